@@ -1,0 +1,30 @@
+/* ih_config - the sizes that every stage shares.
+ *
+ * A limit that belongs to one stage stands in that stage's header; here are only the few that
+ * several stages must agree on. All are compile-time constants, so that the whole state is one
+ * struct of known size and nothing is ever allocated.
+ */
+#ifndef IH_CONFIG_H
+#define IH_CONFIG_H
+
+/* Dots in a row and in a column of the projected pattern (paper, section 2.1: 19x19). */
+#define IH_GRID 19
+/* Slots of the dot table; slot = row * IH_GRID + column. */
+#define IH_SLOTS (IH_GRID * IH_GRID)
+
+/* Frame sizes that are accepted. The widest frame costs IH_FRAME_WIDTH_MAX * 2 * IH_DOTS_ROWS bytes
+ * of row buffer in ih_dots. Range images may be smaller than camera frames. */
+#define IH_FRAME_WIDTH_MIN 320
+#define IH_FRAME_HEIGHT_MIN 240
+#define IH_FRAME_WIDTH_MAX 1280
+#define IH_FRAME_HEIGHT_MAX 800
+#define IH_RANGE_SIDE_MIN 64
+
+/* Working range that a rig may ask for. */
+#define IH_DEPTH_MIN_MM 100
+#define IH_DEPTH_MAX_MM 16000
+
+/* "no such slot, dot or contour" in index fields. */
+#define IH_NONE (-1)
+
+#endif

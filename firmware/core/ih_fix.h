@@ -1,0 +1,83 @@
+/* ih_fix - the only place where numbers change their format.
+ *
+ * A name ending in _qN carries N fraction bits; the C type gives the width. Right shifts round to
+ * nearest, halves upwards (towards plus infinity), on every target alike: a negative value is never
+ * shifted right in a way the C standard leaves open except arithmetic shift, which a static
+ * assertion in ih_fix.c demands.
+ */
+#ifndef IH_FIX_H
+#define IH_FIX_H
+
+#include <stdint.h>
+
+/* value / 2^shift, rounded. shift 0..62; |value| <= 2^63 - 1 - 2^(shift-1). */
+static inline int64_t ih_shift_round(int64_t value, int shift)
+{
+    if (shift == 0) {
+        return value;
+    }
+    return (value + ((int64_t)1 << (shift - 1))) >> shift;
+}
+
+/* a * b / 2^shift, rounded; the product must stay below 2^62. */
+static inline int64_t ih_mul_shift(int64_t a, int64_t b, int shift)
+{
+    return ih_shift_round(a * b, shift);
+}
+
+/* a * b / 2^shift, rounded, where the product may need 95 bits but the result fits 63.
+ * b is not negative; shift 32..62. Done in two 64-bit halves, exact to the last bit. */
+int64_t ih_mul_wide_shift(int64_t a, uint32_t b, int shift);
+
+/* numerator / denominator rounded to nearest, halves away from zero; denominator > 0,
+ * |numerator| + denominator / 2 < 2^63. */
+int64_t ih_div_round(int64_t numerator, int64_t denominator);
+
+/* value limited to the range of int32_t. */
+static inline int32_t ih_saturate_s32(int64_t value)
+{
+    if (value > INT32_MAX) {
+        return INT32_MAX;
+    }
+    if (value < INT32_MIN) {
+        return INT32_MIN;
+    }
+    return (int32_t)value;
+}
+
+static inline int32_t ih_min_s32(int32_t a, int32_t b)
+{
+    return a < b ? a : b;
+}
+
+static inline int32_t ih_max_s32(int32_t a, int32_t b)
+{
+    return a > b ? a : b;
+}
+
+static inline int32_t ih_clamp_s32(int32_t value, int32_t low, int32_t high)
+{
+    return ih_min_s32(ih_max_s32(value, low), high);
+}
+
+static inline int64_t ih_abs_s64(int64_t value)
+{
+    return value < 0 ? -value : value;
+}
+
+static inline int32_t ih_abs_s32(int32_t value)
+{
+    return value < 0 ? -value : value;
+}
+
+/* floor(sqrt(value)), exact for all 2^64 inputs. */
+uint32_t ih_isqrt_u64(uint64_t value);
+
+/* Number of bits needed for value; 0 for 0. */
+int ih_bits_u64(uint64_t value);
+
+/* Angle of (x, y) from +x towards +y in thousandths of a degree, (-180000, 180000]; 0 for (0, 0).
+ * |x|, |y| <= 2^40. Within 2 mdeg of atan2. */
+int32_t ih_atan2_mdeg(int64_t y, int64_t x);
+
+#endif

@@ -1,0 +1,62 @@
+/* ih_heads - which hypotheses are heads? (paper, section 3.3)
+ *
+ * In:    nests.
+ * Out:   candidates in the frame's pixels and in mm, each accepted or with the first test that it
+ *        failed; the accepted ones in order, best first; the selected one.
+ * Tests, none of them in absolute depth:
+ *        area       of the widest slice, in mm^2
+ *        curvature  k = sum(A t) / sum(t^2) over slices at most 70 mm behind the minimum: the
+ *                   growth of the area A with the depth t of the cut, mm^2/mm; and the extent, the
+ *                   depth over which the nest keeps growing
+ *        shape      a head that is longer than wide stands more upright than it lies
+ * Nests whose centres are within merge_mm of a better one are the same thing and are dropped.
+ * The centre of the head's volume lies centre_behind_mm behind the nearest point, on the ray
+ * through the middle of its ellipses.
+ */
+#ifndef IH_HEADS_H
+#define IH_HEADS_H
+
+#include "ih_hypotheses.h"
+
+enum ih_reject { IH_ACCEPTED = 0, IH_REJECT_AREA, IH_REJECT_CURVATURE, IH_REJECT_SHAPE };
+
+struct ih_heads_params {
+    int32_t area_min_mm2, area_max_mm2;
+    int32_t curvature_min_mm, curvature_max_mm; /* mm^2 per mm */
+    int32_t extent_min_mm;
+    int32_t tilt_max_mdeg;     /* of the major axis from vertical, once the ratio is over */
+    int32_t tilt_ratio_q16;    /* this */
+    int32_t merge_mm;
+    int32_t centre_behind_mm;
+};
+
+struct ih_hypothesis {
+    int32_t u_px_q12, v_px_q12;  /* centre of the ellipse in the frame (distorted pixels) */
+    int32_t a_px_q12, b_px_q12;  /* semi-axes, a >= b */
+    int32_t angle_mdeg;          /* of a, from +u towards +v, 0 .. 179999 */
+    int32_t distance_mm_q8;      /* camera's centre to the surface at the ellipse's centre */
+    int32_t centre_mm_q8[3];     /* of the head's volume, camera frame */
+    int32_t area_mm2;            /* of the widest slice */
+    int32_t curvature_mm_q8;
+    int32_t extent_mm_q8;
+    int32_t rejected;            /* enum ih_reject */
+    int32_t nest;                /* index into ih_hypotheses.nest */
+};
+
+struct ih_heads {
+    int32_t hypothesis_count;
+    int32_t head_count;
+    int32_t head[IH_HYPOTHESES_MAX]; /* indices of the accepted ones, best first */
+    struct ih_hypothesis hypothesis[IH_HYPOTHESES_MAX];
+};
+
+void ih_heads_params_default(struct ih_heads_params *params);
+
+void ih_heads_select(const struct ih_hypotheses *hypotheses, const struct ih_surface *surface,
+                     const struct ih_rig *rig, const struct ih_heads_params *params,
+                     struct ih_heads *out);
+
+/* The word that the record uses: "area", "curvature", "shape"; NULL for an accepted one. */
+const char *ih_reject_text(int32_t reject);
+
+#endif

@@ -1,0 +1,70 @@
+/* ih_hypotheses - nests of growing ellipses around the minima of depth (paper, section 3.2).
+ *
+ * In:    the surface.
+ * Out:   per minimum the sequence of ellipses (slices) that supports it.
+ * Way:   every minimum of the grid starts a nest. Levels go from the nearest node back in steps
+ *        of level_step; at each level the contour that winds round the minimum supports the nest:
+ *        whole when it is closed and elliptical, else by its elliptical part. Contours around a
+ *        maximum (shrinking) have negative area and support nothing. A nest ends depth_max behind
+ *        its minimum, when its area falls below 0.6 of the slice before, when it jumps by more
+ *        than 3.2 times and 2500 mm^2 beyond end_depth, or after gap_max levels without support.
+ * Cost:  levels x (cells + minima x contours); the chord search only where no whole ellipse is.
+ * Full tables drop and count: minima_dropped (the farthest), contours_dropped.
+ */
+#ifndef IH_HYPOTHESES_H
+#define IH_HYPOTHESES_H
+
+#include "ih_ellipse.h"
+
+/* Minima that are followed. Each nest costs 16 slices of 48 bytes. */
+#define IH_HYPOTHESES_MAX 16
+#define IH_HYPOTHESES_SLICES_MAX 16
+
+struct ih_hypotheses_params {
+    struct ih_ellipse_params ellipse;
+    int32_t level_step_mm;
+    int32_t levels_behind_mm; /* last level: this far behind the nearest node */
+    int32_t depth_max_mm;     /* a nest reaches this far behind its minimum */
+    int32_t end_depth_mm;     /* from here a jump in area ends the nest */
+    int32_t gap_max;
+};
+
+struct ih_slice {
+    struct ih_ellipse ellipse;
+    int32_t behind_mm_q8; /* depth of the cut behind the minimum */
+    int32_t area_mm2;
+    bool whole; /* a closed contour; false: an elliptical part */
+};
+
+struct ih_nest {
+    struct ih_vertex minimum; /* a node */
+    int32_t nearest_mm_q8;
+    int32_t slice_count;
+    int32_t gap;
+    bool ended;
+    struct ih_slice slice[IH_HYPOTHESES_SLICES_MAX];
+};
+
+struct ih_hypotheses {
+    int32_t nest_count;
+    int32_t minima_dropped, contours_dropped;
+    struct ih_nest nest[IH_HYPOTHESES_MAX];
+};
+
+struct ih_hypotheses_scratch {
+    struct ih_cuts cuts;
+    struct ih_ellipse_scratch ellipse;
+};
+
+void ih_hypotheses_params_default(struct ih_hypotheses_params *params);
+
+void ih_hypotheses_find(const struct ih_surface *surface,
+                        const struct ih_hypotheses_params *params,
+                        struct ih_hypotheses_scratch *scratch, struct ih_hypotheses *out);
+
+/* The depth of level number index for this surface; false beyond the last. For tracing. */
+bool ih_hypotheses_level(const struct ih_surface *surface,
+                         const struct ih_hypotheses_params *params, int32_t index,
+                         int32_t *level_mm_q8);
+
+#endif

@@ -1,0 +1,74 @@
+/* ih_labels - which detected dot is which of the 361? (paper, section 2.3)
+ *
+ * In:    dots, rig.
+ * Out:   the 361-slot table: per slot a dot or IH_NONE; no dot twice.
+ * Way:   1. Candidates: a dot is a candidate of every slot whose epipolar line, in undistorted
+ *           pixels, passes within perp_max of it, in the working range.
+ *        2. Seeds: the four slots of each smallest rectangle of the pattern; a choice of
+ *           candidates is an affine image of it when p00 - p01 - p10 + p11 = 0. Error
+ *           sqrt(|p00 - p01 - p10 + p11|^2 / 4 + 9 (sum of perp^2) / 4); taken when below
+ *           seed_max and no other choice comes within seed_margin.
+ *        3. Growing: a slot with labelled neighbours expects its dot where the affine map of the
+ *           5x5 around it says (weights 1/d^2), or at the depth of one of its 3x3 neighbours;
+ *           error hypot(along, 6 perp) < epsilon; best pairs first. When a pass assigns fewer than
+ *           5, epsilon grows by half, up to epsilon_max.
+ *        4. Check: a label that its neighbours contradict while another candidate agrees with
+ *           them is moved there; wrong seeds on a far wall die here.
+ * Cost:  dots x 361 line tests; growing visits the open slots a few dozen times.
+ * Full tables drop and count: candidates_dropped.
+ */
+#ifndef IH_LABELS_H
+#define IH_LABELS_H
+
+#include "ih_dots.h"
+#include "ih_rig.h"
+
+/* Candidates kept per slot. With a 125 mm baseline a line crosses the places of about ten others. */
+#define IH_LABELS_CANDIDATES_MAX 16
+
+struct ih_labels_params {
+    int32_t perp_max_px_q12;    /* a dot farther from the line than this is not its dot */
+    int32_t seed_max_px_q12;    /* affine error of a seed */
+    int32_t seed_margin_px_q12; /* the next best choice must be worse by this */
+    int32_t epsilon_min_px_q12, epsilon_max_px_q12;
+};
+
+struct ih_labels {
+    int32_t labelled_count;
+    int32_t seed_count; /* slots labelled by seeds */
+    int32_t candidates_dropped;
+    int16_t dot_of_slot[IH_SLOTS]; /* index into ih_dots.dot, or IH_NONE */
+    /* Where the dot is on its line, and how far beside it; valid where a dot is. */
+    int32_t t_px_q12[IH_SLOTS];
+    int16_t perp_px_q12[IH_SLOTS];
+};
+
+struct ih_candidate {
+    int32_t t_px_q12;
+    int32_t inverse_depth_q36; /* 1/mm */
+    int16_t perp_px_q12;
+    int16_t dot;
+};
+
+/* A pair that growing considers. */
+struct ih_labels_offer {
+    int32_t error_px_q12;
+    int16_t slot, candidate;
+};
+
+struct ih_labels_scratch {
+    int32_t u_px_q12[IH_DOTS_MAX], v_px_q12[IH_DOTS_MAX]; /* undistorted */
+    int16_t slot_of_dot[IH_DOTS_MAX];
+    int8_t candidate_count[IH_SLOTS];
+    int8_t choice[IH_SLOTS]; /* candidate taken, or IH_NONE */
+    struct ih_candidate candidate[IH_SLOTS][IH_LABELS_CANDIDATES_MAX];
+    struct ih_labels_offer offer[IH_SLOTS];
+};
+
+void ih_labels_params_default(struct ih_labels_params *params);
+
+void ih_labels_assign(const struct ih_dots *dots, const struct ih_rig *rig,
+                      const struct ih_labels_params *params, struct ih_labels_scratch *scratch,
+                      struct ih_labels *out);
+
+#endif

@@ -1,0 +1,68 @@
+/* isohead - find a person's head in 3-D from one frame of 361 laser dots.
+ *
+ * The whole of isohead behind three calls:
+ *
+ *     static struct isohead head;              // the only memory there is
+ *     isohead_init(&head, &calibration, &bad); // checks the rig once
+ *     isohead_frame(&head, &frame);            // every frame: dots .. heads
+ *     head.heads ...                           // the result; every stage's output is beside it
+ *
+ * The frame is a camera frame for a dot rig, a depth image for a range rig. Integer arithmetic
+ * only; the same frame gives the same bytes on every processor. Not thread-safe per struct; two
+ * structs are independent.
+ *
+ * Method: M. Clabian, H. Roetzer, H. Bischof, W. G. Kropatsch, "Head detection and localization
+ * from sparse 3D data", DAGM 2002. Each stage's header names its section.
+ */
+#ifndef ISOHEAD_H
+#define ISOHEAD_H
+
+#include "ih_heads.h"
+
+#define ISOHEAD_VERSION "0.1.0"
+
+/* RAM for the whole state, the frame itself not included. */
+#define IH_RAM_MAX (512 * 1024)
+
+struct ih_params {
+    struct ih_dots_params dots;
+    struct ih_labels_params labels;
+    struct ih_points_params points;
+    struct ih_samples_params samples;
+    struct ih_surface_params surface;
+    struct ih_hypotheses_params hypotheses;
+    struct ih_heads_params heads;
+};
+
+struct isohead {
+    struct ih_rig rig;
+    struct ih_params params;
+    /* The stages' outputs of the last frame, in order. */
+    struct ih_dots dots;
+    struct ih_labels labels;
+    struct ih_points points;
+    struct ih_samples samples;
+    struct ih_surface surface;
+    struct ih_hypotheses hypotheses;
+    struct ih_heads heads;
+    /* Working memory; stages never run at the same time, so they share it. */
+    union {
+        struct ih_dots_scratch dots;
+        struct ih_labels_scratch labels;
+        struct ih_surface_scratch surface;
+        struct ih_hypotheses_scratch hypotheses;
+    } scratch;
+};
+
+void ih_params_default(struct ih_params *params);
+
+/* Check the calibration, derive the rig, set default parameters. */
+enum ih_err isohead_init(struct isohead *head, const struct ih_calibration *calibration,
+                         int32_t *bad_slot) __attribute__((warn_unused_result));
+
+/* Process one frame. IH_ERR_SIZE when it is not of the rig's size or its view is malformed,
+ * IH_ERR_KIND when its sample size is not the rig's; then the outputs are those of an empty frame. */
+enum ih_err isohead_frame(struct isohead *head, const struct ih_frame *frame)
+    __attribute__((warn_unused_result));
+
+#endif
