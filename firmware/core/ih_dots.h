@@ -37,6 +37,10 @@
 #define IH_DOTS_ROWS (2 * IH_DOTS_REACH + 1)
 /* One 12-bit grey level in units of R. */
 #define IH_DOTS_RESPONSE_UNIT 1296
+/* The noise is measured to 1/16 of a 12-bit grey level, up to 16 8-bit grey levels. */
+#define IH_DOTS_NOISE_BIN (IH_DOTS_RESPONSE_UNIT / 16)
+#define IH_DOTS_NOISE_BINS 4096
+#define IH_DOTS_NOISE_STEP 8
 /* Side of the blocks of the over-exposure map. */
 #define IH_DOTS_BLOCK 8
 #define IH_DOTS_BLOCKS_X (IH_FRAME_WIDTH_MAX / IH_DOTS_BLOCK)
@@ -81,8 +85,12 @@ struct ih_dots_run {
 };
 
 struct ih_dots_scratch {
-    int32_t width, height, rows_in, rows_out;
+    uint16_t noise_histogram[IH_DOTS_NOISE_BINS];
+    int32_t width, height;
+    int32_t rows_in; /* pushed into the ring, repeated border rows included */
     struct ih_dots_params params;
+    int32_t block_rows; /* rows in block_sum */
+    uint16_t incoming_q4[IH_FRAME_WIDTH_MAX];           /* the newest row */
     uint16_t grey_q4[IH_DOTS_ROWS][IH_FRAME_WIDTH_MAX]; /* ring of rows */
     uint32_t column_sum[IH_FRAME_WIDTH_MAX];            /* of the ring, for the outer box */
     uint32_t block_sum[IH_DOTS_BLOCKS_X];
@@ -95,22 +103,22 @@ struct ih_dots_scratch {
 
 void ih_dots_params_default(struct ih_dots_params *params);
 
-/* Median of |R| over every 8th pixel of every 8th row, in units of R. The frame's noise. */
-int32_t ih_dots_noise(const struct ih_frame *frame);
+/* Median of |R| over every 8th pixel of every 8th row, in units of R: the frame's noise. Rounded
+ * up to a multiple of IH_DOTS_NOISE_BIN; at most IH_DOTS_NOISE_BINS of them. */
+int32_t ih_dots_noise(const struct ih_frame *frame, struct ih_dots_scratch *scratch);
 
 /* Rows as they come: begin, then row height times, then end. noise as from ih_dots_noise, of this
  * frame or of the last one. */
-enum ih_err ih_dots_begin(struct ih_dots_scratch *scratch, struct ih_dots *out,
-                          const struct ih_dots_params *params, int32_t width, int32_t height,
-                          int32_t noise) __attribute__((warn_unused_result));
-void ih_dots_row(struct ih_dots_scratch *scratch, struct ih_dots *out,
-                 const struct ih_frame *frame, int32_t row);
+void ih_dots_begin(struct ih_dots_scratch *scratch, struct ih_dots *out,
+                   const struct ih_dots_params *params, int32_t width, int32_t height,
+                   int32_t noise);
+void ih_dots_row(struct ih_dots_scratch *scratch, struct ih_dots *out, const void *samples,
+                 int32_t bytes_per_sample, int32_t maximum);
 void ih_dots_end(struct ih_dots_scratch *scratch, struct ih_dots *out);
 
-/* The whole frame in one call: noise, begin, rows, end. */
-enum ih_err ih_dots_find(const struct ih_frame *frame, const struct ih_dots_params *params,
-                         struct ih_dots_scratch *scratch, struct ih_dots *out)
-    __attribute__((warn_unused_result));
+/* The whole frame in one call: noise, begin, rows, end. The frame's view has been checked. */
+void ih_dots_find(const struct ih_frame *frame, const struct ih_dots_params *params,
+                  struct ih_dots_scratch *scratch, struct ih_dots *out);
 
 /* Is the frame's block at this pixel over-exposed? Outside the frame: false. */
 bool ih_dots_is_bright(const struct ih_dots *dots, int32_t u_px, int32_t v_px);

@@ -50,10 +50,12 @@ struct ih_candidate {
     int16_t dot;
 };
 
-/* A pair that growing considers. */
+/* Something that may be assigned: a rectangle of four slots while seeding (slot is its first
+ * corner), one slot while growing (choice[0] alone is used). */
 struct ih_labels_offer {
     int32_t error_px_q12;
-    int16_t slot, candidate;
+    int16_t slot;
+    int8_t choice[4]; /* candidates */
 };
 
 struct ih_labels_scratch {

@@ -9,8 +9,9 @@
 enum ih_err {
     IH_OK = 0,
     IH_ERR_SIZE = -1,         /* a width, height, stride or maximum that is out of bounds */
-    IH_ERR_FOCAL = -2,        /* focal length not positive or out of bounds */
-    IH_ERR_PRINCIPAL = -3,    /* principal point far outside the frame */
+    IH_ERR_FOCAL = -2,        /* focal length not positive or above IH_RIG_FOCAL_MAX_PX */
+    IH_ERR_PRINCIPAL = -3,    /* with this focal length and principal point, the frame's border is
+                                 seen at more than IH_RIG_TAN_MAX from the optical axis */
     IH_ERR_DISTORTION = -4,   /* distortion that cannot be undone everywhere in the frame */
     IH_ERR_RANGE = -5,        /* near and far out of order or out of bounds */
     IH_ERR_BASELINE = -6,     /* projector origin on the camera's centre, or too far away */

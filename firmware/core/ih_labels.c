@@ -1,0 +1,384 @@
+#include "ih_labels.h"
+
+#include <string.h>
+
+#include "ih_fix.h"
+
+/* A dot's centre may be off by this along the line and still belong to the working range. */
+#define RANGE_MARGIN_PX_Q12 2048
+/* Growing raises epsilon when a pass assigned fewer than this (paper, section 2.3). */
+#define FEW_ASSIGNED 5
+#define PERP_WEIGHT 6
+/* No affine error can reach this: wider than any frame. */
+#define ERROR_NONE_PX_Q12 INT32_MAX
+
+void ih_labels_params_default(struct ih_labels_params *params)
+{
+    *params = (struct ih_labels_params){
+        .perp_max_px_q12 = 2458,    /* 0.6 px */
+        .seed_max_px_q12 = 4096,    /* 1.0 px */
+        .seed_margin_px_q12 = 2048, /* 0.5 px */
+        .epsilon_min_px_q12 = 6144, /* 1.5 px */
+        .epsilon_max_px_q12 = 40 * 4096,
+    };
+}
+
+static void undistort_dots(const struct ih_dots *dots, const struct ih_rig *rig,
+                           struct ih_labels_scratch *scratch)
+{
+    const struct ih_calibration *c = &rig->calibration;
+    for (int32_t i = 0; i < dots->dot_count; i++) {
+        int32_t x_q28, y_q28;
+        ih_rig_undistort(rig, dots->dot[i].u_px_q12, dots->dot[i].v_px_q12, &x_q28, &y_q28);
+        scratch->u_px_q12[i] =
+            (int32_t)(ih_mul_shift(x_q28, c->fx_px_q16, 32) + ih_shift_round(c->cx_px_q16, 4));
+        scratch->v_px_q12[i] =
+            (int32_t)(ih_mul_shift(y_q28, c->fy_px_q16, 32) + ih_shift_round(c->cy_px_q16, 4));
+        scratch->slot_of_dot[i] = IH_NONE;
+    }
+}
+
+/* Candidates of one slot. Coordinates below 2^26 in Q12 times a Q30 unit vector: below 2^57. */
+static void find_candidates(const struct ih_dots *dots, const struct ih_line *line, int32_t slot,
+                            const struct ih_labels_params *params,
+                            struct ih_labels_scratch *scratch, struct ih_labels *out)
+{
+    int8_t count = 0;
+    for (int32_t i = 0; i < dots->dot_count; i++) {
+        int64_t du = scratch->u_px_q12[i] - line->infinity_u_px_q12;
+        int64_t dv = scratch->v_px_q12[i] - line->infinity_v_px_q12;
+        int64_t perp = ih_shift_round(dv * line->dir_u_q30 - du * line->dir_v_q30, 30);
+        int64_t t = ih_shift_round(du * line->dir_u_q30 + dv * line->dir_v_q30, 30);
+        if (ih_abs_s64(perp) > params->perp_max_px_q12 ||
+            t < line->t_far_px_q12 - RANGE_MARGIN_PX_Q12 ||
+            t > line->t_near_px_q12 + RANGE_MARGIN_PX_Q12 || t <= 0) {
+            continue;
+        }
+        if (count == IH_LABELS_CANDIDATES_MAX) {
+            out->candidates_dropped++;
+            continue;
+        }
+        scratch->candidate[slot][count++] = (struct ih_candidate){
+            .t_px_q12 = (int32_t)t,
+            /* t in Q12 over length in Q8: 36 + 8 - 12 = 32 more bits give Q36 */
+            .inverse_depth_q36 =
+                ih_saturate_s32(ih_div_round(t * ((int64_t)1 << 32), line->length_px_mm_q8)),
+            .perp_px_q12 = (int16_t)perp,
+            .dot = (int16_t)i,
+        };
+    }
+    scratch->candidate_count[slot] = count;
+    scratch->choice[slot] = IH_NONE;
+}
+
+static const struct ih_candidate *candidate_of(const struct ih_labels_scratch *scratch,
+                                               int32_t slot, int32_t choice)
+{
+    return &scratch->candidate[slot][choice];
+}
+
+/* sqrt(|p00 - p01 - p10 + p11|^2 / 4 + 9 (sum of perp^2) / 4) */
+static int32_t rectangle_error(const struct ih_labels_scratch *scratch,
+                               const struct ih_candidate *const corner[4])
+{
+    int64_t u = 0;
+    int64_t v = 0;
+    int64_t perp2 = 0;
+    for (int i = 0; i < 4; i++) {
+        int64_t sign = i == 0 || i == 3 ? 1 : -1;
+        u += sign * scratch->u_px_q12[corner[i]->dot];
+        v += sign * scratch->v_px_q12[corner[i]->dot];
+        perp2 += (int64_t)corner[i]->perp_px_q12 * corner[i]->perp_px_q12;
+    }
+    return (int32_t)ih_isqrt_u64((uint64_t)((u * u + v * v + 9 * perp2) / 4));
+}
+
+/* The best choice of candidates for the rectangle whose first corner is slot. False when there is
+ * none below the limit, or when another choice is nearly as good. */
+static bool find_seed(const struct ih_labels_scratch *scratch, const int32_t slot[4],
+                      const struct ih_labels_params *params, struct ih_labels_offer *out)
+{
+    int32_t best = ERROR_NONE_PX_Q12;
+    int32_t second = ERROR_NONE_PX_Q12;
+    int8_t i[4];
+    for (i[0] = 0; i[0] < scratch->candidate_count[slot[0]]; i[0]++) {
+        for (i[1] = 0; i[1] < scratch->candidate_count[slot[1]]; i[1]++) {
+            for (i[2] = 0; i[2] < scratch->candidate_count[slot[2]]; i[2]++) {
+                for (i[3] = 0; i[3] < scratch->candidate_count[slot[3]]; i[3]++) {
+                    const struct ih_candidate *corner[4];
+                    for (int k = 0; k < 4; k++) {
+                        corner[k] = candidate_of(scratch, slot[k], i[k]);
+                    }
+                    int32_t error = rectangle_error(scratch, corner);
+                    if (error < best) {
+                        second = best;
+                        best = error;
+                        memcpy(out->choice, i, sizeof i);
+                    } else if (error < second) {
+                        second = error;
+                    }
+                }
+            }
+        }
+    }
+    out->error_px_q12 = best;
+    return best < params->seed_max_px_q12 && second - best > params->seed_margin_px_q12;
+}
+
+/* Shell sort by error, then slot: the order of equal errors must not depend on anything else. */
+static bool offer_before(const struct ih_labels_offer *a, const struct ih_labels_offer *b)
+{
+    return a->error_px_q12 != b->error_px_q12 ? a->error_px_q12 < b->error_px_q12
+                                              : a->slot < b->slot;
+}
+
+static void sort_offers(struct ih_labels_offer *offer, int32_t count)
+{
+    static const int32_t gaps[] = {132, 57, 23, 10, 4, 1};
+    for (size_t g = 0; g < sizeof gaps / sizeof gaps[0]; g++) {
+        int32_t gap = gaps[g];
+        for (int32_t i = gap; i < count; i++) {
+            struct ih_labels_offer moved = offer[i];
+            int32_t at = i;
+            while (at >= gap && offer_before(&moved, &offer[at - gap])) {
+                offer[at] = offer[at - gap];
+                at -= gap;
+            }
+            offer[at] = moved;
+        }
+    }
+}
+
+static bool can_assign(const struct ih_labels_scratch *scratch, int32_t slot, int8_t choice)
+{
+    if (scratch->choice[slot] != IH_NONE) {
+        return scratch->choice[slot] == choice;
+    }
+    return scratch->slot_of_dot[candidate_of(scratch, slot, choice)->dot] == IH_NONE;
+}
+
+static void assign(struct ih_labels_scratch *scratch, int32_t slot, int8_t choice)
+{
+    scratch->choice[slot] = choice;
+    scratch->slot_of_dot[candidate_of(scratch, slot, choice)->dot] = (int16_t)slot;
+}
+
+static void rectangle_slots(int32_t first, int32_t slot[4])
+{
+    slot[0] = first;
+    slot[1] = first + 1;
+    slot[2] = first + IH_GRID;
+    slot[3] = first + IH_GRID + 1;
+}
+
+static void seed(const struct ih_labels_params *params, struct ih_labels_scratch *scratch)
+{
+    int32_t count = 0;
+    for (int32_t first = 0; first < IH_SLOTS - IH_GRID - 1; first++) {
+        int32_t slot[4];
+        rectangle_slots(first, slot);
+        if (first % IH_GRID != IH_GRID - 1 &&
+            find_seed(scratch, slot, params, &scratch->offer[count])) {
+            scratch->offer[count++].slot = (int16_t)first;
+        }
+    }
+    sort_offers(scratch->offer, count);
+    for (int32_t i = 0; i < count; i++) {
+        const struct ih_labels_offer *offer = &scratch->offer[i];
+        int32_t slot[4];
+        rectangle_slots(offer->slot, slot);
+        bool free = true;
+        for (int k = 0; k < 4; k++) {
+            free = free && can_assign(scratch, slot[k], offer->choice[k]);
+        }
+        for (int k = 0; free && k < 4; k++) {
+            assign(scratch, slot[k], offer->choice[k]);
+        }
+    }
+}
+
+static bool labelled_inverse_depth(const struct ih_labels_scratch *scratch, int32_t row,
+                                   int32_t column, int32_t *inverse_depth_q36)
+{
+    if (row < 0 || column < 0 || row >= IH_GRID || column >= IH_GRID) {
+        return false;
+    }
+    int32_t slot = row * IH_GRID + column;
+    if (scratch->choice[slot] == IH_NONE) {
+        return false;
+    }
+    *inverse_depth_q36 = candidate_of(scratch, slot, scratch->choice[slot])->inverse_depth_q36;
+    return true;
+}
+
+/* What the neighbours of a slot expect of it. */
+struct expectation {
+    int32_t count;        /* values of inverse depth, 1/mm */
+    int32_t value_q36[9]; /* of the up to 8 nearest neighbours, and of the affine map */
+};
+
+/* The affine map of inverse depth over the labelled slots of the 5x5 around (row, column),
+ * evaluated in its middle: for planes 1/Z is affine in the image. Weights 40 / d^2, so that they
+ * are whole. Sums: weights 364 in all, second order at most 480, inverse depths below 2^31: the
+ * three products below 2^(9 + 31 + 18) each. */
+static bool affine_expectation(const struct ih_labels_scratch *scratch, int32_t row, int32_t column,
+                               int32_t *value_q36)
+{
+    static const int8_t weight_of_d2[9] = {0, 40, 20, 0, 10, 8, 0, 0, 5};
+    int64_t s = 0, sx = 0, sy = 0, sxx = 0, sxy = 0, syy = 0, sq = 0, sxq = 0, syq = 0;
+    for (int32_t dy = -2; dy <= 2; dy++) {
+        for (int32_t dx = -2; dx <= 2; dx++) {
+            int32_t q;
+            if ((dx == 0 && dy == 0) ||
+                !labelled_inverse_depth(scratch, row + dy, column + dx, &q)) {
+                continue;
+            }
+            int64_t w = weight_of_d2[dx * dx + dy * dy];
+            s += w;
+            sx += w * dx;
+            sy += w * dy;
+            sxx += w * dx * dx;
+            sxy += w * dx * dy;
+            syy += w * dy * dy;
+            sq += w * q;
+            sxq += w * dx * q;
+            syq += w * dy * q;
+        }
+    }
+    int64_t c0 = sxx * syy - sxy * sxy;
+    int64_t c1 = sxy * sy - sx * syy;
+    int64_t c2 = sx * sxy - sxx * sy;
+    int64_t determinant = s * c0 + sx * c1 + sy * c2;
+    if (determinant <= 0) { /* fewer than three, or all on one line */
+        return false;
+    }
+    *value_q36 = ih_saturate_s32(ih_div_round(sq * c0 + sxq * c1 + syq * c2, determinant));
+    return true;
+}
+
+static void expect(const struct ih_labels_scratch *scratch, int32_t slot, struct expectation *out)
+{
+    int32_t row = slot / IH_GRID;
+    int32_t column = slot % IH_GRID;
+    out->count = 0;
+    for (int32_t dy = -1; dy <= 1; dy++) {
+        for (int32_t dx = -1; dx <= 1; dx++) {
+            if ((dx != 0 || dy != 0) && labelled_inverse_depth(scratch, row + dy, column + dx,
+                                                               &out->value_q36[out->count])) {
+                out->count++;
+            }
+        }
+    }
+    if (affine_expectation(scratch, row, column, &out->value_q36[out->count])) {
+        out->count++;
+    }
+}
+
+/* hypot(along, 6 perp) against the expectation that suits the candidate best. */
+static int32_t growth_error(const struct ih_candidate *candidate, const struct expectation *expected,
+                            int32_t length_px_mm_q8)
+{
+    int64_t off_q36 = INT32_MAX;
+    for (int32_t i = 0; i < expected->count; i++) {
+        int64_t difference =
+            ih_abs_s64((int64_t)candidate->inverse_depth_q36 - expected->value_q36[i]);
+        off_q36 = difference < off_q36 ? difference : off_q36;
+    }
+    int64_t along = ih_mul_shift(off_q36, length_px_mm_q8, 32); /* Q36 Q8 -> Q12 */
+    int64_t perp = (int64_t)PERP_WEIGHT * candidate->perp_px_q12;
+    along = along > (1 << 28) ? 1 << 28 : along;
+    return (int32_t)ih_isqrt_u64((uint64_t)(along * along + perp * perp));
+}
+
+/* The best free candidate of an open slot; false when none is below epsilon. */
+static bool find_offer(const struct ih_labels_scratch *scratch, const struct ih_rig *rig,
+                       int32_t slot, int32_t epsilon_px_q12, struct ih_labels_offer *out)
+{
+    struct expectation expected;
+    expect(scratch, slot, &expected);
+    out->error_px_q12 = epsilon_px_q12;
+    out->slot = (int16_t)slot;
+    bool found = false;
+    for (int8_t i = 0; expected.count > 0 && i < scratch->candidate_count[slot]; i++) {
+        const struct ih_candidate *candidate = candidate_of(scratch, slot, i);
+        if (scratch->slot_of_dot[candidate->dot] != IH_NONE) {
+            continue;
+        }
+        int32_t error = growth_error(candidate, &expected, rig->line[slot].length_px_mm_q8);
+        if (error < out->error_px_q12) {
+            out->error_px_q12 = error;
+            out->choice[0] = i;
+            found = true;
+        }
+    }
+    return found;
+}
+
+/* One pass over all open slots; returns how many were labelled. */
+static int32_t grow_once(const struct ih_rig *rig, struct ih_labels_scratch *scratch,
+                         int32_t epsilon_px_q12)
+{
+    int32_t count = 0;
+    for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
+        if (scratch->choice[slot] == IH_NONE &&
+            find_offer(scratch, rig, slot, epsilon_px_q12, &scratch->offer[count])) {
+            count++;
+        }
+    }
+    sort_offers(scratch->offer, count);
+    int32_t assigned = 0;
+    for (int32_t i = 0; i < count; i++) {
+        const struct ih_labels_offer *offer = &scratch->offer[i];
+        if (can_assign(scratch, offer->slot, offer->choice[0])) {
+            assign(scratch, offer->slot, offer->choice[0]);
+            assigned++;
+        }
+    }
+    return assigned;
+}
+
+static void grow(const struct ih_rig *rig, const struct ih_labels_params *params,
+                 struct ih_labels_scratch *scratch)
+{
+    int32_t epsilon = params->epsilon_min_px_q12;
+    while (epsilon <= params->epsilon_max_px_q12) {
+        if (grow_once(rig, scratch, epsilon) < FEW_ASSIGNED) {
+            epsilon += epsilon / 2;
+        }
+    }
+}
+
+static void write_table(const struct ih_labels_scratch *scratch, struct ih_labels *out)
+{
+    out->labelled_count = 0;
+    for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
+        out->dot_of_slot[slot] = IH_NONE;
+        out->t_px_q12[slot] = 0;
+        out->perp_px_q12[slot] = 0;
+        if (scratch->choice[slot] != IH_NONE) {
+            const struct ih_candidate *c = candidate_of(scratch, slot, scratch->choice[slot]);
+            out->dot_of_slot[slot] = c->dot;
+            out->t_px_q12[slot] = c->t_px_q12;
+            out->perp_px_q12[slot] = c->perp_px_q12;
+            out->labelled_count++;
+        }
+    }
+}
+
+void ih_labels_assign(const struct ih_dots *dots, const struct ih_rig *rig,
+                      const struct ih_labels_params *params, struct ih_labels_scratch *scratch,
+                      struct ih_labels *out)
+{
+    out->candidates_dropped = 0;
+    undistort_dots(dots, rig, scratch);
+    for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
+        find_candidates(dots, &rig->line[slot], slot, params, scratch, out);
+    }
+    seed(params, scratch);
+    out->seed_count = 0;
+    for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
+        out->seed_count += scratch->choice[slot] != IH_NONE;
+    }
+    grow(rig, params, scratch);
+    write_table(scratch, out);
+}

@@ -1,0 +1,296 @@
+#include "ih_rig.h"
+
+#include "ih_fix.h"
+
+/* Depth in whose place the middle dot marks the middle of the surface: where a person sits. */
+#define FIELD_DEPTH_MM 900
+#define ONE_Q28 ((int64_t)1 << 28)
+#define UNDISTORT_STEPS 24
+/* Probes of the lens along each side of the frame, and how well they must come back. */
+#define LENS_PROBES 17
+#define LENS_ERROR_MAX_PX_Q12 82 /* 0.02 px */
+/* Rays steeper than this against the optical axis are no camera's business. */
+#define RAY_FORWARD_MIN_Q30 (1 << 28)
+#define RAY_LENGTH_TOLERANCE_Q30 (1 << 16) /* 6e-5 */
+
+static int64_t product_q28(int64_t a_q28, int64_t b_q28)
+{
+    return ih_mul_shift(a_q28, b_q28, 28);
+}
+
+/* OpenCV's Brown model. |x|, |y| <= 2: r2 <= 8, and with |k| < 128 every term is below
+ * 128 * 512 = 2^16, in Q28 2^44; products with x stay below 2^46. */
+static void brown(const struct ih_calibration *c, int64_t x_q28, int64_t y_q28, int64_t *radial_q28,
+                  int64_t *dx_q28, int64_t *dy_q28)
+{
+    int64_t xx = product_q28(x_q28, x_q28);
+    int64_t yy = product_q28(y_q28, y_q28);
+    int64_t xy = product_q28(x_q28, y_q28);
+    int64_t r2 = xx + yy;
+    int64_t r4 = product_q28(r2, r2);
+    int64_t r6 = product_q28(r4, r2);
+    *radial_q28 = ONE_Q28 + ih_mul_shift(r2, c->k1_q24, 24) + ih_mul_shift(r4, c->k2_q24, 24) +
+                  ih_mul_shift(r6, c->k3_q24, 24);
+    *dx_q28 = ih_mul_shift(2 * xy, c->p1_q24, 24) + ih_mul_shift(r2 + 2 * xx, c->p2_q24, 24);
+    *dy_q28 = ih_mul_shift(r2 + 2 * yy, c->p1_q24, 24) + ih_mul_shift(2 * xy, c->p2_q24, 24);
+}
+
+static int32_t limit_tan_q28(int64_t value_q28)
+{
+    int64_t limit = IH_RIG_TAN_MAX * ONE_Q28;
+    return (int32_t)(value_q28 > limit ? limit : value_q28 < -limit ? -limit : value_q28);
+}
+
+void ih_rig_undistort(const struct ih_rig *rig, int32_t u_px_q12, int32_t v_px_q12, int32_t *x_q28,
+                      int32_t *y_q28)
+{
+    const struct ih_calibration *c = &rig->calibration;
+    int64_t xd = limit_tan_q28(
+        ih_div_round(((int64_t)u_px_q12 * 16 - c->cx_px_q16) * ONE_Q28, c->fx_px_q16));
+    int64_t yd = limit_tan_q28(
+        ih_div_round(((int64_t)v_px_q12 * 16 - c->cy_px_q16) * ONE_Q28, c->fy_px_q16));
+    int64_t x = xd;
+    int64_t y = yd;
+    /* Fixed-point iteration x <- (xd - dx(x)) / radial(x); each step gains a factor of about the
+     * distortion itself. It stops when nothing moves any more. */
+    for (int i = 0; i < UNDISTORT_STEPS; i++) {
+        int64_t radial, dx, dy;
+        brown(c, x, y, &radial, &dx, &dy);
+        if (radial < ONE_Q28 / 8) {
+            radial = ONE_Q28 / 8;
+        }
+        int64_t next_x = limit_tan_q28(ih_div_round((xd - dx) * ONE_Q28, radial));
+        int64_t next_y = limit_tan_q28(ih_div_round((yd - dy) * ONE_Q28, radial));
+        bool still = next_x == x && next_y == y;
+        x = next_x;
+        y = next_y;
+        if (still) {
+            break;
+        }
+    }
+    *x_q28 = (int32_t)x;
+    *y_q28 = (int32_t)y;
+}
+
+void ih_rig_distort(const struct ih_rig *rig, int32_t x_q28, int32_t y_q28, int32_t *u_px_q12,
+                    int32_t *v_px_q12)
+{
+    const struct ih_calibration *c = &rig->calibration;
+    int64_t x = limit_tan_q28(x_q28);
+    int64_t y = limit_tan_q28(y_q28);
+    int64_t radial, dx, dy;
+    brown(c, x, y, &radial, &dx, &dy);
+    /* Far outside the frame a strong lens can go anywhere: keep the result in the format. */
+    int64_t xd = limit_tan_q28(ih_clamp_s32(ih_saturate_s32(product_q28(x, radial) + dx), -(1 << 30),
+                                            1 << 30));
+    int64_t yd = limit_tan_q28(ih_clamp_s32(ih_saturate_s32(product_q28(y, radial) + dy), -(1 << 30),
+                                            1 << 30));
+    *u_px_q12 = (int32_t)(ih_mul_shift(xd, c->fx_px_q16, 32) + ih_shift_round(c->cx_px_q16, 4));
+    *v_px_q12 = (int32_t)(ih_mul_shift(yd, c->fy_px_q16, 32) + ih_shift_round(c->cy_px_q16, 4));
+}
+
+bool ih_rig_inside(const struct ih_rig *rig, int32_t u_px_q12, int32_t v_px_q12)
+{
+    const struct ih_calibration *c = &rig->calibration;
+    return u_px_q12 >= 0 && v_px_q12 >= 0 && u_px_q12 <= (c->width - 1) * 4096 &&
+           v_px_q12 <= (c->height - 1) * 4096;
+}
+
+/* tan of the ray and its offset O - Oz r/rz: X/Z = tan + offset / Z. */
+static void ray_line(const struct ih_calibration *c, int32_t slot, int axis, int64_t *tan_q30,
+                     int64_t *offset_mm_q16)
+{
+    const int32_t *ray = c->ray_q30[slot];
+    *tan_q30 = ih_div_round((int64_t)ray[axis] * ((int64_t)1 << 30), ray[2]);
+    *offset_mm_q16 = c->origin_mm_q16[axis] - ih_mul_shift(c->origin_mm_q16[2], *tan_q30, 30);
+}
+
+void ih_rig_dot_at(const struct ih_rig *rig, int32_t slot, int32_t depth_mm_q8, int32_t *x_q28,
+                   int32_t *y_q28)
+{
+    int32_t *out[2] = {x_q28, y_q28};
+    for (int axis = 0; axis < 2; axis++) {
+        int64_t tan_q30, offset_mm_q16;
+        ray_line(&rig->calibration, slot, axis, &tan_q30, &offset_mm_q16);
+        /* offset below 2^11 mm in Q16, times 2^20: below 2^47; a quotient in Q28. */
+        int64_t shift_q28 = ih_div_round(offset_mm_q16 * (1 << 20), depth_mm_q8);
+        *out[axis] = limit_tan_q28(ih_shift_round(tan_q30, 2) + shift_q28);
+    }
+}
+
+/* Are both ends of a side within the widest angle? The principal point itself may lie outside the
+ * frame: a range image may be cropped. */
+static bool side_in_view(int32_t side_px, int32_t principal_px_q16, int32_t focal_px_q16)
+{
+    int64_t limit_q16 = (int64_t)IH_RIG_TAN_MAX * focal_px_q16;
+    return principal_px_q16 <= limit_q16 &&
+           (int64_t)side_px * 65536 - principal_px_q16 <= limit_q16;
+}
+
+static enum ih_err check_camera(const struct ih_calibration *c)
+{
+    bool range = c->kind == IH_RIG_RANGE;
+    if (!range && c->kind != IH_RIG_DOTS) {
+        return IH_ERR_KIND;
+    }
+    if (c->width > IH_FRAME_WIDTH_MAX || c->height > (range ? IH_FRAME_WIDTH_MAX : IH_FRAME_HEIGHT_MAX) ||
+        c->width < (range ? IH_RANGE_SIDE_MIN : IH_FRAME_WIDTH_MIN) ||
+        c->height < (range ? IH_RANGE_SIDE_MIN : IH_FRAME_HEIGHT_MIN)) {
+        return IH_ERR_SIZE;
+    }
+    int32_t focal_max = IH_RIG_FOCAL_MAX_PX << 16;
+    if (c->fx_px_q16 <= 0 || c->fy_px_q16 <= 0 || c->fx_px_q16 > focal_max ||
+        c->fy_px_q16 > focal_max) {
+        return IH_ERR_FOCAL;
+    }
+    if (!side_in_view(c->width, c->cx_px_q16, c->fx_px_q16) ||
+        !side_in_view(c->height, c->cy_px_q16, c->fy_px_q16)) {
+        return IH_ERR_PRINCIPAL;
+    }
+    if (c->near_mm < IH_DEPTH_MIN_MM || c->far_mm > IH_DEPTH_MAX_MM || c->near_mm >= c->far_mm) {
+        return IH_ERR_RANGE;
+    }
+    return IH_OK;
+}
+
+/* Undistort and distort again over the whole frame: what does not come back cannot be measured. */
+static enum ih_err check_lens(const struct ih_rig *rig)
+{
+    const struct ih_calibration *c = &rig->calibration;
+    for (int32_t row = 0; row < LENS_PROBES; row++) {
+        for (int32_t column = 0; column < LENS_PROBES; column++) {
+            int32_t u = (c->width - 1) * 4096 / (LENS_PROBES - 1) * column;
+            int32_t v = (c->height - 1) * 4096 / (LENS_PROBES - 1) * row;
+            int32_t x, y, back_u, back_v;
+            ih_rig_undistort(rig, u, v, &x, &y);
+            ih_rig_distort(rig, x, y, &back_u, &back_v);
+            if (ih_abs_s32(back_u - u) > LENS_ERROR_MAX_PX_Q12 ||
+                ih_abs_s32(back_v - v) > LENS_ERROR_MAX_PX_Q12) {
+                return IH_ERR_DISTORTION;
+            }
+        }
+    }
+    return IH_OK;
+}
+
+static enum ih_err check_projector(const struct ih_calibration *c, int32_t *bad_slot)
+{
+    for (int axis = 0; axis < 3; axis++) {
+        if (ih_abs_s64(c->origin_mm_q16[axis]) > (int64_t)IH_RIG_BASELINE_MAX_MM << 16) {
+            return IH_ERR_BASELINE;
+        }
+    }
+    for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
+        const int32_t *ray = c->ray_q30[slot];
+        int64_t length2_q58 = 0;
+        for (int axis = 0; axis < 3; axis++) {
+            int64_t part = ih_abs_s64(ray[axis]) >> 1;
+            length2_q58 += part * part; /* each below 2^60 */
+        }
+        int64_t length_q30 = 2 * (int64_t)ih_isqrt_u64((uint64_t)length2_q58);
+        if (ray[2] < RAY_FORWARD_MIN_Q30 ||
+            ih_abs_s64(length_q30 - ((int64_t)1 << 30)) > RAY_LENGTH_TOLERANCE_Q30) {
+            *bad_slot = slot;
+            return IH_ERR_RAY;
+        }
+    }
+    return IH_OK;
+}
+
+static int32_t shift_at_depth_px_q12(int32_t length_px_mm_q8, int32_t depth_mm)
+{
+    return (int32_t)ih_div_round((int64_t)length_px_mm_q8 << 4, depth_mm);
+}
+
+/* False when the projector sits on the camera's centre: the dot does not move with depth. */
+static bool fill_line(struct ih_rig *rig, int32_t slot)
+{
+    const struct ih_calibration *c = &rig->calibration;
+    struct ih_line *line = &rig->line[slot];
+    int64_t tan_q30[2], offset_mm_q16[2];
+    ray_line(c, slot, 0, &tan_q30[0], &offset_mm_q16[0]);
+    ray_line(c, slot, 1, &tan_q30[1], &offset_mm_q16[1]);
+
+    /* tan below 4 in Q30, focal below 2^29 in Q16: products below 2^61. */
+    line->infinity_u_px_q12 = (int32_t)(ih_mul_shift(tan_q30[0], c->fx_px_q16, 34) +
+                                        ih_shift_round(c->cx_px_q16, 4));
+    line->infinity_v_px_q12 = (int32_t)(ih_mul_shift(tan_q30[1], c->fy_px_q16, 34) +
+                                        ih_shift_round(c->cy_px_q16, 4));
+
+    /* e = focal * offset: below 2^13 px * 5000 mm = 2^26; in Q8, its square below 2^69: use Q4 less
+     * for the length's square and take the root in Q8 from Q16. */
+    int64_t e_u_q8 = ih_mul_shift(c->fx_px_q16, offset_mm_q16[0], 24);
+    int64_t e_v_q8 = ih_mul_shift(c->fy_px_q16, offset_mm_q16[1], 24);
+    if (ih_abs_s64(e_u_q8) >= (int64_t)1 << 30 || ih_abs_s64(e_v_q8) >= (int64_t)1 << 30) {
+        return false;
+    }
+    uint64_t length2_q16 = (uint64_t)(e_u_q8 * e_u_q8) + (uint64_t)(e_v_q8 * e_v_q8);
+    int64_t length_q8 = ih_isqrt_u64(length2_q16);
+    if (length_q8 < (int64_t)100 << 8) { /* 100 px mm: a tenth of a pixel at a metre */
+        return false;
+    }
+    line->length_px_mm_q8 = (int32_t)length_q8;
+    line->dir_u_q30 = (int32_t)ih_div_round(e_u_q8 * ((int64_t)1 << 30), length_q8);
+    line->dir_v_q30 = (int32_t)ih_div_round(e_v_q8 * ((int64_t)1 << 30), length_q8);
+    line->t_far_px_q12 = shift_at_depth_px_q12(line->length_px_mm_q8, c->far_mm);
+    line->t_near_px_q12 = shift_at_depth_px_q12(line->length_px_mm_q8, c->near_mm);
+
+    int32_t x, y;
+    ih_rig_dot_at(rig, slot, c->far_mm << 8, &x, &y);
+    ih_rig_distort(rig, x, y, &line->far_u_px_q12, &line->far_v_px_q12);
+    ih_rig_dot_at(rig, slot, c->near_mm << 8, &x, &y);
+    ih_rig_distort(rig, x, y, &line->near_u_px_q12, &line->near_v_px_q12);
+    return true;
+}
+
+/* Mean distance of the pattern's columns and rows in normalised coordinates, halved: the unit. */
+static void fill_field(struct ih_rig *rig)
+{
+    const struct ih_calibration *c = &rig->calibration;
+    const int32_t ends[4][2] = {{0, IH_GRID - 1},
+                                {IH_SLOTS - IH_GRID, IH_SLOTS - 1},
+                                {0, IH_SLOTS - IH_GRID},
+                                {IH_GRID - 1, IH_SLOTS - 1}};
+    int32_t depth_q8 = ih_clamp_s32(FIELD_DEPTH_MM, c->near_mm, c->far_mm) << 8;
+    int64_t sum_q28 = 0;
+    for (int i = 0; i < 4; i++) {
+        int32_t x0, y0, x1, y1;
+        ih_rig_dot_at(rig, ends[i][0], depth_q8, &x0, &y0);
+        ih_rig_dot_at(rig, ends[i][1], depth_q8, &x1, &y1);
+        int64_t dx = x1 - (int64_t)x0;
+        int64_t dy = y1 - (int64_t)y0;
+        sum_q28 += ih_isqrt_u64((uint64_t)(dx * dx) + (uint64_t)(dy * dy));
+    }
+    ih_rig_dot_at(rig, IH_SLOTS / 2, depth_q8, &rig->field.centre_x_q28, &rig->field.centre_y_q28);
+    rig->field.unit_q28 = (int32_t)ih_div_round(sum_q28, 4 * (IH_GRID - 1) * 2);
+}
+
+enum ih_err ih_rig_init(struct ih_rig *rig, const struct ih_calibration *calibration,
+                        int32_t *bad_slot)
+{
+    *bad_slot = IH_NONE;
+    *rig = (struct ih_rig){0};
+    rig->calibration = *calibration;
+    enum ih_err err = check_camera(calibration);
+    if (err == IH_OK) {
+        err = check_lens(rig);
+    }
+    if (err != IH_OK || calibration->kind == IH_RIG_RANGE) {
+        return err;
+    }
+    err = check_projector(calibration, bad_slot);
+    if (err != IH_OK) {
+        return err;
+    }
+    for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
+        if (!fill_line(rig, slot)) {
+            *bad_slot = slot;
+            return IH_ERR_BASELINE;
+        }
+    }
+    fill_field(rig);
+    if (rig->field.unit_q28 < (1 << 28) / 1000) { /* dots closer than 2 mrad: not a 19x19 pattern */
+        return IH_ERR_RAY;
+    }
+    return IH_OK;
+}
