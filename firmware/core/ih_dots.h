@@ -6,8 +6,8 @@
  * Way:   grey levels are brought to 12 bits (255 of an 8-bit sensor = 4080). Band-pass
  *        R = 81 * (3x3 binomial sum, weight 16) - 16 * (9x9 box sum, weight 81), edge pixels
  *        repeated outside: exact integers, R / 1296 is the response in 12-bit grey levels.
- *        R > threshold makes runs, runs that touch (8 neighbours) make blobs, the centre is the
- *        R-weighted mean of the pixel centres. Threshold = max(floor, gain * median |R|), the
+ *        R > threshold makes runs, runs that touch (8 neighbours) make blobs, the centre is the mean
+ *        of the pixel centres weighted by floor(R / 256)^2. Threshold = max(floor, gain * median |R|), the
  *        median over a sparse sample of the frame (ih_dots_noise).
  * Cost:  one pass; IH_DOTS_ROWS rows of scratch, no copy of the frame. About 30 integer
  *        operations per pixel.
@@ -74,7 +74,7 @@ struct ih_dots {
 
 /* A blob being collected. */
 struct ih_dots_blob {
-    int64_t weight_u, weight_v, weight; /* sums of R u, R v, R */
+    int64_t weight_u, weight_v, weight; /* sums of w u, w v, w; w = (R / 2^8)^2 */
     int32_t area_px, peak;
     int16_t u_min, u_max, v_min, v_max;
 };

@@ -19,7 +19,7 @@ void ih_labels_params_default(struct ih_labels_params *params)
         .seed_max_px_q12 = 4096,    /* 1.0 px */
         .seed_margin_px_q12 = 2048, /* 0.5 px */
         .epsilon_min_px_q12 = 6144, /* 1.5 px */
-        .epsilon_max_px_q12 = 40 * 4096,
+        .epsilon_max_px_q12 = 8 * 4096,
     };
 }
 

@@ -11,9 +11,8 @@
  *        3. Growing: a slot with labelled neighbours expects its dot where the affine map of the
  *           5x5 around it says (weights 1/d^2), or at the depth of one of its 3x3 neighbours;
  *           error hypot(along, 6 perp) < epsilon; best pairs first. When a pass assigns fewer than
- *           5, epsilon grows by half, up to epsilon_max.
- *        4. Check: a label that its neighbours contradict while another candidate agrees with
- *           them is moved there; wrong seeds on a far wall die here.
+ *           5, epsilon grows by half, up to epsilon_max. What is left then is not labelled: at
+ *           8 px nine of ten further labels would be wrong, and seeds have bridged the edges.
  * Cost:  dots x 361 line tests; growing visits the open slots a few dozen times.
  * Full tables drop and count: candidates_dropped.
  */

@@ -4,11 +4,11 @@
  * Out:   per slot the normalised image position and the Z depth; the field on which they stand.
  * Way:   dots: t px from infinity along the line, Z = |e| / t, one division. The position is
  *        the dot's place on its line, (infinity + t dir), so that depth and position agree.
- *        range image: a 19x19 lattice is laid over the image part of interest: its pitch is a
- *        head's (pitch_mm at the depth of the nearest tenth of the measured pixels), its centre
- *        the middle of what is near. Each slot takes the nearest valid pixel within a quarter
- *        pitch, nearest to the slot first.
- * Cost:  361 divisions; a range image is read once at every IH_POINTS_STEP-th pixel.
+ *        range image: a 19x19 lattice is laid where a head would be: its pitch is pitch_mm at the
+ *        depth of the nearest tenth of the measured pixels; it hangs from the highest row that is
+ *        near (within reach_mm of that depth) over top_width_mm, with headroom pitches above it.
+ *        Each slot takes the valid pixel nearest to it within a quarter pitch.
+ * Cost:  361 divisions; a range image is surveyed twice at about 160 x 120 pixels.
  */
 #ifndef IH_POINTS_H
 #define IH_POINTS_H
@@ -16,14 +16,17 @@
 #include "ih_labels.h"
 
 struct ih_points_params {
-    int32_t pitch_mm_q8; /* range images: distance of lattice points at the depth of interest */
-    int32_t reach_mm;    /* range images: what lies this far behind the nearest is "near" */
+    /* range images only */
+    int32_t pitch_mm_q8;  /* distance of lattice points at the depth of what is near */
+    int32_t reach_mm;     /* what lies this far behind the nearest tenth is still "near" */
+    int32_t headroom_q8;  /* lattice pitches above the top of what is near */
+    int32_t top_width_mm; /* narrower tops than this are not looked at */
 };
 
 enum ih_point_state {
     IH_POINT_MISSING = 0,  /* nothing was measured; a surface there would have been seen */
     IH_POINT_SEEN = 1,
-    IH_POINT_UNKNOWN = 2,  /* missing, but that says nothing: outside the frame or over-exposed */
+    IH_POINT_UNKNOWN = 2,  /* missing, but that says nothing: outside a range image */
 };
 
 struct ih_point {

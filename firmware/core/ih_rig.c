@@ -5,10 +5,12 @@
 /* Depth in whose place the middle dot marks the middle of the surface: where a person sits. */
 #define FIELD_DEPTH_MM 900
 #define ONE_Q28 ((int64_t)1 << 28)
-#define UNDISTORT_STEPS 24
+/* Enough for a lens whose iteration gains only a third a step; usual ones need five. */
+#define UNDISTORT_STEPS 64
+#define BROWN_MAX 16
 /* Probes of the lens along each side of the frame, and how well they must come back. */
 #define LENS_PROBES 17
-#define LENS_ERROR_MAX_PX_Q12 82 /* 0.02 px */
+#define LENS_ERROR_MAX_PX_Q12 20 /* 0.005 px */
 /* Rays steeper than this against the optical axis are no camera's business. */
 #define RAY_FORWARD_MIN_Q30 (1 << 28)
 #define RAY_LENGTH_TOLERANCE_Q30 (1 << 16) /* 6e-5 */
@@ -18,8 +20,15 @@ static int64_t product_q28(int64_t a_q28, int64_t b_q28)
     return ih_mul_shift(a_q28, b_q28, 28);
 }
 
-/* OpenCV's Brown model. |x|, |y| <= 2: r2 <= 8, and with |k| < 128 every term is below
- * 128 * 512 = 2^16, in Q28 2^44; products with x stay below 2^46. */
+static int64_t clamp_brown_q28(int64_t value_q28)
+{
+    int64_t limit = BROWN_MAX * ONE_Q28;
+    return value_q28 > limit ? limit : value_q28 < -limit ? -limit : value_q28;
+}
+
+/* OpenCV's Brown model. |x|, |y| <= 2, so r2 <= 8 = 2^31 in Q28, r4 <= 64 = 2^31 in Q25 and
+ * r6 <= 512 = 2^31 in Q22: times a coefficient in int32 each stays below 2^62. A lens that needs
+ * more than BROWN_MAX anywhere is limited to it, and then does not come back in check_lens. */
 static void brown(const struct ih_calibration *c, int64_t x_q28, int64_t y_q28, int64_t *radial_q28,
                   int64_t *dx_q28, int64_t *dy_q28)
 {
@@ -27,12 +36,16 @@ static void brown(const struct ih_calibration *c, int64_t x_q28, int64_t y_q28, 
     int64_t yy = product_q28(y_q28, y_q28);
     int64_t xy = product_q28(x_q28, y_q28);
     int64_t r2 = xx + yy;
-    int64_t r4 = product_q28(r2, r2);
-    int64_t r6 = product_q28(r4, r2);
-    *radial_q28 = ONE_Q28 + ih_mul_shift(r2, c->k1_q24, 24) + ih_mul_shift(r4, c->k2_q24, 24) +
-                  ih_mul_shift(r6, c->k3_q24, 24);
-    *dx_q28 = ih_mul_shift(2 * xy, c->p1_q24, 24) + ih_mul_shift(r2 + 2 * xx, c->p2_q24, 24);
-    *dy_q28 = ih_mul_shift(r2 + 2 * yy, c->p1_q24, 24) + ih_mul_shift(2 * xy, c->p2_q24, 24);
+    int64_t r4_q25 = ih_mul_shift(r2, r2, 31);
+    int64_t r6_q22 = ih_mul_shift(r4_q25, r2, 31);
+    *radial_q28 = clamp_brown_q28(ONE_Q28 + ih_mul_shift(r2, c->k1_q24, 24) +
+                                  ih_mul_shift(r4_q25, c->k2_q24, 21) +
+                                  ih_mul_shift(r6_q22, c->k3_q24, 18));
+    /* 2 xy <= 8; (r2 + 2 xx) / 2 <= 8 */
+    *dx_q28 = clamp_brown_q28(ih_mul_shift(2 * xy, c->p1_q24, 24) +
+                              ih_mul_shift(r2 / 2 + xx, c->p2_q24, 23));
+    *dy_q28 = clamp_brown_q28(ih_mul_shift(r2 / 2 + yy, c->p1_q24, 23) +
+                              ih_mul_shift(2 * xy, c->p2_q24, 24));
 }
 
 static int32_t limit_tan_q28(int64_t value_q28)
@@ -81,10 +94,8 @@ void ih_rig_distort(const struct ih_rig *rig, int32_t x_q28, int32_t y_q28, int3
     int64_t radial, dx, dy;
     brown(c, x, y, &radial, &dx, &dy);
     /* Far outside the frame a strong lens can go anywhere: keep the result in the format. */
-    int64_t xd = limit_tan_q28(ih_clamp_s32(ih_saturate_s32(product_q28(x, radial) + dx), -(1 << 30),
-                                            1 << 30));
-    int64_t yd = limit_tan_q28(ih_clamp_s32(ih_saturate_s32(product_q28(y, radial) + dy), -(1 << 30),
-                                            1 << 30));
+    int64_t xd = limit_tan_q28(product_q28(x, radial) + dx);
+    int64_t yd = limit_tan_q28(product_q28(y, radial) + dy);
     *u_px_q12 = (int32_t)(ih_mul_shift(xd, c->fx_px_q16, 32) + ih_shift_round(c->cx_px_q16, 4));
     *v_px_q12 = (int32_t)(ih_mul_shift(yd, c->fy_px_q16, 32) + ih_shift_round(c->cy_px_q16, 4));
 }

@@ -69,7 +69,8 @@ struct ih_rig {
 enum ih_err ih_rig_init(struct ih_rig *rig, const struct ih_calibration *calibration,
                         int32_t *bad_slot) __attribute__((warn_unused_result));
 
-/* Frame pixel -> normalised coordinates, within 0.005 px of the exact inverse inside the frame. */
+/* Frame pixel -> normalised coordinates. Inside the frame ih_rig_distort brings it back within
+ * 0.005 px: ih_rig_init refuses a lens for which this does not hold. */
 void ih_rig_undistort(const struct ih_rig *rig, int32_t u_px_q12, int32_t v_px_q12, int32_t *x_q28,
                       int32_t *y_q28);
 

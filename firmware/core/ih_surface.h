@@ -54,8 +54,9 @@ struct ih_surface_scratch {
     int32_t factor_q30[IH_CHOLESKY_PACKED(IH_SURFACE_TERMS)];
     int64_t right_q28[IH_SURFACE_TERMS];
     int32_t row_q20[IH_SURFACE_TERMS];
-    uint32_t scale[IH_SURFACE_TERMS];
-    int32_t solution[IH_SURFACE_TERMS];
+    uint32_t scale[IH_SURFACE_TERMS]; /* 0.995 * 2^51 / sqrt(N_ii), N in Q40 */
+    int32_t right[IH_SURFACE_TERMS], solution[IH_SURFACE_TERMS];
+    int32_t solution_shift; /* coefficient = solution / 2^solution_shift, mm per field unit */
     int32_t table_q20[IH_SURFACE_GRID + 1][IH_SURFACE_GRID + 1];
 };
 

@@ -1,0 +1,81 @@
+#include "ih_cholesky.h"
+
+#include <stdbool.h>
+
+#include "ih_fix.h"
+
+/* Mantissas of a solution stay below this: 144 products with |L| <= 1 in Q30 then sum below
+ * 2^(25 + 30 + 7.2) < 2^63. */
+#define MANTISSA_MAX (1 << 25)
+
+static const int32_t *row_of(const int32_t *l_q30, int32_t i)
+{
+    return l_q30 + IH_CHOLESKY_PACKED(i);
+}
+
+static int64_t dot_q60(const int32_t *a_q30, const int32_t *b_q30, int32_t count)
+{
+    int64_t sum = 0;
+    for (int32_t k = 0; k < count; k++) {
+        sum += (int64_t)a_q30[k] * b_q30[k];
+    }
+    return sum;
+}
+
+enum ih_err ih_cholesky_factor(int32_t *a_q30, int32_t n, int32_t *bad_pivot)
+{
+    *bad_pivot = -1;
+    for (int32_t i = 0; i < n; i++) {
+        int32_t *row = a_q30 + IH_CHOLESKY_PACKED(i);
+        for (int32_t j = 0; j < i; j++) {
+            const int32_t *other = row_of(a_q30, j);
+            int64_t rest_q60 = (int64_t)row[j] * (1 << 30) - dot_q60(row, other, j);
+            row[j] = ih_saturate_s32(ih_div_round(rest_q60, other[j]));
+        }
+        int64_t pivot_q60 = (int64_t)row[i] * (1 << 30) - dot_q60(row, row, i);
+        uint32_t root_q30 = pivot_q60 > 0 ? ih_isqrt_u64((uint64_t)pivot_q60) : 0;
+        if (root_q30 == 0) {
+            *bad_pivot = i;
+            return IH_ERR_NOT_POSITIVE;
+        }
+        row[i] = (int32_t)root_q30;
+    }
+    return IH_OK;
+}
+
+/* Move the binary point of what is solved so far, x[from .. n - 1]. */
+static void rescale(int32_t *x, int32_t from, int32_t n, int shift)
+{
+    for (int32_t k = from; k < n; k++) {
+        x[k] = (int32_t)ih_shift_round(x[k], shift);
+    }
+}
+
+void ih_cholesky_solve(const int32_t *l_q30, int32_t n, const int32_t *b, int32_t *x_mantissa,
+                       int32_t *x_exponent)
+{
+    for (int32_t i = 0; i < n; i++) { /* L y = b */
+        const int32_t *row = row_of(l_q30, i);
+        int64_t rest = (int64_t)b[i] * (1 << 30) - dot_q60(row, x_mantissa, i);
+        x_mantissa[i] = ih_saturate_s32(ih_div_round(rest, row[i]));
+    }
+    int exponent = 0;
+    for (int32_t i = n - 1; i >= 0; i--) { /* L^T x = y, in units of 2^exponent */
+        int64_t sum = 0;
+        for (int32_t k = i + 1; k < n; k++) {
+            sum += (int64_t)row_of(l_q30, k)[i] * x_mantissa[k];
+        }
+        int64_t rest = ih_shift_round((int64_t)x_mantissa[i] * (1 << 30), exponent) - sum;
+        int64_t value = ih_div_round(rest, row_of(l_q30, i)[i]);
+        int grow = 0;
+        while ((ih_abs_s64(value) >> grow) >= MANTISSA_MAX) {
+            grow++;
+        }
+        if (grow > 0) {
+            exponent += grow;
+            rescale(x_mantissa, i + 1, n, grow);
+        }
+        x_mantissa[i] = (int32_t)ih_shift_round(value, grow);
+    }
+    *x_exponent = exponent;
+}

@@ -1,0 +1,266 @@
+#include "ih_surface.h"
+
+#include <string.h>
+
+#include "ih_fix.h"
+
+#define TERMS IH_SURFACE_TERMS
+/* Scale factors are 0.995 * 2^SCALE_SHIFT / sqrt(N_ii): with N_ii of 2^40 (a single sample, weight
+ * 1, B = 1) to 2^61.5 they lie between 2^20 and 2^31. */
+#define SCALE_SHIFT 51
+#define SCALE_NUMERATOR ((((int64_t)1 << SCALE_SHIFT) / 1000) * 995)
+#define SCALE_MAX 0x7fffffff
+/* The right side keeps its norm below this, so that the forward solve stays within int32. */
+#define RIGHT_BITS 30
+/* Coefficients below 2^28, basis below 2^26.5, 144 terms: sums below 2^61.7. */
+#define SOLUTION_BITS 28
+
+void ih_surface_params_default(struct ih_surface_params *params)
+{
+    *params = (struct ih_surface_params){
+        .ridge_q30 = 10737, /* 1e-5 */
+        .huber_mm = 60,
+    };
+}
+
+/* sqrt(dx^2 + dy^2 + 1), Q20, rounded. dx, dy < 60 in Q16: the radicand in Q42 is below 2^55. */
+static int32_t basis_q20(int64_t dx_q16, int64_t dy_q16)
+{
+    uint64_t radicand_q32 =
+        (uint64_t)(dx_q16 * dx_q16) + (uint64_t)(dy_q16 * dy_q16) + ((uint64_t)1 << 32);
+    return (int32_t)((ih_isqrt_u64(radicand_q32 << 10) + 1) >> 1);
+}
+
+/* Place of a row or column of centres: (2 k - 11) * 20 / 11 field units. */
+static int32_t centre_q16(int32_t k)
+{
+    return (int32_t)ih_div_round((int64_t)(2 * k - (IH_SURFACE_CENTRES - 1)) * 20 * 65536,
+                                 IH_SURFACE_CENTRES - 1);
+}
+
+static void fill_row(const struct ih_sample *sample, int32_t *row_q20)
+{
+    for (int32_t i = 0; i < TERMS; i++) {
+        int64_t dx = sample->x_q16 - centre_q16(i % IH_SURFACE_CENTRES);
+        int64_t dy = sample->y_q16 - centre_q16(i / IH_SURFACE_CENTRES);
+        row_q20[i] = basis_q20(dx, dy);
+    }
+}
+
+/* Add sign times the sample's weighted row to the normal equations. Exact in integers, so taking a
+ * row out again leaves no trace. */
+static void accumulate(struct ih_surface_scratch *scratch, const struct ih_sample *sample,
+                       int32_t mean_mm_q8, int32_t root_weight_q15, int64_t sign)
+{
+    int32_t row[TERMS];
+    for (int32_t i = 0; i < TERMS; i++) {
+        row[i] = (int32_t)ih_mul_shift(scratch->row_q20[i], root_weight_q15, 15);
+    }
+    int64_t depth_q8 =
+        ih_mul_shift((int64_t)sample->depth_mm_q8 - mean_mm_q8, root_weight_q15, 15);
+    int64_t *normal = scratch->normal_q40;
+    for (int32_t i = 0; i < TERMS; i++) {
+        int64_t signed_row = sign * row[i];
+        for (int32_t j = 0; j <= i; j++) {
+            *normal++ += signed_row * row[j];
+        }
+        scratch->right_q28[i] += signed_row * depth_q8;
+    }
+}
+
+static int32_t mean_depth_mm_q8(const struct ih_samples *samples)
+{
+    int64_t sum = 0;
+    for (int32_t i = 0; i < samples->sample_count; i++) {
+        sum += samples->sample[i].depth_mm_q8;
+    }
+    return (int32_t)ih_div_round(sum, samples->sample_count);
+}
+
+static void assemble(const struct ih_samples *samples, struct ih_surface_scratch *scratch,
+                     struct ih_surface *out)
+{
+    memset(scratch->normal_q40, 0, sizeof scratch->normal_q40);
+    memset(scratch->right_q28, 0, sizeof scratch->right_q28);
+    out->mean_mm_q8 = mean_depth_mm_q8(samples);
+    for (int32_t i = 0; i < samples->sample_count; i++) {
+        const struct ih_sample *sample = &samples->sample[i];
+        fill_row(sample, scratch->row_q20);
+        accumulate(scratch, sample, out->mean_mm_q8, sample->root_weight_q15, 1);
+        out->root_weight_q15[i] = sample->root_weight_q15;
+    }
+}
+
+/* N scaled to diagonal 0.99, with ridge, in Q30. */
+static void scale_system(const struct ih_surface_params *params,
+                         struct ih_surface_scratch *scratch)
+{
+    const int64_t *normal = scratch->normal_q40;
+    int32_t *factor = scratch->factor_q30;
+    for (int32_t i = 0; i < TERMS; i++) {
+        uint64_t diagonal = (uint64_t)normal[IH_CHOLESKY_PACKED(i + 1) - 1];
+        int64_t root = (int64_t)ih_isqrt_u64(diagonal) + 1; /* + 1: the scaled diagonal stays < 1 */
+        int64_t scale = SCALE_NUMERATOR / root;
+        scratch->scale[i] = (uint32_t)(scale < SCALE_MAX ? scale : SCALE_MAX);
+    }
+    for (int32_t i = 0; i < TERMS; i++) {
+        for (int32_t j = 0; j <= i; j++) {
+            /* |N_ij| <= root_i root_j: after the first step below 2^47 */
+            int64_t half = ih_mul_wide_shift(*normal++, scratch->scale[i], 36);
+            *factor++ = ih_saturate_s32(
+                ih_mul_wide_shift(half, scratch->scale[j], 2 * SCALE_SHIFT - 36 - 30));
+        }
+        factor[-1] += (int32_t)ih_mul_shift(factor[-1], params->ridge_q30, 30);
+    }
+}
+
+/* The right side in int32: fraction bits as many as its norm, sqrt(sum of z^2) at the most, allows.
+ * Returns them. */
+static int scale_right(const struct ih_samples *samples, int32_t mean_mm_q8,
+                       struct ih_surface_scratch *scratch)
+{
+    uint64_t norm2_q16 = 1;
+    for (int32_t i = 0; i < samples->sample_count; i++) {
+        int64_t depth_q8 = (int64_t)samples->sample[i].depth_mm_q8 - mean_mm_q8;
+        norm2_q16 += (uint64_t)(depth_q8 * depth_q8);
+    }
+    int bits = ih_bits_u64(ih_isqrt_u64(norm2_q16)); /* of the norm in Q8 */
+    int fraction = ih_min_s32(8 + RIGHT_BITS - bits, 24);
+    for (int32_t i = 0; i < TERMS; i++) {
+        scratch->right[i] = ih_saturate_s32(ih_mul_wide_shift(
+            scratch->right_q28[i], scratch->scale[i], SCALE_SHIFT + 8 - fraction));
+    }
+    return fraction;
+}
+
+/* Undo the scaling of the unknowns: coefficient_i = x_i * scale_i / 2^31 with fraction bits. */
+static void unscale_solution(struct ih_surface_scratch *scratch, int fraction)
+{
+    uint64_t largest = 0;
+    for (int32_t i = 0; i < TERMS; i++) {
+        int64_t product = (int64_t)scratch->solution[i] * scratch->scale[i]; /* < 2^56 */
+        largest |= (uint64_t)ih_abs_s64(product);
+    }
+    int shift = ih_max_s32(0, ih_bits_u64(largest) - SOLUTION_BITS);
+    for (int32_t i = 0; i < TERMS; i++) {
+        int64_t product = (int64_t)scratch->solution[i] * scratch->scale[i];
+        scratch->solution[i] = (int32_t)ih_shift_round(product, shift);
+    }
+    scratch->solution_shift = fraction + (SCALE_SHIFT - 20) - shift;
+}
+
+static bool solve(const struct ih_samples *samples, const struct ih_surface_params *params,
+                  int32_t mean_mm_q8, struct ih_surface_scratch *scratch)
+{
+    int32_t bad_pivot, exponent;
+    scale_system(params, scratch);
+    if (ih_cholesky_factor(scratch->factor_q30, TERMS, &bad_pivot) != IH_OK) {
+        return false;
+    }
+    int fraction = scale_right(samples, mean_mm_q8, scratch);
+    ih_cholesky_solve(scratch->factor_q30, TERMS, scratch->right, scratch->solution, &exponent);
+    unscale_solution(scratch, fraction - exponent);
+    return true;
+}
+
+/* sum_n c_n B_n in Q8 from a sum in Q(20 + solution_shift). */
+static int32_t depth_of_sum(const struct ih_surface_scratch *scratch, int32_t mean_mm_q8,
+                            int64_t sum)
+{
+    int shift = 20 + scratch->solution_shift - 8;
+    int64_t depth_q8 = shift >= 0 ? ih_shift_round(sum, ih_min_s32(shift, 62)) : INT32_MAX;
+    return ih_saturate_s32(mean_mm_q8 + depth_q8);
+}
+
+/* Huber step: samples that are too far from the surface get less weight; only their rows change. */
+static int32_t reweight(const struct ih_samples *samples, const struct ih_surface_params *params,
+                        struct ih_surface_scratch *scratch, struct ih_surface *out)
+{
+    int32_t changed = 0;
+    int64_t limit_q8 = (int64_t)params->huber_mm << 8;
+    for (int32_t i = 0; i < samples->sample_count; i++) {
+        const struct ih_sample *sample = &samples->sample[i];
+        fill_row(sample, scratch->row_q20);
+        int64_t sum = 0;
+        for (int32_t k = 0; k < TERMS; k++) {
+            sum += (int64_t)scratch->solution[k] * scratch->row_q20[k];
+        }
+        int64_t off_q8 = ih_abs_s64((int64_t)sample->depth_mm_q8 -
+                                    depth_of_sum(scratch, out->mean_mm_q8, sum));
+        if (off_q8 <= limit_q8) {
+            continue;
+        }
+        /* sqrt(limit / off) in Q15 */
+        int64_t root_q15 = ih_isqrt_u64((uint64_t)ih_div_round(limit_q8 * (1 << 30), off_q8));
+        int32_t weight = (int32_t)ih_mul_shift(sample->root_weight_q15, root_q15, 15);
+        accumulate(scratch, sample, out->mean_mm_q8, out->root_weight_q15[i], -1);
+        accumulate(scratch, sample, out->mean_mm_q8, weight, 1);
+        out->root_weight_q15[i] = weight;
+        changed++;
+    }
+    return changed;
+}
+
+/* B for whole grid steps: sqrt((a^2 + b^2) 100 / 121 + 1) in Q20. */
+static void fill_table(struct ih_surface_scratch *scratch)
+{
+    const int64_t numerator2 = IH_SURFACE_STEP_NUMERATOR * IH_SURFACE_STEP_NUMERATOR;
+    const int64_t denominator2 = IH_SURFACE_STEP_DENOMINATOR * IH_SURFACE_STEP_DENOMINATOR;
+    for (int64_t b = 0; b <= IH_SURFACE_GRID; b++) {
+        for (int64_t a = 0; a <= IH_SURFACE_GRID; a++) {
+            int64_t radicand_q42 =
+                ih_div_round(((a * a + b * b) * numerator2 + denominator2) * ((int64_t)1 << 42),
+                             denominator2);
+            scratch->table_q20[b][a] =
+                (int32_t)((ih_isqrt_u64((uint64_t)radicand_q42) + 1) >> 1);
+        }
+    }
+}
+
+/* Grid node and centre k are both at whole steps: centre k at 4 k - 22 from the middle, node g at
+ * g - 23. */
+static int32_t steps_between(int32_t node, int32_t centre)
+{
+    return ih_abs_s32((node - (IH_SURFACE_GRID - 1) / 2) -
+                      (IH_SURFACE_STEPS_PER_CENTRE * centre -
+                       IH_SURFACE_STEPS_PER_CENTRE * (IH_SURFACE_CENTRES - 1) / 2));
+}
+
+static void evaluate(const struct ih_surface_scratch *scratch, struct ih_surface *out)
+{
+    out->nearest_mm_q8 = INT32_MAX;
+    for (int32_t y = 0; y < IH_SURFACE_GRID; y++) {
+        for (int32_t x = 0; x < IH_SURFACE_GRID; x++) {
+            int64_t sum = 0;
+            for (int32_t i = 0; i < TERMS; i++) {
+                int32_t b = steps_between(y, i / IH_SURFACE_CENTRES);
+                int32_t a = steps_between(x, i % IH_SURFACE_CENTRES);
+                sum += (int64_t)scratch->solution[i] * scratch->table_q20[b][a];
+            }
+            out->depth_mm_q8[y][x] = depth_of_sum(scratch, out->mean_mm_q8, sum);
+            out->nearest_mm_q8 = ih_min_s32(out->nearest_mm_q8, out->depth_mm_q8[y][x]);
+        }
+    }
+}
+
+void ih_surface_fit(const struct ih_samples *samples, const struct ih_field *field,
+                    const struct ih_surface_params *params, struct ih_surface_scratch *scratch,
+                    struct ih_surface *out)
+{
+    memset(out, 0, sizeof *out);
+    out->field = *field;
+    if (samples->sample_count < IH_SURFACE_SAMPLES_MIN) {
+        return;
+    }
+    assemble(samples, scratch, out);
+    if (!solve(samples, params, out->mean_mm_q8, scratch)) {
+        return;
+    }
+    out->downweighted_count = reweight(samples, params, scratch, out);
+    if (out->downweighted_count > 0 && !solve(samples, params, out->mean_mm_q8, scratch)) {
+        return;
+    }
+    fill_table(scratch);
+    evaluate(scratch, out);
+    out->valid = true;
+}
