@@ -6,8 +6,8 @@
  *        meets a node exactly still gives clean polygons. Vertices are interpolated along the cell
  *        edges. A saddle cell is joined across when the mean of its four nodes is inside: one rule
  *        for all, so contours never cross. Every contour runs with the inside (nearer) on its
- *        left as seen with x right and y down, that is: the signed area below is positive around a
- *        minimum of depth and negative around a maximum.
+ *        right as seen on a screen (x right, y down): its signed area, sum(x0 y1 - x1 y0) / 2, is
+ *        positive around a minimum of depth and negative around a maximum.
  * Cost:  one test per cell; one division per vertex.
  * Full tables drop and count: a contour that does not fit is left out whole, contours_dropped.
  */
@@ -37,7 +37,7 @@ struct ih_cuts {
     int32_t contours_dropped;
     struct ih_contour contour[IH_CUTS_CONTOURS_MAX];
     struct ih_vertex vertex[IH_CUTS_VERTICES_MAX];
-    /* scratch: cell edges already walked */
+    /* scratch: bit i = the cell was entered through its edge i */
     uint8_t walked[IH_SURFACE_GRID][IH_SURFACE_GRID];
 };
 

@@ -8,9 +8,11 @@
  *        chord. The contour is resampled to IH_ELLIPSE_POINTS equal steps; of all parts that wind
  *        round the place with chord <= chord_max arc, and that are elliptical, the one with the
  *        greatest arc - 1.6 chord - 8 (shape - 1) arc is taken.
- * Scaling and overflow: coordinates relative to the place, Q8 steps, below 2^13.6; edges of a
- *        contour are shorter than 1.5 steps, of a resampled one than 55; see docs/numerics.md for
- *        the bound 2^62 on the sums of third order.
+ * Scaling and overflow: coordinates relative to the place, Q8 steps: |p| below 46 * 256 * 1.42 =
+ *        2^14.1. An edge's cross product is at most |p| |edge|, its second-order factor at most
+ *        3 * 2^27.1. Edges of a contour are shorter than 1.42 steps = 2^8.6: 2048 terms of
+ *        2^(14.1 + 8.6 + 28.7) sum below 2^62.4. Edges of a resampled one are at most
+ *        IH_ELLIPSE_VERTICES_MAX / 56 * 1.42 steps = 2^12.7: 112 terms of 2^55.5 below 2^62.3.
  */
 #ifndef IH_ELLIPSE_H
 #define IH_ELLIPSE_H
@@ -18,6 +20,8 @@
 #include "ih_cuts.h"
 
 #define IH_ELLIPSE_POINTS 56
+/* Longer contours are not searched for an elliptical part; it bounds the sums above. */
+#define IH_ELLIPSE_VERTICES_MAX 768
 
 struct ih_ellipse_params {
     int32_t shape_max_q16;        /* most that shape may be for an ellipse */
@@ -33,17 +37,20 @@ struct ih_ellipse {
     int64_t xx_q16, xy_q16, yy_q16;
     int32_t shape_q16;
     int32_t ratio_q16; /* major / minor axis, at most 255 */
+    int32_t merit_q8;  /* of a part: arc - 1.6 chord - 8 (shape - 1) arc, steps */
+};
+
+/* Sums over the edges of a polygon around a place, coordinates in Q8 steps; see ih_ellipse.c. */
+struct ih_moments {
+    int64_t area2_q16;                 /* twice the area */
+    int64_t x_q24, y_q24;              /* 6 times the first moments */
+    int64_t xx_q32, xy_q32, yy_q32;    /* 12 times the second moments */
+    int32_t winding;
 };
 
 struct ih_ellipse_scratch {
-    struct ih_vertex point[IH_ELLIPSE_POINTS];
-    /* prefix sums around the place, over twice the points for closed contours */
-    int64_t area[2 * IH_ELLIPSE_POINTS + 1];
-    int64_t first_x[2 * IH_ELLIPSE_POINTS + 1], first_y[2 * IH_ELLIPSE_POINTS + 1];
-    int64_t second_xx[2 * IH_ELLIPSE_POINTS + 1], second_xy[2 * IH_ELLIPSE_POINTS + 1],
-        second_yy[2 * IH_ELLIPSE_POINTS + 1];
-    int32_t arc_q8[2 * IH_ELLIPSE_POINTS + 1];
-    int32_t crossings[2 * IH_ELLIPSE_POINTS + 1];
+    int32_t x_q8[2 * IH_ELLIPSE_POINTS], y_q8[2 * IH_ELLIPSE_POINTS]; /* resampled, twice round */
+    struct ih_moments prefix[2 * IH_ELLIPSE_POINTS]; /* of the edges before each point */
 };
 
 void ih_ellipse_params_default(struct ih_ellipse_params *params);
@@ -52,9 +59,10 @@ void ih_ellipse_params_default(struct ih_ellipse_params *params);
 bool ih_ellipse_of_contour(const struct ih_cuts *cuts, const struct ih_contour *contour,
                            struct ih_ellipse *out);
 
-/* Does the closed contour wind round the place? */
-bool ih_ellipse_surrounds(const struct ih_cuts *cuts, const struct ih_contour *contour,
-                          struct ih_vertex place);
+/* How often the contour, closed by a chord if it is open, winds round the place: 1 around a minimum,
+ * -1 around a maximum, 0 beside. */
+int32_t ih_ellipse_winding(const struct ih_cuts *cuts, const struct ih_contour *contour,
+                           struct ih_vertex place);
 
 /* The best elliptical part of an open or closed contour around the place. False when none. */
 bool ih_ellipse_of_part(const struct ih_cuts *cuts, const struct ih_contour *contour,

@@ -1,0 +1,267 @@
+#include "ih_ellipse.h"
+
+#include "ih_fix.h"
+
+#define FOUR_PI_Q16 823550 /* 4 pi */
+#define RATIO_MAX 255
+/* A part must have this much area: half a grid cell. */
+#define AREA2_MIN_Q16 65536
+/* The weights of chord and shape in a part's merit. */
+#define CHORD_COST_Q8 410 /* 1.6 */
+#define SHAPE_COST 8
+/* A part has at least this many of the 56 points: fewer are no ellipse's outline. */
+#define PART_EDGES_MIN 8
+
+void ih_ellipse_params_default(struct ih_ellipse_params *params)
+{
+    *params = (struct ih_ellipse_params){
+        .shape_max_q16 = 68485,         /* 1.045 */
+        .ratio_closed_max_q16 = 124518, /* 1.9 */
+        .ratio_part_max_q16 = 114688,   /* 1.75 */
+        .chord_max_q16 = 27525,         /* 0.42 */
+    };
+}
+
+/* Add the edge p -> q. Green's theorem: with w = px qy - qx py,
+ *   2 area = sum w                        6 int x  = sum w (px + qx)
+ *   12 int x^2 = sum w (px^2 + px qx + qx^2)
+ *   12 int x y = sum w (2 px py + px qy + qx py + 2 qx qy) / 2 */
+static void add_edge(struct ih_moments *m, int64_t px, int64_t py, int64_t qx, int64_t qy)
+{
+    int64_t w = px * qy - qx * py;
+    m->area2_q16 += w;
+    m->x_q24 += w * (px + qx);
+    m->y_q24 += w * (py + qy);
+    m->xx_q32 += w * (px * px + px * qx + qx * qx);
+    m->yy_q32 += w * (py * py + py * qy + qy * qy);
+    m->xy_q32 += w * (2 * px * py + px * qy + qx * py + 2 * qx * qy) / 2;
+    if (py <= 0 && qy > 0 && w > 0) {
+        m->winding++;
+    } else if (py > 0 && qy <= 0 && w < 0) {
+        m->winding--;
+    }
+}
+
+/* Axis ratio from the covariance; 0 when it is not positive definite. */
+static int32_t axis_ratio_q16(int64_t xx_q16, int64_t xy_q16, int64_t yy_q16)
+{
+    int64_t half_difference = (xx_q16 - yy_q16) / 2;
+    int64_t root =
+        ih_isqrt_u64((uint64_t)(half_difference * half_difference + xy_q16 * xy_q16));
+    int64_t major = (xx_q16 + yy_q16) / 2 + root;
+    int64_t minor = (xx_q16 + yy_q16) / 2 - root;
+    if (minor <= 0) {
+        return 0;
+    }
+    int64_t square = major / minor >= RATIO_MAX * RATIO_MAX
+                         ? (int64_t)RATIO_MAX * RATIO_MAX << 32
+                         : (major << 32) / minor; /* major below 2^26 */
+    return (int32_t)ih_isqrt_u64((uint64_t)square);
+}
+
+/* A Q24 sum over a Q16 sum, in Q16: whole part and remainder apart, so that 8 more fraction bits
+ * need no wider product. */
+static int64_t quotient_q16(int64_t sum_q24, int64_t divisor_q16)
+{
+    int64_t whole_q8 = sum_q24 / divisor_q16;
+    int64_t rest = sum_q24 % divisor_q16; /* divisor below 2^32: rest * 256 below 2^40 */
+    return whole_q8 * 256 + ih_div_round(rest * 256, divisor_q16);
+}
+
+/* Ellipse of closed moments around (x0, y0), Q8 steps. False when the area is nothing. */
+static bool ellipse_of_moments(const struct ih_moments *m, int32_t x0_q8, int32_t y0_q8,
+                               struct ih_ellipse *out)
+{
+    int64_t sign = m->area2_q16 < 0 ? -1 : 1;
+    int64_t area2_q16 = sign * m->area2_q16;
+    if (area2_q16 < AREA2_MIN_Q16) {
+        return false;
+    }
+    int64_t x_q16 = quotient_q16(sign * m->x_q24, 3 * area2_q16);
+    int64_t y_q16 = quotient_q16(sign * m->y_q24, 3 * area2_q16);
+    out->area_q16 = sign * (area2_q16 / 2);
+    out->x_q16 = (int32_t)(x_q16 + x0_q8 * 256);
+    out->y_q16 = (int32_t)(y_q16 + y0_q8 * 256);
+    out->xx_q16 = ih_div_round(sign * m->xx_q32, 6 * area2_q16) - ih_mul_shift(x_q16, x_q16, 16);
+    out->yy_q16 = ih_div_round(sign * m->yy_q32, 6 * area2_q16) - ih_mul_shift(y_q16, y_q16, 16);
+    out->xy_q16 = ih_div_round(sign * m->xy_q32, 6 * area2_q16) - ih_mul_shift(x_q16, y_q16, 16);
+    int64_t determinant_q32 = out->xx_q16 * out->yy_q16 - out->xy_q16 * out->xy_q16;
+    out->ratio_q16 = axis_ratio_q16(out->xx_q16, out->xy_q16, out->yy_q16);
+    if (determinant_q32 <= 0 || out->ratio_q16 == 0) {
+        return false;
+    }
+    int64_t root_q16 = ih_isqrt_u64((uint64_t)determinant_q32);
+    /* 4 pi sqrt(det) / area; the factor 2 because area2 is twice the area */
+    out->shape_q16 = ih_saturate_s32(ih_div_round(2 * FOUR_PI_Q16 * root_q16, area2_q16));
+    out->merit_q8 = 0;
+    return true;
+}
+
+static int32_t half_q9(int32_t value_q9)
+{
+    return (int32_t)ih_shift_round(value_q9, 1);
+}
+
+static struct ih_moments contour_moments(const struct ih_cuts *cuts,
+                                         const struct ih_contour *contour, struct ih_vertex place)
+{
+    const struct ih_vertex *vertex = &cuts->vertex[contour->first];
+    struct ih_moments m = {0};
+    for (int32_t i = 0; i < contour->vertex_count; i++) {
+        struct ih_vertex p = vertex[i];
+        struct ih_vertex q = vertex[i + 1 < contour->vertex_count ? i + 1 : 0];
+        add_edge(&m, half_q9(p.x_q9 - place.x_q9), half_q9(p.y_q9 - place.y_q9),
+                 half_q9(q.x_q9 - place.x_q9), half_q9(q.y_q9 - place.y_q9));
+    }
+    return m;
+}
+
+bool ih_ellipse_of_contour(const struct ih_cuts *cuts, const struct ih_contour *contour,
+                           struct ih_ellipse *out)
+{
+    struct ih_vertex place = cuts->vertex[contour->first];
+    place.x_q9 = (int16_t)(place.x_q9 & ~1); /* a whole Q8 number */
+    place.y_q9 = (int16_t)(place.y_q9 & ~1);
+    struct ih_moments m = contour_moments(cuts, contour, place);
+    return ellipse_of_moments(&m, place.x_q9 / 2, place.y_q9 / 2, out);
+}
+
+int32_t ih_ellipse_winding(const struct ih_cuts *cuts, const struct ih_contour *contour,
+                           struct ih_vertex place)
+{
+    return contour_moments(cuts, contour, place).winding;
+}
+
+static int32_t edge_length_q9(const struct ih_cuts *cuts, const struct ih_contour *contour,
+                              int32_t i)
+{
+    const struct ih_vertex *vertex = &cuts->vertex[contour->first];
+    struct ih_vertex p = vertex[i];
+    struct ih_vertex q = vertex[i + 1 < contour->vertex_count ? i + 1 : 0];
+    int64_t dx = q.x_q9 - p.x_q9;
+    int64_t dy = q.y_q9 - p.y_q9;
+    return (int32_t)ih_isqrt_u64((uint64_t)(dx * dx + dy * dy));
+}
+
+/* Points at equal steps along the contour, relative to the place. Returns the contour's length. */
+static int32_t resample(const struct ih_cuts *cuts, const struct ih_contour *contour,
+                        struct ih_vertex place, struct ih_ellipse_scratch *scratch)
+{
+    const struct ih_vertex *vertex = &cuts->vertex[contour->first];
+    int32_t edges = contour->closed ? contour->vertex_count : contour->vertex_count - 1;
+    int32_t steps = contour->closed ? IH_ELLIPSE_POINTS : IH_ELLIPSE_POINTS - 1;
+    int32_t total_q9 = 0;
+    for (int32_t i = 0; i < edges; i++) {
+        total_q9 += edge_length_q9(cuts, contour, i);
+    }
+    int32_t edge = 0;
+    int32_t before_q9 = 0; /* length up to the edge */
+    int32_t length_q9 = edge_length_q9(cuts, contour, 0);
+    for (int32_t k = 0; k < IH_ELLIPSE_POINTS; k++) {
+        int32_t target_q9 = (int32_t)((int64_t)total_q9 * k / steps);
+        while (edge < edges - 1 && before_q9 + length_q9 < target_q9) {
+            before_q9 += length_q9;
+            edge++;
+            length_q9 = edge_length_q9(cuts, contour, edge);
+        }
+        struct ih_vertex p = vertex[edge];
+        struct ih_vertex q = vertex[edge + 1 < contour->vertex_count ? edge + 1 : 0];
+        int32_t part_q9 = ih_min_s32(target_q9 - before_q9, length_q9);
+        int64_t divisor = length_q9 > 0 ? length_q9 : 1;
+        int64_t x_q9 = p.x_q9 - place.x_q9 +
+                       ih_div_round((int64_t)(q.x_q9 - p.x_q9) * part_q9, divisor);
+        int64_t y_q9 = p.y_q9 - place.y_q9 +
+                       ih_div_round((int64_t)(q.y_q9 - p.y_q9) * part_q9, divisor);
+        scratch->x_q8[k] = half_q9((int32_t)x_q9);
+        scratch->y_q8[k] = half_q9((int32_t)y_q9);
+    }
+    return total_q9 / 2;
+}
+
+/* Prefix sums of the moments; a closed contour goes round twice. */
+static int32_t accumulate(const struct ih_contour *contour, struct ih_ellipse_scratch *scratch)
+{
+    int32_t count = contour->closed ? 2 * IH_ELLIPSE_POINTS : IH_ELLIPSE_POINTS;
+    for (int32_t k = IH_ELLIPSE_POINTS; k < count; k++) {
+        scratch->x_q8[k] = scratch->x_q8[k - IH_ELLIPSE_POINTS];
+        scratch->y_q8[k] = scratch->y_q8[k - IH_ELLIPSE_POINTS];
+    }
+    scratch->prefix[0] = (struct ih_moments){0};
+    for (int32_t k = 1; k < count; k++) {
+        scratch->prefix[k] = scratch->prefix[k - 1];
+        add_edge(&scratch->prefix[k], scratch->x_q8[k - 1], scratch->y_q8[k - 1],
+                 scratch->x_q8[k], scratch->y_q8[k]);
+    }
+    return count;
+}
+
+/* Moments of the points from..to closed by their chord. */
+static struct ih_moments part_moments(const struct ih_ellipse_scratch *scratch, int32_t from,
+                                      int32_t to)
+{
+    struct ih_moments m = scratch->prefix[to];
+    const struct ih_moments *before = &scratch->prefix[from];
+    m.area2_q16 -= before->area2_q16;
+    m.x_q24 -= before->x_q24;
+    m.y_q24 -= before->y_q24;
+    m.xx_q32 -= before->xx_q32;
+    m.xy_q32 -= before->xy_q32;
+    m.yy_q32 -= before->yy_q32;
+    m.winding -= before->winding;
+    add_edge(&m, scratch->x_q8[to], scratch->y_q8[to], scratch->x_q8[from], scratch->y_q8[from]);
+    return m;
+}
+
+static int32_t chord_q8(const struct ih_ellipse_scratch *scratch, int32_t from, int32_t to)
+{
+    int64_t dx = scratch->x_q8[to] - scratch->x_q8[from];
+    int64_t dy = scratch->y_q8[to] - scratch->y_q8[from];
+    return (int32_t)ih_isqrt_u64((uint64_t)(dx * dx + dy * dy));
+}
+
+/* Is the part an ellipse around the place? The cheap tests come first. */
+static bool test_part(const struct ih_ellipse_scratch *scratch, int32_t from, int32_t to,
+                      int32_t arc_q8, struct ih_vertex place,
+                      const struct ih_ellipse_params *params, struct ih_ellipse *out)
+{
+    int64_t chord = chord_q8(scratch, from, to);
+    if (chord * 65536 > (int64_t)params->chord_max_q16 * arc_q8) {
+        return false;
+    }
+    struct ih_moments m = part_moments(scratch, from, to);
+    if (m.winding != 1 || !ellipse_of_moments(&m, half_q9(place.x_q9), half_q9(place.y_q9), out) ||
+        out->area_q16 <= 0 || out->shape_q16 > params->shape_max_q16 ||
+        out->ratio_q16 > params->ratio_part_max_q16) {
+        return false;
+    }
+    int64_t shape_cost_q8 = ih_mul_shift((int64_t)SHAPE_COST * (out->shape_q16 - 65536), arc_q8, 16);
+    out->merit_q8 =
+        ih_saturate_s32(arc_q8 - ih_mul_shift(CHORD_COST_Q8, chord, 8) - shape_cost_q8);
+    return true;
+}
+
+bool ih_ellipse_of_part(const struct ih_cuts *cuts, const struct ih_contour *contour,
+                        struct ih_vertex place, const struct ih_ellipse_params *params,
+                        struct ih_ellipse_scratch *scratch, struct ih_ellipse *out)
+{
+    if (contour->vertex_count > IH_ELLIPSE_VERTICES_MAX || contour->vertex_count < PART_EDGES_MIN) {
+        return false;
+    }
+    int32_t length_q8 = resample(cuts, contour, place, scratch);
+    int32_t count = accumulate(contour, scratch);
+    int32_t steps = contour->closed ? IH_ELLIPSE_POINTS : IH_ELLIPSE_POINTS - 1;
+    bool found = false;
+    for (int32_t from = 0; from < IH_ELLIPSE_POINTS; from++) {
+        int32_t last = ih_min_s32(count - 1, from + IH_ELLIPSE_POINTS - 1);
+        for (int32_t to = from + PART_EDGES_MIN; to <= last; to++) {
+            struct ih_ellipse part;
+            int32_t arc_q8 = (int32_t)((int64_t)length_q8 * (to - from) / steps);
+            if (test_part(scratch, from, to, arc_q8, place, params, &part) &&
+                (!found || part.merit_q8 > out->merit_q8)) {
+                *out = part;
+                found = true;
+            }
+        }
+    }
+    return found;
+}

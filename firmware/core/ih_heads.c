@@ -1,0 +1,257 @@
+#include "ih_heads.h"
+
+#include <stddef.h>
+
+#include "ih_fix.h"
+
+/* Slices up to this depth behind the minimum make the curvature. */
+#define CURVATURE_DEPTH_MM 70
+/* Slices from this depth on make the centre: nearer ones are the nose's. */
+#define CENTRE_DEPTH_MM 40
+
+void ih_heads_params_default(struct ih_heads_params *params)
+{
+    *params = (struct ih_heads_params){
+        .area_min_mm2 = 13000,
+        .area_max_mm2 = 46000,
+        .curvature_min_mm = 60,
+        .curvature_max_mm = 520,
+        .extent_min_mm = 60,
+        .tilt_max_mdeg = 50000,
+        .tilt_ratio_q16 = 78643, /* 1.2 */
+        .merge_mm = 80,
+        .centre_behind_mm = 120,
+    };
+}
+
+const char *ih_reject_text(int32_t reject)
+{
+    switch (reject) {
+    case IH_REJECT_AREA:
+        return "area";
+    case IH_REJECT_CURVATURE:
+        return "curvature";
+    case IH_REJECT_SHAPE:
+        return "shape";
+    default:
+        return NULL;
+    }
+}
+
+static int32_t widest_area_mm2(const struct ih_nest *nest)
+{
+    int32_t area = 0;
+    for (int32_t i = 0; i < nest->slice_count; i++) {
+        area = ih_max_s32(area, nest->slice[i].area_mm2);
+    }
+    return area;
+}
+
+/* k = sum(A t) / sum(t^2): the slope of the line through the origin that fits A(t) best. A below
+ * 2^31, t below 2^15 in Q8, 16 slices: below 2^50. */
+static int32_t curvature_mm_q8(const struct ih_nest *nest)
+{
+    int64_t at_q8 = 0;
+    int64_t tt_q16 = 0;
+    for (int32_t i = 0; i < nest->slice_count; i++) {
+        int64_t t_q8 = nest->slice[i].behind_mm_q8;
+        if (t_q8 <= CURVATURE_DEPTH_MM << 8) {
+            at_q8 += nest->slice[i].area_mm2 * t_q8;
+            tt_q16 += t_q8 * t_q8;
+        }
+    }
+    return tt_q16 == 0 ? 0 : ih_saturate_s32(ih_div_round(at_q8 << 13, tt_q16 >> 3));
+}
+
+/* Centre of the nest on the grid: mean over its deeper slices, by area; all when there are none. */
+static void nest_centre_q16(const struct ih_nest *nest, int32_t *x_q16, int32_t *y_q16)
+{
+    int64_t x = 0;
+    int64_t y = 0;
+    int64_t weight = 0;
+    for (int32_t i = 0; i < nest->slice_count; i++) {
+        const struct ih_slice *slice = &nest->slice[i];
+        bool deep = slice->behind_mm_q8 >= CENTRE_DEPTH_MM << 8;
+        int64_t w = deep ? slice->ellipse.area_q16 >> 8 : 1; /* below 2^20 */
+        x += w * slice->ellipse.x_q16;
+        y += w * slice->ellipse.y_q16;
+        weight += w;
+    }
+    *x_q16 = (int32_t)ih_div_round(x, weight);
+    *y_q16 = (int32_t)ih_div_round(y, weight);
+}
+
+/* A place on the grid (steps) to normalised coordinates. */
+static int32_t to_normalised_q28(int32_t place_q16, int32_t centre_q28, int32_t unit_q28)
+{
+    int64_t steps_q16 = (int64_t)place_q16 - ((IH_SURFACE_GRID - 1) / 2) * 65536;
+    int64_t offset = ih_div_round(steps_q16 * unit_q28 * IH_SURFACE_STEP_NUMERATOR,
+                                  (int64_t)IH_SURFACE_STEP_DENOMINATOR * 65536);
+    return ih_saturate_s32(centre_q28 + offset);
+}
+
+static int32_t surface_depth_mm_q8(const struct ih_surface *surface, int32_t x_q16, int32_t y_q16)
+{
+    int32_t x = ih_clamp_s32(x_q16, 0, (IH_SURFACE_GRID - 1) * 65536 - 1);
+    int32_t y = ih_clamp_s32(y_q16, 0, (IH_SURFACE_GRID - 1) * 65536 - 1);
+    int64_t fx = x & 0xffff;
+    int64_t fy = y & 0xffff;
+    const int32_t *near_row = &surface->depth_mm_q8[y >> 16][x >> 16];
+    const int32_t *far_row = &surface->depth_mm_q8[(y >> 16) + 1][x >> 16];
+    int64_t top = near_row[0] * (65536 - fx) + near_row[1] * fx;
+    int64_t bottom = far_row[0] * (65536 - fx) + far_row[1] * fx;
+    return (int32_t)ih_shift_round(ih_shift_round(top, 16) * (65536 - fy) +
+                                       ih_shift_round(bottom, 16) * fy, 16);
+}
+
+/* Covariance on the grid to an ellipse in pixels. */
+static void fill_axes(const struct ih_ellipse *ellipse, const struct ih_surface *surface,
+                      const struct ih_rig *rig, struct ih_hypothesis *out)
+{
+    const struct ih_calibration *c = &rig->calibration;
+    /* px per grid step in Q12; below 2^9 px for a sane pitch */
+    int64_t step_u = ih_div_round(ih_mul_shift(surface->field.unit_q28, c->fx_px_q16, 32) *
+                                      IH_SURFACE_STEP_NUMERATOR, IH_SURFACE_STEP_DENOMINATOR);
+    int64_t step_v = ih_div_round(ih_mul_shift(surface->field.unit_q28, c->fy_px_q16, 32) *
+                                      IH_SURFACE_STEP_NUMERATOR, IH_SURFACE_STEP_DENOMINATOR);
+    int64_t uu = ih_mul_shift(ih_mul_shift(ellipse->xx_q16, step_u, 12), step_u, 12);
+    int64_t uv = ih_mul_shift(ih_mul_shift(ellipse->xy_q16, step_u, 12), step_v, 12);
+    int64_t vv = ih_mul_shift(ih_mul_shift(ellipse->yy_q16, step_v, 12), step_v, 12);
+    int64_t half = (uu - vv) / 2;
+    int64_t root = ih_isqrt_u64((uint64_t)(half * half + uv * uv));
+    int64_t major = (uu + vv) / 2 + root;
+    int64_t minor = (uu + vv) / 2 - root;
+    /* semi-axis = 2 sqrt(variance): Q16 -> Q24 for a root in Q12 */
+    out->a_px_q12 = (int32_t)(2 * (int64_t)ih_isqrt_u64((uint64_t)major << 8));
+    out->b_px_q12 = (int32_t)(2 * (int64_t)ih_isqrt_u64((uint64_t)(minor > 0 ? minor : 0) << 8));
+    int32_t angle = (int32_t)ih_div_round(ih_atan2_mdeg(2 * uv, uu - vv), 2);
+    out->angle_mdeg = angle < 0 ? angle + 180000 : angle == 180000 ? 0 : angle;
+}
+
+static int32_t ray_length_q28(int32_t x_q28, int32_t y_q28)
+{
+    /* x, y up to 2 in Q26: squares below 2^54 */
+    int64_t x = x_q28 / 4;
+    int64_t y = y_q28 / 4;
+    int64_t root_q26 = ih_isqrt_u64((uint64_t)(x * x + y * y) + ((uint64_t)1 << 52));
+    return (int32_t)(root_q26 * 4);
+}
+
+static void fill_place(const struct ih_nest *nest, const struct ih_surface *surface,
+                       const struct ih_rig *rig, const struct ih_heads_params *params,
+                       struct ih_hypothesis *out)
+{
+    int32_t x_q16, y_q16;
+    nest_centre_q16(nest, &x_q16, &y_q16);
+    int32_t x_q28 =
+        to_normalised_q28(x_q16, surface->field.centre_x_q28, surface->field.unit_q28);
+    int32_t y_q28 =
+        to_normalised_q28(y_q16, surface->field.centre_y_q28, surface->field.unit_q28);
+    ih_rig_distort(rig, x_q28, y_q28, &out->u_px_q12, &out->v_px_q12);
+    out->distance_mm_q8 = ih_saturate_s32(ih_mul_shift(surface_depth_mm_q8(surface, x_q16, y_q16),
+                                                       ray_length_q28(x_q28, y_q28), 28));
+    int64_t depth_q8 = nest->nearest_mm_q8 + (int64_t)(params->centre_behind_mm << 8);
+    out->centre_mm_q8[0] = ih_saturate_s32(ih_mul_shift(depth_q8, x_q28, 28));
+    out->centre_mm_q8[1] = ih_saturate_s32(ih_mul_shift(depth_q8, y_q28, 28));
+    out->centre_mm_q8[2] = ih_saturate_s32(depth_q8);
+}
+
+static enum ih_reject test(const struct ih_hypothesis *h, const struct ih_ellipse *widest,
+                           const struct ih_heads_params *params)
+{
+    if (h->area_mm2 < params->area_min_mm2 || h->area_mm2 > params->area_max_mm2) {
+        return IH_REJECT_AREA;
+    }
+    if (h->curvature_mm_q8 < params->curvature_min_mm << 8 ||
+        h->curvature_mm_q8 > params->curvature_max_mm << 8 ||
+        h->extent_mm_q8 < params->extent_min_mm << 8) {
+        return IH_REJECT_CURVATURE;
+    }
+    int32_t tilt = ih_abs_s32(h->angle_mdeg - 90000);
+    if (widest->ratio_q16 > params->tilt_ratio_q16 && tilt > params->tilt_max_mdeg) {
+        return IH_REJECT_SHAPE;
+    }
+    return IH_ACCEPTED;
+}
+
+static struct ih_hypothesis judge(const struct ih_nest *nest, const struct ih_surface *surface,
+                                  const struct ih_rig *rig, const struct ih_heads_params *params)
+{
+    struct ih_hypothesis h = {0};
+    const struct ih_slice *last = &nest->slice[nest->slice_count - 1];
+    h.area_mm2 = widest_area_mm2(nest);
+    h.curvature_mm_q8 = curvature_mm_q8(nest);
+    h.extent_mm_q8 = last->behind_mm_q8;
+    fill_place(nest, surface, rig, params, &h);
+    fill_axes(&last->ellipse, surface, rig, &h);
+    h.rejected = test(&h, &last->ellipse, params);
+    return h;
+}
+
+/* Accepted before rejected, then the greater extent, then the nearer. */
+static bool is_better(const struct ih_hypothesis *a, const struct ih_hypothesis *b)
+{
+    bool a_accepted = a->rejected == IH_ACCEPTED;
+    bool b_accepted = b->rejected == IH_ACCEPTED;
+    if (a_accepted != b_accepted) {
+        return a_accepted;
+    }
+    if (a->extent_mm_q8 != b->extent_mm_q8) {
+        return a->extent_mm_q8 > b->extent_mm_q8;
+    }
+    return a->nest < b->nest;
+}
+
+static bool is_same_thing(const struct ih_hypothesis *a, const struct ih_hypothesis *b,
+                          int32_t merge_mm)
+{
+    int64_t distance2 = 0;
+    for (int axis = 0; axis < 3; axis++) {
+        int64_t d = (int64_t)a->centre_mm_q8[axis] - b->centre_mm_q8[axis];
+        distance2 += d * d; /* each below 2^46: coordinates are within 2^22 */
+    }
+    int64_t limit = (int64_t)merge_mm << 8;
+    return distance2 < limit * limit;
+}
+
+/* Drop what lies too near to a better one; the list is sorted. */
+static void merge(struct ih_heads *heads, int32_t merge_mm)
+{
+    int32_t kept = 0;
+    for (int32_t i = 0; i < heads->hypothesis_count; i++) {
+        bool same = false;
+        for (int32_t k = 0; k < kept && !same; k++) {
+            same = is_same_thing(&heads->hypothesis[i], &heads->hypothesis[k], merge_mm);
+        }
+        if (!same) {
+            heads->hypothesis[kept++] = heads->hypothesis[i];
+        }
+    }
+    heads->hypothesis_count = kept;
+}
+
+void ih_heads_select(const struct ih_hypotheses *hypotheses, const struct ih_surface *surface,
+                     const struct ih_rig *rig, const struct ih_heads_params *params,
+                     struct ih_heads *out)
+{
+    out->hypothesis_count = 0;
+    out->head_count = 0;
+    for (int32_t i = 0; i < hypotheses->nest_count; i++) {
+        if (hypotheses->nest[i].slice_count == 0) {
+            continue;
+        }
+        struct ih_hypothesis h = judge(&hypotheses->nest[i], surface, rig, params);
+        h.nest = i;
+        int32_t at = out->hypothesis_count++;
+        for (; at > 0 && is_better(&h, &out->hypothesis[at - 1]); at--) {
+            out->hypothesis[at] = out->hypothesis[at - 1];
+        }
+        out->hypothesis[at] = h;
+    }
+    merge(out, params->merge_mm);
+    for (int32_t i = 0; i < out->hypothesis_count; i++) {
+        if (out->hypothesis[i].rejected == IH_ACCEPTED) {
+            out->head[out->head_count++] = i;
+        }
+    }
+}

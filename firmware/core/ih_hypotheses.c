@@ -1,0 +1,200 @@
+#include "ih_hypotheses.h"
+
+#include <string.h>
+
+#include "ih_fix.h"
+
+/* A slice's area as a part of the one before: below this the nest shrinks and ends. */
+#define SHRINK_MIN_Q16 39322 /* 0.6 */
+/* Beyond end_depth_mm a slice that is more than this many times, plus this many mm^2, larger than
+ * the one before belongs to something else: the shoulders, a wall. */
+#define JUMP_Q16 209715 /* 3.2 */
+#define JUMP_MM2 2500
+
+void ih_hypotheses_params_default(struct ih_hypotheses_params *params)
+{
+    ih_ellipse_params_default(&params->ellipse);
+    params->level_step_mm = 10;
+    params->levels_behind_mm = 700;
+    params->depth_max_mm = 130;
+    params->end_depth_mm = 60;
+    params->gap_max = 3;
+}
+
+/* A minimum is nearer than its 8 neighbours; of equal nodes the first in reading order. */
+static bool is_minimum(const struct ih_surface *surface, int32_t x, int32_t y)
+{
+    int32_t depth = surface->depth_mm_q8[y][x];
+    for (int32_t dy = -1; dy <= 1; dy++) {
+        for (int32_t dx = -1; dx <= 1; dx++) {
+            int32_t other = surface->depth_mm_q8[y + dy][x + dx];
+            bool earlier = dy < 0 || (dy == 0 && dx < 0);
+            bool self = dx == 0 && dy == 0;
+            if (!self && (earlier ? other <= depth : other < depth)) {
+                return false;
+            }
+        }
+    }
+    return true;
+}
+
+/* Keep the nearest minima, sorted by depth. */
+static void add_nest(struct ih_hypotheses *out, int32_t x, int32_t y, int32_t depth_mm_q8)
+{
+    if (out->nest_count == IH_HYPOTHESES_MAX) {
+        out->minima_dropped++;
+        if (out->nest[IH_HYPOTHESES_MAX - 1].nearest_mm_q8 <= depth_mm_q8) {
+            return;
+        }
+        out->nest_count--;
+    }
+    int32_t at = out->nest_count++;
+    for (; at > 0 && out->nest[at - 1].nearest_mm_q8 > depth_mm_q8; at--) {
+        out->nest[at] = out->nest[at - 1];
+    }
+    struct ih_nest *nest = &out->nest[at];
+    memset(nest, 0, sizeof *nest);
+    nest->minimum = (struct ih_vertex){(int16_t)(x * 512), (int16_t)(y * 512)};
+    nest->nearest_mm_q8 = depth_mm_q8;
+}
+
+static void find_minima(const struct ih_surface *surface, struct ih_hypotheses *out)
+{
+    for (int32_t y = 1; y < IH_SURFACE_GRID - 1; y++) {
+        for (int32_t x = 1; x < IH_SURFACE_GRID - 1; x++) {
+            if (is_minimum(surface, x, y)) {
+                add_nest(out, x, y, surface->depth_mm_q8[y][x]);
+            }
+        }
+    }
+}
+
+/* Area of an ellipse at a depth in mm^2. One grid step is depth * unit * 10 / 11. Depth below
+ * 2^22 and unit below 2^26 (a pitch of half a radian): the step below 2^29 in Q16, its square in
+ * Q16 below 2^42 for areas below 2^(11 + 16). Real ones are 2^20 times smaller. */
+static int32_t area_mm2(const struct ih_surface *surface, int32_t level_mm_q8, int64_t area_q16)
+{
+    int64_t step_q16 = ih_div_round(
+        ih_mul_shift(level_mm_q8, surface->field.unit_q28, 20) * IH_SURFACE_STEP_NUMERATOR,
+        IH_SURFACE_STEP_DENOMINATOR);
+    int64_t square_q16 = ih_mul_shift(step_q16, step_q16, 16);
+    return ih_saturate_s32(ih_mul_wide_shift(square_q16, (uint32_t)area_q16, 32));
+}
+
+/* The ellipse that supports the nest at this level: the closed contour around its minimum when it
+ * is one, else the best elliptical part of that contour or of an open one. */
+static bool find_support(const struct ih_nest *nest, const struct ih_hypotheses_params *params,
+                         struct ih_hypotheses_scratch *scratch, struct ih_slice *out)
+{
+    const struct ih_cuts *cuts = &scratch->cuts;
+    bool found = false;
+    out->whole = false;
+    for (int32_t i = 0; i < cuts->contour_count; i++) {
+        const struct ih_contour *contour = &cuts->contour[i];
+        struct ih_ellipse ellipse;
+        if (contour->closed) {
+            if (ih_ellipse_winding(cuts, contour, nest->minimum) != 1) {
+                continue;
+            }
+            if (ih_ellipse_of_contour(cuts, contour, &ellipse) &&
+                ellipse.shape_q16 <= params->ellipse.shape_max_q16 &&
+                ellipse.ratio_q16 <= params->ellipse.ratio_closed_max_q16) {
+                out->ellipse = ellipse;
+                out->whole = true;
+                return true;
+            }
+        }
+        if (ih_ellipse_of_part(cuts, contour, nest->minimum, &params->ellipse, &scratch->ellipse,
+                               &ellipse) &&
+            (!found || ellipse.merit_q8 > out->ellipse.merit_q8)) {
+            out->ellipse = ellipse;
+            found = true;
+        }
+    }
+    return found;
+}
+
+/* Does the slice continue the nest? */
+static bool continues(const struct ih_nest *nest, const struct ih_slice *slice,
+                      const struct ih_hypotheses_params *params)
+{
+    if (nest->slice_count == 0) {
+        return true;
+    }
+    int64_t last = nest->slice[nest->slice_count - 1].area_mm2;
+    bool shrinks = slice->area_mm2 < ih_mul_shift(last, SHRINK_MIN_Q16, 16);
+    bool jumps = slice->behind_mm_q8 >= params->end_depth_mm << 8 &&
+                 slice->area_mm2 > ih_mul_shift(last, JUMP_Q16, 16) + JUMP_MM2;
+    return !shrinks && !jumps;
+}
+
+static void extend_nest(const struct ih_surface *surface, int32_t level_mm_q8,
+                        const struct ih_hypotheses_params *params,
+                        struct ih_hypotheses_scratch *scratch, struct ih_nest *nest)
+{
+    struct ih_slice slice;
+    slice.behind_mm_q8 = level_mm_q8 - nest->nearest_mm_q8;
+    if (slice.behind_mm_q8 <= 0 || nest->ended) {
+        return;
+    }
+    if (slice.behind_mm_q8 > params->depth_max_mm << 8 ||
+        nest->slice_count == IH_HYPOTHESES_SLICES_MAX) {
+        nest->ended = true;
+        return;
+    }
+    if (!find_support(nest, params, scratch, &slice)) {
+        nest->gap++;
+        nest->ended = nest->gap > params->gap_max;
+        return;
+    }
+    slice.area_mm2 = area_mm2(surface, level_mm_q8, slice.ellipse.area_q16);
+    if (!continues(nest, &slice, params)) {
+        nest->ended = true;
+        return;
+    }
+    nest->gap = 0;
+    nest->slice[nest->slice_count++] = slice;
+}
+
+bool ih_hypotheses_level(const struct ih_surface *surface,
+                         const struct ih_hypotheses_params *params, int32_t index,
+                         int32_t *level_mm_q8)
+{
+    int32_t behind_mm = (index + 1) * params->level_step_mm;
+    *level_mm_q8 = surface->nearest_mm_q8 + (behind_mm << 8);
+    return surface->valid && index >= 0 && behind_mm <= params->levels_behind_mm;
+}
+
+/* Is any nest still waiting for this level or a later one? */
+static bool any_alive(const struct ih_hypotheses *hypotheses)
+{
+    for (int32_t i = 0; i < hypotheses->nest_count; i++) {
+        if (!hypotheses->nest[i].ended) {
+            return true;
+        }
+    }
+    return false;
+}
+
+void ih_hypotheses_find(const struct ih_surface *surface,
+                        const struct ih_hypotheses_params *params,
+                        struct ih_hypotheses_scratch *scratch, struct ih_hypotheses *out)
+{
+    out->nest_count = 0;
+    out->minima_dropped = 0;
+    out->contours_dropped = 0;
+    if (!surface->valid) {
+        return;
+    }
+    find_minima(surface, out);
+    int32_t level_mm_q8;
+    for (int32_t index = 0; ih_hypotheses_level(surface, params, index, &level_mm_q8) &&
+                            any_alive(out);
+         index++) {
+        ih_cuts_level(surface, level_mm_q8, &scratch->cuts);
+        out->contours_dropped += scratch->cuts.contours_dropped;
+        for (int32_t i = 0; i < out->nest_count; i++) {
+            extend_nest(surface, level_mm_q8, params, scratch, &out->nest[i]);
+        }
+    }
+}
