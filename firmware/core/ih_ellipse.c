@@ -6,9 +6,16 @@
 #define RATIO_MAX 255
 /* A part must have this much area: half a grid cell. */
 #define AREA2_MIN_Q16 65536
+/* No polygon on the grid has its centre or its second moments beyond these; products of two of them
+ * stay below 2^58. */
+#define GRID_Q16 ((int64_t)IH_SURFACE_GRID << 16)
+#define VARIANCE_MAX_Q16 ((int64_t)IH_SURFACE_GRID * IH_SURFACE_GRID << 16)
 /* The weights of chord and shape in a part's merit. */
 #define CHORD_COST_Q8 410 /* 1.6 */
 #define SHAPE_COST 8
+/* No simple polygon has a shape below 1, the ellipse's: less means that the chord crosses the arc.
+ * 1 / 256 is left for rounding. */
+#define SHAPE_MIN_Q16 65280
 /* A part has at least this many of the 56 points: fewer are no ellipse's outline. */
 #define PART_EDGES_MIN 8
 
@@ -79,12 +86,19 @@ static bool ellipse_of_moments(const struct ih_moments *m, int32_t x0_q8, int32_
     }
     int64_t x_q16 = quotient_q16(sign * m->x_q24, 3 * area2_q16);
     int64_t y_q16 = quotient_q16(sign * m->y_q24, 3 * area2_q16);
+    if (ih_abs_s64(x_q16) > GRID_Q16 || ih_abs_s64(y_q16) > GRID_Q16) {
+        return false; /* a chord that crosses its arc: hardly any area, its centre far outside */
+    }
     out->area_q16 = sign * (area2_q16 / 2);
     out->x_q16 = (int32_t)(x_q16 + x0_q8 * 256);
     out->y_q16 = (int32_t)(y_q16 + y0_q8 * 256);
     out->xx_q16 = ih_div_round(sign * m->xx_q32, 6 * area2_q16) - ih_mul_shift(x_q16, x_q16, 16);
     out->yy_q16 = ih_div_round(sign * m->yy_q32, 6 * area2_q16) - ih_mul_shift(y_q16, y_q16, 16);
     out->xy_q16 = ih_div_round(sign * m->xy_q32, 6 * area2_q16) - ih_mul_shift(x_q16, y_q16, 16);
+    if (ih_abs_s64(out->xx_q16) > VARIANCE_MAX_Q16 || ih_abs_s64(out->yy_q16) > VARIANCE_MAX_Q16 ||
+        ih_abs_s64(out->xy_q16) > VARIANCE_MAX_Q16) {
+        return false;
+    }
     int64_t determinant_q32 = out->xx_q16 * out->yy_q16 - out->xy_q16 * out->xy_q16;
     out->ratio_q16 = axis_ratio_q16(out->xx_q16, out->xy_q16, out->yy_q16);
     if (determinant_q32 <= 0 || out->ratio_q16 == 0) {
@@ -230,7 +244,8 @@ static bool test_part(const struct ih_ellipse_scratch *scratch, int32_t from, in
     }
     struct ih_moments m = part_moments(scratch, from, to);
     if (m.winding != 1 || !ellipse_of_moments(&m, half_q9(place.x_q9), half_q9(place.y_q9), out) ||
-        out->area_q16 <= 0 || out->shape_q16 > params->shape_max_q16 ||
+        out->area_q16 <= 0 || out->shape_q16 < SHAPE_MIN_Q16 ||
+        out->shape_q16 > params->shape_max_q16 ||
         out->ratio_q16 > params->ratio_part_max_q16) {
         return false;
     }

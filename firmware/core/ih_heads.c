@@ -13,10 +13,10 @@ void ih_heads_params_default(struct ih_heads_params *params)
 {
     *params = (struct ih_heads_params){
         .area_min_mm2 = 13000,
-        .area_max_mm2 = 46000,
+        .area_max_mm2 = 56000,
         .curvature_min_mm = 60,
         .curvature_max_mm = 520,
-        .extent_min_mm = 60,
+        .extent_min_mm = 75,
         .tilt_max_mdeg = 50000,
         .tilt_ratio_q16 = 78643, /* 1.2 */
         .merge_mm = 80,

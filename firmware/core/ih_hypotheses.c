@@ -18,7 +18,7 @@ void ih_hypotheses_params_default(struct ih_hypotheses_params *params)
     params->levels_behind_mm = 700;
     params->depth_max_mm = 130;
     params->end_depth_mm = 60;
-    params->gap_max = 3;
+    params->gap_max = 8;
 }
 
 /* A minimum is nearer than its 8 neighbours; of equal nodes the first in reading order. */

@@ -9,8 +9,6 @@
 /* Growing raises epsilon when a pass assigned fewer than this (paper, section 2.3). */
 #define FEW_ASSIGNED 5
 #define PERP_WEIGHT 6
-/* No affine error can reach this: wider than any frame. */
-#define ERROR_NONE_PX_Q12 INT32_MAX
 
 void ih_labels_params_default(struct ih_labels_params *params)
 {
@@ -77,9 +75,9 @@ static const struct ih_candidate *candidate_of(const struct ih_labels_scratch *s
     return &scratch->candidate[slot][choice];
 }
 
-/* sqrt(|p00 - p01 - p10 + p11|^2 / 4 + 9 (sum of perp^2) / 4) */
-static int32_t rectangle_error(const struct ih_labels_scratch *scratch,
-                               const struct ih_candidate *const corner[4])
+/* Square of the seed's error. Differences of places below 2^26 in Q12: below 2^56 in all. */
+static uint64_t rectangle_error2(const struct ih_labels_scratch *scratch,
+                                 const struct ih_candidate *const corner[4])
 {
     int64_t u = 0;
     int64_t v = 0;
@@ -90,38 +88,65 @@ static int32_t rectangle_error(const struct ih_labels_scratch *scratch,
         v += sign * scratch->v_px_q12[corner[i]->dot];
         perp2 += (int64_t)corner[i]->perp_px_q12 * corner[i]->perp_px_q12;
     }
-    return (int32_t)ih_isqrt_u64((uint64_t)((u * u + v * v + 9 * perp2) / 4));
+    return (uint64_t)((u * u + v * v + 9 * perp2) / 4);
 }
 
-/* The best choice of candidates for the rectangle whose first corner is slot. False when there is
- * none below the limit, or when another choice is nearly as good. */
+/* The best and the second best choice of candidates for a rectangle. */
+struct seed_search {
+    uint64_t best2, second2;
+    int8_t choice[4];
+};
+
+/* Try every candidate of the last corner with the three that are chosen. */
+static void try_last_corner(const struct ih_labels_scratch *scratch, int32_t slot,
+                            const struct ih_candidate *corner[4], int8_t choice[4],
+                            struct seed_search *search)
+{
+    for (int8_t i = 0; i < scratch->candidate_count[slot]; i++) {
+        corner[3] = candidate_of(scratch, slot, i);
+        if (corner[3]->dot == corner[0]->dot || corner[3]->dot == corner[1]->dot ||
+            corner[3]->dot == corner[2]->dot) {
+            continue;
+        }
+        uint64_t error2 = rectangle_error2(scratch, corner);
+        if (error2 < search->best2) {
+            choice[3] = i;
+            search->second2 = search->best2;
+            search->best2 = error2;
+            memcpy(search->choice, choice, sizeof search->choice);
+        } else if (error2 < search->second2) {
+            search->second2 = error2;
+        }
+    }
+}
+
+/* The best choice of candidates for the rectangle of four slots. False when there is none below the
+ * limit, or when another choice is nearly as good. */
 static bool find_seed(const struct ih_labels_scratch *scratch, const int32_t slot[4],
                       const struct ih_labels_params *params, struct ih_labels_offer *out)
 {
-    int32_t best = ERROR_NONE_PX_Q12;
-    int32_t second = ERROR_NONE_PX_Q12;
+    struct seed_search search = {UINT64_MAX, UINT64_MAX, {0}};
+    const struct ih_candidate *corner[4];
     int8_t i[4];
     for (i[0] = 0; i[0] < scratch->candidate_count[slot[0]]; i[0]++) {
+        corner[0] = candidate_of(scratch, slot[0], i[0]);
         for (i[1] = 0; i[1] < scratch->candidate_count[slot[1]]; i[1]++) {
+            corner[1] = candidate_of(scratch, slot[1], i[1]);
             for (i[2] = 0; i[2] < scratch->candidate_count[slot[2]]; i[2]++) {
-                for (i[3] = 0; i[3] < scratch->candidate_count[slot[3]]; i[3]++) {
-                    const struct ih_candidate *corner[4];
-                    for (int k = 0; k < 4; k++) {
-                        corner[k] = candidate_of(scratch, slot[k], i[k]);
-                    }
-                    int32_t error = rectangle_error(scratch, corner);
-                    if (error < best) {
-                        second = best;
-                        best = error;
-                        memcpy(out->choice, i, sizeof i);
-                    } else if (error < second) {
-                        second = error;
-                    }
+                corner[2] = candidate_of(scratch, slot[2], i[2]);
+                bool distinct = corner[0]->dot != corner[1]->dot &&
+                                corner[0]->dot != corner[2]->dot &&
+                                corner[1]->dot != corner[2]->dot;
+                if (distinct) {
+                    try_last_corner(scratch, slot[3], corner, i, &search);
                 }
             }
         }
     }
-    out->error_px_q12 = best;
+    int64_t best = ih_isqrt_u64(search.best2);
+    int64_t second = ih_isqrt_u64(search.second2);
+    memcpy(out->choice, search.choice, sizeof out->choice);
+    out->error_px_q12 = (int32_t)(best < INT32_MAX ? best : INT32_MAX);
     return best < params->seed_max_px_q12 && second - best > params->seed_margin_px_q12;
 }
 

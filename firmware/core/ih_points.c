@@ -99,28 +99,40 @@ static int32_t near_depth_mm(const struct ih_frame *frame, const struct ih_rig *
     return count == 0 ? 0 : bin * SURVEY_BIN_MM + SURVEY_BIN_MM / 2;
 }
 
+/* The first run of near pixels in a row that is at least width_px long. */
+static bool find_near_run(const struct ih_frame *frame, const struct ih_rig *rig, int32_t v,
+                          int32_t far_mm, int32_t width_px, int32_t *first_px, int32_t *last_px)
+{
+    int32_t step = survey_step(frame);
+    int32_t first = IH_NONE;
+    int32_t last = IH_NONE;
+    for (int32_t u = 0; u < frame->width; u += step) {
+        int32_t depth = depth_mm_at(frame, rig, u, v);
+        bool is_near = depth > 0 && depth <= far_mm;
+        if (!is_near && first != IH_NONE && last - first >= width_px) {
+            break;
+        }
+        first = !is_near ? IH_NONE : first == IH_NONE ? u : first;
+        last = u;
+    }
+    *first_px = first;
+    *last_px = last;
+    return first != IH_NONE && last - first >= width_px;
+}
+
 /* Where a head would be among what is near: the highest row that is near over the width of a head,
- * and the middle of that row. False when there is none. */
+ * and the middle of its first run. False when there is none. */
 static bool find_top(const struct ih_frame *frame, const struct ih_rig *rig, int32_t near_mm,
                      const struct ih_points_params *params, int32_t *u_px, int32_t *v_px)
 {
-    int32_t step = survey_step(frame);
     int32_t width_px = (int32_t)(((int64_t)rig->calibration.fx_px_q16 * params->top_width_mm /
                                   near_mm) >> 16);
-    for (int32_t v = 0; v < frame->height; v += step) {
-        int32_t first = IH_NONE;
-        for (int32_t u = 0; u < frame->width; u += step) {
-            int32_t depth = depth_mm_at(frame, rig, u, v);
-            if (depth == 0 || depth > near_mm + params->reach_mm) {
-                first = IH_NONE;
-            } else if (first == IH_NONE) {
-                first = u;
-            }
-            if (first != IH_NONE && u - first >= width_px) {
-                *u_px = (first + u) / 2;
-                *v_px = v;
-                return true;
-            }
+    for (int32_t v = 0; v < frame->height; v += survey_step(frame)) {
+        int32_t first, last;
+        if (find_near_run(frame, rig, v, near_mm + params->reach_mm, width_px, &first, &last)) {
+            *u_px = (first + last) / 2;
+            *v_px = v;
+            return true;
         }
     }
     return false;

@@ -3,10 +3,10 @@
  *
  * In:    points by slot, the dots' over-exposure map (NULL for a range image), rig.
  * Out:   up to 361 rows (place in field units, depth, weight) for the least-squares fit.
- * Way:   1. Isolated: a point with at least 3 of 8 neighbours that differs by more than
- *           isolated_mm from all but one of them is dropped.
- *        2. Clip: depth := min(depth, max(p8 + clip_behind, clip_least)), p8 the 8th percentile of
+ * Way:   1. Clip: depth := min(depth, max(p8 + clip_behind, clip_least)), p8 the 8th percentile of
  *           the seen depths. The surface has no business with the far wall.
+ *        2. Isolated: a point with at least 3 of 8 neighbours whose clipped depth differs by more
+ *           than isolated_mm from all but one of them is dropped.
  *        3. Missing dots: a dot that is not seen says that nothing is there: it enters as a far
  *           point at the clip depth, at the place where its ray shows there, with a small weight.
  *           Only where fewer than fill_neighbours of its 8 neighbours are seen (a hole inside a

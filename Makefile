@@ -1,0 +1,58 @@
+# The front door. CMake does the work; `make help` lists what can be done.
+
+MAKEFLAGS += --no-print-directory
+BUILD := build
+# Where the measured frames and scans are, for `make accept`.
+DATA ?= ../shared/data
+# A folder with unity.c, or one with cJSON.c: used instead of fetching the source package.
+UNITY_DIR ?= $(BUILD)/third_party/unity
+CJSON_DIR ?= $(BUILD)/third_party/cjson
+
+.DEFAULT_GOAL := help
+.PHONY: help sim frames test accept bits vectors format lint clean
+
+help: ## this list
+	@awk -F ':.*## ' '/^[a-z_]+:.*## / { printf "  make %-8s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+
+sim: ## build host_sim, and render frames/ if they are not there
+	@tools/setup.sh sim
+	@cmake --preset host > $(BUILD)/host.log 2>&1 || { cat $(BUILD)/host.log; exit 1; }
+	@cmake --build --preset host --parallel
+	@$(MAKE) frames
+
+frames: frames/sequence1/rig.json frames/sequence2/rig.json
+
+# rig.json is written last: it stands for the whole directory.
+frames/sequence%/rig.json:
+	@mkdir -p frames
+	@$(BUILD)/host/tools/render/render --sequence $* --seed $* frames/sequence$*
+
+test: sim ## every test: units against float64, sanitizers, bad input, rules of the core, same bits
+	@tools/setup.sh test
+	@cmake --preset sanitize -DISOHEAD_UNITY_DIR=$(abspath $(UNITY_DIR)) \
+	  > $(BUILD)/sanitize.log 2>&1 || { cat $(BUILD)/sanitize.log; exit 1; }
+	@cmake --build --preset sanitize --parallel
+	@ctest --test-dir $(BUILD)/sanitize --output-on-failure
+
+accept: test ## the measured limits on the data sets in DATA (default ../shared/data)
+	@tests/accept/accept.sh $(BUILD)/host/sim/host_sim $(DATA)
+
+bits: sim ## the same records from gcc and clang, -O0 and -O3, x86-64 and aarch64
+	@tools/setup.sh bits
+	@tests/checks/same_bits.sh $(abspath $(CJSON_DIR)) frames $(wildcard $(DATA))
+
+vectors: ## write tests/vectors anew with the float64 reference
+	@tools/setup.sh vectors
+	@/usr/bin/python3 tools/oracle/make_vectors.py --out tests/vectors
+
+format: ## clang-format over all C sources
+	@tools/setup.sh format
+	@git ls-files '*.c' '*.h' | xargs clang-format -i
+
+lint: sim ## clang-tidy over the core, the simulator and the renderer
+	@tools/setup.sh lint
+	@git ls-files 'firmware/*.c' 'hal/*.c' 'sim/*.c' 'tools/*.c' | \
+	  xargs -P 2 -n 4 clang-tidy --quiet -p $(BUILD)/host
+
+clean: ## remove the build; rendered frames stay
+	@rm -rf $(BUILD)

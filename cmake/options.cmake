@@ -1,0 +1,41 @@
+# Compiler options shared by all targets.
+
+# Everything of ours: warnings are errors.
+add_library(isohead_warnings INTERFACE)
+target_compile_options(isohead_warnings INTERFACE
+  -Wall -Wextra -Wconversion -Wshadow -Wdouble-promotion -Wvla -Wstrict-prototypes
+  -Wmissing-prototypes -Werror)
+
+# The host's floating point must not depend on the compiler's taste for fused operations.
+add_compile_options(-ffp-contract=off)
+
+# The core: no floating-point register may be touched at all.
+add_library(isohead_integer_only INTERFACE)
+include(CheckCCompilerFlag)
+check_c_compiler_flag(-mgeneral-regs-only ISOHEAD_HAS_GENERAL_REGS_ONLY)
+if(ISOHEAD_HAS_GENERAL_REGS_ONLY)
+  target_compile_options(isohead_integer_only INTERFACE -mgeneral-regs-only)
+endif()
+
+if(ISOHEAD_SANITIZE)
+  add_compile_options(-fsanitize=address,undefined -fno-sanitize-recover=all
+                      -fno-omit-frame-pointer -g)
+  add_link_options(-fsanitize=address,undefined)
+endif()
+
+# cJSON: the installed library, or one source file that was named.
+add_library(isohead_cjson INTERFACE)
+if(ISOHEAD_CJSON_DIR)
+  add_library(cjson_source STATIC "${ISOHEAD_CJSON_DIR}/cJSON.c")
+  # <cjson/cJSON.h> is how the installed library is included
+  file(MAKE_DIRECTORY "${CMAKE_BINARY_DIR}/cjson_include/cjson")
+  configure_file("${ISOHEAD_CJSON_DIR}/cJSON.h"
+                 "${CMAKE_BINARY_DIR}/cjson_include/cjson/cJSON.h" COPYONLY)
+  target_include_directories(isohead_cjson SYSTEM INTERFACE "${CMAKE_BINARY_DIR}/cjson_include")
+  target_link_libraries(isohead_cjson INTERFACE cjson_source m)
+else()
+  find_library(ISOHEAD_CJSON_LIBRARY cjson REQUIRED)
+  find_path(ISOHEAD_CJSON_INCLUDE cjson/cJSON.h REQUIRED)
+  target_include_directories(isohead_cjson SYSTEM INTERFACE "${ISOHEAD_CJSON_INCLUDE}")
+  target_link_libraries(isohead_cjson INTERFACE "${ISOHEAD_CJSON_LIBRARY}" m)
+endif()

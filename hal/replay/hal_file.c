@@ -1,0 +1,89 @@
+#include "replay/hal_file.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+
+static void fail(struct hal_error *error, const char *text)
+{
+    snprintf(error->text, sizeof error->text, "%s", text);
+}
+
+bool hal_file_exists(const char *path)
+{
+    struct stat status;
+    return lstat(path, &status) == 0;
+}
+
+FILE *hal_file_open(const char *path, size_t limit, struct hal_error *error)
+{
+    struct stat status;
+    if (stat(path, &status) != 0) {
+        fail(error, strerror(errno));
+    } else if (S_ISDIR(status.st_mode)) {
+        fail(error, "a directory, expected a file");
+    } else if (!S_ISREG(status.st_mode)) {
+        fail(error, "a device or pipe, expected a file");
+    } else if (status.st_size < 0 || (uintmax_t)status.st_size > limit) {
+        snprintf(error->text, sizeof error->text, "%jd bytes, expected at most %zu",
+                 (intmax_t)status.st_size, limit);
+    } else {
+        FILE *file = fopen(path, "rb");
+        if (file == NULL) {
+            fail(error, strerror(errno));
+        }
+        return file;
+    }
+    return NULL;
+}
+
+/* Content of an open file in new memory; NULL when it cannot be read. The file may have changed
+ * since it was measured: what is read counts, and never more than the limit. */
+static uint8_t *read_content(FILE *file, size_t limit, size_t *size, struct hal_error *error)
+{
+    struct stat status;
+    if (fstat(fileno(file), &status) != 0) {
+        fail(error, strerror(errno));
+        return NULL;
+    }
+    size_t length = (uintmax_t)status.st_size > limit ? limit : (size_t)status.st_size;
+    uint8_t *content = malloc(length + 1);
+    if (content == NULL) {
+        fail(error, "no memory for this file");
+        return NULL;
+    }
+    *size = fread(content, 1, length, file);
+    if (ferror(file)) {
+        fail(error, strerror(errno));
+        free(content);
+        return NULL;
+    }
+    content[*size] = 0;
+    return content;
+}
+
+bool hal_file_read(const char *path, size_t limit, uint8_t **data, size_t *size,
+                   struct hal_error *error)
+{
+    FILE *file = hal_file_open(path, limit, error);
+    if (file == NULL) {
+        return false;
+    }
+    *data = read_content(file, limit, size, error);
+    fclose(file);
+    return *data != NULL;
+}
+
+char *hal_file_join(const char *dir, const char *name)
+{
+    size_t size = strlen(dir) + 1 + strlen(name) + 1;
+    char *path = malloc(size);
+    if (path != NULL) {
+        size_t dir_length = strlen(dir);
+        bool has_slash = dir_length > 0 && dir[dir_length - 1] == '/';
+        snprintf(path, size, "%s%s%s", dir, has_slash ? "" : "/", name);
+    }
+    return path;
+}

@@ -1,0 +1,27 @@
+/* hal_file - regular files, opened or read whole.
+ *
+ * Error: as text without the file's name: what the system says, a directory or device in place of
+ *        a file (opening a pipe would wait for ever), more bytes than the limit, no memory.
+ */
+#ifndef HAL_FILE_H
+#define HAL_FILE_H
+
+#include <stddef.h>
+#include <stdio.h>
+
+#include "hal.h"
+
+/* Is there anything of this name, be it a link that leads nowhere? */
+bool hal_file_exists(const char *path);
+
+/* For reading; NULL with *error when that is not possible or it has more bytes than the limit. */
+FILE *hal_file_open(const char *path, size_t limit, struct hal_error *error);
+
+/* *data: to be freed by the caller; a zero byte that *size does not count follows the content. */
+bool hal_file_read(const char *path, size_t limit, uint8_t **data, size_t *size,
+                   struct hal_error *error);
+
+/* dir/name in new memory; NULL when there is none. */
+char *hal_file_join(const char *dir, const char *name);
+
+#endif

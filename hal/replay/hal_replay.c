@@ -1,0 +1,352 @@
+#include "replay/hal_replay.h"
+
+#include <dirent.h>
+#include <errno.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "replay/hal_file.h"
+#include "replay/hal_lines.h"
+#include "replay/hal_pgm.h"
+
+#define LIST_NAME "frames.jsonl"
+#define FRAME_SUFFIX ".pgm"
+/* Times beyond this are not exact in JSON's numbers. */
+#define TIME_MAX_US ((double)((int64_t)1 << 53))
+
+static bool fail(struct hal_error *error, const char *format, ...)
+    __attribute__((format(printf, 2, 3)));
+
+static bool fail(struct hal_error *error, const char *format, ...)
+{
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(error->text, sizeof error->text, format, arguments);
+    va_end(arguments);
+    return false;
+}
+
+static char *copy_text(const char *text)
+{
+    size_t size = strlen(text) + 1;
+    char *copy = malloc(size);
+    if (copy != NULL) {
+        memcpy(copy, text, size);
+    }
+    return copy;
+}
+
+/* Frames are what the shell's *.pgm matches. */
+static bool is_frame_name(const char *name)
+{
+    size_t length = strlen(name);
+    size_t suffix_length = strlen(FRAME_SUFFIX);
+    return name[0] != '.' && length > suffix_length &&
+           strcmp(name + length - suffix_length, FRAME_SUFFIX) == 0 && strchr(name, '/') == NULL;
+}
+
+/* Index of the first entry whose name is not less. */
+static size_t find_place(const struct hal_replay *replay, const char *name)
+{
+    size_t low = 0;
+    size_t high = replay->entry_count;
+    while (low < high) {
+        size_t middle = low + (high - low) / 2;
+        if (strcmp(replay->entry[middle].name, name) < 0) {
+            low = middle + 1;
+        } else {
+            high = middle;
+        }
+    }
+    return low;
+}
+
+static struct hal_replay_entry *find_entry(const struct hal_replay *replay, const char *name)
+{
+    size_t place = find_place(replay, name);
+    if (place < replay->entry_count && strcmp(replay->entry[place].name, name) == 0) {
+        return &replay->entry[place];
+    }
+    return NULL;
+}
+
+/* A new entry in its place; NULL when there is no memory. */
+static struct hal_replay_entry *add_entry(struct hal_replay *replay, const char *name)
+{
+    if (replay->entry_count == replay->entry_capacity) {
+        size_t capacity = replay->entry_capacity == 0 ? 64 : replay->entry_capacity * 2;
+        struct hal_replay_entry *grown = realloc(replay->entry, capacity * sizeof *grown);
+        if (grown == NULL) {
+            return NULL;
+        }
+        replay->entry = grown;
+        replay->entry_capacity = capacity;
+    }
+    char *copy = copy_text(name);
+    if (copy == NULL) {
+        return NULL;
+    }
+    size_t place = find_place(replay, name);
+    struct hal_replay_entry *entry = &replay->entry[place];
+    memmove(entry + 1, entry, (replay->entry_count - place) * sizeof *entry);
+    *entry = (struct hal_replay_entry){.name = copy, .laser = true};
+    replay->entry_count++;
+    return entry;
+}
+
+static bool read_names(struct hal_replay *replay, struct hal_error *error)
+{
+    DIR *dir = opendir(replay->dir);
+    if (dir == NULL) {
+        return fail(error, "%s", strerror(errno));
+    }
+    bool good = true;
+    struct dirent *item = NULL;
+    while (good && (item = readdir(dir)) != NULL) {
+        if (is_frame_name(item->d_name)) {
+            struct hal_replay_entry *entry = add_entry(replay, item->d_name);
+            good = entry != NULL;
+            if (good) {
+                entry->on_disk = true;
+            }
+        }
+    }
+    closedir(dir);
+    if (!good) {
+        return fail(error, "no memory for the list of frames");
+    }
+    if (replay->entry_count == 0) {
+        return fail(error, "no frames (*" FRAME_SUFFIX ") in this directory");
+    }
+    return true;
+}
+
+/* Time and laser of one line. False: *error says which field is wrong. */
+static bool read_fields(const cJSON *line, struct hal_replay_entry *entry, struct hal_error *error)
+{
+    const cJSON *time = cJSON_GetObjectItemCaseSensitive(line, "time_us");
+    const cJSON *laser = cJSON_GetObjectItemCaseSensitive(line, "laser");
+    if (laser != NULL) {
+        if (!cJSON_IsBool(laser)) {
+            return fail(error, "laser is neither true nor false");
+        }
+        entry->laser = cJSON_IsTrue(laser);
+    }
+    if (time == NULL) {
+        return fail(error, "no time_us");
+    }
+    if (!cJSON_IsNumber(time)) {
+        return fail(error, "time_us is not a number");
+    }
+    double value = time->valuedouble;
+    if (!(value >= -TIME_MAX_US && value <= TIME_MAX_US) || (double)(int64_t)value != value) {
+        return fail(error, "time_us is %g, expected a whole number within +-2^53", value);
+    }
+    entry->time_us = (int64_t)value;
+    return true;
+}
+
+/* The entry that a line names, from now on listed; NULL with *error when there is none to take. */
+static struct hal_replay_entry *claim_entry(struct hal_replay *replay, const cJSON *line,
+                                            struct hal_error *error)
+{
+    const cJSON *file = cJSON_GetObjectItemCaseSensitive(line, "file");
+    if (!cJSON_IsString(file)) {
+        fail(error, "no file, expected the name of a frame");
+        return NULL;
+    }
+    const char *name = file->valuestring;
+    if (!is_frame_name(name)) {
+        fail(error, "file is \"%.100s\", expected the name of a *" FRAME_SUFFIX, name);
+        return NULL;
+    }
+    struct hal_replay_entry *entry = find_entry(replay, name);
+    if (entry == NULL) {
+        entry = add_entry(replay, name);
+        if (entry == NULL) {
+            fail(error, "no memory for the list of frames");
+        }
+    } else if (entry->listed) {
+        fail(error, "%.100s was listed before; this line is ignored", name);
+        return NULL;
+    }
+    if (entry != NULL) {
+        entry->listed = true;
+    }
+    return entry;
+}
+
+/* The text may be lost for want of memory; that the entry is bad is not. */
+static void spoil(struct hal_replay_entry *entry, const char *text)
+{
+    entry->bad = true;
+    entry->error = copy_text(text);
+}
+
+/* Note what one line says in the entry that it names. False: it names none that it may. */
+static bool read_line(struct hal_replay *replay, const cJSON *line, long number,
+                      struct hal_error *error)
+{
+    struct hal_replay_entry *entry = claim_entry(replay, line, error);
+    if (entry == NULL) {
+        return false;
+    }
+    char message[HAL_ERROR_MAX + 64];
+    if (!read_fields(line, entry, error)) {
+        snprintf(message, sizeof message, LIST_NAME " line %ld: %s", number, error->text);
+        spoil(entry, message);
+    } else if (!entry->on_disk) {
+        snprintf(message, sizeof message, "no such file; listed in " LIST_NAME " line %ld", number);
+        spoil(entry, message);
+    }
+    return true;
+}
+
+static void read_lines(struct hal_replay *replay, struct hal_lines *lines, const char *path,
+                       const struct hal_log *log)
+{
+    struct hal_error error;
+    cJSON *line = NULL;
+    enum hal_lines_next next = HAL_LINES_END;
+    while ((next = hal_lines_next(lines, &line, &error)) != HAL_LINES_END) {
+        if (next == HAL_LINES_BAD) {
+            log->error(log->context, path, error.text);
+            continue;
+        }
+        if (!read_line(replay, line, lines->number, &error)) {
+            char message[HAL_ERROR_MAX + 64];
+            snprintf(message, sizeof message, "line %ld: %s", lines->number, error.text);
+            log->error(log->context, path, message);
+        }
+        cJSON_Delete(line);
+    }
+}
+
+/* A frame that was taken before the one before it is an error of its own; the time goes on from
+ * there, so that one slip in a recording costs one frame. */
+static void check_order(struct hal_replay *replay)
+{
+    const struct hal_replay_entry *before = NULL;
+    for (size_t i = 0; i < replay->entry_count; i++) {
+        struct hal_replay_entry *entry = &replay->entry[i];
+        if (entry->bad || !entry->listed) {
+            continue;
+        }
+        if (before != NULL && entry->time_us < before->time_us) {
+            char message[HAL_ERROR_MAX];
+            snprintf(message, sizeof message,
+                     LIST_NAME ": time_us %lld is before %lld of the frame before it",
+                     (long long)entry->time_us, (long long)before->time_us);
+            spoil(entry, message);
+        }
+        before = entry;
+    }
+}
+
+static void read_list(struct hal_replay *replay, const struct hal_log *log)
+{
+    struct hal_error error = {"no memory"};
+    struct hal_lines lines;
+    char *path = hal_file_join(replay->dir, LIST_NAME);
+    if (path != NULL && !hal_file_exists(path)) {
+        free(path);
+        return;
+    }
+    if (path != NULL && hal_lines_open(&lines, path, &error)) {
+        replay->listed = true;
+        read_lines(replay, &lines, path, log);
+        check_order(replay);
+        hal_lines_close(&lines);
+    } else {
+        log->error(log->context, path == NULL ? LIST_NAME : path, error.text);
+    }
+    free(path);
+}
+
+/* The samples of a frame from the disk. */
+static bool load_frame(struct hal_replay *replay, const char *name, struct hal_pgm *pgm,
+                       struct hal_error *error)
+{
+    char *path = hal_file_join(replay->dir, name);
+    if (path == NULL) {
+        return fail(error, "no memory for this file");
+    }
+    size_t size = 0;
+    bool good = hal_file_read(path, HAL_PGM_FILE_MAX, &replay->samples, &size, error) &&
+                hal_pgm_decode(replay->samples, size, pgm, error);
+    free(path);
+    return good;
+}
+
+static enum hal_next next_frame(void *context, struct hal_frame *frame, struct hal_error *error)
+{
+    struct hal_replay *replay = context;
+    free(replay->samples);
+    replay->samples = NULL;
+    if (replay->next_index == replay->entry_count) {
+        return HAL_NEXT_END;
+    }
+    const struct hal_replay_entry *entry = &replay->entry[replay->next_index++];
+    *frame = (struct hal_frame){
+        .name = entry->name, .time_us = entry->time_us, .laser = entry->laser};
+    if (entry->bad) {
+        fail(error, "%s", entry->error == NULL ? "no memory" : entry->error);
+        return HAL_NEXT_BAD;
+    }
+    if (replay->listed && !entry->listed) {
+        fail(error, "not listed in " LIST_NAME);
+        return HAL_NEXT_BAD;
+    }
+    struct hal_pgm pgm;
+    if (!load_frame(replay, entry->name, &pgm, error)) {
+        return HAL_NEXT_BAD;
+    }
+    frame->samples = replay->samples;
+    frame->width = pgm.width;
+    frame->height = pgm.height;
+    frame->stride_bytes = pgm.width * pgm.bytes_per_sample;
+    frame->bytes_per_sample = pgm.bytes_per_sample;
+    frame->maximum = pgm.maximum;
+    return HAL_NEXT_FRAME;
+}
+
+bool hal_replay_open(struct hal_replay *replay, const char *dir, const struct hal_log *log,
+                     struct hal_error *error)
+{
+    *replay = (struct hal_replay){.camera = {.context = replay, .next = next_frame}};
+    replay->dir = copy_text(dir);
+    if (replay->dir == NULL) {
+        return fail(error, "no memory");
+    }
+    if (!read_names(replay, error)) {
+        hal_replay_close(replay);
+        return false;
+    }
+    read_list(replay, log);
+    if (!replay->listed) {
+        for (size_t i = 0; i < replay->entry_count; i++) {
+            replay->entry[i].time_us = (int64_t)i * HAL_REPLAY_STEP_US;
+        }
+    }
+    return true;
+}
+
+void hal_replay_close(struct hal_replay *replay)
+{
+    for (size_t i = 0; i < replay->entry_count; i++) {
+        free(replay->entry[i].name);
+        free(replay->entry[i].error);
+    }
+    free(replay->entry);
+    free(replay->samples);
+    free(replay->dir);
+    *replay = (struct hal_replay){.next_index = 0};
+}
+
+bool hal_replay_has(const struct hal_replay *replay, const char *name)
+{
+    const struct hal_replay_entry *entry = find_entry(replay, name);
+    return entry != NULL && entry->on_disk;
+}

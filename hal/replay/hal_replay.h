@@ -1,0 +1,54 @@
+/* hal_replay - a frames directory as a camera.
+ *
+ * In:    the directory's *.pgm and, if it is there, its frames.jsonl (docs/contract.md).
+ * Out:   the frames in the lexicographic (byte) order of their names. Without frames.jsonl the
+ *        laser is on and frames are HAL_REPLAY_STEP_US apart.
+ * Error: on opening: no directory, no frames, no memory. To the log: what is wrong in frames.jsonl
+ *        and cannot be tied to a frame. As HAL_NEXT_BAD, in the frame's place: a frame that cannot
+ *        be read; a frame that frames.jsonl does not list; a listed one that is not there; one
+ *        whose line has a bad time_us or laser, or a time before that of the frame before it.
+ *
+ * frames.jsonl line by line: empty lines are skipped; `laser` may be left out and is true; of two
+ * lines for one frame the first counts and the second goes to the log; a line that is no JSON
+ * object or has no usable `file` goes to the log, and the frame that it meant is then unlisted.
+ * When frames.jsonl is there but cannot be opened, that goes to the log and the frames get the
+ * times that they would have without it.
+ */
+#ifndef HAL_REPLAY_H
+#define HAL_REPLAY_H
+
+#include <stddef.h>
+
+#include "hal.h"
+
+#define HAL_REPLAY_STEP_US 40000
+
+struct hal_replay_entry {
+    char *name;
+    int64_t time_us;
+    bool laser;
+    bool on_disk;
+    bool listed; /* frames.jsonl has a line for it */
+    bool bad;    /* cannot be handed on, because of its line */
+    char *error; /* why */
+};
+
+struct hal_replay {
+    struct hal_camera camera; /* the way to the frames */
+    char *dir;
+    struct hal_replay_entry *entry; /* sorted by name */
+    size_t entry_count, entry_capacity;
+    size_t next_index;
+    bool listed;      /* there is a frames.jsonl */
+    uint8_t *samples; /* of the frame handed on last */
+};
+
+/* log is used during this call only. False: *error says why, and there is nothing to close. */
+bool hal_replay_open(struct hal_replay *replay, const char *dir, const struct hal_log *log,
+                     struct hal_error *error);
+void hal_replay_close(struct hal_replay *replay);
+
+/* Is a frame of this name on the disk? */
+bool hal_replay_has(const struct hal_replay *replay, const char *name);
+
+#endif

@@ -1,0 +1,30 @@
+/* sim_dirs - which frames directories the command line means.
+ *
+ * A DIR with a rig.json is one itself; any other stands for those of its subdirectories that have
+ * one, in byte order of their names, hidden ones left out. With --rig frames do in place of a
+ * rig.json. A DIR that is neither is an error in the report.
+ */
+#ifndef SIM_DIRS_H
+#define SIM_DIRS_H
+
+#include <stdbool.h>
+#include <stddef.h>
+
+#include "sim_report.h"
+
+struct sim_dir {
+    char *path;
+    char *label; /* last part of the path, unique among all: names rows and trace folders */
+};
+
+struct sim_dirs {
+    struct sim_dir *dir;
+    size_t dir_count, dir_capacity;
+};
+
+/* with_rig: a rig comes from elsewhere. Adds to dirs. */
+void sim_dirs_add(struct sim_dirs *dirs, const char *path, bool with_rig,
+                  struct sim_report *report);
+void sim_dirs_free(struct sim_dirs *dirs);
+
+#endif

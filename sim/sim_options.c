@@ -1,0 +1,94 @@
+#include "sim_options.h"
+
+#include <getopt.h>
+#include <stdio.h>
+
+enum { OPTION_JSON = 1, OPTION_PAPER, OPTION_RIG, OPTION_TRACE, OPTION_HELP, OPTION_VERSION };
+
+static const struct option table[] = {
+    {"json", no_argument, NULL, OPTION_JSON},
+    {"paper", no_argument, NULL, OPTION_PAPER},
+    {"rig", required_argument, NULL, OPTION_RIG},
+    {"trace", required_argument, NULL, OPTION_TRACE},
+    {"help", no_argument, NULL, OPTION_HELP},
+    {"version", no_argument, NULL, OPTION_VERSION},
+    {NULL, 0, NULL, 0},
+};
+
+static bool refuse(const char *reason, const char *subject)
+{
+    fprintf(stderr, "host_sim: %s%s; host_sim --help tells more\n", reason, subject);
+    return false;
+}
+
+static void take(struct sim_options *options, int option)
+{
+    switch (option) {
+    case OPTION_JSON:
+        options->json = true;
+        break;
+    case OPTION_PAPER:
+        options->paper = true;
+        break;
+    case OPTION_RIG:
+        options->rig = optarg;
+        break;
+    case OPTION_TRACE:
+        options->trace = optarg;
+        break;
+    case OPTION_HELP:
+        options->help = true;
+        break;
+    default:
+        options->version = true;
+        break;
+    }
+}
+
+bool sim_options_parse(struct sim_options *options, int argument_count, char **arguments)
+{
+    *options = (struct sim_options){.json = false};
+    int option = 0;
+    opterr = 0;
+    /* The leading ':' tells a missing argument from an unknown option. */
+    while ((option = getopt_long(argument_count, arguments, ":", table, NULL)) != -1) {
+        if (option == ':') {
+            return refuse("missing argument of ", arguments[optind - 1]);
+        }
+        if (option == '?') {
+            /* optopt is the letter of a short option; for a long one it is small or 0. */
+            const char letter[] = {'-', (char)optopt, 0};
+            return refuse("unknown option or unexpected argument: ",
+                          optopt >= ' ' ? letter : arguments[optind - 1]);
+        }
+        if (optarg != NULL && optarg[0] == 0) {
+            return refuse("empty argument of ", arguments[optind - 2]);
+        }
+        take(options, option);
+    }
+    options->dirs = arguments + optind;
+    options->dir_count = argument_count - optind;
+    if (options->dir_count == 0 && !options->help && !options->version) {
+        return refuse("no frames directory given", "");
+    }
+    return true;
+}
+
+void sim_options_help(void)
+{
+    fputs("host_sim [options] DIR...\n"
+          "Find a person's head in 3-D in the frames of each DIR (*.pgm, rig.json).\n"
+          "A DIR without rig.json stands for those of its subdirectories that have one.\n"
+          "\n"
+          "  --json         a JSON record per frame on standard output, nothing else there\n"
+          "  --paper        the paper's method alone: every frame on its own\n"
+          "  --rig FILE     this rig file instead of DIR/rig.json\n"
+          "  --trace OUT    write every stage's results of each frame under OUT, as JSON\n"
+          "  --help         this text\n"
+          "  --version      the version\n"
+          "\n"
+          "Without --json: a line per frame, then, where there is truth, the paper's Table 1.\n"
+          "Exit status: 0 all frames processed, 1 some input wrong (see standard error),\n"
+          "2 wrong usage. docs/contract.md describes all files.\n",
+          stdout);
+}

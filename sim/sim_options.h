@@ -1,0 +1,29 @@
+/* sim_options - the command line of host_sim. */
+#ifndef SIM_OPTIONS_H
+#define SIM_OPTIONS_H
+
+#include <stdbool.h>
+
+enum sim_status {
+    SIM_STATUS_GOOD = 0,  /* every frame was processed */
+    SIM_STATUS_INPUT = 1, /* some input was unreadable or wrong, or output could not be written */
+    SIM_STATUS_USAGE = 2
+};
+
+struct sim_options {
+    bool json;
+    bool paper;        /* the paper's method alone */
+    bool help, version;
+    const char *rig;   /* NULL: DIR/rig.json */
+    const char *trace; /* NULL: none */
+    char **dirs;
+    int dir_count; /* at least 1, unless help or version is asked for */
+};
+
+/* False: wrong usage, told on standard error. */
+bool sim_options_parse(struct sim_options *options, int argument_count, char **arguments);
+
+/* The text of --help, on standard output. */
+void sim_options_help(void);
+
+#endif

@@ -1,0 +1,138 @@
+#include "sim_record.h"
+
+#include "sim_score.h"
+#include "sim_write.h"
+
+#define PIXEL_DECIMALS 2
+#define MM_DECIMALS 1
+
+static void write_pair_px(struct sim_write *write, const char *key, int32_t first_px_q12,
+                          int32_t second_px_q12)
+{
+    sim_write_key(write, key);
+    sim_write_open(write, '[');
+    sim_write_decimal(write, sim_text_fixed(first_px_q12, 12, PIXEL_DECIMALS));
+    sim_write_decimal(write, sim_text_fixed(second_px_q12, 12, PIXEL_DECIMALS));
+    sim_write_close(write, ']');
+}
+
+static void write_hypothesis(struct sim_write *write, const struct ih_hypothesis *hypothesis)
+{
+    sim_write_open(write, '{');
+    write_pair_px(write, "pixel", hypothesis->u_px_q12, hypothesis->v_px_q12);
+    write_pair_px(write, "axes_px", hypothesis->a_px_q12, hypothesis->b_px_q12);
+    sim_write_key(write, "angle_deg");
+    sim_write_decimal(write, sim_text_angle(hypothesis->angle_mdeg));
+    sim_write_key(write, "distance_mm");
+    sim_write_decimal(write, sim_text_fixed(hypothesis->distance_mm_q8, 8, MM_DECIMALS));
+    sim_write_key(write, "centre_mm");
+    sim_write_open(write, '[');
+    for (int axis = 0; axis < 3; axis++) {
+        sim_write_decimal(write, sim_text_fixed(hypothesis->centre_mm_q8[axis], 8, MM_DECIMALS));
+    }
+    sim_write_close(write, ']');
+    sim_write_key(write, "rejected");
+    const char *reason = ih_reject_text(hypothesis->rejected);
+    if (reason == NULL) {
+        sim_write_null(write);
+    } else {
+        sim_write_string(write, reason);
+    }
+    sim_write_close(write, '}');
+}
+
+static void write_heads(struct sim_write *write, const struct ih_heads *heads, bool paper)
+{
+    sim_write_key(write, "hypotheses");
+    sim_write_open(write, '[');
+    for (int32_t i = 0; i < heads->hypothesis_count; i++) {
+        write_hypothesis(write, &heads->hypothesis[i]);
+    }
+    sim_write_close(write, ']');
+    sim_write_key(write, "heads");
+    sim_write_open(write, '[');
+    for (int32_t i = 0; i < heads->head_count; i++) {
+        sim_write_int(write, heads->head[i]);
+    }
+    sim_write_close(write, ']');
+    sim_write_key(write, "head");
+    int32_t selected = sim_score_selected(heads, paper);
+    if (selected == IH_NONE) {
+        sim_write_null(write);
+    } else {
+        sim_write_int(write, selected);
+    }
+}
+
+static void write_dropped(struct sim_write *write, const struct isohead *head)
+{
+    const struct {
+        const char *key;
+        int32_t count;
+    } dropped[] = {
+        {"dots", head->dots.dots_dropped},
+        {"runs", head->dots.runs_dropped},
+        {"candidates", head->labels.candidates_dropped},
+        {"minima", head->hypotheses.minima_dropped},
+        {"contours", head->hypotheses.contours_dropped},
+    };
+    bool any = false;
+    for (size_t i = 0; i < sizeof dropped / sizeof dropped[0]; i++) {
+        if (dropped[i].count == 0) {
+            continue;
+        }
+        if (!any) {
+            sim_write_key(write, "dropped");
+            sim_write_open(write, '{');
+            any = true;
+        }
+        sim_write_int_field(write, dropped[i].key, dropped[i].count);
+    }
+    if (any) {
+        sim_write_close(write, '}');
+    }
+}
+
+static struct sim_write begin(const struct sim_record *record, const char *name)
+{
+    struct sim_write write = {.file = record->file};
+    sim_write_open(&write, '{');
+    sim_write_key(&write, "file");
+    sim_write_string(&write, name);
+    return write;
+}
+
+/* Flushed, so that a reader at the other end of a pipe has each record at once. */
+static void end(const struct sim_record *record, struct sim_write *write)
+{
+    if (record->dir != NULL) {
+        sim_write_key(write, "dir");
+        sim_write_string(write, record->dir);
+    }
+    sim_write_close(write, '}');
+    fputc('\n', record->file);
+    fflush(record->file);
+}
+
+void sim_record_frame(const struct sim_record *record, const struct hal_frame *frame,
+                      const struct isohead *head)
+{
+    struct sim_write write = begin(record, frame->name);
+    sim_write_int_field(&write, "time_us", frame->time_us);
+    sim_write_int_field(&write, "dots", head->dots.dot_count);
+    sim_write_int_field(&write, "labelled", head->labels.labelled_count);
+    write_heads(&write, &head->heads, record->paper);
+    if (head->rig.calibration.kind == IH_RIG_RANGE) {
+        sim_write_int_field(&write, "points", head->points.seen_count);
+    }
+    write_dropped(&write, head);
+    end(record, &write);
+}
+
+void sim_record_error(const struct sim_record *record, const char *name, const char *error)
+{
+    struct sim_write write = begin(record, name);
+    sim_write_key(&write, "error");
+    sim_write_string(&write, error);
+    end(record, &write);
+}

@@ -1,0 +1,257 @@
+#include "sim_run.h"
+
+#include <errno.h>
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "replay/hal_file.h"
+#include "replay/hal_replay.h"
+#include "sim_dirs.h"
+#include "sim_record.h"
+#include "sim_report.h"
+#include "sim_rig.h"
+#include "sim_rig_explain.h"
+#include "sim_score.h"
+#include "sim_table.h"
+#include "sim_trace.h"
+#include "sim_truth.h"
+
+#define STDOUT_NAME "standard output"
+
+/* What a run works with. */
+struct run {
+    const struct sim_options *options;
+    struct isohead *head;
+    struct sim_report report;
+    struct sim_dirs dirs;
+    struct sim_score *score; /* one per directory */
+};
+
+/* One directory of it. */
+struct visit {
+    struct run *run;
+    const struct sim_dir *dir;
+    struct hal_replay replay;
+    struct sim_truth truth;
+    struct sim_record record;
+    struct sim_score *score;
+};
+
+/* Rig file to a core that is ready; wrong ones go to the report. */
+static bool start_core(struct run *run, const char *dir)
+{
+    struct ih_calibration calibration;
+    struct hal_error error = {"no memory"};
+    int32_t bad_slot = IH_NONE;
+    char *own = hal_file_join(dir, "rig.json");
+    const char *path = run->options->rig != NULL ? run->options->rig : own;
+    bool good = path != NULL && sim_rig_load(path, &calibration, &error);
+    if (good) {
+        enum ih_err err = isohead_init(run->head, &calibration, &bad_slot);
+        good = err == IH_OK;
+        if (!good) {
+            sim_rig_explain(&calibration, err, bad_slot, &error);
+        }
+    }
+    if (!good) {
+        sim_report_error(&run->report, path != NULL ? path : dir, "%s", error.text);
+    }
+    free(own);
+    return good;
+}
+
+static void report_frame(struct visit *visit, const char *name, const char *text)
+{
+    char *path = hal_file_join(visit->dir->path, name);
+    sim_report_error(&visit->run->report, path != NULL ? path : name, "%s", text);
+    free(path);
+}
+
+/* A frame that is lost. One without laser has no record, only a message. */
+static void lose_frame(struct visit *visit, const struct hal_frame *frame, const char *text)
+{
+    report_frame(visit, frame->name, text);
+    if (!frame->laser) {
+        return;
+    }
+    if (visit->run->options->json) {
+        sim_record_error(&visit->record, frame->name, text);
+    } else {
+        sim_table_error(stdout, frame->name, text);
+    }
+}
+
+/* The core's refusal of a frame, in terms of the frame and the rig. */
+static void explain_frame(const struct isohead *head, const struct hal_frame *frame,
+                          enum ih_err err, struct hal_error *error)
+{
+    const struct ih_calibration *rig = &head->rig.calibration;
+    if (frame->width != rig->width || frame->height != rig->height) {
+        snprintf(error->text, sizeof error->text,
+                 "%" PRId32 "x%" PRId32 " px, expected %" PRId32 "x%" PRId32 " as in the rig",
+                 frame->width, frame->height, rig->width, rig->height);
+    } else if (err == IH_ERR_KIND && rig->kind == IH_RIG_RANGE) {
+        snprintf(error->text, sizeof error->text,
+                 "maxval %" PRId32 ", expected above 255: a range image has two bytes per pixel",
+                 frame->maximum);
+    } else {
+        snprintf(error->text, sizeof error->text, "%s", ih_err_text(err));
+    }
+}
+
+/* Results of one frame to where they are wanted. */
+static void put_frame(struct visit *visit, const struct hal_frame *frame)
+{
+    const struct sim_options *options = visit->run->options;
+    const struct isohead *head = visit->run->head;
+    const struct sim_truth_frame *truth = sim_truth_find(&visit->truth, frame->name);
+    if (visit->truth.present && truth == NULL) {
+        sim_report_error(&visit->run->report, visit->truth.path, "no line for %s", frame->name);
+    }
+    struct sim_verdict verdict = sim_score_judge(&head->heads, options->paper, truth);
+    sim_score_add(visit->score, &verdict);
+    if (truth != NULL && truth->has_dots) {
+        sim_score_add_dots(visit->score, head, truth);
+    }
+    if (options->json) {
+        sim_record_frame(&visit->record, frame, head);
+    } else {
+        sim_table_frame(stdout, frame, head, options->paper, &verdict);
+    }
+}
+
+static void process_frame(struct visit *visit, const struct hal_frame *frame)
+{
+    struct isohead *head = visit->run->head;
+    struct hal_error error;
+    const struct ih_frame view = {
+        .samples = frame->samples,
+        .width = frame->width,
+        .height = frame->height,
+        .stride_bytes = frame->stride_bytes,
+        .bytes_per_sample = frame->bytes_per_sample,
+        .maximum = frame->maximum,
+    };
+    if (!frame->laser) {
+        return;
+    }
+    enum ih_err err = isohead_frame(head, &view);
+    if (err != IH_OK) {
+        explain_frame(head, frame, err, &error);
+        lose_frame(visit, frame, error.text);
+        return;
+    }
+    put_frame(visit, frame);
+    if (visit->run->options->trace != NULL) {
+        const struct sim_trace trace = {visit->run->options->trace, visit->dir->label};
+        if (!sim_trace_frame(&trace, frame, head, &error)) {
+            report_frame(visit, frame->name, error.text);
+        }
+    }
+}
+
+static void process_frames(struct visit *visit)
+{
+    const struct hal_camera *camera = &visit->replay.camera;
+    struct sim_report *report = &visit->run->report;
+    struct hal_frame frame;
+    struct hal_error error;
+    enum hal_next next = HAL_NEXT_END;
+    while (!ferror(stdout) &&
+           (next = camera->next(camera->context, &frame, &error)) != HAL_NEXT_END) {
+        if (next == HAL_NEXT_BAD) {
+            lose_frame(visit, &frame, error.text);
+        } else {
+            process_frame(visit, &frame);
+        }
+        sim_report_progress(report, visit->dir->label, visit->replay.next_index,
+                            visit->replay.entry_count);
+    }
+    sim_report_progress_end(report);
+}
+
+static void process_dir(struct run *run, size_t index)
+{
+    struct hal_error error;
+    const struct sim_dir *dir = &run->dirs.dir[index];
+    struct visit visit = {
+        .run = run,
+        .dir = dir,
+        .record = {.file = stdout,
+                   .dir = run->dirs.dir_count > 1 ? dir->path : NULL,
+                   .paper = run->options->paper},
+        .score = &run->score[index],
+    };
+    if (!start_core(run, dir->path)) {
+        return;
+    }
+    struct hal_log log = sim_report_log(&run->report);
+    if (!hal_replay_open(&visit.replay, dir->path, &log, &error)) {
+        sim_report_error(&run->report, dir->path, "%s", error.text);
+        return;
+    }
+    sim_truth_load(&visit.truth, dir->path, &visit.replay, &run->report);
+    if (!run->options->json) {
+        sim_table_title(stdout, dir->path);
+    }
+    process_frames(&visit);
+    sim_truth_free(&visit.truth);
+    hal_replay_close(&visit.replay);
+}
+
+static void print_tables(struct run *run)
+{
+    struct sim_score sum = {.true_dot_count = 0};
+    size_t count = run->dirs.dir_count;
+    for (size_t i = 0; i < count; i++) {
+        sim_score_merge(&sum, &run->score[i]);
+    }
+    if (sum.with_head.frame_count + sum.empty.frame_count > 0) {
+        sim_table_heading(stdout);
+        for (size_t i = 0; i < count; i++) {
+            sim_table_row(stdout, run->dirs.dir[i].label, &run->score[i]);
+        }
+        if (count > 1) {
+            sim_table_row(stdout, "all", &sum);
+        }
+    }
+    if (sum.true_dot_count > 0) {
+        sim_table_dots_heading(stdout);
+        for (size_t i = 0; i < count; i++) {
+            sim_table_dots_row(stdout, run->dirs.dir[i].label, &run->score[i]);
+        }
+        if (count > 1) {
+            sim_table_dots_row(stdout, "all", &sum);
+        }
+    }
+    sim_score_free(&sum);
+}
+
+enum sim_status sim_run(const struct sim_options *options, struct isohead *head)
+{
+    struct run run = {.options = options, .head = head};
+    sim_report_init(&run.report);
+    for (int i = 0; i < options->dir_count; i++) {
+        sim_dirs_add(&run.dirs, options->dirs[i], options->rig != NULL, &run.report);
+    }
+    size_t count = run.dirs.dir_count;
+    run.score = sim_report_grow(NULL, count + 1, sizeof *run.score);
+    memset(run.score, 0, (count + 1) * sizeof *run.score);
+    for (size_t i = 0; i < count && !ferror(stdout); i++) {
+        process_dir(&run, i);
+    }
+    if (!options->json) {
+        print_tables(&run);
+    }
+    if (fflush(stdout) != 0 || ferror(stdout)) {
+        sim_report_error(&run.report, STDOUT_NAME, "cannot be written: %s", strerror(errno));
+    }
+    for (size_t i = 0; i < count; i++) {
+        sim_score_free(&run.score[i]);
+    }
+    free(run.score);
+    sim_dirs_free(&run.dirs);
+    return run.report.error_count == 0 ? SIM_STATUS_GOOD : SIM_STATUS_INPUT;
+}

@@ -1,0 +1,167 @@
+#include "sim_table.h"
+
+#include <inttypes.h>
+#include <string.h>
+
+#include "sim_text.h"
+
+#define LABEL_WIDTH 20
+#define NAME_MAX_BYTES 256
+
+static const char *const outcome_text[SIM_OUTCOMES] = {"correct", "ambiguous", "wrong",
+                                                       "not done"};
+
+/* A name from the disk, safe for a terminal. */
+static const char *tame(char *buffer, size_t size, const char *name)
+{
+    snprintf(buffer, size, "%s", name);
+    sim_text_tame(buffer);
+    return buffer;
+}
+
+void sim_table_title(FILE *file, const char *path)
+{
+    char name[NAME_MAX_BYTES];
+    fprintf(file, "%s\n%-14s %5s %5s %4s %7s %7s %7s %6s  %s\n", tame(name, sizeof name, path),
+            "frame", "dots", "label", "hyp", "x mm", "y mm", "z mm", "dist", "head");
+}
+
+/* What the truth says of the selection: nothing is printed for a frame that is not scored. */
+static void print_verdict(FILE *file, const struct sim_verdict *verdict)
+{
+    if (!verdict->scored) {
+        return;
+    }
+    if (!verdict->head_there) {
+        fputs(verdict->outcome == SIM_OUTCOME_NONE ? "right: empty" : "wrong: empty", file);
+        return;
+    }
+    fputs(outcome_text[verdict->outcome], file);
+    if (verdict->error_known) {
+        fprintf(file, " %s mm", sim_text_fixed(verdict->error_mm_q8, 8, 0).text);
+    }
+}
+
+void sim_table_frame(FILE *file, const struct hal_frame *frame, const struct isohead *head,
+                     bool paper, const struct sim_verdict *verdict)
+{
+    char name[NAME_MAX_BYTES];
+    const struct ih_heads *heads = &head->heads;
+    int32_t selected = sim_score_selected(heads, paper);
+    fprintf(file, "%-14s %5" PRId32 " %5" PRId32 " %4" PRId32 " ",
+            tame(name, sizeof name, frame->name), head->dots.dot_count,
+            head->labels.labelled_count, heads->hypothesis_count);
+    if (selected != IH_NONE) {
+        const struct ih_hypothesis *hypothesis = &heads->hypothesis[selected];
+        for (int axis = 0; axis < 3; axis++) {
+            fprintf(file, "%7s ", sim_text_fixed(hypothesis->centre_mm_q8[axis], 8, 1).text);
+        }
+        fprintf(file, "%6s  ", sim_text_fixed(hypothesis->distance_mm_q8, 8, 0).text);
+    } else {
+        fprintf(file, "%-32s", heads->head_count > 1 ? "    ambiguous" : "         none");
+    }
+    print_verdict(file, verdict);
+    fputc('\n', file);
+    fflush(file);
+}
+
+void sim_table_error(FILE *file, const char *name, const char *error)
+{
+    char text[NAME_MAX_BYTES];
+    fprintf(file, "%-14s error: ", tame(text, sizeof text, name));
+    fprintf(file, "%s\n", tame(text, sizeof text, error));
+    fflush(file);
+}
+
+/* The end of a label that is too long tells directories apart better than its beginning. */
+static const char *shorten(char *buffer, size_t size, const char *label)
+{
+    tame(buffer, size, label);
+    size_t length = strlen(buffer);
+    return length > LABEL_WIDTH ? buffer + (length - LABEL_WIDTH) : buffer;
+}
+
+void sim_table_heading(FILE *file)
+{
+    fprintf(file, "\nTable 1 (one row per directory; below it its frames without a head)\n");
+    fprintf(file, "%-*s %6s %9s %7s %5s %5s %5s %6s %9s\n", LABEL_WIDTH, "", "", "head in",
+            "correct", "with", "", "not", "head", "error mm");
+    fprintf(file, "%-*s %6s %4s %4s %7s %5s %5s %5s %6s %4s %4s\n", LABEL_WIDTH, "", "frames",
+            "yes", "no", "no amb.", "amb.", "wrong", "done", "right", "50%", "90%");
+}
+
+static void print_head_row(FILE *file, struct sim_score *score)
+{
+    const struct sim_tally *tally = &score->with_head;
+    fprintf(file, " %6" PRId32 " %4" PRId32 " %4" PRId32 " %7" PRId32 " %5" PRId32 " %5" PRId32,
+            tally->frame_count, tally->detected_count, tally->frame_count - tally->detected_count,
+            tally->outcome_count[SIM_OUTCOME_CORRECT], tally->outcome_count[SIM_OUTCOME_AMBIGUOUS],
+            tally->outcome_count[SIM_OUTCOME_WRONG]);
+    fprintf(file, " %5" PRId32 " %6" PRId32, tally->outcome_count[SIM_OUTCOME_NONE],
+            tally->selected_right_count);
+    if (score->error_mm_q8.count > 0) {
+        fprintf(file, " %4s", sim_text_fixed(sim_list_rank(&score->error_mm_q8, 50), 8, 0).text);
+        fprintf(file, " %4s", sim_text_fixed(sim_list_rank(&score->error_mm_q8, 90), 8, 0).text);
+    }
+    fputc('\n', file);
+}
+
+void sim_table_row(FILE *file, const char *label, struct sim_score *score)
+{
+    char text[NAME_MAX_BYTES];
+    const char *shown = shorten(text, sizeof text, label);
+    const struct sim_tally *empty = &score->empty;
+    if (score->with_head.frame_count > 0) {
+        fprintf(file, "%-*s", LABEL_WIDTH, shown);
+        print_head_row(file, score);
+        shown = "";
+    }
+    if (empty->frame_count > 0) {
+        fprintf(file, "%-*s %6" PRId32 " %4s %4s %7s %5s %5" PRId32 " %5" PRId32 " %6" PRId32 "\n",
+                LABEL_WIDTH, shown[0] != 0 ? shown : "  empty", empty->frame_count, "-", "-", "-",
+                "-", empty->outcome_count[SIM_OUTCOME_WRONG],
+                empty->outcome_count[SIM_OUTCOME_NONE], empty->selected_right_count);
+    }
+}
+
+void sim_table_dots_heading(FILE *file)
+{
+    fprintf(file, "\nDots (found: a dot within %d px; errors of found dots and right labels)\n",
+            SIM_SCORE_DOT_PX);
+    fprintf(file, "%-*s %8s %7s %11s %8s %7s %11s\n", LABEL_WIDTH, "", "visible", "found",
+            "error px", "labels", "right", "depth mm");
+    fprintf(file, "%-*s %8s %7s %5s %5s %8s %7s %5s %5s\n", LABEL_WIDTH, "", "", "", "50%", "90%",
+            "", "", "50%", "90%");
+}
+
+/* part / whole in percent to two decimals. */
+static struct sim_decimal percent(int32_t part, int32_t whole)
+{
+    /* A 24-bit fraction: its error is far below the last decimal. */
+    return sim_text_fixed(whole == 0 ? 0 : ((int64_t)part * 100 << 24) / whole, 24, 2);
+}
+
+static void print_ranks(FILE *file, struct sim_list *list, int fraction_bits)
+{
+    if (list->count == 0) {
+        fprintf(file, " %5s %5s", "-", "-");
+        return;
+    }
+    fprintf(file, " %5s", sim_text_fixed(sim_list_rank(list, 50), fraction_bits, 2).text);
+    fprintf(file, " %5s", sim_text_fixed(sim_list_rank(list, 90), fraction_bits, 2).text);
+}
+
+void sim_table_dots_row(FILE *file, const char *label, struct sim_score *score)
+{
+    char text[NAME_MAX_BYTES];
+    if (score->true_dot_count == 0) {
+        return;
+    }
+    fprintf(file, "%-*s %8" PRId32 " %7s", LABEL_WIDTH, shorten(text, sizeof text, label),
+            score->true_dot_count, percent(score->found_dot_count, score->true_dot_count).text);
+    print_ranks(file, &score->dot_error_px_q12, 12);
+    fprintf(file, " %8" PRId32 " %7s", score->label_count,
+            percent(score->right_label_count, score->label_count).text);
+    print_ranks(file, &score->depth_error_mm_q8, 8);
+    fputc('\n', file);
+}

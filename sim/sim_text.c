@@ -1,0 +1,50 @@
+#include "sim_text.h"
+
+#include <inttypes.h>
+#include <stdio.h>
+
+/* A whole number of 10^-decimals as text. */
+static struct sim_decimal print_scaled(int64_t scaled, int decimals)
+{
+    struct sim_decimal decimal;
+    int64_t unit = 1;
+    for (int i = 0; i < decimals; i++) {
+        unit *= 10;
+    }
+    int64_t magnitude = scaled < 0 ? -scaled : scaled;
+    const char *sign = scaled < 0 ? "-" : "";
+    if (decimals == 0) {
+        snprintf(decimal.text, sizeof decimal.text, "%s%" PRId64, sign, magnitude);
+    } else {
+        snprintf(decimal.text, sizeof decimal.text, "%s%" PRId64 ".%0*" PRId64, sign,
+                 magnitude / unit, decimals, magnitude % unit);
+    }
+    return decimal;
+}
+
+struct sim_decimal sim_text_fixed(int64_t value, int fraction_bits, int decimals)
+{
+    int64_t magnitude = value < 0 ? -value : value;
+    for (int i = 0; i < decimals; i++) {
+        magnitude *= 10;
+    }
+    int64_t half = fraction_bits == 0 ? 0 : (int64_t)1 << (fraction_bits - 1);
+    int64_t scaled = (magnitude + half) >> fraction_bits;
+    return print_scaled(value < 0 ? -scaled : scaled, decimals);
+}
+
+struct sim_decimal sim_text_angle(int32_t angle_mdeg)
+{
+    int64_t tenths = (angle_mdeg + 50) / 100;
+    return print_scaled(tenths % 1800, 1);
+}
+
+void sim_text_tame(char *text)
+{
+    for (; *text != 0; text++) {
+        unsigned char byte = (unsigned char)*text;
+        if (byte < ' ' || byte == 0x7f) {
+            *text = '?';
+        }
+    }
+}

@@ -1,0 +1,344 @@
+#include "sim_trace.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+
+#include "replay/hal_file.h"
+#include "sim_write.h"
+
+/* An int32_t member of an array of structs as a list of its own. */
+static void write_column(struct sim_write *write, const char *key, const void *first, int32_t count,
+                         size_t stride_bytes)
+{
+    const uint8_t *at = first;
+    sim_write_key(write, key);
+    sim_write_open(write, '[');
+    for (int32_t i = 0; i < count; i++) {
+        int32_t value = 0;
+        memcpy(&value, at + (size_t)i * stride_bytes, sizeof value);
+        sim_write_int(write, value);
+    }
+    sim_write_close(write, ']');
+}
+
+static void write_field(struct sim_write *write, const struct ih_field *field)
+{
+    sim_write_key(write, "field");
+    sim_write_open(write, '{');
+    sim_write_int_field(write, "centre_x_q28", field->centre_x_q28);
+    sim_write_int_field(write, "centre_y_q28", field->centre_y_q28);
+    sim_write_int_field(write, "unit_q28", field->unit_q28);
+    sim_write_close(write, '}');
+}
+
+static void write_dots(struct sim_write *write, const struct ih_dots *dots)
+{
+    const struct ih_dot *dot = dots->dot;
+    sim_write_key(write, "dots");
+    sim_write_open(write, '{');
+    sim_write_int_field(write, "dot_count", dots->dot_count);
+    sim_write_int_field(write, "threshold", dots->threshold);
+    sim_write_int_field(write, "small_count", dots->small_count);
+    sim_write_int_field(write, "large_count", dots->large_count);
+    sim_write_int_field(write, "dots_dropped", dots->dots_dropped);
+    sim_write_int_field(write, "runs_dropped", dots->runs_dropped);
+    write_column(write, "u_px_q12", &dot->u_px_q12, dots->dot_count, sizeof *dot);
+    write_column(write, "v_px_q12", &dot->v_px_q12, dots->dot_count, sizeof *dot);
+    write_column(write, "peak", &dot->peak, dots->dot_count, sizeof *dot);
+    sim_write_close(write, '}');
+}
+
+static void write_labels(struct sim_write *write, const struct ih_labels *labels)
+{
+    sim_write_key(write, "labels");
+    sim_write_open(write, '{');
+    sim_write_int_field(write, "labelled_count", labels->labelled_count);
+    sim_write_int_field(write, "seed_count", labels->seed_count);
+    sim_write_int_field(write, "candidates_dropped", labels->candidates_dropped);
+    sim_write_key(write, "slot");
+    sim_write_open(write, '[');
+    for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
+        if (labels->dot_of_slot[slot] == IH_NONE) {
+            sim_write_null(write);
+            continue;
+        }
+        sim_write_open(write, '{');
+        sim_write_int_field(write, "dot", labels->dot_of_slot[slot]);
+        sim_write_int_field(write, "t_px_q12", labels->t_px_q12[slot]);
+        sim_write_int_field(write, "perp_px_q12", labels->perp_px_q12[slot]);
+        sim_write_close(write, '}');
+    }
+    sim_write_close(write, ']');
+    sim_write_close(write, '}');
+}
+
+static void write_points(struct sim_write *write, const struct ih_points *points)
+{
+    const struct ih_point *point = points->point;
+    sim_write_key(write, "points");
+    sim_write_open(write, '{');
+    sim_write_int_field(write, "seen_count", points->seen_count);
+    write_field(write, &points->field);
+    write_column(write, "x_q28", &point->x_q28, IH_SLOTS, sizeof *point);
+    write_column(write, "y_q28", &point->y_q28, IH_SLOTS, sizeof *point);
+    write_column(write, "depth_mm_q8", &point->depth_mm_q8, IH_SLOTS, sizeof *point);
+    write_column(write, "state", &point->state, IH_SLOTS, sizeof *point);
+    sim_write_close(write, '}');
+}
+
+static void write_samples(struct sim_write *write, const struct ih_samples *samples,
+                          const struct ih_surface *surface)
+{
+    const struct ih_sample *sample = samples->sample;
+    int32_t count = samples->sample_count;
+    sim_write_key(write, "samples");
+    sim_write_open(write, '{');
+    sim_write_int_field(write, "sample_count", count);
+    sim_write_int_field(write, "seen_count", samples->seen_count);
+    sim_write_int_field(write, "filled_count", samples->filled_count);
+    sim_write_int_field(write, "isolated_count", samples->isolated_count);
+    sim_write_int_field(write, "outside_count", samples->outside_count);
+    sim_write_int_field(write, "nearest_mm_q8", samples->nearest_mm_q8);
+    sim_write_int_field(write, "clip_mm_q8", samples->clip_mm_q8);
+    write_column(write, "slot", &sample->slot, count, sizeof *sample);
+    write_column(write, "x_q16", &sample->x_q16, count, sizeof *sample);
+    write_column(write, "y_q16", &sample->y_q16, count, sizeof *sample);
+    write_column(write, "depth_mm_q8", &sample->depth_mm_q8, count, sizeof *sample);
+    write_column(write, "root_weight_q15", &sample->root_weight_q15, count, sizeof *sample);
+    write_column(write, "final_root_weight_q15", surface->root_weight_q15,
+                 surface->valid ? count : 0, sizeof surface->root_weight_q15[0]);
+    sim_write_close(write, '}');
+}
+
+static void write_surface(struct sim_write *write, const struct ih_surface *surface)
+{
+    sim_write_key(write, "surface");
+    sim_write_open(write, '{');
+    sim_write_key(write, "valid");
+    sim_write_bool(write, surface->valid);
+    if (surface->valid) {
+        sim_write_int_field(write, "downweighted_count", surface->downweighted_count);
+        sim_write_int_field(write, "mean_mm_q8", surface->mean_mm_q8);
+        sim_write_int_field(write, "nearest_mm_q8", surface->nearest_mm_q8);
+        write_field(write, &surface->field);
+        sim_write_key(write, "depth_mm_q8");
+        sim_write_open(write, '[');
+        for (int32_t y = 0; y < IH_SURFACE_GRID; y++) {
+            sim_write_open(write, '[');
+            for (int32_t x = 0; x < IH_SURFACE_GRID; x++) {
+                sim_write_int(write, surface->depth_mm_q8[y][x]);
+            }
+            sim_write_close(write, ']');
+        }
+        sim_write_close(write, ']');
+    }
+    sim_write_close(write, '}');
+}
+
+static void write_contour(struct sim_write *write, const struct ih_cuts *cuts,
+                          const struct ih_contour *contour)
+{
+    sim_write_open(write, '{');
+    sim_write_key(write, "closed");
+    sim_write_bool(write, contour->closed);
+    sim_write_key(write, "x_y_q9");
+    sim_write_open(write, '[');
+    for (int32_t i = 0; i < contour->vertex_count; i++) {
+        const struct ih_vertex *vertex = &cuts->vertex[contour->first + i];
+        sim_write_open(write, '[');
+        sim_write_int(write, vertex->x_q9);
+        sim_write_int(write, vertex->y_q9);
+        sim_write_close(write, ']');
+    }
+    sim_write_close(write, ']');
+    sim_write_close(write, '}');
+}
+
+/* The cuts are not kept by the core: every level is cut once more. */
+static void write_cuts(struct sim_write *write, struct isohead *head)
+{
+    struct ih_cuts *cuts = &head->scratch.hypotheses.cuts;
+    int32_t level_mm_q8 = 0;
+    sim_write_key(write, "cuts");
+    sim_write_open(write, '[');
+    for (int32_t index = 0;
+         head->surface.valid &&
+         ih_hypotheses_level(&head->surface, &head->params.hypotheses, index, &level_mm_q8);
+         index++) {
+        ih_cuts_level(&head->surface, level_mm_q8, cuts);
+        sim_write_open(write, '{');
+        sim_write_int_field(write, "level_mm_q8", cuts->level_mm_q8);
+        sim_write_int_field(write, "contours_dropped", cuts->contours_dropped);
+        sim_write_key(write, "contour");
+        sim_write_open(write, '[');
+        for (int32_t i = 0; i < cuts->contour_count; i++) {
+            write_contour(write, cuts, &cuts->contour[i]);
+        }
+        sim_write_close(write, ']');
+        sim_write_close(write, '}');
+    }
+    sim_write_close(write, ']');
+}
+
+static void write_slice(struct sim_write *write, const struct ih_slice *slice)
+{
+    const struct ih_ellipse *ellipse = &slice->ellipse;
+    sim_write_open(write, '{');
+    sim_write_int_field(write, "behind_mm_q8", slice->behind_mm_q8);
+    sim_write_int_field(write, "area_mm2", slice->area_mm2);
+    sim_write_key(write, "whole");
+    sim_write_bool(write, slice->whole);
+    sim_write_int_field(write, "area_q16", ellipse->area_q16);
+    sim_write_int_field(write, "x_q16", ellipse->x_q16);
+    sim_write_int_field(write, "y_q16", ellipse->y_q16);
+    sim_write_int_field(write, "xx_q16", ellipse->xx_q16);
+    sim_write_int_field(write, "xy_q16", ellipse->xy_q16);
+    sim_write_int_field(write, "yy_q16", ellipse->yy_q16);
+    sim_write_int_field(write, "shape_q16", ellipse->shape_q16);
+    sim_write_int_field(write, "ratio_q16", ellipse->ratio_q16);
+    sim_write_close(write, '}');
+}
+
+static void write_nest(struct sim_write *write, const struct ih_nest *nest)
+{
+    sim_write_open(write, '{');
+    sim_write_int_field(write, "minimum_x_q9", nest->minimum.x_q9);
+    sim_write_int_field(write, "minimum_y_q9", nest->minimum.y_q9);
+    sim_write_int_field(write, "nearest_mm_q8", nest->nearest_mm_q8);
+    sim_write_key(write, "slice");
+    sim_write_open(write, '[');
+    for (int32_t i = 0; i < nest->slice_count; i++) {
+        write_slice(write, &nest->slice[i]);
+    }
+    sim_write_close(write, ']');
+    sim_write_close(write, '}');
+}
+
+static void write_hypotheses(struct sim_write *write, const struct ih_hypotheses *hypotheses)
+{
+    sim_write_key(write, "hypotheses");
+    sim_write_open(write, '{');
+    sim_write_int_field(write, "minima_dropped", hypotheses->minima_dropped);
+    sim_write_int_field(write, "contours_dropped", hypotheses->contours_dropped);
+    sim_write_key(write, "nest");
+    sim_write_open(write, '[');
+    for (int32_t i = 0; i < hypotheses->nest_count; i++) {
+        write_nest(write, &hypotheses->nest[i]);
+    }
+    sim_write_close(write, ']');
+    sim_write_close(write, '}');
+}
+
+static void write_candidate(struct sim_write *write, const struct ih_hypothesis *hypothesis)
+{
+    sim_write_open(write, '{');
+    sim_write_int_field(write, "nest", hypothesis->nest);
+    sim_write_int_field(write, "u_px_q12", hypothesis->u_px_q12);
+    sim_write_int_field(write, "v_px_q12", hypothesis->v_px_q12);
+    sim_write_int_field(write, "a_px_q12", hypothesis->a_px_q12);
+    sim_write_int_field(write, "b_px_q12", hypothesis->b_px_q12);
+    sim_write_int_field(write, "angle_mdeg", hypothesis->angle_mdeg);
+    sim_write_int_field(write, "distance_mm_q8", hypothesis->distance_mm_q8);
+    write_column(write, "centre_mm_q8", hypothesis->centre_mm_q8, 3,
+                 sizeof hypothesis->centre_mm_q8[0]);
+    sim_write_int_field(write, "area_mm2", hypothesis->area_mm2);
+    sim_write_int_field(write, "curvature_mm_q8", hypothesis->curvature_mm_q8);
+    sim_write_int_field(write, "extent_mm_q8", hypothesis->extent_mm_q8);
+    sim_write_key(write, "rejected");
+    const char *reason = ih_reject_text(hypothesis->rejected);
+    if (reason == NULL) {
+        sim_write_null(write);
+    } else {
+        sim_write_string(write, reason);
+    }
+    sim_write_close(write, '}');
+}
+
+static void write_heads(struct sim_write *write, const struct ih_heads *heads)
+{
+    sim_write_key(write, "heads");
+    sim_write_open(write, '{');
+    sim_write_key(write, "hypothesis");
+    sim_write_open(write, '[');
+    for (int32_t i = 0; i < heads->hypothesis_count; i++) {
+        write_candidate(write, &heads->hypothesis[i]);
+    }
+    sim_write_close(write, ']');
+    write_column(write, "head", heads->head, heads->head_count, sizeof heads->head[0]);
+    sim_write_close(write, '}');
+}
+
+static void write_frame(FILE *file, const struct hal_frame *frame, struct isohead *head)
+{
+    struct sim_write write = {.file = file};
+    sim_write_open(&write, '{');
+    sim_write_key(&write, "file");
+    sim_write_string(&write, frame->name);
+    sim_write_int_field(&write, "time_us", frame->time_us);
+    write_dots(&write, &head->dots);
+    write_labels(&write, &head->labels);
+    write_points(&write, &head->points);
+    write_samples(&write, &head->samples, &head->surface);
+    write_surface(&write, &head->surface);
+    write_cuts(&write, head);
+    write_hypotheses(&write, &head->hypotheses);
+    write_heads(&write, &head->heads);
+    sim_write_close(&write, '}');
+    fputc('\n', file);
+}
+
+static bool fail(struct hal_error *error, const char *path)
+{
+    snprintf(error->text, sizeof error->text, "trace %.150s: %s", path, strerror(errno));
+    return false;
+}
+
+/* The folders above the last part of the path, which is changed meanwhile. */
+static void make_parents(char *path)
+{
+    for (char *slash = strchr(path + 1, '/'); slash != NULL; slash = strchr(slash + 1, '/')) {
+        *slash = 0;
+        /* Whether it worked shows when the file is opened. */
+        (void)mkdir(path, 0777);
+        *slash = '/';
+    }
+}
+
+/* OUT/LABEL/FRAME.json in new memory. */
+static char *make_path(const struct sim_trace *trace, const char *name)
+{
+    size_t size = strlen(trace->out) + strlen(trace->label) + strlen(name) + sizeof "//.json";
+    const char *dot = strrchr(name, '.');
+    int stem_length = (int)(dot == NULL ? strlen(name) : (size_t)(dot - name));
+    char *path = malloc(size);
+    if (path != NULL) {
+        snprintf(path, size, "%s/%s/%.*s.json", trace->out, trace->label, stem_length, name);
+    }
+    return path;
+}
+
+bool sim_trace_frame(const struct sim_trace *trace, const struct hal_frame *frame,
+                     struct isohead *head, struct hal_error *error)
+{
+    char *path = make_path(trace, frame->name);
+    if (path == NULL) {
+        return fail(error, frame->name);
+    }
+    make_parents(path);
+    FILE *file = fopen(path, "w");
+    bool good = file != NULL;
+    if (good) {
+        write_frame(file, frame, head);
+        good = !ferror(file);
+        /* Closing writes the rest, so it too can fail; it must be done in any case. */
+        good = fclose(file) == 0 && good;
+    }
+    if (!good) {
+        fail(error, path);
+    }
+    free(path);
+    return good;
+}

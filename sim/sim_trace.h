@@ -1,0 +1,23 @@
+/* sim_trace - every stage's results of one frame as a JSON file, raw integers.
+ *
+ * File:  OUT/LABEL/FRAME.json, LABEL the last part of the frames directory's path, FRAME the
+ *        frame's name without .pgm. Folders are made as needed; files are overwritten.
+ * Keys:  the names of the core's struct members with unit and format; a key per stage.
+ * Error: what could not be made or written, and why.
+ */
+#ifndef SIM_TRACE_H
+#define SIM_TRACE_H
+
+#include "hal.h"
+#include "isohead.h"
+
+struct sim_trace {
+    const char *out;
+    const char *label;
+};
+
+/* Uses head->scratch to cut the surface again. False: *error says why. */
+bool sim_trace_frame(const struct sim_trace *trace, const struct hal_frame *frame,
+                     struct isohead *head, struct hal_error *error);
+
+#endif

@@ -1,0 +1,623 @@
+#!/bin/sh
+# Bad inputs of host_sim, one after the other: each must be told with file and reason, must not
+# harm what is beside it, and must not crash.
+#
+#     bad_input.sh HOST_SIM FRAMES_DIR
+#
+# FRAMES_DIR: any frames directory with at least three good frames; its first three are used, with
+# a rig that is made here. Prints TAP; exit status 1 when a case fails.
+set -u
+LC_ALL=C
+export LC_ALL
+
+if [ $# -ne 2 ] || [ ! -x "$1" ] || [ ! -d "$2" ]; then
+    echo "usage: $0 HOST_SIM FRAMES_DIR" >&2
+    exit 2
+fi
+host_sim=$(cd "$(dirname "$1")" && pwd)/$(basename "$1")
+good=$(cd "$2" && pwd)
+work=$(mktemp -d) || exit 2
+trap 'rm -rf "$work"' EXIT
+trap 'exit 130' INT TERM
+cd "$work" || exit 2
+
+# A report of a sanitizer must not pass for the program's own status 1.
+ASAN_OPTIONS="${ASAN_OPTIONS:+$ASAN_OPTIONS:}exitcode=99"
+UBSAN_OPTIONS="${UBSAN_OPTIONS:+$UBSAN_OPTIONS:}halt_on_error=1:exitcode=99"
+export ASAN_OPTIONS UBSAN_OPTIONS
+
+number=0
+failed=0
+
+# --- checking ------------------------------------------------------------------------------------
+
+# result NAME REASON: an empty reason is a pass.
+result() {
+    number=$((number + 1))
+    if [ -z "$2" ]; then
+        echo "ok $number - $1"
+        return
+    fi
+    failed=$((failed + 1))
+    echo "not ok $number - $1"
+    echo "# $2"
+    sed 's/^/# stderr: /' err | head -n 5
+}
+
+# run ARGUMENT...: host_sim with its output in the files out, err and status.
+run() {
+    timeout 120 "$host_sim" "$@" >out 2>err
+    echo $? >status
+}
+
+# check NAME STATUS GOOD BAD PATTERN: of the last run: exit status, records of good frames, records
+# of lost ones, and what standard error must say (- for nothing at all).
+check() {
+    reason=
+    is_status=$(cat status)
+    is_good=$(grep -c '^{"file":.*"hypotheses":\[.*}$' out)
+    is_bad=$(grep -c '^{"file":"[^}]*","error":"[^}]*}$' out)
+    is_lines=$(wc -l <out)
+    if grep -Eq 'Sanitizer|runtime error' err; then
+        reason="a sanitizer report"
+    elif [ "$is_status" -ne "$2" ]; then
+        reason="exit status $is_status, expected $2"
+    elif [ "$is_good" -ne "$3" ] || [ "$is_bad" -ne "$4" ]; then
+        reason="$is_good good and $is_bad lost records, expected $3 and $4"
+    elif [ "$is_lines" -ne $(($3 + $4)) ]; then
+        reason="$is_lines lines of output, expected $(($3 + $4))"
+    elif [ "$5" = - ]; then
+        [ ! -s err ] || reason="standard error is not empty"
+    elif ! grep -Eq -- "$5" err; then
+        reason="standard error does not say: $5"
+    fi
+    result "$1" "$reason"
+}
+
+# --- making --------------------------------------------------------------------------------------
+
+frame_header() { # first three numbers of a PGM without comments
+    head -c 40 "$1" | tr '\n' ' ' | cut -d ' ' -f 2-4
+}
+
+# matrix ROWS COLS NUMBERS
+matrix() {
+    printf '{"type_id":"opencv-matrix","rows":%s,"cols":%s,"dt":"d","data":[%s]}' "$1" "$2" "$3"
+}
+
+# rays [SLOT X Y Z]: the pattern's unit vectors; one of them replaced.
+rays() {
+    awk -v slot="${1:--1}" -v new="${2:-0},${3:-0},${4:-0}" 'BEGIN {
+        for (i = 0; i < 361; i++) {
+            x = (i % 19 - 9) * 0.0305 + (int(i / 19) - 9) * 0.0016
+            y = (int(i / 19) - 9) * 0.0305 - (i % 19 - 9) * 0.0016
+            n = sqrt(x * x + y * y + 1)
+            ray = i == slot ? new : sprintf("%.12f,%.12f,%.12f", x / n, y / n, 1 / n)
+            printf "%s%s", i ? "," : "", ray
+        }
+    }'
+}
+
+# rig FIELD JSON: a good rig with this field replaced, or left out for -.
+rig() {
+    printf '{'
+    comma=
+    for field in kind image_width image_height camera_matrix distortion_coefficients \
+        projector_origin dot_rays near_mm far_mm extra; do
+        value=$(cat "fields/$field")
+        [ "$field" != "$1" ] || value=$2
+        if [ "$value" != - ]; then
+            printf '%s"%s":%s' "$comma" "$field" "$value"
+            comma=,
+        fi
+    done
+    printf '}\n'
+}
+
+# The directory d as it should be: three frames and a rig.
+fresh() {
+    rm -rf d
+    cp -R base d
+}
+
+# --- a good directory ----------------------------------------------------------------------------
+
+mkdir base fields
+set -- "$good"/*.pgm
+if [ $# -lt 3 ]; then
+    echo "$good: fewer than 3 frames" >&2
+    exit 2
+fi
+cp "$1" base/a.pgm && cp "$2" base/b.pgm && cp "$3" base/c.pgm || exit 2
+chmod u+w base/*.pgm
+# shellcheck disable=SC2046 # three words are wanted
+set -- $(frame_header base/a.pgm)
+width=$1
+height=$2
+camera="$((width + 100)),0,$((width / 2)),0,$((width + 120)),$((height / 2)),0,0,1"
+echo - >fields/kind
+echo "$width" >fields/image_width
+echo "$height" >fields/image_height
+matrix 3 3 "$camera" >fields/camera_matrix
+matrix 1 5 -0.17,0.06,0.0005,-0.0003,0 >fields/distortion_coefficients
+matrix 3 1 12.5,0,0.2 >fields/projector_origin
+matrix 361 3 "$(rays)" >fields/dot_rays
+echo 400 >fields/near_mm
+echo 2600.0 >fields/far_mm
+echo - >fields/extra
+rig none - >base/rig.json
+
+fresh
+run --json d
+check 'good directory' 0 3 0 -
+
+# --- frames --------------------------------------------------------------------------------------
+
+# frame NAME PATTERN: d/b.pgm was spoilt; the others must go on.
+frame() {
+    run --json d
+    check "frame: $1" 1 2 1 "$2"
+    fresh
+}
+
+# frame_bytes NAME PATTERN FORMAT: the frame is what printf makes of the format.
+frame_bytes() {
+    # shellcheck disable=SC2059 # the format is the frame
+    printf "$3" >d/b.pgm
+    frame "$1" "$2"
+}
+
+head -c 1000 base/b.pgm >d/b.pgm
+frame 'truncated' 'd/b\.pgm: offset [0-9]+: [0-9]+ bytes of samples, expected [0-9]+.*truncated'
+size=$(wc -c <base/b.pgm)
+head -c $((size - 1)) base/b.pgm >d/b.pgm
+frame 'one byte short' 'd/b\.pgm: offset .*truncated'
+printf x >>d/b.pgm
+frame 'a byte too many' 'd/b\.pgm: offset .*more than one image'
+cat base/c.pgm >>d/b.pgm
+frame 'two images' 'd/b\.pgm: offset .*more than one image'
+: >d/b.pgm
+frame 'empty' 'd/b\.pgm: .*empty, expected a binary PGM'
+frame_bytes 'text' 'd/b\.pgm: offset 0: not a PGM, expected a binary PGM' 'not an image\n'
+frame_bytes 'JPEG' 'd/b\.pgm: offset 0: not a PGM' '\377\330\377\340\000\020JFIF'
+frame_bytes 'P5 and no more' 'd/b\.pgm: offset 0: not a PGM' 'P5'
+frame_bytes 'plain PGM' 'd/b\.pgm: offset 0: format P2' 'P2\n2 2\n255\n1 2 3 4\n'
+frame_bytes 'colour image' 'd/b\.pgm: offset 0: format P6' 'P6\n1 1\n255\nabc'
+frame_bytes 'header ends early' 'd/b\.pgm: offset 6: the file ends, expected height' 'P5\n752'
+frame_bytes 'letters for width' "d/b\\.pgm: offset 3: 'w', expected width" 'P5\nwide 4\n255\n'
+frame_bytes 'negative width' "d/b\\.pgm: offset 3: '-', expected width" 'P5\n-4 4\n255\n'
+frame_bytes 'width 0' 'd/b\.pgm: offset 3: width 0, expected 1 to' 'P5\n0 4\n255\n'
+frame_bytes 'height 0' 'd/b\.pgm: offset 5: height 0, expected 1 to' 'P5\n4 0\n255\n'
+frame_bytes 'width of 30 digits' 'd/b\.pgm: offset 3: width .*expected 1 to' \
+    'P5\n999999999999999999999999999999 4\n255\n'
+frame_bytes 'width 2^32 + 4' 'd/b\.pgm: offset 3: width .*expected 1 to' \
+    'P5\n4294967300 4\n255\nabcdabcdabcdabcd'
+frame_bytes 'huge size' 'd/b\.pgm: offset .*expected 134217728' 'P5\n8192 8192\n65535\nab'
+frame_bytes 'maxval 0' 'd/b\.pgm: offset 7: maxval 0, expected 1 to 65535' 'P5\n4 4\n0\nabcd'
+frame_bytes 'maxval 65536' 'd/b\.pgm: offset 7: maxval 65536, expected 1 to 65535' \
+    'P5\n4 4\n65536\nabcd'
+frame_bytes 'nothing behind maxval' 'd/b\.pgm: offset 10: the file ends, expected one white space' \
+    'P5\n4 4\n255'
+frame_bytes 'endless comment' 'd/b\.pgm: offset .*the file ends, expected width' \
+    'P5\n# no line end 4 4 255'
+{ printf 'P5\n320 240\n255\n' && head -c 76800 /dev/zero; } >d/b.pgm
+frame 'wrong size' "d/b\\.pgm: 320x240 px, expected ${width}x$height"
+{ printf 'P5\n%d %d\n255\n' "$height" "$width" && tail -c $((width * height)) base/b.pgm; } >d/b.pgm
+frame 'width and height exchanged' "d/b\\.pgm: ${height}x$width px, expected ${width}x$height"
+{ printf 'P5\n%d %d\n1023\n' "$width" "$height" && tail -c $((width * height)) base/b.pgm; } >d/b.pgm
+frame '16 bits announced, 8 there' 'd/b\.pgm: offset .*2 bytes each.*truncated'
+rm d/b.pgm && mkdir d/b.pgm
+frame 'a directory' 'd/b\.pgm: a directory, expected a file'
+rm d/b.pgm && ln -s nowhere d/b.pgm
+frame 'a link to nowhere' 'd/b\.pgm: No such file'
+rm d/b.pgm && ln -s b.pgm d/b.pgm
+frame 'a link to itself' 'd/b\.pgm: .*symbolic links'
+rm d/b.pgm && mkfifo d/b.pgm
+frame 'a pipe' 'd/b\.pgm: a device or pipe, expected a file'
+rm d/b.pgm && ln -s /dev/zero d/b.pgm
+frame 'an endless device' 'd/b\.pgm: a device or pipe, expected a file'
+if [ "$(id -u)" -ne 0 ]; then # root may read everything
+    chmod 000 d/b.pgm
+    frame 'not permitted' 'd/b\.pgm: Permission denied'
+fi
+
+{ printf 'P5\n# a comment\n%d # another\n%d\n255\n' "$width" "$height" &&
+    tail -c $((width * height)) base/b.pgm; } >d/b.pgm
+run --json d
+check 'frame: comments in the header are fine' 0 3 0 -
+fresh
+{ printf 'P5 %d %d 1023 ' "$width" "$height" && head -c $((width * height * 2)) /dev/zero; } >d/b.pgm
+run --json d
+check 'frame: 16 bits are fine' 0 3 0 -
+fresh
+cp base/a.pgm d/.hidden.pgm && mkdir d/sub && cp base/a.pgm d/notes.txt
+run --json d
+check 'frame: other files are ignored' 0 3 0 -
+fresh
+name=$(printf 'b"\\\t\377\033[2J.pgm')
+mv d/b.pgm "d/$name"
+run --json d
+check 'frame: strange name' 0 3 0 -
+reason=
+grep -Fq '{"file":"b\"\\\u0009\ufffd\u001b[2J.pgm",' out || reason='name not escaped'
+result 'frame: strange name is escaped' "$reason"
+: >"d/$name"
+run --json d
+reason='a control character went to standard error'
+[ "$(tr -d -c '\033\011' <err | wc -c)" -ne 0 ] || reason=
+result 'frame: strange name does not steer the terminal' "$reason"
+fresh
+
+# --- rig -----------------------------------------------------------------------------------------
+
+# rig_case NAME PATTERN: d/rig.json is wrong; nothing can be processed.
+rig_case() {
+    run --json d
+    check "rig: $1" 1 0 0 "$2"
+    fresh
+}
+
+# field NAME JSON PATTERN: d/rig.json with one field wrong; the pattern follows the file's name.
+field() {
+    rig "$1" "$2" >d/rig.json
+    rig_case "$1 $(echo "$2" | cut -c 1-40)" "d/rig\\.json: $3"
+}
+
+rm d/rig.json
+rig_case 'missing' 'd: no rig\.json'
+: >d/rig.json
+rig_case 'empty' 'd/rig\.json: line 1: not JSON'
+head -c 300 base/rig.json >d/rig.json
+rig_case 'truncated' 'd/rig\.json: line 1.*: not JSON'
+echo '%YAML:1.0' >d/rig.json
+rig_case 'YAML' 'd/rig\.json: line 1 column 1: not JSON: %YAML'
+printf '{\n"image_width":752,\n"near_mm":.Nan}' >d/rig.json
+rig_case 'a bare NaN' 'd/rig\.json: line 3 column [0-9]+: not JSON'
+echo '[1,2]' >d/rig.json
+rig_case 'an array' 'd/rig\.json: an array, expected an object'
+{ cat base/rig.json && echo '{}'; } >d/rig.json
+rig_case 'two objects' 'd/rig\.json: line 2 column 1: not JSON'
+{ printf '{"a":1,\000' && tail -c +2 base/rig.json; } >d/rig.json
+rig_case 'a zero byte' 'd/rig\.json: offset 7: a zero byte'
+head -c 100000 /dev/zero | tr '\000' '[' >d/rig.json
+rig_case 'deep nesting' 'd/rig\.json: line 1 column [0-9]+: not JSON'
+{ cat base/rig.json && head -c 5000000 /dev/zero | tr '\000' ' '; } >d/rig.json
+rig_case 'too long' 'd/rig\.json: [0-9]+ bytes, expected at most'
+rm d/rig.json && mkdir d/rig.json
+rig_case 'a directory' 'd/rig\.json: a directory, expected a file'
+rm d/rig.json && ln -s nowhere d/rig.json
+rig_case 'a link to nowhere' 'd/rig\.json: No such file'
+
+for name in image_width image_height camera_matrix distortion_coefficients projector_origin \
+    dot_rays near_mm far_mm; do
+    field $name - "$name: missing"
+    field $name '"text"' "$name: .*expected"
+    field $name null "$name: .*expected"
+    field $name '[1,2,3]' "$name: .*expected"
+done
+
+field kind '"stereo"' 'kind: "stereo", expected "dots" or "range"'
+field kind 1 'kind: .*expected "dots" or "range"'
+for name in image_width image_height; do
+    field $name 0 'image_width, image_height: .*expected'
+    field $name -200 'image_width, image_height: .*expected'
+    field $name 5000 'image_width, image_height: .*expected'
+    field $name 480.5 "$name: 480\\.5, expected a whole number"
+    field $name 1e999 "$name: inf, out of range"
+    field $name 4294967616 "$name: .*out of range"
+done
+
+field camera_matrix "$(matrix 2 3 "$camera")" 'camera_matrix: rows is 2, expected 3'
+field camera_matrix "$(matrix 3 4 "$camera")" 'camera_matrix: cols is 4, expected 3'
+field camera_matrix "$(matrix '"3"' 3 "$camera")" 'camera_matrix: no rows, expected 3'
+field camera_matrix "$(matrix 3 3 "$camera,1")" 'camera_matrix: 10 numbers in data, expected 9'
+field camera_matrix "$(matrix 3 3 '')" 'camera_matrix: 0 numbers in data, expected 9'
+field camera_matrix "$(matrix 3 3 "$camera" | sed 's/"dt":"d"/"dt":"u"/')" \
+    'camera_matrix: dt is u, expected'
+field camera_matrix "$(matrix 3 3 "$camera" | sed 's/"dt":"d",//')" 'camera_matrix: dt is missing'
+field camera_matrix "$(matrix 3 3 "$camera" | sed 's/opencv/other/')" \
+    'camera_matrix: type_id is other-matrix, expected'
+field camera_matrix "$(matrix 3 3 "$camera" | sed 's/"data":.*]/"data":7/')" \
+    'camera_matrix: data is no array'
+field camera_matrix "$(matrix 3 3 '900,0,"x",0,900,200,0,0,1')" \
+    'camera_matrix\[0\]\[2\]: a string, expected a number'
+field camera_matrix "$(matrix 3 3 '1e999,0,300,0,900,200,0,0,1')" \
+    'camera_matrix\[0\]\[0\]: inf, expected a finite number'
+field camera_matrix "$(matrix 3 3 '0,0,300,0,900,200,0,0,1')" 'camera_matrix: focal lengths 0 and'
+field camera_matrix "$(matrix 3 3 '900,0,300,0,-900,200,0,0,1')" 'camera_matrix: focal .* -900'
+field camera_matrix "$(matrix 3 3 '20000,0,300,0,900,200,0,0,1')" 'camera_matrix: focal .* 20000'
+field camera_matrix "$(matrix 3 3 '1e9,0,300,0,900,200,0,0,1')" 'camera_matrix\[0\]\[0\]: 1e\+09'
+field camera_matrix "$(matrix 3 3 '900,2,300,0,900,200,0,0,1')" \
+    'camera_matrix\[0\]\[1\]: 2, expected 0'
+field camera_matrix "$(matrix 3 3 '900,0,300,0,900,200,0,0,2')" \
+    'camera_matrix\[2\]\[2\]: 2, expected 1'
+field camera_matrix "$(matrix 3 3 '900,0,9000,0,900,200,0,0,1')" \
+    'camera_matrix: principal point \(9000, 200\)'
+field camera_matrix "$(matrix 3 3 '100,0,300,0,100,200,0,0,1')" 'camera_matrix: '
+
+field distortion_coefficients "$(matrix 1 4 0,0,0,0)" 'distortion_coefficients: cols is 4'
+field distortion_coefficients "$(matrix 1 5 1e999,0,0,0,0)" \
+    'distortion_coefficients\[0\]\[0\]: inf'
+field distortion_coefficients "$(matrix 1 5 0,0,0,0,-500)" \
+    'distortion_coefficients k3: -500, expected less than 128'
+field distortion_coefficients "$(matrix 1 5 -30,0,0,0,0)" \
+    'distortion_coefficients: -30 .*cannot be undone'
+
+field projector_origin "$(matrix 1 3 12,0,0)" 'projector_origin: rows is 1, expected 3'
+field projector_origin "$(matrix 3 1 0,0,0)" 'projector_origin: \(0, 0, 0\) mm, expected'
+field projector_origin "$(matrix 3 1 5000,0,0)" 'projector_origin: \(5000, 0, 0\) mm, expected'
+field projector_origin "$(matrix 3 1 12,1e6,0)" 'projector_origin y: 1e\+06, expected less than'
+field projector_origin "$(matrix 3 1 12,0,-1e999)" 'projector_origin\[2\]\[0\]: -inf'
+
+field dot_rays "$(matrix 360 3 "$(rays)")" 'dot_rays: rows is 360, expected 361'
+field dot_rays "$(matrix 361 3 1,2,3)" 'dot_rays: 3 numbers in data, expected 1083'
+field dot_rays "$(matrix 361 3 "$(rays 17 0 0 0.87)")" \
+    'dot_rays\[17\]: \(0, 0, 0\.87\), length 0\.87, expected a unit vector'
+field dot_rays "$(matrix 361 3 "$(rays 0 0 0 0)")" 'dot_rays\[0\]: .*length 0, expected'
+field dot_rays "$(matrix 361 3 "$(rays 360 0 0 -1)")" 'dot_rays\[360\]: \(0, 0, -1\)'
+field dot_rays "$(matrix 361 3 "$(rays 5 1 0 0)")" 'dot_rays\[5\]: \(1, 0, 0\)'
+field dot_rays "$(matrix 361 3 "$(rays 5 7 0 0)")" 'dot_rays\[5\] x: 7, expected less than 2'
+field dot_rays "$(matrix 361 3 "$(rays 5 0 1e999 0)")" 'dot_rays\[5\]\[1\]: inf'
+
+field near_mm 3000 'near_mm, far_mm: 3000 and 2600, expected'
+field near_mm 2600 'near_mm, far_mm: 2600 and 2600, expected'
+field near_mm 0 'near_mm, far_mm: 0 and 2600, expected'
+field near_mm -400 'near_mm, far_mm: -400 and 2600, expected'
+field near_mm 1e999 'near_mm: inf, out of range'
+field far_mm 1e6 'near_mm, far_mm: 400 and 1000000, expected'
+field far_mm -1e999 'far_mm: -inf, out of range'
+
+rig extra '{"kind":["anything"]}' >d/rig.json
+run --json d
+check 'rig: an unknown field is ignored' 0 3 0 -
+rig near_mm 400.7 >d/rig.json
+run --json d
+check 'rig: a fraction in near_mm is fine' 0 3 0 -
+rig kind '"dots"' >d/rig.json
+run --json d
+check 'rig: kind "dots" is fine' 0 3 0 -
+rig kind '"range"' >d/rig.json
+run --json d
+check 'rig: kind "range" with 8-bit frames' 1 0 3 'd/b\.pgm: maxval 255, expected above 255'
+fresh
+
+run --json --rig nowhere.json d
+check 'rig: --rig names no file' 1 0 0 'nowhere\.json: No such file'
+cp base/a.pgm other.json
+run --json --rig other.json d
+check 'rig: --rig names a frame' 1 0 0 'other\.json: .*expected'
+echo broken >d/rig.json
+run --json --rig base/rig.json d
+check 'rig: --rig in place of a broken one' 0 3 0 -
+rm d/rig.json
+run --json --rig base/rig.json d
+check 'rig: --rig in place of a missing one' 0 3 0 -
+fresh
+
+# --- range images --------------------------------------------------------------------------------
+
+mkdir range
+cat >range/rig.json <<'END'
+{"kind":"range","image_width":64,"image_height":80,"near_mm":400,"far_mm":4000,
+"camera_matrix":{"type_id":"opencv-matrix","rows":3,"cols":3,"dt":"d",
+"data":[60,0,32,0,60,40,0,0,1]},
+"distortion_coefficients":{"type_id":"opencv-matrix","rows":1,"cols":5,"dt":"f","data":[0,0,0,0,0]}}
+END
+{ printf 'P5\n64 80\n65535\n' && head -c 10240 /dev/zero; } >range/a.pgm
+{ printf 'P5\n64 80\n65535\n' && head -c 10240 /dev/zero | tr '\000' '\003'; } >range/b.pgm
+{ printf 'P5\n64 80\n65535\n' && head -c 10240 /dev/zero | tr '\000' '\377'; } >range/c.pgm
+run --json range
+check 'range: no depth, one depth, and beyond all range' 0 3 0 -
+{ printf 'P5\n64 80\n255\n' && head -c 5120 /dev/zero; } >range/b.pgm
+run --json range
+check 'range: an 8-bit frame' 1 2 1 'range/b\.pgm: maxval 255, expected above 255'
+
+# --- frames.jsonl --------------------------------------------------------------------------------
+
+# list NAME STATUS GOOD BAD PATTERN LINES: frames.jsonl is what printf makes of the lines.
+list() {
+    # shellcheck disable=SC2059
+    printf "$6" >d/frames.jsonl
+    run --json d
+    check "frames.jsonl: $1" "$2" "$3" "$4" "$5"
+    fresh
+}
+
+a='{"file":"a.pgm","time_us":0,"laser":true}\n'
+b='{"file":"b.pgm","time_us":40000,"laser":true}\n'
+c='{"file":"c.pgm","time_us":80000,"laser":true}\n'
+list 'good, in another order' 0 3 0 - "$c$a\\n$b"
+list 'laser off makes no record' 0 2 0 - "$a"'{"file":"b.pgm","time_us":5,"laser":false}\n'"$c"
+list 'laser left out' 0 3 0 - "$a"'{"file":"b.pgm","time_us":5}\n'"$c"
+list 'a broken line' 1 2 1 'd/frames\.jsonl: line 2: not a JSON object: \{"file":' \
+    "$a"'{"file":"b.pgm","time_us"\n'"$c"
+list 'a line that is no object' 1 2 1 'd/frames\.jsonl: line 2: not a JSON object' "$a"'[]\n'"$c"
+list 'a zero byte' 1 2 1 'd/frames\.jsonl: line 2: a zero byte' "$a"'{"file":\000}\n'"$c"
+list 'a frame that is not listed' 1 2 1 'd/b\.pgm: not listed in frames\.jsonl' "$a$c"
+list 'a listed frame that is not there' 1 3 1 'd/d\.pgm: no such file; listed in .* line 4' \
+    "$a$b$c"'{"file":"d.pgm","time_us":99999,"laser":true}\n'
+list 'a frame listed twice' 1 3 0 'd/frames\.jsonl: line 3: b\.pgm was listed before' "$a$b$b$c"
+list 'no file' 1 2 1 'd/frames\.jsonl: line 2: no file' "$a"'{"time_us":5}\n'"$c"
+list 'a path for a file' 1 3 0 'd/frames\.jsonl: line 4: file is "../d/a\.pgm", expected' \
+    "$a$b$c"'{"file":"../d/a.pgm","time_us":5}\n'
+list 'not the name of a frame' 1 3 0 'd/frames\.jsonl: line 4: file is "rig\.json", expected' \
+    "$a$b$c"'{"file":"rig.json","time_us":5}\n'
+list 'no time' 1 2 1 'd/b\.pgm: frames\.jsonl line 2: no time_us' "$a"'{"file":"b.pgm"}\n'"$c"
+list 'a string for a time' 1 2 1 'd/b\.pgm: frames\.jsonl line 2: time_us is not a number' \
+    "$a"'{"file":"b.pgm","time_us":"5"}\n'"$c"
+list 'a fraction for a time' 1 2 1 'd/b\.pgm: frames\.jsonl line 2: time_us is 5\.5, expected' \
+    "$a"'{"file":"b.pgm","time_us":5.5}\n'"$c"
+list 'an endless time' 1 2 1 'd/b\.pgm: frames\.jsonl line 2: time_us is inf, expected' \
+    "$a"'{"file":"b.pgm","time_us":1e999}\n'"$c"
+list 'a word for laser' 1 2 1 'd/b\.pgm: frames\.jsonl line 2: laser is neither true nor false' \
+    "$a"'{"file":"b.pgm","time_us":5,"laser":"on"}\n'"$c"
+list 'time goes back' 1 2 1 'd/c\.pgm: frames\.jsonl: time_us 39999 is before 40000' \
+    "$a$b"'{"file":"c.pgm","time_us":39999}\n'
+list 'empty' 1 0 3 'd/b\.pgm: not listed in frames\.jsonl' ''
+list 'garbage' 1 0 3 'd/frames\.jsonl: line 1: not a JSON object' '\377\376\001\002\n\n{{{{'
+mkdir d/frames.jsonl
+run --json d
+check 'frames.jsonl: a directory' 1 3 0 'd/frames\.jsonl: a directory, expected a file'
+fresh
+printf "$a"'{"file":"b.pgm","time_us":5,"laser":false}\n'"$c" >d/frames.jsonl
+: >d/b.pgm
+run --json d
+check 'frames.jsonl: a lost frame with the laser off' 1 2 0 'd/b\.pgm: .*empty'
+fresh
+
+# --- truth.jsonl ---------------------------------------------------------------------------------
+
+# truth NAME PATTERN LINE: truth of b.pgm is this line; all frames are processed all the same.
+truth() {
+    printf '{"file":"a.pgm","head":null}\n%s\n{"file":"c.pgm","head":null}\n' "$3" >d/truth.jsonl
+    run --json d
+    check "truth.jsonl: $1" 1 3 0 "d/truth\\.jsonl: $2"
+    fresh
+}
+
+printf '{"file":"%s.pgm","head":{"centre_mm":[1,-2.5,800]},"dots":[[0,1.5,2,900]]}\n' a b c \
+    >d/truth.jsonl
+run --json d
+check 'truth.jsonl: good' 0 3 0 -
+printf '{"file":"%s.pgm","heads":[{"centre_mm":[1,2,3]}]}\n' a b c >d/truth.jsonl
+run --json d
+check 'truth.jsonl: several heads are fine' 0 3 0 -
+fresh
+truth 'a frame that does not exist' 'line 2: z\.pgm: no such frame' '{"file":"z.pgm","head":null}'
+truth 'a frame without truth' 'no line for b\.pgm' ''
+truth 'two lines for a frame' 'line 2: a\.pgm has truth in line 1 already' \
+    '{"file":"a.pgm","head":null}'
+truth 'a broken line' 'line 2: not a JSON object' '{"file":"b.pgm","head":'
+truth 'no file' 'line 2: no file' '{"head":null}'
+truth 'a number for a file' 'line 2: no file' '{"file":7,"head":null}'
+truth 'no head' 'line 2: no head' '{"file":"b.pgm"}'
+truth 'a string for a head' 'line 2: head is neither' '{"file":"b.pgm","head":"yes"}'
+truth 'a head without centre' 'line 2: head\.centre_mm: expected 3' '{"file":"b.pgm","head":{}}'
+truth 'a centre of 2 numbers' 'line 2: head\.centre_mm: expected 3' \
+    '{"file":"b.pgm","head":{"centre_mm":[1,2]}}'
+truth 'a centre at infinity' 'line 2: head\.centre_mm: expected 3 numbers within' \
+    '{"file":"b.pgm","head":{"centre_mm":[1,2,1e999]}}'
+truth 'a negative axis' 'line 2: head\.semi_axes_mm: expected' \
+    '{"file":"b.pgm","head":{"centre_mm":[1,2,3],"semi_axes_mm":[70,-1,90]}}'
+truth 'dots that are no array' 'line 2: dots: expected' '{"file":"b.pgm","head":null,"dots":5}'
+truth 'a dot of index 361' 'line 2: dots\[1\]: expected \[index below 361' \
+    '{"file":"b.pgm","head":null,"dots":[[0,1,2,900],[361,1,2,900]]}'
+truth 'a dot of 3 numbers' 'line 2: dots\[0\]: expected' \
+    '{"file":"b.pgm","head":null,"dots":[[0,1,2]]}'
+truth 'a dot twice' 'line 2: dots\[1\]: index 4 was there before' \
+    '{"file":"b.pgm","head":null,"dots":[[4,1,2,900],[4,1,2,900]]}'
+mkdir d/truth.jsonl
+run --json d
+check 'truth.jsonl: a directory' 1 3 0 'd/truth\.jsonl: a directory, expected a file'
+fresh
+
+# --- directories ---------------------------------------------------------------------------------
+
+run --json nowhere
+check 'directory: not there' 1 0 0 'nowhere: No such file'
+run --json nowhere d
+check 'directory: not there, another is good' 1 3 0 'nowhere: No such file'
+run --json d/a.pgm
+check 'directory: a file' 1 0 0 'd/a\.pgm: Not a directory'
+mkdir empty
+run --json empty
+check 'directory: empty' 1 0 0 'empty: no rig\.json here and in no subdirectory'
+rm d/*.pgm
+run --json d
+check 'directory: no frames' 1 0 0 'd: no frames \(\*\.pgm\)'
+fresh
+mkdir many many/notes && cp -R base many/two && cp -R base many/one
+run --json many
+check 'directory: subdirectories in order' 0 6 0 -
+reason=
+head -n 1 out | grep -q '"dir":"many/one"' || reason='many/one does not come first'
+result 'directory: records say which' "$reason"
+echo broken >many/one/rig.json
+: >many/two/a.pgm
+run --json many
+check 'directory: a broken rig beside a good one' 1 2 1 'many/one/rig\.json: .*not JSON'
+rm -rf many/one/rig.json
+run --json many
+check 'directory: one without a rig is passed over' 1 2 1 'many/two/a\.pgm: '
+
+# --- command line --------------------------------------------------------------------------------
+
+run
+check 'usage: nothing' 2 0 0 'host_sim: no frames directory'
+run --json
+check 'usage: no directory' 2 0 0 'host_sim: no frames directory'
+run --nonsense d
+check 'usage: unknown option' 2 0 0 'host_sim: unknown option.*--nonsense'
+run -x d
+check 'usage: unknown letter' 2 0 0 'host_sim: unknown option.*-x'
+run --json=1 d
+check 'usage: argument that is not wanted' 2 0 0 'host_sim: .*--json=1'
+run --rig
+check 'usage: --rig without a file' 2 0 0 'host_sim: missing argument of --rig'
+run --trace '' d
+check 'usage: empty --trace' 2 0 0 'host_sim: empty argument of --trace'
+run --help
+reason='no help'
+[ "$(cat status)" -ne 0 ] || ! grep -q -- '--trace OUT' out || reason=
+result 'usage: --help' "$reason"
+run --version
+reason='no version'
+[ "$(cat status)" -ne 0 ] || ! grep -Eq '^host_sim [0-9]+\.[0-9]+' out || reason=
+result 'usage: --version' "$reason"
+
+# --- output --------------------------------------------------------------------------------------
+
+# unwritable NAME ARGUMENT...: standard output is full.
+unwritable() {
+    name=$1
+    shift
+    : >out
+    timeout 120 "$host_sim" "$@" >/dev/full 2>err
+    echo $? >status
+    check "output: full, $name" 1 0 0 'standard output'
+}
+unwritable 'records' --json d
+unwritable 'table' d
+unwritable 'help' --help
+
+: >out
+timeout 120 "$host_sim" --json --trace trace d >&- 2>err
+echo $? >status
+check 'output: closed' 1 0 0 'standard output'
+timeout 120 "$host_sim" --json d >out 2>&-
+echo $? >status
+: >err
+check 'output: standard error is closed' 0 3 0 -
+: >d/b.pgm
+timeout 120 "$host_sim" --json --trace trace d >out 2>&-
+echo $? >status
+check 'output: standard error is closed and something to tell' 1 2 1 -
+rm -rf trace
+
+run d
+reason='the table does not go on behind an error'
+! grep -Eq '^c\.pgm ' out || ! grep -Eq '^b\.pgm +error: ' out || reason=
+result 'output: table with a lost frame' "$reason"
+fresh
+
+run --json --trace trace d
+check 'trace: good' 0 3 0 -
+reason='not all frames are there'
+[ ! -s trace/d/a.json ] || [ ! -s trace/d/b.json ] || [ ! -s trace/d/c.json ] || reason=
+result 'trace: a file per frame' "$reason"
+rm trace/d/b.json && ln -s /dev/full trace/d/b.json
+run --json --trace trace d
+check 'trace: full' 1 3 0 'd/b\.pgm: trace trace/d/b\.json: No space left'
+run --json --trace d/a.pgm d
+check 'trace: OUT is a file' 1 3 0 'd/a\.pgm: trace d/a\.pgm/d/a\.json: Not a directory'
+rm -rf trace many/two/a.pgm && cp base/a.pgm many/two/a.pgm && mkdir elsewhere &&
+    cp -R base elsewhere/two
+run --json --trace trace/deep/er many elsewhere
+check 'trace: two directories of one name' 0 6 0 -
+reason='they are not kept apart'
+[ ! -s trace/deep/er/two/a.json ] || [ ! -s trace/deep/er/two-2/a.json ] || reason=
+result 'trace: two directories of one name are kept apart' "$reason"
+
+echo "1..$number"
+echo "# $((number - failed)) passed, $failed failed"
+[ "$failed" -eq 0 ]

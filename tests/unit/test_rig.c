@@ -1,0 +1,519 @@
+/* ih_rig against float64: lens, epipolar lines, and every field that can be wrong. */
+#include "ih_rig.h"
+
+#include "ih_test.h"
+#include "rigs.inc"
+
+struct vector_line {
+    int rig, slot;
+    double infinity_u, infinity_v, dir_u, dir_v, length;
+    double far_u, far_v, near_u, near_v;
+};
+
+struct vector_lens {
+    int rig;
+    int32_t u_px_q12, v_px_q12;
+    double x, y;
+};
+
+#include "rig.inc"
+
+#define RIG_COUNT IH_TEST_COUNT(vector_rigs)
+#define LSB_Q12 (1.0 / 4096)
+
+static struct ih_rig rigs[RIG_COUNT];
+static struct ih_rig rig;
+static struct ih_calibration calibration;
+static int32_t bad_slot;
+
+void setUp(void)
+{
+    int i;
+
+    for (i = 0; i < RIG_COUNT; i++) {
+        IH_TEST_EQUAL(IH_OK, ih_rig_init(&rigs[i], &vector_rigs[i], &bad_slot), "rig", i);
+        IH_TEST_EQUAL(IH_NONE, bad_slot, "bad slot of rig", i);
+    }
+    calibration = vector_rigs[0];
+    bad_slot = 12345;
+}
+
+void tearDown(void)
+{
+}
+
+static double focal_max(const struct ih_rig *of)
+{
+    return fmax(of->calibration.fx_px_q16, of->calibration.fy_px_q16) / 65536;
+}
+
+/* |e| = focal * offset: the offset is rounded to Q16 mm twice, each component of e to Q8, the
+ * length downwards to Q8. */
+static double length_tolerance(const struct ih_rig *of)
+{
+    return focal_max(of) / 65536 + 2.0 / 256;
+}
+
+static void lines_match_float64(void)
+{
+    int i;
+
+    for (i = 0; i < IH_TEST_COUNT(vector_lines); i++) {
+        const struct vector_line *v = &vector_lines[i];
+        const struct ih_line *line = &rigs[v->rig].line[v->slot];
+        const double length = length_tolerance(&rigs[v->rig]);
+
+        IH_TEST_WITHIN(LSB_Q12, v->infinity_u, ih_test_from_q(line->infinity_u_px_q12, 12), "u", i);
+        IH_TEST_WITHIN(LSB_Q12, v->infinity_v, ih_test_from_q(line->infinity_v_px_q12, 12), "v", i);
+        IH_TEST_WITHIN(length, v->length, ih_test_from_q(line->length_px_mm_q8, 8), "length", i);
+        IH_TEST_WITHIN(2 * length / v->length, v->dir_u, ih_test_from_q(line->dir_u_q30, 30),
+                       "dir u", i);
+        IH_TEST_WITHIN(2 * length / v->length, v->dir_v, ih_test_from_q(line->dir_v_q30, 30),
+                       "dir v", i);
+    }
+}
+
+static void working_range_matches_float64(void)
+{
+    int i;
+
+    for (i = 0; i < IH_TEST_COUNT(vector_lines); i++) {
+        const struct vector_line *v = &vector_lines[i];
+        const struct ih_calibration *c = &vector_rigs[v->rig];
+        const struct ih_line *line = &rigs[v->rig].line[v->slot];
+        /* The error of the length at this depth, and half a unit of Q12. */
+        const double far = length_tolerance(&rigs[v->rig]) / c->far_mm + LSB_Q12;
+        const double near = length_tolerance(&rigs[v->rig]) / c->near_mm + LSB_Q12;
+
+        IH_TEST_WITHIN(far, v->length / c->far_mm, ih_test_from_q(line->t_far_px_q12, 12),
+                       "t far", i);
+        IH_TEST_WITHIN(near, v->length / c->near_mm, ih_test_from_q(line->t_near_px_q12, 12),
+                       "t near", i);
+        TEST_ASSERT_TRUE(line->t_far_px_q12 < line->t_near_px_q12);
+        /* In the frame's own pixels; the lenses here magnify by less than 2. */
+        IH_TEST_WITHIN(2 * far, v->far_u, ih_test_from_q(line->far_u_px_q12, 12), "far u", i);
+        IH_TEST_WITHIN(2 * far, v->far_v, ih_test_from_q(line->far_v_px_q12, 12), "far v", i);
+        IH_TEST_WITHIN(2 * near, v->near_u, ih_test_from_q(line->near_u_px_q12, 12), "near u", i);
+        IH_TEST_WITHIN(2 * near, v->near_v, ih_test_from_q(line->near_v_px_q12, 12), "near v", i);
+    }
+}
+
+static void all_directions_are_unit_vectors(void)
+{
+    int i, slot;
+
+    for (i = 0; i < RIG_COUNT; i++) {
+        for (slot = 0; slot < IH_SLOTS; slot++) {
+            const struct ih_line *line = &rigs[i].line[slot];
+            const double size = hypot(ih_test_from_q(line->dir_u_q30, 30),
+                                      ih_test_from_q(line->dir_v_q30, 30));
+
+            /* The length is rounded down by up to 1/256 px mm. */
+            IH_TEST_WITHIN(1.0 / line->length_px_mm_q8 + 2e-9, 1.0, size, "unit vector", slot);
+        }
+    }
+}
+
+static void undistort_matches_the_exact_inverse(void)
+{
+    int i;
+
+    for (i = 0; i < IH_TEST_COUNT(vector_lens); i++) {
+        const struct vector_lens *v = &vector_lens[i];
+        /* 0.005 px as the header promises. */
+        const double tolerance = 0.005 / focal_max(&rigs[v->rig]);
+        int32_t x_q28, y_q28;
+
+        ih_rig_undistort(&rigs[v->rig], v->u_px_q12, v->v_px_q12, &x_q28, &y_q28);
+        IH_TEST_WITHIN(tolerance, v->x, ih_test_from_q(x_q28, 28), "x", i);
+        IH_TEST_WITHIN(tolerance, v->y, ih_test_from_q(y_q28, 28), "y", i);
+    }
+}
+
+static void distort_matches_float64(void)
+{
+    int i;
+
+    for (i = 0; i < IH_TEST_COUNT(vector_lens); i++) {
+        const struct vector_lens *v = &vector_lens[i];
+        int32_t u_px_q12, v_px_q12;
+
+        ih_rig_distort(&rigs[v->rig], (int32_t)lround(ldexp(v->x, 28)),
+                       (int32_t)lround(ldexp(v->y, 28)), &u_px_q12, &v_px_q12);
+        /* Two roundings to Q12, of the product and of the principal point; the Q28 terms add less
+         * than 1400 px * 8 * 2^-28 = 0.2 units. */
+        IH_TEST_RANGE(v->u_px_q12 - 2, v->u_px_q12 + 2, u_px_q12, "u", i);
+        IH_TEST_RANGE(v->v_px_q12 - 2, v->v_px_q12 + 2, v_px_q12, "v", i);
+    }
+}
+
+static void distort_limits_what_is_far_outside(void)
+{
+    static const int32_t wild[] = {INT32_MIN, -(3 << 28), 0, 1, (2 << 28) + 1, INT32_MAX};
+    int i, j, k;
+
+    for (k = 0; k < RIG_COUNT; k++) {
+        for (i = 0; i < IH_TEST_COUNT(wild); i++) {
+            for (j = 0; j < IH_TEST_COUNT(wild); j++) {
+                const int32_t limit = IH_RIG_TAN_MAX << 28;
+                const int32_t x = wild[i] > limit ? limit : wild[i] < -limit ? -limit : wild[i];
+                const int32_t y = wild[j] > limit ? limit : wild[j] < -limit ? -limit : wild[j];
+                int32_t u, v, limited_u, limited_v;
+
+                ih_rig_distort(&rigs[k], wild[i], wild[j], &u, &v);
+                ih_rig_distort(&rigs[k], x, y, &limited_u, &limited_v);
+                IH_TEST_EQUAL(limited_u, u, "u", k);
+                IH_TEST_EQUAL(limited_v, v, "v", k);
+            }
+        }
+    }
+}
+
+static void undistort_survives_any_pixel(void)
+{
+    static const int32_t wild[] = {INT32_MIN, -4096, 0, 4096 * 1280, INT32_MAX};
+    int i, j, k;
+
+    for (k = 0; k < RIG_COUNT; k++) {
+        for (i = 0; i < IH_TEST_COUNT(wild); i++) {
+            for (j = 0; j < IH_TEST_COUNT(wild); j++) {
+                int32_t x, y;
+
+                ih_rig_undistort(&rigs[k], wild[i], wild[j], &x, &y);
+                IH_TEST_RANGE(-(IH_RIG_TAN_MAX << 28), IH_RIG_TAN_MAX << 28, x, "x", k);
+                IH_TEST_RANGE(-(IH_RIG_TAN_MAX << 28), IH_RIG_TAN_MAX << 28, y, "y", k);
+            }
+        }
+    }
+}
+
+/* Closed form: without distortion a pixel is a tangent. */
+static void without_distortion_undistort_is_a_division(void)
+{
+    const struct ih_rig *plain = &rigs[2];
+    const struct ih_calibration *c = &plain->calibration;
+    int32_t u;
+
+    for (u = 0; u < c->width; u += 7) {
+        int32_t x, y;
+
+        ih_rig_undistort(plain, u << 12, 50 << 12, &x, &y);
+        /* Half a unit of Q28. */
+        IH_TEST_WITHIN(0.51, ldexp((u * 65536.0 - c->cx_px_q16) / c->fx_px_q16, 28), x, "x", u);
+        IH_TEST_WITHIN(0.51, ldexp((50 * 65536.0 - c->cy_px_q16) / c->fy_px_q16, 28), y, "y", u);
+    }
+}
+
+/* X/Z of the ray O + s r at depth Z, straight from the definition. */
+static double ray_at(const struct ih_calibration *c, int slot, int axis, double depth)
+{
+    const int32_t *ray = c->ray_q30[slot];
+    const double along = (depth - c->origin_mm_q16[2] / 65536.0) / ray[2];
+
+    return (c->origin_mm_q16[axis] / 65536.0 + along * ray[axis]) / depth;
+}
+
+static void dot_at_is_the_ray_at_that_depth(void)
+{
+    static const int32_t depth_mm_q8[] = {100 << 8, 25700, 400 << 8, 300007, 16000 << 8};
+    int i, k, slot;
+
+    for (k = 0; k < RIG_COUNT; k++) {
+        for (slot = 0; slot < IH_SLOTS; slot++) {
+            for (i = 0; i < IH_TEST_COUNT(depth_mm_q8); i++) {
+                const double depth = depth_mm_q8[i] / 256.0;
+                /* The offset is rounded to Q16 mm twice; the rest is half units of Q28. */
+                const double tolerance = 1.0 / 65536 / depth + ldexp(2, -28);
+                int32_t x, y;
+
+                ih_rig_dot_at(&rigs[k], slot, depth_mm_q8[i], &x, &y);
+                IH_TEST_WITHIN(tolerance, ray_at(&vector_rigs[k], slot, 0, depth),
+                               ih_test_from_q(x, 28), "x", slot);
+                IH_TEST_WITHIN(tolerance, ray_at(&vector_rigs[k], slot, 1, depth),
+                               ih_test_from_q(y, 28), "y", slot);
+            }
+        }
+    }
+}
+
+static double dot_distance(const struct ih_calibration *c, int slot, int other, double depth)
+{
+    return hypot(ray_at(c, slot, 0, depth) - ray_at(c, other, 0, depth),
+                 ray_at(c, slot, 1, depth) - ray_at(c, other, 1, depth));
+}
+
+static void field_unit_is_half_the_pitch(void)
+{
+    int i, k;
+
+    for (k = 0; k < RIG_COUNT; k++) {
+        double sum = 0;
+
+        for (i = 0; i < IH_SLOTS - IH_GRID; i++) {
+            sum += dot_distance(&vector_rigs[k], i, i + IH_GRID, 1e9);
+            sum += dot_distance(&vector_rigs[k], i / 18 * IH_GRID + i % 18,
+                                i / 18 * IH_GRID + i % 18 + 1, 1e9);
+        }
+        /* Equal steps in angle are no equal steps in the image: means over all dots or over the
+         * outer ones, at infinity or nearer, differ by a few percent. */
+        IH_TEST_WITHIN(0.05, 1.0,
+                       ih_test_from_q(rigs[k].field.unit_q28, 28) / (sum / (4 * (IH_SLOTS - IH_GRID))),
+                       "unit", k);
+    }
+}
+
+static void field_centre_is_a_place_of_the_middle_dot(void)
+{
+    int k;
+
+    for (k = 0; k < RIG_COUNT; k++) {
+        const struct ih_calibration *c = &vector_rigs[k];
+        const int middle = IH_SLOTS / 2;
+        const double x = ih_test_from_q(rigs[k].field.centre_x_q28, 28);
+        const double y = ih_test_from_q(rigs[k].field.centre_y_q28, 28);
+        const double far_x = ray_at(c, middle, 0, c->far_mm);
+        const double far_y = ray_at(c, middle, 1, c->far_mm);
+        const double along_x = ray_at(c, middle, 0, c->near_mm) - far_x;
+        const double along_y = ray_at(c, middle, 1, c->near_mm) - far_y;
+        const double length = hypot(along_x, along_y);
+        const double along = ((x - far_x) * along_x + (y - far_y) * along_y) / (length * length);
+
+        TEST_ASSERT_TRUE(along > 0 && along < 1);
+        /* Rounding of the offset, as in dot_at. */
+        IH_TEST_WITHIN(1.0 / 65536 / c->near_mm, 0.0,
+                       ((x - far_x) * along_y - (y - far_y) * along_x) / length, "beside", k);
+    }
+}
+
+static void inside_ends_at_the_outer_pixel_centres(void)
+{
+    const int32_t right = (calibration.width - 1) * 4096;
+    const int32_t bottom = (calibration.height - 1) * 4096;
+
+    TEST_ASSERT_TRUE(ih_rig_inside(&rigs[0], 0, 0));
+    TEST_ASSERT_TRUE(ih_rig_inside(&rigs[0], right, bottom));
+    TEST_ASSERT_FALSE(ih_rig_inside(&rigs[0], -1, 0));
+    TEST_ASSERT_FALSE(ih_rig_inside(&rigs[0], 0, -1));
+    TEST_ASSERT_FALSE(ih_rig_inside(&rigs[0], right + 1, 0));
+    TEST_ASSERT_FALSE(ih_rig_inside(&rigs[0], 0, bottom + 1));
+    TEST_ASSERT_FALSE(ih_rig_inside(&rigs[0], INT32_MIN, INT32_MAX));
+}
+
+/* Each of these sets one field of a good calibration and expects a code. */
+static void expect(enum ih_err err, int32_t slot, const char *what)
+{
+    IH_TEST_EQUAL(err, ih_rig_init(&rig, &calibration, &bad_slot), what, 0);
+    IH_TEST_EQUAL(slot, bad_slot, what, 1);
+}
+
+#define EXPECT_WITH(field, value, err)                                                             \
+    do {                                                                                           \
+        calibration = vector_rigs[0];                                                              \
+        calibration.field = (value);                                                               \
+        expect((err), IH_NONE, #field " = " #value);                                               \
+    } while (0)
+
+static void sizes_are_checked(void)
+{
+    EXPECT_WITH(width, IH_FRAME_WIDTH_MIN - 1, IH_ERR_SIZE);
+    EXPECT_WITH(width, IH_FRAME_WIDTH_MAX + 1, IH_ERR_SIZE);
+    EXPECT_WITH(height, IH_FRAME_HEIGHT_MIN - 1, IH_ERR_SIZE);
+    EXPECT_WITH(height, IH_FRAME_HEIGHT_MAX + 1, IH_ERR_SIZE);
+    EXPECT_WITH(width, 0, IH_ERR_SIZE);
+    EXPECT_WITH(width, INT32_MIN, IH_ERR_SIZE);
+    EXPECT_WITH(height, INT32_MAX, IH_ERR_SIZE);
+    EXPECT_WITH(width, IH_FRAME_WIDTH_MIN, IH_OK);
+    EXPECT_WITH(height, IH_FRAME_HEIGHT_MIN, IH_OK);
+}
+
+static void focal_lengths_are_checked(void)
+{
+    EXPECT_WITH(fx_px_q16, 0, IH_ERR_FOCAL);
+    EXPECT_WITH(fy_px_q16, 0, IH_ERR_FOCAL);
+    EXPECT_WITH(fx_px_q16, -1, IH_ERR_FOCAL);
+    EXPECT_WITH(fy_px_q16, INT32_MIN, IH_ERR_FOCAL);
+    EXPECT_WITH(fx_px_q16, (IH_RIG_FOCAL_MAX_PX << 16) + 1, IH_ERR_FOCAL);
+    EXPECT_WITH(fy_px_q16, INT32_MAX, IH_ERR_FOCAL);
+    EXPECT_WITH(fx_px_q16, IH_RIG_FOCAL_MAX_PX << 16, IH_OK);
+}
+
+static void the_view_is_at_most_as_wide_as_it_may_be(void)
+{
+    /* 752 px wide with the principal point at 375.5: 376.5 px to the right, 188.25 px at tan 2. */
+    EXPECT_WITH(fx_px_q16, 1, IH_ERR_PRINCIPAL);
+    EXPECT_WITH(fx_px_q16, 100 << 16, IH_ERR_PRINCIPAL);
+    EXPECT_WITH(fy_px_q16, 100 << 16, IH_ERR_PRINCIPAL);
+    EXPECT_WITH(cx_px_q16, 1900 << 16, IH_ERR_PRINCIPAL);
+    EXPECT_WITH(cx_px_q16, -(1200 << 16), IH_ERR_PRINCIPAL);
+    EXPECT_WITH(cy_px_q16, INT32_MAX, IH_ERR_PRINCIPAL);
+    EXPECT_WITH(cy_px_q16, INT32_MIN, IH_ERR_PRINCIPAL);
+}
+
+static void lenses_that_fold_the_picture_are_refused(void)
+{
+    EXPECT_WITH(k1_q24, -2 * (1 << 24), IH_ERR_DISTORTION);
+    EXPECT_WITH(k2_q24, -20 * (1 << 24), IH_ERR_DISTORTION);
+    EXPECT_WITH(k1_q24, INT32_MIN, IH_ERR_DISTORTION);
+    EXPECT_WITH(k3_q24, INT32_MIN, IH_ERR_DISTORTION);
+    EXPECT_WITH(p1_q24, 127 << 24, IH_ERR_DISTORTION);
+    EXPECT_WITH(p2_q24, -(127 << 24), IH_ERR_DISTORTION);
+}
+
+static void the_working_range_is_checked(void)
+{
+    EXPECT_WITH(near_mm, IH_DEPTH_MIN_MM - 1, IH_ERR_RANGE);
+    EXPECT_WITH(far_mm, IH_DEPTH_MAX_MM + 1, IH_ERR_RANGE);
+    EXPECT_WITH(near_mm, 2600, IH_ERR_RANGE);
+    EXPECT_WITH(far_mm, 399, IH_ERR_RANGE);
+    EXPECT_WITH(near_mm, -400, IH_ERR_RANGE);
+    EXPECT_WITH(far_mm, INT32_MAX, IH_ERR_RANGE);
+    EXPECT_WITH(near_mm, IH_DEPTH_MIN_MM, IH_OK);
+    EXPECT_WITH(far_mm, IH_DEPTH_MAX_MM, IH_OK);
+    EXPECT_WITH(near_mm, 2599, IH_OK);
+}
+
+static void the_baseline_is_checked(void)
+{
+    calibration.origin_mm_q16[0] = calibration.origin_mm_q16[1] = calibration.origin_mm_q16[2] = 0;
+    TEST_ASSERT_EQUAL_INT(IH_ERR_BASELINE, ih_rig_init(&rig, &calibration, &bad_slot));
+    EXPECT_WITH(origin_mm_q16[0], (IH_RIG_BASELINE_MAX_MM << 16) + 1, IH_ERR_BASELINE);
+    EXPECT_WITH(origin_mm_q16[1], INT32_MAX, IH_ERR_BASELINE);
+    EXPECT_WITH(origin_mm_q16[2], INT32_MIN, IH_ERR_BASELINE);
+    EXPECT_WITH(origin_mm_q16[1], -(IH_RIG_BASELINE_MAX_MM << 16), IH_OK);
+}
+
+/* A dot whose ray passes through the camera's centre stands still at every depth: slot 200 here. */
+static void a_dot_that_does_not_move_is_refused(void)
+{
+    int axis;
+
+    for (axis = 0; axis < 3; axis++) {
+        const double part = vector_rigs[0].ray_q30[200][axis] / 1073741824.0;
+
+        calibration.origin_mm_q16[axis] = (int32_t)lround(300 * 65536 * part);
+    }
+    expect(IH_ERR_BASELINE, 200, "dot on the camera's centre");
+}
+
+static void rays_are_checked_one_by_one(void)
+{
+    static const int slots[] = {0, 17, 180, IH_SLOTS - 1};
+    int i, axis;
+
+    for (i = 0; i < IH_TEST_COUNT(slots); i++) {
+        int32_t *ray = calibration.ray_q30[slots[i]];
+
+        calibration = vector_rigs[0];
+        ray[2] = -ray[2];
+        expect(IH_ERR_RAY, slots[i], "backwards");
+        calibration = vector_rigs[0];
+        ray[0] = ray[1] = ray[2] = 0;
+        expect(IH_ERR_RAY, slots[i], "no direction");
+        calibration = vector_rigs[0];
+        ray[2] = INT32_MAX;
+        expect(IH_ERR_RAY, slots[i], "too long");
+        calibration = vector_rigs[0];
+        for (axis = 0; axis < 3; axis++) {
+            ray[axis] = ray[axis] / 100 * 99;
+        }
+        expect(IH_ERR_RAY, slots[i], "too short");
+        calibration = vector_rigs[0];
+        ray[0] = INT32_MIN;
+        ray[1] = INT32_MIN;
+        ray[2] = INT32_MIN;
+        expect(IH_ERR_RAY, slots[i], "least integers");
+        calibration = vector_rigs[0];
+        ray[0] = 1 << 30;
+        ray[1] = ray[2] = 0;
+        expect(IH_ERR_RAY, slots[i], "sideways");
+    }
+}
+
+static void equal_rays_are_no_pattern(void)
+{
+    int slot, axis;
+
+    for (slot = 1; slot < IH_SLOTS; slot++) {
+        for (axis = 0; axis < 3; axis++) {
+            calibration.ray_q30[slot][axis] = calibration.ray_q30[0][axis];
+        }
+    }
+    TEST_ASSERT_EQUAL_INT(IH_ERR_RAY, ih_rig_init(&rig, &calibration, &bad_slot));
+}
+
+static void kinds_are_checked(void)
+{
+    EXPECT_WITH(kind, (enum ih_rig_kind)2, IH_ERR_KIND);
+    EXPECT_WITH(kind, (enum ih_rig_kind)-1, IH_ERR_KIND);
+}
+
+/* A range rig may be smaller and has no projector: its rays and origin do not matter. */
+static void a_range_rig_needs_no_projector(void)
+{
+    memset(calibration.ray_q30, 0, sizeof calibration.ray_q30);
+    memset(calibration.origin_mm_q16, 0, sizeof calibration.origin_mm_q16);
+    calibration.kind = IH_RIG_RANGE;
+    expect(IH_OK, IH_NONE, "range");
+    calibration.width = calibration.height = IH_RANGE_SIDE_MIN;
+    calibration.cx_px_q16 = calibration.cy_px_q16 = 32 << 16;
+    expect(IH_OK, IH_NONE, "least range image");
+    calibration.width = IH_RANGE_SIDE_MIN - 1;
+    expect(IH_ERR_SIZE, IH_NONE, "narrower than the least");
+    calibration.width = IH_RANGE_SIDE_MIN;
+    calibration.height = IH_RANGE_SIDE_MIN - 1;
+    expect(IH_ERR_SIZE, IH_NONE, "lower than the least");
+    calibration.height = 320; /* higher than wide */
+    expect(IH_OK, IH_NONE, "portrait");
+}
+
+/* Each line's place at infinity and direction rebuild the dot at any depth. */
+static void a_line_gives_the_dot_at_any_depth(void)
+{
+    int k, slot;
+
+    for (k = 0; k < RIG_COUNT; k++) {
+        const struct ih_calibration *c = &vector_rigs[k];
+
+        for (slot = 0; slot < IH_SLOTS; slot++) {
+            const struct ih_line *line = &rigs[k].line[slot];
+            const double depth = c->near_mm + (c->far_mm - c->near_mm) * slot / 360.0;
+            const double t = ih_test_from_q(line->length_px_mm_q8, 8) / depth;
+            const double u = ih_test_from_q(line->infinity_u_px_q12, 12) +
+                             t * ih_test_from_q(line->dir_u_q30, 30);
+            const double exact = ray_at(c, slot, 0, depth) * c->fx_px_q16 / 65536 +
+                                 ih_test_from_q(c->cx_px_q16, 16);
+
+            IH_TEST_WITHIN(LSB_Q12 + 2 * length_tolerance(&rigs[k]) / depth, exact, u, "u", slot);
+        }
+    }
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(lines_match_float64);
+    RUN_TEST(working_range_matches_float64);
+    RUN_TEST(all_directions_are_unit_vectors);
+    RUN_TEST(a_line_gives_the_dot_at_any_depth);
+    RUN_TEST(undistort_matches_the_exact_inverse);
+    RUN_TEST(undistort_survives_any_pixel);
+    RUN_TEST(without_distortion_undistort_is_a_division);
+    RUN_TEST(distort_matches_float64);
+    RUN_TEST(distort_limits_what_is_far_outside);
+    RUN_TEST(dot_at_is_the_ray_at_that_depth);
+    RUN_TEST(field_unit_is_half_the_pitch);
+    RUN_TEST(field_centre_is_a_place_of_the_middle_dot);
+    RUN_TEST(inside_ends_at_the_outer_pixel_centres);
+    RUN_TEST(sizes_are_checked);
+    RUN_TEST(focal_lengths_are_checked);
+    RUN_TEST(the_view_is_at_most_as_wide_as_it_may_be);
+    RUN_TEST(lenses_that_fold_the_picture_are_refused);
+    RUN_TEST(the_working_range_is_checked);
+    RUN_TEST(the_baseline_is_checked);
+    RUN_TEST(a_dot_that_does_not_move_is_refused);
+    RUN_TEST(rays_are_checked_one_by_one);
+    RUN_TEST(equal_rays_are_no_pattern);
+    RUN_TEST(kinds_are_checked);
+    RUN_TEST(a_range_rig_needs_no_projector);
+    return UNITY_END();
+}

@@ -1,0 +1,63 @@
+"""Float64 reference of the factorisation and the solution, by scipy.linalg."""
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+
+import emit
+import surface
+from rig import to_q, from_q
+
+DIAGONAL = 0.99
+
+
+def packed(matrix):
+    return matrix[np.tril_indices(len(matrix))]
+
+
+def scaled(matrix):
+    """Diagonal 0.99, as the surface scales it, and rounded to Q30."""
+    scale = np.sqrt(DIAGONAL / np.diag(matrix))
+    return to_q(matrix * scale[:, None] * scale, 30)
+
+
+def random_matrix(random, n, condition):
+    """Eigenvalues spread evenly on a log scale."""
+    basis, _ = np.linalg.qr(random.standard_normal((n, n)))
+    values = np.logspace(0, -np.log10(condition), n) if n > 1 else np.ones(1)
+    return scaled(basis * values @ basis.T)
+
+
+def surface_matrix(random, ridge):
+    """The normal equations of 300 dots on a 12x12 multiquadric basis."""
+    places = random.uniform(-18, 18, (300, 2))
+    rows = surface.basis(places)
+    normal = rows.T @ rows
+    return scaled(normal + ridge * np.diag(np.diag(normal)))
+
+
+def write_vectors(directory):
+    random = np.random.default_rng(31)
+    systems = [("one", random_matrix(random, 1, 1)),
+               ("two", random_matrix(random, 2, 10)),
+               ("easy", random_matrix(random, 24, 10)),
+               ("usual", random_matrix(random, 40, 1e3)),
+               ("hard", random_matrix(random, 40, 1e5)),
+               ("surface", surface_matrix(random, 1e-5))]
+    inc = emit.Inc("Positive definite systems, their factors and solutions in float64.")
+    rows = []
+    for name, matrix_q30 in systems:
+        n = len(matrix_q30)
+        matrix = from_q(matrix_q30, 30)
+        factor, _ = cho_factor(matrix, lower=True)
+        truth = random.uniform(-1, 1, n) * 2.0 ** random.integers(0, 3, n)
+        right = to_q(matrix @ truth, 24)
+        inc.array("int32_t", "vector_%s_a_q30" % name, packed(matrix_q30))
+        inc.array("double", "vector_%s_last_row" % name, np.tril(factor)[-1], 12)
+        inc.array("double", "vector_%s_diagonal" % name, np.diag(factor), 12)
+        inc.array("int32_t", "vector_%s_b" % name, right)
+        inc.array("double", "vector_%s_x" % name, cho_solve((factor, True), right.astype(float)), 3)
+        fields = ["a_q30", "last_row", "diagonal", "b", "x"]
+        rows.append('"%s", %d, %.4g, %s' % (name, n, np.linalg.cond(matrix), ", ".join(
+            "vector_%s_%s" % (name, f) for f in fields)))
+    inc.struct_array("vector_system", "vector_systems", rows)
+    return inc.write(directory, "cholesky.inc")

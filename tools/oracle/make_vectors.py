@@ -1,0 +1,36 @@
+#!/usr/bin/env python3
+"""Write the unit tests' vectors: inputs and float64 reference results of each stage.
+
+The reference is NumPy and SciPy, by library calls where there are any, never the firmware's own
+output. Seeds are fixed: the same files come out every time.
+"""
+
+import argparse
+import os
+
+import cholesky
+import dots
+import labels
+import points
+import rig
+import samples
+import surface
+
+STAGES = {"rig": rig, "cholesky": cholesky, "surface": surface,
+          "dots": dots, "labels": labels, "points": points, "samples": samples}
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--out", required=True, metavar="DIR", help="for example tests/vectors")
+    parser.add_argument("stage", nargs="*", choices=[[], *STAGES], help="only these; default all")
+    arguments = parser.parse_args()
+    os.makedirs(arguments.out, exist_ok=True)
+    for name in arguments.stage or STAGES:
+        size = STAGES[name].write_vectors(arguments.out)
+        print("%-12s %7d bytes" % (name, size))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,124 @@
+"""Float64 reference of the surface: weighted ridge regression on multiquadrics."""
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+
+import emit
+from rig import to_q, from_q
+
+CENTRES = 12
+GRID = 47
+STEP = 10 / 11  # of the grid, in field units
+SAMPLES_MIN = 16
+RIDGE_Q30 = 10737
+HUBER_MM = 60
+
+CENTRE_LINE = (np.arange(CENTRES) - (CENTRES - 1) / 2) * 4 * STEP
+CENTRE_PLACES = np.stack(np.meshgrid(CENTRE_LINE, CENTRE_LINE), axis=-1).reshape(-1, 2)
+GRID_LINE = (np.arange(GRID) - (GRID - 1) / 2) * STEP
+GRID_PLACES = np.stack(np.meshgrid(GRID_LINE, GRID_LINE), axis=-1).reshape(-1, 2)
+
+
+def basis(places):
+    """B of every centre at every place: sqrt(dx^2 + dy^2 + 1), field units."""
+    away = places[:, None, :] - CENTRE_PLACES[None, :, :]
+    return np.sqrt((away**2).sum(axis=2) + 1)
+
+
+def solve(places, depth_mm, root_weight, mean_mm, ridge):
+    """Coefficients of z - mean, for rows scaled by the root weight."""
+    rows = basis(places) * root_weight[:, None]
+    normal = rows.T @ rows
+    normal += ridge * np.diag(np.diag(normal))
+    scale = 1 / np.sqrt(np.diag(normal))
+    factor = cho_factor(normal * scale[:, None] * scale, lower=True)
+    right = rows.T @ (root_weight * (depth_mm - mean_mm))
+    return cho_solve(factor, right * scale) * scale
+
+
+def on_grid(coefficients, mean_mm):
+    return (mean_mm + basis(GRID_PLACES) @ coefficients).reshape(GRID, GRID)
+
+
+def huber(places, depth_mm, coefficients, mean_mm, huber_mm):
+    """Root of the weight huber / |residual| of samples that are off by more than huber."""
+    residual = np.abs(mean_mm + basis(places) @ coefficients - depth_mm)
+    return np.where(residual > huber_mm, np.sqrt(huber_mm / np.maximum(residual, 1e-9)), 1.0)
+
+
+def fit(places, depth_mm, root_weight, mean_mm, ridge=RIDGE_Q30 / 2**30, huber_mm=HUBER_MM):
+    """Both passes. Returns the grid and the root weights of the second pass."""
+    first = solve(places, depth_mm, root_weight, mean_mm, ridge)
+    final = root_weight * huber(places, depth_mm, first, mean_mm, huber_mm)
+    return on_grid(solve(places, depth_mm, final, mean_mm, ridge), mean_mm), final
+
+
+def mean_of(depth_mm_q8):
+    """Plain mean of the samples' depths, to Q8 as the firmware keeps it."""
+    return np.rint(np.mean(depth_mm_q8)) / 256
+
+
+def lattice(random, jitter):
+    """Places of the 19x19 dots, field units."""
+    line = (np.arange(19) - 9) * 2.0
+    places = np.stack(np.meshgrid(line, line), axis=-1).reshape(-1, 2)
+    return places + random.uniform(-jitter, jitter, places.shape)
+
+
+def head_before_wall(places):
+    """Depth of a head and a body before a wall, mm."""
+    x, y = places[:, 0], places[:, 1]
+    head = 1 - (x / 5.5)**2 - ((y + 5) / 7.5)**2
+    body = 1 - (x / 13)**2 - ((y - 12) / 9)**2
+    depth = np.full(len(places), 1180.0)
+    depth = np.where(body > 0, 900 - 60 * np.sqrt(np.maximum(body, 0)), depth)
+    return np.where(head > 0, 860 - 95 * np.sqrt(np.maximum(head, 0)), depth)
+
+
+def sample_sets():
+    """name, places, depths in mm, root weights."""
+    random = np.random.default_rng(41)
+    everywhere = lattice(random, 0.3)
+    ones = np.ones(len(everywhere))
+    yield "head", everywhere, head_before_wall(everywhere) + random.normal(0, 4, 361), ones
+
+    weak = np.where(random.uniform(size=361) < 0.3, 0.548, 1.0)
+    yield "weak", everywhere, np.where(weak < 1, 1180, head_before_wall(everywhere)), weak
+
+    some = random.permutation(361)[:250]
+    depth = 900 + 4 * everywhere[some, 0] - 7 * everywhere[some, 1]
+    depth[17] -= 600
+    yield "outlier", everywhere[some], depth, ones[some]
+
+    yield "noise", random.uniform(-18, 18, (361, 2)), random.uniform(500, 1500, 361), ones
+
+    cluster = np.concatenate([random.normal(0, 1.5, (200, 2)), random.uniform(-18, 18, (12, 2))])
+    yield "cluster", cluster, head_before_wall(cluster), np.ones(212)
+
+    few = random.uniform(-15, 15, (SAMPLES_MIN, 2))
+    yield "few", few, head_before_wall(few), np.ones(SAMPLES_MIN)
+
+    far = random.uniform(-39.9, 39.9, (300, 2))
+    yield "ends", far, np.where(far[:, 0] > 0, 16000.0, 100.0), random.uniform(0.01, 1, 300)
+
+
+def write_vectors(directory):
+    inc = emit.Inc("Sample sets, and their surfaces by weighted ridge regression in float64.")
+    inc.raw("\n#define VECTOR_RIDGE_Q30 %d\n#define VECTOR_HUBER_MM %d\n" % (RIDGE_Q30, HUBER_MM))
+    rows = []
+    for name, places, depth_mm, root_weight in sample_sets():
+        places_q16, depth_q8 = to_q(places, 16), to_q(depth_mm, 8)
+        weight_q15 = to_q(root_weight, 15)
+        mean_mm = mean_of(depth_q8)
+        grid, final = fit(from_q(places_q16, 16), from_q(depth_q8, 8), from_q(weight_q15, 15),
+                          mean_mm)
+        samples = ["{%d, %d, %d, %d, %d}" % (x, y, d, w, i) for i, ((x, y), d, w)
+                   in enumerate(zip(places_q16, depth_q8, weight_q15))]
+        inc.raw("\nstatic const struct ih_sample vector_%s_samples[] = {\n%s};\n"
+                % (name, emit.wrap(samples)))
+        inc.array("double", "vector_%s_root_weight" % name, final, 6)
+        inc.array("double", "vector_%s_grid" % name, grid.ravel(), 3)
+        rows.append('"%s", %d, %s, vector_%s_samples, vector_%s_root_weight, vector_%s_grid'
+                    % (name, len(places), emit.number(mean_mm, 4), name, name, name))
+    inc.struct_array("vector_surface", "vector_surfaces", rows)
+    return inc.write(directory, "surface.inc")

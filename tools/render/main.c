@@ -1,0 +1,107 @@
+/* render - draws synthetic frames directories: scene, light, laser dots, sensor; see render --help.
+ * The way of a frame: stage (which shapes) -> ambient (grey picture) -> dots (laser) -> sensor (numbers) -> output.
+ */
+#define _POSIX_C_SOURCE 200809L
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <unistd.h>
+
+#include "rd_ambient.h"
+#include "rd_dots.h"
+#include "rd_options.h"
+#include "rd_output.h"
+#include "rd_rig.h"
+#include "rd_sensor.h"
+#include "rd_stage.h"
+
+struct studio {
+    struct rd_rig rig;
+    struct rd_laser laser;
+    struct rd_sensor sensor;
+    struct rd_stage stage;
+    struct rd_dot_list visible;
+    struct rd_ambient *ambient;
+    float *grey;
+    uint16_t *samples;
+};
+
+static void studio_free(struct studio *studio)
+{
+    if (studio == NULL)
+        return;
+    rd_ambient_free(studio->ambient);
+    free(studio->grey);
+    free(studio->samples);
+    free(studio);
+}
+
+/* NULL: out of memory. */
+static struct studio *studio_new(const struct rd_options *options)
+{
+    struct studio *studio = calloc(1, sizeof *studio);
+    size_t pixel_count = (size_t)options->width * (size_t)options->height;
+    if (studio == NULL)
+        return NULL;
+    rd_rig_make(&studio->rig, options);
+    rd_laser_make(&studio->laser, options);
+    rd_sensor_make(&studio->sensor, options);
+    rd_stage_make(&studio->stage, options);
+    studio->ambient = rd_ambient_new(&studio->rig);
+    studio->grey = malloc(pixel_count * sizeof *studio->grey);
+    studio->samples = malloc(pixel_count * sizeof *studio->samples);
+    if (studio->ambient == NULL || studio->grey == NULL || studio->samples == NULL) {
+        studio_free(studio);
+        return NULL;
+    }
+    return studio;
+}
+
+static bool render_frame(struct studio *studio, struct rd_output *output, int frame)
+{
+    struct rd_stage *stage = &studio->stage;
+    rd_stage_frame(stage, frame);
+    if (stage->still_changed)
+        rd_ambient_still(studio->ambient, &stage->scene, &stage->light);
+    rd_ambient_frame(studio->ambient, &stage->scene, &stage->light, studio->grey);
+    rd_dots_cast(&studio->laser, &studio->rig, &stage->scene, studio->grey, &studio->visible);
+    rd_sensor_expose(&studio->sensor, studio->grey, frame, studio->samples);
+    rd_output_truth(output, frame, &stage->truth, &studio->visible);
+    return rd_output_frame(output, frame, stage->time_us, studio->rig.width, studio->rig.height,
+                           studio->sensor.max_value, studio->samples);
+}
+
+static bool render_all(struct studio *studio, const struct rd_options *options)
+{
+    struct rd_output output;
+    bool talk = isatty(STDERR_FILENO) == 1;
+    bool good = rd_output_open(&output, options->out_dir);
+    for (int frame = 0; good && frame < options->frame_count; frame++) {
+        if (talk)
+            fprintf(stderr, "\rrender: %s %d/%d", options->out_dir, frame + 1, options->frame_count);
+        good = render_frame(studio, &output, frame);
+    }
+    if (talk)
+        fputc('\n', stderr);
+    if (good)
+        good = rd_output_finish(&output, &studio->rig, options->frame_count);
+    else
+        rd_output_abandon(&output);
+    return good;
+}
+
+int main(int argc, char **argv)
+{
+    struct rd_options options;
+    enum rd_options_result parsed = rd_options_parse(argc, argv, &options);
+    if (parsed != RD_OPTIONS_RUN)
+        return parsed == RD_OPTIONS_HELP ? 0 : 2;
+    struct studio *studio = studio_new(&options);
+    if (studio == NULL) {
+        fputs("render: out of memory\n", stderr);
+        return 1;
+    }
+    bool good = render_all(studio, &options);
+    studio_free(studio);
+    return good ? 0 : 1;
+}

@@ -1,0 +1,259 @@
+#include "rd_furniture.h"
+
+#include "rd_room.h"
+
+#define SHELF_BOARDS 4
+#define BOOKS_PER_BOARD 6
+#define LEAVES 22
+
+static void put(struct rd_scene *scene, struct rd_shape shape)
+{
+    rd_scene_add(scene, &shape);
+}
+
+static struct rd_rot upright_turn(struct rd_rng *rng)
+{
+    return rd_rot_euler(rd_rng_uniform(rng, -RD_PI, RD_PI), 0.0, 0.0);
+}
+
+static struct rd_vec draw_vec(struct rd_rng *rng, double low, double high)
+{
+    struct rd_vec v;
+    v.x = rd_rng_uniform(rng, low, high);
+    v.y = rd_rng_uniform(rng, low, high);
+    v.z = rd_rng_uniform(rng, low, high);
+    return v;
+}
+
+void rd_furniture_thing(struct rd_scene *scene, struct rd_rng *rng, struct rd_vec at_mm)
+{
+    int paint = rd_room_paint(scene, rng, 0.1, 0.7);
+    struct rd_vec angles = draw_vec(rng, -0.6, 0.6);
+    struct rd_pose pose = {rd_rot_euler(angles.x, 0.3 * angles.y, 0.5 * angles.z), at_mm};
+    struct rd_vec half_mm = draw_vec(rng, 50.0, 200.0);
+    switch (rd_rng_pick(rng, 4)) {
+    case 0:
+        put(scene, rd_shape_box(pose, half_mm, 8.0, paint));
+        break;
+    case 1:
+        half_mm.z = 15.0;
+        put(scene, rd_shape_box(pose, half_mm, 4.0, paint));
+        break;
+    case 2:
+        put(scene, rd_shape_ball(at_mm, 0.7 * half_mm.x, paint));
+        break;
+    default:
+        put(scene, rd_shape_cylinder(pose, 0.25 * half_mm.x, 3.0 * half_mm.y, paint));
+        break;
+    }
+}
+
+void rd_furniture_shelf(struct rd_scene *scene, struct rd_rng *rng, struct rd_vec at_mm)
+{
+    int wood = rd_room_paint(scene, rng, 0.25, 0.6);
+    int books[3];
+    for (int i = 0; i < 3; i++)
+        books[i] = rd_room_paint(scene, rng, 0.06, 0.7);
+    for (int board = 0; board < SHELF_BOARDS; board++) {
+        double y = at_mm.y - 450.0 + 320.0 * board, x = at_mm.x - 360.0;
+        put(scene, rd_shape_box(rd_pose_at(rd_v(at_mm.x, y, at_mm.z + 140.0)), rd_v(400.0, 11.0, 140.0), 2.0, wood));
+        for (int book = 0; book < BOOKS_PER_BOARD; book++) {
+            double thick_mm = rd_rng_uniform(rng, 12.0, 55.0), tall_mm = rd_rng_uniform(rng, 80.0, 140.0);
+            double back_mm = rd_rng_uniform(rng, 90.0, 180.0);
+            int paint = books[rd_rng_pick(rng, 3)];
+            x += thick_mm;
+            put(scene, rd_shape_box(rd_pose_at(rd_v(x, y - 11.0 - tall_mm, at_mm.z + back_mm)),
+                                    rd_v(thick_mm, tall_mm, 80.0), 3.0, paint));
+            x += thick_mm + rd_rng_uniform(rng, 0.0, 90.0);
+        }
+    }
+    for (double side = -1.0; side <= 1.0; side += 2.0)
+        put(scene, rd_shape_box(rd_pose_at(rd_v(at_mm.x + side * 400.0, at_mm.y + 30.0, at_mm.z + 140.0)),
+                                rd_v(11.0, 520.0, 140.0), 2.0, wood));
+}
+
+/* The lower half of an ellipsoid; its foot stands at `foot_mm`. */
+static void put_bowl(struct rd_scene *scene, struct rd_rng *rng, struct rd_vec foot_mm, int paint)
+{
+    double radius_mm = rd_rng_uniform(rng, 60.0, 140.0);
+    double deep_mm = radius_mm * rd_rng_uniform(rng, 0.45, 0.9);
+    bool upside_down = rd_rng_chance(rng, 0.3);
+    struct rd_vec middle = rd_along(foot_mm, rd_v(0.0, -1.0, 0.0), upside_down ? 0.0 : deep_mm);
+    struct rd_shape bowl = rd_shape_ellipsoid(rd_pose_at(middle), rd_v(radius_mm, deep_mm, radius_mm), paint);
+    bowl.clip_normal = rd_v(0.0, upside_down ? 1.0 : -1.0, 0.0);
+    bowl.clip_limit = 0.0;
+    put(scene, bowl);
+}
+
+static void put_bottle(struct rd_scene *scene, struct rd_rng *rng, struct rd_vec foot_mm, int paint)
+{
+    double radius_mm = rd_rng_uniform(rng, 28.0, 55.0), half_mm = rd_rng_uniform(rng, 60.0, 120.0);
+    struct rd_vec top = rd_along(foot_mm, rd_v(0.0, -1.0, 0.0), 2.0 * half_mm);
+    struct rd_vec neck = rd_along(top, rd_v(0.0, -1.0, 0.0), 2.2 * radius_mm);
+    struct rd_vec middle = rd_along(foot_mm, rd_v(0.0, -1.0, 0.0), half_mm);
+    put(scene, rd_shape_cylinder(rd_pose_at(middle), radius_mm, half_mm, paint));
+    put(scene, rd_shape_cone(top, neck, 0.95 * radius_mm, 0.35 * radius_mm, paint));
+}
+
+static void put_plant(struct rd_scene *scene, struct rd_rng *rng, struct rd_vec foot_mm, double size)
+{
+    int clay = rd_room_paint(scene, rng, 0.2, 0.5), green = rd_room_paint(scene, rng, 0.15, 0.4);
+    double high_mm = size * rd_rng_uniform(rng, 150.0, 260.0);
+    struct rd_vec crown = rd_along(foot_mm, rd_v(0.0, -1.0, 0.0), size * 150.0 + high_mm);
+    put(scene, rd_shape_cylinder(rd_pose_at(rd_along(foot_mm, rd_v(0.0, -1.0, 0.0), 75.0 * size)), 80.0 * size,
+                                 75.0 * size, clay));
+    put(scene, rd_shape_cone(foot_mm, crown, 12.0 * size, 7.0 * size, green));
+    for (int i = 0; i < LEAVES; i++) {
+        struct rd_vec way = draw_vec(rng, -1.0, 1.0);
+        struct rd_vec hint = draw_vec(rng, -1.0, 1.0);
+        double away_mm = size * rd_rng_uniform(rng, 40.0, 150.0);
+        struct rd_vec y = rd_unit(way);
+        struct rd_pose pose = {rd_rot_frame(y, hint), rd_along(crown, y, away_mm)};
+        put(scene, rd_shape_ellipsoid(pose, rd_v(24.0 * size, 65.0 * size, 3.0), green));
+    }
+}
+
+static void put_on_table(struct rd_scene *scene, struct rd_rng *rng, struct rd_vec foot_mm)
+{
+    struct rd_vec up = rd_v(0.0, -1.0, 0.0);
+    struct rd_vec half_mm = draw_vec(rng, 30.0, 110.0);
+    struct rd_rot turn = upright_turn(rng);
+    int kind = rd_rng_pick(rng, 8);
+    if (kind == 7) {
+        put_plant(scene, rng, foot_mm, rd_rng_uniform(rng, 0.5, 0.9));
+        return;
+    }
+    int paint = rd_room_paint(scene, rng, 0.1, 0.75);
+    struct rd_pose middle = {turn, rd_along(foot_mm, up, half_mm.y)};
+    if (kind <= 1)
+        put_bowl(scene, rng, foot_mm, paint);
+    else if (kind == 2)
+        put_bottle(scene, rng, foot_mm, paint);
+    else if (kind == 3)
+        put(scene, rd_shape_box(middle, half_mm, 5.0, paint));
+    else if (kind == 4)
+        put(scene, rd_shape_ball(middle.origin_mm, half_mm.y, paint));
+    else if (kind == 5)
+        put(scene, rd_shape_ellipsoid(middle, half_mm, paint));
+    else
+        put(scene, rd_shape_cylinder(middle, 0.6 * half_mm.x, half_mm.y, paint));
+}
+
+void rd_furniture_table(struct rd_scene *scene, struct rd_rng *rng)
+{
+    double look_down = rd_rng_uniform(rng, 0.30, 0.95);
+    double distance_mm = rd_rng_uniform(rng, 750.0, 1250.0);
+    double top_y_mm = distance_mm * sin(look_down), middle_z_mm = distance_mm * cos(look_down);
+    double turn = rd_rng_uniform(rng, -0.7, 0.7);
+    int count = 3 + rd_rng_pick(rng, 8);
+    int first = scene->shape_count;
+    int floor_paint = rd_room_paint(scene, rng, 0.15, 0.6), wood = rd_room_paint(scene, rng, 0.2, 0.7);
+    struct rd_pose floor_pose = {rd_rot_euler(0.0, -0.5 * RD_PI, 0.0), rd_v(0.0, top_y_mm + 720.0, 1500.0)};
+    put(scene, rd_shape_wall(floor_pose, 4000.0, 4000.0, floor_paint));
+    if (rd_rng_chance(rng, 0.6)) {
+        double behind_mm = rd_rng_uniform(rng, 500.0, 2500.0);
+        int wall_paint = rd_room_paint(scene, rng, 0.2, 0.7);
+        put(scene, rd_shape_wall(rd_pose_at(rd_v(0.0, 0.0, middle_z_mm + behind_mm)), 4000.0, 3000.0, wall_paint));
+    }
+    struct rd_pose top = {rd_rot_euler(turn, 0.0, 0.0), rd_v(0.0, top_y_mm + 15.0, middle_z_mm)};
+    put(scene, rd_shape_box(top, rd_v(600.0, 15.0, 420.0), 4.0, wood));
+    for (int i = 0; i < count; i++) {
+        double x = rd_rng_uniform(rng, -300.0, 300.0), z = rd_rng_uniform(rng, -280.0, 280.0);
+        put_on_table(scene, rng, rd_v(x, top_y_mm, middle_z_mm + z));
+    }
+    struct rd_pose camera = {rd_rot_euler(0.0, look_down, 0.0), rd_v(0.0, 0.0, 0.0)};
+    rd_scene_move(scene, first, &camera);
+}
+
+static void put_chair(struct rd_scene *scene, struct rd_rng *rng, struct rd_vec foot_mm)
+{
+    int wood = rd_room_paint(scene, rng, 0.1, 0.6);
+    struct rd_pose pose = {upright_turn(rng), foot_mm};
+    bool slats = rd_rng_chance(rng, 0.5);
+    int first = scene->shape_count;
+    put(scene, rd_shape_box(rd_pose_at(rd_v(0.0, -450.0, 0.0)), rd_v(215.0, 22.0, 210.0), 15.0, wood));
+    if (!slats)
+        put(scene, rd_shape_box(rd_pose_at(rd_v(0.0, -740.0, 215.0)), rd_v(205.0, 180.0, 18.0), 15.0, wood));
+    for (int i = 0; slats && i < 3; i++)
+        put(scene, rd_shape_box(rd_pose_at(rd_v(0.0, -590.0 - 130.0 * i, 215.0)), rd_v(200.0, 32.0, 12.0), 8.0, wood));
+    for (int i = 0; i < 4; i++) {
+        double x = i % 2 == 0 ? -195.0 : 195.0, z = i / 2 == 0 ? -190.0 : 215.0;
+        double top_mm = z > 0.0 ? 920.0 : 450.0;
+        put(scene, rd_shape_cylinder(rd_pose_at(rd_v(x, -0.5 * top_mm, z)), 17.0, 0.5 * top_mm, wood));
+    }
+    rd_scene_move(scene, first, &pose);
+}
+
+static void put_lamp(struct rd_scene *scene, struct rd_rng *rng, struct rd_vec foot_mm)
+{
+    int metal = rd_room_paint(scene, rng, 0.1, 0.5), shade = rd_room_paint(scene, rng, 0.4, 0.8);
+    double high_mm = rd_rng_uniform(rng, 800.0, 1300.0), radius_mm = rd_rng_uniform(rng, 80.0, 170.0);
+    put(scene, rd_shape_cylinder(rd_pose_at(rd_along(foot_mm, rd_v(0.0, -1.0, 0.0), 0.5 * high_mm)), 13.0,
+                                 0.5 * high_mm, metal));
+    struct rd_vec top = rd_along(foot_mm, rd_v(0.0, -1.0, 0.0), high_mm);
+    if (rd_rng_chance(rng, 0.5))
+        put(scene, rd_shape_ball(top, radius_mm, shade));
+    else
+        put(scene, rd_shape_cylinder(rd_pose_at(top), radius_mm, 0.9 * radius_mm, shade));
+}
+
+static void put_sofa(struct rd_scene *scene, struct rd_rng *rng, struct rd_vec foot_mm)
+{
+    int cover = rd_room_paint(scene, rng, 0.1, 0.6), cushion = rd_room_paint(scene, rng, 0.2, 0.7);
+    struct rd_pose pose = {rd_rot_euler(rd_rng_uniform(rng, -0.6, 0.6), 0.0, 0.0), foot_mm};
+    int first = scene->shape_count;
+    put(scene, rd_shape_box(rd_pose_at(rd_v(0.0, -210.0, 0.0)), rd_v(600.0, 210.0, 380.0), 50.0, cover));
+    put(scene, rd_shape_box(rd_pose_at(rd_v(0.0, -600.0, 300.0)), rd_v(600.0, 260.0, 110.0), 70.0, cover));
+    for (int i = 0; i < 2; i++) {
+        double x = rd_rng_uniform(rng, -400.0, 400.0);
+        struct rd_pose leaning = {rd_rot_euler(0.0, -0.35, rd_rng_uniform(rng, -0.6, 0.6)), rd_v(x, -590.0, 150.0)};
+        put(scene, rd_shape_ellipsoid(leaning, rd_v(200.0, 190.0, 75.0), cushion));
+    }
+    rd_scene_move(scene, first, &pose);
+}
+
+static void put_in_room(struct rd_scene *scene, struct rd_rng *rng, struct rd_vec foot_mm)
+{
+    switch (rd_rng_pick(rng, 6)) {
+    case 0:
+    case 1:
+        put_chair(scene, rng, foot_mm);
+        break;
+    case 2:
+        put_plant(scene, rng, foot_mm, rd_rng_uniform(rng, 0.9, 2.6));
+        break;
+    case 3:
+        put_lamp(scene, rng, foot_mm);
+        break;
+    case 4:
+        put_sofa(scene, rng, foot_mm);
+        break;
+    default:
+        rd_furniture_shelf(scene, rng, rd_along(foot_mm, rd_v(0.0, -1.0, 0.0), 900.0));
+        break;
+    }
+}
+
+void rd_furniture_room(struct rd_scene *scene, struct rd_rng *rng)
+{
+    double floor_y_mm = rd_rng_uniform(rng, 550.0, 1150.0), wall_z_mm = rd_rng_uniform(rng, 1700.0, 4800.0);
+    double pitch = rd_rng_uniform(rng, -0.05, 0.35);
+    double wall_yaw = rd_rng_uniform(rng, -0.5, 0.5);
+    int count = 2 + rd_rng_pick(rng, 4), thing_count = rd_rng_pick(rng, 4);
+    int first = scene->shape_count;
+    int floor_paint = rd_room_paint(scene, rng, 0.15, 0.6), wall_paint = rd_room_paint(scene, rng, 0.25, 0.75);
+    struct rd_pose floor_pose = {rd_rot_euler(0.0, -0.5 * RD_PI, 0.0), rd_v(0.0, floor_y_mm, 2500.0)};
+    struct rd_pose wall_pose = {rd_rot_euler(wall_yaw, 0.0, 0.0), rd_v(0.0, 0.0, wall_z_mm)};
+    put(scene, rd_shape_wall(floor_pose, 5000.0, 5000.0, floor_paint));
+    put(scene, rd_shape_wall(wall_pose, 5000.0, 3000.0, wall_paint));
+    for (int i = 0; i < count; i++) {
+        double z = rd_rng_uniform(rng, 950.0, fmin(2800.0, wall_z_mm)), x = rd_rng_uniform(rng, -0.4, 0.4) * z;
+        put_in_room(scene, rng, rd_v(x, floor_y_mm, z));
+    }
+    for (int i = 0; i < thing_count; i++) {
+        double z = rd_rng_uniform(rng, 800.0, 2200.0), x = rd_rng_uniform(rng, -0.35, 0.35) * z;
+        rd_furniture_thing(scene, rng, rd_v(x, rd_rng_uniform(rng, -0.3, 0.3) * z, z));
+    }
+    struct rd_pose camera = {rd_rot_euler(0.0, pitch, 0.0), rd_v(0.0, 0.0, 0.0)};
+    rd_scene_move(scene, first, &camera);
+}

@@ -1,0 +1,45 @@
+/* rd_material - how much light a point of a surface sends back (its albedo at the laser's 670 nm, also used for
+ * the ambient picture), by pattern and place.
+ * In:    a point in the pattern's own frame, mm.
+ * Out:   albedo 0.01 .. 0.95.
+ */
+#ifndef RD_MATERIAL_H
+#define RD_MATERIAL_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "rd_vec.h"
+
+enum rd_pattern {
+    RD_PLAIN,
+    RD_STRIPES, /* across Y */
+    RD_CHECKS,
+    RD_TILES,  /* joints of the second albedo in X and Y */
+    RD_MOTTLE, /* coarse smooth spots between the two albedos */
+    RD_FACE    /* skin and what is painted on it: see struct rd_face_paint */
+};
+
+/* Coordinates of the paint are the head's own, in units of its semi-axes: the face looks to -Z. */
+struct rd_face_paint {
+    struct rd_vec axes_mm;
+    double hairline;     /* -1 top of the head .. 0 middle; below -1: bald */
+    double hair_albedo;
+    double beard_albedo; /* 0: none */
+    bool glasses, mask;
+};
+
+struct rd_material {
+    enum rd_pattern pattern;
+    double albedo, albedo2;
+    double period_mm;
+    double grain; /* relative amplitude of fine irregularity, 0 .. 0.5 */
+    double grain_mm;
+    double gloss; /* strength of a highlight in the ambient picture, 0 .. 1 */
+    uint64_t seed;
+    struct rd_face_paint face;
+};
+
+double rd_material_albedo(const struct rd_material *material, struct rd_vec local_mm);
+
+#endif

@@ -1,0 +1,50 @@
+/* rd_motion - what a person does over the frames of a sequence.
+ * Trunk and head sway as sums of two slow oscillations; a turning person goes right round on the chair. In
+ * sequence 2 each hand has its own list of gestures: over the face, at the cheek, on the head, waving beside it,
+ * reaching for the camera, and rests between them.
+ */
+#ifndef RD_MOTION_H
+#define RD_MOTION_H
+
+#include "rd_person.h"
+
+/* A gesture and the way to the next take three frames at least: enough for RD_FRAMES_MAX frames. */
+#define RD_GESTURES_MAX 2048
+
+struct rd_sway {
+    double middle, reach1, reach2; /* reach: amplitude */
+    double period1, period2;       /* frames */
+    double phase1, phase2;
+};
+
+struct rd_gesture {
+    int arrive_frame, leave_frame; /* there from .. to; on the way between two gestures */
+    int kind;                      /* index into the table of gestures */
+    struct rd_vec shift_mm;        /* from the table's place */
+    bool cross;                    /* to the other side of the body */
+    double tilt;                   /* of the fingers, radians */
+    double curl, spread;
+};
+
+struct rd_motion {
+    struct rd_vec hips_mm;
+    struct rd_sway lean, bend, twist;  /* trunk: roll, pitch, yaw */
+    struct rd_sway yaw, pitch, roll;   /* head against trunk */
+    bool turning;
+    double turn_start, turn_total;     /* radians */
+    int frame_count;
+    struct rd_gesture gestures[2][RD_GESTURES_MAX];
+    int gesture_count[2];
+};
+
+/* Plans a sequence around a place of the head at rest. */
+void rd_motion_make(struct rd_motion *motion, const struct rd_person *person, uint64_t seed, int frame_count,
+                    struct rd_vec head_mm, bool turning, bool hands_move);
+
+/* Yaw of the trunk and of the chair under it, radians. */
+double rd_motion_turn(const struct rd_motion *motion, int frame);
+
+void rd_motion_posture(const struct rd_motion *motion, const struct rd_person *person, int frame,
+                       struct rd_posture *posture);
+
+#endif

@@ -1,0 +1,167 @@
+#include "rd_options.h"
+
+#include <errno.h>
+#include <getopt.h>
+#include <limits.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define FRAMES_MAX 5000
+
+enum option_id { OPT_SCENE = 1, OPT_SEQUENCE, OPT_RIG, OPT_SEED, OPT_FRAMES, OPT_SIZE, OPT_BACKGROUND, OPT_BITS,
+                 OPT_DISTORTION, OPT_AMBIENT, OPT_HELP };
+
+static const char help_text[] =
+    "Usage: render [options] OUT_DIR\n"
+    "Renders a frames directory: pictures of a scene with 19x19 laser dots on it, the rig and the truth.\n"
+    "The same options give the same files.\n"
+    "\n"
+    "  --scene KIND       person (default): somebody on a seat; turning: right round on an office chair;\n"
+    "                     empty: the seat alone; table: things on a table; room: furniture, nobody there\n"
+    "  --sequence N       1 (default): hands down; 2: hands move strongly and partly cover the head\n"
+    "  --rig KIND         paper (default): 12.5 mm between camera and projector; wide: 125 mm\n"
+    "  --seed N           which person, room, light, motion (default 1)\n"
+    "  --frames N         1 to 5000 (default 50, four of them without the person)\n"
+    "  --size WxH         320x240 to 1280x800 (default 752x582); the focal length follows the width\n"
+    "  --background KIND  varied (default, by seed), near, far, none\n"
+    "  --ambient KIND     varied (default, by seed), dim, normal, bright\n"
+    "  --distortion KIND  normal (default), none, strong\n"
+    "  --bits N           8 (default), 10, 12 or 16 bits per sample\n"
+    "  --help             this text\n"
+    "\n"
+    "rig.json is written last: a directory that has it is complete.\n"
+    "Exit status: 0 done, 1 something could not be written, 2 wrong usage.\n";
+
+static bool complain(const char *option, const char *value, const char *wanted)
+{
+    fprintf(stderr, "render: --%s %s: must be %s\n", option, value, wanted);
+    return false;
+}
+
+/* A whole decimal number with nothing after it. */
+static bool read_number(const char *option, const char *text, uint64_t low, uint64_t high, const char *wanted,
+                        uint64_t *value)
+{
+    char *end;
+    errno = 0;
+    unsigned long long read = strtoull(text, &end, 10);
+    if (text[0] < '0' || text[0] > '9' || *end != '\0' || errno != 0 || read < low || read > high)
+        return complain(option, text, wanted);
+    *value = read;
+    return true;
+}
+
+static bool read_int(const char *option, const char *text, int low, int high, const char *wanted, int *value)
+{
+    uint64_t read;
+    if (!read_number(option, text, (uint64_t)low, (uint64_t)high, wanted, &read))
+        return false;
+    *value = (int)read;
+    return true;
+}
+
+/* Index of a word in a list that ends with NULL. */
+static bool read_word(const char *option, const char *text, const char *const *words, const char *wanted, int *index)
+{
+    for (*index = 0; words[*index] != NULL; (*index)++) {
+        if (strcmp(text, words[*index]) == 0)
+            return true;
+    }
+    return complain(option, text, wanted);
+}
+
+static bool read_size(const char *text, struct rd_options *options)
+{
+    int width, height, length = 0;
+    bool read = sscanf(text, "%4dx%4d%n", &width, &height, &length) == 2 && text[length] == '\0';
+    if (!read || width < 320 || width > 1280 || height < 240 || height > 800)
+        return complain("size", text, "WxH from 320x240 to 1280x800");
+    options->width = width;
+    options->height = height;
+    return true;
+}
+
+static bool take_word(int id, const char *text, struct rd_options *options)
+{
+    static const char *const scenes[] = {"person", "turning", "empty", "table", "room", NULL};
+    static const char *const rigs[] = {"paper", "wide", NULL};
+    static const char *const backgrounds[] = {"varied", "near", "far", "none", NULL};
+    static const char *const lenses[] = {"normal", "none", "strong", NULL};
+    static const char *const ambients[] = {"varied", "dim", "normal", "bright", NULL};
+    int index = 0;
+    bool known = false;
+    if (id == OPT_SCENE) {
+        known = read_word("scene", text, scenes, "person, turning, empty, table or room", &index);
+        options->scene = (enum rd_scene_kind)index;
+    } else if (id == OPT_RIG) {
+        known = read_word("rig", text, rigs, "paper or wide", &index);
+        options->rig = (enum rd_rig_kind)index;
+    } else if (id == OPT_BACKGROUND) {
+        known = read_word("background", text, backgrounds, "varied, near, far or none", &index);
+        options->background = (enum rd_background)index;
+    } else if (id == OPT_DISTORTION) {
+        known = read_word("distortion", text, lenses, "normal, none or strong", &index);
+        options->distortion = (enum rd_distortion)index;
+    } else if (id == OPT_AMBIENT) {
+        known = read_word("ambient", text, ambients, "varied, dim, normal or bright", &index);
+        options->ambient = (enum rd_ambient_kind)index;
+    }
+    return known;
+}
+
+static bool take_option(int id, const char *text, struct rd_options *options)
+{
+    switch (id) {
+    case OPT_SEQUENCE:
+        return read_int("sequence", text, 1, 2, "1 or 2", &options->sequence);
+    case OPT_SEED:
+        return read_number("seed", text, 0, UINT64_MAX, "a whole number", &options->seed);
+    case OPT_FRAMES:
+        return read_int("frames", text, 1, FRAMES_MAX, "a whole number from 1 to 5000", &options->frame_count);
+    case OPT_SIZE:
+        return read_size(text, options);
+    case OPT_BITS:
+        return read_int("bits", text, 8, 16, "8, 10, 12 or 16", &options->bits) &&
+               (options->bits == 8 || options->bits == 10 || options->bits == 12 || options->bits == 16 ||
+                complain("bits", text, "8, 10, 12 or 16"));
+    default:
+        return take_word(id, text, options);
+    }
+}
+
+enum rd_options_result rd_options_parse(int argc, char **argv, struct rd_options *options)
+{
+    static const struct option long_options[] = {
+        {"scene", required_argument, NULL, OPT_SCENE},
+        {"sequence", required_argument, NULL, OPT_SEQUENCE},
+        {"rig", required_argument, NULL, OPT_RIG},
+        {"seed", required_argument, NULL, OPT_SEED},
+        {"frames", required_argument, NULL, OPT_FRAMES},
+        {"size", required_argument, NULL, OPT_SIZE},
+        {"background", required_argument, NULL, OPT_BACKGROUND},
+        {"bits", required_argument, NULL, OPT_BITS},
+        {"distortion", required_argument, NULL, OPT_DISTORTION},
+        {"ambient", required_argument, NULL, OPT_AMBIENT},
+        {"help", no_argument, NULL, OPT_HELP},
+        {NULL, 0, NULL, 0},
+    };
+    int id;
+    *options = (struct rd_options){.sequence = 1, .seed = 1, .frame_count = 50, .width = 752, .height = 582, .bits = 8};
+    while ((id = getopt_long(argc, argv, "", long_options, NULL)) != -1) {
+        if (id == OPT_HELP) {
+            fputs(help_text, stdout);
+            return RD_OPTIONS_HELP;
+        }
+        /* getopt_long has already said what it did not understand. */
+        if (id == '?' || !take_option(id, optarg, options))
+            return RD_OPTIONS_WRONG;
+    }
+    if (optind != argc - 1 || argv[optind][0] == '\0') {
+        fputs("render: one OUT_DIR is needed; see render --help\n", stderr);
+        return RD_OPTIONS_WRONG;
+    }
+    options->out_dir = argv[optind];
+    return RD_OPTIONS_RUN;
+}

@@ -1,0 +1,33 @@
+/* rd_options - the command line, checked. */
+#ifndef RD_OPTIONS_H
+#define RD_OPTIONS_H
+
+#include <stdint.h>
+
+enum rd_scene_kind { RD_SCENE_PERSON, RD_SCENE_TURNING, RD_SCENE_EMPTY, RD_SCENE_TABLE, RD_SCENE_ROOM };
+enum rd_rig_kind { RD_RIG_PAPER, RD_RIG_WIDE };
+enum rd_background { RD_BACK_VARIED, RD_BACK_NEAR, RD_BACK_FAR, RD_BACK_NONE };
+enum rd_distortion { RD_LENS_NORMAL, RD_LENS_NONE, RD_LENS_STRONG };
+enum rd_ambient_kind { RD_AMBIENT_VARIED, RD_AMBIENT_DIM, RD_AMBIENT_NORMAL, RD_AMBIENT_BRIGHT };
+
+/* What parsing came to. */
+enum rd_options_result { RD_OPTIONS_RUN, RD_OPTIONS_HELP, RD_OPTIONS_WRONG };
+
+struct rd_options {
+    const char *out_dir;
+    enum rd_scene_kind scene;
+    int sequence; /* 1: hands down; 2: hands move strongly */
+    enum rd_rig_kind rig;
+    enum rd_background background;
+    enum rd_distortion distortion;
+    enum rd_ambient_kind ambient;
+    uint64_t seed;
+    int frame_count;
+    int width, height; /* pixels */
+    int bits;          /* per sample of the image files */
+};
+
+/* Fills `options`; prints the help on standard output, or what is wrong on standard error. */
+enum rd_options_result rd_options_parse(int argc, char **argv, struct rd_options *options);
+
+#endif

@@ -1,0 +1,200 @@
+#define _POSIX_C_SOURCE 200809L
+
+#include "rd_output.h"
+
+#include <errno.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+static bool complain(const char *path)
+{
+    fprintf(stderr, "render: %s: %s\n", path, strerror(errno));
+    return false;
+}
+
+static bool path_in(const struct rd_output *output, const char *name, char path[RD_PATH_MAX])
+{
+    int length = snprintf(path, RD_PATH_MAX, "%s/%s", output->dir, name);
+    if (length > 0 && length < RD_PATH_MAX)
+        return true;
+    errno = ENAMETOOLONG;
+    return complain(output->dir);
+}
+
+static void frame_name(int frame, char name[32])
+{
+    snprintf(name, 32, "%06d.pgm", frame);
+}
+
+static FILE *open_in(const struct rd_output *output, const char *name)
+{
+    char path[RD_PATH_MAX];
+    if (!path_in(output, name, path))
+        return NULL;
+    FILE *file = fopen(path, "wb");
+    if (file == NULL)
+        complain(path);
+    return file;
+}
+
+/* Closes a file that was written; a full disk often shows only now. */
+static bool close_in(const struct rd_output *output, const char *name, FILE *file)
+{
+    char path[RD_PATH_MAX];
+    bool written = !ferror(file);
+    if (fclose(file) == 0 && written)
+        return true;
+    if (!written)
+        errno = EIO; /* the write's own reason is long gone */
+    return path_in(output, name, path) && complain(path);
+}
+
+static bool make_directories(const char *dir)
+{
+    char path[RD_PATH_MAX];
+    size_t length = strlen(dir);
+    if (length >= sizeof path) {
+        errno = ENAMETOOLONG;
+        return complain(dir);
+    }
+    for (size_t i = 1; i <= length; i++) {
+        if (dir[i] != '/' && dir[i] != '\0')
+            continue;
+        memcpy(path, dir, i);
+        path[i] = '\0';
+        if (mkdir(path, 0777) != 0 && errno != EEXIST)
+            return complain(path);
+    }
+    return true;
+}
+
+static bool remove_in(const struct rd_output *output, const char *name, bool *was_there)
+{
+    char path[RD_PATH_MAX];
+    if (!path_in(output, name, path))
+        return false;
+    *was_there = unlink(path) == 0;
+    return *was_there || errno == ENOENT || complain(path);
+}
+
+bool rd_output_open(struct rd_output *output, const char *dir)
+{
+    bool was_there;
+    *output = (struct rd_output){.dir = dir};
+    if (!make_directories(dir) || !remove_in(output, "rig.json", &was_there))
+        return false;
+    output->frames = open_in(output, "frames.jsonl");
+    output->truth = output->frames != NULL ? open_in(output, "truth.jsonl") : NULL;
+    return output->truth != NULL;
+}
+
+static void write_samples(FILE *file, int count, int max_value, const uint16_t *samples)
+{
+    for (int i = 0; i < count; i++) {
+        if (max_value > 255)
+            putc(samples[i] >> 8, file);
+        putc(samples[i] & 255, file);
+    }
+}
+
+bool rd_output_frame(struct rd_output *output, int frame, int64_t time_us, int width, int height, int max_value,
+                     const uint16_t *samples)
+{
+    char name[32];
+    frame_name(frame, name);
+    FILE *file = open_in(output, name);
+    if (file == NULL)
+        return false;
+    fprintf(file, "P5\n%d %d\n%d\n", width, height, max_value);
+    write_samples(file, width * height, max_value, samples);
+    fprintf(output->frames, "{\"file\":\"%s\",\"time_us\":%lld,\"laser\":true}\n", name, (long long)time_us);
+    return close_in(output, name, file);
+}
+
+void rd_output_truth(struct rd_output *output, int frame, const struct rd_truth *truth,
+                     const struct rd_dot_list *visible)
+{
+    FILE *file = output->truth;
+    char name[32];
+    frame_name(frame, name);
+    fprintf(file, "{\"file\":\"%s\",\"head\":", name);
+    if (truth->somebody)
+        fprintf(file,
+                "{\"centre_mm\":[%.2f,%.2f,%.2f],\"semi_axes_mm\":[%.2f,%.2f,%.2f],\"angles_deg\":[%.2f,%.2f,%.2f]}",
+                truth->centre_mm.x, truth->centre_mm.y, truth->centre_mm.z, truth->semi_axes_mm.x,
+                truth->semi_axes_mm.y, truth->semi_axes_mm.z, truth->yaw_deg, truth->pitch_deg, truth->roll_deg);
+    else
+        fputs("null", file);
+    fputs(",\"dots\":[", file);
+    for (int i = 0; i < visible->dot_count; i++) {
+        const struct rd_dot *dot = &visible->dots[i];
+        fprintf(file, "%s[%d,%.3f,%.3f,%.2f]", i > 0 ? "," : "", dot->index, dot->u_px, dot->v_px, dot->z_mm);
+    }
+    fputs("]}\n", file);
+}
+
+static void write_matrix(FILE *file, const char *name, int rows, int columns, const double *data)
+{
+    fprintf(file, "  \"%s\":{\"type_id\":\"opencv-matrix\",\"rows\":%d,\"cols\":%d,\"dt\":\"d\",\"data\":[", name, rows,
+            columns);
+    for (int i = 0; i < rows * columns; i++) {
+        /* With a point or exponent: OpenCV's reader would take a bare 0 for an integer. */
+        char number[40];
+        snprintf(number, sizeof number, "%.17g", data[i]);
+        fprintf(file, "%s%s%s", i > 0 ? "," : "", number, strpbrk(number, ".e") != NULL ? "" : ".0");
+    }
+    fputs("]},\n", file);
+}
+
+static bool write_rig(const struct rd_output *output, const struct rd_rig *rig)
+{
+    FILE *file = open_in(output, "rig.json");
+    if (file == NULL)
+        return false;
+    double camera[9] = {rig->fx_px, 0.0, rig->cx_px, 0.0, rig->fy_px, rig->cy_px, 0.0, 0.0, 1.0};
+    double lens[5] = {rig->k1, rig->k2, rig->p1, rig->p2, rig->k3};
+    double projector[3] = {rig->projector_mm.x, rig->projector_mm.y, rig->projector_mm.z};
+    double rays[3 * RD_DOT_COUNT];
+    for (int i = 0; i < RD_DOT_COUNT; i++) {
+        rays[3 * i] = rig->dot_rays[i].x;
+        rays[3 * i + 1] = rig->dot_rays[i].y;
+        rays[3 * i + 2] = rig->dot_rays[i].z;
+    }
+    fprintf(file, "{\n  \"kind\":\"dots\",\n  \"image_width\":%d,\n  \"image_height\":%d,\n", rig->width, rig->height);
+    write_matrix(file, "camera_matrix", 3, 3, camera);
+    write_matrix(file, "distortion_coefficients", 1, 5, lens);
+    write_matrix(file, "projector_origin", 3, 1, projector);
+    write_matrix(file, "dot_rays", RD_DOT_COUNT, 3, rays);
+    fprintf(file, "  \"near_mm\":%.1f,\n  \"far_mm\":%.1f\n}\n", rig->near_mm, rig->far_mm);
+    return close_in(output, "rig.json", file);
+}
+
+static bool remove_later_frames(const struct rd_output *output, int frame_count)
+{
+    bool was_there = true;
+    for (int frame = frame_count; was_there; frame++) {
+        char name[32];
+        frame_name(frame, name);
+        if (!remove_in(output, name, &was_there))
+            return false;
+    }
+    return true;
+}
+
+bool rd_output_finish(struct rd_output *output, const struct rd_rig *rig, int frame_count)
+{
+    bool frames_ok = close_in(output, "frames.jsonl", output->frames);
+    bool truth_ok = close_in(output, "truth.jsonl", output->truth);
+    output->frames = NULL;
+    output->truth = NULL;
+    return frames_ok && truth_ok && remove_later_frames(output, frame_count) && write_rig(output, rig);
+}
+
+void rd_output_abandon(struct rd_output *output)
+{
+    if (output->frames != NULL)
+        fclose(output->frames);
+    if (output->truth != NULL)
+        fclose(output->truth);
+}

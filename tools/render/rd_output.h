@@ -1,0 +1,40 @@
+/* rd_output - a frames directory on disk.
+ * rig.json is taken away first and written last: where it is, the directory is complete.
+ * A function that returns false has told the file and the reason on standard error. Failed writes to the lists
+ * show when they are closed.
+ */
+#ifndef RD_OUTPUT_H
+#define RD_OUTPUT_H
+
+#include <stdbool.h>
+#include <stdint.h>
+#include <stdio.h>
+
+#include "rd_dots.h"
+#include "rd_rig.h"
+
+#define RD_PATH_MAX 4096
+
+struct rd_truth {
+    bool somebody;
+    struct rd_vec centre_mm, semi_axes_mm;
+    double yaw_deg, pitch_deg, roll_deg;
+};
+
+struct rd_output {
+    const char *dir;
+    FILE *frames, *truth;
+};
+
+/* Makes the directory (and those above it) if needed. */
+bool rd_output_open(struct rd_output *output, const char *dir);
+bool rd_output_frame(struct rd_output *output, int frame, int64_t time_us, int width, int height, int max_value,
+                     const uint16_t *samples);
+void rd_output_truth(struct rd_output *output, int frame, const struct rd_truth *truth,
+                     const struct rd_dot_list *visible);
+/* Removes frames of an earlier, longer run, closes the lists and writes rig.json. */
+bool rd_output_finish(struct rd_output *output, const struct rd_rig *rig, int frame_count);
+/* Gives up: closes what is open. */
+void rd_output_abandon(struct rd_output *output);
+
+#endif

@@ -1,0 +1,100 @@
+#include "rd_rig.h"
+
+#include "rd_rng.h"
+
+/* The camera of the paper, at its own picture size. */
+#define PAPER_WIDTH_PX 752
+#define PAPER_FX_PX 920.8
+#define PAPER_FY_PX 943.8
+#define PAPER_BASELINE_MM 12.5
+#define WIDE_BASELINE_MM 125.0
+/* Where the pattern's middle crosses the camera's axis, nearly. */
+#define MEET_MM 800.0
+/* 1.7 degrees; turned by one dot in nineteen, so that no two dots share an epipolar line. */
+#define PITCH_COSINE (1.7 * RD_RAD_PER_DEG)
+#define TURN_TANGENT (1.0 / 19.0)
+#define NEAR_MM 400.0
+#define SEAT_FAR_MM 2600.0
+#define ROOM_FAR_MM 6000.0
+/* Outside this tangent of the field angle the distortion polynomial is meaningless. */
+#define FIELD_TANGENT_MAX 0.8
+#define UNDISTORT_STEPS 12
+
+static void make_lens(struct rd_rig *rig, const struct rd_options *options)
+{
+    struct rd_rng rng = rd_rng_start(options->seed, RD_STREAM_RIG);
+    double k1 = rd_rng_uniform(&rng, -0.18, -0.14);
+    double k2 = rd_rng_uniform(&rng, 0.045, 0.08);
+    double p1 = rd_rng_uniform(&rng, -5.5e-4, 5.5e-4);
+    double p2 = rd_rng_uniform(&rng, -5.5e-4, 5.5e-4);
+    double strength = options->distortion == RD_LENS_NONE ? 0.0 : options->distortion == RD_LENS_STRONG ? 1.8 : 1.0;
+    rig->k1 = strength * k1;
+    rig->k2 = strength * k2;
+    rig->p1 = strength * p1;
+    rig->p2 = strength * p2;
+    rig->k3 = 0.0;
+}
+
+static void make_dots(struct rd_rig *rig, double baseline_mm)
+{
+    double toe_in = atan(baseline_mm / MEET_MM);
+    struct rd_rot towards = rd_rot_euler(-toe_in, 0.0, 0.0);
+    double across = PITCH_COSINE / sqrt(1.0 + TURN_TANGENT * TURN_TANGENT);
+    double down = across * TURN_TANGENT;
+    rig->projector_mm = rd_v(baseline_mm * cos(toe_in), 0.0, baseline_mm * sin(toe_in));
+    for (int i = 0; i < RD_DOT_COUNT; i++) {
+        double row = i / RD_DOT_ROWS - RD_DOT_ROWS / 2, column = i % RD_DOT_ROWS - RD_DOT_ROWS / 2;
+        double x = column * across - row * down, y = column * down + row * across;
+        rig->dot_rays[i] = rd_turn(&towards, rd_v(x, y, sqrt(1.0 - x * x - y * y)));
+    }
+}
+
+void rd_rig_make(struct rd_rig *rig, const struct rd_options *options)
+{
+    double zoom = (double)options->width / PAPER_WIDTH_PX;
+    bool open_room = options->scene == RD_SCENE_TABLE || options->scene == RD_SCENE_ROOM;
+    rig->width = options->width;
+    rig->height = options->height;
+    rig->fx_px = PAPER_FX_PX * zoom;
+    rig->fy_px = PAPER_FY_PX * zoom;
+    rig->cx_px = 0.5 * (options->width - 1);
+    rig->cy_px = 0.5 * (options->height - 1);
+    rig->near_mm = NEAR_MM;
+    rig->far_mm = open_room ? ROOM_FAR_MM : SEAT_FAR_MM;
+    make_lens(rig, options);
+    make_dots(rig, options->rig == RD_RIG_WIDE ? WIDE_BASELINE_MM : PAPER_BASELINE_MM);
+}
+
+static void distort(const struct rd_rig *rig, double x, double y, double *xd, double *yd)
+{
+    double r2 = x * x + y * y;
+    double radial = 1.0 + r2 * (rig->k1 + r2 * (rig->k2 + r2 * rig->k3));
+    *xd = x * radial + 2.0 * rig->p1 * x * y + rig->p2 * (r2 + 2.0 * x * x);
+    *yd = y * radial + rig->p1 * (r2 + 2.0 * y * y) + 2.0 * rig->p2 * x * y;
+}
+
+bool rd_rig_project(const struct rd_rig *rig, struct rd_vec point_mm, double *u_px, double *v_px)
+{
+    if (point_mm.z < 1.0)
+        return false;
+    double x = point_mm.x / point_mm.z, y = point_mm.y / point_mm.z, xd, yd;
+    if (x * x + y * y > FIELD_TANGENT_MAX * FIELD_TANGENT_MAX)
+        return false;
+    distort(rig, x, y, &xd, &yd);
+    *u_px = rig->fx_px * xd + rig->cx_px;
+    *v_px = rig->fy_px * yd + rig->cy_px;
+    return true;
+}
+
+struct rd_vec rd_rig_pixel_ray(const struct rd_rig *rig, double u_px, double v_px)
+{
+    double xd = (u_px - rig->cx_px) / rig->fx_px, yd = (v_px - rig->cy_px) / rig->fy_px;
+    double x = xd, y = yd;
+    for (int step = 0; step < UNDISTORT_STEPS; step++) {
+        double bent_x, bent_y;
+        distort(rig, x, y, &bent_x, &bent_y);
+        x += xd - bent_x;
+        y += yd - bent_y;
+    }
+    return rd_unit(rd_v(x, y, 1.0));
+}

@@ -1,0 +1,34 @@
+/* rd_rig - camera and dot projector.
+ * The camera looks along Z. The projector stands beside it at the same height; both look at the point
+ * 800 mm ahead, so the wider the baseline, the more the pattern is toed in.
+ * The beam splitter is a grating: dots are equally spaced in direction cosines, not in angle.
+ */
+#ifndef RD_RIG_H
+#define RD_RIG_H
+
+#include <stdbool.h>
+
+#include "rd_options.h"
+#include "rd_vec.h"
+
+#define RD_DOT_ROWS 19
+#define RD_DOT_COUNT (RD_DOT_ROWS * RD_DOT_ROWS)
+
+struct rd_rig {
+    int width, height;
+    double fx_px, fy_px, cx_px, cy_px;
+    double k1, k2, p1, p2, k3; /* OpenCV's distortion */
+    struct rd_vec projector_mm;
+    struct rd_vec dot_rays[RD_DOT_COUNT]; /* index = row * 19 + column */
+    double near_mm, far_mm;
+};
+
+void rd_rig_make(struct rd_rig *rig, const struct rd_options *options);
+
+/* Pixel of a point in space. False: behind the camera or so far aside that the lens model says nothing. */
+bool rd_rig_project(const struct rd_rig *rig, struct rd_vec point_mm, double *u_px, double *v_px);
+
+/* Unit direction of what a pixel sees. */
+struct rd_vec rd_rig_pixel_ray(const struct rd_rig *rig, double u_px, double v_px);
+
+#endif

@@ -1,0 +1,83 @@
+#!/bin/sh
+# Bring what a make target needs and this machine lacks.
+#
+#   tools/setup.sh sim|test|bits|vectors|format|lint
+#
+# On Debian and its kin missing packages are installed when that is allowed (root, or sudo without a
+# password); otherwise the exact command is printed and the exit status is 1. Nothing is installed
+# when everything is there.
+set -eu
+cd "$(dirname "$0")/.."
+mkdir -p build
+
+packages=
+lacks() { packages="$packages $1"; }
+need_program() { command -v "$1" >/dev/null 2>&1 || lacks "$2"; }
+need_header() {
+    echo "#include <$1>" | ${CC:-cc} -E -x c - >/dev/null 2>&1 || lacks "$2"
+}
+need_python() {
+    /usr/bin/python3 -c "import $1" >/dev/null 2>&1 || lacks "$2"
+}
+
+need_sim() {
+    need_program cc gcc
+    need_program cmake cmake
+    need_header stdlib.h libc6-dev
+    need_header cjson/cJSON.h libcjson-dev
+}
+
+case "${1:-}" in
+sim) need_sim ;;
+test)
+    need_sim
+    need_python numpy python3-numpy
+    need_python scipy python3-scipy
+    need_program nm binutils
+    ;;
+bits)
+    need_sim
+    need_program clang clang
+    need_program qemu-aarch64 qemu-user
+    need_program aarch64-linux-gnu-gcc gcc-aarch64-linux-gnu
+    [ -e /usr/aarch64-linux-gnu/lib/libc.a ] || lacks libc6-dev-arm64-cross
+    ;;
+vectors)
+    need_python numpy python3-numpy
+    need_python scipy python3-scipy
+    ;;
+format) need_program clang-format clang-format ;;
+lint)
+    need_program clang clang
+    need_program clang-tidy clang-tidy
+    ;;
+*)
+    echo "usage: tools/setup.sh sim|test|bits|vectors|format|lint" >&2
+    exit 2
+    ;;
+esac
+
+if [ -n "$packages" ]; then
+    as_root=
+    if [ "$(id -u)" != 0 ]; then
+        if command -v sudo >/dev/null 2>&1 && sudo -n true 2>/dev/null; then
+            as_root="sudo -n"
+        else
+            as_root=no
+        fi
+    fi
+    if ! command -v apt-get >/dev/null 2>&1 || [ "$as_root" = no ]; then
+        echo "make $1 needs these Debian packages, or their like:$packages" >&2
+        echo "type:  sudo apt-get install --yes$packages" >&2
+        exit 1
+    fi
+    echo "setup: installing$packages"
+    $as_root apt-get update -qq
+    # shellcheck disable=SC2086 # both are lists of words
+    DEBIAN_FRONTEND=noninteractive $as_root apt-get install -qq --yes --no-install-recommends \
+        $packages >build/setup.log 2>&1 || { tail -n 20 build/setup.log >&2; exit 1; }
+fi
+
+case "$1" in
+test | bits) tools/fetch_third_party.sh build/third_party ;;
+esac
