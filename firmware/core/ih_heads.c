@@ -12,13 +12,18 @@
 void ih_heads_params_default(struct ih_heads_params *params)
 {
     *params = (struct ih_heads_params){
-        .area_min_mm2 = 13000,
+        .area_min_mm2 = 14500,
         .area_max_mm2 = 56000,
         .curvature_min_mm = 60,
         .curvature_max_mm = 520,
-        .extent_min_mm = 75,
-        .tilt_max_mdeg = 50000,
+        .extent_min_mm = 85,
+        .tilt_max_mdeg = 40000,
         .tilt_ratio_q16 = 78643, /* 1.2 */
+        .points_min = 12,
+        .jump_mm = 80,
+        .above_min_percent = 70,
+        .beside_min_percent = 40,
+        .below_min_percent = 45,
         .merge_mm = 80,
         .centre_behind_mm = 120,
     };
@@ -33,6 +38,8 @@ const char *ih_reject_text(int32_t reject)
         return "curvature";
     case IH_REJECT_SHAPE:
         return "shape";
+    case IH_REJECT_OUTLINE:
+        return "outline";
     default:
         return NULL;
     }
@@ -128,6 +135,81 @@ static void fill_axes(const struct ih_ellipse *ellipse, const struct ih_surface 
     out->angle_mdeg = angle < 0 ? angle + 180000 : angle == 180000 ? 0 : angle;
 }
 
+/* Ring around the last ellipse in which its surroundings are looked at: squares of the sizes, Q4. */
+#define RING_INNER2_Q4 23 /* 1.2^2 */
+#define RING_OUTER2_Q4 58 /* 1.9^2 */
+
+/* Where a sample lies relative to an ellipse: the ellipse's normalised radius squared, Q4, and the
+ * offset in grid steps, Q8. With q = yy dx^2 - 2 xy dx dy + xx dy^2 and det = xx yy - xy^2 the
+ * radius squared is q / (4 det). Offsets below 2^15 in Q8, moments below 2^28 in Q16: the three
+ * terms below 2^59 each; only the ratio to 4 det matters, limited to 255. */
+struct placed {
+    int64_t dx_q8, dy_q8;
+    int32_t radius2_q4;
+};
+
+static struct placed place_sample(const struct ih_sample *sample, const struct ih_ellipse *ellipse)
+{
+    const int32_t middle_q8 = (IH_SURFACE_GRID - 1) / 2 * 256;
+    struct placed p;
+    /* field units in Q16 to grid steps in Q8 */
+    p.dx_q8 = ih_div_round((int64_t)sample->x_q16 * IH_SURFACE_STEP_DENOMINATOR,
+                           IH_SURFACE_STEP_NUMERATOR * 256) +
+              middle_q8 - ih_shift_round(ellipse->x_q16, 8);
+    p.dy_q8 = ih_div_round((int64_t)sample->y_q16 * IH_SURFACE_STEP_DENOMINATOR,
+                           IH_SURFACE_STEP_NUMERATOR * 256) +
+              middle_q8 - ih_shift_round(ellipse->y_q16, 8);
+    int64_t determinant_q32 =
+        ellipse->xx_q16 * ellipse->yy_q16 - ellipse->xy_q16 * ellipse->xy_q16;
+    int64_t q_q32 = ellipse->yy_q16 * p.dx_q8 * p.dx_q8 -
+                    2 * ellipse->xy_q16 * p.dx_q8 * p.dy_q8 +
+                    ellipse->xx_q16 * p.dy_q8 * p.dy_q8;
+    int64_t quarter = determinant_q32 / 4 + 1; /* 4 det in sixteenths */
+    p.radius2_q4 = (int32_t)(q_q32 / quarter > 4080 ? 4080 : q_q32 / quarter);
+    return p;
+}
+
+static void count_around(const struct placed *p, bool is_behind, struct ih_outline *out)
+{
+    if (2 * p->dy_q8 < -ih_abs_s64(p->dx_q8)) {
+        out->above++;
+        out->above_behind += is_behind;
+    } else if (p->dy_q8 > ih_abs_s64(p->dx_q8)) {
+        out->below++;
+        out->below_near += !is_behind;
+    } else {
+        out->beside++;
+        out->beside_behind += is_behind;
+    }
+}
+
+static void fill_outline(const struct ih_nest *nest, const struct ih_samples *samples,
+                         const struct ih_heads_params *params, struct ih_outline *out)
+{
+    const struct ih_slice *last = &nest->slice[nest->slice_count - 1];
+    int64_t behind_q8 =
+        (int64_t)nest->nearest_mm_q8 + last->behind_mm_q8 + (params->jump_mm << 8);
+    for (int32_t i = 0; i < samples->sample_count; i++) {
+        const struct ih_sample *sample = &samples->sample[i];
+        struct placed p = place_sample(sample, &last->ellipse);
+        bool is_seen = sample->root_weight_q15 == 1 << 15; /* filled ones weigh less */
+        if (p.radius2_q4 < 16) {
+            out->inside += is_seen;
+        } else if (p.radius2_q4 > RING_INNER2_Q4 && p.radius2_q4 < RING_OUTER2_Q4) {
+            count_around(&p, !is_seen || sample->depth_mm_q8 > behind_q8, out);
+        }
+    }
+}
+
+/* Does what the samples show look like a head that stands out? */
+static bool stands_out(const struct ih_outline *o, const struct ih_heads_params *params)
+{
+    return o->inside >= params->points_min &&
+           o->above_behind * 100 >= o->above * params->above_min_percent &&
+           o->beside_behind * 100 >= o->beside * params->beside_min_percent &&
+           o->below_near * 100 >= o->below * params->below_min_percent;
+}
+
 static int32_t ray_length_q28(int32_t x_q28, int32_t y_q28)
 {
     /* x, y up to 2 in Q26: squares below 2^54 */
@@ -171,11 +253,12 @@ static enum ih_reject test(const struct ih_hypothesis *h, const struct ih_ellips
     if (widest->ratio_q16 > params->tilt_ratio_q16 && tilt > params->tilt_max_mdeg) {
         return IH_REJECT_SHAPE;
     }
-    return IH_ACCEPTED;
+    return stands_out(&h->outline, params) ? IH_ACCEPTED : IH_REJECT_OUTLINE;
 }
 
 static struct ih_hypothesis judge(const struct ih_nest *nest, const struct ih_surface *surface,
-                                  const struct ih_rig *rig, const struct ih_heads_params *params)
+                                  const struct ih_samples *samples, const struct ih_rig *rig,
+                                  const struct ih_heads_params *params)
 {
     struct ih_hypothesis h = {0};
     const struct ih_slice *last = &nest->slice[nest->slice_count - 1];
@@ -184,6 +267,7 @@ static struct ih_hypothesis judge(const struct ih_nest *nest, const struct ih_su
     h.extent_mm_q8 = last->behind_mm_q8;
     fill_place(nest, surface, rig, params, &h);
     fill_axes(&last->ellipse, surface, rig, &h);
+    fill_outline(nest, samples, params, &h.outline);
     h.rejected = test(&h, &last->ellipse, params);
     return h;
 }
@@ -231,8 +315,8 @@ static void merge(struct ih_heads *heads, int32_t merge_mm)
 }
 
 void ih_heads_select(const struct ih_hypotheses *hypotheses, const struct ih_surface *surface,
-                     const struct ih_rig *rig, const struct ih_heads_params *params,
-                     struct ih_heads *out)
+                     const struct ih_samples *samples, const struct ih_rig *rig,
+                     const struct ih_heads_params *params, struct ih_heads *out)
 {
     out->hypothesis_count = 0;
     out->head_count = 0;
@@ -240,7 +324,7 @@ void ih_heads_select(const struct ih_hypotheses *hypotheses, const struct ih_sur
         if (hypotheses->nest[i].slice_count == 0) {
             continue;
         }
-        struct ih_hypothesis h = judge(&hypotheses->nest[i], surface, rig, params);
+        struct ih_hypothesis h = judge(&hypotheses->nest[i], surface, samples, rig, params);
         h.nest = i;
         int32_t at = out->hypothesis_count++;
         for (; at > 0 && is_better(&h, &out->hypothesis[at - 1]); at--) {

@@ -1,6 +1,6 @@
 /* ih_heads - which hypotheses are heads? (paper, section 3.3)
  *
- * In:    nests.
+ * In:    nests, and the samples that the surface was fitted to.
  * Out:   candidates in the frame's pixels and in mm, each accepted or with the first test that it
  *        failed; the accepted ones in order, best first; the selected one.
  * Tests, none of them in absolute depth:
@@ -9,6 +9,11 @@
  *                   growth of the area A with the depth t of the cut, mm^2/mm; and the extent, the
  *                   depth over which the nest keeps growing
  *        shape      a head that is longer than wide stands more upright than it lies
+ *        outline    ours, not the paper's: the surface is smooth everywhere, the scene is not. At
+ *                   least points_min points carry the head, and around its last ellipse, between
+ *                   1.2 and 1.9 times its size, most points above and beside it lie at least
+ *                   jump_mm behind it (or nothing was seen there), and most below it do not: there
+ *                   the neck and the body are. Bowls on a table and bulges of a body end gently.
  * Nests whose centres are within merge_mm of a better one are the same thing and are dropped.
  * The centre of the head's volume lies centre_behind_mm behind the nearest point, on the ray
  * through the middle of its ellipses.
@@ -18,7 +23,7 @@
 
 #include "ih_hypotheses.h"
 
-enum ih_reject { IH_ACCEPTED = 0, IH_REJECT_AREA, IH_REJECT_CURVATURE, IH_REJECT_SHAPE };
+enum ih_reject { IH_ACCEPTED = 0, IH_REJECT_AREA, IH_REJECT_CURVATURE, IH_REJECT_SHAPE, IH_REJECT_OUTLINE };
 
 struct ih_heads_params {
     int32_t area_min_mm2, area_max_mm2;
@@ -26,8 +31,19 @@ struct ih_heads_params {
     int32_t extent_min_mm;
     int32_t tilt_max_mdeg;     /* of the major axis from vertical, once the ratio is over */
     int32_t tilt_ratio_q16;    /* this */
+    int32_t points_min;
+    int32_t jump_mm;
+    int32_t above_min_percent, beside_min_percent, below_min_percent;
     int32_t merge_mm;
     int32_t centre_behind_mm;
+};
+
+/* What the samples say about a hypothesis; counts of samples. */
+struct ih_outline {
+    int32_t inside;              /* seen, within the last ellipse */
+    int32_t above, above_behind; /* around it: all, and those that lie behind it */
+    int32_t beside, beside_behind;
+    int32_t below, below_near;   /* all, and those that do not */
 };
 
 struct ih_hypothesis {
@@ -39,6 +55,7 @@ struct ih_hypothesis {
     int32_t area_mm2;            /* of the widest slice */
     int32_t curvature_mm_q8;
     int32_t extent_mm_q8;
+    struct ih_outline outline;
     int32_t rejected;            /* enum ih_reject */
     int32_t nest;                /* index into ih_hypotheses.nest */
 };
@@ -53,10 +70,10 @@ struct ih_heads {
 void ih_heads_params_default(struct ih_heads_params *params);
 
 void ih_heads_select(const struct ih_hypotheses *hypotheses, const struct ih_surface *surface,
-                     const struct ih_rig *rig, const struct ih_heads_params *params,
-                     struct ih_heads *out);
+                     const struct ih_samples *samples, const struct ih_rig *rig,
+                     const struct ih_heads_params *params, struct ih_heads *out);
 
-/* The word that the record uses: "area", "curvature", "shape"; NULL for an accepted one. */
+/* The word that the record uses: "area", "curvature", "shape", "outline"; NULL for an accepted one. */
 const char *ih_reject_text(int32_t reject);
 
 #endif

@@ -102,6 +102,7 @@ enum ih_err isohead_frame(struct isohead *head, const struct ih_frame *frame)
                    &head->surface);
     ih_hypotheses_find(&head->surface, &params->hypotheses, &head->scratch.hypotheses,
                        &head->hypotheses);
-    ih_heads_select(&head->hypotheses, &head->surface, rig, &params->heads, &head->heads);
+    ih_heads_select(&head->hypotheses, &head->surface, &head->samples, rig, &params->heads,
+                    &head->heads);
     return IH_OK;
 }
