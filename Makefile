@@ -5,7 +5,7 @@ BUILD := build
 # Where the measured frames and scans are, for `make accept`.
 DATA ?= ../shared/data
 # A folder with unity.c, or one with cJSON.c: used instead of fetching the source package.
-UNITY_DIR ?= $(BUILD)/third_party/unity
+UNITY_DIR ?= $(BUILD)/third_party/unity/src
 CJSON_DIR ?= $(BUILD)/third_party/cjson
 
 .DEFAULT_GOAL := help

@@ -1,7 +1,7 @@
 #!/bin/sh
 # Bring Unity (the test framework) and cJSON's one source file (for cross builds) into a folder.
 #
-#   tools/fetch_third_party.sh DIR      ->  DIR/unity/unity.{c,h}..., DIR/cjson/cJSON.{c,h}
+#   tools/fetch_third_party.sh DIR      ->  DIR/unity/src/unity.{c,h}..., DIR/cjson/cJSON.{c,h}
 #
 # Unity is no Debian binary package, but Debian's source package of cJSON carries it whole. It is
 # fetched through apt, which checks its signature, with a package list of our own below DIR: neither
@@ -11,7 +11,7 @@ set -eu
 [ $# = 1 ] || { echo "usage: $0 DIR" >&2; exit 2; }
 mkdir -p "$1"
 dir=$(cd "$1" && pwd)
-[ -e "$dir/unity/unity.c" ] && [ -e "$dir/cjson/cJSON.c" ] && exit 0
+[ -e "$dir/unity/src/unity.c" ] && [ -e "$dir/cjson/cJSON.c" ] && exit 0
 
 if ! command -v apt-get >/dev/null 2>&1; then
     echo "no apt-get here: give make UNITY_DIR=<folder with unity.c> and CJSON_DIR=<folder with cJSON.c>" >&2
@@ -38,7 +38,8 @@ options="-o Dir::Etc::SourceList=/dev/null -o Dir::Etc::SourceParts=$apt_dir/par
 (cd "$apt_dir" && apt-get $options update -qq && apt-get $options source --download-only -qq cjson) \
     >"$apt_dir/log" 2>&1 || { cat "$apt_dir/log" >&2; exit 1; }
 tar -x -C "$apt_dir" -f "$apt_dir"/cjson_*.orig.tar.*
-mkdir -p "$dir/unity" "$dir/cjson"
-cp "$apt_dir"/cJSON-*/tests/unity/src/unity*.[ch] "$dir/unity/"
+mkdir -p "$dir/cjson"
+rm -rf "$dir/unity"
+cp -r "$apt_dir"/cJSON-*/tests/unity "$dir/unity"
 cp "$apt_dir"/cJSON-*/cJSON.[ch] "$dir/cjson/"
 rm -rf "$apt_dir"

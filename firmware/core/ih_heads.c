@@ -16,16 +16,16 @@ void ih_heads_params_default(struct ih_heads_params *params)
         .area_max_mm2 = 56000,
         .curvature_min_mm = 60,
         .curvature_max_mm = 520,
-        .extent_min_mm = 85,
-        .tilt_max_mdeg = 40000,
+        .extent_min_mm = 78,
+        .tilt_max_mdeg = 42000,
         .tilt_ratio_q16 = 78643, /* 1.2 */
         .points_min = 12,
-        .jump_mm = 80,
-        .above_min_percent = 70,
-        .beside_min_percent = 40,
+        .jump_mm = 75,
+        .above_min_percent = 76,
+        .beside_min_percent = 45,
         .below_min_percent = 45,
         .merge_mm = 80,
-        .centre_behind_mm = 120,
+        .centre_behind_mm = 128,
     };
 }
 
@@ -67,7 +67,9 @@ static int32_t curvature_mm_q8(const struct ih_nest *nest)
             tt_q16 += t_q8 * t_q8;
         }
     }
-    return tt_q16 == 0 ? 0 : ih_saturate_s32(ih_div_round(at_q8 << 13, tt_q16 >> 3));
+    /* a slice closer than 1/90 mm to the minimum must not divide by zero */
+    int64_t divisor = tt_q16 >> 3 > 0 ? tt_q16 >> 3 : 1;
+    return tt_q16 == 0 ? 0 : ih_saturate_s32(ih_div_round(at_q8 << 13, divisor));
 }
 
 /* Centre of the nest on the grid: mean over its deeper slices, by area; all when there are none. */
@@ -111,6 +113,13 @@ static int32_t surface_depth_mm_q8(const struct ih_surface *surface, int32_t x_q
                                        ih_shift_round(bottom, 16) * fy, 16);
 }
 
+/* Semi-axis = 2 sqrt(variance); the variance in Q16 px^2 less drop bits, below 2^32. */
+static int32_t semi_axis_px_q12(int64_t variance, int drop)
+{
+    uint64_t variance_q24 = variance > 0 ? (uint64_t)variance << (8 + drop) : 0;
+    return ih_saturate_s32(2 * (int64_t)ih_isqrt_u64(variance_q24));
+}
+
 /* Covariance on the grid to an ellipse in pixels. */
 static void fill_axes(const struct ih_ellipse *ellipse, const struct ih_surface *surface,
                       const struct ih_rig *rig, struct ih_hypothesis *out)
@@ -124,13 +133,16 @@ static void fill_axes(const struct ih_ellipse *ellipse, const struct ih_surface 
     int64_t uu = ih_mul_shift(ih_mul_shift(ellipse->xx_q16, step_u, 12), step_u, 12);
     int64_t uv = ih_mul_shift(ih_mul_shift(ellipse->xy_q16, step_u, 12), step_v, 12);
     int64_t vv = ih_mul_shift(ih_mul_shift(ellipse->yy_q16, step_v, 12), step_v, 12);
+    /* Squares of the variances must fit: drop bits that a large ellipse does not need. */
+    uint64_t all = (uint64_t)ih_abs_s64(uu) | (uint64_t)ih_abs_s64(uv) | (uint64_t)ih_abs_s64(vv);
+    int drop = ih_max_s32(0, ih_bits_u64(all) - 30);
+    uu = ih_shift_round(uu, drop);
+    uv = ih_shift_round(uv, drop);
+    vv = ih_shift_round(vv, drop);
     int64_t half = (uu - vv) / 2;
     int64_t root = ih_isqrt_u64((uint64_t)(half * half + uv * uv));
-    int64_t major = (uu + vv) / 2 + root;
-    int64_t minor = (uu + vv) / 2 - root;
-    /* semi-axis = 2 sqrt(variance): Q16 -> Q24 for a root in Q12 */
-    out->a_px_q12 = (int32_t)(2 * (int64_t)ih_isqrt_u64((uint64_t)major << 8));
-    out->b_px_q12 = (int32_t)(2 * (int64_t)ih_isqrt_u64((uint64_t)(minor > 0 ? minor : 0) << 8));
+    out->a_px_q12 = semi_axis_px_q12((uu + vv) / 2 + root, drop);
+    out->b_px_q12 = semi_axis_px_q12((uu + vv) / 2 - root, drop);
     int32_t angle = (int32_t)ih_div_round(ih_atan2_mdeg(2 * uv, uu - vv), 2);
     out->angle_mdeg = angle < 0 ? angle + 180000 : angle == 180000 ? 0 : angle;
 }

@@ -17,7 +17,7 @@ void ih_hypotheses_params_default(struct ih_hypotheses_params *params)
     params->level_step_mm = 10;
     params->levels_behind_mm = 700;
     params->depth_max_mm = 130;
-    params->end_depth_mm = 60;
+    params->end_depth_mm = 50;
     params->gap_max = 8;
 }
 

@@ -54,14 +54,20 @@ static int32_t limit_tan_q28(int64_t value_q28)
     return (int32_t)(value_q28 > limit ? limit : value_q28 < -limit ? -limit : value_q28);
 }
 
+/* A pixel to the lens's own, distorted coordinate. Pixels beyond +-16384 are limited: in Q16 below
+ * 2^32, times 2^28. */
+static int32_t distorted_q28(int32_t px_q12, int32_t principal_px_q16, int32_t focal_px_q16)
+{
+    int64_t px_q16 = (int64_t)ih_clamp_s32(px_q12, -(1 << 26), 1 << 26) * 16;
+    return limit_tan_q28(ih_div_round((px_q16 - principal_px_q16) * ONE_Q28, focal_px_q16));
+}
+
 void ih_rig_undistort(const struct ih_rig *rig, int32_t u_px_q12, int32_t v_px_q12, int32_t *x_q28,
                       int32_t *y_q28)
 {
     const struct ih_calibration *c = &rig->calibration;
-    int64_t xd = limit_tan_q28(
-        ih_div_round(((int64_t)u_px_q12 * 16 - c->cx_px_q16) * ONE_Q28, c->fx_px_q16));
-    int64_t yd = limit_tan_q28(
-        ih_div_round(((int64_t)v_px_q12 * 16 - c->cy_px_q16) * ONE_Q28, c->fy_px_q16));
+    int64_t xd = distorted_q28(u_px_q12, c->cx_px_q16, c->fx_px_q16);
+    int64_t yd = distorted_q28(v_px_q12, c->cy_px_q16, c->fy_px_q16);
     int64_t x = xd;
     int64_t y = yd;
     /* Fixed-point iteration x <- (xd - dx(x)) / radial(x); each step gains a factor of about the

@@ -74,6 +74,9 @@ static void clear_outputs(struct isohead *head)
 {
     size_t first = offsetof(struct isohead, dots);
     memset((uint8_t *)head + first, 0, offsetof(struct isohead, scratch) - first);
+    for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
+        head->labels.dot_of_slot[slot] = IH_NONE;
+    }
 }
 
 enum ih_err isohead_frame(struct isohead *head, const struct ih_frame *frame)

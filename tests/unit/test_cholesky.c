@@ -8,10 +8,8 @@ struct vector_system {
     const char *name;
     int32_t n;
     double condition;
-    const int32_t *a_q30;
-    const double *last_row, *diagonal;
-    const int32_t *b;
-    const double *x;
+    const int32_t *a_q30, *b;
+    const double *last_row, *diagonal, *x; /* NULL: too ill-conditioned to be compared */
 };
 
 #include "cholesky.inc"
@@ -108,10 +106,8 @@ static void check_exponent_is_least(int32_t n, const char *what)
     TEST_ASSERT_TRUE(exponent == 0 || largest >= (1 << 24) - 1);
 }
 
-/* Perturbation theory: a relative error e of A moves L and x by at most condition * e. Beyond this
- * condition the bound says nothing any more; check_factor and check_solution still do. */
-#define CONDITION_MAX 1e4
-
+/* Perturbation theory: a relative error e of A moves L and x by at most condition * e. Where that
+ * is too much to say anything, check_factor and check_solution still do. */
 static void factors_match_scipy(void)
 {
     int i, k;
@@ -122,7 +118,7 @@ static void factors_match_scipy(void)
 
         factorise(v->a_q30, v->n, v->name);
         check_factor(v->a_q30, v->n, v->name);
-        for (k = 0; k < v->n && v->condition < CONDITION_MAX; k++) {
+        for (k = 0; k < v->n && v->x != NULL; k++) {
             IH_TEST_WITHIN(tolerance, v->diagonal[k], ih_test_from_q(at(factor, k, k), 30), v->name,
                            k);
             IH_TEST_WITHIN(tolerance, v->last_row[k], ih_test_from_q(at(factor, v->n - 1, k), 30),
@@ -144,10 +140,10 @@ static void solutions_match_scipy(void)
         IH_TEST_UNTOUCHED(&mantissa[v->n], GUARD * sizeof *mantissa, v->name);
         check_solution(v->a_q30, v->n, v->b, v->name);
         check_exponent_is_least(v->n, v->name);
-        for (k = 0; k < v->n; k++) {
+        for (k = 0; k < v->n && v->x != NULL; k++) {
             largest = fmax(largest, fabs(v->x[k]));
         }
-        for (k = 0; k < v->n && v->condition < CONDITION_MAX; k++) {
+        for (k = 0; k < v->n && v->x != NULL; k++) {
             /* As for the factor; and the rounding of x and, times the condition, of b. */
             IH_TEST_WITHIN(v->condition * (v->n * ldexp(largest, -30) + 1) + ldexp(1, exponent),
                            v->x[k], ldexp(mantissa[k], exponent), v->name, k);

@@ -100,7 +100,8 @@ static void mark_boxes(const struct vector_spec *spec)
 
 static int32_t hash_noise(const struct vector_spec *spec, int32_t u, int32_t v)
 {
-    uint32_t h = (uint32_t)u * 73856093u ^ (uint32_t)v * 19349663u ^ (uint32_t)spec->seed * 83492791u;
+    uint32_t h =
+        (uint32_t)u * 73856093u ^ (uint32_t)v * 19349663u ^ (uint32_t)spec->seed * 83492791u;
 
     h ^= h >> 13;
     h *= 0x5bd1e995u;

@@ -152,8 +152,7 @@ static void mul_shift_is_exact(void)
         const int64_t a = ih_test_any_size(&random_source, bits);
         const int64_t b = ih_test_any_size(&random_source, 62 - bits);
 
-        IH_TEST_EQUAL(round_shift((int128)a * b, shift), ih_mul_shift(a, b, shift), "shift",
-                      shift);
+        IH_TEST_EQUAL(round_shift((int128)a * b, shift), ih_mul_shift(a, b, shift), "shift", shift);
     }
 }
 
@@ -180,8 +179,17 @@ static void mul_wide_shift_is_exact(void)
 
 static void mul_wide_shift_is_exact_at_the_ends_and_at_halves(void)
 {
-    static const int64_t a[] = {0,  1,          -1,        INT32_MAX,      INT32_MIN,      INT64_MAX,
-                                2, INT64_C(1) << 62, -INT64_MAX, -(INT64_C(1) << 62), INT64_MIN + 1};
+    static const int64_t a[] = {0,
+                                1,
+                                -1,
+                                INT32_MAX,
+                                INT32_MIN,
+                                INT64_MAX,
+                                2,
+                                INT64_C(1) << 62,
+                                -INT64_MAX,
+                                -(INT64_C(1) << 62),
+                                INT64_MIN + 1};
     static const uint32_t b[] = {0, 1, 2, 3, UINT32_C(1) << 31, UINT32_MAX - 1, UINT32_MAX};
     int i, j, shift;
 

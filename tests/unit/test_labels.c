@@ -170,8 +170,8 @@ static void check_places(const char *what)
         dir_u = ih_test_from_q(line->dir_u_q30, 30);
         dir_v = ih_test_from_q(line->dir_v_q30, 30);
         /* Undistorted places are rounded to Q12, the products once more: two units. */
-        IH_TEST_WITHIN(2.0 / 4096, u * dir_u + v * dir_v,
-                       ih_test_from_q(labels.t_px_q12[slot], 12), what, slot);
+        IH_TEST_WITHIN(2.0 / 4096, u * dir_u + v * dir_v, ih_test_from_q(labels.t_px_q12[slot], 12),
+                       what, slot);
         IH_TEST_WITHIN(2.0 / 4096, fabs(u * dir_v - v * dir_u),
                        fabs(ih_test_from_q(labels.perp_px_q12[slot], 12)), what, slot);
     }
@@ -186,8 +186,8 @@ static void flat_walls_are_labelled_without_error(void)
         const struct vector_scene *scene = &vector_scenes[i];
         struct outcome outcome;
 
-        if (!scene->clean || (strstr(scene->name, "wall") == NULL &&
-                              strstr(scene->name, "tilted") == NULL)) {
+        if (!scene->clean ||
+            (strstr(scene->name, "wall") == NULL && strstr(scene->name, "tilted") == NULL)) {
             continue;
         }
         take_scene(scene);

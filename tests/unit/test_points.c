@@ -52,7 +52,8 @@ static void triangulation_matches_float64(void)
     for (i = 0; i < IH_TEST_COUNT(vector_points); i++) {
         const struct vector_point *v = &vector_points[i];
         const struct ih_calibration *c = &vector_rigs[v->rig];
-        const double focal = ih_test_from_q(c->fx_px_q16 > c->fy_px_q16 ? c->fx_px_q16 : c->fy_px_q16, 16);
+        const double focal =
+            ih_test_from_q(c->fx_px_q16 > c->fy_px_q16 ? c->fx_px_q16 : c->fy_px_q16, 16);
         const double length = v->depth_mm * v->t_px_q12 / 4096;
         /* The length is good to focal / 2^16 + 2 / 2^8 px mm (see test_rig); half a unit of Q8. */
         const double depth = v->depth_mm * (focal / 65536 + 2.0 / 256) / length + 0.5 / 256;
@@ -88,8 +89,7 @@ static void depth_comes_back_through_the_rig(void)
         use_dot_rig(k);
         for (slot = 0; slot < IH_SLOTS; slot++) {
             labels.dot_of_slot[slot] = (int16_t)slot;
-            labels.t_px_q12[slot] =
-                (int32_t)lround(16.0 * rig.line[slot].length_px_mm_q8 / middle);
+            labels.t_px_q12[slot] = (int32_t)lround(16.0 * rig.line[slot].length_px_mm_q8 / middle);
         }
         ih_points_from_labels(&labels, &rig, &points);
         IH_TEST_EQUAL(IH_SLOTS, points.seen_count, "seen", k);
@@ -167,13 +167,15 @@ static void convert(void)
 
 static double pixel_u(int32_t slot)
 {
-    return ih_test_from_q(points.point[slot].x_q28, 28) * ih_test_from_q(calibration.fx_px_q16, 16) +
+    return ih_test_from_q(points.point[slot].x_q28, 28) *
+               ih_test_from_q(calibration.fx_px_q16, 16) +
            ih_test_from_q(calibration.cx_px_q16, 16);
 }
 
 static double pixel_v(int32_t slot)
 {
-    return ih_test_from_q(points.point[slot].y_q28, 28) * ih_test_from_q(calibration.fy_px_q16, 16) +
+    return ih_test_from_q(points.point[slot].y_q28, 28) *
+               ih_test_from_q(calibration.fy_px_q16, 16) +
            ih_test_from_q(calibration.cy_px_q16, 16);
 }
 

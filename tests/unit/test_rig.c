@@ -85,8 +85,8 @@ static void working_range_matches_float64(void)
         const double far = length_tolerance(&rigs[v->rig]) / c->far_mm + LSB_Q12;
         const double near = length_tolerance(&rigs[v->rig]) / c->near_mm + LSB_Q12;
 
-        IH_TEST_WITHIN(far, v->length / c->far_mm, ih_test_from_q(line->t_far_px_q12, 12),
-                       "t far", i);
+        IH_TEST_WITHIN(far, v->length / c->far_mm, ih_test_from_q(line->t_far_px_q12, 12), "t far",
+                       i);
         IH_TEST_WITHIN(near, v->length / c->near_mm, ih_test_from_q(line->t_near_px_q12, 12),
                        "t near", i);
         TEST_ASSERT_TRUE(line->t_far_px_q12 < line->t_near_px_q12);
@@ -105,8 +105,8 @@ static void all_directions_are_unit_vectors(void)
     for (i = 0; i < RIG_COUNT; i++) {
         for (slot = 0; slot < IH_SLOTS; slot++) {
             const struct ih_line *line = &rigs[i].line[slot];
-            const double size = hypot(ih_test_from_q(line->dir_u_q30, 30),
-                                      ih_test_from_q(line->dir_v_q30, 30));
+            const double size =
+                hypot(ih_test_from_q(line->dir_u_q30, 30), ih_test_from_q(line->dir_v_q30, 30));
 
             /* The length is rounded down by up to 1/256 px mm. */
             IH_TEST_WITHIN(1.0 / line->length_px_mm_q8 + 2e-9, 1.0, size, "unit vector", slot);
@@ -257,7 +257,8 @@ static void field_unit_is_half_the_pitch(void)
         /* Equal steps in angle are no equal steps in the image: means over all dots or over the
          * outer ones, at infinity or nearer, differ by a few percent. */
         IH_TEST_WITHIN(0.05, 1.0,
-                       ih_test_from_q(rigs[k].field.unit_q28, 28) / (sum / (4 * (IH_SLOTS - IH_GRID))),
+                       ih_test_from_q(rigs[k].field.unit_q28, 28) /
+                           (sum / (4 * (IH_SLOTS - IH_GRID))),
                        "unit", k);
     }
 }
@@ -444,7 +445,7 @@ static void equal_rays_are_no_pattern(void)
 static void kinds_are_checked(void)
 {
     EXPECT_WITH(kind, (enum ih_rig_kind)2, IH_ERR_KIND);
-    EXPECT_WITH(kind, (enum ih_rig_kind)-1, IH_ERR_KIND);
+    EXPECT_WITH(kind, (enum ih_rig_kind) - 1, IH_ERR_KIND);
 }
 
 /* A range rig may be smaller and has no projector: its rays and origin do not matter. */
@@ -480,8 +481,8 @@ static void a_line_gives_the_dot_at_any_depth(void)
             const double t = ih_test_from_q(line->length_px_mm_q8, 8) / depth;
             const double u = ih_test_from_q(line->infinity_u_px_q12, 12) +
                              t * ih_test_from_q(line->dir_u_q30, 30);
-            const double exact = ray_at(c, slot, 0, depth) * c->fx_px_q16 / 65536 +
-                                 ih_test_from_q(c->cx_px_q16, 16);
+            const double exact =
+                ray_at(c, slot, 0, depth) * c->fx_px_q16 / 65536 + ih_test_from_q(c->cx_px_q16, 16);
 
             IH_TEST_WITHIN(LSB_Q12 + 2 * length_tolerance(&rigs[k]) / depth, exact, u, "u", slot);
         }

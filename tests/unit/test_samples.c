@@ -144,7 +144,8 @@ static void a_flat_wall_passes_whole(void)
     select_samples();
     TEST_ASSERT_EQUAL_INT32(IH_SLOTS, samples.sample_count);
     TEST_ASSERT_EQUAL_INT32(IH_SLOTS, samples.seen_count);
-    TEST_ASSERT_EQUAL_INT32(0, samples.filled_count + samples.isolated_count + samples.outside_count);
+    TEST_ASSERT_EQUAL_INT32(0,
+                            samples.filled_count + samples.isolated_count + samples.outside_count);
     TEST_ASSERT_EQUAL_INT32(1000 << 8, samples.nearest_mm_q8);
     TEST_ASSERT_EQUAL_INT32(1400 << 8, samples.clip_mm_q8);
     for (slot = 0; slot < IH_SLOTS; slot++) {
@@ -292,7 +293,8 @@ static void a_filled_point_is_not_far_behind_its_surroundings(void)
 {
     make_hole(2);
     params.fill_behind_mm = 250;
-    set_depth(MIDDLE + 3 * IH_GRID, 950); /* within 5 x 5 of the slot below the middle, no other's */
+    set_depth(MIDDLE + 3 * IH_GRID,
+              950); /* within 5 x 5 of the slot below the middle, no other's */
     select_samples();
     TEST_ASSERT_EQUAL_INT32(1200 << 8, sample_of(MIDDLE + IH_GRID)->depth_mm_q8);
     TEST_ASSERT_EQUAL_INT32(1250 << 8, sample_of(MIDDLE - IH_GRID)->depth_mm_q8);

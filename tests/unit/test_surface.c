@@ -199,7 +199,8 @@ static void rows_are_y_and_columns_are_x(void)
     fit();
     TEST_ASSERT_TRUE(node_mm(23 * IH_SURFACE_GRID + 30) > node_mm(23 * IH_SURFACE_GRID + 16) + 100);
     /* Ridge bias, as for the plane. */
-    IH_TEST_WITHIN(1, node_mm(16 * IH_SURFACE_GRID + 23), node_mm(30 * IH_SURFACE_GRID + 23), "y", 0);
+    IH_TEST_WITHIN(1, node_mm(16 * IH_SURFACE_GRID + 23), node_mm(30 * IH_SURFACE_GRID + 23), "y",
+                   0);
 }
 
 /* "Outliers have no influence": one sample moves the plane around it as little at 3 m as at 60 cm

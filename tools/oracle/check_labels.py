@@ -2,12 +2,12 @@
 """Compare traced dots and labels with the truth of rendered sequences.
 
 TRACE_DIR holds a directory of frames per sequence (host_sim --trace); DATA_DIR the sequences' own
-directories of the same names with truth.jsonl, whose "dots" are [index, u, v, z_mm] of every visible
-dot. Reported per sequence and for all:
+directories of the same names with truth.jsonl, whose "dots" are [index, u, v, z_mm] of every
+visible dot. Reported per sequence and for all:
   recall   share of the true dots with a detected dot within 1.5 px
   error    median distance of those to the nearest detected dot, px
-  right    share of the assigned labels whose dot lies within 1.5 px of the true dot of that index; a
-           label where no such dot is visible is wrong
+  right    share of the assigned labels whose dot lies within 1.5 px of the true dot of that index;
+           a label where no such dot is visible is wrong
 Exit status 1 if a limit given as an option is not kept, 2 if there was nothing to compare.
 """
 

@@ -10,6 +10,8 @@ import os
 
 import cholesky
 import dots
+import ellipse
+import isohead
 import labels
 import points
 import rig
@@ -17,7 +19,8 @@ import samples
 import surface
 
 STAGES = {"rig": rig, "cholesky": cholesky, "surface": surface,
-          "dots": dots, "labels": labels, "points": points, "samples": samples}
+          "dots": dots, "labels": labels, "points": points, "samples": samples,
+          "ellipse": ellipse, "isohead": isohead}
 
 
 def main():

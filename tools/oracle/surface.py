@@ -25,6 +25,9 @@ def basis(places):
     return np.sqrt((away**2).sum(axis=2) + 1)
 
 
+GRID_BASIS = basis(GRID_PLACES)
+
+
 def solve(places, depth_mm, root_weight, mean_mm, ridge):
     """Coefficients of z - mean, for rows scaled by the root weight."""
     rows = basis(places) * root_weight[:, None]
@@ -37,7 +40,7 @@ def solve(places, depth_mm, root_weight, mean_mm, ridge):
 
 
 def on_grid(coefficients, mean_mm):
-    return (mean_mm + basis(GRID_PLACES) @ coefficients).reshape(GRID, GRID)
+    return (mean_mm + GRID_BASIS @ coefficients).reshape(GRID, GRID)
 
 
 def huber(places, depth_mm, coefficients, mean_mm, huber_mm):

@@ -9,7 +9,8 @@ def sequences(root):
     for directory, below, files in os.walk(root):
         below.sort()
         if any(f.endswith(".json") for f in files):
-            yield os.path.relpath(directory, root), directory
+            name = os.path.relpath(directory, root)
+            yield os.path.basename(os.path.abspath(root)) if name == "." else name, directory
 
 
 def frames(directory):

@@ -1,0 +1,177 @@
+#!/usr/bin/env python3
+"""Who may include whom: the rules of the source tree, read from the #include lines.
+
+  core     the stages form a chain; a stage's header includes the stage before it and the few
+           headers that all share, its source only its own header and the arithmetic. isohead.c sees
+           the stages through isohead.h alone. Of the system: fixed-width integers, bool, size_t and
+           string.h, nothing that does I/O, allocates or knows floating point.
+  hal      hal.h, its own files and the system; never firmware.
+  sim      core, hal, its own files.
+  render   its own files and the system: what draws the frames shares no line with what reads them.
+  tests    anything.
+
+includes.py [--self-test]      exit status 1 if a rule is broken, each with file and line
+"""
+
+import argparse
+import os
+import re
+import sys
+
+ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+
+# Each core header and what it may include; CORE_SHARED goes without saying above ih_rig.h.
+CORE_SHARED = {"ih_config.h", "ih_types.h", "ih_rig.h"}
+CORE_HEADERS = {
+    "ih_config.h": set(),
+    "ih_types.h": set(),
+    "ih_fix.h": set(),
+    "ih_rig.h": {"ih_config.h", "ih_types.h"},
+    "ih_cholesky.h": {"ih_types.h"},
+    "ih_dots.h": CORE_SHARED,
+    "ih_labels.h": CORE_SHARED | {"ih_dots.h"},
+    "ih_points.h": CORE_SHARED | {"ih_labels.h"},
+    "ih_samples.h": CORE_SHARED | {"ih_points.h"},
+    "ih_surface.h": CORE_SHARED | {"ih_samples.h", "ih_cholesky.h"},
+    "ih_cuts.h": CORE_SHARED | {"ih_surface.h"},
+    "ih_ellipse.h": CORE_SHARED | {"ih_cuts.h"},
+    "ih_hypotheses.h": CORE_SHARED | {"ih_ellipse.h"},
+    "ih_heads.h": CORE_SHARED | {"ih_hypotheses.h"},
+    "isohead.h": CORE_SHARED | {"ih_heads.h"},
+}
+CORE_SYSTEM = {"stdbool.h", "stddef.h", "stdint.h", "string.h"}
+
+INCLUDE = re.compile(r'^\s*#\s*include\s*(["<])([^">]+)[">]')
+
+
+def allowed_in_core(name):
+    if name in CORE_HEADERS:
+        return CORE_HEADERS[name]
+    own = name[:-len(".c")] + ".h"
+    if name == "isohead.c":
+        return {own}
+    return {own, "ih_fix.h"} if own in CORE_HEADERS else None
+
+
+def judge_core(path, quoted, target):
+    name = os.path.basename(path)
+    allowed = allowed_in_core(name)
+    if allowed is None:
+        return "this file stands in no rule: add it to tests/checks/includes.py"
+    if not quoted:
+        return None if target in CORE_SYSTEM else "the core does without <%s>" % target
+    if target in allowed:
+        return None
+    return "%s may include only %s" % (name, ", ".join(sorted(allowed)) or "nothing of ours")
+
+
+def is_core(target):
+    return os.path.basename(target) in CORE_HEADERS or target.startswith(("ih_", "isohead"))
+
+
+def judge_hal(path, quoted, target):
+    if is_core(target):
+        return "hal knows no firmware"
+    own = os.path.basename(os.path.dirname(path))
+    if quoted and not re.fullmatch(r"hal\.h|(%s/)?hal_\w+\.h" % own, target):
+        return "a back end includes hal.h and its own files"
+    return None
+
+
+def judge_sim(path, quoted, target):
+    if not quoted or is_core(target):
+        return None
+    good = re.fullmatch(r"sim_\w+\.h|hal\.h|(replay/)?hal_\w+\.h", target)
+    return None if good else "sim includes the core, hal and its own files"
+
+
+def judge_render(path, quoted, target):
+    if is_core(target) or re.match(r"(sim|hal)\b|(sim|hal)_", target):
+        return "render shares nothing with the programs that read its frames"
+    if quoted and not re.fullmatch(r"rd_\w+\.h", target):
+        return "render includes its own files"
+    return None
+
+
+FOLDERS = {"firmware/core": judge_core, "hal": judge_hal, "sim": judge_sim,
+           "tools/render": judge_render}
+
+
+def judge(path, line):
+    """What is wrong with a line of a file; None when nothing is."""
+    found = INCLUDE.match(line)
+    if not found:
+        return "an include of a macro" if re.match(r"\s*#\s*include", line) else None
+    if ".." in found[2].split("/"):
+        return "no way up: name the file from an include directory"
+    for folder, rule in FOLDERS.items():
+        if path.startswith(folder + "/"):
+            return rule(path, found[1] == '"', found[2])
+    return "this folder stands in no rule: add it to tests/checks/includes.py"
+
+
+def sources():
+    for top in ("firmware", "hal", "sim", "tools"):
+        for directory, below, files in os.walk(os.path.join(ROOT, top)):
+            below.sort()
+            for name in sorted(files):
+                if name.endswith((".c", ".h")):
+                    yield os.path.relpath(os.path.join(directory, name), ROOT)
+
+
+def check():
+    bad = lines = files = 0
+    for path in sources():
+        files += 1
+        with open(os.path.join(ROOT, path), encoding="utf-8") as file:
+            for number, line in enumerate(file, 1):
+                lines += bool(INCLUDE.match(line))
+                reason = judge(path, line)
+                if reason:
+                    bad += 1
+                    print("%s:%d: %s: %s" % (path, number, line.strip(), reason))
+    print("includes: %d files, %d includes, %d against the rules" % (files, lines, bad))
+    return 1 if bad or not lines else 0
+
+
+def self_test():
+    """Lines that must be refused, and lines that must not."""
+    refused = [("firmware/core/ih_dots.h", '#include "ih_labels.h"'),
+               ("firmware/core/ih_points.h", '#include "ih_dots.h"'),
+               ("firmware/core/ih_dots.c", '#include "ih_rig.h"'),
+               ("firmware/core/ih_dots.c", "#include <stdio.h>"),
+               ("firmware/core/ih_dots.c", "#include <stdlib.h>"),
+               ("firmware/core/ih_dots.c", "#include <math.h>"),
+               ("firmware/core/isohead.c", '#include "ih_fix.h"'),
+               ("firmware/core/ih_new.c", '#include "ih_new.h"'),
+               ("hal/replay/hal_pgm.c", '#include "ih_types.h"'),
+               ("hal/linux/hal_v4l2.c", '#include "replay/hal_file.h"'),
+               ("hal/hal.h", '#include "sim_text.h"'),
+               ("sim/sim_run.c", '#include "rd_rig.h"'),
+               ("sim/sim_run.c", '#include "../firmware/core/isohead.h"'),
+               ("tools/render/main.c", '#include "isohead.h"'),
+               ("tools/render/main.c", "#include <hal.h>"),
+               ("firmware/app/main.c", '#include "isohead.h"')]
+    good = [("firmware/core/ih_labels.h", '#include "ih_dots.h"'),
+            ("firmware/core/ih_labels.c", '#include "ih_fix.h"'),
+            ("firmware/core/ih_labels.c", "#include <string.h>"),
+            ("hal/replay/hal_pgm.c", "#include <cjson/cJSON.h>"),
+            ("sim/sim_run.c", '#include "replay/hal_replay.h"'),
+            ("tools/render/main.c", '#include "rd_rig.h"')]
+    missed = [line for line in refused if judge(*line) is None]
+    missed += [line for line in good if judge(*line) is not None]
+    for path, line in missed:
+        print("judged wrongly: %s: %s" % (path, line))
+    print("includes: %d made-up lines, %d judged wrongly" % (len(refused + good), len(missed)))
+    return 1 if missed else 0
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--self-test", action="store_true")
+    return self_test() if parser.parse_args().self_test else check()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

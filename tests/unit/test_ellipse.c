@@ -1,0 +1,332 @@
+/* ih_ellipse against closed forms, against float64 moments by triangles, and its search against a
+ * float64 search that tries every part. */
+#include "ih_ellipse.h"
+
+#include "ih_test.h"
+
+struct vector_polygon {
+    const char *name;
+    int16_t vertex_count;
+    const struct ih_vertex *vertex;
+    double area, x, y, xx, xy, yy, shape, ratio;
+};
+
+struct vector_part {
+    const char *name;
+    bool closed;
+    int16_t vertex_count;
+    const struct ih_vertex *vertex;
+    struct ih_vertex place;
+    bool found;
+    double merit, area, x, y;
+};
+
+#include "ellipse.inc"
+
+#define UNIT 512
+
+static struct ih_cuts cuts;
+static struct ih_contour contour;
+static struct ih_ellipse ellipse;
+static struct ih_ellipse_params params;
+static struct ih_ellipse_scratch scratch;
+
+void setUp(void)
+{
+    memset(&cuts, IH_TEST_FILL, sizeof cuts);
+    memset(&scratch, IH_TEST_FILL, sizeof scratch);
+    memset(&ellipse, IH_TEST_FILL, sizeof ellipse);
+    ih_ellipse_params_default(&params);
+}
+
+void tearDown(void)
+{
+}
+
+/* Somewhere inside the pool, so that the first vertex is not the pool's. */
+static void take(const struct ih_vertex *vertex, int32_t count, bool closed)
+{
+    contour = (struct ih_contour){100, (int16_t)count, closed};
+    memcpy(&cuts.vertex[100], vertex, (size_t)count * sizeof *vertex);
+}
+
+static double from_q16(int64_t value)
+{
+    return ih_test_from_q(value, 16);
+}
+
+static void moments_match_float64(void)
+{
+    int i;
+
+    for (i = 0; i < IH_TEST_COUNT(vector_polygons); i++) {
+        const struct vector_polygon *v = &vector_polygons[i];
+        double length = 0, size = sqrt(v->xx + v->yy), error;
+        int k;
+
+        take(v->vertex, v->vertex_count, true);
+        for (k = 0; k < v->vertex_count; k++) {
+            const struct ih_vertex a = v->vertex[k], b = v->vertex[(k + 1) % v->vertex_count];
+
+            length += hypot(a.x_q9 - b.x_q9, a.y_q9 - b.y_q9) / UNIT;
+        }
+        /* Vertices are rounded to Q8: each may be off by 1/512 step across its edge, all to one
+         * side in the worst case. That moves the area by at most length / 512, the centre by that
+         * times the distance to it over the area, the second moments by the distance squared; the
+         * farthest vertex is at most 3 sigma away. */
+        error = length / 512;
+        TEST_ASSERT_TRUE_MESSAGE(ih_ellipse_of_contour(&cuts, &contour, &ellipse), v->name);
+        IH_TEST_WITHIN(error, v->area, from_q16(ellipse.area_q16), v->name, 0);
+        error /= fabs(v->area);
+        IH_TEST_WITHIN(error * 3 * size + 2e-5, v->x, from_q16(ellipse.x_q16), v->name, 1);
+        IH_TEST_WITHIN(error * 3 * size + 2e-5, v->y, from_q16(ellipse.y_q16), v->name, 2);
+        error = error * 9 * size * size + 2e-5;
+        IH_TEST_WITHIN(error, v->xx, from_q16(ellipse.xx_q16), v->name, 3);
+        IH_TEST_WITHIN(error, v->xy, from_q16(ellipse.xy_q16), v->name, 4);
+        IH_TEST_WITHIN(error, v->yy, from_q16(ellipse.yy_q16), v->name, 5);
+        if (v->ratio < 10) { /* else the smaller axis is a matter of rounding */
+            /* In relative terms those errors, doubled by the division. */
+            IH_TEST_WITHIN(0.01, 1.0, from_q16(ellipse.shape_q16) / v->shape, v->name, 6);
+            IH_TEST_WITHIN(0.01, 1.0, from_q16(ellipse.ratio_q16) / v->ratio, v->name, 7);
+        }
+    }
+}
+
+/* Closed form: w x h at (x, y): w h, w^2 / 12, h^2 / 12, 4 pi / 12, w / h. Whole numbers of Q8, so
+ * that nothing is rounded before the divisions. */
+static void rectangles_match_the_closed_form(void)
+{
+    static const int16_t box[][4] = {{0, 0, 1, 1},   {3, 5, 4, 4},   {10, 0, 30, 5},
+                                     {0, 0, 46, 46}, {44, 1, 2, 45}, {20, 20, 3, 1}};
+    int i;
+
+    for (i = 0; i < IH_TEST_COUNT(box); i++) {
+        const int16_t x = (int16_t)(box[i][0] * UNIT), y = (int16_t)(box[i][1] * UNIT);
+        const int16_t x2 = (int16_t)(x + box[i][2] * UNIT), y2 = (int16_t)(y + box[i][3] * UNIT);
+        const double w = box[i][2], h = box[i][3];
+        const struct ih_vertex corner[4] = {{x, y}, {x2, y}, {x2, y2}, {x, y2}};
+
+        take(corner, 4, true);
+        TEST_ASSERT_TRUE(ih_ellipse_of_contour(&cuts, &contour, &ellipse));
+        /* Half a unit of Q16 each; the second moments take the square of the centre away. */
+        IH_TEST_WITHIN(1.0 / 65536, w * h, from_q16(ellipse.area_q16), "area", i);
+        IH_TEST_WITHIN(1.0 / 65536, box[i][0] + w / 2, from_q16(ellipse.x_q16), "x", i);
+        IH_TEST_WITHIN(1.0 / 65536, box[i][1] + h / 2, from_q16(ellipse.y_q16), "y", i);
+        IH_TEST_WITHIN(50.0 / 65536, w * w / 12, from_q16(ellipse.xx_q16), "xx", i);
+        IH_TEST_WITHIN(50.0 / 65536, h * h / 12, from_q16(ellipse.yy_q16), "yy", i);
+        IH_TEST_WITHIN(50.0 / 65536, 0, from_q16(ellipse.xy_q16), "xy", i);
+        IH_TEST_WITHIN(0.002, acos(-1.0) / 3, from_q16(ellipse.shape_q16), "shape", i);
+        IH_TEST_WITHIN(0.002, 1.0, from_q16(ellipse.ratio_q16) / (w > h ? w / h : h / w), "ratio",
+                       i);
+    }
+}
+
+/* Moments belong to the polygon, not to where it stands or where its list begins. */
+static void place_and_beginning_do_not_matter(void)
+{
+    static struct ih_vertex moved[256];
+    const struct vector_part *v = &vector_parts[1];
+    struct ih_ellipse first;
+    int i;
+
+    take(v->vertex, v->vertex_count, true);
+    TEST_ASSERT_TRUE(ih_ellipse_of_contour(&cuts, &contour, &first));
+    for (i = 0; i < v->vertex_count; i++) {
+        const struct ih_vertex from = v->vertex[(i + 37) % v->vertex_count];
+
+        moved[i] =
+            (struct ih_vertex){(int16_t)(from.x_q9 + 5 * UNIT), (int16_t)(from.y_q9 - 7 * UNIT)};
+    }
+    take(moved, v->vertex_count, true);
+    TEST_ASSERT_TRUE(ih_ellipse_of_contour(&cuts, &contour, &ellipse));
+    /* Another beginning is another origin: vertices are rounded the other way, up to 1/512 step. */
+    IH_TEST_WITHIN(0.1, from_q16(first.area_q16), from_q16(ellipse.area_q16), "area", 0);
+    IH_TEST_WITHIN(0.01, from_q16(first.x_q16) + 5, from_q16(ellipse.x_q16), "x", 0);
+    IH_TEST_WITHIN(0.01, from_q16(first.y_q16) - 7, from_q16(ellipse.y_q16), "y", 0);
+    IH_TEST_WITHIN(0.05, from_q16(first.xx_q16), from_q16(ellipse.xx_q16), "xx", 0);
+}
+
+static void polygons_without_area_are_no_ellipse(void)
+{
+    static const struct ih_vertex line[] = {{0, 0}, {5000, 5000}, {10000, 10000}};
+    static const struct ih_vertex point[] = {{700, 700}, {700, 700}, {700, 700}, {700, 700}};
+    static const struct ih_vertex two[] = {{0, 512}, {512, 0}};
+
+    take(line, 3, true);
+    TEST_ASSERT_FALSE(ih_ellipse_of_contour(&cuts, &contour, &ellipse));
+    take(point, 4, true);
+    TEST_ASSERT_FALSE(ih_ellipse_of_contour(&cuts, &contour, &ellipse));
+    take(two, 2, true);
+    TEST_ASSERT_FALSE(ih_ellipse_of_contour(&cuts, &contour, &ellipse));
+}
+
+static void the_winding_tells_inside_from_beside_and_minima_from_maxima(void)
+{
+    static const struct ih_vertex box[] = {
+        {5120, 5120}, {10240, 5120}, {10240, 10240}, {5120, 10240}};
+    static const struct ih_vertex back[] = {
+        {5120, 5120}, {5120, 10240}, {10240, 10240}, {10240, 5120}};
+    static const struct ih_vertex beside[] = {{5000, 7000},  {11000, 7000}, {7000, 5000},
+                                              {7000, 11000}, {0, 0},        {23552, 23552},
+                                              {0, 10240},    {5120, 0}};
+    int i;
+
+    take(box, 4, true);
+    TEST_ASSERT_EQUAL_INT32(1, ih_ellipse_winding(&cuts, &contour, (struct ih_vertex){7168, 7168}));
+    TEST_ASSERT_EQUAL_INT32(1,
+                            ih_ellipse_winding(&cuts, &contour, (struct ih_vertex){5122, 10238}));
+    for (i = 0; i < IH_TEST_COUNT(beside); i++) {
+        IH_TEST_EQUAL(0, ih_ellipse_winding(&cuts, &contour, beside[i]), "beside", i);
+    }
+    take(back, 4, true);
+    TEST_ASSERT_EQUAL_INT32(-1,
+                            ih_ellipse_winding(&cuts, &contour, (struct ih_vertex){7168, 7168}));
+    take(box, 4, false); /* an open one is closed by its chord */
+    TEST_ASSERT_EQUAL_INT32(1, ih_ellipse_winding(&cuts, &contour, (struct ih_vertex){7168, 7168}));
+}
+
+/* A horseshoe: its gap is not inside. */
+static void the_winding_follows_a_concave_contour(void)
+{
+    static const struct ih_vertex horseshoe[] = {{5120, 5120},   {15360, 5120}, {15360, 15360},
+                                                 {12800, 15360}, {12800, 7680}, {7680, 7680},
+                                                 {7680, 15360},  {5120, 15360}};
+
+    take(horseshoe, 8, true);
+    TEST_ASSERT_EQUAL_INT32(0,
+                            ih_ellipse_winding(&cuts, &contour, (struct ih_vertex){10240, 12800}));
+    TEST_ASSERT_EQUAL_INT32(1,
+                            ih_ellipse_winding(&cuts, &contour, (struct ih_vertex){10240, 6400}));
+    TEST_ASSERT_EQUAL_INT32(1,
+                            ih_ellipse_winding(&cuts, &contour, (struct ih_vertex){6400, 12800}));
+}
+
+static bool find_part(const struct vector_part *v)
+{
+    take(v->vertex, v->vertex_count, v->closed);
+    return ih_ellipse_of_part(&cuts, &contour, v->place, &params, &scratch, &ellipse);
+}
+
+static void the_best_part_matches_the_float_search(void)
+{
+    int i;
+
+    for (i = 0; i < IH_TEST_COUNT(vector_parts); i++) {
+        const struct vector_part *v = &vector_parts[i];
+
+        IH_TEST_EQUAL(v->found, find_part(v), v->name, i);
+        if (!v->found) {
+            continue;
+        }
+        /* Points rounded to 1/512 step around a part of radius r change its shape by about
+         * 1 / (256 r), and the merit by 8 arc = 50 r times that: 0.2 step. */
+        IH_TEST_WITHIN(0.25, v->merit, ih_test_from_q(ellipse.merit_q8, 8), v->name, i);
+        /* Parts that differ by one point at an end have nearly the same merit. */
+        IH_TEST_WITHIN(0.05, 1.0, from_q16(ellipse.area_q16) / v->area, v->name, i);
+        IH_TEST_WITHIN(0.3, v->x, from_q16(ellipse.x_q16), v->name, i);
+        IH_TEST_WITHIN(0.3, v->y, from_q16(ellipse.y_q16), v->name, i);
+        TEST_ASSERT_TRUE(ellipse.shape_q16 <= params.shape_max_q16);
+        TEST_ASSERT_TRUE(ellipse.ratio_q16 <= params.ratio_part_max_q16);
+    }
+}
+
+/* Every limit, set to what no part keeps, lets nothing through. */
+static void limits_are_obeyed(void)
+{
+    const struct vector_part *v = &vector_parts[1];
+
+    TEST_ASSERT_TRUE(find_part(v));
+    params.shape_max_q16 = 65280;
+    TEST_ASSERT_FALSE(find_part(v));
+    ih_ellipse_params_default(&params);
+    params.ratio_part_max_q16 = 65536;
+    TEST_ASSERT_FALSE(find_part(v));
+    ih_ellipse_params_default(&params);
+    params.chord_max_q16 = 0;
+    TEST_ASSERT_FALSE(find_part(v));
+}
+
+static void contours_that_are_too_short_or_too_long_have_no_part(void)
+{
+    static struct ih_vertex longest[IH_CUTS_VERTICES_MAX];
+    const struct ih_vertex place = {23 * UNIT, 23 * UNIT};
+    int32_t i, count;
+
+    for (count = 1; count < 8; count++) {
+        take(vector_parts[0].vertex, count, false);
+        TEST_ASSERT_FALSE(ih_ellipse_of_part(&cuts, &contour, vector_parts[0].place, &params,
+                                             &scratch, &ellipse));
+    }
+    for (i = 0; i < IH_CUTS_VERTICES_MAX; i++) {
+        const double angle = i * 2 * acos(-1.0) / (IH_ELLIPSE_VERTICES_MAX + 1);
+
+        longest[i] = (struct ih_vertex){(int16_t)lround((23 + 20 * cos(angle)) * UNIT),
+                                        (int16_t)lround((23 + 20 * sin(angle)) * UNIT)};
+    }
+    contour = (struct ih_contour){0, IH_ELLIPSE_VERTICES_MAX + 1, true};
+    memcpy(cuts.vertex, longest, sizeof longest);
+    TEST_ASSERT_FALSE(ih_ellipse_of_part(&cuts, &contour, place, &params, &scratch, &ellipse));
+}
+
+/* All vertices at one place, and a line there and back: no length, no area, nothing to divide by.
+ */
+static void degenerate_contours_have_no_part(void)
+{
+    static struct ih_vertex vertex[40];
+    const struct ih_vertex place = {20 * UNIT, 20 * UNIT};
+    int i, pass;
+
+    for (pass = 0; pass < 4; pass++) {
+        for (i = 0; i < 40; i++) {
+            const int along = pass / 2 == 0 ? 0 : i < 20 ? i : 39 - i;
+
+            vertex[i] = (struct ih_vertex){(int16_t)(20 * UNIT + along * 500),
+                                           (int16_t)(20 * UNIT + along * 300)};
+        }
+        take(vertex, 40, pass % 2 == 0);
+        TEST_ASSERT_FALSE(ih_ellipse_of_part(&cuts, &contour, place, &params, &scratch, &ellipse));
+    }
+}
+
+/* The largest sums: a contour as long as is searched, all over the grid, seen from a corner. */
+static void the_longest_contours_do_not_overflow(void)
+{
+    static struct ih_vertex vertex[IH_ELLIPSE_VERTICES_MAX];
+    struct ih_test_random random = {82};
+    int32_t i, pass;
+
+    for (pass = 0; pass < 40; pass++) {
+        int32_t x = 23 * UNIT, y = 23 * UNIT;
+
+        for (i = 0; i < IH_ELLIPSE_VERTICES_MAX; i++) { /* a walk in steps of at most one cell */
+            x += (int32_t)ih_test_between(&random, pass % 2 == 0 ? -UNIT : 0, UNIT);
+            y += (int32_t)ih_test_between(&random, -UNIT, pass % 3 == 0 ? 0 : UNIT);
+            x = x < 0 ? 0 : x > 46 * UNIT ? 46 * UNIT : x;
+            y = y < 0 ? 0 : y > 46 * UNIT ? 46 * UNIT : y;
+            vertex[i] = (struct ih_vertex){(int16_t)x, (int16_t)y};
+        }
+        take(vertex, IH_ELLIPSE_VERTICES_MAX, pass % 4 < 2);
+        if (ih_ellipse_of_part(&cuts, &contour, (struct ih_vertex){0, 0}, &params, &scratch,
+                               &ellipse)) {
+            IH_TEST_RANGE(0, 46 << 16, ellipse.x_q16, "x", pass);
+        }
+        (void)ih_ellipse_of_contour(&cuts, &contour, &ellipse);
+    }
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(moments_match_float64);
+    RUN_TEST(rectangles_match_the_closed_form);
+    RUN_TEST(place_and_beginning_do_not_matter);
+    RUN_TEST(polygons_without_area_are_no_ellipse);
+    RUN_TEST(the_winding_tells_inside_from_beside_and_minima_from_maxima);
+    RUN_TEST(the_winding_follows_a_concave_contour);
+    RUN_TEST(the_best_part_matches_the_float_search);
+    RUN_TEST(limits_are_obeyed);
+    RUN_TEST(contours_that_are_too_short_or_too_long_have_no_part);
+    RUN_TEST(degenerate_contours_have_no_part);
+    RUN_TEST(the_longest_contours_do_not_overflow);
+    return UNITY_END();
+}

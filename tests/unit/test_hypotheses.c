@@ -1,0 +1,473 @@
+/* ih_hypotheses on surfaces whose cuts are known in closed form. */
+#include "ih_hypotheses.h"
+
+#include "ih_test.h"
+
+#define SIDE IH_SURFACE_GRID
+#define PI 3.14159265358979323846
+#define UNIT_Q28 4026532 /* 0.015: 11.6 mm a grid step at 850 mm */
+
+/* Half an ellipsoid: middle and semi-axes on the grid in steps, front and depth in mm. */
+struct half_ellipsoid {
+    double x, y, a, b, front_mm, depth_mm;
+};
+
+static struct ih_surface surface;
+static struct ih_hypotheses_params params;
+static struct ih_hypotheses_scratch scratch;
+static struct ih_hypotheses hypotheses;
+
+void setUp(void)
+{
+    memset(&surface, 0, sizeof surface);
+    memset(&scratch, IH_TEST_FILL, sizeof scratch);
+    memset(&hypotheses, IH_TEST_FILL, sizeof hypotheses);
+    ih_hypotheses_params_default(&params);
+    surface.valid = true;
+    surface.field.unit_q28 = UNIT_Q28;
+}
+
+void tearDown(void)
+{
+}
+
+static void set_plane(double depth_mm, double per_x, double per_y)
+{
+    int32_t x, y;
+
+    for (y = 0; y < SIDE; y++) {
+        for (x = 0; x < SIDE; x++) {
+            surface.depth_mm_q8[y][x] = (int32_t)lround(256 * (depth_mm + per_x * x + per_y * y));
+        }
+    }
+}
+
+/* Put something before what is there. */
+static void put_nearer(int32_t x, int32_t y, double depth_mm)
+{
+    const int32_t depth_q8 = (int32_t)lround(256 * depth_mm);
+
+    if (depth_q8 < surface.depth_mm_q8[y][x]) {
+        surface.depth_mm_q8[y][x] = depth_q8;
+    }
+}
+
+static void put_ellipsoid(const struct half_ellipsoid *e)
+{
+    int32_t x, y;
+
+    for (y = 0; y < SIDE; y++) {
+        for (x = 0; x < SIDE; x++) {
+            const double r2 =
+                (x - e->x) * (x - e->x) / (e->a * e->a) + (y - e->y) * (y - e->y) / (e->b * e->b);
+
+            if (r2 < 1) {
+                put_nearer(x, y, e->front_mm + e->depth_mm * (1 - sqrt(1 - r2)));
+            }
+        }
+    }
+}
+
+static void find(void)
+{
+    int32_t i;
+
+    surface.nearest_mm_q8 = INT32_MAX;
+    for (i = 0; i < SIDE * SIDE; i++) {
+        if (surface.depth_mm_q8[i / SIDE][i % SIDE] < surface.nearest_mm_q8) {
+            surface.nearest_mm_q8 = surface.depth_mm_q8[i / SIDE][i % SIDE];
+        }
+    }
+    memset(&hypotheses, IH_TEST_FILL, sizeof hypotheses);
+    ih_hypotheses_find(&surface, &params, &scratch, &hypotheses);
+}
+
+/* What holds for every nest. */
+static void check_nests(void)
+{
+    int32_t i, k;
+
+    IH_TEST_RANGE(0, IH_HYPOTHESES_MAX, hypotheses.nest_count, "nests", 0);
+    for (i = 0; i < hypotheses.nest_count; i++) {
+        const struct ih_nest *nest = &hypotheses.nest[i];
+
+        IH_TEST_EQUAL(surface.depth_mm_q8[nest->minimum.y_q9 / 512][nest->minimum.x_q9 / 512],
+                      nest->nearest_mm_q8, "depth of the minimum", i);
+        TEST_ASSERT_TRUE(i == 0 || nest[-1].nearest_mm_q8 <= nest->nearest_mm_q8);
+        IH_TEST_RANGE(0, IH_HYPOTHESES_SLICES_MAX, nest->slice_count, "slices", i);
+        for (k = 0; k < nest->slice_count; k++) {
+            const struct ih_slice *slice = &nest->slice[k];
+
+            IH_TEST_RANGE(1, params.depth_max_mm << 8, slice->behind_mm_q8, "behind", k);
+            TEST_ASSERT_TRUE(k == 0 || slice->behind_mm_q8 > slice[-1].behind_mm_q8);
+            TEST_ASSERT_TRUE(slice->ellipse.area_q16 > 0 && slice->area_mm2 > 0);
+            IH_TEST_RANGE(0, params.ellipse.shape_max_q16, slice->ellipse.shape_q16, "shape", k);
+            IH_TEST_RANGE(65536 - 256,
+                          slice->whole ? params.ellipse.ratio_closed_max_q16
+                                       : params.ellipse.ratio_part_max_q16,
+                          slice->ellipse.ratio_q16, "ratio", k);
+            /* "when its area falls below 0.6 of the slice before"; 1 mm^2 for rounding */
+            TEST_ASSERT_TRUE(k == 0 || slice->area_mm2 >= 0.6 * slice[-1].area_mm2 - 1);
+        }
+    }
+}
+
+/* A grid step in mm at a depth. */
+static double step_mm(double depth_mm)
+{
+    return depth_mm * ih_test_from_q(UNIT_Q28, 28) * IH_SURFACE_STEP_NUMERATOR /
+           IH_SURFACE_STEP_DENOMINATOR;
+}
+
+static const struct ih_nest *nest_at(double x, double y)
+{
+    int32_t i;
+
+    for (i = 0; i < hypotheses.nest_count; i++) {
+        if (hypot(hypotheses.nest[i].minimum.x_q9 / 512.0 - x,
+                  hypotheses.nest[i].minimum.y_q9 / 512.0 - y) < 1) {
+            return &hypotheses.nest[i];
+        }
+    }
+    return NULL;
+}
+
+/* Closed form: t behind the front the cut is pi a b (1 - (1 - t / c)^2). */
+static void check_slices(const struct ih_nest *nest, const struct half_ellipsoid *e, int32_t least)
+{
+    int32_t k, compared = 0;
+
+    for (k = 0; k < nest->slice_count; k++) {
+        const struct ih_slice *slice = &nest->slice[k];
+        const double level = ih_test_from_q(nest->nearest_mm_q8 + slice->behind_mm_q8, 8);
+        const double part = (level - e->front_mm) / e->depth_mm;
+        const double area = PI * e->a * e->b * (1 - (1 - part) * (1 - part));
+        const double small = sqrt(area / PI);
+
+        if (part > 0.5 || small < 2) {
+            continue; /* steep flanks and cuts of a few cells are not what the grid can show */
+        }
+        TEST_ASSERT_TRUE(slice->whole);
+        /* Linear interpolation moves a vertex inwards by up to f'' / (8 f') along the slope, 4 / 8
+         * r at half the depth, r being the radius, and by 1 / 8 r across: 5 / 8 r in all, and
+         * relative to the area twice that by r. */
+        IH_TEST_WITHIN(1.25 / (small * small), 1.0,
+                       ih_test_from_q(slice->ellipse.area_q16, 16) / area, "area", k);
+        IH_TEST_WITHIN(1.25 / (small * small), 1.0,
+                       slice->area_mm2 / (area * step_mm(level) * step_mm(level)), "area in mm^2",
+                       k);
+        /* The cut is symmetric; the grid is not, by a part of a cell's error above. */
+        IH_TEST_WITHIN(0.1, e->x, ih_test_from_q(slice->ellipse.x_q16, 16), "x", k);
+        IH_TEST_WITHIN(0.1, e->y, ih_test_from_q(slice->ellipse.y_q16, 16), "y", k);
+        IH_TEST_WITHIN(1.25 / (small * small), e->b > e->a ? e->b / e->a : e->a / e->b,
+                       ih_test_from_q(slice->ellipse.ratio_q16, 16), "ratio", k);
+        compared++;
+    }
+    IH_TEST_RANGE(least, IH_HYPOTHESES_SLICES_MAX, compared, "slices compared", 0);
+}
+
+static void an_ellipsoid_before_a_wall_is_one_nest(void)
+{
+    static const struct half_ellipsoid heads[] = {
+        {23, 23, 6.5, 9.5, 850, 98}, {18.4, 15.7, 8, 8, 700, 120}, {27.2, 30.9, 10, 6.5, 1200, 90}};
+    int i;
+
+    for (i = 0; i < IH_TEST_COUNT(heads); i++) {
+        set_plane(heads[i].front_mm + 400, 0, 0);
+        put_ellipsoid(&heads[i]);
+        find();
+        check_nests();
+        TEST_ASSERT_EQUAL_INT32(1, hypotheses.nest_count);
+        TEST_ASSERT_NOT_NULL(nest_at(heads[i].x, heads[i].y));
+        check_slices(&hypotheses.nest[0], &heads[i], 3);
+    }
+}
+
+static void two_ellipsoids_are_two_nests(void)
+{
+    static const struct half_ellipsoid near = {12, 20, 6.5, 9, 800, 100};
+    static const struct half_ellipsoid far = {34, 24, 7, 8, 953, 110};
+
+    set_plane(1500, 0, 0);
+    put_ellipsoid(&near);
+    put_ellipsoid(&far);
+    find();
+    check_nests();
+    TEST_ASSERT_EQUAL_INT32(2, hypotheses.nest_count);
+    TEST_ASSERT_TRUE(nest_at(near.x, near.y) == &hypotheses.nest[0]);
+    TEST_ASSERT_TRUE(nest_at(far.x, far.y) == &hypotheses.nest[1]);
+    check_slices(&hypotheses.nest[0], &near, 4);
+    check_slices(&hypotheses.nest[1], &far, 4);
+}
+
+/* A pit is a maximum of depth: its contours shrink with depth, nothing may stand on them. The flat
+ * plate round it may count as a minimum. */
+static void a_pit_supports_nothing(void)
+{
+    int32_t x, y, i;
+
+    set_plane(900, 0, 0);
+    for (y = 0; y < SIDE; y++) {
+        for (x = 0; x < SIDE; x++) {
+            const double r2 = ((x - 23) * (x - 23) + (y - 23) * (y - 23)) / 144.0;
+
+            surface.depth_mm_q8[y][x] += r2 < 1 ? (int32_t)(256 * 100 * (1 - r2)) : 0;
+        }
+    }
+    find();
+    check_nests();
+    for (i = 0; i < hypotheses.nest_count; i++) {
+        IH_TEST_EQUAL(0, hypotheses.nest[i].slice_count, "slices", i);
+    }
+}
+
+/* The same pit in a plate that is bent towards the camera in its middle row: minima beside the pit
+ * exist, but no slice may be centred in the pit. */
+static void a_pit_in_a_bulge_is_no_slice(void)
+{
+    int32_t x, y, i, k;
+
+    for (y = 0; y < SIDE; y++) {
+        for (x = 0; x < SIDE; x++) {
+            const double r2 = (x - 23) * (x - 23) + (y - 23) * (y - 23);
+
+            surface.depth_mm_q8[y][x] =
+                (int32_t)(256 * (900 + 0.3 * r2 + 60 * exp(-r2 / 18) + 0.1 * x));
+        }
+    }
+    find();
+    check_nests();
+    TEST_ASSERT_TRUE(hypotheses.nest_count > 0);
+    for (i = 0; i < hypotheses.nest_count; i++) {
+        for (k = 0; k < hypotheses.nest[i].slice_count; k++) {
+            const struct ih_slice *slice = &hypotheses.nest[i].slice[k];
+            const double radius = sqrt(ih_test_from_q(slice->ellipse.area_q16, 16) / PI);
+            const double away = hypot(ih_test_from_q(slice->ellipse.x_q16, 16) - 23,
+                                      ih_test_from_q(slice->ellipse.y_q16, 16) - 23);
+
+            /* Either beside the pit, or all round it: the pit's rim has a radius of 6 steps. */
+            TEST_ASSERT_TRUE(away > 2 || radius > 6);
+        }
+    }
+}
+
+static void planes_have_no_minimum(void)
+{
+    static const double slopes[][2] = {{0, 0}, {5, 0}, {0, -4}, {3, 7}, {-0.01, 0.02}};
+    int i;
+
+    for (i = 0; i < IH_TEST_COUNT(slopes); i++) {
+        set_plane(1000, slopes[i][0], slopes[i][1]);
+        find();
+        IH_TEST_EQUAL(0, hypotheses.nest_count, "plane", i);
+        IH_TEST_EQUAL(0, hypotheses.minima_dropped, "plane", i);
+    }
+}
+
+/* Of equal nodes the first counts, so that a flat top is one minimum. */
+static void a_flat_top_is_one_minimum(void)
+{
+    int32_t x, y;
+
+    set_plane(1000, 0, 0);
+    for (y = 20; y < 24; y++) {
+        for (x = 18; x < 25; x++) {
+            put_nearer(x, y, 800);
+        }
+    }
+    find();
+    check_nests();
+    TEST_ASSERT_EQUAL_INT32(1, hypotheses.nest_count);
+    TEST_ASSERT_EQUAL_INT16(18 * 512, hypotheses.nest[0].minimum.x_q9);
+    TEST_ASSERT_EQUAL_INT16(20 * 512, hypotheses.nest[0].minimum.y_q9);
+}
+
+/* A head on a body that leaves the grid below: behind the chin the contours are open and the head's
+ * part is cut out of them. */
+static void a_head_on_shoulders_is_cut_out(void)
+{
+    static const struct half_ellipsoid head = {23, 16, 6.5, 9, 850, 100};
+    static const struct half_ellipsoid body = {23, 44, 19, 22, 870, 190};
+    int32_t k, parts = 0;
+
+    set_plane(1400, 0, 0);
+    put_ellipsoid(&body);
+    put_ellipsoid(&head);
+    find();
+    check_nests();
+    TEST_ASSERT_NOT_NULL(nest_at(head.x, head.y));
+    for (k = 0; k < nest_at(head.x, head.y)->slice_count; k++) {
+        const struct ih_slice *slice = &nest_at(head.x, head.y)->slice[k];
+
+        parts += !slice->whole;
+        /* Within the head, or its outline with a part of the neck. */
+        IH_TEST_WITHIN(1, head.x, ih_test_from_q(slice->ellipse.x_q16, 16), "x", k);
+        IH_TEST_WITHIN(3, head.y, ih_test_from_q(slice->ellipse.y_q16, 16), "y", k);
+        TEST_ASSERT_TRUE(slice->ellipse.area_q16 < (int64_t)(65536 * 1.3 * PI * head.a * head.b));
+    }
+    TEST_ASSERT_TRUE(parts >= 2);
+}
+
+/* A knob on a dish: where the cut reaches the dish its area jumps to five times. Before end_depth a
+ * nest may grow like that, later it ends. */
+static void put_knob_on_dish(double knob_mm)
+{
+    const struct half_ellipsoid knob = {23, 23, 4, 4.5, 850, knob_mm};
+    int32_t x, y;
+
+    set_plane(3000, 0, 0);
+    for (y = 0; y < SIDE; y++) {
+        for (x = 0; x < SIDE; x++) {
+            put_nearer(x, y, 850 + knob_mm + 1 + 0.5 * hypot(x - 23, y - 23));
+        }
+    }
+    put_ellipsoid(&knob);
+}
+
+static void a_jump_in_area_ends_a_nest_once_it_is_deep(void)
+{
+    const struct ih_nest *nest = &hypotheses.nest[0];
+
+    put_knob_on_dish(75);
+    find();
+    check_nests();
+    TEST_ASSERT_EQUAL_INT32(1, hypotheses.nest_count);
+    TEST_ASSERT_EQUAL_INT32(7, nest->slice_count); /* 10 .. 70 mm */
+    TEST_ASSERT_TRUE(nest->ended);
+    put_knob_on_dish(32);
+    find();
+    check_nests();
+    TEST_ASSERT_EQUAL_INT32(1, hypotheses.nest_count);
+    TEST_ASSERT_TRUE(nest->slice_count >= 4);
+    TEST_ASSERT_TRUE(nest->slice[nest->slice_count - 1].ellipse.area_q16 >
+                     4 * nest->slice[2].ellipse.area_q16);
+}
+
+static void a_nest_reaches_no_deeper_than_it_may(void)
+{
+    static const struct half_ellipsoid deep = {23, 23, 20, 20, 800, 600};
+
+    set_plane(2000, 0, 0);
+    put_ellipsoid(&deep);
+    params.depth_max_mm = 85;
+    find();
+    check_nests();
+    TEST_ASSERT_EQUAL_INT32(8, hypotheses.nest[0].slice_count); /* 10 .. 80 mm */
+    params.depth_max_mm = 100000;                               /* now the table is what ends it */
+    params.levels_behind_mm = 300;
+    find();
+    TEST_ASSERT_EQUAL_INT32(IH_HYPOTHESES_SLICES_MAX, hypotheses.nest[0].slice_count);
+    params.levels_behind_mm = 30;
+    find();
+    TEST_ASSERT_EQUAL_INT32(3, hypotheses.nest[0].slice_count);
+}
+
+/* 25 separate bumps, each at its own depth: the nearest 16 are followed. */
+static void the_nearest_minima_are_kept(void)
+{
+    int32_t i;
+
+    set_plane(2000, 0, 0);
+    for (i = 0; i < 25; i++) {
+        const int32_t order = i * 7 % 25;
+        const struct half_ellipsoid bump = {
+            4.0 + i % 5 * 9, 4.0 + (double)(i / 5) * 9, 3, 3, 800 + 9.0 * order, 100};
+
+        put_ellipsoid(&bump);
+    }
+    find();
+    check_nests();
+    TEST_ASSERT_EQUAL_INT32(IH_HYPOTHESES_MAX, hypotheses.nest_count);
+    TEST_ASSERT_EQUAL_INT32(25 - IH_HYPOTHESES_MAX, hypotheses.minima_dropped);
+    for (i = 0; i < IH_HYPOTHESES_MAX; i++) {
+        IH_TEST_EQUAL((800 + 9 * i) << 8, hypotheses.nest[i].nearest_mm_q8, "nearest", i);
+    }
+}
+
+static void a_minimum_at_the_border_is_none(void)
+{
+    static const struct half_ellipsoid cut_off = {0, 20, 6, 8, 800, 100};
+
+    set_plane(1500, 0, 0);
+    put_ellipsoid(&cut_off);
+    find();
+    TEST_ASSERT_EQUAL_INT32(0, hypotheses.nest_count);
+}
+
+static void an_invalid_surface_has_no_hypotheses(void)
+{
+    int32_t level;
+    static const struct half_ellipsoid head = {23, 23, 6.5, 9.5, 850, 98};
+
+    set_plane(1200, 0, 0);
+    put_ellipsoid(&head);
+    surface.valid = false;
+    find();
+    TEST_ASSERT_EQUAL_INT32(0, hypotheses.nest_count);
+    TEST_ASSERT_EQUAL_INT32(0, hypotheses.minima_dropped + hypotheses.contours_dropped);
+    TEST_ASSERT_FALSE(ih_hypotheses_level(&surface, &params, 0, &level));
+}
+
+static void levels_go_back_from_the_nearest_node(void)
+{
+    int32_t index, level;
+
+    set_plane(800, 1, 0);
+    find();
+    for (index = 0; index < 70; index++) {
+        TEST_ASSERT_TRUE(ih_hypotheses_level(&surface, &params, index, &level));
+        TEST_ASSERT_EQUAL_INT32((800 + 10 * (index + 1)) << 8, level);
+    }
+    TEST_ASSERT_FALSE(ih_hypotheses_level(&surface, &params, 70, &level));
+    TEST_ASSERT_FALSE(ih_hypotheses_level(&surface, &params, -1, &level));
+}
+
+/* Noise of any size: full tables, many minima, contours of all kinds. */
+static void rough_surfaces_are_survived(void)
+{
+    struct ih_test_random random = {91};
+    int32_t pass, i;
+
+    for (pass = 0; pass < 20; pass++) {
+        for (i = 0; i < SIDE * SIDE; i++) {
+            surface.depth_mm_q8[i / SIDE][i % SIDE] =
+                (1000 << 8) + (int32_t)ih_test_any_size(&random, 6 + pass % 12);
+        }
+        find();
+        check_nests();
+        TEST_ASSERT_TRUE(hypotheses.minima_dropped > 0);
+    }
+}
+
+/* What the surface can be at its worst: from before the camera's centre to 30 m behind it. */
+static void extreme_depths_are_survived(void)
+{
+    static const struct half_ellipsoid head = {23, 23, 6.5, 9.5, -4000, 98};
+
+    surface.field.unit_q28 = 1 << 26;
+    set_plane(30000, 0, 0);
+    put_ellipsoid(&head);
+    find();
+    IH_TEST_EQUAL(1, hypotheses.nest_count, "nests", 0);
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(an_ellipsoid_before_a_wall_is_one_nest);
+    RUN_TEST(two_ellipsoids_are_two_nests);
+    RUN_TEST(a_pit_supports_nothing);
+    RUN_TEST(a_pit_in_a_bulge_is_no_slice);
+    RUN_TEST(planes_have_no_minimum);
+    RUN_TEST(a_flat_top_is_one_minimum);
+    RUN_TEST(a_head_on_shoulders_is_cut_out);
+    RUN_TEST(a_jump_in_area_ends_a_nest_once_it_is_deep);
+    RUN_TEST(a_nest_reaches_no_deeper_than_it_may);
+    RUN_TEST(the_nearest_minima_are_kept);
+    RUN_TEST(a_minimum_at_the_border_is_none);
+    RUN_TEST(an_invalid_surface_has_no_hypotheses);
+    RUN_TEST(levels_go_back_from_the_nearest_node);
+    RUN_TEST(rough_surfaces_are_survived);
+    RUN_TEST(extreme_depths_are_survived);
+    return UNITY_END();
+}

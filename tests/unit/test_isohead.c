@@ -1,0 +1,420 @@
+/* The whole of isohead: frames in, heads out; wrong frames; nothing remembered, nothing touched. */
+#include "isohead.h"
+
+#include "ih_test.h"
+#include "rigs.inc"
+
+struct vector_dot {
+    int32_t u_px_q12, v_px_q12;
+    int16_t slot;
+};
+
+struct vector_bust {
+    const char *name;
+    int rig;
+    double x_mm, y_mm, z_mm, radius_mm; /* of the head */
+    int32_t dot_count;
+    const struct vector_dot *dot;
+};
+
+#include "isohead.inc"
+
+#define PIXELS_MAX (IH_FRAME_WIDTH_MAX * IH_FRAME_HEIGHT_MAX)
+
+static struct isohead head, other;
+static uint8_t grey8[PIXELS_MAX], copy8[PIXELS_MAX];
+static uint16_t grey16[PIXELS_MAX];
+static struct ih_frame frame;
+static struct ih_test_random random_source;
+
+static void start(struct isohead *which, int rig)
+{
+    int32_t bad_slot;
+
+    TEST_ASSERT_EQUAL_INT(IH_OK, isohead_init(which, &vector_rigs[rig], &bad_slot));
+    TEST_ASSERT_EQUAL_INT32(IH_NONE, bad_slot);
+}
+
+static void view8(const struct isohead *which)
+{
+    const struct ih_calibration *c = &which->rig.calibration;
+
+    frame = (struct ih_frame){grey8, c->width, c->height, c->width, 1, 255};
+}
+
+void setUp(void)
+{
+    random_source.state = 92;
+    memset(&head, IH_TEST_FILL, sizeof head);
+    memset(&other, IH_TEST_FILL, sizeof other);
+    memset(grey8, 0, sizeof grey8);
+    start(&head, 0);
+    view8(&head);
+}
+
+void tearDown(void)
+{
+}
+
+/* A dot as the laser makes it: Gaussian, on a grey background with a little noise. */
+static void paint_dot(const struct vector_dot *dot)
+{
+    const double u = dot->u_px_q12 / 4096.0, v = dot->v_px_q12 / 4096.0;
+    int32_t x, y;
+
+    for (y = (int32_t)v - 5; y <= (int32_t)v + 6; y++) {
+        for (x = (int32_t)u - 5; x <= (int32_t)u + 6; x++) {
+            if (x >= 0 && y >= 0 && x < frame.width && y < frame.height) {
+                const double r2 = (x - u) * (x - u) + (y - v) * (y - v);
+
+                grey8[y * frame.width + x] =
+                    (uint8_t)(grey8[y * frame.width + x] + lround(90 * exp(-r2 / (2 * 1.3 * 1.3))));
+            }
+        }
+    }
+}
+
+static void paint_bust(const struct vector_bust *bust)
+{
+    int32_t i;
+
+    start(&head, bust->rig);
+    view8(&head);
+    for (i = 0; i < frame.width * frame.height; i++) {
+        grey8[i] = (uint8_t)(30 + ih_test_between(&random_source, 0, 3));
+    }
+    for (i = 0; i < bust->dot_count; i++) {
+        paint_dot(&bust->dot[i]);
+    }
+}
+
+static void process(void)
+{
+    TEST_ASSERT_EQUAL_INT(IH_OK, isohead_frame(&head, &frame));
+}
+
+static double miss_mm(const struct ih_hypothesis *hypothesis, double x, double y, double z)
+{
+    const double dx = hypothesis->centre_mm_q8[0] / 256.0 - x;
+    const double dy = hypothesis->centre_mm_q8[1] / 256.0 - y;
+    const double dz = hypothesis->centre_mm_q8[2] / 256.0 - z;
+
+    return sqrt(dx * dx + dy * dy + dz * dz);
+}
+
+static void a_bust_before_a_wall_has_one_head(void)
+{
+    int i;
+
+    for (i = 0; i < IH_TEST_COUNT(vector_busts); i++) {
+        const struct vector_bust *bust = &vector_busts[i];
+        const struct ih_hypothesis *best = &head.heads.hypothesis[0];
+
+        paint_bust(bust);
+        process();
+        /* At an outline two dots may be one blob. */
+        IH_TEST_RANGE(bust->dot_count * 98 / 100, bust->dot_count, head.dots.dot_count, bust->name,
+                      i);
+        /* The dots at the outlines may go unlabelled. */
+        IH_TEST_RANGE(bust->dot_count * 9 / 10, bust->dot_count, head.labels.labelled_count,
+                      bust->name, i);
+        TEST_ASSERT_TRUE(head.surface.valid);
+        IH_TEST_EQUAL(1, head.heads.head_count, bust->name, i);
+        IH_TEST_EQUAL(0, head.heads.head[0], bust->name, i);
+        /* The centre is put centre_behind_mm (a head's) behind the front, here a sphere's radius:
+         * 20 to 30 mm off by that alone; the rest is the smooth surface, which rounds the front
+         * off and is pulled down by the body. */
+        IH_TEST_WITHIN(60, 0, miss_mm(best, bust->x_mm, bust->y_mm, bust->z_mm), bust->name, i);
+        IH_TEST_WITHIN(25, bust->x_mm, best->centre_mm_q8[0] / 256.0, bust->name, i);
+    }
+}
+
+static void render_range(double x_mm, double y_mm, double z_mm, double radius_mm)
+{
+    static const double body_radius_mm = 230;
+    const struct ih_calibration *c = &head.rig.calibration;
+    int32_t i, ball;
+
+    for (i = 0; i < c->width * c->height; i++) {
+        const double x = ((i % c->width) * 65536.0 - c->cx_px_q16) / c->fx_px_q16;
+        const double y = ((double)(i / c->width) * 65536.0 - c->cy_px_q16) / c->fy_px_q16;
+        double depth = 1700;
+
+        for (ball = 0; ball < 2; ball++) {
+            const double cy = y_mm + ball * 320, cz = z_mm + ball * 80;
+            const double r = ball == 0 ? radius_mm : body_radius_mm;
+            const double a = x * x + y * y + 1, b = x * x_mm + y * cy + cz;
+            const double root = b * b - a * (x_mm * x_mm + cy * cy + cz * cz - r * r);
+
+            depth = root > 0 && (b - sqrt(root)) / a < depth ? (b - sqrt(root)) / a : depth;
+        }
+        grey16[i] = (uint16_t)lround(depth);
+    }
+    frame = (struct ih_frame){grey16, c->width, c->height, c->width * 2, 2, 65535};
+}
+
+static void start_range(int32_t width, int32_t height)
+{
+    struct ih_calibration c = vector_rigs[2];
+    int32_t bad_slot;
+
+    c.kind = IH_RIG_RANGE;
+    c.width = width;
+    c.height = height;
+    c.fx_px_q16 = c.fy_px_q16 = width << 16;
+    c.cx_px_q16 = (width - 1) << 15;
+    c.cy_px_q16 = (height - 1) << 15;
+    memset(c.ray_q30, 0, sizeof c.ray_q30);
+    TEST_ASSERT_EQUAL_INT(IH_OK, isohead_init(&head, &c, &bad_slot));
+}
+
+static void a_range_image_of_a_bust_has_one_head(void)
+{
+    static const int32_t size[][2] = {{320, 240}, {640, 480}, {480, 640}};
+    int i;
+    int32_t slot;
+
+    for (i = 0; i < IH_TEST_COUNT(size); i++) {
+        start_range(size[i][0], size[i][1]);
+        render_range(30, -60, 900, 95);
+        process();
+        IH_TEST_EQUAL(1, head.heads.head_count, "heads", i);
+        /* As for dots. */
+        IH_TEST_WITHIN(60, 0, miss_mm(&head.heads.hypothesis[head.heads.head[0]], 30, -60, 900),
+                       "centre", i);
+        TEST_ASSERT_EQUAL_INT32(0, head.dots.dot_count);
+        for (slot = 0; slot < IH_SLOTS; slot++) {
+            IH_TEST_EQUAL(IH_NONE, head.labels.dot_of_slot[slot], "labels of a range image", slot);
+        }
+    }
+}
+
+static void check_empty(const char *what)
+{
+    int32_t slot;
+
+    IH_TEST_EQUAL(0, head.dots.dot_count, what, 0);
+    IH_TEST_EQUAL(0, head.labels.labelled_count, what, 1);
+    IH_TEST_EQUAL(0, head.points.seen_count, what, 2);
+    IH_TEST_EQUAL(0, head.hypotheses.nest_count, what, 3);
+    IH_TEST_EQUAL(0, head.heads.hypothesis_count, what, 4);
+    IH_TEST_EQUAL(0, head.heads.head_count, what, 5);
+    for (slot = 0; slot < IH_SLOTS; slot++) {
+        IH_TEST_EQUAL(IH_NONE, head.labels.dot_of_slot[slot], what, slot);
+    }
+}
+
+static void flat_frames_have_no_head(void)
+{
+    static const uint8_t levels[] = {0, 100, 255};
+    int i;
+
+    for (i = 0; i < IH_TEST_COUNT(levels); i++) {
+        memset(grey8, levels[i], sizeof grey8);
+        process();
+        check_empty("flat frame");
+        TEST_ASSERT_EQUAL_INT32(0, head.samples.seen_count);
+    }
+    start_range(320, 240);
+    memset(grey16, 0, sizeof grey16);
+    frame = (struct ih_frame){grey16, 320, 240, 640, 2, 65535};
+    process();
+    check_empty("empty range image");
+    TEST_ASSERT_FALSE(head.surface.valid); /* nothing known is no far wall */
+}
+
+/* After a good frame, so that what is left of it would show. */
+static void expect_error(enum ih_err err, const char *what)
+{
+    const struct ih_frame wrong = frame;
+
+    paint_bust(&vector_busts[0]);
+    process();
+    TEST_ASSERT_EQUAL_INT32(1, head.heads.head_count);
+    IH_TEST_EQUAL(err, isohead_frame(&head, &wrong), what, 0);
+    check_empty(what);
+    TEST_ASSERT_FALSE(head.surface.valid);
+    view8(&head);
+}
+
+#define EXPECT_WITH(field, value, err)                                                             \
+    do {                                                                                           \
+        frame.field = (value);                                                                     \
+        expect_error((err), #field " = " #value);                                                  \
+    } while (0)
+
+static void wrong_sizes_are_refused(void)
+{
+    EXPECT_WITH(width, frame.width - 1, IH_ERR_SIZE);
+    EXPECT_WITH(width, frame.width + 1, IH_ERR_SIZE);
+    EXPECT_WITH(width, 0, IH_ERR_SIZE);
+    EXPECT_WITH(width, INT32_MIN, IH_ERR_SIZE);
+    EXPECT_WITH(height, frame.height + 1, IH_ERR_SIZE);
+    EXPECT_WITH(height, -frame.height, IH_ERR_SIZE);
+    EXPECT_WITH(stride_bytes, frame.width - 1, IH_ERR_SIZE);
+    EXPECT_WITH(stride_bytes, 0, IH_ERR_SIZE);
+    EXPECT_WITH(stride_bytes, INT32_MIN, IH_ERR_SIZE);
+    EXPECT_WITH(samples, NULL, IH_ERR_SIZE);
+    EXPECT_WITH(maximum, 0, IH_ERR_SIZE);
+    EXPECT_WITH(maximum, -1, IH_ERR_SIZE);
+    EXPECT_WITH(maximum, 256, IH_ERR_SIZE);
+    frame = (struct ih_frame){grey16, frame.width, frame.height, 2 * frame.width, 2, 65536};
+    expect_error(IH_ERR_SIZE, "maximum of 17 bits");
+    frame = (struct ih_frame){grey16, frame.width, frame.height, 2 * frame.width + 1, 2, 1023};
+    expect_error(IH_ERR_SIZE, "a row that begins at an odd address");
+}
+
+static void wrong_kinds_are_refused(void)
+{
+    EXPECT_WITH(bytes_per_sample, 0, IH_ERR_KIND);
+    EXPECT_WITH(bytes_per_sample, 3, IH_ERR_KIND);
+    EXPECT_WITH(bytes_per_sample, INT32_MIN, IH_ERR_KIND);
+    start_range(320, 240);
+    frame = (struct ih_frame){grey8, 320, 240, 320, 1, 255};
+    TEST_ASSERT_EQUAL_INT(IH_ERR_KIND, isohead_frame(&head, &frame));
+    check_empty("grey frame for a range rig");
+}
+
+/* All outputs of two states. Slices have gaps between their members, so nests are compared by what
+ * they lead to and by their counts. */
+static void check_same(const struct isohead *a, const struct isohead *b)
+{
+    int32_t i, k;
+
+    TEST_ASSERT_EQUAL_MEMORY(&a->dots, &b->dots, sizeof a->dots);
+    TEST_ASSERT_EQUAL_MEMORY(&a->labels, &b->labels, sizeof a->labels);
+    TEST_ASSERT_EQUAL_MEMORY(&a->points, &b->points, sizeof a->points);
+    TEST_ASSERT_EQUAL_MEMORY(&a->samples, &b->samples, sizeof a->samples);
+    TEST_ASSERT_EQUAL_MEMORY(&a->surface, &b->surface, sizeof a->surface);
+    TEST_ASSERT_EQUAL_MEMORY(&a->heads, &b->heads, sizeof a->heads);
+    TEST_ASSERT_EQUAL_INT32(a->hypotheses.nest_count, b->hypotheses.nest_count);
+    for (i = 0; i < a->hypotheses.nest_count; i++) {
+        const struct ih_nest *one = &a->hypotheses.nest[i], *two = &b->hypotheses.nest[i];
+
+        TEST_ASSERT_EQUAL_INT32(one->slice_count, two->slice_count);
+        for (k = 0; k < one->slice_count; k++) {
+            TEST_ASSERT_EQUAL_INT32(one->slice[k].area_mm2, two->slice[k].area_mm2);
+            TEST_ASSERT_EQUAL_INT32(one->slice[k].ellipse.shape_q16,
+                                    two->slice[k].ellipse.shape_q16);
+        }
+    }
+}
+
+static void nothing_is_remembered_from_frame_to_frame(void)
+{
+    static struct isohead first;
+
+    paint_bust(&vector_busts[1]);
+    process();
+    first = head;
+    memset(&head.scratch, 0x5A, sizeof head.scratch);
+    process();
+    check_same(&first, &head);
+    memcpy(copy8, grey8, sizeof grey8);
+    memset(grey8, 0, sizeof grey8); /* another scene in between */
+    process();
+    TEST_ASSERT_EQUAL_INT32(0, head.heads.head_count);
+    memcpy(grey8, copy8, sizeof grey8);
+    process();
+    check_same(&first, &head);
+}
+
+static void two_states_are_independent(void)
+{
+    paint_bust(&vector_busts[2]);
+    start(&other, vector_busts[2].rig);
+    TEST_ASSERT_EQUAL_INT(IH_OK, isohead_frame(&other, &frame));
+    paint_bust(&vector_busts[0]);
+    process();
+    TEST_ASSERT_TRUE(memcmp(&head.heads, &other.heads, sizeof head.heads) != 0);
+    random_source.state = 92; /* the same noise again */
+    paint_bust(&vector_busts[2]);
+    process();
+    check_same(&other, &head);
+}
+
+static void the_frame_and_the_rig_are_left_alone(void)
+{
+    static struct ih_rig rig;
+    static struct ih_params params;
+
+    paint_bust(&vector_busts[0]);
+    memset(&grey8[frame.width * frame.height], IH_TEST_FILL, 4096);
+    memcpy(copy8, grey8, sizeof grey8);
+    rig = head.rig;
+    params = head.params;
+    process();
+    TEST_ASSERT_EQUAL_MEMORY(copy8, grey8, sizeof grey8);
+    TEST_ASSERT_EQUAL_MEMORY(&rig, &head.rig, sizeof rig);
+    TEST_ASSERT_EQUAL_MEMORY(&params, &head.params, sizeof params);
+}
+
+/* 16-bit noise at the greatest size: full tables everywhere, and sane counts. */
+static void noise_is_survived(void)
+{
+    int32_t i, pass;
+
+    for (pass = 0; pass < 3; pass++) {
+        start(&head, 3);
+        for (i = 0; i < PIXELS_MAX; i++) {
+            grey16[i] =
+                (uint16_t)(pass == 0   ? ih_test_u64(&random_source)
+                           : pass == 1 ? (ih_test_u64(&random_source) % 60 == 0) * UINT64_C(65535)
+                                       : (i % 16 == 0 && i / 1280 % 16 == 0) * UINT64_C(60000));
+        }
+        frame = (struct ih_frame){grey16, 1280, 800, 2560, 2, 65535};
+        process();
+        IH_TEST_RANGE(0, IH_DOTS_MAX, head.dots.dot_count, "dots", pass);
+        IH_TEST_RANGE(0, IH_SLOTS, head.labels.labelled_count, "labels", pass);
+        IH_TEST_RANGE(0, IH_SLOTS, head.samples.sample_count, "samples", pass);
+        IH_TEST_RANGE(0, IH_HYPOTHESES_MAX, head.heads.hypothesis_count, "hypotheses", pass);
+    }
+}
+
+static void a_bad_calibration_is_refused(void)
+{
+    struct ih_calibration c = vector_rigs[0];
+    int32_t bad_slot = 0;
+
+    c.ray_q30[77][2] = 0;
+    TEST_ASSERT_EQUAL_INT(IH_ERR_RAY, isohead_init(&head, &c, &bad_slot));
+    TEST_ASSERT_EQUAL_INT32(77, bad_slot);
+}
+
+static void the_state_keeps_to_its_budget(void)
+{
+    TEST_ASSERT_TRUE(sizeof(struct isohead) <= IH_RAM_MAX);
+}
+
+static void every_error_has_its_own_text(void)
+{
+    int one, two;
+
+    for (one = 0; one >= IH_ERR_NOT_POSITIVE; one--) {
+        TEST_ASSERT_NOT_NULL(ih_err_text((enum ih_err)one));
+        for (two = one - 1; two >= IH_ERR_NOT_POSITIVE; two--) {
+            TEST_ASSERT_TRUE(strcmp(ih_err_text((enum ih_err)one), ih_err_text((enum ih_err)two)) !=
+                             0);
+        }
+    }
+    TEST_ASSERT_NOT_NULL(ih_err_text((enum ih_err) - 1000));
+    TEST_ASSERT_NOT_NULL(ih_err_text((enum ih_err)7));
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(a_bust_before_a_wall_has_one_head);
+    RUN_TEST(a_range_image_of_a_bust_has_one_head);
+    RUN_TEST(flat_frames_have_no_head);
+    RUN_TEST(wrong_sizes_are_refused);
+    RUN_TEST(wrong_kinds_are_refused);
+    RUN_TEST(nothing_is_remembered_from_frame_to_frame);
+    RUN_TEST(two_states_are_independent);
+    RUN_TEST(the_frame_and_the_rig_are_left_alone);
+    RUN_TEST(noise_is_survived);
+    RUN_TEST(a_bad_calibration_is_refused);
+    RUN_TEST(the_state_keeps_to_its_budget);
+    RUN_TEST(every_error_has_its_own_text);
+    return UNITY_END();
+}
