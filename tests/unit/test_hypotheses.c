@@ -251,6 +251,70 @@ static void a_pit_in_a_bulge_is_no_slice(void)
     }
 }
 
+/* A bump on the floor of a crater in a plate that comes nearer outwards, so that it has no minimum
+ * of its own: the cuts of the crater run round the bump as well, the other way. */
+static void a_bump_in_a_crater_stands_on_its_own_contours(void)
+{
+    static const struct half_ellipsoid bump = {23, 23, 7, 8, 900, 90};
+    int32_t x, y;
+
+    for (y = 0; y < SIDE; y++) {
+        for (x = 0; x < SIDE; x++) {
+            const double r = hypot(x - 23, y - 23);
+
+            surface.depth_mm_q8[y][x] = (int32_t)(256 * (r > 18 ? 900 - 3 * r : 1050));
+        }
+    }
+    put_ellipsoid(&bump);
+    find();
+    check_nests();
+    TEST_ASSERT_NOT_NULL(nest_at(bump.x, bump.y));
+    check_slices(nest_at(bump.x, bump.y), &bump, 3);
+}
+
+/* Depth behind the tip at which a five-lobed body is as wide as r in direction angle: round at the
+ * tip and from 120 mm on, lobed in between, ever wider. */
+static double lobed_depth_mm(double r, double angle)
+{
+    double t = 0;
+
+    for (t = 0; t < 300; t += 0.25) {
+        const double lobe = t > 20 && t < 120 ? pow(sin(PI * (t - 20) / 100), 2) : 0;
+
+        if ((2 + 0.1 * t) * (1 + 0.25 * lobe * cos(5 * angle)) > r) {
+            break;
+        }
+    }
+    return t;
+}
+
+/* From 70 to 90 mm its cuts are no ellipses (shape 1.05 to 1.12) and have no part that is one. */
+static void a_nest_bridges_as_many_levels_as_it_may(void)
+{
+    const struct ih_nest *nest = &hypotheses.nest[0];
+    int32_t x, y, k, between = 0;
+
+    for (y = 0; y < SIDE; y++) {
+        for (x = 0; x < SIDE; x++) {
+            surface.depth_mm_q8[y][x] = (int32_t)lround(
+                256 * (800 + lobed_depth_mm(hypot(x - 23, y - 23), atan2(y - 23, x - 23)) +
+                       0.05 * hypot(x - 23, y - 23)));
+        }
+    }
+    find();
+    check_nests();
+    TEST_ASSERT_EQUAL_INT32(1, hypotheses.nest_count);
+    for (k = 0; k < nest->slice_count; k++) {
+        between += nest->slice[k].behind_mm_q8 > 75 << 8 && nest->slice[k].behind_mm_q8 < 85 << 8;
+    }
+    TEST_ASSERT_EQUAL_INT32(0, between);
+    TEST_ASSERT_TRUE(nest->slice[nest->slice_count - 1].behind_mm_q8 >= 110 << 8);
+    params.gap_max = 1;
+    find();
+    TEST_ASSERT_TRUE(nest->ended);
+    TEST_ASSERT_TRUE(nest->slice[nest->slice_count - 1].behind_mm_q8 < 80 << 8);
+}
+
 static void planes_have_no_minimum(void)
 {
     static const double slopes[][2] = {{0, 0}, {5, 0}, {0, -4}, {3, 7}, {-0.01, 0.02}};
@@ -458,6 +522,8 @@ int main(void)
     RUN_TEST(two_ellipsoids_are_two_nests);
     RUN_TEST(a_pit_supports_nothing);
     RUN_TEST(a_pit_in_a_bulge_is_no_slice);
+    RUN_TEST(a_bump_in_a_crater_stands_on_its_own_contours);
+    RUN_TEST(a_nest_bridges_as_many_levels_as_it_may);
     RUN_TEST(planes_have_no_minimum);
     RUN_TEST(a_flat_top_is_one_minimum);
     RUN_TEST(a_head_on_shoulders_is_cut_out);

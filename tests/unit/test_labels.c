@@ -315,8 +315,9 @@ static void spurious_dots_change_little(void)
     }
 }
 
-/* The same dots twice: one of each pair is left over. */
-static void doubled_dots_are_used_once(void)
+/* The same dots twice: each rectangle has another choice that is just as good, so that none is a
+ * seed. */
+static void ambiguous_rectangles_are_no_seeds(void)
 {
     int32_t i, count;
 
@@ -328,6 +329,31 @@ static void doubled_dots_are_used_once(void)
     sort_dots();
     assign();
     check_table("doubled");
+    TEST_ASSERT_EQUAL_INT32(0, labels.seed_count);
+    TEST_ASSERT_EQUAL_INT32(0, labels.labelled_count);
+}
+
+static void limits_are_obeyed(void)
+{
+    int32_t slot;
+
+    take_scene(&vector_scenes[5]); /* with noise */
+    params.seed_max_px_q12 = 0;
+    assign();
+    TEST_ASSERT_EQUAL_INT32(0, labels.labelled_count);
+    ih_labels_params_default(&params);
+    params.epsilon_max_px_q12 = params.epsilon_min_px_q12 - 1; /* no growing */
+    assign();
+    TEST_ASSERT_TRUE(labels.seed_count > 0);
+    TEST_ASSERT_EQUAL_INT32(labels.seed_count, labels.labelled_count);
+    ih_labels_params_default(&params);
+    params.perp_max_px_q12 = 200; /* 0.05 px: half a sigma of the noise */
+    assign();
+    check_table("narrow lines");
+    for (slot = 0; slot < IH_SLOTS; slot++) {
+        TEST_ASSERT_TRUE(labels.dot_of_slot[slot] == IH_NONE ||
+                         abs(labels.perp_px_q12[slot]) <= 200);
+    }
 }
 
 static void as_many_dots_as_there_may_be_are_survived(void)
@@ -401,7 +427,8 @@ int main(void)
     RUN_TEST(one_dot_alone_is_not_labelled);
     RUN_TEST(noise_alone_is_hardly_labelled);
     RUN_TEST(spurious_dots_change_little);
-    RUN_TEST(doubled_dots_are_used_once);
+    RUN_TEST(ambiguous_rectangles_are_no_seeds);
+    RUN_TEST(limits_are_obeyed);
     RUN_TEST(as_many_dots_as_there_may_be_are_survived);
     RUN_TEST(the_same_dots_give_the_same_labels);
     RUN_TEST(dots_out_of_range_are_not_labelled);

@@ -123,6 +123,12 @@ static double peak_near(const struct rd_rig *rig, const float *grey, double u_px
     return fmin(peak, RD_FULL_GREY);
 }
 
+/* Does the place belong to one of the frame's pixels? */
+static bool in_frame(const struct rd_rig *rig, double u_px, double v_px)
+{
+    return u_px >= -0.5 && v_px >= -0.5 && u_px <= rig->width - 0.5 && v_px <= rig->height - 0.5;
+}
+
 /* Beam width as an angle, where the beam lands. */
 static double beam_sigma(const struct rd_laser *laser, const struct rd_scene *scene, const struct rd_ray *ray)
 {
@@ -150,7 +156,7 @@ static bool cast_dot(const struct rd_laser *laser, const struct rd_rig *rig, con
         if (!spot_of(laser, rig, scene, &hit, share * power, &spot))
             continue;
         if (sub == 0) {
-            middle_seen = true;
+            middle_seen = in_frame(rig, spot.u_px, spot.v_px);
             before_grey = peak_near(rig, grey, spot.u_px, spot.v_px);
             *dot = (struct rd_dot){index, spot.u_px, spot.v_px, hit.point_mm.z};
         }

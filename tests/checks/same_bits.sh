@@ -1,0 +1,152 @@
+#!/bin/sh
+# The same frames give the same bytes, whatever compiled host_sim and wherever it runs: gcc and
+# clang, -O0 and -O3, x86-64 and, under qemu-user, aarch64.
+#
+#     same_bits.sh [--every N] CJSON_DIR FRAMES_DIR...
+#
+# CJSON_DIR: a folder with cJSON.c for the cross build. Of each frames directory (or of those below
+# FRAMES_DIR) every Nth frame is used, default 10, and of two of them every stage's raw integers
+# (--trace) too. Builds below build/bits. Exit status 1 on a difference.
+set -eu
+LC_ALL=C
+export LC_ALL
+
+usage() {
+    echo "usage: $0 [--every N] CJSON_DIR FRAMES_DIR..." >&2
+    exit 2
+}
+every=10
+if [ "${1:-}" = --every ]; then
+    [ $# -ge 2 ] || usage
+    every=$2
+    shift 2
+fi
+[ $# -ge 2 ] || usage
+case $every in '' | 0* | *[!0-9]*) usage ;; esac
+[ -e "$1/cJSON.c" ] || { echo "same_bits: $1 has no cJSON.c" >&2; exit 2; }
+cjson=$(cd "$1" && pwd)
+shift
+for dir in "$@"; do
+    [ -d "$dir" ] || { echo "same_bits: $dir is no directory" >&2; exit 2; }
+done
+
+root=$(cd "$(dirname "$0")/../.." && pwd)
+builds=$root/build/bits
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+
+# --- the builds ----------------------------------------------------------------------------------
+
+# build NAME OPTION...
+build() {
+    dir=$builds/$1
+    shift
+    mkdir -p "$dir"
+    {
+        cmake -S "$root" -B "$dir" "$@" &&
+            cmake --build "$dir" --target host_sim --parallel
+    } >"$dir/log" 2>&1 || {
+        tail -n 30 "$dir/log" >&2
+        echo "same_bits: $dir does not build" >&2
+        exit 1
+    }
+}
+
+names="gcc-O0 gcc-O3 clang-O0 clang-O3 arm64-O0 arm64-O3"
+for level in O0 O3; do
+    # -w: warnings are the ordinary builds' business; a newer compiler's must not stop this check.
+    type="-DCMAKE_BUILD_TYPE=Bits"
+    flags="-DCMAKE_C_FLAGS_BITS=-$level -w"
+    build "gcc-$level" "$type" "$flags" -DCMAKE_C_COMPILER=gcc
+    build "clang-$level" "$type" "$flags" -DCMAKE_C_COMPILER=clang
+    build "arm64-$level" "$type" "$flags" -DCMAKE_TOOLCHAIN_FILE="$root/cmake/arm64.cmake" \
+        -DISOHEAD_CJSON_DIR="$cjson" -DCMAKE_EXE_LINKER_FLAGS=-static
+done
+
+# host_sim NAME ARGUMENT...
+host_sim() {
+    program=$builds/$1/sim/host_sim
+    case $1 in
+    arm64-*)
+        shift
+        qemu-aarch64 "$program" "$@"
+        ;;
+    *)
+        shift
+        "$program" "$@"
+        ;;
+    esac
+}
+
+# --- the frames ----------------------------------------------------------------------------------
+
+# thin FROM TO STEP: every STEPth frame, without frames.jsonl, which would miss the others.
+thin() {
+    mkdir -p "$2"
+    cp "$1/rig.json" "$2/"
+    number=0
+    for frame in "$1"/*.pgm; do
+        if [ $((number % $3)) = 0 ]; then
+            cp "$frame" "$2/"
+        fi
+        number=$((number + 1))
+    done
+}
+
+# middle FROM TO: the frame in the middle alone.
+middle() {
+    mkdir -p "$2"
+    cp "$1/rig.json" "$2/"
+    set -- "$1" "$2" "$1"/*.pgm
+    from=$2
+    shift $((1 + $# / 2))
+    cp "$1" "$from/"
+}
+
+count=0
+for dir in "$@"; do
+    for rig in "$dir"/rig.json "$dir"/*/rig.json; do
+        [ -e "$rig" ] || continue
+        from=$(dirname "$rig")
+        count=$((count + 1))
+        # The number keeps directories of the same name apart.
+        name=$count-$(basename "$from")
+        thin "$from" "$work/frames/$name" "$every"
+        if [ $count -le 2 ]; then
+            middle "$from" "$work/traced/$name"
+        fi
+    done
+done
+[ $count -gt 0 ] || { echo "same_bits: no frames directory (with rig.json) in: $*" >&2; exit 2; }
+
+# --- the comparison ------------------------------------------------------------------------------
+
+printf '%-10s %-18s %-18s %s\n' build "--json" "--json --paper" "--trace of 2 frames"
+lines=$work/lines
+for name in $names; do
+    mkdir -p "$work/out"
+    if ! host_sim "$name" --json "$work/frames" >"$work/out/json" ||
+        ! host_sim "$name" --json --paper "$work/frames" >"$work/out/paper" ||
+        ! host_sim "$name" --json --trace "$work/trace" "$work/traced" >"$work/out/traced"; then
+        echo "same_bits: host_sim of $name failed" >&2
+        exit 1
+    fi
+    json=$(sha256sum <"$work/out/json" | cut -c 1-16)
+    paper=$(sha256sum <"$work/out/paper" | cut -c 1-16)
+    trace=$(cd "$work/trace" && find . -type f | sort | xargs cat | sha256sum | cut -c 1-16)
+    printf '%-10s %-18s %-18s %s\n' "$name" "$json" "$paper" "$trace"
+    echo "$json $paper $trace" >>"$lines"
+    records=$(wc -l <"$work/out/json")
+    cp "$work/out/json" "$work/$name.json"
+    rm -rf "$work/trace"
+done
+
+kinds=$(sort -u "$lines" | wc -l)
+if [ "$kinds" != 1 ]; then
+    for name in $names; do
+        cmp "$work/gcc-O0.json" "$work/$name.json" || true
+    done
+    echo "same_bits: NOT the same bytes" >&2
+    exit 1
+fi
+echo "the same bytes from all: $records frames of $count directories"
