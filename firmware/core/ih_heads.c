@@ -6,26 +6,25 @@
 
 /* Slices up to this depth behind the minimum make the curvature. */
 #define CURVATURE_DEPTH_MM 70
-/* Slices from this depth on make the centre: nearer ones are the nose's. */
-#define CENTRE_DEPTH_MM 40
+/* Slices from this depth on make the centre and the proportions: nearer ones are the nose's. */
+#define CENTRE_DEPTH_MM 30
 
 void ih_heads_params_default(struct ih_heads_params *params)
 {
     *params = (struct ih_heads_params){
-        .area_min_mm2 = 14500,
+        .area_min_mm2 = 13000,
         .area_max_mm2 = 56000,
         .curvature_min_mm = 60,
-        .curvature_max_mm = 520,
-        .extent_min_mm = 78,
-        .tilt_max_mdeg = 42000,
-        .tilt_ratio_q16 = 78643, /* 1.2 */
-        .points_min = 12,
+        .curvature_max_mm = 800,
+        .extent_min_mm = 65,
+        .upright_min_q16 = 62259, /* 0.95 */
+        .points_min = 13,
         .jump_mm = 75,
         .above_min_percent = 76,
         .beside_min_percent = 45,
         .below_min_percent = 45,
         .merge_mm = 80,
-        .centre_behind_mm = 128,
+        .centre_behind_mm = 108,
     };
 }
 
@@ -70,6 +69,21 @@ static int32_t curvature_mm_q8(const struct ih_nest *nest)
     /* a slice closer than 1/90 mm to the minimum must not divide by zero */
     int64_t divisor = tt_q16 >> 3 > 0 ? tt_q16 >> 3 : 1;
     return tt_q16 == 0 ? 0 : ih_saturate_s32(ih_div_round(at_q8 << 13, divisor));
+}
+
+/* Vertical over horizontal second moments, summed over the deeper slices: wide ones count most. */
+static int32_t upright_q16(const struct ih_nest *nest)
+{
+    int64_t vertical_q16 = 0;
+    int64_t horizontal_q16 = 1;
+    for (int32_t i = 0; i < nest->slice_count; i++) {
+        const struct ih_slice *slice = &nest->slice[i];
+        if (slice->behind_mm_q8 >= CENTRE_DEPTH_MM << 8 || i == nest->slice_count - 1) {
+            vertical_q16 += slice->ellipse.yy_q16;
+            horizontal_q16 += slice->ellipse.xx_q16;
+        }
+    }
+    return ih_saturate_s32(ih_div_round(vertical_q16 * 65536, horizontal_q16));
 }
 
 /* Centre of the nest on the grid: mean over its deeper slices, by area; all when there are none. */
@@ -200,7 +214,7 @@ static void fill_outline(const struct ih_nest *nest, const struct ih_samples *sa
 {
     const struct ih_slice *last = &nest->slice[nest->slice_count - 1];
     int64_t behind_q8 =
-        (int64_t)nest->nearest_mm_q8 + last->behind_mm_q8 + (params->jump_mm << 8);
+        (int64_t)nest->front_mm_q8 + last->behind_mm_q8 + (params->jump_mm << 8);
     for (int32_t i = 0; i < samples->sample_count; i++) {
         const struct ih_sample *sample = &samples->sample[i];
         struct placed p = place_sample(sample, &last->ellipse);
@@ -244,14 +258,13 @@ static void fill_place(const struct ih_nest *nest, const struct ih_surface *surf
     ih_rig_distort(rig, x_q28, y_q28, &out->u_px_q12, &out->v_px_q12);
     out->distance_mm_q8 = ih_saturate_s32(ih_mul_shift(surface_depth_mm_q8(surface, x_q16, y_q16),
                                                        ray_length_q28(x_q28, y_q28), 28));
-    int64_t depth_q8 = nest->nearest_mm_q8 + (int64_t)(params->centre_behind_mm << 8);
+    int64_t depth_q8 = nest->front_mm_q8 + (int64_t)(params->centre_behind_mm << 8);
     out->centre_mm_q8[0] = ih_saturate_s32(ih_mul_shift(depth_q8, x_q28, 28));
     out->centre_mm_q8[1] = ih_saturate_s32(ih_mul_shift(depth_q8, y_q28, 28));
     out->centre_mm_q8[2] = ih_saturate_s32(depth_q8);
 }
 
-static enum ih_reject test(const struct ih_hypothesis *h, const struct ih_ellipse *widest,
-                           const struct ih_heads_params *params)
+static enum ih_reject test(const struct ih_hypothesis *h, const struct ih_heads_params *params)
 {
     if (h->area_mm2 < params->area_min_mm2 || h->area_mm2 > params->area_max_mm2) {
         return IH_REJECT_AREA;
@@ -261,8 +274,7 @@ static enum ih_reject test(const struct ih_hypothesis *h, const struct ih_ellips
         h->extent_mm_q8 < params->extent_min_mm << 8) {
         return IH_REJECT_CURVATURE;
     }
-    int32_t tilt = ih_abs_s32(h->angle_mdeg - 90000);
-    if (widest->ratio_q16 > params->tilt_ratio_q16 && tilt > params->tilt_max_mdeg) {
+    if (h->upright_q16 < params->upright_min_q16) {
         return IH_REJECT_SHAPE;
     }
     return stands_out(&h->outline, params) ? IH_ACCEPTED : IH_REJECT_OUTLINE;
@@ -280,7 +292,8 @@ static struct ih_hypothesis judge(const struct ih_nest *nest, const struct ih_su
     fill_place(nest, surface, rig, params, &h);
     fill_axes(&last->ellipse, surface, rig, &h);
     fill_outline(nest, samples, params, &h.outline);
-    h.rejected = test(&h, &last->ellipse, params);
+    h.upright_q16 = upright_q16(nest);
+    h.rejected = test(&h, params);
     return h;
 }
 

@@ -5,17 +5,17 @@
  *        failed; the accepted ones in order, best first; the selected one.
  * Tests, none of them in absolute depth:
  *        area       of the widest slice, in mm^2
- *        curvature  k = sum(A t) / sum(t^2) over slices at most 70 mm behind the minimum: the
+ *        curvature  k = sum(A t) / sum(t^2) over slices at most 70 mm behind the front: the
  *                   growth of the area A with the depth t of the cut, mm^2/mm; and the extent, the
  *                   depth over which the nest keeps growing
- *        shape      a head that is longer than wide stands more upright than it lies
+ *        shape      a head is about as tall as wide, or taller: a headrest is not
  *        outline    ours, not the paper's: the surface is smooth everywhere, the scene is not. At
  *                   least points_min points carry the head, and around its last ellipse, between
  *                   1.2 and 1.9 times its size, most points above and beside it lie at least
  *                   jump_mm behind it (or nothing was seen there), and most below it do not: there
  *                   the neck and the body are. Bowls on a table and bulges of a body end gently.
  * Nests whose centres are within merge_mm of a better one are the same thing and are dropped.
- * The centre of the head's volume lies centre_behind_mm behind the nearest point, on the ray
+ * The centre of the head's volume lies centre_behind_mm behind the front, on the ray
  * through the middle of its ellipses.
  */
 #ifndef IH_HEADS_H
@@ -29,8 +29,7 @@ struct ih_heads_params {
     int32_t area_min_mm2, area_max_mm2;
     int32_t curvature_min_mm, curvature_max_mm; /* mm^2 per mm */
     int32_t extent_min_mm;
-    int32_t tilt_max_mdeg;     /* of the major axis from vertical, once the ratio is over */
-    int32_t tilt_ratio_q16;    /* this */
+    int32_t upright_min_q16; /* height^2 / width^2 over the deeper slices */
     int32_t points_min;
     int32_t jump_mm;
     int32_t above_min_percent, beside_min_percent, below_min_percent;
@@ -55,6 +54,7 @@ struct ih_hypothesis {
     int32_t area_mm2;            /* of the widest slice */
     int32_t curvature_mm_q8;
     int32_t extent_mm_q8;
+    int32_t upright_q16;
     struct ih_outline outline;
     int32_t rejected;            /* enum ih_reject */
     int32_t nest;                /* index into ih_hypotheses.nest */

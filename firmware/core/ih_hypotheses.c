@@ -10,13 +10,18 @@
  * the one before belongs to something else: the shoulders, a wall. */
 #define JUMP_Q16 209715 /* 3.2 */
 #define JUMP_MM2 2500
+/* An ellipsoid of a head's size grows by this area per mm of depth at its front: 2 pi a b / c for
+ * semi-axes of 78, 113 and 98 mm. */
+#define FRONT_GROWTH_MM 565
 
 void ih_hypotheses_params_default(struct ih_hypotheses_params *params)
 {
     ih_ellipse_params_default(&params->ellipse);
     params->level_step_mm = 10;
     params->levels_behind_mm = 700;
-    params->depth_max_mm = 130;
+    params->blunt_mm2 = 2000;
+    params->tip_max_mm = 70;
+    params->depth_max_mm = 110;
     params->end_depth_mm = 50;
     params->gap_max = 8;
 }
@@ -56,6 +61,8 @@ static void add_nest(struct ih_hypotheses *out, int32_t x, int32_t y, int32_t de
     memset(nest, 0, sizeof *nest);
     nest->minimum = (struct ih_vertex){(int16_t)(x * 512), (int16_t)(y * 512)};
     nest->nearest_mm_q8 = depth_mm_q8;
+    nest->front_mm_q8 = depth_mm_q8;
+    nest->tip_level_mm_q8 = depth_mm_q8;
 }
 
 static void find_minima(const struct ih_surface *surface, struct ih_hypotheses *out)
@@ -128,32 +135,69 @@ static bool continues(const struct ih_nest *nest, const struct ih_slice *slice,
     return !shrinks && !jumps;
 }
 
+/* The first slice that is not the tip's: the front lies where the area passed blunt_mm2 on the way
+ * here, less the depth that a head needs to grow so wide. */
+static void set_front(const struct ih_hypotheses_params *params, int32_t level_mm_q8,
+                      int32_t area_mm2_here, struct ih_nest *nest)
+{
+    /* tip_area < blunt <= area here, so the divisor is positive; spans below 2^15 in Q8 */
+    int64_t span_q8 = level_mm_q8 - nest->tip_level_mm_q8;
+    int64_t passed_q8 = ih_div_round(span_q8 * (params->blunt_mm2 - nest->tip_area_mm2),
+                                     area_mm2_here - nest->tip_area_mm2);
+    int64_t front_q8 = nest->tip_level_mm_q8 + passed_q8 -
+                       ih_div_round((int64_t)params->blunt_mm2 << 8, FRONT_GROWTH_MM);
+    nest->front_mm_q8 = ih_max_s32((int32_t)front_q8, nest->nearest_mm_q8);
+}
+
+/* Slices up to here belong to the tip; too long a tip ends the nest. */
+static void extend_tip(const struct ih_hypotheses_params *params, int32_t level_mm_q8,
+                       int32_t area_mm2_here, struct ih_nest *nest)
+{
+    nest->tip_level_mm_q8 = level_mm_q8;
+    nest->tip_area_mm2 = area_mm2_here;
+    nest->ended = level_mm_q8 - nest->nearest_mm_q8 > params->tip_max_mm << 8;
+}
+
+static void add_slice(struct ih_slice *slice, int32_t level_mm_q8,
+                      const struct ih_hypotheses_params *params, struct ih_nest *nest)
+{
+    if (nest->slice_count == 0) {
+        if (slice->area_mm2 < params->blunt_mm2) {
+            extend_tip(params, level_mm_q8, slice->area_mm2, nest);
+            return;
+        }
+        set_front(params, level_mm_q8, slice->area_mm2, nest);
+    }
+    slice->behind_mm_q8 = level_mm_q8 - nest->front_mm_q8;
+    if (continues(nest, slice, params)) {
+        nest->slice[nest->slice_count++] = *slice;
+    } else {
+        nest->ended = true;
+    }
+}
+
 static void extend_nest(const struct ih_surface *surface, int32_t level_mm_q8,
                         const struct ih_hypotheses_params *params,
                         struct ih_hypotheses_scratch *scratch, struct ih_nest *nest)
 {
-    struct ih_slice slice;
-    slice.behind_mm_q8 = level_mm_q8 - nest->nearest_mm_q8;
-    if (slice.behind_mm_q8 <= 0 || nest->ended) {
+    if (level_mm_q8 <= nest->nearest_mm_q8 || nest->ended) {
         return;
     }
-    if (slice.behind_mm_q8 > params->depth_max_mm << 8 ||
+    if ((nest->slice_count > 0 &&
+         level_mm_q8 - nest->front_mm_q8 > params->depth_max_mm << 8) ||
         nest->slice_count == IH_HYPOTHESES_SLICES_MAX) {
         nest->ended = true;
         return;
     }
+    struct ih_slice slice;
     if (!find_support(nest, params, scratch, &slice)) {
         nest->gap++;
         nest->ended = nest->gap > params->gap_max;
         return;
     }
-    slice.area_mm2 = area_mm2(surface, level_mm_q8, slice.ellipse.area_q16);
-    if (!continues(nest, &slice, params)) {
-        nest->ended = true;
-        return;
-    }
     nest->gap = 0;
-    nest->slice[nest->slice_count++] = slice;
+    slice.area_mm2 = area_mm2(surface, level_mm_q8, slice.ellipse.area_q16);
+    add_slice(&slice, level_mm_q8, params, nest);
 }
 
 bool ih_hypotheses_level(const struct ih_surface *surface,

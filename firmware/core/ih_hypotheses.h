@@ -5,8 +5,10 @@
  * Way:   every minimum of the grid starts a nest. Levels go from the nearest node back in steps
  *        of level_step; at each level the contour that winds round the minimum supports the nest:
  *        whole when it is closed and elliptical, else by its elliptical part. Contours around a
- *        maximum (shrinking) have negative area and support nothing. A nest ends depth_max behind
- *        its minimum, when its area falls below 0.6 of the slice before, when it jumps by more
+ *        maximum (shrinking) have negative area and support nothing. A head is blunt, the nearest
+ *        node is often the tip of a nose, a finger or of noise: slices smaller than blunt_mm2 are
+ *        the tip and are passed over, up to tip_max_mm of them; the front of the nest is where the
+ *        area grows past blunt_mm2. A nest ends depth_max behind its front, when its area falls below 0.6 of the slice before, when it jumps by more
  *        than 3.2 times and 2500 mm^2 beyond end_depth, or after gap_max levels without support.
  * Cost:  levels x (cells + minima x contours); the chord search only where no whole ellipse is.
  * Full tables drop and count: minima_dropped (the farthest), contours_dropped.
@@ -24,21 +26,25 @@ struct ih_hypotheses_params {
     struct ih_ellipse_params ellipse;
     int32_t level_step_mm;
     int32_t levels_behind_mm; /* last level: this far behind the nearest node */
-    int32_t depth_max_mm;     /* a nest reaches this far behind its minimum */
+    int32_t blunt_mm2;        /* slices smaller than this belong to the tip */
+    int32_t tip_max_mm;       /* a longer tip is no head's */
+    int32_t depth_max_mm;     /* a nest reaches this far behind its front */
     int32_t end_depth_mm;     /* from here a jump in area ends the nest */
     int32_t gap_max;
 };
 
 struct ih_slice {
     struct ih_ellipse ellipse;
-    int32_t behind_mm_q8; /* depth of the cut behind the minimum */
+    int32_t behind_mm_q8; /* depth of the cut behind the front */
     int32_t area_mm2;
     bool whole; /* a closed contour; false: an elliptical part */
 };
 
 struct ih_nest {
     struct ih_vertex minimum; /* a node */
-    int32_t nearest_mm_q8;
+    int32_t nearest_mm_q8; /* depth of the minimum */
+    int32_t front_mm_q8;   /* depth at which the tip ends; the minimum's while there is no slice */
+    int32_t tip_level_mm_q8, tip_area_mm2; /* the last slice of the tip */
     int32_t slice_count;
     int32_t gap;
     bool ended;
