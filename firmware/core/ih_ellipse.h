@@ -6,8 +6,10 @@
  *        covariance: 1 for an ellipse and greater for everything else.
  * Way:   moments are sums over the edges, so prefix sums give those of any part closed by its
  *        chord. The contour is resampled to IH_ELLIPSE_POINTS equal steps; of all parts that wind
- *        round the place with chord <= chord_max arc, and that are elliptical, the one with the
- *        greatest arc - 1.6 chord - 8 (shape - 1) arc is taken.
+ *        round the place with chord <= chord_max arc, that have at least 8 of the steps, and that
+ *        are elliptical, the one with the greatest arc - 1.6 chord - 8 (shape - 1) arc is taken.
+ *        No simple polygon has a shape below 1: a part with less (1/256 is left for rounding)
+ *        crosses its own chord and is refused, as is an area below half a grid cell.
  * Scaling and overflow: coordinates relative to the place, Q8 steps: |p| below 46 * 256 * 1.42 =
  *        2^14.1. An edge's cross product is at most |p| |edge|, its second-order factor at most
  *        3 * 2^27.1. Edges of a contour are shorter than 1.42 steps = 2^8.6: 2048 terms of

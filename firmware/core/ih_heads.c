@@ -218,11 +218,10 @@ static void fill_outline(const struct ih_nest *nest, const struct ih_samples *sa
     for (int32_t i = 0; i < samples->sample_count; i++) {
         const struct ih_sample *sample = &samples->sample[i];
         struct placed p = place_sample(sample, &last->ellipse);
-        bool is_seen = sample->root_weight_q15 == 1 << 15; /* filled ones weigh less */
         if (p.radius2_q4 < 16) {
-            out->inside += is_seen;
+            out->inside += !sample->is_filled;
         } else if (p.radius2_q4 > RING_INNER2_Q4 && p.radius2_q4 < RING_OUTER2_Q4) {
-            count_around(&p, !is_seen || sample->depth_mm_q8 > behind_q8, out);
+            count_around(&p, sample->is_filled || sample->depth_mm_q8 > behind_q8, out);
         }
     }
 }

@@ -11,12 +11,13 @@
  *        shape      a head is about as tall as wide, or taller: a headrest is not
  *        outline    ours, not the paper's: the surface is smooth everywhere, the scene is not. At
  *                   least points_min points carry the head, and around its last ellipse, between
- *                   1.2 and 1.9 times its size, most points above and beside it lie at least
- *                   jump_mm behind it (or nothing was seen there), and most below it do not: there
- *                   the neck and the body are. Bowls on a table and bulges of a body end gently.
+ *                   1.2 and 1.9 times its size, most points above it (2 dy < -|dx|) and beside it
+ *                   lie at least jump_mm behind it, or nothing was seen there, and most below it
+ *                   (dy > |dx|) do not: there the neck and the body are. Bowls on a table and
+ *                   bulges of a body end gently.
  * Nests whose centres are within merge_mm of a better one are the same thing and are dropped.
- * The centre of the head's volume lies centre_behind_mm behind the front, on the ray
- * through the middle of its ellipses.
+ * The centre of the head's volume lies centre_behind_mm behind the front, on the ray through the
+ * middle of its ellipses: the mean, by area, of those at least 30 mm behind the front.
  */
 #ifndef IH_HEADS_H
 #define IH_HEADS_H

@@ -59,9 +59,11 @@ struct ih_field {
     int32_t unit_q28; /* one field unit = half a dot pitch */
 };
 
+/* Dots: centre at the middle dot's place at 900 mm (or the nearest depth in range), unit from the
+ * four sides of the pattern at that depth. Fixed per rig. Range images choose theirs per frame. */
 struct ih_rig {
     struct ih_calibration calibration;
-    struct ih_field field; /* dots: fixed. Range images choose theirs per frame. */
+    struct ih_field field;
     struct ih_line line[IH_SLOTS];
 };
 

@@ -83,8 +83,8 @@ static bool in_field(int64_t x_q16, int64_t y_q16)
     return ih_abs_s64(x_q16) < limit && ih_abs_s64(y_q16) < limit;
 }
 
-static void add_sample(struct ih_samples *out, const struct ih_field *field, int32_t slot,
-                       int32_t x_q28, int32_t y_q28, int32_t depth_mm_q8, int32_t root_weight_q15)
+static void add_sample(struct ih_samples *out, const struct ih_field *field, int32_t x_q28,
+                       int32_t y_q28, struct ih_sample sample)
 {
     int64_t x_q16 = ih_div_round(((int64_t)x_q28 - field->centre_x_q28) * 65536, field->unit_q28);
     int64_t y_q16 = ih_div_round(((int64_t)y_q28 - field->centre_y_q28) * 65536, field->unit_q28);
@@ -92,13 +92,11 @@ static void add_sample(struct ih_samples *out, const struct ih_field *field, int
         out->outside_count++;
         return;
     }
-    out->sample[out->sample_count++] = (struct ih_sample){
-        .x_q16 = (int32_t)x_q16,
-        .y_q16 = (int32_t)y_q16,
-        .depth_mm_q8 = depth_mm_q8,
-        .root_weight_q15 = root_weight_q15,
-        .slot = slot,
-    };
+    sample.x_q16 = (int32_t)x_q16;
+    sample.y_q16 = (int32_t)y_q16;
+    out->sample[out->sample_count++] = sample;
+    out->filled_count += sample.is_filled;
+    out->seen_count += !sample.is_filled;
 }
 
 /* Would the dot have been seen at (x, y) if there were something to see? */
@@ -128,9 +126,11 @@ static void fill_missing(const struct ih_points *points, const struct ih_dots *d
         ih_rig_dot_at(rig, slot, depth_q8, &x_q28, &y_q28);
     }
     if (place_is_visible(rig, dots, x_q28, y_q28)) {
-        int32_t before = out->sample_count;
-        add_sample(out, &points->field, slot, x_q28, y_q28, depth_q8, params->fill_root_weight_q15);
-        out->filled_count += out->sample_count - before;
+        add_sample(out, &points->field, x_q28, y_q28,
+                   (struct ih_sample){.slot = slot,
+                                      .depth_mm_q8 = depth_q8,
+                                      .root_weight_q15 = params->fill_root_weight_q15,
+                                      .is_filled = true});
     }
 }
 
@@ -143,9 +143,9 @@ static void take_seen(const struct ih_points *points, const struct surroundings 
         return;
     }
     int32_t depth_q8 = ih_min_s32(point->depth_mm_q8, out->clip_mm_q8);
-    int32_t before = out->sample_count;
-    add_sample(out, &points->field, slot, point->x_q28, point->y_q28, depth_q8, 1 << 15);
-    out->seen_count += out->sample_count - before;
+    add_sample(out, &points->field, point->x_q28, point->y_q28,
+               (struct ih_sample){
+                   .slot = slot, .depth_mm_q8 = depth_q8, .root_weight_q15 = 1 << 15});
     out->nearest_mm_q8 = ih_min_s32(out->nearest_mm_q8, depth_q8);
 }
 

@@ -4,7 +4,7 @@
  * In:    points by slot, the dots' over-exposure map (NULL for a range image), rig.
  * Out:   up to 361 rows (place in field units, depth, weight) for the least-squares fit.
  * Way:   1. Clip: depth := min(depth, max(p8 + clip_behind, clip_least)), p8 the 8th percentile of
- *           the seen depths. The surface has no business with the far wall.
+ *           the seen depths (the sorted depths' entry number count * 8 / 100). The surface has no business with the far wall.
  *        2. Isolated: a point with at least 3 of 8 neighbours whose clipped depth differs by more
  *           than isolated_mm from all but one of them is dropped.
  *        3. Missing dots: a dot that is not seen says that nothing is there: it enters as a far
@@ -30,6 +30,7 @@ struct ih_sample {
     int32_t x_q16, y_q16; /* field units from the field's centre */
     int32_t depth_mm_q8;
     int32_t root_weight_q15; /* the row is scaled by this, <= 1 */
+    bool is_filled;          /* a missing dot that was filled in */
     int32_t slot;
 };
 

@@ -4,15 +4,16 @@
  * Out:   depth on a regular grid of IH_SURFACE_GRID x IH_SURFACE_GRID nodes; the weight that each
  *        sample ended with.
  * Way:   z = mean + sum_n c_n B(x - x_n, y - y_n), B = sqrt(dx^2 + dy^2 + 1) in field units, on
- *        IH_SURFACE_CENTRES^2 centres. Weighted least squares by normal equations N = R^T R,
- *        R's rows being the basis rows times the root weight; ridge: N's diagonal times
- *        (1 + 1e-5). Then one Huber step: samples off by more than huber_mm get the weight
- *        huber / |residual| and the system is solved again.
+ *        IH_SURFACE_CENTRES^2 centres; mean is the plain mean of the samples' depths. Weighted least
+ *        squares by normal equations N = R^T R, R's rows being the basis rows times the root weight;
+ *        ridge: N's diagonal times (1 + 1e-5). Then one Huber step: samples off by more than
+ *        huber_mm get the weight huber / |residual| and the system is solved again.
  * Scaling and overflow: field units, samples within IH_SAMPLES_REACH, centres within 20: dx and
  *        dy below 60, B below 85 = 2^6.5, in Q20 below 2^26.5; products below 2^53, sums over 361
  *        rows below 2^61.5. N is scaled by r_i r_j (r = 0.995 / sqrt(N_ii)) to diagonal 0.99 and
  *        rounded to Q30; the ridge keeps the least pivot above 3e-3.
- * Error: within 0.2 mm of the float64 solution of the same system, everywhere on the grid.
+ * Error: within 0.2 mm of the float64 solution of the same system, everywhere on the grid, for
+ *        depths that span up to 1.5 m (ih_samples clips them); it grows with the span.
  * Cost:  samples x 144 square roots; samples x 10,440 multiply-adds; two factorisations of n = 144;
  *        grid x 144 multiply-adds.
  */

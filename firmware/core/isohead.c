@@ -48,7 +48,11 @@ enum ih_err isohead_init(struct isohead *head, const struct ih_calibration *cali
 {
     memset(head, 0, sizeof *head);
     ih_params_default(&head->params);
-    return ih_rig_init(&head->rig, calibration, bad_slot);
+    enum ih_err err = ih_rig_init(&head->rig, calibration, bad_slot);
+    if (err != IH_OK) {
+        memset(&head->rig, 0, sizeof head->rig); /* no frame has the size of this rig */
+    }
+    return err;
 }
 
 static enum ih_err check_frame(const struct ih_frame *frame, const struct ih_calibration *c)
@@ -62,8 +66,10 @@ static enum ih_err check_frame(const struct ih_frame *frame, const struct ih_cal
     }
     bool maximum_ok = c->kind == IH_RIG_RANGE ||
                       (frame->maximum >= 1 && frame->maximum <= (bytes == 1 ? 255 : 65535));
-    if (frame->samples == NULL || frame->width != c->width || frame->height != c->height ||
-        frame->stride_bytes < frame->width * bytes || frame->stride_bytes % bytes != 0 ||
+    bool aligned = (uintptr_t)frame->samples % (uintptr_t)bytes == 0 &&
+                   frame->stride_bytes % bytes == 0;
+    if (frame->samples == NULL || frame->width < 1 || frame->width != c->width ||
+        frame->height != c->height || frame->stride_bytes < frame->width * bytes || !aligned ||
         !maximum_ok) {
         return IH_ERR_SIZE;
     }

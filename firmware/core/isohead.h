@@ -56,7 +56,8 @@ struct isohead {
 
 void ih_params_default(struct ih_params *params);
 
-/* Check the calibration, derive the rig, set default parameters. */
+/* Check the calibration, derive the rig, set default parameters. After an error every frame is
+ * refused. */
 enum ih_err isohead_init(struct isohead *head, const struct ih_calibration *calibration,
                          int32_t *bad_slot) __attribute__((warn_unused_result));
 
