@@ -5,6 +5,7 @@
 #include "ih_fix.h"
 
 #define CELLS (IH_SURFACE_GRID - 1)
+#define ALL_INSIDE 0xfu
 
 /* Corners of a cell clockwise on the screen; edge i runs from corner i to corner i + 1. A contour
  * walks with the inside on its right, so it enters through an edge whose corner i is inside and
@@ -31,10 +32,20 @@ static bool is_inside(const struct ih_surface *surface, const struct ih_cuts *cu
     return corner_depth(surface, x, y, corner) < cuts->level_mm_q8;
 }
 
-static bool can_enter(const struct ih_surface *surface, const struct ih_cuts *cuts, int32_t x,
-                      int32_t y, int32_t edge)
+/* Bit i = corner i is inside. 0 and ALL_INSIDE: no contour passes this cell. */
+static uint32_t inside_corners(const struct ih_surface *surface, const struct ih_cuts *cuts,
+                               int32_t x, int32_t y)
 {
-    return is_inside(surface, cuts, x, y, edge) && !is_inside(surface, cuts, x, y, edge + 1);
+    uint32_t corners = 0;
+    for (int32_t corner = 0; corner < 4; corner++) {
+        corners |= (uint32_t)is_inside(surface, cuts, x, y, corner) << corner;
+    }
+    return corners;
+}
+
+static bool can_enter(uint32_t corners, int32_t edge)
+{
+    return (corners >> edge & 1u) != 0 && (corners >> ((edge + 1) & 3) & 1u) == 0;
 }
 
 static bool is_cell(int32_t x, int32_t y)
@@ -110,19 +121,31 @@ static void trace(const struct ih_surface *surface, struct ih_cuts *cuts, struct
     cuts->vertex_count += count;
 }
 
-/* Start contours at every edge that is an entrance and has not been walked. Those that begin at the
- * border come first, so that an open contour is found from its beginning. */
+/* Start contours at every edge of the cell that is an entrance and has not been walked. */
+static void start_in_cell(const struct ih_surface *surface, struct ih_cuts *cuts, int32_t x,
+                          int32_t y, bool border)
+{
+    uint32_t corners = inside_corners(surface, cuts, x, y);
+    if (corners == 0 || corners == ALL_INSIDE) {
+        return;
+    }
+    for (int32_t edge = 0; edge < 4; edge++) {
+        bool on_border = !is_cell(x + beyond_x[edge], y + beyond_y[edge]);
+        if ((on_border || !border) && can_enter(corners, edge) &&
+            (cuts->walked[y][x] & (1u << edge)) == 0) {
+            trace(surface, cuts, (struct walker){x, y, edge});
+        }
+    }
+}
+
+/* Contours that begin at the border come first, so that an open one is found from its beginning. */
 static void start_contours(const struct ih_surface *surface, struct ih_cuts *cuts, bool border)
 {
     for (int32_t y = 0; y < CELLS; y++) {
-        for (int32_t x = 0; x < CELLS; x++) {
-            for (int32_t edge = 0; edge < 4; edge++) {
-                bool on_border = !is_cell(x + beyond_x[edge], y + beyond_y[edge]);
-                if ((on_border || !border) && can_enter(surface, cuts, x, y, edge) &&
-                    (cuts->walked[y][x] & (1u << edge)) == 0) {
-                    trace(surface, cuts, (struct walker){x, y, edge});
-                }
-            }
+        bool border_row = y == 0 || y == CELLS - 1;
+        int32_t step = border && !border_row ? CELLS - 1 : 1;
+        for (int32_t x = 0; x < CELLS; x += step) {
+            start_in_cell(surface, cuts, x, y, border);
         }
     }
 }

@@ -22,7 +22,7 @@
 #define ISOHEAD_VERSION "0.1.0"
 
 /* RAM for the whole state, the frame itself not included. */
-#define IH_RAM_MAX (512 * 1024)
+#define IH_RAM_MAX (224 * 1024)
 
 struct ih_params {
     struct ih_dots_params dots;
