@@ -7,12 +7,14 @@ DATA ?= ../shared/data
 # A folder with unity.c, or one with cJSON.c: used instead of fetching the source package.
 UNITY_DIR ?= $(BUILD)/third_party/unity/src
 CJSON_DIR ?= $(BUILD)/third_party/cjson
+# The frame of frames/sequence2 that docs/picture.png shows.
+PICTURE ?= 000024
 
 .DEFAULT_GOAL := help
-.PHONY: help sim frames test accept bits vectors format lint clean
+.PHONY: help sim frames test accept bits vectors picture format formatted lint clean
 
 help: ## this list
-	@awk -F ':.*## ' '/^[a-z_]+:.*## / { printf "  make %-8s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z_]+:.*## / { printf "  make %-9s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
 sim: ## build host_sim, and render frames/ if they are not there
 	@tools/setup.sh sim
@@ -30,29 +32,41 @@ frames/sequence%/rig.json:
 test: sim ## every test: units against float64, sanitizers, bad input, rules of the core, same bits
 	@tools/setup.sh test
 	@cmake --preset sanitize -DISOHEAD_UNITY_DIR=$(abspath $(UNITY_DIR)) \
+	  -DISOHEAD_CJSON_SOURCE_DIR=$(abspath $(CJSON_DIR)) \
 	  > $(BUILD)/sanitize.log 2>&1 || { cat $(BUILD)/sanitize.log; exit 1; }
 	@cmake --build --preset sanitize --parallel
-	@ctest --test-dir $(BUILD)/sanitize --output-on-failure
+	@ctest --test-dir $(BUILD)/sanitize --output-on-failure --parallel 2
 
-accept: test ## the measured limits on the data sets in DATA (default ../shared/data)
+accept: sim ## the measured limits on the data sets in DATA (default ../shared/data)
+	@tools/setup.sh accept
 	@tests/accept/accept.sh $(BUILD)/host/sim/host_sim $(DATA)
 
 bits: sim ## the same records from gcc and clang, -O0 and -O3, x86-64 and aarch64
 	@tools/setup.sh bits
-	@tests/checks/same_bits.sh $(abspath $(CJSON_DIR)) frames $(wildcard $(DATA))
+	@tests/checks/same_bits.sh $(abspath $(CJSON_DIR)) frames $(wildcard $(DATA)/dots $(DATA)/range)
 
 vectors: ## write tests/vectors anew with the float64 reference
 	@tools/setup.sh vectors
 	@/usr/bin/python3 tools/oracle/make_vectors.py --out tests/vectors
 
+picture: sim ## draw docs/picture.png anew
+	@tools/setup.sh picture
+	@./host_sim --json --trace $(BUILD)/trace frames/sequence2 > /dev/null
+	@/usr/bin/python3 tools/picture.py frames/sequence2 $(BUILD)/trace/sequence2/$(PICTURE).json \
+	  docs/picture.png
+
 format: ## clang-format over all C sources
 	@tools/setup.sh format
 	@git ls-files '*.c' '*.h' | xargs clang-format -i
 
+formatted: ## fail when make format would change something
+	@tools/setup.sh format
+	@git ls-files '*.c' '*.h' | xargs clang-format --dry-run --Werror
+
 lint: sim ## clang-tidy over the core, the simulator and the renderer
 	@tools/setup.sh lint
 	@git ls-files 'firmware/*.c' 'hal/*.c' 'sim/*.c' 'tools/*.c' | \
-	  xargs -P 2 -n 4 clang-tidy --quiet -p $(BUILD)/host
+	  xargs -P 2 -n 1 clang-tidy --quiet -p $(BUILD)/host
 
 clean: ## remove the build; rendered frames stay
 	@rm -rf $(BUILD)

@@ -135,8 +135,7 @@ static char **find_children(const char *path, DIR *stream, bool with_rig, size_t
     return child;
 }
 
-void sim_dirs_add(struct sim_dirs *dirs, const char *path, bool with_rig,
-                  struct sim_report *report)
+void sim_dirs_add(struct sim_dirs *dirs, const char *path, bool with_rig, struct sim_report *report)
 {
     if (is_frames_dir(path, with_rig)) {
         size_t size = strlen(path) + 1;

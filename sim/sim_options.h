@@ -12,7 +12,7 @@ enum sim_status {
 
 struct sim_options {
     bool json;
-    bool paper;        /* the paper's method alone */
+    bool paper; /* the paper's method alone */
     bool help, version;
     const char *rig;   /* NULL: DIR/rig.json */
     const char *trace; /* NULL: none */

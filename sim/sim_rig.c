@@ -105,8 +105,7 @@ static const cJSON *find_matrix(const struct field *field, int rows, int columns
     if (matrix == NULL) {
         return NULL;
     }
-    const char *type =
-        cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(matrix, "type_id"));
+    const char *type = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(matrix, "type_id"));
     if (type == NULL || strcmp(type, "opencv-matrix") != 0) {
         fail(field->error, "%s: type_id is %s, expected \"opencv-matrix\"", field->name,
              type == NULL ? "missing" : type);
@@ -184,7 +183,7 @@ static bool read_size(struct field *field, struct ih_calibration *calibration)
 static bool read_camera(struct field *field, struct ih_calibration *calibration)
 {
     static const double fixed_part[9] = {-1, 0, -1, 0, -1, -1, 0, 0, 1};
-    double matrix[9];
+    double matrix[9] = {0};
     field->name = "camera_matrix";
     if (!read_matrix(field, 3, 3, matrix)) {
         return false;
@@ -203,7 +202,7 @@ static bool read_camera(struct field *field, struct ih_calibration *calibration)
 
 static bool read_distortion(struct field *field, struct ih_calibration *calibration)
 {
-    double k[5];
+    double k[5] = {0};
     field->name = "distortion_coefficients";
     return read_matrix(field, 1, 5, k) &&
            round_fixed(field, " k1", k[0], 24, &calibration->k1_q24) &&
@@ -232,7 +231,7 @@ static bool read_range(struct field *field, struct ih_calibration *calibration)
 static bool read_projector(struct field *field, struct ih_calibration *calibration)
 {
     static const char *const axis[RAY_AXES] = {" x", " y", " z"};
-    double origin_mm[RAY_AXES];
+    double origin_mm[RAY_AXES] = {0};
     double ray[IH_SLOTS * RAY_AXES];
     field->name = "projector_origin";
     if (!read_matrix(field, RAY_AXES, 1, origin_mm)) {

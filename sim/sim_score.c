@@ -42,8 +42,7 @@ static int32_t distance_mm_q8(const struct ih_hypothesis *hypothesis,
 {
     uint64_t sum = 0;
     for (int axis = 0; axis < 3; axis++) {
-        int64_t difference =
-            (int64_t)hypothesis->centre_mm_q8[axis] - truth->centre_mm_q8[axis];
+        int64_t difference = (int64_t)hypothesis->centre_mm_q8[axis] - truth->centre_mm_q8[axis];
         sum += (uint64_t)(difference * difference);
     }
     return ih_saturate_s32(ih_isqrt_u64(sum));
@@ -124,8 +123,8 @@ void sim_score_add_dots(struct sim_score *score, const struct isohead *head,
         const struct sim_truth_dot *true_dot = &truth->dot[i];
         int32_t nearest_px_q12 = INT32_MAX;
         for (int32_t k = 0; k < head->dots.dot_count; k++) {
-            nearest_px_q12 = ih_min_s32(nearest_px_q12,
-                                        dot_distance_px_q12(&head->dots.dot[k], true_dot));
+            nearest_px_q12 =
+                ih_min_s32(nearest_px_q12, dot_distance_px_q12(&head->dots.dot[k], true_dot));
         }
         score->true_dot_count++;
         if (nearest_px_q12 <= near_px_q12) {
@@ -136,9 +135,9 @@ void sim_score_add_dots(struct sim_score *score, const struct isohead *head,
         if (label != IH_NONE &&
             dot_distance_px_q12(&head->dots.dot[label], true_dot) <= near_px_q12) {
             score->right_label_count++;
-            add_value(&score->depth_error_mm_q8,
-                      ih_abs_s32(head->points.point[true_dot->slot].depth_mm_q8 -
-                                 true_dot->depth_mm_q8));
+            add_value(
+                &score->depth_error_mm_q8,
+                ih_abs_s32(head->points.point[true_dot->slot].depth_mm_q8 - true_dot->depth_mm_q8));
         }
     }
 }

@@ -8,8 +8,7 @@
 #define LABEL_WIDTH 20
 #define NAME_MAX_BYTES 256
 
-static const char *const outcome_text[SIM_OUTCOMES] = {"correct", "ambiguous", "wrong",
-                                                       "not done"};
+static const char *const outcome_text[SIM_OUTCOMES] = {"correct", "ambiguous", "wrong", "not done"};
 
 /* A name from the disk, safe for a terminal. */
 static const char *tame(char *buffer, size_t size, const char *name)
@@ -49,8 +48,8 @@ void sim_table_frame(FILE *file, const struct hal_frame *frame, const struct iso
     const struct ih_heads *heads = &head->heads;
     int32_t selected = sim_score_selected(heads, paper);
     fprintf(file, "%-14s %5" PRId32 " %5" PRId32 " %4" PRId32 " ",
-            tame(name, sizeof name, frame->name), head->dots.dot_count,
-            head->labels.labelled_count, heads->hypothesis_count);
+            tame(name, sizeof name, frame->name), head->dots.dot_count, head->labels.labelled_count,
+            heads->hypothesis_count);
     if (selected != IH_NONE) {
         const struct ih_hypothesis *hypothesis = &heads->hypothesis[selected];
         for (int axis = 0; axis < 3; axis++) {

@@ -49,8 +49,8 @@ static bool read_head(const cJSON *line, struct sim_truth_frame *frame, struct h
 {
     const cJSON *head = cJSON_GetObjectItemCaseSensitive(line, "head");
     const cJSON *heads = cJSON_GetObjectItemCaseSensitive(line, "heads");
-    double centre_mm[AXES];
-    double semi_axes_mm[AXES];
+    double centre_mm[AXES] = {0};
+    double semi_axes_mm[AXES] = {0};
     bool several = cJSON_IsArray(heads) && cJSON_GetArraySize(heads) > 0;
     if (cJSON_IsNull(head) || (head == NULL && several)) {
         frame->head = several ? SIM_TRUTH_UNSCORED : SIM_TRUTH_NOBODY;

@@ -1,7 +1,7 @@
 #!/bin/sh
 # Bring what a make target needs and this machine lacks.
 #
-#   tools/setup.sh sim|test|bits|vectors|format|lint
+#   tools/setup.sh sim|test|accept|bits|vectors|picture|format|lint
 #
 # On Debian and its kin missing packages are installed when that is allowed (root, or sudo without a
 # password); otherwise the exact command is printed and the exit status is 1. Nothing is installed
@@ -27,22 +27,34 @@ need_sim() {
     need_header cjson/cJSON.h libcjson-dev
 }
 
-case "${1:-}" in
-sim) need_sim ;;
-test)
-    need_sim
-    need_python numpy python3-numpy
-    need_python scipy python3-scipy
-    need_program nm binutils
-    ;;
-bits)
-    need_sim
+# Compilers and the emulator for tests/checks/same_bits.sh.
+need_bits() {
+    need_program gcc gcc
     need_program clang clang
     need_program qemu-aarch64 qemu-user
     need_program aarch64-linux-gnu-gcc gcc-aarch64-linux-gnu
     [ -e /usr/aarch64-linux-gnu/lib/libc.a ] || lacks libc6-dev-arm64-cross
+}
+
+case "${1:-}" in
+sim) need_sim ;;
+test)
+    need_sim
+    need_bits
+    need_python numpy python3-numpy
+    need_python scipy python3-scipy
+    need_program nm binutils
     ;;
-vectors)
+picture)
+    need_sim
+    need_python numpy python3-numpy
+    need_python matplotlib python3-matplotlib
+    ;;
+bits)
+    need_sim
+    need_bits
+    ;;
+accept | vectors)
     need_python numpy python3-numpy
     need_python scipy python3-scipy
     ;;
@@ -52,7 +64,7 @@ lint)
     need_program clang-tidy clang-tidy
     ;;
 *)
-    echo "usage: tools/setup.sh sim|test|bits|vectors|format|lint" >&2
+    echo "usage: tools/setup.sh sim|test|accept|bits|vectors|picture|format|lint" >&2
     exit 2
     ;;
 esac

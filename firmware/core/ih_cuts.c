@@ -79,8 +79,8 @@ static struct ih_vertex crossing(const struct ih_surface *surface, const struct 
     int64_t to_depth = corner_depth(surface, x, y, to);
     /* One end is inside and one is not: the difference is not 0, the quotient in 0 .. 512. */
     int64_t rise = to_depth - from_depth;
-    int64_t part_q9 = ih_div_round((cuts->level_mm_q8 - from_depth) * (rise > 0 ? 512 : -512),
-                                   ih_abs_s64(rise));
+    int64_t part_q9 =
+        ih_div_round((cuts->level_mm_q8 - from_depth) * (rise > 0 ? 512 : -512), ih_abs_s64(rise));
     int64_t x_q9 = (x + corner_x[from]) * 512 + (corner_x[to] - corner_x[from]) * part_q9;
     int64_t y_q9 = (y + corner_y[from]) * 512 + (corner_y[to] - corner_y[from]) * part_q9;
     return (struct ih_vertex){(int16_t)x_q9, (int16_t)y_q9};

@@ -15,7 +15,7 @@
 void ih_dots_params_default(struct ih_dots_params *params)
 {
     *params = (struct ih_dots_params){
-        .floor_grey_q4 = 29,  /* 1.8 grey levels */
+        .floor_grey_q4 = 29,   /* 1.8 grey levels */
         .noise_gain_q8 = 1708, /* 4.5 x 1.4826: 4.5 sigma of Gaussian noise */
         .area_min_px = 4,
         .area_max_px = 120,
@@ -358,8 +358,8 @@ void ih_dots_row(struct ih_dots_scratch *scratch, struct ih_dots *out, const voi
     uint16_t *row_q4 = scratch->incoming_q4;
     uint32_t gain_q16 = grey_gain_q16(maximum);
     for (int32_t u = 0; u < scratch->width; u++) {
-        uint32_t sample = bytes_per_sample == 1 ? ((const uint8_t *)samples)[u]
-                                                : ((const uint16_t *)samples)[u];
+        uint32_t sample =
+            bytes_per_sample == 1 ? ((const uint8_t *)samples)[u] : ((const uint16_t *)samples)[u];
         row_q4[u] = grey_q4(sample, (uint32_t)maximum, gain_q16);
     }
     int32_t row = ih_max_s32(0, scratch->rows_in - IH_DOTS_REACH);

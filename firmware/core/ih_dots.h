@@ -47,12 +47,12 @@
 #define IH_DOTS_BLOCKS_Y (IH_FRAME_HEIGHT_MAX / IH_DOTS_BLOCK)
 
 struct ih_dots_params {
-    int32_t floor_grey_q4;  /* least threshold, 8-bit grey levels in Q4 */
-    int32_t noise_gain_q8;  /* threshold in medians of |R| */
-    int32_t area_min_px;    /* blobs outside these limits are not dots */
+    int32_t floor_grey_q4; /* least threshold, 8-bit grey levels in Q4 */
+    int32_t noise_gain_q8; /* threshold in medians of |R| */
+    int32_t area_min_px;   /* blobs outside these limits are not dots */
     int32_t area_max_px;
-    int32_t extent_max_px;  /* longest side of the bounding box */
-    int32_t bright_grey;    /* block mean above this (0..255) = over-exposed */
+    int32_t extent_max_px; /* longest side of the bounding box */
+    int32_t bright_grey;   /* block mean above this (0..255) = over-exposed */
 };
 
 struct ih_dot {
@@ -89,7 +89,7 @@ struct ih_dots_scratch {
     int32_t width, height;
     int32_t rows_in; /* pushed into the ring, repeated border rows included */
     struct ih_dots_params params;
-    int32_t block_rows; /* rows in block_sum */
+    int32_t block_rows;                                 /* rows in block_sum */
     uint16_t incoming_q4[IH_FRAME_WIDTH_MAX];           /* the newest row */
     uint16_t grey_q4[IH_DOTS_ROWS][IH_FRAME_WIDTH_MAX]; /* ring of rows */
     uint32_t column_sum[IH_FRAME_WIDTH_MAX];            /* of the ring, for the outer box */

@@ -53,8 +53,7 @@ static void add_edge(struct ih_moments *m, int64_t px, int64_t py, int64_t qx, i
 static int32_t axis_ratio_q16(int64_t xx_q16, int64_t xy_q16, int64_t yy_q16)
 {
     int64_t half_difference = (xx_q16 - yy_q16) / 2;
-    int64_t root =
-        ih_isqrt_u64((uint64_t)(half_difference * half_difference + xy_q16 * xy_q16));
+    int64_t root = ih_isqrt_u64((uint64_t)(half_difference * half_difference + xy_q16 * xy_q16));
     int64_t major = (xx_q16 + yy_q16) / 2 + root;
     int64_t minor = (xx_q16 + yy_q16) / 2 - root;
     if (minor <= 0) {
@@ -182,10 +181,10 @@ static int32_t resample(const struct ih_cuts *cuts, const struct ih_contour *con
         struct ih_vertex q = vertex[edge + 1 < contour->vertex_count ? edge + 1 : 0];
         int32_t part_q9 = ih_min_s32(target_q9 - before_q9, length_q9);
         int64_t divisor = length_q9 > 0 ? length_q9 : 1;
-        int64_t x_q9 = p.x_q9 - place.x_q9 +
-                       ih_div_round((int64_t)(q.x_q9 - p.x_q9) * part_q9, divisor);
-        int64_t y_q9 = p.y_q9 - place.y_q9 +
-                       ih_div_round((int64_t)(q.y_q9 - p.y_q9) * part_q9, divisor);
+        int64_t x_q9 =
+            p.x_q9 - place.x_q9 + ih_div_round((int64_t)(q.x_q9 - p.x_q9) * part_q9, divisor);
+        int64_t y_q9 =
+            p.y_q9 - place.y_q9 + ih_div_round((int64_t)(q.y_q9 - p.y_q9) * part_q9, divisor);
         scratch->x_q8[k] = half_q9((int32_t)x_q9);
         scratch->y_q8[k] = half_q9((int32_t)y_q9);
     }
@@ -203,8 +202,8 @@ static int32_t accumulate(const struct ih_contour *contour, struct ih_ellipse_sc
     scratch->prefix[0] = (struct ih_moments){0};
     for (int32_t k = 1; k < count; k++) {
         scratch->prefix[k] = scratch->prefix[k - 1];
-        add_edge(&scratch->prefix[k], scratch->x_q8[k - 1], scratch->y_q8[k - 1],
-                 scratch->x_q8[k], scratch->y_q8[k]);
+        add_edge(&scratch->prefix[k], scratch->x_q8[k - 1], scratch->y_q8[k - 1], scratch->x_q8[k],
+                 scratch->y_q8[k]);
     }
     return count;
 }
@@ -245,13 +244,12 @@ static bool test_part(const struct ih_ellipse_scratch *scratch, int32_t from, in
     struct ih_moments m = part_moments(scratch, from, to);
     if (m.winding != 1 || !ellipse_of_moments(&m, half_q9(place.x_q9), half_q9(place.y_q9), out) ||
         out->area_q16 <= 0 || out->shape_q16 < SHAPE_MIN_Q16 ||
-        out->shape_q16 > params->shape_max_q16 ||
-        out->ratio_q16 > params->ratio_part_max_q16) {
+        out->shape_q16 > params->shape_max_q16 || out->ratio_q16 > params->ratio_part_max_q16) {
         return false;
     }
-    int64_t shape_cost_q8 = ih_mul_shift((int64_t)SHAPE_COST * (out->shape_q16 - 65536), arc_q8, 16);
-    out->merit_q8 =
-        ih_saturate_s32(arc_q8 - ih_mul_shift(CHORD_COST_Q8, chord, 8) - shape_cost_q8);
+    int64_t shape_cost_q8 =
+        ih_mul_shift((int64_t)SHAPE_COST * (out->shape_q16 - 65536), arc_q8, 16);
+    out->merit_q8 = ih_saturate_s32(arc_q8 - ih_mul_shift(CHORD_COST_Q8, chord, 8) - shape_cost_q8);
     return true;
 }
 

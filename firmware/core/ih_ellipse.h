@@ -29,7 +29,7 @@ struct ih_ellipse_params {
     int32_t shape_max_q16;        /* most that shape may be for an ellipse */
     int32_t ratio_closed_max_q16; /* axis ratio of a closed contour, of a cut part */
     int32_t ratio_part_max_q16;
-    int32_t chord_max_q16;        /* chord / arc of a cut part */
+    int32_t chord_max_q16; /* chord / arc of a cut part */
 };
 
 /* In grid steps. Second moments are central, per area. */
@@ -44,9 +44,9 @@ struct ih_ellipse {
 
 /* Sums over the edges of a polygon around a place, coordinates in Q8 steps; see ih_ellipse.c. */
 struct ih_moments {
-    int64_t area2_q16;                 /* twice the area */
-    int64_t x_q24, y_q24;              /* 6 times the first moments */
-    int64_t xx_q32, xy_q32, yy_q32;    /* 12 times the second moments */
+    int64_t area2_q16;              /* twice the area */
+    int64_t x_q24, y_q24;           /* 6 times the first moments */
+    int64_t xx_q32, xy_q32, yy_q32; /* 12 times the second moments */
     int32_t winding;
 };
 

@@ -12,7 +12,7 @@
 void ih_heads_params_default(struct ih_heads_params *params)
 {
     *params = (struct ih_heads_params){
-        .area_min_mm2 = 13000,
+        .area_min_mm2 = 12000,
         .area_max_mm2 = 56000,
         .curvature_min_mm = 60,
         .curvature_max_mm = 800,
@@ -21,7 +21,7 @@ void ih_heads_params_default(struct ih_heads_params *params)
         .points_min = 13,
         .jump_mm = 75,
         .above_min_percent = 76,
-        .beside_min_percent = 45,
+        .beside_min_percent = 40,
         .below_min_percent = 45,
         .merge_mm = 80,
         .centre_behind_mm = 108,
@@ -123,8 +123,8 @@ static int32_t surface_depth_mm_q8(const struct ih_surface *surface, int32_t x_q
     const int32_t *far_row = &surface->depth_mm_q8[(y >> 16) + 1][x >> 16];
     int64_t top = near_row[0] * (65536 - fx) + near_row[1] * fx;
     int64_t bottom = far_row[0] * (65536 - fx) + far_row[1] * fx;
-    return (int32_t)ih_shift_round(ih_shift_round(top, 16) * (65536 - fy) +
-                                       ih_shift_round(bottom, 16) * fy, 16);
+    return (int32_t)ih_shift_round(
+        ih_shift_round(top, 16) * (65536 - fy) + ih_shift_round(bottom, 16) * fy, 16);
 }
 
 /* Semi-axis = 2 sqrt(variance); the variance in Q16 px^2 less drop bits, below 2^32. */
@@ -141,9 +141,11 @@ static void fill_axes(const struct ih_ellipse *ellipse, const struct ih_surface 
     const struct ih_calibration *c = &rig->calibration;
     /* px per grid step in Q12; below 2^9 px for a sane pitch */
     int64_t step_u = ih_div_round(ih_mul_shift(surface->field.unit_q28, c->fx_px_q16, 32) *
-                                      IH_SURFACE_STEP_NUMERATOR, IH_SURFACE_STEP_DENOMINATOR);
+                                      IH_SURFACE_STEP_NUMERATOR,
+                                  IH_SURFACE_STEP_DENOMINATOR);
     int64_t step_v = ih_div_round(ih_mul_shift(surface->field.unit_q28, c->fy_px_q16, 32) *
-                                      IH_SURFACE_STEP_NUMERATOR, IH_SURFACE_STEP_DENOMINATOR);
+                                      IH_SURFACE_STEP_NUMERATOR,
+                                  IH_SURFACE_STEP_DENOMINATOR);
     int64_t uu = ih_mul_shift(ih_mul_shift(ellipse->xx_q16, step_u, 12), step_u, 12);
     int64_t uv = ih_mul_shift(ih_mul_shift(ellipse->xy_q16, step_u, 12), step_v, 12);
     int64_t vv = ih_mul_shift(ih_mul_shift(ellipse->yy_q16, step_v, 12), step_v, 12);
@@ -185,10 +187,8 @@ static struct placed place_sample(const struct ih_sample *sample, const struct i
     p.dy_q8 = ih_div_round((int64_t)sample->y_q16 * IH_SURFACE_STEP_DENOMINATOR,
                            IH_SURFACE_STEP_NUMERATOR * 256) +
               middle_q8 - ih_shift_round(ellipse->y_q16, 8);
-    int64_t determinant_q32 =
-        ellipse->xx_q16 * ellipse->yy_q16 - ellipse->xy_q16 * ellipse->xy_q16;
-    int64_t q_q32 = ellipse->yy_q16 * p.dx_q8 * p.dx_q8 -
-                    2 * ellipse->xy_q16 * p.dx_q8 * p.dy_q8 +
+    int64_t determinant_q32 = ellipse->xx_q16 * ellipse->yy_q16 - ellipse->xy_q16 * ellipse->xy_q16;
+    int64_t q_q32 = ellipse->yy_q16 * p.dx_q8 * p.dx_q8 - 2 * ellipse->xy_q16 * p.dx_q8 * p.dy_q8 +
                     ellipse->xx_q16 * p.dy_q8 * p.dy_q8;
     int64_t quarter = determinant_q32 / 4 + 1; /* 4 det in sixteenths */
     p.radius2_q4 = (int32_t)(q_q32 / quarter > 4080 ? 4080 : q_q32 / quarter);
@@ -213,8 +213,7 @@ static void fill_outline(const struct ih_nest *nest, const struct ih_samples *sa
                          const struct ih_heads_params *params, struct ih_outline *out)
 {
     const struct ih_slice *last = &nest->slice[nest->slice_count - 1];
-    int64_t behind_q8 =
-        (int64_t)nest->front_mm_q8 + last->behind_mm_q8 + (params->jump_mm << 8);
+    int64_t behind_q8 = (int64_t)nest->front_mm_q8 + last->behind_mm_q8 + (params->jump_mm << 8);
     for (int32_t i = 0; i < samples->sample_count; i++) {
         const struct ih_sample *sample = &samples->sample[i];
         struct placed p = place_sample(sample, &last->ellipse);
@@ -250,13 +249,11 @@ static void fill_place(const struct ih_nest *nest, const struct ih_surface *surf
 {
     int32_t x_q16, y_q16;
     nest_centre_q16(nest, &x_q16, &y_q16);
-    int32_t x_q28 =
-        to_normalised_q28(x_q16, surface->field.centre_x_q28, surface->field.unit_q28);
-    int32_t y_q28 =
-        to_normalised_q28(y_q16, surface->field.centre_y_q28, surface->field.unit_q28);
+    int32_t x_q28 = to_normalised_q28(x_q16, surface->field.centre_x_q28, surface->field.unit_q28);
+    int32_t y_q28 = to_normalised_q28(y_q16, surface->field.centre_y_q28, surface->field.unit_q28);
     ih_rig_distort(rig, x_q28, y_q28, &out->u_px_q12, &out->v_px_q12);
-    out->distance_mm_q8 = ih_saturate_s32(ih_mul_shift(surface_depth_mm_q8(surface, x_q16, y_q16),
-                                                       ray_length_q28(x_q28, y_q28), 28));
+    out->distance_mm_q8 = ih_saturate_s32(
+        ih_mul_shift(surface_depth_mm_q8(surface, x_q16, y_q16), ray_length_q28(x_q28, y_q28), 28));
     int64_t depth_q8 = nest->front_mm_q8 + (int64_t)(params->centre_behind_mm << 8);
     out->centre_mm_q8[0] = ih_saturate_s32(ih_mul_shift(depth_q8, x_q28, 28));
     out->centre_mm_q8[1] = ih_saturate_s32(ih_mul_shift(depth_q8, y_q28, 28));
@@ -292,7 +289,7 @@ static struct ih_hypothesis judge(const struct ih_nest *nest, const struct ih_su
     fill_axes(&last->ellipse, surface, rig, &h);
     fill_outline(nest, samples, params, &h.outline);
     h.upright_q16 = upright_q16(nest);
-    h.rejected = test(&h, params);
+    h.rejected = (int32_t)test(&h, params);
     return h;
 }
 

@@ -24,7 +24,13 @@
 
 #include "ih_hypotheses.h"
 
-enum ih_reject { IH_ACCEPTED = 0, IH_REJECT_AREA, IH_REJECT_CURVATURE, IH_REJECT_SHAPE, IH_REJECT_OUTLINE };
+enum ih_reject {
+    IH_ACCEPTED = 0,
+    IH_REJECT_AREA,
+    IH_REJECT_CURVATURE,
+    IH_REJECT_SHAPE,
+    IH_REJECT_OUTLINE
+};
 
 struct ih_heads_params {
     int32_t area_min_mm2, area_max_mm2;
@@ -43,22 +49,22 @@ struct ih_outline {
     int32_t inside;              /* seen, within the last ellipse */
     int32_t above, above_behind; /* around it: all, and those that lie behind it */
     int32_t beside, beside_behind;
-    int32_t below, below_near;   /* all, and those that do not */
+    int32_t below, below_near; /* all, and those that do not */
 };
 
 struct ih_hypothesis {
-    int32_t u_px_q12, v_px_q12;  /* centre of the ellipse in the frame (distorted pixels) */
-    int32_t a_px_q12, b_px_q12;  /* semi-axes, a >= b */
-    int32_t angle_mdeg;          /* of a, from +u towards +v, 0 .. 179999 */
-    int32_t distance_mm_q8;      /* camera's centre to the surface at the ellipse's centre */
-    int32_t centre_mm_q8[3];     /* of the head's volume, camera frame */
-    int32_t area_mm2;            /* of the widest slice */
+    int32_t u_px_q12, v_px_q12; /* centre of the ellipse in the frame (distorted pixels) */
+    int32_t a_px_q12, b_px_q12; /* semi-axes, a >= b */
+    int32_t angle_mdeg;         /* of a, from +u towards +v, 0 .. 179999 */
+    int32_t distance_mm_q8;     /* camera's centre to the surface at the ellipse's centre */
+    int32_t centre_mm_q8[3];    /* of the head's volume, camera frame */
+    int32_t area_mm2;           /* of the widest slice */
     int32_t curvature_mm_q8;
     int32_t extent_mm_q8;
     int32_t upright_q16;
     struct ih_outline outline;
-    int32_t rejected;            /* enum ih_reject */
-    int32_t nest;                /* index into ih_hypotheses.nest */
+    int32_t rejected; /* enum ih_reject */
+    int32_t nest;     /* index into ih_hypotheses.nest */
 };
 
 struct ih_heads {

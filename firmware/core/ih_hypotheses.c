@@ -81,9 +81,9 @@ static void find_minima(const struct ih_surface *surface, struct ih_hypotheses *
  * Q16 below 2^42 for areas below 2^(11 + 16). Real ones are 2^20 times smaller. */
 static int32_t area_mm2(const struct ih_surface *surface, int32_t level_mm_q8, int64_t area_q16)
 {
-    int64_t step_q16 = ih_div_round(
-        ih_mul_shift(level_mm_q8, surface->field.unit_q28, 20) * IH_SURFACE_STEP_NUMERATOR,
-        IH_SURFACE_STEP_DENOMINATOR);
+    int64_t step_q16 = ih_div_round(ih_mul_shift(level_mm_q8, surface->field.unit_q28, 20) *
+                                        IH_SURFACE_STEP_NUMERATOR,
+                                    IH_SURFACE_STEP_DENOMINATOR);
     int64_t square_q16 = ih_mul_shift(step_q16, step_q16, 16);
     return ih_saturate_s32(ih_mul_wide_shift(square_q16, (uint32_t)area_q16, 32));
 }
@@ -145,7 +145,7 @@ static void set_front(const struct ih_hypotheses_params *params, int32_t level_m
     int64_t passed_q8 = ih_div_round(span_q8 * (params->blunt_mm2 - nest->tip_area_mm2),
                                      area_mm2_here - nest->tip_area_mm2);
     int64_t front_q8 = nest->tip_level_mm_q8 + passed_q8 -
-                       ih_div_round((int64_t)params->blunt_mm2 << 8, FRONT_GROWTH_MM);
+                       ih_div_round((int64_t)params->blunt_mm2 * 256, FRONT_GROWTH_MM);
     nest->front_mm_q8 = ih_max_s32((int32_t)front_q8, nest->nearest_mm_q8);
 }
 
@@ -183,8 +183,7 @@ static void extend_nest(const struct ih_surface *surface, int32_t level_mm_q8,
     if (level_mm_q8 <= nest->nearest_mm_q8 || nest->ended) {
         return;
     }
-    if ((nest->slice_count > 0 &&
-         level_mm_q8 - nest->front_mm_q8 > params->depth_max_mm << 8) ||
+    if ((nest->slice_count > 0 && level_mm_q8 - nest->front_mm_q8 > params->depth_max_mm << 8) ||
         nest->slice_count == IH_HYPOTHESES_SLICES_MAX) {
         nest->ended = true;
         return;
@@ -220,8 +219,7 @@ static bool any_alive(const struct ih_hypotheses *hypotheses)
     return false;
 }
 
-void ih_hypotheses_find(const struct ih_surface *surface,
-                        const struct ih_hypotheses_params *params,
+void ih_hypotheses_find(const struct ih_surface *surface, const struct ih_hypotheses_params *params,
                         struct ih_hypotheses_scratch *scratch, struct ih_hypotheses *out)
 {
     out->nest_count = 0;
@@ -232,9 +230,8 @@ void ih_hypotheses_find(const struct ih_surface *surface,
     }
     find_minima(surface, out);
     int32_t level_mm_q8;
-    for (int32_t index = 0; ih_hypotheses_level(surface, params, index, &level_mm_q8) &&
-                            any_alive(out);
-         index++) {
+    for (int32_t index = 0;
+         ih_hypotheses_level(surface, params, index, &level_mm_q8) && any_alive(out); index++) {
         ih_cuts_level(surface, level_mm_q8, &scratch->cuts);
         out->contours_dropped += scratch->cuts.contours_dropped;
         for (int32_t i = 0; i < out->nest_count; i++) {

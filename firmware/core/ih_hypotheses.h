@@ -42,8 +42,8 @@ struct ih_slice {
 
 struct ih_nest {
     struct ih_vertex minimum; /* a node */
-    int32_t nearest_mm_q8; /* depth of the minimum */
-    int32_t front_mm_q8;   /* depth at which the tip ends; the minimum's while there is no slice */
+    int32_t nearest_mm_q8;    /* depth of the minimum */
+    int32_t front_mm_q8; /* depth at which the tip ends; the minimum's while there is no slice */
     int32_t tip_level_mm_q8, tip_area_mm2; /* the last slice of the tip */
     int32_t slice_count;
     int32_t gap;
@@ -64,8 +64,7 @@ struct ih_hypotheses_scratch {
 
 void ih_hypotheses_params_default(struct ih_hypotheses_params *params);
 
-void ih_hypotheses_find(const struct ih_surface *surface,
-                        const struct ih_hypotheses_params *params,
+void ih_hypotheses_find(const struct ih_surface *surface, const struct ih_hypotheses_params *params,
                         struct ih_hypotheses_scratch *scratch, struct ih_hypotheses *out);
 
 /* The depth of level number index for this surface; false beyond the last. For tracing. */

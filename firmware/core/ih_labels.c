@@ -300,8 +300,8 @@ static void expect(const struct ih_labels_scratch *scratch, int32_t slot, struct
 }
 
 /* hypot(along, 6 perp) against the expectation that suits the candidate best. */
-static int32_t growth_error(const struct ih_candidate *candidate, const struct expectation *expected,
-                            int32_t length_px_mm_q8)
+static int32_t growth_error(const struct ih_candidate *candidate,
+                            const struct expectation *expected, int32_t length_px_mm_q8)
 {
     int64_t off_q36 = INT32_MAX;
     for (int32_t i = 0; i < expected->count; i++) {

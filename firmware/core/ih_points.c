@@ -16,7 +16,7 @@ void ih_points_params_default(struct ih_points_params *params)
 {
     *params = (struct ih_points_params){
         .pitch_mm_q8 = 28 << 8, /* the paper rig spans 26 mm on a head at 0.85 m */
-        .reach_mm = 500,
+        .reach_mm = 350,
         .headroom_q8 = 3 << 8,
         .top_width_mm = 60,
     };
@@ -125,8 +125,8 @@ static bool find_near_run(const struct ih_frame *frame, const struct ih_rig *rig
 static bool find_top(const struct ih_frame *frame, const struct ih_rig *rig, int32_t near_mm,
                      const struct ih_points_params *params, int32_t *u_px, int32_t *v_px)
 {
-    int32_t width_px = (int32_t)(((int64_t)rig->calibration.fx_px_q16 * params->top_width_mm /
-                                  near_mm) >> 16);
+    int32_t width_px =
+        (int32_t)(((int64_t)rig->calibration.fx_px_q16 * params->top_width_mm / near_mm) >> 16);
     for (int32_t v = 0; v < frame->height; v += survey_step(frame)) {
         int32_t first, last;
         if (find_near_run(frame, rig, v, near_mm + params->reach_mm, width_px, &first, &last)) {
@@ -149,7 +149,8 @@ static void place_field(const struct ih_frame *frame, const struct ih_rig *rig,
     out->unit_q28 = (int32_t)(pitch_q28 / 2);
     ih_rig_undistort(rig, u * 4096, v * 4096, &out->centre_x_q28, &out->centre_y_q28);
     if (found) {
-        int64_t down_q28 = pitch_q28 * LATTICE_HALF - ih_mul_shift(pitch_q28, params->headroom_q8, 8);
+        int64_t down_q28 =
+            pitch_q28 * LATTICE_HALF - ih_mul_shift(pitch_q28, params->headroom_q8, 8);
         out->centre_y_q28 = ih_saturate_s32(out->centre_y_q28 + down_q28);
     }
 }
@@ -163,8 +164,8 @@ static int32_t sample_depth_mm(const struct ih_frame *frame, const struct ih_rig
     for (int32_t dv = -reach_px; dv <= reach_px; dv++) {
         for (int32_t du = -reach_px; du <= reach_px; du++) {
             int32_t d2 = du * du + dv * dv;
-            bool inside = u + du >= 0 && v + dv >= 0 && u + du < frame->width &&
-                          v + dv < frame->height;
+            bool inside =
+                u + du >= 0 && v + dv >= 0 && u + du < frame->width && v + dv < frame->height;
             int32_t depth = inside && d2 < best_d2 ? depth_mm_at(frame, rig, u + du, v + dv) : 0;
             if (depth > 0) {
                 best_mm = depth;

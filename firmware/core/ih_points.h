@@ -25,9 +25,9 @@ struct ih_points_params {
 };
 
 enum ih_point_state {
-    IH_POINT_MISSING = 0,  /* nothing was measured; a surface there would have been seen */
+    IH_POINT_MISSING = 0, /* nothing was measured; a surface there would have been seen */
     IH_POINT_SEEN = 1,
-    IH_POINT_UNKNOWN = 2,  /* missing, but that says nothing: outside a range image */
+    IH_POINT_UNKNOWN = 2, /* missing, but that says nothing: outside a range image */
 };
 
 struct ih_point {

@@ -38,9 +38,9 @@ static void brown(const struct ih_calibration *c, int64_t x_q28, int64_t y_q28, 
     int64_t r2 = xx + yy;
     int64_t r4_q25 = ih_mul_shift(r2, r2, 31);
     int64_t r6_q22 = ih_mul_shift(r4_q25, r2, 31);
-    *radial_q28 = clamp_brown_q28(ONE_Q28 + ih_mul_shift(r2, c->k1_q24, 24) +
-                                  ih_mul_shift(r4_q25, c->k2_q24, 21) +
-                                  ih_mul_shift(r6_q22, c->k3_q24, 18));
+    *radial_q28 =
+        clamp_brown_q28(ONE_Q28 + ih_mul_shift(r2, c->k1_q24, 24) +
+                        ih_mul_shift(r4_q25, c->k2_q24, 21) + ih_mul_shift(r6_q22, c->k3_q24, 18));
     /* 2 xy <= 8; (r2 + 2 xx) / 2 <= 8 */
     *dx_q28 = clamp_brown_q28(ih_mul_shift(2 * xy, c->p1_q24, 24) +
                               ih_mul_shift(r2 / 2 + xx, c->p2_q24, 23));
@@ -150,7 +150,8 @@ static enum ih_err check_camera(const struct ih_calibration *c)
     if (!range && c->kind != IH_RIG_DOTS) {
         return IH_ERR_KIND;
     }
-    if (c->width > IH_FRAME_WIDTH_MAX || c->height > (range ? IH_FRAME_WIDTH_MAX : IH_FRAME_HEIGHT_MAX) ||
+    if (c->width > IH_FRAME_WIDTH_MAX ||
+        c->height > (range ? IH_FRAME_WIDTH_MAX : IH_FRAME_HEIGHT_MAX) ||
         c->width < (range ? IH_RANGE_SIDE_MIN : IH_FRAME_WIDTH_MIN) ||
         c->height < (range ? IH_RANGE_SIDE_MIN : IH_FRAME_HEIGHT_MIN)) {
         return IH_ERR_SIZE;
@@ -229,10 +230,10 @@ static bool fill_line(struct ih_rig *rig, int32_t slot)
     ray_line(c, slot, 1, &tan_q30[1], &offset_mm_q16[1]);
 
     /* tan below 4 in Q30, focal below 2^29 in Q16: products below 2^61. */
-    line->infinity_u_px_q12 = (int32_t)(ih_mul_shift(tan_q30[0], c->fx_px_q16, 34) +
-                                        ih_shift_round(c->cx_px_q16, 4));
-    line->infinity_v_px_q12 = (int32_t)(ih_mul_shift(tan_q30[1], c->fy_px_q16, 34) +
-                                        ih_shift_round(c->cy_px_q16, 4));
+    line->infinity_u_px_q12 =
+        (int32_t)(ih_mul_shift(tan_q30[0], c->fx_px_q16, 34) + ih_shift_round(c->cx_px_q16, 4));
+    line->infinity_v_px_q12 =
+        (int32_t)(ih_mul_shift(tan_q30[1], c->fy_px_q16, 34) + ih_shift_round(c->cy_px_q16, 4));
 
     /* e = focal * offset: below 2^13 px * 5000 mm = 2^26; in Q8, its square below 2^69: use Q4 less
      * for the length's square and take the root in Q8 from Q16. */

@@ -12,7 +12,7 @@ void ih_samples_params_default(struct ih_samples_params *params)
 {
     *params = (struct ih_samples_params){
         .isolated_mm = 60,
-        .clip_behind_mm = 400,
+        .clip_behind_mm = 250,
         .clip_least_mm = 1100,
         .fill_neighbours = 3,
         .fill_root_weight_q15 = 17948, /* sqrt(0.3) */
@@ -39,8 +39,8 @@ static int32_t percentile_mm_q8(const struct ih_points *points)
 }
 
 /* A slot's neighbour by row and column; NULL beyond the pattern's edge. */
-static const struct ih_point *neighbour(const struct ih_points *points, int32_t slot,
-                                        int32_t d_row, int32_t d_column)
+static const struct ih_point *neighbour(const struct ih_points *points, int32_t slot, int32_t d_row,
+                                        int32_t d_column)
 {
     int32_t row = slot / IH_GRID + d_row;
     int32_t column = slot % IH_GRID + d_column;
@@ -49,8 +49,8 @@ static const struct ih_point *neighbour(const struct ih_points *points, int32_t 
 }
 
 struct surroundings {
-    int32_t seen;    /* of the 8 neighbours */
-    int32_t friends; /* of those, at nearly the same depth */
+    int32_t seen;          /* of the 8 neighbours */
+    int32_t friends;       /* of those, at nearly the same depth */
     int32_t nearest_mm_q8; /* of the seen ones in the 5x5 around; INT32_MAX when none */
 };
 
@@ -143,9 +143,9 @@ static void take_seen(const struct ih_points *points, const struct surroundings 
         return;
     }
     int32_t depth_q8 = ih_min_s32(point->depth_mm_q8, out->clip_mm_q8);
-    add_sample(out, &points->field, point->x_q28, point->y_q28,
-               (struct ih_sample){
-                   .slot = slot, .depth_mm_q8 = depth_q8, .root_weight_q15 = 1 << 15});
+    add_sample(
+        out, &points->field, point->x_q28, point->y_q28,
+        (struct ih_sample){.slot = slot, .depth_mm_q8 = depth_q8, .root_weight_q15 = 1 << 15});
     out->nearest_mm_q8 = ih_min_s32(out->nearest_mm_q8, depth_q8);
 }
 

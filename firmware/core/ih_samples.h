@@ -30,8 +30,8 @@ struct ih_sample {
     int32_t x_q16, y_q16; /* field units from the field's centre */
     int32_t depth_mm_q8;
     int32_t root_weight_q15; /* the row is scaled by this, <= 1 */
-    bool is_filled;          /* a missing dot that was filled in */
     int32_t slot;
+    bool is_filled; /* a missing dot that was filled in */
 };
 
 struct ih_samples {

@@ -56,8 +56,7 @@ static void accumulate(struct ih_surface_scratch *scratch, const struct ih_sampl
     for (int32_t i = 0; i < TERMS; i++) {
         row[i] = (int32_t)ih_mul_shift(scratch->row_q20[i], root_weight_q15, 15);
     }
-    int64_t depth_q8 =
-        ih_mul_shift((int64_t)sample->depth_mm_q8 - mean_mm_q8, root_weight_q15, 15);
+    int64_t depth_q8 = ih_mul_shift((int64_t)sample->depth_mm_q8 - mean_mm_q8, root_weight_q15, 15);
     int64_t *normal = scratch->normal_q40;
     for (int32_t i = 0; i < TERMS; i++) {
         int64_t signed_row = sign * row[i];
@@ -92,8 +91,7 @@ static void assemble(const struct ih_samples *samples, struct ih_surface_scratch
 }
 
 /* N scaled to diagonal 0.99, with ridge, in Q30. */
-static void scale_system(const struct ih_surface_params *params,
-                         struct ih_surface_scratch *scratch)
+static void scale_system(const struct ih_surface_params *params, struct ih_surface_scratch *scratch)
 {
     const int64_t *normal = scratch->normal_q40;
     int32_t *factor = scratch->factor_q30;
@@ -185,8 +183,8 @@ static int32_t reweight(const struct ih_samples *samples, const struct ih_surfac
         for (int32_t k = 0; k < TERMS; k++) {
             sum += (int64_t)scratch->solution[k] * scratch->row_q20[k];
         }
-        int64_t off_q8 = ih_abs_s64((int64_t)sample->depth_mm_q8 -
-                                    depth_of_sum(scratch, out->mean_mm_q8, sum));
+        int64_t off_q8 =
+            ih_abs_s64((int64_t)sample->depth_mm_q8 - depth_of_sum(scratch, out->mean_mm_q8, sum));
         if (off_q8 <= limit_q8) {
             continue;
         }
@@ -208,11 +206,9 @@ static void fill_table(struct ih_surface_scratch *scratch)
     const int64_t denominator2 = IH_SURFACE_STEP_DENOMINATOR * IH_SURFACE_STEP_DENOMINATOR;
     for (int64_t b = 0; b <= IH_SURFACE_GRID; b++) {
         for (int64_t a = 0; a <= IH_SURFACE_GRID; a++) {
-            int64_t radicand_q42 =
-                ih_div_round(((a * a + b * b) * numerator2 + denominator2) * ((int64_t)1 << 42),
-                             denominator2);
-            scratch->table_q20[b][a] =
-                (int32_t)((ih_isqrt_u64((uint64_t)radicand_q42) + 1) >> 1);
+            int64_t radicand_q42 = ih_div_round(
+                ((a * a + b * b) * numerator2 + denominator2) * ((int64_t)1 << 42), denominator2);
+            scratch->table_q20[b][a] = (int32_t)((ih_isqrt_u64((uint64_t)radicand_q42) + 1) >> 1);
         }
     }
 }

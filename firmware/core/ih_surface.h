@@ -45,8 +45,8 @@ struct ih_surface {
     int32_t downweighted_count;
     int32_t mean_mm_q8;
     struct ih_field field;
-    int32_t nearest_mm_q8;               /* least node of the grid */
-    int32_t root_weight_q15[IH_SLOTS];   /* by sample, after the Huber step */
+    int32_t nearest_mm_q8;                                 /* least node of the grid */
+    int32_t root_weight_q15[IH_SLOTS];                     /* by sample, after the Huber step */
     int32_t depth_mm_q8[IH_SURFACE_GRID][IH_SURFACE_GRID]; /* [y][x] */
 };
 

@@ -66,8 +66,8 @@ static enum ih_err check_frame(const struct ih_frame *frame, const struct ih_cal
     }
     bool maximum_ok = c->kind == IH_RIG_RANGE ||
                       (frame->maximum >= 1 && frame->maximum <= (bytes == 1 ? 255 : 65535));
-    bool aligned = (uintptr_t)frame->samples % (uintptr_t)bytes == 0 &&
-                   frame->stride_bytes % bytes == 0;
+    bool aligned =
+        (uintptr_t)frame->samples % (uintptr_t)bytes == 0 && frame->stride_bytes % bytes == 0;
     if (frame->samples == NULL || frame->width < 1 || frame->width != c->width ||
         frame->height != c->height || frame->stride_bytes < frame->width * bytes || !aligned ||
         !maximum_ok) {

@@ -30,8 +30,7 @@ static ssize_t read_text(struct hal_lines *lines)
     return -1;
 }
 
-enum hal_lines_next hal_lines_next(struct hal_lines *lines, cJSON **object,
-                                   struct hal_error *error)
+enum hal_lines_next hal_lines_next(struct hal_lines *lines, cJSON **object, struct hal_error *error)
 {
     errno = 0;
     ssize_t length = read_text(lines);

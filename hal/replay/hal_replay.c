@@ -289,8 +289,8 @@ static enum hal_next next_frame(void *context, struct hal_frame *frame, struct h
         return HAL_NEXT_END;
     }
     const struct hal_replay_entry *entry = &replay->entry[replay->next_index++];
-    *frame = (struct hal_frame){
-        .name = entry->name, .time_us = entry->time_us, .laser = entry->laser};
+    *frame =
+        (struct hal_frame){.name = entry->name, .time_us = entry->time_us, .laser = entry->laser};
     if (entry->bad) {
         fail(error, "%s", entry->error == NULL ? "no memory" : entry->error);
         return HAL_NEXT_BAD;
@@ -299,7 +299,7 @@ static enum hal_next next_frame(void *context, struct hal_frame *frame, struct h
         fail(error, "not listed in " LIST_NAME);
         return HAL_NEXT_BAD;
     }
-    struct hal_pgm pgm;
+    struct hal_pgm pgm = {0};
     if (!load_frame(replay, entry->name, &pgm, error)) {
         return HAL_NEXT_BAD;
     }

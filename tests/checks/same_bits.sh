@@ -5,8 +5,8 @@
 #     same_bits.sh [--every N] CJSON_DIR FRAMES_DIR...
 #
 # CJSON_DIR: a folder with cJSON.c for the cross build. Of each frames directory (or of those below
-# FRAMES_DIR) every Nth frame is used, default 10, and of two of them every stage's raw integers
-# (--trace) too. Builds below build/bits. Exit status 1 on a difference.
+# FRAMES_DIR) every Nth frame is used, default 10, and of one frame of the first and one of the last
+# directory every stage's raw integers (--trace) too. Builds below build/bits. Exit status 1 on a difference.
 set -eu
 LC_ALL=C
 export LC_ALL
@@ -63,7 +63,7 @@ for level in O0 O3; do
         -DISOHEAD_CJSON_DIR="$cjson" -DCMAKE_EXE_LINKER_FLAGS=-static
 done
 
-# host_sim NAME ARGUMENT...
+# host_sim NAME ARGUMENT...: paths in it are relative, so that records are the same every time.
 host_sim() {
     program=$builds/$1/sim/host_sim
     case $1 in
@@ -112,39 +112,41 @@ for dir in "$@"; do
         # The number keeps directories of the same name apart.
         name=$count-$(basename "$from")
         thin "$from" "$work/frames/$name" "$every"
-        if [ $count -le 2 ]; then
-            middle "$from" "$work/traced/$name"
+        if [ $count = 1 ]; then
+            middle "$from" "$work/traced/first"
         fi
     done
 done
+[ $count -le 1 ] || middle "$from" "$work/traced/last"
 [ $count -gt 0 ] || { echo "same_bits: no frames directory (with rig.json) in: $*" >&2; exit 2; }
 
 # --- the comparison ------------------------------------------------------------------------------
 
 printf '%-10s %-18s %-18s %s\n' build "--json" "--json --paper" "--trace of 2 frames"
 lines=$work/lines
+cd "$work"
+mkdir out
 for name in $names; do
-    mkdir -p "$work/out"
-    if ! host_sim "$name" --json "$work/frames" >"$work/out/json" ||
-        ! host_sim "$name" --json --paper "$work/frames" >"$work/out/paper" ||
-        ! host_sim "$name" --json --trace "$work/trace" "$work/traced" >"$work/out/traced"; then
+    if ! host_sim "$name" --json frames >out/json ||
+        ! host_sim "$name" --json --paper frames >out/paper ||
+        ! host_sim "$name" --json --trace trace traced >out/traced; then
         echo "same_bits: host_sim of $name failed" >&2
         exit 1
     fi
-    json=$(sha256sum <"$work/out/json" | cut -c 1-16)
-    paper=$(sha256sum <"$work/out/paper" | cut -c 1-16)
-    trace=$(cd "$work/trace" && find . -type f | sort | xargs cat | sha256sum | cut -c 1-16)
+    json=$(sha256sum <out/json | cut -c 1-16)
+    paper=$(sha256sum <out/paper | cut -c 1-16)
+    trace=$(cd trace && find . -type f | sort | xargs cat | sha256sum | cut -c 1-16)
     printf '%-10s %-18s %-18s %s\n' "$name" "$json" "$paper" "$trace"
     echo "$json $paper $trace" >>"$lines"
-    records=$(wc -l <"$work/out/json")
-    cp "$work/out/json" "$work/$name.json"
-    rm -rf "$work/trace"
+    records=$(wc -l <out/json)
+    cp out/json "$name.json"
+    rm -rf trace
 done
 
 kinds=$(sort -u "$lines" | wc -l)
 if [ "$kinds" != 1 ]; then
     for name in $names; do
-        cmp "$work/gcc-O0.json" "$work/$name.json" || true
+        cmp gcc-O0.json "$name.json" || true
     done
     echo "same_bits: NOT the same bytes" >&2
     exit 1

@@ -385,7 +385,7 @@ run --json --rig nowhere.json d
 check 'rig: --rig names no file' 1 0 0 'nowhere\.json: No such file'
 cp base/a.pgm other.json
 run --json --rig other.json d
-check 'rig: --rig names a frame' 1 0 0 'other\.json: .*expected'
+check 'rig: --rig names a frame' 1 0 0 'other\.json: line 1 column 1: not JSON'
 echo broken >d/rig.json
 run --json --rig base/rig.json d
 check 'rig: --rig in place of a broken one' 0 3 0 -

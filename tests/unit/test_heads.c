@@ -62,13 +62,16 @@ static struct ih_ellipse make_ellipse(double x, double y, double a, double b, do
     return out;
 }
 
-/* A nest of slices every 10 mm down to depth_mm whose area grows by growth mm^2 per mm. */
-static struct ih_nest *add_nest(double x, double y, double nearest_mm, int depth_mm, double growth)
+/* A nest of slices every 10 mm down to depth_mm whose area grows by growth mm^2 per mm. Its tip
+ * stands out by TIP_MM: nothing in here may count from there. */
+#define TIP_MM 37
+static struct ih_nest *add_nest(double x, double y, double front_mm, int depth_mm, double growth)
 {
     struct ih_nest *nest = &hypotheses.nest[hypotheses.nest_count++];
     int t;
 
-    nest->nearest_mm_q8 = (int32_t)lround(256 * nearest_mm);
+    nest->front_mm_q8 = (int32_t)lround(256 * front_mm);
+    nest->nearest_mm_q8 = nest->front_mm_q8 - (TIP_MM << 8);
     nest->minimum = (struct ih_vertex){(int16_t)(x * 512), (int16_t)(y * 512)};
     for (t = 10; t <= depth_mm; t += 10) {
         struct ih_slice *slice = &nest->slice[nest->slice_count++];
@@ -81,9 +84,9 @@ static struct ih_nest *add_nest(double x, double y, double nearest_mm, int depth
     return nest;
 }
 
-static struct ih_nest *add_head(double x, double y, double nearest_mm)
+static struct ih_nest *add_head(double x, double y, double front_mm)
 {
-    return add_nest(x, y, nearest_mm, 110, 250); /* 27,500 mm^2 at 110 mm */
+    return add_nest(x, y, front_mm, 110, 250); /* 27,500 mm^2 at 110 mm */
 }
 
 static void select_heads(void)
@@ -178,38 +181,120 @@ static void the_extent_has_its_limit(void)
     expect_alone(IH_REJECT_CURVATURE, "70 mm");
 }
 
-/* A lying ellipse is no head, a standing one is; one that is nearly round may lie. */
-static void long_heads_stand_upright(void)
+/* The same moments for all slices from first on; xx a power of two, so that the limit is exact. */
+static void set_moments(struct ih_nest *nest, int first, int64_t xx_q16, int64_t yy_q16)
 {
-    double turn;
+    int k;
 
-    for (turn = 0; turn < 180; turn += 7) {
-        struct ih_nest *nest = add_head(20, 22, 850);
-        const bool upright = fabs(turn - 90) < params.tilt_max_mdeg / 1000.0;
-
-        if (fabs(fabs(turn - 90) - params.tilt_max_mdeg / 1000.0) < 1.5) {
-            nest->slice_count = 0; /* the pixels are not square: leave the limit itself alone */
-            hypotheses.nest_count = 0;
-            continue;
-        }
-        nest->slice[nest->slice_count - 1].ellipse = make_ellipse(20, 22, 9, 6, turn);
-        expect_alone(upright ? IH_ACCEPTED : IH_REJECT_SHAPE, "long");
-        nest = add_head(20, 22, 850);
-        nest->slice[nest->slice_count - 1].ellipse = make_ellipse(20, 22, 7, 6, turn);
-        expect_alone(IH_ACCEPTED, "nearly round");
+    for (k = first; k < nest->slice_count; k++) {
+        nest->slice[k].ellipse.xx_q16 = xx_q16;
+        nest->slice[k].ellipse.yy_q16 = yy_q16;
     }
 }
 
-/* The first test that fails is told: area before curvature before shape. */
+static void proportions_have_their_limit(void)
+{
+    const int64_t limit = params.upright_min_q16;
+    int off;
+
+    for (off = -2; off <= 2; off++) {
+        set_moments(add_head(20, 22, 850), 0, 8 << 16, 8 * (limit + off));
+        select_heads();
+        IH_TEST_EQUAL(limit + off, heads.hypothesis[0].upright_q16, "upright", off);
+        expect_alone(off >= 0 ? IH_ACCEPTED : IH_REJECT_SHAPE, "limit");
+    }
+}
+
+/* Slice number k lies 10 (k + 1) mm behind the front: 0 and 1 are the nose's. */
+static void proportions_are_those_of_the_deeper_slices(void)
+{
+    struct ih_nest *nest = add_head(20, 22, 850);
+
+    set_moments(nest, 0, 100 << 16, 1 << 16);
+    set_moments(nest, 2, 8 << 16, 9 << 16);
+    expect_alone(IH_ACCEPTED, "lying up to 20 mm");
+    nest = add_head(20, 22, 850);
+    set_moments(nest, 0, 1 << 16, 100 << 16);
+    set_moments(nest, 2, 9 << 16, 8 << 16);
+    expect_alone(IH_REJECT_SHAPE, "standing up to 20 mm");
+    nest = add_head(20, 22, 850);
+    set_moments(nest, 0, 8 << 16, 9 << 16);
+    nest->slice[2].ellipse.xx_q16 = 100 << 16; /* 9 * 9 over 8 * 8 + 100 */
+    expect_alone(IH_REJECT_SHAPE, "30 mm counts");
+}
+
+/* With nothing as deep as 30 mm the last slice is what there is. */
+static void proportions_of_a_shallow_nest_are_its_last_slices(void)
+{
+    int turn;
+
+    params.extent_min_mm = 0;
+    params.area_min_mm2 = 0;
+    for (turn = 0; turn < 2; turn++) {
+        struct ih_nest *nest = add_nest(20, 22, 850, 20, 250);
+
+        set_moments(nest, 0, 1 << 16, turn == 0 ? 100 << 16 : 1 << 14);
+        set_moments(nest, 1, 8 << 16, turn == 0 ? 4 << 16 : 16 << 16);
+        select_heads();
+        IH_TEST_EQUAL(turn == 0 ? 32768 : 131072, heads.hypothesis[0].upright_q16, "last", turn);
+        expect_alone(turn == 0 ? IH_REJECT_SHAPE : IH_ACCEPTED, "shallow");
+    }
+}
+
+/* Wide slices count most: sums are divided, not quotients averaged. */
+static void proportions_are_sums_over_sums(void)
+{
+    struct ih_nest *nest = add_head(20, 22, 850);
+    double vertical = 0, horizontal = 0;
+    int k;
+
+    for (k = 0; k < nest->slice_count; k++) {
+        const double a = 2 + k, b = k < 6 ? 3 * a : 0.8 * a;
+
+        nest->slice[k].ellipse = make_ellipse(20, 22, a, b, 0);
+        vertical += k < 2 ? 0 : b * b;
+        horizontal += k < 2 ? 0 : a * a;
+    }
+    select_heads();
+    /* Moments are rounded to 2^-16 of at least 4, and the quotient to Q16: two units of about 2. */
+    IH_TEST_WITHIN(4.0 / 65536, vertical / horizontal,
+                   ih_test_from_q(heads.hypothesis[0].upright_q16, 16), "sums", 0);
+}
+
+/* A turned ellipse is as tall as yy is, as wide as xx. */
+static void long_heads_stand_upright(void)
+{
+    const double limit = ih_test_from_q(params.upright_min_q16, 16);
+    int turn, k;
+
+    for (turn = 0; turn < 180; turn++) {
+        const double c = cos(turn * PI / 180), s = sin(turn * PI / 180);
+        const double upright = (81 * s * s + 36 * c * c) / (81 * c * c + 36 * s * s);
+        struct ih_nest *nest = add_head(20, 22, 850);
+
+        for (k = 0; k < nest->slice_count; k++) {
+            nest->slice[k].ellipse = make_ellipse(20, 22, 9, 6, turn);
+        }
+        select_heads();
+        /* Moments of at least 9 rounded to 2^-16, and the quotient of up to 2.25: one unit each. */
+        IH_TEST_WITHIN(2.0 / 65536, upright, ih_test_from_q(heads.hypothesis[0].upright_q16, 16),
+                       "upright", turn);
+        expect_alone(upright >= limit ? IH_ACCEPTED : IH_REJECT_SHAPE, "long");
+    }
+}
+
+/* The first test that fails is told: area before curvature before shape before outline. */
 static void the_first_failed_test_is_told(void)
 {
-    struct ih_nest *nest = add_nest(20, 22, 850, 110, 600);
-
-    nest->slice[nest->slice_count - 1].ellipse = make_ellipse(20, 22, 9, 6, 0);
+    ih_heads_params_default(&params); /* there are no samples: the outline always fails */
+    set_moments(add_nest(20, 22, 850, 60, 1000), 0, 2 << 16, 1 << 16);
     expect_alone(IH_REJECT_AREA, "area first");
-    nest = add_nest(20, 22, 850, 70, 250);
-    nest->slice[nest->slice_count - 1].ellipse = make_ellipse(20, 22, 9, 6, 0);
+    set_moments(add_nest(20, 22, 850, 60, 250), 0, 2 << 16, 1 << 16);
     expect_alone(IH_REJECT_CURVATURE, "then curvature");
+    set_moments(add_head(20, 22, 850), 0, 2 << 16, 1 << 16);
+    expect_alone(IH_REJECT_SHAPE, "then shape");
+    add_head(20, 22, 850);
+    expect_alone(IH_REJECT_OUTLINE, "outline last");
     TEST_ASSERT_EQUAL_STRING("area", ih_reject_text(IH_REJECT_AREA));
     TEST_ASSERT_EQUAL_STRING("curvature", ih_reject_text(IH_REJECT_CURVATURE));
     TEST_ASSERT_EQUAL_STRING("shape", ih_reject_text(IH_REJECT_SHAPE));
@@ -297,16 +382,16 @@ static void the_middle_is_that_of_the_deeper_slices(void)
     int k;
 
     for (k = 0; k < nest->slice_count; k++) {
-        const double middle = k < 3 ? 30 : 20 + 0.2 * k;
+        const double middle = k < 2 ? 30 : 20 + 0.2 * k;
         const double size = 4 + 0.5 * k;
 
         nest->slice[k].ellipse = make_ellipse(middle, 22, size, size, 0);
-        sum += k < 3 ? 0 : middle * size * size;
-        weight += k < 3 ? 0 : size * size;
+        sum += k < 2 ? 0 : middle * size * size;
+        weight += k < 2 ? 0 : size * size;
     }
     select_heads();
     x = normalised(sum / weight, surface.field.centre_x_q28);
-    /* Each of the three nearer slices may weigh up to a 256th of a step's area: 30 units of 2^16.
+    /* Each of the two slices nearer than 30 mm may weigh up to a 256th of a step's area: 30 units of 2^16.
      */
     IH_TEST_WITHIN(0.02, x * c->fx_px_q16 / 65536 + c->cx_px_q16 / 65536.0,
                    ih_test_from_q(heads.hypothesis[0].u_px_q12, 12), "u", 0);
@@ -357,24 +442,31 @@ static void pixel_ellipses_match_the_closed_form(void)
 
 enum sector { ABOVE = -90, BESIDE = 0, BELOW = 90 };
 
-/* Samples at so many times the radius, in a narrow bundle of directions. */
+/* A sample at so many times the radius. The weight says nothing: it is the wrong way round. */
+static void put_sample(double radius, double direction_deg, double depth_mm, bool seen)
+{
+    struct ih_sample *sample = &samples.sample[samples.sample_count++];
+    const double angle = direction_deg * PI / 180;
+    const double per_step = 10.0 / 11;
+
+    sample->x_q16 = (int32_t)lround(ldexp(RADIUS * radius * cos(angle) * per_step, 16));
+    sample->y_q16 = (int32_t)lround(ldexp(RADIUS * radius * sin(angle) * per_step, 16));
+    sample->depth_mm_q8 = (int32_t)lround(256 * depth_mm);
+    sample->root_weight_q15 = seen ? 17948 : 32768;
+    sample->is_filled = !seen;
+}
+
+/* Samples in a bundle of 20 degrees. */
 static void put_samples(int32_t count, double radius, int direction_deg, double depth_mm, bool seen)
 {
     int32_t i;
 
     for (i = 0; i < count; i++) {
-        struct ih_sample *sample = &samples.sample[samples.sample_count++];
-        const double angle = (direction_deg + 2 * i - count) * PI / 180;
-        const double per_step = 10.0 / 11;
-
-        sample->x_q16 = (int32_t)lround(ldexp(RADIUS * radius * cos(angle) * per_step, 16));
-        sample->y_q16 = (int32_t)lround(ldexp(RADIUS * radius * sin(angle) * per_step, 16));
-        sample->depth_mm_q8 = (int32_t)lround(256 * depth_mm);
-        sample->root_weight_q15 = seen ? 32768 : 17948;
+        put_sample(radius, direction_deg - 10 + 20 * (i + 0.5) / count, depth_mm, seen);
     }
 }
 
-/* So many of ten above and beside lie behind, so many below do not. */
+/* So many of a hundred above and beside lie behind, so many below do not. */
 static void expect_outline(int32_t inside, int32_t above, int32_t beside, int32_t below,
                            int32_t rejected, const char *what)
 {
@@ -387,42 +479,79 @@ static void expect_outline(int32_t inside, int32_t above, int32_t beside, int32_
     add_head(23, 23, 850);
     put_samples(inside, 0.5, ABOVE, 900, true);
     put_samples(above, 1.5, ABOVE, far_mm, true);
-    put_samples(10 - above, 1.4, ABOVE, near_mm, true);
+    put_samples(100 - above, 1.4, ABOVE, near_mm, true);
     put_samples(beside, 1.5, BESIDE, far_mm, true);
-    put_samples(10 - beside, 1.4, BESIDE + 180, near_mm, true);
-    put_samples(10 - below, 1.5, BELOW, far_mm, true);
+    put_samples(100 - beside, 1.4, BESIDE + 180, near_mm, true);
+    put_samples(100 - below, 1.5, BELOW, far_mm, true);
     put_samples(below, 1.4, BELOW, near_mm, true);
     select_heads();
-    IH_TEST_EQUAL(rejected, heads.hypothesis[0].rejected, what, 0);
     IH_TEST_EQUAL(inside, o->inside, what, 1);
-    IH_TEST_EQUAL(10, o->above, what, 2);
+    IH_TEST_EQUAL(100, o->above, what, 2);
     IH_TEST_EQUAL(above, o->above_behind, what, 3);
-    IH_TEST_EQUAL(10, o->beside, what, 4);
+    IH_TEST_EQUAL(100, o->beside, what, 4);
     IH_TEST_EQUAL(beside, o->beside_behind, what, 5);
-    IH_TEST_EQUAL(10, o->below, what, 6);
+    IH_TEST_EQUAL(100, o->below, what, 6);
     IH_TEST_EQUAL(below, o->below_near, what, 7);
-}
-
-static int32_t tenths(int32_t percent)
-{
-    return (percent + 9) / 10;
+    IH_TEST_EQUAL(rejected, heads.hypothesis[0].rejected, what, 0);
+    IH_TEST_EQUAL(rejected == IH_ACCEPTED, heads.head_count, what, 8);
 }
 
 static void a_head_stands_out_from_what_is_round_it(void)
 {
-    int32_t inside, above, beside, below;
+    struct ih_heads_params least;
 
+    ih_heads_params_default(&least);
+    expect_outline(30, 100, 100, 100, IH_ACCEPTED, "a clear case");
+    expect_outline(least.points_min, least.above_min_percent, least.beside_min_percent,
+                   least.below_min_percent, IH_ACCEPTED, "all at their limits");
+}
+
+static void each_part_of_the_outline_rejects_alone(void)
+{
+    struct ih_heads_params least;
+
+    ih_heads_params_default(&least);
+    expect_outline(least.points_min, 100, 100, 100, IH_ACCEPTED, "just enough points");
+    expect_outline(least.points_min - 1, 100, 100, 100, IH_REJECT_OUTLINE, "too few points");
+    expect_outline(30, least.above_min_percent, 100, 100, IH_ACCEPTED, "above, just");
+    expect_outline(30, least.above_min_percent - 1, 100, 100, IH_REJECT_OUTLINE, "above");
+    expect_outline(30, 100, least.beside_min_percent, 100, IH_ACCEPTED, "beside, just");
+    expect_outline(30, 100, least.beside_min_percent - 1, 100, IH_REJECT_OUTLINE, "beside");
+    expect_outline(30, 100, 100, least.below_min_percent, IH_ACCEPTED, "below, just");
+    expect_outline(30, 100, 100, least.below_min_percent - 1, IH_REJECT_OUTLINE, "below");
+}
+
+/* A head at the pattern's edge has nothing on that side: that is no reason against it. */
+static void an_empty_side_rejects_nothing(void)
+{
     ih_heads_params_default(&params);
-    inside = params.points_min;
-    above = tenths(params.above_min_percent);
-    beside = tenths(params.beside_min_percent);
-    below = tenths(params.below_min_percent);
-    expect_outline(30, 10, 10, 10, IH_ACCEPTED, "a clear case");
-    expect_outline(inside, above, beside, below, IH_ACCEPTED, "all at their limits");
-    expect_outline(inside - 1, 10, 10, 10, IH_REJECT_OUTLINE, "too few points");
-    expect_outline(30, above - 1, 10, 10, IH_REJECT_OUTLINE, "above");
-    expect_outline(30, 10, beside - 1, 10, IH_REJECT_OUTLINE, "beside");
-    expect_outline(30, 10, 10, below - 1, IH_REJECT_OUTLINE, "below");
+    add_head(23, 23, 850);
+    put_samples(params.points_min, 0.5, ABOVE, 900, true);
+    expect_alone(IH_ACCEPTED, "nothing around");
+}
+
+/* Above is steeper than one in two, below steeper than one in one; all round, degree by degree. */
+static void the_sides_have_their_borders(void)
+{
+    int degree;
+
+    for (degree = 0; degree < 360; degree++) {
+        const struct ih_outline *o = &heads.hypothesis[0].outline;
+        const double dx = cos(degree * PI / 180), dy = sin(degree * PI / 180);
+        const bool above = 2 * dy<-fabs(dx), below = dy> fabs(dx);
+
+        if (fabs(dy - fabs(dx)) < 0.01) {
+            continue; /* on the border itself rounding decides */
+        }
+        memset(&hypotheses, 0, sizeof hypotheses);
+        samples.sample_count = 0;
+        add_head(23, 23, 850);
+        put_sample(1.5, degree, 900, true);
+        select_heads();
+        IH_TEST_EQUAL(above, o->above, "above", degree);
+        IH_TEST_EQUAL(below, o->below, "below", degree);
+        IH_TEST_EQUAL(!above && !below, o->beside, "beside", degree);
+    }
 }
 
 static void what_was_not_seen_lies_behind(void)
@@ -600,8 +729,8 @@ static void the_ends_of_all_ranges_are_survived(void)
     surface.field = (struct ih_field){INT32_MAX / 2, INT32_MIN / 2, 1 << 26};
     surface.depth_mm_q8[0][0] = surface.depth_mm_q8[SIDE - 1][SIDE - 1] = 1 << 23;
     samples.sample_count = 2;
-    samples.sample[0] = (struct ih_sample){-2621439, -2621439, 1, 32768, 0};
-    samples.sample[1] = (struct ih_sample){2621439, 2621439, 16000 << 8, 1, 1};
+    samples.sample[0] = (struct ih_sample){-2621439, -2621439, 1, 32768, false, 0};
+    samples.sample[1] = (struct ih_sample){2621439, 2621439, 16000 << 8, 1, true, 1};
     select_heads();
     TEST_ASSERT_EQUAL_INT32(2, heads.hypothesis_count);
     TEST_ASSERT_EQUAL_INT32(0, heads.head_count);
@@ -615,6 +744,10 @@ int main(void)
     RUN_TEST(curvatures_have_their_limits);
     RUN_TEST(curvature_is_fitted_to_the_first_70_mm);
     RUN_TEST(the_extent_has_its_limit);
+    RUN_TEST(proportions_have_their_limit);
+    RUN_TEST(proportions_are_those_of_the_deeper_slices);
+    RUN_TEST(proportions_of_a_shallow_nest_are_its_last_slices);
+    RUN_TEST(proportions_are_sums_over_sums);
     RUN_TEST(long_heads_stand_upright);
     RUN_TEST(the_first_failed_test_is_told);
     RUN_TEST(places_match_the_closed_form);
@@ -623,6 +756,9 @@ int main(void)
     RUN_TEST(the_middle_is_that_of_the_deeper_slices);
     RUN_TEST(pixel_ellipses_match_the_closed_form);
     RUN_TEST(a_head_stands_out_from_what_is_round_it);
+    RUN_TEST(each_part_of_the_outline_rejects_alone);
+    RUN_TEST(an_empty_side_rejects_nothing);
+    RUN_TEST(the_sides_have_their_borders);
     RUN_TEST(what_was_not_seen_lies_behind);
     RUN_TEST(only_the_ring_is_looked_at);
     RUN_TEST(behind_begins_beyond_the_jump);

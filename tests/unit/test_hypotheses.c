@@ -95,9 +95,20 @@ static void check_nests(void)
                       nest->nearest_mm_q8, "depth of the minimum", i);
         TEST_ASSERT_TRUE(i == 0 || nest[-1].nearest_mm_q8 <= nest->nearest_mm_q8);
         IH_TEST_RANGE(0, IH_HYPOTHESES_SLICES_MAX, nest->slice_count, "slices", i);
+        TEST_ASSERT_TRUE(nest->front_mm_q8 >= nest->nearest_mm_q8);
+        if (nest->slice_count == 0) {
+            IH_TEST_EQUAL(nest->nearest_mm_q8, nest->front_mm_q8, "front without slices", i);
+        } else {
+            TEST_ASSERT_TRUE(nest->slice[0].area_mm2 >= params.blunt_mm2);
+        }
         for (k = 0; k < nest->slice_count; k++) {
             const struct ih_slice *slice = &nest->slice[k];
 
+            /* the front and what lies behind it add up to a level */
+            IH_TEST_EQUAL(0,
+                          (nest->front_mm_q8 + slice->behind_mm_q8 - surface.nearest_mm_q8) %
+                              (params.level_step_mm << 8),
+                          "level", k);
             IH_TEST_RANGE(1, params.depth_max_mm << 8, slice->behind_mm_q8, "behind", k);
             TEST_ASSERT_TRUE(k == 0 || slice->behind_mm_q8 > slice[-1].behind_mm_q8);
             TEST_ASSERT_TRUE(slice->ellipse.area_q16 > 0 && slice->area_mm2 > 0);
@@ -132,14 +143,14 @@ static const struct ih_nest *nest_at(double x, double y)
     return NULL;
 }
 
-/* Closed form: t behind the front the cut is pi a b (1 - (1 - t / c)^2). */
+/* Closed form: t behind the ellipsoid's front the cut is pi a b (1 - (1 - t / c)^2). */
 static void check_slices(const struct ih_nest *nest, const struct half_ellipsoid *e, int32_t least)
 {
     int32_t k, compared = 0;
 
     for (k = 0; k < nest->slice_count; k++) {
         const struct ih_slice *slice = &nest->slice[k];
-        const double level = ih_test_from_q(nest->nearest_mm_q8 + slice->behind_mm_q8, 8);
+        const double level = ih_test_from_q(nest->front_mm_q8 + slice->behind_mm_q8, 8);
         const double part = (level - e->front_mm) / e->depth_mm;
         const double area = PI * e->a * e->b * (1 - (1 - part) * (1 - part));
         const double small = sqrt(area / PI);
@@ -181,6 +192,137 @@ static void an_ellipsoid_before_a_wall_is_one_nest(void)
         TEST_ASSERT_NOT_NULL(nest_at(heads[i].x, heads[i].y));
         check_slices(&hypotheses.nest[0], &heads[i], 3);
     }
+}
+
+/* Fine steps, 4.25 mm at 850 mm: so that a tip of less than blunt_mm2 spans several cells. */
+#define FINE_UNIT_Q28 1476395 /* 0.0055 */
+#define SPIKE_RADIUS 4.0      /* steps, where it is as high as SPIKE_HEIGHT_MM */
+#define SPIKE_HEIGHT_MM 45.0
+
+/* A spike, a paraboloid whose tip is so far before the front of a round ellipsoid. */
+static void put_spiked(const struct half_ellipsoid *e, double spike_mm)
+{
+    int32_t x, y;
+
+    surface.field.unit_q28 = FINE_UNIT_Q28;
+    set_plane(e->front_mm + 400, 0, 0);
+    put_ellipsoid(e);
+    for (y = 0; y < SIDE; y++) {
+        for (x = 0; x < SIDE; x++) {
+            const double r2 =
+                ((x - e->x) * (x - e->x) + (y - e->y) * (y - e->y)) / (SPIKE_RADIUS * SPIKE_RADIUS);
+
+            if (spike_mm > 0 && r2 < 4) {
+                put_nearer(x, y, e->front_mm - spike_mm + SPIKE_HEIGHT_MM * r2);
+            }
+        }
+    }
+    find();
+    check_nests();
+    TEST_ASSERT_NOT_NULL(nest_at(e->x, e->y));
+}
+
+/* Both are round and have one axis: the cut is the greater of the two circles, mm^2. */
+static double spiked_area_mm2(const struct half_ellipsoid *e, double spike_mm, double level_mm)
+{
+    const double step = level_mm * ih_test_from_q(FINE_UNIT_Q28, 28) * IH_SURFACE_STEP_NUMERATOR /
+                        IH_SURFACE_STEP_DENOMINATOR;
+    const double t = level_mm - e->front_mm;
+    const double body = t <= 0 ? 0 : e->a * e->a * (1 - pow(1 - t / e->depth_mm, 2));
+    const double spike =
+        spike_mm <= 0 ? 0 : SPIKE_RADIUS * SPIKE_RADIUS * (t + spike_mm) / SPIKE_HEIGHT_MM;
+
+    return PI * fmax(body, spike) * step * step;
+}
+
+/* The front in closed form: between the levels, 10 mm apart from the tip on, before and behind
+ * which the area passes blunt_mm2; less blunt_mm2 over a head's growth of 565 mm^2 per mm. */
+static double spiked_front_mm(const struct half_ellipsoid *e, double spike_mm, double *passed_level)
+{
+    double level = e->front_mm - spike_mm, area = 0, next = 0;
+
+    for (;; level += params.level_step_mm, area = next) {
+        next = spiked_area_mm2(e, spike_mm, level + params.level_step_mm);
+        if (next >= params.blunt_mm2) {
+            break;
+        }
+    }
+    *passed_level = level + params.level_step_mm;
+    return fmax(e->front_mm - spike_mm,
+                level + params.level_step_mm * (params.blunt_mm2 - area) / (next - area) -
+                    params.blunt_mm2 / 565.0);
+}
+
+static void the_tip_is_passed_over(void)
+{
+    static const struct half_ellipsoid head = {23, 23, 19, 19, 850, 98};
+    int32_t spike, compared = 0;
+
+    for (spike = 0; spike <= 66; spike += 3) {
+        double level;
+        const double front = spiked_front_mm(&head, spike, &level);
+        const double area = spiked_area_mm2(&head, spike, level);
+        const struct ih_nest *nest;
+
+        if (fabs(area / params.blunt_mm2 - 1) < 0.2 ||
+            fabs(spiked_area_mm2(&head, spike, level - 10) / params.blunt_mm2 - 1) < 0.2) {
+            continue; /* the grid may see either side of the limit */
+        }
+        put_spiked(&head, spike);
+        nest = nest_at(head.x, head.y);
+        TEST_ASSERT_NOT_NULL(nest);
+        TEST_ASSERT_TRUE(nest->slice_count >= 5);
+        IH_TEST_EQUAL((850 - spike) << 8, nest->nearest_mm_q8, "nearest", spike);
+        IH_TEST_WITHIN(0.02, level,
+                       ih_test_from_q(nest->front_mm_q8 + nest->slice[0].behind_mm_q8, 8),
+                       "first slice that is not the tip's", spike);
+        /* Areas of 4 to 8 steps' radius are good to 1.25 / r^2 (as above): 3 to 8 % of up to
+         * 2000 mm^2 at the tip and of 2500 to 7000 mm^2 behind it. Of the 10 mm between them the
+         * limit lies at a part that is then good to 8 %. */
+        IH_TEST_WITHIN(0.8, front, ih_test_from_q(nest->front_mm_q8, 8), "front", spike);
+        /* That is the ellipsoid's front, not the spike's tip. A sphere of 19 steps grows by 390 mm
+         * a mm, not by 565: it needs 5.2 mm, of which 3.5 are allowed for. */
+        IH_TEST_WITHIN(2, head.front_mm, ih_test_from_q(nest->front_mm_q8, 8), "true front", spike);
+        compared++;
+    }
+    TEST_ASSERT_TRUE(compared >= 15);
+}
+
+/* With nothing to pass over a nest begins at its minimum. */
+static void without_a_limit_there_is_no_tip(void)
+{
+    static const struct half_ellipsoid head = {23, 23, 19, 19, 850, 98};
+    const struct ih_nest *nest = &hypotheses.nest[0];
+
+    params.blunt_mm2 = 0;
+    put_spiked(&head, 40);
+    TEST_ASSERT_TRUE(nest == nest_at(head.x, head.y));
+    TEST_ASSERT_EQUAL_INT32(810 << 8, nest->nearest_mm_q8);
+    TEST_ASSERT_EQUAL_INT32(nest->nearest_mm_q8, nest->front_mm_q8);
+    TEST_ASSERT_EQUAL_INT32(10 << 8, nest->slice[0].behind_mm_q8);
+}
+
+/* 75 mm: the cut is still the spike's 70 mm behind its tip and the ellipsoid's at 80. */
+static void a_tip_that_is_too_long_ends_the_nest(void)
+{
+    static const struct half_ellipsoid head = {23, 23, 19, 19, 850, 98};
+    static const int32_t most[] = {70, 69, 100, 40};
+    int i;
+
+    for (i = 0; i < IH_TEST_COUNT(most); i++) {
+        const struct ih_nest *nest;
+
+        params.tip_max_mm = most[i];
+        put_spiked(&head, 75);
+        nest = nest_at(head.x, head.y);
+        TEST_ASSERT_NOT_NULL(nest);
+        IH_TEST_EQUAL(most[i] < 70, nest->slice_count == 0, "tip", most[i]);
+        TEST_ASSERT_TRUE(nest->ended);
+    }
+    params.tip_max_mm = 70;
+    put_spiked(&head, 85); /* 80 mm and still thin */
+    TEST_ASSERT_EQUAL_INT32(0, nest_at(head.x, head.y)->slice_count);
+    TEST_ASSERT_TRUE(nest_at(head.x, head.y)->ended);
 }
 
 static void two_ellipsoids_are_two_nests(void)
@@ -272,6 +414,11 @@ static void a_bump_in_a_crater_stands_on_its_own_contours(void)
     check_slices(nest_at(bump.x, bump.y), &bump, 3);
 }
 
+static int32_t below_tip_q8(const struct ih_nest *nest, int32_t slice)
+{
+    return nest->front_mm_q8 + nest->slice[slice].behind_mm_q8 - nest->nearest_mm_q8;
+}
+
 /* Depth behind the tip at which a five-lobed body is as wide as r in direction angle: round at the
  * tip and from 120 mm on, lobed in between, ever wider. */
 static double lobed_depth_mm(double r, double angle)
@@ -305,14 +452,81 @@ static void a_nest_bridges_as_many_levels_as_it_may(void)
     check_nests();
     TEST_ASSERT_EQUAL_INT32(1, hypotheses.nest_count);
     for (k = 0; k < nest->slice_count; k++) {
-        between += nest->slice[k].behind_mm_q8 > 75 << 8 && nest->slice[k].behind_mm_q8 < 85 << 8;
+        between += below_tip_q8(nest, k) > 75 << 8 && below_tip_q8(nest, k) < 85 << 8;
     }
     TEST_ASSERT_EQUAL_INT32(0, between);
-    TEST_ASSERT_TRUE(nest->slice[nest->slice_count - 1].behind_mm_q8 >= 110 << 8);
+    TEST_ASSERT_TRUE(below_tip_q8(nest, nest->slice_count - 1) >= 110 << 8);
     params.gap_max = 1;
     find();
     TEST_ASSERT_TRUE(nest->ended);
-    TEST_ASSERT_TRUE(nest->slice[nest->slice_count - 1].behind_mm_q8 < 80 << 8);
+    TEST_ASSERT_TRUE(below_tip_q8(nest, nest->slice_count - 1) < 80 << 8);
+}
+
+/* A five-lobed body that widens by 0.12 steps per mm: its outline at t is 3 + 0.12 t times
+ * 1 + e cos 5a. The lobes swell and vanish twice, about 50 and about 120 mm behind the tip. */
+static double lobes_at(double t)
+{
+    if (t > 20 && t < 80) {
+        return 0.25 * pow(sin(PI * (t - 20) / 60), 2);
+    }
+    return t > 80 && t < 160 ? 0.25 * pow(sin(PI * (t - 80) / 80), 2) : 0;
+}
+
+/* Its shape, 4 pi sqrt(det) / area, with area pi R^2 (1 + e^2 / 2) and fourth moment
+ * pi R^4 / 4 (1 + 3 e^2 + 3 e^4 / 8) in either direction. */
+static double lobed_shape(double e)
+{
+    return (1 + 3 * e * e + 3 * pow(e, 4) / 8) / pow(1 + e * e / 2, 2);
+}
+
+static void put_twice_lobed(void)
+{
+    int32_t x, y;
+
+    for (y = 0; y < SIDE; y++) {
+        for (x = 0; x < SIDE; x++) {
+            const double r = hypot(x - 23, y - 23), angle = atan2(y - 23, x - 23);
+            double t = 0;
+
+            while (t < 300 && (3 + 0.12 * t) * (1 + lobes_at(t) * cos(5 * angle)) <= r) {
+                t += 0.25;
+            }
+            surface.depth_mm_q8[y][x] = (int32_t)lround(256 * (800 + t + 0.02 * r));
+        }
+    }
+}
+
+/* Two gaps of three levels: a nest that may bridge three gets over both, one after the other. */
+static void a_bridged_gap_is_forgotten(void)
+{
+    const struct ih_nest *nest = &hypotheses.nest[0];
+    int32_t t, k = 0, missing = 0;
+
+    params.ellipse.chord_max_q16 = 0; /* no parts: the closed contour or nothing */
+    params.depth_max_mm = 155;
+    params.end_depth_mm = 1000; /* after a gap the area is three times as large */
+    params.gap_max = 3;
+    put_twice_lobed();
+    find();
+    check_nests();
+    TEST_ASSERT_EQUAL_INT32(1, hypotheses.nest_count);
+    for (t = 10; t <= 150; t += 10) {
+        const bool elliptical =
+            lobed_shape(lobes_at(t)) <= ih_test_from_q(params.ellipse.shape_max_q16, 16);
+
+        missing += !elliptical;
+        if (elliptical) {
+            TEST_ASSERT_TRUE(k < nest->slice_count);
+            IH_TEST_EQUAL(t << 8, below_tip_q8(nest, k), "level of a slice", t);
+            k++;
+        }
+    }
+    TEST_ASSERT_EQUAL_INT32(6, missing); /* 40, 50, 60 and 110, 120, 130 */
+    TEST_ASSERT_EQUAL_INT32(k, nest->slice_count);
+    params.gap_max = 2;
+    find();
+    TEST_ASSERT_TRUE(nest->ended);
+    TEST_ASSERT_EQUAL_INT32(3, nest->slice_count); /* 10, 20, 30 */
 }
 
 static void planes_have_no_minimum(void)
@@ -351,7 +565,7 @@ static void a_flat_top_is_one_minimum(void)
 static void a_head_on_shoulders_is_cut_out(void)
 {
     static const struct half_ellipsoid head = {23, 16, 6.5, 9, 850, 100};
-    static const struct half_ellipsoid body = {23, 44, 19, 22, 870, 190};
+    static const struct half_ellipsoid body = {23, 44, 19, 22, 870, 120};
     int32_t k, parts = 0;
 
     set_plane(1400, 0, 0);
@@ -372,8 +586,93 @@ static void a_head_on_shoulders_is_cut_out(void)
     TEST_ASSERT_TRUE(parts >= 2);
 }
 
-/* A knob on a dish: where the cut reaches the dish its area jumps to five times. Before end_depth a
- * nest may grow like that, later it ends. */
+/* Ellipses of width x 11 steps that grow out of a minimum near their upper end, whole at 45 mm; behind
+ * them, at 55 mm, a plate that begins in row top_row and leaves the grid on three sides. */
+static void put_egg_on_plate(double width, double top_row)
+{
+    int32_t x, y;
+
+    set_plane(2000, 0, 0);
+    for (y = 0; y < SIDE; y++) {
+        for (x = 0; x < SIDE; x++) {
+            double t = 0;
+
+            /* at t the ellipse's middle is 7 s below the minimum, its axes width s and 11 s */
+            while (t < 46 &&
+                   pow((x - 23) / width, 2) + pow((y - 13 - 7 * t / 45) / 11, 2) > pow(t / 45, 2)) {
+                t += 0.125;
+            }
+            if (t < 46) {
+                put_nearer(x, y, 850 + t);
+            }
+            /* a ramp of one step, so that the edge lies where it is wanted */
+            if (y >= top_row - 1) {
+                put_nearer(x, y, 910 - fmin(y - top_row, 1) * 5);
+            }
+        }
+    }
+}
+
+/* The part of the level's contours that supports the nest best, mm^2; 0 when there is none. */
+static double part_mm2(const struct ih_nest *nest, double level_mm)
+{
+    static struct ih_cuts cuts;
+    static struct ih_ellipse_scratch ellipse_scratch;
+    struct ih_ellipse part, best = {0};
+    int32_t i, parts = 0;
+
+    ih_cuts_level(&surface, (int32_t)lround(256 * level_mm), &cuts);
+    for (i = 0; i < cuts.contour_count; i++) {
+        if (ih_ellipse_of_part(&cuts, &cuts.contour[i], nest->minimum, &params.ellipse,
+                               &ellipse_scratch, &part)) {
+            best = part;
+            parts++;
+        }
+    }
+    TEST_ASSERT_TRUE(parts <= 1); /* else it would have to be the better one */
+    return ih_test_from_q(best.area_q16, 16) * step_mm(level_mm) * step_mm(level_mm);
+}
+
+/* At 60 mm the cut is the egg and the plate, and only the egg's upper end is elliptical: the less,
+ * the higher the plate reaches. */
+static void a_nest_that_shrinks_ends(void)
+{
+    double most_ended = 0, least_kept = 1;
+    int i;
+
+    params.blunt_mm2 = 0;
+    params.ellipse.shape_max_q16 = 70779; /* 1.08: half an ellipse has 1.058 */
+    for (i = 0; i < 25 * 32; i++) {
+        const struct ih_nest *nest;
+        double part, proportion;
+
+        put_egg_on_plate(6 + 0.05 * (i / 32), 22 + i % 32 / 16.0);
+        find();
+        check_nests();
+        nest = nest_at(23, 13);
+        TEST_ASSERT_NOT_NULL(nest);
+        TEST_ASSERT_TRUE(nest->slice_count >= 5); /* 10 .. 50 mm, the egg alone */
+        TEST_ASSERT_TRUE(nest->slice[4].whole);
+        part = part_mm2(nest, 910);
+        proportion = part / nest->slice[4].area_mm2;
+        if (part <= 0 || fabs(proportion - 0.6) < 0.0005) {
+            continue; /* areas are rounded to whole mm^2 of 16,000 to 35,000 */
+        }
+        IH_TEST_EQUAL(proportion < 0.6, nest->slice_count == 5, "shrinks",
+                      lround(1e4 * proportion));
+        TEST_ASSERT_TRUE(proportion > 0.6 || nest->ended);
+        if (proportion < 0.6) {
+            most_ended = fmax(most_ended, proportion);
+        } else {
+            least_kept = fmin(least_kept, proportion);
+        }
+    }
+    /* Both sides were there, and close by. */
+    TEST_ASSERT_TRUE(most_ended > 0.59 && least_kept < 0.61);
+}
+
+/* A knob on a dish: where the cut reaches the dish its area jumps to fourteen times. Before end_depth
+ * a nest may grow like that, later it ends. The knob is thin: the tip has tests of its own. */
 static void put_knob_on_dish(double knob_mm)
 {
     const struct half_ellipsoid knob = {23, 23, 4, 4.5, 850, knob_mm};
@@ -382,7 +681,7 @@ static void put_knob_on_dish(double knob_mm)
     set_plane(3000, 0, 0);
     for (y = 0; y < SIDE; y++) {
         for (x = 0; x < SIDE; x++) {
-            put_nearer(x, y, 850 + knob_mm + 1 + 0.5 * hypot(x - 23, y - 23));
+            put_nearer(x, y, 850 + knob_mm + 1 + 0.25 * hypot(x - 23, y - 23));
         }
     }
     put_ellipsoid(&knob);
@@ -392,19 +691,22 @@ static void a_jump_in_area_ends_a_nest_once_it_is_deep(void)
 {
     const struct ih_nest *nest = &hypotheses.nest[0];
 
+    params.blunt_mm2 = 0;
     put_knob_on_dish(75);
     find();
     check_nests();
     TEST_ASSERT_EQUAL_INT32(1, hypotheses.nest_count);
     TEST_ASSERT_EQUAL_INT32(7, nest->slice_count); /* 10 .. 70 mm */
     TEST_ASSERT_TRUE(nest->ended);
-    put_knob_on_dish(32);
+    put_knob_on_dish(45); /* the jump is at 50 mm, which is end_depth */
     find();
-    check_nests();
-    TEST_ASSERT_EQUAL_INT32(1, hypotheses.nest_count);
-    TEST_ASSERT_TRUE(nest->slice_count >= 4);
-    TEST_ASSERT_TRUE(nest->slice[nest->slice_count - 1].ellipse.area_q16 >
-                     4 * nest->slice[2].ellipse.area_q16);
+    TEST_ASSERT_EQUAL_INT32(50, params.end_depth_mm);
+    TEST_ASSERT_EQUAL_INT32(4, nest->slice_count);
+    TEST_ASSERT_TRUE(nest->ended);
+    params.end_depth_mm = 51;
+    find();
+    TEST_ASSERT_TRUE(nest->slice_count >= 5);
+    TEST_ASSERT_TRUE(nest->slice[4].ellipse.area_q16 > 8 * nest->slice[3].ellipse.area_q16);
 }
 
 static void a_nest_reaches_no_deeper_than_it_may(void)
@@ -519,14 +821,19 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(an_ellipsoid_before_a_wall_is_one_nest);
+    RUN_TEST(the_tip_is_passed_over);
+    RUN_TEST(without_a_limit_there_is_no_tip);
+    RUN_TEST(a_tip_that_is_too_long_ends_the_nest);
     RUN_TEST(two_ellipsoids_are_two_nests);
     RUN_TEST(a_pit_supports_nothing);
     RUN_TEST(a_pit_in_a_bulge_is_no_slice);
     RUN_TEST(a_bump_in_a_crater_stands_on_its_own_contours);
     RUN_TEST(a_nest_bridges_as_many_levels_as_it_may);
+    RUN_TEST(a_bridged_gap_is_forgotten);
     RUN_TEST(planes_have_no_minimum);
     RUN_TEST(a_flat_top_is_one_minimum);
     RUN_TEST(a_head_on_shoulders_is_cut_out);
+    RUN_TEST(a_nest_that_shrinks_ends);
     RUN_TEST(a_jump_in_area_ends_a_nest_once_it_is_deep);
     RUN_TEST(a_nest_reaches_no_deeper_than_it_may);
     RUN_TEST(the_nearest_minima_are_kept);

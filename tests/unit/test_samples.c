@@ -35,6 +35,12 @@ void setUp(void)
 
     TEST_ASSERT_EQUAL_INT(IH_OK, ih_rig_init(&rig, &vector_rigs[0], &bad_slot));
     ih_samples_params_default(&params);
+    /* What the expectations below were worked out with; the defaults may be tuned. */
+    params.isolated_mm = 60;
+    params.clip_behind_mm = 400;
+    params.clip_least_mm = 1100;
+    params.fill_neighbours = 3;
+    params.fill_root_weight_q15 = 17948;
     memset(&samples, IH_TEST_FILL, sizeof samples);
     memset(&dots, 0, sizeof dots);
     points.field = vector_field;

@@ -48,8 +48,8 @@ static void add_hand(const struct rd_person *p, const struct rd_hand *hand, doub
     static const double finger_length[FINGER_COUNT] = {0.40, 0.44, 0.41, 0.32};
     double size = p->hand_mm;
     int skin = p->paint.skin;
-    struct rd_shape palm = rd_shape_ellipsoid(rd_pose_at(rd_v(0.0, 0.0, 0.0)),
-                                              rd_v(0.23 * size, 0.30 * size, 0.085 * size), skin);
+    struct rd_shape palm =
+        rd_shape_ellipsoid(rd_pose_at(rd_v(0.0, 0.0, 0.0)), rd_v(0.23 * size, 0.30 * size, 0.085 * size), skin);
     rd_scene_add(scene, &palm);
     for (int i = 0; i < FINGER_COUNT; i++) {
         double across = thumb_side * (1.5 - i);

@@ -17,12 +17,12 @@
 #define RD_FULL_GREY 255.0
 
 struct rd_laser {
-    double power_grey;      /* peak on a white surface at 1 m that faces the camera, for a spot of 1.2 px */
-    double optics_px;       /* width (sigma) that the lens gives a point, picture middle */
-    double field_blur;      /* relative growth of that towards the corners */
-    double beam_mm;         /* beam width (sigma) at the projector */
-    double divergence;      /* growth of that, mm per mm */
-    double speckle;         /* 0 none .. 1 full */
+    double power_grey;         /* peak on a white surface at 1 m that faces the camera, for a spot of 1.2 px */
+    double optics_px;          /* width (sigma) that the lens gives a point, picture middle */
+    double field_blur;         /* relative growth of that towards the corners */
+    double beam_mm;            /* beam width (sigma) at the projector */
+    double divergence;         /* growth of that, mm per mm */
+    double speckle;            /* 0 none .. 1 full */
     double gain[RD_DOT_COUNT]; /* the grating does not share the light evenly */
     uint64_t seed;
 };

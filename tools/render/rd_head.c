@@ -28,13 +28,13 @@ static void add_skull(const struct rd_person *p, struct rd_scene *scene)
     int face = p->paint.face;
     double jaw = p->jaw_width;
     struct lump lumps[] = {
-        {rd_v(0.0, -0.22, 0.0), in_head(p, 1.0, 0.78, 1.0)},                /* skull */
-        {rd_v(0.0, 0.27, -0.22), in_head(p, 0.84 * jaw, 0.68, 0.72)},       /* face */
-        {rd_v(0.0, 0.62, -0.30), in_head(p, 0.68 * jaw, 0.34, 0.54)},       /* jaw */
-        {rd_v(0.0, 0.83, -0.58), rd_v(31.0 * jaw, 17.0, 18.0)},             /* chin */
+        {rd_v(0.0, -0.22, 0.0), in_head(p, 1.0, 0.78, 1.0)},                   /* skull */
+        {rd_v(0.0, 0.27, -0.22), in_head(p, 0.84 * jaw, 0.68, 0.72)},          /* face */
+        {rd_v(0.0, 0.62, -0.30), in_head(p, 0.68 * jaw, 0.34, 0.54)},          /* jaw */
+        {rd_v(0.0, 0.83, -0.58), rd_v(31.0 * jaw, 17.0, 18.0)},                /* chin */
         {rd_v(0.0, -0.18, -0.86), rd_v(0.60 * p->head_axes_mm.x, 12.0, 15.0)}, /* brow */
-        {rd_v(0.0, 0.56, -0.80), rd_v(26.0, 15.0, 13.0)},                   /* lips */
-        {rd_v(-0.36, 0.20, -0.63), rd_v(24.0, 22.0, 14.0)},                 /* cheeks */
+        {rd_v(0.0, 0.56, -0.80), rd_v(26.0, 15.0, 13.0)},                      /* lips */
+        {rd_v(-0.36, 0.20, -0.63), rd_v(24.0, 22.0, 14.0)},                    /* cheeks */
         {rd_v(0.36, 0.20, -0.63), rd_v(24.0, 22.0, 14.0)},
     };
     for (size_t i = 0; i < sizeof lumps / sizeof lumps[0]; i++)

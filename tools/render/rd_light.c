@@ -13,8 +13,9 @@ void rd_light_make(struct rd_light *light, const struct rd_options *options)
     struct rd_rng rng = rd_rng_start(options->seed, RD_STREAM_LIGHT);
     enum rd_ambient_kind drawn = draw_kind(&rng);
     enum rd_ambient_kind kind = options->ambient == RD_AMBIENT_VARIED ? drawn : options->ambient;
-    double strength = kind == RD_AMBIENT_DIM ? rd_rng_uniform(&rng, 0.3, 0.9)
-                      : kind == RD_AMBIENT_NORMAL ? rd_rng_uniform(&rng, 1.0, 2.0) : rd_rng_uniform(&rng, 1.6, 2.6);
+    double strength = kind == RD_AMBIENT_DIM      ? rd_rng_uniform(&rng, 0.3, 0.9)
+                      : kind == RD_AMBIENT_NORMAL ? rd_rng_uniform(&rng, 1.0, 2.0)
+                                                  : rd_rng_uniform(&rng, 1.6, 2.6);
     double azimuth = rd_rng_uniform(&rng, -1.3, 1.3), height = rd_rng_uniform(&rng, 0.1, 1.1);
     light->sky_grey = strength * rd_rng_uniform(&rng, 25.0, 60.0);
     light->key_grey = strength * rd_rng_uniform(&rng, 20.0, 70.0);

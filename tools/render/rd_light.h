@@ -8,14 +8,14 @@
 #include "rd_scene.h"
 
 struct rd_light {
-    double sky_grey;        /* from all around, stronger from above */
-    struct rd_vec key_dir;  /* towards the sun, a window or a ceiling lamp; unit */
+    double sky_grey;       /* from all around, stronger from above */
+    struct rd_vec key_dir; /* towards the sun, a window or a ceiling lamp; unit */
     double key_grey;
-    double lamp_grey;       /* beside the camera, at 1 m; falls with the square of the distance */
-    bool bars;              /* the key light comes through a window's bars or leaves */
+    double lamp_grey; /* beside the camera, at 1 m; falls with the square of the distance */
+    bool bars;        /* the key light comes through a window's bars or leaves */
     double bars_mm;
-    struct rd_vec slope;    /* relative change of all of it per metre: rooms are not evenly lit */
-    double nothing_grey;    /* where no surface is seen */
+    struct rd_vec slope; /* relative change of all of it per metre: rooms are not evenly lit */
+    double nothing_grey; /* where no surface is seen */
 };
 
 void rd_light_make(struct rd_light *light, const struct rd_options *options);

@@ -23,7 +23,7 @@ enum rd_pattern {
 /* Coordinates of the paint are the head's own, in units of its semi-axes: the face looks to -Z. */
 struct rd_face_paint {
     struct rd_vec axes_mm;
-    double hairline;     /* -1 top of the head .. 0 middle; below -1: bald */
+    double hairline; /* -1 top of the head .. 0 middle; below -1: bald */
     double hair_albedo;
     double beard_albedo; /* 0: none */
     bool glasses, mask;

@@ -28,10 +28,10 @@ struct rd_gesture {
 
 struct rd_motion {
     struct rd_vec hips_mm;
-    struct rd_sway lean, bend, twist;  /* trunk: roll, pitch, yaw */
-    struct rd_sway yaw, pitch, roll;   /* head against trunk */
+    struct rd_sway lean, bend, twist; /* trunk: roll, pitch, yaw */
+    struct rd_sway yaw, pitch, roll;  /* head against trunk */
     bool turning;
-    double turn_start, turn_total;     /* radians */
+    double turn_start, turn_total; /* radians */
     int frame_count;
     struct rd_gesture gestures[2][RD_GESTURES_MAX];
     int gesture_count[2];

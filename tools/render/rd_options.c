@@ -10,8 +10,19 @@
 
 #define FRAMES_MAX 5000
 
-enum option_id { OPT_SCENE = 1, OPT_SEQUENCE, OPT_RIG, OPT_SEED, OPT_FRAMES, OPT_SIZE, OPT_BACKGROUND, OPT_BITS,
-                 OPT_DISTORTION, OPT_AMBIENT, OPT_HELP };
+enum option_id {
+    OPT_SCENE = 1,
+    OPT_SEQUENCE,
+    OPT_RIG,
+    OPT_SEED,
+    OPT_FRAMES,
+    OPT_SIZE,
+    OPT_BACKGROUND,
+    OPT_BITS,
+    OPT_DISTORTION,
+    OPT_AMBIENT,
+    OPT_HELP
+};
 
 static const char help_text[] =
     "Usage: render [options] OUT_DIR\n"

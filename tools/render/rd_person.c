@@ -42,8 +42,9 @@ void rd_person_make(struct rd_person *person, struct rd_rng *rng)
 static double hair_albedo(struct rd_rng *rng)
 {
     double kind = rd_rng_uniform(rng, 0.0, 1.0);
-    return kind < 0.65 ? rd_rng_uniform(rng, 0.05, 0.11)
-           : kind < 0.88 ? rd_rng_uniform(rng, 0.14, 0.24) : rd_rng_uniform(rng, 0.30, 0.45);
+    return kind < 0.65   ? rd_rng_uniform(rng, 0.05, 0.11)
+           : kind < 0.88 ? rd_rng_uniform(rng, 0.14, 0.24)
+                         : rd_rng_uniform(rng, 0.30, 0.45);
 }
 
 static struct rd_material cloth(struct rd_rng *rng)
@@ -110,19 +111,19 @@ static void add_trunk(const struct rd_person *p, struct rd_scene *scene)
     int cloth_index = p->paint.cloth;
     struct rd_shape chest = rd_shape_ellipsoid(rd_pose_at(rd_v(0.0, top + 210.0, 6.0)),
                                                rd_v(0.92 * wide * g, 230.0, 104.0 * g), cloth_index);
-    struct rd_shape collar = rd_shape_ellipsoid(rd_pose_at(rd_v(0.0, top + 95.0, 6.0)),
-                                                rd_v(0.98 * wide, 100.0, 80.0 * g), cloth_index);
-    struct rd_shape belly = rd_shape_ellipsoid(rd_pose_at(rd_v(0.0, -70.0, -15.0)),
-                                               rd_v(160.0 * g, 190.0, 130.0 * g), cloth_index);
+    struct rd_shape collar =
+        rd_shape_ellipsoid(rd_pose_at(rd_v(0.0, top + 95.0, 6.0)), rd_v(0.98 * wide, 100.0, 80.0 * g), cloth_index);
+    struct rd_shape belly =
+        rd_shape_ellipsoid(rd_pose_at(rd_v(0.0, -70.0, -15.0)), rd_v(160.0 * g, 190.0, 130.0 * g), cloth_index);
     struct rd_pose whole = rd_pose_at(rd_v(0.0, 0.0, 0.0));
     chest.paint = collar.paint = belly.paint = whole;
     rd_scene_add(scene, &chest);
     rd_scene_add(scene, &collar);
     rd_scene_add(scene, &belly);
     for (double side = -1.0; side <= 1.0; side += 2.0) {
-        struct rd_shape muscle = rd_shape_cone(rd_v(side * 28.0, top + 2.0, 14.0),
-                                               rd_v(side * wide, top + p->shoulder_drop_mm, 8.0), 52.0, 56.0 * g,
-                                               cloth_index);
+        struct rd_shape muscle =
+            rd_shape_cone(rd_v(side * 28.0, top + 2.0, 14.0), rd_v(side * wide, top + p->shoulder_drop_mm, 8.0), 52.0,
+                          56.0 * g, cloth_index);
         muscle.paint = whole;
         rd_scene_add(scene, &muscle);
     }

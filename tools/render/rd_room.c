@@ -52,8 +52,8 @@ static void add_thing(struct rd_scene *scene, struct rd_rng *rng, double nearest
 
 void rd_room_build(struct rd_scene *scene, struct rd_rng *rng, enum rd_background kind, double nearest_mm)
 {
-    double distance_mm = kind == RD_BACK_NEAR ? rd_rng_uniform(rng, 350.0, 800.0) + nearest_mm
-                                              : rd_rng_uniform(rng, 1900.0, 2600.0);
+    double distance_mm =
+        kind == RD_BACK_NEAR ? rd_rng_uniform(rng, 350.0, 800.0) + nearest_mm : rd_rng_uniform(rng, 1900.0, 2600.0);
     int thing_count = kind == RD_BACK_NONE ? rd_rng_pick(rng, 3) : rd_rng_pick(rng, 5);
     if (kind != RD_BACK_NONE)
         add_wall(scene, rng, distance_mm);
@@ -83,21 +83,21 @@ void rd_seat_build(struct rd_scene *scene, struct rd_rng *rng, struct rd_vec hea
                            rd_add(head_mm, rd_v(rd_rng_uniform(rng, -25.0, 25.0), rest_y_mm, 145.0 + gap_mm))};
     int first = scene->shape_count;
     if (rest) {
-        struct rd_shape cushion = rd_shape_box(rd_pose_at(rd_v(0.0, 0.0, 0.0)),
-                                               rd_v(rest_half_x_mm, rest_half_y_mm, 48.0), 40.0, cover);
+        struct rd_shape cushion =
+            rd_shape_box(rd_pose_at(rd_v(0.0, 0.0, 0.0)), rd_v(rest_half_x_mm, rest_half_y_mm, 48.0), 40.0, cover);
         rd_scene_add(scene, &cushion);
         for (double side = -1.0; side <= 1.0; side += 2.0) {
             struct rd_shape post = rd_shape_cylinder(rd_pose_at(rd_v(side * 55.0, 140.0, 5.0)), 7.0, 110.0, metal);
             rd_scene_add(scene, &post);
         }
     }
-    struct rd_shape back = rd_shape_box(rd_pose_at(rd_v(0.0, back_top_mm + 330.0, 15.0)),
-                                        rd_v(back_half_mm, 330.0, 60.0), 55.0, cover);
+    struct rd_shape back =
+        rd_shape_box(rd_pose_at(rd_v(0.0, back_top_mm + 330.0, 15.0)), rd_v(back_half_mm, 330.0, 60.0), 55.0, cover);
     rd_scene_add(scene, &back);
     for (double side = -1.0; bolsters && side <= 1.0; side += 2.0) {
-        struct rd_shape bolster = rd_shape_cone(rd_v(side * (back_half_mm - 40.0), back_top_mm + 90.0, -35.0),
-                                                rd_v(side * back_half_mm, back_top_mm + 650.0, -60.0), 48.0, 60.0,
-                                                cover);
+        struct rd_shape bolster =
+            rd_shape_cone(rd_v(side * (back_half_mm - 40.0), back_top_mm + 90.0, -35.0),
+                          rd_v(side * back_half_mm, back_top_mm + 650.0, -60.0), 48.0, 60.0, cover);
         rd_scene_add(scene, &bolster);
     }
     rd_scene_move(scene, first, &seat);
@@ -120,12 +120,12 @@ void rd_chair_build(const struct rd_chair *chair, struct rd_scene *scene, struct
     struct rd_pose pose = {rd_rot_euler(turn, 0.0, 0.0), hips_mm};
     int first = scene->shape_count;
     struct rd_pose behind = {rd_rot_euler(0.0, -0.12, 0.0), rd_v(0.0, -chair->back_above_mm, chair->back_behind_mm)};
-    struct rd_shape back = rd_shape_box(behind, rd_v(chair->back_half_width_mm, chair->back_half_height_mm, 30.0), 28.0,
-                                        chair->cover);
-    struct rd_shape post = rd_shape_cylinder(rd_pose_at(rd_v(0.0, 60.0, chair->back_behind_mm + 40.0)), 25.0, 300.0,
-                                             chair->metal);
-    struct rd_shape seat = rd_shape_box(rd_pose_at(rd_v(0.0, 130.0, -60.0)), rd_v(240.0, 40.0, 240.0), 35.0,
-                                        chair->cover);
+    struct rd_shape back =
+        rd_shape_box(behind, rd_v(chair->back_half_width_mm, chair->back_half_height_mm, 30.0), 28.0, chair->cover);
+    struct rd_shape post =
+        rd_shape_cylinder(rd_pose_at(rd_v(0.0, 60.0, chair->back_behind_mm + 40.0)), 25.0, 300.0, chair->metal);
+    struct rd_shape seat =
+        rd_shape_box(rd_pose_at(rd_v(0.0, 130.0, -60.0)), rd_v(240.0, 40.0, 240.0), 35.0, chair->cover);
     rd_scene_add(scene, &back);
     rd_scene_add(scene, &post);
     rd_scene_add(scene, &seat);

@@ -45,8 +45,8 @@ static void describe(const struct rd_scene *scene, const struct rd_shape *shape,
     hit->gloss = material->gloss;
 }
 
-bool rd_scene_hit_among(const struct rd_scene *scene, const int16_t *indices, int index_count,
-                        const struct rd_ray *ray, double t_max_mm, struct rd_hit *hit)
+bool rd_scene_hit_among(const struct rd_scene *scene, const int16_t *indices, int index_count, const struct rd_ray *ray,
+                        double t_max_mm, struct rd_hit *hit)
 {
     const struct rd_shape *nearest = NULL;
     for (int i = 0; i < index_count; i++) {

@@ -41,8 +41,8 @@ void rd_scene_move(struct rd_scene *scene, int first, const struct rd_pose *oute
 /* The first surface along the ray nearer than t_max_mm. False: nothing there. */
 bool rd_scene_hit(const struct rd_scene *scene, const struct rd_ray *ray, double t_max_mm, struct rd_hit *hit);
 /* The same among some of the shapes only; indices NULL: among the first index_count. */
-bool rd_scene_hit_among(const struct rd_scene *scene, const int16_t *indices, int index_count,
-                        const struct rd_ray *ray, double t_max_mm, struct rd_hit *hit);
+bool rd_scene_hit_among(const struct rd_scene *scene, const int16_t *indices, int index_count, const struct rd_ray *ray,
+                        double t_max_mm, struct rd_hit *hit);
 /* Whether anything stands between `from` and `to`. */
 bool rd_scene_blocked(const struct rd_scene *scene, struct rd_vec from_mm, struct rd_vec to_mm);
 

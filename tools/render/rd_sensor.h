@@ -15,7 +15,7 @@ struct rd_sensor {
     double scale; /* numbers per grey level of 255 */
     int max_value;
     float offset_grey;
-    float noise_grey[256];        /* standard deviation by grey level: reading and photons */
+    float noise_grey[256];          /* standard deviation by grey level: reading and photons */
     float deviates[RD_NOISE_TABLE]; /* normally distributed */
     int hot_pixels[RD_HOT_MAX];
     float hot_grey[RD_HOT_MAX]; /* added there */

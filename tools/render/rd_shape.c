@@ -239,7 +239,7 @@ static struct rd_vec box_normal(const struct rd_shape *s, struct rd_vec p)
 
 struct rd_vec rd_shape_normal(const struct rd_shape *shape, struct rd_vec point_mm)
 {
-    struct rd_vec p = rd_pose_in(&shape->pose, point_mm), n = p;
+    struct rd_vec p = rd_pose_in(&shape->pose, point_mm), n = {0.0, 0.0, 0.0};
     switch (shape->kind) {
     case RD_ELLIPSOID:
         n = rd_over(rd_over(p, shape->half_mm), shape->half_mm);

@@ -33,7 +33,7 @@ struct rd_shape {
     double round_mm;
     struct rd_vec clip_normal;
     double clip_limit;
-    struct rd_pose paint;         /* frame of the material's pattern */
+    struct rd_pose paint;          /* frame of the material's pattern */
     struct rd_vec bound_centre_mm; /* a ball that holds the whole shape */
     double bound_radius_mm;
 };
