@@ -110,7 +110,7 @@ void ih_dots_begin(struct ih_dots_scratch *scratch, struct ih_dots *out,
     out->dots_dropped = 0;
     out->runs_dropped = 0;
     memset(out->bright, 0, sizeof out->bright);
-    /* Noise at most 4096 bins of 81: the product stays below 2^30 for gains below 2^12. */
+    /* Noise at most 4096 bins of 81 = 2^18.4: the threshold fits for gains below 2^20. */
     int32_t floor = params->floor_grey_q4 * IH_DOTS_RESPONSE_UNIT;
     out->threshold = ih_max_s32(floor, (int32_t)ih_mul_shift(noise, params->noise_gain_q8, 8));
 }

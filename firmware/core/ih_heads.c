@@ -139,7 +139,9 @@ static void fill_axes(const struct ih_ellipse *ellipse, const struct ih_surface 
                       const struct ih_rig *rig, struct ih_hypothesis *out)
 {
     const struct ih_calibration *c = &rig->calibration;
-    /* px per grid step in Q12; below 2^9 px for a sane pitch */
+    /* px per grid step in Q12: a unit below 2^25.5 (a pitch of a third of a radian) at 8192 px is
+     * below 2^11; a variance of 2^28 in Q16 times its square stays below 2^62 as it is scaled back
+     * in between. */
     int64_t step_u = ih_div_round(ih_mul_shift(surface->field.unit_q28, c->fx_px_q16, 32) *
                                       IH_SURFACE_STEP_NUMERATOR,
                                   IH_SURFACE_STEP_DENOMINATOR);
@@ -236,9 +238,9 @@ static bool stands_out(const struct ih_outline *o, const struct ih_heads_params 
 
 static int32_t ray_length_q28(int32_t x_q28, int32_t y_q28)
 {
-    /* x, y up to 2 in Q26: squares below 2^54 */
-    int64_t x = x_q28 / 4;
-    int64_t y = y_q28 / 4;
+    /* The field may reach beyond the frame: limited to 4, the root of 33 still fits Q28. */
+    int64_t x = ih_clamp_s32(x_q28, -(1 << 30), 1 << 30) / 4;
+    int64_t y = ih_clamp_s32(y_q28, -(1 << 30), 1 << 30) / 4;
     int64_t root_q26 = ih_isqrt_u64((uint64_t)(x * x + y * y) + ((uint64_t)1 << 52));
     return (int32_t)(root_q26 * 4);
 }
@@ -313,7 +315,7 @@ static bool is_same_thing(const struct ih_hypothesis *a, const struct ih_hypothe
     int64_t distance2 = 0;
     for (int axis = 0; axis < 3; axis++) {
         int64_t d = (int64_t)a->centre_mm_q8[axis] - b->centre_mm_q8[axis];
-        distance2 += d * d; /* each below 2^46: coordinates are within 2^22 */
+        distance2 += d * d; /* each below 2^54: coordinates are within 2^26 */
     }
     int64_t limit = (int64_t)merge_mm << 8;
     return distance2 < limit * limit;

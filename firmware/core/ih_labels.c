@@ -36,7 +36,8 @@ static void undistort_dots(const struct ih_dots *dots, const struct ih_rig *rig,
     }
 }
 
-/* Candidates of one slot. Coordinates below 2^26 in Q12 times a Q30 unit vector: below 2^57. */
+/* Candidates of one slot. Places are within 2^28.4 in Q12 (8192 px focal length, tan
+ * below 6), times a Q30 unit vector: two products, below 2^60.4. */
 static void find_candidates(const struct ih_dots *dots, const struct ih_line *line, int32_t slot,
                             const struct ih_labels_params *params,
                             struct ih_labels_scratch *scratch, struct ih_labels *out)
@@ -75,7 +76,8 @@ static const struct ih_candidate *candidate_of(const struct ih_labels_scratch *s
     return &scratch->candidate[slot][choice];
 }
 
-/* Square of the seed's error. Differences of places below 2^26 in Q12: below 2^56 in all. */
+/* Square of the seed's error. Places of dots are within 2^26.1 in Q12 (an
+ * undistorted coordinate is limited to tan 2), a second difference below 2^28.1: 2^57.2 in all. */
 static uint64_t rectangle_error2(const struct ih_labels_scratch *scratch,
                                  const struct ih_candidate *const corner[4])
 {

@@ -129,7 +129,8 @@ void ih_rig_dot_at(const struct ih_rig *rig, int32_t slot, int32_t depth_mm_q8, 
     for (int axis = 0; axis < 2; axis++) {
         int64_t tan_q30, offset_mm_q16;
         ray_line(&rig->calibration, slot, axis, &tan_q30, &offset_mm_q16);
-        /* offset below 2^11 mm in Q16, times 2^20: below 2^47; a quotient in Q28. */
+        /* |offset| <= |O| + |Oz| |tan|: below 5000 mm = 2^28.3 in Q16, times 2^20; a quotient in
+         * Q28. */
         int64_t shift_q28 = ih_div_round(offset_mm_q16 * (1 << 20), depth_mm_q8);
         *out[axis] = limit_tan_q28(ih_shift_round(tan_q30, 2) + shift_q28);
     }
