@@ -15,7 +15,7 @@
 void ih_points_params_default(struct ih_points_params *params)
 {
     *params = (struct ih_points_params){
-        .pitch_mm_q8 = 28 << 8, /* the paper rig spans 26 mm on a head at 0.85 m */
+        .pitch_mm_q8 = 29 << 8, /* the paper rig spans 26 mm on a head at 0.85 m */
         .reach_mm = 350,
         .headroom_q8 = 3 << 8,
         .top_width_mm = 60,

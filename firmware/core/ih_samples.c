@@ -159,8 +159,10 @@ void ih_samples_select(const struct ih_points *points, const struct ih_dots *dot
     out->isolated_count = 0;
     out->outside_count = 0;
     out->nearest_mm_q8 = INT32_MAX;
-    out->clip_mm_q8 = ih_max_s32(percentile_mm_q8(points) + (params->clip_behind_mm << 8),
-                                 params->clip_least_mm << 8);
+    out->clip_mm_q8 = percentile_mm_q8(points) + (params->clip_behind_mm << 8);
+    if (rig->calibration.kind == IH_RIG_DOTS) {
+        out->clip_mm_q8 = ih_max_s32(out->clip_mm_q8, params->clip_least_mm << 8);
+    }
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
         struct surroundings around =
             look_around(points, slot, out->clip_mm_q8, params->isolated_mm << 8);

@@ -3,8 +3,12 @@
  *
  * In:    points by slot, the dots' over-exposure map (NULL for a range image), rig.
  * Out:   up to 361 rows (place in field units, depth, weight) for the least-squares fit.
- * Way:   1. Clip: depth := min(depth, max(p8 + clip_behind, clip_least)), p8 the 8th percentile of
- *           the seen depths (the sorted depths' entry number count * 8 / 100). The surface has no business with the far wall.
+ * Way:   1. Clip: depth := min(depth, p8 + clip_behind), p8 the 8th percentile of the seen depths
+ *           (the sorted depths' entry number count * 8 / 100): the surface has no business with the
+ *           far wall, and the higher its step beside a head, the more it rings. With a dot rig the
+ *           clip is at clip_least or farther: there the dots stand the denser the nearer they are,
+ *           and a near hand must not clip the head behind it. A range image's lattice has the same
+ *           pitch at any depth.
  *        2. Isolated: a point with at least 3 of 8 neighbours whose clipped depth differs by more
  *           than isolated_mm from all but one of them is dropped.
  *        3. Missing dots: a dot that is not seen says that nothing is there: it enters as a far

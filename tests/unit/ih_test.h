@@ -112,11 +112,11 @@ static inline void ih_test_range_at(int64_t low, int64_t high, int64_t actual, c
 }
 
 /* index: which of many comparisons this is; it is printed when the comparison fails. */
-#define IH_TEST_WITHIN(tolerance, expected, actual, what, index)                                   \
+#define IH_TEST_WITHIN(tolerance, expected, actual, what, index) \
     ih_test_within_at((tolerance), (expected), (actual), (what), (index), __LINE__)
-#define IH_TEST_EQUAL(expected, actual, what, index)                                               \
+#define IH_TEST_EQUAL(expected, actual, what, index) \
     ih_test_equal_at((int64_t)(expected), (int64_t)(actual), (what), (index), __LINE__)
-#define IH_TEST_RANGE(low, high, actual, what, index)                                              \
+#define IH_TEST_RANGE(low, high, actual, what, index) \
     ih_test_range_at((int64_t)(low), (int64_t)(high), (int64_t)(actual), (what), (index), __LINE__)
 
 /* Fill memory with a pattern that no result has, and see later that it is still there. */
@@ -135,7 +135,7 @@ static inline void ih_test_untouched_at(const void *memory, size_t size, const c
     }
 }
 
-#define IH_TEST_UNTOUCHED(memory, size, what)                                                      \
+#define IH_TEST_UNTOUCHED(memory, size, what) \
     ih_test_untouched_at((memory), (size), (what), __LINE__)
 
 #endif

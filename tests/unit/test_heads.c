@@ -729,8 +729,14 @@ static void the_ends_of_all_ranges_are_survived(void)
     surface.field = (struct ih_field){INT32_MAX / 2, INT32_MIN / 2, 1 << 26};
     surface.depth_mm_q8[0][0] = surface.depth_mm_q8[SIDE - 1][SIDE - 1] = 1 << 23;
     samples.sample_count = 2;
-    samples.sample[0] = (struct ih_sample){-2621439, -2621439, 1, 32768, false, 0};
-    samples.sample[1] = (struct ih_sample){2621439, 2621439, 16000 << 8, 1, true, 1};
+    samples.sample[0] = (struct ih_sample){
+        .x_q16 = -2621439, .y_q16 = -2621439, .depth_mm_q8 = 1, .root_weight_q15 = 32768};
+    samples.sample[1] = (struct ih_sample){.x_q16 = 2621439,
+                                           .y_q16 = 2621439,
+                                           .depth_mm_q8 = 16000 << 8,
+                                           .root_weight_q15 = 1,
+                                           .slot = 1,
+                                           .is_filled = true};
     select_heads();
     TEST_ASSERT_EQUAL_INT32(2, heads.hypothesis_count);
     TEST_ASSERT_EQUAL_INT32(0, heads.head_count);

@@ -266,6 +266,14 @@ static void a_range_image_of_a_bust_has_one_head(void)
     check_range_image(480, 640, 900, 1700);
 }
 
+/* Nearer than 0.9 m: more pixels fall on the head, and the wall is farther behind it. */
+static void a_range_image_of_a_near_bust_has_one_head(void)
+{
+    check_range_image(320, 240, 700, 1700);
+    check_range_image(640, 480, 800, 1700);
+    check_range_image(480, 640, 850, 1700);
+}
+
 static void check_empty(const char *what)
 {
     int32_t slot;
@@ -485,6 +493,7 @@ int main(void)
     RUN_TEST(a_bust_at_a_metre_has_one_head);
     RUN_TEST(a_range_image_of_a_bust_close_to_a_wall_has_one_head);
     RUN_TEST(a_range_image_of_a_bust_has_one_head);
+    RUN_TEST(a_range_image_of_a_near_bust_has_one_head);
     RUN_TEST(flat_frames_have_no_head);
     RUN_TEST(wrong_sizes_are_refused);
     RUN_TEST(wrong_kinds_are_refused);

@@ -307,11 +307,11 @@ static void expect(enum ih_err err, int32_t slot, const char *what)
     IH_TEST_EQUAL(slot, bad_slot, what, 1);
 }
 
-#define EXPECT_WITH(field, value, err)                                                             \
-    do {                                                                                           \
-        calibration = vector_rigs[0];                                                              \
-        calibration.field = (value);                                                               \
-        expect((err), IH_NONE, #field " = " #value);                                               \
+#define EXPECT_WITH(field, value, err)               \
+    do {                                             \
+        calibration = vector_rigs[0];                \
+        calibration.field = (value);                 \
+        expect((err), IH_NONE, #field " = " #value); \
     } while (0)
 
 static void sizes_are_checked(void)
