@@ -77,7 +77,7 @@ static void find_minima(const struct ih_surface *surface, struct ih_hypotheses *
 }
 
 /* Area of an ellipse at a depth in mm^2. One grid step is depth * unit * 10 / 11. Depth below
- * 2^22 and unit below 2^26 (a pitch of half a radian): the step below 2^29 in Q16, its square in
+ * 2^23 and unit below 2^26 (a pitch of half a radian): the step below 2^29 in Q16, its square in
  * Q16 below 2^42 for areas below 2^(11 + 16). Real ones are 2^20 times smaller. */
 static int32_t area_mm2(const struct ih_surface *surface, int32_t level_mm_q8, int64_t area_q16)
 {

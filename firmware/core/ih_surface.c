@@ -213,6 +213,16 @@ static void fill_table(struct ih_surface_scratch *scratch)
     }
 }
 
+/* Nearer than this no node can be: see IH_SURFACE_OVERSHOOT_MM. */
+static int32_t least_depth_mm_q8(const struct ih_samples *samples)
+{
+    int32_t nearest_q8 = INT32_MAX;
+    for (int32_t i = 0; i < samples->sample_count; i++) {
+        nearest_q8 = ih_min_s32(nearest_q8, samples->sample[i].depth_mm_q8);
+    }
+    return ih_max_s32(nearest_q8 - (IH_SURFACE_OVERSHOOT_MM << 8), 1 << 8);
+}
+
 /* Grid node and centre k are both at whole steps: centre k at 4 k - 22 from the middle, node g at
  * g - 23. */
 static int32_t steps_between(int32_t node, int32_t centre)
@@ -222,8 +232,10 @@ static int32_t steps_between(int32_t node, int32_t centre)
                        IH_SURFACE_STEPS_PER_CENTRE * (IH_SURFACE_CENTRES - 1) / 2));
 }
 
-static void evaluate(const struct ih_surface_scratch *scratch, struct ih_surface *out)
+static void evaluate(const struct ih_samples *samples, const struct ih_surface_scratch *scratch,
+                     struct ih_surface *out)
 {
+    int32_t least_q8 = least_depth_mm_q8(samples);
     out->nearest_mm_q8 = INT32_MAX;
     for (int32_t y = 0; y < IH_SURFACE_GRID; y++) {
         for (int32_t x = 0; x < IH_SURFACE_GRID; x++) {
@@ -233,7 +245,8 @@ static void evaluate(const struct ih_surface_scratch *scratch, struct ih_surface
                 int32_t a = steps_between(x, i % IH_SURFACE_CENTRES);
                 sum += (int64_t)scratch->solution[i] * scratch->table_q20[b][a];
             }
-            out->depth_mm_q8[y][x] = depth_of_sum(scratch, out->mean_mm_q8, sum);
+            out->depth_mm_q8[y][x] = ih_clamp_s32(depth_of_sum(scratch, out->mean_mm_q8, sum),
+                                                  least_q8, IH_SURFACE_DEPTH_MAX_MM << 8);
             out->nearest_mm_q8 = ih_min_s32(out->nearest_mm_q8, out->depth_mm_q8[y][x]);
         }
     }
@@ -257,6 +270,6 @@ void ih_surface_fit(const struct ih_samples *samples, const struct ih_field *fie
         return;
     }
     fill_table(scratch);
-    evaluate(scratch, out);
+    evaluate(samples, scratch, out);
     out->valid = true;
 }

@@ -32,6 +32,11 @@
 #define IH_SURFACE_STEPS_PER_CENTRE 4
 #define IH_SURFACE_STEP_NUMERATOR 10
 #define IH_SURFACE_STEP_DENOMINATOR 11
+/* Where there are no samples the surface is an extrapolation and can dive; the cuts count from its
+ * nearest node. So nodes are limited to this far before the nearest sample, to at least 1 mm, and to
+ * DEPTH_MAX. Between samples it overshoots by less than half of that. */
+#define IH_SURFACE_OVERSHOOT_MM 200
+#define IH_SURFACE_DEPTH_MAX_MM (2 * IH_DEPTH_MAX_MM)
 /* Fewer samples than this make no surface. */
 #define IH_SURFACE_SAMPLES_MIN 16
 

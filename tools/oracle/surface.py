@@ -9,6 +9,7 @@ from rig import to_q, from_q
 CENTRES = 12
 GRID = 47
 STEP = 10 / 11  # of the grid, in field units
+OVERSHOOT_MM, DEPTH_MAX_MM = 200, 32000
 SAMPLES_MIN = 16
 RIDGE_Q30 = 10737
 HUBER_MM = 60
@@ -39,8 +40,11 @@ def solve(places, depth_mm, root_weight, mean_mm, ridge):
     return cho_solve(factor, right * scale) * scale
 
 
-def on_grid(coefficients, mean_mm):
-    return (mean_mm + GRID_BASIS @ coefficients).reshape(GRID, GRID)
+def on_grid(coefficients, mean_mm, depth_mm):
+    """The surface on the grid, limited to OVERSHOOT_MM before the nearest sample."""
+    least_mm = max(depth_mm.min() - OVERSHOOT_MM, 1)
+    grid = (mean_mm + GRID_BASIS @ coefficients).reshape(GRID, GRID)
+    return np.clip(grid, least_mm, DEPTH_MAX_MM)
 
 
 def huber(places, depth_mm, coefficients, mean_mm, huber_mm):
@@ -53,7 +57,7 @@ def fit(places, depth_mm, root_weight, mean_mm, ridge=RIDGE_Q30 / 2**30, huber_m
     """Both passes. Returns the grid and the root weights of the second pass."""
     first = solve(places, depth_mm, root_weight, mean_mm, ridge)
     final = root_weight * huber(places, depth_mm, first, mean_mm, huber_mm)
-    return on_grid(solve(places, depth_mm, final, mean_mm, ridge), mean_mm), final
+    return on_grid(solve(places, depth_mm, final, mean_mm, ridge), mean_mm, depth_mm), final
 
 
 def mean_of(depth_mm_q8):
