@@ -1,7 +1,5 @@
 #include "ih_cholesky.h"
 
-#include <stdbool.h>
-
 #include "ih_fix.h"
 
 /* Mantissas of a solution stay below this: 144 products with |L| <= 1 in Q30 then sum below
@@ -24,7 +22,7 @@ static int64_t dot_q60(const int32_t *a_q30, const int32_t *b_q30, int32_t count
 
 enum ih_err ih_cholesky_factor(int32_t *a_q30, int32_t n, int32_t *bad_pivot)
 {
-    *bad_pivot = -1;
+    *bad_pivot = IH_NONE;
     for (int32_t i = 0; i < n; i++) {
         int32_t *row = a_q30 + IH_CHOLESKY_PACKED(i);
         for (int32_t j = 0; j < i; j++) {

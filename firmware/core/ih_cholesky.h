@@ -15,6 +15,7 @@
 
 #include <stdint.h>
 
+#include "ih_config.h"
 #include "ih_types.h"
 
 /* Largest system. The packed triangle costs n (n + 1) / 2 * 4 bytes: 41,760 for 144. */
@@ -26,8 +27,8 @@ enum ih_err ih_cholesky_factor(int32_t *a_q30, int32_t n, int32_t *bad_pivot)
     __attribute__((warn_unused_result));
 
 /* Solve L L^T x = b. b: any common scale, |b_i| <= 2^31 - 1, and so small that |L^-1 b| stays
- * within int32 (true when b = R^T y with |y| in range: see ih_surface). x: mantissas below
- * 2^25 with x_i = mantissa_i * 2^exponent in b's unit, exponent >= 0 as small as that allows. b and x may be
+ * within int32 (true when b = R^T y with |y| in range: see ih_surface). x: mantissas below 2^25 with
+ * x_i = mantissa_i * 2^exponent in b's unit, exponent >= 0 as small as that allows. b and x may be
  * the same array. */
 void ih_cholesky_solve(const int32_t *l_q30, int32_t n, const int32_t *b, int32_t *x_mantissa,
                        int32_t *x_exponent);

@@ -174,7 +174,8 @@ static void add_blob(struct ih_dots_blob *to, const struct ih_dots_blob *from)
     to->v_max = (int16_t)ih_max_s32(to->v_max, from->v_max);
 }
 
-/* The blob of a run: that of the runs it touches in the row above, joined into one; or a new one. */
+/* The blob of a run: that of the runs it touches in the row above, joined into one; or a new
+ * one. */
 static int16_t blob_of_run(struct ih_dots_scratch *scratch, const struct ih_dots_run *run,
                            int32_t *first_previous)
 {

@@ -6,9 +6,9 @@
  * Way:   grey levels are brought to 12 bits (255 of an 8-bit sensor = 4080). Band-pass
  *        R = 81 * (3x3 binomial sum, weight 16) - 16 * (9x9 box sum, weight 81), edge pixels
  *        repeated outside: exact integers, R / 1296 is the response in 12-bit grey levels.
- *        R > threshold makes runs, runs that touch (8 neighbours) make blobs, the centre is the mean
- *        of the pixel centres weighted by floor(R / 256)^2. Threshold = max(floor, gain * median |R|), the
- *        median over a sparse sample of the frame (ih_dots_noise).
+ *        R > threshold makes runs, runs that touch (8 neighbours) make blobs, the centre is the
+ *        mean of the pixel centres weighted by floor(R / 256)^2. Threshold = max(floor, gain *
+ *        median |R|), the median over a sparse sample of the frame (ih_dots_noise).
  * Cost:  one pass; IH_DOTS_ROWS rows of scratch, no copy of the frame. About 30 integer
  *        operations per pixel.
  * Error: centres within 0.01 px of the float64 reference (same formula; only Q12 rounding).
@@ -23,14 +23,14 @@
 #include "ih_config.h"
 #include "ih_types.h"
 
-/* Most dots kept per frame. Each costs 12 bytes here and 16 in ih_labels. */
+/* Most dots kept per frame. Each costs 12 bytes here and 10 in ih_labels. */
 #ifndef IH_DOTS_MAX
 #define IH_DOTS_MAX 1024
 #endif
 #if IH_DOTS_MAX < IH_SLOTS || IH_DOTS_MAX > 4096
 #error "IH_DOTS_MAX must be in 361..4096"
 #endif
-/* Most blobs that can be open (touch the current row) at once. Each costs 40 bytes. */
+/* Most blobs that can be open (touch the current row) at once. Each costs 96 bytes. */
 #define IH_DOTS_OPEN_MAX 256
 /* Half width of the outer box; rows needed before a row's response is known. */
 #define IH_DOTS_REACH 4

@@ -61,8 +61,8 @@ void ih_ellipse_params_default(struct ih_ellipse_params *params);
 bool ih_ellipse_of_contour(const struct ih_cuts *cuts, const struct ih_contour *contour,
                            struct ih_ellipse *out);
 
-/* How often the contour, closed by a chord if it is open, winds round the place: 1 around a minimum,
- * -1 around a maximum, 0 beside. */
+/* How often the contour, closed by a chord if it is open, winds round the place: 1 around a
+ * minimum, -1 around a maximum, 0 beside. */
 int32_t ih_ellipse_winding(const struct ih_cuts *cuts, const struct ih_contour *contour,
                            struct ih_vertex place);
 

@@ -9,6 +9,11 @@
 /* Slices from this depth on make the centre and the proportions: nearer ones are the nose's. */
 #define CENTRE_DEPTH_MM 30
 
+/* Ring around the last ellipse in which its surroundings are looked at: squares of the sizes,
+ * Q4. */
+#define RING_INNER2_Q4 23 /* 1.2^2 */
+#define RING_OUTER2_Q4 58 /* 1.9^2 */
+
 void ih_heads_params_default(struct ih_heads_params *params)
 {
     *params = (struct ih_heads_params){
@@ -71,34 +76,41 @@ static int32_t curvature_mm_q8(const struct ih_nest *nest)
     return tt_q16 == 0 ? 0 : ih_saturate_s32(ih_div_round(at_q8 << 13, divisor));
 }
 
+/* Do the slice's centre and proportions count? The last one always does. */
+static bool is_deep(const struct ih_nest *nest, int32_t index)
+{
+    return nest->slice[index].behind_mm_q8 >= CENTRE_DEPTH_MM << 8 ||
+           index == nest->slice_count - 1;
+}
+
 /* Vertical over horizontal second moments, summed over the deeper slices: wide ones count most. */
 static int32_t upright_q16(const struct ih_nest *nest)
 {
     int64_t vertical_q16 = 0;
     int64_t horizontal_q16 = 1;
     for (int32_t i = 0; i < nest->slice_count; i++) {
-        const struct ih_slice *slice = &nest->slice[i];
-        if (slice->behind_mm_q8 >= CENTRE_DEPTH_MM << 8 || i == nest->slice_count - 1) {
-            vertical_q16 += slice->ellipse.yy_q16;
-            horizontal_q16 += slice->ellipse.xx_q16;
+        if (is_deep(nest, i)) {
+            vertical_q16 += nest->slice[i].ellipse.yy_q16;
+            horizontal_q16 += nest->slice[i].ellipse.xx_q16;
         }
     }
     return ih_saturate_s32(ih_div_round(vertical_q16 * 65536, horizontal_q16));
 }
 
-/* Centre of the nest on the grid: mean over its deeper slices, by area; all when there are none. */
+/* Centre of the nest on the grid: mean over its deeper slices, by area. */
 static void nest_centre_q16(const struct ih_nest *nest, int32_t *x_q16, int32_t *y_q16)
 {
     int64_t x = 0;
     int64_t y = 0;
     int64_t weight = 0;
     for (int32_t i = 0; i < nest->slice_count; i++) {
-        const struct ih_slice *slice = &nest->slice[i];
-        bool deep = slice->behind_mm_q8 >= CENTRE_DEPTH_MM << 8;
-        int64_t w = deep ? slice->ellipse.area_q16 >> 8 : 1; /* below 2^20 */
-        x += w * slice->ellipse.x_q16;
-        y += w * slice->ellipse.y_q16;
-        weight += w;
+        if (is_deep(nest, i)) {
+            const struct ih_ellipse *ellipse = &nest->slice[i].ellipse;
+            int64_t area = (ellipse->area_q16 >> 8) + 1; /* below 2^20; never 0 */
+            x += area * ellipse->x_q16;
+            y += area * ellipse->y_q16;
+            weight += area;
+        }
     }
     *x_q16 = (int32_t)ih_div_round(x, weight);
     *y_q16 = (int32_t)ih_div_round(y, weight);
@@ -165,14 +177,10 @@ static void fill_axes(const struct ih_ellipse *ellipse, const struct ih_surface 
     out->angle_mdeg = angle < 0 ? angle + 180000 : angle == 180000 ? 0 : angle;
 }
 
-/* Ring around the last ellipse in which its surroundings are looked at: squares of the sizes, Q4. */
-#define RING_INNER2_Q4 23 /* 1.2^2 */
-#define RING_OUTER2_Q4 58 /* 1.9^2 */
-
 /* Where a sample lies relative to an ellipse: the ellipse's normalised radius squared, Q4, and the
  * offset in grid steps, Q8. With q = yy dx^2 - 2 xy dx dy + xx dy^2 and det = xx yy - xy^2 the
- * radius squared is q / (4 det). Offsets below 2^15 in Q8, moments below 2^28 in Q16: the three
- * terms below 2^59 each; only the ratio to 4 det matters, limited to 255. */
+ * radius squared is q / (4 det). Offsets below 2^15.3 in Q8, moments below 2^27.2 in Q16: the
+ * three terms below 2^59 each; only the ratio to 4 det matters, limited to 255. */
 struct placed {
     int64_t dx_q8, dy_q8;
     int32_t radius2_q4;
@@ -315,7 +323,7 @@ static bool is_same_thing(const struct ih_hypothesis *a, const struct ih_hypothe
     int64_t distance2 = 0;
     for (int axis = 0; axis < 3; axis++) {
         int64_t d = (int64_t)a->centre_mm_q8[axis] - b->centre_mm_q8[axis];
-        distance2 += d * d; /* each below 2^54: coordinates are within 2^26 */
+        distance2 += d * d; /* each below 2^54: coordinates are within 2^25.2 */
     }
     int64_t limit = (int64_t)merge_mm << 8;
     return distance2 < limit * limit;

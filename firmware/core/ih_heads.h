@@ -17,7 +17,8 @@
  *                   bulges of a body end gently.
  * Nests whose centres are within merge_mm of a better one are the same thing and are dropped.
  * The centre of the head's volume lies centre_behind_mm behind the front, on the ray through the
- * middle of its ellipses: the mean, by area, of those at least 30 mm behind the front.
+ * middle of its ellipses: the mean, by area, of those at least 30 mm behind the front; the last one
+ * always counts.
  */
 #ifndef IH_HEADS_H
 #define IH_HEADS_H
@@ -80,7 +81,8 @@ void ih_heads_select(const struct ih_hypotheses *hypotheses, const struct ih_sur
                      const struct ih_samples *samples, const struct ih_rig *rig,
                      const struct ih_heads_params *params, struct ih_heads *out);
 
-/* The word that the record uses: "area", "curvature", "shape", "outline"; NULL for an accepted one. */
+/* The word that the record uses: "area", "curvature", "shape", "outline"; NULL for an accepted
+ * one. */
 const char *ih_reject_text(int32_t reject);
 
 #endif

@@ -8,8 +8,9 @@
  *        maximum (shrinking) have negative area and support nothing. A head is blunt, the nearest
  *        node is often the tip of a nose, a finger or of noise: slices smaller than blunt_mm2 are
  *        the tip and are passed over, up to tip_max_mm of them; the front of the nest is where the
- *        area grows past blunt_mm2. A nest ends depth_max behind its front, when its area falls below 0.6 of the slice before, when it jumps by more
- *        than 3.2 times and 2500 mm^2 beyond end_depth, or after gap_max levels without support.
+ *        area grows past blunt_mm2. A nest ends depth_max behind its
+ *        front, when its area falls below 0.6 of the slice before, when it jumps by more than 3.2
+ *        times and 2500 mm^2 beyond end_depth, or after gap_max levels without support.
  * Cost:  levels x (cells + minima x contours); the chord search only where no whole ellipse is.
  * Full tables drop and count: minima_dropped (the farthest), contours_dropped.
  */
@@ -18,7 +19,7 @@
 
 #include "ih_ellipse.h"
 
-/* Minima that are followed. Each nest costs 16 slices of 48 bytes. */
+/* Minima that are followed. Each nest costs 1184 bytes, most of them slices. */
 #define IH_HYPOTHESES_MAX 16
 #define IH_HYPOTHESES_SLICES_MAX 16
 

@@ -4,11 +4,12 @@
  * Out:   per slot the normalised image position and the Z depth; the field on which they stand.
  * Way:   dots: t px from infinity along the line, Z = |e| / t, one division. The position is
  *        the dot's place on its line, (infinity + t dir), so that depth and position agree.
+ *        Depths are limited to 1 mm .. far_mm.
  *        range image: a 19x19 lattice is laid where a head would be: its pitch is pitch_mm at the
- *        depth of the nearest tenth of the measured pixels; it hangs from the middle of the first run of
- *        pixels, row by row, that is near (within reach_mm of that depth) over top_width_mm, with
- *        headroom pitches above it.
- *        Each slot takes the valid pixel nearest to it within a quarter pitch.
+ *        depth of the nearest tenth of the measured pixels; it hangs from the middle of the first
+ *        run of pixels, row by row, that is near (within reach_mm of that depth) over top_width_mm,
+ *        with headroom pitches above it. Each slot takes the valid pixel nearest to it within a
+ *        quarter pitch.
  * Cost:  361 divisions; a range image is surveyed twice at about 160 x 120 pixels.
  */
 #ifndef IH_POINTS_H

@@ -9,7 +9,7 @@
 #define UNDISTORT_STEPS 64
 #define BROWN_MAX 16
 /* Probes of the lens along each side of the frame, and how well they must come back. */
-#define LENS_PROBES 17
+#define LENS_PROBES 65
 #define LENS_ERROR_MAX_PX_Q12 20 /* 0.005 px */
 /* Rays steeper than this against the optical axis are no camera's business. */
 #define RAY_FORWARD_MIN_Q30 (1 << 28)

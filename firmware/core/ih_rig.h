@@ -5,7 +5,7 @@
  *        its epipolar line, for the surface the field of view in units of half a dot pitch.
  * Error: each check has its own code; index says which dot. A rig that passes is safe for all
  *        stages: no later stage divides by zero or overflows because of it.
- * Cost:  once per rig. 361 lines, and 17 x 17 probes of the lens.
+ * Cost:  once per rig. 361 lines, and 65 x 65 probes of the lens.
  *
  * The camera frame is OpenCV's: X right, Y down, Z forward, mm. Normalised coordinates are
  * x = X / Z and y = Y / Z after removal of the lens distortion; "undistorted pixels" are
@@ -48,7 +48,7 @@ struct ih_line {
     int32_t infinity_u_px_q12, infinity_v_px_q12; /* undistorted pixels */
     int32_t dir_u_q30, dir_v_q30;                 /* unit vector towards nearer depth */
     int32_t length_px_mm_q8;                      /* |e|: t = |e| / Z */
-    int32_t t_far_px_q12, t_near_px_q12;          /* the working range, t_far < t_near */
+    int32_t t_far_px_q12, t_near_px_q12;          /* the working range, t_far <= t_near */
     /* The same two ends in the frame's own, distorted pixels. */
     int32_t far_u_px_q12, far_v_px_q12, near_u_px_q12, near_v_px_q12;
 };

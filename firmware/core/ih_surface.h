@@ -4,10 +4,10 @@
  * Out:   depth on a regular grid of IH_SURFACE_GRID x IH_SURFACE_GRID nodes; the weight that each
  *        sample ended with.
  * Way:   z = mean + sum_n c_n B(x - x_n, y - y_n), B = sqrt(dx^2 + dy^2 + 1) in field units, on
- *        IH_SURFACE_CENTRES^2 centres; mean is the plain mean of the samples' depths. Weighted least
- *        squares by normal equations N = R^T R, R's rows being the basis rows times the root weight;
- *        ridge: N's diagonal times (1 + 1e-5). Then one Huber step: samples off by more than
- *        huber_mm get the weight huber / |residual| and the system is solved again.
+ *        IH_SURFACE_CENTRES^2 centres; mean is the plain mean of the samples' depths. Weighted
+ *        least squares by normal equations N = R^T R, R's rows being the basis rows times the root
+ *        weight; ridge: N's diagonal times (1 + 1e-5). Then one Huber step: samples off by more
+ *        than huber_mm get the weight huber / |residual| and the system is solved again.
  * Scaling and overflow: field units, samples within IH_SAMPLES_REACH, centres within 20: dx and
  *        dy below 60, B below 85 = 2^6.5, in Q20 below 2^26.5; products below 2^53, sums over 361
  *        rows below 2^61.5. N is scaled by r_i r_j (r = 0.995 / sqrt(N_ii)) to diagonal 0.99 and
@@ -33,8 +33,8 @@
 #define IH_SURFACE_STEP_NUMERATOR 10
 #define IH_SURFACE_STEP_DENOMINATOR 11
 /* Where there are no samples the surface is an extrapolation and can dive; the cuts count from its
- * nearest node. So nodes are limited to this far before the nearest sample, to at least 1 mm, and to
- * DEPTH_MAX. Between samples it overshoots by less than half of that. */
+ * nearest node. So nodes are limited to this far before the nearest sample, to at least 1 mm, and
+ * to DEPTH_MAX. Between samples it overshoots by less than half of that. */
 #define IH_SURFACE_OVERSHOOT_MM 200
 #define IH_SURFACE_DEPTH_MAX_MM (2 * IH_DEPTH_MAX_MM)
 /* Fewer samples than this make no surface. */

@@ -24,8 +24,8 @@ enum ih_err {
 const char *ih_err_text(enum ih_err err);
 
 /* A view of one frame. The core reads it and never copies or keeps it.
- * bytes_per_sample 1: uint8_t samples; 2: uint16_t samples in the processor's own byte order, on
- * even addresses.
+ * bytes_per_sample 1: uint8_t samples; 2: uint16_t samples in the processor's own byte order,
+ * stored as uint16_t (on even addresses).
  * maximum: the value of full scale, 1..255 or 1..65535. Samples above it count as full scale.
  * A range frame has 2 bytes per sample, Z depth in mm, 0 = no measurement; maximum is ignored. */
 struct ih_frame {

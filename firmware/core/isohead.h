@@ -62,7 +62,8 @@ enum ih_err isohead_init(struct isohead *head, const struct ih_calibration *cali
                          int32_t *bad_slot) __attribute__((warn_unused_result));
 
 /* Process one frame. IH_ERR_SIZE when it is not of the rig's size or its view is malformed,
- * IH_ERR_KIND when its sample size is not the rig's; then the outputs are those of an empty frame. */
+ * IH_ERR_KIND when it does not have 1 or 2 bytes per sample, or a range rig's not 2; then the
+ * outputs are those of an empty frame. */
 enum ih_err isohead_frame(struct isohead *head, const struct ih_frame *frame)
     __attribute__((warn_unused_result));
 

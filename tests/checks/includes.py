@@ -27,7 +27,7 @@ CORE_HEADERS = {
     "ih_types.h": set(),
     "ih_fix.h": set(),
     "ih_rig.h": {"ih_config.h", "ih_types.h"},
-    "ih_cholesky.h": {"ih_types.h"},
+    "ih_cholesky.h": {"ih_config.h", "ih_types.h"},
     "ih_dots.h": CORE_SHARED,
     "ih_labels.h": CORE_SHARED | {"ih_dots.h"},
     "ih_points.h": CORE_SHARED | {"ih_labels.h"},

@@ -181,7 +181,7 @@ struct ellipsoid {
     double middle_mm[3], axis_mm[3];
 };
 
-/* Depth along the ray through (x, y, 1); INFINITY beside it. */
+/* Depth along the ray through (x, y, 1); (double)INFINITY beside it. */
 static double ellipsoid_depth_mm(const struct ellipsoid *e, double x, double y)
 {
     const double ray[3] = {x, y, 1};
@@ -196,7 +196,7 @@ static double ellipsoid_depth_mm(const struct ellipsoid *e, double x, double y)
         c += e->middle_mm[k] * e->middle_mm[k] / axis2;
     }
     root = b * b - a * c;
-    return root > 0 ? (b - sqrt(root)) / a : INFINITY;
+    return root > 0 ? (b - sqrt(root)) / a : (double)INFINITY;
 }
 
 /* The same bust as that of the dots (tools/oracle/isohead.py). */

@@ -119,7 +119,7 @@ def write_vectors(directory):
         mean_mm = mean_of(depth_q8)
         grid, final = fit(from_q(places_q16, 16), from_q(depth_q8, 8), from_q(weight_q15, 15),
                           mean_mm)
-        samples = ["{%d, %d, %d, %d, %d}" % (x, y, d, w, i) for i, ((x, y), d, w)
+        samples = ["{%d, %d, %d, %d, %d, false}" % (x, y, d, w, i) for i, ((x, y), d, w)
                    in enumerate(zip(places_q16, depth_q8, weight_q15))]
         inc.raw("\nstatic const struct ih_sample vector_%s_samples[] = {\n%s};\n"
                 % (name, emit.wrap(samples)))
