@@ -11,8 +11,8 @@
  *        3. Growing: a slot with labelled neighbours expects its dot where the affine map of the
  *           5x5 around it says (weights 1/d^2), or at the depth of one of its 3x3 neighbours;
  *           error hypot(along, 6 perp) < epsilon; best pairs first. When a pass assigns fewer than
- *           5, epsilon grows by half, up to epsilon_max. What is left then is not labelled: at
- *           8 px nine of ten further labels would be wrong, and seeds have bridged the edges.
+ *           5, epsilon grows by half, up to epsilon_max. What is left then is not labelled: of
+ *           what 40 px instead of 8 would add half is wrong, and seeds have bridged the edges.
  * Cost:  dots x 361 line tests; growing visits the open slots a few dozen times. Seeding tries the
  *        candidates of four slots with each other: 324 x 16^4 at the very worst, which a frame made
  *        for it can bring about, ten thousand for a real one.
