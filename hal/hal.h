@@ -20,6 +20,10 @@ struct hal_error {
     char text[HAL_ERROR_MAX];
 };
 
+/* Set the text; always false, so that a failing function can return it. */
+bool hal_fail(struct hal_error *error, const char *format, ...)
+    __attribute__((format(printf, 2, 3)));
+
 /* One frame. The samples and the name belong to the camera and live until its next call. */
 struct hal_frame {
     const void *samples;

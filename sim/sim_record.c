@@ -32,12 +32,7 @@ static void write_hypothesis(struct sim_write *write, const struct ih_hypothesis
     }
     sim_write_close(write, ']');
     sim_write_key(write, "rejected");
-    const char *reason = ih_reject_text(hypothesis->rejected);
-    if (reason == NULL) {
-        sim_write_null(write);
-    } else {
-        sim_write_string(write, reason);
-    }
+    sim_write_string_or_null(write, ih_reject_text(hypothesis->rejected));
     sim_write_close(write, '}');
 }
 

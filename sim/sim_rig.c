@@ -2,7 +2,6 @@
 
 #include <cjson/cJSON.h>
 #include <math.h>
-#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -17,18 +16,6 @@ struct field {
     const char *name;
     struct hal_error *error;
 };
-
-static bool fail(struct hal_error *error, const char *format, ...)
-    __attribute__((format(printf, 2, 3)));
-
-static bool fail(struct hal_error *error, const char *format, ...)
-{
-    va_list arguments;
-    va_start(arguments, format);
-    vsnprintf(error->text, sizeof error->text, format, arguments);
-    va_end(arguments);
-    return false;
-}
 
 /* What stands where a number was expected. */
 static const char *type_text(const cJSON *item)
@@ -49,7 +36,7 @@ static const cJSON *find(const struct field *field)
 {
     const cJSON *item = cJSON_GetObjectItemCaseSensitive(field->rig, field->name);
     if (item == NULL) {
-        fail(field->error, "%s: missing", field->name);
+        hal_fail(field->error, "%s: missing", field->name);
     }
     return item;
 }
@@ -62,11 +49,11 @@ static bool read_number(const struct field *field, double *value)
         return false;
     }
     if (!cJSON_IsNumber(item)) {
-        return fail(field->error, "%s: %s, expected a number", field->name, type_text(item));
+        return hal_fail(field->error, "%s: %s, expected a number", field->name, type_text(item));
     }
     *value = item->valuedouble;
     if (!isfinite(*value) || fabs(*value) >= INT32_MAX) {
-        return fail(field->error, "%s: %g, out of range", field->name, *value);
+        return hal_fail(field->error, "%s: %g, out of range", field->name, *value);
     }
     return true;
 }
@@ -78,7 +65,7 @@ static bool read_integer(const struct field *field, int32_t *value)
         return false;
     }
     if (number != floor(number)) {
-        return fail(field->error, "%s: %g, expected a whole number", field->name, number);
+        return hal_fail(field->error, "%s: %g, expected a whole number", field->name, number);
     }
     *value = (int32_t)number;
     return true;
@@ -89,11 +76,11 @@ static bool check_count(const struct field *field, const cJSON *matrix, const ch
 {
     const cJSON *item = cJSON_GetObjectItemCaseSensitive(matrix, key);
     if (!cJSON_IsNumber(item)) {
-        return fail(field->error, "%s: no %s, expected %d", field->name, key, expected);
+        return hal_fail(field->error, "%s: no %s, expected %d", field->name, key, expected);
     }
     if (item->valuedouble != expected) {
-        return fail(field->error, "%s: %s is %g, expected %d", field->name, key, item->valuedouble,
-                    expected);
+        return hal_fail(field->error, "%s: %s is %g, expected %d", field->name, key,
+                        item->valuedouble, expected);
     }
     return true;
 }
@@ -107,14 +94,14 @@ static const cJSON *find_matrix(const struct field *field, int rows, int columns
     }
     const char *type = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(matrix, "type_id"));
     if (type == NULL || strcmp(type, "opencv-matrix") != 0) {
-        fail(field->error, "%s: type_id is %s, expected \"opencv-matrix\"", field->name,
-             type == NULL ? "missing" : type);
+        hal_fail(field->error, "%s: type_id is %s, expected \"opencv-matrix\"", field->name,
+                 type == NULL ? "missing" : type);
         return NULL;
     }
     const char *format = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(matrix, "dt"));
     if (format == NULL || (strcmp(format, "d") != 0 && strcmp(format, "f") != 0)) {
-        fail(field->error, "%s: dt is %s, expected \"d\" or \"f\"", field->name,
-             format == NULL ? "missing" : format);
+        hal_fail(field->error, "%s: dt is %s, expected \"d\" or \"f\"", field->name,
+                 format == NULL ? "missing" : format);
         return NULL;
     }
     if (!check_count(field, matrix, "rows", rows) || !check_count(field, matrix, "cols", columns)) {
@@ -132,24 +119,24 @@ static bool read_matrix(const struct field *field, int rows, int columns, double
     }
     const cJSON *data = cJSON_GetObjectItemCaseSensitive(matrix, "data");
     if (!cJSON_IsArray(data)) {
-        return fail(field->error, "%s: data is no array", field->name);
+        return hal_fail(field->error, "%s: data is no array", field->name);
     }
     if (cJSON_GetArraySize(data) != rows * columns) {
-        return fail(field->error, "%s: %d numbers in data, expected %d", field->name,
-                    cJSON_GetArraySize(data), rows * columns);
+        return hal_fail(field->error, "%s: %d numbers in data, expected %d", field->name,
+                        cJSON_GetArraySize(data), rows * columns);
     }
     int index = 0;
     const cJSON *item = NULL;
     cJSON_ArrayForEach(item, data)
     {
         if (!cJSON_IsNumber(item)) {
-            return fail(field->error, "%s[%d][%d]: %s, expected a number", field->name,
-                        index / columns, index % columns, type_text(item));
+            return hal_fail(field->error, "%s[%d][%d]: %s, expected a number", field->name,
+                            index / columns, index % columns, type_text(item));
         }
         value[index] = item->valuedouble;
         if (!isfinite(value[index])) {
-            return fail(field->error, "%s[%d][%d]: %g, expected a finite number", field->name,
-                        index / columns, index % columns, value[index]);
+            return hal_fail(field->error, "%s[%d][%d]: %g, expected a finite number", field->name,
+                            index / columns, index % columns, value[index]);
         }
         index++;
     }
@@ -163,8 +150,8 @@ static bool round_fixed(const struct field *field, const char *part, double valu
     double scaled = ldexp(value, fraction_bits);
     double limit = ldexp(1.0, 31 - fraction_bits);
     if (!(fabs(scaled) < INT32_MAX)) {
-        return fail(field->error, "%s%s: %g, expected less than %g in size", field->name, part,
-                    value, limit);
+        return hal_fail(field->error, "%s%s: %g, expected less than %g in size", field->name, part,
+                        value, limit);
     }
     *fixed = (int32_t)llround(scaled);
     return true;
@@ -190,8 +177,8 @@ static bool read_camera(struct field *field, struct ih_calibration *calibration)
     }
     for (int i = 0; i < 9; i++) {
         if (fixed_part[i] >= 0 && matrix[i] != fixed_part[i]) {
-            return fail(field->error, "camera_matrix[%d][%d]: %g, expected %g", i / 3, i % 3,
-                        matrix[i], fixed_part[i]);
+            return hal_fail(field->error, "camera_matrix[%d][%d]: %g, expected %g", i / 3, i % 3,
+                            matrix[i], fixed_part[i]);
         }
     }
     return round_fixed(field, "[0][0]", matrix[0], 16, &calibration->fx_px_q16) &&
@@ -265,13 +252,13 @@ static bool read_kind(struct field *field, struct ih_calibration *calibration)
         return true;
     }
     if (!cJSON_IsString(kind)) {
-        return fail(field->error, "kind: not a string, expected \"dots\" or \"range\"");
+        return hal_fail(field->error, "kind: not a string, expected \"dots\" or \"range\"");
     }
     if (strcmp(kind->valuestring, "range") == 0) {
         calibration->kind = IH_RIG_RANGE;
     } else if (strcmp(kind->valuestring, "dots") != 0) {
-        return fail(field->error, "kind: \"%.60s\", expected \"dots\" or \"range\"",
-                    kind->valuestring);
+        return hal_fail(field->error, "kind: \"%.60s\", expected \"dots\" or \"range\"",
+                        kind->valuestring);
     }
     return true;
 }
@@ -298,10 +285,10 @@ static void locate(const char *text, const char *stop, struct hal_error *error)
         }
     }
     if (*stop == 0) {
-        fail(error, "line %ld: not JSON: the file ends too early", line);
+        hal_fail(error, "line %ld: not JSON: the file ends too early", line);
     } else {
-        fail(error, "line %ld column %ld: not JSON: %.40s", line, (long)(stop - line_start) + 1,
-             stop);
+        hal_fail(error, "line %ld column %ld: not JSON: %.40s", line, (long)(stop - line_start) + 1,
+                 stop);
     }
 }
 
@@ -317,11 +304,11 @@ bool sim_rig_load(const char *path, struct ih_calibration *calibration, struct h
     cJSON *rig = NULL;
     bool good = false;
     if (strlen(text) != size) {
-        fail(error, "offset %zu: a zero byte, expected JSON", strlen(text));
+        hal_fail(error, "offset %zu: a zero byte, expected JSON", strlen(text));
     } else if ((rig = cJSON_ParseWithOpts(text, &stop, 1)) == NULL) {
         locate(text, stop, error);
     } else if (!cJSON_IsObject(rig)) {
-        fail(error, "%s, expected an object", type_text(rig));
+        hal_fail(error, "%s, expected an object", type_text(rig));
     } else {
         good = read_rig(rig, calibration, error);
     }

@@ -1,21 +1,8 @@
 #include "sim_rig_explain.h"
 
 #include <math.h>
-#include <stdarg.h>
-#include <stdio.h>
 
 #define RAY_AXES 3
-
-static void fail(struct hal_error *error, const char *format, ...)
-    __attribute__((format(printf, 2, 3)));
-
-static void fail(struct hal_error *error, const char *format, ...)
-{
-    va_list arguments;
-    va_start(arguments, format);
-    vsnprintf(error->text, sizeof error->text, format, arguments);
-    va_end(arguments);
-}
 
 static double from_fixed(int32_t value, int fraction_bits)
 {
@@ -29,9 +16,10 @@ static void explain_ray(const struct ih_calibration *calibration, int32_t slot,
     for (int i = 0; i < RAY_AXES; i++) {
         ray[i] = from_fixed(calibration->ray_q30[slot][i], 30);
     }
-    fail(error, "dot_rays[%ld]: (%.6g, %.6g, %.6g), length %.6g, expected a unit vector forward",
-         (long)slot, ray[0], ray[1], ray[2],
-         sqrt(ray[0] * ray[0] + ray[1] * ray[1] + ray[2] * ray[2]));
+    (void)hal_fail(error,
+                   "dot_rays[%ld]: (%.6g, %.6g, %.6g), length %.6g, expected a unit vector forward",
+                   (long)slot, ray[0], ray[1], ray[2],
+                   sqrt(ray[0] * ray[0] + ray[1] * ray[1] + ray[2] * ray[2]));
 }
 
 static void explain_baseline(const struct ih_calibration *calibration, struct hal_error *error)
@@ -40,18 +28,19 @@ static void explain_baseline(const struct ih_calibration *calibration, struct ha
     for (int i = 0; i < RAY_AXES; i++) {
         origin_mm[i] = from_fixed(calibration->origin_mm_q16[i], 16);
     }
-    fail(error, "projector_origin: (%g, %g, %g) mm, expected off the camera's centre and within %d",
-         origin_mm[0], origin_mm[1], origin_mm[2], IH_RIG_BASELINE_MAX_MM);
+    (void)hal_fail(
+        error, "projector_origin: (%g, %g, %g) mm, expected off the camera's centre and within %d",
+        origin_mm[0], origin_mm[1], origin_mm[2], IH_RIG_BASELINE_MAX_MM);
 }
 
 static void explain_size(const struct ih_calibration *calibration, struct hal_error *error)
 {
     bool range = calibration->kind == IH_RIG_RANGE;
-    fail(error, "image_width, image_height: %ldx%ld, expected %dx%d to %dx%d",
-         (long)calibration->width, (long)calibration->height,
-         range ? IH_RANGE_SIDE_MIN : IH_FRAME_WIDTH_MIN,
-         range ? IH_RANGE_SIDE_MIN : IH_FRAME_HEIGHT_MIN, IH_FRAME_WIDTH_MAX,
-         range ? IH_FRAME_WIDTH_MAX : IH_FRAME_HEIGHT_MAX);
+    (void)hal_fail(error, "image_width, image_height: %ldx%ld, expected %dx%d to %dx%d",
+                   (long)calibration->width, (long)calibration->height,
+                   range ? IH_RANGE_SIDE_MIN : IH_FRAME_WIDTH_MIN,
+                   range ? IH_RANGE_SIDE_MIN : IH_FRAME_HEIGHT_MIN, IH_FRAME_WIDTH_MAX,
+                   range ? IH_FRAME_WIDTH_MAX : IH_FRAME_HEIGHT_MAX);
 }
 
 void sim_rig_explain(const struct ih_calibration *calibration, enum ih_err err, int32_t bad_slot,
@@ -63,23 +52,26 @@ void sim_rig_explain(const struct ih_calibration *calibration, enum ih_err err, 
         explain_size(c, error);
         break;
     case IH_ERR_FOCAL:
-        fail(error, "camera_matrix: focal lengths %g and %g px, expected above 0 and at most %d",
-             from_fixed(c->fx_px_q16, 16), from_fixed(c->fy_px_q16, 16), IH_RIG_FOCAL_MAX_PX);
+        (void)hal_fail(
+            error, "camera_matrix: focal lengths %g and %g px, expected above 0 and at most %d",
+            from_fixed(c->fx_px_q16, 16), from_fixed(c->fy_px_q16, 16), IH_RIG_FOCAL_MAX_PX);
         break;
     case IH_ERR_PRINCIPAL:
-        fail(error, "camera_matrix: principal point (%g, %g), too far off the %ldx%ld image",
-             from_fixed(c->cx_px_q16, 16), from_fixed(c->cy_px_q16, 16), (long)c->width,
-             (long)c->height);
+        (void)hal_fail(error,
+                       "camera_matrix: principal point (%g, %g), too far off the %ldx%ld image",
+                       from_fixed(c->cx_px_q16, 16), from_fixed(c->cy_px_q16, 16), (long)c->width,
+                       (long)c->height);
         break;
     case IH_ERR_DISTORTION:
-        fail(error,
-             "distortion_coefficients: %g %g %g %g %g cannot be undone everywhere in the frame",
-             from_fixed(c->k1_q24, 24), from_fixed(c->k2_q24, 24), from_fixed(c->p1_q24, 24),
-             from_fixed(c->p2_q24, 24), from_fixed(c->k3_q24, 24));
+        (void)hal_fail(
+            error,
+            "distortion_coefficients: %g %g %g %g %g cannot be undone everywhere in the frame",
+            from_fixed(c->k1_q24, 24), from_fixed(c->k2_q24, 24), from_fixed(c->p1_q24, 24),
+            from_fixed(c->p2_q24, 24), from_fixed(c->k3_q24, 24));
         break;
     case IH_ERR_RANGE:
-        fail(error, "near_mm, far_mm: %ld and %ld, expected %d <= near < far <= %d",
-             (long)c->near_mm, (long)c->far_mm, IH_DEPTH_MIN_MM, IH_DEPTH_MAX_MM);
+        (void)hal_fail(error, "near_mm, far_mm: %ld and %ld, expected %d <= near < far <= %d",
+                       (long)c->near_mm, (long)c->far_mm, IH_DEPTH_MIN_MM, IH_DEPTH_MAX_MM);
         break;
     case IH_ERR_BASELINE:
         explain_baseline(c, error);
@@ -89,10 +81,10 @@ void sim_rig_explain(const struct ih_calibration *calibration, enum ih_err err, 
             explain_ray(c, bad_slot, error);
             break;
         }
-        fail(error, "dot_rays: %s", ih_err_text(err));
+        (void)hal_fail(error, "dot_rays: %s", ih_err_text(err));
         break;
     default:
-        fail(error, "%s", ih_err_text(err));
+        (void)hal_fail(error, "%s", ih_err_text(err));
         break;
     }
 }

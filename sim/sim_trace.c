@@ -208,6 +208,7 @@ static void write_nest(struct sim_write *write, const struct ih_nest *nest)
     sim_write_int_field(write, "minimum_x_q9", nest->minimum.x_q9);
     sim_write_int_field(write, "minimum_y_q9", nest->minimum.y_q9);
     sim_write_int_field(write, "nearest_mm_q8", nest->nearest_mm_q8);
+    sim_write_int_field(write, "front_mm_q8", nest->front_mm_q8);
     sim_write_key(write, "slice");
     sim_write_open(write, '[');
     for (int32_t i = 0; i < nest->slice_count; i++) {
@@ -232,6 +233,20 @@ static void write_hypotheses(struct sim_write *write, const struct ih_hypotheses
     sim_write_close(write, '}');
 }
 
+static void write_outline(struct sim_write *write, const struct ih_outline *outline)
+{
+    sim_write_key(write, "outline");
+    sim_write_open(write, '{');
+    sim_write_int_field(write, "inside", outline->inside);
+    sim_write_int_field(write, "above", outline->above);
+    sim_write_int_field(write, "above_behind", outline->above_behind);
+    sim_write_int_field(write, "beside", outline->beside);
+    sim_write_int_field(write, "beside_behind", outline->beside_behind);
+    sim_write_int_field(write, "below", outline->below);
+    sim_write_int_field(write, "below_near", outline->below_near);
+    sim_write_close(write, '}');
+}
+
 static void write_candidate(struct sim_write *write, const struct ih_hypothesis *hypothesis)
 {
     sim_write_open(write, '{');
@@ -247,13 +262,10 @@ static void write_candidate(struct sim_write *write, const struct ih_hypothesis 
     sim_write_int_field(write, "area_mm2", hypothesis->area_mm2);
     sim_write_int_field(write, "curvature_mm_q8", hypothesis->curvature_mm_q8);
     sim_write_int_field(write, "extent_mm_q8", hypothesis->extent_mm_q8);
+    sim_write_int_field(write, "upright_q16", hypothesis->upright_q16);
+    write_outline(write, &hypothesis->outline);
     sim_write_key(write, "rejected");
-    const char *reason = ih_reject_text(hypothesis->rejected);
-    if (reason == NULL) {
-        sim_write_null(write);
-    } else {
-        sim_write_string(write, reason);
-    }
+    sim_write_string_or_null(write, ih_reject_text(hypothesis->rejected));
     sim_write_close(write, '}');
 }
 

@@ -1,7 +1,6 @@
 #include "sim_truth.h"
 
 #include <math.h>
-#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -14,18 +13,6 @@
 #define AXES 3
 /* index, u, v, z */
 #define DOT_NUMBERS 4
-
-static bool fail(struct hal_error *error, const char *format, ...)
-    __attribute__((format(printf, 2, 3)));
-
-static bool fail(struct hal_error *error, const char *format, ...)
-{
-    va_list arguments;
-    va_start(arguments, format);
-    vsnprintf(error->text, sizeof error->text, format, arguments);
-    va_end(arguments);
-    return false;
-}
 
 /* An array of exactly count numbers below the limit in size. */
 static bool read_numbers(const cJSON *array, int count, double limit, double *value)
@@ -57,16 +44,17 @@ static bool read_head(const cJSON *line, struct sim_truth_frame *frame, struct h
         return true;
     }
     if (!cJSON_IsObject(head)) {
-        return fail(error, "%s", head == NULL ? "no head" : "head is neither an object nor null");
+        return hal_fail(error, "%s",
+                        head == NULL ? "no head" : "head is neither an object nor null");
     }
     if (!read_numbers(cJSON_GetObjectItemCaseSensitive(head, "centre_mm"), AXES, SIM_TRUTH_MM_MAX,
                       centre_mm)) {
-        return fail(error, "head.centre_mm: expected 3 numbers within +-%d", SIM_TRUTH_MM_MAX);
+        return hal_fail(error, "head.centre_mm: expected 3 numbers within +-%d", SIM_TRUTH_MM_MAX);
     }
     const cJSON *axes = cJSON_GetObjectItemCaseSensitive(head, "semi_axes_mm");
     if (axes != NULL && (!read_numbers(axes, AXES, SIM_TRUTH_MM_MAX, semi_axes_mm) ||
                          !(semi_axes_mm[0] > 0 && semi_axes_mm[1] > 0 && semi_axes_mm[2] > 0))) {
-        return fail(error, "head.semi_axes_mm: expected 3 numbers above 0");
+        return hal_fail(error, "head.semi_axes_mm: expected 3 numbers above 0");
     }
     frame->head = SIM_TRUTH_HEAD;
     for (int i = 0; i < AXES; i++) {
@@ -99,7 +87,7 @@ static bool read_dots(const cJSON *line, struct sim_truth_frame *frame, struct h
         return true;
     }
     if (!cJSON_IsArray(dots) || cJSON_GetArraySize(dots) > IH_SLOTS) {
-        return fail(error, "dots: expected an array of at most %d dots", IH_SLOTS);
+        return hal_fail(error, "dots: expected an array of at most %d dots", IH_SLOTS);
     }
     frame->has_dots = true;
     bool taken[IH_SLOTS] = {false};
@@ -109,12 +97,12 @@ static bool read_dots(const cJSON *line, struct sim_truth_frame *frame, struct h
     {
         struct sim_truth_dot *dot = &frame->dot[frame->dot_count];
         if (!read_dot(item, dot)) {
-            return fail(error, "dots[%zu]: expected [index below %d, u, v, z_mm above 0]",
-                        frame->dot_count, IH_SLOTS);
+            return hal_fail(error, "dots[%zu]: expected [index below %d, u, v, z_mm above 0]",
+                            frame->dot_count, IH_SLOTS);
         }
         if (taken[dot->slot]) {
-            return fail(error, "dots[%zu]: index %ld was there before", frame->dot_count,
-                        (long)dot->slot);
+            return hal_fail(error, "dots[%zu]: index %ld was there before", frame->dot_count,
+                            (long)dot->slot);
         }
         taken[dot->slot] = true;
         frame->dot_count++;
@@ -134,10 +122,10 @@ static bool read_frame(const cJSON *line, const struct hal_replay *replay,
 {
     const char *name = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(line, "file"));
     if (name == NULL) {
-        return fail(error, "no file, expected the name of a frame");
+        return hal_fail(error, "no file, expected the name of a frame");
     }
     if (!hal_replay_has(replay, name)) {
-        return fail(error, "%.100s: no such frame in this directory", name);
+        return hal_fail(error, "%.100s: no such frame in this directory", name);
     }
     size_t size = strlen(name) + 1;
     frame->name = sim_report_grow(NULL, size, 1);

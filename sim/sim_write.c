@@ -111,6 +111,15 @@ void sim_write_string(struct sim_write *write, const char *text)
     fputc('"', write->file);
 }
 
+void sim_write_string_or_null(struct sim_write *write, const char *text)
+{
+    if (text == NULL) {
+        sim_write_null(write);
+    } else {
+        sim_write_string(write, text);
+    }
+}
+
 void sim_write_int_field(struct sim_write *write, const char *key, int64_t value)
 {
     sim_write_key(write, key);

@@ -30,6 +30,8 @@ void sim_write_decimal(struct sim_write *write, struct sim_decimal decimal);
 void sim_write_bool(struct sim_write *write, bool value);
 void sim_write_null(struct sim_write *write);
 void sim_write_string(struct sim_write *write, const char *text);
+/* NULL becomes null. */
+void sim_write_string_or_null(struct sim_write *write, const char *text);
 
 /* "key":value. */
 void sim_write_int_field(struct sim_write *write, const char *key, int64_t value);

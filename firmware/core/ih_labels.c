@@ -24,14 +24,10 @@ void ih_labels_params_default(struct ih_labels_params *params)
 static void undistort_dots(const struct ih_dots *dots, const struct ih_rig *rig,
                            struct ih_labels_scratch *scratch)
 {
-    const struct ih_calibration *c = &rig->calibration;
     for (int32_t i = 0; i < dots->dot_count; i++) {
         int32_t x_q28, y_q28;
         ih_rig_undistort(rig, dots->dot[i].u_px_q12, dots->dot[i].v_px_q12, &x_q28, &y_q28);
-        scratch->u_px_q12[i] =
-            (int32_t)(ih_mul_shift(x_q28, c->fx_px_q16, 32) + ih_shift_round(c->cx_px_q16, 4));
-        scratch->v_px_q12[i] =
-            (int32_t)(ih_mul_shift(y_q28, c->fy_px_q16, 32) + ih_shift_round(c->cy_px_q16, 4));
+        ih_rig_to_pixel(rig, x_q28, y_q28, &scratch->u_px_q12[i], &scratch->v_px_q12[i]);
         scratch->slot_of_dot[i] = IH_NONE;
     }
 }
@@ -214,11 +210,11 @@ static void seed(const struct ih_labels_params *params, struct ih_labels_scratch
         const struct ih_labels_offer *offer = &scratch->offer[i];
         int32_t slot[4];
         rectangle_slots(offer->slot, slot);
-        bool free = true;
+        bool possible = true;
         for (int k = 0; k < 4; k++) {
-            free = free && can_assign(scratch, slot[k], offer->choice[k]);
+            possible = possible && can_assign(scratch, slot[k], offer->choice[k]);
         }
-        for (int k = 0; free && k < 4; k++) {
+        for (int k = 0; possible && k < 4; k++) {
             assign(scratch, slot[k], offer->choice[k]);
         }
     }

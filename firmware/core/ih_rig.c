@@ -91,6 +91,14 @@ void ih_rig_undistort(const struct ih_rig *rig, int32_t u_px_q12, int32_t v_px_q
     *y_q28 = (int32_t)y;
 }
 
+void ih_rig_to_pixel(const struct ih_rig *rig, int32_t x_q28, int32_t y_q28, int32_t *u_px_q12,
+                     int32_t *v_px_q12)
+{
+    const struct ih_calibration *c = &rig->calibration;
+    *u_px_q12 = (int32_t)(ih_mul_shift(x_q28, c->fx_px_q16, 32) + ih_shift_round(c->cx_px_q16, 4));
+    *v_px_q12 = (int32_t)(ih_mul_shift(y_q28, c->fy_px_q16, 32) + ih_shift_round(c->cy_px_q16, 4));
+}
+
 void ih_rig_distort(const struct ih_rig *rig, int32_t x_q28, int32_t y_q28, int32_t *u_px_q12,
                     int32_t *v_px_q12)
 {
@@ -100,10 +108,8 @@ void ih_rig_distort(const struct ih_rig *rig, int32_t x_q28, int32_t y_q28, int3
     int64_t radial, dx, dy;
     brown(c, x, y, &radial, &dx, &dy);
     /* Far outside the frame a strong lens can go anywhere: keep the result in the format. */
-    int64_t xd = limit_tan_q28(product_q28(x, radial) + dx);
-    int64_t yd = limit_tan_q28(product_q28(y, radial) + dy);
-    *u_px_q12 = (int32_t)(ih_mul_shift(xd, c->fx_px_q16, 32) + ih_shift_round(c->cx_px_q16, 4));
-    *v_px_q12 = (int32_t)(ih_mul_shift(yd, c->fy_px_q16, 32) + ih_shift_round(c->cy_px_q16, 4));
+    ih_rig_to_pixel(rig, limit_tan_q28(product_q28(x, radial) + dx),
+                    limit_tan_q28(product_q28(y, radial) + dy), u_px_q12, v_px_q12);
 }
 
 bool ih_rig_inside(const struct ih_rig *rig, int32_t u_px_q12, int32_t v_px_q12)

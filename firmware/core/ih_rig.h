@@ -80,6 +80,10 @@ void ih_rig_undistort(const struct ih_rig *rig, int32_t u_px_q12, int32_t v_px_q
 void ih_rig_distort(const struct ih_rig *rig, int32_t x_q28, int32_t y_q28, int32_t *u_px_q12,
                     int32_t *v_px_q12);
 
+/* Normalised coordinates -> undistorted pixel (fx x + cx, fy y + cy). */
+void ih_rig_to_pixel(const struct ih_rig *rig, int32_t x_q28, int32_t y_q28, int32_t *u_px_q12,
+                     int32_t *v_px_q12);
+
 /* Normalised coordinates of a dot at a depth; depth_mm_q8 > 0. */
 void ih_rig_dot_at(const struct ih_rig *rig, int32_t slot, int32_t depth_mm_q8, int32_t *x_q28,
                    int32_t *y_q28);

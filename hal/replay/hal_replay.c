@@ -2,7 +2,6 @@
 
 #include <dirent.h>
 #include <errno.h>
-#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -15,18 +14,6 @@
 #define FRAME_SUFFIX ".pgm"
 /* Times beyond this are not exact in JSON's numbers. */
 #define TIME_MAX_US ((double)((int64_t)1 << 53))
-
-static bool fail(struct hal_error *error, const char *format, ...)
-    __attribute__((format(printf, 2, 3)));
-
-static bool fail(struct hal_error *error, const char *format, ...)
-{
-    va_list arguments;
-    va_start(arguments, format);
-    vsnprintf(error->text, sizeof error->text, format, arguments);
-    va_end(arguments);
-    return false;
-}
 
 static char *copy_text(const char *text)
 {
@@ -100,7 +87,7 @@ static bool read_names(struct hal_replay *replay, struct hal_error *error)
 {
     DIR *dir = opendir(replay->dir);
     if (dir == NULL) {
-        return fail(error, "%s", strerror(errno));
+        return hal_fail(error, "%s", strerror(errno));
     }
     bool good = true;
     struct dirent *item = NULL;
@@ -115,10 +102,10 @@ static bool read_names(struct hal_replay *replay, struct hal_error *error)
     }
     closedir(dir);
     if (!good) {
-        return fail(error, "no memory for the list of frames");
+        return hal_fail(error, "no memory for the list of frames");
     }
     if (replay->entry_count == 0) {
-        return fail(error, "no frames (*" FRAME_SUFFIX ") in this directory");
+        return hal_fail(error, "no frames (*" FRAME_SUFFIX ") in this directory");
     }
     return true;
 }
@@ -130,19 +117,19 @@ static bool read_fields(const cJSON *line, struct hal_replay_entry *entry, struc
     const cJSON *laser = cJSON_GetObjectItemCaseSensitive(line, "laser");
     if (laser != NULL) {
         if (!cJSON_IsBool(laser)) {
-            return fail(error, "laser is neither true nor false");
+            return hal_fail(error, "laser is neither true nor false");
         }
         entry->laser = cJSON_IsTrue(laser);
     }
     if (time == NULL) {
-        return fail(error, "no time_us");
+        return hal_fail(error, "no time_us");
     }
     if (!cJSON_IsNumber(time)) {
-        return fail(error, "time_us is not a number");
+        return hal_fail(error, "time_us is not a number");
     }
     double value = time->valuedouble;
     if (!(value >= -TIME_MAX_US && value <= TIME_MAX_US) || (double)(int64_t)value != value) {
-        return fail(error, "time_us is %g, expected a whole number within +-2^53", value);
+        return hal_fail(error, "time_us is %g, expected a whole number within +-2^53", value);
     }
     entry->time_us = (int64_t)value;
     return true;
@@ -154,22 +141,22 @@ static struct hal_replay_entry *claim_entry(struct hal_replay *replay, const cJS
 {
     const cJSON *file = cJSON_GetObjectItemCaseSensitive(line, "file");
     if (!cJSON_IsString(file)) {
-        fail(error, "no file, expected the name of a frame");
+        hal_fail(error, "no file, expected the name of a frame");
         return NULL;
     }
     const char *name = file->valuestring;
     if (!is_frame_name(name)) {
-        fail(error, "file is \"%.100s\", expected the name of a *" FRAME_SUFFIX, name);
+        hal_fail(error, "file is \"%.100s\", expected the name of a *" FRAME_SUFFIX, name);
         return NULL;
     }
     struct hal_replay_entry *entry = find_entry(replay, name);
     if (entry == NULL) {
         entry = add_entry(replay, name);
         if (entry == NULL) {
-            fail(error, "no memory for the list of frames");
+            hal_fail(error, "no memory for the list of frames");
         }
     } else if (entry->listed) {
-        fail(error, "%.100s was listed before; this line is ignored", name);
+        hal_fail(error, "%.100s was listed before; this line is ignored", name);
         return NULL;
     }
     if (entry != NULL) {
@@ -271,7 +258,7 @@ static bool load_frame(struct hal_replay *replay, const char *name, struct hal_p
 {
     char *path = hal_file_join(replay->dir, name);
     if (path == NULL) {
-        return fail(error, "no memory for this file");
+        return hal_fail(error, "no memory for this file");
     }
     size_t size = 0;
     bool good = hal_file_read(path, HAL_PGM_FILE_MAX, &replay->samples, &size, error) &&
@@ -292,11 +279,11 @@ static enum hal_next next_frame(void *context, struct hal_frame *frame, struct h
     *frame =
         (struct hal_frame){.name = entry->name, .time_us = entry->time_us, .laser = entry->laser};
     if (entry->bad) {
-        fail(error, "%s", entry->error == NULL ? "no memory" : entry->error);
+        hal_fail(error, "%s", entry->error == NULL ? "no memory" : entry->error);
         return HAL_NEXT_BAD;
     }
     if (replay->listed && !entry->listed) {
-        fail(error, "not listed in " LIST_NAME);
+        hal_fail(error, "not listed in " LIST_NAME);
         return HAL_NEXT_BAD;
     }
     struct hal_pgm pgm = {0};
@@ -318,7 +305,7 @@ bool hal_replay_open(struct hal_replay *replay, const char *dir, const struct ha
     *replay = (struct hal_replay){.camera = {.context = replay, .next = next_frame}};
     replay->dir = copy_text(dir);
     if (replay->dir == NULL) {
-        return fail(error, "no memory");
+        return hal_fail(error, "no memory");
     }
     if (!read_names(replay, error)) {
         hal_replay_close(replay);
