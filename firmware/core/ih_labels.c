@@ -366,7 +366,7 @@ static void grow(const struct ih_rig *rig, const struct ih_labels_params *params
     int32_t epsilon = params->epsilon_min_px_q12;
     while (epsilon <= params->epsilon_max_px_q12) {
         if (grow_once(rig, scratch, epsilon) < FEW_ASSIGNED) {
-            epsilon += epsilon / 2;
+            epsilon += ih_max_s32(epsilon / 2, 1); /* it grows from any start */
         }
     }
 }

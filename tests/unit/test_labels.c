@@ -333,6 +333,16 @@ static void ambiguous_rectangles_are_no_seeds(void)
     TEST_ASSERT_EQUAL_INT32(0, labels.labelled_count);
 }
 
+/* Epsilon is raised until it reaches its limit, wherever it starts: the call must come back. */
+static void growing_starts_from_any_epsilon(void)
+{
+    take_scene(&vector_scenes[5]);
+    params.epsilon_min_px_q12 = 0;
+    assign();
+    TEST_ASSERT_TRUE(labels.labelled_count > labels.seed_count);
+    check_table("epsilon from 0");
+}
+
 static void limits_are_obeyed(void)
 {
     int32_t slot;
@@ -428,6 +438,7 @@ int main(void)
     RUN_TEST(noise_alone_is_hardly_labelled);
     RUN_TEST(spurious_dots_change_little);
     RUN_TEST(ambiguous_rectangles_are_no_seeds);
+    RUN_TEST(growing_starts_from_any_epsilon);
     RUN_TEST(limits_are_obeyed);
     RUN_TEST(as_many_dots_as_there_may_be_are_survived);
     RUN_TEST(the_same_dots_give_the_same_labels);
