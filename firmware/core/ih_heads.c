@@ -4,11 +4,10 @@
 
 #include "ih_fix.h"
 
-/* Slices up to this depth behind the minimum make the curvature. */
+/* Slices up to this depth behind the front make the curvature. */
 #define CURVATURE_DEPTH_MM 70
 /* Slices from this depth on make the centre and the proportions: nearer ones are the nose's. */
 #define CENTRE_DEPTH_MM 30
-
 /* Ring around the last ellipse in which its surroundings are looked at: squares of the sizes,
  * Q4. */
 #define RING_INNER2_Q4 23 /* 1.2^2 */
@@ -71,7 +70,7 @@ static int32_t curvature_mm_q8(const struct ih_nest *nest)
             tt_q16 += t_q8 * t_q8;
         }
     }
-    /* a slice closer than 1/90 mm to the minimum must not divide by zero */
+    /* a slice closer than 1/90 mm to the front must not divide by zero */
     int64_t divisor = tt_q16 >> 3 > 0 ? tt_q16 >> 3 : 1;
     return tt_q16 == 0 ? 0 : ih_saturate_s32(ih_div_round(at_q8 << 13, divisor));
 }

@@ -2,7 +2,7 @@
  *
  * In:    nests, and the samples that the surface was fitted to.
  * Out:   candidates in the frame's pixels and in mm, each accepted or with the first test that it
- *        failed; the accepted ones in order, best first; the selected one.
+ *        failed; the accepted ones in order, best first.
  * Tests, none of them in absolute depth:
  *        area       of the widest slice, in mm^2
  *        curvature  k = sum(A t) / sum(t^2) over slices at most 70 mm behind the front: the

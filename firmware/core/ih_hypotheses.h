@@ -7,10 +7,10 @@
  *        whole when it is closed and elliptical, else by its elliptical part. Contours around a
  *        maximum (shrinking) have negative area and support nothing. A head is blunt, the nearest
  *        node is often the tip of a nose, a finger or of noise: slices smaller than blunt_mm2 are
- *        the tip and are passed over, up to tip_max_mm of them; the front of the nest is where the
- *        area grows past blunt_mm2. A nest ends depth_max behind its
- *        front, when its area falls below 0.6 of the slice before, when it jumps by more than 3.2
- *        times and 2500 mm^2 beyond end_depth, or after gap_max levels without support.
+ *        the tip and are passed over, until it is longer than tip_max_mm; the front of the nest is
+ *        where the area grows past blunt_mm2. A nest ends depth_max behind its front, when its area
+ *        falls below 0.6 of the slice before, when it jumps by more than 3.2 times and 2500 mm^2
+ *        beyond end_depth, or after gap_max levels without support.
  * Cost:  levels x (cells + minima x contours); the chord search only where no whole ellipse is.
  * Full tables drop and count: minima_dropped (the farthest), contours_dropped.
  */
@@ -31,7 +31,7 @@ struct ih_hypotheses_params {
     int32_t tip_max_mm;       /* a longer tip is no head's */
     int32_t depth_max_mm;     /* a nest reaches this far behind its front */
     int32_t end_depth_mm;     /* from here a jump in area ends the nest */
-    int32_t gap_max;
+    int32_t gap_max;          /* levels in a row */
 };
 
 struct ih_slice {

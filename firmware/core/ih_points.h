@@ -32,7 +32,7 @@ enum ih_point_state {
 };
 
 struct ih_point {
-    int32_t x_q28, y_q28; /* normalised; for one that is not seen its place at far_mm */
+    int32_t x_q28, y_q28; /* normalised; of a dot that is not seen its place at far_mm */
     int32_t depth_mm_q8;  /* Z; 0 when not seen */
     int32_t state;        /* enum ih_point_state */
 };

@@ -16,7 +16,6 @@ void ih_samples_params_default(struct ih_samples_params *params)
         .clip_least_mm = 1100,
         .fill_neighbours = 3,
         .fill_root_weight_q15 = 17948, /* sqrt(0.3) */
-        .fill_behind_mm = 2000,
     };
 }
 
@@ -49,29 +48,25 @@ static const struct ih_point *neighbour(const struct ih_points *points, int32_t 
 }
 
 struct surroundings {
-    int32_t seen;          /* of the 8 neighbours */
-    int32_t friends;       /* of those, at nearly the same depth */
-    int32_t nearest_mm_q8; /* of the seen ones in the 5x5 around; INT32_MAX when none */
+    int32_t seen;    /* of the 8 neighbours */
+    int32_t friends; /* of those, at nearly the same depth */
 };
 
 static struct surroundings look_around(const struct ih_points *points, int32_t slot,
                                        int32_t clip_q8, int32_t isolated_q8)
 {
-    struct surroundings s = {0, 0, INT32_MAX};
+    struct surroundings s = {0, 0};
     int32_t own = ih_min_s32(points->point[slot].depth_mm_q8, clip_q8);
-    for (int32_t d_row = -2; d_row <= 2; d_row++) {
-        for (int32_t d_column = -2; d_column <= 2; d_column++) {
+    for (int32_t d_row = -1; d_row <= 1; d_row++) {
+        for (int32_t d_column = -1; d_column <= 1; d_column++) {
             const struct ih_point *other = neighbour(points, slot, d_row, d_column);
             bool self = d_row == 0 && d_column == 0;
             if (self || other == NULL || other->state != IH_POINT_SEEN) {
                 continue;
             }
             int32_t depth = ih_min_s32(other->depth_mm_q8, clip_q8);
-            s.nearest_mm_q8 = ih_min_s32(s.nearest_mm_q8, depth);
-            if (ih_abs_s32(d_row) <= 1 && ih_abs_s32(d_column) <= 1) {
-                s.seen++;
-                s.friends += ih_abs_s32(depth - own) <= isolated_q8;
-            }
+            s.seen++;
+            s.friends += ih_abs_s32(depth - own) <= isolated_q8;
         }
     }
     return s;
@@ -117,9 +112,6 @@ static void fill_missing(const struct ih_points *points, const struct ih_dots *d
         return;
     }
     int32_t depth_q8 = out->clip_mm_q8;
-    if (around->nearest_mm_q8 != INT32_MAX) {
-        depth_q8 = ih_min_s32(depth_q8, around->nearest_mm_q8 + (params->fill_behind_mm << 8));
-    }
     int32_t x_q28 = point->x_q28;
     int32_t y_q28 = point->y_q28;
     if (rig->calibration.kind == IH_RIG_DOTS) {

@@ -27,7 +27,6 @@ struct ih_samples_params {
     int32_t clip_behind_mm, clip_least_mm;
     int32_t fill_neighbours;
     int32_t fill_root_weight_q15; /* square root of the weight; 0 = missing dots are ignored */
-    int32_t fill_behind_mm;       /* a filled point is at most this far behind the nearest in 5x5 */
 };
 
 struct ih_sample {

@@ -31,19 +31,21 @@ static int32_t basis_q20(int64_t dx_q16, int64_t dy_q16)
     return (int32_t)((ih_isqrt_u64(radicand_q32 << 10) + 1) >> 1);
 }
 
-/* Place of a row or column of centres: (2 k - 11) * 20 / 11 field units. */
-static int32_t centre_q16(int32_t k)
+/* Places of a row or column of centres: (2 k - 11) * 20 / 11 field units. */
+static void place_centres(struct ih_surface_scratch *scratch)
 {
-    return (int32_t)ih_div_round((int64_t)(2 * k - (IH_SURFACE_CENTRES - 1)) * 20 * 65536,
-                                 IH_SURFACE_CENTRES - 1);
+    for (int32_t k = 0; k < IH_SURFACE_CENTRES; k++) {
+        int64_t place_q16 = (int64_t)(2 * k - (IH_SURFACE_CENTRES - 1)) * 20 * 65536;
+        scratch->centre_q16[k] = (int32_t)ih_div_round(place_q16, IH_SURFACE_CENTRES - 1);
+    }
 }
 
-static void fill_row(const struct ih_sample *sample, int32_t *row_q20)
+static void fill_row(const struct ih_sample *sample, struct ih_surface_scratch *scratch)
 {
     for (int32_t i = 0; i < TERMS; i++) {
-        int64_t dx = sample->x_q16 - centre_q16(i % IH_SURFACE_CENTRES);
-        int64_t dy = sample->y_q16 - centre_q16(i / IH_SURFACE_CENTRES);
-        row_q20[i] = basis_q20(dx, dy);
+        int64_t dx = (int64_t)sample->x_q16 - scratch->centre_q16[i % IH_SURFACE_CENTRES];
+        int64_t dy = (int64_t)sample->y_q16 - scratch->centre_q16[i / IH_SURFACE_CENTRES];
+        scratch->row_q20[i] = basis_q20(dx, dy);
     }
 }
 
@@ -84,7 +86,7 @@ static void assemble(const struct ih_samples *samples, struct ih_surface_scratch
     out->mean_mm_q8 = mean_depth_mm_q8(samples);
     for (int32_t i = 0; i < samples->sample_count; i++) {
         const struct ih_sample *sample = &samples->sample[i];
-        fill_row(sample, scratch->row_q20);
+        fill_row(sample, scratch);
         accumulate(scratch, sample, out->mean_mm_q8, sample->root_weight_q15, 1);
         out->root_weight_q15[i] = sample->root_weight_q15;
     }
@@ -178,7 +180,7 @@ static int32_t reweight(const struct ih_samples *samples, const struct ih_surfac
     int64_t limit_q8 = (int64_t)params->huber_mm << 8;
     for (int32_t i = 0; i < samples->sample_count; i++) {
         const struct ih_sample *sample = &samples->sample[i];
-        fill_row(sample, scratch->row_q20);
+        fill_row(sample, scratch);
         int64_t sum = 0;
         for (int32_t k = 0; k < TERMS; k++) {
             sum += (int64_t)scratch->solution[k] * scratch->row_q20[k];
@@ -204,8 +206,8 @@ static void fill_table(struct ih_surface_scratch *scratch)
 {
     const int64_t numerator2 = IH_SURFACE_STEP_NUMERATOR * IH_SURFACE_STEP_NUMERATOR;
     const int64_t denominator2 = IH_SURFACE_STEP_DENOMINATOR * IH_SURFACE_STEP_DENOMINATOR;
-    for (int64_t b = 0; b <= IH_SURFACE_GRID; b++) {
-        for (int64_t a = 0; a <= IH_SURFACE_GRID; a++) {
+    for (int64_t b = 0; b < IH_SURFACE_STEPS; b++) {
+        for (int64_t a = 0; a < IH_SURFACE_STEPS; a++) {
             int64_t radicand_q42 = ih_div_round(
                 ((a * a + b * b) * numerator2 + denominator2) * ((int64_t)1 << 42), denominator2);
             scratch->table_q20[b][a] = (int32_t)((ih_isqrt_u64((uint64_t)radicand_q42) + 1) >> 1);
@@ -261,6 +263,7 @@ void ih_surface_fit(const struct ih_samples *samples, const struct ih_field *fie
     if (samples->sample_count < IH_SURFACE_SAMPLES_MIN) {
         return;
     }
+    place_centres(scratch);
     assemble(samples, scratch, out);
     if (!solve(samples, params, out->mean_mm_q8, scratch)) {
         return;

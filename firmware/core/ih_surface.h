@@ -32,6 +32,8 @@
 #define IH_SURFACE_STEPS_PER_CENTRE 4
 #define IH_SURFACE_STEP_NUMERATOR 10
 #define IH_SURFACE_STEP_DENOMINATOR 11
+/* Whole steps between a node and a centre: 0 .. 23 + 22. */
+#define IH_SURFACE_STEPS (IH_SURFACE_GRID - 1)
 /* Where there are no samples the surface is an extrapolation and can dive; the cuts count from its
  * nearest node. So nodes are limited to this far before the nearest sample, to at least 1 mm, and
  * to DEPTH_MAX. Between samples it overshoots by less than half of that. */
@@ -63,7 +65,8 @@ struct ih_surface_scratch {
     uint32_t scale[IH_SURFACE_TERMS]; /* 0.995 * 2^51 / sqrt(N_ii), N in Q40 */
     int32_t right[IH_SURFACE_TERMS], solution[IH_SURFACE_TERMS];
     int32_t solution_shift; /* coefficient = solution / 2^solution_shift, mm per field unit */
-    int32_t table_q20[IH_SURFACE_GRID + 1][IH_SURFACE_GRID + 1];
+    int32_t centre_q16[IH_SURFACE_CENTRES]; /* places of the centres in a row, field units */
+    int32_t table_q20[IH_SURFACE_STEPS][IH_SURFACE_STEPS];
 };
 
 void ih_surface_params_default(struct ih_surface_params *params);

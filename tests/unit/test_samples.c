@@ -104,7 +104,6 @@ static void samples_match_the_second_implementation(void)
     int i;
     int32_t k;
 
-    params.fill_behind_mm = VECTOR_FILL_BEHIND_MM;
     for (i = 0; i < IH_TEST_COUNT(vector_choices); i++) {
         const struct vector_choice *v = &vector_choices[i];
 
@@ -294,20 +293,6 @@ static void a_filled_point_stands_on_its_ray_at_the_clip_depth(void)
                    ih_test_from_q(sample->x_q16, 16), "x", 0);
 }
 
-/* The nearest seen within 5 x 5 limits the depth of a filled point. */
-static void a_filled_point_is_not_far_behind_its_surroundings(void)
-{
-    make_hole(2);
-    params.fill_behind_mm = 250;
-    set_depth(MIDDLE + 3 * IH_GRID,
-              950); /* within 5 x 5 of the slot below the middle, no other's */
-    select_samples();
-    TEST_ASSERT_EQUAL_INT32(1200 << 8, sample_of(MIDDLE + IH_GRID)->depth_mm_q8);
-    TEST_ASSERT_EQUAL_INT32(1250 << 8, sample_of(MIDDLE - IH_GRID)->depth_mm_q8);
-    /* The middle sees no one within 5 x 5: the clip depth. */
-    TEST_ASSERT_EQUAL_INT32(1400 << 8, sample_of(MIDDLE)->depth_mm_q8);
-}
-
 static void over_exposed_and_unknown_places_are_not_filled(void)
 {
     make_hole(2);
@@ -402,7 +387,6 @@ int main(void)
     RUN_TEST(depths_are_clipped_behind_the_nearest);
     RUN_TEST(only_the_inside_of_a_hole_is_filled);
     RUN_TEST(a_filled_point_stands_on_its_ray_at_the_clip_depth);
-    RUN_TEST(a_filled_point_is_not_far_behind_its_surroundings);
     RUN_TEST(over_exposed_and_unknown_places_are_not_filled);
     RUN_TEST(without_weight_nothing_is_filled);
     RUN_TEST(places_outside_the_picture_are_not_filled);

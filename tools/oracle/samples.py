@@ -17,7 +17,7 @@ NOT_CLOSE_PX = 1.5
 
 class Params:
     isolated_mm, clip_behind_mm, clip_least_mm = 60, 400, 1100
-    fill_neighbours, fill_root_weight_q15, fill_behind_mm = 3, 17948, 350
+    fill_neighbours, fill_root_weight_q15 = 3, 17948
 
 
 def around(values, row, column, reach):
@@ -41,8 +41,6 @@ def select(rig, field_q28, x, y, depth_mm, state, bright, params):
         row, column = divmod(slot, GRID)
         near = around(depth, row, column, 1)
         near = near[np.isfinite(near)]
-        wide = around(depth, row, column, 2)
-        wide = wide[np.isfinite(wide)]
         if state[slot] == SEEN:
             alike = np.abs(near - depth[row, column]) <= params.isolated_mm
             if len(near) >= 3 and alike.sum() <= 1:
@@ -51,7 +49,7 @@ def select(rig, field_q28, x, y, depth_mm, state, bright, params):
             kind, place, z, weight = "seen", (x[slot], y[slot]), depth[row, column], 32768
         elif state[slot] == MISSING and len(near) < params.fill_neighbours \
                 and params.fill_root_weight_q15:
-            z = min([clip] + [w + params.fill_behind_mm for w in wide])
+            z = clip
             place = rig.dot_at(slot, z)
             u, v = rig.distort(*place)
             edges = np.array([u, v, rig.width - 1 - u, rig.height - 1 - v, u - BRIGHT_U])
@@ -96,8 +94,7 @@ def write_vectors(directory):
     field_q28 = to_q([0.002, -0.001, 0.015], 28)
     rows = []
     inc.raw("\nstatic const struct ih_field vector_field = {%d, %d, %d};\n" % tuple(field_q28))
-    inc.raw("#define VECTOR_BRIGHT_U %d\n#define VECTOR_FILL_BEHIND_MM %d\n"
-            % (BRIGHT_U, Params.fill_behind_mm))
+    inc.raw("#define VECTOR_BRIGHT_U %d\n" % BRIGHT_U)
     for index, (missing, spread, reach, bright) in enumerate(
             [(0.1, 15, 1, False), (0.3, 40, 1, True), (0.6, 20, 1, False), (0.9, 20, 1, True),
              (0.2, 25, 2.5, False), (1, 1, 1, True)]):
