@@ -135,6 +135,95 @@ fits empty 320 240 255 no
 fits table 320 240 255 no
 fits room 320 240 255 no
 
+# --- depth images --------------------------------------------------------------------------------
+# Two directories: a ball 900 mm away before a wall, with a hole in it; a slanted wall.
+cat >depths.py <<'PYTHON'
+import json, math, os, struct
+
+W, H, F = 160, 120, 140.0
+
+def ball(u, v):
+    x, y = (u - 79.5) / F, (v - 59.5) / F
+    a, b, c = x * x + y * y + 1, -900.0, 900.0 ** 2 - 100.0 ** 2
+    root = b * b - a * c
+    if 20 <= u < 40:
+        return 0
+    return (-b - math.sqrt(root)) / a if root > 0 else 1500
+
+def slope(u, v):
+    return 1000 / (1 + 0.5 * (u - 79.5) / F)
+
+def matrix(rows, cols, data):
+    return {"type_id": "opencv-matrix", "rows": rows, "cols": cols, "dt": "d", "data": data}
+
+def write(folder, depth, heads):
+    os.makedirs(folder)
+    with open(folder + "/000000.pgm", "wb") as file:
+        file.write(b"P5\n%d %d\n65535\n" % (W, H))
+        for v in range(H):
+            file.write(b"".join(struct.pack(">H", round(depth(u, v))) for u in range(W)))
+    rig = {"kind": "range", "image_width": W, "image_height": H,
+           "camera_matrix": matrix(3, 3, [F, 0, 79.5, 0, F, 59.5, 0, 0, 1]),
+           "distortion_coefficients": matrix(1, 5, [0, 0, 0, 0, 0]), "near_mm": 400, "far_mm": 4000}
+    json.dump(rig, open(folder + "/rig.json", "w"))
+    truth = {"file": "000000.pgm", "head": heads[0] if heads else None}
+    if len(heads) > 1:
+        truth["heads"] = heads
+    print(json.dumps(truth), file=open(folder + "/truth.jsonl", "w"))
+
+if __name__ == "__main__":
+    head = {"centre_mm": [0, 0, 900], "semi_axes_mm": [100, 100, 100]}
+    other = {"centre_mm": [350, 0, 900], "semi_axes_mm": [100, 100, 100]}
+    write("range/ball", ball, [other, head])
+    write("range/slope", slope, [])
+PYTHON
+cat >cast.py <<'PYTHON'
+import json
+from depths import ball, slope, F
+
+# --seed 0: the camera is the depth camera, so a dot's pixel tells which depth it must have.
+rig = json.load(open("cast/rig.json"))
+m = rig["camera_matrix"]["data"]
+frames = [json.loads(line) for line in open("cast/frames.jsonl")]
+truths = [json.loads(line) for line in open("cast/truth.jsonl")]
+assert [f["source"] for f in frames] == ["ball/000000.pgm", "slope/000000.pgm"], "sources"
+assert frames[1]["time_us"] - frames[0]["time_us"] >= 10000000, "unrelated frames without a gap"
+for truth, depth in zip(truths, (ball, slope)):
+    hit_count = 0
+    for index, u, v, z in truth["dots"]:
+        u, v = (u - m[2]) / m[0] * F + 79.5, (v - m[5]) / m[4] * F + 59.5
+        near = [depth(round(u) + i, round(v) + j) for i in (-1, 0, 1) for j in (-1, 0, 1)]
+        assert min(near) - 3 <= z <= max(near) + 3, "dot %d at %g, depth image %s" % (index, z, near)
+        hit_count += z < 1000
+    assert hit_count > 15, "few dots: %d" % hit_count
+assert not [d for d in truths[0]["dots"] if 21 < (d[1] - m[2]) / m[0] * F + 79.5 < 38], "a dot in the hole"
+assert truths[0]["head"]["centre_mm"] == [0, 0, 900], "head: the one nearest the middle"
+assert len(truths[0]["heads"]) == 2 and truths[1]["head"] is None, "heads"
+moved = [json.loads(line) for line in open("moved/truth.jsonl")]
+assert len(moved) == 6, "three poses for each depth image"
+for truth in moved[:3]:
+    x, y, z = truth["head"]["centre_mm"]
+    assert 590 < (x * x + y * y + z * z) ** 0.5 < 1410 and abs(x) < 0.27 * z, "head's place %g %g %g" % (x, y, z)
+    on_head = [d for d in truth["dots"] if z - 120 < d[3] < z]
+    assert len(on_head) >= 8, "dots on the head: %d" % len(on_head)
+assert len({json.dumps(t["head"]) for t in moved[:3]}) == 3, "the same pose twice"
+assert all(len(t["dots"]) >= 100 for t in moved), "too few dots"
+PYTHON
+/usr/bin/python3 depths.py
+draw "depth images as they were taken" cast --range range --seed 0 --ambient dim --distortion none \
+    --size 320x240
+draw "depth images from other places" moved --range range --seed 4 --frames 3 --size 320x240 --ambient dim
+/usr/bin/python3 cast.py >out 2>&1 && reason= || reason=$(tail -n 1 out)
+result "dots lie on the measured surface, heads go with it" "$reason"
+refuse "depth images and a scene" 2 "--range" --range range --scene room a
+refuse "no range directory" 1 "nowhere" --range nowhere a
+refuse "a directory of dots as range" 1 "one/rig.json.*kind" --range one a
+mkdir short && cp range/slope/* short && head -c 20000 range/slope/000000.pgm >short/000000.pgm
+refuse "depth image cut off" 1 "short/000000.pgm: too short" --range short a
+cp range/slope/000000.pgm short && : >short/truth.jsonl
+refuse "depth image without a truth" 1 "short/truth.jsonl" --range short a
+rm -rf a
+
 # --- refusals ------------------------------------------------------------------------------------
 refuse "no directory" 2 "OUT_DIR"
 refuse "two directories" 2 "OUT_DIR" a b

@@ -30,6 +30,7 @@ static void studio_free(struct studio *studio)
 {
     if (studio == NULL)
         return;
+    rd_stage_end(&studio->stage);
     rd_ambient_free(studio->ambient);
     free(studio->grey);
     free(studio->samples);
@@ -44,9 +45,8 @@ static struct studio *studio_new(const struct rd_options *options)
     if (studio == NULL)
         return NULL;
     rd_rig_make(&studio->rig, options);
-    rd_laser_make(&studio->laser, options);
+    rd_laser_make(&studio->laser, options, &studio->rig);
     rd_sensor_make(&studio->sensor, options);
-    rd_stage_make(&studio->stage, options);
     studio->ambient = rd_ambient_new(&studio->rig);
     studio->grey = malloc(pixel_count * sizeof *studio->grey);
     studio->samples = malloc(pixel_count * sizeof *studio->samples);
@@ -60,31 +60,33 @@ static struct studio *studio_new(const struct rd_options *options)
 static bool render_frame(struct studio *studio, struct rd_output *output, int frame)
 {
     struct rd_stage *stage = &studio->stage;
-    rd_stage_frame(stage, frame);
+    if (!rd_stage_frame(stage, frame))
+        return false;
     if (stage->still_changed)
         rd_ambient_still(studio->ambient, &stage->scene, &stage->light);
     rd_ambient_frame(studio->ambient, &stage->scene, &stage->light, studio->grey);
     rd_dots_cast(&studio->laser, &studio->rig, &stage->scene, studio->grey, &studio->visible);
     rd_sensor_expose(&studio->sensor, studio->grey, frame, studio->samples);
     rd_output_truth(output, frame, &stage->truth, &studio->visible);
-    return rd_output_frame(output, frame, stage->time_us, studio->rig.width, studio->rig.height,
-                           studio->sensor.max_value, studio->samples);
+    return rd_output_frame(output, frame, stage->time_us, stage->source, &studio->rig, studio->sensor.max_value,
+                           studio->samples);
 }
 
 static bool render_all(struct studio *studio, const struct rd_options *options)
 {
     struct rd_output output;
     bool talk = isatty(STDERR_FILENO) == 1;
+    int frame_count = studio->stage.frame_count;
     bool good = rd_output_open(&output, options->out_dir);
-    for (int frame = 0; good && frame < options->frame_count; frame++) {
+    for (int frame = 0; good && frame < frame_count; frame++) {
         if (talk)
-            fprintf(stderr, "\rrender: %s %d/%d", options->out_dir, frame + 1, options->frame_count);
+            fprintf(stderr, "\rrender: %s %d/%d", options->out_dir, frame + 1, frame_count);
         good = render_frame(studio, &output, frame);
     }
     if (talk)
         fputc('\n', stderr);
     if (good)
-        good = rd_output_finish(&output, &studio->rig, options->frame_count);
+        good = rd_output_finish(&output, &studio->rig, frame_count);
     else
         rd_output_abandon(&output);
     return good;
@@ -101,7 +103,7 @@ int main(int argc, char **argv)
         fputs("render: out of memory\n", stderr);
         return 1;
     }
-    bool good = render_all(studio, &options);
+    bool good = rd_stage_make(&studio->stage, &options, &studio->rig) && render_all(studio, &options);
     studio_free(studio);
     return good ? 0 : 1;
 }

@@ -1,5 +1,7 @@
 #include "rd_dots.h"
 
+#include <stddef.h>
+
 #include "rd_rng.h"
 
 /* The bundle: one ray in the middle and two rings. Radii (in sigmas) and shares reproduce a Gaussian's variance. */
@@ -26,7 +28,7 @@ struct spot {
     double sigma_px;
 };
 
-void rd_laser_make(struct rd_laser *laser, const struct rd_options *options)
+void rd_laser_make(struct rd_laser *laser, const struct rd_options *options, const struct rd_rig *rig)
 {
     struct rd_rng rng = rd_rng_start(options->seed, RD_STREAM_LASER);
     double zoom = options->width / 752.0;
@@ -37,6 +39,7 @@ void rd_laser_make(struct rd_laser *laser, const struct rd_options *options)
     laser->divergence = rd_rng_uniform(&rng, 1e-4, 3e-4);
     laser->speckle = rd_rng_uniform(&rng, 0.15, 0.45);
     laser->seed = rd_rng_next(&rng);
+    laser->reach_mm = options->range_dir != NULL ? rig->far_mm : RD_FAR_AWAY_MM;
     for (int i = 0; i < RD_DOT_COUNT; i++) {
         double row = i / RD_DOT_ROWS - RD_DOT_ROWS / 2, column = i % RD_DOT_ROWS - RD_DOT_ROWS / 2;
         double outwards = (row * row + column * column) / 162.0;
@@ -133,7 +136,7 @@ static bool in_frame(const struct rd_rig *rig, double u_px, double v_px)
 static double beam_sigma(const struct rd_laser *laser, const struct rd_scene *scene, const struct rd_ray *ray)
 {
     struct rd_hit hit;
-    double reach_mm = rd_scene_hit(scene, ray, RD_FAR_AWAY_MM, &hit) ? hit.t_mm : NOWHERE_MM;
+    double reach_mm = rd_scene_hit(scene, ray, laser->reach_mm, &hit) ? hit.t_mm : NOWHERE_MM;
     return laser->beam_mm / reach_mm + laser->divergence;
 }
 
@@ -150,7 +153,7 @@ static bool cast_dot(const struct rd_laser *laser, const struct rd_rig *rig, con
         struct spot spot;
         struct rd_hit hit;
         ray.dir = sub_ray(rig->dot_rays[index], sub, sigma, &share);
-        if (!rd_scene_hit(scene, &ray, RD_FAR_AWAY_MM, &hit))
+        if (!rd_scene_hit(scene, &ray, laser->reach_mm, &hit))
             continue;
         share *= speckle_gain(laser, index, sub, hit.point_mm);
         if (!spot_of(laser, rig, scene, &hit, share * power, &spot))

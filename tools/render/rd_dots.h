@@ -22,6 +22,7 @@ struct rd_laser {
     double field_blur;         /* relative growth of that towards the corners */
     double beam_mm;            /* beam width (sigma) at the projector */
     double divergence;         /* growth of that, mm per mm */
+    double reach_mm;           /* farther surfaces show no dots */
     double speckle;            /* 0 none .. 1 full */
     double gain[RD_DOT_COUNT]; /* the grating does not share the light evenly */
     uint64_t seed;
@@ -37,7 +38,7 @@ struct rd_dot_list {
     int dot_count;
 };
 
-void rd_laser_make(struct rd_laser *laser, const struct rd_options *options);
+void rd_laser_make(struct rd_laser *laser, const struct rd_options *options, const struct rd_rig *rig);
 
 /* Adds all dots to `grey` and lists the visible ones with the true places of their middle rays. */
 void rd_dots_cast(const struct rd_laser *laser, const struct rd_rig *rig, const struct rd_scene *scene, float *grey,

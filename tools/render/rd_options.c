@@ -21,6 +21,7 @@ enum option_id {
     OPT_BITS,
     OPT_DISTORTION,
     OPT_AMBIENT,
+    OPT_RANGE,
     OPT_HELP
 };
 
@@ -31,10 +32,13 @@ static const char help_text[] =
     "\n"
     "  --scene KIND       person (default): somebody on a seat; turning: right round on an office chair;\n"
     "                     empty: the seat alone; table: things on a table; room: furniture, nobody there\n"
+    "  --range DIR        no scene, but the real depth images of a range directory or of those in DIR\n"
     "  --sequence N       1 (default): hands down; 2: hands move strongly and partly cover the head\n"
     "  --rig KIND         paper (default): 12.5 mm between camera and projector; wide: 125 mm\n"
-    "  --seed N           which person, room, light, motion (default 1)\n"
-    "  --frames N         1 to 5000 (default 50, four of them without the person)\n"
+    "  --seed N           which person, room, light, motion (default 1); with --range: from where, 0 for the\n"
+    "                     depth camera's own place\n"
+    "  --frames N         1 to 5000 (default 50, four of them without the person); with --range for each depth\n"
+    "                     image (default 1)\n"
     "  --size WxH         320x240 to 1280x800 (default 752x582); the focal length follows the width\n"
     "  --background KIND  varied (default, by seed), near, far, none\n"
     "  --ambient KIND     varied (default, by seed), dim, normal, bright\n"
@@ -43,7 +47,7 @@ static const char help_text[] =
     "  --help             this text\n"
     "\n"
     "rig.json is written last: a directory that has it is complete.\n"
-    "Exit status: 0 done, 1 something could not be written, 2 wrong usage.\n";
+    "Exit status: 0 done, 1 something could not be read or written, 2 wrong usage.\n";
 
 static bool complain(const char *option, const char *value, const char *wanted)
 {
@@ -137,6 +141,9 @@ static bool take_option(int id, const char *text, struct rd_options *options)
         return read_int("bits", text, 8, 16, "8, 10, 12 or 16", &options->bits) &&
                (options->bits == 8 || options->bits == 10 || options->bits == 12 || options->bits == 16 ||
                 complain("bits", text, "8, 10, 12 or 16"));
+    case OPT_RANGE:
+        options->range_dir = text;
+        return text[0] != '\0' || complain("range", text, "a directory");
     default:
         return take_word(id, text, options);
     }
@@ -155,11 +162,13 @@ enum rd_options_result rd_options_parse(int argc, char **argv, struct rd_options
         {"bits", required_argument, NULL, OPT_BITS},
         {"distortion", required_argument, NULL, OPT_DISTORTION},
         {"ambient", required_argument, NULL, OPT_AMBIENT},
+        {"range", required_argument, NULL, OPT_RANGE},
         {"help", no_argument, NULL, OPT_HELP},
         {NULL, 0, NULL, 0},
     };
     int id;
-    *options = (struct rd_options){.sequence = 1, .seed = 1, .frame_count = 50, .width = 752, .height = 582, .bits = 8};
+    bool scene_given = false;
+    *options = (struct rd_options){.sequence = 1, .seed = 1, .width = 752, .height = 582, .bits = 8};
     while ((id = getopt_long(argc, argv, "", long_options, NULL)) != -1) {
         if (id == OPT_HELP) {
             fputs(help_text, stdout);
@@ -168,11 +177,18 @@ enum rd_options_result rd_options_parse(int argc, char **argv, struct rd_options
         /* getopt_long has already said what it did not understand. */
         if (id == '?' || !take_option(id, optarg, options))
             return RD_OPTIONS_WRONG;
+        scene_given = scene_given || id == OPT_SCENE;
     }
     if (optind != argc - 1 || argv[optind][0] == '\0') {
         fputs("render: one OUT_DIR is needed; see render --help\n", stderr);
         return RD_OPTIONS_WRONG;
     }
+    if (options->range_dir != NULL && scene_given) {
+        fputs("render: --range takes the place of --scene\n", stderr);
+        return RD_OPTIONS_WRONG;
+    }
+    if (options->frame_count == 0)
+        options->frame_count = options->range_dir != NULL ? 1 : 50;
     options->out_dir = argv[optind];
     return RD_OPTIONS_RUN;
 }

@@ -15,6 +15,7 @@ enum rd_options_result { RD_OPTIONS_RUN, RD_OPTIONS_HELP, RD_OPTIONS_WRONG };
 
 struct rd_options {
     const char *out_dir;
+    const char *range_dir; /* real depth images instead of a scene; NULL: none */
     enum rd_scene_kind scene;
     int sequence; /* 1: hands down; 2: hands move strongly */
     enum rd_rig_kind rig;
@@ -22,7 +23,7 @@ struct rd_options {
     enum rd_distortion distortion;
     enum rd_ambient_kind ambient;
     uint64_t seed;
-    int frame_count;
+    int frame_count;   /* for each depth image, where there are any */
     int width, height; /* pixels */
     int bits;          /* per sample of the image files */
 };

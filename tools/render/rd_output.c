@@ -98,18 +98,45 @@ static void write_samples(FILE *file, int count, int max_value, const uint16_t *
     }
 }
 
-bool rd_output_frame(struct rd_output *output, int frame, int64_t time_us, int width, int height, int max_value,
-                     const uint16_t *samples)
+/* Any text as a JSON string. */
+static void write_string(FILE *file, const char *text)
+{
+    putc('"', file);
+    for (const char *at = text; *at != '\0'; at++) {
+        if ((unsigned char)*at < 0x20)
+            fprintf(file, "\\u%04x", (unsigned)*at);
+        else
+            fprintf(file, "%s%c", *at == '"' || *at == '\\' ? "\\" : "", *at);
+    }
+    putc('"', file);
+}
+
+bool rd_output_frame(struct rd_output *output, int frame, int64_t time_us, const char *source, const struct rd_rig *rig,
+                     int max_value, const uint16_t *samples)
 {
     char name[32];
     frame_name(frame, name);
     FILE *file = open_in(output, name);
     if (file == NULL)
         return false;
-    fprintf(file, "P5\n%d %d\n%d\n", width, height, max_value);
-    write_samples(file, width * height, max_value, samples);
-    fprintf(output->frames, "{\"file\":\"%s\",\"time_us\":%lld,\"laser\":true}\n", name, (long long)time_us);
+    fprintf(file, "P5\n%d %d\n%d\n", rig->width, rig->height, max_value);
+    write_samples(file, rig->width * rig->height, max_value, samples);
+    fprintf(output->frames, "{\"file\":\"%s\",\"time_us\":%lld,\"laser\":true", name, (long long)time_us);
+    if (source != NULL) {
+        fputs(",\"source\":", output->frames);
+        write_string(output->frames, source);
+    }
+    fputs("}\n", output->frames);
     return close_in(output, name, file);
+}
+
+static void write_head(FILE *file, const struct rd_head_truth *head)
+{
+    struct rd_vec c = head->centre_mm, a = head->semi_axes_mm;
+    fprintf(file, "{\"centre_mm\":[%.2f,%.2f,%.2f],\"semi_axes_mm\":[%.2f,%.2f,%.2f]", c.x, c.y, c.z, a.x, a.y, a.z);
+    if (head->angles_known)
+        fprintf(file, ",\"angles_deg\":[%.2f,%.2f,%.2f]", head->yaw_deg, head->pitch_deg, head->roll_deg);
+    putc('}', file);
 }
 
 void rd_output_truth(struct rd_output *output, int frame, const struct rd_truth *truth,
@@ -119,13 +146,15 @@ void rd_output_truth(struct rd_output *output, int frame, const struct rd_truth 
     char name[32];
     frame_name(frame, name);
     fprintf(file, "{\"file\":\"%s\",\"head\":", name);
-    if (truth->somebody)
-        fprintf(file,
-                "{\"centre_mm\":[%.2f,%.2f,%.2f],\"semi_axes_mm\":[%.2f,%.2f,%.2f],\"angles_deg\":[%.2f,%.2f,%.2f]}",
-                truth->centre_mm.x, truth->centre_mm.y, truth->centre_mm.z, truth->semi_axes_mm.x,
-                truth->semi_axes_mm.y, truth->semi_axes_mm.z, truth->yaw_deg, truth->pitch_deg, truth->roll_deg);
+    if (truth->head != RD_NOBODY)
+        write_head(file, &truth->heads[truth->head]);
     else
         fputs("null", file);
+    for (int i = 0; truth->several && i < truth->head_count; i++) {
+        fputs(i == 0 ? ",\"heads\":[" : ",", file);
+        write_head(file, &truth->heads[i]);
+        fputs(i == truth->head_count - 1 ? "]" : "", file);
+    }
     fputs(",\"dots\":[", file);
     for (int i = 0; i < visible->dot_count; i++) {
         const struct rd_dot *dot = &visible->dots[i];

@@ -15,10 +15,20 @@
 
 #define RD_PATH_MAX 4096
 
-struct rd_truth {
-    bool somebody;
+#define RD_HEADS_MAX 16
+#define RD_NOBODY (-1)
+
+struct rd_head_truth {
     struct rd_vec centre_mm, semi_axes_mm;
+    bool angles_known;
     double yaw_deg, pitch_deg, roll_deg;
+};
+
+struct rd_truth {
+    struct rd_head_truth heads[RD_HEADS_MAX];
+    int head_count;
+    int head;     /* the one to find, or RD_NOBODY */
+    bool several; /* all heads are listed too */
 };
 
 struct rd_output {
@@ -28,8 +38,9 @@ struct rd_output {
 
 /* Makes the directory (and those above it) if needed. */
 bool rd_output_open(struct rd_output *output, const char *dir);
-bool rd_output_frame(struct rd_output *output, int frame, int64_t time_us, int width, int height, int max_value,
-                     const uint16_t *samples);
+/* source: what the frame was made of, or NULL. */
+bool rd_output_frame(struct rd_output *output, int frame, int64_t time_us, const char *source, const struct rd_rig *rig,
+                     int max_value, const uint16_t *samples);
 void rd_output_truth(struct rd_output *output, int frame, const struct rd_truth *truth,
                      const struct rd_dot_list *visible);
 /* Removes frames of an earlier, longer run, closes the lists and writes rig.json. */

@@ -1,5 +1,7 @@
 #include "rd_rig.h"
 
+#include <stddef.h>
+
 #include "rd_rng.h"
 
 /* The camera of the paper, at its own picture size. */
@@ -52,7 +54,7 @@ static void make_dots(struct rd_rig *rig, double baseline_mm)
 void rd_rig_make(struct rd_rig *rig, const struct rd_options *options)
 {
     double zoom = (double)options->width / PAPER_WIDTH_PX;
-    bool open_room = options->scene == RD_SCENE_TABLE || options->scene == RD_SCENE_ROOM;
+    bool open_room = options->scene == RD_SCENE_TABLE || options->scene == RD_SCENE_ROOM || options->range_dir != NULL;
     rig->width = options->width;
     rig->height = options->height;
     rig->fx_px = PAPER_FX_PX * zoom;
@@ -84,6 +86,18 @@ bool rd_rig_project(const struct rd_rig *rig, struct rd_vec point_mm, double *u_
     *u_px = rig->fx_px * xd + rig->cx_px;
     *v_px = rig->fy_px * yd + rig->cy_px;
     return true;
+}
+
+/* The middle dot's neighbours on both sides give the grating's two axes, as long as one step of direction cosine. */
+bool rd_rig_pattern_place(const struct rd_rig *rig, struct rd_vec point_mm, double *row, double *column)
+{
+    const struct rd_vec *middle = &rig->dot_rays[RD_DOT_COUNT / 2];
+    struct rd_vec across = rd_scale(rd_sub(middle[1], middle[-1]), 0.5);
+    struct rd_vec down = rd_scale(rd_sub(middle[RD_DOT_ROWS], middle[-RD_DOT_ROWS]), 0.5);
+    struct rd_vec dir = rd_unit(rd_sub(point_mm, rig->projector_mm));
+    *row = rd_dot(dir, down) / rd_dot(down, down);
+    *column = rd_dot(dir, across) / rd_dot(across, across);
+    return rd_dot(dir, *middle) > 0.0;
 }
 
 struct rd_vec rd_rig_pixel_ray(const struct rd_rig *rig, double u_px, double v_px)

@@ -28,6 +28,10 @@ void rd_rig_make(struct rd_rig *rig, const struct rd_options *options);
 /* Pixel of a point in space. False: behind the camera or so far aside that the lens model says nothing. */
 bool rd_rig_project(const struct rd_rig *rig, struct rd_vec point_mm, double *u_px, double *v_px);
 
+/* Where a point lies in the pattern, as seen from the projector: row and column of dots from the middle one, -9 .. 9
+ * within the pattern. False: behind the projector. */
+bool rd_rig_pattern_place(const struct rd_rig *rig, struct rd_vec point_mm, double *row, double *column);
+
 /* Unit direction of what a pixel sees. */
 struct rd_vec rd_rig_pixel_ray(const struct rd_rig *rig, double u_px, double v_px);
 

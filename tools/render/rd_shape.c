@@ -7,6 +7,8 @@
 /* Steps and tolerance of the walk towards a rounded edge. */
 #define BOX_STEPS_MAX 40
 #define BOX_CLOSE_MM 0.02
+/* No measured surface ends beyond this. */
+#define RELIEF_REACH_MM 1e6
 
 static struct rd_shape shape_of(enum rd_shape_kind kind, struct rd_pose pose, struct rd_vec half_mm, int material)
 {
@@ -61,6 +63,13 @@ struct rd_shape rd_shape_cylinder(struct rd_pose pose, double radius_mm, double 
 struct rd_shape rd_shape_wall(struct rd_pose pose, double half_width_mm, double half_height_mm, int material)
 {
     return shape_of(RD_WALL, pose, rd_v(half_width_mm, half_height_mm, 0.0), material);
+}
+
+struct rd_shape rd_shape_relief(struct rd_pose pose, const struct rd_relief *relief, int material)
+{
+    struct rd_shape shape = shape_of(RD_RELIEF, pose, rd_v(RELIEF_REACH_MM, 0.0, 0.0), material);
+    shape.relief = relief;
+    return shape;
 }
 
 void rd_shape_move(struct rd_shape *shape, const struct rd_pose *outer)
@@ -211,6 +220,8 @@ double rd_shape_hit(const struct rd_shape *shape, const struct rd_ray *ray, doub
         return hit_cylinder(shape, o, d, t_max_mm);
     case RD_WALL:
         return hit_wall(shape, o, d, t_max_mm);
+    case RD_RELIEF:
+        return rd_relief_hit(shape->relief, o, d, T_MIN_MM, t_max_mm);
     }
     return RD_MISS;
 }
@@ -255,6 +266,9 @@ struct rd_vec rd_shape_normal(const struct rd_shape *shape, struct rd_vec point_
         break;
     case RD_WALL:
         n = rd_v(0.0, 0.0, -1.0);
+        break;
+    case RD_RELIEF:
+        n = rd_relief_normal(shape->relief, p);
         break;
     }
     return rd_turn(&shape->pose.rot, rd_unit(n));

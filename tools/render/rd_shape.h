@@ -9,16 +9,17 @@
  *   box          half edges                          round_mm: radius of its edges
  *   cylinder     x radius, y half height             closed at both ends
  *   wall         x, y half width and height          a flat rectangle at local z = 0
+ *   relief                                           a measured surface, in its depth camera's frame
  */
 #ifndef RD_SHAPE_H
 #define RD_SHAPE_H
 
-#include "rd_vec.h"
+#include "rd_relief.h"
 
 /* Returned where a ray misses. */
 #define RD_MISS (-1.0)
 
-enum rd_shape_kind { RD_ELLIPSOID, RD_CONE, RD_BOX, RD_CYLINDER, RD_WALL };
+enum rd_shape_kind { RD_ELLIPSOID, RD_CONE, RD_BOX, RD_CYLINDER, RD_WALL, RD_RELIEF };
 
 struct rd_ray {
     struct rd_vec origin_mm;
@@ -33,6 +34,7 @@ struct rd_shape {
     double round_mm;
     struct rd_vec clip_normal;
     double clip_limit;
+    const struct rd_relief *relief;
     struct rd_pose paint;          /* frame of the material's pattern */
     struct rd_vec bound_centre_mm; /* a ball that holds the whole shape */
     double bound_radius_mm;
@@ -45,6 +47,9 @@ struct rd_shape rd_shape_cone(struct rd_vec a_mm, struct rd_vec b_mm, double a_r
 struct rd_shape rd_shape_box(struct rd_pose pose, struct rd_vec half_mm, double round_mm, int material);
 struct rd_shape rd_shape_cylinder(struct rd_pose pose, double radius_mm, double half_height_mm, int material);
 struct rd_shape rd_shape_wall(struct rd_pose pose, double half_width_mm, double half_height_mm, int material);
+
+/* The relief must outlive the shape. */
+struct rd_shape rd_shape_relief(struct rd_pose pose, const struct rd_relief *relief, int material);
 
 /* Puts a shape that was made with respect to `outer` into outer's own surroundings. */
 void rd_shape_move(struct rd_shape *shape, const struct rd_pose *outer);

@@ -1,12 +1,14 @@
 #include "rd_stage.h"
 
 #include "rd_furniture.h"
+#include "rd_view.h"
 
 #define FRAME_US 100000
 #define ARRANGEMENT_FRAMES 10
 #define ARRANGEMENT_US 10000000
 /* Frames without the person, of fifty. */
 #define EMPTY_OF_50 4
+#define PATTERN_HALF (RD_DOT_ROWS / 2)
 
 static bool somebody_comes(const struct rd_options *options)
 {
@@ -16,7 +18,7 @@ static bool somebody_comes(const struct rd_options *options)
 static void plan_absence(struct rd_stage *stage)
 {
     struct rd_rng rng = rd_rng_start(stage->options.seed, RD_STREAM_SCHEDULE);
-    int frame_count = stage->options.frame_count;
+    int frame_count = stage->frame_count;
     int empty_count = (frame_count * EMPTY_OF_50 + 25) / 50;
     int place = rd_rng_pick(&rng, 3);
     int first = place == 0 ? 0 : place == 1 ? frame_count / 2 : frame_count - empty_count;
@@ -81,63 +83,132 @@ static void arrange(struct rd_stage *stage, int arrangement)
     stage->still_changed = true;
 }
 
+static bool open_range(struct rd_stage *stage)
+{
+    bool good = rd_range_open(&stage->range, stage->options.range_dir);
+    stage->frame_count = stage->range.frame_count * stage->options.frame_count;
+    return good;
+}
+
 static bool has_arrangements(const struct rd_options *options)
 {
     return options->scene == RD_SCENE_TABLE || options->scene == RD_SCENE_ROOM;
 }
 
-void rd_stage_make(struct rd_stage *stage, const struct rd_options *options)
+bool rd_stage_make(struct rd_stage *stage, const struct rd_options *options, const struct rd_rig *rig)
 {
     stage->options = *options;
+    stage->rig = rig;
+    stage->frame_count = options->frame_count;
     stage->arrangement = -1;
     stage->still_changed = true;
     rd_scene_clear(&stage->scene);
     rd_light_make(&stage->light, options);
+    if (options->range_dir != NULL)
+        return open_range(stage);
     plan_absence(stage);
     if (!has_arrangements(options))
         make_seated(stage);
     stage->scene.still_count = stage->scene.shape_count;
+    return true;
 }
 
-static void set_truth(struct rd_stage *stage, const struct rd_posture *posture)
+static void add_truth(struct rd_truth *truth, const struct rd_person *person, const struct rd_posture *posture)
 {
     const struct rd_rot *rot = &posture->head.rot;
-    stage->truth.centre_mm = posture->head.origin_mm;
-    stage->truth.semi_axes_mm = stage->person.head_axes_mm;
-    /* Yaw, pitch and roll of rd_rot_euler, read back from the axes. */
-    stage->truth.yaw_deg = atan2(rot->z.x, rot->z.z) / RD_RAD_PER_DEG;
-    stage->truth.pitch_deg = asin(rd_clamp(-rot->z.y, -1.0, 1.0)) / RD_RAD_PER_DEG;
-    stage->truth.roll_deg = atan2(rot->x.y, rot->y.y) / RD_RAD_PER_DEG;
+    truth->heads[truth->head_count++] = (struct rd_head_truth){
+        .centre_mm = posture->head.origin_mm,
+        .semi_axes_mm = person->head_axes_mm,
+        .angles_known = true,
+        /* Yaw, pitch and roll of rd_rot_euler, read back from the axes. */
+        .yaw_deg = atan2(rot->z.x, rot->z.z) / RD_RAD_PER_DEG,
+        .pitch_deg = asin(rd_clamp(-rot->z.y, -1.0, 1.0)) / RD_RAD_PER_DEG,
+        .roll_deg = atan2(rot->x.y, rot->y.y) / RD_RAD_PER_DEG,
+    };
+}
+
+/* The head nearest the pattern's middle whose centre lies within the pattern. */
+static void choose_head(struct rd_truth *truth, const struct rd_rig *rig)
+{
+    double least = 1e9;
+    truth->head = RD_NOBODY;
+    for (int i = 0; i < truth->head_count; i++) {
+        double row, column;
+        bool ahead = rd_rig_pattern_place(rig, truth->heads[i].centre_mm, &row, &column);
+        if (!ahead || fmax(fabs(row), fabs(column)) > PATTERN_HALF || hypot(row, column) >= least)
+            continue;
+        least = hypot(row, column);
+        truth->head = i;
+    }
+}
+
+static bool show_range(struct rd_stage *stage, int frame)
+{
+    int index = frame / stage->options.frame_count;
+    const struct rd_range_frame *from = &stage->range.frames[index];
+    struct rd_rng rng = rd_rng_start(stage->options.seed, RD_STREAM_ROOM + ((uint64_t)(index + 1) << 32));
+    if (index != stage->arrangement) {
+        rd_relief_free(stage->relief);
+        stage->relief = rd_range_load(from);
+        stage->arrangement = index;
+    }
+    if (stage->relief == NULL)
+        return false;
+    struct rd_pose camera = rd_view_draw(stage->relief, from, stage->rig, stage->options.seed, (uint64_t)frame);
+    struct rd_pose back = rd_pose_inverse(&camera);
+    rd_scene_clear(&stage->scene);
+    struct rd_shape surface = rd_shape_relief(back, stage->relief, rd_room_paint(&stage->scene, &rng, 0.15, 0.75));
+    rd_scene_add(&stage->scene, &surface);
+    stage->scene.still_count = stage->scene.shape_count;
+    stage->still_changed = true;
+    stage->source = from->source;
+    stage->time_us = (int64_t)frame * ARRANGEMENT_US;
+    stage->truth = (struct rd_truth){.head_count = from->head_count, .several = from->head_count > 1};
+    for (int i = 0; i < from->head_count; i++)
+        stage->truth.heads[i] = (struct rd_head_truth){.centre_mm = rd_pose_out(&back, from->heads[i].centre_mm),
+                                                       .semi_axes_mm = from->heads[i].semi_axes_mm};
+    choose_head(&stage->truth, stage->rig);
+    return true;
 }
 
 /* An empty chair stays as it was left, or as it will be found. */
 static void add_chair(struct rd_stage *stage, int frame)
 {
-    if (!stage->truth.somebody)
+    if (stage->truth.head == RD_NOBODY)
         frame = stage->empty_first > 0 ? stage->empty_first - 1 : stage->empty_end;
     double turn = rd_motion_turn(&stage->motion, frame);
     rd_chair_build(&stage->chair, &stage->scene, stage->motion.hips_mm, turn, stage->person.torso_mm);
 }
 
-void rd_stage_frame(struct rd_stage *stage, int frame)
+bool rd_stage_frame(struct rd_stage *stage, int frame)
 {
+    if (stage->options.range_dir != NULL)
+        return show_range(stage, frame);
+    bool somebody = frame < stage->empty_first || frame >= stage->empty_end;
+    stage->truth = (struct rd_truth){.head = somebody ? 0 : RD_NOBODY};
     stage->time_us = (int64_t)frame * FRAME_US;
-    stage->truth.somebody = frame < stage->empty_first || frame >= stage->empty_end;
     stage->still_changed = frame == 0;
     if (has_arrangements(&stage->options)) {
         int arrangement = frame / ARRANGEMENT_FRAMES;
         stage->time_us += (int64_t)arrangement * ARRANGEMENT_US;
         if (arrangement != stage->arrangement)
             arrange(stage, arrangement);
-        return;
+        return true;
     }
     stage->scene.shape_count = stage->scene.still_count;
     if (stage->options.scene == RD_SCENE_TURNING)
         add_chair(stage, frame);
-    if (stage->truth.somebody) {
+    if (somebody) {
         struct rd_posture posture;
         rd_motion_posture(&stage->motion, &stage->person, frame, &posture);
         rd_person_build(&stage->person, &posture, &stage->scene);
-        set_truth(stage, &posture);
+        add_truth(&stage->truth, &stage->person, &posture);
     }
+    return true;
+}
+
+void rd_stage_end(struct rd_stage *stage)
+{
+    rd_relief_free(stage->relief);
+    rd_range_close(&stage->range);
 }

@@ -1,6 +1,8 @@
 /* rd_stage - which scene stands before the camera in which frame.
  * person, turning: somebody is there except in four of fifty frames (at the start, in the middle or at the end, by
  * seed). empty: the seat alone. table, room: nobody; another arrangement every ten frames, ten seconds later.
+ * A range directory: each of its depth images in turn, every frame ten seconds later; the heads are those of its truth
+ * file, and the one to find is the one nearest the pattern's middle, if its centre lies within the pattern.
  */
 #ifndef RD_STAGE_H
 #define RD_STAGE_H
@@ -11,11 +13,15 @@
 #include "rd_motion.h"
 #include "rd_options.h"
 #include "rd_output.h"
+#include "rd_range.h"
+#include "rd_rig.h"
 #include "rd_room.h"
 #include "rd_scene.h"
 
 struct rd_stage {
     struct rd_options options;
+    const struct rd_rig *rig;
+    int frame_count;
     struct rd_scene scene;
     struct rd_light light;
     struct rd_person person;
@@ -24,12 +30,17 @@ struct rd_stage {
     bool still_changed; /* the still shapes are others than in the frame before */
     int arrangement;
     int empty_first, empty_end; /* frames without the person */
+    struct rd_range range;
+    struct rd_relief *relief; /* of the depth image whose index is the arrangement */
+    const char *source;       /* where the frame comes from, or NULL */
     struct rd_truth truth;
     int64_t time_us;
 };
 
-void rd_stage_make(struct rd_stage *stage, const struct rd_options *options);
-/* Sets scene, truth, time and still_changed for a frame; frames come in order from 0. */
-void rd_stage_frame(struct rd_stage *stage, int frame);
+/* The rig must outlive the stage. False: a file's fault has been told; rd_stage_end is due all the same. */
+bool rd_stage_make(struct rd_stage *stage, const struct rd_options *options, const struct rd_rig *rig);
+/* Sets scene, truth, time, source and still_changed for a frame; frames come in order from 0. False: told. */
+bool rd_stage_frame(struct rd_stage *stage, int frame);
+void rd_stage_end(struct rd_stage *stage);
 
 #endif

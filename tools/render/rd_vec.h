@@ -151,6 +151,14 @@ static inline struct rd_vec rd_pose_in(const struct rd_pose *pose, struct rd_vec
     return rd_turn_back(&pose->rot, rd_sub(outer, pose->origin_mm));
 }
 
+/* The outer frame's pose as it is seen from inside. */
+static inline struct rd_pose rd_pose_inverse(const struct rd_pose *pose)
+{
+    const struct rd_rot *r = &pose->rot;
+    struct rd_rot back = {{r->x.x, r->y.x, r->z.x}, {r->x.y, r->y.y, r->z.y}, {r->x.z, r->y.z, r->z.z}};
+    return (struct rd_pose){back, rd_scale(rd_turn_back(r, pose->origin_mm), -1.0)};
+}
+
 /* The pose of something that stands in `inner` with respect to `outer`. */
 static inline struct rd_pose rd_pose_mul(const struct rd_pose *outer, const struct rd_pose *inner)
 {
