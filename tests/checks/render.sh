@@ -86,7 +86,7 @@ draw "1280x800, 16 bits, wide rig, hands" large --frames 1 --size 1280x800 --bit
 draw "10 bits, strong lens, nothing behind" ten --frames 1 --size 640x480 --bits 10 --distortion strong \
     --background none
 draw "12 bits, turning, no lens" twelve --frames 1 --size 320x240 --bits 12 --scene turning --distortion none
-for scene in empty table room; do
+for scene in empty table room clutter; do
     draw "scene $scene, ambient bright" "$scene" --frames 1 --size 320x240 --scene "$scene" --ambient bright
 done
 
@@ -134,6 +134,7 @@ fits twelve 320 240 4095 any
 fits empty 320 240 255 no
 fits table 320 240 255 no
 fits room 320 240 255 no
+fits clutter 320 240 255 no
 
 # --- depth images --------------------------------------------------------------------------------
 # Two directories: a ball 900 mm away before a wall, with a hole in it; a slanted wall.

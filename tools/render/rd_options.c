@@ -31,7 +31,8 @@ static const char help_text[] =
     "The same options give the same files.\n"
     "\n"
     "  --scene KIND       person (default): somebody on a seat; turning: right round on an office chair;\n"
-    "                     empty: the seat alone; table: things on a table; room: furniture, nobody there\n"
+    "                     empty: the seat alone; table: things on a table; room: furniture, nobody there;\n"
+    "                     clutter: things that might be taken for a head\n"
     "  --range DIR        no scene, but the real depth images of a range directory or of those in DIR\n"
     "  --sequence N       1 (default): hands down; 2: hands move strongly and partly cover the head\n"
     "  --rig KIND         paper (default): 12.5 mm between camera and projector; wide: 125 mm\n"
@@ -100,7 +101,7 @@ static bool read_size(const char *text, struct rd_options *options)
 
 static bool take_word(int id, const char *text, struct rd_options *options)
 {
-    static const char *const scenes[] = {"person", "turning", "empty", "table", "room", NULL};
+    static const char *const scenes[] = {"person", "turning", "empty", "table", "room", "clutter", NULL};
     static const char *const rigs[] = {"paper", "wide", NULL};
     static const char *const backgrounds[] = {"varied", "near", "far", "none", NULL};
     static const char *const lenses[] = {"normal", "none", "strong", NULL};
@@ -108,7 +109,7 @@ static bool take_word(int id, const char *text, struct rd_options *options)
     int index = 0;
     bool known = false;
     if (id == OPT_SCENE) {
-        known = read_word("scene", text, scenes, "person, turning, empty, table or room", &index);
+        known = read_word("scene", text, scenes, "person, turning, empty, table, room or clutter", &index);
         options->scene = (enum rd_scene_kind)index;
     } else if (id == OPT_RIG) {
         known = read_word("rig", text, rigs, "paper or wide", &index);

@@ -4,7 +4,14 @@
 
 #include <stdint.h>
 
-enum rd_scene_kind { RD_SCENE_PERSON, RD_SCENE_TURNING, RD_SCENE_EMPTY, RD_SCENE_TABLE, RD_SCENE_ROOM };
+enum rd_scene_kind {
+    RD_SCENE_PERSON,
+    RD_SCENE_TURNING,
+    RD_SCENE_EMPTY,
+    RD_SCENE_TABLE,
+    RD_SCENE_ROOM,
+    RD_SCENE_CLUTTER
+};
 enum rd_rig_kind { RD_RIG_PAPER, RD_RIG_WIDE };
 enum rd_background { RD_BACK_VARIED, RD_BACK_NEAR, RD_BACK_FAR, RD_BACK_NONE };
 enum rd_distortion { RD_LENS_NORMAL, RD_LENS_NONE, RD_LENS_STRONG };

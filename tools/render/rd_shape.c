@@ -60,6 +60,12 @@ struct rd_shape rd_shape_cylinder(struct rd_pose pose, double radius_mm, double 
     return shape_of(RD_CYLINDER, pose, rd_v(radius_mm, half_height_mm, 0.0), material);
 }
 
+struct rd_shape rd_shape_frustum(struct rd_pose pose, double lower_radius_mm, double upper_radius_mm,
+                                 double half_height_mm, int material)
+{
+    return shape_of(RD_FRUSTUM, pose, rd_v(lower_radius_mm, half_height_mm, upper_radius_mm), material);
+}
+
 struct rd_shape rd_shape_wall(struct rd_pose pose, double half_width_mm, double half_height_mm, int material)
 {
     return shape_of(RD_WALL, pose, rd_v(half_width_mm, half_height_mm, 0.0), material);
@@ -192,6 +198,29 @@ static double hit_cylinder(const struct rd_shape *s, struct rd_vec o, struct rd_
     return best;
 }
 
+/* Change of the radius along Y. */
+static double frustum_slope(const struct rd_shape *s)
+{
+    return 0.5 * (s->half_mm.x - s->half_mm.z) / s->half_mm.y;
+}
+
+/* Both crossings count, as with a bowl. */
+static double hit_frustum(const struct rd_shape *s, struct rd_vec o, struct rd_vec d, double t_max)
+{
+    double slope = frustum_slope(s), r0 = s->half_mm.z + slope * (o.y + s->half_mm.y), r1 = slope * d.y;
+    double a = d.x * d.x + d.z * d.z - r1 * r1, b = o.x * d.x + o.z * d.z - r0 * r1;
+    double c = o.x * o.x + o.z * o.z - r0 * r0, root = b * b - a * c;
+    if (root < 0.0 || fabs(a) < 1e-12)
+        return RD_MISS;
+    root = copysign(sqrt(root), a);
+    for (int side = 0; side < 2; side++) {
+        double t = (side == 0 ? -b - root : -b + root) / a;
+        if (inside(t, t_max) && fabs(o.y + t * d.y) <= s->half_mm.y)
+            return t;
+    }
+    return RD_MISS;
+}
+
 static double hit_wall(const struct rd_shape *s, struct rd_vec o, struct rd_vec d, double t_max)
 {
     if (fabs(d.z) < 1e-12)
@@ -218,6 +247,8 @@ double rd_shape_hit(const struct rd_shape *shape, const struct rd_ray *ray, doub
         return hit_box(shape, o, d, t_max_mm);
     case RD_CYLINDER:
         return hit_cylinder(shape, o, d, t_max_mm);
+    case RD_FRUSTUM:
+        return hit_frustum(shape, o, d, t_max_mm);
     case RD_WALL:
         return hit_wall(shape, o, d, t_max_mm);
     case RD_RELIEF:
@@ -263,6 +294,9 @@ struct rd_vec rd_shape_normal(const struct rd_shape *shape, struct rd_vec point_
         break;
     case RD_CYLINDER:
         n = fabs(p.y) > shape->half_mm.y - 1e-6 ? rd_v(0.0, p.y, 0.0) : rd_v(p.x, 0.0, p.z);
+        break;
+    case RD_FRUSTUM:
+        n = rd_v(p.x, -frustum_slope(shape) * hypot(p.x, p.z), p.z);
         break;
     case RD_WALL:
         n = rd_v(0.0, 0.0, -1.0);

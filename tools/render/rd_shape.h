@@ -8,6 +8,8 @@
  *                y their distance; starts at origin
  *   box          half edges                          round_mm: radius of its edges
  *   cylinder     x radius, y half height             closed at both ends
+ *   frustum      x lower, z upper radius,            a round tube that narrows, open at both ends
+ *                y half height
  *   wall         x, y half width and height          a flat rectangle at local z = 0
  *   relief                                           a measured surface, in its depth camera's frame
  */
@@ -19,7 +21,7 @@
 /* Returned where a ray misses. */
 #define RD_MISS (-1.0)
 
-enum rd_shape_kind { RD_ELLIPSOID, RD_CONE, RD_BOX, RD_CYLINDER, RD_WALL, RD_RELIEF };
+enum rd_shape_kind { RD_ELLIPSOID, RD_CONE, RD_BOX, RD_CYLINDER, RD_FRUSTUM, RD_WALL, RD_RELIEF };
 
 struct rd_ray {
     struct rd_vec origin_mm;
@@ -46,6 +48,8 @@ struct rd_shape rd_shape_cone(struct rd_vec a_mm, struct rd_vec b_mm, double a_r
                               int material);
 struct rd_shape rd_shape_box(struct rd_pose pose, struct rd_vec half_mm, double round_mm, int material);
 struct rd_shape rd_shape_cylinder(struct rd_pose pose, double radius_mm, double half_height_mm, int material);
+struct rd_shape rd_shape_frustum(struct rd_pose pose, double lower_radius_mm, double upper_radius_mm,
+                                 double half_height_mm, int material);
 struct rd_shape rd_shape_wall(struct rd_pose pose, double half_width_mm, double half_height_mm, int material);
 
 /* The relief must outlive the shape. */

@@ -1,5 +1,6 @@
 #include "rd_stage.h"
 
+#include "rd_clutter.h"
 #include "rd_furniture.h"
 #include "rd_view.h"
 
@@ -76,6 +77,8 @@ static void arrange(struct rd_stage *stage, int arrangement)
     rd_scene_clear(&stage->scene);
     if (stage->options.scene == RD_SCENE_TABLE)
         rd_furniture_table(&stage->scene, &rng);
+    else if (stage->options.scene == RD_SCENE_CLUTTER)
+        rd_clutter_build(&stage->scene, &rng);
     else
         rd_furniture_room(&stage->scene, &rng);
     stage->scene.still_count = stage->scene.shape_count;
@@ -92,7 +95,7 @@ static bool open_range(struct rd_stage *stage)
 
 static bool has_arrangements(const struct rd_options *options)
 {
-    return options->scene == RD_SCENE_TABLE || options->scene == RD_SCENE_ROOM;
+    return options->scene == RD_SCENE_TABLE || options->scene == RD_SCENE_ROOM || options->scene == RD_SCENE_CLUTTER;
 }
 
 bool rd_stage_make(struct rd_stage *stage, const struct rd_options *options, const struct rd_rig *rig)

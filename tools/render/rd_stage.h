@@ -1,6 +1,6 @@
 /* rd_stage - which scene stands before the camera in which frame.
  * person, turning: somebody is there except in four of fifty frames (at the start, in the middle or at the end, by
- * seed). empty: the seat alone. table, room: nobody; another arrangement every ten frames, ten seconds later.
+ * seed). empty: the seat alone. table, room, clutter: nobody; another arrangement every ten frames, ten seconds later.
  * A range directory: each of its depth images in turn, every frame ten seconds later; the heads are those of its truth
  * file, and the one to find is the one nearest the pattern's middle, if its centre lies within the pattern.
  */
