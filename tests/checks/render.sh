@@ -225,6 +225,43 @@ cp range/slope/000000.pgm short && : >short/truth.jsonl
 refuse "depth image without a truth" 1 "short/truth.jsonl" --range short a
 rm -rf a
 
+# --- somebody comes and goes -------------------------------------------------------------------------
+cat >pattern.py <<'PYTHON'
+import json
+
+def place(rig, point):
+    """Row and column of the pattern in which a point lies, from the middle dot, and whether it is ahead."""
+    data, origin = rig["dot_rays"]["data"], rig["projector_origin"]["data"]
+    ray = [data[3 * i:3 * i + 3] for i in range(361)]
+    way = [p - o for p, o in zip(point, origin)]
+    length = sum(w * w for w in way) ** 0.5
+    steps = []
+    for stride in (19, 1):
+        step = [(b - a) / 2 for a, b in zip(ray[180 - stride], ray[180 + stride])]
+        steps.append(sum(s * w for s, w in zip(step, way)) / length / sum(s * s for s in step))
+    return steps
+
+def read(folder):
+    rig = json.load(open(folder + "/rig.json"))
+    return rig, [json.loads(line) for line in open(folder + "/truth.jsonl")]
+PYTHON
+cat >visit.py <<'PYTHON'
+from pattern import place, read
+
+rig, truths = read("visit")
+there = [truth["head"] is not None for truth in truths]
+assert not any(there[:6] + there[-6:]), "a head at the start or the end"
+first, last = there.index(True), len(there) - 1 - there[::-1].index(True)
+assert all(there[first:last + 1]) and last - first >= 8, "no stay: %s" % there
+for truth in truths[first:last + 1]:
+    assert max(map(abs, place(rig, truth["head"]["centre_mm"]))) <= 8.01, "a head beside the pattern"
+ends = [place(rig, truths[i]["head"]["centre_mm"]) for i in (first, (first + last) // 2, last)]
+assert min(max(map(abs, ends[0])), max(map(abs, ends[2]))) > max(map(abs, ends[1])), "not from a side: %s" % ends
+PYTHON
+draw "a visit" visit --scene visit --frames 40 --size 320x240
+/usr/bin/python3 visit.py >out 2>&1 && reason= || reason=$(tail -n 1 out)
+result "a visitor comes, is told while in the pattern, and goes" "$reason"
+
 # --- refusals ------------------------------------------------------------------------------------
 refuse "no directory" 2 "OUT_DIR"
 refuse "two directories" 2 "OUT_DIR" a b

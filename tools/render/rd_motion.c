@@ -32,6 +32,7 @@ void rd_motion_make(struct rd_motion *motion, const struct rd_person *person, ui
     motion->yaw = sway_of(&rng, 8.0, 12.0, 50.0);
     motion->pitch = sway_of(&rng, 4.0, 4.0, 14.0);
     motion->roll = sway_of(&rng, 2.0, 3.0, 10.0);
+    motion->approach = (struct rd_approach){.yaw = 0.0};
     motion->turning = turning;
     motion->turn_start = rd_rng_uniform(&rng, -0.6, 0.6);
     motion->turn_total = rd_rng_sign(&rng) * 2.0 * RD_PI;
@@ -54,10 +55,11 @@ double rd_motion_turn(const struct rd_motion *motion, int frame)
 void rd_motion_posture(const struct rd_motion *motion, const struct rd_person *person, int frame,
                        struct rd_posture *posture)
 {
-    double turn = rd_motion_turn(motion, frame);
-    struct rd_rot lean = rd_rot_euler(turn + sway_at(&motion->twist, frame), sway_at(&motion->bend, frame),
-                                      sway_at(&motion->lean, frame));
-    posture->torso = (struct rd_pose){lean, motion->hips_mm};
+    const struct rd_approach *approach = &motion->approach;
+    double yaw = rd_motion_turn(motion, frame) + sway_at(&motion->twist, frame) + approach->yaw;
+    double pitch = sway_at(&motion->bend, frame) + approach->pitch;
+    struct rd_rot lean = rd_rot_euler(yaw, pitch, sway_at(&motion->lean, frame));
+    posture->torso = (struct rd_pose){lean, rd_add(motion->hips_mm, approach->shift_mm)};
     posture->head = rd_person_head_pose(person, &posture->torso, sway_at(&motion->yaw, frame),
                                         sway_at(&motion->pitch, frame), sway_at(&motion->roll, frame));
     rd_hands_pose(motion, person, frame, posture);

@@ -7,6 +7,7 @@
 #define RD_MOTION_H
 
 #include "rd_person.h"
+#include "rd_visit.h"
 
 /* A gesture and the way to the next take three frames at least: enough for RD_FRAMES_MAX frames. */
 #define RD_GESTURES_MAX 2048
@@ -32,6 +33,7 @@ struct rd_motion {
     struct rd_sway yaw, pitch, roll;  /* head against trunk */
     bool turning;
     double turn_start, turn_total; /* radians */
+    struct rd_approach approach;   /* of the present frame; zero: on the seat */
     int frame_count;
     struct rd_gesture gestures[2][RD_GESTURES_MAX];
     int gesture_count[2];

@@ -32,14 +32,15 @@ static const char help_text[] =
     "\n"
     "  --scene KIND       person (default): somebody on a seat; turning: right round on an office chair;\n"
     "                     empty: the seat alone; table: things on a table; room: furniture, nobody there;\n"
-    "                     clutter: things that might be taken for a head\n"
+    "                     clutter: things that might be taken for a head; visit: somebody comes\n"
+    "                     to an empty seat, stays and goes\n"
     "  --range DIR        no scene, but the real depth images of a range directory or of those in DIR\n"
     "  --sequence N       1 (default): hands down; 2: hands move strongly and partly cover the head\n"
     "  --rig KIND         paper (default): 12.5 mm between camera and projector; wide: 125 mm\n"
     "  --seed N           which person, room, light, motion (default 1); with --range: from where, 0 for the\n"
     "                     depth camera's own place\n"
-    "  --frames N         1 to 5000 (default 50, four of them without the person); with --range for each depth\n"
-    "                     image (default 1)\n"
+    "  --frames N         1 to 5000 (default 50, four of them without the person; for a visit 100); with --range\n"
+    "                     for each depth image (default 1)\n"
     "  --size WxH         320x240 to 1280x800 (default 752x582); the focal length follows the width\n"
     "  --background KIND  varied (default, by seed), near, far, none\n"
     "  --ambient KIND     varied (default, by seed), dim, normal, bright\n"
@@ -101,7 +102,7 @@ static bool read_size(const char *text, struct rd_options *options)
 
 static bool take_word(int id, const char *text, struct rd_options *options)
 {
-    static const char *const scenes[] = {"person", "turning", "empty", "table", "room", "clutter", NULL};
+    static const char *const scenes[] = {"person", "turning", "empty", "table", "room", "clutter", "visit", NULL};
     static const char *const rigs[] = {"paper", "wide", NULL};
     static const char *const backgrounds[] = {"varied", "near", "far", "none", NULL};
     static const char *const lenses[] = {"normal", "none", "strong", NULL};
@@ -109,7 +110,7 @@ static bool take_word(int id, const char *text, struct rd_options *options)
     int index = 0;
     bool known = false;
     if (id == OPT_SCENE) {
-        known = read_word("scene", text, scenes, "person, turning, empty, table, room or clutter", &index);
+        known = read_word("scene", text, scenes, "person, turning, empty, table, room, clutter or visit", &index);
         options->scene = (enum rd_scene_kind)index;
     } else if (id == OPT_RIG) {
         known = read_word("rig", text, rigs, "paper or wide", &index);
@@ -189,7 +190,7 @@ enum rd_options_result rd_options_parse(int argc, char **argv, struct rd_options
         return RD_OPTIONS_WRONG;
     }
     if (options->frame_count == 0)
-        options->frame_count = options->range_dir != NULL ? 1 : 50;
+        options->frame_count = options->range_dir != NULL ? 1 : options->scene == RD_SCENE_VISIT ? 100 : 50;
     options->out_dir = argv[optind];
     return RD_OPTIONS_RUN;
 }

@@ -10,7 +10,8 @@ enum rd_scene_kind {
     RD_SCENE_EMPTY,
     RD_SCENE_TABLE,
     RD_SCENE_ROOM,
-    RD_SCENE_CLUTTER
+    RD_SCENE_CLUTTER,
+    RD_SCENE_VISIT
 };
 enum rd_rig_kind { RD_RIG_PAPER, RD_RIG_WIDE };
 enum rd_background { RD_BACK_VARIED, RD_BACK_NEAR, RD_BACK_FAR, RD_BACK_NONE };

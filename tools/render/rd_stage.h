@@ -1,6 +1,6 @@
 /* rd_stage - which scene stands before the camera in which frame.
- * person, turning: somebody is there except in four of fifty frames (at the start, in the middle or at the end, by
- * seed). empty: the seat alone. table, room, clutter: nobody; another arrangement every ten frames, ten seconds later.
+ * person, turning, empty, visit: see rd_company.h. table, room, clutter: nobody; another arrangement every ten
+ * frames, ten seconds later.
  * A range directory: each of its depth images in turn, every frame ten seconds later; the heads are those of its truth
  * file, and the one to find is the one nearest the pattern's middle, if its centre lies within the pattern.
  */
@@ -9,14 +9,9 @@
 
 #include <stdint.h>
 
+#include "rd_company.h"
 #include "rd_light.h"
-#include "rd_motion.h"
-#include "rd_options.h"
-#include "rd_output.h"
 #include "rd_range.h"
-#include "rd_rig.h"
-#include "rd_room.h"
-#include "rd_scene.h"
 
 struct rd_stage {
     struct rd_options options;
@@ -24,15 +19,12 @@ struct rd_stage {
     int frame_count;
     struct rd_scene scene;
     struct rd_light light;
-    struct rd_person person;
-    struct rd_motion motion;
-    struct rd_chair chair;
-    bool still_changed; /* the still shapes are others than in the frame before */
-    int arrangement;
-    int empty_first, empty_end; /* frames without the person */
+    struct rd_company company;
     struct rd_range range;
     struct rd_relief *relief; /* of the depth image whose index is the arrangement */
-    const char *source;       /* where the frame comes from, or NULL */
+    int arrangement;
+    bool still_changed; /* the still shapes are others than in the frame before */
+    const char *source; /* where the frame comes from, or NULL */
     struct rd_truth truth;
     int64_t time_us;
 };

@@ -1,0 +1,160 @@
+#include "rd_company.h"
+
+/* Frames without the person, of fifty. */
+#define EMPTY_OF_50 4
+/* Dots from the pattern's middle to where a coming head is counted. */
+#define VISIT_DOTS 8.0
+#define ASIDE_MM 1000.0
+
+static bool sits(const struct rd_options *options)
+{
+    return options->scene == RD_SCENE_PERSON || options->scene == RD_SCENE_TURNING;
+}
+
+static void plan_absence(struct rd_company *company, const struct rd_options *options)
+{
+    struct rd_rng rng = rd_rng_start(options->seed, RD_STREAM_SCHEDULE);
+    int frame_count = options->frame_count;
+    int empty_count = (frame_count * EMPTY_OF_50 + 25) / 50;
+    int place = rd_rng_pick(&rng, 3);
+    int first = place == 0 ? 0 : place == 1 ? frame_count / 2 : frame_count - empty_count;
+    company->empty_first = first;
+    company->empty_end = first + empty_count;
+    if (!sits(options)) {
+        company->empty_first = 0;
+        company->empty_end = frame_count;
+    }
+}
+
+static struct rd_vec draw_head_place(struct rd_rng *rng, bool far_off)
+{
+    struct rd_vec at;
+    at.x = rd_rng_uniform(rng, -45.0, 45.0);
+    at.y = rd_rng_uniform(rng, -80.0, 0.0);
+    at.z = far_off ? rd_rng_uniform(rng, 850.0, 1250.0) : rd_rng_uniform(rng, 730.0, 1060.0);
+    return at;
+}
+
+static enum rd_background background_of(const struct rd_options *options, struct rd_rng *rng)
+{
+    double drawn = rd_rng_uniform(rng, 0.0, 1.0);
+    if (options->background != RD_BACK_VARIED)
+        return options->background;
+    /* Who turns on an office chair mostly sits in the open. */
+    if (options->scene == RD_SCENE_TURNING)
+        drawn = 0.3 + 0.7 * drawn;
+    return drawn < 0.45 ? RD_BACK_NEAR : drawn < 0.75 ? RD_BACK_FAR : RD_BACK_NONE;
+}
+
+/* One can come from where no wall stands. */
+static void plan_visits(struct rd_company *company, const struct rd_options *options, const struct rd_scene *scene,
+                        struct rd_vec head_mm)
+{
+    bool side_free[2];
+    for (int i = 0; i < 2; i++) {
+        struct rd_vec aside = rd_v(i == 0 ? -ASIDE_MM : ASIDE_MM, 0.0, 0.0);
+        side_free[i] = !rd_scene_blocked(scene, head_mm, rd_add(head_mm, aside));
+    }
+    rd_visits_plan(&company->visits, options->seed, options->frame_count, head_mm.z, side_free);
+}
+
+static void add_visited_seat(struct rd_company *company, struct rd_scene *scene, struct rd_rng *rng,
+                             struct rd_vec head_mm)
+{
+    int kind = rd_rng_pick(rng, 3);
+    double turn = rd_rng_uniform(rng, -0.3, 0.3);
+    if (kind == 0) {
+        rd_seat_build(scene, rng, head_mm);
+    } else if (kind == 1) {
+        rd_chair_make(&company->chair, scene, rng);
+        rd_chair_build(&company->chair, scene, company->motion.hips_mm, turn, company->person.torso_mm);
+    }
+}
+
+void rd_company_make(struct rd_company *company, const struct rd_options *options, const struct rd_rig *rig,
+                     struct rd_scene *scene)
+{
+    bool turning = options->scene == RD_SCENE_TURNING, visit = options->scene == RD_SCENE_VISIT;
+    struct rd_rng person_rng = rd_rng_start(options->seed, RD_STREAM_PERSON);
+    struct rd_rng room_rng = rd_rng_start(options->seed, RD_STREAM_ROOM);
+    struct rd_rng seat_rng = rd_rng_start(options->seed, RD_STREAM_SEAT);
+    struct rd_vec head_mm = draw_head_place(&person_rng, turning || visit);
+    company->kind = options->scene;
+    company->rig = rig;
+    plan_absence(company, options);
+    rd_person_make(&company->person, &person_rng);
+    rd_person_dress(&company->person, scene, &person_rng);
+    rd_motion_make(&company->motion, &company->person, options->seed, options->frame_count, head_mm, turning,
+                   options->sequence == 2);
+    rd_room_build(scene, &room_rng, background_of(options, &room_rng), head_mm.z + 350.0);
+    if (visit)
+        plan_visits(company, options, scene, head_mm);
+    if (turning)
+        rd_chair_make(&company->chair, scene, &seat_rng);
+    else if (visit)
+        add_visited_seat(company, scene, &seat_rng, head_mm);
+    else
+        rd_seat_build(scene, &seat_rng, head_mm);
+}
+
+static void add_truth(struct rd_truth *truth, const struct rd_person *person, const struct rd_posture *posture)
+{
+    const struct rd_rot *rot = &posture->head.rot;
+    truth->heads[truth->head_count++] = (struct rd_head_truth){
+        .centre_mm = posture->head.origin_mm,
+        .semi_axes_mm = person->head_axes_mm,
+        .angles_known = true,
+        /* Yaw, pitch and roll of rd_rot_euler, read back from the axes. */
+        .yaw_deg = atan2(rot->z.x, rot->z.z) / RD_RAD_PER_DEG,
+        .pitch_deg = asin(rd_clamp(-rot->z.y, -1.0, 1.0)) / RD_RAD_PER_DEG,
+        .roll_deg = atan2(rot->x.y, rot->y.y) / RD_RAD_PER_DEG,
+    };
+}
+
+void rd_company_choose(struct rd_truth *truth, const struct rd_rig *rig, double dots)
+{
+    double least = 1e9;
+    truth->head = RD_NOBODY;
+    for (int i = 0; i < truth->head_count; i++) {
+        double row, column;
+        bool ahead = rd_rig_pattern_place(rig, truth->heads[i].centre_mm, &row, &column);
+        if (!ahead || fmax(fabs(row), fabs(column)) > dots || hypot(row, column) >= least)
+            continue;
+        least = hypot(row, column);
+        truth->head = i;
+    }
+}
+
+/* An empty chair stays as it was left, or as it will be found. */
+static void add_chair(struct rd_company *company, int frame, bool somebody, struct rd_scene *scene)
+{
+    if (!somebody)
+        frame = company->empty_first > 0 ? company->empty_first - 1 : company->empty_end;
+    double turn = rd_motion_turn(&company->motion, frame);
+    rd_chair_build(&company->chair, scene, company->motion.hips_mm, turn, company->person.torso_mm);
+}
+
+static bool somebody_in(struct rd_company *company, int frame)
+{
+    if (company->kind == RD_SCENE_VISIT)
+        return rd_visits_at(&company->visits, frame, &company->motion.approach);
+    return frame < company->empty_first || frame >= company->empty_end;
+}
+
+void rd_company_frame(struct rd_company *company, int frame, struct rd_scene *scene, struct rd_truth *truth)
+{
+    bool somebody = somebody_in(company, frame);
+    *truth = (struct rd_truth){.head = RD_NOBODY};
+    if (company->kind == RD_SCENE_TURNING)
+        add_chair(company, frame, somebody, scene);
+    if (!somebody)
+        return;
+    struct rd_posture posture;
+    rd_motion_posture(&company->motion, &company->person, frame, &posture);
+    rd_person_build(&company->person, &posture, scene);
+    add_truth(truth, &company->person, &posture);
+    if (company->kind == RD_SCENE_VISIT)
+        rd_company_choose(truth, company->rig, VISIT_DOTS);
+    else
+        truth->head = 0;
+}
