@@ -262,6 +262,55 @@ draw "a visit" visit --scene visit --frames 40 --size 320x240
 /usr/bin/python3 visit.py >out 2>&1 && reason= || reason=$(tail -n 1 out)
 result "a visitor comes, is told while in the pattern, and goes" "$reason"
 
+# --- who, and what they do ---------------------------------------------------------------------------
+cat >people.py <<'PYTHON'
+from pattern import read
+
+def heads(folder):
+    return [t["head"] for t in read(folder)[1] if t["head"]]
+
+def before_face(folder):
+    """Dots well before the face: on hands."""
+    rig, truths = read(folder)
+    m, count = rig["camera_matrix"]["data"], 0
+    for truth in filter(lambda t: t["head"], truths):
+        c, a = truth["head"]["centre_mm"], truth["head"]["semi_axes_mm"]
+        for index, u, v, z in truth["dots"]:
+            x, y = (u - m[2]) / m[0] * z - c[0], (v - m[5]) / m[4] * z - c[1]
+            count += x * x + y * y < a[0] * a[0] and z < c[2] - a[2] - 32
+    return count
+
+anybody, child = heads("anybody"), heads("child")
+shrunk = [a / b for a, b in zip(child[0]["semi_axes_mm"], anybody[0]["semi_axes_mm"])]
+assert 0.895 < min(shrunk) <= max(shrunk) < 0.945, "a child's head: %s" % shrunk
+assert child[0]["centre_mm"][1] > anybody[0]["centre_mm"][1] + 30, "a child sits no lower"
+turns = [abs(head["angles_deg"][0]) for head in heads("back")]
+assert max(turns) > 60 and min(turns) < 45, "turns to the back: %s" % turns
+assert before_face("anybody") == 0 and before_face("face") > 20, "hands: %d" % before_face("face")
+PYTHON
+few="--frames 4 --size 320x240 --ambient dim --distortion none --seed 5"
+# shellcheck disable=SC2086 # a list of options
+{
+    draw "anybody" anybody $few
+    for person in child hat mask beard long-hair bald glasses headphones; do
+        draw "person $person" "$person" $few --person "$person"
+        [ "$(fingerprint "$person")" != "$(fingerprint anybody)" ] && reason= || reason="the same bytes"
+        result "a person with $person is not just anybody" "$reason"
+    done
+    draw "act none" none $few --act none --sequence 2
+    draw "act phone" phone $few --act phone
+    draw "act face" face $few --act face
+    draw "act back" back --frames 30 --size 320x240 --seed 5 --act back
+    refuse "unknown person" 2 "--person" --person dog a
+    refuse "unknown act" 2 "--act" --act sleep a
+}
+[ "$(fingerprint none)" = "$(fingerprint anybody)" ] && reason= || reason="bytes differ"
+result "who does nothing keeps the hands down" "$reason"
+[ "$(fingerprint phone)" != "$(fingerprint anybody)" ] && reason= || reason="the same bytes"
+result "who telephones lifts a hand" "$reason"
+/usr/bin/python3 people.py >out 2>&1 && reason= || reason=$(tail -n 1 out)
+result "children are small, faces are touched, heads turn back" "$reason"
+
 # --- refusals ------------------------------------------------------------------------------------
 refuse "no directory" 2 "OUT_DIR"
 refuse "two directories" 2 "OUT_DIR" a b

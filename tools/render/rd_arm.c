@@ -62,6 +62,11 @@ static void add_hand(const struct rd_person *p, const struct rd_hand *hand, doub
     struct rd_vec tip = rd_along(root, rd_v(thumb_side * sin(out), -cos(out), -0.35), 0.34 * size);
     struct rd_shape thumb = rd_shape_cone(root, tip, 0.068 * size, 0.048 * size, skin);
     rd_scene_add(scene, &thumb);
+    if (hand->phone) {
+        struct rd_pose before = rd_pose_at(rd_v(0.0, -0.12 * size, -0.085 * size - 5.0));
+        struct rd_shape phone = rd_shape_box(before, rd_v(36.0, 75.0, 5.0), 4.0, p->gear.dark);
+        rd_scene_add(scene, &phone);
+    }
 }
 
 void rd_arm_build(const struct rd_person *person, struct rd_vec shoulder_mm, const struct rd_pose *torso,

@@ -76,6 +76,7 @@ void rd_company_make(struct rd_company *company, const struct rd_options *option
 {
     bool turning = options->scene == RD_SCENE_TURNING, visit = options->scene == RD_SCENE_VISIT;
     struct rd_rng person_rng = rd_rng_start(options->seed, RD_STREAM_PERSON);
+    struct rd_rng kind_rng = rd_rng_start(options->seed, RD_STREAM_PERSON + ((uint64_t)1 << 32));
     struct rd_rng room_rng = rd_rng_start(options->seed, RD_STREAM_ROOM);
     struct rd_rng seat_rng = rd_rng_start(options->seed, RD_STREAM_SEAT);
     struct rd_vec head_mm = draw_head_place(&person_rng, turning || visit);
@@ -83,9 +84,11 @@ void rd_company_make(struct rd_company *company, const struct rd_options *option
     company->rig = rig;
     plan_absence(company, options);
     rd_person_make(&company->person, &person_rng);
+    rd_person_make_kind(&company->person, options->person, &kind_rng);
     rd_person_dress(&company->person, scene, &person_rng);
-    rd_motion_make(&company->motion, &company->person, options->seed, options->frame_count, head_mm, turning,
-                   options->sequence == 2);
+    rd_gear_dress(&company->person, scene, &kind_rng);
+    struct rd_vec lower_mm = rd_v(0.0, company->person.lower_mm, 0.0);
+    rd_motion_make(&company->motion, &company->person, options, options->seed, rd_add(head_mm, lower_mm));
     rd_room_build(scene, &room_rng, background_of(options, &room_rng), head_mm.z + 350.0);
     if (visit)
         plan_visits(company, options, scene, head_mm);

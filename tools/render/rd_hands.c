@@ -3,7 +3,20 @@
 /* On the way from one place to the next the hand swings forward, round the head. */
 #define SWING_MM 70.0
 
-enum gesture_kind { IN_LAP, ON_FACE, AT_CHEEK, ON_TOP, AT_CHIN, BESIDE, REACH, AT_CHEST, AT_BROW, KIND_COUNT };
+enum gesture_kind {
+    IN_LAP,
+    ON_FACE,
+    AT_CHEEK,
+    ON_TOP,
+    AT_CHIN,
+    BESIDE,
+    REACH,
+    AT_CHEST,
+    AT_BROW,
+    AT_EYES,
+    AT_EAR,
+    KIND_COUNT
+};
 
 /* Whose frame the place is given in. */
 enum gesture_frame { OF_HEAD, OF_TORSO };
@@ -27,6 +40,9 @@ static const struct place places[KIND_COUNT] = {
     [REACH] = {OF_TORSO, {0.3, 0.5, -1}, {40, 0, -190}, {-0.2, -0.5, -0.8}, {0, 0.6, -0.7}, 60.0, 0.06},
     [AT_CHEST] = {OF_TORSO, {0.4, 1.9, -1}, {20, 0, -60}, {-1, -0.3, 0}, {0, 0, 1}, 45.0, 0.04},
     [AT_BROW] = {OF_HEAD, {0.2, -0.45, -0.95}, {0, 0, -35}, {-1, -0.35, 0}, {0, 0.2, 1}, 18.0, 0.05},
+    /* Only those whose act it is. */
+    [AT_EYES] = {OF_HEAD, {0.36, -0.02, -1}, {0, 0, -34}, {-0.3, -1, 0.1}, {0, 0, 1}, 12.0, 0.0},
+    [AT_EAR] = {OF_HEAD, {1, 0.15, -0.1}, {36, 0, 0}, {-0.05, -1, 0.15}, {-1, 0, 0.1}, 8.0, 0.0},
 };
 
 static int draw_kind(struct rd_rng *rng)
@@ -69,15 +85,59 @@ static void plan_hand(struct rd_motion *motion, int index, struct rd_rng *rng)
     motion->gesture_count[index] = count;
 }
 
-void rd_hands_plan(struct rd_motion *motion, uint64_t seed, bool hands_move)
+/* What a hand does most of the time. */
+struct habit {
+    const int *kinds;
+    int kind_count;
+    double rest; /* how often it is in the lap instead */
+    int stay_frames, stay_more;
+};
+
+static void plan_habit(struct rd_motion *motion, int index, struct rd_rng *rng, const struct habit *habit)
+{
+    int count = 0;
+    int frame = -rd_rng_pick(rng, 8);
+    while (frame < motion->frame_count && count < RD_GESTURES_MAX) {
+        bool rests = rd_rng_chance(rng, habit->rest);
+        int kind = rests ? IN_LAP : habit->kinds[rd_rng_pick(rng, habit->kind_count)];
+        struct rd_gesture g = draw_gesture(rng, kind);
+        g.cross = false;
+        g.arrive_frame = frame;
+        g.leave_frame = frame + 2 + (rests ? 0 : habit->stay_frames) + rd_rng_pick(rng, rests ? 4 : habit->stay_more);
+        frame = g.leave_frame + 2 + rd_rng_pick(rng, 3);
+        motion->gestures[index][count++] = g;
+    }
+    motion->gesture_count[index] = count;
+}
+
+static void plan_act(struct rd_motion *motion, uint64_t seed, enum rd_act act)
+{
+    static const int at_face[] = {ON_FACE, AT_CHIN, AT_CHEEK, AT_BROW, AT_EYES, AT_EYES};
+    static const int at_ear[] = {AT_EAR};
+    struct habit often = {at_face, 6, 0.12, 4, 14}, sometimes = {at_face, 6, 0.45, 4, 14};
+    struct habit telephoning = {at_ear, 1, 0.15, 15, 25};
+    struct rd_rng rng = rd_rng_start(seed, RD_STREAM_HANDS + ((uint64_t)1 << 32));
+    int first = rd_rng_pick(&rng, 2);
+    if (act == RD_ACT_PHONE) {
+        plan_habit(motion, first, &rng, &telephoning);
+        motion->phone[first] = true;
+    } else if (act == RD_ACT_FACE) {
+        plan_habit(motion, first, &rng, &often);
+        plan_habit(motion, 1 - first, &rng, &sometimes);
+    }
+}
+
+void rd_hands_plan(struct rd_motion *motion, uint64_t seed, enum rd_act act, bool hands_move)
 {
     struct rd_rng rng = rd_rng_start(seed, RD_STREAM_HANDS);
     for (int i = 0; i < 2; i++) {
         motion->gestures[i][0] = draw_gesture(&rng, IN_LAP);
         motion->gesture_count[i] = 1;
-        if (hands_move)
+        motion->phone[i] = false;
+        if (hands_move && act != RD_ACT_NONE)
             plan_hand(motion, i, &rng);
     }
+    plan_act(motion, seed, act);
 }
 
 /* X of every place is outwards; `side` makes it this hand's side, or the other one for a crossing hand. */
@@ -142,6 +202,8 @@ static struct rd_hand hand_in_frame(const struct rd_motion *motion, const struct
 void rd_hands_pose(const struct rd_motion *motion, const struct rd_person *person, int frame,
                    struct rd_posture *posture)
 {
-    for (int i = 0; i < 2; i++)
+    for (int i = 0; i < 2; i++) {
         posture->hands[i] = hand_in_frame(motion, person, i, frame, posture);
+        posture->hands[i].phone = motion->phone[i];
+    }
 }

@@ -5,8 +5,8 @@
 
 #include "rd_motion.h"
 
-/* Fills the lists of gestures. Without `hands_move` both hands stay in the lap. */
-void rd_hands_plan(struct rd_motion *motion, uint64_t seed, bool hands_move);
+/* Fills the lists of gestures. Without `hands_move` both hands stay in the lap, but for what the act asks of them. */
+void rd_hands_plan(struct rd_motion *motion, uint64_t seed, enum rd_act act, bool hands_move);
 
 /* Sets posture->hands for a frame from the posture's head and torso. */
 void rd_hands_pose(const struct rd_motion *motion, const struct rd_person *person, int frame,

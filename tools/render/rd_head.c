@@ -105,7 +105,8 @@ void rd_head_build(const struct rd_person *person, const struct rd_pose *head, s
     add_skull(person, scene);
     add_nose_and_ears(person, scene);
     add_hair(person, scene);
-    if (person->hat)
+    if (person->hat && !person->gear.own_hat)
         add_hat(person, scene);
+    rd_gear_build(person, scene);
     rd_scene_move(scene, first, head);
 }

@@ -1,7 +1,8 @@
 /* rd_motion - what a person does over the frames of a sequence.
  * Trunk and head sway as sums of two slow oscillations; a turning person goes right round on the chair. In
  * sequence 2 each hand has its own list of gestures: over the face, at the cheek, on the head, waving beside it,
- * reaching for the camera, and rests between them.
+ * reaching for the camera, and rests between them. Whoever telephones has one hand with the phone at the ear most of
+ * the time; others keep their hands at the face, or turn to the back seat every two to four seconds.
  */
 #ifndef RD_MOTION_H
 #define RD_MOTION_H
@@ -16,6 +17,14 @@ struct rd_sway {
     double middle, reach1, reach2; /* reach: amplitude */
     double period1, period2;       /* frames */
     double phase1, phase2;
+};
+
+/* Somebody who looks to the back seat: a turn there, a while there, the way back, and a while forward. */
+struct rd_look_back {
+    bool often;
+    double period, start, way, stay; /* frames */
+    double trunk, head;              /* radians */
+    uint64_t seed;
 };
 
 struct rd_gesture {
@@ -33,15 +42,17 @@ struct rd_motion {
     struct rd_sway yaw, pitch, roll;  /* head against trunk */
     bool turning;
     double turn_start, turn_total; /* radians */
-    struct rd_approach approach;   /* of the present frame; zero: on the seat */
+    struct rd_look_back back;
+    bool phone[2];               /* which hand holds one */
+    struct rd_approach approach; /* of the present frame; zero: on the seat */
     int frame_count;
     struct rd_gesture gestures[2][RD_GESTURES_MAX];
     int gesture_count[2];
 };
 
 /* Plans a sequence around a place of the head at rest. */
-void rd_motion_make(struct rd_motion *motion, const struct rd_person *person, uint64_t seed, int frame_count,
-                    struct rd_vec head_mm, bool turning, bool hands_move);
+void rd_motion_make(struct rd_motion *motion, const struct rd_person *person, const struct rd_options *options,
+                    uint64_t seed, struct rd_vec head_mm);
 
 /* Yaw of the trunk and of the chair under it, radians. */
 double rd_motion_turn(const struct rd_motion *motion, int frame);

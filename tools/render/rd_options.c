@@ -22,6 +22,8 @@ enum option_id {
     OPT_DISTORTION,
     OPT_AMBIENT,
     OPT_RANGE,
+    OPT_PERSON,
+    OPT_ACT,
     OPT_HELP
 };
 
@@ -36,6 +38,9 @@ static const char help_text[] =
     "                     to an empty seat, stays and goes\n"
     "  --range DIR        no scene, but the real depth images of a range directory or of those in DIR\n"
     "  --sequence N       1 (default): hands down; 2: hands move strongly and partly cover the head\n"
+    "  --person KIND      varied (default, by seed), child, hat, mask, beard, long-hair, bald, glasses, headphones\n"
+    "  --act KIND         varied (default: as --sequence says), phone (at the ear), face (hands on it), back (turns\n"
+    "                     to the back seat again and again), none (hands down)\n"
     "  --rig KIND         paper (default): 12.5 mm between camera and projector; wide: 125 mm\n"
     "  --seed N           which person, room, light, motion (default 1); with --range: from where, 0 for the\n"
     "                     depth camera's own place\n"
@@ -103,6 +108,9 @@ static bool read_size(const char *text, struct rd_options *options)
 static bool take_word(int id, const char *text, struct rd_options *options)
 {
     static const char *const scenes[] = {"person", "turning", "empty", "table", "room", "clutter", "visit", NULL};
+    static const char *const persons[] = {"varied",    "child", "hat",     "mask",       "beard",
+                                          "long-hair", "bald",  "glasses", "headphones", NULL};
+    static const char *const acts[] = {"varied", "phone", "face", "back", "none", NULL};
     static const char *const rigs[] = {"paper", "wide", NULL};
     static const char *const backgrounds[] = {"varied", "near", "far", "none", NULL};
     static const char *const lenses[] = {"normal", "none", "strong", NULL};
@@ -112,6 +120,13 @@ static bool take_word(int id, const char *text, struct rd_options *options)
     if (id == OPT_SCENE) {
         known = read_word("scene", text, scenes, "person, turning, empty, table, room, clutter or visit", &index);
         options->scene = (enum rd_scene_kind)index;
+    } else if (id == OPT_PERSON) {
+        known = read_word("person", text, persons,
+                          "varied, child, hat, mask, beard, long-hair, bald, glasses or headphones", &index);
+        options->person = (enum rd_person_kind)index;
+    } else if (id == OPT_ACT) {
+        known = read_word("act", text, acts, "varied, phone, face, back or none", &index);
+        options->act = (enum rd_act)index;
     } else if (id == OPT_RIG) {
         known = read_word("rig", text, rigs, "paper or wide", &index);
         options->rig = (enum rd_rig_kind)index;
@@ -165,6 +180,8 @@ enum rd_options_result rd_options_parse(int argc, char **argv, struct rd_options
         {"distortion", required_argument, NULL, OPT_DISTORTION},
         {"ambient", required_argument, NULL, OPT_AMBIENT},
         {"range", required_argument, NULL, OPT_RANGE},
+        {"person", required_argument, NULL, OPT_PERSON},
+        {"act", required_argument, NULL, OPT_ACT},
         {"help", no_argument, NULL, OPT_HELP},
         {NULL, 0, NULL, 0},
     };

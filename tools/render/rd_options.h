@@ -13,6 +13,18 @@ enum rd_scene_kind {
     RD_SCENE_CLUTTER,
     RD_SCENE_VISIT
 };
+enum rd_person_kind {
+    RD_PERSON_VARIED,
+    RD_PERSON_CHILD,
+    RD_PERSON_HAT,
+    RD_PERSON_MASK,
+    RD_PERSON_BEARD,
+    RD_PERSON_LONG_HAIR,
+    RD_PERSON_BALD,
+    RD_PERSON_GLASSES,
+    RD_PERSON_HEADPHONES
+};
+enum rd_act { RD_ACT_VARIED, RD_ACT_PHONE, RD_ACT_FACE, RD_ACT_BACK, RD_ACT_NONE };
 enum rd_rig_kind { RD_RIG_PAPER, RD_RIG_WIDE };
 enum rd_background { RD_BACK_VARIED, RD_BACK_NEAR, RD_BACK_FAR, RD_BACK_NONE };
 enum rd_distortion { RD_LENS_NORMAL, RD_LENS_NONE, RD_LENS_STRONG };
@@ -26,6 +38,8 @@ struct rd_options {
     const char *range_dir; /* real depth images instead of a scene; NULL: none */
     enum rd_scene_kind scene;
     int sequence; /* 1: hands down; 2: hands move strongly */
+    enum rd_person_kind person;
+    enum rd_act act;
     enum rd_rig_kind rig;
     enum rd_background background;
     enum rd_distortion distortion;

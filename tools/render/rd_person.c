@@ -34,6 +34,7 @@ static void draw_looks(struct rd_person *p, struct rd_rng *rng)
 
 void rd_person_make(struct rd_person *person, struct rd_rng *rng)
 {
+    *person = (struct rd_person){.build = 1.0};
     draw_body(person, rng);
     draw_looks(person, rng);
 }
@@ -70,7 +71,7 @@ void rd_person_dress(struct rd_person *person, struct rd_scene *scene, struct rd
     struct rd_material face = skin;
     face.pattern = RD_FACE;
     face.face = (struct rd_face_paint){.axes_mm = person->head_axes_mm,
-                                       .hairline = bald ? -2.5 : hairline,
+                                       .hairline = bald || person->bald ? -2.5 : hairline,
                                        .hair_albedo = hair,
                                        .beard_albedo = person->beard ? 1.2 * hair : 0.0,
                                        .glasses = person->glasses,
@@ -107,14 +108,14 @@ struct rd_pose rd_person_head_pose(const struct rd_person *person, const struct 
 /* Chest, belly, collar and the muscles from neck to shoulders, in the torso's frame. */
 static void add_trunk(const struct rd_person *p, struct rd_scene *scene)
 {
-    double g = p->girth, top = -p->torso_mm, wide = p->shoulder_mm;
+    double g = p->girth, b = p->build, top = -p->torso_mm, wide = p->shoulder_mm;
     int cloth_index = p->paint.cloth;
-    struct rd_shape chest = rd_shape_ellipsoid(rd_pose_at(rd_v(0.0, top + 210.0, 6.0)),
-                                               rd_v(0.92 * wide * g, 230.0, 104.0 * g), cloth_index);
-    struct rd_shape collar =
-        rd_shape_ellipsoid(rd_pose_at(rd_v(0.0, top + 95.0, 6.0)), rd_v(0.98 * wide, 100.0, 80.0 * g), cloth_index);
-    struct rd_shape belly =
-        rd_shape_ellipsoid(rd_pose_at(rd_v(0.0, -70.0, -15.0)), rd_v(160.0 * g, 190.0, 130.0 * g), cloth_index);
+    struct rd_shape chest = rd_shape_ellipsoid(rd_pose_at(rd_v(0.0, top + 210.0 * b, 6.0)),
+                                               rd_v(0.92 * wide * g, 230.0 * b, 104.0 * g), cloth_index);
+    struct rd_shape collar = rd_shape_ellipsoid(rd_pose_at(rd_v(0.0, top + 95.0 * b, 6.0)),
+                                                rd_v(0.98 * wide, 100.0 * b, 80.0 * g), cloth_index);
+    struct rd_shape belly = rd_shape_ellipsoid(rd_pose_at(rd_v(0.0, -70.0, -15.0)),
+                                               rd_v(160.0 * g * b, 190.0 * b, 130.0 * g * b), cloth_index);
     struct rd_pose whole = rd_pose_at(rd_v(0.0, 0.0, 0.0));
     chest.paint = collar.paint = belly.paint = whole;
     rd_scene_add(scene, &chest);
@@ -122,8 +123,8 @@ static void add_trunk(const struct rd_person *p, struct rd_scene *scene)
     rd_scene_add(scene, &belly);
     for (double side = -1.0; side <= 1.0; side += 2.0) {
         struct rd_shape muscle =
-            rd_shape_cone(rd_v(side * 28.0, top + 2.0, 14.0), rd_v(side * wide, top + p->shoulder_drop_mm, 8.0), 52.0,
-                          56.0 * g, cloth_index);
+            rd_shape_cone(rd_v(side * 28.0 * b, top + 2.0, 14.0), rd_v(side * wide, top + p->shoulder_drop_mm, 8.0),
+                          52.0 * b, 56.0 * g, cloth_index);
         muscle.paint = whole;
         rd_scene_add(scene, &muscle);
     }

@@ -5,10 +5,21 @@
 #ifndef RD_PERSON_H
 #define RD_PERSON_H
 
+#include "rd_options.h"
 #include "rd_rng.h"
 #include "rd_scene.h"
 
 enum rd_hair_style { RD_HAIR_SHORT, RD_HAIR_FULL, RD_HAIR_LONG, RD_HAIR_BUN };
+
+enum rd_hat_kind { RD_HAT_PEAKED, RD_HAT_KNITTED, RD_HAT_WIDE, RD_HAT_HOOD };
+
+/* What only some kinds of persons wear. */
+struct rd_gear {
+    bool headphones, frames, dark_lenses, cup, thick_beard, own_hat;
+    enum rd_hat_kind hat;
+    double bulk;       /* 0 small .. 1 large */
+    int plastic, dark; /* materials */
+};
 
 /* Materials, as indices into the scene. */
 struct rd_person_paint {
@@ -21,10 +32,13 @@ struct rd_person {
     double neck_radius_mm, neck_length_mm;
     double torso_mm; /* hips to the base of the neck */
     double shoulder_mm, shoulder_drop_mm;
-    double girth; /* of torso and arms, relative */
+    double girth;    /* of torso and arms, relative */
+    double build;    /* of the trunk's bones, relative */
+    double lower_mm; /* how much lower than others the head is on the same seat */
     double upper_arm_mm, forearm_mm, hand_mm;
     enum rd_hair_style hair;
-    bool hat, beard, glasses, mask, bare_arms;
+    bool hat, beard, glasses, mask, bare_arms, bald;
+    struct rd_gear gear;
     struct rd_person_paint paint;
 };
 
@@ -35,6 +49,7 @@ struct rd_hand {
     struct rd_vec facing;  /* unit: where the palm looks */
     double curl;           /* 0 flat hand .. 1 fist */
     double spread;         /* 0 fingers together .. 1 spread */
+    bool phone;            /* holds one */
 };
 
 struct rd_posture {
@@ -44,7 +59,11 @@ struct rd_posture {
 
 /* Draws a person; its materials go into the scene with rd_person_dress. */
 void rd_person_make(struct rd_person *person, struct rd_rng *rng);
+/* Makes one of a kind of the person. */
+void rd_person_make_kind(struct rd_person *person, enum rd_person_kind kind, struct rd_rng *rng);
 void rd_person_dress(struct rd_person *person, struct rd_scene *scene, struct rd_rng *rng);
+/* The materials of gear and phone. */
+void rd_gear_dress(struct rd_person *person, struct rd_scene *scene, struct rd_rng *rng);
 
 /* The head's pose on a torso. Angles in radians, with respect to the torso. */
 struct rd_pose rd_person_head_pose(const struct rd_person *person, const struct rd_pose *torso, double yaw,
