@@ -3,6 +3,8 @@
  * seed). empty: the seat alone. visit: a seat, an office chair or an open room that somebody comes to and leaves
  * again (rd_visit.h); the truth has the head when somebody is there and the head's centre lies within the pattern by
  * at least one dot's distance, as seen from the projector: rows and columns -8 .. 8 of -9 .. 9.
+ * two: two people side by side, 450 to 650 mm apart, the second up to 200 mm behind; the head to find is the one
+ * nearest the pattern's middle. They come and go as in the scene person.
  */
 #ifndef RD_COMPANY_H
 #define RD_COMPANY_H
@@ -15,11 +17,16 @@
 #include "rd_scene.h"
 #include "rd_visit.h"
 
+#define RD_SITTERS_MAX 2
+
 struct rd_company {
     enum rd_scene_kind kind;
     const struct rd_rig *rig;
-    struct rd_person person;
-    struct rd_motion motion;
+    struct rd_sitter {
+        struct rd_person person;
+        struct rd_motion motion;
+    } sitters[RD_SITTERS_MAX];
+    int sitter_count;
     struct rd_chair chair;
     int empty_first, empty_end; /* frames without the person, but for visits */
     struct rd_visits visits;

@@ -35,7 +35,7 @@ static const char help_text[] =
     "  --scene KIND       person (default): somebody on a seat; turning: right round on an office chair;\n"
     "                     empty: the seat alone; table: things on a table; room: furniture, nobody there;\n"
     "                     clutter: things that might be taken for a head; visit: somebody comes\n"
-    "                     to an empty seat, stays and goes\n"
+    "                     to an empty seat, stays and goes; two: two people side by side\n"
     "  --range DIR        no scene, but the real depth images of a range directory or of those in DIR\n"
     "  --sequence N       1 (default): hands down; 2: hands move strongly and partly cover the head\n"
     "  --person KIND      varied (default, by seed), child, hat, mask, beard, long-hair, bald, glasses, headphones\n"
@@ -107,7 +107,8 @@ static bool read_size(const char *text, struct rd_options *options)
 
 static bool take_word(int id, const char *text, struct rd_options *options)
 {
-    static const char *const scenes[] = {"person", "turning", "empty", "table", "room", "clutter", "visit", NULL};
+    static const char *const scenes[] = {"person",  "turning", "empty", "table", "room",
+                                         "clutter", "visit",   "two",   NULL};
     static const char *const persons[] = {"varied",    "child", "hat",     "mask",       "beard",
                                           "long-hair", "bald",  "glasses", "headphones", NULL};
     static const char *const acts[] = {"varied", "phone", "face", "back", "none", NULL};
@@ -118,7 +119,7 @@ static bool take_word(int id, const char *text, struct rd_options *options)
     int index = 0;
     bool known = false;
     if (id == OPT_SCENE) {
-        known = read_word("scene", text, scenes, "person, turning, empty, table, room, clutter or visit", &index);
+        known = read_word("scene", text, scenes, "person, turning, empty, table, room, clutter, visit or two", &index);
         options->scene = (enum rd_scene_kind)index;
     } else if (id == OPT_PERSON) {
         known = read_word("person", text, persons,

@@ -11,7 +11,8 @@ enum rd_scene_kind {
     RD_SCENE_TABLE,
     RD_SCENE_ROOM,
     RD_SCENE_CLUTTER,
-    RD_SCENE_VISIT
+    RD_SCENE_VISIT,
+    RD_SCENE_TWO
 };
 enum rd_person_kind {
     RD_PERSON_VARIED,

@@ -1,5 +1,5 @@
 /* rd_stage - which scene stands before the camera in which frame.
- * person, turning, empty, visit: see rd_company.h. table, room, clutter: nobody; another arrangement every ten
+ * person, turning, empty, visit, two: see rd_company.h. table, room, clutter: nobody; another arrangement every ten
  * frames, ten seconds later.
  * A range directory: each of its depth images in turn, every frame ten seconds later; the heads are those of its truth
  * file, and the one to find is the one nearest the pattern's middle, if its centre lies within the pattern.
