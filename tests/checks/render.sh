@@ -320,6 +320,55 @@ result "who telephones lifts a hand" "$reason"
 /usr/bin/python3 people.py >out 2>&1 && reason= || reason=$(tail -n 1 out)
 result "children are small, faces touched, heads turned, two told" "$reason"
 
+# --- a rig that is not as it says, and sunlight ------------------------------------------------------
+cat >wrong.py <<'PYTHON'
+import math
+from pattern import read
+
+def rays(rig):
+    data = rig["dot_rays"]["data"]
+    return [data[3 * i:3 * i + 3] for i in range(361)]
+
+def turns(folder):
+    """Angles between where the dots went and where rig.json sends them, degrees."""
+    rig, truths = read(folder)
+    m, origin, ray = rig["camera_matrix"]["data"], rig["projector_origin"]["data"], rays(rig)
+    angles = []
+    for index, u, v, z in truths[0]["dots"]:
+        way = [(u - m[2]) / m[0] * z - origin[0], (v - m[5]) / m[4] * z - origin[1], z - origin[2]]
+        cross = [way[i - 2] * ray[index][i - 1] - way[i - 1] * ray[index][i - 2] for i in range(3)]
+        angles.append(math.degrees(math.asin(math.hypot(*cross) / math.hypot(*way))))
+    return angles
+
+def bright(folder):
+    data = open(folder + "/000002.pgm", "rb").read()[-320 * 240:]
+    return sum(sample >= 250 for sample in data) / len(data)
+
+assert max(turns("anybody")) < 0.02, "a straight rig is not straight: %g" % max(turns("anybody"))
+assert 0.1 < max(turns("knocked")) < 0.32, "knocked by %g" % max(turns("knocked"))
+noisy, true = read("noisy")[0], read("anybody")[0]
+m, n = noisy["camera_matrix"]["data"], true["camera_matrix"]["data"]
+assert 0 < abs(m[0] / n[0] - 1) < 0.01 and 0 < abs(m[2] - n[2]) < 10, "camera_matrix"
+errors = [math.degrees(math.dist(a, b)) for a, b in zip(rays(noisy), rays(true))]
+assert 0.015 < sum(errors) / 361 < 0.05, "rays: %g" % (sum(errors) / 361)
+assert bright("anybody") < 0.01 < 0.03 < bright("sunlight") < 0.7, "bright: %g" % bright("sunlight")
+PYTHON
+# shellcheck disable=SC2086 # a list of options
+{
+    draw "a knocked projector" knocked $few --knock 0.3
+    draw "errors of calibration" noisy $few --calibration-noise 2
+    draw "sunlight" sunlight --frames 4 --size 320x240 --seed 8 --ambient sunlight
+    refuse "too hard a knock" 2 "--knock" --knock 0.51 a
+    refuse "knock backwards" 2 "--knock" --knock -0.1 a
+    refuse "noise that is no number" 2 "--calibration-noise" --calibration-noise 1e a
+}
+cmp -s knocked/rig.json anybody/rig.json && reason= || reason="rig.json differs"
+result "rig.json knows nothing of the knock" "$reason"
+cmp -s noisy/000002.pgm anybody/000002.pgm && reason= || reason="frame differs"
+result "errors of calibration change no frame" "$reason"
+/usr/bin/python3 wrong.py >out 2>&1 && reason= || reason=$(tail -n 1 out)
+result "knock, errors of calibration and sunlight are as large as asked for" "$reason"
+
 # --- refusals ------------------------------------------------------------------------------------
 refuse "no directory" 2 "OUT_DIR"
 refuse "two directories" 2 "OUT_DIR" a b

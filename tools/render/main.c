@@ -16,7 +16,7 @@
 #include "rd_stage.h"
 
 struct studio {
-    struct rd_rig rig;
+    struct rd_rig rig, told_rig; /* as it is, and as rig.json has it */
     struct rd_laser laser;
     struct rd_sensor sensor;
     struct rd_stage stage;
@@ -45,6 +45,9 @@ static struct studio *studio_new(const struct rd_options *options)
     if (studio == NULL)
         return NULL;
     rd_rig_make(&studio->rig, options);
+    studio->told_rig = studio->rig;
+    rd_rig_knock(&studio->rig, options);
+    rd_rig_misjudge(&studio->told_rig, options);
     rd_laser_make(&studio->laser, options, &studio->rig);
     rd_sensor_make(&studio->sensor, options);
     studio->ambient = rd_ambient_new(&studio->rig);
@@ -62,7 +65,7 @@ static bool render_frame(struct studio *studio, struct rd_output *output, int fr
     struct rd_stage *stage = &studio->stage;
     if (!rd_stage_frame(stage, frame))
         return false;
-    if (stage->still_changed)
+    if (stage->still_changed || stage->light.shadows)
         rd_ambient_still(studio->ambient, &stage->scene, &stage->light);
     rd_ambient_frame(studio->ambient, &stage->scene, &stage->light, studio->grey);
     rd_dots_cast(&studio->laser, &studio->rig, &stage->scene, studio->grey, &studio->visible);
@@ -86,7 +89,7 @@ static bool render_all(struct studio *studio, const struct rd_options *options)
     if (talk)
         fputc('\n', stderr);
     if (good)
-        good = rd_output_finish(&output, &studio->rig, frame_count);
+        good = rd_output_finish(&output, &studio->told_rig, frame_count);
     else
         rd_output_abandon(&output);
     return good;

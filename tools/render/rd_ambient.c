@@ -119,7 +119,7 @@ static void still_tile(struct rd_ambient *a, const struct rd_scene *scene, const
             struct rd_ray ray = {rd_v(0.0, 0.0, 0.0), a->rays[i]};
             struct rd_hit hit;
             bool seen = rd_scene_hit_among(scene, indices, count, &ray, RD_FAR_AWAY_MM, &hit);
-            a->still_grey[i] = (float)(seen ? rd_light_grey(light, &hit, ray.dir) : light->nothing_grey);
+            a->still_grey[i] = (float)(seen ? rd_light_grey(light, scene, &hit, ray.dir) : light->nothing_grey);
             a->still_t_mm[i] = (float)(seen ? hit.t_mm : RD_FAR_AWAY_MM);
         }
     }
@@ -147,7 +147,7 @@ static void moving_tile(const struct rd_ambient *a, const struct rd_scene *scene
             struct rd_ray ray = {rd_v(0.0, 0.0, 0.0), a->rays[i]};
             struct rd_hit hit;
             if (rd_scene_hit_among(scene, indices, count, &ray, (double)a->still_t_mm[i], &hit))
-                grey[i] = (float)rd_light_grey(light, &hit, ray.dir);
+                grey[i] = (float)rd_light_grey(light, scene, &hit, ray.dir);
         }
     }
 }

@@ -15,7 +15,7 @@ struct rd_ambient;
 struct rd_ambient *rd_ambient_new(const struct rd_rig *rig);
 void rd_ambient_free(struct rd_ambient *ambient);
 
-/* Renders the scene's still shapes; needed after each change of them. */
+/* Renders the scene's still shapes; needed after each change of them, and of the others where they throw shadows. */
 void rd_ambient_still(struct rd_ambient *ambient, const struct rd_scene *scene, const struct rd_light *light);
 
 /* The whole scene as grey levels (of 255, may exceed it), width x height, row by row. */

@@ -12,6 +12,7 @@ struct rd_light {
     struct rd_vec key_dir; /* towards the sun, a window or a ceiling lamp; unit */
     double key_grey;
     double lamp_grey; /* beside the camera, at 1 m; falls with the square of the distance */
+    bool shadows;     /* surfaces keep the key light from others */
     bool bars;        /* the key light comes through a window's bars or leaves */
     double bars_mm;
     struct rd_vec slope; /* relative change of all of it per metre: rooms are not evenly lit */
@@ -20,7 +21,8 @@ struct rd_light {
 
 void rd_light_make(struct rd_light *light, const struct rd_options *options);
 
-/* Grey level of a point seen along `view` (unit, away from the camera). */
-double rd_light_grey(const struct rd_light *light, const struct rd_hit *hit, struct rd_vec view);
+/* Grey level of a point of the scene seen along `view` (unit, away from the camera). */
+double rd_light_grey(const struct rd_light *light, const struct rd_scene *scene, const struct rd_hit *hit,
+                     struct rd_vec view);
 
 #endif

@@ -24,6 +24,8 @@ enum option_id {
     OPT_RANGE,
     OPT_PERSON,
     OPT_ACT,
+    OPT_KNOCK,
+    OPT_CALIBRATION_NOISE,
     OPT_HELP
 };
 
@@ -48,8 +50,11 @@ static const char help_text[] =
     "                     for each depth image (default 1)\n"
     "  --size WxH         320x240 to 1280x800 (default 752x582); the focal length follows the width\n"
     "  --background KIND  varied (default, by seed), near, far, none\n"
-    "  --ambient KIND     varied (default, by seed), dim, normal, bright\n"
+    "  --ambient KIND     varied (default, by seed), dim, normal, bright, sunlight (hard shadows)\n"
     "  --distortion KIND  normal (default), none, strong\n"
+    "  --knock DEG        0 (default) to 0.5: the projector is turned by this against what rig.json says\n"
+    "  --calibration-noise X  0 (default) to 10: rig.json's errors, in typical ones: 0.1 % of fx, 1 px of the centre,\n"
+    "                     0.01 degrees of each ray, 0.1 mm of the projector's place\n"
     "  --bits N           8 (default), 10, 12 or 16 bits per sample\n"
     "  --help             this text\n"
     "\n"
@@ -84,6 +89,17 @@ static bool read_int(const char *option, const char *text, int low, int high, co
     return true;
 }
 
+/* A decimal number without sign or exponent. */
+static bool read_decimal(const char *option, const char *text, double low, double high, const char *wanted,
+                         double *value)
+{
+    char *end;
+    *value = strtod(text, &end);
+    if (strspn(text, "0123456789.") != strlen(text) || end == text || *end != '\0' || *value < low || *value > high)
+        return complain(option, text, wanted);
+    return true;
+}
+
 /* Index of a word in a list that ends with NULL. */
 static bool read_word(const char *option, const char *text, const char *const *words, const char *wanted, int *index)
 {
@@ -115,7 +131,7 @@ static bool take_word(int id, const char *text, struct rd_options *options)
     static const char *const rigs[] = {"paper", "wide", NULL};
     static const char *const backgrounds[] = {"varied", "near", "far", "none", NULL};
     static const char *const lenses[] = {"normal", "none", "strong", NULL};
-    static const char *const ambients[] = {"varied", "dim", "normal", "bright", NULL};
+    static const char *const ambients[] = {"varied", "dim", "normal", "bright", "sunlight", NULL};
     int index = 0;
     bool known = false;
     if (id == OPT_SCENE) {
@@ -138,7 +154,7 @@ static bool take_word(int id, const char *text, struct rd_options *options)
         known = read_word("distortion", text, lenses, "normal, none or strong", &index);
         options->distortion = (enum rd_distortion)index;
     } else if (id == OPT_AMBIENT) {
-        known = read_word("ambient", text, ambients, "varied, dim, normal or bright", &index);
+        known = read_word("ambient", text, ambients, "varied, dim, normal, bright or sunlight", &index);
         options->ambient = (enum rd_ambient_kind)index;
     }
     return known;
@@ -159,6 +175,10 @@ static bool take_option(int id, const char *text, struct rd_options *options)
         return read_int("bits", text, 8, 16, "8, 10, 12 or 16", &options->bits) &&
                (options->bits == 8 || options->bits == 10 || options->bits == 12 || options->bits == 16 ||
                 complain("bits", text, "8, 10, 12 or 16"));
+    case OPT_KNOCK:
+        return read_decimal("knock", text, 0.0, 0.5, "a number from 0 to 0.5", &options->knock_deg);
+    case OPT_CALIBRATION_NOISE:
+        return read_decimal("calibration-noise", text, 0.0, 10.0, "a number from 0 to 10", &options->calibration_noise);
     case OPT_RANGE:
         options->range_dir = text;
         return text[0] != '\0' || complain("range", text, "a directory");
@@ -183,6 +203,8 @@ enum rd_options_result rd_options_parse(int argc, char **argv, struct rd_options
         {"range", required_argument, NULL, OPT_RANGE},
         {"person", required_argument, NULL, OPT_PERSON},
         {"act", required_argument, NULL, OPT_ACT},
+        {"knock", required_argument, NULL, OPT_KNOCK},
+        {"calibration-noise", required_argument, NULL, OPT_CALIBRATION_NOISE},
         {"help", no_argument, NULL, OPT_HELP},
         {NULL, 0, NULL, 0},
     };

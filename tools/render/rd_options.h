@@ -29,7 +29,7 @@ enum rd_act { RD_ACT_VARIED, RD_ACT_PHONE, RD_ACT_FACE, RD_ACT_BACK, RD_ACT_NONE
 enum rd_rig_kind { RD_RIG_PAPER, RD_RIG_WIDE };
 enum rd_background { RD_BACK_VARIED, RD_BACK_NEAR, RD_BACK_FAR, RD_BACK_NONE };
 enum rd_distortion { RD_LENS_NORMAL, RD_LENS_NONE, RD_LENS_STRONG };
-enum rd_ambient_kind { RD_AMBIENT_VARIED, RD_AMBIENT_DIM, RD_AMBIENT_NORMAL, RD_AMBIENT_BRIGHT };
+enum rd_ambient_kind { RD_AMBIENT_VARIED, RD_AMBIENT_DIM, RD_AMBIENT_NORMAL, RD_AMBIENT_BRIGHT, RD_AMBIENT_SUNLIGHT };
 
 /* What parsing came to. */
 enum rd_options_result { RD_OPTIONS_RUN, RD_OPTIONS_HELP, RD_OPTIONS_WRONG };
@@ -46,9 +46,11 @@ struct rd_options {
     enum rd_distortion distortion;
     enum rd_ambient_kind ambient;
     uint64_t seed;
-    int frame_count;   /* for each depth image, where there are any */
-    int width, height; /* pixels */
-    int bits;          /* per sample of the image files */
+    int frame_count;          /* for each depth image, where there are any */
+    double knock_deg;         /* the projector's turn against what rig.json says */
+    double calibration_noise; /* rig.json's errors, in typical errors of a calibration */
+    int width, height;        /* pixels */
+    int bits;                 /* per sample of the image files */
 };
 
 /* Fills `options`; prints the help on standard output, or what is wrong on standard error. */

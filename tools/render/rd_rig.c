@@ -21,6 +21,11 @@
 /* Outside this tangent of the field angle the distortion polynomial is meaningless. */
 #define FIELD_TANGENT_MAX 0.8
 #define UNDISTORT_STEPS 12
+/* Typical errors of a calibration. */
+#define FOCAL_ERROR 1e-3
+#define CENTRE_ERROR_PX 1.0
+#define ORIGIN_ERROR_MM 0.1
+#define RAY_ERROR_DEG 0.01
 
 static void make_lens(struct rd_rig *rig, const struct rd_options *options)
 {
@@ -65,6 +70,47 @@ void rd_rig_make(struct rd_rig *rig, const struct rd_options *options)
     rig->far_mm = open_room ? ROOM_FAR_MM : SEAT_FAR_MM;
     make_lens(rig, options);
     make_dots(rig, options->rig == RD_RIG_WIDE ? WIDE_BASELINE_MM : PAPER_BASELINE_MM);
+}
+
+/* About an axis (unit), by Rodrigues. */
+static struct rd_vec turned(struct rd_vec v, struct rd_vec axis, double angle)
+{
+    struct rd_vec along = rd_scale(axis, rd_dot(axis, v) * (1.0 - cos(angle)));
+    return rd_along(rd_along(along, v, cos(angle)), rd_cross(axis, v), sin(angle));
+}
+
+static struct rd_vec draw_normal_vec(struct rd_rng *rng)
+{
+    struct rd_vec v;
+    v.x = rd_rng_normal(rng);
+    v.y = rd_rng_normal(rng);
+    v.z = rd_rng_normal(rng);
+    return v;
+}
+
+void rd_rig_knock(struct rd_rig *rig, const struct rd_options *options)
+{
+    struct rd_rng rng = rd_rng_start(options->seed, RD_STREAM_RIG + ((uint64_t)1 << 32));
+    struct rd_vec axis = rd_unit(draw_normal_vec(&rng));
+    for (int i = 0; options->knock_deg > 0.0 && i < RD_DOT_COUNT; i++)
+        rig->dot_rays[i] = rd_unit(turned(rig->dot_rays[i], axis, options->knock_deg * RD_RAD_PER_DEG));
+}
+
+void rd_rig_misjudge(struct rd_rig *rig, const struct rd_options *options)
+{
+    struct rd_rng rng = rd_rng_start(options->seed, RD_STREAM_RIG + ((uint64_t)2 << 32));
+    double noise = options->calibration_noise;
+    if (noise <= 0.0)
+        return;
+    rig->fx_px *= 1.0 + noise * FOCAL_ERROR * rd_rng_normal(&rng);
+    rig->fy_px *= 1.0 + noise * FOCAL_ERROR * rd_rng_normal(&rng);
+    rig->cx_px += noise * CENTRE_ERROR_PX * rd_rng_normal(&rng);
+    rig->cy_px += noise * CENTRE_ERROR_PX * rd_rng_normal(&rng);
+    rig->projector_mm = rd_along(rig->projector_mm, draw_normal_vec(&rng), noise * ORIGIN_ERROR_MM);
+    for (int i = 0; i < RD_DOT_COUNT; i++) {
+        struct rd_vec error = rd_scale(draw_normal_vec(&rng), noise * RAY_ERROR_DEG * RD_RAD_PER_DEG);
+        rig->dot_rays[i] = rd_unit(rd_add(rig->dot_rays[i], error));
+    }
 }
 
 static void distort(const struct rd_rig *rig, double x, double y, double *xd, double *yd)

@@ -25,6 +25,11 @@ struct rd_rig {
 
 void rd_rig_make(struct rd_rig *rig, const struct rd_options *options);
 
+/* Turns the projector by the options' angle about an axis by seed: what a knock does to a rig that was calibrated. */
+void rd_rig_knock(struct rd_rig *rig, const struct rd_options *options);
+/* Gives all numbers of a rig the errors of a calibration, as large as the options say. */
+void rd_rig_misjudge(struct rd_rig *rig, const struct rd_options *options);
+
 /* Pixel of a point in space. False: behind the camera or so far aside that the lens model says nothing. */
 bool rd_rig_project(const struct rd_rig *rig, struct rd_vec point_mm, double *u_px, double *v_px);
 
