@@ -17,9 +17,10 @@ import points
 import rig
 import samples
 import surface
+import windows
 
 STAGES = {"rig": rig, "cholesky": cholesky, "surface": surface,
-          "dots": dots, "labels": labels, "points": points, "samples": samples,
+          "dots": dots, "labels": labels, "windows": windows, "points": points, "samples": samples,
           "ellipse": ellipse, "isohead": isohead}
 
 

@@ -1,0 +1,191 @@
+"""Float64 reference of the search for windows, a second and plain implementation.
+
+Scenes are ellipsoids before a plane; the test draws them with the same formula. Every place is
+scored, the best is taken and everything near it struck out, until nothing is left."""
+
+import numpy as np
+
+import emit
+
+NEAR_MM, FAR_MM = 400, 8000
+CELLS_MAX, PLACES_APART_MM, WINDOWS_MAX = 19200, 200, 8
+SCORE_MIN, SCORE_BEHIND_MAX, CELLS_MIN = 720, 130, 2.5
+INSIDE = [(0, 0), (-35, 0), (35, 0), (0, -45), (0, 45), (-40, -45), (40, 45), (-40, 45), (40, -45),
+          (-58, 0), (58, 0), (0, -80), (0, 80)]
+AROUND = [(s * x, y) for s in (-1, 1) for x, y in
+          ((135, 50), (135, 0), (135, -50), (120, -100), (80, -145), (40, -165))] + [(0, -170)]
+BELOW = [(0, 150), (0, 200), (-60, 230), (60, 230), (0, 260), (-150, 260), (150, 260)]
+BESIDE = [(x, y) for x in (-135, 135) for y in (50, 0, -50, -100)]
+
+
+class Scene:
+    """ellipsoids: middle and semi-axes, mm; plane: its inverse depth on the optical axis and how
+    much that grows per unit of y, 1/m; every: only every so many columns and rows are measured."""
+
+    def __init__(self, name, size, focal, plane, ellipsoids, every=1):
+        self.name, self.size, self.focal, self.plane = name, size, focal, plane
+        self.ellipsoids, self.every = ellipsoids, every
+
+    def draw(self):
+        width, height = self.size
+        v, u = np.mgrid[:height, :width].astype(float)
+        x, y = (u - (width - 1) / 2) / self.focal, (v - (height - 1) / 2) / self.focal
+        inverse = (self.plane[0] + self.plane[1] * y) / 1000
+        depth = np.where(inverse > 1 / 16000, 1 / np.maximum(inverse, 1e-9), np.inf)
+        for middle, axes in self.ellipsoids:
+            ray = np.array([x, y, np.ones_like(x)])
+            a2 = np.array(axes, float)[:, None, None]**2
+            m = np.array(middle, float)[:, None, None]
+            a, b, c = (ray * ray / a2).sum(0), (ray * m / a2).sum(0), (m * m / a2).sum(0) - 1
+            root = b * b - a * c
+            depth = np.minimum(depth, np.where(root > 0, (b - np.sqrt(np.abs(root))) / a, np.inf))
+        depth = np.where(depth < 16000, np.floor(np.minimum(depth, 16000) + 0.5), 0)
+        depth[(u % self.every > 0) | (v % self.every > 0)] = 0
+        return np.where((depth >= NEAR_MM) & (depth <= FAR_MM), depth, 0)
+
+
+def survey(image, cell, reach):
+    height, width = image.shape
+    out = np.zeros((-(-height // cell), -(-width // cell)))
+    for row, column in np.ndindex(out.shape):
+        v, u = min(row * cell + cell // 2, height - 1), min(column * cell + cell // 2, width - 1)
+        top, left = max(0, v - reach), max(0, u - reach)
+        part = image[top:v + reach + 1, left:u + reach + 1]
+        dv, du = np.nonzero(part)
+        if len(dv):
+            out[row, column] = part[dv, du][np.argmin((dv + top - v)**2 + (du + left - u)**2)]
+    return out
+
+
+def survey_frame(image):
+    cell = 1
+    while -(-image.shape[0] // cell) * -(-image.shape[1] // cell) > CELLS_MAX:
+        cell += 1
+    least, cells = cell, survey(image, cell, max(1, cell // 2))
+    while (cells[:, 1:] > 0).any() and \
+            ((cells[:, 1:] > 0) & (cells[:, :-1] > 0)).sum() < 0.7 * (cells[:, 1:] > 0).sum():
+        cell *= 2
+        cells = survey(image, cell, cell // 2)
+    if cell == least:
+        return cells, cell, 0
+    return survey(image, cell // 2, cell // 2), cell // 2, cell
+
+
+class Places:
+    def __init__(self, scene):
+        self.scene = scene
+        self.depth, self.cell, self.spacing = survey_frame(scene.draw())
+
+    def seen(self, row, column, probes):
+        """Depths under probes: nan beyond the edge, 0 where nothing is."""
+        z = self.depth[row, column]
+        at = np.floor(np.array(probes) * self.scene.focal / (z * self.cell) + 0.5).astype(int)
+        c, r = column + at[:, 0], row + at[:, 1]
+        inside = (c >= 0) & (r >= 0) & (c < self.depth.shape[1]) & (r < self.depth.shape[0])
+        found = np.full(len(probes), np.nan)
+        found[inside] = self.depth[r[inside], c[inside]]
+        return found
+
+    def score(self, row, column):
+        z = self.depth[row, column]
+        if z == 0 or 150 * self.scene.focal / (z * self.cell) < CELLS_MIN:
+            return 0
+        inside, around, below = (self.seen(row, column, p) for p in (INSIDE, AROUND, BELOW))
+        hit = (inside > 0) & (inside - z >= -40) & (inside - z <= 110)
+        share = np.select([np.isnan(inside), inside == 0, hit], [0.5, 0.3, 1], 0).mean() * 350
+        share += np.select([np.isnan(around), around == 0, around - z >= 90, around - z < -100],
+                           [0.5, 0.7, 1, 0.4], 0).mean() * 400
+        share += np.select([np.isnan(below), below == 0, np.abs(below - z) < 150],
+                           [0.5, 0.3, 1], 0).mean() * 150
+        bulge = 7.5
+        if hit[:5].any() and hit[5:].sum() >= 3:
+            bulge = np.clip(inside[5:][hit[5:]].mean() - inside[:5][hit[:5]].mean(), 0, 15)
+        return share + bulge / 15 * 100 - z * 0.02
+
+    def on_plane(self, row, column):
+        beside, below = self.seen(row, column, BESIDE), self.seen(row, column, BELOW)
+        if not (beside > 0).all():
+            return False
+        terms = np.column_stack([np.ones(len(BESIDE)), BESIDE])
+        fit = np.linalg.lstsq(terms, 1 / beside, rcond=None)[0]
+        known = below > 0
+        there = 1 / (np.column_stack([np.ones(len(BELOW)), BELOW]) @ fit)[known]
+        near = np.abs(there - below[known]) <= 40
+        return known.sum() >= 2 and 3 * near.sum() >= 2 * known.sum()
+
+    def apart(self, place, rows, columns):
+        """mm from one place to others, in the image at the depth of the nearer one."""
+        z = np.minimum(self.depth[place], self.depth[rows, columns])
+        aside = np.hypot(rows - place[0], columns - place[1]) * self.cell * z / self.scene.focal
+        return np.hypot(aside, self.depth[rows, columns] - self.depth[place])
+
+    def window(self, scores, place):
+        rows, columns = np.nonzero(scores)
+        reach = np.floor(70 * self.scene.focal / (self.depth[place] * self.cell) + 0.5)
+        weight = scores[rows, columns] - scores[place] + 80
+        good = (np.abs(rows - place[0]) <= reach) & (np.abs(columns - place[1]) <= reach) & \
+            (weight > 0) & (np.abs(self.depth[rows, columns] - self.depth[place]) <= 80)
+        mean = [np.average(value[good], weights=weight[good])
+                for value in (columns, rows, self.depth[rows, columns])]
+        middle = (np.array(self.scene.size) - 1) / 2
+        pixel = np.array(mean[:2]) * self.cell + self.cell // 2
+        return [*((pixel - middle) / self.scene.focal), mean[2], scores[place]]
+
+    def windows(self):
+        scores = np.zeros_like(self.depth)
+        for place in np.ndindex(scores.shape):
+            scores[place] = self.score(*place)
+        left, out = np.where(scores >= SCORE_MIN, scores, 0), []
+        while left.any() and len(out) < WINDOWS_MAX:
+            place = np.unravel_index(np.argmax(left), left.shape)
+            if scores[place] < left.max() or scores[place] < scores.max() - SCORE_BEHIND_MAX:
+                break
+            if not self.on_plane(*place):
+                out.append(self.window(scores, place))
+            rows, columns = np.nonzero(left)
+            near = self.apart(place, rows, columns) < PLACES_APART_MM
+            left[rows[near], columns[near]] = 0
+        return out
+
+
+def person(x, y, z, size=1.0):
+    """A head, a neck and a torso."""
+    return [((x, y, z), (78 * size, 113 * size, 98 * size)),
+            ((x, y + 120 * size, z + 25), (58 * size, 110 * size, 62 * size)),
+            ((x, y + 400 * size, z + 45), (215 * size, 235 * size, 115 * size))]
+
+
+WALL, NOTHING, TABLE = (0.25, 0), (0, 0), (1.1, 0.9)
+SCENES = [
+    Scene("before a wall", (320, 240), 280, WALL, person(60, -80, 900)),
+    Scene("nothing behind", (160, 120), 140, NOTHING, person(-150, -50, 1200)),
+    Scene("three", (640, 480), 525, WALL,
+          person(-500, -250, 1900) + person(0, -200, 2400) + person(520, -300, 3000)),
+    Scene("64 x 64", (64, 64), 56, WALL, person(0, -100, 1500)),
+    Scene("1280 x 800", (1280, 800), 914, WALL, person(500, -400, 2000)),
+    Scene("portrait", (120, 200), 160, WALL, person(30, -100, 800)),
+    Scene("rare", (320, 240), 280, WALL, person(40, -60, 850), every=7),
+    Scene("on a table", (320, 240), 280, TABLE, [((0, 0, 800), (60, 100, 60))]),
+    Scene("only a wall", (320, 240), 280, WALL, []),
+]
+
+
+def write_vectors(directory):
+    inc = emit.Inc("Scenes, and the windows that they give in float64.")
+    rows = []
+    for index, scene in enumerate(SCENES):
+        places = Places(scene)
+        found = places.windows()
+        inc.raw("\nstatic const struct vector_ellipsoid vector_%d_ellipsoids[] = {\n%s};\n" % (
+            index, emit.wrap(["{{%s}, {%s}}" % tuple(", ".join(emit.numbers(p, 3)) for p in e)
+                              for e in scene.ellipsoids or [((0, 0, 0), (1, 1, 1))]])))
+        inc.raw("\nstatic const struct vector_window vector_%d_windows[] = {\n%s};\n" % (
+            index, emit.wrap(["{%s}" % ", ".join(emit.numbers(w, 6))
+                              for w in found or [(0, 0, 0, 0)]])))
+        rows.append('"%s", %d, %d, %d, %s, %s, %d, %d, vector_%d_ellipsoids, %d, %d, %d, '
+                    'vector_%d_windows' % (
+                        scene.name, *scene.size, scene.focal,
+                        *emit.numbers(scene.plane, 3), scene.every, len(scene.ellipsoids), index,
+                        places.cell, places.spacing, len(found), index))
+    inc.struct_array("vector_scene", "vector_scenes", rows)
+    return inc.write(directory, "windows.inc")
