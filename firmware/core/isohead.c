@@ -36,6 +36,7 @@ void ih_params_default(struct ih_params *params)
 {
     ih_dots_params_default(&params->dots);
     ih_labels_params_default(&params->labels);
+    ih_windows_params_default(&params->windows);
     ih_points_params_default(&params->points);
     ih_samples_params_default(&params->samples);
     ih_surface_params_default(&params->surface);
@@ -96,7 +97,12 @@ enum ih_err isohead_frame(struct isohead *head, const struct ih_frame *frame)
     }
     bool range = rig->calibration.kind == IH_RIG_RANGE;
     if (range) {
-        err = ih_points_from_range(frame, rig, &params->points, &head->points);
+        err = ih_windows_find(frame, rig, &params->windows, &head->scratch.windows, &head->windows);
+        if (err != IH_OK || head->windows.window_count == 0) {
+            return err;
+        }
+        err = ih_points_from_range(frame, rig, &params->points, &head->windows.window[0],
+                                   &head->points);
         if (err != IH_OK) {
             return err;
         }

@@ -27,6 +27,7 @@
 struct ih_params {
     struct ih_dots_params dots;
     struct ih_labels_params labels;
+    struct ih_windows_params windows;
     struct ih_points_params points;
     struct ih_samples_params samples;
     struct ih_surface_params surface;
@@ -40,6 +41,7 @@ struct isohead {
     /* The stages' outputs of the last frame, in order. */
     struct ih_dots dots;
     struct ih_labels labels;
+    struct ih_windows windows;
     struct ih_points points;
     struct ih_samples samples;
     struct ih_surface surface;
@@ -49,6 +51,7 @@ struct isohead {
     union {
         struct ih_dots_scratch dots;
         struct ih_labels_scratch labels;
+        struct ih_windows_scratch windows;
         struct ih_surface_scratch surface;
         struct ih_hypotheses_scratch hypotheses;
     } scratch;

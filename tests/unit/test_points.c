@@ -21,6 +21,7 @@ static struct ih_points_params params;
 static struct ih_points points;
 static uint16_t depth_mm[PIXELS_MAX];
 static struct ih_frame frame;
+static struct ih_window window;
 
 void setUp(void)
 {
@@ -149,6 +150,7 @@ static void use_range_rig(int32_t width, int32_t height)
     calibration.far_mm = 4000;
     TEST_ASSERT_EQUAL_INT(IH_OK, ih_rig_init(&rig, &calibration, &bad_slot));
     frame = (struct ih_frame){depth_mm, width, height, width * 2, 2, 0};
+    window = (struct ih_window){.depth_mm_q8 = 1000 << 8};
 }
 
 static void fill(uint16_t value)
@@ -162,7 +164,7 @@ static void fill(uint16_t value)
 
 static void convert(void)
 {
-    TEST_ASSERT_EQUAL_INT(IH_OK, ih_points_from_range(&frame, &rig, &params, &points));
+    TEST_ASSERT_EQUAL_INT(IH_OK, ih_points_from_range(&frame, &rig, &params, &window, &points));
 }
 
 static double pixel_u(int32_t slot)
@@ -185,27 +187,39 @@ static bool in_frame(int32_t slot)
            pixel_v(slot) <= frame.height - 1;
 }
 
+/* A quarter pitch, and never less than a pixel. */
+static double quarter_pitch_px(void)
+{
+    return fmax(1.0, floor(ih_test_from_q(points.field.unit_q28, 28) / 2 *
+                               ih_test_from_q(calibration.fx_px_q16, 16) +
+                           0.5));
+}
+
 /* What holds for every range image. */
 static void check_points(const char *what)
 {
+    /* A pixel that is not the slot's own; the slot's own place is rounded to a pixel first. */
+    const int64_t reach =
+        (int64_t)((quarter_pitch_px() + 0.51) * 65536 * (1 << 28) / (double)calibration.fx_px_q16);
     int32_t slot, seen = 0;
 
     TEST_ASSERT_TRUE(points.field.unit_q28 > 0);
     for (slot = 0; slot < IH_SLOTS; slot++) {
         const struct ih_point *point = &points.point[slot];
         const int64_t step = 2 * (int64_t)points.field.unit_q28;
+        const int64_t x = points.field.centre_x_q28 + (slot % IH_GRID - 9) * step;
+        const int64_t y = points.field.centre_y_q28 + (slot / IH_GRID - 9) * step;
+        const bool is_seen = point->state == IH_POINT_SEEN;
 
-        IH_TEST_EQUAL(points.field.centre_x_q28 + (slot % IH_GRID - 9) * step, point->x_q28, what,
-                      slot);
-        IH_TEST_EQUAL(points.field.centre_y_q28 + (slot / IH_GRID - 9) * step, point->y_q28, what,
-                      slot);
-        IH_TEST_EQUAL(point->state == IH_POINT_SEEN, point->depth_mm_q8 != 0, what, slot);
+        IH_TEST_RANGE(is_seen ? x - reach : x, is_seen ? x + reach : x, point->x_q28, what, slot);
+        IH_TEST_RANGE(is_seen ? y - reach : y, is_seen ? y + reach : y, point->y_q28, what, slot);
+        IH_TEST_EQUAL(is_seen, point->depth_mm_q8 != 0, what, slot);
         if (!in_frame(slot)) {
             IH_TEST_EQUAL(IH_POINT_UNKNOWN, point->state, what, slot);
-        } else {
+        } else if (window.spacing_px == 0) {
             IH_TEST_RANGE(IH_POINT_MISSING, IH_POINT_SEEN, point->state, what, slot);
         }
-        seen += point->state == IH_POINT_SEEN;
+        seen += is_seen;
     }
     IH_TEST_EQUAL(seen, points.seen_count, what, 0);
 }
@@ -219,7 +233,6 @@ static void an_empty_range_image_has_no_points(void)
     TEST_ASSERT_EQUAL_INT32(0, points.seen_count);
 }
 
-/* A lattice as wide as a head's: pitch_mm at the depth of the wall. */
 static void a_wall_is_seen_wherever_it_is_in_view(void)
 {
     static const int32_t size[][2] = {{64, 64}, {320, 240}, {240, 320}, {1280, 800}, {64, 400}};
@@ -237,8 +250,7 @@ static void a_wall_is_seen_wherever_it_is_in_view(void)
             }
         }
         TEST_ASSERT_TRUE(points.seen_count > 0);
-        /* The depth of interest is known to half a bin of 64 mm. */
-        IH_TEST_WITHIN(0.033, 1.0,
+        IH_TEST_WITHIN(1e-6, 1.0,
                        2000.0 * ih_test_from_q(points.field.unit_q28, 28) * 256 /
                            params.pitch_mm_q8,
                        "pitch", i);
@@ -283,7 +295,8 @@ static void small_holes_are_bridged(void)
     for (slot = 0; slot < IH_SLOTS; slot++) {
         if (in_frame(slot) && pixel_u(slot) < 638 && pixel_v(slot) < 478) {
             IH_TEST_EQUAL(IH_POINT_SEEN, points.point[slot].state, "bridged", slot);
-            IH_TEST_WITHIN(1.501, pixel_u(slot), points.point[slot].depth_mm_q8 / 256 - 1000,
+            /* The place is that of the pixel. */
+            IH_TEST_WITHIN(0.501, pixel_u(slot), points.point[slot].depth_mm_q8 / 256 - 1000,
                            "bridged", slot);
         }
     }
@@ -346,34 +359,97 @@ static void depths_out_of_range_are_no_measurement(void)
     TEST_ASSERT_TRUE(points.seen_count > 0);
 }
 
-/* A sphere of a head's size, off the middle, its background cut away: the lattice must lie over it,
- * at its depth. */
-static void the_lattice_finds_what_is_near(void)
+/* With lower_q8 of one pitch the slot above the middle one stands where the window is. */
+static void the_lattice_lies_where_the_window_is(void)
 {
-    const double cx = 150, cy = -60, cz = 900, radius = 110, focal = 640 * 4 / 5;
-    int32_t u, v, slot, on_sphere = 0;
+    static const int32_t middle = 9 * IH_GRID + 9;
+    static const int32_t depths_mm[] = {400, 850, 4000};
+    int i;
 
     use_range_rig(640, 480);
-    for (v = 0; v < 480; v++) {
-        for (u = 0; u < 640; u++) {
-            const double x = (u - 319.5) / focal, y = (v - 239.5) / focal;
-            const double a = x * x + y * y + 1, b = x * cx + y * cy + cz;
-            const double root = b * b - a * (cx * cx + cy * cy + cz * cz - radius * radius);
+    fill(1000);
+    for (i = 0; i < IH_TEST_COUNT(depths_mm); i++) {
+        window = (struct ih_window){12345678, -23456789, depths_mm[i] << 8, 0, 0};
+        convert();
+        check_points("window");
+        IH_TEST_EQUAL(params.lower_q8, 1 << 8, "lower", i);
+        IH_TEST_RANGE(-1, 1, points.point[middle - IH_GRID].x_q28 - window.x_q28, "x", i);
+        IH_TEST_RANGE(-1, 1, points.point[middle - IH_GRID].y_q28 - window.y_q28, "y", i);
+        IH_TEST_WITHIN(
+            2.0 / (1 << 28), params.pitch_mm_q8 / 256.0 / depths_mm[i],
+            ih_test_from_q(points.point[middle + 1].x_q28 - (int64_t)points.point[middle].x_q28,
+                           28),
+            "pitch", i);
+    }
+}
 
-            depth_mm[v * 640 + u] = (uint16_t)(root > 0 ? lround((b - sqrt(root)) / a) : 0);
+/* A window at the image's edge, and one whose lattice would reach beyond every number: slots beyond
+ * the edge are unknown, none wraps round. */
+static void windows_at_the_ends_are_survived(void)
+{
+    static const int32_t far_out[] = {INT32_MIN, -(2 << 28), 0, 2 << 28, INT32_MAX};
+    int i, k;
+
+    use_range_rig(64, 64);
+    fill(400);
+    for (i = 0; i < IH_TEST_COUNT(far_out); i++) {
+        for (k = 0; k < IH_TEST_COUNT(far_out); k++) {
+            window = (struct ih_window){far_out[i], far_out[k], 100 << 8, 0, 0};
+            convert();
+            IH_TEST_RANGE(0, IH_SLOTS, points.seen_count, "seen", i);
+            if (far_out[i] != 0 || far_out[k] != 0) {
+                IH_TEST_EQUAL(
+                    IH_POINT_UNKNOWN,
+                    points.point[far_out[i] < 0 || far_out[k] < 0 ? 0 : IH_SLOTS - 1].state,
+                    "beyond the edge", i * 5 + k);
+            }
+        }
+    }
+}
+
+/* Only every tenth pixel of every tenth row is measured; the pitch is 13.3 px. A slot takes one
+ * within half of that, and where none is near it is not known that there is nothing, unless no
+ * pixel lies within 12.5 px. */
+static void rare_points_leave_slots_unknown(void)
+{
+    int32_t i, slot, count[3] = {0, 0, 0};
+
+    use_range_rig(640, 480);
+    window.spacing_px = 10;
+    fill(0);
+    for (i = 0; i < 640 * 480; i++) {
+        const int32_t u = i % 640, v = i / 640;
+
+        if (u % 10 == 0 && v % 10 == 0 && u < 400) {
+            depth_mm[i] = (uint16_t)(1000 + u);
         }
     }
     convert();
-    check_points("sphere");
     for (slot = 0; slot < IH_SLOTS; slot++) {
-        on_sphere += points.point[slot].state == IH_POINT_SEEN;
+        const int64_t step = 2 * (int64_t)points.field.unit_q28;
+        const double u =
+            rint(ih_test_from_q(points.field.centre_x_q28 + (slot % IH_GRID - 9) * step, 28) * 512 +
+                 319.5);
+        const double v =
+            rint(ih_test_from_q(points.field.centre_y_q28 + (slot / IH_GRID - 9) * step, 28) * 512 +
+                 239.5);
+        const double found_u = fmin(390, 10 * rint(u / 10)), found_v = 10 * rint(v / 10);
+        const double away = hypot(found_u - u, found_v - v);
+        const double square = fmax(fabs(found_u - u), fabs(found_v - v));
+        const enum ih_point_state state = away <= 6      ? IH_POINT_SEEN
+                                          : square <= 12 ? IH_POINT_UNKNOWN
+                                                         : IH_POINT_MISSING;
+
+        IH_TEST_EQUAL(state, points.point[slot].state, "state", slot);
+        count[state]++;
+        if (state == IH_POINT_SEEN && fabs(found_u - u) != 5 && fabs(found_v - v) != 5) {
+            IH_TEST_EQUAL(1000 + (int32_t)found_u, points.point[slot].depth_mm_q8 / 256, "depth",
+                          slot);
+            IH_TEST_WITHIN(away > 0 ? 0.001 : 0.501, found_u, pixel_u(slot), "u", slot);
+            IH_TEST_WITHIN(away > 0 ? 0.001 : 0.501, found_v, pixel_v(slot), "v", slot);
+        }
     }
-    /* Its outline is a disc of tan 0.121; the pitch is 26 mm at 800 mm, the nearest tenth's depth;
-     * a slot a quarter pitch beside the outline still finds it: pi (0.121 / 0.0325 + 0.25)^2 = 50,
-     * 5 % more for the oblique view, give or take those at the rim. */
-    IH_TEST_RANGE(45, 60, on_sphere, "points on the sphere", 0);
-    /* The top is cut off where it is 60 mm wide, whose middle is above the sphere's centre. */
-    IH_TEST_WITHIN(20, cx, 850 * ih_test_from_q(points.field.centre_x_q28, 28), "middle", 0);
+    TEST_ASSERT_TRUE(count[0] > 5 && count[1] > 5 && count[2] > 5);
 }
 
 static void the_stride_is_followed(void)
@@ -401,10 +477,12 @@ static void the_wrong_kind_is_refused(void)
     use_range_rig(320, 240);
     frame.bytes_per_sample = 1;
     frame.stride_bytes = 320;
-    TEST_ASSERT_EQUAL_INT(IH_ERR_KIND, ih_points_from_range(&frame, &rig, &params, &points));
+    TEST_ASSERT_EQUAL_INT(IH_ERR_KIND,
+                          ih_points_from_range(&frame, &rig, &params, &window, &points));
     use_range_rig(320, 240);
     use_dot_rig(0);
-    TEST_ASSERT_EQUAL_INT(IH_ERR_KIND, ih_points_from_range(&frame, &rig, &params, &points));
+    TEST_ASSERT_EQUAL_INT(IH_ERR_KIND,
+                          ih_points_from_range(&frame, &rig, &params, &window, &points));
 }
 
 int main(void)
@@ -420,7 +498,9 @@ int main(void)
     RUN_TEST(small_holes_are_bridged);
     RUN_TEST(large_holes_stay_missing);
     RUN_TEST(depths_out_of_range_are_no_measurement);
-    RUN_TEST(the_lattice_finds_what_is_near);
+    RUN_TEST(the_lattice_lies_where_the_window_is);
+    RUN_TEST(windows_at_the_ends_are_survived);
+    RUN_TEST(rare_points_leave_slots_unknown);
     RUN_TEST(the_stride_is_followed);
     RUN_TEST(the_wrong_kind_is_refused);
     return UNITY_END();
