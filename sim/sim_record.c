@@ -66,7 +66,6 @@ static void write_dropped(struct sim_write *write, const struct isohead *head)
         int32_t count;
     } dropped[] = {
         {"dots", head->dots.dots_dropped},
-        {"runs", head->dots.runs_dropped},
         {"candidates", head->labels.candidates_dropped},
         {"minima", head->hypotheses.minima_dropped},
         {"contours", head->hypotheses.contours_dropped},

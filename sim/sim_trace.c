@@ -40,11 +40,9 @@ static void write_dots(struct sim_write *write, const struct ih_dots *dots)
     sim_write_key(write, "dots");
     sim_write_open(write, '{');
     sim_write_int_field(write, "dot_count", dots->dot_count);
-    sim_write_int_field(write, "threshold", dots->threshold);
-    sim_write_int_field(write, "small_count", dots->small_count);
-    sim_write_int_field(write, "large_count", dots->large_count);
+    sim_write_int_field(write, "edge_count", dots->edge_count);
+    sim_write_int_field(write, "hot_count", dots->hot_count);
     sim_write_int_field(write, "dots_dropped", dots->dots_dropped);
-    sim_write_int_field(write, "runs_dropped", dots->runs_dropped);
     write_column(write, "u_px_q12", &dot->u_px_q12, dots->dot_count, sizeof *dot);
     write_column(write, "v_px_q12", &dot->v_px_q12, dots->dot_count, sizeof *dot);
     write_column(write, "peak", &dot->peak, dots->dot_count, sizeof *dot);

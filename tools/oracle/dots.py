@@ -1,88 +1,65 @@
-"""Float64 reference of dot detection, by scipy.ndimage, on frames that a formula makes.
-
-The unit test makes the same frames with the same integer formula, so that no picture is stored.
-"""
+"""Float64 reference of dot detection, by scipy.ndimage, on frames that a formula makes."""
 
 import numpy as np
 from scipy import ndimage
 
+import band
 import emit
+import noise
+from frames import Frame, spec
 
-FULL_Q4 = 4080
-RESPONSE_UNIT = 1296
-MASK32 = 0xFFFFFFFF
-
-
-class Frame:
-    def __init__(self, name, size, maximum=255, background=0, noise=0, slope=(0, 0), seed=1,
-                 spots=(), boxes=(), tile=None, floor_q4=29, gain_q8=1708):
-        self.name, self.maximum = name, maximum
-        self.width, self.height = size
-        self.background, self.noise, self.slope, self.seed = background, noise, slope, seed
-        self.spots = [tuple(int(x) for x in s) for s in spots]  # u, v, radius (Q4), height
-        self.boxes = [tuple(int(x) for x in b) for b in boxes]  # u0, v0, u1, v1 (included), height
-        self.tile = tile or size  # spots and boxes repeat with this period
-        self.floor_q4, self.gain_q8 = floor_q4, gain_q8
-
-    def marks(self):
-        u, v = np.meshgrid(np.arange(self.tile[0]), np.arange(self.tile[1]))
-        value = np.zeros(u.shape, np.int64)
-        for cu, cv, radius, height in self.spots:
-            near = np.s_[max(0, (cv - radius) // 16):max(0, (cv + radius) // 16 + 1),
-                         max(0, (cu - radius) // 16):max(0, (cu + radius) // 16 + 1)]
-            far2 = (16 * u[near] - cu)**2 + (16 * v[near] - cv)**2
-            value[near] += np.where(far2 < radius**2,
-                                    height * (radius**2 - far2) // radius**2, 0)
-        for u0, v0, u1, v1, height in self.boxes:
-            value[v0:v1 + 1, u0:u1 + 1] += height
-        rows = np.arange(self.height) % self.tile[1]
-        return value[rows][:, np.arange(self.width) % self.tile[0]]
-
-    def pixels(self):
-        u, v = np.meshgrid(np.arange(self.width, dtype=np.int64),
-                           np.arange(self.height, dtype=np.int64))
-        value = self.background + ((self.slope[0] * u + self.slope[1] * v) >> 8)
-        h = (u * 73856093 ^ v * 19349663 ^ self.seed * 83492791) & MASK32
-        h ^= h >> 13
-        h = (h * 0x5bd1e995) & MASK32
-        h ^= h >> 15
-        value += h % (2 * self.noise + 1) - self.noise
-        return np.clip(value + self.marks(), 0, self.maximum)
+RING = [(4, 0), (4, 2), (3, 3), (2, 4), (0, 4), (-2, 4), (-3, 3), (-4, 2),
+        (-4, 0), (-4, -2), (-3, -3), (-2, -4), (0, -4), (2, -4), (3, -3), (4, -2)]
+EDGE = 4
 
 
-def response(grey_q4):
-    grey = grey_q4.astype(float)
-    inner = ndimage.correlate(grey, np.outer([1, 2, 1], [1, 2, 1]).astype(float), mode="nearest")
-    outer = ndimage.correlate(grey, np.ones((9, 9)), mode="nearest")
-    return 81 * inner - 16 * outer
+def maxima(response):
+    """(v, u) of the pixels above or equal to their eight neighbours; of equal ones the first in
+    reading order."""
+    first = np.zeros((3, 3), bool)
+    first[0] = first[1, 0] = True
+    later = ~first
+    later[1, 1] = False
+    padded = np.pad(response, 1)
+    return np.argwhere((response > ndimage.maximum_filter(padded, footprint=first)[1:-1, 1:-1])
+                       & (response >= ndimage.maximum_filter(padded, footprint=later)[1:-1, 1:-1]))
 
 
-def find(frame, area=(4, 120), extent=16):
-    """threshold, dots (u, v, peak), small and large count, runs of every row."""
-    grey_q4 = np.rint(frame.pixels() * (FULL_Q4 / frame.maximum))
-    filtered = response(grey_q4)
-    sample = np.sort(np.abs(filtered[::8, ::8]).ravel())
-    median = sample[len(sample) // 2]
-    noise = (median // 81 + 1) * 81  # of the bin that holds the median, the upper end
-    threshold = max(frame.floor_q4 * RESPONSE_UNIT, np.floor(noise * frame.gain_q8 / 256 + 0.5))
-    above = filtered > threshold
-    label, count = ndimage.label(above, np.ones((3, 3)))
-    dots, small, large = [], 0, 0
-    for index, box in enumerate(ndimage.find_objects(label), 1):
-        mine = label[box] == index
-        size = max(s.stop - s.start for s in box)
-        if mine.sum() < area[0]:
-            small += 1
-        elif mine.sum() > area[1] or size > extent:
-            large += 1
+def beside(response, u, v):
+    height, width = response.shape
+    return (response[v, u - 1 if u > 0 else u + 1] + response[v, u + 1 if u + 1 < width else u - 1]
+            + response[v - 1 if v > 0 else v + 1, u] + response[v + 1 if v + 1 < height else v - 1, u])
+
+
+def centre(padded, u, v):
+    """Mean of the 5x5 pixels weighted by (R - a quarter of the peak)^2 where positive."""
+    part = padded[v + EDGE - 2:v + EDGE + 3, u + EDGE - 2:u + EDGE + 3]
+    weight = np.maximum(part - part[2, 2] // 4, 0)**2
+    dv, du = np.mgrid[-2:3, -2:3]
+    return u + (weight * du).sum() / weight.sum(), v + (weight * dv).sum() / weight.sum()
+
+
+def find(frame, ring_max=128 / 256, side_min=138 / 256):
+    """dots (u, v, peak), maxima above the threshold that are edges or hot pixels."""
+    response = band.response(frame.grey_q4())
+    level = noise.spread(noise.smoothed(noise.medians(response), True), response.shape, True)
+    threshold = np.maximum(np.floor(frame.floor_q4 * band.UNIT / 16 + 0.5),
+                           np.floor(level * frame.gain_q8 / 256 + 0.5))
+    padded = np.pad(response, EDGE)
+    dots, edge, hot = [], 0, 0
+    for v, u in maxima(response):
+        peak = response[v, u]
+        if peak <= threshold[v, u]:
+            continue
+        ring = max(padded[v + EDGE + dv, u + EDGE + du] for du, dv in RING)
+        if ring > np.floor(peak * ring_max + 0.5):
+            edge += 1
+        elif beside(response, u, v) < 4 * side_min * peak:
+            hot += 1
         else:
-            weight = np.where(mine, filtered[box], 0)**2
-            v, u = np.mgrid[box]
-            dots.append(((weight * u).sum() / weight.sum(), (weight * v).sum() / weight.sum(),
-                         np.where(mine, filtered[box], 0).max()))
+            dots.append((*centre(padded, u, v), peak))
     dots.sort(key=lambda d: (d[1], d[0]))
-    starts = above & ~np.pad(above, ((0, 0), (1, 0)))[:, :-1]
-    return median, threshold, dots, small, large, starts.sum(axis=1)
+    return dots, edge, hot
 
 
 def scattered(random, count, size, apart, radius, height):
@@ -111,8 +88,8 @@ def border_spots(width, height):
 
 
 def shapes():
-    """Boxes: a U that joins late, its mirror image, a W, a diagonal chain, an O, hot pixels, bars
-    too long and blobs too large."""
+    """Boxes: a U, its mirror image, a W, a diagonal chain, an O, hot pixels, long bars and large
+    blobs."""
     def u_shape(u, v, arms, depth):
         boxes = [(u + 5 * a, v, u + 5 * a, v + depth, 120) for a in range(arms)]
         return boxes + [(u, v + depth + 1, u + 5 * (arms - 1), v + depth + 1, 120)]
@@ -146,6 +123,8 @@ def frames():
     yield Frame("saturated", least, 255, 200, 3, (0, 0), 5,
                 scattered(random, 40, least, 16, (40, 70), (60, 400)))
     yield Frame("noise", least, 255, 100, 30, (0, 0), 6, gain_q8=800)
+    yield Frame("loud", (640, 480), 255, 60, 1, (0, 0), 8,
+                scattered(random, 120, (640, 480), 20, (30, 70), (12, 80)), loud=15)
     row, column = np.divmod(np.arange(361), 19)
     lattice = np.column_stack([16 * (60 + 33 * column + row) + column * 5 % 16,
                                16 * (40 + 27 * row - column) + row * 7 % 16,
@@ -154,42 +133,23 @@ def frames():
 
 
 def crowds():
-    """More dots than are kept, and more runs than are kept: only counters can be compared."""
+    """More dots than are kept: only counters can be compared."""
     yield Frame("dots", (1280, 800), spots=[(128, 128, 48, 100)], tile=(16, 16))
-    yield Frame("runs", (1280, 240), boxes=[(1, 0, 1, 0, 200)], tile=(4, 1), gain_q8=0)
-    yield Frame("board", (1280, 240), boxes=[(0, 0, 0, 0, 200), (2, 6, 2, 6, 200)], tile=(4, 12),
+    yield Frame("board", (1280, 240), boxes=[(0, 0, 1, 1, 200), (6, 6, 7, 7, 200)], tile=(12, 12),
                 gain_q8=0)
-
-
-def spec(inc, frame):
-    inc.raw("\nstatic const struct vector_spot vector_%s_spots[] = {\n%s};\n" % (
-        frame.name, emit.wrap(["{%d, %d, %d, %d}" % s for s in frame.spots or [(0, 0, 1, 0)]])))
-    inc.raw("\nstatic const struct vector_box vector_%s_boxes[] = {\n%s};\n" % (
-        frame.name, emit.wrap(["{%d, %d, %d, %d, %d}" % b for b in frame.boxes
-                               or [(0, 0, 0, 0, 0)]])))
-    numbers = (frame.width, frame.height, frame.maximum, frame.background, frame.noise,
-               *frame.slope, frame.seed, *frame.tile, frame.floor_q4, frame.gain_q8)
-    return '"%s", %s, %d, vector_%s_spots, %d, vector_%s_boxes' % (
-        frame.name, ", ".join(map(str, numbers)), len(frame.spots), frame.name, len(frame.boxes),
-        frame.name)
 
 
 def write_vectors(directory):
     inc = emit.Inc("Frames by formula, and their dots by scipy.ndimage.")
     rows = []
     for frame in frames():
-        median, threshold, dots, small, large, _ = find(frame)
+        dots, edge, hot = find(frame)
         row = spec(inc, frame)
         found = ["{%s}" % ", ".join(emit.numbers(d[:2], 5) + [emit.number(d[2])]) for d in dots]
         inc.raw("\nstatic const struct vector_dot vector_%s_dots[] = {\n%s};\n" % (
             frame.name, emit.wrap(found or ["{0, 0, 0}"])))
-        rows.append("{%s}, %d, %d, %d, %d, %d, vector_%s_dots" % (
-            row, median, threshold, small, large, len(dots), frame.name))
+        rows.append("{%s}, %d, %d, %d, vector_%s_dots" % (row, edge, hot, len(dots), frame.name))
     inc.struct_array("vector_frame", "vector_frames", rows)
-    rows = []
-    for frame in crowds():
-        _, _, dots, _, _, runs = find(frame)
-        rows.append("{%s}, %d, %d" % (spec(inc, frame), len(dots),
-                                      np.maximum(runs - 256, 0).sum()))
+    rows = ["{%s}, %d" % (spec(inc, frame), len(find(frame)[0])) for frame in crowds()]
     inc.struct_array("vector_crowd", "vector_crowds", rows)
     return inc.write(directory, "dots.inc")

@@ -8,11 +8,13 @@ output. Seeds are fixed: the same files come out every time.
 import argparse
 import os
 
+import band
 import cholesky
 import dots
 import ellipse
 import isohead
 import labels
+import noise
 import points
 import rig
 import samples
@@ -20,8 +22,8 @@ import surface
 import windows
 
 STAGES = {"rig": rig, "cholesky": cholesky, "surface": surface,
-          "dots": dots, "labels": labels, "windows": windows, "points": points, "samples": samples,
-          "ellipse": ellipse, "isohead": isohead}
+          "band": band, "noise": noise, "dots": dots, "labels": labels, "windows": windows,
+          "points": points, "samples": samples, "ellipse": ellipse, "isohead": isohead}
 
 
 def main():

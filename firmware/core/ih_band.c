@@ -1,0 +1,105 @@
+#include "ih_band.h"
+
+#include <string.h>
+
+#include "ih_fix.h"
+
+#define INNER_WEIGHT 81 /* the outer box has 81 pixels, the inner kernel weight 16: */
+#define OUTER_WEIGHT 16 /* 81 inner - 16 outer has no response to a constant */
+#define RESPONSE_SHIFT 8
+
+struct ih_row ih_frame_row(const struct ih_frame *frame, int32_t v)
+{
+    return (struct ih_row){
+        .samples = (const uint8_t *)frame->samples + (size_t)v * (size_t)frame->stride_bytes,
+        .bytes_per_sample = frame->bytes_per_sample,
+        .maximum = frame->maximum,
+    };
+}
+
+void ih_band_begin(struct ih_band *band, int32_t width)
+{
+    band->width = width;
+    band->rows_in = 0;
+}
+
+void ih_band_take(struct ih_band *band, const struct ih_row *row)
+{
+    const uint32_t maximum = (uint32_t)row->maximum;
+    /* 255 of 255 and 65535 of 65535 become 4080. */
+    const uint32_t gain_q16 = (IH_BAND_FULL_Q4 * 65536u + maximum / 2) / maximum;
+    const uint8_t *narrow = row->samples;
+    const uint16_t *wide = row->samples;
+    for (int32_t u = 0; u < band->width; u++) {
+        uint32_t sample = row->bytes_per_sample == 1 ? narrow[u] : wide[u];
+        if (sample > maximum) {
+            sample = maximum;
+        }
+        band->incoming_q4[u] = (uint16_t)((sample * gain_q16 + 32768u) >> 16);
+    }
+}
+
+/* Column sums with the newest row and without the one that leaves the ring. */
+static void move_ring(struct ih_band *band)
+{
+    const int32_t width = band->width;
+    const uint16_t *from = band->incoming_q4;
+    uint16_t *to = band->grey_q4[band->rows_in % IH_BAND_ROWS];
+    uint16_t *sum = &band->column_sum[IH_BAND_REACH];
+    if (band->rows_in == 0) {
+        memset(band->column_sum, 0, sizeof band->column_sum);
+    }
+    if (band->rows_in < IH_BAND_ROWS) {
+        memset(to, 0, (size_t)width * sizeof *to);
+    }
+    for (int32_t u = 0; u < width; u++) {
+        sum[u] = (uint16_t)(sum[u] + from[u] - to[u]);
+    }
+    memcpy(to, from, (size_t)width * sizeof *to);
+    for (int32_t i = 1; i <= IH_BAND_REACH; i++) {
+        sum[-i] = sum[0];
+        sum[width - 1 + i] = sum[width - 1];
+    }
+    band->rows_in++;
+}
+
+static int32_t weighed(int32_t inner, int32_t box)
+{
+    return (INNER_WEIGHT * inner - OUTER_WEIGHT * box + (1 << (RESPONSE_SHIFT - 1))) >>
+           RESPONSE_SHIFT;
+}
+
+/* R of the ring's centre row. */
+static void filter_row(const struct ih_band *band, int16_t *response)
+{
+    const int32_t last = band->width - 1;
+    const int32_t centre = band->rows_in - IH_BAND_REACH - 1;
+    const uint16_t *above = band->grey_q4[(centre - 1) % IH_BAND_ROWS];
+    const uint16_t *middle = band->grey_q4[centre % IH_BAND_ROWS];
+    const uint16_t *below = band->grey_q4[(centre + 1) % IH_BAND_ROWS];
+    const uint16_t *first_sum = band->column_sum; /* of the box around pixel u: first_sum[u] */
+    int32_t box = 0;
+    for (int32_t i = 0; i < IH_BAND_ROWS; i++) {
+        box += first_sum[i];
+    }
+    int32_t left = above[0] + 2 * middle[0] + below[0];
+    int32_t here = left;
+    for (int32_t u = 0; u < last; u++) {
+        int32_t right = above[u + 1] + 2 * middle[u + 1] + below[u + 1];
+        response[u] = (int16_t)weighed(left + 2 * here + right, box);
+        box += first_sum[u + IH_BAND_ROWS] - first_sum[u];
+        left = here;
+        here = right;
+    }
+    response[last] = (int16_t)weighed(left + 3 * here, box);
+}
+
+bool ih_band_push(struct ih_band *band, int16_t *response)
+{
+    move_ring(band);
+    if (band->rows_in < IH_BAND_ROWS) {
+        return false;
+    }
+    filter_row(band, response);
+    return true;
+}

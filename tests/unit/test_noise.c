@@ -1,0 +1,176 @@
+/* ih_noise against NumPy, on frames that both sides make by the same formula. */
+#include "ih_noise.h"
+
+#include "ih_test_frame.h"
+
+struct vector_place {
+    int32_t u, v;
+    double noise;
+};
+
+struct vector_noise {
+    struct vector_spec spec;
+    int32_t columns, rows;
+    const double *block;
+    int32_t place_count;
+    const struct vector_place *place;
+};
+
+#include "noise.inc"
+
+static struct ih_noise_scratch scratch;
+static struct ih_noise noise;
+
+void setUp(void)
+{
+    memset(&scratch, IH_TEST_FILL, sizeof scratch);
+    memset(&noise, IH_TEST_FILL, sizeof noise);
+}
+
+void tearDown(void)
+{
+}
+
+static int32_t at(int32_t u, int32_t v)
+{
+    uint16_t row[IH_NOISE_BLOCKS_X];
+
+    (void)ih_noise_row(&noise, v, row);
+    return ih_noise_at(&noise, row, u);
+}
+
+static void blocks_match_numpy(void)
+{
+    int i, k;
+
+    for (i = 0; i < IH_TEST_COUNT(vector_noises); i++) {
+        const struct vector_noise *v = &vector_noises[i];
+
+        make_frame(&v->spec);
+        ih_noise_measure(&frame, &scratch, &noise);
+        IH_TEST_EQUAL(v->columns, noise.columns, v->spec.name, i);
+        IH_TEST_EQUAL(v->rows, noise.rows, v->spec.name, i);
+        for (k = 0; k < v->columns * v->rows; k++) {
+            /* Two smoothings round by half a unit each; a grey that rounds the other way moves a
+             * median by a few units at most. */
+            IH_TEST_WITHIN(exact_grey(&v->spec) ? 1.0 : 4.0, v->block[k],
+                           noise.median[k / v->columns][k % v->columns], v->spec.name, k);
+        }
+    }
+}
+
+static void places_match_numpy(void)
+{
+    int i, k;
+
+    for (i = 0; i < IH_TEST_COUNT(vector_noises); i++) {
+        const struct vector_noise *v = &vector_noises[i];
+
+        make_frame(&v->spec);
+        ih_noise_measure(&frame, &scratch, &noise);
+        for (k = 0; k < v->place_count; k++) {
+            /* As the blocks, and half a unit for each of the two interpolations. */
+            IH_TEST_WITHIN(exact_grey(&v->spec) ? 2.0 : 5.0, v->place[k].noise,
+                           at(v->place[k].u, v->place[k].v), v->spec.name, k);
+        }
+    }
+}
+
+static void flat_frames_have_no_noise(void)
+{
+    fill8(1280, 800, 255);
+    ih_noise_measure(&frame, &scratch, &noise);
+    TEST_ASSERT_EQUAL_INT32(40, noise.columns);
+    TEST_ASSERT_EQUAL_INT32(25, noise.rows);
+    TEST_ASSERT_EQUAL_INT32(0, at(0, 0));
+    TEST_ASSERT_EQUAL_INT32(0, at(1279, 799));
+}
+
+/* From one pixel to the next the noise changes by a 32nd of a block's difference, never more: no
+ * seams. */
+static void there_are_no_seams(void)
+{
+    int32_t u, v, greatest = 0;
+
+    make_frame(&vector_noises[IH_TEST_COUNT(vector_noises) - 1].spec);
+    ih_noise_measure(&frame, &scratch, &noise);
+    for (v = 0; v < noise.rows; v++) {
+        for (u = 0; u + 1 < noise.columns; u++) {
+            const int32_t step = noise.median[v][u + 1] - noise.median[v][u];
+
+            greatest = step > greatest ? step : -step > greatest ? -step : greatest;
+        }
+    }
+    TEST_ASSERT_GREATER_THAN_INT32(100, greatest);
+    for (v = 0; v < frame.height; v += 13) {
+        for (u = 0; u + 1 < frame.width; u++) {
+            IH_TEST_RANGE(-greatest / 32 - 2, greatest / 32 + 2, at(u + 1, v) - at(u, v), "step",
+                          v * frame.width + u);
+        }
+    }
+}
+
+/* The least of a row is never above any of its pixels. */
+static void the_least_of_a_row_is_the_least(void)
+{
+    uint16_t row[IH_NOISE_BLOCKS_X];
+    int32_t u, v;
+
+    make_frame(&vector_noises[IH_TEST_COUNT(vector_noises) - 1].spec);
+    ih_noise_measure(&frame, &scratch, &noise);
+    for (v = 0; v < frame.height; v += 7) {
+        const int32_t least = ih_noise_row(&noise, v, row);
+
+        for (u = 0; u < frame.width; u++) {
+            IH_TEST_RANGE(least, UINT16_MAX, ih_noise_at(&noise, row, u), "noise", v);
+        }
+    }
+}
+
+/* A bright dot in every block, as close as the pattern comes: the noise stays that of the frame. */
+static void dots_are_no_noise(void)
+{
+    int32_t u, v, plain;
+    struct ih_test_random random = {3};
+
+    fill8(640, 480, 0);
+    for (v = 0; v < 480 * 640; v++) {
+        grey8[v] = (uint8_t)(60 + ih_test_between(&random, -4, 4));
+    }
+    ih_noise_measure(&frame, &scratch, &noise);
+    plain = at(320, 240);
+    for (v = 12; v < 470; v += 28) {
+        for (u = 12; u < 630; u += 28) {
+            paint_block(u - 1, v - 1, 3, 3, 250);
+        }
+    }
+    ih_noise_measure(&frame, &scratch, &noise);
+    IH_TEST_RANGE(plain * 9 / 10, plain * 13 / 10, at(320, 240), "noise", 0);
+}
+
+static void the_hardest_frames_fit(void)
+{
+    int32_t i;
+
+    fill8(1280, 800, 0);
+    for (i = 0; i < PIXELS_MAX; i++) {
+        grey8[i] = (i % 1280 / 3 + i / 1280 / 3) % 4 == 0 ? 255 : 0;
+    }
+    ih_noise_measure(&frame, &scratch, &noise);
+    for (i = 0; i < 1280; i += 5) {
+        IH_TEST_RANGE(0, 18360, at(i, i * 5 / 8), "noise", i);
+    }
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(blocks_match_numpy);
+    RUN_TEST(places_match_numpy);
+    RUN_TEST(flat_frames_have_no_noise);
+    RUN_TEST(there_are_no_seams);
+    RUN_TEST(the_least_of_a_row_is_the_least);
+    RUN_TEST(dots_are_no_noise);
+    RUN_TEST(the_hardest_frames_fit);
+    return UNITY_END();
+}
