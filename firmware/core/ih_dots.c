@@ -4,8 +4,13 @@
 
 #include "ih_fix.h"
 
-/* The centre is taken over so many pixels on each side of the peak. */
+/* The centre is taken over so many pixels on each side of the peak, */
 #define CENTRE_REACH 2
+/* of a plateau over so many; */
+#define PLATEAU_REACH 4
+/* and its ring is at most so far from the peak. */
+#define SHIFT_MAX 2
+#define TWIN_PX_Q12 (3 * 4096)
 #define RING_PLACES 16
 
 void ih_dots_params_default(struct ih_dots_params *params)
@@ -15,6 +20,7 @@ void ih_dots_params_default(struct ih_dots_params *params)
         .noise_gain_q8 = 1178, /* 4.6: 3.1 sigma of Gaussian noise */
         .ring_max_q8 = 128,
         .side_min_q8 = 138,
+        .flat_min_q8 = 225, /* a Gaussian dot has 0.78, and 0.86 with the widest beam and lens */
         .bright_grey = 200,
     };
 }
@@ -41,6 +47,18 @@ void ih_dots_begin(struct ih_dots_scratch *scratch, struct ih_dots *out,
     memset(out->bright, 0, sizeof out->bright);
 }
 
+static bool has_twin(const struct ih_dots *dots, const struct ih_dot *dot)
+{
+    for (int32_t i = dots->dot_count - 1;
+         i >= 0 && dots->dot[i].v_px_q12 > dot->v_px_q12 - TWIN_PX_Q12; i--) {
+        if (ih_abs_s32(dots->dot[i].u_px_q12 - dot->u_px_q12) < TWIN_PX_Q12 &&
+            dots->dot[i].v_px_q12 < dot->v_px_q12 + TWIN_PX_Q12) {
+            return true;
+        }
+    }
+    return false;
+}
+
 /* Keep the dots sorted by v, then u; peaks come nearly in that order. */
 static void insert_dot(struct ih_dots *out, struct ih_dot dot)
 {
@@ -58,7 +76,7 @@ static void insert_dot(struct ih_dots *out, struct ih_dot dot)
     out->dot[at] = dot;
 }
 
-/* R of row v, its first pixel at [0]; from 4 before to 4 behind the frame it may be read. */
+/* R of row v, its first pixel at [0]; IH_DOTS_REACH pixels beyond the frame may be read. */
 static int16_t *response_row(struct ih_dots_scratch *scratch, int32_t v)
 {
     return &scratch->rows.finding.response[(v + IH_DOTS_REACH) % IH_DOTS_ROWS][IH_DOTS_REACH];
@@ -103,16 +121,16 @@ static int32_t beside(struct ih_dots_scratch *scratch, int32_t u, int32_t v)
            response_row(scratch, below)[u];
 }
 
-/* Weights: R <= 18,360, squared 2^28.4; 25 of them 2^33; offsets of 2 in Q12 2^46. */
-static struct ih_dot centred(struct ih_dots_scratch *scratch, int32_t u, int32_t v)
+/* Weights: R <= 18,360, squared 2^28.4; 81 of them 2^34.8; offsets of 4 in Q12 2^49. */
+static struct ih_dot centred(struct ih_dots_scratch *scratch, int32_t u, int32_t v, int32_t reach)
 {
     const int32_t peak = response_row(scratch, v)[u];
     int64_t weight_sum = 0;
     int64_t sum_u = 0;
     int64_t sum_v = 0;
-    for (int32_t dv = -CENTRE_REACH; dv <= CENTRE_REACH; dv++) {
+    for (int32_t dv = -reach; dv <= reach; dv++) {
         const int16_t *row = response_row(scratch, v + dv);
-        for (int32_t du = -CENTRE_REACH; du <= CENTRE_REACH; du++) {
+        for (int32_t du = -reach; du <= reach; du++) {
             int64_t above = ih_max_s32(0, row[u + du] - peak / 4);
             weight_sum += above * above;
             sum_u += above * above * du;
@@ -126,6 +144,13 @@ static struct ih_dot centred(struct ih_dots_scratch *scratch, int32_t u, int32_t
     };
 }
 
+/* The pixel of a plateau's centre, near the peak's. */
+static int32_t ring_place(int32_t centre_px_q12, int32_t peak_px)
+{
+    int32_t pixel = (int32_t)ih_shift_round(centre_px_q12, 12);
+    return ih_clamp_s32(pixel, peak_px - SHIFT_MAX, peak_px + SHIFT_MAX);
+}
+
 static int32_t threshold_of(const struct ih_dots_params *params, int32_t noise)
 {
     int32_t floor = (int32_t)ih_mul_shift(params->floor_grey_q4, IH_BAND_UNIT, 4);
@@ -137,13 +162,25 @@ static void judge(struct ih_dots_scratch *scratch, struct ih_dots *out, int32_t 
 {
     const struct ih_dots_params *params = &scratch->params;
     const int32_t peak = response_row(scratch, v)[u];
-    if (!stands_alone(scratch, u, v, (int32_t)ih_mul_shift(peak, params->ring_max_q8, 8))) {
-        out->edge_count++;
-    } else if ((int64_t)beside(scratch, u, v) * 64 < (int64_t)peak * params->side_min_q8) {
+    const int32_t ring_max = (int32_t)ih_mul_shift(peak, params->ring_max_q8, 8);
+    const int64_t beside_q6 = (int64_t)beside(scratch, u, v) * 64;
+    const bool flat = beside_q6 >= (int64_t)peak * params->flat_min_q8;
+    if (beside_q6 < (int64_t)peak * params->side_min_q8) {
         out->hot_count++;
-    } else {
-        insert_dot(out, centred(scratch, u, v));
+        return;
     }
+    if (!flat && !stands_alone(scratch, u, v, ring_max)) {
+        out->edge_count++;
+        return;
+    }
+    struct ih_dot dot = centred(scratch, u, v, flat ? PLATEAU_REACH : CENTRE_REACH);
+    if ((flat && !stands_alone(scratch, ring_place(dot.u_px_q12, u), ring_place(dot.v_px_q12, v),
+                               ring_max)) ||
+        has_twin(out, &dot)) {
+        out->edge_count++;
+        return;
+    }
+    insert_dot(out, dot);
 }
 
 /* Row v has all its neighbours in the ring. */

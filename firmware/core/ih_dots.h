@@ -12,9 +12,14 @@
  *           single pixel has 0.474, the sharpest dot about 0.65.
  *        Its centre is the mean of the 5x5 pixels around it, weighted by (R - R of the peak / 4)^2
  *        where that is positive. Outside the frame R counts as 0.
+ *        A dot that is over-exposed is a plateau of full scale, and so nearly is R: the peak is
+ *        anywhere on it, and there may be several. Where R beside the peak is flat_min of it or
+ *        more, the centre is taken over 9x9 pixels, which hold the plateau's rim, and the ring is
+ *        laid around the centre, at most 2 px from the peak. This finds plateaus up to 7 px across.
+ *        Of two centres less than 3 px apart in u and v the first stays.
  *        The threshold falls with the place's own noise, so that dots in quiet places are not lost
  *        to texture elsewhere; tests 2 and 3 keep what is no dot out, so that it can be low.
- * Cost:  one pass; nine rows of grey and nine of R. About 25 integer operations per pixel, a few
+ * Cost:  one pass; nine rows of grey and 13 of R. About 25 integer operations per pixel, a few
  *        hundred for each of some thousand maxima.
  * Error: centres within 0.01 px of the float64 reference.
  * A full table drops and counts: dots_dropped.
@@ -35,8 +40,9 @@
 #if IH_DOTS_MAX < IH_SLOTS || IH_DOTS_MAX > 4096
 #error "IH_DOTS_MAX must be in 361..4096"
 #endif
-/* Radius of the ring; rows of R above and below a maximum that are needed. */
-#define IH_DOTS_REACH 4
+/* Radius of the ring and what it may be shifted by: rows of R above and below a maximum that are
+ * needed. */
+#define IH_DOTS_REACH 6
 #define IH_DOTS_ROWS (2 * IH_DOTS_REACH + 1)
 /* Side of the blocks of the over-exposure map. */
 #define IH_DOTS_BLOCK 8
@@ -48,6 +54,7 @@ struct ih_dots_params {
     int32_t noise_gain_q8; /* threshold in medians of |R| */
     int32_t ring_max_q8;   /* most of the peak's R on the ring */
     int32_t side_min_q8;   /* least of the peak's R beside it, mean of four */
+    int32_t flat_min_q8;   /* from there on it is a plateau */
     int32_t bright_grey;   /* block mean above this (0..255) = over-exposed */
 };
 

@@ -208,6 +208,31 @@ static void spots_of_all_widths_are_centred(void)
     }
 }
 
+/* Twice to sixteen times over-exposed, on dark and on bright ground: one dot, not several, and in the
+ * middle of its plateau. */
+static void over_exposed_spots_are_plateaus(void)
+{
+    static const struct {
+        uint8_t ground;
+        double sigma, height;
+    } spot[] = {{40, 1.2, 430},  {40, 1.2, 1700},  {40, 1.2, 3400},  {40, 1.6, 860}, {40, 2.0, 430},
+                {180, 1.2, 860}, {180, 1.2, 1700}, {180, 1.2, 3400}, {180, 1.6, 430}};
+    int i, k;
+
+    for (i = 0; i < IH_TEST_COUNT(spot); i++) {
+        for (k = 0; k < 25; k++) {
+            const double u = 100 + 0.2 * (k % 5 - 2), v = 90 + 0.2 * (double)(k / 5 - 2);
+
+            fill8(320, 240, spot[i].ground);
+            add_spot(u, v, spot[i].sigma, spot[i].height);
+            find();
+            IH_TEST_EQUAL(1, dots.dot_count, "dots", i * 25 + k);
+            IH_TEST_WITHIN(0.3, u, ih_test_from_q(dots.dot[0].u_px_q12, 12), "u", i * 25 + k);
+            IH_TEST_WITHIN(0.3, v, ih_test_from_q(dots.dot[0].v_px_q12, 12), "v", i * 25 + k);
+        }
+    }
+}
+
 /* R > threshold, strictly; in a frame without noise the floor alone counts. One pixel of 4 gives
  * R = 308 * 64 / 256 = 77. */
 static void the_threshold_itself_is_not_above(void)
@@ -483,6 +508,7 @@ int main(void)
     RUN_TEST(one_bright_pixel_is_hot);
     RUN_TEST(a_block_of_equal_pixels_is_centred_between_them);
     RUN_TEST(spots_of_all_widths_are_centred);
+    RUN_TEST(over_exposed_spots_are_plateaus);
     RUN_TEST(the_threshold_itself_is_not_above);
     RUN_TEST(edges_stripes_and_boards_are_no_dots);
     RUN_TEST(texture_elsewhere_hides_no_dot);

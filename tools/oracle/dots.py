@@ -10,7 +10,8 @@ from frames import Frame, spec
 
 RING = [(4, 0), (4, 2), (3, 3), (2, 4), (0, 4), (-2, 4), (-3, 3), (-4, 2),
         (-4, 0), (-4, -2), (-3, -3), (-2, -4), (0, -4), (2, -4), (3, -3), (4, -2)]
-EDGE = 4
+EDGE = 6
+TWIN = 3
 
 
 def maxima(response):
@@ -31,35 +32,52 @@ def beside(response, u, v):
             + response[v - 1 if v > 0 else v + 1, u] + response[v + 1 if v + 1 < height else v - 1, u])
 
 
-def centre(padded, u, v):
-    """Mean of the 5x5 pixels weighted by (R - a quarter of the peak)^2 where positive."""
-    part = padded[v + EDGE - 2:v + EDGE + 3, u + EDGE - 2:u + EDGE + 3]
-    weight = np.maximum(part - part[2, 2] // 4, 0)**2
-    dv, du = np.mgrid[-2:3, -2:3]
-    return u + (weight * du).sum() / weight.sum(), v + (weight * dv).sum() / weight.sum()
+def centre(padded, u, v, reach):
+    """Mean of the pixels around, weighted by (R - a quarter of the peak)^2 where positive."""
+    u, v = u + EDGE, v + EDGE
+    part = padded[v - reach:v + reach + 1, u - reach:u + reach + 1]
+    weight = np.maximum(part - padded[v, u] // 4, 0)**2
+    dv, du = np.mgrid[-reach:reach + 1, -reach:reach + 1]
+    return (u - EDGE + (weight * du).sum() / weight.sum(),
+            v - EDGE + (weight * dv).sum() / weight.sum())
 
 
-def find(frame, ring_max=128 / 256, side_min=138 / 256):
-    """dots (u, v, peak), maxima above the threshold that are edges or hot pixels."""
+def judge(response, padded, u, v, ring_max, side_min, flat_min):
+    """"edge", "hot" or the centre of a maximum."""
+    peak, sides = response[v, u], beside(response, u, v)
+    if sides < 4 * side_min * peak:
+        return "hot"
+    flat = sides >= 4 * flat_min * peak
+    place = centre(padded, u, v, 4 if flat else 2)
+    ring_u, ring_v = u, v
+    if flat:  # around the plateau's middle, at most 2 px from the peak
+        ring_u = int(np.clip(np.floor(place[0] + 0.5), u - 2, u + 2))
+        ring_v = int(np.clip(np.floor(place[1] + 0.5), v - 2, v + 2))
+    ring = max(padded[ring_v + EDGE + dv, ring_u + EDGE + du] for du, dv in RING)
+    return "edge" if ring > np.floor(peak * ring_max + 0.5) else place
+
+
+def find(frame, ring_max=128 / 256, side_min=138 / 256, flat_min=225 / 256):
+    """dots (u, v, peak), maxima above the threshold that are edges or twins, and hot pixels."""
     response = band.response(frame.grey_q4())
     level = noise.spread(noise.smoothed(noise.medians(response), True), response.shape, True)
     threshold = np.maximum(np.floor(frame.floor_q4 * band.UNIT / 16 + 0.5),
                            np.floor(level * frame.gain_q8 / 256 + 0.5))
     padded = np.pad(response, EDGE)
-    dots, edge, hot = [], 0, 0
+    dots, refused = [], {"edge": 0, "hot": 0}
     for v, u in maxima(response):
-        peak = response[v, u]
-        if peak <= threshold[v, u]:
+        if response[v, u] <= threshold[v, u]:
             continue
-        ring = max(padded[v + EDGE + dv, u + EDGE + du] for du, dv in RING)
-        if ring > np.floor(peak * ring_max + 0.5):
-            edge += 1
-        elif beside(response, u, v) < 4 * side_min * peak:
-            hot += 1
+        found = judge(response, padded, u, v, ring_max, side_min, flat_min)
+        if not isinstance(found, str) and any(
+                abs(found[0] - d[0]) < TWIN and abs(found[1] - d[1]) < TWIN for d in dots):
+            found = "edge"
+        if isinstance(found, str):
+            refused[found] += 1
         else:
-            dots.append((*centre(padded, u, v), peak))
+            dots.append((*found, response[v, u]))
     dots.sort(key=lambda d: (d[1], d[0]))
-    return dots, edge, hot
+    return dots, refused["edge"], refused["hot"]
 
 
 def scattered(random, count, size, apart, radius, height):
@@ -122,6 +140,8 @@ def frames():
     yield Frame("shapes", least, 255, 10, boxes=shapes())
     yield Frame("saturated", least, 255, 200, 3, (0, 0), 5,
                 scattered(random, 40, least, 16, (40, 70), (60, 400)))
+    yield Frame("burnt", (400, 320), 255, 40, 2, (0, 0), 9,
+                scattered(random, 90, (400, 320), 24, (30, 80), (200, 2500)))
     yield Frame("noise", least, 255, 100, 30, (0, 0), 6, gain_q8=800)
     yield Frame("loud", (640, 480), 255, 60, 1, (0, 0), 8,
                 scattered(random, 120, (640, 480), 20, (30, 70), (12, 80)), loud=15)
