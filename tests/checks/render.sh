@@ -369,6 +369,54 @@ result "errors of calibration change no frame" "$reason"
 /usr/bin/python3 wrong.py >out 2>&1 && reason= || reason=$(tail -n 1 out)
 result "knock, errors of calibration and sunlight are as large as asked for" "$reason"
 
+# --- laser off, exposure, a part of a sequence ---------------------------------------------------------
+cat >exposed.py <<'PYTHON'
+import json
+from pattern import read
+
+def peaks(folder, name, dots, fx):
+    """How much the dots' pixels stand out of what is around, grey levels."""
+    data = open("%s/%s" % (folder, name), "rb").read()[-320 * 240:]
+    def at(u, v):
+        return data[320 * min(max(v, 0), 239) + min(max(u, 0), 319)]
+    rise = [max(at(round(u) + i, round(v) + j) for i in (-1, 0, 1) for j in (-1, 0, 1)) -
+            (at(round(u) - 6, round(v)) + at(round(u) + 6, round(v))) / 2 for _, u, v, _ in dots]
+    return sum(rise) / len(rise)
+
+rig, on = read("anybody")
+_, alternate = read("alternate")
+frames = [json.loads(line) for line in open("alternate/frames.jsonl")]
+assert [f["laser"] for f in frames] == [True, False, True, False], "laser: %s" % frames
+assert [t["file"] for t in alternate] == ["000000.pgm", "000002.pgm"], "truth of frames without laser"
+assert alternate == on[::2], "another truth"
+fx = rig["camera_matrix"]["data"][0]
+assert peaks("alternate", "000002.pgm", on[2]["dots"], fx) > 10, "dots do not stand out"
+assert peaks("alternate", "000001.pgm", on[1]["dots"], fx) < 5, "dots without a laser"
+half, once = (peaks(f, "000002.pgm", on[2]["dots"], fx) for f in ("half", "anybody"))
+assert 0.4 < half / once < 0.65, "half the exposure: %g of %g" % (half, once)
+assert len(read("half")[1][2]["dots"]) <= len(on[2]["dots"]), "more dots with less light"
+PYTHON
+# shellcheck disable=SC2086 # a list of options
+{
+    draw "laser alternate" alternate $few --laser alternate
+    draw "half the exposure" half $few --exposure 0.5
+    cp -r anybody part
+    draw "two frames of four" part $few --first-frame 1+2
+    refuse "no such first frame" 2 "--first-frame 4.*only 4" $few --first-frame 4 a
+    refuse "first frame and nothing" 2 "--first-frame" --first-frame 1+ a
+    refuse "exposure 0" 2 "--exposure" --exposure 0 a
+    refuse "laser off" 2 "--laser" --laser off a
+}
+/usr/bin/python3 exposed.py >out 2>&1 && reason= || reason=$(tail -n 1 out)
+result "the laser is off where it is told, exposure scales the light" "$reason"
+reason=
+[ "$(ls part)" = "$(printf '%s\n' 000001.pgm 000002.pgm frames.jsonl rig.json truth.jsonl)" ] || reason=$(ls part)
+for frame in 000001 000002; do
+    cmp -s part/$frame.pgm anybody/$frame.pgm || reason="$frame differs"
+done
+[ "$(cat part/truth.jsonl)" = "$(sed -n 2,3p anybody/truth.jsonl)" ] || reason="truth differs"
+result "a part of a sequence is the same as in the whole" "$reason"
+
 # --- refusals ------------------------------------------------------------------------------------
 refuse "no directory" 2 "OUT_DIR"
 refuse "two directories" 2 "OUT_DIR" a b

@@ -68,28 +68,32 @@ static bool render_frame(struct studio *studio, struct rd_output *output, int fr
     if (stage->still_changed || stage->light.shadows)
         rd_ambient_still(studio->ambient, &stage->scene, &stage->light);
     rd_ambient_frame(studio->ambient, &stage->scene, &stage->light, studio->grey);
-    rd_dots_cast(&studio->laser, &studio->rig, &stage->scene, studio->grey, &studio->visible);
+    struct rd_frame_note note = {stage->time_us, !stage->options.alternate || frame % 2 == 0, stage->source};
+    if (note.laser) {
+        rd_dots_cast(&studio->laser, &studio->rig, &stage->scene, studio->grey, &studio->visible);
+        rd_output_truth(output, frame, &stage->truth, &studio->visible);
+    }
     rd_sensor_expose(&studio->sensor, studio->grey, frame, studio->samples);
-    rd_output_truth(output, frame, &stage->truth, &studio->visible);
-    return rd_output_frame(output, frame, stage->time_us, stage->source, &studio->rig, studio->sensor.max_value,
-                           studio->samples);
+    return rd_output_frame(output, frame, &note, &studio->rig, studio->sensor.max_value, studio->samples);
 }
 
 static bool render_all(struct studio *studio, const struct rd_options *options)
 {
     struct rd_output output;
     bool talk = isatty(STDERR_FILENO) == 1;
-    int frame_count = studio->stage.frame_count;
+    int first = options->first_frame, end = studio->stage.frame_count;
+    if (options->shown_count > 0 && options->shown_count < end - first)
+        end = first + options->shown_count;
     bool good = rd_output_open(&output, options->out_dir);
-    for (int frame = 0; good && frame < frame_count; frame++) {
+    for (int frame = first; good && frame < end; frame++) {
         if (talk)
-            fprintf(stderr, "\rrender: %s %d/%d", options->out_dir, frame + 1, frame_count);
+            fprintf(stderr, "\rrender: %s %d/%d", options->out_dir, frame + 1, end);
         good = render_frame(studio, &output, frame);
     }
     if (talk)
         fputc('\n', stderr);
     if (good)
-        good = rd_output_finish(&output, &studio->told_rig, frame_count);
+        good = rd_output_finish(&output, &studio->told_rig, first, end);
     else
         rd_output_abandon(&output);
     return good;
@@ -106,7 +110,14 @@ int main(int argc, char **argv)
         fputs("render: out of memory\n", stderr);
         return 1;
     }
-    bool good = rd_stage_make(&studio->stage, &options, &studio->rig) && render_all(studio, &options);
+    int status = rd_stage_make(&studio->stage, &options, &studio->rig) ? 0 : 1;
+    if (status == 0 && options.first_frame >= studio->stage.frame_count) {
+        fprintf(stderr, "render: --first-frame %d: there are only %d frames\n", options.first_frame,
+                studio->stage.frame_count);
+        status = 2;
+    }
+    if (status == 0 && !render_all(studio, &options))
+        status = 1;
     studio_free(studio);
-    return good ? 0 : 1;
+    return status;
 }

@@ -32,7 +32,7 @@ void rd_laser_make(struct rd_laser *laser, const struct rd_options *options, con
 {
     struct rd_rng rng = rd_rng_start(options->seed, RD_STREAM_LASER);
     double zoom = options->width / 752.0;
-    laser->power_grey = rd_rng_uniform(&rng, 105.0, 180.0);
+    laser->power_grey = options->exposure * rd_rng_uniform(&rng, 105.0, 180.0);
     laser->optics_px = rd_rng_uniform(&rng, 0.80, 0.98) * fmax(0.9, sqrt(zoom));
     laser->field_blur = rd_rng_uniform(&rng, 0.05, 0.35);
     laser->beam_mm = rd_rng_uniform(&rng, 0.45, 0.75);

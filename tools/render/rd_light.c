@@ -48,6 +48,10 @@ void rd_light_make(struct rd_light *light, const struct rd_options *options)
     light->shadows = false;
     if (kind == RD_AMBIENT_SUNLIGHT)
         make_sunlight(light, options->seed);
+    light->sky_grey *= options->exposure;
+    light->key_grey *= options->exposure;
+    light->lamp_grey *= options->exposure;
+    light->nothing_grey *= options->exposure;
 }
 
 /* Share of the key light that reaches a point between the bars. */

@@ -25,6 +25,9 @@ enum option_id {
     OPT_PERSON,
     OPT_ACT,
     OPT_KNOCK,
+    OPT_LASER,
+    OPT_EXPOSURE,
+    OPT_FIRST_FRAME,
     OPT_CALIBRATION_NOISE,
     OPT_HELP
 };
@@ -55,6 +58,10 @@ static const char help_text[] =
     "  --knock DEG        0 (default) to 0.5: the projector is turned by this against what rig.json says\n"
     "  --calibration-noise X  0 (default) to 10: rig.json's errors, in typical ones: 0.1 % of fx, 1 px of the centre,\n"
     "                     0.01 degrees of each ray, 0.1 mm of the projector's place\n"
+    "  --laser KIND       on (default), alternate: every second frame (1, 3, ...) without it\n"
+    "  --exposure X       0.05 to 20 (default 1): all light of the sensor's frames by this factor\n"
+    "  --first-frame N[+COUNT]  only frame N and what follows, or COUNT frames from N on; they are the same as in the\n"
+    "                     whole sequence\n"
     "  --bits N           8 (default), 10, 12 or 16 bits per sample\n"
     "  --help             this text\n"
     "\n"
@@ -121,6 +128,24 @@ static bool read_size(const char *text, struct rd_options *options)
     return true;
 }
 
+static bool read_first_frame(const char *text, struct rd_options *options)
+{
+    int first, count = 0, length = 0;
+    bool read = sscanf(text, "%4d%n", &first, &length) == 1;
+    if (read && text[length] == '+') {
+        const char *rest = text + length + 1;
+        read = sscanf(rest, "%4d%n", &count, &length) == 1 && rest[0] >= '0' && rest[0] <= '9' && count > 0 &&
+               rest[length] == '\0';
+    } else {
+        read = read && text[length] == '\0';
+    }
+    if (!read || text[0] < '0' || text[0] > '9')
+        return complain("first-frame", text, "N or N+COUNT");
+    options->first_frame = first;
+    options->shown_count = count;
+    return true;
+}
+
 static bool take_word(int id, const char *text, struct rd_options *options)
 {
     static const char *const scenes[] = {"person",  "turning", "empty", "table", "room",
@@ -128,6 +153,7 @@ static bool take_word(int id, const char *text, struct rd_options *options)
     static const char *const persons[] = {"varied",    "child", "hat",     "mask",       "beard",
                                           "long-hair", "bald",  "glasses", "headphones", NULL};
     static const char *const acts[] = {"varied", "phone", "face", "back", "none", NULL};
+    static const char *const lasers[] = {"on", "alternate", NULL};
     static const char *const rigs[] = {"paper", "wide", NULL};
     static const char *const backgrounds[] = {"varied", "near", "far", "none", NULL};
     static const char *const lenses[] = {"normal", "none", "strong", NULL};
@@ -144,6 +170,9 @@ static bool take_word(int id, const char *text, struct rd_options *options)
     } else if (id == OPT_ACT) {
         known = read_word("act", text, acts, "varied, phone, face, back or none", &index);
         options->act = (enum rd_act)index;
+    } else if (id == OPT_LASER) {
+        known = read_word("laser", text, lasers, "on or alternate", &index);
+        options->alternate = index == 1;
     } else if (id == OPT_RIG) {
         known = read_word("rig", text, rigs, "paper or wide", &index);
         options->rig = (enum rd_rig_kind)index;
@@ -179,6 +208,10 @@ static bool take_option(int id, const char *text, struct rd_options *options)
         return read_decimal("knock", text, 0.0, 0.5, "a number from 0 to 0.5", &options->knock_deg);
     case OPT_CALIBRATION_NOISE:
         return read_decimal("calibration-noise", text, 0.0, 10.0, "a number from 0 to 10", &options->calibration_noise);
+    case OPT_EXPOSURE:
+        return read_decimal("exposure", text, 0.05, 20.0, "a number from 0.05 to 20", &options->exposure);
+    case OPT_FIRST_FRAME:
+        return read_first_frame(text, options);
     case OPT_RANGE:
         options->range_dir = text;
         return text[0] != '\0' || complain("range", text, "a directory");
@@ -205,12 +238,15 @@ enum rd_options_result rd_options_parse(int argc, char **argv, struct rd_options
         {"act", required_argument, NULL, OPT_ACT},
         {"knock", required_argument, NULL, OPT_KNOCK},
         {"calibration-noise", required_argument, NULL, OPT_CALIBRATION_NOISE},
+        {"laser", required_argument, NULL, OPT_LASER},
+        {"exposure", required_argument, NULL, OPT_EXPOSURE},
+        {"first-frame", required_argument, NULL, OPT_FIRST_FRAME},
         {"help", no_argument, NULL, OPT_HELP},
         {NULL, 0, NULL, 0},
     };
     int id;
     bool scene_given = false;
-    *options = (struct rd_options){.sequence = 1, .seed = 1, .width = 752, .height = 582, .bits = 8};
+    *options = (struct rd_options){.sequence = 1, .exposure = 1.0, .seed = 1, .width = 752, .height = 582, .bits = 8};
     while ((id = getopt_long(argc, argv, "", long_options, NULL)) != -1) {
         if (id == OPT_HELP) {
             fputs(help_text, stdout);

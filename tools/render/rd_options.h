@@ -2,6 +2,7 @@
 #ifndef RD_OPTIONS_H
 #define RD_OPTIONS_H
 
+#include <stdbool.h>
 #include <stdint.h>
 
 enum rd_scene_kind {
@@ -45,12 +46,16 @@ struct rd_options {
     enum rd_background background;
     enum rd_distortion distortion;
     enum rd_ambient_kind ambient;
+    bool alternate;  /* every second frame without the laser */
+    double exposure; /* all light, relative */
     uint64_t seed;
     int frame_count;          /* for each depth image, where there are any */
     double knock_deg;         /* the projector's turn against what rig.json says */
     double calibration_noise; /* rig.json's errors, in typical errors of a calibration */
-    int width, height;        /* pixels */
-    int bits;                 /* per sample of the image files */
+    int first_frame;
+    int shown_count;   /* frames from the first on; 0: all that follow */
+    int width, height; /* pixels */
+    int bits;          /* per sample of the image files */
 };
 
 /* Fills `options`; prints the help on standard output, or what is wrong on standard error. */

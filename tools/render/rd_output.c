@@ -2,6 +2,7 @@
 
 #include "rd_output.h"
 
+#include <dirent.h>
 #include <errno.h>
 #include <string.h>
 #include <sys/stat.h>
@@ -69,20 +70,17 @@ static bool make_directories(const char *dir)
     return true;
 }
 
-static bool remove_in(const struct rd_output *output, const char *name, bool *was_there)
+/* True: it is not there (any more). */
+static bool remove_in(const struct rd_output *output, const char *name)
 {
     char path[RD_PATH_MAX];
-    if (!path_in(output, name, path))
-        return false;
-    *was_there = unlink(path) == 0;
-    return *was_there || errno == ENOENT || complain(path);
+    return path_in(output, name, path) && (unlink(path) == 0 || errno == ENOENT || complain(path));
 }
 
 bool rd_output_open(struct rd_output *output, const char *dir)
 {
-    bool was_there;
     *output = (struct rd_output){.dir = dir};
-    if (!make_directories(dir) || !remove_in(output, "rig.json", &was_there))
+    if (!make_directories(dir) || !remove_in(output, "rig.json"))
         return false;
     output->frames = open_in(output, "frames.jsonl");
     output->truth = output->frames != NULL ? open_in(output, "truth.jsonl") : NULL;
@@ -111,7 +109,7 @@ static void write_string(FILE *file, const char *text)
     putc('"', file);
 }
 
-bool rd_output_frame(struct rd_output *output, int frame, int64_t time_us, const char *source, const struct rd_rig *rig,
+bool rd_output_frame(struct rd_output *output, int frame, const struct rd_frame_note *note, const struct rd_rig *rig,
                      int max_value, const uint16_t *samples)
 {
     char name[32];
@@ -121,10 +119,11 @@ bool rd_output_frame(struct rd_output *output, int frame, int64_t time_us, const
         return false;
     fprintf(file, "P5\n%d %d\n%d\n", rig->width, rig->height, max_value);
     write_samples(file, rig->width * rig->height, max_value, samples);
-    fprintf(output->frames, "{\"file\":\"%s\",\"time_us\":%lld,\"laser\":true", name, (long long)time_us);
-    if (source != NULL) {
+    fprintf(output->frames, "{\"file\":\"%s\",\"time_us\":%lld,\"laser\":%s", name, (long long)note->time_us,
+            note->laser ? "true" : "false");
+    if (note->source != NULL) {
         fputs(",\"source\":", output->frames);
-        write_string(output->frames, source);
+        write_string(output->frames, note->source);
     }
     fputs("}\n", output->frames);
     return close_in(output, name, file);
@@ -199,25 +198,34 @@ static bool write_rig(const struct rd_output *output, const struct rd_rig *rig)
     return close_in(output, "rig.json", file);
 }
 
-static bool remove_later_frames(const struct rd_output *output, int frame_count)
+/* A frame's name, of another frame than first .. end - 1. */
+static bool is_other_frame(const char *name, int first, int end)
 {
-    bool was_there = true;
-    for (int frame = frame_count; was_there; frame++) {
-        char name[32];
-        frame_name(frame, name);
-        if (!remove_in(output, name, &was_there))
-            return false;
-    }
-    return true;
+    int frame, length = 0;
+    bool is_frame = strspn(name, "0123456789") >= 6 && sscanf(name, "%9d.pgm%n", &frame, &length) == 1 && length > 0;
+    return is_frame && name[length] == '\0' && (frame < first || frame >= end);
 }
 
-bool rd_output_finish(struct rd_output *output, const struct rd_rig *rig, int frame_count)
+static bool remove_other_frames(const struct rd_output *output, int first, int end)
+{
+    bool good = true;
+    DIR *stream = opendir(output->dir);
+    const struct dirent *entry;
+    if (stream == NULL)
+        return complain(output->dir);
+    while (good && (entry = readdir(stream)) != NULL)
+        good = !is_other_frame(entry->d_name, first, end) || remove_in(output, entry->d_name);
+    closedir(stream);
+    return good;
+}
+
+bool rd_output_finish(struct rd_output *output, const struct rd_rig *rig, int first, int end)
 {
     bool frames_ok = close_in(output, "frames.jsonl", output->frames);
     bool truth_ok = close_in(output, "truth.jsonl", output->truth);
     output->frames = NULL;
     output->truth = NULL;
-    return frames_ok && truth_ok && remove_later_frames(output, frame_count) && write_rig(output, rig);
+    return frames_ok && truth_ok && remove_other_frames(output, first, end) && write_rig(output, rig);
 }
 
 void rd_output_abandon(struct rd_output *output)

@@ -38,13 +38,19 @@ struct rd_output {
 
 /* Makes the directory (and those above it) if needed. */
 bool rd_output_open(struct rd_output *output, const char *dir);
-/* source: what the frame was made of, or NULL. */
-bool rd_output_frame(struct rd_output *output, int frame, int64_t time_us, const char *source, const struct rd_rig *rig,
+/* What the list says of a frame. */
+struct rd_frame_note {
+    int64_t time_us;
+    bool laser;
+    const char *source; /* what it was made of, or NULL */
+};
+
+bool rd_output_frame(struct rd_output *output, int frame, const struct rd_frame_note *note, const struct rd_rig *rig,
                      int max_value, const uint16_t *samples);
 void rd_output_truth(struct rd_output *output, int frame, const struct rd_truth *truth,
                      const struct rd_dot_list *visible);
-/* Removes frames of an earlier, longer run, closes the lists and writes rig.json. */
-bool rd_output_finish(struct rd_output *output, const struct rd_rig *rig, int frame_count);
+/* Removes an earlier run's frames other than first .. end - 1, closes the lists and writes rig.json. */
+bool rd_output_finish(struct rd_output *output, const struct rd_rig *rig, int first, int end);
 /* Gives up: closes what is open. */
 void rd_output_abandon(struct rd_output *output);
 

@@ -107,7 +107,7 @@ bool rd_stage_frame(struct rd_stage *stage, int frame)
     if (stage->options.range_dir != NULL)
         return show_range(stage, frame);
     stage->time_us = (int64_t)frame * FRAME_US;
-    stage->still_changed = frame == 0;
+    stage->still_changed = frame == stage->options.first_frame;
     if (has_arrangements(&stage->options)) {
         show_arrangement(stage, frame);
     } else {
