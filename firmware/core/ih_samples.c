@@ -19,8 +19,7 @@ void ih_samples_params_default(struct ih_samples_params *params)
     };
 }
 
-/* The 8th percentile of the seen depths. */
-static int32_t percentile_mm_q8(const struct ih_points *points)
+int32_t ih_samples_near_mm_q8(const struct ih_points *points)
 {
     int32_t depth[IH_SLOTS];
     int32_t count = 0;
@@ -151,7 +150,7 @@ void ih_samples_select(const struct ih_points *points, const struct ih_dots *dot
     out->isolated_count = 0;
     out->outside_count = 0;
     out->nearest_mm_q8 = INT32_MAX;
-    out->clip_mm_q8 = percentile_mm_q8(points) + (params->clip_behind_mm << 8);
+    out->clip_mm_q8 = ih_samples_near_mm_q8(points) + (params->clip_behind_mm << 8);
     if (rig->calibration.kind == IH_RIG_DOTS) {
         out->clip_mm_q8 = ih_max_s32(out->clip_mm_q8, params->clip_least_mm << 8);
     }

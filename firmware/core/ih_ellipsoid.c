@@ -1,0 +1,71 @@
+#include "ih_ellipsoid.h"
+
+#include "ih_fix.h"
+
+#define REACH_Q14 (IH_ELLIPSOID_REACH << 14)
+
+struct ih_ellipsoid ih_ellipsoid_mean(const int32_t centre_mm_q8[3])
+{
+    return (struct ih_ellipsoid){
+        .centre_mm_q8 = {centre_mm_q8[0], centre_mm_q8[1], centre_mm_q8[2]},
+        .semi_mm_q8 = {78 << 8, 113 << 8, 98 << 8},
+    };
+}
+
+static bool in_reach(int64_t place_q14)
+{
+    return ih_abs_s64(place_q14) <= REACH_Q14;
+}
+
+bool ih_ellipsoid_cross(const struct ih_ellipsoid *ellipsoid, const int32_t origin_mm_q8[3],
+                        const struct ih_ray *ray, struct ih_crossing *out)
+{
+    const int32_t slope_q20[2] = {ray->slope_x_q20, ray->slope_y_q20};
+    int64_t depth_q8 = (int64_t)ellipsoid->centre_mm_q8[2] - origin_mm_q8[2];
+    int32_t deep_q8 = ellipsoid->semi_mm_q8[2];
+    int64_t g_q14[2], e_q14[2];
+    for (int axis = 0; axis < 2; axis++) {
+        int64_t offset_q8 = origin_mm_q8[axis] + ih_mul_shift(depth_q8, slope_q20[axis], 20) -
+                            ellipsoid->centre_mm_q8[axis];
+        e_q14[axis] = ih_div_round(offset_q8 * (1 << 14), ellipsoid->semi_mm_q8[axis]);
+        if (!in_reach(e_q14[axis])) {
+            return false;
+        }
+        g_q14[axis] = ih_div_round(ih_shift_round((int64_t)slope_q20[axis] * deep_q8, 6),
+                                   ellipsoid->semi_mm_q8[axis]);
+    }
+    int64_t gg_q28 = ((int64_t)1 << 28) + g_q14[0] * g_q14[0] + g_q14[1] * g_q14[1];
+    int64_t eg_q28 = e_q14[0] * g_q14[0] + e_q14[1] * g_q14[1];
+    int64_t ee_q28 = e_q14[0] * e_q14[0] + e_q14[1] * e_q14[1];
+    int64_t tau_q14 = -ih_div_round(eg_q28 * (1 << 14), gg_q28);
+    int64_t radius2_q28 = ee_q28 + ih_mul_shift(eg_q28, tau_q14, 14);
+    radius2_q28 = radius2_q28 < 0 ? 0 : radius2_q28;
+    for (int axis = 0; axis < 2; axis++) {
+        out->at_q14[axis] = (int32_t)e_q14[axis];
+        out->nearest_q14[axis] = (int32_t)(e_q14[axis] + ih_mul_shift(g_q14[axis], tau_q14, 14));
+    }
+    out->nearest_q14[2] = (int32_t)tau_q14;
+    out->radius2_q14 = (int32_t)ih_shift_round(radius2_q28, 14);
+    int64_t enter_q14 = tau_q14;
+    int64_t inside_q28 = ((int64_t)1 << 28) - radius2_q28;
+    if (inside_q28 > 0) {
+        enter_q14 -= ih_isqrt_u64((uint64_t)ih_div_round(inside_q28 * (1 << 28), gg_q28));
+    }
+    out->entry_mm_q8 =
+        ellipsoid->centre_mm_q8[2] + (int32_t)ih_mul_shift(enter_q14, deep_q8, 14);
+    return true;
+}
+
+bool ih_ellipsoid_place(const struct ih_ellipsoid *ellipsoid, const int32_t point_mm_q8[3],
+                        int32_t place_q14[3])
+{
+    for (int axis = 0; axis < 3; axis++) {
+        int64_t offset_q8 = (int64_t)point_mm_q8[axis] - ellipsoid->centre_mm_q8[axis];
+        int64_t place = ih_div_round(offset_q8 * (1 << 14), ellipsoid->semi_mm_q8[axis]);
+        if (!in_reach(place)) {
+            return false;
+        }
+        place_q14[axis] = (int32_t)place;
+    }
+    return true;
+}

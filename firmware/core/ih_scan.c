@@ -1,0 +1,153 @@
+#include "ih_scan.h"
+
+#include <stddef.h>
+
+#include "ih_fix.h"
+
+#define ONE_Q12 4096
+#define ON_SURFACE_MM_Q8 (28 << 8)
+#define BEHIND_FULL_MM_Q8 (60 << 8)
+#define BEHIND_CENTRE_MM_Q8 (60 << 8)
+#define VALUE_NEARER_Q12 (-614)   /* -0.15 */
+#define VALUE_EMPTY_Q12 (-2458)   /* -0.6 */
+#define VALUE_UNKNOWN_Q12 (-614)  /* -0.15 */
+#define RING_EMPTY_Q12 2867       /* 0.7 */
+#define RING_NEAR_Q12 (-2458)     /* -0.6 */
+#define RING_INNER2_Q14 27689     /* 1.3^2 */
+#define RING_OUTER2_Q14 59146     /* 1.9^2 */
+#define RING_SHARE_PERCENT 60
+#define RAYS_LEAST 8
+
+void ih_scan_params_default(struct ih_scan_params *params)
+{
+    *params = (struct ih_scan_params){.deep_mm = 98, .spacing_mm = 80};
+}
+
+static int32_t inside_value_q12(const struct ih_ray *ray, const struct ih_crossing *crossing)
+{
+    if (ray->state != IH_RAY_SEEN) {
+        return ray->state == IH_RAY_EMPTY ? VALUE_EMPTY_Q12 : VALUE_UNKNOWN_Q12;
+    }
+    int32_t behind_q8 = ray->point_mm_q8[2] - crossing->entry_mm_q8;
+    if (ih_abs_s32(behind_q8) < ON_SURFACE_MM_Q8) {
+        return ONE_Q12;
+    }
+    if (behind_q8 < 0) {
+        return VALUE_NEARER_Q12;
+    }
+    return -ih_min_s32(behind_q8, BEHIND_FULL_MM_Q8) * ONE_Q12 / BEHIND_FULL_MM_Q8;
+}
+
+static int32_t ring_value_q12(const struct ih_ray *ray, int32_t centre_depth_q8)
+{
+    if (ray->state != IH_RAY_SEEN) {
+        return ray->state == IH_RAY_EMPTY ? RING_EMPTY_Q12 : 0;
+    }
+    return ray->point_mm_q8[2] > centre_depth_q8 + BEHIND_CENTRE_MM_Q8 ? ONE_Q12 : RING_NEAR_Q12;
+}
+
+/* Beside or above, not below (dy > |dx|, in mm). */
+static bool is_in_ring(const struct ih_crossing *crossing, const struct ih_ellipsoid *head)
+{
+    int64_t dx = (int64_t)crossing->nearest_q14[0] * head->semi_mm_q8[0];
+    int64_t dy = (int64_t)crossing->nearest_q14[1] * head->semi_mm_q8[1];
+    return crossing->radius2_q14 > RING_INNER2_Q14 && crossing->radius2_q14 < RING_OUTER2_Q14 &&
+           dy <= ih_abs_s64(dx);
+}
+
+static int32_t score_q12(const struct ih_space *space, const struct ih_ellipsoid *head)
+{
+    int32_t inside_sum = 0;
+    int32_t inside_count = 0;
+    int32_t ring_sum = 0;
+    int32_t ring_count = 0;
+    for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
+        const struct ih_ray *ray = &space->ray[slot];
+        struct ih_crossing crossing;
+        if (!ih_ellipsoid_cross(head, space->origin_mm_q8, ray, &crossing)) {
+            continue;
+        }
+        if (crossing.radius2_q14 < 1 << 14) {
+            inside_sum += inside_value_q12(ray, &crossing);
+            inside_count++;
+        } else if (is_in_ring(&crossing, head)) {
+            ring_sum += ring_value_q12(ray, head->centre_mm_q8[2]);
+            ring_count++;
+        }
+    }
+    return inside_sum / ih_max_s32(inside_count, RAYS_LEAST) +
+           ring_sum * RING_SHARE_PERCENT / (100 * ih_max_s32(ring_count, RAYS_LEAST));
+}
+
+/* The place `deep` behind a point, along its ray. */
+static void centre_behind(const struct ih_ray *ray, int32_t deep_mm, int32_t centre_mm_q8[3])
+{
+    int64_t x = ray->slope_x_q20;
+    int64_t y = ray->slope_y_q20;
+    int64_t length_q20 = ih_isqrt_u64((uint64_t)(x * x + y * y) + ((uint64_t)1 << 40));
+    int64_t deep_q8 = (int64_t)deep_mm << 8;
+    int64_t step_q8 = ih_div_round(deep_q8 * (1 << 20), length_q20);
+    centre_mm_q8[0] = ray->point_mm_q8[0] + (int32_t)ih_mul_shift(step_q8, x, 20);
+    centre_mm_q8[1] = ray->point_mm_q8[1] + (int32_t)ih_mul_shift(step_q8, y, 20);
+    centre_mm_q8[2] = ray->point_mm_q8[2] + (int32_t)step_q8;
+}
+
+static bool is_near(const int32_t a_mm_q8[3], const int32_t b_mm_q8[3], int32_t distance_mm)
+{
+    int64_t sum = 0;
+    for (int axis = 0; axis < 3; axis++) {
+        int64_t d = (int64_t)a_mm_q8[axis] - b_mm_q8[axis];
+        sum += d * d;
+    }
+    int64_t limit = (int64_t)distance_mm << 8;
+    return sum <= limit * limit;
+}
+
+static bool is_taken(const struct ih_scan *out, const struct ih_scan_place *place,
+                     int32_t spacing_mm)
+{
+    for (int32_t i = 0; i < out->place_count; i++) {
+        if (is_near(out->place[i].centre_mm_q8, place->centre_mm_q8, spacing_mm)) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* The best place that is not near one already taken; NULL when there is none. */
+static const struct ih_scan_place *best_left(const struct ih_scan_place *tried, int32_t count,
+                                             const struct ih_scan *out, int32_t spacing_mm)
+{
+    const struct ih_scan_place *best = NULL;
+    for (int32_t i = 0; i < count; i++) {
+        if ((best == NULL || tried[i].score_q12 > best->score_q12) &&
+            !is_taken(out, &tried[i], spacing_mm)) {
+            best = &tried[i];
+        }
+    }
+    return best;
+}
+
+void ih_scan_find(const struct ih_space *space, const struct ih_scan_params *params,
+                  struct ih_scan_scratch *scratch, struct ih_scan *out)
+{
+    int32_t count = 0;
+    for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
+        if (space->ray[slot].state != IH_RAY_SEEN) {
+            continue;
+        }
+        struct ih_scan_place *place = &scratch->tried[count++];
+        centre_behind(&space->ray[slot], params->deep_mm, place->centre_mm_q8);
+        struct ih_ellipsoid head = ih_ellipsoid_mean(place->centre_mm_q8);
+        place->score_q12 = score_q12(space, &head);
+    }
+    out->place_count = 0;
+    while (out->place_count < IH_SCAN_MAX) {
+        const struct ih_scan_place *best =
+            best_left(scratch->tried, count, out, params->spacing_mm);
+        if (best == NULL) {
+            break;
+        }
+        out->place[out->place_count++] = *best;
+    }
+}
