@@ -1,10 +1,10 @@
 #include "sim_record.h"
 
-#include "sim_score.h"
 #include "sim_write.h"
 
 #define PIXEL_DECIMALS 2
 #define MM_DECIMALS 1
+#define PROBABILITY_DECIMALS 3
 
 static void write_pair_px(struct sim_write *write, const char *key, int32_t first_px_q12,
                           int32_t second_px_q12)
@@ -16,7 +16,7 @@ static void write_pair_px(struct sim_write *write, const char *key, int32_t firs
     sim_write_close(write, ']');
 }
 
-static void write_hypothesis(struct sim_write *write, const struct ih_hypothesis *hypothesis)
+static void write_hypothesis(struct sim_write *write, const struct ih_result_entry *hypothesis)
 {
     sim_write_open(write, '{');
     write_pair_px(write, "pixel", hypothesis->u_px_q12, hypothesis->v_px_q12);
@@ -33,29 +33,42 @@ static void write_hypothesis(struct sim_write *write, const struct ih_hypothesis
     sim_write_close(write, ']');
     sim_write_key(write, "rejected");
     sim_write_string_or_null(write, ih_reject_text(hypothesis->rejected));
+    if (hypothesis->has_probability) {
+        sim_write_key(write, "score");
+        sim_write_decimal(write,
+                          sim_text_fixed(hypothesis->probability_q16, 16, PROBABILITY_DECIMALS));
+    }
+    if (hypothesis->track_id != 0) {
+        sim_write_int_field(write, "track", hypothesis->track_id);
+        sim_write_key(write, "sigma_mm");
+        sim_write_decimal(write, sim_text_fixed(hypothesis->sigma_mm_q8, 8, MM_DECIMALS));
+    }
+    if (hypothesis->is_predicted) {
+        sim_write_key(write, "predicted");
+        sim_write_bool(write, true);
+    }
     sim_write_close(write, '}');
 }
 
-static void write_heads(struct sim_write *write, const struct ih_heads *heads, bool paper)
+static void write_result(struct sim_write *write, const struct ih_result *result)
 {
     sim_write_key(write, "hypotheses");
     sim_write_open(write, '[');
-    for (int32_t i = 0; i < heads->hypothesis_count; i++) {
-        write_hypothesis(write, &heads->hypothesis[i]);
+    for (int32_t i = 0; i < result->entry_count; i++) {
+        write_hypothesis(write, &result->entry[i]);
     }
     sim_write_close(write, ']');
     sim_write_key(write, "heads");
     sim_write_open(write, '[');
-    for (int32_t i = 0; i < heads->head_count; i++) {
-        sim_write_int(write, heads->head[i]);
+    for (int32_t i = 0; i < result->head_count; i++) {
+        sim_write_int(write, result->head[i]);
     }
     sim_write_close(write, ']');
     sim_write_key(write, "head");
-    int32_t selected = sim_score_selected(heads, paper);
-    if (selected == IH_NONE) {
+    if (result->selected == IH_NONE) {
         sim_write_null(write);
     } else {
-        sim_write_int(write, selected);
+        sim_write_int(write, result->selected);
     }
 }
 
@@ -69,6 +82,8 @@ static void write_dropped(struct sim_write *write, const struct isohead *head)
         {"candidates", head->labels.candidates_dropped},
         {"minima", head->hypotheses.minima_dropped},
         {"contours", head->hypotheses.contours_dropped},
+        {"places", head->windows.places_dropped},
+        {"findings", head->findings.dropped_count},
     };
     bool any = false;
     for (size_t i = 0; i < sizeof dropped / sizeof dropped[0]; i++) {
@@ -115,7 +130,7 @@ void sim_record_frame(const struct sim_record *record, const struct hal_frame *f
     sim_write_int_field(&write, "time_us", frame->time_us);
     sim_write_int_field(&write, "dots", head->dots.dot_count);
     sim_write_int_field(&write, "labelled", head->labels.labelled_count);
-    write_heads(&write, &head->heads, record->paper);
+    write_result(&write, &head->result);
     if (head->rig.calibration.kind == IH_RIG_RANGE) {
         sim_write_int_field(&write, "points", head->points.seen_count);
     }

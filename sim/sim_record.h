@@ -17,7 +17,6 @@
 struct sim_record {
     FILE *file;
     const char *dir; /* NULL: the run has one directory only */
-    bool paper;      /* of several heads none is selected */
 };
 
 void sim_record_frame(const struct sim_record *record, const struct hal_frame *frame,

@@ -50,6 +50,7 @@ static bool start_core(struct run *run, const char *dir)
     bool good = path != NULL && sim_rig_load(path, &calibration, &error);
     if (good) {
         enum ih_err err = isohead_init(run->head, &calibration, &bad_slot);
+        run->head->params.is_paper = run->options->paper;
         good = err == IH_OK;
         if (!good) {
             sim_rig_explain(&calibration, err, bad_slot, &error);
@@ -110,7 +111,7 @@ static void put_frame(struct visit *visit, const struct hal_frame *frame)
     if (visit->truth.present && truth == NULL) {
         sim_report_error(&visit->run->report, visit->truth.path, "no line for %s", frame->name);
     }
-    struct sim_verdict verdict = sim_score_judge(&head->heads, options->paper, truth);
+    struct sim_verdict verdict = sim_score_judge(&head->result, truth);
     sim_score_add(visit->score, &verdict);
     if (truth != NULL && truth->has_dots) {
         sim_score_add_dots(visit->score, head, truth);
@@ -118,7 +119,7 @@ static void put_frame(struct visit *visit, const struct hal_frame *frame)
     if (options->json) {
         sim_record_frame(&visit->record, frame, head);
     } else {
-        sim_table_frame(stdout, frame, head, options->paper, &verdict);
+        sim_table_frame(stdout, frame, head, &verdict);
     }
 }
 
@@ -137,7 +138,7 @@ static void process_frame(struct visit *visit, const struct hal_frame *frame)
     if (!frame->laser) {
         return;
     }
-    enum ih_err err = isohead_frame(head, &view);
+    enum ih_err err = isohead_frame(head, &view, frame->time_us);
     if (err != IH_OK) {
         explain_frame(head, frame, err, &error);
         lose_frame(visit, frame, error.text);
@@ -179,9 +180,7 @@ static void process_dir(struct run *run, size_t index)
     struct visit visit = {
         .run = run,
         .dir = dir,
-        .record = {.file = stdout,
-                   .dir = run->dirs.dir_count > 1 ? dir->path : NULL,
-                   .paper = run->options->paper},
+        .record = {.file = stdout, .dir = run->dirs.dir_count > 1 ? dir->path : NULL},
         .score = &run->score[index],
     };
     if (!start_core(run, dir->path)) {

@@ -28,47 +28,39 @@ int32_t sim_list_rank(struct sim_list *list, int percent)
     return list->value[rank == 0 ? 0 : rank - 1];
 }
 
-int32_t sim_score_selected(const struct ih_heads *heads, bool paper)
-{
-    if (heads->head_count == 0 || (paper && heads->head_count > 1)) {
-        return IH_NONE;
-    }
-    return heads->head[0];
-}
-
 /* Distance of a hypothesis from the true head. Coordinates below 2^26, so squares fit. */
-static int32_t distance_mm_q8(const struct ih_hypothesis *hypothesis,
+static int32_t distance_mm_q8(const struct ih_result_entry *entry,
                               const struct sim_truth_frame *truth)
 {
     uint64_t sum = 0;
     for (int axis = 0; axis < 3; axis++) {
-        int64_t difference = (int64_t)hypothesis->centre_mm_q8[axis] - truth->centre_mm_q8[axis];
+        int64_t difference = (int64_t)entry->centre_mm_q8[axis] - truth->centre_mm_q8[axis];
         sum += (uint64_t)(difference * difference);
     }
     return ih_saturate_s32(ih_isqrt_u64(sum));
 }
 
-static bool matches(const struct ih_hypothesis *hypothesis, const struct sim_truth_frame *truth)
+static bool matches(const struct ih_result_entry *entry, const struct sim_truth_frame *truth)
 {
     return truth->head == SIM_TRUTH_HEAD &&
-           distance_mm_q8(hypothesis, truth) <= SIM_SCORE_MATCH_MM * 256;
+           distance_mm_q8(entry, truth) <= SIM_SCORE_MATCH_MM * 256;
 }
 
-static enum sim_outcome judge_selection(const struct ih_heads *heads,
+static enum sim_outcome judge_selection(const struct ih_result *result,
                                         const struct sim_truth_frame *truth)
 {
-    if (heads->head_count == 0) {
+    if (result->head_count == 0) {
         return SIM_OUTCOME_NONE;
     }
-    for (int32_t i = 0; i < heads->head_count; i++) {
-        if (matches(&heads->hypothesis[heads->head[i]], truth)) {
-            return heads->head_count == 1 ? SIM_OUTCOME_CORRECT : SIM_OUTCOME_AMBIGUOUS;
+    for (int32_t i = 0; i < result->head_count; i++) {
+        if (matches(&result->entry[result->head[i]], truth)) {
+            return result->head_count == 1 ? SIM_OUTCOME_CORRECT : SIM_OUTCOME_AMBIGUOUS;
         }
     }
     return SIM_OUTCOME_WRONG;
 }
 
-struct sim_verdict sim_score_judge(const struct ih_heads *heads, bool paper,
+struct sim_verdict sim_score_judge(const struct ih_result *result,
                                    const struct sim_truth_frame *truth)
 {
     struct sim_verdict verdict = {.scored = false};
@@ -77,17 +69,17 @@ struct sim_verdict sim_score_judge(const struct ih_heads *heads, bool paper,
     }
     verdict.scored = true;
     verdict.head_there = truth->head == SIM_TRUTH_HEAD;
-    for (int32_t i = 0; i < heads->hypothesis_count; i++) {
-        verdict.detected = verdict.detected || matches(&heads->hypothesis[i], truth);
+    for (int32_t i = 0; i < result->entry_count; i++) {
+        verdict.detected = verdict.detected || matches(&result->entry[i], truth);
     }
-    verdict.outcome = judge_selection(heads, truth);
-    int32_t selected = sim_score_selected(heads, paper);
+    verdict.outcome = judge_selection(result, truth);
+    int32_t selected = result->selected;
     if (selected == IH_NONE) {
         verdict.selected_right = !verdict.head_there;
-    } else if (matches(&heads->hypothesis[selected], truth)) {
+    } else if (matches(&result->entry[selected], truth)) {
         verdict.selected_right = true;
         verdict.error_known = true;
-        verdict.error_mm_q8 = distance_mm_q8(&heads->hypothesis[selected], truth);
+        verdict.error_mm_q8 = distance_mm_q8(&result->entry[selected], truth);
     }
     return verdict;
 }

@@ -54,11 +54,8 @@ struct sim_score {
     struct sim_list depth_error_mm_q8; /* of right labels */
 };
 
-/* The selected head, or IH_NONE. With paper the choice among several is left open. */
-int32_t sim_score_selected(const struct ih_heads *heads, bool paper);
-
 /* truth NULL: a frame without truth, not scored. */
-struct sim_verdict sim_score_judge(const struct ih_heads *heads, bool paper,
+struct sim_verdict sim_score_judge(const struct ih_result *result,
                                    const struct sim_truth_frame *truth);
 
 void sim_score_add(struct sim_score *score, const struct sim_verdict *verdict);

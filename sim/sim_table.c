@@ -42,22 +42,22 @@ static void print_verdict(FILE *file, const struct sim_verdict *verdict)
 }
 
 void sim_table_frame(FILE *file, const struct hal_frame *frame, const struct isohead *head,
-                     bool paper, const struct sim_verdict *verdict)
+                     const struct sim_verdict *verdict)
 {
     char name[NAME_MAX_BYTES];
-    const struct ih_heads *heads = &head->heads;
-    int32_t selected = sim_score_selected(heads, paper);
+    const struct ih_result *result = &head->result;
+    int32_t selected = result->selected;
     fprintf(file, "%-14s %5" PRId32 " %5" PRId32 " %4" PRId32 " ",
             tame(name, sizeof name, frame->name), head->dots.dot_count, head->labels.labelled_count,
-            heads->hypothesis_count);
+            result->entry_count);
     if (selected != IH_NONE) {
-        const struct ih_hypothesis *hypothesis = &heads->hypothesis[selected];
+        const struct ih_result_entry *hypothesis = &result->entry[selected];
         for (int axis = 0; axis < 3; axis++) {
             fprintf(file, "%7s ", sim_text_fixed(hypothesis->centre_mm_q8[axis], 8, 1).text);
         }
         fprintf(file, "%6s  ", sim_text_fixed(hypothesis->distance_mm_q8, 8, 0).text);
     } else {
-        fprintf(file, "%-32s", heads->head_count > 1 ? "    ambiguous" : "         none");
+        fprintf(file, "%-32s", result->head_count > 1 ? "    ambiguous" : "         none");
     }
     print_verdict(file, verdict);
     fputc('\n', file);

@@ -16,7 +16,7 @@
 void sim_table_title(FILE *file, const char *path);
 
 void sim_table_frame(FILE *file, const struct hal_frame *frame, const struct isohead *head,
-                     bool paper, const struct sim_verdict *verdict);
+                     const struct sim_verdict *verdict);
 void sim_table_error(FILE *file, const char *name, const char *error);
 
 /* Heading, then a row per directory and last the sum, each for Table 1 and for the dots. Rows

@@ -281,6 +281,44 @@ static void write_heads(struct sim_write *write, const struct ih_heads *heads)
     sim_write_close(write, '}');
 }
 
+static void write_finding(struct sim_write *write, const struct ih_finding *finding)
+{
+    struct ih_score score;
+    ih_score_rate(&finding->evidence, &score);
+    sim_write_open(write, '{');
+    write_column(write, "centre_mm_q8", finding->head.centre_mm_q8, 3, sizeof(int32_t));
+    write_column(write, "semi_mm_q8", finding->head.semi_mm_q8, 3, sizeof(int32_t));
+    sim_write_int_field(write, "source", finding->source);
+    sim_write_int_field(write, "track", finding->track_id);
+    sim_write_key(write, "predicted");
+    sim_write_bool(write, finding->is_predicted);
+    sim_write_int_field(write, "logit_q10", finding->logit_q10);
+    sim_write_int_field(write, "probability_q16", finding->probability_q16);
+    write_column(write, "evidence_q8", finding->evidence.value_q8, IH_EVIDENCE_COUNT,
+                 sizeof(int32_t));
+    write_column(write, "part_q10", score.part_q10, IH_EVIDENCE_COUNT, sizeof(int32_t));
+    sim_write_int_field(write, "through_count", finding->evidence.through_count);
+    sim_write_int_field(write, "hit_count", finding->evidence.hit_count);
+    sim_write_int_field(write, "front_count", finding->evidence.front_count);
+    sim_write_close(write, '}');
+}
+
+static void write_findings(struct sim_write *write, const struct ih_findings *findings)
+{
+    sim_write_key(write, "evidence");
+    sim_write_open(write, '[');
+    for (int kind = 0; kind < IH_EVIDENCE_COUNT; kind++) {
+        sim_write_string(write, ih_evidence_text((enum ih_evidence_kind)kind));
+    }
+    sim_write_close(write, ']');
+    sim_write_key(write, "findings");
+    sim_write_open(write, '[');
+    for (int32_t i = 0; i < findings->finding_count; i++) {
+        write_finding(write, &findings->finding[i]);
+    }
+    sim_write_close(write, ']');
+}
+
 static void write_frame(FILE *file, const struct hal_frame *frame, struct isohead *head)
 {
     struct sim_write write = {.file = file};
@@ -296,6 +334,7 @@ static void write_frame(FILE *file, const struct hal_frame *frame, struct isohea
     write_cuts(&write, head);
     write_hypotheses(&write, &head->hypotheses);
     write_heads(&write, &head->heads);
+    write_findings(&write, &head->findings);
     sim_write_close(&write, '}');
     fputc('\n', file);
 }

@@ -43,6 +43,8 @@ const char *ih_reject_text(int32_t reject)
         return "shape";
     case IH_REJECT_OUTLINE:
         return "outline";
+    case IH_REJECT_SCORE:
+        return "score";
     default:
         return NULL;
     }

@@ -30,7 +30,8 @@ enum ih_reject {
     IH_REJECT_AREA,
     IH_REJECT_CURVATURE,
     IH_REJECT_SHAPE,
-    IH_REJECT_OUTLINE
+    IH_REJECT_OUTLINE,
+    IH_REJECT_SCORE /* by ih_tracks: not probable enough */
 };
 
 struct ih_heads_params {
@@ -81,7 +82,7 @@ void ih_heads_select(const struct ih_hypotheses *hypotheses, const struct ih_sur
                      const struct ih_samples *samples, const struct ih_rig *rig,
                      const struct ih_heads_params *params, struct ih_heads *out);
 
-/* The word that the record uses: "area", "curvature", "shape", "outline"; NULL for an accepted
+/* The word that the record uses: "area", "curvature", "shape", "outline", "score"; NULL for an accepted
  * one. */
 const char *ih_reject_text(int32_t reject);
 

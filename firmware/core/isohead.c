@@ -3,6 +3,8 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "ih_fix.h"
+
 _Static_assert(sizeof(struct isohead) <= IH_RAM_MAX, "the state no longer fits its budget");
 
 const char *ih_err_text(enum ih_err err)
@@ -42,6 +44,8 @@ void ih_params_default(struct ih_params *params)
     ih_surface_params_default(&params->surface);
     ih_hypotheses_params_default(&params->hypotheses);
     ih_heads_params_default(&params->heads);
+    ih_findings_params_default(&params->findings);
+    ih_tracks_params_default(&params->tracks);
 }
 
 enum ih_err isohead_init(struct isohead *head, const struct ih_calibration *calibration,
@@ -49,6 +53,8 @@ enum ih_err isohead_init(struct isohead *head, const struct ih_calibration *cali
 {
     memset(head, 0, sizeof *head);
     ih_params_default(&head->params);
+    ih_tracks_init(&head->tracks);
+    ih_result_clear(&head->result);
     enum ih_err err = ih_rig_init(&head->rig, calibration, bad_slot);
     if (err != IH_OK) {
         memset(&head->rig, 0, sizeof head->rig); /* no frame has the size of this rig */
@@ -84,40 +90,88 @@ static void clear_outputs(struct isohead *head)
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
         head->labels.dot_of_slot[slot] = IH_NONE;
     }
+    ih_result_clear(&head->result);
 }
 
-enum ih_err isohead_frame(struct isohead *head, const struct ih_frame *frame)
+/* From points to hypotheses: the paper's method. */
+static void find_nests(struct isohead *head, const struct ih_dots *dots)
 {
     const struct ih_rig *rig = &head->rig;
     const struct ih_params *params = &head->params;
-    enum ih_err err = check_frame(frame, &rig->calibration);
-    clear_outputs(head);
-    if (err != IH_OK) {
-        return err;
-    }
-    bool range = rig->calibration.kind == IH_RIG_RANGE;
-    if (range) {
-        err = ih_windows_find(frame, rig, &params->windows, &head->scratch.windows, &head->windows);
-        if (err != IH_OK || head->windows.window_count == 0) {
-            return err;
-        }
-        err = ih_points_from_range(frame, rig, &params->points, &head->windows.window[0],
-                                   &head->points);
-        if (err != IH_OK) {
-            return err;
-        }
-    } else {
-        ih_dots_find(frame, &params->dots, &head->scratch.dots, &head->dots);
-        ih_labels_assign(&head->dots, rig, &params->labels, &head->scratch.labels, &head->labels);
-        ih_points_from_labels(&head->labels, rig, &head->points);
-    }
-    ih_samples_select(&head->points, range ? NULL : &head->dots, rig, &params->samples,
-                      &head->samples);
+    ih_samples_select(&head->points, dots, rig, &params->samples, &head->samples);
     ih_surface_fit(&head->samples, &head->points.field, &params->surface, &head->scratch.surface,
                    &head->surface);
     ih_hypotheses_find(&head->surface, &params->hypotheses, &head->scratch.hypotheses,
                        &head->hypotheses);
     ih_heads_select(&head->hypotheses, &head->surface, &head->samples, rig, &params->heads,
                     &head->heads);
-    return IH_OK;
+}
+
+/* And on to findings, unless the paper's method alone is wanted. */
+static void look(struct isohead *head, const struct ih_dots *dots,
+                 const struct ih_expected *expected)
+{
+    find_nests(head, dots);
+    if (!head->params.is_paper) {
+        ih_findings_add(&head->points, dots, &head->heads, expected, &head->rig,
+                        &head->params.findings, &head->scratch.findings, &head->findings);
+    }
+}
+
+static void look_at_dots(struct isohead *head, const struct ih_frame *frame,
+                         const struct ih_expected *expected)
+{
+    const struct ih_params *params = &head->params;
+    ih_dots_find(frame, &params->dots, &head->scratch.dots, &head->dots);
+    ih_labels_assign(&head->dots, &head->rig, &params->labels, &head->scratch.labels,
+                     &head->labels);
+    ih_points_from_labels(&head->labels, &head->rig, &head->points);
+    look(head, &head->dots, expected);
+}
+
+/* The best window comes last, so that the stages' outputs that stay are its own. */
+static enum ih_err look_at_windows(struct isohead *head, const struct ih_frame *frame,
+                                   const struct ih_expected *expected)
+{
+    const struct ih_params *params = &head->params;
+    enum ih_err err = ih_windows_find(frame, &head->rig, &params->windows, &head->scratch.windows,
+                                      &head->windows);
+    int32_t count = head->windows.window_count;
+    if (params->is_paper) {
+        count = ih_min_s32(count, 1);
+    }
+    for (int32_t i = count - 1; i >= 0 && err == IH_OK; i--) {
+        err = ih_points_from_range(frame, &head->rig, &params->points, &head->windows.window[i],
+                                   &head->points);
+        if (err == IH_OK) {
+            look(head, NULL, expected);
+        }
+    }
+    return err;
+}
+
+enum ih_err isohead_frame(struct isohead *head, const struct ih_frame *frame, int64_t time_us)
+{
+    enum ih_err err = check_frame(frame, &head->rig.calibration);
+    clear_outputs(head);
+    if (err != IH_OK) {
+        return err;
+    }
+    struct ih_expected expected = {0};
+    if (!head->params.is_paper) {
+        ih_tracks_expect(&head->tracks, &head->params.tracks, time_us, &expected);
+        ih_findings_begin(&head->findings);
+    }
+    if (head->rig.calibration.kind == IH_RIG_RANGE) {
+        err = look_at_windows(head, frame, &expected);
+    } else {
+        look_at_dots(head, frame, &expected);
+    }
+    if (head->params.is_paper) {
+        ih_result_from_heads(&head->heads, &head->result);
+    } else {
+        ih_tracks_update(&head->tracks, &head->params.tracks, &head->rig, &head->findings);
+        ih_result_from_tracks(&head->findings, &head->tracks, &head->result);
+    }
+    return err;
 }

@@ -4,8 +4,8 @@
  *
  *     static struct isohead head;              // the only memory there is
  *     isohead_init(&head, &calibration, &bad); // checks the rig once
- *     isohead_frame(&head, &frame);            // every frame: dots .. heads
- *     head.heads ...                           // the result; every stage's output is beside it
+ *     isohead_frame(&head, &frame, time_us);   // every frame: dots .. heads
+ *     head.result ...                          // the result; every stage's output is beside it
  *
  * The frame is a camera frame for a dot rig, a depth image for a range rig. Integer arithmetic
  * only; the same frame gives the same bytes on every processor. Not thread-safe per struct; two
@@ -17,14 +17,15 @@
 #ifndef ISOHEAD_H
 #define ISOHEAD_H
 
-#include "ih_heads.h"
+#include "ih_result.h"
 
 #define ISOHEAD_VERSION "0.1.0"
 
 /* RAM for the whole state, the frame itself not included. */
-#define IH_RAM_MAX (224 * 1024)
+#define IH_RAM_MAX (232 * 1024)
 
 struct ih_params {
+    bool is_paper; /* the paper's method alone: every frame on its own, nests judged by limits */
     struct ih_dots_params dots;
     struct ih_labels_params labels;
     struct ih_windows_params windows;
@@ -33,11 +34,15 @@ struct ih_params {
     struct ih_surface_params surface;
     struct ih_hypotheses_params hypotheses;
     struct ih_heads_params heads;
+    struct ih_findings_params findings;
+    struct ih_tracks_params tracks;
 };
 
 struct isohead {
     struct ih_rig rig;
     struct ih_params params;
+    /* What is known from the frames before. */
+    struct ih_tracks tracks;
     /* The stages' outputs of the last frame, in order. */
     struct ih_dots dots;
     struct ih_labels labels;
@@ -47,6 +52,8 @@ struct isohead {
     struct ih_surface surface;
     struct ih_hypotheses hypotheses;
     struct ih_heads heads;
+    struct ih_findings findings;
+    struct ih_result result;
     /* Working memory; stages never run at the same time, so they share it. */
     union {
         struct ih_dots_scratch dots;
@@ -54,6 +61,7 @@ struct isohead {
         struct ih_windows_scratch windows;
         struct ih_surface_scratch surface;
         struct ih_hypotheses_scratch hypotheses;
+        struct ih_findings_scratch findings;
     } scratch;
 };
 
@@ -67,7 +75,7 @@ enum ih_err isohead_init(struct isohead *head, const struct ih_calibration *cali
 /* Process one frame. IH_ERR_SIZE when it is not of the rig's size or its view is malformed,
  * IH_ERR_KIND when it does not have 1 or 2 bytes per sample, or a range rig's not 2; then the
  * outputs are those of an empty frame. */
-enum ih_err isohead_frame(struct isohead *head, const struct ih_frame *frame)
+enum ih_err isohead_frame(struct isohead *head, const struct ih_frame *frame, int64_t time_us)
     __attribute__((warn_unused_result));
 
 #endif

@@ -40,7 +40,17 @@ CORE_HEADERS = {
     "ih_ellipse.h": CORE_SHARED | {"ih_cuts.h"},
     "ih_hypotheses.h": CORE_SHARED | {"ih_ellipse.h"},
     "ih_heads.h": CORE_SHARED | {"ih_hypotheses.h"},
-    "isohead.h": CORE_SHARED | {"ih_heads.h"},
+    "ih_space.h": CORE_SHARED | {"ih_samples.h"},
+    "ih_ellipsoid.h": CORE_SHARED | {"ih_space.h"},
+    "ih_scan.h": CORE_SHARED | {"ih_ellipsoid.h"},
+    "ih_fit.h": CORE_SHARED | {"ih_ellipsoid.h", "ih_cholesky.h"},
+    "ih_evidence.h": CORE_SHARED | {"ih_fit.h"},
+    "ih_score.h": CORE_SHARED | {"ih_evidence.h"},
+    "ih_score_weights.h": {"ih_score.h"},
+    "ih_findings.h": CORE_SHARED | {"ih_heads.h", "ih_scan.h", "ih_score.h"},
+    "ih_tracks.h": CORE_SHARED | {"ih_findings.h"},
+    "ih_result.h": CORE_SHARED | {"ih_tracks.h"},
+    "isohead.h": CORE_SHARED | {"ih_result.h"},
 }
 CORE_SYSTEM = {"stdbool.h", "stddef.h", "stdint.h", "string.h"}
 
@@ -52,7 +62,9 @@ def allowed_in_core(name):
         return CORE_HEADERS[name]
     own = name[:-len(".c")] + ".h"
     if name == "isohead.c":
-        return {own}
+        return {own, "ih_fix.h"}
+    if name == "ih_score.c":
+        return {own, "ih_fix.h", "ih_score_weights.h"}
     return {own, "ih_fix.h"} if own in CORE_HEADERS else None
 
 

@@ -90,7 +90,7 @@ static void paint_bust(const struct vector_bust *bust)
 
 static void process(void)
 {
-    TEST_ASSERT_EQUAL_INT(IH_OK, isohead_frame(&head, &frame));
+    TEST_ASSERT_EQUAL_INT(IH_OK, isohead_frame(&head, &frame, 0));
 }
 
 static double miss_mm(const struct ih_hypothesis *hypothesis, double x, double y, double z)
@@ -316,7 +316,7 @@ static void expect_error(enum ih_err err, const char *what)
     paint_bust(&vector_busts[0]);
     process();
     TEST_ASSERT_EQUAL_INT32(1, head.heads.head_count);
-    IH_TEST_EQUAL(err, isohead_frame(&head, &wrong), what, 0);
+    IH_TEST_EQUAL(err, isohead_frame(&head, &wrong, 0), what, 0);
     check_empty(what);
     TEST_ASSERT_FALSE(head.surface.valid);
     view8(&head);
@@ -356,7 +356,7 @@ static void wrong_kinds_are_refused(void)
     EXPECT_WITH(bytes_per_sample, INT32_MIN, IH_ERR_KIND);
     start_range(320, 240);
     frame = (struct ih_frame){grey8, 320, 240, 320, 1, 255};
-    TEST_ASSERT_EQUAL_INT(IH_ERR_KIND, isohead_frame(&head, &frame));
+    TEST_ASSERT_EQUAL_INT(IH_ERR_KIND, isohead_frame(&head, &frame, 0));
     check_empty("grey frame for a range rig");
 }
 
@@ -408,7 +408,7 @@ static void two_states_are_independent(void)
 {
     paint_bust(&vector_busts[2]);
     start(&other, vector_busts[2].rig);
-    TEST_ASSERT_EQUAL_INT(IH_OK, isohead_frame(&other, &frame));
+    TEST_ASSERT_EQUAL_INT(IH_OK, isohead_frame(&other, &frame, 0));
     paint_bust(&vector_busts[0]);
     process();
     TEST_ASSERT_TRUE(memcmp(&head.heads, &other.heads, sizeof head.heads) != 0);

@@ -1,0 +1,94 @@
+/* ih_findings - everything in the frame that may be a head, each with its probability (ours).
+ *
+ * In:    nests and their hypotheses (ih_heads), points, dots, rig, and places from where a head is
+ *        expected (tracks).
+ * Out:   findings, the most probable first, at least spacing_mm apart.
+ * Way:   candidates are the nests' centres, the places of the model scan and the expected ones; each
+ *        is fitted (ih_fit), looked at (ih_evidence) and rated (ih_score). A range frame is looked at
+ *        window by window: findings are collected over begin, one add a window, and end.
+ *        Of an expected head that is not found it also says what its rays met (views): whether it is
+ *        hidden, or gone.
+ * Full table: the least probable drop and count in dropped_count.
+ * Cost:  up to 28 fits a window.
+ */
+#ifndef IH_FINDINGS_H
+#define IH_FINDINGS_H
+
+#include "ih_heads.h"
+#include "ih_scan.h"
+#include "ih_score.h"
+
+/* Findings kept; each costs 200 bytes. */
+#define IH_FINDINGS_MAX 16
+/* Expected places that are tried. */
+#define IH_FINDINGS_EXPECTED_MAX 4
+
+enum ih_source { IH_SOURCE_SCAN, IH_SOURCE_NEST, IH_SOURCE_EXPECTED };
+
+struct ih_findings_params {
+    struct ih_space_params space;
+    struct ih_scan_params scan;
+    struct ih_fit_params fit;
+    int32_t spacing_mm;   /* of two findings */
+    int32_t nest_near_mm; /* a nest this near is the candidate's own */
+    int32_t front_least_mm; /* nothing nearer than this is a head: the lens is there */
+};
+
+struct ih_finding {
+    struct ih_ellipsoid head;
+    struct ih_evidence evidence;
+    int32_t logit_q10;
+    int32_t probability_q16;
+    int32_t source; /* enum ih_source */
+    /* Set by ih_tracks. */
+    int32_t track_id;     /* 0: none */
+    int32_t sigma_mm_q8;  /* of the centre along each axis; 0: unknown */
+    bool is_head;         /* accepted */
+    bool is_predicted;    /* not seen in this frame: where its track says that it is */
+    /* Its outline in the frame, as in ih_hypothesis. */
+    int32_t u_px_q12, v_px_q12;
+    int32_t a_px_q12, b_px_q12;
+    int32_t angle_mdeg;
+    int32_t distance_mm_q8;
+};
+
+/* What the rays through an expected head met: something behind it or nothing, its surface, something
+ * before it. Counts. */
+struct ih_view {
+    int32_t through, hit, front;
+};
+
+struct ih_findings {
+    int32_t finding_count;
+    int32_t dropped_count;
+    /* The last IH_FINDINGS_EXPECTED_MAX entries are for predicted ones. */
+    struct ih_finding finding[IH_FINDINGS_MAX + IH_FINDINGS_EXPECTED_MAX];
+    struct ih_view view[IH_FINDINGS_EXPECTED_MAX]; /* by expected head, summed over windows */
+};
+
+/* Heads that are expected. */
+struct ih_expected {
+    int32_t count;
+    struct ih_ellipsoid head[IH_FINDINGS_EXPECTED_MAX];
+};
+
+struct ih_findings_scratch {
+    struct ih_space space;
+    struct ih_scan scan;
+    struct ih_scan_scratch scan_scratch;
+};
+
+void ih_findings_params_default(struct ih_findings_params *params);
+
+void ih_findings_begin(struct ih_findings *out);
+
+/* Add what one set of points shows. */
+void ih_findings_add(const struct ih_points *points, const struct ih_dots *dots,
+                     const struct ih_heads *heads, const struct ih_expected *expected,
+                     const struct ih_rig *rig, const struct ih_findings_params *params,
+                     struct ih_findings_scratch *scratch, struct ih_findings *out);
+
+/* The outline of an ellipsoid in the frame; fills the finding from u_px_q12 on. */
+void ih_findings_outline(const struct ih_rig *rig, struct ih_finding *finding);
+
+#endif

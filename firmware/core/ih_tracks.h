@@ -1,0 +1,91 @@
+/* ih_tracks - heads over time: one track per person, and which head is the one (the paper's second
+ * next step).
+ *
+ * In:    findings of this frame, its time; the tracks so far.
+ * Out:   tracks; findings marked with their track, accepted or not; heads in order of probability,
+ *        and the selected one. A head that is carried through an occlusion or a lost frame is
+ *        appended to the findings as a predicted one.
+ * Way:   per track a constant-velocity Kalman filter, one variance for all axes. ih_tracks_expect
+ *        moves the tracks to the frame's time and says where heads are expected; ih_tracks_update
+ *        then
+ *        1. gives findings to tracks, the best pair first: within the gate, and log-odds above
+ *           keep_logit even if it would not start a track.
+ *        2. ends a track that found nothing convincing when more than half of the rays through it go
+ *           through and fewer than 30 % are stopped before it: the seat is empty.
+ *        3. carries the others, slowing down, for at most carry_us.
+ *        4. starts tracks with what is left and above start_logit.
+ *        A track's log-odds are a running mean of its findings'; it is a head above accept_logit,
+ *        until it falls below drop_logit.
+ *        The selected head is the one nearest the middle of the pattern (or the leftmost or
+ *        rightmost in the picture, by side), of those not much less probable than the best; another
+ *        takes its place after switch_frames frames.
+ * Time:  frames may come late, be lost, or jump: a step back, or forward by more than gap_us, forgets
+ *        all tracks; ids go on.
+ * Overflow: steps below 2 s, accelerations below 2^13 mm/s^2, speeds limited to 3 m/s: variances
+ *        stay below 2^26 (mm/s)^2; all in Q8, 64-bit.
+ * Cost:  tracks x findings distances.
+ */
+#ifndef IH_TRACKS_H
+#define IH_TRACKS_H
+
+#include "ih_findings.h"
+
+#define IH_TRACKS_MAX IH_FINDINGS_EXPECTED_MAX
+
+enum ih_side { IH_SIDE_MIDDLE, IH_SIDE_LEFT, IH_SIDE_RIGHT };
+
+struct ih_tracks_params {
+    int32_t gate_mm;          /* a finding this near belongs to the track .. */
+    int32_t gate_mm_per_s;    /* .. and farther, the longer it was not seen */
+    int32_t start_logit_q10;  /* findings above this start a track */
+    int32_t accept_logit_q10; /* tracks above this are heads .. */
+    int32_t drop_logit_q10;   /* .. until they fall below this */
+    int32_t keep_logit_q10;   /* findings above this continue a track */
+    int32_t memory_q16;       /* share of the old mean in the new one */
+    int32_t through_percent, front_percent;
+    int32_t carry_us;
+    int32_t gap_us; /* up to 2 s */
+    int32_t measured_mm;         /* standard deviation of a finding's centre */
+    int32_t acceleration_mm_s2;  /* of heads, standard deviation */
+    int32_t switch_frames;
+    int32_t side; /* enum ih_side */
+};
+
+struct ih_track {
+    int32_t id;
+    bool is_head;
+    int32_t mean_logit_q10;
+    struct ih_ellipsoid head; /* filtered */
+    int32_t velocity_mm_s_q8[3];
+    /* covariance of place and velocity along each axis: mm^2, mm^2/s, mm^2/s^2 */
+    int64_t place_q8, cross_q8, speed_q8;
+    int64_t seen_us;
+    int32_t finding; /* of this frame, or IH_NONE */
+};
+
+struct ih_tracks {
+    bool has_time;
+    int64_t time_us;
+    int32_t last_id;
+    int32_t track_count;
+    struct ih_track track[IH_TRACKS_MAX];
+    int32_t selected_id; /* 0: none */
+    int32_t rival_id, rival_frames;
+    /* Of this frame: indices into findings, most probable first. */
+    int32_t head_count;
+    int32_t head[IH_TRACKS_MAX];
+    int32_t selected; /* index into findings, or IH_NONE */
+};
+
+void ih_tracks_params_default(struct ih_tracks_params *params);
+
+/* No track; ids begin at 1. */
+void ih_tracks_init(struct ih_tracks *tracks);
+
+void ih_tracks_expect(struct ih_tracks *tracks, const struct ih_tracks_params *params,
+                      int64_t time_us, struct ih_expected *expected);
+
+void ih_tracks_update(struct ih_tracks *tracks, const struct ih_tracks_params *params,
+                      const struct ih_rig *rig, struct ih_findings *findings);
+
+#endif
