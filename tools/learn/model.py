@@ -1,0 +1,111 @@
+"""Logistic regression on piecewise linear curves, and its rounding to the firmware's numbers."""
+
+import dataclasses
+
+import numpy
+
+KNOTS = 7
+SIZE_PENALTY = 1.0
+STEP_PENALTY = 3.0
+BEND_PENALTY = 10.0
+
+
+@dataclasses.dataclass
+class Curves:
+    """first_q8, step_q8 (kinds), at_q10 (kinds x KNOTS), bias_q10: exactly what the firmware has."""
+
+    first_q8: numpy.ndarray
+    step_q8: numpy.ndarray
+    at_q10: numpy.ndarray
+    bias_q10: int
+
+    def logits(self, evidence):
+        place = (evidence * 256 - self.first_q8) / self.step_q8
+        place = numpy.clip(place, 0, KNOTS - 1)
+        knot = numpy.minimum(place.astype(int), KNOTS - 2)
+        part = place - knot
+        kind = numpy.arange(evidence.shape[1])
+        low, high = self.at_q10[kind, knot], self.at_q10[kind, knot + 1]
+        return ((low * (1 - part) + high * part).sum(axis=1) + self.bias_q10) / 1024
+
+
+def make_knots(evidence):
+    """Equally spaced from the first to the 99th percentile of each kind, in Q8."""
+    low, high = numpy.percentile(evidence, [1, 99], axis=0)
+    step = numpy.maximum(numpy.round((high - low) * 256 / (KNOTS - 1)), 1).astype(int)
+    return numpy.round(low * 256).astype(int), step
+
+
+def hats(evidence, first_q8, step_q8):
+    """Columns of the linear model: KNOTS hat functions per kind, and a one."""
+    place = numpy.clip((evidence * 256 - first_q8) / step_q8, 0, KNOTS - 1)
+    columns = [numpy.maximum(0, 1 - numpy.abs(place - knot)) for knot in range(KNOTS)]
+    design = numpy.stack(columns, axis=2).reshape(len(evidence), -1)
+    return numpy.concatenate([design, numpy.ones((len(evidence), 1))], axis=1)
+
+
+def penalty(kinds):
+    one = numpy.eye(KNOTS)
+    step = numpy.diff(one, axis=0)
+    bend = numpy.diff(one, 2, axis=0)
+    block = SIZE_PENALTY * one + STEP_PENALTY * step.T @ step + BEND_PENALTY * bend.T @ bend
+    size = kinds * KNOTS + 1
+    whole = numpy.zeros((size, size))
+    for kind in range(kinds):
+        at = slice(kind * KNOTS, (kind + 1) * KNOTS)
+        whole[at, at] = block
+    whole[-1, -1] = 1e-3
+    return whole
+
+
+def fit(evidence, labels):
+    """Newton's method on the penalised likelihood."""
+    first_q8, step_q8 = make_knots(evidence)
+    design = hats(evidence, first_q8, step_q8)
+    smooth = penalty(evidence.shape[1])
+    weights = numpy.zeros(design.shape[1])
+    for _ in range(40):
+        probability = 1 / (1 + numpy.exp(-design @ weights))
+        slope = design.T @ (probability - labels) + smooth @ weights
+        spread = probability * (1 - probability) + 1e-6
+        change = numpy.linalg.solve((design * spread[:, None]).T @ design + smooth, slope)
+        weights -= change * min(1, 5 / numpy.abs(design @ change).max())
+        if numpy.abs(change).max() < 1e-5:
+            break
+    curves = weights[:-1].reshape(-1, KNOTS)
+    middle = curves.mean(axis=1, keepdims=True)
+    bias = weights[-1] + middle.sum()
+    at_q10 = numpy.round((curves - middle) * 1024).astype(int)
+    return Curves(first_q8, step_q8, at_q10, int(round(bias * 1024)))
+
+
+def write(path, learnt, kinds, command):
+    """The header that ih_score.c includes."""
+    rows = []
+    for kind, first, step, at in zip(kinds, learnt.first_q8, learnt.step_q8, learnt.at_q10):
+        rows.append("    [IH_EVIDENCE_%s] = {%d, %d, {%s}}," %
+                    (kind.upper(), first, step, ", ".join(str(value) for value in at)))
+    with open(path, "w", encoding="utf-8") as file:
+        file.write("""/* ih_score_weights - the curves of ih_score, written by
+ *     %s
+ * Do not edit. */
+#ifndef IH_SCORE_WEIGHTS_H
+#define IH_SCORE_WEIGHTS_H
+
+#include "ih_score.h"
+
+/* clang-format off */
+struct curve {
+    int32_t first_q8, step_q8;     /* evidence at the first knot, and from knot to knot */
+    int16_t at_q10[IH_SCORE_KNOTS]; /* part of the log-odds at each knot */
+};
+
+static const int32_t bias_q10 = %d;
+
+static const struct curve curves[IH_EVIDENCE_COUNT] = {
+%s
+};
+/* clang-format on */
+
+#endif
+""" % (command, learnt.bias_q10, "\n".join(rows)))

@@ -1,0 +1,41 @@
+"""The rendered scenes that the score is learnt from: as many kinds as tools/render has.
+
+Variety decides, not number: a score learnt in one kind of room fails in every other.
+"""
+
+RIGS = ("paper", "wide")
+BACKGROUNDS = ("varied", "none", "far", "near")
+AMBIENTS = ("varied", "normal", "bright", "dim", "varied", "sunlight")
+PERSONS = ("varied", "child", "hat", "mask", "beard", "long-hair", "bald", "glasses", "headphones")
+ACTS = ("phone", "face", "back", "none")
+
+
+def scenes_of_seed(seed):
+    """(name, options of tools/render) of every scene that is rendered for one seed."""
+    rig, other = RIGS[seed % 2], RIGS[(seed + 1) % 2]
+    background = BACKGROUNDS[seed // 2 % len(BACKGROUNDS)]
+    ambient = AMBIENTS[seed % len(AMBIENTS)]
+    person = PERSONS[seed % len(PERSONS)]
+    act = ACTS[seed % len(ACTS)]
+    knock = ("0", "0", "0.05", "0.1")[seed % 4]
+
+    def scene(name, kind, frames, rig, *more):
+        return name, ["--scene", kind, "--frames", str(frames), "--rig", rig, "--ambient", ambient,
+                      *more]
+
+    return [
+        scene("still", "person", 12, rig, "--background", background),
+        scene("hands", "person", 20, rig, "--sequence", "2", "--background", background),
+        scene("hands-other", "person", 20, other, "--sequence", "2"),
+        scene("people", "person", 12, other, "--person", person, "--background", background),
+        scene("acts", "person", 12, rig, "--act", act, "--person", person, "--knock", knock),
+        scene("turning", "turning", 20, rig, "--background", background),
+        scene("turning-other", "turning", 12, other, "--person", person),
+        scene("visit", "visit", 60, rig, "--background", background),
+        scene("two", "two", 12, other),
+        scene("empty", "empty", 10, other, "--background", background),
+        scene("table", "table", 20, rig),
+        scene("room", "room", 20, other, "--background", background),
+        scene("clutter", "clutter", 40, rig, "--background", background),
+        scene("clutter-other", "clutter", 30, other),
+    ]
