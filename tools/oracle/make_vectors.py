@@ -10,6 +10,7 @@ import os
 
 import band
 import cholesky
+import cloud
 import dots
 import ellipse
 import isohead
@@ -22,8 +23,9 @@ import surface
 import windows
 
 STAGES = {"rig": rig, "cholesky": cholesky, "surface": surface,
-          "band": band, "noise": noise, "dots": dots, "labels": labels, "windows": windows,
-          "points": points, "samples": samples, "ellipse": ellipse, "isohead": isohead}
+          "band": band, "noise": noise, "dots": dots, "labels": labels, "cloud": cloud,
+          "windows": windows, "points": points, "samples": samples, "ellipse": ellipse,
+          "isohead": isohead}
 
 
 def main():
