@@ -24,13 +24,16 @@ struct hal_error {
 bool hal_fail(struct hal_error *error, const char *format, ...)
     __attribute__((format(printf, 2, 3)));
 
-/* One frame. The samples and the name belong to the camera and live until its next call. */
+/* One frame: an image, or a list of points; then samples is NULL and what describes them 0. Samples,
+ * points and name belong to the camera and live until its next call. */
 struct hal_frame {
     const void *samples;
-    int32_t width, height;    /* px */
-    int32_t stride_bytes;     /* from one row to the next */
-    int32_t bytes_per_sample; /* 1: uint8_t; 2: uint16_t in the processor's own byte order */
-    int32_t maximum;          /* the sample value of full scale */
+    int32_t width, height;           /* px */
+    int32_t stride_bytes;            /* from one row to the next */
+    int32_t bytes_per_sample;        /* 1: uint8_t; 2: uint16_t in the processor's own byte order */
+    int32_t maximum;                 /* the sample value of full scale */
+    const int32_t (*point_mm_q8)[3]; /* x, y, z in the camera frame */
+    int32_t point_count;
     int64_t time_us;
     bool laser; /* the dots were on */
     const char *name;

@@ -41,7 +41,8 @@ static bool has_frames(const char *dir)
     struct dirent *item = NULL;
     while (stream != NULL && !found && (item = readdir(stream)) != NULL) {
         const char *suffix = strrchr(item->d_name, '.');
-        found = suffix != NULL && suffix != item->d_name && strcmp(suffix, ".pgm") == 0;
+        found = suffix != NULL && suffix != item->d_name &&
+                (strcmp(suffix, ".pgm") == 0 || strcmp(suffix, ".xyz") == 0);
     }
     if (stream != NULL) {
         closedir(stream);
@@ -156,7 +157,7 @@ void sim_dirs_add(struct sim_dirs *dirs, const char *path, bool with_rig, struct
     free(child);
     if (count == 0) {
         sim_report_error(report, path, "no %s here and in no subdirectory",
-                         with_rig ? "frames (*.pgm)" : RIG_NAME);
+                         with_rig ? "frames (*.pgm, *.xyz)" : RIG_NAME);
     }
 }
 

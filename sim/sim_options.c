@@ -78,6 +78,7 @@ void sim_options_help(void)
 {
     fputs("host_sim [options] DIR...\n"
           "Find a person's head in 3-D in the frames of each DIR (*.pgm, rig.json).\n"
+          "With a range rig *.xyz are frames too: a line `x y z` in mm per point.\n"
           "A DIR without rig.json stands for those of its subdirectories that have one.\n"
           "\n"
           "  --json         a JSON record per frame on standard output, nothing else there\n"

@@ -8,6 +8,7 @@
 
 #include "replay/hal_file.h"
 #include "replay/hal_replay.h"
+#include "sim_cloud.h"
 #include "sim_dirs.h"
 #include "sim_record.h"
 #include "sim_report.h"
@@ -36,6 +37,7 @@ struct visit {
     struct hal_replay replay;
     struct sim_truth truth;
     struct sim_record record;
+    struct sim_cloud cloud;
     struct sim_score *score;
 };
 
@@ -127,15 +129,12 @@ static void process_frame(struct visit *visit, const struct hal_frame *frame)
 {
     struct isohead *head = visit->run->head;
     struct hal_error error;
-    const struct ih_frame view = {
-        .samples = frame->samples,
-        .width = frame->width,
-        .height = frame->height,
-        .stride_bytes = frame->stride_bytes,
-        .bytes_per_sample = frame->bytes_per_sample,
-        .maximum = frame->maximum,
-    };
+    struct ih_frame view;
     if (!frame->laser) {
+        return;
+    }
+    if (!sim_cloud_view(&visit->cloud, frame, &head->rig, &view, &error)) {
+        lose_frame(visit, frame, error.text);
         return;
     }
     enum ih_err err = isohead_frame(head, &view, frame->time_us);
@@ -187,7 +186,8 @@ static void process_dir(struct run *run, size_t index)
         return;
     }
     struct hal_log log = sim_report_log(&run->report);
-    if (!hal_replay_open(&visit.replay, dir->path, &log, &error)) {
+    bool with_lists = run->head->rig.calibration.kind == IH_RIG_RANGE;
+    if (!hal_replay_open(&visit.replay, dir->path, with_lists, &log, &error)) {
         sim_report_error(&run->report, dir->path, "%s", error.text);
         return;
     }
@@ -197,6 +197,7 @@ static void process_dir(struct run *run, size_t index)
     }
     process_frames(&visit);
     sim_truth_free(&visit.truth);
+    sim_cloud_free(&visit.cloud);
     hal_replay_close(&visit.replay);
 }
 

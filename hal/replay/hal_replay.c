@@ -9,9 +9,11 @@
 #include "replay/hal_file.h"
 #include "replay/hal_lines.h"
 #include "replay/hal_pgm.h"
+#include "replay/hal_xyz.h"
 
 #define LIST_NAME "frames.jsonl"
 #define FRAME_SUFFIX ".pgm"
+#define POINTS_SUFFIX ".xyz"
 /* Times beyond this are not exact in JSON's numbers. */
 #define TIME_MAX_US ((double)((int64_t)1 << 53))
 
@@ -25,13 +27,25 @@ static char *copy_text(const char *text)
     return copy;
 }
 
-/* Frames are what the shell's *.pgm matches. */
-static bool is_frame_name(const char *name)
+static bool has_suffix(const char *name, const char *suffix)
 {
     size_t length = strlen(name);
-    size_t suffix_length = strlen(FRAME_SUFFIX);
-    return name[0] != '.' && length > suffix_length &&
-           strcmp(name + length - suffix_length, FRAME_SUFFIX) == 0 && strchr(name, '/') == NULL;
+    size_t suffix_length = strlen(suffix);
+    return length > suffix_length && strcmp(name + length - suffix_length, suffix) == 0;
+}
+
+/* Frames are what the shell's *.pgm matches, and *.xyz where lists are asked for. */
+static bool is_frame_name(const struct hal_replay *replay, const char *name)
+{
+    return name[0] != '.' && strchr(name, '/') == NULL &&
+           (has_suffix(name, FRAME_SUFFIX) ||
+            (replay->with_lists && has_suffix(name, POINTS_SUFFIX)));
+}
+
+/* What a frame is called, for messages. */
+static const char *frame_names(const struct hal_replay *replay)
+{
+    return replay->with_lists ? "*" FRAME_SUFFIX ", *" POINTS_SUFFIX : "*" FRAME_SUFFIX;
 }
 
 /* Index of the first entry whose name is not less. */
@@ -92,7 +106,7 @@ static bool read_names(struct hal_replay *replay, struct hal_error *error)
     bool good = true;
     struct dirent *item = NULL;
     while (good && (item = readdir(dir)) != NULL) {
-        if (is_frame_name(item->d_name)) {
+        if (is_frame_name(replay, item->d_name)) {
             struct hal_replay_entry *entry = add_entry(replay, item->d_name);
             good = entry != NULL;
             if (good) {
@@ -105,7 +119,7 @@ static bool read_names(struct hal_replay *replay, struct hal_error *error)
         return hal_fail(error, "no memory for the list of frames");
     }
     if (replay->entry_count == 0) {
-        return hal_fail(error, "no frames (*" FRAME_SUFFIX ") in this directory");
+        return hal_fail(error, "no frames (%s) in this directory", frame_names(replay));
     }
     return true;
 }
@@ -145,8 +159,8 @@ static struct hal_replay_entry *claim_entry(struct hal_replay *replay, const cJS
         return NULL;
     }
     const char *name = file->valuestring;
-    if (!is_frame_name(name)) {
-        hal_fail(error, "file is \"%.100s\", expected the name of a *" FRAME_SUFFIX, name);
+    if (!is_frame_name(replay, name)) {
+        hal_fail(error, "file is \"%.100s\", expected the name of a %s", name, frame_names(replay));
         return NULL;
     }
     struct hal_replay_entry *entry = find_entry(replay, name);
@@ -252,17 +266,51 @@ static void read_list(struct hal_replay *replay, const struct hal_log *log)
     free(path);
 }
 
-/* The samples of a frame from the disk. */
-static bool load_frame(struct hal_replay *replay, const char *name, struct hal_pgm *pgm,
+static bool load_image(struct hal_replay *replay, const char *path, struct hal_frame *frame,
+                       struct hal_error *error)
+{
+    size_t size = 0;
+    struct hal_pgm pgm = {0};
+    if (!hal_file_read(path, HAL_PGM_FILE_MAX, &replay->samples, &size, error) ||
+        !hal_pgm_decode(replay->samples, size, &pgm, error)) {
+        return false;
+    }
+    frame->samples = replay->samples;
+    frame->width = pgm.width;
+    frame->height = pgm.height;
+    frame->stride_bytes = pgm.width * pgm.bytes_per_sample;
+    frame->bytes_per_sample = pgm.bytes_per_sample;
+    frame->maximum = pgm.maximum;
+    return true;
+}
+
+static bool load_points(struct hal_replay *replay, const char *path, struct hal_frame *frame,
+                        struct hal_error *error)
+{
+    uint8_t *text = NULL;
+    size_t size = 0;
+    struct hal_xyz xyz = {0};
+    if (!hal_file_read(path, HAL_XYZ_FILE_MAX, &text, &size, error)) {
+        return false;
+    }
+    bool good = hal_xyz_decode((const char *)text, size, &xyz, error);
+    free(text);
+    replay->point_mm_q8 = xyz.point_mm_q8;
+    frame->point_mm_q8 = (const int32_t(*)[3])xyz.point_mm_q8;
+    frame->point_count = xyz.point_count;
+    return good;
+}
+
+/* A frame's content from the disk. */
+static bool load_frame(struct hal_replay *replay, const char *name, struct hal_frame *frame,
                        struct hal_error *error)
 {
     char *path = hal_file_join(replay->dir, name);
     if (path == NULL) {
         return hal_fail(error, "no memory for this file");
     }
-    size_t size = 0;
-    bool good = hal_file_read(path, HAL_PGM_FILE_MAX, &replay->samples, &size, error) &&
-                hal_pgm_decode(replay->samples, size, pgm, error);
+    bool good = has_suffix(name, POINTS_SUFFIX) ? load_points(replay, path, frame, error)
+                                                : load_image(replay, path, frame, error);
     free(path);
     return good;
 }
@@ -271,7 +319,9 @@ static enum hal_next next_frame(void *context, struct hal_frame *frame, struct h
 {
     struct hal_replay *replay = context;
     free(replay->samples);
+    free(replay->point_mm_q8);
     replay->samples = NULL;
+    replay->point_mm_q8 = NULL;
     if (replay->next_index == replay->entry_count) {
         return HAL_NEXT_END;
     }
@@ -286,23 +336,14 @@ static enum hal_next next_frame(void *context, struct hal_frame *frame, struct h
         hal_fail(error, "not listed in " LIST_NAME);
         return HAL_NEXT_BAD;
     }
-    struct hal_pgm pgm = {0};
-    if (!load_frame(replay, entry->name, &pgm, error)) {
-        return HAL_NEXT_BAD;
-    }
-    frame->samples = replay->samples;
-    frame->width = pgm.width;
-    frame->height = pgm.height;
-    frame->stride_bytes = pgm.width * pgm.bytes_per_sample;
-    frame->bytes_per_sample = pgm.bytes_per_sample;
-    frame->maximum = pgm.maximum;
-    return HAL_NEXT_FRAME;
+    return load_frame(replay, entry->name, frame, error) ? HAL_NEXT_FRAME : HAL_NEXT_BAD;
 }
 
-bool hal_replay_open(struct hal_replay *replay, const char *dir, const struct hal_log *log,
-                     struct hal_error *error)
+bool hal_replay_open(struct hal_replay *replay, const char *dir, bool with_lists,
+                     const struct hal_log *log, struct hal_error *error)
 {
-    *replay = (struct hal_replay){.camera = {.context = replay, .next = next_frame}};
+    *replay = (struct hal_replay){.camera = {.context = replay, .next = next_frame},
+                                  .with_lists = with_lists};
     replay->dir = copy_text(dir);
     if (replay->dir == NULL) {
         return hal_fail(error, "no memory");
@@ -328,6 +369,7 @@ void hal_replay_close(struct hal_replay *replay)
     }
     free(replay->entry);
     free(replay->samples);
+    free(replay->point_mm_q8);
     free(replay->dir);
     *replay = (struct hal_replay){.next_index = 0};
 }

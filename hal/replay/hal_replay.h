@@ -1,6 +1,7 @@
 /* hal_replay - a frames directory as a camera.
  *
- * In:    the directory's *.pgm and, if it is there, its frames.jsonl (docs/contract.md).
+ * In:    the directory's *.pgm and, if it is there, its frames.jsonl (docs/contract.md); its *.xyz
+ *        too, lists of points (hal_xyz.h), for a program that asks for them.
  * Out:   the frames in the lexicographic (byte) order of their names. Without frames.jsonl the
  *        laser is on and frames are HAL_REPLAY_STEP_US apart.
  * Error: on opening: no directory, no frames, no memory. To the log: what is wrong in frames.jsonl
@@ -39,13 +40,15 @@ struct hal_replay {
     struct hal_replay_entry *entry; /* sorted by name */
     size_t entry_count, entry_capacity;
     size_t next_index;
-    bool listed;      /* there is a frames.jsonl */
-    uint8_t *samples; /* of the frame handed on last */
+    bool with_lists;           /* *.xyz are frames too */
+    bool listed;               /* there is a frames.jsonl */
+    uint8_t *samples;          /* of the frame handed on last, */
+    int32_t (*point_mm_q8)[3]; /* or its points */
 };
 
 /* log is used during this call only. False: *error says why, and there is nothing to close. */
-bool hal_replay_open(struct hal_replay *replay, const char *dir, const struct hal_log *log,
-                     struct hal_error *error);
+bool hal_replay_open(struct hal_replay *replay, const char *dir, bool with_lists,
+                     const struct hal_log *log, struct hal_error *error);
 void hal_replay_close(struct hal_replay *replay);
 
 /* Is a frame of this name on the disk? */

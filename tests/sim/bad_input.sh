@@ -408,6 +408,65 @@ END
 { printf 'P5\n64 80\n65535\n' && head -c 10240 /dev/zero | tr '\000' '\377'; } >range/c.pgm
 run --json range
 check 'range: no depth, one depth, and beyond all range' 0 3 0 -
+
+# Lists of points beside images.
+cp -R range lists
+
+# points NAME PATTERN FORMAT: lists/b.xyz is what printf makes of it.
+points() {
+    # shellcheck disable=SC2059 # the format is the list
+    printf "$3" >lists/b.xyz
+    run --json lists
+    check "list: $1" 1 4 1 "$2"
+}
+
+# good_points NAME FORMAT: the same, and nothing is wrong with it.
+good_points() {
+    # shellcheck disable=SC2059 # the format is the list
+    printf "$2" >lists/b.xyz
+    run --json lists
+    check "list: $1" 0 5 0 -
+}
+
+printf '0 0 1000\n' >lists/aa.xyz
+good_points 'one point' '0 0 1000'
+good_points 'no points' ''
+good_points 'comments, empty lines, blanks and carriage returns' \
+    '# made by hand\n\n \t# more\r\n  1.5\t-2e1 +1000.25 \r\n\r\n0 0 900 '
+reason='the order is not that of the names'
+order=$(sed 's/^{"file":"\([^"]*\)".*/\1/' out | tr '\n' ' ')
+[ "$order" != 'a.pgm aa.xyz b.pgm b.xyz c.pgm ' ] || reason=
+result 'list: mixed with images in the order of names' "$reason"
+points 'two numbers' 'lists/b\.xyz: line 2: it ends early, expected three numbers' '0 0 900\n1 2\n'
+points 'two numbers at the end' 'lists/b\.xyz: line 1: it ends early' '1 2'
+points 'four numbers' 'lists/b\.xyz: line 1: more than three numbers' '1 2 900 4\n'
+points 'a word' 'lists/b\.xyz: line 3: high, expected a number' '#\n\n1 2 high\n'
+points 'commas' 'lists/b\.xyz: line 1: 1,2,900, expected a number' '1,2,900\n'
+points 'digits and more' 'lists/b\.xyz: line 1: 900mm, expected a number' '1 2 900mm\n'
+points 'a comment behind a point' 'lists/b\.xyz: line 1: more than three numbers' '1 2 900 # head\n'
+points 'not a number' 'lists/b\.xyz: line 1: -?nan mm, expected within' 'nan nan nan\n'
+points 'infinite' 'lists/b\.xyz: line 1: inf mm, expected within' '1 2 inf\n'
+points 'beyond all bounds' 'lists/b\.xyz: line 1: 8\.00001e\+06 mm, expected within' '1 2 8000010\n'
+points 'a zero byte' 'lists/b\.xyz: offset 8: a zero byte' '1 2 900\n\000'
+points 'metres' 'lists/b\.xyz: none of 2 points can be seen: 2 are nearer than 400 mm' \
+    '0 0 0.9\n0 0.1 1.1\n'
+points 'far and beside' 'lists/b\.xyz: none of 2 .* 1 farther than 4000 mm, 1 beside the image' \
+    '0 0 9000\n5000 0 1000\n'
+points 'a very long word' 'lists/b\.xyz: line 1: x{40}, expected a number' \
+    "$(printf '%0300d' 0 | tr 0 x)"
+rm lists/b.xyz && mkdir lists/b.xyz
+run --json lists
+check 'list: a directory' 1 4 1 'lists/b\.xyz: a directory, expected a file'
+rm -r lists/b.xyz lists/a*.* lists/b.pgm lists/c.pgm
+printf '0 0 1000\n' >lists/only.xyz
+run --json lists
+check 'list: nothing else' 0 1 0 -
+run --json --rig lists/rig.json lists
+check 'list: with the rig from elsewhere' 0 1 0 -
+printf '0 0 1000\n' >d/b.xyz
+run --json d
+check 'list: no frame for a dot rig' 0 3 0 -
+fresh
 { printf 'P5\n64 80\n255\n' && head -c 5120 /dev/zero; } >range/b.pgm
 run --json range
 check 'range: an 8-bit frame' 1 2 1 'range/b\.pgm: maxval 255, expected above 255'

@@ -1,0 +1,17 @@
+/* sim_cloud - the frame that the core is given: the camera's own, or a list of points drawn. */
+#ifndef SIM_CLOUD_H
+#define SIM_CLOUD_H
+
+#include "hal.h"
+#include "ih_cloud.h"
+
+struct sim_cloud {
+    uint16_t *depth_mm; /* NULL while no list came */
+};
+
+/* False when not one of a list's points can be seen: *error says where they are. */
+bool sim_cloud_view(struct sim_cloud *cloud, const struct hal_frame *frame,
+                    const struct ih_rig *rig, struct ih_frame *view, struct hal_error *error);
+void sim_cloud_free(struct sim_cloud *cloud);
+
+#endif
