@@ -16,12 +16,14 @@
 /* A metre farther away is worth this much less. */
 #define SCORE_PER_METRE 20
 
-/* Probes for the plane: two columns at +-PLANE_X_MM, rows every 50 mm from 50 up to -100 about
- * PLANE_Y_MM, PLANE_Y2_MM2 the sum of their squares about it. */
+/* Probes for the plane, and the sums of their squares in x, and in y about PLANE_Y_MM. */
 #define PLANE_PROBES 8
-#define PLANE_X_MM 135
 #define PLANE_Y_MM (-25)
+#define PLANE_X2_MM2 145800
 #define PLANE_Y2_MM2 25000
+static const int16_t beside_mm[PLANE_PROBES][2] = {
+    {-135, 50}, {135, 50}, {-135, 0}, {135, 0}, {-135, -50}, {135, -50}, {-135, -100}, {135, -100}};
+/* This far from a plane is on it; less seen below says nothing. */
 #define PLANE_OFF_MM 40
 #define PLANE_SEEN_MIN 2
 
@@ -405,29 +407,41 @@ struct plane {
     int64_t middle_q30, x_q46, y_q46;
 };
 
-/* The plane through eight probes beside the head; false where one of them shows nothing. With left
- * and right alike in number, and places symmetric about y = PLANE_Y_MM, least squares are sums. */
-static bool fit_plane(const struct ih_windows_scratch *s, const struct ih_windows_place *at,
-                      struct scale scale, struct plane *plane)
+/* Is what a probe saw on the plane? */
+static bool is_on_plane(const struct plane *plane, const int16_t probe_mm[2], int32_t depth_mm)
 {
+    int64_t inverse_q30 =
+        plane->middle_q30 + (plane->x_q46 * probe_mm[0] + plane->y_q46 * probe_mm[1]) / 65536;
+    return inverse_q30 > 0 && ih_abs_s64((1 << 30) / inverse_q30 - depth_mm) <= PLANE_OFF_MM;
+}
+
+/* The plane on which all probes beside a head lie; false where there is none. There are as many left
+ * as right, and their rows are symmetric about PLANE_Y_MM: least squares are sums. */
+static bool find_plane(const struct ih_windows_scratch *s, const struct ih_windows_place *at,
+                       struct scale scale, struct plane *plane)
+{
+    int32_t depth_mm[PLANE_PROBES];
     int64_t sum = 0;
     int64_t sum_x = 0;
     int64_t sum_y = 0;
     for (int32_t i = 0; i < PLANE_PROBES; i++) {
-        int16_t x_mm = i % 2 == 0 ? -PLANE_X_MM : PLANE_X_MM;
-        int16_t y_mm = (int16_t)(50 - 50 * (i / 2));
-        int32_t depth_mm = probe_mm(s, at, scale, (int16_t[2]){x_mm, y_mm});
-        if (depth_mm <= 0) {
+        depth_mm[i] = probe_mm(s, at, scale, beside_mm[i]);
+        if (depth_mm[i] <= 0) {
             return false;
         }
-        int64_t inverse_q30 = (1 << 30) / depth_mm;
+        int64_t inverse_q30 = (1 << 30) / depth_mm[i];
         sum += inverse_q30;
-        sum_x += inverse_q30 * x_mm;
-        sum_y += inverse_q30 * (y_mm - PLANE_Y_MM);
+        sum_x += inverse_q30 * beside_mm[i][0];
+        sum_y += inverse_q30 * (beside_mm[i][1] - PLANE_Y_MM);
     }
-    plane->x_q46 = sum_x * 65536 / (PLANE_PROBES * PLANE_X_MM * PLANE_X_MM);
+    plane->x_q46 = sum_x * 65536 / PLANE_X2_MM2;
     plane->y_q46 = sum_y * 65536 / PLANE_Y2_MM2;
     plane->middle_q30 = sum / PLANE_PROBES - PLANE_Y_MM * plane->y_q46 / 65536;
+    for (int32_t i = 0; i < PLANE_PROBES; i++) {
+        if (!is_on_plane(plane, beside_mm[i], depth_mm[i])) {
+            return false;
+        }
+    }
     return true;
 }
 
@@ -440,18 +454,13 @@ static bool stands_on_plane(const struct ih_windows_scratch *s, const struct ih_
     struct plane plane;
     int32_t seen = 0;
     int32_t on_plane = 0;
-    if (!fit_plane(s, at, scale, &plane)) {
+    if (!find_plane(s, at, scale, &plane)) {
         return false;
     }
     for (int32_t i = 0; i < g->probe_count; i++) {
         int32_t depth_mm = probe_mm(s, at, scale, g->probe_mm[i]);
-        int64_t inverse_q30 =
-            plane.middle_q30 +
-            (plane.x_q46 * g->probe_mm[i][0] + plane.y_q46 * g->probe_mm[i][1]) / 65536;
-        if (depth_mm > 0 && inverse_q30 > 0) {
-            on_plane += ih_abs_s64((1 << 30) / inverse_q30 - depth_mm) <= PLANE_OFF_MM;
-        }
         seen += depth_mm > 0;
+        on_plane += depth_mm > 0 && is_on_plane(&plane, g->probe_mm[i], depth_mm);
     }
     return seen >= PLANE_SEEN_MIN && 3 * on_plane >= 2 * seen;
 }

@@ -18,11 +18,12 @@
  *        3. The best one within apart_mm, in the image and in depth, stands for all there. Its place
  *           is the mean of those around it that score nearly as much.
  *        4. What stands on a table is no head: where all that is beside the place lies in one plane,
- *           and two thirds of what is below it too, within 40 mm, there is no window, nor near it.
+ *           and two thirds of what is below it too, within 40 mm each, there is no window, nor near it.
  *        Windows are few: one that scores score_behind_max less than the best, or less than
  *        score_min, is none.
  * Cost:  33 probes a cell with a depth, two divisions; every pixel is read about once, about six
- *        times where measured ones are rare. 4 ms for any image on one core of a server.
+ *        times where measured ones are rare. One core of a server takes 4 ms for 640 x 480 pixels and
+ *        16 ms for 1280 x 800.
  * Error: within a step of the float64 reference, apart from probes that hit another cell.
  * Bounds: focal length 2^29 in Q16 over a depth of at least 100 mm: 2^22.4 cells per mm; times 260 mm
  *        2^30.4. The sums of a place: 19,200 cells, weights of 1000, depths of 16,000: 2^38.2.

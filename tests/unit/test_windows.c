@@ -342,6 +342,29 @@ static void what_stands_on_a_table_is_no_head(void)
     TEST_ASSERT_EQUAL_INT32(1, windows.window_count);
 }
 
+/* High shoulders before a far wall, and a chest that comes nearer: a plane through what is beside the
+ * head would meet the chest, but it goes through nothing of what is beside. */
+static void what_is_beside_must_be_a_plane(void)
+{
+    static const struct vector_ellipsoid head = {{0, 0, 835}, {78, 113, 98}};
+    int32_t i;
+
+    use_rig(320, 240, 280);
+    for (i = 0; i < 320 * 240; i++) {
+        const double x = (i % 320 - 159.5) / 280, y = (i / 320 - 119.5) / 280;
+        const double y_mm = y * 737;
+        const double body = y_mm > 115  ? 1 / (6.98e-4 + (y_mm + 25) * 2.52e-6)
+                            : y_mm > 25 ? 987
+                                        : 1687;
+
+        depth_mm[i] = (uint16_t)lround(fmin(body, ellipsoid_depth_mm(&head, x, y)));
+    }
+    find("high shoulders");
+    TEST_ASSERT_TRUE(windows.window_count > 0);
+    IH_TEST_WITHIN(0.04, 0, ih_test_from_q(windows.window[0].x_q28, 28), "x", 0);
+    IH_TEST_WITHIN(0.04, 0, ih_test_from_q(windows.window[0].y_q28, 28), "y", 0);
+}
+
 /* Of pixels at the same distance the first in reading order, else the nearest: by trying all. */
 static void a_pixel_is_the_nearest(void)
 {
@@ -421,6 +444,7 @@ int main(void)
     RUN_TEST(extreme_lenses_are_survived);
     RUN_TEST(windows_are_at_most_as_many_as_asked_for);
     RUN_TEST(what_stands_on_a_table_is_no_head);
+    RUN_TEST(what_is_beside_must_be_a_plane);
     RUN_TEST(a_pixel_is_the_nearest);
     RUN_TEST(the_stride_is_followed);
     RUN_TEST(the_wrong_kind_is_refused);

@@ -108,6 +108,8 @@ class Places:
             return False
         terms = np.column_stack([np.ones(len(BESIDE)), BESIDE])
         fit = np.linalg.lstsq(terms, 1 / beside, rcond=None)[0]
+        if (np.abs(1 / (terms @ fit) - beside) > 40).any():
+            return False
         known = below > 0
         there = 1 / (np.column_stack([np.ones(len(BELOW)), BELOW]) @ fit)[known]
         near = np.abs(there - below[known]) <= 40
