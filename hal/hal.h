@@ -24,8 +24,8 @@ struct hal_error {
 bool hal_fail(struct hal_error *error, const char *format, ...)
     __attribute__((format(printf, 2, 3)));
 
-/* One frame: an image, or a list of points; then samples is NULL and what describes them 0. Samples,
- * points and name belong to the camera and live until its next call. */
+/* One frame: an image, or a list of points; then samples is NULL and what describes them 0.
+ * Samples, points and name belong to the camera and live until its next call. */
 struct hal_frame {
     const void *samples;
     int32_t width, height;           /* px */

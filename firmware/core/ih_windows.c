@@ -401,8 +401,8 @@ static void place_window(const struct ih_windows_scratch *s, const struct ih_rig
     out->score = best->score;
 }
 
-/* Inverse depth at probes, which is linear in x and y where a plane is seen: 2^30 per mm, in x and y
- * per mm of the template and times 65536. */
+/* Inverse depth at probes, which is linear in x and y where a plane is seen: 2^30 per mm, in x and
+ * y per mm of the template and times 65536. */
 struct plane {
     int64_t middle_q30, x_q46, y_q46;
 };
@@ -415,8 +415,8 @@ static bool is_on_plane(const struct plane *plane, const int16_t probe_mm[2], in
     return inverse_q30 > 0 && ih_abs_s64((1 << 30) / inverse_q30 - depth_mm) <= PLANE_OFF_MM;
 }
 
-/* The plane on which all probes beside a head lie; false where there is none. There are as many left
- * as right, and their rows are symmetric about PLANE_Y_MM: least squares are sums. */
+/* The plane on which all probes beside a head lie; false where there is none. There are as many
+ * left as right, and their rows are symmetric about PLANE_Y_MM: least squares are sums. */
 static bool find_plane(const struct ih_windows_scratch *s, const struct ih_windows_place *at,
                        struct scale scale, struct plane *plane)
 {

@@ -342,8 +342,8 @@ static void what_stands_on_a_table_is_no_head(void)
     TEST_ASSERT_EQUAL_INT32(1, windows.window_count);
 }
 
-/* High shoulders before a far wall, and a chest that comes nearer: a plane through what is beside the
- * head would meet the chest, but it goes through nothing of what is beside. */
+/* High shoulders before a far wall, and a chest that comes nearer: a plane through what is beside
+ * the head would meet the chest, but it goes through nothing of what is beside. */
 static void what_is_beside_must_be_a_plane(void)
 {
     static const struct vector_ellipsoid head = {{0, 0, 835}, {78, 113, 98}};
