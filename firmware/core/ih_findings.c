@@ -19,6 +19,7 @@ void ih_findings_begin(struct ih_findings *out)
 {
     out->finding_count = 0;
     out->dropped_count = 0;
+    out->seen_count = 0;
     memset(out->view, 0, sizeof out->view);
 }
 
@@ -164,6 +165,7 @@ void ih_findings_add(const struct ih_points *points, const struct ih_dots *dots,
                      struct ih_findings_scratch *scratch, struct ih_findings *out)
 {
     const struct work work = {&scratch->space, heads, rig, params, out};
+    out->seen_count += points->seen_count;
     ih_space_make(points, dots, rig, &params->space, &scratch->space);
     ih_scan_find(&scratch->space, &params->scan, &scratch->scan_scratch, &scratch->scan);
     for (int32_t i = 0; i < scratch->scan.place_count; i++) {

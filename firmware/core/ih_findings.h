@@ -61,6 +61,7 @@ struct ih_view {
 struct ih_findings {
     int32_t finding_count;
     int32_t dropped_count;
+    int32_t seen_count; /* points, over all windows */
     /* The last IH_FINDINGS_EXPECTED_MAX entries are for predicted ones. */
     struct ih_finding finding[IH_FINDINGS_MAX + IH_FINDINGS_EXPECTED_MAX];
     struct ih_view view[IH_FINDINGS_EXPECTED_MAX]; /* by expected head, summed over windows */

@@ -23,6 +23,7 @@
 /* Two tracks nearer than this follow the same head. */
 #define SAME_MM 80
 #define VIEW_RAYS_MIN 4
+#define FINDING_COUNT_MAX 1000
 /* Heads this much less probable than the best are not chosen for their place. */
 #define CHOICE_LOGIT_Q10 (3 << 10)
 
@@ -32,12 +33,15 @@ void ih_tracks_params_default(struct ih_tracks_params *params)
         .gate_mm = 90,
         .gate_mm_per_s = 300,
         .start_logit_q10 = -1024,
-        .accept_logit_q10 = 1024,
+        .start_head_logit_q10 = 1024,
+        .mature_findings = 3,
+        .accept_logit_q10 = 256,
         .drop_logit_q10 = -512,
         .keep_logit_q10 = -3072,
         .memory_q16 = 49152,
         .through_percent = 50,
         .front_percent = 30,
+        .seen_least = 30,
         .carry_us = 1000000,
         .gap_us = 2000000,
         .measured_mm = 12,
@@ -166,8 +170,13 @@ static void remember_logit(struct ih_track *track, int32_t logit_q10, int32_t me
 
 static void judge(struct ih_track *track, const struct ih_tracks_params *params)
 {
-    track->is_head = track->mean_logit_q10 >
-                     (track->is_head ? params->drop_logit_q10 : params->accept_logit_q10);
+    int32_t limit_q10 = params->start_head_logit_q10;
+    if (track->is_head) {
+        limit_q10 = params->drop_logit_q10;
+    } else if (track->finding_count >= params->mature_findings) {
+        limit_q10 = params->accept_logit_q10;
+    }
+    track->is_head = track->mean_logit_q10 > limit_q10;
 }
 
 static void give(struct ih_tracks *tracks, const struct ih_tracks_params *params,
@@ -177,16 +186,25 @@ static void give(struct ih_tracks *tracks, const struct ih_tracks_params *params
     finding->track_id = track->id;
     track->finding = index;
     track->seen_us = tracks->time_us;
+    track->finding_count = ih_min_s32(track->finding_count + 1, FINDING_COUNT_MAX);
     correct(track, finding, params);
     remember_logit(track, finding->logit_q10, params->memory_q16);
     judge(track, params);
 }
 
-/* Does nothing convincing stand there, and do the rays go through? */
-static bool is_gone(const struct ih_view *view, const struct ih_tracks_params *params)
+/* Do the rays go through where the head was, or is it out of the pattern? */
+static bool is_gone(const struct ih_findings *findings, int32_t track,
+                    const struct ih_tracks_params *params)
 {
+    const struct ih_view *view = &findings->view[track];
     int32_t rays = view->through + view->hit + view->front;
-    return rays >= VIEW_RAYS_MIN && view->through * 100 > rays * params->through_percent &&
+    if (findings->seen_count < params->seen_least) {
+        return false;
+    }
+    if (rays < VIEW_RAYS_MIN) {
+        return true;
+    }
+    return view->through * 100 > rays * params->through_percent &&
            view->front * 100 < rays * params->front_percent;
 }
 
@@ -196,12 +214,12 @@ static bool best_pair(const struct ih_tracks *tracks, const struct ih_tracks_par
 {
     int32_t best = INT32_MIN;
     for (int32_t t = 0; t < tracks->track_count; t++) {
-        bool gone = is_gone(&findings->view[t], params);
+        bool gone = is_gone(findings, t, params);
         for (int32_t f = 0; f < findings->finding_count; f++) {
             int32_t merit;
             if (tracks->track[t].finding != IH_NONE ||
                 !fits(tracks, params, &tracks->track[t], &findings->finding[f], &merit) ||
-                (gone && findings->finding[f].logit_q10 < params->accept_logit_q10)) {
+                (gone && findings->finding[f].logit_q10 < params->start_head_logit_q10)) {
                 continue;
             }
             if (merit > best) {
@@ -247,7 +265,7 @@ static void prune(struct ih_tracks *tracks, const struct ih_tracks_params *param
         bool seen = track->finding != IH_NONE;
         bool ended = seen ? track->mean_logit_q10 < params->keep_logit_q10
                           : !track->is_head || unseen_us > params->carry_us ||
-                                is_gone(&findings->view[t], params);
+                                is_gone(findings, t, params);
         if (ended || is_double(tracks, kept, track)) {
             if (seen) {
                 findings->finding[track->finding].track_id = 0;
@@ -274,6 +292,7 @@ static void start_track(struct ih_tracks *tracks, const struct ih_tracks_params 
         .place_q8 = (int64_t)params->measured_mm * params->measured_mm * 256,
         .speed_q8 = (int64_t)START_SPEED_MM_S * START_SPEED_MM_S * 256,
         .seen_us = tracks->time_us,
+        .finding_count = 1,
         .finding = index,
     };
     if (is_double(tracks, tracks->track_count, track)) {

@@ -11,11 +11,13 @@
  *        1. gives findings to tracks, the best pair first: within the gate, and log-odds above
  *           keep_logit even if it would not start a track.
  *        2. ends a track that found nothing convincing when more than half of the rays through it go
- *           through and fewer than 30 % are stopped before it: the seat is empty.
+ *           through and fewer than 30 % are stopped before it: the seat is empty; or when hardly a
+ *           ray meets it any more: it has left the pattern. A frame in which fewer than seen_least
+ *           dots were seen says neither: it is lost.
  *        3. carries the others, slowing down, for at most carry_us.
  *        4. starts tracks with what is left and above start_logit.
- *        A track's log-odds are a running mean of its findings'; it is a head above accept_logit,
- *        until it falls below drop_logit.
+ *        A track's log-odds are a running mean of its findings'; it is a head above start_head_logit,
+ *        from its mature_findings-th finding on above accept_logit, until it falls below drop_logit.
  *        The selected head is the one nearest the middle of the pattern (or the leftmost or
  *        rightmost in the picture, by side), of those not much less probable than the best; another
  *        takes its place after switch_frames frames.
@@ -38,11 +40,13 @@ struct ih_tracks_params {
     int32_t gate_mm;          /* a finding this near belongs to the track .. */
     int32_t gate_mm_per_s;    /* .. and farther, the longer it was not seen */
     int32_t start_logit_q10;  /* findings above this start a track */
-    int32_t accept_logit_q10; /* tracks above this are heads .. */
-    int32_t drop_logit_q10;   /* .. until they fall below this */
+    int32_t start_head_logit_q10; /* a new track above this is a head at once .. */
+    int32_t mature_findings, accept_logit_q10; /* .. later above this .. */
+    int32_t drop_logit_q10;   /* .. until it falls below this */
     int32_t keep_logit_q10;   /* findings above this continue a track */
     int32_t memory_q16;       /* share of the old mean in the new one */
     int32_t through_percent, front_percent;
+    int32_t seen_least;
     int32_t carry_us;
     int32_t gap_us; /* up to 2 s */
     int32_t measured_mm;         /* standard deviation of a finding's centre */
@@ -60,6 +64,7 @@ struct ih_track {
     /* covariance of place and velocity along each axis: mm^2, mm^2/s, mm^2/s^2 */
     int64_t place_q8, cross_q8, speed_q8;
     int64_t seen_us;
+    int32_t finding_count; /* so far, at most 1000 */
     int32_t finding; /* of this frame, or IH_NONE */
 };
 

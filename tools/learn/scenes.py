@@ -17,7 +17,7 @@ def scenes_of_seed(seed):
     ambient = AMBIENTS[seed % len(AMBIENTS)]
     person = PERSONS[seed % len(PERSONS)]
     act = ACTS[seed % len(ACTS)]
-    knock = ("0", "0", "0.05", "0.1")[seed % 4]
+    knock = ("0", "0", "0.01", "0.02")[seed % 4]
 
     def scene(name, kind, frames, rig, *more):
         return name, ["--scene", kind, "--frames", str(frames), "--rig", rig, "--ambient", ambient,
