@@ -20,6 +20,9 @@
 #include "sim_truth.h"
 
 #define STDOUT_NAME "standard output"
+/* An ambient frame older than this says too little about the scene: at 1 m/s somebody has moved by
+ * 200 mm. */
+#define AMBIENT_AGE_MAX_US 200000
 
 /* What a run works with. */
 struct run {
@@ -39,6 +42,9 @@ struct visit {
     struct sim_record record;
     struct sim_cloud cloud;
     struct sim_score *score;
+    /* The last frame without laser, for the lit ones after it; samples NULL: none yet. */
+    struct ih_frame ambient;
+    int64_t ambient_time_us;
 };
 
 /* Rig file to a core that is ready; wrong ones go to the report. */
@@ -125,19 +131,60 @@ static void put_frame(struct visit *visit, const struct hal_frame *frame)
     }
 }
 
+static struct ih_frame view_of(const struct hal_frame *frame)
+{
+    return (struct ih_frame){
+        .samples = frame->samples,
+        .width = frame->width,
+        .height = frame->height,
+        .stride_bytes = frame->stride_bytes,
+        .bytes_per_sample = frame->bytes_per_sample,
+        .maximum = frame->maximum,
+    };
+}
+
+/* Keep a frame without laser: the camera's own buffer lives only until the next one. */
+static void keep_ambient(struct visit *visit, const struct hal_frame *frame)
+{
+    const struct isohead *head = visit->run->head;
+    struct hal_error error;
+    size_t size = (size_t)frame->height * (size_t)frame->stride_bytes;
+    if (frame->width != head->rig.calibration.width ||
+        frame->height != head->rig.calibration.height) {
+        explain_frame(head, frame, IH_ERR_SIZE, &error);
+        lose_frame(visit, frame, error.text);
+        return;
+    }
+    free((void *)visit->ambient.samples);
+    void *copy = sim_report_grow(NULL, size, 1);
+    memcpy(copy, frame->samples, size);
+    visit->ambient = view_of(frame);
+    visit->ambient.samples = copy;
+    visit->ambient_time_us = frame->time_us;
+}
+
+static const struct ih_frame *fresh_ambient(const struct visit *visit, int64_t time_us)
+{
+    bool fresh =
+        visit->ambient.samples != NULL && time_us - visit->ambient_time_us <= AMBIENT_AGE_MAX_US;
+    return fresh ? &visit->ambient : NULL;
+}
+
 static void process_frame(struct visit *visit, const struct hal_frame *frame)
 {
     struct isohead *head = visit->run->head;
     struct hal_error error;
     struct ih_frame view;
     if (!frame->laser) {
+        keep_ambient(visit, frame);
         return;
     }
     if (!sim_cloud_view(&visit->cloud, frame, &head->rig, &view, &error)) {
         lose_frame(visit, frame, error.text);
         return;
     }
-    enum ih_err err = isohead_frame(head, &view, frame->time_us);
+    enum ih_err err =
+        isohead_frame(head, &view, fresh_ambient(visit, frame->time_us), frame->time_us);
     if (err != IH_OK) {
         explain_frame(head, frame, err, &error);
         lose_frame(visit, frame, error.text);
@@ -196,6 +243,7 @@ static void process_dir(struct run *run, size_t index)
         sim_table_title(stdout, dir->path);
     }
     process_frames(&visit);
+    free((void *)visit.ambient.samples);
     sim_truth_free(&visit.truth);
     sim_cloud_free(&visit.cloud);
     hal_replay_close(&visit.replay);

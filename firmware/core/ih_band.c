@@ -17,26 +17,26 @@ struct ih_row ih_frame_row(const struct ih_frame *frame, int32_t v)
     };
 }
 
-void ih_band_begin(struct ih_band *band, int32_t width)
-{
-    band->width = width;
-    band->rows_in = 0;
-}
-
-void ih_band_take(struct ih_band *band, const struct ih_row *row)
+void ih_row_grey(const struct ih_row *row, int32_t width, uint16_t *grey_q4)
 {
     const uint32_t maximum = (uint32_t)row->maximum;
     /* 255 of 255 and 65535 of 65535 become 4080. */
     const uint32_t gain_q16 = (IH_BAND_FULL_Q4 * 65536u + maximum / 2) / maximum;
     const uint8_t *narrow = row->samples;
     const uint16_t *wide = row->samples;
-    for (int32_t u = 0; u < band->width; u++) {
+    for (int32_t u = 0; u < width; u++) {
         uint32_t sample = row->bytes_per_sample == 1 ? narrow[u] : wide[u];
         if (sample > maximum) {
             sample = maximum;
         }
-        band->incoming_q4[u] = (uint16_t)((sample * gain_q16 + 32768u) >> 16);
+        grey_q4[u] = (uint16_t)((sample * gain_q16 + 32768u) >> 16);
     }
+}
+
+void ih_band_begin(struct ih_band *band, int32_t width)
+{
+    band->width = width;
+    band->rows_in = 0;
 }
 
 /* Column sums with the newest row and without the one that leaves the ring. */

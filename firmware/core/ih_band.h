@@ -6,8 +6,9 @@
  *        sum I (weight 16) and the 9x9 box sum B (weight 81), edge pixels repeated outside,
  *        R = (81 I - 16 B) / 256, rounded. A constant gives 0; IH_BAND_UNIT units of R are one grey
  *        level of 8 bits.
- * Range: I <= 65,280, so 81 I <= 2^22.4, less what the nine bright pixels add to the box:
- *        |R| <= 18,360, 16 bits. Column sums of nine rows <= 36,720, 16 bits without sign.
+ * Range: grey <= 4080, 4144 after an ambient frame was subtracted (ih_noise). I <= 66,304, so
+ *        81 I <= 2^22.4, less what the nine bright pixels add to the box: |R| <= 18,648, 16 bits.
+ *        Column sums of nine rows <= 37,296, 16 bits without sign.
  * Cost:  nine rows of 16 bits; about 20 operations per pixel.
  * Error: R within half a unit (0.006 grey levels) of the exact filter; samples deeper than 8 bits are
  *        rounded to 12 bits before.
@@ -49,11 +50,11 @@ struct ih_row ih_frame_row(const struct ih_frame *frame, int32_t v);
 
 void ih_band_begin(struct ih_band *band, int32_t width);
 
-/* Bring a row's samples to 12 bits, in incoming_q4. */
-void ih_band_take(struct ih_band *band, const struct ih_row *row);
+/* A row's samples in 12 bits. */
+void ih_row_grey(const struct ih_row *row, int32_t width, uint16_t *grey_q4);
 
-/* Push what incoming_q4 holds. True: response[0 .. width - 1] is that of the row IH_BAND_REACH
- * pushes ago. Rows repeated at the frame's top and bottom are pushed by the caller. */
+/* Push what incoming_q4 holds, filled by the caller. True: response[0 .. width - 1] is that of the
+ * row IH_BAND_REACH pushes ago. Rows repeated at the frame's top and bottom are pushed by the caller. */
 bool ih_band_push(struct ih_band *band, int16_t *response);
 
 #endif

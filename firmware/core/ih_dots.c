@@ -121,7 +121,7 @@ static int32_t beside(struct ih_dots_scratch *scratch, int32_t u, int32_t v)
            response_row(scratch, below)[u];
 }
 
-/* Weights: R <= 18,360, squared 2^28.4; 81 of them 2^34.8; offsets of 4 in Q12 2^49. */
+/* Weights: R <= 18,648, squared 2^28.4; 81 of them 2^34.8; offsets of 4 in Q12 2^49. */
 static struct ih_dot centred(struct ih_dots_scratch *scratch, int32_t u, int32_t v, int32_t reach)
 {
     const int32_t peak = response_row(scratch, v)[u];
@@ -244,12 +244,18 @@ static void add_to_blocks(struct ih_dots_scratch *scratch, struct ih_dots *out, 
     }
 }
 
-void ih_dots_row(struct ih_dots_scratch *scratch, struct ih_dots *out, const struct ih_row *row)
+void ih_dots_row(struct ih_dots_scratch *scratch, struct ih_dots *out, const struct ih_row *row,
+                 const struct ih_row *ambient)
 {
-    int32_t copies =
-        scratch->rows_taken == 0 ? IH_BAND_REACH + 1 : 1; /* repeat the first upwards */
-    ih_band_take(&scratch->rows.finding.band, row);
-    add_to_blocks(scratch, out, scratch->rows_taken++);
+    struct ih_band *band = &scratch->rows.finding.band;
+    int32_t v = scratch->rows_taken++;
+    int32_t copies = v == 0 ? IH_BAND_REACH + 1 : 1; /* repeat the first upwards */
+    ih_row_grey(row, band->width, band->incoming_q4);
+    add_to_blocks(scratch, out, v);
+    if (ambient != NULL) {
+        ih_row_grey(ambient, band->width, scratch->ambient_q4);
+        ih_noise_subtract(&scratch->noise, v, band->width, scratch->ambient_q4, band->incoming_q4);
+    }
     for (int32_t i = 0; i < copies; i++) {
         push_row(scratch, out);
     }
@@ -268,14 +274,16 @@ void ih_dots_end(struct ih_dots_scratch *scratch, struct ih_dots *out)
     }
 }
 
-void ih_dots_find(const struct ih_frame *frame, const struct ih_dots_params *params,
-                  struct ih_dots_scratch *scratch, struct ih_dots *out)
+void ih_dots_find(const struct ih_frame *frame, const struct ih_frame *ambient,
+                  const struct ih_dots_params *params, struct ih_dots_scratch *scratch,
+                  struct ih_dots *out)
 {
-    ih_noise_measure(frame, &scratch->rows.measuring, &scratch->noise);
+    ih_noise_measure(frame, ambient, &scratch->rows.measuring, &scratch->noise);
     ih_dots_begin(scratch, out, params, frame->width, frame->height, &scratch->noise);
     for (int32_t v = 0; v < frame->height; v++) {
         struct ih_row row = ih_frame_row(frame, v);
-        ih_dots_row(scratch, out, &row);
+        struct ih_row under = ih_frame_row(ambient != NULL ? ambient : frame, v);
+        ih_dots_row(scratch, out, &row, ambient != NULL ? &under : NULL);
     }
     ih_dots_end(scratch, out);
 }

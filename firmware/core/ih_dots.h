@@ -1,7 +1,8 @@
 /* ih_dots - find projected laser dots in one grey frame (paper, section 2.2).
  *
  * In:    rows of the frame from top to bottom; pixel centres at integer coordinates; a map of the
- *        noise (ih_noise).
+ *        noise (ih_noise). If there is one, the rows of the ambient frame: they are subtracted
+ *        where the map says so, before anything but the map of over-exposed blocks.
  * Out:   dots by row, then column: sub-pixel centres in the frame's own (distorted) pixels; a map
  *        of over-exposed blocks; counters of what was refused or dropped.
  * Way:   a dot is a local maximum (3x3) of the band-pass's response R (ih_band) that
@@ -80,6 +81,7 @@ struct ih_dots_scratch {
     int32_t response_rows; /* in the ring, those below the frame included */
     int32_t block_rows;    /* in block_sum */
     uint32_t block_sum[IH_DOTS_BLOCKS_X];
+    uint16_t ambient_q4[IH_FRAME_WIDTH_MAX];
     struct ih_noise noise;
     union {
         struct ih_noise_scratch measuring;
@@ -98,12 +100,16 @@ void ih_dots_params_default(struct ih_dots_params *params);
 void ih_dots_begin(struct ih_dots_scratch *scratch, struct ih_dots *out,
                    const struct ih_dots_params *params, int32_t width, int32_t height,
                    const struct ih_noise *noise);
-void ih_dots_row(struct ih_dots_scratch *scratch, struct ih_dots *out, const struct ih_row *row);
+/* ambient: the same row of the ambient frame, or NULL. */
+void ih_dots_row(struct ih_dots_scratch *scratch, struct ih_dots *out, const struct ih_row *row,
+                 const struct ih_row *ambient);
 void ih_dots_end(struct ih_dots_scratch *scratch, struct ih_dots *out);
 
-/* The whole frame in one call: noise, begin, rows, end. The frame's view has been checked. */
-void ih_dots_find(const struct ih_frame *frame, const struct ih_dots_params *params,
-                  struct ih_dots_scratch *scratch, struct ih_dots *out);
+/* The whole frame in one call: noise, begin, rows, end. ambient: of the same width and height, or
+ * NULL. Both views have been checked. */
+void ih_dots_find(const struct ih_frame *frame, const struct ih_frame *ambient,
+                  const struct ih_dots_params *params, struct ih_dots_scratch *scratch,
+                  struct ih_dots *out);
 
 /* Is the frame's block at this pixel over-exposed? Outside the frame: false. */
 bool ih_dots_is_bright(const struct ih_dots *dots, int32_t u_px, int32_t v_px);

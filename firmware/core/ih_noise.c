@@ -4,7 +4,27 @@
 
 #include "ih_fix.h"
 
-#define SAMPLES_MAX (IH_NOISE_BLOCK / IH_NOISE_STEP * IH_NOISE_BLOCK)
+/* All of the ambient light is taken away. */
+#define WHOLE_Q12 4096
+/* What is left where nothing changed; noise must not be cut at 0, but the dark ghost of something
+ * that moved shall be. */
+#define REST_Q4 64
+/* White noise, which is what is left, has more lonely maxima than texture of the same median. */
+#define WHITE_Q4 19
+#define SAMPLED_ROWS (IH_NOISE_BLOCK / IH_NOISE_STEP)
+#define SAMPLES_MAX (SAMPLED_ROWS * IH_NOISE_BLOCK)
+
+/* Twice the distance of a pixel from the first block's centre, limited to between the outermost
+ * centres; a block is 2 * IH_NOISE_BLOCK of it. */
+static int32_t twice_offset(int32_t pixel, int32_t blocks)
+{
+    return ih_clamp_s32(2 * pixel - (IH_NOISE_BLOCK - 1), 0, 2 * IH_NOISE_BLOCK * (blocks - 1));
+}
+
+static int32_t between(int32_t low, int32_t high, int32_t part)
+{
+    return low + (int32_t)ih_shift_round((int64_t)(high - low) * part, 6);
+}
 
 /* The value of rank count / 2, from 0: the k-th smallest by halving the range of values. */
 static uint16_t median_of(const uint16_t *value, int32_t count)
@@ -40,14 +60,163 @@ static uint16_t block_median(const struct ih_noise_scratch *scratch, int32_t col
     return median_of(value, count);
 }
 
-static void respond(const struct ih_frame *frame, int32_t v, struct ih_band *band,
-                    int16_t *response)
+static bool is_any_subtracted(const struct ih_noise *noise, int32_t above, int32_t below)
 {
-    ih_band_begin(band, frame->width);
-    for (int32_t dv = -IH_BAND_REACH; dv <= IH_BAND_REACH; dv++) {
-        struct ih_row row = ih_frame_row(frame, ih_clamp_s32(v + dv, 0, frame->height - 1));
-        ih_band_take(band, &row);
-        (void)ih_band_push(band, response);
+    uint32_t any = 0;
+    for (int32_t column = 0; column < noise->columns; column++) {
+        any |= noise->subtract[above][column] | noise->subtract[below][column];
+    }
+    return any != 0;
+}
+
+/* The share that a block wants. */
+static int32_t share_q12(const struct ih_noise *noise, int32_t row, int32_t column)
+{
+    return noise->subtract[row][column] != 0 ? WHOLE_Q12 : 0;
+}
+
+/* Pixels first .. end - 1 lie behind one block's centre and before the next one's, the first of them
+ * part 64ths of the way on, each further one 2 more. */
+static void subtract_span(const uint16_t *ambient_q4, uint16_t *grey_q4, int32_t first, int32_t end,
+                          int32_t from_q12, int32_t to_q12, int32_t part)
+{
+    if (from_q12 == 0 && to_q12 == 0) {
+        return;
+    }
+    for (int32_t u = first; u < end; u++) {
+        int32_t share = from_q12 + (((to_q12 - from_q12) * part + 32) >> 6);
+        int32_t taken = ((ambient_q4[u] - REST_Q4) * share + WHOLE_Q12 / 2) >> 12;
+        grey_q4[u] = (uint16_t)ih_max_s32(0, grey_q4[u] - taken);
+        part += 2;
+    }
+}
+
+void ih_noise_subtract(const struct ih_noise *noise, int32_t v, int32_t width,
+                       const uint16_t *ambient_q4, uint16_t *grey_q4)
+{
+    const int32_t offset_v = twice_offset(v, noise->rows);
+    const int32_t above = offset_v / (2 * IH_NOISE_BLOCK);
+    const int32_t below = ih_min_s32(above + 1, noise->rows - 1);
+    if (!is_any_subtracted(noise, above, below)) {
+        return;
+    }
+    int32_t before_q12 = 0;
+    int32_t first = 0;
+    for (int32_t column = 0; column < noise->columns; column++) {
+        int32_t here_q12 = between(share_q12(noise, above, column), share_q12(noise, below, column),
+                                   offset_v % (2 * IH_NOISE_BLOCK));
+        int32_t end = ih_min_s32(width, column * IH_NOISE_BLOCK + IH_NOISE_BLOCK / 2);
+        subtract_span(ambient_q4, grey_q4, first, end, column == 0 ? here_q12 : before_q12,
+                      here_q12, 1);
+        before_q12 = here_q12;
+        first = end;
+    }
+    subtract_span(ambient_q4, grey_q4, first, width, before_q12, before_q12, 1);
+}
+
+/* The row that is looked at next in a row of blocks; at least one, even if the frame ends above. */
+static int32_t sampled_row(int32_t block_row, int32_t sample, int32_t height)
+{
+    int32_t v = block_row * IH_NOISE_BLOCK + IH_BAND_REACH + sample * IH_NOISE_STEP;
+    if (v < height) {
+        return v;
+    }
+    return sample == 0 ? height - 1 : IH_NONE;
+}
+
+/* Grey levels of a row of both frames. */
+static void take_rows(const struct ih_frame *frame, const struct ih_frame *ambient, int32_t v,
+                      struct ih_noise_scratch *scratch)
+{
+    int32_t inside = ih_clamp_s32(v, 0, frame->height - 1);
+    struct ih_row row = ih_frame_row(frame, inside);
+    ih_row_grey(&row, frame->width, scratch->band.incoming_q4);
+    if (ambient != NULL) {
+        row = ih_frame_row(ambient, inside);
+        ih_row_grey(&row, frame->width, scratch->ambient_q4);
+    }
+}
+
+static void measure(const struct ih_frame *frame, const struct ih_frame *ambient,
+                    struct ih_noise_scratch *scratch, struct ih_noise *out)
+{
+    for (int32_t block_row = 0; block_row < out->rows; block_row++) {
+        int32_t count = 0;
+        int32_t v;
+        while (count < SAMPLED_ROWS &&
+               (v = sampled_row(block_row, count, frame->height)) != IH_NONE) {
+            ih_band_begin(&scratch->band, frame->width);
+            for (int32_t at = v - IH_BAND_REACH; at <= v + IH_BAND_REACH; at++) {
+                take_rows(frame, ambient, at, scratch);
+                if (ambient != NULL) {
+                    ih_noise_subtract(out, ih_clamp_s32(at, 0, frame->height - 1), frame->width,
+                                      scratch->ambient_q4, scratch->band.incoming_q4);
+                }
+                (void)ih_band_push(&scratch->band, scratch->response[count]);
+            }
+            count++;
+        }
+        for (int32_t column = 0; column < out->columns; column++) {
+            out->median[block_row][column] = block_median(scratch, column, count);
+        }
+    }
+}
+
+/* Half of the difference of both rows, from the middle of the range: not cut on either side. */
+static void halve_difference(struct ih_noise_scratch *scratch)
+{
+    uint16_t *grey_q4 = scratch->band.incoming_q4;
+    for (int32_t u = 0; u < scratch->band.width; u++) {
+        grey_q4[u] = (uint16_t)((grey_q4[u] + IH_BAND_FULL_Q4 - scratch->ambient_q4[u]) >> 1);
+    }
+}
+
+/* Sum over a row's part in each block. */
+static void add_row(const struct ih_band *band, int32_t sum[IH_NOISE_BLOCKS_X])
+{
+    for (int32_t u = 0; u < band->width; u++) {
+        sum[u / IH_NOISE_BLOCK] += band->incoming_q4[u] - IH_BAND_FULL_Q4 / 2;
+    }
+}
+
+/* In a row of blocks: is it quieter by an eighth without the ambient light, and not darker than the
+ * ambient frame? median holds the noise with it. */
+static void choose(const struct ih_frame *frame, const struct ih_frame *ambient,
+                   struct ih_noise_scratch *scratch, struct ih_noise *out, int32_t block_row)
+{
+    int32_t half_sum[IH_NOISE_BLOCKS_X] = {0};
+    int32_t count = 0;
+    int32_t v;
+    while (count < SAMPLED_ROWS && (v = sampled_row(block_row, count, frame->height)) != IH_NONE) {
+        ih_band_begin(&scratch->band, frame->width);
+        for (int32_t at = v - IH_BAND_REACH; at <= v + IH_BAND_REACH; at++) {
+            take_rows(frame, ambient, at, scratch);
+            halve_difference(scratch);
+            if (at == v) {
+                add_row(&scratch->band, half_sum);
+            }
+            (void)ih_band_push(&scratch->band, scratch->response[count]);
+        }
+        count++;
+    }
+    for (int32_t column = 0; column < out->columns; column++) {
+        int32_t width = ih_min_s32(IH_NOISE_BLOCK, frame->width - column * IH_NOISE_BLOCK);
+        bool quieter =
+            16 * block_median(scratch, column, count) < 7 * out->median[block_row][column];
+        bool darker = half_sum[column] < -(REST_Q4 / 4) * width * count;
+        out->subtract[block_row][column] = quieter && !darker;
+    }
+}
+
+static void raise_white(struct ih_noise *out)
+{
+    for (int32_t row = 0; row < out->rows; row++) {
+        for (int32_t column = 0; column < out->columns; column++) {
+            if (out->subtract[row][column] != 0) {
+                out->median[row][column] =
+                    (uint16_t)ih_shift_round(out->median[row][column] * WHITE_Q4, 4);
+            }
+        }
     }
 }
 
@@ -63,24 +232,19 @@ static void smooth(uint16_t *first, int32_t count, int32_t step)
     }
 }
 
-void ih_noise_measure(const struct ih_frame *frame, struct ih_noise_scratch *scratch,
-                      struct ih_noise *out)
+void ih_noise_measure(const struct ih_frame *frame, const struct ih_frame *ambient,
+                      struct ih_noise_scratch *scratch, struct ih_noise *out)
 {
     memset(out, 0, sizeof *out);
     out->columns = (int16_t)((frame->width + IH_NOISE_BLOCK - 1) / IH_NOISE_BLOCK);
     out->rows = (int16_t)((frame->height + IH_NOISE_BLOCK - 1) / IH_NOISE_BLOCK);
-    for (int32_t block_row = 0; block_row < out->rows; block_row++) {
-        int32_t count = 0;
-        for (int32_t v = block_row * IH_NOISE_BLOCK + IH_BAND_REACH;
-             v < (block_row + 1) * IH_NOISE_BLOCK; v += IH_NOISE_STEP) {
-            if (v < frame->height || count == 0) {
-                respond(frame, ih_min_s32(v, frame->height - 1), &scratch->band,
-                        scratch->response[count++]);
-            }
+    measure(frame, NULL, scratch, out);
+    if (ambient != NULL) {
+        for (int32_t row = 0; row < out->rows; row++) {
+            choose(frame, ambient, scratch, out, row);
         }
-        for (int32_t column = 0; column < out->columns; column++) {
-            out->median[block_row][column] = block_median(scratch, column, count);
-        }
+        measure(frame, ambient, scratch, out);
+        raise_white(out);
     }
     for (int32_t row = 0; row < out->rows; row++) {
         smooth(out->median[row], out->columns, 1);
@@ -88,18 +252,6 @@ void ih_noise_measure(const struct ih_frame *frame, struct ih_noise_scratch *scr
     for (int32_t column = 0; column < out->columns; column++) {
         smooth(&out->median[0][column], out->rows, IH_NOISE_BLOCKS_X);
     }
-}
-
-/* Twice the distance of a pixel from the first block's centre, limited to between the outermost
- * centres; a block is 2 * IH_NOISE_BLOCK of it. */
-static int32_t twice_offset(int32_t pixel, int32_t blocks)
-{
-    return ih_clamp_s32(2 * pixel - (IH_NOISE_BLOCK - 1), 0, 2 * IH_NOISE_BLOCK * (blocks - 1));
-}
-
-static int32_t between(int32_t low, int32_t high, int32_t part)
-{
-    return low + (int32_t)ih_shift_round((int64_t)(high - low) * part, 6);
 }
 
 int32_t ih_noise_row(const struct ih_noise *noise, int32_t v, uint16_t row[IH_NOISE_BLOCKS_X])

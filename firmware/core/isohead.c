@@ -119,10 +119,10 @@ static void look(struct isohead *head, const struct ih_dots *dots,
 }
 
 static void look_at_dots(struct isohead *head, const struct ih_frame *frame,
-                         const struct ih_expected *expected)
+                         const struct ih_frame *ambient, const struct ih_expected *expected)
 {
     const struct ih_params *params = &head->params;
-    ih_dots_find(frame, &params->dots, &head->scratch.dots, &head->dots);
+    ih_dots_find(frame, ambient, &params->dots, &head->scratch.dots, &head->dots);
     ih_labels_assign(&head->dots, &head->rig, &params->labels, &head->scratch.labels,
                      &head->labels);
     ih_points_from_labels(&head->labels, &head->rig, &head->points);
@@ -150,9 +150,14 @@ static enum ih_err look_at_windows(struct isohead *head, const struct ih_frame *
     return err;
 }
 
-enum ih_err isohead_frame(struct isohead *head, const struct ih_frame *frame, int64_t time_us)
+enum ih_err isohead_frame(struct isohead *head, const struct ih_frame *frame,
+                          const struct ih_frame *ambient, int64_t time_us)
 {
+    bool is_range = head->rig.calibration.kind == IH_RIG_RANGE;
     enum ih_err err = check_frame(frame, &head->rig.calibration);
+    if (err == IH_OK && ambient != NULL && !is_range) {
+        err = check_frame(ambient, &head->rig.calibration);
+    }
     clear_outputs(head);
     if (err != IH_OK) {
         return err;
@@ -162,10 +167,10 @@ enum ih_err isohead_frame(struct isohead *head, const struct ih_frame *frame, in
         ih_tracks_expect(&head->tracks, &head->params.tracks, time_us, &expected);
         ih_findings_begin(&head->findings);
     }
-    if (head->rig.calibration.kind == IH_RIG_RANGE) {
+    if (is_range) {
         err = look_at_windows(head, frame, &expected);
     } else {
-        look_at_dots(head, frame, &expected);
+        look_at_dots(head, frame, ambient, &expected);
     }
     if (head->params.is_paper) {
         ih_result_from_heads(&head->heads, &head->result);

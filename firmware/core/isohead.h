@@ -4,7 +4,7 @@
  *
  *     static struct isohead head;              // the only memory there is
  *     isohead_init(&head, &calibration, &bad); // checks the rig once
- *     isohead_frame(&head, &frame, time_us);   // every frame: dots .. heads
+ *     isohead_frame(&head, &frame, NULL, time_us); // every frame: dots .. heads
  *     head.result ...                          // the result; every stage's output is beside it
  *
  * The frame is a camera frame for a dot rig, a depth image for a range rig. Integer arithmetic
@@ -72,10 +72,13 @@ void ih_params_default(struct ih_params *params);
 enum ih_err isohead_init(struct isohead *head, const struct ih_calibration *calibration,
                          int32_t *bad_slot) __attribute__((warn_unused_result));
 
-/* Process one frame. IH_ERR_SIZE when it is not of the rig's size or its view is malformed,
- * IH_ERR_KIND when it does not have 1 or 2 bytes per sample, or a range rig's not 2; then the
- * outputs are those of an empty frame. */
-enum ih_err isohead_frame(struct isohead *head, const struct ih_frame *frame, int64_t time_us)
+/* Process one frame that was taken at time_us, which may have any origin. ambient: the last frame
+ * that was taken with the laser off, or NULL; it takes what is no dot away and should be as fresh as
+ * possible. A range rig ignores it. IH_ERR_SIZE when one of them is not of the rig's size or its view
+ * is malformed, IH_ERR_KIND when it does not have 1 or 2 bytes per sample, or a range rig's not 2;
+ * then the outputs are those of an empty frame, and tracks stay as they were. */
+enum ih_err isohead_frame(struct isohead *head, const struct ih_frame *frame,
+                          const struct ih_frame *ambient, int64_t time_us)
     __attribute__((warn_unused_result));
 
 #endif

@@ -523,6 +523,24 @@ printf "$a"'{"file":"b.pgm","time_us":5,"laser":false}\n'"$c" >d/frames.jsonl
 run --json d
 check 'frames.jsonl: a lost frame with the laser off' 1 2 0 'd/b\.pgm: .*empty'
 fresh
+printf "$a"'{"file":"b.pgm","time_us":5,"laser":false}\n'"$c" >d/frames.jsonl
+printf 'P5\n2 2\n255\n1234' >d/b.pgm
+run --json d
+check 'frames.jsonl: a frame with the laser off of another size' 1 2 0 'd/b\.pgm: 2x2 px, expected'
+fresh
+
+# A frame without laser takes from the next what they have in common, when it is fresh: here all of it.
+ambient() {
+    cp d/c.pgm d/b.pgm
+    printf "$a"'{"file":"b.pgm","time_us":5,"laser":false}\n{"file":"c.pgm","time_us":%d}\n' "$1" >d/frames.jsonl
+    run --json d
+    dots=$(sed -n 's/^{"file":"c.pgm".*"dots":\([0-9]*\),.*/\1/p' out)
+    [ "$dots" "$2" 30 ] && reason= || reason="$dots dots"
+    result "$3" "$reason"
+    fresh
+}
+ambient 200005 -lt 'the same frame without laser 200 ms before: no dots'
+ambient 200006 -gt 'the same frame without laser 200.001 ms before: all dots'
 
 # --- truth.jsonl ---------------------------------------------------------------------------------
 

@@ -145,4 +145,18 @@ static inline void paint_block(int32_t u, int32_t v, int32_t width, int32_t heig
     }
 }
 
+/* What frame shows, in a buffer of its own: the last frame without laser. */
+static uint8_t ambient8[PIXELS_MAX];
+static uint16_t ambient16[PIXELS_MAX];
+static struct ih_frame ambient;
+
+static inline void keep_ambient(void)
+{
+    memcpy(ambient8, grey8, sizeof ambient8);
+    memcpy(ambient16, grey16, sizeof ambient16);
+    ambient = frame;
+    ambient.samples =
+        frame.bytes_per_sample == 1 ? (const void *)ambient8 : (const void *)ambient16;
+}
+
 #endif

@@ -39,7 +39,7 @@ static void filter(void)
         const int32_t inside = v < 0 ? 0 : v >= frame.height ? frame.height - 1 : v;
         const struct ih_row row = ih_frame_row(&frame, inside);
 
-        ih_band_take(&band, &row);
+        ih_row_grey(&row, frame.width, band.incoming_q4);
         rows += ih_band_push(&band, response[rows]);
     }
     TEST_ASSERT_EQUAL_INT32(frame.height, rows);

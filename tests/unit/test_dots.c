@@ -20,6 +20,11 @@ struct vector_crowd {
     int32_t dot_count;
 };
 
+struct vector_pair {
+    struct vector_frame lit;
+    struct vector_spec ambient;
+};
+
 #include "dots.inc"
 
 static struct ih_dots_params params;
@@ -46,7 +51,7 @@ static void make(const struct vector_spec *spec)
 
 static void find(void)
 {
-    ih_dots_find(&frame, &params, &scratch, &dots);
+    ih_dots_find(&frame, NULL, &params, &scratch, &dots);
 }
 
 static const struct vector_frame *frame_named(const char *name)
@@ -62,34 +67,57 @@ static const struct vector_frame *frame_named(const char *name)
     return &vector_frames[0];
 }
 
+static void compare(const struct vector_frame *v, int i)
+{
+    int k;
+
+    IH_TEST_EQUAL(v->dot_count, dots.dot_count, v->spec.name, i);
+    IH_TEST_EQUAL(v->edge_count, dots.edge_count, v->spec.name, i);
+    IH_TEST_EQUAL(v->hot_count, dots.hot_count, v->spec.name, i);
+    IH_TEST_EQUAL(0, dots.dots_dropped, v->spec.name, i);
+    for (k = 0; k < v->dot_count; k++) {
+        /* 0.01 px as the header promises. */
+        IH_TEST_WITHIN(0.01, v->dot[k].u, ih_test_from_q(dots.dot[k].u_px_q12, 12), v->spec.name,
+                       k);
+        IH_TEST_WITHIN(0.01, v->dot[k].v, ih_test_from_q(dots.dot[k].v_px_q12, 12), v->spec.name,
+                       k);
+        /* Whole units on both sides; deeper greys are rounded to 12 bits by a multiplication, half
+         * a level off here and there. */
+        IH_TEST_WITHIN(exact_grey(&v->spec) ? 0 : 5, v->dot[k].peak, dots.dot[k].peak, v->spec.name,
+                       k);
+    }
+    IH_TEST_UNTOUCHED(&dots.dot[dots.dot_count],
+                      (size_t)(IH_DOTS_MAX - dots.dot_count) * sizeof dots.dot[0], v->spec.name);
+}
+
 static void dots_match_scipy(void)
 {
-    int i, k;
+    int i;
 
     for (i = 0; i < IH_TEST_COUNT(vector_frames); i++) {
-        const struct vector_frame *v = &vector_frames[i];
-
-        make(&v->spec);
+        make(&vector_frames[i].spec);
         memset(&dots, IH_TEST_FILL, sizeof dots);
         find();
-        IH_TEST_EQUAL(v->dot_count, dots.dot_count, v->spec.name, i);
-        IH_TEST_EQUAL(v->edge_count, dots.edge_count, v->spec.name, i);
-        IH_TEST_EQUAL(v->hot_count, dots.hot_count, v->spec.name, i);
-        IH_TEST_EQUAL(0, dots.dots_dropped, v->spec.name, i);
-        for (k = 0; k < v->dot_count; k++) {
-            /* 0.01 px as the header promises. */
-            IH_TEST_WITHIN(0.01, v->dot[k].u, ih_test_from_q(dots.dot[k].u_px_q12, 12),
-                           v->spec.name, k);
-            IH_TEST_WITHIN(0.01, v->dot[k].v, ih_test_from_q(dots.dot[k].v_px_q12, 12),
-                           v->spec.name, k);
-            /* Whole units on both sides; deeper greys are rounded to 12 bits by a multiplication,
-             * half a level off here and there. */
-            IH_TEST_WITHIN(exact_grey(&v->spec) ? 0 : 5, v->dot[k].peak, dots.dot[k].peak,
-                           v->spec.name, k);
-        }
-        IH_TEST_UNTOUCHED(&dots.dot[dots.dot_count],
-                          (size_t)(IH_DOTS_MAX - dots.dot_count) * sizeof dots.dot[0],
-                          v->spec.name);
+        compare(&vector_frames[i], i);
+    }
+}
+
+static void find_with_ambient(void)
+{
+    memset(&dots, IH_TEST_FILL, sizeof dots);
+    ih_dots_find(&frame, &ambient, &params, &scratch, &dots);
+}
+
+static void dots_with_an_ambient_frame_match_scipy(void)
+{
+    int i;
+
+    for (i = 0; i < IH_TEST_COUNT(vector_pairs); i++) {
+        make(&vector_pairs[i].ambient);
+        keep_ambient();
+        make(&vector_pairs[i].lit.spec);
+        find_with_ambient();
+        compare(&vector_pairs[i].lit, i);
     }
 }
 
@@ -231,6 +259,112 @@ static void over_exposed_spots_are_plateaus(void)
             IH_TEST_WITHIN(0.3, v, ih_test_from_q(dots.dot[0].v_px_q12, 12), "v", i * 25 + k);
         }
     }
+}
+
+/* Texture of 40 levels in rows of 640, moved to the right. */
+static void paint_texture(int32_t shift)
+{
+    int32_t u, v;
+
+    fill8(640, 480, 0);
+    for (v = 0; v < 480; v++) {
+        for (u = 0; u < 640; u++) {
+            const struct vector_spec spec = {.noise = 40, .loud = 40, .seed = 1};
+
+            grey8[v * 640 + u] = (uint8_t)(100 + hash_noise(&spec, u - shift, v));
+        }
+    }
+}
+
+static void add_spots(double height)
+{
+    int32_t u, v;
+
+    for (v = 30; v < 460; v += 40) {
+        for (u = 30; u < 620; u += 40) {
+            add_spot(u, v, 1.2, height);
+        }
+    }
+}
+
+/* How many of the spots are found, and how many others. */
+static int32_t count_spots(int32_t *others)
+{
+    int32_t k, found = 0;
+
+    for (k = 0; k < dots.dot_count; k++) {
+        const int32_t u = (dots.dot[k].u_px_q12 + 2048) / 4096;
+        const int32_t v = (dots.dot[k].v_px_q12 + 2048) / 4096;
+
+        found += u % 40 >= 29 && u % 40 <= 31 && v % 40 >= 29 && v % 40 <= 31;
+    }
+    *others = dots.dot_count - found;
+    return found;
+}
+
+/* What both frames show alike is taken away: dots that drown in texture come up. */
+static void the_ambient_frame_takes_texture_away(void)
+{
+    int32_t others;
+
+    paint_texture(0);
+    keep_ambient();
+    add_spots(20);
+    find();
+    IH_TEST_RANGE(0, 40, count_spots(&others), "without", 0);
+    find_with_ambient();
+    IH_TEST_EQUAL(11 * 15, count_spots(&others), "with", 0);
+    IH_TEST_EQUAL(0, others, "others", 0);
+}
+
+/* The texture has moved by 3 px: the ambient frame is of no use, and does no harm. */
+static void an_ambient_frame_that_moved_does_no_harm(void)
+{
+    static struct ih_dots plain;
+
+    paint_texture(3);
+    keep_ambient();
+    paint_texture(0);
+    add_spots(20);
+    find();
+    plain = dots;
+    find_with_ambient();
+    /* A block at the border, which has few pixels, may look quieter by chance. */
+    IH_TEST_RANGE(plain.dot_count * 9 / 10, plain.dot_count * 11 / 10, dots.dot_count, "dots", 0);
+}
+
+/* A bright thing has moved before a still texture: its two ghosts, the dark and the bright, are no
+ * dots, and the dots beside them stay. */
+static void ghosts_are_no_dots(void)
+{
+    int32_t others, shift, found;
+
+    for (shift = 1; shift <= 24; shift += 5) {
+        paint_texture(0);
+        paint_block(200 + shift, 150, 90, 160, 220);
+        keep_ambient();
+        paint_texture(0);
+        paint_block(200, 150, 90, 160, 220);
+        add_spots(25);
+        find_with_ambient();
+        found = count_spots(&others);
+        IH_TEST_RANGE(150, 165, found, "found", shift);
+        IH_TEST_RANGE(0, 30, others, "others", shift);
+    }
+}
+
+/* The map of over-exposed blocks is that of the lit frame. */
+static void subtracted_blocks_stay_over_exposed(void)
+{
+    fill8(320, 240, 255);
+    keep_ambient();
+    find_with_ambient();
+    TEST_ASSERT_TRUE(ih_dots_is_bright(&dots, 100, 100));
+    TEST_ASSERT_EQUAL_INT32(0, dots.dot_count);
+    fill8(320, 240, 100);
+    find_with_ambient();
+    TEST_ASSERT_FALSE(ih_dots_is_bright(&dots, 100, 100));
+    TEST_ASSERT_EQUAL_INT32(0, dots.dot_count);
 }
 
 /* R > threshold, strictly; in a frame without noise the floor alone counts. One pixel of 4 gives
@@ -386,14 +520,14 @@ static void row_by_row_is_the_same_as_the_whole_frame(void)
     make(&frame_named("loud")->spec);
     find();
     whole = dots;
-    ih_noise_measure(&frame, &scratch.rows.measuring, &noise);
+    ih_noise_measure(&frame, NULL, &scratch.rows.measuring, &noise);
     memset(&dots, 0, sizeof dots);
     memset(&scratch, IH_TEST_FILL, sizeof scratch);
     ih_dots_begin(&scratch, &dots, &params, frame.width, frame.height, &noise);
     for (v = 0; v < frame.height; v++) {
         const struct ih_row row = ih_frame_row(&frame, v);
 
-        ih_dots_row(&scratch, &dots, &row);
+        ih_dots_row(&scratch, &dots, &row, NULL);
     }
     ih_dots_end(&scratch, &dots);
     TEST_ASSERT_EQUAL_INT32(whole.dot_count, dots.dot_count);
@@ -502,6 +636,11 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(dots_match_scipy);
+    RUN_TEST(dots_with_an_ambient_frame_match_scipy);
+    RUN_TEST(the_ambient_frame_takes_texture_away);
+    RUN_TEST(an_ambient_frame_that_moved_does_no_harm);
+    RUN_TEST(ghosts_are_no_dots);
+    RUN_TEST(subtracted_blocks_stay_over_exposed);
     RUN_TEST(all_361_dots_are_found_in_order);
     RUN_TEST(full_tables_are_counted);
     RUN_TEST(flat_frames_have_no_dots);

@@ -90,7 +90,7 @@ static void paint_bust(const struct vector_bust *bust)
 
 static void process(void)
 {
-    TEST_ASSERT_EQUAL_INT(IH_OK, isohead_frame(&head, &frame, 0));
+    TEST_ASSERT_EQUAL_INT(IH_OK, isohead_frame(&head, &frame, NULL, 0));
 }
 
 static double miss_mm(const struct ih_hypothesis *hypothesis, double x, double y, double z)
@@ -316,7 +316,7 @@ static void expect_error(enum ih_err err, const char *what)
     paint_bust(&vector_busts[0]);
     process();
     TEST_ASSERT_EQUAL_INT32(1, head.heads.head_count);
-    IH_TEST_EQUAL(err, isohead_frame(&head, &wrong, 0), what, 0);
+    IH_TEST_EQUAL(err, isohead_frame(&head, &wrong, NULL, 0), what, 0);
     check_empty(what);
     TEST_ASSERT_FALSE(head.surface.valid);
     view8(&head);
@@ -356,8 +356,30 @@ static void wrong_kinds_are_refused(void)
     EXPECT_WITH(bytes_per_sample, INT32_MIN, IH_ERR_KIND);
     start_range(320, 240);
     frame = (struct ih_frame){grey8, 320, 240, 320, 1, 255};
-    TEST_ASSERT_EQUAL_INT(IH_ERR_KIND, isohead_frame(&head, &frame, 0));
+    TEST_ASSERT_EQUAL_INT(IH_ERR_KIND, isohead_frame(&head, &frame, NULL, 0));
     check_empty("grey frame for a range rig");
+}
+
+/* An ambient frame must be as sound as the lit one, but need not have its depth. */
+static void ambient_frames_are_checked(void)
+{
+    struct ih_frame ambient;
+
+    paint_bust(&vector_busts[0]);
+    memset(grey16, 0, sizeof grey16);
+    ambient = (struct ih_frame){grey16, frame.width, frame.height, 2 * frame.width, 2, 1023};
+    TEST_ASSERT_EQUAL_INT(IH_OK, isohead_frame(&head, &frame, &ambient));
+    TEST_ASSERT_EQUAL_INT32(1, head.heads.head_count);
+    ambient.height--;
+    TEST_ASSERT_EQUAL_INT(IH_ERR_SIZE, isohead_frame(&head, &frame, &ambient));
+    check_empty("ambient frame of another size");
+    ambient.height++;
+    ambient.samples = NULL;
+    TEST_ASSERT_EQUAL_INT(IH_ERR_SIZE, isohead_frame(&head, &frame, &ambient));
+    check_empty("ambient frame of nothing");
+    start_range(320, 240);
+    frame = (struct ih_frame){grey16, 320, 240, 640, 2, 65535};
+    TEST_ASSERT_EQUAL_INT(IH_OK, isohead_frame(&head, &frame, &ambient));
 }
 
 /* All outputs of two states. Slices have gaps between their members, so nests are compared by what
@@ -408,7 +430,7 @@ static void two_states_are_independent(void)
 {
     paint_bust(&vector_busts[2]);
     start(&other, vector_busts[2].rig);
-    TEST_ASSERT_EQUAL_INT(IH_OK, isohead_frame(&other, &frame, 0));
+    TEST_ASSERT_EQUAL_INT(IH_OK, isohead_frame(&other, &frame, NULL, 0));
     paint_bust(&vector_busts[0]);
     process();
     TEST_ASSERT_TRUE(memcmp(&head.heads, &other.heads, sizeof head.heads) != 0);
@@ -497,6 +519,7 @@ int main(void)
     RUN_TEST(flat_frames_have_no_head);
     RUN_TEST(wrong_sizes_are_refused);
     RUN_TEST(wrong_kinds_are_refused);
+    RUN_TEST(ambient_frames_are_checked);
     RUN_TEST(nothing_is_remembered_from_frame_to_frame);
     RUN_TEST(two_states_are_independent);
     RUN_TEST(the_frame_and_the_rig_are_left_alone);

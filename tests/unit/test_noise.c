@@ -16,6 +16,12 @@ struct vector_noise {
     const struct vector_place *place;
 };
 
+struct vector_pair {
+    struct vector_spec lit, ambient;
+    const double *block;
+    const uint8_t *subtract;
+};
+
 #include "noise.inc"
 
 static struct ih_noise_scratch scratch;
@@ -47,7 +53,7 @@ static void blocks_match_numpy(void)
         const struct vector_noise *v = &vector_noises[i];
 
         make_frame(&v->spec);
-        ih_noise_measure(&frame, &scratch, &noise);
+        ih_noise_measure(&frame, NULL, &scratch, &noise);
         IH_TEST_EQUAL(v->columns, noise.columns, v->spec.name, i);
         IH_TEST_EQUAL(v->rows, noise.rows, v->spec.name, i);
         for (k = 0; k < v->columns * v->rows; k++) {
@@ -67,7 +73,7 @@ static void places_match_numpy(void)
         const struct vector_noise *v = &vector_noises[i];
 
         make_frame(&v->spec);
-        ih_noise_measure(&frame, &scratch, &noise);
+        ih_noise_measure(&frame, NULL, &scratch, &noise);
         for (k = 0; k < v->place_count; k++) {
             /* As the blocks, and half a unit for each of the two interpolations. */
             IH_TEST_WITHIN(exact_grey(&v->spec) ? 2.0 : 5.0, v->place[k].noise,
@@ -76,10 +82,80 @@ static void places_match_numpy(void)
     }
 }
 
+static void pairs_match_numpy(void)
+{
+    int i, k;
+
+    for (i = 0; i < IH_TEST_COUNT(vector_pairs); i++) {
+        const struct vector_pair *v = &vector_pairs[i];
+
+        make_frame(&v->ambient);
+        keep_ambient();
+        make_frame(&v->lit);
+        ih_noise_measure(&frame, &ambient, &scratch, &noise);
+        for (k = 0; k < noise.columns * noise.rows; k++) {
+            const int32_t row = k / noise.columns, column = k % noise.columns;
+
+            IH_TEST_EQUAL(v->subtract[k], noise.subtract[row][column], v->lit.name, k);
+            IH_TEST_WITHIN(exact_grey(&v->lit) ? 1.6 : 5.0, v->block[k], noise.median[row][column],
+                           v->lit.name, k);
+        }
+    }
+}
+
+/* A dark ambient frame takes nothing away, one of noise alone does harm and is left out. */
+static void useless_ambient_frames_are_left_out(void)
+{
+    static struct ih_noise plain;
+    struct ih_test_random random = {5};
+    int32_t i;
+
+    make_frame(&vector_noises[0].spec);
+    ih_noise_measure(&frame, NULL, &scratch, &plain);
+    keep_ambient();
+    memset(ambient8, 0, sizeof ambient8);
+    ih_noise_measure(&frame, &ambient, &scratch, &noise);
+    TEST_ASSERT_EQUAL_MEMORY(&plain, &noise, sizeof noise);
+    for (i = 0; i < frame.width * frame.height; i++) {
+        ambient8[i] = (uint8_t)ih_test_between(&random, 90, 110);
+    }
+    ih_noise_measure(&frame, &ambient, &scratch, &noise);
+    TEST_ASSERT_EQUAL_MEMORY(&plain, &noise, sizeof noise);
+    for (i = 0; i < frame.width * frame.height;
+         i++) { /* the same, but light has been switched off */
+        ambient8[i] = (uint8_t)(grey8[i] + 10);
+    }
+    ih_noise_measure(&frame, &ambient, &scratch, &noise);
+    TEST_ASSERT_EQUAL_MEMORY(&plain, &noise, sizeof noise);
+}
+
+/* A share that goes from all to nothing over a block leaves a ramp, not a step. */
+static void the_share_has_no_seams(void)
+{
+    uint16_t lit[640], under[640];
+    int32_t u, v;
+
+    memset(&noise, 0, sizeof noise);
+    noise.columns = 20;
+    noise.rows = 15;
+    noise.subtract[7][10] = 1;
+    for (v = 0; v < 480; v++) {
+        for (u = 0; u < 640; u++) {
+            lit[u] = under[u] = 2064;
+        }
+        ih_noise_subtract(&noise, v, 640, under, lit);
+        for (u = 0; u + 1 < 640; u++) {
+            IH_TEST_RANGE(-64, 64, lit[u + 1] - lit[u], "step", v * 640 + u); /* 2000 / 32 */
+        }
+        IH_TEST_EQUAL(v < 208 || v > 271 ? 2064 : lit[336], lit[336], "column", v);
+    }
+    ih_noise_subtract(&noise, 239, 640, under, lit);
+}
+
 static void flat_frames_have_no_noise(void)
 {
     fill8(1280, 800, 255);
-    ih_noise_measure(&frame, &scratch, &noise);
+    ih_noise_measure(&frame, NULL, &scratch, &noise);
     TEST_ASSERT_EQUAL_INT32(40, noise.columns);
     TEST_ASSERT_EQUAL_INT32(25, noise.rows);
     TEST_ASSERT_EQUAL_INT32(0, at(0, 0));
@@ -93,7 +169,7 @@ static void there_are_no_seams(void)
     int32_t u, v, greatest = 0;
 
     make_frame(&vector_noises[IH_TEST_COUNT(vector_noises) - 1].spec);
-    ih_noise_measure(&frame, &scratch, &noise);
+    ih_noise_measure(&frame, NULL, &scratch, &noise);
     for (v = 0; v < noise.rows; v++) {
         for (u = 0; u + 1 < noise.columns; u++) {
             const int32_t step = noise.median[v][u + 1] - noise.median[v][u];
@@ -117,7 +193,7 @@ static void the_least_of_a_row_is_the_least(void)
     int32_t u, v;
 
     make_frame(&vector_noises[IH_TEST_COUNT(vector_noises) - 1].spec);
-    ih_noise_measure(&frame, &scratch, &noise);
+    ih_noise_measure(&frame, NULL, &scratch, &noise);
     for (v = 0; v < frame.height; v += 7) {
         const int32_t least = ih_noise_row(&noise, v, row);
 
@@ -137,14 +213,14 @@ static void dots_are_no_noise(void)
     for (v = 0; v < 480 * 640; v++) {
         grey8[v] = (uint8_t)(60 + ih_test_between(&random, -4, 4));
     }
-    ih_noise_measure(&frame, &scratch, &noise);
+    ih_noise_measure(&frame, NULL, &scratch, &noise);
     plain = at(320, 240);
     for (v = 12; v < 470; v += 28) {
         for (u = 12; u < 630; u += 28) {
             paint_block(u - 1, v - 1, 3, 3, 250);
         }
     }
-    ih_noise_measure(&frame, &scratch, &noise);
+    ih_noise_measure(&frame, NULL, &scratch, &noise);
     IH_TEST_RANGE(plain * 9 / 10, plain * 13 / 10, at(320, 240), "noise", 0);
 }
 
@@ -156,7 +232,7 @@ static void the_hardest_frames_fit(void)
     for (i = 0; i < PIXELS_MAX; i++) {
         grey8[i] = (i % 1280 / 3 + i / 1280 / 3) % 4 == 0 ? 255 : 0;
     }
-    ih_noise_measure(&frame, &scratch, &noise);
+    ih_noise_measure(&frame, NULL, &scratch, &noise);
     for (i = 0; i < 1280; i += 5) {
         IH_TEST_RANGE(0, 18360, at(i, i * 5 / 8), "noise", i);
     }
@@ -167,6 +243,9 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(blocks_match_numpy);
     RUN_TEST(places_match_numpy);
+    RUN_TEST(pairs_match_numpy);
+    RUN_TEST(useless_ambient_frames_are_left_out);
+    RUN_TEST(the_share_has_no_seams);
     RUN_TEST(flat_frames_have_no_noise);
     RUN_TEST(there_are_no_seams);
     RUN_TEST(the_least_of_a_row_is_the_least);

@@ -6,7 +6,7 @@ from scipy import ndimage
 import band
 import emit
 import noise
-from frames import Frame, spec
+from frames import Frame, pairs, spec
 
 RING = [(4, 0), (4, 2), (3, 3), (2, 4), (0, 4), (-2, 4), (-3, 3), (-4, 2),
         (-4, 0), (-4, -2), (-3, -3), (-2, -4), (0, -4), (2, -4), (3, -3), (4, -2)]
@@ -57,10 +57,11 @@ def judge(response, padded, u, v, ring_max, side_min, flat_min):
     return "edge" if ring > np.floor(peak * ring_max + 0.5) else place
 
 
-def find(frame, ring_max=128 / 256, side_min=138 / 256, flat_min=225 / 256):
+def find(frame, ambient=None, ring_max=128 / 256, side_min=138 / 256, flat_min=225 / 256):
     """dots (u, v, peak), maxima above the threshold that are edges or twins, and hot pixels."""
-    response = band.response(frame.grey_q4())
-    level = noise.spread(noise.smoothed(noise.medians(response), True), response.shape, True)
+    left, block, _ = noise.measure(frame.grey_q4(), ambient and ambient.grey_q4(), True)
+    response = band.response(left)
+    level = noise.spread(block, response.shape, True)
     threshold = np.maximum(np.floor(frame.floor_q4 * band.UNIT / 16 + 0.5),
                            np.floor(level * frame.gain_q8 / 256 + 0.5))
     padded = np.pad(response, EDGE)
@@ -159,17 +160,22 @@ def crowds():
                 gain_q8=0)
 
 
+def frame_row(inc, frame, result):
+    dots, edge, hot = result
+    row = spec(inc, frame)
+    found = ["{%s}" % ", ".join(emit.numbers(d[:2], 5) + [emit.number(d[2])]) for d in dots]
+    inc.raw("\nstatic const struct vector_dot vector_%s_dots[] = {\n%s};\n" % (
+        frame.name, emit.wrap(found or ["{0, 0, 0}"])))
+    return "{%s}, %d, %d, %d, vector_%s_dots" % (row, edge, hot, len(dots), frame.name)
+
+
 def write_vectors(directory):
     inc = emit.Inc("Frames by formula, and their dots by scipy.ndimage.")
-    rows = []
-    for frame in frames():
-        dots, edge, hot = find(frame)
-        row = spec(inc, frame)
-        found = ["{%s}" % ", ".join(emit.numbers(d[:2], 5) + [emit.number(d[2])]) for d in dots]
-        inc.raw("\nstatic const struct vector_dot vector_%s_dots[] = {\n%s};\n" % (
-            frame.name, emit.wrap(found or ["{0, 0, 0}"])))
-        rows.append("{%s}, %d, %d, %d, vector_%s_dots" % (row, edge, hot, len(dots), frame.name))
-    inc.struct_array("vector_frame", "vector_frames", rows)
+    inc.struct_array("vector_frame", "vector_frames",
+                     [frame_row(inc, frame, find(frame)) for frame in frames()])
+    inc.struct_array("vector_pair", "vector_pairs",
+                     ["{%s}, {%s}" % (frame_row(inc, lit, find(lit, ambient)), spec(inc, ambient))
+                      for lit, ambient in pairs()])
     rows = ["{%s}, %d" % (spec(inc, frame), len(find(frame)[0])) for frame in crowds()]
     inc.struct_array("vector_crowd", "vector_crowds", rows)
     return inc.write(directory, "dots.inc")

@@ -64,3 +64,16 @@ def spec(inc, frame):
     return '"%s", %s, %d, vector_%s_spots, %d, vector_%s_boxes' % (
         frame.name, ", ".join(map(str, numbers)), len(frame.spots), frame.name, len(frame.boxes),
         frame.name)
+
+
+def pairs():
+    """A lit frame and an ambient one. Where the noise is the same number in both it is texture that
+    the ambient frame takes away; in every other 128x128 it is another one in each."""
+    random = np.random.default_rng(47)
+    lattice = [(16 * u + int(random.integers(16)), 16 * v + int(random.integers(16)), 44,
+                int(random.integers(20, 60))) for v in range(20, 400, 31) for u in range(20, 500, 29)]
+    yield (Frame("pair8", (512, 410), 255, 90, 30, (20, 10), 3, lattice, loud=12),
+           Frame("pair8_ambient", (512, 410), 255, 90, 30, (20, 10), 3, loud=9))
+    yield (Frame("pair_mixed", (520, 400), 1023, 400, 100, (0, 0), 4,
+                 [(u, v, r, 4 * h) for u, v, r, h in lattice], loud=20),
+           Frame("pair_mixed_ambient", (520, 400), 1023, 380, 100, (0, 0), 4, loud=200))

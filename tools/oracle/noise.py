@@ -9,6 +9,14 @@ import frames
 
 BLOCK = 32
 STEP = 16
+WHOLE = 4096
+REST_Q4 = 64
+WHITE = 19 / 16
+
+
+def sampled(height, i):
+    """The rows that are looked at in a row of blocks."""
+    return [v for v in range(i * BLOCK + 4, (i + 1) * BLOCK, STEP) if v < height] or [height - 1]
 
 
 def medians(response):
@@ -18,9 +26,9 @@ def medians(response):
     rows, columns = -(-height // BLOCK), -(-width // BLOCK)
     out = np.zeros((rows, columns))
     for i in range(rows):
-        look = [v for v in range(i * BLOCK + 4, (i + 1) * BLOCK, STEP) if v < height] or [height - 1]
         for j in range(columns):
-            values = np.sort(np.abs(response[look, j * BLOCK:(j + 1) * BLOCK]).ravel())
+            part = response[sampled(height, i), j * BLOCK:(j + 1) * BLOCK]
+            values = np.sort(np.abs(part).ravel())
             out[i, j] = values[len(values) // 2]
     return out
 
@@ -46,6 +54,35 @@ def spread(block, shape, whole=False):
     return lines(lines(block, shape[0], 0), shape[1], 1)
 
 
+def rest(grey, ambient, subtract):
+    """The lit frame less the ambient one as far as the map of blocks says."""
+    share = spread(np.where(subtract, WHOLE, 0).astype(float), grey.shape, True)
+    return np.maximum(grey - np.floor((ambient - REST_Q4) * share / WHOLE + 0.5), 0)
+
+
+def choose(grey, ambient):
+    """Is a block quieter, by an eighth, without the ambient light, and not darker by more than
+    2 grey levels in the mean? On half of the difference, which needs no cutting off."""
+    half = np.floor((grey + frames.FULL_Q4 - ambient) / 2)
+    quieter = 16 * medians(band.response(half)) < 7 * medians(band.response(grey))
+    for i, j in np.argwhere(quieter):
+        part = half[sampled(len(grey), i), j * BLOCK:(j + 1) * BLOCK] - frames.FULL_Q4 // 2
+        quieter[i, j] = part.mean() >= -REST_Q4 / 4
+    return quieter
+
+
+def measure(grey, ambient=None, whole=False):
+    """What is left of a frame, its map of noise and what is subtracted."""
+    if ambient is None:
+        block = medians(band.response(grey))
+        return grey, smoothed(block, whole), np.zeros(block.shape, bool)
+    subtract = choose(grey, ambient)
+    left = rest(grey, ambient, subtract)
+    block = medians(band.response(left))
+    block = np.where(subtract, np.floor(block * WHITE + 0.5) if whole else block * WHITE, block)
+    return left, smoothed(block, whole), subtract
+
+
 def write_vectors(directory):
     inc = emit.Inc("Frames by formula, and their noise.")
     random = np.random.default_rng(49)
@@ -68,4 +105,12 @@ def write_vectors(directory):
             frames.spec(inc, frame), block.shape[1], block.shape[0], frame.name, len(places),
             frame.name))
     inc.struct_array("vector_noise", "vector_noises", rows)
+    rows = []
+    for lit, ambient in frames.pairs():
+        _, block, subtract = measure(lit.grey_q4(), ambient.grey_q4())
+        inc.array("double", "vector_%s_blocks" % lit.name, block.ravel(), 4)
+        inc.array("uint8_t", "vector_%s_subtract" % lit.name, subtract.ravel().astype(int))
+        rows.append("{%s}, {%s}, vector_%s_blocks, vector_%s_subtract" % (
+            frames.spec(inc, lit), frames.spec(inc, ambient), lit.name, lit.name))
+    inc.struct_array("vector_pair", "vector_pairs", rows)
     return inc.write(directory, "noise.inc")
