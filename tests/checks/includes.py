@@ -32,6 +32,7 @@ CORE_HEADERS = {
     "ih_noise.h": {"ih_config.h", "ih_types.h", "ih_band.h"},
     "ih_dots.h": CORE_SHARED | {"ih_noise.h"},
     "ih_labels.h": CORE_SHARED | {"ih_dots.h"},
+    "ih_exposure.h": CORE_SHARED | {"ih_labels.h"},
     "ih_cloud.h": CORE_SHARED,
     "ih_windows.h": CORE_SHARED,
     "ih_points.h": CORE_SHARED | {"ih_labels.h", "ih_windows.h"},

@@ -13,6 +13,7 @@ import cholesky
 import cloud
 import dots
 import ellipse
+import exposure
 import isohead
 import labels
 import noise
@@ -23,7 +24,8 @@ import surface
 import windows
 
 STAGES = {"rig": rig, "cholesky": cholesky, "surface": surface,
-          "band": band, "noise": noise, "dots": dots, "labels": labels, "cloud": cloud,
+          "band": band, "noise": noise, "dots": dots, "labels": labels, "exposure": exposure,
+          "cloud": cloud,
           "windows": windows, "points": points, "samples": samples, "ellipse": ellipse,
           "isohead": isohead}
 
