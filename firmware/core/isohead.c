@@ -3,8 +3,6 @@
 #include <stddef.h>
 #include <string.h>
 
-#include "ih_fix.h"
-
 _Static_assert(sizeof(struct isohead) <= IH_RAM_MAX, "the state no longer fits its budget");
 
 const char *ih_err_text(enum ih_err err)
@@ -137,8 +135,8 @@ static enum ih_err look_at_windows(struct isohead *head, const struct ih_frame *
     enum ih_err err = ih_windows_find(frame, &head->rig, &params->windows, &head->scratch.windows,
                                       &head->windows);
     int32_t count = head->windows.window_count;
-    if (params->is_paper) {
-        count = ih_min_s32(count, 1);
+    if (params->is_paper && count > 1) {
+        count = 1;
     }
     for (int32_t i = count - 1; i >= 0 && err == IH_OK; i--) {
         err = ih_points_from_range(frame, &head->rig, &params->points, &head->windows.window[i],

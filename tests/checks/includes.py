@@ -64,7 +64,7 @@ def allowed_in_core(name):
         return CORE_HEADERS[name]
     own = name[:-len(".c")] + ".h"
     if name == "isohead.c":
-        return {own, "ih_fix.h"}
+        return {own}
     if name == "ih_score.c":
         return {own, "ih_fix.h", "ih_score_weights.h"}
     return {own, "ih_fix.h"} if own in CORE_HEADERS else None

@@ -368,18 +368,18 @@ static void ambient_frames_are_checked(void)
     paint_bust(&vector_busts[0]);
     memset(grey16, 0, sizeof grey16);
     ambient = (struct ih_frame){grey16, frame.width, frame.height, 2 * frame.width, 2, 1023};
-    TEST_ASSERT_EQUAL_INT(IH_OK, isohead_frame(&head, &frame, &ambient));
+    TEST_ASSERT_EQUAL_INT(IH_OK, isohead_frame(&head, &frame, &ambient, 0));
     TEST_ASSERT_EQUAL_INT32(1, head.heads.head_count);
     ambient.height--;
-    TEST_ASSERT_EQUAL_INT(IH_ERR_SIZE, isohead_frame(&head, &frame, &ambient));
+    TEST_ASSERT_EQUAL_INT(IH_ERR_SIZE, isohead_frame(&head, &frame, &ambient, 0));
     check_empty("ambient frame of another size");
     ambient.height++;
     ambient.samples = NULL;
-    TEST_ASSERT_EQUAL_INT(IH_ERR_SIZE, isohead_frame(&head, &frame, &ambient));
+    TEST_ASSERT_EQUAL_INT(IH_ERR_SIZE, isohead_frame(&head, &frame, &ambient, 0));
     check_empty("ambient frame of nothing");
     start_range(320, 240);
     frame = (struct ih_frame){grey16, 320, 240, 640, 2, 65535};
-    TEST_ASSERT_EQUAL_INT(IH_OK, isohead_frame(&head, &frame, &ambient));
+    TEST_ASSERT_EQUAL_INT(IH_OK, isohead_frame(&head, &frame, &ambient, 0));
 }
 
 /* All outputs of two states. Slices have gaps between their members, so nests are compared by what
