@@ -51,8 +51,7 @@ bool ih_ellipsoid_cross(const struct ih_ellipsoid *ellipsoid, const int32_t orig
     if (inside_q28 > 0) {
         enter_q14 -= ih_isqrt_u64((uint64_t)ih_div_round(inside_q28 * (1 << 28), gg_q28));
     }
-    out->entry_mm_q8 =
-        ellipsoid->centre_mm_q8[2] + (int32_t)ih_mul_shift(enter_q14, deep_q8, 14);
+    out->entry_mm_q8 = ellipsoid->centre_mm_q8[2] + (int32_t)ih_mul_shift(enter_q14, deep_q8, 14);
     return true;
 }
 

@@ -12,6 +12,7 @@ void ih_findings_params_default(struct ih_findings_params *params)
     ih_fit_params_default(&params->fit);
     params->spacing_mm = 80;
     params->nest_near_mm = 90;
+    params->range_prior_q10 = -1280;
     params->front_least_mm = 150;
 }
 
@@ -68,10 +69,10 @@ void ih_findings_outline(const struct ih_rig *rig, struct ih_finding *finding)
     int64_t y_q28 = ih_div_round((int64_t)head->centre_mm_q8[1] * (1 << 28), depth_q8);
     ih_rig_distort(rig, ih_saturate_s32(x_q28), ih_saturate_s32(y_q28), &finding->u_px_q12,
                    &finding->v_px_q12);
-    int32_t across_q12 = ih_saturate_s32(
-        ih_div_round(ih_mul_shift(head->semi_mm_q8[0], c->fx_px_q16, 4), depth_q8));
-    int32_t up_q12 = ih_saturate_s32(
-        ih_div_round(ih_mul_shift(head->semi_mm_q8[1], c->fy_px_q16, 4), depth_q8));
+    int32_t across_q12 =
+        ih_saturate_s32(ih_div_round(ih_mul_shift(head->semi_mm_q8[0], c->fx_px_q16, 4), depth_q8));
+    int32_t up_q12 =
+        ih_saturate_s32(ih_div_round(ih_mul_shift(head->semi_mm_q8[1], c->fy_px_q16, 4), depth_q8));
     finding->a_px_q12 = ih_max_s32(across_q12, up_q12);
     finding->b_px_q12 = ih_min_s32(across_q12, up_q12);
     finding->angle_mdeg = up_q12 > across_q12 ? 90000 : 0;
@@ -136,13 +137,15 @@ static void try_start(const struct work *work, const struct ih_ellipsoid *start,
     ih_evidence_collect(work->space, &finding.head, start->centre_mm_q8, &nest, &finding.evidence);
     ih_score_rate(&finding.evidence, &score);
     finding.logit_q10 = score.logit_q10;
-    finding.probability_q16 = score.probability_q16;
+    if (work->rig->calibration.kind == IH_RIG_RANGE) {
+        finding.logit_q10 += params->range_prior_q10;
+    }
+    finding.probability_q16 = ih_score_probability_q16(finding.logit_q10);
     ih_findings_outline(work->rig, &finding);
     insert(work->out, &finding, params->spacing_mm);
 }
 
-static void try_place(const struct work *work, const int32_t centre_mm_q8[3],
-                      enum ih_source source)
+static void try_place(const struct work *work, const int32_t centre_mm_q8[3], enum ih_source source)
 {
     struct ih_ellipsoid start = ih_ellipsoid_mean(centre_mm_q8);
     try_start(work, &start, source);

@@ -21,7 +21,7 @@
 /* Findings kept; each costs 200 bytes. */
 #define IH_FINDINGS_MAX 16
 /* Expected places that are tried. */
-#define IH_FINDINGS_EXPECTED_MAX 4
+#define IH_FINDINGS_EXPECTED_MAX 8
 
 enum ih_source { IH_SOURCE_SCAN, IH_SOURCE_NEST, IH_SOURCE_EXPECTED };
 
@@ -29,8 +29,9 @@ struct ih_findings_params {
     struct ih_space_params space;
     struct ih_scan_params scan;
     struct ih_fit_params fit;
-    int32_t spacing_mm;   /* of two findings */
-    int32_t nest_near_mm; /* a nest this near is the candidate's own */
+    int32_t spacing_mm;     /* of two findings */
+    int32_t nest_near_mm;   /* a nest this near is the candidate's own */
+    int32_t range_prior_q10; /* log-odds added with a range rig: most windows show no head */
     int32_t front_least_mm; /* nothing nearer than this is a head: the lens is there */
 };
 
@@ -41,10 +42,10 @@ struct ih_finding {
     int32_t probability_q16;
     int32_t source; /* enum ih_source */
     /* Set by ih_tracks. */
-    int32_t track_id;     /* 0: none */
-    int32_t sigma_mm_q8;  /* of the centre along each axis; 0: unknown */
-    bool is_head;         /* accepted */
-    bool is_predicted;    /* not seen in this frame: where its track says that it is */
+    int32_t track_id;    /* 0: none */
+    int32_t sigma_mm_q8; /* of the centre along each axis; 0: unknown */
+    bool is_head;        /* accepted */
+    bool is_predicted;   /* not seen in this frame: where its track says that it is */
     /* Its outline in the frame, as in ih_hypothesis. */
     int32_t u_px_q12, v_px_q12;
     int32_t a_px_q12, b_px_q12;

@@ -175,8 +175,7 @@ static void add_priors(struct system *system, const struct state *state,
                        const struct ih_ellipsoid *start)
 {
     for (int axis = 0; axis < 3; axis++) {
-        int64_t moved_q8 =
-            (int64_t)state->ellipsoid.centre_mm_q8[axis] - start->centre_mm_q8[axis];
+        int64_t moved_q8 = (int64_t)state->ellipsoid.centre_mm_q8[axis] - start->centre_mm_q8[axis];
         system->normal_q16[IH_CHOLESKY_PACKED(axis + 1) - 1] += PRIOR_CENTRE_Q16;
         system->right_q16[axis] -= ih_mul_shift(PRIOR_CENTRE_Q16, moved_q8, 8);
         system->normal_q16[IH_CHOLESKY_PACKED(axis + 4) - 1] += PRIOR_AXES_Q16;

@@ -8,13 +8,13 @@
 #define ON_SURFACE_MM_Q8 (28 << 8)
 #define BEHIND_FULL_MM_Q8 (60 << 8)
 #define BEHIND_CENTRE_MM_Q8 (60 << 8)
-#define VALUE_NEARER_Q12 (-614)   /* -0.15 */
-#define VALUE_EMPTY_Q12 (-2458)   /* -0.6 */
-#define VALUE_UNKNOWN_Q12 (-614)  /* -0.15 */
-#define RING_EMPTY_Q12 2867       /* 0.7 */
-#define RING_NEAR_Q12 (-2458)     /* -0.6 */
-#define RING_INNER2_Q14 27689     /* 1.3^2 */
-#define RING_OUTER2_Q14 59146     /* 1.9^2 */
+#define VALUE_NEARER_Q12 (-614)  /* -0.15 */
+#define VALUE_EMPTY_Q12 (-2458)  /* -0.6 */
+#define VALUE_UNKNOWN_Q12 (-614) /* -0.15 */
+#define RING_EMPTY_Q12 2867      /* 0.7 */
+#define RING_NEAR_Q12 (-2458)    /* -0.6 */
+#define RING_INNER2_Q14 27689    /* 1.3^2 */
+#define RING_OUTER2_Q14 59146    /* 1.9^2 */
 #define RING_SHARE_PERCENT 60
 #define RAYS_LEAST 8
 

@@ -24,8 +24,7 @@ int32_t ih_score_probability_q16(int32_t logit_q10)
 
 static int32_t curve_q10(const struct curve *curve, int32_t value_q8)
 {
-    int64_t place_q16 =
-        ih_div_round(((int64_t)value_q8 - curve->first_q8) * 65536, curve->step_q8);
+    int64_t place_q16 = ih_div_round(((int64_t)value_q8 - curve->first_q8) * 65536, curve->step_q8);
     const int64_t last_q16 = (int64_t)(IH_SCORE_KNOTS - 1) << 16;
     place_q16 = place_q16 < 0 ? 0 : place_q16 > last_q16 ? last_q16 : place_q16;
     int32_t knot = (int32_t)(place_q16 >> 16);

@@ -116,12 +116,10 @@ static int64_t distance2_q16(const int32_t a_mm_q8[3], const int32_t b_mm_q8[3])
 
 /* How well a finding continues a track, as log-odds; false: not at all. */
 static bool fits(const struct ih_tracks *tracks, const struct ih_tracks_params *params,
-                 const struct ih_track *track, const struct ih_finding *finding,
-                 int32_t *merit_q10)
+                 const struct ih_track *track, const struct ih_finding *finding, int32_t *merit_q10)
 {
     int64_t unseen_us = tracks->time_us - track->seen_us;
-    int64_t gate_mm =
-        params->gate_mm + ih_div_round(params->gate_mm_per_s * unseen_us, 1000000);
+    int64_t gate_mm = params->gate_mm + ih_div_round(params->gate_mm_per_s * unseen_us, 1000000);
     int64_t gate2_q16 = gate_mm * gate_mm * 65536;
     int64_t distance2 = distance2_q16(track->head.centre_mm_q8, finding->head.centre_mm_q8);
     if (finding->track_id != 0 || finding->logit_q10 < params->keep_logit_q10 ||
@@ -145,10 +143,8 @@ static void correct(struct ih_track *track, const struct ih_finding *finding,
     int64_t gain_q16 = ih_div_round(track->place_q8 * 65536, sum_q8);
     int64_t speed_gain_q16 = ih_div_round(track->cross_q8 * 65536, sum_q8); /* 1/s */
     for (int axis = 0; axis < 3; axis++) {
-        int64_t off_q8 =
-            (int64_t)finding->head.centre_mm_q8[axis] - track->head.centre_mm_q8[axis];
-        int64_t speed =
-            track->velocity_mm_s_q8[axis] + ih_mul_shift(off_q8, speed_gain_q16, 16);
+        int64_t off_q8 = (int64_t)finding->head.centre_mm_q8[axis] - track->head.centre_mm_q8[axis];
+        int64_t speed = track->velocity_mm_s_q8[axis] + ih_mul_shift(off_q8, speed_gain_q16, 16);
         track->velocity_mm_s_q8[axis] =
             ih_clamp_s32(ih_saturate_s32(speed), -SPEED_MAX_MM_S_Q8, SPEED_MAX_MM_S_Q8);
         track->head.centre_mm_q8[axis] += (int32_t)ih_mul_shift(off_q8, gain_q16, 16);
@@ -163,8 +159,8 @@ static void correct(struct ih_track *track, const struct ih_finding *finding,
 static void remember_logit(struct ih_track *track, int32_t logit_q10, int32_t memory_q16)
 {
     int32_t limited = ih_clamp_s32(logit_q10, -LOGIT_MAX_Q10, LOGIT_MAX_Q10);
-    int64_t sum = (int64_t)track->mean_logit_q10 * memory_q16 +
-                  (int64_t)limited * (65536 - memory_q16);
+    int64_t sum =
+        (int64_t)track->mean_logit_q10 * memory_q16 + (int64_t)limited * (65536 - memory_q16);
     track->mean_logit_q10 = (int32_t)ih_shift_round(sum, 16);
 }
 
@@ -263,9 +259,9 @@ static void prune(struct ih_tracks *tracks, const struct ih_tracks_params *param
         struct ih_track *track = &tracks->track[t];
         int64_t unseen_us = tracks->time_us - track->seen_us;
         bool seen = track->finding != IH_NONE;
-        bool ended = seen ? track->mean_logit_q10 < params->keep_logit_q10
-                          : !track->is_head || unseen_us > params->carry_us ||
-                                is_gone(findings, t, params);
+        bool ended =
+            seen ? track->mean_logit_q10 < params->keep_logit_q10
+                 : !track->is_head || unseen_us > params->carry_us || is_gone(findings, t, params);
         if (ended || is_double(tracks, kept, track)) {
             if (seen) {
                 findings->finding[track->finding].track_id = 0;
@@ -348,8 +344,8 @@ static void list_heads(struct ih_tracks *tracks, const struct ih_findings *findi
         }
         int32_t own = tracks->track[t].finding;
         int32_t at = tracks->head_count++;
-        for (; at > 0 && findings->finding[tracks->head[at - 1]].logit_q10 <
-                             findings->finding[own].logit_q10;
+        for (; at > 0 &&
+               findings->finding[tracks->head[at - 1]].logit_q10 < findings->finding[own].logit_q10;
              at--) {
             tracks->head[at] = tracks->head[at - 1];
         }
@@ -365,8 +361,7 @@ static int64_t aside_q28(const struct ih_finding *finding, const struct ih_rig *
     if (side != IH_SIDE_MIDDLE) {
         return side == IH_SIDE_LEFT ? x_q28 : -x_q28;
     }
-    int64_t middle =
-        rig->calibration.kind == IH_RIG_DOTS ? rig->field.centre_x_q28 : 0;
+    int64_t middle = rig->calibration.kind == IH_RIG_DOTS ? rig->field.centre_x_q28 : 0;
     return ih_abs_s64(x_q28 - middle);
 }
 

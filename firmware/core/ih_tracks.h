@@ -37,20 +37,20 @@
 enum ih_side { IH_SIDE_MIDDLE, IH_SIDE_LEFT, IH_SIDE_RIGHT };
 
 struct ih_tracks_params {
-    int32_t gate_mm;          /* a finding this near belongs to the track .. */
-    int32_t gate_mm_per_s;    /* .. and farther, the longer it was not seen */
-    int32_t start_logit_q10;  /* findings above this start a track */
-    int32_t start_head_logit_q10; /* a new track above this is a head at once .. */
+    int32_t gate_mm;                           /* a finding this near belongs to the track .. */
+    int32_t gate_mm_per_s;                     /* .. and farther, the longer it was not seen */
+    int32_t start_logit_q10;                   /* findings above this start a track */
+    int32_t start_head_logit_q10;              /* a new track above this is a head at once .. */
     int32_t mature_findings, accept_logit_q10; /* .. later above this .. */
-    int32_t drop_logit_q10;   /* .. until it falls below this */
-    int32_t keep_logit_q10;   /* findings above this continue a track */
-    int32_t memory_q16;       /* share of the old mean in the new one */
+    int32_t drop_logit_q10;                    /* .. until it falls below this */
+    int32_t keep_logit_q10;                    /* findings above this continue a track */
+    int32_t memory_q16;                        /* share of the old mean in the new one */
     int32_t through_percent, front_percent;
     int32_t seen_least;
     int32_t carry_us;
-    int32_t gap_us; /* up to 2 s */
-    int32_t measured_mm;         /* standard deviation of a finding's centre */
-    int32_t acceleration_mm_s2;  /* of heads, standard deviation */
+    int32_t gap_us;             /* up to 2 s */
+    int32_t measured_mm;        /* standard deviation of a finding's centre */
+    int32_t acceleration_mm_s2; /* of heads, standard deviation */
     int32_t switch_frames;
     int32_t side; /* enum ih_side */
 };
@@ -65,7 +65,7 @@ struct ih_track {
     int64_t place_q8, cross_q8, speed_q8;
     int64_t seen_us;
     int32_t finding_count; /* so far, at most 1000 */
-    int32_t finding; /* of this frame, or IH_NONE */
+    int32_t finding;       /* of this frame, or IH_NONE */
 };
 
 struct ih_tracks {
