@@ -33,7 +33,7 @@ void ih_tracks_params_default(struct ih_tracks_params *params)
         .gate_mm = 90,
         .gate_mm_per_s = 300,
         .start_logit_q10 = -1024,
-        .start_head_logit_q10 = 1024,
+        .start_head_logit_q10 = 768,
         .mature_findings = 3,
         .accept_logit_q10 = 256,
         .drop_logit_q10 = -512,
@@ -215,7 +215,7 @@ static bool best_pair(const struct ih_tracks *tracks, const struct ih_tracks_par
             int32_t merit;
             if (tracks->track[t].finding != IH_NONE ||
                 !fits(tracks, params, &tracks->track[t], &findings->finding[f], &merit) ||
-                (gone && findings->finding[f].logit_q10 < params->start_head_logit_q10)) {
+                (gone && findings->finding[f].logit_q10 < params->accept_logit_q10)) {
                 continue;
             }
             if (merit > best) {
@@ -353,16 +353,29 @@ static void list_heads(struct ih_tracks *tracks, const struct ih_findings *findi
     }
 }
 
-/* How far from the wanted side, in the picture; less is better. */
+/* Where the middle dot's ray is at a depth; for a range rig the optical axis. */
+static int64_t middle_x_mm_q8(const struct ih_rig *rig, int32_t depth_mm_q8)
+{
+    const struct ih_calibration *c = &rig->calibration;
+    const int32_t *ray_q30 = c->ray_q30[IH_SLOTS / 2];
+    if (c->kind == IH_RIG_RANGE) {
+        return 0;
+    }
+    int64_t way_q8 = depth_mm_q8 - ih_shift_round(c->origin_mm_q16[2], 8);
+    return ih_shift_round(c->origin_mm_q16[0], 8) + ih_div_round(way_q8 * ray_q30[0], ray_q30[2]);
+}
+
+/* How far from the wanted side, as a slope; less is better. */
 static int64_t aside_q28(const struct ih_finding *finding, const struct ih_rig *rig, int32_t side)
 {
-    int64_t depth_q8 = ih_max_s32(finding->head.centre_mm_q8[2], 1 << 8);
-    int64_t x_q28 = ih_div_round((int64_t)finding->head.centre_mm_q8[0] * (1 << 28), depth_q8);
-    if (side != IH_SIDE_MIDDLE) {
-        return side == IH_SIDE_LEFT ? x_q28 : -x_q28;
+    int32_t depth_q8 = ih_max_s32(finding->head.centre_mm_q8[2], 1 << 8);
+    int64_t x_q8 = finding->head.centre_mm_q8[0];
+    if (side == IH_SIDE_MIDDLE) {
+        x_q8 = ih_abs_s64(x_q8 - middle_x_mm_q8(rig, depth_q8));
+    } else if (side == IH_SIDE_RIGHT) {
+        x_q8 = -x_q8;
     }
-    int64_t middle = rig->calibration.kind == IH_RIG_DOTS ? rig->field.centre_x_q28 : 0;
-    return ih_abs_s64(x_q28 - middle);
+    return ih_div_round(x_q8 * (1 << 28), depth_q8);
 }
 
 static int32_t choose(const struct ih_tracks *tracks, const struct ih_tracks_params *params,
