@@ -381,19 +381,24 @@ static int64_t aside_q28(const struct ih_finding *finding, const struct ih_rig *
 static int32_t choose(const struct ih_tracks *tracks, const struct ih_tracks_params *params,
                       const struct ih_rig *rig, const struct ih_findings *findings)
 {
-    int32_t best = IH_NONE;
+    const struct ih_finding *best = NULL;
+    int32_t chosen = IH_NONE;
     for (int32_t i = 0; i < tracks->head_count; i++) {
         const struct ih_finding *finding = &findings->finding[tracks->head[i]];
         const struct ih_finding *first = &findings->finding[tracks->head[0]];
         if (finding->logit_q10 < first->logit_q10 - CHOICE_LOGIT_Q10) {
             break;
         }
-        if (best == IH_NONE || aside_q28(finding, rig, params->side) <
-                                   aside_q28(&findings->finding[best], rig, params->side)) {
-            best = tracks->head[i];
+        bool is_better = best == NULL || (best->is_predicted && !finding->is_predicted) ||
+                         (best->is_predicted == finding->is_predicted &&
+                          aside_q28(finding, rig, params->side) <
+                              aside_q28(best, rig, params->side));
+        if (is_better) {
+            best = finding;
+            chosen = tracks->head[i];
         }
     }
-    return best;
+    return chosen;
 }
 
 /* The head of the selected track stays selected until another was better for some frames. */

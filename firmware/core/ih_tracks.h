@@ -19,7 +19,8 @@
  *        A track's log-odds are a running mean of its findings'; it is a head above start_head_logit,
  *        from its mature_findings-th finding on above accept_logit, until it falls below drop_logit.
  *        The selected head is the one nearest the middle of the pattern (or the leftmost or
- *        rightmost in the picture, by side), of those not much less probable than the best; another
+ *        rightmost in the picture, by side), of those not much less probable than the best, and one
+ *        that is seen before one that is carried; another
  *        takes its place after switch_frames frames.
  * Time:  frames may come late, be lost, or jump: a step back, or forward by more than gap_us, forgets
  *        all tracks; ids go on.
