@@ -4,7 +4,8 @@
 accept.py DATA_DIR WORK_DIR
 
 WORK_DIR, made by accept.sh: PART/NAME/records (host_sim --json --paper), PART/trace/NAME/*.json
-(--trace) and PART/table (what host_sim itself prints) for PART dots and range. Nothing is taken from
+(--trace) and PART/table (what host_sim itself prints) for PART dots and range, and
+full/PART/NAME/records (host_sim --json, everything switched on). Nothing is taken from
 the program's own score: the rules are docs/contract.md's, "Score", written once more; at the end the
 two are compared. Exit status 1 when a limit is missed or the two scores differ.
 
@@ -61,8 +62,13 @@ class Heads:
         self.detected = 0
         self.selected = collections.Counter()
         self.errors_mm = []
+        self.several = self.several_found = 0  # heads of frames whose truth has several
 
     def add(self, record, truth):
+        for head in truth.get("heads", []):
+            self.several += 1
+            self.several_found += any(matches(record["hypotheses"][i], head["centre_mm"])
+                                      for i in record["heads"])
         if "head" not in truth:
             return
         centre_mm = truth["head"] and truth["head"]["centre_mm"]
@@ -124,6 +130,20 @@ class Dots:
 # --- everything ----------------------------------------------------------------------------------
 
 
+def score_heads(data, work, part):
+    """Heads of each sequence of a part, by name."""
+    heads = {}
+    for name in sorted(os.listdir(os.path.join(data, part))):
+        path = os.path.join(work, part, name, "records")
+        if not os.path.exists(path):
+            continue
+        truths = {t["file"]: t for t in read_lines(os.path.join(data, part, name, "truth.jsonl"))}
+        heads[name] = Heads()
+        for record in read_lines(path):
+            heads[name].add(record, truths[record["file"]])
+    return heads
+
+
 def score(data, work, part):
     """(heads, dots) of each sequence of a part, by name."""
     heads, dots = {}, {}
@@ -174,6 +194,27 @@ def limits(dots_heads, dots, range_heads):
     yield ("range: seated person correct, of 1", range_heads["pcl_person_seated"].correct, 1, True)
     yield ("range: empty right, of %d" % sum(h.frames[False] for h in range_empty),
            sum(h.empty_right for h in range_empty), 24, True)
+
+
+def full_limits(dots_heads, range_heads):
+    """The same for everything switched on."""
+    rendered = [dots_heads[name] for name in RENDERED]
+    empty = [h for name, h in dots_heads.items() if name.startswith("real_empty")]
+    range_empty = [h for name, h in range_heads.items() if name.startswith("neg_")]
+    errors_mm = sum((h.errors_mm for h in rendered), [])
+    people = range_heads["pcl_five_people_standing"]
+    yield ("all: rendered, selected right, of %d" % sum(sum(h.frames.values()) for h in rendered),
+           sum(sum(h.selected.values()) for h in rendered), 286, True)
+    yield ("all: position error, median, mm", statistics.median(errors_mm), 16.0, False)
+    yield ("all: position error, 90 %, mm", np.percentile(errors_mm, 90), 32.0, False)
+    for name in ("real_person_paper", "real_person_wide"):
+        yield ("all: %s, selected right, of 1" % name, dots_heads[name].selected[True], 1, True)
+    yield ("all: real rooms, dots: empty right, of %d" % sum(h.frames[False] for h in empty),
+           sum(h.selected[False] for h in empty), 24, True)
+    yield ("all: range: seated person right, of 1", range_heads["pcl_person_seated"].selected[True], 1, True)
+    yield ("all: range: people found, of %d" % people.several, people.several_found, 4, True)
+    yield ("all: range: empty right, of %d" % sum(h.frames[False] for h in range_empty),
+           sum(h.selected[False] for h in range_empty), 27, True)
 
 
 def show(value):
@@ -258,9 +299,13 @@ def main():
     data, work = sys.argv[1:]
     dots_heads, dots = score(data, work, "dots")
     range_heads, _ = score(data, work, "range")
-    good = print_limits(limits(dots_heads, dots, range_heads))
-    print_sequences("dots", dots_heads)
-    print_sequences("range", range_heads)
+    full = os.path.join(work, "full")
+    full_dots, full_range = score_heads(data, full, "dots"), score_heads(data, full, "range")
+    good = print_limits([*limits(dots_heads, dots, range_heads), *full_limits(full_dots, full_range)])
+    print_sequences("dots, the paper's method alone", dots_heads)
+    print_sequences("range, the paper's method alone", range_heads)
+    print_sequences("dots, all", full_dots)
+    print_sequences("range, all", full_range)
     print("\n%-34s %8s %7s %9s %8s %7s" % ("dots", "visible", "found", "error px", "labels", "right"))
     for name, d in dots.items():
         print("%-34s %8d %7.2f %9.3f %8d %7.2f" % (name, d.true, 100 * d.recall, d.median_px, d.labels,

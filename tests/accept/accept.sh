@@ -1,5 +1,6 @@
 #!/bin/sh
-# The measured limits: host_sim --paper over the data sets, scored anew from its records.
+# The measured limits: host_sim, with --paper and without, over the data sets, scored anew from its
+# records.
 #
 #     accept.sh [--if-present] HOST_SIM DATA_DIR
 #
@@ -33,7 +34,8 @@ for part in dots range; do
     for dir in "$data/$part"/*/; do
         [ -e "${dir}rig.json" ] || continue
         name=$(basename "$dir")
-        mkdir -p "$work/$part/$name"
+        mkdir -p "$work/$part/$name" "$work/full/$part/$name"
+        "$host_sim" --json "$dir" >"$work/full/$part/$name/records"
         "$host_sim" --json --paper --trace "$work/$part/trace" "$dir" >"$work/$part/$name/records"
     done
     "$host_sim" --paper "$data/$part" >"$work/$part/table"
