@@ -4,10 +4,15 @@
  * Out:   per slot its ray and, where it was seen, its point in mm; where it was not, whether that
  *        says something.
  * Way:   a ray is the line from the projector through the slot's dot (from the camera, for a range
- *        image): at the depth Z it is at origin + (Z - origin_z) (slope_x, slope_y, 1). A dot that is
- *        not seen is "empty" when a surface near by would have shown it: its place, probe_mm behind
- *        the 8th percentile of the seen depths, is inside the picture and not over-exposed.
- * Cost:  361 x 2 divisions, one selection of 361 depths.
+ *        image): at the depth Z it is at origin + (Z - origin_z) (slope_x, slope_y, 1). A seen
+ *        point is where the camera saw it: its place times its depth. A dot that is missing is
+ *        "empty" when a surface near by would have shown it: its place, probe_mm behind the 8th
+ *        percentile of the seen depths (as in ih_samples; 0 when nothing was seen), is inside the
+ *        picture and not over-exposed. A missing point of a range image is always "empty":
+ *        ih_points says "unknown" where it may only be outside.
+ * Overflow: a slope is 2^22, a depth 2^22 in Q8 and a place 2^31 in Q28: points below 2^25.
+ * Error: half a step of each format (docs/numerics.md).
+ * Cost:  361 x 2 divisions, 4 more and the lens for a missing dot, one selection of 361 depths.
  */
 #ifndef IH_SPACE_H
 #define IH_SPACE_H
@@ -35,7 +40,7 @@ struct ih_space {
 };
 
 struct ih_space_params {
-    int32_t probe_mm; /* "near by" is this far behind the 8th percentile of the depths */
+    int32_t probe_mm; /* "near by" is this far behind the 8th percentile of the depths; above 0 */
 };
 
 void ih_space_params_default(struct ih_space_params *params);

@@ -13,6 +13,7 @@ import cholesky
 import cloud
 import dots
 import ellipse
+import ellipsoid
 import exposure
 import isohead
 import labels
@@ -20,14 +21,14 @@ import noise
 import points
 import rig
 import samples
+import space
 import surface
 import windows
 
-STAGES = {"rig": rig, "cholesky": cholesky, "surface": surface,
-          "band": band, "noise": noise, "dots": dots, "labels": labels, "exposure": exposure,
-          "cloud": cloud,
-          "windows": windows, "points": points, "samples": samples, "ellipse": ellipse,
-          "isohead": isohead}
+STAGES = {"rig": rig, "band": band, "noise": noise, "dots": dots, "labels": labels,
+          "exposure": exposure, "cloud": cloud, "windows": windows, "points": points,
+          "samples": samples, "cholesky": cholesky, "surface": surface, "ellipse": ellipse,
+          "space": space, "ellipsoid": ellipsoid, "isohead": isohead}
 
 
 def main():
