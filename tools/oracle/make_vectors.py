@@ -15,6 +15,7 @@ import dots
 import ellipse
 import ellipsoid
 import exposure
+import fit
 import isohead
 import labels
 import noise
@@ -28,7 +29,7 @@ import windows
 STAGES = {"rig": rig, "band": band, "noise": noise, "dots": dots, "labels": labels,
           "exposure": exposure, "cloud": cloud, "windows": windows, "points": points,
           "samples": samples, "cholesky": cholesky, "surface": surface, "ellipse": ellipse,
-          "space": space, "ellipsoid": ellipsoid, "isohead": isohead}
+          "space": space, "ellipsoid": ellipsoid, "fit": fit, "isohead": isohead}
 
 
 def main():
