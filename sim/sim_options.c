@@ -3,13 +3,22 @@
 #include <getopt.h>
 #include <stdio.h>
 
-enum { OPTION_JSON = 1, OPTION_PAPER, OPTION_RIG, OPTION_TRACE, OPTION_HELP, OPTION_VERSION };
+enum {
+    OPTION_JSON = 1,
+    OPTION_PAPER,
+    OPTION_RIG,
+    OPTION_TRACE,
+    OPTION_WITHOUT,
+    OPTION_HELP,
+    OPTION_VERSION
+};
 
 static const struct option table[] = {
     {"json", no_argument, NULL, OPTION_JSON},
     {"paper", no_argument, NULL, OPTION_PAPER},
     {"rig", required_argument, NULL, OPTION_RIG},
     {"trace", required_argument, NULL, OPTION_TRACE},
+    {"without", required_argument, NULL, OPTION_WITHOUT},
     {"help", no_argument, NULL, OPTION_HELP},
     {"version", no_argument, NULL, OPTION_VERSION},
     {NULL, 0, NULL, 0},
@@ -21,7 +30,7 @@ static bool refuse(const char *reason, const char *subject)
     return false;
 }
 
-static void take(struct sim_options *options, int option)
+static bool take(struct sim_options *options, int option)
 {
     switch (option) {
     case OPTION_JSON:
@@ -36,6 +45,11 @@ static void take(struct sim_options *options, int option)
     case OPTION_TRACE:
         options->trace = optarg;
         break;
+    case OPTION_WITHOUT:
+        if (!sim_without_add(&options->without, optarg)) {
+            return refuse("unknown part in --without ", optarg);
+        }
+        break;
     case OPTION_HELP:
         options->help = true;
         break;
@@ -43,6 +57,7 @@ static void take(struct sim_options *options, int option)
         options->version = true;
         break;
     }
+    return true;
 }
 
 bool sim_options_parse(struct sim_options *options, int argument_count, char **arguments)
@@ -64,7 +79,9 @@ bool sim_options_parse(struct sim_options *options, int argument_count, char **a
         if (optarg != NULL && optarg[0] == 0) {
             return refuse("empty argument of ", arguments[optind - 2]);
         }
-        take(options, option);
+        if (!take(options, option)) {
+            return false;
+        }
     }
     options->dirs = arguments + optind;
     options->dir_count = argument_count - optind;
@@ -85,6 +102,14 @@ void sim_options_help(void)
           "  --paper        the paper's method alone: every frame on its own\n"
           "  --rig FILE     this rig file instead of DIR/rig.json\n"
           "  --trace OUT    write every stage's results of each frame under OUT, as JSON\n"
+          "  --without PART[,PART...]  leave out parts of the method, to see what each brings:\n"
+          "                 scan      no candidates from the model scan\n"
+          "                 nests     no candidates from the paper's nests; they stay evidence\n"
+          "                 expected  no candidates from tracks\n"
+          "                 fit       candidates are not fitted: a mean head where each starts\n"
+          "                 tracks    every frame on its own\n"
+          "                 windows   of a depth image only the best window\n"
+          "                 missing   dots that are not seen are not entered as far points\n"
           "  --help         this text\n"
           "  --version      the version\n"
           "\n"

@@ -4,6 +4,8 @@
 
 #include <stdbool.h>
 
+#include "sim_without.h"
+
 enum sim_status {
     SIM_STATUS_GOOD = 0,  /* every frame was processed */
     SIM_STATUS_INPUT = 1, /* some input was unreadable or wrong, or output could not be written */
@@ -12,7 +14,8 @@ enum sim_status {
 
 struct sim_options {
     bool json;
-    bool paper; /* the paper's method alone */
+    bool paper;       /* the paper's method alone */
+    uint32_t without; /* parts that are left out, sim_without.h */
     bool help, version;
     const char *rig;   /* NULL: DIR/rig.json */
     const char *trace; /* NULL: none */

@@ -59,6 +59,7 @@ static bool start_core(struct run *run, const char *dir)
     if (good) {
         enum ih_err err = isohead_init(run->head, &calibration, &bad_slot);
         run->head->params.is_paper = run->options->paper;
+        sim_without_apply(run->options->without, &run->head->params);
         good = err == IH_OK;
         if (!good) {
             sim_rig_explain(&calibration, err, bad_slot, &error);

@@ -13,6 +13,8 @@ void ih_findings_params_default(struct ih_findings_params *params)
     params->spacing_mm = 80;
     params->nest_near_mm = 90;
     params->range_prior_q10 = -1280;
+    params->nest_max = IH_HYPOTHESES_MAX;
+    params->expected_max = IH_FINDINGS_EXPECTED_MAX;
     params->front_least_mm = 150;
 }
 
@@ -174,11 +176,13 @@ void ih_findings_add(const struct ih_points *points, const struct ih_dots *dots,
     for (int32_t i = 0; i < scratch->scan.place_count; i++) {
         try_place(&work, scratch->scan.place[i].centre_mm_q8, IH_SOURCE_SCAN);
     }
-    for (int32_t i = 0; i < heads->hypothesis_count; i++) {
+    for (int32_t i = 0; i < ih_min_s32(heads->hypothesis_count, params->nest_max); i++) {
         try_place(&work, heads->hypothesis[i].centre_mm_q8, IH_SOURCE_NEST);
     }
     for (int32_t i = 0; i < expected->count; i++) {
-        try_start(&work, &expected->head[i], IH_SOURCE_EXPECTED);
+        if (i < params->expected_max) {
+            try_start(&work, &expected->head[i], IH_SOURCE_EXPECTED);
+        }
         view_expected(&scratch->space, &expected->head[i], &out->view[i]);
     }
 }

@@ -29,10 +29,12 @@ struct ih_findings_params {
     struct ih_space_params space;
     struct ih_scan_params scan;
     struct ih_fit_params fit;
-    int32_t spacing_mm;     /* of two findings */
-    int32_t nest_near_mm;   /* a nest this near is the candidate's own */
+    int32_t spacing_mm;      /* of two findings */
+    int32_t nest_near_mm;    /* a nest this near is the candidate's own */
+    int32_t nest_max;        /* of them this many are candidates themselves */
+    int32_t expected_max;    /* of the expected heads this many are */
     int32_t range_prior_q10; /* log-odds added with a range rig: most windows show no head */
-    int32_t front_least_mm; /* nothing nearer than this is a head: the lens is there */
+    int32_t front_least_mm;  /* nothing nearer than this is a head: the lens is there */
 };
 
 struct ih_finding {

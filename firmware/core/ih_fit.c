@@ -30,7 +30,7 @@ static const int8_t robust_mm[IH_FIT_STEPS] = {24, 16, 8, 8, 8, 8};
 
 void ih_fit_params_default(struct ih_fit_params *params)
 {
-    *params = (struct ih_fit_params){.see_through_mm = 60};
+    *params = (struct ih_fit_params){.see_through_mm = 60, .step_count = IH_FIT_STEPS};
 }
 
 /* One observation: how far off and how that changes with the unknowns. */
@@ -251,7 +251,7 @@ void ih_fit_ellipsoid(const struct ih_space *space, const struct ih_fit_params *
     for (int axis = 0; axis < 3; axis++) {
         state.ln_q16[axis] = ln_ratio_q16(start->semi_mm_q8[axis], mean.semi_mm_q8[axis]);
     }
-    for (int step = 0; step < IH_FIT_STEPS; step++) {
+    for (int step = 0; step < params->step_count; step++) {
         struct system system;
         int32_t step_q16[IH_FIT_UNKNOWNS];
         memset(&system, 0, sizeof system);

@@ -44,6 +44,7 @@
 
 struct ih_fit_params {
     int32_t see_through_mm; /* a point this far behind the entry is seen through the ellipsoid */
+    int32_t step_count;     /* up to IH_FIT_STEPS; 0: the start as it is */
 };
 
 void ih_fit_params_default(struct ih_fit_params *params);

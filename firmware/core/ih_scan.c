@@ -20,7 +20,11 @@
 
 void ih_scan_params_default(struct ih_scan_params *params)
 {
-    *params = (struct ih_scan_params){.deep_mm = 98, .spacing_mm = 80};
+    *params = (struct ih_scan_params){
+        .deep_mm = 98,
+        .spacing_mm = 80,
+        .place_max = IH_SCAN_MAX,
+    };
 }
 
 static int32_t inside_value_q12(const struct ih_ray *ray, const struct ih_crossing *crossing)
@@ -142,7 +146,7 @@ void ih_scan_find(const struct ih_space *space, const struct ih_scan_params *par
         place->score_q12 = score_q12(space, &head);
     }
     out->place_count = 0;
-    while (out->place_count < IH_SCAN_MAX) {
+    while (out->place_count < params->place_max) {
         const struct ih_scan_place *best =
             best_left(scratch->tried, count, out, params->spacing_mm);
         if (best == NULL) {

@@ -25,6 +25,7 @@
 struct ih_scan_params {
     int32_t deep_mm;
     int32_t spacing_mm;
+    int32_t place_max; /* up to IH_SCAN_MAX */
 };
 
 struct ih_scan_place {

@@ -49,7 +49,7 @@ struct ih_tracks_params {
     int32_t through_percent, front_percent;
     int32_t seen_least;
     int32_t carry_us;
-    int32_t gap_us;             /* up to 2 s */
+    int32_t gap_us;             /* up to 2 s; -1: every frame on its own */
     int32_t measured_mm;        /* standard deviation of a finding's centre */
     int32_t acceleration_mm_s2; /* of heads, standard deviation */
     int32_t switch_frames;

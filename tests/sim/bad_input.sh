@@ -633,6 +633,16 @@ run --rig
 check 'usage: --rig without a file' 2 0 0 'host_sim: missing argument of --rig'
 run --trace '' d
 check 'usage: empty --trace' 2 0 0 'host_sim: empty argument of --trace'
+run --json --without
+check 'usage: --without without a part' 2 0 0 'host_sim: missing argument of --without'
+run --json --without '' d
+check 'usage: empty --without' 2 0 0 'host_sim: empty argument of --without'
+for list in tracking scan,tracking scan, ,scan scan,,fit sca scans; do
+    run --json --without "$list" d
+    check "usage: --without $list" 2 0 0 "host_sim: unknown part in --without $list;"
+done
+run --json --without scan --without fit,tracks --without nests,expected,windows,missing d
+check 'usage: --without all parts' 0 3 0 -
 run --help
 reason='no help'
 [ "$(cat status)" -ne 0 ] || ! grep -q -- '--trace OUT' out || reason=

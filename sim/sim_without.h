@@ -1,0 +1,18 @@
+/* sim_without - parts of the method left out, to measure what each of them brings.
+ *
+ * Every part is a parameter of the core that is set so that the part does nothing.
+ */
+#ifndef SIM_WITHOUT_H
+#define SIM_WITHOUT_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "isohead.h"
+
+/* Add the parts of a list, "scan,fit", to a set. False: one of them does not exist. */
+bool sim_without_add(uint32_t *parts, const char *list);
+
+void sim_without_apply(uint32_t parts, struct ih_params *params);
+
+#endif
