@@ -2,7 +2,7 @@
 
 MAKEFLAGS += --no-print-directory
 BUILD := build
-# Where the measured frames and scans are, for `make accept`.
+# Where the measured frames and scans are, for `make accept` and `make eval`.
 DATA ?= ../shared/data
 # A folder with unity.c, or one with cJSON.c: used instead of fetching the source package.
 UNITY_DIR ?= $(BUILD)/third_party/unity/src
@@ -11,7 +11,7 @@ CJSON_DIR ?= $(BUILD)/third_party/cjson
 PICTURE ?= 000024
 
 .DEFAULT_GOAL := help
-.PHONY: help sim frames test accept bits vectors picture format formatted lint clean
+.PHONY: help sim frames test accept eval bits vectors picture format formatted lint clean
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z_]+:.*## / { printf "  make %-9s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -40,6 +40,11 @@ test: sim ## every test: units against float64, sanitizers, bad input, rules of 
 accept: sim ## the measured limits on the data sets in DATA (default ../shared/data)
 	@tools/setup.sh accept
 	@tests/accept/accept.sh $(BUILD)/host/sim/host_sim $(DATA)
+
+eval: sim ## everything measured: all data sets, fresh scenes, each part left out; pictures of failures
+	@tools/setup.sh eval
+	@/usr/bin/python3 tools/eval/evaluate.py --host-sim $(BUILD)/host/sim/host_sim \
+	  --render $(BUILD)/host/tools/render/render --work $(BUILD)/eval --data $(DATA)
 
 bits: sim ## the same records from gcc and clang, -O0 and -O3, x86-64 and aarch64
 	@tools/setup.sh bits

@@ -1,7 +1,7 @@
 #!/bin/sh
 # Bring what a make target needs and this machine lacks.
 #
-#   tools/setup.sh sim|test|accept|bits|vectors|picture|format|lint
+#   tools/setup.sh sim|test|accept|eval|bits|vectors|picture|format|lint
 #
 # On Debian and its kin missing packages are installed when that is allowed (root, or sudo without a
 # password); otherwise the exact command is printed and the exit status is 1. Nothing is installed
@@ -50,6 +50,14 @@ picture)
     need_python numpy python3-numpy
     need_python matplotlib python3-matplotlib
     ;;
+eval)
+    need_sim
+    need_python numpy python3-numpy
+    need_python matplotlib python3-matplotlib
+    need_program valgrind valgrind
+    need_program gcc gcc
+    need_program nm binutils
+    ;;
 bits)
     need_sim
     need_bits
@@ -64,7 +72,7 @@ lint)
     need_program clang-tidy clang-tidy
     ;;
 *)
-    echo "usage: tools/setup.sh sim|test|accept|bits|vectors|picture|format|lint" >&2
+    echo "usage: tools/setup.sh sim|test|accept|eval|bits|vectors|picture|format|lint" >&2
     exit 2
     ;;
 esac

@@ -1,0 +1,204 @@
+#!/usr/bin/env python3
+"""tools/eval: its scores of records that were made by hand, and a short run with the programs.
+
+eval.py HOST_SIM RENDER
+"""
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import unittest
+
+TOOLS = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "tools", "eval")
+sys.path.insert(0, TOOLS)
+import report
+import runs
+import scenes
+import score
+
+CENTRE = [10.0, -20.0, 800.0]
+OTHER = [-400.0, 0.0, 900.0]
+PROGRAMS = []
+
+
+def record(centres, heads, head):
+    return {"hypotheses": [{"centre_mm": list(c)} for c in centres], "heads": heads, "head": head}
+
+
+def off(x_mm, y_mm=0.0, z_mm=0.0):
+    return [CENTRE[0] + x_mm, CENTRE[1] + y_mm, CENTRE[2] + z_mm]
+
+
+def truth(*centres):
+    heads = [{"centre_mm": list(c)} for c in centres]
+    return {"head": heads[0] if heads else None, **({"heads": heads} if len(heads) > 1 else {})}
+
+
+class Judging(unittest.TestCase):
+    def expect(self, verdict, detected, outcome, right, error_mm=None, what=""):
+        self.assertEqual((verdict.detected, verdict.outcome, verdict.right, verdict.error_mm, verdict.what),
+                         (detected, outcome, right, error_mm, what))
+
+    def test_the_one_head_is_found(self):
+        self.expect(score.judge(record([off(3, 4)], [0], 0), truth(CENTRE)), True, "correct", True, 5.0)
+
+    def test_100_mm_is_a_match_and_more_is_none(self):
+        self.expect(score.judge(record([off(0, 60, 80)], [0], 0), truth(CENTRE)), True, "correct", True,
+                    100.0)
+        self.expect(score.judge(record([off(0, 0, 100.1)], [0], 0), truth(CENTRE)), False, "wrong", False,
+                    None, "100 mm off, head not among the hypotheses")
+
+    def test_two_heads_of_which_the_right_one_is_selected(self):
+        self.expect(score.judge(record([off(0), off(500)], [0, 1], 0), truth(CENTRE)), True, "ambiguous",
+                    True, 0.0)
+
+    def test_two_heads_of_which_the_wrong_one_is_selected(self):
+        self.expect(score.judge(record([off(500), off(0)], [0, 1], 0), truth(CENTRE)), True, "ambiguous",
+                    False, None, "500 mm off")
+
+    def test_two_heads_and_none_selected(self):
+        self.expect(score.judge(record([off(0), off(500)], [0, 1], None), truth(CENTRE)), True,
+                    "ambiguous", False, None, "several heads, none selected")
+
+    def test_two_wrong_heads(self):
+        self.expect(score.judge(record([off(0), off(500), off(600)], [2, 1], 2), truth(CENTRE)), True,
+                    "wrong", False, None, "600 mm off")
+
+    def test_nothing_accepted(self):
+        self.expect(score.judge(record([off(30)], [], None), truth(CENTRE)), True, "not done", False, None,
+                    "head found, not accepted")
+        self.expect(score.judge(record([], [], None), truth(CENTRE)), False, "not done", False, None,
+                    "head not among the hypotheses")
+
+    def test_nobody_there(self):
+        self.expect(score.judge(record([off(0)], [], None), truth()), False, "not done", True)
+        self.expect(score.judge(record([off(0)], [0], 0), truth()), False, "wrong", False, None,
+                    "a head where nobody is")
+        # as with --paper: nothing is selected, but the table counts it as wrong
+        self.expect(score.judge(record([off(0), off(300)], [0, 1], None), truth()), False, "wrong", True)
+
+    def test_the_other_person(self):
+        self.expect(score.judge(record([OTHER], [0], 0), truth(CENTRE, OTHER)), False, "wrong", False, None,
+                    "the other person")
+
+    def test_truth_that_says_nothing(self):
+        self.assertIsNone(score.judge(record([], [], None), {"heads": [{"centre_mm": CENTRE}]}))
+
+
+class People(unittest.TestCase):
+    def found(self, accepted, *centres):
+        return score.people(record(accepted, list(range(len(accepted))), 0), centres)
+
+    def test_both(self):
+        self.assertEqual(self.found([OTHER, off(20)], CENTRE, OTHER), (2, 0, True))
+
+    def test_one_and_something_else(self):
+        self.assertEqual(self.found([off(20), off(0, 300)], CENTRE, OTHER), (1, 1, True))
+
+    def test_one_between_two_heads_finds_one(self):
+        self.assertEqual(self.found([off(60)], off(0), off(120)), (1, 0, True))
+
+    def test_two_on_one_head_find_one(self):
+        self.assertEqual(self.found([off(10), off(-20)], CENTRE, OTHER), (1, 0, True))
+
+    def test_rejected_ones_find_nothing(self):
+        self.assertEqual(score.people(record([off(0)], [], None), [CENTRE]), (0, 0, False))
+
+    def test_heads_beyond_the_picture_are_not_asked_for(self):
+        rig = {"image_width": 640, "image_height": 480, "near_mm": 400, "far_mm": 2600,
+               "camera_matrix": {"data": [600, 0, 320, 0, 600, 240, 0, 0, 1]}}
+        sees = runs.Camera(rig).sees
+        self.assertTrue(sees([0, 0, 800]))
+        self.assertFalse(sees([0, 0, -150]))
+        self.assertFalse(sees([0, 0, 3000]))
+        self.assertFalse(sees([-500, 0, 900]))
+
+
+class Sums(unittest.TestCase):
+    def counts(self):
+        counts = score.Counts()
+        for one, real in ((record([off(3, 4)], [0], 0), truth(CENTRE)),
+                          (record([off(0), off(12)], [0, 1], 1), truth(CENTRE)),
+                          (record([off(500)], [0], 0), truth(CENTRE)),
+                          (record([off(0)], [], None), truth(CENTRE)),
+                          (record([], [], None), truth()),
+                          (record([OTHER], [0], 0), truth())):
+            counts.add(score.judge(one, real))
+        return counts
+
+    def test_counts(self):
+        expected = {"heads": 4, "detected": 3, "correct": 1, "ambiguous": 1, "wrong": 1, "not_done": 1,
+                    "selected_right": 2, "selected_wrong": 1, "empty": 2, "empty_right": 1,
+                    "error_50_mm": 5.0, "error_90_mm": 12.0}
+        self.assertEqual(self.counts().as_json(), expected)
+
+    def test_merging_adds(self):
+        both = self.counts()
+        both.merge(self.counts())
+        self.assertEqual((both.frame_count, both.right_count, both.detected), (12, 6, 6))
+        self.assertEqual(both.outcomes[True]["wrong"], 2)
+
+    def test_percentiles_are_values_that_occur(self):
+        values = [5, 1, 4, 2, 3, 6, 7, 8, 9, 10]
+        self.assertEqual([score.percentile(values, p) for p in (1, 50, 51, 90, 100)], [1, 5, 6, 9, 10])
+        self.assertIsNone(score.percentile([], 50))
+
+    def test_a_part_that_helps_gains(self):
+        scene = scenes.Scene("k", "empty", "n")
+        helped = score.Counts()
+        helped.add(score.judge(record([], [], None), truth()))
+        without = score.Counts()
+        without.add(score.judge(record([off(0)], [0], 0), truth()))
+        results = {scene: runs.Run({runs.FULL: helped, "without scan": without}, [])}
+        rows = report.gains(results, lambda c: c.right_count, lambda c: c.frame_count).splitlines()
+        self.assertEqual(rows[2].split("|")[2].strip(), "1/1")
+        self.assertEqual(rows[3].split("|")[2].strip(), "+1")
+
+
+class Scenes(unittest.TestCase):
+    def test_every_rendered_scene_has_a_seed_of_its_own(self):
+        rendered = scenes.rendered_scenes()
+        seeds = [scene.seed for scene in rendered]
+        self.assertGreaterEqual(len(seeds), 40)
+        self.assertEqual(seeds, list(range(scenes.FIRST_SEED, scenes.FIRST_SEED + len(seeds))))
+        self.assertEqual(len({scene.name for scene in rendered}), len(seeds))
+        self.assertLessEqual({scene.group for scene in rendered}, set(scenes.GROUPS))
+
+
+class Programs(unittest.TestCase):
+    def evaluate(self, work):
+        subprocess.run(["/usr/bin/python3", os.path.join(TOOLS, "evaluate.py"), "--quick", "--host-sim",
+                        PROGRAMS[0], "--render", PROGRAMS[1], "--work", work], check=True,
+                       stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        written = []
+        for name in ("report.md", "results.json"):
+            with open(os.path.join(work, name), encoding="utf-8") as file:
+                written.append(file.read())
+        return written
+
+    def test_a_short_run(self):
+        with tempfile.TemporaryDirectory() as work:
+            text, results = self.evaluate(work)
+            self.assertEqual(self.evaluate(work), [text, results], "twice is the same")
+        two = json.loads(results)["scenes"]
+        self.assertEqual([scene["kind"] for scene in two], list(scenes.QUICK_KINDS))
+        for scene in two:
+            full = scene["variants"][runs.FULL]
+            self.assertEqual(full["heads"] + full["empty"], scenes.QUICK_FRAMES)
+            self.assertEqual(len(scene["failures"]), scenes.QUICK_FRAMES - full["selected_right"]
+                             - full["empty_right"])
+        self.assertGreater(two[1]["variants"][runs.FULL]["people"]["there"], 0)
+        for heading in ("by kind of scene", "What each part brings", "Table 1", "Several people"):
+            self.assertIn(heading, text)
+        for seeds in ("7005 to 7048", "5001-5030", "6001-6006"):
+            self.assertIn(seeds, text)
+
+
+if __name__ == "__main__":
+    if len(sys.argv) != 3:
+        print("usage: eval.py HOST_SIM RENDER", file=sys.stderr)
+        sys.exit(2)
+    PROGRAMS += sys.argv[1:]
+    unittest.main(argv=sys.argv[:1])
