@@ -417,6 +417,44 @@ done
 [ "$(cat part/truth.jsonl)" = "$(sed -n 2,3p anybody/truth.jsonl)" ] || reason="truth differs"
 result "a part of a sequence is the same as in the whole" "$reason"
 
+# --- a camera that looks up or down ---------------------------------------------------------------
+cat >tilted.py <<'END'
+"""The head at rest stays where it is (within its sway), and turns; what is below it comes nearer when the camera
+looks up. Shoulders are the visible dots 180 to 300 mm below the head's centre."""
+import json
+
+import numpy
+
+
+def read(directory):
+    lines = [json.loads(line) for line in open(directory + "/truth.jsonl", encoding="utf-8")]
+    lines = [line for line in lines if line["head"]]
+    rig = json.load(open(directory + "/rig.json", encoding="utf-8"))
+    matrix = numpy.array(rig["camera_matrix"]["data"]).reshape(3, 3)
+    below = []
+    for line in lines:
+        dots = numpy.array(line["dots"])
+        y_mm = (dots[:, 2] - matrix[1, 2]) / matrix[1, 1] * dots[:, 3]
+        centre = line["head"]["centre_mm"]
+        near = (y_mm - centre[1] > 180) & (y_mm - centre[1] < 300) & (dots[:, 3] < centre[2] + 300)
+        below.append(numpy.median(dots[near, 3]) - centre[2])
+    return numpy.array([line["head"]["centre_mm"] for line in lines]), numpy.median(below)
+
+
+level, level_below = read("level")
+up, up_below = read("up")
+down, down_below = read("down")
+assert numpy.abs(up.mean(axis=0) - level.mean(axis=0)).max() < 30, (up.mean(axis=0), level.mean(axis=0))
+assert up_below < level_below - 60 < level_below + 60 < down_below, (up_below, level_below, down_below)
+END
+for tilt in "level 0" "up 25" "down -25"; do
+    # shellcheck disable=SC2086 # a name and an angle
+    set -- $tilt
+    "$render" --seed 4 --frames 6 --background none --tilt "$2" "$1"
+done
+/usr/bin/python3 tilted.py >out 2>&1 && reason= || reason=$(tail -n 1 out)
+result "a tilted camera turns the scene about the head" "$reason"
+
 # --- refusals ------------------------------------------------------------------------------------
 refuse "no directory" 2 "OUT_DIR"
 refuse "two directories" 2 "OUT_DIR" a b
@@ -429,6 +467,8 @@ refuse "too many frames" 2 "--frames" --frames 5001 a
 refuse "too small" 2 "--size" --size 319x240 a
 refuse "too large" 2 "--size" --size 1280x801 a
 refuse "size with something after it" 2 "--size" --size 320x240x8 a
+refuse "too steep" 2 "--tilt" --tilt 41 a
+refuse "tilt that is no number" 2 "--tilt" --tilt -up a
 refuse "9 bits" 2 "--bits" --bits 9 a
 refuse "unknown scene" 2 "--scene" --scene cat a
 refuse "unknown rig" 2 "--rig" --rig narrow a

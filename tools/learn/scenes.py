@@ -17,6 +17,7 @@ def scenes_of_seed(seed):
     ambient = AMBIENTS[seed % len(AMBIENTS)]
     person = PERSONS[seed % len(PERSONS)]
     act = ACTS[seed % len(ACTS)]
+    tilt = str((seed * 7 % 11 - 5) * 6)  # -30 .. 30 degrees
     knock = ("0", "0", "0.01", "0.02")[seed % 4]
 
     def scene(name, kind, frames, rig, *more):
@@ -33,6 +34,9 @@ def scenes_of_seed(seed):
         scene("turning-other", "turning", 12, other, "--person", person),
         scene("visit", "visit", 60, rig, "--background", background),
         scene("two", "two", 12, other),
+        scene("tilted", "person", 16, rig, "--sequence", "2", "--tilt", tilt),
+        scene("tilted-turning", "turning", 12, other, "--background", background, "--tilt", tilt),
+        scene("tilted-empty", "empty", 6, rig, "--background", background, "--tilt", tilt),
         scene("empty", "empty", 10, other, "--background", background),
         scene("table", "table", 20, rig),
         scene("room", "room", 20, other, "--background", background),

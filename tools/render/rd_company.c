@@ -110,6 +110,14 @@ static struct rd_vec draw_neighbour(uint64_t seed, struct rd_vec *first_mm)
     return rd_v(side * sqrt(apart_mm * apart_mm - behind_mm * behind_mm), up_mm, behind_mm);
 }
 
+/* A camera that looks up sees what is below the head nearer than the head. */
+static void plan_tilt(struct rd_company *company, double tilt_deg, struct rd_vec head_mm)
+{
+    company->tilted = tilt_deg != 0.0;
+    company->tilt.rot = rd_rot_euler(0.0, -tilt_deg * RD_RAD_PER_DEG, 0.0);
+    company->tilt.origin_mm = rd_sub(head_mm, rd_turn(&company->tilt.rot, head_mm));
+}
+
 void rd_company_make(struct rd_company *company, const struct rd_options *options, const struct rd_rig *rig,
                      struct rd_scene *scene)
 {
@@ -137,13 +145,16 @@ void rd_company_make(struct rd_company *company, const struct rd_options *option
         rd_seat_build(scene, &seat_rng, head_mm);
     if (two)
         make_neighbour(company, options, &seat_rng, rd_add(head_mm, beside_mm), scene);
+    plan_tilt(company, options->tilt_deg, head_mm);
+    if (company->tilted)
+        rd_scene_move(scene, 0, &company->tilt);
 }
 
-static void add_truth(struct rd_truth *truth, const struct rd_person *person, const struct rd_posture *posture)
+static void add_truth(struct rd_truth *truth, const struct rd_person *person, const struct rd_pose *head)
 {
-    const struct rd_rot *rot = &posture->head.rot;
+    const struct rd_rot *rot = &head->rot;
     truth->heads[truth->head_count++] = (struct rd_head_truth){
-        .centre_mm = posture->head.origin_mm,
+        .centre_mm = head->origin_mm,
         .semi_axes_mm = person->head_axes_mm,
         .angles_known = true,
         /* Yaw, pitch and roll of rd_rot_euler, read back from the axes. */
@@ -187,6 +198,7 @@ static bool somebody_in(struct rd_company *company, int frame)
 void rd_company_frame(struct rd_company *company, int frame, struct rd_scene *scene, struct rd_truth *truth)
 {
     bool somebody = somebody_in(company, frame);
+    int first = scene->shape_count;
     *truth = (struct rd_truth){.head = RD_NOBODY, .several = company->sitter_count > 1};
     if (company->kind == RD_SCENE_TURNING)
         add_chair(company, frame, somebody, scene);
@@ -195,7 +207,10 @@ void rd_company_frame(struct rd_company *company, int frame, struct rd_scene *sc
         struct rd_posture posture;
         rd_motion_posture(&sitter->motion, &sitter->person, frame, &posture);
         rd_person_build(&sitter->person, &posture, scene);
-        add_truth(truth, &sitter->person, &posture);
+        struct rd_pose head = company->tilted ? rd_pose_mul(&company->tilt, &posture.head) : posture.head;
+        add_truth(truth, &sitter->person, &head);
     }
+    if (company->tilted)
+        rd_scene_move(scene, first, &company->tilt);
     rd_company_choose(truth, company->rig, company->kind == RD_SCENE_VISIT ? VISIT_DOTS : ANYWHERE_DOTS);
 }

@@ -24,6 +24,7 @@ enum option_id {
     OPT_RANGE,
     OPT_PERSON,
     OPT_ACT,
+    OPT_TILT,
     OPT_KNOCK,
     OPT_LASER,
     OPT_EXPOSURE,
@@ -55,6 +56,7 @@ static const char help_text[] =
     "  --background KIND  varied (default, by seed), near, far, none\n"
     "  --ambient KIND     varied (default, by seed), dim, normal, bright, sunlight (hard shadows)\n"
     "  --distortion KIND  normal (default), none, strong\n"
+    "  --tilt DEG         -40 to 40 (default 0): the camera looks up at people by this, down where it is negative\n"
     "  --knock DEG        0 (default) to 0.5: the projector is turned by this against what rig.json says\n"
     "  --calibration-noise X  0 (default) to 10: rig.json's errors, in typical ones: 0.1 % of fx, 1 px of the centre,\n"
     "                     0.01 degrees of each ray, 0.1 mm of the projector's place\n"
@@ -101,8 +103,9 @@ static bool read_decimal(const char *option, const char *text, double low, doubl
                          double *value)
 {
     char *end;
+    const char *digits = text + (low < 0.0 && text[0] == '-');
     *value = strtod(text, &end);
-    if (strspn(text, "0123456789.") != strlen(text) || end == text || *end != '\0' || *value < low || *value > high)
+    if (strspn(digits, "0123456789.") != strlen(digits) || end == text || *end != '\0' || *value < low || *value > high)
         return complain(option, text, wanted);
     return true;
 }
@@ -204,6 +207,8 @@ static bool take_option(int id, const char *text, struct rd_options *options)
         return read_int("bits", text, 8, 16, "8, 10, 12 or 16", &options->bits) &&
                (options->bits == 8 || options->bits == 10 || options->bits == 12 || options->bits == 16 ||
                 complain("bits", text, "8, 10, 12 or 16"));
+    case OPT_TILT:
+        return read_decimal("tilt", text, -40.0, 40.0, "a number from -40 to 40", &options->tilt_deg);
     case OPT_KNOCK:
         return read_decimal("knock", text, 0.0, 0.5, "a number from 0 to 0.5", &options->knock_deg);
     case OPT_CALIBRATION_NOISE:
@@ -236,6 +241,7 @@ enum rd_options_result rd_options_parse(int argc, char **argv, struct rd_options
         {"range", required_argument, NULL, OPT_RANGE},
         {"person", required_argument, NULL, OPT_PERSON},
         {"act", required_argument, NULL, OPT_ACT},
+        {"tilt", required_argument, NULL, OPT_TILT},
         {"knock", required_argument, NULL, OPT_KNOCK},
         {"calibration-noise", required_argument, NULL, OPT_CALIBRATION_NOISE},
         {"laser", required_argument, NULL, OPT_LASER},

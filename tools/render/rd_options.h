@@ -50,6 +50,7 @@ struct rd_options {
     double exposure; /* all light, relative */
     uint64_t seed;
     int frame_count;          /* for each depth image, where there are any */
+    double tilt_deg;          /* the camera looks up at people by this, or down */
     double knock_deg;         /* the projector's turn against what rig.json says */
     double calibration_noise; /* rig.json's errors, in typical errors of a calibration */
     int first_frame;
