@@ -422,29 +422,28 @@ cat >tilted.py <<'END'
 """The head at rest stays where it is (within its sway), and turns; what is below it comes nearer when the camera
 looks up. Shoulders are the visible dots 180 to 300 mm below the head's centre."""
 import json
-
-import numpy
+import statistics
 
 
 def read(directory):
     lines = [json.loads(line) for line in open(directory + "/truth.jsonl", encoding="utf-8")]
     lines = [line for line in lines if line["head"]]
-    rig = json.load(open(directory + "/rig.json", encoding="utf-8"))
-    matrix = numpy.array(rig["camera_matrix"]["data"]).reshape(3, 3)
+    matrix = json.load(open(directory + "/rig.json", encoding="utf-8"))["camera_matrix"]["data"]
     below = []
     for line in lines:
-        dots = numpy.array(line["dots"])
-        y_mm = (dots[:, 2] - matrix[1, 2]) / matrix[1, 1] * dots[:, 3]
         centre = line["head"]["centre_mm"]
-        near = (y_mm - centre[1] > 180) & (y_mm - centre[1] < 300) & (dots[:, 3] < centre[2] + 300)
-        below.append(numpy.median(dots[near, 3]) - centre[2])
-    return numpy.array([line["head"]["centre_mm"] for line in lines]), numpy.median(below)
+        for _, _, v, z in line["dots"]:
+            under = (v - matrix[5]) / matrix[4] * z - centre[1]
+            if 180 < under < 300 and z < centre[2] + 300:
+                below.append(z - centre[2])
+    middle = [statistics.mean(line["head"]["centre_mm"][axis] for line in lines) for axis in range(3)]
+    return middle, statistics.median(below)
 
 
 level, level_below = read("level")
 up, up_below = read("up")
 down, down_below = read("down")
-assert numpy.abs(up.mean(axis=0) - level.mean(axis=0)).max() < 30, (up.mean(axis=0), level.mean(axis=0))
+assert max(abs(a - b) for a, b in zip(up, level)) < 30, (up, level)
 assert up_below < level_below - 60 < level_below + 60 < down_below, (up_below, level_below, down_below)
 END
 for tilt in "level 0" "up 25" "down -25"; do
