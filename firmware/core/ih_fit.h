@@ -31,7 +31,9 @@
  *        Against the truth on made scenes: 1 to 4 mm for a mean head, 9 for one a tenth larger in
  *        every direction. A fifth of all dots anywhere between 0.5 and 2.5 m: 17 mm (median; 48 in
  *        1 of 20), because wrong dots behind the head push.
- * Cost:  steps x (361 crossings + points in reach x 27 multiply-adds), one Cholesky of 6 a step.
+ * Cost:  steps x (a crossing for each point + points in reach x 27 multiply-adds), one Cholesky of 6
+ *        a step. 1.3 million instructions a fit with 320 points (x86-64, gcc -O3, frames of
+ *        sequence 1).
  */
 #ifndef IH_FIT_H
 #define IH_FIT_H

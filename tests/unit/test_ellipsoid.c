@@ -198,6 +198,14 @@ static void the_extremes_do_not_overflow(void)
         }
         const struct ih_ray ray = ray_of(slope[0], slope[1]);
 
+        if ((i & 32) != 0) { /* through the middle, which is only before or behind */
+            for (axis = 0; axis < 2; axis++) {
+                at.centre_mm_q8[axis] =
+                    (int32_t)(origin[axis] +
+                              ((int64_t)(at.centre_mm_q8[2] - origin[2]) * slope[axis] >> 20));
+            }
+            at.centre_mm_q8[2] += (int32_t)ih_test_any_size(&random, 10);
+        }
         if (!ih_ellipsoid_cross(&at, origin, &ray, &crossing)) {
             continue;
         }

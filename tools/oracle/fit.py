@@ -1,4 +1,8 @@
-"""Float64 reference of the fit of an ellipsoid: Gauss-Newton, each step with numpy.linalg.solve."""
+"""Float64 reference of the fit of an ellipsoid: Gauss-Newton, each step with numpy.linalg.solve.
+
+Where little but the prior holds an ellipsoid, or a point more or less decides, the firmware's
+rounding is multiplied: by how much is found out by fits whose right sides are rounded like its own,
+at random, and is each fit's slack."""
 
 import numpy as np
 
@@ -15,6 +19,7 @@ LOW_FROM, LOW_TO, LOW_WEIGHT = 0.5, 0.8, 0.5
 SEE_THROUGH_MM, PUSH_MAX_MM, PUSH_WEIGHT = 60, 30, 0.5
 POINT_MM, PRIOR_CENTRE_MM, PRIOR_LN = 6, 60, 0.09
 STEP_MAX_MM, STEP_MAX_LN, LN_MAX = 40, 0.15, 0.35
+ROUNDING_MM = 1 / 1024  # of the right side, half a step
 
 
 def rows(place, semi):
@@ -48,8 +53,8 @@ def observations(space, centre, semi, robust_mm):
             np.append(weight[used], np.full(pushes.sum(), PUSH_WEIGHT)))
 
 
-def fit(space, start_centre, start_semi):
-    """Centre and semi-axes."""
+def fit(space, start_centre, start_semi, rounding=lambda: 0):
+    """Centre and semi-axes. rounding: what is added to the right sides."""
     start = np.concatenate([start_centre, np.log(np.divide(start_semi, MEAN_SEMI_MM))])
     prior_mean = np.append(start[:3], np.zeros(3))
     prior = POINT_MM**2 / np.repeat([PRIOR_CENTRE_MM, PRIOR_LN], 3)**2.0
@@ -59,10 +64,20 @@ def fit(space, start_centre, start_semi):
         residual, derivative, weight = observations(space, state[:3], semi, robust_mm)
         normal = derivative.T @ (weight[:, None] * derivative) + np.diag(prior)
         right = -derivative.T @ (weight * residual) - prior * (state - prior_mean)
+        right += rounding()
         limit = np.repeat([STEP_MAX_MM, STEP_MAX_LN], 3)
         state += np.clip(np.linalg.solve(normal, right), -limit, limit)
         state[3:] = np.clip(state[3:], -LN_MAX, LN_MAX)
     return state[:3], MEAN_SEMI_MM * np.exp(state[3:])
+
+
+def slack_of(random, space, centre, semi):
+    """What rounding can make of a fit, mm."""
+    def rounding():  # derivatives by ln are a hundred times those by its hundredths
+        return random.uniform(-ROUNDING_MM, ROUNDING_MM, 6) * np.repeat([1, 100], 3)
+    exact = np.concatenate(fit(space, centre, semi))
+    off = [np.concatenate(fit(space, centre, semi, rounding)) - exact for _ in range(12)]
+    return 8 * np.abs(off).max()  # places and sums are rounded too: measured up to 6 times
 
 
 def starts(random, scene):
@@ -97,8 +112,9 @@ def write_vectors(directory):
     for index, (scene, space, _) in enumerate(scenes.spaces()):
         for centre_q8, semi_q8 in starts(random, scene):
             centre, semi = fit(space, from_q(centre_q8, 8), from_q(semi_q8, 8))
-            lines.append("%d, {{%d, %d, %d}, {%d, %d, %d}}, {%s}, {%s}" % (
+            slack = slack_of(random, space, from_q(centre_q8, 8), from_q(semi_q8, 8))
+            lines.append("%d, {{%d, %d, %d}, {%d, %d, %d}}, {%s}, {%s}, %s" % (
                 index, *centre_q8, *semi_q8, ", ".join(emit.numbers(centre, 4)),
-                ", ".join(emit.numbers(semi, 4))))
+                ", ".join(emit.numbers(semi, 4)), emit.number(slack, 4)))
     inc.struct_array("vector_fit", "vector_fits", lines)
     return inc.write(directory, "fit.inc")

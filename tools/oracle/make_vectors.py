@@ -22,6 +22,7 @@ import noise
 import points
 import rig
 import samples
+import scan
 import space
 import surface
 import windows
@@ -29,7 +30,7 @@ import windows
 STAGES = {"rig": rig, "band": band, "noise": noise, "dots": dots, "labels": labels,
           "exposure": exposure, "cloud": cloud, "windows": windows, "points": points,
           "samples": samples, "cholesky": cholesky, "surface": surface, "ellipse": ellipse,
-          "space": space, "ellipsoid": ellipsoid, "fit": fit, "isohead": isohead}
+          "space": space, "ellipsoid": ellipsoid, "scan": scan, "fit": fit, "isohead": isohead}
 
 
 def main():
