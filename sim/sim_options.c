@@ -103,6 +103,7 @@ void sim_options_help(void)
           "  --rig FILE     this rig file instead of DIR/rig.json\n"
           "  --trace OUT    write every stage's results of each frame under OUT, as JSON\n"
           "  --without PART[,PART...]  leave out parts of the method, to see what each brings:\n"
+          "                 ambient   frames without laser help nothing\n"
           "                 scan      no candidates from the model scan\n"
           "                 nests     no candidates from the paper's nests; they stay evidence\n"
           "                 expected  no candidates from tracks\n"

@@ -168,7 +168,8 @@ static const struct ih_frame *fresh_ambient(const struct visit *visit, int64_t t
 {
     bool fresh =
         visit->ambient.samples != NULL && time_us - visit->ambient_time_us <= AMBIENT_AGE_MAX_US;
-    return fresh ? &visit->ambient : NULL;
+    bool wanted = !sim_without_ambient(visit->run->options->without);
+    return wanted && fresh ? &visit->ambient : NULL;
 }
 
 static void process_frame(struct visit *visit, const struct hal_frame *frame)

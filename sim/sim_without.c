@@ -38,12 +38,20 @@ static void without_missing(struct ih_params *params)
     params->samples.fill_root_weight_q15 = 0;
 }
 
+/* Index of the part that is no parameter. */
+#define PART_AMBIENT 0
+
 static const struct {
     const char *name;
-    void (*apply)(struct ih_params *params);
+    void (*apply)(struct ih_params *params); /* NULL: none */
 } part[] = {
-    {"scan", without_scan},       {"nests", without_nests},   {"expected", without_expected},
-    {"fit", without_fit},         {"tracks", without_tracks}, {"windows", without_windows},
+    {"ambient", NULL},
+    {"scan", without_scan},
+    {"nests", without_nests},
+    {"expected", without_expected},
+    {"fit", without_fit},
+    {"tracks", without_tracks},
+    {"windows", without_windows},
     {"missing", without_missing},
 };
 
@@ -77,8 +85,13 @@ bool sim_without_add(uint32_t *parts, const char *list)
 void sim_without_apply(uint32_t parts, struct ih_params *params)
 {
     for (size_t i = 0; i < PART_COUNT; i++) {
-        if ((parts >> i & 1) != 0) {
+        if ((parts >> i & 1) != 0 && part[i].apply != NULL) {
             part[i].apply(params);
         }
     }
+}
+
+bool sim_without_ambient(uint32_t parts)
+{
+    return (parts >> PART_AMBIENT & 1) != 0;
 }

@@ -1,6 +1,7 @@
 /* sim_without - parts of the method left out, to measure what each of them brings.
  *
- * Every part is a parameter of the core that is set so that the part does nothing.
+ * Every part is a parameter of the core that is set so that the part does nothing; but for ambient
+ * frames, which the core is not given.
  */
 #ifndef SIM_WITHOUT_H
 #define SIM_WITHOUT_H
@@ -14,5 +15,8 @@
 bool sim_without_add(uint32_t *parts, const char *list);
 
 void sim_without_apply(uint32_t parts, struct ih_params *params);
+
+/* Are frames without laser left out? */
+bool sim_without_ambient(uint32_t parts);
 
 #endif

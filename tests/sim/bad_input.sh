@@ -533,14 +533,15 @@ fresh
 ambient() {
     cp d/c.pgm d/b.pgm
     printf "$a"'{"file":"b.pgm","time_us":5,"laser":false}\n{"file":"c.pgm","time_us":%d}\n' "$1" >d/frames.jsonl
-    run --json d
+    run --json $3 d
     dots=$(sed -n 's/^{"file":"c.pgm".*"dots":\([0-9]*\),.*/\1/p' out)
     [ "$dots" "$2" 30 ] && reason= || reason="$dots dots"
-    result "$3" "$reason"
+    result "$4" "$reason"
     fresh
 }
-ambient 200005 -lt 'the same frame without laser 200 ms before: no dots'
-ambient 200006 -gt 'the same frame without laser 200.001 ms before: all dots'
+ambient 200005 -lt '' 'the same frame without laser 200 ms before: no dots'
+ambient 200006 -gt '' 'the same frame without laser 200.001 ms before: all dots'
+ambient 200005 -gt '--without ambient' 'the same, left out: all dots'
 
 # --- truth.jsonl ---------------------------------------------------------------------------------
 
@@ -641,7 +642,7 @@ for list in tracking scan,tracking scan, ,scan scan,,fit sca scans; do
     run --json --without "$list" d
     check "usage: --without $list" 2 0 0 "host_sim: unknown part in --without $list;"
 done
-run --json --without scan --without fit,tracks --without nests,expected,windows,missing d
+run --json --without scan --without fit,tracks --without nests,expected,windows,missing,ambient d
 check 'usage: --without all parts' 0 3 0 -
 run --help
 reason='no help'

@@ -149,10 +149,10 @@ def scene_list(results):
 
 def seeds(results):
     used = sorted(scene.seed for scene in results if scene.seed)
-    return ("%d scenes are rendered, seeds %d to %d: reported on, nothing is tuned on them. The score's "
-            "curves are learnt\nfrom seeds %s and were looked at with %s (tools/learn). The data sets "
+    return ("%d scenes are rendered or cast, seeds %d to %d: reported on, nothing is tuned on them. The "
+            "score's curves are learnt\nfrom seeds %s and were looked at with %s (tools/learn). The data sets "
             "(six, real, range) were looked at\nwhile parameters were chosen.\n"
-            % (len(used), used[0], used[-1], scenes.LEARNT_SEEDS, scenes.CHECK_SEEDS))
+            % (len(used), used[0], used[-1], scenes.learnt_seeds(), scenes.CHECK_SEEDS))
 
 
 def text(results, costs):
@@ -178,7 +178,7 @@ def text(results, costs):
 def as_json(results):
     return {
         "seeds": {"reported": sorted(scene.seed for scene in results if scene.seed),
-                  "learnt": scenes.LEARNT_SEEDS, "check": scenes.CHECK_SEEDS},
+                  "learnt": scenes.learnt_seeds(), "check": scenes.CHECK_SEEDS},
         "scenes": [{"name": scene.name, "kind": scene.kind, "group": scene.group, "seed": scene.seed,
                     "options": [os_free(option) for option in scene.options],
                     "variants": {v: c.as_json() for v, c in result.counts.items()},

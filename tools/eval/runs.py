@@ -11,7 +11,7 @@ import subprocess
 
 import score
 
-PARTS = ("scan", "nests", "expected", "fit", "tracks", "windows", "missing")
+PARTS = ("ambient", "scan", "nests", "expected", "fit", "tracks", "windows", "missing")
 FULL = "full"
 PAPER = "paper"
 PAPER_PLAIN = "paper, without missing"
@@ -124,6 +124,14 @@ def keep_traces(scratch, kept, files):
     return found
 
 
+def idle_variants(directory, rig):
+    """Those that leave out what this directory has not: they need no run of their own."""
+    idle = set() if rig.get("kind") == "range" else {"without windows"}
+    path = os.path.join(directory, "frames.jsonl")
+    frames = read_lines(path) if os.path.exists(path) else []
+    return idle if any(not frame.get("laser", True) for frame in frames) else idle | {"without ambient"}
+
+
 def run(programs, work, scene, variants, with_traces):
     """One scene through every variant."""
     directory = scene.directory
@@ -133,11 +141,11 @@ def run(programs, work, scene, variants, with_traces):
     truths = {t["file"]: t for t in read_lines(os.path.join(directory, "truth.jsonl"))}
     with open(os.path.join(directory, "rig.json"), encoding="utf-8") as file:
         rig = json.load(file)
-    camera, is_range = Camera(rig), rig.get("kind") == "range"
+    camera, idle = Camera(rig), idle_variants(directory, rig)
     result = Run({}, [])
     for variant in variants:
-        if variant == "without windows" and not is_range and FULL in result.counts:
-            result.counts[variant] = result.counts[FULL]  # dots have no windows
+        if variant in idle and FULL in result.counts:
+            result.counts[variant] = result.counts[FULL]
             continue
         scratch = os.path.join(work, "scratch", scene.name)
         trace = ["--trace", scratch] if variant == FULL and with_traces else []

@@ -1,15 +1,19 @@
 """What the evaluation looks at: rendered scenes, casts on real depth images, recorded data sets.
 
 Every rendered scene has a seed of its own, from 7001 on. Nobody tunes on these: the score's curves
-are learnt from LEARNT_SEEDS and were looked at with CHECK_SEEDS (tools/learn).
+are learnt from other seeds, which their header names, and were looked at with CHECK_SEEDS
+(tools/learn).
 """
 
 import dataclasses
 import os
+import re
 
-LEARNT_SEEDS = "5001-5030"
+WEIGHTS = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "firmware", "core",
+                       "ih_score_weights.h")
 CHECK_SEEDS = "6001-6006"
 FIRST_SEED = 7001
+FIRST_CAST_SEED = 7101
 
 # Columns of the tables of what each part brings, in this order.
 GROUPS = ("six", "real", "seq 1", "seq 2", "people", "acts", "light", "rig", "visit", "two", "empty",
@@ -64,6 +68,10 @@ RENDERED = (
     ("empty", "room", 16, ("--rig paper --scene room", "--rig wide --scene room")),
     ("empty", "clutter", 24, ("--rig paper --scene clutter", "--rig wide --scene clutter",
                               "--rig paper --scene clutter --background near")),
+    ("light", "sunlight, laser every second frame", 24, (
+        "--rig paper --ambient sunlight --laser alternate",
+        "--rig wide --ambient sunlight --laser alternate --sequence 2",
+        "--rig paper --ambient bright --laser alternate")),
 )
 
 # The dots cast on real depth images: (kind, folder of DATA/range, frames an image, rigs).
@@ -78,6 +86,13 @@ QUICK_KINDS = ("sequence 2", "two people")
 QUICK_FRAMES = 4
 
 
+def learnt_seeds():
+    """As the curves themselves say."""
+    with open(WEIGHTS, encoding="utf-8") as file:
+        found = re.search(r"--seeds (\d+-\d+)", file.read())
+    return found[1] if found else "(unknown)"
+
+
 def rendered_scenes():
     scenes, seed = [], FIRST_SEED
     for group, kind, frames, variants in RENDERED:
@@ -87,8 +102,8 @@ def rendered_scenes():
     return scenes
 
 
-def cast_scenes(data, first_seed):
-    scenes, seed = [], first_seed
+def cast_scenes(data):
+    scenes, seed = [], FIRST_CAST_SEED
     for kind, folder, frames, rigs in CAST:
         for rig in rigs:
             source = os.path.join(data, "range", folder) if folder else os.path.join(data, "range")
@@ -123,11 +138,9 @@ def recorded_scenes(data):
 
 def all_scenes(data):
     """Recorded, rendered, cast; without data sets only the rendered ones."""
-    rendered = rendered_scenes()
     recorded = recorded_scenes(data)
     has_range = any(scene.group == "range" for scene in recorded)
-    cast = cast_scenes(data, rendered[-1].seed + 1) if has_range else []
-    return recorded + rendered + cast
+    return recorded + rendered_scenes() + (cast_scenes(data) if has_range else [])
 
 
 def quick_scenes():
