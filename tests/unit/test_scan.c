@@ -148,71 +148,99 @@ static void the_best_place_is_the_head(void)
     TEST_ASSERT_TRUE(from_q12(scan.place[0].score_q12) < 0.8);
 }
 
-/* One ray straight ahead and no other near: its value is an eighth of a mean over at least eight. */
+/* A head's front at 1000 mm straight ahead, where slot 0 sees it; all others but slot 1 are out of
+ * reach. The deep semi-axis, mm. */
+static int32_t stand_before_a_head(void)
+{
+    const struct ih_ellipsoid mean = ih_ellipsoid_mean((const int32_t[3]){0, 0, 0});
+    int32_t slot;
+
+    memset(&space, 0, sizeof space);
+    for (slot = 2; slot < IH_SLOTS; slot++) {
+        space.ray[slot].slope_x_q20 = 2 << 20;
+    }
+    see(0, 1000 << 8);
+    params.deep_mm = mean.semi_mm_q8[2] >> 8;
+    return params.deep_mm;
+}
+
+static void set_state(int32_t slot, enum ih_ray_state state, int32_t depth_mm)
+{
+    if (state == IH_RAY_SEEN) {
+        see(slot, depth_mm << 8);
+    } else {
+        lose(slot, state);
+    }
+}
+
+/* One more ray straight ahead: its value is an eighth of a mean over at least eight. */
 static void the_values_of_single_rays(void)
 {
     static const struct {
         enum ih_ray_state state;
-        int32_t depth_mm; /* the front is at 1000 mm, the centre at 1098 */
+        int32_t behind_mm;
         double value;
     } cases[] = {
-        {IH_RAY_SEEN, 1000, 1},     {IH_RAY_SEEN, 1027, 1},    {IH_RAY_SEEN, 973, 1},
-        {IH_RAY_SEEN, 972, -0.15},  {IH_RAY_SEEN, 500, -0.15}, {IH_RAY_SEEN, 1028, -28 / 60.0},
-        {IH_RAY_SEEN, 1045, -0.75}, {IH_RAY_SEEN, 1060, -1},   {IH_RAY_SEEN, 9000, -1},
-        {IH_RAY_EMPTY, 0, -0.6},    {IH_RAY_UNKNOWN, 0, -0.15}};
-    int32_t i, slot;
+        {IH_RAY_SEEN, 0, 1},
+        {IH_RAY_SEEN, VECTOR_ON_SURFACE_MM - 1, 1},
+        {IH_RAY_SEEN, -VECTOR_ON_SURFACE_MM + 1, 1},
+        {IH_RAY_SEEN, -VECTOR_ON_SURFACE_MM, VECTOR_NEARER},
+        {IH_RAY_SEEN, -500, VECTOR_NEARER},
+        {IH_RAY_SEEN, VECTOR_ON_SURFACE_MM, -(double)VECTOR_ON_SURFACE_MM / VECTOR_BEHIND_FULL_MM},
+        {IH_RAY_SEEN, VECTOR_BEHIND_FULL_MM - 6, 6.0 / VECTOR_BEHIND_FULL_MM - 1},
+        {IH_RAY_SEEN, VECTOR_BEHIND_FULL_MM, -1},
+        {IH_RAY_SEEN, 9000, -1},
+        {IH_RAY_EMPTY, 0, VECTOR_EMPTY},
+        {IH_RAY_UNKNOWN, 0, VECTOR_UNKNOWN},
+    };
+    int32_t i;
 
     for (i = 0; i < IH_TEST_COUNT(cases); i++) {
-        memset(&space, 0, sizeof space);
-        for (slot = 2; slot < IH_SLOTS; slot++) { /* out of reach */
-            space.ray[slot].slope_x_q20 = 2 << 20;
-        }
-        see(0, 1000 << 8);
-        if (cases[i].state == IH_RAY_SEEN) {
-            see(1, cases[i].depth_mm << 8);
-        } else {
-            lose(1, cases[i].state);
-        }
+        stand_before_a_head();
+        set_state(1, cases[i].state, 1000 + cases[i].behind_mm);
         find();
         IH_TEST_WITHIN(0.0005, (1 + cases[i].value) / 8, from_q12(scratch.tried[0].score_q12),
                        "value", i);
     }
 }
 
-/* A ray beside (1.6 radii), above and below: what is below does not count. The slope is that at the
- * centre's depth of 1098 mm, where the nearest place is but for 2 %. */
+/* A ray beside, above and below: what is below does not count. Places are hundredths of semi-axes
+ * at the centre's depth; the nearest place is that but for 2 %. */
 static void the_values_of_rays_around(void)
 {
     static const struct {
-        int32_t aside_mm, down_mm;
+        int32_t aside, down;
         enum ih_ray_state state;
-        int32_t depth_mm;
+        int32_t behind_mm; /* the centre */
         double value;
-    } cases[] = {{125, 0, IH_RAY_SEEN, 1159, 1},  {-125, 0, IH_RAY_SEEN, 1157, -0.6},
-                 {0, -181, IH_RAY_SEEN, 3000, 1}, {0, -181, IH_RAY_EMPTY, 0, 0.7},
-                 {-125, 0, IH_RAY_UNKNOWN, 0, 0}, {0, 181, IH_RAY_SEEN, 3000, 0},
-                 {0, 181, IH_RAY_EMPTY, 0, 0},    {100, 90, IH_RAY_EMPTY, 0, 0.7},
-                 {90, 100, IH_RAY_EMPTY, 0, 0},   {100, 0, IH_RAY_EMPTY, 0, 0},
-                 {153, 0, IH_RAY_EMPTY, 0, 0},    {-106, 0, IH_RAY_EMPTY, 0, 0.7},
-                 {-145, 0, IH_RAY_EMPTY, 0, 0.7}};
-    int32_t i, slot;
+    } cases[] = {
+        {160, 0, IH_RAY_SEEN, VECTOR_BEHIND_CENTRE_MM + 1, 1},
+        {-160, 0, IH_RAY_SEEN, VECTOR_BEHIND_CENTRE_MM - 1, VECTOR_RING_NEAR},
+        {0, -160, IH_RAY_SEEN, 2000, 1},
+        {0, -160, IH_RAY_EMPTY, 0, VECTOR_RING_EMPTY},
+        {-160, 0, IH_RAY_UNKNOWN, 0, 0},
+        {0, 160, IH_RAY_SEEN, 2000, 0},
+        {0, 160, IH_RAY_EMPTY, 0, 0},
+        {128, 80, IH_RAY_EMPTY, 0, VECTOR_RING_EMPTY},
+        {115, 88, IH_RAY_EMPTY, 0, 0},
+        {128, 0, IH_RAY_EMPTY, 0, 0},
+        {196, 0, IH_RAY_EMPTY, 0, 0},
+        {-136, 0, IH_RAY_EMPTY, 0, VECTOR_RING_EMPTY},
+        {-186, 0, IH_RAY_EMPTY, 0, VECTOR_RING_EMPTY},
+    };
+    const struct ih_ellipsoid mean = ih_ellipsoid_mean((const int32_t[3]){0, 0, 0});
+    int32_t i;
 
     for (i = 0; i < IH_TEST_COUNT(cases); i++) {
-        memset(&space, 0, sizeof space);
-        for (slot = 2; slot < IH_SLOTS; slot++) {
-            space.ray[slot].slope_x_q20 = 2 << 20;
-        }
-        see(0, 1000 << 8);
-        space.ray[1].slope_x_q20 = cases[i].aside_mm * (1 << 20) / 1098;
-        space.ray[1].slope_y_q20 = cases[i].down_mm * (1 << 20) / 1098;
-        if (cases[i].state == IH_RAY_SEEN) {
-            see(1, cases[i].depth_mm << 8);
-        } else {
-            lose(1, cases[i].state);
-        }
+        const int32_t centre_mm = 1000 + stand_before_a_head();
+        const double unit = 1048576.0 / 100 / 256 / centre_mm;
+
+        space.ray[1].slope_x_q20 = (int32_t)lround(cases[i].aside * mean.semi_mm_q8[0] * unit);
+        space.ray[1].slope_y_q20 = (int32_t)lround(cases[i].down * mean.semi_mm_q8[1] * unit);
+        set_state(1, cases[i].state, centre_mm + cases[i].behind_mm);
         find();
-        IH_TEST_WITHIN(0.0005, (1 + 0.6 * cases[i].value) / 8, from_q12(scratch.tried[0].score_q12),
-                       "value", i);
+        IH_TEST_WITHIN(0.0005, (1 + VECTOR_RING_SHARE * cases[i].value) / 8,
+                       from_q12(scratch.tried[0].score_q12), "value", i);
     }
 }
 
@@ -243,7 +271,7 @@ static void the_centre_is_behind_the_point_along_its_ray(void)
 
     for (i = 0; i < 25; i++) {
         const double x = slope_q20[i % 5] / 1048576.0, y = slope_q20[i / 5] / 1048576.0;
-        const double step = 98 / sqrt(1 + x * x + y * y);
+        const double step = VECTOR_DEEP_MM / sqrt(1 + x * x + y * y);
         const double expected[3] = {step * x, step * y, step};
 
         memset(&space, 0, sizeof space);

@@ -26,7 +26,8 @@ def cross(centre, semi, origin, slope):
     nearest = at + tau[:, None] * along
     radius2 = (nearest**2).sum(axis=1)
     half = np.sqrt(np.maximum(0, 1 - radius2) / (along**2).sum(axis=1))
-    return at[:, :2], nearest, radius2, centre[2] + tau - half, (np.abs(at[:, :2]) <= REACH).all(axis=1)
+    near = (np.abs(at[:, :2]) <= REACH).all(axis=1)
+    return at[:, :2], nearest, radius2, centre[2] + tau - half, near
 
 
 def random_ray(random, wild):

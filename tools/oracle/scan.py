@@ -67,7 +67,10 @@ def score(space, centre):
 def write_vectors(directory):
     inc = emit.Inc("Places behind the seen points of the scenes in scenes.inc, and the scores of a\n"
                    " * mean head there with their slack, in float64.")
-    inc.raw("\n#define VECTOR_DEEP_MM %d\n#define VECTOR_SPACING_MM %d\n" % (DEEP_MM, SPACING_MM))
+    inc.raw("\n")
+    for name in ("DEEP_MM", "SPACING_MM", "ON_SURFACE_MM", "BEHIND_FULL_MM", "BEHIND_CENTRE_MM",
+                 "NEARER", "EMPTY", "UNKNOWN", "RING_EMPTY", "RING_NEAR", "RING_SHARE"):
+        inc.raw("#define VECTOR_%s (%s)\n" % (name, globals()[name]))
     rows = []
     for scene, space, _ in scenes.spaces():
         tried = []
