@@ -24,13 +24,13 @@
  *        2^33.5. A point adds at most 2.6 to an entry of the diagonal, its push 1.3: 361 of both
  *        1408, and scaled by 2^-11 to 0.69 in Q30. The right side's root mean square of weighted
  *        residuals is below 470 mm, in the solve's units 2^23.4.
- * Error: against the float64 reference 0.02 mm from starts some 35 mm off a head (600 fits, median
- *        0.005), 0.05 mm with a fifth of the dots wrong; 0.1 mm where the prior alone holds it. A fit
- *        that runs away, as from starts 100 mm off, may end 12 mm elsewhere: there a point more or
- *        less in reach decides.
- *        Against the truth on made scenes: 1 to 4 mm for a mean head, 9 for one a tenth larger in
- *        every direction. A fifth of all dots anywhere between 0.5 and 2.5 m: 17 mm (median; 48 in
- *        1 of 20), because wrong dots behind the head push.
+ * Error: against the float64 reference, starts some 35 mm off a head in made scenes (330 fits):
+ *        worst 0.02 mm, median 0.005; with a fifth of the dots wrong 0.05. Before a bare wall, where
+ *        little but the prior holds it, 0.25 mm in 19 of 20 (30 fits), worst 1.1. From starts some
+ *        100 mm off a fit may run away and end 12 mm elsewhere: a point more or less decides there.
+ *        Against the truth in these scenes, starts 35 mm off: at most 5 mm for a mean head, 10 for
+ *        one a tenth larger in every direction. A fifth of all dots anywhere between 0.5 and 2.5 m:
+ *        17 mm (median of 30 fits; worst 56), because wrong dots behind the head push.
  * Cost:  steps x (a crossing for each point + points in reach x 27 multiply-adds), one Cholesky of 6
  *        a step. 1.3 million instructions a fit with 320 points (x86-64, gcc -O3, frames of
  *        sequence 1).

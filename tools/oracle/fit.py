@@ -77,7 +77,7 @@ def slack_of(random, space, centre, semi):
         return random.uniform(-ROUNDING_MM, ROUNDING_MM, 6) * np.repeat([1, 100], 3)
     exact = np.concatenate(fit(space, centre, semi))
     off = [np.concatenate(fit(space, centre, semi, rounding)) - exact for _ in range(12)]
-    return 8 * np.abs(off).max()  # places and sums are rounded too: measured up to 6 times
+    return 8 * np.abs(off).max()  # places and sums are rounded too
 
 
 def starts(random, scene):
