@@ -1,8 +1,8 @@
 /* ih_fit - a head model fitted to the points of one candidate (ours; the paper's direct fit failed
  * because it did not know where to look).
  *
- * In:    rays and points, a start: its semi-axes within a factor e^0.35 of the mean head's, as those
- *        of any result are.
+ * In:    rays and points, a start: its semi-axes within a factor e^0.35 of the mean head's, as any
+ *        result has.
  * Out:   an upright ellipsoid: centre and semi-axes.
  * Way:   IH_FIT_STEPS Gauss-Newton steps on centre and logarithms of the semi-axes. With a point's
  *        place s in the ellipsoid's units and f = |s|, its residual is its distance to first order,
@@ -25,13 +25,13 @@
  *        1408, and scaled by 2^-11 to 0.69 in Q30. The right side's root mean square of weighted
  *        residuals is below 470 mm, in the solve's units 2^23.4.
  * Error: against the float64 reference, starts some 35 mm off a head in made scenes (330 fits):
- *        worst 0.02 mm, median 0.005; with a fifth of the dots wrong 0.05. Before a bare wall, where
+ *        worst 0.02 mm, median 0.005; with a fifth of dots wrong 0.05. Before a bare wall, where
  *        little but the prior holds it, 0.25 mm in 19 of 20 (30 fits), worst 1.1. From starts some
  *        100 mm off a fit may run away and end 12 mm elsewhere: a point more or less decides there.
  *        Against the truth in these scenes, starts 35 mm off: at most 5 mm for a mean head, 10 for
  *        one a tenth larger in every direction. A fifth of all dots anywhere between 0.5 and 2.5 m:
  *        17 mm (median of 30 fits; worst 56), because wrong dots behind the head push.
- * Cost:  steps x (a crossing for each point + points in reach x 27 multiply-adds), one Cholesky of 6
+ * Cost:  steps x (a crossing for each point + points in reach x 27 products), one Cholesky of 6
  *        a step. 1.3 million instructions a fit with 320 points (x86-64, gcc -O3, frames of
  *        sequence 1).
  */
