@@ -31,17 +31,17 @@ struct share {
 struct view {
     const struct ih_ray *ray;
     struct ih_crossing crossing;
-    int32_t x_mm_q8, y_mm_q8;     /* offset at the centre's depth */
-    int32_t below_chin_mm_q8;     /* y less the semi-axis up */
-    int32_t dz_mm_q8;             /* of its point, against the centre */
-    int64_t distance2_q28;        /* of the offset, in semi-axes */
+    int32_t x_mm_q8, y_mm_q8; /* offset at the centre's depth */
+    int32_t below_chin_mm_q8; /* y less the semi-axis up */
+    int32_t dz_mm_q8;         /* of its point, against the centre */
+    int64_t distance2_q28;    /* of the offset, in semi-axes */
     bool is_seen, is_telling, is_open, is_body;
 };
 
 struct tally {
     struct share above, left, right, below, high, nothing, body, wide, level, shoulder[2];
     int32_t on, before, through, hit, front;
-    int64_t on_square_q16;  /* sum of squared distances, mm^2 */
+    int64_t on_square_q16; /* sum of squared distances, mm^2 */
     int64_t body_dz_q8;
     /* For the plane through the points on the ellipsoid: sums of x, y, z and of their products,
      * mm in Q4 from the centre. */
@@ -51,9 +51,9 @@ struct tally {
 const char *ih_evidence_text(enum ih_evidence_kind kind)
 {
     static const char *const text[IH_EVIDENCE_COUNT] = {
-        "on",       "rough",      "bulge", "tall",  "moved",    "above",  "beside",
-        "below",    "high",       "nothing", "body", "body_rays", "body_depth", "wide",
-        "level",    "shoulder",   "before", "extent", "upright",
+        "on",    "rough",    "bulge",   "tall",   "moved",     "above",      "beside",
+        "below", "high",     "nothing", "body",   "body_rays", "body_depth", "wide",
+        "level", "shoulder", "before",  "extent", "upright",
     };
     return (int)kind >= 0 && kind < IH_EVIDENCE_COUNT ? text[kind] : NULL;
 }
@@ -75,8 +75,8 @@ static bool make_view(const struct ih_space *space, const struct ih_ellipsoid *e
     view->dz_mm_q8 =
         view->is_seen ? view->ray->point_mm_q8[2] - ellipsoid->centre_mm_q8[2] : INT32_MAX;
     view->is_open = view->is_telling && view->dz_mm_q8 > OPEN_MM_Q8;
-    view->is_body = view->is_seen && view->dz_mm_q8 > BODY_BEFORE_MM_Q8 &&
-                    view->dz_mm_q8 < BODY_BEHIND_MM_Q8;
+    view->is_body =
+        view->is_seen && view->dz_mm_q8 > BODY_BEFORE_MM_Q8 && view->dz_mm_q8 < BODY_BEHIND_MM_Q8;
     return true;
 }
 
@@ -174,8 +174,8 @@ static void look_below(const struct view *view, const struct ih_ellipsoid *ellip
     if (ih_abs_s32(view->y_mm_q8) < ellipsoid->semi_mm_q8[1] && between_mm(aside_q8, 170, 330)) {
         count(&tally->level, view->is_seen && ih_abs_s32(view->dz_mm_q8) < LEVEL_MM_Q8);
     }
-    if (10 * (int64_t)view->y_mm_q8 > 9 * (int64_t)ellipsoid->semi_mm_q8[1] &&
-        chin_q8 < 160 << 8 && between_mm(aside_q8, 100, 260)) {
+    if (10 * (int64_t)view->y_mm_q8 > 9 * (int64_t)ellipsoid->semi_mm_q8[1] && chin_q8 < 160 << 8 &&
+        between_mm(aside_q8, 100, 260)) {
         count(&tally->shoulder[view->x_mm_q8 > 0], view->is_body);
     }
 }
@@ -199,8 +199,7 @@ static int64_t plane_rest_q8(const struct tally *tally)
     int64_t n = tally->on;
     for (int axis = 0; axis < 3; axis++) {
         for (int other = 0; other <= axis; other++) {
-            int64_t mean_q8 =
-                ih_div_round(tally->sum_q4[axis] * tally->sum_q4[other], n);
+            int64_t mean_q8 = ih_div_round(tally->sum_q4[axis] * tally->sum_q4[other], n);
             c[axis][other] = ih_div_round(tally->product_q8[axis][other] - mean_q8, n);
         }
     }
@@ -214,8 +213,8 @@ static int64_t plane_rest_q8(const struct tally *tally)
     int64_t top_y_q16 = zy * c[0][0] - zx * c[1][0];
     /* slopes in Q12; a surface steeper than 64 is not looked at by a camera */
     const int64_t steep = 64 << 12;
-    int drop = ih_max_s32(0, ih_bits_u64((uint64_t)ih_abs_s64(top_x_q16) |
-                                         (uint64_t)ih_abs_s64(top_y_q16)) - 50);
+    int drop = ih_max_s32(
+        0, ih_bits_u64((uint64_t)ih_abs_s64(top_x_q16) | (uint64_t)ih_abs_s64(top_y_q16)) - 50);
     int64_t det = (det_q16 >> drop) + 1;
     int64_t slope_x = ih_div_round((top_x_q16 >> drop) * 4096, det);
     int64_t slope_y = ih_div_round((top_y_q16 >> drop) * 4096, det);
@@ -254,8 +253,7 @@ static void summarise(const struct tally *tally, const struct ih_evidence_nest *
     int32_t rough_q8 = root_mm_q8(tally->on_square_q16 / on);
     value_q8[IH_EVIDENCE_ON] = tally->on << 8;
     value_q8[IH_EVIDENCE_ROUGH] = rough_q8;
-    int32_t plane_q8 =
-        tally->on >= PLANE_POINTS_MIN ? root_mm_q8(plane_rest_q8(tally) * 256) : 0;
+    int32_t plane_q8 = tally->on >= PLANE_POINTS_MIN ? root_mm_q8(plane_rest_q8(tally) * 256) : 0;
     value_q8[IH_EVIDENCE_BULGE] = plane_q8 - rough_q8;
     value_q8[IH_EVIDENCE_ABOVE] = careful_q8(tally->above);
     value_q8[IH_EVIDENCE_BESIDE] = ih_min_s32(careful_q8(tally->left), careful_q8(tally->right));

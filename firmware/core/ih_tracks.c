@@ -33,9 +33,9 @@ void ih_tracks_params_default(struct ih_tracks_params *params)
         .gate_mm = 90,
         .gate_mm_per_s = 300,
         .start_logit_q10 = -1024,
-        .start_head_logit_q10 = 768,
+        .start_head_logit_q10 = 1024,
         .mature_findings = 3,
-        .accept_logit_q10 = 256,
+        .accept_logit_q10 = 512,
         .drop_logit_q10 = -512,
         .keep_logit_q10 = -3072,
         .memory_q16 = 49152,
@@ -228,6 +228,16 @@ static bool best_pair(const struct ih_tracks *tracks, const struct ih_tracks_par
     return best != INT32_MIN;
 }
 
+/* Could something before it hide the head, or was the frame lost? Else it would have been found. */
+static bool may_be_hidden(const struct ih_findings *findings, int32_t track,
+                          const struct ih_tracks_params *params)
+{
+    const struct ih_view *view = &findings->view[track];
+    int32_t rays = view->through + view->hit + view->front;
+    return findings->seen_count < params->seen_least ||
+           view->front * 100 >= rays * params->front_percent;
+}
+
 static void slow_down(struct ih_track *track, int64_t step_us)
 {
     int64_t kept_q16 = 65536 - ih_div_round(at_most(step_us, SLOW_US) * 65536, SLOW_US);
@@ -270,6 +280,10 @@ static void prune(struct ih_tracks *tracks, const struct ih_tracks_params *param
         }
         if (!seen) {
             slow_down(track, unseen_us);
+            if (!may_be_hidden(findings, t, params)) {
+                remember_logit(track, params->keep_logit_q10, params->memory_q16);
+                judge(track, params);
+            }
         }
         tracks->track[kept++] = *track;
     }
@@ -389,10 +403,10 @@ static int32_t choose(const struct ih_tracks *tracks, const struct ih_tracks_par
         if (finding->logit_q10 < first->logit_q10 - CHOICE_LOGIT_Q10) {
             break;
         }
-        bool is_better = best == NULL || (best->is_predicted && !finding->is_predicted) ||
-                         (best->is_predicted == finding->is_predicted &&
-                          aside_q28(finding, rig, params->side) <
-                              aside_q28(best, rig, params->side));
+        bool is_better =
+            best == NULL || (best->is_predicted && !finding->is_predicted) ||
+            (best->is_predicted == finding->is_predicted &&
+             aside_q28(finding, rig, params->side) < aside_q28(best, rig, params->side));
         if (is_better) {
             best = finding;
             chosen = tracks->head[i];

@@ -14,7 +14,8 @@
  *           through and fewer than 30 % are stopped before it: the seat is empty; or when hardly a
  *           ray meets it any more: it has left the pattern. A frame in which fewer than seen_least
  *           dots were seen says neither: it is lost.
- *        3. carries the others, slowing down, for at most carry_us.
+ *        3. carries the others, slowing down, for at most carry_us. If nothing before it can hide the
+ *           head and the frame is not lost, that counts as a finding with log-odds keep_logit.
  *        4. starts tracks with what is left and above start_logit.
  *        A track's log-odds are a running mean of its findings'; it is a head above start_head_logit,
  *        from its mature_findings-th finding on above accept_logit, until it falls below drop_logit.
