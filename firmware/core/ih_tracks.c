@@ -62,6 +62,16 @@ static int64_t at_most(int64_t value, int64_t limit)
     return value > limit ? limit : value;
 }
 
+/* Cross term when one of the variances is limited: cut by the same share, rounded towards 0, so that
+ * the covariance stays positive. */
+static int64_t limited_cross_q8(int64_t cross_q8, int64_t variance_q8, int64_t limit_q8)
+{
+    if (variance_q8 <= limit_q8) {
+        return cross_q8;
+    }
+    return cross_q8 * (limit_q8 * (1 << 24) / variance_q8) / (1 << 24);
+}
+
 /* step_us below 2^21. */
 static void predict(struct ih_track *track, int64_t step_us, int32_t acceleration_mm_s2)
 {
@@ -75,6 +85,8 @@ static void predict(struct ih_track *track, int64_t step_us, int32_t acceleratio
                        ih_mul_shift(track->speed_q8, dt2_q20, 20) + added_place_q8;
     track->cross_q8 += ih_mul_shift(track->speed_q8, dt_q20, 20) + added_cross_q8;
     track->speed_q8 += added_speed_q8;
+    track->cross_q8 = limited_cross_q8(track->cross_q8, track->place_q8, PLACE_VARIANCE_MAX_Q8);
+    track->cross_q8 = limited_cross_q8(track->cross_q8, track->speed_q8, SPEED_VARIANCE_MAX_Q8);
     track->place_q8 = at_most(track->place_q8, PLACE_VARIANCE_MAX_Q8);
     track->speed_q8 = at_most(track->speed_q8, SPEED_VARIANCE_MAX_Q8);
     for (int axis = 0; axis < 3; axis++) {
@@ -83,15 +95,25 @@ static void predict(struct ih_track *track, int64_t step_us, int32_t acceleratio
     }
 }
 
+/* Whether later is 0 to gap_us after earlier. Their difference may not fit 64 bits. */
+static bool follows(int64_t earlier_us, int64_t later_us, int32_t gap_us)
+{
+    if (later_us < earlier_us || (earlier_us < 0 && later_us > INT64_MAX + earlier_us)) {
+        return false;
+    }
+    return later_us - earlier_us <= gap_us;
+}
+
 void ih_tracks_expect(struct ih_tracks *tracks, const struct ih_tracks_params *params,
                       int64_t time_us, struct ih_expected *expected)
 {
-    int64_t step_us = time_us - tracks->time_us;
-    if (!tracks->has_time || step_us < 0 || step_us > params->gap_us) {
+    int64_t step_us = 0;
+    if (tracks->has_time && follows(tracks->time_us, time_us, params->gap_us)) {
+        step_us = time_us - tracks->time_us;
+    } else {
         tracks->track_count = 0;
         tracks->selected_id = 0;
         tracks->rival_frames = 0;
-        step_us = 0;
     }
     tracks->has_time = true;
     tracks->time_us = time_us;
@@ -290,13 +312,33 @@ static void prune(struct ih_tracks *tracks, const struct ih_tracks_params *param
     tracks->track_count = kept;
 }
 
+static bool has_id(const struct ih_tracks *tracks, int32_t id)
+{
+    for (int32_t t = 0; t < tracks->track_count; t++) {
+        if (tracks->track[t].id == id) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* After the largest id comes 1 again, or the first one after it that no track has. */
+static int32_t next_id(const struct ih_tracks *tracks)
+{
+    int32_t id = tracks->last_id;
+    do {
+        id = id == INT32_MAX ? 1 : id + 1;
+    } while (has_id(tracks, id));
+    return id;
+}
+
 static void start_track(struct ih_tracks *tracks, const struct ih_tracks_params *params,
                         struct ih_findings *findings, int32_t index)
 {
     struct ih_finding *finding = &findings->finding[index];
     struct ih_track *track = &tracks->track[tracks->track_count];
     *track = (struct ih_track){
-        .id = tracks->last_id + 1,
+        .id = next_id(tracks),
         .mean_logit_q10 = ih_clamp_s32(finding->logit_q10, -LOGIT_MAX_Q10, LOGIT_MAX_Q10),
         .head = finding->head,
         .place_q8 = (int64_t)params->measured_mm * params->measured_mm * 256,
@@ -309,7 +351,7 @@ static void start_track(struct ih_tracks *tracks, const struct ih_tracks_params 
         return;
     }
     tracks->track_count++;
-    tracks->last_id = track->id == INT32_MAX ? 0 : track->id;
+    tracks->last_id = track->id;
     finding->track_id = track->id;
     judge(track, params);
 }

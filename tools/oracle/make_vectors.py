@@ -25,12 +25,14 @@ import samples
 import scan
 import space
 import surface
+import tracks
 import windows
 
 STAGES = {"rig": rig, "band": band, "noise": noise, "dots": dots, "labels": labels,
           "exposure": exposure, "cloud": cloud, "windows": windows, "points": points,
           "samples": samples, "cholesky": cholesky, "surface": surface, "ellipse": ellipse,
-          "space": space, "ellipsoid": ellipsoid, "scan": scan, "fit": fit, "isohead": isohead}
+          "space": space, "ellipsoid": ellipsoid, "scan": scan, "fit": fit, "tracks": tracks,
+          "isohead": isohead}
 
 
 def main():
