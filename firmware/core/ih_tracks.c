@@ -62,8 +62,8 @@ static int64_t at_most(int64_t value, int64_t limit)
     return value > limit ? limit : value;
 }
 
-/* Cross term when one of the variances is limited: cut by the same share, rounded towards 0, so that
- * the covariance stays positive. */
+/* Cross term when a variance is limited: cut by the same share, rounded towards 0, so that the
+ * covariance stays positive. */
 static int64_t limited_cross_q8(int64_t cross_q8, int64_t variance_q8, int64_t limit_q8)
 {
     if (variance_q8 <= limit_q8) {

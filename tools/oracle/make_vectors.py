@@ -23,6 +23,7 @@ import points
 import rig
 import samples
 import scan
+import score
 import space
 import surface
 import tracks
@@ -31,8 +32,8 @@ import windows
 STAGES = {"rig": rig, "band": band, "noise": noise, "dots": dots, "labels": labels,
           "exposure": exposure, "cloud": cloud, "windows": windows, "points": points,
           "samples": samples, "cholesky": cholesky, "surface": surface, "ellipse": ellipse,
-          "space": space, "ellipsoid": ellipsoid, "scan": scan, "fit": fit, "tracks": tracks,
-          "isohead": isohead}
+          "space": space, "ellipsoid": ellipsoid, "scan": scan, "fit": fit, "score": score,
+          "tracks": tracks, "isohead": isohead}
 
 
 def main():

@@ -1,5 +1,5 @@
-"""Float64 reference of the tracks: constant-velocity Kalman filters in matrix form, and the rules of
-ih_tracks.h for who gets which finding, what is carried, what ends and which head is the one.
+"""Float64 reference of the tracks: constant-velocity Kalman filters in matrix form, and the rules
+of ih_tracks.h for who gets which finding, what is carried, what ends and which head is the one.
 
 Sequences are drawn anew until no decision in them is a matter of rounding.
 """

@@ -1,0 +1,95 @@
+"""Float64 reference of the score: the log-odds as tools/learn computes them, for curves drawn here.
+
+    score.py --check HEADER      is ih_score_weights.h what tools/learn/model.py writes?
+"""
+
+import argparse
+import os
+import re
+import sys
+import tempfile
+
+import numpy as np
+
+import emit
+
+ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+sys.path.insert(0, os.path.join(ROOT, "tools", "learn"))
+import model  # pylint: disable=wrong-import-position
+
+KINDS = 12  # no more than the firmware has; its test leaves the others flat
+CASES = 40
+
+
+def drawn_curves(random):
+    first = random.integers(-60000, 20000, KINDS)
+    step = np.append(random.integers(1, 8000, KINDS - 2), [1, 30000])
+    at = random.integers(-4000, 4001, (KINDS, model.KNOTS))
+    at[0] = np.array([-32768, 32767] * model.KNOTS)[:model.KNOTS]
+    return model.Curves(first, step, at, int(random.integers(-9000, 9000)))
+
+
+def drawn_evidence(random, curves):
+    """Within the knots, beyond them, and on them, in Q8."""
+    place = random.uniform(-1.5, model.KNOTS + 0.5, (CASES, KINDS))
+    on_knot = random.uniform(size=place.shape) < 0.3
+    place[on_knot] = np.round(place[on_knot])
+    evidence = np.rint(curves.first_q8 + place * curves.step_q8).astype(np.int64)
+    evidence[0], evidence[1] = 2**31 - 1, -2**31
+    return evidence
+
+
+def write_vectors(directory):
+    random = np.random.default_rng(61)
+    curves = drawn_curves(random)
+    evidence = drawn_evidence(random, curves)
+    logits = curves.logits(evidence / 256)
+    inc = emit.Inc("Curves of a score, evidence, and the log-odds that they give.")
+    inc.raw("\n#define VECTOR_KINDS %d\n#define VECTOR_BIAS_Q10 %d\n" % (KINDS, curves.bias_q10))
+    inc.struct_array("curve", "vector_curves", [
+        "%d, %d, {%s}" % (first, step, ", ".join(emit.numbers(at)))
+        for first, step, at in zip(curves.first_q8, curves.step_q8, curves.at_q10)])
+    inc.struct_array("vector_case", "vector_cases", [
+        "{%s}, %s" % (", ".join(emit.numbers(row)), emit.number(logit, 6))
+        for row, logit in zip(evidence, logits)])
+    return inc.write(directory, "score.inc")
+
+
+def read_header(path):
+    """Kinds, curves and the command that made them."""
+    with open(path, encoding="utf-8") as file:
+        text = file.read()
+    rows = re.findall(r"\[IH_EVIDENCE_(\w+)\] = \{(-?\d+), (\d+), \{([-\d, ]+)\}\},", text)
+    at = np.array([[int(value) for value in row[3].split(",")] for row in rows])
+    curves = model.Curves(np.array([int(row[1]) for row in rows]),
+                          np.array([int(row[2]) for row in rows]), at,
+                          int(re.search(r"bias_q10 = (-?\d+);", text)[1]))
+    return [row[0].lower() for row in rows], curves, re.search(r"written by\n \* +(.*)", text)[1]
+
+
+def kinds_of_firmware():
+    with open(os.path.join(ROOT, "firmware/core/ih_evidence.h"), encoding="utf-8") as file:
+        body = re.search(r"enum ih_evidence_kind \{(.*?)\}", file.read(), re.S)[1]
+    return [k.lower() for k in re.findall(r"IH_EVIDENCE_(\w+),", body)]
+
+
+def check(path):
+    kinds, curves, command = read_header(path)
+    with tempfile.TemporaryDirectory() as work:
+        again = os.path.join(work, "again.h")
+        model.write(again, curves, kinds, command)
+        with open(path, encoding="utf-8") as one, open(again, encoding="utf-8") as other:
+            same = one.read() == other.read()
+    if not same:
+        print("%s: not as tools/learn/model.py writes it" % path)
+    if kinds != kinds_of_firmware():
+        print("%s: not the evidence of ih_evidence.h" % path)
+        same = False
+    return 0 if same else 1
+
+
+if __name__ == "__main__":
+    PARSER = argparse.ArgumentParser(description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    PARSER.add_argument("--check", required=True, metavar="HEADER")
+    sys.exit(check(PARSER.parse_args().check))
