@@ -192,7 +192,7 @@ static int32_t plain_q8(struct share share, int32_t least)
 }
 
 /* Variance of the points' depths that no plane explains, mm^2 in Q8: szz - b^T S^-1 b, S and b the
- * centred moments of x, y and with z. Moments below 2^22 each. */
+ * central moments of x, y and with z, each below 2^24. */
 static int64_t plane_rest_q8(const struct tally *tally)
 {
     int64_t c[3][3];
@@ -239,7 +239,7 @@ static int32_t moved_mm_q8(const struct ih_ellipsoid *ellipsoid, const int32_t s
     return ih_saturate_s32(ih_isqrt_u64((uint64_t)sum_q16));
 }
 
-/* 100 (a - m) / m: the logarithm's first term does, it is monotonous and within 6 % of it. */
+/* 100 (a - m) / m */
 static int32_t taller_q8(const struct ih_ellipsoid *ellipsoid)
 {
     int32_t mean_q8 = ih_ellipsoid_mean(ellipsoid->centre_mm_q8).semi_mm_q8[1];

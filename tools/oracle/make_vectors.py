@@ -14,6 +14,7 @@ import cloud
 import dots
 import ellipse
 import ellipsoid
+import evidence
 import exposure
 import fit
 import isohead
@@ -32,8 +33,8 @@ import windows
 STAGES = {"rig": rig, "band": band, "noise": noise, "dots": dots, "labels": labels,
           "exposure": exposure, "cloud": cloud, "windows": windows, "points": points,
           "samples": samples, "cholesky": cholesky, "surface": surface, "ellipse": ellipse,
-          "space": space, "ellipsoid": ellipsoid, "scan": scan, "fit": fit, "score": score,
-          "tracks": tracks, "isohead": isohead}
+          "space": space, "ellipsoid": ellipsoid, "scan": scan, "fit": fit, "evidence": evidence,
+          "score": score, "tracks": tracks, "isohead": isohead}
 
 
 def main():

@@ -1,0 +1,237 @@
+"""Float64 reference of the evidence, over scenes of simple bodies.
+
+Rays for which a count is a matter of rounding are made unknown ones, which count nowhere.
+"""
+
+import numpy as np
+
+import emit
+from rig import GRID, SLOTS, from_q, to_q
+
+UNKNOWN, SEEN, EMPTY = 0, 1, 2
+MEAN_SEMI = np.array([78.0, 113, 98])
+CENTRE = np.array([10.0, -100, 800])
+ORIGIN = np.array([60.0, -20, 15])
+PITCH = 0.05
+KINDS = ("on rough bulge tall moved above beside below high nothing body body_rays body_depth wide "
+         "level shoulder before extent upright").split()
+
+
+def lattice():
+    """Slopes of all rays, Q20: a turned, slightly wavy lattice."""
+    index = np.arange(SLOTS)
+    column, row = index % GRID - 9, index // GRID - 9
+    x = PITCH * (column + 0.05 * row + 0.2 * np.sin(index)) - 0.07
+    y = PITCH * (row - 0.05 * column + 0.2 * np.cos(3 * index)) + 0.02
+    return to_q(np.stack([x, y], axis=1), 20)
+
+
+def ellipsoid_depth(slope, centre, semi):
+    """Where a ray enters; nan where it does not."""
+    ray = np.column_stack([slope, np.ones(len(slope))]) / semi
+    away = (ORIGIN - centre) / semi
+    a, b, c = (ray * ray).sum(1), ray @ away, away @ away - 1
+    root = b * b - a * c
+    return ORIGIN[2] + (-b - np.sqrt(np.where(root > 0, root, np.nan))) / a
+
+
+def box_depth(slope, z, x_range, y_range):
+    """A frontal rectangle."""
+    place = ORIGIN[:2] + (z - ORIGIN[2]) * slope
+    inside = ((place > [x_range[0], y_range[0]]) & (place < [x_range[1], y_range[1]])).all(1)
+    return np.where(inside, z, np.nan)
+
+
+def bodies(name):
+    """Depths along the rays; those of the nearest body are seen."""
+    head = ("ellipsoid", CENTRE, MEAN_SEMI)
+    neck = ("box", 830, (-40, 60), (-20, 60))
+    torso = ("ellipsoid", CENTRE + [0, 300, 40], np.array([240.0, 190, 120]))
+    wall = ("box", 2000, (-5000, 5000), (-5000, 5000))
+    return {
+        "head": [head, neck, torso, wall],
+        "board": [("disc", 715), neck, torso, wall],
+        "table": [head, ("box", 850, (-5000, 5000), (60, 5000)), wall],
+        "headrest": [head, ("box", 780, (-130, 150), (-60, 300)), wall],
+        "hand": [head, neck, torso, wall,
+                 ("ellipsoid", CENTRE + [-70, 40, -220], np.full(3, 70.0))],
+        "alone": [head, wall],
+        "before_a_wall": [head, neck, torso, ("box", 840, (-5000, 5000), (-5000, 5000))],
+        "before_nothing": [head, neck, torso],
+        "rough": [head, neck, torso, wall],
+        "dark": [head, neck, torso, wall],
+        "leaning": [head, neck, ("ellipsoid", CENTRE + [0, 300, -90], np.array([240.0, 190, 120])),
+                    wall],
+        "small": [("ellipsoid", CENTRE, MEAN_SEMI * [1, 0.8, 1]), neck, torso, wall],
+        "moved": [head, neck, torso, wall],
+        "neighbours": [head, neck, torso, wall, ("ellipsoid", CENTRE + [-250, 0, 0], MEAN_SEMI),
+                       ("ellipsoid", CENTRE + [260, 0, 20], MEAN_SEMI)],
+        "gone": [wall],
+        "unknown": [],
+    }[name]
+
+
+SCENES = ("head board table headrest hand alone before_a_wall before_nothing rough dark leaning "
+          "small moved neighbours gone unknown").split()
+
+
+def depth_of(body, slope):
+    if body[0] == "ellipsoid":
+        return ellipsoid_depth(slope, *body[1:])
+    if body[0] == "box":
+        return box_depth(slope, *body[1:])
+    place = ORIGIN[:2] + (body[1] - ORIGIN[2]) * slope
+    inside = (((place - CENTRE[:2]) / MEAN_SEMI[:2])**2).sum(1) < 1
+    return np.where(inside, body[1] + 0.3 * (place[:, 0] - CENTRE[0]), np.nan)
+
+
+def make_scene(name, slope_q20, random):
+    """Points in Q8, by integers as in the test, and states."""
+    slope = from_q(slope_q20, 20)
+    depths = np.array([depth_of(b, slope) for b in bodies(name)] + [np.full(SLOTS, np.inf)])
+    depth = np.nanmin(depths, axis=0)
+    depth += random.normal(0, 9 if name == "rough" else 1.5, SLOTS)
+    state = np.where(np.isfinite(depth), SEEN, EMPTY)
+    if name == "unknown":
+        state[:] = UNKNOWN
+    state[random.uniform(size=SLOTS) < (0.5 if name == "dark" else 0.03)] = UNKNOWN
+    return to_q(np.where(state == SEEN, depth, 0), 8), state
+
+
+def points_of(depth_q8, slope_q20):
+    origin_q8 = to_q(ORIGIN, 8)
+    aside = ((depth_q8 - origin_q8[2])[:, None] * slope_q20 + (1 << 19)) >> 20
+    return np.column_stack([origin_q8[:2] + aside, depth_q8])
+
+
+def share(part, everything):
+    return (part.sum() + 0.5) / (everything.sum() + 1)
+
+
+def plain(part, everything, least):
+    return part.sum() / max(everything.sum(), least)
+
+
+class Scene:
+    """What a ray is, against one ellipsoid."""
+
+    def __init__(self, slope_q20, depth_q8, state, centre, semi):
+        self.centre, self.semi = centre, semi
+        slope = from_q(slope_q20, 20)
+        self.point = from_q(points_of(depth_q8, slope_q20), 8)
+        self.seen, self.empty = state == SEEN, state == EMPTY
+        self.telling = self.seen | self.empty
+        self.aside = ORIGIN[:2] + (centre[2] - ORIGIN[2]) * slope - centre[:2]
+        self.e = self.aside / semi[:2]
+        g = slope * semi[2] / semi[:2]
+        gg, eg = 1 + (g * g).sum(1), (self.e * g).sum(1)
+        self.radius2 = (self.e**2).sum(1) - eg**2 / gg
+        inside = np.sqrt(np.maximum(1 - self.radius2, 0) / gg)
+        self.entry = centre[2] + semi[2] * (-eg / gg - inside)
+        self.dz = np.where(self.seen, self.point[:, 2] - centre[2], np.inf)
+        place = (self.point - centre) / semi
+        f = np.linalg.norm(place, axis=1)
+        self.distance = (f - 1) / (np.linalg.norm(place / semi, axis=1) / f)
+        self.margin = np.full(SLOTS, np.inf)
+
+    def above(self, value, limit, step):
+        """value > limit; notes how clear that is, in steps of rounding."""
+        with np.errstate(invalid="ignore"):
+            self.margin = np.minimum(self.margin, np.abs(value - limit) / step)
+        return value > limit
+
+    def between(self, value, low, high):
+        return self.above(value, low, 0.05) & ~self.above(value, high, 0.05)
+
+
+def look(s, start, nest):
+    """All numbers by name, and the three counts for the tracks."""
+    ex, ey = s.e.T
+    out = {}
+    reach = ~s.above(np.abs(ex), 8, 1e-3) & ~s.above(np.abs(ey), 8, 1e-3)
+    telling, seen = s.telling & reach, s.seen & reach
+    inside = reach & ~s.above(s.radius2, 0.9, 2e-3)
+    behind = s.point[:, 2] - s.entry
+    on = inside & seen & ~s.above(np.abs(s.distance), 20, 0.05)
+    through = inside & (s.empty | (seen & s.above(behind, 50, 0.2)))
+    front = inside & seen & ~s.above(behind, -30, 0.2)
+    out["on"] = on.sum()
+    out["rough"] = np.sqrt((s.distance[on]**2).mean()) if on.any() else 0
+    bulge = 0
+    if on.sum() >= 6:
+        p = s.point[on] - s.centre
+        design = np.column_stack([p[:, :2], np.ones(len(p))])
+        rest = p[:, 2] - design @ np.linalg.lstsq(design, p[:, 2], rcond=None)[0]
+        bulge = np.sqrt((rest**2).mean())
+    out["bulge"] = bulge - out["rough"]
+    out["tall"] = 100 * (s.semi[1] - MEAN_SEMI[1]) / MEAN_SEMI[1]
+    out["moved"] = np.linalg.norm(s.centre - start)
+    is_open = telling & s.above(s.dz, 60, 0.02)
+    body = seen & s.above(s.dz, -220, 0.02) & ~s.above(s.dz, 200, 0.02)
+    high = telling & ~s.above(ey, -1.9, 1e-3) & ~s.above(np.abs(ex), 1.6, 1e-3)
+    out["high"] = share(is_open & high, high)
+    d2 = ex**2 + ey**2
+    ring = telling & s.above(d2, 1.25**2, 4e-3) & ~s.above(d2, 1.9**2, 4e-3)
+    low = ring & s.above(ey - 0.9 * np.abs(ex), 0, 1e-3)
+    ring &= ~low
+    top = ring & ~s.above(ey + 0.8 * np.abs(ex), 0, 1e-3)
+    left = ring & ~top & ~s.above(ex, 0, 1e-3)
+    right = ring & ~top & ~left
+    out["below"] = share(is_open & low, low)
+    out["nothing"] = plain(s.empty & ring, ring, 1)
+    out["above"] = share(is_open & top, top)
+    out["beside"] = min(share(is_open & left, left), share(is_open & right, right))
+    x, y = s.aside.T
+    chin = y - s.semi[1]
+    here = telling & s.between(chin, 40, 260) & ~s.above(np.abs(x), 180, 0.05)
+    out["body"] = plain(body & here, here, 3)
+    out["body_rays"] = min(here.sum(), 30)
+    out["body_depth"] = s.dz[body & here].mean() if (body & here).any() else 0
+    here = telling & s.between(chin, 40, 240) & s.above(np.abs(x), 300, 0.05)
+    out["wide"] = plain(body & here, here, 3)
+    here = telling & ~s.above(np.abs(y), s.semi[1], 0.05) & s.between(np.abs(x), 170, 330)
+    out["level"] = plain(here & seen & ~s.above(np.abs(s.dz), 150, 0.02), here, 3)
+    here = (telling & s.above(y, 0.9 * s.semi[1], 0.05) & ~s.above(chin, 160, 0.05)
+            & s.between(np.abs(x), 100, 260))
+    side = s.above(x, 0, 0.05)
+    out["shoulder"] = min(plain(body & here & side, here & side, 2),
+                          plain(body & here & ~side, here & ~side, 2))
+    out["before"] = (seen & ~s.above(d2, 2.5**2, 8e-3)
+                     & ~s.above(s.dz, -s.semi[2] - 60, 0.02)).sum()
+    out["extent"] = nest[0] if nest else 0
+    out["upright"] = nest[1] if nest else 1
+    return out, (through.sum(), on.sum(), front.sum())
+
+
+def write_vectors(directory):
+    random = np.random.default_rng(51)
+    slope_q20 = lattice()
+    inc = emit.Inc("Scenes of simple bodies, and the evidence for a head in them.")
+    inc.raw("\nstatic const int32_t vector_origin_mm_q8[] = {%d, %d, %d};\n"
+            % tuple(to_q(ORIGIN, 8)))
+    inc.raw("\nstatic const int32_t vector_slope_q20[][2] = {\n%s};\n"
+            % emit.wrap(["{%d, %d}" % tuple(s) for s in slope_q20]))
+    rows = []
+    for name in SCENES:
+        depth_q8, state = make_scene(name, slope_q20, random)
+        semi = MEAN_SEMI * ([1, 0.8, 1] if name == "small" else 1)
+        centre_q8, semi_q8 = to_q(CENTRE, 8), to_q(semi, 8)
+        start_q8 = centre_q8 + (to_q([30, -40, 0], 8) if name == "moved" else 0)
+        nest_q = (123 << 8, int(1.7 * 65536)) if name == "moved" else None
+        nest = (123, nest_q[1] / 65536) if nest_q else None
+        first = Scene(slope_q20, depth_q8, state, from_q(centre_q8, 8), from_q(semi_q8, 8))
+        look(first, CENTRE, None)
+        state = np.where(first.margin < 1, UNKNOWN, state)
+        depth_q8 = np.where(state == SEEN, depth_q8, 0)
+        found, counts = look(Scene(slope_q20, depth_q8, state, from_q(centre_q8, 8),
+                                   from_q(semi_q8, 8)), from_q(start_q8, 8), nest)
+        assert list(sorted(found)) == sorted(KINDS)
+        inc.raw("\nstatic const struct vector_ray vector_%s_rays[] = {\n%s};\n" % (
+            name, emit.wrap(["{%d, %d}" % r for r in zip(depth_q8, state)])))
+        rows.append('"%s", vector_%s_rays, {{%d, %d, %d}, {%d, %d, %d}}, {%d, %d, %d}, '
+                    '{%s, %d, %d}, {%s}, %d, %d, %d' % (
+                        name, name, *centre_q8, *semi_q8, *start_q8,
+                        "true" if nest else "false", *(nest_q or (0, 0)),
+                        ", ".join(emit.numbers([found[k] for k in KINDS], 5)), *counts))
+    inc.struct_array("vector_scene", "vector_scenes", rows)
+    return inc.write(directory, "evidence.inc")
