@@ -60,8 +60,6 @@ static struct ih_evidence_nest nest_at(const struct ih_heads *heads, const int32
     return nest;
 }
 
-/* An axis-parallel ellipsoid is seen as (nearly) the ellipse of its cross-section at its centre's
- * depth: what perspective adds is below 2 % beyond 500 mm. */
 void ih_findings_outline(const struct ih_rig *rig, struct ih_finding *finding)
 {
     const struct ih_calibration *c = &rig->calibration;

@@ -34,6 +34,7 @@ const char *ih_err_text(enum ih_err err)
 
 void ih_params_default(struct ih_params *params)
 {
+    params->is_paper = false;
     ih_dots_params_default(&params->dots);
     ih_labels_params_default(&params->labels);
     ih_windows_params_default(&params->windows);

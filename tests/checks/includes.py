@@ -159,7 +159,7 @@ def self_test():
                ("firmware/core/ih_dots.c", "#include <stdio.h>"),
                ("firmware/core/ih_dots.c", "#include <stdlib.h>"),
                ("firmware/core/ih_dots.c", "#include <math.h>"),
-               ("firmware/core/isohead.c", '#include "ih_fix.h"'),
+               ("firmware/core/isohead.c", '#include "ih_tracks.h"'),
                ("firmware/core/ih_new.c", '#include "ih_new.h"'),
                ("hal/replay/hal_pgm.c", '#include "ih_types.h"'),
                ("hal/linux/hal_v4l2.c", '#include "replay/hal_file.h"'),

@@ -343,8 +343,9 @@ static void the_order_of_findings_does_not_matter(void)
 
         setUp();
         for (i = 0; i < 4; i++) {
-            add(ih_test_between(&random, -60, 60) + 130 * i, ih_test_between(&random, -90, 90),
-                800 + ih_test_between(&random, -90, 90), 2);
+            add((double)ih_test_between(&random, -60, 60) + 130 * i,
+                (double)ih_test_between(&random, -90, 90),
+                800 + (double)ih_test_between(&random, -90, 90), 2);
         }
         frame();
         start = tracks;
