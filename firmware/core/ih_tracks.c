@@ -291,6 +291,10 @@ static void prune(struct ih_tracks *tracks, const struct ih_tracks_params *param
         struct ih_track *track = &tracks->track[t];
         int64_t unseen_us = tracks->time_us - track->seen_us;
         bool seen = track->finding != IH_NONE;
+        if (!seen && !may_be_hidden(findings, t, params)) {
+            remember_logit(track, params->keep_logit_q10, params->memory_q16);
+            judge(track, params);
+        }
         bool ended =
             seen ? track->mean_logit_q10 < params->keep_logit_q10
                  : !track->is_head || unseen_us > params->carry_us || is_gone(findings, t, params);
@@ -302,10 +306,6 @@ static void prune(struct ih_tracks *tracks, const struct ih_tracks_params *param
         }
         if (!seen) {
             slow_down(track, unseen_us);
-            if (!may_be_hidden(findings, t, params)) {
-                remember_logit(track, params->keep_logit_q10, params->memory_q16);
-                judge(track, params);
-            }
         }
         tracks->track[kept++] = *track;
     }

@@ -11,7 +11,7 @@ import numpy as np
 import emit
 from rig import from_q, to_q
 
-TRACKS_MAX = 4
+TRACKS_MAX = 8
 NONE = -1
 SEMI_MM = np.array([78.0, 113, 98])
 START_SPEED = 300.0
@@ -28,7 +28,8 @@ class Params:
     """What the test sets, whatever ih_tracks_params_default says."""
 
     gate_mm, gate_mm_per_s = 90, 300
-    start, accept, drop, keep = -1.0, 1.0, -0.5, -3.0
+    start, start_head, accept, drop, keep = -1.0, 1.0, 0.5, -0.5, -3.0
+    mature_findings = 3
     memory = 0.75
     through_percent, front_percent = 50, 30
     carry_s, gap_s = 1.0, 2.0
@@ -65,6 +66,7 @@ class Track:
     seen_s: float
     is_head: bool
     finding: object = None
+    findings: int = 1
 
     def predict(self, dt):
         move = np.array([[1, dt], [0, 1]])
@@ -90,7 +92,13 @@ class Track:
         self.semi = self.semi + AXES_SHARE * (finding.semi - self.semi)
 
     def judge(self):
-        self.is_head = clear(self.logit - (Params.drop if self.is_head else Params.accept), 0.004)
+        limit = Params.start_head if self.findings < Params.mature_findings else Params.accept
+        self.is_head = clear(self.logit - (Params.drop if self.is_head else limit), 0.004)
+
+    def remember(self, logit):
+        limited = np.clip(logit, -LOGIT_MAX, LOGIT_MAX)
+        self.logit = Params.memory * self.logit + (1 - Params.memory) * limited
+        self.judge()
 
 
 class Tracks:
@@ -129,15 +137,16 @@ class Tracks:
                 clear(pairs[0][0] - pairs[1][0], 0.02)
             _, track, finding = pairs[0]
             track.finding, finding.track, track.seen_s = finding, track.id, self.time_s
+            track.findings += 1
             track.correct(finding)
-            limited = np.clip(finding.logit, -LOGIT_MAX, LOGIT_MAX)
-            track.logit = Params.memory * track.logit + (1 - Params.memory) * limited
-            track.judge()
+            track.remember(finding.logit)
 
-    def prune(self, gone):
+    def prune(self, gone, hidden):
         kept = []
-        for track, is_gone in zip(self.tracks, gone):
+        for track, is_gone, is_hidden in zip(self.tracks, gone, hidden):
             unseen = self.time_s - track.seen_s
+            if track.finding is None and not is_hidden:
+                track.remember(Params.keep)
             if track.finding is not None:
                 ended = not clear(track.logit - Params.keep, 0.004)
             else:
@@ -175,10 +184,11 @@ class Tracks:
         """The head nearest the middle of those not much less probable than the best."""
         heads = sorted([t for t in self.tracks if t.is_head], key=lambda t: -t.logit)
         good = [t for t in heads if not clear(heads[0].logit - CHOICE_LOGIT - t.logit, 0.004)]
-        aside = sorted([(abs(self.shown(t)[0] / self.shown(t)[2] - middle), t.id) for t in good])
-        if len(aside) > 1:
-            clear(aside[0][0] - aside[1][0], 1e-4)
-        wanted = aside[0][1] if aside else 0
+        aside = sorted([(t.finding is None, abs(self.shown(t)[0] / self.shown(t)[2] - middle), t.id)
+                        for t in good])
+        if len(aside) > 1 and aside[0][0] == aside[1][0]:
+            clear(aside[0][1] - aside[1][1], 1e-4)
+        wanted = aside[0][2] if aside else 0
         if self.selected in [t.id for t in heads] and wanted != self.selected:
             self.rival_frames = self.rival_frames + 1 if wanted == self.rival else 1
             self.rival = wanted
@@ -193,13 +203,14 @@ class Tracks:
         return track.state[0] if track.finding is None else track.finding.place
 
     def update(self, findings, views, middle):
-        gone = []
+        gone, hidden = [], []
         for through, hit, front in views:
             rays = through + hit + front
-            gone.append(rays >= VIEW_RAYS_MIN and 100 * through > Params.through_percent * rays
-                        and 100 * front < Params.front_percent * rays)
+            hidden.append(100 * front >= Params.front_percent * rays)
+            gone.append(rays < VIEW_RAYS_MIN or
+                        100 * through > Params.through_percent * rays and not hidden[-1])
         self.associate(findings, gone)
-        self.prune(gone)
+        self.prune(gone, hidden)
         self.start(findings)
         self.select(middle)
 
