@@ -168,6 +168,9 @@ void ih_findings_add(const struct ih_points *points, const struct ih_dots *dots,
                      struct ih_findings_scratch *scratch, struct ih_findings *out)
 {
     const struct work work = {&scratch->space, heads, rig, params, out};
+    if (points->seen_count == 0) {
+        return;
+    }
     out->seen_count += points->seen_count;
     ih_space_make(points, dots, rig, &params->space, &scratch->space);
     ih_scan_find(&scratch->space, &params->scan, &scratch->scan_scratch, &scratch->scan);

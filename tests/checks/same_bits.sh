@@ -5,8 +5,9 @@
 #     same_bits.sh [--every N] CJSON_DIR FRAMES_DIR...
 #
 # CJSON_DIR: a folder with cJSON.c for the cross build. Of each frames directory (or of those below
-# FRAMES_DIR) every Nth frame is used, default 10, and of one frame of the first and one of the last
-# directory every stage's raw integers (--trace) too. Builds below build/bits. Exit status 1 on a difference.
+# FRAMES_DIR) every Nth frame is used, default 10, of the first also six in a row, and of one frame of
+# the first and one of the last directory every stage's raw integers (--trace) too. Builds below
+# build/bits. Exit status 1 on a difference.
 set -eu
 LC_ALL=C
 export LC_ALL
@@ -103,6 +104,19 @@ middle() {
     cp "$1" "$from/"
 }
 
+# series FROM TO: six frames in a row from the middle on, for the tracks.
+series() {
+    mkdir -p "$2"
+    cp "$1/rig.json" "$2/"
+    to=$2
+    set -- "$1"/*.pgm
+    shift $(($# / 2))
+    for frame in "$@"; do
+        cp "$frame" "$to/"
+        [ "$(ls "$to" | wc -l)" -le 6 ] || break
+    done
+}
+
 count=0
 for dir in "$@"; do
     for rig in "$dir"/rig.json "$dir"/*/rig.json; do
@@ -114,6 +128,7 @@ for dir in "$@"; do
         thin "$from" "$work/frames/$name" "$every"
         if [ $count = 1 ]; then
             middle "$from" "$work/traced/first"
+            series "$from" "$work/frames/0-series"
         fi
     done
 done
