@@ -13,7 +13,7 @@
  * Overflow: points and centres below 2^26 in Q8. Moments are of points on the ellipsoid, 220 mm at
  *        most from its centre: products 2^23.6 in Q8, 361 of them 2^32.1, squared sums 2^40.6;
  *        central ones 2^23.6, their determinants 2^48.2, times 2^12 2^60.2.
- * Error: counts are exact but where a ray passes within 2^-12 of a limit; rough within 0.03 mm, bulge
+ * Error: counts are exact but where a ray passes within 2^-10 of a limit; rough within 0.03 mm, bulge
  *        within 0.06 mm.
  * Cost:  361 crossings.
  */
