@@ -8,7 +8,7 @@ DATA ?= ../shared/data
 UNITY_DIR ?= $(BUILD)/third_party/unity/src
 CJSON_DIR ?= $(BUILD)/third_party/cjson
 # The frame of frames/sequence2 that docs/picture.png shows.
-PICTURE ?= 000024
+PICTURE ?= 000020
 
 .DEFAULT_GOAL := help
 .PHONY: help sim frames test accept eval bits vectors picture format formatted lint clean

@@ -292,6 +292,8 @@ static void write_finding(struct sim_write *write, const struct ih_finding *find
     sim_write_int_field(write, "track", finding->track_id);
     sim_write_key(write, "predicted");
     sim_write_bool(write, finding->is_predicted);
+    sim_write_key(write, "head");
+    sim_write_bool(write, finding->is_head);
     sim_write_int_field(write, "logit_q10", finding->logit_q10);
     sim_write_int_field(write, "probability_q16", finding->probability_q16);
     write_column(write, "evidence_q8", finding->evidence.value_q8, IH_EVIDENCE_COUNT,

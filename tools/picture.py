@@ -4,8 +4,9 @@
 picture.py FRAMES_DIR TRACE.json OUT.png
 
 Left the frame with its labelled dots, coloured by depth; right the surface as a contour plot (near =
-dark) with the ellipse of every hypothesis, accepted ones emphasised, and the open polygons whose
-elliptical part supports an accepted one, dashed. Both in the frame's pixels.
+dark) with the ellipse of every nest, those that the paper's tests accept emphasised, and the open
+polygons whose elliptical part supports an accepted one, dashed. In both the heads of the whole method, as
+ellipsoids with their probability. Both in the frame's pixels.
 """
 
 import json
@@ -109,25 +110,38 @@ def draw_hypotheses(axes, trace, camera):
         good = index in accepted
         shape = Ellipse((h["u_px_q12"] / 4096, h["v_px_q12"] / 4096), 2 * h["a_px_q12"] / 4096,
                         2 * h["b_px_q12"] / 4096, angle=h["angle_mdeg"] / 1000, fill=False,
-                        color="red" if good else "deepskyblue", linewidth=2.4 if good else 1.1, zorder=3)
+                        color="darkorange" if good else "deepskyblue", linewidth=2.4 if good else 1.1, zorder=3)
         axes.add_patch(shape)
         if good:
-            x, y, z = (value / 256 for value in h["centre_mm_q8"])
-            axes.annotate("head at (%.0f, %.0f, %.0f) mm" % (x, y, z), shape.center, color="red",
-                          xytext=(0.02, 0.03), textcoords="axes fraction", fontsize=9,
-                          bbox={"facecolor": "white", "linewidth": 0, "alpha": 0.85, "pad": 2})
             nest = trace["hypotheses"]["nest"][h["nest"]]
             parts = [piece for piece in nest["slice"] if not piece["whole"]]
             places = nearest_open(trace, nest, parts[-1]) if parts else None
             if places is not None:
-                axes.plot(*grid_pixels(trace["surface"], camera, *places.T), color="red", linewidth=1,
+                axes.plot(*grid_pixels(trace["surface"], camera, *places.T), color="darkorange", linewidth=1,
                           linestyle="--", zorder=2)
         else:
             axes.text(*shape.center, h["rejected"], color="deepskyblue", fontsize=7, ha="center",
                       va="center", zorder=4)
     count = len(trace["heads"]["hypothesis"])
-    axes.set_title("surface, %d %s, %d accepted" % (count, "hypothesis" if count == 1 else "hypotheses",
-                                                    len(accepted)))
+    axes.set_title("surface, %d %s, %d accepted by the paper's tests" %
+                   (count, "nest" if count == 1 else "nests", len(accepted)))
+
+
+def draw_heads(axes, trace, camera):
+    """The fitted ellipsoids that are heads, and their centres."""
+    for finding in trace["findings"]:
+        if not finding["head"]:
+            continue
+        x, y, z = (value / 256 for value in finding["centre_mm_q8"])
+        across, up, _ = (value / 256 for value in finding["semi_mm_q8"])
+        turn = np.linspace(0, 2 * np.pi, 73)
+        outline = camera.pixels((x + across * np.cos(turn)) / z, (y + up * np.sin(turn)) / z)
+        axes.plot(*outline, color="red", linewidth=2.2, zorder=5)
+        axes.plot(*camera.pixels(np.array([x / z]), np.array([y / z])), "+", color="red", zorder=5)
+        axes.annotate("head at (%.0f, %.0f, %.0f) mm, %.1f %% sure" %
+                      (x, y, z, 100 * finding["probability_q16"] / 65536), (0, 0), color="red",
+                      xytext=(0.02, 0.03), textcoords="axes fraction", fontsize=9,
+                      bbox={"facecolor": "white", "linewidth": 0, "alpha": 0.85, "pad": 2})
 
 
 def main():
@@ -144,6 +158,8 @@ def main():
     draw_frame(left, trace, image, maximum)
     draw_surface(right, trace, camera, left.get_xlim() + left.get_ylim())
     draw_hypotheses(right, trace, camera)
+    draw_heads(left, trace, camera)
+    draw_heads(right, trace, camera)
     for axes in (left, right):
         axes.set_xticks([])
         axes.set_yticks([])
