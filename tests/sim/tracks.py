@@ -140,7 +140,7 @@ def check_person(test, frames):
                all(len(h) == 1 and h[0].get("predicted") is True and h[0]["track"] == own
                    and h[0]["rejected"] is None for h in carried), carried)
     test.check("and is the head", all(dark[i]["head"] == 0 for i in LOST))
-    sigma = [h[0]["sigma_mm"] for h in carried if h]
+    sigma = [h[0].get("sigma_mm", 0) for h in carried if h]
     test.check("less and less certain", sigma == sorted(set(sigma)) and len(sigma) == len(LOST),
                sigma)
     after = dark[LOST[-1] + 1:]

@@ -463,6 +463,7 @@ static void nothing_at_the_lens_is_a_head(void)
 static void no_points_give_no_findings(void)
 {
     rig.calibration.kind = IH_RIG_RANGE;
+    expect_head();
     look();
     TEST_ASSERT_EQUAL_INT32(0, findings.finding_count);
     TEST_ASSERT_EQUAL_INT32(0, findings.dropped_count);
