@@ -11,7 +11,7 @@ CJSON_DIR ?= $(BUILD)/third_party/cjson
 PICTURE ?= 000020
 
 .DEFAULT_GOAL := help
-.PHONY: help sim frames test accept eval bits vectors picture format formatted lint clean
+.PHONY: help sim frames test accept eval bits vectors learn picture format formatted lint clean
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z_]+:.*## / { printf "  make %-9s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -53,6 +53,11 @@ bits: sim ## the same records from gcc and clang, -O0 and -O3, x86-64 and aarch6
 vectors: ## write tests/vectors anew with the float64 reference
 	@tools/setup.sh vectors
 	@/usr/bin/python3 tools/oracle/make_vectors.py --out tests/vectors
+
+learn: sim ## learn the score's curves anew from rendered scenes; half an hour
+	@tools/setup.sh vectors
+	@/usr/bin/python3 tools/learn/learn.py --render $(BUILD)/host/tools/render/render \
+	  --host-sim $(BUILD)/host/sim/host_sim --work $(BUILD)/learn
 
 picture: sim ## draw docs/picture.png anew
 	@tools/setup.sh picture

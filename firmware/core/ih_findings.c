@@ -172,9 +172,6 @@ void ih_findings_add(const struct ih_points *points, const struct ih_dots *dots,
         return;
     }
     out->seen_count += points->seen_count;
-    if (points->seen_count == 0) {
-        return;
-    }
     ih_space_make(points, dots, rig, &params->space, &scratch->space);
     ih_scan_find(&scratch->space, &params->scan, &scratch->scan_scratch, &scratch->scan);
     for (int32_t i = 0; i < scratch->scan.place_count; i++) {

@@ -71,7 +71,7 @@ def parse():
     parser.add_argument("--render", required=True)
     parser.add_argument("--host-sim", required=True)
     parser.add_argument("--work", required=True)
-    parser.add_argument("--seeds", default="5001-5030", help="learnt from (default 5001-5030)")
+    parser.add_argument("--seeds", default="5001-5060", help="learnt from (default 5001-5060)")
     parser.add_argument("--check-seeds", default="6001-6006",
                         help="reported on, not learnt from (default 6001-6006)")
     parser.add_argument("--also", nargs="*", default=[], help="frames directories to report on")
