@@ -231,12 +231,8 @@ static int32_t root_mm_q8(int64_t square_q16)
 
 static int32_t moved_mm_q8(const struct ih_ellipsoid *ellipsoid, const int32_t start_mm_q8[3])
 {
-    int64_t sum_q16 = 0;
-    for (int axis = 0; axis < 3; axis++) {
-        int64_t d = (int64_t)ellipsoid->centre_mm_q8[axis] - start_mm_q8[axis];
-        sum_q16 += d * d;
-    }
-    return ih_saturate_s32(ih_isqrt_u64((uint64_t)sum_q16));
+    int64_t distance2_q16 = ih_distance2_s32(ellipsoid->centre_mm_q8, start_mm_q8);
+    return ih_saturate_s32(ih_isqrt_u64((uint64_t)distance2_q16));
 }
 
 /* 100 (a - m) / m */

@@ -26,16 +26,6 @@ void ih_findings_begin(struct ih_findings *out)
     memset(out->view, 0, sizeof out->view);
 }
 
-static int64_t distance2_q16(const int32_t a_mm_q8[3], const int32_t b_mm_q8[3])
-{
-    int64_t sum = 0;
-    for (int axis = 0; axis < 3; axis++) {
-        int64_t d = (int64_t)a_mm_q8[axis] - b_mm_q8[axis];
-        sum += d * d;
-    }
-    return sum;
-}
-
 static int64_t square_q16(int32_t distance_mm)
 {
     return (int64_t)distance_mm * distance_mm * 65536;
@@ -49,7 +39,7 @@ static struct ih_evidence_nest nest_at(const struct ih_heads *heads, const int32
     int64_t best = square_q16(near_mm);
     for (int32_t i = 0; i < heads->hypothesis_count; i++) {
         const struct ih_hypothesis *h = &heads->hypothesis[i];
-        int64_t distance2 = distance2_q16(h->centre_mm_q8, centre_mm_q8);
+        int64_t distance2 = ih_distance2_s32(h->centre_mm_q8, centre_mm_q8);
         if (distance2 < best) {
             best = distance2;
             nest.present = true;
@@ -91,7 +81,8 @@ static void insert(struct ih_findings *out, const struct ih_finding *finding, in
     int32_t kept = 0;
     for (int32_t i = 0; i < out->finding_count; i++) {
         const struct ih_finding *other = &out->finding[i];
-        bool same = distance2_q16(other->head.centre_mm_q8, finding->head.centre_mm_q8) < spacing2;
+        bool same =
+            ih_distance2_s32(other->head.centre_mm_q8, finding->head.centre_mm_q8) < spacing2;
         if (same && other->logit_q10 >= finding->logit_q10) {
             return; /* sorted: nothing was dropped before this */
         }

@@ -70,6 +70,17 @@ static inline int32_t ih_abs_s32(int32_t value)
     return value < 0 ? -value : value;
 }
 
+/* Square of the distance of two places whose coordinates differ by less than 2^30.7. */
+static inline int64_t ih_distance2_s32(const int32_t a[3], const int32_t b[3])
+{
+    int64_t sum = 0;
+    for (int axis = 0; axis < 3; axis++) {
+        int64_t d = (int64_t)a[axis] - b[axis];
+        sum += d * d;
+    }
+    return sum;
+}
+
 /* floor(sqrt(value)), exact for all 2^64 inputs. */
 uint32_t ih_isqrt_u64(uint64_t value);
 

@@ -321,13 +321,8 @@ static bool is_better(const struct ih_hypothesis *a, const struct ih_hypothesis 
 static bool is_same_thing(const struct ih_hypothesis *a, const struct ih_hypothesis *b,
                           int32_t merge_mm)
 {
-    int64_t distance2 = 0;
-    for (int axis = 0; axis < 3; axis++) {
-        int64_t d = (int64_t)a->centre_mm_q8[axis] - b->centre_mm_q8[axis];
-        distance2 += d * d; /* each below 2^54: coordinates are within 2^25.2 */
-    }
     int64_t limit = (int64_t)merge_mm << 8;
-    return distance2 < limit * limit;
+    return ih_distance2_s32(a->centre_mm_q8, b->centre_mm_q8) < limit * limit;
 }
 
 /* Drop what lies too near to a better one; the list is sorted. */

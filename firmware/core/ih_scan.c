@@ -98,13 +98,8 @@ static void centre_behind(const struct ih_ray *ray, int32_t deep_mm, int32_t cen
 
 static bool is_near(const int32_t a_mm_q8[3], const int32_t b_mm_q8[3], int32_t distance_mm)
 {
-    int64_t sum = 0;
-    for (int axis = 0; axis < 3; axis++) {
-        int64_t d = (int64_t)a_mm_q8[axis] - b_mm_q8[axis];
-        sum += d * d;
-    }
     int64_t limit = (int64_t)distance_mm << 8;
-    return sum <= limit * limit;
+    return ih_distance2_s32(a_mm_q8, b_mm_q8) <= limit * limit;
 }
 
 static bool is_taken(const struct ih_scan *out, const struct ih_scan_place *place,

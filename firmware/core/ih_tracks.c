@@ -126,16 +126,6 @@ void ih_tracks_expect(struct ih_tracks *tracks, const struct ih_tracks_params *p
     }
 }
 
-static int64_t distance2_q16(const int32_t a_mm_q8[3], const int32_t b_mm_q8[3])
-{
-    int64_t sum = 0;
-    for (int axis = 0; axis < 3; axis++) {
-        int64_t d = (int64_t)a_mm_q8[axis] - b_mm_q8[axis];
-        sum += d * d;
-    }
-    return sum;
-}
-
 /* How well a finding continues a track, as log-odds; false: not at all. */
 static bool fits(const struct ih_tracks *tracks, const struct ih_tracks_params *params,
                  const struct ih_track *track, const struct ih_finding *finding, int32_t *merit_q10)
@@ -143,7 +133,7 @@ static bool fits(const struct ih_tracks *tracks, const struct ih_tracks_params *
     int64_t unseen_us = tracks->time_us - track->seen_us;
     int64_t gate_mm = params->gate_mm + ih_div_round(params->gate_mm_per_s * unseen_us, 1000000);
     int64_t gate2_q16 = gate_mm * gate_mm * 65536;
-    int64_t distance2 = distance2_q16(track->head.centre_mm_q8, finding->head.centre_mm_q8);
+    int64_t distance2 = ih_distance2_s32(track->head.centre_mm_q8, finding->head.centre_mm_q8);
     if (finding->track_id != 0 || finding->logit_q10 < params->keep_logit_q10 ||
         distance2 > gate2_q16) {
         return false;
@@ -273,7 +263,7 @@ static void slow_down(struct ih_track *track, int64_t step_us)
 static bool is_double(const struct ih_tracks *tracks, int32_t kept, const struct ih_track *track)
 {
     for (int32_t i = 0; i < kept; i++) {
-        if (distance2_q16(tracks->track[i].head.centre_mm_q8, track->head.centre_mm_q8) <
+        if (ih_distance2_s32(tracks->track[i].head.centre_mm_q8, track->head.centre_mm_q8) <
             (int64_t)SAME_MM * SAME_MM * 65536) {
             return true;
         }
