@@ -54,8 +54,8 @@ struct ih_evidence_nest {
 
 struct ih_evidence {
     int32_t value_q8[IH_EVIDENCE_COUNT];
-    /* For following a head over time: of the rays through it, those that saw its surface, were
-     * stopped before it, or went through it. */
+    /* For following a head over time: of the rays through it, those that went through it, that saw
+     * its surface, that were stopped before it. */
     int32_t through_count, hit_count, front_count;
 };
 

@@ -5,7 +5,7 @@
  * Out:   findings, the most probable first, at least spacing_mm apart.
  * Way:   candidates are the nests' centres, the places of the model scan and the expected ones; each
  *        is fitted (ih_fit), looked at (ih_evidence) and rated (ih_score). A range frame is looked at
- *        window by window: findings are collected over begin, one add a window, and end.
+ *        window by window: begin once a frame, add once a window.
  *        Of an expected head that is not found it also says what its rays met (views): whether it is
  *        hidden, or gone.
  *        Of two within spacing_mm the more probable stays, of equals the first; it takes the place of
@@ -13,7 +13,8 @@
  * Full table: the least probable drop and count in dropped_count.
  * Overflow: points are below 2^25 in Q8 (16 m, slopes up to 8), a fit moves 240 mm, a track 3 m: centres
  *        below 2^26, squares of differences 2^55.6.
- * Cost:  up to 28 fits a window.
+ * Cost:  up to IH_SCAN_MAX + IH_HYPOTHESES_MAX + IH_FINDINGS_EXPECTED_MAX = 32 fits a window, usually
+ *        about 13.
  */
 #ifndef IH_FINDINGS_H
 #define IH_FINDINGS_H
@@ -22,9 +23,9 @@
 #include "ih_scan.h"
 #include "ih_score.h"
 
-/* Findings kept; each costs 200 bytes. */
+/* Findings kept; each costs 160 bytes. */
 #define IH_FINDINGS_MAX 16
-/* Expected places that are tried. */
+/* Expected places that are tried, and so the tracks; each costs a track and a finding. */
 #define IH_FINDINGS_EXPECTED_MAX 8
 
 enum ih_source { IH_SOURCE_SCAN, IH_SOURCE_NEST, IH_SOURCE_EXPECTED };

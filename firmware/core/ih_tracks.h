@@ -24,8 +24,7 @@
  *        from its mature_findings-th finding on above accept_logit, until it falls below drop_logit.
  *        The selected head is the one nearest the middle of the pattern (or the leftmost or
  *        rightmost in the picture, by side), of those not much less probable than the best, and one
- *        that is seen before one that is carried; another
- *        takes its place after switch_frames frames.
+ *        that is seen before one that is carried; another takes its place after switch_frames frames.
  * Time:  frames may come late, be lost, or jump: a step back, or forward by more than gap_us,
  *        forgets all tracks; ids go on, after the largest from 1 again.
  * Overflow: steps up to 2 s = 2^21 in Q20, accelerations below 2^13 mm/s^2: what a step adds to a
@@ -55,8 +54,8 @@ struct ih_tracks_params {
     int32_t drop_logit_q10;                    /* .. until it falls below this */
     int32_t keep_logit_q10;                    /* findings above this continue a track */
     int32_t memory_q16;                        /* share of the old mean in the new one */
-    int32_t through_percent, front_percent;
-    int32_t seen_least; /* points; a frame with fewer is lost */
+    int32_t through_percent, front_percent;    /* of the rays that meet it: gone, hidden */
+    int32_t seen_least;                        /* points; a frame with fewer is lost */
     int32_t carry_us;
     int32_t gap_us;             /* up to 2 s; -1: every frame on its own */
     int32_t measured_mm;        /* standard deviation of a finding's centre; 4 .. 500 */
