@@ -107,30 +107,17 @@ static void find_nests(struct isohead *head, const struct ih_dots *dots)
 }
 
 /* And on to findings, unless the paper's method alone is wanted. */
-static void look(struct isohead *head, const struct ih_dots *dots,
-                 const struct ih_expected *expected)
+static void look(struct isohead *head, const struct ih_dots *dots)
 {
     find_nests(head, dots);
     if (!head->params.is_paper) {
-        ih_findings_add(&head->points, dots, &head->heads, expected, &head->rig,
+        ih_findings_add(&head->points, dots, &head->heads, &head->expected, &head->rig,
                         &head->params.findings, &head->scratch.findings, &head->findings);
     }
 }
 
-static void look_at_dots(struct isohead *head, const struct ih_frame *frame,
-                         const struct ih_frame *ambient, const struct ih_expected *expected)
-{
-    const struct ih_params *params = &head->params;
-    ih_dots_find(frame, ambient, &params->dots, &head->scratch.dots, &head->dots);
-    ih_labels_assign(&head->dots, &head->rig, &params->labels, &head->scratch.labels,
-                     &head->labels);
-    ih_points_from_labels(&head->labels, &head->rig, &head->points);
-    look(head, &head->dots, expected);
-}
-
 /* The best window comes last, so that the stages' outputs that stay are its own. */
-static enum ih_err look_at_windows(struct isohead *head, const struct ih_frame *frame,
-                                   const struct ih_expected *expected)
+static enum ih_err look_at_windows(struct isohead *head, const struct ih_frame *frame)
 {
     const struct ih_params *params = &head->params;
     enum ih_err err = ih_windows_find(frame, &head->rig, &params->windows, &head->scratch.windows,
@@ -143,39 +130,81 @@ static enum ih_err look_at_windows(struct isohead *head, const struct ih_frame *
         err = ih_points_from_range(frame, &head->rig, &params->points, &head->windows.window[i],
                                    &head->points);
         if (err == IH_OK) {
-            look(head, NULL, expected);
+            look(head, NULL);
         }
     }
     return err;
 }
 
-enum ih_err isohead_frame(struct isohead *head, const struct ih_frame *frame,
-                          const struct ih_frame *ambient, int64_t time_us)
+/* What the tracks expect, before anything of this frame is looked at. */
+static void begin(struct isohead *head, int64_t time_us)
 {
-    bool is_range = head->rig.calibration.kind == IH_RIG_RANGE;
-    enum ih_err err = check_frame(frame, &head->rig.calibration);
-    if (err == IH_OK && ambient != NULL && !is_range) {
-        err = check_frame(ambient, &head->rig.calibration);
-    }
-    clear_outputs(head);
-    if (err != IH_OK) {
-        return err;
-    }
-    struct ih_expected expected = {0};
     if (!head->params.is_paper) {
-        ih_tracks_expect(&head->tracks, &head->params.tracks, time_us, &expected);
+        ih_tracks_expect(&head->tracks, &head->params.tracks, time_us, &head->expected);
         ih_findings_begin(&head->findings);
     }
-    if (is_range) {
-        err = look_at_windows(head, frame, &expected);
-    } else {
-        look_at_dots(head, frame, ambient, &expected);
-    }
+}
+
+/* One answer from all that was found. */
+static void conclude(struct isohead *head)
+{
     if (head->params.is_paper) {
         ih_result_from_heads(&head->heads, &head->result);
     } else {
         ih_tracks_update(&head->tracks, &head->params.tracks, &head->rig, &head->findings);
         ih_result_from_tracks(&head->findings, &head->tracks, &head->result);
+    }
+}
+
+static enum ih_err frame_of_range(struct isohead *head, const struct ih_frame *frame,
+                                  int64_t time_us)
+{
+    clear_outputs(head);
+    enum ih_err err = check_frame(frame, &head->rig.calibration);
+    if (err == IH_OK) {
+        begin(head, time_us);
+        err = look_at_windows(head, frame);
+        conclude(head);
+    }
+    return err;
+}
+
+enum ih_err isohead_label(struct isohead *head, const struct ih_frame *frame,
+                          const struct ih_frame *ambient)
+{
+    const struct ih_params *params = &head->params;
+    enum ih_err err = head->rig.calibration.kind == IH_RIG_RANGE
+                          ? IH_ERR_KIND
+                          : check_frame(frame, &head->rig.calibration);
+    if (err == IH_OK && ambient != NULL) {
+        err = check_frame(ambient, &head->rig.calibration);
+    }
+    clear_outputs(head);
+    if (err == IH_OK) {
+        ih_dots_find(frame, ambient, &params->dots, &head->scratch.dots, &head->dots);
+        ih_labels_assign(&head->dots, &head->rig, &params->labels, &head->scratch.labels,
+                         &head->labels);
+    }
+    return err;
+}
+
+void isohead_find(struct isohead *head, int64_t time_us)
+{
+    begin(head, time_us);
+    ih_points_from_labels(&head->labels, &head->rig, &head->points);
+    look(head, &head->dots);
+    conclude(head);
+}
+
+enum ih_err isohead_frame(struct isohead *head, const struct ih_frame *frame,
+                          const struct ih_frame *ambient, int64_t time_us)
+{
+    if (head->rig.calibration.kind == IH_RIG_RANGE) {
+        return frame_of_range(head, frame, time_us);
+    }
+    enum ih_err err = isohead_label(head, frame, ambient);
+    if (err == IH_OK) {
+        isohead_find(head, time_us);
     }
     return err;
 }

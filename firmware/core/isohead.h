@@ -46,6 +46,7 @@ struct isohead {
     /* The stages' outputs of the last frame, in order. */
     struct ih_dots dots;
     struct ih_labels labels;
+    struct ih_expected expected; /* by the tracks */
     struct ih_windows windows;
     struct ih_points points;
     struct ih_samples samples;
@@ -80,5 +81,14 @@ enum ih_err isohead_init(struct isohead *head, const struct ih_calibration *cali
 enum ih_err isohead_frame(struct isohead *head, const struct ih_frame *frame,
                           const struct ih_frame *ambient, int64_t time_us)
     __attribute__((warn_unused_result));
+
+/* isohead_frame in two halves, for a dot rig whose caller does not know whether the dots were on
+ * when the frame was taken, and decides from head->labels whether it counts. isohead_label fills
+ * head->dots and head->labels, leaves all other outputs empty and the tracks as they were; a range
+ * rig is IH_ERR_KIND. It may be called again, with an ambient frame this time. isohead_find goes on
+ * from there, once per frame that counts. */
+enum ih_err isohead_label(struct isohead *head, const struct ih_frame *frame,
+                          const struct ih_frame *ambient) __attribute__((warn_unused_result));
+void isohead_find(struct isohead *head, int64_t time_us);
 
 #endif
