@@ -1,4 +1,4 @@
-#include "replay/hal_file.h"
+#include "hal_file.h"
 
 #include <errno.h>
 #include <stdio.h>

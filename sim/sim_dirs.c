@@ -8,7 +8,7 @@
 #include <string.h>
 #include <sys/stat.h>
 
-#include "replay/hal_file.h"
+#include "hal_file.h"
 
 #define RIG_NAME "rig.json"
 /* Room for a number after a label. */

@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <unistd.h>
 
-#include "sim_text.h"
+#include "app_text.h"
 
 /* Longest message; longer ones are cut. Paths may be of 4096 bytes. */
 #define MESSAGE_MAX 5120
@@ -27,7 +27,7 @@ void sim_report_error(struct sim_report *report, const char *subject, const char
         vsnprintf(message + length, sizeof message - (size_t)length, format, arguments);
         va_end(arguments);
     }
-    sim_text_tame(message);
+    app_text_tame(message);
     sim_report_progress_end(report);
     fprintf(stderr, "host_sim: %s\n", message);
     report->error_count++;
@@ -40,7 +40,7 @@ void sim_report_progress(struct sim_report *report, const char *name, size_t don
     }
     char line[80];
     snprintf(line, sizeof line, "%.40s %zu/%zu", name, done, count);
-    sim_text_tame(line);
+    app_text_tame(line);
     fprintf(stderr, "\r\033[K%s", line);
     fflush(stderr);
     report->progress_shown = true;

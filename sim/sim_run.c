@@ -6,14 +6,14 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "replay/hal_file.h"
+#include "hal_file.h"
 #include "replay/hal_replay.h"
 #include "sim_cloud.h"
 #include "sim_dirs.h"
-#include "sim_record.h"
+#include "app_record.h"
 #include "sim_report.h"
-#include "sim_rig.h"
-#include "sim_rig_explain.h"
+#include "app_rig.h"
+#include "app_rig_explain.h"
 #include "sim_score.h"
 #include "sim_table.h"
 #include "sim_trace.h"
@@ -39,12 +39,12 @@ struct visit {
     const struct sim_dir *dir;
     struct hal_replay replay;
     struct sim_truth truth;
-    struct sim_record record;
+    struct app_record record;
     struct sim_cloud cloud;
     struct sim_score *score;
     /* The last frame without laser, for the lit ones after it; samples NULL: none yet. */
-    struct ih_frame ambient;
-    int64_t ambient_time_us;
+    struct hal_frame ambient;
+    struct ih_frame ambient_view;
 };
 
 /* Rig file to a core that is ready; wrong ones go to the report. */
@@ -55,14 +55,14 @@ static bool start_core(struct run *run, const char *dir)
     int32_t bad_slot = IH_NONE;
     char *own = hal_file_join(dir, "rig.json");
     const char *path = run->options->rig != NULL ? run->options->rig : own;
-    bool good = path != NULL && sim_rig_load(path, &calibration, &error);
+    bool good = path != NULL && app_rig_load(path, &calibration, &error);
     if (good) {
         enum ih_err err = isohead_init(run->head, &calibration, &bad_slot);
         run->head->params.is_paper = run->options->paper;
         sim_without_apply(run->options->without, &run->head->params);
         good = err == IH_OK;
         if (!good) {
-            sim_rig_explain(&calibration, err, bad_slot, &error);
+            app_rig_explain(&calibration, err, bad_slot, &error);
         }
     }
     if (!good) {
@@ -87,27 +87,9 @@ static void lose_frame(struct visit *visit, const struct hal_frame *frame, const
         return;
     }
     if (visit->run->options->json) {
-        sim_record_error(&visit->record, frame->name, text);
+        app_record_error(&visit->record, frame->name, text);
     } else {
         sim_table_error(stdout, frame->name, text);
-    }
-}
-
-/* The core's refusal of a frame, in terms of the frame and the rig. */
-static void explain_frame(const struct isohead *head, const struct hal_frame *frame,
-                          enum ih_err err, struct hal_error *error)
-{
-    const struct ih_calibration *rig = &head->rig.calibration;
-    if (frame->width != rig->width || frame->height != rig->height) {
-        snprintf(error->text, sizeof error->text,
-                 "%" PRId32 "x%" PRId32 " px, expected %" PRId32 "x%" PRId32 " as in the rig",
-                 frame->width, frame->height, rig->width, rig->height);
-    } else if (err == IH_ERR_KIND && rig->kind == IH_RIG_RANGE) {
-        snprintf(error->text, sizeof error->text,
-                 "maxval %" PRId32 ", expected above 255: a range image has two bytes per pixel",
-                 frame->maximum);
-    } else {
-        snprintf(error->text, sizeof error->text, "%s", ih_err_text(err));
     }
 }
 
@@ -126,7 +108,7 @@ static void put_frame(struct visit *visit, const struct hal_frame *frame)
         sim_score_add_dots(visit->score, head, truth);
     }
     if (options->json) {
-        sim_record_frame(&visit->record, frame, head);
+        app_record_frame(&visit->record, frame, head);
     } else {
         sim_table_frame(stdout, frame, head, &verdict);
     }
@@ -144,43 +126,41 @@ static struct ih_frame view_of(const struct hal_frame *frame)
     };
 }
 
-/* Keep a frame without laser: the camera's own buffer lives only until the next one. */
+static void release(struct visit *visit, const struct hal_frame *frame)
+{
+    const struct hal_camera *camera = &visit->replay.camera;
+    camera->release(camera->context, frame);
+}
+
+/* A frame without laser is held until the next one. */
 static void keep_ambient(struct visit *visit, const struct hal_frame *frame)
 {
-    const struct isohead *head = visit->run->head;
+    const struct ih_calibration *rig = &visit->run->head->rig.calibration;
     struct hal_error error;
-    size_t size = (size_t)frame->height * (size_t)frame->stride_bytes;
-    if (frame->width != head->rig.calibration.width ||
-        frame->height != head->rig.calibration.height) {
-        explain_frame(head, frame, IH_ERR_SIZE, &error);
+    if (frame->width != rig->width || frame->height != rig->height) {
+        app_rig_explain_frame(rig, frame, IH_ERR_SIZE, &error);
         lose_frame(visit, frame, error.text);
+        release(visit, frame);
         return;
     }
-    free((void *)visit->ambient.samples);
-    void *copy = sim_report_grow(NULL, size, 1);
-    memcpy(copy, frame->samples, size);
-    visit->ambient = view_of(frame);
-    visit->ambient.samples = copy;
-    visit->ambient_time_us = frame->time_us;
+    release(visit, &visit->ambient);
+    visit->ambient = *frame;
+    visit->ambient_view = view_of(frame);
 }
 
 static const struct ih_frame *fresh_ambient(const struct visit *visit, int64_t time_us)
 {
     bool fresh =
-        visit->ambient.samples != NULL && time_us - visit->ambient_time_us <= AMBIENT_AGE_MAX_US;
+        visit->ambient.samples != NULL && time_us - visit->ambient.time_us <= AMBIENT_AGE_MAX_US;
     bool wanted = !sim_without_ambient(visit->run->options->without);
-    return wanted && fresh ? &visit->ambient : NULL;
+    return wanted && fresh ? &visit->ambient_view : NULL;
 }
 
-static void process_frame(struct visit *visit, const struct hal_frame *frame)
+static void process_lit(struct visit *visit, const struct hal_frame *frame)
 {
     struct isohead *head = visit->run->head;
     struct hal_error error;
     struct ih_frame view;
-    if (!frame->laser) {
-        keep_ambient(visit, frame);
-        return;
-    }
     if (!sim_cloud_view(&visit->cloud, frame, &head->rig, &view, &error)) {
         lose_frame(visit, frame, error.text);
         return;
@@ -188,7 +168,7 @@ static void process_frame(struct visit *visit, const struct hal_frame *frame)
     enum ih_err err =
         isohead_frame(head, &view, fresh_ambient(visit, frame->time_us), frame->time_us);
     if (err != IH_OK) {
-        explain_frame(head, frame, err, &error);
+        app_rig_explain_frame(&head->rig.calibration, frame, err, &error);
         lose_frame(visit, frame, error.text);
         return;
     }
@@ -198,6 +178,16 @@ static void process_frame(struct visit *visit, const struct hal_frame *frame)
         if (!sim_trace_frame(&trace, frame, head, &error)) {
             report_frame(visit, frame->name, error.text);
         }
+    }
+}
+
+static void process_frame(struct visit *visit, const struct hal_frame *frame)
+{
+    if (frame->laser) {
+        process_lit(visit, frame);
+        release(visit, frame);
+    } else {
+        keep_ambient(visit, frame);
     }
 }
 
@@ -245,7 +235,7 @@ static void process_dir(struct run *run, size_t index)
         sim_table_title(stdout, dir->path);
     }
     process_frames(&visit);
-    free((void *)visit.ambient.samples);
+    release(&visit, &visit.ambient);
     sim_truth_free(&visit.truth);
     sim_cloud_free(&visit.cloud);
     hal_replay_close(&visit.replay);

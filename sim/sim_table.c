@@ -3,7 +3,7 @@
 #include <inttypes.h>
 #include <string.h>
 
-#include "sim_text.h"
+#include "app_text.h"
 
 #define LABEL_WIDTH 20
 #define NAME_MAX_BYTES 256
@@ -14,7 +14,7 @@ static const char *const outcome_text[SIM_OUTCOMES] = {"correct", "ambiguous", "
 static const char *tame(char *buffer, size_t size, const char *name)
 {
     snprintf(buffer, size, "%s", name);
-    sim_text_tame(buffer);
+    app_text_tame(buffer);
     return buffer;
 }
 
@@ -37,7 +37,7 @@ static void print_verdict(FILE *file, const struct sim_verdict *verdict)
     }
     fputs(outcome_text[verdict->outcome], file);
     if (verdict->error_known) {
-        fprintf(file, " %s mm", sim_text_fixed(verdict->error_mm_q8, 8, 0).text);
+        fprintf(file, " %s mm", app_text_fixed(verdict->error_mm_q8, 8, 0).text);
     }
 }
 
@@ -53,9 +53,9 @@ void sim_table_frame(FILE *file, const struct hal_frame *frame, const struct iso
     if (selected != IH_NONE) {
         const struct ih_result_entry *hypothesis = &result->entry[selected];
         for (int axis = 0; axis < 3; axis++) {
-            fprintf(file, "%7s ", sim_text_fixed(hypothesis->centre_mm_q8[axis], 8, 1).text);
+            fprintf(file, "%7s ", app_text_fixed(hypothesis->centre_mm_q8[axis], 8, 1).text);
         }
-        fprintf(file, "%6s  ", sim_text_fixed(hypothesis->distance_mm_q8, 8, 0).text);
+        fprintf(file, "%6s  ", app_text_fixed(hypothesis->distance_mm_q8, 8, 0).text);
     } else {
         fprintf(file, "%-32s", result->head_count > 1 ? "    ambiguous" : "         none");
     }
@@ -99,8 +99,8 @@ static void print_head_row(FILE *file, struct sim_score *score)
     fprintf(file, " %5" PRId32 " %6" PRId32, tally->outcome_count[SIM_OUTCOME_NONE],
             tally->selected_right_count);
     if (score->error_mm_q8.count > 0) {
-        fprintf(file, " %4s", sim_text_fixed(sim_list_rank(&score->error_mm_q8, 50), 8, 0).text);
-        fprintf(file, " %4s", sim_text_fixed(sim_list_rank(&score->error_mm_q8, 90), 8, 0).text);
+        fprintf(file, " %4s", app_text_fixed(sim_list_rank(&score->error_mm_q8, 50), 8, 0).text);
+        fprintf(file, " %4s", app_text_fixed(sim_list_rank(&score->error_mm_q8, 90), 8, 0).text);
     }
     fputc('\n', file);
 }
@@ -134,10 +134,10 @@ void sim_table_dots_heading(FILE *file)
 }
 
 /* part / whole in percent to two decimals. */
-static struct sim_decimal percent(int32_t part, int32_t whole)
+static struct app_decimal percent(int32_t part, int32_t whole)
 {
     /* A 24-bit fraction: its error is far below the last decimal. */
-    return sim_text_fixed(whole == 0 ? 0 : ((int64_t)part * 100 << 24) / whole, 24, 2);
+    return app_text_fixed(whole == 0 ? 0 : ((int64_t)part * 100 << 24) / whole, 24, 2);
 }
 
 static void print_ranks(FILE *file, struct sim_list *list, int fraction_bits)
@@ -146,8 +146,8 @@ static void print_ranks(FILE *file, struct sim_list *list, int fraction_bits)
         fprintf(file, " %5s %5s", "-", "-");
         return;
     }
-    fprintf(file, " %5s", sim_text_fixed(sim_list_rank(list, 50), fraction_bits, 2).text);
-    fprintf(file, " %5s", sim_text_fixed(sim_list_rank(list, 90), fraction_bits, 2).text);
+    fprintf(file, " %5s", app_text_fixed(sim_list_rank(list, 50), fraction_bits, 2).text);
+    fprintf(file, " %5s", app_text_fixed(sim_list_rank(list, 90), fraction_bits, 2).text);
 }
 
 void sim_table_dots_row(FILE *file, const char *label, struct sim_score *score)

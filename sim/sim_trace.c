@@ -6,101 +6,101 @@
 #include <string.h>
 #include <sys/stat.h>
 
-#include "replay/hal_file.h"
-#include "sim_write.h"
+#include "hal_file.h"
+#include "app_write.h"
 
 /* An int32_t member of an array of structs as a list of its own. */
-static void write_column(struct sim_write *write, const char *key, const void *first, int32_t count,
+static void write_column(struct app_write *write, const char *key, const void *first, int32_t count,
                          size_t stride_bytes)
 {
     const uint8_t *at = first;
-    sim_write_key(write, key);
-    sim_write_open(write, '[');
+    app_write_key(write, key);
+    app_write_open(write, '[');
     for (int32_t i = 0; i < count; i++) {
         int32_t value = 0;
         memcpy(&value, at + (size_t)i * stride_bytes, sizeof value);
-        sim_write_int(write, value);
+        app_write_int(write, value);
     }
-    sim_write_close(write, ']');
+    app_write_close(write, ']');
 }
 
-static void write_field(struct sim_write *write, const struct ih_field *field)
+static void write_field(struct app_write *write, const struct ih_field *field)
 {
-    sim_write_key(write, "field");
-    sim_write_open(write, '{');
-    sim_write_int_field(write, "centre_x_q28", field->centre_x_q28);
-    sim_write_int_field(write, "centre_y_q28", field->centre_y_q28);
-    sim_write_int_field(write, "unit_q28", field->unit_q28);
-    sim_write_close(write, '}');
+    app_write_key(write, "field");
+    app_write_open(write, '{');
+    app_write_int_field(write, "centre_x_q28", field->centre_x_q28);
+    app_write_int_field(write, "centre_y_q28", field->centre_y_q28);
+    app_write_int_field(write, "unit_q28", field->unit_q28);
+    app_write_close(write, '}');
 }
 
-static void write_dots(struct sim_write *write, const struct ih_dots *dots)
+static void write_dots(struct app_write *write, const struct ih_dots *dots)
 {
     const struct ih_dot *dot = dots->dot;
-    sim_write_key(write, "dots");
-    sim_write_open(write, '{');
-    sim_write_int_field(write, "dot_count", dots->dot_count);
-    sim_write_int_field(write, "edge_count", dots->edge_count);
-    sim_write_int_field(write, "hot_count", dots->hot_count);
-    sim_write_int_field(write, "dots_dropped", dots->dots_dropped);
+    app_write_key(write, "dots");
+    app_write_open(write, '{');
+    app_write_int_field(write, "dot_count", dots->dot_count);
+    app_write_int_field(write, "edge_count", dots->edge_count);
+    app_write_int_field(write, "hot_count", dots->hot_count);
+    app_write_int_field(write, "dots_dropped", dots->dots_dropped);
     write_column(write, "u_px_q12", &dot->u_px_q12, dots->dot_count, sizeof *dot);
     write_column(write, "v_px_q12", &dot->v_px_q12, dots->dot_count, sizeof *dot);
     write_column(write, "peak", &dot->peak, dots->dot_count, sizeof *dot);
-    sim_write_close(write, '}');
+    app_write_close(write, '}');
 }
 
-static void write_labels(struct sim_write *write, const struct ih_labels *labels)
+static void write_labels(struct app_write *write, const struct ih_labels *labels)
 {
-    sim_write_key(write, "labels");
-    sim_write_open(write, '{');
-    sim_write_int_field(write, "labelled_count", labels->labelled_count);
-    sim_write_int_field(write, "seed_count", labels->seed_count);
-    sim_write_int_field(write, "candidates_dropped", labels->candidates_dropped);
-    sim_write_key(write, "slot");
-    sim_write_open(write, '[');
+    app_write_key(write, "labels");
+    app_write_open(write, '{');
+    app_write_int_field(write, "labelled_count", labels->labelled_count);
+    app_write_int_field(write, "seed_count", labels->seed_count);
+    app_write_int_field(write, "candidates_dropped", labels->candidates_dropped);
+    app_write_key(write, "slot");
+    app_write_open(write, '[');
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
         if (labels->dot_of_slot[slot] == IH_NONE) {
-            sim_write_null(write);
+            app_write_null(write);
             continue;
         }
-        sim_write_open(write, '{');
-        sim_write_int_field(write, "dot", labels->dot_of_slot[slot]);
-        sim_write_int_field(write, "t_px_q12", labels->t_px_q12[slot]);
-        sim_write_int_field(write, "perp_px_q12", labels->perp_px_q12[slot]);
-        sim_write_close(write, '}');
+        app_write_open(write, '{');
+        app_write_int_field(write, "dot", labels->dot_of_slot[slot]);
+        app_write_int_field(write, "t_px_q12", labels->t_px_q12[slot]);
+        app_write_int_field(write, "perp_px_q12", labels->perp_px_q12[slot]);
+        app_write_close(write, '}');
     }
-    sim_write_close(write, ']');
-    sim_write_close(write, '}');
+    app_write_close(write, ']');
+    app_write_close(write, '}');
 }
 
-static void write_points(struct sim_write *write, const struct ih_points *points)
+static void write_points(struct app_write *write, const struct ih_points *points)
 {
     const struct ih_point *point = points->point;
-    sim_write_key(write, "points");
-    sim_write_open(write, '{');
-    sim_write_int_field(write, "seen_count", points->seen_count);
+    app_write_key(write, "points");
+    app_write_open(write, '{');
+    app_write_int_field(write, "seen_count", points->seen_count);
     write_field(write, &points->field);
     write_column(write, "x_q28", &point->x_q28, IH_SLOTS, sizeof *point);
     write_column(write, "y_q28", &point->y_q28, IH_SLOTS, sizeof *point);
     write_column(write, "depth_mm_q8", &point->depth_mm_q8, IH_SLOTS, sizeof *point);
     write_column(write, "state", &point->state, IH_SLOTS, sizeof *point);
-    sim_write_close(write, '}');
+    app_write_close(write, '}');
 }
 
-static void write_samples(struct sim_write *write, const struct ih_samples *samples,
+static void write_samples(struct app_write *write, const struct ih_samples *samples,
                           const struct ih_surface *surface)
 {
     const struct ih_sample *sample = samples->sample;
     int32_t count = samples->sample_count;
-    sim_write_key(write, "samples");
-    sim_write_open(write, '{');
-    sim_write_int_field(write, "sample_count", count);
-    sim_write_int_field(write, "seen_count", samples->seen_count);
-    sim_write_int_field(write, "filled_count", samples->filled_count);
-    sim_write_int_field(write, "isolated_count", samples->isolated_count);
-    sim_write_int_field(write, "outside_count", samples->outside_count);
-    sim_write_int_field(write, "nearest_mm_q8", samples->nearest_mm_q8);
-    sim_write_int_field(write, "clip_mm_q8", samples->clip_mm_q8);
+    app_write_key(write, "samples");
+    app_write_open(write, '{');
+    app_write_int_field(write, "sample_count", count);
+    app_write_int_field(write, "seen_count", samples->seen_count);
+    app_write_int_field(write, "filled_count", samples->filled_count);
+    app_write_int_field(write, "isolated_count", samples->isolated_count);
+    app_write_int_field(write, "outside_count", samples->outside_count);
+    app_write_int_field(write, "nearest_mm_q8", samples->nearest_mm_q8);
+    app_write_int_field(write, "clip_mm_q8", samples->clip_mm_q8);
     write_column(write, "slot", &sample->slot, count, sizeof *sample);
     write_column(write, "x_q16", &sample->x_q16, count, sizeof *sample);
     write_column(write, "y_q16", &sample->y_q16, count, sizeof *sample);
@@ -108,226 +108,226 @@ static void write_samples(struct sim_write *write, const struct ih_samples *samp
     write_column(write, "root_weight_q15", &sample->root_weight_q15, count, sizeof *sample);
     write_column(write, "final_root_weight_q15", surface->root_weight_q15,
                  surface->valid ? count : 0, sizeof surface->root_weight_q15[0]);
-    sim_write_close(write, '}');
+    app_write_close(write, '}');
 }
 
-static void write_surface(struct sim_write *write, const struct ih_surface *surface)
+static void write_surface(struct app_write *write, const struct ih_surface *surface)
 {
-    sim_write_key(write, "surface");
-    sim_write_open(write, '{');
-    sim_write_key(write, "valid");
-    sim_write_bool(write, surface->valid);
+    app_write_key(write, "surface");
+    app_write_open(write, '{');
+    app_write_key(write, "valid");
+    app_write_bool(write, surface->valid);
     if (surface->valid) {
-        sim_write_int_field(write, "downweighted_count", surface->downweighted_count);
-        sim_write_int_field(write, "mean_mm_q8", surface->mean_mm_q8);
-        sim_write_int_field(write, "nearest_mm_q8", surface->nearest_mm_q8);
+        app_write_int_field(write, "downweighted_count", surface->downweighted_count);
+        app_write_int_field(write, "mean_mm_q8", surface->mean_mm_q8);
+        app_write_int_field(write, "nearest_mm_q8", surface->nearest_mm_q8);
         write_field(write, &surface->field);
-        sim_write_key(write, "depth_mm_q8");
-        sim_write_open(write, '[');
+        app_write_key(write, "depth_mm_q8");
+        app_write_open(write, '[');
         for (int32_t y = 0; y < IH_SURFACE_GRID; y++) {
-            sim_write_open(write, '[');
+            app_write_open(write, '[');
             for (int32_t x = 0; x < IH_SURFACE_GRID; x++) {
-                sim_write_int(write, surface->depth_mm_q8[y][x]);
+                app_write_int(write, surface->depth_mm_q8[y][x]);
             }
-            sim_write_close(write, ']');
+            app_write_close(write, ']');
         }
-        sim_write_close(write, ']');
+        app_write_close(write, ']');
     }
-    sim_write_close(write, '}');
+    app_write_close(write, '}');
 }
 
-static void write_contour(struct sim_write *write, const struct ih_cuts *cuts,
+static void write_contour(struct app_write *write, const struct ih_cuts *cuts,
                           const struct ih_contour *contour)
 {
-    sim_write_open(write, '{');
-    sim_write_key(write, "closed");
-    sim_write_bool(write, contour->closed);
-    sim_write_key(write, "x_y_q9");
-    sim_write_open(write, '[');
+    app_write_open(write, '{');
+    app_write_key(write, "closed");
+    app_write_bool(write, contour->closed);
+    app_write_key(write, "x_y_q9");
+    app_write_open(write, '[');
     for (int32_t i = 0; i < contour->vertex_count; i++) {
         const struct ih_vertex *vertex = &cuts->vertex[contour->first + i];
-        sim_write_open(write, '[');
-        sim_write_int(write, vertex->x_q9);
-        sim_write_int(write, vertex->y_q9);
-        sim_write_close(write, ']');
+        app_write_open(write, '[');
+        app_write_int(write, vertex->x_q9);
+        app_write_int(write, vertex->y_q9);
+        app_write_close(write, ']');
     }
-    sim_write_close(write, ']');
-    sim_write_close(write, '}');
+    app_write_close(write, ']');
+    app_write_close(write, '}');
 }
 
 /* The cuts are not kept by the core: every level is cut once more. */
-static void write_cuts(struct sim_write *write, struct isohead *head)
+static void write_cuts(struct app_write *write, struct isohead *head)
 {
     struct ih_cuts *cuts = &head->scratch.hypotheses.cuts;
     int32_t level_mm_q8 = 0;
-    sim_write_key(write, "cuts");
-    sim_write_open(write, '[');
+    app_write_key(write, "cuts");
+    app_write_open(write, '[');
     for (int32_t index = 0;
          head->surface.valid &&
          ih_hypotheses_level(&head->surface, &head->params.hypotheses, index, &level_mm_q8);
          index++) {
         ih_cuts_level(&head->surface, level_mm_q8, cuts);
-        sim_write_open(write, '{');
-        sim_write_int_field(write, "level_mm_q8", cuts->level_mm_q8);
-        sim_write_int_field(write, "contours_dropped", cuts->contours_dropped);
-        sim_write_key(write, "contour");
-        sim_write_open(write, '[');
+        app_write_open(write, '{');
+        app_write_int_field(write, "level_mm_q8", cuts->level_mm_q8);
+        app_write_int_field(write, "contours_dropped", cuts->contours_dropped);
+        app_write_key(write, "contour");
+        app_write_open(write, '[');
         for (int32_t i = 0; i < cuts->contour_count; i++) {
             write_contour(write, cuts, &cuts->contour[i]);
         }
-        sim_write_close(write, ']');
-        sim_write_close(write, '}');
+        app_write_close(write, ']');
+        app_write_close(write, '}');
     }
-    sim_write_close(write, ']');
+    app_write_close(write, ']');
 }
 
-static void write_slice(struct sim_write *write, const struct ih_slice *slice)
+static void write_slice(struct app_write *write, const struct ih_slice *slice)
 {
     const struct ih_ellipse *ellipse = &slice->ellipse;
-    sim_write_open(write, '{');
-    sim_write_int_field(write, "behind_mm_q8", slice->behind_mm_q8);
-    sim_write_int_field(write, "area_mm2", slice->area_mm2);
-    sim_write_key(write, "whole");
-    sim_write_bool(write, slice->whole);
-    sim_write_int_field(write, "area_q16", ellipse->area_q16);
-    sim_write_int_field(write, "x_q16", ellipse->x_q16);
-    sim_write_int_field(write, "y_q16", ellipse->y_q16);
-    sim_write_int_field(write, "xx_q16", ellipse->xx_q16);
-    sim_write_int_field(write, "xy_q16", ellipse->xy_q16);
-    sim_write_int_field(write, "yy_q16", ellipse->yy_q16);
-    sim_write_int_field(write, "shape_q16", ellipse->shape_q16);
-    sim_write_int_field(write, "ratio_q16", ellipse->ratio_q16);
-    sim_write_close(write, '}');
+    app_write_open(write, '{');
+    app_write_int_field(write, "behind_mm_q8", slice->behind_mm_q8);
+    app_write_int_field(write, "area_mm2", slice->area_mm2);
+    app_write_key(write, "whole");
+    app_write_bool(write, slice->whole);
+    app_write_int_field(write, "area_q16", ellipse->area_q16);
+    app_write_int_field(write, "x_q16", ellipse->x_q16);
+    app_write_int_field(write, "y_q16", ellipse->y_q16);
+    app_write_int_field(write, "xx_q16", ellipse->xx_q16);
+    app_write_int_field(write, "xy_q16", ellipse->xy_q16);
+    app_write_int_field(write, "yy_q16", ellipse->yy_q16);
+    app_write_int_field(write, "shape_q16", ellipse->shape_q16);
+    app_write_int_field(write, "ratio_q16", ellipse->ratio_q16);
+    app_write_close(write, '}');
 }
 
-static void write_nest(struct sim_write *write, const struct ih_nest *nest)
+static void write_nest(struct app_write *write, const struct ih_nest *nest)
 {
-    sim_write_open(write, '{');
-    sim_write_int_field(write, "minimum_x_q9", nest->minimum.x_q9);
-    sim_write_int_field(write, "minimum_y_q9", nest->minimum.y_q9);
-    sim_write_int_field(write, "nearest_mm_q8", nest->nearest_mm_q8);
-    sim_write_int_field(write, "front_mm_q8", nest->front_mm_q8);
-    sim_write_key(write, "slice");
-    sim_write_open(write, '[');
+    app_write_open(write, '{');
+    app_write_int_field(write, "minimum_x_q9", nest->minimum.x_q9);
+    app_write_int_field(write, "minimum_y_q9", nest->minimum.y_q9);
+    app_write_int_field(write, "nearest_mm_q8", nest->nearest_mm_q8);
+    app_write_int_field(write, "front_mm_q8", nest->front_mm_q8);
+    app_write_key(write, "slice");
+    app_write_open(write, '[');
     for (int32_t i = 0; i < nest->slice_count; i++) {
         write_slice(write, &nest->slice[i]);
     }
-    sim_write_close(write, ']');
-    sim_write_close(write, '}');
+    app_write_close(write, ']');
+    app_write_close(write, '}');
 }
 
-static void write_hypotheses(struct sim_write *write, const struct ih_hypotheses *hypotheses)
+static void write_hypotheses(struct app_write *write, const struct ih_hypotheses *hypotheses)
 {
-    sim_write_key(write, "hypotheses");
-    sim_write_open(write, '{');
-    sim_write_int_field(write, "minima_dropped", hypotheses->minima_dropped);
-    sim_write_int_field(write, "contours_dropped", hypotheses->contours_dropped);
-    sim_write_key(write, "nest");
-    sim_write_open(write, '[');
+    app_write_key(write, "hypotheses");
+    app_write_open(write, '{');
+    app_write_int_field(write, "minima_dropped", hypotheses->minima_dropped);
+    app_write_int_field(write, "contours_dropped", hypotheses->contours_dropped);
+    app_write_key(write, "nest");
+    app_write_open(write, '[');
     for (int32_t i = 0; i < hypotheses->nest_count; i++) {
         write_nest(write, &hypotheses->nest[i]);
     }
-    sim_write_close(write, ']');
-    sim_write_close(write, '}');
+    app_write_close(write, ']');
+    app_write_close(write, '}');
 }
 
-static void write_outline(struct sim_write *write, const struct ih_outline *outline)
+static void write_outline(struct app_write *write, const struct ih_outline *outline)
 {
-    sim_write_key(write, "outline");
-    sim_write_open(write, '{');
-    sim_write_int_field(write, "inside", outline->inside);
-    sim_write_int_field(write, "above", outline->above);
-    sim_write_int_field(write, "above_behind", outline->above_behind);
-    sim_write_int_field(write, "beside", outline->beside);
-    sim_write_int_field(write, "beside_behind", outline->beside_behind);
-    sim_write_int_field(write, "below", outline->below);
-    sim_write_int_field(write, "below_near", outline->below_near);
-    sim_write_close(write, '}');
+    app_write_key(write, "outline");
+    app_write_open(write, '{');
+    app_write_int_field(write, "inside", outline->inside);
+    app_write_int_field(write, "above", outline->above);
+    app_write_int_field(write, "above_behind", outline->above_behind);
+    app_write_int_field(write, "beside", outline->beside);
+    app_write_int_field(write, "beside_behind", outline->beside_behind);
+    app_write_int_field(write, "below", outline->below);
+    app_write_int_field(write, "below_near", outline->below_near);
+    app_write_close(write, '}');
 }
 
-static void write_candidate(struct sim_write *write, const struct ih_hypothesis *hypothesis)
+static void write_candidate(struct app_write *write, const struct ih_hypothesis *hypothesis)
 {
-    sim_write_open(write, '{');
-    sim_write_int_field(write, "nest", hypothesis->nest);
-    sim_write_int_field(write, "u_px_q12", hypothesis->u_px_q12);
-    sim_write_int_field(write, "v_px_q12", hypothesis->v_px_q12);
-    sim_write_int_field(write, "a_px_q12", hypothesis->a_px_q12);
-    sim_write_int_field(write, "b_px_q12", hypothesis->b_px_q12);
-    sim_write_int_field(write, "angle_mdeg", hypothesis->angle_mdeg);
-    sim_write_int_field(write, "distance_mm_q8", hypothesis->distance_mm_q8);
+    app_write_open(write, '{');
+    app_write_int_field(write, "nest", hypothesis->nest);
+    app_write_int_field(write, "u_px_q12", hypothesis->u_px_q12);
+    app_write_int_field(write, "v_px_q12", hypothesis->v_px_q12);
+    app_write_int_field(write, "a_px_q12", hypothesis->a_px_q12);
+    app_write_int_field(write, "b_px_q12", hypothesis->b_px_q12);
+    app_write_int_field(write, "angle_mdeg", hypothesis->angle_mdeg);
+    app_write_int_field(write, "distance_mm_q8", hypothesis->distance_mm_q8);
     write_column(write, "centre_mm_q8", hypothesis->centre_mm_q8, 3,
                  sizeof hypothesis->centre_mm_q8[0]);
-    sim_write_int_field(write, "area_mm2", hypothesis->area_mm2);
-    sim_write_int_field(write, "curvature_mm_q8", hypothesis->curvature_mm_q8);
-    sim_write_int_field(write, "extent_mm_q8", hypothesis->extent_mm_q8);
-    sim_write_int_field(write, "upright_q16", hypothesis->upright_q16);
+    app_write_int_field(write, "area_mm2", hypothesis->area_mm2);
+    app_write_int_field(write, "curvature_mm_q8", hypothesis->curvature_mm_q8);
+    app_write_int_field(write, "extent_mm_q8", hypothesis->extent_mm_q8);
+    app_write_int_field(write, "upright_q16", hypothesis->upright_q16);
     write_outline(write, &hypothesis->outline);
-    sim_write_key(write, "rejected");
-    sim_write_string_or_null(write, ih_reject_text(hypothesis->rejected));
-    sim_write_close(write, '}');
+    app_write_key(write, "rejected");
+    app_write_string_or_null(write, ih_reject_text(hypothesis->rejected));
+    app_write_close(write, '}');
 }
 
-static void write_heads(struct sim_write *write, const struct ih_heads *heads)
+static void write_heads(struct app_write *write, const struct ih_heads *heads)
 {
-    sim_write_key(write, "heads");
-    sim_write_open(write, '{');
-    sim_write_key(write, "hypothesis");
-    sim_write_open(write, '[');
+    app_write_key(write, "heads");
+    app_write_open(write, '{');
+    app_write_key(write, "hypothesis");
+    app_write_open(write, '[');
     for (int32_t i = 0; i < heads->hypothesis_count; i++) {
         write_candidate(write, &heads->hypothesis[i]);
     }
-    sim_write_close(write, ']');
+    app_write_close(write, ']');
     write_column(write, "head", heads->head, heads->head_count, sizeof heads->head[0]);
-    sim_write_close(write, '}');
+    app_write_close(write, '}');
 }
 
-static void write_finding(struct sim_write *write, const struct ih_finding *finding)
+static void write_finding(struct app_write *write, const struct ih_finding *finding)
 {
     struct ih_score score;
     ih_score_rate(&finding->evidence, &score);
-    sim_write_open(write, '{');
+    app_write_open(write, '{');
     write_column(write, "centre_mm_q8", finding->head.centre_mm_q8, 3, sizeof(int32_t));
     write_column(write, "semi_mm_q8", finding->head.semi_mm_q8, 3, sizeof(int32_t));
-    sim_write_int_field(write, "source", finding->source);
-    sim_write_int_field(write, "track", finding->track_id);
-    sim_write_key(write, "predicted");
-    sim_write_bool(write, finding->is_predicted);
-    sim_write_key(write, "head");
-    sim_write_bool(write, finding->is_head);
-    sim_write_int_field(write, "logit_q10", finding->logit_q10);
-    sim_write_int_field(write, "probability_q16", finding->probability_q16);
+    app_write_int_field(write, "source", finding->source);
+    app_write_int_field(write, "track", finding->track_id);
+    app_write_key(write, "predicted");
+    app_write_bool(write, finding->is_predicted);
+    app_write_key(write, "head");
+    app_write_bool(write, finding->is_head);
+    app_write_int_field(write, "logit_q10", finding->logit_q10);
+    app_write_int_field(write, "probability_q16", finding->probability_q16);
     write_column(write, "evidence_q8", finding->evidence.value_q8, IH_EVIDENCE_COUNT,
                  sizeof(int32_t));
     write_column(write, "part_q10", score.part_q10, IH_EVIDENCE_COUNT, sizeof(int32_t));
-    sim_write_int_field(write, "through_count", finding->evidence.through_count);
-    sim_write_int_field(write, "hit_count", finding->evidence.hit_count);
-    sim_write_int_field(write, "front_count", finding->evidence.front_count);
-    sim_write_close(write, '}');
+    app_write_int_field(write, "through_count", finding->evidence.through_count);
+    app_write_int_field(write, "hit_count", finding->evidence.hit_count);
+    app_write_int_field(write, "front_count", finding->evidence.front_count);
+    app_write_close(write, '}');
 }
 
-static void write_findings(struct sim_write *write, const struct ih_findings *findings)
+static void write_findings(struct app_write *write, const struct ih_findings *findings)
 {
-    sim_write_key(write, "evidence");
-    sim_write_open(write, '[');
+    app_write_key(write, "evidence");
+    app_write_open(write, '[');
     for (int kind = 0; kind < IH_EVIDENCE_COUNT; kind++) {
-        sim_write_string(write, ih_evidence_text((enum ih_evidence_kind)kind));
+        app_write_string(write, ih_evidence_text((enum ih_evidence_kind)kind));
     }
-    sim_write_close(write, ']');
-    sim_write_key(write, "findings");
-    sim_write_open(write, '[');
+    app_write_close(write, ']');
+    app_write_key(write, "findings");
+    app_write_open(write, '[');
     for (int32_t i = 0; i < findings->finding_count; i++) {
         write_finding(write, &findings->finding[i]);
     }
-    sim_write_close(write, ']');
+    app_write_close(write, ']');
 }
 
 static void write_frame(FILE *file, const struct hal_frame *frame, struct isohead *head)
 {
-    struct sim_write write = {.file = file};
-    sim_write_open(&write, '{');
-    sim_write_key(&write, "file");
-    sim_write_string(&write, frame->name);
-    sim_write_int_field(&write, "time_us", frame->time_us);
+    struct app_write write = {.file = file};
+    app_write_open(&write, '{');
+    app_write_key(&write, "file");
+    app_write_string(&write, frame->name);
+    app_write_int_field(&write, "time_us", frame->time_us);
     write_dots(&write, &head->dots);
     write_labels(&write, &head->labels);
     write_points(&write, &head->points);
@@ -337,7 +337,7 @@ static void write_frame(FILE *file, const struct hal_frame *frame, struct isohea
     write_hypotheses(&write, &head->hypotheses);
     write_heads(&write, &head->heads);
     write_findings(&write, &head->findings);
-    sim_write_close(&write, '}');
+    app_write_close(&write, '}');
     fputc('\n', file);
 }
 

@@ -6,7 +6,7 @@
 #include <string.h>
 
 #include "ih_config.h"
-#include "replay/hal_file.h"
+#include "hal_file.h"
 #include "replay/hal_lines.h"
 
 #define TRUTH_NAME "truth.jsonl"

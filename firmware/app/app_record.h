@@ -1,4 +1,4 @@
-/* sim_record - a frame's result as one line of JSON (docs/contract.md, "A record").
+/* app_record - a frame's result as one line of JSON (docs/contract.md, "A record").
  *
  * Printed from integers: pixels with 2 decimals, mm and degrees with 1, so that the same frames
  * give the same bytes on every machine. Beyond the contract's fields:
@@ -6,23 +6,23 @@
  *   "points"   measured points; range images only, which have no dots and labels
  *   "dropped"  what did not fit into a full table, by kind; only where something was dropped
  */
-#ifndef SIM_RECORD_H
-#define SIM_RECORD_H
+#ifndef APP_RECORD_H
+#define APP_RECORD_H
 
 #include <stdio.h>
 
 #include "hal.h"
 #include "isohead.h"
 
-struct sim_record {
+struct app_record {
     FILE *file;
     const char *dir; /* NULL: the run has one directory only */
 };
 
-void sim_record_frame(const struct sim_record *record, const struct hal_frame *frame,
+void app_record_frame(const struct app_record *record, const struct hal_frame *frame,
                       const struct isohead *head);
 
 /* A frame that could not be processed. */
-void sim_record_error(const struct sim_record *record, const char *name, const char *error);
+void app_record_error(const struct app_record *record, const char *name, const char *error);
 
 #endif

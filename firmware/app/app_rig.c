@@ -1,4 +1,4 @@
-#include "sim_rig.h"
+#include "app_rig.h"
 
 #include <cjson/cJSON.h>
 #include <math.h>
@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "replay/hal_file.h"
+#include "hal_file.h"
 
 #define RAY_AXES 3
 
@@ -292,11 +292,11 @@ static void locate(const char *text, const char *stop, struct hal_error *error)
     }
 }
 
-bool sim_rig_load(const char *path, struct ih_calibration *calibration, struct hal_error *error)
+bool app_rig_load(const char *path, struct ih_calibration *calibration, struct hal_error *error)
 {
     uint8_t *data = NULL;
     size_t size = 0;
-    if (!hal_file_read(path, SIM_RIG_FILE_MAX, &data, &size, error)) {
+    if (!hal_file_read(path, APP_RIG_FILE_MAX, &data, &size, error)) {
         return false;
     }
     const char *text = (const char *)data;

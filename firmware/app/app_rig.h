@@ -1,22 +1,22 @@
-/* sim_rig - rig.json to the core's calibration.
+/* app_rig - rig.json to the core's calibration.
  *
  * In:    JSON as OpenCV's FileStorage writes it (docs/contract.md). Unknown fields are ignored.
  * Out:   the numbers rounded to the formats of struct ih_calibration, nothing else: near_mm is
  *        rounded down and far_mm up, so that the range never shrinks.
  * Error: one line that names field, value and expectation. What can be seen in one number (missing,
  *        wrong type or shape, not finite, beyond its format) is found here; what makes a rig is
- *        judged by the core (ih_rig_init), and sim_rig_explain words its verdict.
+ *        judged by the core (ih_rig_init), and app_rig_explain words its verdict.
  */
-#ifndef SIM_RIG_H
-#define SIM_RIG_H
+#ifndef APP_RIG_H
+#define APP_RIG_H
 
 #include "hal.h"
 #include "ih_rig.h"
 
 /* Largest rig.json; 361 rays in full precision need 30 kB. */
-#define SIM_RIG_FILE_MAX ((size_t)4 << 20)
+#define APP_RIG_FILE_MAX ((size_t)4 << 20)
 
 /* False: *error says why. */
-bool sim_rig_load(const char *path, struct ih_calibration *calibration, struct hal_error *error);
+bool app_rig_load(const char *path, struct ih_calibration *calibration, struct hal_error *error);
 
 #endif

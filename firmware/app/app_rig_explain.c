@@ -1,5 +1,6 @@
-#include "sim_rig_explain.h"
+#include "app_rig_explain.h"
 
+#include <inttypes.h>
 #include <math.h>
 
 #define RAY_AXES 3
@@ -43,7 +44,7 @@ static void explain_size(const struct ih_calibration *calibration, struct hal_er
                    range ? IH_FRAME_WIDTH_MAX : IH_FRAME_HEIGHT_MAX);
 }
 
-void sim_rig_explain(const struct ih_calibration *calibration, enum ih_err err, int32_t bad_slot,
+void app_rig_explain(const struct ih_calibration *calibration, enum ih_err err, int32_t bad_slot,
                      struct hal_error *error)
 {
     const struct ih_calibration *c = calibration;
@@ -86,5 +87,21 @@ void sim_rig_explain(const struct ih_calibration *calibration, enum ih_err err, 
     default:
         (void)hal_fail(error, "%s", ih_err_text(err));
         break;
+    }
+}
+
+void app_rig_explain_frame(const struct ih_calibration *calibration, const struct hal_frame *frame,
+                           enum ih_err err, struct hal_error *error)
+{
+    if (frame->width != calibration->width || frame->height != calibration->height) {
+        hal_fail(error,
+                 "%" PRId32 "x%" PRId32 " px, expected %" PRId32 "x%" PRId32 " as in the rig",
+                 frame->width, frame->height, calibration->width, calibration->height);
+    } else if (err == IH_ERR_KIND && calibration->kind == IH_RIG_RANGE) {
+        hal_fail(error,
+                 "maxval %" PRId32 ", expected above 255: a range image has two bytes per pixel",
+                 frame->maximum);
+    } else {
+        hal_fail(error, "%s", ih_err_text(err));
     }
 }

@@ -1,12 +1,16 @@
-/* sim_rig_explain - why the core refuses a calibration, in terms of rig.json. */
-#ifndef SIM_RIG_EXPLAIN_H
-#define SIM_RIG_EXPLAIN_H
+/* app_rig_explain - why the core refuses a calibration, in terms of rig.json, or a frame. */
+#ifndef APP_RIG_EXPLAIN_H
+#define APP_RIG_EXPLAIN_H
 
 #include "hal.h"
 #include "ih_rig.h"
 
 /* err and bad_slot as from ih_rig_init. *error names field, value and expectation. */
-void sim_rig_explain(const struct ih_calibration *calibration, enum ih_err err, int32_t bad_slot,
+void app_rig_explain(const struct ih_calibration *calibration, enum ih_err err, int32_t bad_slot,
                      struct hal_error *error);
+
+/* err as from isohead_frame. */
+void app_rig_explain_frame(const struct ih_calibration *calibration, const struct hal_frame *frame,
+                           enum ih_err err, struct hal_error *error);
 
 #endif

@@ -1,12 +1,12 @@
-#include "sim_text.h"
+#include "app_text.h"
 
 #include <inttypes.h>
 #include <stdio.h>
 
 /* A whole number of 10^-decimals as text. */
-static struct sim_decimal print_scaled(int64_t scaled, int decimals)
+static struct app_decimal print_scaled(int64_t scaled, int decimals)
 {
-    struct sim_decimal decimal;
+    struct app_decimal decimal;
     int64_t unit = 1;
     for (int i = 0; i < decimals; i++) {
         unit *= 10;
@@ -22,7 +22,7 @@ static struct sim_decimal print_scaled(int64_t scaled, int decimals)
     return decimal;
 }
 
-struct sim_decimal sim_text_fixed(int64_t value, int fraction_bits, int decimals)
+struct app_decimal app_text_fixed(int64_t value, int fraction_bits, int decimals)
 {
     int64_t magnitude = value < 0 ? -value : value;
     for (int i = 0; i < decimals; i++) {
@@ -33,13 +33,13 @@ struct sim_decimal sim_text_fixed(int64_t value, int fraction_bits, int decimals
     return print_scaled(value < 0 ? -scaled : scaled, decimals);
 }
 
-struct sim_decimal sim_text_angle(int32_t angle_mdeg)
+struct app_decimal app_text_angle(int32_t angle_mdeg)
 {
     int64_t tenths = (angle_mdeg + 50) / 100;
     return print_scaled(tenths % 1800, 1);
 }
 
-void sim_text_tame(char *text)
+void app_text_tame(char *text)
 {
     for (; *text != 0; text++) {
         unsigned char byte = (unsigned char)*text;

@@ -1,31 +1,31 @@
-/* sim_text - numbers and names as text, without floating point.
+/* app_text - numbers and names as text, without floating point.
  *
  * A fixed-point value becomes a decimal by integer arithmetic, rounded to nearest, halves away
  * from zero, so that the same bytes come out on every machine. A value that rounds to zero has no
  * minus sign.
  */
-#ifndef SIM_TEXT_H
-#define SIM_TEXT_H
+#ifndef APP_TEXT_H
+#define APP_TEXT_H
 
 #include <stddef.h>
 #include <stdint.h>
 
 /* Room for any decimal written here. */
-#define SIM_TEXT_DECIMAL 32
+#define APP_TEXT_DECIMAL 32
 /* Most decimals. */
-#define SIM_TEXT_DECIMALS_MAX 6
+#define APP_TEXT_DECIMALS_MAX 6
 
-struct sim_decimal {
-    char text[SIM_TEXT_DECIMAL];
+struct app_decimal {
+    char text[APP_TEXT_DECIMAL];
 };
 
 /* value / 2^fraction_bits; |value| < 2^42, fraction_bits 0..40, decimals 0..6. */
-struct sim_decimal sim_text_fixed(int64_t value, int fraction_bits, int decimals);
+struct app_decimal app_text_fixed(int64_t value, int fraction_bits, int decimals);
 
 /* Angle of a line: thousandths of a degree, 0 .. 179999, to one decimal, below 180.0. */
-struct sim_decimal sim_text_angle(int32_t angle_mdeg);
+struct app_decimal app_text_angle(int32_t angle_mdeg);
 
 /* Control characters become '?', in place: names from a disk must not steer a terminal. */
-void sim_text_tame(char *text);
+void app_text_tame(char *text);
 
 #endif

@@ -1,8 +1,8 @@
-#include "sim_write.h"
+#include "app_write.h"
 
 #include <inttypes.h>
 
-static void separate(struct sim_write *write)
+static void separate(struct app_write *write)
 {
     if (write->comma) {
         fputc(',', write->file);
@@ -10,45 +10,45 @@ static void separate(struct sim_write *write)
     write->comma = true;
 }
 
-void sim_write_open(struct sim_write *write, char bracket)
+void app_write_open(struct app_write *write, char bracket)
 {
     separate(write);
     fputc(bracket, write->file);
     write->comma = false;
 }
 
-void sim_write_close(struct sim_write *write, char bracket)
+void app_write_close(struct app_write *write, char bracket)
 {
     fputc(bracket, write->file);
     write->comma = true;
 }
 
-void sim_write_key(struct sim_write *write, const char *key)
+void app_write_key(struct app_write *write, const char *key)
 {
     separate(write);
     fprintf(write->file, "\"%s\":", key);
     write->comma = false;
 }
 
-void sim_write_int(struct sim_write *write, int64_t value)
+void app_write_int(struct app_write *write, int64_t value)
 {
     separate(write);
     fprintf(write->file, "%" PRId64, value);
 }
 
-void sim_write_decimal(struct sim_write *write, struct sim_decimal decimal)
+void app_write_decimal(struct app_write *write, struct app_decimal decimal)
 {
     separate(write);
     fputs(decimal.text, write->file);
 }
 
-void sim_write_bool(struct sim_write *write, bool value)
+void app_write_bool(struct app_write *write, bool value)
 {
     separate(write);
     fputs(value ? "true" : "false", write->file);
 }
 
-void sim_write_null(struct sim_write *write)
+void app_write_null(struct app_write *write)
 {
     separate(write);
     fputs("null", write->file);
@@ -89,7 +89,7 @@ static int utf8_length(const unsigned char *text)
     return length;
 }
 
-void sim_write_string(struct sim_write *write, const char *text)
+void app_write_string(struct app_write *write, const char *text)
 {
     separate(write);
     fputc('"', write->file);
@@ -111,17 +111,17 @@ void sim_write_string(struct sim_write *write, const char *text)
     fputc('"', write->file);
 }
 
-void sim_write_string_or_null(struct sim_write *write, const char *text)
+void app_write_string_or_null(struct app_write *write, const char *text)
 {
     if (text == NULL) {
-        sim_write_null(write);
+        app_write_null(write);
     } else {
-        sim_write_string(write, text);
+        app_write_string(write, text);
     }
 }
 
-void sim_write_int_field(struct sim_write *write, const char *key, int64_t value)
+void app_write_int_field(struct app_write *write, const char *key, int64_t value)
 {
-    sim_write_key(write, key);
-    sim_write_int(write, value);
+    app_write_key(write, key);
+    app_write_int(write, value);
 }

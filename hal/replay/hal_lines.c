@@ -5,7 +5,7 @@
 #include <string.h>
 #include <sys/types.h>
 
-#include "replay/hal_file.h"
+#include "hal_file.h"
 
 bool hal_lines_open(struct hal_lines *lines, const char *path, struct hal_error *error)
 {

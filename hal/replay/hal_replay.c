@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "replay/hal_file.h"
+#include "hal_file.h"
 #include "replay/hal_lines.h"
 #include "replay/hal_pgm.h"
 #include "replay/hal_xyz.h"
@@ -266,16 +266,19 @@ static void read_list(struct hal_replay *replay, const struct hal_log *log)
     free(path);
 }
 
-static bool load_image(struct hal_replay *replay, const char *path, struct hal_frame *frame,
-                       struct hal_error *error)
+static bool load_image(const char *path, struct hal_frame *frame, struct hal_error *error)
 {
     size_t size = 0;
     struct hal_pgm pgm = {0};
-    if (!hal_file_read(path, HAL_PGM_FILE_MAX, &replay->samples, &size, error) ||
-        !hal_pgm_decode(replay->samples, size, &pgm, error)) {
+    uint8_t *bytes = NULL;
+    if (!hal_file_read(path, HAL_PGM_FILE_MAX, &bytes, &size, error)) {
         return false;
     }
-    frame->samples = replay->samples;
+    if (!hal_pgm_decode(bytes, size, &pgm, error)) {
+        free(bytes);
+        return false;
+    }
+    frame->samples = bytes;
     frame->width = pgm.width;
     frame->height = pgm.height;
     frame->stride_bytes = pgm.width * pgm.bytes_per_sample;
@@ -284,8 +287,7 @@ static bool load_image(struct hal_replay *replay, const char *path, struct hal_f
     return true;
 }
 
-static bool load_points(struct hal_replay *replay, const char *path, struct hal_frame *frame,
-                        struct hal_error *error)
+static bool load_points(const char *path, struct hal_frame *frame, struct hal_error *error)
 {
     uint8_t *text = NULL;
     size_t size = 0;
@@ -295,7 +297,6 @@ static bool load_points(struct hal_replay *replay, const char *path, struct hal_
     }
     bool good = hal_xyz_decode((const char *)text, size, &xyz, error);
     free(text);
-    replay->point_mm_q8 = xyz.point_mm_q8;
     frame->point_mm_q8 = (const int32_t(*)[3])xyz.point_mm_q8;
     frame->point_count = xyz.point_count;
     return good;
@@ -309,8 +310,8 @@ static bool load_frame(struct hal_replay *replay, const char *name, struct hal_f
     if (path == NULL) {
         return hal_fail(error, "no memory for this file");
     }
-    bool good = has_suffix(name, POINTS_SUFFIX) ? load_points(replay, path, frame, error)
-                                                : load_image(replay, path, frame, error);
+    bool good = has_suffix(name, POINTS_SUFFIX) ? load_points(path, frame, error)
+                                                : load_image(path, frame, error);
     free(path);
     return good;
 }
@@ -318,16 +319,15 @@ static bool load_frame(struct hal_replay *replay, const char *name, struct hal_f
 static enum hal_next next_frame(void *context, struct hal_frame *frame, struct hal_error *error)
 {
     struct hal_replay *replay = context;
-    free(replay->samples);
-    free(replay->point_mm_q8);
-    replay->samples = NULL;
-    replay->point_mm_q8 = NULL;
     if (replay->next_index == replay->entry_count) {
         return HAL_NEXT_END;
     }
-    const struct hal_replay_entry *entry = &replay->entry[replay->next_index++];
-    *frame =
-        (struct hal_frame){.name = entry->name, .time_us = entry->time_us, .laser = entry->laser};
+    const struct hal_replay_entry *entry = &replay->entry[replay->next_index];
+    *frame = (struct hal_frame){.name = entry->name,
+                                .time_us = entry->time_us,
+                                .sequence = (int64_t)replay->next_index,
+                                .laser = entry->laser};
+    replay->next_index++;
     if (entry->bad) {
         hal_fail(error, "%s", entry->error == NULL ? "no memory" : entry->error);
         return HAL_NEXT_BAD;
@@ -339,11 +339,20 @@ static enum hal_next next_frame(void *context, struct hal_frame *frame, struct h
     return load_frame(replay, entry->name, frame, error) ? HAL_NEXT_FRAME : HAL_NEXT_BAD;
 }
 
+static void release_frame(void *context, const struct hal_frame *frame)
+{
+    (void)context;
+    free((void *)frame->samples);
+    free((void *)frame->point_mm_q8);
+}
+
 bool hal_replay_open(struct hal_replay *replay, const char *dir, bool with_lists,
                      const struct hal_log *log, struct hal_error *error)
 {
-    *replay = (struct hal_replay){.camera = {.context = replay, .next = next_frame},
-                                  .with_lists = with_lists};
+    *replay = (struct hal_replay){
+        .camera = {.context = replay, .next = next_frame, .release = release_frame},
+        .with_lists = with_lists,
+    };
     replay->dir = copy_text(dir);
     if (replay->dir == NULL) {
         return hal_fail(error, "no memory");
@@ -368,8 +377,6 @@ void hal_replay_close(struct hal_replay *replay)
         free(replay->entry[i].error);
     }
     free(replay->entry);
-    free(replay->samples);
-    free(replay->point_mm_q8);
     free(replay->dir);
     *replay = (struct hal_replay){.next_index = 0};
 }

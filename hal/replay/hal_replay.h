@@ -35,15 +35,13 @@ struct hal_replay_entry {
 };
 
 struct hal_replay {
-    struct hal_camera camera; /* the way to the frames */
+    struct hal_camera camera; /* the way to the frames: next and release, nothing else */
     char *dir;
     struct hal_replay_entry *entry; /* sorted by name */
     size_t entry_count, entry_capacity;
     size_t next_index;
-    bool with_lists;           /* *.xyz are frames too */
-    bool listed;               /* there is a frames.jsonl */
-    uint8_t *samples;          /* of the frame handed on last, */
-    int32_t (*point_mm_q8)[3]; /* or its points */
+    bool with_lists; /* *.xyz are frames too */
+    bool listed;     /* there is a frames.jsonl */
 };
 
 /* log is used during this call only. False: *error says why, and there is nothing to close. */

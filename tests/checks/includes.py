@@ -5,8 +5,9 @@
            headers that all share, its source only its own header and the arithmetic. isohead.c sees
            the stages through isohead.h alone. Of the system: fixed-width integers, bool, size_t and
            string.h, nothing that does I/O, allocates or knows floating point.
-  hal      hal.h, its own files and the system; never firmware.
-  sim      core, hal, its own files.
+  hal      hal.h, what all back ends share, its own files and the system; never firmware.
+  app      core, hal.h, its own files; of the back ends only app_board.c knows one, hal/linux.
+  sim      core, the app's records and rig, hal, its own files.
   render   its own files and the system: what draws the frames shares no line with what reads them.
   tests    anything.
 
@@ -90,27 +91,37 @@ def judge_hal(path, quoted, target):
     if is_core(target):
         return "hal knows no firmware"
     own = os.path.basename(os.path.dirname(path))
-    if quoted and not re.fullmatch(r"hal\.h|(%s/)?hal_\w+\.h" % own, target):
-        return "a back end includes hal.h and its own files"
+    if quoted and not re.fullmatch(r"hal\.h|hal_file\.h|(%s/)hal_\w+\.h" % own, target):
+        return "a back end includes hal.h, hal_file.h and its own files by their folder"
     return None
+
+
+def judge_app(path, quoted, target):
+    if not quoted or is_core(target):
+        return None
+    good = re.fullmatch(r"app_\w+\.h|hal\.h|hal_file\.h", target)
+    if os.path.basename(path) == "app_board.c":
+        good = good or re.fullmatch(r"linux/hal_\w+\.h", target)
+    return None if good else "the app includes the core, hal.h and its own files"
 
 
 def judge_sim(path, quoted, target):
     if not quoted or is_core(target):
         return None
-    good = re.fullmatch(r"sim_\w+\.h|hal\.h|(replay/)?hal_\w+\.h", target)
-    return None if good else "sim includes the core, hal and its own files"
+    good = re.fullmatch(r"sim_\w+\.h|hal\.h|hal_file\.h|replay/hal_\w+\.h|"
+                        r"app_(rig|rig_explain|record|text|write)\.h", target)
+    return None if good else "sim includes the core, hal, the app's records and its own files"
 
 
 def judge_render(path, quoted, target):
-    if is_core(target) or re.match(r"(sim|hal)\b|(sim|hal)_", target):
+    if is_core(target) or re.match(r"(sim|hal|app)\b|(sim|hal|app)_", target):
         return "render shares nothing with the programs that read its frames"
     if quoted and not re.fullmatch(r"rd_\w+\.h", target):
         return "render includes its own files"
     return None
 
 
-FOLDERS = {"firmware/core": judge_core, "hal": judge_hal, "sim": judge_sim,
+FOLDERS = {"firmware/core": judge_core, "firmware/app": judge_app, "hal": judge_hal, "sim": judge_sim,
            "tools/render": judge_render}
 
 
@@ -162,18 +173,24 @@ def self_test():
                ("firmware/core/isohead.c", '#include "ih_tracks.h"'),
                ("firmware/core/ih_new.c", '#include "ih_new.h"'),
                ("hal/replay/hal_pgm.c", '#include "ih_types.h"'),
-               ("hal/linux/hal_v4l2.c", '#include "replay/hal_file.h"'),
-               ("hal/hal.h", '#include "sim_text.h"'),
+               ("hal/linux/hal_v4l2.c", '#include "replay/hal_pgm.h"'),
+               ("hal/hal.h", '#include "app_text.h"'),
                ("sim/sim_run.c", '#include "rd_rig.h"'),
                ("sim/sim_run.c", '#include "../firmware/core/isohead.h"'),
                ("tools/render/main.c", '#include "isohead.h"'),
                ("tools/render/main.c", "#include <hal.h>"),
-               ("firmware/app/main.c", '#include "isohead.h"')]
+               ("firmware/app/app_loop.c", '#include "linux/hal_gpio.h"'),
+               ("firmware/app/app_loop.c", '#include "sim_run.h"'),
+               ("sim/sim_run.c", '#include "app_laser.h"'),
+               ("firmware/other/main.c", '#include "isohead.h"')]
     good = [("firmware/core/ih_labels.h", '#include "ih_dots.h"'),
             ("firmware/core/ih_labels.c", '#include "ih_fix.h"'),
             ("firmware/core/ih_labels.c", "#include <string.h>"),
             ("hal/replay/hal_pgm.c", "#include <cjson/cJSON.h>"),
             ("sim/sim_run.c", '#include "replay/hal_replay.h"'),
+            ("sim/sim_run.c", '#include "app_record.h"'),
+            ("firmware/app/app_board.c", '#include "linux/hal_gpio.h"'),
+            ("firmware/app/app_loop.c", '#include "isohead.h"'),
             ("tools/render/main.c", '#include "rd_rig.h"')]
     missed = [line for line in refused if judge(*line) is None]
     missed += [line for line in good if judge(*line) is not None]
