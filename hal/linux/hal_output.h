@@ -1,0 +1,62 @@
+/* hal_output - records to standard output, a UDP receiver or a serial device, without ever waiting.
+ *
+ * A record leaves whole or not at all. A stream may take a part of one: the rest is kept here and
+ * goes first at the next call; until it is gone newer records are refused, so that a slow reader
+ * gets whole and recent ones. A UDP datagram is one record.
+ *
+ * Standard output is shared with others, so it is not made non-blocking: it is asked (poll), and
+ * given pieces so small that they fit where it says that there is room. If somebody else fills the
+ * same pipe in between, that piece waits.
+ *
+ * A serial device is raw, 8 bits, no parity, no flow control. When it is gone it is opened again, at
+ * most once a second, and sending starts with an empty line, as the last record may be cut.
+ *
+ * Error: HAL_SENT_NOT has its reason in *error too. HAL_SENT_NEVER only from standard output: its
+ *        reader has gone, it is closed or broken.
+ * SIGPIPE is ignored from hal_output_stdout on, for the whole process.
+ */
+#ifndef HAL_OUTPUT_H
+#define HAL_OUTPUT_H
+
+#include <sys/types.h>
+
+#include "hal.h"
+
+/* Longest record: what fits into a UDP datagram; the same for all. */
+#define HAL_OUTPUT_RECORD_MAX 65507
+/* Longest path of a serial device, its closing zero included. */
+#define HAL_OUTPUT_PATH_MAX 256
+#define HAL_OUTPUT_REOPEN_US 1000000
+
+struct hal_output_state {
+    struct hal_output output; /* the table; after one of the three functions below */
+    int descriptor;           /* -1: none */
+    bool owned;               /* to be closed */
+    size_t piece_bytes;       /* most at a time, after asking; 0: no need to ask */
+    /* The rest of a record that is on its way. */
+    char rest[HAL_OUTPUT_RECORD_MAX];
+    size_t rest_start, rest_count;
+    /* Serial. */
+    char path[HAL_OUTPUT_PATH_MAX];
+    int32_t baud;
+    const struct hal_clock *clock;
+    int64_t tried_us;
+};
+
+/* Each fills state->output; the state must stay where it is. False: *error. */
+
+bool hal_output_stdout(struct hal_output_state *state, struct hal_error *error);
+
+/* host: a name or address; port: a number. The name is looked up once, which may take its time. */
+bool hal_output_udp(struct hal_output_state *state, const char *host, const char *port,
+                    struct hal_error *error);
+
+/* baud: one of the rates of termios, 1200 .. 4000000. */
+bool hal_output_serial(struct hal_output_state *state, const char *path, int32_t baud,
+                       const struct hal_clock *clock, struct hal_error *error);
+
+/* What is still kept goes out if that is possible at once. Closing a serial device may take as long
+ * as the system needs for what it has taken: switch the laser off first. */
+void hal_output_close(struct hal_output_state *state);
+
+#endif
