@@ -79,6 +79,20 @@ static void report_frame(struct visit *visit, const char *name, const char *text
     free(path);
 }
 
+/* A record that is written, to standard output: flushed, so that a reader at the other end of a pipe
+ * has each at once. */
+static void put_record(struct visit *visit, const char *name, bool fits)
+{
+    if (!fits) {
+        struct hal_error error;
+        hal_fail(&error, "its record has more than %d bytes", APP_RECORD_MAX);
+        report_frame(visit, name, error.text);
+        return;
+    }
+    fwrite(visit->record.text, 1, visit->record.length, stdout);
+    fflush(stdout);
+}
+
 /* A frame that is lost. One without laser has no record, only a message. */
 static void lose_frame(struct visit *visit, const struct hal_frame *frame, const char *text)
 {
@@ -87,7 +101,7 @@ static void lose_frame(struct visit *visit, const struct hal_frame *frame, const
         return;
     }
     if (visit->run->options->json) {
-        app_record_error(&visit->record, frame->name, text);
+        put_record(visit, frame->name, app_record_error(&visit->record, frame->name, text));
     } else {
         sim_table_error(stdout, frame->name, text);
     }
@@ -108,7 +122,7 @@ static void put_frame(struct visit *visit, const struct hal_frame *frame)
         sim_score_add_dots(visit->score, head, truth);
     }
     if (options->json) {
-        app_record_frame(&visit->record, frame, head);
+        put_record(visit, frame->name, app_record_frame(&visit->record, frame, head, NULL));
     } else {
         sim_table_frame(stdout, frame, head, &verdict);
     }
@@ -218,7 +232,7 @@ static void process_dir(struct run *run, size_t index)
     struct visit visit = {
         .run = run,
         .dir = dir,
-        .record = {.file = stdout, .dir = run->dirs.dir_count > 1 ? dir->path : NULL},
+        .record = {.dir = run->dirs.dir_count > 1 ? dir->path : NULL},
         .score = &run->score[index],
     };
     if (!start_core(run, dir->path)) {

@@ -102,29 +102,43 @@ static void write_dropped(struct app_write *write, const struct isohead *head)
     }
 }
 
-static struct app_write begin(const struct app_record *record, const char *name)
+static struct app_write begin(struct app_record *record, const char *name)
 {
-    struct app_write write = {.file = record->file};
+    struct app_write write = {.memory = record->text, .size = sizeof record->text};
     app_write_open(&write, '{');
     app_write_key(&write, "file");
     app_write_string(&write, name);
     return write;
 }
 
-/* Flushed, so that a reader at the other end of a pipe has each record at once. */
-static void end(const struct app_record *record, struct app_write *write)
+static bool end(struct app_record *record, struct app_write *write)
 {
     if (record->dir != NULL) {
         app_write_key(write, "dir");
         app_write_string(write, record->dir);
     }
     app_write_close(write, '}');
-    fputc('\n', record->file);
-    fflush(record->file);
+    app_write_line_end(write);
+    record->length = write->full ? 0 : write->length;
+    return !write->full;
 }
 
-void app_record_frame(const struct app_record *record, const struct hal_frame *frame,
-                      const struct isohead *head)
+static void write_live(struct app_write *write, const struct app_record_live *live)
+{
+    if (live->lost_count != 0) {
+        app_write_int_field(write, "lost", live->lost_count);
+    }
+    if (live->skipped_count != 0) {
+        app_write_int_field(write, "skipped", live->skipped_count);
+    }
+    if (live->strobe != NULL) {
+        app_write_key(write, "strobe");
+        app_write_string(write, live->strobe);
+    }
+}
+
+bool app_record_frame(struct app_record *record, const struct hal_frame *frame,
+                      const struct isohead *head, const struct app_record_live *live)
 {
     struct app_write write = begin(record, frame->name);
     app_write_int_field(&write, "time_us", frame->time_us);
@@ -135,13 +149,16 @@ void app_record_frame(const struct app_record *record, const struct hal_frame *f
         app_write_int_field(&write, "points", head->points.seen_count);
     }
     write_dropped(&write, head);
-    end(record, &write);
+    if (live != NULL) {
+        write_live(&write, live);
+    }
+    return end(record, &write);
 }
 
-void app_record_error(const struct app_record *record, const char *name, const char *error)
+bool app_record_error(struct app_record *record, const char *name, const char *error)
 {
     struct app_write write = begin(record, name);
     app_write_key(&write, "error");
     app_write_string(&write, error);
-    end(record, &write);
+    return end(record, &write);
 }

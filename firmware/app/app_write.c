@@ -1,11 +1,36 @@
 #include "app_write.h"
 
 #include <inttypes.h>
+#include <string.h>
+
+static void put(struct app_write *write, const char *text, size_t length)
+{
+    if (write->file != NULL) {
+        fwrite(text, 1, length, write->file);
+        return;
+    }
+    /* Once full it stays so: a text that ends early is better than one with a hole. */
+    write->full = write->full || length > write->size - write->length;
+    if (!write->full) {
+        memcpy(write->memory + write->length, text, length);
+        write->length += length;
+    }
+}
+
+static void put_text(struct app_write *write, const char *text)
+{
+    put(write, text, strlen(text));
+}
+
+static void put_char(struct app_write *write, char letter)
+{
+    put(write, &letter, 1);
+}
 
 static void separate(struct app_write *write)
 {
     if (write->comma) {
-        fputc(',', write->file);
+        put_char(write, ',');
     }
     write->comma = true;
 }
@@ -13,45 +38,55 @@ static void separate(struct app_write *write)
 void app_write_open(struct app_write *write, char bracket)
 {
     separate(write);
-    fputc(bracket, write->file);
+    put_char(write, bracket);
     write->comma = false;
 }
 
 void app_write_close(struct app_write *write, char bracket)
 {
-    fputc(bracket, write->file);
+    put_char(write, bracket);
     write->comma = true;
+}
+
+void app_write_line_end(struct app_write *write)
+{
+    put_char(write, '\n');
+    write->comma = false;
 }
 
 void app_write_key(struct app_write *write, const char *key)
 {
     separate(write);
-    fprintf(write->file, "\"%s\":", key);
+    put_char(write, '"');
+    put_text(write, key);
+    put_text(write, "\":");
     write->comma = false;
 }
 
 void app_write_int(struct app_write *write, int64_t value)
 {
     separate(write);
-    fprintf(write->file, "%" PRId64, value);
+    char text[sizeof "-9223372036854775808"];
+    snprintf(text, sizeof text, "%" PRId64, value);
+    put_text(write, text);
 }
 
 void app_write_decimal(struct app_write *write, struct app_decimal decimal)
 {
     separate(write);
-    fputs(decimal.text, write->file);
+    put_text(write, decimal.text);
 }
 
 void app_write_bool(struct app_write *write, bool value)
 {
     separate(write);
-    fputs(value ? "true" : "false", write->file);
+    put_text(write, value ? "true" : "false");
 }
 
 void app_write_null(struct app_write *write)
 {
     separate(write);
-    fputs("null", write->file);
+    put_text(write, "null");
 }
 
 /* Length of the UTF-8 sequence at text, 0 when it is none: overlong forms, surrogates and code
@@ -92,23 +127,26 @@ static int utf8_length(const unsigned char *text)
 void app_write_string(struct app_write *write, const char *text)
 {
     separate(write);
-    fputc('"', write->file);
+    put_char(write, '"');
     const unsigned char *at = (const unsigned char *)text;
     while (*at != 0) {
         int length = utf8_length(at);
         if (length == 0) {
-            fputs("\\ufffd", write->file);
+            put_text(write, "\\ufffd");
             length = 1;
         } else if (*at == '"' || *at == '\\') {
-            fprintf(write->file, "\\%c", *at);
+            put_char(write, '\\');
+            put_char(write, (char)*at);
         } else if (*at < ' ' || *at == 0x7f) {
-            fprintf(write->file, "\\u%04x", *at);
+            char escape[sizeof "\\u0000"];
+            snprintf(escape, sizeof escape, "\\u%04x", (unsigned)*at);
+            put_text(write, escape);
         } else {
-            fwrite(at, 1, (size_t)length, write->file);
+            put(write, (const char *)at, (size_t)length);
         }
         at += length;
     }
-    fputc('"', write->file);
+    put_char(write, '"');
 }
 
 void app_write_string_or_null(struct app_write *write, const char *text)

@@ -1,8 +1,9 @@
-/* app_write - JSON onto a stream, value by value, without white space.
+/* app_write - JSON onto a stream or into memory, value by value, without white space.
  *
  * The writer only places commas; that brackets and keys pair up is the caller's business. Strings
  * are escaped, and bytes that are no UTF-8 become U+FFFD, since JSON has no way to say them.
- * Write errors stay in the stream: ask ferror or fclose at the end.
+ * Write errors stay in the stream: ask ferror or fclose at the end. Memory that is full takes nothing
+ * more: ask `full`.
  */
 #ifndef APP_WRITE_H
 #define APP_WRITE_H
@@ -14,13 +15,19 @@
 #include "app_text.h"
 
 struct app_write {
-    FILE *file;
-    bool comma; /* the next value needs one before it */
+    FILE *file; /* NULL: memory */
+    char *memory;
+    size_t size, length; /* of memory, and how much of it is written; no closing zero */
+    bool full;           /* something did not fit */
+    bool comma;          /* the next value needs one before it */
 };
 
 /* bracket: '{' or '[', and '}' or ']'. */
 void app_write_open(struct app_write *write, char bracket);
 void app_write_close(struct app_write *write, char bracket);
+
+/* After the last bracket. */
+void app_write_line_end(struct app_write *write);
 
 /* The key of the value that follows; of a plain ASCII name. */
 void app_write_key(struct app_write *write, const char *key);
