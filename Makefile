@@ -9,9 +9,11 @@ UNITY_DIR ?= $(BUILD)/third_party/unity/src
 CJSON_DIR ?= $(BUILD)/third_party/cjson
 # The frame of frames/sequence2 that docs/picture.png shows.
 PICTURE ?= 000020
+# What the board's program is built for: arm64, armhf or host.
+ARCH ?= arm64
 
 .DEFAULT_GOAL := help
-.PHONY: help sim frames test accept eval bits vectors learn picture format formatted lint clean
+.PHONY: help sim frames test accept eval bits vectors learn picture board format formatted lint clean
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z_]+:.*## / { printf "  make %-9s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -64,6 +66,11 @@ picture: sim ## draw docs/picture.png anew
 	@./host_sim --json --trace $(BUILD)/trace frames/sequence2 > /dev/null
 	@/usr/bin/python3 tools/picture.py frames/sequence2 $(BUILD)/trace/sequence2/$(PICTURE).json \
 	  docs/picture.png
+
+board: ## build isohead_board for ARCH=arm64 (default), armhf or host: build/board-ARCH/firmware/app
+	@tools/setup.sh board $(ARCH)
+	@cmake --preset board-$(ARCH) > $(BUILD)/board-$(ARCH).log 2>&1 || { cat $(BUILD)/board-$(ARCH).log; exit 1; }
+	@cmake --build --preset board-$(ARCH) --parallel 2 --target isohead_board
 
 format: ## clang-format over all C sources
 	@tools/setup.sh format

@@ -1,4 +1,5 @@
-set(CMAKE_SYSTEM_NAME Linux)
+# 64-bit ARM Linux, with Debian's cross compiler.
 set(CMAKE_SYSTEM_PROCESSOR aarch64)
-set(CMAKE_C_COMPILER aarch64-linux-gnu-gcc)
-set(CMAKE_FIND_ROOT_PATH_MODE_PROGRAM NEVER)
+set(ISOHEAD_TRIPLET aarch64-linux-gnu)
+set(ISOHEAD_SYSROOT "${CMAKE_CURRENT_LIST_DIR}/../build/sysroot/arm64")
+include("${CMAKE_CURRENT_LIST_DIR}/cross.cmake")

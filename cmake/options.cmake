@@ -23,6 +23,17 @@ if(ISOHEAD_SANITIZE)
   add_link_options(-fsanitize=address,undefined)
 endif()
 
+# The board's program runs for months on devices that are not ours: what the compiler can harden is
+# hardened. No path of the machine that built it stays in it.
+if(ISOHEAD_BOARD)
+  set(CMAKE_POSITION_INDEPENDENT_CODE ON)
+  include(CheckPIESupported)
+  check_pie_supported(LANGUAGES C)
+  add_compile_options(-fstack-protector-strong "-ffile-prefix-map=${CMAKE_SOURCE_DIR}=."
+                      "$<$<CONFIG:Release>:-D_FORTIFY_SOURCE=2>")
+  add_link_options(-Wl,-z,relro,-z,now)
+endif()
+
 # cJSON: the installed library, or one source file that was named.
 add_library(isohead_cjson INTERFACE)
 if(ISOHEAD_CJSON_DIR)

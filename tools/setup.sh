@@ -2,6 +2,7 @@
 # Bring what a make target needs and this machine lacks.
 #
 #   tools/setup.sh sim|test|accept|eval|bits|vectors|picture|format|lint
+#   tools/setup.sh board arm64|armhf|host
 #
 # On Debian and its kin missing packages are installed when that is allowed (root, or sudo without a
 # password); otherwise the exact command is printed and the exit status is 1. Nothing is installed
@@ -36,8 +37,34 @@ need_bits() {
     [ -e /usr/aarch64-linux-gnu/lib/libc.a ] || lacks libc6-dev-arm64-cross
 }
 
+# need_board arm64|armhf|host
+need_board() {
+    need_program cmake cmake
+    need_program make make
+    case "${1:-}" in
+    host)
+        need_sim
+        need_header libv4l2.h libv4l-dev
+        need_header gpiod.h libgpiod-dev
+        ;;
+    arm64)
+        need_program aarch64-linux-gnu-gcc gcc-aarch64-linux-gnu
+        [ -e /usr/aarch64-linux-gnu/lib/libc.so ] || lacks libc6-dev-arm64-cross
+        ;;
+    armhf)
+        need_program arm-linux-gnueabihf-gcc gcc-arm-linux-gnueabihf
+        [ -e /usr/arm-linux-gnueabihf/lib/libc.so ] || lacks libc6-dev-armhf-cross
+        ;;
+    *)
+        echo "there is no board '${1:-}': name arm64, armhf or host" >&2
+        exit 2
+        ;;
+    esac
+}
+
 case "${1:-}" in
 sim) need_sim ;;
+board) need_board "${2:-}" ;;
 test)
     need_sim
     need_bits
@@ -72,7 +99,7 @@ lint)
     need_program clang-tidy clang-tidy
     ;;
 *)
-    echo "usage: tools/setup.sh sim|test|accept|eval|bits|vectors|picture|format|lint" >&2
+    echo "usage: tools/setup.sh sim|test|accept|eval|bits|vectors|picture|format|lint|board ARCH" >&2
     exit 2
     ;;
 esac
@@ -100,4 +127,5 @@ fi
 
 case "$1" in
 test | bits) tools/fetch_third_party.sh build/third_party ;;
+board) [ "$2" = host ] || tools/board/sysroot.sh "$2" ;;
 esac
