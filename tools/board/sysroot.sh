@@ -17,7 +17,7 @@ arm64 | armhf) arch=$1 ;;
     ;;
 esac
 packages="libv4l-dev libv4l-0 libv4lconvert0 libjpeg62-turbo libgpiod-dev libgpiod2 libcjson-dev
-    libcjson1 libc6 libgcc-s1"
+    libcjson1 libc6"
 
 sysroot=build/sysroot/$arch
 [ "$(cat "$sysroot/packages" 2>/dev/null)" != "$packages" ] || exit 0
@@ -34,6 +34,7 @@ tools/board/apt.sh unpack "$sysroot" $(printf "%s:$arch " $packages)
 # What dpkg would know, were they installed: whose each file is, and which symbols since when.
 info=$sysroot/var/lib/dpkg/info
 mkdir -p "$info"
+echo 1 >"$info/format"
 for package in $packages; do
     deb=build/apt/debs/$package:$arch.deb
     dpkg-deb --control "$deb" "$sysroot/control"
@@ -43,7 +44,7 @@ for package in $packages; do
     } >>"$sysroot/var/lib/dpkg/status"
     name=$package
     grep -q '^Multi-Arch: same' "$sysroot/control/control" && name=$package:$arch
-    dpkg-deb --fsys-tarfile "$deb" | tar -t | sed -e 's,^\.,,' -e 's,/$,,' -e 's,^$,/.,' >"$info/$name.list"
+    dpkg-deb --fsys-tarfile "$deb" | tar -t | sed -e 's,/$,,' -e "s,^\.,$PWD/$sysroot," >"$info/$name.list"
     for kind in shlibs symbols; do
         [ ! -e "$sysroot/control/$kind" ] || cp "$sysroot/control/$kind" "$info/$name.$kind"
     done
