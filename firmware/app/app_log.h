@@ -2,7 +2,7 @@
  *
  * A message's kind is its format and level. In APP_LOG_INTERVAL_US from the first of a kind
  * APP_LOG_BURST are told; further ones are counted, and at the interval's end the last of them is
- * told with the count: "camera: short frame (and 37 more like this in 60 s)". There is room for
+ * told with their count: "camera: short frame (last of 37 held back in 60 s)". There is room for
  * APP_LOG_KINDS_MAX kinds at a time; what comes beside them shares one more.
  *
  * Time is what app_log_time was told last. Control characters become '?', a text that is too long

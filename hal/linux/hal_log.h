@@ -27,7 +27,7 @@ struct hal_log_writer {
 void hal_log_open(struct hal_log_writer *writer, const char *program, const char *socket_path);
 void hal_log_close(struct hal_log_writer *writer);
 
-/* A line without its end. level: syslog's, 3 error, 4 warning, 6 information. */
-void hal_log_write(void *writer, int level, const char *text);
+/* A line without its end; context: the writer. level: syslog's, 3 error, 4 warning, 6 information. */
+void hal_log_write(void *context, int level, const char *text);
 
 #endif

@@ -12,7 +12,7 @@
  * most once a second, and sending starts with an empty line, as the last record may be cut.
  *
  * Error: HAL_SENT_NOT has its reason in *error too. HAL_SENT_NEVER only from standard output: its
- *        reader has gone, it is closed or broken.
+ *        reader has gone, it is closed or broken. HAL_SENT does not say that it has arrived.
  * SIGPIPE is ignored from hal_output_stdout on, for the whole process.
  */
 #ifndef HAL_OUTPUT_H
@@ -51,7 +51,7 @@ bool hal_output_stdout(struct hal_output_state *state, struct hal_error *error);
 bool hal_output_udp(struct hal_output_state *state, const char *host, const char *port,
                     struct hal_error *error);
 
-/* baud: one of the rates of termios, 1200 .. 4000000. */
+/* baud: 9600, 19200, 38400, 57600, 115200, 230400, 460800 or 921600. */
 bool hal_output_serial(struct hal_output_state *state, const char *path, int32_t baud,
                        const struct hal_clock *clock, struct hal_error *error);
 
