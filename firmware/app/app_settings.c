@@ -138,13 +138,14 @@ static bool take_udp(struct app_config *config, const char *value)
         return false;
     }
     size_t length = (size_t)(colon - value);
+    /* Only in brackets may a host have colons: where it ends were not clear. */
+    const char *forbidden = ":[]";
     if (length > 2 && value[0] == '[' && value[length - 1] == ']') {
         value++;
         length -= 2;
-    } else if (memchr(value, ':', length) != NULL) {
-        return false; /* an IPv6 address needs its brackets: where it ends is not clear */
+        forbidden = "[]";
     }
-    if (length == 0) {
+    if (length == 0 || strcspn(value, forbidden) < length) {
         return false;
     }
     memcpy(config->output_host, value, length);
