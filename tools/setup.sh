@@ -71,6 +71,7 @@ test)
     need_python numpy python3-numpy
     need_python scipy python3-scipy
     need_program nm binutils
+    need_header libv4l2.h libv4l-dev
     ;;
 picture)
     need_sim
