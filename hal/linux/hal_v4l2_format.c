@@ -78,7 +78,10 @@ static void name_fourcc(uint32_t fourcc, char name[5])
 {
     for (uint32_t k = 0; k < 4; k++) {
         const uint8_t letter = (uint8_t)(fourcc >> 8 * k);
-        name[k] = letter >= ' ' && letter <= '~' ? (char)letter : '?';
+        name[k] = '?';
+        if (letter >= ' ' && letter <= '~') {
+            name[k] = (char)letter;
+        }
     }
     name[4] = 0;
     for (int k = 3; k > 0 && name[k] == ' '; k--) {
@@ -251,7 +254,7 @@ bool hal_v4l2_format_set(int fd, const char *wanted, int32_t width, int32_t heig
         return false;
     }
     for (size_t k = 0; k < CHOICE_COUNT; k++) {
-        struct v4l2_pix_format given;
+        struct v4l2_pix_format given = {0};
         if (!offer.has[k] || !is_wanted(wanted, &choices[k])) {
             continue;
         }

@@ -57,6 +57,7 @@ static struct {
     uint32_t capabilities, device_capabilities;
     struct fake_format format[FAKE_FORMATS];
     int32_t format_count;
+    bool is_endless; /* lists its formats, and their sizes, over and over */
     struct fake_control control[FAKE_CONTROLS];
     int32_t control_count;
     uint32_t padding, field, quantization, colorspace;
@@ -225,27 +226,32 @@ static struct fake_format *fake_find_format(uint32_t fourcc)
 
 static int fake_enum_format(struct v4l2_fmtdesc *description)
 {
-    if (description->type != V4L2_BUF_TYPE_VIDEO_CAPTURE ||
-        description->index >= (uint32_t)fake.format_count) {
+    const uint32_t count = (uint32_t)fake.format_count;
+    const uint32_t index = fake.is_endless ? description->index % count : description->index;
+
+    if (description->type != V4L2_BUF_TYPE_VIDEO_CAPTURE || index >= count) {
         return fake_fail(EINVAL);
     }
-    description->pixelformat = fake.format[description->index].fourcc;
-    description->flags = fake.format[description->index].flags;
+    description->pixelformat = fake.format[index].fourcc;
+    description->flags = fake.format[index].flags;
     return 0;
 }
 
 static int fake_enum_size(struct v4l2_frmsizeenum *size)
 {
     const struct fake_format *format = fake_find_format(size->pixel_format);
-    const int32_t count = format == NULL ? 0 : format->is_stepwise ? 1 : format->size_count;
+    const uint32_t count = format == NULL        ? 0
+                           : format->is_stepwise ? 1
+                                                 : (uint32_t)format->size_count;
+    const uint32_t index = fake.is_endless ? size->index % count : size->index;
 
-    if (size->index >= (uint32_t)count) {
+    if (index >= count) {
         return fake_fail(EINVAL);
     }
     if (!format->is_stepwise) {
         size->type = V4L2_FRMSIZE_TYPE_DISCRETE;
-        size->discrete.width = format->size[size->index].width;
-        size->discrete.height = format->size[size->index].height;
+        size->discrete.width = format->size[index].width;
+        size->discrete.height = format->size[index].height;
         return 0;
     }
     size->type = V4L2_FRMSIZE_TYPE_STEPWISE;
