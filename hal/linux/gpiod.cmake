@@ -1,0 +1,45 @@
+# libgpiod, of version 1 or 2: the target isohead_gpiod, and ISOHEAD_GPIOD_VERSION for what includes it.
+#
+# Which one it is the header says that was found; ISOHEAD_GPIOD asks for one and refuses the other.
+# Version 2 may also be built from sources (tools/board/gpiod2.sh): ISOHEAD_GPIOD2_DIR.
+set(ISOHEAD_GPIOD "" CACHE STRING "Major version of libgpiod, 1 or 2; empty: the one that is there")
+set(ISOHEAD_GPIOD2_DIR "" CACHE PATH
+    "Folder with the sources of libgpiod 2; empty: the installed library (cross builds name one)")
+
+if(ISOHEAD_GPIOD2_DIR)
+  file(GLOB gpiod2_sources "${ISOHEAD_GPIOD2_DIR}/lib/*.c")
+  if(NOT gpiod2_sources)
+    message(FATAL_ERROR "ISOHEAD_GPIOD2_DIR (now '${ISOHEAD_GPIOD2_DIR}') must name a folder with "
+                        "lib/*.c and include/gpiod.h; tools/board/gpiod2.sh brings one")
+  endif()
+  file(STRINGS "${ISOHEAD_GPIOD2_DIR}/libgpiod-version.txt" gpiod2_version)
+  add_library(gpiod2_source STATIC EXCLUDE_FROM_ALL ${gpiod2_sources})
+  target_compile_definitions(gpiod2_source PRIVATE _GNU_SOURCE "GPIOD_VERSION_STR=\"${gpiod2_version}\"")
+  target_compile_options(gpiod2_source PRIVATE -w)
+  target_include_directories(gpiod2_source SYSTEM PUBLIC "${ISOHEAD_GPIOD2_DIR}/include")
+endif()
+
+add_library(isohead_gpiod INTERFACE)
+if(ISOHEAD_GPIOD2_DIR AND NOT ISOHEAD_GPIOD STREQUAL "1")
+  set(ISOHEAD_GPIOD_VERSION 2)
+  target_link_libraries(isohead_gpiod INTERFACE gpiod2_source)
+else()
+  find_path(ISOHEAD_GPIOD_INCLUDE gpiod.h)
+  find_library(ISOHEAD_GPIOD_LIBRARY gpiod)
+  if(NOT ISOHEAD_GPIOD_INCLUDE OR NOT ISOHEAD_GPIOD_LIBRARY)
+    message(FATAL_ERROR "libgpiod is not there: install libgpiod-dev, or give ISOHEAD_GPIOD2_DIR")
+  endif()
+  # what version 2 does not have any more
+  file(STRINGS "${ISOHEAD_GPIOD_INCLUDE}/gpiod.h" gpiod_one REGEX "gpiod_line_request_output")
+  if(gpiod_one)
+    set(ISOHEAD_GPIOD_VERSION 1)
+  else()
+    set(ISOHEAD_GPIOD_VERSION 2)
+  endif()
+  target_include_directories(isohead_gpiod SYSTEM INTERFACE "${ISOHEAD_GPIOD_INCLUDE}")
+  target_link_libraries(isohead_gpiod INTERFACE "${ISOHEAD_GPIOD_LIBRARY}")
+endif()
+if(ISOHEAD_GPIOD AND NOT ISOHEAD_GPIOD STREQUAL ISOHEAD_GPIOD_VERSION)
+  message(FATAL_ERROR "ISOHEAD_GPIOD is ${ISOHEAD_GPIOD}, but libgpiod ${ISOHEAD_GPIOD_VERSION} was found in "
+                      "${ISOHEAD_GPIOD_INCLUDE}${ISOHEAD_GPIOD2_DIR}")
+endif()

@@ -1,0 +1,26 @@
+/* hal_guard_child - what the guard does on its side of the fork; see hal_guard.h. */
+#ifndef HAL_GUARD_CHILD_H
+#define HAL_GUARD_CHILD_H
+
+#include "linux/hal_guard.h"
+
+/* The bytes on the socket. */
+#define GUARD_ALIVE 'a' /* to the guard */
+#define GUARD_DONE 'd'  /* to the guard: off, and end */
+#define GUARD_READY 'r' /* from the guard, once */
+
+/* The guard's exit status. */
+enum guard_exit {
+    GUARD_EXIT_DONE = 0,  /* it was told so */
+    GUARD_EXIT_GONE = 1,  /* the other process has died */
+    GUARD_EXIT_LATE = 2,  /* not told for too long that the other process lives */
+    GUARD_EXIT_SETUP = 3, /* it never began */
+    GUARD_EXIT_LINE = 4   /* the line could not be set */
+};
+
+#define GUARD_OFF_TRIES 100
+
+/* The child's life, right after the fork with all signals blocked. Does not return. */
+_Noreturn void hal_guard_child(const struct hal_guard_config *config, int socket_fd);
+
+#endif

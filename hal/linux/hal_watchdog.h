@@ -1,0 +1,56 @@
+/* hal_watchdog - tells whoever watches that the program lives: systemd, the machine's watchdog, the
+ * guard of the laser.
+ *
+ * feed() may be called as often as one likes, and has to be at least every HAL_WATCHDOG_STEP_US;
+ * each watcher is told only as often as it needs:
+ * systemd:  where NOTIFY_SOCKET is set: READY=1 with the first feed, STOPPING=1 at the end. Where
+ *           WATCHDOG_USEC is set too, and meant for this process (WATCHDOG_PID): WATCHDOG=1 as often
+ *           as half of it. Both variables are removed from the environment, so that no child speaks
+ *           for this process. The protocol is one datagram of text to a socket, promised to stay
+ *           (sd_notify(3), "Notes"); the fifty lines for it here replace a library and its
+ *           dependencies in packages and cross builds.
+ * machine:  a device like /dev/watchdog: a byte each HAL_WATCHDOG_STEP_US, and 'V' at the orderly end,
+ *           which stops it (a driver set to nowayout goes on and resets the machine). A period below
+ *           two steps is too short for it.
+ * guard:    hal_guard_feed each HAL_WATCHDOG_STEP_US, or four times per its timeout.
+ *
+ * Error:    all are told before one that failed is reported; the guard first. A full socket of systemd
+ *           is no error: it is tried again with the next feed.
+ */
+#ifndef HAL_WATCHDOG_H
+#define HAL_WATCHDOG_H
+
+#include "linux/hal_guard.h"
+
+#define HAL_WATCHDOG_STEP_US 400000
+
+struct hal_watchdog_config {
+    const char *path;        /* a watchdog device; NULL: none */
+    struct hal_guard *guard; /* NULL: none */
+    const struct hal_clock *clock;
+};
+
+/* A watcher that is told at times. */
+struct hal_watchdog_turn {
+    int64_t step_us; /* 0: with each feed */
+    int64_t next_us;
+};
+
+struct hal_watchdog_feeder {
+    struct hal_watchdog watchdog;
+    /* Private from here on. */
+    struct hal_watchdog_config config;
+    int device_fd, notify_fd; /* -1: none */
+    bool ready;               /* READY=1 has been sent */
+    bool wants_life;          /* WATCHDOG=1 is asked for */
+    struct hal_watchdog_turn device, notify, guard;
+};
+
+/* False: *error names the variable or device, what was found and expected; nothing is open. Opening
+ * the device starts it. */
+bool hal_watchdog_open(struct hal_watchdog_feeder *feeder, const struct hal_watchdog_config *config,
+                       struct hal_error *error);
+/* The orderly end. Without it the watchers act, as they should. */
+void hal_watchdog_close(struct hal_watchdog_feeder *feeder);
+
+#endif
