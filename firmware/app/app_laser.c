@@ -1,0 +1,272 @@
+#include "app_laser.h"
+
+#define PERCENT 100
+
+static int64_t credit_max(const struct app_laser *laser)
+{
+    return (int64_t)laser->config.duty_percent * APP_LASER_BURST_US;
+}
+
+static void block(struct app_laser *laser, enum app_laser_block why, bool blocked)
+{
+    if (blocked) {
+        laser->blocks |= (unsigned)why;
+    } else {
+        laser->blocks &= ~(unsigned)why;
+    }
+}
+
+/* The time since the last call goes into the sums. */
+static void account(struct app_laser *laser, int64_t now_us)
+{
+    int64_t passed_us = now_us - laser->tick_us;
+    int32_t duty = laser->config.duty_percent;
+    laser->tick_us = now_us;
+    if (laser->is_on) {
+        laser->on_us += passed_us;
+        laser->silent_us += passed_us;
+        laser->credit -= passed_us * (PERCENT - duty);
+    } else {
+        laser->credit += passed_us * duty;
+    }
+    if (laser->credit > credit_max(laser)) {
+        laser->credit = credit_max(laser);
+    }
+}
+
+/* Off, whatever it takes. The error that brought us here is kept, not the ones that follow. */
+static void force_off(struct app_laser *laser)
+{
+    struct hal_error error;
+    bool off = false;
+    for (int i = 0; i < APP_LASER_OFF_TRIES && !off; i++) {
+        off = laser->strobe->set(laser->strobe->context, false, &error);
+    }
+    laser->strobe->close(laser->strobe->context);
+    laser->is_open = false;
+    laser->is_on = false;
+}
+
+static void fail(struct app_laser *laser)
+{
+    block(laser, APP_LASER_BLOCK_FAULT, true);
+    force_off(laser);
+}
+
+static void switch_off(struct app_laser *laser)
+{
+    laser->is_on = false;
+    if (!laser->strobe->set(laser->strobe->context, false, &laser->failed)) {
+        fail(laser);
+    }
+}
+
+/* False: it could not be read, and everything is off. */
+static bool read_interlock(struct app_laser *laser)
+{
+    bool closed = false;
+    if (!laser->strobe->interlock(laser->strobe->context, &closed, &laser->failed)) {
+        fail(laser);
+        return false;
+    }
+    block(laser, APP_LASER_BLOCK_INTERLOCK, !closed);
+    return true;
+}
+
+static void switch_on(struct app_laser *laser)
+{
+    if (!read_interlock(laser) || laser->blocks != 0) {
+        return;
+    }
+    laser->is_on = true;
+    laser->on_count++;
+    if (!laser->strobe->set(laser->strobe->context, true, &laser->failed)) {
+        fail(laser);
+        return;
+    }
+    if (read_interlock(laser) && laser->blocks != 0) {
+        switch_off(laser);
+    }
+}
+
+/* The line as wish and blocks say. */
+static void apply(struct app_laser *laser)
+{
+    if (!laser->is_open) {
+        return;
+    }
+    bool on = laser->wished && laser->blocks == 0;
+    if (on && !laser->is_on) {
+        switch_on(laser);
+    } else if (!on && laser->is_on) {
+        switch_off(laser);
+    }
+}
+
+void app_laser_init(struct app_laser *laser, const struct app_laser_config *config,
+                    const struct hal_strobe *strobe, int64_t now_us)
+{
+    *laser = (struct app_laser){
+        .config = *config,
+        .strobe = strobe,
+        .blocks = APP_LASER_BLOCK_RIG | APP_LASER_BLOCK_CAMERA,
+        .tick_us = now_us,
+        .beat_us = now_us,
+    };
+    if (!config->enabled) {
+        laser->blocks |= APP_LASER_BLOCK_DISABLED;
+    }
+    laser->credit = credit_max(laser);
+}
+
+bool app_laser_open(struct app_laser *laser)
+{
+    if (!laser->config.enabled) {
+        return true;
+    }
+    if (!laser->strobe->open(laser->strobe->context, &laser->failed)) {
+        block(laser, APP_LASER_BLOCK_FAULT, true);
+        return false;
+    }
+    laser->is_open = true;
+    return true;
+}
+
+void app_laser_close(struct app_laser *laser, int64_t now_us)
+{
+    account(laser, now_us);
+    laser->wished = false;
+    if (laser->is_open) {
+        force_off(laser);
+    }
+}
+
+void app_laser_wish(struct app_laser *laser, bool on, int64_t now_us)
+{
+    account(laser, now_us);
+    laser->wished = on;
+    apply(laser);
+}
+
+void app_laser_rig(struct app_laser *laser, bool is_valid, int64_t now_us)
+{
+    account(laser, now_us);
+    block(laser, APP_LASER_BLOCK_RIG, !is_valid);
+    apply(laser);
+}
+
+void app_laser_camera(struct app_laser *laser, bool streams, int64_t frame_time_us, int64_t now_us)
+{
+    account(laser, now_us);
+    if (streams) {
+        laser->silent_us = 0;
+        laser->silent_max_us = APP_LASER_SILENT_FRAMES * frame_time_us;
+        block(laser, APP_LASER_BLOCK_SILENCE, false);
+    }
+    block(laser, APP_LASER_BLOCK_CAMERA, !streams);
+    apply(laser);
+}
+
+/* Nothing is switched on here: the loop says first what this frame means for the next one. */
+void app_laser_frame(struct app_laser *laser, int64_t now_us)
+{
+    account(laser, now_us);
+    laser->silent_us = 0;
+    block(laser, APP_LASER_BLOCK_SILENCE, false);
+}
+
+void app_laser_interlock(struct app_laser *laser, int64_t now_us)
+{
+    account(laser, now_us);
+    if (laser->is_open && read_interlock(laser)) {
+        apply(laser);
+    }
+}
+
+/* How long until the duty changes something; account has just run. */
+static int64_t duty_wait_us(struct app_laser *laser)
+{
+    int32_t duty = laser->config.duty_percent;
+    if (laser->is_on) {
+        if (duty == PERCENT) {
+            return APP_LASER_NEVER_US;
+        }
+        if (laser->credit <= 0) {
+            block(laser, APP_LASER_BLOCK_DUTY, true);
+            return 1;
+        }
+        return laser->credit / (PERCENT - duty) + 1;
+    }
+    if ((laser->blocks & APP_LASER_BLOCK_DUTY) != 0) {
+        int64_t missing = credit_max(laser) - laser->credit;
+        if (missing <= 0) {
+            block(laser, APP_LASER_BLOCK_DUTY, false);
+            return 1;
+        }
+        return missing / duty + 1;
+    }
+    return APP_LASER_NEVER_US;
+}
+
+static int64_t silence_wait_us(struct app_laser *laser)
+{
+    int64_t left_us = laser->silent_max_us - laser->silent_us;
+    if (!laser->is_on) {
+        return APP_LASER_NEVER_US;
+    }
+    if (left_us <= 0) {
+        block(laser, APP_LASER_BLOCK_SILENCE, true);
+        return 1;
+    }
+    return left_us;
+}
+
+static int64_t beat_wait_us(struct app_laser *laser, int64_t now_us)
+{
+    if (!laser->is_on) {
+        return APP_LASER_NEVER_US;
+    }
+    if (now_us - laser->beat_us >= APP_LASER_BEAT_US) {
+        laser->beat_us = now_us;
+        if (!laser->strobe->beat(laser->strobe->context, &laser->failed)) {
+            fail(laser);
+        }
+    }
+    return laser->beat_us + APP_LASER_BEAT_US - now_us;
+}
+
+int64_t app_laser_tick(struct app_laser *laser, int64_t now_us)
+{
+    account(laser, now_us);
+    if (laser->is_open) {
+        read_interlock(laser); /* should its event have been lost */
+    }
+    int64_t wait_us = duty_wait_us(laser);
+    int64_t silence_us = silence_wait_us(laser);
+    wait_us = silence_us < wait_us ? silence_us : wait_us;
+    apply(laser);
+    int64_t beat_us = beat_wait_us(laser, now_us);
+    return beat_us < wait_us ? beat_us : wait_us;
+}
+
+const char *app_laser_block_text(unsigned blocks)
+{
+    static const struct {
+        enum app_laser_block block;
+        const char *text;
+    } texts[] = {
+        {APP_LASER_BLOCK_FAULT, "its line failed"},
+        {APP_LASER_BLOCK_DISABLED, "not asked for"},
+        {APP_LASER_BLOCK_INTERLOCK, "the interlock is open"},
+        {APP_LASER_BLOCK_RIG, "no valid rig"},
+        {APP_LASER_BLOCK_CAMERA, "no camera"},
+        {APP_LASER_BLOCK_SILENCE, "no frames come"},
+        {APP_LASER_BLOCK_DUTY, "the duty limit is reached"},
+    };
+    for (unsigned i = 0; i < sizeof texts / sizeof texts[0]; i++) {
+        if ((blocks & texts[i].block) != 0) {
+            return texts[i].text;
+        }
+    }
+    return NULL;
+}

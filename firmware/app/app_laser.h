@@ -1,0 +1,101 @@
+/* app_laser - the laser's policy: the only place that switches it on.
+ *
+ * In:    what the loop wishes, what it sees (frames, the interlock's events, the time), and what
+ *        may be wrong (rig, camera).
+ * Out:   the strobe line. It is high only while the loop wishes it and nothing speaks against it:
+ *        - it was asked for (app_laser_config.enabled);
+ *        - the rig is valid (app_laser_rig) and the camera streams (app_laser_camera);
+ *        - it has not been on for APP_LASER_SILENT_FRAMES frame times since the last frame came;
+ *        - the interlock is closed. It is read before switching on and once more afterwards, so that
+ *          one that opens in between is seen here or comes as an event later; and at every tick;
+ *        - the duty is kept: over any time T the laser is on for at most duty_percent of
+ *          T + APP_LASER_BURST_US;
+ *        - no call of the strobe has failed. After a failure it is switched off by every means there
+ *          is (again, then by giving the lines back) and stays off: the caller ends.
+ * Time:  app_laser_tick looks at the clock. The loop calls it before it waits and does not wait for
+ *        longer than what it returns, so that a limit in time is kept to the timer's precision while
+ *        the loop waits. While a frame is processed nobody looks: the guard and the interlock in
+ *        hardware do (docs/safety.md).
+ * Errors: app_laser.failed, with the text; told once through the caller.
+ */
+#ifndef APP_LASER_H
+#define APP_LASER_H
+
+#include "hal.h"
+
+/* The laser may be on for so much longer than its duty, once. */
+#define APP_LASER_BURST_US 100000
+/* Between two edges for an external one-shot while the laser is on. The one-shot has to bridge the
+ * processing of a frame too. */
+#define APP_LASER_BEAT_US 10000
+/* Without a frame for so many frame times it goes off. */
+#define APP_LASER_SILENT_FRAMES 3
+/* A wait that nothing limits; the watchdogs want a sign of life several times in 2 s. */
+#define APP_LASER_NEVER_US 400000
+/* How often switching off is tried before the lines are given back. */
+#define APP_LASER_OFF_TRIES 3
+
+/* What can speak against the laser; a set. */
+enum app_laser_block {
+    APP_LASER_BLOCK_DISABLED = 1,   /* nobody asked for it */
+    APP_LASER_BLOCK_RIG = 2,        /* no valid rig */
+    APP_LASER_BLOCK_CAMERA = 4,     /* the camera does not stream */
+    APP_LASER_BLOCK_SILENCE = 8,    /* frames have stopped coming */
+    APP_LASER_BLOCK_INTERLOCK = 16, /* the interlock is open */
+    APP_LASER_BLOCK_DUTY = 32,      /* on for too long, will be over soon */
+    APP_LASER_BLOCK_FAULT = 64      /* the strobe failed; never taken back */
+};
+
+struct app_laser_config {
+    bool enabled;         /* false: the strobe is never touched */
+    int32_t duty_percent; /* 1 .. 100 */
+};
+
+struct app_laser {
+    struct app_laser_config config;
+    const struct hal_strobe *strobe;
+    bool wished;
+    bool is_on;              /* what the line was told last */
+    unsigned blocks;         /* of enum app_laser_block */
+    bool is_open;            /* the lines are taken */
+    int64_t silent_us;       /* on without a frame, */
+    int64_t silent_max_us;   /* and its limit */
+    int64_t tick_us;         /* when time was last accounted for */
+    int64_t credit;          /* left of the duty, percent x us */
+    int64_t beat_us;         /* last edge for the one-shot */
+    int64_t on_us;           /* sum of all times with the laser on */
+    int32_t on_count;        /* how often it was switched on */
+    struct hal_error failed; /* why APP_LASER_BLOCK_FAULT */
+};
+
+/* Off, with everything against it that can be; strobe and config's values are kept. */
+void app_laser_init(struct app_laser *laser, const struct app_laser_config *config,
+                    const struct hal_strobe *strobe, int64_t now_us);
+
+/* Take the lines; false: failed. Not enabled: nothing happens. */
+bool app_laser_open(struct app_laser *laser);
+
+/* Off by every means, lines given back. May be called at any time, several times. */
+void app_laser_close(struct app_laser *laser, int64_t now_us);
+
+/* The loop's wish. */
+void app_laser_wish(struct app_laser *laser, bool on, int64_t now_us);
+
+void app_laser_rig(struct app_laser *laser, bool is_valid, int64_t now_us);
+
+/* The camera streams, a frame every frame_time_us, or it does not: then the time does not matter. */
+void app_laser_camera(struct app_laser *laser, bool streams, int64_t frame_time_us, int64_t now_us);
+
+/* A frame came, or the loop was busy with one until now. */
+void app_laser_frame(struct app_laser *laser, int64_t now_us);
+
+/* The interlock has moved, or might have. */
+void app_laser_interlock(struct app_laser *laser, int64_t now_us);
+
+/* Keep the limits in time. How long one may wait until the next call, in us, at least 1. */
+int64_t app_laser_tick(struct app_laser *laser, int64_t now_us);
+
+/* What speaks against it, the weightiest; for messages. NULL: nothing. */
+const char *app_laser_block_text(unsigned blocks);
+
+#endif

@@ -1,0 +1,278 @@
+/* app_laser: the policy against a line that can fail and an interlock that can open at any moment. */
+#include "app_laser.h"
+#include "unity.h"
+
+#define FRAME_US 40000
+
+static struct {
+    bool line, taken, closed;
+    bool opens_after_read; /* the interlock opens right after it was read */
+    int off_failures;      /* so many calls of set(false) fail */
+    bool on_fails;
+    int close_count, beat_count, call_count;
+} fake;
+
+static struct app_laser laser;
+
+static bool fake_open(void *context, struct hal_error *error)
+{
+    (void)context;
+    (void)error;
+    fake.taken = true;
+    return true;
+}
+
+static void fake_close(void *context)
+{
+    (void)context;
+    fake.taken = false;
+    fake.line = false;
+    fake.close_count++;
+}
+
+static bool fake_set(void *context, bool on, struct hal_error *error)
+{
+    (void)context;
+    fake.call_count++;
+    if (!on && fake.off_failures > 0) {
+        fake.off_failures--;
+        return hal_fail(error, "off fails");
+    }
+    fake.line = on;
+    return on && fake.on_fails ? hal_fail(error, "on fails") : true;
+}
+
+static bool fake_beat(void *context, struct hal_error *error)
+{
+    (void)context;
+    (void)error;
+    fake.beat_count++;
+    return true;
+}
+
+static bool fake_interlock(void *context, bool *closed, struct hal_error *error)
+{
+    (void)context;
+    (void)error;
+    *closed = fake.closed;
+    fake.closed = fake.closed && !fake.opens_after_read;
+    return true;
+}
+
+static const struct hal_strobe strobe = {NULL,     fake_open, fake_close,
+                                         fake_set, fake_beat, fake_interlock};
+
+static void start(bool enabled, int32_t duty_percent)
+{
+    const struct app_laser_config config = {enabled, duty_percent};
+    app_laser_init(&laser, &config, &strobe, 0);
+    TEST_ASSERT_TRUE(app_laser_open(&laser));
+    app_laser_rig(&laser, true, 0);
+    app_laser_camera(&laser, true, FRAME_US, 0);
+}
+
+void setUp(void)
+{
+    fake.line = fake.taken = fake.opens_after_read = fake.on_fails = false;
+    fake.closed = true;
+    fake.off_failures = fake.close_count = fake.beat_count = fake.call_count = 0;
+}
+
+void tearDown(void)
+{
+}
+
+static void test_on_needs_everything(void)
+{
+    start(true, 100);
+    TEST_ASSERT_FALSE(fake.line);
+    app_laser_wish(&laser, true, 0);
+    TEST_ASSERT_TRUE(fake.line);
+    app_laser_rig(&laser, false, 0);
+    TEST_ASSERT_FALSE(fake.line);
+    app_laser_rig(&laser, true, 0);
+    TEST_ASSERT_TRUE(fake.line);
+    app_laser_camera(&laser, false, 0, 0);
+    TEST_ASSERT_FALSE(fake.line);
+    app_laser_camera(&laser, true, FRAME_US, 0);
+    TEST_ASSERT_TRUE(fake.line);
+    app_laser_wish(&laser, false, 0);
+    TEST_ASSERT_FALSE(fake.line);
+    app_laser_wish(&laser, true, 0);
+    app_laser_close(&laser, 0);
+    TEST_ASSERT_FALSE(fake.line);
+    app_laser_wish(&laser, true, 0);
+    TEST_ASSERT_FALSE(fake.line);
+}
+
+static void test_not_enabled_touches_nothing(void)
+{
+    start(false, 100);
+    app_laser_wish(&laser, true, 0);
+    app_laser_tick(&laser, 1000000);
+    app_laser_interlock(&laser, 1000000);
+    app_laser_close(&laser, 1000000);
+    TEST_ASSERT_FALSE(fake.taken);
+    TEST_ASSERT_EQUAL_INT(0, fake.call_count + fake.close_count + fake.beat_count);
+}
+
+/* Off no later than 3 frame times after the last frame, on again with the next one. */
+static void test_silence(void)
+{
+    int64_t now_us = 0;
+    start(true, 100);
+    app_laser_wish(&laser, true, 0);
+    while (fake.line) {
+        int64_t wait_us = app_laser_tick(&laser, now_us);
+        TEST_ASSERT_GREATER_THAN_INT64(0, wait_us);
+        now_us += fake.line ? wait_us : 0;
+        TEST_ASSERT_LESS_OR_EQUAL_INT64(3 * FRAME_US, now_us);
+    }
+    TEST_ASSERT_EQUAL_INT64(3 * FRAME_US, now_us);
+    app_laser_wish(&laser, true, now_us + 100);
+    TEST_ASSERT_FALSE_MESSAGE(fake.line, "on again without a frame");
+    app_laser_frame(&laser, now_us + 200);
+    app_laser_wish(&laser, true, now_us + 200);
+    TEST_ASSERT_TRUE(fake.line);
+}
+
+/* Switching off and on does not start the time anew: only frames do. */
+static void test_silence_is_not_forgotten(void)
+{
+    start(true, 100);
+    for (int64_t now_us = 0; now_us < 100 * FRAME_US; now_us += FRAME_US / 4) {
+        app_laser_wish(&laser, now_us / FRAME_US % 2 == 0, now_us);
+        app_laser_tick(&laser, now_us);
+        TEST_ASSERT_FALSE(fake.line && now_us >= 6 * FRAME_US);
+    }
+}
+
+static void test_interlock(void)
+{
+    start(true, 100);
+    app_laser_wish(&laser, true, 0);
+    fake.closed = false;
+    app_laser_interlock(&laser, 0);
+    TEST_ASSERT_FALSE(fake.line);
+    app_laser_wish(&laser, false, 0);
+    app_laser_wish(&laser, true, 0);
+    app_laser_frame(&laser, 0);
+    app_laser_tick(&laser, 0);
+    TEST_ASSERT_FALSE(fake.line);
+    fake.closed = true;
+    app_laser_interlock(&laser, 0);
+    TEST_ASSERT_TRUE(fake.line);
+}
+
+/* It opens between the look at it and the switching on. */
+static void test_interlock_race(void)
+{
+    start(true, 100);
+    fake.opens_after_read = true;
+    app_laser_wish(&laser, true, 0);
+    TEST_ASSERT_FALSE(fake.line);
+    TEST_ASSERT_EQUAL_INT(1, laser.on_count); /* it was on, for the time of one call */
+}
+
+/* Whatever is wished at whatever time: within any stretch of time no more than the duty and one
+ * burst. Judged by adding up the line's level, not by the policy's own sums. */
+static void test_duty(void)
+{
+    static const int32_t duties[] = {1, 10, 50, 90, 99};
+    enum { STEP_US = 1000, STEPS = 6000 };
+    static int64_t on_until_us[STEPS + 1];
+    uint32_t random = 1;
+    for (int d = 0; d < 5; d++) {
+        start(true, duties[d]);
+        bool wished = true;
+        int64_t due_us = 0;
+        on_until_us[0] = 0;
+        for (int step = 0; step < STEPS; step++) {
+            int64_t now_us = (int64_t)step * STEP_US;
+            random = random * 1664525u + 1013904223u;
+            if (step > STEPS / 2 && random >> 28 == 0) {
+                wished = !wished;
+            }
+            app_laser_frame(&laser, now_us);
+            app_laser_wish(&laser, wished, now_us);
+            if (due_us <= now_us || step > STEPS / 2) {
+                due_us = now_us + app_laser_tick(&laser, now_us);
+            }
+            on_until_us[step + 1] = on_until_us[step] + (fake.line ? STEP_US : 0);
+        }
+        for (int from = 0; from < STEPS; from += 7) {
+            for (int to = from + 1; to <= STEPS; to += 13) {
+                int64_t on_us = on_until_us[to] - on_until_us[from];
+                int64_t all_us = (int64_t)(to - from) * STEP_US;
+                int64_t most_us = duties[d] * (all_us + APP_LASER_BURST_US) / 100;
+                /* a step of this test is as coarse as 2 ms */
+                TEST_ASSERT_LESS_OR_EQUAL_INT64(most_us + 2 * STEP_US, on_us);
+            }
+        }
+        TEST_ASSERT_GREATER_THAN_INT64_MESSAGE((int64_t)duties[d] * STEPS / 2 * STEP_US / 200,
+                                               on_until_us[STEPS / 2], "the duty is hardly used");
+    }
+}
+
+static void test_beats_while_on(void)
+{
+    start(true, 100);
+    app_laser_wish(&laser, true, 0);
+    for (int64_t now_us = 0; now_us < 100000; now_us += 1000) {
+        app_laser_frame(&laser, now_us);
+        TEST_ASSERT_LESS_OR_EQUAL_INT64(APP_LASER_BEAT_US, app_laser_tick(&laser, now_us));
+    }
+    TEST_ASSERT_INT_WITHIN(1, 10, fake.beat_count);
+    app_laser_wish(&laser, false, 100000);
+    int beats = fake.beat_count;
+    app_laser_tick(&laser, 200000);
+    TEST_ASSERT_EQUAL_INT(beats, fake.beat_count);
+}
+
+/* Off fails once: tried again. For good: the lines are given back. Either way it is over. */
+static void test_off_fails(void)
+{
+    for (int failures = 1; failures <= 100; failures += 99) {
+        setUp();
+        start(true, 100);
+        app_laser_wish(&laser, true, 0);
+        fake.off_failures = failures;
+        app_laser_wish(&laser, false, 0);
+        TEST_ASSERT_FALSE(fake.line);
+        TEST_ASSERT_FALSE(fake.taken);
+        TEST_ASSERT_BITS_HIGH(APP_LASER_BLOCK_FAULT, laser.blocks);
+        TEST_ASSERT_EQUAL_STRING("off fails", laser.failed.text);
+        app_laser_wish(&laser, true, 0);
+        app_laser_interlock(&laser, 0);
+        app_laser_frame(&laser, 0);
+        app_laser_tick(&laser, 0);
+        app_laser_close(&laser, 0);
+        TEST_ASSERT_FALSE(fake.line);
+    }
+}
+
+static void test_on_fails(void)
+{
+    start(true, 100);
+    fake.on_fails = true;
+    app_laser_wish(&laser, true, 0);
+    TEST_ASSERT_FALSE(fake.line);
+    TEST_ASSERT_FALSE(fake.taken);
+    TEST_ASSERT_BITS_HIGH(APP_LASER_BLOCK_FAULT, laser.blocks);
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(test_on_needs_everything);
+    RUN_TEST(test_not_enabled_touches_nothing);
+    RUN_TEST(test_silence);
+    RUN_TEST(test_silence_is_not_forgotten);
+    RUN_TEST(test_interlock);
+    RUN_TEST(test_interlock_race);
+    RUN_TEST(test_duty);
+    RUN_TEST(test_beats_while_on);
+    RUN_TEST(test_off_fails);
+    RUN_TEST(test_on_fails);
+    return UNITY_END();
+}
