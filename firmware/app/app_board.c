@@ -1,0 +1,189 @@
+#include "app_board.h"
+
+#include <time.h>
+
+#include "app_rig.h"
+
+#define PROGRAM "isohead_board"
+
+static struct hal_v4l2_setting exposure_of(const struct app_config *config)
+{
+    switch (config->exposure) {
+    case APP_EXPOSURE_AUTO:
+        return (struct hal_v4l2_setting){.mode = HAL_V4L2_AUTO};
+    case APP_EXPOSURE_FIXED:
+        return (struct hal_v4l2_setting){HAL_V4L2_VALUE, config->exposure_us};
+    case APP_EXPOSURE_KEEP:
+    case APP_EXPOSURE_STEER: /* the loop sets it */
+        break;
+    }
+    return (struct hal_v4l2_setting){.mode = HAL_V4L2_KEEP};
+}
+
+static struct hal_v4l2_setting gain_of(const struct app_config *config)
+{
+    switch (config->gain) {
+    case APP_GAIN_AUTO:
+        return (struct hal_v4l2_setting){.mode = HAL_V4L2_AUTO};
+    case APP_GAIN_FIXED:
+        return (struct hal_v4l2_setting){HAL_V4L2_VALUE, config->gain_value};
+    case APP_GAIN_KEEP:
+        break;
+    }
+    return (struct hal_v4l2_setting){.mode = HAL_V4L2_KEEP};
+}
+
+static void open_log(struct app_board *board, const struct app_config *config)
+{
+    hal_log_open(&board->writer, PROGRAM,
+                 config->log == APP_MESSAGES_SYSLOG ? HAL_LOG_SYSLOG : NULL);
+    app_log_init(&board->log, hal_log_write, &board->writer, hal_clock.now_us(hal_clock.context));
+}
+
+static enum app_exit fail(struct app_board *board, const char *what, const struct hal_error *error,
+                          enum app_exit exit)
+{
+    app_log_say(&board->log, APP_LOG_ERROR, "%s: %s", what, error->text);
+    return exit;
+}
+
+static void init_gpio(struct app_board *board, const struct app_config *config)
+{
+    const struct hal_gpio_config gpio = {
+        .chip = config->gpio_chip,
+        .laser_line = config->laser_line,
+        .laser_active_low = config->laser_active_low,
+        .interlock_line = config->interlock_line,
+        .interlock_active_low = config->interlock_active_low,
+        .heartbeat_line = config->heartbeat_line,
+        .consumer = "isohead",
+    };
+    hal_gpio_init(&board->gpio, &gpio);
+    const struct hal_guard_config guard = {
+        .strobe = &board->gpio.strobe,
+        .line_fd = &board->gpio.laser_fd,
+        .timeout_ms = HAL_GUARD_TIMEOUT_MS,
+    };
+    hal_guard_init(&board->guard, &guard);
+}
+
+/* The camera has to have the rig's size. */
+static bool init_camera(struct app_board *board, const struct app_config *config,
+                        struct hal_error *error)
+{
+    struct ih_calibration calibration;
+    if (!app_rig_load(config->rig, &calibration, error)) {
+        return false;
+    }
+    const struct hal_v4l2_config v4l2 = {
+        .device = config->device,
+        .format = config->format,
+        .width = calibration.width,
+        .height = calibration.height,
+        .rate_mhz = config->rate_mhz,
+        .exposure = exposure_of(config),
+        .gain = gain_of(config),
+    };
+    hal_v4l2_init(&board->v4l2, &v4l2);
+    return true;
+}
+
+static bool open_output(struct app_board *board, const struct app_config *config,
+                        struct hal_error *error)
+{
+    switch (config->output) {
+    case APP_OUTPUT_UDP:
+        return hal_output_udp(&board->output, config->output_host, config->output_port, error);
+    case APP_OUTPUT_SERIAL:
+        return hal_output_serial(&board->output, config->output_path, config->output_baud,
+                                 &hal_clock, error);
+    case APP_OUTPUT_STDOUT:
+        break;
+    }
+    return hal_output_stdout(&board->output, error);
+}
+
+static enum app_exit run_loop(struct app_board *board, const struct app_config *config)
+{
+    const struct hal_events_config events = {
+        .camera_fd = &board->v4l2.fd,
+        .interlock_fd = &board->gpio.interlock_fd,
+        .signal_fd = &board->signals.fd,
+    };
+    hal_events_init(&board->events, &events);
+    board->loop.config = config;
+    board->loop.log = &board->log;
+    board->loop.head = &board->head;
+    board->loop.hal = (struct app_hal){
+        .camera = &board->v4l2.camera,
+        .strobe = &board->guard.strobe,
+        .events = &board->events.events,
+        .clock = &hal_clock,
+        .watchdog = &board->watchdog.watchdog,
+        .output = &board->output.output,
+    };
+    return app_loop_run(&board->loop);
+}
+
+static enum app_exit run_with_output(struct app_board *board, const struct app_config *config)
+{
+    struct hal_error error;
+    const struct hal_watchdog_config watchdog = {
+        .path = config->watchdog,
+        .guard = config->laser ? &board->guard : NULL,
+        .clock = &hal_clock,
+    };
+    if (!hal_signals_open(&board->signals, config->laser ? &board->guard.strobe : NULL, &error)) {
+        return fail(board, "signals", &error, APP_EXIT_FAILED);
+    }
+    if (!hal_watchdog_open(&board->watchdog, &watchdog, &error)) {
+        return fail(board, "watchdog", &error, APP_EXIT_FAILED);
+    }
+    enum app_exit exit = run_loop(board, config);
+    hal_watchdog_close(&board->watchdog);
+    return exit;
+}
+
+enum app_exit app_board_run(struct app_board *board, const struct app_config *config)
+{
+    struct hal_error error;
+    enum app_exit exit = APP_EXIT_FAILED;
+    open_log(board, config);
+    init_gpio(board, config);
+    if (!init_camera(board, config, &error)) {
+        exit = fail(board, config->rig, &error, APP_EXIT_USAGE);
+    } else if (!open_output(board, config, &error)) {
+        exit = fail(board, "output", &error, APP_EXIT_FAILED);
+    } else {
+        exit = run_with_output(board, config);
+        hal_output_close(&board->output);
+    }
+    hal_log_close(&board->writer);
+    return exit;
+}
+
+enum app_exit app_board_laser_off(struct app_board *board, const struct app_config *config)
+{
+    const struct timespec pause = {.tv_nsec = APP_BOARD_OFF_PAUSE_MS * 1000000L};
+    const struct hal_strobe *strobe = &board->gpio.strobe;
+    struct hal_error error = {"gpio-chip and laser-line: missing, nothing can be switched off"};
+    enum app_exit exit = APP_EXIT_USAGE;
+    open_log(board, config);
+    if (config->gpio_chip != NULL && config->laser_line != NULL) {
+        init_gpio(board, config);
+        exit = APP_EXIT_FAILED;
+        for (int i = 0; i < APP_BOARD_OFF_TRIES && exit != APP_EXIT_GOOD; i++) {
+            if (strobe->open(strobe->context, &error)) {
+                exit = APP_EXIT_GOOD;
+            } else {
+                nanosleep(&pause, NULL);
+            }
+        }
+        strobe->close(strobe->context);
+    }
+    if (exit != APP_EXIT_GOOD) {
+        fail(board, "laser", &error, exit);
+    }
+    hal_log_close(&board->writer);
+    return exit;
+}

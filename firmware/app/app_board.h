@@ -1,0 +1,48 @@
+/* app_board - the settings made into a Linux board: the only file of the program that knows hal/linux.
+ *
+ * What is opened stands in one struct of the caller's and is closed before app_board_run returns,
+ * the laser first. The strobe is opened before the camera: the guard process that it starts then
+ * has nothing of the camera's.
+ */
+#ifndef APP_BOARD_H
+#define APP_BOARD_H
+
+#include "app_config.h"
+#include "app_log.h"
+#include "app_loop.h"
+#include "isohead.h"
+#include "linux/hal_clock.h"
+#include "linux/hal_events.h"
+#include "linux/hal_gpio.h"
+#include "linux/hal_guard.h"
+#include "linux/hal_log.h"
+#include "linux/hal_output.h"
+#include "linux/hal_signals.h"
+#include "linux/hal_v4l2.h"
+#include "linux/hal_watchdog.h"
+
+/* How long --laser-off waits for a line that a dying program's guard still holds. */
+#define APP_BOARD_OFF_TRIES 100
+#define APP_BOARD_OFF_PAUSE_MS 20
+
+struct app_board {
+    struct hal_log_writer writer;
+    struct app_log log;
+    struct hal_v4l2 v4l2;
+    struct hal_gpio gpio;
+    struct hal_guard guard;
+    struct hal_signals signals;
+    struct hal_event_source events;
+    struct hal_watchdog_feeder watchdog;
+    struct hal_output_state output;
+    struct isohead head;
+    struct app_loop loop;
+};
+
+/* Frames in, records out, until asked to end. */
+enum app_exit app_board_run(struct app_board *board, const struct app_config *config);
+
+/* Only make the laser's line low and give it back. */
+enum app_exit app_board_laser_off(struct app_board *board, const struct app_config *config);
+
+#endif

@@ -1,0 +1,561 @@
+/* app_world - a camera, a laser line and time for tests of the board program's loop, all made up.
+ *
+ * A frame is exposed every 40 ms while the camera is open; it is lit when the laser's line is high
+ * then, and comes out of the camera `flight` frames later. Time passes only in wait(). The core is a
+ * double too: a frame has as many labels as its first byte says.
+ *
+ * Every call of the HAL goes through world_call, which counts it and lets the one that was chosen
+ * fail, once or from then on. And every call looks whether the laser may be on at this moment.
+ */
+#ifndef APP_WORLD_H
+#define APP_WORLD_H
+
+#include <stdio.h>
+#include <string.h>
+
+#include "app_loop.h"
+#include "app_rig.h"
+#include "unity.h"
+
+#define WORLD_FRAME_US 40000
+#define WORLD_LIT_LABELS 200
+#define WORLD_UNPLUGGED_US 300000
+#define WORLD_BUFFERS 16
+
+enum world_function {
+    WORLD_CAMERA_OPEN,
+    WORLD_CAMERA_NEXT_GONE,
+    WORLD_CAMERA_NEXT_BAD,
+    WORLD_CAMERA_NEXT_END,
+    WORLD_CAMERA_NEXT_NONE,
+    WORLD_CAMERA_EXPOSURE,
+    WORLD_STROBE_OPEN,
+    WORLD_STROBE_ON,      /* fails, and the line is low */
+    WORLD_STROBE_ON_HIGH, /* fails, and the line is high all the same */
+    WORLD_STROBE_OFF,
+    WORLD_STROBE_BEAT,
+    WORLD_STROBE_INTERLOCK,
+    WORLD_EVENTS_WAIT,
+    WORLD_EVENTS_NOTHING, /* an event goes by unseen */
+    WORLD_WATCHDOG_FEED,
+    WORLD_OUTPUT_NOT,
+    WORLD_OUTPUT_NEVER,
+    WORLD_FUNCTIONS
+};
+
+static const char *const world_function_text[WORLD_FUNCTIONS] = {
+    "camera.open",      "camera.next: gone",   "camera.next: bad frame",
+    "camera.next: end", "camera.next: none",   "camera.set_exposure",
+    "strobe.open",      "strobe.set on",       "strobe.set on, but high",
+    "strobe.set off",   "strobe.beat",         "strobe.interlock",
+    "events.wait",      "events.wait: unseen", "watchdog.feed",
+    "output.send: not", "output.send: never",
+};
+
+/* What happens at a frame's time, in place of the frame or with it. */
+enum world_act {
+    WORLD_FRAME = 0, /* as it should be */
+    WORLD_LOST,      /* the driver drops it */
+    WORLD_TWICE,     /* two are delivered at once */
+    WORLD_PAUSE,     /* nothing, the sequence goes on: late */
+    WORLD_HALF, /* exposed while the laser was switched: half of the labels that it would have */
+    WORLD_INTERLOCK_OPENS,
+    WORLD_INTERLOCK_CLOSES,
+    WORLD_INTERLOCK_BLINKS, /* opens and closes */
+    WORLD_RELOAD,
+    WORLD_UNPLUGGED, /* the camera is gone, and cannot be opened for a while */
+    WORLD_STOP
+};
+
+struct world {
+    /* Given. */
+    const enum world_act *act; /* of each frame's time, from 0; then WORLD_STOP */
+    int act_count;
+    int flight;
+    enum world_function fault;
+    int fault_call; /* which call of it fails, from 1; 0: none */
+    bool fault_stays;
+    const char *next_rig; /* from the next reload on; NULL: the same */
+    /* The world. */
+    int64_t now_us, next_us;
+    int act_index;
+    bool line, line_taken, interlock_closed, interlock_event, interlock_opened;
+    bool camera_open;
+    int64_t unplugged_until_us;
+    int64_t sequence;
+    struct hal_frame queue[WORLD_BUFFERS];
+    int queue_count;
+    uint8_t labels[WORLD_BUFFERS];
+    char names[WORLD_BUFFERS][24];
+    bool held[WORLD_BUFFERS];
+    unsigned events;
+    /* What it saw. */
+    int calls[WORLD_FUNCTIONS];
+    bool fault_done;
+    int64_t on_since_us; /* of the line, without a frame */
+    int record_count, lit_count, dark_count, error_count, ambient_count;
+    int rise_count, beat_count;
+    size_t records_length;
+    char records[16384];
+    int waits;
+    /* The board program. */
+    struct app_config config;
+    struct app_log log;
+    struct app_loop loop;
+    struct hal_camera camera;
+    struct hal_strobe strobe;
+    struct hal_events event_table;
+    struct hal_clock clock;
+    struct hal_watchdog watchdog;
+    struct hal_output output;
+};
+
+static struct world world;
+static struct isohead world_head; /* its content does not matter */
+static bool world_quiet = true;
+
+/* Doubles of the rig file and of the core. */
+bool app_rig_load(const char *path, struct ih_calibration *calibration, struct hal_error *error)
+{
+    *calibration = (struct ih_calibration){.kind = IH_RIG_DOTS, .width = 752, .height = 582};
+    calibration->kind = strcmp(path, "range") == 0 ? IH_RIG_RANGE : IH_RIG_DOTS;
+    calibration->width = strcmp(path, "narrow") == 0 ? 640 : 752;
+    return strcmp(path, "bad") == 0 ? hal_fail(error, "near_mm: missing") : true;
+}
+
+enum ih_err isohead_init(struct isohead *head, const struct ih_calibration *calibration,
+                         int32_t *bad_slot)
+{
+    *bad_slot = IH_NONE;
+    head->rig.calibration = *calibration;
+    return IH_OK;
+}
+
+enum ih_err isohead_label(struct isohead *head, const struct ih_frame *frame,
+                          const struct ih_frame *ambient)
+{
+    if (frame->width != head->rig.calibration.width) {
+        return IH_ERR_SIZE;
+    }
+    head->labels.labelled_count = *(const uint8_t *)frame->samples;
+    head->dots.dot_count = head->labels.labelled_count;
+    if (ambient != NULL) {
+        TEST_ASSERT_EQUAL_INT(0, *(const uint8_t *)ambient->samples);
+        world.ambient_count++;
+    }
+    return IH_OK;
+}
+
+void isohead_find(struct isohead *head, int64_t time_us)
+{
+    (void)time_us;
+    head->result.entry_count = 0;
+    head->result.head_count = 0;
+    head->result.selected = IH_NONE;
+    if (head->labels.labelled_count > 0) {
+        world.lit_count++;
+    } else {
+        world.dark_count++;
+    }
+}
+
+const char *ih_err_text(enum ih_err err)
+{
+    return err == IH_ERR_SIZE ? "size" : "error";
+}
+
+const char *ih_reject_text(int32_t reject)
+{
+    (void)reject;
+    return NULL;
+}
+
+/* May the laser be on now? Silence is measured as the policy promises it: while it is on. */
+static void world_look(void)
+{
+    if (!world.line) {
+        return;
+    }
+    TEST_ASSERT_TRUE_MESSAGE(world.config.laser, "on though nobody asked for it");
+    TEST_ASSERT_TRUE_MESSAGE(world.line_taken, "on though the line was given back");
+}
+
+/* What holds whenever the loop waits, and no later. */
+static void world_look_waiting(void)
+{
+    world_look();
+    if (!world.line) {
+        return;
+    }
+    TEST_ASSERT_TRUE_MESSAGE(world.camera_open, "on without a camera");
+    TEST_ASSERT_TRUE_MESSAGE(world.interlock_closed, "on with the interlock open");
+    TEST_ASSERT_TRUE_MESSAGE(world.now_us - world.on_since_us <= 3 * WORLD_FRAME_US,
+                             "on for more than 3 frame times without a frame");
+}
+
+/* True: this call is to fail. */
+static bool world_call(enum world_function function)
+{
+    world_look();
+    world.calls[function]++;
+    bool hit = world.fault_call != 0 && function == world.fault &&
+               (world.calls[function] == world.fault_call ||
+                (world.fault_stays && world.calls[function] > world.fault_call));
+    world.fault_done |= hit;
+    return hit;
+}
+
+static bool world_camera_open(void *context, struct hal_error *error)
+{
+    (void)context;
+    TEST_ASSERT_FALSE(world.camera_open);
+    TEST_ASSERT_FALSE_MESSAGE(world.line, "on while the camera is opened");
+    if (world_call(WORLD_CAMERA_OPEN) || world.now_us < world.unplugged_until_us) {
+        return hal_fail(error, "no such device");
+    }
+    world.camera_open = true;
+    world.queue_count = 0;
+    world.sequence = 0;
+    world.next_us = world.now_us + WORLD_FRAME_US;
+    world.events &= ~(unsigned)HAL_EVENT_FRAME;
+    return true;
+}
+
+static void world_camera_close(void *context)
+{
+    (void)context;
+    TEST_ASSERT_FALSE_MESSAGE(world.line, "on while the camera is closed");
+    for (int i = 0; i < WORLD_BUFFERS; i++) {
+        TEST_ASSERT_FALSE_MESSAGE(world.held[i], "a frame is held beyond the camera's end");
+    }
+    world.camera_open = false;
+    world.queue_count = 0;
+    world.events &= ~(unsigned)HAL_EVENT_FRAME;
+}
+
+static enum hal_next world_camera_next(void *context, struct hal_frame *frame,
+                                       struct hal_error *error)
+{
+    (void)context;
+    TEST_ASSERT_TRUE(world.camera_open);
+    if (world_call(WORLD_CAMERA_NEXT_GONE) || world.now_us < world.unplugged_until_us) {
+        hal_fail(error, "no such device");
+        return HAL_NEXT_GONE;
+    }
+    if (world_call(WORLD_CAMERA_NEXT_END)) {
+        return HAL_NEXT_END;
+    }
+    if (world_call(WORLD_CAMERA_NEXT_NONE) || world.queue_count <= world.flight) {
+        return HAL_NEXT_NONE;
+    }
+    *frame = world.queue[0];
+    world.queue_count--;
+    memmove(&world.queue[0], &world.queue[1], (size_t)world.queue_count * sizeof world.queue[0]);
+    if (world_call(WORLD_CAMERA_NEXT_BAD)) {
+        hal_fail(error, "short frame");
+        frame->samples = NULL;
+        world.on_since_us = world.now_us;
+        return HAL_NEXT_BAD;
+    }
+    int held = 0;
+    world.held[frame->buffer_index] = true;
+    for (int i = 0; i < WORLD_BUFFERS; i++) {
+        held += world.held[i];
+    }
+    TEST_ASSERT_LESS_OR_EQUAL_INT(HAL_CAMERA_HOLD_MAX + 1, held);
+    world.on_since_us = world.now_us;
+    return HAL_NEXT_FRAME;
+}
+
+static void world_camera_release(void *context, const struct hal_frame *frame)
+{
+    (void)context;
+    TEST_ASSERT_TRUE_MESSAGE(world.held[frame->buffer_index], "released twice");
+    world.held[frame->buffer_index] = false;
+}
+
+static bool world_camera_exposure(void *context, int32_t exposure_us, struct hal_error *error)
+{
+    (void)context;
+    TEST_ASSERT_GREATER_THAN_INT32(0, exposure_us);
+    return world_call(WORLD_CAMERA_EXPOSURE) ? hal_fail(error, "busy") : true;
+}
+
+static int32_t world_camera_frame_time(void *context)
+{
+    (void)context;
+    return WORLD_FRAME_US;
+}
+
+static bool world_strobe_open(void *context, struct hal_error *error)
+{
+    (void)context;
+    if (world_call(WORLD_STROBE_OPEN)) {
+        return hal_fail(error, "line 3: busy");
+    }
+    world.line_taken = true;
+    world.line = false;
+    return true;
+}
+
+/* The line falls with its pull-down. */
+static void world_strobe_close(void *context)
+{
+    (void)context;
+    world.line = false;
+    world.line_taken = false;
+}
+
+static bool world_strobe_set(void *context, bool on, struct hal_error *error)
+{
+    (void)context;
+    TEST_ASSERT_TRUE(world.line_taken);
+    if (!on) {
+        if (world_call(WORLD_STROBE_OFF)) {
+            return hal_fail(error, "cannot be set"); /* and the line is as it was */
+        }
+        world.line = false;
+        return true;
+    }
+    if (world_call(WORLD_STROBE_ON)) {
+        return hal_fail(error, "cannot be set");
+    }
+    world.rise_count += !world.line;
+    world.on_since_us = world.line ? world.on_since_us : world.now_us;
+    world.line = true;
+    return world_call(WORLD_STROBE_ON_HIGH) ? hal_fail(error, "no answer") : true;
+}
+
+static bool world_strobe_beat(void *context, struct hal_error *error)
+{
+    (void)context;
+    world.beat_count++;
+    return world_call(WORLD_STROBE_BEAT) ? hal_fail(error, "cannot be set") : true;
+}
+
+static bool world_strobe_interlock(void *context, bool *closed, struct hal_error *error)
+{
+    (void)context;
+    if (world_call(WORLD_STROBE_INTERLOCK)) {
+        return hal_fail(error, "cannot be read");
+    }
+    *closed = world.interlock_closed && !world.interlock_opened;
+    world.interlock_opened = false;
+    return true;
+}
+
+static void world_push(bool is_half)
+{
+    struct hal_frame *frame = &world.queue[world.queue_count];
+    int buffer = 0;
+    bool used = true;
+    while (used) { /* a buffer that is neither held nor waiting */
+        used = world.held[buffer];
+        for (int i = 0; i < world.queue_count; i++) {
+            used |= world.queue[i].buffer_index == buffer;
+        }
+        buffer += used;
+    }
+    TEST_ASSERT_LESS_THAN_INT(WORLD_BUFFERS, buffer);
+    world.labels[buffer] = (uint8_t)(world.line ? WORLD_LIT_LABELS / (is_half ? 5 : 1) : 0);
+    snprintf(world.names[buffer], sizeof world.names[buffer], "%06lld.pgm",
+             (long long)world.sequence);
+    *frame = (struct hal_frame){
+        .samples = &world.labels[buffer],
+        .width = 752,
+        .height = 582,
+        .stride_bytes = 752,
+        .bytes_per_sample = 1,
+        .maximum = 255,
+        .time_us = world.now_us,
+        .sequence = world.sequence,
+        .laser = true,
+        .name = world.names[buffer],
+        .buffer_index = buffer,
+    };
+    world.queue_count++;
+}
+
+/* What happens at a frame's time. */
+static void world_step(void)
+{
+    enum world_act act =
+        world.act_index < world.act_count ? world.act[world.act_index] : WORLD_STOP;
+    world.act_index++;
+    world.next_us += WORLD_FRAME_US;
+    switch (act) {
+    case WORLD_STOP:
+        world.events |= HAL_EVENT_STOP;
+        return;
+    case WORLD_UNPLUGGED:
+        world.unplugged_until_us = world.now_us + WORLD_UNPLUGGED_US;
+        world.events |= HAL_EVENT_FRAME;
+        return;
+    case WORLD_RELOAD:
+        world.config.rig = world.next_rig != NULL ? world.next_rig : world.config.rig;
+        world.events |= HAL_EVENT_RELOAD;
+        break;
+    case WORLD_INTERLOCK_OPENS:
+        world.interlock_closed = false;
+        world.interlock_opened = true;
+        world.events |= HAL_EVENT_INTERLOCK;
+        break;
+    case WORLD_INTERLOCK_BLINKS:
+        world.interlock_opened = true;
+        world.events |= HAL_EVENT_INTERLOCK;
+        break;
+    case WORLD_INTERLOCK_CLOSES:
+        world.interlock_closed = true;
+        world.events |= HAL_EVENT_INTERLOCK;
+        break;
+    default:
+        break;
+    }
+    if (!world.camera_open) {
+        return;
+    }
+    if (act == WORLD_PAUSE) {
+        return;
+    }
+    if (act != WORLD_LOST) {
+        world_push(act == WORLD_HALF);
+    }
+    world.sequence++;
+    if (act == WORLD_TWICE) {
+        world_push(false);
+        world.sequence++;
+    }
+    if (world.queue_count > world.flight) {
+        world.events |= HAL_EVENT_FRAME;
+    }
+}
+
+static bool world_wait(void *context, int64_t timeout_us, unsigned *events, struct hal_error *error)
+{
+    (void)context;
+    TEST_ASSERT_GREATER_OR_EQUAL_INT64(0, timeout_us);
+    TEST_ASSERT_LESS_THAN_INT_MESSAGE(100000, ++world.waits, "the loop does not end");
+    if (world_call(WORLD_EVENTS_WAIT)) {
+        return hal_fail(error, "bad descriptor");
+    }
+    int64_t until_us = world.now_us + timeout_us;
+    if (world.events == 0 && world.next_us <= until_us) {
+        world.now_us = world.next_us > world.now_us ? world.next_us : world.now_us;
+        world_look_waiting();
+        world_step();
+    } else if (world.events == 0) {
+        world.now_us = until_us;
+        world_look_waiting();
+    }
+    world.now_us += 100; /* however quick, no call takes no time */
+    *events = world.events;
+    /* a signal that was seen is gone; frames stay until they are taken */
+    world.events &= world.queue_count > world.flight ? (unsigned)HAL_EVENT_FRAME : 0;
+    if (world_call(WORLD_EVENTS_NOTHING) && (*events & HAL_EVENT_STOP) == 0) {
+        *events = 0;
+    }
+    return true;
+}
+
+static int64_t world_now(void *context)
+{
+    (void)context;
+    return world.now_us;
+}
+
+static bool world_feed(void *context, struct hal_error *error)
+{
+    (void)context;
+    return world_call(WORLD_WATCHDOG_FEED) ? hal_fail(error, "the guard is gone") : true;
+}
+
+static enum hal_sent world_send(void *context, const char *bytes, size_t count,
+                                struct hal_error *error)
+{
+    (void)context;
+    TEST_ASSERT_EQUAL_INT('\n', bytes[count - 1]);
+    if (world_call(WORLD_OUTPUT_NOT)) {
+        return HAL_SENT_NOT;
+    }
+    if (world_call(WORLD_OUTPUT_NEVER)) {
+        hal_fail(error, "closed");
+        return HAL_SENT_NEVER;
+    }
+    world.record_count++;
+    size_t length = world.records_length;
+    TEST_ASSERT_LESS_THAN_UINT(sizeof world.records, length + count + 1);
+    memcpy(world.records + length, bytes, count);
+    world.records[length + count] = '\0';
+    world.records_length += count;
+    world.error_count += strstr(world.records + length, "\"error\"") != NULL;
+    return HAL_SENT;
+}
+
+static void world_write(void *context, int level, const char *text)
+{
+    (void)context;
+    if (!world_quiet) {
+        printf("%lld <%d> %s\n", (long long)world.now_us, level, text);
+    }
+}
+
+/* A world at its beginning; the caller changes what it wants before world_run. */
+static void world_init(enum app_strobe strobe, const enum world_act *act, int act_count)
+{
+    memset(&world, 0, sizeof world);
+    world.act = act;
+    world.act_count = act_count;
+    world.now_us = 1000000;
+    world.next_us = world.now_us + WORLD_FRAME_US;
+    world.interlock_closed = true;
+    world.config.rig = "good";
+    world.config.device = "made up";
+    world.config.rate_mhz = 25000;
+    world.config.laser = true;
+    world.config.strobe = strobe;
+    world.config.duty_percent = 100;
+    world.config.exposure = APP_EXPOSURE_KEEP;
+    app_log_init(&world.log, world_write, NULL, world.now_us);
+    world.camera = (struct hal_camera){
+        .open = world_camera_open,
+        .close = world_camera_close,
+        .next = world_camera_next,
+        .release = world_camera_release,
+        .set_exposure = world_camera_exposure,
+        .frame_time_us = world_camera_frame_time,
+    };
+    world.strobe = (struct hal_strobe){
+        .open = world_strobe_open,
+        .close = world_strobe_close,
+        .set = world_strobe_set,
+        .beat = world_strobe_beat,
+        .interlock = world_strobe_interlock,
+    };
+    world.event_table = (struct hal_events){.wait = world_wait};
+    world.clock = (struct hal_clock){.now_us = world_now};
+    world.watchdog = (struct hal_watchdog){.feed = world_feed};
+    world.output = (struct hal_output){.send = world_send};
+    world.loop.config = &world.config;
+    world.loop.log = &world.log;
+    world.loop.head = &world_head;
+    world.loop.hal = (struct app_hal){
+        .camera = &world.camera,
+        .strobe = &world.strobe,
+        .events = &world.event_table,
+        .clock = &world.clock,
+        .watchdog = &world.watchdog,
+        .output = &world.output,
+    };
+}
+
+/* Until it ends; then the line is low and nothing is held. */
+static enum app_exit world_run(void)
+{
+    enum app_exit exit = app_loop_run(&world.loop);
+    TEST_ASSERT_FALSE_MESSAGE(world.line, "the laser is on at the end");
+    TEST_ASSERT_FALSE_MESSAGE(world.line_taken, "the line is still taken at the end");
+    TEST_ASSERT_FALSE_MESSAGE(world.camera_open, "the camera is open at the end");
+    return exit;
+}
+
+#endif

@@ -1,0 +1,311 @@
+/* app_loop and app_frame in a made-up world (app_world.h), every call of the HAL failing in turn. */
+#include "app_world.h"
+
+#define COUNT(acts) ((int)(sizeof(acts) / sizeof(acts)[0]))
+#define FIVE WORLD_FRAME, WORLD_FRAME, WORLD_FRAME, WORLD_FRAME, WORLD_FRAME
+#define TWENTY FIVE, FIVE, FIVE, FIVE
+
+void setUp(void)
+{
+}
+
+void tearDown(void)
+{
+}
+
+/* How often a text stands in the records. */
+static int count_in_records(const char *text)
+{
+    int count = 0;
+    for (const char *at = world.records; (at = strstr(at, text)) != NULL; at++) {
+        count++;
+    }
+    return count;
+}
+
+static void test_gated_takes_every_frame(void)
+{
+    static const enum world_act acts[] = {TWENTY};
+    world_init(APP_STROBE_GATED, acts, COUNT(acts));
+    TEST_ASSERT_EQUAL_INT(APP_EXIT_GOOD, world_run());
+    TEST_ASSERT_EQUAL_INT(20, world.lit_count);
+    TEST_ASSERT_EQUAL_INT(20, world.record_count);
+    TEST_ASSERT_EQUAL_INT(0, world.dark_count);
+    TEST_ASSERT_EQUAL_INT(21, world.rise_count); /* one for the frame that did not come any more */
+    TEST_ASSERT_EQUAL_INT(0, count_in_records("lost") + count_in_records("skipped"));
+}
+
+/* Frames in flight were exposed before the laser was on: none of them counts. */
+static void test_gated_with_frames_in_flight(void)
+{
+    static const enum world_act acts[] = {TWENTY, TWENTY};
+    for (int flight = 1; flight <= 4; flight++) {
+        world_init(APP_STROBE_GATED, acts, COUNT(acts));
+        world.flight = flight;
+        TEST_ASSERT_EQUAL_INT(APP_EXIT_GOOD, world_run());
+        TEST_ASSERT_EQUAL_INT(0, world.dark_count);
+        TEST_ASSERT_GREATER_THAN_INT(20, world.lit_count);
+    }
+}
+
+static void test_alternating(void)
+{
+    static const enum world_act acts[] = {TWENTY};
+    world_init(APP_STROBE_ALTERNATING, acts, COUNT(acts));
+    TEST_ASSERT_EQUAL_INT(APP_EXIT_GOOD, world_run());
+    TEST_ASSERT_EQUAL_INT(10, world.lit_count);
+    TEST_ASSERT_EQUAL_INT(10, world.record_count);
+    TEST_ASSERT_EQUAL_INT(9, world.ambient_count); /* all lit ones but the first */
+    TEST_ASSERT_EQUAL_INT(0, count_in_records("skipped"));
+    for (int flight = 1; flight <= 4; flight++) {
+        world_init(APP_STROBE_ALTERNATING, acts, COUNT(acts));
+        world.flight = flight;
+        TEST_ASSERT_EQUAL_INT(APP_EXIT_GOOD, world_run());
+        TEST_ASSERT_EQUAL_INT(0, world.dark_count);
+        TEST_ASSERT_GREATER_OR_EQUAL_INT(6, world.lit_count);
+        TEST_ASSERT_GREATER_THAN_INT(0, world.ambient_count);
+    }
+}
+
+static void test_always(void)
+{
+    static const enum world_act acts[] = {TWENTY};
+    for (int flight = 0; flight <= 4; flight++) {
+        world_init(APP_STROBE_ALWAYS, acts, COUNT(acts));
+        world.flight = flight;
+        TEST_ASSERT_EQUAL_INT(APP_EXIT_GOOD, world_run());
+        TEST_ASSERT_EQUAL_INT(0, world.dark_count);
+        if (flight < 3) {
+            TEST_ASSERT_EQUAL_INT(20 - flight, world.lit_count);
+            TEST_ASSERT_EQUAL_INT(1, world.rise_count);
+        } else { /* the first frame comes too late for the laser to stay on until then */
+            TEST_ASSERT_GREATER_OR_EQUAL_INT(20 - 2 * flight, world.lit_count);
+            TEST_ASSERT_EQUAL_INT(2, world.rise_count);
+        }
+    }
+}
+
+/* The second record after a disturbance at the latest is as if nothing had been. */
+static void test_lost_twice_half(void)
+{
+    static const enum world_act disturbances[] = {WORLD_LOST, WORLD_TWICE, WORLD_HALF};
+    static const char *const told[] = {"\"lost\":1", "\"skipped\":1", "\"skipped\":1"};
+    for (int i = 0; i < 3; i++) {
+        enum world_act acts[] = {FIVE, disturbances[i], FIVE, FIVE};
+        world_init(APP_STROBE_GATED, acts, COUNT(acts));
+        TEST_ASSERT_EQUAL_INT(APP_EXIT_GOOD, world_run());
+        TEST_ASSERT_EQUAL_INT(0, world.dark_count);
+        TEST_ASSERT_GREATER_OR_EQUAL_INT(15, world.lit_count);
+        TEST_ASSERT_EQUAL_INT(1, count_in_records(told[i]));
+        world_init(APP_STROBE_ALTERNATING, acts, COUNT(acts));
+        TEST_ASSERT_EQUAL_INT(APP_EXIT_GOOD, world_run());
+        TEST_ASSERT_EQUAL_INT(0, world.dark_count);
+        TEST_ASSERT_GREATER_OR_EQUAL_INT(7, world.lit_count);
+    }
+}
+
+/* Frames stop: off within 3 frame times (world_look_waiting sees to that), and on again. */
+static void test_late(void)
+{
+    static const enum world_act acts[] = {FIVE,        WORLD_PAUSE, WORLD_PAUSE, WORLD_PAUSE,
+                                          WORLD_PAUSE, WORLD_PAUSE, WORLD_PAUSE, TWENTY};
+    for (int mode = 0; mode < 3; mode++) {
+        world_init((enum app_strobe)mode, acts, COUNT(acts));
+        TEST_ASSERT_EQUAL_INT(APP_EXIT_GOOD, world_run());
+        TEST_ASSERT_EQUAL_INT(0, world.dark_count);
+        TEST_ASSERT_EQUAL_INT(1, count_in_records("\"strobe\":\"late\""));
+        TEST_ASSERT_GREATER_OR_EQUAL_INT(mode == APP_STROBE_ALTERNATING ? 11 : 23, world.lit_count);
+        TEST_ASSERT_EQUAL_INT(1, world.calls[WORLD_CAMERA_OPEN]);
+    }
+}
+
+/* Frames stay away: the camera is opened anew. */
+static void test_silent(void)
+{
+    enum world_act acts[60];
+    for (int i = 0; i < COUNT(acts); i++) {
+        acts[i] = i >= 5 && i < 45 ? WORLD_PAUSE : WORLD_FRAME;
+    }
+    world_init(APP_STROBE_GATED, acts, COUNT(acts));
+    TEST_ASSERT_EQUAL_INT(APP_EXIT_GOOD, world_run());
+    TEST_ASSERT_GREATER_THAN_INT(1, world.calls[WORLD_CAMERA_OPEN]);
+    TEST_ASSERT_EQUAL_INT(1, count_in_records("\"strobe\":\"reopened\""));
+    TEST_ASSERT_GREATER_OR_EQUAL_INT(18, world.lit_count);
+}
+
+static void test_interlock(void)
+{
+    static const enum world_act acts[] = {
+        FIVE, WORLD_INTERLOCK_OPENS, TWENTY, WORLD_INTERLOCK_CLOSES, FIVE, FIVE};
+    for (int mode = 0; mode < 3; mode++) {
+        world_init((enum app_strobe)mode, acts, COUNT(acts));
+        TEST_ASSERT_EQUAL_INT(APP_EXIT_GOOD, world_run());
+        TEST_ASSERT_EQUAL_INT_MESSAGE(0, world.dark_count,
+                                      "a dark frame was taken for an empty seat");
+        TEST_ASSERT_GREATER_OR_EQUAL_INT(mode == APP_STROBE_ALTERNATING ? 7 : 14, world.lit_count);
+        TEST_ASSERT_LESS_OR_EQUAL_INT(17, world.lit_count);
+    }
+}
+
+static void test_interlock_blinks(void)
+{
+    static const enum world_act acts[] = {FIVE, WORLD_INTERLOCK_BLINKS, FIVE};
+    world_init(APP_STROBE_ALWAYS, acts, COUNT(acts));
+    TEST_ASSERT_EQUAL_INT(APP_EXIT_GOOD, world_run());
+    TEST_ASSERT_EQUAL_INT(2, world.rise_count); /* off in between, though it was too short to see */
+}
+
+static void test_unplugged(void)
+{
+    static const enum world_act acts[] = {FIVE, WORLD_UNPLUGGED, TWENTY, TWENTY, TWENTY, TWENTY};
+    world_init(APP_STROBE_ALTERNATING, acts, COUNT(acts));
+    TEST_ASSERT_EQUAL_INT(APP_EXIT_GOOD, world_run());
+    TEST_ASSERT_GREATER_THAN_INT(2, world.calls[WORLD_CAMERA_OPEN]);
+    TEST_ASSERT_LESS_THAN_INT(8, world.calls[WORLD_CAMERA_OPEN]); /* each try later than the last */
+    TEST_ASSERT_EQUAL_INT(1, count_in_records("\"strobe\":\"reopened\""));
+    TEST_ASSERT_GREATER_THAN_INT(20, world.lit_count);
+}
+
+static void test_reload(void)
+{
+    static const enum world_act acts[] = {FIVE, WORLD_RELOAD, FIVE};
+    world_init(APP_STROBE_GATED, acts, COUNT(acts));
+    TEST_ASSERT_EQUAL_INT(APP_EXIT_GOOD, world_run());
+    TEST_ASSERT_EQUAL_INT(11, world.lit_count);
+}
+
+/* Not to be read, of another kind, or of another size: laser off, no records. */
+static void test_reload_bad(void)
+{
+    static const enum world_act acts[] = {FIVE, WORLD_RELOAD, TWENTY};
+    static const char *const rigs[] = {"bad", "range", "narrow"};
+    for (int i = 0; i < 3; i++) {
+        world_init(APP_STROBE_GATED, acts, COUNT(acts));
+        world.next_rig = rigs[i];
+        TEST_ASSERT_EQUAL_INT(APP_EXIT_GOOD, world_run());
+        TEST_ASSERT_LESS_OR_EQUAL_INT(6, world.lit_count);
+        TEST_ASSERT_LESS_OR_EQUAL_INT(7, world.rise_count);
+        TEST_ASSERT_EQUAL_INT(0, world.dark_count);
+    }
+}
+
+static void test_no_rig(void)
+{
+    static const enum world_act acts[] = {FIVE};
+    world_init(APP_STROBE_GATED, acts, COUNT(acts));
+    world.config.rig = "bad";
+    TEST_ASSERT_EQUAL_INT(APP_EXIT_USAGE, world_run());
+    TEST_ASSERT_EQUAL_INT(0, world.calls[WORLD_STROBE_OPEN]);
+}
+
+static void test_without_laser(void)
+{
+    static const enum world_act acts[] = {TWENTY};
+    world_init(APP_STROBE_ALTERNATING, acts, COUNT(acts));
+    world.config.laser = false;
+    TEST_ASSERT_EQUAL_INT(APP_EXIT_GOOD, world_run());
+    TEST_ASSERT_EQUAL_INT(20, world.dark_count); /* every frame is taken */
+    TEST_ASSERT_EQUAL_INT(0, world.calls[WORLD_STROBE_OPEN]);
+    TEST_ASSERT_EQUAL_INT(0, world.rise_count);
+}
+
+static void test_nothing_in_range(void)
+{
+    /* No frame shows dots, as in an empty hall: still a record now and then, saying so. */
+    enum world_act acts[40];
+    for (int i = 0; i < COUNT(acts); i++) {
+        acts[i] = WORLD_INTERLOCK_CLOSES; /* a frame, and an event that changes nothing */
+    }
+    world_init(APP_STROBE_GATED, acts, COUNT(acts));
+    world.flight = 0;
+    world.config.duty_percent = 100;
+    world.config.exposure = APP_EXPOSURE_STEER;
+    TEST_ASSERT_EQUAL_INT(APP_EXIT_GOOD, world_run());
+    TEST_ASSERT_EQUAL_INT(40, world.lit_count);
+}
+
+/* Every kind of thing that can happen, for the faults. */
+static const enum world_act eventful[] = {
+    FIVE,        WORLD_LOST,
+    WORLD_FRAME, WORLD_TWICE,
+    WORLD_FRAME, WORLD_HALF,
+    WORLD_FRAME, WORLD_INTERLOCK_OPENS,
+    WORLD_FRAME, WORLD_INTERLOCK_CLOSES,
+    FIVE,        WORLD_PAUSE,
+    WORLD_PAUSE, WORLD_PAUSE,
+    WORLD_PAUSE, WORLD_PAUSE,
+    WORLD_FRAME, WORLD_RELOAD,
+    FIVE,        WORLD_INTERLOCK_BLINKS,
+    FIVE,        WORLD_UNPLUGGED,
+    FIVE,        FIVE,
+};
+
+static void init_eventful(int mode, int flight)
+{
+    world_init((enum app_strobe)mode, eventful, COUNT(eventful));
+    world.flight = flight;
+    world.config.exposure = APP_EXPOSURE_STEER;
+    world.config.duty_percent = 90;
+}
+
+/* Runs with a fault at each call of a function; false in counts: none at all. */
+static int fail_each_call(enum world_function function, int mode, int flight, bool stays)
+{
+    init_eventful(mode, flight);
+    world_run();
+    int calls = world.calls[function];
+    for (int call = 1; call <= calls; call++) {
+        char message[128];
+        init_eventful(mode, flight);
+        world.fault = function;
+        world.fault_call = call;
+        world.fault_stays = stays;
+        snprintf(message, sizeof message, "%s, call %d, mode %d, flight %d, %s",
+                 world_function_text[function], call, mode, flight, stays ? "for good" : "once");
+        world_run();
+        TEST_ASSERT_TRUE_MESSAGE(world.fault_done, message);
+    }
+    return calls;
+}
+
+static void test_every_call_fails(void)
+{
+    int all = 0;
+    printf("faults injected: calls of each function, three modes, without and with 2 frames in "
+           "flight,\nonce and for good; line low after every one\n");
+    for (int function = 0; function < WORLD_FUNCTIONS; function++) {
+        int sum = 0;
+        for (int mode = 0; mode < 3; mode++) {
+            for (int flight = 0; flight <= 2; flight += 2) {
+                int calls = fail_each_call((enum world_function)function, mode, flight, false);
+                TEST_ASSERT_GREATER_THAN_INT_MESSAGE(0, calls, world_function_text[function]);
+                sum += calls + fail_each_call((enum world_function)function, mode, flight, true);
+            }
+        }
+        printf("  %-24s %5d\n", world_function_text[function], sum);
+        all += sum;
+    }
+    printf("  %-24s %5d\n", "all", all);
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(test_gated_takes_every_frame);
+    RUN_TEST(test_gated_with_frames_in_flight);
+    RUN_TEST(test_alternating);
+    RUN_TEST(test_always);
+    RUN_TEST(test_lost_twice_half);
+    RUN_TEST(test_late);
+    RUN_TEST(test_silent);
+    RUN_TEST(test_interlock);
+    RUN_TEST(test_interlock_blinks);
+    RUN_TEST(test_unplugged);
+    RUN_TEST(test_reload);
+    RUN_TEST(test_reload_bad);
+    RUN_TEST(test_no_rig);
+    RUN_TEST(test_without_laser);
+    RUN_TEST(test_nothing_in_range);
+    RUN_TEST(test_every_call_fails);
+    return UNITY_END();
+}
