@@ -6,7 +6,7 @@
            the stages through isohead.h alone. Of the system: fixed-width integers, bool, size_t and
            string.h, nothing that does I/O, allocates or knows floating point.
   hal      hal.h, what all back ends share, its own files and the system; never firmware.
-  app      core, hal.h, its own files; of the back ends only app_board.c knows one, hal/linux.
+  app      core, hal.h, its own files; of the back ends only app_board knows one, hal/linux.
   sim      core, the app's records and rig, hal, its own files.
   render   its own files and the system: what draws the frames shares no line with what reads them.
   tests    anything.
@@ -100,7 +100,7 @@ def judge_app(path, quoted, target):
     if not quoted or is_core(target):
         return None
     good = re.fullmatch(r"app_\w+\.h|hal\.h|hal_file\.h", target)
-    if os.path.basename(path) == "app_board.c":
+    if os.path.basename(path).startswith("app_board."):
         good = good or re.fullmatch(r"linux/hal_\w+\.h", target)
     return None if good else "the app includes the core, hal.h and its own files"
 
