@@ -14,9 +14,10 @@
 #include <time.h>
 #include <unistd.h>
 
-/* Longest line with all that stands before its text. Standard error takes it whole where it says
- * that there is room, as a pipe has this much then. */
+/* Longest line with all that stands before its text. A pipe that says it has room has room for it. */
 #define LINE_MAX_BYTES 1024
+/* And a terminal for this, with line ends doubled: its buffers are of 256 bytes and more. */
+#define TERMINAL_PIECE 128
 _Static_assert(LINE_MAX_BYTES <= PIPE_BUF, "");
 /* Syslog's number of the facility "daemon". */
 #define FACILITY_DAEMON (3 << 3)
@@ -34,18 +35,30 @@ static bool leads_to_journal(int descriptor)
     return strcmp(journal, own) == 0;
 }
 
+/* In pieces that fit where it says that there is room; what it does not take then is lost. */
+static bool write_pieces(const char *line, size_t count, size_t piece)
+{
+    struct pollfd asked = {.fd = STDERR_FILENO, .events = POLLOUT};
+    size_t done = 0;
+    while (done < count && poll(&asked, 1, 0) > 0) {
+        ssize_t written =
+            write(STDERR_FILENO, line + done, count - done < piece ? count - done : piece);
+        if (written <= 0) {
+            break;
+        }
+        done += (size_t)written;
+    }
+    return done > 0;
+}
+
 static bool write_stderr(const struct hal_log_writer *writer, int level, const char *text)
 {
     char line[LINE_MAX_BYTES];
     int length = writer->journal ? snprintf(line, sizeof line, "<%d>%s", level, text)
                                  : snprintf(line, sizeof line, "%s: %s", writer->program, text);
-    struct pollfd asked = {.fd = STDERR_FILENO, .events = POLLOUT};
-    if (length < 0 || poll(&asked, 1, 0) <= 0) {
-        return false;
-    }
-    size_t count = (size_t)length < sizeof line ? (size_t)length : sizeof line - 1;
+    size_t count = length < (int)sizeof line ? (size_t)length : sizeof line - 1;
     line[count] = '\n';
-    return write(STDERR_FILENO, line, count + 1) > 0;
+    return write_pieces(line, count + 1, isatty(STDERR_FILENO) ? TERMINAL_PIECE : LINE_MAX_BYTES);
 }
 
 static void disconnect(struct hal_log_writer *writer)
