@@ -20,12 +20,12 @@ struct app_setting {
     /* What is to be read, and the offset in struct app_config where it goes. False: wrong. */
     bool (*take)(const struct app_setting *setting, struct app_config *config, const char *value);
     size_t offset;
-    enum app_settings_place place;
+    size_t number_offset;     /* where a number goes that stands in place of a word */
     const char *const *words; /* up to NULL; the first is the default */
+    const char *heading;      /* --help: above this one; NULL: none */
     int32_t minimum, maximum; /* of a number */
     int32_t decimals;         /* it is kept in 10^-decimals */
-    size_t number_offset;     /* where a number goes that stands in place of a word */
-    const char *heading;      /* --help: above this one; NULL: none */
+    enum app_settings_place place;
 };
 
 #define APP_SETTINGS_COUNT 24

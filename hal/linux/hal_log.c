@@ -2,8 +2,6 @@
 
 #include <errno.h>
 #include <inttypes.h>
-#include <limits.h>
-#include <poll.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -14,11 +12,10 @@
 #include <time.h>
 #include <unistd.h>
 
-/* Longest line with all that stands before its text. A pipe that says it has room has room for it. */
+#include "linux/hal_shared.h"
+
+/* Longest line with all that stands before its text. */
 #define LINE_MAX_BYTES 1024
-/* And a terminal for this, with line ends doubled: its buffers are of 256 bytes and more. */
-#define TERMINAL_PIECE 128
-_Static_assert(LINE_MAX_BYTES <= PIPE_BUF, "");
 /* Syslog's number of the facility "daemon". */
 #define FACILITY_DAEMON (3 << 3)
 
@@ -35,17 +32,13 @@ static bool leads_to_journal(int descriptor)
     return strcmp(journal, own) == 0;
 }
 
-/* In pieces that fit where it says that there is room; what it does not take then is lost. */
-static bool write_pieces(const char *line, size_t count, size_t piece)
+/* What standard error does not take at once is lost. */
+static bool write_now(const char *line, size_t count)
 {
-    struct pollfd asked = {.fd = STDERR_FILENO, .events = POLLOUT};
     size_t done = 0;
-    while (done < count && poll(&asked, 1, 0) > 0) {
-        ssize_t written =
-            write(STDERR_FILENO, line + done, count - done < piece ? count - done : piece);
-        if (written <= 0) {
-            break;
-        }
+    ssize_t written = 0;
+    while (done < count &&
+           (written = hal_shared_write(STDERR_FILENO, line + done, count - done)) > 0) {
         done += (size_t)written;
     }
     return done > 0;
@@ -58,7 +51,7 @@ static bool write_stderr(const struct hal_log_writer *writer, int level, const c
                                  : snprintf(line, sizeof line, "%s: %s", writer->program, text);
     size_t count = length < (int)sizeof line ? (size_t)length : sizeof line - 1;
     line[count] = '\n';
-    return write_pieces(line, count + 1, isatty(STDERR_FILENO) ? TERMINAL_PIECE : LINE_MAX_BYTES);
+    return write_now(line, count + 1);
 }
 
 static void disconnect(struct hal_log_writer *writer)

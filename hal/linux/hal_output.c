@@ -2,9 +2,7 @@
 
 #include <errno.h>
 #include <fcntl.h>
-#include <limits.h>
 #include <netdb.h>
-#include <poll.h>
 #include <signal.h>
 #include <stdio.h>
 #include <string.h>
@@ -12,9 +10,7 @@
 #include <termios.h>
 #include <unistd.h>
 
-/* A terminal that says it has room has room for this, with line ends doubled: its buffers are of 256
- * bytes and more. */
-#define TERMINAL_PIECE 128
+#include "linux/hal_shared.h"
 
 static enum hal_sent refuse(struct hal_error *error, const char *text)
 {
@@ -27,27 +23,15 @@ static bool would_wait(int number)
     return number == EAGAIN || number == EWOULDBLOCK;
 }
 
-/* As write(), but EAGAIN where it would wait. */
-static ssize_t write_piece(const struct hal_output_state *state, const char *bytes, size_t count)
-{
-    if (state->piece_bytes > 0) {
-        struct pollfd asked = {.fd = state->descriptor, .events = POLLOUT};
-        if (poll(&asked, 1, 0) == 0) {
-            errno = EAGAIN;
-            return -1;
-        }
-        count = count < state->piece_bytes ? count : state->piece_bytes;
-    }
-    return write(state->descriptor, bytes, count);
-}
-
 /* As much as is taken at once. Returns errno, 0 when all is gone; *done counts the bytes. */
 static int write_some(const struct hal_output_state *state, const char *bytes, size_t count,
                       size_t *done)
 {
     *done = 0;
     while (*done < count) {
-        ssize_t written = write_piece(state, bytes + *done, count - *done);
+        ssize_t written = state->owned
+                              ? write(state->descriptor, bytes + *done, count - *done)
+                              : hal_shared_write(state->descriptor, bytes + *done, count - *done);
         if (written > 0) {
             *done += (size_t)written;
         } else if (written == 0) {
@@ -239,7 +223,6 @@ bool hal_output_stdout(struct hal_output_state *state, struct hal_error *error)
     }
     signal(SIGPIPE, SIG_IGN);
     state->descriptor = STDOUT_FILENO;
-    state->piece_bytes = isatty(STDOUT_FILENO) ? TERMINAL_PIECE : PIPE_BUF;
     return true;
 }
 

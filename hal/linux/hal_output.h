@@ -4,9 +4,7 @@
  * goes first at the next call; until it is gone newer records are refused, so that a slow reader
  * gets whole and recent ones. A UDP datagram is one record.
  *
- * Standard output is shared with others, so it is not made non-blocking: it is asked (poll), and
- * given pieces so small that they fit where it says that there is room. If somebody else fills the
- * same pipe in between, that piece waits.
+ * Standard output is shared with others, so it is not made non-blocking (hal_shared).
  *
  * A serial device is raw, 8 bits, no parity, no flow control. When it is gone it is opened again, at
  * most once a second, and sending starts with an empty line, as the last record may be cut.
@@ -31,8 +29,7 @@
 struct hal_output_state {
     struct hal_output output; /* the table; after one of the three functions below */
     int descriptor;           /* -1: none */
-    bool owned;               /* to be closed */
-    size_t piece_bytes;       /* most at a time, after asking; 0: no need to ask */
+    bool owned;               /* not standard output: non-blocking, and to be closed */
     /* The rest of a record that is on its way. */
     char rest[HAL_OUTPUT_RECORD_MAX];
     size_t rest_start, rest_count;

@@ -25,6 +25,8 @@ static int64_t now_us;
 /* What was accepted, and what came out. */
 static char sent[SENT_MAX], got[SENT_MAX];
 static size_t sent_count, got_count;
+/* A terminal makes two characters of a line's end. */
+static bool doubled;
 
 static int64_t tell_time(void *context)
 {
@@ -42,6 +44,7 @@ void setUp(void)
     now_us = 5000000;
     sent_count = 0;
     got_count = 0;
+    doubled = false;
     remove(TTY_LINK);
     remove(PLAIN_FILE);
 }
@@ -123,9 +126,13 @@ static void drain_until(int descriptor, size_t count)
 
 static void remember(const char *bytes, size_t count)
 {
-    TEST_ASSERT_LESS_OR_EQUAL_UINT64(SENT_MAX, sent_count + count);
+    TEST_ASSERT_LESS_OR_EQUAL_UINT64(SENT_MAX, sent_count + count + 1);
     memcpy(sent + sent_count, bytes, count);
     sent_count += count;
+    if (doubled) {
+        memcpy(sent + sent_count - 1, "\r\n", 2);
+        sent_count++;
+    }
 }
 
 /* A record whose every byte says where it belongs. */
@@ -170,7 +177,7 @@ static void press(int writing, int reading, uint64_t seed, size_t longest)
     TEST_ASSERT_GREATER_THAN_INT(5, dropped_count);
     /* What is kept goes out at the end when the reader has made room; closing again tries again. */
     while (state.rest_count > 0) {
-        drain_until(reading, sent_count - state.rest_count);
+        drain_until(reading, sent_count - state.rest_count - doubled);
         state.descriptor = STDOUT_FILENO;
         close_stdout(writing);
     }
@@ -225,7 +232,7 @@ static void a_stream_socket_works_too(void)
     close(ends[1]);
 }
 
-static int open_terminal(int *slave)
+static int open_terminal(int *slave, bool raw)
 {
     struct termios settings;
     int master = posix_openpt(O_RDWR | O_NOCTTY);
@@ -236,7 +243,7 @@ static int open_terminal(int *slave)
     *slave = open(ptsname(master), O_RDWR | O_NOCTTY);
     TEST_ASSERT_GREATER_OR_EQUAL_INT(0, *slave);
     TEST_ASSERT_EQUAL_INT(0, tcgetattr(*slave, &settings));
-    settings.c_oflag = 0; /* bytes as they are, to compare */
+    settings.c_oflag = raw ? 0 : OPOST | ONLCR;
     TEST_ASSERT_EQUAL_INT(0, tcsetattr(*slave, TCSANOW, &settings));
     return master;
 }
@@ -244,7 +251,7 @@ static int open_terminal(int *slave)
 static void a_terminal_gets_whole_records(void)
 {
     int slave;
-    int master = open_terminal(&slave);
+    int master = open_terminal(&slave, true);
 
     open_stdout(slave);
     press(slave, master, 5, 5000);
@@ -253,11 +260,28 @@ static void a_terminal_gets_whole_records(void)
     close(master);
 }
 
+static void a_usual_terminal_gets_whole_lines(void)
+{
+    uint64_t seed;
+
+    doubled = true;
+    for (seed = 10; seed < 30; seed++) {
+        int slave;
+        int master = open_terminal(&slave, false);
+        open_stdout(slave);
+        press(slave, master, seed, seed % 2 == 0 ? 5000 : 300);
+        close(slave);
+        close(master);
+        sent_count = 0;
+        got_count = 0;
+    }
+}
+
 /* Somebody typed ^S. */
 static void a_stopped_terminal_drops_records(void)
 {
     int slave;
-    int master = open_terminal(&slave);
+    int master = open_terminal(&slave, true);
 
     open_stdout(slave);
     TEST_ASSERT_EQUAL_INT(HAL_SENT, send_to(slave, "one\n", 4));
@@ -598,6 +622,7 @@ int main(void)
     RUN_TEST(a_pipe_that_somebody_made_non_blocking_works_too);
     RUN_TEST(a_stream_socket_works_too);
     RUN_TEST(a_terminal_gets_whole_records);
+    RUN_TEST(a_usual_terminal_gets_whole_lines);
     RUN_TEST(a_stopped_terminal_drops_records);
     RUN_TEST(a_reader_that_has_gone_ends_it);
     RUN_TEST(a_reader_that_goes_in_mid_record_ends_it);
