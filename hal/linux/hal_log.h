@@ -4,7 +4,7 @@
  * it) "<LEVEL>TEXT", which the journal understands. Syslog: a datagram to /dev/log, facility daemon.
  * The C library's syslog() would wait for a daemon that hangs; here the message goes to standard
  * error instead, and if that takes none either it is counted and the next one that gets through
- * says so.
+ * says so. A terminal that is stuck may take a part of one.
  *
  * SIGPIPE is ignored from hal_log_open on, for the whole process.
  */

@@ -148,33 +148,31 @@ static size_t make_record(char *record, struct ih_test_random *random, size_t lo
     return count;
 }
 
-/* Readers of all speeds: what arrives is exactly what was accepted, in order. */
+/* Readers of all speeds, at first none: what arrives is exactly what was accepted, in order. */
 static void press(int writing, int reading, uint64_t seed, size_t longest)
 {
     static char record[HAL_OUTPUT_RECORD_MAX];
     struct ih_test_random random = {seed};
-    int dropped_count = 0;
-    int accepted_count = 0;
-    int round;
+    bool dropped = false;
+    int round = 0;
 
-    for (round = 0; round < 600 && sent_count < SENT_MAX / 2; round++) {
+    while (!dropped || (round < 600 && sent_count < SENT_MAX / 2)) {
         size_t count = make_record(record, &random, longest);
         enum hal_sent result = send_to(writing, record, count);
         TEST_ASSERT_NOT_EQUAL(HAL_SENT_NEVER, result);
         if (result == HAL_SENT) {
             remember(record, count);
-            accepted_count++;
         } else {
             TEST_ASSERT_EQUAL_STRING("its reader is slow", error.text);
-            dropped_count++;
+            dropped = true;
         }
-        if (ih_test_between(&random, 0, 3) == 0) {
+        if (dropped && ih_test_between(&random, 0, 3) == 0) {
             (void)drain(reading, (size_t)ih_test_between(&random, 1, 3 * (int64_t)longest));
             TEST_ASSERT_EQUAL_MEMORY(sent, got, got_count);
         }
+        round++;
     }
-    TEST_ASSERT_GREATER_THAN_INT(5, accepted_count);
-    TEST_ASSERT_GREATER_THAN_INT(5, dropped_count);
+    TEST_ASSERT_GREATER_THAN_UINT64(0, sent_count);
     /* What is kept goes out at the end when the reader has made room; closing again tries again. */
     while (state.rest_count > 0) {
         drain_until(reading, sent_count - state.rest_count - doubled);
@@ -543,24 +541,28 @@ static void a_serial_line_that_is_too_slow_drops_records(void)
     static char record[9000];
     struct ih_test_random random = {7};
     int master = plug_in();
-    int dropped_count = 0;
-    int i;
+    bool dropped = false;
+    int round = 0;
 
     TEST_ASSERT_TRUE(hal_output_serial(&state, TTY_LINK, 115200, &test_clock, &error));
-    for (i = 0; i < 200; i++) {
+    while (!dropped || round < 200) {
         size_t count = make_record(record, &random, sizeof record);
         enum hal_sent result = send_datagram(record, count);
         TEST_ASSERT_NOT_EQUAL(HAL_SENT_NEVER, result);
         if (result == HAL_SENT) {
             remember(record, count);
         } else {
-            dropped_count++;
+            TEST_ASSERT_EQUAL_STRING("the line is slower than the records, or stopped", error.text);
+            dropped = true;
         }
-        (void)drain(master, (size_t)ih_test_between(&random, 0, 3000));
-        TEST_ASSERT_EQUAL_MEMORY(sent, got, got_count);
+        if (dropped) {
+            (void)drain(master, (size_t)ih_test_between(&random, 0, 3000));
+            TEST_ASSERT_EQUAL_MEMORY(sent, got, got_count);
+        }
+        round++;
     }
-    TEST_ASSERT_GREATER_THAN_INT(5, dropped_count);
-    TEST_ASSERT_GREATER_THAN_UINT64(50000, got_count);
+    drain_until(master, sent_count - state.rest_count);
+    TEST_ASSERT_EQUAL_MEMORY(sent, got, got_count);
     hal_output_close(&state);
     close(master);
 }
