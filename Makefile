@@ -7,13 +7,15 @@ DATA ?= ../shared/data
 # A folder with unity.c, or one with cJSON.c: used instead of fetching the source package.
 UNITY_DIR ?= $(BUILD)/third_party/unity/src
 CJSON_DIR ?= $(BUILD)/third_party/cjson
+# A folder with the sources of libgpiod 2: used instead of fetching them.
+GPIOD2_DIR ?= $(BUILD)/third_party/gpiod2
 # The frame of frames/sequence2 that docs/picture.png shows.
 PICTURE ?= 000020
 # What the board's program is built for: arm64, armhf or host.
 ARCH ?= arm64
 
 .DEFAULT_GOAL := help
-.PHONY: help sim frames test accept eval bits vectors learn picture board format formatted lint clean
+.PHONY: help sim frames sanitize test accept eval bits vectors learn picture board format formatted lint clean
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z_]+:.*## / { printf "  make %-9s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -31,11 +33,15 @@ frames/sequence%/rig.json:
 	@mkdir -p frames
 	@$(BUILD)/host/tools/render/render --sequence $* --seed $* frames/sequence$*
 
-test: sim ## every test: units against float64, sanitizers, bad input, rules of the core, same bits
+# The build of the tests, which has every source that there is.
+sanitize: sim
 	@tools/setup.sh test
 	@cmake --preset sanitize -DISOHEAD_UNITY_DIR=$(abspath $(UNITY_DIR)) \
 	  -DISOHEAD_CJSON_SOURCE_DIR=$(abspath $(CJSON_DIR)) \
+	  -DISOHEAD_GPIOD2_DIR=$(abspath $(GPIOD2_DIR)) \
 	  > $(BUILD)/sanitize.log 2>&1 || { cat $(BUILD)/sanitize.log; exit 1; }
+
+test: sanitize ## every test: units against float64, sanitizers, bad input, rules of the core, same bits
 	@cmake --build --preset sanitize --parallel
 	@ctest --test-dir $(BUILD)/sanitize --output-on-failure --parallel 2
 
@@ -80,10 +86,10 @@ formatted: ## fail when make format would change something
 	@tools/setup.sh format
 	@git ls-files '*.c' '*.h' | xargs clang-format --dry-run --Werror
 
-lint: sim ## clang-tidy over the core, the simulator and the renderer
+lint: sanitize ## clang-tidy over all C sources but the tests'
 	@tools/setup.sh lint
 	@git ls-files 'firmware/*.c' 'hal/*.c' 'sim/*.c' 'tools/*.c' | \
-	  xargs -P 2 -n 1 clang-tidy --quiet -p $(BUILD)/host
+	  xargs -P 2 -n 1 clang-tidy --quiet -p $(BUILD)/sanitize
 
 clean: ## remove the build; rendered frames stay
 	@rm -rf $(BUILD)

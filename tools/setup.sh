@@ -62,6 +62,12 @@ need_board() {
     esac
 }
 
+# libgpiod, and pip for tools/board/gpiod2.sh, which fetches another version of it.
+need_gpio() {
+    need_header gpiod.h libgpiod-dev
+    need_python pip python3-pip
+}
+
 case "${1:-}" in
 sim) need_sim ;;
 board) need_board "${2:-}" ;;
@@ -72,6 +78,7 @@ test)
     need_python scipy python3-scipy
     need_program nm binutils
     need_header libv4l2.h libv4l-dev
+    need_gpio
     ;;
 picture)
     need_sim
@@ -129,4 +136,7 @@ fi
 case "$1" in
 test | bits) tools/fetch_third_party.sh build/third_party ;;
 board) [ "$2" = host ] || tools/board/sysroot.sh "$2" ;;
+esac
+case "$1" in
+test) tools/board/gpiod2.sh build/third_party/gpiod2 ;;
 esac

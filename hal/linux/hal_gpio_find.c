@@ -2,23 +2,28 @@
 
 #include <dirent.h>
 #include <errno.h>
-#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 /* More to the end of an error; what does not fit is cut by its last three characters, "...". */
-__attribute__((format(printf, 2, 3))) static void add(struct hal_error *error, const char *format,
-                                                      ...)
+static void add(struct hal_error *error, const char *text)
 {
     size_t length = strlen(error->text);
-    va_list arguments;
-    va_start(arguments, format);
-    int wanted = vsnprintf(error->text + length, sizeof error->text - length, format, arguments);
-    va_end(arguments);
-    if (wanted >= 0 && (size_t)wanted >= sizeof error->text - length) {
+    size_t room = sizeof error->text - length;
+    if ((size_t)snprintf(error->text + length, room, "%s", text) >= room) {
         memcpy(error->text + sizeof error->text - 4, "...", 4);
     }
+}
+
+/* The same for one of a list: a name, and what is to be said of it. */
+static void add_chip(struct hal_error *list, const char *name, const char *about)
+{
+    add(list, " ");
+    add(list, name);
+    add(list, " (");
+    add(list, about);
+    add(list, ")");
 }
 
 static int is_gpiochip(const struct dirent *entry)
@@ -54,11 +59,13 @@ static void look_at(struct search *search, const char *name)
     snprintf(path, sizeof path, "/dev/%s", name);
     struct gpiod_chip *chip = open_path(path, &info);
     if (chip == NULL) {
-        add(&search->all, " %s (%s)", name, strerror(errno));
+        add_chip(&search->all, name, strerror(errno));
         return;
     }
-    add(&search->all, " %s (%s)", info.name, info.label);
-    if (strcmp(info.name, search->called) != 0 && strcmp(info.label, search->called) != 0) {
+    add_chip(&search->all, info.name, info.label);
+    bool same = search->called[0] != 0 &&
+                (strcmp(info.name, search->called) == 0 || strcmp(info.label, search->called) == 0);
+    if (!same) {
         hal_gpio_chip_close(chip);
         return;
     }
@@ -123,12 +130,14 @@ static bool compare(struct gpiod_chip *chip, unsigned offset, const char *called
     if (!hal_gpio_line_about(chip, offset, &info)) {
         return false;
     }
-    *same = strcmp(info.name, called) == 0;
+    *same = info.name[0] != 0 && strcmp(info.name, called) == 0;
+    char entry[HAL_GPIO_NAME_MAX + 4];
     if (info.name[0] != 0) {
-        add(all, " '%s'", info.name);
+        snprintf(entry, sizeof entry, " '%s'", info.name);
     } else {
-        add(all, " %u", offset);
+        snprintf(entry, sizeof entry, " %u", offset);
     }
+    add(all, entry);
     return true;
 }
 
@@ -161,7 +170,7 @@ static bool find_name(struct gpiod_chip *chip, const struct hal_gpio_chip_info *
     }
     hal_fail(error, "%s: no line of %s (%s) is called '%.31s'; it has:", setting, info->name,
              info->label, called);
-    add(error, "%s", all.text);
+    add(error, all.text);
     return false;
 }
 

@@ -1,0 +1,513 @@
+/* The guard: real processes that die in every way, and a line that all of them see. The program under
+ * guard is a child of the test; orphaned guards become children of the test too, so that their end is
+ * waited for and not guessed. */
+#include <errno.h>
+#include <fcntl.h>
+#include <poll.h>
+#include <signal.h>
+#include <stdlib.h>
+#include <sys/mman.h>
+#include <sys/prctl.h>
+#include <sys/resource.h>
+#include <sys/syscall.h>
+#include <sys/wait.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "ih_test.h"
+#include "linux/hal_guard.h"
+#include "linux/hal_guard_child.h"
+
+#define LONG_MS (1000 * 1000)
+
+/* Seen by every process. */
+struct shared {
+    volatile int level;
+    volatile int taken;          /* opened and not closed */
+    volatile int off_fail_count; /* as many settings to off fail */
+    volatile int off_count;      /* settings to off */
+    volatile pid_t guard_pid;
+    volatile int open_fails;
+};
+
+static struct shared *shared;
+static int line_fd = -1;
+static int line_ends[2]; /* the reading end sees its end of file when no process holds the line */
+static struct hal_guard guard;
+static struct hal_error error;
+
+static bool line_open(void *context, struct hal_error *why)
+{
+    (void)context;
+    if (shared->open_fails) {
+        return hal_fail(why, "line: refused");
+    }
+    TEST_ASSERT_EQUAL_INT(0, pipe(line_ends));
+    line_fd = line_ends[1];
+    shared->level = 0;
+    shared->taken = 1;
+    return true;
+}
+
+static void line_close(void *context)
+{
+    (void)context;
+    if (line_fd >= 0) {
+        shared->level = 0;
+        close(line_fd);
+        shared->taken = 0;
+    }
+    line_fd = -1;
+}
+
+static bool line_set(void *context, bool on, struct hal_error *why)
+{
+    (void)context;
+    if (on) {
+        shared->level = 1;
+        return true;
+    }
+    shared->off_count++;
+    if (shared->off_fail_count > 0) {
+        shared->off_fail_count--;
+        return hal_fail(why, "line: stuck");
+    }
+    shared->level = 0;
+    return true;
+}
+
+static bool line_beat(void *context, struct hal_error *why)
+{
+    (void)context;
+    return hal_fail(why, "line: beat");
+}
+
+static bool line_interlock(void *context, bool *closed, struct hal_error *why)
+{
+    (void)context;
+    (void)why;
+    *closed = true;
+    return true;
+}
+
+static const struct hal_strobe line = {NULL,     line_open, line_close,
+                                       line_set, line_beat, line_interlock};
+
+static void init(int timeout_ms)
+{
+    const struct hal_guard_config config = {
+        .strobe = &line, .line_fd = &line_fd, .timeout_ms = timeout_ms};
+
+    hal_guard_init(&guard, &config);
+}
+
+static bool set(bool on)
+{
+    return guard.strobe.set(guard.strobe.context, on, &error);
+}
+
+static bool open_it(void)
+{
+    return guard.strobe.open(guard.strobe.context, &error);
+}
+
+static void close_it(void)
+{
+    guard.strobe.close(guard.strobe.context);
+}
+
+void setUp(void)
+{
+    memset((void *)shared, 0, sizeof *shared);
+    memset(&error, 0, sizeof error);
+    init(LONG_MS);
+}
+
+void tearDown(void)
+{
+    close_it();
+    TEST_ASSERT_EQUAL_INT(0, shared->level);
+    /* No process is left over. */
+    TEST_ASSERT_EQUAL_INT(-1, waitpid(-1, NULL, WNOHANG));
+    TEST_ASSERT_EQUAL_INT(ECHILD, errno);
+}
+
+/* The exit status of one's own child, or of a guard whose program has been collected before: only
+ * then it is certain to be a child of the test. */
+static int end_of(pid_t pid)
+{
+    int status = 0;
+
+    TEST_ASSERT_EQUAL_INT(pid, waitpid(pid, &status, 0));
+    return status;
+}
+
+static void expect_exit(pid_t pid, int code)
+{
+    const int status = end_of(pid);
+
+    TEST_ASSERT_TRUE(WIFEXITED(status));
+    TEST_ASSERT_EQUAL_INT(code, WEXITSTATUS(status));
+}
+
+/* For good, since nothing here collects it: the guard of this very process has ended. */
+static void wait_for_end_of_own_guard(void)
+{
+    siginfo_t info;
+
+    TEST_ASSERT_EQUAL_INT(0, waitid(P_PID, (id_t)guard.pid, &info, WEXITED | WNOWAIT));
+}
+
+/* A program with its laser on, that then does one thing. It tells when it is about to. */
+static pid_t program(int timeout_ms, void (*act)(void))
+{
+    int ready[2];
+    char byte = 0;
+    pid_t pid = 0;
+
+    TEST_ASSERT_EQUAL_INT(0, pipe(ready));
+    pid = fork();
+    if (pid == 0) {
+        init(timeout_ms);
+        /* On a slow machine a guard with a short time may have let go before. */
+        while (!open_it() || !set(true)) {
+        }
+        shared->guard_pid = guard.pid;
+        byte = write(ready[1], "r", 1) == 1;
+        act();
+        for (;;) {
+            pause();
+        }
+    }
+    close(ready[1]);
+    TEST_ASSERT_EQUAL_INT(1, read(ready[0], &byte, 1));
+    close(ready[0]);
+    return pid;
+}
+
+static void go_on(void)
+{
+}
+
+static void leave(void)
+{
+    _exit(7);
+}
+
+static int64_t now_us(void)
+{
+    struct timespec now;
+
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000;
+}
+
+static void killed_the_laser_goes_off(void)
+{
+    int64_t longest_us = 0;
+    int i;
+
+    for (i = 0; i < 20; i++) {
+        const pid_t pid = program(LONG_MS, go_on);
+        int64_t before_us, took_us;
+
+        TEST_ASSERT_EQUAL_INT(1, shared->level);
+        before_us = now_us();
+        TEST_ASSERT_EQUAL_INT(0, kill(pid, SIGKILL));
+        TEST_ASSERT_EQUAL_INT(SIGKILL, WTERMSIG(end_of(pid)));
+        expect_exit(shared->guard_pid, GUARD_EXIT_GONE);
+        took_us = now_us() - before_us;
+        longest_us = took_us > longest_us ? took_us : longest_us;
+        TEST_ASSERT_EQUAL_INT(0, shared->level);
+    }
+    printf("SIGKILL to guard ended, %d times: at most %lld us\n", i, (long long)longest_us);
+}
+
+static void left_without_a_word_the_laser_goes_off(void)
+{
+    const pid_t pid = program(LONG_MS, leave);
+
+    expect_exit(pid, 7);
+    expect_exit(shared->guard_pid, GUARD_EXIT_GONE);
+    TEST_ASSERT_EQUAL_INT(0, shared->level);
+}
+
+static void stopped_the_laser_goes_off(void)
+{
+    const pid_t pid = program(50, go_on);
+
+    struct pollfd ended = {.fd = (int)syscall(SYS_pidfd_open, shared->guard_pid, 0),
+                           .events = POLLIN};
+
+    TEST_ASSERT_TRUE(ended.fd >= 0);
+    TEST_ASSERT_EQUAL_INT(0, kill(pid, SIGSTOP));
+    TEST_ASSERT_EQUAL_INT(1, poll(&ended, 1, -1));
+    close(ended.fd);
+    TEST_ASSERT_EQUAL_INT(0, shared->level);
+    TEST_ASSERT_EQUAL_INT(0, kill(pid, SIGKILL));
+    end_of(pid);
+    expect_exit(shared->guard_pid, GUARD_EXIT_LATE);
+}
+
+static void a_line_that_fails_is_tried_again(void)
+{
+    const pid_t pid = program(LONG_MS, go_on);
+
+    shared->off_fail_count = 5;
+    shared->off_count = 0;
+    kill(pid, SIGKILL);
+    end_of(pid);
+    expect_exit(shared->guard_pid, GUARD_EXIT_GONE);
+    TEST_ASSERT_EQUAL_INT(0, shared->level);
+    TEST_ASSERT_EQUAL_INT(6, shared->off_count);
+}
+
+static void a_line_that_fails_for_good_is_given_up(void)
+{
+    const pid_t pid = program(LONG_MS, go_on);
+
+    shared->off_fail_count = 1000;
+    shared->off_count = 0;
+    kill(pid, SIGKILL);
+    end_of(pid);
+    expect_exit(shared->guard_pid, GUARD_EXIT_LINE);
+    TEST_ASSERT_EQUAL_INT(GUARD_OFF_TRIES, shared->off_count);
+    shared->level = 0;
+}
+
+/* Signals that a terminal, a service manager or a user sends to the guard do not end it. */
+static void signals_do_not_end_the_guard(void)
+{
+    static const int sent[] = {SIGTERM, SIGINT,  SIGHUP,  SIGQUIT, SIGUSR1, SIGUSR2,
+                               SIGPIPE, SIGALRM, SIGTSTP, SIGTTIN, SIGTTOU, SIGCONT};
+    int i;
+
+    TEST_ASSERT_TRUE_MESSAGE(open_it(), error.text);
+    TEST_ASSERT_TRUE(set(true));
+    for (i = 0; i < IH_TEST_COUNT(sent); i++) {
+        TEST_ASSERT_EQUAL_INT(0, kill(guard.pid, sent[i]));
+    }
+    TEST_ASSERT_TRUE(hal_guard_feed(&guard, &error));
+    TEST_ASSERT_TRUE(set(true));
+    TEST_ASSERT_EQUAL_INT(1, shared->level);
+    TEST_ASSERT_TRUE(getsid(guard.pid) == guard.pid);
+    TEST_ASSERT_TRUE(getsid(0) != guard.pid);
+}
+
+static void it_is_named_and_holds_two_descriptors(void)
+{
+    char path[64], text[32] = "";
+    int other[2], i, open_count = 0;
+    ssize_t length;
+
+    TEST_ASSERT_EQUAL_INT(0, pipe(other));
+    TEST_ASSERT_TRUE(open_it());
+    snprintf(path, sizeof path, "/proc/%d/comm", (int)guard.pid);
+    i = open(path, O_RDONLY);
+    length = read(i, text, sizeof text - 1);
+    close(i);
+    TEST_ASSERT_TRUE(length > 0);
+    TEST_ASSERT_EQUAL_STRING("isohead-guard\n", text);
+    for (i = 0; i < 256; i++) {
+        snprintf(path, sizeof path, "/proc/%d/fd/%d", (int)guard.pid, i);
+        open_count += readlink(path, text, sizeof text) >= 0;
+        if (i == line_fd) {
+            TEST_ASSERT_TRUE(readlink(path, text, sizeof text) >= 0);
+        }
+    }
+    TEST_ASSERT_EQUAL_INT(2, open_count);
+    /* Not by the guard either: the end of this pipe is seen. */
+    close(other[1]);
+    TEST_ASSERT_EQUAL_INT(0, read(other[0], text, 1));
+    close(other[0]);
+}
+
+static void closed_the_guard_ends_and_gives_the_line_back(void)
+{
+    char byte;
+    pid_t pid;
+
+    TEST_ASSERT_TRUE(open_it());
+    TEST_ASSERT_TRUE(set(true));
+    pid = guard.pid;
+    close_it();
+    TEST_ASSERT_EQUAL_INT(0, shared->level);
+    TEST_ASSERT_EQUAL_INT(0, shared->taken);
+    TEST_ASSERT_EQUAL_INT(0, read(line_ends[0], &byte, 1));
+    TEST_ASSERT_EQUAL_INT(-1, kill(pid, 0));
+    TEST_ASSERT_EQUAL_INT(ESRCH, errno);
+    TEST_ASSERT_TRUE(hal_guard_feed(&guard, &error));
+    TEST_ASSERT_TRUE(set(false));
+    TEST_ASSERT_FALSE(set(true));
+    TEST_ASSERT_EQUAL_INT(0, shared->level);
+}
+
+static void opened_again_the_old_guard_has_ended_first(void)
+{
+    pid_t first;
+
+    TEST_ASSERT_TRUE(open_it());
+    TEST_ASSERT_TRUE(set(true));
+    first = guard.pid;
+    TEST_ASSERT_TRUE(open_it());
+    TEST_ASSERT_EQUAL_INT(0, shared->level);
+    TEST_ASSERT_TRUE(guard.pid != first);
+    TEST_ASSERT_EQUAL_INT(-1, kill(first, 0));
+    TEST_ASSERT_TRUE(set(true));
+    TEST_ASSERT_TRUE(hal_guard_feed(&guard, &error));
+}
+
+static void an_opening_that_fails_has_no_guard(void)
+{
+    shared->open_fails = 1;
+    TEST_ASSERT_FALSE(open_it());
+    TEST_ASSERT_EQUAL_STRING("line: refused", error.text);
+    TEST_ASSERT_FALSE(set(true));
+    TEST_ASSERT_EQUAL_INT(0, shared->level);
+    shared->open_fails = 0;
+    TEST_ASSERT_TRUE(open_it());
+    TEST_ASSERT_TRUE(set(true));
+    shared->open_fails = 1;
+    TEST_ASSERT_FALSE(open_it());
+    TEST_ASSERT_EQUAL_INT(0, shared->level);
+}
+
+static void without_a_socket_or_process_the_line_is_given_back(void)
+{
+    int fds[1024], count = 0;
+
+    /* All descriptors are used up but those of the line. */
+    while (count < IH_TEST_COUNT(fds) && (fds[count] = dup(0)) >= 0) {
+        count++;
+    }
+    TEST_ASSERT_TRUE_MESSAGE(count < IH_TEST_COUNT(fds), "no limit of descriptors was set");
+    close(fds[--count]);
+    close(fds[--count]);
+    TEST_ASSERT_FALSE(open_it());
+    while (count > 0) {
+        close(fds[--count]);
+    }
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(error.text, "guard: no socket"), error.text);
+    TEST_ASSERT_EQUAL_INT(0, shared->taken);
+}
+
+static void a_dead_guard_is_noticed(void)
+{
+    TEST_ASSERT_TRUE(open_it());
+    TEST_ASSERT_TRUE(hal_guard_feed(&guard, &error));
+    TEST_ASSERT_TRUE(set(true));
+    kill(guard.pid, SIGKILL);
+    wait_for_end_of_own_guard();
+    TEST_ASSERT_FALSE(hal_guard_feed(&guard, &error));
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(error.text, "died of signal 9"), error.text);
+    TEST_ASSERT_FALSE(hal_guard_feed(&guard, &error));
+    /* It cannot be switched on, and is off after trying. */
+    TEST_ASSERT_FALSE(set(true));
+    TEST_ASSERT_EQUAL_INT(0, shared->level);
+    TEST_ASSERT_TRUE(open_it());
+    TEST_ASSERT_TRUE(set(true));
+}
+
+static void a_guard_that_was_stopped_is_noticed(void)
+{
+    siginfo_t info;
+
+    TEST_ASSERT_TRUE(open_it());
+    kill(guard.pid, SIGSTOP);
+    TEST_ASSERT_EQUAL_INT(0, waitid(P_PID, (id_t)guard.pid, &info, WSTOPPED | WNOWAIT));
+    TEST_ASSERT_FALSE(hal_guard_feed(&guard, &error));
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(error.text, "stopped by signal"), error.text);
+    kill(guard.pid, SIGCONT);
+    TEST_ASSERT_EQUAL_INT(0, waitid(P_PID, (id_t)guard.pid, &info, WCONTINUED));
+    TEST_ASSERT_TRUE_MESSAGE(hal_guard_feed(&guard, &error), error.text);
+}
+
+/* It takes as long as a guard is waited for. */
+static void a_guard_that_was_stopped_can_be_replaced(void)
+{
+    TEST_ASSERT_TRUE(open_it());
+    TEST_ASSERT_TRUE(set(true));
+    kill(guard.pid, SIGSTOP);
+    TEST_ASSERT_TRUE(open_it());
+    TEST_ASSERT_EQUAL_INT(0, shared->level);
+    TEST_ASSERT_TRUE(set(true));
+}
+
+static void without_signs_of_life_it_lets_go(void)
+{
+    init(1);
+    TEST_ASSERT_TRUE(open_it());
+    wait_for_end_of_own_guard();
+    /* Once in opening, once by the guard. */
+    TEST_ASSERT_EQUAL_INT(2, shared->off_count);
+    TEST_ASSERT_FALSE(hal_guard_feed(&guard, &error));
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(error.text, "no sign of life for 1 ms"), error.text);
+    TEST_ASSERT_FALSE(set(true));
+    TEST_ASSERT_EQUAL_INT(0, shared->level);
+}
+
+/* The time starts anew with every sign of life. A machine that is so slow that the guard was right
+ * to end before the sign says nothing, and is asked again. */
+static void a_sign_of_life_starts_the_time_anew(void)
+{
+    const int timeout_ms = 100;
+    int tries;
+
+    for (tries = 0; tries < 50; tries++) {
+        int64_t fed_us;
+
+        init(timeout_ms);
+        TEST_ASSERT_TRUE(open_it());
+        poll(NULL, 0, timeout_ms / 2);
+        fed_us = now_us();
+        if (hal_guard_feed(&guard, &error)) {
+            wait_for_end_of_own_guard();
+            TEST_ASSERT_TRUE(now_us() - fed_us >= timeout_ms * 1000);
+            return;
+        }
+        close_it();
+    }
+    TEST_FAIL_MESSAGE("in 50 tries no sign of life came in time");
+}
+
+static void the_rest_is_the_strobe_below(void)
+{
+    bool closed = false;
+
+    TEST_ASSERT_TRUE(open_it());
+    TEST_ASSERT_TRUE(guard.strobe.interlock(guard.strobe.context, &closed, &error));
+    TEST_ASSERT_TRUE(closed);
+    TEST_ASSERT_FALSE(guard.strobe.beat(guard.strobe.context, &error));
+    TEST_ASSERT_EQUAL_STRING("line: beat", error.text);
+}
+
+int main(void)
+{
+    const struct rlimit files = {.rlim_cur = 200, .rlim_max = 200};
+
+    UNITY_BEGIN();
+    setrlimit(RLIMIT_NOFILE, &files);
+    prctl(PR_SET_CHILD_SUBREAPER, 1);
+    shared = mmap(NULL, sizeof *shared, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+    if (shared == MAP_FAILED) {
+        return 1;
+    }
+    RUN_TEST(killed_the_laser_goes_off);
+    RUN_TEST(left_without_a_word_the_laser_goes_off);
+    RUN_TEST(stopped_the_laser_goes_off);
+    RUN_TEST(a_line_that_fails_is_tried_again);
+    RUN_TEST(a_line_that_fails_for_good_is_given_up);
+    RUN_TEST(signals_do_not_end_the_guard);
+    RUN_TEST(it_is_named_and_holds_two_descriptors);
+    RUN_TEST(closed_the_guard_ends_and_gives_the_line_back);
+    RUN_TEST(opened_again_the_old_guard_has_ended_first);
+    RUN_TEST(an_opening_that_fails_has_no_guard);
+    RUN_TEST(without_a_socket_or_process_the_line_is_given_back);
+    RUN_TEST(a_dead_guard_is_noticed);
+    RUN_TEST(a_guard_that_was_stopped_is_noticed);
+    RUN_TEST(a_guard_that_was_stopped_can_be_replaced);
+    RUN_TEST(without_signs_of_life_it_lets_go);
+    RUN_TEST(a_sign_of_life_starts_the_time_anew);
+    RUN_TEST(the_rest_is_the_strobe_below);
+    return UNITY_END();
+}
