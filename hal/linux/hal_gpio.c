@@ -179,7 +179,6 @@ static bool gpio_interlock(void *context, bool *closed, struct hal_error *error)
     int event_count = hal_gpio_line_drain(&gpio->interlock);
     int level = event_count < 0 ? -1 : hal_gpio_line_get(&gpio->interlock);
     if (level < 0) {
-        gpio->told_closed = false;
         return hal_fail(error, "interlock-line: cannot read '%.31s' of %.80s: %s",
                         gpio->config.interlock_line, gpio->config.chip, strerror(errno));
     }

@@ -84,14 +84,13 @@ static void stop(struct hal_guard *guard)
 }
 
 /* Fork, with no signal between the fork and what the child does about signals. */
-static pid_t fork_child(const struct hal_guard_config *config, int own_fd, int child_fd)
+static pid_t fork_child(const struct hal_guard_config *config, int child_fd)
 {
     sigset_t all, before;
     sigfillset(&all);
     sigprocmask(SIG_SETMASK, &all, &before);
     pid_t pid = fork();
     if (pid == 0) {
-        close(own_fd);
         hal_guard_child(config, child_fd);
     }
     int error = errno;
@@ -107,7 +106,7 @@ static bool start(struct hal_guard *guard, struct hal_error *error)
     if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0) {
         return hal_fail(error, "guard: no socket: %s", strerror(errno));
     }
-    guard->pid = fork_child(&guard->config, ends[0], ends[1]);
+    guard->pid = fork_child(&guard->config, ends[1]);
     int reason = errno;
     close(ends[1]);
     if (guard->pid < 0) {

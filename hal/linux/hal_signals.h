@@ -8,6 +8,7 @@
  *           and sends the signal with its own data again, so that exit status and core dump are those
  *           of a program without a handler. A fault inside the handler kills at once: the guard acts.
  *
+ * Before the strobe is opened: the guard's process (hal_guard.h) then has the same handlers.
  * For a process with one thread: another's faults would find no stack of their own.
  */
 #ifndef HAL_SIGNALS_H

@@ -4,11 +4,13 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <poll.h>
+#include <semaphore.h>
 #include <signal.h>
 #include <stdlib.h>
 #include <sys/mman.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
+#include <sys/socket.h>
 #include <sys/syscall.h>
 #include <sys/wait.h>
 #include <time.h>
@@ -17,6 +19,7 @@
 #include "ih_test.h"
 #include "linux/hal_guard.h"
 #include "linux/hal_guard_child.h"
+#include "linux/hal_signals.h"
 
 #define LONG_MS (1000 * 1000)
 
@@ -28,9 +31,13 @@ struct shared {
     volatile int off_count;      /* settings to off */
     volatile pid_t guard_pid;
     volatile int open_fails;
+    /* The guard is told to end while set(true) is under way, and held between off and its end. */
+    volatile int end_while_on;
+    sem_t is_off, may_end;
 };
 
 static struct shared *shared;
+static pid_t test_pid;
 static int line_fd = -1;
 static int line_ends[2]; /* the reading end sees its end of file when no process holds the line */
 static struct hal_guard guard;
@@ -64,6 +71,12 @@ static bool line_set(void *context, bool on, struct hal_error *why)
 {
     (void)context;
     if (on) {
+        if (shared->end_while_on) {
+            const char done = GUARD_DONE;
+
+            TEST_ASSERT_EQUAL_INT(1, send(guard.socket_fd, &done, 1, 0));
+            sem_wait(&shared->is_off);
+        }
         shared->level = 1;
         return true;
     }
@@ -73,6 +86,10 @@ static bool line_set(void *context, bool on, struct hal_error *why)
         return hal_fail(why, "line: stuck");
     }
     shared->level = 0;
+    if (shared->end_while_on && getpid() != test_pid) {
+        sem_post(&shared->is_off);
+        sem_wait(&shared->may_end);
+    }
     return true;
 }
 
@@ -119,6 +136,8 @@ static void close_it(void)
 void setUp(void)
 {
     memset((void *)shared, 0, sizeof *shared);
+    sem_init(&shared->is_off, 1, 0);
+    sem_init(&shared->may_end, 1, 0);
     memset(&error, 0, sizeof error);
     init(LONG_MS);
 }
@@ -280,6 +299,8 @@ static void signals_do_not_end_the_guard(void)
 {
     static const int sent[] = {SIGTERM, SIGINT,  SIGHUP,  SIGQUIT, SIGUSR1, SIGUSR2,
                                SIGPIPE, SIGALRM, SIGTSTP, SIGTTIN, SIGTTOU, SIGCONT};
+    const char done = GUARD_DONE;
+    siginfo_t info;
     int i;
 
     TEST_ASSERT_TRUE_MESSAGE(open_it(), error.text);
@@ -288,10 +309,63 @@ static void signals_do_not_end_the_guard(void)
         TEST_ASSERT_EQUAL_INT(0, kill(guard.pid, sent[i]));
     }
     TEST_ASSERT_TRUE(hal_guard_feed(&guard, &error));
-    TEST_ASSERT_TRUE(set(true));
     TEST_ASSERT_EQUAL_INT(1, shared->level);
     TEST_ASSERT_TRUE(getsid(guard.pid) == guard.pid);
     TEST_ASSERT_TRUE(getsid(0) != guard.pid);
+    /* A signal that got through would come before this byte is read. */
+    TEST_ASSERT_EQUAL_INT(1, send(guard.socket_fd, &done, 1, 0));
+    TEST_ASSERT_EQUAL_INT(0, waitid(P_PID, (id_t)guard.pid, &info, WEXITED | WNOWAIT));
+    TEST_ASSERT_EQUAL_INT(CLD_EXITED, info.si_code);
+    TEST_ASSERT_EQUAL_INT(GUARD_EXIT_DONE, info.si_status);
+}
+
+static void catch_signals(void)
+{
+    static struct hal_signals signals;
+
+    hal_signals_open(&signals, &guard.strobe, &error);
+}
+
+/* A fault in the guard itself, or what a service manager sends to all on its watchdog's behalf: the
+ * handler that the guard has inherited switches off. The program must have it before the guard. */
+static void dying_of_a_fault_the_guard_switches_off(void)
+{
+    const pid_t pid = fork();
+    siginfo_t info;
+    int status = 0;
+
+    if (pid == 0) {
+        catch_signals();
+        if (!open_it() || !set(true)) {
+            _exit(1);
+        }
+        kill(guard.pid, SIGABRT);
+        if (waitid(P_PID, (id_t)guard.pid, &info, WEXITED | WNOWAIT) != 0) {
+            _exit(2);
+        }
+        _exit((info.si_code != CLD_KILLED && info.si_code != CLD_DUMPED) ||
+                      info.si_status != SIGABRT
+                  ? 3
+              : shared->level != 0 ? 4
+                                   : 0);
+    }
+    TEST_ASSERT_EQUAL_INT(pid, waitpid(pid, &status, 0));
+    TEST_ASSERT_EQUAL_INT(0, status);
+    /* The program has left its zombie to the test. */
+    TEST_ASSERT_TRUE(waitpid(-1, &status, 0) > 0);
+    TEST_ASSERT_EQUAL_INT(SIGABRT, WTERMSIG(status));
+}
+
+/* The guard's off comes before the program's on: the program has to see that it is alone. */
+static void switched_on_behind_the_guards_back_it_goes_off_again(void)
+{
+    TEST_ASSERT_TRUE(open_it());
+    shared->end_while_on = 1;
+    TEST_ASSERT_FALSE(set(true));
+    TEST_ASSERT_EQUAL_INT(0, shared->level);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(error.text, "has let go"), error.text);
+    shared->end_while_on = 0;
+    sem_post(&shared->may_end);
 }
 
 static void it_is_named_and_holds_two_descriptors(void)
@@ -483,10 +557,12 @@ static void the_rest_is_the_strobe_below(void)
 
 int main(void)
 {
-    const struct rlimit files = {.rlim_cur = 200, .rlim_max = 200};
+    const struct rlimit files = {.rlim_cur = 200, .rlim_max = 200}, no_core = {0, 0};
 
     UNITY_BEGIN();
+    test_pid = getpid();
     setrlimit(RLIMIT_NOFILE, &files);
+    setrlimit(RLIMIT_CORE, &no_core);
     prctl(PR_SET_CHILD_SUBREAPER, 1);
     shared = mmap(NULL, sizeof *shared, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
     if (shared == MAP_FAILED) {
@@ -498,6 +574,8 @@ int main(void)
     RUN_TEST(a_line_that_fails_is_tried_again);
     RUN_TEST(a_line_that_fails_for_good_is_given_up);
     RUN_TEST(signals_do_not_end_the_guard);
+    RUN_TEST(dying_of_a_fault_the_guard_switches_off);
+    RUN_TEST(switched_on_behind_the_guards_back_it_goes_off_again);
     RUN_TEST(it_is_named_and_holds_two_descriptors);
     RUN_TEST(closed_the_guard_ends_and_gives_the_line_back);
     RUN_TEST(opened_again_the_old_guard_has_ended_first);
