@@ -190,15 +190,14 @@ static enum hal_next go(struct hal_v4l2 *v4l2, const struct hal_error *error)
     return HAL_NEXT_GONE;
 }
 
-static bool return_buffer(struct hal_v4l2 *v4l2, uint32_t index)
+/* If the driver does not take it, the next call says so. */
+static void return_buffer(struct hal_v4l2 *v4l2, uint32_t index)
 {
     struct hal_error error;
-    if (give_buffer(v4l2, index)) {
-        return true;
+    if (!give_buffer(v4l2, index)) {
+        hal_fail(&error, "giving buffer %u back: %s", index, strerror(errno));
+        go(v4l2, &error);
     }
-    hal_fail(&error, "giving buffer %u back: %s", index, strerror(errno));
-    go(v4l2, &error);
-    return false;
 }
 
 /* Asked first, since libv4l2 writes every EAGAIN to standard error. An error counts as ready: the
@@ -302,7 +301,7 @@ static void hand_on(struct hal_v4l2 *v4l2, const struct v4l2_buffer *buffer,
         uint8_t *image = v4l2->images + (size_t)hold_index * v4l2->image_bytes;
         hal_pixels_decode(format->layout, samples, (size_t)format->stride_bytes, v4l2->config.width,
                           v4l2->config.height, image);
-        return_buffer(v4l2, buffer->index); /* if that fails, the next call says so */
+        return_buffer(v4l2, buffer->index);
         samples = image;
         stride_bytes = v4l2->config.width * hal_pixels_sample_bytes(format->layout);
     }
@@ -342,7 +341,7 @@ static enum hal_next next_frame(void *context, struct hal_frame *frame, struct h
     count_frame(v4l2, buffer.sequence);
     if (!check_buffer(v4l2, &buffer, error)) {
         name_frame(v4l2, v4l2->bad_name, time_of(&buffer), frame);
-        return_buffer(v4l2, buffer.index); /* if that fails, the next call says so */
+        return_buffer(v4l2, buffer.index);
         return HAL_NEXT_BAD;
     }
     hand_on(v4l2, &buffer, hold, frame);
@@ -357,7 +356,7 @@ static void release_frame(void *context, const struct hal_frame *frame)
     }
     struct hal_v4l2_hold *hold = &v4l2->hold[frame->buffer_index];
     if (hold->used && hold->has_buffer && !v4l2->gone) {
-        return_buffer(v4l2, hold->buffer_index); /* if that fails, next says so */
+        return_buffer(v4l2, hold->buffer_index);
     }
     hold->used = false;
 }

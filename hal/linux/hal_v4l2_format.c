@@ -14,7 +14,7 @@
 #define AUTO "auto"
 /* No device has more formats or sizes than this; a broken driver may list them without end. */
 #define LIST_MAX 64
-#define LIST_TEXT_MAX 160
+#define LIST_TEXT_MAX 100
 /* Luma of YUV with limited range is white here. */
 #define LIMITED_WHITE 235
 
@@ -44,7 +44,7 @@ struct list {
 
 struct offer {
     bool has[CHOICE_COUNT];
-    struct list names;
+    struct list others;
 };
 
 int hal_v4l2_ioctl(int fd, unsigned long request, void *argument)
@@ -89,13 +89,12 @@ static void name_fourcc(uint32_t fourcc, char name[5])
     }
 }
 
-/* Our name of a format, or its four letters. */
+/* Whether it is one of ours; else its four letters. */
 static void note_format(const struct v4l2_fmtdesc *description, struct offer *offer)
 {
     for (size_t k = 0; k < CHOICE_COUNT; k++) {
         if (choices[k].fourcc == description->pixelformat) {
             offer->has[k] = true;
-            add_item(&offer->names, choices[k].name);
             return;
         }
     }
@@ -103,13 +102,13 @@ static void note_format(const struct v4l2_fmtdesc *description, struct offer *of
     if ((description->flags & V4L2_FMT_FLAG_EMULATED) == 0) {
         char name[5];
         name_fourcc(description->pixelformat, name);
-        add_item(&offer->names, name);
+        add_item(&offer->others, name);
     }
 }
 
 static bool read_formats(int fd, struct offer *offer, struct hal_error *error)
 {
-    *offer = (struct offer){.names = {""}};
+    *offer = (struct offer){.others = {""}};
     for (uint32_t index = 0; index < LIST_MAX; index++) {
         struct v4l2_fmtdesc description = {.index = index, .type = V4L2_BUF_TYPE_VIDEO_CAPTURE};
         if (hal_v4l2_ioctl(fd, VIDIOC_ENUM_FMT, &description) == 0) {
@@ -237,6 +236,23 @@ static bool is_name(const char *wanted)
     return good;
 }
 
+static void explain_lack(const char *wanted, const struct offer *offer, struct hal_error *error)
+{
+    struct list ours = {""};
+    for (size_t k = 0; k < CHOICE_COUNT; k++) {
+        if (offer->has[k]) {
+            add_item(&ours, choices[k].name);
+        }
+    }
+    if (strcmp(wanted, AUTO) == 0) {
+        hal_fail(error, "none of " HAL_V4L2_FORMATS "; the device has: %s",
+                 list_text(&offer->others));
+    } else {
+        hal_fail(error, "no format %s; the device has: %s; and of no use: %s", wanted,
+                 list_text(&ours), list_text(&offer->others));
+    }
+}
+
 bool hal_v4l2_format_set(int fd, const char *wanted, int32_t width, int32_t height,
                          struct hal_v4l2_format *format, struct hal_error *error)
 {
@@ -270,8 +286,7 @@ bool hal_v4l2_format_set(int fd, const char *wanted, int32_t width, int32_t heig
         }
     }
     if (!refused) {
-        hal_fail(error, "no format %s; the device has: %s",
-                 strcmp(wanted, AUTO) == 0 ? HAL_V4L2_FORMATS : wanted, list_text(&offer.names));
+        explain_lack(wanted, &offer, error);
     }
     return false;
 }
