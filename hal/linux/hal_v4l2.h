@@ -38,7 +38,8 @@
  * Exposure: V4L2_CID_EXPOSURE_ABSOLUTE, in units of 100 us. Sensors that have V4L2_CID_EXPOSURE
  * instead, which counts rows, are served when the device also has V4L2_CID_HBLANK and
  * V4L2_CID_PIXEL_RATE: a row takes (width + hblank) / pixel rate. A time is rounded to the nearest
- * unit and must lie in the control's range. Automatic exposure is switched off before.
+ * unit and must lie in the control's range. Automatic exposure is switched off before. Setting it
+ * waits for the device's answer: over USB that takes some milliseconds.
  * Gain: V4L2_CID_GAIN, or else V4L2_CID_ANALOGUE_GAIN, in the device's own units, after
  * V4L2_CID_AUTOGAIN was switched off where there is one. All are read back: another answer than what
  * was asked, by a step or more, is an error.

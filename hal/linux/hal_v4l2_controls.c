@@ -151,8 +151,12 @@ bool hal_v4l2_exposure_set(int fd, int32_t width, int32_t exposure_us,
             return false;
         }
         *exposure = (struct hal_v4l2_exposure){true, control.id, unit_ns};
-    } else if (find_control(fd, exposure->control, &control, error) != FOUND) {
-        return hal_fail(error, "%s: the device's control of exposure is gone", asked);
+    } else {
+        const enum found found = find_control(fd, exposure->control, &control, error);
+        if (found != FOUND) {
+            return found == FOUND_NOT &&
+                   hal_fail(error, "%s: the device's control of exposure is gone", asked);
+        }
     }
     const int64_t value =
         ((int64_t)exposure_us * NS_PER_US + exposure->unit_ns / 2) / exposure->unit_ns;

@@ -499,6 +499,21 @@ static void the_first_exposure_may_come_later(void)
     TEST_ASSERT_EQUAL_INT64(10, fake.control[1].value);
 }
 
+/* What was there on opening need not stay, as with a device that is unplugged. */
+static void exposure_of_a_device_that_changes(void)
+{
+    add_exposure();
+    want_exposure(HAL_V4L2_VALUE, 1000);
+    start();
+    fake.control[1].flags = V4L2_CTRL_FLAG_DISABLED;
+    TEST_ASSERT_FALSE(v4l2.camera.set_exposure(&v4l2, 1000, &error));
+    TEST_ASSERT_EQUAL_STRING("exposure 1000 us: the device's control of exposure is gone",
+                             error.text);
+    fake.unplugged = true;
+    TEST_ASSERT_FALSE(v4l2.camera.set_exposure(&v4l2, 1000, &error));
+    TEST_ASSERT_EQUAL_STRING("asking for control 0x009a0902: No such device", error.text);
+}
+
 /* Devices have one of two ways to be automatic, and to be manual. */
 static void the_other_automatic_and_the_other_manual(void)
 {
@@ -1283,6 +1298,7 @@ int main(void)
     RUN_TEST(what_is_to_be_kept_is_not_touched);
     RUN_TEST(exposure_is_set_in_its_units_after_the_automatic_is_off);
     RUN_TEST(the_first_exposure_may_come_later);
+    RUN_TEST(exposure_of_a_device_that_changes);
     RUN_TEST(the_other_automatic_and_the_other_manual);
     RUN_TEST(exposure_that_cannot_be_set);
     RUN_TEST(steps_are_allowed);
