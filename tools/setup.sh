@@ -105,6 +105,7 @@ format) need_program clang-format clang-format ;;
 lint)
     need_program clang clang
     need_program clang-tidy clang-tidy
+    need_header libv4l2.h libv4l-dev
     ;;
 *)
     echo "usage: tools/setup.sh sim|test|accept|eval|bits|vectors|picture|format|lint|board ARCH" >&2
