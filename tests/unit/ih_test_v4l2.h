@@ -66,7 +66,7 @@ static struct {
     uint32_t buffers_given; /* 0: as many as asked */
     uint32_t bytes_short;   /* buffers are so much too small */
     uint32_t other_fourcc;  /* not 0: what every format becomes */
-    bool no_parameters;     /* no VIDIOC_G_PARM */
+    int no_parameters;      /* not 0: errno of every rate */
     uint32_t rate_flags;
     struct v4l2_fract frame_time, only_time; /* only_time: not 0: what every rate becomes */
     struct fake_frame frame[FAKE_FRAMES];
@@ -307,8 +307,8 @@ static int fake_set_format(struct v4l2_format *wanted)
 
 static int fake_parameters(struct v4l2_streamparm *parameters, bool set)
 {
-    if (fake.no_parameters) {
-        return fake_fail(ENOTTY);
+    if (fake.no_parameters != 0) {
+        return fake_fail(fake.no_parameters);
     }
     if (set) {
         fake.frame_time = fake.only_time.denominator != 0 ? fake.only_time

@@ -344,6 +344,9 @@ static void sizes_that_make_no_sense(void)
     config.width = WIDTH;
     config.height = 16385;
     check_refused("asked for frames of 20x16385, expected 1..16384 each");
+    config.width = 16385;
+    config.height = HEIGHT;
+    check_refused("asked for frames of 16385x6, expected 1..16384 each");
 }
 
 static void interlaced_frames_are_refused(void)
@@ -406,6 +409,10 @@ static void a_rate_nearby_is_taken_another_is_not(void)
     start();
     TEST_ASSERT_EQUAL_INT32(33366, v4l2.camera.frame_time_us(&v4l2));
     tearDown();
+    fake.only_time = (struct v4l2_fract){10, 302};
+    start();
+    TEST_ASSERT_EQUAL_INT32(33112, v4l2.camera.frame_time_us(&v4l2));
+    tearDown();
     setUp();
     config.rate_mhz = 30000;
     fake.only_time = (struct v4l2_fract){2, 15};
@@ -418,13 +425,19 @@ static void a_rate_nearby_is_taken_another_is_not(void)
 
 static void a_device_without_a_rate(void)
 {
-    fake.no_parameters = true;
+    fake.no_parameters = EINVAL;
+    start();
+    TEST_ASSERT_EQUAL_INT32(0, v4l2.camera.frame_time_us(&v4l2));
+    tearDown();
+    fake.no_parameters = ENOTTY;
     start();
     TEST_ASSERT_EQUAL_INT32(0, v4l2.camera.frame_time_us(&v4l2));
     tearDown();
     config.rate_mhz = 12500;
     check_refused("asked for 12.500 frames a second, the device's rate is fixed");
-    fake.no_parameters = false;
+    fake.no_parameters = EIO;
+    check_refused("asking for its frame rate: Input/output error");
+    fake.no_parameters = 0;
     fake.rate_flags = 0;
     check_refused("asked for 12.500 frames a second, the device's rate is fixed");
     config.rate_mhz = -1;
@@ -572,6 +585,17 @@ static void steps_are_allowed(void)
     TEST_ASSERT_EQUAL_INT64(53, time->value);
     tearDown();
     time->is_stubborn = true;
+    time->value = 61;
+    start();
+    tearDown();
+    time->value = 62;
+    check_refused("exposure 5700 us: Exposure Time, Absolute set to 57 (of 100000 ns), the device "
+                  "says 62");
+    time->step = 0; /* does not say: 1 */
+    time->value = 58;
+    check_refused("exposure 5700 us: Exposure Time, Absolute set to 57 (of 100000 ns), the device "
+                  "says 58");
+    time->step = 5;
     time->value = 52;
     check_refused("exposure 5700 us: Exposure Time, Absolute set to 57 (of 100000 ns), the device "
                   "says 52");
@@ -589,6 +613,10 @@ static void exposure_in_rows(void)
     check_refused("exposure 5000 us: the device counts exposure in rows and does not tell how long "
                   "a row takes (controls pixel rate and horizontal blanking)");
     add_control(V4L2_CID_PIXEL_RATE, "Pixel Rate", 0, 0, 100000000);
+    fake.control[1].id = V4L2_CID_VBLANK; /* the other one is not there */
+    check_refused("exposure 5000 us: the device counts exposure in rows and does not tell how long "
+                  "a row takes (controls pixel rate and horizontal blanking)");
+    fake.control[1].id = V4L2_CID_HBLANK;
     start();
     TEST_ASSERT_EQUAL_INT64(250, rows->value);
     TEST_ASSERT_TRUE(v4l2.camera.set_exposure(&v4l2, 1009, &error));
@@ -1196,7 +1224,7 @@ static void every_call_fails_once(void)
     for (kind = 0; kind < 5; kind++) {
         for (reason = 0; reason < IH_TEST_COUNT(reasons); reason++) {
             for (call = 1;; call++) {
-                int32_t k;
+                int32_t k, opening;
                 bool good;
 
                 prepare(kind);
@@ -1209,6 +1237,7 @@ static void every_call_fails_once(void)
                 fake.fail_reason = reasons[reason];
                 memset(&v4l2, IH_TEST_FILL, sizeof v4l2);
                 good = open_camera();
+                opening = fake.call_count;
                 if (good) {
                     live();
                     v4l2.camera.close(&v4l2);
@@ -1217,6 +1246,10 @@ static void every_call_fails_once(void)
                     refusals++;
                 }
                 check_closed();
+                /* where nothing has a second choice, a device that goes away is noticed at once */
+                if (reasons[reason] == ENODEV && (kind == 0 || kind == 2)) {
+                    TEST_ASSERT_EQUAL_INT(call > opening, good);
+                }
                 if (reasons[reason] == EINTR) { /* signals change nothing */
                     TEST_ASSERT_EQUAL_INT(kind != 4, good);
                 }
