@@ -15,10 +15,10 @@ PICTURE ?= 000020
 ARCH ?= arm64
 
 .DEFAULT_GOAL := help
-.PHONY: help sim frames sanitize test accept eval bits vectors learn picture board format formatted lint clean
+.PHONY: help sim frames sanitize test accept eval bits vectors learn picture board deb test-deb format formatted lint clean
 
 help: ## this list
-	@awk -F ':.*## ' '/^[a-z_]+:.*## / { printf "  make %-9s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z_-]+:.*## / { printf "  make %-9s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
 sim: ## build host_sim, and render frames/ if they are not there
 	@tools/setup.sh sim
@@ -77,6 +77,16 @@ board: ## build isohead_board for ARCH=arm64 (default), armhf or host: build/boa
 	@tools/setup.sh board $(ARCH)
 	@cmake --preset board-$(ARCH) > $(BUILD)/board-$(ARCH).log 2>&1 || { cat $(BUILD)/board-$(ARCH).log; exit 1; }
 	@cmake --build --preset board-$(ARCH) --parallel 2 --target isohead_board
+
+deb: board ## the Debian package of isohead_board for ARCH=arm64 (default) or armhf: build/*.deb
+	@tools/setup.sh deb $(ARCH)
+	@tools/board/deb.sh $(ARCH)
+
+test-deb: sim ## build both Debian packages; install, run, update and purge one in a Debian arm64 root
+	@tools/setup.sh test-deb
+	@$(MAKE) board ARCH=arm64
+	@$(MAKE) board ARCH=armhf
+	@tests/board/deb.sh frames/sequence1/rig.json
 
 format: ## clang-format over all C sources
 	@tools/setup.sh format

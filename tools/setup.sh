@@ -3,6 +3,8 @@
 #
 #   tools/setup.sh sim|test|accept|eval|bits|vectors|picture|format|lint
 #   tools/setup.sh board arm64|armhf|host
+#   tools/setup.sh deb arm64|armhf
+#   tools/setup.sh test-deb
 #
 # On Debian and its kin missing packages are installed when that is allowed (root, or sudo without a
 # password); otherwise the exact command is printed and the exit status is 1. Nothing is installed
@@ -68,9 +70,38 @@ need_gpio() {
     need_python pip python3-pip
 }
 
+# need_deb arm64|armhf
+need_deb() {
+    case "${1:-}" in
+    arm64) need_program aarch64-linux-gnu-strip binutils-aarch64-linux-gnu ;;
+    armhf) need_program arm-linux-gnueabihf-strip binutils-arm-linux-gnueabihf ;;
+    *)
+        echo "there is no package for '${1:-}': name arm64 or armhf" >&2
+        exit 2
+        ;;
+    esac
+    need_program dpkg-shlibdeps dpkg-dev
+}
+
+need_test_deb() {
+    need_deb arm64
+    need_deb armhf
+    need_program readelf binutils
+    need_program lintian lintian
+    need_program mandoc mandoc
+    need_program man man-db
+    need_program systemd-analyze systemd
+    need_program mmdebstrap mmdebstrap
+    need_program arch-test arch-test
+    [ "$(uname -m)" = aarch64 ] || [ -e /usr/lib/binfmt.d/qemu-aarch64.conf ] ||
+        lacks qemu-user-static
+}
+
 case "${1:-}" in
 sim) need_sim ;;
 board) need_board "${2:-}" ;;
+deb) need_deb "${2:-}" ;;
+test-deb) need_test_deb ;;
 test)
     need_sim
     need_bits
@@ -108,7 +139,7 @@ lint)
     need_header libv4l2.h libv4l-dev
     ;;
 *)
-    echo "usage: tools/setup.sh sim|test|accept|eval|bits|vectors|picture|format|lint|board ARCH" >&2
+    sed -n '4,7s/^# \{0,1\}//p' "$0" >&2
     exit 2
     ;;
 esac
