@@ -1,0 +1,66 @@
+#!/bin/sh
+# The emulated board's kernel: Debian's own for arm64, and the modules that its camera needs.
+#
+#   tests/board/get.sh    ->  build/board/Image              the kernel
+#                             build/board/root/lib/modules   modules, with what they depend on
+#                             build/board/root/bin/busybox
+#                             build/board/release            the kernel's `uname -r`
+#
+# The camera is v4l2loopback, built here against the kernel's headers. Nothing happens when all is
+# there and this script is unchanged; remove build/board for a newer kernel.
+set -eu
+cd "$(dirname "$0")/../.."
+out=$PWD/build/board
+apt=tools/board/apt.sh
+stamp=$(cksum <tests/board/get.sh)
+[ "$(cat "$out/stamp" 2>/dev/null)" = "$stamp" ] && exit 0
+
+rm -rf "$out"
+mkdir -p "$out/root/bin"
+# The number in the names moves with every security update.
+image=$($apt newest 'linux-image-6\.1\.0-[0-9]+-arm64')
+release=${image#linux-image-}
+common=linux-headers-${release%-arm64}-common
+unpacked=$out/unpacked
+$apt unpack "$unpacked" "$image:arm64" "linux-headers-$release:arm64" "$common" linux-kbuild-6.1 \
+    busybox-static:arm64 v4l2loopback-source
+
+# The headers name each other by where they would be installed.
+headers=$unpacked/usr/src/linux-headers-$release
+sed -i "s|^include /usr/src/|include $unpacked/usr/src/|" "$headers/Makefile"
+
+# A frame's number is what the feeder says: v4l2loopback has none for frames that are queued with
+# a time stamp. Like a camera's, the stamps are said to be of the monotonic clock.
+tar -x -C "$unpacked" -f "$unpacked/usr/src/v4l2loopback.tar.bz2"
+source=$unpacked/modules/v4l2loopback
+line='b->buffer.bytesused = buf->bytesused;'
+grep -qF "$line" "$source/v4l2loopback.c" ||
+    { echo "$0: v4l2loopback.c has changed: no line '$line' in it" >&2; exit 1; }
+sed -i "s|$line|& b->buffer.sequence = buf->sequence;\
+    b->buffer.flags \|= V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC;|" "$source/v4l2loopback.c"
+make -C "$headers" ARCH=arm64 CROSS_COMPILE=aarch64-linux-gnu- M="$source" modules \
+    >"$out/log" 2>&1 || { tail -n 20 "$out/log" >&2; exit 1; }
+
+# All modules, to find out what depends on what; then only those that are wanted.
+mkdir -p "$unpacked/lib/modules/$release/extra"
+aarch64-linux-gnu-strip --strip-debug -o "$unpacked/lib/modules/$release/extra/v4l2loopback.ko" \
+    "$source/v4l2loopback.ko"
+PATH=$PATH:/sbin:/usr/sbin
+depmod -b "$unpacked" "$release"
+modules=$out/root/lib/modules/$release
+mkdir -p "$modules"
+for module in virtio_mmio virtio_console v4l2loopback vivid; do
+    modprobe -d "$unpacked" -S "$release" --ignore-install --show-depends "$module" |
+        while read -r verb file rest; do
+            [ "$verb" != insmod ] || cp "$file" "$modules/"
+        done
+done
+cp "$unpacked/lib/modules/$release"/modules.builtin* "$unpacked/lib/modules/$release/modules.order" \
+    "$modules/"
+depmod -b "$out/root" "$release"
+
+cp "$unpacked/boot/vmlinuz-$release" "$out/Image"
+cp "$unpacked/bin/busybox" "$out/root/bin/"
+echo "$release" >"$out/release"
+rm -rf "$unpacked"
+echo "$stamp" >"$out/stamp"
