@@ -15,10 +15,10 @@ PICTURE ?= 000020
 ARCH ?= arm64
 
 .DEFAULT_GOAL := help
-.PHONY: help sim frames sanitize test accept eval bits vectors learn picture board deb test-deb format formatted lint clean
+.PHONY: help sim frames sanitize test accept eval bits vectors learn picture board deb test-deb test-board format formatted lint clean
 
 help: ## this list
-	@awk -F ':.*## ' '/^[a-z_-]+:.*## / { printf "  make %-9s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z_-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
 sim: ## build host_sim, and render frames/ if they are not there
 	@tools/setup.sh sim
@@ -87,6 +87,14 @@ test-deb: sim ## build both Debian packages; install, run, update and purge one 
 	@$(MAKE) board ARCH=arm64
 	@$(MAKE) board ARCH=armhf
 	@tests/board/deb.sh frames/sequence1/rig.json
+
+test-board: sim ## isohead_board on an emulated ARM board: frames, faults, signals and the laser's line
+	@tools/setup.sh test-board
+	@$(MAKE) board ARCH=arm64
+	@tests/board/get.sh
+	@/usr/bin/python3 tests/board/test_board.py --program $(BUILD)/board-arm64/firmware/app/isohead_board \
+	  --sysroot $(BUILD)/sysroot/arm64 --host-sim $(BUILD)/host/sim/host_sim \
+	  --render $(BUILD)/host/tools/render/render --board $(BUILD)/board
 
 format: ## clang-format over all C sources
 	@tools/setup.sh format

@@ -5,6 +5,7 @@
 #   tools/setup.sh board arm64|armhf|host
 #   tools/setup.sh deb arm64|armhf
 #   tools/setup.sh test-deb
+#   tools/setup.sh test-board
 #
 # On Debian and its kin missing packages are installed when that is allowed (root, or sudo without a
 # password); otherwise the exact command is printed and the exit status is 1. Nothing is installed
@@ -102,6 +103,14 @@ sim) need_sim ;;
 board) need_board "${2:-}" ;;
 deb) need_deb "${2:-}" ;;
 test-deb) need_test_deb ;;
+test-board)
+    need_board arm64
+    [ -e /usr/aarch64-linux-gnu/lib/libc.a ] || lacks libc6-dev-arm64-cross
+    need_program qemu-system-aarch64 qemu-system-arm
+    PATH=$PATH:/sbin:/usr/sbin need_program depmod kmod
+    need_program bzip2 bzip2
+    need_program python3 python3-minimal
+    ;;
 test)
     need_sim
     need_bits
@@ -140,6 +149,7 @@ lint)
     ;;
 *)
     sed -n '4,7s/^# \{0,1\}//p' "$0" >&2
+    echo "usage: tools/setup.sh sim|test|accept|eval|bits|vectors|picture|format|lint|test-board|board ARCH" >&2
     exit 2
     ;;
 esac

@@ -78,7 +78,10 @@ class Board:
     # --- QEMU ---
 
     def _start(self, kernel, initramfs):
+        # icount: a nanosecond of the board's time per instruction while it computes, the host's time
+        # while it waits. A host under load then makes no frame late.
         arguments = ["qemu-system-aarch64", "-M", "virt,acpi=off", "-cpu", "cortex-a53", "-m", "256",
+                     "-icount", "shift=0",
                      "-nodefaults", "-display", "none", "-no-reboot", "-serial", "file:" + self.console,
                      "-kernel", kernel, "-initrd", initramfs,
                      "-append", "console=ttyAMA0 loglevel=5 panic=-1 nokaslr",
@@ -140,6 +143,7 @@ class Board:
             if left <= 0:
                 raise BoardError(f"no {what} within {limit_s:g} s\n{self.story()}")
             self._pump(left)
+        self._pump(0)  # what happened before, but came over a socket that is read later
 
     def settle(self, duration_s):
         """Take in what happens for so long."""
@@ -246,8 +250,8 @@ class Board:
     def start(self, arguments):
         self.command("start " + arguments)
 
-    def signal(self, name):
-        self.command(f"kill -{name} $program")
+    def signal(self, name, process="$program"):
+        self.command(f"kill -{name} {process}")
 
     def exit_status(self, limit_s):
         """Wait for the program's end; -N when signal N ended it, as in subprocess."""

@@ -29,15 +29,19 @@ $apt unpack "$unpacked" "$image:arm64" "linux-headers-$release:arm64" "$common" 
 headers=$unpacked/usr/src/linux-headers-$release
 sed -i "s|^include /usr/src/|include $unpacked/usr/src/|" "$headers/Makefile"
 
-# A frame's number is what the feeder says: v4l2loopback has none for frames that are queued with
-# a time stamp. Like a camera's, the stamps are said to be of the monotonic clock.
+# Two lines of v4l2loopback are not as a camera's driver would have them. Frames that are queued with
+# a time stamp get no number: it shall be the feeder's, and the stamp of the monotonic clock. And the
+# frame rate can be set, but it does not say so.
 tar -x -C "$unpacked" -f "$unpacked/usr/src/v4l2loopback.tar.bz2"
 source=$unpacked/modules/v4l2loopback
-line='b->buffer.bytesused = buf->bytesused;'
-grep -qF "$line" "$source/v4l2loopback.c" ||
-    { echo "$0: v4l2loopback.c has changed: no line '$line' in it" >&2; exit 1; }
-sed -i "s|$line|& b->buffer.sequence = buf->sequence;\
-    b->buffer.flags \|= V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC;|" "$source/v4l2loopback.c"
+change() {
+    grep -qF "$1" "$source/v4l2loopback.c" ||
+        { echo "$0: v4l2loopback.c has changed: no line '$1' in it" >&2; exit 1; }
+    sed -i "s/$1/$2/" "$source/v4l2loopback.c"
+}
+change 'b->buffer.bytesused = buf->bytesused;' "& b->buffer.sequence = buf->sequence;\
+    b->buffer.flags |= V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC;"
+change 'capture_param->capability = 0;' 'capture_param->capability = V4L2_CAP_TIMEPERFRAME;'
 make -C "$headers" ARCH=arm64 CROSS_COMPILE=aarch64-linux-gnu- M="$source" modules \
     >"$out/log" 2>&1 || { tail -n 20 "$out/log" >&2; exit 1; }
 
