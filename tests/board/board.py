@@ -78,11 +78,12 @@ class Board:
     # --- QEMU ---
 
     def _start(self, kernel, initramfs):
-        # icount: a nanosecond of the board's time per instruction while it computes, the host's time
-        # while it waits. A host under load then makes no frame late.
-        arguments = ["qemu-system-aarch64", "-M", "virt,acpi=off", "-cpu", "cortex-a53", "-m", "256",
-                     "-icount", "shift=0",
-                     "-nodefaults", "-display", "none", "-no-reboot", "-serial", "file:" + self.console,
+        # icount: a nanosecond of the board's time per instruction while it computes, the host's
+        # time while it waits. A host under load then makes no frame late.
+        arguments = ["qemu-system-aarch64", "-M", "virt,acpi=off", "-cpu", "cortex-a53",
+                     "-m", "256", "-icount", "shift=0",
+                     "-nodefaults", "-display", "none", "-no-reboot",
+                     "-serial", "file:" + self.console,
                      "-kernel", kernel, "-initrd", initramfs,
                      "-append", "console=ttyAMA0 loglevel=5 panic=-1 nokaslr",
                      "-device", "virtio-serial-device"]
@@ -111,7 +112,7 @@ class Board:
         items = self.qmp("qom-list", path="/machine/unattached")
         names = [item["name"] for item in items if item["type"] == GPIO_TYPE]
         if len(names) != 1:
-            raise BoardError(f"QEMU's board has {len(names)} GPIO chips of type {GPIO_TYPE}, not one")
+            raise BoardError(f"{len(names)} GPIO chips of type {GPIO_TYPE} in QEMU, not one")
         self.gpio = "/machine/unattached/" + names[0]
         self.qtest("irq_intercept_out " + self.gpio)
 

@@ -1,0 +1,186 @@
+"""Cases of frames: each returns what was seen; its first line says what is done."""
+
+import json
+import time
+
+from frames import TIME_0_US, host_records, picked
+from run import (FRAME_S, HEIGHT, INTERLOCK, LASER, LIVE_FIELDS, SILENT_S, SOON_S, WIDTH, expect,
+                 same_but)
+
+
+def case_gated(run):
+    """closed loop, gated: each frame after the laser's rising edge"""
+    expected = host_records(run, run.gated)
+    run.start(run.gated, "gated")
+    run.laser(1)
+    begin = time.monotonic()
+    for index, line in enumerate(expected):
+        record = run.lit_frame(run.gated, index)
+        expect(record == line, f"frame {index}:\nboard    {record}\nhost_sim {line}")
+    frame_ms = 1000 * (time.monotonic() - begin) / len(expected)
+    resident_kb, most_kb = run.board.memory_kb()
+    run.stop()
+    run.facts.append(f"memory: {resident_kb} kB resident, at most {most_kb} kB")
+    return f"{len(expected)} records identical to host_sim's, {frame_ms:.0f} ms each"
+
+
+def case_alternating(run):
+    """alternating: a lit frame while the line is high, a dark one while it is low"""
+    frames = run.alternating
+    expected = iter(host_records(run, frames))
+    run.start(run.alternating, "alternating")
+    identical = 0
+    for index in range(len(frames)):
+        run.laser(int(frames.lit(index)))
+        run.give(frames, index)
+        if frames.lit(index):
+            record, line = run.board.record(SOON_S), next(expected)
+            expect(record == line, f"frame {index}:\nboard    {record}\nhost_sim {line}")
+            identical += 1
+    run.stop()
+    expect(not run.board.records, f"records of dark frames: {list(run.board.records)}")
+    return f"{identical} lit and {len(frames) - identical} dark frames, records identical"
+
+def case_dropped(run):
+    """two frames lost on the way: a gap in the camera's numbers"""
+    indices = [0, 1, 2, 3, 6, 7, 8]
+    frames = picked(run, "dropped", run.gated, [(i, run.gated.time_us(i)) for i in indices])
+    expected = host_records(run, frames)
+    run.start(run.gated, "gated")
+    for number, index in enumerate(indices):
+        record = run.lit_frame(frames, number, sequence=index)
+        live = {"lost": 2} if index == 6 else {}
+        same_but(record, expected[number], **live)
+        expect(json.loads(record)["file"] == f"{index:06}.pgm", f"frame {index}'s name: {record}")
+    run.stop()
+    return "lost 2 in the record after the gap, its head as in host_sim, nothing later"
+
+
+def case_doubled(run):
+    """a frame that comes twice: both after one rise of the line"""
+    gated, again = run.gated, 3
+    run.start(gated, "gated")
+    for index in range(again):
+        same_but(run.lit_frame(gated, index), host_records(run, gated)[index])
+    run.laser(1)
+    run.give(gated, again)
+    run.give(gated, again)
+    # Both in turn, or the newest alone when both wait by the time that the program looks.
+    first = json.loads(run.board.record(SOON_S))
+    skipped = first.get("skipped", 0)
+    twice = [again] if skipped else [again, again]
+    indices = [*range(again), *twice, 4, 5]
+    frames = picked(run, "doubled", gated, [(i, gated.time_us(i)) for i in indices])
+    expected = host_records(run, frames)
+    same_but(json.dumps(first), expected[again], **({"skipped": 1} if skipped else {}))
+    if not skipped:
+        same_but(run.board.record(SOON_S), expected[again + 1])
+    for index in [4, 5]:
+        same_but(run.lit_frame(gated, index), expected[index + len(twice) - 1])
+    run.stop()
+    return f"{len(twice)} of 2 have a record (skipped {skipped}), those after them as in host_sim"
+
+
+def case_in_flight(run):
+    """alternating: a frame is late by one, so that light and line disagree"""
+    frames = run.alternating
+    # What the camera gives: from the fourth on each was exposed before the line last moved.
+    order = [0, 1, 2, 2, 3, 4, 5]
+    run.start(run.alternating, "alternating")
+    records = []
+    sent = 0
+    for index in order:
+        run.give(frames, index, sequence=sent, time_us=TIME_0_US + 100000 * sent)
+        sent += 1
+        if frames.lit(index):
+            records.append(json.loads(run.board.record(SOON_S)))
+            expect(records[-1]["labelled"] > 100, f"a lit frame's record: {records[-1]}")
+            run.laser(0)
+        else:
+            run.laser(1)
+    run.stop()
+    expect(not run.board.records, f"records of dark frames: {list(run.board.records)}")
+    return f"{len(records)} lit of {len(order)} frames have their record, the line follows at once"
+
+
+def case_late(run):
+    """no frame for longer than 3 frame times, then a dark one, then all is well"""
+    frames, lit, dark = run.alternating, [0, 2, 4, 6], 1
+    run.start(run.alternating, "gated")
+    for index in lit[:2]:
+        run.lit_frame(frames, index)
+    run.laser(1)
+    begin = run.last_edge(LASER)
+    run.laser(0)
+    high_s = run.last_edge(LASER) - begin
+    expect(high_s < SILENT_S + FRAME_S, f"the line stayed high for {high_s:.2f} s without a frame")
+    # What a camera sees while the line is low; the frame was only late, not lost.
+    run.give(frames, dark, sequence=3)
+    record = json.loads(run.lit_frame(frames, lit[2]))
+    expect(record.get("strobe") == "late" and record.get("skipped") == 1,
+           f"the record after a late frame: {record}")
+    record = json.loads(run.lit_frame(frames, lit[3], sequence=5))
+    expect(not set(LIVE_FIELDS) & set(record), f"the second record after a late frame: {record}")
+    run.stop()
+    return f"low {high_s:.2f} s after its rise (3 frame times: {SILENT_S:.2f} s); recorded as late"
+
+
+def case_silent(run):
+    """no frame for 10 frame times: the camera is opened anew"""
+    run.start(run.gated, "gated")
+    run.lit_frame(run.gated, 0)
+    run.board.wait(lambda: any("open, a frame" in line for line in run.board.log[1:]), SOON_S,
+                   "second opening of the camera")
+    # v4l2loopback gives whoever opens it what was written last.
+    record = json.loads(run.board.record(SOON_S))
+    expect(record.get("strobe") == "reopened", f"the first record afterwards: {record}")
+    record = json.loads(run.lit_frame(run.gated, 1))
+    expect(not set(LIVE_FIELDS) & set(record), f"the second record afterwards: {record}")
+    run.stop()
+    return "the record says reopened, the next one is clean"
+
+
+def case_truncated(run):
+    """half a frame: an error record, then all is well"""
+    expected = host_records(run, run.gated)
+    run.start(run.gated, "gated")
+    same_but(run.lit_frame(run.gated, 0), expected[0])
+    run.laser(1)
+    run.board.send_frame(1, run.gated.time_us(1), run.gated.samples(1)[:WIDTH * HEIGHT // 2])
+    record = json.loads(run.board.record(SOON_S))
+    expect(record["file"] == "000001.pgm" and "error" in record, f"half a frame's record: {record}")
+    record = json.loads(run.lit_frame(run.gated, 2))
+    expect("error" not in record and record["labelled"] > 100, f"the record after it: {record}")
+    run.stop()
+    return "error record, the next one is good"
+
+
+def case_unplugged(run):
+    """camera pulled out while the laser is on, and put back (the kernel's virtual camera)"""
+    board = run.board
+    board.command("modprobe vivid n_devs=1 num_inputs=1 input_types=0 node_types=1 vid_cap_nr=1")
+    board.log.clear()
+    board.set_input(INTERLOCK, 1)
+    run.start_at("/dev/video1", "small", "always")
+    run.laser(1)
+    board.record(SOON_S)
+    # The shell keeps the device open, so that it does not come back yet.
+    pulled = time.monotonic()
+    board.command("exec 6</dev/video1; unplug /dev/video1")
+    run.laser(0)
+    low_ms = 1000 * (run.last_edge(LASER) - pulled)
+    rises = board.rises[LASER]
+    board.wait(lambda: sum("trying again" in line for line in board.log) >= 3, SOON_S,
+               "third try to open the camera")
+    expect(board.rises[LASER] == rises, "the laser went on without a camera")
+    board.records.clear()
+    board.command("exec 6<&-")
+    run.laser(1)
+    record = json.loads(board.record(SOON_S))
+    expect(record.get("strobe") == "reopened", f"the first record afterwards: {record}")
+    run.stop()
+    return f"low {low_ms:.0f} ms later, no rise while it is gone, goes on by itself"
+
+
+CASES = [case_gated, case_alternating, case_dropped, case_doubled, case_in_flight, case_late,
+         case_silent, case_truncated, case_unplugged]

@@ -1,0 +1,193 @@
+"""Cases of the laser's line: each returns what was seen; its first line says what is done."""
+
+import json
+import time
+
+from frames import host_records
+from run import (FRAME_S, HEARTBEAT, HEIGHT, INTERLOCK, LASER, LIVE_FIELDS, RATE, SILENT_S, SOON_S,
+                 WIDTH, expect, same_but)
+
+# Its process number, for the board's shell.
+GUARD = "$(pidof isohead-guard)"
+
+
+def case_interlock(run):
+    """interlock opened while the laser is on, then closed again"""
+    frames, board = run.alternating, run.board
+    run.start(run.alternating, "gated")
+    run.lit_frame(frames, 0)
+    run.laser(1)
+    begin = time.monotonic()
+    board.set_input(INTERLOCK, 0)
+    run.laser(0, SOON_S)
+    low_ms = 1000 * (run.last_edge(LASER) - begin)
+    rises = board.rises[LASER]
+    for sequence in range(1, 4):
+        run.give(frames, 1, sequence=sequence)
+        board.settle(FRAME_S)
+    expect(board.rises[LASER] == rises, "the laser went on with the interlock open")
+    board.set_input(INTERLOCK, 1)
+    record = json.loads(run.lit_frame(frames, 2, sequence=4))
+    expect(record["labelled"] > 100, f"the first record afterwards: {record}")
+    record = json.loads(run.lit_frame(frames, 4, sequence=5))
+    expect(not set(LIVE_FIELDS) & set(record), f"the second record afterwards: {record}")
+    run.stop()
+    board.set_input(INTERLOCK, 0)
+    board.command(f"feed {WIDTH} {HEIGHT} GREY")
+    run.start_at("/dev/video0", frames.rig, "always")
+    rises = board.rises[LASER]
+    board.settle(2)
+    expect(board.rises[LASER] == rises, "the laser went on: started with the interlock open")
+    run.stop()
+    return f"low {low_ms:.1f} ms after the pin, no rise while it is open, goes on when it is closed"
+
+
+def case_reload(run):
+    """SIGHUP with a broken rig, then with a good one"""
+    board = run.board
+    run.start(run.gated, "gated")
+    run.lit_frame(run.gated, 0)
+    run.laser(1)
+    board.command("cp /rig/gated.json /rig/good.json; echo broken >/rig/gated.json")
+    board.signal("HUP")
+    run.laser(0)
+    rises = board.rises[LASER]
+    run.give(run.gated, 1)
+    board.settle(2 * FRAME_S)
+    expect(not board.records, f"a record without a rig: {list(board.records)}")
+    expect(board.rises[LASER] == rises, "the laser went on without a rig")
+    board.command("cp /rig/good.json /rig/gated.json")
+    board.signal("HUP")
+    record = json.loads(run.lit_frame(run.gated, 2))
+    expect(record["labelled"] > 100, f"the first record afterwards: {record}")
+    run.stop()
+    return "laser off and no records with the broken one; goes on with the good one"
+
+
+def case_unasked(run):
+    """without --laser, and with a bad rig: the line is never touched"""
+    board = run.board
+    board.command(f"feed {WIDTH} {HEIGHT} GREY")
+    rises = board.rises[LASER]
+    run_options = f"--device /dev/video0 --format GREY --rate {RATE} --exposure keep --gain keep"
+    board.start(f"{run.name} --rig /rig/gated.json {run_options}")
+    board.wait(lambda: any("open, a frame" in line for line in board.log), SOON_S, "open camera")
+    run.give(run.gated, 0)
+    same_but(board.record(SOON_S), host_records(run, run.gated)[0])
+    run.stop()
+    board.start(f"{run.name} --rig /proc/version {run_options} --laser "
+                f"--gpio-chip /dev/gpiochip0 --laser-line {LASER}")
+    status = board.exit_status(SOON_S)
+    expect(status == 2, f"exit status {status} with a bad rig, not 2")
+    expect(board.rises[LASER] == rises, "the line has risen")
+    return "a record without the laser; exit status 2 for the bad rig"
+
+
+# Signals and how the program ends: 0 as asked, else by the signal itself.
+SIGNALS = {"TERM": 0, "INT": 0, "QUIT": -3, "ILL": -4, "TRAP": -5, "ABRT": -6, "BUS": -7, "FPE": -8,
+           "USR1": -10, "SEGV": -11, "USR2": -12, "ALRM": -14, "XCPU": -24, "SYS": -31}
+
+
+def case_signals(run):
+    """killed by each signal while the laser is on"""
+    board = run.board
+    slowest_ms = 0
+    for name, wanted in SIGNALS.items():
+        run.start(run.gated, "gated")
+        run.lit_frame(run.gated, 0)
+        run.laser(1)
+        begin = time.monotonic()
+        board.signal(name)
+        run.laser(0)
+        slowest_ms = max(slowest_ms, 1000 * (run.last_edge(LASER) - begin))
+        status = board.exit_status(SOON_S)
+        expect(status == wanted, f"exit status {status} after SIG{name}, not {wanted}")
+        expect(board.levels[LASER] == 0, f"the laser's line is high after SIG{name}")
+    return f"{len(SIGNALS)} signals: low after at most {slowest_ms:.0f} ms, exit status as expected"
+
+
+def case_killed(run):
+    """SIGKILL while the laser is on: the guard process acts"""
+    board = run.board
+    run.start(run.gated, "gated")
+    run.lit_frame(run.gated, 0)
+    run.laser(1)
+    board.wait_rises(HEARTBEAT, board.rises[HEARTBEAT] + 2, SOON_S)
+    begin = time.monotonic()
+    board.signal("KILL")
+    run.laser(0)
+    low_ms = 1000 * (run.last_edge(LASER) - begin)
+    status = board.exit_status(SOON_S)
+    expect(status == -9, f"exit status {status} after SIGKILL")
+    return f"low {low_ms:.0f} ms later"
+
+
+def case_all_killed(run):
+    """SIGKILL for program and guard at once: hardware and systemd are left"""
+    board = run.board
+    run.start(run.gated, "gated")
+    run.lit_frame(run.gated, 0)
+    run.laser(1)
+    board.signal("KILL", f"$program {GUARD}")
+    status = board.exit_status(SOON_S)
+    expect(status == -9, f"exit status {status} after SIGKILL")
+    stuck = "high" if board.levels[LASER] else "low"
+    edges = len(board.edges)
+    board.settle(1)
+    expect(len(board.edges) == edges, "a line moves although all are dead")
+    board.start(f"{run.name} --laser-off --gpio-chip /dev/gpiochip0 --laser-line {LASER}")
+    status = board.exit_status(SOON_S)
+    expect(status == 0, f"exit status {status} of --laser-off: {board.log[-3:]}")
+    expect(board.levels[LASER] == 0, "the laser's line is high after --laser-off")
+    return f"the line stays {stuck}, the heartbeat stops; low after --laser-off"
+
+
+def case_stopped(run):
+    """SIGSTOP while the laser is on: the guard process acts"""
+    board = run.board
+    run.start(run.gated, "gated")
+    run.lit_frame(run.gated, 0)
+    run.laser(1)
+    begin = time.monotonic()
+    board.signal("STOP")
+    run.laser(0)
+    low_s = run.last_edge(LASER) - begin
+    rises = board.rises[LASER]
+    board.signal("CONT")
+    status = board.exit_status(SOON_S)
+    expect(status == 1, f"exit status {status} after SIGCONT, not 1: {board.log[-3:]}")
+    expect(board.rises[LASER] == rises, "the laser went on after SIGCONT")
+    return f"low {low_s:.1f} s later; the program ends when it goes on"
+
+
+def case_guard_killed(run):
+    """the guard process killed while the laser is on"""
+    board = run.board
+    run.start(run.gated, "gated")
+    run.lit_frame(run.gated, 0)
+    run.laser(1)
+    begin = time.monotonic()
+    board.signal("KILL", GUARD)
+    run.laser(0)
+    low_ms = 1000 * (run.last_edge(LASER) - begin)
+    status = board.exit_status(SOON_S)
+    expect(status == 1, f"exit status {status}, not 1: {board.log[-3:]}")
+    expect(board.levels[LASER] == 0, "the laser's line is high after the end")
+    return f"low {low_ms:.0f} ms later, exit status 1"
+
+
+def case_duty(run):
+    """duty limit of 30 %, laser always on"""
+    run.start(run.gated, "always", "--duty 30")
+    run.laser(1)
+    begin = time.monotonic()
+    run.board.settle(2 * SILENT_S)
+    share = run.high_share(begin, time.monotonic())
+    # A burst of 100 ms is allowed at the start.
+    expect(0.2 < share < 0.4, f"the line was high for {100 * share:.0f} % of the time, expected 30")
+    run.stop()
+    return f"high for {100 * share:.0f} % of {2 * SILENT_S:.0f} s"
+
+
+CASES = [case_interlock, case_reload, case_unasked, case_signals, case_killed, case_all_killed,
+         case_stopped, case_guard_killed, case_duty]
