@@ -105,11 +105,10 @@ deb) need_deb "${2:-}" ;;
 test-deb) need_test_deb ;;
 test-board)
     need_board arm64
-    [ -e /usr/aarch64-linux-gnu/lib/libc.a ] || lacks libc6-dev-arm64-cross
     need_program qemu-system-aarch64 qemu-system-arm
     PATH=$PATH:/sbin:/usr/sbin need_program depmod kmod
     need_program bzip2 bzip2
-    need_program python3 python3-minimal
+    need_python json python3
     ;;
 test)
     need_sim
