@@ -16,6 +16,7 @@ time.monotonic().
 import collections
 import json
 import os
+import re
 import selectors
 import signal
 import socket
@@ -238,6 +239,24 @@ class Board:
         if line != "= 0":
             raise BoardError(f"'{text}' failed on the board with {line[2:]}: {output}")
         return "\n".join(output)
+
+    def watch_pins(self):
+        """From now on the kernel notes what pins it sets and when: for pins()."""
+        self.command("echo 1 >/sys/kernel/tracing/events/gpio/gpio_value/enable; "
+                     "echo >/sys/kernel/tracing/trace")
+
+    def pins(self):
+        """Edges of output pins since watch_pins(), by the board's clock: what a time limit of the
+        program has to be held against, as the host's runs differently while the board computes."""
+        base = int(self.command("cat /sys/class/gpio/gpiochip*/base"))
+        text = self.command("cat /sys/kernel/tracing/trace")
+        edges, levels = [], {}
+        for time_s, number, level in re.findall(r"([0-9.]+): gpio_value: (\d+) set ([01])", text):
+            edge = Edge(float(time_s), int(number) - base, int(level))
+            if levels.get(edge.line) != edge.level:
+                edges.append(edge)
+            levels[edge.line] = edge.level
+        return edges
 
     def send_frame(self, sequence, time_us, samples):
         """Into the camera that `feed` has made; returns at once."""

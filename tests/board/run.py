@@ -107,14 +107,10 @@ class Run:
     def last_edge(self, line):
         return next(edge.time_s for edge in reversed(self.board.edges) if edge.line == line)
 
-    def high_share(self, begin_s, end_s):
-        """For which part of that time the laser's line was high; it was so at its begin."""
-        high_s, since_s = 0, begin_s
-        for edge in self.board.edges:
-            if edge.line == LASER and begin_s < edge.time_s < end_s:
-                high_s += 0 if edge.level else edge.time_s - since_s
-                since_s = edge.time_s
-        return (high_s + self.board.levels[LASER] * (end_s - since_s)) / (end_s - begin_s)
+    def high_times(self):
+        """(rise, fall) of the laser's line since board.watch_pins(), by the board's clock."""
+        edges = [edge for edge in self.board.pins() if edge.line == LASER]
+        return [(rise.time_s, fall.time_s) for rise, fall in zip(edges, edges[1:]) if rise.level]
 
     def give(self, frames, index, sequence=None, time_us=None):
         self.board.send_frame(index if sequence is None else sequence,
