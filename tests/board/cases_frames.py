@@ -3,7 +3,7 @@
 import json
 import time
 
-from frames import TIME_0_US, host_records, picked
+from frames import TIME_0_US, clipped, host_records, picked, render
 from run import (FRAME_S, HEIGHT, INTERLOCK, LASER, LIVE_FIELDS, SILENT_S, SOON_S, WIDTH, expect,
                  same_but)
 
@@ -40,6 +40,57 @@ def case_alternating(run):
     run.stop()
     expect(not run.board.records, f"records of dark frames: {list(run.board.records)}")
     return f"{identical} lit and {len(frames) - identical} dark frames, records identical"
+
+def case_always(run):
+    """always on while frames come"""
+    frames = run.gated
+    expected = host_records(run, frames)
+    run.start(frames, "always")
+    run.laser(1)
+    rises = run.board.rises[LASER]
+    for index in range(6):
+        run.give(frames, index)
+        record, line = run.board.record(SOON_S), expected[index]
+        expect(record == line, f"frame {index}:\nboard    {record}\nhost_sim {line}")
+    expect(run.board.levels[LASER] == 1 and run.board.rises[LASER] == rises,
+           "the laser's line has moved while frames came")
+    run.stop()
+    return "6 records identical, the line stays high"
+
+
+# What the camera gives, bits per sample, and where its colours are put. (v4l2loopback's Y10 and Y12
+# have rows that are too short for them.)
+KINDS = [("YUYV", 8, "after"), ("UYVY", 8, "before"), ("Y16", 16, None)]
+# V4L2: white of a picture with colours, where the driver says nothing else of its range.
+LIMITED_WHITE = 235
+
+
+def with_colour(samples, place):
+    """YUYV or UYVY of a grey picture, its colours grey as well."""
+    both = bytearray(b"\x80" * (2 * len(samples)))
+    start = 0 if place == "after" else 1
+    both[start::2] = samples
+    return bytes(both)
+
+
+def case_kinds(run):
+    """cameras with colours and with more than 8 bits"""
+    for kind, bits, colour in KINDS:
+        frames = render(run, "gated", "--sequence", "1", "--seed", "1", "--frames", "2", "--bits",
+                        str(bits))
+        if colour:
+            frames = clipped(run, "limited", frames, LIMITED_WHITE)
+        expected = host_records(run, frames)
+        run.start(frames, "always", kind=kind)
+        run.laser(1)
+        for index, line in enumerate(expected):
+            samples = frames.samples(index)
+            run.give_samples(frames, index, with_colour(samples, colour) if colour else samples)
+            record = run.board.record(SOON_S)
+            expect(record == line, f"{kind}, {index}:\nboard    {record}\nhost_sim {line}")
+        run.stop()
+    return f"{', '.join(kind for kind, _, _ in KINDS)}: records identical to host_sim's"
+
 
 def case_dropped(run):
     """two frames lost on the way: a gap in the camera's numbers"""
@@ -162,7 +213,7 @@ def case_unplugged(run):
     board.command("modprobe vivid n_devs=1 num_inputs=1 input_types=0 node_types=1 vid_cap_nr=1")
     board.log.clear()
     board.set_input(INTERLOCK, 1)
-    run.start_at("/dev/video1", "small", "always")
+    run.start_at("/dev/video1", "small", "always", "--format GREY")
     run.laser(1)
     board.record(SOON_S)
     # The shell keeps the device open, so that it does not come back yet.
@@ -183,5 +234,5 @@ def case_unplugged(run):
     return f"low {low_ms:.0f} ms later, no rise while it is gone, goes on by itself"
 
 
-CASES = [case_gated, case_alternating, case_dropped, case_doubled, case_in_flight, case_late,
-         case_silent, case_truncated, case_unplugged]
+CASES = [case_gated, case_alternating, case_always, case_kinds, case_dropped, case_doubled,
+         case_in_flight, case_late, case_silent, case_truncated, case_unplugged]

@@ -34,7 +34,7 @@ def case_interlock(run):
     run.stop()
     board.set_input(INTERLOCK, 0)
     board.command(f"feed {WIDTH} {HEIGHT} GREY")
-    run.start_at("/dev/video0", frames.rig, "always")
+    run.start_at("/dev/video0", frames.rig, "always", "--format GREY")
     rises = board.rises[LASER]
     board.settle(2)
     expect(board.rises[LASER] == rises, "the laser went on: started with the interlock open")

@@ -23,12 +23,15 @@ class Frames:
         return len(self.entries)
 
     def samples(self, index):
+        """As a camera gives them: a byte each, or two, the least significant first."""
         with open(os.path.join(self.directory, self.entries[index]["file"]), "rb") as file:
-            content = file.read()
-        head = content.split(b"\n", 3)
-        if head[0] != b"P5" or head[2] != b"255":
-            raise ValueError(f"{self.directory}: frame {index} is no 8-bit PGM")
-        return head[3]
+            kind, _, maximum, content = file.read().split(b"\n", 3)
+        if kind != b"P5":
+            raise ValueError(f"{self.directory}: frame {index} is no PGM as render writes it")
+        samples = bytearray(content)
+        if int(maximum) > 255:
+            samples[0::2], samples[1::2] = samples[1::2], samples[0::2]
+        return bytes(samples)
 
     def time_us(self, index):
         return self.entries[index]["time_us"]
@@ -64,6 +67,23 @@ def picked(run, name, frames, picks):
             file.write(json.dumps(entry) + "\n")
             source = os.path.join(frames.directory, frames.entries[index]["file"])
             os.symlink(os.path.abspath(source), os.path.join(directory, entry["file"]))
+    return Frames(directory, frames.rig)
+
+
+def clipped(run, name, frames, white):
+    """The same frames of 8 bits, with another white; what is brighter becomes white."""
+    directory = os.path.join(run.work, "frames", name)
+    shutil.rmtree(directory, ignore_errors=True)
+    os.makedirs(directory)
+    for file in ["rig.json", "frames.jsonl"]:
+        shutil.copy(os.path.join(frames.directory, file), directory)
+    for index, entry in enumerate(frames.entries):
+        with open(os.path.join(frames.directory, entry["file"]), "rb") as file:
+            kind, size, _, _ = file.read().split(b"\n", 3)
+        table = bytes(min(value, white) for value in range(256))
+        with open(os.path.join(directory, entry["file"]), "wb") as file:
+            file.write(b"\n".join([kind, size, b"%d" % white,
+                                   frames.samples(index).translate(table)]))
     return Frames(directory, frames.rig)
 
 

@@ -77,19 +77,19 @@ class Run:
             self.board.close()
         self.board = None
 
-    def start(self, frames, strobe, more=""):
+    def start(self, frames, strobe, more="", kind="GREY"):
         """The program with a fresh camera and a closed interlock; laser low before."""
         board = self.board
-        board.command(f"feed {WIDTH} {HEIGHT} GREY")
+        board.command(f"feed {WIDTH} {HEIGHT} '{kind:4}'")
         board.set_input(INTERLOCK, 1)
         board.records.clear()
         board.log.clear()
-        self.start_at("/dev/video0", frames.rig, strobe, more)
+        self.start_at("/dev/video0", frames.rig, strobe, f"--format {kind} {more}")
 
     def start_at(self, device, rig, strobe, more=""):
         expect(self.board.levels[LASER] == 0, "the laser's line is high before the program starts")
         self.board.start(
-            f"{self.name} --rig /rig/{rig}.json --device {device} --format GREY --rate {RATE} "
+            f"{self.name} --rig /rig/{rig}.json --device {device} --rate {RATE} "
             f"--exposure keep --gain keep --laser --strobe {strobe} --gpio-chip /dev/gpiochip0 "
             f"--laser-line {LASER} --heartbeat-line {HEARTBEAT} --interlock-line {INTERLOCK} "
             f"--output - {more}")
@@ -113,9 +113,11 @@ class Run:
         return [(rise.time_s, fall.time_s) for rise, fall in zip(edges, edges[1:]) if rise.level]
 
     def give(self, frames, index, sequence=None, time_us=None):
+        self.give_samples(frames, index, frames.samples(index), sequence, time_us)
+
+    def give_samples(self, frames, index, samples, sequence=None, time_us=None):
         self.board.send_frame(index if sequence is None else sequence,
-                              frames.time_us(index) if time_us is None else time_us,
-                              frames.samples(index))
+                              frames.time_us(index) if time_us is None else time_us, samples)
 
     def lit_frame(self, frames, index, sequence=None, time_us=None):
         """Wait for the laser, give the frame, and take the record; the laser went off for it."""
