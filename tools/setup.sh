@@ -148,7 +148,6 @@ lint)
     ;;
 *)
     sed -n '4,7s/^# \{0,1\}//p' "$0" >&2
-    echo "usage: tools/setup.sh sim|test|accept|eval|bits|vectors|picture|format|lint|test-board|board ARCH" >&2
     exit 2
     ;;
 esac
