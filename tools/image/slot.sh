@@ -1,0 +1,122 @@
+#!/bin/sh
+# The root of one slot of the image: everything that an update replaces.
+#
+#   tools/image/slot.sh WORK BOARD
+#
+# BOARD is isohead_board for arm64. Writes WORK/slot.squashfs, and WORK/boot/ with the kernel, the
+# initramfs and the boot loader; kernel and initramfs are in the slot too, so that its one file is
+# all of an update. WORK/root, what the slot was made of, is left there.
+# Same input, same bytes: SOURCE_DATE_EPOCH is the time of every file, names are sorted.
+set -eu
+[ $# = 2 ] || { sed -n '2,4s/^# \{0,1\}//p' "$0" >&2; exit 2; }
+here=$(cd "$(dirname "$0")" && pwd)
+apt=$here/../board/apt.sh
+mkdir -p "$1"
+work=$(cd "$1" && pwd)
+board=$2
+: "${SOURCE_DATE_EPOCH:?is the time that all files get}"
+export LC_ALL=C
+umask 022
+
+packages=$work/packages
+root=$work/root
+initramfs=$work/initramfs
+rm -rf "$packages" "$root" "$initramfs" "${work:?}/boot"
+mkdir -p "$root" "$initramfs" "$work/boot"
+
+kernel_package=$("$apt" newest 'linux-image-6\.1\.0-[0-9]*-arm64')
+"$apt" unpack "$packages" "$kernel_package:arm64" busybox-static:arm64 systemd-boot-efi:arm64 \
+    libc6:arm64 libgcc-s1:arm64 libv4l-0:arm64 libv4lconvert0:arm64 libjpeg62-turbo:arm64 \
+    libgpiod2:arm64 libcjson1:arm64
+version=$(basename "$packages"/lib/modules/*)
+
+# modules TREE KIND...: the kernel's modules of these kinds in modules.list, and what they need
+modules() {
+    tree=$1
+    shift
+    from=$packages/lib/modules/$version
+    to=$tree/lib/modules/$version
+    mkdir -p "$to"
+    for kind in "$@"; do
+        sed -n "s/^$kind //p" "$here/modules.list"
+    done | sort >"$work/wanted"
+    while read -r path; do
+        [ -e "$from/kernel/$path" ] || { echo "modules.list: kernel $version has no $path" >&2; exit 1; }
+        (cd "$from" && find "kernel/$path" -name '*.ko')
+    done <"$work/wanted" >"$work/modules"
+    # modules.dep names all that a module needs, not only the next.
+    awk 'NR == FNR { wanted[$1 ":"]; next } $1 in wanted { for (i = 2; i <= NF; i++) print $i }' \
+        "$work/modules" "$from/modules.dep" | sort -u - "$work/modules" >"$work/all_modules"
+    (cd "$from" && cpio --quiet -pdm "$to" <"$work/all_modules")
+    cp "$from/modules.builtin" "$from/modules.builtin.modinfo" "$from/modules.order" "$to/"
+    depmod -b "$tree" "$version"
+    rm -f "$to"/modules.*.bin "$to"/modules.builtin* "$to/modules.order" # busybox reads the text files
+}
+
+# libraries PROGRAM: it and the libraries it needs, and theirs, copied to where they are looked for
+libraries() {
+    found=" "
+    queue=$1
+    while [ -n "$queue" ]; do
+        first=${queue%% *}
+        queue=${queue#"$first"}
+        queue=${queue# }
+        for name in $(readelf -d "$first" | sed -n 's/.*(NEEDED).*\[\(.*\)\]/\1/p'); do
+            case "$found" in *" $name "*) continue ;; esac
+            found="$found$name "
+            file=$(find "$packages/lib" "$packages/usr/lib" -name "$name" | head -n 1)
+            [ -n "$file" ] || { echo "$first needs $name, which is in none of the packages" >&2; exit 1; }
+            cp -L "$file" "$root/usr/lib/aarch64-linux-gnu/$name"
+            queue="$queue${queue:+ }$root/usr/lib/aarch64-linux-gnu/$name"
+        done
+    done
+}
+
+# busybox TREE FOLDER: it and a link for each of its commands
+busybox() {
+    install -D "$packages/bin/busybox" "$1/$2/busybox"
+    for name in $(qemu-aarch64 "$packages/bin/busybox" --list); do
+        [ "$name" = busybox ] || ln -sf busybox "$1/$2/$name"
+    done
+}
+
+# All times equal; the rest of what differs from run to run is left out by cpio and mksquashfs.
+fix_times() { find "$1" -exec touch -hd "@$SOURCE_DATE_EPOCH" {} +; }
+
+[ -e "$packages/lib/modules/$version/modules.dep" ] || depmod -b "$packages" "$version"
+
+mkdir -p "$initramfs/dev" "$initramfs/proc" "$initramfs/sys" "$initramfs/run" "$initramfs/root" \
+    "$initramfs/lib/isohead"
+busybox "$initramfs" bin
+cp "$here/initramfs/init" "$initramfs/init"
+cp "$here/root/usr/lib/isohead/slots" "$initramfs/lib/isohead/"
+modules "$initramfs" boot
+fix_times "$initramfs"
+(cd "$initramfs" && find . | sort | cpio --quiet --reproducible -R 0:0 -o -H newc) |
+    zstd --quiet -19 >"$work/boot/initrd"
+cp "$packages/boot/vmlinuz-$version" "$work/boot/linux"
+cp "$packages/usr/lib/systemd/boot/efi/systemd-bootaa64.efi" "$work/boot/"
+
+cp -R "$here/root/." "$root/"
+for folder in boot data dev etc proc run sys tmp usr/bin usr/lib/aarch64-linux-gnu; do
+    mkdir -p "$root/$folder"
+done
+ln -s usr/bin "$root/bin"
+ln -s usr/sbin "$root/sbin"
+ln -s usr/lib "$root/lib"
+ln -s ../run/resolv.conf "$root/etc/resolv.conf"
+busybox "$root" bin
+ln -s ../bin/busybox "$root/usr/sbin/init"
+modules "$root" boot root
+install -m 755 "$board" "$root/usr/bin/isohead_board"
+case "$(file -b "$board")" in
+*"dynamically linked"*)
+    libraries "$board"
+    ln -s aarch64-linux-gnu/ld-linux-aarch64.so.1 "$root/usr/lib/ld-linux-aarch64.so.1"
+    ;;
+esac
+cp "$work/boot/linux" "$work/boot/initrd" "$root/boot/"
+fix_times "$root"
+rm -f "$work/slot.squashfs"
+mksquashfs "$root" "$work/slot.squashfs" -quiet -no-progress -all-root -no-xattrs -no-exports \
+    -comp zstd -Xcompression-level 19 -b 256K >"$work/mksquashfs.log"
