@@ -1,0 +1,414 @@
+#!/usr/bin/env python3
+"""The image of tools/image on an emulated UEFI board: it boots into the firmware, which finds the
+heads in the frames it is fed; slots that are damaged or whose firmware fails are left by themselves.
+
+image.py --image DIR --board DIR --frames DIR --host-sim FILE --work DIR [CASE...]
+
+--image: what tools/image/image.sh has made; --board: what get.sh has made; --frames: a rendered
+frames directory. The image is used as it is, but for its data partition: that gets a rig, settings,
+and a start.sh that makes a camera of v4l2loopback, for frames that come over a virtio-serial port.
+Cases run at the same time. Exit status 1 if one fails.
+"""
+
+import argparse
+import concurrent.futures
+import hashlib
+import json
+import os
+import re
+import selectors
+import shutil
+import socket
+import struct
+import subprocess
+import sys
+import time
+
+HERE = os.path.dirname(os.path.abspath(__file__))
+FIRMWARE = "/usr/share/AAVMF"
+FRAME_COUNT = 10
+# Time stamps start here: v4l2loopback takes 0 for none.
+TIME_0_US = 1000000
+# Longest times: a start takes 20 s when idle, and several may run at once.
+START_S, ANSWER_S = 120, 60
+
+CONFIG = """device = /dev/video0
+format = GREY
+rate = 2
+exposure = keep
+gain = keep
+laser = off
+output = -
+status = 0
+"""
+START = """cp /data/test/feeder /run/feeder
+modprobe videodev
+insmod /data/test/v4l2loopback.ko devices=1 video_nr=0 max_buffers=4
+for port in /sys/class/virtio-ports/*; do
+    [ "$(cat $port/name)" != frames ] || /run/feeder /dev/${port##*/} /dev/video0 %d %d GREY
+done
+"""
+
+
+class Wrong(Exception):
+    """The board did something else than it should."""
+
+
+def expect(condition, text):
+    if not condition:
+        raise Wrong(text)
+
+
+def run(*arguments, **options):
+    return subprocess.run(arguments, check=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+                          text=True, **options).stdout
+
+
+# --- frames ---
+
+
+class Frames:
+    """The first frames of a directory, with time stamps that a driver takes; what host_sim says."""
+
+    def __init__(self, source, work, host_sim):
+        shutil.rmtree(work, ignore_errors=True)
+        os.makedirs(work)
+        with open(os.path.join(source, "frames.jsonl"), encoding="ascii") as file:
+            entries = [json.loads(line) for line in file][:FRAME_COUNT]
+        self.samples = []
+        with open(os.path.join(work, "frames.jsonl"), "w", encoding="ascii") as file:
+            for entry in entries:
+                entry["time_us"] += TIME_0_US
+                file.write(json.dumps(entry) + "\n")
+                shutil.copy(os.path.join(source, entry["file"]), work)
+                self.samples.append(self._read(os.path.join(work, entry["file"])))
+        self.times_us = [entry["time_us"] for entry in entries]
+        self.rig = shutil.copy(os.path.join(source, "rig.json"), work)
+        self.records = run(host_sim, "--json", work).splitlines()
+        expect(len(self.records) == FRAME_COUNT, f"host_sim gives {len(self.records)} records")
+        expect(any(json.loads(record)["heads"] for record in self.records),
+               f"no head in the first {FRAME_COUNT} frames of {source}")
+
+    def _read(self, path):
+        with open(path, "rb") as file:
+            magic, size, maximum, samples = file.read().split(b"\n", 3)
+        expect((magic, maximum) == (b"P5", b"255"), f"{path} is not an 8-bit PGM as render writes")
+        self.width, self.height = [int(word) for word in size.split()]
+        return samples
+
+
+# --- the disk ---
+
+
+class Disk:
+    """A copy of the image, and what lies where in it."""
+
+    def __init__(self, image, path):
+        run("cp", "--sparse=always", image, path)
+        self.path = path
+        table = json.loads(run("/sbin/sfdisk", "--json", path))["partitiontable"]
+        self.places = {part["name"]: (part["start"] * 512, part["size"] * 512)
+                       for part in table["partitions"]}
+
+    def _fat(self, name):
+        return f"{self.path}@@{self.places[name][0]}"
+
+    def put(self, sources, folder):
+        """Files into a folder of the data partition."""
+        run("mcopy", "-o", "-i", self._fat("isohead-data"), *sources, "::" + folder)
+
+    def make_folder(self, folder):
+        run("mmd", "-i", self._fat("isohead-data"), "::" + folder)
+
+    def entries(self):
+        """Names of the boot loader's entries."""
+        names = run("mdir", "-b", "-i", self._fat("isohead-esp"), "::/loader/entries").split()
+        return sorted(os.path.basename(name) for name in names)
+
+    def content(self, name, size=None):
+        start, whole = self.places[name]
+        with open(self.path, "rb") as file:
+            file.seek(start)
+            return file.read(whole if size is None else size)
+
+    def zero(self, name):
+        start, size = self.places[name]
+        with open(self.path, "r+b") as file:
+            file.seek(start)
+            file.write(bytes(size))
+
+    def check_esp(self, work):
+        """Is the ESP whole, and unmounted cleanly?"""
+        path = os.path.join(work, "esp.fat")
+        with open(path, "wb") as file:
+            file.write(self.content("isohead-esp"))
+        result = subprocess.run(["/sbin/fsck.vfat", "-n", path], stdout=subprocess.PIPE, text=True,
+                                check=False)
+        os.remove(path)
+        expect(result.returncode == 0, f"the ESP is not whole:\n{result.stdout}")
+
+
+# --- the board ---
+
+
+class Board:
+    """QEMU's virt board with UEFI, its console, and a port for frames."""
+
+    def __init__(self, disk, work):
+        self.log_path = os.path.join(work, "console.log")
+        variables = shutil.copy(os.path.join(FIRMWARE, "AAVMF_VARS.fd"), work)
+        arguments = [
+            "qemu-system-aarch64", "-M", "virt,acpi=off", "-cpu", "cortex-a53", "-m", "512",
+            "-nodefaults", "-display", "none",
+            "-drive", f"if=pflash,format=raw,readonly=on,file={FIRMWARE}/AAVMF_CODE.fd",
+            "-drive", f"if=pflash,format=raw,file={variables}",
+            "-drive", f"if=none,id=disk,format=raw,file={disk.path}",
+            "-device", "virtio-blk-device,drive=disk", "-device", "i6300esb",
+            "-device", "virtio-serial-device", "-device", "virtserialport,chardev=frames,name=frames",
+            "-serial", "chardev:console"]
+        self.sockets, theirs = {}, []
+        for name in ["console", "frames"]:
+            self.sockets[name], other = socket.socketpair()
+            theirs.append(other)
+            arguments += ["-chardev", f"socket,id={name},fd={other.fileno()}"]
+        self.text = ""
+        self.seen = 0  # how far `text` has been looked at
+        self.selector = selectors.DefaultSelector()
+        self.selector.register(self.sockets["console"], selectors.EVENT_READ)
+        self.begin = time.monotonic()
+        self.qemu = subprocess.Popen(arguments, stdin=subprocess.DEVNULL, stderr=subprocess.PIPE,
+                                     pass_fds=[sock.fileno() for sock in theirs], text=True)
+        for sock in theirs:
+            sock.close()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.qemu.kill()
+        self.qemu.wait()
+        for sock in self.sockets.values():
+            sock.close()
+        with open(self.log_path, "w", encoding="utf-8") as file:
+            file.write(self.text)
+
+    def now_s(self):
+        """Since power-on."""
+        return time.monotonic() - self.begin
+
+    def wait(self, pattern, limit_s):
+        """For the pattern in what the console has said since the last match; returns the match."""
+        end = time.monotonic() + limit_s
+        while True:
+            match = re.compile(pattern).search(self.text, self.seen)
+            if match:
+                self.seen = match.end()
+                return match
+            left = end - time.monotonic()
+            if left <= 0:
+                tail = "\n".join(self.text.splitlines()[-12:])
+                raise Wrong(f"no '{pattern}' on the console within {limit_s} s; its end:\n{tail}")
+            if self.qemu.poll() is not None:
+                raise Wrong(f"QEMU ended with status {self.qemu.returncode}: {self.qemu.stderr.read()}")
+            if self.selector.select(min(left, 1)):
+                content = self.sockets["console"].recv(65536)
+                self.text += content.decode("utf-8", errors="replace").replace("\r", "")
+
+    def command(self, text, limit_s=ANSWER_S):
+        """For the console's shell; it must succeed. Wakes the shell first."""
+        self.sockets["console"].sendall(f"\n{text}; echo status-$?-$((6 * 7))\n".encode())
+        match = self.wait(r"status-(\d+)-42\n", limit_s)
+        expect(match.group(1) == "0", f"'{text}' failed:\n{self.text[match.start() - 500:match.end()]}")
+
+    def send_frame(self, frames, index):
+        samples = frames.samples[index]
+        head = struct.pack("<qII", frames.times_us[index], index, len(samples))
+        self.sockets["frames"].sendall(head + samples)
+
+    def first_record(self, frames):
+        """Boot with a camera, until the record of the first frame; it is host_sim's."""
+        # What is written before the camera is opened waits for whoever opens it.
+        self.wait(r"running /data/start.sh", START_S)
+        self.send_frame(frames, 0)
+        self.check_record(frames, 0)
+
+    def check_record(self, frames, index):
+        record = self.wait(r'(?m)^(\{"file".*\})\n', ANSWER_S).group(1)
+        expect(record == frames.records[index],
+               f"frame {index}:\nboard    {record}\nhost_sim {frames.records[index]}")
+
+    def wait_slot(self, name):
+        """For the slot that is started next; True when it is whole."""
+        match = self.wait(r"isohead: slot (.) on \S+ is (whole|damaged)", START_S)
+        expect(match.group(1) == name, f"slot {match.group(1)} was started, not {name}")
+        return match.group(2) == "whole"
+
+
+# --- cases: each returns what was seen ---
+
+
+class Case:
+    """What a case needs: a disk of its own whose data partition is set up."""
+
+    def __init__(self, shared, name):
+        self.work = os.path.join(shared.work, name)
+        shutil.rmtree(self.work, ignore_errors=True)
+        os.makedirs(self.work)
+        self.frames = shared.frames
+        self.slot = os.path.join(shared.image, "slot.squashfs")
+        self.image = shared.image
+        self.disk = Disk(os.path.join(shared.image, "isohead.img"), os.path.join(self.work, "disk"))
+        self._write("isohead.conf", CONFIG)
+        self._write("start.sh", START % (self.frames.width, self.frames.height))
+        self.disk.put([os.path.join(self.work, "isohead.conf"), os.path.join(self.work, "start.sh"),
+                       self.frames.rig], "/")
+        self.disk.make_folder("/test")
+        self.disk.put([shared.feeder, shared.loopback], "/test")
+
+    def _write(self, name, text):
+        with open(os.path.join(self.work, name), "w", encoding="ascii") as file:
+            file.write(text)
+
+    def broken_slot(self):
+        """A slot whose firmware ends at once."""
+        root = os.path.join(self.work, "root")
+        run("cp", "--archive", "--link", os.path.join(self.image, "root"), root)
+        program = os.path.join(root, "usr/bin/isohead_board")
+        os.remove(program)
+        with open(program, "w", encoding="ascii") as file:
+            file.write("#!/bin/sh\necho this firmware is broken >&2\nexit 1\n")
+        os.chmod(program, 0o755)
+        path = os.path.join(self.work, "broken.squashfs")
+        run("mksquashfs", root, path, "-quiet", "-no-progress", "-all-root", "-comp", "zstd",
+            "-Xcompression-level", "3")
+        shutil.rmtree(root)
+        return path
+
+    def data_digest(self):
+        return hashlib.sha256(self.disk.content("isohead-data")).hexdigest()
+
+    def update(self, board, path):
+        with open(path, "rb") as file:
+            digest = hashlib.sha256(file.read()).hexdigest()
+        board.command(f"isohead-update /data/{os.path.basename(path)} {digest}", START_S)
+
+
+def case_update(shared):
+    """boots, finds heads; an update whose firmware fails is tried 3 times, then taken back"""
+    case = Case(shared, "update")
+    broken = case.broken_slot()
+    case.disk.put([broken], "/")
+    data = case.data_digest()
+    with Board(case.disk, case.work) as board:
+        expect(board.wait_slot("a"), "slot A is damaged")
+        board.first_record(case.frames)
+        first_s = board.now_s()
+        for index in range(1, FRAME_COUNT):
+            board.send_frame(case.frames, index)
+            board.check_record(case.frames, index)
+        expect("slot a is good" in board.text, "slot A is not good after its first records")
+        board.command("grep -q ' /data vfat ro,' /proc/mounts")
+        board.command("! touch /usr/x")
+        case.update(board, broken)
+        board.command("reboot")
+        begin_s = board.now_s()
+        for _ in range(3):
+            expect(board.wait_slot("b"), "slot B is damaged")
+            board.wait("slot b on trial: the firmware ended 3 times; starting again", START_S)
+        expect(board.wait_slot("a"), "slot A is damaged")
+        board.first_record(case.frames)
+        back_s = board.now_s() - begin_s
+        board.command("sync")
+    entries = case.disk.entries()
+    expect(entries == ["slot-a.conf", "slot-b+0-3.conf"], f"boot loader entries: {entries}")
+    expect(case.data_digest() == data, "the data partition was written to")
+    case.disk.check_esp(case.work)
+    return (f"power-on to first record {first_s:.1f} s; {FRAME_COUNT} records identical to "
+            f"host_sim's; back in slot A after 3 failed starts of B: first record after {back_s:.1f} s")
+
+
+def case_zeroed(shared):
+    """slot A zeroed: falls back to B by itself; an update then brings A back"""
+    case = Case(shared, "zeroed")
+    case.disk.put([case.slot], "/")
+    case.disk.zero("isohead-a")
+    data = case.data_digest()
+    with Board(case.disk, case.work) as board:
+        expect(not board.wait_slot("a"), "a zeroed slot counts as whole")
+        expect(board.wait_slot("b"), "slot B is damaged")
+        board.first_record(case.frames)
+        first_s = board.now_s()
+        board.wait("slot b is good", ANSWER_S)
+        case.update(board, case.slot)
+        board.command("reboot")
+        expect(board.wait_slot("a"), "slot A is damaged after the update")
+        board.first_record(case.frames)
+        board.wait("slot a is good", ANSWER_S)
+        board.command("sync")
+    entries = case.disk.entries()
+    expect(entries == ["slot-a.conf", "slot-b.conf"], f"boot loader entries: {entries}")
+    with open(case.slot, "rb") as file:
+        slot = file.read()
+    expect(case.disk.content("isohead-a", len(slot)) == slot, "slot A is not what the update held")
+    expect(case.data_digest() == data, "the data partition was written to")
+    case.disk.check_esp(case.work)
+    return f"power-on to first record, from slot B: {first_s:.1f} s; then slot A updated and good"
+
+
+CASES = [case_update, case_zeroed]
+
+
+# --- all of it ---
+
+
+class Shared:
+    """What the cases have in common."""
+
+    def __init__(self, arguments):
+        self.work = arguments.work
+        self.image = arguments.image
+        os.makedirs(self.work, exist_ok=True)
+        self.frames = Frames(arguments.frames, os.path.join(self.work, "frames"), arguments.host_sim)
+        with open(os.path.join(arguments.board, "release"), encoding="ascii") as file:
+            release = file.read().strip()
+        modules = os.path.join(arguments.board, "root", "lib", "modules", release)
+        self.loopback = os.path.join(modules, "v4l2loopback.ko")
+        expect(os.path.isdir(os.path.join(self.image, "root", "lib", "modules", release)),
+               f"the image's kernel is not {release}, for which v4l2loopback was built: remove "
+               f"{arguments.board} and make it anew")
+        self.feeder = os.path.join(self.work, "feeder")
+        run("aarch64-linux-gnu-gcc", "-std=c11", "-D_GNU_SOURCE", "-O2", "-Wall", "-Wextra", "-Werror",
+            "-static", "-o", self.feeder, os.path.join(HERE, "feeder.c"))
+
+
+def run_case(shared, case):
+    """Good, seconds, what was seen or went wrong."""
+    begin = time.monotonic()
+    try:
+        text = case(shared)
+    except (Wrong, subprocess.CalledProcessError) as error:
+        return False, time.monotonic() - begin, f"{error} {getattr(error, 'output', '')}"
+    return True, time.monotonic() - begin, text
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    for name in ["image", "board", "frames", "host-sim", "work"]:
+        parser.add_argument("--" + name, required=True, type=os.path.abspath)
+    parser.add_argument("case", nargs="*")
+    arguments = parser.parse_args()
+    chosen = [case for case in CASES
+              if not arguments.case or case.__name__[len("case_"):] in arguments.case]
+    begin = time.monotonic()
+    shared = Shared(arguments)
+    with concurrent.futures.ThreadPoolExecutor(max_workers=2) as pool:
+        results = list(pool.map(lambda case: run_case(shared, case), chosen))
+    for case, (good, duration_s, text) in zip(chosen, results):
+        print(f"{'ok  ' if good else 'FAIL'} {duration_s:6.1f} s  {case.__doc__}\n{'':15}{text}")
+    failures = sum(not good for good, _, _ in results)
+    print(f"{len(chosen) - failures} of {len(chosen)} cases, {time.monotonic() - begin:.0f} s")
+    return 1 if failures or not chosen else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
