@@ -147,7 +147,7 @@ lint)
     need_header libv4l2.h libv4l-dev
     ;;
 *)
-    sed -n '4,7s/^# \{0,1\}//p' "$0" >&2
+    sed -n '4,8s/^# \{0,1\}//p' "$0" >&2
     exit 2
     ;;
 esac
