@@ -15,7 +15,9 @@ PICTURE ?= 000020
 ARCH ?= arm64
 
 .DEFAULT_GOAL := help
-.PHONY: help sim frames sanitize test accept eval bits vectors learn picture board deb test-deb test-board format formatted lint clean
+.PHONY: help sim frames sanitize test accept eval bits vectors learn picture board deb image flash \
+  test-deb test-board test-image format formatted lint clean
+
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z_-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -95,6 +97,22 @@ test-board: sim ## isohead_board on an emulated ARM board: frames, faults, signa
 	@/usr/bin/python3 tests/board/test_board.py --program $(BUILD)/board-arm64/firmware/app/isohead_board \
 	  --sysroot $(BUILD)/sysroot/arm64 --host-sim $(BUILD)/host/sim/host_sim \
 	  --render $(BUILD)/host/tools/render/render --board $(BUILD)/board
+
+image: ## the image to flash for arm64: build/image/isohead.img; XZ=1 packs it too
+	@tools/setup.sh image
+	@$(MAKE) board ARCH=arm64
+	@tools/image/image.sh
+
+flash: ## write IMAGE (default build/image/isohead.img) to the disk DEVICE=/dev/..., and read it back
+	@tools/setup.sh flash
+	@tools/image/flash.sh "$(DEVICE)" $(IMAGE)
+
+test-image: sim image ## boot the image on an emulated board; failed updates and slots; what flash refuses
+	@tools/setup.sh test-image
+	@tests/board/get.sh
+	@tests/board/flash.sh $(BUILD)/test_flash
+	@/usr/bin/python3 tests/board/image.py --image $(BUILD)/image --board $(BUILD)/board \
+	  --frames frames/sequence2 --host-sim $(BUILD)/host/sim/host_sim --work $(BUILD)/test_image
 
 format: ## clang-format over all C sources
 	@tools/setup.sh format

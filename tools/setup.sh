@@ -6,6 +6,7 @@
 #   tools/setup.sh deb arm64|armhf
 #   tools/setup.sh test-deb
 #   tools/setup.sh test-board
+#   tools/setup.sh image|flash|test-image
 #
 # On Debian and its kin missing packages are installed when that is allowed (root, or sudo without a
 # password); otherwise the exact command is printed and the exit status is 1. Nothing is installed
@@ -98,6 +99,28 @@ need_test_deb() {
         lacks qemu-user-static
 }
 
+need_image() {
+    need_board arm64
+    need_program qemu-aarch64 qemu-user
+    need_program mksquashfs squashfs-tools
+    need_program mcopy mtools
+    need_program cpio cpio
+    need_program zstd zstd
+    need_program xz xz-utils
+    need_program git git
+    need_program readelf binutils
+    PATH=$PATH:/sbin:/usr/sbin need_program mkfs.vfat dosfstools
+    PATH=$PATH:/sbin:/usr/sbin need_program sfdisk fdisk
+    PATH=$PATH:/sbin:/usr/sbin need_program depmod kmod
+}
+
+need_flash() {
+    need_program lsblk util-linux
+    PATH=$PATH:/sbin:/usr/sbin need_program sfdisk fdisk
+    need_program cmp diffutils
+    [ -x /usr/bin/python3 ] || lacks python3-minimal
+}
+
 case "${1:-}" in
 sim) need_sim ;;
 board) need_board "${2:-}" ;;
@@ -109,6 +132,17 @@ test-board)
     PATH=$PATH:/sbin:/usr/sbin need_program depmod kmod
     need_program bzip2 bzip2
     need_python json python3
+    ;;
+image) need_image ;;
+flash) need_flash ;;
+test-image)
+    need_image
+    need_flash
+    need_program qemu-system-aarch64 qemu-system-arm
+    [ -e /usr/share/AAVMF/AAVMF_CODE.fd ] || lacks qemu-efi-aarch64
+    [ -e /usr/aarch64-linux-gnu/lib/libc.a ] || lacks libc6-dev-arm64-cross
+    need_program bzip2 bzip2
+    PATH=$PATH:/sbin:/usr/sbin need_program mkfs.ext4 e2fsprogs
     ;;
 test)
     need_sim
@@ -147,7 +181,7 @@ lint)
     need_header libv4l2.h libv4l-dev
     ;;
 *)
-    sed -n '4,8s/^# \{0,1\}//p' "$0" >&2
+    sed -n '4,9s/^# \{0,1\}//p' "$0" >&2
     exit 2
     ;;
 esac

@@ -34,7 +34,7 @@ START_S, ANSWER_S = 120, 60
 
 CONFIG = """device = /dev/video0
 format = GREY
-rate = 2
+rate = 1
 exposure = keep
 gain = keep
 laser = off
@@ -227,8 +227,7 @@ class Board:
 
     def first_record(self, frames):
         """Boot with a camera, until the record of the first frame; it is host_sim's."""
-        # What is written before the camera is opened waits for whoever opens it.
-        self.wait(r"running /data/start.sh", START_S)
+        self.wait(r"isohead_board: /dev/video0: open", START_S)
         self.send_frame(frames, 0)
         self.check_record(frames, 0)
 
@@ -309,6 +308,7 @@ def case_update(shared):
         expect("slot a is good" in board.text, "slot A is not good after its first records")
         board.command("grep -q ' /data vfat ro,' /proc/mounts")
         board.command("! touch /usr/x")
+        board.command("ls -l /proc/$(pidof isohead_board)/fd | grep -q /dev/watchdog")
         case.update(board, broken)
         board.command("reboot")
         begin_s = board.now_s()

@@ -8,7 +8,10 @@
 # to be typed once more; YES=1 in the environment stands for that.
 set -eu
 PATH=$PATH:/sbin:/usr/sbin
-[ $# = 1 ] || [ $# = 2 ] || { sed -n '2,4s/^# \{0,1\}//p' "$0" >&2; exit 2; }
+if [ -z "${1:-}" ] || [ $# -gt 2 ]; then
+    sed -n '2,4s/^# \{0,1\}//p' "$0" >&2
+    exit 2
+fi
 device=$1
 image=${2:-$(dirname "$0")/../../build/image/isohead.img}
 refuse() { echo "flash: $device: $*; nothing was written" >&2; exit 1; }

@@ -80,8 +80,11 @@ busybox() {
     done
 }
 
-# All times equal; the rest of what differs from run to run is left out by cpio and mksquashfs.
-fix_times() { find "$1" -exec touch -hd "@$SOURCE_DATE_EPOCH" {} +; }
+# What may differ from one working copy to the next; cpio and mksquashfs leave out the rest.
+level() {
+    chmod -R u=rwX,go=rX "$1"
+    find "$1" -exec touch -hd "@$SOURCE_DATE_EPOCH" {} +
+}
 
 [ -e "$packages/lib/modules/$version/modules.dep" ] || depmod -b "$packages" "$version"
 
@@ -91,7 +94,7 @@ busybox "$initramfs" bin
 cp "$here/initramfs/init" "$initramfs/init"
 cp "$here/root/usr/lib/isohead/slots" "$initramfs/lib/isohead/"
 modules "$initramfs" boot
-fix_times "$initramfs"
+level "$initramfs"
 (cd "$initramfs" && find . | sort | cpio --quiet --reproducible -R 0:0 -o -H newc) |
     zstd --quiet -19 >"$work/boot/initrd"
 cp "$packages/boot/vmlinuz-$version" "$work/boot/linux"
@@ -108,15 +111,11 @@ ln -s ../run/resolv.conf "$root/etc/resolv.conf"
 busybox "$root" bin
 ln -s ../bin/busybox "$root/usr/sbin/init"
 modules "$root" boot root
-install -m 755 "$board" "$root/usr/bin/isohead_board"
-case "$(file -b "$board")" in
-*"dynamically linked"*)
-    libraries "$board"
-    ln -s aarch64-linux-gnu/ld-linux-aarch64.so.1 "$root/usr/lib/ld-linux-aarch64.so.1"
-    ;;
-esac
+aarch64-linux-gnu-strip -o "$root/usr/bin/isohead_board" "$board"
+libraries "$board"
+ln -s aarch64-linux-gnu/ld-linux-aarch64.so.1 "$root/usr/lib/ld-linux-aarch64.so.1"
 cp "$work/boot/linux" "$work/boot/initrd" "$root/boot/"
-fix_times "$root"
+level "$root"
 rm -f "$work/slot.squashfs"
 mksquashfs "$root" "$work/slot.squashfs" -quiet -no-progress -all-root -no-xattrs -no-exports \
     -comp zstd -Xcompression-level 19 -b 256K >"$work/mksquashfs.log"
