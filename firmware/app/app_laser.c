@@ -69,7 +69,12 @@ static bool read_interlock(struct app_laser *laser)
         fail(laser);
         return false;
     }
-    block(laser, APP_LASER_BLOCK_INTERLOCK, !closed);
+    if (!closed) {
+        laser->open_us = laser->tick_us;
+        block(laser, APP_LASER_BLOCK_INTERLOCK, true);
+    } else if (laser->tick_us - laser->open_us >= APP_LASER_CLOSED_US) {
+        block(laser, APP_LASER_BLOCK_INTERLOCK, false);
+    }
     return true;
 }
 
@@ -112,6 +117,7 @@ void app_laser_init(struct app_laser *laser, const struct app_laser_config *conf
         .blocks = APP_LASER_BLOCK_RIG | APP_LASER_BLOCK_CAMERA,
         .tick_us = now_us,
         .beat_us = now_us,
+        .open_us = now_us - APP_LASER_CLOSED_US,
     };
     if (!config->enabled) {
         laser->blocks |= APP_LASER_BLOCK_DISABLED;
@@ -208,6 +214,12 @@ static int64_t duty_wait_us(struct app_laser *laser)
     return APP_LASER_NEVER_US;
 }
 
+static int64_t interlock_wait_us(const struct app_laser *laser)
+{
+    return (laser->blocks & APP_LASER_BLOCK_INTERLOCK) != 0 ? APP_LASER_CLOSED_US
+                                                            : APP_LASER_NEVER_US;
+}
+
 static int64_t silence_wait_us(struct app_laser *laser)
 {
     int64_t left_us = laser->silent_max_us - laser->silent_us;
@@ -235,18 +247,21 @@ static int64_t beat_wait_us(struct app_laser *laser, int64_t now_us)
     return laser->beat_us + APP_LASER_BEAT_US - now_us;
 }
 
+static int64_t least(int64_t a, int64_t b)
+{
+    return a < b ? a : b;
+}
+
 int64_t app_laser_tick(struct app_laser *laser, int64_t now_us)
 {
     account(laser, now_us);
     if (laser->is_open) {
         read_interlock(laser); /* should its event have been lost */
     }
-    int64_t wait_us = duty_wait_us(laser);
-    int64_t silence_us = silence_wait_us(laser);
-    wait_us = silence_us < wait_us ? silence_us : wait_us;
+    int64_t wait_us = least(duty_wait_us(laser), silence_wait_us(laser));
+    wait_us = least(wait_us, interlock_wait_us(laser));
     apply(laser);
-    int64_t beat_us = beat_wait_us(laser, now_us);
-    return beat_us < wait_us ? beat_us : wait_us;
+    return least(wait_us, beat_wait_us(laser, now_us));
 }
 
 const char *app_laser_block_text(unsigned blocks)

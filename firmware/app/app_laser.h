@@ -6,7 +6,8 @@
  *        - it was asked for (app_laser_config.enabled);
  *        - the rig is valid (app_laser_rig) and the camera streams (app_laser_camera);
  *        - it has not been on for APP_LASER_SILENT_FRAMES frame times since the last frame came;
- *        - the interlock is closed. It is read before switching on and once more afterwards, so that
+ *        - the interlock is closed, after an opening for APP_LASER_CLOSED_US: contacts bounce, and the
+ *          guard, which switches off too, is done with it by then. It is read before switching on and once more afterwards, so that
  *          one that opens in between is seen here or comes as an event later; and at every tick;
  *        - the duty is kept: over any time T the laser is on for at most duty_percent of
  *          T + APP_LASER_BURST_US;
@@ -14,8 +15,8 @@
  *          is (again, then by giving the lines back) and stays off: the caller ends.
  * Time:  app_laser_tick looks at the clock. The loop calls it before it waits and does not wait for
  *        longer than what it returns, so that a limit in time is kept to the timer's precision while
- *        the loop waits. While a frame is processed nobody looks: the guard and the interlock in
- *        hardware do (docs/safety.md).
+ *        the loop waits. While a frame is processed the guard looks at the interlock and for life
+ *        (hal/linux/hal_guard.h, docs/safety.md).
  * Errors: app_laser.failed, with the text; told once through the caller.
  */
 #ifndef APP_LASER_H
@@ -32,6 +33,8 @@
 #define APP_LASER_SILENT_FRAMES 3
 /* A wait that nothing limits; the watchdogs want a sign of life several times in 2 s. */
 #define APP_LASER_NEVER_US 400000
+/* So long the interlock is closed before the laser is on again. */
+#define APP_LASER_CLOSED_US 20000
 /* How often switching off is tried before the lines are given back. */
 #define APP_LASER_OFF_TRIES 3
 
@@ -62,6 +65,7 @@ struct app_laser {
     int64_t silent_max_us;   /* and its limit */
     int64_t tick_us;         /* when time was last accounted for */
     int64_t credit;          /* left of the duty, percent x us */
+    int64_t open_us;         /* when the interlock was last seen open */
     int64_t beat_us;         /* last edge for the one-shot */
     int64_t on_us;           /* sum of all times with the laser on */
     int32_t on_count;        /* how often it was switched on */

@@ -36,7 +36,8 @@ int main(int argument_count, char **arguments)
     bool good = app_config_read(&config, argument_count, arguments, &errors);
     if (config.laser_off) {
         /* Even with a configuration that is wrong elsewhere. */
-        return (int)app_board_laser_off(&board, &config);
+        enum app_exit exit = app_board_laser_off(&board, &config);
+        return good ? (int)exit : APP_EXIT_USAGE;
     }
     if (!good) {
         return APP_EXIT_USAGE;

@@ -8,6 +8,9 @@
  *        - the socket to this process reads end of file: this process has died, by SIGKILL too;
  *        - it was not told for timeout_ms that this process lives (hal_guard_feed);
  *        - it is told that all is done.
+ * It switches off, and goes on, when the interlock opens: this process may be busy with a frame for as
+ *        long as a slow processor needs. It only looks at the level; the event stays for this process,
+ *        which has to look at the interlock before and after set(true) (firmware/app/app_laser.h).
  *        It has tried GUARD_OFF_TRIES times, 10 ms apart, before it gives up on a line that fails.
  * While it lives, set(true) is refused and undone as soon as the guard has let go: whatever the order
  *        of events, the line is not on for longer without a guard than one set(true) takes.
@@ -15,7 +18,8 @@
  *        below.
  * The child: a session of its own, so that a terminal's keys do not reach it; every signal blocked
  *        but SIGKILL, SIGSTOP and those of its own faults, for which it has inherited the handlers
- *        of hal_signals.h; no descriptor open but its end of the socket and the line; named
+ *        of hal_signals.h; no descriptor open but its end of the socket, the line and the interlock;
+ *        named
  *        isohead-guard; it never writes a word.
  *        It is a copy of this process: memory-mapped buffers of a camera that is open while the
  *        strobe is opened stay mapped in it, and keep the device in use. Open the strobe first, or
@@ -36,10 +40,18 @@
 
 #define HAL_GUARD_TIMEOUT_MS 2000
 
+/* fd: readable when it has moved, until this process has taken the event. NULL, or -1 in it: none. */
+struct hal_guard_interlock {
+    const int *fd;
+    bool (*is_closed)(void *context); /* looks at the level only; false also when that fails */
+    void *context;
+};
+
 struct hal_guard_config {
     const struct hal_strobe *strobe; /* to be guarded */
     const int *line_fd; /* the descriptor that the open strobe sets its line by; -1 in it: none */
     int32_t timeout_ms; /* at least 1; HAL_GUARD_TIMEOUT_MS where nothing speaks against it */
+    struct hal_guard_interlock interlock;
 };
 
 struct hal_guard {

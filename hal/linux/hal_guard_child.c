@@ -10,8 +10,8 @@
 #include <time.h>
 #include <unistd.h>
 
-/* All but two. The kernel lists what is open; a limit to count up to could be a thousand million. */
-static bool close_others(int keep_fd, int keep_too_fd)
+/* All but these. The kernel lists what is open; a limit to count up to could be a thousand million. */
+static bool close_others(const int *keep_fds, int keep_count)
 {
     DIR *list = opendir("/proc/self/fd");
     if (list == NULL) {
@@ -19,8 +19,11 @@ static bool close_others(int keep_fd, int keep_too_fd)
     }
     for (const struct dirent *entry = readdir(list); entry != NULL; entry = readdir(list)) {
         int fd = (int)strtol(entry->d_name, NULL, 10);
-        bool number = entry->d_name[0] != '.';
-        if (number && fd != keep_fd && fd != keep_too_fd && fd != dirfd(list)) {
+        bool keep = entry->d_name[0] == '.' || fd == dirfd(list);
+        for (int i = 0; i < keep_count; i++) {
+            keep = keep || fd == keep_fds[i];
+        }
+        if (!keep) {
             close(fd);
         }
     }
@@ -41,28 +44,6 @@ static void let_faults_through(void)
     sigprocmask(SIG_UNBLOCK, &set, NULL);
 }
 
-/* Why to switch off: waits for it. */
-static enum guard_exit wait_for_the_end(int socket_fd, int timeout_ms)
-{
-    for (;;) {
-        struct pollfd waiting = {.fd = socket_fd, .events = POLLIN};
-        char bytes[64];
-        int ready = poll(&waiting, 1, timeout_ms);
-        if (ready == 0) {
-            return GUARD_EXIT_LATE;
-        }
-        ssize_t count = ready < 0 ? -1 : recv(socket_fd, bytes, sizeof bytes, MSG_DONTWAIT);
-        if (count == 0 || (count < 0 && errno != EINTR && errno != EAGAIN)) {
-            return GUARD_EXIT_GONE;
-        }
-        for (ssize_t i = 0; i < count; i++) {
-            if (bytes[i] == GUARD_DONE) {
-                return GUARD_EXIT_DONE;
-            }
-        }
-    }
-}
-
 static bool switch_off(const struct hal_strobe *strobe)
 {
     const struct timespec pause = {.tv_nsec = 10 * 1000 * 1000};
@@ -76,16 +57,72 @@ static bool switch_off(const struct hal_strobe *strobe)
     return false;
 }
 
+static int64_t now_ms(void)
+{
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (int64_t)now.tv_sec * 1000 + now.tv_nsec / 1000000;
+}
+
+/* What the other process has said; -1: nothing yet, and it lives. */
+static int listen_to(int socket_fd)
+{
+    char bytes[64];
+    ssize_t count = recv(socket_fd, bytes, sizeof bytes, MSG_DONTWAIT);
+    if (count == 0 || (count < 0 && errno != EINTR && errno != EAGAIN)) {
+        return GUARD_EXIT_GONE;
+    }
+    for (ssize_t i = 0; i < count; i++) {
+        if (bytes[i] == GUARD_DONE) {
+            return GUARD_EXIT_DONE;
+        }
+    }
+    return -1;
+}
+
+/* Why to switch off for good: waits for it. An interlock that opens switches off too, for now: the
+ * event is left to the other process, and until it has been taken the level is looked at every
+ * GUARD_LEVEL_MS, since waiting for it would return at once. */
+static enum guard_exit wait_for_the_end(const struct hal_guard_config *config, int socket_fd)
+{
+    const struct hal_guard_interlock *interlock = &config->interlock;
+    int64_t end_ms = now_ms() + config->timeout_ms;
+    bool moved = false;
+    for (;;) {
+        struct pollfd waiting[] = {
+            {.fd = socket_fd, .events = POLLIN},
+            {.fd = moved || interlock->fd == NULL ? -1 : *interlock->fd, .events = POLLIN}};
+        int64_t left_ms = end_ms - now_ms();
+        if (left_ms <= 0) {
+            return GUARD_EXIT_LATE;
+        }
+        poll(waiting, 2, moved && left_ms > GUARD_LEVEL_MS ? GUARD_LEVEL_MS : (int)left_ms);
+        moved = waiting[1].revents != 0;
+        if (moved && !interlock->is_closed(interlock->context)) {
+            switch_off(config->strobe);
+        }
+        if (waiting[0].revents != 0) {
+            int why = listen_to(socket_fd);
+            if (why >= 0) {
+                return (enum guard_exit)why;
+            }
+            end_ms = now_ms() + config->timeout_ms;
+        }
+    }
+}
+
 _Noreturn void hal_guard_child(const struct hal_guard_config *config, int socket_fd)
 {
     const char ready = GUARD_READY;
     let_faults_through();
     prctl(PR_SET_NAME, "isohead-guard");
-    if (setsid() < 0 || !close_others(socket_fd, *config->line_fd) ||
+    const int *interlock_fd = config->interlock.fd;
+    const int keep_fds[] = {socket_fd, *config->line_fd, interlock_fd == NULL ? -1 : *interlock_fd};
+    if (setsid() < 0 || !close_others(keep_fds, 3) ||
         send(socket_fd, &ready, 1, MSG_NOSIGNAL) != 1) {
         _exit(GUARD_EXIT_SETUP);
     }
-    enum guard_exit why = wait_for_the_end(socket_fd, config->timeout_ms);
+    enum guard_exit why = wait_for_the_end(config, socket_fd);
     /* In this order: who switches on and then still finds the socket open was before this. */
     shutdown(socket_fd, SHUT_RDWR);
     _exit(switch_off(config->strobe) ? (int)why : GUARD_EXIT_LINE);

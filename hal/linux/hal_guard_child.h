@@ -19,6 +19,8 @@ enum guard_exit {
 };
 
 #define GUARD_OFF_TRIES 100
+/* Between two looks at an interlock that has moved. */
+#define GUARD_LEVEL_MS 2
 
 /* The child's life, right after the fork with all signals blocked. Does not return. */
 _Noreturn void hal_guard_child(const struct hal_guard_config *config, int socket_fd);

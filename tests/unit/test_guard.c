@@ -33,6 +33,8 @@ struct shared {
     volatile int open_fails;
     /* The guard is told to end while set(true) is under way, and held between off and its end. */
     volatile int end_while_on;
+    volatile int interlock_open;
+    volatile int tell_off; /* each setting to off by the guard is told through is_off */
     sem_t is_off, may_end;
 };
 
@@ -40,6 +42,7 @@ static struct shared *shared;
 static pid_t test_pid;
 static int line_fd = -1;
 static int line_ends[2]; /* the reading end sees its end of file when no process holds the line */
+static int interlock_fd = -1;
 static struct hal_guard guard;
 static struct hal_error error;
 
@@ -86,6 +89,9 @@ static bool line_set(void *context, bool on, struct hal_error *why)
         return hal_fail(why, "line: stuck");
     }
     shared->level = 0;
+    if (shared->tell_off && getpid() != test_pid) {
+        sem_post(&shared->is_off);
+    }
     if (shared->end_while_on && getpid() != test_pid) {
         sem_post(&shared->is_off);
         sem_wait(&shared->may_end);
@@ -110,10 +116,20 @@ static bool line_interlock(void *context, bool *closed, struct hal_error *why)
 static const struct hal_strobe line = {NULL,     line_open, line_close,
                                        line_set, line_beat, line_interlock};
 
+static bool is_closed(void *context)
+{
+    TEST_ASSERT_EQUAL_PTR(&interlock_fd, context);
+    return !shared->interlock_open;
+}
+
 static void init(int timeout_ms)
 {
     const struct hal_guard_config config = {
-        .strobe = &line, .line_fd = &line_fd, .timeout_ms = timeout_ms};
+        .strobe = &line,
+        .line_fd = &line_fd,
+        .timeout_ms = timeout_ms,
+        .interlock = {&interlock_fd, is_closed, &interlock_fd},
+    };
 
     hal_guard_init(&guard, &config);
 }
@@ -368,6 +384,33 @@ static void switched_on_behind_the_guards_back_it_goes_off_again(void)
     sem_post(&shared->may_end);
 }
 
+/* It opens while this process is busy: the guard switches off, and this process still learns of it. */
+static void an_open_interlock_switches_off(void)
+{
+    struct pollfd waiting = {.events = POLLIN};
+    char event = 'e';
+    int ends[2];
+
+    TEST_ASSERT_EQUAL_INT(0, pipe(ends));
+    interlock_fd = waiting.fd = ends[0];
+    TEST_ASSERT_TRUE(open_it());
+    shared->tell_off = 1;
+    TEST_ASSERT_TRUE(set(true));
+    TEST_ASSERT_EQUAL_INT(1, shared->level);
+    shared->interlock_open = 1;
+    TEST_ASSERT_EQUAL_INT(1, write(ends[1], &event, 1));
+    while (sem_wait(&shared->is_off) != 0) {
+    }
+    TEST_ASSERT_EQUAL_INT(0, shared->level);
+    TEST_ASSERT_EQUAL_INT(1, poll(&waiting, 1, 0));
+    TEST_ASSERT_TRUE(hal_guard_feed(&guard, &error));
+    shared->tell_off = 0;
+    close_it();
+    interlock_fd = -1;
+    close(ends[0]);
+    close(ends[1]);
+}
+
 static void it_is_named_and_holds_two_descriptors(void)
 {
     char path[64], text[32] = "";
@@ -576,6 +619,7 @@ int main(void)
     RUN_TEST(signals_do_not_end_the_guard);
     RUN_TEST(dying_of_a_fault_the_guard_switches_off);
     RUN_TEST(switched_on_behind_the_guards_back_it_goes_off_again);
+    RUN_TEST(an_open_interlock_switches_off);
     RUN_TEST(it_is_named_and_holds_two_descriptors);
     RUN_TEST(closed_the_guard_ends_and_gives_the_line_back);
     RUN_TEST(opened_again_the_old_guard_has_ended_first);

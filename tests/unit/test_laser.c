@@ -160,8 +160,16 @@ static void test_interlock(void)
     app_laser_tick(&laser, 0);
     TEST_ASSERT_FALSE(fake.line);
     fake.closed = true;
-    app_laser_interlock(&laser, 0);
-    TEST_ASSERT_TRUE(fake.line);
+    app_laser_interlock(&laser, 10);
+    TEST_ASSERT_FALSE_MESSAGE(fake.line, "on while the contact may bounce");
+    fake.closed = false;
+    app_laser_tick(&laser, 100);
+    fake.closed = true;
+    int64_t now_us = 100;
+    while (!fake.line && now_us < 1000000) {
+        now_us += app_laser_tick(&laser, now_us);
+    }
+    TEST_ASSERT_INT64_WITHIN(APP_LASER_CLOSED_US, 100 + 3 * APP_LASER_CLOSED_US / 2, now_us);
 }
 
 /* It opens between the look at it and the switching on. */
