@@ -112,7 +112,8 @@ test-image: sim image ## boot the image on an emulated board; failed updates and
 	@tests/board/get.sh
 	@tests/board/flash.sh $(BUILD)/test_flash
 	@/usr/bin/python3 tests/board/image.py --image $(BUILD)/image --board $(BUILD)/board \
-	  --frames frames/sequence2 --host-sim $(BUILD)/host/sim/host_sim --work $(BUILD)/test_image
+	  --program $(BUILD)/board-arm64/firmware/app/isohead_board --frames frames/sequence2 \
+	  --host-sim $(BUILD)/host/sim/host_sim --work $(BUILD)/test_image
 
 format: ## clang-format over all C sources
 	@tools/setup.sh format

@@ -2,9 +2,9 @@
 """The image of tools/image on an emulated UEFI board: it boots into the firmware, which finds the
 heads in the frames it is fed; slots that are damaged or whose firmware fails are left by themselves.
 
-image.py --image DIR --board DIR --frames DIR --host-sim FILE --work DIR [CASE...]
+image.py --image DIR --program FILE --board DIR --frames DIR --host-sim FILE --work DIR [CASE...]
 
---image: what tools/image/image.sh has made; --board: what get.sh has made; --frames: a rendered
+--image: what tools/image/image.sh has made of --program; --board: what get.sh has made; --frames: a rendered
 frames directory. The image is used as it is, but for its data partition: that gets a rig, settings,
 and a start.sh that makes a camera of v4l2loopback, for frames that come over a virtio-serial port.
 Cases run at the same time. Exit status 1 if one fails.
@@ -355,7 +355,20 @@ def case_zeroed(shared):
     return f"power-on to first record, from slot B: {first_s:.1f} s; then slot A updated and good"
 
 
-CASES = [case_update, case_zeroed]
+def case_same_bytes(shared):
+    """built a second time, elsewhere: the same bytes"""
+    again = os.path.join(shared.work, "again")
+    run(os.path.join(HERE, "..", "..", "tools", "image", "image.sh"), shared.program, again)
+    sums = []
+    for folder in [shared.image, again]:
+        with open(os.path.join(folder, "SHA256SUMS"), encoding="ascii") as file:
+            sums.append(file.read())
+    expect(sums[0] == sums[1], f"first:\n{sums[0]}second:\n{sums[1]}")
+    shutil.rmtree(again)
+    return f"SHA-256 of the image {sums[0].split()[0]}"
+
+
+CASES = [case_update, case_zeroed, case_same_bytes]
 
 
 # --- all of it ---
@@ -367,6 +380,7 @@ class Shared:
     def __init__(self, arguments):
         self.work = arguments.work
         self.image = arguments.image
+        self.program = arguments.program
         os.makedirs(self.work, exist_ok=True)
         self.frames = Frames(arguments.frames, os.path.join(self.work, "frames"), arguments.host_sim)
         with open(os.path.join(arguments.board, "release"), encoding="ascii") as file:
@@ -393,7 +407,7 @@ def run_case(shared, case):
 
 def main():
     parser = argparse.ArgumentParser()
-    for name in ["image", "board", "frames", "host-sim", "work"]:
+    for name in ["image", "program", "board", "frames", "host-sim", "work"]:
         parser.add_argument("--" + name, required=True, type=os.path.abspath)
     parser.add_argument("case", nargs="*")
     arguments = parser.parse_args()
