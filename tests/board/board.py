@@ -240,10 +240,16 @@ class Board:
             raise BoardError(f"'{text}' failed on the board with {line[2:]}: {output}")
         return "\n".join(output)
 
-    def watch_pins(self):
-        """From now on the kernel notes what pins it sets and when: for pins()."""
-        self.command("echo 1 >/sys/kernel/tracing/events/gpio/gpio_value/enable; "
-                     "echo >/sys/kernel/tracing/trace")
+    def watch_pins(self, then=":"):
+        """From now on the kernel notes what pins it sets and when: for pins(). then: what the
+        board's shell does next; mark() says when."""
+        self.command("cd /sys/kernel/tracing; echo 1 >events/gpio/gpio_value/enable; echo >trace; "
+                     f"echo mark >trace_marker; cd /; {then}")
+
+    def mark(self):
+        """When watch_pins() was asked to do something, by the board's clock."""
+        text = self.command("cat /sys/kernel/tracing/trace")
+        return float(re.search(r"([0-9.]+): tracing_mark_write: mark", text)[1])
 
     def pins(self):
         """Edges of output pins since watch_pins(), by the board's clock: what a time limit of the

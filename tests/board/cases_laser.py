@@ -1,7 +1,6 @@
 """Cases of the laser's line: each returns what was seen; its first line says what is done."""
 
 import json
-import time
 
 from frames import host_records
 from run import (FRAME_S, HEARTBEAT, HEIGHT, INTERLOCK, LASER, LIVE_FIELDS, RATE, SILENT_S, SOON_S,
@@ -9,6 +8,8 @@ from run import (FRAME_S, HEARTBEAT, HEIGHT, INTERLOCK, LASER, LIVE_FIELDS, RATE
 
 # Its process number, for the board's shell.
 GUARD = "$(pidof isohead-guard)"
+# It acts when the program has shown no sign of life for so long (hal_guard.h).
+GUARD_S = 2
 
 
 def case_interlock(run):
@@ -16,11 +17,7 @@ def case_interlock(run):
     frames, board = run.alternating, run.board
     run.start(run.alternating, "gated")
     run.lit_frame(frames, 0)
-    run.laser(1)
-    begin = time.monotonic()
-    board.set_input(INTERLOCK, 0)
-    run.laser(0, SOON_S)
-    low_ms = 1000 * (run.last_edge(LASER) - begin)
+    low_ms = run.low_after(pins=[(INTERLOCK, 0)])
     rises = board.rises[LASER]
     for sequence in range(1, 4):
         run.give(frames, 1, sequence=sequence)
@@ -39,7 +36,7 @@ def case_interlock(run):
     board.settle(2)
     expect(board.rises[LASER] == rises, "the laser went on: started with the interlock open")
     run.stop()
-    return f"low {low_ms:.1f} ms after the pin, no rise while it is open, goes on when it is closed"
+    return f"low {low_ms:.1f} ms later, no rise while it is open, goes on when it is closed"
 
 
 def case_reload(run):
@@ -49,8 +46,7 @@ def case_reload(run):
     run.lit_frame(run.gated, 0)
     run.laser(1)
     board.command("cp /rig/gated.json /rig/good.json; echo broken >/rig/gated.json")
-    board.signal("HUP")
-    run.laser(0)
+    low_ms = run.low_after("kill -HUP $program")
     rises = board.rises[LASER]
     run.give(run.gated, 1)
     board.settle(2 * FRAME_S)
@@ -61,7 +57,7 @@ def case_reload(run):
     record = json.loads(run.lit_frame(run.gated, 2))
     expect(record["labelled"] > 100, f"the first record afterwards: {record}")
     run.stop()
-    return "laser off and no records with the broken one; goes on with the good one"
+    return f"low {low_ms:.1f} ms later, no records with the broken one; goes on with the good one"
 
 
 def case_unasked(run):
@@ -95,15 +91,11 @@ def case_signals(run):
     for name, wanted in SIGNALS.items():
         run.start(run.gated, "gated")
         run.lit_frame(run.gated, 0)
-        run.laser(1)
-        begin = time.monotonic()
-        board.signal(name)
-        run.laser(0)
-        slowest_ms = max(slowest_ms, 1000 * (run.last_edge(LASER) - begin))
+        slowest_ms = max(slowest_ms, run.low_after(f"kill -{name} $program"))
         status = board.exit_status(SOON_S)
         expect(status == wanted, f"exit status {status} after SIG{name}, not {wanted}")
         expect(board.levels[LASER] == 0, f"the laser's line is high after SIG{name}")
-    return f"{len(SIGNALS)} signals: low after at most {slowest_ms:.0f} ms, exit status as expected"
+    return f"{len(SIGNALS)} signals: low after at most {slowest_ms:.1f} ms, exit status as expected"
 
 
 def case_killed(run):
@@ -113,13 +105,10 @@ def case_killed(run):
     run.lit_frame(run.gated, 0)
     run.laser(1)
     board.wait_rises(HEARTBEAT, board.rises[HEARTBEAT] + 2, SOON_S)
-    begin = time.monotonic()
-    board.signal("KILL")
-    run.laser(0)
-    low_ms = 1000 * (run.last_edge(LASER) - begin)
+    low_ms = run.low_after("kill -KILL $program")
     status = board.exit_status(SOON_S)
     expect(status == -9, f"exit status {status} after SIGKILL")
-    return f"low {low_ms:.0f} ms later"
+    return f"low {low_ms:.1f} ms later"
 
 
 def case_all_killed(run):
@@ -147,17 +136,13 @@ def case_stopped(run):
     board = run.board
     run.start(run.gated, "gated")
     run.lit_frame(run.gated, 0)
-    run.laser(1)
-    begin = time.monotonic()
-    board.signal("STOP")
-    run.laser(0)
-    low_s = run.last_edge(LASER) - begin
+    low_ms = run.low_after("kill -STOP $program", GUARD_S + FRAME_S)
     rises = board.rises[LASER]
     board.signal("CONT")
     status = board.exit_status(SOON_S)
     expect(status == 1, f"exit status {status} after SIGCONT, not 1: {board.log[-3:]}")
     expect(board.rises[LASER] == rises, "the laser went on after SIGCONT")
-    return f"low {low_s:.1f} s later; the program ends when it goes on"
+    return f"low {low_ms:.0f} ms later; the program ends when it goes on"
 
 
 def case_guard_killed(run):
@@ -165,11 +150,7 @@ def case_guard_killed(run):
     board = run.board
     run.start(run.gated, "gated")
     run.lit_frame(run.gated, 0)
-    run.laser(1)
-    begin = time.monotonic()
-    board.signal("KILL", GUARD)
-    run.laser(0)
-    low_ms = 1000 * (run.last_edge(LASER) - begin)
+    low_ms = run.low_after(f"kill -KILL {GUARD}")
     status = board.exit_status(SOON_S)
     expect(status == 1, f"exit status {status}, not 1: {board.log[-3:]}")
     expect(board.levels[LASER] == 0, "the laser's line is high after the end")

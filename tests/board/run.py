@@ -104,8 +104,18 @@ class Run:
     def laser(self, level, limit_s=SOON_S):
         self.board.wait_level(LASER, level, limit_s)
 
-    def last_edge(self, line):
-        return next(edge.time_s for edge in reversed(self.board.edges) if edge.line == line)
+    def low_after(self, text=":", limit_s=FRAME_S, pins=()):
+        """Let the board's shell do something, or set input pins, while the laser is on, after which
+        it has to go off within limit_s; after how many ms it did, by the board's clock."""
+        self.laser(1)
+        self.board.watch_pins(text)
+        for line, level in pins:
+            self.board.set_input(line, level)
+        self.laser(0)
+        falls = [edge for edge in self.board.pins() if edge.line == LASER and not edge.level]
+        low_s = falls[-1].time_s - self.board.mark()
+        expect(low_s < limit_s, f"the laser's line was high for {low_s:.2f} s more, not {limit_s:g}")
+        return 1000 * low_s
 
     def high_times(self):
         """(rise, fall) of the laser's line since board.watch_pins(), by the board's clock."""
