@@ -61,7 +61,7 @@ struct app_config {
     const char *rig;    /* file; never NULL after success without laser_off, help or version */
     const char *device; /* default /dev/video0 */
     const char *format; /* auto (default), GREY, Y10, ..., convert */
-    int32_t rate_mhz;   /* frames per 1000 s, 1000 .. 1000000; default 25000 */
+    int32_t rate_mhz;   /* frames per 1000 s, 1000 .. 1000000; default 0: as the camera is set */
     enum app_exposure exposure;
     int32_t exposure_us; /* 1 .. 1000000 with APP_EXPOSURE_FIXED, else 0 */
     enum app_gain gain;

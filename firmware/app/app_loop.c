@@ -116,9 +116,11 @@ static void open_camera(struct app_loop *loop)
         lose_camera(loop, error.text);
         return;
     }
-    int32_t said_us = camera->frame_time_us(camera->context);
     loop->is_streaming = true;
-    loop->frame_time_us = said_us > 0 ? said_us : INT64_C(1000000000) / loop->config->rate_mhz;
+    loop->frame_time_us = camera->frame_time_us(camera->context);
+    if (loop->frame_time_us <= 0) { /* it does not say, and then it took no rate either */
+        loop->frame_time_us = APP_LOOP_FRAME_TIME_US;
+    }
     loop->frame_us = now(loop);
     app_frame_begin(loop);
     app_log_say(loop->log, APP_LOG_INFO, "%s: open, a frame every %" PRId64 " us",

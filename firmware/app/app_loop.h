@@ -49,6 +49,8 @@
  * 200 mm. */
 #define APP_LOOP_AMBIENT_AGE_MAX_US 200000
 
+/* Between frames of a camera that does not say. */
+#define APP_LOOP_FRAME_TIME_US 40000
 /* The first exposure when it is steered. */
 #define APP_LOOP_EXPOSURE_US 4000
 

@@ -94,7 +94,7 @@ static void what_is_not_given_has_its_default(void)
     TEST_ASSERT_EQUAL_STRING("r.json", config.rig);
     TEST_ASSERT_EQUAL_STRING("/dev/video0", config.device);
     TEST_ASSERT_EQUAL_STRING("auto", config.format);
-    TEST_ASSERT_EQUAL_INT32(25000, config.rate_mhz);
+    TEST_ASSERT_EQUAL_INT32(0, config.rate_mhz);
     TEST_ASSERT_EQUAL_INT(APP_EXPOSURE_AUTO, config.exposure);
     TEST_ASSERT_EQUAL_INT32(0, config.exposure_us);
     TEST_ASSERT_EQUAL_INT(APP_GAIN_AUTO, config.gain);
@@ -256,7 +256,7 @@ static void numbers_have_bounds(void)
 
     for (i = 0; i < IH_TEST_COUNT(rates); i++) {
         TEST_ASSERT_EQUAL_MESSAGE(rates[i].good, READ("--rig=r", rates[i].option), rates[i].option);
-        TEST_ASSERT_EQUAL_INT32_MESSAGE(rates[i].good ? rates[i].value : 25000, config.rate_mhz,
+        TEST_ASSERT_EQUAL_INT32_MESSAGE(rates[i].good ? rates[i].value : 0, config.rate_mhz,
                                         rates[i].option);
     }
     for (i = 0; i < IH_TEST_COUNT(duties); i++) {
@@ -670,6 +670,8 @@ static void the_installed_file_has_every_key(void)
     TEST_ASSERT_NOT_NULL(config.watchdog);
     config.gpio_chip = config.laser_line = config.interlock_line = config.heartbeat_line = NULL;
     config.watchdog = NULL;
+    TEST_ASSERT_EQUAL_INT32(25000, config.rate_mhz);
+    config.rate_mhz = 0;
     /* All else is the default. */
     app_settings_default(&wanted);
     TEST_ASSERT_EQUAL_STRING(wanted.device, config.device);
@@ -727,7 +729,8 @@ static void files_of_rubbish_do_no_harm(void)
         TEST_ASSERT_EQUAL(good, error_count == 0);
         TEST_ASSERT_LESS_OR_EQUAL_INT(APP_CONFIG_ERRORS_MAX + 1, error_count);
         TEST_ASSERT_TRUE(config.duty_percent >= 1 && config.duty_percent <= 100);
-        TEST_ASSERT_TRUE(config.rate_mhz >= 1000 && config.rate_mhz <= 1000000);
+        TEST_ASSERT_TRUE(config.rate_mhz == 0 ||
+                         (config.rate_mhz >= 1000 && config.rate_mhz <= 1000000));
         TEST_ASSERT_TRUE(!good || config.rig != NULL);
         TEST_ASSERT_TRUE(!good || !config.laser || (config.laser_line && config.gpio_chip));
         TEST_ASSERT_TRUE((int)config.strobe >= 0 && config.strobe <= APP_STROBE_ALTERNATING);
