@@ -27,6 +27,7 @@ import time
 PORTS = ["frames", "records", "log", "control"]
 # Longest time from power-on to the first process's "ready": ten times what it takes when idle.
 BOOT_S = 60
+MEMORY_MB = 256
 # Longest time that QEMU or the board's shell may take for an answer.
 ANSWER_S = 30
 GPIO_TYPE = "child<pl061>"
@@ -39,7 +40,7 @@ class BoardError(Exception):
 
 
 class Board:
-    def __init__(self, kernel, initramfs, console):
+    def __init__(self, kernel, initramfs, console, memory_mb=MEMORY_MB, boot_s=BOOT_S):
         self.console = console
         self.edges = []  # of output pins, since power-on
         self.levels = collections.defaultdict(int)
@@ -53,9 +54,9 @@ class Board:
         self.sockets = {}
         self.qemu = None
         try:
-            self._start(kernel, initramfs)
+            self._start(kernel, initramfs, memory_mb)
             self._find_gpio()
-            self.wait(lambda: self.lines["control"], BOOT_S, "the board's first process")
+            self.wait(lambda: self.lines["control"], boot_s, "the board's first process")
             self.lines["control"].popleft()
         except BaseException:
             self.close()
@@ -78,11 +79,11 @@ class Board:
 
     # --- QEMU ---
 
-    def _start(self, kernel, initramfs):
+    def _start(self, kernel, initramfs, memory_mb):
         # icount: a nanosecond of the board's time per instruction while it computes, the host's
         # time while it waits. A host under load then makes no frame late.
         arguments = ["qemu-system-aarch64", "-M", "virt,acpi=off", "-cpu", "cortex-a53",
-                     "-m", "256", "-icount", "shift=0",
+                     "-m", str(memory_mb), "-icount", "shift=0",
                      "-nodefaults", "-display", "none", "-no-reboot",
                      "-serial", "file:" + self.console,
                      "-kernel", kernel, "-initrd", initramfs,
