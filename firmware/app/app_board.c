@@ -169,6 +169,10 @@ enum app_exit app_board_laser_off(struct app_board *board, const struct app_conf
     const struct hal_strobe *strobe = &board->gpio.strobe;
     struct hal_error error = {"gpio-chip and laser-line: missing, nothing can be switched off"};
     enum app_exit exit = APP_EXIT_USAGE;
+    if (config->path != NULL && !config->laser && config->gpio_chip == NULL &&
+        config->laser_line == NULL) {
+        return APP_EXIT_GOOD; /* a board without a laser: what its service runs after each end */
+    }
     open_log(board, config);
     if (config->gpio_chip != NULL && config->laser_line != NULL) {
         init_gpio(board, config);

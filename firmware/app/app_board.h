@@ -42,7 +42,8 @@ struct app_board {
 /* Frames in, records out, until asked to end. */
 enum app_exit app_board_run(struct app_board *board, const struct app_config *config);
 
-/* Only make the laser's line low and give it back. */
+/* Only make the laser's line low and give it back. Without chip and line that is wrong usage; but good
+ * where a configuration file was read that has none and no laser. */
 enum app_exit app_board_laser_off(struct app_board *board, const struct app_config *config);
 
 #endif
