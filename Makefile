@@ -84,10 +84,11 @@ deb: board ## the Debian package of isohead_board for ARCH=arm64 (default) or ar
 	@tools/setup.sh deb $(ARCH)
 	@tools/board/deb.sh $(ARCH)
 
-test-deb: sim ## build both Debian packages; install, run, update and purge one in a Debian arm64 root
+test-deb: sim ## build both Debian packages; install, run, update, purge one; its unit under systemd
 	@tools/setup.sh test-deb
 	@$(MAKE) board ARCH=arm64
 	@$(MAKE) board ARCH=armhf
+	@tests/board/get.sh
 	@tests/board/deb.sh frames/sequence1/rig.json
 
 test-board: sim ## isohead_board on an emulated ARM board: frames, faults, signals and the laser's line

@@ -85,7 +85,18 @@ need_deb() {
     need_program dpkg-shlibdeps dpkg-dev
 }
 
+need_test_board() {
+    need_board arm64
+    need_program qemu-system-aarch64 qemu-system-arm
+    PATH=$PATH:/sbin:/usr/sbin need_program depmod kmod
+    need_program bzip2 bzip2
+    need_python json python3
+}
+
 need_test_deb() {
+    need_test_board
+    need_board armhf
+    need_program cpio cpio
     need_deb arm64
     need_deb armhf
     need_program readelf binutils
@@ -126,13 +137,7 @@ sim) need_sim ;;
 board) need_board "${2:-}" ;;
 deb) need_deb "${2:-}" ;;
 test-deb) need_test_deb ;;
-test-board)
-    need_board arm64
-    need_program qemu-system-aarch64 qemu-system-arm
-    PATH=$PATH:/sbin:/usr/sbin need_program depmod kmod
-    need_program bzip2 bzip2
-    need_python json python3
-    ;;
+test-board) need_test_board ;;
 image) need_image ;;
 flash) need_flash ;;
 test-image)

@@ -1,10 +1,10 @@
 #!/bin/sh
-# The Debian packages: what is in them, and one of them installed, run, updated, removed and purged in
-# a Debian arm64 root.
+# The Debian packages: what is in them, and one of them installed, run, started by systemd, updated,
+# removed and purged in a Debian arm64 root.
 #
 #     tests/board/deb.sh RIG_JSON
 #
-# Needs the programs of `make board` for arm64 and armhf, root (for chroot), and mmdebstrap. The root
+# Needs the programs of `make board` for arm64 and armhf, the kernel of get.sh, and root. The arm64 root
 # is a small Debian of the archives that this machine is set up for; on a processor other than ARM its
 # programs run by qemu-user through binfmt_misc, which is set up here if it is not. A root of the last
 # day is used again: build/deb-root.tar. Exit status 1 when something is wrong.
@@ -105,7 +105,7 @@ need_binfmt() {
     arch-test arm64 >/dev/null 2>&1 || fail "arm64 programs do not run, in spite of $binfmt/qemu-aarch64"
 }
 
-# build/deb-root.tar: apt, what is essential, and the archives' lists
+# build/deb-root.tar: apt, what is essential, the archives' lists, and what unit.sh wants
 make_root() {
     [ -z "$(find build/deb-root.tar -mmin -1440 2>/dev/null)" ] || return 0
     # shellcheck source=/dev/null
@@ -115,6 +115,7 @@ make_root() {
         sed -e '/^deb-src/d' -e 's/^Types:.*/Types: deb/' "$file" >"$work/sources/$(basename "$file")"
     done
     mmdebstrap --quiet --architectures=arm64 --variant=apt --skip=cleanup/apt \
+        --include=systemd-sysv,udev,kmod \
         --dpkgopt=force-unsafe-io --dpkgopt='path-exclude=/usr/share/doc/*' \
         --dpkgopt='path-exclude=/usr/share/man/*' --dpkgopt='path-exclude=/usr/share/locale/*' \
         --aptopt='Acquire::Languages "none"' --aptopt='APT::Install-Recommends "false"' \
@@ -173,12 +174,13 @@ check_run() {
     as_user 0 isohead_board --help
     says '^ *--laser-off'
     # The file's third line is wrong.
-    printf '# a comment\nrate = 25\nstrobe = sometimes\n' >"$work/root/etc/isohead/wrong.conf"
+    printf '# a comment\nrig = rig.json\nstrobe = sometimes\n' >"$work/root/etc/isohead/wrong.conf"
     as_user 2 isohead_board --config /etc/isohead/wrong.conf
     says 'wrong\.conf:3'
     rm "$work/root/etc/isohead/wrong.conf"
-    # As the unit calls it after every end, with the configuration as installed.
+    # As the unit calls it after every end, with the configuration as installed: there is no laser.
     as_user 0 isohead_board --config /etc/isohead/isohead.conf --laser-off
+    as_user 2 isohead_board --laser-off
     cp "$rig" "$work/root/etc/isohead/rig.json"
     # A GPIO chip that is not there.
     as_user 1 isohead_board --rig /etc/isohead/rig.json --laser --gpio-chip /dev/gpiochip0 --laser-line 3
@@ -256,6 +258,8 @@ check_install
 tests/checks/manual.sh chroot "$work/root" isohead_board
 check_run
 check_stop
+tests/board/unit.sh "$work/root" "$rig"
+step "the unit under systemd"
 check_update
 check_remove
 step "all good"
