@@ -1,6 +1,7 @@
 """Cases of the laser's line: each returns what was seen; its first line says what is done."""
 
 import json
+import re
 
 from frames import host_records
 from run import (FRAME_S, HEARTBEAT, HEIGHT, INTERLOCK, LASER, LIVE_FIELDS, RATE, SILENT_S, SOON_S,
@@ -172,5 +173,21 @@ def case_duty(run):
     return f"high for {100 * share:.0f} % of {times[-1][1] - times[0][0]:.1f} s"
 
 
+def case_status(run):
+    """the status line's share of the laser, gated"""
+    board, index = run.board, 0
+    board.watch_pins()
+    run.start(run.gated, "gated", "--status 1")
+    while not (told := [line for line in board.log if "laser on" in line]):
+        run.lit_frame(run.gated, index)
+        index += 1
+    run.stop()
+    times = run.high_times()
+    share = 100 * sum(fall_s - rise_s for rise_s, fall_s in times) / (times[-1][1] - times[0][0])
+    percent = int(re.search(r"laser on (\d+) %", told[0])[1])
+    expect(abs(percent - share) < 5, f"told {percent} %, the line was high for {share:.1f} %")
+    return f"told {percent} %, the line was high for {share:.1f} %"
+
+
 CASES = [case_interlock, case_reload, case_unasked, case_signals, case_killed, case_all_killed,
-         case_stopped, case_guard_killed, case_duty]
+         case_stopped, case_guard_killed, case_duty, case_status]
