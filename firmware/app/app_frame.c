@@ -7,21 +7,13 @@ static int64_t now(const struct app_loop *loop)
     return loop->hal.clock->now_us(loop->hal.clock->context);
 }
 
-/* The status has to know at once: while a frame is looked at nobody else tells it. */
-static void switch_laser(struct app_loop *loop, bool on)
-{
-    int64_t now_us = now(loop);
-    app_laser_wish(&loop->laser, on, now_us);
-    app_status_laser(&loop->status, loop->laser.is_on, now_us);
-}
-
 static void wish_light(struct app_loop *loop, bool on)
 {
     if (on && !loop->light_wanted) {
         loop->on_frames = 0;
     }
     loop->light_wanted = on;
-    switch_laser(loop, on && !loop->is_over);
+    app_laser_wish(&loop->laser, on && !loop->is_over, now(loop));
 }
 
 static void put_record(struct app_loop *loop, bool is_complete, const char *name)
@@ -217,7 +209,7 @@ void app_frame_use(struct app_loop *loop, const struct hal_frame *frame)
     count_lost(loop, frame);
     loop->on_frames = loop->laser.is_on && loop->light_wanted ? loop->on_frames + 1 : 0;
     if (loop->config->strobe == APP_STROBE_GATED) {
-        switch_laser(loop, false);
+        app_laser_wish(&loop->laser, false, now(loop));
     }
     if (!loop->rig_is_valid) {
         skip_frame(loop, frame);

@@ -24,7 +24,7 @@ static void watch_laser(struct app_loop *loop)
     struct app_laser *laser = &loop->laser;
     const unsigned quiet = APP_LASER_BLOCK_DISABLED | APP_LASER_BLOCK_DUTY;
     unsigned blocks = laser->blocks & ~quiet;
-    app_status_laser(&loop->status, laser->is_on, now(loop));
+    loop->status.laser_on_us = laser->on_us;
     if (blocks != loop->told_blocks && laser->config.enabled) {
         const char *why = app_laser_block_text(blocks);
         if (why != NULL) {

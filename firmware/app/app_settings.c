@@ -218,8 +218,8 @@ const struct app_setting app_settings[] = {
      "grey from what else it has; default auto, the best of them that it has",
      .take = take_word, .offset = AT(format), .words = format_words},
     {"rate", "FPS", "frames per second from 1 to 1000, with up to 3 decimals",
-     "frames per second; default: as the camera is set", .take = take_number, .offset = AT(rate_mhz), .minimum = 1000,
-     .maximum = 1000000, .decimals = 3},
+     "frames per second; default: as the camera is set", .take = take_number,
+     .offset = AT(rate_mhz), .minimum = 1000, .maximum = 1000000, .decimals = 3},
     {"exposure", "WHAT", "auto, keep, steer or microseconds from 1 to 1000000",
      "auto, the camera's own control, the default; keep, as it is; steer, by the dots' brightness; "
      "or microseconds",

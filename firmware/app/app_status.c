@@ -18,8 +18,8 @@ static void start(struct app_status *status, int64_t now_us)
     memset(status, 0, sizeof *status);
     status->interval_us = before.interval_us;
     status->since_us = now_us;
-    status->laser = before.laser;
-    status->laser_since_us = now_us;
+    status->laser_before_us = before.laser_on_us;
+    status->laser_on_us = before.laser_on_us;
 }
 
 void app_status_init(struct app_status *status, int32_t interval_s, int64_t now_us)
@@ -40,18 +40,10 @@ void app_status_frame(struct app_status *status, int32_t dot_count, int32_t head
     }
 }
 
-void app_status_laser(struct app_status *status, bool on, int64_t now_us)
-{
-    if (status->laser) {
-        status->laser_on_us += now_us - status->laser_since_us;
-    }
-    status->laser = on;
-    status->laser_since_us = now_us;
-}
-
 static void print_line(const struct app_status *status, int64_t passed_us, char *text)
 {
     int64_t count = status->frame_count;
+    int64_t laser_us = status->laser_on_us - status->laser_before_us;
     int64_t rate = tenths(count * SECOND_US, passed_us);
     size_t room = APP_STATUS_TEXT_MAX;
     size_t length = 0;
@@ -67,8 +59,7 @@ static void print_line(const struct app_status *status, int64_t passed_us, char 
                                ", lost %" PRId64 ", skipped %" PRId64 ", bad %" PRId64
                                ", unsent %" PRId64 ", laser on %" PRId64 " %%",
                                status->lost_count, status->skipped_count, status->bad_count,
-                               status->unsent_count,
-                               (status->laser_on_us * 100 + passed_us / 2) / passed_us);
+                               status->unsent_count, (laser_us * 100 + passed_us / 2) / passed_us);
     if (count > 0) {
         snprintf(text + length, room - length, ", frame %" PRId64 " ms",
                  (status->process_max_us + 999) / 1000);
@@ -81,7 +72,6 @@ bool app_status_line(struct app_status *status, int64_t now_us, char text[APP_ST
     if (status->interval_us == 0 || passed_us < status->interval_us) {
         return false;
     }
-    app_status_laser(status, status->laser, now_us);
     print_line(status, passed_us, text);
     start(status, now_us);
     return true;

@@ -18,24 +18,21 @@ struct app_status {
     int64_t since_us;
     int64_t frame_count, dot_sum, head_sum;
     int64_t process_max_us;
-    bool laser;
-    int64_t laser_since_us, laser_on_us;
+    int64_t laser_before_us; /* laser_on_us at the last line */
     /* The caller adds to these. */
+    int64_t laser_on_us;   /* time with the laser on, since ever */
     int64_t lost_count;    /* missing in the camera's sequence */
     int64_t skipped_count; /* not used: dark or half lit */
     int64_t bad_count;     /* could not be read or processed */
     int64_t unsent_count;  /* records that the output did not take */
 };
 
-/* interval_s: 0, no lines, or 1 .. 86400. The laser is off. */
+/* interval_s: 0, no lines, or 1 .. 86400. */
 void app_status_init(struct app_status *status, int32_t interval_s, int64_t now_us);
 
 /* A frame with a result, and how long that took. */
 void app_status_frame(struct app_status *status, int32_t dot_count, int32_t head_count,
                       int64_t process_us);
-
-/* The laser is switched; or told again what it is. */
-void app_status_laser(struct app_status *status, bool on, int64_t now_us);
 
 /* True when a line is due: it stands in text, and counting starts anew. */
 bool app_status_line(struct app_status *status, int64_t now_us, char text[APP_STATUS_TEXT_MAX]);
