@@ -29,8 +29,11 @@ static void account(struct app_laser *laser, int64_t now_us)
     } else {
         laser->credit += passed_us * duty;
     }
-    if (laser->credit > credit_max(laser)) {
+    if (laser->credit <= 0) {
+        block(laser, APP_LASER_BLOCK_DUTY, true);
+    } else if (laser->credit >= credit_max(laser)) {
         laser->credit = credit_max(laser);
+        block(laser, APP_LASER_BLOCK_DUTY, false);
     }
 }
 
@@ -189,27 +192,15 @@ void app_laser_interlock(struct app_laser *laser, int64_t now_us)
     }
 }
 
-/* How long until the duty changes something; account has just run. */
-static int64_t duty_wait_us(struct app_laser *laser)
+/* How long until the duty changes something. */
+static int64_t duty_wait_us(const struct app_laser *laser)
 {
     int32_t duty = laser->config.duty_percent;
-    if (laser->is_on) {
-        if (duty == PERCENT) {
-            return APP_LASER_NEVER_US;
-        }
-        if (laser->credit <= 0) {
-            block(laser, APP_LASER_BLOCK_DUTY, true);
-            return 1;
-        }
+    if (laser->is_on && duty < PERCENT) {
         return laser->credit / (PERCENT - duty) + 1;
     }
     if ((laser->blocks & APP_LASER_BLOCK_DUTY) != 0) {
-        int64_t missing = credit_max(laser) - laser->credit;
-        if (missing <= 0) {
-            block(laser, APP_LASER_BLOCK_DUTY, false);
-            return 1;
-        }
-        return missing / duty + 1;
+        return (credit_max(laser) - laser->credit) / duty + 1;
     }
     return APP_LASER_NEVER_US;
 }
@@ -220,31 +211,24 @@ static int64_t interlock_wait_us(const struct app_laser *laser)
                                                             : APP_LASER_NEVER_US;
 }
 
-static int64_t silence_wait_us(struct app_laser *laser)
+static int64_t silence_wait_us(const struct app_laser *laser)
 {
-    int64_t left_us = laser->silent_max_us - laser->silent_us;
-    if (!laser->is_on) {
-        return APP_LASER_NEVER_US;
-    }
-    if (left_us <= 0) {
-        block(laser, APP_LASER_BLOCK_SILENCE, true);
-        return 1;
-    }
-    return left_us;
+    return laser->is_on ? laser->silent_max_us - laser->silent_us : APP_LASER_NEVER_US;
 }
 
-static int64_t beat_wait_us(struct app_laser *laser, int64_t now_us)
+static int64_t beat_wait_us(const struct app_laser *laser, int64_t now_us)
 {
-    if (!laser->is_on) {
-        return APP_LASER_NEVER_US;
-    }
-    if (now_us - laser->beat_us >= APP_LASER_BEAT_US) {
+    return laser->is_on ? laser->beat_us + APP_LASER_BEAT_US - now_us : APP_LASER_NEVER_US;
+}
+
+static void beat(struct app_laser *laser, int64_t now_us)
+{
+    if (laser->is_on && now_us - laser->beat_us >= APP_LASER_BEAT_US) {
         laser->beat_us = now_us;
         if (!laser->strobe->beat(laser->strobe->context, &laser->failed)) {
             fail(laser);
         }
     }
-    return laser->beat_us + APP_LASER_BEAT_US - now_us;
 }
 
 static int64_t least(int64_t a, int64_t b)
@@ -258,9 +242,14 @@ int64_t app_laser_tick(struct app_laser *laser, int64_t now_us)
     if (laser->is_open) {
         read_interlock(laser); /* should its event have been lost */
     }
+    if (laser->silent_us >= laser->silent_max_us && (laser->blocks & APP_LASER_BLOCK_CAMERA) == 0) {
+        block(laser, APP_LASER_BLOCK_SILENCE, true);
+    }
+    apply(laser);
+    beat(laser, now_us);
+    /* Only now: what was switched on just now has limits too. */
     int64_t wait_us = least(duty_wait_us(laser), silence_wait_us(laser));
     wait_us = least(wait_us, interlock_wait_us(laser));
-    apply(laser);
     return least(wait_us, beat_wait_us(laser, now_us));
 }
 

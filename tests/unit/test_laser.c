@@ -222,6 +222,46 @@ static void test_duty(void)
     }
 }
 
+/* A tick that switches on says when the limits in time are reached, not the next beat. */
+static void test_tick_switches_on(void)
+{
+    start(true, 1);
+    app_laser_wish(&laser, true, 0);
+    fake.closed = false;
+    app_laser_interlock(&laser, 500); /* half of the burst of 1 ms is left */
+    fake.closed = true;
+    TEST_ASSERT_LESS_OR_EQUAL_INT64(APP_LASER_CLOSED_US, app_laser_tick(&laser, 600));
+    TEST_ASSERT_FALSE(fake.line);
+    int64_t wait_us = app_laser_tick(&laser, 30000);
+    TEST_ASSERT_TRUE(fake.line);
+    TEST_ASSERT_LESS_OR_EQUAL_INT64(1 + APP_LASER_BURST_US / 99, wait_us);
+
+    setUp();
+    start(true, 100);
+    app_laser_wish(&laser, true, 0);
+    fake.closed = false;
+    app_laser_interlock(&laser, 3 * FRAME_US - 1000);
+    fake.closed = true;
+    wait_us = app_laser_tick(&laser, 4 * FRAME_US);
+    TEST_ASSERT_TRUE(fake.line);
+    TEST_ASSERT_LESS_OR_EQUAL_INT64(1000, wait_us);
+}
+
+/* More than the duty was used between two ticks: it does not go on before the duty is made up for. */
+static void test_duty_used_without_a_tick(void)
+{
+    start(true, 10);
+    app_laser_wish(&laser, true, 0);
+    app_laser_wish(&laser, false, APP_LASER_BURST_US);
+    app_laser_frame(&laser, APP_LASER_BURST_US);
+    app_laser_wish(&laser, true, APP_LASER_BURST_US + 1);
+    TEST_ASSERT_FALSE(fake.line);
+    app_laser_tick(&laser, 10 * APP_LASER_BURST_US - 10);
+    TEST_ASSERT_FALSE(fake.line);
+    app_laser_tick(&laser, 10 * APP_LASER_BURST_US);
+    TEST_ASSERT_TRUE(fake.line);
+}
+
 static void test_beats_while_on(void)
 {
     start(true, 100);
@@ -279,6 +319,8 @@ int main(void)
     RUN_TEST(test_interlock);
     RUN_TEST(test_interlock_race);
     RUN_TEST(test_duty);
+    RUN_TEST(test_tick_switches_on);
+    RUN_TEST(test_duty_used_without_a_tick);
     RUN_TEST(test_beats_while_on);
     RUN_TEST(test_off_fails);
     RUN_TEST(test_on_fails);
