@@ -90,7 +90,7 @@ void app_laser_rig(struct app_laser *laser, bool is_valid, int64_t now_us);
 /* The camera streams, a frame every frame_time_us, or it does not: then the time does not matter. */
 void app_laser_camera(struct app_laser *laser, bool streams, int64_t frame_time_us, int64_t now_us);
 
-/* A frame came, or the loop was busy with one until now. */
+/* A frame came that can be looked at, or the loop was busy with one until now. */
 void app_laser_frame(struct app_laser *laser, int64_t now_us);
 
 /* The interlock has moved, or might have. */

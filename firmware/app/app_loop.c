@@ -139,7 +139,6 @@ static void note_frame(struct app_loop *loop)
     }
     loop->frame_us = now_us;
     loop->retry_wait_us = APP_LOOP_RETRY_MIN_US;
-    app_laser_frame(&loop->laser, now_us);
 }
 
 /* The newest frame that waits, or what is wrong. */
@@ -161,9 +160,11 @@ static void take_frames(struct app_loop *loop)
         }
         note_frame(loop);
         if (next == HAL_NEXT_BAD) {
+            /* The camera lives, but nobody has seen anything: no frame to the laser. */
             app_frame_lose(loop, &frame, error.text);
             continue;
         }
+        app_laser_frame(&loop->laser, now(loop));
         if (has_newest) {
             app_frame_skip(loop, &newest);
         }

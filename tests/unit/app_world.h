@@ -254,7 +254,6 @@ static enum hal_next world_camera_next(void *context, struct hal_frame *frame,
     if (world_call(WORLD_CAMERA_NEXT_BAD)) {
         hal_fail(error, "short frame");
         frame->samples = NULL;
-        world.on_since_us = world.now_us;
         return HAL_NEXT_BAD;
     }
     int held = 0;

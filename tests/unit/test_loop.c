@@ -224,6 +224,25 @@ static void test_nothing_in_range(void)
     TEST_ASSERT_EQUAL_INT(40, world.lit_count);
 }
 
+/* Nobody sees anything in frames that cannot be read: they do not keep the laser on. A good one does
+ * again. */
+static void test_bad_frames_only(void)
+{
+    static const enum world_act acts[] = {FIVE, TWENTY};
+    for (int mode = 0; mode < 3; mode++) {
+        for (int flight = 0; flight <= 2; flight += 2) {
+            world_init((enum app_strobe)mode, acts, COUNT(acts));
+            world.flight = flight;
+            world.fault = WORLD_CAMERA_NEXT_BAD;
+            world.fault_call = 4;
+            world.fault_stays = true;
+            TEST_ASSERT_EQUAL_INT(APP_EXIT_GOOD, world_run());
+            TEST_ASSERT_GREATER_THAN_INT(15, world.error_count);
+            TEST_ASSERT_EQUAL_INT(1, world.calls[WORLD_CAMERA_OPEN]);
+        }
+    }
+}
+
 /* Every kind of thing that can happen, for the faults. */
 static const enum world_act eventful[] = {
     FIVE,        WORLD_LOST,
@@ -306,6 +325,7 @@ int main(void)
     RUN_TEST(test_no_rig);
     RUN_TEST(test_without_laser);
     RUN_TEST(test_nothing_in_range);
+    RUN_TEST(test_bad_frames_only);
     RUN_TEST(test_every_call_fails);
     return UNITY_END();
 }
