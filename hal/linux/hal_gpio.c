@@ -144,7 +144,6 @@ static bool gpio_open(void *context, struct hal_error *error)
     gpio->laser_fd = gpio->laser.fd;
     gpio->interlock_fd = gpio->interlock.fd;
     gpio->beat = false;
-    gpio->told_closed = false;
     return true;
 }
 
@@ -182,8 +181,7 @@ static bool gpio_interlock(void *context, bool *closed, struct hal_error *error)
         return hal_fail(error, "interlock-line: cannot read '%.31s' of %.80s: %s",
                         gpio->config.interlock_line, gpio->config.chip, strerror(errno));
     }
-    *closed = level == 1 && !(gpio->told_closed && event_count > 0);
-    gpio->told_closed = *closed;
+    *closed = level == 1 && event_count == 0;
     return true;
 }
 

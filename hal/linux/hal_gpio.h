@@ -5,10 +5,11 @@
  * Out:   "on" and "closed" are logical: active-low lines are turned around by the kernel. The laser's
  *        line is requested as an output that is off, in one call: it is never on in between. With a
  *        push-pull output of the controller; a bias is the board's business (docs/hardware.md).
- * Interlock: both edges are watched. interlock() says "open" when the line is open now, and once when
- *        it is closed now but anything happened to it since it was last said to be closed: an
- *        opening between two calls is not lost. Contacts that bounce on closing are told as open
- *        once more; that is meant. The kernel keeps the events, so nothing is missed between.
+ * Interlock: both edges are watched. interlock() says "closed" only when the line is closed now and
+ *        nothing has happened to it since the call before: an opening between two calls is not lost,
+ *        and a contact that chatters is open for as long as it does. One that has just closed is
+ *        told as open once more; that is meant. The kernel keeps the events, so nothing is missed
+ *        between.
  * Signals: set(false) is safe in a signal handler in fact, not by promise. gpiod_line_set_value of
  *        1.6.3 and gpiod_line_request_set_value of 2.2 and 2.3 compare fields of their own, fill a
  *        structure on the stack and call ioctl: no lock, no allocation, no stdio. (2.x has asserts
@@ -60,9 +61,8 @@ struct hal_gpio {
     struct hal_gpio_config config;
     struct gpiod_chip *chip;
     struct hal_gpio_line laser, interlock, heartbeat;
-    bool beat;        /* the heartbeat's level */
-    bool told_closed; /* what interlock() said last */
-    char what[96];    /* the laser's line in errors */
+    bool beat;     /* the heartbeat's level */
+    char what[96]; /* the laser's line in errors */
 };
 
 /* Nothing is opened yet. */

@@ -79,7 +79,8 @@ struct world {
     /* The world. */
     int64_t now_us, next_us;
     int act_index;
-    bool line, line_taken, interlock_closed, interlock_event, interlock_opened;
+    bool line, line_taken, interlock_closed, interlock_moved;
+    int64_t interlock_us; /* when it moved */
     bool camera_open;
     int64_t unplugged_until_us;
     int64_t sequence;
@@ -319,6 +320,8 @@ static bool world_strobe_set(void *context, bool on, struct hal_error *error)
     if (world_call(WORLD_STROBE_ON)) {
         return hal_fail(error, "cannot be set");
     }
+    TEST_ASSERT_TRUE_MESSAGE(world.now_us - world.interlock_us >= APP_LASER_CLOSED_US,
+                             "on while the interlock's contact may bounce");
     world.rise_count += !world.line;
     world.on_since_us = world.line ? world.on_since_us : world.now_us;
     world.line = true;
@@ -338,8 +341,8 @@ static bool world_strobe_interlock(void *context, bool *closed, struct hal_error
     if (world_call(WORLD_STROBE_INTERLOCK)) {
         return hal_fail(error, "cannot be read");
     }
-    *closed = world.interlock_closed && !world.interlock_opened;
-    world.interlock_opened = false;
+    *closed = world.interlock_closed && !world.interlock_moved;
+    world.interlock_moved = false;
     return true;
 }
 
@@ -375,6 +378,15 @@ static void world_push(bool is_half)
     world.queue_count++;
 }
 
+/* To closed or open, with an event in any case. */
+static void world_move_interlock(bool closed)
+{
+    world.interlock_closed = closed;
+    world.interlock_moved = true;
+    world.interlock_us = world.now_us;
+    world.events |= HAL_EVENT_INTERLOCK;
+}
+
 /* What happens at a frame's time. */
 static void world_step(void)
 {
@@ -395,17 +407,13 @@ static void world_step(void)
         world.events |= HAL_EVENT_RELOAD;
         break;
     case WORLD_INTERLOCK_OPENS:
-        world.interlock_closed = false;
-        world.interlock_opened = true;
-        world.events |= HAL_EVENT_INTERLOCK;
+        world_move_interlock(false);
         break;
     case WORLD_INTERLOCK_BLINKS:
-        world.interlock_opened = true;
-        world.events |= HAL_EVENT_INTERLOCK;
+        world_move_interlock(world.interlock_closed);
         break;
     case WORLD_INTERLOCK_CLOSES:
-        world.interlock_closed = true;
-        world.events |= HAL_EVENT_INTERLOCK;
+        world_move_interlock(true);
         break;
     default:
         break;

@@ -269,7 +269,7 @@ static void the_interlock_is_its_level(void)
     TEST_ASSERT_FALSE(is_closed());
     fake_drive(interlock, 1);
     TEST_ASSERT_TRUE(has_news());
-    TEST_ASSERT_TRUE(is_closed());
+    TEST_ASSERT_FALSE(is_closed());
     TEST_ASSERT_FALSE(has_news());
     TEST_ASSERT_TRUE(is_closed());
     fake_drive(interlock, 0);
@@ -293,6 +293,23 @@ static void an_active_low_interlock_is_closed_when_low(void)
     fake_drive(interlock, 1);
     TEST_ASSERT_FALSE(is_closed());
     fake_drive(interlock, 0);
+    TEST_ASSERT_FALSE(is_closed());
+    TEST_ASSERT_TRUE(is_closed());
+}
+
+/* It opens again between any two looks, and is closed whenever it is looked at. */
+static void a_contact_that_chatters_is_never_closed(void)
+{
+    int look;
+
+    interlock->level = 1;
+    TEST_ASSERT_TRUE(open_with(&full));
+    TEST_ASSERT_TRUE(is_closed());
+    for (look = 0; look < 10; look++) {
+        fake_drive(interlock, 0);
+        fake_drive(interlock, 1);
+        TEST_ASSERT_FALSE(is_closed());
+    }
     TEST_ASSERT_TRUE(is_closed());
 }
 
@@ -328,9 +345,8 @@ static void many_events_are_taken_by_several_calls(void)
     }
     TEST_ASSERT_FALSE(is_closed());
     TEST_ASSERT_TRUE(has_news());
-    is_closed();
+    TEST_ASSERT_FALSE(is_closed());
     TEST_ASSERT_FALSE(has_news());
-    is_closed();
     TEST_ASSERT_TRUE(is_closed());
 }
 
@@ -488,6 +504,7 @@ int main(void)
     RUN_TEST(the_interlock_is_its_level);
     RUN_TEST(without_an_interlock_it_is_closed);
     RUN_TEST(an_active_low_interlock_is_closed_when_low);
+    RUN_TEST(a_contact_that_chatters_is_never_closed);
     RUN_TEST(a_short_opening_is_told_once);
     RUN_TEST(many_events_are_taken_by_several_calls);
     RUN_TEST(an_interlock_that_cannot_be_read_is_not_closed);
