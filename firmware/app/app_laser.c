@@ -37,23 +37,25 @@ static void account(struct app_laser *laser, int64_t now_us)
     }
 }
 
-/* Off, whatever it takes. The error that brought us here is kept, not the ones that follow. */
-static void force_off(struct app_laser *laser)
+/* Off, whatever it takes. False: only giving the lines back may have done it. */
+static bool force_off(struct app_laser *laser, struct hal_error *error)
 {
-    struct hal_error error;
     bool off = false;
     for (int i = 0; i < APP_LASER_OFF_TRIES && !off; i++) {
-        off = laser->strobe->set(laser->strobe->context, false, &error);
+        off = laser->strobe->set(laser->strobe->context, false, error);
     }
     laser->strobe->close(laser->strobe->context);
     laser->is_open = false;
     laser->is_on = false;
+    return off;
 }
 
+/* The error that brought us here is kept, not the ones that follow. */
 static void fail(struct app_laser *laser)
 {
+    struct hal_error ignored;
     block(laser, APP_LASER_BLOCK_FAULT, true);
-    force_off(laser);
+    force_off(laser, &ignored);
 }
 
 static void switch_off(struct app_laser *laser)
@@ -145,8 +147,8 @@ void app_laser_close(struct app_laser *laser, int64_t now_us)
 {
     account(laser, now_us);
     laser->wished = false;
-    if (laser->is_open) {
-        force_off(laser);
+    if (laser->is_open && !force_off(laser, &laser->failed)) {
+        block(laser, APP_LASER_BLOCK_FAULT, true);
     }
 }
 

@@ -79,7 +79,8 @@ void app_laser_init(struct app_laser *laser, const struct app_laser_config *conf
 /* Take the lines; false: failed. Not enabled: nothing happens. */
 bool app_laser_open(struct app_laser *laser);
 
-/* Off by every means, lines given back. May be called at any time, several times. */
+/* Off by every means, lines given back. May be called at any time, several times. If it could not be
+ * switched off before: failed. */
 void app_laser_close(struct app_laser *laser, int64_t now_us);
 
 /* The loop's wish. */

@@ -18,6 +18,17 @@ void app_loop_end(struct app_loop *loop, enum app_exit exit)
     loop->exit = exit;
 }
 
+/* A strobe that failed ends the program, and is told even at its end: the laser may be on. */
+static void watch_fault(struct app_loop *loop)
+{
+    const struct app_laser *laser = &loop->laser;
+    if ((laser->blocks & APP_LASER_BLOCK_FAULT) != 0 && !loop->told_fault) {
+        loop->told_fault = true;
+        app_log_say(loop->log, APP_LOG_ERROR, "laser: %s", laser->failed.text);
+        app_loop_end(loop, APP_EXIT_FAILED);
+    }
+}
+
 /* Into the log and the sums: what became of the laser. */
 static void watch_laser(struct app_loop *loop)
 {
@@ -34,10 +45,7 @@ static void watch_laser(struct app_loop *loop)
         }
     }
     loop->told_blocks = blocks;
-    if ((blocks & APP_LASER_BLOCK_FAULT) != 0 && !loop->is_over) {
-        app_log_say(loop->log, APP_LOG_ERROR, "laser: %s", laser->failed.text);
-        app_loop_end(loop, APP_EXIT_FAILED);
-    }
+    watch_fault(loop);
 }
 
 static bool load_rig(struct app_loop *loop, struct hal_error *error)
@@ -192,6 +200,7 @@ static void reset(struct app_loop *loop)
     app_phase_init(&loop->phase);
     app_status_init(&loop->status, config->status_s, now_us);
     loop->told_blocks = loop->laser.blocks;
+    loop->told_fault = false;
     loop->light_wanted = false;
     loop->on_frames = 0;
     loop->is_streaming = false;
@@ -301,6 +310,7 @@ enum app_exit app_loop_run(struct app_loop *loop)
     }
     close_camera(loop);
     app_laser_close(&loop->laser, now(loop));
+    watch_fault(loop);
     app_log_end(loop->log);
     return loop->exit;
 }

@@ -78,6 +78,7 @@ struct app_loop {
     /* Its own. */
     struct app_laser laser;
     unsigned told_blocks; /* of the laser, in the log */
+    bool told_fault;      /* the laser's, in the log */
     struct app_phase phase;
     struct app_status status;
     bool light_wanted; /* the next frame shall be lit */

@@ -93,6 +93,7 @@ struct world {
     /* What it saw. */
     int calls[WORLD_FUNCTIONS];
     bool fault_done;
+    bool told_fault;     /* a message says that the line cannot be set */
     int64_t on_since_us; /* of the line, without a frame */
     int record_count, lit_count, dark_count, error_count, ambient_count;
     int rise_count, beat_count;
@@ -501,6 +502,7 @@ static enum hal_sent world_send(void *context, const char *bytes, size_t count,
 static void world_write(void *context, int level, const char *text)
 {
     (void)context;
+    world.told_fault |= strstr(text, "laser: cannot be set") != NULL;
     if (!world_quiet) {
         printf("%lld <%d> %s\n", (long long)world.now_us, level, text);
     }

@@ -281,8 +281,13 @@ static int fail_each_call(enum world_function function, int mode, int flight, bo
         world.fault_stays = stays;
         snprintf(message, sizeof message, "%s, call %d, mode %d, flight %d, %s",
                  world_function_text[function], call, mode, flight, stays ? "for good" : "once");
-        world_run();
+        enum app_exit exit = world_run();
         TEST_ASSERT_TRUE_MESSAGE(world.fault_done, message);
+        /* Who looks at a laser that could not be switched off has to be told. */
+        if (function == WORLD_STROBE_OFF && stays) {
+            TEST_ASSERT_EQUAL_INT_MESSAGE(APP_EXIT_FAILED, exit, message);
+            TEST_ASSERT_TRUE_MESSAGE(world.told_fault, message);
+        }
     }
     return calls;
 }
