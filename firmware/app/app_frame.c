@@ -202,12 +202,22 @@ static void count_lost(struct app_loop *loop, const struct hal_frame *frame)
     loop->sequence = frame->sequence;
 }
 
+/* No further than it matters: at 1000 frames a second an int32_t is full after 25 days. */
+static void count_lit(struct app_loop *loop)
+{
+    if (!loop->laser.is_on || !loop->light_wanted) {
+        loop->on_frames = 0;
+    } else if (loop->on_frames <= APP_PHASE_FLIGHT_MAX) {
+        loop->on_frames++;
+    }
+}
+
 void app_frame_use(struct app_loop *loop, const struct hal_frame *frame)
 {
     struct ih_frame view = view_of(frame);
     struct hal_error error;
     count_lost(loop, frame);
-    loop->on_frames = loop->laser.is_on && loop->light_wanted ? loop->on_frames + 1 : 0;
+    count_lit(loop);
     if (loop->config->strobe == APP_STROBE_GATED) {
         app_laser_wish(&loop->laser, false, now(loop));
     }

@@ -68,7 +68,7 @@ struct app_laser {
     int64_t open_us;         /* when the interlock was last seen open */
     int64_t beat_us;         /* last edge for the one-shot */
     int64_t on_us;           /* sum of all times with the laser on */
-    int32_t on_count;        /* how often it was switched on */
+    int64_t on_count;        /* how often it was switched on */
     struct hal_error failed; /* why APP_LASER_BLOCK_FAULT */
 };
 

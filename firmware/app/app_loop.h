@@ -82,7 +82,7 @@ struct app_loop {
     struct app_phase phase;
     struct app_status status;
     bool light_wanted; /* the next frame shall be lit */
-    int32_t on_frames; /* frames since then with the laser on */
+    int32_t on_frames; /* frames since then with the laser on, up to APP_PHASE_FLIGHT_MAX + 1 */
     bool is_streaming; /* the camera is open */
     int64_t frame_time_us;
     int64_t frame_us; /* when the last frame came */

@@ -1,4 +1,5 @@
 /* app_loop and app_frame in a made-up world (app_world.h), every call of the HAL failing in turn. */
+#include "app_frame.h"
 #include "app_world.h"
 
 #define COUNT(acts) ((int)(sizeof(acts) / sizeof(acts)[0]))
@@ -224,6 +225,22 @@ static void test_nothing_in_range(void)
     TEST_ASSERT_EQUAL_INT(40, world.lit_count);
 }
 
+/* 1000 frames a second for 25 days: still lit, whatever it shows. */
+static void test_on_for_long(void)
+{
+    static const enum world_act acts[] = {WORLD_FRAME};
+    static const uint8_t nothing = 0;
+    const struct hal_frame frame = {.samples = &nothing, .width = 752, .height = 582, .name = ""};
+    world_init(APP_STROBE_ALWAYS, acts, COUNT(acts));
+    TEST_ASSERT_EQUAL_INT(APP_EXIT_GOOD, world_run());
+    world.loop.laser.is_on = world.loop.light_wanted = true;
+    world.loop.on_frames = INT32_MAX;
+    world.held[0] = true;
+    app_frame_use(&world.loop, &frame);
+    TEST_ASSERT_GREATER_THAN_INT32(APP_PHASE_FLIGHT_MAX, world.loop.on_frames);
+    TEST_ASSERT_EQUAL_INT(1, world.dark_count);
+}
+
 /* Nobody sees anything in frames that cannot be read: they do not keep the laser on. A good one does
  * again. */
 static void test_bad_frames_only(void)
@@ -330,6 +347,7 @@ int main(void)
     RUN_TEST(test_no_rig);
     RUN_TEST(test_without_laser);
     RUN_TEST(test_nothing_in_range);
+    RUN_TEST(test_on_for_long);
     RUN_TEST(test_bad_frames_only);
     RUN_TEST(test_every_call_fails);
     return UNITY_END();
