@@ -59,13 +59,17 @@ static bool is_watching(const struct hal_guard *guard)
     return count < 0 && errno == EAGAIN;
 }
 
+static bool tell(const struct hal_guard *guard, char byte)
+{
+    return send(guard->socket_fd, &byte, 1, MSG_NOSIGNAL | MSG_DONTWAIT) == 1;
+}
+
 static void stop(struct hal_guard *guard)
 {
-    const char done = GUARD_DONE;
     if (guard->socket_fd < 0) {
         return;
     }
-    send(guard->socket_fd, &done, 1, MSG_NOSIGNAL | MSG_DONTWAIT);
+    tell(guard, GUARD_DONE);
     shutdown(guard->socket_fd, SHUT_WR);
     /* It closes its end in ending; one that was stopped does not. */
     struct pollfd waiting = {.fd = guard->socket_fd};
@@ -127,7 +131,6 @@ static bool start(struct hal_guard *guard, struct hal_error *error)
 
 bool hal_guard_feed(struct hal_guard *guard, struct hal_error *error)
 {
-    const char alive = GUARD_ALIVE;
     siginfo_t info = {.si_pid = 0};
     if (guard->socket_fd < 0) {
         return true;
@@ -135,8 +138,7 @@ bool hal_guard_feed(struct hal_guard *guard, struct hal_error *error)
     /* One that was stopped still has its socket open. */
     bool stands = waitid(P_PID, (id_t)guard->pid, &info, WSTOPPED | WNOHANG | WNOWAIT) == 0 &&
                   info.si_pid != 0;
-    if (stands || !is_watching(guard) ||
-        send(guard->socket_fd, &alive, 1, MSG_NOSIGNAL | MSG_DONTWAIT) != 1) {
+    if (stands || !is_watching(guard) || !tell(guard, GUARD_ALIVE)) {
         return fail_gone(guard, error);
     }
     return true;
@@ -173,12 +175,18 @@ static bool guard_set(void *context, bool on, struct hal_error *error)
     struct hal_guard *guard = context;
     const struct hal_strobe *strobe = guard->config.strobe;
     if (!on) {
-        return strobe->set(strobe->context, false, error);
+        if (!strobe->set(strobe->context, false, error)) {
+            return false;
+        }
+        if (guard->socket_fd >= 0) {
+            tell(guard, GUARD_OFF); /* else it goes on to expect signs of life */
+        }
+        return true;
     }
     if (guard->socket_fd < 0) {
         return hal_fail(error, "guard: none, expected an open strobe");
     }
-    if (is_watching(guard)) {
+    if (is_watching(guard) && tell(guard, GUARD_ON)) {
         if (!strobe->set(strobe->context, true, error)) {
             return false;
         }

@@ -6,7 +6,8 @@
  *        has given the old ones back before they are taken anew (else the kernel would say EBUSY).
  * The guard switches off and ends when
  *        - the socket to this process reads end of file: this process has died, by SIGKILL too;
- *        - it was not told for timeout_ms that this process lives (hal_guard_feed);
+ *        - it was not told for timeout_ms that this process lives (hal_guard_feed), with the laser on;
+ *          while it is off a camera may take seconds to open;
  *        - it is told that all is done.
  * It switches off, and goes on, when the interlock opens: this process may be busy with a frame for as
  *        long as a slow processor needs. It only looks at the level; the event stays for this process,
@@ -14,8 +15,8 @@
  *        It has tried GUARD_OFF_TRIES times, 10 ms apart, before it gives up on a line that fails.
  * While it lives, set(true) is refused and undone as soon as the guard has let go: whatever the order
  *        of events, the line is not on for longer without a guard than one set(true) takes.
- *        set(false) never asks the guard and is as safe in a signal handler as that of the strobe
- *        below.
+ *        set(false) never asks the guard, only tells it, and is as safe in a signal handler as that
+ *        of the strobe below.
  * The child: a session of its own, so that a terminal's keys do not reach it; every signal blocked
  *        but SIGKILL, SIGSTOP and those of its own faults, for which it has inherited the handlers
  *        of hal_signals.h; no descriptor open but its end of the socket, the line and the interlock;

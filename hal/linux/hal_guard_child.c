@@ -64,8 +64,8 @@ static int64_t now_ms(void)
     return (int64_t)now.tv_sec * 1000 + now.tv_nsec / 1000000;
 }
 
-/* What the other process has said; -1: nothing yet, and it lives. */
-static int listen_to(int socket_fd)
+/* Takes what the other process has said. Why to end; -1: it lives. */
+static int listen_to(int socket_fd, bool *on)
 {
     char bytes[64];
     ssize_t count = recv(socket_fd, bytes, sizeof bytes, MSG_DONTWAIT);
@@ -75,6 +75,9 @@ static int listen_to(int socket_fd)
     for (ssize_t i = 0; i < count; i++) {
         if (bytes[i] == GUARD_DONE) {
             return GUARD_EXIT_DONE;
+        }
+        if (bytes[i] == GUARD_ON || bytes[i] == GUARD_OFF) {
+            *on = bytes[i] == GUARD_ON;
         }
     }
     return -1;
@@ -86,13 +89,13 @@ static int listen_to(int socket_fd)
 static enum guard_exit wait_for_the_end(const struct hal_guard_config *config, int socket_fd)
 {
     const struct hal_guard_interlock *interlock = &config->interlock;
-    int64_t end_ms = now_ms() + config->timeout_ms;
-    bool moved = false;
+    int64_t end_ms = 0;
+    bool moved = false, on = false;
     for (;;) {
         struct pollfd waiting[] = {
             {.fd = socket_fd, .events = POLLIN},
             {.fd = moved || interlock->fd == NULL ? -1 : *interlock->fd, .events = POLLIN}};
-        int64_t left_ms = end_ms - now_ms();
+        int64_t left_ms = on ? end_ms - now_ms() : config->timeout_ms;
         if (left_ms <= 0) {
             return GUARD_EXIT_LATE;
         }
@@ -102,7 +105,7 @@ static enum guard_exit wait_for_the_end(const struct hal_guard_config *config, i
             switch_off(config->strobe);
         }
         if (waiting[0].revents != 0) {
-            int why = listen_to(socket_fd);
+            int why = listen_to(socket_fd, &on);
             if (why >= 0) {
                 return (enum guard_exit)why;
             }

@@ -6,6 +6,8 @@
 
 /* The bytes on the socket. */
 #define GUARD_ALIVE 'a' /* to the guard */
+#define GUARD_ON 'n'    /* to the guard, before it is switched on: signs of life will follow */
+#define GUARD_OFF 'o'   /* to the guard, after it was switched off: they need not */
 #define GUARD_DONE 'd'  /* to the guard: off, and end */
 #define GUARD_READY 'r' /* from the guard, once */
 
