@@ -63,7 +63,7 @@ static void init_gpio(struct app_board *board, const struct app_config *config)
         .strobe = &board->gpio.strobe,
         .line_fd = &board->gpio.laser_fd,
         .timeout_ms = HAL_GUARD_TIMEOUT_MS,
-        .interlock = {&board->gpio.interlock_fd, hal_gpio_interlock_is_closed, &board->gpio},
+        .interlock_fd = &board->gpio.interlock_fd,
     };
     hal_guard_init(&board->guard, &guard);
 }

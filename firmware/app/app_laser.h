@@ -6,9 +6,10 @@
  *        - it was asked for (app_laser_config.enabled);
  *        - the rig is valid (app_laser_rig) and the camera streams (app_laser_camera);
  *        - it has not been on for APP_LASER_SILENT_FRAMES frame times since the last frame came;
- *        - the interlock is closed, after an opening for APP_LASER_CLOSED_US: contacts bounce, and the
- *          guard, which switches off too, is done with it by then. It is read before switching on and once more afterwards, so that
- *          one that opens in between is seen here or comes as an event later; and at every tick;
+ *        - the interlock is closed, after a movement for APP_LASER_CLOSED_US: contacts bounce. It is
+ *          read before switching on and once more afterwards, so that one that opens in between is
+ *          seen here or comes as an event later; and at every tick, which is also how the guard tells
+ *          that it has switched off;
  *        - the duty is kept: over any time T the laser is on for at most duty_percent of
  *          T + APP_LASER_BURST_US;
  *        - no call of the strobe has failed. After a failure it is switched off by every means there
@@ -33,7 +34,7 @@
 #define APP_LASER_SILENT_FRAMES 3
 /* A wait that nothing limits; the watchdogs want a sign of life several times in 2 s. */
 #define APP_LASER_NEVER_US 400000
-/* So long the interlock is closed before the laser is on again. */
+/* So long the interlock has been closed and has not moved before the laser is on again. */
 #define APP_LASER_CLOSED_US 20000
 /* How often switching off is tried before the lines are given back. */
 #define APP_LASER_OFF_TRIES 3

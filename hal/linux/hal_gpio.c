@@ -185,12 +185,6 @@ static bool gpio_interlock(void *context, bool *closed, struct hal_error *error)
     return true;
 }
 
-bool hal_gpio_interlock_is_closed(void *context)
-{
-    struct hal_gpio *gpio = context;
-    return gpio->interlock.handle != NULL && hal_gpio_line_get(&gpio->interlock) == 1;
-}
-
 void hal_gpio_init(struct hal_gpio *gpio, const struct hal_gpio_config *config)
 {
     *gpio = (struct hal_gpio){

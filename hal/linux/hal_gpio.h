@@ -68,8 +68,4 @@ struct hal_gpio {
 /* Nothing is opened yet. */
 void hal_gpio_init(struct hal_gpio *gpio, const struct hal_gpio_config *config);
 
-/* The interlock's level now; events stay where they are. context: the hal_gpio. False also where it
- * cannot be read. For the guard (hal_guard.h), which shares the taken line. */
-bool hal_gpio_interlock_is_closed(void *context);
-
 #endif

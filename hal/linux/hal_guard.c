@@ -48,14 +48,15 @@ static bool fail_gone(const struct hal_guard *guard, struct hal_error *error)
                     status);
 }
 
-/* Nothing to be read and not the end of the file: then the guard is watching. */
-static bool is_watching(const struct hal_guard *guard)
+/* Takes what the guard has said. Not the end of the file: then it is watching. */
+static bool is_watching(struct hal_guard *guard)
 {
-    char byte;
-    ssize_t count = -1;
+    char bytes[64];
+    ssize_t count = 0;
     do {
-        count = recv(guard->socket_fd, &byte, 1, MSG_PEEK | MSG_DONTWAIT);
-    } while (count < 0 && errno == EINTR);
+        count = recv(guard->socket_fd, bytes, sizeof bytes, MSG_DONTWAIT);
+        guard->moved = guard->moved || count > 0;
+    } while (count > 0 || (count < 0 && errno == EINTR));
     return count < 0 && errno == EAGAIN;
 }
 
@@ -118,6 +119,7 @@ static bool start(struct hal_guard *guard, struct hal_error *error)
         return hal_fail(error, "guard: no process: %s", strerror(reason));
     }
     guard->socket_fd = ends[0];
+    guard->moved = false;
     if (!wait_readable(guard->socket_fd) || recv(guard->socket_fd, &byte, 1, MSG_DONTWAIT) != 1 ||
         byte != GUARD_READY) {
         stop(guard);
@@ -205,10 +207,21 @@ static bool guard_beat(void *context, struct hal_error *error)
     return strobe->beat(strobe->context, error);
 }
 
+/* One that has ended is noticed here, too: sooner than by the next sign of life. */
 static bool guard_interlock(void *context, bool *closed, struct hal_error *error)
 {
-    const struct hal_strobe *strobe = ((struct hal_guard *)context)->config.strobe;
-    return strobe->interlock(strobe->context, closed, error);
+    struct hal_guard *guard = context;
+    const struct hal_strobe *strobe = guard->config.strobe;
+    if (!strobe->interlock(strobe->context, closed, error)) {
+        return false;
+    }
+    if (guard->socket_fd >= 0 && !is_watching(guard)) {
+        *closed = false;
+        return fail_gone(guard, error);
+    }
+    *closed = *closed && !guard->moved;
+    guard->moved = false;
+    return true;
 }
 
 void hal_guard_init(struct hal_guard *guard, const struct hal_guard_config *config)

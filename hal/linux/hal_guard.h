@@ -9,9 +9,11 @@
  *        - it was not told for timeout_ms that this process lives (hal_guard_feed), with the laser on;
  *          while it is off a camera may take seconds to open;
  *        - it is told that all is done.
- * It switches off, and goes on, when the interlock opens: this process may be busy with a frame for as
- *        long as a slow processor needs. It only looks at the level; the event stays for this process,
- *        which has to look at the interlock before and after set(true) (firmware/app/app_laser.h).
+ * It switches off, and goes on, when the interlock moves: this process may be busy with a frame for as
+ *        long as a slow processor needs. The event stays for this process, and interlock() here says
+ *        "open" once after the guard has switched off, so that nobody believes the laser to be on.
+ *        This process has to look at the interlock before and after set(true) and several times a
+ *        second while it is on (firmware/app/app_laser.h).
  *        It has tried GUARD_OFF_TRIES times, 10 ms apart, before it gives up on a line that fails.
  * While it lives, set(true) is refused and undone as soon as the guard has let go: whatever the order
  *        of events, the line is not on for longer without a guard than one set(true) takes.
@@ -41,18 +43,13 @@
 
 #define HAL_GUARD_TIMEOUT_MS 2000
 
-/* fd: readable when it has moved, until this process has taken the event. NULL, or -1 in it: none. */
-struct hal_guard_interlock {
-    const int *fd;
-    bool (*is_closed)(void *context); /* looks at the level only; false also when that fails */
-    void *context;
-};
-
 struct hal_guard_config {
     const struct hal_strobe *strobe; /* to be guarded */
     const int *line_fd; /* the descriptor that the open strobe sets its line by; -1 in it: none */
     int32_t timeout_ms; /* at least 1; HAL_GUARD_TIMEOUT_MS where nothing speaks against it */
-    struct hal_guard_interlock interlock;
+    /* Readable when the interlock has moved, until this process has taken the event. NULL, or -1 in
+     * it: none. */
+    const int *interlock_fd;
 };
 
 struct hal_guard {
@@ -61,6 +58,7 @@ struct hal_guard {
     struct hal_guard_config config;
     int socket_fd; /* -1: there is no guard */
     pid_t pid;
+    bool moved; /* the guard has switched off, and nobody has been told yet */
 };
 
 /* What config points at lives as long as the guard. */

@@ -83,26 +83,29 @@ static int listen_to(int socket_fd, bool *on)
     return -1;
 }
 
-/* Why to switch off for good: waits for it. An interlock that opens switches off too, for now: the
- * event is left to the other process, and until it has been taken the level is looked at every
- * GUARD_LEVEL_MS, since waiting for it would return at once. */
+/* Why to switch off for good: waits for it. An interlock that moves switches off too, for now,
+ * whatever its level is by then. The event is left to the other process; until it has been taken this
+ * goes on every GUARD_LOOK_MS, since waiting for it would return at once. */
 static enum guard_exit wait_for_the_end(const struct hal_guard_config *config, int socket_fd)
 {
-    const struct hal_guard_interlock *interlock = &config->interlock;
+    const char told = GUARD_MOVED;
     int64_t end_ms = 0;
     bool moved = false, on = false;
     for (;;) {
         struct pollfd waiting[] = {
             {.fd = socket_fd, .events = POLLIN},
-            {.fd = moved || interlock->fd == NULL ? -1 : *interlock->fd, .events = POLLIN}};
+            {.fd = moved || config->interlock_fd == NULL ? -1 : *config->interlock_fd,
+             .events = POLLIN}};
         int64_t left_ms = on ? end_ms - now_ms() : config->timeout_ms;
         if (left_ms <= 0) {
             return GUARD_EXIT_LATE;
         }
-        poll(waiting, 2, moved && left_ms > GUARD_LEVEL_MS ? GUARD_LEVEL_MS : (int)left_ms);
+        poll(waiting, 2, moved && left_ms > GUARD_LOOK_MS ? GUARD_LOOK_MS : (int)left_ms);
         moved = waiting[1].revents != 0;
-        if (moved && !interlock->is_closed(interlock->context)) {
+        if (moved) {
             switch_off(config->strobe);
+            /* Full: it has been told often enough. */
+            send(socket_fd, &told, 1, MSG_NOSIGNAL | MSG_DONTWAIT);
         }
         if (waiting[0].revents != 0) {
             int why = listen_to(socket_fd, &on);
@@ -119,7 +122,7 @@ _Noreturn void hal_guard_child(const struct hal_guard_config *config, int socket
     const char ready = GUARD_READY;
     let_faults_through();
     prctl(PR_SET_NAME, "isohead-guard");
-    const int *interlock_fd = config->interlock.fd;
+    const int *interlock_fd = config->interlock_fd;
     const int keep_fds[] = {socket_fd, *config->line_fd, interlock_fd == NULL ? -1 : *interlock_fd};
     if (setsid() < 0 || !close_others(keep_fds, 3) ||
         send(socket_fd, &ready, 1, MSG_NOSIGNAL) != 1) {

@@ -10,6 +10,7 @@
 #define GUARD_OFF 'o'   /* to the guard, after it was switched off: they need not */
 #define GUARD_DONE 'd'  /* to the guard: off, and end */
 #define GUARD_READY 'r' /* from the guard, once */
+#define GUARD_MOVED 'm' /* from the guard: off, since the interlock has moved */
 
 /* The guard's exit status. */
 enum guard_exit {
@@ -21,8 +22,8 @@ enum guard_exit {
 };
 
 #define GUARD_OFF_TRIES 100
-/* Between two looks at an interlock that has moved. */
-#define GUARD_LEVEL_MS 2
+/* Between two looks whether the interlock's event has been taken. */
+#define GUARD_LOOK_MS 2
 
 /* The child's life, right after the fork with all signals blocked. Does not return. */
 _Noreturn void hal_guard_child(const struct hal_guard_config *config, int socket_fd);

@@ -33,7 +33,6 @@ struct shared {
     volatile int open_fails;
     /* The guard is told to end while set(true) is under way, and held between off and its end. */
     volatile int end_while_on;
-    volatile int interlock_open;
     volatile int tell_off; /* each setting to off by the guard is told through is_off */
     sem_t is_off, may_end;
 };
@@ -116,19 +115,13 @@ static bool line_interlock(void *context, bool *closed, struct hal_error *why)
 static const struct hal_strobe line = {NULL,     line_open, line_close,
                                        line_set, line_beat, line_interlock};
 
-static bool is_closed(void *context)
-{
-    TEST_ASSERT_EQUAL_PTR(&interlock_fd, context);
-    return !shared->interlock_open;
-}
-
 static void init(int timeout_ms)
 {
     const struct hal_guard_config config = {
         .strobe = &line,
         .line_fd = &line_fd,
         .timeout_ms = timeout_ms,
-        .interlock = {&interlock_fd, is_closed, &interlock_fd},
+        .interlock_fd = &interlock_fd,
     };
 
     hal_guard_init(&guard, &config);
@@ -384,27 +377,38 @@ static void switched_on_behind_the_guards_back_it_goes_off_again(void)
     sem_post(&shared->may_end);
 }
 
-/* It opens while this process is busy: the guard switches off, and this process still learns of it. */
-static void an_open_interlock_switches_off(void)
+/* It moves while this process is busy, and is closed again already: the guard switches off, and this
+ * process learns of both. */
+static void a_moving_interlock_switches_off(void)
 {
-    struct pollfd waiting = {.events = POLLIN};
+    struct pollfd event_waits = {.events = POLLIN}, told = {.events = POLLIN};
     char event = 'e';
+    bool closed = true;
+    struct timespec end;
     int ends[2];
 
     TEST_ASSERT_EQUAL_INT(0, pipe(ends));
-    interlock_fd = waiting.fd = ends[0];
+    interlock_fd = event_waits.fd = ends[0];
     TEST_ASSERT_TRUE(open_it());
     shared->tell_off = 1;
     TEST_ASSERT_TRUE(set(true));
     TEST_ASSERT_EQUAL_INT(1, shared->level);
-    shared->interlock_open = 1;
     TEST_ASSERT_EQUAL_INT(1, write(ends[1], &event, 1));
-    while (sem_wait(&shared->is_off) != 0) {
-    }
-    TEST_ASSERT_EQUAL_INT(0, shared->level);
-    TEST_ASSERT_EQUAL_INT(1, poll(&waiting, 1, 0));
-    TEST_ASSERT_TRUE(hal_guard_feed(&guard, &error));
+    clock_gettime(CLOCK_REALTIME, &end);
+    end.tv_sec += 20;
+    TEST_ASSERT_EQUAL_INT(0, sem_timedwait(&shared->is_off, &end));
     shared->tell_off = 0;
+    TEST_ASSERT_EQUAL_INT(0, shared->level);
+    TEST_ASSERT_EQUAL_INT(1, poll(&event_waits, 1, 0));
+    told.fd = guard.socket_fd;
+    TEST_ASSERT_EQUAL_INT(1, poll(&told, 1, 20000));
+    TEST_ASSERT_TRUE_MESSAGE(hal_guard_feed(&guard, &error), error.text);
+    TEST_ASSERT_TRUE(guard.strobe.interlock(guard.strobe.context, &closed, &error));
+    TEST_ASSERT_FALSE_MESSAGE(closed, "the program would believe that the laser is on");
+    TEST_ASSERT_EQUAL_INT(1, read(ends[0], &event, 1));
+    while (!closed) {
+        TEST_ASSERT_TRUE(guard.strobe.interlock(guard.strobe.context, &closed, &error));
+    }
     close_it();
     interlock_fd = -1;
     close(ends[0]);
@@ -644,7 +648,7 @@ int main(void)
     RUN_TEST(signals_do_not_end_the_guard);
     RUN_TEST(dying_of_a_fault_the_guard_switches_off);
     RUN_TEST(switched_on_behind_the_guards_back_it_goes_off_again);
-    RUN_TEST(an_open_interlock_switches_off);
+    RUN_TEST(a_moving_interlock_switches_off);
     RUN_TEST(it_is_named_and_holds_two_descriptors);
     RUN_TEST(closed_the_guard_ends_and_gives_the_line_back);
     RUN_TEST(opened_again_the_old_guard_has_ended_first);
