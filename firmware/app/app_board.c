@@ -47,15 +47,16 @@ static enum app_exit fail(struct app_board *board, const char *what, const struc
     return exit;
 }
 
-static void init_gpio(struct app_board *board, const struct app_config *config)
+/* only_laser: another line that is wrong or in use must not keep the laser's from being made low. */
+static void init_gpio(struct app_board *board, const struct app_config *config, bool only_laser)
 {
     const struct hal_gpio_config gpio = {
         .chip = config->gpio_chip,
         .laser_line = config->laser_line,
         .laser_active_low = config->laser_active_low,
-        .interlock_line = config->interlock_line,
+        .interlock_line = only_laser ? NULL : config->interlock_line,
         .interlock_active_low = config->interlock_active_low,
-        .heartbeat_line = config->heartbeat_line,
+        .heartbeat_line = only_laser ? NULL : config->heartbeat_line,
         .consumer = "isohead",
     };
     hal_gpio_init(&board->gpio, &gpio);
@@ -150,7 +151,7 @@ enum app_exit app_board_run(struct app_board *board, const struct app_config *co
     struct hal_error error;
     enum app_exit exit = APP_EXIT_FAILED;
     open_log(board, config);
-    init_gpio(board, config);
+    init_gpio(board, config, false);
     if (!init_camera(board, config, &error)) {
         exit = fail(board, config->rig, &error, APP_EXIT_USAGE);
     } else if (!open_output(board, config, &error)) {
@@ -175,7 +176,7 @@ enum app_exit app_board_laser_off(struct app_board *board, const struct app_conf
     }
     open_log(board, config);
     if (config->gpio_chip != NULL && config->laser_line != NULL) {
-        init_gpio(board, config);
+        init_gpio(board, config, true);
         exit = APP_EXIT_FAILED;
         for (int i = 0; i < APP_BOARD_OFF_TRIES && exit != APP_EXIT_GOOD; i++) {
             if (strobe->open(strobe->context, &error)) {
