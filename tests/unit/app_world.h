@@ -21,6 +21,9 @@
 #define WORLD_LIT_LABELS 200
 #define WORLD_UNPLUGGED_US 300000
 #define WORLD_BUFFERS 16
+#define WORLD_FAULTS 2
+/* However quick, no wait takes no time. */
+#define WORLD_WAIT_US 100
 
 enum world_function {
     WORLD_CAMERA_OPEN,
@@ -67,14 +70,21 @@ enum world_act {
     WORLD_STOP
 };
 
+struct world_fault {
+    enum world_function function;
+    int call;   /* which call of it fails, from 1; 0: none */
+    bool stays; /* those after it, too */
+    bool done;  /* it was reached */
+};
+
 struct world {
     /* Given. */
     const enum world_act *act; /* of each frame's time, from 0; then WORLD_STOP */
     int act_count;
     int flight;
-    enum world_function fault;
-    int fault_call; /* which call of it fails, from 1; 0: none */
-    bool fault_stays;
+    struct world_fault faults[WORLD_FAULTS];
+    uint32_t rig_random; /* the rig "now and then" is bad by chance, until this act */
+    int rig_is_good_from_act;
     const char *next_rig; /* from the next reload on; NULL: the same */
     /* The world. */
     int64_t now_us, next_us;
@@ -92,13 +102,14 @@ struct world {
     unsigned events;
     /* What it saw. */
     int calls[WORLD_FUNCTIONS];
-    bool fault_done;
     bool told_fault;     /* a message says that the line cannot be set */
+    int64_t excess;      /* on beyond the duty, percent x us, in the worst time until now */
     int64_t on_since_us; /* of the line, without a frame */
+    int64_t last_record_us;
     int record_count, lit_count, dark_count, error_count, ambient_count;
     int rise_count, beat_count;
     size_t records_length;
-    char records[16384];
+    char records[65536];
     int waits;
     /* The board program. */
     struct app_config config;
@@ -115,6 +126,7 @@ struct world {
 static struct world world;
 static struct isohead world_head; /* its content does not matter */
 static bool world_quiet = true;
+static const char *world_doing; /* what is told where a run of many fails */
 
 /* Doubles of the rig file and of the core. */
 bool app_rig_load(const char *path, struct ih_calibration *calibration, struct hal_error *error)
@@ -122,7 +134,12 @@ bool app_rig_load(const char *path, struct ih_calibration *calibration, struct h
     *calibration = (struct ih_calibration){.kind = IH_RIG_DOTS, .width = 752, .height = 582};
     calibration->kind = strcmp(path, "range") == 0 ? IH_RIG_RANGE : IH_RIG_DOTS;
     calibration->width = strcmp(path, "narrow") == 0 ? 640 : 752;
-    return strcmp(path, "bad") == 0 ? hal_fail(error, "near_mm: missing") : true;
+    bool is_bad = strcmp(path, "bad") == 0;
+    if (strcmp(path, "now and then") == 0 && world.act_index <= world.rig_is_good_from_act) {
+        world.rig_random = world.rig_random * 1664525u + 1013904223u;
+        is_bad = world.rig_random >> 31 != 0;
+    }
+    return is_bad ? hal_fail(error, "near_mm: missing") : true;
 }
 
 enum ih_err isohead_init(struct isohead *head, const struct ih_calibration *calibration,
@@ -159,6 +176,36 @@ void isohead_find(struct isohead *head, int64_t time_us)
     } else {
         world.dark_count++;
     }
+}
+
+void ih_exposure_params_default(struct ih_exposure_params *params)
+{
+    *params = (struct ih_exposure_params){.exposure_max_us = 20000, .duty_max_q8 = 256};
+}
+
+void ih_exposure_start(const struct ih_exposure_params *params, int32_t exposure_us,
+                       int32_t duty_q8, struct ih_exposure *state)
+{
+    TEST_ASSERT_LESS_OR_EQUAL_INT32(WORLD_FRAME_US, params->exposure_max_us);
+    *state = (struct ih_exposure){.exposure_us = exposure_us, .duty_q8 = duty_q8};
+}
+
+void ih_exposure_look(const struct ih_dots *dots, const struct ih_labels *labels, int32_t width,
+                      int32_t height, struct ih_exposure_look *out)
+{
+    (void)dots;
+    (void)width;
+    (void)height;
+    out->labelled_count = labels->labelled_count;
+}
+
+/* Another one for every second frame. */
+void ih_exposure_next(const struct ih_exposure_params *params, const struct ih_exposure_look *look,
+                      struct ih_exposure *state)
+{
+    TEST_ASSERT_EQUAL_INT32(256, params->duty_min_q8);
+    TEST_ASSERT_EQUAL_INT(world_head.labels.labelled_count, look->labelled_count);
+    state->exposure_us += world.lit_count % 2 * 100;
 }
 
 const char *ih_err_text(enum ih_err err)
@@ -200,11 +247,28 @@ static bool world_call(enum world_function function)
 {
     world_look();
     world.calls[function]++;
-    bool hit = world.fault_call != 0 && function == world.fault &&
-               (world.calls[function] == world.fault_call ||
-                (world.fault_stays && world.calls[function] > world.fault_call));
-    world.fault_done |= hit;
-    return hit;
+    bool fails = false;
+    for (int i = 0; i < WORLD_FAULTS; i++) {
+        struct world_fault *fault = &world.faults[i];
+        int over = world.calls[function] - fault->call;
+        bool hit = fault->call != 0 && function == fault->function &&
+                   (over == 0 || (over > 0 && fault->stays));
+        fault->done |= hit;
+        fails |= hit;
+    }
+    return fails;
+}
+
+/* Time passes; over any time the laser is on for no more than its duty of that and of one burst. */
+static void world_pass(int64_t passed_us)
+{
+    int32_t duty = world.config.duty_percent;
+    world.now_us += passed_us;
+    world.excess += passed_us * ((world.line ? 100 : 0) - duty);
+    world.excess = world.excess > 0 ? world.excess : 0;
+    TEST_ASSERT_LESS_OR_EQUAL_INT64_MESSAGE((int64_t)duty * APP_LASER_BURST_US +
+                                                100 * 2 * WORLD_WAIT_US,
+                                            world.excess, "on for more than the duty");
 }
 
 static bool world_camera_open(void *context, struct hal_error *error)
@@ -448,14 +512,14 @@ static bool world_wait(void *context, int64_t timeout_us, unsigned *events, stru
     }
     int64_t until_us = world.now_us + timeout_us;
     if (world.events == 0 && world.next_us <= until_us) {
-        world.now_us = world.next_us > world.now_us ? world.next_us : world.now_us;
+        world_pass(world.next_us > world.now_us ? world.next_us - world.now_us : 0);
         world_look_waiting();
         world_step();
     } else if (world.events == 0) {
-        world.now_us = until_us;
+        world_pass(timeout_us);
         world_look_waiting();
     }
-    world.now_us += 100; /* however quick, no call takes no time */
+    world_pass(WORLD_WAIT_US);
     *events = world.events;
     /* a signal that was seen is gone; frames stay until they are taken */
     world.events &= world.queue_count > world.flight ? (unsigned)HAL_EVENT_FRAME : 0;
@@ -490,6 +554,7 @@ static enum hal_sent world_send(void *context, const char *bytes, size_t count,
         return HAL_SENT_NEVER;
     }
     world.record_count++;
+    world.last_record_us = world.now_us;
     size_t length = world.records_length;
     TEST_ASSERT_LESS_THAN_UINT(sizeof world.records, length + count + 1);
     memcpy(world.records + length, bytes, count);

@@ -12,6 +12,10 @@ void setUp(void)
 
 void tearDown(void)
 {
+    if (world_doing != NULL) { /* what failed says so, but not in which run */
+        printf("in %s\n", world_doing);
+        world_doing = NULL;
+    }
 }
 
 /* How often a text stands in the records. */
@@ -250,9 +254,7 @@ static void test_bad_frames_only(void)
         for (int flight = 0; flight <= 2; flight += 2) {
             world_init((enum app_strobe)mode, acts, COUNT(acts));
             world.flight = flight;
-            world.fault = WORLD_CAMERA_NEXT_BAD;
-            world.fault_call = 4;
-            world.fault_stays = true;
+            world.faults[0] = (struct world_fault){WORLD_CAMERA_NEXT_BAD, 4, .stays = true};
             TEST_ASSERT_EQUAL_INT(APP_EXIT_GOOD, world_run());
             TEST_ASSERT_GREATER_THAN_INT(15, world.error_count);
             TEST_ASSERT_EQUAL_INT(1, world.calls[WORLD_CAMERA_OPEN]);
@@ -291,21 +293,21 @@ static int fail_each_call(enum world_function function, int mode, int flight, bo
     world_run();
     int calls = world.calls[function];
     for (int call = 1; call <= calls; call++) {
-        char message[128];
+        static char message[128]; /* told after a failure */
         init_eventful(mode, flight);
-        world.fault = function;
-        world.fault_call = call;
-        world.fault_stays = stays;
+        world.faults[0] = (struct world_fault){function, call, .stays = stays};
         snprintf(message, sizeof message, "%s, call %d, mode %d, flight %d, %s",
                  world_function_text[function], call, mode, flight, stays ? "for good" : "once");
+        world_doing = message;
         enum app_exit exit = world_run();
-        TEST_ASSERT_TRUE_MESSAGE(world.fault_done, message);
+        TEST_ASSERT_TRUE_MESSAGE(world.faults[0].done, message);
         /* Who looks at a laser that could not be switched off has to be told. */
         if (function == WORLD_STROBE_OFF && stays) {
             TEST_ASSERT_EQUAL_INT_MESSAGE(APP_EXIT_FAILED, exit, message);
             TEST_ASSERT_TRUE_MESSAGE(world.told_fault, message);
         }
     }
+    world_doing = NULL;
     return calls;
 }
 
@@ -329,6 +331,92 @@ static void test_every_call_fails(void)
     printf("  %-24s %5d\n", "all", all);
 }
 
+/* 0 .. below - 1, the same in every run of the test. */
+static int random_below(uint32_t *state, int below)
+{
+    *state = *state * 1664525u + 1013904223u;
+    return (int)((uint64_t)*state * (uint32_t)below >> 32);
+}
+
+/* Two faults in one run, at any of their calls. The second may come while the first is dealt with. */
+static void test_two_calls_fail(void)
+{
+    enum { RUNS = 25000 };
+    int calls[3][2][WORLD_FUNCTIONS];
+    int both_count = 0;
+    uint32_t random = 20;
+    for (int mode = 0; mode < 3; mode++) {
+        for (int flight = 0; flight < 2; flight++) {
+            init_eventful(mode, 2 * flight);
+            world_run();
+            memcpy(calls[mode][flight], world.calls, sizeof world.calls);
+        }
+    }
+    for (int run = 0; run < RUNS; run++) {
+        int mode = random_below(&random, 3), flight = random_below(&random, 2);
+        static char message[160]; /* told after a failure */
+        init_eventful(mode, 2 * flight);
+        for (int i = 0; i < WORLD_FAULTS; i++) {
+            int function = random_below(&random, WORLD_FUNCTIONS);
+            world.faults[i] = (struct world_fault){
+                (enum world_function)function,
+                1 + random_below(&random, calls[mode][flight][function]),
+                .stays = random_below(&random, 4) == 0,
+            };
+        }
+        const struct world_fault *faults = world.faults;
+        snprintf(message, sizeof message, "run %d: %s, call %d; %s, call %d", run,
+                 world_function_text[faults[0].function], faults[0].call,
+                 world_function_text[faults[1].function], faults[1].call);
+        world_doing = message;
+        world_run();
+        both_count += faults[0].done && faults[1].done;
+    }
+    world_doing = NULL;
+    printf("two faults in each of %d runs, %d times both were reached; line low after every one\n",
+           RUNS, both_count);
+    TEST_ASSERT_GREATER_THAN_INT(RUNS / 4, both_count);
+}
+
+/* Anything in any order. Then all is well again for long enough: there are records. */
+static void test_anything_happens(void)
+{
+    enum { RUNS = 3000, ACTS = 80, CALM = 200 };
+    static const int32_t duties[] = {1, 10, 30, 50, 90, 100};
+    static enum world_act acts[ACTS + CALM];
+    uint32_t random = 4;
+    for (int run = 0; run < RUNS; run++) {
+        static char message[80]; /* told after a failure */
+        int wild = 1 + random_below(&random, 8);
+        for (int i = 0; i < ACTS; i++) {
+            acts[i] = random_below(&random, 8) >= wild
+                          ? WORLD_FRAME
+                          : (enum world_act)random_below(&random, WORLD_STOP);
+        }
+        for (int i = ACTS; i < ACTS + CALM; i++) {
+            acts[i] = i == ACTS       ? WORLD_INTERLOCK_CLOSES
+                      : i == ACTS + 1 ? WORLD_RELOAD
+                                      : WORLD_FRAME;
+        }
+        int mode = random_below(&random, 3);
+        world_init((enum app_strobe)mode, acts, ACTS + CALM);
+        world.flight = random_below(&random, 5);
+        world.config.duty_percent = duties[random_below(&random, COUNT(duties))];
+        world.config.exposure = random_below(&random, 2) ? APP_EXPOSURE_STEER : APP_EXPOSURE_KEEP;
+        world.next_rig = "now and then";
+        world.rig_random = random;
+        world.rig_is_good_from_act = ACTS;
+        snprintf(message, sizeof message, "run %d: mode %d, flight %d, duty %d", run, mode,
+                 world.flight, (int)world.config.duty_percent);
+        world_doing = message;
+        TEST_ASSERT_EQUAL_INT_MESSAGE(APP_EXIT_GOOD, world_run(), message);
+        TEST_ASSERT_TRUE_MESSAGE(world.last_record_us > world.now_us - 20 * WORLD_FRAME_US ||
+                                     world.config.duty_percent < 50,
+                                 message);
+    }
+    world_doing = NULL;
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -350,5 +438,7 @@ int main(void)
     RUN_TEST(test_on_for_long);
     RUN_TEST(test_bad_frames_only);
     RUN_TEST(test_every_call_fails);
+    RUN_TEST(test_two_calls_fail);
+    RUN_TEST(test_anything_happens);
     return UNITY_END();
 }
