@@ -113,6 +113,19 @@ static void apply(struct app_laser *laser)
     }
 }
 
+/* How long until the duty changes something. */
+static int64_t duty_wait_us(const struct app_laser *laser)
+{
+    int32_t duty = laser->config.duty_percent;
+    if (laser->is_on && duty < PERCENT) {
+        return laser->credit / (PERCENT - duty) + 1;
+    }
+    if ((laser->blocks & APP_LASER_BLOCK_DUTY) != 0) {
+        return (credit_max(laser) - laser->credit) / duty + 1;
+    }
+    return APP_LASER_NEVER_US;
+}
+
 void app_laser_init(struct app_laser *laser, const struct app_laser_config *config,
                     const struct hal_strobe *strobe, int64_t now_us)
 {
@@ -186,25 +199,31 @@ void app_laser_frame(struct app_laser *laser, int64_t now_us)
     block(laser, APP_LASER_BLOCK_SILENCE, false);
 }
 
+void app_laser_busy(struct app_laser *laser, bool busy, int64_t now_us)
+{
+    account(laser, now_us);
+    if (busy) {
+        laser->busy_us = now_us;
+        if (laser->config.duty_percent < PERCENT && laser->is_on &&
+            duty_wait_us(laser) <= 2 * laser->busy_max_us) {
+            block(laser, APP_LASER_BLOCK_DUTY, true);
+        }
+        apply(laser);
+        return;
+    }
+    laser->silent_us = 0;
+    block(laser, APP_LASER_BLOCK_SILENCE, false);
+    if (now_us - laser->busy_us > laser->busy_max_us) {
+        laser->busy_max_us = now_us - laser->busy_us;
+    }
+}
+
 void app_laser_interlock(struct app_laser *laser, int64_t now_us)
 {
     account(laser, now_us);
     if (laser->is_open && read_interlock(laser)) {
         apply(laser);
     }
-}
-
-/* How long until the duty changes something. */
-static int64_t duty_wait_us(const struct app_laser *laser)
-{
-    int32_t duty = laser->config.duty_percent;
-    if (laser->is_on && duty < PERCENT) {
-        return laser->credit / (PERCENT - duty) + 1;
-    }
-    if ((laser->blocks & APP_LASER_BLOCK_DUTY) != 0) {
-        return (credit_max(laser) - laser->credit) / duty + 1;
-    }
-    return APP_LASER_NEVER_US;
 }
 
 static int64_t interlock_wait_us(const struct app_laser *laser)

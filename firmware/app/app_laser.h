@@ -16,7 +16,7 @@
  *          is (again, then by giving the lines back) and stays off: the caller ends.
  * Time:  app_laser_tick looks at the clock. The loop calls it before it waits and does not wait for
  *        longer than what it returns, so that a limit in time is kept to the timer's precision while
- *        the loop waits. While a frame is processed the guard looks at the interlock and for life
+ *        the loop waits. While a frame is processed (app_laser_busy) the guard looks at the interlock and for life
  *        (hal/linux/hal_guard.h, docs/safety.md).
  * Errors: app_laser.failed, with the text; told once through the caller.
  */
@@ -66,6 +66,8 @@ struct app_laser {
     int64_t silent_max_us;   /* and its limit */
     int64_t tick_us;         /* when time was last accounted for */
     int64_t credit;          /* left of the duty, percent x us */
+    int64_t busy_us;         /* since when the loop is busy, */
+    int64_t busy_max_us;     /* and for how long at most it has been */
     int64_t open_us;         /* when the interlock was last seen open */
     int64_t beat_us;         /* last edge for the one-shot */
     int64_t on_us;           /* sum of all times with the laser on */
@@ -92,8 +94,12 @@ void app_laser_rig(struct app_laser *laser, bool is_valid, int64_t now_us);
 /* The camera streams, a frame every frame_time_us, or it does not: then the time does not matter. */
 void app_laser_camera(struct app_laser *laser, bool streams, int64_t frame_time_us, int64_t now_us);
 
-/* A frame came that can be looked at, or the loop was busy with one until now. */
+/* A frame came that can be looked at. */
 void app_laser_frame(struct app_laser *laser, int64_t now_us);
+
+/* The loop is busy with a frame from now on, or has been until now: no time to tick, and no silence.
+ * Where the duty might not last for twice as long as the longest such time it goes off before. */
+void app_laser_busy(struct app_laser *laser, bool busy, int64_t now_us);
 
 /* The interlock has moved, or might have. */
 void app_laser_interlock(struct app_laser *laser, int64_t now_us);

@@ -185,8 +185,9 @@ static void take_frames(struct app_loop *loop)
         }
         lose_camera(loop, next == HAL_NEXT_GONE ? error.text : "no more frames");
     } else if (has_newest) {
+        app_laser_busy(&loop->laser, true, now(loop));
         app_frame_use(loop, &newest);
-        app_laser_frame(&loop->laser, now(loop)); /* the time it took was no silence */
+        app_laser_busy(&loop->laser, false, now(loop));
         loop->frame_us = now(loop);
     }
 }

@@ -82,6 +82,7 @@ struct world {
     const enum world_act *act; /* of each frame's time, from 0; then WORLD_STOP */
     int act_count;
     int flight;
+    int64_t busy_us; /* so long a lit frame is looked at */
     struct world_fault faults[WORLD_FAULTS];
     uint32_t rig_random; /* the rig "now and then" is bad by chance, until this act */
     int rig_is_good_from_act;
@@ -142,6 +143,18 @@ bool app_rig_load(const char *path, struct ih_calibration *calibration, struct h
     return is_bad ? hal_fail(error, "near_mm: missing") : true;
 }
 
+/* Time passes; over any time the laser is on for no more than its duty of that and of one burst. */
+static void world_pass(int64_t passed_us)
+{
+    int32_t duty = world.config.duty_percent;
+    world.now_us += passed_us;
+    world.excess += passed_us * ((world.line ? 100 : 0) - duty);
+    world.excess = world.excess > 0 ? world.excess : 0;
+    TEST_ASSERT_LESS_OR_EQUAL_INT64_MESSAGE((int64_t)duty * APP_LASER_BURST_US +
+                                                100 * 2 * WORLD_WAIT_US,
+                                            world.excess, "on for more than the duty");
+}
+
 enum ih_err isohead_init(struct isohead *head, const struct ih_calibration *calibration,
                          int32_t *bad_slot)
 {
@@ -168,6 +181,13 @@ enum ih_err isohead_label(struct isohead *head, const struct ih_frame *frame,
 void isohead_find(struct isohead *head, int64_t time_us)
 {
     (void)time_us;
+    if (world.lit_count + world.dark_count == 0) {
+        world.now_us += world.busy_us; /* nobody knows yet how long it takes */
+        world.excess = 0;
+    } else {
+        world_pass(world.busy_us);
+    }
+    world.on_since_us = world.now_us;
     head->result.entry_count = 0;
     head->result.head_count = 0;
     head->result.selected = IH_NONE;
@@ -257,18 +277,6 @@ static bool world_call(enum world_function function)
         fails |= hit;
     }
     return fails;
-}
-
-/* Time passes; over any time the laser is on for no more than its duty of that and of one burst. */
-static void world_pass(int64_t passed_us)
-{
-    int32_t duty = world.config.duty_percent;
-    world.now_us += passed_us;
-    world.excess += passed_us * ((world.line ? 100 : 0) - duty);
-    world.excess = world.excess > 0 ? world.excess : 0;
-    TEST_ASSERT_LESS_OR_EQUAL_INT64_MESSAGE((int64_t)duty * APP_LASER_BURST_US +
-                                                100 * 2 * WORLD_WAIT_US,
-                                            world.excess, "on for more than the duty");
 }
 
 static bool world_camera_open(void *context, struct hal_error *error)

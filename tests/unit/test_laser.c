@@ -262,6 +262,57 @@ static void test_duty_used_without_a_tick(void)
     TEST_ASSERT_TRUE(fake.line);
 }
 
+/* Nobody looks at the clock while a frame is processed. From the second one on it is known how long
+ * that takes, and the duty is kept there, too. */
+static void test_duty_while_busy(void)
+{
+    static const int32_t duties[] = {1, 10, 50, 90, 99};
+    enum { BUSY_US = 30000 };
+    for (int d = 0; d < 5; d++) {
+        int64_t now_us = 0, excess = 0;
+        const int64_t most = (int64_t)duties[d] * APP_LASER_BURST_US;
+        start(true, duties[d]);
+        app_laser_wish(&laser, true, now_us);
+        for (int frame = 0; frame < 300; frame++) {
+            for (int64_t passed_us = 0; passed_us < FRAME_US - BUSY_US;) {
+                int64_t wait_us = app_laser_tick(&laser, now_us);
+                int64_t left_us = FRAME_US - BUSY_US - passed_us;
+                wait_us = wait_us < left_us ? wait_us : left_us;
+                excess += wait_us * ((fake.line ? 100 : 0) - duties[d]);
+                excess = excess < 0 || frame == 0 ? 0 : excess;
+                TEST_ASSERT_LESS_OR_EQUAL_INT64(most + 100, excess);
+                now_us += wait_us;
+                passed_us += wait_us;
+            }
+            app_laser_frame(&laser, now_us);
+            app_laser_busy(&laser, true, now_us);
+            excess += BUSY_US * ((fake.line ? 100 : 0) - duties[d]);
+            excess = excess < 0 || frame == 0 ? 0 : excess;
+            TEST_ASSERT_LESS_OR_EQUAL_INT64(most + 100, excess);
+            now_us += BUSY_US;
+            app_laser_busy(&laser, false, now_us);
+            app_laser_wish(&laser, true, now_us);
+        }
+        TEST_ASSERT_GREATER_THAN_INT64_MESSAGE(0, laser.on_us, "never on");
+    }
+}
+
+/* The time that a frame takes is no silence, however long. */
+static void test_busy_is_no_silence(void)
+{
+    start(true, 100);
+    app_laser_wish(&laser, true, 0);
+    app_laser_busy(&laser, true, 1000);
+    TEST_ASSERT_TRUE(fake.line);
+    app_laser_busy(&laser, false, 10 * FRAME_US);
+    app_laser_tick(&laser, 10 * FRAME_US);
+    app_laser_busy(&laser, true, 10 * FRAME_US);
+    TEST_ASSERT_TRUE_MESSAGE(fake.line, "off though there is no limit");
+    app_laser_busy(&laser, false, 10 * FRAME_US);
+    app_laser_tick(&laser, 13 * FRAME_US);
+    TEST_ASSERT_FALSE(fake.line);
+}
+
 static void test_beats_while_on(void)
 {
     start(true, 100);
@@ -321,6 +372,8 @@ int main(void)
     RUN_TEST(test_duty);
     RUN_TEST(test_tick_switches_on);
     RUN_TEST(test_duty_used_without_a_tick);
+    RUN_TEST(test_duty_while_busy);
+    RUN_TEST(test_busy_is_no_silence);
     RUN_TEST(test_beats_while_on);
     RUN_TEST(test_off_fails);
     RUN_TEST(test_on_fails);

@@ -402,6 +402,7 @@ static void test_anything_happens(void)
         world_init((enum app_strobe)mode, acts, ACTS + CALM);
         world.flight = random_below(&random, 5);
         world.config.duty_percent = duties[random_below(&random, COUNT(duties))];
+        world.busy_us = random_below(&random, 3) * 10000;
         world.config.exposure = random_below(&random, 2) ? APP_EXPOSURE_STEER : APP_EXPOSURE_KEEP;
         world.next_rig = "now and then";
         world.rig_random = random;
