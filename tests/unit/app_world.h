@@ -82,6 +82,7 @@ struct world {
     const enum world_act *act; /* of each frame's time, from 0; then WORLD_STOP */
     int act_count;
     int flight;
+    bool is_empty;   /* nothing is within the laser's range */
     int64_t busy_us; /* so long a lit frame is looked at */
     struct world_fault faults[WORLD_FAULTS];
     uint32_t rig_random; /* the rig "now and then" is bad by chance, until this act */
@@ -136,6 +137,7 @@ bool app_rig_load(const char *path, struct ih_calibration *calibration, struct h
     calibration->kind = strcmp(path, "range") == 0 ? IH_RIG_RANGE : IH_RIG_DOTS;
     calibration->width = strcmp(path, "narrow") == 0 ? 640 : 752;
     bool is_bad = strcmp(path, "bad") == 0;
+    TEST_ASSERT_FALSE_MESSAGE(world.line, "on while the rig is read");
     if (strcmp(path, "now and then") == 0 && world.act_index <= world.rig_is_good_from_act) {
         world.rig_random = world.rig_random * 1664525u + 1013904223u;
         is_bad = world.rig_random >> 31 != 0;
@@ -432,7 +434,8 @@ static void world_push(bool is_half)
         buffer += used;
     }
     TEST_ASSERT_LESS_THAN_INT(WORLD_BUFFERS, buffer);
-    world.labels[buffer] = (uint8_t)(world.line ? WORLD_LIT_LABELS / (is_half ? 5 : 1) : 0);
+    world.labels[buffer] =
+        (uint8_t)(world.line && !world.is_empty ? WORLD_LIT_LABELS / (is_half ? 5 : 1) : 0);
     snprintf(world.names[buffer], sizeof world.names[buffer], "%06lld.pgm",
              (long long)world.sequence);
     *frame = (struct hal_frame){
