@@ -262,6 +262,38 @@ static void test_duty_used_without_a_tick(void)
     TEST_ASSERT_TRUE(fake.line);
 }
 
+/* Whatever switches it off: the time until then counts as on, the time after it as off. */
+static void test_time_is_accounted_for(void)
+{
+    for (int how = 0; how < 5; how++) {
+        setUp();
+        start(true, 50);
+        app_laser_wish(&laser, true, 0);
+        switch (how) {
+        case 0:
+            app_laser_wish(&laser, false, 50000);
+            break;
+        case 1:
+            app_laser_rig(&laser, false, 50000);
+            break;
+        case 2:
+            app_laser_camera(&laser, false, 0, 50000);
+            break;
+        case 3:
+            fake.closed = false;
+            app_laser_interlock(&laser, 50000);
+            break;
+        default:
+            app_laser_close(&laser, 50000);
+            break;
+        }
+        TEST_ASSERT_FALSE(fake.line);
+        app_laser_tick(&laser, 70000);
+        TEST_ASSERT_EQUAL_INT64(50000, laser.on_us);
+        TEST_ASSERT_EQUAL_INT64(50 * (APP_LASER_BURST_US - 50000 + 20000), laser.credit);
+    }
+}
+
 /* Nobody looks at the clock while a frame is processed. From the second one on it is known how long
  * that takes, and the duty is kept there, too. */
 static void test_duty_while_busy(void)
@@ -372,6 +404,7 @@ int main(void)
     RUN_TEST(test_duty);
     RUN_TEST(test_tick_switches_on);
     RUN_TEST(test_duty_used_without_a_tick);
+    RUN_TEST(test_time_is_accounted_for);
     RUN_TEST(test_duty_while_busy);
     RUN_TEST(test_busy_is_no_silence);
     RUN_TEST(test_beats_while_on);
