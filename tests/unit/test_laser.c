@@ -262,6 +262,24 @@ static void test_duty_used_without_a_tick(void)
     TEST_ASSERT_TRUE(fake.line);
 }
 
+/* One wait, neither shorter nor longer, and what was used up is there again. */
+static void test_duty_is_made_up_for_in_time(void)
+{
+    start(true, 20);
+    app_laser_wish(&laser, true, 0);
+    int64_t now_us = 0, wait_us = 0;
+    while (fake.line) {
+        now_us += wait_us;
+        wait_us = app_laser_tick(&laser, now_us);
+    }
+    TEST_ASSERT_INT64_WITHIN(1, APP_LASER_BURST_US * 20 / 80, now_us);
+    TEST_ASSERT_INT64_WITHIN(5, APP_LASER_BURST_US, wait_us);
+    app_laser_tick(&laser, now_us + wait_us - 10);
+    TEST_ASSERT_FALSE(fake.line);
+    app_laser_tick(&laser, now_us + wait_us);
+    TEST_ASSERT_TRUE(fake.line);
+}
+
 /* Whatever switches it off: the time until then counts as on, the time after it as off. */
 static void test_time_is_accounted_for(void)
 {
@@ -404,6 +422,7 @@ int main(void)
     RUN_TEST(test_duty);
     RUN_TEST(test_tick_switches_on);
     RUN_TEST(test_duty_used_without_a_tick);
+    RUN_TEST(test_duty_is_made_up_for_in_time);
     RUN_TEST(test_time_is_accounted_for);
     RUN_TEST(test_duty_while_busy);
     RUN_TEST(test_busy_is_no_silence);
