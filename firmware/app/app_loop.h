@@ -78,12 +78,11 @@ struct app_loop {
     /* Its own. */
     struct app_laser laser;
     unsigned told_blocks; /* of the laser, in the log */
-    bool told_fault;      /* the laser's, in the log */
     struct app_phase phase;
     struct app_status status;
+    bool is_streaming; /* the camera is open */
     bool light_wanted; /* the next frame shall be lit */
     int32_t on_frames; /* frames since then with the laser on, up to APP_PHASE_FLIGHT_MAX + 1 */
-    bool is_streaming; /* the camera is open */
     int64_t frame_time_us;
     int64_t frame_us; /* when the last frame came */
     int64_t retry_us; /* when the camera is to be opened */
@@ -98,6 +97,7 @@ struct app_loop {
     bool rig_is_valid;
     int32_t width, height; /* of the first rig */
     bool is_over;
+    bool told_fault; /* the laser's, in the log */
     enum app_exit exit;
     struct app_record record;
 };
