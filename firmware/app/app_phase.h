@@ -33,8 +33,8 @@
 enum app_phase_verdict { APP_PHASE_LIT, APP_PHASE_DARK, APP_PHASE_PARTIAL };
 
 struct app_phase {
-    int32_t typical_count;      /* labels of the last lit frame; 0: none yet */
-    bool was_dark, was_partial; /* the frame before */
+    int32_t typical_count; /* labels of the last lit frame; 0: none yet */
+    bool was_partial;      /* the frame before */
 };
 
 void app_phase_init(struct app_phase *phase);
