@@ -2,6 +2,7 @@
 
 #include <inttypes.h>
 #include <stdarg.h>
+#include <stdbool.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -112,16 +113,4 @@ void app_log_end(struct app_log *log)
             close_kind(log, &log->kind[i]);
         }
     }
-}
-
-static void table_error(void *context, const char *subject, const char *text)
-{
-    char line[APP_LOG_TEXT_MAX];
-    snprintf(line, sizeof line, "%s: %s", subject, text);
-    app_log_tell(context, APP_LOG_ERROR, line);
-}
-
-struct hal_log app_log_table(struct app_log *log)
-{
-    return (struct hal_log){.context = log, .error = table_error};
 }

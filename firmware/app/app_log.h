@@ -11,7 +11,7 @@
 #ifndef APP_LOG_H
 #define APP_LOG_H
 
-#include "hal.h"
+#include <stdint.h>
 
 #define APP_LOG_BURST 5
 #define APP_LOG_INTERVAL_US 60000000
@@ -59,8 +59,5 @@ void app_log_tell(struct app_log *log, enum app_log_level level, const char *tex
 
 /* All that is still held back; before the end. */
 void app_log_end(struct app_log *log);
-
-/* For those who know hal_log only: errors "SUBJECT: TEXT", without limit. */
-struct hal_log app_log_table(struct app_log *log);
 
 #endif
