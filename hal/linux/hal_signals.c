@@ -62,7 +62,7 @@ static bool catch_deadly(struct hal_error *error)
     struct sigaction action = {.sa_sigaction = die_switched_off,
                                .sa_flags = SA_SIGINFO | SA_ONSTACK};
     if (sigaltstack(&stack, NULL) != 0) {
-        return hal_fail(error, "signals: no stack for the handler: %s", strerror(errno));
+        return hal_fail(error, "no stack for the handler: %s", strerror(errno));
     }
     /* Nothing else may interrupt the handler. */
     sigfillset(&action.sa_mask);
@@ -70,7 +70,7 @@ static bool catch_deadly(struct hal_error *error)
         /* Between the last usual one and SIGRTMIN are some that the C library keeps for itself. */
         bool reserved = number >= 32 && number < SIGRTMIN;
         if (!reserved && !needs_no_handler(number) && sigaction(number, &action, NULL) != 0) {
-            return hal_fail(error, "signals: cannot catch signal %d: %s", number, strerror(errno));
+            return hal_fail(error, "cannot catch signal %d: %s", number, strerror(errno));
         }
     }
     return true;
@@ -102,11 +102,11 @@ bool hal_signals_open(struct hal_signals *signals, const struct hal_strobe *stro
         return false;
     }
     if (sigprocmask(SIG_SETMASK, &read_ones, NULL) != 0) {
-        return hal_fail(error, "signals: cannot block: %s", strerror(errno));
+        return hal_fail(error, "cannot block: %s", strerror(errno));
     }
     signals->fd = signalfd(-1, &read_ones, SFD_CLOEXEC | SFD_NONBLOCK);
     if (signals->fd < 0) {
-        return hal_fail(error, "signals: no descriptor to read them from: %s", strerror(errno));
+        return hal_fail(error, "no descriptor to read them from: %s", strerror(errno));
     }
     return true;
 }

@@ -84,7 +84,7 @@ static bool open_device(struct hal_watchdog_feeder *feeder, struct hal_error *er
     }
     feeder->device_fd = open(path, O_WRONLY | O_CLOEXEC | O_NONBLOCK);
     if (feeder->device_fd < 0) {
-        return hal_fail(error, "watchdog: '%.120s': %s; expected a device like /dev/watchdog", path,
+        return hal_fail(error, "'%.120s': %s; expected a device like /dev/watchdog", path,
                         strerror(errno));
     }
     return true;
@@ -123,7 +123,7 @@ static bool feed_device(struct hal_watchdog_feeder *feeder, int64_t now_us, stru
         return true;
     }
     if (write(feeder->device_fd, "", 1) != 1) {
-        return hal_fail(error, "watchdog: '%.120s' cannot be written: %s", feeder->config.path,
+        return hal_fail(error, "'%.120s' cannot be written: %s", feeder->config.path,
                         strerror(errno));
     }
     told(&feeder->device, now_us);
