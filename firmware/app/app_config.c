@@ -84,13 +84,18 @@ static bool concerns_line(int index)
            offset == offsetof(struct app_config, path);
 }
 
+/* A setting is called as it is written there. */
+static const char *dashes_at(const char *where)
+{
+    return strcmp(where, COMMAND_LINE) == 0 ? "--" : "";
+}
+
 static void take(struct reader *reader, const char *where, int index, const char *value)
 {
     struct hal_error error;
     if (!app_settings_take(index, reader->config, value, &error)) {
         reader->line_unsure = reader->line_unsure || concerns_line(index);
-        const char *dashes = strcmp(where, COMMAND_LINE) == 0 ? "--" : "";
-        tell(reader, where, "%s%s: %s", dashes, app_settings[index].name, error.text);
+        tell(reader, where, "%s%s: %s", dashes_at(where), app_settings[index].name, error.text);
     }
 }
 
@@ -287,7 +292,7 @@ static void demand(struct reader *reader, bool good, const char *name, const cha
 {
     if (!good) {
         struct place place = place_of_setting(reader, name);
-        tell(reader, place.text, "%s: %s", name, text);
+        tell(reader, place.text, "%s%s: %s", dashes_at(place.text), name, text);
     }
 }
 
@@ -319,7 +324,8 @@ static void check_lines(struct reader *reader)
 static void check(struct reader *reader)
 {
     const struct app_config *config = reader->config;
-    demand(reader, config->rig != NULL, "rig", "missing, expected a file");
+    demand(reader, config->rig != NULL, "rig",
+           "missing, expected the file with the calibration; --help lists all settings");
     demand(reader, !config->laser || config->laser_line != NULL, "laser",
            "on, but no laser-line, expected the line that switches it");
     demand(reader, config->laser || config->strobe != APP_STROBE_ALTERNATING, "strobe",

@@ -483,7 +483,8 @@ static void files_that_are_none_are_told(void)
     write_file(big, sizeof big - 1);
     TEST_ASSERT_TRUE(READ("--config", PATH));
     TEST_ASSERT_FALSE(read_text(""));
-    assert_one_error(PATH ": rig: missing, expected a file");
+    assert_one_error(
+        PATH ": rig: missing, expected the file with the calibration; --help lists all settings");
 }
 
 static void what_does_not_go_together_is_told(void)
@@ -518,10 +519,12 @@ static void what_does_not_go_together_is_told(void)
     }
     write_file("rig = r\n", 8);
     TEST_ASSERT_FALSE(READ("--config", PATH, "--laser"));
-    assert_one_error("command line: laser: on, but no laser-line, expected the line that switches "
-                     "it");
+    assert_one_error(
+        "command line: --laser: on, but no laser-line, expected the line that switches "
+        "it");
     TEST_ASSERT_FALSE(READ("--device=x"));
-    assert_one_error("command line: rig: missing, expected a file");
+    assert_one_error("command line: --rig: missing, expected the file with the calibration; --help "
+                     "lists all settings");
 }
 
 #define LINE "gpio-chip = c\nlaser-line = 3\nlaser-active-low = on\n"
