@@ -9,17 +9,15 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
-#include <time.h>
+
+#include "linux/hal_clock.h"
 
 #define US_PER_S 1000000
-#define NS_PER_US 1000
 #define HOLD_COUNT (HAL_CAMERA_HOLD_MAX + 1)
 
 static int64_t now_us(void)
 {
-    struct timespec now = {0};
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return (int64_t)now.tv_sec * US_PER_S + now.tv_nsec / NS_PER_US;
+    return hal_clock.now_us(hal_clock.context);
 }
 
 static bool check_capabilities(int fd, struct hal_error *error)
