@@ -157,6 +157,19 @@ static void close_camera(void *context)
     memset(v4l2->hold, 0, sizeof v4l2->hold);
 }
 
+/* What else to look at, for those who set up a board. */
+static const char *hint_on(int reason)
+{
+    switch (reason) {
+    case EACCES:
+        return "; is this user in the device's group, mostly video?";
+    case EBUSY:
+        return "; another program has it";
+    default:
+        return "; expected a camera: v4l2-ctl --list-devices shows what there is";
+    }
+}
+
 static bool open_camera(void *context, struct hal_error *error)
 {
     struct hal_v4l2 *v4l2 = context;
@@ -166,7 +179,7 @@ static bool open_camera(void *context, struct hal_error *error)
         v4l2->fd = v4l2_open(config->device, O_RDWR | O_NONBLOCK | O_CLOEXEC);
     } while (v4l2->fd < 0 && errno == EINTR);
     if (v4l2->fd < 0) {
-        return hal_fail(error, "opening: %s", strerror(errno));
+        return hal_fail(error, "opening: %s%s", strerror(errno), hint_on(errno));
     }
     if (check_capabilities(v4l2->fd, error) &&
         hal_v4l2_format_set(v4l2->fd, config->format, config->width, config->height, &v4l2->format,

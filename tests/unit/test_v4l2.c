@@ -181,7 +181,14 @@ static void a_device_that_cannot_be_opened(void)
 {
     fake.fail_call = 1;
     fake.fail_reason = ENOENT;
-    check_refused("opening: No such file or directory");
+    check_refused("opening: No such file or directory; expected a camera: v4l2-ctl --list-devices "
+                  "shows what there is");
+    fake.call_count = 0;
+    fake.fail_reason = EACCES;
+    check_refused("opening: Permission denied; is this user in the device's group, mostly video?");
+    fake.call_count = 0;
+    fake.fail_reason = EBUSY;
+    check_refused("opening: Device or resource busy; another program has it");
 }
 
 static void a_device_that_is_no_camera(void)
