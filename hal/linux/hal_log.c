@@ -9,6 +9,7 @@
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/un.h>
+#include <syslog.h>
 #include <time.h>
 #include <unistd.h>
 
@@ -16,8 +17,6 @@
 
 /* Longest line with all that stands before its text. */
 #define LINE_MAX_BYTES 1024
-/* Syslog's number of the facility "daemon". */
-#define FACILITY_DAEMON (3 << 3)
 
 /* systemd says which device and inode the journal's end has. */
 static bool leads_to_journal(int descriptor)
@@ -88,7 +87,7 @@ static bool write_syslog(struct hal_log_writer *writer, int level, const char *t
     if (localtime_r(&now, &local) != NULL) {
         (void)strftime(date, sizeof date, "%b %e %H:%M:%S ", &local);
     }
-    int length = snprintf(line, sizeof line, "<%d>%s%s[%ld]: %s", FACILITY_DAEMON | level, date,
+    int length = snprintf(line, sizeof line, "<%d>%s%s[%ld]: %s", LOG_DAEMON | level, date,
                           writer->program, (long)getpid(), text);
     size_t count = length < (int)sizeof line ? (size_t)length : sizeof line - 1;
     for (int attempt = 0; attempt < 2; attempt++) {
@@ -135,7 +134,7 @@ void hal_log_write(void *context, int level, const char *text)
         char told[64];
         snprintf(told, sizeof told, "%" PRId64 " messages could not be told",
                  writer->dropped_count);
-        if (write_line(writer, 4, told)) {
+        if (write_line(writer, LOG_WARNING, told)) {
             writer->dropped_count = 0;
         }
     }
