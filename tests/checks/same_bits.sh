@@ -113,7 +113,7 @@ series() {
     shift $(($# / 2))
     for frame in "$@"; do
         cp "$frame" "$to/"
-        [ "$(ls "$to" | wc -l)" -le 6 ] || break
+        [ "$(find "$to" -type f | wc -l)" -le 6 ] || break
     done
 }
 

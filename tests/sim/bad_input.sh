@@ -518,11 +518,13 @@ mkdir d/frames.jsonl
 run --json d
 check 'frames.jsonl: a directory' 1 3 0 'd/frames\.jsonl: a directory, expected a file'
 fresh
+# shellcheck disable=SC2059 # $a is written as a format: \n
 printf "$a"'{"file":"b.pgm","time_us":5,"laser":false}\n'"$c" >d/frames.jsonl
 : >d/b.pgm
 run --json d
 check 'frames.jsonl: a lost frame with the laser off' 1 2 0 'd/b\.pgm: .*empty'
 fresh
+# shellcheck disable=SC2059 # $a is written as a format: \n
 printf "$a"'{"file":"b.pgm","time_us":5,"laser":false}\n'"$c" >d/frames.jsonl
 printf 'P5\n2 2\n255\n1234' >d/b.pgm
 run --json d
@@ -532,10 +534,12 @@ fresh
 # A frame without laser takes from the next what they have in common, when it is fresh: here all of it.
 ambient() {
     cp d/c.pgm d/b.pgm
+    # shellcheck disable=SC2059 # $a is written as a format: \n
     printf "$a"'{"file":"b.pgm","time_us":5,"laser":false}\n{"file":"c.pgm","time_us":%d}\n' "$1" >d/frames.jsonl
+    # shellcheck disable=SC2086 # no or two words
     run --json $3 d
     dots=$(sed -n 's/^{"file":"c.pgm".*"dots":\([0-9]*\),.*/\1/p' out)
-    [ "$dots" "$2" 30 ] && reason= || reason="$dots dots"
+    test "$dots" "$2" 30 && reason= || reason="$dots dots"
     result "$4" "$reason"
     fresh
 }
@@ -638,7 +642,7 @@ run --json --without
 check 'usage: --without without a part' 2 0 0 'host_sim: missing argument of --without'
 run --json --without '' d
 check 'usage: empty --without' 2 0 0 'host_sim: empty argument of --without'
-for list in tracking scan,tracking scan, ,scan scan,,fit sca scans; do
+for list in tracking scan,tracking 'scan,' ',scan' 'scan,,fit' sca scans; do
     run --json --without "$list" d
     check "usage: --without $list" 2 0 0 "host_sim: unknown part in --without $list;"
 done
