@@ -48,6 +48,10 @@ put 644 packaging/60-isohead.rules /lib/udev/rules.d/60-isohead.rules
 put 644 firmware/app/isohead.conf /etc/isohead/isohead.conf
 pack packaging/isohead_board.1 /usr/share/man/man1/isohead_board.1.gz
 pack packaging/isohead.conf.5 /usr/share/man/man5/isohead.conf.5.gz
+# Who has only the package shall be able to read what the settings tell him to.
+for text in safety hardware contract; do
+    put 644 "docs/$text.md" "/usr/share/doc/isohead/$text.md"
+done
 
 # The licence's text as an indented paragraph, empty lines as dots.
 sed '1,/^$/d' LICENSE | sed '1,/^$/d' | sed -e 's/^$/./' -e 's/^/ /' | cat packaging/copyright - \
