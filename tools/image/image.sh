@@ -65,7 +65,7 @@ entry b 1 | mcopy -i "$esp" - ::/loader/entries/slot-b+3.conf
 
 data=$out/data.fat
 fat "$data" $DATA_MIB ISOHEAD 15048eda
-mcopy -i "$data" tools/image/data/readme.txt ::/
+mcopy -i "$data" tools/image/data/readme.txt docs/safety.md ::/
 sed 's|^rig = .*|rig = /data/rig.json|' firmware/app/isohead.conf | mcopy -i "$data" - ::/isohead.conf
 
 image=$out/isohead.img
