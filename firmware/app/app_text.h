@@ -12,8 +12,6 @@
 
 /* Room for any decimal written here. */
 #define APP_TEXT_DECIMAL 32
-/* Most decimals. */
-#define APP_TEXT_DECIMALS_MAX 6
 
 struct app_decimal {
     char text[APP_TEXT_DECIMAL];
