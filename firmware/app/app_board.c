@@ -168,7 +168,8 @@ enum app_exit app_board_laser_off(struct app_board *board, const struct app_conf
 {
     const struct timespec pause = {.tv_nsec = APP_BOARD_OFF_PAUSE_MS * 1000000L};
     const struct hal_strobe *strobe = &board->gpio.strobe;
-    struct hal_error error = {"gpio-chip and laser-line: missing, nothing can be switched off"};
+    struct hal_error error = {
+        "gpio-chip and laser-line: missing or in doubt, so that nothing was switched off"};
     enum app_exit exit = APP_EXIT_USAGE;
     if (config->path != NULL && !config->laser && config->gpio_chip == NULL &&
         config->laser_line == NULL) {
