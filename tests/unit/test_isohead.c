@@ -426,6 +426,41 @@ static void nothing_is_remembered_from_frame_to_frame(void)
     check_same(&first, &head);
 }
 
+/* Labels first, looked at twice, and the rest later: as all at once. In between nothing is concluded. */
+static void a_frame_in_halves_is_the_whole(void)
+{
+    paint_bust(&vector_busts[1]);
+    start(&other, vector_busts[1].rig);
+    TEST_ASSERT_EQUAL_INT(IH_OK, isohead_frame(&other, &frame, NULL, 40000));
+    TEST_ASSERT_GREATER_THAN_INT32(0, other.result.entry_count);
+    TEST_ASSERT_EQUAL_INT(IH_OK, isohead_label(&head, &frame, NULL));
+    TEST_ASSERT_EQUAL_MEMORY(&other.labels, &head.labels, sizeof head.labels);
+    TEST_ASSERT_EQUAL_INT32(0, head.result.entry_count);
+    TEST_ASSERT_EQUAL_INT32(IH_NONE, head.result.selected);
+    TEST_ASSERT_EQUAL_INT(IH_OK, isohead_label(&head, &frame, NULL));
+    isohead_find(&head, 40000);
+    check_same(&other, &head);
+    TEST_ASSERT_EQUAL_MEMORY(&other.result, &head.result, sizeof head.result);
+    TEST_ASSERT_EQUAL_MEMORY(&other.tracks, &head.tracks, sizeof head.tracks);
+}
+
+/* A frame that is only labelled, dark or not, leaves the tracks as they are. */
+static void labels_alone_change_no_track(void)
+{
+    paint_bust(&vector_busts[1]);
+    process();
+    other = head;
+    memset(grey8, 0, sizeof grey8);
+    TEST_ASSERT_EQUAL_INT(IH_OK, isohead_label(&head, &frame, NULL));
+    TEST_ASSERT_EQUAL_INT32(0, head.labels.labelled_count);
+    TEST_ASSERT_EQUAL_MEMORY(&other.tracks, &head.tracks, sizeof head.tracks);
+    frame.width--;
+    TEST_ASSERT_EQUAL_INT(IH_ERR_SIZE, isohead_label(&head, &frame, NULL));
+    TEST_ASSERT_EQUAL_MEMORY(&other.tracks, &head.tracks, sizeof head.tracks);
+    start_range(640, 480);
+    TEST_ASSERT_EQUAL_INT(IH_ERR_KIND, isohead_label(&head, &frame, NULL));
+}
+
 static void two_states_are_independent(void)
 {
     paint_bust(&vector_busts[2]);
@@ -521,6 +556,8 @@ int main(void)
     RUN_TEST(wrong_kinds_are_refused);
     RUN_TEST(ambient_frames_are_checked);
     RUN_TEST(nothing_is_remembered_from_frame_to_frame);
+    RUN_TEST(a_frame_in_halves_is_the_whole);
+    RUN_TEST(labels_alone_change_no_track);
     RUN_TEST(two_states_are_independent);
     RUN_TEST(the_frame_and_the_rig_are_left_alone);
     RUN_TEST(noise_is_survived);
