@@ -83,9 +83,24 @@ static bool read_interlock(struct app_laser *laser)
     return true;
 }
 
+/* An edge for the one-shot. False: it failed, and everything is off. */
+static bool beat(struct app_laser *laser)
+{
+    laser->beat_us = laser->tick_us;
+    if (!laser->strobe->beat(laser->strobe->context, &laser->failed)) {
+        fail(laser);
+        return false;
+    }
+    return true;
+}
+
 static void switch_on(struct app_laser *laser)
 {
     if (!read_interlock(laser) || laser->blocks != 0) {
+        return;
+    }
+    /* Two edges, so that one of them rises: a one-shot that has run out lets light through at once. */
+    if (!beat(laser) || !beat(laser)) {
         return;
     }
     laser->is_on = true;
@@ -242,16 +257,6 @@ static int64_t beat_wait_us(const struct app_laser *laser, int64_t now_us)
     return laser->is_on ? laser->beat_us + APP_LASER_BEAT_US - now_us : APP_LASER_NEVER_US;
 }
 
-static void beat(struct app_laser *laser, int64_t now_us)
-{
-    if (laser->is_on && now_us - laser->beat_us >= APP_LASER_BEAT_US) {
-        laser->beat_us = now_us;
-        if (!laser->strobe->beat(laser->strobe->context, &laser->failed)) {
-            fail(laser);
-        }
-    }
-}
-
 static int64_t least(int64_t a, int64_t b)
 {
     return a < b ? a : b;
@@ -267,7 +272,9 @@ int64_t app_laser_tick(struct app_laser *laser, int64_t now_us)
         block(laser, APP_LASER_BLOCK_SILENCE, true);
     }
     apply(laser);
-    beat(laser, now_us);
+    if (laser->is_on && now_us - laser->beat_us >= APP_LASER_BEAT_US) {
+        beat(laser);
+    }
     /* Only now: what was switched on just now has limits too. */
     int64_t wait_us = least(duty_wait_us(laser), silence_wait_us(laser));
     wait_us = least(wait_us, interlock_wait_us(laser));
@@ -280,7 +287,6 @@ const char *app_laser_block_text(unsigned blocks)
         enum app_laser_block block;
         const char *text;
     } texts[] = {
-        {APP_LASER_BLOCK_FAULT, "its line failed"},
         {APP_LASER_BLOCK_DISABLED, "not asked for"},
         {APP_LASER_BLOCK_INTERLOCK, "the interlock is open"},
         {APP_LASER_BLOCK_RIG, "no valid rig"},

@@ -11,13 +11,13 @@
  *          seen here or comes as an event later; and at every tick, which is also how the guard tells
  *          that it has switched off;
  *        - the duty is kept: over any time T the laser is on for at most duty_percent of
- *          T + APP_LASER_BURST_US;
+ *          (T + APP_LASER_BURST_US);
  *        - no call of the strobe has failed. After a failure it is switched off by every means there
  *          is (again, then by giving the lines back) and stays off: the caller ends.
  * Time:  app_laser_tick looks at the clock. The loop calls it before it waits and does not wait for
  *        longer than what it returns, so that a limit in time is kept to the timer's precision while
- *        the loop waits. While a frame is processed (app_laser_busy) the guard looks at the interlock and for life
- *        (hal/linux/hal_guard.h, docs/safety.md).
+ *        the loop waits. While a frame is processed (app_laser_busy) the guard looks at the interlock
+ *        and for life (hal/linux/hal_guard.h, docs/safety.md).
  * Errors: app_laser.failed, with the text; told once through the caller.
  */
 #ifndef APP_LASER_H
@@ -25,10 +25,10 @@
 
 #include "hal.h"
 
-/* The laser may be on for so much longer than its duty, once. */
+/* The time whose duty may be used at once, after a rest. */
 #define APP_LASER_BURST_US 100000
-/* Between two edges for an external one-shot while the laser is on. The one-shot has to bridge the
- * processing of a frame too. */
+/* Between two edges for an external one-shot while the laser is on; there is a rising one just before
+ * it is switched on. The one-shot has to bridge the processing of a frame too. */
 #define APP_LASER_BEAT_US 10000
 /* Without a frame for so many frame times it goes off. */
 #define APP_LASER_SILENT_FRAMES 3
@@ -107,7 +107,7 @@ void app_laser_interlock(struct app_laser *laser, int64_t now_us);
 /* Keep the limits in time. How long one may wait until the next call, in us, at least 1. */
 int64_t app_laser_tick(struct app_laser *laser, int64_t now_us);
 
-/* What speaks against it, the weightiest; for messages. NULL: nothing. */
+/* What speaks against it, the weightiest; for messages. NULL: nothing, or what app_laser.failed says. */
 const char *app_laser_block_text(unsigned blocks);
 
 #endif

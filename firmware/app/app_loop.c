@@ -36,7 +36,8 @@ static void watch_laser(struct app_loop *loop)
     const unsigned quiet = APP_LASER_BLOCK_DISABLED | APP_LASER_BLOCK_DUTY;
     unsigned blocks = laser->blocks & ~quiet;
     loop->status.laser_on_us = laser->on_us;
-    if (blocks != loop->told_blocks && laser->config.enabled) {
+    bool is_fault = (blocks & APP_LASER_BLOCK_FAULT) != 0; /* has a message of its own */
+    if (blocks != loop->told_blocks && laser->config.enabled && !is_fault) {
         const char *why = app_laser_block_text(blocks);
         if (why != NULL) {
             app_log_say(loop->log, APP_LOG_WARNING, "laser off: %s", why);
@@ -106,6 +107,9 @@ static void close_camera(struct app_loop *loop)
 /* Laser off, and again later. */
 static void lose_camera(struct app_loop *loop, const char *why)
 {
+    if (loop->is_streaming) {
+        loop->live.strobe = "reopened";
+    }
     close_camera(loop);
     app_log_say(loop->log, APP_LOG_ERROR, "%s: %s; trying again", loop->config->device, why);
     loop->retry_us = now(loop) + loop->retry_wait_us;
@@ -113,7 +117,6 @@ static void lose_camera(struct app_loop *loop, const char *why)
     if (loop->retry_wait_us > APP_LOOP_RETRY_MAX_US) {
         loop->retry_wait_us = APP_LOOP_RETRY_MAX_US;
     }
-    loop->live.strobe = "reopened";
 }
 
 static void open_camera(struct app_loop *loop)

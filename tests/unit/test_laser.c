@@ -10,6 +10,8 @@ static struct {
     int off_failures;      /* so many calls of set(false) fail */
     bool on_fails;
     int close_count, beat_count, call_count;
+    bool beat_high;      /* the heartbeat's line, whatever it began with */
+    bool rise_before_on; /* it has risen while the laser was off */
 } fake;
 
 static struct app_laser laser;
@@ -47,6 +49,8 @@ static bool fake_beat(void *context, struct hal_error *error)
     (void)context;
     (void)error;
     fake.beat_count++;
+    fake.beat_high = !fake.beat_high;
+    fake.rise_before_on = fake.rise_before_on || (fake.beat_high && !fake.line);
     return true;
 }
 
@@ -366,6 +370,20 @@ static void test_busy_is_no_silence(void)
     TEST_ASSERT_FALSE(fake.line);
 }
 
+/* Whatever level the heartbeat's line has: a one-shot that has run out lets light through from now on. */
+static void test_a_rising_edge_comes_before_the_light(void)
+{
+    start(true, 100);
+    for (int i = 0; i < 4; i++) {
+        fake.beat_high = i % 2 == 0;
+        fake.rise_before_on = false;
+        app_laser_wish(&laser, true, i);
+        TEST_ASSERT_TRUE(fake.line);
+        TEST_ASSERT_TRUE(fake.rise_before_on);
+        app_laser_wish(&laser, false, i);
+    }
+}
+
 static void test_beats_while_on(void)
 {
     start(true, 100);
@@ -374,7 +392,7 @@ static void test_beats_while_on(void)
         app_laser_frame(&laser, now_us);
         TEST_ASSERT_LESS_OR_EQUAL_INT64(APP_LASER_BEAT_US, app_laser_tick(&laser, now_us));
     }
-    TEST_ASSERT_INT_WITHIN(1, 10, fake.beat_count);
+    TEST_ASSERT_INT_WITHIN(1, 2 + 10, fake.beat_count);
     app_laser_wish(&laser, false, 100000);
     int beats = fake.beat_count;
     app_laser_tick(&laser, 200000);
@@ -429,6 +447,7 @@ int main(void)
     RUN_TEST(test_time_is_accounted_for);
     RUN_TEST(test_duty_while_busy);
     RUN_TEST(test_busy_is_no_silence);
+    RUN_TEST(test_a_rising_edge_comes_before_the_light);
     RUN_TEST(test_beats_while_on);
     RUN_TEST(test_off_fails);
     RUN_TEST(test_on_fails);

@@ -171,6 +171,17 @@ static void test_unplugged(void)
     TEST_ASSERT_GREATER_THAN_INT(20, world.lit_count);
 }
 
+/* A camera that was never there is not one that is there again. */
+static void test_plugged_in_late(void)
+{
+    static const enum world_act acts[] = {TWENTY, TWENTY};
+    world_init(APP_STROBE_GATED, acts, COUNT(acts));
+    world.unplugged_until_us = world.now_us + WORLD_UNPLUGGED_US;
+    TEST_ASSERT_EQUAL_INT(APP_EXIT_GOOD, world_run());
+    TEST_ASSERT_GREATER_THAN_INT(10, world.lit_count);
+    TEST_ASSERT_EQUAL_INT(0, count_in_records("reopened"));
+}
+
 static void test_reload(void)
 {
     static const enum world_act acts[] = {FIVE, WORLD_RELOAD, FIVE};
@@ -466,6 +477,7 @@ int main(void)
     RUN_TEST(test_interlock);
     RUN_TEST(test_interlock_blinks);
     RUN_TEST(test_unplugged);
+    RUN_TEST(test_plugged_in_late);
     RUN_TEST(test_reload);
     RUN_TEST(test_reload_bad);
     RUN_TEST(test_no_rig);
