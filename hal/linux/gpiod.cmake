@@ -1,4 +1,5 @@
-# libgpiod, of version 1 or 2: the target isohead_gpiod, and ISOHEAD_GPIOD_VERSION for what includes it.
+# libgpiod, of version 1 or 2: the target isohead_gpiod; and for what includes it ISOHEAD_GPIOD_VERSION
+# and ISOHEAD_GPIOD_HEADERS, which come before any folder where the other version may be installed.
 #
 # Which one it is the header says that was found; ISOHEAD_GPIOD asks for one and refuses the other.
 # Version 2 may also be built from sources (tools/board/gpiod2.sh): ISOHEAD_GPIOD2_DIR.
@@ -35,10 +36,11 @@ endif()
 add_library(isohead_gpiod INTERFACE)
 if(ISOHEAD_GPIOD2_DIR AND NOT ISOHEAD_GPIOD STREQUAL "1")
   set(ISOHEAD_GPIOD_VERSION 2)
+  set(ISOHEAD_GPIOD_HEADERS "${ISOHEAD_GPIOD2_DIR}/include")
   target_link_libraries(isohead_gpiod INTERFACE gpiod2_source)
 elseif(ISOHEAD_GPIOD_INSTALLED)
   set(ISOHEAD_GPIOD_VERSION ${ISOHEAD_GPIOD_INSTALLED})
-  target_include_directories(isohead_gpiod SYSTEM INTERFACE "${ISOHEAD_GPIOD_INCLUDE}")
+  set(ISOHEAD_GPIOD_HEADERS "${ISOHEAD_GPIOD_INCLUDE}")
   target_link_libraries(isohead_gpiod INTERFACE "${ISOHEAD_GPIOD_LIBRARY}")
 else()
   message(FATAL_ERROR "libgpiod is not there: install libgpiod-dev, or give ISOHEAD_GPIOD2_DIR "
