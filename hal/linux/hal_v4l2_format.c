@@ -15,6 +15,8 @@
 /* No device has more formats or sizes than this; a broken driver may list them without end. */
 #define LIST_MAX 64
 #define LIST_TEXT_MAX 100
+/* Longest text of a rate, its closing zero included. */
+#define RATE_TEXT_MAX 24
 /* Luma of YUV with limited range is white here. */
 #define LIMITED_WHITE 235
 
@@ -297,6 +299,43 @@ static int64_t rate_of(const struct v4l2_fract *time)
     return time->numerator == 0 ? 0 : (int64_t)time->denominator * 1000 / time->numerator;
 }
 
+static void name_rate(int64_t rate_mhz, char *text, size_t size)
+{
+    snprintf(text, size, "%lld.%03lld", (long long)rate_mhz / 1000, (long long)rate_mhz % 1000);
+}
+
+/* The rates that the device has for its format and size, as far as it says. */
+static void read_rates(int fd, struct list *rates)
+{
+    struct v4l2_format format = {.type = V4L2_BUF_TYPE_VIDEO_CAPTURE};
+    *rates = (struct list){""};
+    if (hal_v4l2_ioctl(fd, VIDIOC_G_FMT, &format) != 0) {
+        return;
+    }
+    for (uint32_t index = 0; index < LIST_MAX; index++) {
+        struct v4l2_frmivalenum time = {.index = index,
+                                        .pixel_format = format.fmt.pix.pixelformat,
+                                        .width = format.fmt.pix.width,
+                                        .height = format.fmt.pix.height};
+        char item[64];
+        if (hal_v4l2_ioctl(fd, VIDIOC_ENUM_FRAMEINTERVALS, &time) != 0) {
+            break;
+        }
+        if (time.type == V4L2_FRMIVAL_TYPE_DISCRETE) {
+            name_rate(rate_of(&time.discrete), item, sizeof item);
+            add_item(rates, item);
+            continue;
+        }
+        char slowest[RATE_TEXT_MAX];
+        char quickest[RATE_TEXT_MAX];
+        name_rate(rate_of(&time.stepwise.max), slowest, sizeof slowest);
+        name_rate(rate_of(&time.stepwise.min), quickest, sizeof quickest);
+        snprintf(item, sizeof item, "%s to %s", slowest, quickest);
+        add_item(rates, item);
+        break; /* there is only one such answer */
+    }
+}
+
 static bool ask_rate(int fd, int32_t rate_mhz, struct v4l2_fract *time, struct hal_error *error)
 {
     struct v4l2_streamparm parameters = {.type = V4L2_BUF_TYPE_VIDEO_CAPTURE};
@@ -314,9 +353,13 @@ static bool ask_rate(int fd, int32_t rate_mhz, struct v4l2_fract *time, struct h
     const int64_t given_mhz = rate_of(time);
     const int64_t beside_mhz = given_mhz > rate_mhz ? given_mhz - rate_mhz : rate_mhz - given_mhz;
     if (beside_mhz * 100 >= rate_mhz) {
-        return hal_fail(error, "asked for %d.%03d frames a second, the device gives %lld.%03lld",
-                        rate_mhz / 1000, rate_mhz % 1000, (long long)given_mhz / 1000,
-                        (long long)given_mhz % 1000);
+        char given[RATE_TEXT_MAX];
+        struct list rates;
+        name_rate(given_mhz, given, sizeof given);
+        read_rates(fd, &rates);
+        return hal_fail(error, "asked for %d.%03d frames a second, the device gives %s%s%s",
+                        rate_mhz / 1000, rate_mhz % 1000, given,
+                        rates.text[0] == 0 ? "" : "; it has: ", rates.text);
     }
     return true;
 }

@@ -3,7 +3,7 @@
  * In:    an open device, the names of hal_v4l2.h.
  * Out:   the device set to it, and how its frames lie in memory.
  * Error: as text: no such format or size, with the list of those that there are; a rate that the
- *        device does not take, with the one that it gives; rows too short for the width.
+ *        device does not take, with the one that it gives and those that there are; rows too short for the width.
  */
 #ifndef HAL_V4L2_FORMAT_H
 #define HAL_V4L2_FORMAT_H

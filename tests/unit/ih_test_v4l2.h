@@ -69,6 +69,9 @@ static struct {
     int no_parameters;      /* not 0: errno of every rate */
     uint32_t rate_flags;
     struct v4l2_fract frame_time, only_time; /* only_time: not 0: what every rate becomes */
+    struct v4l2_fract times[3];              /* that it lists for its format and size */
+    uint32_t time_count;
+    bool times_are_stepwise; /* all from times[0] to times[1] */
     struct fake_frame frame[FAKE_FRAMES];
     int32_t frame_count, frame_next;
     /* faults */
@@ -319,6 +322,28 @@ static int fake_parameters(struct v4l2_streamparm *parameters, bool set)
     return 0;
 }
 
+static int fake_get_format(struct v4l2_format *format)
+{
+    format->fmt.pix = fake.current;
+    return 0;
+}
+
+static int fake_enum_time(struct v4l2_frmivalenum *time)
+{
+    if (time->pixel_format != fake.current.pixelformat || time->width != fake.current.width ||
+        time->height != fake.current.height ||
+        time->index >= (fake.times_are_stepwise ? 1 : fake.time_count)) {
+        return fake_fail(EINVAL);
+    }
+    time->type = V4L2_FRMIVAL_TYPE_DISCRETE;
+    time->discrete = fake.times[time->index];
+    if (fake.times_are_stepwise) {
+        time->type = V4L2_FRMIVAL_TYPE_CONTINUOUS;
+        time->stepwise = (struct v4l2_frmival_stepwise){fake.times[0], fake.times[1], {1, 1}};
+    }
+    return 0;
+}
+
 static struct fake_control *fake_find_control(uint32_t id)
 {
     int32_t k;
@@ -475,6 +500,10 @@ static int fake_answer(unsigned long request, void *argument)
         return fake_enum_size(argument);
     case VIDIOC_S_FMT:
         return fake_set_format(argument);
+    case VIDIOC_G_FMT:
+        return fake_get_format(argument);
+    case VIDIOC_ENUM_FRAMEINTERVALS:
+        return fake_enum_time(argument);
     case VIDIOC_S_PARM:
         return fake_parameters(argument, true);
     case VIDIOC_G_PARM:

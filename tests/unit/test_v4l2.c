@@ -430,6 +430,21 @@ static void a_rate_nearby_is_taken_another_is_not(void)
     check_refused("asked for 30.000 frames a second, the device gives 0.000");
 }
 
+static void a_refused_rate_names_those_that_there_are(void)
+{
+    config.rate_mhz = 27000;
+    fake.only_time = (struct v4l2_fract){1, 25};
+    fake.times[0] = (struct v4l2_fract){2, 25};
+    fake.times[1] = (struct v4l2_fract){1, 25};
+    fake.times[2] = (struct v4l2_fract){1001, 30000};
+    fake.time_count = 3;
+    check_refused("asked for 27.000 frames a second, the device gives 25.000; it has: 12.500, "
+                  "25.000, 29.970");
+    fake.times_are_stepwise = true;
+    check_refused("asked for 27.000 frames a second, the device gives 25.000; it has: 25.000 to "
+                  "12.500");
+}
+
 static void a_device_without_a_rate(void)
 {
     fake.no_parameters = EINVAL;
@@ -1334,6 +1349,7 @@ int main(void)
     RUN_TEST(buffers_that_are_too_small_or_too_few);
     RUN_TEST(the_rate_is_asked_for_only_when_it_is_wanted);
     RUN_TEST(a_rate_nearby_is_taken_another_is_not);
+    RUN_TEST(a_refused_rate_names_those_that_there_are);
     RUN_TEST(a_device_without_a_rate);
     RUN_TEST(what_is_to_be_kept_is_not_touched);
     RUN_TEST(exposure_is_set_in_its_units_after_the_automatic_is_off);
