@@ -99,7 +99,18 @@ static enum hal_sent send_stdout(void *context, const char *bytes, size_t count,
     return number == ENOSPC || number == EDQUOT ? HAL_SENT_NOT : HAL_SENT_NEVER;
 }
 
-/* A network that fails may work again, whatever it says. */
+static bool send_datagram(int descriptor, const char *bytes, size_t count)
+{
+    ssize_t sent = -1;
+    do {
+        sent = send(descriptor, bytes, count, MSG_DONTWAIT | MSG_NOSIGNAL);
+    } while (sent < 0 && errno == EINTR);
+    return sent >= 0;
+}
+
+/* A network that fails may work again, whatever it says. That nobody listens is said of the datagram
+ * before this one, which then is what has been dropped: this one goes out all the same, as somebody
+ * may listen by now. */
 static enum hal_sent send_udp(void *context, const char *bytes, size_t count,
                               struct hal_error *error)
 {
@@ -107,11 +118,14 @@ static enum hal_sent send_udp(void *context, const char *bytes, size_t count,
     if (is_too_long(count, error)) {
         return HAL_SENT_NOT;
     }
-    ssize_t sent = -1;
-    do {
-        sent = send(state->descriptor, bytes, count, MSG_DONTWAIT | MSG_NOSIGNAL);
-    } while (sent < 0 && errno == EINTR);
-    return sent < 0 ? refuse(error, strerror(errno)) : HAL_SENT;
+    if (send_datagram(state->descriptor, bytes, count)) {
+        return HAL_SENT;
+    }
+    int number = errno;
+    if (number == ECONNREFUSED) {
+        (void)send_datagram(state->descriptor, bytes, count);
+    }
+    return refuse(error, strerror(number));
 }
 
 static speed_t speed_of(int32_t baud)
@@ -147,15 +161,18 @@ static bool make_raw(int descriptor, int32_t baud)
            tcsetattr(descriptor, TCSANOW, &settings) == 0;
 }
 
+/* Closing would wait for what the line has not sent yet: half a minute where it stands still. */
 static void shut(struct hal_output_state *state)
 {
     if (state->descriptor >= 0) {
+        (void)tcflush(state->descriptor, TCOFLUSH); /* nothing to do for a datagram */
         close(state->descriptor);
     }
     state->descriptor = -1;
     state->rest_count = 0;
 }
 
+/* Whoever is at the other end may have half a record of before: an empty line ends it. */
 static bool open_serial(struct hal_output_state *state, struct hal_error *error)
 {
     state->tried_us = state->clock->now_us(state->clock->context);
@@ -168,23 +185,19 @@ static bool open_serial(struct hal_output_state *state, struct hal_error *error)
         shut(state);
         return false;
     }
+    state->rest[0] = '\n';
+    state->rest_start = 0;
+    state->rest_count = 1;
     return true;
 }
 
-/* Whoever is at the other end may have half a record: an empty line ends it. */
 static bool reopen_serial(struct hal_output_state *state, struct hal_error *error)
 {
     int64_t passed_us = state->clock->now_us(state->clock->context) - state->tried_us;
     if (passed_us < HAL_OUTPUT_REOPEN_US) {
         return hal_fail(error, "%s is gone", state->path);
     }
-    if (!open_serial(state, error)) {
-        return false;
-    }
-    state->rest[0] = '\n';
-    state->rest_start = 0;
-    state->rest_count = 1;
-    return true;
+    return open_serial(state, error);
 }
 
 static enum hal_sent send_serial(void *context, const char *bytes, size_t count,

@@ -2,12 +2,15 @@
  *
  * A record leaves whole or not at all. A stream may take a part of one: the rest is kept here and
  * goes first at the next call; until it is gone newer records are refused, so that a slow reader
- * gets whole and recent ones. A UDP datagram is one record.
+ * gets whole and recent ones. A UDP datagram is one record. Where the receiver's machine says that
+ * nobody listens, it says so of the datagram before: HAL_SENT_NOT then stands for that one, and the
+ * new one is on its way; the first one that somebody hears is no longer lost.
  *
  * Standard output is shared with others, so it is not made non-blocking (hal_shared).
  *
  * A serial device is raw, 8 bits, no parity, no flow control. When it is gone it is opened again, at
- * most once a second, and sending starts with an empty line, as the last record may be cut.
+ * most once a second. Whenever it is opened sending starts with an empty line, as the last record of
+ * before may be cut: what the device has not sent by the time that it is closed is thrown away.
  *
  * Error: HAL_SENT_NOT has its reason in *error too. HAL_SENT_NEVER only from standard output: its
  *        reader has gone, it is closed or broken. HAL_SENT does not say that it has arrived.
@@ -52,8 +55,7 @@ bool hal_output_udp(struct hal_output_state *state, const char *host, const char
 bool hal_output_serial(struct hal_output_state *state, const char *path, int32_t baud,
                        const struct hal_clock *clock, struct hal_error *error);
 
-/* What is still kept goes out if that is possible at once. Closing a serial device may take as long
- * as the system needs for what it has taken: switch the laser off first. */
+/* What is still kept goes out if that is possible at once; see above for a serial device. */
 void hal_output_close(struct hal_output_state *state);
 
 #endif
