@@ -2,10 +2,11 @@
 #include "linux/hal_gpio_lines.h"
 
 #include <errno.h>
-#include <fcntl.h>
 #include <gpiod.h>
+#include <linux/gpio.h>
 #include <stdio.h>
 #include <sys/eventfd.h>
+#include <sys/ioctl.h>
 #include <unistd.h>
 
 struct gpiod_chip *hal_gpio_chip_open(const char *path)
@@ -41,7 +42,8 @@ bool hal_gpio_line_about(struct gpiod_chip *chip, unsigned offset, struct hal_gp
 }
 
 /* This library does not tell the descriptor of an output. The kernel gives out the lowest free
- * number, and this process has one thread: what is free before the request is the line's after it. */
+ * number, and this process has one thread: what is free before the request is the line's after it.
+ * That a line is there now is made sure of: the guard sets it when this process is dead. */
 static int lowest_free_fd(void)
 {
     int fd = eventfd(0, EFD_CLOEXEC);
@@ -49,6 +51,12 @@ static int lowest_free_fd(void)
         close(fd);
     }
     return fd;
+}
+
+static bool is_line(int fd)
+{
+    struct gpiohandle_data levels;
+    return ioctl(fd, GPIOHANDLE_GET_LINE_VALUES_IOCTL, &levels) == 0;
 }
 
 bool hal_gpio_line_output(struct hal_gpio_line *line, struct gpiod_chip *chip,
@@ -63,8 +71,10 @@ bool hal_gpio_line_output(struct hal_gpio_line *line, struct gpiod_chip *chip,
     if (gpiod_line_request_output_flags(handle, request->consumer, flags, 0) != 0) {
         return false;
     }
-    if (fcntl(fd, F_GETFD) < 0) {
+    if (!is_line(fd)) {
+        int error = errno;
         gpiod_line_release(handle);
+        errno = error;
         return false;
     }
     line->offset = request->offset;

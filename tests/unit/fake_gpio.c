@@ -123,6 +123,9 @@ bool fake_take(struct fake_line *line, bool output, bool active_low, int value,
         errno = EBUSY;
         return false;
     }
+    if (fake.opens_more && fake.more_fd < 0) {
+        fake.more_fd = eventfd(0, EFD_CLOEXEC);
+    }
     line->fd = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
     line->taken = true;
     line->output = output;

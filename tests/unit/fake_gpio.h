@@ -41,6 +41,8 @@ struct fake_gpio {
     int fail_errno;
     int object_count; /* of libgpiod's, not freed yet */
     int misuse_count; /* calls that libgpiod does not allow */
+    bool opens_more;  /* a request opens something else before the line, and keeps it */
+    int more_fd;      /* that; -1: none */
 };
 
 extern struct fake_gpio fake;

@@ -3,7 +3,10 @@
 
 #include <errno.h>
 #include <gpiod.h>
+#include <linux/gpio.h>
+#include <stdarg.h>
 #include <stddef.h>
+#include <sys/ioctl.h>
 
 /* The library's types are incomplete: chips and lines of the fake are handed out as such. */
 static struct fake_chip *chip_of(struct gpiod_chip *chip)
@@ -117,4 +120,27 @@ int gpiod_line_event_read_multiple(struct gpiod_line *line, struct gpiod_line_ev
 {
     (void)events;
     return fake_read_events(line_of(line), (int)num_events);
+}
+
+/* The kernel's own call, for the descriptor of a line that is taken as an output. */
+int ioctl(int fd, unsigned long request, ...)
+{
+    va_list arguments;
+    int i, k;
+
+    va_start(arguments, request);
+    struct gpiohandle_data *levels = va_arg(arguments, struct gpiohandle_data *);
+    va_end(arguments);
+    fake.misuse_count += request != GPIOHANDLE_GET_LINE_VALUES_IOCTL;
+    for (i = 0; i < FAKE_CHIPS; i++) {
+        for (k = 0; k < FAKE_LINES; k++) {
+            const struct fake_line *line = &fake.chip[i].line[k];
+            if (line->taken && line->output && line->fd == fd) {
+                levels->values[0] = (unsigned char)(line->level ^ line->active_low);
+                return 0;
+            }
+        }
+    }
+    errno = ENOTTY;
+    return -1;
 }

@@ -2,6 +2,7 @@
  * left when any call fails. */
 #include <dirent.h>
 #include <poll.h>
+#include <unistd.h>
 
 #include "fake_gpio.h"
 #include "ih_test.h"
@@ -131,6 +132,18 @@ static void the_descriptors_are_those_of_the_lines(void)
     close_it();
     TEST_ASSERT_TRUE(open_with(&plain));
     TEST_ASSERT_EQUAL_INT(-1, gpio.interlock_fd);
+}
+
+/* What libgpiod 1 does not tell is found out: never another file's, whatever else a request opens. */
+static void no_other_descriptor_is_taken_for_the_lines(void)
+{
+    fake.opens_more = true;
+    fake.more_fd = -1;
+    bool good = open_with(&plain);
+    TEST_ASSERT_GREATER_OR_EQUAL_INT(0, fake.more_fd);
+    TEST_ASSERT_EQUAL_INT(good ? laser->fd : -1, gpio.laser_fd);
+    TEST_ASSERT_EQUAL(good, laser->taken);
+    close(fake.more_fd);
 }
 
 static void not_taken_off_is_nothing_and_the_rest_fails(void)
@@ -494,6 +507,7 @@ int main(void)
     RUN_TEST(on_is_high_and_closing_switches_off_first);
     RUN_TEST(opened_again_the_lines_are_taken_anew);
     RUN_TEST(the_descriptors_are_those_of_the_lines);
+    RUN_TEST(no_other_descriptor_is_taken_for_the_lines);
     RUN_TEST(not_taken_off_is_nothing_and_the_rest_fails);
     RUN_TEST(the_heartbeat_toggles_from_low);
     RUN_TEST(chips_and_lines_have_several_names);
