@@ -15,7 +15,7 @@ PICTURE ?= 000020
 ARCH ?= arm64
 
 .DEFAULT_GOAL := help
-.PHONY: help sim frames sanitize test accept eval bits vectors learn picture board deb image flash \
+.PHONY: help sim frames sanitize test accept eval bits vectors learn picture board board-gpiod2 deb image flash \
   test-deb test-board test-image format formatted lint clean
 
 
@@ -80,6 +80,12 @@ board: ## build isohead_board for ARCH=arm64 (default), armhf or host: build/boa
 	@cmake --preset board-$(ARCH) > $(BUILD)/board-$(ARCH).log 2>&1 || { cat $(BUILD)/board-$(ARCH).log; exit 1; }
 	@cmake --build --preset board-$(ARCH) --parallel 2 --target isohead_board
 
+# The same for arm64 with libgpiod 2, which Debian 12 does not have.
+board-gpiod2:
+	@cmake --preset board-arm64-gpiod2 -DISOHEAD_GPIOD2_DIR=$(abspath $(GPIOD2_DIR)) \
+	  > $(BUILD)/board-arm64-gpiod2.log 2>&1 || { cat $(BUILD)/board-arm64-gpiod2.log; exit 1; }
+	@cmake --build --preset board-arm64-gpiod2 --parallel 2 --target isohead_board
+
 deb: board ## the Debian package of isohead_board for ARCH=arm64 (default) or armhf: build/*.deb
 	@tools/setup.sh deb $(ARCH)
 	@tools/board/deb.sh $(ARCH)
@@ -94,9 +100,10 @@ test-deb: sim ## build both Debian packages; install, run, update, purge one; it
 test-board: sim ## isohead_board on an emulated ARM board: frames, faults, signals and the laser's line
 	@tools/setup.sh test-board
 	@$(MAKE) board ARCH=arm64
+	@$(MAKE) board-gpiod2
 	@tests/board/get.sh
 	@/usr/bin/python3 tests/board/test_board.py --program $(BUILD)/board-arm64/firmware/app/isohead_board \
-	  --sysroot $(BUILD)/sysroot/arm64 --host-sim $(BUILD)/host/sim/host_sim \
+	  --program2 $(BUILD)/board-arm64-gpiod2/firmware/app/isohead_board --sysroot $(BUILD)/sysroot/arm64 --host-sim $(BUILD)/host/sim/host_sim \
 	  --render $(BUILD)/host/tools/render/render --board $(BUILD)/board
 
 image: ## the image to flash for arm64: build/image/isohead.img; XZ=1 packs it too

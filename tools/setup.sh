@@ -91,6 +91,7 @@ need_test_board() {
     PATH=$PATH:/sbin:/usr/sbin need_program depmod kmod
     need_program bzip2 bzip2
     need_python json python3
+    need_python pip python3-pip
 }
 
 need_test_deb() {
@@ -217,5 +218,5 @@ test | bits) tools/fetch_third_party.sh build/third_party ;;
 board) [ "$2" = host ] || tools/board/sysroot.sh "$2" ;;
 esac
 case "$1" in
-test) tools/board/gpiod2.sh build/third_party/gpiod2 ;;
+test | test-board) tools/board/gpiod2.sh build/third_party/gpiod2 ;;
 esac

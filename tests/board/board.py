@@ -8,12 +8,13 @@
         record = board.record(5)
 
 QEMU's test socket tells of every edge of the GPIO chip's pins at once and drives its inputs; four
-virtio-serial ports carry frames, records, the program's log and commands. Nothing waits without a
-limit: BoardError says what did not come, and shows the end of the logs. Seconds throughout, of
-time.monotonic().
+virtio-serial ports carry frames, records, the program's log and commands. A serial line (ttyS0) and
+a network (eth0; this machine is HOST on it) are there too. Nothing waits without a limit: BoardError
+says what did not come, and shows the end of the logs. Seconds throughout, of time.monotonic().
 """
 
 import collections
+import contextlib
 import json
 import os
 import re
@@ -31,6 +32,8 @@ MEMORY_MB = 256
 # Longest time that QEMU or the board's shell may take for an answer.
 ANSWER_S = 30
 GPIO_TYPE = "child<pl061>"
+# What QEMU calls this machine and the board on their network.
+HOST, GUEST = "10.0.2.2", "10.0.2.15"
 
 Edge = collections.namedtuple("Edge", "time_s line level")
 
@@ -90,18 +93,21 @@ class Board:
                      "-append", "console=ttyAMA0 loglevel=5 panic=-1 nokaslr",
                      "-device", "virtio-serial-device"]
         theirs = []
-        for name in PORTS + ["qtest", "qmp"]:
+        for name in PORTS + ["qtest", "qmp", "serial"]:
             ours, other = socket.socketpair()
             theirs.append(other)
             ours.setblocking(False)
             self.sockets[name] = ours
-            self.sending[name] = bytearray()
-            self.selector.register(ours, selectors.EVENT_READ, name)
+            if name != "serial":  # that one is read when a case says so
+                self.sending[name] = bytearray()
+                self.selector.register(ours, selectors.EVENT_READ, name)
             arguments += ["-chardev", f"socket,id={name},fd={other.fileno()}"]
             if name in PORTS:
                 arguments += ["-device", f"virtserialport,chardev={name},name={name}"]
         arguments += ["-qtest", "chardev:qtest", "-qtest-log", "none",
-                      "-mon", "chardev=qmp,mode=control"]
+                      "-mon", "chardev=qmp,mode=control",
+                      "-device", "pci-serial,chardev=serial",
+                      "-netdev", "user,id=net", "-device", "virtio-net-device,netdev=net"]
         self.qemu = subprocess.Popen(arguments, stdin=subprocess.DEVNULL, stderr=subprocess.PIPE,
                                      pass_fds=[sock.fileno() for sock in theirs], text=True)
         for sock in theirs:
@@ -265,9 +271,30 @@ class Board:
             levels[edge.line] = edge.level
         return edges
 
-    def send_frame(self, sequence, time_us, samples):
-        """Into the camera that `feed` has made; returns at once."""
-        self._send("frames", struct.pack("<qII", time_us, sequence, len(samples)) + samples)
+    def send_frame(self, sequence, time_us, samples, held=False):
+        """Into the camera that `feed` has made. held: together with the next."""
+        head = struct.pack("<qIIII", time_us, sequence, len(samples), held, 0)
+        self._send("frames", head + samples)
+        # All of it, as who sends it may have something else to do than to wait for the board.
+        self.wait(lambda: not self.sending["frames"], ANSWER_S, "reader of the frames port")
+
+    def take_serial(self, count):
+        """So many bytes of the serial line, fewer where no more wait: some hundred do, then the line
+        stands still."""
+        content = b""
+        with contextlib.suppress(BlockingIOError):
+            while len(content) < count:
+                content += self.sockets["serial"].recv(count - len(content))
+        return content
+
+    @contextlib.contextmanager
+    def serial_lines(self):
+        """Read the serial line as fast as it comes: its whole lines in turn."""
+        self.selector.register(self.sockets["serial"], selectors.EVENT_READ, "serial")
+        try:
+            yield self.lines["serial"]
+        finally:
+            self.selector.unregister(self.sockets["serial"])
 
     def record(self, limit_s):
         """The next line of the program's standard output."""

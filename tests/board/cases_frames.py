@@ -5,7 +5,7 @@ import time
 
 from frames import TIME_0_US, clipped, host_records, picked, render
 from run import (FRAME_S, HEIGHT, INTERLOCK, LASER, LIVE_FIELDS, SILENT_S, SOON_S, WIDTH, expect,
-                 same_but)
+                 gated_loop, same_but)
 
 
 def case_gated(run):
@@ -14,9 +14,7 @@ def case_gated(run):
     run.start(run.gated, "gated")
     run.laser(1)
     begin = time.monotonic()
-    for index, line in enumerate(expected):
-        record = run.lit_frame(run.gated, index)
-        expect(record == line, f"frame {index}:\nboard    {record}\nhost_sim {line}")
+    gated_loop(run, len(expected))
     frame_ms = 1000 * (time.monotonic() - begin) / len(expected)
     resident_kb, most_kb = run.board.memory_kb()
     run.stop()
@@ -40,6 +38,7 @@ def case_alternating(run):
     run.stop()
     expect(not run.board.records, f"records of dark frames: {list(run.board.records)}")
     return f"{identical} lit and {len(frames) - identical} dark frames, records identical"
+
 
 def case_always(run):
     """always on while frames come"""
@@ -110,26 +109,27 @@ def case_dropped(run):
 def case_doubled(run):
     """a frame that comes twice: both after one rise of the line"""
     gated, again = run.gated, 3
+    expected = []
+    for name, twice in [("doubled", [again, again]), ("newest", [again])]:
+        picks = [(i, gated.time_us(i)) for i in [*range(again), *twice, 4, 5]]
+        expected.append(host_records(run, picked(run, name, gated, picks)))
     run.start(gated, "gated")
     for index in range(again):
-        same_but(run.lit_frame(gated, index), host_records(run, gated)[index])
+        same_but(run.lit_frame(gated, index), expected[0][index])
     run.laser(1)
     run.give(gated, again)
     run.give(gated, again)
     # Both in turn, or the newest alone when both wait by the time that the program looks.
-    first = json.loads(run.board.record(SOON_S))
-    skipped = first.get("skipped", 0)
-    twice = [again] if skipped else [again, again]
-    indices = [*range(again), *twice, 4, 5]
-    frames = picked(run, "doubled", gated, [(i, gated.time_us(i)) for i in indices])
-    expected = host_records(run, frames)
-    same_but(json.dumps(first), expected[again], **({"skipped": 1} if skipped else {}))
+    first = run.board.record(SOON_S)
+    skipped = json.loads(first).get("skipped", 0)
+    wanted = expected[skipped][again:]
+    same_but(first, wanted.pop(0), **({"skipped": 1} if skipped else {}))
     if not skipped:
-        same_but(run.board.record(SOON_S), expected[again + 1])
-    for index in [4, 5]:
-        same_but(run.lit_frame(gated, index), expected[index + len(twice) - 1])
+        same_but(run.board.record(SOON_S), wanted.pop(0))
+    for index, line in zip([4, 5], wanted):
+        same_but(run.lit_frame(gated, index), line)
     run.stop()
-    return f"{len(twice)} of 2 have a record (skipped {skipped}), those after them as in host_sim"
+    return f"{2 - skipped} of 2 have a record (skipped {skipped}), those after them as in host_sim"
 
 
 def case_in_flight(run):
@@ -152,6 +152,58 @@ def case_in_flight(run):
     run.stop()
     expect(not run.board.records, f"records of dark frames: {list(run.board.records)}")
     return f"{len(records)} lit of {len(order)} frames have their record, the line follows at once"
+
+
+# Bursts, each before the program looks once: letters of lit and dark frames, as the line was when
+# each was exposed, which may be before it last moved.
+ALTERNATING_BURSTS = ["L", "D", "DLL", "LDD", "DDL", "LLD", "DL", "D", "L"]
+GATED_BURSTS = ["L", "DDL", "LDD", "DDD", "L", "LLL"]
+
+
+def case_queue(run):
+    """up to three frames wait in the driver's queue, exposed before the laser was switched"""
+    return "; ".join(bursts(run, strobe, plan) for strobe, plan in
+                     [("alternating", ALTERNATING_BURSTS), ("gated", GATED_BURSTS)])
+
+
+def bursts(run, strobe, plan):
+    frames, lit, dark, sequence = run.alternating, 0, 1, 0
+    used, skipped = [], []  # the frames that count, and what was skipped before the lit ones
+    records = []
+    passed = 0
+    run.start(frames, strobe)
+    run.laser(1)
+    for letters in plan:
+        on, rises = run.is_on(), run.board.rises[LASER]
+        for place, letter in enumerate(letters):
+            index = lit if letter == "L" else dark
+            lit, dark = lit + 2 * (letter == "L"), dark + 2 * (letter == "D")
+            time_us = TIME_0_US + 100000 * sequence
+            run.give(frames, index, sequence, time_us, held=place < len(letters) - 1)
+            sequence += 1
+        passed += len(letters) - 1
+        if letters[-1] == "L":
+            used.append((index, time_us))
+            skipped.append(passed)
+            records.append(run.board.record(SOON_S))
+            passed = 0
+        elif strobe == "alternating":
+            used.append((index, time_us))
+        else:
+            passed += 1
+        # The program has looked: it switched the laser over, or off and on again.
+        if strobe == "alternating":
+            run.laser(not on)
+        else:
+            run.board.wait_rises(LASER, rises + 1, SOON_S)
+    run.stop()
+    expect(not run.board.records, f"records of dark frames: {list(run.board.records)}")
+    expected = host_records(run, picked(run, "queue", frames, used))
+    expect(len(expected) == len(records), f"{len(records)} records, host_sim {len(expected)}")
+    for record, line, count in zip(records, expected, skipped):
+        same_but(record, line, **({"skipped": count} if count else {}))
+    return (f"{strobe}: {len(records)} records of {sequence} frames as host_sim's, "
+            f"{sum(skipped)} skipped")
 
 
 def case_late(run):
@@ -217,7 +269,7 @@ def case_unplugged(run):
     run.laser(1)
     board.record(SOON_S)
     # The shell keeps the device open, so that it does not come back yet.
-    low_ms = run.low_after("exec 6</dev/video1; unplug /dev/video1")
+    low_ms = run.low_after("exec 6</dev/video1; control /dev/video1 Disconnect 1")
     rises = board.rises[LASER]
     board.wait(lambda: sum("trying again" in line for line in board.log) >= 3, SOON_S,
                "third try to open the camera")
@@ -232,4 +284,4 @@ def case_unplugged(run):
 
 
 CASES = [case_gated, case_alternating, case_always, case_kinds, case_dropped, case_doubled,
-         case_in_flight, case_late, case_silent, case_truncated, case_unplugged]
+         case_in_flight, case_queue, case_late, case_silent, case_truncated, case_unplugged]

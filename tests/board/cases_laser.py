@@ -42,21 +42,27 @@ def case_interlock(run):
 
 def case_reload(run):
     """SIGHUP with a broken rig, then with a good one"""
-    board = run.board
-    run.start(run.gated, "gated")
-    run.lit_frame(run.gated, 0)
+    frames, board = run.alternating, run.board
+    rig = f"/rig/{frames.rig}.json"
+    run.start(frames, "gated")
+    run.lit_frame(frames, 0)
     run.laser(1)
-    board.command("cp /rig/gated.json /rig/good.json; echo broken >/rig/gated.json")
+    board.command(f"cp {rig} /rig/good.json; echo broken >{rig}")
     low_ms = run.low_after("kill -HUP $program")
     rises = board.rises[LASER]
-    run.give(run.gated, 1)
+    run.give(frames, 1)
     board.settle(2 * FRAME_S)
     expect(not board.records, f"a record without a rig: {list(board.records)}")
     expect(board.rises[LASER] == rises, "the laser went on without a rig")
-    board.command("cp /rig/good.json /rig/gated.json")
+    board.command(f"cp /rig/good.json {rig}")
     board.signal("HUP")
-    record = json.loads(run.lit_frame(run.gated, 2))
-    expect(record["labelled"] > 100, f"the first record afterwards: {record}")
+    board.wait(lambda: any("reloaded" in line for line in board.log), SOON_S, "reloaded rig")
+    # A camera gives frames while the laser is off too.
+    run.give(frames, 3, sequence=2)
+    record = json.loads(run.lit_frame(frames, 2, sequence=3))
+    expect(record["file"] == "000003.pgm" and record["labelled"] > 100,
+           f"the first record afterwards: {record}")
+    expect(record.get("strobe") != "reopened", f"the camera was opened anew: {record}")
     run.stop()
     return f"low {low_ms:.1f} ms later, no records with the broken one; goes on with the good one"
 
@@ -87,16 +93,20 @@ SIGNALS = {"TERM": 0, "INT": 0, "QUIT": -3, "ILL": -4, "TRAP": -5, "ABRT": -6, "
 
 def case_signals(run):
     """killed by each signal while the laser is on"""
-    board = run.board
-    slowest_ms = 0
-    for name, wanted in SIGNALS.items():
+    return signals(run, SIGNALS)
+
+
+def signals(run, names):
+    board, slowest_ms = run.board, 0
+    for name in names:
+        wanted = SIGNALS[name]
         run.start(run.gated, "gated")
         run.lit_frame(run.gated, 0)
         slowest_ms = max(slowest_ms, run.low_after(f"kill -{name} $program"))
         status = board.exit_status(SOON_S)
         expect(status == wanted, f"exit status {status} after SIG{name}, not {wanted}")
-        expect(board.levels[LASER] == 0, f"the laser's line is high after SIG{name}")
-    return f"{len(SIGNALS)} signals: low after at most {slowest_ms:.1f} ms, exit status as expected"
+        expect(not run.is_on(), f"the laser is on after SIG{name}")
+    return f"{len(names)} signals: low after at most {slowest_ms:.1f} ms, exit status as expected"
 
 
 def case_killed(run):
@@ -109,6 +119,7 @@ def case_killed(run):
     low_ms = run.low_after("kill -KILL $program")
     status = board.exit_status(SOON_S)
     expect(status == -9, f"exit status {status} after SIGKILL")
+    expect(not run.is_on(), "the laser is on after SIGKILL")
     return f"low {low_ms:.1f} ms later"
 
 
@@ -126,11 +137,7 @@ def case_all_killed(run):
     board.settle(1)
     expect(len(board.edges) == edges, "a line moves although all are dead")
     # Lines that do not exist are nothing to it.
-    board.start(f"{run.name} --laser-off --gpio-chip /dev/gpiochip0 --laser-line {LASER} "
-                "--interlock-line nothing --heartbeat-line 99")
-    status = board.exit_status(SOON_S)
-    expect(status == 0, f"exit status {status} of --laser-off: {board.log[-3:]}")
-    expect(board.levels[LASER] == 0, "the laser's line is high after --laser-off")
+    run.laser_off("--interlock-line nothing --heartbeat-line 99")
     return f"the line stays {stuck}, the heartbeat stops; low after --laser-off"
 
 

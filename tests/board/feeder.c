@@ -3,7 +3,11 @@
  *   feeder PORT DEVICE WIDTH HEIGHT FOURCC
  *
  * Goes into the background as soon as the device gives frames of that kind, so that whoever starts
- * it may open the camera next, and prints its process number; ends when it is killed. On PORT: a struct header, then its samples.
+ * it may open the camera next, and prints its process number; ends when it is killed. On PORT: a
+ * struct header, then its samples.
+ *
+ * Frames that are held back go together with the next one that is not, before anybody else runs on
+ * the board's one processor: who reads them finds them all.
  *
  * The bytes are the device's, which has BUFFERS of them (module parameter max_buffers); they are
  * used in turn. v4l2loopback's own order of OUTPUT buffers is not asked for: it hands out the one
@@ -11,6 +15,8 @@
  */
 #include <fcntl.h>
 #include <linux/videodev2.h>
+#include <sched.h>
+#include <stdbool.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -25,6 +31,8 @@ struct header {
     int64_t time_us;     /* of the frame's start; not 0, which v4l2loopback takes for "none" */
     uint32_t sequence;   /* the sensor's count of frames, lost ones included */
     uint32_t size_bytes; /* of the samples; less than a frame: what a broken transfer leaves */
+    uint32_t held;       /* not 0: not before the next one; at most BUFFERS - 1 in a row */
+    uint32_t unused;
 };
 
 static void fail(const char *what)
@@ -96,26 +104,41 @@ static void map_buffers(int device, char *samples[BUFFERS], uint32_t *size_bytes
     }
 }
 
+static void fill(int port, struct v4l2_buffer *buffer, char *samples, uint32_t size_bytes,
+                 bool *held)
+{
+    struct header header;
+    read_all(port, &header, sizeof header);
+    if (header.size_bytes > size_bytes) {
+        fprintf(stderr, "feeder: %u bytes for a buffer of %u\n", header.size_bytes, size_bytes);
+        exit(1);
+    }
+    read_all(port, samples, header.size_bytes);
+    buffer->sequence = header.sequence;
+    buffer->bytesused = header.size_bytes;
+    buffer->timestamp.tv_sec = header.time_us / 1000000;
+    buffer->timestamp.tv_usec = header.time_us % 1000000;
+    *held = header.held != 0;
+}
+
 static void feed(int port, int device, char *samples[BUFFERS], uint32_t size_bytes)
 {
+    struct v4l2_buffer waiting[BUFFERS];
+    uint32_t count = 0;
     for (uint32_t index = 0;; index = (index + 1) % BUFFERS) {
-        struct header header;
-        read_all(port, &header, sizeof header);
-        if (header.size_bytes > size_bytes) {
-            fprintf(stderr, "feeder: %u bytes for a buffer of %u\n", header.size_bytes, size_bytes);
-            exit(1);
+        bool held = false;
+        waiting[count] = (struct v4l2_buffer){.index = index,
+                                              .type = V4L2_BUF_TYPE_VIDEO_OUTPUT,
+                                              .memory = V4L2_MEMORY_MMAP,
+                                              .field = V4L2_FIELD_NONE};
+        fill(port, &waiting[count++], samples[index], size_bytes, &held);
+        if (held && count < BUFFERS)
+            continue;
+        for (uint32_t i = 0; i < count; i++) {
+            if (ioctl(device, VIDIOC_QBUF, &waiting[i]) != 0)
+                fail("feeder: VIDIOC_QBUF");
         }
-        read_all(port, samples[index], header.size_bytes);
-        struct v4l2_buffer buffer = {.index = index,
-                                     .type = V4L2_BUF_TYPE_VIDEO_OUTPUT,
-                                     .memory = V4L2_MEMORY_MMAP,
-                                     .field = V4L2_FIELD_NONE,
-                                     .sequence = header.sequence,
-                                     .bytesused = header.size_bytes};
-        buffer.timestamp.tv_sec = header.time_us / 1000000;
-        buffer.timestamp.tv_usec = header.time_us % 1000000;
-        if (ioctl(device, VIDIOC_QBUF, &buffer) != 0)
-            fail("feeder: VIDIOC_QBUF");
+        count = 0;
     }
 }
 
@@ -145,6 +168,9 @@ int main(int argc, char **argv)
         printf("%d\n", (int)child);
         return 0;
     }
+    struct sched_param first = {.sched_priority = 1};
+    if (sched_setscheduler(0, SCHED_FIFO, &first) != 0)
+        fail("feeder: sched_setscheduler");
     close(STDOUT_FILENO); /* whoever reads the child's number waits for this */
     feed(port, device, samples, size_bytes);
     return 0;

@@ -29,9 +29,10 @@ $apt unpack "$unpacked" "$image:arm64" "linux-headers-$release:arm64" "$common" 
 headers=$unpacked/usr/src/linux-headers-$release
 sed -i "s|^include /usr/src/|include $unpacked/usr/src/|" "$headers/Makefile"
 
-# Two lines of v4l2loopback are not as a camera's driver would have them. Frames that are queued with
+# Three lines of v4l2loopback are not as a camera's driver would have them. Frames that are queued with
 # a time stamp get no number: it shall be the feeder's, and the stamp of the monotonic clock. And the
-# frame rate can be set, but it does not say so.
+# frame rate can be set, but it does not say so. And whoever is more than two frames behind gets the last
+# one only: a camera's driver keeps as many as it has buffers.
 tar -x -C "$unpacked" -f "$unpacked/usr/src/v4l2loopback.tar.bz2"
 source=$unpacked/modules/v4l2loopback
 change() {
@@ -42,6 +43,8 @@ change() {
 change 'b->buffer.bytesused = buf->bytesused;' "& b->buffer.sequence = buf->sequence;\
     b->buffer.flags |= V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC;"
 change 'capture_param->capability = 0;' 'capture_param->capability = V4L2_CAP_TIMEPERFRAME;'
+change 'if (dev->write_position > opener->read_position + 2)' \
+    'if (dev->write_position > opener->read_position + dev->used_buffers)'
 make -C "$headers" ARCH=arm64 CROSS_COMPILE=aarch64-linux-gnu- M="$source" modules \
     >"$out/log" 2>&1 || { tail -n 20 "$out/log" >&2; exit 1; }
 
@@ -53,7 +56,7 @@ PATH=$PATH:/sbin:/usr/sbin
 depmod -b "$unpacked" "$release"
 modules=$out/root/lib/modules/$release
 mkdir -p "$modules"
-for module in virtio_mmio virtio_console v4l2loopback vivid; do
+for module in virtio_mmio virtio_console virtio_net v4l2loopback vivid; do
     modprobe -d "$unpacked" -S "$release" --ignore-install --show-depends "$module" |
         while read -r verb file rest; do
             [ "$verb" != insmod ] || cp "$file" "$modules/"

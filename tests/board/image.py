@@ -222,7 +222,7 @@ class Board:
 
     def send_frame(self, frames, index):
         samples = frames.samples[index]
-        head = struct.pack("<qII", frames.times_us[index], index, len(samples))
+        head = struct.pack("<qIIII", frames.times_us[index], index, len(samples), 0, 0)
         self.sockets["frames"].sendall(head + samples)
 
     def first_record(self, frames):

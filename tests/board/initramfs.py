@@ -67,17 +67,19 @@ class Archive:
                 file.write(head + bytes(-len(head) % 4) + content + bytes(-len(content) % 4))
 
 
-def build(out, root, program, sysroot, tools, files):
-    """root: what get.sh has made; tools: our own helpers; files: {name on the board: path}."""
+def build(out, root, programs, sysroot, tools, files):
+    """root: what get.sh has made; tools: our own helpers, linked statically; programs, files: {name
+    on the board: path}."""
     here = os.path.dirname(os.path.abspath(__file__))
     archive = Archive()
     archive.add_tree(root)
     archive.add_file("init", os.path.join(here, "init"))
-    for path in [program, *tools]:
+    for path in tools:
         archive.add_file("bin/" + os.path.basename(path), path)
-    for name, path in needed_libraries(program, sysroot).items():
-        folder = "lib" if name.startswith("ld-linux") else "lib/aarch64-linux-gnu"
-        archive.add_file(f"{folder}/{name}", path)
-    for name, path in files.items():
+    for program in programs.values():
+        for name, path in needed_libraries(program, sysroot).items():
+            folder = "lib" if name.startswith("ld-linux") else "lib/aarch64-linux-gnu"
+            archive.add_file(f"{folder}/{name}", path)
+    for name, path in {**programs, **files}.items():
         archive.add_file(name, path)
     archive.write(out)

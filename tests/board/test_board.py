@@ -2,7 +2,10 @@
 """isohead_board on the emulated board (board.py): what it does with frames, faults and signals, and
 where the laser's line stands meanwhile.
 
-test_board.py --program FILE --sysroot DIR --host-sim FILE --render FILE --board DIR [CASE...]
+test_board.py --program FILE --program2 FILE --sysroot DIR --host-sim FILE --render FILE --board DIR
+              [CASE...]
+
+--program, --program2: built with libgpiod 1 and 2.
 
 --board: what get.sh has made; logs and rendered frames go there too. Frames come when the laser's
 line says so, never by the clock, so that a slow machine changes no result. Exit status 1 if a case
@@ -14,10 +17,16 @@ import signal
 import sys
 import time
 
+import cases_camera
+import cases_end
 import cases_frames
+import cases_gpio
 import cases_laser
+import cases_output
 from board import BoardError
 from run import Run, Wrong
+
+MODULES = [cases_frames, cases_camera, cases_laser, cases_gpio, cases_end, cases_output]
 
 
 def run_case(run, case):
@@ -33,11 +42,11 @@ def run_case(run, case):
 
 def main():
     parser = argparse.ArgumentParser()
-    for name in ["program", "sysroot", "host-sim", "render", "board"]:
+    for name in ["program", "program2", "sysroot", "host-sim", "render", "board"]:
         parser.add_argument("--" + name, required=True)
     parser.add_argument("case", nargs="*")
     arguments = parser.parse_args()
-    chosen = [case for case in cases_frames.CASES + cases_laser.CASES
+    chosen = [case for module in MODULES for case in module.CASES
               if not arguments.case or case.__name__[len("case_"):] in arguments.case]
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # by way of "finally"
     begin = time.monotonic()
