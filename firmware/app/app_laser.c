@@ -100,8 +100,10 @@ static void switch_on(struct app_laser *laser)
         return;
     }
     /* Two edges, so that one of them rises: a one-shot that has run out lets light through at once. */
-    if (!beat(laser) || !beat(laser)) {
-        return;
+    for (int edge = 0; edge < 2; edge++) {
+        if (!beat(laser)) {
+            return;
+        }
     }
     laser->is_on = true;
     laser->on_count++;
