@@ -83,6 +83,7 @@ static void reload_rig(struct app_loop *loop)
     if (loop->rig_is_valid) {
         app_log_say(loop->log, APP_LOG_INFO, "%s: reloaded", loop->config->rig);
         app_laser_rig(&loop->laser, true, now(loop));
+        app_frame_light(loop);
     } else {
         app_log_say(loop->log, APP_LOG_ERROR, "%s: %s; no records until a good one is reloaded",
                     loop->config->rig, error.text);

@@ -66,7 +66,8 @@ enum world_act {
     WORLD_INTERLOCK_CLOSES,
     WORLD_INTERLOCK_BLINKS, /* opens and closes */
     WORLD_RELOAD,
-    WORLD_UNPLUGGED, /* the camera is gone, and cannot be opened for a while */
+    WORLD_RELOAD_ALONE, /* and no frame; the rig and next_rig change places */
+    WORLD_UNPLUGGED,    /* the camera is gone, and cannot be opened for a while */
     WORLD_STOP
 };
 
@@ -482,6 +483,13 @@ static void world_step(void)
         world.config.rig = world.next_rig != NULL ? world.next_rig : world.config.rig;
         world.events |= HAL_EVENT_RELOAD;
         break;
+    case WORLD_RELOAD_ALONE: {
+        const char *rig = world.config.rig;
+        world.config.rig = world.next_rig;
+        world.next_rig = rig;
+        world.events |= HAL_EVENT_RELOAD;
+        return;
+    }
     case WORLD_INTERLOCK_OPENS:
         world_move_interlock(false);
         break;

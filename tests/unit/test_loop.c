@@ -205,6 +205,21 @@ static void test_reload_bad(void)
     }
 }
 
+/* A good one after a bad one: the very next frame is lit. A camera that waits for the laser sends none
+ * without. */
+static void test_reload_good_again(void)
+{
+    static const enum world_act acts[] = {FIVE, WORLD_RELOAD_ALONE, WORLD_FRAME, WORLD_RELOAD_ALONE,
+                                          FIVE};
+    for (int mode = 0; mode < 3; mode++) {
+        world_init((enum app_strobe)mode, acts, COUNT(acts));
+        world.next_rig = "bad";
+        TEST_ASSERT_EQUAL_INT(APP_EXIT_GOOD, world_run());
+        TEST_ASSERT_EQUAL_INT(0, world.dark_count);
+        TEST_ASSERT_EQUAL_INT(mode == APP_STROBE_ALTERNATING ? 6 : 10, world.lit_count);
+    }
+}
+
 static void test_no_rig(void)
 {
     static const enum world_act acts[] = {FIVE};
@@ -480,6 +495,7 @@ int main(void)
     RUN_TEST(test_plugged_in_late);
     RUN_TEST(test_reload);
     RUN_TEST(test_reload_bad);
+    RUN_TEST(test_reload_good_again);
     RUN_TEST(test_no_rig);
     RUN_TEST(test_without_laser);
     RUN_TEST(test_nothing_in_range);
