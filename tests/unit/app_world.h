@@ -485,7 +485,7 @@ static void world_step(void)
         break;
     case WORLD_RELOAD_ALONE: {
         const char *rig = world.config.rig;
-        world.config.rig = world.next_rig;
+        world.config.rig = world.next_rig != NULL ? world.next_rig : rig;
         world.next_rig = rig;
         world.events |= HAL_EVENT_RELOAD;
         return;
