@@ -40,32 +40,46 @@ static void place_centres(struct ih_surface_scratch *scratch)
     }
 }
 
-static void fill_row(const struct ih_sample *sample, struct ih_surface_scratch *scratch)
+/* The sample's row of the basis, as number `at` of those side by side. */
+static void fill_row(struct ih_surface_scratch *scratch, const struct ih_sample *sample, int32_t at)
 {
     for (int32_t i = 0; i < TERMS; i++) {
         int64_t dx = (int64_t)sample->x_q16 - scratch->centre_q16[i % IH_SURFACE_CENTRES];
         int64_t dy = (int64_t)sample->y_q16 - scratch->centre_q16[i / IH_SURFACE_CENTRES];
-        scratch->row_q20[i] = basis_q20(dx, dy);
+        scratch->row_q20[i][at] = basis_q20(dx, dy);
     }
 }
 
-/* Add sign times the sample's weighted row to the normal equations. Exact in integers, so taking a
- * row out again leaves no trace. */
-static void accumulate(struct ih_surface_scratch *scratch, const struct ih_sample *sample,
-                       int32_t mean_mm_q8, int32_t root_weight_q15, int64_t sign)
+static void weigh_row(struct ih_surface_scratch *scratch, const struct ih_sample *sample,
+                      int32_t mean_mm_q8, int32_t root_weight_q15, int32_t at)
 {
-    int32_t row[TERMS];
     for (int32_t i = 0; i < TERMS; i++) {
-        row[i] = (int32_t)ih_mul_shift(scratch->row_q20[i], root_weight_q15, 15);
+        int32_t *entry = &scratch->row_q20[i][at];
+        *entry = (int32_t)ih_mul_shift(*entry, root_weight_q15, 15);
     }
-    int64_t depth_q8 = ih_mul_shift((int64_t)sample->depth_mm_q8 - mean_mm_q8, root_weight_q15, 15);
-    int64_t *normal = scratch->normal_q40;
+    scratch->off_mm_q8[at] =
+        (int32_t)ih_mul_shift((int64_t)sample->depth_mm_q8 - mean_mm_q8, root_weight_q15, 15);
+}
+
+static int64_t dot_of_rows(const int32_t *a, const int32_t *b)
+{
+    int64_t sum = 0;
+    for (int32_t k = 0; k < IH_SURFACE_ROWS; k++) {
+        sum += (int64_t)a[k] * b[k];
+    }
+    return sum;
+}
+
+/* Add the weighted rows to the normal equations. */
+static void add_rows(struct ih_surface_scratch *scratch)
+{
+    int64_t *normal = scratch->of.normal_q40;
     for (int32_t i = 0; i < TERMS; i++) {
-        int64_t signed_row = sign * row[i];
+        const int32_t *row = scratch->row_q20[i];
         for (int32_t j = 0; j <= i; j++) {
-            *normal++ += signed_row * row[j];
+            *normal++ += dot_of_rows(row, scratch->row_q20[j]);
         }
-        scratch->right_q28[i] += signed_row * depth_q8;
+        scratch->right_q28[i] += dot_of_rows(row, scratch->off_mm_q8);
     }
 }
 
@@ -78,39 +92,28 @@ static int32_t mean_depth_mm_q8(const struct ih_samples *samples)
     return (int32_t)ih_div_round(sum, samples->sample_count);
 }
 
-static void assemble(const struct ih_samples *samples, struct ih_surface_scratch *scratch,
-                     struct ih_surface *out)
-{
-    memset(scratch->normal_q40, 0, sizeof scratch->normal_q40);
-    memset(scratch->right_q28, 0, sizeof scratch->right_q28);
-    out->mean_mm_q8 = mean_depth_mm_q8(samples);
-    for (int32_t i = 0; i < samples->sample_count; i++) {
-        const struct ih_sample *sample = &samples->sample[i];
-        fill_row(sample, scratch);
-        accumulate(scratch, sample, out->mean_mm_q8, sample->root_weight_q15, 1);
-        out->root_weight_q15[i] = sample->root_weight_q15;
-    }
-}
-
-/* N scaled to diagonal 0.99, with ridge, in Q30. */
+/* N scaled to diagonal 0.99, with ridge, in Q30, row by row in N's place: a row of the factor ends
+ * before the next one of N begins. Rows are copied because the same bytes change their type. */
 static void scale_system(const struct ih_surface_params *params, struct ih_surface_scratch *scratch)
 {
-    const int64_t *normal = scratch->normal_q40;
-    int32_t *factor = scratch->factor_q30;
+    int32_t row[TERMS];
     for (int32_t i = 0; i < TERMS; i++) {
-        uint64_t diagonal = (uint64_t)normal[IH_CHOLESKY_PACKED(i + 1) - 1];
+        uint64_t diagonal = (uint64_t)scratch->of.normal_q40[IH_CHOLESKY_PACKED(i + 1) - 1];
         int64_t root = (int64_t)ih_isqrt_u64(diagonal) + 1; /* + 1: the scaled diagonal stays < 1 */
         int64_t scale = SCALE_NUMERATOR / root;
         scratch->scale[i] = (uint32_t)(scale < SCALE_MAX ? scale : SCALE_MAX);
     }
     for (int32_t i = 0; i < TERMS; i++) {
+        const int64_t *normal = &scratch->of.normal_q40[IH_CHOLESKY_PACKED(i)];
         for (int32_t j = 0; j <= i; j++) {
             /* |N_ij| <= root_i root_j: after the first step below 2^47 */
-            int64_t half = ih_mul_wide_shift(*normal++, scratch->scale[i], 36);
-            *factor++ = ih_saturate_s32(
+            int64_t half = ih_mul_wide_shift(normal[j], scratch->scale[i], 36);
+            row[j] = ih_saturate_s32(
                 ih_mul_wide_shift(half, scratch->scale[j], 2 * SCALE_SHIFT - 36 - 30));
         }
-        factor[-1] += (int32_t)ih_mul_shift(factor[-1], params->ridge_q30, 30);
+        row[i] += (int32_t)ih_mul_shift(row[i], params->ridge_q30, 30);
+        memcpy(&scratch->of.factor_q30[IH_CHOLESKY_PACKED(i)], row,
+               (size_t)(i + 1) * sizeof row[0]);
     }
 }
 
@@ -127,7 +130,7 @@ static int scale_right(const struct ih_samples *samples, int32_t mean_mm_q8,
     int bits = ih_bits_u64(ih_isqrt_u64(norm2_q16)); /* of the norm in Q8 */
     int fraction = ih_min_s32(8 + RIGHT_BITS - bits, 24);
     for (int32_t i = 0; i < TERMS; i++) {
-        scratch->right[i] = ih_saturate_s32(ih_mul_wide_shift(
+        scratch->solution[i] = ih_saturate_s32(ih_mul_wide_shift(
             scratch->right_q28[i], scratch->scale[i], SCALE_SHIFT + 8 - fraction));
     }
     return fraction;
@@ -154,11 +157,12 @@ static bool solve(const struct ih_samples *samples, const struct ih_surface_para
 {
     int32_t bad_pivot, exponent;
     scale_system(params, scratch);
-    if (ih_cholesky_factor(scratch->factor_q30, TERMS, &bad_pivot) != IH_OK) {
+    if (ih_cholesky_factor(scratch->of.factor_q30, TERMS, &bad_pivot) != IH_OK) {
         return false;
     }
     int fraction = scale_right(samples, mean_mm_q8, scratch);
-    ih_cholesky_solve(scratch->factor_q30, TERMS, scratch->right, scratch->solution, &exponent);
+    ih_cholesky_solve(scratch->of.factor_q30, TERMS, scratch->solution, scratch->solution,
+                      &exponent);
     unscale_solution(scratch, fraction - exponent);
     return true;
 }
@@ -172,31 +176,47 @@ static int32_t depth_of_sum(const struct ih_surface_scratch *scratch, int32_t me
     return ih_saturate_s32(mean_mm_q8 + depth_q8);
 }
 
-/* Huber step: samples that are too far from the surface get less weight; only their rows change. */
-static int32_t reweight(const struct ih_samples *samples, const struct ih_surface_params *params,
+/* Huber step: a sample that is too far from the surface gets less weight. Row number `at` is its
+ * own, without weight. False when it is near enough. */
+static bool reweight(const struct ih_surface_scratch *scratch, const struct ih_sample *sample,
+                     const struct ih_surface_params *params, int32_t at, int32_t mean_mm_q8,
+                     int32_t *root_weight_q15)
+{
+    int64_t limit_q8 = (int64_t)params->huber_mm << 8;
+    int64_t sum = 0;
+    for (int32_t k = 0; k < TERMS; k++) {
+        sum += (int64_t)scratch->solution[k] * scratch->row_q20[k][at];
+    }
+    int64_t off_q8 =
+        ih_abs_s64((int64_t)sample->depth_mm_q8 - depth_of_sum(scratch, mean_mm_q8, sum));
+    if (off_q8 <= limit_q8) {
+        return false;
+    }
+    /* sqrt(limit / off) in Q15 */
+    int64_t root_q15 = ih_isqrt_u64((uint64_t)ih_div_round(limit_q8 * (1 << 30), off_q8));
+    *root_weight_q15 = (int32_t)ih_mul_shift(sample->root_weight_q15, root_q15, 15);
+    return true;
+}
+
+/* The normal equations of all samples. huber: NULL for the samples' own weights; else samples that
+ * are too far from the surface that was solved last get less. Returns how many do. */
+static int32_t assemble(const struct ih_samples *samples, const struct ih_surface_params *huber,
                         struct ih_surface_scratch *scratch, struct ih_surface *out)
 {
     int32_t changed = 0;
-    int64_t limit_q8 = (int64_t)params->huber_mm << 8;
-    for (int32_t i = 0; i < samples->sample_count; i++) {
-        const struct ih_sample *sample = &samples->sample[i];
-        fill_row(sample, scratch);
-        int64_t sum = 0;
-        for (int32_t k = 0; k < TERMS; k++) {
-            sum += (int64_t)scratch->solution[k] * scratch->row_q20[k];
+    memset(scratch->of.normal_q40, 0, sizeof scratch->of.normal_q40);
+    memset(scratch->right_q28, 0, sizeof scratch->right_q28);
+    for (int32_t first = 0; first < samples->sample_count; first += IH_SURFACE_ROWS) {
+        memset(scratch->row_q20, 0, sizeof scratch->row_q20); /* the last ones may be fewer */
+        for (int32_t i = first; i < samples->sample_count && i < first + IH_SURFACE_ROWS; i++) {
+            const struct ih_sample *sample = &samples->sample[i];
+            fill_row(scratch, sample, i - first);
+            out->root_weight_q15[i] = sample->root_weight_q15;
+            changed += huber != NULL && reweight(scratch, sample, huber, i - first, out->mean_mm_q8,
+                                                 &out->root_weight_q15[i]);
+            weigh_row(scratch, sample, out->mean_mm_q8, out->root_weight_q15[i], i - first);
         }
-        int64_t off_q8 =
-            ih_abs_s64((int64_t)sample->depth_mm_q8 - depth_of_sum(scratch, out->mean_mm_q8, sum));
-        if (off_q8 <= limit_q8) {
-            continue;
-        }
-        /* sqrt(limit / off) in Q15 */
-        int64_t root_q15 = ih_isqrt_u64((uint64_t)ih_div_round(limit_q8 * (1 << 30), off_q8));
-        int32_t weight = (int32_t)ih_mul_shift(sample->root_weight_q15, root_q15, 15);
-        accumulate(scratch, sample, out->mean_mm_q8, out->root_weight_q15[i], -1);
-        accumulate(scratch, sample, out->mean_mm_q8, weight, 1);
-        out->root_weight_q15[i] = weight;
-        changed++;
+        add_rows(scratch);
     }
     return changed;
 }
@@ -210,7 +230,8 @@ static void fill_table(struct ih_surface_scratch *scratch)
         for (int64_t a = 0; a < IH_SURFACE_STEPS; a++) {
             int64_t radicand_q42 = ih_div_round(
                 ((a * a + b * b) * numerator2 + denominator2) * ((int64_t)1 << 42), denominator2);
-            scratch->table_q20[b][a] = (int32_t)((ih_isqrt_u64((uint64_t)radicand_q42) + 1) >> 1);
+            scratch->of.table_q20[b][a] =
+                (int32_t)((ih_isqrt_u64((uint64_t)radicand_q42) + 1) >> 1);
         }
     }
 }
@@ -245,7 +266,7 @@ static void evaluate(const struct ih_samples *samples, const struct ih_surface_s
             for (int32_t i = 0; i < TERMS; i++) {
                 int32_t b = steps_between(y, i / IH_SURFACE_CENTRES);
                 int32_t a = steps_between(x, i % IH_SURFACE_CENTRES);
-                sum += (int64_t)scratch->solution[i] * scratch->table_q20[b][a];
+                sum += (int64_t)scratch->solution[i] * scratch->of.table_q20[b][a];
             }
             out->depth_mm_q8[y][x] = ih_clamp_s32(depth_of_sum(scratch, out->mean_mm_q8, sum),
                                                   least_q8, IH_SURFACE_DEPTH_MAX_MM << 8);
@@ -264,11 +285,12 @@ void ih_surface_fit(const struct ih_samples *samples, const struct ih_field *fie
         return;
     }
     place_centres(scratch);
-    assemble(samples, scratch, out);
+    out->mean_mm_q8 = mean_depth_mm_q8(samples);
+    assemble(samples, NULL, scratch, out);
     if (!solve(samples, params, out->mean_mm_q8, scratch)) {
         return;
     }
-    out->downweighted_count = reweight(samples, params, scratch, out);
+    out->downweighted_count = assemble(samples, params, scratch, out);
     if (out->downweighted_count > 0 && !solve(samples, params, out->mean_mm_q8, scratch)) {
         return;
     }

@@ -14,8 +14,8 @@
  *        rounded to Q30; the ridge keeps the least pivot above 3e-3.
  * Error: within 0.2 mm of the float64 solution of the same system, everywhere on the grid, for
  *        depths that span up to 1.5 m (ih_samples clips them); it grows with the span.
- * Cost:  samples x 144 square roots; samples x 10,440 multiply-adds; two factorisations of n = 144;
- *        grid x 144 multiply-adds.
+ * Cost:  twice samples x 144 square roots and samples x 10,440 multiply-adds; two factorisations of
+ *        n = 144; grid x 144 multiply-adds.
  */
 #ifndef IH_SURFACE_H
 #define IH_SURFACE_H
@@ -57,16 +57,25 @@ struct ih_surface {
     int32_t depth_mm_q8[IH_SURFACE_GRID][IH_SURFACE_GRID]; /* [y][x] */
 };
 
+/* Basis rows that are added to the normal equations together: a sum of 4 is 4 times less reading and
+ * writing of 84 kB. */
+#define IH_SURFACE_ROWS 4
+
 struct ih_surface_scratch {
-    int64_t normal_q40[IH_CHOLESKY_PACKED(IH_SURFACE_TERMS)];
-    int32_t factor_q30[IH_CHOLESKY_PACKED(IH_SURFACE_TERMS)];
+    /* One after the other: the factor takes the place of the normal equations, which are summed
+     * anew with the Huber step's weights; the table takes that of the factor. */
+    union {
+        int64_t normal_q40[IH_CHOLESKY_PACKED(IH_SURFACE_TERMS)];
+        int32_t factor_q30[IH_CHOLESKY_PACKED(IH_SURFACE_TERMS)];
+        int32_t table_q20[IH_SURFACE_STEPS][IH_SURFACE_STEPS];
+    } of;
     int64_t right_q28[IH_SURFACE_TERMS];
-    int32_t row_q20[IH_SURFACE_TERMS];
-    uint32_t scale[IH_SURFACE_TERMS]; /* 0.995 * 2^51 / sqrt(N_ii), N in Q40 */
-    int32_t right[IH_SURFACE_TERMS], solution[IH_SURFACE_TERMS];
+    int32_t row_q20[IH_SURFACE_TERMS][IH_SURFACE_ROWS]; /* rows side by side */
+    int32_t off_mm_q8[IH_SURFACE_ROWS];                 /* their depths, less the mean, weighted */
+    uint32_t scale[IH_SURFACE_TERMS];                   /* 0.995 * 2^51 / sqrt(N_ii), N in Q40 */
+    int32_t solution[IH_SURFACE_TERMS];                 /* the right side before */
     int32_t solution_shift; /* coefficient = solution / 2^solution_shift, mm per field unit */
     int32_t centre_q16[IH_SURFACE_CENTRES]; /* places of the centres in a row, field units */
-    int32_t table_q20[IH_SURFACE_STEPS][IH_SURFACE_STEPS];
 };
 
 void ih_surface_params_default(struct ih_surface_params *params);

@@ -22,7 +22,7 @@
 #define ISOHEAD_VERSION "0.1.0"
 
 /* RAM for the whole state, the frame itself not included. */
-#define IH_RAM_MAX (232 * 1024)
+#define IH_RAM_MAX (192 * 1024)
 
 struct ih_params {
     bool is_paper; /* the paper's method alone: every frame on its own, nests judged by limits */
