@@ -39,18 +39,18 @@ uint32_t ih_isqrt_u64(uint64_t value)
     if (value < 2) {
         return (uint32_t)value;
     }
-    /* Newton from above: the start 2^ceil(bits/2) is at least the root (limited to 2^32 - 1, which
-     * is at least floor(root) for every input), each step halves the excess, and the sequence
-     * falls until it reaches floor(root). */
+    /* Newton from above: from any start that is at least floor(root) each step comes nearer, and
+     * the first whose square is not above the value is floor(root). The start is a tangent of the
+     * root: with x = value / 4^half in 1/4 .. 1 it is x + 1/4 below a half, (x + 1) / 2 above, 6 %
+     * too large at most. */
     int bits = ih_bits_u64(value);
-    uint64_t root = bits > 62 ? UINT32_MAX : (uint64_t)1 << ((bits + 1) / 2);
-    for (;;) {
-        uint64_t next = (root + value / root) / 2;
-        if (next >= root) {
-            return (uint32_t)root;
-        }
-        root = next;
+    int half = (bits + 1) / 2;
+    uint64_t root = bits % 2 != 0 ? (value >> half) + ((uint64_t)1 << (half - 2))
+                                  : ((value >> half) + ((uint64_t)1 << half)) / 2;
+    while (root * root > value) {
+        root = (root + value / root) / 2;
     }
+    return (uint32_t)root;
 }
 
 /* atan(2^-i) in millionths of a degree. */
