@@ -32,18 +32,33 @@ static void undistort_dots(const struct ih_dots *dots, const struct ih_rig *rig,
     }
 }
 
-/* Candidates of one slot. Places are within 2^28.4 in Q12 (8192 px focal length, tan
- * below 6), times a Q30 unit vector: two products, below 2^60.4. */
+/* Where a dot is on a line, and how far beside it. Places are within 2^28.4 in Q12 (8192 px focal
+ * length, tan below 6), times a Q30 unit vector: two products, below 2^60.4. */
+static int64_t along_line(const struct ih_labels_scratch *scratch, int32_t dot,
+                          const struct ih_line *line)
+{
+    int64_t du = scratch->u_px_q12[dot] - line->infinity_u_px_q12;
+    int64_t dv = scratch->v_px_q12[dot] - line->infinity_v_px_q12;
+    return ih_shift_round(du * line->dir_u_q30 + dv * line->dir_v_q30, 30);
+}
+
+static int64_t beside_line(const struct ih_labels_scratch *scratch, int32_t dot,
+                           const struct ih_line *line)
+{
+    int64_t du = scratch->u_px_q12[dot] - line->infinity_u_px_q12;
+    int64_t dv = scratch->v_px_q12[dot] - line->infinity_v_px_q12;
+    return ih_shift_round(dv * line->dir_u_q30 - du * line->dir_v_q30, 30);
+}
+
+/* Candidates of one slot. */
 static void find_candidates(const struct ih_dots *dots, const struct ih_line *line, int32_t slot,
                             const struct ih_labels_params *params,
                             struct ih_labels_scratch *scratch, struct ih_labels *out)
 {
     int8_t count = 0;
     for (int32_t i = 0; i < dots->dot_count; i++) {
-        int64_t du = scratch->u_px_q12[i] - line->infinity_u_px_q12;
-        int64_t dv = scratch->v_px_q12[i] - line->infinity_v_px_q12;
-        int64_t perp = ih_shift_round(dv * line->dir_u_q30 - du * line->dir_v_q30, 30);
-        int64_t t = ih_shift_round(du * line->dir_u_q30 + dv * line->dir_v_q30, 30);
+        int64_t perp = beside_line(scratch, i, line);
+        int64_t t = along_line(scratch, i, line);
         if (ih_abs_s64(perp) > params->perp_max_px_q12 ||
             t < line->t_far_px_q12 - RANGE_MARGIN_PX_Q12 ||
             t > line->t_near_px_q12 + RANGE_MARGIN_PX_Q12 || t <= 0) {
@@ -54,7 +69,6 @@ static void find_candidates(const struct ih_dots *dots, const struct ih_line *li
             continue;
         }
         scratch->candidate[slot][count++] = (struct ih_candidate){
-            .t_px_q12 = (int32_t)t,
             /* t in Q12 over length in Q8: 36 + 8 - 12 = 32 more bits give Q36 */
             .inverse_depth_q36 =
                 ih_saturate_s32(ih_div_round(t * ((int64_t)1 << 32), line->length_px_mm_q8)),
@@ -371,7 +385,8 @@ static void grow(const struct ih_rig *rig, const struct ih_labels_params *params
     }
 }
 
-static void write_table(const struct ih_labels_scratch *scratch, struct ih_labels *out)
+static void write_table(const struct ih_labels_scratch *scratch, const struct ih_rig *rig,
+                        struct ih_labels *out)
 {
     out->labelled_count = 0;
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
@@ -381,7 +396,7 @@ static void write_table(const struct ih_labels_scratch *scratch, struct ih_label
         if (scratch->choice[slot] != IH_NONE) {
             const struct ih_candidate *c = candidate_of(scratch, slot, scratch->choice[slot]);
             out->dot_of_slot[slot] = c->dot;
-            out->t_px_q12[slot] = c->t_px_q12;
+            out->t_px_q12[slot] = (int32_t)along_line(scratch, c->dot, &rig->line[slot]);
             out->perp_px_q12[slot] = c->perp_px_q12;
             out->labelled_count++;
         }
@@ -403,5 +418,5 @@ void ih_labels_assign(const struct ih_dots *dots, const struct ih_rig *rig,
         out->seed_count += scratch->choice[slot] != IH_NONE;
     }
     grow(rig, params, scratch);
-    write_table(scratch, out);
+    write_table(scratch, rig, out);
 }

@@ -24,7 +24,7 @@
 #include "ih_dots.h"
 #include "ih_rig.h"
 
-/* Candidates kept per slot; each costs 12 bytes a slot. With a 125 mm baseline a line crosses the
+/* Candidates kept per slot; each costs 8 bytes a slot. With a 125 mm baseline a line crosses the
  * places of about ten others. */
 #define IH_LABELS_CANDIDATES_MAX 16
 
@@ -46,7 +46,6 @@ struct ih_labels {
 };
 
 struct ih_candidate {
-    int32_t t_px_q12;
     int32_t inverse_depth_q36; /* 1/mm */
     int16_t perp_px_q12;
     int16_t dot;
