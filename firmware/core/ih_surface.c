@@ -23,14 +23,6 @@ void ih_surface_params_default(struct ih_surface_params *params)
     };
 }
 
-/* sqrt(dx^2 + dy^2 + 1), Q20, rounded. dx, dy < 60 in Q16: the radicand in Q42 is below 2^55. */
-static int32_t basis_q20(int64_t dx_q16, int64_t dy_q16)
-{
-    uint64_t radicand_q32 =
-        (uint64_t)(dx_q16 * dx_q16) + (uint64_t)(dy_q16 * dy_q16) + ((uint64_t)1 << 32);
-    return (int32_t)((ih_isqrt_u64(radicand_q32 << 10) + 1) >> 1);
-}
-
 /* Places of a row or column of centres: (2 k - 11) * 20 / 11 field units. */
 static void place_centres(struct ih_surface_scratch *scratch)
 {
@@ -40,25 +32,45 @@ static void place_centres(struct ih_surface_scratch *scratch)
     }
 }
 
-/* The sample's row of the basis, as number `at` of those side by side. */
-static void fill_row(struct ih_surface_scratch *scratch, const struct ih_sample *sample, int32_t at)
+/* The first `terms` entries of the sample's row of the basis, as number `at` of those side by side:
+ * sqrt(dx^2 + dy^2 + 1), Q20, rounded. dx, dy < 60 in Q16: the radicand in Q42 is below 2^55. */
+static void fill_row(struct ih_surface_scratch *scratch, const struct ih_sample *sample, int32_t at,
+                     int32_t terms)
 {
-    for (int32_t i = 0; i < TERMS; i++) {
-        int64_t dx = (int64_t)sample->x_q16 - scratch->centre_q16[i % IH_SURFACE_CENTRES];
-        int64_t dy = (int64_t)sample->y_q16 - scratch->centre_q16[i / IH_SURFACE_CENTRES];
-        scratch->row_q20[i][at] = basis_q20(dx, dy);
+    uint64_t dx2_q32[IH_SURFACE_CENTRES];
+    uint64_t dy2_q32 = 0;
+    for (int32_t k = 0; k < IH_SURFACE_CENTRES; k++) {
+        int64_t dx = (int64_t)sample->x_q16 - scratch->centre_q16[k];
+        dx2_q32[k] = (uint64_t)(dx * dx) + ((uint64_t)1 << 32);
+    }
+    for (int32_t i = 0, column = 0; i < terms; i++) {
+        if (column == 0) {
+            int64_t dy = (int64_t)sample->y_q16 - scratch->centre_q16[i / IH_SURFACE_CENTRES];
+            dy2_q32 = (uint64_t)(dy * dy);
+        }
+        uint32_t root_q21 = ih_isqrt_u64((dx2_q32[column] + dy2_q32) << 10);
+        scratch->row_q20[i][at] = (int32_t)((root_q21 + 1) >> 1);
+        column = column + 1 == IH_SURFACE_CENTRES ? 0 : column + 1;
     }
 }
 
 static void weigh_row(struct ih_surface_scratch *scratch, const struct ih_sample *sample,
-                      int32_t mean_mm_q8, int32_t root_weight_q15, int32_t at)
+                      int32_t mean_mm_q8, int32_t root_weight_q15, int32_t at, int32_t terms)
 {
-    for (int32_t i = 0; i < TERMS; i++) {
+    bool is_one = root_weight_q15 == 1 << 15; /* as nearly all are: nothing to round */
+    for (int32_t i = 0; !is_one && i < terms; i++) {
         int32_t *entry = &scratch->row_q20[i][at];
         *entry = (int32_t)ih_mul_shift(*entry, root_weight_q15, 15);
     }
     scratch->off_mm_q8[at] =
         (int32_t)ih_mul_shift((int64_t)sample->depth_mm_q8 - mean_mm_q8, root_weight_q15, 15);
+}
+
+/* Where row i of the normal equations begins. */
+static int64_t *normal_row(struct ih_surface_scratch *scratch, int32_t i)
+{
+    int32_t ahead = i < IH_SURFACE_SPLIT ? 0 : IH_CHOLESKY_PACKED(IH_SURFACE_SPLIT) / 2;
+    return &scratch->of.normal_q40[IH_CHOLESKY_PACKED(i) - ahead];
 }
 
 static int64_t dot_of_rows(const int32_t *a, const int32_t *b)
@@ -70,11 +82,11 @@ static int64_t dot_of_rows(const int32_t *a, const int32_t *b)
     return sum;
 }
 
-/* Add the weighted rows to the normal equations. */
-static void add_rows(struct ih_surface_scratch *scratch)
+/* Add what the weighted rows bring to the normal equations' rows from .. to - 1. */
+static void add_rows(struct ih_surface_scratch *scratch, int32_t from, int32_t to)
 {
-    int64_t *normal = scratch->of.normal_q40;
-    for (int32_t i = 0; i < TERMS; i++) {
+    int64_t *normal = normal_row(scratch, from);
+    for (int32_t i = from; i < to; i++) {
         const int32_t *row = scratch->row_q20[i];
         for (int32_t j = 0; j <= i; j++) {
             *normal++ += dot_of_rows(row, scratch->row_q20[j]);
@@ -92,19 +104,17 @@ static int32_t mean_depth_mm_q8(const struct ih_samples *samples)
     return (int32_t)ih_div_round(sum, samples->sample_count);
 }
 
-/* N scaled to diagonal 0.99, with ridge, in Q30, row by row in N's place: a row of the factor ends
- * before the next one of N begins. Rows are copied because the same bytes change their type. */
-static void scale_system(const struct ih_surface_params *params, struct ih_surface_scratch *scratch)
+/* N's rows from .. to - 1 scaled to diagonal 0.99, with ridge, in Q30, in N's place: a row of the
+ * factor ends before the next one of N begins. They are copied because the same bytes change type. */
+static void scale_rows(const struct ih_surface_params *params, struct ih_surface_scratch *scratch,
+                       int32_t from, int32_t to)
 {
     int32_t row[TERMS];
-    for (int32_t i = 0; i < TERMS; i++) {
-        uint64_t diagonal = (uint64_t)scratch->of.normal_q40[IH_CHOLESKY_PACKED(i + 1) - 1];
-        int64_t root = (int64_t)ih_isqrt_u64(diagonal) + 1; /* + 1: the scaled diagonal stays < 1 */
+    for (int32_t i = from; i < to; i++) {
+        const int64_t *normal = normal_row(scratch, i);
+        int64_t root = (int64_t)ih_isqrt_u64((uint64_t)normal[i]) + 1; /* the diagonal stays < 1 */
         int64_t scale = SCALE_NUMERATOR / root;
         scratch->scale[i] = (uint32_t)(scale < SCALE_MAX ? scale : SCALE_MAX);
-    }
-    for (int32_t i = 0; i < TERMS; i++) {
-        const int64_t *normal = &scratch->of.normal_q40[IH_CHOLESKY_PACKED(i)];
         for (int32_t j = 0; j <= i; j++) {
             /* |N_ij| <= root_i root_j: after the first step below 2^47 */
             int64_t half = ih_mul_wide_shift(normal[j], scratch->scale[i], 36);
@@ -152,17 +162,16 @@ static void unscale_solution(struct ih_surface_scratch *scratch, int fraction)
     scratch->solution_shift = fraction + (SCALE_SHIFT - 20) - shift;
 }
 
-static bool solve(const struct ih_samples *samples, const struct ih_surface_params *params,
-                  int32_t mean_mm_q8, struct ih_surface_scratch *scratch)
+static bool solve(const struct ih_samples *samples, int32_t mean_mm_q8,
+                  struct ih_surface_scratch *scratch)
 {
     int32_t bad_pivot, exponent;
-    scale_system(params, scratch);
-    if (ih_cholesky_factor(scratch->of.factor_q30, TERMS, &bad_pivot) != IH_OK) {
+    int32_t *factor = scratch->of.factor_q30;
+    if (ih_cholesky_factor(factor, TERMS, &bad_pivot) != IH_OK) {
         return false;
     }
     int fraction = scale_right(samples, mean_mm_q8, scratch);
-    ih_cholesky_solve(scratch->of.factor_q30, TERMS, scratch->solution, scratch->solution,
-                      &exponent);
+    ih_cholesky_solve(factor, TERMS, scratch->solution, scratch->solution, &exponent);
     unscale_solution(scratch, fraction - exponent);
     return true;
 }
@@ -198,27 +207,43 @@ static bool reweight(const struct ih_surface_scratch *scratch, const struct ih_s
     return true;
 }
 
-/* The normal equations of all samples. huber: NULL for the samples' own weights; else samples that
- * are too far from the surface that was solved last get less. Returns how many do. */
-static int32_t assemble(const struct ih_samples *samples, const struct ih_surface_params *huber,
-                        struct ih_surface_scratch *scratch, struct ih_surface *out)
+/* Rows from .. to - 1 of the normal equations, of all samples. huber: NULL; or samples that are too
+ * far from the surface that was solved last get less weight first. Returns how many do. */
+static int32_t sum_rows(const struct ih_samples *samples, const struct ih_surface_params *huber,
+                        struct ih_surface_scratch *scratch, int32_t from, int32_t to,
+                        struct ih_surface *out)
 {
     int32_t changed = 0;
-    memset(scratch->of.normal_q40, 0, sizeof scratch->of.normal_q40);
-    memset(scratch->right_q28, 0, sizeof scratch->right_q28);
+    int32_t entries = IH_CHOLESKY_PACKED(to) - IH_CHOLESKY_PACKED(from);
+    memset(normal_row(scratch, from), 0, (size_t)entries * sizeof scratch->of.normal_q40[0]);
+    memset(&scratch->right_q28[from], 0, (size_t)(to - from) * sizeof scratch->right_q28[0]);
     for (int32_t first = 0; first < samples->sample_count; first += IH_SURFACE_ROWS) {
         memset(scratch->row_q20, 0, sizeof scratch->row_q20); /* the last ones may be fewer */
         for (int32_t i = first; i < samples->sample_count && i < first + IH_SURFACE_ROWS; i++) {
             const struct ih_sample *sample = &samples->sample[i];
-            fill_row(scratch, sample, i - first);
-            out->root_weight_q15[i] = sample->root_weight_q15;
+            fill_row(scratch, sample, i - first, huber != NULL ? TERMS : to);
             changed += huber != NULL && reweight(scratch, sample, huber, i - first, out->mean_mm_q8,
                                                  &out->root_weight_q15[i]);
-            weigh_row(scratch, sample, out->mean_mm_q8, out->root_weight_q15[i], i - first);
+            weigh_row(scratch, sample, out->mean_mm_q8, out->root_weight_q15[i], i - first, to);
         }
-        add_rows(scratch);
+        add_rows(scratch, from, to);
     }
     return changed;
+}
+
+/* Solve for the surface; again: with less weight for the samples that are far from it, if any. */
+static bool fit(const struct ih_samples *samples, const struct ih_surface_params *params,
+                bool again, struct ih_surface_scratch *scratch, struct ih_surface *out)
+{
+    const struct ih_surface_params *huber = again ? params : NULL;
+    out->downweighted_count = sum_rows(samples, huber, scratch, 0, IH_SURFACE_SPLIT, out);
+    if (again && out->downweighted_count == 0) {
+        return true;
+    }
+    scale_rows(params, scratch, 0, IH_SURFACE_SPLIT);
+    sum_rows(samples, NULL, scratch, IH_SURFACE_SPLIT, TERMS, out);
+    scale_rows(params, scratch, IH_SURFACE_SPLIT, TERMS);
+    return solve(samples, out->mean_mm_q8, scratch);
 }
 
 /* B for whole grid steps: sqrt((a^2 + b^2) 100 / 121 + 1) in Q20. */
@@ -255,6 +280,24 @@ static int32_t steps_between(int32_t node, int32_t centre)
                        IH_SURFACE_STEPS_PER_CENTRE * (IH_SURFACE_CENTRES - 1) / 2));
 }
 
+/* sum_n c_n B_n at a node. */
+static int64_t sum_at(const struct ih_surface_scratch *scratch, int32_t y, int32_t x)
+{
+    int32_t across[IH_SURFACE_CENTRES];
+    for (int32_t k = 0; k < IH_SURFACE_CENTRES; k++) {
+        across[k] = steps_between(x, k);
+    }
+    const int32_t *solution = scratch->solution;
+    int64_t sum = 0;
+    for (int32_t row = 0; row < IH_SURFACE_CENTRES; row++) {
+        const int32_t *table = scratch->of.table_q20[steps_between(y, row)];
+        for (int32_t k = 0; k < IH_SURFACE_CENTRES; k++) {
+            sum += (int64_t)*solution++ * table[across[k]];
+        }
+    }
+    return sum;
+}
+
 static void evaluate(const struct ih_samples *samples, const struct ih_surface_scratch *scratch,
                      struct ih_surface *out)
 {
@@ -262,14 +305,8 @@ static void evaluate(const struct ih_samples *samples, const struct ih_surface_s
     out->nearest_mm_q8 = INT32_MAX;
     for (int32_t y = 0; y < IH_SURFACE_GRID; y++) {
         for (int32_t x = 0; x < IH_SURFACE_GRID; x++) {
-            int64_t sum = 0;
-            for (int32_t i = 0; i < TERMS; i++) {
-                int32_t b = steps_between(y, i / IH_SURFACE_CENTRES);
-                int32_t a = steps_between(x, i % IH_SURFACE_CENTRES);
-                sum += (int64_t)scratch->solution[i] * scratch->of.table_q20[b][a];
-            }
-            out->depth_mm_q8[y][x] = ih_clamp_s32(depth_of_sum(scratch, out->mean_mm_q8, sum),
-                                                  least_q8, IH_SURFACE_DEPTH_MAX_MM << 8);
+            int32_t depth_q8 = depth_of_sum(scratch, out->mean_mm_q8, sum_at(scratch, y, x));
+            out->depth_mm_q8[y][x] = ih_clamp_s32(depth_q8, least_q8, IH_SURFACE_DEPTH_MAX_MM << 8);
             out->nearest_mm_q8 = ih_min_s32(out->nearest_mm_q8, out->depth_mm_q8[y][x]);
         }
     }
@@ -286,12 +323,10 @@ void ih_surface_fit(const struct ih_samples *samples, const struct ih_field *fie
     }
     place_centres(scratch);
     out->mean_mm_q8 = mean_depth_mm_q8(samples);
-    assemble(samples, NULL, scratch, out);
-    if (!solve(samples, params, out->mean_mm_q8, scratch)) {
-        return;
+    for (int32_t i = 0; i < samples->sample_count; i++) {
+        out->root_weight_q15[i] = samples->sample[i].root_weight_q15;
     }
-    out->downweighted_count = assemble(samples, params, scratch, out);
-    if (out->downweighted_count > 0 && !solve(samples, params, out->mean_mm_q8, scratch)) {
+    if (!fit(samples, params, false, scratch, out) || !fit(samples, params, true, scratch, out)) {
         return;
     }
     fill_table(scratch);
