@@ -9,6 +9,8 @@ UNITY_DIR ?= $(BUILD)/third_party/unity/src
 CJSON_DIR ?= $(BUILD)/third_party/cjson
 # A folder with the sources of libgpiod 2: used instead of fetching them.
 GPIOD2_DIR ?= $(BUILD)/third_party/gpiod2
+# The builds whose outputs of every stage are compared; make test takes the first six.
+GOLDEN_ALL := gcc-O0 gcc-O3 clang-O0 clang-O3 arm64-O0 arm64-O3 armhf-O2 riscv64-O2 s390x-O2 ppc64-O2
 # The frame of frames/sequence2 that docs/picture.png shows.
 PICTURE ?= 000020
 # What the board's program is built for: arm64, armhf or host.
@@ -56,8 +58,9 @@ eval: sim ## everything measured: all data sets, fresh scenes, each part left ou
 	@/usr/bin/python3 tools/eval/evaluate.py --host-sim $(BUILD)/host/sim/host_sim \
 	  --render $(BUILD)/host/tools/render/render --work $(BUILD)/eval --data $(DATA)
 
-bits: sim ## the same records from gcc and clang, -O0 and -O3, x86-64 and aarch64
+bits: sim ## the same bits from gcc and clang, -O0 and -O3, on six processors
 	@tools/setup.sh bits
+	@tests/golden/golden.sh $(abspath $(CJSON_DIR)) frames $(GOLDEN_ALL)
 	@tests/checks/same_bits.sh $(abspath $(CJSON_DIR)) frames $(wildcard $(DATA)/dots $(DATA)/range)
 
 vectors: ## write tests/vectors anew with the float64 reference

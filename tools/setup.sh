@@ -32,13 +32,26 @@ need_sim() {
     need_header cjson/cJSON.h libcjson-dev
 }
 
-# Compilers and the emulator for tests/checks/same_bits.sh.
+# Compilers and the emulator for tests/checks/same_bits.sh and tests/golden/golden.sh in make test.
 need_bits() {
     need_program gcc gcc
     need_program clang clang
-    need_program qemu-aarch64 qemu-user
-    need_program aarch64-linux-gnu-gcc gcc-aarch64-linux-gnu
-    [ -e /usr/aarch64-linux-gnu/lib/libc.a ] || lacks libc6-dev-arm64-cross
+    need_cross aarch64-linux-gnu arm64 aarch64
+}
+
+# need_cross TRIPLET DEBIAN_NAME QEMU: what builds and runs a static program of another processor.
+need_cross() {
+    need_program "qemu-$3" qemu-user
+    need_program "$1-gcc" "gcc-$1"
+    [ -e "/usr/$1/lib/libc.a" ] || lacks "libc6-dev-$2-cross"
+}
+
+# The processors that make bits has beyond make test.
+need_bits_all() {
+    need_cross arm-linux-gnueabihf armhf arm
+    need_cross riscv64-linux-gnu riscv64 riscv64
+    need_cross s390x-linux-gnu s390x s390x
+    need_cross powerpc64-linux-gnu ppc64 ppc64
 }
 
 # need_board arm64|armhf|host
@@ -175,6 +188,7 @@ eval)
 bits)
     need_sim
     need_bits
+    need_bits_all
     ;;
 accept | vectors)
     need_python numpy python3-numpy

@@ -32,51 +32,23 @@ for dir in "$@"; do
 done
 
 root=$(cd "$(dirname "$0")/../.." && pwd)
-builds=$root/build/bits
+# shellcheck source=tests/checks/builds.sh
+. "$root/tests/checks/builds.sh"
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
 # --- the builds ----------------------------------------------------------------------------------
 
-# build NAME OPTION...
-build() {
-    dir=$builds/$1
-    shift
-    mkdir -p "$dir"
-    {
-        cmake -S "$root" -B "$dir" "$@" &&
-            cmake --build "$dir" --target host_sim --parallel
-    } >"$dir/log" 2>&1 || {
-        tail -n 30 "$dir/log" >&2
-        echo "same_bits: $dir does not build" >&2
-        exit 1
-    }
-}
-
 names="gcc-O0 gcc-O3 clang-O0 clang-O3 arm64-O0 arm64-O3"
-for level in O0 O3; do
-    # -w: warnings are the ordinary builds' business; a newer compiler's must not stop this check.
-    type="-DCMAKE_BUILD_TYPE=Bits"
-    flags="-DCMAKE_C_FLAGS_BITS=-$level -w"
-    build "gcc-$level" "$type" "$flags" -DCMAKE_C_COMPILER=gcc
-    build "clang-$level" "$type" "$flags" -DCMAKE_C_COMPILER=clang
-    build "arm64-$level" "$type" "$flags" -DCMAKE_TOOLCHAIN_FILE="$root/cmake/arm64.cmake" \
-        -DISOHEAD_CJSON_DIR="$cjson" -DCMAKE_EXE_LINKER_FLAGS=-static
+for name in $names; do
+    builds_make "$name" host_sim
 done
 
 # host_sim NAME ARGUMENT...: paths in it are relative, so that records are the same every time.
 host_sim() {
-    program=$builds/$1/sim/host_sim
-    case $1 in
-    arm64-*)
-        shift
-        qemu-aarch64 "$program" "$@"
-        ;;
-    *)
-        shift
-        "$program" "$@"
-        ;;
-    esac
+    build=$1
+    shift
+    builds_run "$build" sim/host_sim "$@"
 }
 
 # --- the frames ----------------------------------------------------------------------------------

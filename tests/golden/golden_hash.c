@@ -1,0 +1,290 @@
+#include "golden_hash.h"
+
+#include <string.h>
+
+#define FNV_START 0xcbf29ce484222325u
+#define FNV_PRIME 0x100000001b3u
+
+static uint64_t add(uint64_t hash, int64_t value, int bytes)
+{
+    for (int i = 0; i < bytes; i++) {
+        hash = (hash ^ (((uint64_t)value >> (8 * i)) & 0xff)) * FNV_PRIME;
+    }
+    return hash;
+}
+
+static uint64_t add_word(uint64_t hash, int32_t value)
+{
+    return add(hash, value, 4);
+}
+
+/* An array of 32-bit integers, or a struct that has no other members. */
+static uint64_t add_words(uint64_t hash, const void *first, size_t size)
+{
+    for (size_t at = 0; at < size; at += sizeof(int32_t)) {
+        int32_t value = 0;
+        memcpy(&value, (const char *)first + at, sizeof value);
+        hash = add_word(hash, value);
+    }
+    return hash;
+}
+
+/* Structs that add_words takes: a member of another type would change these sizes. */
+#define WORDS(n) ((n) * sizeof(int32_t))
+_Static_assert(sizeof(struct ih_line) == WORDS(11), "ih_line");
+_Static_assert(sizeof(struct ih_field) == WORDS(3), "ih_field");
+_Static_assert(sizeof(struct ih_dot) == WORDS(3), "ih_dot");
+_Static_assert(sizeof(struct ih_window) == WORDS(5), "ih_window");
+_Static_assert(sizeof(struct ih_point) == WORDS(4), "ih_point");
+_Static_assert(sizeof(struct ih_hypothesis) == WORDS(22), "ih_hypothesis");
+_Static_assert(sizeof(struct ih_ellipsoid) == WORDS(6), "ih_ellipsoid");
+_Static_assert(sizeof(struct ih_evidence) == WORDS(IH_EVIDENCE_COUNT + 3), "ih_evidence");
+_Static_assert(sizeof(struct ih_view) == WORDS(3), "ih_view");
+
+uint64_t golden_hash_rig(const struct isohead *head)
+{
+    const struct ih_rig *rig = &head->rig;
+    uint64_t hash = add_words(FNV_START, &rig->field, sizeof rig->field);
+    return add_words(hash, rig->line, sizeof rig->line);
+}
+
+static uint64_t hash_dots(const struct isohead *head)
+{
+    const struct ih_dots *dots = &head->dots;
+    uint64_t hash = add_word(FNV_START, dots->dot_count);
+    hash = add_word(hash, dots->edge_count);
+    hash = add_word(hash, dots->hot_count);
+    hash = add_word(hash, dots->dots_dropped);
+    hash = add_words(hash, dots->dot, (size_t)dots->dot_count * sizeof dots->dot[0]);
+    return add_words(hash, dots->bright, sizeof dots->bright);
+}
+
+static uint64_t hash_labels(const struct isohead *head)
+{
+    const struct ih_labels *labels = &head->labels;
+    uint64_t hash = add_word(FNV_START, labels->labelled_count);
+    hash = add_word(hash, labels->seed_count);
+    hash = add_word(hash, labels->candidates_dropped);
+    for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
+        hash = add_word(hash, labels->dot_of_slot[slot]);
+        if (labels->dot_of_slot[slot] != IH_NONE) {
+            hash = add_word(hash, labels->t_px_q12[slot]);
+            hash = add_word(hash, labels->perp_px_q12[slot]);
+        }
+    }
+    return hash;
+}
+
+static uint64_t hash_windows(const struct isohead *head)
+{
+    const struct ih_windows *windows = &head->windows;
+    uint64_t hash = add_word(FNV_START, windows->window_count);
+    hash = add_word(hash, windows->places_dropped);
+    return add_words(hash, windows->window,
+                     (size_t)windows->window_count * sizeof windows->window[0]);
+}
+
+static uint64_t hash_points(const struct isohead *head)
+{
+    const struct ih_points *points = &head->points;
+    uint64_t hash = add_word(FNV_START, points->seen_count);
+    hash = add_words(hash, &points->field, sizeof points->field);
+    return add_words(hash, points->point, sizeof points->point);
+}
+
+static uint64_t hash_samples(const struct isohead *head)
+{
+    const struct ih_samples *samples = &head->samples;
+    uint64_t hash = add_word(FNV_START, samples->sample_count);
+    hash = add_word(hash, samples->seen_count);
+    hash = add_word(hash, samples->filled_count);
+    hash = add_word(hash, samples->isolated_count);
+    hash = add_word(hash, samples->outside_count);
+    hash = add_word(hash, samples->nearest_mm_q8);
+    hash = add_word(hash, samples->clip_mm_q8);
+    for (int32_t i = 0; i < samples->sample_count; i++) {
+        const struct ih_sample *sample = &samples->sample[i];
+        hash = add_word(hash, sample->x_q16);
+        hash = add_word(hash, sample->y_q16);
+        hash = add_word(hash, sample->depth_mm_q8);
+        hash = add_word(hash, sample->root_weight_q15);
+        hash = add_word(hash, sample->slot);
+        hash = add_word(hash, sample->is_filled);
+    }
+    return hash;
+}
+
+static uint64_t hash_surface(const struct isohead *head)
+{
+    const struct ih_surface *surface = &head->surface;
+    uint64_t hash = add_word(FNV_START, surface->valid);
+    if (!surface->valid) {
+        return hash;
+    }
+    size_t count = (size_t)head->samples.sample_count;
+    hash = add_word(hash, surface->downweighted_count);
+    hash = add_word(hash, surface->mean_mm_q8);
+    hash = add_words(hash, &surface->field, sizeof surface->field);
+    hash = add_word(hash, surface->nearest_mm_q8);
+    hash = add_words(hash, surface->root_weight_q15, count * sizeof surface->root_weight_q15[0]);
+    return add_words(hash, surface->depth_mm_q8, sizeof surface->depth_mm_q8);
+}
+
+static uint64_t add_slice(uint64_t hash, const struct ih_slice *slice)
+{
+    const struct ih_ellipse *ellipse = &slice->ellipse;
+    hash = add(hash, ellipse->area_q16, 8);
+    hash = add_word(hash, ellipse->x_q16);
+    hash = add_word(hash, ellipse->y_q16);
+    hash = add(hash, ellipse->xx_q16, 8);
+    hash = add(hash, ellipse->xy_q16, 8);
+    hash = add(hash, ellipse->yy_q16, 8);
+    hash = add_word(hash, ellipse->shape_q16);
+    hash = add_word(hash, ellipse->ratio_q16);
+    hash = add_word(hash, ellipse->merit_q8);
+    hash = add_word(hash, slice->behind_mm_q8);
+    hash = add_word(hash, slice->area_mm2);
+    return add_word(hash, slice->whole);
+}
+
+static uint64_t hash_hypotheses(const struct isohead *head)
+{
+    const struct ih_hypotheses *hypotheses = &head->hypotheses;
+    uint64_t hash = add_word(FNV_START, hypotheses->nest_count);
+    hash = add_word(hash, hypotheses->minima_dropped);
+    hash = add_word(hash, hypotheses->contours_dropped);
+    for (int32_t i = 0; i < hypotheses->nest_count; i++) {
+        const struct ih_nest *nest = &hypotheses->nest[i];
+        hash = add_word(hash, nest->minimum.x_q9);
+        hash = add_word(hash, nest->minimum.y_q9);
+        hash = add_word(hash, nest->nearest_mm_q8);
+        hash = add_word(hash, nest->front_mm_q8);
+        hash = add_word(hash, nest->tip_level_mm_q8);
+        hash = add_word(hash, nest->tip_area_mm2);
+        hash = add_word(hash, nest->slice_count);
+        hash = add_word(hash, nest->gap);
+        hash = add_word(hash, nest->ended);
+        for (int32_t k = 0; k < nest->slice_count; k++) {
+            hash = add_slice(hash, &nest->slice[k]);
+        }
+    }
+    return hash;
+}
+
+static uint64_t hash_heads(const struct isohead *head)
+{
+    const struct ih_heads *heads = &head->heads;
+    uint64_t hash = add_word(FNV_START, heads->hypothesis_count);
+    hash = add_word(hash, heads->head_count);
+    hash = add_words(hash, heads->head, (size_t)heads->head_count * sizeof heads->head[0]);
+    return add_words(hash, heads->hypothesis,
+                     (size_t)heads->hypothesis_count * sizeof heads->hypothesis[0]);
+}
+
+static uint64_t hash_expected(const struct isohead *head)
+{
+    const struct ih_expected *expected = &head->expected;
+    uint64_t hash = add_word(FNV_START, expected->count);
+    return add_words(hash, expected->head, (size_t)expected->count * sizeof expected->head[0]);
+}
+
+static uint64_t hash_findings(const struct isohead *head)
+{
+    const struct ih_findings *findings = &head->findings;
+    uint64_t hash = add_word(FNV_START, findings->finding_count);
+    hash = add_word(hash, findings->dropped_count);
+    hash = add_word(hash, findings->seen_count);
+    for (int32_t i = 0; i < findings->finding_count; i++) {
+        const struct ih_finding *finding = &findings->finding[i];
+        hash = add_words(hash, &finding->head, sizeof finding->head);
+        hash = add_words(hash, &finding->evidence, sizeof finding->evidence);
+        hash = add_word(hash, finding->logit_q10);
+        hash = add_word(hash, finding->probability_q16);
+        hash = add_word(hash, finding->source);
+        hash = add_word(hash, finding->track_id);
+        hash = add_word(hash, finding->sigma_mm_q8);
+        hash = add_word(hash, finding->is_head);
+        hash = add_word(hash, finding->is_predicted);
+        hash = add_word(hash, finding->u_px_q12);
+        hash = add_word(hash, finding->v_px_q12);
+        hash = add_word(hash, finding->a_px_q12);
+        hash = add_word(hash, finding->b_px_q12);
+        hash = add_word(hash, finding->angle_mdeg);
+        hash = add_word(hash, finding->distance_mm_q8);
+    }
+    return add_words(hash, findings->view, sizeof findings->view);
+}
+
+static uint64_t add_track(uint64_t hash, const struct ih_track *track)
+{
+    hash = add_word(hash, track->id);
+    hash = add_word(hash, track->is_head);
+    hash = add_word(hash, track->mean_logit_q10);
+    hash = add_words(hash, &track->head, sizeof track->head);
+    hash = add_words(hash, track->velocity_mm_s_q8, sizeof track->velocity_mm_s_q8);
+    hash = add(hash, track->place_q8, 8);
+    hash = add(hash, track->cross_q8, 8);
+    hash = add(hash, track->speed_q8, 8);
+    hash = add(hash, track->seen_us, 8);
+    hash = add_word(hash, track->finding_count);
+    return add_word(hash, track->finding);
+}
+
+static uint64_t hash_tracks(const struct isohead *head)
+{
+    const struct ih_tracks *tracks = &head->tracks;
+    uint64_t hash = add_word(FNV_START, tracks->has_time);
+    hash = add(hash, tracks->time_us, 8);
+    hash = add_word(hash, tracks->last_id);
+    hash = add_word(hash, tracks->track_count);
+    for (int32_t i = 0; i < tracks->track_count; i++) {
+        hash = add_track(hash, &tracks->track[i]);
+    }
+    hash = add_word(hash, tracks->selected_id);
+    hash = add_word(hash, tracks->rival_id);
+    hash = add_word(hash, tracks->rival_frames);
+    hash = add_word(hash, tracks->head_count);
+    hash = add_words(hash, tracks->head, (size_t)tracks->head_count * sizeof tracks->head[0]);
+    return add_word(hash, tracks->selected);
+}
+
+static uint64_t hash_result(const struct isohead *head)
+{
+    const struct ih_result *result = &head->result;
+    uint64_t hash = add_word(FNV_START, result->entry_count);
+    hash = add_word(hash, result->head_count);
+    hash = add_words(hash, result->head, (size_t)result->head_count * sizeof result->head[0]);
+    hash = add_word(hash, result->selected);
+    for (int32_t i = 0; i < result->entry_count; i++) {
+        const struct ih_result_entry *entry = &result->entry[i];
+        hash = add_word(hash, entry->u_px_q12);
+        hash = add_word(hash, entry->v_px_q12);
+        hash = add_word(hash, entry->a_px_q12);
+        hash = add_word(hash, entry->b_px_q12);
+        hash = add_word(hash, entry->angle_mdeg);
+        hash = add_word(hash, entry->distance_mm_q8);
+        hash = add_words(hash, entry->centre_mm_q8, sizeof entry->centre_mm_q8);
+        hash = add_word(hash, entry->rejected);
+        hash = add_word(hash, entry->has_probability);
+        hash = add_word(hash, entry->probability_q16);
+        hash = add_word(hash, entry->track_id);
+        hash = add_word(hash, entry->sigma_mm_q8);
+        hash = add_word(hash, entry->is_predicted);
+    }
+    return hash;
+}
+
+const struct golden_stage golden_stage[GOLDEN_STAGES] = {
+    {"dots", hash_dots},
+    {"labels", hash_labels},
+    {"windows", hash_windows},
+    {"points", hash_points},
+    {"samples", hash_samples},
+    {"surface", hash_surface},
+    {"hypotheses", hash_hypotheses},
+    {"heads", hash_heads},
+    {"expected", hash_expected},
+    {"findings", hash_findings},
+    {"tracks", hash_tracks},
+    {"result", hash_result},
+};
