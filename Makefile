@@ -17,7 +17,7 @@ PICTURE ?= 000020
 ARCH ?= arm64
 
 .DEFAULT_GOAL := help
-.PHONY: help sim frames sanitize test accept eval bits vectors learn picture board board-gpiod2 deb image flash \
+.PHONY: help sim frames sanitize test accept eval bits cortexm vectors learn picture board board-gpiod2 deb image flash \
   test-deb test-board test-image format formatted lint clean
 
 
@@ -62,6 +62,10 @@ bits: sim ## the same bits from gcc and clang, -O0 and -O3, on six processors
 	@tools/setup.sh bits
 	@tests/golden/golden.sh $(abspath $(CJSON_DIR)) frames $(GOLDEN_ALL)
 	@tests/checks/same_bits.sh $(abspath $(CJSON_DIR)) frames $(wildcard $(DATA)/dots $(DATA)/range)
+
+cortexm: sim ## the same bits on emulated Cortex-M4, M7 and M55 boards; the core's size there
+	@tools/setup.sh cortexm
+	@tests/golden/cortexm.sh $(abspath $(CJSON_DIR)) frames
 
 vectors: ## write tests/vectors anew with the float64 reference
 	@tools/setup.sh vectors

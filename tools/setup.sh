@@ -1,7 +1,7 @@
 #!/bin/sh
 # Bring what a make target needs and this machine lacks.
 #
-#   tools/setup.sh sim|test|accept|eval|bits|vectors|picture|format|lint
+#   tools/setup.sh sim|test|accept|eval|bits|cortexm|vectors|picture|format|lint
 #   tools/setup.sh board arm64|armhf|host
 #   tools/setup.sh deb arm64|armhf
 #   tools/setup.sh test-deb
@@ -190,6 +190,13 @@ bits)
     need_bits
     need_bits_all
     ;;
+cortexm)
+    need_sim
+    need_program gcc gcc
+    need_program arm-none-eabi-gcc gcc-arm-none-eabi
+    [ -e "$(arm-none-eabi-gcc -print-file-name=libc.a 2>/dev/null)" ] || lacks libnewlib-arm-none-eabi
+    need_program qemu-system-arm qemu-system-arm
+    ;;
 accept | vectors)
     need_python numpy python3-numpy
     need_python scipy python3-scipy
@@ -228,7 +235,7 @@ if [ -n "$packages" ]; then
 fi
 
 case "$1" in
-test | bits) tools/fetch_third_party.sh build/third_party ;;
+test | bits | cortexm) tools/fetch_third_party.sh build/third_party ;;
 board) [ "$2" = host ] || tools/board/sysroot.sh "$2" ;;
 esac
 case "$1" in

@@ -51,6 +51,12 @@ builds_run() {
     ppc64-*) qemu-ppc64 "$program" "$@" ;;
     riscv64-*) qemu-riscv64 "$program" "$@" ;;
     s390x-*) qemu-s390x "$program" "$@" ;;
+    mps*)
+        # a program that hangs is ended
+        timeout 300 qemu-system-arm -M "${name%-*}" -nographic -monitor none -serial none \
+            -semihosting-config "enable=on,target=native,arg=$(echo golden "$@" | sed 's/ /,arg=/g')" \
+            -kernel "$program"
+        ;;
     *)
         echo "builds_run: nothing runs '$name'" >&2
         return 2
