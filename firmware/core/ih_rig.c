@@ -259,12 +259,6 @@ static bool fill_line(struct ih_rig *rig, int32_t slot)
     line->dir_v_q30 = (int32_t)ih_div_round(e_v_q8 * ((int64_t)1 << 30), length_q8);
     line->t_far_px_q12 = shift_at_depth_px_q12(line->length_px_mm_q8, c->far_mm);
     line->t_near_px_q12 = shift_at_depth_px_q12(line->length_px_mm_q8, c->near_mm);
-
-    int32_t x, y;
-    ih_rig_dot_at(rig, slot, c->far_mm << 8, &x, &y);
-    ih_rig_distort(rig, x, y, &line->far_u_px_q12, &line->far_v_px_q12);
-    ih_rig_dot_at(rig, slot, c->near_mm << 8, &x, &y);
-    ih_rig_distort(rig, x, y, &line->near_u_px_q12, &line->near_v_px_q12);
     return true;
 }
 

@@ -49,8 +49,6 @@ struct ih_line {
     int32_t dir_u_q30, dir_v_q30;                 /* unit vector towards nearer depth */
     int32_t length_px_mm_q8;                      /* |e|: t = |e| / Z */
     int32_t t_far_px_q12, t_near_px_q12;          /* the working range, t_far <= t_near */
-    /* The same two ends in the frame's own, distorted pixels. */
-    int32_t far_u_px_q12, far_v_px_q12, near_u_px_q12, near_v_px_q12;
 };
 
 /* The part of the image plane on which the surface stands, in normalised coordinates. */
