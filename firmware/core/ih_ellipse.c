@@ -88,18 +88,21 @@ static bool ellipse_of_moments(const struct ih_moments *m, int32_t x0_q8, int32_
     if (ih_abs_s64(x_q16) > GRID_Q16 || ih_abs_s64(y_q16) > GRID_Q16) {
         return false; /* a chord that crosses its arc: hardly any area, its centre far outside */
     }
-    out->area_q16 = sign * (area2_q16 / 2);
-    out->x_q16 = (int32_t)(x_q16 + x0_q8 * 256);
-    out->y_q16 = (int32_t)(y_q16 + y0_q8 * 256);
-    out->xx_q16 = ih_div_round(sign * m->xx_q32, 6 * area2_q16) - ih_mul_shift(x_q16, x_q16, 16);
-    out->yy_q16 = ih_div_round(sign * m->yy_q32, 6 * area2_q16) - ih_mul_shift(y_q16, y_q16, 16);
-    out->xy_q16 = ih_div_round(sign * m->xy_q32, 6 * area2_q16) - ih_mul_shift(x_q16, y_q16, 16);
-    if (ih_abs_s64(out->xx_q16) > VARIANCE_MAX_Q16 || ih_abs_s64(out->yy_q16) > VARIANCE_MAX_Q16 ||
-        ih_abs_s64(out->xy_q16) > VARIANCE_MAX_Q16) {
+    int64_t xx_q16 = ih_div_round(sign * m->xx_q32, 6 * area2_q16) - ih_mul_shift(x_q16, x_q16, 16);
+    int64_t yy_q16 = ih_div_round(sign * m->yy_q32, 6 * area2_q16) - ih_mul_shift(y_q16, y_q16, 16);
+    int64_t xy_q16 = ih_div_round(sign * m->xy_q32, 6 * area2_q16) - ih_mul_shift(x_q16, y_q16, 16);
+    if (ih_abs_s64(xx_q16) > VARIANCE_MAX_Q16 || ih_abs_s64(yy_q16) > VARIANCE_MAX_Q16 ||
+        ih_abs_s64(xy_q16) > VARIANCE_MAX_Q16) {
         return false;
     }
-    int64_t determinant_q32 = out->xx_q16 * out->yy_q16 - out->xy_q16 * out->xy_q16;
-    out->ratio_q16 = axis_ratio_q16(out->xx_q16, out->xy_q16, out->yy_q16);
+    out->area_q16 = ih_saturate_s32(sign * (area2_q16 / 2));
+    out->x_q16 = (int32_t)(x_q16 + x0_q8 * 256);
+    out->y_q16 = (int32_t)(y_q16 + y0_q8 * 256);
+    out->xx_q16 = (int32_t)xx_q16;
+    out->yy_q16 = (int32_t)yy_q16;
+    out->xy_q16 = (int32_t)xy_q16;
+    int64_t determinant_q32 = xx_q16 * yy_q16 - xy_q16 * xy_q16;
+    out->ratio_q16 = axis_ratio_q16(xx_q16, xy_q16, yy_q16);
     if (determinant_q32 <= 0 || out->ratio_q16 == 0) {
         return false;
     }

@@ -34,9 +34,9 @@ struct ih_ellipse_params {
 
 /* In grid steps. Second moments are central, per area. */
 struct ih_ellipse {
-    int64_t area_q16; /* signed: positive around a minimum */
+    int32_t area_q16; /* signed: positive around a minimum */
     int32_t x_q16, y_q16;
-    int64_t xx_q16, xy_q16, yy_q16;
+    int32_t xx_q16, xy_q16, yy_q16;
     int32_t shape_q16;
     int32_t ratio_q16; /* major / minor axis, at most 255 */
     int32_t merit_q8;  /* of a part: arc - 1.6 chord - 8 (shape - 1) arc, steps */

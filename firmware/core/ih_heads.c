@@ -198,9 +198,9 @@ static struct placed place_sample(const struct ih_sample *sample, const struct i
     p.dy_q8 = ih_div_round((int64_t)sample->y_q16 * IH_SURFACE_STEP_DENOMINATOR,
                            IH_SURFACE_STEP_NUMERATOR * 256) +
               middle_q8 - ih_shift_round(ellipse->y_q16, 8);
-    int64_t determinant_q32 = ellipse->xx_q16 * ellipse->yy_q16 - ellipse->xy_q16 * ellipse->xy_q16;
-    int64_t q_q32 = ellipse->yy_q16 * p.dx_q8 * p.dx_q8 - 2 * ellipse->xy_q16 * p.dx_q8 * p.dy_q8 +
-                    ellipse->xx_q16 * p.dy_q8 * p.dy_q8;
+    int64_t xx = ellipse->xx_q16, xy = ellipse->xy_q16, yy = ellipse->yy_q16;
+    int64_t determinant_q32 = xx * yy - xy * xy;
+    int64_t q_q32 = yy * p.dx_q8 * p.dx_q8 - 2 * xy * p.dx_q8 * p.dy_q8 + xx * p.dy_q8 * p.dy_q8;
     int64_t quarter = determinant_q32 / 4 + 1; /* 4 det in sixteenths */
     p.radius2_q4 = (int32_t)(q_q32 / quarter > 4080 ? 4080 : q_q32 / quarter);
     return p;

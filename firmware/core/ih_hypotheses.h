@@ -19,7 +19,7 @@
 
 #include "ih_ellipse.h"
 
-/* Minima that are followed. Each nest costs 1184 bytes, most of them slices. */
+/* Minima that are followed. Each nest costs 800 bytes, most of them slices. */
 #define IH_HYPOTHESES_MAX 16
 #define IH_HYPOTHESES_SLICES_MAX 16
 

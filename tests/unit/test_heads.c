@@ -51,12 +51,12 @@ static struct ih_ellipse make_ellipse(double x, double y, double a, double b, do
     const double c = cos(turn_deg * PI / 180), s = sin(turn_deg * PI / 180);
     struct ih_ellipse out = {0};
 
-    out.area_q16 = lround(ldexp(PI * a * b, 16));
+    out.area_q16 = (int32_t)lround(ldexp(PI * a * b, 16));
     out.x_q16 = (int32_t)lround(ldexp(x, 16));
     out.y_q16 = (int32_t)lround(ldexp(y, 16));
-    out.xx_q16 = lround(ldexp((a * a * c * c + b * b * s * s) / 4, 16));
-    out.xy_q16 = lround(ldexp((a * a - b * b) * c * s / 4, 16));
-    out.yy_q16 = lround(ldexp((a * a * s * s + b * b * c * c) / 4, 16));
+    out.xx_q16 = (int32_t)lround(ldexp((a * a * c * c + b * b * s * s) / 4, 16));
+    out.xy_q16 = (int32_t)lround(ldexp((a * a - b * b) * c * s / 4, 16));
+    out.yy_q16 = (int32_t)lround(ldexp((a * a * s * s + b * b * c * c) / 4, 16));
     out.shape_q16 = 65536;
     out.ratio_q16 = (int32_t)lround(ldexp(a > b ? a / b : b / a, 16));
     return out;
@@ -182,7 +182,7 @@ static void the_extent_has_its_limit(void)
 }
 
 /* The same moments for all slices from first on; xx a power of two, so that the limit is exact. */
-static void set_moments(struct ih_nest *nest, int first, int64_t xx_q16, int64_t yy_q16)
+static void set_moments(struct ih_nest *nest, int first, int32_t xx_q16, int32_t yy_q16)
 {
     int k;
 
@@ -198,7 +198,7 @@ static void proportions_have_their_limit(void)
     int off;
 
     for (off = -2; off <= 2; off++) {
-        set_moments(add_head(20, 22, 850), 0, 8 << 16, 8 * (limit + off));
+        set_moments(add_head(20, 22, 850), 0, 8 << 16, (int32_t)(8 * (limit + off)));
         select_heads();
         IH_TEST_EQUAL(limit + off, heads.hypothesis[0].upright_q16, "upright", off);
         expect_alone(off >= 0 ? IH_ACCEPTED : IH_REJECT_SHAPE, "limit");
