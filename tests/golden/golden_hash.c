@@ -31,7 +31,7 @@ static uint64_t add_words(uint64_t hash, const void *first, size_t size)
 
 /* Structs that add_words takes: a member of another type would change these sizes. */
 #define WORDS(n) ((n) * sizeof(int32_t))
-_Static_assert(sizeof(struct ih_line) == WORDS(11), "ih_line");
+_Static_assert(sizeof(struct ih_line) == WORDS(7), "ih_line");
 _Static_assert(sizeof(struct ih_field) == WORDS(3), "ih_field");
 _Static_assert(sizeof(struct ih_dot) == WORDS(3), "ih_dot");
 _Static_assert(sizeof(struct ih_window) == WORDS(5), "ih_window");
