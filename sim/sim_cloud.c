@@ -3,6 +3,7 @@
 #include <inttypes.h>
 #include <stdlib.h>
 
+#include "app_view.h"
 #include "sim_report.h"
 
 static bool draw(struct sim_cloud *cloud, const struct hal_frame *frame, const struct ih_rig *rig,
@@ -32,14 +33,7 @@ static bool draw(struct sim_cloud *cloud, const struct hal_frame *frame, const s
 bool sim_cloud_view(struct sim_cloud *cloud, const struct hal_frame *frame,
                     const struct ih_rig *rig, struct ih_frame *view, struct hal_error *error)
 {
-    *view = (struct ih_frame){
-        .samples = frame->samples,
-        .width = frame->width,
-        .height = frame->height,
-        .stride_bytes = frame->stride_bytes,
-        .bytes_per_sample = frame->bytes_per_sample,
-        .maximum = frame->maximum,
-    };
+    *view = app_view_of(frame);
     if (frame->samples != NULL) {
         return true;
     }

@@ -14,6 +14,7 @@
 #include "sim_report.h"
 #include "app_rig.h"
 #include "app_rig_explain.h"
+#include "app_view.h"
 #include "sim_score.h"
 #include "sim_table.h"
 #include "sim_trace.h"
@@ -128,18 +129,6 @@ static void put_frame(struct visit *visit, const struct hal_frame *frame)
     }
 }
 
-static struct ih_frame view_of(const struct hal_frame *frame)
-{
-    return (struct ih_frame){
-        .samples = frame->samples,
-        .width = frame->width,
-        .height = frame->height,
-        .stride_bytes = frame->stride_bytes,
-        .bytes_per_sample = frame->bytes_per_sample,
-        .maximum = frame->maximum,
-    };
-}
-
 static void release(struct visit *visit, const struct hal_frame *frame)
 {
     const struct hal_camera *camera = &visit->replay.camera;
@@ -159,7 +148,7 @@ static void keep_ambient(struct visit *visit, const struct hal_frame *frame)
     }
     release(visit, &visit->ambient);
     visit->ambient = *frame;
-    visit->ambient_view = view_of(frame);
+    visit->ambient_view = app_view_of(frame);
 }
 
 static const struct ih_frame *fresh_ambient(const struct visit *visit, int64_t time_us)

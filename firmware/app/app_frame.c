@@ -1,6 +1,7 @@
 #include "app_frame.h"
 
 #include "app_rig_explain.h"
+#include "app_view.h"
 
 static int64_t now(const struct app_loop *loop)
 {
@@ -53,18 +54,6 @@ static void skip_frame(struct app_loop *loop, const struct hal_frame *frame)
     loop->status.skipped_count++;
     loop->live.skipped_count++;
     release(loop, frame);
-}
-
-static struct ih_frame view_of(const struct hal_frame *frame)
-{
-    return (struct ih_frame){
-        .samples = frame->samples,
-        .width = frame->width,
-        .height = frame->height,
-        .stride_bytes = frame->stride_bytes,
-        .bytes_per_sample = frame->bytes_per_sample,
-        .maximum = frame->maximum,
-    };
 }
 
 /* The laser is on for the whole of an exposure, and an exposure ends within its frame. */
@@ -123,8 +112,8 @@ static void use_lit(struct app_loop *loop, const struct hal_frame *frame, int64_
     bool is_fresh =
         loop->has_ambient && frame->time_us - loop->ambient.time_us <= APP_LOOP_AMBIENT_AGE_MAX_US;
     if (is_fresh) {
-        struct ih_frame view = view_of(frame);
-        struct ih_frame ambient = view_of(&loop->ambient);
+        struct ih_frame view = app_view_of(frame);
+        struct ih_frame ambient = app_view_of(&loop->ambient);
         enum ih_err err = isohead_label(head, &view, &ambient);
         if (err != IH_OK) {
             lose_frame(loop, frame->name, ih_err_text(err));
@@ -214,7 +203,7 @@ static void count_lit(struct app_loop *loop)
 
 void app_frame_use(struct app_loop *loop, const struct hal_frame *frame)
 {
-    struct ih_frame view = view_of(frame);
+    struct ih_frame view = app_view_of(frame);
     struct hal_error error;
     count_lost(loop, frame);
     count_lit(loop);

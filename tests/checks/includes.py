@@ -109,7 +109,7 @@ def judge_sim(path, quoted, target):
     if not quoted or is_core(target):
         return None
     good = re.fullmatch(r"sim_\w+\.h|hal\.h|hal_file\.h|replay/hal_\w+\.h|"
-                        r"app_(rig|rig_explain|record|text|write)\.h", target)
+                        r"app_(rig|rig_explain|record|text|view|write)\.h", target)
     return None if good else "sim includes the core, hal, the app's records and its own files"
 
 
