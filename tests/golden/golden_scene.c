@@ -187,7 +187,7 @@ const char *golden_scene_range(int index, const struct ih_calibration *calibrati
         return name[index];
     }
     for (int32_t i = 0; i < width * height; i++) {
-        samples[i] = index == 2 ? (uint16_t)(next_noise(&state) % 5000) : all[index];
+        samples[i] = (uint16_t)(index == 2 ? next_noise(&state) % 5000 : all[index]);
     }
     return name[index];
 }
