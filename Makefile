@@ -144,5 +144,6 @@ lint: sanitize ## clang-tidy over all C sources but the tests'
 	  xargs -P 2 -n 1 clang-tidy --quiet -p $(BUILD)/sanitize 2> $(BUILD)/lint.log || \
 	  { grep -v 'warnings* generated' $(BUILD)/lint.log; exit 1; }
 
+# A test that was killed may have left a file system mounted below the build: never into that.
 clean: ## remove the build; rendered frames stay
-	@rm -rf $(BUILD)
+	@rm -rf --one-file-system $(BUILD)
