@@ -32,66 +32,72 @@ static void place_centres(struct ih_surface_scratch *scratch)
     }
 }
 
-/* The first `terms` entries of the sample's row of the basis, as number `at` of those side by side:
- * sqrt(dx^2 + dy^2 + 1), Q20, rounded. dx, dy < 60 in Q16: the radicand in Q42 is below 2^55. */
-static void fill_row(struct ih_surface_scratch *scratch, const struct ih_sample *sample, int32_t at,
-                     int32_t terms)
+/* The sample's row of the basis: sqrt(dx^2 + dy^2 + 1), Q20, rounded. dx, dy < 60 in Q16: the
+ * radicand in Q42 is below 2^55. */
+static void fill_row(const struct ih_surface_scratch *scratch, const struct ih_sample *sample,
+                     int32_t row_q20[TERMS])
 {
     uint64_t dx2_q32[IH_SURFACE_CENTRES];
-    uint64_t dy2_q32 = 0;
     for (int32_t k = 0; k < IH_SURFACE_CENTRES; k++) {
         int64_t dx = (int64_t)sample->x_q16 - scratch->centre_q16[k];
         dx2_q32[k] = (uint64_t)(dx * dx) + ((uint64_t)1 << 32);
     }
-    for (int32_t i = 0, column = 0; i < terms; i++) {
-        if (column == 0) {
-            int64_t dy = (int64_t)sample->y_q16 - scratch->centre_q16[i / IH_SURFACE_CENTRES];
-            dy2_q32 = (uint64_t)(dy * dy);
+    int32_t *entry = row_q20;
+    for (int32_t k = 0; k < IH_SURFACE_CENTRES; k++) {
+        int64_t dy = (int64_t)sample->y_q16 - scratch->centre_q16[k];
+        uint64_t dy2_q32 = (uint64_t)(dy * dy);
+        for (int32_t column = 0; column < IH_SURFACE_CENTRES; column++) {
+            uint32_t root_q21 = ih_isqrt_u64((dx2_q32[column] + dy2_q32) << 10);
+            *entry++ = (int32_t)((root_q21 + 1) >> 1);
         }
-        uint32_t root_q21 = ih_isqrt_u64((dx2_q32[column] + dy2_q32) << 10);
-        scratch->row_q20[i][at] = (int32_t)((root_q21 + 1) >> 1);
-        column = column + 1 == IH_SURFACE_CENTRES ? 0 : column + 1;
     }
 }
 
+/* Multiply row number `at` with the sample's weight; what the row stands for, too. */
 static void weigh_row(struct ih_surface_scratch *scratch, const struct ih_sample *sample,
-                      int32_t mean_mm_q8, int32_t root_weight_q15, int32_t at, int32_t terms)
+                      int32_t mean_mm_q8, int32_t root_weight_q15, int32_t at)
 {
     bool is_one = root_weight_q15 == 1 << 15; /* as nearly all are: nothing to round */
-    for (int32_t i = 0; !is_one && i < terms; i++) {
-        int32_t *entry = &scratch->row_q20[i][at];
+    for (int32_t i = 0; !is_one && i < TERMS; i++) {
+        int32_t *entry = &scratch->row_q20[at][i];
         *entry = (int32_t)ih_mul_shift(*entry, root_weight_q15, 15);
     }
     scratch->off_mm_q8[at] =
         (int32_t)ih_mul_shift((int64_t)sample->depth_mm_q8 - mean_mm_q8, root_weight_q15, 15);
 }
 
-/* Where row i of the normal equations begins. */
-static int64_t *normal_row(struct ih_surface_scratch *scratch, int32_t i)
+/* Add the weighted rows' products of one column with each up to it: a row of N. Columns `here` and
+ * `next` = here + 1 at once, so that each entry is read for two products. */
+static void add_columns(const struct ih_surface_scratch *scratch, int32_t here, int64_t *row_here,
+                        int64_t *row_next)
 {
-    int32_t ahead = i < IH_SURFACE_SPLIT ? 0 : IH_CHOLESKY_PACKED(IH_SURFACE_SPLIT) / 2;
-    return &scratch->of.normal_q40[IH_CHOLESKY_PACKED(i) - ahead];
-}
-
-static int64_t dot_of_rows(const int32_t *a, const int32_t *b)
-{
-    int64_t sum = 0;
-    for (int32_t k = 0; k < IH_SURFACE_ROWS; k++) {
-        sum += (int64_t)a[k] * b[k];
+    const int32_t *a = scratch->row_q20[0];
+    const int32_t *b = scratch->row_q20[1];
+    const int32_t *c = scratch->row_q20[2];
+    const int32_t *d = scratch->row_q20[3];
+    const int32_t next = here + 1;
+    const int64_t a_here = a[here], b_here = b[here], c_here = c[here], d_here = d[here];
+    const int64_t a_next = a[next], b_next = b[next], c_next = c[next], d_next = d[next];
+    for (int32_t j = 0; j <= here; j++) {
+        row_here[j] += a_here * a[j] + b_here * b[j] + c_here * c[j] + d_here * d[j];
+        row_next[j] += a_next * a[j] + b_next * b[j] + c_next * c[j] + d_next * d[j];
     }
-    return sum;
+    row_next[next] += a_next * a_next + b_next * b_next + c_next * c_next + d_next * d_next;
 }
 
-/* Add what the weighted rows bring to the normal equations' rows from .. to - 1. */
-static void add_rows(struct ih_surface_scratch *scratch, int32_t from, int32_t to)
+_Static_assert(IH_SURFACE_ROWS == 4 && TERMS % 2 == 0, "add_columns takes 4 rows, 2 columns");
+
+/* Add what the weighted rows bring to the normal equations. */
+static void add_rows(struct ih_surface_scratch *scratch)
 {
-    int64_t *normal = normal_row(scratch, from);
-    for (int32_t i = from; i < to; i++) {
-        const int32_t *row = scratch->row_q20[i];
-        for (int32_t j = 0; j <= i; j++) {
-            *normal++ += dot_of_rows(row, scratch->row_q20[j]);
+    int64_t *normal = scratch->of.normal_q40;
+    for (int32_t i = 0; i < TERMS; i += 2) {
+        add_columns(scratch, i, normal + IH_CHOLESKY_PACKED(i), normal + IH_CHOLESKY_PACKED(i + 1));
+    }
+    for (int32_t k = 0; k < IH_SURFACE_ROWS; k++) {
+        for (int32_t i = 0; i < TERMS; i++) {
+            scratch->right_q28[i] += (int64_t)scratch->row_q20[k][i] * scratch->off_mm_q8[k];
         }
-        scratch->right_q28[i] += dot_of_rows(row, scratch->off_mm_q8);
     }
 }
 
@@ -104,14 +110,13 @@ static int32_t mean_depth_mm_q8(const struct ih_samples *samples)
     return (int32_t)ih_div_round(sum, samples->sample_count);
 }
 
-/* N's rows from .. to - 1 scaled to diagonal 0.99, with ridge, in Q30, in N's place: a row of the
- * factor ends before the next one of N begins. They are copied because the same bytes change type. */
-static void scale_rows(const struct ih_surface_params *params, struct ih_surface_scratch *scratch,
-                       int32_t from, int32_t to)
+/* N scaled to diagonal 0.99, with ridge, in Q30, in N's place: a row of the factor ends before the
+ * next one of N begins. Rows are copied because the same bytes change type. */
+static void scale_rows(const struct ih_surface_params *params, struct ih_surface_scratch *scratch)
 {
     int32_t row[TERMS];
-    for (int32_t i = from; i < to; i++) {
-        const int64_t *normal = normal_row(scratch, i);
+    for (int32_t i = 0; i < TERMS; i++) {
+        const int64_t *normal = &scratch->of.normal_q40[IH_CHOLESKY_PACKED(i)];
         int64_t root = (int64_t)ih_isqrt_u64((uint64_t)normal[i]) + 1; /* the diagonal stays < 1 */
         int64_t scale = SCALE_NUMERATOR / root;
         scratch->scale[i] = (uint32_t)(scale < SCALE_MAX ? scale : SCALE_MAX);
@@ -185,16 +190,16 @@ static int32_t depth_of_sum(const struct ih_surface_scratch *scratch, int32_t me
     return ih_saturate_s32(mean_mm_q8 + depth_q8);
 }
 
-/* Huber step: a sample that is too far from the surface gets less weight. Row number `at` is its
- * own, without weight. False when it is near enough. */
+/* Huber step: a sample that is too far from the surface gets less weight. row_q20 is its own,
+ * without weight. False when it is near enough. */
 static bool reweight(const struct ih_surface_scratch *scratch, const struct ih_sample *sample,
-                     const struct ih_surface_params *params, int32_t at, int32_t mean_mm_q8,
-                     int32_t *root_weight_q15)
+                     const struct ih_surface_params *params, const int32_t row_q20[TERMS],
+                     int32_t mean_mm_q8, int32_t *root_weight_q15)
 {
     int64_t limit_q8 = (int64_t)params->huber_mm << 8;
     int64_t sum = 0;
     for (int32_t k = 0; k < TERMS; k++) {
-        sum += (int64_t)scratch->solution[k] * scratch->row_q20[k][at];
+        sum += (int64_t)scratch->solution[k] * row_q20[k];
     }
     int64_t off_q8 =
         ih_abs_s64((int64_t)sample->depth_mm_q8 - depth_of_sum(scratch, mean_mm_q8, sum));
@@ -207,26 +212,25 @@ static bool reweight(const struct ih_surface_scratch *scratch, const struct ih_s
     return true;
 }
 
-/* Rows from .. to - 1 of the normal equations, of all samples. huber: NULL; or samples that are too
- * far from the surface that was solved last get less weight first. Returns how many do. */
+/* The normal equations of all samples. huber: NULL; or samples that are too far from the surface
+ * that was solved last get less weight first. Returns how many do. */
 static int32_t sum_rows(const struct ih_samples *samples, const struct ih_surface_params *huber,
-                        struct ih_surface_scratch *scratch, int32_t from, int32_t to,
-                        struct ih_surface *out)
+                        struct ih_surface_scratch *scratch, struct ih_surface *out)
 {
     int32_t changed = 0;
-    int32_t entries = IH_CHOLESKY_PACKED(to) - IH_CHOLESKY_PACKED(from);
-    memset(normal_row(scratch, from), 0, (size_t)entries * sizeof scratch->of.normal_q40[0]);
-    memset(&scratch->right_q28[from], 0, (size_t)(to - from) * sizeof scratch->right_q28[0]);
+    memset(scratch->of.normal_q40, 0, sizeof scratch->of.normal_q40);
+    memset(scratch->right_q28, 0, sizeof scratch->right_q28);
     for (int32_t first = 0; first < samples->sample_count; first += IH_SURFACE_ROWS) {
         memset(scratch->row_q20, 0, sizeof scratch->row_q20); /* the last ones may be fewer */
         for (int32_t i = first; i < samples->sample_count && i < first + IH_SURFACE_ROWS; i++) {
             const struct ih_sample *sample = &samples->sample[i];
-            fill_row(scratch, sample, i - first, huber != NULL ? TERMS : to);
-            changed += huber != NULL && reweight(scratch, sample, huber, i - first, out->mean_mm_q8,
+            int32_t *row_q20 = scratch->row_q20[i - first];
+            fill_row(scratch, sample, row_q20);
+            changed += huber != NULL && reweight(scratch, sample, huber, row_q20, out->mean_mm_q8,
                                                  &out->root_weight_q15[i]);
-            weigh_row(scratch, sample, out->mean_mm_q8, out->root_weight_q15[i], i - first, to);
+            weigh_row(scratch, sample, out->mean_mm_q8, out->root_weight_q15[i], i - first);
         }
-        add_rows(scratch, from, to);
+        add_rows(scratch);
     }
     return changed;
 }
@@ -235,14 +239,11 @@ static int32_t sum_rows(const struct ih_samples *samples, const struct ih_surfac
 static bool fit(const struct ih_samples *samples, const struct ih_surface_params *params,
                 bool again, struct ih_surface_scratch *scratch, struct ih_surface *out)
 {
-    const struct ih_surface_params *huber = again ? params : NULL;
-    out->downweighted_count = sum_rows(samples, huber, scratch, 0, IH_SURFACE_SPLIT, out);
+    out->downweighted_count = sum_rows(samples, again ? params : NULL, scratch, out);
     if (again && out->downweighted_count == 0) {
         return true;
     }
-    scale_rows(params, scratch, 0, IH_SURFACE_SPLIT);
-    sum_rows(samples, NULL, scratch, IH_SURFACE_SPLIT, TERMS, out);
-    scale_rows(params, scratch, IH_SURFACE_SPLIT, TERMS);
+    scale_rows(params, scratch);
     return solve(samples, out->mean_mm_q8, scratch);
 }
 

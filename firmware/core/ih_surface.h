@@ -14,7 +14,7 @@
  *        rounded to Q30; the ridge keeps the least pivot above 3e-3.
  * Error: within 0.2 mm of the float64 solution of the same system, everywhere on the grid, for
  *        depths that span up to 1.5 m (ih_samples clips them); it grows with the span.
- * Cost:  samples x 532 square roots; twice samples x 10,440 multiply-adds; two factorisations of
+ * Cost:  samples x 288 square roots; twice samples x 10,440 multiply-adds; two factorisations of
  *        n = 144; grid x 144 multiply-adds.
  */
 #ifndef IH_SURFACE_H
@@ -61,25 +61,17 @@ struct ih_surface {
  * writing of 84 kB. */
 #define IH_SURFACE_ROWS 4
 
-/* The normal equations are summed in two parts, this many rows first: scaled to 32 bits they take
- * half of their place, which leaves 20 kB less for both. A greater number costs more square roots, a
- * smaller one memory. IH_CHOLESKY_PACKED of it is even. */
-#define IH_SURFACE_SPLIT 100
-
 struct ih_surface_scratch {
-    /* The normal equations' rows from IH_SURFACE_SPLIT on stand behind the scaled ones of the rows
-     * before; then the factor; then the table. */
     union {
-        int64_t normal_q40[IH_CHOLESKY_PACKED(IH_SURFACE_TERMS) -
-                           IH_CHOLESKY_PACKED(IH_SURFACE_SPLIT) / 2];
-        int32_t factor_q30[IH_CHOLESKY_PACKED(IH_SURFACE_TERMS)];
+        int64_t normal_q40[IH_CHOLESKY_PACKED(IH_SURFACE_TERMS)]; /* lower triangle, row by row */
+        int32_t factor_q30[IH_CHOLESKY_PACKED(IH_SURFACE_TERMS)]; /* scaled, then factored */
         int32_t table_q20[IH_SURFACE_STEPS][IH_SURFACE_STEPS];
     } of;
     int64_t right_q28[IH_SURFACE_TERMS];
-    int32_t row_q20[IH_SURFACE_TERMS][IH_SURFACE_ROWS]; /* rows side by side */
-    int32_t off_mm_q8[IH_SURFACE_ROWS];                 /* their depths, less the mean, weighted */
-    uint32_t scale[IH_SURFACE_TERMS];                   /* 0.995 * 2^51 / sqrt(N_ii), N in Q40 */
-    int32_t solution[IH_SURFACE_TERMS];                 /* the right side before */
+    int32_t row_q20[IH_SURFACE_ROWS][IH_SURFACE_TERMS];
+    int32_t off_mm_q8[IH_SURFACE_ROWS]; /* their depths, less the mean, weighted */
+    uint32_t scale[IH_SURFACE_TERMS];   /* 0.995 * 2^51 / sqrt(N_ii), N in Q40 */
+    int32_t solution[IH_SURFACE_TERMS]; /* the right side before */
     int32_t solution_shift; /* coefficient = solution / 2^solution_shift, mm per field unit */
     int32_t centre_q16[IH_SURFACE_CENTRES]; /* places of the centres in a row, field units */
 };
