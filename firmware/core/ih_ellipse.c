@@ -29,6 +29,16 @@ void ih_ellipse_params_default(struct ih_ellipse_params *params)
     };
 }
 
+/* How the edge p -> q crosses the positive x axis. */
+static int32_t winding_of_edge(int64_t px, int64_t py, int64_t qx, int64_t qy)
+{
+    if ((py <= 0) == (qy <= 0)) {
+        return 0;
+    }
+    int64_t w = px * qy - qx * py;
+    return py <= 0 ? w > 0 : -(w < 0);
+}
+
 /* Add the edge p -> q. Green's theorem: with w = px qy - qx py,
  *   2 area = sum w                        6 int x  = sum w (px + qx)
  *   12 int x^2 = sum w (px^2 + px qx + qx^2)
@@ -42,11 +52,7 @@ static void add_edge(struct ih_moments *m, int64_t px, int64_t py, int64_t qx, i
     m->xx_q32 += w * (px * px + px * qx + qx * qx);
     m->yy_q32 += w * (py * py + py * qy + qy * qy);
     m->xy_q32 += w * (2 * px * py + px * qy + qx * py + 2 * qx * qy) / 2;
-    if (py <= 0 && qy > 0 && w > 0) {
-        m->winding++;
-    } else if (py > 0 && qy <= 0 && w < 0) {
-        m->winding--;
-    }
+    m->winding += winding_of_edge(px, py, qx, qy);
 }
 
 /* Axis ratio from the covariance; 0 when it is not positive definite. */
@@ -211,71 +217,124 @@ static int32_t accumulate(const struct ih_contour *contour, struct ih_ellipse_sc
     return count;
 }
 
-/* Moments of the points from..to closed by their chord. */
-static struct ih_moments part_moments(const struct ih_ellipse_scratch *scratch, int32_t from,
-                                      int32_t to)
+/* Moments of the points from..to closed by their chord. False when they do not wind round the place
+ * once: that is known before the sums are. */
+static bool part_moments(const struct ih_ellipse_scratch *scratch, int32_t from, int32_t to,
+                         struct ih_moments *out)
 {
-    struct ih_moments m = scratch->prefix[to];
-    const struct ih_moments *before = &scratch->prefix[from];
-    m.area2_q16 -= before->area2_q16;
-    m.x_q24 -= before->x_q24;
-    m.y_q24 -= before->y_q24;
-    m.xx_q32 -= before->xx_q32;
-    m.xy_q32 -= before->xy_q32;
-    m.yy_q32 -= before->yy_q32;
-    m.winding -= before->winding;
-    add_edge(&m, scratch->x_q8[to], scratch->y_q8[to], scratch->x_q8[from], scratch->y_q8[from]);
-    return m;
-}
-
-static int32_t chord_q8(const struct ih_ellipse_scratch *scratch, int32_t from, int32_t to)
-{
-    int64_t dx = scratch->x_q8[to] - scratch->x_q8[from];
-    int64_t dy = scratch->y_q8[to] - scratch->y_q8[from];
-    return (int32_t)ih_isqrt_u64((uint64_t)(dx * dx + dy * dy));
-}
-
-/* Is the part an ellipse around the place? The cheap tests come first. */
-static bool test_part(const struct ih_ellipse_scratch *scratch, int32_t from, int32_t to,
-                      int32_t arc_q8, struct ih_vertex place,
-                      const struct ih_ellipse_params *params, struct ih_ellipse *out)
-{
-    int64_t chord = chord_q8(scratch, from, to);
-    if (chord * 65536 > (int64_t)params->chord_max_q16 * arc_q8) {
+    struct ih_moments m = {.winding = scratch->prefix[to].winding - scratch->prefix[from].winding};
+    const int64_t px = scratch->x_q8[to], py = scratch->y_q8[to];
+    const int64_t qx = scratch->x_q8[from], qy = scratch->y_q8[from];
+    if (m.winding + winding_of_edge(px, py, qx, qy) != 1) {
         return false;
     }
-    struct ih_moments m = part_moments(scratch, from, to);
-    if (m.winding != 1 || !ellipse_of_moments(&m, half_q9(place.x_q9), half_q9(place.y_q9), out) ||
+    const struct ih_moments *after = &scratch->prefix[to];
+    const struct ih_moments *before = &scratch->prefix[from];
+    m.area2_q16 = after->area2_q16 - before->area2_q16;
+    m.x_q24 = after->x_q24 - before->x_q24;
+    m.y_q24 = after->y_q24 - before->y_q24;
+    m.xx_q32 = after->xx_q32 - before->xx_q32;
+    m.xy_q32 = after->xy_q32 - before->xy_q32;
+    m.yy_q32 = after->yy_q32 - before->yy_q32;
+    add_edge(&m, px, py, qx, qy);
+    *out = m;
+    return true;
+}
+
+/* Square of the chord from one point to another, Q16. */
+static int32_t chord2_q16(const struct ih_ellipse_scratch *scratch, int32_t from, int32_t to)
+{
+    int32_t dx = scratch->x_q8[to] - scratch->x_q8[from];
+    int32_t dy = scratch->y_q8[to] - scratch->y_q8[from];
+    return dx * dx + dy * dy; /* at most 2 (46 * 256)^2 = 2^28.1 */
+}
+
+/* A part's merit. */
+static int32_t merit_q8(int32_t arc_q8, int32_t chord_q8, int32_t shape_q16)
+{
+    int64_t shape_cost_q8 = ih_mul_shift((int64_t)SHAPE_COST * (shape_q16 - 65536), arc_q8, 16);
+    return ih_saturate_s32(arc_q8 - ih_mul_shift(CHORD_COST_Q8, chord_q8, 8) - shape_cost_q8);
+}
+
+/* Is the part an ellipse around the place, of more merit than `least`? The cheap tests come first:
+ * no part has more merit than one of the best shape. */
+static bool test_part(const struct ih_ellipse_scratch *scratch, int32_t from, int32_t to,
+                      int32_t arc_q8, int32_t least_q8, struct ih_vertex place,
+                      const struct ih_ellipse_params *params, struct ih_ellipse *out)
+{
+    int32_t chord_q8 = (int32_t)ih_isqrt_u64((uint64_t)chord2_q16(scratch, from, to));
+    struct ih_moments m;
+    if (merit_q8(arc_q8, chord_q8, SHAPE_MIN_Q16) < least_q8 ||
+        !part_moments(scratch, from, to, &m) ||
+        !ellipse_of_moments(&m, half_q9(place.x_q9), half_q9(place.y_q9), out) ||
         out->area_q16 <= 0 || out->shape_q16 < SHAPE_MIN_Q16 ||
         out->shape_q16 > params->shape_max_q16 || out->ratio_q16 > params->ratio_part_max_q16) {
         return false;
     }
-    int64_t shape_cost_q8 =
-        ih_mul_shift((int64_t)SHAPE_COST * (out->shape_q16 - 65536), arc_q8, 16);
-    out->merit_q8 = ih_saturate_s32(arc_q8 - ih_mul_shift(CHORD_COST_Q8, chord, 8) - shape_cost_q8);
-    return true;
+    out->merit_q8 = merit_q8(arc_q8, chord_q8, out->shape_q16);
+    return out->merit_q8 >= least_q8;
+}
+
+/* Is the place inside the box around the contour? Outside nothing winds round it. One step is left
+ * for what resampling rounds. */
+static bool is_place_inside(const struct ih_cuts *cuts, const struct ih_contour *contour,
+                            struct ih_vertex place)
+{
+    const struct ih_vertex *vertex = &cuts->vertex[contour->first];
+    bool left = false, right = false, above = false, below = false;
+    for (int32_t i = 0; i < contour->vertex_count; i++) {
+        left |= vertex[i].x_q9 <= place.x_q9 + 2;
+        right |= vertex[i].x_q9 >= place.x_q9 - 2;
+        above |= vertex[i].y_q9 <= place.y_q9 + 2;
+        below |= vertex[i].y_q9 >= place.y_q9 - 2;
+    }
+    return left && right && above && below;
+}
+
+/* What belongs to an arc of so many steps. */
+struct arc {
+    int32_t length_q8;
+    int64_t chord2_end_q16; /* a longer chord's square is at least this */
+};
+
+static void measure_arcs(int32_t length_q8, int32_t steps, const struct ih_ellipse_params *params,
+                         struct arc arc[IH_ELLIPSE_POINTS])
+{
+    for (int32_t k = 0; k < IH_ELLIPSE_POINTS; k++) {
+        arc[k].length_q8 = (int32_t)((int64_t)length_q8 * k / steps);
+        int64_t chord_end_q8 = ((int64_t)params->chord_max_q16 * arc[k].length_q8 >> 16) + 1;
+        arc[k].chord2_end_q16 = chord_end_q8 * chord_end_q8;
+    }
 }
 
 bool ih_ellipse_of_part(const struct ih_cuts *cuts, const struct ih_contour *contour,
                         struct ih_vertex place, const struct ih_ellipse_params *params,
                         struct ih_ellipse_scratch *scratch, struct ih_ellipse *out)
 {
-    if (contour->vertex_count > IH_ELLIPSE_VERTICES_MAX || contour->vertex_count < PART_EDGES_MIN) {
+    if (contour->vertex_count > IH_ELLIPSE_VERTICES_MAX || contour->vertex_count < PART_EDGES_MIN ||
+        !is_place_inside(cuts, contour, place)) {
         return false;
     }
+    struct arc arc[IH_ELLIPSE_POINTS];
     int32_t length_q8 = resample(cuts, contour, place, scratch);
     int32_t count = accumulate(contour, scratch);
-    int32_t steps = contour->closed ? IH_ELLIPSE_POINTS : IH_ELLIPSE_POINTS - 1;
+    measure_arcs(length_q8, contour->closed ? IH_ELLIPSE_POINTS : IH_ELLIPSE_POINTS - 1, params,
+                 arc);
     bool found = false;
+    /* Of equal ones the first, the shortest of those, is taken. Long ones, which have more merit,
+     * are looked at first. */
     for (int32_t from = 0; from < IH_ELLIPSE_POINTS; from++) {
         int32_t last = ih_min_s32(count - 1, from + IH_ELLIPSE_POINTS - 1);
-        for (int32_t to = from + PART_EDGES_MIN; to <= last; to++) {
+        bool found_here = false;
+        for (int32_t to = last; to >= from + PART_EDGES_MIN; to--) {
+            int32_t least_q8 = !found ? INT32_MIN : out->merit_q8 + (found_here ? 0 : 1);
             struct ih_ellipse part;
-            int32_t arc_q8 = (int32_t)((int64_t)length_q8 * (to - from) / steps);
-            if (test_part(scratch, from, to, arc_q8, place, params, &part) &&
-                (!found || part.merit_q8 > out->merit_q8)) {
+            if (chord2_q16(scratch, from, to) < arc[to - from].chord2_end_q16 &&
+                test_part(scratch, from, to, arc[to - from].length_q8, least_q8, place, params,
+                          &part)) {
                 *out = part;
                 found = true;
+                found_here = true;
             }
         }
     }
