@@ -256,21 +256,19 @@ static int32_t merit_q8(int32_t arc_q8, int32_t chord_q8, int32_t shape_q16)
     return ih_saturate_s32(arc_q8 - ih_mul_shift(CHORD_COST_Q8, chord_q8, 8) - shape_cost_q8);
 }
 
-/* Is the part an ellipse around the place, of more merit than `least`? The cheap tests come first:
- * no part has more merit than one of the best shape. */
+/* Is the part an ellipse around the place, of at least so much merit? */
 static bool test_part(const struct ih_ellipse_scratch *scratch, int32_t from, int32_t to,
                       int32_t arc_q8, int32_t least_q8, struct ih_vertex place,
                       const struct ih_ellipse_params *params, struct ih_ellipse *out)
 {
-    int32_t chord_q8 = (int32_t)ih_isqrt_u64((uint64_t)chord2_q16(scratch, from, to));
     struct ih_moments m;
-    if (merit_q8(arc_q8, chord_q8, SHAPE_MIN_Q16) < least_q8 ||
-        !part_moments(scratch, from, to, &m) ||
+    if (!part_moments(scratch, from, to, &m) ||
         !ellipse_of_moments(&m, half_q9(place.x_q9), half_q9(place.y_q9), out) ||
         out->area_q16 <= 0 || out->shape_q16 < SHAPE_MIN_Q16 ||
         out->shape_q16 > params->shape_max_q16 || out->ratio_q16 > params->ratio_part_max_q16) {
         return false;
     }
+    int32_t chord_q8 = (int32_t)ih_isqrt_u64((uint64_t)chord2_q16(scratch, from, to));
     out->merit_q8 = merit_q8(arc_q8, chord_q8, out->shape_q16);
     return out->merit_q8 >= least_q8;
 }
@@ -294,16 +292,32 @@ static bool is_place_inside(const struct ih_cuts *cuts, const struct ih_contour 
 /* What belongs to an arc of so many steps. */
 struct arc {
     int32_t length_q8;
-    int64_t chord2_end_q16; /* a longer chord's square is at least this */
+    int32_t merit_most_q8;  /* with the best shape and no chord */
+    int32_t chord_end_q8;   /* from here on a chord is too long */
+    int32_t chord2_end_q16; /* or the part has too little merit: in squares, no root is needed */
 };
 
 static void measure_arcs(int32_t length_q8, int32_t steps, const struct ih_ellipse_params *params,
                          struct arc arc[IH_ELLIPSE_POINTS])
 {
     for (int32_t k = 0; k < IH_ELLIPSE_POINTS; k++) {
-        arc[k].length_q8 = (int32_t)((int64_t)length_q8 * k / steps);
-        int64_t chord_end_q8 = ((int64_t)params->chord_max_q16 * arc[k].length_q8 >> 16) + 1;
-        arc[k].chord2_end_q16 = chord_end_q8 * chord_end_q8;
+        int32_t part_q8 = (int32_t)((int64_t)length_q8 * k / steps);
+        arc[k].length_q8 = part_q8;
+        arc[k].merit_most_q8 = merit_q8(part_q8, 0, SHAPE_MIN_Q16);
+        arc[k].chord_end_q8 = (int32_t)((int64_t)params->chord_max_q16 * part_q8 >> 16) + 1;
+    }
+}
+
+/* A chord costs 1.6 of its length: 160 / 256 is more than its inverse, 2 for what was rounded.
+ * Chords are below 2^14.1, so a limit beyond 2^15 is none. */
+static void limit_chords(struct arc arc[IH_ELLIPSE_POINTS], int32_t least_q8)
+{
+    for (int32_t k = 0; k < IH_ELLIPSE_POINTS; k++) {
+        int64_t spare_q8 = (int64_t)arc[k].merit_most_q8 - least_q8;
+        int64_t end_q8 = spare_q8 < 0 ? 0 : (spare_q8 * 160 >> 8) + 2;
+        end_q8 = end_q8 < arc[k].chord_end_q8 ? end_q8 : arc[k].chord_end_q8;
+        int32_t bounded_q8 = ih_min_s32((int32_t)end_q8, 1 << 15);
+        arc[k].chord2_end_q16 = bounded_q8 * bounded_q8;
     }
 }
 
@@ -320,6 +334,7 @@ bool ih_ellipse_of_part(const struct ih_cuts *cuts, const struct ih_contour *con
     int32_t count = accumulate(contour, scratch);
     measure_arcs(length_q8, contour->closed ? IH_ELLIPSE_POINTS : IH_ELLIPSE_POINTS - 1, params,
                  arc);
+    limit_chords(arc, INT32_MIN);
     bool found = false;
     /* Of equal ones the first, the shortest of those, is taken. Long ones, which have more merit,
      * are looked at first. */
@@ -327,14 +342,17 @@ bool ih_ellipse_of_part(const struct ih_cuts *cuts, const struct ih_contour *con
         int32_t last = ih_min_s32(count - 1, from + IH_ELLIPSE_POINTS - 1);
         bool found_here = false;
         for (int32_t to = last; to >= from + PART_EDGES_MIN; to--) {
+            if (chord2_q16(scratch, from, to) >= arc[to - from].chord2_end_q16) {
+                continue;
+            }
             int32_t least_q8 = !found ? INT32_MIN : out->merit_q8 + (found_here ? 0 : 1);
             struct ih_ellipse part;
-            if (chord2_q16(scratch, from, to) < arc[to - from].chord2_end_q16 &&
-                test_part(scratch, from, to, arc[to - from].length_q8, least_q8, place, params,
+            if (test_part(scratch, from, to, arc[to - from].length_q8, least_q8, place, params,
                           &part)) {
                 *out = part;
                 found = true;
                 found_here = true;
+                limit_chords(arc, part.merit_q8);
             }
         }
     }
