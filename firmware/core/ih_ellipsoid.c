@@ -12,6 +12,30 @@ struct ih_ellipsoid ih_ellipsoid_mean(const int32_t centre_mm_q8[3])
     };
 }
 
+/* What the errors of radius2 and the box's own rounding need: 2^-6, and two steps. */
+#define BOX_RADIUS2_Q14 (1 << 8)
+#define BOX_MM_Q8 2
+
+struct ih_ellipsoid_box ih_ellipsoid_box(const struct ih_ellipsoid *ellipsoid,
+                                         const int32_t slope_most_q20[2], int32_t radius2_q14)
+{
+    uint64_t sum_q14 = 1 << 14; /* 1 + g.g; g is at most 20 on each axis */
+    for (int axis = 0; axis < 2; axis++) {
+        int64_t g_q14 = ih_div_round(
+            ih_shift_round((int64_t)slope_most_q20[axis] * ellipsoid->semi_mm_q8[2], 6),
+            ellipsoid->semi_mm_q8[axis]);
+        sum_q14 += (uint64_t)(g_q14 * g_q14 >> 14) + 1;
+    }
+    int64_t most_q14 =
+        (int64_t)ih_isqrt_u64((uint64_t)(radius2_q14 + BOX_RADIUS2_Q14) * sum_q14) + 1;
+    struct ih_ellipsoid_box box;
+    for (int axis = 0; axis < 2; axis++) {
+        int64_t half_q8 = ih_mul_shift(most_q14, ellipsoid->semi_mm_q8[axis], 14);
+        box.half_mm_q8[axis] = (int32_t)half_q8 + BOX_MM_Q8;
+    }
+    return box;
+}
+
 static bool in_reach(int64_t place_q14)
 {
     return ih_abs_s64(place_q14) <= REACH_Q14;

@@ -21,6 +21,7 @@
 #ifndef IH_ELLIPSOID_H
 #define IH_ELLIPSOID_H
 
+#include "ih_fix.h"
 #include "ih_space.h"
 
 #define IH_ELLIPSOID_SEMI_MIN_MM 40
@@ -40,12 +41,35 @@ struct ih_crossing {
     int32_t entry_mm_q8; /* Z; of a ray that passes: the depth of its nearest place */
 };
 
+/* Half sides of a box around an ellipsoid's centre, at its depth. */
+struct ih_ellipsoid_box {
+    int32_t half_mm_q8[2];
+};
+
 /* The mean adult head, hair included. */
 struct ih_ellipsoid ih_ellipsoid_mean(const int32_t centre_mm_q8[3]);
 
 /* False: far away, *out is not set. */
 bool ih_ellipsoid_cross(const struct ih_ellipsoid *ellipsoid, const int32_t origin_mm_q8[3],
                         const struct ih_ray *ray, struct ih_crossing *out);
+
+/* The box through which every ray passes that comes nearer than radius, with slopes up to slope_most
+ * (as from ih_space_slope_most): radius2 >= e.e / (1 + g.g). The errors above are allowed for. */
+struct ih_ellipsoid_box ih_ellipsoid_box(const struct ih_ellipsoid *ellipsoid,
+                                         const int32_t slope_most_q20[2], int32_t radius2_q14);
+
+/* Does the ray pass through the box? Two products, for those that are not worth a crossing. */
+static inline bool ih_ellipsoid_in_box(const struct ih_ellipsoid *ellipsoid,
+                                       const struct ih_ellipsoid_box *box,
+                                       const int32_t origin_mm_q8[3], const struct ih_ray *ray)
+{
+    int64_t depth_q8 = (int64_t)ellipsoid->centre_mm_q8[2] - origin_mm_q8[2];
+    int64_t x_q8 =
+        (depth_q8 * ray->slope_x_q20 >> 20) + origin_mm_q8[0] - ellipsoid->centre_mm_q8[0];
+    int64_t y_q8 =
+        (depth_q8 * ray->slope_y_q20 >> 20) + origin_mm_q8[1] - ellipsoid->centre_mm_q8[1];
+    return ih_abs_s64(x_q8) <= box->half_mm_q8[0] && ih_abs_s64(y_q8) <= box->half_mm_q8[1];
+}
 
 /* A point in the ellipsoid's units. False when beyond the reach on any axis. */
 bool ih_ellipsoid_place(const struct ih_ellipsoid *ellipsoid, const int32_t point_mm_q8[3],

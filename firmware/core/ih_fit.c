@@ -146,15 +146,16 @@ static void add_point(struct system *system, const struct ih_ellipsoid *ellipsoi
     }
 }
 
-/* A point seen behind the ellipsoid, through it. */
+/* A point seen behind the ellipsoid, through it, if it passes through the box. */
 static void add_push(struct system *system, const struct ih_ellipsoid *ellipsoid,
-                     const int32_t origin_mm_q8[3], const struct ih_ray *ray,
-                     int32_t see_through_mm)
+                     const struct ih_ellipsoid_box *box, const int32_t origin_mm_q8[3],
+                     const struct ih_ray *ray, int32_t see_through_mm)
 {
     struct ih_crossing crossing;
     struct gradient g;
     struct row row;
-    if (!ih_ellipsoid_cross(ellipsoid, origin_mm_q8, ray, &crossing) ||
+    if (!ih_ellipsoid_in_box(ellipsoid, box, origin_mm_q8, ray) ||
+        !ih_ellipsoid_cross(ellipsoid, origin_mm_q8, ray, &crossing) ||
         crossing.radius2_q14 >= ONE_Q14 ||
         ray->point_mm_q8[2] <= crossing.entry_mm_q8 + (see_through_mm << 8) ||
         !find_gradient(ellipsoid, crossing.nearest_q14, &g)) {
@@ -251,7 +252,11 @@ void ih_fit_ellipsoid(const struct ih_space *space, const struct ih_fit_params *
     for (int axis = 0; axis < 3; axis++) {
         state.ln_q16[axis] = ln_ratio_q16(start->semi_mm_q8[axis], mean.semi_mm_q8[axis]);
     }
+    int32_t slope_most_q20[2];
+    ih_space_slope_most(space, slope_most_q20);
     for (int step = 0; step < params->step_count; step++) {
+        const struct ih_ellipsoid_box box =
+            ih_ellipsoid_box(&state.ellipsoid, slope_most_q20, ONE_Q14);
         struct system system;
         int32_t step_q16[IH_FIT_UNKNOWNS];
         memset(&system, 0, sizeof system);
@@ -259,7 +264,7 @@ void ih_fit_ellipsoid(const struct ih_space *space, const struct ih_fit_params *
             const struct ih_ray *ray = &space->ray[slot];
             if (ray->state == IH_RAY_SEEN) {
                 add_point(&system, &state.ellipsoid, ray, robust_mm[step]);
-                add_push(&system, &state.ellipsoid, space->origin_mm_q8, ray,
+                add_push(&system, &state.ellipsoid, &box, space->origin_mm_q8, ray,
                          params->see_through_mm);
             }
         }

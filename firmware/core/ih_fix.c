@@ -23,12 +23,6 @@ int64_t ih_mul_wide_shift(int64_t a, uint32_t b, int shift)
                                          * upper side: rounding half upwards ignores it */
 }
 
-int64_t ih_div_round(int64_t numerator, int64_t denominator)
-{
-    int64_t half = denominator / 2;
-    return (numerator >= 0 ? numerator + half : numerator - half) / denominator;
-}
-
 int ih_bits_u64(uint64_t value)
 {
     return value == 0 ? 0 : 64 - __builtin_clzll(value);

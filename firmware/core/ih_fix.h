@@ -31,7 +31,11 @@ int64_t ih_mul_wide_shift(int64_t a, uint32_t b, int shift);
 
 /* numerator / denominator rounded to nearest, halves away from zero; denominator > 0,
  * |numerator| + denominator / 2 < 2^63. */
-int64_t ih_div_round(int64_t numerator, int64_t denominator);
+static inline int64_t ih_div_round(int64_t numerator, int64_t denominator)
+{
+    int64_t half = denominator / 2;
+    return (numerator >= 0 ? numerator + half : numerator - half) / denominator;
+}
 
 /* value limited to the range of int32_t. */
 static inline int32_t ih_saturate_s32(int64_t value)

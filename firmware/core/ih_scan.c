@@ -59,7 +59,8 @@ static bool is_in_ring(const struct ih_crossing *crossing, const struct ih_ellip
            dy <= ih_abs_s64(dx);
 }
 
-static int32_t score_q12(const struct ih_space *space, const struct ih_ellipsoid *head)
+static int32_t score_q12(const struct ih_space *space, const struct ih_ellipsoid_box *box,
+                         const struct ih_ellipsoid *head)
 {
     int32_t inside_sum = 0;
     int32_t inside_count = 0;
@@ -68,7 +69,8 @@ static int32_t score_q12(const struct ih_space *space, const struct ih_ellipsoid
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
         const struct ih_ray *ray = &space->ray[slot];
         struct ih_crossing crossing;
-        if (!ih_ellipsoid_cross(head, space->origin_mm_q8, ray, &crossing)) {
+        if (!ih_ellipsoid_in_box(head, box, space->origin_mm_q8, ray) ||
+            !ih_ellipsoid_cross(head, space->origin_mm_q8, ray, &crossing)) {
             continue;
         }
         if (crossing.radius2_q14 < 1 << 14) {
@@ -131,6 +133,10 @@ void ih_scan_find(const struct ih_space *space, const struct ih_scan_params *par
                   struct ih_scan_scratch *scratch, struct ih_scan *out)
 {
     int32_t count = 0;
+    int32_t slope_most_q20[2];
+    ih_space_slope_most(space, slope_most_q20);
+    const struct ih_ellipsoid mean = ih_ellipsoid_mean(space->origin_mm_q8);
+    const struct ih_ellipsoid_box box = ih_ellipsoid_box(&mean, slope_most_q20, RING_OUTER2_Q14);
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
         if (space->ray[slot].state != IH_RAY_SEEN) {
             continue;
@@ -138,7 +144,7 @@ void ih_scan_find(const struct ih_space *space, const struct ih_scan_params *par
         struct ih_scan_place *place = &scratch->tried[count++];
         centre_behind(&space->ray[slot], params->deep_mm, place->centre_mm_q8);
         struct ih_ellipsoid head = ih_ellipsoid_mean(place->centre_mm_q8);
-        place->score_q12 = score_q12(space, &head);
+        place->score_q12 = score_q12(space, &box, &head);
     }
     out->place_count = 0;
     while (out->place_count < params->place_max) {

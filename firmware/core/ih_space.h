@@ -49,4 +49,7 @@ void ih_space_make(const struct ih_points *points, const struct ih_dots *dots,
                    const struct ih_rig *rig, const struct ih_space_params *params,
                    struct ih_space *out);
 
+/* The greatest |slope| of all rays, x and y. */
+void ih_space_slope_most(const struct ih_space *space, int32_t slope_most_q20[2]);
+
 #endif
