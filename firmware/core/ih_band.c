@@ -7,6 +7,8 @@
 #define INNER_WEIGHT 81 /* the outer box has 81 pixels, the inner kernel weight 16: */
 #define OUTER_WEIGHT 16 /* 81 inner - 16 outer has no response to a constant */
 #define RESPONSE_SHIFT 8
+/* Pixels that are filtered together: their sums take 8 bytes each of the stack. */
+#define SPAN 64
 
 struct ih_row ih_frame_row(const struct ih_frame *frame, int32_t v)
 {
@@ -69,29 +71,56 @@ static int32_t weighed(int32_t inner, int32_t box)
            RESPONSE_SHIFT;
 }
 
+/* Three rows' sum, weights 1-2-1, at each pixel. */
+struct rows {
+    const uint16_t *above, *middle, *below;
+};
+
+static int32_t column_of(const struct rows *rows, int32_t u)
+{
+    return rows->above[u] + 2 * rows->middle[u] + rows->below[u];
+}
+
+/* R of count pixels from u on; box: the sum around the first of them, moved on to the pixel after
+ * the last. The box's running sum has each value wait for the one before; what is done to all pixels
+ * alike stands in loops of its own, which compilers turn into vectors. */
+static void filter_span(const struct ih_band *band, const struct rows *rows, int32_t u,
+                        int32_t count, int32_t *box, int16_t *response)
+{
+    int32_t box_at[SPAN];
+    int32_t column[SPAN + 2]; /* one pixel more on both sides, repeated outside the frame */
+    const uint16_t *sum = &band->column_sum[u]; /* of the box around pixel u: from sum[0] on */
+    for (int32_t i = 0; i < count; i++) {
+        box_at[i] = *box;
+        *box += sum[i + IH_BAND_ROWS] - sum[i];
+    }
+    for (int32_t i = 0; i < count; i++) {
+        column[i + 1] = column_of(rows, u + i);
+    }
+    column[0] = column_of(rows, ih_max_s32(u - 1, 0));
+    column[count + 1] = column_of(rows, ih_min_s32(u + count, band->width - 1));
+    for (int32_t i = 0; i < count; i++) {
+        response[u + i] =
+            (int16_t)weighed(column[i] + 2 * column[i + 1] + column[i + 2], box_at[i]);
+    }
+}
+
 /* R of the ring's centre row. */
 static void filter_row(const struct ih_band *band, int16_t *response)
 {
-    const int32_t last = band->width - 1;
     const int32_t centre = band->rows_in - IH_BAND_REACH - 1;
-    const uint16_t *above = band->grey_q4[(centre - 1) % IH_BAND_ROWS];
-    const uint16_t *middle = band->grey_q4[centre % IH_BAND_ROWS];
-    const uint16_t *below = band->grey_q4[(centre + 1) % IH_BAND_ROWS];
-    const uint16_t *first_sum = band->column_sum; /* of the box around pixel u: first_sum[u] */
+    const struct rows rows = {
+        .above = band->grey_q4[(centre - 1) % IH_BAND_ROWS],
+        .middle = band->grey_q4[centre % IH_BAND_ROWS],
+        .below = band->grey_q4[(centre + 1) % IH_BAND_ROWS],
+    };
     int32_t box = 0;
     for (int32_t i = 0; i < IH_BAND_ROWS; i++) {
-        box += first_sum[i];
+        box += band->column_sum[i];
     }
-    int32_t left = above[0] + 2 * middle[0] + below[0];
-    int32_t here = left;
-    for (int32_t u = 0; u < last; u++) {
-        int32_t right = above[u + 1] + 2 * middle[u + 1] + below[u + 1];
-        response[u] = (int16_t)weighed(left + 2 * here + right, box);
-        box += first_sum[u + IH_BAND_ROWS] - first_sum[u];
-        left = here;
-        here = right;
+    for (int32_t u = 0; u < band->width; u += SPAN) {
+        filter_span(band, &rows, u, ih_min_s32(SPAN, band->width - u), &box, response);
     }
-    response[last] = (int16_t)weighed(left + 3 * here, box);
 }
 
 bool ih_band_push(struct ih_band *band, int16_t *response)

@@ -43,7 +43,7 @@ struct ih_band {
     uint16_t incoming_q4[IH_FRAME_WIDTH_MAX];           /* the newest row */
     uint16_t grey_q4[IH_BAND_ROWS][IH_FRAME_WIDTH_MAX]; /* ring of rows */
     /* Of the rows in the ring; at the ends the first and the last are repeated. */
-    uint16_t column_sum[IH_FRAME_WIDTH_MAX + 2 * IH_BAND_REACH];
+    uint16_t column_sum[IH_FRAME_WIDTH_MAX + 2 * IH_BAND_REACH + 1]; /* the last is not used up */
 };
 
 struct ih_row ih_frame_row(const struct ih_frame *frame, int32_t v);

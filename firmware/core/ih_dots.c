@@ -12,6 +12,8 @@
 #define SHIFT_MAX 2
 #define TWIN_PX_Q12 (3 * 4096)
 #define RING_PLACES 16
+/* Pixels of a row that are passed over together. */
+#define SPAN 16
 
 void ih_dots_params_default(struct ih_dots_params *params)
 {
@@ -183,17 +185,34 @@ static void judge(struct ih_dots_scratch *scratch, struct ih_dots *out, int32_t 
     insert_dot(out, dot);
 }
 
-/* Row v has all its neighbours in the ring. */
+/* The greatest R of so many pixels. */
+static int32_t greatest(const int16_t *response, int32_t count)
+{
+    int16_t most = INT16_MIN;
+    for (int32_t u = 0; u < count; u++) {
+        most = response[u] > most ? response[u] : most;
+    }
+    return most;
+}
+
+/* Row v has all its neighbours in the ring. Most of its spans have nothing above any threshold. */
 static void find_dots(struct ih_dots_scratch *scratch, struct ih_dots *out, int32_t v)
 {
     uint16_t noise[IH_NOISE_BLOCKS_X];
     const int32_t width = scratch->rows.finding.band.width;
     const int16_t *response = response_row(scratch, v);
     const int32_t least = threshold_of(&scratch->params, ih_noise_row(&scratch->noise, v, noise));
-    for (int32_t u = 0; u < width; u++) {
-        if (response[u] > least && is_maximum(scratch, u, v) &&
-            response[u] > threshold_of(&scratch->params, ih_noise_at(&scratch->noise, noise, u))) {
-            judge(scratch, out, u, v);
+    for (int32_t first = 0; first < width; first += SPAN) {
+        const int32_t end = ih_min_s32(first + SPAN, width);
+        if (greatest(&response[first], end - first) <= least) {
+            continue;
+        }
+        for (int32_t u = first; u < end; u++) {
+            if (response[u] > least && is_maximum(scratch, u, v) &&
+                response[u] >
+                    threshold_of(&scratch->params, ih_noise_at(&scratch->noise, noise, u))) {
+                judge(scratch, out, u, v);
+            }
         }
     }
 }
@@ -231,12 +250,17 @@ static void finish_blocks(struct ih_dots_scratch *scratch, struct ih_dots *out, 
 static void add_to_blocks(struct ih_dots_scratch *scratch, struct ih_dots *out, int32_t row)
 {
     const struct ih_band *band = &scratch->rows.finding.band;
+    const int32_t whole = band->width / IH_DOTS_BLOCK;
     const uint16_t *grey_q4 = band->incoming_q4;
-    for (int32_t block = 0; block * IH_DOTS_BLOCK < band->width; block++) {
-        int32_t end = ih_min_s32((block + 1) * IH_DOTS_BLOCK, band->width);
-        for (int32_t u = block * IH_DOTS_BLOCK; u < end; u++) {
-            scratch->block_sum[block] += grey_q4[u];
+    for (int32_t block = 0; block < whole; block++) {
+        uint32_t sum = 0;
+        for (int32_t i = 0; i < IH_DOTS_BLOCK; i++) {
+            sum += *grey_q4++;
         }
+        scratch->block_sum[block] += sum;
+    }
+    for (int32_t u = whole * IH_DOTS_BLOCK; u < band->width; u++) { /* what is left of a block */
+        scratch->block_sum[whole] += *grey_q4++;
     }
     scratch->block_rows++;
     if (scratch->block_rows == IH_DOTS_BLOCK || row == scratch->height - 1) {
