@@ -9,7 +9,7 @@ target_compile_options(isohead_warnings INTERFACE
 # The host's floating point must not depend on the compiler's taste for fused operations.
 add_compile_options(-ffp-contract=off)
 
-# The core: no floating-point register may be touched at all.
+# No floating-point register may be touched at all, which forbids vectors too.
 add_library(isohead_integer_only INTERFACE)
 include(CheckCCompilerFlag)
 check_c_compiler_flag(-mgeneral-regs-only ISOHEAD_HAS_GENERAL_REGS_ONLY)
