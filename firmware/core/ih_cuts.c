@@ -5,7 +5,10 @@
 #include "ih_fix.h"
 
 #define CELLS (IH_SURFACE_GRID - 1)
-#define ALL_INSIDE 0xfu
+/* Cells of a row, bit by bit; those at the border. */
+#define ALL_CELLS (((uint64_t)1 << CELLS) - 1)
+#define BORDER_CELLS ((uint64_t)1 << (CELLS - 1) | 1)
+_Static_assert(IH_SURFACE_GRID <= 64, "a row of nodes has a bit each in 64");
 
 /* Corners of a cell clockwise on the screen; edge i runs from corner i to corner i + 1. A contour
  * walks with the inside on its right, so it enters through an edge whose corner i is inside and
@@ -32,7 +35,7 @@ static bool is_inside(const struct ih_surface *surface, const struct ih_cuts *cu
     return corner_depth(surface, x, y, corner) < cuts->level_mm_q8;
 }
 
-/* Bit i = corner i is inside. 0 and ALL_INSIDE: no contour passes this cell. */
+/* Bit i = corner i is inside. */
 static uint32_t inside_corners(const struct ih_surface *surface, const struct ih_cuts *cuts,
                                int32_t x, int32_t y)
 {
@@ -126,9 +129,6 @@ static void start_in_cell(const struct ih_surface *surface, struct ih_cuts *cuts
                           int32_t y, bool border)
 {
     uint32_t corners = inside_corners(surface, cuts, x, y);
-    if (corners == 0 || corners == ALL_INSIDE) {
-        return;
-    }
     for (int32_t edge = 0; edge < 4; edge++) {
         bool on_border = !is_cell(x + beyond_x[edge], y + beyond_y[edge]);
         if ((on_border || !border) && can_enter(corners, edge) &&
@@ -138,14 +138,33 @@ static void start_in_cell(const struct ih_surface *surface, struct ih_cuts *cuts
     }
 }
 
+/* Bit x = node x of a row is inside. */
+static uint64_t inside_nodes(const struct ih_surface *surface, int32_t level_mm_q8, int32_t y)
+{
+    uint64_t nodes = 0;
+    for (int32_t x = IH_SURFACE_GRID - 1; x >= 0; x--) {
+        nodes = nodes << 1 | (surface->depth_mm_q8[y][x] < level_mm_q8);
+    }
+    return nodes;
+}
+
+/* Bit x = a contour passes cell x between two rows of nodes: some corners are inside, some not. */
+static uint64_t passed_cells(uint64_t above, uint64_t below)
+{
+    uint64_t any = above | above >> 1 | below | below >> 1;
+    uint64_t all = above & above >> 1 & below & below >> 1;
+    return any & ~all & ALL_CELLS;
+}
+
 /* Contours that begin at the border come first, so that an open one is found from its beginning. */
-static void start_contours(const struct ih_surface *surface, struct ih_cuts *cuts, bool border)
+static void start_contours(const struct ih_surface *surface, struct ih_cuts *cuts,
+                           const uint64_t passed[CELLS], bool border)
 {
     for (int32_t y = 0; y < CELLS; y++) {
         bool border_row = y == 0 || y == CELLS - 1;
-        int32_t step = border && !border_row ? CELLS - 1 : 1;
-        for (int32_t x = 0; x < CELLS; x += step) {
-            start_in_cell(surface, cuts, x, y, border);
+        uint64_t left = passed[y] & (border && !border_row ? BORDER_CELLS : ALL_CELLS);
+        for (; left != 0; left &= left - 1) {
+            start_in_cell(surface, cuts, __builtin_ctzll(left), y, border);
         }
     }
 }
@@ -157,6 +176,13 @@ void ih_cuts_level(const struct ih_surface *surface, int32_t level_mm_q8, struct
     out->vertex_count = 0;
     out->contours_dropped = 0;
     memset(out->walked, 0, sizeof out->walked);
-    start_contours(surface, out, true);
-    start_contours(surface, out, false);
+    uint64_t passed[CELLS];
+    uint64_t above = inside_nodes(surface, level_mm_q8, 0);
+    for (int32_t y = 0; y < CELLS; y++) {
+        uint64_t below = inside_nodes(surface, level_mm_q8, y + 1);
+        passed[y] = passed_cells(above, below);
+        above = below;
+    }
+    start_contours(surface, out, passed, true);
+    start_contours(surface, out, passed, false);
 }

@@ -8,7 +8,7 @@
  *        for all, so contours never cross. Every contour runs with the inside (nearer) on its
  *        right as seen on a screen (x right, y down): its signed area, sum(x0 y1 - x1 y0) / 2, is
  *        positive around a minimum of depth and negative around a maximum.
- * Cost:  one test per cell; one division per vertex.
+ * Cost:  one comparison per node; one division per vertex.
  * Full tables drop and count: a contour that does not fit is left out whole, contours_dropped.
  */
 #ifndef IH_CUTS_H
