@@ -289,36 +289,48 @@ static bool is_place_inside(const struct ih_cuts *cuts, const struct ih_contour 
     return left && right && above && below;
 }
 
-/* What belongs to an arc of so many steps. */
-struct arc {
-    int32_t length_q8;
-    int32_t merit_most_q8;  /* with the best shape and no chord */
-    int32_t chord_end_q8;   /* from here on a chord is too long */
-    int32_t chord2_end_q16; /* or the part has too little merit: in squares, no root is needed */
+/* What belongs to an arc of k steps. */
+struct arcs {
+    int32_t length_q8[IH_ELLIPSE_POINTS];
+    int32_t merit_most_q8[IH_ELLIPSE_POINTS]; /* with the best shape and no chord */
+    int32_t chord_end_q8[IH_ELLIPSE_POINTS];  /* from here on a chord is too long */
+    /* or the part has too little merit: in squares, no root is needed */
+    int32_t chord2_end_q16[IH_ELLIPSE_POINTS];
 };
 
 static void measure_arcs(int32_t length_q8, int32_t steps, const struct ih_ellipse_params *params,
-                         struct arc arc[IH_ELLIPSE_POINTS])
+                         struct arcs *arcs)
 {
     for (int32_t k = 0; k < IH_ELLIPSE_POINTS; k++) {
         int32_t part_q8 = (int32_t)((int64_t)length_q8 * k / steps);
-        arc[k].length_q8 = part_q8;
-        arc[k].merit_most_q8 = merit_q8(part_q8, 0, SHAPE_MIN_Q16);
-        arc[k].chord_end_q8 = (int32_t)((int64_t)params->chord_max_q16 * part_q8 >> 16) + 1;
+        arcs->length_q8[k] = part_q8;
+        arcs->merit_most_q8[k] = merit_q8(part_q8, 0, SHAPE_MIN_Q16);
+        arcs->chord_end_q8[k] = (int32_t)((int64_t)params->chord_max_q16 * part_q8 >> 16) + 1;
     }
 }
 
 /* A chord costs 1.6 of its length: 160 / 256 is more than its inverse, 2 for what was rounded.
  * Chords are below 2^14.1, so a limit beyond 2^15 is none. */
-static void limit_chords(struct arc arc[IH_ELLIPSE_POINTS], int32_t least_q8)
+static void limit_chords(struct arcs *arcs, int32_t least_q8)
 {
     for (int32_t k = 0; k < IH_ELLIPSE_POINTS; k++) {
-        int64_t spare_q8 = (int64_t)arc[k].merit_most_q8 - least_q8;
+        int64_t spare_q8 = (int64_t)arcs->merit_most_q8[k] - least_q8;
         int64_t end_q8 = spare_q8 < 0 ? 0 : (spare_q8 * 160 >> 8) + 2;
-        end_q8 = end_q8 < arc[k].chord_end_q8 ? end_q8 : arc[k].chord_end_q8;
+        end_q8 = end_q8 < arcs->chord_end_q8[k] ? end_q8 : arcs->chord_end_q8[k];
         int32_t bounded_q8 = ih_min_s32((int32_t)end_q8, 1 << 15);
-        arc[k].chord2_end_q16 = bounded_q8 * bounded_q8;
+        arcs->chord2_end_q16[k] = bounded_q8 * bounded_q8;
     }
+}
+
+/* Has any part from a point to one of first..last a chord that is short enough? */
+static bool any_chord(const struct ih_ellipse_scratch *scratch, const struct arcs *arcs,
+                      int32_t from, int32_t first, int32_t last)
+{
+    uint32_t any = 0;
+    for (int32_t to = first; to <= last; to++) {
+        any |= chord2_q16(scratch, from, to) < arcs->chord2_end_q16[to - from];
+    }
+    return any != 0;
 }
 
 bool ih_ellipse_of_part(const struct ih_cuts *cuts, const struct ih_contour *contour,
@@ -329,30 +341,34 @@ bool ih_ellipse_of_part(const struct ih_cuts *cuts, const struct ih_contour *con
         !is_place_inside(cuts, contour, place)) {
         return false;
     }
-    struct arc arc[IH_ELLIPSE_POINTS];
+    struct arcs arcs;
     int32_t length_q8 = resample(cuts, contour, place, scratch);
     int32_t count = accumulate(contour, scratch);
     measure_arcs(length_q8, contour->closed ? IH_ELLIPSE_POINTS : IH_ELLIPSE_POINTS - 1, params,
-                 arc);
-    limit_chords(arc, INT32_MIN);
+                 &arcs);
+    limit_chords(&arcs, INT32_MIN);
     bool found = false;
     /* Of equal ones the first, the shortest of those, is taken. Long ones, which have more merit,
      * are looked at first. */
     for (int32_t from = 0; from < IH_ELLIPSE_POINTS; from++) {
-        int32_t last = ih_min_s32(count - 1, from + IH_ELLIPSE_POINTS - 1);
+        const int32_t first = from + PART_EDGES_MIN;
+        const int32_t last = ih_min_s32(count - 1, from + IH_ELLIPSE_POINTS - 1);
         bool found_here = false;
-        for (int32_t to = last; to >= from + PART_EDGES_MIN; to--) {
-            if (chord2_q16(scratch, from, to) >= arc[to - from].chord2_end_q16) {
+        if (!any_chord(scratch, &arcs, from, first, last)) {
+            continue;
+        }
+        for (int32_t to = last; to >= first; to--) {
+            if (chord2_q16(scratch, from, to) >= arcs.chord2_end_q16[to - from]) {
                 continue;
             }
             int32_t least_q8 = !found ? INT32_MIN : out->merit_q8 + (found_here ? 0 : 1);
             struct ih_ellipse part;
-            if (test_part(scratch, from, to, arc[to - from].length_q8, least_q8, place, params,
+            if (test_part(scratch, from, to, arcs.length_q8[to - from], least_q8, place, params,
                           &part)) {
                 *out = part;
                 found = true;
                 found_here = true;
-                limit_chords(arc, part.merit_q8);
+                limit_chords(&arcs, part.merit_q8);
             }
         }
     }
