@@ -80,7 +80,8 @@ static int64_t quotient_q16(int64_t sum_q24, int64_t divisor_q16)
     return whole_q8 * 256 + ih_div_round(rest * 256, divisor_q16);
 }
 
-/* Ellipse of closed moments around (x0, y0), Q8 steps. False when the area is nothing. */
+/* Ellipse of closed moments around (x0, y0), Q8 steps, but for its axis ratio. False when the area is
+ * nothing. */
 static bool ellipse_of_moments(const struct ih_moments *m, int32_t x0_q8, int32_t y0_q8,
                                struct ih_ellipse *out)
 {
@@ -108,8 +109,7 @@ static bool ellipse_of_moments(const struct ih_moments *m, int32_t x0_q8, int32_
     out->yy_q16 = (int32_t)yy_q16;
     out->xy_q16 = (int32_t)xy_q16;
     int64_t determinant_q32 = xx_q16 * yy_q16 - xy_q16 * xy_q16;
-    out->ratio_q16 = axis_ratio_q16(xx_q16, xy_q16, yy_q16);
-    if (determinant_q32 <= 0 || out->ratio_q16 == 0) {
+    if (determinant_q32 <= 0) {
         return false;
     }
     int64_t root_q16 = ih_isqrt_u64((uint64_t)determinant_q32);
@@ -117,6 +117,12 @@ static bool ellipse_of_moments(const struct ih_moments *m, int32_t x0_q8, int32_
     out->shape_q16 = ih_saturate_s32(ih_div_round(2 * FOUR_PI_Q16 * root_q16, area2_q16));
     out->merit_q8 = 0;
     return true;
+}
+
+static bool set_ratio(struct ih_ellipse *ellipse)
+{
+    ellipse->ratio_q16 = axis_ratio_q16(ellipse->xx_q16, ellipse->xy_q16, ellipse->yy_q16);
+    return ellipse->ratio_q16 != 0;
 }
 
 static int32_t half_q9(int32_t value_q9)
@@ -145,7 +151,7 @@ bool ih_ellipse_of_contour(const struct ih_cuts *cuts, const struct ih_contour *
     place.x_q9 = (int16_t)(place.x_q9 & ~1); /* a whole Q8 number */
     place.y_q9 = (int16_t)(place.y_q9 & ~1);
     struct ih_moments m = contour_moments(cuts, contour, place);
-    return ellipse_of_moments(&m, place.x_q9 / 2, place.y_q9 / 2, out);
+    return ellipse_of_moments(&m, place.x_q9 / 2, place.y_q9 / 2, out) && set_ratio(out);
 }
 
 int32_t ih_ellipse_winding(const struct ih_cuts *cuts, const struct ih_contour *contour,
@@ -265,7 +271,8 @@ static bool test_part(const struct ih_ellipse_scratch *scratch, int32_t from, in
     if (!part_moments(scratch, from, to, &m) ||
         !ellipse_of_moments(&m, half_q9(place.x_q9), half_q9(place.y_q9), out) ||
         out->area_q16 <= 0 || out->shape_q16 < SHAPE_MIN_Q16 ||
-        out->shape_q16 > params->shape_max_q16 || out->ratio_q16 > params->ratio_part_max_q16) {
+        out->shape_q16 > params->shape_max_q16 || !set_ratio(out) ||
+        out->ratio_q16 > params->ratio_part_max_q16) {
         return false;
     }
     int32_t chord_q8 = (int32_t)ih_isqrt_u64((uint64_t)chord2_q16(scratch, from, to));
