@@ -17,6 +17,8 @@ static const int8_t robust_mm[IH_FIT_STEPS] = {24, 16, 8, 8, 8, 8};
 #define LOW_LOSS_Q16 32768   /* 0.5 */
 #define PUSH_MAX_MM_Q8 (30 << 8)
 #define PUSH_WEIGHT_Q16 32768 /* 0.5 */
+/* An entry may be off by this, see ih_ellipsoid. */
+#define FRONT_MM_Q8 256
 /* (6 mm)^2 over the priors' variances, Q16: 60 mm; 9 hundredths of ln. */
 #define PRIOR_CENTRE_Q16 655
 #define PRIOR_AXES_Q16 29127
@@ -129,35 +131,73 @@ static int64_t low_weight_q16(int32_t down_q14)
     return ONE_Q16 - (int64_t)LOW_LOSS_Q16 * over_q14 / LOW_SPAN_Q14;
 }
 
-static void add_point(struct system *system, const struct ih_ellipsoid *ellipsoid,
-                      const struct ih_ray *ray, int32_t scale_mm)
+/* What a step's ellipsoid is asked for at every ray. */
+struct step {
+    struct ih_ellipsoid ellipsoid;
+    struct ih_ellipsoid_box box; /* rays that may hit it pass through */
+    int32_t scale_mm;
+    int32_t reach_mm_q8[3]; /* points farther from the centre have no weight */
+};
+
+/* A residual is at least (f - 1) times the shortest semi-axis: it has no weight from f = 1 + 8 k / a
+ * on. A 64th more for what is rounded. */
+static void begin_step(struct step *step, const struct ih_ellipsoid *ellipsoid,
+                       const int32_t slope_most_q20[2], int32_t scale_mm)
 {
+    const int32_t *semi_mm_q8 = ellipsoid->semi_mm_q8;
+    int32_t shortest_q8 = ih_min_s32(ih_min_s32(semi_mm_q8[0], semi_mm_q8[1]), semi_mm_q8[2]);
+    int64_t most_q14 =
+        ONE_Q14 + ih_div_round((int64_t)ROBUST_REACH * scale_mm * (ONE_Q14 << 8), shortest_q8);
+    step->ellipsoid = *ellipsoid;
+    step->box = ih_ellipsoid_box(ellipsoid, slope_most_q20, ONE_Q14);
+    step->scale_mm = scale_mm;
+    for (int axis = 0; axis < 3; axis++) {
+        step->reach_mm_q8[axis] =
+            (int32_t)ih_mul_shift(most_q14 + most_q14 / 64, semi_mm_q8[axis], 14);
+    }
+}
+
+static bool has_weight(const struct step *step, const int32_t point_mm_q8[3])
+{
+    bool near = true;
+    for (int axis = 0; axis < 3; axis++) {
+        int32_t off_q8 = ih_abs_s32(point_mm_q8[axis] - step->ellipsoid.centre_mm_q8[axis]);
+        near = near && off_q8 <= step->reach_mm_q8[axis];
+    }
+    return near;
+}
+
+static void add_point(struct system *system, const struct step *step, const struct ih_ray *ray)
+{
+    const struct ih_ellipsoid *ellipsoid = &step->ellipsoid;
     int32_t place_q14[3];
     struct gradient g;
     struct row row;
-    if (!ih_ellipsoid_place(ellipsoid, ray->point_mm_q8, place_q14) ||
+    if (!has_weight(step, ray->point_mm_q8) ||
+        !ih_ellipsoid_place(ellipsoid, ray->point_mm_q8, place_q14) ||
         !find_gradient(ellipsoid, place_q14, &g)) {
         return;
     }
-    int64_t weight_q16 = robust_weight_q16(distance_mm_q8(&g), scale_mm);
+    int64_t weight_q16 = robust_weight_q16(distance_mm_q8(&g), step->scale_mm);
     if (weight_q16 > 0) {
         fill_row(&g, place_q14, &row);
         add_row(system, &row, ih_mul_shift(weight_q16, low_weight_q16(place_q14[1]), 16));
     }
 }
 
-/* A point seen behind the ellipsoid, through it, if it passes through the box. */
-static void add_push(struct system *system, const struct ih_ellipsoid *ellipsoid,
-                     const struct ih_ellipsoid_box *box, const int32_t origin_mm_q8[3],
+/* A point seen behind the ellipsoid, through it; nothing is entered before its front. */
+static void add_push(struct system *system, const struct step *step, const int32_t origin_mm_q8[3],
                      const struct ih_ray *ray, int32_t see_through_mm)
 {
+    const struct ih_ellipsoid *ellipsoid = &step->ellipsoid;
+    const int32_t through_q8 = ray->point_mm_q8[2] - (see_through_mm << 8);
     struct ih_crossing crossing;
     struct gradient g;
     struct row row;
-    if (!ih_ellipsoid_in_box(ellipsoid, box, origin_mm_q8, ray) ||
+    if (through_q8 < ellipsoid->centre_mm_q8[2] - ellipsoid->semi_mm_q8[2] - FRONT_MM_Q8 ||
+        !ih_ellipsoid_in_box(ellipsoid, &step->box, origin_mm_q8, ray) ||
         !ih_ellipsoid_cross(ellipsoid, origin_mm_q8, ray, &crossing) ||
-        crossing.radius2_q14 >= ONE_Q14 ||
-        ray->point_mm_q8[2] <= crossing.entry_mm_q8 + (see_through_mm << 8) ||
+        crossing.radius2_q14 >= ONE_Q14 || through_q8 <= crossing.entry_mm_q8 ||
         !find_gradient(ellipsoid, crossing.nearest_q14, &g)) {
         return;
     }
@@ -254,18 +294,17 @@ void ih_fit_ellipsoid(const struct ih_space *space, const struct ih_fit_params *
     }
     int32_t slope_most_q20[2];
     ih_space_slope_most(space, slope_most_q20);
-    for (int step = 0; step < params->step_count; step++) {
-        const struct ih_ellipsoid_box box =
-            ih_ellipsoid_box(&state.ellipsoid, slope_most_q20, ONE_Q14);
+    for (int i = 0; i < params->step_count; i++) {
+        struct step step;
         struct system system;
         int32_t step_q16[IH_FIT_UNKNOWNS];
+        begin_step(&step, &state.ellipsoid, slope_most_q20, robust_mm[i]);
         memset(&system, 0, sizeof system);
         for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
             const struct ih_ray *ray = &space->ray[slot];
             if (ray->state == IH_RAY_SEEN) {
-                add_point(&system, &state.ellipsoid, ray, robust_mm[step]);
-                add_push(&system, &state.ellipsoid, &box, space->origin_mm_q8, ray,
-                         params->see_through_mm);
+                add_point(&system, &step, ray);
+                add_push(&system, &step, space->origin_mm_q8, ray, params->see_through_mm);
             }
         }
         add_priors(&system, &state, start);
