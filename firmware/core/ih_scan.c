@@ -1,6 +1,7 @@
 #include "ih_scan.h"
 
 #include <stddef.h>
+#include <string.h>
 
 #include "ih_fix.h"
 
@@ -59,30 +60,70 @@ static bool is_in_ring(const struct ih_crossing *crossing, const struct ih_ellip
            dy <= ih_abs_s64(dx);
 }
 
-static int32_t score_q12(const struct ih_space *space, const struct ih_ellipsoid_box *box,
-                         const struct ih_ellipsoid *head)
+/* Half sides of the box that ih_ellipsoid_box gives, whole mm. */
+struct half {
+    int32_t x_mm, y_mm;
+};
+
+/* Slopes in 14 bits and whole mm: rounded down, they are off by 4 mm each at the limits, and by less
+ * than a mm for the origin and the centre. */
+#define NEAR_MARGIN_MM 12
+
+/* Which rays pass through the box around a centre. A loop without a branch: compilers turn it into
+ * vectors. Depths below 2^14.1 mm, slopes up to 2^14. */
+static void flag_near(const struct ih_space *space, const int32_t centre_mm_q8[3],
+                      const struct half *half, struct ih_scan_scratch *scratch)
 {
-    int32_t inside_sum = 0;
-    int32_t inside_count = 0;
-    int32_t ring_sum = 0;
-    int32_t ring_count = 0;
-    for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
-        const struct ih_ray *ray = &space->ray[slot];
-        struct ih_crossing crossing;
-        if (!ih_ellipsoid_in_box(head, box, space->origin_mm_q8, ray) ||
-            !ih_ellipsoid_cross(head, space->origin_mm_q8, ray, &crossing)) {
-            continue;
-        }
-        if (crossing.radius2_q14 < 1 << 14) {
-            inside_sum += inside_value_q12(ray, &crossing);
-            inside_count++;
-        } else if (is_in_ring(&crossing, head)) {
-            ring_sum += ring_value_q12(ray, head->centre_mm_q8[2]);
-            ring_count++;
+    const int32_t depth_mm = (centre_mm_q8[2] - space->origin_mm_q8[2]) >> 8;
+    const int32_t x_mm = ((space->origin_mm_q8[0] - centre_mm_q8[0]) >> 8) + half->x_mm;
+    const int32_t y_mm = ((space->origin_mm_q8[1] - centre_mm_q8[1]) >> 8) + half->y_mm;
+    for (int32_t slot = 0; slot < IH_SCAN_FLAGS; slot++) {
+        int32_t off_x_mm = (depth_mm * scratch->slope_q12[0][slot] >> 12) + x_mm;
+        int32_t off_y_mm = (depth_mm * scratch->slope_q12[1][slot] >> 12) + y_mm;
+        scratch->near[slot] = (uint8_t)(((uint32_t)off_x_mm <= 2 * (uint32_t)half->x_mm) &
+                                        ((uint32_t)off_y_mm <= 2 * (uint32_t)half->y_mm));
+    }
+}
+
+/* What the rays through a head and around it say. */
+struct sums {
+    int32_t inside, inside_count;
+    int32_t ring, ring_count;
+};
+
+static void add_ray(const struct ih_space *space, const struct ih_ellipsoid *head, int32_t slot,
+                    struct sums *sums)
+{
+    const struct ih_ray *ray = &space->ray[slot];
+    struct ih_crossing crossing;
+    if (!ih_ellipsoid_cross(head, space->origin_mm_q8, ray, &crossing)) {
+        return;
+    }
+    if (crossing.radius2_q14 < 1 << 14) {
+        sums->inside += inside_value_q12(ray, &crossing);
+        sums->inside_count++;
+    } else if (is_in_ring(&crossing, head)) {
+        sums->ring += ring_value_q12(ray, head->centre_mm_q8[2]);
+        sums->ring_count++;
+    }
+}
+
+static int32_t score_q12(const struct ih_space *space, const struct half *half,
+                         struct ih_scan_scratch *scratch, const struct ih_ellipsoid *head)
+{
+    struct sums sums = {0};
+    flag_near(space, head->centre_mm_q8, half, scratch);
+    for (int32_t first = 0; first < IH_SLOTS; first += 8) {
+        uint64_t any; /* of eight slots */
+        memcpy(&any, &scratch->near[first], sizeof any);
+        for (int32_t slot = first; any != 0 && slot < ih_min_s32(first + 8, IH_SLOTS); slot++) {
+            if (scratch->near[slot] != 0) {
+                add_ray(space, head, slot, &sums);
+            }
         }
     }
-    return inside_sum / ih_max_s32(inside_count, RAYS_LEAST) +
-           ring_sum * RING_SHARE_PERCENT / (100 * ih_max_s32(ring_count, RAYS_LEAST));
+    return sums.inside / ih_max_s32(sums.inside_count, RAYS_LEAST) +
+           sums.ring * RING_SHARE_PERCENT / (100 * ih_max_s32(sums.ring_count, RAYS_LEAST));
 }
 
 /* The place `deep` behind a point, along its ray. */
@@ -129,14 +170,29 @@ static const struct ih_scan_place *best_left(const struct ih_scan_place *tried, 
     return best;
 }
 
-void ih_scan_find(const struct ih_space *space, const struct ih_scan_params *params,
-                  struct ih_scan_scratch *scratch, struct ih_scan *out)
+/* What is the same for all centres. */
+static void prepare(const struct ih_space *space, struct ih_scan_scratch *scratch,
+                    struct half *half)
 {
-    int32_t count = 0;
     int32_t slope_most_q20[2];
     ih_space_slope_most(space, slope_most_q20);
     const struct ih_ellipsoid mean = ih_ellipsoid_mean(space->origin_mm_q8);
     const struct ih_ellipsoid_box box = ih_ellipsoid_box(&mean, slope_most_q20, RING_OUTER2_Q14);
+    half->x_mm = (box.half_mm_q8[0] >> 8) + NEAR_MARGIN_MM;
+    half->y_mm = (box.half_mm_q8[1] >> 8) + NEAR_MARGIN_MM;
+    memset(scratch->slope_q12, 0, sizeof scratch->slope_q12); /* behind the last slot, too */
+    for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
+        scratch->slope_q12[0][slot] = space->ray[slot].slope_x_q20 >> 8;
+        scratch->slope_q12[1][slot] = space->ray[slot].slope_y_q20 >> 8;
+    }
+}
+
+void ih_scan_find(const struct ih_space *space, const struct ih_scan_params *params,
+                  struct ih_scan_scratch *scratch, struct ih_scan *out)
+{
+    int32_t count = 0;
+    struct half half;
+    prepare(space, scratch, &half);
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
         if (space->ray[slot].state != IH_RAY_SEEN) {
             continue;
@@ -144,7 +200,7 @@ void ih_scan_find(const struct ih_space *space, const struct ih_scan_params *par
         struct ih_scan_place *place = &scratch->tried[count++];
         centre_behind(&space->ray[slot], params->deep_mm, place->centre_mm_q8);
         struct ih_ellipsoid head = ih_ellipsoid_mean(place->centre_mm_q8);
-        place->score_q12 = score_q12(space, &box, &head);
+        place->score_q12 = score_q12(space, &half, scratch, &head);
     }
     out->place_count = 0;
     while (out->place_count < params->place_max) {
