@@ -36,6 +36,16 @@ struct ih_ellipsoid_box ih_ellipsoid_box(const struct ih_ellipsoid *ellipsoid,
     return box;
 }
 
+bool ih_ellipsoid_in_box(const struct ih_ellipsoid *ellipsoid, const struct ih_ellipsoid_box *box,
+                         const int32_t origin_mm_q8[3], const struct ih_ray *ray)
+{
+    const int32_t *centre_q8 = ellipsoid->centre_mm_q8;
+    int64_t depth_q8 = (int64_t)centre_q8[2] - origin_mm_q8[2];
+    int64_t x_q8 = (depth_q8 * ray->slope_x_q20 >> 20) + origin_mm_q8[0] - centre_q8[0];
+    int64_t y_q8 = (depth_q8 * ray->slope_y_q20 >> 20) + origin_mm_q8[1] - centre_q8[1];
+    return ih_abs_s64(x_q8) <= box->half_mm_q8[0] && ih_abs_s64(y_q8) <= box->half_mm_q8[1];
+}
+
 static bool in_reach(int64_t place_q14)
 {
     return ih_abs_s64(place_q14) <= REACH_Q14;

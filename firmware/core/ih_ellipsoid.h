@@ -21,7 +21,6 @@
 #ifndef IH_ELLIPSOID_H
 #define IH_ELLIPSOID_H
 
-#include "ih_fix.h"
 #include "ih_space.h"
 
 #define IH_ELLIPSOID_SEMI_MIN_MM 40
@@ -59,17 +58,8 @@ struct ih_ellipsoid_box ih_ellipsoid_box(const struct ih_ellipsoid *ellipsoid,
                                          const int32_t slope_most_q20[2], int32_t radius2_q14);
 
 /* Does the ray pass through the box? Two products, for those that are not worth a crossing. */
-static inline bool ih_ellipsoid_in_box(const struct ih_ellipsoid *ellipsoid,
-                                       const struct ih_ellipsoid_box *box,
-                                       const int32_t origin_mm_q8[3], const struct ih_ray *ray)
-{
-    int64_t depth_q8 = (int64_t)ellipsoid->centre_mm_q8[2] - origin_mm_q8[2];
-    int64_t x_q8 =
-        (depth_q8 * ray->slope_x_q20 >> 20) + origin_mm_q8[0] - ellipsoid->centre_mm_q8[0];
-    int64_t y_q8 =
-        (depth_q8 * ray->slope_y_q20 >> 20) + origin_mm_q8[1] - ellipsoid->centre_mm_q8[1];
-    return ih_abs_s64(x_q8) <= box->half_mm_q8[0] && ih_abs_s64(y_q8) <= box->half_mm_q8[1];
-}
+bool ih_ellipsoid_in_box(const struct ih_ellipsoid *ellipsoid, const struct ih_ellipsoid_box *box,
+                         const int32_t origin_mm_q8[3], const struct ih_ray *ray);
 
 /* A point in the ellipsoid's units. False when beyond the reach on any axis. */
 bool ih_ellipsoid_place(const struct ih_ellipsoid *ellipsoid, const int32_t point_mm_q8[3],

@@ -223,6 +223,52 @@ static void the_extremes_do_not_overflow(void)
     TEST_ASSERT_TRUE(hits > 1000);
 }
 
+/* Whatever comes nearer than the radius passes through the box; of what passes far away, most does
+ * not, or the box would be of no use. */
+static void the_box_misses_nothing(void)
+{
+    struct ih_test_random random = {305};
+    int32_t i, axis, near = 0, far = 0, far_in_box = 0;
+
+    for (i = 0; i < 100000; i++) {
+        const int32_t slope_max = i % 2 == 0 ? 1 << 19 : IH_SPACE_SLOPE_MAX << 20;
+        const int32_t slope_most[2] = {slope_max, slope_max / 2};
+        const int32_t radius2_q14 = (int32_t)ih_test_between(&random, 1 << 12, 4 << 14);
+        const int32_t origin[3] = {0, 12 << 8, (int32_t)ih_test_between(&random, -2000, 2000)};
+        struct ih_ellipsoid at = {.centre_mm_q8[2] =
+                                      (int32_t)ih_test_between(&random, 300 << 8, 4000 << 8)};
+        const struct ih_ray ray =
+            ray_of((int32_t)ih_test_between(&random, -slope_most[0], slope_most[0]),
+                   (int32_t)ih_test_between(&random, -slope_most[1], slope_most[1]));
+        const int32_t slope[2] = {ray.slope_x_q20, ray.slope_y_q20};
+        struct ih_crossing crossing;
+
+        for (axis = 0; axis < 3; axis++) {
+            at.semi_mm_q8[axis] = (int32_t)ih_test_between(&random, IH_ELLIPSOID_SEMI_MIN_MM << 8,
+                                                           IH_ELLIPSOID_SEMI_MAX_MM << 8);
+        }
+        for (axis = 0; axis < 2; axis++) {
+            at.centre_mm_q8[axis] =
+                (int32_t)(origin[axis] +
+                          ((int64_t)(at.centre_mm_q8[2] - origin[2]) * slope[axis] >> 20) +
+                          ih_test_between(&random, -(600 << 8), 600 << 8));
+        }
+        const struct ih_ellipsoid_box box = ih_ellipsoid_box(&at, slope_most, radius2_q14);
+        const bool in_box = ih_ellipsoid_in_box(&at, &box, origin, &ray);
+
+        if (ih_ellipsoid_cross(&at, origin, &ray, &crossing) &&
+            crossing.radius2_q14 < radius2_q14) {
+            TEST_ASSERT_TRUE(in_box);
+            near++;
+        } else if (i % 2 == 0) {
+            far++;
+            far_in_box += in_box;
+        }
+    }
+    TEST_ASSERT_GREATER_THAN(5000, near);
+    TEST_ASSERT_LESS_THAN(far / 3, far_in_box);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -233,5 +279,6 @@ int main(void)
     RUN_TEST(a_mirror_changes_the_sign_alone);
     RUN_TEST(places_are_in_semi_axes);
     RUN_TEST(the_extremes_do_not_overflow);
+    RUN_TEST(the_box_misses_nothing);
     return UNITY_END();
 }
