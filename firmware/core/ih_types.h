@@ -18,6 +18,14 @@ enum ih_err {
     IH_ERR_RAY = -7,          /* a dot ray that is not a unit vector or does not point forward */
     IH_ERR_KIND = -8,         /* a range frame for a dot rig, or the other way round */
     IH_ERR_NOT_POSITIVE = -9, /* Cholesky met a pivot that is not positive */
+    /* A rig as bytes (ih_blob.h). */
+    IH_ERR_BLOB_SHORT = -10,   /* bytes are missing */
+    IH_ERR_BLOB_LONG = -11,    /* bytes follow */
+    IH_ERR_BLOB_MAGIC = -12,   /* something else */
+    IH_ERR_BLOB_VERSION = -13, /* another version */
+    IH_ERR_BLOB_LENGTH = -14,  /* a length that the version does not have */
+    IH_ERR_BLOB_CRC = -15,     /* changed bytes */
+    IH_ERR_BLOB_FIELD = -16,   /* a kind that does not exist, or a range rig with a projector */
 };
 
 /* One line of English for a code, without a full stop; never NULL. */

@@ -28,6 +28,20 @@ const char *ih_err_text(enum ih_err err)
         return "frame of another kind than the rig";
     case IH_ERR_NOT_POSITIVE:
         return "matrix that is not positive definite";
+    case IH_ERR_BLOB_SHORT:
+        return "rig blob that is too short";
+    case IH_ERR_BLOB_LONG:
+        return "rig blob with bytes after its end";
+    case IH_ERR_BLOB_MAGIC:
+        return "no rig blob: it does not begin with IHRB";
+    case IH_ERR_BLOB_VERSION:
+        return "rig blob of another version";
+    case IH_ERR_BLOB_LENGTH:
+        return "rig blob of a length that its version does not have";
+    case IH_ERR_BLOB_CRC:
+        return "rig blob whose bytes have changed: its CRC-32 does not fit";
+    case IH_ERR_BLOB_FIELD:
+        return "rig blob of an unknown kind, or of a range rig with a projector";
     }
     return "unknown error";
 }

@@ -28,6 +28,7 @@ CORE_HEADERS = {
     "ih_types.h": set(),
     "ih_fix.h": set(),
     "ih_rig.h": {"ih_config.h", "ih_types.h"},
+    "ih_blob.h": CORE_SHARED,
     "ih_cholesky.h": {"ih_config.h", "ih_types.h"},
     "ih_band.h": {"ih_config.h", "ih_types.h"},
     "ih_noise.h": {"ih_config.h", "ih_types.h", "ih_band.h"},
