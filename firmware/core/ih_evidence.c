@@ -55,7 +55,7 @@ const char *ih_evidence_text(enum ih_evidence_kind kind)
         "below", "high",     "nothing", "body",   "body_rays", "body_depth", "wide",
         "level", "shoulder", "before",  "extent", "upright",
     };
-    return (int)kind >= 0 && kind < IH_EVIDENCE_COUNT ? text[kind] : NULL;
+    return (uint32_t)kind < IH_EVIDENCE_COUNT ? text[kind] : NULL;
 }
 
 static bool make_view(const struct ih_space *space, const struct ih_ellipsoid *ellipsoid,
