@@ -141,7 +141,7 @@ static void keep_ambient(struct visit *visit, const struct hal_frame *frame)
     const struct ih_calibration *rig = &visit->run->head->rig.calibration;
     struct hal_error error;
     if (frame->width != rig->width || frame->height != rig->height) {
-        app_rig_explain_frame(rig, frame, IH_ERR_SIZE, &error);
+        app_view_explain(frame, rig, IH_ERR_SIZE, &error);
         lose_frame(visit, frame, error.text);
         release(visit, frame);
         return;
@@ -171,7 +171,7 @@ static void process_lit(struct visit *visit, const struct hal_frame *frame)
     enum ih_err err =
         isohead_frame(head, &view, fresh_ambient(visit, frame->time_us), frame->time_us);
     if (err != IH_OK) {
-        app_rig_explain_frame(&head->rig.calibration, frame, err, &error);
+        app_view_explain(frame, &head->rig.calibration, err, &error);
         lose_frame(visit, frame, error.text);
         return;
     }

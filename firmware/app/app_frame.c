@@ -1,6 +1,5 @@
 #include "app_frame.h"
 
-#include "app_rig_explain.h"
 #include "app_view.h"
 
 static int64_t now(const struct app_loop *loop)
@@ -216,7 +215,7 @@ void app_frame_use(struct app_loop *loop, const struct hal_frame *frame)
     }
     enum ih_err err = isohead_label(loop->head, &view, NULL);
     if (err != IH_OK) {
-        app_rig_explain_frame(&loop->head->rig.calibration, frame, err, &error);
+        app_view_explain(frame, &loop->head->rig.calibration, err, &error);
         lose_frame(loop, frame->name, error.text);
         release(loop, frame);
         wish_light(loop, true);

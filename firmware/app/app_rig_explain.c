@@ -1,6 +1,5 @@
 #include "app_rig_explain.h"
 
-#include <inttypes.h>
 #include <math.h>
 
 #define RAY_AXES 3
@@ -87,21 +86,5 @@ void app_rig_explain(const struct ih_calibration *calibration, enum ih_err err, 
     default:
         (void)hal_fail(error, "%s", ih_err_text(err));
         break;
-    }
-}
-
-void app_rig_explain_frame(const struct ih_calibration *calibration, const struct hal_frame *frame,
-                           enum ih_err err, struct hal_error *error)
-{
-    if (frame->width != calibration->width || frame->height != calibration->height) {
-        hal_fail(error,
-                 "%" PRId32 "x%" PRId32 " px, expected %" PRId32 "x%" PRId32 " as in the rig",
-                 frame->width, frame->height, calibration->width, calibration->height);
-    } else if (err == IH_ERR_KIND && calibration->kind == IH_RIG_RANGE) {
-        hal_fail(error,
-                 "maxval %" PRId32 ", expected above 255: a range image has two bytes per pixel",
-                 frame->maximum);
-    } else {
-        hal_fail(error, "%s", ih_err_text(err));
     }
 }

@@ -1,4 +1,4 @@
-/* app_rig_explain - why the core refuses a calibration, in terms of rig.json, or a frame. */
+/* app_rig_explain - why the core refuses a calibration, in terms of rig.json. */
 #ifndef APP_RIG_EXPLAIN_H
 #define APP_RIG_EXPLAIN_H
 
@@ -8,9 +8,5 @@
 /* err and bad_slot as from ih_rig_init. *error names field, value and expectation. */
 void app_rig_explain(const struct ih_calibration *calibration, enum ih_err err, int32_t bad_slot,
                      struct hal_error *error);
-
-/* err as from isohead_frame. */
-void app_rig_explain_frame(const struct ih_calibration *calibration, const struct hal_frame *frame,
-                           enum ih_err err, struct hal_error *error);
 
 #endif

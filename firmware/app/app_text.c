@@ -1,23 +1,22 @@
 #include "app_text.h"
 
-#include <inttypes.h>
-#include <stdio.h>
+#include "hal_text.h"
 
 /* A whole number of 10^-decimals as text. */
 static struct app_decimal print_scaled(int64_t scaled, int decimals)
 {
     struct app_decimal decimal;
+    struct hal_text text = hal_text_begin(decimal.text, sizeof decimal.text);
     int64_t unit = 1;
     for (int i = 0; i < decimals; i++) {
         unit *= 10;
     }
     int64_t magnitude = scaled < 0 ? -scaled : scaled;
-    const char *sign = scaled < 0 ? "-" : "";
-    if (decimals == 0) {
-        snprintf(decimal.text, sizeof decimal.text, "%s%" PRId64, sign, magnitude);
-    } else {
-        snprintf(decimal.text, sizeof decimal.text, "%s%" PRId64 ".%0*" PRId64, sign,
-                 magnitude / unit, decimals, magnitude % unit);
+    hal_text_put(&text, scaled < 0 ? "-" : "");
+    hal_text_put_number(&text, magnitude / unit, 1);
+    if (decimals > 0) {
+        hal_text_put(&text, ".");
+        hal_text_put_number(&text, magnitude % unit, decimals);
     }
     return decimal;
 }

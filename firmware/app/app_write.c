@@ -1,12 +1,13 @@
 #include "app_write.h"
 
-#include <inttypes.h>
 #include <string.h>
+
+#include "hal_text.h"
 
 static void put(struct app_write *write, const char *text, size_t length)
 {
-    if (write->file != NULL) {
-        fwrite(text, 1, length, write->file);
+    if (write->take != NULL) {
+        write->take(write->context, text, length);
         return;
     }
     /* Once full it stays so: a text that ends early is better than one with a hole. */
@@ -19,7 +20,7 @@ static void put(struct app_write *write, const char *text, size_t length)
 
 static void put_text(struct app_write *write, const char *text)
 {
-    put(write, text, strlen(text));
+    put(write, text, hal_text_length(text));
 }
 
 static void put_char(struct app_write *write, char letter)
@@ -66,9 +67,10 @@ void app_write_key(struct app_write *write, const char *key)
 void app_write_int(struct app_write *write, int64_t value)
 {
     separate(write);
-    char text[sizeof "-9223372036854775808"];
-    snprintf(text, sizeof text, "%" PRId64, value);
-    put_text(write, text);
+    char memory[sizeof "-9223372036854775808"];
+    struct hal_text text = hal_text_begin(memory, sizeof memory);
+    hal_text_put_number(&text, value, 1);
+    put(write, text.text, text.length);
 }
 
 void app_write_decimal(struct app_write *write, struct app_decimal decimal)
@@ -138,9 +140,11 @@ void app_write_string(struct app_write *write, const char *text)
             put_char(write, '\\');
             put_char(write, (char)*at);
         } else if (*at < ' ' || *at == 0x7f) {
-            char escape[sizeof "\\u0000"];
-            snprintf(escape, sizeof escape, "\\u%04x", (unsigned)*at);
-            put_text(write, escape);
+            char memory[sizeof "\\u0000"];
+            struct hal_text escape = hal_text_begin(memory, sizeof memory);
+            hal_text_put(&escape, "\\u");
+            hal_text_put_hex(&escape, *at, 4);
+            put(write, escape.text, escape.length);
         } else {
             put(write, (const char *)at, (size_t)length);
         }

@@ -1,21 +1,22 @@
-/* app_write - JSON onto a stream or into memory, value by value, without white space.
+/* app_write - JSON into memory or wherever the caller puts it, value by value, without white space.
  *
  * The writer only places commas; that brackets and keys pair up is the caller's business. Strings
  * are escaped, and bytes that are no UTF-8 become U+FFFD, since JSON has no way to say them.
- * Write errors stay in the stream: ask ferror or fclose at the end. Memory that is full takes nothing
- * more: ask `full`.
+ * Memory that is full takes nothing more: ask `full`.
  */
 #ifndef APP_WRITE_H
 #define APP_WRITE_H
 
 #include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
-#include <stdio.h>
 
 #include "app_text.h"
 
 struct app_write {
-    FILE *file; /* NULL: memory */
+    /* Takes every piece of text, in order; NULL: memory. */
+    void (*take)(void *context, const char *text, size_t length);
+    void *context;
     char *memory;
     size_t size, length; /* of memory, and how much of it is written; no closing zero */
     bool full;           /* something did not fit */

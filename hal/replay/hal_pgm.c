@@ -1,7 +1,8 @@
 #include "replay/hal_pgm.h"
 
-#include <stdio.h>
 #include <string.h>
+
+#include "hal_text.h"
 
 #define MAXVAL_MAX 65535
 #define BYTE_MAX 255
@@ -41,26 +42,40 @@ static void skip_blanks(struct cursor *cursor)
     }
 }
 
+static void put_offset(struct hal_text *text, size_t offset)
+{
+    hal_text_put(text, "offset ");
+    hal_text_put_number(text, (int64_t)offset, 1);
+    hal_text_put(text, ": ");
+}
+
 static bool fail_at(struct hal_error *error, size_t offset, const char *found, const char *expected)
 {
-    snprintf(error->text, sizeof error->text, "offset %zu: %s, expected %s", offset, found,
-             expected);
+    struct hal_text text = hal_text_begin(error->text, sizeof error->text);
+    put_offset(&text, offset);
+    hal_text_put(&text, found);
+    hal_text_put(&text, ", expected ");
+    hal_text_put(&text, expected);
     return false;
 }
 
 /* What stands at the cursor, for an error text. */
-static const char *describe(const struct cursor *cursor, char *text, size_t text_size)
+static const char *describe(const struct cursor *cursor, char *memory, size_t size)
 {
+    struct hal_text text = hal_text_begin(memory, size);
     if (cursor->at >= cursor->size) {
         return "the file ends";
     }
     uint8_t byte = cursor->data[cursor->at];
     if (byte > ' ' && byte < 0x7f) {
-        snprintf(text, text_size, "'%c'", byte);
+        hal_text_put(&text, "'");
+        hal_text_put_some(&text, (const char *)&byte, 1);
+        hal_text_put(&text, "'");
     } else {
-        snprintf(text, text_size, "byte 0x%02x", byte);
+        hal_text_put(&text, "byte 0x");
+        hal_text_put_hex(&text, byte, 2);
     }
-    return text;
+    return memory;
 }
 
 static bool read_magic(struct cursor *cursor, struct hal_error *error)
@@ -71,7 +86,9 @@ static bool read_magic(struct cursor *cursor, struct hal_error *error)
     }
     if (cursor->size >= 2 && cursor->data[0] == 'P' && is_digit(cursor->data[1]) &&
         cursor->data[1] != '5') {
-        snprintf(found, sizeof found, "format P%c", cursor->data[1]);
+        struct hal_text text = hal_text_begin(found, sizeof found);
+        hal_text_put(&text, "format ");
+        hal_text_put_some(&text, (const char *)cursor->data, 2);
         return fail_at(error, 0, found, "a binary PGM (P5)");
     }
     if (cursor->size < 3 || memcmp(cursor->data, "P5", 2) != 0 ||
@@ -96,15 +113,21 @@ static bool read_number(struct cursor *cursor, const char *name, int32_t maximum
         number = number * 10 + (cursor->data[cursor->at] - '0');
         cursor->at++;
     }
+    struct hal_text wanted = hal_text_begin(expected, sizeof expected);
     if (cursor->at == start) {
-        snprintf(expected, sizeof expected, "%s in decimal", name);
+        hal_text_put(&wanted, name);
+        hal_text_put(&wanted, " in decimal");
         return fail_at(error, start, describe(cursor, found, sizeof found), expected);
     }
     bool longer = cursor->at < cursor->size && is_digit(cursor->data[cursor->at]);
     if (longer || number < 1 || number > maximum) {
-        snprintf(found, sizeof found, "%s %.*s%s", name, (int)(cursor->at - start),
-                 (const char *)cursor->data + start, longer ? "..." : "");
-        snprintf(expected, sizeof expected, "1 to %ld", (long)maximum);
+        struct hal_text text = hal_text_begin(found, sizeof found);
+        hal_text_put(&text, name);
+        hal_text_put(&text, " ");
+        hal_text_put_some(&text, (const char *)cursor->data + start, cursor->at - start);
+        hal_text_put(&text, longer ? "..." : "");
+        hal_text_put(&wanted, "1 to ");
+        hal_text_put_number(&wanted, maximum, 1);
         return fail_at(error, start, found, expected);
     }
     *value = number;
@@ -143,21 +166,38 @@ static void unpack(uint8_t *data, size_t offset, const struct hal_pgm *pgm, size
     }
 }
 
+static size_t sample_bytes(const struct hal_pgm *pgm)
+{
+    return (size_t)pgm->width * (size_t)pgm->height * (size_t)pgm->bytes_per_sample;
+}
+
+static bool fail_size(struct hal_error *error, size_t offset, size_t found,
+                      const struct hal_pgm *pgm)
+{
+    struct hal_text text = hal_text_begin(error->text, sizeof error->text);
+    put_offset(&text, offset);
+    hal_text_put_number(&text, (int64_t)found, 1);
+    hal_text_put(&text, " bytes of samples, expected ");
+    hal_text_put_number(&text, (int64_t)sample_bytes(pgm), 1);
+    hal_text_put(&text, " (");
+    hal_text_put_number(&text, pgm->width, 1);
+    hal_text_put(&text, "x");
+    hal_text_put_number(&text, pgm->height, 1);
+    hal_text_put(&text, pgm->bytes_per_sample == 1 ? ", 1 byte each)" : ", 2 bytes each)");
+    hal_text_put(&text, found < sample_bytes(pgm) ? "; truncated?" : "; more than one image?");
+    return false;
+}
+
 bool hal_pgm_decode(uint8_t *data, size_t size, struct hal_pgm *pgm, struct hal_error *error)
 {
     struct cursor cursor = {data, size, 0};
     if (!read_header(&cursor, pgm, error)) {
         return false;
     }
-    size_t expected = (size_t)pgm->width * (size_t)pgm->height * (size_t)pgm->bytes_per_sample;
+    size_t expected = sample_bytes(pgm);
     size_t found = size - cursor.at;
     if (found != expected) {
-        snprintf(error->text, sizeof error->text,
-                 "offset %zu: %zu bytes of samples, expected %zu (%ldx%ld, %ld byte%s each)%s",
-                 cursor.at, found, expected, (long)pgm->width, (long)pgm->height,
-                 (long)pgm->bytes_per_sample, pgm->bytes_per_sample == 1 ? "" : "s",
-                 found < expected ? "; truncated?" : "; more than one image?");
-        return false;
+        return fail_size(error, cursor.at, found, pgm);
     }
     unpack(data, cursor.at, pgm, expected);
     return true;

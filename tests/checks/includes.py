@@ -6,7 +6,8 @@
            the stages through isohead.h alone. Of the system: fixed-width integers, bool, size_t and
            string.h, nothing that does I/O, allocates or knows floating point.
   hal      hal.h, what all back ends share, its own files and the system; never firmware.
-  app      core, hal.h, its own files; of the back ends only app_board knows one, hal/linux.
+  app      core, hal.h, its own files; of the back ends only app_board knows one, hal/linux, and
+           app_cortexm one, hal/cortexm, with the decoder of PGM.
   sim      core, the app's records and rig, hal, its own files.
   render   its own files and the system: what draws the frames shares no line with what reads them.
   tests    anything.
@@ -92,17 +93,19 @@ def judge_hal(path, quoted, target):
     if is_core(target):
         return "hal knows no firmware"
     own = os.path.basename(os.path.dirname(path))
-    if quoted and not re.fullmatch(r"hal\.h|hal_file\.h|(%s/)hal_\w+\.h" % own, target):
-        return "a back end includes hal.h, hal_file.h and its own files by their folder"
+    if quoted and not re.fullmatch(r"hal\.h|hal_(file|text)\.h|(%s/)hal_\w+\.h" % own, target):
+        return "a back end includes hal.h, hal_file.h, hal_text.h and its own files by their folder"
     return None
 
 
 def judge_app(path, quoted, target):
     if not quoted or is_core(target):
         return None
-    good = re.fullmatch(r"app_\w+\.h|hal\.h|hal_file\.h", target)
+    good = re.fullmatch(r"app_\w+\.h|hal\.h|hal_(file|text)\.h", target)
     if os.path.basename(path).startswith("app_board."):
         good = good or re.fullmatch(r"linux/hal_\w+\.h", target)
+    if os.path.basename(path) == "app_cortexm.c":
+        good = good or re.fullmatch(r"cortexm/hal_\w+\.h|replay/hal_pgm\.h", target)
     return None if good else "the app includes the core, hal.h and its own files"
 
 
