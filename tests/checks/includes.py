@@ -10,6 +10,7 @@
            app_cortexm one, hal/cortexm, with the decoder of PGM.
   sim      core, the app's records and rig, hal, its own files.
   render   its own files and the system: what draws the frames shares no line with what reads them.
+  rigblob  core, the app's rig, hal_file.h.
   tests    anything.
 
 includes.py [--self-test]      exit status 1 if a rule is broken, each with file and line
@@ -125,8 +126,14 @@ def judge_render(path, quoted, target):
     return None
 
 
+def judge_rigblob(path, quoted, target):
+    if not quoted or is_core(target) or re.fullmatch(r"app_rig(_explain)?\.h|hal\.h|hal_file\.h", target):
+        return None
+    return "rigblob includes the core, the app's rig and hal_file.h"
+
+
 FOLDERS = {"firmware/core": judge_core, "firmware/app": judge_app, "hal": judge_hal, "sim": judge_sim,
-           "tools/render": judge_render}
+           "tools/render": judge_render, "tools/rigblob": judge_rigblob}
 
 
 def judge(path, line):
@@ -186,6 +193,9 @@ def self_test():
                ("firmware/app/app_loop.c", '#include "linux/hal_gpio.h"'),
                ("firmware/app/app_loop.c", '#include "sim_run.h"'),
                ("sim/sim_run.c", '#include "app_laser.h"'),
+               ("tools/rigblob/main.c", '#include "app_record.h"'),
+               ("firmware/app/app_loop.c", '#include "cortexm/hal_semihosting.h"'),
+               ("firmware/app/app_cortexm.c", '#include "linux/hal_gpio.h"'),
                ("firmware/other/main.c", '#include "isohead.h"')]
     good = [("firmware/core/ih_labels.h", '#include "ih_dots.h"'),
             ("firmware/core/ih_labels.c", '#include "ih_fix.h"'),
