@@ -63,9 +63,10 @@ bits: sim ## the same bits from gcc and clang, -O0 and -O3, on six processors
 	@tests/golden/golden.sh $(abspath $(CJSON_DIR)) frames $(GOLDEN_ALL)
 	@tests/checks/same_bits.sh $(abspath $(CJSON_DIR)) frames $(wildcard $(DATA)/dots $(DATA)/range)
 
-cortexm: sim ## the same bits on emulated Cortex-M4, M7 and M55 boards; the core's size there
+cortexm: sim ## the same bits and records on emulated Cortex-M4, M7 and M55 boards
 	@tools/setup.sh cortexm
 	@tests/golden/cortexm.sh $(abspath $(CJSON_DIR)) frames
+	@tests/golden/cortexm_records.sh $(abspath $(CJSON_DIR)) frames $(BUILD)/host
 
 vectors: ## write tests/vectors anew with the float64 reference
 	@tools/setup.sh vectors

@@ -196,6 +196,7 @@ cortexm)
     need_program arm-none-eabi-gcc gcc-arm-none-eabi
     [ -e "$(arm-none-eabi-gcc -print-file-name=libc.a 2>/dev/null)" ] || lacks libnewlib-arm-none-eabi
     need_program qemu-system-arm qemu-system-arm
+    need_python json python3
     ;;
 accept | vectors)
     need_python numpy python3-numpy

@@ -9,14 +9,21 @@
 #include <stdbool.h>
 #include <stddef.h>
 
+#include "hal.h"
+
 /* A file for reading; negative when it cannot be opened. name ends with a zero byte. */
 int hal_semihosting_open(const char *name);
 
 /* True: size bytes were read. */
 bool hal_semihosting_read(int file, void *data, size_t size);
 
-/* To standard output. True: all of it was written. */
+/* A file whole, into size bytes of memory; *length of them are its own. False: *error says why. */
+bool hal_semihosting_load(const char *name, void *data, size_t size, size_t *length,
+                          struct hal_error *error);
+
+/* To standard output, or to standard error. True: all of it was written. */
 bool hal_semihosting_write(const char *text, size_t size);
+bool hal_semihosting_complain(const char *text, size_t size);
 
 /* The command line, its words apart by blanks, ending with a zero byte; false when it does not fit. */
 bool hal_semihosting_command_line(char *line, size_t size);

@@ -1,7 +1,6 @@
 /* golden - the golden set on a Cortex-M. The last word of the command line is the file. */
-#include <string.h>
-
 #include "cortexm/hal_semihosting.h"
+#include "hal_text.h"
 #include "golden.h"
 
 static int file;
@@ -18,7 +17,7 @@ bool golden_write(const char *text, size_t size)
 
 static int fail(const char *text)
 {
-    golden_write(text, strlen(text));
+    golden_write(text, hal_text_length(text));
     return 2;
 }
 
