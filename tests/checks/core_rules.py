@@ -5,7 +5,8 @@
   symbols    nothing is called outside the core but a short list
   data       no writable static data: .data, .bss, their thread-local kin and commons are empty
   calls      no recursion, no call through a pointer, no alloca, no variable-length array
-  stack      the deepest call chain from each public function, below STACK_MAX_BYTES
+  stack      the deepest call chain from each public function, within tests/limits.conf
+  size       code and constants, and struct isohead, within tests/limits.conf
   commands   every build really compiles the core with -mgeneral-regs-only, but for the files whose
              loops may become vectors
 
@@ -14,7 +15,6 @@ core_rules.py --self-test                  breaks each rule in a copy and sees i
 """
 
 import argparse
-import functools
 import json
 import os
 import re
@@ -24,26 +24,25 @@ import tempfile
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 CORE = os.path.join(ROOT, "firmware", "core")
+sys.path.insert(0, os.path.join(ROOT, "tools", "size"))
+import call_graph
+import limits
+import ram
+from call_graph import Broken
 
 # The only functions the core may leave to others. Compilers call these four on their own, for
 # struct copies and initial values, so that even freestanding C must have them.
 SYMBOLS_ALLOWED = {"memcpy", "memmove", "memset", "memcmp"}
 # Stack charged for a call of one of them.
-LIBRARY_STACK_BYTES = 64
 # Files whose loops may become vectors, and so are not built with -mgeneral-regs-only; here they are.
 VECTORS = {"ih_band.c", "ih_noise.c", "ih_dots.c", "ih_cholesky.c", "ih_surface.c",
            "ih_ellipse.c", "ih_scan.c"}
-# The measured value (1,568), rounded up. The aim for small boards is 4,096.
-STACK_MAX_BYTES = 2048
+OUTSIDE = {name: 64 for name in SYMBOLS_ALLOWED}
 ENTRIES = ("isohead_init", "isohead_frame", "isohead_label", "isohead_find", "ih_cloud_draw")
 
 COMPILE = ["gcc", "-std=c11", "-O2", "-mgeneral-regs-only", "-fcallgraph-info=su", "-Wvla",
            "-Werror=vla", "-fno-stack-protector", "-U_FORTIFY_SOURCE", "-fno-pic", "-I", CORE, "-c"]
 WRITABLE = re.compile(r"^\.?(l?data|l?bss|tdata|tbss|COMMON)(\.|$)")
-
-
-class Broken(Exception):
-    """A rule that is not kept; the first word names it."""
 
 
 def run(command, **options):
@@ -101,81 +100,18 @@ def check_data(objects):
     return total
 
 
-def plain(title):
-    """A static function's title is PATH/FILE:NAME; two files may have one of the same name."""
-    return os.path.basename(title)
-
-
-def call_graph(objects):
-    """(stack bytes by function, callees by function) from what the compiler wrote beside them."""
-    stack, callees = {}, {}
-    for path in objects:
-        with open(path[:-2] + ".ci", encoding="utf-8") as file:
-            text = file.read()
-        for title, label in re.findall(r'node: \{ title: "([^"]*)" label: "([^"]*)"', text):
-            size = re.search(r"(\d+) bytes \(([^)]*)\)", label)
-            if not size:
-                continue
-            if size[2] not in ("static", "dynamic,bounded"):  # the latter's bytes are the bound
-                raise Broken("calls: %s has a stack frame that is %s" % (title, size[2]))
-            stack[plain(title)] = int(size[1])
-            callees.setdefault(plain(title), set())
-        for source, target in re.findall(r'edge: \{ sourcename: "([^"]*)" targetname: "([^"]*)"', text):
-            if target == "__indirect_call":
-                raise Broken("calls: %s calls through a pointer" % source)
-            callees.setdefault(plain(source), set()).add(plain(target))
-    return stack, callees
-
-
-def deepest(stack, callees, entry):
-    """(bytes, chain) of the worst chain of calls from a function."""
-    active = []
-
-    @functools.lru_cache(maxsize=None)
-    def below(function):
-        if function in active:
-            raise Broken("calls: recursion: " + " -> ".join(active[active.index(function):] + [function]))
-        if function not in stack:
-            if function not in SYMBOLS_ALLOWED:
-                raise Broken("calls: %s is called and nowhere defined" % function)
-            return LIBRARY_STACK_BYTES, (function,)
-        active.append(function)
-        worst = max((below(callee) for callee in sorted(callees[function])), default=(0, ()))
-        active.pop()
-        return stack[function] + worst[0], (function,) + worst[1]
-
-    return below(entry)
-
-
 def check_stack(objects, limit_bytes):
-    stack, callees = call_graph(objects)
-    for function in sorted(stack):  # recursion anywhere, reachable or not
-        deepest(stack, callees, function)
-    worst = {entry: deepest(stack, callees, entry) for entry in ENTRIES}
+    stack, callees = call_graph.read(path[:-2] + ".ci" for path in objects)
+    call_graph.check_all(stack, callees, OUTSIDE)
+    worst = {entry: call_graph.deepest(stack, callees, entry, OUTSIDE) for entry in ENTRIES}
     for entry, (size, chain) in worst.items():
-        if size > limit_bytes:
-            raise Broken("stack: %s needs %d bytes, the limit is %d: %s"
-                         % (entry, size, limit_bytes, " -> ".join(chain)))
+        check_limit("stack", "stack of %s (%s)" % (entry, " -> ".join(chain)), size, limit_bytes)
     return worst
 
 
-def sizes(directory):
-    """sizeof the state and of its parts, in the order of their declaration."""
-    with open(os.path.join(CORE, "isohead.h"), encoding="utf-8") as file:
-        body = re.search(r"\nstruct isohead \{\n(.*?)\n\};", file.read(), re.S)[1]
-    outer, inner = re.subn(r"union \{(.*?)\} scratch;", "", body, flags=re.S)[0], \
-        re.search(r"union \{(.*?)\} scratch;", body, re.S)
-    member = re.compile(r"struct \w+ (\w+);")
-    names = member.findall(outer) + ["scratch"] * bool(inner)
-    names += ["scratch." + name for name in member.findall(inner[1] if inner else "")]
-    lines = "".join('printf("%%zu %s\\n", sizeof h.%s);' % (name, name) for name in names)
-    source = os.path.join(directory, "sizes.c")
-    with open(source, "w", encoding="utf-8") as file:
-        file.write("#include <stdio.h>\n#include \"isohead.h\"\nint main(void){static struct isohead h;"
-                   'printf("%%zu struct isohead\\n", sizeof h);%s return 0;}\n' % lines)
-    program = os.path.join(directory, "sizes")
-    run(["gcc", "-I", CORE, source, "-o", program])
-    return [line.split(" ", 1) for line in run([program]).splitlines()]
+def check_limit(rule, what, size, limit):
+    if size > limit:
+        raise Broken("%s: %s: %d bytes, the limit is %d" % (rule, what, size, limit))
 
 
 def check_commands(path):
@@ -194,20 +130,25 @@ def check_commands(path):
 
 
 def check(arguments):
+    bounds = limits.read()
     with tempfile.TemporaryDirectory() as directory:
         objects = [compile_one(source, directory) for source in core_sources()]
         symbols = check_symbols(objects)
         total = check_data(objects)
-        worst = check_stack(objects, STACK_MAX_BYTES)
+        worst = check_stack(objects, bounds["x86_stack_bytes"])
+        sizes, ram_max = ram.sizes(["gcc"], "nm", directory)
+        check_limit("size", "struct isohead", sizes[ram.WHOLE], bounds["ram_bytes"])
+        check_limit("size", "IH_RAM_MAX", ram_max, bounds["ram_bytes"])
+        check_limit("size", "code and constants", sum(total.values()), bounds["flash_bytes"])
         if arguments.compile_commands:
             check_commands(arguments.compile_commands)
         print("calls outside the core: %s" % (", ".join(symbols) or "none"))
         print("writable static data: 0 bytes; code %(code)d bytes, constants %(constants)d bytes" % total)
         for entry, (size, chain) in worst.items():
             print("stack of %s: %d bytes, limit %d (%s)"
-                  % (entry, size, STACK_MAX_BYTES, " -> ".join(chain)))
-        for size, name in sizes(directory):
-            print("%8s bytes %s" % (size, name))
+                  % (entry, size, bounds["x86_stack_bytes"], " -> ".join(chain)))
+        for name, size in sizes.items():
+            print("%8d bytes %s" % (size, name))
 
 
 # What must be noticed: the rule, and what is added to a source of the core.
@@ -244,7 +185,7 @@ def notice(injected, good, directory):
         objects.append(compile_one(source, directory))
         check_symbols(objects)
         check_data(objects)
-        check_stack(objects, STACK_MAX_BYTES)
+        check_stack(objects, limits.read()["x86_stack_bytes"])
     except Broken as broken:
         return str(broken)
     return None
@@ -298,7 +239,7 @@ def main():
         if arguments.self_test:
             return self_test()
         check(arguments)
-    except Broken as broken:
+    except (Broken, limits.Wrong) as broken:
         print("core_rules: %s" % broken, file=sys.stderr)
         return 1
     return 0

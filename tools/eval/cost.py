@@ -99,7 +99,7 @@ def code_bytes():
 
 def state_bytes():
     with tempfile.TemporaryDirectory() as work:
-        return {name: int(size) for size, name in core_rules.sizes(work)}
+        return core_rules.ram.sizes(["gcc"], "nm", work)[0]
 
 
 def kilo(number):
