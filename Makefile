@@ -9,6 +9,8 @@ UNITY_DIR ?= $(BUILD)/third_party/unity/src
 CJSON_DIR ?= $(BUILD)/third_party/cjson
 # A folder with the sources of libgpiod 2: used instead of fetching them.
 GPIOD2_DIR ?= $(BUILD)/third_party/gpiod2
+# A folder with qemu-plugin.h: used instead of fetching QEMU's source package.
+QEMU_PLUGIN_DIR ?= $(BUILD)/third_party/qemu
 # The builds whose outputs of every stage are compared; make test takes the first six.
 GOLDEN_ALL := gcc-O0 gcc-O3 clang-O0 clang-O3 arm64-O0 arm64-O3 armhf-O2 riscv64-O2 s390x-O2 ppc64-O2
 # The frame of frames/sequence2 that docs/picture.png shows.
@@ -17,7 +19,7 @@ PICTURE ?= 000020
 ARCH ?= arm64
 
 .DEFAULT_GOAL := help
-.PHONY: help sim frames sanitize test accept eval bits cortexm vectors learn picture board board-gpiod2 deb image flash \
+.PHONY: help sim frames sanitize test accept eval bits cortexm size vectors learn picture board board-gpiod2 deb image flash \
   test-deb test-board test-image format formatted lint clean
 
 
@@ -67,6 +69,10 @@ cortexm: sim ## the same bits and records on emulated Cortex-M4, M7 and M55 boar
 	@tools/setup.sh cortexm
 	@tests/golden/cortexm.sh $(abspath $(CJSON_DIR)) frames
 	@tests/golden/cortexm_records.sh $(abspath $(CJSON_DIR)) frames $(BUILD)/host
+
+size: sim ## flash, RAM, stack and instructions of each stage on a Cortex-M7, against tests/limits.conf
+	@tools/setup.sh size
+	@tools/size/size.sh $(abspath $(CJSON_DIR)) frames $(BUILD)/host/tools/rigblob/rigblob $(QEMU_PLUGIN_DIR)
 
 vectors: ## write tests/vectors anew with the float64 reference
 	@tools/setup.sh vectors
@@ -139,9 +145,9 @@ formatted: ## fail when make format would change something
 	@tools/setup.sh format
 	@git ls-files '*.c' '*.h' | xargs clang-format --dry-run --Werror
 
-lint: sanitize ## clang-tidy over all C sources but the tests'
+lint: sanitize ## clang-tidy over all C sources but the tests' and QEMU's plugin
 	@tools/setup.sh lint
-	@git ls-files 'firmware/*.c' 'hal/*.c' 'sim/*.c' 'tools/*.c' | \
+	@git ls-files 'firmware/*.c' 'hal/*.c' 'sim/*.c' 'tools/*.c' ':!tools/size' | \
 	  xargs -P 2 -n 1 clang-tidy --quiet -p $(BUILD)/sanitize 2> $(BUILD)/lint.log || \
 	  { grep -v 'warnings* generated' $(BUILD)/lint.log; exit 1; }
 

@@ -1,7 +1,7 @@
 #!/bin/sh
 # Bring what a make target needs and this machine lacks.
 #
-#   tools/setup.sh sim|test|accept|eval|bits|cortexm|vectors|picture|format|lint
+#   tools/setup.sh sim|test|accept|eval|bits|cortexm|size|vectors|picture|format|lint
 #   tools/setup.sh board arm64|armhf|host
 #   tools/setup.sh deb arm64|armhf
 #   tools/setup.sh test-deb
@@ -190,7 +190,7 @@ bits)
     need_bits
     need_bits_all
     ;;
-cortexm)
+cortexm | size)
     need_sim
     need_program gcc gcc
     need_program arm-none-eabi-gcc gcc-arm-none-eabi
@@ -236,9 +236,18 @@ if [ -n "$packages" ]; then
 fi
 
 case "$1" in
-test | bits | cortexm) tools/fetch_third_party.sh build/third_party ;;
+test | bits | cortexm | size) tools/fetch_third_party.sh build/third_party ;;
 board) [ "$2" = host ] || tools/board/sysroot.sh "$2" ;;
 esac
 case "$1" in
+size)
+    # of the installed QEMU's own version, as Debian has one alone
+    header=include/qemu/qemu-plugin.h
+    if [ ! -e build/third_party/qemu/qemu-plugin.h ]; then
+        rm -rf build/third_party/qemu
+        tools/apt_source.sh qemu build/third_party/qemu "$header"
+        mv build/third_party/qemu/qemu-*/"$header" build/third_party/qemu/
+    fi
+    ;;
 test | test-board) tools/board/gpiod2.sh build/third_party/gpiod2 ;;
 esac

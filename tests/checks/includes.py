@@ -11,6 +11,7 @@
   sim      core, the app's records and rig, hal, its own files.
   render   its own files and the system: what draws the frames shares no line with what reads them.
   rigblob  core, the app's rig, hal_file.h.
+  size     the system: a plugin of QEMU.
   tests    anything.
 
 includes.py [--self-test]      exit status 1 if a rule is broken, each with file and line
@@ -126,6 +127,10 @@ def judge_render(path, quoted, target):
     return None
 
 
+def judge_size(_path, quoted, _target):
+    return "a plugin of QEMU knows nothing of ours" if quoted else None
+
+
 def judge_rigblob(path, quoted, target):
     if not quoted or is_core(target) or re.fullmatch(r"app_rig(_explain)?\.h|hal\.h|hal_file\.h", target):
         return None
@@ -133,7 +138,8 @@ def judge_rigblob(path, quoted, target):
 
 
 FOLDERS = {"firmware/core": judge_core, "firmware/app": judge_app, "hal": judge_hal, "sim": judge_sim,
-           "tools/render": judge_render, "tools/rigblob": judge_rigblob}
+           "tools/render": judge_render, "tools/rigblob": judge_rigblob,
+           "tools/size": judge_size}
 
 
 def judge(path, line):
@@ -194,6 +200,7 @@ def self_test():
                ("firmware/app/app_loop.c", '#include "sim_run.h"'),
                ("sim/sim_run.c", '#include "app_laser.h"'),
                ("tools/rigblob/main.c", '#include "app_record.h"'),
+               ("tools/size/count.c", '#include "isohead.h"'),
                ("firmware/app/app_loop.c", '#include "cortexm/hal_semihosting.h"'),
                ("firmware/app/app_cortexm.c", '#include "linux/hal_gpio.h"'),
                ("firmware/other/main.c", '#include "isohead.h"')]
