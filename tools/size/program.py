@@ -74,8 +74,10 @@ class Program:
                 self.name.setdefault(address, static + part[2])
 
     def _read_code(self):
-        """{function: [(mnemonic, operands)]}"""
+        """{function: [(mnemonic, operands)]}, and where each instruction stands."""
         self.code = {}
+        self.places = []  # addresses of all instructions, rising
+        self.targets = {}  # address of an instruction that may go to the start of a function: its name
         current = None
         for line in run(PREFIX + "objdump", "-d", "--no-show-raw-insn", self.path).splitlines():
             start = re.match(r"([0-9a-f]+) <[^>]*>:$", line)
@@ -84,6 +86,19 @@ class Program:
                 current = self.code.setdefault(self.name.get(int(start[1], 16)), [])
             elif found and current is not None and not found[2].startswith("."):
                 current.append((found[2], found[3] or ""))
+                self.places.append(int(found[1], 16))
+                target = re.search(r"\b([0-9a-f]+) <[^>+]*>", found[3] or "")
+                if target and found[2].startswith("b"):
+                    self.targets[self.places[-1]] = self.name.get(int(target[1], 16))
+        self.function_starts = sorted(self.name)
+
+    def function_at(self, address):
+        """The function that an address is in."""
+        return self.name[self.function_starts[bisect.bisect_right(self.function_starts, address) - 1]]
+
+    def called_by(self, address, count):
+        """The function that the last of count instructions from an address on goes to; None: none."""
+        return self.targets.get(self.places[bisect.bisect_left(self.places, address) + count - 1])
 
     def calls(self, function):
         """Other functions that its code goes to; Broken where it goes through a register."""

@@ -15,6 +15,7 @@ QEMU, and a rig as a blob. Frames are processed in order; the last MEASURED of t
 """
 
 import argparse
+import functools
 import glob
 import os
 import re
@@ -38,6 +39,7 @@ ENTRIES = (INIT, FRAME, "ih_blob_decode")
 ENDS = ("app_record_frame", "app_record_error", "hal_semihosting_call")
 MEM = ("memcpy", "memmove", "memset", "memcmp")
 DIVISION = ("__aeabi_ldivmod", "__aeabi_uldivmod")
+HELPERS = ("ih_fix.c", "memory", "division")
 ROWS_OUTSIDE = {"memory": "memcpy and its kin (C library)", "division": "64-bit division (compiler)"}
 
 
@@ -82,8 +84,8 @@ def check_calls(stack, callees):
 
 
 def count(program, plugin, rig, frames):
-    """[(mark, first store, lowest store, {address: instructions})] of every phase."""
-    marks = {program.symbol[name]: name for name in (INIT, FRAME) + ENDS if name in program.symbol}
+    """[(mark, first store, lowest store, {(address, instructions): runs})] of every phase."""
+    marks = {program.symbol[name]: name for name in (INIT, FRAME) + ENDS}
     words = ["isohead_cortexm", rig] + frames
     if any("," in word or " " in word for word in words):
         raise Broken("frames: a name with a blank or comma, which semihosting cannot pass on")
@@ -107,23 +109,54 @@ def count(program, plugin, rig, frames):
                 else:
                     at, instructions, runs = (int(word, 16) for word in part)
                     table = phases[-1][3]
-                    table[at] = table.get(at, 0) + instructions * runs
+                    table[at, instructions] = table.get((at, instructions), 0) + runs
         return phases
 
 
-def by_row(program, counts):
-    """{source: instructions}, what is not the core's under the names of ROWS_OUTSIDE; the caller's few
-    instructions between the end of a function of the core and the next mark are left out."""
+def row_at(program, address):
+    """The row of the table that an address belongs to; None: the calling program's. Its few instructions
+    between the end of a function of the core and the next mark are left out."""
+    source = program.source_of(address)
+    if source.removesuffix("-stub") in MEM:
+        return "memory"
+    if source.startswith("_") and "libgcc" in program.object_of(address):
+        return "division"
+    return source if source.startswith(("ih_", "isohead.c")) else None
+
+
+def by_row(program, pieces):
+    """{row: instructions}"""
     rows = {}
-    for address, instructions in counts.items():
-        source = program.source_of(address)
-        if source.removesuffix("-stub") in MEM:
-            source = "memory"
-        elif source.startswith("_") and "libgcc" in program.object_of(address):
-            source = "division"
-        elif not source.startswith(("ih_", "isohead.c")):
-            continue
-        rows[source] = rows.get(source, 0) + instructions
+    for (address, instructions), runs in pieces.items():
+        row = row_at(program, address)
+        if row:
+            rows[row] = rows.get(row, 0) + instructions * runs
+    return rows
+
+
+def shared_out(program, pieces):
+    """{row: instructions} with those of HELPERS handed on to who calls them, in proportion to the calls."""
+    own, calls, total_calls = {}, {}, {}
+    for (address, instructions), runs in pieces.items():
+        caller = program.function_at(address)
+        callee = program.called_by(address, instructions)
+        own[caller] = own.get(caller, 0) + instructions * runs
+        if callee and callee != caller:
+            calls.setdefault(caller, {})
+            calls[caller][callee] = calls[caller].get(callee, 0) + runs
+            total_calls[callee] = total_calls.get(callee, 0) + runs
+    row = {name: row_at(program, address) for address, name in program.name.items()}
+
+    @functools.lru_cache(maxsize=None)
+    def with_helpers(function):
+        return own.get(function, 0) + sum(
+            with_helpers(callee) * runs / total_calls[callee]
+            for callee, runs in calls.get(function, {}).items() if row[callee] in HELPERS)
+
+    rows = {}
+    for function in own:
+        if row[function] and row[function] not in HELPERS:
+            rows[row[function]] = rows.get(row[function], 0) + with_helpers(function)
     return rows
 
 
@@ -136,28 +169,41 @@ def order():
 def outside_flash(program, row):
     """Code of the linked functions that a row stands for."""
     return sum(size for at, size, kind, _ in program.sections
-               if kind == ".text" and row in by_row(program, {at: 1}))
+               if kind == ".text" and row == row_at(program, at))
+
+
+def joined(tables):
+    """The sums of several tables."""
+    total = {}
+    for table in tables:
+        for key, value in table.items():
+            total[key] = total.get(key, 0) + value
+    return total
 
 
 def print_stages(table, program, frames, init):
-    mean = {row: sum(frame.get(row, 0) for frame in frames) / len(frames)
-            for row in list(table) + list(ROWS_OUTSIDE)}
-    total = sum(mean.values())
-    line = "%-32s %7s %9s %7s %11s %5s %11s %10s"
-    print(line % ("stage", "code", "constants", "flash", "frame,", "%", "worst", "init,"))
-    print(line % ("", "bytes", "bytes", "bytes", "instr.", "", "frame", "instr."))
+    """frames, init: pieces. Returns flash and the mean of instructions."""
+    pieces = joined(frames)
+    own, shared, at_init = by_row(program, pieces), shared_out(program, pieces), by_row(program, init)
+    total = sum(own.values())
+    line = "%-32s %6s %9s %6s %12s %12s %5s %10s"
+    print(line % ("", "code", "constants", "flash", "own", "with help", "", "init"))
+    print(line % ("stage", "B", "B", "B", "instr/frame", "instr/frame", "%", "instr"))
     for row in order() + list(ROWS_OUTSIDE):
         code, constants = table[row] if row in table else (outside_flash(program, row), 0)
-        print(line % (ROWS_OUTSIDE.get(row, row), code, constants, code + constants, "%d" % mean[row],
-                      "%.1f" % (100 * mean[row] / total), max(frame.get(row, 0) for frame in frames),
-                      init.get(row, 0)))
+        part = shared.get(row, 0)
+        print(line % (ROWS_OUTSIDE.get(row, row), code, constants, code + constants,
+                      round(own.get(row, 0) / len(frames)),
+                      "shared out" if row in HELPERS else round(part / len(frames)),
+                      "" if row in HELPERS else "%.1f" % (100 * part / total), at_init.get(row, 0)))
     code, constants = (sum(sizes[i] for sizes in table.values()) for i in (0, 1))
-    totals = [sum(frame.values()) for frame in frames]
-    print(line % ("the core, and what it calls", code, constants, code + constants, "%d" % total, "100",
-                  max(totals), sum(init.values())))
-    print("flash of the last line is the core's own; frame: mean of %d, median %d, least %d\n"
-          % (len(frames), statistics.median(totals), min(totals)))
-    return code + constants, round(total)
+    totals = [sum(by_row(program, frame).values()) for frame in frames]
+    print(line % ("all; flash: the core's own", code, constants, code + constants, round(total / len(frames)),
+                  round(sum(shared.values()) / len(frames)), "100", sum(at_init.values())))
+    print("instr/frame: mean of %d frames; their least %d, median %d, worst %d. with help: and of the helpers,\n"
+          "ih_fix, memcpy and division, what they spend for the stage, in proportion to its calls.\n"
+          % (len(frames), min(totals), statistics.median(totals), max(totals)))
+    return code + constants, round(total / len(frames))
 
 
 def print_ram(directory):
@@ -208,8 +254,8 @@ def measure(arguments, directory):
         raise Broken("build: %s: other objects than firmware/core has sources" % arguments.build)
     stack, callees = graph(objects, program)
     phases = count(program, arguments.plugin, arguments.rig, arguments.frames)
-    frames = [by_row(program, counts) for mark, _, _, counts in phases if mark == FRAME][-MEASURED:]
-    init = next(by_row(program, counts) for mark, _, _, counts in phases if mark == INIT)
+    frames = [pieces for mark, _, _, pieces in phases if mark == FRAME][-MEASURED:]
+    init = next(pieces for mark, _, _, pieces in phases if mark == INIT)
     print("Cortex-M7 (%s), %s\n" % (BOARD, run(PREFIX + "gcc", "--version").splitlines()[0]))
     found = {}
     found["flash_bytes"], found["cortexm7_frame_instructions"] = print_stages(table, program, frames, init)
