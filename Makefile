@@ -15,11 +15,13 @@ QEMU_PLUGIN_DIR ?= $(BUILD)/third_party/qemu
 GOLDEN_ALL := gcc-O0 gcc-O3 clang-O0 clang-O3 arm64-O0 arm64-O3 armhf-O2 riscv64-O2 s390x-O2 ppc64-O2
 # The frame of frames/sequence2 that docs/picture.png shows.
 PICTURE ?= 000020
+# Frames of make longrun; make test takes a few hundred.
+LONGRUN_FRAMES ?= 100000
 # What the board's program is built for: arm64, armhf or host.
 ARCH ?= arm64
 
 .DEFAULT_GOAL := help
-.PHONY: help sim frames sanitize test accept eval bits cortexm size vectors learn picture board board-gpiod2 deb image flash \
+.PHONY: help sim frames sanitize test accept eval bits cortexm longrun size vectors learn picture board board-gpiod2 deb image flash \
   test-deb test-board test-image format formatted lint clean
 
 
@@ -73,6 +75,10 @@ cortexm: sim ## the same bits and records on emulated Cortex-M4, M7 and M55 boar
 size: sim ## flash, RAM, stack and instructions of each stage on a Cortex-M7, against tests/limits.conf
 	@tools/setup.sh size
 	@tools/size/size.sh $(abspath $(CJSON_DIR)) frames $(BUILD)/host/tools/rigblob/rigblob $(QEMU_PLUGIN_DIR)
+
+longrun: sim ## 100,000 frames in one process: same memory, same records at the end as at the start
+	@tests/longrun/longrun.sh $(BUILD)/host/tests/longrun/longrun $(BUILD)/host/tools/render/render \
+	  $(BUILD)/longrun $(LONGRUN_FRAMES)
 
 vectors: ## write tests/vectors anew with the float64 reference
 	@tools/setup.sh vectors
