@@ -50,12 +50,42 @@ static int64_t beside_line(const struct ih_labels_scratch *scratch, int32_t dot,
     return ih_shift_round(dv * line->dir_u_q30 - du * line->dir_v_q30, 30);
 }
 
+/* Reading order: by row, then column. */
+static bool reads_before(const struct ih_dot *a, const struct ih_dot *b)
+{
+    return a->v_px_q12 != b->v_px_q12 ? a->v_px_q12 < b->v_px_q12 : a->u_px_q12 < b->u_px_q12;
+}
+
+/* A slot's candidates stand in reading order, the last ones drop out of a full table: of equally good
+ * ones the first is taken later, and none of that may depend on the order of the dots. */
+static void add_candidate(const struct ih_dots *dots, struct ih_candidate candidate, int32_t slot,
+                          struct ih_labels_scratch *scratch, struct ih_labels *out)
+{
+    struct ih_candidate *list = scratch->candidate[slot];
+    const struct ih_dot *dot = &dots->dot[candidate.dot];
+    int8_t at = scratch->candidate_count[slot];
+    if (at == IH_LABELS_CANDIDATES_MAX) {
+        out->candidates_dropped++;
+        at--;
+        if (!reads_before(dot, &dots->dot[list[at].dot])) {
+            return;
+        }
+    } else {
+        scratch->candidate_count[slot]++;
+    }
+    for (; at > 0 && reads_before(dot, &dots->dot[list[at - 1].dot]); at--) {
+        list[at] = list[at - 1];
+    }
+    list[at] = candidate;
+}
+
 /* Candidates of one slot. */
 static void find_candidates(const struct ih_dots *dots, const struct ih_line *line, int32_t slot,
                             const struct ih_labels_params *params,
                             struct ih_labels_scratch *scratch, struct ih_labels *out)
 {
-    int8_t count = 0;
+    scratch->candidate_count[slot] = 0;
+    scratch->choice[slot] = IH_NONE;
     for (int32_t i = 0; i < dots->dot_count; i++) {
         int64_t perp = beside_line(scratch, i, line);
         int64_t t = along_line(scratch, i, line);
@@ -64,20 +94,15 @@ static void find_candidates(const struct ih_dots *dots, const struct ih_line *li
             t > line->t_near_px_q12 + RANGE_MARGIN_PX_Q12 || t <= 0) {
             continue;
         }
-        if (count == IH_LABELS_CANDIDATES_MAX) {
-            out->candidates_dropped++;
-            continue;
-        }
-        scratch->candidate[slot][count++] = (struct ih_candidate){
+        struct ih_candidate candidate = {
             /* t in Q12 over length in Q8: 36 + 8 - 12 = 32 more bits give Q36 */
             .inverse_depth_q36 =
                 ih_saturate_s32(ih_div_round(t * ((int64_t)1 << 32), line->length_px_mm_q8)),
             .perp_px_q12 = (int16_t)perp,
             .dot = (int16_t)i,
         };
+        add_candidate(dots, candidate, slot, scratch, out);
     }
-    scratch->candidate_count[slot] = count;
-    scratch->choice[slot] = IH_NONE;
 }
 
 static const struct ih_candidate *candidate_of(const struct ih_labels_scratch *scratch,

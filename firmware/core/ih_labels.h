@@ -1,6 +1,7 @@
 /* ih_labels - which detected dot is which of the 361? (paper, section 2.3)
  *
- * In:    dots, rig.
+ * In:    dots in any order, rig. Where it matters which of two comes first, it is the one that reads
+ *        first in the frame.
  * Out:   the 361-slot table: per slot a dot or IH_NONE; no dot twice.
  * Way:   1. Candidates: a dot is a candidate of every slot whose epipolar line, in undistorted
  *           pixels, passes within perp_max of it, in the working range.
