@@ -12,7 +12,8 @@ GPIOD2_DIR ?= $(BUILD)/third_party/gpiod2
 # A folder with qemu-plugin.h: used instead of fetching QEMU's source package.
 QEMU_PLUGIN_DIR ?= $(BUILD)/third_party/qemu
 # The builds whose outputs of every stage are compared; make test takes the first six.
-GOLDEN_ALL := gcc-O0 gcc-O3 clang-O0 clang-O3 arm64-O0 arm64-O3 armhf-O2 riscv64-O2 s390x-O2 ppc64-O2
+GOLDEN_ALL := gcc-O0 gcc-O3 clang-O0 clang-O3 arm64-O0 arm64-O3 armhf-O2 riscv64-O2 s390x-O2 ppc64-O2 \
+  mps2-an386-O2 mps2-an500-O2 mps3-an547-O2
 # The frame of frames/sequence2 that docs/picture.png shows.
 PICTURE ?= 000020
 # Frames of make longrun; make test takes a few hundred.
@@ -62,8 +63,9 @@ eval: sim ## everything measured: all data sets, fresh scenes, each part left ou
 	@/usr/bin/python3 tools/eval/evaluate.py --host-sim $(BUILD)/host/sim/host_sim \
 	  --render $(BUILD)/host/tools/render/render --work $(BUILD)/eval --data $(DATA)
 
-bits: sim ## the same bits from gcc and clang, -O0 and -O3, on six processors
+bits: sim ## the same bits from gcc and clang, -O0 and -O3, on nine processors, three of them Cortex-M
 	@tools/setup.sh bits
+	@tools/setup.sh cortexm
 	@tests/golden/golden.sh $(abspath $(CJSON_DIR)) frames $(GOLDEN_ALL)
 	@tests/checks/same_bits.sh $(abspath $(CJSON_DIR)) frames $(wildcard $(DATA)/dots $(DATA)/range)
 

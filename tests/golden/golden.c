@@ -4,11 +4,13 @@
 
 #include "golden_file.h"
 #include "golden_hash.h"
+#include "golden_inner.h"
 #include "golden_scene.h"
 
 #define FRAME_US 40000
 
 static struct isohead head;
+static struct ih_exposure exposure;
 static struct ih_calibration calibration;
 static uint16_t samples[GOLDEN_FRAME_BYTES / 2];
 static uint16_t ambient_samples[GOLDEN_AMBIENT_BYTES / 2];
@@ -94,7 +96,23 @@ static bool start_set(struct set *set)
     if (err != IH_OK) {
         return fail("the core refuses the rig with error", (uint32_t)-err, "none");
     }
+    golden_inner_start(&exposure);
     return put_stage(set->number, "-", "rig", golden_hash_rig(&head));
+}
+
+/* The stages whose outputs the state does not keep. */
+static bool put_inners(const struct set *set, const char *name, const struct ih_frame *frame,
+                       const struct ih_frame *ambient)
+{
+    const struct golden_inner_view view = {&head, frame, ambient, &exposure};
+    bool is_range = head.rig.calibration.kind == IH_RIG_RANGE;
+    bool good = true;
+    for (int i = 0; i < GOLDEN_INNERS && good; i++) {
+        if (!is_range || !golden_inner[i].dots_only) {
+            good = put_stage(set->number, name, golden_inner[i].name, golden_inner[i].hash(&view));
+        }
+    }
+    return good;
 }
 
 static bool run_frame(struct set *set, const char *name, const struct ih_frame *frame,
@@ -110,7 +128,7 @@ static bool run_frame(struct set *set, const char *name, const struct ih_frame *
             return false;
         }
     }
-    return true;
+    return put_inners(set, name, frame, ambient);
 }
 
 static bool read_word(uint32_t *word)

@@ -4,8 +4,8 @@
 #
 #     golden.sh CJSON_DIR FRAMES_DIR NAME...
 #
-# CJSON_DIR: a folder with cJSON.c. FRAMES_DIR: its sequence1 and sequence2 are the rigs, with three
-# frames each from the middle. NAME: builds as tests/checks/builds.sh describes them; the first is
+# CJSON_DIR: a folder with cJSON.c. FRAMES_DIR: of its sequence1 and sequence2, both of the paper's rig,
+# three frames each from the middle are taken; three of the wide rig are rendered. NAME: builds as tests/checks/builds.sh describes them; the first is
 # what the others are compared with. Everything lies below build/bits. Exit status 1 on a difference.
 set -eu
 LC_ALL=C
@@ -26,15 +26,17 @@ root=$(cd "$(dirname "$0")/../.." && pwd)
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
-# sequence N: the arguments of golden_pack for one of them.
+# sequence DIR: the arguments of golden_pack for one of them.
 sequence() {
     for frame in rig.json 000024.pgm 000025.pgm 000026.pgm; do
-        echo "$frames/sequence$1/$frame"
+        echo "$1/$frame"
     done
 }
-builds_make gcc-O3 golden_pack
+builds_make gcc-O3 golden_pack render
+builds_run gcc-O3 tools/render/render --rig wide --sequence 2 --seed 3 --first-frame 24+3 "$work/wide"
 # shellcheck disable=SC2046 # a list of files
-builds_run gcc-O3 tests/golden/golden_pack "$work/golden.bin" $(sequence 1) $(sequence 2)
+builds_run gcc-O3 tests/golden/golden_pack "$work/golden.bin" $(sequence "$frames/sequence1") \
+    $(sequence "$frames/sequence2") $(sequence "$work/wide")
 
 # compiler NAME: what the build was compiled with.
 compiler() {
@@ -51,9 +53,21 @@ hashes() {
     }
 }
 
+# processor NAME: what it runs on.
+processor() {
+    case ${1%-*} in
+    gcc | clang) uname -m ;;
+    arm64) echo aarch64 ;;
+    mps2-an386) echo Cortex-M4 ;;
+    mps2-an500) echo Cortex-M7 ;;
+    mps3-an547) echo Cortex-M55 ;;
+    *) echo "${1%-*}" ;;
+    esac
+}
+
 first=$1
 bad=0
-printf '%-16s %-36s %6s  %-16s %s\n' target compiler frames hash equal
+printf '%-11s %-14s %-32s %6s %6s  %-16s %s\n' processor build compiler frames hashes 'hash of them' equal
 for name in "$@"; do
     builds_make "$name" golden
     hashes "$name" golden.bin >"$work/out" || { tail -n 1 "$work/out" >&2; exit 1; }
@@ -62,8 +76,10 @@ for name in "$@"; do
     fi
     equal=yes
     cmp -s "$work/expected" "$work/out" || { equal=NO; bad=1; }
-    printf '%-16s %-36s %6s  %-16s %s\n' "$name" "$(compiler "$name")" \
-        "$(grep -c ' result ' "$work/out")" "$(sha256sum <"$work/out" | cut -c 1-16)" $equal
+    printf '%-11s %-14s %-32s %6s %6s  %-16s %s\n' "$(processor "$name")" "$name" "$(compiler "$name")" \
+        "$(grep -c ' result ' "$work/out")" "$(wc -l <"$work/out")" \
+        "$(sha256sum <"$work/out" | cut -c 1-16)" $equal
+    processor "$name" >>"$work/processors"
     if [ $equal = NO ]; then
         diff "$work/expected" "$work/out" | sed -n '2,/^>/p' | head -n 10
     fi
@@ -80,4 +96,5 @@ if cmp -s "$work/expected" "$work/out"; then
     echo "golden: a rig with another focal length gives the same hashes" >&2
     exit 1
 fi
-echo "golden: the same $(wc -l <"$work/expected") hashes of $# builds"
+echo "golden: the same $(wc -l <"$work/expected") hashes of $# builds for" \
+    "$(sort -u "$work/processors" | wc -l) processors"

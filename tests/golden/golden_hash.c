@@ -1,35 +1,8 @@
 #include "golden_hash.h"
 
-#include <string.h>
+#include "golden_fnv.h"
 
-#define FNV_START 0xcbf29ce484222325u
-#define FNV_PRIME 0x100000001b3u
-
-static uint64_t add(uint64_t hash, int64_t value, int bytes)
-{
-    for (int i = 0; i < bytes; i++) {
-        hash = (hash ^ (((uint64_t)value >> (8 * i)) & 0xff)) * FNV_PRIME;
-    }
-    return hash;
-}
-
-static uint64_t add_word(uint64_t hash, int32_t value)
-{
-    return add(hash, value, 4);
-}
-
-/* An array of 32-bit integers, or a struct that has no other members. */
-static uint64_t add_words(uint64_t hash, const void *first, size_t size)
-{
-    for (size_t at = 0; at < size; at += sizeof(int32_t)) {
-        int32_t value = 0;
-        memcpy(&value, (const char *)first + at, sizeof value);
-        hash = add_word(hash, value);
-    }
-    return hash;
-}
-
-/* Structs that add_words takes: a member of another type would change these sizes. */
+/* Structs that golden_add_words takes: a member of another type would change these sizes. */
 #define WORDS(n) ((n) * sizeof(int32_t))
 _Static_assert(sizeof(struct ih_line) == WORDS(7), "ih_line");
 _Static_assert(sizeof(struct ih_field) == WORDS(3), "ih_field");
@@ -44,32 +17,32 @@ _Static_assert(sizeof(struct ih_view) == WORDS(3), "ih_view");
 uint64_t golden_hash_rig(const struct isohead *head)
 {
     const struct ih_rig *rig = &head->rig;
-    uint64_t hash = add_words(FNV_START, &rig->field, sizeof rig->field);
-    return add_words(hash, rig->line, sizeof rig->line);
+    uint64_t hash = golden_add_words(GOLDEN_FNV_START, &rig->field, sizeof rig->field);
+    return golden_add_words(hash, rig->line, sizeof rig->line);
 }
 
 static uint64_t hash_dots(const struct isohead *head)
 {
     const struct ih_dots *dots = &head->dots;
-    uint64_t hash = add_word(FNV_START, dots->dot_count);
-    hash = add_word(hash, dots->edge_count);
-    hash = add_word(hash, dots->hot_count);
-    hash = add_word(hash, dots->dots_dropped);
-    hash = add_words(hash, dots->dot, (size_t)dots->dot_count * sizeof dots->dot[0]);
-    return add_words(hash, dots->bright, sizeof dots->bright);
+    uint64_t hash = golden_add_word(GOLDEN_FNV_START, dots->dot_count);
+    hash = golden_add_word(hash, dots->edge_count);
+    hash = golden_add_word(hash, dots->hot_count);
+    hash = golden_add_word(hash, dots->dots_dropped);
+    hash = golden_add_words(hash, dots->dot, (size_t)dots->dot_count * sizeof dots->dot[0]);
+    return golden_add_words(hash, dots->bright, sizeof dots->bright);
 }
 
 static uint64_t hash_labels(const struct isohead *head)
 {
     const struct ih_labels *labels = &head->labels;
-    uint64_t hash = add_word(FNV_START, labels->labelled_count);
-    hash = add_word(hash, labels->seed_count);
-    hash = add_word(hash, labels->candidates_dropped);
+    uint64_t hash = golden_add_word(GOLDEN_FNV_START, labels->labelled_count);
+    hash = golden_add_word(hash, labels->seed_count);
+    hash = golden_add_word(hash, labels->candidates_dropped);
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
-        hash = add_word(hash, labels->dot_of_slot[slot]);
+        hash = golden_add_word(hash, labels->dot_of_slot[slot]);
         if (labels->dot_of_slot[slot] != IH_NONE) {
-            hash = add_word(hash, labels->t_px_q12[slot]);
-            hash = add_word(hash, labels->perp_px_q12[slot]);
+            hash = golden_add_word(hash, labels->t_px_q12[slot]);
+            hash = golden_add_word(hash, labels->perp_px_q12[slot]);
         }
     }
     return hash;
@@ -78,38 +51,38 @@ static uint64_t hash_labels(const struct isohead *head)
 static uint64_t hash_windows(const struct isohead *head)
 {
     const struct ih_windows *windows = &head->windows;
-    uint64_t hash = add_word(FNV_START, windows->window_count);
-    hash = add_word(hash, windows->places_dropped);
-    return add_words(hash, windows->window,
-                     (size_t)windows->window_count * sizeof windows->window[0]);
+    uint64_t hash = golden_add_word(GOLDEN_FNV_START, windows->window_count);
+    hash = golden_add_word(hash, windows->places_dropped);
+    return golden_add_words(hash, windows->window,
+                            (size_t)windows->window_count * sizeof windows->window[0]);
 }
 
 static uint64_t hash_points(const struct isohead *head)
 {
     const struct ih_points *points = &head->points;
-    uint64_t hash = add_word(FNV_START, points->seen_count);
-    hash = add_words(hash, &points->field, sizeof points->field);
-    return add_words(hash, points->point, sizeof points->point);
+    uint64_t hash = golden_add_word(GOLDEN_FNV_START, points->seen_count);
+    hash = golden_add_words(hash, &points->field, sizeof points->field);
+    return golden_add_words(hash, points->point, sizeof points->point);
 }
 
 static uint64_t hash_samples(const struct isohead *head)
 {
     const struct ih_samples *samples = &head->samples;
-    uint64_t hash = add_word(FNV_START, samples->sample_count);
-    hash = add_word(hash, samples->seen_count);
-    hash = add_word(hash, samples->filled_count);
-    hash = add_word(hash, samples->isolated_count);
-    hash = add_word(hash, samples->outside_count);
-    hash = add_word(hash, samples->nearest_mm_q8);
-    hash = add_word(hash, samples->clip_mm_q8);
+    uint64_t hash = golden_add_word(GOLDEN_FNV_START, samples->sample_count);
+    hash = golden_add_word(hash, samples->seen_count);
+    hash = golden_add_word(hash, samples->filled_count);
+    hash = golden_add_word(hash, samples->isolated_count);
+    hash = golden_add_word(hash, samples->outside_count);
+    hash = golden_add_word(hash, samples->nearest_mm_q8);
+    hash = golden_add_word(hash, samples->clip_mm_q8);
     for (int32_t i = 0; i < samples->sample_count; i++) {
         const struct ih_sample *sample = &samples->sample[i];
-        hash = add_word(hash, sample->x_q16);
-        hash = add_word(hash, sample->y_q16);
-        hash = add_word(hash, sample->depth_mm_q8);
-        hash = add_word(hash, sample->root_weight_q15);
-        hash = add_word(hash, sample->slot);
-        hash = add_word(hash, sample->is_filled);
+        hash = golden_add_word(hash, sample->x_q16);
+        hash = golden_add_word(hash, sample->y_q16);
+        hash = golden_add_word(hash, sample->depth_mm_q8);
+        hash = golden_add_word(hash, sample->root_weight_q15);
+        hash = golden_add_word(hash, sample->slot);
+        hash = golden_add_word(hash, sample->is_filled);
     }
     return hash;
 }
@@ -117,53 +90,54 @@ static uint64_t hash_samples(const struct isohead *head)
 static uint64_t hash_surface(const struct isohead *head)
 {
     const struct ih_surface *surface = &head->surface;
-    uint64_t hash = add_word(FNV_START, surface->valid);
+    uint64_t hash = golden_add_word(GOLDEN_FNV_START, surface->valid);
     if (!surface->valid) {
         return hash;
     }
     size_t count = (size_t)head->samples.sample_count;
-    hash = add_word(hash, surface->downweighted_count);
-    hash = add_word(hash, surface->mean_mm_q8);
-    hash = add_words(hash, &surface->field, sizeof surface->field);
-    hash = add_word(hash, surface->nearest_mm_q8);
-    hash = add_words(hash, surface->root_weight_q15, count * sizeof surface->root_weight_q15[0]);
-    return add_words(hash, surface->depth_mm_q8, sizeof surface->depth_mm_q8);
+    hash = golden_add_word(hash, surface->downweighted_count);
+    hash = golden_add_word(hash, surface->mean_mm_q8);
+    hash = golden_add_words(hash, &surface->field, sizeof surface->field);
+    hash = golden_add_word(hash, surface->nearest_mm_q8);
+    hash = golden_add_words(hash, surface->root_weight_q15,
+                            count * sizeof surface->root_weight_q15[0]);
+    return golden_add_words(hash, surface->depth_mm_q8, sizeof surface->depth_mm_q8);
 }
 
 static uint64_t add_slice(uint64_t hash, const struct ih_slice *slice)
 {
     const struct ih_ellipse *ellipse = &slice->ellipse;
-    hash = add(hash, ellipse->area_q16, 8);
-    hash = add_word(hash, ellipse->x_q16);
-    hash = add_word(hash, ellipse->y_q16);
-    hash = add(hash, ellipse->xx_q16, 8);
-    hash = add(hash, ellipse->xy_q16, 8);
-    hash = add(hash, ellipse->yy_q16, 8);
-    hash = add_word(hash, ellipse->shape_q16);
-    hash = add_word(hash, ellipse->ratio_q16);
-    hash = add_word(hash, ellipse->merit_q8);
-    hash = add_word(hash, slice->behind_mm_q8);
-    hash = add_word(hash, slice->area_mm2);
-    return add_word(hash, slice->whole);
+    hash = golden_add(hash, ellipse->area_q16, 8);
+    hash = golden_add_word(hash, ellipse->x_q16);
+    hash = golden_add_word(hash, ellipse->y_q16);
+    hash = golden_add(hash, ellipse->xx_q16, 8);
+    hash = golden_add(hash, ellipse->xy_q16, 8);
+    hash = golden_add(hash, ellipse->yy_q16, 8);
+    hash = golden_add_word(hash, ellipse->shape_q16);
+    hash = golden_add_word(hash, ellipse->ratio_q16);
+    hash = golden_add_word(hash, ellipse->merit_q8);
+    hash = golden_add_word(hash, slice->behind_mm_q8);
+    hash = golden_add_word(hash, slice->area_mm2);
+    return golden_add_word(hash, slice->whole);
 }
 
 static uint64_t hash_hypotheses(const struct isohead *head)
 {
     const struct ih_hypotheses *hypotheses = &head->hypotheses;
-    uint64_t hash = add_word(FNV_START, hypotheses->nest_count);
-    hash = add_word(hash, hypotheses->minima_dropped);
-    hash = add_word(hash, hypotheses->contours_dropped);
+    uint64_t hash = golden_add_word(GOLDEN_FNV_START, hypotheses->nest_count);
+    hash = golden_add_word(hash, hypotheses->minima_dropped);
+    hash = golden_add_word(hash, hypotheses->contours_dropped);
     for (int32_t i = 0; i < hypotheses->nest_count; i++) {
         const struct ih_nest *nest = &hypotheses->nest[i];
-        hash = add_word(hash, nest->minimum.x_q9);
-        hash = add_word(hash, nest->minimum.y_q9);
-        hash = add_word(hash, nest->nearest_mm_q8);
-        hash = add_word(hash, nest->front_mm_q8);
-        hash = add_word(hash, nest->tip_level_mm_q8);
-        hash = add_word(hash, nest->tip_area_mm2);
-        hash = add_word(hash, nest->slice_count);
-        hash = add_word(hash, nest->gap);
-        hash = add_word(hash, nest->ended);
+        hash = golden_add_word(hash, nest->minimum.x_q9);
+        hash = golden_add_word(hash, nest->minimum.y_q9);
+        hash = golden_add_word(hash, nest->nearest_mm_q8);
+        hash = golden_add_word(hash, nest->front_mm_q8);
+        hash = golden_add_word(hash, nest->tip_level_mm_q8);
+        hash = golden_add_word(hash, nest->tip_area_mm2);
+        hash = golden_add_word(hash, nest->slice_count);
+        hash = golden_add_word(hash, nest->gap);
+        hash = golden_add_word(hash, nest->ended);
         for (int32_t k = 0; k < nest->slice_count; k++) {
             hash = add_slice(hash, &nest->slice[k]);
         }
@@ -174,102 +148,105 @@ static uint64_t hash_hypotheses(const struct isohead *head)
 static uint64_t hash_heads(const struct isohead *head)
 {
     const struct ih_heads *heads = &head->heads;
-    uint64_t hash = add_word(FNV_START, heads->hypothesis_count);
-    hash = add_word(hash, heads->head_count);
-    hash = add_words(hash, heads->head, (size_t)heads->head_count * sizeof heads->head[0]);
-    return add_words(hash, heads->hypothesis,
-                     (size_t)heads->hypothesis_count * sizeof heads->hypothesis[0]);
+    uint64_t hash = golden_add_word(GOLDEN_FNV_START, heads->hypothesis_count);
+    hash = golden_add_word(hash, heads->head_count);
+    hash = golden_add_words(hash, heads->head, (size_t)heads->head_count * sizeof heads->head[0]);
+    return golden_add_words(hash, heads->hypothesis,
+                            (size_t)heads->hypothesis_count * sizeof heads->hypothesis[0]);
 }
 
 static uint64_t hash_expected(const struct isohead *head)
 {
     const struct ih_expected *expected = &head->expected;
-    uint64_t hash = add_word(FNV_START, expected->count);
-    return add_words(hash, expected->head, (size_t)expected->count * sizeof expected->head[0]);
+    uint64_t hash = golden_add_word(GOLDEN_FNV_START, expected->count);
+    return golden_add_words(hash, expected->head,
+                            (size_t)expected->count * sizeof expected->head[0]);
 }
 
 static uint64_t hash_findings(const struct isohead *head)
 {
     const struct ih_findings *findings = &head->findings;
-    uint64_t hash = add_word(FNV_START, findings->finding_count);
-    hash = add_word(hash, findings->dropped_count);
-    hash = add_word(hash, findings->seen_count);
+    uint64_t hash = golden_add_word(GOLDEN_FNV_START, findings->finding_count);
+    hash = golden_add_word(hash, findings->dropped_count);
+    hash = golden_add_word(hash, findings->seen_count);
     for (int32_t i = 0; i < findings->finding_count; i++) {
         const struct ih_finding *finding = &findings->finding[i];
-        hash = add_words(hash, &finding->head, sizeof finding->head);
-        hash = add_words(hash, &finding->evidence, sizeof finding->evidence);
-        hash = add_word(hash, finding->logit_q10);
-        hash = add_word(hash, finding->probability_q16);
-        hash = add_word(hash, finding->source);
-        hash = add_word(hash, finding->track_id);
-        hash = add_word(hash, finding->sigma_mm_q8);
-        hash = add_word(hash, finding->is_head);
-        hash = add_word(hash, finding->is_predicted);
-        hash = add_word(hash, finding->u_px_q12);
-        hash = add_word(hash, finding->v_px_q12);
-        hash = add_word(hash, finding->a_px_q12);
-        hash = add_word(hash, finding->b_px_q12);
-        hash = add_word(hash, finding->angle_mdeg);
-        hash = add_word(hash, finding->distance_mm_q8);
+        hash = golden_add_words(hash, &finding->head, sizeof finding->head);
+        hash = golden_add_words(hash, &finding->evidence, sizeof finding->evidence);
+        hash = golden_add_word(hash, finding->logit_q10);
+        hash = golden_add_word(hash, finding->probability_q16);
+        hash = golden_add_word(hash, finding->source);
+        hash = golden_add_word(hash, finding->track_id);
+        hash = golden_add_word(hash, finding->sigma_mm_q8);
+        hash = golden_add_word(hash, finding->is_head);
+        hash = golden_add_word(hash, finding->is_predicted);
+        hash = golden_add_word(hash, finding->u_px_q12);
+        hash = golden_add_word(hash, finding->v_px_q12);
+        hash = golden_add_word(hash, finding->a_px_q12);
+        hash = golden_add_word(hash, finding->b_px_q12);
+        hash = golden_add_word(hash, finding->angle_mdeg);
+        hash = golden_add_word(hash, finding->distance_mm_q8);
     }
-    return add_words(hash, findings->view, sizeof findings->view);
+    return golden_add_words(hash, findings->view, sizeof findings->view);
 }
 
 static uint64_t add_track(uint64_t hash, const struct ih_track *track)
 {
-    hash = add_word(hash, track->id);
-    hash = add_word(hash, track->is_head);
-    hash = add_word(hash, track->mean_logit_q10);
-    hash = add_words(hash, &track->head, sizeof track->head);
-    hash = add_words(hash, track->velocity_mm_s_q8, sizeof track->velocity_mm_s_q8);
-    hash = add(hash, track->place_q8, 8);
-    hash = add(hash, track->cross_q8, 8);
-    hash = add(hash, track->speed_q8, 8);
-    hash = add(hash, track->seen_us, 8);
-    hash = add_word(hash, track->finding_count);
-    return add_word(hash, track->finding);
+    hash = golden_add_word(hash, track->id);
+    hash = golden_add_word(hash, track->is_head);
+    hash = golden_add_word(hash, track->mean_logit_q10);
+    hash = golden_add_words(hash, &track->head, sizeof track->head);
+    hash = golden_add_words(hash, track->velocity_mm_s_q8, sizeof track->velocity_mm_s_q8);
+    hash = golden_add(hash, track->place_q8, 8);
+    hash = golden_add(hash, track->cross_q8, 8);
+    hash = golden_add(hash, track->speed_q8, 8);
+    hash = golden_add(hash, track->seen_us, 8);
+    hash = golden_add_word(hash, track->finding_count);
+    return golden_add_word(hash, track->finding);
 }
 
 static uint64_t hash_tracks(const struct isohead *head)
 {
     const struct ih_tracks *tracks = &head->tracks;
-    uint64_t hash = add_word(FNV_START, tracks->has_time);
-    hash = add(hash, tracks->time_us, 8);
-    hash = add_word(hash, tracks->last_id);
-    hash = add_word(hash, tracks->track_count);
+    uint64_t hash = golden_add_word(GOLDEN_FNV_START, tracks->has_time);
+    hash = golden_add(hash, tracks->time_us, 8);
+    hash = golden_add_word(hash, tracks->last_id);
+    hash = golden_add_word(hash, tracks->track_count);
     for (int32_t i = 0; i < tracks->track_count; i++) {
         hash = add_track(hash, &tracks->track[i]);
     }
-    hash = add_word(hash, tracks->selected_id);
-    hash = add_word(hash, tracks->rival_id);
-    hash = add_word(hash, tracks->rival_frames);
-    hash = add_word(hash, tracks->head_count);
-    hash = add_words(hash, tracks->head, (size_t)tracks->head_count * sizeof tracks->head[0]);
-    return add_word(hash, tracks->selected);
+    hash = golden_add_word(hash, tracks->selected_id);
+    hash = golden_add_word(hash, tracks->rival_id);
+    hash = golden_add_word(hash, tracks->rival_frames);
+    hash = golden_add_word(hash, tracks->head_count);
+    hash =
+        golden_add_words(hash, tracks->head, (size_t)tracks->head_count * sizeof tracks->head[0]);
+    return golden_add_word(hash, tracks->selected);
 }
 
 static uint64_t hash_result(const struct isohead *head)
 {
     const struct ih_result *result = &head->result;
-    uint64_t hash = add_word(FNV_START, result->entry_count);
-    hash = add_word(hash, result->head_count);
-    hash = add_words(hash, result->head, (size_t)result->head_count * sizeof result->head[0]);
-    hash = add_word(hash, result->selected);
+    uint64_t hash = golden_add_word(GOLDEN_FNV_START, result->entry_count);
+    hash = golden_add_word(hash, result->head_count);
+    hash =
+        golden_add_words(hash, result->head, (size_t)result->head_count * sizeof result->head[0]);
+    hash = golden_add_word(hash, result->selected);
     for (int32_t i = 0; i < result->entry_count; i++) {
         const struct ih_result_entry *entry = &result->entry[i];
-        hash = add_word(hash, entry->u_px_q12);
-        hash = add_word(hash, entry->v_px_q12);
-        hash = add_word(hash, entry->a_px_q12);
-        hash = add_word(hash, entry->b_px_q12);
-        hash = add_word(hash, entry->angle_mdeg);
-        hash = add_word(hash, entry->distance_mm_q8);
-        hash = add_words(hash, entry->centre_mm_q8, sizeof entry->centre_mm_q8);
-        hash = add_word(hash, entry->rejected);
-        hash = add_word(hash, entry->has_probability);
-        hash = add_word(hash, entry->probability_q16);
-        hash = add_word(hash, entry->track_id);
-        hash = add_word(hash, entry->sigma_mm_q8);
-        hash = add_word(hash, entry->is_predicted);
+        hash = golden_add_word(hash, entry->u_px_q12);
+        hash = golden_add_word(hash, entry->v_px_q12);
+        hash = golden_add_word(hash, entry->a_px_q12);
+        hash = golden_add_word(hash, entry->b_px_q12);
+        hash = golden_add_word(hash, entry->angle_mdeg);
+        hash = golden_add_word(hash, entry->distance_mm_q8);
+        hash = golden_add_words(hash, entry->centre_mm_q8, sizeof entry->centre_mm_q8);
+        hash = golden_add_word(hash, entry->rejected);
+        hash = golden_add_word(hash, entry->has_probability);
+        hash = golden_add_word(hash, entry->probability_q16);
+        hash = golden_add_word(hash, entry->track_id);
+        hash = golden_add_word(hash, entry->sigma_mm_q8);
+        hash = golden_add_word(hash, entry->is_predicted);
     }
     return hash;
 }

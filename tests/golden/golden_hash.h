@@ -1,8 +1,7 @@
 /* golden_hash - one number for what a stage put out.
  *
- * FNV-1a, 64 bits, over the output's members in the order of their declaration, each as its value,
- * least significant byte first: neither padding nor the processor's byte order matter. Of a table
- * only the entries that its count says are there, of a slot without a dot only that it has none.
+ * Over the output's members in the order of their declaration (golden_fnv.h). Of a table only the
+ * entries that its count says are there, of a slot without a dot only that it has none.
  */
 #ifndef GOLDEN_HASH_H
 #define GOLDEN_HASH_H

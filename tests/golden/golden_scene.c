@@ -7,6 +7,7 @@
 #define DOT_RADIUS2_Q8 (5 * 256 / 2) /* (1.6 px)^2 */
 #define WALL_MM 1200
 #define HEAD_MM 800
+#define SPARSE_PX 7
 
 /* Numerical Recipes' generator; its upper bits. */
 static int32_t next_noise(uint32_t *state)
@@ -173,21 +174,55 @@ static void fill_person(uint16_t *samples, const struct ih_frame *frame, int32_t
     }
 }
 
+/* Only every SPARSE_PXth pixel of every SPARSE_PXth row was measured. */
+static void thin_out(uint16_t *samples, const struct ih_frame *frame)
+{
+    for (int32_t i = 0; i < frame->width * frame->height; i++) {
+        if (i % frame->width % SPARSE_PX != 0 || i / frame->width % SPARSE_PX != 0) {
+            samples[i] = 0;
+        }
+    }
+}
+
+static void fill_border(uint16_t *samples, const struct ih_frame *frame)
+{
+    for (int32_t i = 0; i < frame->width * frame->height; i++) {
+        int32_t u = i % frame->width, v = i / frame->width;
+        bool inside = u > 0 && v > 0 && u < frame->width - 1 && v < frame->height - 1;
+        samples[i] = inside ? 0 : HEAD_MM;
+    }
+}
+
 const char *golden_scene_range(int index, const struct ih_calibration *calibration,
                                uint16_t *samples, struct ih_frame *frame)
 {
-    static const char *const name[GOLDEN_RANGE_SCENES] = {"empty", "full",  "noise", "wall",
-                                                          "head0", "head1", "head2"};
-    static const uint16_t all[GOLDEN_RANGE_SCENES] = {0, 65535, 0, WALL_MM, 0, 0, 0};
+    static const char *const name[GOLDEN_RANGE_SCENES] = {
+        "empty", "full", "noise", "wall", "one", "border", "sparse", "head0", "head1", "head2"};
+    static const uint16_t all[GOLDEN_RANGE_SCENES] = {[1] = 65535, [3] = WALL_MM};
     uint32_t state = 3;
     int32_t width = calibration->width, height = calibration->height;
     *frame = (struct ih_frame){samples, width, height, 2 * width, 2, 65535};
-    if (index >= 4) {
-        fill_person(samples, frame, (index - 4) * 5);
-        return name[index];
-    }
     for (int32_t i = 0; i < width * height; i++) {
         samples[i] = (uint16_t)(index == 2 ? next_noise(&state) % 5000 : all[index]);
+    }
+    switch (index) {
+    case 4:
+        samples[height / 2 * width + width / 2] = HEAD_MM;
+        break;
+    case 5:
+        fill_border(samples, frame);
+        break;
+    case 6:
+        fill_person(samples, frame, 0);
+        thin_out(samples, frame);
+        break;
+    case 7:
+    case 8:
+    case 9:
+        fill_person(samples, frame, (index - 7) * 5);
+        break;
+    default: /* empty, full, noise, wall */
+        break;
     }
     return name[index];
 }

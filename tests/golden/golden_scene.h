@@ -3,7 +3,8 @@
  * For a rig of dots: nothing but black, white or noise; one dot; 361 dots in a lattice that is none of
  * the pattern's; dots on the border and beyond it; the pattern on a wall and on a bump before it;
  * the latter in noise, with the noise alone as ambient frame. For a depth camera: nothing, full scale,
- * noise, a wall, and a head above shoulders that moves.
+ * noise, a wall, one pixel, the frame's border alone, a head above shoulders of which one pixel in 49
+ * was measured, and the same that moves, all of it measured.
  */
 #ifndef GOLDEN_SCENE_H
 #define GOLDEN_SCENE_H
@@ -15,7 +16,7 @@
 #define GOLDEN_AMBIENT_BYTES (752 * 582)
 
 #define GOLDEN_DOT_SCENES 10
-#define GOLDEN_RANGE_SCENES 7
+#define GOLDEN_RANGE_SCENES 10
 
 /* Make a scene of a rig; samples has room for GOLDEN_FRAME_BYTES. Returns its name. Where there
  * is an ambient frame it is put to ambient_samples and *has_ambient is true. */
