@@ -104,15 +104,14 @@ static bool start_set(struct set *set)
 static bool put_inners(const struct set *set, const char *name, const struct ih_frame *frame,
                        const struct ih_frame *ambient)
 {
-    const struct golden_inner_view view = {&head, frame, ambient, &exposure};
-    bool is_range = head.rig.calibration.kind == IH_RIG_RANGE;
-    bool good = true;
-    for (int i = 0; i < GOLDEN_INNERS && good; i++) {
-        if (!is_range || !golden_inner[i].dots_only) {
-            good = put_stage(set->number, name, golden_inner[i].name, golden_inner[i].hash(&view));
+    uint64_t hash[GOLDEN_INNERS];
+    golden_inner_hash(&head, frame, ambient, &exposure, hash);
+    for (int i = 0; i < GOLDEN_INNERS; i++) {
+        if (!put_stage(set->number, name, golden_inner_name[i], hash[i])) {
+            return false;
         }
     }
-    return good;
+    return true;
 }
 
 static bool run_frame(struct set *set, const char *name, const struct ih_frame *frame,

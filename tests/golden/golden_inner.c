@@ -1,5 +1,7 @@
 #include "golden_inner.h"
 
+#include <stddef.h>
+
 #include "golden_fnv.h"
 
 void golden_inner_start(struct ih_exposure *exposure)
@@ -9,11 +11,11 @@ void golden_inner_start(struct ih_exposure *exposure)
     ih_exposure_start(&params, 4000, 128, exposure);
 }
 
-static uint64_t hash_noise(const struct golden_inner_view *view)
+static uint64_t hash_noise(struct ih_dots_scratch *scratch, const struct ih_frame *frame,
+                           const struct ih_frame *ambient)
 {
-    struct ih_dots_scratch *scratch = &view->head->scratch.dots;
     const struct ih_noise *noise = &scratch->noise;
-    ih_noise_measure(view->frame, view->ambient, &scratch->rows.measuring, &scratch->noise);
+    ih_noise_measure(frame, ambient, &scratch->rows.measuring, &scratch->noise);
     uint64_t hash = golden_add_word(GOLDEN_FNV_START, noise->columns);
     hash = golden_add_word(hash, noise->rows);
     for (int32_t row = 0; row < noise->rows; row++) {
@@ -25,16 +27,16 @@ static uint64_t hash_noise(const struct golden_inner_view *view)
     return hash;
 }
 
-static uint64_t hash_exposure(const struct golden_inner_view *view)
+static uint64_t hash_exposure(const struct isohead *head, const struct ih_frame *frame,
+                              struct ih_exposure *exposure)
 {
-    const struct isohead *head = view->head;
     struct ih_exposure_params params;
     struct ih_exposure_look look;
     ih_exposure_params_default(&params);
-    ih_exposure_look(&head->dots, &head->labels, view->frame->width, view->frame->height, &look);
-    ih_exposure_next(&params, &look, view->exposure);
+    ih_exposure_look(&head->dots, &head->labels, frame->width, frame->height, &look);
+    ih_exposure_next(&params, &look, exposure);
     uint64_t hash = golden_add_words(GOLDEN_FNV_START, &look, sizeof look);
-    return golden_add_words(hash, view->exposure, sizeof *view->exposure);
+    return golden_add_words(hash, exposure, sizeof *exposure);
 }
 
 static uint64_t add_contours(uint64_t hash, const struct ih_cuts *cuts)
@@ -64,131 +66,60 @@ static uint64_t add_ellipses(uint64_t hash, const struct ih_cuts *cuts)
     return hash;
 }
 
-static uint64_t over_levels(const struct golden_inner_view *view,
-                            uint64_t (*add)(uint64_t hash, const struct ih_cuts *cuts))
+static void hash_levels(struct isohead *head, uint64_t hash[GOLDEN_INNERS])
 {
-    struct isohead *head = view->head;
     struct ih_cuts *cuts = &head->scratch.hypotheses.cuts;
-    uint64_t hash = GOLDEN_FNV_START;
     int32_t level_mm_q8 = 0;
     for (int32_t i = 0;
          ih_hypotheses_level(&head->surface, &head->params.hypotheses, i, &level_mm_q8); i++) {
         ih_cuts_level(&head->surface, level_mm_q8, cuts);
-        hash = add(golden_add_word(hash, level_mm_q8), cuts);
+        hash[GOLDEN_CUTS] = add_contours(golden_add_word(hash[GOLDEN_CUTS], level_mm_q8), cuts);
+        hash[GOLDEN_ELLIPSES] = add_ellipses(hash[GOLDEN_ELLIPSES], cuts);
     }
-    return hash;
 }
 
-static uint64_t hash_cuts(const struct golden_inner_view *view)
+/* A head fitted from one start, what speaks for it, and its score. */
+static void hash_start(const struct isohead *head, const int32_t centre_mm_q8[3],
+                       uint64_t hash[GOLDEN_INNERS])
 {
-    return over_levels(view, add_contours);
-}
-
-static uint64_t hash_ellipses(const struct golden_inner_view *view)
-{
-    return over_levels(view, add_ellipses);
-}
-
-static void make_space(const struct golden_inner_view *view)
-{
-    struct isohead *head = view->head;
-    const struct ih_dots *dots = head->rig.calibration.kind == IH_RIG_DOTS ? &head->dots : NULL;
-    ih_space_make(&head->points, dots, &head->rig, &head->params.findings.space,
-                  &head->scratch.findings.space);
-}
-
-static const struct ih_scan *make_scan(const struct golden_inner_view *view)
-{
-    struct ih_findings_scratch *scratch = &view->head->scratch.findings;
-    make_space(view);
-    ih_scan_find(&scratch->space, &view->head->params.findings.scan, &scratch->scan_scratch,
-                 &scratch->scan);
-    return &scratch->scan;
-}
-
-static uint64_t hash_space(const struct golden_inner_view *view)
-{
-    const struct ih_space *space = &view->head->scratch.findings.space;
-    make_space(view);
-    return golden_add_words(GOLDEN_FNV_START, space, sizeof *space);
-}
-
-static uint64_t hash_scan(const struct golden_inner_view *view)
-{
-    const struct ih_scan *scan = make_scan(view);
-    uint64_t hash = golden_add_word(GOLDEN_FNV_START, scan->place_count);
-    return golden_add_words(hash, scan->place, (size_t)scan->place_count * sizeof scan->place[0]);
-}
-
-/* What the stages from the fit on make of one start. */
-struct candidate {
-    struct ih_ellipsoid head;
+    const struct ih_space *space = &head->scratch.findings.space;
+    const struct ih_evidence_nest nest = {.present = false};
+    struct ih_ellipsoid start = ih_ellipsoid_mean(centre_mm_q8), fitted;
     struct ih_evidence evidence;
     struct ih_score score;
-};
-
-static struct candidate try_start(const struct golden_inner_view *view,
-                                  const int32_t centre_mm_q8[3])
-{
-    const struct ih_space *space = &view->head->scratch.findings.space;
-    const struct ih_evidence_nest nest = {.present = false};
-    struct ih_ellipsoid start = ih_ellipsoid_mean(centre_mm_q8);
-    struct candidate out;
-    ih_fit_ellipsoid(space, &view->head->params.findings.fit, &start, &out.head);
-    ih_evidence_collect(space, &out.head, centre_mm_q8, &nest, &out.evidence);
-    ih_score_rate(&out.evidence, &out.score);
-    return out;
+    ih_fit_ellipsoid(space, &head->params.findings.fit, &start, &fitted);
+    ih_evidence_collect(space, &fitted, centre_mm_q8, &nest, &evidence);
+    ih_score_rate(&evidence, &score);
+    hash[GOLDEN_FIT] = golden_add_words(hash[GOLDEN_FIT], &fitted, sizeof fitted);
+    hash[GOLDEN_EVIDENCE] = golden_add_words(hash[GOLDEN_EVIDENCE], &evidence, sizeof evidence);
+    hash[GOLDEN_SCORE] = golden_add_words(hash[GOLDEN_SCORE], &score, sizeof score);
 }
 
-static uint64_t over_starts(const struct golden_inner_view *view,
-                            uint64_t (*add)(uint64_t hash, const struct candidate *candidate))
+static void hash_candidates(struct isohead *head, uint64_t hash[GOLDEN_INNERS])
 {
-    const struct ih_heads *heads = &view->head->heads;
-    const struct ih_scan *scan = make_scan(view);
-    uint64_t hash = GOLDEN_FNV_START;
-    for (int32_t i = 0; i < scan->place_count + heads->hypothesis_count; i++) {
-        const struct candidate candidate = try_start(
-            view, i < scan->place_count ? scan->place[i].centre_mm_q8
-                                        : heads->hypothesis[i - scan->place_count].centre_mm_q8);
-        hash = add(hash, &candidate);
+    const struct ih_dots *dots = head->rig.calibration.kind == IH_RIG_DOTS ? &head->dots : NULL;
+    struct ih_findings_scratch *scratch = &head->scratch.findings;
+    const struct ih_scan *scan = &scratch->scan;
+    ih_space_make(&head->points, dots, &head->rig, &head->params.findings.space, &scratch->space);
+    ih_scan_find(&scratch->space, &head->params.findings.scan, &scratch->scan_scratch,
+                 &scratch->scan);
+    hash[GOLDEN_SPACE] =
+        golden_add_words(hash[GOLDEN_SPACE], &scratch->space, sizeof scratch->space);
+    hash[GOLDEN_SCAN] = golden_add_word(hash[GOLDEN_SCAN], scan->place_count);
+    hash[GOLDEN_SCAN] = golden_add_words(hash[GOLDEN_SCAN], scan->place,
+                                         (size_t)scan->place_count * sizeof scan->place[0]);
+    for (int32_t i = 0; i < scan->place_count; i++) {
+        hash_start(head, scan->place[i].centre_mm_q8, hash);
     }
-    return hash;
+    for (int32_t i = 0; i < head->heads.hypothesis_count; i++) {
+        hash_start(head, head->heads.hypothesis[i].centre_mm_q8, hash);
+    }
 }
 
-static uint64_t add_fit(uint64_t hash, const struct candidate *candidate)
-{
-    return golden_add_words(hash, &candidate->head, sizeof candidate->head);
-}
-
-static uint64_t add_evidence(uint64_t hash, const struct candidate *candidate)
-{
-    return golden_add_words(hash, &candidate->evidence, sizeof candidate->evidence);
-}
-
-static uint64_t add_score(uint64_t hash, const struct candidate *candidate)
-{
-    return golden_add_words(hash, &candidate->score, sizeof candidate->score);
-}
-
-static uint64_t hash_fit(const struct golden_inner_view *view)
-{
-    return over_starts(view, add_fit);
-}
-
-static uint64_t hash_evidence(const struct golden_inner_view *view)
-{
-    return over_starts(view, add_evidence);
-}
-
-static uint64_t hash_score(const struct golden_inner_view *view)
-{
-    return over_starts(view, add_score);
-}
-
-static uint64_t hash_paper(const struct golden_inner_view *view)
+static uint64_t hash_paper(const struct ih_heads *heads)
 {
     struct ih_result result;
-    ih_result_from_heads(&view->head->heads, &result);
+    ih_result_from_heads(heads, &result);
     uint64_t hash = golden_add_word(GOLDEN_FNV_START, result.entry_count);
     hash = golden_add_word(hash, result.selected);
     for (int32_t i = 0; i < result.entry_count; i++) {
@@ -210,10 +141,21 @@ _Static_assert(sizeof(struct ih_space) == WORDS(3 + 6 * IH_SLOTS), "ih_space");
 _Static_assert(sizeof(struct ih_scan_place) == WORDS(4), "ih_scan_place");
 _Static_assert(sizeof(struct ih_score) == WORDS(2 + IH_EVIDENCE_COUNT), "ih_score");
 
-const struct golden_inner golden_inner[GOLDEN_INNERS] = {
-    {"noise", true, hash_noise},  {"exposure", true, hash_exposure},
-    {"cuts", false, hash_cuts},   {"ellipses", false, hash_ellipses},
-    {"space", false, hash_space}, {"scan", false, hash_scan},
-    {"fit", false, hash_fit},     {"evidence", false, hash_evidence},
-    {"score", false, hash_score}, {"paper", false, hash_paper},
-};
+const char *const golden_inner_name[GOLDEN_INNERS] = {
+    "noise", "exposure", "cuts", "ellipses", "space", "scan", "fit", "evidence", "score", "paper"};
+
+void golden_inner_hash(struct isohead *head, const struct ih_frame *frame,
+                       const struct ih_frame *ambient, struct ih_exposure *exposure,
+                       uint64_t hash[GOLDEN_INNERS])
+{
+    for (int i = 0; i < GOLDEN_INNERS; i++) {
+        hash[i] = GOLDEN_FNV_START;
+    }
+    if (head->rig.calibration.kind == IH_RIG_DOTS) {
+        hash[GOLDEN_NOISE] = hash_noise(&head->scratch.dots, frame, ambient);
+        hash[GOLDEN_EXPOSURE] = hash_exposure(head, frame, exposure);
+    }
+    hash_levels(head, hash);
+    hash_candidates(head, hash);
+    hash[GOLDEN_PAPER] = hash_paper(&head->heads);
+}

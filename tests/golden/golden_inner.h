@@ -14,24 +14,27 @@
 #include "ih_exposure.h"
 #include "isohead.h"
 
-struct golden_inner_view {
-    struct isohead *head; /* only its scratch is written to */
-    const struct ih_frame *frame, *ambient;
-    struct ih_exposure *exposure; /* goes on from frame to frame */
+enum golden_inner {
+    GOLDEN_NOISE, /* of dots only, as the next */
+    GOLDEN_EXPOSURE,
+    GOLDEN_CUTS,
+    GOLDEN_ELLIPSES,
+    GOLDEN_SPACE,
+    GOLDEN_SCAN,
+    GOLDEN_FIT,
+    GOLDEN_EVIDENCE,
+    GOLDEN_SCORE,
+    GOLDEN_PAPER,
+    GOLDEN_INNERS
 };
 
-struct golden_inner {
-    const char *name;
-    bool dots_only; /* not of a depth camera */
-    uint64_t (*hash)(const struct golden_inner_view *view);
-};
+extern const char *const golden_inner_name[GOLDEN_INNERS];
 
-#define GOLDEN_INNERS 10
-
-/* In the order of a frame's way. */
-extern const struct golden_inner golden_inner[GOLDEN_INNERS];
-
-/* Before the first frame of a rig. */
+/* exposure: goes on from frame to frame; golden_inner_start before a rig's first. Of head only the
+ * scratch is written to. */
 void golden_inner_start(struct ih_exposure *exposure);
+void golden_inner_hash(struct isohead *head, const struct ih_frame *frame,
+                       const struct ih_frame *ambient, struct ih_exposure *exposure,
+                       uint64_t hash[GOLDEN_INNERS]);
 
 #endif
