@@ -22,7 +22,7 @@ LONGRUN_FRAMES ?= 100000
 ARCH ?= arm64
 
 .DEFAULT_GOAL := help
-.PHONY: help sim frames sanitize test accept eval bits cortexm longrun size vectors learn picture board board-gpiod2 deb image flash \
+.PHONY: help sim frames sanitize test coverage mutation accept eval bits cortexm longrun size vectors learn picture board board-gpiod2 deb image flash \
   test-deb test-board test-image format formatted lint clean
 
 
@@ -53,6 +53,15 @@ sanitize: sim
 test: sanitize ## every test: units against float64, sanitizers, bad input, rules of the core, same bits
 	@cmake --build --preset sanitize --parallel
 	@ctest --test-dir $(BUILD)/sanitize --output-on-failure --parallel 2
+
+coverage: sim ## the core's lines and branches that its own tests run, against the limits
+	@tools/setup.sh coverage
+	@cmake --preset coverage -DISOHEAD_UNITY_DIR=$(abspath $(UNITY_DIR)) \
+	  > $(BUILD)/coverage.log 2>&1 || { cat $(BUILD)/coverage.log; exit 1; }
+	@find $(BUILD)/coverage -name '*.gcda' -delete
+	@cmake --build --preset coverage --parallel 2
+	@ctest --test-dir $(BUILD)/coverage --label-regex '^core$$' --output-on-failure --parallel 2
+	@/usr/bin/python3 tests/checks/coverage.py $(BUILD)/coverage
 
 accept: sim ## the measured limits on the data sets in DATA (default ../shared/data)
 	@tools/setup.sh accept

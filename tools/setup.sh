@@ -1,7 +1,7 @@
 #!/bin/sh
 # Bring what a make target needs and this machine lacks.
 #
-#   tools/setup.sh sim|test|accept|eval|bits|cortexm|size|vectors|picture|format|lint
+#   tools/setup.sh sim|test|coverage|mutation|accept|eval|bits|cortexm|size|vectors|picture|format|lint
 #   tools/setup.sh board arm64|armhf|host
 #   tools/setup.sh deb arm64|armhf
 #   tools/setup.sh test-deb
@@ -172,6 +172,10 @@ test)
     need_header libv4l2.h libv4l-dev
     need_gpio
     ;;
+coverage | mutation)
+    need_sim
+    need_program gcc gcc
+    ;;
 picture)
     need_sim
     need_python numpy python3-numpy
@@ -236,7 +240,7 @@ if [ -n "$packages" ]; then
 fi
 
 case "$1" in
-test | bits | cortexm | size) tools/fetch_third_party.sh build/third_party ;;
+test | coverage | mutation | bits | cortexm) tools/fetch_third_party.sh build/third_party ;;| cortexm | size) tools/fetch_third_party.sh build/third_party ;;
 board) [ "$2" = host ] || tools/board/sysroot.sh "$2" ;;
 esac
 case "$1" in

@@ -1,0 +1,163 @@
+#!/usr/bin/env python3
+"""What of firmware/core its own tests run: lines and branches per file, from gcov.
+
+A branch is one of the ways out of one condition of the source, as gcc -O0 compiles it: `a && b` has
+four. A line or branch that several compilations have (an inline function of a header) counts once,
+and is run when any of them ran it.
+
+coverage.py BUILD           after the tests ran in a build with gcc --coverage -O0: the table, what
+                            was not run, and exit status 1 below the limits
+coverage.py --self-test     notices an untaken branch and a line that was never reached
+"""
+
+import argparse
+import collections
+import json
+import os
+import subprocess
+import sys
+import tempfile
+
+ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+CORE = os.path.join(ROOT, "firmware", "core")
+
+# Of all the core's lines and branches, in per cent.
+LINES_MIN = 97.0
+BRANCHES_MIN = 92.0
+
+
+def data_files(build):
+    return sorted(os.path.join(directory, name) for directory, _, names in os.walk(build)
+                  for name in names if name.endswith(".gcda"))
+
+
+def gcov(path):
+    """The reports on one object's sources."""
+    done = subprocess.run(["gcov", "--json-format", "--stdout", "--branch-probabilities", path],
+                          cwd=os.path.dirname(path), text=True, stdout=subprocess.PIPE,
+                          stderr=subprocess.DEVNULL, check=True)
+    for text in done.stdout.splitlines():
+        report = json.loads(text)
+        for file in report["files"]:
+            yield os.path.realpath(os.path.join(report["current_working_directory"],
+                                                file["file"])), file
+
+
+def counts(build, core):
+    """{file: {line: runs}}, {file: {(line, number of the branch): times taken}}"""
+    lines = collections.defaultdict(collections.Counter)
+    branches = collections.defaultdict(collections.Counter)
+    found = data_files(os.path.abspath(build))
+    if not found:
+        sys.exit("coverage: no .gcda below %s: run the tests of a build with --coverage" % build)
+    for path in found:
+        for source, file in gcov(path):
+            if os.path.dirname(source) != core:
+                continue
+            name = os.path.basename(source)
+            for line in file["lines"]:
+                lines[name][line["line_number"]] += line["count"]
+                for i, branch in enumerate(line["branches"]):
+                    branches[name][line["line_number"], i] += branch["count"]
+    return lines, branches
+
+
+def per_cent(counter):
+    return 100.0 * sum(count > 0 for count in counter.values()) / len(counter) if counter else 100.0
+
+
+def table(lines, branches):
+    """Prints it; the two figures of the whole."""
+    print("%-20s %6s %7s   %8s %7s" % ("file", "lines", "run", "branches", "taken"))
+    for name in sorted(lines):
+        print("%-20s %6d %6.1f%%   %8d %6.1f%%" % (name, len(lines[name]), per_cent(lines[name]),
+                                                 len(branches[name]), per_cent(branches[name])))
+    all_lines = {(name, key): n for name in lines for key, n in lines[name].items()}
+    all_branches = {(name, key): n for name in branches for key, n in branches[name].items()}
+    result = per_cent(all_lines), per_cent(all_branches)
+    print("%-20s %6d %6.1f%%   %8d %6.1f%%" % ("all", len(all_lines), result[0],
+                                             len(all_branches), result[1]))
+    return result
+
+
+def left(lines, branches, core):
+    """Each source line of which something was not run."""
+    for name in sorted(lines):
+        with open(os.path.join(core, name), encoding="utf-8") as file:
+            text = file.read().splitlines()
+        for line in sorted(lines[name]):
+            taken = [n for (at, _), n in branches[name].items() if at == line]
+            missed = sum(n == 0 for n in taken)
+            if lines[name][line] == 0:
+                yield "%s:%d: never run: %s" % (name, line, text[line - 1].strip())
+            elif missed:
+                yield "%s:%d: %d of %d branches not taken: %s" % (name, line, missed, len(taken),
+                                                                 text[line - 1].strip())
+
+
+def check(build):
+    lines, branches = counts(build, CORE)
+    absent = sorted(name for name in os.listdir(CORE) if name.endswith(".c") and name not in lines)
+    if absent:
+        sys.exit("coverage: no test is linked with %s" % ", ".join(absent))
+    lines_run, branches_taken = table(lines, branches)
+    print("\nnot run:")
+    for line in left(lines, branches, CORE):
+        print("  " + line)
+    bad = lines_run < LINES_MIN or branches_taken < BRANCHES_MIN
+    print("coverage: %.1f %% of lines, at least %.0f; %.1f %% of branches, at least %.0f%s"
+          % (lines_run, LINES_MIN, branches_taken, BRANCHES_MIN, ": NOT reached" if bad else ""))
+    return 1 if bad else 0
+
+
+# Run without arguments: neither operand of && is ever false, and the first case is never reached.
+SAMPLE = """int main(int count, char **words)
+{
+    if (count > 0 && words != 0) {
+        switch (count) {
+        case 7:
+            return 1;
+        default:
+            break;
+        }
+    }
+    return 0;
+}
+"""
+SAMPLE_LEFT = ["sample.c:3: 2 of 4", "sample.c:4: 1 of 2", "sample.c:5: never run", "sample.c:6: never run"]
+
+
+def self_test():
+    with tempfile.TemporaryDirectory() as directory:
+        directory = os.path.realpath(directory)
+        with open(os.path.join(directory, "sample.c"), "w", encoding="utf-8") as file:
+            file.write(SAMPLE)
+        subprocess.run(["gcc", "-O0", "--coverage", "sample.c", "-o", "sample"], cwd=directory,
+                       check=True)
+        subprocess.run(["./sample"], cwd=directory, check=True)
+        lines, branches = counts(directory, directory)
+        seen = list(left(lines, branches, directory))
+        for line in seen:
+            print("noticed: " + line)
+        missed = [want for want in SAMPLE_LEFT if not any(line.startswith(want) for line in seen)]
+        if missed or len(seen) != len(SAMPLE_LEFT):
+            print("coverage: MISSED, or too much noticed: expected %s" % SAMPLE_LEFT)
+            return 1
+    return 0
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("build", nargs="?")
+    parser.add_argument("--self-test", action="store_true")
+    arguments = parser.parse_args()
+    if arguments.self_test:
+        return self_test()
+    if not arguments.build:
+        parser.error("name the build")
+    return check(arguments.build)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
