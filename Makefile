@@ -165,6 +165,12 @@ formatted: ## fail when make format would change something
 lint: sanitize ## clang-tidy over all C sources but the tests' and QEMU's plugin
 	@tools/setup.sh lint
 	@git ls-files 'firmware/*.c' 'hal/*.c' 'sim/*.c' 'tools/*.c' ':!tools/size' | \
+
+lint: sanitize ## clang-tidy, cppcheck, MISRA C and gcc -fanalyzer; what they may find: docs/misra.md
+	@tools/setup.sh lint
+	@/usr/bin/python3 tests/checks/static.py --self-test > $(BUILD)/static.log || { cat $(BUILD)/static.log; exit 1; }
+	@/usr/bin/python3 tests/checks/static.py $(BUILD)/sanitize
+	@git ls-files 'firmware/*.c' 'hal/*.c' 'sim/*.c' 'tools/*.c' | \
 	  xargs -P 2 -n 1 clang-tidy --quiet -p $(BUILD)/sanitize 2> $(BUILD)/lint.log || \
 	  { grep -v 'warnings* generated' $(BUILD)/lint.log; exit 1; }
 

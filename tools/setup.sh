@@ -210,6 +210,8 @@ format) need_program clang-format clang-format ;;
 lint)
     need_program clang clang
     need_program clang-tidy clang-tidy
+    need_program cppcheck cppcheck
+    need_program gcc gcc
     need_header libv4l2.h libv4l-dev
     ;;
 *)
