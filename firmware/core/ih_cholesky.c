@@ -8,7 +8,7 @@
 
 static const int32_t *row_of(const int32_t *l_q30, int32_t i)
 {
-    return l_q30 + IH_CHOLESKY_PACKED(i);
+    return &l_q30[IH_CHOLESKY_PACKED(i)];
 }
 
 static int64_t dot_q60(const int32_t *a_q30, const int32_t *b_q30, int32_t count)
@@ -24,7 +24,7 @@ enum ih_err ih_cholesky_factor(int32_t *a_q30, int32_t n, int32_t *bad_pivot)
 {
     *bad_pivot = IH_NONE;
     for (int32_t i = 0; i < n; i++) {
-        int32_t *row = a_q30 + IH_CHOLESKY_PACKED(i);
+        int32_t *row = &a_q30[IH_CHOLESKY_PACKED(i)];
         for (int32_t j = 0; j < i; j++) {
             const int32_t *other = row_of(a_q30, j);
             int64_t rest_q60 = (int64_t)row[j] * (1 << 30) - dot_q60(row, other, j);
