@@ -114,14 +114,16 @@ void ih_noise_subtract(const struct ih_noise *noise, int32_t v, int32_t width,
     subtract_span(ambient_q4, grey_q4, first, width, before_q12, before_q12, 1);
 }
 
-/* The row that is looked at next in a row of blocks; at least one, even if the frame ends above. */
-static int32_t sampled_row(int32_t block_row, int32_t sample, int32_t height)
+/* The first row that is looked at in a row of blocks, even if the frame ends above it. */
+static int32_t first_row(int32_t block_row, int32_t height)
 {
-    int32_t v = block_row * IH_NOISE_BLOCK + IH_BAND_REACH + sample * IH_NOISE_STEP;
-    if (v < height) {
-        return v;
-    }
-    return sample == 0 ? height - 1 : IH_NONE;
+    return ih_min_s32(block_row * IH_NOISE_BLOCK + IH_BAND_REACH, height - 1);
+}
+
+/* Are there so many, and does the frame reach this one? */
+static bool is_sampled(int32_t count, int32_t v, int32_t height)
+{
+    return count < SAMPLED_ROWS && v < height;
 }
 
 /* Grey levels of a row of both frames. */
@@ -142,9 +144,8 @@ static void measure(const struct ih_frame *frame, const struct ih_frame *ambient
 {
     for (int32_t block_row = 0; block_row < out->rows; block_row++) {
         int32_t count = 0;
-        int32_t v;
-        while (count < SAMPLED_ROWS &&
-               (v = sampled_row(block_row, count, frame->height)) != IH_NONE) {
+        for (int32_t v = first_row(block_row, frame->height); is_sampled(count, v, frame->height);
+             v += IH_NOISE_STEP) {
             ih_band_begin(&scratch->band, frame->width);
             for (int32_t at = v - IH_BAND_REACH; at <= v + IH_BAND_REACH; at++) {
                 take_rows(frame, ambient, at, scratch);
@@ -186,8 +187,8 @@ static void choose(const struct ih_frame *frame, const struct ih_frame *ambient,
 {
     int32_t half_sum[IH_NOISE_BLOCKS_X] = {0};
     int32_t count = 0;
-    int32_t v;
-    while (count < SAMPLED_ROWS && (v = sampled_row(block_row, count, frame->height)) != IH_NONE) {
+    for (int32_t v = first_row(block_row, frame->height); is_sampled(count, v, frame->height);
+         v += IH_NOISE_STEP) {
         ih_band_begin(&scratch->band, frame->width);
         for (int32_t at = v - IH_BAND_REACH; at <= v + IH_BAND_REACH; at++) {
             take_rows(frame, ambient, at, scratch);
