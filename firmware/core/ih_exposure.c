@@ -130,8 +130,8 @@ static int32_t damped_q8(int32_t wanted, int32_t is)
                         STEP_MAX_Q8);
 }
 
-static void raise(const struct ih_exposure_params *params, int32_t factor_q8, bool exposure_too,
-                  struct ih_exposure *state)
+static void raise_light(const struct ih_exposure_params *params, int32_t factor_q8,
+                        bool exposure_too, struct ih_exposure *state)
 {
     if (state->duty_q8 < params->duty_max_q8) {
         /* One more at least: a small duty would be rounded back. */
@@ -146,8 +146,8 @@ static void raise(const struct ih_exposure_params *params, int32_t factor_q8, bo
     }
 }
 
-static void lower(const struct ih_exposure_params *params, int32_t factor_q8,
-                  struct ih_exposure *state)
+static void lower_light(const struct ih_exposure_params *params, int32_t factor_q8,
+                        struct ih_exposure *state)
 {
     if (state->duty_q8 > params->duty_min_q8) {
         state->duty_q8 =
@@ -196,11 +196,11 @@ void ih_exposure_next(const struct ih_exposure_params *params, const struct ih_e
     if (look->lost_count > params->lost_max && can_shorten(params, look, weak_aim, state)) {
         shorten(params, state);
     } else if (look->labelled_count < IH_EXPOSURE_LABELLED_MIN) {
-        raise(params, STEP_MAX_Q8, true, state);
+        raise_light(params, STEP_MAX_Q8, true, state);
     } else if (8 * look->weak < 7 * weak_aim && 8 * look->strong < 7 * strong_aim) {
-        raise(params, damped_q8(weak_aim, look->weak), 2 * look->lost_count <= params->lost_max,
-              state);
+        raise_light(params, damped_q8(weak_aim, look->weak),
+                    2 * look->lost_count <= params->lost_max, state);
     } else if (8 * look->strong > 9 * strong_aim && 8 * look->weak > 9 * weak_aim) {
-        lower(params, damped_q8(strong_aim, look->strong), state);
+        lower_light(params, damped_q8(strong_aim, look->strong), state);
     }
 }
