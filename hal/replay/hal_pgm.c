@@ -80,12 +80,12 @@ static const char *describe(const struct cursor *cursor, char *memory, size_t si
 
 static bool read_magic(struct cursor *cursor, struct hal_error *error)
 {
-    char found[32];
     if (cursor->size == 0) {
         return fail_at(error, 0, "the file is empty", "a binary PGM (P5)");
     }
     if (cursor->size >= 2 && cursor->data[0] == 'P' && is_digit(cursor->data[1]) &&
         cursor->data[1] != '5') {
+        char found[32];
         struct hal_text text = hal_text_begin(found, sizeof found);
         hal_text_put(&text, "format ");
         hal_text_put_some(&text, (const char *)cursor->data, 2);
@@ -136,7 +136,6 @@ static bool read_number(struct cursor *cursor, const char *name, int32_t maximum
 
 static bool read_header(struct cursor *cursor, struct hal_pgm *pgm, struct hal_error *error)
 {
-    char found[32];
     if (!read_magic(cursor, error) ||
         !read_number(cursor, "width", HAL_PGM_SIDE_MAX, &pgm->width, error) ||
         !read_number(cursor, "height", HAL_PGM_SIDE_MAX, &pgm->height, error) ||
@@ -144,6 +143,7 @@ static bool read_header(struct cursor *cursor, struct hal_pgm *pgm, struct hal_e
         return false;
     }
     if (cursor->at >= cursor->size || !is_space(cursor->data[cursor->at])) {
+        char found[32];
         return fail_at(error, cursor->at, describe(cursor, found, sizeof found),
                        "one white space character after maxval");
     }
