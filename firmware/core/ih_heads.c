@@ -72,9 +72,9 @@ static int32_t curvature_mm_q8(const struct ih_nest *nest)
             tt_q16 += t_q8 * t_q8;
         }
     }
-    /* a slice closer than 1/90 mm to the front must not divide by zero */
+    /* slices at the front, or none in reach, must not divide by zero */
     int64_t divisor = tt_q16 >> 3 > 0 ? tt_q16 >> 3 : 1;
-    return tt_q16 == 0 ? 0 : ih_saturate_s32(ih_div_round(at_q8 << 13, divisor));
+    return ih_saturate_s32(ih_div_round(at_q8 << 13, divisor));
 }
 
 /* Do the slice's centre and proportions count? The last one always does. */
@@ -175,7 +175,7 @@ static void fill_axes(const struct ih_ellipse *ellipse, const struct ih_surface 
     out->a_px_q12 = semi_axis_px_q12((uu + vv) / 2 + root, drop);
     out->b_px_q12 = semi_axis_px_q12((uu + vv) / 2 - root, drop);
     int32_t angle = (int32_t)ih_div_round(ih_atan2_mdeg(2 * uv, uu - vv), 2);
-    out->angle_mdeg = angle < 0 ? angle + 180000 : angle == 180000 ? 0 : angle;
+    out->angle_mdeg = angle < 0 ? angle + 180000 : angle;
 }
 
 /* Where a sample lies relative to an ellipse: the ellipse's normalised radius squared, Q4, and the
