@@ -360,6 +360,7 @@ static void every_kind_has_a_word_of_its_own(void)
         }
     }
     TEST_ASSERT_NULL(ih_evidence_text(IH_EVIDENCE_COUNT));
+    TEST_ASSERT_NULL(ih_evidence_text((enum ih_evidence_kind) - 1));
 }
 
 int main(void)

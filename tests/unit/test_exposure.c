@@ -116,6 +116,53 @@ static void only_missing_dots_in_bright_places_are_lost(void)
     TEST_ASSERT_EQUAL_INT32(0, look.lost_count);
 }
 
+/* At each corner and edge of the pattern: the neighbours that there are say where the dot would be;
+ * fewer than there must be say nothing. */
+static void dots_at_the_edges_of_the_pattern_can_be_lost(void)
+{
+    static const int32_t slots[] = {0,
+                                    IH_GRID / 2,
+                                    IH_GRID - 1,
+                                    9 * IH_GRID,
+                                    10 * IH_GRID - 1,
+                                    IH_SLOTS - IH_GRID,
+                                    IH_SLOTS - IH_GRID / 2,
+                                    IH_SLOTS - 1};
+    struct ih_exposure_look look;
+    int i;
+
+    for (i = 0; i < IH_TEST_COUNT(slots); i++) {
+        const int32_t slot = slots[i];
+        double u = 0, v = 0;
+        int32_t other, count = 0;
+
+        label_all();
+        memset(dots.bright, 0, sizeof dots.bright);
+        take_out(slot);
+        for (other = 0; other < IH_SLOTS; other++) {
+            if (other != slot && abs(other % IH_GRID - slot % IH_GRID) <= 2 &&
+                abs(other / IH_GRID - slot / IH_GRID) <= 2) {
+                u += dots.dot[other].u_px_q12 / 4096.0;
+                v += dots.dot[other].v_px_q12 / 4096.0;
+                count++;
+            }
+        }
+        dots.bright[(int)(v / count) / 8][(int)(u / count) / 8 / 32] |=
+            1u << ((int)(u / count) / 8 % 32);
+        ih_exposure_look(&dots, &labels, 640, 600, &look);
+        IH_TEST_EQUAL(1, look.lost_count, "lost", slot);
+        for (other = 0; other < IH_SLOTS; other++) { /* alone: nobody knows where it would be */
+            if (other != slot && abs(other % IH_GRID - slot % IH_GRID) <= 2 &&
+                abs(other / IH_GRID - slot / IH_GRID) <= 2) {
+                labels.dot_of_slot[other] = IH_NONE;
+            }
+        }
+        light_all();
+        ih_exposure_look(&dots, &labels, 640, 600, &look);
+        IH_TEST_RANGE(0, IH_SLOTS - 1, look.lost_count, "alone", slot);
+    }
+}
+
 static void without_labels_the_frame_itself_is_looked_at(void)
 {
     struct ih_exposure_look look;
@@ -351,6 +398,7 @@ int main(void)
     RUN_TEST(steps_match_float64);
     RUN_TEST(a_look_sorts_the_labelled_peaks);
     RUN_TEST(only_missing_dots_in_bright_places_are_lost);
+    RUN_TEST(dots_at_the_edges_of_the_pattern_can_be_lost);
     RUN_TEST(without_labels_the_frame_itself_is_looked_at);
     RUN_TEST(all_scenes_come_to_rest_near_the_best);
     RUN_TEST(retries_are_rare);

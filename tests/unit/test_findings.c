@@ -405,6 +405,34 @@ static void an_expected_head_is_looked_for(void)
     IH_TEST_EQUAL(0, findings.view[0].front, "front", 0);
 }
 
+/* More heads may be expected than are looked for again: their rays are looked at all the same. */
+static void only_so_many_expected_heads_are_looked_for(void)
+{
+    int32_t hit[3], count[3] = {0};
+    int pass, i;
+
+    for (pass = 0; pass < 3; pass++) {
+        make_points(true, false);
+        ih_findings_begin(&findings);
+        params.scan.place_max = 0;
+        params.spacing_mm = 1;
+        params.expected_max = pass;
+        expected.count = 0;
+        expect_head();
+        expect_head();
+        expected.head[1].centre_mm_q8[0] += 20 << 8;
+        look();
+        hit[pass] = findings.view[0].hit + 1000 * findings.view[1].hit;
+        for (i = 0; i < findings.finding_count; i++) {
+            count[pass] += findings.finding[i].source == IH_SOURCE_EXPECTED;
+        }
+        IH_TEST_RANGE(0, pass, count[pass], "looked for", pass);
+        IH_TEST_EQUAL(hit[0], hit[pass], "rays", pass);
+    }
+    TEST_ASSERT_TRUE(hit[0] % 1000 > 15 && hit[0] / 1000 > 15);
+    TEST_ASSERT_EQUAL_INT32(1, count[1]);
+}
+
 static void views_tell_an_empty_seat_from_hands(void)
 {
     make_points(false, false);
@@ -483,6 +511,7 @@ int main(void)
     RUN_TEST(outlines_exist_for_any_place);
     RUN_TEST(a_head_is_among_the_findings);
     RUN_TEST(an_expected_head_is_looked_for);
+    RUN_TEST(only_so_many_expected_heads_are_looked_for);
     RUN_TEST(views_tell_an_empty_seat_from_hands);
     RUN_TEST(windows_add_up);
     RUN_TEST(nothing_at_the_lens_is_a_head);

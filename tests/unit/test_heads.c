@@ -299,6 +299,7 @@ static void the_first_failed_test_is_told(void)
     TEST_ASSERT_EQUAL_STRING("curvature", ih_reject_text(IH_REJECT_CURVATURE));
     TEST_ASSERT_EQUAL_STRING("shape", ih_reject_text(IH_REJECT_SHAPE));
     TEST_ASSERT_EQUAL_STRING("outline", ih_reject_text(IH_REJECT_OUTLINE));
+    TEST_ASSERT_EQUAL_STRING("score", ih_reject_text(IH_REJECT_SCORE));
     TEST_ASSERT_NULL(ih_reject_text(IH_ACCEPTED));
 }
 
@@ -433,6 +434,57 @@ static void pixel_ellipses_match_the_closed_form(void)
         /* 2 mdeg of atan2 halved; the covariance's error over the difference of axes: 5 mdeg. */
         IH_TEST_WITHIN(0.006, 0, remainder(angle, 180), "angle", turn);
         TEST_ASSERT_TRUE(h->a_px_q12 >= h->b_px_q12);
+    }
+}
+
+/* An ellipse without width lies along a diagonal: no rounding makes its short axis anything but
+ * nothing, and its long one is twice the root of both variances' sum. */
+static void an_ellipse_without_width_is_a_line(void)
+{
+    int32_t variance;
+    int sign;
+
+    for (variance = 1 << 12; variance < 1 << 24; variance = variance * 3 / 2) {
+        for (sign = -1; sign <= 1; sign += 2) {
+            struct ih_nest *nest = add_head(20, 22, 850);
+            struct ih_ellipse *last = &nest->slice[nest->slice_count - 1].ellipse;
+            const struct ih_hypothesis *h = &heads.hypothesis[0];
+            const double step =
+                ldexp(UNIT_Q28, -28) * IH_SURFACE_STEP_NUMERATOR / IH_SURFACE_STEP_DENOMINATOR;
+            const double wide = step * rig.calibration.fx_px_q16 / 65536;
+            const double high = step * rig.calibration.fy_px_q16 / 65536;
+            const double long_px = 2 * hypot(wide, high) * sqrt(ldexp(variance, -16));
+            const double turn_deg = atan2(high, wide) * 180 / PI;
+
+            last->xx_q16 = last->yy_q16 = variance;
+            last->xy_q16 = sign * variance;
+            select_heads();
+            /* Roundings of three and a half units of a variance in Q16, before the root. */
+            IH_TEST_WITHIN(2 * sqrt(3.5 / 65536), 0, ih_test_from_q(h->b_px_q12, 12), "b",
+                           variance);
+            IH_TEST_WITHIN(0.001 * long_px + 0.01, long_px, ih_test_from_q(h->a_px_q12, 12), "a",
+                           variance);
+            IH_TEST_WITHIN(0.02, sign > 0 ? turn_deg : 180 - turn_deg, h->angle_mdeg / 1000.0,
+                           "angle", variance);
+            memset(&hypotheses, 0, sizeof hypotheses);
+        }
+    }
+}
+
+/* Nothing up to 70 mm behind the front has no curvature, and nothing at the front itself has. */
+static void without_slices_in_reach_the_curvature_is_nothing(void)
+{
+    int pass, k;
+
+    for (pass = 0; pass < 2; pass++) {
+        struct ih_nest *nest = add_head(20, 22, 850);
+
+        for (k = 0; k < nest->slice_count; k++) {
+            nest->slice[k].behind_mm_q8 = pass == 0 ? (71 + k) << 8 : 0;
+        }
+        select_heads();
+        IH_TEST_EQUAL(0, heads.hypothesis[0].curvature_mm_q8, "curvature", pass);
+        memset(&hypotheses, 0, sizeof hypotheses);
     }
 }
 
@@ -761,6 +813,8 @@ int main(void)
     RUN_TEST(the_distance_is_read_off_the_surface);
     RUN_TEST(the_middle_is_that_of_the_deeper_slices);
     RUN_TEST(pixel_ellipses_match_the_closed_form);
+    RUN_TEST(an_ellipse_without_width_is_a_line);
+    RUN_TEST(without_slices_in_reach_the_curvature_is_nothing);
     RUN_TEST(a_head_stands_out_from_what_is_round_it);
     RUN_TEST(each_part_of_the_outline_rejects_alone);
     RUN_TEST(an_empty_side_rejects_nothing);

@@ -1,6 +1,8 @@
 /* The whole of isohead: frames in, heads out; wrong frames; nothing remembered, nothing touched. */
 #include "isohead.h"
 
+#include <stdlib.h>
+
 #include "ih_test.h"
 #include "rigs.inc"
 
@@ -347,6 +349,9 @@ static void wrong_sizes_are_refused(void)
     expect_error(IH_ERR_SIZE, "maximum of 17 bits");
     frame = (struct ih_frame){grey16, frame.width, frame.height, 2 * frame.width + 1, 2, 1023};
     expect_error(IH_ERR_SIZE, "a row that begins at an odd address");
+    frame = (struct ih_frame){
+        (const uint8_t *)grey16 + 1, frame.width, frame.height, 2 * frame.width, 2, 1023};
+    expect_error(IH_ERR_SIZE, "samples at an odd address");
 }
 
 static void wrong_kinds_are_refused(void)
@@ -461,6 +466,78 @@ static void labels_alone_change_no_track(void)
     TEST_ASSERT_EQUAL_INT(IH_ERR_KIND, isohead_label(&head, &frame, NULL));
 }
 
+/* The paper's method: the nests of this frame alone, nothing found otherwise, nothing remembered. */
+static void expect_the_nests(double x_mm, double y_mm, double z_mm)
+{
+    const struct ih_result *r = &head.result;
+    int32_t i;
+
+    TEST_ASSERT_EQUAL_INT32(1, r->head_count);
+    TEST_ASSERT_EQUAL_INT32(0, r->head[0]);
+    TEST_ASSERT_EQUAL_INT32(0, r->selected);
+    TEST_ASSERT_EQUAL_INT32(head.heads.hypothesis_count, r->entry_count);
+    for (i = 0; i < r->entry_count; i++) {
+        IH_TEST_EQUAL(i == 0 ? IH_ACCEPTED : head.heads.hypothesis[i].rejected,
+                      r->entry[i].rejected, "rejected", i);
+        IH_TEST_EQUAL(false, r->entry[i].has_probability, "no probability", i);
+        IH_TEST_EQUAL(0, r->entry[i].track_id, "no track", i);
+    }
+    IH_TEST_WITHIN(MISS_MAX_MM, 0, miss_mm(&head.heads.hypothesis[0], x_mm, y_mm, z_mm), "head", 0);
+    TEST_ASSERT_EQUAL_INT32(0, head.findings.finding_count);
+    TEST_ASSERT_EQUAL_INT32(0, head.tracks.track_count);
+}
+
+static void the_paper_alone_judges_each_frame_by_its_nests(void)
+{
+    const struct vector_bust *bust = &vector_busts[0];
+    int pass;
+
+    paint_bust(bust);
+    process();
+    TEST_ASSERT_TRUE(head.result.entry_count > 0 && head.result.entry[0].has_probability);
+    paint_bust(bust);
+    head.params.is_paper = true;
+    for (pass = 0; pass < 2; pass++) {
+        TEST_ASSERT_EQUAL_INT(IH_OK, isohead_frame(&head, &frame, NULL, pass * 40000));
+        expect_the_nests(bust->x_mm, bust->y_mm, bust->z_mm);
+    }
+    memset(grey8, 30, sizeof grey8);
+    TEST_ASSERT_EQUAL_INT(IH_OK, isohead_frame(&head, &frame, NULL, 80000));
+    TEST_ASSERT_EQUAL_INT32(0, head.result.entry_count); /* the head of before is forgotten */
+    TEST_ASSERT_EQUAL_INT32(IH_NONE, head.result.selected);
+}
+
+/* Of two people the paper's method looks at the one in the best window, the other finds both. */
+static void the_paper_alone_takes_the_best_window(void)
+{
+    static uint16_t left[640 * 480];
+    int32_t i, near = 0;
+    int pass;
+
+    for (pass = 0; pass < 2; pass++) {
+        start_range(640, 480);
+        head.params.is_paper = pass == 0;
+        render_range(-330, -60, 900, 1700);
+        memcpy(left, grey16, sizeof left);
+        render_range(330, -60, 900, 1700);
+        for (i = 0; i < 640 * 480; i++) {
+            grey16[i] = left[i] < grey16[i] ? left[i] : grey16[i];
+        }
+        process();
+        IH_TEST_RANGE(2, IH_WINDOWS_MAX, head.windows.window_count, "windows", pass);
+        if (pass == 0) {
+            expect_the_nests(head.windows.window[0].x_q28 < 0 ? -330 : 330, -60, 900);
+        }
+    }
+    for (i = 0; i < head.result.entry_count; i++) {
+        const int32_t *centre = head.result.entry[i].centre_mm_q8;
+
+        near |= abs(centre[0] + (330 << 8)) < 50 << 8 ? 1 : 0;
+        near |= abs(centre[0] - (330 << 8)) < 50 << 8 ? 2 : 0;
+    }
+    TEST_ASSERT_EQUAL_INT32(3, near);
+}
+
 static void two_states_are_independent(void)
 {
     paint_bust(&vector_busts[2]);
@@ -558,6 +635,8 @@ int main(void)
     RUN_TEST(nothing_is_remembered_from_frame_to_frame);
     RUN_TEST(a_frame_in_halves_is_the_whole);
     RUN_TEST(labels_alone_change_no_track);
+    RUN_TEST(the_paper_alone_judges_each_frame_by_its_nests);
+    RUN_TEST(the_paper_alone_takes_the_best_window);
     RUN_TEST(two_states_are_independent);
     RUN_TEST(the_frame_and_the_rig_are_left_alone);
     RUN_TEST(noise_is_survived);

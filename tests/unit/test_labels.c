@@ -407,6 +407,33 @@ static void the_same_dots_give_the_same_labels(void)
 }
 
 /* Dots nearer or farther than the working range are nobody's. */
+/* With a baseline of 10 mm the far end of a line is less than the margin from infinity, but nothing
+ * lies behind infinity: a dot there is on no line. */
+static void nothing_lies_behind_infinity(void)
+{
+    struct ih_calibration c = vector_rigs[2];
+    int32_t bad_slot, off_q12, t_far;
+
+    c.far_mm = IH_DEPTH_MAX_MM;
+    memset(c.origin_mm_q16, 0, sizeof c.origin_mm_q16);
+    c.origin_mm_q16[0] = 10 << 16;
+    TEST_ASSERT_EQUAL_INT(IH_OK, ih_rig_init(&rig, &c, &bad_slot));
+    t_far = rig.line[180].t_far_px_q12;
+    IH_TEST_RANGE(1, 2047, t_far, "nearer than the margin", 0);
+    for (off_q12 = -600; off_q12 <= 600; off_q12 += 200) {
+        const struct ih_line *line = &rig.line[180];
+
+        dots.dot_count = 0;
+        /* a lens without distortion: undistorted pixels are pixels, to a few units */
+        add_dot(line->infinity_u_px_q12 + (int32_t)((int64_t)off_q12 * line->dir_u_q30 >> 30),
+                line->infinity_v_px_q12 + (int32_t)((int64_t)off_q12 * line->dir_v_q30 >> 30), 180);
+        assign();
+        if (off_q12 != 0) {
+            IH_TEST_EQUAL(off_q12 > 0, scratch.candidate_count[180], "candidates", off_q12);
+        }
+    }
+}
+
 static void dots_out_of_range_are_not_labelled(void)
 {
     int32_t slot;
@@ -443,5 +470,6 @@ int main(void)
     RUN_TEST(as_many_dots_as_there_may_be_are_survived);
     RUN_TEST(the_same_dots_give_the_same_labels);
     RUN_TEST(dots_out_of_range_are_not_labelled);
+    RUN_TEST(nothing_lies_behind_infinity);
     return UNITY_END();
 }

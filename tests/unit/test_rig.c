@@ -411,6 +411,30 @@ static void a_dot_that_does_not_move_is_refused(void)
     expect(IH_ERR_BASELINE, 200, "dot on the camera's centre");
 }
 
+/* Focal length times offset must stay below 2^22 px mm: at 8192 px an offset of 512 mm is too far,
+ * sideways and down, where 511 mm is not. All rays go straight ahead, so that the offset is the
+ * origin itself; then they are no pattern. */
+static void lines_that_move_too_fast_are_refused(void)
+{
+    int axis, slot, mm;
+
+    for (axis = 0; axis < 2; axis++) {
+        for (mm = 511; mm <= 512; mm++) {
+            calibration = vector_rigs[2];
+            calibration.fx_px_q16 = calibration.fy_px_q16 = IH_RIG_FOCAL_MAX_PX << 16;
+            memset(calibration.origin_mm_q16, 0, sizeof calibration.origin_mm_q16);
+            calibration.origin_mm_q16[axis] = mm << 16;
+            for (slot = 0; slot < IH_SLOTS; slot++) {
+                calibration.ray_q30[slot][0] = calibration.ray_q30[slot][1] = 0;
+                calibration.ray_q30[slot][2] = 1 << 30;
+            }
+            TEST_ASSERT_EQUAL_INT(mm == 512 ? IH_ERR_BASELINE : IH_ERR_RAY,
+                                  ih_rig_init(&rig, &calibration, &bad_slot));
+            IH_TEST_EQUAL(mm == 512 ? 0 : IH_NONE, bad_slot, "slot", axis);
+        }
+    }
+}
+
 static void rays_are_checked_one_by_one(void)
 {
     static const int slots[] = {0, 17, 180, IH_SLOTS - 1};
@@ -527,6 +551,7 @@ int main(void)
     RUN_TEST(the_working_range_is_checked);
     RUN_TEST(the_baseline_is_checked);
     RUN_TEST(a_dot_that_does_not_move_is_refused);
+    RUN_TEST(lines_that_move_too_fast_are_refused);
     RUN_TEST(rays_are_checked_one_by_one);
     RUN_TEST(equal_rays_are_no_pattern);
     RUN_TEST(kinds_are_checked);

@@ -322,6 +322,47 @@ static void windows_are_at_most_as_many_as_asked_for(void)
     }
 }
 
+/* Many places that are hardly heads: those that find no room are counted, and the best one is the
+ * same as without them. */
+static void a_full_table_keeps_the_best_places(void)
+{
+    static const struct vector_ellipsoid person[] = {{{0, -100, 1200}, {78, 113, 98}},
+                                                     {{0, 20, 1225}, {58, 110, 62}},
+                                                     {{0, 300, 1245}, {215, 235, 115}}};
+    const struct vector_scene scene = {"noise", 640, 480, 280, 0, 0, 1, 3, person, 0, 0, 0, NULL};
+    struct ih_test_random random = {31};
+    struct ih_window best;
+    int32_t i;
+
+    draw(&scene);
+    find("a person");
+    TEST_ASSERT_EQUAL_INT32(0, windows.places_dropped);
+    TEST_ASSERT_EQUAL_INT32(1, windows.window_count);
+    best = windows.window[0];
+    for (i = 0; i < 640 * 480;
+         i += 640 * 8) { /* the outer columns are noise now, 8 x 8 pixels each */
+        int32_t u, k;
+
+        for (u = 0; u < 640; u += 8) {
+            const uint16_t depth = (uint16_t)ih_test_between(&random, 2600, 7900);
+
+            for (k = 0; k < 64 && (u < 128 || u >= 512); k++) {
+                depth_mm[i + u + k / 8 * 640 + k % 8] = depth;
+            }
+        }
+    }
+    params.score_min = 1;
+    params.width_min_q8 = 0;
+    find("noise");
+    TEST_ASSERT_TRUE(windows.places_dropped > 0);
+    TEST_ASSERT_EQUAL_INT32(IH_WINDOWS_PLACES_MAX, guarded.scratch.place_count);
+    for (i = 1; i < IH_WINDOWS_PLACES_MAX; i++) {
+        IH_TEST_RANGE(params.score_min, guarded.scratch.place[i - 1].score,
+                      guarded.scratch.place[i].score, "best first", i);
+    }
+    TEST_ASSERT_EQUAL_MEMORY(&best, &windows.window[0], sizeof best);
+}
+
 /* An object that would be a head in the air is none where the table goes on below it. */
 static void what_stands_on_a_table_is_no_head(void)
 {
@@ -443,6 +484,7 @@ int main(void)
     RUN_TEST(noise_is_survived);
     RUN_TEST(extreme_lenses_are_survived);
     RUN_TEST(windows_are_at_most_as_many_as_asked_for);
+    RUN_TEST(a_full_table_keeps_the_best_places);
     RUN_TEST(what_stands_on_a_table_is_no_head);
     RUN_TEST(what_is_beside_must_be_a_plane);
     RUN_TEST(a_pixel_is_the_nearest);
