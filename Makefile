@@ -14,6 +14,10 @@ QEMU_PLUGIN_DIR ?= $(BUILD)/third_party/qemu
 # The builds whose outputs of every stage are compared; make test takes the first six.
 GOLDEN_ALL := gcc-O0 gcc-O3 clang-O0 clang-O3 arm64-O0 arm64-O3 armhf-O2 riscv64-O2 s390x-O2 ppc64-O2 \
   mps2-an386-O2 mps2-an500-O2 mps3-an547-O2
+
+GOLDEN_ALL := gcc-O0 gcc-O3 clang-O0 clang-O3 arm64-O0 arm64-O3 armhf-O2 riscv64-O2 s390x-O2 ppc64-O2
+# How many mistakes make mutation makes.
+MUTANTS ?= 500
 # The frame of frames/sequence2 that docs/picture.png shows.
 PICTURE ?= 000020
 # Frames of make longrun; make test takes a few hundred.
@@ -62,6 +66,14 @@ coverage: sim ## the core's lines and branches that its own tests run, against t
 	@cmake --build --preset coverage --parallel 2
 	@ctest --test-dir $(BUILD)/coverage --label-regex '^core$$' --output-on-failure --parallel 2
 	@/usr/bin/python3 tests/checks/coverage.py $(BUILD)/coverage
+
+# MUTANTS=20 is the short form.
+mutation: sim ## would the tests notice? Mistakes made in the core one at a time; an hour
+	@tools/setup.sh mutation
+	@$(BUILD)/host/tests/golden/golden_pack $(BUILD)/golden.bin \
+	  $(foreach n,1 2,$(addprefix frames/sequence$n/,rig.json 000024.pgm 000025.pgm 000026.pgm))
+	@/usr/bin/python3 tests/checks/mutation.py --count $(MUTANTS) --unity $(abspath $(UNITY_DIR)) \
+	  --golden $(BUILD)/golden.bin
 
 accept: sim ## the measured limits on the data sets in DATA (default ../shared/data)
 	@tools/setup.sh accept

@@ -1,0 +1,415 @@
+#!/usr/bin/env python3
+"""Would the tests notice a mistake? Mistakes are made in firmware/core one at a time: another
+operator, a constant one more or less, a condition the other way round, a statement left out. The
+tests that are linked with the mutated source run, its own first, until one fails; at last its own
+once more with the sanitizers that make test has.
+
+A mutant is one of
+  no C         does not compile; not counted
+  equivalent   gcc -O2 makes the same object code of it as of the original; not counted
+  caught       a test fails, crashes, or needs CPU_TIMES as much of the processor as without the
+               mutant, CPU_LEAST_S at least
+  golden       no test fails, but the golden set's hashes of every stage's output differ
+  alive        nobody noticed
+
+mutation.py [--count N] [--seed N] [--stage NAME]... [--jobs N] [--unity DIR] [--golden GOLDEN_FILE]
+            the table per stage, the mutants that live, and exit status 1 when fewer than
+            CAUGHT_MIN per cent are caught by tests alone. The mutants are drawn by the seed, of
+            each source as many as is its share; a source that was not changed keeps its own.
+mutation.py --self-test
+            finds in a little program mutants of each kind
+"""
+
+import argparse
+import collections
+import concurrent.futures
+import glob
+import math
+import os
+import random
+import re
+import resource
+import shutil
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+
+import mutation_sites as sites
+
+ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+CAUGHT_MIN = 85.0
+CPU_TIMES = 6
+CPU_LEAST_S = 2
+RESULTS = ("no C", "equivalent", "caught", "golden", "alive")
+
+COMPILE_CORE = ["gcc", "-std=c11", "-O2", "-ffp-contract=off", "-mgeneral-regs-only", "-w", "-c"]
+COMPILE_TEST = ["gcc", "-std=c11", "-O1", "-ffp-contract=off", "-w", "-c"]
+SANITIZERS = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
+SANITIZERS_SLOWER = 10
+
+
+def run(command, directory=None):
+    done = subprocess.run(command, cwd=directory, text=True, stdout=subprocess.PIPE,
+                          stderr=subprocess.STDOUT, check=False)
+    if done.returncode:
+        sys.exit("mutation: %s\n%s" % (" ".join(command), done.stdout))
+    return done.stdout
+
+
+def read(path, mode="r"):
+    with open(path, mode) as file:
+        return file.read()
+
+
+class Bench:
+    """The core and its tests, built once, in a folder; a mutant is built and run in its own one."""
+
+    def __init__(self, core, tests, unity, work, golden=None):
+        self.core, self.tests, self.unity, self.work = core, tests, unity, work
+        self.golden_file, self.golden_hashes = golden, None
+        self.seconds = {}
+        self.linked = {}  # objects of the core, by test
+        self.lock = threading.Lock()
+        shutil.rmtree(work, ignore_errors=True)
+        os.makedirs(os.path.join(work, "core"))
+        for path in glob.glob(core + "/*.[ch]"):
+            shutil.copy(path, os.path.join(work, "core"))
+        self.sources = sorted(os.path.basename(path) for path in glob.glob(core + "/*.c"))
+        for source in self.sources:
+            run(COMPILE_CORE + [source], os.path.join(work, "core"))
+        self.library = os.path.join(work, "libcore.a")
+        run(["ar", "rcs", self.library] + sorted(glob.glob(work + "/core/*.o")))
+        if unity:
+            run(COMPILE_TEST + [unity + "/unity.c", "-o", work + "/unity.o"])
+        for test in tests:
+            self.build_test(test)
+        if golden:
+            self.build_golden()
+
+    def program(self, test):
+        return os.path.join(self.work, os.path.basename(test)[:-2])
+
+    def sanitized(self, test):
+        """The object of a test with the sanitizers, built when it is first asked for."""
+        output = self.program(test) + ".sanitized.o"
+        with self.lock:
+            if not os.path.exists(output):
+                run(self.compile_test(test, os.path.join(self.work, "core"), output) + SANITIZERS)
+                program = output[:-2]
+                self.link([output], program, options=SANITIZERS)
+                if fails(program, SANITIZERS_SLOWER * self.seconds[test]):
+                    sys.exit("mutation: %s fails with sanitizers without any mutant" % os.path.basename(test))
+        return output
+
+    def compile_test(self, test, core, output):
+        folders = [core, os.path.dirname(test), os.path.join(os.path.dirname(test), "../unit"),
+                   os.path.join(os.path.dirname(test), "../vectors")] + [self.unity] * bool(self.unity)
+        return COMPILE_TEST + ["-I" + folder for folder in folders] + [test, "-o", output]
+
+    def link(self, objects, output, library=None, options=()):
+        return run(["gcc", *options] + objects + [library or self.library] + [self.work + "/unity.o"] * bool(self.unity) +
+                   ["-lm", "-Wl,--trace", "-o", output])
+
+    def build_test(self, test):
+        program = self.program(test)
+        run(self.compile_test(test, os.path.join(self.work, "core"), program + ".o"))
+        trace = self.link([program + ".o"], program)
+        self.linked[test] = set(re.findall(r"libcore\.a\W+(\w+)\.o", trace))
+        included = included_source(test)
+        if included:
+            self.linked[test].add(included[:-2])
+        begin = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
+        if subprocess.run([program], stdout=subprocess.DEVNULL, check=False).returncode:
+            sys.exit("mutation: %s fails without any mutant" % os.path.basename(test))
+        self.seconds[test] = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - begin
+
+    def build_golden(self):
+        folder = os.path.join(ROOT, "tests", "golden")
+        objects = []
+        for name in ("golden", "golden_hash", "golden_scene", "golden_host"):
+            objects.append(os.path.join(self.work, name + ".o"))
+            run(COMPILE_TEST + ["-I", self.core, os.path.join(folder, name + ".c"), "-o", objects[-1]])
+        self.golden_objects = objects
+        program = os.path.join(self.work, "golden")
+        self.link(objects, program)
+        self.golden_hashes = run([program, self.golden_file])
+
+    def tests_of(self, source):
+        """Those that the source is linked with: its own, then the others, the quick ones first."""
+        own = [test for test in self.tests if is_own(test, source)]
+        others = [test for test in self.tests if test not in own and
+                  (source.endswith(".h") or source[:-2] in self.linked[test])]
+        return own + sorted(others, key=lambda test: self.seconds[test])
+
+
+def is_own(test, source):
+    return os.path.basename(test)[5:-2] == re.sub(r"^ih_", "", source[:-2])
+
+
+def included_source(test):
+    """The source of the core that a test includes, to reach its static functions."""
+    found = re.search(r'^#include "(\w+\.c)"', read(test), re.MULTILINE)
+    return found[1] if found else None
+
+
+def limited(program, seconds):
+    """The command for a program that must not run for ever; how busy the machine is is no matter."""
+    return ["prlimit", "--cpu=%d" % math.ceil(max(CPU_LEAST_S, CPU_TIMES * seconds)), program]
+
+
+def fails(program, seconds):
+    """Runs a test until its first failure; needing more than its time is one too."""
+    # stdbuf: each line as it is written, not all of them at the end
+    with subprocess.Popen(["stdbuf", "-oL"] + limited(program, seconds), text=True, errors="replace",
+                          stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
+                          env=dict(os.environ, ASAN_OPTIONS="verify_asan_link_order=0")) as process:
+        if any(":FAIL" in text for text in process.stdout):
+            process.kill()
+    return process.returncode != 0
+
+
+class Trial:
+    """One mutant, in a folder of its own."""
+
+    def __init__(self, bench, source, mutant, folder):
+        self.bench, self.source, self.mutant, self.folder = bench, source, mutant, folder
+        self.core = os.path.join(folder, "core")
+        shutil.copytree(os.path.join(bench.work, "core"), self.core)
+        text = read(os.path.join(self.core, source))
+        with open(os.path.join(self.core, source), "w", encoding="utf-8") as file:
+            file.write(sites.apply(text, mutant))
+        # A header's mutant is in every source; which of them include it is not looked up.
+        self.sources = bench.sources if source.endswith(".h") else [source]
+        self.objects = [os.path.join(self.core, name[:-2] + ".o") for name in self.sources]
+
+    def compile(self):
+        return all(subprocess.run(COMPILE_CORE + [name], cwd=self.core, stderr=subprocess.DEVNULL,
+                                  check=False).returncode == 0 for name in self.sources)
+
+    def is_equivalent(self):
+        return all(read(path, "rb") == read(os.path.join(self.bench.work, "core", os.path.basename(path)), "rb")
+                   for path in self.objects)
+
+    def put_into_library(self):
+        self.library = shutil.copy(self.bench.library, self.folder)
+        run(["ar", "r", self.library] + self.objects)
+
+    def is_caught_by(self, test):
+        built = self.bench.program(test) + ".o"
+        if included_source(test) == self.source or \
+                self.source.endswith(".h") and is_own(test, self.source):
+            built = os.path.join(self.folder, "test.o")
+            if subprocess.run(self.bench.compile_test(test, self.core, built), check=False,
+                              stderr=subprocess.DEVNULL).returncode:
+                return True  # a static assertion of the test
+        program = os.path.join(self.folder, "test")
+        self.bench.link([built], program, self.library)
+        return fails(program, self.bench.seconds[test])
+
+    def is_caught_by_sanitizers(self, test):
+        """A source's own test, with both of them compiled as make test does."""
+        objects = [os.path.join(self.folder, "sanitized.o")]
+        if included_source(test) == self.source:
+            run(self.bench.compile_test(test, self.core, objects[0]) + SANITIZERS)
+        else:
+            run(COMPILE_CORE + ["-O1", self.source, "-o", objects[0]] + SANITIZERS, self.core)
+            objects.append(self.bench.sanitized(test))
+        program = os.path.join(self.folder, "test")
+        self.bench.link(objects, program, self.library, SANITIZERS)
+        return fails(program, SANITIZERS_SLOWER * self.bench.seconds[test])
+
+    def differs_in_golden(self):
+        if not self.bench.golden_file:
+            return False
+        program = os.path.join(self.folder, "golden")
+        self.bench.link(self.bench.golden_objects, program, self.library)
+        done = subprocess.run(limited(program, CPU_LEAST_S) + [self.bench.golden_file], text=True,
+                              stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, check=False)
+        return done.stdout != self.bench.golden_hashes
+
+    def result(self):
+        """(one of RESULTS, the test that caught it)"""
+        if not self.compile():
+            return "no C", ""
+        if self.is_equivalent():
+            return "equivalent", ""
+        self.put_into_library()
+        tests = self.bench.tests_of(self.source)
+        for test in tests:
+            if self.is_caught_by(test):
+                return "caught", os.path.basename(test)
+        if self.source.endswith(".c") and is_own(tests[0], self.source) and self.is_caught_by_sanitizers(tests[0]):
+            return "caught", os.path.basename(tests[0]) + " with sanitizers"
+        return ("golden" if self.differs_in_golden() else "alive"), ""
+
+
+def try_one(bench, source, mutant):
+    with tempfile.TemporaryDirectory(dir=bench.work) as folder:
+        return mutant, Trial(bench, source, mutant, folder).result()
+
+
+def mutated_sources(core):
+    """Every source, and the headers that hold code."""
+    return sorted(os.path.basename(path) for path in glob.glob(core + "/*.[ch]")
+                  if path.endswith(".c") or "static inline" in read(path))
+
+
+def shares(weights, count):
+    """Whole numbers in proportion to the weights, at least 1 each, that add up to count or more."""
+    total = sum(weights.values())
+    return {name: max(1, round(count * weight / total)) for name, weight in weights.items()}
+
+
+def draw(bench, source, count, seed, pool):
+    """Tries mutants of one source until so many count, or there are no more."""
+    every = sites.mutants(read(os.path.join(bench.work, "core", source)))
+    random.Random("%d %s" % (seed, source)).shuffle(every)
+    tried, counted = [], 0
+    while every and counted < count:
+        batch, every = every[:count - counted], every[count - counted:]
+        for mutant, result in pool.map(lambda one: try_one(bench, source, one), batch):
+            tried.append((mutant, result))
+            counted += result[0] not in ("no C", "equivalent")
+    return tried
+
+
+def rate(count, *results):
+    all_counted = sum(count[name] for name in ("caught", "golden", "alive"))
+    return 100.0 * sum(count[name] for name in results) / all_counted if all_counted else 100.0
+
+
+def line(name, count):
+    if count is None:
+        print(name)
+        return
+    counted = sum(count[result] for result in ("caught", "golden", "alive"))
+    print("%-14s %7d %7d %6.1f%% %7d %6.1f%% %6d   %10d" %
+          (name, counted, count["caught"], rate(count, "caught"), count["golden"],
+           rate(count, "caught", "golden"), count["alive"], count["equivalent"]))
+
+
+def report(bench, quota, seed, jobs):
+    """Runs them all and prints those that live as they come, then the tables; the counts of all."""
+    stages, kinds = {}, collections.defaultdict(collections.Counter)
+    print("not caught by a test (golden: the golden set's hashes differ):", flush=True)
+    with concurrent.futures.ThreadPoolExecutor(jobs) as pool:
+        for source, count in quota.items():
+            text = read(os.path.join(bench.work, "core", source))
+            results = stages[source] = collections.Counter()
+            for mutant, (result, _) in draw(bench, source, count, seed, pool):
+                results[result] += 1
+                kinds[mutant.kind][result] += 1
+                if result in ("golden", "alive"):
+                    print("  %-6s %s:%d %s" % (result, source, sites.line_of(text, mutant),
+                                               sites.describe(text, mutant)), flush=True)
+    total = sum(stages.values(), collections.Counter())
+    print("\n%-14s %7s %15s %15s %6s   %10s" % ("source", "mutants", "caught by tests", "or golden",
+                                               "alive", "equivalent"))
+    for name, count in list(stages.items()) + [("all", total)] + [("", None)] + \
+            [(kind, kinds[kind]) for kind in sites.KINDS]:
+        line(name, count)
+    return total
+
+
+def check(arguments):
+    tests = [path for path in sorted(glob.glob(ROOT + "/tests/unit/test_*.c")) if is_of_core(path)]
+    core = os.path.join(ROOT, "firmware", "core")
+    begin = time.monotonic()
+    bench = Bench(core, tests, arguments.unity, os.path.join(ROOT, "build", "mutation"), arguments.golden)
+    quota = shares({name: len(sites.mutants(read(os.path.join(core, name))))
+                    for name in mutated_sources(core)}, arguments.count)
+    if arguments.stage:
+        quota = {name: quota[name] for name in quota
+                 if re.sub(r"^ih_|\.[ch]$", "", name) in arguments.stage}
+    total = report(bench, quota, arguments.seed, arguments.jobs)
+    caught = rate(total, "caught")
+    counted = sum(total[name] for name in ("caught", "golden", "alive"))
+    bad = caught < CAUGHT_MIN
+    print("mutation: %d mutants, tests alone catch %.1f %%, at least %.0f%s; with the golden set %.1f %%; "
+          "%.0f s" % (counted, caught, CAUGHT_MIN, ": NOT reached" if bad else "",
+                      rate(total, "caught", "golden"), time.monotonic() - begin))
+    return 1 if bad else 0
+
+
+def is_of_core(test):
+    stem = os.path.basename(test)[5:-2]
+    return any(os.path.exists(os.path.join(ROOT, "firmware", "core", name + ".c"))
+               for name in (stem, "ih_" + stem))
+
+
+# A core of one stage and its test. Of the mutants of each line it is known what becomes of them.
+SAMPLE = """#include "ih_sample.h"
+int sample_sum(int count)
+{
+    int sum = 0;
+    for (int i = 0; i < count; i++) {
+        sum += i;
+    }
+    return sum + 0;
+}
+int sample_unused(int value)
+{
+    return value + 3;
+}
+"""
+SAMPLE_HEADER = "int sample_sum(int count);\nint sample_unused(int value);\n"
+SAMPLE_TEST = """#include "ih_sample.h"
+int main(void)
+{
+    return sample_sum(5) == 10 ? 0 : 1;
+}
+"""
+# (line, what stands there, what instead): the result
+SAMPLE_RESULTS = {
+    (5, "i < count", "comparison", "<="): "caught",
+    (5, "i++", "arithmetic", "--"): "caught",  # runs on
+    (6, "sum += i", "arithmetic", "-="): "caught",
+    (6, "sum += i", "statement", ""): "caught",
+    (8, "sum + 0", "arithmetic", "-"): "equivalent",
+    (8, "sum + 0", "constant", "1"): "caught",
+    (12, "value + 3", "arithmetic", "-"): "alive",
+    (12, "value + 3", "constant", "2"): "alive",
+}
+
+
+def self_test():
+    with tempfile.TemporaryDirectory() as directory:
+        files = {"core/ih_sample.c": SAMPLE, "core/ih_sample.h": SAMPLE_HEADER,
+                 "test_sample.c": SAMPLE_TEST}
+        os.mkdir(os.path.join(directory, "core"))
+        for name, text in files.items():
+            with open(os.path.join(directory, name), "w", encoding="utf-8") as file:
+                file.write(text)
+        bench = Bench(os.path.join(directory, "core"), [os.path.join(directory, "test_sample.c")], None,
+                      os.path.join(directory, "work"))
+        every = {(sites.line_of(SAMPLE, m), m.kind, m.new): m for m in sites.mutants(SAMPLE)}
+        missed = 0
+        for (at, what, kind, new), expected in SAMPLE_RESULTS.items():
+            mutant = every.get((at, kind, new))
+            was = try_one(bench, "ih_sample.c", mutant)[1][0] if mutant else "not made"
+            missed += was != expected
+            print("%s: %s with %s '%s': %s" % ("right" if was == expected else "MISSED (%s)" % expected,
+                                               what, kind, new, was))
+        print("mutation: %d known mutants, %d wrong" % (len(SAMPLE_RESULTS), missed))
+        return 1 if missed else 0
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--count", type=int, default=500)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--stage", action="append", help="only this one; dots, isohead ...")
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--unity", default=os.path.join(ROOT, "build", "third_party", "unity", "src"))
+    parser.add_argument("--golden", metavar="FILE", help="frames of golden_pack")
+    parser.add_argument("--self-test", action="store_true")
+    arguments = parser.parse_args()
+    os.nice(10)
+    return self_test() if arguments.self_test else check(arguments)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
