@@ -3,6 +3,8 @@
 
 #include <stdlib.h>
 
+#include "ih_fix.h"
+
 #include "ih_test_frame.h"
 
 struct vector_dot {
@@ -166,13 +168,16 @@ static void flat_frames_have_no_dots(void)
     }
 }
 
-/* A spot of a Gaussian shape, sigma in px, on what is there. */
+/* A spot of a Gaussian shape, sigma in px, on what is there; farther away it is rounded to nothing. */
 static void add_spot(double u, double v, double sigma, double height)
 {
+    const int32_t reach = (int32_t)ceil(sigma * sqrt(2 * log(2 * height + 1))) + 1;
     int32_t iu, iv;
 
-    for (iv = 0; iv < frame.height; iv++) {
-        for (iu = 0; iu < frame.width; iu++) {
+    for (iv = ih_max_s32(0, (int32_t)v - reach);
+         iv <= ih_min_s32(frame.height - 1, (int32_t)v + reach + 1); iv++) {
+        for (iu = ih_max_s32(0, (int32_t)u - reach);
+             iu <= ih_min_s32(frame.width - 1, (int32_t)u + reach + 1); iu++) {
             const double r2 = (iu - u) * (iu - u) + (iv - v) * (iv - v);
             const double sum = grey8[iv * frame.width + iu] +
                                floor(height * exp(-0.5 * r2 / (sigma * sigma)) + 0.5);
