@@ -1,0 +1,37 @@
+/* fuzz_check - what holds of every stage's output, whatever its input was: counts within their
+ * tables, indices that point at something, parts that add up to the whole, numbers within what the
+ * stage's header says. A violation ends the process as a finding. */
+#ifndef FUZZ_CHECK_H
+#define FUZZ_CHECK_H
+
+#include "isohead.h"
+
+#include "fuzz.h"
+
+void fuzz_check_dots(const struct ih_dots *dots, int32_t width, int32_t height);
+void fuzz_check_labels(const struct ih_labels *labels, const struct ih_dots *dots,
+                       const struct ih_rig *rig, const struct ih_labels_params *params);
+void fuzz_check_windows(const struct ih_windows *windows, const struct ih_rig *rig);
+void fuzz_check_points(const struct ih_points *points, const struct ih_rig *rig);
+void fuzz_check_samples(const struct ih_samples *samples, const struct ih_points *points);
+void fuzz_check_surface(const struct ih_surface *surface, const struct ih_samples *samples);
+void fuzz_check_cuts(const struct ih_cuts *cuts);
+void fuzz_check_hypotheses(const struct ih_hypotheses *hypotheses, const struct ih_surface *surface,
+                           const struct ih_hypotheses_params *params);
+void fuzz_check_heads(const struct ih_heads *heads, const struct ih_hypotheses *hypotheses,
+                      const struct ih_samples *samples);
+/* After ih_findings_add, before the tracks. */
+void fuzz_check_findings(const struct ih_findings *findings);
+void fuzz_check_tracks(const struct ih_tracks *tracks, const struct ih_findings *findings);
+void fuzz_check_result(const struct ih_result *result);
+
+/* All of a core after isohead_frame. */
+void fuzz_check_core(const struct isohead *core);
+
+/* An output of nothing, as after a frame that was refused. */
+void fuzz_check_empty(const struct isohead *core);
+
+/* The same outputs, stage by stage. */
+void fuzz_check_same(const struct isohead *a, const struct isohead *b);
+
+#endif

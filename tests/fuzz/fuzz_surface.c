@@ -1,0 +1,30 @@
+/* The surface through any samples, its cuts, hypotheses and heads. Input: rig, field, samples. */
+#include <string.h>
+
+#include "fuzz_check.h"
+#include "fuzz_tables.h"
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
+{
+    static struct ih_samples samples;
+    static struct ih_surface surface;
+    static struct ih_surface_scratch surface_scratch;
+    static struct ih_hypotheses hypotheses;
+    static struct ih_hypotheses_scratch hypotheses_scratch;
+    static struct ih_heads heads;
+    struct fuzz_input input = {data, size};
+    struct ih_params params;
+    struct ih_field field;
+    ih_params_default(&params);
+    const struct ih_rig *rig = fuzz_tables_rig(&input);
+    fuzz_tables_field(&input, &field);
+    fuzz_tables_samples(&input, &samples);
+    memset(&surface_scratch, 0xa5, sizeof surface_scratch);
+    ih_surface_fit(&samples, &field, &params.surface, &surface_scratch, &surface);
+    fuzz_check_surface(&surface, &samples);
+    ih_hypotheses_find(&surface, &params.hypotheses, &hypotheses_scratch, &hypotheses);
+    fuzz_check_hypotheses(&hypotheses, &surface, &params.hypotheses);
+    ih_heads_select(&hypotheses, &surface, &samples, rig, &params.heads, &heads);
+    fuzz_check_heads(&heads, &hypotheses, &samples);
+    return 0;
+}

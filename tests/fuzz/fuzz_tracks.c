@@ -1,0 +1,88 @@
+/* Tracks and the result from any findings, over several frames. Input: parameters, then frames: the
+ * step in time, findings, views. */
+#include <string.h>
+
+#include "fuzz_check.h"
+#include "fuzz_tables.h"
+
+#define FRAMES_MAX 32
+#define LOGIT_MOST_Q10 (1 << 14)
+
+static void fill_params(struct fuzz_input *input, struct ih_tracks_params *params)
+{
+    uint8_t flags = fuzz_byte(input);
+    ih_tracks_params_default(params);
+    params->side = fuzz_byte(input) % 3;
+    if ((flags & 1) != 0) {
+        params->gap_us = fuzz_within(input, -1, 2000000);
+        params->carry_us = fuzz_within(input, 0, 2000000);
+    }
+    if ((flags & 2) != 0) {
+        params->measured_mm = fuzz_within(input, 4, 500);
+        params->acceleration_mm_s2 = fuzz_within(input, 0, 8191);
+    }
+    if ((flags & 4) != 0) {
+        params->gate_mm = fuzz_within(input, 0, 1000);
+        params->gate_mm_per_s = fuzz_within(input, 0, 3000);
+        params->switch_frames = fuzz_within(input, 0, 8);
+    }
+}
+
+/* Sorted by their log-odds, as ih_findings leaves them. */
+static void fill_findings(struct fuzz_input *input, struct ih_findings *out)
+{
+    memset(out, 0xa5, sizeof *out);
+    ih_findings_begin(out);
+    out->seen_count = fuzz_within(input, 0, 8 * IH_SLOTS);
+    int32_t count = fuzz_byte(input) % (IH_FINDINGS_MAX + 1);
+    int32_t logit_q10 = LOGIT_MOST_Q10;
+    for (int32_t i = 0; i < count; i++) {
+        struct ih_finding *finding = &out->finding[out->finding_count++];
+        memset(finding, 0, sizeof *finding);
+        fuzz_tables_head(input, &finding->head);
+        logit_q10 -= fuzz_within(input, 0, 8 << 10);
+        finding->logit_q10 = logit_q10 > -LOGIT_MOST_Q10 ? logit_q10 : -LOGIT_MOST_Q10;
+        finding->probability_q16 = ih_score_probability_q16(finding->logit_q10);
+        finding->source = IH_SOURCE_SCAN;
+    }
+    for (int32_t i = 0; i < IH_FINDINGS_EXPECTED_MAX; i++) {
+        uint8_t rays = fuzz_byte(input);
+        out->view[i] = (struct ih_view){rays % 8 * 5, rays / 8 % 8 * 5, rays / 64 * 10};
+    }
+}
+
+static void check_expected(const struct ih_expected *expected, const struct ih_tracks *tracks)
+{
+    FUZZ_CHECK(expected->count == tracks->track_count);
+    for (int32_t i = 0; i < expected->count; i++) {
+        FUZZ_CHECK(memcmp(&expected->head[i], &tracks->track[i].head, sizeof expected->head[i]) ==
+                   0);
+    }
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
+{
+    static struct ih_tracks tracks;
+    static struct ih_findings findings;
+    static struct ih_result result;
+    struct fuzz_input input = {data, size};
+    struct ih_tracks_params params;
+    struct ih_expected expected;
+    int64_t time_us = 0;
+    const struct ih_rig *rig = fuzz_tables_rig(&input);
+    fill_params(&input, &params);
+    ih_tracks_init(&tracks);
+    tracks.last_id = fuzz_byte(&input) % 4 == 3 ? INT32_MAX - 2 : 0;
+    for (int frame = 0; frame < FRAMES_MAX && input.left > 0; frame++) {
+        time_us = fuzz_next_time_us(&input, time_us);
+        ih_tracks_expect(&tracks, &params, time_us, &expected);
+        check_expected(&expected, &tracks);
+        fill_findings(&input, &findings);
+        ih_tracks_update(&tracks, &params, rig, &findings);
+        fuzz_check_tracks(&tracks, &findings);
+        ih_result_from_tracks(&findings, &tracks, &result);
+        fuzz_check_result(&result);
+        FUZZ_CHECK(result.selected == tracks.selected);
+    }
+    return 0;
+}
