@@ -26,7 +26,7 @@ LONGRUN_FRAMES ?= 100000
 ARCH ?= arm64
 
 .DEFAULT_GOAL := help
-.PHONY: help sim frames sanitize test coverage mutation accept eval bits cortexm longrun size vectors learn picture board board-gpiod2 deb image flash \
+.PHONY: help sim frames sanitize test fuzz coverage mutation accept eval bits cortexm longrun size vectors learn picture board board-gpiod2 deb image flash \
   test-deb test-board test-image format formatted lint clean
 
 
@@ -74,6 +74,10 @@ mutation: sim ## would the tests notice? Mistakes made in the core one at a time
 	  $(foreach n,1 2,$(addprefix frames/sequence$n/,rig.json 000024.pgm 000025.pgm 000026.pgm))
 	@/usr/bin/python3 tests/checks/mutation.py --count $(MUTANTS) --unity $(abspath $(UNITY_DIR)) \
 	  --golden $(BUILD)/golden.bin
+
+fuzz: ## fuzz every target with libFuzzer and AFL++, FUZZ_SECONDS each (default 60) or FUZZ_RUNS; a table
+	@tools/setup.sh fuzz
+	@tests/fuzz/run.sh $(abspath $(CJSON_DIR))
 
 accept: sim ## the measured limits on the data sets in DATA (default ../shared/data)
 	@tools/setup.sh accept

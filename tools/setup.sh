@@ -1,7 +1,7 @@
 #!/bin/sh
 # Bring what a make target needs and this machine lacks.
 #
-#   tools/setup.sh sim|test|coverage|mutation|accept|eval|bits|cortexm|size|vectors|picture|format|lint
+#   tools/setup.sh sim|test|fuzz|coverage|mutation|accept|eval|bits|cortexm|size|vectors|picture|format|lint
 #   tools/setup.sh board arm64|armhf|host
 #   tools/setup.sh deb arm64|armhf
 #   tools/setup.sh test-deb
@@ -98,6 +98,18 @@ need_deb() {
     need_program dpkg-shlibdeps dpkg-dev
 }
 
+# clang's run-time libraries are a package of their own, with its version in the name.
+need_fuzz() {
+    need_program cmake cmake
+    need_program make make
+    need_program clang clang
+    need_program afl-fuzz afl++
+    if ! [ -e "$(clang -print-file-name=libclang_rt.fuzzer-x86_64.a 2>/dev/null)" ]; then
+        version=$(apt-cache depends clang 2>/dev/null | sed -n 's/.*Depends: clang-\([0-9]*\)$/\1/p')
+        lacks "libclang-rt-${version:-14}-dev"
+    fi
+}
+
 need_test_board() {
     need_board arm64
     need_program qemu-system-aarch64 qemu-system-arm
@@ -176,6 +188,7 @@ coverage | mutation)
     need_sim
     need_program gcc gcc
     ;;
+fuzz) need_fuzz ;;
 picture)
     need_sim
     need_python numpy python3-numpy
@@ -242,7 +255,7 @@ if [ -n "$packages" ]; then
 fi
 
 case "$1" in
-test | coverage | mutation | bits | cortexm) tools/fetch_third_party.sh build/third_party ;;| cortexm | size) tools/fetch_third_party.sh build/third_party ;;
+test | coverage | mutation | bits | cortexm) tools/fetch_third_party.sh build/third_party ;;| cortexm | fuzz) tools/fetch_third_party.sh build/third_party ;;| size) tools/fetch_third_party.sh build/third_party ;;
 board) [ "$2" = host ] || tools/board/sysroot.sh "$2" ;;
 esac
 case "$1" in

@@ -6,11 +6,41 @@
 
 #define PATH_MAX_BYTES 256
 
+struct file {
+    const char *name;
+    int descriptor;
+    char path[PATH_MAX_BYTES]; /* of the file itself */
+};
+
 static struct {
     char path[PATH_MAX_BYTES];
-    const char *name[FUZZ_FILES_MAX];
-    int name_count;
+    struct file file[FUZZ_FILES_MAX];
+    int file_count;
 } directory;
+
+static void make(struct file *file, const char *name)
+{
+    file->name = name;
+    file->descriptor = memfd_create(name, 0);
+    FUZZ_CHECK(file->descriptor >= 0);
+    snprintf(file->path, sizeof file->path, "/proc/self/fd/%d", file->descriptor);
+}
+
+static void rewrite(const struct file *file, const uint8_t *bytes, size_t size)
+{
+    FUZZ_CHECK(ftruncate(file->descriptor, 0) == 0);
+    FUZZ_CHECK(pwrite(file->descriptor, bytes, size, 0) == (ssize_t)size);
+}
+
+const char *fuzz_file_path(const uint8_t *bytes, size_t size)
+{
+    static struct file file;
+    if (file.name == NULL) {
+        make(&file, "file");
+    }
+    rewrite(&file, bytes, size);
+    return file.path;
+}
 
 static void join(char path[PATH_MAX_BYTES], const char *name)
 {
@@ -18,25 +48,11 @@ static void join(char path[PATH_MAX_BYTES], const char *name)
     FUZZ_CHECK(length > 0 && length < PATH_MAX_BYTES);
 }
 
-const char *fuzz_file_path(const uint8_t *bytes, size_t size)
-{
-    static char path[PATH_MAX_BYTES];
-    static int file = -1;
-    if (file < 0) {
-        file = memfd_create("fuzz", 0);
-        FUZZ_CHECK(file >= 0);
-        snprintf(path, sizeof path, "/proc/self/fd/%d", file);
-    }
-    FUZZ_CHECK(ftruncate(file, 0) == 0);
-    FUZZ_CHECK(pwrite(file, bytes, size, 0) == (ssize_t)size);
-    return path;
-}
-
 static void remove_directory(void)
 {
-    for (int i = 0; i < directory.name_count; i++) {
+    for (int i = 0; i < directory.file_count; i++) {
         char path[PATH_MAX_BYTES];
-        join(path, directory.name[i]);
+        join(path, directory.file[i].name);
         unlink(path);
     }
     rmdir(directory.path);
@@ -54,25 +70,24 @@ const char *fuzz_file_directory(void)
     return directory.path;
 }
 
-static void remember(const char *name)
+static const struct file *find_or_make(const char *name)
 {
-    for (int i = 0; i < directory.name_count; i++) {
-        if (strcmp(directory.name[i], name) == 0) {
-            return;
+    for (int i = 0; i < directory.file_count; i++) {
+        if (strcmp(directory.file[i].name, name) == 0) {
+            return &directory.file[i];
         }
     }
-    FUZZ_CHECK(directory.name_count < FUZZ_FILES_MAX);
-    directory.name[directory.name_count++] = name;
+    FUZZ_CHECK(directory.file_count < FUZZ_FILES_MAX);
+    fuzz_file_directory();
+    struct file *file = &directory.file[directory.file_count++];
+    char path[PATH_MAX_BYTES];
+    make(file, name);
+    join(path, name);
+    FUZZ_CHECK(symlink(file->path, path) == 0);
+    return file;
 }
 
 void fuzz_file_write(const char *name, const uint8_t *bytes, size_t size)
 {
-    char path[PATH_MAX_BYTES];
-    fuzz_file_directory();
-    remember(name);
-    join(path, name);
-    FILE *file = fopen(path, "wb");
-    FUZZ_CHECK(file != NULL);
-    FUZZ_CHECK(fwrite(bytes, 1, size, file) == size);
-    FUZZ_CHECK(fclose(file) == 0);
+    rewrite(find_or_make(name), bytes, size);
 }
