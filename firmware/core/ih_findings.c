@@ -70,8 +70,9 @@ void ih_findings_outline(const struct ih_rig *rig, struct ih_finding *finding)
     for (int axis = 0; axis < 3; axis++) {
         length2_q16 += (int64_t)head->centre_mm_q8[axis] * head->centre_mm_q8[axis];
     }
-    finding->distance_mm_q8 =
-        ih_saturate_s32((int64_t)ih_isqrt_u64((uint64_t)length2_q16) - head->semi_mm_q8[2]);
+    /* A head that is carried on may pass the camera: then there is no surface before it. */
+    finding->distance_mm_q8 = ih_max_s32(
+        ih_saturate_s32((int64_t)ih_isqrt_u64((uint64_t)length2_q16) - head->semi_mm_q8[2]), 0);
 }
 
 /* More probable first; what is nearer than spacing to a more probable one is the same thing. */

@@ -102,7 +102,8 @@ void ih_findings_add(const struct ih_points *points, const struct ih_dots *dots,
  * 900 mm, and at a slope s from the axis by up to 0.8 s^2 more in that direction, 8 % at 0.3; there
  * its long axis is tilted by up to 10 degrees, and its centre lies s (98 / Z)^2 of a focal length
  * farther out (11 px at 500 mm, 3 px at 900 mm and s = 0.3). The lens bends the centre only. The
- * distance takes the head to be as deep from every side: 2 mm short at s = 0.3. */
+ * distance takes the head to be as deep from every side: 2 mm short at s = 0.3; it is 0 where the
+ * camera would be inside the head. */
 void ih_findings_outline(const struct ih_rig *rig, struct ih_finding *finding);
 
 #endif

@@ -301,6 +301,7 @@ static void outlines_exist_for_any_place(void)
         }
         ih_findings_outline(&rig, &finding);
         TEST_ASSERT_TRUE(finding.a_px_q12 >= finding.b_px_q12 && finding.b_px_q12 > 0);
+        TEST_ASSERT_TRUE(finding.distance_mm_q8 >= 0);
     }
 }
 
