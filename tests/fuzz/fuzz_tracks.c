@@ -6,6 +6,7 @@
 #include "fuzz_tables.h"
 
 #define FRAMES_MAX 32
+#define FRONT_LEAST_MM 150
 #define LOGIT_MOST_Q10 (1 << 14)
 
 static void fill_params(struct fuzz_input *input, struct ih_tracks_params *params)
@@ -28,7 +29,7 @@ static void fill_params(struct fuzz_input *input, struct ih_tracks_params *param
     }
 }
 
-/* Sorted by their log-odds, as ih_findings leaves them. */
+/* As ih_findings leaves them: sorted by their log-odds, none before front_least_mm. */
 static void fill_findings(struct fuzz_input *input, struct ih_findings *out)
 {
     memset(out, 0xa5, sizeof *out);
@@ -40,6 +41,10 @@ static void fill_findings(struct fuzz_input *input, struct ih_findings *out)
         struct ih_finding *finding = &out->finding[out->finding_count++];
         memset(finding, 0, sizeof *finding);
         fuzz_tables_head(input, &finding->head);
+        int32_t nearest_q8 = FRONT_LEAST_MM * 256 + finding->head.semi_mm_q8[2];
+        if (finding->head.centre_mm_q8[2] < nearest_q8) {
+            finding->head.centre_mm_q8[2] = nearest_q8;
+        }
         logit_q10 -= fuzz_within(input, 0, 8 << 10);
         finding->logit_q10 = logit_q10 > -LOGIT_MOST_Q10 ? logit_q10 : -LOGIT_MOST_Q10;
         finding->probability_q16 = ih_score_probability_q16(finding->logit_q10);
