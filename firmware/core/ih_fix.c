@@ -8,7 +8,7 @@ int64_t ih_mul_wide_shift(int64_t a, uint32_t b, int shift)
 {
     /* a = high * 2^32 + low with 0 <= low < 2^32, so a * b = high * b * 2^32 + low * b. */
     int64_t high = a >> 32;
-    uint64_t low = (uint64_t)a & UINT32_MAX;
+    uint64_t low = (uint64_t)(a & UINT32_MAX);
     uint64_t low_product = low * b;
     /* |high| <= 2^31 and b < 2^32 keep this below 2^63; the carry adds less than 2^32. */
     int64_t upper = high * (int64_t)b + (int64_t)(low_product >> 32);

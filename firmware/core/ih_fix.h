@@ -10,6 +10,8 @@
 
 #include <stdint.h>
 
+#include "ih_range.h"
+
 /* value / 2^shift, rounded. shift 0..62; |value| <= 2^63 - 1 - 2^(shift-1). */
 static inline int64_t ih_shift_round(int64_t value, int shift)
 {

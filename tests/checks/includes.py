@@ -29,7 +29,8 @@ CORE_SHARED = {"ih_config.h", "ih_types.h", "ih_rig.h"}
 CORE_HEADERS = {
     "ih_config.h": set(),
     "ih_types.h": set(),
-    "ih_fix.h": set(),
+    "ih_range.h": set(),
+    "ih_fix.h": {"ih_range.h"},
     "ih_rig.h": {"ih_config.h", "ih_types.h"},
     "ih_blob.h": CORE_SHARED,
     "ih_cholesky.h": {"ih_config.h", "ih_types.h"},
