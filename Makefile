@@ -26,7 +26,7 @@ LONGRUN_FRAMES ?= 100000
 ARCH ?= arm64
 
 .DEFAULT_GOAL := help
-.PHONY: help sim frames sanitize test fuzz coverage mutation accept eval bits cortexm longrun size vectors learn picture board board-gpiod2 deb image flash \
+.PHONY: help sim frames sanitize test fuzz coverage mutation accept eval bench bits cortexm longrun size vectors learn picture board board-gpiod2 deb image flash \
   test-deb test-board test-image format formatted lint clean
 
 
@@ -107,6 +107,10 @@ longrun: sim ## 100,000 frames in one process: same memory, same records at the 
 	@tests/longrun/longrun.sh $(BUILD)/host/tests/longrun/longrun $(BUILD)/host/tools/render/render \
 	  $(BUILD)/longrun $(LONGRUN_FRAMES)
 
+bench: sim ## time isohead against the same work by OpenCV and Eigen: build/bench.json; minutes
+	@tools/setup.sh bench
+	@/usr/bin/python3 tools/bench/timing.py
+
 vectors: ## write tests/vectors anew with the float64 reference
 	@tools/setup.sh vectors
 	@/usr/bin/python3 tools/oracle/make_vectors.py --out tests/vectors
@@ -170,13 +174,13 @@ test-image: sim image ## boot the image on an emulated board; failed updates and
 	  --program $(BUILD)/board-arm64/firmware/app/isohead_board --frames frames/sequence2 \
 	  --host-sim $(BUILD)/host/sim/host_sim --work $(BUILD)/test_image
 
-format: ## clang-format over all C sources
+format: ## clang-format over all C and C++ sources
 	@tools/setup.sh format
-	@git ls-files '*.c' '*.h' | xargs clang-format -i
+	@git ls-files '*.c' '*.h' '*.cpp' '*.hpp' | xargs clang-format -i
 
 formatted: ## fail when make format would change something
 	@tools/setup.sh format
-	@git ls-files '*.c' '*.h' | xargs clang-format --dry-run --Werror
+	@git ls-files '*.c' '*.h' '*.cpp' '*.hpp' | xargs clang-format --dry-run --Werror
 
 lint: sanitize ## clang-tidy over all C sources but the tests' and QEMU's plugin
 	@tools/setup.sh lint

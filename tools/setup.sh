@@ -1,7 +1,7 @@
 #!/bin/sh
 # Bring what a make target needs and this machine lacks.
 #
-#   tools/setup.sh sim|test|fuzz|coverage|mutation|accept|eval|bits|cortexm|size|vectors|picture|format|lint
+#   tools/setup.sh sim|test|fuzz|coverage|mutation|accept|eval|bench|bits|cortexm|size|vectors|picture|format|lint
 #   tools/setup.sh board arm64|armhf|host
 #   tools/setup.sh deb arm64|armhf
 #   tools/setup.sh test-deb
@@ -201,6 +201,16 @@ eval)
     need_program valgrind valgrind
     need_program gcc gcc
     need_program nm binutils
+    ;;
+bench)
+    need_sim
+    need_program gcc gcc
+    need_program g++ g++
+    need_program clang clang
+    need_python numpy python3-numpy
+    [ -e /usr/include/opencv4/opencv2/calib3d.hpp ] || lacks libopencv-calib3d-dev
+    [ -e /usr/include/opencv4/opencv2/imgproc.hpp ] || lacks libopencv-imgproc-dev
+    [ -e /usr/include/eigen3/Eigen/Dense ] || lacks libeigen3-dev
     ;;
 bits)
     need_sim

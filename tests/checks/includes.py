@@ -12,6 +12,7 @@
   render   its own files and the system: what draws the frames shares no line with what reads them.
   rigblob  core, the app's rig, hal_file.h.
   size     the system: a plugin of QEMU.
+  bench    core, the app's rig, hal's files, its own files.
   tests    anything.
 
 includes.py [--self-test]      exit status 1 if a rule is broken, each with file and line
@@ -138,9 +139,16 @@ def judge_rigblob(path, quoted, target):
     return "rigblob includes the core, the app's rig and hal_file.h"
 
 
+def judge_bench(path, quoted, target):
+    if not quoted or is_core(target):
+        return None
+    good = re.fullmatch(r"bench_\w+\.h|hal_file\.h|replay/hal_pgm\.h|app_rig\.h", target)
+    return None if good else "bench includes the core, the app's rig, hal's files and its own"
+
+
 FOLDERS = {"firmware/core": judge_core, "firmware/app": judge_app, "hal": judge_hal, "sim": judge_sim,
-           "tools/render": judge_render, "tools/rigblob": judge_rigblob,
-           "tools/size": judge_size}
+           "tools/render": judge_render, "tools/rigblob": judge_rigblob, "tools/size": judge_size,
+           "tools/bench": judge_bench}
 
 
 def judge(path, line):
@@ -197,6 +205,7 @@ def self_test():
                ("sim/sim_run.c", '#include "../firmware/core/isohead.h"'),
                ("tools/render/main.c", '#include "isohead.h"'),
                ("tools/render/main.c", "#include <hal.h>"),
+               ("tools/bench/bench_isohead.c", '#include "app_loop.h"'),
                ("firmware/app/app_loop.c", '#include "linux/hal_gpio.h"'),
                ("firmware/app/app_loop.c", '#include "sim_run.h"'),
                ("sim/sim_run.c", '#include "app_laser.h"'),
@@ -213,7 +222,8 @@ def self_test():
             ("sim/sim_run.c", '#include "app_record.h"'),
             ("firmware/app/app_board.c", '#include "linux/hal_gpio.h"'),
             ("firmware/app/app_loop.c", '#include "isohead.h"'),
-            ("tools/render/main.c", '#include "rd_rig.h"')]
+            ("tools/render/main.c", '#include "rd_rig.h"'),
+            ("tools/bench/bench_isohead.c", '#include "isohead.h"')]
     missed = [line for line in refused if judge(*line) is None]
     missed += [line for line in good if judge(*line) is not None]
     for path, line in missed:

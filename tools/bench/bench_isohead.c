@@ -1,0 +1,170 @@
+/* bench_isohead --turns|--once|--results RIG.json FRAME.pgm... [RIG.json FRAME.pgm...]
+ *
+ * isohead in its default mode over frames that are in memory; each rig's frames are a sequence.
+ *   --turns    for every line of standard input a line of JSON: nanoseconds a frame, the whole frame
+ *              without timers inside and, from a second run, each stage
+ *   --once     runs once, to be counted from outside; prints each frame's count of dots and labels
+ *   --results  what was found, a line of JSON a frame: dots, labels, nodes of the surface, the head
+ */
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "app_rig.h"
+#include "bench_input.h"
+#include "bench_stages.h"
+#include "isohead.h"
+
+#define FRAME_US 40000
+
+static struct isohead head;
+
+static bool start_set(const struct bench_set *set)
+{
+    static struct ih_calibration calibration;
+    struct hal_error error;
+    int32_t bad_slot;
+    if (!app_rig_load(set->rig_path, &calibration, &error)) {
+        fprintf(stderr, "bench_isohead: %s: %s\n", set->rig_path, error.text);
+        return false;
+    }
+    enum ih_err err = isohead_init(&head, &calibration, &bad_slot);
+    if (err != IH_OK) {
+        fprintf(stderr, "bench_isohead: %s: %s\n", set->rig_path, ih_err_text(err));
+    }
+    return err == IH_OK;
+}
+
+static bool run_frame(const struct bench_set *set, int32_t index)
+{
+    const struct bench_frame *f = &set->frame[index];
+    struct ih_frame view = {f->samples,          f->width,
+                            f->height,           f->width * f->bytes_per_sample,
+                            f->bytes_per_sample, f->maximum};
+    enum ih_err err = isohead_frame(&head, &view, NULL, (int64_t)index * FRAME_US);
+    if (err != IH_OK) {
+        fprintf(stderr, "bench_isohead: %s, frame %d: %s\n", set->rig_path, (int)index,
+                ih_err_text(err));
+    }
+    return err == IH_OK;
+}
+
+/* All frames; their time together. handle: NULL, or called after each. */
+static bool run_all(const struct bench_input *input, void (*handle)(void), int64_t *whole_ns)
+{
+    *whole_ns = 0;
+    for (int32_t s = 0; s < input->set_count; s++) {
+        const struct bench_set *set = &input->set[s];
+        if (!start_set(set)) {
+            return false;
+        }
+        for (int32_t i = 0; i < set->frame_count; i++) {
+            int64_t started_ns = bench_now_ns();
+            bool good = run_frame(set, i);
+            *whole_ns += bench_now_ns() - started_ns;
+            if (!good) {
+                return false;
+            }
+            if (handle != NULL) {
+                handle();
+            }
+        }
+    }
+    return true;
+}
+
+static void print_counts(void)
+{
+    printf("dots %d labels %d findings %d\n", (int)head.dots.dot_count,
+           (int)head.labels.labelled_count, (int)head.findings.finding_count);
+}
+
+static void print_dots(void)
+{
+    printf("{\"dots\":[");
+    for (int32_t i = 0; i < head.dots.dot_count; i++) {
+        printf("%s[%.4f,%.4f]", i > 0 ? "," : "", ldexp(head.dots.dot[i].u_px_q12, -12),
+               ldexp(head.dots.dot[i].v_px_q12, -12));
+    }
+    printf("],\"labels\":[");
+    const char *comma = "";
+    for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
+        if (head.labels.dot_of_slot[slot] != IH_NONE) {
+            printf("%s[%d,%d,%.3f]", comma, (int)slot, (int)head.labels.dot_of_slot[slot],
+                   ldexp(head.points.point[slot].depth_mm_q8, -8));
+            comma = ",";
+        }
+    }
+    printf("]");
+}
+
+static void print_result(void)
+{
+    print_dots();
+    printf(",\"surface\":[");
+    for (int32_t y = 0; head.surface.valid && y < IH_SURFACE_GRID; y++) {
+        for (int32_t x = 0; x < IH_SURFACE_GRID; x++) {
+            printf("%s%.2f", x + y > 0 ? "," : "", ldexp(head.surface.depth_mm_q8[y][x], -8));
+        }
+    }
+    printf("],\"head\":");
+    if (head.result.selected == IH_NONE) {
+        puts("null}");
+        return;
+    }
+    const int32_t *centre = head.result.entry[head.result.selected].centre_mm_q8;
+    printf("[%.2f,%.2f,%.2f]}\n", ldexp(centre[0], -8), ldexp(centre[1], -8), ldexp(centre[2], -8));
+}
+
+/* One turn: the whole without timers inside, then the stages. */
+static bool take_turn(const struct bench_input *input)
+{
+    int64_t whole_ns, timed_ns;
+    bench_times = (struct bench_times){.is_on = false};
+    if (!run_all(input, NULL, &whole_ns)) {
+        return false;
+    }
+    bench_times.is_on = true;
+    if (!run_all(input, NULL, &timed_ns)) {
+        return false;
+    }
+    int64_t rest_ns = timed_ns;
+    printf("{\"whole\":%.0f", (double)whole_ns / input->frame_count);
+    for (int i = 0; i < BENCH_STAGES; i++) {
+        if (bench_times.calls[i] == 0) {
+            fprintf(stderr, "bench_isohead: the stage %s was never called\n", bench_stage_name(i));
+            return false;
+        }
+        rest_ns -= bench_times.stage_ns[i];
+        printf(",\"%s\":%.0f", bench_stage_name(i),
+               (double)bench_times.stage_ns[i] / input->frame_count);
+    }
+    printf(",\"rest\":%.0f}\n", (double)rest_ns / input->frame_count);
+    return fflush(stdout) == 0;
+}
+
+int main(int argument_count, char **arguments)
+{
+    struct bench_input input;
+    char line[16];
+    int64_t whole_ns;
+    const char *mode = argument_count > 1 ? arguments[1] : "";
+    bool is_turns = strcmp(mode, "--turns") == 0;
+    bool is_results = strcmp(mode, "--results") == 0;
+    if (!is_turns && !is_results && strcmp(mode, "--once") != 0) {
+        fputs("usage: bench_isohead --turns|--once|--results RIG.json FRAME.pgm...\n", stderr);
+        return 2;
+    }
+    if (!bench_input_load(argument_count - 2, arguments + 2, &input)) {
+        return 1;
+    }
+    bool good = true;
+    if (is_turns) {
+        while (good && fgets(line, sizeof line, stdin) != NULL) {
+            good = take_turn(&input);
+        }
+    } else {
+        good = run_all(&input, is_results ? print_result : print_counts, &whole_ns);
+    }
+    return good && fflush(stdout) == 0 ? 0 : 1;
+}

@@ -1,0 +1,84 @@
+#include "bench_stages.h"
+
+#include "bench_input.h"
+#include "isohead.h"
+
+struct bench_times bench_times;
+
+const char *bench_stage_name(int stage)
+{
+    static const char *const names[BENCH_STAGES] = {
+        [BENCH_DOTS] = "dots",         [BENCH_LABELS] = "labels",    [BENCH_POINTS] = "points",
+        [BENCH_SURFACE] = "surface",   [BENCH_HYPOTHESES] = "nests", [BENCH_HEADS] = "heads",
+        [BENCH_FINDINGS] = "findings", [BENCH_TRACKS] = "tracks",
+    };
+    return names[stage];
+}
+
+static int64_t start(void)
+{
+    return bench_times.is_on ? bench_now_ns() : 0;
+}
+
+static void stop(enum bench_stage stage, int64_t started_ns)
+{
+    if (bench_times.is_on) {
+        bench_times.stage_ns[stage] += bench_now_ns() - started_ns;
+        bench_times.calls[stage]++;
+    }
+}
+
+/* WRAP(stage, name, parameters, arguments): what the linker calls instead of name, and name itself. */
+#define WRAP(stage, name, parameters, arguments) \
+    void __real_##name parameters;               \
+    void __wrap_##name parameters;               \
+    void __wrap_##name parameters                \
+    {                                            \
+        int64_t started_ns = start();            \
+        __real_##name arguments;                 \
+        stop(stage, started_ns);                 \
+    }
+
+WRAP(BENCH_DOTS, ih_dots_find,
+     (const struct ih_frame *frame, const struct ih_frame *ambient,
+      const struct ih_dots_params *params, struct ih_dots_scratch *scratch, struct ih_dots *out),
+     (frame, ambient, params, scratch, out))
+WRAP(BENCH_LABELS, ih_labels_assign,
+     (const struct ih_dots *dots, const struct ih_rig *rig, const struct ih_labels_params *params,
+      struct ih_labels_scratch *scratch, struct ih_labels *out),
+     (dots, rig, params, scratch, out))
+WRAP(BENCH_POINTS, ih_points_from_labels,
+     (const struct ih_labels *labels, const struct ih_rig *rig, struct ih_points *out),
+     (labels, rig, out))
+WRAP(BENCH_POINTS, ih_samples_select,
+     (const struct ih_points *points, const struct ih_dots *dots, const struct ih_rig *rig,
+      const struct ih_samples_params *params, struct ih_samples *out),
+     (points, dots, rig, params, out))
+WRAP(BENCH_SURFACE, ih_surface_fit,
+     (const struct ih_samples *samples, const struct ih_field *field,
+      const struct ih_surface_params *params, struct ih_surface_scratch *scratch,
+      struct ih_surface *out),
+     (samples, field, params, scratch, out))
+WRAP(BENCH_HYPOTHESES, ih_hypotheses_find,
+     (const struct ih_surface *surface, const struct ih_hypotheses_params *params,
+      struct ih_hypotheses_scratch *scratch, struct ih_hypotheses *out),
+     (surface, params, scratch, out))
+WRAP(BENCH_HEADS, ih_heads_select,
+     (const struct ih_hypotheses *hypotheses, const struct ih_surface *surface,
+      const struct ih_samples *samples, const struct ih_rig *rig,
+      const struct ih_heads_params *params, struct ih_heads *out),
+     (hypotheses, surface, samples, rig, params, out))
+WRAP(BENCH_FINDINGS, ih_findings_add,
+     (const struct ih_points *points, const struct ih_dots *dots, const struct ih_heads *heads,
+      const struct ih_expected *expected, const struct ih_rig *rig,
+      const struct ih_findings_params *params, struct ih_findings_scratch *scratch,
+      struct ih_findings *out),
+     (points, dots, heads, expected, rig, params, scratch, out))
+WRAP(BENCH_TRACKS, ih_tracks_expect,
+     (const struct ih_tracks *tracks, const struct ih_tracks_params *params, int64_t time_us,
+      struct ih_expected *out),
+     (tracks, params, time_us, out))
+WRAP(BENCH_TRACKS, ih_tracks_update,
+     (struct ih_tracks * tracks, const struct ih_tracks_params *params, const struct ih_rig *rig,
+      struct ih_findings *findings),
+     (tracks, params, rig, findings))

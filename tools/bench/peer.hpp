@@ -1,0 +1,167 @@
+/* peer - isohead's method as a competent engineer writes it with OpenCV and Eigen, to compare with.
+ *
+ * Two of them (../shared/peers.md has how they were found):
+ *   A  what is written first: a difference of Gaussians in float by two GaussianBlur (sigma 1.0 and
+ *      2.5), connectedComponentsWithStats, weighted centres; the surface in double, its normal
+ *      equations summed anew for the second robust pass; whole contours by fitEllipseDirect.
+ *   B  the fastest composition of library calls that was found: an 8-bit Gaussian 3x3 less an 8-bit
+ *      box 13x13, findContours, weighted centres; the surface in double too (in float it is 20 mm off: its
+ *      normal equations have a condition number of 10^7), but the second robust pass only takes
+ *      away what its changed rows weigh less; whole contours by their moments.
+ *
+ * What both do, as isohead does it in its default mode and with the same numbers: dots of the whole
+ * frame; undistortPoints; candidates on the 361 lines, seeds by affine rectangles, growing; points;
+ * samples (clip, lonely points, missing dots filled in); 144 multiquadrics, weighted least squares
+ * with a ridge, one Huber step, Eigen's LLT; 47x47 nodes from a table of the basis that is filled
+ * once; contours by marching squares every 10 mm while a nest lives; nests of ellipses, whole or cut
+ * by the best of all chords; the scan of a mean head behind every point; six Gauss-Newton steps of
+ * an ellipsoid for every place of the scan, every nest and last frame's head.
+ * What they do not do, which is in their favour: a threshold that follows the noise of the place (one
+ * for the frame instead), tests for edges and hot pixels, over-exposed plateaus, the paper's tests of
+ * heads (area, curvature, shape, outline), evidence, learnt score, tracks: the best of the fitted
+ * places by the scan's own score is the head.
+ *
+ * mm, pixels, field units (half a dot pitch); floating point. Nothing is allocated here that could be
+ * kept from frame to frame; what OpenCV and Eigen allocate they do as always.
+ */
+#ifndef PEER_HPP
+#define PEER_HPP
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include <Eigen/Dense>
+#include <opencv2/core.hpp>
+
+constexpr int PEER_GRID = 19; /* dots in a row of the pattern */
+constexpr int PEER_SLOTS = PEER_GRID * PEER_GRID;
+constexpr int PEER_CENTRES = 12; /* of the surface, in a row */
+constexpr int PEER_TERMS = PEER_CENTRES * PEER_CENTRES;
+constexpr int PEER_NODES = 47; /* of the surface's grid, in a row */
+
+enum class peer_kind { a, b };
+
+/* One dot's epipolar line in undistorted pixels: place = infinity + t dir, t = length / Z. */
+struct peer_line {
+    double infinity_u, infinity_v, dir_u, dir_v, length_px_mm, t_far_px, t_near_px;
+};
+
+struct peer_rig {
+    int width, height;
+    cv::Matx33d camera;
+    cv::Mat distortion;
+    double origin_mm[3];
+    double slope[PEER_SLOTS][2]; /* of each dot's ray */
+    double near_mm, far_mm;
+    double field_x, field_y, field_unit; /* the surface's field, normalised coordinates */
+    std::array<peer_line, PEER_SLOTS> line;
+};
+
+/* A slot's dot. */
+struct peer_point {
+    bool seen;
+    int dot;
+    double x, y; /* normalised */
+    double depth_mm;
+};
+
+struct peer_sample {
+    double x, y; /* field units */
+    double depth_mm, root_weight;
+};
+
+enum class peer_ray_state { unknown, seen, empty };
+struct peer_ray {
+    double slope_x, slope_y;
+    double point_mm[3];
+    peer_ray_state state;
+};
+
+/* Place of node 0, .. and of a row of centres, field units. */
+double peer_node_place(int node);
+double peer_centre_place(int centre);
+
+struct peer_contour {
+    std::vector<cv::Point2f> vertex; /* grid steps; runs with what is nearer on its right */
+    bool closed;
+};
+
+struct peer_ellipse {
+    double area, x, y; /* grid steps */
+};
+
+struct peer_slice {
+    peer_ellipse ellipse;
+    double behind_mm, area_mm2;
+};
+
+struct peer_nest {
+    int x, y; /* the node of the minimum */
+    double nearest_mm, front_mm, tip_level_mm, tip_area_mm2;
+    int gap;
+    bool ended;
+    std::vector<peer_slice> slice;
+};
+
+struct peer_head {
+    double centre_mm[3];
+    double semi_mm[3]; /* across, up, deep */
+    double score;
+};
+
+using peer_grid = Eigen::Matrix<double, PEER_NODES, PEER_NODES, Eigen::RowMajor>;
+using peer_basis = Eigen::Matrix<double, Eigen::Dynamic, PEER_TERMS>;
+
+/* Everything that is kept: outputs of the stages in order, tables that are filled once. */
+struct peer {
+    peer_kind kind;
+    peer_rig rig;
+    peer_basis node_basis; /* of the grid's nodes */
+    cv::Mat image;         /* the frame, as a view */
+    std::vector<cv::Point2d> dots;
+    std::vector<peer_point> points; /* by slot */
+    std::vector<peer_sample> samples;
+    double nearest_sample_mm;
+    bool has_surface;
+    peer_grid surface_mm;
+    double nearest_node_mm;
+    std::vector<peer_nest> nests;
+    std::array<peer_ray, PEER_SLOTS> rays;
+    bool has_head;
+    peer_head head;
+};
+
+/* Reads rig.json; throws std::runtime_error with what is wrong. */
+peer_rig peer_rig_read(const std::string &path);
+/* Normalised place of a slot's dot at a depth; its frame pixel. */
+cv::Point2d peer_rig_dot_at(const peer_rig &rig, int slot, double depth_mm);
+cv::Point2d peer_rig_distort(const peer_rig &rig, cv::Point2d normalised);
+
+void peer_begin(peer &p, peer_kind kind, const peer_rig &rig);
+
+/* The stages, in order; each reads what the one before it wrote. Not inlined, so that callgrind sees
+ * them. */
+extern "C" {
+void peer_frame(peer &p, const cv::Mat &image);
+void peer_find_dots(peer &p);
+void peer_find_labels(peer &p);
+void peer_find_samples(peer &p);
+void peer_fit_surface(peer &p);
+void peer_find_nests(peer &p);
+void peer_find_heads(peer &p);
+}
+
+/* Parts of stages. */
+void peer_cut(const peer_grid &surface_mm, double level_mm, std::vector<peer_contour> &out);
+bool peer_ellipse_whole(peer_kind kind, const peer_contour &contour, cv::Point2f place,
+                        peer_ellipse &out);
+bool peer_ellipse_part(peer_kind kind, const peer_contour &contour, cv::Point2f place,
+                       peer_ellipse &out, double &merit);
+double peer_near_mm(const std::vector<peer_point> &points);
+bool peer_is_visible(const peer &p, cv::Point2d normalised);
+double peer_scan_score(const peer &p, const peer_head &head);
+void peer_fit_head(const peer &p, peer_head &head);
+
+#endif

@@ -1,0 +1,103 @@
+#include "peer.hpp"
+
+#include <opencv2/imgproc.hpp>
+
+namespace
+{
+
+/* Edges of cells: those from a node to the right, then those from a node down. */
+constexpr int DOWN = PEER_NODES * PEER_NODES;
+constexpr int EDGES = 2 * DOWN;
+
+struct walker {
+    const peer_grid *surface_mm;
+    double level_mm;
+    int next[EDGES]; /* the edge that the contour leaves the cell through; -1: none */
+    bool is_entered[EDGES];
+    std::vector<int> edges; /* that a contour leaves from */
+};
+
+void link(walker &w, int from, int to)
+{
+    w.next[from] = to;
+    w.is_entered[to] = true;
+    w.edges.push_back(from);
+}
+
+/* What is nearer is on the right as one goes from edge to edge. */
+void cut_cell(walker &w, int y, int x)
+{
+    const peer_grid &z = *w.surface_mm;
+    int corners = (z(y, x) < w.level_mm) | (z(y, x + 1) < w.level_mm) << 1 |
+                  (z(y + 1, x + 1) < w.level_mm) << 2 | (z(y + 1, x) < w.level_mm) << 3;
+    if (corners == 0 || corners == 15) {
+        return;
+    }
+    const int at = y * PEER_NODES + x;
+    const int edge[4] = {at, DOWN + at + 1, at + PEER_NODES, DOWN + at}; /* top right bottom left */
+    static const signed char way[16][2] = {{-1, -1}, {0, 3}, {1, 0}, {1, 3},  {2, 1},   {-1, -1},
+                                           {2, 0},   {2, 3}, {3, 2}, {0, 2},  {-1, -1}, {1, 2},
+                                           {3, 1},   {0, 1}, {3, 0}, {-1, -1}};
+    if (way[corners][0] >= 0) {
+        link(w, edge[static_cast<int>(way[corners][0])], edge[static_cast<int>(way[corners][1])]);
+        return;
+    }
+    bool joined = z(y, x) + z(y, x + 1) + z(y + 1, x + 1) + z(y + 1, x) < 4 * w.level_mm;
+    if (corners == 5) {
+        link(w, edge[0], edge[joined ? 1 : 3]);
+        link(w, edge[2], edge[joined ? 3 : 1]);
+    } else {
+        link(w, edge[joined ? 3 : 1], edge[0]);
+        link(w, edge[joined ? 1 : 3], edge[2]);
+    }
+}
+
+cv::Point2f crossing(const walker &w, int edge)
+{
+    bool is_down = edge >= DOWN;
+    int at = is_down ? edge - DOWN : edge;
+    int y = at / PEER_NODES, x = at % PEER_NODES;
+    const peer_grid &z = *w.surface_mm;
+    double here = z(y, x), there = is_down ? z(y + 1, x) : z(y, x + 1);
+    float part = static_cast<float>((w.level_mm - here) / (there - here));
+    return {static_cast<float>(x) + (is_down ? 0.0F : part),
+            static_cast<float>(y) + (is_down ? part : 0.0F)};
+}
+
+void follow(walker &w, int start, peer_contour &out)
+{
+    int edge = start;
+    do {
+        out.vertex.push_back(crossing(w, edge));
+        int next = w.next[edge];
+        w.next[edge] = -1;
+        edge = next;
+    } while (edge >= 0 && edge != start);
+    out.closed = edge == start;
+}
+
+} // namespace
+
+void peer_cut(const peer_grid &surface_mm, double level_mm, std::vector<peer_contour> &out)
+{
+    static walker w;
+    out.clear();
+    w.surface_mm = &surface_mm;
+    w.level_mm = level_mm;
+    w.edges.clear();
+    std::fill(w.next, w.next + EDGES, -1);
+    std::fill(w.is_entered, w.is_entered + EDGES, false);
+    for (int y = 0; y < PEER_NODES - 1; y++) {
+        for (int x = 0; x < PEER_NODES - 1; x++) {
+            cut_cell(w, y, x);
+        }
+    }
+    for (int open = 1; open >= 0; open--) { /* open ones first, from their beginnings */
+        for (int edge : w.edges) {
+            if (w.next[edge] >= 0 && (!open || !w.is_entered[edge])) {
+                out.emplace_back();
+                follow(w, edge, out.back());
+            }
+        }
+    }
+}
