@@ -26,7 +26,7 @@ LONGRUN_FRAMES ?= 100000
 ARCH ?= arm64
 
 .DEFAULT_GOAL := help
-.PHONY: help sim frames sanitize test fuzz coverage mutation accept eval bench bits cortexm longrun size vectors learn picture board board-gpiod2 deb image flash \
+.PHONY: help sim frames sanitize test fuzz coverage mutation accept eval bench bench-instructions test-bench bits cortexm longrun size vectors learn picture board board-gpiod2 deb image flash \
   test-deb test-board test-image format formatted lint clean
 
 
@@ -110,6 +110,14 @@ longrun: sim ## 100,000 frames in one process: same memory, same records at the 
 bench: sim ## time isohead against the same work by OpenCV and Eigen: build/bench.json; minutes
 	@tools/setup.sh bench
 	@/usr/bin/python3 tools/bench/timing.py
+
+bench-instructions: sim ## instructions of each stage, by callgrind, with both compilers
+	@tools/setup.sh bench
+	@/usr/bin/python3 tools/bench/counts.py
+
+test-bench: sim ## do isohead and what it is compared with find the same?
+	@tools/setup.sh bench
+	@/usr/bin/python3 tools/bench/agree.py
 
 vectors: ## write tests/vectors anew with the float64 reference
 	@tools/setup.sh vectors

@@ -181,6 +181,7 @@ test)
     need_python numpy python3-numpy
     need_python scipy python3-scipy
     need_program nm binutils
+    need_program valgrind valgrind
     need_header libv4l2.h libv4l-dev
     need_gpio
     ;;
@@ -207,6 +208,7 @@ bench)
     need_program gcc gcc
     need_program g++ g++
     need_program clang clang
+    need_program valgrind valgrind
     need_python numpy python3-numpy
     [ -e /usr/include/opencv4/opencv2/calib3d.hpp ] || lacks libopencv-calib3d-dev
     [ -e /usr/include/opencv4/opencv2/imgproc.hpp ] || lacks libopencv-imgproc-dev

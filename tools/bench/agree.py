@@ -1,4 +1,7 @@
+#!/usr/bin/env python3
 """Do isohead and its peers find the same? Nothing is timed before they do.
+
+    agree.py        exit status 1 when they do not; gcc -O2 builds
 
 Against the truth of the rendered frames: dots found, labels right. Against isohead: the same dots behind
 the same labels; the surface in mm, at the nodes next to dots that both have labelled (elsewhere one of
@@ -8,6 +11,7 @@ them has to guess) and on all 47x47 nodes; the head.
 import json
 import os
 import subprocess
+import sys
 
 import numpy as np
 
@@ -152,3 +156,28 @@ def compare(isohead, peers, arguments):
     if bad:
         builds.fail("no agreement, so nothing is timed:\n  " + "\n  ".join(bad))
     return numbers
+
+
+def programs(folder):
+    """Commands by name, of a build's folder."""
+    peer = builds.program(folder, "bench_peer")
+    return {"isohead": [builds.program(folder, "bench_isohead")], "A": [peer, "a"], "B": [peer, "b"]}
+
+
+def table(numbers):
+    lines = ["| mean of the frames | isohead | A | B |", "| --- | --- | --- | --- |"]
+    for key in LIMITS:
+        lines.append("| %s | " % key + " | ".join("%.3g" % numbers[who][key] for who in ("isohead", "A", "B")) + " |")
+    return "\n".join(lines)
+
+
+def main():
+    commands = programs(builds.make("gcc-O2", ["bench_isohead", "bench_peer"]))
+    frames = builds.timed_frames()
+    numbers = compare(commands.pop("isohead"), commands, frames)
+    print(table(numbers) + "\n\nok: isohead and its peers agree on %d frames"
+          % sum(path.endswith(".pgm") for path in frames))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -21,7 +21,6 @@ import numpy as np
 import agree
 import builds
 
-PEERS = {"A": "a", "B": "b"}
 # Rows of the table: name, what isohead's stages and the peers' are called.
 ROWS = [("dots", ("dots",)), ("labels", ("labels",)), ("points, samples", ("points",)), ("surface", ("surface",)),
         ("cuts, nests", ("nests",)), ("heads to tracks", ("heads", "findings", "tracks", "rest"))]
@@ -54,12 +53,6 @@ class Worker:
     def us(self, keys):
         """Microseconds a frame of some stages, by repetition."""
         return np.array([sum(turn.get(key, 0) for key in keys) for turn in self.turns]) / 1000
-
-
-def commands(name, folder):
-    peer = builds.program(folder, "bench_peer")
-    return {"isohead": [builds.program(folder, "bench_isohead")],
-            **{who: [peer, kind] for who, kind in PEERS.items()}}
 
 
 def summary(worker):
@@ -99,10 +92,9 @@ def main():
     parser.add_argument("--repetitions", type=int, default=200)
     options = parser.parse_args()
     frames = builds.timed_frames()
-    programs = {name: commands(name, builds.make(name, ["bench_isohead", "bench_peer"])) for name in builds.NAMES}
-    accuracy = {}
-    for name, program in programs.items():
-        accuracy[name] = agree.compare(program["isohead"], {who: program[who] for who in PEERS}, frames)
+    programs = {name: agree.programs(builds.make(name, ["bench_isohead", "bench_peer"])) for name in builds.NAMES}
+    accuracy = {name: agree.compare(p["isohead"], {who: p[who] for who in "AB"}, frames)
+                for name, p in programs.items()}
     core = max(os.sched_getaffinity(0))
     workers = [(name, Worker("%s %s" % (name, who), command, frames, core))
                for name, program in programs.items() for who, command in program.items()]
@@ -118,11 +110,9 @@ def main():
                                                          options.repetitions))
     for name in programs:
         print(table(name, stages[name]))
-    print("| mean of the frames | " + " | ".join(agree.LIMITS) + " |\n" + "| --- " * (1 + len(agree.LIMITS)) + "|")
-    for who, numbers in accuracy["gcc-O3-v3"].items():
-        print("| %s | " % who + " | ".join("%.3g" % numbers[key] for key in agree.LIMITS) + " |")
+    print(agree.table(accuracy["gcc-O3-v3"]))
     with open(os.path.join(builds.ROOT, "build", "bench.json"), "w", encoding="utf-8") as file:
-        json.dump({"processor": processor(), "repetitions": options.repetitions, "frames": len(frames) - 2,
+        json.dump({"processor": processor(), "repetitions": options.repetitions, "frames": sum(p.endswith(".pgm") for p in frames),
                    "compilers": {name: builds.compiler_version(name) for name in programs},
                    "accuracy": accuracy, "stages": stages}, file, indent=1)
 
