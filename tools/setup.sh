@@ -267,7 +267,7 @@ if [ -n "$packages" ]; then
 fi
 
 case "$1" in
-test | coverage | mutation | bits | cortexm) tools/fetch_third_party.sh build/third_party ;;| cortexm | fuzz) tools/fetch_third_party.sh build/third_party ;;| size) tools/fetch_third_party.sh build/third_party ;;
+test | coverage | mutation | bits | cortexm | fuzz | size) tools/fetch_third_party.sh build/third_party ;;
 board) [ "$2" = host ] || tools/board/sysroot.sh "$2" ;;
 esac
 case "$1" in
