@@ -76,7 +76,7 @@ static double enter(const struct prop_body *body, const double from[3], const do
     const double inside = b * b - a * c;
     const double s = inside < 0 ? -1 : (-b - sqrt(inside)) / a;
 
-    return s > 0 ? s : INFINITY;
+    return s > 0 ? s : (double)INFINITY;
 }
 
 double prop_depth_mm(const struct prop_scene *scene, const double from_mm[3],
