@@ -1,4 +1,4 @@
-/* Rays, scan, fits, evidence, scores and findings from any points. Input: rig, points, over-exposed
+/* Samples, rays, scan, fits, evidence, scores and findings from any points. Input: rig, points, over-exposed
  * blocks, expected heads, hypotheses. */
 #include <string.h>
 
@@ -60,6 +60,16 @@ static void fill_heads(struct fuzz_input *input, struct ih_heads *out)
     }
 }
 
+static void select_samples(const struct ih_points *points, const struct ih_dots *dots,
+                           const struct ih_rig *rig)
+{
+    static struct ih_samples samples;
+    struct ih_samples_params params;
+    ih_samples_params_default(&params);
+    ih_samples_select(points, dots, rig, &params, &samples);
+    fuzz_check_samples(&samples, points);
+}
+
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     static struct ih_points points;
@@ -85,6 +95,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     for (int32_t i = 0; i < windows; i++) {
         fill_points(&input, rig, &points);
         fill_heads(&input, &heads);
+        select_samples(&points, is_range ? NULL : &dots, rig);
         ih_findings_add(&points, is_range ? NULL : &dots, &heads, &expected, rig, &params, &scratch,
                         &findings);
         fuzz_check_findings(&findings);
