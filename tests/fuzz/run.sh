@@ -61,7 +61,16 @@ run_libfuzzer() {
     fi
 }
 
-# AFL++ starts from the corpus that libFuzzer left, and goes on after a finding.
+# keep DIRECTORY FILE...: those that there are, under the name of what is in them.
+keep() {
+    directory=$1
+    shift
+    for input in "$@"; do
+        [ ! -e "$input" ] || cp "$input" "$directory/$(sha1sum <"$input" | cut -d ' ' -f 1)"
+    done
+}
+
+# AFL++ goes on after a finding; what it found new goes to the corpus of later runs.
 run_afl() {
     work=$root/$1
     words=$(dictionary "$1")
@@ -69,7 +78,7 @@ run_afl() {
     if [ -n "$runs" ]; then limit="-E $runs"; else limit="-V $seconds"; fi
     # shellcheck disable=SC2086 # two words
     AFL_SKIP_CPUFREQ=1 AFL_I_DONT_CARE_ABOUT_MISSING_CRASHES=1 AFL_NO_AFFINITY=1 AFL_NO_UI=1 \
-        AFL_CMPLOG_ONLY_NEW=1 AFL_FAST_CAL=1 nice afl-fuzz -i "$work/corpus" -o "$work/afl" $limit \
+        AFL_CMPLOG_ONLY_NEW=1 AFL_FAST_CAL=1 nice afl-fuzz -i "tests/fuzz/corpus/$1" -o "$work/afl" $limit \
         ${words:+-x "$words"} -t 20000 -m none -- "build/fuzz-afl/tests/fuzz/fuzz_$1" \
         >"$work/afl.log" 2>&1 || true
     stats=$work/afl/default/fuzzer_stats
@@ -79,9 +88,8 @@ run_afl() {
     fi
     executions=$(sed -n 's/^execs_done *: //p' "$stats")
     edges=$(sed -n 's/^edges_found *: //p' "$stats")
-    for input in "$work"/afl/default/crashes/id* "$work"/afl/default/hangs/id*; do
-        [ ! -e "$input" ] || cp "$input" "$work/findings/afl-$(sha1sum <"$input" | cut -c 1-16)"
-    done
+    keep "$work/findings" "$work"/afl/default/crashes/id* "$work"/afl/default/hangs/id*
+    keep "$work/corpus" "$work"/afl/default/queue/id*+cov
 }
 
 sum=0
