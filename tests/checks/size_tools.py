@@ -109,6 +109,13 @@ class Assembly(unittest.TestCase):
                             b=[("sub", "sp, #8"), ("bx", "lr")], c=[("sub", "sp, #12"), ("beq.n", "34 <c+0x4>")])
         self.assertEqual(made.stack_of("a"), 20)
 
+    def test_first_store(self):
+        made = self.made_up(a=[("cmp", "r1, #11"), ("push", "{r4, lr}"), ("sub", "sp, #8")],
+                            b=[("str", "r0, [sp, #4]"), ("push", "{r4, lr}")])
+        self.assertEqual(made.first_push("a"), 8)
+        with self.assertRaises(call_graph.Broken):
+            made.first_push("b")
+
     def test_recursion_and_registers(self):
         made = self.made_up(a=[("bl", "20 <b>")], b=[("b.n", "10 <a>")], c=[("blx", "r3")], d=[("mov", "pc, r3")])
         for function in "acd":

@@ -122,8 +122,10 @@ class Program:
                          default=0)
 
     def first_push(self, function):
-        name, operands = self.code[function][0]
-        size = pushed(name, operands)
-        if size == 0:
-            raise Broken("stack: %s begins with '%s', expected a push" % (function, name))
-        return size
+        """Bytes of its first store on the stack: a push, behind what does without one."""
+        for name, operands in self.code[function]:
+            if pushed(name, operands):
+                return pushed(name, operands)
+            if name.startswith(("st", "vst", "bl")):
+                break
+        raise Broken("stack: %s stores or calls before it pushes" % function)

@@ -33,8 +33,8 @@ from program import PREFIX, Program, run
 BOARD = "mps2-an500"
 COMPILER = [PREFIX + "gcc", "-mcpu=cortex-m7", "-mthumb", "-mfloat-abi=soft"]
 MEASURED = 5
-INIT, FRAME = "isohead_init", "isohead_frame"
-ENTRIES = (INIT, FRAME, "ih_blob_decode")
+DECODE, INIT, FRAME = "ih_blob_decode", "isohead_init", "isohead_frame"
+ENTRIES = (DECODE, INIT, FRAME)
 # Where the work of the core ends: what the program calls next.
 ENDS = ("app_record_frame", "app_record_error", "hal_semihosting_call")
 MEM = ("memcpy", "memmove", "memset", "memcmp")
@@ -85,7 +85,7 @@ def check_calls(stack, callees):
 
 def count(program, plugin, rig, frames):
     """[(mark, first store, lowest store, {(address, instructions): runs})] of every phase."""
-    marks = {program.symbol[name]: name for name in (INIT, FRAME) + ENDS}
+    marks = {program.symbol[name]: name for name in ENTRIES + ENDS}
     words = ["isohead_cortexm", rig] + frames
     if any("," in word or " " in word for word in words):
         raise Broken("frames: a name with a blank or comma, which semihosting cannot pass on")
@@ -181,13 +181,13 @@ def joined(tables):
     return total
 
 
-def print_stages(table, program, frames, init):
-    """frames, init: pieces. Returns flash and the mean of instructions."""
+def print_stages(table, program, frames, rig):
+    """frames, rig: pieces. Returns flash and the mean of instructions."""
     pieces = joined(frames)
-    own, shared, at_init = by_row(program, pieces), shared_out(program, pieces), by_row(program, init)
+    own, shared, once = by_row(program, pieces), shared_out(program, pieces), by_row(program, rig)
     total = sum(own.values())
     line = "%-32s %6s %9s %6s %12s %12s %5s %10s"
-    print(line % ("", "code", "constants", "flash", "own", "with help", "", "init"))
+    print(line % ("", "code", "constants", "flash", "own", "with help", "", "rig, once"))
     print(line % ("stage", "B", "B", "B", "instr/frame", "instr/frame", "%", "instr"))
     for row in order() + list(ROWS_OUTSIDE):
         code, constants = table[row] if row in table else (outside_flash(program, row), 0)
@@ -195,11 +195,11 @@ def print_stages(table, program, frames, init):
         print(line % (ROWS_OUTSIDE.get(row, row), code, constants, code + constants,
                       round(own.get(row, 0) / len(frames)),
                       "shared out" if row in HELPERS else round(part / len(frames)),
-                      "" if row in HELPERS else "%.1f" % (100 * part / total), at_init.get(row, 0)))
+                      "" if row in HELPERS else "%.1f" % (100 * part / total), once.get(row, 0)))
     code, constants = (sum(sizes[i] for sizes in table.values()) for i in (0, 1))
     totals = [sum(by_row(program, frame).values()) for frame in frames]
     print(line % ("all; flash: the core's own", code, constants, code + constants, round(total / len(frames)),
-                  round(sum(shared.values()) / len(frames)), "100", sum(at_init.values())))
+                  round(sum(shared.values()) / len(frames)), "100", sum(once.values())))
     print("instr/frame: mean of %d frames; their least %d, median %d, worst %d. with help: and of the helpers,\n"
           "ih_fix, memcpy and division, what they spend for the stage, in proportion to its calls.\n"
           % (len(frames), min(totals), statistics.median(totals), max(totals)))
@@ -255,10 +255,10 @@ def measure(arguments, directory):
     stack, callees = graph(objects, program)
     phases = count(program, arguments.plugin, arguments.rig, arguments.frames)
     frames = [pieces for mark, _, _, pieces in phases if mark == FRAME][-MEASURED:]
-    init = next(pieces for mark, _, _, pieces in phases if mark == INIT)
+    rig = joined(pieces for mark, _, _, pieces in phases if mark in (DECODE, INIT))
     print("Cortex-M7 (%s), %s\n" % (BOARD, run(PREFIX + "gcc", "--version").splitlines()[0]))
     found = {}
-    found["flash_bytes"], found["cortexm7_frame_instructions"] = print_stages(table, program, frames, init)
+    found["flash_bytes"], found["cortexm7_frame_instructions"] = print_stages(table, program, frames, rig)
     found["ram_bytes"], ram_max = print_ram(directory)
     found["stack_bytes"] = print_stack(stack, callees, program, phases)
     if ram_max != limits.read()["ram_bytes"]:
