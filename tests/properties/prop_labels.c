@@ -1,15 +1,15 @@
 /* Labels of any subset of the true dots, their centres off as measured ones are.
  *
- * Where no dot's line passes near the places of another dot within the working range, which is so for the
- * paper's short baseline, none is ever labelled wrongly: a dot can only get the label of a slot whose
- * candidate it is. With a long baseline a dot is a candidate of up to ten slots, and where the true dot
- * of one of them is missing it may be taken for it: there the share of wrong labels is bounded. */
+ * A dot gets no label but those of slots whose line it lies on. With the paper's short baseline that is
+ * one slot, whatever is missing: none is ever labelled wrongly. With a long baseline it may be several,
+ * and where the true dot of one of them is missing another may be taken for it: there the share of wrong
+ * labels is bounded, no more. */
 #include "ih_labels.h"
 #include "prop_scene.h"
 
 #include "rigs.inc"
 
-/* Of a centre, per axis: twice the median of found dots' errors (README, "centre of a dot"). */
+/* Of a centre, per axis: a median of 0.15 px off, where rendered frames have 0.13 (README). */
 #define SIGMA_PX 0.13
 
 static struct ih_rig rig;
@@ -21,6 +21,7 @@ static int16_t slot_of_all[IH_DOTS_MAX], slot_of_dot[IH_DOTS_MAX];
 
 struct tally {
     int64_t dots, right, wrong;
+    int64_t candidates; /* of slots, as many as there are for all dots */
 };
 
 void setUp(void)
@@ -46,12 +47,13 @@ static void take_subset(struct ih_test_random *random, double share)
 /* Labels of one subset; the missing ones are what is left of dots. */
 static struct tally count(void)
 {
-    struct tally tally = {dots.dot_count, 0, 0};
+    struct tally tally = {dots.dot_count, 0, 0, 0};
 
     ih_labels_assign(&dots, &rig, &params, &scratch, &labels);
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
         const int32_t dot = labels.dot_of_slot[slot];
 
+        tally.candidates += scratch.candidate_count[slot];
         if (dot != IH_NONE) {
             tally.right += slot_of_dot[dot] == slot;
             tally.wrong += slot_of_dot[dot] != slot;
@@ -65,7 +67,7 @@ static struct tally count(void)
 static struct tally try_subsets(int which, uint64_t seed, int32_t seeds, double least, double most)
 {
     struct ih_test_random random = {seed};
-    struct tally sum = {0, 0, 0};
+    struct tally sum = {0, 0, 0, 0};
     int32_t bad_slot;
 
     TEST_ASSERT_EQUAL_INT(IH_OK, ih_rig_init(&rig, &vector_rigs[which], &bad_slot));
@@ -79,11 +81,13 @@ static struct tally try_subsets(int which, uint64_t seed, int32_t seeds, double 
         sum.dots += one.dots;
         sum.right += one.right;
         sum.wrong += one.wrong;
+        sum.candidates += one.candidates;
     }
     printf("labels: rig %d, %3.0f to %3.0f %% of the dots left: %lld dots, %.2f %% labelled right, "
-           "%.3f %% wrong\n",
-           which, 100 * least, 100 * most, (long long)sum.dots, 100.0 * (double)sum.right / (double)sum.dots,
-           100.0 * (double)sum.wrong / (double)sum.dots);
+           "%.3f %% wrong; %.2f slots that a dot may belong to\n",
+           which, 100 * least, 100 * most, (long long)sum.dots,
+           100.0 * (double)sum.right / (double)sum.dots,
+           100.0 * (double)sum.wrong / (double)sum.dots, (double)sum.candidates / (double)sum.dots);
     return sum;
 }
 
@@ -99,12 +103,13 @@ static void with_a_short_baseline_no_subset_has_a_wrong_label(void)
         const struct tally most = try_subsets(short_rigs[i], 703, prop_seeds(250), 0.8, 1);
 
         TEST_ASSERT_EQUAL_INT64(0, few.wrong + many.wrong + most.wrong);
+        TEST_ASSERT_LESS_OR_EQUAL_INT64(most.dots, most.candidates);
         TEST_ASSERT_GREATER_OR_EQUAL_INT64(many.dots * 97 / 100, many.right);
         TEST_ASSERT_GREATER_OR_EQUAL_INT64(most.dots * 995 / 1000, most.right);
     }
 }
 
-/* 125 mm: bounds are twice what other seeds gave. */
+/* 125 mm: bounds are twice what other seeds gave: 1.4, 1.8, 0.5 and 0.08 %. */
 static void with_a_long_baseline_few_labels_are_wrong(void)
 {
     const struct tally few = try_subsets(1, 711, prop_seeds(150), 0, 0.5);
@@ -114,8 +119,8 @@ static void with_a_long_baseline_few_labels_are_wrong(void)
 
     TEST_ASSERT_LESS_OR_EQUAL_INT64(few.dots * 35 / 1000, few.wrong);
     TEST_ASSERT_LESS_OR_EQUAL_INT64(many.dots * 35 / 1000, many.wrong);
-    TEST_ASSERT_LESS_OR_EQUAL_INT64(most.dots * 12 / 1000, most.wrong);
-    TEST_ASSERT_LESS_OR_EQUAL_INT64(every.dots * 3 / 1000, every.wrong);
+    TEST_ASSERT_LESS_OR_EQUAL_INT64(most.dots * 10 / 1000, most.wrong);
+    TEST_ASSERT_LESS_OR_EQUAL_INT64(every.dots * 2 / 1000, every.wrong);
     TEST_ASSERT_GREATER_OR_EQUAL_INT64(every.dots * 99 / 100, every.right);
 }
 
