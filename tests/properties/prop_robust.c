@@ -6,8 +6,10 @@
  * behind it, which clip_behind limits; so the bound is for the inner three quarters of the head, and in the
  * mean of the squares. 20 points are fewer than 8 % of 361: the clip depth, their 8th percentile, stays that
  * of true ones; most of them are isolated and dropped, the Huber step weakens the others. No node can move
- * farther than from the overshoot's limit before the nearest sample to the farthest depth. The bounds are
- * 1.5 times the worst of 3000 scenes of other seeds. */
+ * farther than from the overshoot's limit before the nearest sample to the farthest depth.
+ *
+ * Bounds: 1.5 times the worst of scenes of other seeds, for points taken away 91 mm of 3700, for points
+ * moved 53 mm of 2300; and of their means, 16 mm and 9 mm. */
 #include "ih_labels.h"
 #include "ih_surface.h"
 #include "prop_scene.h"
@@ -115,7 +117,8 @@ static double difference_mm(const struct prop_scene *scene, double *worst)
     return sqrt(sum / count);
 }
 
-static void check(int which, uint64_t seed, int32_t taken, int32_t moved, double bound_mm)
+static void check(int which, uint64_t seed, int32_t taken, int32_t moved, double bound_mm,
+                  double mean_bound_mm)
 {
     struct ih_test_random random = {seed};
     struct ih_labels_params params;
@@ -149,14 +152,14 @@ static void check(int which, uint64_t seed, int32_t taken, int32_t moved, double
 
 static void any_70_points_may_be_missing(void)
 {
-    check(0, 901, TAKEN, 0, 120);
-    check(1, 902, TAKEN, 0, 120);
+    check(0, 901, TAKEN, 0, 137, 24);
+    check(1, 902, TAKEN, 0, 137, 24);
 }
 
 static void any_20_points_may_be_wrong(void)
 {
-    check(0, 903, 0, MOVED, 120);
-    check(1, 904, 0, MOVED, 120);
+    check(0, 903, 0, MOVED, 80, 13.5);
+    check(1, 904, 0, MOVED, 80, 13.5);
 }
 
 int main(void)

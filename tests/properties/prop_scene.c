@@ -60,7 +60,7 @@ struct prop_scene prop_moved(const struct prop_scene *scene, const double by_mm[
     return out;
 }
 
-/* Where a line enters an ellipsoid: the least s > 0; INFINITY where it does not. */
+/* Where a line enters an ellipsoid: the least s > 0; HUGE_VAL where it does not. */
 static double enter(const struct prop_body *body, const double from[3], const double towards[3])
 {
     double a = 0, b = 0, c = -1;
@@ -76,7 +76,7 @@ static double enter(const struct prop_body *body, const double from[3], const do
     const double inside = b * b - a * c;
     const double s = inside < 0 ? -1 : (-b - sqrt(inside)) / a;
 
-    return s > 0 ? s : (double)INFINITY;
+    return s > 0 ? s : HUGE_VAL;
 }
 
 double prop_depth_mm(const struct prop_scene *scene, const double from_mm[3],
@@ -120,7 +120,7 @@ static bool is_hidden(const struct prop_scene *scene, const double point_mm[3])
 {
     static const double camera[3] = {0, 0, 0};
 
-    return prop_depth_mm(scene, camera, point_mm, NULL) < point_mm[2] - 0.5;
+    return prop_depth_mm(scene, camera, point_mm, NULL) < point_mm[2] * 0.9995;
 }
 
 struct prop_dot prop_dot_of(const struct prop_scene *scene, const struct ih_calibration *c,
