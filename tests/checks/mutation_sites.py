@@ -76,8 +76,15 @@ def without_assertions(found):
 
 def is_array_size(found, i):
     """Is this number all there is between the brackets of a declaration?"""
-    return (2 < i < len(found) - 1 and found[i - 1].text == "[" and found[i + 1].text == "]" and
-            (found[i - 3].kind == "word" or found[i - 3].text in ("*", ",")))
+    if not (2 < i < len(found) - 1 and found[i - 1].text == "[" and found[i + 1].text == "]"):
+        return False
+    name = i - 2
+    while found[name].text == "]":  # of an array of arrays
+        while found[name].text != "[":
+            name -= 1
+        name -= 1
+    before = found[name - 1]
+    return before.kind == "word" and before.text != "return" or before.text in ("*", ",")
 
 
 def constants(found):

@@ -298,6 +298,211 @@ static void a_line_has_no_bulge(void)
     }
 }
 
+/* --- limits, to the last unit --------------------------------------------------------------------
+ */
+
+/* A ball of 64 mm, 1024 mm ahead: a slope of 4 n in Q20 passes its centre's depth n / 256 mm aside,
+ * which is n in semi-axes too, in Q14. */
+#define BALL_MM_Q8 (64 << 8)
+#define BALL_Z_MM_Q8 (1024 << 8)
+#define NO_POINT INT32_MAX
+
+struct limit {
+    const char *what;
+    int kind;
+    int32_t x_mm_q8, y_mm_q8, dz_mm_q8; /* of a ray and its point; NO_POINT: it is empty */
+    int32_t value_q8;
+};
+
+static void cast_ray(int32_t slot, int32_t x_mm_q8, int32_t y_mm_q8, int32_t dz_mm_q8)
+{
+    space.ray[slot] = (struct ih_ray){
+        .slope_x_q20 = 4 * x_mm_q8, .slope_y_q20 = 4 * y_mm_q8, .state = IH_RAY_EMPTY};
+    if (dz_mm_q8 != NO_POINT) {
+        const double depth = (double)BALL_Z_MM_Q8 + dz_mm_q8;
+
+        space.ray[slot].state = IH_RAY_SEEN;
+        space.ray[slot].point_mm_q8[0] = (int32_t)lround(x_mm_q8 * depth / BALL_Z_MM_Q8);
+        space.ray[slot].point_mm_q8[1] = (int32_t)lround(y_mm_q8 * depth / BALL_Z_MM_Q8);
+        space.ray[slot].point_mm_q8[2] = BALL_Z_MM_Q8 + dz_mm_q8;
+    }
+}
+
+static void forget_rays(void)
+{
+    int slot;
+
+    memset(&space, 0, sizeof space);
+    for (slot = 0; slot < IH_SLOTS; slot++) {
+        space.ray[slot].state = IH_RAY_UNKNOWN;
+    }
+}
+
+static void collect_ball(void)
+{
+    static const struct ih_ellipsoid ball = {.centre_mm_q8 = {0, 0, BALL_Z_MM_Q8},
+                                             .semi_mm_q8 = {BALL_MM_Q8, BALL_MM_Q8, BALL_MM_Q8}};
+
+    ih_evidence_collect(&space, &ball, ball.centre_mm_q8, &no_nest, &evidence);
+}
+
+/* One ray each. A closed one makes a share of openness a quarter, none a half; one of body, of three
+ * rays at least, makes a third. */
+static void places_and_depths_have_their_limits(void)
+{
+    enum { MM = 256, CHIN = BALL_MM_Q8 };
+    static const struct limit limits[] = {
+        {"body, 40 mm", IH_EVIDENCE_BODY, 0, CHIN + 40 * MM, 0, 0},
+        {"body, beyond 40 mm", IH_EVIDENCE_BODY, 0, CHIN + 40 * MM + 1, 0, 85},
+        {"body, before 260 mm", IH_EVIDENCE_BODY, 0, CHIN + 260 * MM - 1, 0, 85},
+        {"body, 260 mm", IH_EVIDENCE_BODY, 0, CHIN + 260 * MM, 0, 0},
+        {"body, before 180 mm aside", IH_EVIDENCE_BODY, 180 * MM - 1, CHIN + 100 * MM, 0, 85},
+        {"body, 180 mm aside", IH_EVIDENCE_BODY, -180 * MM, CHIN + 100 * MM, 0, 0},
+        {"body, dz -220", IH_EVIDENCE_BODY, 0, CHIN + 100 * MM, -220 * MM, 0},
+        {"body, dz above -220", IH_EVIDENCE_BODY, 0, CHIN + 100 * MM, -220 * MM + 1, 85},
+        {"body, dz below 200", IH_EVIDENCE_BODY, 0, CHIN + 100 * MM, 200 * MM - 1, 85},
+        {"body, dz 200", IH_EVIDENCE_BODY, 0, CHIN + 100 * MM, 200 * MM, 0},
+        {"wide, 40 mm", IH_EVIDENCE_WIDE, 310 * MM, CHIN + 40 * MM, 0, 0},
+        {"wide, beyond 40 mm", IH_EVIDENCE_WIDE, 310 * MM, CHIN + 40 * MM + 1, 0, 85},
+        {"wide, before 240 mm", IH_EVIDENCE_WIDE, -310 * MM, CHIN + 240 * MM - 1, 0, 85},
+        {"wide, 240 mm", IH_EVIDENCE_WIDE, -310 * MM, CHIN + 240 * MM, 0, 0},
+        {"wide, 300 mm aside", IH_EVIDENCE_WIDE, 300 * MM, CHIN + 100 * MM, 0, 0},
+        {"wide, beyond 300 mm aside", IH_EVIDENCE_WIDE, -300 * MM - 1, CHIN + 100 * MM, 0, 85},
+        {"level, 170 mm aside", IH_EVIDENCE_LEVEL, 170 * MM, 0, 0, 0},
+        {"level, beyond 170 mm", IH_EVIDENCE_LEVEL, 170 * MM + 1, 0, 0, 85},
+        {"level, before 330 mm", IH_EVIDENCE_LEVEL, -330 * MM + 1, 0, 0, 85},
+        {"level, 330 mm", IH_EVIDENCE_LEVEL, -330 * MM, 0, 0, 0},
+        {"level, just below the top", IH_EVIDENCE_LEVEL, 200 * MM, 1 - BALL_MM_Q8, 0, 85},
+        {"level, at the top", IH_EVIDENCE_LEVEL, 200 * MM, -BALL_MM_Q8, 0, 0},
+        {"level, at the chin", IH_EVIDENCE_LEVEL, 200 * MM, BALL_MM_Q8, 0, 0},
+        {"level, dz 150", IH_EVIDENCE_LEVEL, 200 * MM, 0, 150 * MM, 0},
+        {"level, dz below 150", IH_EVIDENCE_LEVEL, 200 * MM, 0, 150 * MM - 1, 85},
+        {"level, dz above -150", IH_EVIDENCE_LEVEL, 200 * MM, 0, 1 - 150 * MM, 85},
+        {"level, dz -150", IH_EVIDENCE_LEVEL, 200 * MM, 0, -150 * MM, 0},
+        {"below, 9 in 10", IH_EVIDENCE_BELOW, 20000, 18000, 0, 128},
+        {"below, steeper", IH_EVIDENCE_BELOW, 20000, 18001, 0, 64},
+        {"right, 9 in 10 below", IH_EVIDENCE_BESIDE, 20000, 18000, 0, 64},
+        {"left, 8 in 10 above", IH_EVIDENCE_BESIDE, -20000, -16000, 0, 64},
+        {"above, 8 in 10", IH_EVIDENCE_ABOVE, -20000, -16000, 0, 128},
+        {"above, steeper", IH_EVIDENCE_ABOVE, -20000, -16001, 0, 64},
+        {"above, 1.25 semi-axes", IH_EVIDENCE_ABOVE, 0, -20480, 0, 128},
+        {"above, beyond 1.25 semi-axes", IH_EVIDENCE_ABOVE, 0, -20481, 0, 64},
+        {"above, before 1.9 semi-axes", IH_EVIDENCE_ABOVE, 0, -31129, 0, 64},
+        {"above, 1.9 semi-axes", IH_EVIDENCE_ABOVE, 0, -31130, 0, 128},
+        {"high, 1.9 semi-axes", IH_EVIDENCE_HIGH, 0, -31130, 0, 128},
+        {"high, beyond 1.9 semi-axes", IH_EVIDENCE_HIGH, 0, -31131, 0, 64},
+        {"high, before 1.6 semi-axes aside", IH_EVIDENCE_HIGH, 26213, -40000, 0, 64},
+        {"high, 1.6 semi-axes aside", IH_EVIDENCE_HIGH, -26214, -40000, 0, 128},
+        {"open, dz 60", IH_EVIDENCE_ABOVE, 0, -25000, 60 * MM, 64},
+        {"open, dz above 60", IH_EVIDENCE_ABOVE, 0, -25000, 60 * MM + 1, 192},
+        {"open, nothing", IH_EVIDENCE_ABOVE, 0, -25000, NO_POINT, 192},
+        {"nothing above", IH_EVIDENCE_NOTHING, 0, -25000, NO_POINT, 256},
+        {"something above", IH_EVIDENCE_NOTHING, 0, -25000, 0, 0},
+        {"nothing below", IH_EVIDENCE_NOTHING, 0, 25000, NO_POINT, 0},
+        {"before, 60 mm", IH_EVIDENCE_BEFORE, 0, 30000, -124 * MM, 0},
+        {"before, beyond 60 mm", IH_EVIDENCE_BEFORE, 0, 30000, -124 * MM - 1, 256},
+        {"before, just within 2.5 semi-axes", IH_EVIDENCE_BEFORE, 40959, 0, -200 * MM, 256},
+        {"before, 2.5 semi-axes", IH_EVIDENCE_BEFORE, 40960, 0, -200 * MM, 0},
+    };
+    int i;
+
+    for (i = 0; i < IH_TEST_COUNT(limits); i++) {
+        const struct limit *l = &limits[i];
+
+        forget_rays();
+        cast_ray(i % IH_SLOTS, l->x_mm_q8, l->y_mm_q8, l->dz_mm_q8);
+        collect_ball();
+        IH_TEST_EQUAL(l->value_q8, evidence.value_q8[l->kind], l->what, i);
+    }
+}
+
+/* Shoulders are the lesser of both sides, of two rays at least. */
+static void shoulders_have_their_limits(void)
+{
+    enum { MM = 256, LOW = BALL_MM_Q8 };
+    static const struct {
+        const char *what;
+        int32_t left_mm_q8, right_mm_q8, y_mm_q8, value_q8;
+    } cases[] = {
+        {"between", -150 * MM, 150 * MM, LOW, 128},
+        {"left, 100 mm", -100 * MM, 150 * MM, LOW, 0},
+        {"right, 100 mm", -150 * MM, 100 * MM, LOW, 0},
+        {"beyond 100 mm", -100 * MM - 1, 100 * MM + 1, LOW, 128},
+        {"before 260 mm", -260 * MM + 1, 260 * MM - 1, LOW, 128},
+        {"left, 260 mm", -260 * MM, 150 * MM, LOW, 0},
+        {"both on the left", -150 * MM, -160 * MM, LOW, 0},
+        {"0.9 semi-axes down", -150 * MM, 150 * MM, 14745, 0}, /* 0.9 of 16,384 is 14,745.6 */
+        {"beyond 0.9 semi-axes", -150 * MM, 150 * MM, 14746, 128},
+        {"before 160 mm below the chin", -150 * MM, 150 * MM, LOW + 160 * MM - 1, 128},
+        {"160 mm below the chin", -150 * MM, 150 * MM, LOW + 160 * MM, 0},
+    };
+    int i;
+
+    for (i = 0; i < IH_TEST_COUNT(cases); i++) {
+        forget_rays();
+        cast_ray(3, cases[i].left_mm_q8, cases[i].y_mm_q8, 0);
+        cast_ray(4, cases[i].right_mm_q8, cases[i].y_mm_q8, 0);
+        collect_ball();
+        IH_TEST_EQUAL(cases[i].value_q8, evidence.value_q8[IH_EVIDENCE_SHOULDER], cases[i].what, i);
+    }
+}
+
+/* n rays of body: shares are of three at least, the count is theirs up to 30. */
+static void few_rays_say_little(void)
+{
+    static const struct {
+        int kind;
+        int32_t x_mm_q8, y_mm_q8;
+    } places[] = {{IH_EVIDENCE_BODY, 0, 164 << 8},
+                  {IH_EVIDENCE_WIDE, 310 << 8, 164 << 8},
+                  {IH_EVIDENCE_LEVEL, 200 << 8, 0}};
+    int i, count;
+
+    for (i = 0; i < IH_TEST_COUNT(places); i++) {
+        forget_rays();
+        for (count = 1; count <= 33; count++) {
+            cast_ray(5 * count, places[i].x_mm_q8, places[i].y_mm_q8, 50 << 8);
+            collect_ball();
+            IH_TEST_EQUAL(count < 3 ? count * 256 / 3 : 256, evidence.value_q8[places[i].kind],
+                          "share", count);
+            if (places[i].kind == IH_EVIDENCE_BODY) {
+                IH_TEST_EQUAL((count < 30 ? count : 30) << 8,
+                              evidence.value_q8[IH_EVIDENCE_BODY_RAYS], "rays", count);
+                IH_TEST_EQUAL(50 << 8, evidence.value_q8[IH_EVIDENCE_BODY_DEPTH], "depth", count);
+            }
+        }
+        for (count = 0; count < 3; count++) { /* as many again that are no body */
+            cast_ray(2 + 5 * count, places[i].x_mm_q8, places[i].y_mm_q8, NO_POINT);
+        }
+        collect_ball();
+        IH_TEST_EQUAL(33 * 256 / 36, evidence.value_q8[places[i].kind], "of more", i);
+    }
+}
+
+/* A ray through the middle enters 64 mm before it. */
+static void rays_through_the_middle_have_their_limits(void)
+{
+    enum { MM = 256 };
+    static const struct {
+        int32_t dz_mm_q8, through, front, hit;
+    } cases[] = {
+        {-64 * MM, 0, 0, 1},           {-14 * MM, 0, 0, 0},           {-14 * MM + 1, 1, 0, 0},
+        {-94 * MM, 0, 0, 0},           {-94 * MM - 1, 0, 1, 0},       {-64 * MM - 19 * MM, 0, 0, 1},
+        {-64 * MM - 21 * MM, 0, 0, 0}, {-64 * MM + 19 * MM, 0, 0, 1}, {NO_POINT, 1, 0, 0},
+    };
+    int i;
+
+    for (i = 0; i < IH_TEST_COUNT(cases); i++) {
+        forget_rays();
+        cast_ray(180, 0, 0, cases[i].dz_mm_q8);
+        collect_ball();
+        IH_TEST_EQUAL(cases[i].through, evidence.through_count, "through", i);
+        IH_TEST_EQUAL(cases[i].front, evidence.front_count, "front", i);
+        IH_TEST_EQUAL(cases[i].hit, evidence.hit_count, "hit", i);
+        IH_TEST_EQUAL(cases[i].hit << 8, evidence.value_q8[IH_EVIDENCE_ON], "on", i);
+    }
+}
+
 /* --- extremes ------------------------------------------------------------------------------------
  */
 
@@ -372,6 +577,10 @@ int main(void)
     RUN_TEST(without_rays_nothing_is_known);
     RUN_TEST(bulges_match_the_best_plane);
     RUN_TEST(a_line_has_no_bulge);
+    RUN_TEST(places_and_depths_have_their_limits);
+    RUN_TEST(shoulders_have_their_limits);
+    RUN_TEST(few_rays_say_little);
+    RUN_TEST(rays_through_the_middle_have_their_limits);
     RUN_TEST(extremes_do_not_overflow);
     RUN_TEST(every_kind_has_a_word_of_its_own);
     return UNITY_END();

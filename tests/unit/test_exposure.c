@@ -174,6 +174,54 @@ static void without_labels_the_frame_itself_is_looked_at(void)
     TEST_ASSERT_EQUAL_INT32(IH_SLOTS / 8, look.lost_count);
 }
 
+/* Aims of 8 and 80 grey levels: the gaps begin at 7 and 70 below, at 9 and 90 above. */
+static void steps_begin_beyond_the_gaps(void)
+{
+    static const struct {
+        int32_t weak, strong, step; /* less its limit by one, at it, ...; which way */
+    } cases[] = {
+        {7 * IH_BAND_UNIT - 1, 70 * IH_BAND_UNIT - 1, 1},
+        {7 * IH_BAND_UNIT, 70 * IH_BAND_UNIT - 1, 0},
+        {7 * IH_BAND_UNIT - 1, 70 * IH_BAND_UNIT, 0},
+        {9 * IH_BAND_UNIT, 90 * IH_BAND_UNIT + 1, 0},
+        {9 * IH_BAND_UNIT + 1, 90 * IH_BAND_UNIT, 0},
+        {9 * IH_BAND_UNIT + 1, 90 * IH_BAND_UNIT + 1, -1},
+    };
+    int i;
+
+    params.weak_grey_q4 = 8 * 16;
+    params.strong_grey_q4 = 80 * 16;
+    for (i = 0; i < IH_TEST_COUNT(cases); i++) {
+        const struct ih_exposure_look look = {
+            .labelled_count = IH_SLOTS, .weak = cases[i].weak, .strong = cases[i].strong};
+
+        ih_exposure_start(&params, 2000, 128, &state);
+        ih_exposure_next(&params, &look, &state);
+        IH_TEST_EQUAL(cases[i].step, (state.duty_q8 > 128) - (state.duty_q8 < 128), "duty", i);
+        IH_TEST_EQUAL(2000, state.exposure_us, "exposure", i);
+    }
+}
+
+/* An eighth more of a duty of 3 is rounded to nothing: it is one more all the same, not two, and
+ * never more than there may be. */
+static void a_small_duty_grows_by_one(void)
+{
+    const int32_t weak_aim = params.weak_grey_q4 * IH_BAND_UNIT / 16;
+    const struct ih_exposure_look look = {
+        .labelled_count = IH_SLOTS, .weak = weak_aim * 8 / 10, .strong = 1};
+
+    params.duty_min_q8 = 1;
+    params.duty_max_q8 = 5;
+    ih_exposure_start(&params, 2000, 3, &state);
+    ih_exposure_next(&params, &look, &state);
+    TEST_ASSERT_EQUAL_INT32(4, state.duty_q8);
+    ih_exposure_next(&params, &look, &state);
+    TEST_ASSERT_EQUAL_INT32(5, state.duty_q8);
+    ih_exposure_next(&params, &look, &state);
+    TEST_ASSERT_EQUAL_INT32(5, state.duty_q8);
+    TEST_ASSERT_GREATER_THAN_INT32(2000, state.exposure_us);
+}
+
 /* --- closed loop --------------------------------------------------------------------------------- */
 
 /* What a camera sees: a dot is as high as its surface, exposure and duty say, up to full scale less
@@ -400,6 +448,8 @@ int main(void)
     RUN_TEST(only_missing_dots_in_bright_places_are_lost);
     RUN_TEST(dots_at_the_edges_of_the_pattern_can_be_lost);
     RUN_TEST(without_labels_the_frame_itself_is_looked_at);
+    RUN_TEST(steps_begin_beyond_the_gaps);
+    RUN_TEST(a_small_duty_grows_by_one);
     RUN_TEST(all_scenes_come_to_rest_near_the_best);
     RUN_TEST(retries_are_rare);
     RUN_TEST(jitter_is_not_amplified);
