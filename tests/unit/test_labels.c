@@ -407,6 +407,57 @@ static void the_same_dots_give_the_same_labels(void)
 }
 
 /* Dots nearer or farther than the working range are nobody's. */
+/* A slot's dot where a surface of this inverse depth, 1/mm, shows it. */
+static void put_on_plane(int32_t slot, double inverse_depth)
+{
+    const struct ih_line *line = &rig.line[slot];
+    const double t = inverse_depth * line->length_px_mm_q8 / 256;
+
+    add_dot((int32_t)lround(line->infinity_u_px_q12 + 4096 * t * line->dir_u_q30 / (1 << 30)),
+            (int32_t)lround(line->infinity_v_px_q12 + 4096 * t * line->dir_v_q30 / (1 << 30)),
+            (int16_t)slot);
+}
+
+/* A slot at the pattern's edge, its neighbours along that edge missing, so that no rectangle has it,
+ * before a plane whose dots move by 3 px from row to row of the pattern (or column to column). Its
+ * own dot continues the plane; another is nearer to what its neighbours show, but not on the plane. */
+static void growing_follows_tilted_planes(void)
+{
+    static const struct {
+        int32_t row, column, inwards_row, inwards_column;
+    } edges[] = {{0, 9, 1, 0}, {18, 9, -1, 0}, {9, 0, 0, 1}, {9, 18, 0, -1}};
+    int i, tilt;
+
+    for (i = 0; i < 2 * IH_TEST_COUNT(edges); i++) {
+        const int32_t row = edges[i / 2].row, column = edges[i / 2].column;
+        const int32_t slot = row * IH_GRID + column;
+        int32_t depth, across;
+        double px;
+
+        use_rig(2);
+        dots.dot_count = 0;
+        tilt = i % 2 == 0 ? 1 : -1;
+        px = 256.0 / rig.line[slot].length_px_mm_q8; /* of inverse depth */
+        put_on_plane(slot, 1.0 / 900);
+        put_on_plane(slot, 1.0 / 900 + tilt * 2 * px); /* 1 px from the next row's */
+        for (depth = 0; depth < 5; depth++) {
+            for (across = -2; across <= 2; across++) {
+                const int32_t r =
+                    row + depth * edges[i / 2].inwards_row + across * edges[i / 2].inwards_column;
+                const int32_t c = column + depth * edges[i / 2].inwards_column +
+                                  across * edges[i / 2].inwards_row;
+
+                if (depth > 0) {
+                    put_on_plane(r * IH_GRID + c, 1.0 / 900 + tilt * depth * 3 * px);
+                }
+            }
+        }
+        assign();
+        IH_TEST_RANGE(12, 20, labels.seed_count, "seeds", i);
+        IH_TEST_EQUAL(0, labels.dot_of_slot[slot], "the dot on the plane", i);
+    }
+}
+
 /* With a baseline of 10 mm the far end of a line is less than the margin from infinity, but nothing
  * lies behind infinity: a dot there is on no line. */
 static void nothing_lies_behind_infinity(void)
@@ -466,6 +517,7 @@ int main(void)
     RUN_TEST(spurious_dots_change_little);
     RUN_TEST(ambiguous_rectangles_are_no_seeds);
     RUN_TEST(growing_starts_from_any_epsilon);
+    RUN_TEST(growing_follows_tilted_planes);
     RUN_TEST(limits_are_obeyed);
     RUN_TEST(as_many_dots_as_there_may_be_are_survived);
     RUN_TEST(the_same_dots_give_the_same_labels);
