@@ -649,6 +649,29 @@ static void a_head_in_plain_view_is_not_carried(void)
     TEST_ASSERT_EQUAL_INT(1000000 / FRAME_US + 1, frames);
 }
 
+/* Hidden begins at 30 % of all rays, whatever the others say: its log-odds stay what they were. */
+static void hidden_begins_at_its_limit(void)
+{
+    static const struct {
+        struct ih_view view;
+        bool hidden;
+    } cases[] = {{{0, 70, 30}, true},   {{0, 71, 29}, false}, {{35, 35, 30}, true},
+                 {{35, 36, 29}, false}, {{0, 0, 10}, true},   {{0, 99, 1}, false}};
+    int i;
+
+    for (i = 0; i < IH_TEST_COUNT(cases); i++) {
+        int32_t logit_q10;
+
+        setUp();
+        frames_with(5, 0, 0, 800, 5);
+        logit_q10 = tracks.track[0].mean_logit_q10;
+        view = cases[i].view;
+        frame();
+        IH_TEST_EQUAL(1, tracks.track_count, "carried", i);
+        IH_TEST_EQUAL(cases[i].hidden, tracks.track[0].mean_logit_q10 == logit_q10, "hidden", i);
+    }
+}
+
 /* Heads at once, later, not yet: by the log-odds of a new track and of one that was found thrice. */
 static void evidence_makes_a_head(void)
 {
@@ -690,6 +713,24 @@ static void hands_before_a_head_do_not_end_it(void)
     frames_with(1, 40, 0, 800, 3);
     TEST_ASSERT_EQUAL_INT32(1, tracks.selected_id);
     TEST_ASSERT_FALSE(is_carried(0));
+}
+
+/* What stands in the list for a carried head is the track's alone: nothing of a finding that stood
+ * there before. */
+static void a_carried_head_has_no_evidence(void)
+{
+    int kind;
+
+    frames_with(10, 0, 0, 800, 3);
+    view = front;
+    memset(findings.finding, IH_TEST_FILL, sizeof findings.finding);
+    frame();
+    TEST_ASSERT_TRUE(is_carried(0));
+    for (kind = 0; kind < IH_EVIDENCE_COUNT; kind++) {
+        IH_TEST_EQUAL(0, findings.finding[0].evidence.value_q8[kind], "evidence", kind);
+    }
+    IH_TEST_EQUAL(0, findings.finding[0].evidence.hit_count, "hits", 0);
+    IH_TEST_EQUAL(IH_SOURCE_EXPECTED, findings.finding[0].source, "source", 0);
 }
 
 static void a_head_is_carried_for_carry_us_at_most(void)
@@ -906,6 +947,28 @@ static void the_middle_is_the_patterns(void)
     TEST_ASSERT_EQUAL_INT32(1, tracks.selected_id);
 }
 
+/* The middle dot's ray from a projector that is not beside the camera: at 900 mm it has gone
+ * 900 + 200 mm ahead from (50, 20, -200), at 3 in 4 aside. */
+static void the_middle_is_on_the_projectors_ray(void)
+{
+    const double middle = 50 + 1100 * 0.75;
+    int side;
+
+    for (side = -1; side <= 1; side += 2) {
+        setUp();
+        rig.calibration.origin_mm_q16[0] = 50 << 16;
+        rig.calibration.origin_mm_q16[1] = 20 << 16;
+        rig.calibration.origin_mm_q16[2] = -(200 << 16);
+        rig.calibration.ray_q30[IH_SLOTS / 2][0] = (1 << 30) / 10 * 6;
+        rig.calibration.ray_q30[IH_SLOTS / 2][1] = 0;
+        rig.calibration.ray_q30[IH_SLOTS / 2][2] = (1 << 30) / 10 * 8;
+        add(middle + side * 101, 0, 900, 3);
+        add(middle - side * 99, 0, 900, 3);
+        frame();
+        IH_TEST_EQUAL(2, tracks.selected_id, "nearer", side);
+    }
+}
+
 static void a_doubtful_head_is_not_chosen_for_its_place(void)
 {
     frames_with(1, 0, 0, 900, 1.5);
@@ -1070,8 +1133,10 @@ int main(void)
     RUN_TEST(what_is_seen_through_needs_a_convincing_finding);
     RUN_TEST(a_seat_is_empty_by_its_limits);
     RUN_TEST(a_head_in_plain_view_is_not_carried);
+    RUN_TEST(hidden_begins_at_its_limit);
     RUN_TEST(evidence_makes_a_head);
     RUN_TEST(hands_before_a_head_do_not_end_it);
+    RUN_TEST(a_carried_head_has_no_evidence);
     RUN_TEST(a_head_is_carried_for_carry_us_at_most);
     RUN_TEST(a_carried_head_slows_down);
     RUN_TEST(the_gate_grows_while_carried);
@@ -1084,6 +1149,7 @@ int main(void)
     RUN_TEST(the_head_is_chosen_by_side);
     RUN_TEST(sides_are_those_of_the_picture);
     RUN_TEST(the_middle_is_the_patterns);
+    RUN_TEST(the_middle_is_on_the_projectors_ray);
     RUN_TEST(a_doubtful_head_is_not_chosen_for_its_place);
     RUN_TEST(the_selected_head_changes_slowly);
     RUN_TEST(extreme_places_do_not_overflow);
