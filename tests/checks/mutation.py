@@ -104,13 +104,14 @@ class Bench:
         return output
 
     def compile_test(self, test, core, output):
-        folders = [core, os.path.dirname(test), os.path.join(os.path.dirname(test), "../unit"),
-                   os.path.join(os.path.dirname(test), "../vectors")] + [self.unity] * bool(self.unity)
+        own = os.path.dirname(test)
+        folders = [core, own, os.path.join(own, "../vectors")] + ([self.unity] if self.unity else [])
         return COMPILE_TEST + ["-I" + folder for folder in folders] + [test, "-o", output]
 
     def link(self, objects, output, library=None, options=()):
-        return run(["gcc", *options] + objects + [library or self.library] + [self.work + "/unity.o"] * bool(self.unity) +
-                   ["-lm", "-Wl,--trace", "-o", output])
+        unity = [self.work + "/unity.o"] if self.unity else []
+        return run(["gcc", *options, *objects, library or self.library, *unity, "-lm", "-Wl,--trace",
+                    "-o", output])
 
     def build_test(self, test):
         program = self.program(test)

@@ -184,19 +184,24 @@ int32_t sample_table(void)
     return table[2];
 }
 """
+SAMPLE_HEADER = """#include <stdint.h>
+#include <stdlib.h>
+int32_t sample(int32_t *room, int32_t count);
+int32_t sample_table(void);
+"""
 SAMPLE_TABLE = """
 | 15.6 | braces | `sample.c` | `count > 3` | this row is needed |
 | 15.1 | goto | `other.c` | all | this is another file |
 """
 # The leading words of what must be found; 15.6 must not.
-SAMPLE_FOUND = ["sample.c:6: misra-c2012-15.1", "sample.c:14: arrayIndexOutOfBounds", "sample.c:7: analyzer-double-free"]
+SAMPLE_FOUND = ["sample.c:6: misra-c2012-15.1", "sample.c:14: arrayIndexOutOfBounds",
+                "sample.c:7: analyzer-double-free"]
 
 
 def self_test():
     with tempfile.TemporaryDirectory() as directory:
         directory = os.path.realpath(directory)
-        for name, text in (("sample.c", SAMPLE), ("sample.h", "#include <stdint.h>\n#include <stdlib.h>\n"
-                                                              "int32_t sample(int32_t *room, int32_t count);\nint32_t sample_table(void);\n")):
+        for name, text in (("sample.c", SAMPLE), ("sample.h", SAMPLE_HEADER)):
             with open(os.path.join(directory, name), "w", encoding="utf-8") as file:
                 file.write(text)
         findings = misra(["sample.c"], directory, ".") + cppcheck(["--enable=warning"], ["sample.c"], directory)
