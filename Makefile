@@ -27,6 +27,8 @@ ARCH ?= arm64
 .DEFAULT_GOAL := help
 .PHONY: help sim frames sanitize test fuzz coverage mutation accept eval bench bench-instructions \
   test-bench bits cortexm longrun size vectors learn picture board board-gpiod2 deb image flash \
+
+.PHONY: help sim frames sanitize test accept eval bench bench-instructions bench-worst test-bench bits cortexm size vectors learn picture board board-gpiod2 deb image flash \
   test-deb test-board test-image format formatted lint clean
 
 
@@ -114,6 +116,11 @@ bench-instructions: sim ## instructions of each stage, by callgrind, with both c
 	@tools/setup.sh bench
 	@/usr/bin/python3 tools/bench/counts.py
 
+bench-worst: sim ## which of 10,000 frames costs most, and why; an hour
+	@tools/setup.sh size
+	@tools/setup.sh bench
+	@/usr/bin/python3 tools/bench/worst.py --plugin-header $(QEMU_PLUGIN_DIR)
+
 test-bench: sim ## do isohead and what it is compared with find the same?
 	@tools/setup.sh bench
 	@/usr/bin/python3 tools/bench/agree.py
@@ -194,6 +201,8 @@ lint: sanitize ## clang-tidy, cppcheck, MISRA C and gcc -fanalyzer; what they ma
 	@/usr/bin/python3 tests/checks/static.py --self-test > $(BUILD)/static.log || { cat $(BUILD)/static.log; exit 1; }
 	@/usr/bin/python3 tests/checks/static.py $(BUILD)/sanitize
 	@git ls-files 'firmware/*.c' 'hal/*.c' 'sim/*.c' 'tools/*.c' ':!tools/size' | \
+
+	@git ls-files 'firmware/*.c' 'hal/*.c' 'sim/*.c' 'tools/*.c' ':!tools/size' ':!tools/bench/worst_count.c' | \
 	  xargs -P 2 -n 1 clang-tidy --quiet -p $(BUILD)/sanitize 2> $(BUILD)/lint.log || \
 	  { grep -v 'warnings* generated' $(BUILD)/lint.log; exit 1; }
 

@@ -208,6 +208,7 @@ bench)
     need_program gcc gcc
     need_program g++ g++
     need_program clang clang
+    need_cross aarch64-linux-gnu arm64 aarch64
     need_program valgrind valgrind
     need_python numpy python3-numpy
     [ -e /usr/include/opencv4/opencv2/calib3d.hpp ] || lacks libopencv-calib3d-dev

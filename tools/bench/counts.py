@@ -44,16 +44,15 @@ FUNCTIONS = {
     "tracks": ("ih_tracks_expect", "ih_tracks_update"),
 }
 BOUNDED = ("frame", "dots", "labels", "surface", "nests", "findings")
-LINE = re.compile(r"^\s*([\d,]+)\s.*:((?:ih|isohead|peer)_\w+)\b")
+LINE = re.compile(r"^\s*([\d,]+)\s.*:((?:ih|isohead|bench)_\w+)\b")
 
 
-def count(program, arguments, within):
+def count(command, frames, within):
     """Inclusive instructions by function, a frame; of what runs below the function `within`."""
-    frames = sum(path.endswith(".pgm") for path in arguments)
     with tempfile.TemporaryDirectory() as work:
         out = os.path.join(work, "callgrind.out")
         subprocess.run(["valgrind", "--quiet", "--tool=callgrind", "--callgrind-out-file=" + out,
-                        "--toggle-collect=" + within, *program, "--once", *arguments],
+                        "--toggle-collect=" + within, *command],
                        check=True, stdout=subprocess.DEVNULL)
         listed = subprocess.run(["callgrind_annotate", "--inclusive=yes", "--threshold=100", out], check=True,
                                 stdout=subprocess.PIPE, text=True).stdout
@@ -63,7 +62,7 @@ def count(program, arguments, within):
         if found:
             counts.setdefault(found[2], int(found[1].replace(",", "")) / frames)
     if within not in counts:
-        builds.fail("callgrind saw no call of %s in %s" % (within, program[0]))
+        builds.fail("callgrind saw no call of %s in %s" % (within, command[0]))
     return counts
 
 
@@ -73,7 +72,8 @@ def of_stages(counts):
 
 def isohead_counts(name, frames):
     folder = builds.make(name, ["bench_isohead"])
-    return of_stages(count([builds.program(folder, "bench_isohead")], frames, "isohead_frame"))
+    command = [builds.program(folder, "bench_isohead"), "--once", *frames]
+    return of_stages(count(command, sum(path.endswith(".pgm") for path in frames), "isohead_frame"))
 
 
 def check(frames):
