@@ -45,16 +45,17 @@ bool bench_input_load(int path_count, char **paths, struct bench_input *out)
         fputs("bench: expected RIG.json FRAME.pgm... for each rig\n", stderr);
         return false;
     }
-    struct bench_frame *frames = calloc((size_t)path_count, sizeof *frames);
+    out->frame = calloc((size_t)path_count, sizeof *out->frame);
     out->set = calloc((size_t)path_count, sizeof *out->set);
-    if (frames == NULL || out->set == NULL) {
+    if (out->frame == NULL || out->set == NULL) {
         fputs("bench: no memory for the list of frames\n", stderr);
         return false;
     }
     for (int i = 0; i < path_count; i++) {
         if (is_rig(paths[i])) {
-            out->set[out->set_count++] = (struct bench_set){paths[i], 0, &frames[out->frame_count]};
-        } else if (load_frame(paths[i], &frames[out->frame_count])) {
+            out->set[out->set_count++] =
+                (struct bench_set){paths[i], 0, &out->frame[out->frame_count]};
+        } else if (load_frame(paths[i], &out->frame[out->frame_count])) {
             out->set[out->set_count - 1].frame_count++;
             out->frame_count++;
         } else {

@@ -30,6 +30,7 @@ struct bench_set {
 struct bench_input {
     int32_t set_count, frame_count;
     struct bench_set *set;
+    struct bench_frame *frame; /* of all sets */
 };
 
 /* False: said on standard error what was wrong. */

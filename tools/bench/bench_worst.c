@@ -65,7 +65,7 @@ static bool start(const struct ih_calibration *calibration)
     return err == IH_OK;
 }
 
-static struct ih_frame view_of(uint8_t *samples)
+static struct ih_frame view_of(const uint8_t *samples)
 {
     const struct ih_calibration *c = &head.rig.calibration;
     return (struct ih_frame){samples, c->width, c->height, c->width, 1, 255};
@@ -137,6 +137,18 @@ static bool run_named(const struct ih_calibration *calibration, int32_t first,
     return true;
 }
 
+static bool parse(const char *text, int32_t *number)
+{
+    char *end;
+    long value = strtol(text, &end, 10);
+    if (end == text || *end != 0 || value < 0 || value > 100000000) {
+        fprintf(stderr, "bench_worst: %s: expected a number from 0 to 100000000\n", text);
+        return false;
+    }
+    *number = (int32_t)value;
+    return true;
+}
+
 int main(int argument_count, char **arguments)
 {
     static struct ih_calibration calibration;
@@ -150,7 +162,10 @@ int main(int argument_count, char **arguments)
         fputs("usage: bench_worst [--save OUT.pgm] RIG.json FIRST COUNT [FRAME.pgm...]\n", stderr);
         return 2;
     }
-    int32_t first = atoi(arguments[at + 1]), count = atoi(arguments[at + 2]);
+    int32_t first, count;
+    if (!parse(arguments[at + 1], &first) || !parse(arguments[at + 2], &count)) {
+        return 2;
+    }
     if (!load_rig(arguments[at], &calibration)) {
         return 1;
     }

@@ -206,8 +206,11 @@ const char *worst_frame_kind(int32_t number)
 
 void worst_frame_draw(const struct ih_rig *rig, int32_t number, uint8_t *samples)
 {
-    struct picture picture = {rig, rig->calibration.width, rig->calibration.height,
-                              number % WORST_SEQUENCE, samples};
+    struct picture picture = {.rig = rig,
+                              .width = rig->calibration.width,
+                              .height = rig->calibration.height,
+                              .step = number % WORST_SEQUENCE};
+    picture.samples = samples;
     int32_t sequence = number / WORST_SEQUENCE;
     state = (uint32_t)sequence * 2654435761U + 12345U;
     kinds[sequence % KINDS].draw(&picture);
