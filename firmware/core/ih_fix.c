@@ -6,9 +6,10 @@ _Static_assert((-3 >> 1) == -2, "right shift of negative values must be arithmet
 
 int64_t ih_mul_wide_shift(int64_t a, uint32_t b, int shift)
 {
+    IH_IN_RANGE(shift, 32, 62);
     /* a = high * 2^32 + low with 0 <= low < 2^32, so a * b = high * b * 2^32 + low * b. */
     int64_t high = a >> 32;
-    uint64_t low = (uint64_t)(a & UINT32_MAX);
+    uint64_t low = IH_WRAPS(uint64_t, a) & UINT32_MAX; /* the low half of two's complement */
     uint64_t low_product = low * b;
     /* |high| <= 2^31 and b < 2^32 keep this below 2^63; the carry adds less than 2^32. */
     int64_t upper = high * (int64_t)b + (int64_t)(low_product >> 32);
@@ -114,5 +115,6 @@ int32_t ih_atan2_mdeg(int64_t y, int64_t x)
         angle_udeg += up ? atan_udeg[i] : -atan_udeg[i];
     }
     int32_t angle_mdeg = (int32_t)ih_div_round(turn_udeg + angle_udeg, 1000);
+    IH_IN_RANGE(angle_mdeg, -180001, 180001);
     return angle_mdeg <= -180000 ? angle_mdeg + 360000 : angle_mdeg;
 }

@@ -15,6 +15,7 @@
 /* value / 2^shift, rounded. shift 0..62; |value| <= 2^63 - 1 - 2^(shift-1). */
 static inline int64_t ih_shift_round(int64_t value, int shift)
 {
+    IH_IN_RANGE(shift, 0, 62);
     if (shift == 0) {
         return value;
     }
@@ -35,6 +36,7 @@ int64_t ih_mul_wide_shift(int64_t a, uint32_t b, int shift);
  * |numerator| + denominator / 2 < 2^63. */
 static inline int64_t ih_div_round(int64_t numerator, int64_t denominator)
 {
+    IH_IN_RANGE(denominator, 1, INT64_MAX);
     int64_t half = denominator / 2;
     return (numerator >= 0 ? numerator + half : numerator - half) / denominator;
 }

@@ -2,11 +2,15 @@
  *
  * IH_IN_RANGE(value, low, high) is nothing in an ordinary build: its arguments are not evaluated and
  * no code is made. In a build with ISOHEAD_RANGE_CHECKS (make ranges) a value outside low .. high ends
- * the program with file, line, value and range. Arguments must have no side effects.
+ * the program with file, line, value and range; arguments must have no side effects.
  *
- * The constants are the greatest sizes that docs/numerics.md argues for, in the unit and format that
- * their names say; tests/checks/ranges_doc.py compares both. A range without a name in the code is that
- * of a constant of its stage.
+ * That build also checks each cast to an integer type. IH_WRAPS(type, value) is one that may change the
+ * value, on purpose.
+ *
+ * The constants are the greatest sizes that docs/numerics.md argues for, rounded up, in the unit and
+ * format of their names; tests/checks/ranges_doc.py compares them with it. They hold for rigs that
+ * isohead_init accepts and for parameters as ih_params_default sets them. Where a header has a constant
+ * for a range, that one is used.
  */
 #ifndef IH_RANGE_H
 #define IH_RANGE_H
@@ -18,8 +22,71 @@ void ih_range_check(int64_t value, int64_t low, int64_t high, const char *what, 
                     int line);
 #define IH_IN_RANGE(value, low, high) \
     ih_range_check((value), (low), (high), #value, __FILE__, __LINE__)
+#define IH_WRAPS(type, value) ((__typeof__(type))(value))
 #else
 #define IH_IN_RANGE(value, low, high) ((void)sizeof((value) >= (low) && (value) <= (high)))
+#define IH_WRAPS(type, value) ((type)(value))
 #endif
+
+/* Rig. */
+#define IH_RANGE_PLACE_PX_Q12 (1 << 27)    /* undistorted */
+#define IH_RANGE_INFINITY_PX_Q12 197300000 /* of a line */
+#define IH_RANGE_OFFSET_MM_Q16 319500000   /* of a ray from the camera's centre */
+#define IH_RANGE_LENGTH_MIN_PX_MM_Q8 25600 /* |e| of a line */
+#define IH_RANGE_LENGTH_MAX_PX_MM_Q8 1518500249
+#define IH_RANGE_T_PX_Q12 242962089 /* on a line */
+#define IH_RANGE_UNIT_Q28 (1 << 26) /* of a field */
+
+/* Dots. */
+#define IH_RANGE_GREY_Q4 4144
+#define IH_RANGE_RESPONSE 18648
+#define IH_RANGE_NOISE 22145
+
+/* Labels. */
+#define IH_RANGE_INVERSE_DEPTH_Q36 1031000000
+#define IH_RANGE_RECTANGLE_PX_Q12 (1 << 29) /* second difference of four places */
+
+/* Windows. */
+#define IH_RANGE_SCALE_Q16 5368710 /* cells per mm */
+#define IH_RANGE_WINDOW_SCORE 1000
+
+/* Points, samples. */
+#define IH_RANGE_SAMPLE_DEPTH_MM_Q8 4160000
+#define IH_RANGE_ROOT_WEIGHT_Q15 (1 << 15)
+
+/* Surface. */
+#define IH_RANGE_BASIS_Q20 88980803
+#define IH_RANGE_NORMAL_Q40 2858247572211456049 /* 361 times the basis squared */
+#define IH_RANGE_RIGHT_Q28 133627810713280000   /* 361 times the basis times a sample's depth */
+#define IH_RANGE_SCALED_Q30 1063100000          /* entry of the scaled equations */
+#define IH_RANGE_COEFFICIENT (1 << 28)
+#define IH_RANGE_MANTISSA (1 << 25) /* of a solution */
+#define IH_RANGE_EXPONENT 62
+
+/* Cuts, ellipses, hypotheses. */
+#define IH_RANGE_OFFSET_Q8 11776         /* on the grid, from a place on it */
+#define IH_RANGE_MOMENT_Q16 144769024    /* second, of an ellipse */
+#define IH_RANGE_AREA_Q16 1826600000     /* of an accepted ellipse */
+#define IH_RANGE_LEVEL_MM_Q8 8371200     /* of a cut */
+#define IH_RANGE_BEHIND_MM_Q8 (110 << 8) /* of a slice behind the front */
+
+/* Heads, findings. */
+#define IH_RANGE_PX_PER_STEP_Q12 7630000
+#define IH_RANGE_SURFACE_DISTANCE_MM_Q8 47100000
+#define IH_RANGE_CENTRE_MM_Q8 (1 << 27) /* of a head */
+
+/* Space, ellipsoid, scan, fit. */
+#define IH_RANGE_POINT_MM_Q8 32768000
+#define IH_RANGE_PASS_Q14 185400 /* of a ray's nearest place, from the centre */
+#define IH_RANGE_SCAN_MIN_Q12 (-5571)
+#define IH_RANGE_SCAN_MAX_Q12 6554
+#define IH_RANGE_SLOPE_Q14 58983         /* derivative of what has a weight */
+#define IH_RANGE_FIT_NORMAL_Q16 95000000 /* diagonal of the fit's equations */
+
+/* Evidence, score, tracks. */
+#define IH_RANGE_ON_MM_Q4 3520       /* from the centre of an ellipsoid to a point on it */
+#define IH_RANGE_CENTRAL_Q8 12390400 /* central moments of such points */
+#define IH_RANGE_LOGIT_Q10 (1 << 20)
+#define IH_RANGE_CROSS_Q8 384000001 /* of a track's covariance */
 
 #endif
