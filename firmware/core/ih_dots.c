@@ -64,6 +64,9 @@ static bool has_twin(const struct ih_dots *dots, const struct ih_dot *dot)
 /* Keep the dots sorted by v, then u; peaks come nearly in that order. */
 static void insert_dot(struct ih_dots *out, struct ih_dot dot)
 {
+    IH_IN_RANGE(dot.u_px_q12, 0, (IH_FRAME_WIDTH_MAX - 1) * 4096);
+    IH_IN_RANGE(dot.v_px_q12, 0, (IH_FRAME_HEIGHT_MAX - 1) * 4096);
+    IH_IN_RANGE(dot.peak, 1, IH_RANGE_RESPONSE);
     if (out->dot_count == IH_DOTS_MAX) {
         out->dots_dropped++;
         return;
