@@ -55,6 +55,7 @@ static uint16_t block_median(const struct ih_noise_scratch *scratch, int32_t col
     for (int32_t row = 0; row < rows; row++) {
         for (int32_t u = first; u < end; u++) {
             value[count++] = (uint16_t)ih_abs_s32(scratch->response[row][u]);
+            IH_IN_RANGE(value[count - 1], 0, IH_RANGE_RESPONSE);
         }
     }
     return median_of(value, count);
@@ -87,6 +88,7 @@ static void subtract_span(const uint16_t *ambient_q4, uint16_t *grey_q4, int32_t
         int32_t share = from_q12 + (((to_q12 - from_q12) * part + 32) >> 6);
         int32_t taken = ((ambient_q4[u] - REST_Q4) * share + WHOLE_Q12 / 2) >> 12;
         grey_q4[u] = (uint16_t)ih_max_s32(0, grey_q4[u] - taken);
+        IH_IN_RANGE(grey_q4[u], 0, IH_RANGE_GREY_Q4);
         part += 2;
     }
 }
@@ -264,6 +266,7 @@ int32_t ih_noise_row(const struct ih_noise *noise, int32_t v, uint16_t row[IH_NO
     for (int32_t column = 0; column < noise->columns; column++) {
         row[column] = (uint16_t)between(noise->median[above][column], noise->median[below][column],
                                         offset % (2 * IH_NOISE_BLOCK));
+        IH_IN_RANGE(row[column], 0, IH_RANGE_NOISE);
         least = ih_min_s32(least, row[column]);
     }
     return least;
