@@ -203,4 +203,6 @@ void ih_exposure_next(const struct ih_exposure_params *params, const struct ih_e
     } else if (8 * look->strong > 9 * strong_aim && 8 * look->weak > 9 * weak_aim) {
         lower_light(params, damped_q8(strong_aim, look->strong), state);
     }
+    IH_IN_RANGE(state->exposure_us, params->exposure_min_us, params->exposure_max_us);
+    IH_IN_RANGE(state->duty_q8, params->duty_min_q8, params->duty_max_q8);
 }
