@@ -56,6 +56,7 @@ static void move_ring(struct ih_band *band)
     }
     for (int32_t u = 0; u < width; u++) {
         sum[u] = (uint16_t)(sum[u] + from[u] - to[u]);
+        IH_IN_RANGE(sum[u], 0, IH_BAND_ROWS * IH_RANGE_GREY_Q4);
     }
     memcpy(to, from, (size_t)width * sizeof *to);
     for (int32_t i = 1; i <= IH_BAND_REACH; i++) {
