@@ -101,6 +101,7 @@ static void find_candidates(const struct ih_dots *dots, const struct ih_line *li
             .perp_px_q12 = (int16_t)perp,
             .dot = (int16_t)i,
         };
+        IH_IN_RANGE(candidate.inverse_depth_q36, 1, IH_RANGE_INVERSE_DEPTH_Q36);
         add_candidate(dots, candidate, slot, scratch, out);
     }
 }
@@ -125,6 +126,8 @@ static uint64_t rectangle_error2(const struct ih_labels_scratch *scratch,
         v += sign * scratch->v_px_q12[corner[i]->dot];
         perp2 += (int64_t)corner[i]->perp_px_q12 * corner[i]->perp_px_q12;
     }
+    IH_IN_RANGE(u, -IH_RANGE_RECTANGLE_PX_Q12, IH_RANGE_RECTANGLE_PX_Q12);
+    IH_IN_RANGE(v, -IH_RANGE_RECTANGLE_PX_Q12, IH_RANGE_RECTANGLE_PX_Q12);
     return (uint64_t)((u * u + v * v + 9 * perp2) / 4);
 }
 
@@ -422,6 +425,7 @@ static void write_table(const struct ih_labels_scratch *scratch, const struct ih
             const struct ih_candidate *c = candidate_of(scratch, slot, scratch->choice[slot]);
             out->dot_of_slot[slot] = c->dot;
             out->t_px_q12[slot] = (int32_t)along_line(scratch, c->dot, &rig->line[slot]);
+            IH_IN_RANGE(out->t_px_q12[slot], 1, IH_RANGE_T_PX_Q12);
             out->perp_px_q12[slot] = c->perp_px_q12;
             out->labelled_count++;
         }
