@@ -48,7 +48,9 @@ static void fill_row(const struct ih_surface_scratch *scratch, const struct ih_s
         uint64_t dy2_q32 = (uint64_t)(dy * dy);
         for (int32_t column = 0; column < IH_SURFACE_CENTRES; column++) {
             uint32_t root_q21 = ih_isqrt_u64((dx2_q32[column] + dy2_q32) << 10);
-            *entry++ = (int32_t)((root_q21 + 1) >> 1);
+            *entry = (int32_t)((root_q21 + 1) >> 1);
+            IH_IN_RANGE(*entry, 1 << 20, IH_RANGE_BASIS_Q20);
+            entry++;
         }
     }
 }
@@ -117,6 +119,7 @@ static void scale_rows(const struct ih_surface_params *params, struct ih_surface
     int32_t row[TERMS];
     for (int32_t i = 0; i < TERMS; i++) {
         const int64_t *normal = &scratch->of.normal_q40[IH_CHOLESKY_PACKED(i)];
+        IH_IN_RANGE(normal[i], 0, IH_RANGE_NORMAL_Q40);
         int64_t root = (int64_t)ih_isqrt_u64((uint64_t)normal[i]) + 1; /* the diagonal stays < 1 */
         int64_t scale = SCALE_NUMERATOR / root;
         scratch->scale[i] = (uint32_t)(scale < SCALE_MAX ? scale : SCALE_MAX);
@@ -127,6 +130,7 @@ static void scale_rows(const struct ih_surface_params *params, struct ih_surface
                 ih_mul_wide_shift(half, scratch->scale[j], 2 * SCALE_SHIFT - 36 - 30));
         }
         row[i] += (int32_t)ih_mul_shift(row[i], params->ridge_q30, 30);
+        IH_IN_RANGE(row[i], 0, IH_RANGE_SCALED_Q30);
         memcpy(&scratch->of.factor_q30[IH_CHOLESKY_PACKED(i)], row,
                (size_t)(i + 1) * sizeof row[0]);
     }
@@ -147,6 +151,7 @@ static int scale_right(const struct ih_samples *samples, int32_t mean_mm_q8,
     for (int32_t i = 0; i < TERMS; i++) {
         scratch->solution[i] = ih_saturate_s32(ih_mul_wide_shift(
             scratch->right_q28[i], scratch->scale[i], SCALE_SHIFT + 8 - fraction));
+        IH_IN_RANGE(scratch->right_q28[i], -IH_RANGE_RIGHT_Q28, IH_RANGE_RIGHT_Q28);
     }
     return fraction;
 }
@@ -163,6 +168,7 @@ static void unscale_solution(struct ih_surface_scratch *scratch, int fraction)
     for (int32_t i = 0; i < TERMS; i++) {
         int64_t product = (int64_t)scratch->solution[i] * scratch->scale[i];
         scratch->solution[i] = (int32_t)ih_shift_round(product, shift);
+        IH_IN_RANGE(scratch->solution[i], -IH_RANGE_COEFFICIENT, IH_RANGE_COEFFICIENT);
     }
     scratch->solution_shift = fraction + (SCALE_SHIFT - 20) - shift;
 }
