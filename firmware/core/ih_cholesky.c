@@ -29,6 +29,7 @@ enum ih_err ih_cholesky_factor(int32_t *a_q30, int32_t n, int32_t *bad_pivot)
             const int32_t *other = row_of(a_q30, j);
             int64_t rest_q60 = (int64_t)row[j] * (1 << 30) - dot_q60(row, other, j);
             row[j] = ih_saturate_s32(ih_div_round(rest_q60, other[j]));
+            IH_IN_RANGE(row[j], -(1 << 30) - n, (1 << 30) + n);
         }
         int64_t pivot_q60 = (int64_t)row[i] * (1 << 30) - dot_q60(row, row, i);
         uint32_t root_q30 = pivot_q60 > 0 ? ih_isqrt_u64((uint64_t)pivot_q60) : 0;
@@ -56,6 +57,7 @@ void ih_cholesky_solve(const int32_t *l_q30, int32_t n, const int32_t *b, int32_
         const int32_t *row = row_of(l_q30, i);
         int64_t rest = (int64_t)b[i] * (1 << 30) - dot_q60(row, x_mantissa, i);
         x_mantissa[i] = ih_saturate_s32(ih_div_round(rest, row[i]));
+        IH_IN_RANGE(ih_div_round(rest, row[i]), INT32_MIN, INT32_MAX);
     }
     int exponent = 0;
     for (int32_t i = n - 1; i >= 0; i--) { /* L^T x = y, in units of 2^exponent */
@@ -74,6 +76,8 @@ void ih_cholesky_solve(const int32_t *l_q30, int32_t n, const int32_t *b, int32_
             rescale(x_mantissa, i + 1, n, grow);
         }
         x_mantissa[i] = (int32_t)ih_shift_round(value, grow);
+        IH_IN_RANGE(x_mantissa[i], -IH_RANGE_MANTISSA, IH_RANGE_MANTISSA);
     }
+    IH_IN_RANGE(exponent, 0, IH_RANGE_EXPONENT);
     *x_exponent = exponent;
 }
