@@ -86,6 +86,8 @@ static struct ih_vertex crossing(const struct ih_surface *surface, const struct 
         ih_div_round((cuts->level_mm_q8 - from_depth) * (rise > 0 ? 512 : -512), ih_abs_s64(rise));
     int64_t x_q9 = (x + corner_x[from]) * 512 + (corner_x[to] - corner_x[from]) * part_q9;
     int64_t y_q9 = (y + corner_y[from]) * 512 + (corner_y[to] - corner_y[from]) * part_q9;
+    IH_IN_RANGE(x_q9, 0, CELLS * 512);
+    IH_IN_RANGE(y_q9, 0, CELLS * 512);
     return (struct ih_vertex){(int16_t)x_q9, (int16_t)y_q9};
 }
 
