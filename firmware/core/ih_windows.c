@@ -225,6 +225,8 @@ struct scale {
 static struct scale scale_at(const struct ih_windows_scratch *s, const struct ih_rig *rig,
                              int32_t depth_mm)
 {
+    IH_IN_RANGE(rig->calibration.fx_px_q16 / (depth_mm * s->cell_px), 0, IH_RANGE_SCALE_Q16);
+    IH_IN_RANGE(rig->calibration.fy_px_q16 / (depth_mm * s->cell_px), 0, IH_RANGE_SCALE_Q16);
     return (struct scale){rig->calibration.fx_px_q16 / (depth_mm * s->cell_px),
                           rig->calibration.fy_px_q16 / (depth_mm * s->cell_px)};
 }
@@ -346,6 +348,7 @@ static struct ih_windows_place place_at(const struct ih_windows_scratch *s,
                                      (int16_t)s->depth_mm[row * s->column_count + column], 0};
     if (place.depth_mm > 0) {
         place.score = (int16_t)score_of(s, rig, params, &place);
+        IH_IN_RANGE(place.score, 0, IH_RANGE_WINDOW_SCORE);
     }
     return place;
 }
@@ -398,6 +401,7 @@ static void place_window(const struct ih_windows_scratch *s, const struct ih_rig
     ih_rig_undistort(rig, mean_px_q12(u, weights, s), mean_px_q12(v, weights, s), &out->x_q28,
                      &out->y_q28);
     out->depth_mm_q8 = (int32_t)ih_div_round(depth_mm * 256, weights);
+    IH_IN_RANGE(out->depth_mm_q8, IH_DEPTH_MIN_MM << 8, IH_DEPTH_MAX_MM << 8);
     out->score = best->score;
 }
 
