@@ -112,6 +112,8 @@ static bool ellipse_of_moments(const struct ih_moments *m, int32_t x0_q8, int32_
     if (determinant_q32 <= 0) {
         return false;
     }
+    IH_IN_RANGE(xx_q16, 0, IH_RANGE_MOMENT_Q16);
+    IH_IN_RANGE(yy_q16, 0, IH_RANGE_MOMENT_Q16);
     int64_t root_q16 = ih_isqrt_u64((uint64_t)determinant_q32);
     /* 4 pi sqrt(det) / area; the factor 2 because area2 is twice the area */
     out->shape_q16 = ih_saturate_s32(ih_div_round(2 * FOUR_PI_Q16 * root_q16, area2_q16));
@@ -202,6 +204,8 @@ static int32_t resample(const struct ih_cuts *cuts, const struct ih_contour *con
             p.y_q9 - place.y_q9 + ih_div_round((int64_t)(q.y_q9 - p.y_q9) * part_q9, divisor);
         scratch->x_q8[k] = half_q9((int32_t)x_q9);
         scratch->y_q8[k] = half_q9((int32_t)y_q9);
+        IH_IN_RANGE(scratch->x_q8[k], -IH_RANGE_OFFSET_Q8, IH_RANGE_OFFSET_Q8);
+        IH_IN_RANGE(scratch->y_q8[k], -IH_RANGE_OFFSET_Q8, IH_RANGE_OFFSET_Q8);
     }
     return total_q9 / 2;
 }
