@@ -201,6 +201,7 @@ void ih_scan_find(const struct ih_space *space, const struct ih_scan_params *par
         centre_behind(&space->ray[slot], params->deep_mm, place->centre_mm_q8);
         struct ih_ellipsoid head = ih_ellipsoid_mean(place->centre_mm_q8);
         place->score_q12 = score_q12(space, &half, scratch, &head);
+        IH_IN_RANGE(place->score_q12, IH_RANGE_SCAN_MIN_Q12, IH_RANGE_SCAN_MAX_Q12);
     }
     out->place_count = 0;
     while (out->place_count < params->place_max) {
