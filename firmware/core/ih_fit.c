@@ -105,6 +105,7 @@ static void add_row(struct system *system, const struct row *row, int64_t weight
 {
     int32_t at = 0;
     for (int i = 0; i < IH_FIT_UNKNOWNS; i++) {
+        IH_IN_RANGE(row->slope_q14[i], -IH_RANGE_SLOPE_Q14, IH_RANGE_SLOPE_Q14);
         int64_t weighted_q16 = ih_mul_shift(weight_q16, row->slope_q14[i], 14);
         for (int j = 0; j <= i; j++) {
             system->normal_q16[at++] += ih_mul_shift(weighted_q16, row->slope_q14[j], 14);
@@ -236,6 +237,7 @@ static void solve(const struct system *system, int32_t step_q16[IH_FIT_UNKNOWNS]
     for (int i = 0; i < IH_FIT_UNKNOWNS; i++) {
         right[i] = ih_saturate_s32(
             ih_shift_round(system->right_q16[i] * (1 << (RIGHT_BITS - 16)), SYSTEM_SCALE_BITS));
+        IH_IN_RANGE(system->normal_q16[IH_CHOLESKY_PACKED(i + 1) - 1], 1, IH_RANGE_FIT_NORMAL_Q16);
     }
     memset(step_q16, 0, IH_FIT_UNKNOWNS * sizeof *step_q16);
     /* The priors keep it positive; if rounding should ever break that, the fit stays where it is. */
@@ -270,6 +272,10 @@ static void take_step(struct state *state, const int32_t step_q16[IH_FIT_UNKNOWN
         state->ln_q16[axis] = ih_clamp_s32(state->ln_q16[axis] + grow_q16, -LN_MAX_Q16, LN_MAX_Q16);
         state->ellipsoid.semi_mm_q8[axis] =
             (int32_t)ih_mul_shift(mean.semi_mm_q8[axis], exp_q16(state->ln_q16[axis]), 16);
+        IH_IN_RANGE(state->ellipsoid.centre_mm_q8[axis], -IH_RANGE_CENTRE_MM_Q8,
+                    IH_RANGE_CENTRE_MM_Q8);
+        IH_IN_RANGE(state->ellipsoid.semi_mm_q8[axis], IH_ELLIPSOID_SEMI_MIN_MM << 8,
+                    IH_ELLIPSOID_SEMI_MAX_MM << 8);
     }
 }
 
