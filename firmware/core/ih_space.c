@@ -61,6 +61,8 @@ void ih_space_make(const struct ih_points *points, const struct ih_dots *dots,
             ray->point_mm_q8[0] = (int32_t)ih_mul_shift(point->depth_mm_q8, point->x_q28, 28);
             ray->point_mm_q8[1] = (int32_t)ih_mul_shift(point->depth_mm_q8, point->y_q28, 28);
             ray->point_mm_q8[2] = point->depth_mm_q8;
+            IH_IN_RANGE(ray->point_mm_q8[0], -IH_RANGE_POINT_MM_Q8, IH_RANGE_POINT_MM_Q8);
+            IH_IN_RANGE(ray->point_mm_q8[1], -IH_RANGE_POINT_MM_Q8, IH_RANGE_POINT_MM_Q8);
         } else if (point->state == IH_POINT_MISSING &&
                    (is_range || is_empty(rig, dots, slot, probe_mm_q8))) {
             ray->state = IH_RAY_EMPTY;
