@@ -77,6 +77,9 @@ bool ih_ellipsoid_cross(const struct ih_ellipsoid *ellipsoid, const int32_t orig
     for (int axis = 0; axis < 2; axis++) {
         out->at_q14[axis] = (int32_t)e_q14[axis];
         out->nearest_q14[axis] = (int32_t)(e_q14[axis] + ih_mul_shift(g_q14[axis], tau_q14, 14));
+        IH_IN_RANGE(ellipsoid->semi_mm_q8[axis], IH_ELLIPSOID_SEMI_MIN_MM << 8,
+                    IH_ELLIPSOID_SEMI_MAX_MM << 8);
+        IH_IN_RANGE(out->nearest_q14[axis], -IH_RANGE_PASS_Q14, IH_RANGE_PASS_Q14);
     }
     out->nearest_q14[2] = (int32_t)tau_q14;
     out->radius2_q14 = (int32_t)ih_shift_round(radius2_q28, 14);
