@@ -96,6 +96,7 @@ static void add_on(const struct view *view, const struct ih_ellipsoid *ellipsoid
         at_q4[axis] =
             ih_shift_round(view->ray->point_mm_q8[axis] - ellipsoid->centre_mm_q8[axis], 4);
         tally->sum_q4[axis] += at_q4[axis];
+        IH_IN_RANGE(at_q4[axis], -IH_RANGE_ON_MM_Q4, IH_RANGE_ON_MM_Q4);
         for (int other = 0; other <= axis; other++) {
             tally->product_q8[axis][other] += at_q4[axis] * at_q4[other];
         }
@@ -201,6 +202,7 @@ static int64_t plane_rest_q8(const struct tally *tally)
         for (int other = 0; other <= axis; other++) {
             int64_t mean_q8 = ih_div_round(tally->sum_q4[axis] * tally->sum_q4[other], n);
             c[axis][other] = ih_div_round(tally->product_q8[axis][other] - mean_q8, n);
+            IH_IN_RANGE(c[axis][other], -IH_RANGE_CENTRAL_Q8, IH_RANGE_CENTRAL_Q8);
         }
     }
     int64_t det_q16 = c[0][0] * c[1][1] - c[1][0] * c[1][0];

@@ -161,6 +161,8 @@ static void fill_axes(const struct ih_ellipse *ellipse, const struct ih_surface 
     int64_t step_v = ih_div_round(ih_mul_shift(surface->field.unit_q28, c->fy_px_q16, 32) *
                                       IH_SURFACE_STEP_NUMERATOR,
                                   IH_SURFACE_STEP_DENOMINATOR);
+    IH_IN_RANGE(step_u, 0, IH_RANGE_PX_PER_STEP_Q12);
+    IH_IN_RANGE(step_v, 0, IH_RANGE_PX_PER_STEP_Q12);
     int64_t uu = ih_mul_shift(ih_mul_shift(ellipse->xx_q16, step_u, 12), step_u, 12);
     int64_t uv = ih_mul_shift(ih_mul_shift(ellipse->xy_q16, step_u, 12), step_v, 12);
     int64_t vv = ih_mul_shift(ih_mul_shift(ellipse->yy_q16, step_v, 12), step_v, 12);
@@ -269,6 +271,10 @@ static void fill_place(const struct ih_nest *nest, const struct ih_surface *surf
     out->centre_mm_q8[0] = ih_saturate_s32(ih_mul_shift(depth_q8, x_q28, 28));
     out->centre_mm_q8[1] = ih_saturate_s32(ih_mul_shift(depth_q8, y_q28, 28));
     out->centre_mm_q8[2] = ih_saturate_s32(depth_q8);
+    IH_IN_RANGE(out->distance_mm_q8, 1, IH_RANGE_SURFACE_DISTANCE_MM_Q8);
+    IH_IN_RANGE(out->centre_mm_q8[0], -IH_RANGE_CENTRE_MM_Q8, IH_RANGE_CENTRE_MM_Q8);
+    IH_IN_RANGE(out->centre_mm_q8[1], -IH_RANGE_CENTRE_MM_Q8, IH_RANGE_CENTRE_MM_Q8);
+    IH_IN_RANGE(out->centre_mm_q8[2], 1, IH_RANGE_CENTRE_MM_Q8);
 }
 
 static enum ih_reject test(const struct ih_hypothesis *h, const struct ih_heads_params *params)

@@ -29,6 +29,7 @@ static void point_of_dot(const struct ih_labels *labels, const struct ih_rig *ri
     /* length in Q8 over t in Q12: 12 more bits give Q8 */
     int64_t depth_q8 = ih_div_round((int64_t)line->length_px_mm_q8 * 4096, t);
     out->depth_mm_q8 = ih_clamp_s32(ih_saturate_s32(depth_q8), 1 << 8, c->far_mm << 8);
+    IH_IN_RANGE(out->depth_mm_q8, 1 << 8, IH_DEPTH_MAX_MM << 8);
     out->x_q28 = normalised_q28(line->infinity_u_px_q12 + ih_mul_shift(t, line->dir_u_q30, 30),
                                 c->cx_px_q16, c->fx_px_q16);
     out->y_q28 = normalised_q28(line->infinity_v_px_q12 + ih_mul_shift(t, line->dir_v_q30, 30),
@@ -59,6 +60,7 @@ static void place_field(const struct ih_points_params *params, const struct ih_w
 {
     int64_t pitch_q28 = ih_div_round((int64_t)params->pitch_mm_q8 << 28, window->depth_mm_q8);
     out->unit_q28 = (int32_t)(pitch_q28 / 2);
+    IH_IN_RANGE(out->unit_q28, 1, IH_RANGE_UNIT_Q28);
     out->centre_x_q28 = window->x_q28;
     out->centre_y_q28 =
         ih_saturate_s32(window->y_q28 + ih_mul_shift(pitch_q28, params->lower_q8, 8));

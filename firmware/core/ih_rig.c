@@ -97,6 +97,8 @@ void ih_rig_to_pixel(const struct ih_rig *rig, int32_t x_q28, int32_t y_q28, int
     const struct ih_calibration *c = &rig->calibration;
     *u_px_q12 = (int32_t)(ih_mul_shift(x_q28, c->fx_px_q16, 32) + ih_shift_round(c->cx_px_q16, 4));
     *v_px_q12 = (int32_t)(ih_mul_shift(y_q28, c->fy_px_q16, 32) + ih_shift_round(c->cy_px_q16, 4));
+    IH_IN_RANGE(*u_px_q12, -IH_RANGE_PLACE_PX_Q12, IH_RANGE_PLACE_PX_Q12);
+    IH_IN_RANGE(*v_px_q12, -IH_RANGE_PLACE_PX_Q12, IH_RANGE_PLACE_PX_Q12);
 }
 
 void ih_rig_distort(const struct ih_rig *rig, int32_t x_q28, int32_t y_q28, int32_t *u_px_q12,
@@ -126,6 +128,7 @@ static void ray_line(const struct ih_calibration *c, int32_t slot, int axis, int
     const int32_t *ray = c->ray_q30[slot];
     *tan_q30 = ih_div_round((int64_t)ray[axis] * ((int64_t)1 << 30), ray[2]);
     *offset_mm_q16 = c->origin_mm_q16[axis] - ih_mul_shift(c->origin_mm_q16[2], *tan_q30, 30);
+    IH_IN_RANGE(*offset_mm_q16, -IH_RANGE_OFFSET_MM_Q16, IH_RANGE_OFFSET_MM_Q16);
 }
 
 void ih_rig_dot_at(const struct ih_rig *rig, int32_t slot, int32_t depth_mm_q8, int32_t *x_q28,
@@ -259,6 +262,10 @@ static bool fill_line(struct ih_rig *rig, int32_t slot)
     line->dir_v_q30 = (int32_t)ih_div_round(e_v_q8 * ((int64_t)1 << 30), length_q8);
     line->t_far_px_q12 = shift_at_depth_px_q12(line->length_px_mm_q8, c->far_mm);
     line->t_near_px_q12 = shift_at_depth_px_q12(line->length_px_mm_q8, c->near_mm);
+    IH_IN_RANGE(line->infinity_u_px_q12, -IH_RANGE_INFINITY_PX_Q12, IH_RANGE_INFINITY_PX_Q12);
+    IH_IN_RANGE(line->infinity_v_px_q12, -IH_RANGE_INFINITY_PX_Q12, IH_RANGE_INFINITY_PX_Q12);
+    IH_IN_RANGE(length_q8, IH_RANGE_LENGTH_MIN_PX_MM_Q8, IH_RANGE_LENGTH_MAX_PX_MM_Q8);
+    IH_IN_RANGE(line->t_near_px_q12, line->t_far_px_q12, IH_RANGE_T_PX_Q12);
     return true;
 }
 
@@ -282,6 +289,7 @@ static void fill_field(struct ih_rig *rig)
     }
     ih_rig_dot_at(rig, IH_SLOTS / 2, depth_q8, &rig->field.centre_x_q28, &rig->field.centre_y_q28);
     rig->field.unit_q28 = (int32_t)ih_div_round(sum_q28, 4 * (IH_GRID - 1) * 2);
+    IH_IN_RANGE(rig->field.unit_q28, 0, IH_RANGE_UNIT_Q28);
 }
 
 enum ih_err ih_rig_init(struct ih_rig *rig, const struct ih_calibration *calibration,

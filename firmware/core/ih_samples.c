@@ -88,6 +88,8 @@ static void add_sample(struct ih_samples *out, const struct ih_field *field, int
     }
     sample.x_q16 = (int32_t)x_q16;
     sample.y_q16 = (int32_t)y_q16;
+    IH_IN_RANGE(sample.depth_mm_q8, 1 << 8, IH_RANGE_SAMPLE_DEPTH_MM_Q8);
+    IH_IN_RANGE(sample.root_weight_q15, 1, IH_RANGE_ROOT_WEIGHT_Q15);
     out->sample[out->sample_count++] = sample;
     out->filled_count += sample.is_filled;
     out->seen_count += !sample.is_filled;

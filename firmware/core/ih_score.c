@@ -19,6 +19,7 @@ int32_t ih_score_probability_q16(int32_t logit_q10)
     int64_t whole = power2_q16 >> 16;
     int64_t small_q16 = whole > 30 ? 0 : power_q16((int32_t)(power2_q16 & 0xffff)) >> whole;
     int64_t likely_q16 = ih_div_round((int64_t)1 << 32, 65536 + small_q16);
+    IH_IN_RANGE(likely_q16, 32768, 65536);
     return (int32_t)(logit_q10 >= 0 ? likely_q16 : 65536 - likely_q16);
 }
 
@@ -42,5 +43,6 @@ void ih_score_rate(const struct ih_evidence *evidence, struct ih_score *out)
         out->part_q10[kind] = curve_q10(&curves[kind], evidence->value_q8[kind]);
         out->logit_q10 += out->part_q10[kind];
     }
+    IH_IN_RANGE(out->logit_q10, -IH_RANGE_LOGIT_Q10, IH_RANGE_LOGIT_Q10);
     out->probability_q16 = ih_score_probability_q16(out->logit_q10);
 }

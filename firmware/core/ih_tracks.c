@@ -89,6 +89,9 @@ static void predict(struct ih_track *track, int64_t step_us, int32_t acceleratio
     track->cross_q8 = limited_cross_q8(track->cross_q8, track->speed_q8, SPEED_VARIANCE_MAX_Q8);
     track->place_q8 = at_most(track->place_q8, PLACE_VARIANCE_MAX_Q8);
     track->speed_q8 = at_most(track->speed_q8, SPEED_VARIANCE_MAX_Q8);
+    IH_IN_RANGE(track->place_q8, 0, PLACE_VARIANCE_MAX_Q8);
+    IH_IN_RANGE(track->speed_q8, 0, SPEED_VARIANCE_MAX_Q8);
+    IH_IN_RANGE(track->cross_q8, -IH_RANGE_CROSS_Q8, IH_RANGE_CROSS_Q8);
     for (int axis = 0; axis < 3; axis++) {
         track->head.centre_mm_q8[axis] +=
             (int32_t)ih_mul_shift(track->velocity_mm_s_q8[axis], dt_q20, 20);
@@ -166,6 +169,8 @@ static void correct(struct ih_track *track, const struct ih_finding *finding,
     track->speed_q8 -= ih_mul_shift(speed_gain_q16, track->cross_q8, 16);
     track->cross_q8 -= ih_mul_shift(gain_q16, track->cross_q8, 16);
     track->place_q8 -= ih_mul_shift(gain_q16, track->place_q8, 16);
+    IH_IN_RANGE(track->place_q8, 0, PLACE_VARIANCE_MAX_Q8);
+    IH_IN_RANGE(track->speed_q8, 0, SPEED_VARIANCE_MAX_Q8);
 }
 
 static void remember_logit(struct ih_track *track, int32_t logit_q10, int32_t memory_q16)

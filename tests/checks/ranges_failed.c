@@ -23,8 +23,8 @@ __extension__ __int128 ih_range_cast(__int128 value, __int128 low, __int128 high
                                      const char *file, int line)
 {
     if (value < low || value > high) {
-        fprintf(stderr, "%s:%d: range: converted to %s is %.0f, expected %.0f .. %.0f\n", file, line,
-                what, (double)value, (double)low, (double)high);
+        fprintf(stderr, "%s:%d: range: converted to %s is %.0f, expected %.0f .. %.0f\n", file,
+                line, what, (double)value, (double)low, (double)high);
         abort();
     }
     return value;
