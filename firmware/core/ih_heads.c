@@ -274,7 +274,7 @@ static void fill_place(const struct ih_nest *nest, const struct ih_surface *surf
     IH_IN_RANGE(out->distance_mm_q8, 1, IH_RANGE_SURFACE_DISTANCE_MM_Q8);
     IH_IN_RANGE(out->centre_mm_q8[0], -IH_RANGE_CENTRE_MM_Q8, IH_RANGE_CENTRE_MM_Q8);
     IH_IN_RANGE(out->centre_mm_q8[1], -IH_RANGE_CENTRE_MM_Q8, IH_RANGE_CENTRE_MM_Q8);
-    IH_IN_RANGE(out->centre_mm_q8[2], 1, IH_RANGE_CENTRE_MM_Q8);
+    IH_IN_RANGE(out->centre_mm_q8[2], -IH_RANGE_CENTRE_MM_Q8, IH_RANGE_CENTRE_MM_Q8);
 }
 
 static enum ih_reject test(const struct ih_hypothesis *h, const struct ih_heads_params *params)

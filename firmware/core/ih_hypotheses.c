@@ -169,7 +169,7 @@ static void add_slice(struct ih_slice *slice, int32_t level_mm_q8,
         set_front(params, level_mm_q8, slice->area_mm2, nest);
     }
     slice->behind_mm_q8 = level_mm_q8 - nest->front_mm_q8;
-    IH_IN_RANGE(slice->behind_mm_q8, 0, IH_RANGE_BEHIND_MM_Q8);
+    IH_IN_RANGE(slice->behind_mm_q8, 0, params->depth_max_mm << 8);
     if (continues(nest, slice, params)) {
         nest->slice[nest->slice_count++] = *slice;
     } else {
@@ -197,7 +197,7 @@ static void extend_nest(const struct ih_surface *surface, int32_t level_mm_q8,
     }
     nest->gap = 0;
     IH_IN_RANGE(slice.ellipse.area_q16, 1, IH_RANGE_AREA_Q16);
-    IH_IN_RANGE(level_mm_q8, 1, IH_RANGE_LEVEL_MM_Q8);
+    IH_IN_RANGE(level_mm_q8, -IH_RANGE_LEVEL_MM_Q8, IH_RANGE_LEVEL_MM_Q8);
     slice.area_mm2 = area_mm2(surface, level_mm_q8, slice.ellipse.area_q16);
     add_slice(&slice, level_mm_q8, params, nest);
 }

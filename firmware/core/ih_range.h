@@ -64,11 +64,10 @@ void ih_range_check(int64_t value, int64_t low, int64_t high, const char *what, 
 #define IH_RANGE_EXPONENT 62
 
 /* Cuts, ellipses, hypotheses. */
-#define IH_RANGE_OFFSET_Q8 11776         /* on the grid, from a place on it */
-#define IH_RANGE_MOMENT_Q16 144769024    /* second, of an ellipse */
-#define IH_RANGE_AREA_Q16 1826600000     /* of an accepted ellipse */
-#define IH_RANGE_LEVEL_MM_Q8 8371200     /* of a cut */
-#define IH_RANGE_BEHIND_MM_Q8 (110 << 8) /* of a slice behind the front */
+#define IH_RANGE_OFFSET_Q8 11776      /* on the grid, from a place on it */
+#define IH_RANGE_MOMENT_Q16 144769024 /* second, of an ellipse */
+#define IH_RANGE_AREA_Q16 1826600000  /* of an accepted ellipse */
+#define IH_RANGE_LEVEL_MM_Q8 8371200  /* of a cut */
 
 /* Heads, findings. */
 #define IH_RANGE_PX_PER_STEP_Q12 7630000
