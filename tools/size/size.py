@@ -6,7 +6,7 @@
   stack         the deepest chain of calls, from the frames that the compiler tells (-fcallgraph-info=su)
                 and the calls that it tells or that stand in the linked code; and the deepest store that
                 an emulator saw while the frames were processed
-  instructions  executed in an emulator between entry and end of isohead_frame, by source file
+  instructions  executed in an emulator between entry and end of isohead_frame, by source file, most first
 
 size.py --build DIR --plugin FILE --rig FILE FRAME...      exit status 1 when a bound is passed
 
@@ -38,9 +38,9 @@ ENTRIES = (DECODE, INIT, FRAME)
 # Where the work of the core ends: what the program calls next.
 ENDS = ("app_record_frame", "app_record_error", "hal_semihosting_call")
 MEM = ("memcpy", "memmove", "memset", "memcmp")
-DIVISION = ("__aeabi_ldivmod", "__aeabi_uldivmod")
-HELPERS = ("ih_fix.c", "memory", "division")
-ROWS_OUTSIDE = {"memory": "memcpy and its kin (C library)", "division": "64-bit division (compiler)"}
+COMPILER_HELPERS = ("__aeabi_ldivmod", "__aeabi_uldivmod", "__ctzdi2")
+HELPERS = ("ih_fix.c", "memory", "arithmetic")
+ROWS_OUTSIDE = {"memory": "memcpy and its kin (C library)", "arithmetic": "64-bit arithmetic (compiler)"}
 
 
 def sections(path):
@@ -77,7 +77,7 @@ def graph(objects, program):
 
 def check_calls(stack, callees):
     outside = sorted({name for names in callees.values() for name in names if name not in stack})
-    strange = [name for name in outside if name not in MEM + DIVISION]
+    strange = [name for name in outside if name not in MEM + COMPILER_HELPERS]
     if strange:
         raise Broken("symbols: not the core's own and not allowed: " + ", ".join(strange))
     return outside
@@ -120,7 +120,7 @@ def row_at(program, address):
     if source.removesuffix("-stub") in MEM:
         return "memory"
     if source.startswith("_") and "libgcc" in program.object_of(address):
-        return "division"
+        return "arithmetic"
     return source if source.startswith(("ih_", "isohead.c")) else None
 
 
@@ -160,12 +160,6 @@ def shared_out(program, pieces):
     return rows
 
 
-def order():
-    """The core's sources in the order of a frame's way."""
-    with open(os.path.join(ram.CORE, "CMakeLists.txt"), encoding="utf-8") as file:
-        return re.findall(r"\b\w+\.c\b", re.search(r"add_library\(isohead_core(.*?)\)", file.read(), re.S)[1])
-
-
 def outside_flash(program, row):
     """Code of the linked functions that a row stands for."""
     return sum(size for at, size, kind, _ in program.sections
@@ -189,7 +183,7 @@ def print_stages(table, program, frames, rig):
     line = "%-32s %6s %9s %6s %12s %12s %5s %10s"
     print(line % ("", "code", "constants", "flash", "own", "with help", "", "rig, once"))
     print(line % ("stage", "B", "B", "B", "instr/frame", "instr/frame", "%", "instr"))
-    for row in order() + list(ROWS_OUTSIDE):
+    for row in sorted(table, key=lambda row: (-shared.get(row, 0), -own.get(row, 0), row)) + list(ROWS_OUTSIDE):
         code, constants = table[row] if row in table else (outside_flash(program, row), 0)
         part = shared.get(row, 0)
         print(line % (ROWS_OUTSIDE.get(row, row), code, constants, code + constants,
@@ -201,7 +195,7 @@ def print_stages(table, program, frames, rig):
     print(line % ("all; flash: the core's own", code, constants, code + constants, round(total / len(frames)),
                   round(sum(shared.values()) / len(frames)), "100", sum(once.values())))
     print("instr/frame: mean of %d frames; their least %d, median %d, worst %d. with help: and of the helpers,\n"
-          "ih_fix, memcpy and division, what they spend for the stage, in proportion to its calls.\n"
+          "ih_fix, memcpy and 64-bit arithmetic, what they spend for the stage, in proportion to its calls.\n"
           % (len(frames), min(totals), statistics.median(totals), max(totals)))
     return code + constants, round(total / len(frames))
 
@@ -217,7 +211,9 @@ def print_ram(directory):
 
 def print_stack(stack, callees, program, phases):
     """Bytes of the worst of ENTRIES. What the emulator saw must not be more than the bound."""
-    outside = {name: program.stack_of(name) for name in check_calls(stack, callees)}
+    # gcc also tells of calls that it thought of and left out; what is not linked nobody calls.
+    outside = {name: program.stack_of(name) if name in program.code else 0
+               for name in check_calls(stack, callees)}
     call_graph.check_all(stack, callees, outside)
     print("stack, bytes; recursion: none; calls through pointers: none")
     worst = 0
@@ -232,7 +228,8 @@ def print_stack(stack, callees, program, phases):
             "; seen: %d" % max(seen) if seen else ""))
         worst = max(worst, size)
     print("  calls outside the core, with what these call: %s\n"
-          % ", ".join("%s %d" % pair for pair in outside.items()))
+          % ", ".join("%s %s" % (name, size if name in program.code else "(in no code)")
+                      for name, size in outside.items()))
     return worst
 
 
@@ -250,7 +247,7 @@ def measure(arguments, directory):
     objects = sorted(glob.glob(os.path.join(arguments.build, "firmware/core/CMakeFiles/isohead_core.dir/*.obj")))
     program = Program(os.path.join(arguments.build, "firmware/app/isohead_cortexm"))
     table = flash(objects)
-    if sorted(table) != sorted(order()):
+    if set(table) != {name for name in os.listdir(ram.CORE) if name.endswith(".c")}:
         raise Broken("build: %s: other objects than firmware/core has sources" % arguments.build)
     stack, callees = graph(objects, program)
     phases = count(program, arguments.plugin, arguments.rig, arguments.frames)
