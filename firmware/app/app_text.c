@@ -5,7 +5,7 @@
 /* A whole number of 10^-decimals as text. */
 static struct app_decimal print_scaled(int64_t scaled, int decimals)
 {
-    struct app_decimal decimal;
+    struct app_decimal decimal = {.text = {0}};
     struct hal_text text = hal_text_begin(decimal.text, sizeof decimal.text);
     int64_t unit = 1;
     for (int i = 0; i < decimals; i++) {

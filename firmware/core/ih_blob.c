@@ -5,15 +5,14 @@
 
 #define WORD_BYTES 4
 /* Where things stand; between KIND and CRC all are int32_t. */
-enum offset {
-    AT_MAGIC = 0,
-    AT_VERSION = 4,
-    AT_LENGTH = 8,
-    AT_KIND = 12,
-    AT_CAMERA = 16,
-    AT_PROJECTOR = 68,
-    AT_CRC = IH_BLOB_BYTES - WORD_BYTES
-};
+#define AT_MAGIC 0
+#define AT_VERSION 4
+#define AT_LENGTH 8
+#define AT_KIND 12
+#define AT_CAMERA 16
+#define AT_PROJECTOR 68
+#define AT_RAYS 80
+#define AT_CRC (IH_BLOB_BYTES - WORD_BYTES)
 #define HEADER_BYTES AT_KIND
 #define CAMERA_WORDS ((AT_PROJECTOR - AT_CAMERA) / WORD_BYTES)
 #define AXES 3
@@ -73,25 +72,25 @@ static enum ih_err check_frame(const uint8_t *blob, size_t size)
     if (size < HEADER_BYTES) {
         return IH_ERR_BLOB_SHORT;
     }
-    if (memcmp(blob + AT_MAGIC, magic, sizeof magic) != 0) {
+    if (memcmp(&blob[AT_MAGIC], magic, sizeof magic) != 0) {
         return IH_ERR_BLOB_MAGIC;
     }
-    if (get_u32(blob + AT_VERSION) != IH_BLOB_VERSION) {
+    if (get_u32(&blob[AT_VERSION]) != IH_BLOB_VERSION) {
         return IH_ERR_BLOB_VERSION;
     }
-    if (get_u32(blob + AT_LENGTH) != IH_BLOB_BYTES) {
+    if (get_u32(&blob[AT_LENGTH]) != IH_BLOB_BYTES) {
         return IH_ERR_BLOB_LENGTH;
     }
     if (size != IH_BLOB_BYTES) {
         return size < IH_BLOB_BYTES ? IH_ERR_BLOB_SHORT : IH_ERR_BLOB_LONG;
     }
-    return ih_blob_crc32(blob, AT_CRC) == get_u32(blob + AT_CRC) ? IH_OK : IH_ERR_BLOB_CRC;
+    return ih_blob_crc32(blob, AT_CRC) == get_u32(&blob[AT_CRC]) ? IH_OK : IH_ERR_BLOB_CRC;
 }
 
 /* Of a blob in which nothing else is wrong. */
 static enum ih_err check_fields(const uint8_t *blob)
 {
-    uint32_t kind = get_u32(blob + AT_KIND);
+    uint32_t kind = get_u32(&blob[AT_KIND]);
     if (kind != IH_RIG_DOTS && kind != IH_RIG_RANGE) {
         return IH_ERR_BLOB_FIELD;
     }
@@ -113,17 +112,17 @@ enum ih_err ih_blob_decode(const uint8_t *blob, size_t size, struct ih_calibrati
         return err;
     }
     struct ih_calibration *c = calibration;
-    c->kind = get_u32(blob + AT_KIND) == IH_RIG_RANGE ? IH_RIG_RANGE : IH_RIG_DOTS;
-    const uint8_t *at = blob + AT_CAMERA;
-    for (int i = 0; i < CAMERA_WORDS; i++, at += WORD_BYTES) {
-        int32_t value = get_s32(at);
-        memcpy((uint8_t *)c + camera_field[i], &value, sizeof value);
+    c->kind = get_u32(&blob[AT_KIND]) == IH_RIG_RANGE ? IH_RIG_RANGE : IH_RIG_DOTS;
+    uint8_t *member = (uint8_t *)c;
+    for (int i = 0; i < CAMERA_WORDS; i++) {
+        int32_t value = get_s32(&blob[AT_CAMERA + WORD_BYTES * i]);
+        memcpy(&member[camera_field[i]], &value, sizeof value);
     }
-    for (int axis = 0; axis < AXES; axis++, at += WORD_BYTES) {
-        c->origin_mm_q16[axis] = get_s32(at);
+    for (int axis = 0; axis < AXES; axis++) {
+        c->origin_mm_q16[axis] = get_s32(&blob[AT_PROJECTOR + WORD_BYTES * axis]);
     }
-    for (int i = 0; i < AXES * IH_SLOTS; i++, at += WORD_BYTES) {
-        c->ray_q30[i / AXES][i % AXES] = get_s32(at);
+    for (int i = 0; i < AXES * IH_SLOTS; i++) {
+        c->ray_q30[i / AXES][i % AXES] = get_s32(&blob[AT_RAYS + WORD_BYTES * i]);
     }
     return IH_OK;
 }
@@ -131,22 +130,22 @@ enum ih_err ih_blob_decode(const uint8_t *blob, size_t size, struct ih_calibrati
 enum ih_err ih_blob_encode(const struct ih_calibration *calibration, uint8_t blob[IH_BLOB_BYTES])
 {
     const struct ih_calibration *c = calibration;
-    memcpy(blob + AT_MAGIC, magic, sizeof magic);
-    put_u32(blob + AT_VERSION, IH_BLOB_VERSION);
-    put_u32(blob + AT_LENGTH, IH_BLOB_BYTES);
-    put_u32(blob + AT_KIND, (uint32_t)c->kind);
-    uint8_t *at = blob + AT_CAMERA;
-    for (int i = 0; i < CAMERA_WORDS; i++, at += WORD_BYTES) {
+    memcpy(&blob[AT_MAGIC], magic, sizeof magic);
+    put_u32(&blob[AT_VERSION], IH_BLOB_VERSION);
+    put_u32(&blob[AT_LENGTH], IH_BLOB_BYTES);
+    put_u32(&blob[AT_KIND], (uint32_t)c->kind);
+    const uint8_t *member = (const uint8_t *)c;
+    for (int i = 0; i < CAMERA_WORDS; i++) {
         int32_t value = 0;
-        memcpy(&value, (const uint8_t *)c + camera_field[i], sizeof value);
-        put_s32(at, value);
+        memcpy(&value, &member[camera_field[i]], sizeof value);
+        put_s32(&blob[AT_CAMERA + WORD_BYTES * i], value);
     }
-    for (int axis = 0; axis < AXES; axis++, at += WORD_BYTES) {
-        put_s32(at, c->origin_mm_q16[axis]);
+    for (int axis = 0; axis < AXES; axis++) {
+        put_s32(&blob[AT_PROJECTOR + WORD_BYTES * axis], c->origin_mm_q16[axis]);
     }
-    for (int i = 0; i < AXES * IH_SLOTS; i++, at += WORD_BYTES) {
-        put_s32(at, c->ray_q30[i / AXES][i % AXES]);
+    for (int i = 0; i < AXES * IH_SLOTS; i++) {
+        put_s32(&blob[AT_RAYS + WORD_BYTES * i], c->ray_q30[i / AXES][i % AXES]);
     }
-    put_u32(at, ih_blob_crc32(blob, AT_CRC));
+    put_u32(&blob[AT_CRC], ih_blob_crc32(blob, AT_CRC));
     return check_fields(blob);
 }
