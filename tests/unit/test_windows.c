@@ -1,5 +1,5 @@
 /* ih_windows: scenes against a float64 reference; and images that are no scene at all. */
-#include "ih_windows.h"
+#include "ih_windows.c" /* for the score of one place */
 
 #include "ih_test.h"
 
@@ -21,6 +21,11 @@ struct vector_scene {
     int32_t cell_px, spacing_px;
     int32_t window_count;
     const struct vector_window *window;
+};
+
+struct vector_noise {
+    int32_t seed, focal_px, depth_mm;
+    double score; /* of the place in the middle */
 };
 
 #include "windows.inc"
@@ -170,6 +175,52 @@ static void windows_match_float64(void)
             IH_TEST_WITHIN(400.0 / 13 + 2, scene->window[i].score, w->score, "score", s);
             IH_TEST_EQUAL(scene->spacing_px, w->spacing_px, "spacing", s);
         }
+    }
+}
+
+/* Class Noise of tools/oracle/windows.py: wherever a probe is a cell off, or a limit a millimetre,
+ * some score is another. */
+static uint32_t noise_hash(uint32_t number, uint32_t seed)
+{
+    uint32_t h = number * 2654435761u + seed * 40503u;
+
+    h = (h ^ h >> 15) * 1103515245u;
+    return h ^ h >> 13;
+}
+
+static void draw_noise(const struct vector_noise *noise)
+{
+    static const int32_t offset_mm[] = {0,  -40, -41, 110, 111,  -100, -101,
+                                        89, 90,  149, 150, -149, -150, 400};
+    const uint32_t seed = (uint32_t)noise->seed;
+    uint32_t u, v;
+
+    use_rig(160, 120, noise->focal_px);
+    for (v = 0; v < 120; v++) {
+        for (u = 0; u < 160; u++) {
+            const uint32_t which = noise_hash(v * 160 + u, seed) % IH_TEST_COUNT(offset_mm);
+            const bool hole = noise_hash(1000000 + v / 4 * 160 + u / 4, seed) % 6 == 0;
+
+            depth_mm[v * 160 + u] = (uint16_t)(hole ? 0 : noise->depth_mm + offset_mm[which]);
+        }
+    }
+}
+
+static void scores_match_float64(void)
+{
+    int i;
+
+    TEST_ASSERT_TRUE(IH_TEST_COUNT(vector_noises) > 60);
+    for (i = 0; i < IH_TEST_COUNT(vector_noises); i++) {
+        const struct vector_noise *noise = &vector_noises[i];
+        struct ih_windows_place place;
+
+        draw_noise(noise);
+        IH_TEST_EQUAL(0, survey_frame(&frame, &rig, &guarded.scratch), "nothing is rare", i);
+        IH_TEST_EQUAL(1, guarded.scratch.cell_px, "cell", i);
+        place = place_at(&guarded.scratch, &rig, &params, 80, 60);
+        /* Each of five parts is rounded down. */
+        IH_TEST_WITHIN(5, noise->score, place.score, "score", noise->seed);
     }
 }
 
@@ -478,6 +529,7 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(windows_match_float64);
+    RUN_TEST(scores_match_float64);
     RUN_TEST(every_head_has_its_window);
     RUN_TEST(images_without_shape_have_no_window);
     RUN_TEST(one_pixel_is_no_head);

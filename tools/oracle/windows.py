@@ -44,6 +44,44 @@ class Scene:
         return np.where((depth >= NEAR_MM) & (depth <= FAR_MM), depth, 0)
 
 
+class Noise:
+    """160 x 120 cells of depths whose differences are the template's limits, and holes between them:
+    wherever a probe is a cell off, or a limit a millimetre, some score is another."""
+    size = (160, 120)
+    OFFSETS = [0, -40, -41, 110, 111, -100, -101, 89, 90, 149, 150, -149, -150, 400]
+
+    def __init__(self, seed):
+        self.seed, self.focal, self.depth = seed, 50 + seed * 7 % 60, 450 + seed * 31 % 400
+
+    def hash(self, number):
+        h = (number * 2654435761 + self.seed * 40503) % 2**32
+        h = (h ^ h >> 15) * 1103515245 % 2**32
+        return h ^ h >> 13
+
+    def draw(self):
+        v, u = np.mgrid[:120, :160]
+        depth = self.depth + np.array(self.OFFSETS)[self.hash(v * 160 + u) % len(self.OFFSETS)]
+        depth[self.hash(10**6 + v // 4 * 160 + u // 4) % 6 == 0] = 0
+        return np.where(depth >= NEAR_MM, depth, 0).astype(float)
+
+    def score(self):
+        """Of the place in the middle; None where a probe is too near to a cell's border, or the
+        bulge is not a limit's."""
+        places, focal, scores = Places(self), self.focal, []
+        for stretch in (1 - 2e-4, 1 + 2e-5, 1):
+            self.focal = focal * stretch
+            scores.append(places.score(60, 80))
+        self.focal = focal
+        inside = places.seen(60, 80, INSIDE)
+        behind = inside - places.depth[60, 80]
+        hit = (inside > 0) & (behind >= -40) & (behind <= 110)
+        bulge = 99
+        if hit[:5].any() and hit[5:].sum() >= 3:
+            bulge = inside[5:][hit[5:]].mean() - inside[:5][hit[:5]].mean()
+        is_clear = np.ptp(scores) < 0.1 and not -2 < bulge < 17 and scores[-1] > 0
+        return scores[-1] if is_clear else None
+
+
 def survey(image, cell, reach):
     height, width = image.shape
     out = np.zeros((-(-height // cell), -(-width // cell)))
@@ -190,4 +228,8 @@ def write_vectors(directory):
                         *emit.numbers(scene.plane, 3), scene.every, len(scene.ellipsoids), index,
                         places.cell, places.spacing, len(found), index))
     inc.struct_array("vector_scene", "vector_scenes", rows)
+    scores = ((noise, noise.score()) for noise in map(Noise, range(1, 120)))
+    inc.struct_array("vector_noise", "vector_noises",
+                     ["%d, %d, %d, %s" % (noise.seed, noise.focal, noise.depth, emit.number(score, 6))
+                      for noise, score in scores if score is not None])
     return inc.write(directory, "windows.inc")
