@@ -72,7 +72,6 @@ class Bench:
         self.seconds = {}
         self.linked = {}  # objects of the core, by test
         self.lock = threading.Lock()
-        shutil.rmtree(work, ignore_errors=True)
         os.makedirs(os.path.join(work, "core"))
         for path in glob.glob(core + "/*.[ch]"):
             shutil.copy(path, os.path.join(work, "core"))
@@ -317,14 +316,15 @@ def report(bench, quota, seed, jobs):
 def check(arguments):
     tests = [path for path in sorted(glob.glob(ROOT + "/tests/unit/test_*.c")) if is_of_core(path)]
     core = os.path.join(ROOT, "firmware", "core")
-    begin = time.monotonic()
-    bench = Bench(core, tests, arguments.unity, os.path.join(ROOT, "build", "mutation"), arguments.golden)
     quota = shares({name: len(sites.mutants(read(os.path.join(core, name))))
                     for name in mutated_sources(core)}, arguments.count)
     if arguments.stage:
         quota = {name: quota[name] for name in quota
                  if re.sub(r"^ih_|\.[ch]$", "", name) in arguments.stage}
-    total = report(bench, quota, arguments.seed, arguments.jobs)
+    begin = time.monotonic()
+    with tempfile.TemporaryDirectory() as work:
+        bench = Bench(core, tests, arguments.unity, work, arguments.golden)
+        total = report(bench, quota, arguments.seed, arguments.jobs)
     caught = rate(total, "caught")
     counted = sum(total[name] for name in ("caught", "golden", "alive"))
     bad = caught < arguments.least

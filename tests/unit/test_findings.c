@@ -474,12 +474,18 @@ static void nothing_at_the_lens_is_a_head(void)
     int i;
 
     make_points(true, false);
-    params.front_least_mm = 650;
-    look();
-    for (i = 0; i < findings.finding_count; i++) {
-        const struct ih_ellipsoid *head = &findings.finding[i].head;
+    for (params.front_least_mm = 600; params.front_least_mm <= 800; params.front_least_mm += 200) {
+        ih_findings_begin(&findings);
+        look();
+        for (i = 0; i < findings.finding_count; i++) {
+            const struct ih_ellipsoid *head = &findings.finding[i].head;
 
-        TEST_ASSERT_TRUE(head->centre_mm_q8[2] - head->semi_mm_q8[2] >= 650 << 8);
+            TEST_ASSERT_TRUE(head->centre_mm_q8[2] - head->semi_mm_q8[2] >= params.front_least_mm
+                                                                                << 8);
+        }
+        /* The head's own front is at 702 mm. */
+        IH_TEST_EQUAL(params.front_least_mm < 702, nearest_mm() < 30, "found",
+                      params.front_least_mm);
     }
     ih_findings_begin(&findings);
     params.front_least_mm = 3000;
