@@ -604,6 +604,8 @@ static void nothing_is_bright_outside_the_frame(void)
     TEST_ASSERT_FALSE(ih_dots_is_bright(&dots, 0, -1));
     TEST_ASSERT_FALSE(ih_dots_is_bright(&dots, 320, 0));
     TEST_ASSERT_FALSE(ih_dots_is_bright(&dots, 0, 240));
+    TEST_ASSERT_FALSE(ih_dots_is_bright(&dots, IH_FRAME_WIDTH_MAX, 0));
+    TEST_ASSERT_FALSE(ih_dots_is_bright(&dots, 0, IH_FRAME_HEIGHT_MAX));
     TEST_ASSERT_FALSE(ih_dots_is_bright(&dots, INT32_MIN, INT32_MAX));
     TEST_ASSERT_FALSE(ih_dots_is_bright(&dots, INT32_MAX, INT32_MIN));
 }
