@@ -112,8 +112,6 @@ static bool ellipse_of_moments(const struct ih_moments *m, int32_t x0_q8, int32_
     if (determinant_q32 <= 0) {
         return false;
     }
-    IH_IN_RANGE(xx_q16, 0, IH_RANGE_MOMENT_Q16);
-    IH_IN_RANGE(yy_q16, 0, IH_RANGE_MOMENT_Q16);
     int64_t root_q16 = ih_isqrt_u64((uint64_t)determinant_q32);
     /* 4 pi sqrt(det) / area; the factor 2 because area2 is twice the area */
     out->shape_q16 = ih_saturate_s32(ih_div_round(2 * FOUR_PI_Q16 * root_q16, area2_q16));
@@ -124,6 +122,9 @@ static bool ellipse_of_moments(const struct ih_moments *m, int32_t x0_q8, int32_
 static bool set_ratio(struct ih_ellipse *ellipse)
 {
     ellipse->ratio_q16 = axis_ratio_q16(ellipse->xx_q16, ellipse->xy_q16, ellipse->yy_q16);
+    IH_IN_RANGE(ellipse->ratio_q16, 0, RATIO_MAX << 16);
+    IH_IN_RANGE(ellipse->ratio_q16 != 0 ? ellipse->xx_q16 : 0, 0, IH_RANGE_MOMENT_Q16);
+    IH_IN_RANGE(ellipse->ratio_q16 != 0 ? ellipse->yy_q16 : 0, 0, IH_RANGE_MOMENT_Q16);
     return ellipse->ratio_q16 != 0;
 }
 
