@@ -80,12 +80,12 @@ static char output[BUFSIZ]; /* none that is allocated in between */
 static int64_t start_of_round_us(int64_t round)
 {
     static const int64_t start_us[] = {0,
+                                       INT64_MIN,
                                        (INT64_C(1) << 31) - SECOND_US,
+                                       INT64_MAX - INT64_C(60) * SECOND_US,
                                        -SECOND_US,
                                        (INT64_C(1) << 32) - SECOND_US,
-                                       (INT64_C(1) << 53) - SECOND_US,
-                                       INT64_MAX - INT64_C(60) * SECOND_US,
-                                       INT64_MIN};
+                                       (INT64_C(1) << 53) - SECOND_US};
     return start_us[round % (int64_t)(sizeof start_us / sizeof start_us[0])];
 }
 
