@@ -78,7 +78,7 @@ run_afl() {
     if [ -n "$runs" ]; then limit="-E $runs"; else limit="-V $seconds"; fi
     # shellcheck disable=SC2086 # two words
     AFL_SKIP_CPUFREQ=1 AFL_I_DONT_CARE_ABOUT_MISSING_CRASHES=1 AFL_NO_AFFINITY=1 AFL_NO_UI=1 \
-        AFL_CMPLOG_ONLY_NEW=1 AFL_FAST_CAL=1 nice afl-fuzz -i "tests/fuzz/corpus/$1" -o "$work/afl" $limit \
+        AFL_FAST_CAL=1 nice afl-fuzz -i "tests/fuzz/corpus/$1" -o "$work/afl" $limit \
         ${words:+-x "$words"} -t 20000 -m none -- "build/fuzz-afl/tests/fuzz/fuzz_$1" \
         >"$work/afl.log" 2>&1 || true
     stats=$work/afl/default/fuzzer_stats
