@@ -27,6 +27,8 @@ ARCH ?= arm64
 .DEFAULT_GOAL := help
 .PHONY: help sim frames sanitize test fuzz coverage mutation accept eval bench bench-instructions bench-worst \
   test-bench bits cortexm longrun size vectors learn picture board board-gpiod2 deb image flash \
+
+.PHONY: help sim frames sanitize test accept eval bench bench-instructions bench-grow bench-worst test-bench bits cortexm size vectors learn picture board board-gpiod2 deb image flash \
   test-deb test-board test-image format formatted lint clean
 
 help: ## this list
@@ -112,6 +114,10 @@ bench: sim ## time isohead against the same work by OpenCV and Eigen: build/benc
 bench-instructions: sim ## instructions of each stage, by callgrind, with both compilers
 	@tools/setup.sh bench
 	@/usr/bin/python3 tools/bench/counts.py
+
+bench-grow: sim ## how the instructions of a frame grow with its size, dots, centres, grid, levels
+	@tools/setup.sh bench
+	@/usr/bin/python3 tools/bench/grow.py
 
 bench-worst: sim ## which of 10,000 frames costs most, and why; an hour
 	@tools/setup.sh size

@@ -1,9 +1,9 @@
 /* bench_worst [--save OUT.pgm] RIG.json FIRST COUNT [FRAME.pgm...]
  *
- * isohead over COUNT frames from number FIRST on of worst_frames.h; or, where frames are named, over those, the
- * first of which has number 0, to the last. Each is processed within bench_worst_frame, whose instructions are counted from outside
- * (worst_count.c, callgrind). What came before FIRST in its sequence is processed too, but outside. A line a
- * frame of what was found; --save writes the last one.
+ * isohead over COUNT frames from number FIRST on of worst_frames.h; or, where frames are named, over
+ * those, the first of which has number 0, to the last. Each is processed within bench_worst_frame,
+ * whose instructions are counted from outside (worst_count.c, callgrind). What came before FIRST in its
+ * sequence is processed too, but outside. A line a frame of what was found; --save writes the last one.
  */
 #include <stdio.h>
 #include <stdlib.h>

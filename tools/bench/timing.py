@@ -78,7 +78,8 @@ def table(name, stages):
         ratios = ["%.1f" % (cell["median_us"] / own) for cell in cells[1:]]
         lines.append("| " + " | ".join([row] + ["%.0f (%.0f)" % (c["median_us"], c["p5_us"]) for c in cells] + ratios)
                      + " |")
-    return "%s, %s\n\n%s\n" % (builds.compiler_version(name), builds.OPTIONS[name.split("-", 1)[1]], "\n".join(lines))
+    options = builds.OPTIONS[name.split("-", 1)[1]]
+    return "%s, %s\n\n%s\n" % (builds.compiler_version(name), options, "\n".join(lines))
 
 
 def processor():

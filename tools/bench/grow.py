@@ -1,0 +1,211 @@
+#!/usr/bin/env python3
+"""How a frame's cost grows: with frame size, dots, baseline, centres, grid, levels; and RAM.
+
+Instructions of gcc -O2 for x86-64, counted by callgrind, the mean of four rendered frames. What is a constant
+of the core (centres, grid, levels, widest frame) is changed in a copy of the sources below build/bench/grow.
+"""
+
+import json
+import math
+import os
+import random
+import re
+import shutil
+import subprocess
+import sys
+
+import numpy as np
+
+import builds
+import counts
+
+WORK = os.path.join(builds.WORK, "grow")
+STAGES = ("frame", "dots", "labels", "surface", "nests", "findings")
+FIRST, COUNT = 12, 4
+PARTS = ("firmware", "hal", "sim", "tools", "tests", "cmake", "CMakeLists.txt")
+SIZES = ((320, 240), (640, 480), (752, 582), (1024, 768), (1280, 800))
+DOTS = (50, 100, 200, 300, 361)
+CENTRES = (8, 10, 12, 14, 16)
+STEPS_PER_CENTRE = (2, 4, 8)  # even, and in lowest terms small: the table's radicand has 64 bits
+LEVEL_STEPS_MM = (5, 10, 20, 40)
+
+
+def render(name, options):
+    folder = os.path.join(WORK, "frames", name)
+    if not os.path.exists(os.path.join(folder, "rig.json")):
+        program = os.path.join(builds.ROOT, "build", "host", "tools", "render", "render")
+        subprocess.run([program, "--seed", "1", "--first-frame", "%d+%d" % (FIRST, COUNT), *options, folder], check=True,
+                       stdout=subprocess.DEVNULL)
+    return folder
+
+
+def arguments_of(folder):
+    names = sorted(name for name in os.listdir(folder) if name.endswith(".pgm"))
+    if len(names) != COUNT:
+        builds.fail("%s: %d frames, expected %d" % (folder, len(names), COUNT))
+    return [os.path.join(folder, "rig.json")] + [os.path.join(folder, name) for name in names]
+
+
+def read_pgm(path):
+    with open(path, "rb") as file:
+        data = file.read()
+    found = re.match(rb"P5\s+(\d+)\s+(\d+)\s+255\s", data)
+    width, height = int(found[1]), int(found[2])
+    return np.frombuffer(data[found.end():], np.uint8).reshape(height, width).copy()
+
+
+def write_pgm(path, image):
+    with open(path, "wb") as file:
+        file.write(b"P5\n%d %d\n255\n" % (image.shape[1], image.shape[0]) + image.tobytes())
+
+
+def erase(image, u, v):
+    """Put what lies 6 to 8 px left and right of a dot in its place, row by row."""
+    u, v = int(round(u)), int(round(v))
+    for row in range(max(v - 5, 0), min(v + 6, image.shape[0])):
+        around = np.concatenate([image[row, max(u - 8, 0):max(u - 5, 0)], image[row, u + 6:u + 9]])
+        if around.size:
+            image[row, max(u - 5, 0):u + 6] = np.resize(around, image[row, max(u - 5, 0):u + 6].size)
+
+
+def with_dots(source, count):
+    """A copy of the frames with at most so many dots: the others are painted over. Its folder, and how many
+    dots there are in the mean."""
+    folder = os.path.join(WORK, "frames", "dots-%d" % count)
+    os.makedirs(folder, exist_ok=True)
+    chooser, kept = random.Random(7), 0
+    with open(os.path.join(source, "truth.jsonl"), encoding="utf-8") as file:
+        truth = [json.loads(line) for line in file]
+    for entry in truth:
+        image = read_pgm(os.path.join(source, entry["file"]))
+        dots = entry["dots"][:]
+        chooser.shuffle(dots)
+        kept += min(count, len(dots))
+        for _, u, v, _ in dots[count:]:
+            erase(image, u, v)
+        write_pgm(os.path.join(folder, entry["file"]), image)
+    shutil.copy(os.path.join(source, "rig.json"), folder)
+    return folder, round(kept / len(truth))
+
+
+def variant(name, edits):
+    """A copy of the sources with some constants changed; (file, pattern, replacement)."""
+    folder = os.path.join(WORK, name)
+    shutil.rmtree(folder, ignore_errors=True)
+    os.makedirs(folder)
+    for part in PARTS:
+        source = os.path.join(builds.ROOT, part)
+        copy = shutil.copytree if os.path.isdir(source) else shutil.copy
+        copy(source, os.path.join(folder, part))
+    for file, pattern, replacement in edits:
+        path = os.path.join(folder, "firmware", "core", file)
+        with open(path, encoding="utf-8") as opened:
+            text = opened.read()
+        changed, number = re.subn(pattern, replacement, text)
+        if number != 1:
+            builds.fail("%s: '%s' stands there %d times, expected once: tools/bench/grow.py changes it"
+                        % (file, pattern, number))
+        with open(path, "w", encoding="utf-8") as opened:
+            opened.write(changed)
+    return folder
+
+
+def define(file, name, value):
+    return (file, r"(?m)^#define %s .*$" % name, "#define %s %s" % (name, value))
+
+
+def surface(centres, steps):
+    """centres in a row, grid steps per centre: the grid spans the same, its step is 40 / (centres - 1) / steps."""
+    common = math.gcd(40, steps * (centres - 1))
+    edits = [define("ih_surface.h", "IH_SURFACE_CENTRES", centres),
+             define("ih_surface.h", "IH_SURFACE_GRID", steps * (centres - 1) + 3),
+             define("ih_surface.h", "IH_SURFACE_STEPS_PER_CENTRE", steps),
+             define("ih_surface.h", "IH_SURFACE_STEP_NUMERATOR", 40 // common),
+             define("ih_surface.h", "IH_SURFACE_STEP_DENOMINATOR", steps * (centres - 1) // common),
+             define("isohead.h", "IH_RAM_MAX", "(1024 * 1024)")]
+    with open(os.path.join(builds.ROOT, "firmware", "core", "ih_surface.h"), encoding="utf-8") as file:
+        if "#define IH_SURFACE_SPLIT " in file.read():  # its packed triangle has an even count
+            edits.append(define("ih_surface.h", "IH_SURFACE_SPLIT", centres * centres * 25 // 36 // 4 * 4))
+    return edits
+
+
+def levels(step_mm):
+    return [("ih_hypotheses.c", r"level_step_mm = 10;", "level_step_mm = %d;" % step_mm),
+            define("ih_hypotheses.h", "IH_HYPOTHESES_SLICES_MAX", max(16, 110 // step_mm + 2))]
+
+
+def ram_bytes(source):
+    program = os.path.join(WORK, "ram")
+    text = ('#include <stdio.h>\n#include "isohead.h"\n'
+            'int main(void) { printf("%zu\\n", sizeof(struct isohead)); return 0; }\n')
+    subprocess.run(["gcc", "-x", "c", "-I", os.path.join(source, "firmware", "core"), "-o", program, "-"], check=True,
+                   input=text, text=True)
+    return int(subprocess.run([program], check=True, stdout=subprocess.PIPE, text=True).stdout)
+
+
+def measure(source, arguments):
+    work = builds.WORK if source == builds.ROOT else source
+    folder = builds.make("gcc-O2", ["bench_isohead"], source=source, work=work)
+    command = [builds.program(folder, "bench_isohead"), "--once", *arguments]
+    return counts.of_stages(counts.count(command, COUNT, "isohead_frame"))
+
+
+def table(title, rows):
+    """rows: name, stages, other cells by heading."""
+    others = list(rows[0][2])
+    lines = ["| %s | " % title + " | ".join(list(STAGES) + others) + " |", "| --- " * (1 + len(STAGES) + len(others)) + "|"]
+    for name, stages, cells in rows:
+        lines.append("| %s | " % name + " | ".join(["%d" % round(stages[s] / 1000) for s in STAGES]
+                                                   + [str(cells[o]) for o in others]) + " |")
+    print("\n".join(lines) + "\n", flush=True)
+
+
+def widest(size):
+    """RAM of a core for frames of at most this size."""
+    return ram_bytes(variant("size-%dx%d" % size, [define("ih_config.h", "IH_FRAME_WIDTH_MAX", size[0]),
+                                                  define("ih_config.h", "IH_FRAME_HEIGHT_MAX", size[1])]))
+
+
+def grow_frames(base):
+    rows = []
+    for size in SIZES:
+        name = "%dx%d" % size
+        rows.append((name, measure(builds.ROOT, arguments_of(render(name, ["--size", name]))),
+                     {"RAM, made for this size": widest(size), "the frame": size[0] * size[1]}))
+    table("frame size", rows)
+    rows = []
+    for count in DOTS:
+        folder, kept = with_dots(base, count)
+        rows.append((str(kept), measure(builds.ROOT, arguments_of(folder)), {}))
+    table("dots present", rows)
+    rows = [("%s mm" % mm, measure(builds.ROOT, arguments_of(render(rig, ["--rig", rig]))), {})
+            for rig, mm in (("paper", "12.5"), ("wide", "125"))]
+    table("baseline", rows)
+
+
+def grow_constants(base):
+    arguments = arguments_of(base)
+    shipped = measure(builds.ROOT, arguments)
+    for title, variants in (
+            ("centres, grid", [("%d, %dx%d" % (c * c, 4 * c - 1, 4 * c - 1), surface(c, 4)) for c in CENTRES]),
+            ("grid, 144 centres", [("%dx%d" % (11 * s + 3, 11 * s + 3), surface(12, s)) for s in STEPS_PER_CENTRE]),
+            ("mm between levels", [(str(mm), levels(mm)) for mm in LEVEL_STEPS_MM])):
+        rows = []
+        for name, edits in variants:
+            source = variant(re.sub(r"\W+", "-", title + " " + name), edits)
+            rows.append((name, measure(source, arguments), {"RAM": ram_bytes(source)}))
+        if sum(stages == shipped for _, stages, _ in rows) != 1:
+            builds.fail("%s: no variant costs what the core as it is does: one of them should be it" % title)
+        table(title, rows)
+
+
+def main():
+    os.makedirs(WORK, exist_ok=True)
+    base = render("752x582", ["--size", "752x582"])
+    print("Thousand instructions of a frame, and bytes.\n")
+    #    grow_frames(base)
+    grow_constants(base)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
