@@ -26,7 +26,8 @@ PARTS = ("firmware", "hal", "sim", "tools", "tests", "cmake", "CMakeLists.txt")
 SIZES = ((320, 240), (640, 480), (752, 582), (1024, 768), (1280, 800))
 DOTS = (50, 100, 200, 300, 361)
 CENTRES = (8, 10, 12, 14, 16)
-STEPS_PER_CENTRE = (2, 4, 8)  # even, and in lowest terms small: the table's radicand has 64 bits
+# Even; and small once the step is in lowest terms, because the table's radicand has 64 bits.
+STEPS_PER_CENTRE = (2, 4, 8)
 LEVEL_STEPS_MM = (5, 10, 20, 40)
 
 
@@ -34,8 +35,8 @@ def render(name, options):
     folder = os.path.join(WORK, "frames", name)
     if not os.path.exists(os.path.join(folder, "rig.json")):
         program = os.path.join(builds.ROOT, "build", "host", "tools", "render", "render")
-        subprocess.run([program, "--seed", "1", "--first-frame", "%d+%d" % (FIRST, COUNT), *options, folder], check=True,
-                       stdout=subprocess.DEVNULL)
+        subprocess.run([program, "--seed", "1", "--first-frame", "%d+%d" % (FIRST, COUNT), *options, folder],
+                       check=True, stdout=subprocess.DEVNULL)
     return folder
 
 
@@ -153,7 +154,8 @@ def measure(source, arguments):
 def table(title, rows):
     """rows: name, stages, other cells by heading."""
     others = list(rows[0][2])
-    lines = ["| %s | " % title + " | ".join(list(STAGES) + others) + " |", "| --- " * (1 + len(STAGES) + len(others)) + "|"]
+    heads = [title, *STAGES, *others]
+    lines = ["| " + " | ".join(heads) + " |", "| --- " * len(heads) + "|"]
     for name, stages, cells in rows:
         lines.append("| %s | " % name + " | ".join(["%d" % round(stages[s] / 1000) for s in STAGES]
                                                    + [str(cells[o]) for o in others]) + " |")

@@ -194,9 +194,11 @@ static void draw_checks(struct picture *p)
 static const struct {
     const char *name;
     void (*draw)(struct picture *p);
-} kinds[] = {{"bumps", draw_bumps},   {"lines", draw_lines}, {"lattice", draw_lattice},
-             {"crowd", draw_crowd},   {"rows", draw_rows},   {"noise", draw_noise},
-             {"checks", draw_checks}, {"bumps", draw_bumps}};
+    bool is_sequence;
+} kinds[] = {{"bumps", draw_bumps, true},      {"lines", draw_lines, false},
+             {"lattice", draw_lattice, false}, {"crowd", draw_crowd, false},
+             {"rows", draw_rows, false},       {"noise", draw_noise, false},
+             {"checks", draw_checks, false},   {"bumps", draw_bumps, true}};
 #define KINDS ((int32_t)(sizeof kinds / sizeof kinds[0]))
 
 const char *worst_frame_kind(int32_t number)
@@ -212,6 +214,7 @@ void worst_frame_draw(const struct ih_rig *rig, int32_t number, uint8_t *samples
                               .step = number % WORST_SEQUENCE};
     picture.samples = samples;
     int32_t sequence = number / WORST_SEQUENCE;
-    state = (uint32_t)sequence * 2654435761U + 12345U;
+    bool is_sequence = kinds[sequence % KINDS].is_sequence;
+    state = (uint32_t)(is_sequence ? sequence * WORST_SEQUENCE : number) * 2654435761U + 12345U;
     kinds[sequence % KINDS].draw(&picture);
 }

@@ -1,10 +1,11 @@
 /* worst_frames - frames that are meant to cost much, the same on every machine.
  *
- * In:    a rig, a number. A hundred numbers on end are a sequence of one kind, that changes little from frame
- *        to frame, so that tracks live.
- * Out:   an 8-bit frame: dots that a surface of many bumps sends back, all or some, with texture; dots at
- *        several depths of every line, or in rows along the lines; lattices and crowds of dots of all sizes and strengths, most of them
- *        near the threshold; noise, stripes and checks of all sizes.
+ * In:    a rig, a number.
+ * Out:   an 8-bit frame: dots that a surface of many bumps sends back, all or some, with texture; dots
+ *        at several depths of every line, or in rows along the lines; lattices and crowds of dots of all
+ *        sizes and strengths, most of them near the threshold; noise, stripes and checks of all sizes.
+ *        A hundred numbers on end are of one kind. Those of bumps are a sequence that changes little from
+ *        frame to frame, so that tracks live; of all others each frame is drawn anew.
  * Integers only.
  */
 #ifndef WORST_FRAMES_H
