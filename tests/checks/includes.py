@@ -142,7 +142,7 @@ def judge_rigblob(path, quoted, target):
 def judge_bench(path, quoted, target):
     if not quoted or is_core(target):
         return None
-    good = re.fullmatch(r"bench_\w+\.h|hal_file\.h|replay/hal_pgm\.h|app_rig\.h", target)
+    good = re.fullmatch(r"(bench|worst)_\w+\.h|hal_file\.h|replay/hal_pgm\.h|app_rig\.h", target)
     return None if good else "bench includes the core, the app's rig, hal's files and its own"
 
 
