@@ -25,7 +25,7 @@ LONGRUN_FRAMES ?= 100000
 ARCH ?= arm64
 
 .DEFAULT_GOAL := help
-.PHONY: help sim frames sanitize test fuzz coverage mutation accept eval bench bench-instructions bench-worst \
+.PHONY: help sim frames sanitize test fuzz coverage ranges mutation accept eval bench bench-instructions bench-worst \
   test-bench bits cortexm longrun size vectors learn picture board board-gpiod2 deb image flash \
 
 .PHONY: help sim frames sanitize test accept eval bench bench-instructions bench-grow bench-worst test-bench bits cortexm size vectors learn picture board board-gpiod2 deb image flash \
@@ -67,6 +67,10 @@ coverage: sim ## the core's lines and branches that its own tests run, against t
 	@cmake --build --preset coverage --parallel 2
 	@ctest --test-dir $(BUILD)/coverage --label-regex '^core$$' --output-on-failure --parallel 2
 	@/usr/bin/python3 tests/checks/coverage.py $(BUILD)/coverage
+
+ranges: sim ## the core with every operation and range checked, over all frames, its tests, the fuzzers' corpus
+	@tools/setup.sh ranges
+	@tests/checks/ranges.sh --all $(UNITY_DIR) $(BUILD)/host/tests/golden frames $(wildcard $(DATA)/dots $(DATA)/range)
 
 mutation: sim ## would the tests notice? Mistakes made in the core one at a time; half an hour
 	@tools/setup.sh mutation

@@ -23,4 +23,8 @@ if(ISOHEAD_RANGE_CHECKS)
   isohead_check_ranges(isohead_core)
   target_link_libraries(isohead_core PUBLIC isohead_ranges_failed)
   target_link_options(isohead_core INTERFACE -fsanitize=undefined)
+
+  add_executable(ranges_planted tests/checks/ranges_planted.c)
+  target_link_libraries(ranges_planted PRIVATE isohead_core)
+  isohead_check_ranges(ranges_planted)
 endif()

@@ -1,7 +1,7 @@
 #!/bin/sh
 # Bring what a make target needs and this machine lacks.
 #
-#   tools/setup.sh sim|test|fuzz|coverage|mutation|accept|eval|bench|bits|cortexm|size|vectors|picture|format|lint
+#   tools/setup.sh sim|test|fuzz|coverage|ranges|mutation|accept|eval|bench|bits|cortexm|size|vectors|picture|format|lint
 #   tools/setup.sh board arm64|armhf|host
 #   tools/setup.sh deb arm64|armhf
 #   tools/setup.sh test-deb
@@ -185,6 +185,12 @@ test)
     need_header libv4l2.h libv4l-dev
     need_gpio
     ;;
+ranges)
+    need_sim
+    need_program clang clang
+    need_header libv4l2.h libv4l-dev
+    need_gpio
+    ;;
 coverage | mutation)
     need_sim
     need_program gcc gcc
@@ -268,7 +274,7 @@ if [ -n "$packages" ]; then
 fi
 
 case "$1" in
-test | coverage | mutation | bits | cortexm | fuzz | size) tools/fetch_third_party.sh build/third_party ;;
+test | coverage | ranges | mutation | bits | cortexm | fuzz | size) tools/fetch_third_party.sh build/third_party ;;
 board) [ "$2" = host ] || tools/board/sysroot.sh "$2" ;;
 esac
 case "$1" in

@@ -3,6 +3,8 @@
 #include <stdbool.h>
 #include <string.h>
 
+#include "ih_range.h"
+
 #define WORD_BYTES 4
 /* Where things stand; between KIND and CRC all are int32_t. */
 #define AT_MAGIC 0
@@ -51,7 +53,7 @@ static int32_t get_s32(const uint8_t *at)
 
 static void put_s32(uint8_t *at, int32_t value)
 {
-    put_u32(at, (uint32_t)value);
+    put_u32(at, IH_WRAPS(uint32_t, value));
 }
 
 uint32_t ih_blob_crc32(const uint8_t *bytes, size_t count)

@@ -74,7 +74,7 @@ def allowed_in_core(name):
         return {own}
     if name == "ih_score.c":
         return {own, "ih_fix.h", "ih_score_weights.h"}
-    return {own, "ih_fix.h"} if own in CORE_HEADERS else None
+    return {own, "ih_fix.h", "ih_range.h"} if own in CORE_HEADERS else None
 
 
 def judge_core(path, quoted, target):

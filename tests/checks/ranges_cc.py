@@ -5,7 +5,7 @@
 
 Clang's sanitizers check what C converts by itself. A cast they take for meant, and the core has one
 wherever a 64-bit result goes into 32 bits: without a cast the build refuses it. So the source is
-preprocessed, each cast to an integer type of at most 64 bits in a file of firmware/core becomes
+preprocessed, each cast to an integer type but int64_t in a file of firmware/core becomes
     (int32_t)ih_range_cast(OPERAND, INT32_MIN, INT32_MAX, ...)
 and the result is compiled by the same command. Casts to int64_t alone stay: of all that the core has
 only uint64_t can be greater, and there sanitizers see the sum or product that made it so.
@@ -20,6 +20,7 @@ LIMITS = {"int8_t": (-2**7, 2**7 - 1), "uint8_t": (0, 2**8 - 1),
           "int32_t": (-2**31, 2**31 - 1), "int": (-2**31, 2**31 - 1),
           "uint32_t": (0, 2**32 - 1), "uint64_t": (0, 2**64 - 1), "size_t": (0, 2**64 - 1)}
 CAST = re.compile(r"\(\s*(%s)\s*\)" % "|".join(LIMITS))
+CHECKED = re.compile(r"/firmware/core/|/ranges_planted\.c$")
 TYPE = re.compile(r"\(\s*(const\s+)?(struct\s+|enum\s+)?\w+(\s*\*)*\s*\)")
 MARKER = re.compile(r'^# (\d+) "([^"]*)"', re.M)
 DECLARATION = ("__extension__ __int128 ih_range_cast(__int128 value, __int128 low, __int128 high, "
@@ -94,7 +95,7 @@ def check_casts(text, where=None):
             continue
         name, line = where or place(text, found.start())
         end = operand_end(text, found.end())
-        if "/firmware/core/" not in name or end is None:
+        if not CHECKED.search(name) or end is None:
             continue
         low, high = LIMITS[found[1]]
         operand = check_casts(text[found.end():end], (name, line)) if end > found.end() else ""

@@ -1,0 +1,118 @@
+#!/usr/bin/env python3
+"""The ranges of firmware/core/ih_range.h: the same in docs/numerics.md, used, and no code.
+
+  doc     each IH_RANGE_ constant is named in docs/numerics.md, with its value, as `NAME` = 123; the
+          document names no other
+  use     each is used in the core
+  code    without ISOHEAD_RANGE_CHECKS the core's objects are, byte for byte, those of a copy without any
+          IH_IN_RANGE
+
+ranges_doc.py [--self-test]      exit status 1 if one of these does not hold
+"""
+
+import argparse
+import os
+import re
+import subprocess
+import sys
+import tempfile
+
+ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+CORE = os.path.join(ROOT, "firmware", "core")
+CHECK = re.compile(r"^[ \t]*IH_IN_RANGE\([^;]*;\n", re.M)
+COMPILE = ["gcc", "-std=c11", "-O0", "-I", ".", "-c", "-o"]
+
+
+def read(path):
+    with open(path, encoding="utf-8") as file:
+        return file.read()
+
+
+def constants(header):
+    """Name and value of each; a value is a number or one shifted."""
+    found = re.findall(r"^#define (IH_RANGE_\w+) \(?(-?\d+)(?: << (\d+))?\)?", header, re.M)
+    return {name: int(number) << int(shift or 0) for name, number, shift in found}
+
+
+def check_doc(header, doc):
+    stated = {name: int(value.replace(",", ""))
+              for name, value in re.findall(r"`(IH_RANGE_\w+)` = (-?[\d,]+)", doc)}
+    known = constants(header)
+    wrong = ["%s is %s in ih_range.h, %s in docs/numerics.md"
+             % (name, known.get(name, "missing"), stated.get(name, "missing"))
+             for name in sorted(set(known) | set(stated)) if known.get(name) != stated.get(name)]
+    return wrong if known else ["ih_range.h has no constants"]
+
+
+def check_use(header, sources):
+    return ["%s is used nowhere in the core" % name for name in constants(header)
+            if not re.search(r"\b%s\b" % name, sources)]
+
+
+def compile_core(directory, objects):
+    """The core's objects; compiled in their folder, so that paths are the same."""
+    os.mkdir(objects)
+    for name in sorted(os.listdir(directory)):
+        if name.endswith(".c"):
+            subprocess.run(COMPILE + [os.path.join(objects, name), name], cwd=directory, check=True)
+
+
+def check_code(change=lambda text: text):
+    with tempfile.TemporaryDirectory() as work:
+        for side, edit in (("with", change), ("without", lambda text: CHECK.sub("", text))):
+            os.mkdir(os.path.join(work, side))
+            for name in os.listdir(CORE):
+                text = read(os.path.join(CORE, name))
+                with open(os.path.join(work, side, name), "w", encoding="utf-8") as file:
+                    file.write(text if name == "ih_range.h" and side == "without" else edit(text))
+            compile_core(os.path.join(work, side), os.path.join(work, side + ".o"))
+        names = sorted(os.listdir(os.path.join(work, "with.o")))
+        return names, ["%s: an IH_IN_RANGE makes code" % name for name in names
+                       if open(os.path.join(work, "with.o", name), "rb").read()
+                       != open(os.path.join(work, "without.o", name), "rb").read()]
+
+
+def core_sources():
+    return "".join(read(os.path.join(CORE, name)) for name in sorted(os.listdir(CORE))
+                   if name != "ih_range.h" and name.endswith((".c", ".h")))
+
+
+def check():
+    header, doc, sources = (read(os.path.join(CORE, "ih_range.h")),
+                            read(os.path.join(ROOT, "docs", "numerics.md")), core_sources())
+    names, wrong = check_code()
+    wrong += check_doc(header, doc) + check_use(header, sources)
+    for line in wrong:
+        print("ranges_doc: " + line)
+    print("ranges_doc: %d constants, %d checks in the core, %d objects without a trace of them"
+          % (len(constants(header)), len(CHECK.findall(sources)), len(names)))
+    return 1 if wrong else 0
+
+
+def self_test():
+    header = "#define IH_RANGE_A 5\n#define IH_RANGE_B (1 << 4) /* b */\n#define IH_RANGE_C (-7)\n"
+    doc = "`IH_RANGE_A` = 5, `IH_RANGE_B` = 16, `IH_RANGE_C` = -7"
+    noticed = [
+        not check_doc(header, doc),
+        check_doc(header, doc.replace("16", "17")),
+        check_doc(header, doc.replace("`IH_RANGE_C` = -7", "")),
+        check_doc(header, doc + " `IH_RANGE_D` = 1"),
+        check_doc("", ""),
+        not check_use(header, "IH_RANGE_A IH_RANGE_B -IH_RANGE_C"),
+        check_use(header, "IH_RANGE_A IH_RANGE_BC IH_RANGE_C"),
+        check_code(lambda text: text.replace("((void)sizeof((value) >= (low) && (value) <= (high)))",
+                                             "((void)((value) == (low) ? *(volatile int *)0 : 0))"))[1],
+    ]
+    print("ranges_doc: %d of %d made-up mistakes told rightly" % (sum(map(bool, noticed)), len(noticed)))
+    return 0 if all(noticed) else 1
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--self-test", action="store_true")
+    return self_test() if parser.parse_args().self_test else check()
+
+
+if __name__ == "__main__":
+    sys.exit(main())
