@@ -65,14 +65,19 @@ static bool render_frame(struct studio *studio, struct rd_output *output, int fr
     struct rd_stage *stage = &studio->stage;
     if (!rd_stage_frame(stage, frame))
         return false;
-    if (stage->still_changed || stage->light.shadows)
+    if (stage->still_changed || stage->light.shadows) {
         rd_ambient_still(studio->ambient, &stage->scene, &stage->light);
+        if (stage->truth.board_known)
+            rd_ambient_edges(studio->ambient, &studio->rig, &stage->scene, &stage->light);
+    }
     rd_ambient_frame(studio->ambient, &stage->scene, &stage->light, studio->grey);
     struct rd_frame_note note = {stage->time_us, !stage->options.alternate || frame % 2 == 0, stage->source};
     if (note.laser) {
-        rd_dots_cast(&studio->laser, &studio->rig, &stage->scene, studio->grey, &studio->visible);
+        rd_dots_cast(&studio->laser, &studio->rig, &stage->scene, frame, studio->grey, &studio->visible);
         rd_output_truth(output, frame, &stage->truth, &studio->visible);
     }
+    if (stage->options.blur_px > 0.0)
+        rd_ambient_blur(studio->ambient, stage->options.blur_px, studio->grey);
     rd_sensor_expose(&studio->sensor, studio->grey, frame, studio->samples);
     return rd_output_frame(output, frame, &note, &studio->rig, studio->sensor.max_value, studio->samples);
 }

@@ -4,6 +4,10 @@
 #include <string.h>
 
 #define TILE_PX 16
+/* A pixel that differs from a neighbour by this, grey levels, is on an edge. */
+#define EDGE_GREY 4.0f
+#define EDGE_SIDE 4
+#define BLUR_SIGMAS 3.0
 
 /* A tile's view: all its rays lie within an angle of one axis. */
 struct tile {
@@ -131,6 +135,76 @@ void rd_ambient_still(struct rd_ambient *ambient, const struct rd_scene *scene, 
         for (int column = 0; column < ambient->tile_columns; column++)
             still_tile(ambient, scene, light, column, row);
     }
+}
+
+static bool on_edge(const struct rd_ambient *a, int u, int v)
+{
+    float low = a->still_grey[v * a->width + u], high = low;
+    for (int y = v > 0 ? v - 1 : 0; y <= v + 1 && y < a->height; y++) {
+        for (int x = u > 0 ? u - 1 : 0; x <= u + 1 && x < a->width; x++) {
+            low = fminf(low, a->still_grey[y * a->width + x]);
+            high = fmaxf(high, a->still_grey[y * a->width + x]);
+        }
+    }
+    return high - low > EDGE_GREY;
+}
+
+static double mean_grey(const struct rd_rig *rig, const struct rd_scene *scene, const struct rd_light *light, int u,
+                        int v)
+{
+    double sum = 0.0;
+    for (int i = 0; i < EDGE_SIDE * EDGE_SIDE; i++) {
+        double right = (i % EDGE_SIDE + 0.5) / EDGE_SIDE - 0.5, down = (i / EDGE_SIDE + 0.5) / EDGE_SIDE - 0.5;
+        struct rd_ray ray = {rd_v(0.0, 0.0, 0.0), rd_rig_pixel_ray(rig, u + right, v + down)};
+        struct rd_hit hit;
+        bool seen = rd_scene_hit(scene, &ray, RD_FAR_AWAY_MM, &hit);
+        sum += seen ? rd_light_grey(light, scene, &hit, ray.dir) : light->nothing_grey;
+    }
+    return sum / (EDGE_SIDE * EDGE_SIDE);
+}
+
+/* The means go to the rows above the one that is looked at, when no neighbour needs those any more. */
+void rd_ambient_edges(struct rd_ambient *ambient, const struct rd_rig *rig, const struct rd_scene *scene,
+                      const struct rd_light *light)
+{
+    int w = ambient->width;
+    float *before = ambient->row_copy, *here = before + w;
+    for (int v = 0; v < ambient->height; v++) {
+        for (int u = 0; u < w; u++)
+            here[u] =
+                on_edge(ambient, u, v) ? (float)mean_grey(rig, scene, light, u, v) : ambient->still_grey[v * w + u];
+        if (v > 0)
+            memcpy(ambient->still_grey + (v - 1) * w, before, (size_t)w * sizeof *before);
+        float *free_row = before;
+        before = here;
+        here = free_row;
+    }
+    memcpy(ambient->still_grey + (ambient->height - 1) * w, before, (size_t)w * sizeof *before);
+}
+
+/* One line of `count` samples, `step` apart, through a copy of it. */
+static void blur_line(float *line, int count, int step, double sigma_px, float *copy)
+{
+    int reach = (int)(BLUR_SIGMAS * sigma_px + 1.0);
+    for (int i = 0; i < count; i++)
+        copy[i] = line[i * step];
+    for (int i = 0; i < count; i++) {
+        double sum = 0.0, weights = 0.0;
+        for (int k = i > reach ? i - reach : 0; k <= i + reach && k < count; k++) {
+            double weight = exp(-0.5 * (k - i) * (k - i) / (sigma_px * sigma_px));
+            sum += weight * (double)copy[k];
+            weights += weight;
+        }
+        line[i * step] = (float)(sum / weights);
+    }
+}
+
+void rd_ambient_blur(struct rd_ambient *ambient, double sigma_px, float *grey)
+{
+    for (int v = 0; v < ambient->height; v++)
+        blur_line(grey + v * ambient->width, ambient->width, 1, sigma_px, ambient->row_copy);
+    for (int u = 0; u < ambient->width; u++)
+        blur_line(grey + u, ambient->height, ambient->width, sigma_px, ambient->row_copy);
 }
 
 static void moving_tile(const struct rd_ambient *a, const struct rd_scene *scene, const struct rd_light *light,

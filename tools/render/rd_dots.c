@@ -39,6 +39,7 @@ void rd_laser_make(struct rd_laser *laser, const struct rd_options *options, con
     laser->divergence = rd_rng_uniform(&rng, 1e-4, 3e-4);
     laser->speckle = rd_rng_uniform(&rng, 0.15, 0.45);
     laser->seed = rd_rng_next(&rng);
+    laser->missing = options->missing;
     laser->reach_mm = options->range_dir != NULL ? rig->far_mm : RD_FAR_AWAY_MM;
     for (int i = 0; i < RD_DOT_COUNT; i++) {
         double row = i / RD_DOT_ROWS - RD_DOT_ROWS / 2, column = i % RD_DOT_ROWS - RD_DOT_ROWS / 2;
@@ -168,12 +169,13 @@ static bool cast_dot(const struct rd_laser *laser, const struct rd_rig *rig, con
     return middle_seen && peak_near(rig, grey, dot->u_px, dot->v_px) - before_grey >= RD_VISIBLE_GREY;
 }
 
-void rd_dots_cast(const struct rd_laser *laser, const struct rd_rig *rig, const struct rd_scene *scene, float *grey,
-                  struct rd_dot_list *visible)
+void rd_dots_cast(const struct rd_laser *laser, const struct rd_rig *rig, const struct rd_scene *scene, int frame,
+                  float *grey, struct rd_dot_list *visible)
 {
     visible->dot_count = 0;
     for (int i = 0; i < RD_DOT_COUNT; i++) {
-        if (cast_dot(laser, rig, scene, i, grey, &visible->dots[visible->dot_count]))
+        bool missing = rd_hash_unit(laser->seed, (uint64_t)i, (uint64_t)frame) < laser->missing;
+        if (!missing && cast_dot(laser, rig, scene, i, grey, &visible->dots[visible->dot_count]))
             visible->dot_count++;
     }
 }

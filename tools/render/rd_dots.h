@@ -24,6 +24,7 @@ struct rd_laser {
     double divergence;         /* growth of that, mm per mm */
     double reach_mm;           /* farther surfaces show no dots */
     double speckle;            /* 0 none .. 1 full */
+    double missing;            /* share of dots that are not there */
     double gain[RD_DOT_COUNT]; /* the grating does not share the light evenly */
     uint64_t seed;
 };
@@ -41,7 +42,7 @@ struct rd_dot_list {
 void rd_laser_make(struct rd_laser *laser, const struct rd_options *options, const struct rd_rig *rig);
 
 /* Adds all dots to `grey` and lists the visible ones with the true places of their middle rays. */
-void rd_dots_cast(const struct rd_laser *laser, const struct rd_rig *rig, const struct rd_scene *scene, float *grey,
-                  struct rd_dot_list *visible);
+void rd_dots_cast(const struct rd_laser *laser, const struct rd_rig *rig, const struct rd_scene *scene, int frame,
+                  float *grey, struct rd_dot_list *visible);
 
 #endif

@@ -2,6 +2,8 @@
 
 #include "rd_rng.h"
 
+/* A lamp of about 7 degrees. */
+#define GLARE_EXPONENT 400.0
 /* No thing farther off throws a shadow; and none on the very place it hangs on. */
 #define SHADOW_MM 3000.0
 #define SHADOW_SLACK_MM 1.0
@@ -94,5 +96,8 @@ double rd_light_grey(const struct rd_light *light, const struct rd_scene *scene,
         s *= s;
         shine = hit->gloss * key * s * s * s;
     }
+    if (light->glare_grey > 0.0)
+        shine += hit->gloss * light->glare_grey *
+                 pow(fmax(0.0, rd_dot(n, rd_unit(rd_sub(light->glare_dir, view)))), GLARE_EXPONENT);
     return even * (diffuse + shine);
 }

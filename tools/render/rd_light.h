@@ -15,8 +15,10 @@ struct rd_light {
     bool shadows;     /* surfaces keep the key light from others */
     bool bars;        /* the key light comes through a window's bars or leaves */
     double bars_mm;
-    struct rd_vec slope; /* relative change of all of it per metre: rooms are not evenly lit */
-    double nothing_grey; /* where no surface is seen */
+    struct rd_vec slope;     /* relative change of all of it per metre: rooms are not evenly lit */
+    double nothing_grey;     /* where no surface is seen */
+    struct rd_vec glare_dir; /* towards a small lamp that glossy surfaces mirror; unit */
+    double glare_grey;       /* its mirror image on a gloss of 1; 0: no such lamp */
 };
 
 void rd_light_make(struct rd_light *light, const struct rd_options *options);

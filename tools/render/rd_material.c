@@ -72,6 +72,8 @@ static double pattern_albedo(const struct rd_material *m, struct rd_vec p)
     }
     case RD_FACE:
         return face_albedo(m, p);
+    case RD_BITMAP:
+        return rd_bitmap_albedo(m->bitmap, q.x + 0.5 * (m->bitmap->width - 1), q.y + 0.5 * (m->bitmap->height - 1));
     }
     return m->albedo;
 }

@@ -9,6 +9,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "rd_bitmap.h"
 #include "rd_vec.h"
 
 enum rd_pattern {
@@ -17,7 +18,8 @@ enum rd_pattern {
     RD_CHECKS,
     RD_TILES,  /* joints of the second albedo in X and Y */
     RD_MOTTLE, /* coarse smooth spots between the two albedos */
-    RD_FACE    /* skin and what is painted on it: see struct rd_face_paint */
+    RD_FACE,   /* skin and what is painted on it: see struct rd_face_paint */
+    RD_BITMAP  /* a printed sheet about the origin in X and Y, a sample every period_mm */
 };
 
 /* Coordinates of the paint are the head's own, in units of its semi-axes: the face looks to -Z. */
@@ -38,6 +40,7 @@ struct rd_material {
     double gloss; /* strength of a highlight in the ambient picture, 0 .. 1 */
     uint64_t seed;
     struct rd_face_paint face;
+    const struct rd_bitmap *bitmap;
 };
 
 double rd_material_albedo(const struct rd_material *material, struct rd_vec local_mm);

@@ -30,6 +30,13 @@ enum option_id {
     OPT_EXPOSURE,
     OPT_FIRST_FRAME,
     OPT_CALIBRATION_NOISE,
+    OPT_FOCAL,
+    OPT_ASSEMBLY,
+    OPT_BOARD,
+    OPT_BOARD_MM,
+    OPT_MISSING,
+    OPT_BLUR,
+    OPT_GLARE,
     OPT_HELP
 };
 
@@ -41,7 +48,11 @@ static const char help_text[] =
     "  --scene KIND       person (default): somebody on a seat; turning: right round on an office chair;\n"
     "                     empty: the seat alone; table: things on a table; room: furniture, nobody there;\n"
     "                     clutter: things that might be taken for a head; visit: somebody comes\n"
-    "                     to an empty seat, stays and goes; two: two people side by side\n"
+    "                     to an empty seat, stays and goes; two: two people side by side; board: a printed board in\n"
+    "                     another pose in each frame, in each two frames with --laser alternate\n"
+    "  --board FILE       with --scene board: what is printed on it, a binary PGM of 8 bits (255: albedo 1)\n"
+    "  --board-mm W       20 to 2000: its width; its height follows\n"
+    "  --glare            a lamp is mirrored in the board\n"
     "  --range DIR        no scene, but the real depth images of a range directory or of those in DIR\n"
     "  --sequence N       1 (default): hands down; 2: hands move strongly and partly cover the head\n"
     "  --person KIND      varied (default, by seed), child, hat, mask, beard, long-hair, bald, glasses, headphones\n"
@@ -60,6 +71,13 @@ static const char help_text[] =
     "  --knock DEG        0 (default) to 0.5: the projector is turned by this against what rig.json says\n"
     "  --calibration-noise X  0 (default) to 10: rig.json's errors, in typical ones: 0.1 % of fx, 1 px of the centre,\n"
     "                     0.01 degrees of each ray, 0.1 mm of the projector's place\n"
+    "  --focal X          0.5 to 2 (default 1): the focal length against the paper's\n"
+    "  --assembly X       0 (default) to 10: how carelessly the rig was put together, in typical errors that rig.json\n"
+    "                     knows of: 1 % of fx and fy, 6 px of the centre, 1 mm of the projector's place, 0.4 degrees "
+    "of\n"
+    "                     its direction and turn, 0.4 % of the pitch, 0.02 degrees of each ray\n"
+    "  --missing SHARE    0 (default) to 0.9: so many dots are not there, others in each frame\n"
+    "  --blur PX          0 (default) to 10: all frames out of focus, standard deviation\n"
     "  --laser KIND       on (default), alternate: every second frame (1, 3, ...) without it\n"
     "  --exposure X       0.05 to 20 (default 1): all light of the sensor's frames by this factor\n"
     "  --first-frame N[+COUNT]  only frame N and what follows, or COUNT frames from N on; they are the same as in the\n"
@@ -152,7 +170,7 @@ static bool read_first_frame(const char *text, struct rd_options *options)
 static bool take_word(int id, const char *text, struct rd_options *options)
 {
     static const char *const scenes[] = {"person",  "turning", "empty", "table", "room",
-                                         "clutter", "visit",   "two",   NULL};
+                                         "clutter", "visit",   "two",   "board", NULL};
     static const char *const persons[] = {"varied",    "child", "hat",     "mask",       "beard",
                                           "long-hair", "bald",  "glasses", "headphones", NULL};
     static const char *const acts[] = {"varied", "phone", "face", "back", "none", NULL};
@@ -164,7 +182,8 @@ static bool take_word(int id, const char *text, struct rd_options *options)
     int index = 0;
     bool known = false;
     if (id == OPT_SCENE) {
-        known = read_word("scene", text, scenes, "person, turning, empty, table, room, clutter, visit or two", &index);
+        known = read_word("scene", text, scenes, "person, turning, empty, table, room, clutter, visit, two or board",
+                          &index);
         options->scene = (enum rd_scene_kind)index;
     } else if (id == OPT_PERSON) {
         known = read_word("person", text, persons,
@@ -213,6 +232,22 @@ static bool take_option(int id, const char *text, struct rd_options *options)
         return read_decimal("knock", text, 0.0, 0.5, "a number from 0 to 0.5", &options->knock_deg);
     case OPT_CALIBRATION_NOISE:
         return read_decimal("calibration-noise", text, 0.0, 10.0, "a number from 0 to 10", &options->calibration_noise);
+    case OPT_FOCAL:
+        return read_decimal("focal", text, 0.5, 2.0, "a number from 0.5 to 2", &options->focal);
+    case OPT_ASSEMBLY:
+        return read_decimal("assembly", text, 0.0, 10.0, "a number from 0 to 10", &options->assembly);
+    case OPT_BOARD:
+        options->board_file = text;
+        return true;
+    case OPT_BOARD_MM:
+        return read_decimal("board-mm", text, 20.0, 2000.0, "a number from 20 to 2000", &options->board_mm);
+    case OPT_MISSING:
+        return read_decimal("missing", text, 0.0, 0.9, "a number from 0 to 0.9", &options->missing);
+    case OPT_BLUR:
+        return read_decimal("blur", text, 0.0, 10.0, "a number from 0 to 10", &options->blur_px);
+    case OPT_GLARE:
+        options->glare = true;
+        return true;
     case OPT_EXPOSURE:
         return read_decimal("exposure", text, 0.05, 20.0, "a number from 0.05 to 20", &options->exposure);
     case OPT_FIRST_FRAME:
@@ -246,13 +281,21 @@ enum rd_options_result rd_options_parse(int argc, char **argv, struct rd_options
         {"calibration-noise", required_argument, NULL, OPT_CALIBRATION_NOISE},
         {"laser", required_argument, NULL, OPT_LASER},
         {"exposure", required_argument, NULL, OPT_EXPOSURE},
+        {"focal", required_argument, NULL, OPT_FOCAL},
+        {"assembly", required_argument, NULL, OPT_ASSEMBLY},
+        {"board", required_argument, NULL, OPT_BOARD},
+        {"board-mm", required_argument, NULL, OPT_BOARD_MM},
+        {"missing", required_argument, NULL, OPT_MISSING},
+        {"blur", required_argument, NULL, OPT_BLUR},
+        {"glare", no_argument, NULL, OPT_GLARE},
         {"first-frame", required_argument, NULL, OPT_FIRST_FRAME},
         {"help", no_argument, NULL, OPT_HELP},
         {NULL, 0, NULL, 0},
     };
     int id;
     bool scene_given = false;
-    *options = (struct rd_options){.sequence = 1, .exposure = 1.0, .seed = 1, .width = 752, .height = 582, .bits = 8};
+    *options = (struct rd_options){
+        .sequence = 1, .exposure = 1.0, .focal = 1.0, .seed = 1, .width = 752, .height = 582, .bits = 8};
     while ((id = getopt_long(argc, argv, "", long_options, NULL)) != -1) {
         if (id == OPT_HELP) {
             fputs(help_text, stdout);
@@ -269,6 +312,10 @@ enum rd_options_result rd_options_parse(int argc, char **argv, struct rd_options
     }
     if (options->range_dir != NULL && scene_given) {
         fputs("render: --range takes the place of --scene\n", stderr);
+        return RD_OPTIONS_WRONG;
+    }
+    if ((options->scene == RD_SCENE_BOARD) != (options->board_file != NULL && options->board_mm > 0.0)) {
+        fputs("render: --scene board, --board and --board-mm go together\n", stderr);
         return RD_OPTIONS_WRONG;
     }
     if (options->frame_count == 0)

@@ -13,7 +13,8 @@ enum rd_scene_kind {
     RD_SCENE_ROOM,
     RD_SCENE_CLUTTER,
     RD_SCENE_VISIT,
-    RD_SCENE_TWO
+    RD_SCENE_TWO,
+    RD_SCENE_BOARD
 };
 enum rd_person_kind {
     RD_PERSON_VARIED,
@@ -53,6 +54,13 @@ struct rd_options {
     double tilt_deg;          /* the camera looks up at people by this, or down */
     double knock_deg;         /* the projector's turn against what rig.json says */
     double calibration_noise; /* rig.json's errors, in typical errors of a calibration */
+    double focal;             /* the focal length against the paper's */
+    double assembly;          /* the rig's own differences from the plan, in typical ones */
+    const char *board_file;   /* what is printed on the board */
+    double board_mm;          /* its width */
+    double missing;           /* share of the dots that are not there, others in each frame */
+    double blur_px;           /* frames out of focus by this (sigma) */
+    bool glare;               /* a lamp is mirrored in the board */
     int first_frame;
     int shown_count;   /* frames from the first on; 0: all that follow */
     int width, height; /* pixels */

@@ -138,6 +138,11 @@ static void write_head(FILE *file, const struct rd_head_truth *head)
     putc('}', file);
 }
 
+static void write_vec(FILE *file, const char *before, struct rd_vec v)
+{
+    fprintf(file, "%s[%.9g,%.9g,%.9g]", before, v.x, v.y, v.z);
+}
+
 void rd_output_truth(struct rd_output *output, int frame, const struct rd_truth *truth,
                      const struct rd_dot_list *visible)
 {
@@ -153,6 +158,12 @@ void rd_output_truth(struct rd_output *output, int frame, const struct rd_truth 
         fputs(i == 0 ? ",\"heads\":[" : ",", file);
         write_head(file, &truth->heads[i]);
         fputs(i == truth->head_count - 1 ? "]" : "", file);
+    }
+    if (truth->board_known) {
+        write_vec(file, ",\"board\":{\"middle_mm\":", truth->board.origin_mm);
+        write_vec(file, ",\"across\":", truth->board.rot.x);
+        write_vec(file, ",\"down\":", truth->board.rot.y);
+        putc('}', file);
     }
     fputs(",\"dots\":[", file);
     for (int i = 0; i < visible->dot_count; i++) {

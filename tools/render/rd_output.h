@@ -29,6 +29,8 @@ struct rd_truth {
     int head_count;
     int head;     /* the one to find, or RD_NOBODY */
     bool several; /* all heads are listed too */
+    bool board_known;
+    struct rd_pose board;
 };
 
 struct rd_output {

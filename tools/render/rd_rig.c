@@ -26,6 +26,13 @@
 #define CENTRE_ERROR_PX 1.0
 #define ORIGIN_ERROR_MM 0.1
 #define RAY_ERROR_DEG 0.01
+/* How rigs differ from their plan. */
+#define BUILT_FOCAL 0.01
+#define BUILT_CENTRE_PX 6.0
+#define BUILT_PLACE_MM 1.0
+#define BUILT_TURN_DEG 0.4
+#define BUILT_PITCH 0.004
+#define BUILT_RAY_DEG 0.02
 
 static void make_lens(struct rd_rig *rig, const struct rd_options *options)
 {
@@ -56,22 +63,6 @@ static void make_dots(struct rd_rig *rig, double baseline_mm)
     }
 }
 
-void rd_rig_make(struct rd_rig *rig, const struct rd_options *options)
-{
-    double zoom = (double)options->width / PAPER_WIDTH_PX;
-    bool open_room = options->scene == RD_SCENE_TABLE || options->scene == RD_SCENE_ROOM || options->range_dir != NULL;
-    rig->width = options->width;
-    rig->height = options->height;
-    rig->fx_px = PAPER_FX_PX * zoom;
-    rig->fy_px = PAPER_FY_PX * zoom;
-    rig->cx_px = 0.5 * (options->width - 1);
-    rig->cy_px = 0.5 * (options->height - 1);
-    rig->near_mm = NEAR_MM;
-    rig->far_mm = open_room ? ROOM_FAR_MM : SEAT_FAR_MM;
-    make_lens(rig, options);
-    make_dots(rig, options->rig == RD_RIG_WIDE ? WIDE_BASELINE_MM : PAPER_BASELINE_MM);
-}
-
 /* About an axis (unit), by Rodrigues. */
 static struct rd_vec turned(struct rd_vec v, struct rd_vec axis, double angle)
 {
@@ -86,6 +77,46 @@ static struct rd_vec draw_normal_vec(struct rd_rng *rng)
     v.y = rd_rng_normal(rng);
     v.z = rd_rng_normal(rng);
     return v;
+}
+
+/* Draws what the hands that built the rig did not get quite right. */
+static void assemble(struct rd_rig *rig, const struct rd_options *options)
+{
+    struct rd_rng rng = rd_rng_start(options->seed, RD_STREAM_RIG + ((uint64_t)3 << 32));
+    double much = options->assembly, focal = 1.0 + much * BUILT_FOCAL * rd_rng_normal(&rng);
+    rig->fx_px *= focal;
+    rig->fy_px *= focal * (1.0 + 0.1 * much * BUILT_FOCAL * rd_rng_normal(&rng));
+    rig->cx_px += much * BUILT_CENTRE_PX * rd_rng_normal(&rng);
+    rig->cy_px += much * BUILT_CENTRE_PX * rd_rng_normal(&rng);
+    rig->projector_mm = rd_along(rig->projector_mm, draw_normal_vec(&rng), much * BUILT_PLACE_MM);
+    struct rd_vec turn = rd_scale(draw_normal_vec(&rng), much * BUILT_TURN_DEG * RD_RAD_PER_DEG);
+    struct rd_vec middle = rig->dot_rays[RD_DOT_COUNT / 2];
+    double pitch = 1.0 + much * BUILT_PITCH * rd_rng_normal(&rng);
+    for (int i = 0; i < RD_DOT_COUNT; i++) {
+        struct rd_vec ray = rig->dot_rays[i];
+        struct rd_vec aside = rd_along(ray, middle, -rd_dot(ray, middle));
+        struct rd_vec error = rd_scale(draw_normal_vec(&rng), much * BUILT_RAY_DEG * RD_RAD_PER_DEG);
+        ray = rd_unit(rd_add(rd_along(ray, aside, pitch - 1.0), error));
+        rig->dot_rays[i] = rd_unit(turned(ray, rd_unit(turn), rd_length(turn)));
+    }
+}
+
+void rd_rig_make(struct rd_rig *rig, const struct rd_options *options)
+{
+    double zoom = options->focal * options->width / PAPER_WIDTH_PX;
+    bool open_room = options->scene == RD_SCENE_TABLE || options->scene == RD_SCENE_ROOM || options->range_dir != NULL;
+    rig->width = options->width;
+    rig->height = options->height;
+    rig->fx_px = PAPER_FX_PX * zoom;
+    rig->fy_px = PAPER_FY_PX * zoom;
+    rig->cx_px = 0.5 * (options->width - 1);
+    rig->cy_px = 0.5 * (options->height - 1);
+    rig->near_mm = NEAR_MM;
+    rig->far_mm = open_room ? ROOM_FAR_MM : SEAT_FAR_MM;
+    make_lens(rig, options);
+    make_dots(rig, options->rig == RD_RIG_WIDE ? WIDE_BASELINE_MM : PAPER_BASELINE_MM);
+    if (options->assembly > 0.0)
+        assemble(rig, options);
 }
 
 void rd_rig_knock(struct rd_rig *rig, const struct rd_options *options)

@@ -47,6 +47,8 @@ bool rd_stage_make(struct rd_stage *stage, const struct rd_options *options, con
     rd_light_make(&stage->light, options);
     if (options->range_dir != NULL)
         return open_range(stage);
+    if (options->scene == RD_SCENE_BOARD)
+        return rd_board_make(&stage->board, options);
     if (!has_arrangements(options))
         rd_company_make(&stage->company, options, rig, &stage->scene);
     stage->scene.still_count = stage->scene.shape_count;
@@ -102,13 +104,25 @@ static void show_arrangement(struct rd_stage *stage, int frame)
         arrange(stage, arrangement);
 }
 
+static void show_board(struct rd_stage *stage, int frame)
+{
+    int picture = stage->options.alternate ? frame / 2 : frame;
+    stage->still_changed = picture != stage->arrangement;
+    stage->truth = (struct rd_truth){.head = RD_NOBODY, .board_known = true};
+    rd_board_show(&stage->board, &stage->options, stage->rig, picture, &stage->scene, &stage->light,
+                  &stage->truth.board);
+    stage->arrangement = picture;
+}
+
 bool rd_stage_frame(struct rd_stage *stage, int frame)
 {
     if (stage->options.range_dir != NULL)
         return show_range(stage, frame);
     stage->time_us = (int64_t)frame * FRAME_US;
     stage->still_changed = frame == stage->options.first_frame;
-    if (has_arrangements(&stage->options)) {
+    if (stage->options.scene == RD_SCENE_BOARD) {
+        show_board(stage, frame);
+    } else if (has_arrangements(&stage->options)) {
         show_arrangement(stage, frame);
     } else {
         stage->scene.shape_count = stage->scene.still_count;
@@ -119,6 +133,7 @@ bool rd_stage_frame(struct rd_stage *stage, int frame)
 
 void rd_stage_end(struct rd_stage *stage)
 {
+    rd_board_end(&stage->board);
     rd_relief_free(stage->relief);
     rd_range_close(&stage->range);
 }

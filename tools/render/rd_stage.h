@@ -1,6 +1,7 @@
 /* rd_stage - which scene stands before the camera in which frame.
  * person, turning, empty, visit, two: see rd_company.h. table, room, clutter: nobody; another arrangement every ten
  * frames, ten seconds later.
+ * board: see rd_board.h; nobody.
  * A range directory: each of its depth images in turn, every frame ten seconds later; the heads are those of its truth
  * file, and the one to find is the one nearest the pattern's middle, if its centre lies within the pattern.
  */
@@ -9,6 +10,7 @@
 
 #include <stdint.h>
 
+#include "rd_board.h"
 #include "rd_company.h"
 #include "rd_light.h"
 #include "rd_range.h"
@@ -21,6 +23,7 @@ struct rd_stage {
     struct rd_light light;
     struct rd_company company;
     struct rd_range range;
+    struct rd_board board;
     struct rd_relief *relief; /* of the depth image whose index is the arrangement */
     int arrangement;
     bool still_changed; /* the still shapes are others than in the frame before */
