@@ -1,0 +1,83 @@
+#include "cal_board.hpp"
+
+#include <cstring>
+#include <opencv2/imgproc.hpp>
+
+#include "cal_error.hpp"
+
+namespace cal
+{
+/* The white that a printer leaves at the sheet's edges. */
+static constexpr double margin_mm = 8.0;
+static constexpr double marker_share = 0.8;
+static constexpr int dictionary = cv::aruco::DICT_4X4_100;
+static constexpr int markers_max = 100;
+
+cv::Point3d Board::corner_mm(int corner) const
+{
+    return {(corner % (columns - 1) + 1) * square_mm, (corner / (columns - 1) + 1) * square_mm, 0.0};
+}
+
+cv::Point2d Board::sheet_origin_mm() const
+{
+    return middle_mm() - cv::Point2d(0.5 * sheet_width_mm, 0.5 * sheet_height_mm);
+}
+
+Board board_parse(const std::string &name)
+{
+    char kind[16];
+    int columns, rows, length = 0;
+    double square_mm;
+    if (std::sscanf(name.c_str(), "%15[a-z]-%3dx%3d-%lf%n", kind, &columns, &rows, &square_mm, &length) != 4 ||
+        name[static_cast<size_t>(length)] != '\0' ||
+        (std::strcmp(kind, "charuco") != 0 && std::strcmp(kind, "chessboard") != 0))
+        throw Error("--board " + name + ": must be like charuco-9x6-30 or chessboard-9x6-30 (squares across, down, mm)");
+    if (columns < 4 || rows < 4 || !(square_mm >= 5.0) || columns * square_mm > sheet_width_mm - 2 * margin_mm ||
+        rows * square_mm > sheet_height_mm - 2 * margin_mm)
+        throw Error("--board " + name + ": must have at least 4x4 squares of at least 5 mm and fit into 281x194 mm");
+    Board board{std::strcmp(kind, "charuco") == 0, columns, rows, square_mm, name, {}};
+    if (board.charuco && columns * rows / 2 > markers_max)
+        throw Error("--board " + name + ": has more than 100 white squares");
+    if (board.charuco)
+        board.markers = cv::aruco::CharucoBoard::create(columns, rows, static_cast<float>(square_mm),
+                                                        static_cast<float>(marker_share * square_mm),
+                                                        cv::aruco::getPredefinedDictionary(dictionary));
+    return board;
+}
+
+/* A square of the print, in bitmap pixels. */
+static cv::Rect square_of(const Board &board, int px_per_mm, double x_mm, double y_mm, double side_mm)
+{
+    cv::Point2d sheet = board.sheet_origin_mm();
+    int left = cvRound((x_mm - sheet.x) * px_per_mm), top = cvRound((y_mm - sheet.y) * px_per_mm);
+    int right = cvRound((x_mm + side_mm - sheet.x) * px_per_mm);
+    int bottom = cvRound((y_mm + side_mm - sheet.y) * px_per_mm);
+    return {left, top, right - left, bottom - top};
+}
+
+static void draw_marker(const Board &board, int px_per_mm, int column, int row, int marker, cv::Mat &sheet)
+{
+    double side_mm = marker_share * board.square_mm, edge_mm = 0.5 * (board.square_mm - side_mm);
+    cv::Rect place = square_of(board, px_per_mm, column * board.square_mm + edge_mm, row * board.square_mm + edge_mm,
+                               side_mm);
+    cv::Mat drawn;
+    cv::aruco::drawMarker(board.markers->dictionary, marker, board.markers->dictionary->markerSize + 2, drawn, 1);
+    cv::resize(drawn, sheet(place), place.size(), 0.0, 0.0, cv::INTER_NEAREST);
+}
+
+cv::Mat board_bitmap(const Board &board, int px_per_mm)
+{
+    cv::Mat sheet(cvRound(sheet_height_mm * px_per_mm), cvRound(sheet_width_mm * px_per_mm), CV_8U, cv::Scalar(255));
+    int marker = 0;
+    for (int row = 0; row < board.rows; row++) {
+        for (int column = 0; column < board.columns; column++) {
+            if ((row + column) % 2 == 0)
+                sheet(square_of(board, px_per_mm, column * board.square_mm, row * board.square_mm, board.square_mm)) =
+                    cv::Scalar(0);
+            else if (board.charuco)
+                draw_marker(board, px_per_mm, column, row, marker++, sheet);
+        }
+    }
+    return sheet;
+}
+} // namespace cal

@@ -1,0 +1,42 @@
+/* cal_board - the printed board: a chessboard with or without ArUco markers in its white squares, in the middle of a
+ * sheet of A4 that lies across. Units are mm on the sheet unless a name says otherwise.
+ *
+ * The board's frame: origin where the chessboard's top left square begins, X right, Y down, Z away from who looks at
+ * it. Inner corner k is at ((k % (columns - 1) + 1) square, (k / (columns - 1) + 1) square, 0).
+ * The dark squares are grey, not black: the laser's dots must show on them too.
+ */
+#ifndef CAL_BOARD_HPP
+#define CAL_BOARD_HPP
+
+#include <opencv2/aruco/charuco.hpp>
+#include <opencv2/core.hpp>
+#include <string>
+
+namespace cal
+{
+constexpr double sheet_width_mm = 297.0, sheet_height_mm = 210.0;
+/* How much light white and dark of the print send back. */
+constexpr double white_albedo = 0.9, dark_albedo = 0.3;
+
+struct Board {
+    bool charuco;
+    int columns, rows; /* squares */
+    double square_mm;
+    std::string name;                          /* as it was given */
+    cv::Ptr<cv::aruco::CharucoBoard> markers; /* ChArUco only */
+
+    int corner_count() const { return (columns - 1) * (rows - 1); }
+    cv::Point3d corner_mm(int corner) const;
+    cv::Point2d middle_mm() const { return {0.5 * columns * square_mm, 0.5 * rows * square_mm}; }
+    /* Corner of the sheet, in the board's frame. */
+    cv::Point2d sheet_origin_mm() const;
+};
+
+/* "charuco-9x6-30" or "chessboard-9x6-30": squares across, squares down, mm of a square's side. Throws cal::Error. */
+Board board_parse(const std::string &name);
+
+/* The whole sheet, 0 dark and 255 white, as it would be with this resolution. */
+cv::Mat board_bitmap(const Board &board, int px_per_mm);
+} // namespace cal
+
+#endif

@@ -1,0 +1,236 @@
+#include "cal_camera.hpp"
+
+#include <algorithm>
+#include <numeric>
+#include <opencv2/calib3d.hpp>
+
+#include "cal_coverage.hpp"
+#include "cal_error.hpp"
+
+namespace cal
+{
+/* A corner does not fit from this many times the usual residual on; a picture, from this many times the usual rms. */
+static constexpr double corner_sigmas = 4.5, picture_times = 3.0;
+static constexpr double picture_rms_min_px = 0.25;
+static constexpr int rounds = 4;
+static constexpr int corners_min = 8;
+static constexpr double lens_sigmas = 3.0;
+/* What the parameters' standard deviations may be at most. */
+static constexpr double focal_sigma_max = 0.003, centre_sigma_max_px = 3.0;
+
+cv::Vec3d View::in_camera(cv::Point3d place_mm) const
+{
+    cv::Matx33d rotation;
+    cv::Rodrigues(turn, rotation);
+    return rotation * cv::Vec3d(place_mm.x, place_mm.y, place_mm.z) + shift;
+}
+
+cv::Vec3d View::normal() const
+{
+    return in_camera({0.0, 0.0, 1.0}) - shift;
+}
+
+double View::tilt_deg() const
+{
+    return std::acos(std::clamp(std::abs(normal()[2]), 0.0, 1.0)) * 180.0 / CV_PI;
+}
+
+std::vector<cv::Point2d> Camera::tangents(const std::vector<cv::Point2d> &px) const
+{
+    std::vector<cv::Point2d> out;
+    if (!px.empty())
+        cv::undistortPoints(px, out, matrix, distortion, cv::noArray(), cv::noArray(),
+                            {cv::TermCriteria::COUNT + cv::TermCriteria::EPS, 100, 1e-12});
+    return out;
+}
+
+cv::Point2d Camera::undistorted_px(cv::Point2d tangent) const
+{
+    return {matrix.at<double>(0, 0) * tangent.x + matrix.at<double>(0, 2),
+            matrix.at<double>(1, 1) * tangent.y + matrix.at<double>(1, 2)};
+}
+
+void camera_pose(const Camera &camera, const Board &board, View &view)
+{
+    cv::solvePnP(view.corners.places_mm(board), view.corners.px, camera.matrix, camera.distortion, view.turn, view.shift);
+}
+
+static std::vector<cv::Point2d> residuals_of(const Camera &camera, const Board &board, const View &view)
+{
+    std::vector<cv::Point2f> expected;
+    std::vector<cv::Point2d> residuals;
+    cv::projectPoints(view.corners.places_mm(board), view.turn, view.shift, camera.matrix, camera.distortion, expected);
+    for (size_t i = 0; i < expected.size(); i++)
+        residuals.emplace_back(view.corners.px[i] - expected[i]);
+    return residuals;
+}
+
+static double rms_of(const std::vector<cv::Point2d> &residuals)
+{
+    double sum = 0.0;
+    for (const cv::Point2d &residual : residuals)
+        sum += residual.ddot(residual);
+    return residuals.empty() ? 0.0 : std::sqrt(sum / static_cast<double>(residuals.size()));
+}
+
+static double median_of(std::vector<double> values)
+{
+    auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    return *middle;
+}
+
+static void fit(const Board &board, std::vector<View> &views, Camera &camera)
+{
+    std::vector<std::vector<cv::Point3f>> places;
+    std::vector<std::vector<cv::Point2f>> seen;
+    std::vector<View *> used;
+    for (View &view : views) {
+        if (view.good()) {
+            places.push_back(view.corners.places_mm(board));
+            seen.push_back(view.corners.px);
+            used.push_back(&view);
+        }
+    }
+    std::vector<cv::Mat> turns, shifts;
+    cv::Mat sigma, pose_sigma, picture_rms;
+    camera.distortion = cv::Mat::zeros(1, 5, CV_64F);
+    camera.rms_px = cv::calibrateCamera(places, seen, camera.size, camera.matrix, camera.distortion, turns, shifts, sigma,
+                                        pose_sigma, picture_rms, camera.third_radial ? 0 : cv::CALIB_FIX_K3);
+    camera.distortion = camera.distortion.reshape(1, 1).colRange(0, 5).clone();
+    for (int i = 0; i < 4; i++)
+        camera.sigma_px[static_cast<size_t>(i)] = sigma.at<double>(i);
+    for (int i = 0; i < 5; i++)
+        camera.lens_sigma[static_cast<size_t>(i)] = sigma.at<double>(4 + i);
+    for (size_t i = 0; i < used.size(); i++) {
+        used[i]->turn = turns[i];
+        used[i]->shift = shifts[i];
+        used[i]->rms_px = rms_of(residuals_of(camera, board, *used[i]));
+    }
+}
+
+/* Leaves out what does not fit; false: nothing. */
+static bool clean(const Board &board, const Camera &camera, std::vector<View> &views)
+{
+    std::vector<double> sizes, picture_rms;
+    bool changed = false;
+    for (const View &view : views) {
+        if (!view.good())
+            continue;
+        for (const cv::Point2d &residual : residuals_of(camera, board, view))
+            sizes.push_back(cv::norm(residual));
+        picture_rms.push_back(view.rms_px);
+    }
+    double corner_limit = corner_sigmas * median_of(sizes) / 1.1774, usual_rms = median_of(picture_rms);
+    for (View &view : views) {
+        if (!view.good())
+            continue;
+        if (view.rms_px > std::max(picture_times * usual_rms, picture_rms_min_px)) {
+            view.corners.refused = text("its corners do not fit the camera that the others give: %.2f px, usual is %.2f",
+                                        view.rms_px, usual_rms);
+            changed = true;
+            continue;
+        }
+        std::vector<cv::Point2d> residuals = residuals_of(camera, board, view);
+        Corners kept;
+        kept.edge_px = view.corners.edge_px;
+        for (size_t i = 0; i < residuals.size(); i++) {
+            if (cv::norm(residuals[i]) <= corner_limit) {
+                kept.ids.push_back(view.corners.ids[i]);
+                kept.px.push_back(view.corners.px[i]);
+            }
+        }
+        size_t dropped = residuals.size() - kept.ids.size();
+        changed = changed || dropped > 0;
+        view.left_out += static_cast<int>(dropped);
+        view.corners = kept;
+        if (static_cast<int>(kept.ids.size()) < corners_min)
+            view.corners.refused = text("only %zu of its corners fit the camera, %d are needed", kept.ids.size(), corners_min);
+    }
+    return changed;
+}
+
+static void fill_regions(const Board &board, const std::vector<View> &views, Camera &camera)
+{
+    for (const View &view : views) {
+        if (!view.good())
+            continue;
+        std::vector<cv::Point2d> residuals = residuals_of(camera, board, view);
+        for (size_t i = 0; i < residuals.size(); i++) {
+            cv::Point2f px = view.corners.px[i];
+            int column = std::clamp(static_cast<int>(px.x) * region_columns / camera.size.width, 0, region_columns - 1);
+            int row = std::clamp(static_cast<int>(px.y) * region_rows / camera.size.height, 0, region_rows - 1);
+            Region &region = camera.regions[static_cast<size_t>(row * region_columns + column)];
+            region.corner_count++;
+            region.mean_px += residuals[i];
+            region.rms_px += residuals[i].ddot(residuals[i]);
+        }
+    }
+    for (Region &region : camera.regions) {
+        if (region.corner_count > 0) {
+            region.mean_px /= region.corner_count;
+            region.rms_px = std::sqrt(region.rms_px / region.corner_count);
+        }
+    }
+}
+
+static void refuse(const std::vector<std::string> &missing)
+{
+    std::string message = "the pictures cannot support a calibration. Add:";
+    for (const std::string &sentence : missing)
+        message += "\n  - " + sentence;
+    throw Error(message);
+}
+
+static void check_trust(const Camera &camera)
+{
+    std::vector<std::string> missing;
+    double focal = std::max(camera.sigma_px[0] / camera.matrix.at<double>(0, 0),
+                            camera.sigma_px[1] / camera.matrix.at<double>(1, 1));
+    double centre_px = std::max(camera.sigma_px[2], camera.sigma_px[3]);
+    if (focal > focal_sigma_max)
+        missing.push_back(text("pictures with the board tilted by 30 to 45 degrees in all directions: the focal length is "
+                               "only known to %.2f %% (one standard deviation; %.2f is allowed)",
+                               100.0 * focal, 100.0 * focal_sigma_max));
+    if (centre_px > centre_sigma_max_px)
+        missing.push_back(text("pictures with the board tilted, near, and turned on its side: the principal point is only "
+                               "known to %.1f px (%.1f is allowed)",
+                               centre_px, centre_sigma_max_px));
+    if (!missing.empty())
+        refuse(missing);
+}
+
+Camera camera_solve(const Board &board, cv::Size size, std::vector<View> &views)
+{
+    Camera camera;
+    camera.size = size;
+    coverage_guess_poses(board, size, views);
+    std::vector<std::string> missing = coverage_missing(views, size, coverage_least);
+    if (!missing.empty())
+        refuse(missing);
+    fit(board, views, camera);
+    clean(board, camera, views);
+    fit(board, views, camera);
+    for (View &view : views) {
+        if (view.good())
+            corners_complete(board, view.grey8, camera.matrix, camera.distortion, view.corners);
+        view.left_out = 0;
+    }
+    for (int round = 0; round < rounds; round++) {
+        fit(board, views, camera);
+        if (!clean(board, camera, views))
+            break;
+    }
+    camera.third_radial = true;
+    fit(board, views, camera);
+    camera.third_radial = std::abs(camera.distortion.at<double>(4)) > lens_sigmas * camera.lens_sigma[4];
+    if (!camera.third_radial)
+        fit(board, views, camera);
+    missing = coverage_missing(views, size, coverage_least);
+    if (!missing.empty())
+        refuse(missing);
+    check_trust(camera);
+    fill_regions(board, views, camera);
+    return camera;
+}
+} // namespace cal

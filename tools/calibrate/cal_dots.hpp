@@ -1,0 +1,23 @@
+/* cal_dots - the laser's dots in one picture, their centres in floating point; independent of the firmware.
+ * Way:   the picture less its twin without the laser (or alone); a band-pass; its lonely maxima above the noise; to each a
+ *        round Gaussian on a level ground, by least squares. Where there is a twin, what is lit is divided by how light
+ *        the surface is: a dot half on a dark square would else lean out of it.
+ */
+#ifndef CAL_DOTS_HPP
+#define CAL_DOTS_HPP
+
+#include <opencv2/core.hpp>
+#include <vector>
+
+namespace cal
+{
+struct Dot {
+    cv::Point2d px;
+    double peak_grey, sigma_px;
+};
+
+/* `dark` is the twin, or empty. `where` (CV_8U, not 0) says where dots are looked for. */
+std::vector<Dot> dots_find(const cv::Mat &lit, const cv::Mat &dark, const cv::Mat &where);
+} // namespace cal
+
+#endif

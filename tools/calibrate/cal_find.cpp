@@ -1,0 +1,235 @@
+#include "cal_find.hpp"
+
+#include <algorithm>
+#include <map>
+#include <opencv2/aruco.hpp>
+#include <opencv2/calib3d.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "cal_error.hpp"
+
+namespace cal
+{
+static constexpr int corners_min = 8;
+static constexpr double edge_max_px = 4.5;
+/* A marker may lie off the board's plane by this part of a square: lenses bend. */
+static constexpr double marker_slack = 0.35;
+static constexpr double marker_good_share = 0.9;
+/* Small pictures of markers are looked at larger. */
+static constexpr double enlarge = 2.0;
+/* Windows of the search for a corner: this part of a square, within bounds. */
+static constexpr double window_share = 0.25;
+static constexpr int window_min_px = 3, window_max_px = 9;
+static constexpr double moved_max_px = 3.0;
+
+std::vector<cv::Point3f> Corners::places_mm(const Board &board) const
+{
+    std::vector<cv::Point3f> places;
+    for (int id : ids)
+        places.emplace_back(board.corner_mm(id));
+    return places;
+}
+
+static double median(std::vector<double> values)
+{
+    if (values.empty())
+        return 0.0;
+    auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    return *middle;
+}
+
+/* Pairs of corners that are a square apart: indices into ids. */
+static std::vector<std::pair<size_t, size_t>> neighbours(const Board &board, const std::vector<int> &ids)
+{
+    std::map<int, size_t> index;
+    std::vector<std::pair<size_t, size_t>> pairs;
+    for (size_t i = 0; i < ids.size(); i++)
+        index[ids[i]] = i;
+    for (size_t i = 0; i < ids.size(); i++) {
+        int side = board.columns - 1;
+        if (ids[i] % side != side - 1 && index.count(ids[i] + 1))
+            pairs.emplace_back(i, index[ids[i] + 1]);
+        if (index.count(ids[i] + side))
+            pairs.emplace_back(i, index[ids[i] + side]);
+    }
+    return pairs;
+}
+
+static double bilinear(const cv::Mat &grey8, cv::Point2d place)
+{
+    int x = static_cast<int>(place.x), y = static_cast<int>(place.y);
+    if (place.x < 0.0 || place.y < 0.0 || x + 1 >= grey8.cols || y + 1 >= grey8.rows)
+        return -1.0;
+    double fx = place.x - x, fy = place.y - y;
+    double upper = (1.0 - fx) * grey8.at<uchar>(y, x) + fx * grey8.at<uchar>(y, x + 1);
+    double lower = (1.0 - fx) * grey8.at<uchar>(y + 1, x) + fx * grey8.at<uchar>(y + 1, x + 1);
+    return (1.0 - fy) * upper + fy * lower;
+}
+
+/* The width of the edge between two corners, across its middle; negative: not to be told. */
+static double edge_width(const cv::Mat &grey8, cv::Point2d a, cv::Point2d b)
+{
+    constexpr double step_px = 0.5;
+    double length = cv::norm(b - a), reach = std::min(7.0, 0.3 * length), steepest = 0.0, low = 255.0, high = 0.0;
+    cv::Point2d across((b.y - a.y) / length, -(b.x - a.x) / length), middle = 0.5 * (a + b);
+    for (double along = -reach; along <= reach; along += step_px) {
+        double before = bilinear(grey8, middle + (along - 0.5) * across);
+        double after = bilinear(grey8, middle + (along + 0.5) * across);
+        if (before < 0.0 || after < 0.0)
+            return -1.0;
+        steepest = std::max(steepest, std::abs(after - before));
+        low = std::min(low, std::min(before, after));
+        high = std::max(high, std::max(before, after));
+    }
+    return high - low < 15.0 ? -1.0 : (high - low) / steepest;
+}
+
+static double edge_median(const Board &board, const cv::Mat &grey8, const Corners &corners)
+{
+    std::vector<double> widths;
+    for (auto [a, b] : neighbours(board, corners.ids)) {
+        double width = edge_width(grey8, corners.px[a], corners.px[b]);
+        if (width > 0.0)
+            widths.push_back(width);
+    }
+    return median(widths);
+}
+
+static double square_px(const Board &board, const Corners &corners)
+{
+    std::vector<double> sides;
+    for (auto [a, b] : neighbours(board, corners.ids))
+        sides.push_back(cv::norm(corners.px[a] - corners.px[b]));
+    return sides.empty() ? 20.0 : *std::min_element(sides.begin(), sides.end());
+}
+
+/* Every corner anew in windows of one size; those that run away or lie at the border are dropped. */
+static void refine(const Board &board, const cv::Mat &grey8, Corners &corners)
+{
+    if (corners.ids.empty())
+        return;
+    int window = std::clamp(cvRound(window_share * square_px(board, corners)), window_min_px, window_max_px);
+    std::vector<cv::Point2f> start = corners.px;
+    Corners kept;
+    cv::cornerSubPix(grey8, corners.px, {window, window}, {-1, -1},
+                     {cv::TermCriteria::COUNT + cv::TermCriteria::EPS, 40, 0.002});
+    for (size_t i = 0; i < start.size(); i++) {
+        cv::Point2f px = corners.px[i];
+        float border = static_cast<float>(window) + 1.0f;
+        bool inside = px.x >= border && px.y >= border && px.x < static_cast<float>(grey8.cols) - border &&
+                      px.y < static_cast<float>(grey8.rows) - border;
+        if (inside && cv::norm(px - start[i]) <= moved_max_px) {
+            kept.ids.push_back(corners.ids[i]);
+            kept.px.push_back(px);
+        }
+    }
+    corners.ids = kept.ids;
+    corners.px = kept.px;
+}
+
+/* Whether the markers lie to each other as on this board. */
+static bool lies_as_printed(const Board &board, const std::vector<std::vector<cv::Point2f>> &markers,
+                            const std::vector<int> &ids)
+{
+    std::vector<cv::Point2f> printed, seen;
+    for (size_t i = 0; i < ids.size(); i++) {
+        auto known = std::find(board.markers->ids.begin(), board.markers->ids.end(), ids[i]);
+        if (known == board.markers->ids.end())
+            return false;
+        const auto &places = board.markers->objPoints[static_cast<size_t>(known - board.markers->ids.begin())];
+        for (size_t k = 0; k < 4; k++) {
+            printed.emplace_back(places[k].x, places[k].y);
+            seen.push_back(markers[i][k]);
+        }
+    }
+    std::vector<uchar> fits;
+    cv::Mat map = cv::findHomography(seen, printed, cv::RANSAC, marker_slack * board.square_mm, fits);
+    return !map.empty() && cv::countNonZero(fits) >= marker_good_share * static_cast<double>(seen.size());
+}
+
+static void find_charuco(const Board &board, const cv::Mat &grey8, Corners &corners)
+{
+    std::vector<std::vector<cv::Point2f>> markers;
+    std::vector<int> ids;
+    cv::Mat larger;
+    auto settings = cv::aruco::DetectorParameters::create();
+    settings->cornerRefinementMethod = cv::aruco::CORNER_REFINE_SUBPIX;
+    cv::resize(grey8, larger, {}, enlarge, enlarge, cv::INTER_CUBIC);
+    cv::aruco::detectMarkers(larger, board.markers->dictionary, markers, ids, settings);
+    for (auto &marker : markers) {
+        /* Pixel centres are whole numbers in both sizes. */
+        for (auto &px : marker)
+            px = (px + cv::Point2f(0.5f, 0.5f)) / enlarge - cv::Point2f(0.5f, 0.5f);
+    }
+    if (ids.empty()) {
+        corners.refused = "no board found";
+        return;
+    }
+    if (ids.size() >= 2 && !lies_as_printed(board, markers, ids)) {
+        corners.refused = "another board than " + board.name + ": its markers are not these, or not where they should be";
+        return;
+    }
+    cv::Mat found_px, found_ids;
+    cv::aruco::interpolateCornersCharuco(markers, ids, grey8, board.markers, found_px, found_ids);
+    for (int i = 0; i < found_ids.rows; i++) {
+        corners.ids.push_back(found_ids.at<int>(i));
+        corners.px.push_back(found_px.at<cv::Point2f>(i));
+    }
+}
+
+static void find_chessboard(const Board &board, const cv::Mat &grey8, Corners &corners)
+{
+    std::vector<cv::Point2f> px;
+    if (!cv::findChessboardCorners(grey8, {board.columns - 1, board.rows - 1}, px,
+                                   cv::CALIB_CB_ADAPTIVE_THRESH | cv::CALIB_CB_NORMALIZE_IMAGE)) {
+        corners.refused = "no board found; a chessboard must be seen whole";
+        return;
+    }
+    for (int i = 0; i < board.corner_count(); i++)
+        corners.ids.push_back(i);
+    corners.px = px;
+}
+
+Corners corners_find(const Board &board, const cv::Mat &grey8)
+{
+    Corners corners;
+    if (board.charuco)
+        find_charuco(board, grey8, corners);
+    else
+        find_chessboard(board, grey8, corners);
+    refine(board, grey8, corners);
+    corners.edge_px = edge_median(board, grey8, corners);
+    if (!corners.refused.empty())
+        return corners;
+    if (corners.edge_px > edge_max_px)
+        corners.refused = text("blurred: edges are %.1f px wide, %.1f are allowed", corners.edge_px, edge_max_px);
+    else if (static_cast<int>(corners.ids.size()) < corners_min)
+        corners.refused = text("only %zu corners of the board are seen, %d are needed", corners.ids.size(), corners_min);
+    return corners;
+}
+
+void corners_complete(const Board &board, const cv::Mat &grey8, const cv::Mat &camera, const cv::Mat &distortion,
+                      Corners &corners)
+{
+    std::vector<cv::Point3f> all;
+    std::vector<cv::Point2f> seen;
+    cv::Mat turn, shift;
+    Corners more;
+    if (!cv::solvePnP(corners.places_mm(board), corners.px, camera, distortion, turn, shift))
+        return;
+    for (int id = 0; id < board.corner_count(); id++)
+        all.emplace_back(board.corner_mm(id));
+    cv::projectPoints(all, turn, shift, camera, distortion, seen);
+    for (int id = 0; id < board.corner_count(); id++) {
+        cv::Point2f px = seen[static_cast<size_t>(id)];
+        if (px.x > 0.0f && px.y > 0.0f && px.x < static_cast<float>(grey8.cols) && px.y < static_cast<float>(grey8.rows)) {
+            more.ids.push_back(id);
+            more.px.push_back(px);
+        }
+    }
+    refine(board, grey8, more);
+    corners.ids = more.ids;
+    corners.px = more.px;
+}
+} // namespace cal

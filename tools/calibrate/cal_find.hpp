@@ -1,0 +1,33 @@
+/* cal_find - the board in a picture: its inner corners, to a small part of a pixel, and how sharp it is.
+ */
+#ifndef CAL_FIND_HPP
+#define CAL_FIND_HPP
+
+#include <string>
+#include <vector>
+
+#include "cal_board.hpp"
+
+namespace cal
+{
+struct Corners {
+    std::vector<int> ids;
+    std::vector<cv::Point2f> px;
+    /* Width of the board's edges (their rise from dark to white over their steepest slope), median, px. A camera in focus
+     * has 2 to 3. */
+    double edge_px = 0.0;
+    std::string refused; /* why the picture is no good; empty: it is */
+
+    std::vector<cv::Point3f> places_mm(const Board &board) const;
+};
+
+/* A picture whose board is not found, is another one, shows too little of itself or is blurred is refused in `refused`;
+ * corners that were found are kept. */
+Corners corners_find(const Board &board, const cv::Mat &grey8);
+
+/* More corners once the camera is known: at the places where those in `corners` say that the others are. */
+void corners_complete(const Board &board, const cv::Mat &grey8, const cv::Mat &camera, const cv::Mat &distortion,
+                      Corners &corners);
+} // namespace cal
+
+#endif

@@ -1,0 +1,124 @@
+#include "cal_options.hpp"
+
+#include <cstdlib>
+#include <getopt.h>
+
+#include "cal_error.hpp"
+
+namespace cal
+{
+const char *const options_help =
+    "Usage: calibrate board [--board NAME] FILE\n"
+    "       calibrate guide [--board NAME] [--camera DEVICE] DIR\n"
+    "       calibrate solve [--board NAME] [--near MM] [--far MM] [--middle FILE:U,V] --out OUT DIR\n"
+    "From pictures of a printed board to rig.json: docs/calibration.md has the steps.\n"
+    "\n"
+    "  board            the board to print, A4 in true size: FILE.pdf; FILE.pgm for tools/render\n"
+    "  guide            which of DIR's pictures are good, and what is missing; exit status 1 while something is\n"
+    "  solve            camera and projector: OUT/rig.json and OUT/report.html\n"
+    "\n"
+    "  --board NAME     charuco-9x6-30 (default) or the like, or chessboard-...: squares across, down, mm of a side\n"
+    "  --camera DEVICE  take pictures into DIR: a camera's number or device, or a film; each pose twice, laser off and on\n"
+    "  --near MM, --far MM   the working range in Z that rig.json tells (default 400, 2600)\n"
+    "  --middle FILE:U,V     the pattern's middle dot is at pixel U,V of a picture with the laser on; needed only where\n"
+    "                   the pattern's edges are not seen on the board\n"
+    "  --help           this text\n"
+    "\n"
+    "DIR holds binary PGM files and frames.jsonl, which says in which the laser was on (docs/contract.md), or files named\n"
+    "NAME-on.pgm and NAME-off.pgm.\n"
+    "Exit status: 0 done; 1 pictures that cannot be read, or that cannot support a calibration; 2 wrong usage.\n";
+
+enum OptionId { opt_board = 1, opt_camera, opt_near, opt_far, opt_middle, opt_out, opt_help };
+
+static bool complain(const std::string &what)
+{
+    std::fprintf(stderr, "calibrate: %s\n", what.c_str());
+    return false;
+}
+
+static bool read_mm(const char *name, const char *value, double &mm)
+{
+    char *end;
+    mm = std::strtod(value, &end);
+    if (end == value || *end != '\0' || !(mm >= 50.0 && mm <= 20000.0))
+        return complain(std::string("--") + name + " " + value + ": must be a number from 50 to 20000");
+    return true;
+}
+
+static bool read_middle(const std::string &value, MiddleDot &middle)
+{
+    size_t colon = value.rfind(':');
+    int length = 0;
+    if (colon == std::string::npos || colon == 0 ||
+        std::sscanf(value.c_str() + colon + 1, "%lf,%lf%n", &middle.px.x, &middle.px.y, &length) != 2 ||
+        value.size() != colon + 1 + static_cast<size_t>(length))
+        return complain("--middle " + value + ": must be FILE:U,V");
+    middle.file = value.substr(0, colon);
+    return true;
+}
+
+static bool take(int id, const char *value, Options &options)
+{
+    switch (id) {
+    case opt_board:
+        options.board = value;
+        return true;
+    case opt_camera:
+        options.camera = value;
+        return options.verb == Verb::guide || complain("--camera belongs to guide");
+    case opt_near:
+        return read_mm("near", value, options.range.near_mm);
+    case opt_far:
+        return read_mm("far", value, options.range.far_mm);
+    case opt_middle:
+        return read_middle(value, options.middle);
+    case opt_out:
+        options.out = value;
+        return true;
+    case opt_help:
+        options.verb = Verb::help;
+        return true;
+    default:
+        return false; /* getopt_long has told */
+    }
+}
+
+static bool check(const Options &options)
+{
+    bool solve = options.verb == Verb::solve;
+    if (options.target.empty())
+        return complain(options.verb == Verb::board ? "one FILE is needed; see calibrate --help"
+                                                    : "one DIR is needed; see calibrate --help");
+    if (solve != !options.out.empty())
+        return complain("--out belongs to solve, which needs it; see calibrate --help");
+    if (!solve && !options.middle.file.empty())
+        return complain("--middle belongs to solve");
+    return options.range.near_mm < options.range.far_mm || complain("--near must be less than --far");
+}
+
+bool options_parse(int argc, char **argv, Options &options)
+{
+    static const struct option long_options[] = {
+        {"board", required_argument, nullptr, opt_board}, {"camera", required_argument, nullptr, opt_camera},
+        {"near", required_argument, nullptr, opt_near},   {"far", required_argument, nullptr, opt_far},
+        {"middle", required_argument, nullptr, opt_middle}, {"out", required_argument, nullptr, opt_out},
+        {"help", no_argument, nullptr, opt_help},         {nullptr, 0, nullptr, 0},
+    };
+    std::string verb = argc > 1 ? argv[1] : "";
+    if (verb == "--help")
+        return true;
+    if (verb != "board" && verb != "guide" && verb != "solve")
+        return complain("the first word must be board, guide or solve; see calibrate --help");
+    options.verb = verb == "board" ? Verb::board : verb == "guide" ? Verb::guide : Verb::solve;
+    int id;
+    while ((id = getopt_long(argc - 1, argv + 1, "", long_options, nullptr)) != -1) {
+        if (!take(id, optarg, options))
+            return false;
+        if (options.verb == Verb::help)
+            return true;
+    }
+    if (optind == argc - 2)
+        options.target = argv[optind + 1];
+    return check(options);
+}
+} // namespace cal

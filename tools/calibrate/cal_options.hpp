@@ -1,0 +1,28 @@
+/* cal_options - the command line, checked.
+ */
+#ifndef CAL_OPTIONS_HPP
+#define CAL_OPTIONS_HPP
+
+#include "cal_index.hpp"
+#include "cal_rig.hpp"
+
+namespace cal
+{
+enum class Verb { board, guide, solve, help };
+
+struct Options {
+    Verb verb = Verb::help;
+    std::string board = "charuco-9x6-30";
+    std::string target; /* the PDF, or the directory of pictures */
+    std::string out;    /* solve: where rig.json and the report go */
+    std::string camera; /* guide: what cv::VideoCapture opens; empty: look at the directory only */
+    Range range{400.0, 2600.0};
+    MiddleDot middle;
+};
+
+/* What was wrong has been told on standard error when it returns false. */
+bool options_parse(int argc, char **argv, Options &options);
+extern const char *const options_help;
+} // namespace cal
+
+#endif

@@ -1,0 +1,155 @@
+#include "cal_pictures.hpp"
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "cal_error.hpp"
+
+namespace cal
+{
+static constexpr int width_min = 320, height_min = 240, width_max = 1280, height_max = 800;
+
+cv::Mat Picture::grey8() const
+{
+    cv::Mat bytes;
+    grey.convertTo(bytes, CV_8U);
+    return bytes;
+}
+
+/* The next number of a PGM's header; comments are skipped. */
+static int header_number(std::istream &file, const std::string &path)
+{
+    int value = -1;
+    file >> std::ws;
+    while (file.peek() == '#') {
+        std::string comment;
+        std::getline(file, comment);
+        file >> std::ws;
+    }
+    if (!(file >> value))
+        throw Error(path + ": the header of a binary PGM ends too soon");
+    return value;
+}
+
+cv::Mat picture_read(const std::string &path)
+{
+    std::ifstream file(path, std::ios::binary);
+    char magic[2] = {0, 0};
+    if (!file)
+        throw Error(path + ": " + std::strerror(errno));
+    if (!file.read(magic, 2) || magic[0] != 'P' || magic[1] != '5')
+        throw Error(path + ": no binary PGM (P5)");
+    int width = header_number(file, path), height = header_number(file, path), most = header_number(file, path);
+    if (width < width_min || height < height_min || width > width_max || height > height_max)
+        throw Error(path + text(": %dx%d pixels; must be from 320x240 to 1280x800", width, height));
+    if (most < 1 || most > 65535)
+        throw Error(path + text(": maxval %d; must be from 1 to 65535", most));
+    file.get();
+    size_t sample_bytes = most > 255 ? 2 : 1, count = static_cast<size_t>(width) * static_cast<size_t>(height);
+    std::vector<unsigned char> data(count * sample_bytes);
+    file.read(reinterpret_cast<char *>(data.data()), static_cast<std::streamsize>(data.size()));
+    if (static_cast<size_t>(file.gcount()) != data.size())
+        throw Error(path + text(": cut short: %zu of %zu bytes of samples", static_cast<size_t>(file.gcount()), data.size()));
+    cv::Mat grey(height, width, CV_32F);
+    for (size_t i = 0; i < count; i++) {
+        int sample = sample_bytes == 2 ? data[2 * i] * 256 + data[2 * i + 1] : data[i];
+        if (sample > most)
+            throw Error(path + text(": sample %zu is %d, more than the maxval %d", i, sample, most));
+        grey.ptr<float>()[i] = static_cast<float>(sample) * 255.0f / static_cast<float>(most);
+    }
+    return grey;
+}
+
+void picture_write(const std::string &path, const cv::Mat &grey8)
+{
+    cv::Mat whole = grey8.isContinuous() ? grey8 : grey8.clone();
+    std::ofstream file(path, std::ios::binary);
+    file << "P5\n" << whole.cols << ' ' << whole.rows << "\n255\n";
+    file.write(reinterpret_cast<const char *>(whole.data), static_cast<std::streamsize>(whole.total()));
+    if (!file.flush())
+        throw Error(path + ": could not be written");
+}
+
+static bool ends_with(const std::string &name, const std::string &end)
+{
+    return name.size() > end.size() && name.compare(name.size() - end.size(), end.size(), end) == 0;
+}
+
+/* Which files had the laser on, by frames.jsonl. */
+static std::map<std::string, bool> read_list(const std::string &path)
+{
+    std::map<std::string, bool> lasers;
+    std::ifstream list(path);
+    std::string line;
+    for (int number = 1; std::getline(list, line); number++) {
+        if (line.find_first_not_of(" \t\r") == std::string::npos)
+            continue;
+        try {
+            nlohmann::json entry = nlohmann::json::parse(line);
+            lasers[entry.at("file").get<std::string>()] = entry.at("laser").get<bool>();
+        } catch (const nlohmann::json::exception &error) {
+            throw Error(path + text(":%d: must have a \"file\" and a \"laser\" that is true or false: ", number) +
+                        error.what());
+        }
+    }
+    return lasers;
+}
+
+static bool laser_of(const std::string &dir, const std::string &name, const std::map<std::string, bool> &list)
+{
+    auto entry = list.find(name);
+    if (entry != list.end())
+        return entry->second;
+    if (!list.empty())
+        throw Error(dir + "/" + name + ": stands not in frames.jsonl");
+    if (!ends_with(name, "-on.pgm") && !ends_with(name, "-off.pgm"))
+        throw Error(dir + "/" + name + ": was the laser on? Say it in frames.jsonl, or name the file NAME-on.pgm or " +
+                    "NAME-off.pgm");
+    return ends_with(name, "-on.pgm");
+}
+
+static std::vector<std::string> list_names(const std::string &dir)
+{
+    std::vector<std::string> names;
+    std::error_code failed;
+    for (const auto &entry : std::filesystem::directory_iterator(dir, failed)) {
+        if (entry.path().extension() == ".pgm")
+            names.push_back(entry.path().filename());
+    }
+    if (failed)
+        throw Error(dir + ": " + failed.message());
+    if (names.empty())
+        throw Error(dir + ": no *.pgm in it");
+    std::sort(names.begin(), names.end());
+    return names;
+}
+
+std::vector<Picture> pictures_read(const std::string &dir)
+{
+    std::vector<Picture> pictures;
+    std::vector<std::string> names = list_names(dir);
+    std::map<std::string, bool> list = read_list(dir + "/frames.jsonl");
+    std::string faults;
+    for (const auto &entry : list) {
+        if (!std::binary_search(names.begin(), names.end(), entry.first))
+            faults += dir + "/frames.jsonl: names " + entry.first + ", which is not there\n";
+    }
+    for (const std::string &name : names) {
+        try {
+            pictures.push_back({name, picture_read(dir + "/" + name), laser_of(dir, name, list)});
+            if (pictures.back().grey.size() != pictures.front().grey.size())
+                throw Error(dir + "/" + name + ": has another size than " + pictures.front().file);
+        } catch (const Error &error) {
+            faults += std::string(error.what()) + "\n";
+        }
+    }
+    if (!faults.empty())
+        throw Error(faults.substr(0, faults.size() - 1));
+    return pictures;
+}
+} // namespace cal

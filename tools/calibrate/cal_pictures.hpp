@@ -1,0 +1,31 @@
+/* cal_pictures - a frames directory as docs/contract.md describes it: binary PGM files, and frames.jsonl, which says in
+ * which of them the laser was on. Without frames.jsonl the names say it: NAME-on.pgm and NAME-off.pgm.
+ * Whatever cannot be read, is cut short or has another size than the rest is an error; so is a file that is named in
+ * frames.jsonl and not there.
+ */
+#ifndef CAL_PICTURES_HPP
+#define CAL_PICTURES_HPP
+
+#include <opencv2/core.hpp>
+#include <string>
+#include <vector>
+
+namespace cal
+{
+struct Picture {
+    std::string file;
+    cv::Mat grey; /* CV_32F, 0 .. 255 whatever the file's bits are */
+    bool laser;
+
+    cv::Mat grey8() const;
+};
+
+/* One file. Throws cal::Error. */
+cv::Mat picture_read(const std::string &path);
+void picture_write(const std::string &path, const cv::Mat &grey8);
+
+/* All of them in the order of their names. Throws cal::Error; one that stands for all unreadable files. */
+std::vector<Picture> pictures_read(const std::string &dir);
+} // namespace cal
+
+#endif

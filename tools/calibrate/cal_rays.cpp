@@ -1,0 +1,237 @@
+#include "cal_rays.hpp"
+
+#include <algorithm>
+
+#include "cal_error.hpp"
+#include "cal_nominal.hpp"
+
+namespace cal
+{
+static constexpr int steps = 25;
+static constexpr double huber_sigmas = 1.5, outlier_sigmas = 4.5;
+static constexpr double sigma_floor_px = 0.02;
+static constexpr int slots_min = 180;
+static constexpr double origin_sigma_max_mm = 1.0;
+
+/* A sighting as the equations need it: dot `slot` was seen at `tangent` on the plane normal . X = height. */
+struct Equation {
+    Sighting *sighting;
+    size_t slot;
+    cv::Vec3d normal;
+    double height_mm;
+};
+
+struct State {
+    cv::Vec3d origin_mm;
+    std::array<cv::Vec2d, slot_count> tangents; /* a ray is (x, y, 1) */
+};
+
+struct Blocks {
+    cv::Matx33d origin = cv::Matx33d::zeros();
+    cv::Vec3d origin_right{0.0, 0.0, 0.0};
+    std::array<cv::Matx22d, slot_count> ray{};
+    std::array<cv::Matx<double, 3, 2>, slot_count> mixed{};
+    std::array<cv::Vec2d, slot_count> ray_right{};
+};
+
+static cv::Vec3d meet_plane(const State &state, const Equation &equation, double &along_mm)
+{
+    cv::Vec2d tangent = state.tangents[equation.slot];
+    cv::Vec3d ray(tangent[0], tangent[1], 1.0);
+    along_mm = (equation.height_mm - equation.normal.dot(state.origin_mm)) / equation.normal.dot(ray);
+    return state.origin_mm + along_mm * ray;
+}
+
+static cv::Vec2d residual(const Camera &camera, const State &state, const Equation &equation)
+{
+    double along_mm;
+    cv::Vec3d place = meet_plane(state, equation, along_mm);
+    return {camera.matrix.at<double>(0, 0) * (equation.sighting->tangent.x - place[0] / place[2]),
+            camera.matrix.at<double>(1, 1) * (equation.sighting->tangent.y - place[1] / place[2])};
+}
+
+/* Adds one sighting to the normal equations: how its pixel moves with the origin and with its ray. */
+static void add(const Camera &camera, const State &state, const Equation &equation, double weight, Blocks &blocks)
+{
+    double along_mm;
+    cv::Vec3d place = meet_plane(state, equation, along_mm), n = equation.normal;
+    cv::Vec2d tangent = state.tangents[equation.slot], miss = residual(camera, state, equation);
+    cv::Vec3d ray(tangent[0], tangent[1], 1.0);
+    double facing = n.dot(ray), fx = camera.matrix.at<double>(0, 0), fy = camera.matrix.at<double>(1, 1), z = place[2];
+    cv::Matx<double, 2, 3> lens(fx / z, 0.0, -fx * place[0] / (z * z), 0.0, fy / z, -fy * place[1] / (z * z));
+    cv::Matx33d glide = cv::Matx33d::eye() - ray * n.t() * (1.0 / facing); /* along the plane */
+    cv::Matx<double, 2, 3> by_origin = lens * glide;
+    cv::Matx22d by_ray = (by_origin * along_mm).get_minor<2, 2>(0, 0);
+    blocks.origin += weight * (by_origin.t() * by_origin);
+    blocks.origin_right += weight * (by_origin.t() * miss);
+    blocks.ray[equation.slot] += weight * (by_ray.t() * by_ray);
+    blocks.mixed[equation.slot] += weight * (by_origin.t() * by_ray);
+    blocks.ray_right[equation.slot] += weight * (by_ray.t() * miss);
+}
+
+static bool is_seen(const Blocks &blocks, size_t slot)
+{
+    return cv::determinant(blocks.ray[slot]) > 0.0;
+}
+
+/* The origin's own equations once every ray has followed it. */
+static cv::Matx33d reduced(const Blocks &blocks, cv::Vec3d &right)
+{
+    cv::Matx33d normal = blocks.origin;
+    right = blocks.origin_right;
+    for (size_t slot = 0; slot < slot_count; slot++) {
+        if (!is_seen(blocks, slot))
+            continue;
+        cv::Matx<double, 3, 2> back = blocks.mixed[slot] * blocks.ray[slot].inv();
+        normal -= back * blocks.mixed[slot].t();
+        right -= back * blocks.ray_right[slot];
+    }
+    return normal;
+}
+
+static double step(const Blocks &blocks, State &state)
+{
+    cv::Vec3d right, change;
+    cv::Matx33d normal = reduced(blocks, right);
+    if (!cv::solve(normal, right, change, cv::DECOMP_CHOLESKY))
+        throw Error("the rays do not meet in one origin. Add:\n  - pictures with the laser on at other distances");
+    state.origin_mm += change;
+    for (size_t slot = 0; slot < slot_count; slot++) {
+        if (is_seen(blocks, slot))
+            state.tangents[slot] += blocks.ray[slot].inv() * (blocks.ray_right[slot] - blocks.mixed[slot].t() * change);
+    }
+    return cv::norm(change);
+}
+
+static double usual_size(const Camera &camera, const State &state, const std::vector<Equation> &equations)
+{
+    std::vector<double> sizes;
+    for (const Equation &equation : equations)
+        sizes.push_back(cv::norm(residual(camera, state, equation)));
+    auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
+    std::nth_element(sizes.begin(), middle, sizes.end());
+    return std::max(*middle / 1.1774, sigma_floor_px); /* a Rayleigh distribution's median */
+}
+
+static double weight_of(double size_px, double sigma_px)
+{
+    if (size_px > outlier_sigmas * sigma_px)
+        return 0.0;
+    return size_px > huber_sigmas * sigma_px ? huber_sigmas * sigma_px / size_px : 1.0;
+}
+
+static std::vector<Equation> list_equations(std::vector<Lit> &pictures)
+{
+    std::vector<Equation> equations;
+    for (Lit &lit : pictures) {
+        cv::Vec3d normal = lit.view.normal();
+        for (Sighting &sighting : lit.sightings) {
+            if (sighting.slot != no_slot)
+                equations.push_back({&sighting, static_cast<size_t>(sighting.slot), normal, normal.dot(lit.view.shift)});
+        }
+    }
+    return equations;
+}
+
+static State start_state(const std::vector<Equation> &equations, const cv::Vec3d &origin_mm)
+{
+    State state{origin_mm, {}};
+    std::array<std::vector<double>, slot_count> xs, ys;
+    for (const Equation &equation : equations) {
+        cv::Vec3d way = equation.sighting->place_mm - origin_mm;
+        xs[equation.slot].push_back(way[0] / way[2]);
+        ys[equation.slot].push_back(way[1] / way[2]);
+    }
+    for (size_t slot = 0; slot < slot_count; slot++) {
+        if (xs[slot].empty())
+            continue;
+        std::sort(xs[slot].begin(), xs[slot].end());
+        std::sort(ys[slot].begin(), ys[slot].end());
+        state.tangents[slot] = {xs[slot][xs[slot].size() / 2], ys[slot][ys[slot].size() / 2]};
+    }
+    return state;
+}
+
+/* Standard deviations from the equations' curvature at the solution. */
+static void tell_sigmas(const Camera &camera, const Blocks &blocks, double sigma_px, Projector &projector)
+{
+    cv::Vec3d right;
+    cv::Matx33d origin = reduced(blocks, right).inv() * (sigma_px * sigma_px);
+    for (int axis = 0; axis < 3; axis++)
+        projector.origin_sigma_mm[axis] = std::sqrt(origin(axis, axis));
+    (void)camera;
+    for (size_t slot = 0; slot < slot_count; slot++) {
+        if (projector.seen[slot] == 0 || !is_seen(blocks, slot))
+            continue;
+        cv::Matx22d inverse = blocks.ray[slot].inv();
+        cv::Matx<double, 2, 3> with_origin = inverse * blocks.mixed[slot].t();
+        cv::Matx22d spread = inverse * (sigma_px * sigma_px) + with_origin * origin * with_origin.t();
+        projector.sigma_deg[slot] = std::sqrt(0.5 * (spread(0, 0) + spread(1, 1))) * 180.0 / CV_PI;
+    }
+}
+
+static void fill_projector(const Camera &camera, const State &state, const std::vector<Equation> &equations,
+                           double sigma_px, Projector &projector)
+{
+    Blocks blocks;
+    double sum = 0.0;
+    projector.origin_mm = state.origin_mm;
+    for (const Equation &equation : equations) {
+        cv::Vec2d miss = residual(camera, state, equation);
+        equation.sighting->residual_px = {miss[0], miss[1]};
+        equation.sighting->fits = cv::norm(miss) <= outlier_sigmas * sigma_px;
+        projector.sighting_count++;
+        projector.outlier_count += !equation.sighting->fits;
+        if (equation.sighting->fits) {
+            add(camera, state, equation, 1.0, blocks);
+            projector.seen[equation.slot]++;
+            sum += miss.dot(miss);
+        }
+    }
+    int good = projector.sighting_count - projector.outlier_count;
+    projector.rms_px = std::sqrt(sum / std::max(1, good));
+    for (size_t slot = 0; slot < slot_count; slot++)
+        projector.rays[slot] = cv::normalize(cv::Vec3d(state.tangents[slot][0], state.tangents[slot][1], 1.0));
+    tell_sigmas(camera, blocks, projector.rms_px / std::sqrt(2.0), projector);
+}
+
+static void check(const Projector &projector)
+{
+    auto seen = std::count_if(projector.seen.begin(), projector.seen.end(), [](int count) { return count > 0; });
+    double sigma_mm = cv::norm(projector.origin_sigma_mm);
+    if (seen < slots_min)
+        throw Error(text("only %d of the %d dots were seen on the board, %d are needed. Add:\n  - pictures with the laser "
+                         "on and the board where the other dots are",
+                         static_cast<int>(seen), slot_count, slots_min));
+    if (sigma_mm > origin_sigma_max_mm)
+        throw Error(text("the projector's origin is only known to %.1f mm, %.1f is allowed. Add:\n  - pictures with the "
+                         "laser on at more different distances, 0.4 to 1.5 m",
+                         sigma_mm, origin_sigma_max_mm));
+}
+
+Projector rays_solve(const Camera &camera, std::vector<Lit> &pictures, const cv::Vec3d &origin_mm)
+{
+    std::vector<Equation> equations = list_equations(pictures);
+    if (equations.empty())
+        throw Error("no dot of the laser was found on the board");
+    State state = start_state(equations, origin_mm);
+    double sigma_px = usual_size(camera, state, equations);
+    for (int i = 0; i < steps; i++) {
+        Blocks blocks;
+        for (const Equation &equation : equations) {
+            double weight = weight_of(cv::norm(residual(camera, state, equation)), sigma_px);
+            if (weight > 0.0)
+                add(camera, state, equation, weight, blocks);
+        }
+        double moved_mm = step(blocks, state);
+        sigma_px = usual_size(camera, state, equations);
+        if (moved_mm < 1e-7)
+            break;
+    }
+    Projector projector;
+    fill_projector(camera, state, equations, sigma_px, projector);
+    check(projector);
+    nominal_fill(projector);
+    return projector;
+}
+} // namespace cal

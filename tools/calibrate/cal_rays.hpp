@@ -1,0 +1,30 @@
+/* cal_rays - the projector: one origin and a ray for each dot, by least squares.
+ * What is made small is where the camera sees the dots: each ray meets the board's plane, and the distance in undistorted
+ * pixels between that place and the dot counts; large ones less (Huber), and those beyond 4.5 of the usual size not at
+ * all. All rays are solved together with the origin that they share.
+ */
+#ifndef CAL_RAYS_HPP
+#define CAL_RAYS_HPP
+
+#include <array>
+
+#include "cal_sightings.hpp"
+
+namespace cal
+{
+struct Projector {
+    cv::Vec3d origin_mm, origin_sigma_mm;
+    std::array<cv::Vec3d, slot_count> rays;   /* unit */
+    std::array<int, slot_count> seen{};       /* sightings that a ray rests on; 0: by the nominal lattice */
+    std::array<double, slot_count> sigma_deg{}; /* standard deviation, of seen ones */
+    int sighting_count = 0, outlier_count = 0;
+    double rms_px = 0.0;
+    double nominal_rms_deg = 0.0; /* how far the seen rays are from the nominal lattice */
+    double pitch_deg = 0.0, turn_deg = 0.0; /* of the nominal lattice: its step, and its turn against the image's rows */
+};
+
+/* Sets the residuals and `fits` of the sightings. Throws cal::Error where they do not support an origin. */
+Projector rays_solve(const Camera &camera, std::vector<Lit> &pictures, const cv::Vec3d &origin_mm);
+} // namespace cal
+
+#endif

@@ -1,0 +1,124 @@
+#include "cal_sightings.hpp"
+
+#include <algorithm>
+#include <map>
+#include <opencv2/calib3d.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "cal_dots.hpp"
+
+namespace cal
+{
+static constexpr double still_px = 0.7;
+static constexpr size_t common_min = 6;
+static constexpr int bitmap_px_per_mm = 2;
+/* Without a twin a dot must be this far from every edge of the print, else the edge is measured with it. */
+static constexpr double edge_apart_px = 3.0;
+static constexpr double border_mm = 3.0;
+
+/* Whether two pictures show the board in the same place. */
+static bool same_place(const Corners &a, const Corners &b)
+{
+    std::map<int, cv::Point2f> places;
+    std::vector<double> apart;
+    for (size_t i = 0; i < a.ids.size(); i++)
+        places[a.ids[i]] = a.px[i];
+    for (size_t i = 0; i < b.ids.size(); i++) {
+        auto other = places.find(b.ids[i]);
+        if (other != places.end())
+            apart.push_back(cv::norm(other->second - b.px[i]));
+    }
+    if (apart.size() < common_min)
+        return false;
+    auto middle = apart.begin() + static_cast<std::ptrdiff_t>(apart.size() / 2);
+    std::nth_element(apart.begin(), middle, apart.end());
+    return *middle < still_px;
+}
+
+std::vector<int> sightings_twins(const std::vector<Picture> &pictures, const std::vector<View> &views)
+{
+    std::vector<int> twins(pictures.size(), -1);
+    int count = static_cast<int>(pictures.size());
+    for (int i = 0; i < count; i++) {
+        size_t here = static_cast<size_t>(i);
+        for (int other : {i + 1, i - 1}) {
+            if (!pictures[here].laser || twins[here] >= 0 || other < 0 || other >= count)
+                continue;
+            size_t there = static_cast<size_t>(other);
+            if (!pictures[there].laser && same_place(views[here].corners, views[there].corners))
+                twins[here] = other;
+        }
+    }
+    return twins;
+}
+
+/* The part of the frame that the sheet covers, a little less. */
+static cv::Mat sheet_mask(const Camera &camera, const Board &board, const View &view)
+{
+    cv::Point2d origin = board.sheet_origin_mm();
+    double left = origin.x + border_mm, top = origin.y + border_mm;
+    double right = origin.x + sheet_width_mm - border_mm, bottom = origin.y + sheet_height_mm - border_mm;
+    std::vector<cv::Point3d> outline;
+    constexpr int parts = 12;
+    for (int i = 0; i < parts; i++)
+        outline.emplace_back(left + (right - left) * i / parts, top, 0.0);
+    for (int i = 0; i < parts; i++)
+        outline.emplace_back(right, top + (bottom - top) * i / parts, 0.0);
+    for (int i = 0; i < parts; i++)
+        outline.emplace_back(right - (right - left) * i / parts, bottom, 0.0);
+    for (int i = 0; i < parts; i++)
+        outline.emplace_back(left, bottom - (bottom - top) * i / parts, 0.0);
+    std::vector<cv::Point2d> seen;
+    std::vector<cv::Point> whole;
+    cv::projectPoints(outline, view.turn, view.shift, camera.matrix, camera.distortion, seen);
+    for (const cv::Point2d &px : seen)
+        whole.emplace_back(cvRound(px.x), cvRound(px.y));
+    cv::Mat mask = cv::Mat::zeros(camera.size, CV_8U);
+    cv::fillPoly(mask, std::vector<std::vector<cv::Point>>{whole}, cv::Scalar(255));
+    return mask;
+}
+
+/* How far each place of the sheet is from the next edge of the print, in samples. */
+static cv::Mat edge_distances(const Board &board)
+{
+    cv::Mat sheet = board_bitmap(board, bitmap_px_per_mm), wide, narrow, distances;
+    cv::dilate(sheet, wide, cv::Mat::ones(3, 3, CV_8U));
+    cv::erode(sheet, narrow, cv::Mat::ones(3, 3, CV_8U));
+    cv::distanceTransform(wide == narrow, distances, cv::DIST_L2, cv::DIST_MASK_PRECISE);
+    return distances;
+}
+
+static bool clear_of_edges(const Camera &camera, const Board &board, const cv::Mat &distances, const View &view,
+                           const Sighting &sighting)
+{
+    cv::Matx33d rotation;
+    cv::Rodrigues(view.turn, rotation);
+    cv::Vec3d place = rotation.t() * (sighting.place_mm - view.shift);
+    cv::Point2d sheet = (cv::Point2d(place[0], place[1]) - board.sheet_origin_mm()) * bitmap_px_per_mm;
+    int x = cvFloor(sheet.x), y = cvFloor(sheet.y);
+    if (x < 0 || y < 0 || x >= distances.cols || y >= distances.rows)
+        return false;
+    double mm = static_cast<double>(distances.at<float>(y, x)) / bitmap_px_per_mm;
+    double px_per_mm = camera.focal_px() / sighting.place_mm[2] * std::abs(view.normal()[2]);
+    return mm * px_per_mm >= edge_apart_px;
+}
+
+void sightings_find(const Board &board, const Camera &camera, const cv::Mat &grey, const cv::Mat &dark, Lit &lit)
+{
+    std::vector<cv::Point2d> px;
+    for (const Dot &dot : dots_find(grey, dark, sheet_mask(camera, board, lit.view)))
+        px.push_back(dot.px);
+    std::vector<cv::Point2d> tangents = camera.tangents(px);
+    cv::Vec3d normal = lit.view.normal();
+    cv::Mat distances = edge_distances(board);
+    for (size_t i = 0; i < px.size(); i++) {
+        cv::Vec3d sight(tangents[i].x, tangents[i].y, 1.0);
+        Sighting sighting;
+        sighting.px = px[i];
+        sighting.tangent = tangents[i];
+        sighting.place_mm = sight * (normal.dot(lit.view.shift) / normal.dot(sight));
+        if (!dark.empty() || clear_of_edges(camera, board, distances, lit.view, sighting))
+            lit.sightings.push_back(sighting);
+    }
+}
+} // namespace cal

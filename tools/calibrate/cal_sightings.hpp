@@ -1,0 +1,41 @@
+/* cal_sightings - dots on the board, as points in space: each picture with the laser on gives the places where rays of
+ * the projector cross a plane that is known.
+ */
+#ifndef CAL_SIGHTINGS_HPP
+#define CAL_SIGHTINGS_HPP
+
+#include "cal_camera.hpp"
+#include "cal_pictures.hpp"
+
+namespace cal
+{
+constexpr int pattern_side = 19, slot_count = pattern_side * pattern_side;
+constexpr int no_slot = -1;
+
+struct Sighting {
+    cv::Point2d px, tangent; /* as in the frame; undistorted X/Z, Y/Z */
+    cv::Vec3d place_mm;      /* camera frame */
+    cv::Vec2i step;          /* column, row in this picture's own lattice */
+    bool in_lattice = false;
+    int slot = no_slot;       /* row * 19 + column */
+    cv::Point2d residual_px; /* seen less expected, undistorted pixels; set by rays_solve */
+    bool fits = true;
+};
+
+/* A picture with the laser on. */
+struct Lit {
+    std::string file, twin; /* twin: the same without the laser; empty: there is none */
+    View view;              /* the board's pose in it */
+    std::vector<Sighting> sightings;
+    std::string refused; /* why nothing of it is used; empty: it is used */
+};
+
+/* Index of each laser-on picture's twin among the pictures: the one before or after it, where the board has not moved;
+ * -1: it has none. */
+std::vector<int> sightings_twins(const std::vector<Picture> &pictures, const std::vector<View> &views);
+
+/* The board's pose in `lit.view` must be known. */
+void sightings_find(const Board &board, const Camera &camera, const cv::Mat &grey, const cv::Mat &dark, Lit &lit);
+} // namespace cal
+
+#endif

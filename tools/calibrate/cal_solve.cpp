@@ -1,0 +1,150 @@
+#include "cal_solve.hpp"
+
+#include <algorithm>
+#include <filesystem>
+
+#include "cal_error.hpp"
+#include "cal_lattice.hpp"
+#include "cal_report.hpp"
+
+namespace cal
+{
+static constexpr size_t lit_min = 5;
+
+static std::vector<View> find_boards(const Board &board, const std::vector<Picture> &pictures)
+{
+    std::vector<View> views;
+    for (const Picture &picture : pictures) {
+        View view;
+        view.file = picture.file;
+        view.grey8 = picture.grey8();
+        view.corners = corners_find(board, view.grey8);
+        views.push_back(view);
+    }
+    return views;
+}
+
+/* What the camera is calibrated from: all pictures but those with the laser that have a good twin without it. */
+static std::vector<View> camera_views(const std::vector<View> &views, const std::vector<int> &twins)
+{
+    std::vector<View> chosen;
+    for (size_t i = 0; i < views.size(); i++) {
+        if (twins[i] < 0 || !views[static_cast<size_t>(twins[i])].good())
+            chosen.push_back(views[i]);
+    }
+    return chosen;
+}
+
+static const View *view_of(const std::vector<View> &views, const std::string &file)
+{
+    auto view = std::find_if(views.begin(), views.end(), [&](const View &v) { return v.file == file; });
+    return view == views.end() ? nullptr : &*view;
+}
+
+static std::vector<Lit> find_dots(const Result &result, const std::vector<Picture> &pictures,
+                                  const std::vector<int> &twins)
+{
+    std::vector<Lit> all;
+    for (size_t i = 0; i < pictures.size(); i++) {
+        if (!pictures[i].laser)
+            continue;
+        Lit lit;
+        lit.file = pictures[i].file;
+        const View *view = view_of(result.views, lit.file);
+        cv::Mat dark;
+        if (view == nullptr) {
+            const Picture &twin = pictures[static_cast<size_t>(twins[i])];
+            lit.twin = twin.file;
+            dark = twin.grey;
+            view = view_of(result.views, lit.twin);
+        }
+        lit.view = *view;
+        lit.refused = view->corners.refused;
+        if (lit.refused.empty()) {
+            sightings_find(result.board, result.camera, pictures[i].grey, dark, lit);
+            lattice_grow(lit.sightings);
+        }
+        all.push_back(lit);
+    }
+    return all;
+}
+
+static void tell_pictures(const Result &result)
+{
+    for (const View &view : result.views) {
+        if (!view.good())
+            std::printf("%s: not used: %s\n", view.file.c_str(), view.corners.refused.c_str());
+    }
+    for (const Lit &lit : result.lit) {
+        if (!lit.refused.empty() && view_of(result.views, lit.file) == nullptr)
+            std::printf("%s: not used: %s\n", lit.file.c_str(), lit.refused.c_str());
+    }
+}
+
+static void tell_camera(const Camera &camera)
+{
+    std::printf("camera: rms %.3f px; fx %.2f +- %.2f, fy %.2f +- %.2f, cx %.2f +- %.2f, cy %.2f +- %.2f px\n",
+                camera.rms_px, camera.matrix.at<double>(0, 0), camera.sigma_px[0], camera.matrix.at<double>(1, 1),
+                camera.sigma_px[1], camera.matrix.at<double>(0, 2), camera.sigma_px[2], camera.matrix.at<double>(1, 2),
+                camera.sigma_px[3]);
+}
+
+static void tell_projector(const Projector &projector)
+{
+    auto seen = std::count_if(projector.seen.begin(), projector.seen.end(), [](int count) { return count > 0; });
+    std::printf("projector: rms %.3f px of %d sightings, %d left out; origin (%.2f, %.2f, %.2f) mm, +- (%.2f, %.2f, "
+                "%.2f)\n",
+                projector.rms_px, projector.sighting_count, projector.outlier_count, projector.origin_mm[0],
+                projector.origin_mm[1], projector.origin_mm[2], projector.origin_sigma_mm[0],
+                projector.origin_sigma_mm[1], projector.origin_sigma_mm[2]);
+    std::printf("dots: %d of %d seen", static_cast<int>(seen), slot_count);
+    if (seen < slot_count)
+        std::printf("; by the nominal lattice, which the others keep to %.3f degrees:", projector.nominal_rms_deg);
+    for (int slot = 0; slot < slot_count; slot++) {
+        if (projector.seen[static_cast<size_t>(slot)] == 0)
+            std::printf(" %d", slot);
+    }
+    std::printf("\n");
+}
+
+/* A calibration that fails leaves no rig.json of an earlier one behind. */
+static void make_out(const std::string &out)
+{
+    std::error_code failed;
+    std::filesystem::create_directories(out, failed);
+    if (failed)
+        throw Error(out + ": " + failed.message());
+    std::filesystem::remove(out + "/rig.json", failed);
+    if (failed)
+        throw Error(out + "/rig.json: " + failed.message());
+}
+
+void solve_run(const Options &options)
+{
+    Result result;
+    result.board = board_parse(options.board);
+    result.range = options.range;
+    make_out(options.out);
+    std::vector<Picture> pictures = pictures_read(options.target);
+    if (static_cast<size_t>(std::count_if(pictures.begin(), pictures.end(), [](const Picture &p) { return p.laser; })) < lit_min)
+        throw Error(text("too few pictures with the laser on. Add:\n  - pictures with the laser on, at least %zu", lit_min));
+    std::vector<View> views = find_boards(result.board, pictures);
+    std::vector<int> twins = sightings_twins(pictures, views);
+    result.views = camera_views(views, twins);
+    try {
+        result.camera = camera_solve(result.board, pictures.front().grey.size(), result.views);
+        result.lit = find_dots(result, pictures, twins);
+        cv::Vec3d origin_mm = index_assign(result.lit, options.middle);
+        result.projector = rays_solve(result.camera, result.lit, origin_mm);
+    } catch (const Error &) {
+        tell_pictures(result);
+        throw;
+    }
+    tell_pictures(result);
+    tell_camera(result.camera);
+    tell_projector(result.projector);
+    report_write(options.out + "/report.html", result);
+    rig_write(options.out + "/rig.json", result.camera, result.projector, result.range);
+    std::printf("%s/rig.json and %s/report.html are written\n", options.out.c_str(), options.out.c_str());
+}
+} // namespace cal

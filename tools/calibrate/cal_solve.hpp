@@ -1,0 +1,24 @@
+/* cal_solve - the whole way: pictures, camera, projector, rig.json, report.
+ */
+#ifndef CAL_SOLVE_HPP
+#define CAL_SOLVE_HPP
+
+#include "cal_options.hpp"
+
+namespace cal
+{
+/* Everything that a calibration came to. */
+struct Result {
+    Board board;
+    std::vector<View> views; /* by picture; a lit one whose twin is used is in `lit` only */
+    std::vector<Lit> lit;
+    Camera camera;
+    Projector projector;
+    Range range;
+};
+
+/* Prints what it finds on standard output. Throws cal::Error. */
+void solve_run(const Options &options);
+} // namespace cal
+
+#endif
