@@ -23,6 +23,14 @@ cv::Point2d Board::sheet_origin_mm() const
     return middle_mm() - cv::Point2d(0.5 * sheet_width_mm, 0.5 * sheet_height_mm);
 }
 
+/* The first markers of the dictionary alone: the fewer there are, the fewer are found where there is none. */
+static cv::Ptr<cv::aruco::Dictionary> first_markers(int count)
+{
+    auto all = cv::aruco::getPredefinedDictionary(dictionary);
+    return cv::makePtr<cv::aruco::Dictionary>(all->bytesList.rowRange(0, count).clone(), all->markerSize,
+                                              all->maxCorrectionBits);
+}
+
 Board board_parse(const std::string &name)
 {
     char kind[16];
@@ -31,7 +39,8 @@ Board board_parse(const std::string &name)
     if (std::sscanf(name.c_str(), "%15[a-z]-%3dx%3d-%lf%n", kind, &columns, &rows, &square_mm, &length) != 4 ||
         name[static_cast<size_t>(length)] != '\0' ||
         (std::strcmp(kind, "charuco") != 0 && std::strcmp(kind, "chessboard") != 0))
-        throw Error("--board " + name + ": must be like charuco-9x6-30 or chessboard-9x6-30 (squares across, down, mm)");
+        throw Error("--board " + name +
+                    ": must be like charuco-9x6-30 or chessboard-9x6-30 (squares across, down, mm)");
     if (columns < 4 || rows < 4 || !(square_mm >= 5.0) || columns * square_mm > sheet_width_mm - 2 * margin_mm ||
         rows * square_mm > sheet_height_mm - 2 * margin_mm)
         throw Error("--board " + name + ": must have at least 4x4 squares of at least 5 mm and fit into 281x194 mm");
@@ -41,7 +50,7 @@ Board board_parse(const std::string &name)
     if (board.charuco)
         board.markers = cv::aruco::CharucoBoard::create(columns, rows, static_cast<float>(square_mm),
                                                         static_cast<float>(marker_share * square_mm),
-                                                        cv::aruco::getPredefinedDictionary(dictionary));
+                                                        first_markers(columns * rows / 2));
     return board;
 }
 
@@ -58,8 +67,8 @@ static cv::Rect square_of(const Board &board, int px_per_mm, double x_mm, double
 static void draw_marker(const Board &board, int px_per_mm, int column, int row, int marker, cv::Mat &sheet)
 {
     double side_mm = marker_share * board.square_mm, edge_mm = 0.5 * (board.square_mm - side_mm);
-    cv::Rect place = square_of(board, px_per_mm, column * board.square_mm + edge_mm, row * board.square_mm + edge_mm,
-                               side_mm);
+    cv::Rect place =
+        square_of(board, px_per_mm, column * board.square_mm + edge_mm, row * board.square_mm + edge_mm, side_mm);
     cv::Mat drawn;
     cv::aruco::drawMarker(board.markers->dictionary, marker, board.markers->dictionary->markerSize + 2, drawn, 1);
     cv::resize(drawn, sheet(place), place.size(), 0.0, 0.0, cv::INTER_NEAREST);

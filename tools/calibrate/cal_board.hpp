@@ -22,12 +22,18 @@ struct Board {
     bool charuco;
     int columns, rows; /* squares */
     double square_mm;
-    std::string name;                          /* as it was given */
+    std::string name;                         /* as it was given */
     cv::Ptr<cv::aruco::CharucoBoard> markers; /* ChArUco only */
 
-    int corner_count() const { return (columns - 1) * (rows - 1); }
+    int corner_count() const
+    {
+        return (columns - 1) * (rows - 1);
+    }
     cv::Point3d corner_mm(int corner) const;
-    cv::Point2d middle_mm() const { return {0.5 * columns * square_mm, 0.5 * rows * square_mm}; }
+    cv::Point2d middle_mm() const
+    {
+        return {0.5 * columns * square_mm, 0.5 * rows * square_mm};
+    }
     /* Corner of the sheet, in the board's frame. */
     cv::Point2d sheet_origin_mm() const;
 };

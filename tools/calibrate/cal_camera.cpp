@@ -6,12 +6,16 @@
 
 #include "cal_coverage.hpp"
 #include "cal_error.hpp"
+#include "cal_refine.hpp"
 
 namespace cal
 {
-/* A corner does not fit from this many times the usual residual on; a picture, from this many times the usual rms. */
-static constexpr double corner_sigmas = 4.5, picture_times = 3.0;
-static constexpr double picture_rms_min_px = 0.25;
+/* A corner does not fit from this many times the usual residual on. */
+static constexpr double corner_sigmas = 4.5;
+/* Residuals that are good whatever the others are; rough: before the corners are refined. */
+static constexpr double rough_px = 3.0, fine_px = 0.06;
+static constexpr double kept_share = 0.6;
+static constexpr double rayleigh_median = 1.1774; /* in standard deviations of one component */
 static constexpr int rounds = 4;
 static constexpr int corners_min = 8;
 static constexpr double lens_sigmas = 3.0;
@@ -23,6 +27,14 @@ cv::Vec3d View::in_camera(cv::Point3d place_mm) const
     cv::Matx33d rotation;
     cv::Rodrigues(turn, rotation);
     return rotation * cv::Vec3d(place_mm.x, place_mm.y, place_mm.z) + shift;
+}
+
+cv::Point2d View::on_board(const cv::Vec3d &place_mm) const
+{
+    cv::Matx33d rotation;
+    cv::Rodrigues(turn, rotation);
+    cv::Vec3d place = rotation.t() * (place_mm - shift);
+    return {place[0], place[1]};
 }
 
 cv::Vec3d View::normal() const
@@ -52,7 +64,8 @@ cv::Point2d Camera::undistorted_px(cv::Point2d tangent) const
 
 void camera_pose(const Camera &camera, const Board &board, View &view)
 {
-    cv::solvePnP(view.corners.places_mm(board), view.corners.px, camera.matrix, camera.distortion, view.turn, view.shift);
+    cv::solvePnP(view.corners.places_mm(board), view.corners.px, camera.matrix, camera.distortion, view.turn,
+                 view.shift);
 }
 
 static std::vector<cv::Point2d> residuals_of(const Camera &camera, const Board &board, const View &view)
@@ -95,8 +108,8 @@ static void fit(const Board &board, std::vector<View> &views, Camera &camera)
     std::vector<cv::Mat> turns, shifts;
     cv::Mat sigma, pose_sigma, picture_rms;
     camera.distortion = cv::Mat::zeros(1, 5, CV_64F);
-    camera.rms_px = cv::calibrateCamera(places, seen, camera.size, camera.matrix, camera.distortion, turns, shifts, sigma,
-                                        pose_sigma, picture_rms, camera.third_radial ? 0 : cv::CALIB_FIX_K3);
+    camera.rms_px = cv::calibrateCamera(places, seen, camera.size, camera.matrix, camera.distortion, turns, shifts,
+                                        sigma, pose_sigma, picture_rms, camera.third_radial ? 0 : cv::CALIB_FIX_K3);
     camera.distortion = camera.distortion.reshape(1, 1).colRange(0, 5).clone();
     for (int i = 0; i < 4; i++)
         camera.sigma_px[static_cast<size_t>(i)] = sigma.at<double>(i);
@@ -109,33 +122,26 @@ static void fit(const Board &board, std::vector<View> &views, Camera &camera)
     }
 }
 
-/* Leaves out what does not fit; false: nothing. */
-static bool clean(const Board &board, const Camera &camera, std::vector<View> &views)
+/* Leaves out what does not fit; false: nothing. A picture is refused when most of it would have to be left out. */
+static bool clean(const Board &board, const Camera &camera, std::vector<View> &views, double slack_px)
 {
-    std::vector<double> sizes, picture_rms;
+    std::vector<double> sizes;
     bool changed = false;
     for (const View &view : views) {
-        if (!view.good())
-            continue;
-        for (const cv::Point2d &residual : residuals_of(camera, board, view))
+        for (const cv::Point2d &residual : view.good() ? residuals_of(camera, board, view) : std::vector<cv::Point2d>())
             sizes.push_back(cv::norm(residual));
-        picture_rms.push_back(view.rms_px);
     }
-    double corner_limit = corner_sigmas * median_of(sizes) / 1.1774, usual_rms = median_of(picture_rms);
+    if (sizes.empty())
+        return false;
+    double usual_px = median_of(sizes), limit_px = std::max(corner_sigmas * usual_px / rayleigh_median, slack_px);
     for (View &view : views) {
         if (!view.good())
             continue;
-        if (view.rms_px > std::max(picture_times * usual_rms, picture_rms_min_px)) {
-            view.corners.refused = text("its corners do not fit the camera that the others give: %.2f px, usual is %.2f",
-                                        view.rms_px, usual_rms);
-            changed = true;
-            continue;
-        }
         std::vector<cv::Point2d> residuals = residuals_of(camera, board, view);
         Corners kept;
         kept.edge_px = view.corners.edge_px;
         for (size_t i = 0; i < residuals.size(); i++) {
-            if (cv::norm(residuals[i]) <= corner_limit) {
+            if (cv::norm(residuals[i]) <= limit_px) {
                 kept.ids.push_back(view.corners.ids[i]);
                 kept.px.push_back(view.corners.px[i]);
             }
@@ -144,8 +150,12 @@ static bool clean(const Board &board, const Camera &camera, std::vector<View> &v
         changed = changed || dropped > 0;
         view.left_out += static_cast<int>(dropped);
         view.corners = kept;
-        if (static_cast<int>(kept.ids.size()) < corners_min)
-            view.corners.refused = text("only %zu of its corners fit the camera, %d are needed", kept.ids.size(), corners_min);
+        if (static_cast<int>(kept.ids.size()) < corners_min ||
+            static_cast<double>(kept.ids.size()) < kept_share * static_cast<double>(residuals.size()))
+            view.corners.refused =
+                text("%zu of its %zu corners do not fit the camera that the others give (rms %.2f px, "
+                     "usual is %.2f): another board, bent, or moved?",
+                     dropped, residuals.size(), view.rms_px, usual_px);
     }
     return changed;
 }
@@ -189,15 +199,32 @@ static void check_trust(const Camera &camera)
                             camera.sigma_px[1] / camera.matrix.at<double>(1, 1));
     double centre_px = std::max(camera.sigma_px[2], camera.sigma_px[3]);
     if (focal > focal_sigma_max)
-        missing.push_back(text("pictures with the board tilted by 30 to 45 degrees in all directions: the focal length is "
-                               "only known to %.2f %% (one standard deviation; %.2f is allowed)",
-                               100.0 * focal, 100.0 * focal_sigma_max));
+        missing.push_back(
+            text("pictures with the board tilted by 30 to 45 degrees in all directions: the focal length is "
+                 "only known to %.2f %% (one standard deviation; %.2f is allowed)",
+                 100.0 * focal, 100.0 * focal_sigma_max));
     if (centre_px > centre_sigma_max_px)
-        missing.push_back(text("pictures with the board tilted, near, and turned on its side: the principal point is only "
-                               "known to %.1f px (%.1f is allowed)",
-                               centre_px, centre_sigma_max_px));
+        missing.push_back(
+            text("pictures with the board tilted, near, and turned on its side: the principal point is only "
+                 "known to %.1f px (%.1f is allowed)",
+                 centre_px, centre_sigma_max_px));
     if (!missing.empty())
         refuse(missing);
+}
+
+/* All corners anew, by the camera as it is known now. */
+static void refine(const Board &board, const Camera &camera, std::vector<View> &views)
+{
+    cv::Mat print = board_bitmap(board, refine_px_per_mm);
+    for (View &view : views) {
+        view.left_out = 0;
+        if (!view.good())
+            continue;
+        corners_refine(board, print, view.grey8, camera.matrix, camera.distortion, view.corners);
+        if (static_cast<int>(view.corners.ids.size()) < corners_min)
+            view.corners.refused =
+                text("only %zu of its corners look as printed, %d are needed", view.corners.ids.size(), corners_min);
+    }
 }
 
 Camera camera_solve(const Board &board, cv::Size size, std::vector<View> &views)
@@ -209,16 +236,16 @@ Camera camera_solve(const Board &board, cv::Size size, std::vector<View> &views)
     if (!missing.empty())
         refuse(missing);
     fit(board, views, camera);
-    clean(board, camera, views);
+    clean(board, camera, views, rough_px);
     fit(board, views, camera);
-    for (View &view : views) {
-        if (view.good())
-            corners_complete(board, view.grey8, camera.matrix, camera.distortion, view.corners);
-        view.left_out = 0;
-    }
+    refine(board, camera, views);
+    fit(board, views, camera);
+    clean(board, camera, views, fine_px);
+    fit(board, views, camera);
+    refine(board, camera, views);
     for (int round = 0; round < rounds; round++) {
         fit(board, views, camera);
-        if (!clean(board, camera, views))
+        if (!clean(board, camera, views, fine_px))
             break;
     }
     camera.third_radial = true;

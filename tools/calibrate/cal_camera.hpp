@@ -21,9 +21,13 @@ struct View {
     double rms_px = 0.0;
     int left_out = 0; /* corners that did not fit */
 
-    bool good() const { return corners.refused.empty(); }
+    bool good() const
+    {
+        return corners.refused.empty();
+    }
     /* A point of the board in the camera's frame. */
     cv::Vec3d in_camera(cv::Point3d place_mm) const;
+    cv::Point2d on_board(const cv::Vec3d &place_mm) const; /* and back */
     /* The board's own Z in the camera's frame, and its angle against the camera's. */
     cv::Vec3d normal() const;
     double tilt_deg() const;
@@ -40,14 +44,17 @@ struct Region {
 
 struct Camera {
     cv::Size size;
-    cv::Mat matrix, distortion; /* 3x3, 1x5: k1 k2 p1 p2 k3 */
+    cv::Mat matrix, distortion;       /* 3x3, 1x5: k1 k2 p1 p2 k3 */
     std::array<double, 4> sigma_px{}; /* standard deviations: fx fy cx cy */
     std::array<double, 5> lens_sigma{};
     double rms_px = 0.0;
     bool third_radial = false;
     std::array<Region, region_columns * region_rows> regions{};
 
-    double focal_px() const { return matrix.at<double>(0, 0); }
+    double focal_px() const
+    {
+        return matrix.at<double>(0, 0);
+    }
     /* Undistorted tangents X/Z, Y/Z of a pixel, and back to undistorted pixels. */
     std::vector<cv::Point2d> tangents(const std::vector<cv::Point2d> &px) const;
     cv::Point2d undistorted_px(cv::Point2d tangent) const;

@@ -55,15 +55,16 @@ std::vector<std::string> coverage_missing(const std::vector<View> &views, cv::Si
         missing.push_back(text("%d more pictures of the board, sharp and held still: there are %d of %d",
                                limits.pictures - good, good, limits.pictures));
     if (sideways < limits.tilted)
-        missing.push_back(text("the board turned 20 to 45 degrees to the left and to the right: %d of %d", sideways,
-                               limits.tilted));
+        missing.push_back(
+            text("the board turned 20 to 45 degrees to the left and to the right: %d of %d", sideways, limits.tilted));
     if (upwards < limits.tilted)
-        missing.push_back(text("the board leaning 20 to 45 degrees backwards and forwards: %d of %d", upwards,
-                               limits.tilted));
+        missing.push_back(
+            text("the board leaning 20 to 45 degrees backwards and forwards: %d of %d", upwards, limits.tilted));
     if (good > 0 && farthest < limits.distance_ratio * nearest)
-        missing.push_back(text("other distances: the boards are %.0f to %.0f mm away, the farthest should be %.1f times "
-                               "as far as the nearest",
-                               nearest, farthest, limits.distance_ratio));
+        missing.push_back(
+            text("other distances: the boards are %.0f to %.0f mm away, the farthest should be %.1f times "
+                 "as far as the nearest",
+                 nearest, farthest, limits.distance_ratio));
     std::string regions = missing_regions(views, size, limits.region_corners);
     if (!regions.empty())
         missing.push_back("the board in these parts of the frame: " + regions);
@@ -82,13 +83,14 @@ void coverage_guess_poses(const Board &board, cv::Size size, std::vector<View> &
         }
     }
     double focal = guessed_focal * size.width;
-    guess.matrix = (cv::Mat_<double>(3, 3) << focal, 0.0, 0.5 * size.width, 0.0, focal, 0.5 * size.height, 0.0, 0.0, 1.0);
+    guess.matrix =
+        (cv::Mat_<double>(3, 3) << focal, 0.0, 0.5 * size.width, 0.0, focal, 0.5 * size.height, 0.0, 0.0, 1.0);
     guess.distortion = cv::Mat::zeros(1, 5, CV_64F);
     if (places.size() >= views_for_guess) {
         cv::Mat turns, shifts, matrix = guess.matrix.clone(), distortion = guess.distortion.clone();
         cv::calibrateCamera(places, seen, size, matrix, distortion, turns, shifts,
-                            cv::CALIB_USE_INTRINSIC_GUESS | cv::CALIB_FIX_PRINCIPAL_POINT | cv::CALIB_ZERO_TANGENT_DIST |
-                                cv::CALIB_FIX_K2 | cv::CALIB_FIX_K3);
+                            cv::CALIB_USE_INTRINSIC_GUESS | cv::CALIB_FIX_PRINCIPAL_POINT |
+                                cv::CALIB_ZERO_TANGENT_DIST | cv::CALIB_FIX_K2 | cv::CALIB_FIX_K3);
         double found = matrix.at<double>(0, 0);
         if (found > 0.4 * focal && found < 2.5 * focal) {
             guess.matrix = matrix;

@@ -9,9 +9,9 @@
 namespace cal
 {
 struct CoverageLimits {
-    int pictures;         /* with the board found and sharp */
-    int region_corners;   /* corners in each of 4x3 parts of the frame */
-    int tilted;           /* pictures tilted by 20 degrees or more about the vertical, and as many about the horizontal */
+    int pictures;       /* with the board found and sharp */
+    int region_corners; /* corners in each of 4x3 parts of the frame */
+    int tilted;         /* pictures tilted by 20 degrees or more about the vertical, and as many about the horizontal */
     double distance_ratio; /* farthest to nearest board */
 };
 

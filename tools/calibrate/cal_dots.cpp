@@ -10,7 +10,8 @@ static constexpr double noise_times = 5.0, peak_min_grey = 2.5;
 static constexpr double saturated_grey = 250.0;
 static constexpr int window_px = 4;
 static constexpr double sigma_min_px = 0.5, sigma_max_px = 3.2, moved_max_px = 1.5;
-static constexpr int fit_steps = 12;
+static constexpr int fit_steps = 20, used_min = 40;
+static constexpr double damping = 1e-2;
 /* A sensor's black level, roughly, and the least light that tells how light a surface is. */
 static constexpr double black_grey = 4.0, light_min_grey = 12.0;
 
@@ -39,28 +40,38 @@ static cv::Mat evened(const cv::Mat &lit, const cv::Mat &dark, const cv::Mat &wh
     return even;
 }
 
-/* Peak, place, width and ground of a Gaussian, by Gauss-Newton over the window. False: no round dot there. */
-static bool fit_dot(const cv::Mat &picture, int u0, int v0, Dot &dot)
+/* Adds a pixel to the equations of the fit. */
+static void add_pixel(const cv::Matx<double, 5, 1> &p, int u, int v, double grey, cv::Matx<double, 5, 5> &normal,
+                      cv::Matx<double, 5, 1> &right)
+{
+    double du = u - p(1), dv = v - p(2), s2 = p(3) * p(3);
+    double bell = std::exp(-0.5 * (du * du + dv * dv) / s2);
+    cv::Matx<double, 5, 1> slope(bell, p(0) * bell * du / s2, p(0) * bell * dv / s2,
+                                 p(0) * bell * (du * du + dv * dv) / (s2 * p(3)), 1.0);
+    normal += slope * slope.t();
+    right += slope * (grey - p(0) * bell - p(4));
+}
+
+/* Peak, place, width and ground of a Gaussian, by damped Gauss-Newton over the window; pixels of `lit` that are at the
+ * sensor's limit do not count. False: no round dot there. */
+static bool fit_dot(const cv::Mat &picture, const cv::Mat &lit, int u0, int v0, Dot &dot)
 {
     cv::Matx<double, 5, 1> p(static_cast<double>(picture.at<float>(v0, u0)), u0, v0, 1.3, 0.0);
     for (int step = 0; step < fit_steps; step++) {
         cv::Matx<double, 5, 5> normal = cv::Matx<double, 5, 5>::zeros();
-        cv::Matx<double, 5, 1> right = cv::Matx<double, 5, 1>::zeros();
+        cv::Matx<double, 5, 1> right = cv::Matx<double, 5, 1>::zeros(), change;
+        int used = 0;
         for (int v = v0 - window_px; v <= v0 + window_px; v++) {
             for (int u = u0 - window_px; u <= u0 + window_px; u++) {
-                double du = u - p(1), dv = v - p(2), s2 = p(3) * p(3);
-                double bell = std::exp(-0.5 * (du * du + dv * dv) / s2);
-                cv::Matx<double, 5, 1> slope(bell, p(0) * bell * du / s2, p(0) * bell * dv / s2,
-                                             p(0) * bell * (du * du + dv * dv) / (s2 * p(3)), 1.0);
-                double miss = static_cast<double>(picture.at<float>(v, u)) - p(0) * bell - p(4);
-                normal += slope * slope.t();
-                right += slope * miss;
+                if (static_cast<double>(lit.at<float>(v, u)) < saturated_grey) {
+                    add_pixel(p, u, v, static_cast<double>(picture.at<float>(v, u)), normal, right);
+                    used++;
+                }
             }
         }
         for (int i = 0; i < 5; i++)
-            normal(i, i) *= 1.0 + 1e-3;
-        cv::Matx<double, 5, 1> change;
-        if (!cv::solve(normal, right, change, cv::DECOMP_CHOLESKY))
+            normal(i, i) *= 1.0 + damping;
+        if (used < used_min || !cv::solve(normal, right, change, cv::DECOMP_CHOLESKY))
             return false;
         p += change;
         if (!(p(3) > 0.3 && p(3) < 6.0) || std::abs(p(1) - u0) > window_px || std::abs(p(2) - v0) > window_px)
@@ -69,13 +80,6 @@ static bool fit_dot(const cv::Mat &picture, int u0, int v0, Dot &dot)
     dot = {{p(1), p(2)}, p(0), p(3)};
     return p(0) > peak_min_grey && p(3) >= sigma_min_px && p(3) <= sigma_max_px && std::abs(p(1) - u0) < moved_max_px &&
            std::abs(p(2) - v0) < moved_max_px;
-}
-
-static bool is_saturated(const cv::Mat &lit, int u, int v)
-{
-    double most;
-    cv::minMaxLoc(lit(cv::Rect(u - 2, v - 2, 5, 5)), nullptr, &most);
-    return most >= saturated_grey;
 }
 
 std::vector<Dot> dots_find(const cv::Mat &lit, const cv::Mat &dark, const cv::Mat &where)
@@ -93,7 +97,7 @@ std::vector<Dot> dots_find(const cv::Mat &lit, const cv::Mat &dark, const cv::Ma
             float value = band.at<float>(v, u);
             Dot dot;
             if (where.at<uchar>(v, u) != 0 && static_cast<double>(value) > limit && value >= highest.at<float>(v, u) &&
-                !is_saturated(lit, u, v) && fit_dot(fitted, u, v, dot))
+                fit_dot(fitted, lit, u, v, dot))
                 dots.push_back(dot);
         }
     }

@@ -13,12 +13,14 @@ namespace cal
 static constexpr int corners_min = 8;
 static constexpr double edge_max_px = 4.5;
 /* A marker may lie off the board's plane by this part of a square: lenses bend. */
-static constexpr double marker_slack = 0.35;
-static constexpr double marker_good_share = 0.9;
+static constexpr double marker_slack = 0.4;
+static constexpr double marker_good_share = 0.5;
 /* Small pictures of markers are looked at larger. */
-static constexpr double enlarge = 2.0;
+static constexpr double enlarge = 3.0;
+static constexpr size_t markers_min = 3;
+static constexpr int few_corners = 12;
 /* Windows of the search for a corner: this part of a square, within bounds. */
-static constexpr double window_share = 0.25;
+static constexpr double window_share = 0.2;
 static constexpr int window_min_px = 3, window_max_px = 9;
 static constexpr double moved_max_px = 3.0;
 
@@ -128,33 +130,47 @@ static void refine(const Board &board, const cv::Mat &grey8, Corners &corners)
     corners.px = kept.px;
 }
 
-/* Whether the markers lie to each other as on this board. */
-static bool lies_as_printed(const Board &board, const std::vector<std::vector<cv::Point2f>> &markers,
-                            const std::vector<int> &ids)
+/* Keeps the markers that lie to each other as on this board; false: they are another board's. */
+static bool keep_as_printed(const Board &board, std::vector<std::vector<cv::Point2f>> &markers, std::vector<int> &ids)
 {
     std::vector<cv::Point2f> printed, seen;
     for (size_t i = 0; i < ids.size(); i++) {
-        auto known = std::find(board.markers->ids.begin(), board.markers->ids.end(), ids[i]);
-        if (known == board.markers->ids.end())
-            return false;
-        const auto &places = board.markers->objPoints[static_cast<size_t>(known - board.markers->ids.begin())];
+        const auto &places = board.markers->objPoints[static_cast<size_t>(ids[i])];
         for (size_t k = 0; k < 4; k++) {
             printed.emplace_back(places[k].x, places[k].y);
             seen.push_back(markers[i][k]);
         }
     }
     std::vector<uchar> fits;
-    cv::Mat map = cv::findHomography(seen, printed, cv::RANSAC, marker_slack * board.square_mm, fits);
-    return !map.empty() && cv::countNonZero(fits) >= marker_good_share * static_cast<double>(seen.size());
+    if (cv::findHomography(seen, printed, cv::RANSAC, marker_slack * board.square_mm, fits).empty())
+        return false;
+    size_t kept = 0;
+    for (size_t i = 0; i < ids.size(); i++) {
+        if (fits[4 * i] && fits[4 * i + 1] && fits[4 * i + 2] && fits[4 * i + 3]) {
+            ids[kept] = ids[i];
+            markers[kept++] = markers[i];
+        }
+    }
+    bool ours = static_cast<double>(kept) >= marker_good_share * static_cast<double>(ids.size());
+    ids.resize(kept);
+    markers.resize(kept);
+    return ours;
 }
 
-static void find_charuco(const Board &board, const cv::Mat &grey8, Corners &corners)
+/* Small markers in a soft picture are the rule here: a board at 1.5 m has modules of 2 pixels. */
+static void find_markers(const Board &board, const cv::Mat &grey8, std::vector<std::vector<cv::Point2f>> &markers,
+                         std::vector<int> &ids)
 {
-    std::vector<std::vector<cv::Point2f>> markers;
-    std::vector<int> ids;
     cv::Mat larger;
     auto settings = cv::aruco::DetectorParameters::create();
     settings->cornerRefinementMethod = cv::aruco::CORNER_REFINE_SUBPIX;
+    settings->adaptiveThreshWinSizeStep = 4;
+    settings->adaptiveThreshWinSizeMax = 43;
+    settings->adaptiveThreshConstant = 3.0;
+    settings->polygonalApproxAccuracyRate = 0.05;
+    settings->perspectiveRemovePixelPerCell = 8;
+    settings->perspectiveRemoveIgnoredMarginPerCell = 0.25;
+    settings->maxErroneousBitsInBorderRate = 0.5;
     cv::resize(grey8, larger, {}, enlarge, enlarge, cv::INTER_CUBIC);
     cv::aruco::detectMarkers(larger, board.markers->dictionary, markers, ids, settings);
     for (auto &marker : markers) {
@@ -162,12 +178,49 @@ static void find_charuco(const Board &board, const cv::Mat &grey8, Corners &corn
         for (auto &px : marker)
             px = (px + cv::Point2f(0.5f, 0.5f)) / enlarge - cv::Point2f(0.5f, 0.5f);
     }
-    if (ids.empty()) {
-        corners.refused = "no board found";
+}
+
+/* All inner corners, by the markers as a whole: where too few stand beside each other. */
+static void predict_corners(const Board &board, const cv::Mat &grey8,
+                            const std::vector<std::vector<cv::Point2f>> &markers, const std::vector<int> &ids,
+                            Corners &corners)
+{
+    std::vector<cv::Point2f> printed, seen, all, expected;
+    for (size_t i = 0; i < ids.size(); i++) {
+        for (size_t k = 0; k < 4; k++) {
+            cv::Point3f place = board.markers->objPoints[static_cast<size_t>(ids[i])][k];
+            printed.emplace_back(place.x, place.y);
+            seen.push_back(markers[i][k]);
+        }
+    }
+    for (int id = 0; id < board.corner_count(); id++)
+        all.emplace_back(static_cast<float>(board.corner_mm(id).x), static_cast<float>(board.corner_mm(id).y));
+    cv::Mat map = cv::findHomography(printed, seen);
+    if (map.empty())
+        return;
+    cv::perspectiveTransform(all, expected, map);
+    corners.ids.clear();
+    corners.px.clear();
+    cv::Rect2f inside(1.0f, 1.0f, static_cast<float>(grey8.cols) - 3.0f, static_cast<float>(grey8.rows) - 3.0f);
+    for (int id = 0; id < board.corner_count(); id++) {
+        if (inside.contains(expected[static_cast<size_t>(id)])) {
+            corners.ids.push_back(id);
+            corners.px.push_back(expected[static_cast<size_t>(id)]);
+        }
+    }
+}
+
+static void find_charuco(const Board &board, const cv::Mat &grey8, Corners &corners)
+{
+    std::vector<std::vector<cv::Point2f>> markers;
+    std::vector<int> ids;
+    find_markers(board, grey8, markers, ids);
+    if (ids.size() < markers_min) {
+        corners.refused = ids.empty() ? "no board found" : text("no board found, but %zu of its markers", ids.size());
         return;
     }
-    if (ids.size() >= 2 && !lies_as_printed(board, markers, ids)) {
-        corners.refused = "another board than " + board.name + ": its markers are not these, or not where they should be";
+    if (!keep_as_printed(board, markers, ids)) {
+        corners.refused = "another board than " + board.name + ": its markers are not where they should be";
         return;
     }
     cv::Mat found_px, found_ids;
@@ -176,6 +229,8 @@ static void find_charuco(const Board &board, const cv::Mat &grey8, Corners &corn
         corners.ids.push_back(found_ids.at<int>(i));
         corners.px.push_back(found_px.at<cv::Point2f>(i));
     }
+    if (found_ids.rows < few_corners)
+        predict_corners(board, grey8, markers, ids, corners);
 }
 
 static void find_chessboard(const Board &board, const cv::Mat &grey8, Corners &corners)
@@ -205,31 +260,9 @@ Corners corners_find(const Board &board, const cv::Mat &grey8)
     if (corners.edge_px > edge_max_px)
         corners.refused = text("blurred: edges are %.1f px wide, %.1f are allowed", corners.edge_px, edge_max_px);
     else if (static_cast<int>(corners.ids.size()) < corners_min)
-        corners.refused = text("only %zu corners of the board are seen, %d are needed", corners.ids.size(), corners_min);
+        corners.refused =
+            text("only %zu corners of the board are seen, %d are needed", corners.ids.size(), corners_min);
     return corners;
 }
 
-void corners_complete(const Board &board, const cv::Mat &grey8, const cv::Mat &camera, const cv::Mat &distortion,
-                      Corners &corners)
-{
-    std::vector<cv::Point3f> all;
-    std::vector<cv::Point2f> seen;
-    cv::Mat turn, shift;
-    Corners more;
-    if (!cv::solvePnP(corners.places_mm(board), corners.px, camera, distortion, turn, shift))
-        return;
-    for (int id = 0; id < board.corner_count(); id++)
-        all.emplace_back(board.corner_mm(id));
-    cv::projectPoints(all, turn, shift, camera, distortion, seen);
-    for (int id = 0; id < board.corner_count(); id++) {
-        cv::Point2f px = seen[static_cast<size_t>(id)];
-        if (px.x > 0.0f && px.y > 0.0f && px.x < static_cast<float>(grey8.cols) && px.y < static_cast<float>(grey8.rows)) {
-            more.ids.push_back(id);
-            more.px.push_back(px);
-        }
-    }
-    refine(board, grey8, more);
-    corners.ids = more.ids;
-    corners.px = more.px;
-}
 } // namespace cal

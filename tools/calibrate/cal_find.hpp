@@ -24,10 +24,6 @@ struct Corners {
 /* A picture whose board is not found, is another one, shows too little of itself or is blurred is refused in `refused`;
  * corners that were found are kept. */
 Corners corners_find(const Board &board, const cv::Mat &grey8);
-
-/* More corners once the camera is known: at the places where those in `corners` say that the others are. */
-void corners_complete(const Board &board, const cv::Mat &grey8, const cv::Mat &camera, const cv::Mat &distortion,
-                      Corners &corners);
 } // namespace cal
 
 #endif

@@ -1,8 +1,9 @@
 #include "cal_index.hpp"
 
 #include <algorithm>
-#include <array>
 #include <map>
+#include <opencv2/calib3d.hpp>
+#include <set>
 
 #include "cal_error.hpp"
 
@@ -21,6 +22,12 @@ static constexpr double near_steps = 2.2;
 /* Another place for the projector must be worse than this share of the best one's dots. */
 static constexpr double clear_share = 0.9;
 static constexpr double same_origin_mm = 8.0;
+/* A dot this near to the sheet's or the frame's edge may be missed. */
+static constexpr double edge_mm = 8.0, edge_px = 8.0;
+/* A line of dots is one when so many are seen, and this share of those that might be; it is none when it was looked at
+ * so often and hardly any were. */
+static constexpr int line_seen_min = 3, void_looks_min = 6;
+static constexpr double line_share = 0.25, void_share = 0.08;
 
 using Step = std::pair<int, int>;
 
@@ -138,7 +145,8 @@ static Placing place(const Trial &trial, const Lit &lit, double step_length)
     Placing placing;
     for (const Sighting &sighting : lit.sightings) {
         cv::Point2d step;
-        if (!sighting.in_lattice || !predict(trial, direction_of(trial.origin_mm, sighting.place_mm), step_length, step))
+        if (!sighting.in_lattice ||
+            !predict(trial, direction_of(trial.origin_mm, sighting.place_mm), step_length, step))
             continue;
         cv::Point2d shift(step.x - sighting.step[0], step.y - sighting.step[1]);
         shifts.push_back(shift);
@@ -259,57 +267,125 @@ static Trial best_trial(const std::vector<Lit> &pictures)
     size_t first = richest(pictures);
     std::vector<cv::Vec3d> candidates = all_candidates(pictures, first);
     if (candidates.empty())
-        throw Error("the projector's place cannot be told. Add:\n  - pictures with the laser on at other distances: the "
-                    "board near (0.5 m) and far (1.2 m), with many dots on it");
+        throw Error(
+            "the projector's place cannot be told. Add:\n  - pictures with the laser on at other distances: the "
+            "board near (0.5 m) and far (1.2 m), with many dots on it");
     std::vector<Trial> trials;
     for (const cv::Vec3d &candidate : candidates)
         trials.push_back(try_origin(pictures, first, candidate));
     auto best = std::min_element(trials.begin(), trials.end(), better);
     for (const Trial &trial : trials) {
         bool elsewhere = cv::norm(trial.origin_mm - best->origin_mm) > same_origin_mm;
-        if (elsewhere && trial.dot_count > clear_share * best->dot_count &&
-            trial.square_sum < 2.0 * best->square_sum)
-            throw Error(text("the projector's place is not clear: (%.0f, %.0f, %.0f) mm explains the dots as well as "
-                             "(%.0f, %.0f, %.0f). Add:\n  - pictures with the laser on at other distances, near and far",
-                             best->origin_mm[0], best->origin_mm[1], best->origin_mm[2], trial.origin_mm[0],
-                             trial.origin_mm[1], trial.origin_mm[2]));
+        if (elsewhere && trial.dot_count > clear_share * best->dot_count && trial.square_sum < 2.0 * best->square_sum)
+            throw Error(
+                text("the projector's place is not clear: (%.0f, %.0f, %.0f) mm explains the dots as well as "
+                     "(%.0f, %.0f, %.0f). Add:\n  - pictures with the laser on at other distances, near and far",
+                     best->origin_mm[0], best->origin_mm[1], best->origin_mm[2], trial.origin_mm[0], trial.origin_mm[1],
+                     trial.origin_mm[2]));
     }
     return *best;
 }
 
-/* First and last column (axis 0) or row (axis 1) in which dots are seen again and again. */
-static std::array<int, 2> extent_of(const Trial &trial, int axis)
+/* A place of the lattice as a direction: as it was seen, or continued in a straight line from the next two. */
+static bool direction_at(const Trial &trial, Step step, cv::Point2d &direction)
 {
-    std::map<int, int> counts;
-    for (const auto &[step, known] : trial.known)
-        counts[axis == 0 ? step.first : step.second] += known.count >= 2;
-    std::array<int, 2> extent{1, 0};
-    for (const auto &[at, count] : counts) {
-        if (count < 3)
-            continue;
-        if (extent[0] > extent[1])
-            extent[0] = at;
-        extent[1] = at;
+    static constexpr int ways[4][2] = {{1, 0}, {-1, 0}, {0, 1}, {0, -1}};
+    auto known = trial.known.find(step);
+    if (known != trial.known.end()) {
+        direction = known->second.direction;
+        return true;
     }
-    return extent;
+    for (const auto &way : ways) {
+        auto next = trial.known.find({step.first + way[0], step.second + way[1]});
+        auto after = trial.known.find({step.first + 2 * way[0], step.second + 2 * way[1]});
+        if (next != trial.known.end() && after != trial.known.end()) {
+            direction = 2.0 * next->second.direction - after->second.direction;
+            return true;
+        }
+    }
+    return false;
 }
 
-/* The lattice's column (axis 0) or row of the pattern's first one, by its edges. */
-static int first_by_edges(const Trial &trial, int axis)
+/* Whether a dot of that direction would be seen on the board of a picture. */
+static bool is_on_board(const Board &board, const Camera &camera, const Lit &lit, const cv::Vec3d &origin_mm,
+                        cv::Point2d direction)
 {
-    std::array<int, 2> extent = extent_of(trial, axis);
-    int seen = extent[1] - extent[0] + 1;
-    const char *lines = axis == 0 ? "columns" : "rows", *sides = axis == 0 ? "left and right" : "upper and lower";
-    if (seen == pattern_side)
-        return extent[0];
-    if (seen < pattern_side)
-        throw Error(text("only %d %s of dots are seen on the board, so the middle dot cannot be told. Add:\n  - pictures "
-                         "with the laser on and the board at the pattern's %s edge; or name the middle dot in one "
-                         "picture with --middle FILE:U,V",
-                         seen, lines, sides));
-    throw Error(text("%d %s of dots are seen on the board, the pattern has %d: is the board flat, and did it stand still "
-                     "in each pair of pictures?",
-                     seen, lines, pattern_side));
+    cv::Vec3d ray(direction.x, direction.y, 1.0), normal = lit.view.normal();
+    cv::Vec3d place = origin_mm + ray * ((normal.dot(lit.view.shift) - normal.dot(origin_mm)) / normal.dot(ray));
+    cv::Point2d sheet = lit.view.on_board(place) - board.sheet_origin_mm();
+    std::vector<cv::Point2d> px;
+    cv::projectPoints(std::vector<cv::Point3d>{{place[0], place[1], place[2]}}, cv::Vec3d(), cv::Vec3d(), camera.matrix,
+                      camera.distortion, px);
+    return sheet.x > edge_mm && sheet.y > edge_mm && sheet.x < sheet_width_mm - edge_mm &&
+           sheet.y < sheet_height_mm - edge_mm && px[0].x > edge_px && px[0].y > edge_px &&
+           px[0].x < camera.size.width - edge_px && px[0].y < camera.size.height - edge_px;
+}
+
+/* How often dots of a column or row of the lattice should have been seen, were they of the pattern, and how often they
+ * were. */
+struct Line {
+    int looked = 0, seen = 0;
+};
+
+static std::map<int, Line> count_lines(const Board &board, const Camera &camera, const std::vector<Lit> &pictures,
+                                       const Trial &trial, int axis)
+{
+    std::map<int, Line> lines;
+    std::set<Step> sites;
+    for (const auto &[step, known] : trial.known) {
+        for (int away = -1; away <= 1; away++)
+            sites.insert(axis == 0 ? Step{step.first + away, step.second} : Step{step.first, step.second + away});
+    }
+    for (size_t i = 0; i < pictures.size(); i++) {
+        std::set<Step> here;
+        for (const Sighting &sighting : pictures[i].sightings) {
+            if (trial.placed[i] && sighting.in_lattice)
+                here.insert({sighting.step[0] + trial.shift[i][0], sighting.step[1] + trial.shift[i][1]});
+        }
+        for (const Step &site : sites) {
+            cv::Point2d direction;
+            if (trial.placed[i] && direction_at(trial, site, direction) &&
+                is_on_board(board, camera, pictures[i], trial.origin_mm, direction)) {
+                Line &line = lines[axis == 0 ? site.first : site.second];
+                line.looked++;
+                line.seen += here.count(site) != 0;
+            }
+        }
+    }
+    return lines;
+}
+
+/* The lattice's column (axis 0) or row of the pattern's first one: by the lines that are seen, and beyond them one where
+ * dots were looked for in vain. */
+static int first_by_edges(const std::map<int, Line> &lines, int axis)
+{
+    const char *names = axis == 0 ? "columns" : "rows", *sides = axis == 0 ? "left or right" : "upper or lower";
+    int first = 1, last = 0;
+    auto is_void = [&](int at) {
+        auto line = lines.find(at);
+        return line != lines.end() && line->second.looked >= void_looks_min &&
+               line->second.seen < void_share * line->second.looked;
+    };
+    for (const auto &[at, line] : lines) {
+        if (line.seen < line_seen_min || line.seen < line_share * line.looked)
+            continue;
+        first = first > last ? at : first;
+        last = at;
+    }
+    int count = last - first + 1;
+    if (count > pattern_side)
+        throw Error(text("%d %s of dots are seen on the board, the pattern has %d: is the board flat, and did it stand "
+                         "still in each pair of pictures?",
+                         count, names, pattern_side));
+    if (count == pattern_side || is_void(first - 1))
+        return first;
+    if (is_void(last + 1))
+        return last - pattern_side + 1;
+    throw Error(
+        text("%d %s of dots are seen on the board, and no edge of the pattern: the middle dot cannot be told. Add:\n"
+             "  - pictures with the laser on and the board across the pattern's %s edge; or name the middle dot "
+             "in one picture with --middle FILE:U,V",
+             count, names, sides));
 }
 
 /* The same by the dot that the user points at. */
@@ -326,14 +402,15 @@ static cv::Vec2i first_by_middle(const std::vector<Lit> &pictures, const Trial &
                 nearest = &sighting;
         }
         if (nearest == nullptr)
-            throw Error(text("--middle: there is no dot within %.0f px of %.1f,%.1f in ", near_px, middle.px.x, middle.px.y) +
-                        middle.file);
+            throw Error(
+                text("--middle: there is no dot within %.0f px of %.1f,%.1f in ", near_px, middle.px.x, middle.px.y) +
+                middle.file);
         return nearest->step + trial.shift[i] - cv::Vec2i(pattern_side / 2, pattern_side / 2);
     }
     throw Error("--middle: " + middle.file + " is none of the pictures with the laser on whose dots could be placed");
 }
 
-cv::Vec3d index_assign(std::vector<Lit> &pictures, const MiddleDot &middle)
+cv::Vec3d index_assign(const Board &board, const Camera &camera, std::vector<Lit> &pictures, const MiddleDot &middle)
 {
     for (Lit &lit : pictures) {
         int count = static_cast<int>(
@@ -342,8 +419,11 @@ cv::Vec3d index_assign(std::vector<Lit> &pictures, const MiddleDot &middle)
             lit.refused = text("only %d dots in a lattice on the board, %d are needed", count, lattice_min);
     }
     Trial trial = best_trial(pictures);
-    cv::Vec2i first = middle.file.empty() ? cv::Vec2i(first_by_edges(trial, 0), first_by_edges(trial, 1))
-                                          : first_by_middle(pictures, trial, middle);
+    cv::Vec2i first;
+    if (!middle.file.empty())
+        first = first_by_middle(pictures, trial, middle);
+    for (int axis = 0; axis < 2 && middle.file.empty(); axis++)
+        first[axis] = first_by_edges(count_lines(board, camera, pictures, trial, axis), axis);
     for (size_t i = 0; i < pictures.size(); i++) {
         if (pictures[i].refused.empty() && !trial.placed[i])
             pictures[i].refused = "its dots do not fall on the lattice of the others";

@@ -1,5 +1,6 @@
 #include "cal_nominal.hpp"
 
+#include <algorithm>
 #include <opencv2/calib3d.hpp>
 
 namespace cal
@@ -7,6 +8,14 @@ namespace cal
 static constexpr int steps = 12;
 static constexpr double small = 1e-6;
 static constexpr int middle = pattern_side / 2;
+static constexpr int well_seen = 4;
+static constexpr size_t well_seen_min = 40;
+static constexpr double least_sigma = 1e-5;
+
+static double square(double value)
+{
+    return value * value;
+}
 
 /* Turn of the grating's frame (Rodrigues), then what a column and a row add to x and y. */
 using Lattice = cv::Vec<double, 7>;
@@ -65,24 +74,43 @@ static Lattice improved(const Projector &projector, const Lattice &lattice)
     return better;
 }
 
+/* How far rays that are known well are from their nominal ones: the variance of one component, less that of the
+ * measurement. */
+static double ray_variance(const Projector &projector, const Lattice &lattice)
+{
+    std::vector<double> squares;
+    double noise = 0.0;
+    for (size_t slot = 0; slot < slot_count; slot++) {
+        if (projector.seen[slot] < well_seen)
+            continue;
+        cv::Vec3d miss = projector.rays[slot] - ray_of(lattice, static_cast<int>(slot));
+        squares.push_back(miss.dot(miss));
+        noise += square(projector.sigma_deg[slot] * CV_PI / 180.0);
+    }
+    if (squares.size() < well_seen_min)
+        return 1.0;
+    auto half = squares.begin() + static_cast<std::ptrdiff_t>(squares.size() / 2);
+    std::nth_element(squares.begin(), half, squares.end());
+    double total = *half / 1.386; /* an exponential distribution's median, two components */
+    return std::max(total - noise / static_cast<double>(squares.size()), square(least_sigma));
+}
+
 void nominal_fill(Projector &projector)
 {
     Lattice lattice = start(projector);
     for (int step = 0; step < steps; step++)
         lattice = improved(projector, lattice);
-    double sum = 0.0;
-    int count = 0;
-    for (int slot = 0; slot < slot_count; slot++) {
-        cv::Vec3d nominal = ray_of(lattice, slot);
-        if (projector.seen[static_cast<size_t>(slot)] == 0) {
-            projector.rays[static_cast<size_t>(slot)] = nominal;
-        } else {
-            cv::Vec3d miss = projector.rays[static_cast<size_t>(slot)] - nominal;
-            sum += miss.dot(miss);
-            count++;
-        }
+    double ray_var = ray_variance(projector, lattice);
+    for (size_t slot = 0; slot < slot_count; slot++) {
+        cv::Vec3d nominal = ray_of(lattice, static_cast<int>(slot));
+        double seen_var = square(projector.sigma_deg[slot] * CV_PI / 180.0);
+        double trust = projector.seen[slot] == 0 ? 0.0 : ray_var / (ray_var + seen_var);
+        projector.rays[slot] = cv::normalize(nominal + trust * (projector.rays[slot] - nominal));
+        projector.sigma_deg[slot] = std::sqrt(trust * seen_var) * 180.0 / CV_PI;
+        if (projector.seen[slot] == 0)
+            projector.sigma_deg[slot] = std::sqrt(ray_var) * 180.0 / CV_PI;
     }
-    projector.nominal_rms_deg = std::sqrt(sum / std::max(1, count)) * 180.0 / CV_PI;
+    projector.nominal_sigma_deg = std::sqrt(ray_var) * 180.0 / CV_PI;
     projector.pitch_deg = std::hypot(lattice[3], lattice[5]) * 180.0 / CV_PI;
     projector.turn_deg = std::atan2(lattice[5], lattice[3]) * 180.0 / CV_PI;
 }

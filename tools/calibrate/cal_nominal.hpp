@@ -1,5 +1,7 @@
 /* cal_nominal - the lattice that the projector's maker meant: a grating sends its dots out equally spaced in direction
- * cosines, in a frame of its own. Fitted to the rays that were seen, it gives those that never were.
+ * cosines, in a frame of its own. Fitted to the rays that were seen, it gives those that never were;
+ * and a ray that was seen once or twice leans on it, by as much as its own error is larger than what the well-known rays
+ * differ from the lattice.
  */
 #ifndef CAL_NOMINAL_HPP
 #define CAL_NOMINAL_HPP

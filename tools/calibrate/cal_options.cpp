@@ -18,13 +18,16 @@ const char *const options_help =
     "  solve            camera and projector: OUT/rig.json and OUT/report.html\n"
     "\n"
     "  --board NAME     charuco-9x6-30 (default) or the like, or chessboard-...: squares across, down, mm of a side\n"
-    "  --camera DEVICE  take pictures into DIR: a camera's number or device, or a film; each pose twice, laser off and on\n"
+    "  --camera DEVICE  take pictures into DIR: a camera's number or device, or a film; each pose twice, laser off and "
+    "on\n"
     "  --near MM, --far MM   the working range in Z that rig.json tells (default 400, 2600)\n"
-    "  --middle FILE:U,V     the pattern's middle dot is at pixel U,V of a picture with the laser on; needed only where\n"
+    "  --middle FILE:U,V     the pattern's middle dot is at pixel U,V of a picture with the laser on; needed only "
+    "where\n"
     "                   the pattern's edges are not seen on the board\n"
     "  --help           this text\n"
     "\n"
-    "DIR holds binary PGM files and frames.jsonl, which says in which the laser was on (docs/contract.md), or files named\n"
+    "DIR holds binary PGM files and frames.jsonl, which says in which the laser was on (docs/contract.md), or files "
+    "named\n"
     "NAME-on.pgm and NAME-off.pgm.\n"
     "Exit status: 0 done; 1 pictures that cannot be read, or that cannot support a calibration; 2 wrong usage.\n";
 
@@ -99,10 +102,10 @@ static bool check(const Options &options)
 bool options_parse(int argc, char **argv, Options &options)
 {
     static const struct option long_options[] = {
-        {"board", required_argument, nullptr, opt_board}, {"camera", required_argument, nullptr, opt_camera},
-        {"near", required_argument, nullptr, opt_near},   {"far", required_argument, nullptr, opt_far},
+        {"board", required_argument, nullptr, opt_board},   {"camera", required_argument, nullptr, opt_camera},
+        {"near", required_argument, nullptr, opt_near},     {"far", required_argument, nullptr, opt_far},
         {"middle", required_argument, nullptr, opt_middle}, {"out", required_argument, nullptr, opt_out},
-        {"help", no_argument, nullptr, opt_help},         {nullptr, 0, nullptr, 0},
+        {"help", no_argument, nullptr, opt_help},           {nullptr, 0, nullptr, 0},
     };
     std::string verb = argc > 1 ? argv[1] : "";
     if (verb == "--help")

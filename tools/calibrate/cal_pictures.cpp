@@ -54,7 +54,8 @@ cv::Mat picture_read(const std::string &path)
     std::vector<unsigned char> data(count * sample_bytes);
     file.read(reinterpret_cast<char *>(data.data()), static_cast<std::streamsize>(data.size()));
     if (static_cast<size_t>(file.gcount()) != data.size())
-        throw Error(path + text(": cut short: %zu of %zu bytes of samples", static_cast<size_t>(file.gcount()), data.size()));
+        throw Error(path +
+                    text(": cut short: %zu of %zu bytes of samples", static_cast<size_t>(file.gcount()), data.size()));
     cv::Mat grey(height, width, CV_32F);
     for (size_t i = 0; i < count; i++) {
         int sample = sample_bytes == 2 ? data[2 * i] * 256 + data[2 * i + 1] : data[i];

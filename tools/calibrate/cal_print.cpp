@@ -77,7 +77,8 @@ static void draw_ruler(const Board &board, cairo_t *page)
     cairo_select_font_face(page, "sans-serif", CAIRO_FONT_SLANT_NORMAL, CAIRO_FONT_WEIGHT_NORMAL);
     cairo_set_font_size(page, 2.6);
     cairo_move_to(page, left_mm + ruler_mm + 3.0, y_mm);
-    cairo_show_text(page, text("must measure 100 mm: print without scaling. isohead board %s", board.name.c_str()).c_str());
+    cairo_show_text(page,
+                    text("must measure 100 mm: print without scaling. isohead board %s", board.name.c_str()).c_str());
 }
 
 static void write_pdf(const Board &board, const std::string &path)

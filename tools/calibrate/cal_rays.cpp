@@ -127,7 +127,8 @@ static std::vector<Equation> list_equations(std::vector<Lit> &pictures)
         cv::Vec3d normal = lit.view.normal();
         for (Sighting &sighting : lit.sightings) {
             if (sighting.slot != no_slot)
-                equations.push_back({&sighting, static_cast<size_t>(sighting.slot), normal, normal.dot(lit.view.shift)});
+                equations.push_back(
+                    {&sighting, static_cast<size_t>(sighting.slot), normal, normal.dot(lit.view.shift)});
         }
     }
     return equations;
@@ -200,13 +201,15 @@ static void check(const Projector &projector)
     auto seen = std::count_if(projector.seen.begin(), projector.seen.end(), [](int count) { return count > 0; });
     double sigma_mm = cv::norm(projector.origin_sigma_mm);
     if (seen < slots_min)
-        throw Error(text("only %d of the %d dots were seen on the board, %d are needed. Add:\n  - pictures with the laser "
-                         "on and the board where the other dots are",
-                         static_cast<int>(seen), slot_count, slots_min));
+        throw Error(
+            text("only %d of the %d dots were seen on the board, %d are needed. Add:\n  - pictures with the laser "
+                 "on and the board where the other dots are",
+                 static_cast<int>(seen), slot_count, slots_min));
     if (sigma_mm > origin_sigma_max_mm)
-        throw Error(text("the projector's origin is only known to %.1f mm, %.1f is allowed. Add:\n  - pictures with the "
-                         "laser on at more different distances, 0.4 to 1.5 m",
-                         sigma_mm, origin_sigma_max_mm));
+        throw Error(
+            text("the projector's origin is only known to %.1f mm, %.1f is allowed. Add:\n  - pictures with the "
+                 "laser on at more different distances, 0.4 to 1.5 m",
+                 sigma_mm, origin_sigma_max_mm));
 }
 
 Projector rays_solve(const Camera &camera, std::vector<Lit> &pictures, const cv::Vec3d &origin_mm)

@@ -14,13 +14,14 @@ namespace cal
 {
 struct Projector {
     cv::Vec3d origin_mm, origin_sigma_mm;
-    std::array<cv::Vec3d, slot_count> rays;   /* unit */
-    std::array<int, slot_count> seen{};       /* sightings that a ray rests on; 0: by the nominal lattice */
-    std::array<double, slot_count> sigma_deg{}; /* standard deviation, of seen ones */
+    std::array<cv::Vec3d, slot_count> rays;     /* unit */
+    std::array<int, slot_count> seen{};         /* sightings that a ray rests on; 0: by the nominal lattice */
+    std::array<double, slot_count> sigma_deg{}; /* standard deviation of one component */
     int sighting_count = 0, outlier_count = 0;
     double rms_px = 0.0;
-    double nominal_rms_deg = 0.0; /* how far the seen rays are from the nominal lattice */
-    double pitch_deg = 0.0, turn_deg = 0.0; /* of the nominal lattice: its step, and its turn against the image's rows */
+    double nominal_sigma_deg = 0.0; /* how far rays are from the nominal lattice, one component */
+    double pitch_deg = 0.0,
+           turn_deg = 0.0; /* of the nominal lattice: its step, and its turn against the image's rows */
 };
 
 /* Sets the residuals and `fits` of the sightings. Throws cal::Error where they do not support an origin. */

@@ -91,10 +91,7 @@ static cv::Mat edge_distances(const Board &board)
 static bool clear_of_edges(const Camera &camera, const Board &board, const cv::Mat &distances, const View &view,
                            const Sighting &sighting)
 {
-    cv::Matx33d rotation;
-    cv::Rodrigues(view.turn, rotation);
-    cv::Vec3d place = rotation.t() * (sighting.place_mm - view.shift);
-    cv::Point2d sheet = (cv::Point2d(place[0], place[1]) - board.sheet_origin_mm()) * bitmap_px_per_mm;
+    cv::Point2d sheet = (view.on_board(sighting.place_mm) - board.sheet_origin_mm()) * bitmap_px_per_mm;
     int x = cvFloor(sheet.x), y = cvFloor(sheet.y);
     if (x < 0 || y < 0 || x >= distances.cols || y >= distances.rows)
         return false;

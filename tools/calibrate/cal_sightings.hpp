@@ -17,7 +17,7 @@ struct Sighting {
     cv::Vec3d place_mm;      /* camera frame */
     cv::Vec2i step;          /* column, row in this picture's own lattice */
     bool in_lattice = false;
-    int slot = no_slot;       /* row * 19 + column */
+    int slot = no_slot;      /* row * 19 + column */
     cv::Point2d residual_px; /* seen less expected, undistorted pixels; set by rays_solve */
     bool fits = true;
 };

@@ -52,7 +52,7 @@ static std::vector<Lit> find_dots(const Result &result, const std::vector<Pictur
         lit.file = pictures[i].file;
         const View *view = view_of(result.views, lit.file);
         cv::Mat dark;
-        if (view == nullptr) {
+        if (twins[i] >= 0) {
             const Picture &twin = pictures[static_cast<size_t>(twins[i])];
             lit.twin = twin.file;
             dark = twin.grey;
@@ -99,7 +99,7 @@ static void tell_projector(const Projector &projector)
                 projector.origin_sigma_mm[1], projector.origin_sigma_mm[2]);
     std::printf("dots: %d of %d seen", static_cast<int>(seen), slot_count);
     if (seen < slot_count)
-        std::printf("; by the nominal lattice, which the others keep to %.3f degrees:", projector.nominal_rms_deg);
+        std::printf("; by the nominal lattice, which the others keep to %.3f degrees:", projector.nominal_sigma_deg);
     for (int slot = 0; slot < slot_count; slot++) {
         if (projector.seen[static_cast<size_t>(slot)] == 0)
             std::printf(" %d", slot);
@@ -126,15 +126,17 @@ void solve_run(const Options &options)
     result.range = options.range;
     make_out(options.out);
     std::vector<Picture> pictures = pictures_read(options.target);
-    if (static_cast<size_t>(std::count_if(pictures.begin(), pictures.end(), [](const Picture &p) { return p.laser; })) < lit_min)
-        throw Error(text("too few pictures with the laser on. Add:\n  - pictures with the laser on, at least %zu", lit_min));
+    if (static_cast<size_t>(std::count_if(pictures.begin(), pictures.end(), [](const Picture &p) { return p.laser; })) <
+        lit_min)
+        throw Error(
+            text("too few pictures with the laser on. Add:\n  - pictures with the laser on, at least %zu", lit_min));
     std::vector<View> views = find_boards(result.board, pictures);
     std::vector<int> twins = sightings_twins(pictures, views);
     result.views = camera_views(views, twins);
     try {
         result.camera = camera_solve(result.board, pictures.front().grey.size(), result.views);
         result.lit = find_dots(result, pictures, twins);
-        cv::Vec3d origin_mm = index_assign(result.lit, options.middle);
+        cv::Vec3d origin_mm = index_assign(result.board, result.camera, result.lit, options.middle);
         result.projector = rays_solve(result.camera, result.lit, origin_mm);
     } catch (const Error &) {
         tell_pictures(result);

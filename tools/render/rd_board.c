@@ -7,7 +7,7 @@
 
 #define NEAR_MM 400.0
 #define FAR_MM 1500.0
-#define TILT_MAX_DEG 50.0
+#define TILT_MAX_DEG 45.0
 #define ROLL_MAX_DEG 25.0
 #define WALL_MM 1750.0
 /* Fractions of one cycle that no whole number of pictures repeats: the poses spread evenly. */
@@ -18,6 +18,9 @@
 #define DRAWS_MAX 100
 #define SAMPLES_SIDE 7
 #define GLARE_GREY 420.0
+/* Paper is to be well lit, but not white. */
+#define SKY_GREY 170.0
+#define KEY_GREY 40.0
 
 bool rd_board_make(struct rd_board *board, const struct rd_options *options)
 {
@@ -32,6 +35,14 @@ bool rd_board_make(struct rd_board *board, const struct rd_options *options)
 void rd_board_end(struct rd_board *board)
 {
     rd_bitmap_free(board->bitmap);
+}
+
+void rd_board_light(const struct rd_options *options, struct rd_light *light)
+{
+    light->sky_grey = SKY_GREY * options->exposure;
+    light->key_grey = KEY_GREY * options->exposure;
+    light->lamp_grey = 0.0;
+    light->bars = false;
 }
 
 static double cycle(double value)
@@ -56,7 +67,7 @@ static double share_seen(const struct rd_board *board, const struct rd_rig *rig,
 static struct rd_pose draw_pose(const struct rd_rig *rig, struct rd_rng *rng, double start, int picture)
 {
     double distance_part = cycle(start + GOLDEN * picture) + rd_rng_uniform(rng, -0.05, 0.05);
-    double distance_mm = NEAR_MM + (FAR_MM - NEAR_MM) * rd_clamp(distance_part, 0.0, 1.0);
+    double distance_mm = NEAR_MM * pow(FAR_MM / NEAR_MM, rd_clamp(distance_part, 0.0, 1.0));
     double axis = 2.0 * RD_PI * (cycle(start + PLASTIC * picture) + rd_rng_uniform(rng, -0.05, 0.05));
     double tilt = TILT_MAX_DEG * RD_RAD_PER_DEG * sqrt(rd_rng_uniform(rng, 0.0, 1.0));
     double roll = ROLL_MAX_DEG * RD_RAD_PER_DEG * rd_rng_uniform(rng, -1.0, 1.0);

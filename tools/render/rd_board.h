@@ -1,6 +1,6 @@
 /* rd_board - somebody shows a printed board to the camera: the pictures of a calibration.
  * The board is flat, as large as the options say, its picture a bitmap. Picture k has a pose of its own, with its
- * distance (0.4 to 1.5 m), tilt (to 50 degrees) and place in the frame spread as somebody does it who was told to;
+ * distance (0.4 to 1.5 m, evenly in its logarithm), tilt (to 45 degrees) and place in the frame spread as somebody does it who was told to;
  * at least half of the board is in the frame. Behind it is a room. With --laser alternate two frames in succession
  * show the same pose, the first with the laser.
  */
@@ -19,6 +19,9 @@ struct rd_board {
 /* The sheet, as the options name it. False: told. */
 bool rd_board_make(struct rd_board *board, const struct rd_options *options);
 void rd_board_end(struct rd_board *board);
+
+/* The light in which somebody takes such pictures. */
+void rd_board_light(const struct rd_options *options, struct rd_light *light);
 
 /* Sets up the scene of a picture; *pose: the sheet's middle, X along its width, Y down, Z away from who looks at it.
  * With --glare a lamp is mirrored in it. */

@@ -75,7 +75,7 @@ static const char help_text[] =
     "  --assembly X       0 (default) to 10: how carelessly the rig was put together, in typical errors that rig.json\n"
     "                     knows of: 1 % of fx and fy, 6 px of the centre, 1 mm of the projector's place, 0.4 degrees "
     "of\n"
-    "                     its direction and turn, 0.4 % of the pitch, 0.02 degrees of each ray\n"
+    "                     its direction and turn, 0.4 % of the pitch, 0.01 degrees of each ray\n"
     "  --missing SHARE    0 (default) to 0.9: so many dots are not there, others in each frame\n"
     "  --blur PX          0 (default) to 10: all frames out of focus, standard deviation\n"
     "  --laser KIND       on (default), alternate: every second frame (1, 3, ...) without it\n"

@@ -32,7 +32,7 @@
 #define BUILT_PLACE_MM 1.0
 #define BUILT_TURN_DEG 0.4
 #define BUILT_PITCH 0.004
-#define BUILT_RAY_DEG 0.02
+#define BUILT_RAY_DEG 0.01
 
 static void make_lens(struct rd_rig *rig, const struct rd_options *options)
 {

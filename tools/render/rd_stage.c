@@ -47,8 +47,10 @@ bool rd_stage_make(struct rd_stage *stage, const struct rd_options *options, con
     rd_light_make(&stage->light, options);
     if (options->range_dir != NULL)
         return open_range(stage);
-    if (options->scene == RD_SCENE_BOARD)
+    if (options->scene == RD_SCENE_BOARD) {
+        rd_board_light(options, &stage->light);
         return rd_board_make(&stage->board, options);
+    }
     if (!has_arrangements(options))
         rd_company_make(&stage->company, options, rig, &stage->scene);
     stage->scene.still_count = stage->scene.shape_count;

@@ -1,0 +1,19 @@
+/* cal_refine - corners to a fiftieth of a pixel, once it is known roughly how the camera sees the board.
+ * Around each corner the print is drawn as the camera would see it, markers and all, and moved until it lies on the
+ * picture, by least squares with its own gain and ground: all edges near the corner count, not only those that meet in it.
+ */
+#ifndef CAL_REFINE_HPP
+#define CAL_REFINE_HPP
+
+#include "cal_find.hpp"
+
+namespace cal
+{
+/* Sets the corners anew, all that are in the picture and look as they should. `print` is board_bitmap with
+ * refine_px_per_mm. */
+constexpr int refine_px_per_mm = 4;
+void corners_refine(const Board &board, const cv::Mat &print, const cv::Mat &grey8, const cv::Mat &camera,
+                    const cv::Mat &distortion, Corners &corners);
+} // namespace cal
+
+#endif
