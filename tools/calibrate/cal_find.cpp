@@ -16,7 +16,7 @@ static constexpr double edge_max_px = 4.5;
 static constexpr double marker_slack = 0.4;
 static constexpr double marker_good_share = 0.5;
 /* Small pictures of markers are looked at larger. */
-static constexpr double enlarge = 3.0;
+static constexpr double enlarge = 1.5, enlarge_more = 3.0, enough_share = 0.5;
 static constexpr size_t markers_min = 3;
 static constexpr int few_corners = 12;
 /* Windows of the search for a corner: this part of a square, within bounds. */
@@ -157,27 +157,37 @@ static bool keep_as_printed(const Board &board, std::vector<std::vector<cv::Poin
     return ours;
 }
 
-/* Small markers in a soft picture are the rule here: a board at 1.5 m has modules of 2 pixels. */
+static void find_markers_at(const Board &board, const cv::Mat &grey8, double scale,
+                            const cv::Ptr<cv::aruco::DetectorParameters> &settings,
+                            std::vector<std::vector<cv::Point2f>> &markers, std::vector<int> &ids)
+{
+    cv::Mat larger;
+    settings->cornerRefinementMethod = cv::aruco::CORNER_REFINE_SUBPIX;
+    cv::resize(grey8, larger, {}, scale, scale, cv::INTER_CUBIC);
+    cv::aruco::detectMarkers(larger, board.markers->dictionary, markers, ids, settings);
+    for (auto &marker : markers) {
+        /* Pixel centres are whole numbers in both sizes. */
+        for (auto &px : marker)
+            px = (px + cv::Point2f(0.5f, 0.5f)) / scale - cv::Point2f(0.5f, 0.5f);
+    }
+}
+
+/* Small markers in a soft picture, modules of 2 pixels, take ten times as long: only where it must be. */
 static void find_markers(const Board &board, const cv::Mat &grey8, std::vector<std::vector<cv::Point2f>> &markers,
                          std::vector<int> &ids)
 {
-    cv::Mat larger;
+    find_markers_at(board, grey8, enlarge, cv::aruco::DetectorParameters::create(), markers, ids);
+    if (static_cast<double>(ids.size()) >= enough_share * static_cast<double>(board.markers->ids.size()))
+        return;
     auto settings = cv::aruco::DetectorParameters::create();
-    settings->cornerRefinementMethod = cv::aruco::CORNER_REFINE_SUBPIX;
-    settings->adaptiveThreshWinSizeStep = 4;
+    settings->adaptiveThreshWinSizeStep = 10;
     settings->adaptiveThreshWinSizeMax = 43;
     settings->adaptiveThreshConstant = 3.0;
     settings->polygonalApproxAccuracyRate = 0.05;
     settings->perspectiveRemovePixelPerCell = 8;
     settings->perspectiveRemoveIgnoredMarginPerCell = 0.25;
     settings->maxErroneousBitsInBorderRate = 0.5;
-    cv::resize(grey8, larger, {}, enlarge, enlarge, cv::INTER_CUBIC);
-    cv::aruco::detectMarkers(larger, board.markers->dictionary, markers, ids, settings);
-    for (auto &marker : markers) {
-        /* Pixel centres are whole numbers in both sizes. */
-        for (auto &px : marker)
-            px = (px + cv::Point2f(0.5f, 0.5f)) / enlarge - cv::Point2f(0.5f, 0.5f);
-    }
+    find_markers_at(board, grey8, enlarge_more, settings, markers, ids);
 }
 
 /* All inner corners, by the markers as a whole: where too few stand beside each other. */

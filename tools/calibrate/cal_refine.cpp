@@ -8,7 +8,7 @@ namespace cal
 {
 /* Half side of the patch in squares and its bounds; sub-samples of a pixel along each side. */
 static constexpr double patch_share = 0.48;
-static constexpr int patch_min_px = 4, patch_max_px = 11, sub_samples = 3, blur_reach_px = 3;
+static constexpr int patch_min_px = 4, patch_max_px = 16, sub_samples = 3, blur_reach_px = 3;
 static constexpr int steps = 4;
 static constexpr double moved_max_px = 2.5;
 /* What is left may be this part of the contrast. */

@@ -9,7 +9,7 @@
 
 namespace cal
 {
-static constexpr double still_px = 0.7;
+static constexpr double still_px = 0.6;
 static constexpr size_t common_min = 6;
 static constexpr int bitmap_px_per_mm = 2;
 /* Without a twin a dot must be this far from every edge of the print, else the edge is measured with it. */
@@ -30,9 +30,10 @@ static bool same_place(const Corners &a, const Corners &b)
     }
     if (apart.size() < common_min)
         return false;
-    auto middle = apart.begin() + static_cast<std::ptrdiff_t>(apart.size() / 2);
-    std::nth_element(apart.begin(), middle, apart.end());
-    return *middle < still_px;
+    /* Dots on the board push some of its corners aside; a board that moves takes all along. */
+    auto quarter = apart.begin() + static_cast<std::ptrdiff_t>(apart.size() / 4);
+    std::nth_element(apart.begin(), quarter, apart.end());
+    return *quarter < still_px;
 }
 
 std::vector<int> sightings_twins(const std::vector<Picture> &pictures, const std::vector<View> &views)

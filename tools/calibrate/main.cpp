@@ -3,9 +3,9 @@
  * rig, report.
  */
 #include <cstdio>
-#include <opencv2/core/utils/logger.hpp>
+#include <exception>
 
-#include "cal_error.hpp"
+#include "cal_guide.hpp"
 #include "cal_options.hpp"
 #include "cal_print.hpp"
 #include "cal_solve.hpp"
@@ -24,7 +24,7 @@ int main(int argc, char **argv)
             cal::board_print(cal::board_parse(options.board), options.target);
             return 0;
         case cal::Verb::guide:
-            return 0;
+            return (options.camera.empty() ? cal::guide_directory(options) : cal::guide_camera(options)) ? 0 : 1;
         case cal::Verb::solve:
             cal::solve_run(options);
             return 0;

@@ -1,0 +1,44 @@
+/* cal_epipolar - what the rig's geometry is worth: each dot's line in the image, whether dots share lines, and the depth
+ * error that is left.
+ * In undistorted pixels a dot at depth Z is at infinity + move / Z: a straight line, walked in proportion to 1/Z.
+ * Two dots share a line when, somewhere between the nearest and the farthest depth, they come nearer to each other than
+ * two tolerances of the labels stage (0.6 px each): then a dot seen there may be either.
+ */
+#ifndef CAL_EPIPOLAR_HPP
+#define CAL_EPIPOLAR_HPP
+
+#include "cal_rig.hpp"
+
+namespace cal
+{
+constexpr double share_px = 1.2;
+
+struct EpipolarLine {
+    cv::Point2d infinity_px, move_px_mm;
+    cv::Point2d at(double depth_mm) const
+    {
+        return infinity_px + move_px_mm * (1.0 / depth_mm);
+    }
+};
+
+std::array<EpipolarLine, slot_count> epipolar_lines(const Camera &camera, const cv::Vec3d &origin_mm,
+                                                    const std::array<cv::Vec3d, slot_count> &rays);
+
+/* The pattern turned about its middle ray by this angle, clockwise in the image where it is positive. */
+struct Turn {
+    double deg;
+    int shared;            /* pairs of dots that share a line */
+    double least_apart_px; /* of all pairs */
+};
+
+Turn epipolar_turned(const Camera &camera, const Projector &projector, const Range &range, double deg);
+/* From -5 to 5 degrees in steps of 0.1. */
+std::vector<Turn> epipolar_turns(const Camera &camera, const Projector &projector, const Range &range);
+/* The turn to advise: the least one of those with the fewest shared lines. */
+Turn epipolar_best(const std::vector<Turn> &turns);
+
+/* Standard deviation of a depth, mm, by a dot's error along its line, px, in one frame, and by its ray's own error. */
+double depth_sigma_mm(const Camera &camera, const Projector &projector, double dot_sigma_px, double depth_mm);
+} // namespace cal
+
+#endif
