@@ -28,6 +28,9 @@ ARCH ?= arm64
 .PHONY: help sim frames sanitize test fuzz coverage ranges mutation accept eval bench bench-instructions bench-worst \
   test-bench bits cortexm longrun size vectors learn picture board board-gpiod2 deb image flash \
 
+.PHONY: help sim frames sanitize test accept eval bits cortexm vectors learn picture board board-gpiod2 deb image flash \
+  test-deb test-board test-image calibrate test-calibration format formatted lint clean
+
 .PHONY: help sim frames sanitize test accept eval bench bench-instructions bench-grow bench-worst test-bench bits cortexm size vectors learn picture board board-gpiod2 deb image flash \
   test-deb test-board test-image format formatted lint clean
 
@@ -194,6 +197,18 @@ test-image: sim image ## boot the image on an emulated board; failed updates and
 	@/usr/bin/python3 tests/board/image.py --image $(BUILD)/image --board $(BUILD)/board \
 	  --program $(BUILD)/board-arm64/firmware/app/isohead_board --frames frames/sequence2 \
 	  --host-sim $(BUILD)/host/sim/host_sim --work $(BUILD)/test_image
+
+
+calibrate: sim ## build tools/calibrate, from pictures of a board to rig.json: build/calibrate/tools/calibrate/calibrate
+	@tools/setup.sh calibrate
+	@cmake --preset calibrate > $(BUILD)/calibrate.log 2>&1 || { cat $(BUILD)/calibrate.log; exit 1; }
+	@cmake --build --preset calibrate --parallel 2
+
+# SHORT=--short: two of the five rigs.
+test-calibration: calibrate ## calibrate five rendered rigs, compare with the truth; what is refused; ten minutes
+	@/usr/bin/python3 tests/calibration/calibration.py --calibrate $(BUILD)/calibrate/tools/calibrate/calibrate \
+	  --render $(BUILD)/calibrate/tools/render/render --host-sim $(BUILD)/calibrate/sim/host_sim \
+	  --undistort $(BUILD)/calibrate/tests/calibration/test_undistort --work $(BUILD)/test_calibration $(SHORT)
 
 format: ## clang-format over all C and C++ sources
 	@tools/setup.sh format

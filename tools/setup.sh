@@ -7,6 +7,7 @@
 #   tools/setup.sh test-deb
 #   tools/setup.sh test-board
 #   tools/setup.sh image|flash|test-image
+#   tools/setup.sh calibrate
 #
 # On Debian and its kin missing packages are installed when that is allowed (root, or sudo without a
 # password); otherwise the exact command is printed and the exit status is 1. Nothing is installed
@@ -234,6 +235,15 @@ cortexm | size)
     need_program qemu-system-arm qemu-system-arm
     need_python json python3
     ;;
+calibrate)
+    need_sim
+    need_program g++ g++
+    need_header opencv4/opencv2/core/version.hpp libopencv-dev
+    [ -e /usr/include/opencv4/opencv2/aruco/charuco.hpp ] || lacks libopencv-contrib-dev
+    need_header cairo/cairo-pdf.h libcairo2-dev
+    [ -e /usr/include/nlohmann/json.hpp ] || lacks nlohmann-json3-dev
+    need_python numpy python3-numpy
+    ;;
 accept | vectors)
     need_python numpy python3-numpy
     need_python scipy python3-scipy
@@ -247,7 +257,7 @@ lint)
     need_header libv4l2.h libv4l-dev
     ;;
 *)
-    sed -n '4,9s/^# \{0,1\}//p' "$0" >&2
+    sed -n '4,10s/^# \{0,1\}//p' "$0" >&2
     exit 2
     ;;
 esac

@@ -1,0 +1,400 @@
+#!/usr/bin/python3
+"""Calibrates rigs that tools/calibrate does not know, from rendered pictures, and compares with the truth.
+
+    calibration.py --calibrate PROGRAM --render PROGRAM --host-sim PROGRAM --undistort PROGRAM --work DIR [--short]
+
+Five rigs, both baselines, three focal lengths, with distortion: each from 25 good pairs of pictures (laser on and off),
+and from 25 pairs with 30 % of the dots missing and a lamp mirrored in the board, among them five blurred pairs and two
+of another board. Then pictures that cannot do: too few, all alike, corrupt. --short: two of the rigs.
+Prints TAP and a table; exit status 1 when a case fails.
+"""
+
+import argparse
+import concurrent.futures
+import json
+import math
+import os
+import re
+import shutil
+import subprocess
+import sys
+import zlib
+
+import numpy as np
+
+RIGS = [  # name, arguments of render
+    ("paper 1.0", ["--rig", "paper", "--focal", "1", "--seed", "31"]),
+    ("wide 1.0", ["--rig", "wide", "--focal", "1", "--seed", "32", "--distortion", "strong"]),
+    ("paper 0.75", ["--rig", "paper", "--focal", "0.75", "--seed", "33", "--distortion", "strong"]),
+    ("wide 0.75", ["--rig", "wide", "--focal", "0.75", "--seed", "34"]),
+    ("paper 1.1", ["--rig", "paper", "--focal", "1.1", "--seed", "35"]),
+]
+SHORT = (0, 3)
+PAIRS, BLURRED, WRONG = 25, 5, 2
+HEAD_FRAMES = 24
+FOCAL_PERCENT = 0.15
+RAY_DEG = 0.02
+ORIGIN_MM = {"paper": 0.3, "wide": 0.5}
+HEAD_TIMES = 1.1
+
+number = failed = 0
+
+
+def result(name, reason=None):
+    global number, failed
+    number += 1
+    failed += reason is not None
+    print("%s %d - %s%s" % ("not ok" if reason else "ok", number, name, "\n# " + reason if reason else ""), flush=True)
+
+
+def run(*command):
+    done = subprocess.run([str(word) for word in command], capture_output=True, text=True, stdin=subprocess.DEVNULL,
+                          check=False)
+    return done.returncode, done.stdout, done.stderr
+
+
+def must(*command):
+    status, out, err = run(*command)
+    if status != 0:
+        raise RuntimeError("%s: status %d: %s" % (" ".join(map(str, command)), status, err or out))
+    return out
+
+
+def read_rig(directory):
+    with open(directory + "/rig.json", encoding="utf-8") as file:
+        return json.load(file)
+
+
+def numbers(rig, name):
+    return np.array(rig[name]["data"])
+
+
+class Bench:
+    """The programs and where they work."""
+
+    def __init__(self, options):
+        self.calibrate, self.render = options.calibrate, options.render
+        self.host_sim, self.undistort = options.host_sim, options.undistort
+        self.work = options.work
+        self.board = self.path("board.pgm")
+        self.other = self.path("other.pgm")
+
+    def path(self, *names):
+        return os.path.join(self.work, *names)
+
+    def boards(self, out, rig, *more, board=None):
+        must(self.render, "--scene", "board", "--board", board or self.board, "--board-mm", "297", "--assembly", "1",
+             "--laser", "alternate", "--frames", 2 * PAIRS, *rig, *more, out)
+
+    def solve(self, pictures, out, *more):
+        return run(self.calibrate, "solve", *more, "--out", out, pictures)
+
+
+def copy_pictures(sources, out):
+    """One directory of pictures from parts of others: (directory, frame numbers), in order."""
+    shutil.rmtree(out, ignore_errors=True)
+    os.makedirs(out)
+    lines = []
+    for directory, frames in sources:
+        with open(directory + "/frames.jsonl", encoding="utf-8") as file:
+            notes = {json.loads(line)["file"]: json.loads(line) for line in file}
+        for frame in frames:
+            name = "%06d.pgm" % len(lines)
+            shutil.copy(directory + "/%06d.pgm" % frame, out + "/" + name)
+            lines.append(json.dumps({"file": name, "laser": notes["%06d.pgm" % frame]["laser"]}))
+    with open(out + "/frames.jsonl", "w", encoding="utf-8") as file:
+        file.write("\n".join(lines) + "\n")
+
+
+def errors(truth, rig):
+    """Of fx and fy, percent; of the origin, mm; of the rays of all dots, degrees; the same without the turn that they
+    share, which is a choice of the camera's axes; how often each was seen."""
+    m, n = numbers(truth, "camera_matrix"), numbers(rig, "camera_matrix")
+    focal = 100 * max(abs(n[0] / m[0] - 1), abs(n[4] / m[4] - 1))
+    origin = np.linalg.norm(numbers(rig, "projector_origin") - numbers(truth, "projector_origin"))
+    a, b = numbers(truth, "dot_rays").reshape(-1, 3), numbers(rig, "dot_rays").reshape(-1, 3)
+    seen = np.array(rig["dot_sightings"])
+    rays = np.degrees(np.linalg.norm(a - b, axis=1))
+    u, _, v = np.linalg.svd(a[seen > 0].T @ b[seen > 0])
+    turn = u @ np.diag([1, 1, np.linalg.det(u @ v)]) @ v
+    straight = np.degrees(np.linalg.norm(a - b @ turn.T, axis=1))
+    return focal, origin, rays, straight, seen
+
+
+def head_error(bench, frames, rig):
+    """Mean distance of the selected heads from the true ones, mm, over frames where they match; and how many those are."""
+    with open(frames + "/truth.jsonl", encoding="utf-8") as file:
+        truth = {entry["file"]: entry["head"] for entry in map(json.loads, file)}
+    apart = {}
+    for line in must(bench.host_sim, "--json", "--rig", rig + "/rig.json", frames).splitlines():
+        record = json.loads(line)
+        head = truth.get(record["file"])
+        if head and record.get("head") is not None:
+            apart[record["file"]] = math.dist(record["hypotheses"][record["head"]]["centre_mm"], head["centre_mm"])
+    return {name: mm for name, mm in apart.items() if mm <= 100}
+
+
+def heads(bench, frames, calibrated):
+    true, ours = head_error(bench, frames, frames), head_error(bench, frames, calibrated)
+    both = true.keys() & ours.keys()
+    mean = [sum(errors_mm[name] for name in both) / max(1, len(both)) for errors_mm in (true, ours)]
+    return len(true), len(ours), mean[0], mean[1]
+
+
+def draw_rig(bench, index):
+    _, rig = RIGS[index]
+    good, hard, blurred, wrong = (bench.path("rig%d" % index, name) for name in ("good", "hard", "blurred", "wrong"))
+    bench.boards(good, rig)
+    bench.boards(hard, rig, "--missing", "0.3", "--glare")
+    # Poses of the first pictures, taken out of focus; another sheet instead of the board.
+    bench.boards(blurred, rig, "--blur", "3", "--missing", "0.3", "--first-frame", "0+%d" % (2 * BLURRED))
+    bench.boards(wrong, rig, "--first-frame", "0+%d" % (2 * WRONG), board=bench.other)
+    copy_pictures([(hard, range(2 * PAIRS)), (blurred, range(2 * BLURRED)), (wrong, range(2 * WRONG))],
+                  bench.path("rig%d" % index, "mixed"))
+    must(bench.render, *rig, "--assembly", "1", "--frames", HEAD_FRAMES, bench.path("rig%d" % index, "heads"))
+    outputs = {}
+    for name in ("good", "mixed"):
+        outputs[name] = bench.solve(bench.path("rig%d" % index, name), bench.path("rig%d" % index, "from_" + name))
+    return outputs
+
+
+def judge(bench, index, kind, output, table):
+    name, rig = RIGS[index]
+    status, out, err = output
+    title = "%s, %s pictures" % (name, kind)
+    if status != 0:
+        result(title, "status %d: %s" % (status, (err + out).strip().replace("\n", "; ")))
+        return
+    calibrated = bench.path("rig%d" % index, "from_" + kind)
+    focal, origin, rays, straight, seen = errors(read_rig(bench.path("rig%d" % index, "good")), read_rig(calibrated))
+    known = rays[seen > 0]
+    rms, worst, p95 = math.sqrt(np.mean(known ** 2)), known.max(), np.percentile(known, 95)
+    true_count, count, true_mm, mm = heads(bench, bench.path("rig%d" % index, "heads"), calibrated)
+    table.append("| %s, %s | %.3f | %.3f | %.4f | %.4f | %.4f | %.4f | %d | %d | %.2f, %.2f |" % (
+        name, kind, focal, origin, rms, p95, worst, straight[seen > 0].max(), (seen > 0).sum(), count, mm, true_mm))
+    limit = ORIGIN_MM[rig[1]]
+    result(title + ": focal length within %g %%" % FOCAL_PERCENT, None if focal <= FOCAL_PERCENT else "%.3f %%" % focal)
+    result(title + ": origin within %g mm" % limit, None if origin <= limit else "%.3f mm" % origin)
+    result(title + ": rays within %g degrees (rms, 95 %%)" % RAY_DEG,
+           None if max(rms, p95) <= RAY_DEG else "rms %.4f, 95 %% %.4f" % (rms, p95))
+    # 361 chances: the worst of them, all that were never seen included.
+    result(title + ": no ray off by 2.5 times that", None if rays.max() <= 2.5 * RAY_DEG else "%.4f" % rays.max())
+    fine = mm <= HEAD_TIMES * true_mm and count >= true_count - 1 and true_count >= HEAD_FRAMES / 2
+    result(title + ": heads within %g times" % HEAD_TIMES,
+           None if fine else "%.2f mm in %d frames, with the true rig %.2f in %d" % (mm, count, true_mm, true_count))
+    if kind == "mixed":
+        bad = ["%06d.pgm" % frame for frame in range(2 * PAIRS, 2 * (PAIRS + BLURRED + WRONG))]
+        unnamed = [file for file in bad if not re.search("^%s: not used: " % file, out, re.M)]
+        result(title + ": blurred and wrong ones are named", "not named: %s" % unnamed if unnamed else None)
+
+
+def refuse(bench, name, pictures, status, wanted, *more):
+    """The message must match; no rig.json may be there afterwards."""
+    out = bench.path("refused")
+    os.makedirs(out, exist_ok=True)
+    with open(out + "/rig.json", "w", encoding="utf-8") as file:
+        file.write("of an earlier calibration")
+    got, _, err = bench.solve(pictures, out, *more)
+    reason = None
+    if got != status:
+        reason = "status %d instead of %d: %s" % (got, status, err.strip())
+    elif not re.search(wanted, err):
+        reason = "says: " + err.strip().replace("\n", "; ")
+    elif status == 1 and os.path.exists(out + "/rig.json"):
+        reason = "a rig.json is left"
+    result(name, reason)
+
+
+def board_depths(directory):
+    depths = {}
+    with open(directory + "/truth.jsonl", encoding="utf-8") as file:
+        for entry in map(json.loads, file):
+            depths[int(entry["file"][:6])] = entry["board"]["middle_mm"][2]
+    return depths
+
+
+def check_refusals(bench):
+    good = bench.path("rig0", "good")
+    made = bench.path("made")
+    copy_pictures([(good, range(12))], made)
+    refuse(bench, "six pairs: too few", made, 1, r"Add:\n(.*\n)*?  - \d more pictures of the board")
+    copy_pictures([(good, [0, 1] * 14)], made)
+    refuse(bench, "the same pose again and again", made, 1, r"Add:\n(.*\n)*  - the board turned 20 to 45 degrees(.*\n)*"
+           r"  - other distances(.*\n)*  - the board in these parts of the frame: .*top left")
+    depths = board_depths(good)
+    level = [frame for frame in depths if 700 < depths[frame] < 830]
+    copy_pictures([(good, sorted(set(range(1, 2 * PAIRS, 2)) | set(level)))], made)
+    refuse(bench, "the laser at one distance only", made, 1, r"Add:\n  - pictures with the laser on|too few pictures with the laser")
+    copy_pictures([(good, range(1, 2 * PAIRS, 2))], made)
+    refuse(bench, "never with the laser", made, 1, "too few pictures with the laser on. Add:")
+    copy_pictures([(bench.path("rig0", "wrong"), list(range(2 * WRONG)) * 6)], made)
+    refuse(bench, "another board in all of them", made, 1, "12 more pictures|10 more pictures")
+
+
+def spoil(path, change):
+    with open(path, "rb") as file:
+        data = file.read()
+    with open(path, "wb") as file:
+        file.write(change(data))
+
+
+def check_corrupt(bench):
+    good, made = bench.path("rig0", "good"), bench.path("made")
+    cases = [
+        ("cut short", "000007.pgm", lambda data: data[:len(data) // 2], "000007.pgm: cut short"),
+        ("empty", "000007.pgm", lambda data: b"", "000007.pgm: no binary PGM"),
+        ("a header and nothing", "000007.pgm", lambda data: data[:6], "000007.pgm: .*header"),
+        ("a PNG by another name", "000007.pgm", lambda data: b"\x89PNG\r\n" + data, "000007.pgm: no binary PGM"),
+        ("another size", "000007.pgm", lambda data: b"P5\n320 240\n255\n" + bytes(320 * 240), "000007.pgm: has another size"),
+        ("beyond its maxval", "000007.pgm", lambda data: data.replace(b"255", b"100", 1), "000007.pgm: sample"),
+        ("a list that is no JSON", "frames.jsonl", lambda data: data + b"{\n", "frames.jsonl:51: must have"),
+        ("a list without a laser", "frames.jsonl", lambda data: data + b'{"file":"a.pgm"}\n', "frames.jsonl:51: must have"),
+        ("a list with a file that is not there", "frames.jsonl", lambda data: data + b'{"file":"a.pgm","laser":true}\n',
+         "a.pgm, which is not there"),
+        ("a file that is not in the list", "frames.jsonl", lambda data: data[data.index(b"\n") + 1:],
+         "000000.pgm: stands not in frames.jsonl"),
+    ]
+    for name, file, change, wanted in cases:
+        copy_pictures([(good, range(2 * PAIRS))], made)
+        spoil(made + "/" + file, change)
+        refuse(bench, "corrupt: " + name, made, 1, wanted)
+    os.remove(made + "/frames.jsonl")
+    refuse(bench, "nobody says where the laser was on", made, 1, "was the laser on")
+    refuse(bench, "no such directory", bench.path("nowhere"), 1, "nowhere")
+    refuse(bench, "a board that is none", good, 1, "charuco-9x6-30 or chessboard", "--board", "dots")
+    refuse(bench, "a board that is too large", good, 1, "fit into", "--board", "charuco-12x6-30")
+    refuse(bench, "near beyond far", good, 2, "--near", "--near", "900", "--far", "800")
+    refuse(bench, "a middle without a place", good, 2, "FILE:U,V", "--middle", "000000.pgm")
+
+
+def check_alone(bench):
+    """Without pictures without the laser."""
+    good, made, out = bench.path("rig0", "good"), bench.path("made"), bench.path("alone")
+    copy_pictures([(good, range(0, 2 * PAIRS, 2))], made)
+    status, _, err = bench.solve(made, out)
+    if status != 0:
+        result("only pictures with the laser on", "status %d: %s" % (status, err))
+        return
+    focal, origin, rays, _, seen = errors(read_rig(good), read_rig(out))
+    p95 = np.percentile(rays[seen > 0], 95)
+    fine = focal <= FOCAL_PERCENT and origin <= ORIGIN_MM["paper"] and p95 <= 2 * RAY_DEG
+    result("only pictures with the laser on", None if fine else "focal %.3f %%, origin %.3f mm, rays %.4f degrees" %
+           (focal, origin, p95))
+
+
+def check_middle(bench):
+    good, out = bench.path("rig0", "good"), bench.path("middle")
+    with open(good + "/truth.jsonl", encoding="utf-8") as file:
+        entries = list(map(json.loads, file))
+    depths = board_depths(good)
+    for entry in entries:
+        depth = depths[int(entry["file"][:6])]
+        for index, u, v, z in entry["dots"]:
+            if index == 180 and abs(z - depth) < 100:
+                status, _, err = bench.solve(good, out, "--middle", "%s:%.0f,%.0f" % (entry["file"], u, v))
+                same = status == 0 and read_rig(out) == read_rig(bench.path("rig0", "from_good"))
+                result("the middle dot named gives the same rig", None if same else err or "another rig")
+                refuse(bench, "a middle where no dot is", good, 1, "no dot within", "--middle",
+                       "%s:%.0f,%.0f" % (entry["file"], u + 12, v + 12))
+                return
+    result("the middle dot named gives the same rig", "no picture shows dot 180 on the board")
+
+
+def check_guide(bench):
+    good, made = bench.path("rig0", "good"), bench.path("made")
+    status, out, _ = run(bench.calibrate, "guide", good)
+    result("guide: nothing is missing", None if status == 0 and "nothing is missing" in out else out[-300:])
+    copy_pictures([(good, range(6)), (bench.path("rig0", "blurred"), range(2))], made)
+    status, out, _ = run(bench.calibrate, "guide", made)
+    fine = status == 1 and "17 more pictures" in out and "parts of the frame" in out and \
+        re.search("00000[67].pgm: no good", out) and "3 of these beside one without" in out
+    result("guide: tells what is missing", None if fine else out)
+    # A film: each of three poses stands for eight frames.
+    film, taken = bench.path("film"), bench.path("taken")
+    for directory in (film, taken):
+        shutil.rmtree(directory, ignore_errors=True)
+    os.makedirs(film)
+    for frame in range(24):
+        shutil.copy(good + "/%06d.pgm" % (2 * (frame // 8) + 1), film + "/%03d.pgm" % frame)
+    status, out, err = run(bench.calibrate, "guide", "--camera", film + "/%03d.pgm", taken)
+    names = sorted(os.listdir(taken)) if os.path.isdir(taken) else []
+    wanted = ["%03d-%s.pgm" % (i, laser) for i in range(3) for laser in ("off", "on")]
+    fine = status == 1 and names == wanted and "no more frames" in out and "17 more pictures" in out
+    result("guide: takes each pose once, with and without the laser", None if fine else "%s %s %s" % (names, out, err))
+    status, _, err = run(bench.calibrate, "guide", "--camera", bench.path("nothing.avi"), bench.path("taken2"))
+    result("guide: a camera that is not there", None if status == 1 and "could not be opened" in err else err)
+
+
+def check_print(bench):
+    """The page's size, and the first square's, in points of 1/72 inch."""
+    path = bench.path("board.pdf")
+    must(bench.calibrate, "board", path)
+    with open(path, "rb") as file:
+        data = file.read()
+    page = [float(word) for word in re.search(rb"MediaBox \[([^\]]*)\]", data)[1].split()]
+    drawing = zlib.decompress(re.search(rb"stream\r?\n(.*?)endstream", data, re.S)[1]).decode()
+    corners = [float(word) for word in re.search(r"([\d.]+) ([\d.]+) m ([\d.]+) [\d.]+ l [\d.]+ ([\d.]+) l", drawing).groups()]
+    mm = 25.4 / 72
+    sides = ((corners[2] - corners[0]) * mm, (corners[3] - corners[1]) * mm)
+    fine = abs(page[2] * mm - 297) < 0.01 and abs(page[3] * mm - 210) < 0.01 and \
+        all(abs(side - 30) < 0.01 for side in sides)
+    result("the board is printed in true size", None if fine else "page %s, square %s mm" % (page, sides))
+    for name in ("board.txt", "no/board.pdf", "no/board.pgm"):
+        status, _, err = run(bench.calibrate, "board", bench.path(name))
+        result("a board into " + name, None if status == 1 and err else "status %d" % status)
+
+
+def check_undistort(bench, indices):
+    rigs = [bench.path("rig%d" % index, name, "rig.json") for index in indices for name in ("good", "from_good")]
+    status, out, err = run(bench.undistort, *rigs)
+    result("the firmware undistorts within 0.02 px of OpenCV", None if status == 0 else out + err)
+    print("".join("# %s\n" % line.replace(bench.work + "/", "") for line in out.splitlines()), end="")
+
+
+def check_report(bench):
+    with open(bench.path("rig1" if os.path.exists(bench.path("rig1")) else "rig3", "from_good", "report.html"),
+              encoding="utf-8") as file:
+        page = file.read()
+    wanted = ["along their epipolar lines", "Expected depth error", "share an epipolar line", "Residuals by part of the frame",
+              "standard deviation", "<svg", "000000.pgm"]
+    missing = [words for words in wanted if words not in page]
+    result("the report has its parts", "missing: %s" % missing if missing else None)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    for name in ("--calibrate", "--render", "--host-sim", "--undistort", "--work"):
+        parser.add_argument(name, required=True)
+    parser.add_argument("--short", action="store_true")
+    options = parser.parse_args()
+    bench = Bench(options)
+    os.makedirs(options.work, exist_ok=True)
+    must(bench.calibrate, "board", bench.board)
+    must(bench.calibrate, "board", "--board", "charuco-7x5-35", bench.other)
+    indices = SHORT if options.short else range(len(RIGS))
+    table = []
+    with concurrent.futures.ThreadPoolExecutor(2) as pool:
+        drawn = {index: pool.submit(draw_rig, bench, index) for index in indices}
+        for index in indices:
+            outputs = drawn[index].result()
+            for kind in ("good", "mixed"):
+                judge(bench, index, kind, outputs[kind], table)
+    check_refusals(bench)
+    check_corrupt(bench)
+    check_alone(bench)
+    check_middle(bench)
+    check_guide(bench)
+    check_print(bench)
+    check_report(bench)
+    check_undistort(bench, indices)
+    print("1..%d" % number)
+    print("\n| rig, pictures | focal length, % | origin, mm | rays: rms, degrees | 95 % | worst seen | the same without a common "
+          "turn | dots seen | heads | head error: calibrated, true rig, mm |\n" + "| --- " * 10 + "|")
+    print("\n".join(table))
+    if failed:
+        print("# %d of %d failed" % (failed, number))
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
