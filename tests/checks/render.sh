@@ -417,6 +417,68 @@ done
 [ "$(cat part/truth.jsonl)" = "$(sed -n 2,3p anybody/truth.jsonl)" ] || reason="truth differs"
 result "a part of a sequence is the same as in the whole" "$reason"
 
+# --- boards of a calibration ---------------------------------------------------------------------------
+cat >board.py <<'PYTHON'
+import json
+import math
+from pattern import read
+
+def grey(folder, frame):
+    return open("%s/%06d.pgm" % (folder, frame), "rb").read()[-320 * 240:]
+
+rig, truths = read("board")
+m, plan = rig["camera_matrix"]["data"], read("anybody")[0]
+assert [t["file"] for t in truths] == ["000000.pgm", "000002.pgm", "000004.pgm"], "truth of frames without laser"
+for truth in truths:
+    middle, across, down = (truth["board"][name] for name in ("middle_mm", "across", "down"))
+    normal = [across[i - 2] * down[i - 1] - across[i - 1] * down[i - 2] for i in range(3)]
+    assert truth["head"] is None and 390 < middle[2] < 1510 and normal[2] > 0.7, "pose: %s" % truth["board"]
+    on = [d for d in truth["dots"] if d[3] < 1600]
+    for _, u, v, z in on:
+        place = [(u - m[2]) / m[0] * z - middle[0], (v - m[5]) / m[4] * z - middle[1], z - middle[2]]
+        assert abs(sum(n * p for n, p in zip(normal, place))) < 0.1, "a dot off the board"
+    u, v = (m[0] * middle[0] / middle[2] + m[2], m[4] * middle[1] / middle[2] + m[5])
+    # The bitmap's left half is white, its right half dark.
+    for side, frame in ((-1, 1), (1, 1)):
+        x = [c + side * 60 * a for c, a in zip(middle, across)]
+        at = (round(m[0] * x[0] / x[2] + m[2]), round(m[4] * x[1] / x[2] + m[5]))
+        if truth is truths[0] and 0 <= at[0] < 320 and 0 <= at[1] < 240:
+            level = grey("board", frame)[320 * at[1] + at[0]]
+            assert (level > 60) == (side < 0), "bitmap: %d on side %d" % (level, side)
+assert abs(m[0] / (0.8 * plan["camera_matrix"]["data"][0]) - 1) < 0.05 and m[2] != 159.5, "focal length, assembly"
+
+missing = read("missing")[1]
+share = sum(len(t["dots"]) for t in missing) / sum(len(t["dots"]) for t in truths)
+assert 0.4 < share < 0.6, "missing dots: %g are there" % share
+assert sum(g >= 250 for g in grey("glare", 1)) > 20 + sum(g >= 250 for g in grey("board", 1)), "no glare"
+assert sum(sorted(abs(a - b) for a, b in zip(grey("blurred", 1), grey("board", 1)))[-500:]) > 500 * 15, "no blur"
+PYTHON
+{
+    printf 'P5\n200 100\n255\n'
+    for _ in $(seq 100); do
+        head -c 100 /dev/zero | tr '\0' '\346'
+        head -c 100 /dev/zero | tr '\0' '\024'
+    done
+} >half.pgm
+sheet="--scene board --board half.pgm --board-mm 280 --laser alternate --frames 6 --size 320x240 --distortion none
+    --seed 5 --focal 0.8 --assembly 1"
+# shellcheck disable=SC2086 # a list of options
+{
+    draw "a board" board $sheet
+    draw "a board with half the dots" missing $sheet --missing 0.5
+    draw "a board that mirrors a lamp" glare $sheet --glare
+    draw "a board out of focus" blurred $sheet --blur 3
+    refuse "a board without a sheet" 2 "go together" --scene board a
+    refuse "a sheet without a board" 2 "go together" --board half.pgm --board-mm 280 a
+    refuse "a sheet that is none" 1 "rig.json: no binary PGM" --scene board --board one/rig.json --board-mm 280 a
+    refuse "a sheet that is not there" 1 "nowhere" --scene board --board nowhere --board-mm 280 a
+    refuse "too long a focal length" 2 "--focal" --focal 2.1 a
+    refuse "more missing than most" 2 "--missing" --missing 0.95 a
+    rm -rf a
+}
+/usr/bin/python3 board.py >out 2>&1 && reason= || reason=$(tail -n 1 out)
+result "a board is flat, printed, and posed anew for each pair of frames" "$reason"
+
 # --- a camera that looks up or down ---------------------------------------------------------------
 cat >tilted.py <<'END'
 """The head at rest stays where it is (within its sway), and turns; what is below it comes nearer when the camera

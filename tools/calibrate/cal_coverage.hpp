@@ -15,7 +15,7 @@ struct CoverageLimits {
     double distance_ratio; /* farthest to nearest board */
 };
 
-constexpr CoverageLimits coverage_wanted{20, 20, 4, 2.0}, coverage_least{10, 4, 2, 1.4};
+constexpr CoverageLimits coverage_wanted{20, 12, 4, 2.0}, coverage_least{10, 4, 2, 1.4};
 
 /* Sentences that say what to add, the most urgent first; empty: nothing. The views' poses must be known, roughly. */
 std::vector<std::string> coverage_missing(const std::vector<View> &views, cv::Size size, const CoverageLimits &limits);

@@ -82,6 +82,15 @@ static bool fit_dot(const cv::Mat &picture, const cv::Mat &lit, int u0, int v0, 
            std::abs(p(2) - v0) < moved_max_px;
 }
 
+/* Where the surface alone is at the sensor's limit nothing can be seen on it. */
+static bool is_dazzled(const cv::Mat &dark, int u, int v)
+{
+    double most = 0.0;
+    if (!dark.empty())
+        cv::minMaxLoc(dark(cv::Rect(u - 2, v - 2, 5, 5)), nullptr, &most);
+    return most >= saturated_grey;
+}
+
 std::vector<Dot> dots_find(const cv::Mat &lit, const cv::Mat &dark, const cv::Mat &where)
 {
     std::vector<Dot> dots;
@@ -97,7 +106,7 @@ std::vector<Dot> dots_find(const cv::Mat &lit, const cv::Mat &dark, const cv::Ma
             float value = band.at<float>(v, u);
             Dot dot;
             if (where.at<uchar>(v, u) != 0 && static_cast<double>(value) > limit && value >= highest.at<float>(v, u) &&
-                fit_dot(fitted, lit, u, v, dot))
+                !is_dazzled(dark, u, v) && fit_dot(fitted, lit, u, v, dot))
                 dots.push_back(dot);
         }
     }

@@ -11,7 +11,7 @@
 namespace cal
 {
 static constexpr int corners_min = 8;
-static constexpr double edge_max_px = 4.5;
+static constexpr double edge_max_px = 3.5;
 /* A marker may lie off the board's plane by this part of a square: lenses bend. */
 static constexpr double marker_slack = 0.4;
 static constexpr double marker_good_share = 0.5;

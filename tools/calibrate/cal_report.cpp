@@ -105,6 +105,21 @@ static std::string turn_chart(const std::vector<Turn> &turns)
     return chart.svg();
 }
 
+static std::string apart_chart(const std::vector<Turn> &turns)
+{
+    std::vector<cv::Point2d> curve;
+    double most = share_px;
+    for (const Turn &turn : turns) {
+        curve.emplace_back(turn.deg, turn.least_apart_px);
+        most = std::max(most, turn.least_apart_px);
+    }
+    Chart chart("The two nearest lines", "pattern turned by, degrees", "apart, px",
+                {turns.front().deg, 0.0, turns.back().deg - turns.front().deg, 1.05 * most});
+    chart.line(curve, blue);
+    chart.line({{turns.front().deg, share_px}, {turns.back().deg, share_px}}, red);
+    return chart.svg();
+}
+
 static std::string picture_rows(const Result &result)
 {
     std::string rows;
@@ -202,6 +217,8 @@ static std::string turn_words(const std::vector<Turn> &turns, const Turn &now, c
         text("<p>Between %.0f and %.0f mm, <b>%d pairs of dots share an epipolar line</b> (come nearer than "
              "%.1f px); the nearest are %.2f px apart. ",
              range.near_mm, range.far_mm, now.shared, share_px, now.least_apart_px);
+    if (now.shared == 0)
+        return words + "The pattern's turn is good as it is.</p>";
     if (best.shared >= now.shared)
         return words + "No turn of the pattern within 5 degrees makes it better.</p>";
     return words +
@@ -240,7 +257,8 @@ void report_write(const std::string &path, const Result &result)
                  "the rig fits: along, a dot may be anywhere.</p>",
                  residuals.along_rms_px, residuals.across_rms_px)
          << "\n<h2>What to expect</h2>\n"
-         << depth_chart(result, residuals.along_rms_px) << turn_chart(turns) << turn_words(turns, now, result.range)
+         << depth_chart(result, residuals.along_rms_px) << turn_chart(turns) << apart_chart(turns)
+         << turn_words(turns, now, result.range)
          << "\n<h2>Pictures of the board</h2>\n<table><tr><th>picture<th>corners<th>left out<th>rms, px<th>distance, "
             "mm<th>tilt, "
             "degrees<th>edges, px<th></tr>"

@@ -2,8 +2,8 @@
 
 #include "rd_rng.h"
 
-/* A lamp of about 7 degrees. */
-#define GLARE_EXPONENT 400.0
+/* A lamp of about 3 degrees, halo included. */
+#define GLARE_EXPONENT 4000.0
 /* No thing farther off throws a shadow; and none on the very place it hangs on. */
 #define SHADOW_MM 3000.0
 #define SHADOW_SLACK_MM 1.0
