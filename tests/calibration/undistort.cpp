@@ -64,19 +64,24 @@ static double largest_error_px(const Calibrated &calibrated, const ih_rig &rig, 
     int last_u = rig.calibration.width - 1, last_v = rig.calibration.height - 1;
     for (int v = 0; v <= last_v + 3; v += 4) {
         for (int u = 0; u <= last_u + 3; u += 4)
-            places.emplace_back(std::min<double>(u + 0.25 * (v % 3), last_u), std::min<double>(v + 0.25 * (u % 3), last_v));
+            places.emplace_back(std::min<double>(u + 0.25 * (v % 3), last_u),
+                                std::min<double>(v + 0.25 * (u % 3), last_v));
     }
-    cv::undistortPoints(places, expected, calibrated.camera, calibrated.lens, cv::noArray(), cv::noArray(),
+    cv::undistortPoints(places, expected, calibrated.camera, calibrated.lens, cv::noArray(),
+                        cv::noArray(),
                         {cv::TermCriteria::COUNT + cv::TermCriteria::EPS, 500, 1e-14});
-    double largest_px = 0.0, fx = calibrated.camera.at<double>(0, 0), fy = calibrated.camera.at<double>(1, 1);
+    double largest_px = 0.0, fx = calibrated.camera.at<double>(0, 0),
+           fy = calibrated.camera.at<double>(1, 1);
     double cx = calibrated.camera.at<double>(0, 2), cy = calibrated.camera.at<double>(1, 2);
     undone_px = 0.0;
     for (size_t i = 0; i < places.size(); i++) {
         int32_t x_q28, y_q28;
         ih_rig_undistort(&rig, fixed(places[i].x, 12), fixed(places[i].y, 12), &x_q28, &y_q28);
-        double du = fx * (std::ldexp(x_q28, -28) - expected[i].x), dv = fy * (std::ldexp(y_q28, -28) - expected[i].y);
+        double du = fx * (std::ldexp(x_q28, -28) - expected[i].x),
+               dv = fy * (std::ldexp(y_q28, -28) - expected[i].y);
         largest_px = std::max(largest_px, std::hypot(du, dv));
-        undone_px = std::max(undone_px, std::hypot(fx * expected[i].x + cx - places[i].x, fy * expected[i].y + cy - places[i].y));
+        undone_px = std::max(undone_px, std::hypot(fx * expected[i].x + cx - places[i].x,
+                                                   fy * expected[i].y + cy - places[i].y));
     }
     return largest_px;
 }
@@ -94,11 +99,13 @@ int main(int argc, char **argv)
         }
         ih_err status = ih_rig_init(&rig, &calibrated.fixed_point, &bad_slot);
         if (status != IH_OK) {
-            std::fprintf(stderr, "%s: refused by the firmware: %d\n", argv[i], static_cast<int>(status));
+            std::fprintf(stderr, "%s: refused by the firmware: %d\n", argv[i],
+                         static_cast<int>(status));
             return 1;
         }
         double undone_px, error_px = largest_error_px(calibrated, rig, undone_px);
-        std::printf("%s: lens moves pixels by up to %.2f px; undone within %.5f px\n", argv[i], undone_px, error_px);
+        std::printf("%s: lens moves pixels by up to %.2f px; undone within %.5f px\n", argv[i],
+                    undone_px, error_px);
         good = good && error_px < limit_px;
     }
     return good ? 0 : 1;

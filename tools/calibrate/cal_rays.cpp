@@ -154,13 +154,12 @@ static State start_state(const std::vector<Equation> &equations, const cv::Vec3d
 }
 
 /* Standard deviations from the equations' curvature at the solution. */
-static void tell_sigmas(const Camera &camera, const Blocks &blocks, double sigma_px, Projector &projector)
+static void tell_sigmas(const Blocks &blocks, double sigma_px, Projector &projector)
 {
     cv::Vec3d right;
     cv::Matx33d origin = reduced(blocks, right).inv() * (sigma_px * sigma_px);
     for (int axis = 0; axis < 3; axis++)
         projector.origin_sigma_mm[axis] = std::sqrt(origin(axis, axis));
-    (void)camera;
     for (size_t slot = 0; slot < slot_count; slot++) {
         if (projector.seen[slot] == 0 || !is_seen(blocks, slot))
             continue;
@@ -193,7 +192,7 @@ static void fill_projector(const Camera &camera, const State &state, const std::
     projector.rms_px = std::sqrt(sum / std::max(1, good));
     for (size_t slot = 0; slot < slot_count; slot++)
         projector.rays[slot] = cv::normalize(cv::Vec3d(state.tangents[slot][0], state.tangents[slot][1], 1.0));
-    tell_sigmas(camera, blocks, projector.rms_px / std::sqrt(2.0), projector);
+    tell_sigmas(blocks, projector.rms_px / std::sqrt(2.0), projector);
 }
 
 static void check(const Projector &projector)
