@@ -25,14 +25,9 @@ LONGRUN_FRAMES ?= 100000
 ARCH ?= arm64
 
 .DEFAULT_GOAL := help
-.PHONY: help sim frames sanitize test fuzz coverage ranges mutation accept eval bench bench-instructions bench-worst \
-  test-bench bits cortexm longrun size vectors learn picture board board-gpiod2 deb image flash \
-
-.PHONY: help sim frames sanitize test accept eval bits cortexm vectors learn picture board board-gpiod2 deb image flash \
-  test-deb test-board test-image calibrate test-calibration format formatted lint clean
-
-.PHONY: help sim frames sanitize test accept eval bench bench-instructions bench-grow bench-worst test-bench bits cortexm size vectors learn picture board board-gpiod2 deb image flash \
-  test-deb test-board test-image format formatted lint clean
+.PHONY: help sim frames sanitize test fuzz coverage ranges mutation accept eval bench bench-instructions \
+  bench-grow bench-worst test-bench bits cortexm longrun size vectors learn picture board board-gpiod2 deb \
+  image flash calibrate test-calibration test-deb test-board test-image format formatted lint clean
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z_-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)

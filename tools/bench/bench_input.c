@@ -46,17 +46,17 @@ bool bench_input_load(int path_count, char **paths, struct bench_input *out)
         return false;
     }
     out->frame = calloc((size_t)path_count, sizeof *out->frame);
-    out->set = calloc((size_t)path_count, sizeof *out->set);
-    if (out->frame == NULL || out->set == NULL) {
+    out->sets = calloc((size_t)path_count, sizeof *out->sets);
+    if (out->frame == NULL || out->sets == NULL) {
         fputs("bench: no memory for the list of frames\n", stderr);
         return false;
     }
     for (int i = 0; i < path_count; i++) {
         if (is_rig(paths[i])) {
-            out->set[out->set_count++] =
+            out->sets[out->set_count++] =
                 (struct bench_set){paths[i], 0, &out->frame[out->frame_count]};
         } else if (load_frame(paths[i], &out->frame[out->frame_count])) {
-            out->set[out->set_count - 1].frame_count++;
+            out->sets[out->set_count - 1].frame_count++;
             out->frame_count++;
         } else {
             return false;

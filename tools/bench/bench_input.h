@@ -29,7 +29,7 @@ struct bench_set {
 
 struct bench_input {
     int32_t set_count, frame_count;
-    struct bench_set *set;
+    struct bench_set *sets;
     struct bench_frame *frame; /* of all sets */
 };
 

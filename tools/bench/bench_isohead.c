@@ -54,7 +54,7 @@ static bool run_all(const struct bench_input *input, void (*handle)(void), int64
 {
     *whole_ns = 0;
     for (int32_t s = 0; s < input->set_count; s++) {
-        const struct bench_set *set = &input->set[s];
+        const struct bench_set *set = &input->sets[s];
         if (!start_set(set)) {
             return false;
         }

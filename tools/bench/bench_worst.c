@@ -174,7 +174,7 @@ int main(int argument_count, char **arguments)
         struct bench_input input;
         arguments[at + 2] = arguments[at]; /* the rig, before its frames */
         good = bench_input_load(argument_count - at - 2, &arguments[at + 2], &input) &&
-               run_named(&calibration, first, &input.set[0]);
+               run_named(&calibration, first, &input.sets[0]);
     } else {
         good = run_drawn(&calibration, first, count, save_path);
     }
