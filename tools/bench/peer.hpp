@@ -1,6 +1,6 @@
 /* peer - isohead's method as a competent engineer writes it with OpenCV and Eigen, to compare with.
  *
- * Two of them (../shared/peers.md has how they were found):
+ * Two of them:
  *   A  what is written first: a difference of Gaussians in float by two GaussianBlur (sigma 1.0 and
  *      2.5), connectedComponentsWithStats, weighted centres; the surface in double, its normal
  *      equations summed anew for the second robust pass; whole contours by fitEllipseDirect.

@@ -1,7 +1,7 @@
 /* bench_peer a|b --turns|--once|--results RIG.json FRAME.pgm... [RIG.json FRAME.pgm...]
  *
  * Peer A or B over frames that are in memory; modes and output as those of bench_isohead. One thread;
- * freed memory stays with the process, as ../shared/peers.md asks for in their favour. */
+ * freed memory stays with the process: otherwise page faults cost them up to a millisecond a frame. */
 #include <cstdio>
 #include <cstring>
 #include <exception>
