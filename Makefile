@@ -25,8 +25,8 @@ LONGRUN_FRAMES ?= 100000
 ARCH ?= arm64
 
 .DEFAULT_GOAL := help
-.PHONY: help sim frames sanitize test fuzz coverage ranges mutation accept eval bench bench-instructions \
-  bench-grow bench-worst test-bench bits cortexm longrun size vectors learn picture board board-gpiod2 deb \
+.PHONY: help sim frames sanitize test fuzz coverage ranges exhaustive mutation accept eval bench bench-instructions bench-worst \
+  bench-grow bench-worst test-bench bits cortexm longrun size vectors learn picture board board-gpiod2 deb image flash \
   image flash calibrate test-calibration test-deb test-board test-image format formatted lint clean
 
 help: ## this list
@@ -69,6 +69,10 @@ coverage: sim ## the core's lines and branches that its own tests run, against t
 ranges: sim ## the core with every operation and range checked, over all frames, its tests, the fuzzers' corpus
 	@tools/setup.sh ranges
 	@tests/checks/ranges.sh --all $(UNITY_DIR) $(BUILD)/host/tests/golden frames $(wildcard $(DATA)/dots $(DATA)/range)
+
+exhaustive: sim ## square root, division, angle and the surface's basis for all input, not in strides; minutes
+	@tools/setup.sh ranges
+	@tests/checks/exhaustive.sh $(UNITY_DIR)
 
 mutation: sim ## would the tests notice? Mistakes made in the core one at a time; half an hour
 	@tools/setup.sh mutation

@@ -1,6 +1,8 @@
 /* ih_fix against exact 128-bit integers and the C library. */
 #include "ih_fix.h"
 
+#include <stdbool.h>
+
 #include "ih_test.h"
 
 __extension__ typedef __int128 int128;
@@ -326,8 +328,145 @@ static void atan2_follows_libm_for_any_size(void)
     check_angle(-r, -1);
 }
 
-int main(void)
+/* --- whole ranges: in strides here, all of it with --all (make exhaustive; minutes, gcc -O2) --- */
+
+static bool is_all;
+
+/* The last value before each place where the root changes, and the first behind it: with these exact,
+ * and roots that do not fall in between, it is exact for all 2^64 values. */
+static void isqrt_changes_exactly_at_squares(void)
 {
+    const uint64_t stride = is_all ? 1 : 4099;
+    uint64_t k;
+
+    for (k = 1; k <= UINT32_MAX; k += stride) {
+        if (ih_isqrt_u64(k * k) != k || ih_isqrt_u64(k * k - 1) != k - 1) {
+            IH_TEST_EQUAL(k, ih_isqrt_u64(k * k), "root of a square", (int64_t)k);
+            IH_TEST_EQUAL(k - 1, ih_isqrt_u64(k * k - 1), "root below a square", (int64_t)k);
+        }
+    }
+}
+
+/* double has 53 bits: its root is exact enough for every value of 32 bits, and every number of bits
+ * above it. */
+static void isqrt_is_doubles_root_cut_off(void)
+{
+    const uint64_t stride = is_all ? 1 : 2053;
+    uint64_t value;
+    int shift;
+
+    for (value = 0; value <= UINT32_MAX; value += stride) {
+        if (ih_isqrt_u64(value) != (uint32_t)sqrt((double)value)) {
+            IH_TEST_EQUAL(sqrt((double)value), ih_isqrt_u64(value), "root", (int64_t)value);
+        }
+    }
+    for (shift = 1; shift <= 20; shift++) {
+        for (value = 0; value <= UINT32_MAX; value += stride * 997) {
+            check_root(value << shift);
+            IH_TEST_EQUAL(sqrt((double)(value << shift)), ih_isqrt_u64(value << shift), "root",
+                          (int64_t)value);
+        }
+    }
+}
+
+/* Quotients of integers as small as these are exact in double where they are halves. */
+static void div_round_is_doubles_quotient_rounded(void)
+{
+    const int64_t most = is_all ? 20000 : 1000;
+    int64_t n, d;
+
+    for (d = 1; d <= most; d++) {
+        for (n = -most; n <= most; n++) {
+            if (ih_div_round(n, d) != llround((double)n / (double)d)) {
+                IH_TEST_EQUAL(llround((double)n / (double)d), ih_div_round(n, d), "quotient", d);
+            }
+        }
+    }
+}
+
+/* Powers of two and their neighbours. */
+#define NEAR_POWERS (63 * 3)
+
+static int64_t near_power(int index)
+{
+    return (INT64_C(1) << (index / 3)) + index % 3 - 1;
+}
+
+static void div_round_is_exact_near_powers_of_two(void)
+{
+    int i, j;
+
+    for (i = 0; i < NEAR_POWERS; i++) {
+        for (j = 2; j < NEAR_POWERS; j++) {
+            const int64_t n = near_power(i), d = near_power(j);
+
+            if ((int128)n + d / 2 <= INT64_MAX) {
+                IH_TEST_EQUAL(divide_round(n, d), ih_div_round(n, d), "quotient", j);
+                IH_TEST_EQUAL(divide_round(-n, d), ih_div_round(-n, d), "negative", j);
+            }
+        }
+    }
+}
+
+static void shift_round_is_doubles_floor(void)
+{
+    const int64_t most = is_all ? 1 << 20 : 1 << 14;
+    int64_t value;
+    int shift;
+
+    for (shift = 0; shift <= 24; shift++) {
+        for (value = -most; value <= most; value++) {
+            const double exact = floor(ldexp((double)value, -shift) + 0.5);
+
+            if ((double)ih_shift_round(value, shift) != exact) {
+                IH_TEST_EQUAL(exact, ih_shift_round(value, shift), "shifted", value);
+            }
+        }
+    }
+}
+
+static void products_are_exact_near_powers_of_two(void)
+{
+    int i, j, shift;
+
+    for (i = 0; i < NEAR_POWERS; i++) {
+        for (j = 0; j < NEAR_POWERS; j++) {
+            const int64_t a = near_power(i), b = near_power(j);
+
+            for (shift = 0; shift <= 62; shift += is_all ? 1 : 7) {
+                if ((int128)a * b < (int128)1 << 62) {
+                    IH_TEST_EQUAL(round_shift((int128)a * b, shift), ih_mul_shift(a, b, shift),
+                                  "product", shift);
+                    IH_TEST_EQUAL(round_shift((int128)-a * b, shift), ih_mul_shift(-a, b, shift),
+                                  "negative product", shift);
+                }
+                if (shift >= 32 && b <= UINT32_MAX) {
+                    check_wide(a, (uint32_t)b, shift);
+                    check_wide(-a, (uint32_t)b, shift);
+                }
+            }
+        }
+    }
+}
+
+/* Every direction that two integers of ten bits have; with --all, of twelve. */
+static void atan2_follows_libm_in_every_direction(void)
+{
+    const int64_t most = is_all ? 4095 : 400;
+    int64_t x, y;
+
+    for (y = -most; y <= most; y++) {
+        for (x = -most; x <= most; x++) {
+            if (x != 0 || y != 0) {
+                check_angle(y, x);
+            }
+        }
+    }
+}
+
+int main(int count, char **arguments)
+{
+    is_all = count == 2 && strcmp(arguments[1], "--all") == 0;
     UNITY_BEGIN();
     RUN_TEST(isqrt_is_exact_around_squares);
     RUN_TEST(isqrt_is_exact_around_powers_of_two);
@@ -344,5 +483,12 @@ int main(void)
     RUN_TEST(atan2_is_exact_on_the_axes_and_diagonals);
     RUN_TEST(atan2_follows_libm_round_the_circle);
     RUN_TEST(atan2_follows_libm_for_any_size);
+    RUN_TEST(isqrt_changes_exactly_at_squares);
+    RUN_TEST(isqrt_is_doubles_root_cut_off);
+    RUN_TEST(div_round_is_doubles_quotient_rounded);
+    RUN_TEST(div_round_is_exact_near_powers_of_two);
+    RUN_TEST(shift_round_is_doubles_floor);
+    RUN_TEST(products_are_exact_near_powers_of_two);
+    RUN_TEST(atan2_follows_libm_in_every_direction);
     return UNITY_END();
 }

@@ -1,0 +1,127 @@
+/* The surface's multiquadric over the whole range of its input, against double: every basis value of a
+ * sample's row, every entry of the grid's table. Strides here, all places with --all. */
+#include "ih_surface.h"
+
+#include "ih_test.h"
+
+/* In its own words: the two functions are static. */
+#include "ih_surface.c"
+
+#define PLACE_MOST ((IH_SAMPLES_REACH << 16) - 1)
+#define CENTRES IH_SURFACE_CENTRES
+
+static struct ih_surface_scratch scratch;
+static bool is_all;
+static double worst_steps;
+
+void setUp(void)
+{
+    memset(&scratch, 0, sizeof scratch);
+    worst_steps = 0;
+    place_centres(&scratch);
+}
+
+void tearDown(void)
+{
+}
+
+/* Half a step, and what is left of double's 53 bits. The squares are exact in double. */
+static void check_basis(int64_t dx_q16, int64_t dy_q16, int32_t basis_q20)
+{
+    const double square_q32 = (double)(dx_q16 * dx_q16) + (double)(dy_q16 * dy_q16) + 4294967296.0;
+    const double off_steps = fabs(basis_q20 - sqrt(square_q32) * 16.0);
+
+    worst_steps = fmax(worst_steps, off_steps);
+    if (off_steps > 0.5 + 1e-6) {
+        IH_TEST_WITHIN(0.5 + 1e-6, sqrt(square_q32) * 16.0, basis_q20, "basis, dx", dx_q16);
+    }
+}
+
+static void check_row(int32_t x_q16, int32_t y_q16)
+{
+    const struct ih_sample sample = {.x_q16 = x_q16, .y_q16 = y_q16};
+    int32_t row_q20[TERMS];
+    int32_t i;
+
+    fill_row(&scratch, &sample, row_q20);
+    for (i = 0; i < TERMS; i++) {
+        check_basis((int64_t)x_q16 - scratch.centre_q16[i % CENTRES],
+                    (int64_t)y_q16 - scratch.centre_q16[i / CENTRES], row_q20[i]);
+    }
+}
+
+static void centres_stand_evenly(void)
+{
+    int32_t k;
+
+    for (k = 0; k < CENTRES; k++) {
+        IH_TEST_WITHIN(0.5, (2.0 * k - 11) * 20 * 65536 / 11, scratch.centre_q16[k], "centre", k);
+    }
+}
+
+/* x through all that ih_samples lets through, at places of y from end to end. */
+static void every_place_has_its_basis(void)
+{
+    static const int32_t y_q16[] = {-PLACE_MOST, -1310721, 0, 1, 119156, PLACE_MOST};
+    const int32_t stride = is_all ? 1 : 1021;
+    int i;
+
+    for (i = 0; i < IH_TEST_COUNT(y_q16); i++) {
+        int32_t x_q16;
+
+        for (x_q16 = -PLACE_MOST; x_q16 <= PLACE_MOST; x_q16 += stride) {
+            check_row(x_q16, y_q16[i]);
+        }
+        check_row(PLACE_MOST, y_q16[i]);
+    }
+    printf("basis: at most %.7f steps off\n", worst_steps);
+}
+
+static void any_place_has_its_basis(void)
+{
+    struct ih_test_random random = {.state = 77};
+    int i;
+
+    for (i = 0; i < (is_all ? 10000000 : 10000); i++) {
+        check_row((int32_t)ih_test_between(&random, -PLACE_MOST, PLACE_MOST),
+                  (int32_t)ih_test_between(&random, -PLACE_MOST, PLACE_MOST));
+    }
+}
+
+/* At and beside each centre, where the basis is least. */
+static void places_near_centres_have_their_basis(void)
+{
+    int32_t k, off;
+
+    for (k = 0; k < CENTRES; k++) {
+        for (off = -300; off <= 300; off++) {
+            check_row(scratch.centre_q16[k] + off, scratch.centre_q16[CENTRES - 1 - k] - off);
+        }
+    }
+}
+
+static void the_table_is_the_basis_at_whole_steps(void)
+{
+    int a, b;
+
+    fill_table(&scratch);
+    for (b = 0; b < IH_SURFACE_STEPS; b++) {
+        for (a = 0; a < IH_SURFACE_STEPS; a++) {
+            const double exact = sqrt((a * a + b * b) * 100.0 / 121 + 1);
+
+            IH_TEST_WITHIN(0.5 + 1e-6, ldexp(exact, 20), scratch.of.table_q20[b][a], "table", b);
+        }
+    }
+}
+
+int main(int count, char **arguments)
+{
+    is_all = count == 2 && strcmp(arguments[1], "--all") == 0;
+    UNITY_BEGIN();
+    RUN_TEST(centres_stand_evenly);
+    RUN_TEST(every_place_has_its_basis);
+    RUN_TEST(any_place_has_its_basis);
+    RUN_TEST(places_near_centres_have_their_basis);
+    RUN_TEST(the_table_is_the_basis_at_whole_steps);
+    return UNITY_END();
+}
