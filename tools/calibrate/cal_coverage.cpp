@@ -12,12 +12,12 @@ static constexpr double tilted_deg = 20.0;
 static constexpr double guessed_focal = 1.2;
 static constexpr size_t views_for_guess = 5;
 
-static const char *const region_names[region_columns * region_rows] = {
+const char *const coverage_region_names[region_columns * region_rows] = {
     "top left",    "top, left of the middle",    "top, right of the middle",    "top right",
     "left",        "middle, a little left",      "middle, a little right",      "right",
     "bottom left", "bottom, left of the middle", "bottom, right of the middle", "bottom right"};
 
-static std::string missing_regions(const std::vector<View> &views, cv::Size size, int least)
+static std::string missing_regions(const std::vector<View> &views, cv::Size size, const CoverageLimits &limits)
 {
     int counts[region_columns * region_rows] = {};
     std::string names;
@@ -28,11 +28,15 @@ static std::string missing_regions(const std::vector<View> &views, cv::Size size
             counts[row * region_columns + column] += view.good();
         }
     }
+    int without = 0;
     for (int i = 0; i < region_columns * region_rows; i++) {
-        if (counts[i] < least)
-            names += (names.empty() ? "" : "; ") + text("%s (%d corners of %d)", region_names[i], counts[i], least);
+        if (counts[i] < limits.region_corners) {
+            names += (names.empty() ? "" : "; ") +
+                     text("%s (%d corners of %d)", coverage_region_names[i], counts[i], limits.region_corners);
+            without++;
+        }
     }
-    return names;
+    return without > limits.regions_without ? names : "";
 }
 
 std::vector<std::string> coverage_missing(const std::vector<View> &views, cv::Size size, const CoverageLimits &limits)
@@ -65,7 +69,7 @@ std::vector<std::string> coverage_missing(const std::vector<View> &views, cv::Si
             text("other distances: the boards are %.0f to %.0f mm away, the farthest should be %.1f times "
                  "as far as the nearest",
                  nearest, farthest, limits.distance_ratio));
-    std::string regions = missing_regions(views, size, limits.region_corners);
+    std::string regions = missing_regions(views, size, limits);
     if (!regions.empty())
         missing.push_back("the board in these parts of the frame: " + regions);
     return missing;

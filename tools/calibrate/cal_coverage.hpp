@@ -12,10 +12,14 @@ struct CoverageLimits {
     int pictures;       /* with the board found and sharp */
     int region_corners; /* corners in each of 4x3 parts of the frame */
     int tilted;         /* pictures tilted by 20 degrees or more about the vertical, and as many about the horizontal */
+    int regions_without;   /* parts of the frame that may have fewer */
     double distance_ratio; /* farthest to nearest board */
 };
 
-constexpr CoverageLimits coverage_wanted{20, 12, 4, 2.0}, coverage_least{10, 4, 2, 1.4};
+constexpr CoverageLimits coverage_wanted{20, 12, 4, 0, 2.0}, coverage_least{10, 4, 2, 2, 1.4};
+
+/* Of the 4x3 parts, row by row. */
+extern const char *const coverage_region_names[region_columns * region_rows];
 
 /* Sentences that say what to add, the most urgent first; empty: nothing. The views' poses must be known, roughly. */
 std::vector<std::string> coverage_missing(const std::vector<View> &views, cv::Size size, const CoverageLimits &limits);

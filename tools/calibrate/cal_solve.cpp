@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "cal_coverage.hpp"
 #include "cal_error.hpp"
 #include "cal_lattice.hpp"
 #include "cal_report.hpp"
@@ -89,6 +90,16 @@ static void tell_camera(const Camera &camera)
                 camera.sigma_px[3]);
 }
 
+/* Parts of the frame where the lens is only continued from elsewhere. */
+static void tell_uncovered(const Camera &camera)
+{
+    for (size_t i = 0; i < camera.regions.size(); i++) {
+        if (camera.regions[i].corner_count < coverage_least.region_corners)
+            std::printf("note: %d corners %s in the frame: the lens is a guess there\n", camera.regions[i].corner_count,
+                        coverage_region_names[i]);
+    }
+}
+
 static void tell_projector(const Projector &projector)
 {
     auto seen = std::count_if(projector.seen.begin(), projector.seen.end(), [](int count) { return count > 0; });
@@ -144,6 +155,7 @@ void solve_run(const Options &options)
     }
     tell_pictures(result);
     tell_camera(result.camera);
+    tell_uncovered(result.camera);
     tell_projector(result.projector);
     report_write(options.out + "/report.html", result);
     rig_write(options.out + "/rig.json", result.camera, result.projector, result.range);
