@@ -151,7 +151,7 @@ def draw_rig(bench, index):
     bench.boards(wrong, rig, "--first-frame", "0+%d" % (2 * WRONG), board=bench.other)
     copy_pictures([(hard, range(2 * PAIRS)), (blurred, range(2 * BLURRED)), (wrong, range(2 * WRONG))],
                   bench.path("rig%d" % index, "mixed"))
-    must(bench.render, *rig, "--assembly", "1", "--frames", HEAD_FRAMES, bench.path("rig%d" % index, "heads"))
+    must(bench.render, *rig, "--assembly", "1", "--ambient", "dim", "--frames", HEAD_FRAMES, bench.path("rig%d" % index, "heads"))
     outputs = {}
     for name in ("good", "mixed"):
         outputs[name] = bench.solve(bench.path("rig%d" % index, name), bench.path("rig%d" % index, "from_" + name))

@@ -12,7 +12,9 @@ static constexpr int patch_min_px = 4, patch_max_px = 16, sub_samples = 3, blur_
 static constexpr int steps = 4;
 static constexpr double moved_max_px = 2.5;
 /* What is left may be this part of the contrast. */
-static constexpr double miss_max = 0.12, contrast_min_grey = 12.0;
+static constexpr double miss_max = 0.2, contrast_min_grey = 12.0;
+/* Pixels at the sensor's limit do not count: lamps and dots. So much of the patch must be left. */
+static constexpr double saturated_grey = 248.0, used_share = 0.7;
 /* An edge's rise over its steepest slope is this many standard deviations of its blur. */
 static constexpr double edge_sigmas = 2.5066, pixel_sigma_px = 0.29, blur_min_px = 0.4;
 
@@ -86,28 +88,34 @@ static bool match(const cv::Mat &grey8, const cv::Mat &drawn, cv::Point middle_p
     cv::Matx<double, 6, 6> normal = cv::Matx<double, 6, 6>::zeros();
     Unknowns right = Unknowns::zeros();
     double square_sum = 0.0;
+    int used = 0;
     for (int pass = 0; pass < 2; pass++) {
         double gain = pass == 0 ? 1.0 : found(0);
         normal = cv::Matx<double, 6, 6>::zeros();
         right = Unknowns::zeros();
         square_sum = 0.0;
+        used = 0;
         for (int dv = -half; dv <= half; dv++) {
             for (int du = -half; du <= half; du++) {
                 int row = dv + half + blur_reach_px, column = du + half + blur_reach_px;
                 double slope_u = 0.5 * (drawn.at<double>(row, column + 1) - drawn.at<double>(row, column - 1));
                 double slope_v = 0.5 * (drawn.at<double>(row + 1, column) - drawn.at<double>(row - 1, column));
-                Unknowns terms(drawn.at<double>(row, column), 1.0, du, dv, -gain * slope_u, -gain * slope_v);
                 double grey = grey8.at<uchar>(middle_px.y + dv, middle_px.x + du);
+                if (grey >= saturated_grey)
+                    continue;
+                Unknowns terms(drawn.at<double>(row, column), 1.0, du, dv, -gain * slope_u, -gain * slope_v);
+                used++;
                 normal += terms * terms.t();
                 right += terms * grey;
                 square_sum += grey * grey;
             }
         }
-        if (!cv::solve(normal, right, found, cv::DECOMP_CHOLESKY))
+        if (used < used_share * (2 * half + 1) * (2 * half + 1) ||
+            !cv::solve(normal, right, found, cv::DECOMP_CHOLESKY))
             return false;
     }
     double rest = square_sum - (right.t() * found)(0);
-    miss = std::sqrt(std::max(0.0, rest) / ((2 * half + 1) * (2 * half + 1))) / std::max(1.0, found(0));
+    miss = std::sqrt(std::max(0.0, rest) / used) / std::max(1.0, found(0));
     return found(0) >= contrast_min_grey;
 }
 

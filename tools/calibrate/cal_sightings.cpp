@@ -13,7 +13,7 @@ static constexpr double still_px = 0.6;
 static constexpr size_t common_min = 6;
 static constexpr int bitmap_px_per_mm = 2;
 /* Without a twin a dot must be this far from every edge of the print, else the edge is measured with it. */
-static constexpr double edge_apart_px = 3.0;
+static constexpr double edge_apart_px = 2.0;
 static constexpr double border_mm = 3.0;
 
 /* Whether two pictures show the board in the same place. */

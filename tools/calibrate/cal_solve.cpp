@@ -133,9 +133,9 @@ static void make_out(const std::string &out)
 void solve_run(const Options &options)
 {
     Result result;
+    make_out(options.out);
     result.board = board_parse(options.board);
     result.range = options.range;
-    make_out(options.out);
     std::vector<Picture> pictures = pictures_read(options.target);
     if (static_cast<size_t>(std::count_if(pictures.begin(), pictures.end(), [](const Picture &p) { return p.laser; })) <
         lit_min)

@@ -6,7 +6,7 @@
 
 namespace cal
 {
-static constexpr int common_min = 9;       /* dots that two pictures must share */
+static constexpr int common_min = 7;       /* dots that two pictures must share */
 static constexpr double meet_rms_mm = 1.5; /* lines meet within this */
 static constexpr double origin_max_mm = 600.0;
 static constexpr double ratio_min = 1.2; /* of the distances of a pair */
