@@ -9,6 +9,8 @@
 #define SPEED_VARIANCE_MAX_Q8 ((int64_t)3000 * 3000 * 256)
 #define PLACE_VARIANCE_MAX_Q8 ((int64_t)500 * 500 * 256)
 #define START_SPEED_MM_S 300
+/* 262 m: no head is seen as far. It bounds every place that comes of a track. */
+#define PLACE_MAX_MM_Q8 (1 << 26)
 /* Log-odds of one finding count at most this in the mean: one frame must not decide for long. */
 #define LOGIT_MAX_Q10 (6 << 10)
 /* A finding at the edge of the gate must be this much more probable than one at its middle. */
@@ -93,8 +95,9 @@ static void predict(struct ih_track *track, int64_t step_us, int32_t acceleratio
     IH_IN_RANGE(track->speed_q8, 0, SPEED_VARIANCE_MAX_Q8);
     IH_IN_RANGE(track->cross_q8, -IH_RANGE_CROSS_Q8, IH_RANGE_CROSS_Q8);
     for (int axis = 0; axis < 3; axis++) {
-        track->head.centre_mm_q8[axis] +=
-            (int32_t)ih_mul_shift(track->velocity_mm_s_q8[axis], dt_q20, 20);
+        int32_t way_q8 = (int32_t)ih_mul_shift(track->velocity_mm_s_q8[axis], dt_q20, 20);
+        track->head.centre_mm_q8[axis] = ih_clamp_s32(track->head.centre_mm_q8[axis] + way_q8,
+                                                      -PLACE_MAX_MM_Q8, PLACE_MAX_MM_Q8);
     }
 }
 

@@ -30,8 +30,9 @@
  * Overflow: steps up to 2 s = 2^21 in Q20, accelerations below 2^13 mm/s^2: what a step adds to a
  *        variance is below 2^30 mm^2, 2^38 in Q8, times 2^21 2^59. Then standard deviations are
  *        limited to 500 mm and 3 m/s: 2^26 and 2^31.2 in Q8; the cross term, 2^36.3 at most, is cut
- *        by the same share, 2^24, so that the covariance stays positive. Centres of findings are
- *        below 2^26 in Q8, speeds at most 3 m/s: squared distances below 2^56.
+ *        by the same share, 2^24, so that the covariance stays positive. Predicted places are limited
+ *        to 2^26 in Q8, centres of findings below 2^27, speeds at most 3 m/s: squared distances below
+ *        2^57.6.
  * Error: place within 0.05 mm, speed 0.65 mm/s of a float64 filter's; variances 0.03 %, and 2 % in
  *        the ten frames after a step of 0.3 s or more (a gain has 16 bits).
  * Cost:  tracks x findings distances.

@@ -1045,6 +1045,27 @@ static void extreme_places_do_not_overflow(void)
     frames_without(20);
 }
 
+/* Whatever is found where a fast head is expected, hour after hour: its place stays in its format. */
+static void a_head_that_runs_away_stays_in_the_format(void)
+{
+    int i;
+
+    frames_with(5, 0, 0, 800, 5);
+    TEST_ASSERT_EQUAL_INT(1, tracks.track_count);
+    tracks.track[0].velocity_mm_s_q8[0] = -(3000 << 8);
+    tracks.track[0].velocity_mm_s_q8[2] = 3000 << 8;
+    for (i = 0; i < 3000; i++) {
+        ih_tracks_expect(&tracks, &params, time_us += 2000000, &expected);
+        IH_TEST_EQUAL(1, expected.count, "expected", i);
+        IH_TEST_RANGE(-(1 << 26), 0, expected.head[0].centre_mm_q8[0], "x", i);
+        IH_TEST_RANGE(800 << 8, 1 << 26, expected.head[0].centre_mm_q8[2], "z", i);
+        add(0, 0, 0, 5)->head = expected.head[0];
+        ih_tracks_update(&tracks, &params, &rig, &findings);
+        findings.finding_count = 0;
+    }
+    IH_TEST_EQUAL(1 << 26, expected.head[0].centre_mm_q8[2], "z at its end", 0);
+}
+
 /* A step of some seconds' tenths limits variances: their cross term must be limited with them, or a
  * finding makes the rest negative. */
 static void rare_frames_keep_the_variances_positive(void)
@@ -1153,6 +1174,7 @@ int main(void)
     RUN_TEST(a_doubtful_head_is_not_chosen_for_its_place);
     RUN_TEST(the_selected_head_changes_slowly);
     RUN_TEST(extreme_places_do_not_overflow);
+    RUN_TEST(a_head_that_runs_away_stays_in_the_format);
     RUN_TEST(rare_frames_keep_the_variances_positive);
     RUN_TEST(the_covariance_stays_positive);
     return UNITY_END();
