@@ -25,9 +25,10 @@ LONGRUN_FRAMES ?= 100000
 ARCH ?= arm64
 
 .DEFAULT_GOAL := help
-.PHONY: help sim frames sanitize test fuzz coverage ranges exhaustive mutation accept eval bench bench-instructions bench-worst \
-  bench-grow bench-worst test-bench bits cortexm longrun size vectors learn picture board board-gpiod2 deb image flash \
-  image flash calibrate test-calibration test-deb test-board test-image format formatted lint clean
+.PHONY: help sim frames sanitize test fuzz coverage ranges exhaustive mutation accept eval bench \
+  bench-instructions bench-grow bench-worst test-bench bits cortexm longrun size vectors learn picture \
+  board board-gpiod2 deb image flash calibrate test-calibration test-deb test-board test-image format \
+  formatted lint clean
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z_-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)

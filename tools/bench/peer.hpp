@@ -5,9 +5,10 @@
  *      2.5), connectedComponentsWithStats, weighted centres; the surface in double, its normal
  *      equations summed anew for the second robust pass; whole contours by fitEllipseDirect.
  *   B  the fastest composition of library calls that was found: an 8-bit Gaussian 3x3 less an 8-bit
- *      box 13x13, findContours, weighted centres; the surface in double too (in float it is 20 mm off: its
- *      normal equations have a condition number of 10^7), but the second robust pass only takes
- *      away what its changed rows weigh less; whole contours by their moments.
+ *      box 13x13, findContours, weighted centres; the surface in double too (in float its worst node is 5
+ *      to 11 mm off, the median 0.5 mm, in 20 made-up scenes: its normal equations have a condition
+ *      number of 10^7), but the second robust pass only takes away what its changed rows weigh less;
+ *      whole contours by their moments.
  *
  * What both do, as isohead does it in its default mode and with the same numbers: dots of the whole
  * frame; undistortPoints; candidates on the 361 lines, seeds by affine rectangles, growing; points;
