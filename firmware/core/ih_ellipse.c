@@ -67,7 +67,7 @@ static int32_t axis_ratio_q16(int64_t xx_q16, int64_t xy_q16, int64_t yy_q16)
     }
     int64_t square = major / minor >= RATIO_MAX * RATIO_MAX
                          ? (int64_t)RATIO_MAX * RATIO_MAX << 32
-                         : (major << 32) / minor; /* major below 2^28.2 */
+                         : (major << 32) / minor; /* below 2^28.1: minor is positive */
     return (int32_t)ih_isqrt_u64((uint64_t)square);
 }
 

@@ -107,7 +107,7 @@ static void nest_centre_q16(const struct ih_nest *nest, int32_t *x_q16, int32_t 
     for (int32_t i = 0; i < nest->slice_count; i++) {
         if (is_deep(nest, i)) {
             const struct ih_ellipse *ellipse = &nest->slice[i].ellipse;
-            int64_t area = (ellipse->area_q16 >> 8) + 1; /* below 2^20; never 0 */
+            int64_t area = (ellipse->area_q16 >> 8) + 1; /* below 2^22.8; never 0 */
             x += area * ellipse->x_q16;
             y += area * ellipse->y_q16;
             weight += area;

@@ -32,8 +32,8 @@ static void undistort_dots(const struct ih_dots *dots, const struct ih_rig *rig,
     }
 }
 
-/* Where a dot is on a line, and how far beside it. Places are within 2^28.4 in Q12 (8192 px focal
- * length, tan below 6), times a Q30 unit vector: two products, below 2^60.4. */
+/* Where a dot is on a line, and how far beside it. Places are within 2^27 in Q12, those at infinity
+ * within 2^27.6: a difference of 2^28.4 times a Q30 unit vector, two products, below 2^59.4. */
 static int64_t along_line(const struct ih_labels_scratch *scratch, int32_t dot,
                           const struct ih_line *line)
 {
@@ -112,8 +112,8 @@ static const struct ih_candidate *candidate_of(const struct ih_labels_scratch *s
     return &scratch->candidate[slot][choice];
 }
 
-/* Square of the seed's error. Places of dots are within 2^26.1 in Q12 (an
- * undistorted coordinate is limited to tan 2), a second difference below 2^28.1: 2^57.2 in all. */
+/* Square of the seed's error. Places of dots are within 2^27 in Q12 (an undistorted coordinate is
+ * limited to tan 2, the principal point to 2^14 px), a second difference 2^29: 2^59 in all. */
 static uint64_t rectangle_error2(const struct ih_labels_scratch *scratch,
                                  const struct ih_candidate *const corner[4])
 {
