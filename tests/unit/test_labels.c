@@ -418,6 +418,36 @@ static void put_on_plane(int32_t slot, double inverse_depth)
             (int16_t)slot);
 }
 
+/* A rectangle whose fourth corner has two dots, both off by some px along its line: its error is half
+ * of that. The better one must be better by seed_margin, 0.5, and below seed_max, 1. */
+static void seeds_are_better_than_the_next_by_a_margin(void)
+{
+    static const struct {
+        double one_px, other_px;
+        bool is_seed;
+    } cases[] = {{1.2, 2.0, false}, {1.2, 2.4, true},  {-1.2, 2.0, false}, {1.2, -2.4, true},
+                 {0.2, 1.0, false}, {0.2, -1.4, true}, {2.2, 4.0, false},  {1.9, 3.1, true}};
+    const int32_t corner = 10 * IH_GRID + 10;
+    int i;
+
+    for (i = 0; i < IH_TEST_COUNT(cases); i++) {
+        double px;
+
+        use_rig(2);
+        dots.dot_count = 0;
+        px = 256.0 / rig.line[corner].length_px_mm_q8;
+        put_on_plane(corner, 1.0 / 900 + cases[i].one_px * px);
+        put_on_plane(corner, 1.0 / 900 + cases[i].other_px * px);
+        put_on_plane(corner - 1, 1.0 / 900);
+        put_on_plane(corner - IH_GRID, 1.0 / 900);
+        put_on_plane(corner - IH_GRID - 1, 1.0 / 900);
+        params.epsilon_max_px_q12 = 0; /* seeds alone */
+        assign();
+        IH_TEST_EQUAL(cases[i].is_seed ? 4 : 0, labels.seed_count, "seeds", i);
+        IH_TEST_EQUAL(cases[i].is_seed ? 0 : IH_NONE, labels.dot_of_slot[corner], "its dot", i);
+    }
+}
+
 /* A slot at the pattern's edge, its neighbours along that edge missing, so that no rectangle has it,
  * before a plane whose dots move by 3 px from row to row of the pattern (or column to column). Its
  * own dot continues the plane; another is nearer to what its neighbours show, but not on the plane. */
@@ -516,6 +546,7 @@ int main(void)
     RUN_TEST(noise_alone_is_hardly_labelled);
     RUN_TEST(spurious_dots_change_little);
     RUN_TEST(ambiguous_rectangles_are_no_seeds);
+    RUN_TEST(seeds_are_better_than_the_next_by_a_margin);
     RUN_TEST(growing_starts_from_any_epsilon);
     RUN_TEST(growing_follows_tilted_planes);
     RUN_TEST(limits_are_obeyed);

@@ -362,6 +362,7 @@ static void the_nearest_is_a_percentile(void)
             nearer += 1000 + slot * 37 % 61 < near;
         }
         IH_TEST_EQUAL(count * 8 / 100, nearer, "nearer", count);
+        IH_TEST_EQUAL(near << 8, ih_samples_near_mm_q8(&points), "a point's own depth", count);
         IH_TEST_EQUAL(count == 0, near == 0, "of none", count);
     }
 }

@@ -655,8 +655,9 @@ static void hidden_begins_at_its_limit(void)
     static const struct {
         struct ih_view view;
         bool hidden;
-    } cases[] = {{{0, 70, 30}, true},   {{0, 71, 29}, false}, {{35, 35, 30}, true},
-                 {{35, 36, 29}, false}, {{0, 0, 10}, true},   {{0, 99, 1}, false}};
+    } cases[] = {{{0, 70, 30}, true},    {{0, 71, 29}, false}, {{35, 35, 30}, true},
+                 {{35, 36, 29}, false},  {{0, 0, 10}, true},   {{0, 700, 300}, true},
+                 {{0, 702, 298}, false}, {{0, 99, 1}, false}};
     int i;
 
     for (i = 0; i < IH_TEST_COUNT(cases); i++) {
