@@ -14,7 +14,7 @@ namespace cal
 static constexpr double corner_sigmas = 4.5;
 /* Residuals that are good whatever the others are; rough: before the corners are refined. */
 static constexpr double rough_px = 3.0, fine_px = 0.06;
-static constexpr double kept_share = 0.35;
+static constexpr double kept_share = 0.6;
 static constexpr double rayleigh_median = 1.1774; /* in standard deviations of one component */
 static constexpr int rounds = 4;
 static constexpr int corners_min = 8;

@@ -12,7 +12,7 @@ static constexpr int patch_min_px = 4, patch_max_px = 16, sub_samples = 3, blur_
 static constexpr int steps = 4;
 static constexpr double moved_max_px = 2.5;
 /* What is left may be this part of the contrast. */
-static constexpr double miss_max = 0.2, contrast_min_grey = 12.0;
+static constexpr double miss_max = 0.12, contrast_min_grey = 12.0;
 /* Pixels at the sensor's limit do not count: lamps and dots. So much of the patch must be left. */
 static constexpr double saturated_grey = 248.0, used_share = 0.7;
 /* An edge's rise over its steepest slope is this many standard deviations of its blur. */
