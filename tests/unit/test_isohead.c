@@ -600,6 +600,23 @@ static void a_bad_calibration_is_refused(void)
     TEST_ASSERT_EQUAL_INT32(77, bad_slot);
 }
 
+/* Every parameter has a default: nothing of what was there before is left, and the method is ours. */
+static void defaults_fill_every_parameter(void)
+{
+    static struct ih_params params;
+    int32_t word[sizeof params / sizeof(int32_t)];
+    size_t i;
+
+    _Static_assert(sizeof params % sizeof(int32_t) == 0, "parameters are whole words");
+    memset(&params, IH_TEST_FILL, sizeof params);
+    ih_params_default(&params);
+    TEST_ASSERT_FALSE(params.is_paper);
+    memcpy(word, &params, sizeof params);
+    for (i = 1; i < sizeof word / sizeof word[0]; i++) { /* the first holds is_paper alone */
+        TEST_ASSERT_FALSE(word[i] == (int32_t)(0x01010101u * IH_TEST_FILL));
+    }
+}
+
 static void the_state_keeps_to_its_budget(void)
 {
     TEST_ASSERT_TRUE(sizeof(struct isohead) <= IH_RAM_MAX);
@@ -641,6 +658,7 @@ int main(void)
     RUN_TEST(the_frame_and_the_rig_are_left_alone);
     RUN_TEST(noise_is_survived);
     RUN_TEST(a_bad_calibration_is_refused);
+    RUN_TEST(defaults_fill_every_parameter);
     RUN_TEST(the_state_keeps_to_its_budget);
     RUN_TEST(every_error_has_its_own_text);
     return UNITY_END();

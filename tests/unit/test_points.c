@@ -407,6 +407,30 @@ static void windows_at_the_ends_are_survived(void)
     }
 }
 
+/* One measured pixel, so many pixels beside the place of the middle slot: at 10 px from dot to dot it
+ * is the slot's own within 6, and up to 12 it tells that a surface there might not have been seen. */
+static void a_rare_pixel_is_seen_or_leaves_unknown(void)
+{
+    int32_t off, v;
+
+    use_range_rig(640, 480);
+    window.spacing_px = 10;
+    fill(0);
+    convert();
+    v = (int32_t)rint(ih_test_from_q(points.field.centre_y_q28, 28) * 512 + 239.5);
+    for (off = -15; off <= 15; off++) {
+        const int32_t away = off < 0 ? -off : off;
+
+        fill(0);
+        depth_mm[v * 640 + 320 + off] = 1000;
+        convert();
+        IH_TEST_EQUAL(away <= 6    ? IH_POINT_SEEN
+                      : away <= 12 ? IH_POINT_UNKNOWN
+                                   : IH_POINT_MISSING,
+                      points.point[IH_SLOTS / 2].state, "state", off);
+    }
+}
+
 /* Only every tenth pixel of every tenth row is measured; the pitch is 13.3 px. A slot takes one
  * within half of that, and where none is near it is not known that there is nothing, unless no
  * pixel lies within 12.5 px. */
@@ -501,6 +525,7 @@ int main(void)
     RUN_TEST(the_lattice_lies_where_the_window_is);
     RUN_TEST(windows_at_the_ends_are_survived);
     RUN_TEST(rare_points_leave_slots_unknown);
+    RUN_TEST(a_rare_pixel_is_seen_or_leaves_unknown);
     RUN_TEST(the_stride_is_followed);
     RUN_TEST(the_wrong_kind_is_refused);
     return UNITY_END();
