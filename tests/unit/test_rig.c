@@ -278,6 +278,30 @@ static void field_unit_is_half_the_pitch(void)
     }
 }
 
+/* To the last unit: the four outer sides of the pattern at 900 mm, 18 pitches each, or at the end of
+ * the working range that is nearest to that. */
+static void the_field_is_that_of_the_outer_dots(void)
+{
+    static const int sides[4][2] = {{0, 18}, {342, 360}, {0, 342}, {18, 360}};
+    static const int32_t range_mm[][3] = {{400, 3000, 900}, {1200, 3000, 1200}, {300, 800, 800}};
+    int i, k, side;
+
+    for (k = 0; k < RIG_COUNT; k++) {
+        for (i = 0; i < IH_TEST_COUNT(range_mm); i++) {
+            double sum = 0;
+
+            calibration = vector_rigs[k];
+            calibration.near_mm = range_mm[i][0];
+            calibration.far_mm = range_mm[i][1];
+            TEST_ASSERT_EQUAL_INT(IH_OK, ih_rig_init(&rig, &calibration, &bad_slot));
+            for (side = 0; side < 4; side++) {
+                sum += dot_distance(&calibration, sides[side][0], sides[side][1], range_mm[i][2]);
+            }
+            IH_TEST_WITHIN(1, ldexp(sum / (4 * 18 * 2), 28), rig.field.unit_q28, "unit", k);
+        }
+    }
+}
+
 static void field_centre_is_a_place_of_the_middle_dot(void)
 {
     int k;
@@ -542,6 +566,7 @@ int main(void)
     RUN_TEST(distort_limits_what_is_far_outside);
     RUN_TEST(dot_at_is_the_ray_at_that_depth);
     RUN_TEST(field_unit_is_half_the_pitch);
+    RUN_TEST(the_field_is_that_of_the_outer_dots);
     RUN_TEST(field_centre_is_a_place_of_the_middle_dot);
     RUN_TEST(inside_ends_at_the_outer_pixel_centres);
     RUN_TEST(sizes_are_checked);
