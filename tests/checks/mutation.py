@@ -109,8 +109,8 @@ class Bench:
 
     def link(self, objects, output, library=None, options=()):
         unity = [self.work + "/unity.o"] if self.unity else []
-        return run(["gcc", *options, *objects, library or self.library, *unity, "-lm", "-Wl,--trace",
-                    "-o", output])
+        return run(["gcc", *options, *objects, library or self.library, *unity, "-lm", "-Wl,-t,-t", "-o",
+                    output])
 
     def build_test(self, test):
         program = self.program(test)
@@ -240,7 +240,8 @@ class Trial:
         for test in tests:
             if self.is_caught_by(test):
                 return "caught", os.path.basename(test)
-        if self.source.endswith(".c") and is_own(tests[0], self.source) and self.is_caught_by_sanitizers(tests[0]):
+        if self.source.endswith(".c") and tests and is_own(tests[0], self.source) and \
+                self.is_caught_by_sanitizers(tests[0]):
             return "caught", os.path.basename(tests[0]) + " with sanitizers"
         return ("golden" if self.differs_in_golden() else "alive"), ""
 
@@ -340,7 +341,7 @@ def is_of_core(test):
                for name in (stem, "ih_" + stem))
 
 
-# A core of one stage and its test. Of the mutants of each line it is known what becomes of them.
+# A core of two stages, one of them with a test. It is known what becomes of these mutants.
 SAMPLE = """#include "ih_sample.h"
 int sample_sum(int count)
 {
@@ -355,29 +356,36 @@ int sample_unused(int value)
     return value + 3;
 }
 """
-SAMPLE_HEADER = "int sample_sum(int count);\nint sample_unused(int value);\n"
+OTHER = """#include "ih_sample.h"
+int other_half(int value)
+{
+    return value / 2;
+}
+"""
+SAMPLE_HEADER = "int sample_sum(int count);\nint sample_unused(int value);\nint other_half(int value);\n"
 SAMPLE_TEST = """#include "ih_sample.h"
 int main(void)
 {
-    return sample_sum(5) == 10 ? 0 : 1;
+    return sample_sum(5) == 10 && other_half(7) == 3 ? 0 : 1;
 }
 """
-# (line, what stands there, what instead): the result
-SAMPLE_RESULTS = {
-    (5, "i < count", "comparison", "<="): "caught",
-    (5, "i++", "arithmetic", "--"): "caught",  # runs on
-    (6, "sum += i", "arithmetic", "-="): "caught",
-    (6, "sum += i", "statement", ""): "caught",
-    (8, "sum + 0", "arithmetic", "-"): "equivalent",
-    (8, "sum + 0", "constant", "1"): "caught",
-    (12, "value + 3", "arithmetic", "-"): "alive",
-    (12, "value + 3", "constant", "2"): "alive",
-}
+# source, line, what stands there, kind, what instead, the result
+SAMPLE_RESULTS = [
+    ("ih_sample.c", 5, "i < count", "comparison", "<=", "caught"),
+    ("ih_sample.c", 5, "i++", "arithmetic", "--", "caught"),  # runs on
+    ("ih_sample.c", 6, "sum += i", "arithmetic", "-=", "caught"),
+    ("ih_sample.c", 6, "sum += i", "statement", "", "caught"),
+    ("ih_sample.c", 8, "sum + 0", "arithmetic", "-", "equivalent"),
+    ("ih_sample.c", 8, "sum + 0", "constant", "1", "caught"),
+    ("ih_sample.c", 12, "value + 3", "arithmetic", "-", "alive"),
+    ("ih_sample.c", 12, "value + 3", "constant", "2", "alive"),
+    ("ih_other.c", 4, "value / 2", "arithmetic", "*", "caught"),  # by another stage's test
+]
 
 
 def self_test():
     with tempfile.TemporaryDirectory() as directory:
-        files = {"core/ih_sample.c": SAMPLE, "core/ih_sample.h": SAMPLE_HEADER,
+        files = {"core/ih_sample.c": SAMPLE, "core/ih_sample.h": SAMPLE_HEADER, "core/ih_other.c": OTHER,
                  "test_sample.c": SAMPLE_TEST}
         os.mkdir(os.path.join(directory, "core"))
         for name, text in files.items():
@@ -385,11 +393,12 @@ def self_test():
                 file.write(text)
         bench = Bench(os.path.join(directory, "core"), [os.path.join(directory, "test_sample.c")], None,
                       os.path.join(directory, "work"))
-        every = {(sites.line_of(SAMPLE, m), m.kind, m.new): m for m in sites.mutants(SAMPLE)}
         missed = 0
-        for (at, what, kind, new), expected in SAMPLE_RESULTS.items():
+        for source, at, what, kind, new, expected in SAMPLE_RESULTS:
+            text = SAMPLE if source == "ih_sample.c" else OTHER
+            every = {(sites.line_of(text, m), m.kind, m.new): m for m in sites.mutants(text)}
             mutant = every.get((at, kind, new))
-            was = try_one(bench, "ih_sample.c", mutant)[1][0] if mutant else "not made"
+            was = try_one(bench, source, mutant)[1][0] if mutant else "not made"
             missed += was != expected
             print("%s: %s with %s '%s': %s" % ("right" if was == expected else "MISSED (%s)" % expected,
                                                what, kind, new, was))
