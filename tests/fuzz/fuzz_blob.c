@@ -59,7 +59,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     uint8_t flags = fuzz_byte(&input);
     struct ih_calibration calibration;
     uint8_t bytes[SIZE_MAX_BYTES] = {0};
-    size_t length = IH_BLOB_BYTES;
+    size_t length;
     if ((flags & 8) != 0) {
         length = input.left < SIZE_MAX_BYTES ? input.left : SIZE_MAX_BYTES;
         memcpy(bytes, input.at, length);

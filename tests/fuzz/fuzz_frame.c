@@ -154,7 +154,7 @@ static void paint_bytes(struct canvas *canvas, struct fuzz_input *input)
     int32_t from = fuzz_within(input, 0, pixels - 1);
     int32_t length = fuzz_within(input, 1, RAW_MAX);
     int32_t times = fuzz_within(input, 1, RAW_MAX);
-    uint8_t byte[RAW_MAX];
+    uint8_t byte[RAW_MAX] = {0};
     for (int32_t i = 0; i < length; i++) {
         byte[i] = fuzz_byte(input);
     }

@@ -90,7 +90,7 @@ static void paint_bytes(struct image *image, struct fuzz_input *input)
     int32_t from = fuzz_within(input, 0, pixels - 1);
     int32_t length = fuzz_within(input, 1, RAW_MAX);
     int32_t times = fuzz_within(input, 1, RAW_MAX);
-    uint16_t sample[RAW_MAX];
+    uint16_t sample[RAW_MAX] = {0};
     for (int32_t i = 0; i < length; i++) {
         int32_t high = fuzz_byte(input);
         sample[i] = (uint16_t)(high * 256 + fuzz_byte(input));

@@ -146,7 +146,6 @@ static bool take_turn(const struct bench_input *input)
 int main(int argument_count, char **arguments)
 {
     struct bench_input input;
-    char line[16];
     int64_t whole_ns;
     const char *mode = argument_count > 1 ? arguments[1] : "";
     bool is_turns = strcmp(mode, "--turns") == 0;
@@ -160,6 +159,7 @@ int main(int argument_count, char **arguments)
     }
     bool good = true;
     if (is_turns) {
+        char line[16];
         while (good && fgets(line, sizeof line, stdin) != NULL) {
             good = take_turn(&input);
         }

@@ -107,7 +107,7 @@ static bool run_drawn(const struct ih_calibration *calibration, int32_t first, i
         }
         bench_worst_end(i, worst_frame_kind(i));
     }
-    return save_path == NULL || save(save_path, &frame);
+    return save_path == NULL || (frame.samples != NULL && save(save_path, &frame));
 }
 
 /* Frames that are named, a sequence; those from `first` on count. */
