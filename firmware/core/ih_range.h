@@ -18,13 +18,11 @@
 #include <stdint.h>
 
 #ifdef ISOHEAD_RANGE_CHECKS
-void ih_range_check(int64_t value, int64_t low, int64_t high, const char *what, const char *file,
-                    int line);
-#define IH_IN_RANGE(value, low, high) \
-    ih_range_check((value), (low), (high), #value, __FILE__, __LINE__)
+void ih_range_check(int64_t value, int64_t low, int64_t high, const char *file, int line);
+#define IH_IN_RANGE(value, low, high) ih_range_check((value), (low), (high), __FILE__, __LINE__)
 #define IH_WRAPS(type, value) ((__typeof__(type))(value))
 #else
-#define IH_IN_RANGE(value, low, high) ((void)sizeof((value) >= (low) && (value) <= (high)))
+#define IH_IN_RANGE(value, low, high) ((void)sizeof((value) + (low) + (high)))
 #define IH_WRAPS(type, value) ((type)(value))
 #endif
 

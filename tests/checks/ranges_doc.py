@@ -100,7 +100,7 @@ def self_test():
         check_doc("", ""),
         not check_use(header, "IH_RANGE_A IH_RANGE_B -IH_RANGE_C"),
         check_use(header, "IH_RANGE_A IH_RANGE_BC IH_RANGE_C"),
-        check_code(lambda text: text.replace("((void)sizeof((value) >= (low) && (value) <= (high)))",
+        check_code(lambda text: text.replace("((void)sizeof((value) + (low) + (high)))",
                                              "((void)((value) == (low) ? *(volatile int *)0 : 0))"))[1],
     ]
     print("ranges_doc: %d of %d made-up mistakes told rightly" % (sum(map(bool, noticed)), len(noticed)))

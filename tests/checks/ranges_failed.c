@@ -9,12 +9,11 @@
 __extension__ __int128 ih_range_cast(__int128 value, __int128 low, __int128 high, const char *what,
                                      const char *file, int line);
 
-void ih_range_check(int64_t value, int64_t low, int64_t high, const char *what, const char *file,
-                    int line)
+void ih_range_check(int64_t value, int64_t low, int64_t high, const char *file, int line)
 {
     if (value < low || value > high) {
-        fprintf(stderr, "%s:%d: range: %s is %" PRId64 ", expected %" PRId64 " .. %" PRId64 "\n",
-                file, line, what, value, low, high);
+        fprintf(stderr, "%s:%d: range: %" PRId64 ", expected %" PRId64 " .. %" PRId64 "\n", file,
+                line, value, low, high);
         abort();
     }
 }
