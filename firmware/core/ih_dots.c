@@ -193,7 +193,9 @@ static int32_t greatest(const int16_t *response, int32_t count)
 {
     int16_t most = INT16_MIN;
     for (int32_t u = 0; u < count; u++) {
-        most = response[u] > most ? response[u] : most;
+        if (response[u] > most) {
+            most = response[u];
+        }
     }
     return most;
 }

@@ -80,8 +80,9 @@ static void flag_near(const struct ih_space *space, const int32_t centre_mm_q8[3
     for (int32_t slot = 0; slot < IH_SCAN_FLAGS; slot++) {
         int32_t off_x_mm = (depth_mm * scratch->slope_q12[0][slot] >> 12) + x_mm;
         int32_t off_y_mm = (depth_mm * scratch->slope_q12[1][slot] >> 12) + y_mm;
-        scratch->near[slot] = (uint8_t)((IH_WRAPS(uint32_t, off_x_mm) <= 2 * (uint32_t)half->x_mm) &
-                                        (IH_WRAPS(uint32_t, off_y_mm) <= 2 * (uint32_t)half->y_mm));
+        uint8_t in_x = IH_WRAPS(uint32_t, off_x_mm) <= 2 * (uint32_t)half->x_mm;
+        uint8_t in_y = IH_WRAPS(uint32_t, off_y_mm) <= 2 * (uint32_t)half->y_mm;
+        scratch->near[slot] = in_x & in_y;
     }
 }
 
