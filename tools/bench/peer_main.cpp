@@ -83,8 +83,8 @@ void take_turn(const bench_input &input, std::vector<peer> &peers)
     for (int set = 0; set < input.set_count; set++) {
         peer &p = peers[static_cast<size_t>(set)];
         p.has_head = false;
-        for (int i = 0; i < input.set[set].frame_count; i++) {
-            whole_ns += timed_frame(p, view_of(input.set[set].frame[i]));
+        for (int i = 0; i < input.sets[set].frame_count; i++) {
+            whole_ns += timed_frame(p, view_of(input.sets[set].frame[i]));
         }
     }
     std::printf("{\"whole\":%.0f", static_cast<double>(whole_ns) / input.frame_count);
@@ -99,8 +99,8 @@ void run_once(const bench_input &input, std::vector<peer> &peers, bool is_result
 {
     for (int set = 0; set < input.set_count; set++) {
         peer &p = peers[static_cast<size_t>(set)];
-        for (int i = 0; i < input.set[set].frame_count; i++) {
-            peer_frame(p, view_of(input.set[set].frame[i]));
+        for (int i = 0; i < input.sets[set].frame_count; i++) {
+            peer_frame(p, view_of(input.sets[set].frame[i]));
             if (is_results) {
                 print_result(p);
             }
@@ -126,7 +126,7 @@ int run(int argument_count, char **arguments)
     std::vector<peer> peers(static_cast<size_t>(input.set_count));
     for (int set = 0; set < input.set_count; set++) {
         peer_begin(peers[static_cast<size_t>(set)], kind == "a" ? peer_kind::a : peer_kind::b,
-                   peer_rig_read(input.set[set].rig_path));
+                   peer_rig_read(input.sets[set].rig_path));
     }
     if (mode != "--turns") {
         run_once(input, peers, mode == "--results");
