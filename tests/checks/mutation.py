@@ -128,7 +128,7 @@ class Bench:
     def build_golden(self):
         folder = os.path.join(ROOT, "tests", "golden")
         objects = []
-        for name in ("golden", "golden_hash", "golden_scene", "golden_host"):
+        for name in ("golden", "golden_hash", "golden_inner", "golden_scene", "golden_host"):
             objects.append(os.path.join(self.work, name + ".o"))
             run(COMPILE_TEST + ["-I", self.core, os.path.join(folder, name + ".c"), "-o", objects[-1]])
         self.golden_objects = objects
