@@ -100,15 +100,20 @@ need_deb() {
 }
 
 # clang's run-time libraries are a package of their own, with its version in the name.
-need_fuzz() {
-    need_program cmake cmake
-    need_program make make
+# clang with its sanitizers' and libFuzzer's libraries.
+need_clang_rt() {
     need_program clang clang
-    need_program afl-fuzz afl++
-    if ! [ -e "$(clang -print-file-name=libclang_rt.fuzzer-x86_64.a 2>/dev/null)" ]; then
+    if ! [ -e "$(clang -print-file-name="libclang_rt.fuzzer-$(uname -m).a" 2>/dev/null)" ]; then
         version=$(apt-cache depends clang 2>/dev/null | sed -n 's/.*Depends: clang-\([0-9]*\)$/\1/p')
         lacks "libclang-rt-${version:-14}-dev"
     fi
+}
+
+need_fuzz() {
+    need_program cmake cmake
+    need_program make make
+    need_clang_rt
+    need_program afl-fuzz afl++
 }
 
 need_test_board() {
@@ -179,6 +184,7 @@ test-image)
 test)
     need_sim
     need_bits
+    need_clang_rt
     need_python numpy python3-numpy
     need_python scipy python3-scipy
     need_program nm binutils
@@ -188,7 +194,7 @@ test)
     ;;
 ranges)
     need_sim
-    need_program clang clang
+    need_clang_rt
     need_header libv4l2.h libv4l-dev
     need_gpio
     ;;
@@ -218,8 +224,8 @@ bench)
     need_cross aarch64-linux-gnu arm64 aarch64
     need_program valgrind valgrind
     need_python numpy python3-numpy
-    [ -e /usr/include/opencv4/opencv2/calib3d.hpp ] || lacks libopencv-calib3d-dev
-    [ -e /usr/include/opencv4/opencv2/imgproc.hpp ] || lacks libopencv-imgproc-dev
+    # the package with what CMake looks for, not only the modules that are used
+    [ -e "/usr/lib/$(gcc -print-multiarch 2>/dev/null)/cmake/opencv4/OpenCVConfig.cmake" ] || lacks libopencv-dev
     [ -e /usr/include/eigen3/Eigen/Dense ] || lacks libeigen3-dev
     ;;
 bits)
