@@ -7,8 +7,8 @@
 #define INNER_WEIGHT 81 /* the outer box has 81 pixels, the inner kernel weight 16: */
 #define OUTER_WEIGHT 16 /* 81 inner - 16 outer has no response to a constant */
 #define RESPONSE_SHIFT 8
-/* Pixels that are filtered together: their sums take 8 bytes each of the stack. */
-#define SPAN 64
+/* Pixels that are filtered together: their sums take 4 bytes each of the stack. */
+#define SPAN 128
 
 struct ih_row ih_frame_row(const struct ih_frame *frame, int32_t v)
 {
@@ -19,6 +19,16 @@ struct ih_row ih_frame_row(const struct ih_frame *frame, int32_t v)
     };
 }
 
+/* The same where there is nothing to round, as with 8 bits: products of 16 bits. */
+static void grey_whole(const uint8_t *narrow, int32_t width, uint16_t maximum, uint16_t gain,
+                       uint16_t *grey_q4)
+{
+    for (int32_t u = 0; u < width; u++) {
+        uint16_t sample = narrow[u] < maximum ? narrow[u] : maximum;
+        grey_q4[u] = (uint16_t)(sample * gain);
+    }
+}
+
 void ih_row_grey(const struct ih_row *row, int32_t width, uint16_t *grey_q4)
 {
     const uint32_t maximum = (uint32_t)row->maximum;
@@ -26,6 +36,10 @@ void ih_row_grey(const struct ih_row *row, int32_t width, uint16_t *grey_q4)
     const uint32_t gain_q16 = (IH_BAND_FULL_Q4 * 65536u + maximum / 2) / maximum;
     const uint8_t *narrow = row->samples;
     const uint16_t *wide = row->samples;
+    if (row->bytes_per_sample == 1 && gain_q16 % 65536u == 0) {
+        grey_whole(narrow, width, (uint16_t)maximum, (uint16_t)(gain_q16 >> 16), grey_q4);
+        return;
+    }
     for (int32_t u = 0; u < width; u++) {
         uint32_t sample = row->bytes_per_sample == 1 ? narrow[u] : wide[u];
         if (sample > maximum) {
@@ -41,28 +55,40 @@ void ih_band_begin(struct ih_band *band, int32_t width)
     band->rows_in = 0;
 }
 
-/* Column sums with the newest row and without the one that leaves the ring. */
-static void move_ring(struct ih_band *band)
+/* Take the newest row into the box, and out of it the one that leaves the ring: sums over nine pixels
+ * of a row, threes first and then three of those. */
+static void move_box(struct ih_band *band)
 {
     const int32_t width = band->width;
-    const uint16_t *from = band->incoming_q4;
-    uint16_t *to = band->grey_q4[band->rows_in % IH_BAND_ROWS];
-    uint16_t *sum = &band->column_sum[IH_BAND_REACH];
-    if (band->rows_in == 0) {
-        memset(band->column_sum, 0, sizeof band->column_sum);
-    }
+    uint16_t *padded_q4 = band->padded_q4;
+    uint16_t *across = band->across[band->rows_in % IH_BAND_ROWS];
     if (band->rows_in < IH_BAND_ROWS) {
-        memset(to, 0, (size_t)width * sizeof *to);
+        memset(across, 0, (size_t)width * sizeof *across);
+    }
+    memcpy(&padded_q4[IH_BAND_REACH], band->incoming_q4, (size_t)width * sizeof *padded_q4);
+    for (int32_t i = 0; i < IH_BAND_REACH; i++) {
+        padded_q4[i] = band->incoming_q4[0];
+        padded_q4[IH_BAND_REACH + width + i] = band->incoming_q4[width - 1];
+    }
+    for (int32_t i = 0; i < width + 2 * IH_BAND_REACH - 2; i++) {
+        band->three[i] = (uint16_t)(padded_q4[i] + padded_q4[i + 1] + padded_q4[i + 2]);
     }
     for (int32_t u = 0; u < width; u++) {
-        sum[u] = (uint16_t)(sum[u] + from[u] - to[u]);
-        IH_IN_RANGE(sum[u], 0, IH_BAND_ROWS * IH_RANGE_GREY_Q4);
+        uint16_t sum = (uint16_t)(band->three[u] + band->three[u + 3] + band->three[u + 6]);
+        IH_IN_RANGE(sum, 0, IH_BAND_ROWS * IH_RANGE_GREY_Q4);
+        band->box[u] = band->box[u] + sum - across[u];
+        across[u] = sum;
     }
-    memcpy(to, from, (size_t)width * sizeof *to);
-    for (int32_t i = 1; i <= IH_BAND_REACH; i++) {
-        sum[-i] = sum[0];
-        sum[width - 1 + i] = sum[width - 1];
+}
+
+static void move_ring(struct ih_band *band)
+{
+    if (band->rows_in == 0) {
+        memset(band->box, 0, (size_t)band->width * sizeof band->box[0]);
     }
+    move_box(band);
+    memcpy(band->grey_q4[band->rows_in % IH_BAND_GREY_ROWS], band->incoming_q4,
+           (size_t)band->width * sizeof band->incoming_q4[0]);
     band->rows_in++;
 }
 
@@ -77,32 +103,24 @@ struct rows {
     const uint16_t *above, *middle, *below;
 };
 
-static int32_t column_of(const struct rows *rows, int32_t u)
+static uint16_t column_of(const struct rows *rows, int32_t u)
 {
-    return rows->above[u] + 2 * rows->middle[u] + rows->below[u];
+    return (uint16_t)(rows->above[u] + 2 * rows->middle[u] + rows->below[u]);
 }
 
-/* R of count pixels from u on; box: the sum around the first of them, moved on to the pixel after
- * the last. The box's running sum has each value wait for the one before; what is done to all pixels
- * alike stands in loops of its own, which compilers turn into vectors. */
+/* R of count pixels from u on. */
 static void filter_span(const struct ih_band *band, const struct rows *rows, int32_t u,
-                        int32_t count, int32_t *box, int16_t *response)
+                        int32_t count, int16_t *response)
 {
-    int32_t box_at[SPAN];
-    int32_t column[SPAN + 2]; /* one pixel more on both sides, repeated outside the frame */
-    const uint16_t *sum = &band->column_sum[u]; /* of the box around pixel u: from sum[0] on */
-    for (int32_t i = 0; i < count; i++) {
-        box_at[i] = *box;
-        *box += sum[i + IH_BAND_ROWS] - sum[i];
-    }
+    uint16_t column[SPAN + 2]; /* one pixel more on both sides, repeated outside the frame */
     for (int32_t i = 0; i < count; i++) {
         column[i + 1] = column_of(rows, u + i);
     }
     column[0] = column_of(rows, ih_max_s32(u - 1, 0));
     column[count + 1] = column_of(rows, ih_min_s32(u + count, band->width - 1));
     for (int32_t i = 0; i < count; i++) {
-        response[u + i] =
-            (int16_t)weighed(column[i] + 2 * column[i + 1] + column[i + 2], box_at[i]);
+        response[u + i] = (int16_t)weighed(column[i] + 2 * column[i + 1] + column[i + 2],
+                                           (int32_t)band->box[u + i]);
     }
 }
 
@@ -111,16 +129,12 @@ static void filter_row(const struct ih_band *band, int16_t *response)
 {
     const int32_t centre = band->rows_in - IH_BAND_REACH - 1;
     const struct rows rows = {
-        .above = band->grey_q4[(centre - 1) % IH_BAND_ROWS],
-        .middle = band->grey_q4[centre % IH_BAND_ROWS],
-        .below = band->grey_q4[(centre + 1) % IH_BAND_ROWS],
+        .above = band->grey_q4[(centre - 1) % IH_BAND_GREY_ROWS],
+        .middle = band->grey_q4[centre % IH_BAND_GREY_ROWS],
+        .below = band->grey_q4[(centre + 1) % IH_BAND_GREY_ROWS],
     };
-    int32_t box = 0;
-    for (int32_t i = 0; i < IH_BAND_ROWS; i++) {
-        box += band->column_sum[i];
-    }
     for (int32_t u = 0; u < band->width; u += SPAN) {
-        filter_span(band, &rows, u, ih_min_s32(SPAN, band->width - u), &box, response);
+        filter_span(band, &rows, u, ih_min_s32(SPAN, band->width - u), response);
     }
 }
 

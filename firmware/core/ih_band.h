@@ -8,8 +8,9 @@
  *        level of 8 bits.
  * Range: grey <= 4080, 4144 after an ambient frame was subtracted (ih_noise). I <= 66,304, so
  *        81 I <= 2^22.4, less what the nine bright pixels add to the box: |R| <= 18,648, 16 bits.
- *        Column sums of nine rows <= 37,296, 16 bits without sign.
- * Cost:  nine rows of 16 bits; about 20 operations per pixel.
+ *        Sums over nine pixels of a row <= 37,296, 16 bits without sign; over 81 <= 335,664.
+ * Cost:  fifteen rows of 16 bits; about 20 operations per pixel, none of which waits for its
+ *        neighbour's, so that vectors take 8 or 16 at once.
  * Error: R within half a unit (0.006 grey levels) of the exact filter; samples deeper than 8 bits are
  *        rounded to 12 bits before.
  */
@@ -37,13 +38,19 @@ struct ih_row {
     int32_t maximum;
 };
 
+/* The inner kernel's rows stand so far behind the newest one. */
+#define IH_BAND_GREY_ROWS (IH_BAND_REACH + 2)
+
 struct ih_band {
     int32_t width;
-    int32_t rows_in;                                    /* pushed so far, repeated ones included */
-    uint16_t incoming_q4[IH_FRAME_WIDTH_MAX];           /* the newest row */
-    uint16_t grey_q4[IH_BAND_ROWS][IH_FRAME_WIDTH_MAX]; /* ring of rows */
-    /* Of the rows in the ring; at the ends the first and the last are repeated. */
-    uint16_t column_sum[IH_FRAME_WIDTH_MAX + 2 * IH_BAND_REACH + 1]; /* the last is not used up */
+    int32_t rows_in;                          /* pushed so far, repeated ones included */
+    uint16_t incoming_q4[IH_FRAME_WIDTH_MAX]; /* the newest row */
+    uint16_t grey_q4[IH_BAND_GREY_ROWS][IH_FRAME_WIDTH_MAX]; /* ring of rows */
+    uint16_t across[IH_BAND_ROWS][IH_FRAME_WIDTH_MAX];       /* ring: nine pixels of a row */
+    uint32_t box[IH_FRAME_WIDTH_MAX];                        /* B: sum over the rows in across */
+    /* Of the newest row: edge pixels repeated outside, sums of three. */
+    uint16_t padded_q4[IH_FRAME_WIDTH_MAX + 2 * IH_BAND_REACH];
+    uint16_t three[IH_FRAME_WIDTH_MAX + 2 * IH_BAND_REACH];
 };
 
 struct ih_row ih_frame_row(const struct ih_frame *frame, int32_t v);

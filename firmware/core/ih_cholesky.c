@@ -1,5 +1,7 @@
 #include "ih_cholesky.h"
 
+#include <stdbool.h>
+
 #include "ih_fix.h"
 
 /* Mantissas of a solution stay below this: 144 products with |L| <= 1 in Q30 then sum below
@@ -20,24 +22,64 @@ static int64_t dot_q60(const int32_t *a_q30, const int32_t *b_q30, int32_t count
     return sum;
 }
 
+/* The same of two rows at once, so that each entry of the third is read for two products. */
+static void two_dots_q60(const int32_t *a_q30, const int32_t *b_q30, const int32_t *with_q30,
+                         int32_t count, int64_t sum_q60[2])
+{
+    int64_t sum_a = 0;
+    int64_t sum_b = 0;
+    for (int32_t k = 0; k < count; k++) {
+        sum_a += (int64_t)a_q30[k] * with_q30[k];
+        sum_b += (int64_t)b_q30[k] * with_q30[k];
+    }
+    sum_q60[0] = sum_a;
+    sum_q60[1] = sum_b;
+}
+
+/* L_ij from A_ij and what the entries before it take away. */
+static int32_t entry_q30(int32_t a_q30, int64_t taken_q60, int32_t pivot_q30, int32_t n)
+{
+    int64_t rest_q60 = (int64_t)a_q30 * (1 << 30) - taken_q60;
+    int32_t entry = ih_saturate_s32(ih_div_round(rest_q60, pivot_q30));
+    IH_IN_RANGE(entry, -(1 << 30) - n, (1 << 30) + n);
+    return entry;
+}
+
+/* The last entry of a row whose others are done. */
+static bool set_pivot(int32_t *row_q30, int32_t i)
+{
+    int64_t pivot_q60 = (int64_t)row_q30[i] * (1 << 30) - dot_q60(row_q30, row_q30, i);
+    row_q30[i] = pivot_q60 > 0 ? (int32_t)ih_isqrt_u64((uint64_t)pivot_q60) : 0;
+    return row_q30[i] != 0;
+}
+
+/* Two rows at a time: all entries but the last three first. */
 enum ih_err ih_cholesky_factor(int32_t *a_q30, int32_t n, int32_t *bad_pivot)
 {
     *bad_pivot = IH_NONE;
-    for (int32_t i = 0; i < n; i++) {
+    for (int32_t i = 0; i < n; i += 2) {
+        const bool is_last = i + 1 == n;
         int32_t *row = &a_q30[IH_CHOLESKY_PACKED(i)];
+        int32_t *next = &a_q30[IH_CHOLESKY_PACKED(is_last ? i : i + 1)]; /* or the same again */
         for (int32_t j = 0; j < i; j++) {
             const int32_t *other = row_of(a_q30, j);
-            int64_t rest_q60 = (int64_t)row[j] * (1 << 30) - dot_q60(row, other, j);
-            row[j] = ih_saturate_s32(ih_div_round(rest_q60, other[j]));
-            IH_IN_RANGE(row[j], -(1 << 30) - n, (1 << 30) + n);
+            int64_t taken_q60[2];
+            two_dots_q60(row, next, other, j, taken_q60);
+            const int32_t entry = entry_q30(row[j], taken_q60[0], other[j], n);
+            next[j] = entry_q30(next[j], taken_q60[1], other[j], n);
+            row[j] = entry;
         }
-        int64_t pivot_q60 = (int64_t)row[i] * (1 << 30) - dot_q60(row, row, i);
-        uint32_t root_q30 = pivot_q60 > 0 ? ih_isqrt_u64((uint64_t)pivot_q60) : 0;
-        if (root_q30 == 0) {
+        if (!set_pivot(row, i)) {
             *bad_pivot = i;
             return IH_ERR_NOT_POSITIVE;
         }
-        row[i] = (int32_t)root_q30;
+        if (!is_last) {
+            next[i] = entry_q30(next[i], dot_q60(next, row, i), row[i], n);
+            if (!set_pivot(next, i + 1)) {
+                *bad_pivot = i + 1;
+                return IH_ERR_NOT_POSITIVE;
+            }
+        }
     }
     return IH_OK;
 }
@@ -56,8 +98,9 @@ void ih_cholesky_solve(const int32_t *l_q30, int32_t n, const int32_t *b, int32_
     for (int32_t i = 0; i < n; i++) { /* L y = b */
         const int32_t *row = row_of(l_q30, i);
         int64_t rest = (int64_t)b[i] * (1 << 30) - dot_q60(row, x_mantissa, i);
-        x_mantissa[i] = ih_saturate_s32(ih_div_round(rest, row[i]));
-        IH_IN_RANGE(ih_div_round(rest, row[i]), INT32_MIN, INT32_MAX);
+        int64_t value = ih_div_round(rest, row[i]);
+        IH_IN_RANGE(value, INT32_MIN, INT32_MAX);
+        x_mantissa[i] = ih_saturate_s32(value);
     }
     int exponent = 0;
     for (int32_t i = n - 1; i >= 0; i--) { /* L^T x = y, in units of 2^exponent */

@@ -12,8 +12,6 @@
 #define SHIFT_MAX 2
 #define TWIN_PX_Q12 (3 * 4096)
 #define RING_PLACES 16
-/* Pixels of a row that are passed over together. */
-#define SPAN 16
 
 void ih_dots_params_default(struct ih_dots_params *params)
 {
@@ -200,25 +198,44 @@ static int32_t greatest(const int16_t *response, int32_t count)
     return most;
 }
 
+/* Pixels of a row between the centres of two blocks of the noise. */
+struct span {
+    int32_t v, first, end;
+    int32_t least; /* no threshold in between is lower */
+};
+
+static void find_in_span(struct ih_dots_scratch *scratch, struct ih_dots *out,
+                         const struct span *span, const uint16_t noise[IH_NOISE_BLOCKS_X])
+{
+    const int32_t v = span->v;
+    const int16_t *response = response_row(scratch, v);
+    for (int32_t u = span->first; u < span->end; u++) {
+        if (response[u] > span->least && is_maximum(scratch, u, v) &&
+            response[u] > threshold_of(&scratch->params, ih_noise_at(&scratch->noise, noise, u))) {
+            judge(scratch, out, u, v);
+        }
+    }
+}
+
 /* Row v has all its neighbours in the ring. Most of its spans have nothing above any threshold. */
 static void find_dots(struct ih_dots_scratch *scratch, struct ih_dots *out, int32_t v)
 {
     uint16_t noise[IH_NOISE_BLOCKS_X];
     const int32_t width = scratch->rows.finding.band.width;
-    const int16_t *response = response_row(scratch, v);
-    const int32_t least = threshold_of(&scratch->params, ih_noise_row(&scratch->noise, v, noise));
-    for (int32_t first = 0; first < width; first += SPAN) {
-        const int32_t end = ih_min_s32(first + SPAN, width);
-        if (greatest(&response[first], end - first) <= least) {
-            continue;
+    const int32_t last = scratch->noise.columns - 1;
+    struct span span = {.v = v};
+    (void)ih_noise_row(&scratch->noise, v, noise);
+    int32_t column = 0;
+    while (span.first < width) {
+        const int32_t left = noise[ih_max_s32(column - 1, 0)];
+        const int32_t right = noise[ih_min_s32(column, last)];
+        span.end = ih_min_s32(column * IH_NOISE_BLOCK + IH_NOISE_BLOCK / 2, width);
+        span.least = threshold_of(&scratch->params, ih_min_s32(left, right));
+        if (greatest(&response_row(scratch, v)[span.first], span.end - span.first) > span.least) {
+            find_in_span(scratch, out, &span, noise);
         }
-        for (int32_t u = first; u < end; u++) {
-            if (response[u] > least && is_maximum(scratch, u, v) &&
-                response[u] >
-                    threshold_of(&scratch->params, ih_noise_at(&scratch->noise, noise, u))) {
-                judge(scratch, out, u, v);
-            }
-        }
+        span.first = span.end;
+        column++;
     }
 }
 

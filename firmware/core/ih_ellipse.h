@@ -1,36 +1,25 @@
 /* ih_ellipse - the ellipse of a polygon by its area moments, and the elliptical part of a contour
  * (paper, section 3.2).
  *
- * In:    a polygon on the grid; for the part also a place that it must surround.
+ * In:    a polygon on the grid; for the part its outline, and a place that it must surround.
  * Out:   area, centre and second moments; shape = 4 pi sqrt(det) / area, det that of the
  *        covariance: 1 for an ellipse and greater for everything else.
  * Way:   moments are sums over the edges, so prefix sums give those of any part closed by its
- *        chord. The contour is resampled to IH_ELLIPSE_POINTS equal steps; of all parts that wind
- *        round the place with chord <= chord_max arc, that have at least 8 of the steps, and that
- *        are elliptical, the one with the greatest arc - 1.6 chord - 8 (shape - 1) arc is taken.
+ *        chord. Of all parts that the outline leaves (IH_PARTS_STEPS_MIN of its steps at least,
+ *        chord <= chord_max arc), that wind round the place and are elliptical, the one with the
+ *        greatest arc - 1.6 chord - 8 (shape - 1) arc is taken.
  *        No simple polygon has a shape below 1: a part with less (1/256 is left for rounding)
  *        crosses its own chord and is refused, as is an area below half a grid cell.
  * Scaling and overflow: coordinates relative to the place, Q8 steps: |p| below 46 * 256 * 1.42 =
  *        2^14.1. An edge's cross product is at most |p| |edge|, its second-order factor at most
  *        3 * 2^27.1. Edges of a contour are shorter than 1.42 steps = 2^8.6: 2048 terms of
  *        2^(14.1 + 8.6 + 28.7) sum below 2^62.4. Edges of a resampled one are at most
- *        IH_ELLIPSE_VERTICES_MAX / 55 * 1.42 steps = 2^12.4: 112 terms of 2^55.2 below 2^62.1.
+ *        IH_PARTS_VERTICES_MAX / 55 * 1.42 steps = 2^12.4: 112 terms of 2^55.2 below 2^62.1.
  */
 #ifndef IH_ELLIPSE_H
 #define IH_ELLIPSE_H
 
-#include "ih_cuts.h"
-
-#define IH_ELLIPSE_POINTS 56
-/* Longer contours are not searched for an elliptical part; it bounds the sums above. */
-#define IH_ELLIPSE_VERTICES_MAX 768
-
-struct ih_ellipse_params {
-    int32_t shape_max_q16;        /* most that shape may be for an ellipse */
-    int32_t ratio_closed_max_q16; /* axis ratio of a closed contour, of a cut part */
-    int32_t ratio_part_max_q16;
-    int32_t chord_max_q16; /* chord / arc of a cut part */
-};
+#include "ih_parts.h"
 
 /* In grid steps. Second moments are central, per area. */
 struct ih_ellipse {
@@ -51,11 +40,8 @@ struct ih_moments {
 };
 
 struct ih_ellipse_scratch {
-    int32_t x_q8[2 * IH_ELLIPSE_POINTS], y_q8[2 * IH_ELLIPSE_POINTS]; /* resampled, twice round */
-    struct ih_moments prefix[2 * IH_ELLIPSE_POINTS]; /* of the edges before each point */
+    struct ih_moments prefix[2 * IH_PARTS_POINTS]; /* of an outline's edges before each point */
 };
-
-void ih_ellipse_params_default(struct ih_ellipse_params *params);
 
 /* Moments of a closed contour. False when it has no area. */
 bool ih_ellipse_of_contour(const struct ih_cuts *cuts, const struct ih_contour *contour,
@@ -66,9 +52,10 @@ bool ih_ellipse_of_contour(const struct ih_cuts *cuts, const struct ih_contour *
 int32_t ih_ellipse_winding(const struct ih_cuts *cuts, const struct ih_contour *contour,
                            struct ih_vertex place);
 
-/* The best elliptical part of an open or closed contour around the place. False when none. */
-bool ih_ellipse_of_part(const struct ih_cuts *cuts, const struct ih_contour *contour,
-                        struct ih_vertex place, const struct ih_ellipse_params *params,
-                        struct ih_ellipse_scratch *scratch, struct ih_ellipse *out);
+/* The best elliptical part of an outline around the place, a whole number of Q8 as a node is; params
+ * as the outline was made with. False when none. */
+bool ih_ellipse_of_part(const struct ih_parts *parts, struct ih_vertex place,
+                        const struct ih_ellipse_params *params, struct ih_ellipse_scratch *scratch,
+                        struct ih_ellipse *out);
 
 #endif

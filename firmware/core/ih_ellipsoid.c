@@ -51,13 +51,36 @@ static bool in_reach(int64_t place_q14)
     return ih_abs_s64(place_q14) <= REACH_Q14;
 }
 
+struct ih_aim ih_ellipsoid_aim(const int32_t semi_mm_q8[3], const struct ih_ray *ray)
+{
+    const int32_t slope_q20[2] = {ray->slope_x_q20, ray->slope_y_q20};
+    struct ih_aim aim = {.gg_q28 = (int64_t)1 << 28};
+    for (int axis = 0; axis < 2; axis++) {
+        int64_t g_q14 = ih_div_round(ih_shift_round((int64_t)slope_q20[axis] * semi_mm_q8[2], 6),
+                                     semi_mm_q8[axis]);
+        aim.g_q14[axis] = (int32_t)g_q14;
+        aim.gg_q28 += g_q14 * g_q14;
+    }
+    return aim;
+}
+
 bool ih_ellipsoid_cross(const struct ih_ellipsoid *ellipsoid, const int32_t origin_mm_q8[3],
                         const struct ih_ray *ray, struct ih_crossing *out)
 {
+    const struct ih_aim aim = ih_ellipsoid_aim(ellipsoid->semi_mm_q8, ray);
+    return ih_ellipsoid_cross_aimed(ellipsoid, origin_mm_q8, ray, &aim, out);
+}
+
+bool ih_ellipsoid_cross_aimed(const struct ih_ellipsoid *ellipsoid, const int32_t origin_mm_q8[3],
+                              const struct ih_ray *ray, const struct ih_aim *aim,
+                              struct ih_crossing *out)
+{
     const int32_t slope_q20[2] = {ray->slope_x_q20, ray->slope_y_q20};
+    const int64_t g_q14[2] = {aim->g_q14[0], aim->g_q14[1]};
+    const int64_t gg_q28 = aim->gg_q28;
     int64_t depth_q8 = (int64_t)ellipsoid->centre_mm_q8[2] - origin_mm_q8[2];
     int32_t deep_q8 = ellipsoid->semi_mm_q8[2];
-    int64_t g_q14[2], e_q14[2];
+    int64_t e_q14[2];
     for (int axis = 0; axis < 2; axis++) {
         int64_t offset_q8 = origin_mm_q8[axis] + ih_mul_shift(depth_q8, slope_q20[axis], 20) -
                             ellipsoid->centre_mm_q8[axis];
@@ -65,10 +88,7 @@ bool ih_ellipsoid_cross(const struct ih_ellipsoid *ellipsoid, const int32_t orig
         if (!in_reach(e_q14[axis])) {
             return false;
         }
-        g_q14[axis] = ih_div_round(ih_shift_round((int64_t)slope_q20[axis] * deep_q8, 6),
-                                   ellipsoid->semi_mm_q8[axis]);
     }
-    int64_t gg_q28 = ((int64_t)1 << 28) + g_q14[0] * g_q14[0] + g_q14[1] * g_q14[1];
     int64_t eg_q28 = e_q14[0] * g_q14[0] + e_q14[1] * g_q14[1];
     int64_t ee_q28 = e_q14[0] * e_q14[0] + e_q14[1] * e_q14[1];
     int64_t tau_q14 = -ih_div_round(eg_q28 * (1 << 14), gg_q28);

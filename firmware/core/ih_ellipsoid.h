@@ -48,6 +48,19 @@ struct ih_ellipsoid_box {
 /* The mean adult head, hair included. */
 struct ih_ellipsoid ih_ellipsoid_mean(const int32_t centre_mm_q8[3]);
 
+/* What a crossing needs of the ray's direction: the same wherever an ellipsoid of this size stands. */
+struct ih_aim {
+    int32_t g_q14[2];
+    int64_t gg_q28; /* 1 + g.g */
+};
+
+struct ih_aim ih_ellipsoid_aim(const int32_t semi_mm_q8[3], const struct ih_ray *ray);
+
+/* ih_ellipsoid_cross with the aim worked out before. */
+bool ih_ellipsoid_cross_aimed(const struct ih_ellipsoid *ellipsoid, const int32_t origin_mm_q8[3],
+                              const struct ih_ray *ray, const struct ih_aim *aim,
+                              struct ih_crossing *out);
+
 /* False: far away, *out is not set. */
 bool ih_ellipsoid_cross(const struct ih_ellipsoid *ellipsoid, const int32_t origin_mm_q8[3],
                         const struct ih_ray *ray, struct ih_crossing *out);

@@ -31,9 +31,9 @@
  *        Against the truth in these scenes, starts 35 mm off: at most 5 mm for a mean head, 10 for
  *        one a tenth larger in every direction. A fifth of all dots anywhere between 0.5 and 2.5 m:
  *        17 mm (median of 30 fits; worst 56), because wrong dots behind the head push.
- * Cost:  steps x (a crossing for each point + points in reach x 27 products), one Cholesky of 6
- *        a step. 1.3 million instructions a fit with 320 points (x86-64, gcc -O3, frames of
- *        sequence 1).
+ * Cost:  steps x (a box test for each point + a crossing for each that passes + points in reach
+ *        x 27 products), one Cholesky of 6 a step. 0.5 million instructions a fit with 320 points
+ *        (x86-64, gcc -O3, frames of sequence 1).
  */
 #ifndef IH_FIT_H
 #define IH_FIT_H

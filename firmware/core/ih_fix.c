@@ -4,31 +4,6 @@
 
 _Static_assert((-3 >> 1) == -2, "right shift of negative values must be arithmetic");
 
-int64_t ih_mul_wide_shift(int64_t a, uint32_t b, int shift)
-{
-    IH_IN_RANGE(shift, 32, 62);
-    /* a = high * 2^32 + low with 0 <= low < 2^32, so a * b = high * b * 2^32 + low * b. */
-    int64_t high = a >> 32;
-    uint64_t low = IH_WRAPS(uint64_t, a) & UINT32_MAX; /* the low half of two's complement */
-    uint64_t low_product = low * b;
-    /* |high| <= 2^31 and b < 2^32 keep this below 2^63; the carry adds less than 2^32. */
-    int64_t upper = high * (int64_t)b + (int64_t)(low_product >> 32);
-    uint64_t lower = low_product & UINT32_MAX;
-
-    /* The product is upper * 2^32 + lower; divide by 2^shift with shift >= 32. */
-    int rest = shift - 32;
-    if (rest == 0) {
-        return upper + (int64_t)(lower >> 31);
-    }
-    return ih_shift_round(upper, rest); /* lower is below half a unit of the last place or a tie's
-                                         * upper side: rounding half upwards ignores it */
-}
-
-int ih_bits_u64(uint64_t value)
-{
-    return value == 0 ? 0 : 64 - __builtin_clzll(value);
-}
-
 /* 1 / sqrt(m) in Q15 at m = 64/256, 65/256 .. 256/256, lowered by as much as a chord between two of
  * them lies above the curve: what is read between them is never too great, and at most 2^-13.7 too
  * small. Written by tools/oracle/isqrt_table.py. */
@@ -80,6 +55,25 @@ uint32_t ih_isqrt_u64(uint64_t value)
         root++;
     }
     return (uint32_t)(root >> half);
+}
+
+void ih_roots_u54(const uint64_t *square, int32_t count, uint32_t *root)
+{
+    /* As above, but with one correction, rounded at once: at 2^31 .. 2^32 it is short by 36, and the
+     * values are small enough for at most 36 / 2^5 of that to be left. */
+    for (int32_t i = 0; i < count; i++) {
+        const int half = __builtin_clzll(square[i]) / 2; /* none is 0 */
+        const uint64_t shifted = square[i] << (2 * half);
+        const uint64_t r_q15 = inverse_root_q15((uint32_t)(shifted >> 32));
+        uint64_t wide = ((shifted >> 32) * r_q15) >> 15;
+        wide += ((shifted - wide * wide) >> 16) * r_q15 >> 32;
+        int64_t nearest = (int64_t)(wide >> half);
+        for (int64_t rest = (int64_t)square[i] - nearest * nearest; rest > nearest;
+             rest -= 2 * nearest - 1) {
+            nearest++;
+        }
+        root[i] = (uint32_t)nearest;
+    }
 }
 
 /* atan(2^-i) in millionths of a degree. */

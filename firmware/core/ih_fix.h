@@ -30,7 +30,25 @@ static inline int64_t ih_mul_shift(int64_t a, int64_t b, int shift)
 
 /* a * b / 2^shift, rounded, where the product may need 95 bits but the result fits 63.
  * b is not negative; shift 32..62. Done in two 64-bit halves, exact to the last bit. */
-int64_t ih_mul_wide_shift(int64_t a, uint32_t b, int shift);
+static inline int64_t ih_mul_wide_shift(int64_t a, uint32_t b, int shift)
+{
+    IH_IN_RANGE(shift, 32, 62);
+    /* a = high * 2^32 + low with 0 <= low < 2^32, so a * b = high * b * 2^32 + low * b. */
+    int64_t high = a >> 32;
+    uint64_t low = IH_WRAPS(uint64_t, a) & UINT32_MAX; /* the low half of two's complement */
+    uint64_t low_product = low * b;
+    /* |high| <= 2^31 and b < 2^32 keep this below 2^63; the carry adds less than 2^32. */
+    int64_t upper = high * (int64_t)b + (int64_t)(low_product >> 32);
+    uint64_t lower = low_product & UINT32_MAX;
+
+    /* The product is upper * 2^32 + lower; divide by 2^shift with shift >= 32. */
+    int rest = shift - 32;
+    if (rest == 0) {
+        return upper + (int64_t)(lower >> 31);
+    }
+    return ih_shift_round(upper, rest); /* lower is below half a unit of the last place or a tie's
+                                         * upper side: rounding half upwards ignores it */
+}
 
 /* numerator / denominator rounded to nearest, halves away from zero; denominator > 0,
  * |numerator| + denominator / 2 < 2^63. */
@@ -94,8 +112,14 @@ static inline int64_t ih_distance2_s32(const int32_t a[3], const int32_t b[3])
 /* floor(sqrt(value)), exact for all 2^64 inputs. */
 uint32_t ih_isqrt_u64(uint64_t value);
 
+/* Square roots of whole numbers, rounded to nearest; each in 1 .. 2^54 - 1. */
+void ih_roots_u54(const uint64_t *square, int32_t count, uint32_t *root);
+
 /* Number of bits needed for value; 0 for 0. */
-int ih_bits_u64(uint64_t value);
+static inline int ih_bits_u64(uint64_t value)
+{
+    return value == 0 ? 0 : 64 - __builtin_clzll(value);
+}
 
 /* Angle of (x, y) from +x towards +y in thousandths of a degree, (-180000, 180000]; 0 for (0, 0).
  * |x|, |y| <= 2^40. Within 2 mdeg of atan2. */

@@ -88,37 +88,76 @@ static int32_t area_mm2(const struct ih_surface *surface, int32_t level_mm_q8, i
     return ih_saturate_s32(ih_mul_wide_shift(square_q16, (uint32_t)area_q16, 32));
 }
 
-/* The ellipse that supports the nest at this level: the closed contour around its minimum when it
- * is one, else the best elliptical part of that contour or of an open one. */
-static bool find_support(const struct ih_nest *nest, const struct ih_hypotheses_params *params,
-                         struct ih_hypotheses_scratch *scratch, struct ih_slice *out)
+/* What a contour is for every nest that it surrounds. */
+struct study {
+    bool whole; /* a closed contour that is an ellipse */
+    bool is_searched;
+    struct ih_ellipse ellipse;
+};
+
+static struct study study_contour(const struct ih_contour *contour,
+                                  const struct ih_ellipse_params *params,
+                                  struct ih_hypotheses_scratch *scratch)
+{
+    struct study study = {.is_searched = false};
+    study.whole = contour->closed &&
+                  ih_ellipse_of_contour(&scratch->cuts, contour, &study.ellipse) &&
+                  study.ellipse.shape_q16 <= params->shape_max_q16 &&
+                  study.ellipse.ratio_q16 <= params->ratio_closed_max_q16;
+    if (!study.whole) {
+        study.is_searched = ih_parts_make(&scratch->cuts, contour, params, &scratch->parts);
+    }
+    return study;
+}
+
+/* May the contour support a nest at this minimum? An open one winds round nothing by itself. */
+static bool surrounds(const struct ih_cuts *cuts, const struct ih_contour *contour,
+                      const struct ih_box *box, struct ih_vertex minimum)
+{
+    return ih_box_holds(box, minimum) &&
+           (!contour->closed || ih_ellipse_winding(cuts, contour, minimum) == 1);
+}
+
+static void take_support(const struct study *study, const struct ih_ellipse_params *params,
+                         struct ih_hypotheses_scratch *scratch, struct ih_vertex minimum,
+                         struct ih_support *support)
+{
+    struct ih_ellipse part;
+    if (study->whole) {
+        *support = (struct ih_support){
+            .wanted = true, .found = true, .whole = true, .ellipse = study->ellipse};
+    } else if (study->is_searched &&
+               ih_ellipse_of_part(&scratch->parts, minimum, params, &scratch->ellipse, &part) &&
+               (!support->found || part.merit_q8 > support->ellipse.merit_q8)) {
+        *support = (struct ih_support){.wanted = true, .found = true, .ellipse = part};
+    }
+}
+
+/* The ellipses that support the nests at this level: the closed contour around a minimum when it is
+ * one, else the best elliptical part of that contour or of an open one. A contour is studied when
+ * the first nest asks for it. */
+static void find_supports(const struct ih_hypotheses *nests, const struct ih_ellipse_params *params,
+                          struct ih_hypotheses_scratch *scratch)
 {
     const struct ih_cuts *cuts = &scratch->cuts;
-    bool found = false;
-    out->whole = false;
-    for (int32_t i = 0; i < cuts->contour_count; i++) {
-        const struct ih_contour *contour = &cuts->contour[i];
-        struct ih_ellipse ellipse;
-        if (contour->closed) {
-            if (ih_ellipse_winding(cuts, contour, nest->minimum) != 1) {
+    for (int32_t c = 0; c < cuts->contour_count; c++) {
+        const struct ih_contour *contour = &cuts->contour[c];
+        const struct ih_box box = ih_parts_box(cuts, contour);
+        struct study study;
+        bool is_studied = false;
+        for (int32_t i = 0; i < nests->nest_count; i++) {
+            struct ih_support *support = &scratch->support[i];
+            const struct ih_vertex minimum = nests->nest[i].minimum;
+            if (!support->wanted || support->whole || !surrounds(cuts, contour, &box, minimum)) {
                 continue;
             }
-            if (ih_ellipse_of_contour(cuts, contour, &ellipse) &&
-                ellipse.shape_q16 <= params->ellipse.shape_max_q16 &&
-                ellipse.ratio_q16 <= params->ellipse.ratio_closed_max_q16) {
-                out->ellipse = ellipse;
-                out->whole = true;
-                return true;
+            if (!is_studied) {
+                study = study_contour(contour, params, scratch);
+                is_studied = true;
             }
-        }
-        if (ih_ellipse_of_part(cuts, contour, nest->minimum, &params->ellipse, &scratch->ellipse,
-                               &ellipse) &&
-            (!found || ellipse.merit_q8 > out->ellipse.merit_q8)) {
-            out->ellipse = ellipse;
-            found = true;
+            take_support(&study, params, scratch, minimum, support);
         }
     }
-    return found;
 }
 
 /* Does the slice continue the nest? */
@@ -177,29 +216,50 @@ static void add_slice(struct ih_slice *slice, int32_t level_mm_q8,
     }
 }
 
-static void extend_nest(const struct ih_surface *surface, int32_t level_mm_q8,
-                        const struct ih_hypotheses_params *params,
-                        struct ih_hypotheses_scratch *scratch, struct ih_nest *nest)
+/* Is the nest still open at this level? One that has become too deep or too long ends here. */
+static bool is_open(int32_t level_mm_q8, const struct ih_hypotheses_params *params,
+                    struct ih_nest *nest)
 {
     if (level_mm_q8 <= nest->nearest_mm_q8 || nest->ended) {
-        return;
+        return false;
     }
-    if ((nest->slice_count > 0 && level_mm_q8 - nest->front_mm_q8 > params->depth_max_mm << 8) ||
-        nest->slice_count == IH_HYPOTHESES_SLICES_MAX) {
-        nest->ended = true;
-        return;
-    }
-    struct ih_slice slice;
-    if (!find_support(nest, params, scratch, &slice)) {
+    nest->ended =
+        (nest->slice_count > 0 && level_mm_q8 - nest->front_mm_q8 > params->depth_max_mm << 8) ||
+        nest->slice_count == IH_HYPOTHESES_SLICES_MAX;
+    return !nest->ended;
+}
+
+static void extend_nest(const struct ih_surface *surface, int32_t level_mm_q8,
+                        const struct ih_hypotheses_params *params, const struct ih_support *support,
+                        struct ih_nest *nest)
+{
+    if (!support->found) {
         nest->gap++;
         nest->ended = nest->gap > params->gap_max;
         return;
     }
     nest->gap = 0;
+    struct ih_slice slice = {.ellipse = support->ellipse, .whole = support->whole};
     IH_IN_RANGE(slice.ellipse.area_q16, 1, IH_RANGE_AREA_Q16);
     IH_IN_RANGE(level_mm_q8, -IH_RANGE_LEVEL_MM_Q8, IH_RANGE_LEVEL_MM_Q8);
     slice.area_mm2 = area_mm2(surface, level_mm_q8, slice.ellipse.area_q16);
     add_slice(&slice, level_mm_q8, params, nest);
+}
+
+static void extend_nests(const struct ih_surface *surface, int32_t level_mm_q8,
+                         const struct ih_hypotheses_params *params,
+                         struct ih_hypotheses_scratch *scratch, struct ih_hypotheses *out)
+{
+    for (int32_t i = 0; i < out->nest_count; i++) {
+        scratch->support[i] =
+            (struct ih_support){.wanted = is_open(level_mm_q8, params, &out->nest[i])};
+    }
+    find_supports(out, &params->ellipse, scratch);
+    for (int32_t i = 0; i < out->nest_count; i++) {
+        if (scratch->support[i].wanted) {
+            extend_nest(surface, level_mm_q8, params, &scratch->support[i], &out->nest[i]);
+        }
+    }
 }
 
 bool ih_hypotheses_level(const struct ih_surface *surface,
@@ -237,8 +297,6 @@ void ih_hypotheses_find(const struct ih_surface *surface, const struct ih_hypoth
          ih_hypotheses_level(surface, params, index, &level_mm_q8) && any_alive(out); index++) {
         ih_cuts_level(surface, level_mm_q8, &scratch->cuts);
         out->contours_dropped += scratch->cuts.contours_dropped;
-        for (int32_t i = 0; i < out->nest_count; i++) {
-            extend_nest(surface, level_mm_q8, params, scratch, &out->nest[i]);
-        }
+        extend_nests(surface, level_mm_q8, params, scratch, out);
     }
 }

@@ -58,9 +58,18 @@ struct ih_hypotheses {
     struct ih_nest nest[IH_HYPOTHESES_MAX];
 };
 
+/* What supports a nest at a level. */
+struct ih_support {
+    bool wanted, found;
+    bool whole; /* the last word: a closed contour */
+    struct ih_ellipse ellipse;
+};
+
 struct ih_hypotheses_scratch {
     struct ih_cuts cuts;
+    struct ih_parts parts; /* of one contour at a time */
     struct ih_ellipse_scratch ellipse;
+    struct ih_support support[IH_HYPOTHESES_MAX];
 };
 
 void ih_hypotheses_params_default(struct ih_hypotheses_params *params);

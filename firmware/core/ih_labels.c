@@ -79,30 +79,88 @@ static void add_candidate(const struct ih_dots *dots, struct ih_candidate candid
     list[at] = candidate;
 }
 
+/* The dots' numbers in the order of their undistorted rows, so that a line need not look at all. The
+ * dots come nearly so. */
+static void order_dots(int32_t count, struct ih_labels_scratch *scratch)
+{
+    for (int32_t i = 0; i < count; i++) {
+        int32_t at = i;
+        for (; at > 0 && scratch->v_px_q12[scratch->by_row[at - 1]] > scratch->v_px_q12[i]; at--) {
+            scratch->by_row[at] = scratch->by_row[at - 1];
+        }
+        scratch->by_row[at] = (int16_t)i;
+    }
+}
+
+/* How many dots lie above a row. */
+static int32_t dots_above(const struct ih_labels_scratch *scratch, int32_t count, int64_t v_px_q12)
+{
+    int32_t low = 0, high = count;
+    while (low < high) {
+        int32_t middle = (low + high) / 2;
+        if (scratch->v_px_q12[scratch->by_row[middle]] < v_px_q12) {
+            low = middle + 1;
+        } else {
+            high = middle;
+        }
+    }
+    return low;
+}
+
+/* Rows between which a line's candidates lie: those of its ends, which the margins move by at most
+ * their sum; 4 steps for what is rounded. */
+struct row_range {
+    int64_t first_px_q12, last_px_q12;
+};
+
+static struct row_range rows_of_line(const struct ih_line *line,
+                                     const struct ih_labels_params *params)
+{
+    const int64_t margin = (int64_t)params->perp_max_px_q12 + RANGE_MARGIN_PX_Q12 + 4;
+    const int64_t far =
+        line->infinity_v_px_q12 + ih_mul_shift(line->t_far_px_q12, line->dir_v_q30, 30);
+    const int64_t near =
+        line->infinity_v_px_q12 + ih_mul_shift(line->t_near_px_q12, line->dir_v_q30, 30);
+    return (struct row_range){(far < near ? far : near) - margin,
+                              (far < near ? near : far) + margin};
+}
+
+/* A dot that lies on the slot's line, in the working range, becomes its candidate. */
+static void try_candidate(const struct ih_dots *dots, const struct ih_line *line, int32_t slot,
+                          int32_t dot, const struct ih_labels_params *params,
+                          struct ih_labels_scratch *scratch, struct ih_labels *out)
+{
+    int64_t perp = beside_line(scratch, dot, line);
+    if (ih_abs_s64(perp) > params->perp_max_px_q12) {
+        return;
+    }
+    int64_t t = along_line(scratch, dot, line);
+    if (t < line->t_far_px_q12 - RANGE_MARGIN_PX_Q12 ||
+        t > line->t_near_px_q12 + RANGE_MARGIN_PX_Q12 || t <= 0) {
+        return;
+    }
+    struct ih_candidate candidate = {
+        /* t in Q12 over length in Q8: 36 + 8 - 12 = 32 more bits give Q36 */
+        .inverse_depth_q36 =
+            ih_saturate_s32(ih_div_round(t * ((int64_t)1 << 32), line->length_px_mm_q8)),
+        .perp_px_q12 = (int16_t)perp,
+        .dot = (int16_t)dot,
+    };
+    IH_IN_RANGE(candidate.inverse_depth_q36, 1, IH_RANGE_INVERSE_DEPTH_Q36);
+    add_candidate(dots, candidate, slot, scratch, out);
+}
+
 /* Candidates of one slot. */
 static void find_candidates(const struct ih_dots *dots, const struct ih_line *line, int32_t slot,
                             const struct ih_labels_params *params,
                             struct ih_labels_scratch *scratch, struct ih_labels *out)
 {
+    const struct row_range rows = rows_of_line(line, params);
+    const int32_t end = dots_above(scratch, dots->dot_count, rows.last_px_q12 + 1);
     scratch->candidate_count[slot] = 0;
     scratch->choice[slot] = IH_NONE;
-    for (int32_t i = 0; i < dots->dot_count; i++) {
-        int64_t perp = beside_line(scratch, i, line);
-        int64_t t = along_line(scratch, i, line);
-        if (ih_abs_s64(perp) > params->perp_max_px_q12 ||
-            t < line->t_far_px_q12 - RANGE_MARGIN_PX_Q12 ||
-            t > line->t_near_px_q12 + RANGE_MARGIN_PX_Q12 || t <= 0) {
-            continue;
-        }
-        struct ih_candidate candidate = {
-            /* t in Q12 over length in Q8: 36 + 8 - 12 = 32 more bits give Q36 */
-            .inverse_depth_q36 =
-                ih_saturate_s32(ih_div_round(t * ((int64_t)1 << 32), line->length_px_mm_q8)),
-            .perp_px_q12 = (int16_t)perp,
-            .dot = (int16_t)i,
-        };
-        IH_IN_RANGE(candidate.inverse_depth_q36, 1, IH_RANGE_INVERSE_DEPTH_Q36);
-        add_candidate(dots, candidate, slot, scratch, out);
+    for (int32_t i = dots_above(scratch, dots->dot_count, rows.first_px_q12); i < end; i++) {
+        try_candidate(dots, line, slot, scratch->by_row[i], params, scratch, out);
     }
 }
 
@@ -131,26 +189,74 @@ static uint64_t rectangle_error2(const struct ih_labels_scratch *scratch,
     return (uint64_t)((u * u + v * v + 9 * perp2) / 4);
 }
 
-/* The best and the second best choice of candidates for a rectangle. */
+/* The best and the second best choice of candidates for a rectangle; the last corner's candidates in
+ * the order of their places on its line. */
 struct seed_search {
     uint64_t best2, second2;
     int8_t choice[4];
+    const struct ih_line *line; /* of the last corner */
+    int64_t reach_px_q12; /* a last corner farther than this from where it should be is none */
+    int32_t last_count;
+    int64_t last_t_px_q12[IH_LABELS_CANDIDATES_MAX];
+    int8_t last_choice[IH_LABELS_CANDIDATES_MAX];
 };
 
-/* Try every candidate of the last corner with the three that are chosen. */
+/* An error beyond seed_max + seed_margin decides nothing: such a choice is no seed, and no second best
+ * one that is too near. The error is at least half of the last corner's distance; 4 steps for what is
+ * rounded. */
+static void begin_search(const struct ih_labels_scratch *scratch, const struct ih_line *line,
+                         int32_t slot, const struct ih_labels_params *params,
+                         struct seed_search *out)
+{
+    *out = (struct seed_search){.best2 = UINT64_MAX, .second2 = UINT64_MAX, .line = line};
+    out->reach_px_q12 =
+        2 * ((int64_t)params->seed_max_px_q12 + ih_max_s32(params->seed_margin_px_q12, 0)) + 4;
+    for (int8_t i = 0; i < scratch->candidate_count[slot]; i++) {
+        const int64_t t = along_line(scratch, candidate_of(scratch, slot, i)->dot, line);
+        int32_t at = out->last_count++;
+        for (; at > 0 && out->last_t_px_q12[at - 1] > t; at--) {
+            out->last_t_px_q12[at] = out->last_t_px_q12[at - 1];
+            out->last_choice[at] = out->last_choice[at - 1];
+        }
+        out->last_t_px_q12[at] = t;
+        out->last_choice[at] = i;
+    }
+}
+
+/* Where the last corner should be on its line, for three that are chosen. */
+static int64_t expected_t_px_q12(const struct ih_labels_scratch *scratch,
+                                 const struct ih_candidate *const corner[4],
+                                 const struct ih_line *line)
+{
+    const int32_t *u = scratch->u_px_q12;
+    const int32_t *v = scratch->v_px_q12;
+    const int64_t u_px_q12 = (int64_t)u[corner[1]->dot] + u[corner[2]->dot] - u[corner[0]->dot];
+    const int64_t v_px_q12 = (int64_t)v[corner[1]->dot] + v[corner[2]->dot] - v[corner[0]->dot];
+    return ih_shift_round((u_px_q12 - line->infinity_u_px_q12) * line->dir_u_q30 +
+                              (v_px_q12 - line->infinity_v_px_q12) * line->dir_v_q30,
+                          30);
+}
+
+/* Try the candidates of the last corner with the three that are chosen. */
 static void try_last_corner(const struct ih_labels_scratch *scratch, int32_t slot,
                             const struct ih_candidate *corner[4], int8_t choice[4],
                             struct seed_search *search)
 {
-    for (int8_t i = 0; i < scratch->candidate_count[slot]; i++) {
-        corner[3] = candidate_of(scratch, slot, i);
+    const int64_t expected = expected_t_px_q12(scratch, corner, search->line);
+    int32_t i = 0;
+    while (i < search->last_count && search->last_t_px_q12[i] < expected - search->reach_px_q12) {
+        i++;
+    }
+    for (; i < search->last_count && search->last_t_px_q12[i] <= expected + search->reach_px_q12;
+         i++) {
+        corner[3] = candidate_of(scratch, slot, search->last_choice[i]);
         if (corner[3]->dot == corner[0]->dot || corner[3]->dot == corner[1]->dot ||
             corner[3]->dot == corner[2]->dot) {
             continue;
         }
         uint64_t error2 = rectangle_error2(scratch, corner);
         if (error2 < search->best2) {
-            choice[3] = i;
+            choice[3] = search->last_choice[i];
             search->second2 = search->best2;
             search->best2 = error2;
             memcpy(search->choice, choice, sizeof search->choice);
@@ -162,12 +268,14 @@ static void try_last_corner(const struct ih_labels_scratch *scratch, int32_t slo
 
 /* The best choice of candidates for the rectangle of four slots. False when there is none below the
  * limit, or when another choice is nearly as good. */
-static bool find_seed(const struct ih_labels_scratch *scratch, const int32_t slot[4],
-                      const struct ih_labels_params *params, struct ih_labels_offer *out)
+static bool find_seed(const struct ih_rig *rig, const struct ih_labels_scratch *scratch,
+                      const int32_t slot[4], const struct ih_labels_params *params,
+                      struct ih_labels_offer *out)
 {
-    struct seed_search search = {UINT64_MAX, UINT64_MAX, {0}};
+    struct seed_search search;
     const struct ih_candidate *corner[4];
     int8_t i[4];
+    begin_search(scratch, &rig->line[slot[3]], slot[3], params, &search);
     for (i[0] = 0; i[0] < scratch->candidate_count[slot[0]]; i[0]++) {
         corner[0] = candidate_of(scratch, slot[0], i[0]);
         for (i[1] = 0; i[1] < scratch->candidate_count[slot[1]]; i[1]++) {
@@ -236,14 +344,15 @@ static void rectangle_slots(int32_t first, int32_t slot[4])
     slot[3] = first + IH_GRID + 1;
 }
 
-static void seed(const struct ih_labels_params *params, struct ih_labels_scratch *scratch)
+static void seed(const struct ih_rig *rig, const struct ih_labels_params *params,
+                 struct ih_labels_scratch *scratch)
 {
     int32_t count = 0;
     for (int32_t first = 0; first < IH_SLOTS - IH_GRID - 1; first++) {
         int32_t slot[4];
         rectangle_slots(first, slot);
         if (first % IH_GRID != IH_GRID - 1 &&
-            find_seed(scratch, slot, params, &scratch->offer[count])) {
+            find_seed(rig, scratch, slot, params, &scratch->offer[count])) {
             scratch->offer[count++].slot = (int16_t)first;
         }
     }
@@ -438,10 +547,11 @@ void ih_labels_assign(const struct ih_dots *dots, const struct ih_rig *rig,
 {
     out->candidates_dropped = 0;
     undistort_dots(dots, rig, scratch);
+    order_dots(dots->dot_count, scratch);
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
         find_candidates(dots, &rig->line[slot], slot, params, scratch, out);
     }
-    seed(params, scratch);
+    seed(rig, params, scratch);
     out->seed_count = 0;
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
         out->seed_count += scratch->choice[slot] != IH_NONE;

@@ -14,9 +14,11 @@
  *           error hypot(along, 6 perp) < epsilon; best pairs first. When a pass assigns fewer than
  *           5, epsilon grows by half, up to epsilon_max. What is left then is not labelled: of
  *           what 40 px instead of 8 would add half is wrong, and seeds have bridged the edges.
- * Cost:  dots x 361 line tests; growing visits the open slots a few dozen times. Seeding tries the
- *        candidates of four slots with each other: 324 x 16^4 at the very worst, which a frame made
- *        for it can bring about, ten thousand for a real one.
+ * Cost:  361 x the dots in the rows of a line: a few each where lines lie along rows, all where they
+ *        stand upright; growing visits the open slots a few dozen times. Seeding tries the
+ *        candidates of three slots with each other, and of the fourth those that are near where
+ *        it should be: 324 x 16^3 at the very worst, which a frame made for it can bring about, a
+ *        thousand for a real one.
  * Full tables drop and count: candidates_dropped.
  */
 #ifndef IH_LABELS_H
@@ -62,6 +64,7 @@ struct ih_labels_offer {
 
 struct ih_labels_scratch {
     int32_t u_px_q12[IH_DOTS_MAX], v_px_q12[IH_DOTS_MAX]; /* undistorted */
+    int16_t by_row[IH_DOTS_MAX];                          /* dots in the order of v_px_q12 */
     int16_t slot_of_dot[IH_DOTS_MAX];
     int8_t candidate_count[IH_SLOTS];
     int8_t choice[IH_SLOTS]; /* candidate taken, or IH_NONE */

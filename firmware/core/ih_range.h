@@ -44,6 +44,10 @@ void ih_range_check(int64_t value, int64_t low, int64_t high, const char *file, 
 #define IH_RANGE_INVERSE_DEPTH_Q36 1031000000
 #define IH_RANGE_RECTANGLE_PX_Q12 (1 << 29) /* second difference of four places */
 
+/* Turn, health. */
+#define IH_RANGE_TURN_SLOPE_PX_Q4 (1 << 22)
+#define IH_RANGE_HEALTH_SLOPE_PX_Q4 (1 << 18) /* of a dot whose distance counts */
+
 /* Windows. */
 #define IH_RANGE_SCALE_Q16 5368710 /* cells per mm */
 #define IH_RANGE_WINDOW_SCORE 1000

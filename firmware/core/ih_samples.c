@@ -19,21 +19,36 @@ void ih_samples_params_default(struct ih_samples_params *params)
     };
 }
 
+/* The value of a rank, from 0: the range of values is halved until one is left. None is negative. */
+static int32_t value_of_rank(const int32_t *value, int32_t count, int32_t rank)
+{
+    int32_t low = 0;
+    int32_t high = INT32_MAX; /* it is in low..high */
+    while (low < high) {
+        int32_t middle = low + (high - low) / 2;
+        int32_t at_most = 0;
+        for (int32_t i = 0; i < count; i++) {
+            at_most += value[i] <= middle;
+        }
+        if (at_most > rank) {
+            high = middle;
+        } else {
+            low = middle + 1;
+        }
+    }
+    return low;
+}
+
 int32_t ih_samples_near_mm_q8(const struct ih_points *points)
 {
-    int32_t depth[IH_SLOTS];
+    int32_t depth_mm_q8[IH_SLOTS];
     int32_t count = 0;
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
-        if (points->point[slot].state != IH_POINT_SEEN) {
-            continue;
+        if (points->point[slot].state == IH_POINT_SEEN) {
+            depth_mm_q8[count++] = points->point[slot].depth_mm_q8;
         }
-        int32_t at = count++;
-        for (; at > 0 && depth[at - 1] > points->point[slot].depth_mm_q8; at--) {
-            depth[at] = depth[at - 1];
-        }
-        depth[at] = points->point[slot].depth_mm_q8;
     }
-    return count == 0 ? 0 : depth[count * PERCENTILE / 100];
+    return count == 0 ? 0 : value_of_rank(depth_mm_q8, count, count * PERCENTILE / 100);
 }
 
 /* A slot's neighbour by row and column; NULL beyond the pattern's edge. */

@@ -60,17 +60,22 @@ static bool is_in_ring(const struct ih_crossing *crossing, const struct ih_ellip
            dy <= ih_abs_s64(dx);
 }
 
-/* Half sides of the box that ih_ellipsoid_box gives, whole mm. */
+/* Half sides of the box that ih_ellipsoid_box gives, whole mm, and 2^SHARE_BITS over them. */
 struct half {
     int32_t x_mm, y_mm;
+    int32_t x_share, y_share;
 };
 
+#define SHARE_BITS 20
 /* Slopes in 14 bits and whole mm: rounded down, they are off by 4 mm each at the limits, and by less
  * than a mm for the origin and the centre. */
 #define NEAR_MARGIN_MM 12
+/* 1 and what is rounded off a share and its square, Q20. */
+#define NEAR_Q20 ((1 << 20) + (1 << 14))
 
-/* Which rays pass through the box around a centre. A loop without a branch: compilers turn it into
- * vectors. Depths below 2^14.1 mm, slopes up to 2^14. */
+/* Which rays pass through the ellipse in the box around a centre: those outside are farther away than
+ * the ring's outer rim in any direction. A loop without a branch: compilers turn it into vectors.
+ * Depths below 2^14.1 mm, slopes up to 2^14. */
 static void flag_near(const struct ih_space *space, const int32_t centre_mm_q8[3],
                       const struct half *half, struct ih_scan_scratch *scratch)
 {
@@ -82,7 +87,10 @@ static void flag_near(const struct ih_space *space, const int32_t centre_mm_q8[3
         int32_t off_y_mm = (depth_mm * scratch->slope_q12[1][slot] >> 12) + y_mm;
         uint8_t in_x = IH_WRAPS(uint32_t, off_x_mm) <= 2 * (uint32_t)half->x_mm;
         uint8_t in_y = IH_WRAPS(uint32_t, off_y_mm) <= 2 * (uint32_t)half->y_mm;
-        scratch->near[slot] = in_x & in_y;
+        int32_t x_q10 = (in_x ? off_x_mm - half->x_mm : 0) * half->x_share >> (SHARE_BITS - 10);
+        int32_t y_q10 = (in_y ? off_y_mm - half->y_mm : 0) * half->y_share >> (SHARE_BITS - 10);
+        uint8_t is_round = x_q10 * x_q10 + y_q10 * y_q10 <= NEAR_Q20;
+        scratch->near[slot] = in_x & in_y & is_round;
     }
 }
 
@@ -92,12 +100,11 @@ struct sums {
     int32_t ring, ring_count;
 };
 
-static void add_ray(const struct ih_space *space, const struct ih_ellipsoid *head, int32_t slot,
-                    struct sums *sums)
+static void add_ray(const struct ih_space *space, const struct ih_ellipsoid *head,
+                    const struct ih_ray *ray, const struct ih_aim *aim, struct sums *sums)
 {
-    const struct ih_ray *ray = &space->ray[slot];
     struct ih_crossing crossing;
-    if (!ih_ellipsoid_cross(head, space->origin_mm_q8, ray, &crossing)) {
+    if (!ih_ellipsoid_cross_aimed(head, space->origin_mm_q8, ray, aim, &crossing)) {
         return;
     }
     if (crossing.radius2_q14 < 1 << 14) {
@@ -119,7 +126,7 @@ static int32_t score_q12(const struct ih_space *space, const struct half *half,
         memcpy(&any, &scratch->near[first], sizeof any);
         for (int32_t slot = first; any != 0 && slot < ih_min_s32(first + 8, IH_SLOTS); slot++) {
             if (scratch->near[slot] != 0) {
-                add_ray(space, head, slot, &sums);
+                add_ray(space, head, &space->ray[slot], &scratch->aim[slot], &sums);
             }
         }
     }
@@ -181,10 +188,13 @@ static void prepare(const struct ih_space *space, struct ih_scan_scratch *scratc
     const struct ih_ellipsoid_box box = ih_ellipsoid_box(&mean, slope_most_q20, RING_OUTER2_Q14);
     half->x_mm = (box.half_mm_q8[0] >> 8) + NEAR_MARGIN_MM;
     half->y_mm = (box.half_mm_q8[1] >> 8) + NEAR_MARGIN_MM;
+    half->x_share = (1 << SHARE_BITS) / half->x_mm;
+    half->y_share = (1 << SHARE_BITS) / half->y_mm;
     memset(scratch->slope_q12, 0, sizeof scratch->slope_q12); /* behind the last slot, too */
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
         scratch->slope_q12[0][slot] = space->ray[slot].slope_x_q20 >> 8;
         scratch->slope_q12[1][slot] = space->ray[slot].slope_y_q20 >> 8;
+        scratch->aim[slot] = ih_ellipsoid_aim(mean.semi_mm_q8, &space->ray[slot]);
     }
 }
 

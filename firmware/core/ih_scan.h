@@ -53,6 +53,7 @@ struct ih_scan_scratch {
     struct ih_scan_place tried[IH_SLOTS];
     int32_t slope_q12[2][IH_SCAN_FLAGS]; /* x and y of all rays, rounded down */
     uint8_t near[IH_SCAN_FLAGS];         /* 1 = the ray may meet the head or the ring around it */
+    struct ih_aim aim[IH_SLOTS];         /* of all rays, at a mean head */
 };
 
 void ih_scan_params_default(struct ih_scan_params *params);

@@ -33,26 +33,25 @@ static void place_centres(struct ih_surface_scratch *scratch)
 }
 
 /* The sample's row of the basis: sqrt(dx^2 + dy^2 + 1), Q20, rounded. dx, dy < 60 in Q16: the
- * radicand in Q42 is below 2^55. */
+ * radicand in Q40 is below 2^53. */
 static void fill_row(const struct ih_surface_scratch *scratch, const struct ih_sample *sample,
-                     int32_t row_q20[TERMS])
+                     uint32_t row_q20[TERMS])
 {
     uint64_t dx2_q32[IH_SURFACE_CENTRES];
     for (int32_t k = 0; k < IH_SURFACE_CENTRES; k++) {
         int64_t dx = (int64_t)sample->x_q16 - scratch->centre_q16[k];
         dx2_q32[k] = (uint64_t)(dx * dx) + ((uint64_t)1 << 32);
     }
-    int32_t *entry = row_q20;
     for (int32_t k = 0; k < IH_SURFACE_CENTRES; k++) {
         int64_t dy = (int64_t)sample->y_q16 - scratch->centre_q16[k];
         uint64_t dy2_q32 = (uint64_t)(dy * dy);
+        uint64_t square_q40[IH_SURFACE_CENTRES];
         for (int32_t column = 0; column < IH_SURFACE_CENTRES; column++) {
-            uint32_t root_q21 = ih_isqrt_u64((dx2_q32[column] + dy2_q32) << 10);
-            *entry = (int32_t)((root_q21 + 1) >> 1);
-            IH_IN_RANGE(*entry, 1 << 20, IH_RANGE_BASIS_Q20);
-            entry++;
+            square_q40[column] = (dx2_q32[column] + dy2_q32) << 8;
         }
+        ih_roots_u54(square_q40, IH_SURFACE_CENTRES, &row_q20[k * IH_SURFACE_CENTRES]);
     }
+    IH_IN_RANGE(row_q20[0], 1 << 20, IH_RANGE_BASIS_Q20);
 }
 
 /* Multiply row number `at` with the sample's weight; what the row stands for, too. */
@@ -61,44 +60,53 @@ static void weigh_row(struct ih_surface_scratch *scratch, const struct ih_sample
 {
     bool is_one = root_weight_q15 == 1 << 15; /* as nearly all are: nothing to round */
     for (int32_t i = 0; !is_one && i < TERMS; i++) {
-        int32_t *entry = &scratch->row_q20[at][i];
-        *entry = (int32_t)ih_mul_shift(*entry, root_weight_q15, 15);
+        uint32_t *entry = &scratch->row_q20[at][i];
+        *entry = (uint32_t)ih_mul_shift(*entry, root_weight_q15, 15);
     }
     scratch->off_mm_q8[at] =
         (int32_t)ih_mul_shift((int64_t)sample->depth_mm_q8 - mean_mm_q8, root_weight_q15, 15);
 }
 
-/* Add the weighted rows' products of one column with each up to it: a row of N. Columns `here` and
- * `next` = here + 1 at once, so that each entry is read for two products. */
-static void add_columns(const struct ih_surface_scratch *scratch, int32_t here, int64_t *row_here,
-                        int64_t *row_next)
+/* Where row i of N begins. Rows are padded to whole groups of IH_SURFACE_GROUP entries: what stands
+ * behind the diagonal is not used, but loops need no end of their own for what is left of a group. */
+static int32_t normal_row(int32_t i)
 {
-    const int32_t *a = scratch->row_q20[0];
-    const int32_t *b = scratch->row_q20[1];
-    const int32_t *c = scratch->row_q20[2];
-    const int32_t *d = scratch->row_q20[3];
-    const int32_t next = here + 1;
-    const int64_t a_here = a[here], b_here = b[here], c_here = c[here], d_here = d[here];
-    const int64_t a_next = a[next], b_next = b[next], c_next = c[next], d_next = d[next];
-    for (int32_t j = 0; j <= here; j++) {
-        row_here[j] += a_here * a[j] + b_here * b[j] + c_here * c[j] + d_here * d[j];
-        row_next[j] += a_next * a[j] + b_next * b[j] + c_next * c[j] + d_next * d[j];
-    }
-    row_next[next] += a_next * a_next + b_next * b_next + c_next * c_next + d_next * d_next;
+    const int32_t group = i / IH_SURFACE_GROUP;
+    return IH_SURFACE_GROUP * (group + 1) * (IH_SURFACE_GROUP * group / 2 + i % IH_SURFACE_GROUP);
 }
 
-_Static_assert(IH_SURFACE_ROWS == 4 && TERMS % 2 == 0, "add_columns takes 4 rows, 2 columns");
+/* Add two weighted rows' products of one column with each of the first `count`: a row of N. Columns
+ * `here` and here + 1 at once, so that each entry is read for two products. No entry is negative, and
+ * products without a sign are the ones that every processor with vectors has. */
+static void add_columns(const uint32_t *a, const uint32_t *b, int32_t here, int32_t count,
+                        uint64_t *row_here, uint64_t *row_next)
+{
+    const uint32_t a_here = a[here], b_here = b[here];
+    const uint32_t a_next = a[here + 1], b_next = b[here + 1];
+    for (int32_t j = 0; j < count; j++) {
+        row_here[j] += (uint64_t)a_here * a[j] + (uint64_t)b_here * b[j];
+        row_next[j] += (uint64_t)a_next * a[j] + (uint64_t)b_next * b[j];
+    }
+}
+
+_Static_assert(IH_SURFACE_ROWS % 2 == 0 && IH_SURFACE_GROUP % 2 == 0, "add_columns takes two each");
+_Static_assert(TERMS % IH_SURFACE_GROUP == 0, "all groups are whole");
 
 /* Add what the weighted rows bring to the normal equations. */
 static void add_rows(struct ih_surface_scratch *scratch)
 {
-    int64_t *normal = scratch->of.normal_q40;
+    uint64_t *normal = scratch->of.normal_q40;
     for (int32_t i = 0; i < TERMS; i += 2) {
-        add_columns(scratch, i, normal + IH_CHOLESKY_PACKED(i), normal + IH_CHOLESKY_PACKED(i + 1));
+        const int32_t count = (i / IH_SURFACE_GROUP + 1) * IH_SURFACE_GROUP;
+        for (int32_t k = 0; k < IH_SURFACE_ROWS; k += 2) {
+            add_columns(scratch->row_q20[k], scratch->row_q20[k + 1], i, count,
+                        &normal[normal_row(i)], &normal[normal_row(i + 1)]);
+        }
     }
     for (int32_t k = 0; k < IH_SURFACE_ROWS; k++) {
         for (int32_t i = 0; i < TERMS; i++) {
-            scratch->right_q28[i] += (int64_t)scratch->row_q20[k][i] * scratch->off_mm_q8[k];
+            scratch->right_q28[i] +=
+                (int64_t)(int32_t)scratch->row_q20[k][i] * scratch->off_mm_q8[k];
         }
     }
 }
@@ -118,14 +126,14 @@ static void scale_rows(const struct ih_surface_params *params, struct ih_surface
 {
     int32_t row[TERMS];
     for (int32_t i = 0; i < TERMS; i++) {
-        const int64_t *normal = &scratch->of.normal_q40[IH_CHOLESKY_PACKED(i)];
-        IH_IN_RANGE(normal[i], 0, IH_RANGE_NORMAL_Q40);
-        int64_t root = (int64_t)ih_isqrt_u64((uint64_t)normal[i]) + 1; /* the diagonal stays < 1 */
+        const uint64_t *normal = &scratch->of.normal_q40[normal_row(i)];
+        IH_IN_RANGE((int64_t)normal[i], 0, IH_RANGE_NORMAL_Q40);
+        int64_t root = (int64_t)ih_isqrt_u64(normal[i]) + 1; /* the diagonal stays < 1 */
         int64_t scale = SCALE_NUMERATOR / root;
         scratch->scale[i] = (uint32_t)(scale < SCALE_MAX ? scale : SCALE_MAX);
         for (int32_t j = 0; j <= i; j++) {
             /* |N_ij| <= root_i root_j: after the first step below 2^47 */
-            int64_t half = ih_mul_wide_shift(normal[j], scratch->scale[i], 36);
+            int64_t half = ih_mul_wide_shift((int64_t)normal[j], scratch->scale[i], 36);
             row[j] = ih_saturate_s32(
                 ih_mul_wide_shift(half, scratch->scale[j], 2 * SCALE_SHIFT - 36 - 30));
         }
@@ -199,13 +207,13 @@ static int32_t depth_of_sum(const struct ih_surface_scratch *scratch, int32_t me
 /* Huber step: a sample that is too far from the surface gets less weight. row_q20 is its own,
  * without weight. False when it is near enough. */
 static bool reweight(const struct ih_surface_scratch *scratch, const struct ih_sample *sample,
-                     const struct ih_surface_params *params, const int32_t row_q20[TERMS],
+                     const struct ih_surface_params *params, const uint32_t row_q20[TERMS],
                      int32_t mean_mm_q8, int32_t *root_weight_q15)
 {
     int64_t limit_q8 = (int64_t)params->huber_mm << 8;
     int64_t sum = 0;
     for (int32_t k = 0; k < TERMS; k++) {
-        sum += (int64_t)scratch->solution[k] * row_q20[k];
+        sum += (int64_t)scratch->solution[k] * (int32_t)row_q20[k];
     }
     int64_t off_q8 =
         ih_abs_s64((int64_t)sample->depth_mm_q8 - depth_of_sum(scratch, mean_mm_q8, sum));
@@ -230,7 +238,7 @@ static int32_t sum_rows(const struct ih_samples *samples, const struct ih_surfac
         memset(scratch->row_q20, 0, sizeof scratch->row_q20); /* the last ones may be fewer */
         for (int32_t i = first; i < samples->sample_count && i < first + IH_SURFACE_ROWS; i++) {
             const struct ih_sample *sample = &samples->sample[i];
-            int32_t *row_q20 = scratch->row_q20[i - first];
+            uint32_t *row_q20 = scratch->row_q20[i - first];
             fill_row(scratch, sample, row_q20);
             changed += huber != NULL && reweight(scratch, sample, huber, row_q20, out->mean_mm_q8,
                                                  &out->root_weight_q15[i]);
@@ -253,17 +261,19 @@ static bool fit(const struct ih_samples *samples, const struct ih_surface_params
     return solve(samples, out->mean_mm_q8, scratch);
 }
 
-/* B for whole grid steps: sqrt((a^2 + b^2) 100 / 121 + 1) in Q20. */
+/* B for whole grid steps: sqrt((a^2 + b^2) 100 / 121 + 1) in Q20, b down and a to both sides, so that
+ * what a centre adds to a row of nodes stands in a row. */
 static void fill_table(struct ih_surface_scratch *scratch)
 {
     const int64_t numerator2 = IH_SURFACE_STEP_NUMERATOR * IH_SURFACE_STEP_NUMERATOR;
     const int64_t denominator2 = IH_SURFACE_STEP_DENOMINATOR * IH_SURFACE_STEP_DENOMINATOR;
     for (int64_t b = 0; b < IH_SURFACE_STEPS; b++) {
+        int32_t *middle = &scratch->of.table_q20[b][IH_SURFACE_STEPS - 1];
         for (int64_t a = 0; a < IH_SURFACE_STEPS; a++) {
             int64_t radicand_q42 = ih_div_round(
                 ((a * a + b * b) * numerator2 + denominator2) * ((int64_t)1 << 42), denominator2);
-            scratch->of.table_q20[b][a] =
-                (int32_t)((ih_isqrt_u64((uint64_t)radicand_q42) + 1) >> 1);
+            middle[a] = (int32_t)((ih_isqrt_u64((uint64_t)radicand_q42) + 1) >> 1);
+            middle[-a] = middle[a];
         }
     }
 }
@@ -278,31 +288,28 @@ static int32_t least_depth_mm_q8(const struct ih_samples *samples)
     return ih_max_s32(nearest_q8 - (IH_SURFACE_OVERSHOOT_MM << 8), 1 << 8);
 }
 
-/* Grid node and centre k are both at whole steps: centre k at 4 k - 22 from the middle, node g at
- * g - 23. */
-static int32_t steps_between(int32_t node, int32_t centre)
+/* Centre k is at so many grid steps from the grid's first node. */
+static int32_t centre_node(int32_t centre)
 {
-    return ih_abs_s32((node - (IH_SURFACE_GRID - 1) / 2) -
-                      (IH_SURFACE_STEPS_PER_CENTRE * centre -
-                       IH_SURFACE_STEPS_PER_CENTRE * (IH_SURFACE_CENTRES - 1) / 2));
+    return (IH_SURFACE_GRID - 1) / 2 - IH_SURFACE_STEPS_PER_CENTRE * (IH_SURFACE_CENTRES - 1) / 2 +
+           IH_SURFACE_STEPS_PER_CENTRE * centre;
 }
 
-/* sum_n c_n B_n at a node. */
-static int64_t sum_at(const struct ih_surface_scratch *scratch, int32_t y, int32_t x)
+/* sum_n c_n B_n along a row of nodes. */
+static void sum_row(const struct ih_surface_scratch *scratch, int32_t y,
+                    int64_t sum[IH_SURFACE_GRID])
 {
-    int32_t across[IH_SURFACE_CENTRES];
-    for (int32_t k = 0; k < IH_SURFACE_CENTRES; k++) {
-        across[k] = steps_between(x, k);
-    }
-    const int32_t *solution = scratch->solution;
-    int64_t sum = 0;
+    memset(sum, 0, IH_SURFACE_GRID * sizeof *sum);
     for (int32_t row = 0; row < IH_SURFACE_CENTRES; row++) {
-        const int32_t *table = scratch->of.table_q20[steps_between(y, row)];
+        const int32_t *table = scratch->of.table_q20[ih_abs_s32(y - centre_node(row))];
         for (int32_t k = 0; k < IH_SURFACE_CENTRES; k++) {
-            sum += (int64_t)*solution++ * table[across[k]];
+            const int32_t coefficient = scratch->solution[row * IH_SURFACE_CENTRES + k];
+            const int32_t *basis = &table[IH_SURFACE_STEPS - 1 - centre_node(k)];
+            for (int32_t x = 0; x < IH_SURFACE_GRID; x++) {
+                sum[x] += (int64_t)coefficient * basis[x];
+            }
         }
     }
-    return sum;
 }
 
 static void evaluate(const struct ih_samples *samples, const struct ih_surface_scratch *scratch,
@@ -311,8 +318,10 @@ static void evaluate(const struct ih_samples *samples, const struct ih_surface_s
     int32_t least_q8 = least_depth_mm_q8(samples);
     out->nearest_mm_q8 = INT32_MAX;
     for (int32_t y = 0; y < IH_SURFACE_GRID; y++) {
+        int64_t sum[IH_SURFACE_GRID];
+        sum_row(scratch, y, sum);
         for (int32_t x = 0; x < IH_SURFACE_GRID; x++) {
-            int32_t depth_q8 = depth_of_sum(scratch, out->mean_mm_q8, sum_at(scratch, y, x));
+            int32_t depth_q8 = depth_of_sum(scratch, out->mean_mm_q8, sum[x]);
             out->depth_mm_q8[y][x] = ih_clamp_s32(depth_q8, least_q8, IH_SURFACE_DEPTH_MAX_MM << 8);
             out->nearest_mm_q8 = ih_min_s32(out->nearest_mm_q8, out->depth_mm_q8[y][x]);
         }

@@ -14,7 +14,7 @@
  *        rounded to Q30; the ridge keeps the least pivot above 3e-3.
  * Error: within 0.2 mm of the float64 solution of the same system, everywhere on the grid, for
  *        depths that span up to 1.5 m (ih_samples clips them); it grows with the span.
- * Cost:  samples x 288 square roots; twice samples x 10,440 multiply-adds; two factorisations of
+ * Cost:  samples x 288 square roots; twice samples x 10,944 multiply-adds; two factorisations of
  *        n = 144; grid x 144 multiply-adds.
  */
 #ifndef IH_SURFACE_H
@@ -60,15 +60,18 @@ struct ih_surface {
 /* Basis rows that are added to the normal equations together: a sum of 4 is 4 times less reading and
  * writing of 84 kB. */
 #define IH_SURFACE_ROWS 4
+/* Rows of the normal equations are padded to so many entries, which fill the widest vectors. */
+#define IH_SURFACE_GROUP 8
+#define IH_SURFACE_PADDED (IH_SURFACE_TERMS * (IH_SURFACE_TERMS + IH_SURFACE_GROUP) / 2)
 
 struct ih_surface_scratch {
     union {
-        int64_t normal_q40[IH_CHOLESKY_PACKED(IH_SURFACE_TERMS)]; /* lower triangle, row by row */
+        uint64_t normal_q40[IH_SURFACE_PADDED];                   /* lower triangle, row by row */
         int32_t factor_q30[IH_CHOLESKY_PACKED(IH_SURFACE_TERMS)]; /* scaled, then factored */
-        int32_t table_q20[IH_SURFACE_STEPS][IH_SURFACE_STEPS];
+        int32_t table_q20[IH_SURFACE_STEPS][2 * IH_SURFACE_STEPS - 1];
     } of;
     int64_t right_q28[IH_SURFACE_TERMS];
-    int32_t row_q20[IH_SURFACE_ROWS][IH_SURFACE_TERMS];
+    uint32_t row_q20[IH_SURFACE_ROWS][IH_SURFACE_TERMS];
     int32_t off_mm_q8[IH_SURFACE_ROWS]; /* their depths, less the mean, weighted */
     uint32_t scale[IH_SURFACE_TERMS];   /* 0.995 * 2^51 / sqrt(N_ii), N in Q40 */
     int32_t solution[IH_SURFACE_TERMS]; /* the right side before */

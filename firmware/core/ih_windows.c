@@ -225,10 +225,11 @@ struct scale {
 static struct scale scale_at(const struct ih_windows_scratch *s, const struct ih_rig *rig,
                              int32_t depth_mm)
 {
-    IH_IN_RANGE(rig->calibration.fx_px_q16 / (depth_mm * s->cell_px), 0, IH_RANGE_SCALE_Q16);
-    IH_IN_RANGE(rig->calibration.fy_px_q16 / (depth_mm * s->cell_px), 0, IH_RANGE_SCALE_Q16);
-    return (struct scale){rig->calibration.fx_px_q16 / (depth_mm * s->cell_px),
+    struct scale scale = {rig->calibration.fx_px_q16 / (depth_mm * s->cell_px),
                           rig->calibration.fy_px_q16 / (depth_mm * s->cell_px)};
+    IH_IN_RANGE(scale.u_q16, 0, IH_RANGE_SCALE_Q16);
+    IH_IN_RANGE(scale.v_q16, 0, IH_RANGE_SCALE_Q16);
+    return scale;
 }
 
 /* Depth of the cell under a probe, 0 where nothing was measured, IH_NONE beyond the edge. */
