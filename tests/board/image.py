@@ -24,6 +24,8 @@ import subprocess
 import sys
 import time
 
+from frames import as_of_host
+
 HERE = os.path.dirname(os.path.abspath(__file__))
 FIRMWARE = "/usr/share/AAVMF"
 FRAME_COUNT = 10
@@ -232,7 +234,7 @@ class Board:
         self.check_record(frames, 0)
 
     def check_record(self, frames, index):
-        record = self.wait(r'(?m)^(\{"file".*\})\n', ANSWER_S).group(1)
+        record = as_of_host(self.wait(r'(?m)^(\{"file".*\})\n', ANSWER_S).group(1))
         expect(record == frames.records[index],
                f"frame {index}:\nboard    {record}\nhost_sim {frames.records[index]}")
 

@@ -1,0 +1,133 @@
+#include "app_health.h"
+
+#include <inttypes.h>
+#include <string.h>
+
+#include "app_text.h"
+
+/* A turn that differs by more than this from what was told is told again. */
+#define TOLD_RAD_Q30 374802 /* 0.02 degrees */
+#define DEG_PER_RAD_Q10 58671
+
+void app_health_begin(struct app_loop *loop)
+{
+    ih_health_init(&loop->health, &loop->head->rig);
+    loop->told_health = IH_HEALTH_UNKNOWN;
+    memset(loop->told_turn_rad_q30, 0, sizeof loop->told_turn_rad_q30);
+    loop->checked_count = 0;
+}
+
+static struct app_decimal degrees(int32_t angle_rad_q30)
+{
+    return app_text_fixed((int64_t)angle_rad_q30 * DEG_PER_RAD_Q10 / 1024, 30, 3);
+}
+
+static void tell_turn(struct app_loop *loop)
+{
+    const struct ih_health *health = &loop->health;
+    const int32_t *turn = health->turn_rad_q30;
+    const int32_t *sigma = health->sigma_rad_q30;
+    app_log_say(loop->log, APP_LOG_WARNING,
+                "%s: the projector is turned by (%s, %s, %s) +-(%s, %s, %s) degrees about X, Y, Z; "
+                "corrected for until the end, calibrate again",
+                loop->config->rig, degrees(turn[0]).text, degrees(turn[1]).text,
+                degrees(turn[2]).text, degrees(sigma[0]).text, degrees(sigma[1]).text,
+                degrees(sigma[2]).text);
+    memcpy(loop->told_turn_rad_q30, turn, sizeof loop->told_turn_rad_q30);
+}
+
+static void tell_state(struct app_loop *loop)
+{
+    const struct ih_health *health = &loop->health;
+    switch (health->state) {
+    case IH_HEALTH_TURNED:
+        tell_turn(loop);
+        break;
+    case IH_HEALTH_LOST:
+        app_log_say(loop->log, APP_LOG_WARNING,
+                    "%s: does not fit: of %" PRId32 " dots %" PRId32
+                    " have a label, and no turn within 0.6 degrees mends it; calibrate again",
+                    loop->config->rig, health->dot_count, health->labelled_count);
+        break;
+    case IH_HEALTH_FITS:
+        app_log_say(loop->log, APP_LOG_INFO, "%s: fits", loop->config->rig);
+        break;
+    case IH_HEALTH_UNKNOWN:
+        break;
+    }
+    loop->told_health = health->state;
+}
+
+static bool is_told(const struct app_loop *loop)
+{
+    const struct ih_health *health = &loop->health;
+    bool same_turn = true;
+    for (int i = 0; i < 3; i++) {
+        int64_t more = (int64_t)health->turn_rad_q30[i] - loop->told_turn_rad_q30[i];
+        same_turn = same_turn && more <= TOLD_RAD_Q30 && more >= -TOLD_RAD_Q30;
+    }
+    return loop->told_health == health->state &&
+           (same_turn || health->state != IH_HEALTH_TURNED || health->stage != IH_HEALTH_WATCHING);
+}
+
+/* Of this frame; 0: no labels. */
+static int32_t mean_across_px_q12(const struct ih_labels *labels)
+{
+    int64_t sum = 0;
+    int32_t count = 0;
+    for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
+        if (labels->dot_of_slot[slot] != IH_NONE) {
+            int32_t across = labels->perp_px_q12[slot];
+            sum += across < 0 ? -across : across;
+            count++;
+        }
+    }
+    return count == 0 ? 0 : (int32_t)((sum + count / 2) / count);
+}
+
+/* A turn that is still on trial is told, too. */
+static const char *word_of(const struct ih_health *health)
+{
+    const int32_t *turn = health->turn_rad_q30;
+    if (health->state == IH_HEALTH_LOST) {
+        return "lost";
+    }
+    return turn[0] != 0 || turn[1] != 0 || turn[2] != 0 ? "turned" : NULL;
+}
+
+static void check(struct app_loop *loop)
+{
+    const struct ih_health *health = &loop->health;
+    loop->checked_count++;
+    if (loop->checked_count < IH_HEALTH_ENOUGH) {
+        return;
+    }
+    if (health->state == IH_HEALTH_UNKNOWN) {
+        app_log_say(loop->log, APP_LOG_ERROR,
+                    "%s: cannot be told: of %" PRId32 " dots in the last frames %" PRId32
+                    " have a label, expected 200 and more",
+                    loop->config->rig, health->dot_count, health->labelled_count);
+    } else {
+        app_log_say(loop->log, APP_LOG_INFO,
+                    "%s: checked %" PRId32 " frames, %s; dots lie %s px beside their lines",
+                    loop->config->rig, loop->checked_count,
+                    health->state == IH_HEALTH_FITS ? "it fits" : "it does not fit",
+                    app_text_fixed(health->across_px_q12, 12, 2).text);
+    }
+    app_loop_end(loop, health->state == IH_HEALTH_FITS ? APP_EXIT_GOOD : APP_EXIT_FAILED);
+}
+
+void app_health_frame(struct app_loop *loop)
+{
+    struct isohead *head = loop->head;
+    loop->live.across_px_q12 = mean_across_px_q12(&head->labels);
+    (void)ih_health_frame(&loop->health, &head->dots, &head->labels, &head->rig,
+                          &loop->health_scratch);
+    loop->live.rig = word_of(&loop->health);
+    if (!is_told(loop)) {
+        tell_state(loop);
+    }
+    if (loop->config->check) {
+        check(loop);
+    }
+}

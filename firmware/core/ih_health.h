@@ -1,0 +1,101 @@
+/* ih_health - does the rig still fit its calibration? A knock, or heat, that turned the projector is
+ * found from ordinary frames and corrected.
+ *
+ * In:    dots and labels of every lit frame; the rig that they were labelled with.
+ * Out:   the mean distance of labelled dots from their lines, the turn with its uncertainty, a
+ *        state; and the rig, turned when there is reason to.
+ * Way:   Every IH_HEALTH_LOOK frames:
+ *        1. More than half of the dots without a label, or labels as far from their lines as chance puts
+ *           them: maybe the lines are wrong. Over IH_HEALTH_SEARCH frames the dots vote for a turn
+ *           (ih_turn), which is tried. If it gives neither a quarter more labels nor better ones it is
+ *           taken back.
+ *        2. Else the turn that explains the labelled dots' distances from their lines: weighted
+ *           least squares (Tukey, 0.3 px), three parameters, sums since the rig last changed. It is
+ *           taken when it is more than 0.02 degrees and 5 times its uncertainty.
+ *        A turn that was taken is refined from the next 4, 4 and 32 frames, then whenever twice as many
+ *        are there as it was had from. A knock is so found and corrected within 49 of the frames that
+ *        are looked at.
+ *        The uncertainty counts dots that err in the same way in each frame, by 0.12 px: rays of the
+ *        calibration, and what stands still. So it does not vanish with many frames. A
+ *        prior as wide as the turn itself keeps what is hardly seen near 0.
+ * Limits: within IH_TURN_MAX_RAD_Q30 about each axis. Not seen, and not corrected: a shift of the
+ *        projector along the baseline. A shift across it is taken for a turn. docs/health.md
+ * Cost:  361 slots a frame; ih_turn's while searching, and ih_rig_init when the rig changes.
+ * Error: against float64 on the same frames (tools/oracle/knock.py): docs/numerics.md.
+ * Memory: the caller's; 59 kB with the scratch, beside struct isohead. A dot rig only.
+ */
+#ifndef IH_HEALTH_H
+#define IH_HEALTH_H
+
+#include "ih_labels.h"
+#include "ih_turn.h"
+
+/* Frames of a look, and of a search. */
+#define IH_HEALTH_LOOK 6
+#define IH_HEALTH_SEARCH 3
+/* Looks until a search that found nothing is repeated. */
+#define IH_HEALTH_PAUSE 50
+/* Frames after which everything known about a rig that stays is as good as new, or as a check needs. */
+#define IH_HEALTH_ENOUGH 60
+
+enum ih_health_state {
+    IH_HEALTH_UNKNOWN = 0, /* too little was seen yet */
+    IH_HEALTH_FITS = 1,
+    IH_HEALTH_TURNED = 2, /* the projector is turned, and corrected for */
+    IH_HEALTH_LOST = 3,   /* dots are seen, but hardly one lies on its line, and no turn within the
+                           * limit helps */
+};
+
+/* Sums over labelled dots since the rig changed; weights are in Q8. */
+struct ih_health_sums {
+    int32_t frame_count;
+    int64_t normal_q16[6]; /* weight times slope times slope: xx, xy, xz, yy, yz, zz */
+    int64_t right_q24[3];  /* weight times slope times distance */
+    int64_t square_q32;    /* weight times distance squared */
+    int64_t weight_q8, rise_q8;
+};
+
+/* What the last frames of a look showed. */
+struct ih_health_look {
+    int32_t frame_count, dot_count, labelled_count;
+    int64_t across_px_q12; /* sum of distances */
+};
+
+enum ih_health_stage { IH_HEALTH_WATCHING, IH_HEALTH_SEARCHING, IH_HEALTH_SETTLING };
+
+struct ih_health {
+    enum ih_health_state state;
+    int32_t across_px_q12;    /* mean distance of the last look's labelled dots; -1: none */
+    int32_t turn_rad_q30[3];  /* of the rig against the calibration; camera axes */
+    int32_t sigma_rad_q30[3]; /* its uncertainty, one standard deviation; 0 before the first one */
+    int32_t dot_count, labelled_count; /* of the last look, in all its frames */
+    /* Its own. */
+    struct ih_calibration nominal;
+    struct ih_turn_slopes slopes;
+    enum ih_health_stage stage;
+    int32_t step;  /* of searching or settling */
+    int32_t pause; /* looks */
+    struct ih_health_sums sums;
+    struct ih_health_look look;
+    int32_t basis_count;          /* frames that the turn was had from */
+    struct ih_health_look before; /* a search, and the turn then */
+    int32_t before_rad_q30[3];
+    struct ih_turn_votes votes;
+};
+
+struct ih_health_scratch {
+    struct ih_turn_scratch turn;
+    struct ih_calibration calibration;
+    struct ih_rig rig;
+};
+
+/* rig: as ih_rig_init made it from the calibration. */
+void ih_health_init(struct ih_health *health, const struct ih_rig *rig);
+
+/* After each lit frame, when its points are done. True: the rig has been turned, and the next frame is
+ * to be labelled with it. */
+bool ih_health_frame(struct ih_health *health, const struct ih_dots *dots,
+                     const struct ih_labels *labels, struct ih_rig *rig,
+                     struct ih_health_scratch *scratch);
+
+#endif

@@ -1,0 +1,127 @@
+#!/usr/bin/python3
+"""Projectors knocked by 0.3 degrees, in rendered frames that nobody has looked at: are they found and corrected?
+
+    knock.py --knock PROGRAM --render PROGRAM --host-sim PROGRAM --work DIR [--seeds 1] [--frames 50]
+
+Per rig and seed ordinary frames, the projector turned about another axis each: it must be found within 50 of them, and
+told. What is found is compared with the turn in the truth, and with the float64 reference (tools/oracle/knock.py) on
+the same frames. Depth errors on the same frames: with the true turn, without any correction, with the one found;
+the last is at most 5 times the first; with four seeds and 250 frames or more 1.3 times in the median. A rig that fits
+stays as it is. Prints TAP; exit status 1 when a case fails.
+"""
+
+import argparse
+import json
+import os
+import statistics
+import subprocess
+import sys
+
+import numpy as np
+
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "tools", "oracle"))
+import knock as oracle
+
+SEED = 4202
+SEEDS_OF_MEDIAN = 4
+FOUND_FRAMES = 50
+FRAMES_OF_MEDIAN = 250
+KNOCK_DEG = 0.3
+RATIO_MEDIAN, RATIO_MOST = 1.3, 5.0
+# Along the baseline (X) and about the camera's axis (Z) a turn moves dots across their lines; about Y hardly.
+ERROR_DEG = (0.002, 0.04, 0.01)
+FITS, TURNED = 1, 2
+
+number = failed = 0
+
+
+def result(name, reason=None):
+    global number, failed
+    number += 1
+    failed += reason is not None
+    print("%s %d - %s%s" % ("not ok" if reason else "ok", number, name, "\n# " + reason if reason else ""), flush=True)
+
+
+def must(*command):
+    return subprocess.run([str(word) for word in command], check=True, capture_output=True, text=True,
+                          stdin=subprocess.DEVNULL).stdout
+
+
+def render(options, kind, seed, *more):
+    folder = os.path.join(options.work, "%s_%d%s" % (kind, seed, "_knocked" if more else ""))
+    if not os.path.exists(os.path.join(folder, "rig.json")):
+        must(options.render, "--rig", kind, "--seed", seed, "--frames", options.frames, *more, folder)
+    return folder
+
+
+def depth(out):
+    """Labels, and the median error of right ones' depth in mm: the table that host_sim prints where there is truth."""
+    row = out.splitlines()[-1].split()
+    return int(row[5]), float("nan") if row[7] == "-" else float(row[7])
+
+
+def depth_with(options, folder, turn):
+    path = os.path.join(options.work, "rig.json")
+    oracle.Rig(os.path.join(folder, "rig.json")).turned(turn).save(path)
+    return depth(must(options.host_sim, "--rig", path, folder))
+
+
+def health(options, folder):
+    lines = [json.loads(line) for line in must(options.knock, folder).splitlines()]
+    return lines, np.array(lines[-1]["turn_rad_q30"]) / 2**30
+
+
+def knocked(options, kind, seed):
+    folder = render(options, kind, seed, "--knock", KNOCK_DEG)
+    truth = oracle.true_turn(folder)
+    lines, found = health(options, folder)
+    at = next((i for i, line in enumerate(lines) if line["state"] == TURNED), None)
+    error = np.degrees(found - truth)
+    wrong = [axis for axis, e, most in zip("XYZ", error, ERROR_DEG) if abs(e) > most]
+    reason = None
+    if at is None or at >= FOUND_FRAMES:
+        reason = "state %d at the end, expected %d within %d frames" % (lines[-1]["state"], TURNED, FOUND_FRAMES)
+    elif wrong:
+        reason = "turn about %s: off by %s degrees, expected less than %s" % (", ".join(wrong), error.round(4), ERROR_DEG)
+    result("%s, seed %d: found after %s frames" % (kind, seed, at), reason)
+    reference, out = oracle.estimate(folder, options.host_sim, os.path.join(options.work, "trace"), found)
+    labels, straight = depth_with(options, folder, truth)
+    labels_without, _ = depth_with(options, folder, np.zeros(3))
+    labels_found, corrected = depth(out)
+    ratio = corrected / straight
+    result("%s, seed %d: labels %d, without the correction %d, with it %d; depth %.2f mm, with it %.2f"
+           % (kind, seed, labels, labels_without, labels_found, straight, corrected),
+           None if ratio <= RATIO_MOST and labels_found > 0.95 * labels else "%.2f times" % ratio)
+    # Fewer frames than the reference has: half of what the core says that it does not know.
+    sigma = np.array(lines[-1]["sigma_rad_q30"]) / 2**30
+    far = np.abs(reference - found) > np.maximum(0.5 * sigma, np.radians(0.001))
+    result("%s, seed %d: as float64 says" % (kind, seed),
+           "%s, float64 %s degrees" % (np.degrees(found).round(4), np.degrees(reference).round(4)) if far.any() else None)
+    return ratio
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    for name in ("knock", "render", "host-sim", "work"):
+        parser.add_argument("--" + name, required=True)
+    parser.add_argument("--seeds", type=int, default=1)
+    parser.add_argument("--frames", type=int, default=FOUND_FRAMES)
+    options = parser.parse_args()
+    os.makedirs(options.work, exist_ok=True)
+    ratios = []
+    for kind in ("paper", "wide"):
+        for seed in range(SEED, SEED + options.seeds):
+            ratios.append(knocked(options, kind, seed))
+        lines, found = health(options, render(options, kind, SEED))
+        result("%s: a rig that fits is left alone" % kind,
+               None if not found.any() and lines[-1]["state"] == FITS else "turned by %s" % np.degrees(found))
+    middle = statistics.median(ratios)
+    is_judged = options.seeds >= SEEDS_OF_MEDIAN and options.frames >= FRAMES_OF_MEDIAN
+    result("depth errors are %s times those of a rig that fits" % ", ".join("%.2f" % r for r in ratios),
+           "median %.2f, expected at most %.1f" % (middle, RATIO_MEDIAN) if is_judged and middle > RATIO_MEDIAN else None)
+    print("1..%d" % number)
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

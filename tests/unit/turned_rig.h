@@ -1,0 +1,81 @@
+/* turned_rig - dots that a turned projector casts on a bumpy wall, in double: what ih_turn and ih_health
+ * are tested with. Shares nothing with the core but its structs and the lens (ih_rig_distort). */
+#ifndef TURNED_RIG_H
+#define TURNED_RIG_H
+
+#include "ih_dots.h"
+#include "ih_rig.h"
+#include "ih_test.h"
+
+#define Q30 1073741824.0
+#define DEG 0.017453292519943295
+
+/* Unused in one of the two tests. */
+static inline void turn_of(const double turn_deg[3], int32_t turn_rad_q30[3])
+{
+    for (int axis = 0; axis < 3; axis++) {
+        turn_rad_q30[axis] = (int32_t)lround(turn_deg[axis] * DEG * Q30);
+    }
+}
+
+/* By Rodrigues' formula. */
+static inline void turned_ray(const struct ih_calibration *c, int slot, const double turn_deg[3],
+                              double ray[3])
+{
+    double angle = 0, along = 0, r[3], n[3];
+    for (int axis = 0; axis < 3; axis++) {
+        r[axis] = c->ray_q30[slot][axis] / Q30;
+        angle += turn_deg[axis] * turn_deg[axis];
+    }
+    angle = sqrt(angle);
+    for (int axis = 0; axis < 3; axis++) {
+        n[axis] = angle > 0 ? turn_deg[axis] / angle : 0;
+        along += n[axis] * r[axis];
+    }
+    angle *= DEG;
+    for (int axis = 0; axis < 3; axis++) {
+        int next = (axis + 1) % 3, last = (axis + 2) % 3;
+        ray[axis] = r[axis] * cos(angle) + (n[next] * r[last] - n[last] * r[next]) * sin(angle) +
+                    n[axis] * along * (1 - cos(angle));
+    }
+}
+
+/* Undistorted pixel of a dot far away. */
+static inline void place_at_infinity(const struct ih_calibration *c, int slot,
+                                     const double turn_deg[3], double place_px[2])
+{
+    double ray[3];
+    turned_ray(c, slot, turn_deg, ray);
+    place_px[0] = (c->fx_px_q16 * ray[0] / ray[2] + c->cx_px_q16) / 65536.0;
+    place_px[1] = (c->fy_px_q16 * ray[1] / ray[2] + c->cy_px_q16) / 65536.0;
+}
+
+/* A frame's dots on a wall with waves of 100 mm that are elsewhere in each call; noise on both axes. */
+static inline void see_dots(const struct ih_calibration *c, const double turn_deg[3],
+                            double wall_mm, double noise_px, struct ih_test_random *random,
+                            struct ih_dots *out)
+{
+    static struct ih_rig lens;
+    double phase = 6.28 * ih_test_unit(random);
+    lens.calibration = *c;
+    memset(out, 0, sizeof *out);
+    for (int slot = 0; slot < IH_SLOTS; slot++) {
+        double ray[3], point[3];
+        int32_t u, v;
+        turned_ray(c, slot, turn_deg, ray);
+        double depth = wall_mm + 100 * sin(phase + slot % IH_GRID * 0.7 + slot / IH_GRID * 0.4);
+        double far = (depth - c->origin_mm_q16[2] / 65536.0) / ray[2];
+        for (int axis = 0; axis < 3; axis++) {
+            point[axis] = c->origin_mm_q16[axis] / 65536.0 + far * ray[axis];
+        }
+        ih_rig_distort(&lens, (int32_t)lround(point[0] / point[2] * 268435456.0),
+                       (int32_t)lround(point[1] / point[2] * 268435456.0), &u, &v);
+        if (ih_rig_inside(&lens, u, v)) {
+            struct ih_dot *dot = &out->dot[out->dot_count++];
+            dot->u_px_q12 = u + (int32_t)lround(4096 * noise_px * ih_test_normal(random));
+            dot->v_px_q12 = v + (int32_t)lround(4096 * noise_px * ih_test_normal(random));
+        }
+    }
+}
+
+#endif

@@ -1,0 +1,166 @@
+#!/usr/bin/python3
+"""Float64 reference of ih_health: a projector's turn from labelled dots, and what of a turn can be seen at all.
+
+    knock.py FRAMES_DIR...     for the rig of each directory (with truth.jsonl): one dot's share, in px, of a turn by
+                               0.3 degrees and of a shift by 0.3 mm, across and along the lines; how well 50 frames
+                               with that truth's dots show each of the six when all are unknown, when only turns are
+
+The rig is turned exactly (Rodrigues); equations and weights are the core's (firmware/core/ih_health.h), iterated to the
+end, over all frames at once.
+"""
+
+import copy
+import json
+import os
+import shutil
+import subprocess
+import sys
+
+import numpy as np
+
+REACH_PX = 0.3
+NOISE_PX = 0.12  # of a dot, across its line
+TURN_RAD = np.radians(0.3)
+SHIFT_MM = 0.3
+
+
+class Rig:
+    """rig.json in float64."""
+
+    def __init__(self, path):
+        with open(path, encoding="utf-8") as file:
+            self.json = json.load(file)
+
+        def matrix(name):
+            return np.array(self.json[name]["data"], float).reshape(self.json[name]["rows"], -1)
+        camera = matrix("camera_matrix")
+        self.focal, self.centre = camera[[0, 1], [0, 1]], camera[:2, 2]
+        self.lens = matrix("distortion_coefficients")[0]
+        self.origin, self.rays = matrix("projector_origin")[:, 0], matrix("dot_rays")
+
+    def turned(self, turn):
+        """By Rodrigues' formula, about the projector's origin."""
+        out, angle = copy.copy(self), np.linalg.norm(turn)
+        if angle > 0:
+            n = turn / angle
+            out.rays = (self.rays * np.cos(angle) + np.cross(n, self.rays) * np.sin(angle)
+                        + np.outer(self.rays @ n, n) * (1 - np.cos(angle)))
+        return out
+
+    def save(self, path):
+        out = copy.deepcopy(self.json)
+        out["dot_rays"]["data"] = [float(value) for value in self.rays.ravel()]
+        with open(path, "w", encoding="utf-8") as file:
+            json.dump(out, file)
+
+    def undistorted(self, place):
+        target = (place - self.centre) / self.focal
+        x, (k1, k2, p1, p2, k3) = target.copy(), self.lens
+        for _ in range(60):
+            r2, xy = (x * x).sum(axis=1), x[:, 0] * x[:, 1]
+            bent = np.stack([2 * p1 * xy + p2 * (r2 + 2 * x[:, 0]**2), p1 * (r2 + 2 * x[:, 1]**2) + 2 * p2 * xy], 1)
+            x = (target - bent) / (1 + r2 * (k1 + r2 * (k2 + r2 * k3)))[:, None]
+        return x * self.focal + self.centre
+
+    def lines(self):
+        """Place at infinity, direction, and slopes: px across and along the line per rad, per axis."""
+        x, y = (self.rays[:, :2] / self.rays[:, 2:]).T
+        shift = (self.origin[:2] - self.origin[2] * np.stack([x, y], 1)) * self.focal
+        direction = shift / np.linalg.norm(shift, axis=1)[:, None]
+        du = self.focal[0] * np.stack([-x * y, 1 + x * x, -y], 1)
+        dv = self.focal[1] * np.stack([-1 - y * y, x * y, x], 1)
+        across = direction[:, :1] * dv - direction[:, 1:] * du
+        along = direction[:, :1] * du + direction[:, 1:] * dv
+        return np.stack([x, y], 1) * self.focal + self.centre, direction, across, along
+
+
+def truths(folder):
+    """Index, u, v, depth of all visible dots of each frame."""
+    with open(os.path.join(folder, "truth.jsonl"), encoding="utf-8") as file:
+        return [np.array(json.loads(line)["dots"], float).reshape(-1, 4) for line in file]
+
+
+def true_turn(folder):
+    """How the rays of the truth's dots are turned against those of rig.json: least squares."""
+    rig, turn = Rig(os.path.join(folder, "rig.json")), np.zeros(3)
+    dots = np.concatenate(truths(folder)[::5])
+    index, depth = dots[:, 0].astype(int), dots[:, 3:]
+    normal = (rig.undistorted(dots[:, 1:3]) - rig.centre) / rig.focal
+    way = np.hstack([normal * depth, depth]) - rig.origin
+    way /= np.linalg.norm(way, axis=1)[:, None]
+    for _ in range(5):
+        rays = rig.turned(turn).rays[index]
+        matrix = np.stack([np.cross(axis, rays) for axis in np.eye(3)], axis=2)
+        turn = turn + np.linalg.lstsq(matrix.reshape(-1, 3), (way - rays).ravel(), rcond=None)[0]
+    return turn
+
+
+def labelled(folder, rig, host_sim, work):
+    """Slots and undistorted places of all labelled dots of host_sim with this rig; what it prints."""
+    shutil.rmtree(work, ignore_errors=True)
+    os.makedirs(work)
+    rig.save(os.path.join(work, "rig.json"))
+    out = subprocess.run([host_sim, "--rig", os.path.join(work, "rig.json"), "--trace", work, folder], check=True,
+                         stdout=subprocess.PIPE, text=True).stdout
+    slots, places = [], []
+    for directory, _, names in os.walk(work):
+        for name in (n for n in names if n.endswith(".json") and n != "rig.json"):
+            with open(os.path.join(directory, name), encoding="utf-8") as file:
+                trace = json.load(file)
+            for slot, label in enumerate(trace["labels"]["slot"]):
+                if label is not None:
+                    slots.append(slot)
+                    places.append([trace["dots"][key][label["dot"]] / 4096 for key in ("u_px_q12", "v_px_q12")])
+    return np.array(slots), rig.undistorted(np.array(places)), out
+
+
+def estimate(folder, host_sim, work, start):
+    """The turn that fits the dots best that host_sim labels with the rig turned by start; what host_sim prints."""
+    rig = Rig(os.path.join(folder, "rig.json"))
+    slots, places, out = labelled(folder, rig.turned(start), host_sim, work)
+    turn = np.array(start, float)
+    for _ in range(100):
+        infinity, direction, across, _ = rig.turned(turn).lines()
+        off, way = places - infinity[slots], direction[slots]
+        distance = off[:, 1] * way[:, 0] - off[:, 0] * way[:, 1]
+        weight = np.clip(1 - (distance / REACH_PX)**2, 0, None)**2
+        scaled = across[slots] * weight[:, None]
+        turn = turn + np.linalg.solve(scaled.T @ across[slots], scaled.T @ distance)
+    return turn, out
+
+
+def observable(folder):
+    """Rows of (name, rms px across, rms px along, sigma with all six, sigma with turns alone)."""
+    rig = Rig(os.path.join(folder, "rig.json"))
+    dots = np.concatenate(truths(folder)[:50])
+    index = dots[:, 0].astype(int)
+    _, direction, across, along = rig.lines()
+    way, near = direction[index], 1 / dots[:, 3:]
+    x = rig.rays[index, :2] / rig.rays[index, 2:]
+    du = rig.focal[0] * np.hstack([near, 0 * near, -x[:, :1] * near])
+    dv = rig.focal[1] * np.hstack([0 * near, near, -x[:, 1:] * near])
+    shift_across = way[:, :1] * dv - way[:, 1:] * du
+    shift_along = way[:, :1] * du + way[:, 1:] * dv
+    matrix = np.hstack([across[index], shift_across])
+    scale = np.array([TURN_RAD] * 3 + [SHIFT_MM] * 3)
+    # Nothing is known of what is not seen at all: a prior of 100 times the knock keeps it finite.
+    six = np.linalg.inv((matrix * scale).T @ (matrix * scale) / NOISE_PX**2 + 1e-4 * np.eye(6))
+    three = np.linalg.inv((matrix * scale)[:, :3].T @ (matrix * scale)[:, :3] / NOISE_PX**2)
+    sides = np.hstack([along[index], shift_along])
+    names = ["turn X", "turn Y", "turn Z", "shift X", "shift Y", "shift Z"]
+    for i, name in enumerate(names):
+        yield (name, np.sqrt((matrix[:, i]**2).mean()) * scale[i], np.sqrt((sides[:, i]**2).mean()) * scale[i],
+               np.sqrt(six[i, i]), np.sqrt(three[i, i]) if i < 3 else None)
+
+
+def main():
+    for folder in sys.argv[1:]:
+        print("%s: of a turn by 0.3 degrees or a shift by 0.3 mm" % folder)
+        print("            px across   px along   sigma of six   of turns alone (shares of it, 50 frames)")
+        for name, across, along, six, three in observable(folder):
+            print("  %-8s %10.3f %10.3f %14.4f %16s" % (name, across, along, six, "" if three is None else "%.4f" % three))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
