@@ -38,7 +38,7 @@ SYMBOLS_ALLOWED = {"memcpy", "memmove", "memset", "memcmp"}
 VECTORS = {"ih_band.c", "ih_noise.c", "ih_dots.c", "ih_cholesky.c", "ih_surface.c",
            "ih_ellipse.c", "ih_scan.c"}
 OUTSIDE = {name: 64 for name in SYMBOLS_ALLOWED}
-ENTRIES = ("isohead_init", "isohead_frame", "isohead_label", "isohead_find", "ih_cloud_draw")
+ENTRIES = ("isohead_init", "isohead_frame", "isohead_label", "isohead_find", "ih_cloud_draw", "ih_health_frame")
 
 COMPILE = ["gcc", "-std=c11", "-O2", "-mgeneral-regs-only", "-fcallgraph-info=su", "-Wvla",
            "-Werror=vla", "-fno-stack-protector", "-U_FORTIFY_SOURCE", "-fno-pic", "-I", CORE, "-c"]

@@ -6,8 +6,8 @@
            the stages through isohead.h alone. Of the system: fixed-width integers, bool, size_t and
            string.h, nothing that does I/O, allocates or knows floating point.
   hal      hal.h, what all back ends share, its own files and the system; never firmware.
-  app      core, hal.h, its own files; of the back ends only app_board knows one, hal/linux, and
-           app_cortexm one, hal/cortexm, with the decoder of PGM.
+  app      core, hal.h, its own files; of the back ends only app_board and app_live_main know one,
+           hal/linux, and app_cortexm one, hal/cortexm, with the decoder of PGM.
   sim      core, the app's records and rig, hal, its own files.
   render   its own files and the system: what draws the frames shares no line with what reads them.
   rigblob  core, the app's rig, hal_file.h.
@@ -40,13 +40,16 @@ CORE_HEADERS = {
     "ih_dots.h": CORE_SHARED | {"ih_noise.h"},
     "ih_labels.h": CORE_SHARED | {"ih_dots.h"},
     "ih_exposure.h": CORE_SHARED | {"ih_labels.h"},
+    "ih_turn.h": CORE_SHARED | {"ih_dots.h"},
+    "ih_health.h": CORE_SHARED | {"ih_labels.h", "ih_turn.h"},
     "ih_cloud.h": CORE_SHARED,
     "ih_windows.h": CORE_SHARED,
     "ih_points.h": CORE_SHARED | {"ih_labels.h", "ih_windows.h"},
     "ih_samples.h": CORE_SHARED | {"ih_points.h"},
     "ih_surface.h": CORE_SHARED | {"ih_samples.h", "ih_cholesky.h"},
     "ih_cuts.h": CORE_SHARED | {"ih_surface.h"},
-    "ih_ellipse.h": CORE_SHARED | {"ih_cuts.h"},
+    "ih_parts.h": CORE_SHARED | {"ih_cuts.h"},
+    "ih_ellipse.h": CORE_SHARED | {"ih_parts.h"},
     "ih_hypotheses.h": CORE_SHARED | {"ih_ellipse.h"},
     "ih_heads.h": CORE_SHARED | {"ih_hypotheses.h"},
     "ih_space.h": CORE_SHARED | {"ih_samples.h"},
@@ -106,7 +109,7 @@ def judge_app(path, quoted, target):
     if not quoted or is_core(target):
         return None
     good = re.fullmatch(r"app_\w+\.h|hal\.h|hal_(file|text)\.h", target)
-    if os.path.basename(path).startswith("app_board."):
+    if os.path.basename(path).startswith(("app_board.", "app_live_main.")):
         good = good or re.fullmatch(r"linux/hal_\w+\.h", target)
     if os.path.basename(path) == "app_cortexm.c":
         good = good or re.fullmatch(r"cortexm/hal_\w+\.h|replay/hal_pgm\.h", target)
@@ -207,6 +210,7 @@ def self_test():
                ("tools/render/main.c", "#include <hal.h>"),
                ("tools/bench/bench_isohead.c", '#include "app_loop.h"'),
                ("firmware/app/app_loop.c", '#include "linux/hal_gpio.h"'),
+               ("firmware/app/app_live.c", '#include "linux/hal_serve.h"'),
                ("firmware/app/app_loop.c", '#include "sim_run.h"'),
                ("sim/sim_run.c", '#include "app_laser.h"'),
                ("tools/rigblob/main.c", '#include "app_record.h"'),

@@ -19,7 +19,7 @@ cd "$(dirname "$0")/../../packaging"
 sed -n 's/^ *--\([a-z][a-z-]*\).*/\1/p' "$work/help" | sort >"$work/options"
 [ -s "$work/options" ] || { echo "manual: --help lists no options" >&2; exit 1; }
 sed -n 's/^\.It Fl -\([a-z-]*\).*/\1/p' isohead_board.1 | sort >"$work/page1"
-grep -vxE 'config|laser-off|help|version' "$work/options" >"$work/keys"
+grep -vxE 'config|laser-off|check|help|version' "$work/options" >"$work/keys"
 sed -n 's/^\.It Ic \([a-z-]*\) = .*/\1/p' isohead.conf.5 | sort >"$work/page5"
 failed=0
 if ! diff "$work/options" "$work/page1"; then

@@ -126,11 +126,12 @@ class Bench:
         self.seconds[test] = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - begin
 
     def build_golden(self):
-        folder = os.path.join(ROOT, "tests", "golden")
+        folder, hal = os.path.join(ROOT, "tests", "golden"), os.path.join(ROOT, "hal")
+        names = ("golden", "golden_hash", "golden_inner", "golden_scene", "golden_host")
         objects = []
-        for name in ("golden", "golden_hash", "golden_inner", "golden_scene", "golden_host"):
-            objects.append(os.path.join(self.work, name + ".o"))
-            run(COMPILE_TEST + ["-I", self.core, os.path.join(folder, name + ".c"), "-o", objects[-1]])
+        for source in [os.path.join(folder, name + ".c") for name in names] + [os.path.join(hal, "hal_text.c")]:
+            objects.append(os.path.join(self.work, os.path.basename(source)[:-2] + ".o"))
+            run(COMPILE_TEST + ["-I", self.core, "-I", hal, source, "-o", objects[-1]])
         self.golden_objects = objects
         program = os.path.join(self.work, "golden")
         self.link(objects, program)
@@ -336,9 +337,10 @@ def check(arguments):
 
 
 def is_of_core(test):
+    """A test of a source of the core by its name, or one that includes it."""
     stem = os.path.basename(test)[5:-2]
-    return any(os.path.exists(os.path.join(ROOT, "firmware", "core", name + ".c"))
-               for name in (stem, "ih_" + stem))
+    return any(name and os.path.exists(os.path.join(ROOT, "firmware", "core", name))
+               for name in (stem + ".c", "ih_" + stem + ".c", included_source(test)))
 
 
 # A core of two stages, one of them with a test. It is known what becomes of these mutants.

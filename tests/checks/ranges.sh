@@ -88,7 +88,7 @@ planted overflow 'ranges_planted.c:.*signed integer overflow'
 planted shift 'ranges_planted.c:.*shift exponent'
 planted index 'ranges_planted.c:.*out of bounds'
 planted divide 'ranges_planted.c:.*division by zero'
-planted argument 'ih_fix.c:[0-9]*: range: 31, expected 32 .. 62'
+planted argument 'ih_fix.h:[0-9]*: range: 31, expected 32 .. 62'
 planted stage 'ih_ellipsoid.c:[0-9]*: range: 256, expected 10240 .. 51200'
 "$build/ranges_planted" nothing
 echo "ranges: $kinds kinds of planted mistakes noticed"

@@ -83,7 +83,7 @@ def findings_of(pattern, output, root):
 
 
 def cppcheck(options, files, root):
-    command = ["cppcheck", "--std=c11", "--quiet", "--library=posix", "--suppress=missingIncludeSystem",
+    command = ["cppcheck", "--std=c11", "--quiet", "--force", "--library=posix", "--suppress=missingIncludeSystem",
                "--template={file}:{line}: {id}: {message}"] + options + files
     done = subprocess.run(command, cwd=root, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
                           check=False)

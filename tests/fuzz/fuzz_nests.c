@@ -76,6 +76,7 @@ static void fill_surface(struct fuzz_input *input, struct ih_surface *surface)
 static void cut(struct fuzz_input *input, const struct ih_surface *surface)
 {
     static struct ih_cuts cuts;
+    static struct ih_parts parts;
     static struct ih_ellipse_scratch scratch;
     struct ih_ellipse_params params;
     struct ih_ellipse ellipse;
@@ -93,7 +94,8 @@ static void cut(struct fuzz_input *input, const struct ih_surface *surface)
             FUZZ_CHECK(ellipse.area_q16 != 0 && ellipse.shape_q16 > 0);
             FUZZ_CHECK(ellipse.ratio_q16 >= 65535 && ellipse.ratio_q16 <= 255 << 16);
         }
-        if (ih_ellipse_of_part(&cuts, contour, place, &params, &scratch, &ellipse)) {
+        if (ih_parts_make(&cuts, contour, &params, &parts) &&
+            ih_ellipse_of_part(&parts, place, &params, &scratch, &ellipse)) {
             FUZZ_CHECK(ellipse.area_q16 > 0 && ellipse.shape_q16 <= params.shape_max_q16);
             FUZZ_CHECK(ellipse.ratio_q16 <= params.ratio_part_max_q16);
         }

@@ -6,6 +6,7 @@
 #include "golden_hash.h"
 #include "golden_inner.h"
 #include "golden_scene.h"
+#include "hal_text.h"
 
 #define FRAME_US 40000
 
@@ -15,69 +16,41 @@ static struct ih_calibration calibration;
 static uint16_t samples[GOLDEN_FRAME_BYTES / 2];
 static uint16_t ambient_samples[GOLDEN_AMBIENT_BYTES / 2];
 
-/* A line of output. What does not fit is cut off; nothing here is that long. */
-struct line {
-    char text[120];
-    size_t length;
-};
+#define LINE_BYTES 120 /* a line of output; none is that long */
+#define HASH_DIGITS 16
 
-static void put_text(struct line *line, const char *text)
+static bool end_line(struct hal_text *line)
 {
-    for (; *text != 0 && line->length < sizeof line->text - 1; text++) {
-        line->text[line->length++] = *text;
-    }
-}
-
-static void put_number(struct line *line, uint32_t number)
-{
-    char digits[11] = {0};
-    size_t at = sizeof digits - 1;
-    do {
-        digits[--at] = (char)('0' + number % 10);
-        number /= 10;
-    } while (number > 0);
-    put_text(line, &digits[at]);
-}
-
-static void put_hash(struct line *line, uint64_t hash)
-{
-    char digit[2] = {0};
-    for (int shift = 60; shift >= 0; shift -= 4) {
-        digit[0] = "0123456789abcdef"[hash >> shift & 15];
-        put_text(line, digit);
-    }
-}
-
-static bool end_line(struct line *line)
-{
-    line->text[line->length++] = '\n';
+    hal_text_put(line, "\n");
     return golden_write(line->text, line->length);
 }
 
 static bool fail(const char *what, uint32_t number, const char *expected)
 {
-    struct line line = {.length = 0};
-    put_text(&line, "golden: ");
-    put_text(&line, what);
-    put_text(&line, " ");
-    put_number(&line, number);
-    put_text(&line, ", expected ");
-    put_text(&line, expected);
+    char memory[LINE_BYTES];
+    struct hal_text line = hal_text_begin(memory, sizeof memory);
+    hal_text_put(&line, "golden: ");
+    hal_text_put(&line, what);
+    hal_text_put(&line, " ");
+    hal_text_put_number(&line, number, 1);
+    hal_text_put(&line, ", expected ");
+    hal_text_put(&line, expected);
     end_line(&line);
     return false;
 }
 
 static bool put_stage(uint32_t set, const char *frame, const char *stage, uint64_t hash)
 {
-    struct line line = {.length = 0};
-    put_text(&line, "rig");
-    put_number(&line, set);
-    put_text(&line, " ");
-    put_text(&line, frame);
-    put_text(&line, " ");
-    put_text(&line, stage);
-    put_text(&line, " ");
-    put_hash(&line, hash);
+    char memory[LINE_BYTES];
+    struct hal_text line = hal_text_begin(memory, sizeof memory);
+    hal_text_put(&line, "rig");
+    hal_text_put_number(&line, set, 1);
+    hal_text_put(&line, " ");
+    hal_text_put(&line, frame);
+    hal_text_put(&line, " ");
+    hal_text_put(&line, stage);
+    hal_text_put(&line, " ");
+    hal_text_put_hex(&line, hash, HASH_DIGITS);
     return end_line(&line);
 }
 
@@ -192,10 +165,10 @@ static bool read_frame(struct ih_frame *frame)
 static bool run_recorded(struct set *set)
 {
     struct ih_frame frame;
-    struct line name = {.length = 0};
-    put_text(&name, "recorded");
-    put_number(&name, set->frame_count);
-    name.text[name.length] = 0;
+    char memory[LINE_BYTES];
+    struct hal_text name = hal_text_begin(memory, sizeof memory);
+    hal_text_put(&name, "recorded");
+    hal_text_put_number(&name, set->frame_count, 1);
     return read_frame(&frame) && run_frame(set, name.text, &frame, NULL);
 }
 

@@ -8,9 +8,12 @@
  * of true ones; most of them are isolated and dropped, the Huber step weakens the others. No node can move
  * farther than from the overshoot's limit before the nearest sample to the farthest depth.
  *
- * Bounds: 1.5 times the worst of scenes of other seeds, for points taken away 91 mm of 5100, for points
- * moved 53 mm of 3200; of their means, 13.1 mm and 7.3 mm, 1.4 times. Points are moved anywhere in the
- * range, and in every other scene before the head. */
+ * Bounds of a scene: 1.5 times the worst of scenes of other seeds, for points taken away 91 mm of 5100, for
+ * points moved 53 mm of 3200. Of means, which notice what is wrong in every scene, and of the two rigs, 400
+ * scenes of other seeds each: of the move 13.5, 13.0, 7.6 and 5.1 mm, bounded by 1.3 times that; and, since a
+ * surface that follows nothing does not move either, of how far it is from the head itself then, 29.4, 23.8,
+ * 26.5 and 19.4 mm, by 1.2 times that. Points are moved anywhere in the range, and in every other scene before
+ * the head. */
 #include "ih_labels.h"
 #include "ih_surface.h"
 #include "prop_scene.h"
@@ -82,17 +85,21 @@ static void change(struct ih_test_random *random, int32_t taken, int32_t moved, 
     }
 }
 
-/* Root mean square of the difference over the nodes on the inner part of the head; *worst: the largest. */
-static double difference_mm(const struct prop_scene *scene, double *worst)
+/* Over the nodes on the inner part of the head: root mean squares of what the change made of the surface,
+ * and of how far it is from the head then; and the worst of what was made. */
+struct off {
+    double moved_mm, wrong_mm, worst_mm;
+};
+
+static struct off measure(const struct prop_scene *scene)
 {
     static const double camera[3] = {0, 0, 0};
     const double step = ih_test_from_q(rig.field.unit_q28, 28) * IH_SURFACE_STEP_NUMERATOR /
                         IH_SURFACE_STEP_DENOMINATOR;
     struct prop_scene inner = *scene;
-    double sum = 0;
+    struct off off = {0, 0, 0};
     int32_t count = 0;
 
-    *worst = 0;
     for (int axis = 0; axis < 3; axis++) {
         inner.body[0].semi_mm[axis] *= INNER;
     }
@@ -107,23 +114,34 @@ static double difference_mm(const struct prop_scene *scene, double *worst)
 
             prop_depth_mm(&inner, camera, towards, &body);
             if (body == 0) {
-                sum += d * d;
+                const double e = ih_test_from_q(after.depth_mm_q8[y][x], 8) -
+                                 prop_depth_mm(scene, camera, towards, NULL);
+
+                off.moved_mm += d * d;
+                off.wrong_mm += e * e;
+                off.worst_mm = fmax(off.worst_mm, fabs(d));
                 count++;
-                *worst = fabs(d) > *worst ? fabs(d) : *worst;
             }
         }
     }
     TEST_ASSERT_GREATER_THAN_INT32(40, count);
-    return sqrt(sum / count);
+    off.moved_mm = sqrt(off.moved_mm / count);
+    off.wrong_mm = sqrt(off.wrong_mm / count);
+    return off;
 }
 
-static void check(int which, uint64_t seed, int32_t taken, int32_t moved, double bound_mm,
-                  double mean_bound_mm)
+/* Of one scene, and of the mean of all; see above. */
+struct bounds {
+    double moved_mm, mean_moved_mm, mean_wrong_mm;
+};
+
+static void check(int which, uint64_t seed, int32_t taken, int32_t moved,
+                  const struct bounds *bounds)
 {
     struct ih_test_random random = {seed};
     struct ih_labels_params params;
     const int32_t scenes = prop_seeds(25);
-    double worst_rms = 0, worst_node = 0, sum = 0;
+    struct off sum = {0, 0, 0}, worst = {0, 0, 0};
     int32_t bad_slot;
 
     ih_labels_params_default(&params);
@@ -132,37 +150,39 @@ static void check(int which, uint64_t seed, int32_t taken, int32_t moved, double
         const struct prop_scene scene = prop_random_person(&random, 100);
         const double whole_mm = rig.calibration.far_mm - rig.calibration.near_mm;
         const double before_head_mm = scene.body[0].centre_mm[2] - 150 - rig.calibration.near_mm;
-        double node;
 
         prop_dots(&scene, &vector_rigs[which], &random, CENTRE_SIGMA_PX, &dots, slot_of_dot);
         ih_labels_assign(&dots, &rig, &params, &labels_scratch, &labels);
         fit(&labels, &before);
         change(&random, taken, moved, i % 2 == 0 ? whole_mm : before_head_mm);
         fit(&changed, &after);
-        const double rms = difference_mm(&scene, &node);
+        const struct off off = measure(&scene);
 
-        IH_TEST_WITHIN(bound_mm, 0, rms, "the surface on the head moves by mm", i);
-        worst_rms = rms > worst_rms ? rms : worst_rms;
-        worst_node = node > worst_node ? node : worst_node;
-        sum += rms;
+        IH_TEST_WITHIN(bounds->moved_mm, 0, off.moved_mm, "the surface on the head moves by mm", i);
+        worst.moved_mm = fmax(worst.moved_mm, off.moved_mm);
+        worst.worst_mm = fmax(worst.worst_mm, off.worst_mm);
+        sum.moved_mm += off.moved_mm;
+        sum.wrong_mm += off.wrong_mm;
     }
-    IH_TEST_WITHIN(mean_bound_mm, 0, sum / scenes, "the mean of that", scenes);
     printf(
         "robust: rig %d, %d taken away, %d moved, %d scenes: rms on the head mean %.1f mm, worst "
-        "%.1f mm; worst node %.1f mm; bound of the rms %.0f mm\n",
-        which, (int)taken, (int)moved, (int)scenes, sum / scenes, worst_rms, worst_node, bound_mm);
+        "%.1f mm; worst node %.1f mm; from the head itself mean %.1f mm\n",
+        which, (int)taken, (int)moved, (int)scenes, sum.moved_mm / scenes, worst.moved_mm,
+        worst.worst_mm, sum.wrong_mm / scenes);
+    IH_TEST_WITHIN(bounds->mean_moved_mm, 0, sum.moved_mm / scenes, "the mean of that", scenes);
+    IH_TEST_WITHIN(bounds->mean_wrong_mm, 0, sum.wrong_mm / scenes, "from the head itself", scenes);
 }
 
 static void any_70_points_may_be_missing(void)
 {
-    check(0, 901, TAKEN, 0, 137, 18);
-    check(1, 902, TAKEN, 0, 137, 18);
+    check(0, 901, TAKEN, 0, &(struct bounds){137, 17.6, 35.3});
+    check(1, 902, TAKEN, 0, &(struct bounds){137, 16.9, 28.6});
 }
 
 static void any_20_points_may_be_wrong(void)
 {
-    check(0, 903, 0, MOVED, 80, 10);
-    check(1, 904, 0, MOVED, 80, 10);
+    check(0, 903, 0, MOVED, &(struct bounds){80, 9.9, 31.8});
+    check(1, 904, 0, MOVED, &(struct bounds){80, 6.7, 23.3});
 }
 
 int main(void)

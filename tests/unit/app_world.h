@@ -111,6 +111,7 @@ struct world {
     int64_t last_record_us;
     int record_count, lit_count, dark_count, error_count, ambient_count;
     int rise_count, beat_count;
+    enum ih_health_state health;
     size_t records_length;
     char records[65536];
     int waits;
@@ -229,6 +230,25 @@ void ih_exposure_next(const struct ih_exposure_params *params, const struct ih_e
     TEST_ASSERT_EQUAL_INT32(256, params->duty_min_q8);
     TEST_ASSERT_EQUAL_INT(world_head.labels.labelled_count, look->labelled_count);
     state->exposure_us += world.lit_count % 2 * 100;
+}
+
+/* A rig that always fits. */
+void ih_health_init(struct ih_health *health, const struct ih_rig *rig)
+{
+    (void)rig;
+    health->state = IH_HEALTH_UNKNOWN;
+}
+
+bool ih_health_frame(struct ih_health *health, const struct ih_dots *dots,
+                     const struct ih_labels *labels, struct ih_rig *rig,
+                     struct ih_health_scratch *scratch)
+{
+    (void)dots;
+    (void)labels;
+    (void)rig;
+    (void)scratch;
+    health->state = world.health;
+    return false;
 }
 
 const char *ih_err_text(enum ih_err err)

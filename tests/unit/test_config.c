@@ -112,6 +112,7 @@ static void what_is_not_given_has_its_default(void)
     TEST_ASSERT_EQUAL_INT32(10, config.status_s);
     TEST_ASSERT_NULL(config.watchdog);
     TEST_ASSERT_FALSE(config.paper);
+    TEST_ASSERT_EQUAL_STRING("", config.view_port);
     TEST_ASSERT_NULL(config.path);
     TEST_ASSERT_FALSE(config.laser_off || config.help || config.version);
 }
@@ -143,6 +144,8 @@ static void assert_all_is_read(void)
     TEST_ASSERT_EQUAL_INT32(0, config.status_s);
     TEST_ASSERT_EQUAL_STRING("/dev/watchdog1", config.watchdog);
     TEST_ASSERT_TRUE(config.paper);
+    TEST_ASSERT_EQUAL_STRING("10.0.0.1", config.view_host);
+    TEST_ASSERT_EQUAL_STRING("8080", config.view_port);
 }
 
 static void every_setting_is_an_option_and_a_key(void)
@@ -153,7 +156,7 @@ static void every_setting_is_an_option_and_a_key(void)
                           "LASER EN", "--laser-active-low=on", "--interlock-line=6",
                           "--interlock-active-low", "--heartbeat-line", "7", "--duty", "40",
                           "--output", "udp:[fe80::1]:5005", "--log=syslog", "--status", "0",
-                          "--watchdog", "/dev/watchdog1", "--paper"));
+                          "--watchdog", "/dev/watchdog1", "--paper", "--view", "10.0.0.1:8080"));
     assert_all_is_read();
     setUp();
     /* No line end at the end, line ends of other systems, blanks and comments everywhere. */
@@ -179,6 +182,7 @@ static void every_setting_is_an_option_and_a_key(void)
                                "log = syslog\n"
                                "status = 0\n"
                                "watchdog = /dev/watchdog1 #=\n"
+                               "view = 10.0.0.1:8080\n"
                                "paper = on"));
     assert_all_is_read();
 }
@@ -447,6 +451,43 @@ static void wrong_texts_are_tamed_and_cut(void)
     }
 }
 
+static void the_view_is_local_unless_told(void)
+{
+    static const struct {
+        const char *option, *host, *port; /* host NULL: refused */
+    } cases[] = {
+        {"--view=8080", "127.0.0.1", "8080"},
+        {"--view=1", "127.0.0.1", "1"},
+        {"--view=65535", "127.0.0.1", "65535"},
+        {"--view=080", "127.0.0.1", "80"},
+        {"--view=0.0.0.0:80", "0.0.0.0", "80"},
+        {"--view=[::1]:8080", "::1", "8080"},
+        {"--view=[::]:8080", "::", "8080"},
+        {"--view=0", NULL, NULL},
+        {"--view=65536", NULL, NULL},
+        {"--view=999999999999999999999", NULL, NULL},
+        {"--view=-1", NULL, NULL},
+        {"--view=8080x", NULL, NULL},
+        {"--view=:8080", NULL, NULL},
+        {"--view=::1:8080", NULL, NULL},
+        {"--view=127.0.0.1:", NULL, NULL},
+        {"--view=127.0.0.1:0", NULL, NULL},
+        {"--view=on", NULL, NULL},
+        {"--view=", NULL, NULL},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        setUp();
+        bool good = READ("--rig=r", cases[i].option);
+        TEST_ASSERT_EQUAL_MESSAGE(cases[i].host != NULL, good, cases[i].option);
+        if (good) {
+            TEST_ASSERT_EQUAL_STRING(cases[i].host, config.view_host);
+            TEST_ASSERT_EQUAL_STRING(cases[i].port, config.view_port);
+        } else {
+            TEST_ASSERT_EQUAL_STRING("", config.view_port);
+        }
+    }
+}
+
 static void options_are_checked_too(void)
 {
     TEST_ASSERT_FALSE(READ("--rigg=4", "--zzzzzz", "-x", "--version=4", "--", "stray"));
@@ -673,6 +714,9 @@ static void the_installed_file_has_every_key(void)
     TEST_ASSERT_NOT_NULL(config.watchdog);
     config.gpio_chip = config.laser_line = config.interlock_line = config.heartbeat_line = NULL;
     config.watchdog = NULL;
+    TEST_ASSERT_EQUAL_STRING("8080", config.view_port);
+    memset(config.view_host, 0, sizeof config.view_host);
+    memset(config.view_port, 0, sizeof config.view_port);
     TEST_ASSERT_EQUAL_INT32(25000, config.rate_mhz);
     config.rate_mhz = 0;
     /* All else is the default. */
@@ -756,6 +800,7 @@ int main(void)
     RUN_TEST(all_errors_of_a_file_are_told);
     RUN_TEST(very_many_errors_are_cut_short);
     RUN_TEST(wrong_texts_are_tamed_and_cut);
+    RUN_TEST(the_view_is_local_unless_told);
     RUN_TEST(options_are_checked_too);
     RUN_TEST(files_that_are_none_are_told);
     RUN_TEST(what_does_not_go_together_is_told);

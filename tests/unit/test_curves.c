@@ -74,6 +74,30 @@ static void robust_weights_follow_double(void)
     }
 }
 
+/* Linear from all at 0.5 semi-axes below the middle to half at 0.8. A unit of Q14 more or less of either
+ * end is 6 of Q16. */
+static void low_points_count_half(void)
+{
+    int32_t down_q14;
+
+    for (down_q14 = -131072; down_q14 <= 131072; down_q14++) {
+        const double part = (down_q14 / 16384.0 - 0.5) / 0.3;
+        const double exact = 65536 * (1 - 0.5 * fmin(fmax(part, 0), 1));
+
+        if (fabs(exact - (double)low_weight_q16(down_q14)) > 3) {
+            IH_TEST_WITHIN(3, exact, (double)low_weight_q16(down_q14), "weight", down_q14);
+        }
+    }
+}
+
+/* A prior's weight is the square of its part of a point's 6 mm: 60 mm of the centre, 0.09 of a logarithm, of
+ * which a hundredth is a unit. */
+static void priors_weigh_what_they_should(void)
+{
+    TEST_ASSERT_EQUAL_INT32(floor(65536 * (6.0 / 60) * (6.0 / 60)), PRIOR_CENTRE_Q16);
+    TEST_ASSERT_EQUAL_INT32(floor(65536 * (6.0 / 9) * (6.0 / 9)), PRIOR_AXES_Q16);
+}
+
 /* Monotone, so that what is beyond the ends of the loop lies between them and 0 or 1. */
 static void probabilities_follow_libm(void)
 {
@@ -101,6 +125,8 @@ int main(void)
     RUN_TEST(exp_follows_libm);
     RUN_TEST(ln_follows_libm);
     RUN_TEST(robust_weights_follow_double);
+    RUN_TEST(low_points_count_half);
+    RUN_TEST(priors_weigh_what_they_should);
     RUN_TEST(probabilities_follow_libm);
     return UNITY_END();
 }

@@ -29,11 +29,13 @@ static struct ih_cuts cuts;
 static struct ih_contour contour;
 static struct ih_ellipse ellipse;
 static struct ih_ellipse_params params;
+static struct ih_parts parts;
 static struct ih_ellipse_scratch scratch;
 
 void setUp(void)
 {
     memset(&cuts, IH_TEST_FILL, sizeof cuts);
+    memset(&parts, IH_TEST_FILL, sizeof parts);
     memset(&scratch, IH_TEST_FILL, sizeof scratch);
     memset(&ellipse, IH_TEST_FILL, sizeof ellipse);
     ih_ellipse_params_default(&params);
@@ -160,6 +162,20 @@ static void polygons_without_area_are_no_ellipse(void)
     TEST_ASSERT_FALSE(ih_ellipse_of_contour(&cuts, &contour, &ellipse));
 }
 
+/* Squares of 16 cells at both ends of the grid and one of -30 in the middle, on a thread: 2 cells of
+ * area, its middle in the grid, but a variance of 7056. */
+static void a_polygon_whose_parts_cancel_is_no_ellipse(void)
+{
+    static const struct ih_vertex threaded[] = {
+        {0, 10752},     {2048, 10752},  {2048, 12800},  {0, 12800},
+        {0, 10752},     {10240, 10496}, {10240, 13056}, {13312, 13056},
+        {13312, 10496}, {10240, 10496}, {21504, 10752}, {23552, 10752},
+        {23552, 12800}, {21504, 12800}, {21504, 10752}, {10240, 10496}};
+
+    take(threaded, 16, true);
+    TEST_ASSERT_FALSE(ih_ellipse_of_contour(&cuts, &contour, &ellipse));
+}
+
 static void the_winding_tells_inside_from_beside_and_minima_from_maxima(void)
 {
     static const struct ih_vertex box[] = {
@@ -201,10 +217,16 @@ static void the_winding_follows_a_concave_contour(void)
                             ih_ellipse_winding(&cuts, &contour, (struct ih_vertex){6400, 12800}));
 }
 
+static bool find_part_around(struct ih_vertex place)
+{
+    return ih_parts_make(&cuts, &contour, &params, &parts) &&
+           ih_ellipse_of_part(&parts, place, &params, &scratch, &ellipse);
+}
+
 static bool find_part(const struct vector_part *v)
 {
     take(v->vertex, v->vertex_count, v->closed);
-    return ih_ellipse_of_part(&cuts, &contour, v->place, &params, &scratch, &ellipse);
+    return find_part_around(v->place);
 }
 
 static void the_best_part_matches_the_float_search(void)
@@ -254,18 +276,17 @@ static void contours_that_are_too_short_or_too_long_have_no_part(void)
 
     for (count = 1; count < 8; count++) {
         take(vector_parts[0].vertex, count, false);
-        TEST_ASSERT_FALSE(ih_ellipse_of_part(&cuts, &contour, vector_parts[0].place, &params,
-                                             &scratch, &ellipse));
+        TEST_ASSERT_FALSE(find_part_around(vector_parts[0].place));
     }
     for (i = 0; i < IH_CUTS_VERTICES_MAX; i++) {
-        const double angle = i * 2 * acos(-1.0) / (IH_ELLIPSE_VERTICES_MAX + 1);
+        const double angle = i * 2 * acos(-1.0) / (IH_PARTS_VERTICES_MAX + 1);
 
         longest[i] = (struct ih_vertex){(int16_t)lround((23 + 20 * cos(angle)) * UNIT),
                                         (int16_t)lround((23 + 20 * sin(angle)) * UNIT)};
     }
-    contour = (struct ih_contour){0, IH_ELLIPSE_VERTICES_MAX + 1, true};
+    contour = (struct ih_contour){0, IH_PARTS_VERTICES_MAX + 1, true};
     memcpy(cuts.vertex, longest, sizeof longest);
-    TEST_ASSERT_FALSE(ih_ellipse_of_part(&cuts, &contour, place, &params, &scratch, &ellipse));
+    TEST_ASSERT_FALSE(find_part_around(place));
 }
 
 /* All vertices at one place, and a line there and back: no length, no area, nothing to divide by.
@@ -284,33 +305,190 @@ static void degenerate_contours_have_no_part(void)
                                            (int16_t)(20 * UNIT + along * 300)};
         }
         take(vertex, 40, pass % 2 == 0);
-        TEST_ASSERT_FALSE(ih_ellipse_of_part(&cuts, &contour, place, &params, &scratch, &ellipse));
+        TEST_ASSERT_FALSE(find_part_around(place));
     }
 }
 
 /* The largest sums: a contour as long as is searched, all over the grid, seen from a corner. */
 static void the_longest_contours_do_not_overflow(void)
 {
-    static struct ih_vertex vertex[IH_ELLIPSE_VERTICES_MAX];
+    static struct ih_vertex vertex[IH_PARTS_VERTICES_MAX];
     struct ih_test_random random = {82};
     int32_t i, pass;
 
     for (pass = 0; pass < 40; pass++) {
         int32_t x = 23 * UNIT, y = 23 * UNIT;
 
-        for (i = 0; i < IH_ELLIPSE_VERTICES_MAX; i++) { /* a walk in steps of at most one cell */
+        for (i = 0; i < IH_PARTS_VERTICES_MAX; i++) { /* a walk in steps of at most one cell */
             x += (int32_t)ih_test_between(&random, pass % 2 == 0 ? -UNIT : 0, UNIT);
             y += (int32_t)ih_test_between(&random, -UNIT, pass % 3 == 0 ? 0 : UNIT);
             x = x < 0 ? 0 : x > 46 * UNIT ? 46 * UNIT : x;
             y = y < 0 ? 0 : y > 46 * UNIT ? 46 * UNIT : y;
             vertex[i] = (struct ih_vertex){(int16_t)x, (int16_t)y};
         }
-        take(vertex, IH_ELLIPSE_VERTICES_MAX, pass % 4 < 2);
-        if (ih_ellipse_of_part(&cuts, &contour, (struct ih_vertex){0, 0}, &params, &scratch,
-                               &ellipse)) {
+        take(vertex, IH_PARTS_VERTICES_MAX, pass % 4 < 2);
+        if (find_part_around((struct ih_vertex){0, 0})) {
             IH_TEST_RANGE(0, 46 << 16, ellipse.x_q16, "x", pass);
         }
         (void)ih_ellipse_of_contour(&cuts, &contour, &ellipse);
+    }
+}
+
+/* Rectangles of sides w x h around places, turned either way, that hang on the middle of the grid by lines
+ * there and back: their areas, positive or negative, add up, and so do their moments about the middle. */
+struct lobe {
+    double x, y, w, h;
+    int sign;
+};
+
+static void take_lobes(const struct lobe *lobe, int count)
+{
+    static struct ih_vertex vertex[64];
+    int i, k, n = 0;
+
+    for (i = 0; i < count; i++) {
+        const double x = 23 + lobe[i].x, y = 23 + lobe[i].y;
+
+        vertex[n++] = (struct ih_vertex){23 * UNIT, 23 * UNIT};
+        for (k = 0; k <= 4; k++) { /* its corners, back to the first */
+            const int corner = (lobe[i].sign > 0 ? k : 4 - k) % 4;
+            const double right = corner == 1 || corner == 2 ? 0.5 : -0.5;
+            const double down = corner >= 2 ? 0.5 : -0.5;
+
+            vertex[n++] = (struct ih_vertex){(int16_t)lround((x + right * lobe[i].w) * UNIT),
+                                             (int16_t)lround((y + down * lobe[i].h) * UNIT)};
+        }
+    }
+    take(vertex, n, true);
+}
+
+/* Areas that nearly cancel can have their centre or their moments anywhere; no polygon on the grid has
+ * them beyond 47 steps, or 47^2. Two boxes of area 8, as far to either side, less one of 14 leave 2: the
+ * centre is 7 times as far aside as that one, the moment 8 times the square of their distance. */
+static void what_crosses_itself_is_no_ellipse(void)
+{
+    static const struct {
+        double apart, aside, centre;
+        bool is_ellipse;
+    } cases[] = {
+        {20, 6.5, 45.5, true}, {20, 6.8, 47.6, false}, {16, 0, 0, true}, {19, 0, 0, false}};
+    int i, axis;
+
+    for (i = 0; i < IH_TEST_COUNT(cases); i++) {
+        for (axis = 0; axis < 2; axis++) {
+            const double x = axis == 0 ? 1 : 0, y = 1 - x, a = cases[i].apart, n = cases[i].aside;
+            const struct lobe lobes[] = {{a * x, a * y, 2 + 2 * x, 2 + 2 * y, 1},
+                                         {-a * x, -a * y, 2 + 2 * x, 2 + 2 * y, 1},
+                                         {-n * x, -n * y, 2 + 5 * x, 2 + 5 * y, -1}};
+
+            take_lobes(lobes, 3);
+            IH_TEST_EQUAL(cases[i].is_ellipse, ih_ellipse_of_contour(&cuts, &contour, &ellipse),
+                          "ellipse", 2 * i + axis);
+            if (cases[i].is_ellipse) {
+                IH_TEST_WITHIN(1e-4, 2, from_q16(ellipse.area_q16), "area", i);
+                IH_TEST_WITHIN(1e-3, 23 + cases[i].centre * x, from_q16(ellipse.x_q16), "x", i);
+                IH_TEST_WITHIN(1e-3, 23 + cases[i].centre * y, from_q16(ellipse.y_q16), "y", i);
+            }
+        }
+    }
+}
+
+/* Where the list of a contour begins says nothing of how it winds. */
+static void the_winding_does_not_depend_on_the_first_vertex(void)
+{
+    static const struct ih_vertex shape[] = {{5120, 5120},  {9000, 4000},   {14000, 6000},
+                                             {15000, 9000}, {12000, 14000}, {6000, 13000}};
+    struct ih_vertex turned[6];
+    int i, k;
+
+    for (i = 0; i < 6; i++) {
+        for (k = 0; k < 6; k++) {
+            turned[k] = shape[(i + k) % 6];
+        }
+        take(turned, 6, true);
+        IH_TEST_EQUAL(1, ih_ellipse_winding(&cuts, &contour, (struct ih_vertex){10000, 9000}),
+                      "inside", i);
+        IH_TEST_EQUAL(0, ih_ellipse_winding(&cuts, &contour, (struct ih_vertex){4000, 9000}),
+                      "left", i);
+        IH_TEST_EQUAL(0, ih_ellipse_winding(&cuts, &contour, (struct ih_vertex){16000, 9000}),
+                      "right", i);
+        IH_TEST_EQUAL(0, ih_ellipse_winding(&cuts, &contour, (struct ih_vertex){10000, 2000}),
+                      "above", i);
+        IH_TEST_EQUAL(0, ih_ellipse_winding(&cuts, &contour, (struct ih_vertex){10000, 15000}),
+                      "below", i);
+    }
+}
+
+static void take_box(int32_t width_q9, int32_t height_q9)
+{
+    const int16_t x = 512, y = 1024, x2 = (int16_t)(x + width_q9), y2 = (int16_t)(y + height_q9);
+    const struct ih_vertex corner[4] = {{x, y}, {x2, y}, {x2, y2}, {x, y2}};
+
+    take(corner, 4, true);
+}
+
+/* Half a grid cell is the least area; 255 the greatest ratio of the axes, here of 46 x 0.1 steps. */
+static void areas_and_ratios_have_their_limits(void)
+{
+    take_box(UNIT, UNIT / 2);
+    TEST_ASSERT_TRUE(ih_ellipse_of_contour(&cuts, &contour, &ellipse));
+    take_box(UNIT, UNIT / 2 - 2);
+    TEST_ASSERT_FALSE(ih_ellipse_of_contour(&cuts, &contour, &ellipse));
+    take_box(46 * UNIT - 1024, UNIT / 10);
+    TEST_ASSERT_TRUE(ih_ellipse_of_contour(&cuts, &contour, &ellipse));
+    TEST_ASSERT_EQUAL_INT32(255 << 16, ellipse.ratio_q16);
+}
+
+/* A regular polygon, its area n/2 r^2 sin(2 pi / n), from the fewest corners to the most. */
+static void contours_have_eight_to_768_vertices(void)
+{
+    static const int32_t counts[] = {7, 8, IH_PARTS_VERTICES_MAX, IH_PARTS_VERTICES_MAX + 1};
+    static struct ih_vertex vertex[IH_PARTS_VERTICES_MAX + 1];
+    int32_t i, k;
+
+    for (i = 0; i < IH_TEST_COUNT(counts); i++) {
+        const int32_t n = counts[i];
+        const struct ih_vertex place = {23 * UNIT, 22 * UNIT};
+        const double turn = 2 * acos(-1.0) / n;
+
+        for (k = 0; k < n; k++) {
+            vertex[k] = (struct ih_vertex){(int16_t)lround((23 + 20 * cos(k * turn)) * UNIT),
+                                           (int16_t)lround((22 + 20 * sin(k * turn)) * UNIT)};
+        }
+        take(vertex, n, true);
+        IH_TEST_EQUAL(i == 1 || i == 2, find_part_around(place), "vertices", n);
+        if (i == 1 || i == 2) {
+            IH_TEST_WITHIN(0.01, 1, from_q16(ellipse.area_q16) / (n / 2.0 * 400 * sin(turn)),
+                           "area", n);
+            IH_TEST_WITHIN(0.1, 23, from_q16(ellipse.x_q16), "x", n);
+            IH_TEST_WITHIN(0.1, 22, from_q16(ellipse.y_q16), "y", n);
+        }
+    }
+}
+
+/* What is found is found again with its own shape and ratio as limits, and not with less. */
+static void limits_may_be_reached(void)
+{
+    struct ih_ellipse first;
+    int i;
+
+    for (i = 0; i < IH_TEST_COUNT(vector_parts); i++) {
+        const struct vector_part *v = &vector_parts[i];
+
+        if (!find_part(v)) {
+            continue;
+        }
+        first = ellipse;
+        params.shape_max_q16 = first.shape_q16;
+        params.ratio_part_max_q16 = first.ratio_q16;
+        TEST_ASSERT_TRUE(find_part(v));
+        IH_TEST_EQUAL(first.merit_q8, ellipse.merit_q8, v->name, i);
+        params.shape_max_q16--;
+        IH_TEST_EQUAL(false, find_part(v) && ellipse.shape_q16 >= first.shape_q16, v->name, i);
+        params.shape_max_q16++;
+        params.ratio_part_max_q16--;
+        IH_TEST_EQUAL(false, find_part(v) && ellipse.ratio_q16 >= first.ratio_q16, v->name, i);
+        ih_ellipse_params_default(&params);
     }
 }
 
@@ -321,10 +499,16 @@ int main(void)
     RUN_TEST(rectangles_match_the_closed_form);
     RUN_TEST(place_and_beginning_do_not_matter);
     RUN_TEST(polygons_without_area_are_no_ellipse);
+    RUN_TEST(a_polygon_whose_parts_cancel_is_no_ellipse);
     RUN_TEST(the_winding_tells_inside_from_beside_and_minima_from_maxima);
     RUN_TEST(the_winding_follows_a_concave_contour);
     RUN_TEST(the_best_part_matches_the_float_search);
     RUN_TEST(limits_are_obeyed);
+    RUN_TEST(limits_may_be_reached);
+    RUN_TEST(areas_and_ratios_have_their_limits);
+    RUN_TEST(contours_have_eight_to_768_vertices);
+    RUN_TEST(what_crosses_itself_is_no_ellipse);
+    RUN_TEST(the_winding_does_not_depend_on_the_first_vertex);
     RUN_TEST(contours_that_are_too_short_or_too_long_have_no_part);
     RUN_TEST(degenerate_contours_have_no_part);
     RUN_TEST(the_longest_contours_do_not_overflow);

@@ -346,6 +346,22 @@ static void collect_ball(void)
     ih_evidence_collect(&space, &ball, ball.centre_mm_q8, &no_nest, &evidence);
 }
 
+/* A head twice as high as the mean one is 100 per cent taller, to the last unit; one as high as that is not. */
+static void tallness_is_in_hundredths_of_the_mean(void)
+{
+    static const int32_t times[] = {1, 2, 3};
+    int i;
+
+    for (i = 0; i < IH_TEST_COUNT(times); i++) {
+        struct ih_ellipsoid head = ih_ellipsoid_mean((const int32_t[3]){0, 0, BALL_Z_MM_Q8});
+
+        head.semi_mm_q8[1] *= times[i];
+        forget_rays();
+        ih_evidence_collect(&space, &head, head.centre_mm_q8, &no_nest, &evidence);
+        IH_TEST_EQUAL(100 * (times[i] - 1) << 8, evidence.value_q8[IH_EVIDENCE_TALL], "tall", i);
+    }
+}
+
 /* One ray each. A closed one makes a share of openness a quarter, none a half; one of body, of three
  * rays at least, makes a third. */
 static void places_and_depths_have_their_limits(void)
@@ -577,6 +593,7 @@ int main(void)
     RUN_TEST(without_rays_nothing_is_known);
     RUN_TEST(bulges_match_the_best_plane);
     RUN_TEST(a_line_has_no_bulge);
+    RUN_TEST(tallness_is_in_hundredths_of_the_mean);
     RUN_TEST(places_and_depths_have_their_limits);
     RUN_TEST(shoulders_have_their_limits);
     RUN_TEST(few_rays_say_little);

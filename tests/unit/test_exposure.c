@@ -226,6 +226,134 @@ static void a_small_duty_grows_by_one(void)
     TEST_ASSERT_GREATER_THAN_INT32(2000, state.exposure_us);
 }
 
+/* Fewer than 24 labels say nothing about how high dots are. */
+static void twenty_four_labels_say_something(void)
+{
+    const int32_t weak_aim = params.weak_grey_q4 * IH_BAND_UNIT / 16;
+    struct ih_exposure_look look;
+    int32_t count, slot;
+
+    for (count = 23; count <= 24; count++) {
+        label_all();
+        for (slot = count; slot < IH_SLOTS; slot++) {
+            take_out(slot);
+        }
+        ih_exposure_look(&dots, &labels, 640, 600, &look);
+        IH_TEST_EQUAL(count < 24, look.weak == 0 && look.strong == 0, "looked at", count);
+        /* Dots as high as they should be: nothing to do, unless too few say so. */
+        look = (struct ih_exposure_look){.labelled_count = count,
+                                         .weak = weak_aim,
+                                         .strong = params.strong_grey_q4 * IH_BAND_UNIT / 16};
+        ih_exposure_start(&params, 2000, 128, &state);
+        ih_exposure_next(&params, &look, &state);
+        IH_TEST_EQUAL(count < 24 ? 160 : 128, state.duty_q8, "duty", count); /* 1.25 times */
+        /* Weak dots, many lost, all the duty: shorter only if there is nothing to lose. */
+        look.weak = weak_aim / 2 - 1;
+        look.lost_count = params.lost_max + 1;
+        ih_exposure_start(&params, 2000, 256, &state);
+        ih_exposure_next(&params, &look, &state);
+        IH_TEST_EQUAL(count < 24, state.exposure_us < 2000, "exposure", count);
+    }
+}
+
+/* With all the duty a shorter exposure is for dots that have half of what they should have, and for
+ * more lost ones than are accepted. */
+static void over_exposure_is_left_by_its_limits(void)
+{
+    static const struct {
+        int32_t weak_less, lost_more, duty_q8;
+        bool is_shorter;
+    } cases[] = {{0, 1, 256, true},
+                 {1, 1, 256, false},
+                 {0, 0, 256, false},
+                 {1, 1, 255, true},
+                 {1, 0, 255, false}};
+    int i;
+
+    params.weak_grey_q4 = 16 * 2; /* 2 levels: an even number */
+    for (i = 0; i < IH_TEST_COUNT(cases); i++) {
+        const struct ih_exposure_look look = {.labelled_count = IH_SLOTS,
+                                              .weak = IH_BAND_UNIT - cases[i].weak_less,
+                                              .strong = params.strong_grey_q4 * IH_BAND_UNIT / 16,
+                                              .lost_count = params.lost_max + cases[i].lost_more};
+
+        ih_exposure_start(&params, 2000, cases[i].duty_q8, &state);
+        ih_exposure_next(&params, &look, &state);
+        IH_TEST_EQUAL(cases[i].is_shorter ? lround(2000 * 205 / 256.0) : 2000, state.exposure_us,
+                      "exposure", i);
+        IH_TEST_EQUAL(cases[i].is_shorter ? IH_EXPOSURE_RETRY : 0, state.ceiling_frames, "ceiling",
+                      i);
+    }
+}
+
+/* While it is raised for weak dots, the exposure grows only where at most half of the accepted are lost. */
+static void exposure_grows_while_hardly_any_is_lost(void)
+{
+    int32_t lost;
+
+    for (lost = 3; lost <= 4; lost++) {
+        const struct ih_exposure_look look = {
+            .labelled_count = IH_SLOTS, .weak = 81, .strong = 81, .lost_count = lost};
+
+        params.lost_max = 6;
+        ih_exposure_start(&params, 2000, 256, &state);
+        ih_exposure_next(&params, &look, &state);
+        IH_TEST_EQUAL(lost == 3 ? 2500 : 2000, state.exposure_us, "exposure", lost);
+    }
+}
+
+/* A ceiling holds for so many frames, and no longer. */
+static void a_ceiling_is_forgotten_in_time(void)
+{
+    const struct ih_exposure_look look = {.labelled_count = IH_SLOTS, .weak = 81, .strong = 81};
+    int32_t left;
+
+    for (left = 1; left <= 2; left++) {
+        state = (struct ih_exposure){2000, 256, 2100, left};
+        ih_exposure_next(&params, &look, &state);
+        IH_TEST_EQUAL(left - 1, state.ceiling_frames, "frames", left);
+        IH_TEST_EQUAL(left == 1 ? 2500 : 2100, state.exposure_us, "exposure", left);
+    }
+}
+
+/* Blocks of the last, incomplete columns and rows count too: one of four here. */
+static void parts_of_blocks_are_blocks(void)
+{
+    struct ih_exposure_look look;
+
+    dots.bright[0][0] = 1;
+    ih_exposure_look(&dots, &labels, 9, 9, &look);
+    TEST_ASSERT_EQUAL_INT32(IH_SLOTS / 4 / 8, look.lost_count);
+    ih_exposure_look(&dots, &labels, 8, 8, &look);
+    TEST_ASSERT_EQUAL_INT32(IH_SLOTS / 8, look.lost_count);
+}
+
+/* The middle of three neighbours lies a unit left of, or above, a block's border: in the block before. */
+static void a_lost_place_belongs_to_its_block(void)
+{
+    static const int32_t at[] = {1, IH_GRID, IH_GRID + 1};
+    struct ih_exposure_look look;
+    int axis, block, i;
+
+    for (axis = 0; axis < 2; axis++) {
+        for (block = 5; block <= 6; block++) {
+            memset(dots.bright, 0, sizeof dots.bright);
+            label_all();
+            for (i = 0; i < IH_SLOTS; i++) {
+                labels.dot_of_slot[i] = IH_NONE;
+            }
+            for (i = 0; i < 3; i++) {
+                labels.dot_of_slot[at[i]] = (int16_t)at[i];
+                dots.dot[at[i]].u_px_q12 = axis == 0 ? 48 * 4096 - (i == 2) : 20 * 4096;
+                dots.dot[at[i]].v_px_q12 = axis == 1 ? 48 * 4096 - (i == 2) : 20 * 4096;
+            }
+            dots.bright[axis == 0 ? 2 : block][0] = 1u << (axis == 0 ? block : 2);
+            ih_exposure_look(&dots, &labels, 640, 600, &look);
+            IH_TEST_EQUAL(block == 5, look.lost_count > 0, "lost", 10 * axis + block);
+        }
+    }
+}
+
 /* --- closed loop --------------------------------------------------------------------------------- */
 
 /* What a camera sees: a dot is as high as its surface, exposure and duty say, up to full scale less
@@ -454,6 +582,12 @@ int main(void)
     RUN_TEST(without_labels_the_frame_itself_is_looked_at);
     RUN_TEST(steps_begin_beyond_the_gaps);
     RUN_TEST(a_small_duty_grows_by_one);
+    RUN_TEST(twenty_four_labels_say_something);
+    RUN_TEST(over_exposure_is_left_by_its_limits);
+    RUN_TEST(exposure_grows_while_hardly_any_is_lost);
+    RUN_TEST(a_ceiling_is_forgotten_in_time);
+    RUN_TEST(parts_of_blocks_are_blocks);
+    RUN_TEST(a_lost_place_belongs_to_its_block);
     RUN_TEST(all_scenes_come_to_rest_near_the_best);
     RUN_TEST(retries_are_rare);
     RUN_TEST(jitter_is_not_amplified);

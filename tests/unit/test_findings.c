@@ -495,6 +495,68 @@ static void nothing_at_the_lens_is_a_head(void)
     TEST_ASSERT_TRUE(findings.view[0].hit > 15); /* its rays are looked at all the same */
 }
 
+/* Log-odds are those of its evidence, and for a range camera a prior more; the probability is theirs. */
+static void findings_are_rated_by_their_evidence(void)
+{
+    static const int32_t prior_q10[] = {0, -1280, 700};
+    static struct ih_dots dots;
+    int pass, i;
+
+    for (pass = 0; pass < 6; pass++) {
+        const int32_t prior = pass < 3 ? prior_q10[pass] : 0;
+
+        make_points(true, false);
+        rig.calibration.kind = pass < 3 ? IH_RIG_RANGE : IH_RIG_DOTS;
+        params.range_prior_q10 = prior_q10[pass % 3];
+        ih_findings_begin(&findings);
+        expected.count = 0;
+        expect_head();
+        ih_findings_add(&points, &dots, &heads, &expected, &rig, &params, &scratch, &findings);
+        IH_TEST_RANGE(1, IH_FINDINGS_MAX, findings.finding_count, "findings", pass);
+        for (i = 0; i < findings.finding_count; i++) {
+            const struct ih_finding *finding = &findings.finding[i];
+            struct ih_score score;
+
+            ih_score_rate(&finding->evidence, &score);
+            IH_TEST_EQUAL(score.logit_q10 + prior, finding->logit_q10, "log-odds", pass);
+            IH_TEST_WITHIN(0.002, 1 / (1 + exp(-finding->logit_q10 / 1024.0)),
+                           finding->probability_q16 / 65536.0, "probability", pass);
+        }
+    }
+}
+
+/* A head as it is expected, not fitted: its front is 702 mm away. */
+static void a_front_may_be_as_near_as_its_limit(void)
+{
+    make_points(true, false);
+    params.fit.step_count = 0;
+    params.scan.place_max = 0;
+    expect_head();
+    params.front_least_mm = 702;
+    look();
+    TEST_ASSERT_EQUAL_INT32(1, findings.finding_count);
+    ih_findings_begin(&findings);
+    params.front_least_mm = 703;
+    look();
+    TEST_ASSERT_EQUAL_INT32(0, findings.finding_count);
+}
+
+/* What is not before the lens is drawn as if it were 1 mm away. */
+static void outlines_end_a_millimetre_before_the_lens(void)
+{
+    static const double z_mm[] = {1, 0.5, 0, -700};
+    const double fy = rig.calibration.fy_px_q16 / 65536.0;
+    int i;
+
+    for (i = 0; i < IH_TEST_COUNT(z_mm); i++) {
+        const struct ih_finding finding = outline_of(0, 0, z_mm[i]);
+
+        IH_TEST_WITHIN(1, 113 * fy, finding.a_px_q12 / 4096.0, "a", i);
+        IH_TEST_WITHIN(0.01, rig.calibration.cx_px_q16 / 65536.0, finding.u_px_q12 / 4096.0, "u",
+                       i);
+    }
+}
+
 static void no_points_give_no_findings(void)
 {
     rig.calibration.kind = IH_RIG_RANGE;
@@ -522,6 +584,9 @@ int main(void)
     RUN_TEST(views_tell_an_empty_seat_from_hands);
     RUN_TEST(windows_add_up);
     RUN_TEST(nothing_at_the_lens_is_a_head);
+    RUN_TEST(findings_are_rated_by_their_evidence);
+    RUN_TEST(a_front_may_be_as_near_as_its_limit);
+    RUN_TEST(outlines_end_a_millimetre_before_the_lens);
     RUN_TEST(no_points_give_no_findings);
     return UNITY_END();
 }

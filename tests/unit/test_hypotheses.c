@@ -617,14 +617,16 @@ static void put_egg_on_plate(double width, double top_row)
 static double part_mm2(const struct ih_nest *nest, double level_mm)
 {
     static struct ih_cuts cuts;
+    static struct ih_parts parts_of_contour;
     static struct ih_ellipse_scratch ellipse_scratch;
     struct ih_ellipse part, best = {0};
     int32_t i, parts = 0;
 
     ih_cuts_level(&surface, (int32_t)lround(256 * level_mm), &cuts);
     for (i = 0; i < cuts.contour_count; i++) {
-        if (ih_ellipse_of_part(&cuts, &cuts.contour[i], nest->minimum, &params.ellipse,
-                               &ellipse_scratch, &part)) {
+        if (ih_parts_make(&cuts, &cuts.contour[i], &params.ellipse, &parts_of_contour) &&
+            ih_ellipse_of_part(&parts_of_contour, nest->minimum, &params.ellipse, &ellipse_scratch,
+                               &part)) {
             best = part;
             parts++;
         }
@@ -760,6 +762,56 @@ static void a_minimum_at_the_border_is_none(void)
     TEST_ASSERT_EQUAL_INT32(0, hypotheses.nest_count);
 }
 
+/* One step from it is. */
+static void a_minimum_beside_the_border_is_one(void)
+{
+    static const int32_t place[][2] = {{1, 1}, {1, SIDE - 2}, {SIDE - 2, 1}, {SIDE - 2, SIDE - 2}};
+    int i;
+
+    for (i = 0; i < IH_TEST_COUNT(place); i++) {
+        set_plane(1500, 0, 0);
+        put_nearer(place[i][0], place[i][1], 900);
+        find();
+        IH_TEST_EQUAL(1, hypotheses.nest_count, "minima", i);
+        IH_TEST_EQUAL(place[i][0] * 512, hypotheses.nest[0].minimum.x_q9, "x", i);
+        IH_TEST_EQUAL(place[i][1] * 512, hypotheses.nest[0].minimum.y_q9, "y", i);
+    }
+}
+
+/* Without a tip levels stand at tens of millimetres behind the front: the last is as deep as may be. */
+static void the_last_slice_is_as_deep_as_it_may_be(void)
+{
+    static const struct half_ellipsoid deep = {23, 23, 20, 20, 800, 600};
+    int32_t most;
+
+    params.blunt_mm2 = 0;
+    set_plane(2000, 0, 0);
+    put_ellipsoid(&deep);
+    for (most = 79; most <= 81; most++) {
+        params.depth_max_mm = most;
+        find();
+        IH_TEST_EQUAL(most < 80 ? 7 : 8, hypotheses.nest[0].slice_count, "slices", most);
+        TEST_ASSERT_TRUE(hypotheses.nest[0].ended);
+    }
+}
+
+/* The nearest nest ends before the others begin: these have all their slices. */
+static void a_nest_does_not_wait_for_nearer_ones(void)
+{
+    static const struct half_ellipsoid near = {12, 20, 6.5, 9, 800, 100};
+    static const struct half_ellipsoid far = {34, 24, 7, 8, 1203, 110};
+
+    set_plane(2000, 0, 0);
+    put_ellipsoid(&near);
+    put_ellipsoid(&far);
+    params.levels_behind_mm = 1000;
+    find();
+    check_nests();
+    TEST_ASSERT_EQUAL_INT32(2, hypotheses.nest_count);
+    check_slices(&hypotheses.nest[0], &near, 4);
+    check_slices(&hypotheses.nest[1], &far, 4);
+}
+
 static void an_invalid_surface_has_no_hypotheses(void)
 {
     int32_t level;
@@ -838,6 +890,9 @@ int main(void)
     RUN_TEST(a_nest_reaches_no_deeper_than_it_may);
     RUN_TEST(the_nearest_minima_are_kept);
     RUN_TEST(a_minimum_at_the_border_is_none);
+    RUN_TEST(a_minimum_beside_the_border_is_one);
+    RUN_TEST(the_last_slice_is_as_deep_as_it_may_be);
+    RUN_TEST(a_nest_does_not_wait_for_nearer_ones);
     RUN_TEST(an_invalid_surface_has_no_hypotheses);
     RUN_TEST(levels_go_back_from_the_nearest_node);
     RUN_TEST(rough_surfaces_are_survived);

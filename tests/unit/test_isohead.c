@@ -1,5 +1,6 @@
 /* The whole of isohead: frames in, heads out; wrong frames; nothing remembered, nothing touched. */
 #include "isohead.h"
+#include "ih_exposure.h"
 
 #include <stdlib.h>
 
@@ -51,6 +52,8 @@ void setUp(void)
     memset(&other, IH_TEST_FILL, sizeof other);
     memset(grey8, 0, sizeof grey8);
     start(&head, 0);
+    TEST_ASSERT_EQUAL_INT32(IH_NONE, head.tracks.selected); /* nobody yet */
+    TEST_ASSERT_EQUAL_INT32(IH_NONE, head.result.selected);
     view8(&head);
 }
 
@@ -347,6 +350,8 @@ static void wrong_sizes_are_refused(void)
     EXPECT_WITH(maximum, 256, IH_ERR_SIZE);
     frame = (struct ih_frame){grey16, frame.width, frame.height, 2 * frame.width, 2, 65536};
     expect_error(IH_ERR_SIZE, "maximum of 17 bits");
+    frame = (struct ih_frame){grey16, frame.width, frame.height, 2 * frame.width - 2, 2, 1023};
+    expect_error(IH_ERR_SIZE, "a row of fewer samples of two bytes than the frame is wide");
     frame = (struct ih_frame){grey16, frame.width, frame.height, 2 * frame.width + 1, 2, 1023};
     expect_error(IH_ERR_SIZE, "a row that begins at an odd address");
     frame = (struct ih_frame){
@@ -363,6 +368,19 @@ static void wrong_kinds_are_refused(void)
     frame = (struct ih_frame){grey8, 320, 240, 320, 1, 255};
     TEST_ASSERT_EQUAL_INT(IH_ERR_KIND, isohead_frame(&head, &frame, NULL, 0));
     check_empty("grey frame for a range rig");
+}
+
+/* Rows of two bytes a sample that touch, and the greatest and the least white: as good as any. */
+static void frames_at_their_limits_are_taken(void)
+{
+    frame = (struct ih_frame){grey16, frame.width, frame.height, 2 * frame.width, 2, 65535};
+    TEST_ASSERT_EQUAL_INT(IH_OK, isohead_frame(&head, &frame, NULL, 0));
+    frame.maximum = 1;
+    TEST_ASSERT_EQUAL_INT(IH_OK, isohead_frame(&head, &frame, NULL, 0));
+    view8(&head);
+    TEST_ASSERT_EQUAL_INT(IH_OK, isohead_frame(&head, &frame, NULL, 0));
+    frame.maximum = 1;
+    TEST_ASSERT_EQUAL_INT(IH_OK, isohead_frame(&head, &frame, NULL, 0));
 }
 
 /* An ambient frame must be as sound as the lit one, but need not have its depth. */
@@ -447,6 +465,27 @@ static void a_frame_in_halves_is_the_whole(void)
     check_same(&other, &head);
     TEST_ASSERT_EQUAL_MEMORY(&other.result, &head.result, sizeof head.result);
     TEST_ASSERT_EQUAL_MEMORY(&other.tracks, &head.tracks, sizeof head.tracks);
+}
+
+/* The tracks are moved to each frame's time before it is looked at; the paper's method has none. */
+static void the_tracks_follow_the_frames_times(void)
+{
+    int32_t id;
+
+    paint_bust(&vector_busts[1]);
+    TEST_ASSERT_EQUAL_INT(IH_OK, isohead_frame(&head, &frame, NULL, 40000));
+    TEST_ASSERT_TRUE(head.tracks.has_time && head.tracks.time_us == 40000);
+    TEST_ASSERT_EQUAL_INT32(0, head.expected.count);
+    TEST_ASSERT_GREATER_THAN_INT32(0, head.tracks.track_count);
+    id = head.tracks.selected_id;
+    TEST_ASSERT_EQUAL_INT(IH_OK, isohead_frame(&head, &frame, NULL, 80000));
+    TEST_ASSERT_TRUE(head.tracks.time_us == 80000);
+    TEST_ASSERT_GREATER_THAN_INT32(0, head.expected.count);
+    TEST_ASSERT_EQUAL_INT32(id, head.tracks.selected_id);
+    start(&head, vector_busts[1].rig);
+    head.params.is_paper = true;
+    TEST_ASSERT_EQUAL_INT(IH_OK, isohead_frame(&head, &frame, NULL, 40000));
+    TEST_ASSERT_FALSE(head.tracks.has_time);
 }
 
 /* A frame that is only labelled, dark or not, leaves the tracks as they are. */
@@ -617,6 +656,38 @@ static void defaults_fill_every_parameter(void)
     }
 }
 
+/* Of the stages that tools/oracle has a reference with parameters of its own for: in its units, rounded
+ * to the nearest. What is compared with those must be what runs. */
+static void defaults_are_those_of_the_references(void)
+{
+    struct ih_exposure_params exposure;
+    struct ih_params params;
+
+    ih_exposure_params_default(&exposure);
+    ih_params_default(&params);
+    TEST_ASSERT_EQUAL_INT32(100, exposure.exposure_min_us);
+    TEST_ASSERT_EQUAL_INT32(20000, exposure.exposure_max_us);
+    TEST_ASSERT_EQUAL_INT32(16, exposure.duty_min_q8);
+    TEST_ASSERT_EQUAL_INT32(256, exposure.duty_max_q8);
+    TEST_ASSERT_EQUAL_INT32(12 << 4, exposure.weak_grey_q4);
+    TEST_ASSERT_EQUAL_INT32(96 << 4, exposure.strong_grey_q4);
+    TEST_ASSERT_EQUAL_INT32(6, exposure.lost_max);
+    TEST_ASSERT_EQUAL_INT32(8, params.windows.window_max);
+    TEST_ASSERT_EQUAL_INT32(200, params.windows.apart_mm);
+    TEST_ASSERT_EQUAL_INT32(720, params.windows.score_min);
+    TEST_ASSERT_EQUAL_INT32(130, params.windows.score_behind_max);
+    TEST_ASSERT_EQUAL_INT32(lround(2.5 * 256), params.windows.width_min_q8);
+    TEST_ASSERT_EQUAL_INT32(lround(1e-5 * (1 << 30)), params.surface.ridge_q30);
+    TEST_ASSERT_EQUAL_INT32(60, params.surface.huber_mm);
+    TEST_ASSERT_EQUAL_INT32(lround(1.045 * 65536), params.hypotheses.ellipse.shape_max_q16);
+    TEST_ASSERT_EQUAL_INT32(lround(1.75 * 65536), params.hypotheses.ellipse.ratio_part_max_q16);
+    TEST_ASSERT_EQUAL_INT32(lround(0.42 * 65536), params.hypotheses.ellipse.chord_max_q16);
+    TEST_ASSERT_EQUAL_INT32(100, params.findings.space.probe_mm);
+    TEST_ASSERT_EQUAL_INT32(98, params.findings.scan.deep_mm);
+    TEST_ASSERT_EQUAL_INT32(80, params.findings.scan.spacing_mm);
+    TEST_ASSERT_EQUAL_INT32(60, params.findings.fit.see_through_mm);
+}
+
 static void the_state_keeps_to_its_budget(void)
 {
     TEST_ASSERT_TRUE(sizeof(struct isohead) <= IH_RAM_MAX);
@@ -648,9 +719,11 @@ int main(void)
     RUN_TEST(flat_frames_have_no_head);
     RUN_TEST(wrong_sizes_are_refused);
     RUN_TEST(wrong_kinds_are_refused);
+    RUN_TEST(frames_at_their_limits_are_taken);
     RUN_TEST(ambient_frames_are_checked);
     RUN_TEST(nothing_is_remembered_from_frame_to_frame);
     RUN_TEST(a_frame_in_halves_is_the_whole);
+    RUN_TEST(the_tracks_follow_the_frames_times);
     RUN_TEST(labels_alone_change_no_track);
     RUN_TEST(the_paper_alone_judges_each_frame_by_its_nests);
     RUN_TEST(the_paper_alone_takes_the_best_window);
@@ -659,6 +732,7 @@ int main(void)
     RUN_TEST(noise_is_survived);
     RUN_TEST(a_bad_calibration_is_refused);
     RUN_TEST(defaults_fill_every_parameter);
+    RUN_TEST(defaults_are_those_of_the_references);
     RUN_TEST(the_state_keeps_to_its_budget);
     RUN_TEST(every_error_has_its_own_text);
     return UNITY_END();

@@ -448,6 +448,26 @@ static void seeds_are_better_than_the_next_by_a_margin(void)
     }
 }
 
+/* Four dots in each of the pattern's corners: the first and the last rectangles are seeds, too. */
+static void rectangles_reach_all_corners(void)
+{
+    static const int32_t firsts[] = {0, IH_GRID - 2, 17 * IH_GRID, 17 * IH_GRID + IH_GRID - 2};
+    int i;
+
+    for (i = 0; i < IH_TEST_COUNT(firsts); i++) {
+        use_rig(2);
+        dots.dot_count = 0;
+        put_on_plane(firsts[i], 1.0 / 900);
+        put_on_plane(firsts[i] + 1, 1.0 / 900);
+        put_on_plane(firsts[i] + IH_GRID, 1.0 / 900);
+        put_on_plane(firsts[i] + IH_GRID + 1, 1.0 / 900);
+        params.epsilon_max_px_q12 = 0; /* seeds alone */
+        assign();
+        IH_TEST_EQUAL(4, labels.seed_count, "seeds", firsts[i]);
+        IH_TEST_EQUAL(0, labels.dot_of_slot[firsts[i]], "the first dot", firsts[i]);
+    }
+}
+
 /* A slot at the pattern's edge, its neighbours along that edge missing, so that no rectangle has it,
  * before a plane whose dots move by 3 px from row to row of the pattern (or column to column). Its
  * own dot continues the plane; another is nearer to what its neighbours show, but not on the plane. */
@@ -548,6 +568,7 @@ int main(void)
     RUN_TEST(ambiguous_rectangles_are_no_seeds);
     RUN_TEST(seeds_are_better_than_the_next_by_a_margin);
     RUN_TEST(growing_starts_from_any_epsilon);
+    RUN_TEST(rectangles_reach_all_corners);
     RUN_TEST(growing_follows_tilted_planes);
     RUN_TEST(limits_are_obeyed);
     RUN_TEST(as_many_dots_as_there_may_be_are_survived);

@@ -40,6 +40,36 @@ static void test_gated_takes_every_frame(void)
     TEST_ASSERT_EQUAL_INT(0, count_in_records("lost") + count_in_records("skipped"));
 }
 
+/* --check: as many frames as it takes, no record, and a status. */
+static void test_check_says_whether_the_rig_fits(void)
+{
+    static const enum world_act acts[] = {TWENTY, TWENTY, TWENTY, TWENTY};
+    static const enum app_exit exits[] = {
+        [IH_HEALTH_UNKNOWN] = APP_EXIT_FAILED,
+        [IH_HEALTH_FITS] = APP_EXIT_GOOD,
+        [IH_HEALTH_TURNED] = APP_EXIT_FAILED,
+        [IH_HEALTH_LOST] = APP_EXIT_FAILED,
+    };
+    for (int state = IH_HEALTH_UNKNOWN; state <= IH_HEALTH_LOST; state++) {
+        world_init(APP_STROBE_ALWAYS, acts, COUNT(acts));
+        world.config.check = true;
+        world.health = (enum ih_health_state)state;
+        TEST_ASSERT_EQUAL_INT(exits[state], world_run());
+        TEST_ASSERT_EQUAL_INT(IH_HEALTH_ENOUGH, world.lit_count);
+        TEST_ASSERT_EQUAL_INT(0, world.record_count);
+    }
+}
+
+/* Without it the loop goes on, and every record says so. */
+static void test_a_lost_rig_is_told(void)
+{
+    static const enum world_act acts[] = {TWENTY};
+    world_init(APP_STROBE_ALWAYS, acts, COUNT(acts));
+    world.health = IH_HEALTH_LOST;
+    TEST_ASSERT_EQUAL_INT(APP_EXIT_GOOD, world_run());
+    TEST_ASSERT_EQUAL_INT(world.record_count, count_in_records("\"rig\":\"lost\""));
+}
+
 /* Frames in flight were exposed before the laser was on: none of them counts. */
 static void test_gated_with_frames_in_flight(void)
 {
@@ -483,6 +513,8 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_gated_takes_every_frame);
+    RUN_TEST(test_check_says_whether_the_rig_fits);
+    RUN_TEST(test_a_lost_rig_is_told);
     RUN_TEST(test_gated_with_frames_in_flight);
     RUN_TEST(test_alternating);
     RUN_TEST(test_always);

@@ -111,7 +111,7 @@ static void depth_beyond_the_range_is_limited(void)
     labels.t_px_q12[9] = INT32_MAX;
     ih_points_from_labels(&labels, &rig, &points);
     TEST_ASSERT_EQUAL_INT32(vector_rigs[0].far_mm << 8, points.point[7].depth_mm_q8);
-    TEST_ASSERT_TRUE(points.point[9].depth_mm_q8 > 0);
+    TEST_ASSERT_EQUAL_INT32(1 << 8, points.point[9].depth_mm_q8); /* 1 mm */
 }
 
 static void missing_dots_stand_at_the_far_end(void)
@@ -431,6 +431,33 @@ static void a_rare_pixel_is_seen_or_leaves_unknown(void)
     }
 }
 
+/* The same off in both directions: seen within a circle, known within a square. */
+static void a_rare_pixel_may_be_on_a_diagonal(void)
+{
+    static const struct {
+        int32_t du, dv;
+        enum ih_point_state state;
+    } cases[] = {
+        {4, 4, IH_POINT_SEEN},       {-4, 4, IH_POINT_SEEN},      {3, -5, IH_POINT_SEEN},
+        {-5, -3, IH_POINT_SEEN},     {5, 4, IH_POINT_UNKNOWN},    {-4, 5, IH_POINT_UNKNOWN},
+        {6, 1, IH_POINT_UNKNOWN},    {-1, -6, IH_POINT_UNKNOWN},  {12, 12, IH_POINT_UNKNOWN},
+        {-12, 12, IH_POINT_UNKNOWN}, {12, -13, IH_POINT_MISSING}, {13, 12, IH_POINT_MISSING}};
+    int32_t v;
+    int i;
+
+    use_range_rig(640, 480);
+    window.spacing_px = 10;
+    fill(0);
+    convert();
+    v = (int32_t)rint(ih_test_from_q(points.field.centre_y_q28, 28) * 512 + 239.5);
+    for (i = 0; i < IH_TEST_COUNT(cases); i++) {
+        fill(0);
+        depth_mm[(v + cases[i].dv) * 640 + 320 + cases[i].du] = 1000;
+        convert();
+        IH_TEST_EQUAL(cases[i].state, points.point[IH_SLOTS / 2].state, "state", i);
+    }
+}
+
 /* Only every tenth pixel of every tenth row is measured; the pitch is 13.3 px. A slot takes one
  * within half of that, and where none is near it is not known that there is nothing, unless no
  * pixel lies within 12.5 px. */
@@ -526,6 +553,7 @@ int main(void)
     RUN_TEST(windows_at_the_ends_are_survived);
     RUN_TEST(rare_points_leave_slots_unknown);
     RUN_TEST(a_rare_pixel_is_seen_or_leaves_unknown);
+    RUN_TEST(a_rare_pixel_may_be_on_a_diagonal);
     RUN_TEST(the_stride_is_followed);
     RUN_TEST(the_wrong_kind_is_refused);
     return UNITY_END();

@@ -35,7 +35,7 @@ static void assert_record(const char *wanted)
 
 static void live_cameras_add_what_is_not_as_usual(void)
 {
-    struct app_record_live live = {0, 0, NULL};
+    struct app_record_live live = {.lost_count = 0};
 
     TEST_ASSERT_TRUE(app_record_frame(&record, &frame, &head, NULL));
     assert_record(START NOTHING "}\n");
@@ -48,11 +48,12 @@ static void live_cameras_add_what_is_not_as_usual(void)
     TEST_ASSERT_TRUE(app_record_frame(&record, &frame, &head, &live));
     assert_record(START NOTHING ",\"lost\":3,\"dir\":\"a\\\"b\"}\n");
     setUp();
-    live = (struct app_record_live){INT64_MAX, 1, "late"};
+    live = (struct app_record_live){INT64_MAX, 1, "late", 410, "turned"};
     head.dots.dots_dropped = 2;
     TEST_ASSERT_TRUE(app_record_frame(&record, &frame, &head, &live));
-    assert_record(START NOTHING ",\"dropped\":{\"dots\":2},\"lost\":9223372036854775807,"
-                                "\"skipped\":1,\"strobe\":\"late\"}\n");
+    assert_record(START NOTHING
+                  ",\"dropped\":{\"dots\":2},\"lost\":9223372036854775807,"
+                  "\"skipped\":1,\"strobe\":\"late\",\"across_px\":0.10,\"rig\":\"turned\"}\n");
 }
 
 static void errors_are_records_too(void)
@@ -65,7 +66,7 @@ static void errors_are_records_too(void)
 static void the_longest_record_has_room(void)
 {
     static char name[256], dir[4096], error[HAL_ERROR_MAX], word[33];
-    const struct app_record_live live = {INT64_MIN, INT64_MIN, word};
+    const struct app_record_live live = {INT64_MIN, INT64_MIN, word, INT32_MIN, word};
     int i;
 
     memset(name, 0x1b, sizeof name - 1);

@@ -552,6 +552,179 @@ static void a_line_gives_the_dot_at_any_depth(void)
     }
 }
 
+/* --- each limit from both sides --- */
+
+static void use_range_rig(int32_t width, int32_t height, int32_t focal_px)
+{
+    memset(&calibration, 0, sizeof calibration);
+    calibration.kind = IH_RIG_RANGE;
+    calibration.width = width;
+    calibration.height = height;
+    calibration.fx_px_q16 = calibration.fy_px_q16 = focal_px << 16;
+    calibration.cx_px_q16 = width << 15;
+    calibration.cy_px_q16 = height << 15;
+    calibration.near_mm = 400;
+    calibration.far_mm = 8000;
+}
+
+static void sizes_may_be_as_large_as_their_limits(void)
+{
+    use_range_rig(IH_FRAME_WIDTH_MAX, IH_FRAME_WIDTH_MAX, 1000);
+    expect(IH_OK, IH_NONE, "largest range image");
+    calibration.height++;
+    expect(IH_ERR_SIZE, IH_NONE, "higher than the largest range image");
+    calibration = vector_rigs[0];
+    calibration.width = IH_FRAME_WIDTH_MAX;
+    calibration.height = IH_FRAME_HEIGHT_MAX;
+    expect(IH_OK, IH_NONE, "largest frame");
+    EXPECT_WITH(fy_px_q16, IH_RIG_FOCAL_MAX_PX << 16, IH_OK);
+    EXPECT_WITH(fy_px_q16, (IH_RIG_FOCAL_MAX_PX << 16) + 1, IH_ERR_FOCAL);
+}
+
+/* A side's end may be seen at tan 2, twice the focal length from the principal point, and no farther. */
+static void sides_may_be_seen_at_the_widest_angle(void)
+{
+    static const int32_t size_px[2] = {320, 240};
+    int axis;
+
+    for (axis = 0; axis < 2; axis++) {
+        int32_t *principal_px_q16 = axis == 0 ? &calibration.cx_px_q16 : &calibration.cy_px_q16;
+        const int32_t least = (size_px[axis] - 2 * 200) * 65536, most = 2 * 200 << 16;
+
+        use_range_rig(size_px[0], size_px[1], 200);
+        *principal_px_q16 = most;
+        expect(IH_OK, IH_NONE, "greatest principal point");
+        *principal_px_q16 = most + 1;
+        expect(IH_ERR_PRINCIPAL, IH_NONE, "a greater one");
+        *principal_px_q16 = least;
+        expect(IH_OK, IH_NONE, "least principal point");
+        *principal_px_q16 = least - 1;
+        expect(IH_ERR_PRINCIPAL, IH_NONE, "a lesser one");
+    }
+}
+
+static void the_projector_may_be_a_metre_away(void)
+{
+    const int32_t most = IH_RIG_BASELINE_MAX_MM << 16;
+    int axis, sign;
+
+    for (axis = 0; axis < 3; axis++) {
+        for (sign = -1; sign <= 1; sign += 2) {
+            calibration = vector_rigs[0];
+            calibration.origin_mm_q16[axis] = sign * most;
+            expect(IH_OK, IH_NONE, "a metre");
+            calibration.origin_mm_q16[axis] = sign * (most + 1);
+            expect(IH_ERR_BASELINE, IH_NONE, "more than a metre");
+        }
+    }
+}
+
+/* A ray may lean until its Z is a quarter of its length, and be 6e-5, 2^16 of 2^30, too long or short. */
+static void rays_are_good_up_to_their_limits(void)
+{
+    static const int32_t lengths[] = {1 << 16, -(1 << 16)};
+    const int32_t forward = 1 << 28, aside = (int32_t)lround(ldexp(sqrt(15.0 / 16), 30));
+    int32_t *ray = calibration.ray_q30[200];
+    int i;
+
+    calibration.origin_mm_q16[2] = 0;
+    ray[0] = aside;
+    ray[1] = 0;
+    ray[2] = forward;
+    expect(IH_OK, IH_NONE, "leans as much as it may");
+    ray[2] = forward - 1;
+    expect(IH_ERR_RAY, 200, "leans more");
+    ray[0] = 0;
+    for (i = 0; i < IH_TEST_COUNT(lengths); i++) {
+        ray[2] = (1 << 30) + lengths[i];
+        expect(IH_OK, IH_NONE, "longest and shortest");
+        ray[2] += lengths[i] < 0 ? -2 : 2;
+        expect(IH_ERR_RAY, 200, "longer and shorter");
+    }
+}
+
+/* Dots must be 2 mrad apart. All rays leave one place, 100 mm beside the camera, so that the pitch is
+ * the same at any depth. */
+static void dots_may_be_two_milliradians_apart(void)
+{
+    static const double pitch[] = {0.0019999, 0.0020001};
+    int i, slot;
+
+    for (i = 0; i < IH_TEST_COUNT(pitch); i++) {
+        calibration = vector_rigs[2];
+        memset(calibration.origin_mm_q16, 0, sizeof calibration.origin_mm_q16);
+        calibration.origin_mm_q16[0] = 100 << 16;
+        for (slot = 0; slot < IH_SLOTS; slot++) {
+            const double x = (slot % IH_GRID - 9) * pitch[i], y = (slot / IH_GRID - 9) * pitch[i];
+            const double z = 1 / sqrt(1 + x * x + y * y);
+
+            calibration.ray_q30[slot][0] = (int32_t)lround(ldexp(x * z, 30));
+            calibration.ray_q30[slot][1] = (int32_t)lround(ldexp(y * z, 30));
+            calibration.ray_q30[slot][2] = (int32_t)lround(ldexp(z, 30));
+        }
+        expect(i == 0 ? IH_ERR_RAY : IH_OK, IH_NONE, "pitch");
+    }
+}
+
+/* A dot must move by 100 px mm / Z: 0.1 px at a metre. Of a camera of 1024 px the projector must be
+ * 100/1024 mm = 6400 / 65536 mm aside. */
+static void dots_must_move_by_a_tenth_of_a_pixel(void)
+{
+    int32_t off;
+
+    for (off = -1; off <= 0; off++) {
+        calibration = vector_rigs[2];
+        calibration.fx_px_q16 = calibration.fy_px_q16 = 1024 << 16;
+        memset(calibration.origin_mm_q16, 0, sizeof calibration.origin_mm_q16);
+        calibration.origin_mm_q16[1] =
+            6400 + 16 * off; /* e is rounded to Q8: 16 units are 1/4 px mm */
+        expect(off < 0 ? IH_ERR_BASELINE : IH_OK, off < 0 ? 0 : IH_NONE, "the least baseline");
+    }
+}
+
+/* Pixels beyond 16384 are taken for it. A principal point at 16000 is 384 px from there. */
+static void pixels_beyond_16384_are_limited(void)
+{
+    const int32_t most = 16384 * 4096;
+    int32_t x, y, off_x, off_y;
+
+    use_range_rig(64, 64, IH_RIG_FOCAL_MAX_PX);
+    calibration.cx_px_q16 = calibration.cy_px_q16 = 16000 << 16;
+    expect(IH_OK, IH_NONE, "principal point far to the right");
+    ih_rig_undistort(&rig, most, most - 4096, &x, &y);
+    IH_TEST_WITHIN(1, ldexp(384.0 / 8192, 28), x, "x", 0);
+    IH_TEST_WITHIN(1, ldexp(383.0 / 8192, 28), y, "y", 0);
+    ih_rig_undistort(&rig, most + 4096, INT32_MAX, &off_x, &off_y);
+    IH_TEST_EQUAL(x, off_x, "x beyond", 0);
+    IH_TEST_EQUAL(x, off_y, "y beyond", 0);
+    calibration.cx_px_q16 = calibration.cy_px_q16 = -16000 * 65536;
+    expect(IH_OK, IH_NONE, "principal point far to the left");
+    ih_rig_undistort(&rig, -most, -most + 4096, &x, &y);
+    IH_TEST_WITHIN(1, ldexp(-384.0 / 8192, 28), x, "x", 1);
+    IH_TEST_WITHIN(1, ldexp(-383.0 / 8192, 28), y, "y", 1);
+    ih_rig_undistort(&rig, -most - 4096, INT32_MIN, &off_x, &off_y);
+    IH_TEST_EQUAL(x, off_x, "x beyond", 1);
+    IH_TEST_EQUAL(x, off_y, "y beyond", 1);
+}
+
+/* The lens is tried up to the frame's last row and column: k1 r^2 folds the picture only there.
+ * With x = y = 0.5 at the corners of a square, r (1 + k1 r^2) has its turning point, 3 k1 r^2 = -1,
+ * inside the corner or outside it. */
+static void the_lens_is_tried_in_the_corners(void)
+{
+    int32_t k1_q24;
+
+    use_range_rig(1025, 1025, 1024);
+    calibration.cx_px_q16 = calibration.cy_px_q16 = 512 << 16;
+    /* The corner, at 0.5 x 0.5 in the picture, is r_d^2 = 1/2 of the lens; the turning point is at
+     * r_d = 2/3 r, r^2 = -1 / (3 k1): r_d^2 = 4 / 27 / -k1, k1 = -8/27. */
+    k1_q24 = (int32_t)lround(-8.0 / 27 * (1 << 24));
+    calibration.k1_q24 = k1_q24 / 100 * 97;
+    expect(IH_OK, IH_NONE, "the corners are before the fold");
+    calibration.k1_q24 = k1_q24 / 100 * 101;
+    expect(IH_ERR_DISTORTION, IH_NONE, "the corners are behind the fold");
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -581,5 +754,13 @@ int main(void)
     RUN_TEST(equal_rays_are_no_pattern);
     RUN_TEST(kinds_are_checked);
     RUN_TEST(a_range_rig_needs_no_projector);
+    RUN_TEST(sizes_may_be_as_large_as_their_limits);
+    RUN_TEST(sides_may_be_seen_at_the_widest_angle);
+    RUN_TEST(the_projector_may_be_a_metre_away);
+    RUN_TEST(rays_are_good_up_to_their_limits);
+    RUN_TEST(dots_may_be_two_milliradians_apart);
+    RUN_TEST(dots_must_move_by_a_tenth_of_a_pixel);
+    RUN_TEST(pixels_beyond_16384_are_limited);
+    RUN_TEST(the_lens_is_tried_in_the_corners);
     return UNITY_END();
 }

@@ -244,6 +244,106 @@ static void the_values_of_rays_around(void)
     }
 }
 
+/* 360 rays where one ray was: their mean shows the last unit of a value of 4096 parts, which are the
+ * nearest. */
+static void many_rays_show_the_last_unit_of_a_value(void)
+{
+    static const struct {
+        enum ih_ray_state state;
+        int32_t behind_q8;
+        double value;
+    } inside[] = {{IH_RAY_SEEN, -(VECTOR_ON_SURFACE_MM << 8) + 1, 1},
+                  {IH_RAY_SEEN, (VECTOR_ON_SURFACE_MM << 8) - 1, 1},
+                  {IH_RAY_SEEN, -(VECTOR_ON_SURFACE_MM << 8), VECTOR_NEARER},
+                  {IH_RAY_SEEN, VECTOR_ON_SURFACE_MM << 8, -(double)VECTOR_ON_SURFACE_MM / 60},
+                  {IH_RAY_SEEN, 45 << 8, -0.75},
+                  {IH_RAY_SEEN, 60 << 8, -1},
+                  {IH_RAY_SEEN, 61 << 8, -1},
+                  {IH_RAY_EMPTY, 0, VECTOR_EMPTY},
+                  {IH_RAY_UNKNOWN, 0, VECTOR_UNKNOWN}},
+      around[] = {{IH_RAY_SEEN, (VECTOR_BEHIND_CENTRE_MM << 8) + 1, 1},
+                  {IH_RAY_SEEN, VECTOR_BEHIND_CENTRE_MM << 8, VECTOR_RING_NEAR},
+                  {IH_RAY_EMPTY, 0, VECTOR_RING_EMPTY},
+                  {IH_RAY_UNKNOWN, 0, 0}};
+    const struct ih_ellipsoid mean = ih_ellipsoid_mean((const int32_t[3]){0, 0, 0});
+    int32_t i, slot;
+
+    for (i = 0; i < IH_TEST_COUNT(inside); i++) {
+        const double sum = 4096 + 360 * (double)lround(4096 * inside[i].value);
+
+        stand_before_a_head();
+        for (slot = 1; slot < IH_SLOTS; slot++) {
+            space.ray[slot].slope_x_q20 = 0;
+            lose(slot, inside[i].state);
+            if (inside[i].state == IH_RAY_SEEN) {
+                see(slot, (1000 << 8) + inside[i].behind_q8);
+            }
+        }
+        find();
+        IH_TEST_EQUAL(trunc(sum / 361), scratch.tried[0].score_q12, "inside", i);
+    }
+    for (i = 0; i < IH_TEST_COUNT(around); i++) {
+        const double value = (double)lround(4096 * around[i].value);
+        const int32_t centre_mm = 1000 + stand_before_a_head();
+
+        for (slot = 1; slot < IH_SLOTS; slot++) {
+            space.ray[slot].slope_x_q20 =
+                (int32_t)lround(1.6 * mean.semi_mm_q8[0] * 4096 / centre_mm);
+            lose(slot, around[i].state);
+            if (around[i].state == IH_RAY_SEEN) {
+                see(slot, (centre_mm << 8) + around[i].behind_q8);
+            }
+        }
+        find();
+        IH_TEST_EQUAL(4096 / 8 + trunc(0.6 * value), scratch.tried[0].score_q12, "around", i);
+    }
+}
+
+/* Fewer than eight rays count as eight: the mean of n good ones. */
+static void few_rays_count_as_eight(void)
+{
+    const struct ih_ellipsoid mean = ih_ellipsoid_mean((const int32_t[3]){0, 0, 0});
+    int32_t count, slot;
+
+    for (count = 1; count <= 12; count++) {
+        int32_t centre_mm;
+
+        stand_before_a_head();
+        space.ray[1].slope_x_q20 = 2 << 20;
+        for (slot = 1; slot < count; slot++) {
+            space.ray[slot].slope_x_q20 = 0;
+            see(slot, 1000 << 8);
+        }
+        find();
+        IH_TEST_EQUAL(4096 * (count < 8 ? count : 8) / 8, scratch.tried[0].score_q12, "inside",
+                      count);
+        centre_mm = 1000 + stand_before_a_head();
+        for (slot = 1; slot <= count; slot++) {
+            space.ray[slot].slope_x_q20 =
+                (int32_t)lround(-1.6 * mean.semi_mm_q8[0] * 4096 / centre_mm);
+            see(slot, 5000 << 8);
+        }
+        find();
+        IH_TEST_EQUAL(512 + floor(0.6 * 4096 * (count < 8 ? count : 8) / 8),
+                      scratch.tried[0].score_q12, "around", count);
+    }
+}
+
+/* A place just as far as the spacing from a better one is near it. */
+static void places_are_farther_apart_than_the_spacing(void)
+{
+    int32_t off;
+
+    for (off = 0; off <= 1; off++) {
+        memset(&space, 0, sizeof space);
+        space.ray[1].slope_x_q20 = 0;
+        see(0, 1000 << 8);
+        see(1, (1080 << 8) + off);
+        find();
+        IH_TEST_EQUAL(1 + off, scan.place_count, "places", off);
+    }
+}
+
 static void no_point_one_point_and_equal_points(void)
 {
     int32_t slot;
@@ -391,6 +491,9 @@ int main(void)
     RUN_TEST(the_best_place_is_the_head);
     RUN_TEST(the_values_of_single_rays);
     RUN_TEST(the_values_of_rays_around);
+    RUN_TEST(many_rays_show_the_last_unit_of_a_value);
+    RUN_TEST(few_rays_count_as_eight);
+    RUN_TEST(places_are_farther_apart_than_the_spacing);
     RUN_TEST(no_point_one_point_and_equal_points);
     RUN_TEST(the_centre_is_behind_the_point_along_its_ray);
     RUN_TEST(places_keep_their_distance_and_come_best_first);

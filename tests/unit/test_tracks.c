@@ -818,6 +818,184 @@ static void sigma_grows_while_carried_and_shrinks_when_seen(void)
     TEST_ASSERT_TRUE(sigma_mm(0) > last + 1);
 }
 
+/* --- limits --------------------------------------------------------------------------------------
+ */
+
+/* Of 100 points a frame must have as many as that to say anything. */
+static void a_frame_is_lost_with_fewer_points_than_its_limit(void)
+{
+    int32_t seen;
+
+    params.seen_least = 100;
+    for (seen = 99; seen <= 100; seen++) {
+        ih_tracks_init(&tracks);
+        view = hit;
+        findings.seen_count = seen;
+        frames_with(5, 0, 0, 800, 5);
+        view = through;
+        frame();
+        IH_TEST_EQUAL(seen == 99, tracks.track_count, "carried, though seen through", seen);
+        ih_tracks_init(&tracks);
+        view = hit;
+        frames_with(1, 0, 0, 800, 5);
+        frame(); /* in plain view: log-odds fall, unless the frame says nothing */
+        IH_TEST_EQUAL(seen == 99, tracks.track[0].mean_logit_q10 == 5 << 10, "log-odds", seen);
+    }
+}
+
+/* At a gate's end a finding still belongs to the track: 30 mm, and 100 mm/s for 40 ms. */
+static void a_gate_reaches_as_far_as_it_says(void)
+{
+    int far_side;
+
+    params.gate_mm = 30;
+    params.gate_mm_per_s = 100;
+    for (far_side = 0; far_side <= 1; far_side++) {
+        ih_tracks_init(&tracks);
+        add(0, 0, 800, 5);
+        frame();
+        add(0, 34 + far_side / 256.0, 800, -2);
+        frame();
+        IH_TEST_EQUAL(far_side == 0, findings.finding[0].track_id != 0, "in the gate", far_side);
+    }
+}
+
+/* A finding at the gate's end is worth 4 less than one at its middle, in proportion to the square of the
+ * distance: half way, 1 less. */
+static void a_near_finding_is_better_than_a_probable_one(void)
+{
+    static const struct {
+        double more, y_mm;
+        int32_t own; /* the finding that the track takes */
+    } cases[] = {{3.99, 90, 0}, {4.01, 90, 1}, {0.99, 45, 0}, {1.01, 45, 1}};
+    int i;
+
+    params.gate_mm_per_s = 0;
+    for (i = 0; i < IH_TEST_COUNT(cases); i++) {
+        ih_tracks_init(&tracks);
+        add(0, 0, 800, 2);
+        frame();
+        add(0, 0, 800, -2.5);
+        add(0, cases[i].y_mm, 800, -2.5 + cases[i].more);
+        frame();
+        IH_TEST_EQUAL(cases[i].own, tracks.track[0].finding, "finding", i);
+    }
+}
+
+/* Two heads may be 80 mm apart, and no nearer. */
+static void two_tracks_may_be_as_near_as_80_mm(void)
+{
+    add(0, 0, 800, 5);
+    add(80, 0, 800, 4);
+    add(0, 79.996, 800, 4);
+    add(0, 0, 880, 4);
+    frame();
+    TEST_ASSERT_EQUAL_INT32(3, tracks.track_count);
+    TEST_ASSERT_EQUAL_INT32(0, findings.finding[2].track_id);
+}
+
+/* Each verdict needs more than its limit. */
+static void verdicts_need_more_than_their_limits(void)
+{
+    ih_tracks_init(&tracks);
+    frames_with(1, 0, 0, 800, 1); /* start_head */
+    TEST_ASSERT_FALSE(tracks.track[0].is_head);
+    ih_tracks_init(&tracks);
+    frames_with(1, 0, 0, 800, 1025.0 / 1024);
+    TEST_ASSERT_TRUE(tracks.track[0].is_head);
+    ih_tracks_init(&tracks);
+    frames_with(4, 0, 0, 800, 0.5); /* accept, when mature */
+    TEST_ASSERT_FALSE(tracks.track[0].is_head);
+    ih_tracks_init(&tracks);
+    frames_with(3, 0, 0, 800, 513.0 / 1024);
+    TEST_ASSERT_TRUE(tracks.track[0].is_head);
+    params.memory_q16 = 0; /* its mean is its last finding's */
+    frames_with(1, 0, 0, 800, -511.0 / 1024);
+    TEST_ASSERT_TRUE(tracks.track[0].is_head);
+    frames_with(1, 0, 0, 800, -0.5); /* drop */
+    TEST_ASSERT_FALSE(tracks.track[0].is_head);
+}
+
+/* A finding of keep_logit itself continues a track, whose mean may be as low; what is seen through takes
+ * one of accept_logit. */
+static void a_track_is_continued_down_to_its_limits(void)
+{
+    frames_with(1, 0, 0, 800, 5);
+    params.memory_q16 = 0;
+    frames_with(1, 0, 0, 800, -3);
+    TEST_ASSERT_EQUAL_INT32(1, tracks.track_count);
+    TEST_ASSERT_EQUAL_INT32(1, findings.finding[0].track_id);
+    ih_tracks_init(&tracks);
+    frames_with(1, 0, 0, 800, 5);
+    frames_with(1, 0, 0, 800, -3073.0 / 1024);
+    TEST_ASSERT_EQUAL_INT32(0, findings.finding[0].track_id);
+    ih_tracks_init(&tracks);
+    params.memory_q16 = 49152;
+    frames_with(1, 0, 0, 800, 5);
+    view = through;
+    frames_with(1, 0, 0, 800, 0.5);
+    TEST_ASSERT_EQUAL_INT32(1, findings.finding[0].track_id);
+    frames_with(1, 0, 0, 800, 511.0 / 1024);
+    TEST_ASSERT_EQUAL_INT32(2, findings.finding[0].track_id);
+}
+
+/* A head is no more chosen for its place where it is 3 less probable than the best. */
+static void a_head_is_chosen_for_its_place_within_three(void)
+{
+    int less;
+
+    params.side = IH_SIDE_LEFT;
+    for (less = 0; less <= 1; less++) {
+        ih_tracks_init(&tracks);
+        add(0, 0, 800, 5);
+        add(-300, 0, 800, 2 - less / 1024.0);
+        frame();
+        IH_TEST_EQUAL(less == 0, tracks.selected, "selected", less);
+    }
+}
+
+/* Findings are counted up to 1000. */
+static void findings_of_a_track_are_counted(void)
+{
+    int i;
+
+    for (i = 1; i <= 1002; i++) {
+        frames_with(1, 0, 0, 800, 5);
+        IH_TEST_EQUAL(i < 1000 ? i : 1000, tracks.track[0].finding_count, "findings", i);
+    }
+}
+
+/* A place is known to 500 mm at the worst, a speed to 3 m/s, and no head is faster. */
+static void uncertainty_has_its_limits(void)
+{
+    params.acceleration_mm_s2 = 8191;
+    params.carry_us = INT32_MAX;
+    findings.seen_count = 0; /* lost frames: it is carried */
+    frames_with(1, 0, 0, 800, 5);
+    frame_at(time_us + 2000000);
+    frame_at(time_us + 2000000);
+    TEST_ASSERT_EQUAL_INT32(1, tracks.track_count);
+    TEST_ASSERT_TRUE(tracks.track[0].place_q8 == (int64_t)500 * 500 * 256);
+    TEST_ASSERT_TRUE(tracks.track[0].speed_q8 == (int64_t)3000 * 3000 * 256);
+    IH_TEST_EQUAL(500 << 8, findings.finding[tracks.track[0].finding].sigma_mm_q8, "sigma", 0);
+}
+
+/* For a range camera the middle of two heads is the optical axis itself, to the last unit. */
+static void the_middle_of_a_range_camera_is_its_axis(void)
+{
+    int off;
+
+    rig.calibration.kind = IH_RIG_RANGE;
+    for (off = -1; off <= 1; off++) {
+        ih_tracks_init(&tracks);
+        add(-200 + off / 256.0, 0, 800, 5);
+        add(200, 0, 800, 5);
+        frame();
+        /* the first of equals */
+        IH_TEST_EQUAL(off < 0, tracks.selected, "selected", off);
+    }
+}
+
 /* --- time ----------------------------------------------------------------------------------------
  */
 
@@ -1161,6 +1339,16 @@ int main(void)
     RUN_TEST(a_carried_head_has_no_evidence);
     RUN_TEST(a_head_is_carried_for_carry_us_at_most);
     RUN_TEST(a_carried_head_slows_down);
+    RUN_TEST(a_frame_is_lost_with_fewer_points_than_its_limit);
+    RUN_TEST(a_gate_reaches_as_far_as_it_says);
+    RUN_TEST(a_near_finding_is_better_than_a_probable_one);
+    RUN_TEST(two_tracks_may_be_as_near_as_80_mm);
+    RUN_TEST(verdicts_need_more_than_their_limits);
+    RUN_TEST(a_track_is_continued_down_to_its_limits);
+    RUN_TEST(a_head_is_chosen_for_its_place_within_three);
+    RUN_TEST(findings_of_a_track_are_counted);
+    RUN_TEST(uncertainty_has_its_limits);
+    RUN_TEST(the_middle_of_a_range_camera_is_its_axis);
     RUN_TEST(the_gate_grows_while_carried);
     RUN_TEST(sigma_grows_while_carried_and_shrinks_when_seen);
     RUN_TEST(the_same_time_again_is_another_look);

@@ -8,6 +8,8 @@ import numpy as np
 import emit
 
 NEAR_MM, FAR_MM = 400, 8000
+PLANE_OFF_MM = 40
+LARGE_FROM = 500  # of the seeds of Noise
 CELLS_MAX, PLACES_APART_MM, WINDOWS_MAX = 19200, 200, 8
 SCORE_MIN, SCORE_BEHIND_MAX, CELLS_MIN = 720, 130, 2.5
 INSIDE = [(0, 0), (-35, 0), (35, 0), (0, -45), (0, 45), (-40, -45), (40, 45), (-40, 45), (40, -45),
@@ -51,7 +53,10 @@ class Noise:
     OFFSETS = [0, -40, -41, 110, 111, -100, -101, 89, 90, 149, 150, -149, -150, 400]
 
     def __init__(self, seed):
-        self.seed, self.focal, self.depth = seed, 50 + seed * 7 % 60, 450 + seed * 31 % 400
+        self.seed, self.depth = seed, 450 + seed * 31 % 400
+        self.focal = np.full(2, 50 + seed * 7 % 60)
+        if seed >= LARGE_FROM:  # probes a mm apart are other cells in x, or in y
+            self.focal[seed % 2] = 280 + seed * 13 % 200
 
     def hash(self, number):
         h = (number * 2654435761 + self.seed * 40503) % 2**32
@@ -82,11 +87,37 @@ class Noise:
         return scores[-1] if is_clear else None
 
 
+class Tilted(Noise):
+    """A tilted plane from which some cells are off, by less than the 40 mm that may be, or by more."""
+    OFF_MM = [0] * 21 + [36, -36, 36, -36, 60, -60, 60, -60, 60, -60, 60]
+
+    def draw(self):
+        v, u = np.mgrid[:120, :160]
+        across, down = self.seed * 13 % 11 - 5, self.seed * 17 % 13 - 6
+        stretch = 1 + (u - 80) * across * 0.0005 + (v - 60) * down * 0.0008
+        off = np.array(self.OFF_MM)[self.hash(v * 160 + u) % len(self.OFF_MM)]
+        depth = np.floor(self.depth / stretch + 0.5) + off
+        return np.where(depth >= NEAR_MM, depth, 0)
+
+    def on_plane(self):
+        """None where a probe is too near to a cell's border, or off by nearly what may be."""
+        places, focal, answers = Places(self), self.focal, []
+        for stretch in (1 - 2e-4, 1 + 2e-5, 1):
+            for limit in (38, 42, PLANE_OFF_MM):
+                self.focal = focal * stretch
+                answers.append(places.on_plane(60, 80, limit))
+        self.focal = focal
+        return answers[-1] if len(set(answers)) == 1 else None
+
+
 def survey(image, cell, reach):
     height, width = image.shape
     out = np.zeros((-(-height // cell), -(-width // cell)))
     for row, column in np.ndindex(out.shape):
         v, u = min(row * cell + cell // 2, height - 1), min(column * cell + cell // 2, width - 1)
+        out[row, column] = image[v, u]
+        if image[v, u] > 0:
+            continue
         top, left = max(0, v - reach), max(0, u - reach)
         part = image[top:v + reach + 1, left:u + reach + 1]
         dv, du = np.nonzero(part)
@@ -126,7 +157,7 @@ class Places:
 
     def score(self, row, column):
         z = self.depth[row, column]
-        if z == 0 or 150 * self.scene.focal / (z * self.cell) < CELLS_MIN:
+        if z == 0 or 150 * np.ravel(self.scene.focal)[0] / (z * self.cell) < CELLS_MIN:
             return 0
         inside, around, below = (self.seen(row, column, p) for p in (INSIDE, AROUND, BELOW))
         hit = (inside > 0) & (inside - z >= -40) & (inside - z <= 110)
@@ -140,17 +171,17 @@ class Places:
             bulge = np.clip(inside[5:][hit[5:]].mean() - inside[:5][hit[:5]].mean(), 0, 15)
         return share + bulge / 15 * 100 - z * 0.02
 
-    def on_plane(self, row, column):
+    def on_plane(self, row, column, off_mm=PLANE_OFF_MM):
         beside, below = self.seen(row, column, BESIDE), self.seen(row, column, BELOW)
         if not (beside > 0).all():
             return False
         terms = np.column_stack([np.ones(len(BESIDE)), BESIDE])
         fit = np.linalg.lstsq(terms, 1 / beside, rcond=None)[0]
-        if (np.abs(1 / (terms @ fit) - beside) > 40).any():
+        if (np.abs(1 / (terms @ fit) - beside) > off_mm).any():
             return False
         known = below > 0
         there = 1 / (np.column_stack([np.ones(len(BELOW)), BELOW]) @ fit)[known]
-        near = np.abs(there - below[known]) <= 40
+        near = np.abs(there - below[known]) <= off_mm
         return known.sum() >= 2 and 3 * near.sum() >= 2 * known.sum()
 
     def apart(self, place, rows, columns):
@@ -228,8 +259,13 @@ def write_vectors(directory):
                         *emit.numbers(scene.plane, 3), scene.every, len(scene.ellipsoids), index,
                         places.cell, places.spacing, len(found), index))
     inc.struct_array("vector_scene", "vector_scenes", rows)
-    scores = ((noise, noise.score()) for noise in map(Noise, range(1, 120)))
+    scores = ((noise, noise.score()) for noise in
+              map(Noise, [*range(1, 120), *range(LARGE_FROM, LARGE_FROM + 240)]))
     inc.struct_array("vector_noise", "vector_noises",
-                     ["%d, %d, %d, %s" % (noise.seed, noise.focal, noise.depth, emit.number(score, 6))
+                     ["%d, %d, %d, %d, %s" % (noise.seed, *noise.focal, noise.depth, emit.number(score, 6))
                       for noise, score in scores if score is not None])
+    answers = ((tilted, tilted.on_plane()) for tilted in map(Tilted, range(1, LARGE_FROM)))
+    inc.struct_array("vector_tilted", "vector_tilts",
+                     ["%d, %d, %d, %d, %s" % (tilted.seed, *tilted.focal, tilted.depth, str(answer).lower())
+                      for tilted, answer in answers if answer is not None])
     return inc.write(directory, "windows.inc")
