@@ -5,7 +5,7 @@
 
 Five rigs, both baselines, three focal lengths, with distortion: each from 25 good pairs of pictures (laser on and off),
 and from 25 pairs with 30 % of the dots missing and a lamp mirrored in the board, among them five blurred pairs and two
-of another board. Then pictures that cannot do: too few, all alike, corrupt. --short: two of the rigs.
+of another board. Then pictures that cannot do: too few, all alike, corrupt. --short: the first rig, and no more.
 Prints TAP and a table; exit status 1 when a case fails.
 """
 
@@ -29,8 +29,10 @@ RIGS = [  # name, arguments of render
     ("wide 0.75", ["--rig", "wide", "--focal", "0.75", "--seed", "34"]),
     ("paper 1.1", ["--rig", "paper", "--focal", "1.1", "--seed", "35"]),
 ]
-SHORT = (0, 3)
+SHORT = (0,)
 PAIRS, BLURRED, WRONG = 25, 5, 2
+# One sequence's mean error moves by a tenth when the rig is as good: what counts is the mean over several people.
+HEAD_SCENES = ([], ["--person", "bald"], ["--scene", "turning"], ["--person", "child"])
 HEAD_FRAMES = 24
 FOCAL_PERCENT = 0.15
 RAY_DEG = 0.02
@@ -134,11 +136,16 @@ def head_error(bench, frames, rig):
     return {name: mm for name, mm in apart.items() if mm <= 100}
 
 
-def heads(bench, frames, calibrated):
-    true, ours = head_error(bench, frames, frames), head_error(bench, frames, calibrated)
-    both = true.keys() & ours.keys()
-    mean = [sum(errors_mm[name] for name in both) / max(1, len(both)) for errors_mm in (true, ours)]
-    return len(true), len(ours), mean[0], mean[1]
+def heads(bench, index, calibrated):
+    """Over all sequences: how many heads with the true rig and with ours, and both mean errors, mm, where both have one."""
+    counts, pairs = [0, 0], []
+    for scene in range(len(HEAD_SCENES)):
+        frames = bench.path("rig%d" % index, "heads%d" % scene)
+        true, ours = head_error(bench, frames, frames), head_error(bench, frames, calibrated)
+        counts = [counts[0] + len(true), counts[1] + len(ours)]
+        pairs += [(true[name], ours[name]) for name in sorted(true.keys() & ours.keys())]
+    mean = [sum(column) / max(1, len(pairs)) for column in zip(*pairs)] if pairs else [0.0, 0.0]
+    return counts[0], counts[1], mean[0], mean[1]
 
 
 def draw_rig(bench, index):
@@ -151,7 +158,9 @@ def draw_rig(bench, index):
     bench.boards(wrong, rig, "--first-frame", "0+%d" % (2 * WRONG), board=bench.other)
     copy_pictures([(hard, range(2 * PAIRS)), (blurred, range(2 * BLURRED)), (wrong, range(2 * WRONG))],
                   bench.path("rig%d" % index, "mixed"))
-    must(bench.render, *rig, "--assembly", "1", "--ambient", "dim", "--frames", HEAD_FRAMES, bench.path("rig%d" % index, "heads"))
+    for scene, more in enumerate(HEAD_SCENES):
+        must(bench.render, *rig, "--assembly", "1", "--ambient", "dim", "--frames", HEAD_FRAMES, *more,
+             bench.path("rig%d" % index, "heads%d" % scene))
     outputs = {}
     for name in ("good", "mixed"):
         outputs[name] = bench.solve(bench.path("rig%d" % index, name), bench.path("rig%d" % index, "from_" + name))
@@ -169,7 +178,7 @@ def judge(bench, index, kind, output, table):
     focal, origin, rays, straight, seen = errors(read_rig(bench.path("rig%d" % index, "good")), read_rig(calibrated))
     known = rays[seen > 0]
     rms, worst, p95 = math.sqrt(np.mean(known ** 2)), known.max(), np.percentile(known, 95)
-    true_count, count, true_mm, mm = heads(bench, bench.path("rig%d" % index, "heads"), calibrated)
+    true_count, count, true_mm, mm = heads(bench, index, calibrated)
     table.append("| %s, %s | %.3f | %.3f | %.4f | %.4f | %.4f | %.4f | %d | %d | %.2f, %.2f |" % (
         name, kind, focal, origin, rms, p95, worst, straight[seen > 0].max(), (seen > 0).sum(), count, mm, true_mm))
     limit = ORIGIN_MM[rig[1]]
@@ -179,7 +188,8 @@ def judge(bench, index, kind, output, table):
            None if max(rms, p95) <= RAY_DEG else "rms %.4f, 95 %% %.4f" % (rms, p95))
     # 361 chances: the worst of them, all that were never seen included.
     result(title + ": no ray off by 2.5 times that", None if rays.max() <= 2.5 * RAY_DEG else "%.4f" % rays.max())
-    fine = mm <= HEAD_TIMES * true_mm and count >= true_count - 1 and true_count >= HEAD_FRAMES / 2
+    enough = true_count >= HEAD_FRAMES * len(HEAD_SCENES) / 2
+    fine = mm <= HEAD_TIMES * true_mm and count >= 0.98 * true_count and enough
     result(title + ": heads within %g times" % HEAD_TIMES,
            None if fine else "%.2f mm in %d frames, with the true rig %.2f in %d" % (mm, count, true_mm, true_count))
     if kind == "mixed":
@@ -267,37 +277,46 @@ def check_corrupt(bench):
     refuse(bench, "a middle without a place", good, 2, "FILE:U,V", "--middle", "000000.pgm")
 
 
+def middle_seen(directory, step):
+    """A laser-on picture that shows dot 180 on the board, as --middle wants it."""
+    depths = board_depths(directory)
+    with open(directory + "/truth.jsonl", encoding="utf-8") as file:
+        for entry in map(json.loads, file):
+            for index, u, v, z in entry["dots"]:
+                frame = int(entry["file"][:6])
+                if index == 180 and abs(z - depths[frame]) < 100:
+                    return "%06d.pgm" % (frame // step), u, v
+    raise RuntimeError("no picture shows dot 180 on the board")
+
+
 def check_alone(bench):
-    """Without pictures without the laser."""
+    """Pictures with the laser only: most of what lies on the print's edges is lost, so the pattern's edge may be too."""
     good, made, out = bench.path("rig0", "good"), bench.path("made"), bench.path("alone")
     copy_pictures([(good, range(0, 2 * PAIRS, 2))], made)
     status, _, err = bench.solve(made, out)
+    says = status == 0 or re.search(r"Add:\n  - pictures with the laser on(.*\n)*.*--middle", err)
+    result("only pictures with the laser on: a rig, or what to add", None if says else err)
+    status, _, err = bench.solve(made, out, "--middle", "%s:%.0f,%.0f" % middle_seen(good, 2))
     if status != 0:
-        result("only pictures with the laser on", "status %d: %s" % (status, err))
+        result("only pictures with the laser on, the middle dot named", "status %d: %s" % (status, err))
         return
     focal, origin, rays, _, seen = errors(read_rig(good), read_rig(out))
     p95 = np.percentile(rays[seen > 0], 95)
+    print("# laser on alone: focal %.3f %%, origin %.3f mm, rays %.4f degrees (95 %%), %d dots" %
+          (focal, origin, p95, (seen > 0).sum()))
     fine = focal <= FOCAL_PERCENT and origin <= ORIGIN_MM["paper"] and p95 <= 2 * RAY_DEG
-    result("only pictures with the laser on", None if fine else "focal %.3f %%, origin %.3f mm, rays %.4f degrees" %
-           (focal, origin, p95))
+    result("only pictures with the laser on, the middle dot named", None if fine else
+           "focal %.3f %%, origin %.3f mm, rays %.4f degrees" % (focal, origin, p95))
 
 
 def check_middle(bench):
     good, out = bench.path("rig0", "good"), bench.path("middle")
-    with open(good + "/truth.jsonl", encoding="utf-8") as file:
-        entries = list(map(json.loads, file))
-    depths = board_depths(good)
-    for entry in entries:
-        depth = depths[int(entry["file"][:6])]
-        for index, u, v, z in entry["dots"]:
-            if index == 180 and abs(z - depth) < 100:
-                status, _, err = bench.solve(good, out, "--middle", "%s:%.0f,%.0f" % (entry["file"], u, v))
-                same = status == 0 and read_rig(out) == read_rig(bench.path("rig0", "from_good"))
-                result("the middle dot named gives the same rig", None if same else err or "another rig")
-                refuse(bench, "a middle where no dot is", good, 1, "no dot within", "--middle",
-                       "%s:%.0f,%.0f" % (entry["file"], u + 12, v + 12))
-                return
-    result("the middle dot named gives the same rig", "no picture shows dot 180 on the board")
+    file, u, v = middle_seen(good, 1)
+    status, _, err = bench.solve(good, out, "--middle", "%s:%.0f,%.0f" % (file, u, v))
+    same = status == 0 and read_rig(out) == read_rig(bench.path("rig0", "from_good"))
+    result("the middle dot named gives the same rig", None if same else err or "another rig")
+    refuse(bench, "a middle where no dot is", good, 1, "no dot within", "--middle",
+           "%s:%.0f,%.0f" % (file, u + 12, v + 12))
 
 
 def check_guide(bench):
@@ -352,8 +371,7 @@ def check_undistort(bench, indices):
 
 
 def check_report(bench):
-    with open(bench.path("rig1" if os.path.exists(bench.path("rig1")) else "rig3", "from_good", "report.html"),
-              encoding="utf-8") as file:
+    with open(bench.path("rig0", "from_good", "report.html"), encoding="utf-8") as file:
         page = file.read()
     wanted = ["along their epipolar lines", "Expected depth error", "share an epipolar line", "Residuals by part of the frame",
               "standard deviation", "<svg", "000000.pgm"]
@@ -379,11 +397,12 @@ def main():
             outputs = drawn[index].result()
             for kind in ("good", "mixed"):
                 judge(bench, index, kind, outputs[kind], table)
-    check_refusals(bench)
-    check_corrupt(bench)
-    check_alone(bench)
-    check_middle(bench)
-    check_guide(bench)
+    if not options.short:
+        check_refusals(bench)
+        check_corrupt(bench)
+        check_alone(bench)
+        check_middle(bench)
+        check_guide(bench)
     check_print(bench)
     check_report(bench)
     check_undistort(bench, indices)

@@ -4,6 +4,7 @@
 #include <numeric>
 #include <opencv2/calib3d.hpp>
 
+#include "cal_bundle.hpp"
 #include "cal_coverage.hpp"
 #include "cal_error.hpp"
 #include "cal_refine.hpp"
@@ -93,6 +94,7 @@ static double median_of(std::vector<double> values)
     return *middle;
 }
 
+/* A start: every corner counts the same, and the lens has no third radial term. */
 static void fit(const Board &board, std::vector<View> &views, Camera &camera)
 {
     std::vector<std::vector<cv::Point3f>> places;
@@ -106,15 +108,9 @@ static void fit(const Board &board, std::vector<View> &views, Camera &camera)
         }
     }
     std::vector<cv::Mat> turns, shifts;
-    cv::Mat sigma, pose_sigma, picture_rms;
     camera.distortion = cv::Mat::zeros(1, 5, CV_64F);
-    camera.rms_px = cv::calibrateCamera(places, seen, camera.size, camera.matrix, camera.distortion, turns, shifts,
-                                        sigma, pose_sigma, picture_rms, camera.third_radial ? 0 : cv::CALIB_FIX_K3);
+    cv::calibrateCamera(places, seen, camera.size, camera.matrix, camera.distortion, turns, shifts, cv::CALIB_FIX_K3);
     camera.distortion = camera.distortion.reshape(1, 1).colRange(0, 5).clone();
-    for (int i = 0; i < 4; i++)
-        camera.sigma_px[static_cast<size_t>(i)] = sigma.at<double>(i);
-    for (int i = 0; i < 5; i++)
-        camera.lens_sigma[static_cast<size_t>(i)] = sigma.at<double>(4 + i);
     for (size_t i = 0; i < used.size(); i++) {
         used[i]->turn = turns[i];
         used[i]->shift = shifts[i];
@@ -144,6 +140,8 @@ static bool clean(const Board &board, const Camera &camera, std::vector<View> &v
             if (cv::norm(residuals[i]) <= limit_px) {
                 kept.ids.push_back(view.corners.ids[i]);
                 kept.px.push_back(view.corners.px[i]);
+                if (!view.corners.sigma_px.empty())
+                    kept.sigma_px.push_back(view.corners.sigma_px[i]);
             }
         }
         size_t dropped = residuals.size() - kept.ids.size();
@@ -216,11 +214,12 @@ static void check_trust(const Camera &camera)
 static void refine(const Board &board, const Camera &camera, std::vector<View> &views)
 {
     cv::Mat print = board_bitmap(board, refine_px_per_mm);
+    cv::Mat tangents = refine_tangents(camera.size, camera.matrix, camera.distortion);
     for (View &view : views) {
         view.left_out = 0;
         if (!view.good())
             continue;
-        corners_refine(board, print, view.grey8, camera.matrix, camera.distortion, view.corners);
+        corners_refine(board, print, tangents, view.grey, camera.matrix, camera.distortion, view.corners);
         if (static_cast<int>(view.corners.ids.size()) < corners_min)
             view.corners.refused =
                 text("only %zu of its corners look as printed, %d are needed", view.corners.ids.size(), corners_min);
@@ -249,10 +248,12 @@ Camera camera_solve(const Board &board, cv::Size size, std::vector<View> &views)
             break;
     }
     camera.third_radial = true;
-    fit(board, views, camera);
+    bundle_solve(board, views, camera);
     camera.third_radial = std::abs(camera.distortion.at<double>(4)) > lens_sigmas * camera.lens_sigma[4];
-    if (!camera.third_radial)
+    if (!camera.third_radial) {
         fit(board, views, camera);
+        bundle_solve(board, views, camera);
+    }
     missing = coverage_missing(views, size, coverage_least);
     if (!missing.empty())
         refuse(missing);

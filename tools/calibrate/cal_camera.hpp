@@ -1,5 +1,5 @@
-/* cal_camera - the camera's matrix and lens from pictures of the board, by cv::calibrateCamera, and how far to trust it.
- *
+/* cal_camera - the camera's matrix and lens from pictures of the board, by cv::calibrateCamera and cal_bundle, and how far to
+ * trust it.
  * Corners that do not fit are left out, pictures that do not fit as a whole are refused by name. The third radial term
  * is kept only where it is three of its standard deviations away from 0.
  */
@@ -15,7 +15,7 @@ namespace cal
 /* A picture of the board. */
 struct View {
     std::string file;
-    cv::Mat grey8;
+    cv::Mat grey8, grey; /* as taken, CV_8U; CV_32F, which corners are refined in: needed by camera_solve only */
     Corners corners;
     cv::Vec3d turn, shift; /* board to camera: Rodrigues' vector; mm */
     double rms_px = 0.0;

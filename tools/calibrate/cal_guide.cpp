@@ -8,6 +8,7 @@
 
 #include "cal_coverage.hpp"
 #include "cal_error.hpp"
+#include "cal_twins.hpp"
 
 namespace cal
 {
@@ -53,7 +54,7 @@ bool guide_directory(const Options &options)
         if (!picture.laser)
             dark.push_back(views.back());
     }
-    for (int twin : sightings_twins(pictures, views))
+    for (int twin : twins_find(pictures, views))
         twin_count += twin >= 0;
     std::printf(
         "%zu pictures without the laser, %zu with it, %d of these beside one without where the board did not move\n",

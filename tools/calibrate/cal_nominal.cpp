@@ -95,23 +95,19 @@ static double ray_variance(const Projector &projector, const Lattice &lattice)
     return std::max(total - noise / static_cast<double>(squares.size()), square(least_sigma));
 }
 
-void nominal_fill(Projector &projector)
+Nominal nominal_fit(const Projector &projector)
 {
+    Nominal nominal;
     Lattice lattice = start(projector);
     for (int step = 0; step < steps; step++)
         lattice = improved(projector, lattice);
-    double ray_var = ray_variance(projector, lattice);
     for (size_t slot = 0; slot < slot_count; slot++) {
-        cv::Vec3d nominal = ray_of(lattice, static_cast<int>(slot));
-        double seen_var = square(projector.sigma_deg[slot] * CV_PI / 180.0);
-        double trust = projector.seen[slot] == 0 ? 0.0 : ray_var / (ray_var + seen_var);
-        projector.rays[slot] = cv::normalize(nominal + trust * (projector.rays[slot] - nominal));
-        projector.sigma_deg[slot] = std::sqrt(trust * seen_var) * 180.0 / CV_PI;
-        if (projector.seen[slot] == 0)
-            projector.sigma_deg[slot] = std::sqrt(ray_var) * 180.0 / CV_PI;
+        cv::Vec3d ray = ray_of(lattice, static_cast<int>(slot));
+        nominal.tangents[slot] = {ray[0] / ray[2], ray[1] / ray[2]};
     }
-    projector.nominal_sigma_deg = std::sqrt(ray_var) * 180.0 / CV_PI;
-    projector.pitch_deg = std::hypot(lattice[3], lattice[5]) * 180.0 / CV_PI;
-    projector.turn_deg = std::atan2(lattice[5], lattice[3]) * 180.0 / CV_PI;
+    nominal.sigma = std::sqrt(ray_variance(projector, lattice));
+    nominal.pitch_deg = std::hypot(lattice[3], lattice[5]) * 180.0 / CV_PI;
+    nominal.turn_deg = std::atan2(lattice[5], lattice[3]) * 180.0 / CV_PI;
+    return nominal;
 }
 } // namespace cal

@@ -1,7 +1,6 @@
 /* cal_nominal - the lattice that the projector's maker meant: a grating sends its dots out equally spaced in direction
- * cosines, in a frame of its own. Fitted to the rays that were seen, it gives those that never were;
- * and a ray that was seen once or twice leans on it, by as much as its own error is larger than what the well-known rays
- * differ from the lattice.
+ * cosines, in a frame of its own. Fitted to the rays that were seen, it gives those that never were; and how far rays are
+ * from it says how much a ray that was seen once or twice leans on it.
  */
 #ifndef CAL_NOMINAL_HPP
 #define CAL_NOMINAL_HPP
@@ -10,8 +9,14 @@
 
 namespace cal
 {
-/* Fills the rays of dots that were not seen, and what the projector says of its lattice. */
-void nominal_fill(Projector &projector);
+struct Nominal {
+    std::array<cv::Vec2d, slot_count> tangents; /* a ray is (x, y, 1) */
+    double sigma = 0.0;                         /* of one component of a ray's distance from it, radians */
+    double pitch_deg = 0.0, turn_deg = 0.0;     /* its step, and its turn against the image's rows */
+};
+
+/* By the rays that were seen (`seen`, `rays`), and how well those seen often are known (`sigma_deg`). */
+Nominal nominal_fit(const Projector &projector);
 } // namespace cal
 
 #endif

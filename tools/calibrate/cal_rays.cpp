@@ -7,7 +7,7 @@
 
 namespace cal
 {
-static constexpr int steps = 25;
+static constexpr int steps = 25, rounds = 5;
 static constexpr double huber_sigmas = 1.5, outlier_sigmas = 4.5;
 static constexpr double sigma_floor_px = 0.02;
 static constexpr int slots_min = 180;
@@ -74,6 +74,16 @@ static bool is_seen(const Blocks &blocks, size_t slot)
     return cv::determinant(blocks.ray[slot]) > 0.0;
 }
 
+/* Every ray leans on the lattice: as much as its sightings are worth less than the lattice is. */
+static void add_nominal(const Nominal &nominal, double sigma_px, const State &state, Blocks &blocks)
+{
+    double weight = (sigma_px * sigma_px) / (nominal.sigma * nominal.sigma);
+    for (size_t slot = 0; slot < slot_count; slot++) {
+        blocks.ray[slot] += weight * cv::Matx22d::eye();
+        blocks.ray_right[slot] += weight * (nominal.tangents[slot] - state.tangents[slot]);
+    }
+}
+
 /* The origin's own equations once every ray has followed it. */
 static cv::Matx33d reduced(const Blocks &blocks, cv::Vec3d &right)
 {
@@ -103,11 +113,20 @@ static double step(const Blocks &blocks, State &state)
     return cv::norm(change);
 }
 
+/* One component's standard deviation, by the median; a ray seen once fits by itself and tells nothing. */
 static double usual_size(const Camera &camera, const State &state, const std::vector<Equation> &equations)
 {
     std::vector<double> sizes;
+    std::array<int, slot_count> seen{};
     for (const Equation &equation : equations)
-        sizes.push_back(cv::norm(residual(camera, state, equation)));
+        seen[equation.slot]++;
+    for (const Equation &equation : equations) {
+        double free = 1.0 - 1.0 / seen[equation.slot];
+        if (free > 0.0)
+            sizes.push_back(cv::norm(residual(camera, state, equation)) / std::sqrt(free));
+    }
+    if (sizes.empty())
+        return sigma_floor_px;
     auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
     std::nth_element(sizes.begin(), middle, sizes.end());
     return std::max(*middle / 1.1774, sigma_floor_px); /* a Rayleigh distribution's median */
@@ -161,7 +180,7 @@ static void tell_sigmas(const Blocks &blocks, double sigma_px, Projector &projec
     for (int axis = 0; axis < 3; axis++)
         projector.origin_sigma_mm[axis] = std::sqrt(origin(axis, axis));
     for (size_t slot = 0; slot < slot_count; slot++) {
-        if (projector.seen[slot] == 0 || !is_seen(blocks, slot))
+        if (!is_seen(blocks, slot))
             continue;
         cv::Matx22d inverse = blocks.ray[slot].inv();
         cv::Matx<double, 2, 3> with_origin = inverse * blocks.mixed[slot].t();
@@ -170,9 +189,11 @@ static void tell_sigmas(const Blocks &blocks, double sigma_px, Projector &projec
     }
 }
 
-static void fill_projector(const Camera &camera, const State &state, const std::vector<Equation> &equations,
-                           double sigma_px, Projector &projector)
+/* `nominal`: null where rays stand alone. */
+static Projector projector_of(const Camera &camera, const State &state, const std::vector<Equation> &equations,
+                              double sigma_px, const Nominal *nominal)
 {
+    Projector projector;
     Blocks blocks;
     double sum = 0.0;
     projector.origin_mm = state.origin_mm;
@@ -192,7 +213,33 @@ static void fill_projector(const Camera &camera, const State &state, const std::
     projector.rms_px = std::sqrt(sum / std::max(1, good));
     for (size_t slot = 0; slot < slot_count; slot++)
         projector.rays[slot] = cv::normalize(cv::Vec3d(state.tangents[slot][0], state.tangents[slot][1], 1.0));
-    tell_sigmas(blocks, projector.rms_px / std::sqrt(2.0), projector);
+    if (nominal != nullptr)
+        add_nominal(*nominal, sigma_px, state, blocks);
+    tell_sigmas(blocks, sigma_px, projector);
+    return projector;
+}
+
+/* Origin and rays, with the lattice or without. Returns the usual size of a residual's component. */
+static double improve(const Camera &camera, const std::vector<Equation> &equations, const Nominal *nominal,
+                      State &state)
+{
+    double sigma_px = usual_size(camera, state, equations);
+    for (int i = 0; i < steps; i++) {
+        Blocks blocks;
+        for (const Equation &equation : equations) {
+            double weight = weight_of(cv::norm(residual(camera, state, equation)), sigma_px);
+            if (weight > 0.0)
+                add(camera, state, equation, weight, blocks);
+        }
+        if (nominal != nullptr)
+            add_nominal(*nominal, sigma_px, state, blocks);
+        double moved_mm = step(blocks, state);
+        if (nominal == nullptr)
+            sigma_px = usual_size(camera, state, equations);
+        if (moved_mm < 1e-7)
+            break;
+    }
+    return sigma_px;
 }
 
 static void check(const Projector &projector)
@@ -217,23 +264,20 @@ Projector rays_solve(const Camera &camera, std::vector<Lit> &pictures, const cv:
     if (equations.empty())
         throw Error("no dot of the laser was found on the board");
     State state = start_state(equations, origin_mm);
-    double sigma_px = usual_size(camera, state, equations);
-    for (int i = 0; i < steps; i++) {
-        Blocks blocks;
-        for (const Equation &equation : equations) {
-            double weight = weight_of(cv::norm(residual(camera, state, equation)), sigma_px);
-            if (weight > 0.0)
-                add(camera, state, equation, weight, blocks);
-        }
-        double moved_mm = step(blocks, state);
-        sigma_px = usual_size(camera, state, equations);
-        if (moved_mm < 1e-7)
-            break;
-    }
-    Projector projector;
-    fill_projector(camera, state, equations, sigma_px, projector);
+    double sigma_px = improve(camera, equations, nullptr, state);
+    Projector projector = projector_of(camera, state, equations, sigma_px, nullptr);
     check(projector);
-    nominal_fill(projector);
+    Nominal nominal = nominal_fit(projector);
+    for (int round = 0; round < rounds; round++) {
+        improve(camera, equations, &nominal, state);
+        projector = projector_of(camera, state, equations, sigma_px, &nominal);
+        double sigma = nominal.sigma;
+        nominal = nominal_fit(projector);
+        nominal.sigma = sigma; /* rays that lean on the lattice would make it smaller each time */
+    }
+    projector.nominal_sigma_deg = nominal.sigma * 180.0 / CV_PI;
+    projector.pitch_deg = nominal.pitch_deg;
+    projector.turn_deg = nominal.turn_deg;
     return projector;
 }
 } // namespace cal

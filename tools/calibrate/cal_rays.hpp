@@ -1,7 +1,8 @@
 /* cal_rays - the projector: one origin and a ray for each dot, by least squares.
  * What is made small is where the camera sees the dots: each ray meets the board's plane, and the distance in undistorted
  * pixels between that place and the dot counts; large ones less (Huber), and those beyond 4.5 of the usual size not at
- * all. All rays are solved together with the origin that they share.
+ * all. All rays are solved together with the origin that they share and, once it is known how far rays are from it, with the
+ * grating's lattice (cal_nominal).
  */
 #ifndef CAL_RAYS_HPP
 #define CAL_RAYS_HPP

@@ -6,45 +6,62 @@
 
 namespace cal
 {
-/* Half side of the patch in squares and its bounds; sub-samples of a pixel along each side. */
+/* Half side of the patch in squares, and its bounds. */
 static constexpr double patch_share = 0.48;
-static constexpr int patch_min_px = 4, patch_max_px = 16, sub_samples = 3, blur_reach_px = 3;
+static constexpr int patch_min_px = 4, patch_max_px = 30, blur_reach_px = 3;
+static constexpr int sub_samples_min = 3, sub_samples_max = 6; /* about one for each sample of the print */
 static constexpr int steps = 4;
-static constexpr double moved_max_px = 2.5;
+static constexpr double moved_max_px = 2.5, sigma_floor_px = 0.002;
 /* What is left may be this part of the contrast. */
 static constexpr double miss_max = 0.12, contrast_min_grey = 12.0;
-/* Pixels at the sensor's limit do not count: lamps and dots. So much of the patch must be left. */
-static constexpr double saturated_grey = 248.0, used_share = 0.7;
+/* Pixels at the sensor's limit do not count, nor what is so many times the usual residual (a Gaussian's, from the mean
+ * absolute one) above the print, at least so many grey values: dots of the laser. So much of the patch must be left. */
+static constexpr double saturated_grey = 248.0, extra_times = 3.0, extra_min_grey = 4.0, used_share = 0.6;
+static constexpr double mean_to_sigma = 1.2533;
+static constexpr int passes = 4;
 /* An edge's rise over its steepest slope is this many standard deviations of its blur. */
 static constexpr double edge_sigmas = 2.5066, pixel_sigma_px = 0.29, blur_min_px = 0.4;
 
-using Unknowns = cv::Matx<double, 6, 1>; /* gain, ground, its slopes, shift */
+/* Gain; ground, its slopes and curves (a lamp's mirror image is a hill); shift. */
+using Unknowns = cv::Matx<double, 9, 1>;
+static constexpr int shift_u = 7, shift_v = 8;
 
-/* Where a place of the frame lies on the print, near one corner. */
-static cv::Matx33d local_map(const Board &board, int id, const cv::Vec3d &turn, const cv::Vec3d &shift,
-                             const cv::Mat &camera, const cv::Mat &distortion, cv::Point2d &corner_px)
+/* From tangents X/Z, Y/Z to samples of the print. */
+static cv::Matx33d onto_print(const Board &board, const cv::Vec3d &turn, const cv::Vec3d &shift)
 {
-    cv::Point3d middle = board.corner_mm(id);
+    cv::Matx33d rotation;
     cv::Point2d sheet = board.sheet_origin_mm();
-    double half = 0.5 * board.square_mm;
-    std::vector<cv::Point3d> places{middle, middle + cv::Point3d(-half, -half, 0.0),
-                                    middle + cv::Point3d(half, -half, 0.0), middle + cv::Point3d(half, half, 0.0),
-                                    middle + cv::Point3d(-half, half, 0.0)};
-    std::vector<cv::Point2d> seen;
-    cv::projectPoints(places, turn, shift, camera, distortion, seen);
-    corner_px = seen[0];
-    cv::Point2f from[4], to[4];
-    for (size_t i = 0; i < 4; i++) {
-        from[i] = seen[i + 1] - seen[0];
-        to[i] = {static_cast<float>((places[i + 1].x - sheet.x) * refine_px_per_mm - 0.5),
-                 static_cast<float>((places[i + 1].y - sheet.y) * refine_px_per_mm - 0.5)};
+    double scale = refine_px_per_mm;
+    cv::Rodrigues(turn, rotation);
+    cv::Matx33d from_board(rotation(0, 0), rotation(0, 1), shift[0], rotation(1, 0), rotation(1, 1), shift[1],
+                           rotation(2, 0), rotation(2, 1), shift[2]);
+    cv::Matx33d to_print(scale, 0.0, -scale * sheet.x - 0.5, 0.0, scale, -scale * sheet.y - 0.5, 0.0, 0.0, 1.0);
+    return to_print * from_board.inv();
+}
+
+cv::Mat refine_tangents(cv::Size size, const cv::Mat &camera, const cv::Mat &distortion)
+{
+    cv::Mat px(size, CV_64FC2), tangents;
+    for (int v = 0; v < size.height; v++) {
+        for (int u = 0; u < size.width; u++)
+            px.at<cv::Vec2d>(v, u) = {static_cast<double>(u), static_cast<double>(v)};
     }
-    cv::Matx33d map = cv::getPerspectiveTransform(from, to);
-    /* The lens bends what lies between: the corner itself must be exact. */
-    cv::Vec3d at = map * cv::Vec3d(0.0, 0.0, 1.0);
-    double off_x = (middle.x - sheet.x) * refine_px_per_mm - 0.5 - at[0] / at[2];
-    double off_y = (middle.y - sheet.y) * refine_px_per_mm - 0.5 - at[1] / at[2];
-    return cv::Matx33d(1.0, 0.0, off_x, 0.0, 1.0, off_y, 0.0, 0.0, 1.0) * map;
+    cv::undistortPoints(px.reshape(2, 1), tangents, camera, distortion, cv::noArray(), cv::noArray(),
+                        {cv::TermCriteria::COUNT + cv::TermCriteria::EPS, 50, 1e-9});
+    return tangents.reshape(2, size.height);
+}
+
+/* What the camera looks at in a pixel, and how that changes to the right and downwards. */
+struct Sight {
+    cv::Vec2d at, right, down;
+};
+
+static Sight sight_of(const cv::Mat &tangents, cv::Point2d px)
+{
+    int u = std::clamp(cvFloor(px.x), 0, tangents.cols - 2), v = std::clamp(cvFloor(px.y), 0, tangents.rows - 2);
+    cv::Vec2d here = tangents.at<cv::Vec2d>(v, u), right = tangents.at<cv::Vec2d>(v, u + 1) - here;
+    cv::Vec2d down = tangents.at<cv::Vec2d>(v + 1, u) - here;
+    return {here + (px.x - u) * right + (px.y - v) * down, right, down};
 }
 
 static double sample(const cv::Mat &print, double x, double y)
@@ -58,110 +75,179 @@ static double sample(const cv::Mat &print, double x, double y)
            255.0;
 }
 
-/* The print as the camera sees it, 0 dark to 1 white: pixels from -half to half around `middle_px`, with the corner at
- * `corner_px`. */
-static cv::Mat draw_patch(const cv::Mat &print, const cv::Matx33d &map, cv::Point middle_px, cv::Point2d corner_px,
-                          int half, double blur_px)
+/* What draws the print as the camera sees it. */
+struct Drawing {
+    const cv::Mat &print, &tangents;
+    cv::Matx33d map; /* onto_print */
+    double blur_px;
+    int sub_samples; /* along each side of a pixel */
+};
+
+/* 0 dark to 1 white: pixels from -half to half around `middle_px` (and a border for the blur), all moved by `moved_px`. */
+static cv::Mat draw_patch(const Drawing &drawing, cv::Point middle_px, cv::Point2d moved_px, int half)
 {
     int side = 2 * (half + blur_reach_px) + 1;
     cv::Mat drawn(side, side, CV_64F), soft;
+    int parts = drawing.sub_samples;
+    cv::Point2d first = cv::Point2d(middle_px) - moved_px - cv::Point2d(half + blur_reach_px, half + blur_reach_px);
     for (int row = 0; row < side; row++) {
         for (int column = 0; column < side; column++) {
+            Sight sight = sight_of(drawing.tangents, first + cv::Point2d(column, row));
             double sum = 0.0;
-            for (int i = 0; i < sub_samples * sub_samples; i++) {
-                double u = middle_px.x + column - half - blur_reach_px + (i % sub_samples + 0.5) / sub_samples - 0.5;
-                double v = middle_px.y + row - half - blur_reach_px + (i / sub_samples + 0.5) / sub_samples - 0.5;
-                cv::Vec3d at = map * cv::Vec3d(u - corner_px.x, v - corner_px.y, 1.0);
-                sum += sample(print, at[0] / at[2], at[1] / at[2]);
+            for (int i = 0; i < parts * parts; i++) {
+                double right = (i % parts + 0.5) / parts - 0.5, down = (i / parts + 0.5) / parts - 0.5;
+                cv::Vec2d tangent = sight.at + right * sight.right + down * sight.down;
+                cv::Vec3d at = drawing.map * cv::Vec3d(tangent[0], tangent[1], 1.0);
+                sum += sample(drawing.print, at[0] / at[2], at[1] / at[2]);
             }
-            drawn.at<double>(row, column) = sum / (sub_samples * sub_samples);
+            drawn.at<double>(row, column) = sum / (parts * parts);
         }
     }
-    cv::GaussianBlur(drawn, soft, {2 * blur_reach_px + 1, 2 * blur_reach_px + 1}, blur_px);
+    cv::GaussianBlur(drawn, soft, {2 * blur_reach_px + 1, 2 * blur_reach_px + 1}, drawing.blur_px);
     return soft;
 }
 
-/* One step of least squares; returns gain, ground and how far the corner is from where it was drawn. */
-static bool match(const cv::Mat &grey8, const cv::Mat &drawn, cv::Point middle_px, int half, Unknowns &found,
-                  double &miss)
+/* What a pixel of the patch adds to the equations. */
+struct Pixel {
+    Unknowns terms;
+    double grey;
+    bool used;
+};
+
+static std::vector<Pixel> list_pixels(const cv::Mat &grey, const cv::Mat &drawn, cv::Point middle_px, int half)
 {
-    cv::Matx<double, 6, 6> normal = cv::Matx<double, 6, 6>::zeros();
-    Unknowns right = Unknowns::zeros();
-    double square_sum = 0.0;
-    int used = 0;
-    for (int pass = 0; pass < 2; pass++) {
-        double gain = pass == 0 ? 1.0 : found(0);
-        normal = cv::Matx<double, 6, 6>::zeros();
-        right = Unknowns::zeros();
-        square_sum = 0.0;
-        used = 0;
-        for (int dv = -half; dv <= half; dv++) {
-            for (int du = -half; du <= half; du++) {
-                int row = dv + half + blur_reach_px, column = du + half + blur_reach_px;
-                double slope_u = 0.5 * (drawn.at<double>(row, column + 1) - drawn.at<double>(row, column - 1));
-                double slope_v = 0.5 * (drawn.at<double>(row + 1, column) - drawn.at<double>(row - 1, column));
-                double grey = grey8.at<uchar>(middle_px.y + dv, middle_px.x + du);
-                if (grey >= saturated_grey)
-                    continue;
-                Unknowns terms(drawn.at<double>(row, column), 1.0, du, dv, -gain * slope_u, -gain * slope_v);
-                used++;
-                normal += terms * terms.t();
-                right += terms * grey;
-                square_sum += grey * grey;
-            }
+    std::vector<Pixel> pixels;
+    for (int dv = -half; dv <= half; dv++) {
+        for (int du = -half; du <= half; du++) {
+            int row = dv + half + blur_reach_px, column = du + half + blur_reach_px;
+            double slope_u = 0.5 * (drawn.at<double>(row, column + 1) - drawn.at<double>(row, column - 1));
+            double slope_v = 0.5 * (drawn.at<double>(row + 1, column) - drawn.at<double>(row - 1, column));
+            double x = static_cast<double>(du) / half, y = static_cast<double>(dv) / half;
+            double seen = static_cast<double>(grey.at<float>(middle_px.y + dv, middle_px.x + du));
+            pixels.push_back({{drawn.at<double>(row, column), 1.0, x, y, x * x, x * y, y * y, -slope_u, -slope_v},
+                              seen,
+                              seen < saturated_grey});
         }
-        if (used < used_share * (2 * half + 1) * (2 * half + 1) ||
-            !cv::solve(normal, right, found, cv::DECOMP_CHOLESKY))
-            return false;
     }
-    double rest = square_sum - (right.t() * found)(0);
-    miss = std::sqrt(std::max(0.0, rest) / used) / std::max(1.0, found(0));
-    return found(0) >= contrast_min_grey;
+    return pixels;
 }
 
-static bool refine_one(const cv::Mat &print, const cv::Mat &grey8, const cv::Matx33d &map, int half, double blur_px,
-                       cv::Point2d &corner_px)
+/* Without what is much lighter than it should be; false: nothing is. */
+static bool drop_lit(std::vector<Pixel> &pixels, const Unknowns &found)
+{
+    double sum = 0.0;
+    int used = 0;
+    bool changed = false;
+    for (const Pixel &pixel : pixels) {
+        sum += pixel.used ? std::abs(pixel.grey - pixel.terms.dot(found)) : 0.0;
+        used += pixel.used;
+    }
+    double limit = std::max(extra_times * mean_to_sigma * sum / std::max(1, used), extra_min_grey);
+    for (Pixel &pixel : pixels) {
+        bool lit = pixel.used && pixel.grey - pixel.terms.dot(found) > limit;
+        pixel.used = pixel.used && !lit;
+        changed = changed || lit;
+    }
+    return changed;
+}
+
+/* One step of least squares: gain, ground and how far the corner is from where it was drawn (shift times gain: the
+ * equations are linear in that). */
+struct Match {
+    Unknowns found;
+    double miss;     /* what is left, as a part of the gain */
+    double sigma_px; /* of the shift, one component */
+};
+
+static bool match(std::vector<Pixel> &pixels, Match &result)
+{
+    for (int pass = 0; pass < passes; pass++) {
+        cv::Matx<double, 9, 9> normal = cv::Matx<double, 9, 9>::zeros();
+        Unknowns right = Unknowns::zeros();
+        double square_sum = 0.0;
+        int used = 0;
+        for (const Pixel &pixel : pixels) {
+            if (!pixel.used)
+                continue;
+            normal += pixel.terms * pixel.terms.t();
+            right += pixel.terms * pixel.grey;
+            square_sum += pixel.grey * pixel.grey;
+            used++;
+        }
+        bool solved = false;
+        cv::Matx<double, 9, 9> inverse = normal.inv(cv::DECOMP_CHOLESKY, &solved);
+        if (used < used_share * static_cast<double>(pixels.size()) || !solved)
+            return false;
+        result.found = inverse * right;
+        result.miss = std::sqrt(std::max(0.0, square_sum - right.dot(result.found)) / used) / result.found(0);
+        result.sigma_px = result.miss * std::sqrt(0.5 * (inverse(shift_u, shift_u) + inverse(shift_v, shift_v)));
+        if (!drop_lit(pixels, result.found))
+            break;
+    }
+    return result.found(0) >= contrast_min_grey;
+}
+
+static bool refine_one(const Drawing &drawing, const cv::Mat &grey, int half, cv::Point2d &corner_px, double &sigma_px)
 {
     cv::Point2d start = corner_px;
-    double miss = 1.0;
+    Match result{{}, 1.0, 0.0};
     for (int step = 0; step < steps; step++) {
         cv::Point middle(cvRound(corner_px.x), cvRound(corner_px.y));
-        if (middle.x < half || middle.y < half || middle.x >= grey8.cols - half || middle.y >= grey8.rows - half)
+        if (middle.x < half || middle.y < half || middle.x >= grey.cols - half || middle.y >= grey.rows - half)
             return false;
-        Unknowns found;
-        if (!match(grey8, draw_patch(print, map, middle, corner_px, half, blur_px), middle, half, found, miss))
+        std::vector<Pixel> pixels =
+            list_pixels(grey, draw_patch(drawing, middle, corner_px - start, half), middle, half);
+        if (!match(pixels, result))
             return false;
-        cv::Point2d move(found(4), found(5));
+        cv::Point2d move(result.found(shift_u), result.found(shift_v));
+        move *= 1.0 / result.found(0);
         corner_px += move * std::min(1.0, 1.0 / std::max(1e-9, cv::norm(move)));
         if (cv::norm(corner_px - start) > moved_max_px)
             return false;
         if (cv::norm(move) < 0.003)
             break;
     }
-    return miss < miss_max;
+    sigma_px = std::max(result.sigma_px, sigma_floor_px);
+    return result.miss < miss_max;
 }
 
-void corners_refine(const Board &board, const cv::Mat &print, const cv::Mat &grey8, const cv::Mat &camera,
-                    const cv::Mat &distortion, Corners &corners)
+/* The blur of the picture, by its edges' width. */
+static double blur_of(double edge_px)
+{
+    double sigma_px = edge_px / edge_sigmas, square = sigma_px * sigma_px - pixel_sigma_px * pixel_sigma_px;
+    return std::sqrt(std::max(blur_min_px * blur_min_px, square));
+}
+
+void corners_refine(const Board &board, const cv::Mat &print, const cv::Mat &tangents, const cv::Mat &grey,
+                    const cv::Mat &camera, const cv::Mat &distortion, Corners &corners)
 {
     cv::Vec3d turn, shift;
     Corners refined;
     refined.edge_px = corners.edge_px;
     if (!cv::solvePnP(corners.places_mm(board), corners.px, camera, distortion, turn, shift))
         return;
-    double edge_sigma_px = corners.edge_px / edge_sigmas;
-    double blur_px =
-        std::sqrt(std::max(blur_min_px * blur_min_px, edge_sigma_px * edge_sigma_px - pixel_sigma_px * pixel_sigma_px));
+    std::vector<cv::Point3d> places;
+    std::vector<cv::Point2d> expected;
+    double half_square = 0.5 * board.square_mm;
     for (int id = 0; id < board.corner_count(); id++) {
-        cv::Point2d corner_px;
-        cv::Matx33d map = local_map(board, id, turn, shift, camera, distortion, corner_px);
-        cv::Vec2d across(map(0, 0) / map(2, 2), map(1, 0) / map(2, 2)),
-            down(map(0, 1) / map(2, 2), map(1, 1) / map(2, 2));
-        double mm_per_px = std::max(cv::norm(across), cv::norm(down)) / refine_px_per_mm;
-        int half = std::clamp(cvRound(patch_share * board.square_mm / mm_per_px), patch_min_px, patch_max_px);
-        if (refine_one(print, grey8, map, half, blur_px, corner_px)) {
+        places.push_back(board.corner_mm(id));
+        places.push_back(places.back() + cv::Point3d(half_square, 0.0, 0.0));
+        places.push_back(places[places.size() - 2] + cv::Point3d(0.0, half_square, 0.0));
+    }
+    cv::projectPoints(places, turn, shift, camera, distortion, expected);
+    Drawing drawing{print, tangents, onto_print(board, turn, shift), blur_of(corners.edge_px), sub_samples_max};
+    for (int id = 0; id < board.corner_count(); id++) {
+        const cv::Point2d *seen = &expected[3 * static_cast<size_t>(id)];
+        double shorter_px = std::min(cv::norm(seen[1] - seen[0]), cv::norm(seen[2] - seen[0]));
+        int half = std::clamp(cvRound(2.0 * patch_share * shorter_px), patch_min_px, patch_max_px);
+        drawing.sub_samples =
+            std::clamp(cvCeil(half_square * refine_px_per_mm / shorter_px), sub_samples_min, sub_samples_max);
+        cv::Point2d corner_px = seen[0];
+        double sigma_px;
+        if (refine_one(drawing, grey, half, corner_px, sigma_px)) {
             refined.ids.push_back(id);
             refined.px.emplace_back(corner_px);
+            refined.sigma_px.push_back(sigma_px);
         }
     }
     corners = refined;

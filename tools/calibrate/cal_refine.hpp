@@ -1,6 +1,7 @@
 /* cal_refine - corners to a fiftieth of a pixel, once it is known roughly how the camera sees the board.
  * Around each corner the print is drawn as the camera would see it, markers and all, and moved until it lies on the
  * picture, by least squares with its own gain and ground: all edges near the corner count, not only those that meet in it.
+ * Dots of the laser on it are left out.
  */
 #ifndef CAL_REFINE_HPP
 #define CAL_REFINE_HPP
@@ -9,11 +10,15 @@
 
 namespace cal
 {
-/* Sets the corners anew, all that are in the picture and look as they should. `print` is board_bitmap with
- * refine_px_per_mm. */
 constexpr int refine_px_per_mm = 4;
-void corners_refine(const Board &board, const cv::Mat &print, const cv::Mat &grey8, const cv::Mat &camera,
-                    const cv::Mat &distortion, Corners &corners);
+
+/* What the camera looks at in each pixel: X/Z, Y/Z, CV_64FC2. */
+cv::Mat refine_tangents(cv::Size size, const cv::Mat &camera, const cv::Mat &distortion);
+
+/* Sets the corners anew, all that are in the picture (CV_32F) and look as they should. `print` is board_bitmap with
+ * refine_px_per_mm, `tangents` is refine_tangents. */
+void corners_refine(const Board &board, const cv::Mat &print, const cv::Mat &tangents, const cv::Mat &grey,
+                    const cv::Mat &camera, const cv::Mat &distortion, Corners &corners);
 } // namespace cal
 
 #endif

@@ -90,10 +90,16 @@ static std::string depth_chart(const Result &result, double dot_sigma_px)
     return chart.svg();
 }
 
+static void tell_now(Chart &chart, double most)
+{
+    chart.line({{0.0, 0.0}, {0.0, most}}, grey);
+    chart.words({0.08, 0.94 * most}, "now");
+}
+
 static std::string turn_chart(const std::vector<Turn> &turns)
 {
     std::vector<cv::Point2d> curve;
-    double most = 1.0;
+    double most = 5.0; /* pairs come whole: so do the axis' ticks */
     for (const Turn &turn : turns) {
         curve.emplace_back(turn.deg, turn.shared);
         most = std::max(most, static_cast<double>(turn.shared));
@@ -101,7 +107,7 @@ static std::string turn_chart(const std::vector<Turn> &turns)
     Chart chart("Pairs of dots that share a line", "pattern turned by, degrees", "pairs",
                 {turns.front().deg, 0.0, turns.back().deg - turns.front().deg, 1.05 * most});
     chart.line(curve, blue);
-    chart.line({{0.0, 0.0}, {0.0, most}}, grey);
+    tell_now(chart, most);
     return chart.svg();
 }
 
@@ -117,6 +123,8 @@ static std::string apart_chart(const std::vector<Turn> &turns)
                 {turns.front().deg, 0.0, turns.back().deg - turns.front().deg, 1.05 * most});
     chart.line(curve, blue);
     chart.line({{turns.front().deg, share_px}, {turns.back().deg, share_px}}, red);
+    chart.words({turns.front().deg + 0.2, share_px + 0.02 * most}, "shared below this");
+    tell_now(chart, most);
     return chart.svg();
 }
 

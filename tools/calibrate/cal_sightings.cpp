@@ -1,7 +1,5 @@
 #include "cal_sightings.hpp"
 
-#include <algorithm>
-#include <map>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
 
@@ -9,49 +7,10 @@
 
 namespace cal
 {
-static constexpr double still_px = 0.6;
-static constexpr size_t common_min = 6;
 static constexpr int bitmap_px_per_mm = 2;
 /* Without a twin a dot must be this far from every edge of the print, else the edge is measured with it. */
 static constexpr double edge_apart_px = 2.0;
 static constexpr double border_mm = 3.0;
-
-/* Whether two pictures show the board in the same place. */
-static bool same_place(const Corners &a, const Corners &b)
-{
-    std::map<int, cv::Point2f> places;
-    std::vector<double> apart;
-    for (size_t i = 0; i < a.ids.size(); i++)
-        places[a.ids[i]] = a.px[i];
-    for (size_t i = 0; i < b.ids.size(); i++) {
-        auto other = places.find(b.ids[i]);
-        if (other != places.end())
-            apart.push_back(cv::norm(other->second - b.px[i]));
-    }
-    if (apart.size() < common_min)
-        return false;
-    /* Dots on the board push some of its corners aside; a board that moves takes all along. */
-    auto quarter = apart.begin() + static_cast<std::ptrdiff_t>(apart.size() / 4);
-    std::nth_element(apart.begin(), quarter, apart.end());
-    return *quarter < still_px;
-}
-
-std::vector<int> sightings_twins(const std::vector<Picture> &pictures, const std::vector<View> &views)
-{
-    std::vector<int> twins(pictures.size(), -1);
-    int count = static_cast<int>(pictures.size());
-    for (int i = 0; i < count; i++) {
-        size_t here = static_cast<size_t>(i);
-        for (int other : {i + 1, i - 1}) {
-            if (!pictures[here].laser || twins[here] >= 0 || other < 0 || other >= count)
-                continue;
-            size_t there = static_cast<size_t>(other);
-            if (!pictures[there].laser && same_place(views[here].corners, views[there].corners))
-                twins[here] = other;
-        }
-    }
-    return twins;
-}
 
 /* The part of the frame that the sheet covers, a little less. */
 static cv::Mat sheet_mask(const Camera &camera, const Board &board, const View &view)

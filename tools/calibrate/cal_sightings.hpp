@@ -30,10 +30,6 @@ struct Lit {
     std::string refused; /* why nothing of it is used; empty: it is used */
 };
 
-/* Index of each laser-on picture's twin among the pictures: the one before or after it, where the board has not moved;
- * -1: it has none. */
-std::vector<int> sightings_twins(const std::vector<Picture> &pictures, const std::vector<View> &views);
-
 /* The board's pose in `lit.view` must be known. */
 void sightings_find(const Board &board, const Camera &camera, const cv::Mat &grey, const cv::Mat &dark, Lit &lit);
 } // namespace cal

@@ -7,6 +7,7 @@
 #include "cal_error.hpp"
 #include "cal_lattice.hpp"
 #include "cal_report.hpp"
+#include "cal_twins.hpp"
 
 namespace cal
 {
@@ -19,6 +20,7 @@ static std::vector<View> find_boards(const Board &board, const std::vector<Pictu
         View view;
         view.file = picture.file;
         view.grey8 = picture.grey8();
+        view.grey = picture.grey;
         view.corners = corners_find(board, view.grey8);
         views.push_back(view);
     }
@@ -142,7 +144,12 @@ void solve_run(const Options &options)
         throw Error(
             text("too few pictures with the laser on. Add:\n  - pictures with the laser on, at least %zu", lit_min));
     std::vector<View> views = find_boards(result.board, pictures);
-    std::vector<int> twins = sightings_twins(pictures, views);
+    std::vector<int> twins = twins_find(pictures, views);
+    for (size_t i = 0; i < pictures.size(); i++) {
+        if (twins[i] >= 0)
+            views[static_cast<size_t>(twins[i])].grey =
+                twins_mean(pictures[static_cast<size_t>(twins[i])].grey, pictures[i].grey);
+    }
     result.views = camera_views(views, twins);
     try {
         result.camera = camera_solve(result.board, pictures.front().grey.size(), result.views);
