@@ -34,26 +34,26 @@ static bool is_directory(const char *path)
     return stat(path, &status) == 0 && S_ISDIR(status.st_mode);
 }
 
-static bool has_frames(const char *dir)
+static size_t count_frames(const char *dir)
 {
     DIR *stream = opendir(dir);
-    bool found = false;
+    size_t count = 0;
     struct dirent *item = NULL;
-    while (stream != NULL && !found && (item = readdir(stream)) != NULL) {
+    while (stream != NULL && (item = readdir(stream)) != NULL) {
         const char *suffix = strrchr(item->d_name, '.');
-        found = suffix != NULL && suffix != item->d_name &&
-                (strcmp(suffix, ".pgm") == 0 || strcmp(suffix, ".xyz") == 0);
+        count += suffix != NULL && suffix != item->d_name &&
+                 (strcmp(suffix, ".pgm") == 0 || strcmp(suffix, ".xyz") == 0);
     }
     if (stream != NULL) {
         closedir(stream);
     }
-    return found;
+    return count;
 }
 
 /* Can the directory be processed itself? */
 static bool is_frames_dir(const char *path, bool with_rig)
 {
-    return is_directory(path) && (has_rig(path) || (with_rig && has_frames(path)));
+    return is_directory(path) && (has_rig(path) || (with_rig && count_frames(path) > 0));
 }
 
 static bool label_taken(const struct sim_dirs *dirs, const char *label)
@@ -99,7 +99,9 @@ static void add(struct sim_dirs *dirs, char *path)
         dirs->dir_capacity = dirs->dir_capacity == 0 ? 16 : dirs->dir_capacity * 2;
         dirs->dir = sim_report_grow(dirs->dir, dirs->dir_capacity, sizeof *dirs->dir);
     }
-    struct sim_dir dir = {.path = path, .label = make_label(dirs, path)};
+    struct sim_dir dir = {
+        .path = path, .label = make_label(dirs, path), .file_count = count_frames(path)};
+    dirs->file_count += dir.file_count;
     dirs->dir[dirs->dir_count++] = dir;
 }
 
@@ -145,7 +147,8 @@ void sim_dirs_add(struct sim_dirs *dirs, const char *path, bool with_rig, struct
     }
     DIR *stream = opendir(path);
     if (stream == NULL) {
-        sim_report_error(report, path, "%s", strerror(errno));
+        sim_report_error(report, path, "%s; expected a directory with frames and rig.json",
+                         strerror(errno));
         return;
     }
     size_t count = 0;
@@ -156,8 +159,9 @@ void sim_dirs_add(struct sim_dirs *dirs, const char *path, bool with_rig, struct
     }
     free(child);
     if (count == 0) {
-        sim_report_error(report, path, "no %s here and in no subdirectory",
-                         with_rig ? "frames (*.pgm, *.xyz)" : RIG_NAME);
+        sim_report_error(report, path, "no %s here and in no subdirectory%s",
+                         with_rig ? "frames (*.pgm, *.xyz)" : RIG_NAME,
+                         with_rig ? "" : "; name one with --rig, or make one: docs/calibration.md");
     }
 }
 

@@ -14,12 +14,14 @@
 
 struct sim_dir {
     char *path;
-    char *label; /* last part of the path, unique among all: names rows and trace folders */
+    char *label;       /* last part of the path, unique among all: names rows and trace folders */
+    size_t file_count; /* what may be frames in it, for the progress */
 };
 
 struct sim_dirs {
     struct sim_dir *dir;
     size_t dir_count, dir_capacity;
+    size_t file_count; /* of all */
 };
 
 /* with_rig: a rig comes from elsewhere. Adds to dirs. */

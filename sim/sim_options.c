@@ -2,12 +2,14 @@
 
 #include <getopt.h>
 #include <stdio.h>
+#include <string.h>
 
 enum {
     OPTION_JSON = 1,
     OPTION_PAPER,
     OPTION_RIG,
     OPTION_TRACE,
+    OPTION_REPORT,
     OPTION_WITHOUT,
     OPTION_HELP,
     OPTION_VERSION
@@ -18,6 +20,7 @@ static const struct option table[] = {
     {"paper", no_argument, NULL, OPTION_PAPER},
     {"rig", required_argument, NULL, OPTION_RIG},
     {"trace", required_argument, NULL, OPTION_TRACE},
+    {"report", required_argument, NULL, OPTION_REPORT},
     {"without", required_argument, NULL, OPTION_WITHOUT},
     {"help", no_argument, NULL, OPTION_HELP},
     {"version", no_argument, NULL, OPTION_VERSION},
@@ -28,6 +31,16 @@ static bool refuse(const char *reason, const char *subject)
 {
     fprintf(stderr, "host_sim: %s%s; host_sim --help tells more\n", reason, subject);
     return false;
+}
+
+static bool take_without(struct sim_options *options, const char *list)
+{
+    const char *unknown = sim_without_add(&options->without, list);
+    if (unknown != NULL) {
+        fprintf(stderr, "host_sim: --without %s: no part '%.*s'; host_sim --help lists them\n",
+                list, (int)strcspn(unknown, ","), unknown);
+    }
+    return unknown == NULL;
 }
 
 static bool take(struct sim_options *options, int option)
@@ -45,11 +58,11 @@ static bool take(struct sim_options *options, int option)
     case OPTION_TRACE:
         options->trace = optarg;
         break;
-    case OPTION_WITHOUT:
-        if (!sim_without_add(&options->without, optarg)) {
-            return refuse("unknown part in --without ", optarg);
-        }
+    case OPTION_REPORT:
+        options->report = optarg;
         break;
+    case OPTION_WITHOUT:
+        return take_without(options, optarg);
     case OPTION_HELP:
         options->help = true;
         break;
@@ -86,7 +99,7 @@ bool sim_options_parse(struct sim_options *options, int argument_count, char **a
     options->dirs = arguments + optind;
     options->dir_count = argument_count - optind;
     if (options->dir_count == 0 && !options->help && !options->version) {
-        return refuse("no frames directory given", "");
+        return refuse("no frames directory given; make frames renders two: host_sim frames/", "");
     }
     return true;
 }
@@ -98,23 +111,25 @@ void sim_options_help(void)
           "With a range rig *.xyz are frames too: a line `x y z` in mm per point.\n"
           "A DIR without rig.json stands for those of its subdirectories that have one.\n"
           "\n"
-          "  --json         a JSON record per frame on standard output, nothing else there\n"
+          "  --json         a JSON record per frame on standard output, nothing else\n"
           "  --paper        the paper's method alone: every frame on its own\n"
           "  --rig FILE     this rig file instead of DIR/rig.json\n"
-          "  --trace OUT    write every stage's results of each frame under OUT, as JSON\n"
-          "  --without PART[,PART...]  leave out parts of the method, to see what each brings:\n"
+          "  --trace OUT    also write every stage's results of each frame under OUT\n"
+          "  --report FILE  also write a page for a browser that explains each frame\n"
+          "  --without PART[,PART...]  leave out parts of the method:\n"
           "                 ambient   frames without laser help nothing\n"
           "                 scan      no candidates from the model scan\n"
-          "                 nests     no candidates from the paper's nests; they stay evidence\n"
+          "                 nests     no candidates from the paper's nests, only evidence\n"
           "                 expected  no candidates from tracks\n"
-          "                 fit       candidates are not fitted: a mean head where each starts\n"
+          "                 fit       candidates are not fitted: mean heads instead\n"
           "                 tracks    every frame on its own\n"
           "                 windows   of a depth image only the best window\n"
           "                 missing   dots that are not seen are not entered as far points\n"
           "  --help         this text\n"
           "  --version      the version\n"
           "\n"
-          "Without --json: a line per frame, then, where there is truth, the paper's Table 1.\n"
+          "Without --json: a line per frame, then, where there is truth, the paper's\n"
+          "Table 1.\n"
           "Exit status: 0 all frames processed, 1 some input wrong (see standard error),\n"
           "2 wrong usage. docs/contract.md describes all files.\n",
           stdout);

@@ -17,8 +17,9 @@ struct sim_options {
     bool paper;       /* the paper's method alone */
     uint32_t without; /* parts that are left out, sim_without.h */
     bool help, version;
-    const char *rig;   /* NULL: DIR/rig.json */
-    const char *trace; /* NULL: none */
+    const char *rig;    /* NULL: DIR/rig.json */
+    const char *trace;  /* NULL: none */
+    const char *report; /* NULL: none */
     char **dirs;
     int dir_count; /* at least 1, unless help or version is asked for */
 };

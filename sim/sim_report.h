@@ -4,12 +4,15 @@
 
 #include <stdbool.h>
 #include <stddef.h>
+#include <stdint.h>
 
 #include "hal.h"
 
 struct sim_report {
     bool terminal;       /* progress is shown: standard error is a terminal, output is none */
     bool progress_shown; /* the cursor stands behind a progress line */
+    int64_t start_us;    /* of the first progress; 0: none yet */
+    int64_t shown_us;    /* when the line was last written */
     int error_count;     /* not 0: the exit status is 1 */
 };
 
@@ -19,7 +22,8 @@ void sim_report_init(struct sim_report *report);
 void sim_report_error(struct sim_report *report, const char *subject, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
 
-/* "NAME DONE/COUNT" on the same line again and again, where it is shown. */
+/* "NAME DONE/COUNT, RATE frames/s, TIME left" on the same line again and again, where it is shown: ten
+ * times a second. The time that is left is told from the third second on. */
 void sim_report_progress(struct sim_report *report, const char *name, size_t done, size_t count);
 void sim_report_progress_end(struct sim_report *report);
 

@@ -15,6 +15,7 @@
 #include "app_rig.h"
 #include "app_rig_explain.h"
 #include "app_view.h"
+#include "sim_page.h"
 #include "sim_score.h"
 #include "sim_table.h"
 #include "sim_trace.h"
@@ -32,6 +33,8 @@ struct run {
     struct sim_report report;
     struct sim_dirs dirs;
     struct sim_score *score; /* one per directory */
+    struct sim_page page;    /* its file is NULL when none is wanted */
+    size_t done_count;       /* frames of the directories before this one */
 };
 
 /* One directory of it. */
@@ -80,7 +83,7 @@ static void report_frame(struct visit *visit, const char *name, const char *text
     free(path);
 }
 
-/* A record that is written, to standard output: flushed, so that a reader at the other end of a pipe
+/* A record that is written, to standard output if it is wanted there: flushed, so that a reader at the other end of a pipe
  * has each at once. */
 static void put_record(struct visit *visit, const char *name, bool fits)
 {
@@ -88,6 +91,9 @@ static void put_record(struct visit *visit, const char *name, bool fits)
         struct hal_error error;
         hal_fail(&error, "its record has more than %d bytes", APP_RECORD_MAX);
         report_frame(visit, name, error.text);
+        return;
+    }
+    if (!visit->run->options->json) {
         return;
     }
     fwrite(visit->record.text, 1, visit->record.length, stdout);
@@ -101,18 +107,40 @@ static void lose_frame(struct visit *visit, const struct hal_frame *frame, const
     if (!frame->laser) {
         return;
     }
-    if (visit->run->options->json) {
-        put_record(visit, frame->name, app_record_error(&visit->record, frame->name, text));
-    } else {
+    struct run *run = visit->run;
+    put_record(visit, frame->name, app_record_error(&visit->record, frame->name, text));
+    if (run->page.file != NULL && visit->record.length > 0) {
+        sim_page_lost(&run->page, &visit->record);
+    }
+    if (!run->options->json) {
         sim_table_error(stdout, frame->name, text);
     }
 }
 
+/* What else is wanted of a frame, in files. */
+static void put_files(struct visit *visit, const struct sim_page_frame *frame)
+{
+    struct run *run = visit->run;
+    const char *name = frame->frame->name;
+    struct hal_error error = {""};
+    if (run->options->trace != NULL) {
+        const struct sim_trace trace = {run->options->trace, visit->dir->label};
+        if (!sim_trace_frame(&trace, frame->frame, frame->head, &error)) {
+            report_frame(visit, name, error.text);
+        }
+    }
+    if (run->page.file != NULL && visit->record.length > 0 &&
+        !sim_page_frame(&run->page, frame, &error)) {
+        report_frame(visit, name, error.text);
+    }
+}
+
 /* Results of one frame to where they are wanted. */
-static void put_frame(struct visit *visit, const struct hal_frame *frame)
+static void put_frame(struct visit *visit, const struct hal_frame *frame,
+                      const struct ih_frame *view)
 {
     const struct sim_options *options = visit->run->options;
-    const struct isohead *head = visit->run->head;
+    struct isohead *head = visit->run->head;
     const struct sim_truth_frame *truth = sim_truth_find(&visit->truth, frame->name);
     if (visit->truth.present && truth == NULL) {
         sim_report_error(&visit->run->report, visit->truth.path, "no line for %s", frame->name);
@@ -122,11 +150,12 @@ static void put_frame(struct visit *visit, const struct hal_frame *frame)
     if (truth != NULL && truth->has_dots) {
         sim_score_add_dots(visit->score, head, truth);
     }
-    if (options->json) {
-        put_record(visit, frame->name, app_record_frame(&visit->record, frame, head, NULL));
-    } else {
+    put_record(visit, frame->name, app_record_frame(&visit->record, frame, head, NULL));
+    if (!options->json) {
         sim_table_frame(stdout, frame, head, &verdict);
     }
+    const struct sim_page_frame page_frame = {frame, view, head, &visit->record, truth, &verdict};
+    put_files(visit, &page_frame);
 }
 
 static void release(struct visit *visit, const struct hal_frame *frame)
@@ -175,13 +204,7 @@ static void process_lit(struct visit *visit, const struct hal_frame *frame)
         lose_frame(visit, frame, error.text);
         return;
     }
-    put_frame(visit, frame);
-    if (visit->run->options->trace != NULL) {
-        const struct sim_trace trace = {visit->run->options->trace, visit->dir->label};
-        if (!sim_trace_frame(&trace, frame, head, &error)) {
-            report_frame(visit, frame->name, error.text);
-        }
-    }
+    put_frame(visit, frame, &view);
 }
 
 static void process_frame(struct visit *visit, const struct hal_frame *frame)
@@ -208,8 +231,9 @@ static void process_frames(struct visit *visit)
         } else {
             process_frame(visit, &frame);
         }
-        sim_report_progress(report, visit->dir->label, visit->replay.next_index,
-                            visit->replay.entry_count);
+        sim_report_progress(report, visit->dir->label,
+                            visit->run->done_count + visit->replay.next_index,
+                            visit->run->dirs.file_count);
     }
     sim_report_progress_end(report);
 }
@@ -237,6 +261,9 @@ static void process_dir(struct run *run, size_t index)
     if (!run->options->json) {
         sim_table_title(stdout, dir->path);
     }
+    if (run->page.file != NULL) {
+        sim_page_dir(&run->page, dir, run->head);
+    }
     process_frames(&visit);
     release(&visit, &visit.ambient);
     sim_truth_free(&visit.truth);
@@ -244,13 +271,20 @@ static void process_dir(struct run *run, size_t index)
     hal_replay_close(&visit.replay);
 }
 
-static void print_tables(struct run *run)
+/* To be freed. */
+static struct sim_score sum_scores(const struct run *run)
 {
     struct sim_score sum = {.true_dot_count = 0};
-    size_t count = run->dirs.dir_count;
-    for (size_t i = 0; i < count; i++) {
+    for (size_t i = 0; i < run->dirs.dir_count; i++) {
         sim_score_merge(&sum, &run->score[i]);
     }
+    return sum;
+}
+
+static void print_tables(struct run *run)
+{
+    struct sim_score sum = sum_scores(run);
+    size_t count = run->dirs.dir_count;
     if (sum.with_head.frame_count + sum.empty.frame_count > 0) {
         sim_table_heading(stdout);
         for (size_t i = 0; i < count; i++) {
@@ -272,6 +306,60 @@ static void print_tables(struct run *run)
     sim_score_free(&sum);
 }
 
+/* The page's end, and where it is. */
+static void finish_page(struct run *run)
+{
+    struct hal_error error;
+    const char *path = run->options->report;
+    size_t frame_count = run->page.frame_count;
+    for (size_t i = 0; i < run->dirs.dir_count; i++) {
+        sim_page_row(&run->page, run->dirs.dir[i].label, &run->score[i]);
+    }
+    if (run->dirs.dir_count > 1) {
+        struct sim_score sum = sum_scores(run);
+        sim_page_row(&run->page, "all", &sum);
+        sim_score_free(&sum);
+    }
+    if (!sim_page_close(&run->page, &error)) {
+        sim_report_error(&run->report, path, "%s", error.text);
+    } else if (!run->options->json) {
+        printf("\nReport of %zu frames, to be opened in a browser: %s\n", frame_count, path);
+    }
+}
+
+/* False: the page cannot be written, which is told before any frame is processed. */
+static bool start_page(struct run *run)
+{
+    struct hal_error error;
+    const char *path = run->options->report;
+    if (path == NULL || sim_page_open(&run->page, path, &error)) {
+        return true;
+    }
+    sim_report_error(&run->report, path, "%s", error.text);
+    return false;
+}
+
+static void process_all(struct run *run)
+{
+    size_t count = run->dirs.dir_count;
+    run->score = sim_report_grow(NULL, count + 1, sizeof *run->score);
+    memset(run->score, 0, (count + 1) * sizeof *run->score);
+    for (size_t i = 0; i < count && !ferror(stdout); i++) {
+        process_dir(run, i);
+        run->done_count += run->dirs.dir[i].file_count;
+    }
+    if (!run->options->json) {
+        print_tables(run);
+    }
+    if (run->page.file != NULL) {
+        finish_page(run);
+    }
+    for (size_t i = 0; i < count; i++) {
+        sim_score_free(&run->score[i]);
+    }
+    free(run->score);
+}
+
 enum sim_status sim_run(const struct sim_options *options, struct isohead *head)
 {
     struct run run = {.options = options, .head = head};
@@ -279,22 +367,12 @@ enum sim_status sim_run(const struct sim_options *options, struct isohead *head)
     for (int i = 0; i < options->dir_count; i++) {
         sim_dirs_add(&run.dirs, options->dirs[i], options->rig != NULL, &run.report);
     }
-    size_t count = run.dirs.dir_count;
-    run.score = sim_report_grow(NULL, count + 1, sizeof *run.score);
-    memset(run.score, 0, (count + 1) * sizeof *run.score);
-    for (size_t i = 0; i < count && !ferror(stdout); i++) {
-        process_dir(&run, i);
-    }
-    if (!options->json) {
-        print_tables(&run);
+    if (start_page(&run)) {
+        process_all(&run);
     }
     if (fflush(stdout) != 0 || ferror(stdout)) {
         sim_report_error(&run.report, STDOUT_NAME, "cannot be written: %s", strerror(errno));
     }
-    for (size_t i = 0; i < count; i++) {
-        sim_score_free(&run.score[i]);
-    }
-    free(run.score);
     sim_dirs_free(&run.dirs);
     return run.report.error_count == 0 ? SIM_STATUS_GOOD : SIM_STATUS_INPUT;
 }

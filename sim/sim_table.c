@@ -6,9 +6,15 @@
 #include "app_text.h"
 
 #define LABEL_WIDTH 20
+#define FRAME_WIDTH 14
 #define NAME_MAX_BYTES 256
 
 static const char *const outcome_text[SIM_OUTCOMES] = {"correct", "ambiguous", "wrong", "not done"};
+
+const char *sim_table_outcome(enum sim_outcome outcome)
+{
+    return outcome_text[outcome];
+}
 
 /* A name from the disk, safe for a terminal. */
 static const char *tame(char *buffer, size_t size, const char *name)
@@ -18,11 +24,19 @@ static const char *tame(char *buffer, size_t size, const char *name)
     return buffer;
 }
 
+/* The end of a name that is too long tells directories and frames apart better than its beginning. */
+static const char *shorten(char *buffer, size_t size, const char *name, size_t width)
+{
+    tame(buffer, size, name);
+    size_t length = strlen(buffer);
+    return length > width ? buffer + (length - width) : buffer;
+}
+
 void sim_table_title(FILE *file, const char *path)
 {
     char name[NAME_MAX_BYTES];
-    fprintf(file, "%s\n%-14s %5s %5s %4s %7s %7s %7s %6s  %s\n", tame(name, sizeof name, path),
-            "frame", "dots", "label", "hyp", "x mm", "y mm", "z mm", "dist", "head");
+    fprintf(file, "%s\n%-*s %5s %5s %4s %7s %7s %7s %6s  %s\n", tame(name, sizeof name, path),
+            FRAME_WIDTH, "frame", "dots", "label", "hyp", "x mm", "y mm", "z mm", "dist", "head");
 }
 
 /* What the truth says of the selection: nothing is printed for a frame that is not scored. */
@@ -47,9 +61,9 @@ void sim_table_frame(FILE *file, const struct hal_frame *frame, const struct iso
     char name[NAME_MAX_BYTES];
     const struct ih_result *result = &head->result;
     int32_t selected = result->selected;
-    fprintf(file, "%-14s %5" PRId32 " %5" PRId32 " %4" PRId32 " ",
-            tame(name, sizeof name, frame->name), head->dots.dot_count, head->labels.labelled_count,
-            result->entry_count);
+    fprintf(file, "%-*s %5" PRId32 " %5" PRId32 " %4" PRId32 " ", FRAME_WIDTH,
+            shorten(name, sizeof name, frame->name, FRAME_WIDTH), head->dots.dot_count,
+            head->labels.labelled_count, result->entry_count);
     if (selected != IH_NONE) {
         const struct ih_result_entry *hypothesis = &result->entry[selected];
         for (int axis = 0; axis < 3; axis++) {
@@ -67,17 +81,9 @@ void sim_table_frame(FILE *file, const struct hal_frame *frame, const struct iso
 void sim_table_error(FILE *file, const char *name, const char *error)
 {
     char text[NAME_MAX_BYTES];
-    fprintf(file, "%-14s error: ", tame(text, sizeof text, name));
+    fprintf(file, "%-*s error: ", FRAME_WIDTH, tame(text, sizeof text, name));
     fprintf(file, "%s\n", tame(text, sizeof text, error));
     fflush(file);
-}
-
-/* The end of a label that is too long tells directories apart better than its beginning. */
-static const char *shorten(char *buffer, size_t size, const char *label)
-{
-    tame(buffer, size, label);
-    size_t length = strlen(buffer);
-    return length > LABEL_WIDTH ? buffer + (length - LABEL_WIDTH) : buffer;
 }
 
 void sim_table_heading(FILE *file)
@@ -108,7 +114,7 @@ static void print_head_row(FILE *file, struct sim_score *score)
 void sim_table_row(FILE *file, const char *label, struct sim_score *score)
 {
     char text[NAME_MAX_BYTES];
-    const char *shown = shorten(text, sizeof text, label);
+    const char *shown = shorten(text, sizeof text, label, LABEL_WIDTH);
     const struct sim_tally *empty = &score->empty;
     if (score->with_head.frame_count > 0) {
         fprintf(file, "%-*s", LABEL_WIDTH, shown);
@@ -156,8 +162,9 @@ void sim_table_dots_row(FILE *file, const char *label, struct sim_score *score)
     if (score->true_dot_count == 0) {
         return;
     }
-    fprintf(file, "%-*s %8" PRId32 " %7s", LABEL_WIDTH, shorten(text, sizeof text, label),
-            score->true_dot_count, percent(score->found_dot_count, score->true_dot_count).text);
+    fprintf(file, "%-*s %8" PRId32 " %7s", LABEL_WIDTH,
+            shorten(text, sizeof text, label, LABEL_WIDTH), score->true_dot_count,
+            percent(score->found_dot_count, score->true_dot_count).text);
     print_ranks(file, &score->dot_error_px_q12, 12);
     fprintf(file, " %8" PRId32 " %7s", score->label_count,
             percent(score->right_label_count, score->label_count).text);

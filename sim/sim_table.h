@@ -12,6 +12,9 @@
 #include "hal.h"
 #include "sim_score.h"
 
+/* A word for how a selection went. */
+const char *sim_table_outcome(enum sim_outcome outcome);
+
 /* Above the lines of a directory. */
 void sim_table_title(FILE *file, const char *path);
 

@@ -7,7 +7,7 @@
 #include <sys/stat.h>
 
 #include "hal_file.h"
-#include "app_write.h"
+#include "sim_trace_cuts.h"
 
 /* An int32_t member of an array of structs as a list of its own. */
 static void write_column(struct app_write *write, const char *key, const void *first, int32_t count,
@@ -136,51 +136,6 @@ static void write_surface(struct app_write *write, const struct ih_surface *surf
     app_write_close(write, '}');
 }
 
-static void write_contour(struct app_write *write, const struct ih_cuts *cuts,
-                          const struct ih_contour *contour)
-{
-    app_write_open(write, '{');
-    app_write_key(write, "closed");
-    app_write_bool(write, contour->closed);
-    app_write_key(write, "x_y_q9");
-    app_write_open(write, '[');
-    for (int32_t i = 0; i < contour->vertex_count; i++) {
-        const struct ih_vertex *vertex = &cuts->vertex[contour->first + i];
-        app_write_open(write, '[');
-        app_write_int(write, vertex->x_q9);
-        app_write_int(write, vertex->y_q9);
-        app_write_close(write, ']');
-    }
-    app_write_close(write, ']');
-    app_write_close(write, '}');
-}
-
-/* The cuts are not kept by the core: every level is cut once more. */
-static void write_cuts(struct app_write *write, struct isohead *head)
-{
-    struct ih_cuts *cuts = &head->scratch.hypotheses.cuts;
-    int32_t level_mm_q8 = 0;
-    app_write_key(write, "cuts");
-    app_write_open(write, '[');
-    for (int32_t index = 0;
-         head->surface.valid &&
-         ih_hypotheses_level(&head->surface, &head->params.hypotheses, index, &level_mm_q8);
-         index++) {
-        ih_cuts_level(&head->surface, level_mm_q8, cuts);
-        app_write_open(write, '{');
-        app_write_int_field(write, "level_mm_q8", cuts->level_mm_q8);
-        app_write_int_field(write, "contours_dropped", cuts->contours_dropped);
-        app_write_key(write, "contour");
-        app_write_open(write, '[');
-        for (int32_t i = 0; i < cuts->contour_count; i++) {
-            write_contour(write, cuts, &cuts->contour[i]);
-        }
-        app_write_close(write, ']');
-        app_write_close(write, '}');
-    }
-    app_write_close(write, ']');
-}
-
 static void write_slice(struct app_write *write, const struct ih_slice *slice)
 {
     const struct ih_ellipse *ellipse = &slice->ellipse;
@@ -267,7 +222,26 @@ static void write_candidate(struct app_write *write, const struct ih_hypothesis 
     app_write_close(write, '}');
 }
 
-static void write_heads(struct app_write *write, const struct ih_heads *heads)
+/* What the tests of hypotheses compare with. */
+static void write_limits(struct app_write *write, const struct ih_heads_params *params)
+{
+    app_write_key(write, "limits");
+    app_write_open(write, '{');
+    app_write_int_field(write, "area_min_mm2", params->area_min_mm2);
+    app_write_int_field(write, "area_max_mm2", params->area_max_mm2);
+    app_write_int_field(write, "curvature_min_mm", params->curvature_min_mm);
+    app_write_int_field(write, "curvature_max_mm", params->curvature_max_mm);
+    app_write_int_field(write, "extent_min_mm", params->extent_min_mm);
+    app_write_int_field(write, "upright_min_q16", params->upright_min_q16);
+    app_write_int_field(write, "points_min", params->points_min);
+    app_write_int_field(write, "above_min_percent", params->above_min_percent);
+    app_write_int_field(write, "beside_min_percent", params->beside_min_percent);
+    app_write_int_field(write, "below_min_percent", params->below_min_percent);
+    app_write_close(write, '}');
+}
+
+static void write_heads(struct app_write *write, const struct ih_heads *heads,
+                        const struct ih_heads_params *params)
 {
     app_write_key(write, "heads");
     app_write_open(write, '{');
@@ -278,6 +252,7 @@ static void write_heads(struct app_write *write, const struct ih_heads *heads)
     }
     app_write_close(write, ']');
     write_column(write, "head", heads->head, heads->head_count, sizeof heads->head[0]);
+    write_limits(write, params);
     app_write_close(write, '}');
 }
 
@@ -302,6 +277,13 @@ static void write_finding(struct app_write *write, const struct ih_finding *find
     app_write_int_field(write, "through_count", finding->evidence.through_count);
     app_write_int_field(write, "hit_count", finding->evidence.hit_count);
     app_write_int_field(write, "front_count", finding->evidence.front_count);
+    app_write_int_field(write, "sigma_mm_q8", finding->sigma_mm_q8);
+    app_write_int_field(write, "u_px_q12", finding->u_px_q12);
+    app_write_int_field(write, "v_px_q12", finding->v_px_q12);
+    app_write_int_field(write, "a_px_q12", finding->a_px_q12);
+    app_write_int_field(write, "b_px_q12", finding->b_px_q12);
+    app_write_int_field(write, "angle_mdeg", finding->angle_mdeg);
+    app_write_int_field(write, "distance_mm_q8", finding->distance_mm_q8);
     app_write_close(write, '}');
 }
 
@@ -321,29 +303,47 @@ static void write_findings(struct app_write *write, const struct ih_findings *fi
     app_write_close(write, ']');
 }
 
+/* Indices of findings, or with the paper's method alone of heads.hypothesis. */
+static void write_result(struct app_write *write, const struct isohead *head)
+{
+    const struct ih_result *result = &head->result;
+    app_write_key(write, "result");
+    app_write_open(write, '{');
+    app_write_key(write, "paper");
+    app_write_bool(write, head->params.is_paper);
+    write_column(write, "head", result->head, result->head_count, sizeof result->head[0]);
+    app_write_key(write, "selected");
+    if (result->selected == IH_NONE) {
+        app_write_null(write);
+    } else {
+        app_write_int(write, result->selected);
+    }
+    app_write_close(write, '}');
+}
+
 static void take_text(void *file, const char *text, size_t length)
 {
     fwrite(text, 1, length, file); /* an error stays in the file */
 }
 
-static void write_frame(FILE *file, const struct hal_frame *frame, struct isohead *head)
+void sim_trace_write(struct app_write *write, const struct hal_frame *frame, struct isohead *head)
 {
-    struct app_write write = {.take = take_text, .context = file};
-    app_write_open(&write, '{');
-    app_write_key(&write, "file");
-    app_write_string(&write, frame->name);
-    app_write_int_field(&write, "time_us", frame->time_us);
-    write_dots(&write, &head->dots);
-    write_labels(&write, &head->labels);
-    write_points(&write, &head->points);
-    write_samples(&write, &head->samples, &head->surface);
-    write_surface(&write, &head->surface);
-    write_cuts(&write, head);
-    write_hypotheses(&write, &head->hypotheses);
-    write_heads(&write, &head->heads);
-    write_findings(&write, &head->findings);
-    app_write_close(&write, '}');
-    fputc('\n', file);
+    app_write_open(write, '{');
+    app_write_key(write, "file");
+    app_write_string(write, frame->name);
+    app_write_int_field(write, "time_us", frame->time_us);
+    write_dots(write, &head->dots);
+    write_labels(write, &head->labels);
+    write_points(write, &head->points);
+    write_samples(write, &head->samples, &head->surface);
+    write_surface(write, &head->surface);
+    sim_trace_cuts(write, head);
+    write_hypotheses(write, &head->hypotheses);
+    write_heads(write, &head->heads, &head->params.heads);
+    write_findings(write, &head->findings);
+    write_result(write, head);
+    app_write_close(write, '}');
+    app_write_line_end(write);
 }
 
 static bool fail(struct hal_error *error, const char *path)
@@ -387,7 +387,8 @@ bool sim_trace_frame(const struct sim_trace *trace, const struct hal_frame *fram
     FILE *file = fopen(path, "w");
     bool good = file != NULL;
     if (good) {
-        write_frame(file, frame, head);
+        struct app_write write = {.take = take_text, .context = file};
+        sim_trace_write(&write, frame, head);
         good = !ferror(file);
         /* Closing writes the rest, so it too can fail; it must be done in any case. */
         good = fclose(file) == 0 && good;

@@ -8,6 +8,7 @@
 #ifndef SIM_TRACE_H
 #define SIM_TRACE_H
 
+#include "app_write.h"
 #include "hal.h"
 #include "isohead.h"
 
@@ -19,5 +20,8 @@ struct sim_trace {
 /* Uses head->scratch to cut the surface again. False: *error says why. */
 bool sim_trace_frame(const struct sim_trace *trace, const struct hal_frame *frame,
                      struct isohead *head, struct hal_error *error);
+
+/* What goes into the file, to wherever the caller wants it. */
+void sim_trace_write(struct app_write *write, const struct hal_frame *frame, struct isohead *head);
 
 #endif

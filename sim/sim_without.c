@@ -68,18 +68,18 @@ static size_t find(const char *name, size_t length)
     return i;
 }
 
-bool sim_without_add(uint32_t *parts, const char *list)
+const char *sim_without_add(uint32_t *parts, const char *list)
 {
     for (const char *name = list; name != NULL;) {
         size_t length = strcspn(name, ",");
         size_t index = find(name, length);
         if (index == PART_COUNT) {
-            return false;
+            return name;
         }
         *parts |= UINT32_C(1) << index;
         name = name[length] == ',' ? name + length + 1 : NULL;
     }
-    return true;
+    return NULL;
 }
 
 void sim_without_apply(uint32_t parts, struct ih_params *params)

@@ -11,8 +11,9 @@
 
 #include "isohead.h"
 
-/* Add the parts of a list, "scan,fit", to a set. False: one of them does not exist. */
-bool sim_without_add(uint32_t *parts, const char *list);
+/* Add the parts of a list, "scan,fit", to a set. NULL, or where in the list the first stands that does
+ * not exist. */
+const char *sim_without_add(uint32_t *parts, const char *list);
 
 void sim_without_apply(uint32_t parts, struct ih_params *params);
 

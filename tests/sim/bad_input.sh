@@ -642,10 +642,19 @@ run --json --without
 check 'usage: --without without a part' 2 0 0 'host_sim: missing argument of --without'
 run --json --without '' d
 check 'usage: empty --without' 2 0 0 'host_sim: empty argument of --without'
-for list in tracking scan,tracking 'scan,' ',scan' 'scan,,fit' sca scans; do
+# the list, and of it what is no part
+while IFS=: read -r list unknown; do
     run --json --without "$list" d
-    check "usage: --without $list" 2 0 0 "host_sim: unknown part in --without $list;"
-done
+    check "usage: --without $list" 2 0 0 "host_sim: --without $list: no part '$unknown';"
+done <<'END'
+tracking:tracking
+scan,tracking,fit:tracking
+scan,:
+,scan:
+scan,,fit:
+sca:sca
+scans:scans
+END
 run --json --without scan --without fit,tracks --without nests,expected,windows,missing,ambient d
 check 'usage: --without all parts' 0 3 0 -
 run --help

@@ -1,0 +1,15 @@
+# embed(HEADER NAME FILE [NAME FILE]...): files as constant arrays of bytes in a C header of this
+# folder's build.
+function(embed header)
+  set(text "/* Written by cmake/embed.cmake. */\n")
+  set(rest ${ARGN})
+  while(rest)
+    list(POP_FRONT rest name file)
+    set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS "${file}")
+    file(READ "${file}" bytes HEX)
+    string(REGEX REPLACE "([0-9a-f][0-9a-f])" "0x\\1," bytes "${bytes}")
+    string(REGEX REPLACE "(................................................................................)" "\\1\n" bytes "${bytes}")
+    string(APPEND text "static const unsigned char ${name}[] = {\n${bytes}\n};\n")
+  endwhile()
+  file(CONFIGURE OUTPUT "${CMAKE_CURRENT_BINARY_DIR}/embedded/${header}" CONTENT "${text}" @ONLY)
+endfunction()

@@ -1,0 +1,181 @@
+"use strict";
+/* page - which frame is shown, and everything that chooses it. */
+(() => {
+  const PLAY_MS = 120; /* a frame, at least */
+  const by = (id) => document.getElementById(id);
+  const { frames, dirs } = Data;
+  const slider = by("slider"), now = by("now");
+  let current = 0, chosen = 0, dir = -1, playing = false, loaded = { trace: null, image: null };
+
+  const stateText = { right: "right", wrong: "not right", lost: "lost", head: "head", none: "no head" };
+
+  function mm(values) {
+    return values.map((v, i) => `${"xyz"[i]}\u00a0${v.toFixed(1)}`).join(", ");
+  }
+
+  /* What came of the frame, as a sentence: the live region. */
+  function sentence(frame) {
+    const record = frame.record;
+    if (record.error !== undefined) return `lost: ${record.error}`;
+    const score = frame.selected && frame.selected.score !== undefined ? `, score ${frame.selected.score.toFixed(3)}` : "";
+    const head = frame.selected ? `head at ${mm(frame.selected.centre_mm)} mm${score}`
+      : record.heads.length > 1 ? `${record.heads.length} heads, none selected` : "no head";
+    if (!frame.verdict) return head;
+    const v = frame.verdict;
+    if (v.selected_right) return `${head}: right${v.error_mm !== undefined ? `, ${v.error_mm} mm off` : ", the seat is empty"}`;
+    return `${head}: not right, ${!v.head_there ? "nobody is there" : frame.selected ? "it is elsewhere" : "there is one"} (${v.outcome})`;
+  }
+
+  function tell(frame) {
+    const state = Data.state(frame);
+    const tag = Tables.element("span", { class: `tag ${state === "right" ? "good" : state === "wrong" || state === "lost" ? "bad" : "plain"}` }, stateText[state]);
+    now.replaceChildren(tag, " ", Tables.element("span", {}, `Frame ${frame.index + 1} of ${frames.length}`), " ",
+      Tables.element("span", { class: "quiet" }, `${dirs.length > 1 ? `${dirs[frame.dir].label}/` : ""}${frame.record.file}: ${sentence(frame)}`));
+    slider.setAttribute("aria-valuetext", `${frame.index + 1} of ${frames.length}, ${stateText[state]}`);
+  }
+
+  function choose(index) {
+    const count = (frames[current].record.hypotheses || []).length;
+    chosen = count === 0 ? 0 : (index + count) % count;
+    const focused = document.activeElement && document.activeElement.closest("#hypotheses");
+    Tables.fillHypotheses(frames[current], chosen, choose);
+    if (focused) by("hypotheses").querySelectorAll("button")[chosen].focus();
+    Tables.fillEvidence(frames[current], loaded.trace, chosen);
+    Picture.choose(chosen);
+    Space.choose(chosen);
+  }
+
+  function showDir(frame) {
+    if (dir === frame.dir) return;
+    dir = frame.dir;
+    const own = dirs[dir];
+    by("path-dir").textContent = dirs.length > 1 ? `in ${own.label}` : "";
+    by("dir").value = `${dir}`;
+    Charts.show(frames.slice(own.first, own.first + own.count), go);
+  }
+
+  let asked = 0;
+  async function go(index) {
+    const frame = frames[Math.min(Math.max(index, 0), frames.length - 1)];
+    current = frame.index;
+    slider.value = `${current}`;
+    tell(frame);
+    showDir(frame);
+    Charts.mark(frame.inDir);
+    const mine = ++asked;
+    const next = await Data.load(current);
+    if (mine !== asked) return; /* another one was asked for meanwhile */
+    loaded = next;
+    chosen = frame.selected ? frame.record.head : 0;
+    Picture.show(frame, loaded, chosen);
+    Space.show(frame, loaded, chosen);
+    Tables.fillHypotheses(frame, chosen, choose);
+    Tables.fillEvidence(frame, loaded.trace, chosen);
+    Tables.fillNests(frame, loaded.trace);
+    by("record").textContent = JSON.stringify(frame.record);
+    document.documentElement.dataset.shown = `${current}`;
+    if (current + 1 < frames.length) Data.load(current + 1);
+  }
+
+  /* The next frame that is not right, in a direction; where nothing is scored, that has no head. */
+  function goWrong(step) {
+    const states = frames.some((f) => f.verdict) ? ["wrong", "lost"] : ["none", "lost"];
+    for (let i = current + step; i >= 0 && i < frames.length; i += step) {
+      if (states.includes(Data.state(frames[i]))) { go(i); return; }
+    }
+    const sought = states.includes("wrong") ? "not right" : "without a head";
+    now.append(Tables.element("span", { class: "quiet" }, ` (no ${step > 0 ? "later" : "earlier"} frame is ${sought})`));
+  }
+
+  async function play() {
+    playing = !playing;
+    by("play").setAttribute("aria-pressed", `${playing}`);
+    by("play").firstElementChild.textContent = playing ? "❚❚ Stop" : "▶︎ Play";
+    now.setAttribute("aria-live", playing ? "off" : "polite");
+    if (playing && current === frames.length - 1) await go(0);
+    while (playing && current < frames.length - 1) {
+      await Promise.all([go(current + 1), new Promise((resolve) => { setTimeout(resolve, PLAY_MS); })]);
+    }
+    if (playing) play();
+  }
+
+  const keys = {
+    ArrowLeft: () => go(current - 1), ArrowRight: () => go(current + 1),
+    n: () => goWrong(1), p: () => goWrong(-1), h: () => choose(chosen + 1),
+  };
+  /* Elsewhere these scroll the page. */
+  const sliderKeys = {
+    PageUp: () => go(current - 10), PageDown: () => go(current + 10), Home: () => go(0), End: () => go(frames.length - 1), " ": play,
+  };
+  document.addEventListener("keydown", (event) => {
+    if (event.ctrlKey || event.metaKey || event.altKey) return;
+    const at = event.target;
+    /* What the focused element does with a key itself; a list of choices goes to the one with that letter. */
+    if (at.matches("select")) return;
+    if (at.matches("input[type=checkbox], summary, button, .scroll, pre") && (event.key.length > 1 || event.key === " ")) return;
+    const name = event.key.length === 1 ? event.key.toLowerCase() : event.key;
+    const key = keys[name] || (at === slider ? sliderKeys[name] : undefined);
+    if (!key) return;
+    event.preventDefault();
+    key();
+  });
+
+  /* Right or not, below the slider. */
+  function fillStrip() {
+    const colours = { right: "var(--good)", wrong: "var(--bad)", lost: "var(--ink)", head: "var(--accent)", none: "var(--line)" };
+    const stops = frames.flatMap((f, i) => {
+      const c = colours[Data.state(f)];
+      return [`${c} ${(i / frames.length * 100).toFixed(3)}%`, `${c} ${((i + 1) / frames.length * 100).toFixed(3)}%`];
+    });
+    by("strip").style.background = `linear-gradient(90deg, ${stops.join(",")})`;
+    const count = (state) => frames.filter((f) => Data.state(f) === state).length;
+    by("strip-text").textContent = Object.keys(stateText).filter(count).map((s) => `${count(s)} frames ${stateText[s]}`).join(", ");
+  }
+
+  function fillSummary() {
+    const count = (n, one, many) => `${n} ${n === 1 ? one : many}`;
+    const scored = frames.filter((f) => f.verdict), right = scored.filter((f) => f.verdict.selected_right).length;
+    by("summary").textContent = `${count(frames.length, "frame", "frames")} of ${dirs.map((d) => d.path).join(", ")}` +
+      `${dirs.some((d) => d.paper) ? ", the paper’s method alone" : ""}` +
+      `${scored.length > 0 ? `: ${right} of ${scored.length} right.` : "."}`;
+    for (const e of document.querySelectorAll(".with-truth")) e.hidden = scored.length === 0;
+    if (scored.length === 0) {
+      for (const e of document.querySelectorAll(".not-right")) e.textContent = "without a head";
+      by("next-wrong").title = "Next frame without a head (N)";
+    }
+  }
+
+  function fillDirs() {
+    by("dir-choice").hidden = dirs.length < 2;
+    dirs.forEach((d, i) => { if (d.count) by("dir").append(Tables.element("option", { value: `${i}` }, d.label)); });
+    by("dir").addEventListener("change", (event) => go(dirs[Number(event.target.value)].first));
+  }
+
+  function theme() {
+    Charts.theme();
+    Space.theme();
+    Picture.draw();
+  }
+
+  if (!("DecompressionStream" in window)) {
+    by("summary").textContent = "This browser is too old for this page: it cannot unpack the frames. Firefox 113, Chrome 80, Safari 16.4 can.";
+    return;
+  }
+  Tables.fillTable1();
+  fillSummary();
+  by("main").hidden = frames.length === 0;
+  if (frames.length === 0) return;
+  slider.max = `${frames.length - 1}`;
+  slider.addEventListener("input", () => go(Number(slider.value)));
+  by("previous").addEventListener("click", () => go(current - 1));
+  by("next").addEventListener("click", () => go(current + 1));
+  by("next-wrong").addEventListener("click", () => goWrong(1));
+  by("play").addEventListener("click", play);
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", theme);
+  matchMedia("print").addEventListener("change", theme);
+  fillStrip();
+  fillDirs();
+  Space.theme();
+  const first = frames.findIndex((f) => f.selected);
+  go(first < 0 ? 0 : first);
+})();

@@ -1,0 +1,153 @@
+#include "sim_trace_cuts.h"
+
+#include <stdlib.h>
+
+/* An arc; its chord leads from the last point back to the first. */
+struct part {
+    int32_t vertex_count;
+    struct ih_vertex vertex[IH_PARTS_POINTS];
+};
+
+static bool is_same(const struct ih_ellipse *a, const struct ih_ellipse *b)
+{
+    return a->area_q16 == b->area_q16 && a->x_q16 == b->x_q16 && a->y_q16 == b->y_q16 &&
+           a->merit_q8 == b->merit_q8;
+}
+
+/* Where the search's sums have their origin; the place is a node: a whole number of steps. */
+struct origin {
+    int32_t x_q8, y_q8;
+};
+
+/* Has the stretch from..to, closed by its chord, the ellipse's area and centre? The area is the
+ * core's to the last bit, the centre within 1/256 step. */
+static bool has_moments(const struct ih_hypotheses_scratch *scratch, int32_t from, int32_t to,
+                        const struct origin *origin, const struct ih_ellipse *ellipse)
+{
+    const struct ih_parts *parts = &scratch->parts;
+    const struct ih_moments *after = &scratch->ellipse.prefix[to];
+    const struct ih_moments *before = &scratch->ellipse.prefix[from];
+    int64_t px = parts->x_q8[to] - origin->x_q8, py = parts->y_q8[to] - origin->y_q8;
+    int64_t qx = parts->x_q8[from] - origin->x_q8, qy = parts->y_q8[from] - origin->y_q8;
+    int64_t w = px * qy - qx * py;
+    int64_t area2_q16 = after->area2_q16 - before->area2_q16 + w;
+    if (area2_q16 / 2 != ellipse->area_q16 || area2_q16 <= 0) {
+        return false;
+    }
+    int64_t x_q8 = (after->x_q24 - before->x_q24 + w * (px + qx)) / (3 * area2_q16);
+    int64_t y_q8 = (after->y_q24 - before->y_q24 + w * (py + qy)) / (3 * area2_q16);
+    return llabs(x_q8 + origin->x_q8 - ellipse->x_q16 / 256) <= 1 &&
+           llabs(y_q8 + origin->y_q8 - ellipse->y_q16 / 256) <= 1;
+}
+
+static void copy_stretch(const struct ih_parts *parts, int32_t from, int32_t to, struct part *out)
+{
+    out->vertex_count = to - from + 1;
+    for (int32_t i = 0; i < out->vertex_count; i++) {
+        out->vertex[i].x_q9 = (int16_t)(2 * parts->x_q8[from + i]);
+        out->vertex[i].y_q9 = (int16_t)(2 * parts->y_q8[from + i]);
+    }
+}
+
+/* scratch->parts are the contour's. False: the slice's part is not of this contour. */
+static bool find_part(struct ih_hypotheses_scratch *scratch, const struct ih_nest *nest,
+                      const struct ih_slice *slice, const struct ih_ellipse_params *params,
+                      struct part *out)
+{
+    const struct ih_parts *parts = &scratch->parts;
+    struct ih_ellipse ellipse;
+    if (!ih_ellipse_of_part(parts, nest->minimum, params, &scratch->ellipse, &ellipse) ||
+        !is_same(&ellipse, &slice->ellipse)) {
+        return false;
+    }
+    struct origin origin = {nest->minimum.x_q9 / 2, nest->minimum.y_q9 / 2};
+    for (int32_t from = 0; from < IH_PARTS_POINTS; from++) {
+        for (int32_t to = from + 1; to < parts->count && to < from + IH_PARTS_POINTS; to++) {
+            if (has_moments(scratch, from, to, &origin, &ellipse)) {
+                copy_stretch(parts, from, to, out);
+                return true;
+            }
+        }
+    }
+    return false;
+}
+
+static void write_vertices(struct app_write *write, const struct ih_vertex *vertex, int32_t count)
+{
+    app_write_key(write, "x_y_q9");
+    app_write_open(write, '[');
+    for (int32_t i = 0; i < count; i++) {
+        app_write_open(write, '[');
+        app_write_int(write, vertex[i].x_q9);
+        app_write_int(write, vertex[i].y_q9);
+        app_write_close(write, ']');
+    }
+    app_write_close(write, ']');
+}
+
+/* The parts of the contour that support a nest at this level. */
+static void write_parts(struct app_write *write, struct isohead *head,
+                        const struct ih_contour *contour)
+{
+    struct ih_hypotheses_scratch *scratch = &head->scratch.hypotheses;
+    const struct ih_ellipse_params *params = &head->params.hypotheses.ellipse;
+    const struct ih_box box = ih_parts_box(&scratch->cuts, contour);
+    const bool is_searched = ih_parts_make(&scratch->cuts, contour, params, &scratch->parts);
+    struct part part;
+    app_write_key(write, "part");
+    app_write_open(write, '[');
+    for (int32_t i = 0; is_searched && i < head->hypotheses.nest_count; i++) {
+        const struct ih_nest *nest = &head->hypotheses.nest[i];
+        for (int32_t k = 0; k < nest->slice_count; k++) {
+            const struct ih_slice *slice = &nest->slice[k];
+            if (!slice->whole &&
+                nest->front_mm_q8 + slice->behind_mm_q8 == scratch->cuts.level_mm_q8 &&
+                ih_box_holds(&box, nest->minimum) &&
+                find_part(scratch, nest, slice, params, &part)) {
+                app_write_open(write, '{');
+                app_write_int_field(write, "nest", i);
+                app_write_int_field(write, "slice", k);
+                write_vertices(write, part.vertex, part.vertex_count);
+                app_write_close(write, '}');
+            }
+        }
+    }
+    app_write_close(write, ']');
+}
+
+static void write_contour(struct app_write *write, struct isohead *head,
+                          const struct ih_contour *contour)
+{
+    app_write_open(write, '{');
+    app_write_key(write, "closed");
+    app_write_bool(write, contour->closed);
+    write_vertices(write, &head->scratch.hypotheses.cuts.vertex[contour->first],
+                   contour->vertex_count);
+    write_parts(write, head, contour);
+    app_write_close(write, '}');
+}
+
+void sim_trace_cuts(struct app_write *write, struct isohead *head)
+{
+    struct ih_cuts *cuts = &head->scratch.hypotheses.cuts;
+    int32_t level_mm_q8 = 0;
+    app_write_key(write, "cuts");
+    app_write_open(write, '[');
+    for (int32_t index = 0;
+         head->surface.valid &&
+         ih_hypotheses_level(&head->surface, &head->params.hypotheses, index, &level_mm_q8);
+         index++) {
+        ih_cuts_level(&head->surface, level_mm_q8, cuts);
+        app_write_open(write, '{');
+        app_write_int_field(write, "level_mm_q8", cuts->level_mm_q8);
+        app_write_int_field(write, "contours_dropped", cuts->contours_dropped);
+        app_write_key(write, "contour");
+        app_write_open(write, '[');
+        for (int32_t i = 0; i < cuts->contour_count; i++) {
+            write_contour(write, head, &cuts->contour[i]);
+        }
+        app_write_close(write, ']');
+        app_write_close(write, '}');
+    }
+    app_write_close(write, ']');
+}
