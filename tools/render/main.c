@@ -5,6 +5,7 @@
 
 #include <stdio.h>
 #include <stdlib.h>
+#include <time.h>
 #include <unistd.h>
 
 #include "rd_ambient.h"
@@ -82,6 +83,23 @@ static bool render_frame(struct studio *studio, struct rd_output *output, int fr
     return rd_output_frame(output, frame, &note, &studio->rig, studio->sensor.max_value, studio->samples);
 }
 
+static double now_s(void)
+{
+    struct timespec now = {.tv_sec = 0};
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (double)now.tv_sec + (double)now.tv_nsec / 1e9;
+}
+
+/* The frame that is begun; the rate, and the time that is left at it, once they mean something. */
+static void tell_progress(const char *dir, int done, int count, double run_s)
+{
+    fprintf(stderr, "\r\033[Krender: %s %d/%d", dir, done + 1, count);
+    if (done > 0 && run_s >= 2) {
+        int left_s = (int)(run_s / done * (count - done)) + 1;
+        fprintf(stderr, ", %.1f frames/s, %d:%02d min left", done / run_s, left_s / 60, left_s % 60);
+    }
+}
+
 static bool render_all(struct studio *studio, const struct rd_options *options)
 {
     struct rd_output output;
@@ -89,10 +107,11 @@ static bool render_all(struct studio *studio, const struct rd_options *options)
     int first = options->first_frame, end = studio->stage.frame_count;
     if (options->shown_count > 0 && options->shown_count < end - first)
         end = first + options->shown_count;
+    double start_s = now_s();
     bool good = rd_output_open(&output, options->out_dir);
     for (int frame = first; good && frame < end; frame++) {
         if (talk)
-            fprintf(stderr, "\rrender: %s %d/%d", options->out_dir, frame + 1, end);
+            tell_progress(options->out_dir, frame - first, end - first, now_s() - start_s);
         good = render_frame(studio, &output, frame);
     }
     if (talk)

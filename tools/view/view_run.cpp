@@ -1,0 +1,115 @@
+#include "view_run.hpp"
+
+#include <algorithm>
+#include <filesystem>
+#include <limits>
+
+#include "view_control.hpp"
+#include "view_error.hpp"
+#include "view_output.hpp"
+#include "view_sheet.hpp"
+#include "view_traces.hpp"
+
+namespace view
+{
+static constexpr size_t sheet_count = 9;
+/* A film of a single frame, or of frames without times. */
+static constexpr double usual_frames_per_s = 10, most_frames_per_s = 60;
+
+static size_t count_wanted(const Options &options, Format format)
+{
+    if (options.count > 0)
+        return static_cast<size_t>(options.count);
+    if (options.verb == Verb::sheet)
+        return sheet_count;
+    return format == Format::png ? 1 : std::numeric_limits<size_t>::max();
+}
+
+static Shown show(const std::string &trace_path, const std::string &dir, const Rig &rig)
+{
+    Trace trace = trace_read(trace_path);
+    return {trace, control_image(dir + "/" + trace.file, rig)};
+}
+
+/* From the middle one of the gaps between frames. */
+static double frames_per_s(const std::vector<int64_t> &times_us)
+{
+    std::vector<int64_t> gaps_us;
+    for (size_t i = 1; i < times_us.size(); i++)
+        gaps_us.push_back(times_us[i] - times_us[i - 1]);
+    if (gaps_us.empty())
+        return usual_frames_per_s;
+    std::nth_element(gaps_us.begin(), gaps_us.begin() + static_cast<std::ptrdiff_t>(gaps_us.size() / 2), gaps_us.end());
+    int64_t gap_us = gaps_us[gaps_us.size() / 2];
+    return gap_us > 0 ? std::min(1e6 / static_cast<double>(gap_us), most_frames_per_s) : usual_frames_per_s;
+}
+
+static Plot shader_plot(Verb verb, const Rig &rig)
+{
+    switch (verb) {
+    case Verb::contours:
+        return contours_plot(rig);
+    case Verb::pair:
+        return pair_plot(rig);
+    default:
+        return sheet_plot(rig);
+    }
+}
+
+static void draw_one(Verb verb, Output &output, const Shader &shader, const Shown &frame, const Rig &rig)
+{
+    switch (verb) {
+    case Verb::control:
+        output.page(control_page(rig), [&](Canvas &canvas) { control_draw(canvas, frame.image, frame.trace, rig); });
+        break;
+    case Verb::contours:
+        output.page(contours_page(rig), [&](Canvas &canvas) { contours_draw(canvas, shader, frame.trace, rig); });
+        break;
+    default:
+        output.page(pair_page(rig), [&](Canvas &canvas) { pair_draw(canvas, shader, frame, rig); });
+    }
+}
+
+static void draw_sheet(Output &output, const Shader &shader, const std::vector<std::string> &paths,
+                       const Options &options, const Rig &rig)
+{
+    std::vector<Shown> frames;
+    for (const std::string &path : paths)
+        frames.push_back(show(path, options.dir, rig));
+    output.page(sheet_page(frames.size(), rig), [&](Canvas &canvas) { sheet_draw(canvas, shader, frames, rig); });
+}
+
+static void check(const Options &options, Format format)
+{
+    std::error_code failed;
+    if (!std::filesystem::is_directory(options.dir, failed))
+        throw Error(options.dir + ": is no frames directory");
+    if (options.verb == Verb::sheet && format == Format::mp4)
+        throw Error(options.out + ": a sheet is one picture: write a PNG or a PDF, or a film of pair");
+    if (options.verb != Verb::sheet && format == Format::png && options.count > 1)
+        throw Error(options.out +
+                    text(": a PNG holds one picture, not %ld: write a PDF or an MP4, or a sheet", options.count));
+}
+
+bool view_run(const Options &options)
+{
+    Format format = format_of(options.out);
+    check(options, format);
+    Rig rig = rig_read(options.rig.empty() ? options.dir + "/rig.json" : options.rig);
+    Traces traces(options);
+    std::vector<std::string> paths = traces.chosen(options.from, count_wanted(options, format));
+    std::vector<int64_t> times_us;
+    for (size_t i = 0; format == Format::mp4 && i < paths.size(); i++)
+        times_us.push_back(trace_read(paths[i]).time_us);
+    std::unique_ptr<Output> output = output_open(options.out, frames_per_s(times_us));
+    Shader shader(rig, shader_plot(options.verb, rig));
+    if (options.verb == Verb::sheet) {
+        draw_sheet(*output, shader, paths, options, rig);
+    } else {
+        for (const std::string &path : paths)
+            draw_one(options.verb, *output, shader, show(path, options.dir, rig), rig);
+    }
+    output->finish();
+    return !traces.incomplete();
+}
+} // namespace view

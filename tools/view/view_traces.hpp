@@ -1,0 +1,41 @@
+/* view_traces - which trace files there are to draw: those that host_sim --trace wrote, or those that it writes now,
+ * into a temporary folder that goes with the object.
+ */
+#ifndef VIEW_TRACES_HPP
+#define VIEW_TRACES_HPP
+
+#include <string>
+#include <vector>
+
+#include "view_options.hpp"
+
+namespace view
+{
+class Traces
+{
+  public:
+    explicit Traces(const Options &options);
+    ~Traces();
+    Traces(const Traces &) = delete;
+    Traces &operator=(const Traces &) = delete;
+
+    /* Those from options.from on, `most` at most, in the order of their names. */
+    std::vector<std::string> chosen(const std::string &from, size_t most) const;
+    /* host_sim could not use all frames; it has told which. */
+    bool incomplete() const
+    {
+        return incomplete_;
+    }
+
+  private:
+    void run_host_sim(const Options &options);
+    void remove_temporary();
+    void list(const std::string &path, const std::string &dir);
+    std::string temporary_;
+    std::string from_where_;
+    std::vector<std::string> paths_;
+    bool incomplete_ = false;
+};
+} // namespace view
+
+#endif
