@@ -1,0 +1,64 @@
+"""Records as a table: CSV as RFC 4180 has it, a row per hypothesis.
+
+A frame without hypotheses has one row, in which the hypothesis's fields are empty; so has a frame that
+could not be read. What is null or not there is empty. Numbers are printed as the record has them.
+"""
+
+import csv
+
+COLUMNS = (
+    "dir", "file", "time_us", "dots", "labelled", "points", "error", "hypothesis", "pixel_u_px", "pixel_v_px",
+    "axis_a_px", "axis_b_px", "angle_deg", "distance_mm", "centre_x_mm", "centre_y_mm", "centre_z_mm",
+    "rejected", "score", "track", "sigma_mm", "predicted", "head_rank", "selected", "dropped", "lost",
+    "skipped", "strobe", "across_px", "rig",
+)
+
+
+def text(value):
+    if value is None:
+        return ""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return str(value)
+
+
+def frame_fields(record):
+    fields = {key: record.data.get(key) for key in
+              ("dir", "file", "time_us", "dots", "labelled", "points", "error", "lost", "skipped", "strobe",
+               "across_px", "rig")}
+    dropped = record.data.get("dropped", {})
+    fields["dropped"] = " ".join("%s=%s" % (kind, count) for kind, count in dropped.items())
+    return fields
+
+
+def hypothesis_fields(record, index):
+    h = record.hypotheses[index]
+    fields = {key: h.get(key) for key in ("angle_deg", "distance_mm", "rejected", "score", "track", "sigma_mm")}
+    fields["hypothesis"] = index
+    fields["pixel_u_px"], fields["pixel_v_px"] = h["pixel"]
+    fields["axis_a_px"], fields["axis_b_px"] = h["axes_px"]
+    fields["centre_x_mm"], fields["centre_y_mm"], fields["centre_z_mm"] = h["centre_mm"]
+    fields["predicted"] = h.get("predicted", False)
+    fields["head_rank"] = record.heads.index(index) if index in record.heads else None
+    fields["selected"] = index == record.head
+    return fields
+
+
+def rows(record):
+    frame = frame_fields(record)
+    if record.error is not None or not record.hypotheses:
+        return [frame]
+    return [{**frame, **hypothesis_fields(record, index)} for index in range(len(record.hypotheses))]
+
+
+def write(records, file):
+    """file: text, opened with newline="". Returns the numbers of records and of rows."""
+    writer = csv.writer(file)
+    writer.writerow(COLUMNS)
+    record_count = row_count = 0
+    for record in records:
+        record_count += 1
+        for row in rows(record):
+            writer.writerow([text(row.get(column)) for column in COLUMNS])
+            row_count += 1
+    return record_count, row_count
