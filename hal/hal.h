@@ -125,6 +125,19 @@ struct hal_output {
     enum hal_sent (*send)(void *context, const char *bytes, size_t count, struct hal_error *error);
 };
 
+enum hal_look {
+    HAL_LOOK_NONE = 0,   /* nobody waits for a frame */
+    HAL_LOOK_WANTED = 1, /* *room is to be filled, then show() called */
+    HAL_LOOK_GONE = -1   /* told once: nobody ever will; *error */
+};
+
+/* Whoever wants to see what is going on; never waits. */
+struct hal_viewer {
+    void *context;
+    enum hal_look (*ask)(void *context, void **room, struct hal_error *error);
+    void (*show)(void *context);
+};
+
 /* Takes what went wrong beside the frames themselves. subject: a file or device. */
 struct hal_log {
     void *context;

@@ -2,6 +2,7 @@
 
 #include <time.h>
 
+#include "app_live.h"
 #include "app_rig.h"
 
 #define PROGRAM "isohead_board"
@@ -105,6 +106,26 @@ static bool open_output(struct app_board *board, const struct app_config *config
     return hal_output_stdout(&board->output, error);
 }
 
+/* Before the laser's line is taken. */
+static bool open_viewer(struct app_board *board, const struct app_config *config,
+                        struct hal_error *error)
+{
+    const struct hal_v4l2_config *camera = &board->v4l2.config;
+    const struct hal_viewer_config viewer = {
+        .host = config->view_host,
+        .port = config->view_port,
+        .content_size = app_live_size(camera->width, camera->height),
+    };
+    if (!hal_viewer_open(&board->viewer, &viewer, error)) {
+        return false;
+    }
+    app_log_say(&board->log, APP_LOG_INFO, "live view: %s%s", board->viewer.url,
+                board->viewer.is_local
+                    ? ""
+                    : " (without encryption: whoever can read along on the network sees it too)");
+    return true;
+}
+
 static enum app_exit run_loop(struct app_board *board, const struct app_config *config)
 {
     const struct hal_events_config events = {
@@ -123,6 +144,7 @@ static enum app_exit run_loop(struct app_board *board, const struct app_config *
         .clock = &hal_clock,
         .watchdog = &board->watchdog.watchdog,
         .output = &board->output.output,
+        .viewer = config->view_port[0] != 0 ? &board->viewer.viewer : NULL,
     };
     return app_loop_run(&board->loop);
 }
@@ -146,6 +168,20 @@ static enum app_exit run_with_output(struct app_board *board, const struct app_c
     return exit;
 }
 
+static enum app_exit run_with_view(struct app_board *board, const struct app_config *config)
+{
+    struct hal_error error;
+    if (config->view_port[0] == 0) {
+        return run_with_output(board, config);
+    }
+    if (!open_viewer(board, config, &error)) {
+        return fail(board, "view", &error, APP_EXIT_FAILED);
+    }
+    enum app_exit exit = run_with_output(board, config);
+    hal_viewer_close(&board->viewer);
+    return exit;
+}
+
 enum app_exit app_board_run(struct app_board *board, const struct app_config *config)
 {
     struct hal_error error;
@@ -157,7 +193,7 @@ enum app_exit app_board_run(struct app_board *board, const struct app_config *co
     } else if (!open_output(board, config, &error)) {
         exit = fail(board, "output", &error, APP_EXIT_FAILED);
     } else {
-        exit = run_with_output(board, config);
+        exit = run_with_view(board, config);
         hal_output_close(&board->output);
     }
     hal_log_close(&board->writer);

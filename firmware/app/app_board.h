@@ -2,7 +2,8 @@
  *
  * What is opened stands in one struct of the caller's and is closed before app_board_run returns,
  * the laser first. The strobe is opened before the camera: the guard process that it starts then
- * has nothing of the camera's.
+ * has nothing of the camera's. The live view's process is started before both, and before signals have
+ * handlers: it has nothing of either.
  */
 #ifndef APP_BOARD_H
 #define APP_BOARD_H
@@ -19,6 +20,7 @@
 #include "linux/hal_output.h"
 #include "linux/hal_signals.h"
 #include "linux/hal_v4l2.h"
+#include "linux/hal_viewer.h"
 #include "linux/hal_watchdog.h"
 
 /* How long --laser-off waits for a line that a dying program's guard still holds. */
@@ -35,6 +37,7 @@ struct app_board {
     struct hal_event_source events;
     struct hal_watchdog_feeder watchdog;
     struct hal_output_state output;
+    struct hal_viewer_process viewer;
     struct isohead head;
     struct app_loop loop;
 };

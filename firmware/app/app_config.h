@@ -87,10 +87,13 @@ struct app_config {
     int32_t status_s;     /* 0: none, .. 86400; default 10 */
     const char *watchdog; /* device; NULL: none */
     bool paper;
+    char view_host[APP_CONFIG_VALUE_MAX + 1]; /* a numeric address; default 127.0.0.1 */
+    char view_port[sizeof "65535"]; /* decimal, 1 .. 65535; empty (default): no live view */
 
     /* Of the command line only. */
     const char *path; /* of the file; NULL: none */
     bool laser_off;   /* only make the laser's line low and end */
+    bool check;       /* say whether the rig still fits and end */
     bool help, version;
 
     char text[APP_CONFIG_TEXT_MAX + 1]; /* of the file */

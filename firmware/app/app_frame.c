@@ -1,5 +1,7 @@
 #include "app_frame.h"
 
+#include "app_health.h"
+#include "app_live.h"
 #include "app_view.h"
 
 static int64_t now(const struct app_loop *loop)
@@ -20,6 +22,9 @@ static void put_record(struct app_loop *loop, bool is_complete, const char *name
 {
     const struct hal_output *output = loop->hal.output;
     struct hal_error error;
+    if (loop->config->check) {
+        return;
+    }
     if (!is_complete) {
         app_log_say(loop->log, APP_LOG_ERROR, "%s: its record is too long", name);
         loop->status.unsent_count++;
@@ -104,6 +109,29 @@ static void steer(struct app_loop *loop, const struct hal_frame *frame)
     }
 }
 
+/* For whoever waits for a frame in the live view. */
+static void show(struct app_loop *loop, const struct hal_frame *frame)
+{
+    const struct hal_viewer *viewer = loop->hal.viewer;
+    struct hal_error error;
+    void *room = NULL;
+    loop->result_count++;
+    if (viewer == NULL) {
+        return;
+    }
+    switch (viewer->ask(viewer->context, &room, &error)) {
+    case HAL_LOOK_WANTED:
+        app_live_put(room, frame, loop->head, &loop->record, loop->result_count);
+        viewer->show(viewer->context);
+        break;
+    case HAL_LOOK_GONE:
+        app_log_say(loop->log, APP_LOG_WARNING, "view: %s", error.text);
+        break;
+    case HAL_LOOK_NONE:
+        break;
+    }
+}
+
 /* A lit frame whose labels are there: the rest of it. began_us: when it was taken from the camera. */
 static void use_lit(struct app_loop *loop, const struct hal_frame *frame, int64_t began_us)
 {
@@ -120,9 +148,11 @@ static void use_lit(struct app_loop *loop, const struct hal_frame *frame, int64_
         }
     }
     isohead_find(head, frame->time_us);
+    app_health_frame(loop);
     app_status_frame(&loop->status, head->dots.dot_count, head->result.head_count,
                      now(loop) - began_us);
     put_record(loop, app_record_frame(&loop->record, frame, head, &loop->live), frame->name);
+    show(loop, frame);
     loop->live = (struct app_record_live){.lost_count = 0};
     steer(loop, frame);
 }

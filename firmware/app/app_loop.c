@@ -3,6 +3,7 @@
 #include <inttypes.h>
 
 #include "app_frame.h"
+#include "app_health.h"
 #include "app_rig.h"
 #include "app_rig_explain.h"
 
@@ -63,8 +64,10 @@ static bool load_rig(struct app_loop *loop, struct hal_error *error)
     loop->head->params.is_paper = loop->config->paper;
     if (err != IH_OK) {
         app_rig_explain(&calibration, err, bad_slot, error);
+        return false;
     }
-    return err == IH_OK;
+    app_health_begin(loop);
+    return true;
 }
 
 /* The camera was opened for the size of the first rig. */
@@ -215,6 +218,7 @@ static void reset(struct app_loop *loop)
     loop->has_ambient = false;
     loop->steers = false;
     loop->live = (struct app_record_live){.lost_count = 0};
+    loop->result_count = 0;
     loop->record.dir = NULL;
     loop->is_over = false;
     loop->exit = APP_EXIT_GOOD;

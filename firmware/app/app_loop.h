@@ -35,6 +35,7 @@
 #include "app_status.h"
 #include "hal.h"
 #include "ih_exposure.h"
+#include "ih_health.h"
 #include "isohead.h"
 
 /* After so many frame times without a frame, but not sooner than this, the camera is opened anew. */
@@ -67,6 +68,7 @@ struct app_hal {
     const struct hal_clock *clock;
     const struct hal_watchdog *watchdog;
     const struct hal_output *output;
+    const struct hal_viewer *viewer; /* NULL: none */
 };
 
 struct app_loop {
@@ -93,6 +95,12 @@ struct app_loop {
     struct ih_exposure exposure;
     bool steers;                 /* the exposure */
     struct app_record_live live; /* since the last record */
+    int64_t result_count;        /* frames with a result */
+    struct ih_health health;     /* app_health.h */
+    struct ih_health_scratch health_scratch;
+    enum ih_health_state told_health; /* in the log */
+    int32_t told_turn_rad_q30[3];
+    int32_t checked_count; /* frames, with config->check */
 
     bool rig_is_valid;
     int32_t width, height; /* of the first rig */

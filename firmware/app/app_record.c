@@ -135,6 +135,14 @@ static void write_live(struct app_write *write, const struct app_record_live *li
         app_write_key(write, "strobe");
         app_write_string(write, live->strobe);
     }
+    if (live->across_px_q12 != 0) {
+        app_write_key(write, "across_px");
+        app_write_decimal(write, app_text_fixed(live->across_px_q12, 12, PIXEL_DECIMALS));
+    }
+    if (live->rig != NULL) {
+        app_write_key(write, "rig");
+        app_write_string(write, live->rig);
+    }
 }
 
 bool app_record_frame(struct app_record *record, const struct hal_frame *frame,

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #define BAUD_DEFAULT 115200
+#define VIEW_LOCAL "127.0.0.1"
 /* Longest part of a wrong value that is told. */
 #define QUOTE_MAX 60
 /* A name with more wrong letters than this, or with no right one, is not meant. */
@@ -130,7 +131,8 @@ static bool take_flag(const struct app_setting *setting, struct app_config *conf
 }
 
 /* HOST:PORT, [ADDRESS]:PORT. */
-static bool take_udp(struct app_config *config, const char *value)
+static bool take_host_port(const char *value, char host[APP_CONFIG_VALUE_MAX + 1],
+                           char port_text[sizeof "65535"])
 {
     const char *colon = strrchr(value, ':');
     int64_t port = 0;
@@ -148,11 +150,32 @@ static bool take_udp(struct app_config *config, const char *value)
     if (length == 0 || strcspn(value, forbidden) < length) {
         return false;
     }
-    memcpy(config->output_host, value, length);
-    config->output_host[length] = 0;
-    snprintf(config->output_port, sizeof config->output_port, "%d", (int)port);
+    memcpy(host, value, length);
+    host[length] = 0;
+    snprintf(port_text, sizeof "65535", "%d", (int)port);
+    return true;
+}
+
+static bool take_udp(struct app_config *config, const char *value)
+{
+    if (!take_host_port(value, config->output_host, config->output_port)) {
+        return false;
+    }
     config->output = APP_OUTPUT_UDP;
     return true;
+}
+
+/* ADDRESS:PORT; PORT alone is for this machine only. */
+static bool take_view(const struct app_setting *setting, struct app_config *config,
+                      const char *value)
+{
+    char local[sizeof VIEW_LOCAL ":65535"];
+    (void)setting;
+    if (value[strspn(value, "0123456789")] != 0 || strlen(value) >= sizeof "65535") {
+        return take_host_port(value, config->view_host, config->view_port);
+    }
+    snprintf(local, sizeof local, VIEW_LOCAL ":%s", value);
+    return take_host_port(local, config->view_host, config->view_port);
 }
 
 /* PATH, PATH:BAUD; a path may have colons, and what follows its last one is no number. */
@@ -267,12 +290,21 @@ const struct app_setting app_settings[] = {
      .take = take_text, .offset = AT(watchdog)},
     {"paper", NULL, ON_OR_OFF, "the paper's method alone: every frame on its own",
      .take = take_flag, .offset = AT(paper)},
+    {"view", "[ADDRESS:]PORT", "a port from 1 to 65535, or ADDRESS:PORT with a numeric address",
+     "a live view for browsers at this port, of this machine alone unless an address is given; its "
+     "URL "
+     "is in the messages; default: none",
+     .take = take_view},
 
     {"config", "FILE", "a file", "read settings from here too; these options win",
      .take = take_text, .offset = AT(path), .place = APP_SETTINGS_OPTION,
      .heading = "On the command line only"},
     {"laser-off", NULL, NULL, "make the laser's line inactive, give it back, and end",
      .take = take_flag, .offset = AT(laser_off), .place = APP_SETTINGS_COMMAND},
+    {"check", NULL, NULL,
+     "say after 60 frames whether the rig still fits, and end: with 0 if it does, else 1; no "
+     "records",
+     .take = take_flag, .offset = AT(check), .place = APP_SETTINGS_COMMAND},
     {"help", NULL, NULL, "this text", .take = take_flag, .offset = AT(help),
      .place = APP_SETTINGS_COMMAND},
     {"version", NULL, NULL, "the version", .take = take_flag, .offset = AT(version),

@@ -1,35 +1,14 @@
 #include "linux/hal_guard_child.h"
 
-#include <dirent.h>
 #include <errno.h>
 #include <poll.h>
 #include <signal.h>
-#include <stdlib.h>
 #include <sys/prctl.h>
 #include <sys/socket.h>
 #include <time.h>
 #include <unistd.h>
 
-/* All but these. The kernel lists what is open; a limit to count up to could be a thousand million. */
-static bool close_others(const int *keep_fds, int keep_count)
-{
-    DIR *list = opendir("/proc/self/fd");
-    if (list == NULL) {
-        return false;
-    }
-    for (const struct dirent *entry = readdir(list); entry != NULL; entry = readdir(list)) {
-        int fd = (int)strtol(entry->d_name, NULL, 10);
-        bool keep = entry->d_name[0] == '.' || fd == dirfd(list);
-        for (int i = 0; i < keep_count; i++) {
-            keep = keep || fd == keep_fds[i];
-        }
-        if (!keep) {
-            close(fd);
-        }
-    }
-    closedir(list);
-    return true;
-}
+#include "linux/hal_descriptors.h"
 
 /* Everything stays blocked but the signals of own faults: blocked, they would kill without the
  * handler that switches off. */
@@ -124,7 +103,7 @@ _Noreturn void hal_guard_child(const struct hal_guard_config *config, int socket
     prctl(PR_SET_NAME, "isohead-guard");
     const int *interlock_fd = config->interlock_fd;
     const int keep_fds[] = {socket_fd, *config->line_fd, interlock_fd == NULL ? -1 : *interlock_fd};
-    if (setsid() < 0 || !close_others(keep_fds, 3) ||
+    if (setsid() < 0 || !hal_descriptors_keep(keep_fds, 3) ||
         send(socket_fd, &ready, 1, MSG_NOSIGNAL) != 1) {
         _exit(GUARD_EXIT_SETUP);
     }

@@ -25,6 +25,8 @@ import struct
 import subprocess
 import time
 
+from frames import as_of_host
+
 PORTS = ["frames", "records", "log", "control"]
 # Longest time from power-on to the first process's "ready": ten times what it takes when idle.
 BOOT_S = 60
@@ -32,8 +34,9 @@ MEMORY_MB = 256
 # Longest time that QEMU or the board's shell may take for an answer.
 ANSWER_S = 30
 GPIO_TYPE = "child<pl061>"
-# What QEMU calls this machine and the board on their network.
-HOST, GUEST = "10.0.2.2", "10.0.2.15"
+# What QEMU calls this machine and the board on their network, and the board's port that this machine
+# reaches, at board.view_port.
+HOST, GUEST, VIEW_PORT = "10.0.2.2", "10.0.2.15", 8080
 
 Edge = collections.namedtuple("Edge", "time_s line level")
 
@@ -56,6 +59,8 @@ class Board:
         self.selector = selectors.DefaultSelector()
         self.sockets = {}
         self.qemu = None
+        with socket.create_server(("127.0.0.1", 0)) as free:
+            self.view_port = free.getsockname()[1]
         try:
             self._start(kernel, initramfs, memory_mb)
             self._find_gpio()
@@ -107,7 +112,8 @@ class Board:
         arguments += ["-qtest", "chardev:qtest", "-qtest-log", "none",
                       "-mon", "chardev=qmp,mode=control",
                       "-device", "pci-serial,chardev=serial",
-                      "-netdev", "user,id=net", "-device", "virtio-net-device,netdev=net"]
+                      "-netdev", f"user,id=net,hostfwd=tcp:127.0.0.1:{self.view_port}-{GUEST}:{VIEW_PORT}",
+                     "-device", "virtio-net-device,netdev=net"]
         self.qemu = subprocess.Popen(arguments, stdin=subprocess.DEVNULL, stderr=subprocess.PIPE,
                                      pass_fds=[sock.fileno() for sock in theirs], text=True)
         for sock in theirs:
@@ -214,7 +220,7 @@ class Board:
             self.rises[number] += level
             self.edges.append(Edge(time.monotonic(), number, level))
         elif name == "records":
-            self.records.append(line)
+            self.records.append(as_of_host(line))
         elif name == "log":
             self.log.append(line)
         elif name != "qmp" or '"event"' not in line:

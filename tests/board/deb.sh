@@ -66,7 +66,10 @@ check_package() {
     rm -rf "$work/tree"
     dpkg-deb --raw-extract "$deb" "$work/tree"
     check_program "$1" "$work/tree/usr/bin/isohead_board"
-    for library in libc6 libv4l-0 libgpiod libcjson; do
+    check_program "$1" "$work/tree/usr/lib/isohead/isohead_live"
+    # Whoever holds the laser loads nothing of the network.
+    ! readelf --dynamic "$work/tree/usr/bin/isohead_board" | grep -q microhttpd || fail "$1: loads libmicrohttpd"
+    for library in libc6 libv4l-0 libgpiod libcjson libmicrohttpd; do
         dpkg-deb --field "$deb" Depends | grep -q "$library" || fail "$deb does not depend on $library"
     done
     # Nothing is overridden: warnings fail too.
@@ -155,7 +158,7 @@ check_install() {
     ! inside dpkg-query --status libv4l-0 >/dev/null 2>&1 || fail "the root has libv4l-0 already"
     snapshot >"$work/before"
     quietly apt-get install --yes /root/isohead.deb
-    for package in isohead libv4l-0 libgpiod2 libcjson1 adduser; do
+    for package in isohead libv4l-0 libgpiod2 libcjson1 libmicrohttpd12 adduser; do
         inside dpkg-query --status $package | grep -qx 'Status: install ok installed' ||
             fail "$package is not installed"
     done

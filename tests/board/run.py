@@ -22,6 +22,8 @@ SOON_S = 20
 GATED_COUNT, ALTERNATING_COUNT, SMALL_COUNT = 200, 40, 12
 # The program on the board, by the version of libgpiod that is in it.
 NAMES = {1: "/bin/isohead_board", 2: "/bin/isohead_board_gpiod2"}
+# The live view's, where it is on the board, and from the program's folder where that was built.
+LIVE, LIVE_BUILT = "/lib/isohead/isohead_live", "../lib/isohead/isohead_live"
 # What a live camera adds to a record.
 LIVE_FIELDS = ["lost", "skipped", "strobe"]
 
@@ -63,7 +65,8 @@ class Run:
             host_records(self, frames)
         self.image = os.path.join(self.work, "initramfs")
         initramfs.build(self.image, os.path.join(self.work, "root"),
-                        {NAMES[1][1:]: arguments.program, NAMES[2][1:]: arguments.program2},
+                        {NAMES[1][1:]: arguments.program, NAMES[2][1:]: arguments.program2,
+                         LIVE[1:]: os.path.join(os.path.dirname(arguments.program), LIVE_BUILT)},
                         arguments.sysroot, [self._tool("feeder"), self._tool("control")],
                         {f"rig/{frames.rig}.json": os.path.join(frames.directory, "rig.json")
                          for frames in [self.gated, self.alternating, self.small]})

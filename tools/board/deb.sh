@@ -20,6 +20,7 @@ armhf) arch=$1 strip=arm-linux-gnueabihf-strip ;;
     ;;
 esac
 program=build/board-$arch/firmware/app/isohead_board
+live=build/board-$arch/firmware/lib/isohead/isohead_live
 sysroot=$root/build/sysroot/$arch
 [ -x "$program" ] || { echo "deb: no $program: run make board ARCH=$arch" >&2; exit 1; }
 version=$(sed -n 's/^project(isohead VERSION \([0-9.]*\) .*/\1/p' CMakeLists.txt)
@@ -41,15 +42,16 @@ pack() {
     gzip -9n <"$1" >"$package$2"
 }
 put 755 "$program" /usr/bin/isohead_board
+put 755 "$live" /usr/lib/isohead/isohead_live
 "$strip" --strip-unneeded --remove-section=.comment --remove-section=.note \
-    "$package/usr/bin/isohead_board"
+    "$package/usr/bin/isohead_board" "$package/usr/lib/isohead/isohead_live"
 put 644 packaging/isohead.service /lib/systemd/system/isohead.service
 put 644 packaging/60-isohead.rules /lib/udev/rules.d/60-isohead.rules
 put 644 firmware/app/isohead.conf /etc/isohead/isohead.conf
 pack packaging/isohead_board.1 /usr/share/man/man1/isohead_board.1.gz
 pack packaging/isohead.conf.5 /usr/share/man/man5/isohead.conf.5.gz
 # Who has only the package shall be able to read what the settings tell him to.
-for text in safety hardware contract; do
+for text in safety hardware contract live; do
     put 644 "docs/$text.md" "/usr/share/doc/isohead/$text.md"
 done
 
@@ -77,7 +79,7 @@ for dir in "$sysroot"/usr/lib/*-linux-* "$sysroot"/lib/*-linux-*; do
     set -- "$@" "-l$dir"
 done
 depends=$(cd "$stage" && DEB_HOST_ARCH=$arch dpkg-shlibdeps --admindir="$sysroot/var/lib/dpkg" "$@" \
-    -O -Sisohead isohead/usr/bin/isohead_board 2>shlibdeps.log | sed -n 's/^shlibs:Depends=//p')
+    -O -Sisohead isohead/usr/bin/isohead_board isohead/usr/lib/isohead/isohead_live 2>shlibdeps.log | sed -n 's/^shlibs:Depends=//p')
 [ -n "$depends" ] || { cat "$stage/shlibdeps.log" >&2; exit 1; }
 
 # As Debian counts: KiB of each file, rounded up, and one per folder.

@@ -17,7 +17,8 @@ arm64 | armhf) arch=$1 ;;
     ;;
 esac
 packages="libv4l-dev libv4l-0 libv4lconvert0 libjpeg62-turbo libgpiod-dev libgpiod2 libcjson-dev
-    libcjson1 libc6"
+    libcjson1 libc6 libmicrohttpd-dev libmicrohttpd12 libgnutls30 libnettle8 libhogweed6 libgmp10
+    libidn2-0 libunistring2 libtasn1-6 libp11-kit0 libffi8"
 
 sysroot=build/sysroot/$arch
 [ "$(cat "$sysroot/packages" 2>/dev/null)" != "$packages" ] || exit 0
