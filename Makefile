@@ -17,8 +17,11 @@ GOLDEN_ALL := gcc-O0 gcc-O3 clang-O0 clang-O3 arm64-O0 arm64-O3 armhf-O2 riscv64
 # How many mistakes make mutation makes, and how many per cent of them tests must catch.
 MUTANTS ?= 500
 CAUGHT_MIN ?= 85
-# The frame of frames/sequence2 that docs/picture.png shows.
-PICTURE ?= 000020
+# What make view builds.
+VIEW := $(BUILD)/view/tools/view/view
+
+# The frames directory that make export takes.
+FRAMES ?= frames/sequence2
 # Frames of make longrun; make test takes a few hundred.
 LONGRUN_FRAMES ?= 100000
 # What the board's program is built for: arm64, armhf or host.
@@ -26,12 +29,18 @@ ARCH ?= arm64
 
 .DEFAULT_GOAL := help
 .PHONY: help sim frames sanitize test fuzz coverage ranges exhaustive mutation accept eval bench \
-  bench-instructions bench-grow bench-worst test-bench bits cortexm longrun size vectors learn picture \
-  board board-gpiod2 deb image flash calibrate test-calibration test-deb test-board test-image format \
-  formatted lint clean
+  bench-instructions bench-grow bench-worst test-bench bits cortexm longrun size vectors learn view figures \
+  test-view test-report export board board-gpiod2 deb image flash calibrate test-calibration \
+  test-calibration-short test-deb test-board test-image format formatted lint clean
 
 help: ## this list
-	@awk -F ':.*## ' '/^[a-z_-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z_-]+:.*## / { \
+	  count = split($$2, word, " "); line = sprintf("  make %-22s", $$1); \
+	  for (i = 1; i <= count; i++) { \
+	    if (length(line " " word[i]) > 80) { print line; line = sprintf("%29s", "") } \
+	    line = line " " word[i] \
+	  } \
+	  print line }' $(MAKEFILE_LIST)
 
 sim: ## build host_sim, and render frames/ if they are not there
 	@tools/setup.sh sim
@@ -57,6 +66,11 @@ sanitize: sim
 test: sanitize ## every test: units against float64, sanitizers, bad input, rules of the core, same bits
 	@cmake --build --preset sanitize --parallel
 	@ctest --test-dir $(BUILD)/sanitize --output-on-failure --parallel 2
+
+test-report: sim ## the report page in a browser; pictures of it in build/test_report
+	@tools/setup.sh test-report
+	@/usr/bin/python3 -B tests/report/report.py --host-sim $(BUILD)/host/sim/host_sim --frames frames \
+	  --keep $(BUILD)/test_report
 
 coverage: sim ## the core's lines and branches that its own tests run, against the limits
 	@tools/setup.sh coverage
@@ -144,11 +158,26 @@ learn: sim ## learn the score's curves anew from rendered scenes; half an hour
 	@/usr/bin/python3 tools/learn/learn.py --render $(BUILD)/host/tools/render/render \
 	  --host-sim $(BUILD)/host/sim/host_sim --work $(BUILD)/learn
 
-picture: sim ## draw docs/picture.png anew
-	@tools/setup.sh picture
-	@./host_sim --json --trace $(BUILD)/trace frames/sequence2 > /dev/null
-	@/usr/bin/python3 tools/picture.py frames/sequence2 $(BUILD)/trace/sequence2/$(PICTURE).json \
-	  docs/picture.png
+view: sim ## build tools/view, pictures of frames and what was found in them: build/view/tools/view/view
+	@tools/setup.sh view
+	@cmake --preset view > $(BUILD)/view.log 2>&1 || { cat $(BUILD)/view.log; exit 1; }
+	@cmake --build --preset view --parallel 2 --target view
+
+figures: view ## draw docs/figure1.png, docs/figure2.png (the paper's) and docs/figure_control.png anew
+	@$(VIEW) contours --from 000022 frames/sequence2 docs/figure1.png
+	@$(VIEW) sheet --from 000020 frames/sequence2 docs/figure2.png
+	@$(VIEW) control --from 000010 frames/sequence1 docs/figure_control.png
+
+test-view: view ## what tools/view draws, pixel by pixel and word by word; what it refuses
+	@tools/setup.sh test-view
+	@/usr/bin/python3 tests/view/view.py --view $(VIEW) --host-sim $(BUILD)/view/sim/host_sim --frames frames \
+	  --work $(BUILD)/test_view
+
+export: sim ## what is found in FRAMES=DIR for Foxglove and Rerun (MCAP) and spreadsheets (CSV): build/export
+	@tools/setup.sh export
+	@./host_sim --json --trace $(BUILD)/export/trace $(FRAMES) > $(BUILD)/export/records.jsonl
+	@tools/export/isohead-export $(BUILD)/export/records.jsonl --csv $(BUILD)/export/records.csv \
+	  --mcap $(BUILD)/export/frames.mcap --frames $(FRAMES) --trace $(BUILD)/export/trace/$(notdir $(FRAMES:/=))
 
 board: ## build isohead_board for ARCH=arm64 (default), armhf or host: build/board-ARCH/firmware/app
 	@tools/setup.sh board $(ARCH)
@@ -198,17 +227,21 @@ test-image: sim image ## boot the image on an emulated board; failed updates and
 	  --program $(BUILD)/board-arm64/firmware/app/isohead_board --frames frames/sequence2 \
 	  --host-sim $(BUILD)/host/sim/host_sim --work $(BUILD)/test_image
 
-
 calibrate: sim ## build tools/calibrate, from pictures of a board to rig.json: build/calibrate/tools/calibrate/calibrate
 	@tools/setup.sh calibrate
 	@cmake --preset calibrate > $(BUILD)/calibrate.log 2>&1 || { cat $(BUILD)/calibrate.log; exit 1; }
 	@cmake --build --preset calibrate --parallel 2
 
-# SHORT=--short: two of the five rigs.
 test-calibration: calibrate ## calibrate five rendered rigs, compare with the truth; what is refused; ten minutes
 	@/usr/bin/python3 tests/calibration/calibration.py --calibrate $(BUILD)/calibrate/tools/calibrate/calibrate \
 	  --render $(BUILD)/calibrate/tools/render/render --host-sim $(BUILD)/calibrate/sim/host_sim \
-	  --undistort $(BUILD)/calibrate/tests/calibration/test_undistort --work $(BUILD)/test_calibration $(SHORT)
+	  --undistort $(BUILD)/calibrate/tests/calibration/test_undistort --work $(BUILD)/test_calibration
+	@/usr/bin/python3 tests/knock/knock.py --knock $(BUILD)/calibrate/tests/knock/knock \
+	  --render $(BUILD)/calibrate/tools/render/render --host-sim $(BUILD)/calibrate/sim/host_sim \
+	  --work $(BUILD)/test_knock --seeds 4 --frames 250
+
+test-calibration-short: calibrate ## one of these rigs
+	@ctest --test-dir $(BUILD)/calibrate/tests/calibration --output-on-failure
 
 format: ## clang-format over all C and C++ sources
 	@tools/setup.sh format

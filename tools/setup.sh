@@ -1,13 +1,13 @@
 #!/bin/sh
 # Bring what a make target needs and this machine lacks.
 #
-#   tools/setup.sh sim|test|fuzz|coverage|ranges|mutation|accept|eval|bench|bits|cortexm|size|vectors|picture|format|lint
+#   tools/setup.sh sim|test|fuzz|coverage|ranges|mutation|accept|eval|bench|bits|cortexm|size|vectors|format|lint
 #   tools/setup.sh board arm64|armhf|host
 #   tools/setup.sh deb arm64|armhf
 #   tools/setup.sh test-deb
 #   tools/setup.sh test-board
 #   tools/setup.sh image|flash|test-image
-#   tools/setup.sh calibrate
+#   tools/setup.sh calibrate|view|test-view|test-report|export
 #
 # On Debian and its kin missing packages are installed when that is allowed (root, or sudo without a
 # password); otherwise the exact command is printed and the exit status is 1. Nothing is installed
@@ -31,6 +31,20 @@ need_sim() {
     need_program cmake cmake
     need_header stdlib.h libc6-dev
     need_header cjson/cJSON.h libcjson-dev
+    # What is folded into the report page, and writes it. Elsewhere these lie in other places: host_sim is
+    # built without the page, and CMake tells how to name them.
+    if command -v apt-get >/dev/null 2>&1; then
+        need_header zlib.h zlib1g-dev
+        need_header turbojpeg.h libturbojpeg0-dev
+        [ -e /usr/share/javascript/three/three.min.js ] || lacks libjs-three
+        [ -e /usr/share/javascript/chart.js/chart.min.js ] || lacks libjs-chart.js
+    fi
+}
+
+# A browser for the report page.
+need_report() {
+    need_program chromium chromium
+    need_python json python3
 }
 
 # Compilers and the emulator for tests/checks/same_bits.sh and tests/golden/golden.sh in make test.
@@ -64,6 +78,7 @@ need_board() {
         need_sim
         need_header libv4l2.h libv4l-dev
         need_header gpiod.h libgpiod-dev
+        need_header microhttpd.h libmicrohttpd-dev
         ;;
     arm64)
         need_program aarch64-linux-gnu-gcc gcc-aarch64-linux-gnu
@@ -83,6 +98,22 @@ need_board() {
 # libgpiod, and pip for tools/board/gpiod2.sh, which fetches another version of it.
 need_gpio() {
     need_header gpiod.h libgpiod-dev
+    need_python pip python3-pip
+}
+
+need_view() {
+    need_sim
+    need_program g++ g++
+    need_header opencv4/opencv2/core/version.hpp libopencv-dev
+    need_header cairo/cairo-pdf.h libcairo2-dev
+    need_header png.h libpng-dev
+    [ -e /usr/include/nlohmann/json.hpp ] || lacks nlohmann-json3-dev
+}
+
+# mcap's own needs, and pip for tools/export/packages.sh, which fetches mcap.
+need_export() {
+    need_python lz4 python3-lz4
+    need_python zstandard python3-zstandard
     need_python pip python3-pip
 }
 
@@ -181,8 +212,13 @@ test-image)
     need_program bzip2 bzip2
     PATH=$PATH:/sbin:/usr/sbin need_program mkfs.ext4 e2fsprogs
     ;;
+test-report)
+    need_sim
+    need_report
+    ;;
 test)
     need_sim
+    need_report
     need_bits
     need_clang_rt
     need_python numpy python3-numpy
@@ -190,24 +226,23 @@ test)
     need_program nm binutils
     need_program valgrind valgrind
     need_header libv4l2.h libv4l-dev
+    need_header microhttpd.h libmicrohttpd-dev
     need_gpio
+    need_export
     ;;
 ranges)
     need_sim
     need_clang_rt
     need_header libv4l2.h libv4l-dev
+    need_header microhttpd.h libmicrohttpd-dev
     need_gpio
     ;;
 coverage | mutation)
     need_sim
+    need_header microhttpd.h libmicrohttpd-dev
     need_program gcc gcc
     ;;
 fuzz) need_fuzz ;;
-picture)
-    need_sim
-    need_python numpy python3-numpy
-    need_python matplotlib python3-matplotlib
-    ;;
 eval)
     need_sim
     need_python numpy python3-numpy
@@ -250,6 +285,17 @@ calibrate)
     [ -e /usr/include/nlohmann/json.hpp ] || lacks nlohmann-json3-dev
     need_python numpy python3-numpy
     ;;
+view) need_view ;;
+test-view)
+    need_view
+    need_python numpy python3-numpy
+    need_python cv2 python3-opencv
+    need_program pdftotext poppler-utils
+    ;;
+export)
+    need_sim
+    need_export
+    ;;
 accept | vectors)
     need_python numpy python3-numpy
     need_python scipy python3-scipy
@@ -261,9 +307,10 @@ lint)
     need_program cppcheck cppcheck
     need_program gcc gcc
     need_header libv4l2.h libv4l-dev
+    need_header microhttpd.h libmicrohttpd-dev
     ;;
 *)
-    sed -n '4,10s/^# \{0,1\}//p' "$0" >&2
+    sed -n '4,11s/^# \{0,1\}//p' "$0" >&2
     exit 2
     ;;
 esac
@@ -304,4 +351,7 @@ size)
     fi
     ;;
 test | test-board) tools/board/gpiod2.sh build/third_party/gpiod2 ;;
+esac
+case "$1" in
+test | export) tools/export/packages.sh build/export/python ;;
 esac
