@@ -7,6 +7,7 @@ image.py --image DIR --program FILE --board DIR --frames DIR --host-sim FILE --w
 --image: what tools/image/image.sh has made of --program; --board: what get.sh has made; --frames: a rendered
 frames directory. The image is used as it is, but for its data partition: that gets a rig, settings,
 and a start.sh that makes a camera of v4l2loopback, for frames that come over a virtio-serial port.
+Records go over a line of their own: on the console, others write between a record's pieces.
 Cases run at the same time. Exit status 1 if one fails.
 """
 
@@ -40,14 +41,15 @@ rate = 1
 exposure = keep
 gain = keep
 laser = off
-output = -
+output = serial:/run/records
 status = 0
 """
-START = """cp /data/test/feeder /run/feeder
+START = """ln -s /dev/hvc0 /run/records
+cp /data/test/feeder /run/feeder
 modprobe videodev
 insmod /data/test/v4l2loopback.ko devices=1 video_nr=0 max_buffers=4
 for port in /sys/class/virtio-ports/*; do
-    [ "$(cat $port/name)" != frames ] || /run/feeder /dev/${port##*/} /dev/video0 %d %d GREY
+    [ "$(cat $port/name 2>/dev/null)" != frames ] || /run/feeder /dev/${port##*/} /dev/video0 %d %d GREY
 done
 """
 
@@ -154,10 +156,10 @@ class Disk:
 
 
 class Board:
-    """QEMU's virt board with UEFI, its console, and a port for frames."""
+    """QEMU's virt board with UEFI, its console, a line for records and a port for frames."""
 
     def __init__(self, disk, work):
-        self.log_path = os.path.join(work, "console.log")
+        self.work = work
         variables = shutil.copy(os.path.join(FIRMWARE, "AAVMF_VARS.fd"), work)
         arguments = [
             "qemu-system-aarch64", "-M", "virt,acpi=off", "-cpu", "cortex-a53", "-m", "512",
@@ -166,17 +168,19 @@ class Board:
             "-drive", f"if=pflash,format=raw,file={variables}",
             "-drive", f"if=none,id=disk,format=raw,file={disk.path}",
             "-device", "virtio-blk-device,drive=disk", "-device", "i6300esb",
-            "-device", "virtio-serial-device", "-device", "virtserialport,chardev=frames,name=frames",
+            "-device", "virtio-serial-device", "-device", "virtconsole,chardev=records",
+            "-device", "virtserialport,chardev=frames,name=frames",
             "-serial", "chardev:console"]
         self.sockets, theirs = {}, []
-        for name in ["console", "frames"]:
+        for name in ["console", "records", "frames"]:
             self.sockets[name], other = socket.socketpair()
             theirs.append(other)
             arguments += ["-chardev", f"socket,id={name},fd={other.fileno()}"]
-        self.text = ""
-        self.seen = 0  # how far `text` has been looked at
+        self.text = {"console": "", "records": ""}
+        self.seen = {"console": 0, "records": 0}  # how far it has been looked at
         self.selector = selectors.DefaultSelector()
-        self.selector.register(self.sockets["console"], selectors.EVENT_READ)
+        for name in self.text:
+            self.selector.register(self.sockets[name], selectors.EVENT_READ, name)
         self.begin = time.monotonic()
         self.qemu = subprocess.Popen(arguments, stdin=subprocess.DEVNULL, stderr=subprocess.PIPE,
                                      pass_fds=[sock.fileno() for sock in theirs], text=True)
@@ -191,36 +195,51 @@ class Board:
         self.qemu.wait()
         for sock in self.sockets.values():
             sock.close()
-        with open(self.log_path, "w", encoding="utf-8") as file:
-            file.write(self.text)
+        for name, text in self.text.items():
+            with open(os.path.join(self.work, name + ".log"), "w", encoding="utf-8") as file:
+                file.write(text)
 
     def now_s(self):
         """Since power-on."""
         return time.monotonic() - self.begin
 
-    def wait(self, pattern, limit_s):
-        """For the pattern in what the console has said since the last match; returns the match."""
+    def wait(self, pattern, limit_s, name="console"):
+        """For the pattern in what has come on that line since the last match; returns the match."""
         end = time.monotonic() + limit_s
         while True:
-            match = re.compile(pattern).search(self.text, self.seen)
+            match = re.compile(pattern).search(self.text[name], self.seen[name])
             if match:
-                self.seen = match.end()
+                self.seen[name] = match.end()
                 return match
             left = end - time.monotonic()
             if left <= 0:
-                tail = "\n".join(self.text.splitlines()[-12:])
-                raise Wrong(f"no '{pattern}' on the console within {limit_s} s; its end:\n{tail}")
+                raise Wrong(f"no '{pattern}' on the {name} line within {limit_s} s{self.ends()}")
             if self.qemu.poll() is not None:
                 raise Wrong(f"QEMU ended with status {self.qemu.returncode}: {self.qemu.stderr.read()}")
-            if self.selector.select(min(left, 1)):
-                content = self.sockets["console"].recv(65536)
-                self.text += content.decode("utf-8", errors="replace").replace("\r", "")
+            self.read(min(left, 1))
+
+    def read(self, limit_s):
+        """What has come on the lines, or comes within that time; False: nothing."""
+        ready = self.selector.select(limit_s)
+        for key, _ in ready:
+            content = key.fileobj.recv(65536)
+            if not content:  # QEMU has ended
+                self.selector.unregister(key.fileobj)
+            self.text[key.data] += content.decode("utf-8", errors="replace").replace("\r", "")
+        return bool(ready)
+
+    def ends(self):
+        """What came last on each line, for whoever reads only what this program prints."""
+        return "".join(f"; the end of the {name} line:\n" +
+                       "\n".join(line[:200] for line in text.splitlines()[-12:])
+                       for name, text in self.text.items())
 
     def command(self, text, limit_s=ANSWER_S):
         """For the console's shell; it must succeed. Wakes the shell first."""
         self.sockets["console"].sendall(f"\n{text}; echo status-$?-$((6 * 7))\n".encode())
         match = self.wait(r"status-(\d+)-42\n", limit_s)
-        expect(match.group(1) == "0", f"'{text}' failed:\n{self.text[match.start() - 500:match.end()]}")
+        expect(match.group(1) == "0",
+               f"'{text}' failed:\n{self.text['console'][match.start() - 500:match.end()]}")
 
     def send_frame(self, frames, index):
         samples = frames.samples[index]
@@ -230,13 +249,17 @@ class Board:
     def first_record(self, frames):
         """Boot with a camera, until the record of the first frame; it is host_sim's."""
         self.wait(r"isohead_board: /dev/video0: open", START_S)
+        while self.read(0):
+            pass
+        self.seen["records"] = len(self.text["records"])  # of the start before
         self.send_frame(frames, 0)
         self.check_record(frames, 0)
 
     def check_record(self, frames, index):
-        record = as_of_host(self.wait(r'(?m)^(\{"file".*\})\n', ANSWER_S).group(1))
+        match = self.wait(r"(?m)^(.+)\n", ANSWER_S, "records")
+        record = as_of_host(match.group(1))
         expect(record == frames.records[index],
-               f"frame {index}:\nboard    {record}\nhost_sim {frames.records[index]}")
+               f"frame {index}:\nboard    {record}\nhost_sim {frames.records[index]}{self.ends()}")
 
     def wait_slot(self, name):
         """For the slot that is started next; True when it is whole."""
@@ -307,8 +330,7 @@ def case_update(shared):
         for index in range(1, FRAME_COUNT):
             board.send_frame(case.frames, index)
             board.check_record(case.frames, index)
-        if "slot a is good" not in board.text:  # it may come between two records
-            board.wait("slot a is good", ANSWER_S)
+        board.wait("slot a is good", ANSWER_S)
         board.command("grep -q ' /data vfat ro,' /proc/mounts")
         board.command("! touch /usr/x")
         board.command("ls -l /proc/$(pidof isohead_board)/fd | grep -q /dev/watchdog")
