@@ -5,6 +5,7 @@
 #include "ih_fix.h"
 
 #define TERMS IH_SURFACE_TERMS
+#define KEPT IH_SURFACE_KEPT
 /* Scale factors are 0.995 * 2^SCALE_SHIFT / sqrt(N_ii): with N_ii of 2^40 (a single sample, weight
  * 1, B = 1) to 2^61.5 they lie between 2^20 and 2^31. */
 #define SCALE_SHIFT 51
@@ -54,62 +55,41 @@ static void fill_row(const struct ih_surface_scratch *scratch, const struct ih_s
     IH_IN_RANGE(row_q20[0], 1 << 20, IH_RANGE_BASIS_Q20);
 }
 
-/* Multiply row number `at` with the sample's weight; what the row stands for, too. */
-static void weigh_row(struct ih_surface_scratch *scratch, const struct ih_sample *sample,
-                      int32_t mean_mm_q8, int32_t root_weight_q15, int32_t at)
+/* Put the sample's row, which stands in basis_q20, weighted among the rows to be summed, at number `at`. */
+static void weigh_row(struct ih_surface_scratch *scratch, int32_t root_weight_q15, int32_t at)
 {
     bool is_one = root_weight_q15 == 1 << 15; /* as nearly all are: nothing to round */
-    for (int32_t i = 0; !is_one && i < TERMS; i++) {
-        uint32_t *entry = &scratch->row_q20[at][i];
-        *entry = (uint32_t)ih_mul_shift(*entry, root_weight_q15, 15);
+    for (int32_t i = 0; i < TERMS; i++) {
+        const uint32_t basis_q20 = scratch->basis_q20[i];
+        scratch->row_q20[at][i] =
+            is_one ? basis_q20 : (uint32_t)ih_mul_shift(basis_q20, root_weight_q15, 15);
     }
-    scratch->off_mm_q8[at] =
+}
+
+/* Rows from `count` on add nothing. */
+static void clear_rows(struct ih_surface_scratch *scratch, int32_t count)
+{
+    for (int32_t at = count; at < IH_NORMAL_ROWS; at++) {
+        memset(scratch->row_q20[at], 0, sizeof scratch->row_q20[at]);
+    }
+}
+
+/* What row number `at` brings to the right side. */
+static void add_right(struct ih_surface_scratch *scratch, const struct ih_sample *sample,
+                      int32_t mean_mm_q8, int32_t root_weight_q15, int32_t at)
+{
+    const int32_t off_mm_q8 =
         (int32_t)ih_mul_shift((int64_t)sample->depth_mm_q8 - mean_mm_q8, root_weight_q15, 15);
-}
-
-/* Where row i of N begins. Rows are padded to whole groups of IH_SURFACE_GROUP entries: what stands
- * behind the diagonal is not used, but loops need no end of their own for what is left of a group. */
-static int32_t normal_row(int32_t i)
-{
-    const int32_t group = i / IH_SURFACE_GROUP;
-    return IH_SURFACE_GROUP * (group + 1) * (IH_SURFACE_GROUP * group / 2 + i % IH_SURFACE_GROUP);
-}
-
-/* Add two weighted rows' products of one column with each of the first `count`: a row of N. Columns
- * `here` and here + 1 at once, so that each entry is read for two products. No entry is negative, and
- * products without a sign are the ones that every processor with vectors has. */
-static void add_columns(const uint32_t *a, const uint32_t *b, int32_t here, int32_t count,
-                        uint64_t *row_here, uint64_t *row_next)
-{
-    const uint32_t a_here = a[here], b_here = b[here];
-    const uint32_t a_next = a[here + 1], b_next = b[here + 1];
-    for (int32_t j = 0; j < count; j++) {
-        row_here[j] += (uint64_t)a_here * a[j] + (uint64_t)b_here * b[j];
-        row_next[j] += (uint64_t)a_next * a[j] + (uint64_t)b_next * b[j];
+    for (int32_t i = 0; i < TERMS; i++) {
+        scratch->right_q28[i] += (int64_t)(int32_t)scratch->row_q20[at][i] * off_mm_q8;
     }
 }
 
-_Static_assert(IH_SURFACE_ROWS % 2 == 0 && IH_SURFACE_GROUP % 2 == 0, "add_columns takes two each");
-_Static_assert(TERMS % IH_SURFACE_GROUP == 0, "all groups are whole");
-
-/* Add what the weighted rows bring to the normal equations. */
-static void add_rows(struct ih_surface_scratch *scratch)
-{
-    uint64_t *normal = scratch->of.normal_q40;
-    for (int32_t i = 0; i < TERMS; i += 2) {
-        const int32_t count = (i / IH_SURFACE_GROUP + 1) * IH_SURFACE_GROUP;
-        for (int32_t k = 0; k < IH_SURFACE_ROWS; k += 2) {
-            add_columns(scratch->row_q20[k], scratch->row_q20[k + 1], i, count,
-                        &normal[normal_row(i)], &normal[normal_row(i + 1)]);
-        }
-    }
-    for (int32_t k = 0; k < IH_SURFACE_ROWS; k++) {
-        for (int32_t i = 0; i < TERMS; i++) {
-            scratch->right_q28[i] +=
-                (int64_t)(int32_t)scratch->row_q20[k][i] * scratch->off_mm_q8[k];
-        }
-    }
-}
+_Static_assert(TERMS == IH_NORMAL_TERMS && KEPT % IH_NORMAL_GROUP == 0, "lines of ih_normal");
+/* The last line is the nearest to where its scaled one begins. */
+_Static_assert(2 * (IH_NORMAL_LINE(TERMS) - TERMS - IH_NORMAL_LINE(KEPT)) <=
+                   IH_CHOLESKY_PACKED(TERMS - 1),
+               "a line that is scaled must not be in the way of one that is not yet");
 
 static int32_t mean_depth_mm_q8(const struct ih_samples *samples)
 {
@@ -120,27 +100,43 @@ static int32_t mean_depth_mm_q8(const struct ih_samples *samples)
     return (int32_t)ih_div_round(sum, samples->sample_count);
 }
 
-/* N scaled to diagonal 0.99, with ridge, in Q30, in N's place: a row of the factor ends before the
- * next one of N begins. Rows are copied because the same bytes change type. */
-static void scale_rows(const struct ih_surface_params *params, struct ih_surface_scratch *scratch)
+static const uint64_t *line_of(const struct ih_surface_scratch *scratch, int32_t i)
 {
-    int32_t row[TERMS];
+    const int32_t at = ih_normal_line(i);
+    return i < KEPT ? &scratch->kept_q40[at] : &scratch->of.others_q40[at - IH_NORMAL_LINE(KEPT)];
+}
+
+/* Scale factors from N's diagonal. */
+static void set_scale(struct ih_surface_scratch *scratch)
+{
     for (int32_t i = 0; i < TERMS; i++) {
-        const uint64_t *normal = &scratch->of.normal_q40[normal_row(i)];
-        IH_IN_RANGE((int64_t)normal[i], 0, IH_RANGE_NORMAL_Q40);
-        int64_t root = (int64_t)ih_isqrt_u64(normal[i]) + 1; /* the diagonal stays < 1 */
+        const int64_t diagonal = (int64_t)line_of(scratch, i)[i];
+        IH_IN_RANGE(diagonal, 0, IH_RANGE_NORMAL_Q40);
+        int64_t root = (int64_t)ih_isqrt_u64((uint64_t)diagonal) + 1; /* it stays < 1 */
         int64_t scale = SCALE_NUMERATOR / root;
         scratch->scale[i] = (uint32_t)(scale < SCALE_MAX ? scale : SCALE_MAX);
+    }
+}
+
+/* N scaled to diagonal 0.99, with ridge, in Q30, in the place of the lines of N that are not kept: from
+ * the last one on, so that none is written over that is still to be read. They are copied because the
+ * same bytes change type. */
+static void scale_lines(const struct ih_surface_params *params, struct ih_surface_scratch *scratch)
+{
+    int32_t scaled[TERMS];
+    set_scale(scratch);
+    for (int32_t i = TERMS - 1; i >= 0; i--) {
+        const uint64_t *line = line_of(scratch, i);
         for (int32_t j = 0; j <= i; j++) {
             /* |N_ij| <= root_i root_j: after the first step below 2^47 */
-            int64_t half = ih_mul_wide_shift((int64_t)normal[j], scratch->scale[i], 36);
-            row[j] = ih_saturate_s32(
+            int64_t half = ih_mul_wide_shift((int64_t)line[j], scratch->scale[i], 36);
+            scaled[j] = ih_saturate_s32(
                 ih_mul_wide_shift(half, scratch->scale[j], 2 * SCALE_SHIFT - 36 - 30));
         }
-        row[i] += (int32_t)ih_mul_shift(row[i], params->ridge_q30, 30);
-        IH_IN_RANGE(row[i], 0, IH_RANGE_SCALED_Q30);
-        memcpy(&scratch->of.factor_q30[IH_CHOLESKY_PACKED(i)], row,
-               (size_t)(i + 1) * sizeof row[0]);
+        scaled[i] += (int32_t)ih_mul_shift(scaled[i], params->ridge_q30, 30);
+        IH_IN_RANGE(scaled[i], 0, IH_RANGE_SCALED_Q30);
+        memcpy(&scratch->of.factor_q30[IH_CHOLESKY_PACKED(i)], scaled,
+               (size_t)(i + 1) * sizeof scaled[0]);
     }
 }
 
@@ -204,16 +200,16 @@ static int32_t depth_of_sum(const struct ih_surface_scratch *scratch, int32_t me
     return ih_saturate_s32(mean_mm_q8 + depth_q8);
 }
 
-/* Huber step: a sample that is too far from the surface gets less weight. row_q20 is its own,
- * without weight. False when it is near enough. */
+/* Huber step: a sample that is too far from the surface gets less weight. basis_q20 is its row. False
+ * when it is near enough. */
 static bool reweight(const struct ih_surface_scratch *scratch, const struct ih_sample *sample,
-                     const struct ih_surface_params *params, const uint32_t row_q20[TERMS],
-                     int32_t mean_mm_q8, int32_t *root_weight_q15)
+                     const struct ih_surface_params *params, int32_t mean_mm_q8,
+                     int32_t *root_weight_q15)
 {
     int64_t limit_q8 = (int64_t)params->huber_mm << 8;
     int64_t sum = 0;
     for (int32_t k = 0; k < TERMS; k++) {
-        sum += (int64_t)scratch->solution[k] * (int32_t)row_q20[k];
+        sum += (int64_t)scratch->solution[k] * (int32_t)scratch->basis_q20[k];
     }
     int64_t off_q8 =
         ih_abs_s64((int64_t)sample->depth_mm_q8 - depth_of_sum(scratch, mean_mm_q8, sum));
@@ -226,38 +222,95 @@ static bool reweight(const struct ih_surface_scratch *scratch, const struct ih_s
     return true;
 }
 
-/* The normal equations of all samples. huber: NULL; or samples that are too far from the surface
- * that was solved last get less weight first. Returns how many do. */
-static int32_t sum_rows(const struct ih_samples *samples, const struct ih_surface_params *huber,
-                        struct ih_surface_scratch *scratch, struct ih_surface *out)
+/* The normal equations of all samples: all lines, or with huber only those that are not kept, and then
+ * samples that are too far from the surface that was solved last get less weight first. Returns how
+ * many do. */
+static int32_t sum_all(const struct ih_samples *samples, const struct ih_surface_params *huber,
+                       struct ih_surface_scratch *scratch, struct ih_surface *out)
 {
-    int32_t changed = 0;
-    memset(scratch->of.normal_q40, 0, sizeof scratch->of.normal_q40);
+    int32_t lighter = 0;
+    memset(scratch->of.others_q40, 0, sizeof scratch->of.others_q40);
     memset(scratch->right_q28, 0, sizeof scratch->right_q28);
-    for (int32_t first = 0; first < samples->sample_count; first += IH_SURFACE_ROWS) {
-        memset(scratch->row_q20, 0, sizeof scratch->row_q20); /* the last ones may be fewer */
-        for (int32_t i = first; i < samples->sample_count && i < first + IH_SURFACE_ROWS; i++) {
-            const struct ih_sample *sample = &samples->sample[i];
-            uint32_t *row_q20 = scratch->row_q20[i - first];
-            fill_row(scratch, sample, row_q20);
-            changed += huber != NULL && reweight(scratch, sample, huber, row_q20, out->mean_mm_q8,
-                                                 &out->root_weight_q15[i]);
-            weigh_row(scratch, sample, out->mean_mm_q8, out->root_weight_q15[i], i - first);
+    for (int32_t first = 0; first < samples->sample_count; first += IH_NORMAL_ROWS) {
+        const int32_t count = ih_min_s32(samples->sample_count - first, IH_NORMAL_ROWS);
+        for (int32_t at = 0; at < count; at++) {
+            const struct ih_sample *sample = &samples->sample[first + at];
+            int32_t *root_weight_q15 = &out->root_weight_q15[first + at];
+            fill_row(scratch, sample, scratch->basis_q20);
+            lighter +=
+                huber != NULL && reweight(scratch, sample, huber, out->mean_mm_q8, root_weight_q15);
+            weigh_row(scratch, *root_weight_q15, at);
+            add_right(scratch, sample, out->mean_mm_q8, *root_weight_q15, at);
         }
-        add_rows(scratch);
+        clear_rows(scratch, count);
+        if (huber == NULL) {
+            ih_normal_add(scratch->row_q20, 0, KEPT, scratch->kept_q40);
+        }
+        ih_normal_add(scratch->row_q20, KEPT, TERMS, scratch->of.others_q40);
     }
-    return changed;
+    return lighter;
 }
 
-/* Solve for the surface; again: with less weight for the samples that are far from it, if any. */
-static bool fit(const struct ih_samples *samples, const struct ih_surface_params *params,
-                bool again, struct ih_surface_scratch *scratch, struct ih_surface *out)
+/* Add those samples whose weight changed to the lines that are kept, with the weight that they had before
+ * or with the one that they have now. */
+static void sum_changed(const struct ih_samples *samples, const struct ih_surface *out,
+                        bool is_before, struct ih_surface_scratch *scratch)
 {
-    out->downweighted_count = sum_rows(samples, again ? params : NULL, scratch, out);
-    if (again && out->downweighted_count == 0) {
+    int32_t count = 0;
+    for (int32_t i = 0; i < samples->sample_count; i++) {
+        const int32_t before_q15 = samples->sample[i].root_weight_q15;
+        const int32_t now_q15 = out->root_weight_q15[i];
+        if (now_q15 != before_q15) {
+            fill_row(scratch, &samples->sample[i], scratch->basis_q20);
+            weigh_row(scratch, is_before ? before_q15 : now_q15, count);
+            count++;
+        }
+        if (count == IH_NORMAL_ROWS || (count > 0 && i + 1 == samples->sample_count)) {
+            clear_rows(scratch, count);
+            ih_normal_add(scratch->row_q20, 0, KEPT, scratch->kept_q40);
+            count = 0;
+        }
+    }
+}
+
+static void turn_bits(uint64_t *value, int32_t count)
+{
+    for (int32_t i = 0; i < count; i++) {
+        value[i] = ~value[i];
+    }
+}
+
+/* Lines that are kept: samples whose weight changed are taken away with the one that they had, and added
+ * with the one that they have. */
+static void change_kept(const struct ih_samples *samples, const struct ih_surface *out,
+                        struct ih_surface_scratch *scratch)
+{
+    turn_bits(scratch->kept_q40, IH_NORMAL_LINE(KEPT));
+    sum_changed(samples, out, true, scratch);
+    turn_bits(scratch->kept_q40, IH_NORMAL_LINE(KEPT));
+    sum_changed(samples, out, false, scratch);
+}
+
+/* Solve for the surface. */
+static bool fit_first(const struct ih_samples *samples, const struct ih_surface_params *params,
+                      struct ih_surface_scratch *scratch, struct ih_surface *out)
+{
+    memset(scratch->kept_q40, 0, sizeof scratch->kept_q40);
+    sum_all(samples, NULL, scratch, out);
+    scale_lines(params, scratch);
+    return solve(samples, out->mean_mm_q8, scratch);
+}
+
+/* Again, with less weight for the samples that are far from it, if any. */
+static bool fit_again(const struct ih_samples *samples, const struct ih_surface_params *params,
+                      struct ih_surface_scratch *scratch, struct ih_surface *out)
+{
+    out->downweighted_count = sum_all(samples, params, scratch, out);
+    if (out->downweighted_count == 0) {
         return true;
     }
-    scale_rows(params, scratch);
+    change_kept(samples, out, scratch);
+    scale_lines(params, scratch);
     return solve(samples, out->mean_mm_q8, scratch);
 }
 
@@ -342,7 +395,7 @@ void ih_surface_fit(const struct ih_samples *samples, const struct ih_field *fie
     for (int32_t i = 0; i < samples->sample_count; i++) {
         out->root_weight_q15[i] = samples->sample[i].root_weight_q15;
     }
-    if (!fit(samples, params, false, scratch, out) || !fit(samples, params, true, scratch, out)) {
+    if (!fit_first(samples, params, scratch, out) || !fit_again(samples, params, scratch, out)) {
         return;
     }
     fill_table(scratch);

@@ -14,13 +14,14 @@
  *        rounded to Q30; the ridge keeps the least pivot above 3e-3.
  * Error: within 0.2 mm of the float64 solution of the same system, everywhere on the grid, for
  *        depths that span up to 1.5 m (ih_samples clips them); it grows with the span.
- * Cost:  samples x 288 square roots; twice samples x 10,944 multiply-adds; two factorisations of
- *        n = 144; grid x 144 multiply-adds.
+ * Cost:  samples x 288 square roots; samples x 10,944 multiply-adds, and once more about half of
+ *        that; two factorisations of n = 144; grid x 144 multiply-adds.
  */
 #ifndef IH_SURFACE_H
 #define IH_SURFACE_H
 
 #include "ih_cholesky.h"
+#include "ih_normal.h"
 #include "ih_samples.h"
 
 /* Centres in a row and in a column, over +-20 field units (+-10 dot pitches). */
@@ -57,22 +58,22 @@ struct ih_surface {
     int32_t depth_mm_q8[IH_SURFACE_GRID][IH_SURFACE_GRID]; /* [y][x] */
 };
 
-/* Basis rows that are added to the normal equations together: a sum of 4 is 4 times less reading and
- * writing of 84 kB. */
-#define IH_SURFACE_ROWS 4
-/* Rows of the normal equations are padded to so many entries, which fill the widest vectors. */
-#define IH_SURFACE_GROUP 8
-#define IH_SURFACE_PADDED (IH_SURFACE_TERMS * (IH_SURFACE_TERMS + IH_SURFACE_GROUP) / 2)
+/* Lines of the normal equations that outlive the first factor: for the second, only the samples whose
+ * weight changed are taken away from them and added again. The other lines are summed anew, the factor
+ * stands in their place. 8 lines more cost 8 kB and save a tenth of the second sum; from 104 on a line
+ * that is scaled in place is never in the way of one that is not yet. */
+#define IH_SURFACE_KEPT 120
 
 struct ih_surface_scratch {
+    uint64_t kept_q40[IH_NORMAL_LINE(IH_SURFACE_KEPT)]; /* lower triangle, line by line */
     union {
-        uint64_t normal_q40[IH_SURFACE_PADDED];                   /* lower triangle, row by row */
+        uint64_t others_q40[IH_NORMAL_LINE(IH_SURFACE_TERMS) - IH_NORMAL_LINE(IH_SURFACE_KEPT)];
         int32_t factor_q30[IH_CHOLESKY_PACKED(IH_SURFACE_TERMS)]; /* scaled, then factored */
         int32_t table_q20[IH_SURFACE_STEPS][2 * IH_SURFACE_STEPS - 1];
     } of;
     int64_t right_q28[IH_SURFACE_TERMS];
-    uint32_t row_q20[IH_SURFACE_ROWS][IH_SURFACE_TERMS];
-    int32_t off_mm_q8[IH_SURFACE_ROWS]; /* their depths, less the mean, weighted */
+    uint32_t basis_q20[IH_SURFACE_TERMS];                      /* a sample's row */
+    ih_normal_entry row_q20[IH_NORMAL_ROWS][IH_SURFACE_TERMS]; /* such rows, weighted */
     uint32_t scale[IH_SURFACE_TERMS];   /* 0.995 * 2^51 / sqrt(N_ii), N in Q40 */
     int32_t solution[IH_SURFACE_TERMS]; /* the right side before */
     int32_t solution_shift; /* coefficient = solution / 2^solution_shift, mm per field unit */

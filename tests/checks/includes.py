@@ -35,6 +35,7 @@ CORE_HEADERS = {
     "ih_rig.h": {"ih_config.h", "ih_types.h"},
     "ih_blob.h": CORE_SHARED,
     "ih_cholesky.h": {"ih_config.h", "ih_types.h"},
+    "ih_normal.h": {"ih_config.h", "ih_types.h"},
     "ih_band.h": {"ih_config.h", "ih_types.h"},
     "ih_noise.h": {"ih_config.h", "ih_types.h", "ih_band.h"},
     "ih_dots.h": CORE_SHARED | {"ih_noise.h"},
@@ -46,7 +47,7 @@ CORE_HEADERS = {
     "ih_windows.h": CORE_SHARED,
     "ih_points.h": CORE_SHARED | {"ih_labels.h", "ih_windows.h"},
     "ih_samples.h": CORE_SHARED | {"ih_points.h"},
-    "ih_surface.h": CORE_SHARED | {"ih_samples.h", "ih_cholesky.h"},
+    "ih_surface.h": CORE_SHARED | {"ih_samples.h", "ih_cholesky.h", "ih_normal.h"},
     "ih_cuts.h": CORE_SHARED | {"ih_surface.h"},
     "ih_parts.h": CORE_SHARED | {"ih_cuts.h"},
     "ih_ellipse.h": CORE_SHARED | {"ih_parts.h"},
@@ -65,6 +66,8 @@ CORE_HEADERS = {
     "isohead.h": CORE_SHARED | {"ih_result.h"},
 }
 CORE_SYSTEM = {"stdbool.h", "stddef.h", "stdint.h", "string.h"}
+# The vectors of x86, for one file that has the same without.
+CORE_VECTORS = {("ih_normal.c", "immintrin.h")}
 
 INCLUDE = re.compile(r'^\s*#\s*include\s*(["<])([^">]+)[">]')
 
@@ -86,7 +89,7 @@ def judge_core(path, quoted, target):
     if allowed is None:
         return "this file stands in no rule: add it to tests/checks/includes.py"
     if not quoted:
-        return None if target in CORE_SYSTEM else "the core does without <%s>" % target
+        return None if target in CORE_SYSTEM or (name, target) in CORE_VECTORS else "the core does without <%s>" % target
     if target in allowed:
         return None
     return "%s may include only %s" % (name, ", ".join(sorted(allowed)) or "nothing of ours")

@@ -316,6 +316,41 @@ static void the_same_samples_give_the_same_bytes(void)
                              (size_t)samples.sample_count * sizeof first.root_weight_q15[0]);
 }
 
+/* The second system is made from the first by exchanging what some samples brought to it. It must be, to
+ * the last bit, the one that these weights give from the beginning. */
+static void changed_weights_give_what_they_give_at_once(void)
+{
+    static const int32_t outliers[] = {1, 7, 8, 9, 15, 16, 17, 33, 150};
+    static struct ih_surface again;
+    int i;
+    int32_t k;
+
+    for (i = 0; i < IH_TEST_COUNT(outliers); i++) {
+        samples.sample_count = 0;
+        for (k = 0; k < 340; k++) {
+            const bool is_out =
+                k % (340 / outliers[i]) == 0 && k / (340 / outliers[i]) < outliers[i];
+
+            add_sample(2.0 * (k % IH_GRID - 9) + 0.3 * ih_test_unit(&random_source),
+                       2.0 * (k / IH_GRID - 9) + 0.3 * ih_test_unit(&random_source),
+                       is_out ? 600 + k : 1500 + ih_test_unit(&random_source),
+                       k % 11 == 0 ? 0.55 : 1);
+        }
+        params.huber_mm = VECTOR_HUBER_MM;
+        fit();
+        again = surface;
+        IH_TEST_RANGE(outliers[i], samples.sample_count, again.downweighted_count, "lighter", i);
+        for (k = 0; k < samples.sample_count; k++) {
+            samples.sample[k].root_weight_q15 = again.root_weight_q15[k];
+        }
+        params.huber_mm = 100000;
+        memset(&scratch, IH_TEST_FILL, sizeof scratch);
+        fit();
+        IH_TEST_EQUAL(0, surface.downweighted_count, "lighter at once", i);
+        TEST_ASSERT_EQUAL_MEMORY(surface.depth_mm_q8, again.depth_mm_q8, sizeof again.depth_mm_q8);
+    }
+}
+
 static void the_field_is_passed_on(void)
 {
     take_vector(&vector_surfaces[0]);
@@ -345,6 +380,7 @@ int main(void)
     RUN_TEST(samples_without_weight_make_no_surface);
     RUN_TEST(the_ends_of_all_ranges_are_survived);
     RUN_TEST(the_same_samples_give_the_same_bytes);
+    RUN_TEST(changed_weights_give_what_they_give_at_once);
     RUN_TEST(the_field_is_passed_on);
     RUN_TEST(defaults_are_those_of_the_design);
     return UNITY_END();

@@ -123,10 +123,9 @@ def surface(centres, steps):
              define("ih_surface.h", "IH_SURFACE_STEPS_PER_CENTRE", steps),
              define("ih_surface.h", "IH_SURFACE_STEP_NUMERATOR", 40 // common),
              define("ih_surface.h", "IH_SURFACE_STEP_DENOMINATOR", steps * (centres - 1) // common),
+             define("ih_surface.h", "IH_SURFACE_KEPT", -(-centres * centres * 5 // 48) * 8),
+             define("ih_normal.h", "IH_NORMAL_TERMS", centres * centres),
              define("isohead.h", "IH_RAM_MAX", "(1024 * 1024)")]
-    with open(os.path.join(builds.ROOT, "firmware", "core", "ih_surface.h"), encoding="utf-8") as file:
-        if "#define IH_SURFACE_SPLIT " in file.read():  # its packed triangle has an even count
-            edits.append(define("ih_surface.h", "IH_SURFACE_SPLIT", centres * centres * 25 // 36 // 4 * 4))
     return edits
 
 
