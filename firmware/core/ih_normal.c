@@ -18,6 +18,7 @@ int32_t ih_normal_line(int32_t i)
 }
 
 #if defined __x86_64__ && defined __SSE2__
+#define BY_LINES 1
 
 /* Compilers do not find the multiplication of lower halves by themselves: they see one of 64 bits, which
  * takes three of them. */
@@ -57,6 +58,26 @@ static inline void add_line(ih_normal_entry row[ROWS][TERMS], int32_t i, int32_t
         STORE(&line[j], sum);
     }
 }
+
+#elif defined __ARM_NEON
+#define BY_LINES 1
+
+/* As above; compilers find these vectors by themselves. */
+static inline void add_line(ih_normal_entry row[ROWS][TERMS], int32_t i, int32_t length,
+                            uint64_t *line)
+{
+    for (int32_t j = 0; j < length; j++) {
+        uint64_t sum = line[j];
+        for (int32_t k = 0; k < ROWS; k++) {
+            sum += (uint64_t)row[k][i] * row[k][j];
+        }
+        line[j] = sum;
+    }
+}
+
+#endif
+
+#ifdef BY_LINES
 
 void ih_normal_add(ih_normal_entry row[ROWS][TERMS], int32_t first, int32_t last, uint64_t *line)
 {
