@@ -60,12 +60,7 @@ static bool is_in_ring(const struct ih_crossing *crossing, const struct ih_ellip
            dy <= ih_abs_s64(dx);
 }
 
-/* Half sides of the box that ih_ellipsoid_box gives, whole mm, and 2^SHARE_BITS over them. */
-struct half {
-    int32_t x_mm, y_mm;
-    int32_t x_share, y_share;
-};
-
+/* ih_scan_half's shares are 2^this over the sides. */
 #define SHARE_BITS 20
 /* Slopes in 14 bits and whole mm: rounded down, they are off by 4 mm each at the limits, and by less
  * than a mm for the origin and the centre. */
@@ -77,8 +72,9 @@ struct half {
  * the ring's outer rim in any direction. A loop without a branch: compilers turn it into vectors.
  * Depths below 2^14.1 mm, slopes up to 2^14. */
 static void flag_near(const struct ih_space *space, const int32_t centre_mm_q8[3],
-                      const struct half *half, struct ih_scan_scratch *scratch)
+                      struct ih_scan_scratch *scratch)
 {
+    const struct ih_scan_half *half = &scratch->half;
     const int32_t depth_mm = (centre_mm_q8[2] - space->origin_mm_q8[2]) >> 8;
     const int32_t x_mm = ((space->origin_mm_q8[0] - centre_mm_q8[0]) >> 8) + half->x_mm;
     const int32_t y_mm = ((space->origin_mm_q8[1] - centre_mm_q8[1]) >> 8) + half->y_mm;
@@ -116,11 +112,11 @@ static void add_ray(const struct ih_space *space, const struct ih_ellipsoid *hea
     }
 }
 
-static int32_t score_q12(const struct ih_space *space, const struct half *half,
-                         struct ih_scan_scratch *scratch, const struct ih_ellipsoid *head)
+static int32_t score_q12(const struct ih_space *space, struct ih_scan_scratch *scratch,
+                         const struct ih_ellipsoid *head)
 {
     struct sums sums = {0};
-    flag_near(space, head->centre_mm_q8, half, scratch);
+    flag_near(space, head->centre_mm_q8, scratch);
     for (int32_t first = 0; first < IH_SLOTS; first += 8) {
         uint64_t any; /* of eight slots */
         memcpy(&any, &scratch->near[first], sizeof any);
@@ -153,35 +149,38 @@ static bool is_near(const int32_t a_mm_q8[3], const int32_t b_mm_q8[3], int32_t 
     return ih_distance2_s32(a_mm_q8, b_mm_q8) <= limit * limit;
 }
 
-static bool is_taken(const struct ih_scan *out, const struct ih_scan_place *place,
-                     int32_t spacing_mm)
+/* Of what is left, the place that seems best, the first of equals; IH_NONE when nothing is left. */
+static int32_t best_left(const struct ih_scan_scratch *scratch, int32_t count)
 {
-    for (int32_t i = 0; i < out->place_count; i++) {
-        if (is_near(out->place[i].centre_mm_q8, place->centre_mm_q8, spacing_mm)) {
-            return true;
-        }
-    }
-    return false;
-}
-
-/* The best place that is not near one already taken; NULL when there is none. */
-static const struct ih_scan_place *best_left(const struct ih_scan_place *tried, int32_t count,
-                                             const struct ih_scan *out, int32_t spacing_mm)
-{
-    const struct ih_scan_place *best = NULL;
+    int32_t best = IH_NONE;
+    int32_t best_q12 = INT32_MIN;
     for (int32_t i = 0; i < count; i++) {
-        if ((best == NULL || tried[i].score_q12 > best->score_q12) &&
-            !is_taken(out, &tried[i], spacing_mm)) {
-            best = &tried[i];
+        const bool is_better = scratch->tried[i].score_q12 > best_q12;
+        if (is_better && scratch->state[i] != IH_SCAN_TAKEN) {
+            best = i;
+            best_q12 = scratch->tried[i].score_q12;
         }
     }
     return best;
 }
 
-/* What is the same for all centres. */
-static void prepare(const struct ih_space *space, struct ih_scan_scratch *scratch,
-                    struct half *half)
+/* A place is kept; nothing near it is looked at any more, nor is it itself. */
+static void take(struct ih_scan_scratch *scratch, int32_t count, int32_t index, int32_t spacing_mm,
+                 struct ih_scan *out)
 {
+    const struct ih_scan_place *kept = &scratch->tried[index];
+    out->place[out->place_count++] = *kept;
+    for (int32_t i = 0; i < count; i++) {
+        if (is_near(kept->centre_mm_q8, scratch->tried[i].centre_mm_q8, spacing_mm)) {
+            scratch->state[i] = IH_SCAN_TAKEN;
+        }
+    }
+}
+
+/* What is the same for all centres. */
+static void prepare(const struct ih_space *space, struct ih_scan_scratch *scratch)
+{
+    struct ih_scan_half *half = &scratch->half;
     int32_t slope_most_q20[2];
     ih_space_slope_most(space, slope_most_q20);
     const struct ih_ellipsoid mean = ih_ellipsoid_mean(space->origin_mm_q8);
@@ -196,31 +195,45 @@ static void prepare(const struct ih_space *space, struct ih_scan_scratch *scratc
         scratch->slope_q12[1][slot] = space->ray[slot].slope_y_q20 >> 8;
         scratch->aim[slot] = ih_ellipsoid_aim(mean.semi_mm_q8, &space->ray[slot]);
     }
+    ih_bound_prepare(space, &scratch->rays);
 }
 
+int32_t ih_scan_score_q12(const struct ih_space *space, struct ih_scan_scratch *scratch,
+                          const int32_t centre_mm_q8[3])
+{
+    const struct ih_ellipsoid head = ih_ellipsoid_mean(centre_mm_q8);
+    const int32_t score = score_q12(space, scratch, &head);
+    IH_IN_RANGE(score, IH_RANGE_SCAN_MIN_Q12, IH_RANGE_SCAN_MAX_Q12);
+    return score;
+}
+
+/* Bounds first: the score itself is worked out of what seems best and is not yet rated. What is rated
+ * and still seems best is the best. */
 void ih_scan_find(const struct ih_space *space, const struct ih_scan_params *params,
                   struct ih_scan_scratch *scratch, struct ih_scan *out)
 {
     int32_t count = 0;
-    struct half half;
-    prepare(space, scratch, &half);
+    prepare(space, scratch);
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
-        if (space->ray[slot].state != IH_RAY_SEEN) {
-            continue;
+        if (space->ray[slot].state == IH_RAY_SEEN) {
+            struct ih_scan_place *place = &scratch->tried[count];
+            centre_behind(&space->ray[slot], params->deep_mm, place->centre_mm_q8);
+            place->score_q12 = ih_bound_score_q12(space, &scratch->rays, place->centre_mm_q8);
+            scratch->state[count++] = IH_SCAN_BOUND;
         }
-        struct ih_scan_place *place = &scratch->tried[count++];
-        centre_behind(&space->ray[slot], params->deep_mm, place->centre_mm_q8);
-        struct ih_ellipsoid head = ih_ellipsoid_mean(place->centre_mm_q8);
-        place->score_q12 = score_q12(space, &half, scratch, &head);
-        IH_IN_RANGE(place->score_q12, IH_RANGE_SCAN_MIN_Q12, IH_RANGE_SCAN_MAX_Q12);
     }
     out->place_count = 0;
     while (out->place_count < params->place_max) {
-        const struct ih_scan_place *best =
-            best_left(scratch->tried, count, out, params->spacing_mm);
-        if (best == NULL) {
+        const int32_t best = best_left(scratch, count);
+        if (best == IH_NONE) {
             break;
         }
-        out->place[out->place_count++] = *best;
+        if (scratch->state[best] == IH_SCAN_RATED) {
+            take(scratch, count, best, params->spacing_mm, out);
+        } else {
+            struct ih_scan_place *place = &scratch->tried[best];
+            place->score_q12 = ih_scan_score_q12(space, scratch, place->centre_mm_q8);
+            scratch->state[best] = IH_SCAN_RATED;
+        }
     }
 }

@@ -13,19 +13,21 @@
  *        radii away, and not more down than aside, in mm) of
  *            1 where the surface lies more than 60 mm behind the centre, 0.7 where the ray is empty,
  *            0 where it is unknown, else -0.6.
- *        Either mean: fewer than 8 rays count as 8.
+ *        Either mean: fewer than 8 rays count as 8. No place is rated whose bound says that it will
+ *        not be kept.
  * Overflow: sums of 361 values within +-1 in Q12, times 60: 2^26.4. A centre is a point plus at
  *        most deep_mm on an axis; squares of distances 2^53.6.
  * Error: a score within 0.0005 of the float64 reference, but that a ray as good as on a limit may
  *        be counted either way (9250 scores, one in ten has such a ray); centres within 0.003 mm
  *        for slopes up to 1/2.
- * Cost:  points x (361 x 2 products in 32 bits, a crossing for the rays near by, about a hundred). 6
- *        million instructions for 320 points (x86-64-v3, gcc -O3, frames of sequence 1).
+ * Cost:  a bound for each point (ih_bound), and for what seems best the score: some 30 times 361 x 2
+ *        products in 32 bits and a crossing for the rays near by, about a hundred. 1.6 million
+ *        instructions for 320 points (x86-64-v3, gcc -O3, frames of both sequences).
  */
 #ifndef IH_SCAN_H
 #define IH_SCAN_H
 
-#include "ih_ellipsoid.h"
+#include "ih_bound.h"
 
 /* Places kept; each later costs a fit. */
 #define IH_SCAN_MAX 8
@@ -49,8 +51,19 @@ struct ih_scan {
 /* The slots, in whole words of 64 bits when each has a byte. */
 #define IH_SCAN_FLAGS ((IH_SLOTS + 7) / 8 * 8)
 
+/* Half sides of the box around a head and the ring, whole mm, and shares of them. */
+struct ih_scan_half {
+    int32_t x_mm, y_mm;
+    int32_t x_share, y_share;
+};
+
+enum ih_scan_state { IH_SCAN_BOUND, IH_SCAN_RATED, IH_SCAN_TAKEN };
+
 struct ih_scan_scratch {
-    struct ih_scan_place tried[IH_SLOTS];
+    struct ih_scan_place tried[IH_SLOTS]; /* with its score, or with the bound of it */
+    uint8_t state[IH_SLOTS];              /* enum ih_scan_state */
+    struct ih_scan_half half;
+    struct ih_bound_rays rays;
     int32_t slope_q12[2][IH_SCAN_FLAGS]; /* x and y of all rays, rounded down */
     uint8_t near[IH_SCAN_FLAGS];         /* 1 = the ray may meet the head or the ring around it */
     struct ih_aim aim[IH_SLOTS];         /* of all rays, at a mean head */
@@ -60,5 +73,9 @@ void ih_scan_params_default(struct ih_scan_params *params);
 
 void ih_scan_find(const struct ih_space *space, const struct ih_scan_params *params,
                   struct ih_scan_scratch *scratch, struct ih_scan *out);
+
+/* The score of a place, after ih_scan_find of this space with this scratch. */
+int32_t ih_scan_score_q12(const struct ih_space *space, struct ih_scan_scratch *scratch,
+                          const int32_t centre_mm_q8[3]);
 
 #endif

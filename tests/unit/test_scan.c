@@ -31,13 +31,6 @@ void tearDown(void)
 {
 }
 
-static void find(void)
-{
-    memset(&scratch, IH_TEST_FILL, sizeof scratch);
-    memset(&scan, IH_TEST_FILL, sizeof scan);
-    ih_scan_find(&space, &params, &scratch, &scan);
-}
-
 static int32_t seen_count(void)
 {
     int32_t slot, count = 0;
@@ -46,6 +39,25 @@ static int32_t seen_count(void)
         count += space.ray[slot].state == IH_RAY_SEEN;
     }
     return count;
+}
+
+/* Then every place is rated, which the scan itself does only where it may matter: no score is above
+ * its bound, and what it rated it rated so. */
+static void find(void)
+{
+    int32_t k;
+
+    memset(&scratch, IH_TEST_FILL, sizeof scratch);
+    memset(&scan, IH_TEST_FILL, sizeof scan);
+    ih_scan_find(&space, &params, &scratch, &scan);
+    for (k = 0; k < seen_count(); k++) {
+        struct ih_scan_place *place = &scratch.tried[k];
+        const int32_t score_q12 = ih_scan_score_q12(&space, &scratch, place->centre_mm_q8);
+
+        IH_TEST_RANGE(scratch.state[k] == IH_SCAN_RATED ? place->score_q12 : INT32_MIN,
+                      place->score_q12, score_q12, "score and bound", k);
+        place->score_q12 = score_q12;
+    }
 }
 
 static double from_q12(int32_t score_q12)
@@ -344,6 +356,24 @@ static void places_are_farther_apart_than_the_spacing(void)
     }
 }
 
+/* Most places are told by their bound: as many scores are worked out as a frame can afford. */
+static void few_places_are_rated(void)
+{
+    int32_t i, k, tried = 0, rated = 0;
+
+    for (i = 0; i < SCENE_COUNT; i++) {
+        make_scene(&vector_scenes[i]);
+        ih_scan_find(&space, &params, &scratch, &scan);
+        for (k = 0; k < seen_count(); k++) {
+            tried++;
+            rated += scratch.tried[k].score_q12 !=
+                     ih_bound_score_q12(&space, &scratch.rays, scratch.tried[k].centre_mm_q8);
+        }
+    }
+    TEST_ASSERT_TRUE(rated > 0);
+    TEST_ASSERT_TRUE(rated < tried / 5);
+}
+
 static void no_point_one_point_and_equal_points(void)
 {
     int32_t slot;
@@ -494,6 +524,7 @@ int main(void)
     RUN_TEST(many_rays_show_the_last_unit_of_a_value);
     RUN_TEST(few_rays_count_as_eight);
     RUN_TEST(places_are_farther_apart_than_the_spacing);
+    RUN_TEST(few_places_are_rated);
     RUN_TEST(no_point_one_point_and_equal_points);
     RUN_TEST(the_centre_is_behind_the_point_along_its_ray);
     RUN_TEST(places_keep_their_distance_and_come_best_first);
