@@ -1,54 +1,52 @@
 #include "ih_cuts.h"
 
-#include <string.h>
-
 #include "ih_fix.h"
 
 #define CELLS (IH_SURFACE_GRID - 1)
 /* Cells of a row, bit by bit; those at the border. */
 #define ALL_CELLS (((uint64_t)1 << CELLS) - 1)
 #define BORDER_CELLS ((uint64_t)1 << (CELLS - 1) | 1)
-_Static_assert(IH_SURFACE_GRID <= 64, "a row of nodes has a bit each in 64");
+/* Nodes of a row are looked at eight at a time. */
+#define EIGHTS ((IH_SURFACE_GRID + 7) / 8)
+/* Its product with eight bytes of 0 or 1 has them as bits in its highest byte: none meets another. */
+#define GATHER UINT64_C(0x0102040810204080)
+/* With a rise below this a crossing is worked out in 32 bits. */
+#define RISE_NARROW (1 << 22)
+_Static_assert(EIGHTS * 8 <= 64, "a row of nodes has a bit each in 64");
 
 /* Corners of a cell clockwise on the screen; edge i runs from corner i to corner i + 1. A contour
  * walks with the inside on its right, so it enters through an edge whose corner i is inside and
  * i + 1 outside, and leaves through one where it is the other way round. */
-static const int8_t corner_x[4] = {0, 1, 1, 0};
-static const int8_t corner_y[4] = {0, 0, 1, 1};
 static const int8_t beyond_x[4] = {0, 1, 0, -1};
 static const int8_t beyond_y[4] = {-1, 0, 1, 0};
+
+/* By the corners that are inside, 0, 1, 3 and 2 from the lowest bit: through which edge a contour
+ * leaves. Two opposite ones are a saddle, whose exit is not known by them; none or all have none. */
+#define SADDLE 4
+static const int8_t exit_of[16] = {-1, 3, 0, 3, 2, 2, SADDLE, 2, 1, SADDLE, 0, 3, 1, 1, 0, -1};
+
+/* An edge in its cell: its ends as nodes from the cell's first, its beginning, its direction. */
+struct line {
+    int32_t from, to;
+    int32_t x_q9, y_q9;
+    int32_t step_x, step_y;
+};
+static const struct line line_of_edge[4] = {
+    {0, 1, 0, 0, 1, 0},
+    {1, IH_SURFACE_GRID + 1, 512, 0, 0, 1},
+    {IH_SURFACE_GRID + 1, IH_SURFACE_GRID, 512, 512, -1, 0},
+    {IH_SURFACE_GRID, 0, 0, 512, 0, -1},
+};
 
 struct walker {
     int32_t x, y; /* cell */
     int32_t edge; /* entered through */
 };
 
-static int32_t corner_depth(const struct ih_surface *surface, int32_t x, int32_t y, int32_t corner)
+/* Corners 0, 1, 3, 2 from the lowest bit. */
+static uint32_t inside_corners(const struct ih_cuts *cuts, int32_t x, int32_t y)
 {
-    int32_t i = corner & 3;
-    return surface->depth_mm_q8[y + corner_y[i]][x + corner_x[i]];
-}
-
-static bool is_inside(const struct ih_surface *surface, const struct ih_cuts *cuts, int32_t x,
-                      int32_t y, int32_t corner)
-{
-    return corner_depth(surface, x, y, corner) < cuts->level_mm_q8;
-}
-
-/* Bit i = corner i is inside. */
-static uint32_t inside_corners(const struct ih_surface *surface, const struct ih_cuts *cuts,
-                               int32_t x, int32_t y)
-{
-    uint32_t corners = 0;
-    for (int32_t corner = 0; corner < 4; corner++) {
-        corners |= (uint32_t)is_inside(surface, cuts, x, y, corner) << corner;
-    }
-    return corners;
-}
-
-static bool can_enter(uint32_t corners, int32_t edge)
-{
-    return (corners >> edge & 1u) != 0 && (corners >> ((edge + 1) & 3) & 1u) == 0;
+    return (uint32_t)(cuts->inside[y] >> x & 3u) | (uint32_t)(cuts->inside[y + 1] >> x & 3u) << 2;
 }
 
 static bool is_cell(int32_t x, int32_t y)
@@ -56,68 +54,91 @@ static bool is_cell(int32_t x, int32_t y)
     return x >= 0 && y >= 0 && x < CELLS && y < CELLS;
 }
 
+/* Both corners inside are joined, or not. */
+static int32_t exit_of_saddle(const struct ih_surface *surface, const struct ih_cuts *cuts,
+                              const struct walker *at)
+{
+    int64_t sum = 0;
+    for (int32_t corner = 0; corner < 4; corner++) {
+        sum += surface->depth_mm_q8[at->y + corner / 2][at->x + corner % 2];
+    }
+    return (sum < 4 * (int64_t)cuts->level_mm_q8 ? at->edge + 1 : at->edge + 3) & 3;
+}
+
 /* The edge through which the contour leaves the cell. */
 static int32_t exit_edge(const struct ih_surface *surface, const struct ih_cuts *cuts,
                          const struct walker *at)
 {
-    bool opposite_inside = is_inside(surface, cuts, at->x, at->y, at->edge + 2);
-    bool last_inside = is_inside(surface, cuts, at->x, at->y, at->edge + 3);
-    if (opposite_inside && !last_inside) { /* saddle: both corners inside are joined, or not */
-        int64_t sum = 0;
-        for (int32_t corner = 0; corner < 4; corner++) {
-            sum += corner_depth(surface, at->x, at->y, corner);
-        }
-        return sum < 4 * (int64_t)cuts->level_mm_q8 ? at->edge + 1 : at->edge + 3;
+    const int32_t leave = exit_of[inside_corners(cuts, at->x, at->y)];
+    return leave == SADDLE ? exit_of_saddle(surface, cuts, at) : leave;
+}
+
+/* Where on an edge the level lies, from the end at `from`. One end is inside and one is not: the rise
+ * is not 0, the quotient in 0 .. 512. */
+static int32_t part_of_edge_q9(int64_t from, int64_t to, int64_t level)
+{
+    int64_t rise = to - from;
+    int64_t up = level - from;
+    if (rise < 0) {
+        rise = -rise;
+        up = -up;
     }
-    return at->edge + (opposite_inside ? 1 : last_inside ? 2 : 3);
+    if (rise < RISE_NARROW) {
+        return (int32_t)(((uint32_t)up * 512u + (uint32_t)rise / 2) / (uint32_t)rise);
+    }
+    return (int32_t)ih_div_round(up * 512, rise);
 }
 
 /* Where the level crosses an edge. */
-static struct ih_vertex crossing(const struct ih_surface *surface, const struct ih_cuts *cuts,
-                                 int32_t x, int32_t y, int32_t edge)
+static struct ih_vertex crossing(const struct ih_surface *surface, int32_t level_mm_q8, int32_t x,
+                                 int32_t y, int32_t edge)
 {
-    int32_t from = edge & 3;
-    int32_t to = (edge + 1) & 3;
-    int64_t from_depth = corner_depth(surface, x, y, from);
-    int64_t to_depth = corner_depth(surface, x, y, to);
-    /* One end is inside and one is not: the difference is not 0, the quotient in 0 .. 512. */
-    int64_t rise = to_depth - from_depth;
-    int64_t part_q9 =
-        ih_div_round((cuts->level_mm_q8 - from_depth) * (rise > 0 ? 512 : -512), ih_abs_s64(rise));
-    int64_t x_q9 = (x + corner_x[from]) * 512 + (corner_x[to] - corner_x[from]) * part_q9;
-    int64_t y_q9 = (y + corner_y[from]) * 512 + (corner_y[to] - corner_y[from]) * part_q9;
+    const struct line *line = &line_of_edge[edge];
+    const int32_t *node = &surface->depth_mm_q8[0][0] + (y * IH_SURFACE_GRID + x);
+    const int32_t part_q9 = part_of_edge_q9(node[line->from], node[line->to], level_mm_q8);
+    const int32_t x_q9 = x * 512 + line->x_q9 + line->step_x * part_q9;
+    const int32_t y_q9 = y * 512 + line->y_q9 + line->step_y * part_q9;
     IH_IN_RANGE(x_q9, 0, CELLS * 512);
     IH_IN_RANGE(y_q9, 0, CELLS * 512);
     return (struct ih_vertex){(int16_t)x_q9, (int16_t)y_q9};
 }
 
-static void add_vertex(struct ih_cuts *cuts, struct ih_vertex vertex, int32_t *count)
+/* Is the cell still to be entered through the edge? Then it is entered now. */
+static bool enter(struct ih_cuts *cuts, const struct walker *at)
 {
-    if (cuts->vertex_count + *count < IH_CUTS_VERTICES_MAX) {
-        cuts->vertex[cuts->vertex_count + *count] = vertex;
-    }
-    ++*count;
+    uint64_t *left = &cuts->entrance[at->edge >> 1][at->y];
+    const uint64_t cell = (uint64_t)1 << at->x;
+    const bool is_left = (*left & cell) != 0;
+    *left &= ~cell;
+    return is_left;
 }
 
 /* Follow one contour from where it enters a cell until it closes or leaves the grid. */
 static void trace(const struct ih_surface *surface, struct ih_cuts *cuts, struct walker at)
 {
+    const int32_t level_mm_q8 = cuts->level_mm_q8;
+    const int32_t room = IH_CUTS_VERTICES_MAX - cuts->vertex_count;
+    struct ih_vertex *vertex = &cuts->vertex[cuts->vertex_count];
     int32_t count = 0;
     bool closed = true;
-    while ((cuts->walked[at.y][at.x] & (1u << at.edge)) == 0) {
-        cuts->walked[at.y][at.x] |= (uint8_t)(1u << at.edge);
-        add_vertex(cuts, crossing(surface, cuts, at.x, at.y, at.edge), &count);
-        int32_t leave = exit_edge(surface, cuts, &at) & 3;
-        struct walker next = {at.x + beyond_x[leave], at.y + beyond_y[leave], (leave + 2) & 3};
-        if (!is_cell(next.x, next.y)) {
-            add_vertex(cuts, crossing(surface, cuts, at.x, at.y, leave), &count);
-            closed = false;
-            break;
+    while (closed && enter(cuts, &at)) {
+        if (count < room) {
+            vertex[count] = crossing(surface, level_mm_q8, at.x, at.y, at.edge);
         }
-        at = next;
+        count++;
+        const int32_t leave = exit_edge(surface, cuts, &at);
+        const struct walker next = {at.x + beyond_x[leave], at.y + beyond_y[leave], leave ^ 2};
+        closed = is_cell(next.x, next.y);
+        if (closed) {
+            at = next;
+        } else {
+            if (count < room) {
+                vertex[count] = crossing(surface, level_mm_q8, at.x, at.y, leave);
+            }
+            count++;
+        }
     }
-    if (cuts->vertex_count + count > IH_CUTS_VERTICES_MAX ||
-        cuts->contour_count == IH_CUTS_CONTOURS_MAX) {
+    if (count > room || cuts->contour_count == IH_CUTS_CONTOURS_MAX) {
         cuts->contours_dropped++;
         return;
     }
@@ -126,45 +147,60 @@ static void trace(const struct ih_surface *surface, struct ih_cuts *cuts, struct
     cuts->vertex_count += count;
 }
 
-/* Start contours at every edge of the cell that is an entrance and has not been walked. */
+/* Start contours at every entrance of the cell that is left. Of edges 0 and 1 only one can be an
+ * entrance, which one says the corner between them; so it is with 2 and 3. */
 static void start_in_cell(const struct ih_surface *surface, struct ih_cuts *cuts, int32_t x,
                           int32_t y, bool border)
 {
-    uint32_t corners = inside_corners(surface, cuts, x, y);
-    for (int32_t edge = 0; edge < 4; edge++) {
-        bool on_border = !is_cell(x + beyond_x[edge], y + beyond_y[edge]);
-        if ((on_border || !border) && can_enter(corners, edge) &&
-            (cuts->walked[y][x] & (1u << edge)) == 0) {
+    for (int32_t half = 0; half < 2; half++) {
+        const bool between_inside = (cuts->inside[y + half] >> (x + 1 - half) & 1u) != 0;
+        const int32_t edge = 2 * half + (between_inside ? 1 : 0);
+        const bool on_border = !is_cell(x + beyond_x[edge], y + beyond_y[edge]);
+        if ((cuts->entrance[half][y] >> x & 1u) != 0 && (on_border || !border)) {
             trace(surface, cuts, (struct walker){x, y, edge});
         }
     }
 }
 
 /* Bit x = node x of a row is inside. */
-static uint64_t inside_nodes(const struct ih_surface *surface, int32_t level_mm_q8, int32_t y)
+static uint64_t inside_nodes(const int32_t depth_mm_q8[IH_SURFACE_GRID], int32_t level_mm_q8)
 {
+    uint8_t is_inside[EIGHTS * 8];
+    for (int32_t x = 0; x < IH_SURFACE_GRID; x++) {
+        is_inside[x] = depth_mm_q8[x] < level_mm_q8;
+    }
+    for (int32_t x = IH_SURFACE_GRID; x < EIGHTS * 8; x++) {
+        is_inside[x] = 0;
+    }
     uint64_t nodes = 0;
-    for (int32_t x = IH_SURFACE_GRID - 1; x >= 0; x--) {
-        nodes = nodes << 1 | (surface->depth_mm_q8[y][x] < level_mm_q8);
+    for (int32_t i = 0; i < EIGHTS; i++) {
+        const uint8_t *b = &is_inside[8 * i]; /* one load, where the lowest byte comes first */
+        const uint64_t eight = (uint64_t)b[0] | (uint64_t)b[1] << 8 | (uint64_t)b[2] << 16 |
+                               (uint64_t)b[3] << 24 | (uint64_t)b[4] << 32 | (uint64_t)b[5] << 40 |
+                               (uint64_t)b[6] << 48 | (uint64_t)b[7] << 56;
+        nodes |= IH_WRAPS(uint64_t, eight * GATHER) >> 56 << (8 * i);
     }
     return nodes;
 }
 
-/* Bit x = a contour passes cell x between two rows of nodes: some corners are inside, some not. */
-static uint64_t passed_cells(uint64_t above, uint64_t below)
+/* Which cells a contour enters through edge 0 or 1, and which through 2 or 3. */
+static void find_entrances(struct ih_cuts *cuts)
 {
-    uint64_t any = above | above >> 1 | below | below >> 1;
-    uint64_t all = above & above >> 1 & below & below >> 1;
-    return any & ~all & ALL_CELLS;
+    for (int32_t y = 0; y < CELLS; y++) {
+        const uint64_t corner0 = cuts->inside[y], corner1 = corner0 >> 1;
+        const uint64_t corner3 = cuts->inside[y + 1], corner2 = corner3 >> 1;
+        cuts->entrance[0][y] = ((corner0 & ~corner1) | (corner1 & ~corner2)) & ALL_CELLS;
+        cuts->entrance[1][y] = ((corner2 & ~corner3) | (corner3 & ~corner0)) & ALL_CELLS;
+    }
 }
 
 /* Contours that begin at the border come first, so that an open one is found from its beginning. */
-static void start_contours(const struct ih_surface *surface, struct ih_cuts *cuts,
-                           const uint64_t passed[CELLS], bool border)
+static void start_contours(const struct ih_surface *surface, struct ih_cuts *cuts, bool border)
 {
     for (int32_t y = 0; y < CELLS; y++) {
         bool border_row = y == 0 || y == CELLS - 1;
-        uint64_t left = passed[y] & (border && !border_row ? BORDER_CELLS : ALL_CELLS);
+        uint64_t left = (cuts->entrance[0][y] | cuts->entrance[1][y]) &
+                        (border && !border_row ? BORDER_CELLS : ALL_CELLS);
         for (; left != 0; left &= left - 1) {
             start_in_cell(surface, cuts, __builtin_ctzll(left), y, border);
         }
@@ -177,14 +213,10 @@ void ih_cuts_level(const struct ih_surface *surface, int32_t level_mm_q8, struct
     out->contour_count = 0;
     out->vertex_count = 0;
     out->contours_dropped = 0;
-    memset(out->walked, 0, sizeof out->walked);
-    uint64_t passed[CELLS];
-    uint64_t above = inside_nodes(surface, level_mm_q8, 0);
-    for (int32_t y = 0; y < CELLS; y++) {
-        uint64_t below = inside_nodes(surface, level_mm_q8, y + 1);
-        passed[y] = passed_cells(above, below);
-        above = below;
+    for (int32_t y = 0; y < IH_SURFACE_GRID; y++) {
+        out->inside[y] = inside_nodes(surface->depth_mm_q8[y], level_mm_q8);
     }
-    start_contours(surface, out, passed, true);
-    start_contours(surface, out, passed, false);
+    find_entrances(out);
+    start_contours(surface, out, true);
+    start_contours(surface, out, false);
 }

@@ -8,7 +8,8 @@
  *        for all, so contours never cross. Every contour runs with the inside (nearer) on its
  *        right as seen on a screen (x right, y down): its signed area, sum(x0 y1 - x1 y0) / 2, is
  *        positive around a minimum of depth and negative around a maximum.
- * Cost:  one comparison per node; one division per vertex.
+ * Cost:  one comparison per node; one division per vertex. Nodes and cells are bits of a row, so that
+ *        only cells that a contour passes are looked at.
  * Full tables drop and count: a contour that does not fit is left out whole, contours_dropped.
  */
 #ifndef IH_CUTS_H
@@ -37,8 +38,10 @@ struct ih_cuts {
     int32_t contours_dropped;
     struct ih_contour contour[IH_CUTS_CONTOURS_MAX];
     struct ih_vertex vertex[IH_CUTS_VERTICES_MAX];
-    /* scratch: bit i = the cell was entered through its edge i */
-    uint8_t walked[IH_SURFACE_GRID][IH_SURFACE_GRID];
+    /* scratch, bit x of row y: node x is nearer; cell x is still to be entered by a contour, through its
+     * upper or right edge, through its lower or left one */
+    uint64_t inside[IH_SURFACE_GRID];
+    uint64_t entrance[2][IH_SURFACE_GRID];
 };
 
 void ih_cuts_level(const struct ih_surface *surface, int32_t level_mm_q8, struct ih_cuts *out);
