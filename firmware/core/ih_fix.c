@@ -57,25 +57,6 @@ uint32_t ih_isqrt_u64(uint64_t value)
     return (uint32_t)(root >> half);
 }
 
-void ih_roots_u54(const uint64_t *square, int32_t count, uint32_t *root)
-{
-    /* As above, but with one correction, rounded at once: at 2^31 .. 2^32 it is short by 36, and the
-     * values are small enough for at most 36 / 2^5 of that to be left. */
-    for (int32_t i = 0; i < count; i++) {
-        const int half = __builtin_clzll(square[i]) / 2; /* none is 0 */
-        const uint64_t shifted = square[i] << (2 * half);
-        const uint64_t r_q15 = inverse_root_q15((uint32_t)(shifted >> 32));
-        uint64_t wide = ((shifted >> 32) * r_q15) >> 15;
-        wide += ((shifted - wide * wide) >> 16) * r_q15 >> 32;
-        int64_t nearest = (int64_t)(wide >> half);
-        for (int64_t rest = (int64_t)square[i] - nearest * nearest; rest > nearest;
-             rest -= 2 * nearest - 1) {
-            nearest++;
-        }
-        root[i] = (uint32_t)nearest;
-    }
-}
-
 /* atan(2^-i) in millionths of a degree. */
 static const int32_t atan_udeg[] = {45000000, 26565051, 14036243, 7125016, 3576334, 1789911,
                                     895174,   447614,   223811,   111906,  55953,   27976,

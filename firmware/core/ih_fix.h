@@ -112,9 +112,6 @@ static inline int64_t ih_distance2_s32(const int32_t a[3], const int32_t b[3])
 /* floor(sqrt(value)), exact for all 2^64 inputs. */
 uint32_t ih_isqrt_u64(uint64_t value);
 
-/* Square roots of whole numbers, rounded to nearest; each in 1 .. 2^54 - 1. */
-void ih_roots_u54(const uint64_t *square, int32_t count, uint32_t *root);
-
 /* Number of bits needed for value; 0 for 0. */
 static inline int ih_bits_u64(uint64_t value)
 {

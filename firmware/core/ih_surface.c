@@ -33,9 +33,9 @@ static void place_centres(struct ih_surface_scratch *scratch)
     }
 }
 
-/* The sample's row of the basis: sqrt(dx^2 + dy^2 + 1), Q20, rounded. dx, dy < 60 in Q16: the
- * radicand in Q40 is below 2^53. */
-static void fill_row(const struct ih_surface_scratch *scratch, const struct ih_sample *sample,
+/* The sample's row of the basis: sqrt(dx^2 + dy^2 + 1), Q20, rounded. dx, dy < 60 in Q16: the radicand in
+ * Q32 is below 2^45. */
+static void fill_row(struct ih_surface_scratch *scratch, const struct ih_sample *sample,
                      uint32_t row_q20[TERMS])
 {
     uint64_t dx2_q32[IH_SURFACE_CENTRES];
@@ -46,12 +46,11 @@ static void fill_row(const struct ih_surface_scratch *scratch, const struct ih_s
     for (int32_t k = 0; k < IH_SURFACE_CENTRES; k++) {
         int64_t dy = (int64_t)sample->y_q16 - scratch->centre_q16[k];
         uint64_t dy2_q32 = (uint64_t)(dy * dy);
-        uint64_t square_q40[IH_SURFACE_CENTRES];
         for (int32_t column = 0; column < IH_SURFACE_CENTRES; column++) {
-            square_q40[column] = (dx2_q32[column] + dy2_q32) << 8;
+            scratch->square_q32[k * IH_SURFACE_CENTRES + column] = dx2_q32[column] + dy2_q32;
         }
-        ih_roots_u54(square_q40, IH_SURFACE_CENTRES, &row_q20[k * IH_SURFACE_CENTRES]);
     }
+    ih_basis_roots(scratch->square_q32, TERMS, row_q20);
     IH_IN_RANGE(row_q20[0], 1 << 20, IH_RANGE_BASIS_Q20);
 }
 

@@ -20,6 +20,7 @@
 #ifndef IH_SURFACE_H
 #define IH_SURFACE_H
 
+#include "ih_basis.h"
 #include "ih_cholesky.h"
 #include "ih_normal.h"
 #include "ih_samples.h"
@@ -72,7 +73,8 @@ struct ih_surface_scratch {
         int32_t table_q20[IH_SURFACE_STEPS][2 * IH_SURFACE_STEPS - 1];
     } of;
     int64_t right_q28[IH_SURFACE_TERMS];
-    uint32_t basis_q20[IH_SURFACE_TERMS];                      /* a sample's row */
+    uint64_t square_q32[IH_SURFACE_TERMS]; /* of its distances from the centres, and 1 */
+    uint32_t basis_q20[IH_SURFACE_TERMS];  /* a sample's row */
     ih_normal_entry row_q20[IH_NORMAL_ROWS][IH_SURFACE_TERMS]; /* such rows, weighted */
     uint32_t scale[IH_SURFACE_TERMS];   /* 0.995 * 2^51 / sqrt(N_ii), N in Q40 */
     int32_t solution[IH_SURFACE_TERMS]; /* the right side before */

@@ -10,6 +10,6 @@ mkdir -p build/exhaustive
 for name in fix basis; do
     "${CC:-cc}" -std=c11 -O2 -ffp-contract=off -Ifirmware/core -Itests/unit -isystem "$unity" \
         "tests/unit/test_$name.c" "$unity/unity.c" firmware/core/ih_fix.c firmware/core/ih_cholesky.c \
-        firmware/core/ih_normal.c -lm -o "build/exhaustive/test_$name"
+        firmware/core/ih_normal.c firmware/core/ih_basis.c -lm -o "build/exhaustive/test_$name"
     "build/exhaustive/test_$name" --all
 done

@@ -36,6 +36,7 @@ CORE_HEADERS = {
     "ih_blob.h": CORE_SHARED,
     "ih_cholesky.h": {"ih_config.h", "ih_types.h"},
     "ih_normal.h": {"ih_config.h", "ih_types.h"},
+    "ih_basis.h": {"ih_config.h", "ih_types.h"},
     "ih_band.h": {"ih_config.h", "ih_types.h"},
     "ih_noise.h": {"ih_config.h", "ih_types.h", "ih_band.h"},
     "ih_dots.h": CORE_SHARED | {"ih_noise.h"},
@@ -47,7 +48,7 @@ CORE_HEADERS = {
     "ih_windows.h": CORE_SHARED,
     "ih_points.h": CORE_SHARED | {"ih_labels.h", "ih_windows.h"},
     "ih_samples.h": CORE_SHARED | {"ih_points.h"},
-    "ih_surface.h": CORE_SHARED | {"ih_samples.h", "ih_cholesky.h", "ih_normal.h"},
+    "ih_surface.h": CORE_SHARED | {"ih_samples.h", "ih_basis.h", "ih_cholesky.h", "ih_normal.h"},
     "ih_cuts.h": CORE_SHARED | {"ih_surface.h"},
     "ih_parts.h": CORE_SHARED | {"ih_cuts.h"},
     "ih_ellipse.h": CORE_SHARED | {"ih_parts.h"},
@@ -67,8 +68,8 @@ CORE_HEADERS = {
     "isohead.h": CORE_SHARED | {"ih_result.h"},
 }
 CORE_SYSTEM = {"stdbool.h", "stddef.h", "stdint.h", "string.h"}
-# The vectors of x86, for one file that has the same without.
-CORE_VECTORS = {("ih_normal.c", "immintrin.h")}
+# The vectors of x86, for files that have the same without.
+CORE_VECTORS = {("ih_normal.c", "immintrin.h"), ("ih_basis.c", "immintrin.h")}
 
 INCLUDE = re.compile(r'^\s*#\s*include\s*(["<])([^">]+)[">]')
 

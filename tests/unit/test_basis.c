@@ -4,7 +4,7 @@
 
 #include "ih_test.h"
 
-/* In its own words: the two functions are static. */
+/* In its own words: its functions are static. */
 #include "ih_surface.c"
 
 #define PLACE_MOST ((IH_SAMPLES_REACH << 16) - 1)
@@ -47,6 +47,62 @@ static void check_row(int32_t x_q16, int32_t y_q16)
     for (i = 0; i < TERMS; i++) {
         check_basis((int64_t)x_q16 - scratch.centre_q16[i % CENTRES],
                     (int64_t)y_q16 - scratch.centre_q16[i / CENTRES], row_q20[i]);
+    }
+}
+
+/* Is it the nearest whole number to 16 sqrt(square)? In whole numbers: the square of a root less or more a
+ * half. */
+static void check_roots(const uint64_t square_q32[IH_BASIS_GROUP])
+{
+    uint32_t root_q20[IH_BASIS_GROUP + 1];
+    int i;
+
+    root_q20[IH_BASIS_GROUP] = 77;
+    ih_basis_roots(square_q32, IH_BASIS_GROUP, root_q20);
+    for (i = 0; i < IH_BASIS_GROUP; i++) {
+        const int64_t root = root_q20[i];
+        const int64_t rest = (int64_t)(square_q32[i] << 8) - root * root;
+
+        if (rest > root || rest <= -root) {
+            IH_TEST_WITHIN(0.5, sqrt(ldexp((double)square_q32[i], 8)), root, "root", i);
+        }
+    }
+    TEST_ASSERT_EQUAL_UINT32(77, root_q20[IH_BASIS_GROUP]);
+}
+
+/* Where the root changes from one whole number to the next: the squares before and behind each such
+ * place, for all roots that there are. */
+static void roots_change_half_way_between_squares(void)
+{
+    uint64_t square_q32[IH_BASIS_GROUP];
+    int64_t root;
+    int i;
+
+    for (root = 1 << 20; root <= IH_RANGE_BASIS_Q20; root += is_all ? 1 : 499) {
+        for (i = 0; i < IH_BASIS_GROUP; i++) {
+            square_q32[i] = (uint64_t)((root * root + root) / 256 + i - IH_BASIS_GROUP / 2 + 1);
+        }
+        check_roots(square_q32);
+    }
+}
+
+/* Places where the number of leading zeros changes, and entries of the table; the least and the greatest. */
+static void roots_hold_at_the_ends_of_spans(void)
+{
+    const uint64_t most = (uint64_t)7201 << 32;
+    uint64_t square_q32[IH_BASIS_GROUP];
+    uint64_t span;
+    int bit, i;
+
+    for (bit = 32; bit <= 44; bit++) {
+        for (span = 0; span < 64; span++) {
+            for (i = 0; i < IH_BASIS_GROUP; i++) {
+                const uint64_t at = ((64 + span) << (bit - 6)) + (uint64_t)i - IH_BASIS_GROUP / 2;
+
+                square_q32[i] = at < (uint64_t)1 << 32 ? (uint64_t)1 << 32 : at > most ? most : at;
+            }
+            check_roots(square_q32);
+        }
     }
 }
 
@@ -119,6 +175,8 @@ int main(int count, char **arguments)
 {
     is_all = count == 2 && strcmp(arguments[1], "--all") == 0;
     UNITY_BEGIN();
+    RUN_TEST(roots_change_half_way_between_squares);
+    RUN_TEST(roots_hold_at_the_ends_of_spans);
     RUN_TEST(centres_stand_evenly);
     RUN_TEST(every_place_has_its_basis);
     RUN_TEST(any_place_has_its_basis);

@@ -347,38 +347,6 @@ static void isqrt_changes_exactly_at_squares(void)
     }
 }
 
-/* The root changes to k between k^2 - k and the next whole number: with these exact it is exact for all. */
-static void roots_change_half_way_between_squares(void)
-{
-    const uint64_t stride = is_all ? 1 : 127;
-    uint64_t k;
-
-    for (k = 2; k < 1u << 27; k += stride) {
-        const uint64_t square[4] = {k * k - k, k * k - k + 1, k * k, k * k + k};
-        uint32_t root[4];
-
-        ih_roots_u54(square, 4, root);
-        if (root[0] != k - 1 || root[1] != k || root[2] != k || root[3] != k) {
-            IH_TEST_EQUAL(k - 1, root[0], "below half way", (int64_t)k);
-            IH_TEST_EQUAL(k, root[1], "behind half way", (int64_t)k);
-            IH_TEST_EQUAL(k, root[2], "square", (int64_t)k);
-            IH_TEST_EQUAL(k, root[3], "below the next half", (int64_t)k);
-        }
-    }
-}
-
-static void roots_hold_at_both_ends(void)
-{
-    const uint64_t square[3] = {1, 2, ((uint64_t)1 << 54) - 1};
-    uint32_t root[4] = {0, 0, 0, 77};
-
-    ih_roots_u54(square, 3, root);
-    TEST_ASSERT_EQUAL_UINT32(1, root[0]);
-    TEST_ASSERT_EQUAL_UINT32(1, root[1]);
-    TEST_ASSERT_EQUAL_UINT32(1u << 27, root[2]);
-    TEST_ASSERT_EQUAL_UINT32(77, root[3]);
-}
-
 /* double has 53 bits: its root is exact enough for every value of 32 bits, and every number of bits
  * above it. */
 static void isqrt_is_doubles_root_cut_off(void)
@@ -516,8 +484,6 @@ int main(int count, char **arguments)
     RUN_TEST(atan2_follows_libm_round_the_circle);
     RUN_TEST(atan2_follows_libm_for_any_size);
     RUN_TEST(isqrt_changes_exactly_at_squares);
-    RUN_TEST(roots_change_half_way_between_squares);
-    RUN_TEST(roots_hold_at_both_ends);
     RUN_TEST(isqrt_is_doubles_root_cut_off);
     RUN_TEST(div_round_is_doubles_quotient_rounded);
     RUN_TEST(div_round_is_exact_near_powers_of_two);
