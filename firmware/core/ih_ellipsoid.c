@@ -112,6 +112,15 @@ bool ih_ellipsoid_cross_aimed(const struct ih_ellipsoid *ellipsoid, const int32_
     return true;
 }
 
+struct ih_shares ih_ellipsoid_shares(const int32_t semi_mm_q8[3])
+{
+    struct ih_shares shares;
+    for (int axis = 0; axis < 3; axis++) {
+        shares.share_q50[axis] = ((int64_t)1 << 50) / semi_mm_q8[axis] + 1;
+    }
+    return shares;
+}
+
 bool ih_ellipsoid_place(const struct ih_ellipsoid *ellipsoid, const int32_t point_mm_q8[3],
                         int32_t place_q14[3])
 {

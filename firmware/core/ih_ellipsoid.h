@@ -74,6 +74,25 @@ struct ih_ellipsoid_box ih_ellipsoid_box(const struct ih_ellipsoid *ellipsoid,
 bool ih_ellipsoid_in_box(const struct ih_ellipsoid *ellipsoid, const struct ih_ellipsoid_box *box,
                          const int32_t origin_mm_q8[3], const struct ih_ray *ray);
 
+/* Inverses of the semi-axes: what is divided by the same one many times is multiplied instead. */
+struct ih_shares {
+    int64_t share_q50[3]; /* 2^50 / semi, made greater by 1 at most, and by something */
+};
+
+struct ih_shares ih_ellipsoid_shares(const int32_t semi_mm_q8[3]);
+
+/* Offsets farther than this are out of reach: IH_ELLIPSOID_REACH of the greatest semi-axis are less. */
+#define IH_SHARE_MOST (1 << 19)
+
+/* ih_div_round(offset * 2^14, semi), to the last bit, for |offset| up to IH_SHARE_MOST. The product is
+ * too great by up to |offset|, 2^-17 of the quotient's last place, and a quotient that is not on a half
+ * is at least 1 / (2 semi), 2^-16.7, away from the next. One that is on a half comes out beyond it, on
+ * either side of zero: rounded away from zero, as there. */
+static inline int32_t ih_share(int64_t share_q50, int32_t offset)
+{
+    return (int32_t)((offset * share_q50 + ((int64_t)1 << 35)) >> 36);
+}
+
 /* A point in the ellipsoid's units. False when beyond the reach on any axis. */
 bool ih_ellipsoid_place(const struct ih_ellipsoid *ellipsoid, const int32_t point_mm_q8[3],
                         int32_t place_q14[3]);

@@ -27,11 +27,21 @@ struct share {
     int32_t part, all;
 };
 
+/* The candidate, and what is the same for all rays. */
+struct candidate {
+    const struct ih_ellipsoid *ellipsoid;
+    const int32_t *origin_mm_q8;
+    int32_t depth_mm_q8; /* of its centre, from the origin */
+    struct ih_shares shares;
+    struct ih_ellipsoid_box box; /* rays through it pass here */
+};
+
 /* One ray against the candidate. */
 struct view {
     const struct ih_ray *ray;
-    struct ih_crossing crossing;
-    int32_t x_mm_q8, y_mm_q8; /* offset at the centre's depth */
+    bool may_hit;
+    int32_t at_q14[2];        /* offset at the centre's depth, in semi-axes */
+    int32_t x_mm_q8, y_mm_q8; /* and in mm */
     int32_t below_chin_mm_q8; /* y less the semi-axis up */
     int32_t dz_mm_q8;         /* of its point, against the centre */
     int64_t distance2_q28;    /* of the offset, in semi-axes */
@@ -58,14 +68,29 @@ const char *ih_evidence_text(enum ih_evidence_kind kind)
     return (uint32_t)kind < IH_EVIDENCE_COUNT ? text[kind] : NULL;
 }
 
-static bool make_view(const struct ih_space *space, const struct ih_ellipsoid *ellipsoid,
-                      int32_t slot, struct view *view)
+/* False: farther away than IH_ELLIPSOID_REACH semi-axes. */
+static bool make_view(const struct candidate *candidate, const struct ih_ray *ray,
+                      struct view *view)
 {
-    view->ray = &space->ray[slot];
-    if (!ih_ellipsoid_cross(ellipsoid, space->origin_mm_q8, view->ray, &view->crossing)) {
-        return false;
+    const struct ih_ellipsoid *ellipsoid = candidate->ellipsoid;
+    const int32_t slope_q20[2] = {ray->slope_x_q20, ray->slope_y_q20};
+    view->ray = ray;
+    view->may_hit = true;
+    for (int axis = 0; axis < 2; axis++) {
+        const int64_t off_q8 = candidate->origin_mm_q8[axis] +
+                               ih_mul_shift(candidate->depth_mm_q8, slope_q20[axis], 20) -
+                               ellipsoid->centre_mm_q8[axis];
+        if (ih_abs_s64(off_q8) > IH_SHARE_MOST) {
+            return false;
+        }
+        const int32_t at_q14 = ih_share(candidate->shares.share_q50[axis], (int32_t)off_q8);
+        if (ih_abs_s32(at_q14) > IH_ELLIPSOID_REACH << 14) {
+            return false;
+        }
+        view->at_q14[axis] = at_q14;
+        view->may_hit = view->may_hit && ih_abs_s64(off_q8) <= candidate->box.half_mm_q8[axis];
     }
-    const int32_t *at_q14 = view->crossing.at_q14;
+    const int32_t *at_q14 = view->at_q14;
     view->x_mm_q8 = (int32_t)ih_mul_shift(at_q14[0], ellipsoid->semi_mm_q8[0], 14);
     view->y_mm_q8 = (int32_t)ih_mul_shift(at_q14[1], ellipsoid->semi_mm_q8[1], 14);
     view->below_chin_mm_q8 = view->y_mm_q8 - ellipsoid->semi_mm_q8[1];
@@ -104,22 +129,26 @@ static void add_on(const struct view *view, const struct ih_ellipsoid *ellipsoid
 }
 
 /* Rays through the head. */
-static void look_inside(const struct view *view, const struct ih_ellipsoid *ellipsoid,
+static void look_inside(const struct candidate *candidate, const struct view *view,
                         struct tally *tally)
 {
+    const struct ih_ellipsoid *ellipsoid = candidate->ellipsoid;
+    struct ih_crossing crossing;
     int32_t place_q14[3], off_q8;
-    if (view->crossing.radius2_q14 >= INSIDE_Q14) {
+    if (!view->may_hit ||
+        !ih_ellipsoid_cross(ellipsoid, candidate->origin_mm_q8, view->ray, &crossing) ||
+        crossing.radius2_q14 >= INSIDE_Q14) {
         return;
     }
     if (!view->is_seen) {
         tally->through += view->ray->state == IH_RAY_EMPTY;
         return;
     }
-    int32_t behind_q8 = view->ray->point_mm_q8[2] - view->crossing.entry_mm_q8;
+    int32_t behind_q8 = view->ray->point_mm_q8[2] - crossing.entry_mm_q8;
     tally->through += behind_q8 > THROUGH_MM_Q8;
     tally->front += behind_q8 < -FRONT_MM_Q8;
     if (ih_ellipsoid_place(ellipsoid, view->ray->point_mm_q8, place_q14) &&
-        ih_fit_distance(ellipsoid, place_q14, &off_q8) && ih_abs_s32(off_q8) < ON_MM_Q8) {
+        ih_row_distance(ellipsoid, place_q14, &off_q8) && ih_abs_s32(off_q8) < ON_MM_Q8) {
         tally->hit++;
         add_on(view, ellipsoid, off_q8, tally);
     }
@@ -128,8 +157,8 @@ static void look_inside(const struct view *view, const struct ih_ellipsoid *elli
 /* Rays around and above the head: is it open there? */
 static void look_around(const struct view *view, struct tally *tally)
 {
-    int64_t ex = view->crossing.at_q14[0];
-    int64_t ey = view->crossing.at_q14[1];
+    int64_t ex = view->at_q14[0];
+    int64_t ey = view->at_q14[1];
     if (!view->is_telling) {
         return;
     }
@@ -277,13 +306,22 @@ void ih_evidence_collect(const struct ih_space *space, const struct ih_ellipsoid
                          struct ih_evidence *out)
 {
     struct tally tally;
+    struct candidate candidate = {
+        .ellipsoid = ellipsoid,
+        .origin_mm_q8 = space->origin_mm_q8,
+        .depth_mm_q8 = ellipsoid->centre_mm_q8[2] - space->origin_mm_q8[2],
+        .shares = ih_ellipsoid_shares(ellipsoid->semi_mm_q8),
+    };
+    int32_t slope_most_q20[2];
+    ih_space_slope_most(space, slope_most_q20);
+    candidate.box = ih_ellipsoid_box(ellipsoid, slope_most_q20, INSIDE_Q14);
     memset(&tally, 0, sizeof tally);
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
         struct view view;
-        if (!make_view(space, ellipsoid, slot, &view)) {
+        if (!make_view(&candidate, &space->ray[slot], &view)) {
             continue;
         }
-        look_inside(&view, ellipsoid, &tally);
+        look_inside(&candidate, &view, &tally);
         look_around(&view, &tally);
         look_below(&view, ellipsoid, &tally);
         tally.before += view.is_seen && view.distance2_q28 < AROUND2_Q28 &&

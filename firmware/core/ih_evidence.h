@@ -15,7 +15,7 @@
  *        central ones 2^23.6, their determinants 2^48.2, times 2^12 2^60.2.
  * Error: counts are exact but where a ray passes within 2^-10 of a limit; rough within 0.03 mm, bulge
  *        within 0.06 mm.
- * Cost:  361 crossings.
+ * Cost:  two products for each of 361 rays, a crossing for those that may hit the ellipsoid.
  */
 #ifndef IH_EVIDENCE_H
 #define IH_EVIDENCE_H

@@ -111,6 +111,7 @@ struct work {
     const struct ih_heads *heads;
     const struct ih_rig *rig;
     const struct ih_findings_params *params;
+    struct ih_row_scratch *rows;
     struct ih_findings *out;
 };
 
@@ -120,7 +121,7 @@ static void try_start(const struct work *work, const struct ih_ellipsoid *start,
     const struct ih_findings_params *params = work->params;
     struct ih_finding finding = {.source = (int32_t)source};
     struct ih_score score;
-    ih_fit_ellipsoid(work->space, &params->fit, start, &finding.head);
+    ih_fit_ellipsoid(work->space, &params->fit, start, work->rows, &finding.head);
     if (finding.head.centre_mm_q8[2] - finding.head.semi_mm_q8[2] < params->front_least_mm << 8) {
         return;
     }
@@ -159,13 +160,14 @@ void ih_findings_add(const struct ih_points *points, const struct ih_dots *dots,
                      const struct ih_rig *rig, const struct ih_findings_params *params,
                      struct ih_findings_scratch *scratch, struct ih_findings *out)
 {
-    const struct work work = {&scratch->space, heads, rig, params, out};
+    const struct work work = {&scratch->space, heads, rig, params, &scratch->rows, out};
     if (points->seen_count == 0) {
         return;
     }
     out->seen_count += points->seen_count;
     ih_space_make(points, dots, rig, &params->space, &scratch->space);
     ih_scan_find(&scratch->space, &params->scan, &scratch->scan_scratch, &scratch->scan);
+    ih_row_prepare(&scratch->space, &scratch->rows.rays);
     for (int32_t i = 0; i < scratch->scan.place_count; i++) {
         try_place(&work, scratch->scan.place[i].centre_mm_q8, IH_SOURCE_SCAN);
     }

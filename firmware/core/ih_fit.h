@@ -16,8 +16,8 @@
  *        weight 0.5, not robust. A point may count both ways, as one on the ellipsoid's back does.
  *        Rays without a point say nothing here: hair is often dark. Priors: ln axes 0.09 around the
  *        mean head, centre 60 mm around the start on each axis, both against 6 mm for a point.
- *        A step moves the centre at most 40 mm and a logarithm 0.15 on each axis; the logarithms
- *        stay within 0.35 of the mean's.
+ *        What a step's points say is collected by ih_row. A step moves the centre at most 40 mm and
+ *        a logarithm 0.15 on each axis; the logarithms stay within 0.35 of the mean's.
  * Units: unknowns are mm and hundredths of ln, so that all derivatives are of order one.
  * Overflow: derivatives of what has a weight are below 3.6, 2^15.9 in Q14: a product with a weight
  *        of 2^16 is below 2^31.9 before its shift, with another derivative 2^33.8, with a residual
@@ -31,18 +31,15 @@
  *        Against the truth in these scenes, starts 35 mm off: at most 5 mm for a mean head, 10 for
  *        one a tenth larger in every direction. A fifth of all dots anywhere between 0.5 and 2.5 m:
  *        17 mm (median of 30 fits; worst 56), because wrong dots behind the head push.
- * Cost:  steps x (a box test for each point + a crossing for each that passes + points in reach
- *        x 27 products), one Cholesky of 6 a step. 0.5 million instructions a fit with 320 points
- *        (x86-64, gcc -O3, frames of sequence 1).
+ * Cost:  steps x (ih_row, one Cholesky of 6). 0.2 million instructions a fit with 320 points
+ *        (x86-64-v3, gcc -O3, frames of both sequences).
  */
 #ifndef IH_FIT_H
 #define IH_FIT_H
 
-#include "ih_cholesky.h"
-#include "ih_ellipsoid.h"
+#include "ih_row.h"
 
 #define IH_FIT_STEPS 6
-#define IH_FIT_UNKNOWNS 6
 
 struct ih_fit_params {
     int32_t see_through_mm; /* a point this far behind the entry is seen through the ellipsoid */
@@ -51,12 +48,9 @@ struct ih_fit_params {
 
 void ih_fit_params_default(struct ih_fit_params *params);
 
+/* scratch->rays must have been prepared from the space (ih_row_prepare). */
 void ih_fit_ellipsoid(const struct ih_space *space, const struct ih_fit_params *params,
-                      const struct ih_ellipsoid *start, struct ih_ellipsoid *out);
-
-/* A place in the ellipsoid's units to its distance from the surface, to first order; negative
- * inside. False at the centre, where there is none. */
-bool ih_fit_distance(const struct ih_ellipsoid *ellipsoid, const int32_t place_q14[3],
-                     int32_t *distance_mm_q8);
+                      const struct ih_ellipsoid *start, struct ih_row_scratch *scratch,
+                      struct ih_ellipsoid *out);
 
 #endif

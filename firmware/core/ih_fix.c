@@ -57,6 +57,25 @@ uint32_t ih_isqrt_u64(uint64_t value)
     return (uint32_t)(root >> half);
 }
 
+uint32_t ih_isqrt_u54(uint64_t value)
+{
+    if (value == 0) {
+        return 0;
+    }
+    /* As above, but with one correction: at 2^31 .. 2^32 the root is short by 36 and what is cut off, and
+     * the value is small enough for 36 / 2^5 and 1 of that to be left. */
+    const int half = (64 - ih_bits_u64(value)) / 2;
+    const uint64_t shifted = value << (2 * half);
+    const uint64_t r_q15 = inverse_root_q15((uint32_t)(shifted >> 32));
+    uint64_t wide = ((shifted >> 32) * r_q15) >> 15;
+    wide += ((shifted - wide * wide) >> 16) * r_q15 >> 32;
+    uint64_t root = wide >> half;
+    while ((root + 1) * (root + 1) <= value) {
+        root++;
+    }
+    return (uint32_t)root;
+}
+
 /* atan(2^-i) in millionths of a degree. */
 static const int32_t atan_udeg[] = {45000000, 26565051, 14036243, 7125016, 3576334, 1789911,
                                     895174,   447614,   223811,   111906,  55953,   27976,

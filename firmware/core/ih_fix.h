@@ -112,6 +112,9 @@ static inline int64_t ih_distance2_s32(const int32_t a[3], const int32_t b[3])
 /* floor(sqrt(value)), exact for all 2^64 inputs. */
 uint32_t ih_isqrt_u64(uint64_t value);
 
+/* The same of values below 2^54, in half of the time. */
+uint32_t ih_isqrt_u54(uint64_t value);
+
 /* Number of bits needed for value; 0 for 0. */
 static inline int ih_bits_u64(uint64_t value)
 {

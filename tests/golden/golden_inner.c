@@ -79,7 +79,7 @@ static void hash_levels(struct isohead *head, uint64_t hash[GOLDEN_INNERS])
 }
 
 /* A head fitted from one start, what speaks for it, and its score. */
-static void hash_start(const struct isohead *head, const int32_t centre_mm_q8[3],
+static void hash_start(struct isohead *head, const int32_t centre_mm_q8[3],
                        uint64_t hash[GOLDEN_INNERS])
 {
     const struct ih_space *space = &head->scratch.findings.space;
@@ -87,7 +87,8 @@ static void hash_start(const struct isohead *head, const int32_t centre_mm_q8[3]
     struct ih_ellipsoid start = ih_ellipsoid_mean(centre_mm_q8), fitted;
     struct ih_evidence evidence;
     struct ih_score score;
-    ih_fit_ellipsoid(space, &head->params.findings.fit, &start, &fitted);
+    ih_fit_ellipsoid(space, &head->params.findings.fit, &start, &head->scratch.findings.rows,
+                     &fitted);
     ih_evidence_collect(space, &fitted, centre_mm_q8, &nest, &evidence);
     ih_score_rate(&evidence, &score);
     hash[GOLDEN_FIT] = golden_add_words(hash[GOLDEN_FIT], &fitted, sizeof fitted);
@@ -103,6 +104,7 @@ static void hash_candidates(struct isohead *head, uint64_t hash[GOLDEN_INNERS])
     ih_space_make(&head->points, dots, &head->rig, &head->params.findings.space, &scratch->space);
     ih_scan_find(&scratch->space, &head->params.findings.scan, &scratch->scan_scratch,
                  &scratch->scan);
+    ih_row_prepare(&scratch->space, &scratch->rows.rays);
     hash[GOLDEN_SPACE] =
         golden_add_words(hash[GOLDEN_SPACE], &scratch->space, sizeof scratch->space);
     hash[GOLDEN_SCAN] = golden_add_word(hash[GOLDEN_SCAN], scan->place_count);

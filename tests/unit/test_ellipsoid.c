@@ -1,6 +1,8 @@
 /* ih_ellipsoid against the closed form in float64, at the extremes, and cases reasoned by hand. */
 #include "ih_ellipsoid.h"
 
+#include "ih_fix.h"
+
 #include "ih_test.h"
 
 struct vector_crossing {
@@ -269,6 +271,33 @@ static void the_box_misses_nothing(void)
     TEST_ASSERT_LESS_THAN(far / 3, far_in_box);
 }
 
+/* Products with an inverse against divisions: every semi-axis, offsets around halves of the last bit, on
+ * them where there are such, at the ends and anywhere. */
+static void shares_are_the_quotients(void)
+{
+    struct ih_test_random random = {99};
+    int32_t semi, i, near;
+
+    for (semi = IH_ELLIPSOID_SEMI_MIN_MM << 8; semi <= IH_ELLIPSOID_SEMI_MAX_MM << 8; semi++) {
+        const int32_t semis[3] = {semi, semi, semi};
+        const int64_t share = ih_ellipsoid_shares(semis).share_q50[semi % 3];
+        const int32_t step = (semi & (semi - 1)) == 0 ? 1 : 20000;
+
+        for (i = -IH_SHARE_MOST; i <= IH_SHARE_MOST; i += step) {
+            const int64_t half = 2 * ih_test_between(&random, 0, 1 << 17) + 1;
+            const int32_t at = (int32_t)(half * semi / 32768);
+
+            TEST_ASSERT_EQUAL_INT64(ih_div_round((int64_t)i * 16384, semi), ih_share(share, i));
+            for (near = at - 1; near <= at + 1 && near <= IH_SHARE_MOST; near++) {
+                TEST_ASSERT_EQUAL_INT64(ih_div_round((int64_t)near * 16384, semi),
+                                        ih_share(share, near));
+                TEST_ASSERT_EQUAL_INT64(ih_div_round(-(int64_t)near * 16384, semi),
+                                        ih_share(share, -near));
+            }
+        }
+    }
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -280,5 +309,6 @@ int main(void)
     RUN_TEST(places_are_in_semi_axes);
     RUN_TEST(the_extremes_do_not_overflow);
     RUN_TEST(the_box_misses_nothing);
+    RUN_TEST(shares_are_the_quotients);
     return UNITY_END();
 }

@@ -77,6 +77,28 @@ static void isqrt_is_exact_around_powers_of_two(void)
     TEST_ASSERT_EQUAL_UINT32(0, ih_isqrt_u64(0));
 }
 
+/* The short way, where a root changes and anywhere below 2^54. */
+static void isqrt_of_54_bits_is_the_same(void)
+{
+    struct ih_test_random random = {7};
+    uint64_t i;
+
+    for (i = 0; i < 400000; i++) {
+        const uint64_t root = ih_test_u64(&random) >> (37 + i % 27);
+        const uint64_t any = ih_test_u64(&random) >> (10 + i % 54);
+
+        TEST_ASSERT_EQUAL_UINT32(root, ih_isqrt_u54(root * root));
+        if (root > 0) {
+            TEST_ASSERT_EQUAL_UINT32(root - 1, ih_isqrt_u54(root * root - 1));
+        }
+        TEST_ASSERT_EQUAL_UINT32(ih_isqrt_u64(any), ih_isqrt_u54(any));
+    }
+    for (i = 0; i < 100000; i++) {
+        TEST_ASSERT_EQUAL_UINT32(ih_isqrt_u64(i), ih_isqrt_u54(i));
+    }
+    TEST_ASSERT_EQUAL_UINT32((1U << 27) - 1, ih_isqrt_u54(((uint64_t)1 << 54) - 1));
+}
+
 static void isqrt_is_exact_for_all_sizes(void)
 {
     int i;
@@ -470,6 +492,7 @@ int main(int count, char **arguments)
     UNITY_BEGIN();
     RUN_TEST(isqrt_is_exact_around_squares);
     RUN_TEST(isqrt_is_exact_around_powers_of_two);
+    RUN_TEST(isqrt_of_54_bits_is_the_same);
     RUN_TEST(isqrt_is_exact_for_all_sizes);
     RUN_TEST(bits_counts_up_to_the_highest_one);
     RUN_TEST(shift_round_takes_halves_upwards);

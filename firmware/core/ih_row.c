@@ -1,0 +1,395 @@
+#include "ih_row.h"
+
+#include <string.h>
+
+#include "ih_fix.h"
+
+#define ONE_Q14 (1 << 14)
+#define ONE_Q16 (1 << 16)
+/* Points farther than this many robust scales weigh less than 1/4000 and are passed over. */
+#define ROBUST_REACH 8
+/* Places nearer to the centre than this have no direction. */
+#define RADIUS_LEAST_Q14 819 /* 0.05 */
+#define LOW_FROM_Q14 8192    /* 0.5 */
+#define LOW_SPAN_Q14 4915    /* 0.3 */
+#define LOW_LOSS_Q16 32768   /* 0.5 */
+#define PUSH_MAX_MM_Q8 (30 << 8)
+#define PUSH_WEIGHT_Q16 32768 /* 0.5 */
+/* An entry may be off by this, see ih_ellipsoid. */
+#define FRONT_MM_Q8 256
+/* Lengths inside a gradient are in units of this, so that it is of order one. 64 mm in Q8 are 2^14:
+ * s / a is an ih_share of s, too. */
+#define GRADIENT_MM 64
+#define FLAG_POINT 1
+#define FLAG_PUSH 2
+/* Added to products before a shift, so that they are positive: vectors shift those alone. */
+#define BIAS_BITS 40
+
+static int16_t saturate_s16(int64_t value)
+{
+    return (int16_t)(value > INT16_MAX ? INT16_MAX : value < INT16_MIN ? INT16_MIN : value);
+}
+
+void ih_row_prepare(const struct ih_space *space, struct ih_row_rays *out)
+{
+    memset(out, 0, sizeof *out);
+    ih_space_slope_most(space, out->slope_most_q20);
+    for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
+        const struct ih_ray *ray = &space->ray[slot];
+        for (int axis = 0; axis < 3; axis++) {
+            out->point_mm_q1[axis][slot] = saturate_s16(ray->point_mm_q8[axis] >> 7);
+        }
+        out->slope_q12[0][slot] = (int16_t)(ray->slope_x_q20 >> 8);
+        out->slope_q12[1][slot] = (int16_t)(ray->slope_y_q20 >> 8);
+        out->seen[slot] = ray->state == IH_RAY_SEEN;
+    }
+}
+
+/* The gradient's direction and length at a place. */
+struct gradient {
+    int32_t radius_q14;
+    int32_t component_q14[3]; /* s / a, per GRADIENT_MM */
+    int32_t length_q14;
+};
+
+/* False: it has no direction. */
+static bool find_gradient(const int32_t component_q14[3], uint64_t radius2_q28,
+                          struct gradient *out)
+{
+    uint64_t length2_q28 = 0;
+    for (int axis = 0; axis < 3; axis++) {
+        const int64_t component = component_q14[axis];
+        out->component_q14[axis] = component_q14[axis];
+        length2_q28 += (uint64_t)(component * component);
+    }
+    out->radius_q14 = (int32_t)ih_isqrt_u54(radius2_q28);
+    out->length_q14 = (int32_t)ih_isqrt_u54(length2_q28);
+    return out->radius_q14 >= RADIUS_LEAST_Q14;
+}
+
+static uint64_t square_q28(const int32_t place_q14[3])
+{
+    uint64_t sum = 0;
+    for (int axis = 0; axis < 3; axis++) {
+        sum += (uint64_t)((int64_t)place_q14[axis] * place_q14[axis]);
+    }
+    return sum;
+}
+
+/* (f - 1) f */
+static int64_t over_q14(const struct gradient *g)
+{
+    return ih_mul_shift(g->radius_q14, (int64_t)g->radius_q14 - ONE_Q14, 14);
+}
+
+bool ih_row_distance(const struct ih_ellipsoid *ellipsoid, const int32_t place_q14[3],
+                     int32_t *distance_mm_q8)
+{
+    struct gradient g;
+    int32_t component_q14[3];
+    for (int axis = 0; axis < 3; axis++) {
+        component_q14[axis] = (int32_t)ih_div_round((int64_t)place_q14[axis] * (GRADIENT_MM << 8),
+                                                    ellipsoid->semi_mm_q8[axis]);
+    }
+    if (!find_gradient(component_q14, square_q28(place_q14), &g)) {
+        return false;
+    }
+    /* (f - 1) / |grad f|, grad f = (s / a) / f. */
+    *distance_mm_q8 =
+        ih_saturate_s32(ih_div_round(over_q14(&g) * (GRADIENT_MM << 8), g.length_q14));
+    return true;
+}
+
+/* Quotients by a gradient's length L, 151 and more: 25 L once, and products that are rounded as
+ * ih_div_round does. With v, too great by less than 1, instead of 2^62 / (25 L), a quotient n / d is
+ * too great by n' v / 2^k - n / d < n' / 2^k (n' and k as below); it must stay below 1 / (2 d), what it
+ * is away from a half at least if not on it. For f up to 5.8, the most that has a weight, L < 2^17.3 and
+ * squares of places s^2 < 2^19.1. */
+struct inverse {
+    int64_t by_25_q62; /* 2^62 / (25 L) */
+    int64_t whole_q62; /* 2^62 / L */
+    int64_t whole_q58;
+};
+
+static struct inverse invert(int32_t length_q14)
+{
+    struct inverse inverse;
+    inverse.by_25_q62 = (int64_t)(((uint64_t)1 << 62) / ((uint32_t)length_q14 * 25U)) + 1;
+    inverse.whole_q62 = inverse.by_25_q62 * 25;
+    inverse.whole_q58 = (inverse.whole_q62 >> 4) + 1;
+    return inverse;
+}
+
+/* ih_div_round(over * 2^14, L), |over| < 2^19.4 and 15 L: off by 2.6 |over| / 2^44 < 1 / (2 L). */
+static int32_t by_length_q8(const struct inverse *inverse, int64_t over)
+{
+    return (int32_t)((over * inverse->whole_q58 + ((int64_t)1 << 43)) >> 44);
+}
+
+/* ih_div_round(component * 2^14, L), |component| <= L: off by 25 |component| / 2^48 < 1 / (2 L). */
+static int32_t part_q14(const struct inverse *inverse, int32_t component)
+{
+    return (int32_t)((component * inverse->whole_q62 + ((int64_t)1 << 47)) >> 48);
+}
+
+/* ih_div_round(square * 2^20, 100 L) = square * 2^18 / (25 L): off by square / 2^44 < 1 / (50 L). */
+static int32_t square_part_q14(const struct inverse *inverse, int64_t square)
+{
+    return (int32_t)((square * inverse->by_25_q62 + ((int64_t)1 << 43)) >> 44);
+}
+
+/* The lower triangle and the right side, of whole vectors of rows. */
+static void sum_rows(const struct ih_rows *rows, int32_t count, struct ih_row_system *system)
+{
+    const int64_t bias_q30 = ((int64_t)1 << BIAS_BITS) + (1 << 13);
+    const int64_t bias_q24 = ((int64_t)1 << BIAS_BITS) + (1 << 7);
+    int32_t at = 0;
+    for (int i = 0; i < IH_FIT_UNKNOWNS; i++) {
+        const int32_t *weighted_q16 = rows->weighted_q16[i];
+        for (int j = 0; j <= i; j++) {
+            const int32_t *slope_q14 = rows->slope_q14[j];
+            uint64_t sum = 0;
+            for (int32_t k = 0; k < count; k++) {
+                const int64_t product = (int64_t)weighted_q16[k] * slope_q14[k];
+                sum += (uint64_t)(product + bias_q30) >> 14;
+            }
+            system->normal_q16[at++] += (int64_t)sum - ((int64_t)count << (BIAS_BITS - 14));
+        }
+        uint64_t sum = 0;
+        for (int32_t k = 0; k < count; k++) {
+            const int64_t product = (int64_t)weighted_q16[k] * rows->residual_mm_q8[k];
+            sum += (uint64_t)(product + bias_q24) >> 8;
+        }
+        system->right_q16[i] -= (int64_t)sum - ((int64_t)count << (BIAS_BITS - 8));
+    }
+}
+
+static void flush_rows(struct ih_rows *rows, struct ih_row_system *system)
+{
+    const int32_t count = (rows->count + 7) / 8 * 8;
+    for (int32_t k = rows->count; k < count; k++) { /* rows of nothing add nothing */
+        for (int i = 0; i < IH_FIT_UNKNOWNS; i++) {
+            rows->slope_q14[i][k] = 0;
+            rows->weighted_q16[i][k] = 0;
+        }
+        rows->residual_mm_q8[k] = 0;
+    }
+    sum_rows(rows, count, system);
+    rows->count = 0;
+}
+
+static void add_row(struct ih_rows *rows, struct ih_row_system *system, const struct gradient *g,
+                    const struct inverse *inverse, const int32_t place_q14[3],
+                    int32_t residual_mm_q8, int32_t weight_q16)
+{
+    const int32_t at = rows->count++;
+    for (int axis = 0; axis < 3; axis++) {
+        const int64_t s2_q14 = ih_mul_shift(place_q14[axis], place_q14[axis], 14);
+        rows->slope_q14[axis][at] = -part_q14(inverse, g->component_q14[axis]);
+        rows->slope_q14[3 + axis][at] = -square_part_q14(inverse, s2_q14);
+    }
+    for (int i = 0; i < IH_FIT_UNKNOWNS; i++) {
+        IH_IN_RANGE(rows->slope_q14[i][at], -IH_RANGE_SLOPE_Q14, IH_RANGE_SLOPE_Q14);
+        rows->weighted_q16[i][at] = (int32_t)ih_mul_shift(weight_q16, rows->slope_q14[i][at], 14);
+    }
+    rows->residual_mm_q8[at] = residual_mm_q8;
+    if (rows->count == IH_ROW_MAX) {
+        flush_rows(rows, system);
+    }
+}
+
+/* (1 + (r / k)^2)^-2; 0 where that is next to nothing. */
+static int32_t robust_weight_q16(int32_t residual_mm_q8, int32_t scale_mm)
+{
+    const int32_t size_q8 = ih_abs_s32(residual_mm_q8);
+    if (size_q8 > ROBUST_REACH * scale_mm << 8) {
+        return 0;
+    }
+    const uint32_t scale2 = (uint32_t)(scale_mm * scale_mm);
+    const uint32_t ratio2_q16 = ((uint32_t)size_q8 * (uint32_t)size_q8 + scale2 / 2) / scale2;
+    const uint64_t sum_q16 = (uint64_t)ONE_Q16 + ratio2_q16;
+    const uint64_t sum2_q32 = sum_q16 * sum_q16;
+    return (int32_t)((((uint64_t)1 << 48) + sum2_q32 / 2) / sum2_q32);
+}
+
+/* A weight, less for what is low on the head. */
+static int32_t lowered_q16(int32_t weight_q16, int32_t down_q14)
+{
+    if (down_q14 <= LOW_FROM_Q14) {
+        return weight_q16;
+    }
+    const uint32_t over = (uint32_t)ih_min_s32(down_q14 - LOW_FROM_Q14, LOW_SPAN_Q14);
+    const int32_t low_q16 = ONE_Q16 - (int32_t)(LOW_LOSS_Q16 * over / LOW_SPAN_Q14);
+    return (int32_t)ih_mul_shift(weight_q16, low_q16, 16);
+}
+
+/* What a step's ellipsoid is asked for at every ray. */
+struct step {
+    const struct ih_ellipsoid *ellipsoid;
+    const int32_t *origin_mm_q8;
+    struct ih_shares shares;
+    struct ih_ellipsoid_box box; /* rays that may hit it pass through */
+    int32_t scale_mm, see_through_mm;
+    int32_t reach_mm_q8[3]; /* points farther from the centre have no weight */
+    uint64_t reach2_q28;    /* nor has what is farther in semi-axes, squared */
+    int32_t front_mm_q8;    /* nothing is entered before */
+};
+
+/* A residual is at least (f - 1) times the shortest semi-axis: it has no weight from f = 1 + 8 k / a
+ * on. A 64th more for what is rounded. */
+static void begin_step(struct step *step, const struct ih_row_rays *rays)
+{
+    const struct ih_ellipsoid *ellipsoid = step->ellipsoid;
+    const int32_t *semi_mm_q8 = ellipsoid->semi_mm_q8;
+    const int32_t shortest_q8 = ih_min_s32(ih_min_s32(semi_mm_q8[0], semi_mm_q8[1]), semi_mm_q8[2]);
+    int64_t most_q14 =
+        ONE_Q14 +
+        ih_div_round((int64_t)ROBUST_REACH * step->scale_mm * (ONE_Q14 << 8), shortest_q8);
+    most_q14 += most_q14 / 64;
+    step->shares = ih_ellipsoid_shares(semi_mm_q8);
+    step->box = ih_ellipsoid_box(ellipsoid, rays->slope_most_q20, ONE_Q14);
+    for (int axis = 0; axis < 3; axis++) {
+        step->reach_mm_q8[axis] = (int32_t)ih_mul_shift(most_q14, semi_mm_q8[axis], 14);
+    }
+    step->reach2_q28 = (uint64_t)(most_q14 * most_q14);
+    step->front_mm_q8 =
+        ellipsoid->centre_mm_q8[2] - semi_mm_q8[2] - FRONT_MM_Q8 + step->see_through_mm * 256;
+}
+
+/* From here to there, both included. */
+struct span {
+    int16_t low, high;
+};
+
+static struct span span_of(int64_t low, int64_t high)
+{
+    return (struct span){saturate_s16(low), saturate_s16(high)};
+}
+
+/* Slopes of the rays that pass within half of the centre; all where it is too near to the origin's
+ * depth. Slopes and directions are rounded down, which is a step on either side, and half by one. */
+static struct span slopes_within(const struct step *step, int axis)
+{
+    const int64_t depth_q8 = (int64_t)step->ellipsoid->centre_mm_q8[2] - step->origin_mm_q8[2];
+    const int64_t off_q8 = (int64_t)step->ellipsoid->centre_mm_q8[axis] - step->origin_mm_q8[axis];
+    if (depth_q8 < 256) {
+        return span_of(INT16_MIN, INT16_MAX);
+    }
+    const int64_t half_q8 = (int64_t)step->box.half_mm_q8[axis] + 1;
+    return span_of((off_q8 - half_q8) * 4096 / depth_q8 - 2,
+                   (off_q8 + half_q8) * 4096 / depth_q8 + 2);
+}
+
+/* A loop without a branch: compilers turn it into vectors. */
+static void flag_rays(const struct step *step, struct ih_row_scratch *scratch)
+{
+    const struct ih_row_rays *rays = &scratch->rays;
+    const struct span dx = slopes_within(step, 0);
+    const struct span dy = slopes_within(step, 1);
+    const int16_t front = saturate_s16(step->front_mm_q8 >> 7);
+    struct span reach[3];
+    for (int axis = 0; axis < 3; axis++) {
+        const int32_t centre_q8 = step->ellipsoid->centre_mm_q8[axis];
+        reach[axis] = span_of((centre_q8 - step->reach_mm_q8[axis]) >> 7,
+                              (centre_q8 + step->reach_mm_q8[axis]) >> 7);
+    }
+    const struct span x = reach[0];
+    const struct span y = reach[1];
+    const struct span z = reach[2];
+    for (int32_t slot = 0; slot < IH_ROW_RAYS; slot++) {
+        const int16_t at_x = rays->point_mm_q1[0][slot];
+        const int16_t at_y = rays->point_mm_q1[1][slot];
+        const int16_t at_z = rays->point_mm_q1[2][slot];
+        const int16_t slope_x = rays->slope_q12[0][slot];
+        const int16_t slope_y = rays->slope_q12[1][slot];
+        const uint8_t seen = rays->seen[slot];
+        uint8_t in_reach = (at_x >= x.low) & (at_x <= x.high) & (at_y >= y.low) & (at_y <= y.high) &
+                           (at_z >= z.low) & (at_z <= z.high);
+        uint8_t may_push = (slope_x >= dx.low) & (slope_x <= dx.high) & (slope_y >= dy.low) &
+                           (slope_y <= dy.high) & (at_z >= front);
+        scratch->flag[slot] = seen & in_reach;
+        scratch->flag[slot] |= (uint8_t)((seen & may_push) << 1);
+    }
+}
+
+static void add_point(const struct step *step, const struct ih_ray *ray, struct ih_rows *rows,
+                      struct ih_row_system *system)
+{
+    const struct ih_ellipsoid *ellipsoid = step->ellipsoid;
+    int32_t place_q14[3];
+    int32_t component_q14[3];
+    struct gradient g;
+    for (int axis = 0; axis < 3; axis++) {
+        const int32_t off_q8 = ray->point_mm_q8[axis] - ellipsoid->centre_mm_q8[axis];
+        if (ih_abs_s32(off_q8) > step->reach_mm_q8[axis]) {
+            return;
+        }
+        place_q14[axis] = ih_share(step->shares.share_q50[axis], off_q8);
+        component_q14[axis] = ih_share(step->shares.share_q50[axis], place_q14[axis]);
+    }
+    const uint64_t radius2_q28 = square_q28(place_q14);
+    if (radius2_q28 > step->reach2_q28 || !find_gradient(component_q14, radius2_q28, &g)) {
+        return;
+    }
+    const struct inverse inverse = invert(g.length_q14);
+    const int32_t residual_mm_q8 = by_length_q8(&inverse, over_q14(&g));
+    const int32_t weight_q16 = robust_weight_q16(residual_mm_q8, step->scale_mm);
+    if (weight_q16 > 0) {
+        add_row(rows, system, &g, &inverse, place_q14, residual_mm_q8,
+                lowered_q16(weight_q16, place_q14[1]));
+    }
+}
+
+/* A point seen behind the ellipsoid, through it. */
+static void add_push(const struct step *step, const struct ih_ray *ray, struct ih_rows *rows,
+                     struct ih_row_system *system)
+{
+    const struct ih_ellipsoid *ellipsoid = step->ellipsoid;
+    int32_t component_q14[3];
+    struct ih_crossing crossing;
+    struct gradient g;
+    if (ray->point_mm_q8[2] < step->front_mm_q8 ||
+        !ih_ellipsoid_in_box(ellipsoid, &step->box, step->origin_mm_q8, ray) ||
+        !ih_ellipsoid_cross(ellipsoid, step->origin_mm_q8, ray, &crossing) ||
+        crossing.radius2_q14 >= ONE_Q14 ||
+        ray->point_mm_q8[2] - step->see_through_mm * 256 <= crossing.entry_mm_q8) {
+        return;
+    }
+    for (int axis = 0; axis < 3; axis++) {
+        component_q14[axis] = ih_share(step->shares.share_q50[axis], crossing.nearest_q14[axis]);
+    }
+    if (find_gradient(component_q14, square_q28(crossing.nearest_q14), &g)) {
+        const struct inverse inverse = invert(g.length_q14);
+        const int32_t residual_mm_q8 = by_length_q8(&inverse, over_q14(&g));
+        add_row(rows, system, &g, &inverse, crossing.nearest_q14,
+                ih_max_s32(residual_mm_q8, -PUSH_MAX_MM_Q8), PUSH_WEIGHT_Q16);
+    }
+}
+
+void ih_row_collect(const struct ih_space *space, const struct ih_ellipsoid *ellipsoid,
+                    int32_t scale_mm, int32_t see_through_mm, struct ih_row_scratch *scratch,
+                    struct ih_row_system *out)
+{
+    struct step step = {.ellipsoid = ellipsoid,
+                        .origin_mm_q8 = space->origin_mm_q8,
+                        .scale_mm = scale_mm,
+                        .see_through_mm = see_through_mm};
+    begin_step(&step, &scratch->rays);
+    flag_rays(&step, scratch);
+    memset(out, 0, sizeof *out);
+    scratch->rows.count = 0;
+    for (int32_t first = 0; first < IH_SLOTS; first += 8) {
+        uint64_t any; /* of eight slots */
+        memcpy(&any, &scratch->flag[first], sizeof any);
+        for (int32_t slot = first; any != 0 && slot < ih_min_s32(first + 8, IH_SLOTS); slot++) {
+            const uint8_t flag = scratch->flag[slot];
+            if ((flag & FLAG_POINT) != 0) {
+                add_point(&step, &space->ray[slot], &scratch->rows, out);
+            }
+            if ((flag & FLAG_PUSH) != 0) {
+                add_push(&step, &space->ray[slot], &scratch->rows, out);
+            }
+        }
+    }
+    flush_rows(&scratch->rows, out);
+}

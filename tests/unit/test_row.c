@@ -1,0 +1,290 @@
+/* ih_row against the plain way: every point, divisions, whole roots, one product after the other. To
+ * the last bit. */
+#include "ih_row.h"
+
+#include <stdlib.h>
+
+#include "ih_test.h"
+#include "ih_test_scene.h"
+
+static struct ih_row_scratch scratch;
+
+void setUp(void)
+{
+    memset(&space, 0, sizeof space);
+}
+
+void tearDown(void)
+{
+}
+
+/* One point's or push's row, from its place and gradient. */
+struct plain {
+    int64_t radius_q14, length_q14, component_q14[3];
+};
+
+static bool plain_gradient(const struct ih_ellipsoid *e, const int32_t place[3], struct plain *out)
+{
+    int64_t radius2 = 0, length2 = 0;
+    int axis;
+
+    for (axis = 0; axis < 3; axis++) {
+        out->component_q14[axis] = ih_div_round((int64_t)place[axis] * 16384, e->semi_mm_q8[axis]);
+        radius2 += (int64_t)place[axis] * place[axis];
+        length2 += out->component_q14[axis] * out->component_q14[axis];
+    }
+    out->radius_q14 = ih_isqrt_u64((uint64_t)radius2);
+    out->length_q14 = ih_isqrt_u64((uint64_t)length2);
+    return out->radius_q14 >= 819;
+}
+
+static int64_t plain_distance(const struct plain *g)
+{
+    return ih_div_round(ih_mul_shift(g->radius_q14, g->radius_q14 - 16384, 14) * 16384,
+                        g->length_q14);
+}
+
+static void plain_add(struct ih_row_system *system, const struct plain *g, const int32_t place[3],
+                      int64_t residual, int64_t weight)
+{
+    int64_t slope[6];
+    int i, j, at = 0;
+
+    for (i = 0; i < 3; i++) {
+        const int64_t s2 = ih_mul_shift(place[i], place[i], 14);
+
+        slope[i] = -ih_div_round(g->component_q14[i] * 16384, g->length_q14);
+        slope[3 + i] = -ih_div_round(s2 * 16384 * 64, g->length_q14 * 100);
+    }
+    for (i = 0; i < 6; i++) {
+        const int64_t weighted = ih_mul_shift(weight, slope[i], 14);
+
+        for (j = 0; j <= i; j++) {
+            system->normal_q16[at++] += ih_mul_shift(weighted, slope[j], 14);
+        }
+        system->right_q16[i] -= ih_mul_shift(weighted, residual, 8);
+    }
+}
+
+static int64_t plain_weight(int64_t residual, int64_t scale, int32_t down)
+{
+    int64_t ratio2, sum, low, over;
+
+    if (llabs(residual) > 8 * scale * 256) {
+        return 0;
+    }
+    ratio2 = ih_div_round(residual * residual, scale * scale);
+    sum = 65536 + ratio2;
+    over = down < 8192 ? 0 : down > 8192 + 4915 ? 4915 : down - 8192;
+    low = 65536 - 32768 * over / 4915;
+    return ih_mul_shift(ih_div_round((int64_t)1 << 48, sum * sum), low, 16);
+}
+
+/* Rows that it added. */
+static int32_t plain_collect(const struct ih_ellipsoid *e, int32_t scale_mm, int32_t see_through_mm,
+                             struct ih_row_system *out)
+{
+    int32_t slot, count = 0;
+
+    memset(out, 0, sizeof *out);
+    for (slot = 0; slot < IH_SLOTS; slot++) {
+        const struct ih_ray *ray = &space.ray[slot];
+        struct ih_crossing crossing;
+        struct plain g;
+        int32_t place[3];
+
+        if (ray->state != IH_RAY_SEEN) {
+            continue;
+        }
+        if (ih_ellipsoid_place(e, ray->point_mm_q8, place) && plain_gradient(e, place, &g)) {
+            const int64_t residual = plain_distance(&g);
+            const int64_t weight = plain_weight(residual, scale_mm, place[1]);
+
+            if (weight > 0) {
+                plain_add(out, &g, place, residual, weight);
+                count++;
+            }
+        }
+        if (ih_ellipsoid_cross(e, space.origin_mm_q8, ray, &crossing) &&
+            crossing.radius2_q14 < 16384 &&
+            ray->point_mm_q8[2] - see_through_mm * 256 > crossing.entry_mm_q8 &&
+            plain_gradient(e, crossing.nearest_q14, &g)) {
+            const int64_t residual = plain_distance(&g);
+
+            plain_add(out, &g, crossing.nearest_q14, residual < -30 * 256 ? -30 * 256 : residual,
+                      32768);
+            count++;
+        }
+    }
+    return count;
+}
+
+static int32_t check(const struct ih_ellipsoid *e, int32_t scale_mm, const char *what,
+                     int64_t index)
+{
+    struct ih_row_system expected, found;
+    const int32_t see_through_mm = 60;
+    const int32_t count = plain_collect(e, scale_mm, see_through_mm, &expected);
+    int i;
+
+    memset(&scratch, IH_TEST_FILL, sizeof scratch);
+    memset(&found, IH_TEST_FILL, sizeof found);
+    ih_row_prepare(&space, &scratch.rays);
+    ih_row_collect(&space, e, scale_mm, see_through_mm, &scratch, &found);
+    for (i = 0; i < IH_CHOLESKY_PACKED(IH_FIT_UNKNOWNS); i++) {
+        IH_TEST_EQUAL(expected.normal_q16[i], found.normal_q16[i], what, index);
+    }
+    for (i = 0; i < IH_FIT_UNKNOWNS; i++) {
+        IH_TEST_EQUAL(expected.right_q16[i], found.right_q16[i], what, index);
+    }
+    return count;
+}
+
+/* Semi-axes that a fit may have; powers of two among them, of which the inverses are exact. */
+static void random_axes(struct ih_test_random *random, struct ih_ellipsoid *e)
+{
+    static const int32_t mean_mm[3] = {78, 113, 98};
+    int axis;
+
+    for (axis = 0; axis < 3; axis++) {
+        e->semi_mm_q8[axis] =
+            ih_test_between(random, 0, 9) == 0
+                ? 1 << (axis == 1 ? 15 : 14)
+                : (int32_t)ih_test_between(random, mean_mm[axis] * 181, mean_mm[axis] * 363);
+    }
+}
+
+static int32_t random_scale(struct ih_test_random *random)
+{
+    static const int32_t scale_mm[] = {24, 16, 8};
+
+    return scale_mm[ih_test_between(random, 0, 2)];
+}
+
+/* Heads at and around places of made scenes. */
+static void scenes_give_the_plain_sums(void)
+{
+    struct ih_test_random random = {511};
+    int32_t i, pass, axis, rows = 0;
+
+    for (i = 0; i < SCENE_COUNT; i++) {
+        make_scene(&vector_scenes[i]);
+        for (pass = 0; pass < 40; pass++) {
+            const struct ih_ray *ray = &space.ray[ih_test_between(&random, 0, IH_SLOTS - 1)];
+            struct ih_ellipsoid e;
+
+            random_axes(&random, &e);
+            for (axis = 0; axis < 3; axis++) {
+                e.centre_mm_q8[axis] = ray->point_mm_q8[axis] +
+                                       (int32_t)ih_test_between(&random, -(150 << 8), 150 << 8);
+            }
+            rows += check(&e, random_scale(&random), vector_scenes[i].name, pass);
+        }
+    }
+    TEST_ASSERT_TRUE(rows > 10000);
+}
+
+/* Points all over a head's surroundings, so dense that rows fill their room several times; places
+ * that are on a half of the last bit, and the ends of reaches. */
+static void points_around_give_the_plain_sums(void)
+{
+    struct ih_test_random random = {512};
+    int32_t pass, slot, axis, most = 0;
+
+    for (pass = 0; pass < 1500; pass++) {
+        const int32_t around_q8 = (int32_t)ih_test_between(&random, 60, 400) << 8;
+        const int32_t scale_mm = random_scale(&random);
+        struct ih_ellipsoid e;
+        int32_t count;
+
+        random_axes(&random, &e);
+        for (axis = 0; axis < 3; axis++) {
+            space.origin_mm_q8[axis] = (int32_t)ih_test_between(&random, -(99 << 8), 99 << 8);
+            e.centre_mm_q8[axis] =
+                (int32_t)ih_test_between(&random, axis == 2 ? 100 << 8 : -(500 << 8), 1600 << 8);
+        }
+        for (slot = 0; slot < IH_SLOTS; slot++) {
+            struct ih_ray *ray = &space.ray[slot];
+
+            ray->state = ih_test_between(&random, 0, 9) == 0 ? IH_RAY_EMPTY : IH_RAY_SEEN;
+            ray->slope_x_q20 = (int32_t)ih_test_between(&random, -(1 << 20), 1 << 20);
+            ray->slope_y_q20 = (int32_t)ih_test_between(&random, -(1 << 20), 1 << 20);
+            for (axis = 0; axis < 3; axis++) {
+                ray->point_mm_q8[axis] =
+                    e.centre_mm_q8[axis] + (int32_t)ih_test_between(&random, -around_q8, around_q8);
+            }
+            if (ih_test_between(&random, 0, 3) == 0) { /* just where a weight ends, on an axis */
+                const int32_t semi_q8 = e.semi_mm_q8[slot % 3];
+
+                for (axis = 0; axis < 3; axis++) {
+                    ray->point_mm_q8[axis] = e.centre_mm_q8[axis];
+                }
+                ray->point_mm_q8[slot % 3] +=
+                    semi_q8 + 8 * scale_mm * 256 + (int32_t)ih_test_between(&random, -9, 9);
+            }
+        }
+        count = check(&e, scale_mm, "around", pass);
+        most = count > most ? count : most;
+    }
+    TEST_ASSERT_TRUE(most > 3 * IH_ROW_MAX);
+}
+
+/* Rays of all slopes that graze the ellipsoid or go through it, points behind; and origins beside,
+ * behind and within. */
+static void pushes_give_the_plain_sums(void)
+{
+    struct ih_test_random random = {513};
+    int32_t pass, slot, axis, rows = 0;
+
+    for (pass = 0; pass < 1500; pass++) {
+        struct ih_ellipsoid e;
+
+        random_axes(&random, &e);
+        for (axis = 0; axis < 3; axis++) {
+            space.origin_mm_q8[axis] = (int32_t)ih_test_between(&random, -(900 << 8), 900 << 8);
+            e.centre_mm_q8[axis] = (int32_t)ih_test_between(&random, -(900 << 8), 900 << 8);
+        }
+        e.centre_mm_q8[2] = space.origin_mm_q8[2] +
+                            (pass % 5 == 0 ? (int32_t)ih_test_between(&random, -2000, 2000)
+                                           : (int32_t)ih_test_between(&random, 0, 15000 << 8));
+        for (slot = 0; slot < IH_SLOTS; slot++) {
+            struct ih_ray *ray = &space.ray[slot];
+            const int64_t depth = (int64_t)e.centre_mm_q8[2] - space.origin_mm_q8[2];
+            int32_t slope[2];
+
+            for (axis = 0; axis < 2; axis++) { /* at the centre's depth, 1.4 semi-axes around it */
+                const int64_t off = (int64_t)e.centre_mm_q8[axis] - space.origin_mm_q8[axis] +
+                                    ih_test_between(&random, -7, 7) * e.semi_mm_q8[axis] / 5;
+
+                slope[axis] = ih_saturate_s32(ih_div_round(off * 1048576, depth > 0 ? depth : 1));
+                slope[axis] = ih_clamp_s32(slope[axis], -(4 << 20), 4 << 20);
+            }
+            ray->slope_x_q20 = slope[0];
+            ray->slope_y_q20 = slope[1];
+            see(slot, e.centre_mm_q8[2] + (int32_t)ih_test_between(&random, -(150 << 8), 400 << 8));
+        }
+        rows += check(&e, random_scale(&random), "push", pass);
+    }
+    TEST_ASSERT_TRUE(rows > 100000);
+}
+
+static void nothing_seen_adds_nothing(void)
+{
+    struct ih_ellipsoid e = ih_ellipsoid_mean((const int32_t[3]){0, 0, 900 << 8});
+
+    IH_TEST_EQUAL(0, check(&e, 24, "nothing", 0), "rows", 0);
+    see(360, 900 << 8); /* at the centre: no direction */
+    IH_TEST_EQUAL(0, check(&e, 24, "centre", 0), "rows", 0);
+    see(360, 802 << 8);
+    IH_TEST_EQUAL(1, check(&e, 8, "front", 0), "rows", 0);
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(scenes_give_the_plain_sums);
+    RUN_TEST(points_around_give_the_plain_sums);
+    RUN_TEST(pushes_give_the_plain_sums);
+    RUN_TEST(nothing_seen_adds_nothing);
+    return UNITY_END();
+}
