@@ -5,11 +5,16 @@
  * Way:   grey levels are brought to 12 bits (255 of an 8-bit sensor = 4080). With the 3x3 binomial
  *        sum I (weight 16) and the 9x9 box sum B (weight 81), edge pixels repeated outside,
  *        R = (81 I - 16 B) / 256, rounded. A constant gives 0; IH_BAND_UNIT units of R are one grey
- *        level of 8 bits.
+ *        level of 8 bits. Rows of bytes with 255 as full scale are summed as they are: with the sums
+ *        i = I / 16 and b = B / 16 of theirs R = (81 i + 8) / 16 - b, rounded down, and that is
+ *        5 i + (i + 8) / 16 - b.
+ *        Each row is added to the one before. Two neighbouring such pairs are 1-2-1, four pairs and a
+ *        row are nine rows.
  * Range: grey <= 4080, 4144 after an ambient frame was subtracted (ih_noise). I <= 66,304, so
  *        81 I <= 2^22.4, less what the nine bright pixels add to the box: |R| <= 18,648, 16 bits.
- *        Sums over nine pixels of a row <= 37,296, 16 bits without sign; over 81 <= 335,664.
- * Cost:  fifteen rows of 16 bits; about 20 operations per pixel, none of which waits for its
+ *        Sums of nine rows <= 37,296, 16 bits without sign; over 81 <= 335,664. Of bytes
+ *        81 i / 16 and b <= 20,655: everything is in 16 bits.
+ * Cost:  13 rows of 16 bits; about 25 operations per pixel of 16 bits, none of which waits for its
  *        neighbour's, so that vectors take 8 or 16 at once.
  * Error: R within half a unit (0.006 grey levels) of the exact filter; samples deeper than 8 bits are
  *        rounded to 12 bits before.
@@ -38,30 +43,48 @@ struct ih_row {
     int32_t maximum;
 };
 
-/* The inner kernel's rows stand so far behind the newest one. */
-#define IH_BAND_GREY_ROWS (IH_BAND_REACH + 2)
+/* Sums of a row and the one before it that are kept. */
+#define IH_BAND_PAIRS (IH_BAND_ROWS - 1)
 
 struct ih_band {
     int32_t width;
-    int32_t rows_in;                          /* pushed so far, repeated ones included */
-    uint16_t incoming_q4[IH_FRAME_WIDTH_MAX]; /* the newest row */
-    uint16_t grey_q4[IH_BAND_GREY_ROWS][IH_FRAME_WIDTH_MAX]; /* ring of rows */
-    uint16_t across[IH_BAND_ROWS][IH_FRAME_WIDTH_MAX];       /* ring: nine pixels of a row */
-    uint32_t box[IH_FRAME_WIDTH_MAX];                        /* B: sum over the rows in across */
-    /* Of the newest row: edge pixels repeated outside, sums of three. */
-    uint16_t padded_q4[IH_FRAME_WIDTH_MAX + 2 * IH_BAND_REACH];
-    uint16_t three[IH_FRAME_WIDTH_MAX + 2 * IH_BAND_REACH];
+    int32_t rows_in; /* pushed so far, repeated ones included */
+    bool is_bytes;   /* sums of bytes, else of 12 bits */
+    uint16_t newest[IH_FRAME_WIDTH_MAX];
+    uint16_t pair[IH_BAND_PAIRS][IH_FRAME_WIDTH_MAX]; /* ring */
+    /* Of the row whose R is worked out, edge pixels repeated outside: 1-2-1 of three rows, nine rows,
+     * three pixels of nine rows. */
+    uint16_t inner[IH_FRAME_WIDTH_MAX + 2];
+    uint16_t column[IH_FRAME_WIDTH_MAX + 2 * IH_BAND_REACH];
+    union {
+        uint16_t of_bytes[IH_FRAME_WIDTH_MAX + 2 * IH_BAND_REACH];
+        uint32_t of_grey_q4[IH_FRAME_WIDTH_MAX + 2 * IH_BAND_REACH];
+    } three;
 };
 
 struct ih_row ih_frame_row(const struct ih_frame *frame, int32_t v);
 
-void ih_band_begin(struct ih_band *band, int32_t width);
+/* Can its samples be pushed as they are? */
+bool ih_row_is_bytes(const struct ih_row *row);
 
 /* A row's samples in 12 bits. */
 void ih_row_grey(const struct ih_row *row, int32_t width, uint16_t *grey_q4);
 
-/* Push what incoming_q4 holds, filled by the caller. True: response[0 .. width - 1] is that of the
- * row IH_BAND_REACH pushes ago. Rows repeated at the frame's top and bottom are pushed by the caller. */
-bool ih_band_push(struct ih_band *band, int16_t *response);
+/* is_bytes: all rows will be pushed as bytes, else as grey levels of 12 bits. */
+void ih_band_begin(struct ih_band *band, int32_t width, bool is_bytes);
+
+/* Push a row. True: response[0 .. width - 1] is that of the row IH_BAND_REACH pushes ago. */
+bool ih_band_push_bytes(struct ih_band *band, const uint8_t *row, int16_t *response);
+bool ih_band_push_grey(struct ih_band *band, const uint16_t *row_q4, int16_t *response);
+
+/* Sums of the columns of the newest rows, at most IH_BAND_PAIRS of them. */
+void ih_band_columns(const struct ih_band *band, int32_t rows, uint16_t *sum);
+
+/* R of the middle one of nine rows of bytes; nothing is pushed. */
+void ih_band_bytes(struct ih_band *band, const struct ih_row row[IH_BAND_ROWS], int32_t width,
+                   int16_t *response);
+
+/* The newest row once more, as is done at the frame's top and bottom. */
+bool ih_band_repeat(struct ih_band *band, int16_t *response);
 
 #endif

@@ -12,6 +12,8 @@
 #define SHIFT_MAX 2
 #define TWIN_PX_Q12 (3 * 4096)
 #define RING_PLACES 16
+/* So many pixels are passed over at once where none is above its threshold. */
+#define MARKS 32
 
 void ih_dots_params_default(struct ih_dots_params *params)
 {
@@ -30,16 +32,15 @@ void ih_dots_begin(struct ih_dots_scratch *scratch, struct ih_dots *out,
                    const struct ih_noise *noise)
 {
     scratch->params = *params;
+    scratch->width = width;
     scratch->height = height;
     scratch->rows_taken = 0;
     scratch->response_rows = 0;
-    scratch->block_rows = 0;
     if (noise != &scratch->noise) {
         scratch->noise = *noise;
     }
-    ih_band_begin(&scratch->rows.finding.band, width);
     memset(scratch->rows.finding.response, 0, sizeof scratch->rows.finding.response);
-    memset(scratch->block_sum, 0, sizeof scratch->block_sum);
+    memset(scratch->rows.finding.mark, 0, sizeof scratch->rows.finding.mark);
     out->dot_count = 0;
     out->edge_count = 0;
     out->hot_count = 0;
@@ -82,19 +83,8 @@ static void insert_dot(struct ih_dots *out, struct ih_dot dot)
 /* R of row v, its first pixel at [0]; IH_DOTS_REACH pixels beyond the frame may be read. */
 static int16_t *response_row(struct ih_dots_scratch *scratch, int32_t v)
 {
-    return &scratch->rows.finding.response[(v + IH_DOTS_REACH) % IH_DOTS_ROWS][IH_DOTS_REACH];
-}
-
-/* Of equal neighbours the first in reading order is the maximum. */
-static bool is_maximum(struct ih_dots_scratch *scratch, int32_t u, int32_t v)
-{
-    const int16_t *above = response_row(scratch, v - 1);
-    const int16_t *middle = response_row(scratch, v);
-    const int16_t *below = response_row(scratch, v + 1);
-    const int32_t peak = middle[u];
-    return peak > above[u - 1] && peak > above[u] && peak > above[u + 1] && peak > middle[u - 1] &&
-           peak >= middle[u + 1] && peak >= below[u - 1] && peak >= below[u] &&
-           peak >= below[u + 1];
+    const uint32_t row = (uint32_t)(v + IH_DOTS_REACH);
+    return &scratch->rows.finding.response[row % IH_DOTS_ROWS][IH_DOTS_REACH];
 }
 
 static bool stands_alone(struct ih_dots_scratch *scratch, int32_t u, int32_t v, int32_t limit)
@@ -114,7 +104,7 @@ static bool stands_alone(struct ih_dots_scratch *scratch, int32_t u, int32_t v, 
 /* Sum of R over the four pixels beside a peak; one outside the frame counts as the one opposite. */
 static int32_t beside(struct ih_dots_scratch *scratch, int32_t u, int32_t v)
 {
-    const int32_t width = scratch->rows.finding.band.width;
+    const int32_t width = scratch->width;
     const int16_t *middle = response_row(scratch, v);
     int32_t left = u > 0 ? u - 1 : u + 1;
     int32_t right = u + 1 < width ? u + 1 : u - 1;
@@ -124,21 +114,26 @@ static int32_t beside(struct ih_dots_scratch *scratch, int32_t u, int32_t v)
            response_row(scratch, below)[u];
 }
 
-/* Weights: R <= 18,648, squared 2^28.4; 81 of them 2^34.8; offsets of 4 in Q12 2^49. */
-static struct ih_dot centred(struct ih_dots_scratch *scratch, int32_t u, int32_t v, int32_t reach)
+/* Weights: R <= 18,648, squared 2^28.4; of a row of nine 2^31.6, of 81 2^34.8; offsets of 4 in Q12
+ * 2^49. */
+static inline struct ih_dot centred(struct ih_dots_scratch *scratch, int32_t u, int32_t v,
+                                    int32_t reach)
 {
     const int32_t peak = response_row(scratch, v)[u];
+    const int32_t least = peak / 4;
     int64_t weight_sum = 0;
     int64_t sum_u = 0;
     int64_t sum_v = 0;
     for (int32_t dv = -reach; dv <= reach; dv++) {
-        const int16_t *row = response_row(scratch, v + dv);
+        const int16_t *row = &response_row(scratch, v + dv)[u];
+        uint32_t row_sum = 0;
         for (int32_t du = -reach; du <= reach; du++) {
-            int64_t above = ih_max_s32(0, row[u + du] - peak / 4);
-            weight_sum += above * above;
+            const int32_t above = ih_max_s32(0, row[du] - least);
+            row_sum += (uint32_t)(above * above);
             sum_u += above * above * du;
-            sum_v += above * above * dv;
         }
+        weight_sum += row_sum;
+        sum_v += (int64_t)row_sum * dv;
     }
     return (struct ih_dot){
         .u_px_q12 = u * 4096 + (int32_t)ih_div_round(sum_u * 4096, weight_sum),
@@ -176,7 +171,8 @@ static void judge(struct ih_dots_scratch *scratch, struct ih_dots *out, int32_t 
         out->edge_count++;
         return;
     }
-    struct ih_dot dot = centred(scratch, u, v, flat ? PLATEAU_REACH : CENTRE_REACH);
+    const struct ih_dot dot =
+        flat ? centred(scratch, u, v, PLATEAU_REACH) : centred(scratch, u, v, CENTRE_REACH);
     if ((flat && !stands_alone(scratch, ring_place(dot.u_px_q12, u), ring_place(dot.v_px_q12, v),
                                ring_max)) ||
         has_twin(out, &dot)) {
@@ -186,56 +182,113 @@ static void judge(struct ih_dots_scratch *scratch, struct ih_dots *out, int32_t 
     insert_dot(out, dot);
 }
 
-/* The greatest R of so many pixels. */
-static int32_t greatest(const int16_t *response, int32_t count)
+/* What no threshold of row v is below; it changes from block to block. */
+static void lay_least(struct ih_dots_scratch *scratch, int32_t v)
 {
-    int16_t most = INT16_MIN;
-    for (int32_t u = 0; u < count; u++) {
-        if (response[u] > most) {
-            most = response[u];
+    int16_t *least = scratch->rows.finding.least;
+    int32_t u = 0;
+    while (u < scratch->width) {
+        const int32_t end = ih_min_s32((u + IH_NOISE_BLOCK / 2) / IH_NOISE_BLOCK * IH_NOISE_BLOCK +
+                                           IH_NOISE_BLOCK / 2,
+                                       scratch->width);
+        const int32_t threshold =
+            threshold_of(&scratch->params, ih_noise_least(&scratch->noise, u, v));
+        for (; u < end; u++) {
+            least[u] = (int16_t)ih_clamp_s32(threshold, INT16_MIN, INT16_MAX);
         }
     }
-    return most;
 }
 
-/* Pixels of a row between the centres of two blocks of the noise. */
-struct span {
-    int32_t v, first, end;
-    int32_t least; /* no threshold in between is lower */
-};
-
-static void find_in_span(struct ih_dots_scratch *scratch, struct ih_dots *out,
-                         const struct span *span, const uint16_t noise[IH_NOISE_BLOCKS_X])
+static void mark_above(const int16_t *response, const int16_t *least, int32_t width,
+                       uint8_t *restrict mark)
 {
-    const int32_t v = span->v;
+    for (int32_t u = 0; u < width; u++) {
+        mark[u] = response[u] > least[u] ? UINT8_MAX : 0;
+    }
+}
+
+static int16_t greater(int16_t a, int16_t b)
+{
+    return (int16_t)(a > b ? a : b);
+}
+
+/* Marks stay on maxima; of equal neighbours the first in reading order is one: it is greater than all
+ * that are read before it and than one less than those after it. */
+static void keep_maxima(const int16_t *above, const int16_t *middle, const int16_t *below,
+                        uint8_t *restrict mark)
+{
+    for (int32_t u = 0; u < MARKS; u++) {
+        const int16_t before =
+            greater(greater(above[u - 1], above[u]), greater(above[u + 1], middle[u - 1]));
+        const int16_t after =
+            greater(greater(below[u - 1], below[u]), greater(below[u + 1], middle[u + 1]));
+        const uint8_t is_maximum =
+            middle[u] > greater(before, (int16_t)(after - 1)) ? UINT8_MAX : 0;
+        mark[u] = mark[u] & is_maximum;
+    }
+}
+
+static uint64_t eight_marks(const uint8_t *mark)
+{
+    uint64_t word = 0;
+    memcpy(&word, mark, sizeof word);
+    return word;
+}
+
+/* Is one of the next MARKS pixels marked? Behind the frame none is. */
+static bool is_any_marked(const uint8_t mark[MARKS])
+{
+    return (eight_marks(mark) | eight_marks(&mark[8]) | eight_marks(&mark[16]) |
+            eight_marks(&mark[24])) != 0;
+}
+
+static int32_t next_marked(const uint8_t *mark, int32_t first, int32_t width)
+{
+    int32_t u = first;
+    while (u < width && !is_any_marked(&mark[u])) {
+        u += MARKS;
+    }
+    return u;
+}
+
+/* Maxima of row v among MARKS pixels. */
+static void judge_marked(struct ih_dots_scratch *scratch, struct ih_dots *out, int32_t first,
+                         int32_t v)
+{
+    const uint8_t *mark = scratch->rows.finding.mark;
     const int16_t *response = response_row(scratch, v);
-    for (int32_t u = span->first; u < span->end; u++) {
-        if (response[u] > span->least && is_maximum(scratch, u, v) &&
-            response[u] > threshold_of(&scratch->params, ih_noise_at(&scratch->noise, noise, u))) {
+    int32_t u = first;
+    while (u < first + MARKS) {
+        if (u % 8 == 0 && eight_marks(&mark[u]) == 0) {
+            u += 8;
+            continue;
+        }
+        if (mark[u] != 0 &&
+            response[u] > threshold_of(&scratch->params, ih_noise_at(&scratch->noise, u, v))) {
             judge(scratch, out, u, v);
         }
+        u++;
     }
 }
 
-/* Row v has all its neighbours in the ring. Most of its spans have nothing above any threshold. */
+/* Row v has all its neighbours in the ring. Most of its pixels are not above any threshold. */
 static void find_dots(struct ih_dots_scratch *scratch, struct ih_dots *out, int32_t v)
 {
-    uint16_t noise[IH_NOISE_BLOCKS_X];
-    const int32_t width = scratch->rows.finding.band.width;
-    const int32_t last = scratch->noise.columns - 1;
-    struct span span = {.v = v};
-    (void)ih_noise_row(&scratch->noise, v, noise);
-    int32_t column = 0;
-    while (span.first < width) {
-        const int32_t left = noise[ih_max_s32(column - 1, 0)];
-        const int32_t right = noise[ih_min_s32(column, last)];
-        span.end = ih_min_s32(column * IH_NOISE_BLOCK + IH_NOISE_BLOCK / 2, width);
-        span.least = threshold_of(&scratch->params, ih_min_s32(left, right));
-        if (greatest(&response_row(scratch, v)[span.first], span.end - span.first) > span.least) {
-            find_in_span(scratch, out, &span, noise);
+    const int32_t width = scratch->width;
+    const int16_t *above = response_row(scratch, v - 1);
+    const int16_t *middle = response_row(scratch, v);
+    const int16_t *below = response_row(scratch, v + 1);
+    uint8_t *mark = scratch->rows.finding.mark;
+    if (v % IH_NOISE_BLOCK == IH_NOISE_BLOCK / 2 || v == 0) {
+        lay_least(scratch, v);
+    }
+    mark_above(middle, scratch->rows.finding.least, width, mark);
+    for (int32_t first = next_marked(mark, 0, width); first < width;
+         first = next_marked(mark, first + MARKS, width)) {
+        keep_maxima(&above[first], &middle[first], &below[first], &mark[first]);
+        if (is_any_marked(&mark[first])) {
+            judge_marked(scratch, out, first, v);
         }
-        span.first = span.end;
-        column++;
     }
 }
 
@@ -248,45 +301,67 @@ static void advance(struct ih_dots_scratch *scratch, struct ih_dots *out)
     }
 }
 
-static void push_row(struct ih_dots_scratch *scratch, struct ih_dots *out)
+static uint16_t greatest(const uint16_t *sum, int32_t count)
 {
-    if (ih_band_push(&scratch->rows.finding.band, response_row(scratch, scratch->response_rows))) {
-        advance(scratch, out);
+    uint16_t most = 0;
+    for (int32_t i = 0; i < count; i++) {
+        most = sum[i] > most ? sum[i] : most;
     }
+    return most;
 }
 
-static void finish_blocks(struct ih_dots_scratch *scratch, struct ih_dots *out, int32_t block_row)
+/* A row of blocks of which each column's sum is given, and what a bright column has more than. Where
+ * no column is bright no block is. */
+static void mark_bright(struct ih_dots *out, int32_t block_row, const uint16_t *sum, int32_t width,
+                        int32_t limit)
 {
-    const int32_t width = scratch->rows.finding.band.width;
-    for (int32_t block = 0; block * IH_DOTS_BLOCK < width; block++) {
-        int32_t columns = ih_min_s32(IH_DOTS_BLOCK, width - block * IH_DOTS_BLOCK);
-        int32_t pixels = columns * scratch->block_rows;
-        if ((int32_t)scratch->block_sum[block] > scratch->params.bright_grey * 16 * pixels) {
+    if (greatest(sum, width) <= limit) {
+        return;
+    }
+    for (int32_t first = 0; first < width; first += IH_DOTS_BLOCK) {
+        const int32_t columns = ih_min_s32(IH_DOTS_BLOCK, width - first);
+        int32_t block_sum = 0;
+        for (int32_t i = 0; i < columns; i++) {
+            block_sum += sum[first + i];
+        }
+        if (block_sum > limit * columns) {
+            const int32_t block = first / IH_DOTS_BLOCK;
             out->bright[block_row][block / 32] |= 1u << (block % 32);
         }
     }
-    memset(scratch->block_sum, 0, sizeof scratch->block_sum);
-    scratch->block_rows = 0;
 }
 
-static void add_to_blocks(struct ih_dots_scratch *scratch, struct ih_dots *out, int32_t row)
+/* Rows of blocks before the ambient light is subtracted; without it they are known to the band. */
+static void add_bright(struct ih_dots_scratch *scratch, int32_t v)
+{
+    uint16_t *column = scratch->bright_column;
+    if (v % IH_DOTS_BLOCK == 0) {
+        memset(column, 0, sizeof scratch->bright_column);
+    }
+    for (int32_t u = 0; u < scratch->width; u++) {
+        column[u] = (uint16_t)(column[u] + scratch->grey_q4[u]);
+    }
+}
+
+/* Row v is the last one of a row of blocks. */
+static void finish_blocks(struct ih_dots_scratch *scratch, struct ih_dots *out, int32_t v,
+                          bool is_in_band)
 {
     const struct ih_band *band = &scratch->rows.finding.band;
-    const int32_t whole = band->width / IH_DOTS_BLOCK;
-    const uint16_t *grey_q4 = band->incoming_q4;
-    for (int32_t block = 0; block < whole; block++) {
-        uint32_t sum = 0;
-        for (int32_t i = 0; i < IH_DOTS_BLOCK; i++) {
-            sum += *grey_q4++;
-        }
-        scratch->block_sum[block] += sum;
+    const int32_t rows = v % IH_DOTS_BLOCK + 1;
+    const int32_t grey = band->is_bytes ? 1 : 16; /* one level of 8 bits */
+    if (is_in_band) {
+        ih_band_columns(band, rows, scratch->bright_column);
     }
-    for (int32_t u = whole * IH_DOTS_BLOCK; u < band->width; u++) { /* what is left of a block */
-        scratch->block_sum[whole] += *grey_q4++;
-    }
-    scratch->block_rows++;
-    if (scratch->block_rows == IH_DOTS_BLOCK || row == scratch->height - 1) {
-        finish_blocks(scratch, out, row / IH_DOTS_BLOCK);
+    mark_bright(out, v / IH_DOTS_BLOCK, scratch->bright_column, scratch->width,
+                scratch->params.bright_grey * grey * rows);
+}
+
+static void repeat_row(struct ih_dots_scratch *scratch, struct ih_dots *out)
+{
+    if (ih_band_repeat(&scratch->rows.finding.band,
+                       response_row(scratch, scratch->response_rows))) {
+        advance(scratch, out);
     }
 }
 
@@ -294,23 +369,40 @@ void ih_dots_row(struct ih_dots_scratch *scratch, struct ih_dots *out, const str
                  const struct ih_row *ambient)
 {
     struct ih_band *band = &scratch->rows.finding.band;
-    int32_t v = scratch->rows_taken++;
-    int32_t copies = v == 0 ? IH_BAND_REACH + 1 : 1; /* repeat the first upwards */
-    ih_row_grey(row, band->width, band->incoming_q4);
-    add_to_blocks(scratch, out, v);
-    if (ambient != NULL) {
-        ih_row_grey(ambient, band->width, scratch->ambient_q4);
-        ih_noise_subtract(&scratch->noise, v, band->width, scratch->ambient_q4, band->incoming_q4);
+    const int32_t v = scratch->rows_taken++;
+    const bool is_bytes = ambient == NULL && ih_row_is_bytes(row);
+    int16_t *response = response_row(scratch, scratch->response_rows);
+    bool complete = false;
+    if (v == 0) {
+        ih_band_begin(band, scratch->width, is_bytes);
     }
-    for (int32_t i = 0; i < copies; i++) {
-        push_row(scratch, out);
+    if (is_bytes) {
+        complete = ih_band_push_bytes(band, row->samples, response);
+    } else {
+        ih_row_grey(row, scratch->width, scratch->grey_q4);
+        if (ambient != NULL) {
+            add_bright(scratch, v);
+            ih_row_grey(ambient, scratch->width, scratch->ambient_q4);
+            ih_noise_subtract(&scratch->noise, v, scratch->width, scratch->ambient_q4,
+                              scratch->grey_q4);
+        }
+        complete = ih_band_push_grey(band, scratch->grey_q4, response);
+    }
+    if (v % IH_DOTS_BLOCK == IH_DOTS_BLOCK - 1 || v == scratch->height - 1) {
+        finish_blocks(scratch, out, v, ambient == NULL);
+    }
+    if (complete) {
+        advance(scratch, out);
+    }
+    for (int32_t i = 0; v == 0 && i < IH_BAND_REACH; i++) { /* repeat the first row upwards */
+        repeat_row(scratch, out);
     }
 }
 
 void ih_dots_end(struct ih_dots_scratch *scratch, struct ih_dots *out)
 {
     for (int32_t i = 0; i < IH_BAND_REACH; i++) { /* repeat the last row downwards */
-        push_row(scratch, out);
+        repeat_row(scratch, out);
     }
     for (int32_t i = 0; i < IH_DOTS_REACH; i++) { /* nothing below the frame */
         memset(

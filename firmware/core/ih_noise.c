@@ -13,6 +13,8 @@
 #define WHITE_Q4 19
 #define SAMPLED_ROWS (IH_NOISE_BLOCK / IH_NOISE_STEP)
 #define SAMPLES_MAX (SAMPLED_ROWS * IH_NOISE_BLOCK)
+/* Nearly all medians are at most this, three grey levels. */
+#define MOSTLY_BELOW 255
 
 /* Twice the distance of a pixel from the first block's centre, limited to between the outermost
  * centres; a block is 2 * IH_NOISE_BLOCK of it. */
@@ -26,18 +28,29 @@ static int32_t between(int32_t low, int32_t high, int32_t part)
     return low + (int32_t)ih_shift_round((int64_t)(high - low) * part, 6);
 }
 
-/* The value of rank count / 2, from 0: the k-th smallest by halving the range of values. */
-static uint16_t median_of(const uint16_t *value, int32_t count)
+/* How many of the values of a block are at most so large. */
+static int32_t at_most(const uint16_t value[SAMPLES_MAX], uint16_t limit)
+{
+    uint16_t count = 0;
+    for (int32_t i = 0; i < SAMPLES_MAX; i++) {
+        count = (uint16_t)(count + (value[i] <= limit));
+    }
+    return count;
+}
+
+/* The value of rank count / 2, from 0: the k-th smallest by halving the range of values, most often
+ * the first few hundred of them. What is behind count is larger than any. */
+static uint16_t median_of(const uint16_t value[SAMPLES_MAX], int32_t count)
 {
     int32_t low = 0;
-    int32_t high = UINT16_MAX; /* the median is in low..high */
-    while (low < high) {
+    int32_t high = MOSTLY_BELOW;
+    if (at_most(value, MOSTLY_BELOW) <= count / 2) {
+        low = MOSTLY_BELOW + 1;
+        high = UINT16_MAX;
+    }
+    while (low < high) { /* the median is in low..high */
         int32_t middle = (low + high) / 2;
-        int32_t at_most = 0;
-        for (int32_t i = 0; i < count; i++) {
-            at_most += value[i] <= middle;
-        }
-        if (at_most > count / 2) {
+        if (at_most(value, (uint16_t)middle) > count / 2) {
             high = middle;
         } else {
             low = middle + 1;
@@ -57,6 +70,9 @@ static uint16_t block_median(const struct ih_noise_scratch *scratch, int32_t col
             value[count++] = (uint16_t)ih_abs_s32(scratch->response[row][u]);
             IH_IN_RANGE(value[count - 1], 0, IH_RANGE_RESPONSE);
         }
+    }
+    for (int32_t i = count; i < SAMPLES_MAX; i++) {
+        value[i] = UINT16_MAX;
     }
     return median_of(value, count);
 }
@@ -132,32 +148,57 @@ static bool is_sampled(int32_t count, int32_t v, int32_t height)
 static void take_rows(const struct ih_frame *frame, const struct ih_frame *ambient, int32_t v,
                       struct ih_noise_scratch *scratch)
 {
-    int32_t inside = ih_clamp_s32(v, 0, frame->height - 1);
-    struct ih_row row = ih_frame_row(frame, inside);
-    ih_row_grey(&row, frame->width, scratch->band.incoming_q4);
-    if (ambient != NULL) {
-        row = ih_frame_row(ambient, inside);
-        ih_row_grey(&row, frame->width, scratch->ambient_q4);
+    struct ih_row row = ih_frame_row(frame, v);
+    struct ih_row under = ih_frame_row(ambient, v);
+    ih_row_grey(&row, frame->width, scratch->grey_q4);
+    ih_row_grey(&under, frame->width, scratch->ambient_q4);
+}
+
+/* R of row v as it is in the frame. */
+static void filter_bytes(const struct ih_frame *frame, int32_t v, struct ih_band *band,
+                         int16_t *response)
+{
+    struct ih_row row[IH_BAND_ROWS];
+    for (int32_t i = 0; i < IH_BAND_ROWS; i++) {
+        row[i] = ih_frame_row(frame, ih_clamp_s32(v + i - IH_BAND_REACH, 0, frame->height - 1));
+    }
+    ih_band_bytes(band, row, frame->width, response);
+}
+
+/* R of row v, without the ambient frame, if there is one, where the map says so. */
+static void filter_grey(const struct ih_frame *frame, const struct ih_frame *ambient, int32_t v,
+                        const struct ih_noise *noise, struct ih_noise_scratch *scratch,
+                        int16_t *response)
+{
+    ih_band_begin(&scratch->band, frame->width, false);
+    for (int32_t i = -IH_BAND_REACH; i <= IH_BAND_REACH; i++) {
+        const int32_t at = ih_clamp_s32(v + i, 0, frame->height - 1);
+        if (ambient != NULL) {
+            take_rows(frame, ambient, at, scratch);
+            ih_noise_subtract(noise, at, frame->width, scratch->ambient_q4, scratch->grey_q4);
+        } else {
+            const struct ih_row row = ih_frame_row(frame, at);
+            ih_row_grey(&row, frame->width, scratch->grey_q4);
+        }
+        (void)ih_band_push_grey(&scratch->band, scratch->grey_q4, response);
     }
 }
 
 static void measure(const struct ih_frame *frame, const struct ih_frame *ambient,
                     struct ih_noise_scratch *scratch, struct ih_noise *out)
 {
+    const struct ih_row row = ih_frame_row(frame, 0);
+    const bool is_bytes = ambient == NULL && ih_row_is_bytes(&row);
     for (int32_t block_row = 0; block_row < out->rows; block_row++) {
         int32_t count = 0;
         for (int32_t v = first_row(block_row, frame->height); is_sampled(count, v, frame->height);
              v += IH_NOISE_STEP) {
-            ih_band_begin(&scratch->band, frame->width);
-            for (int32_t at = v - IH_BAND_REACH; at <= v + IH_BAND_REACH; at++) {
-                take_rows(frame, ambient, at, scratch);
-                if (ambient != NULL) {
-                    ih_noise_subtract(out, ih_clamp_s32(at, 0, frame->height - 1), frame->width,
-                                      scratch->ambient_q4, scratch->band.incoming_q4);
-                }
-                (void)ih_band_push(&scratch->band, scratch->response[count]);
+            int16_t *response = scratch->response[count++];
+            if (is_bytes) {
+                filter_bytes(frame, v, &scratch->band, response);
+            } else {
+                filter_grey(frame, ambient, v, out, scratch, response);
             }
-            count++;
         }
         for (int32_t column = 0; column < out->columns; column++) {
             out->median[block_row][column] = block_median(scratch, column, count);
@@ -168,17 +209,17 @@ static void measure(const struct ih_frame *frame, const struct ih_frame *ambient
 /* Half of the difference of both rows, from the middle of the range: not cut on either side. */
 static void halve_difference(struct ih_noise_scratch *scratch)
 {
-    uint16_t *grey_q4 = scratch->band.incoming_q4;
+    uint16_t *grey_q4 = scratch->grey_q4;
     for (int32_t u = 0; u < scratch->band.width; u++) {
         grey_q4[u] = (uint16_t)((grey_q4[u] + IH_BAND_FULL_Q4 - scratch->ambient_q4[u]) >> 1);
     }
 }
 
 /* Sum over a row's part in each block. */
-static void add_row(const struct ih_band *band, int32_t sum[IH_NOISE_BLOCKS_X])
+static void add_row(const uint16_t *grey_q4, int32_t width, int32_t sum[IH_NOISE_BLOCKS_X])
 {
-    for (int32_t u = 0; u < band->width; u++) {
-        sum[u / IH_NOISE_BLOCK] += band->incoming_q4[u] - IH_BAND_FULL_Q4 / 2;
+    for (int32_t u = 0; u < width; u++) {
+        sum[u / IH_NOISE_BLOCK] += grey_q4[u] - IH_BAND_FULL_Q4 / 2;
     }
 }
 
@@ -191,14 +232,14 @@ static void choose(const struct ih_frame *frame, const struct ih_frame *ambient,
     int32_t count = 0;
     for (int32_t v = first_row(block_row, frame->height); is_sampled(count, v, frame->height);
          v += IH_NOISE_STEP) {
-        ih_band_begin(&scratch->band, frame->width);
+        ih_band_begin(&scratch->band, frame->width, false);
         for (int32_t at = v - IH_BAND_REACH; at <= v + IH_BAND_REACH; at++) {
-            take_rows(frame, ambient, at, scratch);
+            take_rows(frame, ambient, ih_clamp_s32(at, 0, frame->height - 1), scratch);
             halve_difference(scratch);
             if (at == v) {
-                add_row(&scratch->band, half_sum);
+                add_row(scratch->grey_q4, frame->width, half_sum);
             }
-            (void)ih_band_push(&scratch->band, scratch->response[count]);
+            (void)ih_band_push_grey(&scratch->band, scratch->grey_q4, scratch->response[count]);
         }
         count++;
     }
@@ -257,25 +298,45 @@ void ih_noise_measure(const struct ih_frame *frame, const struct ih_frame *ambie
     }
 }
 
-int32_t ih_noise_row(const struct ih_noise *noise, int32_t v, uint16_t row[IH_NOISE_BLOCKS_X])
+/* The four blocks between whose centres a pixel lies, and how far on it is, in 64ths. */
+struct cell {
+    int32_t left, right, above, below;
+    int32_t part_u, part_v;
+};
+
+static struct cell cell_of(const struct ih_noise *noise, int32_t u, int32_t v)
 {
-    int32_t offset = twice_offset(v, noise->rows);
-    int32_t above = offset / (2 * IH_NOISE_BLOCK);
-    int32_t below = ih_min_s32(above + 1, noise->rows - 1);
-    int32_t least = UINT16_MAX;
-    for (int32_t column = 0; column < noise->columns; column++) {
-        row[column] = (uint16_t)between(noise->median[above][column], noise->median[below][column],
-                                        offset % (2 * IH_NOISE_BLOCK));
-        IH_IN_RANGE(row[column], 0, IH_RANGE_NOISE);
-        least = ih_min_s32(least, row[column]);
-    }
-    return least;
+    const int32_t offset_u = twice_offset(u, noise->columns);
+    const int32_t offset_v = twice_offset(v, noise->rows);
+    const int32_t left = offset_u / (2 * IH_NOISE_BLOCK);
+    const int32_t above = offset_v / (2 * IH_NOISE_BLOCK);
+    return (struct cell){
+        .left = left,
+        .right = ih_min_s32(left + 1, noise->columns - 1),
+        .above = above,
+        .below = ih_min_s32(above + 1, noise->rows - 1),
+        .part_u = offset_u % (2 * IH_NOISE_BLOCK),
+        .part_v = offset_v % (2 * IH_NOISE_BLOCK),
+    };
 }
 
-int32_t ih_noise_at(const struct ih_noise *noise, const uint16_t row[IH_NOISE_BLOCKS_X], int32_t u)
+int32_t ih_noise_at(const struct ih_noise *noise, int32_t u, int32_t v)
 {
-    int32_t offset = twice_offset(u, noise->columns);
-    int32_t left = offset / (2 * IH_NOISE_BLOCK);
-    int32_t right = ih_min_s32(left + 1, noise->columns - 1);
-    return between(row[left], row[right], offset % (2 * IH_NOISE_BLOCK));
+    const struct cell cell = cell_of(noise, u, v);
+    const uint16_t *above = noise->median[cell.above];
+    const uint16_t *below = noise->median[cell.below];
+    const int32_t left = between(above[cell.left], below[cell.left], cell.part_v);
+    const int32_t right = between(above[cell.right], below[cell.right], cell.part_v);
+    IH_IN_RANGE(left, 0, IH_RANGE_NOISE);
+    IH_IN_RANGE(right, 0, IH_RANGE_NOISE);
+    return between(left, right, cell.part_u);
+}
+
+int32_t ih_noise_least(const struct ih_noise *noise, int32_t u, int32_t v)
+{
+    const struct cell cell = cell_of(noise, u, v);
+    const uint16_t *above = noise->median[cell.above];
+    const uint16_t *below = noise->median[cell.below];
+    return ih_min_s32(ih_min_s32(above[cell.left], above[cell.right]),
+                      ih_min_s32(below[cell.left], below[cell.right]));
 }

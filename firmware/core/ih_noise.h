@@ -5,8 +5,8 @@
  *        whether the ambient frame is subtracted there.
  * Way:   median of |R| (ih_band) over every pixel of the rows 4, 20, 36, ... that pass through a
  *        block: a dot covers a fiftieth of it and does not move its median. Then 1-2-1 in both
- *        directions, outermost blocks repeated. Between the blocks' centres ih_noise_row and
- *        ih_noise_at go linearly, so there are no seams.
+ *        directions, outermost blocks repeated. Between the blocks' centres ih_noise_at goes
+ *        linearly, so there are no seams.
  *        Ambient: it takes texture away but brings its own noise. It is subtracted in the blocks
  *        whose median is by an eighth less with it subtracted (half of the difference is looked at:
  *        nothing is cut off), and which are not darker than it by more than 2 grey levels in the
@@ -15,7 +15,7 @@
  *        levels are left; what is below 0 then, the dark ghost of something that moved, is 0. The
  *        noise is that of what is left, in these blocks 19/16 of it: it is white, and has more
  *        lonely maxima than texture.
- * Cost:  half of the frame's rows through ih_band's sums, a sixteenth through its filter; three
+ * Cost:  half of the frame's rows through ih_band's pairs, a sixteenth through its filter; three
  *        times that with an ambient frame.
  * Range: as R; 19/16 of it 22,145. Whole units of R.
  */
@@ -37,7 +37,7 @@ struct ih_noise {
 
 struct ih_noise_scratch {
     struct ih_band band;
-    uint16_t ambient_q4[IH_FRAME_WIDTH_MAX];
+    uint16_t grey_q4[IH_FRAME_WIDTH_MAX], ambient_q4[IH_FRAME_WIDTH_MAX];
     int16_t response[IH_NOISE_BLOCK / IH_NOISE_STEP][IH_FRAME_WIDTH_MAX];
 };
 
@@ -49,10 +49,11 @@ void ih_noise_measure(const struct ih_frame *frame, const struct ih_frame *ambie
 void ih_noise_subtract(const struct ih_noise *noise, int32_t v, int32_t width,
                        const uint16_t *ambient_q4, uint16_t *grey_q4);
 
-/* The noise in a row at the blocks' centres, column by column; the smallest of them is returned. */
-int32_t ih_noise_row(const struct ih_noise *noise, int32_t v, uint16_t row[IH_NOISE_BLOCKS_X]);
+/* The noise at a pixel. */
+int32_t ih_noise_at(const struct ih_noise *noise, int32_t u, int32_t v);
 
-/* The noise at a pixel of that row. */
-int32_t ih_noise_at(const struct ih_noise *noise, const uint16_t row[IH_NOISE_BLOCKS_X], int32_t u);
+/* No pixel between the centres of the same four blocks has less noise. u and v come between other
+ * centres where they are IH_NOISE_BLOCK / 2 more than a multiple of IH_NOISE_BLOCK. */
+int32_t ih_noise_least(const struct ih_noise *noise, int32_t u, int32_t v);
 
 #endif

@@ -29,20 +29,43 @@ void tearDown(void)
 {
 }
 
+/* A row of the frame, in the format that its samples allow. */
+static bool push(int32_t v, int16_t *out)
+{
+    static uint16_t grey_q4[IH_FRAME_WIDTH_MAX];
+    const struct ih_row row = ih_frame_row(&frame, v);
+
+    if (band.is_bytes) {
+        return ih_band_push_bytes(&band, row.samples, out);
+    }
+    ih_row_grey(&row, frame.width, grey_q4);
+    return ih_band_push_grey(&band, grey_q4, out);
+}
+
 /* The whole frame, its first and last row repeated outside. */
-static void filter(void)
+static void filter_as(bool is_bytes)
 {
     int32_t v, rows = 0;
 
-    ih_band_begin(&band, frame.width);
-    for (v = -IH_BAND_REACH; v < frame.height + IH_BAND_REACH; v++) {
-        const int32_t inside = v < 0 ? 0 : v >= frame.height ? frame.height - 1 : v;
-        const struct ih_row row = ih_frame_row(&frame, inside);
-
-        ih_row_grey(&row, frame.width, band.incoming_q4);
-        rows += ih_band_push(&band, response[rows]);
+    ih_band_begin(&band, frame.width, is_bytes);
+    TEST_ASSERT_FALSE(push(0, response[0]));
+    for (v = 1; v <= IH_BAND_REACH; v++) {
+        TEST_ASSERT_FALSE(ih_band_repeat(&band, response[0]));
+    }
+    for (v = 1; v < frame.height; v++) {
+        rows += push(v, response[rows]);
+    }
+    for (v = 0; v < IH_BAND_REACH; v++) {
+        rows += ih_band_repeat(&band, response[rows]);
     }
     TEST_ASSERT_EQUAL_INT32(frame.height, rows);
+}
+
+static void filter(void)
+{
+    const struct ih_row row = ih_frame_row(&frame, 0);
+
+    filter_as(ih_row_is_bytes(&row));
 }
 
 static void responses_match_scipy(void)
@@ -113,6 +136,111 @@ static void the_greatest_responses_fit(void)
     TEST_ASSERT_EQUAL_INT16(-18360, response[101][101]);
 }
 
+/* Noise, lines, single pixels, areas that are full and empty, at all borders. */
+static void fill_hard(int32_t width, int32_t height, uint32_t seed)
+{
+    struct ih_test_random random = {seed};
+    int32_t u, v;
+
+    fill8(width, height, 0);
+    for (v = 0; v < height; v++) {
+        for (u = 0; u < width; u++) {
+            const int32_t kind = (u / 40 + v / 24) % 6;
+            const int32_t noise = (int32_t)ih_test_between(&random, 0, 255);
+
+            grey8[v * width + u] = (uint8_t)(kind == 0   ? noise
+                                             : kind == 1 ? (u % 7 < 3) * 255
+                                             : kind == 2 ? (v % 5 < 2) * 255
+                                             : kind == 3 ? (noise > 250) * 255
+                                             : kind == 4 ? 255 - (noise > 250) * 255
+                                                         : (u * 3 + v + noise / 16) % 256);
+        }
+    }
+}
+
+/* What the header says, pixel by pixel, in 12 bits. */
+static int32_t plain(int32_t u, int32_t v)
+{
+    int32_t du, dv, inner = 0, box = 0;
+
+    for (dv = -4; dv <= 4; dv++) {
+        for (du = -4; du <= 4; du++) {
+            const int32_t at_u = u + du < 0 ? 0 : u + du >= frame.width ? frame.width - 1 : u + du;
+            const int32_t at_v = v + dv < 0               ? 0
+                                 : v + dv >= frame.height ? frame.height - 1
+                                                          : v + dv;
+            const int32_t grey_q4 = 16 * grey8[at_v * frame.width + at_u];
+            const bool is_inner = du >= -1 && du <= 1 && dv >= -1 && dv <= 1;
+
+            box += grey_q4;
+            inner += is_inner ? grey_q4 * (du == 0 ? 2 : 1) * (dv == 0 ? 2 : 1) : 0;
+        }
+    }
+    return (81 * inner - 16 * box + 128) >> 8;
+}
+
+/* Of bytes, of their grey levels in 12 bits, and of nine rows alone: the same to the bit, for widths
+ * that no vector divides too. */
+static void all_ways_give_what_the_header_says(void)
+{
+    static const int32_t widths[] = {320, 321, 333, 350, 367, 751, 1279, 1280};
+    static int16_t row_response[IH_FRAME_WIDTH_MAX];
+    struct ih_row row[IH_BAND_ROWS];
+    int32_t i, k, u, v;
+
+    for (i = 0; i < IH_TEST_COUNT(widths); i++) {
+        fill_hard(widths[i], 240, (uint32_t)i + 1);
+        filter_as(true);
+        for (v = 0; v < 240; v += v < 12 || v > 225 ? 1 : 11) {
+            for (u = 0; u < widths[i]; u++) {
+                IH_TEST_EQUAL(plain(u, v), response[v][u], "bytes", v * 10000 + u);
+            }
+        }
+        for (v = 0; v < 240; v++) {
+            for (k = 0; k < IH_BAND_ROWS; k++) {
+                const int32_t at = v + k - IH_BAND_REACH;
+
+                row[k] = ih_frame_row(&frame, at < 0 ? 0 : at > 239 ? 239 : at);
+            }
+            ih_band_bytes(&band, row, widths[i], row_response);
+            TEST_ASSERT_EQUAL_MEMORY(response[v], row_response,
+                                     (size_t)widths[i] * sizeof row_response[0]);
+        }
+        memset(&band, IH_TEST_FILL, sizeof band);
+        memset(response, IH_TEST_FILL, sizeof response);
+        filter_as(false);
+        for (v = 0; v < 240; v += v < 12 || v > 225 ? 1 : 11) {
+            for (u = 0; u < widths[i]; u++) {
+                IH_TEST_EQUAL(plain(u, v), response[v][u], "grey", v * 10000 + u);
+            }
+        }
+    }
+}
+
+/* Of the newest rows, whatever their count. */
+static void columns_are_sums_of_rows(void)
+{
+    static uint16_t sum[IH_FRAME_WIDTH_MAX];
+    int32_t i, rows, u, v;
+
+    fill_hard(333, 240, 77);
+    ih_band_begin(&band, frame.width, true);
+    for (v = 0; v < 40; v++) {
+        (void)push(v, response[0]);
+        for (rows = 1; rows <= 8 && rows <= v; rows++) {
+            ih_band_columns(&band, rows, sum);
+            for (u = 0; u < frame.width; u++) {
+                int32_t expected = 0;
+
+                for (i = 0; i < rows; i++) {
+                    expected += grey8[(v - i) * frame.width + u];
+                }
+                IH_TEST_EQUAL(expected, sum[u], "columns", rows * 10000 + u);
+            }
+        }
+    }
+}
+
 /* Nothing of the frame before is left. */
 static void a_second_frame_starts_afresh(void)
 {
@@ -134,7 +262,7 @@ static void pixels_beyond_the_width_do_not_matter(void)
 {
     fill8(320, 240, 77);
     filter();
-    IH_TEST_UNTOUCHED(&band.grey_q4[3][320], sizeof band.grey_q4[0][0], "ring");
+    IH_TEST_UNTOUCHED(&band.inner[322], sizeof band.inner[0], "sums");
     IH_TEST_UNTOUCHED(&response[3][320], sizeof response[0][0], "response");
 }
 
@@ -145,6 +273,8 @@ int main(void)
     RUN_TEST(constants_have_no_response);
     RUN_TEST(slopes_have_no_response);
     RUN_TEST(the_greatest_responses_fit);
+    RUN_TEST(all_ways_give_what_the_header_says);
+    RUN_TEST(columns_are_sums_of_rows);
     RUN_TEST(a_second_frame_starts_afresh);
     RUN_TEST(pixels_beyond_the_width_do_not_matter);
     return UNITY_END();

@@ -541,6 +541,144 @@ static void row_by_row_is_the_same_as_the_whole_frame(void)
     TEST_ASSERT_EQUAL_MEMORY(whole.dot, dots.dot, (size_t)dots.dot_count * sizeof dots.dot[0]);
 }
 
+/* Noise that differs from place to place, lines, single pixels, full and empty areas, spots; the same in
+ * the corners and on the borders. */
+static void fill_hard(int32_t width, int32_t height, uint32_t seed)
+{
+    struct ih_test_random random = {seed};
+    int32_t i, u, v;
+
+    fill8(width, height, 0);
+    for (v = 0; v < height; v++) {
+        for (u = 0; u < width; u++) {
+            const int32_t kind = (u / 56 + v / 40 + (int32_t)seed) % 7;
+            const int32_t noise = (int32_t)ih_test_between(&random, 0, 255);
+
+            grey8[v * width + u] = (uint8_t)(kind == 0   ? noise
+                                             : kind == 1 ? (u % 9 < 2) * 255
+                                             : kind == 2 ? (v % 11 < 3) * 180 + noise / 8
+                                             : kind == 3 ? (noise > 252) * 255
+                                             : kind == 4 ? 255 - (noise > 250) * 255
+                                             : kind == 5 ? 20 + noise / 64 + noise % 3
+                                                         : (u * 2 + v + noise / 16) % 256);
+        }
+    }
+    for (i = 0; i < 200; i++) {
+        const int32_t spot_u = (int32_t)ih_test_between(&random, 0, width - 1);
+        const int32_t spot_v = (int32_t)ih_test_between(&random, 0, height - 1);
+
+        add_spot(i % 9 == 0   ? 0
+                 : i % 9 == 1 ? width - 1
+                              : spot_u,
+                 i % 9 == 2   ? 0
+                 : i % 9 == 3 ? height - 1
+                              : spot_v,
+                 1.2, 3 * i % 250);
+    }
+}
+
+/* R with a border of zeros. */
+static int16_t plain[IH_FRAME_HEIGHT_MAX + 2][IH_FRAME_WIDTH_MAX + 2];
+
+static void filter_whole(void)
+{
+    static struct ih_band band;
+    struct ih_row row[IH_BAND_ROWS];
+    int32_t i, v;
+
+    memset(plain, 0, sizeof plain);
+    for (v = 0; v < frame.height; v++) {
+        for (i = 0; i < IH_BAND_ROWS; i++) {
+            row[i] = ih_frame_row(&frame, ih_clamp_s32(v + i - 4, 0, frame.height - 1));
+        }
+        ih_band_bytes(&band, row, frame.width, &plain[v + 1][1]);
+    }
+}
+
+static int32_t plain_maxima(void)
+{
+    int32_t count = 0, i, u, v;
+
+    for (v = 0; v < frame.height; v++) {
+        for (u = 0; u < frame.width; u++) {
+            const int16_t peak = plain[v + 1][u + 1];
+            const int32_t floor = (params.floor_grey_q4 * IH_BAND_UNIT + 8) >> 4;
+            const int32_t noisy =
+                (ih_noise_at(&scratch.noise, u, v) * params.noise_gain_q8 + 128) >> 8;
+            bool is_maximum = peak > floor && peak > noisy;
+
+            for (i = 0; i < 9; i++) {
+                const int16_t other = plain[v + i / 3][u + i % 3];
+
+                is_maximum = is_maximum && (i < 4 ? peak > other : peak >= other);
+            }
+            count += is_maximum;
+        }
+    }
+    return count;
+}
+
+/* What is passed over in groups has no maximum above its own threshold: every one that a plain search
+ * finds is a dot or was refused for a reason. */
+static void no_maximum_is_passed_over(void)
+{
+    static const int32_t sizes[][2] = {{320, 240}, {321, 247}, {383, 256}, {752, 300}, {1280, 241}};
+    static const int32_t gains[] = {0, 300, 1178, 4000};
+    int32_t i, k;
+
+    for (i = 0; i < IH_TEST_COUNT(sizes); i++) {
+        fill_hard(sizes[i][0], sizes[i][1], (uint32_t)i);
+        filter_whole();
+        for (k = 0; k < IH_TEST_COUNT(gains); k++) {
+            params.noise_gain_q8 = gains[k];
+            params.floor_grey_q4 = k == 1 ? 0 : 29;
+            find();
+            IH_TEST_EQUAL(plain_maxima(),
+                          dots.dot_count + dots.edge_count + dots.hot_count + dots.dots_dropped,
+                          "maxima", i * 10 + k);
+        }
+    }
+}
+
+/* Whole blocks and those that the frame cuts off, with the ambient frame and without. */
+static void bright_blocks_are_those_of_a_bright_mean(void)
+{
+    static const int32_t sizes[][2] = {{320, 240}, {321, 241}, {327, 247}, {753, 301}};
+    static const int32_t limits[] = {-1, 0, 60, 127, 200, 254, 255};
+    int32_t i, k, u, v, column, row, bright = 0;
+
+    for (i = 0; i < 2 * IH_TEST_COUNT(sizes); i++) {
+        const int32_t width = sizes[i / 2][0], height = sizes[i / 2][1];
+
+        fill_hard(width, height, (uint32_t)i);
+        keep_ambient();
+        for (k = 0; k < IH_TEST_COUNT(limits); k++) {
+            params.bright_grey = limits[k];
+            if (i % 2 == 0) {
+                find();
+            } else {
+                find_with_ambient();
+            }
+            for (row = 0; row < height; row += 8) {
+                for (column = 0; column < width; column += 8) {
+                    int32_t sum = 0, count = 0;
+
+                    for (v = row; v < row + 8 && v < height; v++) {
+                        for (u = column; u < column + 8 && u < width; u++) {
+                            sum += grey8[v * width + u];
+                            count++;
+                        }
+                    }
+                    IH_TEST_EQUAL(sum > limits[k] * count, ih_dots_is_bright(&dots, column, row),
+                                  "bright", row * 10000 + column);
+                    bright += sum > limits[k] * count;
+                }
+            }
+        }
+    }
+    TEST_ASSERT_GREATER_THAN_INT32(10000, bright);
+}
+
 /* Turned by 180 degrees, a picture has the same dots at the mirrored places. */
 static void a_turned_frame_has_turned_dots(void)
 {
@@ -662,6 +800,8 @@ int main(void)
     RUN_TEST(samples_above_the_maximum_are_full_scale);
     RUN_TEST(a_stride_skips_what_lies_between_rows);
     RUN_TEST(row_by_row_is_the_same_as_the_whole_frame);
+    RUN_TEST(no_maximum_is_passed_over);
+    RUN_TEST(bright_blocks_are_those_of_a_bright_mean);
     RUN_TEST(a_turned_frame_has_turned_dots);
     RUN_TEST(bright_blocks_are_those_above_the_limit);
     RUN_TEST(nothing_is_bright_outside_the_frame);

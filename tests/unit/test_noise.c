@@ -1,6 +1,8 @@
 /* ih_noise against NumPy, on frames that both sides make by the same formula. */
 #include "ih_noise.h"
 
+#include <stdlib.h>
+
 #include "ih_test_frame.h"
 
 struct vector_place {
@@ -39,10 +41,7 @@ void tearDown(void)
 
 static int32_t at(int32_t u, int32_t v)
 {
-    uint16_t row[IH_NOISE_BLOCKS_X];
-
-    (void)ih_noise_row(&noise, v, row);
-    return ih_noise_at(&noise, row, u);
+    return ih_noise_at(&noise, u, v);
 }
 
 static void blocks_match_numpy(void)
@@ -186,19 +185,68 @@ static void there_are_no_seams(void)
     }
 }
 
-/* The least of a row is never above any of its pixels. */
-static void the_least_of_a_row_is_the_least(void)
+/* Never above any pixel between the same four centres, wherever one is asked for, and reached at one
+ * of the centres. */
+static void the_least_is_the_least(void)
 {
-    uint16_t row[IH_NOISE_BLOCKS_X];
     int32_t u, v;
 
     make_frame(&vector_noises[IH_TEST_COUNT(vector_noises) - 1].spec);
     ih_noise_measure(&frame, NULL, &scratch, &noise);
-    for (v = 0; v < frame.height; v += 7) {
-        const int32_t least = ih_noise_row(&noise, v, row);
-
+    for (v = 0; v < frame.height; v += 5) {
         for (u = 0; u < frame.width; u++) {
-            IH_TEST_RANGE(least, UINT16_MAX, ih_noise_at(&noise, row, u), "noise", v);
+            const int32_t first_u = u < 16 ? 0 : (u - 16) / 32 * 32 + 16;
+            const int32_t first_v = v < 16 ? 0 : (v - 16) / 32 * 32 + 16;
+            const int32_t least = ih_noise_least(&noise, u, v);
+
+            IH_TEST_RANGE(least, UINT16_MAX, at(u, v), "noise", v * 10000 + u);
+            IH_TEST_EQUAL(u < 16 ? least : ih_noise_least(&noise, first_u, v), least, "across", u);
+            IH_TEST_EQUAL(v < 16 ? least : ih_noise_least(&noise, u, first_v), least, "down", v);
+        }
+    }
+}
+
+static int compare_values(const void *a, const void *b)
+{
+    return *(const uint16_t *)a - *(const uint16_t *)b;
+}
+
+/* The first block's median, before it is smoothed, is the value in the middle of the sorted ones:
+ * where all blocks are alike smoothing changes nothing. Small and large responses, and at the
+ * frame's right border blocks of few columns. */
+static void medians_are_those_of_sorted_values(void)
+{
+    static const int32_t heights[] = {1, 2, 5, 9, 17, 40, 100, 255};
+    static int16_t out[IH_FRAME_WIDTH_MAX];
+    static struct ih_band band;
+    struct ih_row row[IH_BAND_ROWS];
+    struct ih_test_random random = {11};
+    uint16_t value[64];
+    int32_t i, k, u, v, period;
+
+    for (i = 0; i < IH_TEST_COUNT(heights); i++) {
+        for (period = 32; period >= 1; period /= 4) {
+            fill8(352, 256, 0);
+            for (v = 0; v < 16; v++) {
+                for (u = 0; u < 32; u++) {
+                    grey8[v * 352 + u] = (uint8_t)ih_test_between(&random, 0, heights[i]);
+                }
+            }
+            for (v = 0; v < 256; v++) { /* periods of 16 rows and of up to 32 columns */
+                for (u = 0; u < 352; u++) {
+                    grey8[v * 352 + u] = grey8[v % 16 * 352 + u % period];
+                }
+            }
+            ih_noise_measure(&frame, NULL, &scratch, &noise);
+            for (k = 0; k < IH_BAND_ROWS; k++) {
+                row[k] = ih_frame_row(&frame, 96 + k);
+            }
+            ih_band_bytes(&band, row, 352, out);
+            for (k = 0; k < 64; k++) {
+                value[k] = (uint16_t)abs(out[128 + k % 32]);
+            }
+            qsort(value, 64, sizeof value[0], compare_values);
+            IH_TEST_EQUAL(value[32], noise.median[3][4], "median", heights[i] * 100 + period);
         }
     }
 }
@@ -248,7 +296,8 @@ int main(void)
     RUN_TEST(the_share_has_no_seams);
     RUN_TEST(flat_frames_have_no_noise);
     RUN_TEST(there_are_no_seams);
-    RUN_TEST(the_least_of_a_row_is_the_least);
+    RUN_TEST(the_least_is_the_least);
+    RUN_TEST(medians_are_those_of_sorted_values);
     RUN_TEST(dots_are_no_noise);
     RUN_TEST(the_hardest_frames_fit);
     return UNITY_END();
