@@ -523,6 +523,28 @@ class Table(unittest.TestCase):
         self.assertTrue(all(b"\n" not in line for line in lines))
         self.assertEqual({line.count(b",") for line in lines[:5]}, {lines[0].count(b",")})
 
+    def test_no_formulas(self):
+        """A text that a spreadsheet would run is one no more, whichever column it stands in; all others, and numbers
+        below zero, are as they were."""
+        formulas = ['=cmd|"/C calc"!A0', "+1", "-2.pgm", "@SUM(1)", "\t=1", "\r=1", "\n=1"]
+        others = ["a=1.pgm", "'quoted", " -2.pgm", "2-1.pgm", ""]
+        h = {"pixel": [-1.5, 2], "axes_px": [4, 3], "angle_deg": 0, "distance_mm": 900, "centre_mm": [-7, -0.25, 1000]}
+        with open(at("formulas.jsonl"), "w", encoding="utf-8") as file:
+            for word in formulas + others:
+                file.write(json.dumps({"file": word, "time_us": 0, "dots": 0, "labelled": 0, "dir": word, "strobe": word,
+                                       "rig": word, "dropped": {word: 1}, "heads": [], "head": None,
+                                       "hypotheses": [{**h, "rejected": word}]}) + "\n")
+                file.write(json.dumps({"file": "a.pgm", "error": word}) + "\n")
+        rows = self.rows("formulas")
+        for word, row, bad in zip(formulas + others, rows[::2], rows[1::2]):
+            shown = "'" + word if word in formulas else word
+            self.assertEqual([row[key] for key in ("file", "dir", "strobe", "rig", "rejected")], [shown] * 5)
+            self.assertEqual((row["dropped"], bad["error"]), (shown + "=1" if word else "'=1", shown))
+            self.assertEqual((row["pixel_u_px"], row["centre_x_mm"], row["centre_y_mm"]), ("-1.5", "-7", "-0.25"))
+        for line in rows:
+            for key, cell in line.items():
+                self.assertFalse(cell.startswith(tuple("=@+\t\r\n")), (key, cell))
+
     def test_two_heads(self):
         """The paper's method selects none of two; a tracked run has one of them selected."""
         h = {"pixel": [1, 2], "axes_px": [4, 3], "angle_deg": 0, "distance_mm": 900, "centre_mm": [0, 0, 1000],

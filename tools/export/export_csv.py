@@ -2,6 +2,9 @@
 
 A frame without hypotheses has one row, in which the hypothesis's fields are empty; so has a frame that
 could not be read. What is null or not there is empty. Numbers are printed as the record has them.
+
+A text that a spreadsheet would take for a formula, and run, gets an apostrophe before it. A name of a file may
+be such a text; a number never is.
 """
 
 import csv
@@ -13,12 +16,17 @@ COLUMNS = (
     "skipped", "strobe", "across_px", "rig",
 )
 
+# What a formula begins with, and the white space that spreadsheets skip before one.
+FORMULA = tuple("=+-@\t\r\n")
+
 
 def text(value):
     if value is None:
         return ""
     if isinstance(value, bool):
         return "true" if value else "false"
+    if isinstance(value, str) and value.startswith(FORMULA):
+        return "'" + value
     return str(value)
 
 
