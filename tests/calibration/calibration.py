@@ -363,6 +363,24 @@ def check_print(bench):
         result("a board into " + name, None if status == 1 and err else "status %d" % status)
 
 
+def check_usage(bench):
+    """Wrong usage: status 2, and one line that says what; --help wins over what follows it."""
+    for words, wanted in [((), "the first word must be"), (("frobnicate",), "the first word must be"),
+                          (("guide",), "one DIR is needed"), (("guide", "a", "b"), "one DIR is needed"),
+                          (("board",), "one FILE is needed"), (("solve", "a"), "--out belongs to solve, which needs it"),
+                          (("solve", "--colour", "a"), "unrecognized option"), (("solve", "--near"), "requires an argument"),
+                          (("solve", "--near", "abc", "--out", "o", "a"), "--near abc: must be a number"),
+                          (("board", "--camera", "0", "a.pdf"), "--camera belongs to guide"),
+                          (("guide", "--middle", "a:1,2", "a"), "--middle belongs to solve")]:
+        status, out, err = run(bench.calibrate, *words)
+        fine = status == 2 and not out and wanted in err and len(err.splitlines()) == 1
+        result("usage: calibrate " + " ".join(words), None if fine else "status %d: %s%s" % (status, out, err))
+    for words in [("--help",), ("guide", "--help", "a", "b"), ("solve", "a", "--help", "--colour")]:
+        status, out, err = run(bench.calibrate, *words)
+        fine = status == 0 and out.startswith("Usage: ") and not err
+        result("usage: calibrate " + " ".join(words), None if fine else "status %d: %s%s" % (status, out, err))
+
+
 def check_undistort(bench, indices):
     rigs = [bench.path("rig%d" % index, name, "rig.json") for index in indices for name in ("good", "from_good")]
     status, out, err = run(bench.undistort, *rigs)
@@ -403,6 +421,7 @@ def main():
         check_alone(bench)
         check_middle(bench)
         check_guide(bench)
+    check_usage(bench)
     check_print(bench)
     check_report(bench)
     check_undistort(bench, indices)

@@ -1,9 +1,8 @@
 #include "cal_options.hpp"
 
 #include <cstdlib>
-#include <getopt.h>
 
-#include "cal_error.hpp"
+#include "tool_options.hpp"
 
 namespace cal
 {
@@ -31,12 +30,11 @@ const char *const options_help =
     "NAME-on.pgm and NAME-off.pgm.\n"
     "Exit status: 0 done; 1 pictures that cannot be read, or that cannot support a calibration; 2 wrong usage.\n";
 
-enum OptionId { opt_board = 1, opt_camera, opt_near, opt_far, opt_middle, opt_out, opt_help };
+enum OptionId { opt_board = tool::opt_help + 1, opt_camera, opt_near, opt_far, opt_middle, opt_out };
 
 static bool complain(const std::string &what)
 {
-    std::fprintf(stderr, "calibrate: %s\n", what.c_str());
-    return false;
+    return tool::complain("calibrate", what);
 }
 
 static bool read_mm(const char *name, const char *value, double &mm)
@@ -78,11 +76,8 @@ static bool take(int id, const char *value, Options &options)
     case opt_out:
         options.out = value;
         return true;
-    case opt_help:
-        options.verb = Verb::help;
-        return true;
     default:
-        return false; /* getopt_long has told */
+        return false;
     }
 }
 
@@ -105,23 +100,23 @@ bool options_parse(int argc, char **argv, Options &options)
         {"board", required_argument, nullptr, opt_board},   {"camera", required_argument, nullptr, opt_camera},
         {"near", required_argument, nullptr, opt_near},     {"far", required_argument, nullptr, opt_far},
         {"middle", required_argument, nullptr, opt_middle}, {"out", required_argument, nullptr, opt_out},
-        {"help", no_argument, nullptr, opt_help},           {nullptr, 0, nullptr, 0},
+        {"help", no_argument, nullptr, tool::opt_help},     {nullptr, 0, nullptr, 0},
     };
-    std::string verb = argc > 1 ? argv[1] : "";
+    std::string verb = tool::options_verb(argc, argv);
     if (verb == "--help")
         return true;
     if (verb != "board" && verb != "guide" && verb != "solve")
         return complain("the first word must be board, guide or solve; see calibrate --help");
     options.verb = verb == "board" ? Verb::board : verb == "guide" ? Verb::guide : Verb::solve;
-    int id;
-    while ((id = getopt_long(argc - 1, argv + 1, "", long_options, nullptr)) != -1) {
-        if (!take(id, optarg, options))
-            return false;
-        if (options.verb == Verb::help)
-            return true;
-    }
-    if (optind == argc - 2)
-        options.target = argv[optind + 1];
+    std::vector<std::string> words;
+    auto parsed = tool::options_walk(
+        argc, argv, long_options, [&](int id, const char *value) { return take(id, value, options); }, words);
+    if (parsed == tool::Parsed::help)
+        options.verb = Verb::help;
+    if (parsed != tool::Parsed::words)
+        return parsed == tool::Parsed::help;
+    if (words.size() == 1)
+        options.target = words[0];
     return check(options);
 }
 } // namespace cal

@@ -1,28 +1,14 @@
-/* view_error - what ends a run: a message that says what was wrong, where, and what was expected.
+/* view_error - the tools' errors (tools/common/tool_error.hpp) by this folder's name.
  */
 #ifndef VIEW_ERROR_HPP
 #define VIEW_ERROR_HPP
 
-#include <cstdarg>
-#include <cstdio>
-#include <stdexcept>
-#include <string>
+#include "tool_error.hpp"
 
 namespace view
 {
-struct Error : std::runtime_error {
-    using std::runtime_error::runtime_error;
-};
-
-__attribute__((format(printf, 1, 2))) inline std::string text(const char *format, ...)
-{
-    char buffer[2048];
-    va_list values;
-    va_start(values, format);
-    std::vsnprintf(buffer, sizeof buffer, format, values);
-    va_end(values);
-    return buffer;
-}
+using tool::Error;
+using tool::text;
 } // namespace view
 
 #endif

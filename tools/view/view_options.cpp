@@ -1,8 +1,8 @@
 #include "view_options.hpp"
 
-#include <cstdio>
 #include <cstdlib>
-#include <getopt.h>
+
+#include "tool_options.hpp"
 
 namespace view
 {
@@ -25,12 +25,11 @@ const char *const options_help =
     "\n"
     "Exit status: 0 done; 1 input missing or wrong, or a file that cannot be written; 2 wrong usage.\n";
 
-enum OptionId { opt_from = 1, opt_count, opt_trace, opt_rig, opt_help };
+enum OptionId { opt_from = tool::opt_help + 1, opt_count, opt_trace, opt_rig };
 
 static bool complain(const std::string &what)
 {
-    std::fprintf(stderr, "view: %s\n", what.c_str());
-    return false;
+    return tool::complain("view", what);
 }
 
 static bool read_count(const std::string &value, long &count)
@@ -57,11 +56,8 @@ static bool take(int id, const char *value, Options &options)
     case opt_rig:
         options.rig = value;
         return true;
-    case opt_help:
-        options.verb = Verb::help;
-        return true;
     default:
-        return false; /* getopt_long has told */
+        return false;
     }
 }
 
@@ -83,24 +79,24 @@ bool options_parse(int argc, char **argv, Options &options)
     static const struct option long_options[] = {
         {"from", required_argument, nullptr, opt_from},   {"count", required_argument, nullptr, opt_count},
         {"trace", required_argument, nullptr, opt_trace}, {"rig", required_argument, nullptr, opt_rig},
-        {"help", no_argument, nullptr, opt_help},         {nullptr, 0, nullptr, 0},
+        {"help", no_argument, nullptr, tool::opt_help},   {nullptr, 0, nullptr, 0},
     };
-    std::string word = argc > 1 ? argv[1] : "";
+    std::string word = tool::options_verb(argc, argv);
     if (word == "--help")
         return true;
     if (!read_verb(word, options))
         return false;
-    int id;
-    while ((id = getopt_long(argc - 1, argv + 1, "", long_options, nullptr)) != -1) {
-        if (!take(id, optarg, options))
-            return false;
-        if (options.verb == Verb::help)
-            return true;
-    }
-    if (argc - 1 - optind != 2)
+    std::vector<std::string> words;
+    auto parsed = tool::options_walk(
+        argc, argv, long_options, [&](int id, const char *value) { return take(id, value, options); }, words);
+    if (parsed == tool::Parsed::help)
+        options.verb = Verb::help;
+    if (parsed != tool::Parsed::words)
+        return parsed == tool::Parsed::help;
+    if (words.size() != 2)
         return complain("a frames directory and a FILE are needed; see view --help");
-    options.dir = argv[optind + 1];
-    options.out = argv[optind + 2];
+    options.dir = words[0];
+    options.out = words[1];
     return (!options.dir.empty() && !options.out.empty()) || complain("DIR and FILE must not be empty");
 }
 } // namespace view
