@@ -377,7 +377,7 @@ def check_usage(bench):
         result("usage: calibrate " + " ".join(words), None if fine else "status %d: %s%s" % (status, out, err))
     for words in [("--help",), ("guide", "--help", "a", "b"), ("solve", "a", "--help", "--colour")]:
         status, out, err = run(bench.calibrate, *words)
-        fine = status == 0 and out.startswith("Usage: ") and not err
+        fine = status == 0 and out.startswith("Usage: ") and not err and max(map(len, out.splitlines())) <= 80
         result("usage: calibrate " + " ".join(words), None if fine else "status %d: %s%s" % (status, out, err))
 
 

@@ -548,6 +548,11 @@ result "wrong options leave nothing behind" "$reason"
     refuse "rig's name taken by a folder" 1 "named/rig.json" $small named
 }
 
+"$render" --help >help 2>err && reason= || reason="status $?"
+[ -s help ] && [ ! -s err ] || reason="no help, or more than that"
+awk 'length > 80 { exit 1 }' help || reason=$(awk 'length > 80' help | head -n 1)
+result "--help fits a terminal of 80 columns" "$reason"
+
 echo "1..$number"
 if [ "$failed" != 0 ]; then
     echo "# $failed of $number failed"

@@ -504,6 +504,12 @@ def case_bad_input():
            at("other/rig.json"), made)
 
 
+def case_help():
+    status, out, err = run("--help")
+    wide = [line for line in out.splitlines() if len(line) > 80]
+    result("--help fits a terminal of 80 columns", None if status == 0 and out and not err and not wide else str(wide))
+
+
 def prepare():
     shutil.rmtree(options.work, ignore_errors=True)
     for name in ("tmp", "nothing", "short"):
@@ -547,6 +553,7 @@ def main():
     case_empty()
     case_bad_traces()
     case_bad_input()
+    case_help()
     left = os.listdir(at("tmp")) + [name for name in os.listdir(options.work) if ".part" in name]
     result("nothing temporary is left", None if not left else ", ".join(left))
     print("1..%d" % number)

@@ -6,29 +6,34 @@
 
 namespace cal
 {
-const char *const options_help =
+const char *const options_help = /* at most 80 columns */
     "Usage: calibrate board [--board NAME] FILE\n"
     "       calibrate guide [--board NAME] [--camera DEVICE] DIR\n"
-    "       calibrate solve [--board NAME] [--near MM] [--far MM] [--middle FILE:U,V] --out OUT DIR\n"
+    "       calibrate solve [--board NAME] [--near MM] [--far MM]\n"
+    "                       [--middle FILE:U,V] --out OUT DIR\n"
     "From pictures of a printed board to rig.json: docs/calibration.md has the steps.\n"
     "\n"
-    "  board            the board to print, A4 in true size: FILE.pdf; FILE.pgm for tools/render\n"
-    "  guide            which of DIR's pictures are good, and what is missing; exit status 1 while something is\n"
+    "  board            the board to print, A4 in true size: FILE.pdf; FILE.pgm for\n"
+    "                   tools/render\n"
+    "  guide            which of DIR's pictures are good, and what is missing; exit\n"
+    "                   status 1 while something is\n"
     "  solve            camera and projector: OUT/rig.json and OUT/report.html\n"
     "\n"
-    "  --board NAME     charuco-9x6-30 (default) or the like, or chessboard-...: squares across, down, mm of a side\n"
-    "  --camera DEVICE  take pictures into DIR: a camera's number or device, or a film; each pose twice, laser off and "
-    "on\n"
-    "  --near MM, --far MM   the working range in Z that rig.json tells (default 400, 2600)\n"
-    "  --middle FILE:U,V     the pattern's middle dot is at pixel U,V of a picture with the laser on; needed only "
-    "where\n"
-    "                   the pattern's edges are not seen on the board\n"
+    "  --board NAME     charuco-9x6-30 (default) or the like, or chessboard-...:\n"
+    "                   squares across, down, mm of a side\n"
+    "  --camera DEVICE  take pictures into DIR: a camera's number or device, or a\n"
+    "                   film; each pose twice, laser off and on\n"
+    "  --near MM, --far MM   the working range in Z that rig.json tells (default 400,\n"
+    "                   2600)\n"
+    "  --middle FILE:U,V     the pattern's middle dot is at pixel U,V of a picture\n"
+    "                   with the laser on; needed only where the pattern's edges are\n"
+    "                   not seen on the board\n"
     "  --help           this text\n"
     "\n"
-    "DIR holds binary PGM files and frames.jsonl, which says in which the laser was on (docs/contract.md), or files "
-    "named\n"
-    "NAME-on.pgm and NAME-off.pgm.\n"
-    "Exit status: 0 done; 1 pictures that cannot be read, or that cannot support a calibration; 2 wrong usage.\n";
+    "DIR holds binary PGM files and frames.jsonl, which says in which the laser was\n"
+    "on (docs/contract.md), or files named NAME-on.pgm and NAME-off.pgm.\n"
+    "Exit status: 0 done; 1 pictures that cannot be read, or that cannot support a\n"
+    "calibration; 2 wrong usage.\n";
 
 enum OptionId { opt_board = tool::opt_help + 1, opt_camera, opt_near, opt_far, opt_middle, opt_out };
 

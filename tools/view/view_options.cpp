@@ -6,24 +6,31 @@
 
 namespace view
 {
-const char *const options_help =
+const char *const options_help = /* at most 80 columns */
     "Usage: view control|contours|pair|sheet [options] DIR FILE\n"
-    "Draws what host_sim finds in the frames directory DIR: docs/view.md has examples.\n"
+    "Draws what host_sim finds in the frames directory DIR: docs/view.md has\n"
+    "examples.\n"
     "\n"
     "  control          the image with its dots, their labels and epipolar residuals\n"
     "  contours         the surface's contours, hypotheses with reasons, and the head\n"
     "  pair             both side by side, small\n"
-    "  sheet            consecutive frames: image above, contours below, the head's distance\n"
+    "  sheet            consecutive frames: image above, contours below, the head's\n"
+    "                   distance\n"
     "\n"
-    "FILE.png holds one picture, FILE.pdf a page and FILE.mp4 a film's frame per picture.\n"
+    "FILE.png holds one picture, FILE.pdf a page and FILE.mp4 a film's frame per\n"
+    "picture.\n"
     "\n"
-    "  --from NAME      the first frame, with or without .pgm (default: the first there is)\n"
-    "  --count N        that many frames from there on (default: 1 in a PNG, 9 in a sheet, else all)\n"
-    "  --trace PATH     what host_sim --trace wrote, a directory or one file; without it host_sim is run\n"
+    "  --from NAME      the first frame, with or without .pgm (default: the first\n"
+    "                   there is)\n"
+    "  --count N        that many frames from there on (default: 1 in a PNG, 9 in a\n"
+    "                   sheet, else all)\n"
+    "  --trace PATH     what host_sim --trace wrote, a directory or one file; without\n"
+    "                   it host_sim is run\n"
     "  --rig FILE       this rig file instead of DIR/rig.json\n"
     "  --help           this text\n"
     "\n"
-    "Exit status: 0 done; 1 input missing or wrong, or a file that cannot be written; 2 wrong usage.\n";
+    "Exit status: 0 done; 1 input missing or wrong, or a file that cannot be\n"
+    "written; 2 wrong usage.\n";
 
 enum OptionId { opt_from = tool::opt_help + 1, opt_count, opt_trace, opt_rig };
 
