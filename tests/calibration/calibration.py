@@ -11,9 +11,11 @@ Prints TAP and a table; exit status 1 when a case fails.
 
 import argparse
 import concurrent.futures
+import contextlib
 import json
 import math
 import os
+import pty
 import re
 import shutil
 import subprocess
@@ -381,6 +383,42 @@ def check_usage(bench):
         result("usage: calibrate " + " ".join(words), None if fine else "status %d: %s%s" % (status, out, err))
 
 
+def on_terminal(*command):
+    """Exit status, what came on standard output (a pipe), and what a terminal got as standard error."""
+    ours, theirs = pty.openpty()
+    with subprocess.Popen([str(word) for word in command], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                          stderr=theirs) as process:
+        os.close(theirs)
+        shown = b""
+        with contextlib.suppress(OSError):  # all is read, and the other end closed
+            while data := os.read(ours, 4096):
+                shown += data
+        out = process.stdout.read().decode()
+    os.close(ours)
+    return process.returncode, out, shown.decode()
+
+
+def check_progress(bench):
+    """On a terminal only, and nothing is left of it; standard output is the same."""
+    good, made, out = bench.path("rig0", "good"), bench.path("made"), bench.path("from_terminal")
+    copy_pictures([(good, range(12))], made)
+    for command, steps in [((bench.calibrate, "guide", made), ("looking for the board 0/12",)),
+                           ((bench.calibrate, "solve", "--out", out, good), (
+                               "looking for the board 0/50", "solving for the camera", "looking for the laser's dots 0/50",
+                               "solving for the projector"))]:
+        name = "progress of calibrate %s: " % command[1]
+        _, said, err = run(*command)
+        result(name + "none in a pipe", None if "\r" not in err and "looking" not in err + said else err)
+        _, same, shown = on_terminal(*command)
+        missing = [step for step in steps if "\r\x1b[K" + step not in shown]
+        result(name + "on a terminal", "%s not in %r" % (missing, shown) if missing or same != said else None)
+        result(name + "nothing is left of it", None if shown.endswith("\r\x1b[K") else repr(shown[-80:]))
+    copy_pictures([(good, range(1, 12, 2))] + [(good, range(0, 10, 2))], made)
+    status, _, shown = on_terminal(bench.calibrate, "solve", "--out", out, made)
+    result("progress is gone before an error", None if status == 1 and "\r\x1b[Kcalibrate: the pictures" in shown else
+           repr(shown))
+
+
 def check_undistort(bench, indices):
     rigs = [bench.path("rig%d" % index, name, "rig.json") for index in indices for name in ("good", "from_good")]
     status, out, err = run(bench.undistort, *rigs)
@@ -422,6 +460,7 @@ def main():
         check_middle(bench)
         check_guide(bench)
     check_usage(bench)
+    check_progress(bench)
     check_print(bench)
     check_report(bench)
     check_undistort(bench, indices)

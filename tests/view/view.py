@@ -8,8 +8,10 @@ Prints TAP; exit status 1 when a case fails.
 """
 
 import argparse
+import contextlib
 import json
 import os
+import pty
 import random
 import re
 import resource
@@ -504,6 +506,24 @@ def case_bad_input():
            at("other/rig.json"), made)
 
 
+def case_progress():
+    """host_sim's, then ours, on a terminal only; nothing is left of it."""
+    words = [options.view, "control", at("short"), at("progress.pdf")]
+    quiet = subprocess.run(words, capture_output=True, check=False).stderr
+    result("progress: none in a pipe", quiet.decode())
+    ours, theirs = pty.openpty()
+    with subprocess.Popen(words, stdin=subprocess.DEVNULL, stderr=theirs) as process:
+        os.close(theirs)
+        shown = b""
+        with contextlib.suppress(OSError):  # all is read, and the other end closed
+            while data := os.read(ours, 4096):
+                shown += data
+    os.close(ours)
+    steps = [b"\r\x1b[Kshort 1/%d" % FRAMES, b"\r\x1b[Kdrawing 1/%d" % FRAMES]
+    result("progress: on a terminal", None if process.returncode == 0 and all(s in shown for s in steps) else repr(shown))
+    result("progress: nothing is left of it", None if shown.endswith(b"\r\x1b[K") else repr(shown[-80:]))
+
+
 def case_help():
     status, out, err = run("--help")
     wide = [line for line in out.splitlines() if len(line) > 80]
@@ -554,6 +574,7 @@ def main():
     case_bad_traces()
     case_bad_input()
     case_help()
+    case_progress()
     left = os.listdir(at("tmp")) + [name for name in os.listdir(options.work) if ".part" in name]
     result("nothing temporary is left", None if not left else ", ".join(left))
     print("1..%d" % number)

@@ -9,6 +9,7 @@
 #include "cal_coverage.hpp"
 #include "cal_error.hpp"
 #include "cal_twins.hpp"
+#include "tool_progress.hpp"
 
 namespace cal
 {
@@ -43,7 +44,9 @@ bool guide_directory(const Options &options)
     std::vector<Picture> pictures = pictures_read(options.target);
     std::vector<View> views, dark;
     int twin_count = 0;
+    tool::Progress progress(true);
     for (const Picture &picture : pictures) {
+        progress.show("looking for the board", views.size(), pictures.size());
         views.push_back(look(board, picture.file, picture.grey8()));
         const Corners &corners = views.back().corners;
         if (corners.refused.empty())
@@ -54,6 +57,7 @@ bool guide_directory(const Options &options)
         if (!picture.laser)
             dark.push_back(views.back());
     }
+    progress.clear();
     for (int twin : twins_find(pictures, views))
         twin_count += twin >= 0;
     std::printf(

@@ -8,15 +8,17 @@
 #include "cal_lattice.hpp"
 #include "cal_report.hpp"
 #include "cal_twins.hpp"
+#include "tool_progress.hpp"
 
 namespace cal
 {
 static constexpr size_t lit_min = 5;
 
-static std::vector<View> find_boards(const Board &board, const std::vector<Picture> &pictures)
+static std::vector<View> find_boards(const Board &board, const std::vector<Picture> &pictures, tool::Progress &progress)
 {
     std::vector<View> views;
     for (const Picture &picture : pictures) {
+        progress.show("looking for the board", views.size(), pictures.size());
         View view;
         view.file = picture.file;
         view.grey8 = picture.grey8();
@@ -45,10 +47,11 @@ static const View *view_of(const std::vector<View> &views, const std::string &fi
 }
 
 static std::vector<Lit> find_dots(const Result &result, const std::vector<Picture> &pictures,
-                                  const std::vector<int> &twins)
+                                  const std::vector<int> &twins, tool::Progress &progress)
 {
     std::vector<Lit> all;
     for (size_t i = 0; i < pictures.size(); i++) {
+        progress.show("looking for the laser's dots", i, pictures.size());
         if (!pictures[i].laser)
             continue;
         Lit lit;
@@ -135,6 +138,7 @@ static void make_out(const std::string &out)
 void solve_run(const Options &options)
 {
     Result result;
+    tool::Progress progress;
     make_out(options.out);
     result.board = board_parse(options.board);
     result.range = options.range;
@@ -143,7 +147,7 @@ void solve_run(const Options &options)
         lit_min)
         throw Error(
             text("too few pictures with the laser on. Add:\n  - pictures with the laser on, at least %zu", lit_min));
-    std::vector<View> views = find_boards(result.board, pictures);
+    std::vector<View> views = find_boards(result.board, pictures, progress);
     std::vector<int> twins = twins_find(pictures, views);
     for (size_t i = 0; i < pictures.size(); i++) {
         if (twins[i] >= 0)
@@ -152,14 +156,18 @@ void solve_run(const Options &options)
     }
     result.views = camera_views(views, twins);
     try {
+        progress.show("solving for the camera");
         result.camera = camera_solve(result.board, pictures.front().grey.size(), result.views);
-        result.lit = find_dots(result, pictures, twins);
+        result.lit = find_dots(result, pictures, twins, progress);
+        progress.show("solving for the projector");
         cv::Vec3d origin_mm = index_assign(result.board, result.camera, result.lit, options.middle);
         result.projector = rays_solve(result.camera, result.lit, origin_mm);
     } catch (const Error &) {
+        progress.clear();
         tell_pictures(result);
         throw;
     }
+    progress.clear();
     tell_pictures(result);
     tell_camera(result.camera);
     tell_uncovered(result.camera);

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <limits>
 
+#include "tool_progress.hpp"
 #include "view_control.hpp"
 #include "view_error.hpp"
 #include "view_output.hpp"
@@ -73,10 +74,24 @@ static void draw_one(Verb verb, Output &output, const Shader &shader, const Show
 static void draw_sheet(Output &output, const Shader &shader, const std::vector<std::string> &paths,
                        const Options &options, const Rig &rig)
 {
+    tool::Progress progress;
     std::vector<Shown> frames;
-    for (const std::string &path : paths)
+    for (const std::string &path : paths) {
+        progress.show("reading frames", frames.size(), paths.size());
         frames.push_back(show(path, options.dir, rig));
+    }
+    progress.show("drawing");
     output.page(sheet_page(frames.size(), rig), [&](Canvas &canvas) { sheet_draw(canvas, shader, frames, rig); });
+}
+
+static void draw_each(Output &output, const Shader &shader, const std::vector<std::string> &paths,
+                      const Options &options, const Rig &rig)
+{
+    tool::Progress progress;
+    for (size_t i = 0; i < paths.size(); i++) {
+        draw_one(options.verb, output, shader, show(paths[i], options.dir, rig), rig);
+        progress.show("drawing", i + 1, paths.size());
+    }
 }
 
 static void check(const Options &options, Format format)
@@ -103,12 +118,10 @@ bool view_run(const Options &options)
         times_us.push_back(trace_read(paths[i]).time_us);
     std::unique_ptr<Output> output = output_open(options.out, frames_per_s(times_us));
     Shader shader(rig, shader_plot(options.verb, rig));
-    if (options.verb == Verb::sheet) {
+    if (options.verb == Verb::sheet)
         draw_sheet(*output, shader, paths, options, rig);
-    } else {
-        for (const std::string &path : paths)
-            draw_one(options.verb, *output, shader, show(path, options.dir, rig), rig);
-    }
+    else
+        draw_each(*output, shader, paths, options, rig);
     output->finish();
     return !traces.incomplete();
 }
