@@ -19,6 +19,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import time
 
 import cv2
 import numpy as np
@@ -524,6 +525,65 @@ def case_progress():
     result("progress: nothing is left of it", None if shown.endswith(b"\r\x1b[K") else repr(shown[-80:]))
 
 
+def children(pid):
+    with open("/proc/%d/task/%d/children" % (pid, pid), encoding="ascii") as file:
+        return [int(word) for word in file.read().split()]
+
+
+def is_there(pid):
+    return os.path.exists("/proc/%d" % pid)
+
+
+def stopped(number, ready, *words, ignored=False):
+    """Starts view, sends it a signal once ready(process, its children so far) is true; what it said, its status, and
+    whether a child is left."""
+    environment = dict(os.environ, TMPDIR=at("tmp"))
+    prepare_child = (lambda: signal.signal(number, signal.SIG_IGN)) if ignored else None
+    with subprocess.Popen([options.view, *words], stdin=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+                          env=environment, preexec_fn=prepare_child) as process:
+        seen = set()
+        end = time.monotonic() + LIMIT_S
+        while process.poll() is None and time.monotonic() < end:
+            with contextlib.suppress(FileNotFoundError):
+                seen.update(children(process.pid))
+            if ready(seen):
+                break
+            time.sleep(0.002)
+        process.send_signal(number)
+        said = process.communicate(timeout=LIMIT_S)[1]
+    return said, process.returncode, [pid for pid in seen if is_there(pid)]
+
+
+def case_stopped():
+    """By a signal to itself alone, as a service manager sends it: while host_sim runs, and while it draws."""
+    long = at("long")
+    os.makedirs(long)
+    for index in range(300):
+        os.symlink(at("short/%06d.pgm" % (index % FRAMES)), os.path.join(long, "%06d.pgm" % index))
+    shutil.copy(at("short/rig.json"), long)
+
+    def with_traces(seen):
+        return seen and any(name.endswith(".json") for _, _, names in os.walk(at("tmp")) for name in names)
+
+    def drawing(_):
+        return os.path.exists(at("stopped.mp4.part.mp4")) and os.path.getsize(at("stopped.mp4.part.mp4")) > 0
+
+    for name, number, ready, words in [
+            ("host_sim runs", signal.SIGTERM, with_traces, ("control", long, at("stopped.pdf"))),
+            ("host_sim runs", signal.SIGINT, with_traces, ("sheet", long, at("stopped.png"))),
+            ("host_sim runs", signal.SIGHUP, with_traces, ("control", long, at("stopped.pdf"))),
+            ("it draws", signal.SIGINT, drawing, ("pair", at("short"), at("stopped.mp4"))),
+            ("it draws a trace", signal.SIGTERM, drawing, ("pair", "--trace", at("traces"), at("short"), at("stopped.mp4")))]:
+        said, status, alive = stopped(number, ready, *words)
+        left = os.listdir(at("tmp")) + [other for other in os.listdir(options.work) if other.startswith("stopped")]
+        good = status == -number and not said and not alive and not left
+        result("stopped while %s, by %s: nothing is left" % (name, signal.Signals(number).name),
+               None if good else "status %d, said %s, alive %s, left %s" % (status, said, alive, left))
+    said, status, _ = stopped(signal.SIGHUP, with_traces, "control", at("short"), at("went_on.png"), ignored=True)
+    result("a signal that is ignored, as by nohup, stops nothing",
+           None if status == 0 and os.path.exists(at("went_on.png")) else "status %d, said %s" % (status, said))
+
+
 def case_help():
     status, out, err = run("--help")
     wide = [line for line in out.splitlines() if len(line) > 80]
@@ -575,6 +635,7 @@ def main():
     case_bad_input()
     case_help()
     case_progress()
+    case_stopped()
     left = os.listdir(at("tmp")) + [name for name in os.listdir(options.work) if ".part" in name]
     result("nothing temporary is left", None if not left else ", ".join(left))
     print("1..%d" % number)

@@ -6,6 +6,7 @@
 
 #include "view_options.hpp"
 #include "view_run.hpp"
+#include "view_stop.hpp"
 
 int main(int argc, char **argv)
 {
@@ -17,7 +18,10 @@ int main(int argc, char **argv)
         return 0;
     }
     try {
+        view::Stop stop;
         return view::view_run(options) ? 0 : 1;
+    } catch (const view::Stopped &) {
+        /* the signal has acted when `stop` went */
     } catch (const std::exception &error) {
         std::fprintf(stderr, "view: %s\n", error.what());
     }

@@ -9,6 +9,7 @@
 #include "view_error.hpp"
 #include "view_output.hpp"
 #include "view_sheet.hpp"
+#include "view_stop.hpp"
 #include "view_traces.hpp"
 
 namespace view
@@ -28,8 +29,21 @@ static size_t count_wanted(const Options &options, Format format)
 
 static Shown show(const std::string &trace_path, const std::string &dir, const Rig &rig)
 {
+    stop_check();
     Trace trace = trace_read(trace_path);
     return {trace, control_image(dir + "/" + trace.file, rig)};
+}
+
+static std::vector<int64_t> read_times_us(const std::vector<std::string> &paths)
+{
+    tool::Progress progress;
+    std::vector<int64_t> times_us;
+    for (const std::string &path : paths) {
+        stop_check();
+        progress.show("reading times", times_us.size(), paths.size());
+        times_us.push_back(trace_read(path).time_us);
+    }
+    return times_us;
 }
 
 /* From the middle one of the gaps between frames. */
@@ -113,10 +127,8 @@ bool view_run(const Options &options)
     Rig rig = rig_read(options.rig.empty() ? options.dir + "/rig.json" : options.rig);
     Traces traces(options);
     std::vector<std::string> paths = traces.chosen(options.from, count_wanted(options, format));
-    std::vector<int64_t> times_us;
-    for (size_t i = 0; format == Format::mp4 && i < paths.size(); i++)
-        times_us.push_back(trace_read(paths[i]).time_us);
-    std::unique_ptr<Output> output = output_open(options.out, frames_per_s(times_us));
+    double rate = format == Format::mp4 ? frames_per_s(read_times_us(paths)) : usual_frames_per_s;
+    std::unique_ptr<Output> output = output_open(options.out, rate);
     Shader shader(rig, shader_plot(options.verb, rig));
     if (options.verb == Verb::sheet)
         draw_sheet(*output, shader, paths, options, rig);

@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include "view_error.hpp"
+#include "view_stop.hpp"
 
 namespace view
 {
@@ -91,18 +92,31 @@ static int run_quietly(const std::vector<std::string> &words)
         _exit(127);
     }
     int status = 0;
-    if (child < 0 || waitpid(child, &status, 0) != child)
+    if (child < 0 || !stop_wait(child, status))
         throw Error(words[0] + ": could not be run: " + std::strerror(errno));
+    stop_check(); /* a terminal's Ctrl-C ends both */
     return WIFEXITED(status) ? WEXITSTATUS(status) : 128;
 }
 
-void Traces::run_host_sim(const Options &options)
+TemporaryFolder::~TemporaryFolder()
+{
+    std::error_code ignored; /* what is left of a temporary folder does no harm */
+    if (!path_.empty())
+        fs::remove_all(path_, ignored);
+}
+
+void TemporaryFolder::make()
 {
     std::string path = (fs::temp_directory_path() / "view-XXXXXX").string();
     if (mkdtemp(path.data()) == nullptr)
         throw Error(path + ": " + std::strerror(errno));
-    temporary_ = path;
-    std::vector<std::string> words = {host_sim_path(), "--json", "--trace", temporary_};
+    path_ = path;
+}
+
+void Traces::run_host_sim(const Options &options)
+{
+    temporary_.make();
+    std::vector<std::string> words = {host_sim_path(), "--json", "--trace", temporary_.path()};
     if (!options.rig.empty())
         words.insert(words.end(), {"--rig", options.rig});
     words.insert(words.end(), {"--", options.dir});
@@ -110,13 +124,6 @@ void Traces::run_host_sim(const Options &options)
     if (status > 1)
         throw Error(words[0] + text(": ended with exit status %d", status));
     incomplete_ = status == 1;
-}
-
-void Traces::remove_temporary()
-{
-    std::error_code ignored; /* what is left of a temporary folder does no harm */
-    if (!temporary_.empty())
-        fs::remove_all(temporary_, ignored);
 }
 
 Traces::Traces(const Options &options)
@@ -127,19 +134,13 @@ Traces::Traces(const Options &options)
     }
     try {
         run_host_sim(options);
-        list(only_folder(temporary_), options.dir);
+        list(only_folder(temporary_.path()), options.dir);
         from_where_ = options.dir; /* the user knows of no other */
     } catch (const Error &) {
-        remove_temporary(); /* without an object there is no destructor */
         if (incomplete_)
             throw Error(options.dir + ": host_sim could use none of its frames");
         throw;
     }
-}
-
-Traces::~Traces()
-{
-    remove_temporary();
 }
 
 std::vector<std::string> Traces::chosen(const std::string &from, size_t most) const

@@ -11,13 +11,29 @@
 
 namespace view
 {
+/* Goes with all that is in it, also when what holds it could not be made. */
+class TemporaryFolder
+{
+  public:
+    TemporaryFolder() = default;
+    ~TemporaryFolder();
+    TemporaryFolder(const TemporaryFolder &) = delete;
+    TemporaryFolder &operator=(const TemporaryFolder &) = delete;
+    /* Throws view::Error. */
+    void make();
+    const std::string &path() const
+    {
+        return path_;
+    }
+
+  private:
+    std::string path_; /* empty: none was made */
+};
+
 class Traces
 {
   public:
     explicit Traces(const Options &options);
-    ~Traces();
-    Traces(const Traces &) = delete;
-    Traces &operator=(const Traces &) = delete;
 
     /* Those from options.from on, `most` at most, in the order of their names. */
     std::vector<std::string> chosen(const std::string &from, size_t most) const;
@@ -29,9 +45,8 @@ class Traces
 
   private:
     void run_host_sim(const Options &options);
-    void remove_temporary();
     void list(const std::string &path, const std::string &dir);
-    std::string temporary_;
+    TemporaryFolder temporary_;
     std::string from_where_;
     std::vector<std::string> paths_;
     bool incomplete_ = false;
