@@ -51,9 +51,8 @@ def result(name, reason=None):
     print("%s %d - %s%s" % ("not ok" if reason else "ok", number, name, "\n# " + reason if reason else ""), flush=True)
 
 
-def run(*command):
-    done = subprocess.run([str(word) for word in command], capture_output=True, text=True, stdin=subprocess.DEVNULL,
-                          check=False)
+def run(*command, typed=""):
+    done = subprocess.run([str(word) for word in command], capture_output=True, text=True, input=typed, check=False)
     return done.returncode, done.stdout, done.stderr
 
 
@@ -263,6 +262,8 @@ def check_corrupt(bench):
         ("a list without a laser", "frames.jsonl", lambda data: data + b'{"file":"a.pgm"}\n', "frames.jsonl:51: must have"),
         ("a list with a file that is not there", "frames.jsonl", lambda data: data + b'{"file":"a.pgm","laser":true}\n',
          "a.pgm, which is not there"),
+        ("a file twice in the list", "frames.jsonl", lambda data: data + b'{"file":"000000.pgm","laser":false}\n',
+         "frames.jsonl:51: names a file that an earlier line names"),
         ("a file that is not in the list", "frames.jsonl", lambda data: data[data.index(b"\n") + 1:],
          "000000.pgm: stands not in frames.jsonl"),
     ]
@@ -271,7 +272,7 @@ def check_corrupt(bench):
         spoil(made + "/" + file, change)
         refuse(bench, "corrupt: " + name, made, 1, wanted)
     os.remove(made + "/frames.jsonl")
-    refuse(bench, "nobody says where the laser was on", made, 1, "was the laser on")
+    refuse(bench, "nobody says where the laser was on", made, 1, r"^calibrate: [^\n]*in which pictures was the laser on[^\n]*\n$")
     refuse(bench, "no such directory", bench.path("nowhere"), 1, "nowhere")
     refuse(bench, "a board that is none", good, 1, "charuco-9x6-30 or chessboard", "--board", "dots")
     refuse(bench, "a board that is too large", good, 1, "fit into", "--board", "charuco-12x6-30")
@@ -330,20 +331,80 @@ def check_guide(bench):
     fine = status == 1 and "17 more pictures" in out and "parts of the frame" in out and \
         re.search("00000[67].pgm: no good", out) and "3 of these beside one without" in out
     result("guide: tells what is missing", None if fine else out)
-    # A film: each of three poses stands for eight frames.
-    film, taken = bench.path("film"), bench.path("taken")
-    for directory in (film, taken):
-        shutil.rmtree(directory, ignore_errors=True)
+    # What must be there of the laser is told before solve refuses.
+    for name, frames, wanted in [("only pictures without the laser", range(1, 2 * PAIRS, 2), "15 more pictures with the laser on"),
+                                 ("four pairs", [*range(8), *range(9, 2 * PAIRS, 2)], "11 more pictures with the laser on")]:
+        copy_pictures([(good, frames)], made)
+        status, out, _ = run(bench.calibrate, "guide", made)
+        result("guide: " + name, None if status == 1 and wanted in out else out[-300:])
+    shutil.copytree(good, made, dirs_exist_ok=True)
+    spoil(made + "/frames.jsonl", lambda data: data.replace(b"true", b"none").replace(b"false", b"true").replace(b"none", b"false"))
+    status, out, _ = run(bench.calibrate, "guide", made)
+    fine = status == 1 and out.count("are the two mixed up?") == PAIRS and "15 more pictures with the laser on" in out
+    result("guide: with and without the laser mixed up", None if fine else out[-300:])
+    refuse(bench, "with and without the laser mixed up", made, 1, "no dots of the laser are seen on the board(.*\n)*  - pictures")
+    copy_pictures([(bench.path("rig0", "blurred"), range(2, 6))], made)
+    status, out, _ = run(bench.calibrate, "guide", made)
+    result("guide: no board at all", None if status == 1 and "  - the board in all parts of the frame\n" in out else out)
+
+
+def samples(path):
+    with open(path, "rb") as file:
+        return file.read()[-752 * 582:]
+
+
+def film_of(bench, parts):
+    """A film whose frames are so many each of these."""
+    film = bench.path("film")
+    shutil.rmtree(film, ignore_errors=True)
+    shutil.rmtree(bench.path("taken"), ignore_errors=True)
     os.makedirs(film)
-    for frame in range(24):
-        shutil.copy(good + "/%06d.pgm" % (2 * (frame // 8) + 1), film + "/%03d.pgm" % frame)
-    status, out, err = run(bench.calibrate, "guide", "--camera", film + "/%03d.pgm", taken)
-    names = sorted(os.listdir(taken)) if os.path.isdir(taken) else []
-    wanted = ["%03d-%s.pgm" % (i, laser) for i in range(3) for laser in ("off", "on")]
-    fine = status == 1 and names == wanted and "no more frames" in out and "17 more pictures" in out
-    result("guide: takes each pose once, with and without the laser", None if fine else "%s %s %s" % (names, out, err))
-    status, _, err = run(bench.calibrate, "guide", "--camera", bench.path("nothing.avi"), bench.path("taken2"))
-    result("guide: a camera that is not there", None if status == 1 and "could not be opened" in err else err)
+    frames = [frame for frame, count in parts for _ in range(count)]
+    for index, frame in enumerate(frames):
+        shutil.copy(bench.path("rig0", "good", "%06d.pgm" % frame), film + "/%03d.pgm" % index)
+    return film + "/%03d.pgm"
+
+
+def check_camera(bench):
+    """A film instead of a camera. Frames that a driver queued before the laser was on come first; rendered frames with it
+    have even numbers, their twins are the next ones."""
+    taken = bench.path("taken")
+
+    def take(name, parts, typed, status, names, *wanted, kept=False):
+        if not kept:
+            film_of(bench, parts)
+        got, out, err = run(bench.calibrate, "guide", "--camera", bench.path("film/%03d.pgm"), taken, typed=typed)
+        there = sorted(os.listdir(taken)) if os.path.isdir(taken) else []
+        expected = ["%03d-%s.pgm" % (i, laser) for i in range(names) for laser in ("off", "on")]
+        missing = [words for words in wanted if words not in out + err]
+        result("guide: " + name, None if got == status and there == expected and not missing else
+               "status %d, %s, lacks %s: %s%s" % (got, there, missing, out, err))
+
+    poses = [part for pose in (0, 2, 4) for part in ((pose + 1, 9), (pose, 3))]
+    take("takes each pose once, with and without the laser", poses, "\n" * 3, 1, 3, "no more frames", "17 more pictures",
+         "12 more pictures with the laser on")
+    queued = [i for i in range(3) if samples(taken + "/%03d-on.pgm" % i) != samples(bench.path("rig0", "good", "%06d.pgm" % (2 * i)))]
+    result("guide: none that was queued before the laser was on", "pictures %s" % queued if queued else None)
+    before = bench.path("before")
+    shutil.rmtree(before, ignore_errors=True)
+    shutil.copytree(taken, before)
+    film_of(bench, [(7, 9), (6, 3)])
+    shutil.copytree(before, taken)
+    take("goes on where there are pictures", None, "\n", 1, 4, "3 pictures without the laser are there already", "003-on.pgm", kept=True)
+    take("the laser is never on", [(1, 60)], "\n\n", 1, 0, "no dots of the laser are seen", "switch the laser off")
+    take("the board moves while the laser is switched on", [(1, 6), (2, 40)], "\n\n", 1, 0, "the board has moved")
+    take("nobody presses Enter", [(1, 20)], "", 1, 0, "nobody there to press Enter")
+    shutil.rmtree(taken)
+    for device, wanted in [("nothing.avi", "nothing.avi: is neither"), ("99", "/dev/video99: No such file"),
+                           ("9" * 30, "/dev/video%s: No such file" % ("9" * 30)), ("/dev/none", "/dev/none: No such file"),
+                           ("/dev/null", "/dev/null: is no camera")]:
+        status, out, err = run(bench.calibrate, "guide", "--camera", device, taken)
+        fine = status == 1 and wanted in err and len(err.splitlines()) == 1 and not out and not os.path.exists(taken)
+        result("guide: no camera: " + device, None if fine else "status %d: %s%s" % (status, out, err))
+    film_of(bench, [(1, 20)])
+    shutil.copytree(bench.path("rig0", "good"), taken)
+    status, _, err = run(bench.calibrate, "guide", "--camera", bench.path("film/%03d.pgm"), taken, typed="\n")
+    result("guide: never beside a frames.jsonl", None if status == 1 and "has a frames.jsonl" in err else err)
 
 
 def check_print(bench):
@@ -373,6 +434,8 @@ def check_usage(bench):
                           (("solve", "--colour", "a"), "unrecognized option"), (("solve", "--near"), "requires an argument"),
                           (("solve", "--near", "abc", "--out", "o", "a"), "--near abc: must be a number"),
                           (("board", "--camera", "0", "a.pdf"), "--camera belongs to guide"),
+                          (("guide", "--camera", "", "a"), "argument is empty"),
+                          (("guide", "--far", "900", "a"), "--far belongs to solve"),
                           (("guide", "--middle", "a:1,2", "a"), "--middle belongs to solve")]:
         status, out, err = run(bench.calibrate, *words)
         fine = status == 2 and not out and wanted in err and len(err.splitlines()) == 1
@@ -459,6 +522,7 @@ def main():
         check_alone(bench)
         check_middle(bench)
         check_guide(bench)
+    check_camera(bench)
     check_usage(bench)
     check_progress(bench)
     check_print(bench)

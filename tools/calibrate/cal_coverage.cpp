@@ -70,7 +70,9 @@ std::vector<std::string> coverage_missing(const std::vector<View> &views, cv::Si
                  "as far as the nearest",
                  nearest, farthest, limits.distance_ratio));
     std::string regions = missing_regions(views, size, limits);
-    if (!regions.empty())
+    if (good == 0)
+        missing.push_back("the board in all parts of the frame");
+    else if (!regions.empty())
         missing.push_back("the board in these parts of the frame: " + regions);
     return missing;
 }

@@ -1,12 +1,18 @@
 #include "cal_guide.hpp"
 
 #include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <fcntl.h>
 #include <filesystem>
 #include <iostream>
+#include <opencv2/core/utils/logger.hpp>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/videoio.hpp>
+#include <unistd.h>
 
 #include "cal_coverage.hpp"
+#include "cal_dots.hpp"
 #include "cal_error.hpp"
 #include "cal_twins.hpp"
 #include "tool_progress.hpp"
@@ -17,11 +23,22 @@ namespace cal
  * they are this far from where they were in every picture, in parts of the frame's width. */
 static constexpr double still_px = 0.5, new_share = 0.06;
 static constexpr int still_frames = 3, grab_failures_max = 30;
+/* So many dots between two twins are the laser's. */
+static constexpr size_t dots_min = 8;
+/* A driver hands over what it queued before the laser was on: four frames or more. In so many there must be dots. */
+static constexpr int lit_frames_max = 30;
+/* Pairs with and without the laser: some may be lost. */
+static constexpr int pairs_wanted = 15;
 
-static bool tell_missing(const Board &board, cv::Size size, std::vector<View> &views)
+/* pair_count: pictures with the laser whose twin shows that they have it. */
+static bool tell_missing(const Board &board, cv::Size size, std::vector<View> &dark, int pair_count)
 {
-    coverage_guess_poses(board, size, views);
-    std::vector<std::string> missing = coverage_missing(views, size, coverage_wanted);
+    coverage_guess_poses(board, size, dark);
+    std::vector<std::string> missing = coverage_missing(dark, size, coverage_wanted);
+    if (pair_count < pairs_wanted)
+        missing.push_back(text("%d more pictures with the laser on, each beside one without it where the board did not "
+                               "move: there are %d of %d",
+                               pairs_wanted - pair_count, pair_count, pairs_wanted));
     std::printf(missing.empty() ? "nothing is missing: go on with calibrate solve\n" : "still missing:\n");
     for (const std::string &sentence : missing)
         std::printf("  - %s\n", sentence.c_str());
@@ -38,12 +55,40 @@ static View look(const Board &board, const std::string &file, const cv::Mat &gre
     return view;
 }
 
+static size_t count_dots(const cv::Mat &lit, const cv::Mat &dark)
+{
+    return dots_find(lit, dark, cv::Mat(lit.size(), CV_8U, cv::Scalar(255))).size();
+}
+
+/* How many pictures with the laser have a twin without it. Tells of those whose dots are not there, or in the other one. */
+static int count_pairs(const std::vector<Picture> &pictures, const std::vector<View> &views, tool::Progress &progress)
+{
+    std::vector<int> twins = twins_find(pictures, views);
+    int pair_count = 0;
+    for (size_t i = 0; i < pictures.size(); i++) {
+        progress.show("looking for the laser's dots", i, pictures.size());
+        if (twins[i] < 0)
+            continue;
+        const Picture &lit = pictures[i], &dark = pictures[static_cast<size_t>(twins[i])];
+        if (count_dots(lit.grey, dark.grey) >= dots_min) {
+            pair_count++;
+            continue;
+        }
+        progress.clear();
+        bool mixed_up = count_dots(dark.grey, lit.grey) >= dots_min;
+        std::printf("%s: no good: no dots of the laser, %s\n", lit.file.c_str(),
+                    mixed_up ? ("but in " + dark.file + ", which should have none: are the two mixed up?").c_str()
+                             : "though it should be on");
+    }
+    progress.clear();
+    return pair_count;
+}
+
 bool guide_directory(const Options &options)
 {
     Board board = board_parse(options.board);
     std::vector<Picture> pictures = pictures_read(options.target);
     std::vector<View> views, dark;
-    int twin_count = 0;
     tool::Progress progress(true);
     for (const Picture &picture : pictures) {
         progress.show("looking for the board", views.size(), pictures.size());
@@ -57,13 +102,11 @@ bool guide_directory(const Options &options)
         if (!picture.laser)
             dark.push_back(views.back());
     }
-    progress.clear();
-    for (int twin : twins_find(pictures, views))
-        twin_count += twin >= 0;
+    int pair_count = count_pairs(pictures, views, progress);
     std::printf(
         "%zu pictures without the laser, %zu with it, %d of these beside one without where the board did not move\n",
-        dark.size(), pictures.size() - dark.size(), twin_count);
-    return tell_missing(board, pictures.front().grey.size(), dark);
+        dark.size(), pictures.size() - dark.size(), pair_count);
+    return tell_missing(board, pictures.front().grey.size(), dark, pair_count);
 }
 
 /* How far corners that both show are apart, median; a large number where they share too few. */
@@ -81,21 +124,37 @@ static double moved_px(const Corners &a, const Corners &b)
     return ways[ways.size() / 2];
 }
 
+/* A camera's number or device; else a film, or a film's frames as FFmpeg and OpenCV name them. */
+static std::string device_of(const std::string &name)
+{
+    bool number = name.find_first_not_of("0123456789") == std::string::npos;
+    return number ? "/dev/video" + name : name.compare(0, 5, "/dev/") == 0 ? name : "";
+}
+
 static cv::VideoCapture open_camera(const std::string &name)
 {
     cv::VideoCapture camera;
-    bool number = name.find_first_not_of("0123456789") == std::string::npos;
-    if (number ? !camera.open(std::stoi(name), cv::CAP_V4L2) : !camera.open(name))
-        throw Error("--camera " + name + ": could not be opened");
+    std::string device = device_of(name);
+    cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT); /* of backends that were tried in vain */
+    int opened = device.empty() ? -1 : open(device.c_str(), O_RDWR | O_CLOEXEC);
+    if (!device.empty() && opened < 0)
+        throw Error("--camera " + name + ": " + device + ": " + std::strerror(errno));
+    if (opened >= 0)
+        close(opened);
+    if (!device.empty() && !camera.open(device, cv::CAP_V4L2))
+        throw Error("--camera " + name + ": " + device + ": is no camera, or another program has it");
+    if (device.empty() && !camera.open(name))
+        throw Error("--camera " + name + ": is neither a camera's number or device nor a film that can be read");
     return camera;
 }
 
-/* False: the film is at its end. */
+/* False: the film is at its end. Throws where frames are too large or too small to be used later. */
 static bool next_frame(cv::VideoCapture &camera, cv::Mat &grey8)
 {
     cv::Mat frame;
     for (int failures = 0; failures < grab_failures_max; failures++) {
         if (camera.read(frame) && !frame.empty()) {
+            picture_check_size("the camera's frames", frame.cols, frame.rows);
             if (frame.channels() == 3)
                 cv::cvtColor(frame, grey8, cv::COLOR_BGR2GRAY);
             else
@@ -113,6 +172,9 @@ static bool wait_for_board(const Board &board, cv::VideoCapture &camera, const s
     std::string told;
     cv::Mat grey8;
     for (int still = 0; next_frame(camera, grey8);) {
+        if (!views.empty() && views[0].grey8.size() != grey8.size())
+            throw Error(text("the camera's frames: %dx%d pixels, the pictures before them have %dx%d", grey8.cols,
+                             grey8.rows, views[0].grey8.cols, views[0].grey8.rows));
         taken = look(board, "", grey8);
         bool is_new = std::all_of(views.begin(), views.end(), [&](const View &view) {
             return moved_px(view.corners, taken.corners) > new_share * grey8.cols;
@@ -132,48 +194,112 @@ static bool wait_for_board(const Board &board, cv::VideoCapture &camera, const s
     return false;
 }
 
-/* The same pose with the laser on. False: no more frames. */
-static bool take_lit(cv::VideoCapture &camera, const std::string &path)
+static Picture as_picture(const std::string &file, const cv::Mat &grey8, bool laser)
+{
+    Picture picture{file, {}, laser};
+    grey8.convertTo(picture.grey, CV_32F);
+    return picture;
+}
+
+/* The next frame but one that shows dots: the laser may have come on within the first. False: there is none. */
+static bool next_lit(cv::VideoCapture &camera, const cv::Mat &dark, cv::Mat &grey8)
+{
+    for (int i = 0; i < lit_frames_max && next_frame(camera, grey8); i++) {
+        cv::Mat lit;
+        grey8.convertTo(lit, CV_32F);
+        if (count_dots(lit, dark) >= dots_min)
+            return next_frame(camera, grey8);
+    }
+    return false;
+}
+
+static void wait_for_enter(const char *request)
 {
     std::string line;
-    cv::Mat grey8;
-    std::printf("  now switch the laser on, hold still, press Enter\n");
+    std::printf("  %s, press Enter\n", request);
     std::fflush(stdout);
-    std::getline(std::cin, line);
-    /* What the driver queued before. */
-    for (int i = 0; i < still_frames; i++) {
-        if (!next_frame(camera, grey8))
-            return false;
+    if (!std::getline(std::cin, line))
+        throw Error("nobody there to press Enter: standard input is at its end");
+}
+
+/* The same pose with the laser on. Empty: it could not be had, and the user has been told and has switched it off. */
+static cv::Mat take_lit(const Board &board, cv::VideoCapture &camera, const View &taken)
+{
+    cv::Mat grey8;
+    Picture dark = as_picture(taken.file, taken.grey8, false);
+    wait_for_enter("now switch the laser on, hold still");
+    if (!next_lit(camera, dark.grey, grey8)) {
+        std::printf(
+            "  no dots of the laser are seen but those that were there before: is it on, and was it off then?\n");
+        wait_for_enter("this pose once more: switch the laser off");
+        return {};
     }
-    picture_write(path, grey8);
-    std::printf("  taken; switch it off again\n");
-    return true;
+    Picture lit = as_picture("lit", grey8, true);
+    if (twins_find({dark, lit}, {taken, look(board, lit.file, grey8)})[1] < 0) {
+        std::printf("  the board has moved between the two pictures\n");
+        wait_for_enter("this pose once more: switch the laser off");
+        return {};
+    }
+    return grey8;
+}
+
+/* Pairs that were taken before, without the laser. */
+static std::vector<View> views_before(const Board &board, const std::string &dir, int &pair_count)
+{
+    std::error_code failed;
+    std::vector<View> views, dark;
+    std::filesystem::create_directories(dir, failed);
+    if (failed)
+        throw Error(dir + ": " + failed.message());
+    if (std::filesystem::exists(dir + "/frames.jsonl"))
+        throw Error(dir +
+                    ": has a frames.jsonl, which would not know of new pictures: take them into another directory");
+    if (std::filesystem::is_empty(dir))
+        return {};
+    tool::Progress progress;
+    std::vector<Picture> pictures = pictures_read(dir);
+    for (const Picture &picture : pictures) {
+        progress.show("looking at the pictures that are there", views.size(), pictures.size());
+        views.push_back(look(board, picture.file, picture.grey8()));
+        if (!picture.laser)
+            dark.push_back(views.back());
+    }
+    pair_count = count_pairs(pictures, views, progress);
+    std::printf("%zu pictures without the laser are there already\n", dark.size());
+    return dark;
+}
+
+/* DIR/NNN, the first that is free. */
+static std::string free_name(const std::string &dir)
+{
+    for (int number = 0;; number++) {
+        std::string name = dir + text("/%03d", number);
+        if (!std::filesystem::exists(name + "-off.pgm") && !std::filesystem::exists(name + "-on.pgm"))
+            return name;
+    }
 }
 
 bool guide_camera(const Options &options)
 {
     Board board = board_parse(options.board);
     cv::VideoCapture camera = open_camera(options.camera);
-    std::vector<View> views;
-    std::error_code failed;
-    std::filesystem::create_directories(options.target, failed);
-    if (failed || !std::filesystem::is_empty(options.target))
-        throw Error(options.target + ": must be an empty directory, or none yet");
-    for (;;) {
-        View taken;
-        if (!wait_for_board(board, camera, views, taken)) {
-            std::printf("no more frames from %s\n", options.camera.c_str());
-            return false;
-        }
-        std::string name = text("%03zu", views.size());
-        taken.file = name + "-off.pgm";
-        picture_write(options.target + "/" + taken.file, taken.grey8);
-        std::printf("picture %s\n", taken.file.c_str());
+    int pair_count = 0;
+    std::vector<View> views = views_before(board, options.target, pair_count);
+    View taken;
+    while (wait_for_board(board, camera, views, taken)) {
+        cv::Mat lit = take_lit(board, camera, taken);
+        if (lit.empty())
+            continue;
+        std::string name = free_name(options.target);
+        picture_write(name + "-off.pgm", taken.grey8);
+        picture_write(name + "-on.pgm", lit);
+        std::printf("taken: %s-off.pgm and %s-on.pgm; switch the laser off again\n", name.c_str(), name.c_str());
         views.push_back(taken);
-        if (!take_lit(camera, options.target + "/" + name + "-on.pgm"))
-            return false;
-        if (tell_missing(board, taken.grey8.size(), views))
+        pair_count++;
+        if (tell_missing(board, taken.grey8.size(), views, pair_count))
             return true;
     }
+    std::printf("no more frames from %s\n", options.camera.c_str());
+    return false;
 }
 } // namespace cal

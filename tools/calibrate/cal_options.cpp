@@ -21,8 +21,9 @@ const char *const options_help = /* at most 80 columns */
     "\n"
     "  --board NAME     charuco-9x6-30 (default) or the like, or chessboard-...:\n"
     "                   squares across, down, mm of a side\n"
-    "  --camera DEVICE  take pictures into DIR: a camera's number or device, or a\n"
-    "                   film; each pose twice, laser off and on\n"
+    "  --camera DEVICE  take pictures into DIR, beside those that are there: a\n"
+    "                   camera's number or device, or a film; each pose twice,\n"
+    "                   laser off and on\n"
     "  --near MM, --far MM   the working range in Z that rig.json tells (default 400,\n"
     "                   2600)\n"
     "  --middle FILE:U,V     the pattern's middle dot is at pixel U,V of a picture\n"
@@ -63,8 +64,15 @@ static bool read_middle(const std::string &value, MiddleDot &middle)
     return true;
 }
 
+static bool belongs_to_solve(const char *name, const Options &options)
+{
+    return options.verb == Verb::solve || complain(std::string("--") + name + " belongs to solve");
+}
+
 static bool take(int id, const char *value, Options &options)
 {
+    if (*value == '\0')
+        return complain("an option's argument is empty; see calibrate --help");
     switch (id) {
     case opt_board:
         options.board = value;
@@ -73,11 +81,11 @@ static bool take(int id, const char *value, Options &options)
         options.camera = value;
         return options.verb == Verb::guide || complain("--camera belongs to guide");
     case opt_near:
-        return read_mm("near", value, options.range.near_mm);
+        return belongs_to_solve("near", options) && read_mm("near", value, options.range.near_mm);
     case opt_far:
-        return read_mm("far", value, options.range.far_mm);
+        return belongs_to_solve("far", options) && read_mm("far", value, options.range.far_mm);
     case opt_middle:
-        return read_middle(value, options.middle);
+        return belongs_to_solve("middle", options) && read_middle(value, options.middle);
     case opt_out:
         options.out = value;
         return true;
@@ -94,8 +102,6 @@ static bool check(const Options &options)
                                                     : "one DIR is needed; see calibrate --help");
     if (solve != !options.out.empty())
         return complain("--out belongs to solve, which needs it; see calibrate --help");
-    if (!solve && !options.middle.file.empty())
-        return complain("--middle belongs to solve");
     return options.range.near_mm < options.range.far_mm || complain("--near must be less than --far");
 }
 

@@ -36,6 +36,12 @@ static int header_number(std::istream &file, const std::string &path)
     return value;
 }
 
+void picture_check_size(const std::string &where, int width, int height)
+{
+    if (width < width_min || height < height_min || width > width_max || height > height_max)
+        throw Error(where + text(": %dx%d pixels; must be from 320x240 to 1280x800", width, height));
+}
+
 cv::Mat picture_read(const std::string &path)
 {
     std::ifstream file(path, std::ios::binary);
@@ -45,8 +51,7 @@ cv::Mat picture_read(const std::string &path)
     if (!file.read(magic, 2) || magic[0] != 'P' || magic[1] != '5')
         throw Error(path + ": no binary PGM (P5)");
     int width = header_number(file, path), height = header_number(file, path), most = header_number(file, path);
-    if (width < width_min || height < height_min || width > width_max || height > height_max)
-        throw Error(path + text(": %dx%d pixels; must be from 320x240 to 1280x800", width, height));
+    picture_check_size(path, width, height);
     if (most < 1 || most > 65535)
         throw Error(path + text(": maxval %d; must be from 1 to 65535", most));
     file.get();
@@ -92,7 +97,9 @@ static std::map<std::string, bool> read_list(const std::string &path)
             continue;
         try {
             nlohmann::json entry = nlohmann::json::parse(line);
-            lasers[entry.at("file").get<std::string>()] = entry.at("laser").get<bool>();
+            bool laser = entry.at("laser").get<bool>();
+            if (!lasers.emplace(entry.at("file").get<std::string>(), laser).second)
+                throw Error(path + text(":%d: names a file that an earlier line names", number));
         } catch (const nlohmann::json::exception &error) {
             throw Error(path + text(":%d: must have a \"file\" and a \"laser\" that is true or false: ", number) +
                         error.what());
@@ -114,6 +121,18 @@ static bool laser_of(const std::string &dir, const std::string &name, const std:
     return ends_with(name, "-on.pgm");
 }
 
+/* Neither a list nor any name tells: that is one fault, not one of each file. */
+static void check_told(const std::string &dir, const std::vector<std::string> &names,
+                       const std::map<std::string, bool> &list)
+{
+    bool told = !list.empty() || std::any_of(names.begin(), names.end(), [](const std::string &name) {
+        return ends_with(name, "-on.pgm") || ends_with(name, "-off.pgm");
+    });
+    if (!told)
+        throw Error(dir + ": in which pictures was the laser on? Say it in " + dir +
+                    "/frames.jsonl, or name the files NAME-on.pgm and NAME-off.pgm");
+}
+
 static std::vector<std::string> list_names(const std::string &dir)
 {
     std::vector<std::string> names;
@@ -125,7 +144,7 @@ static std::vector<std::string> list_names(const std::string &dir)
     if (failed)
         throw Error(dir + ": " + failed.message());
     if (names.empty())
-        throw Error(dir + ": no *.pgm in it");
+        throw Error(dir + ": no *.pgm in it; pictures of other kinds must be made binary PGM first");
     std::sort(names.begin(), names.end());
     return names;
 }
@@ -135,6 +154,7 @@ std::vector<Picture> pictures_read(const std::string &dir)
     std::vector<Picture> pictures;
     std::vector<std::string> names = list_names(dir);
     std::map<std::string, bool> list = read_list(dir + "/frames.jsonl");
+    check_told(dir, names, list);
     std::string faults;
     for (const auto &entry : list) {
         if (!std::binary_search(names.begin(), names.end(), entry.first))

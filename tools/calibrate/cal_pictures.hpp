@@ -1,7 +1,7 @@
 /* cal_pictures - a frames directory as docs/contract.md describes it: binary PGM files, and frames.jsonl, which says in
  * which of them the laser was on. Without frames.jsonl the names say it: NAME-on.pgm and NAME-off.pgm.
  * Whatever cannot be read, is cut short or has another size than the rest is an error; so is a file that is named in
- * frames.jsonl and not there.
+ * frames.jsonl twice, or named there and not there.
  */
 #ifndef CAL_PICTURES_HPP
 #define CAL_PICTURES_HPP
@@ -19,6 +19,9 @@ struct Picture {
 
     cv::Mat grey8() const;
 };
+
+/* Throws cal::Error, which begins with `where`, unless host_sim and the board could use frames of that size. */
+void picture_check_size(const std::string &where, int width, int height);
 
 /* One file. Throws cal::Error. */
 cv::Mat picture_read(const std::string &path);

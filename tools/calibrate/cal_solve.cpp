@@ -12,7 +12,7 @@
 
 namespace cal
 {
-static constexpr size_t lit_min = 5;
+static constexpr int lit_min = 5;
 
 static std::vector<View> find_boards(const Board &board, const std::vector<Picture> &pictures, tool::Progress &progress)
 {
@@ -73,6 +73,19 @@ static std::vector<Lit> find_dots(const Result &result, const std::vector<Pictur
         all.push_back(lit);
     }
     return all;
+}
+
+/* Not even one dot among its neighbours: the pictures are not what their names say. */
+static void check_lit(const std::vector<Lit> &pictures)
+{
+    bool looked = std::any_of(pictures.begin(), pictures.end(), [](const Lit &lit) { return lit.refused.empty(); });
+    bool seen = std::any_of(pictures.begin(), pictures.end(), [](const Lit &lit) {
+        return std::any_of(lit.sightings.begin(), lit.sightings.end(), [](const Sighting &s) { return s.in_lattice; });
+    });
+    if (looked && !seen)
+        throw Error(
+            "no dots of the laser are seen on the board in any picture that should have it on: are those with and "
+            "without it mixed up in frames.jsonl, or in the files' names? Add:\n  - pictures with the laser on");
 }
 
 static void tell_pictures(const Result &result)
@@ -143,10 +156,12 @@ void solve_run(const Options &options)
     result.board = board_parse(options.board);
     result.range = options.range;
     std::vector<Picture> pictures = pictures_read(options.target);
-    if (static_cast<size_t>(std::count_if(pictures.begin(), pictures.end(), [](const Picture &p) { return p.laser; })) <
-        lit_min)
-        throw Error(
-            text("too few pictures with the laser on. Add:\n  - pictures with the laser on, at least %zu", lit_min));
+    auto lit_count = std::count_if(pictures.begin(), pictures.end(), [](const Picture &p) { return p.laser; });
+    if (lit_count < lit_min)
+        throw Error(text(
+            "too few pictures with the laser on. Add:\n  - pictures with the laser on: there are %d of at least %d, "
+            "better 25; calibrate guide tells what else is missing",
+            static_cast<int>(lit_count), lit_min));
     std::vector<View> views = find_boards(result.board, pictures, progress);
     std::vector<int> twins = twins_find(pictures, views);
     for (size_t i = 0; i < pictures.size(); i++) {
@@ -159,6 +174,7 @@ void solve_run(const Options &options)
         progress.show("solving for the camera");
         result.camera = camera_solve(result.board, pictures.front().grey.size(), result.views);
         result.lit = find_dots(result, pictures, twins, progress);
+        check_lit(result.lit);
         progress.show("solving for the projector");
         cv::Vec3d origin_mm = index_assign(result.board, result.camera, result.lit, options.middle);
         result.projector = rays_solve(result.camera, result.lit, origin_mm);
