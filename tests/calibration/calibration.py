@@ -391,6 +391,11 @@ def check_camera(bench):
     film_of(bench, [(7, 9), (6, 3)])
     shutil.copytree(before, taken)
     take("goes on where there are pictures", None, "\n", 1, 4, "3 pictures without the laser are there already", "003-on.pgm", kept=True)
+    film_of(bench, [(7, 20)])
+    for size, status, wanted in [("640x480", 1, "752x582 pixels, not 640x480"), ("640", 2, "--size 640: must be WxH"),
+                                 ("1920x1080", 2, "--size 1920x1080: must be WxH")]:
+        got, _, err = run(bench.calibrate, "guide", "--size", size, "--camera", bench.path("film/%03d.pgm"), taken, typed="\n")
+        result("guide: --size " + size, None if got == status and wanted in err else err)
     take("the laser is never on", [(1, 60)], "\n\n", 1, 0, "no dots of the laser are seen", "switch the laser off")
     take("the board moves while the laser is switched on", [(1, 6), (2, 40)], "\n\n", 1, 0, "the board has moved")
     take("nobody presses Enter", [(1, 20)], "", 1, 0, "nobody there to press Enter")
@@ -435,6 +440,7 @@ def check_usage(bench):
                           (("solve", "--near", "abc", "--out", "o", "a"), "--near abc: must be a number"),
                           (("board", "--camera", "0", "a.pdf"), "--camera belongs to guide"),
                           (("guide", "--camera", "", "a"), "argument is empty"),
+                          (("guide", "--size", "640x480", "a"), "--size belongs to guide --camera"),
                           (("guide", "--far", "900", "a"), "--far belongs to solve"),
                           (("guide", "--middle", "a:1,2", "a"), "--middle belongs to solve")]:
         status, out, err = run(bench.calibrate, *words)

@@ -165,16 +165,17 @@ static bool next_frame(cv::VideoCapture &camera, cv::Mat &grey8)
     return false;
 }
 
-/* Frames until the board was found, sharp, still, and elsewhere than in all views. False: no more frames. */
-static bool wait_for_board(const Board &board, cv::VideoCapture &camera, const std::vector<View> &views, View &taken)
+/* Frames, of the wanted size if there is one, until the board was found, sharp, still, and elsewhere than in all views. False: no more frames. */
+static bool wait_for_board(const Board &board, cv::VideoCapture &camera, cv::Size wanted,
+                           const std::vector<View> &views, View &taken)
 {
     Corners before;
     std::string told;
     cv::Mat grey8;
     for (int still = 0; next_frame(camera, grey8);) {
-        if (!views.empty() && views[0].grey8.size() != grey8.size())
-            throw Error(text("the camera's frames: %dx%d pixels, the pictures before them have %dx%d", grey8.cols,
-                             grey8.rows, views[0].grey8.cols, views[0].grey8.rows));
+        if (!wanted.empty() && grey8.size() != wanted)
+            throw Error(text("the camera's frames: %dx%d pixels, not %dx%d as --size or the pictures before them want",
+                             grey8.cols, grey8.rows, wanted.width, wanted.height));
         taken = look(board, "", grey8);
         bool is_new = std::all_of(views.begin(), views.end(), [&](const View &view) {
             return moved_px(view.corners, taken.corners) > new_share * grey8.cols;
@@ -285,8 +286,13 @@ bool guide_camera(const Options &options)
     cv::VideoCapture camera = open_camera(options.camera);
     int pair_count = 0;
     std::vector<View> views = views_before(board, options.target, pair_count);
+    cv::Size wanted = views.empty() ? options.size : views.front().grey8.size();
+    if (!wanted.empty()) {
+        camera.set(cv::CAP_PROP_FRAME_WIDTH, wanted.width);
+        camera.set(cv::CAP_PROP_FRAME_HEIGHT, wanted.height);
+    }
     View taken;
-    while (wait_for_board(board, camera, views, taken)) {
+    while (wait_for_board(board, camera, wanted, views, taken)) {
         cv::Mat lit = take_lit(board, camera, taken);
         if (lit.empty())
             continue;

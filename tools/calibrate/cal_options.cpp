@@ -8,7 +8,7 @@ namespace cal
 {
 const char *const options_help = /* at most 80 columns */
     "Usage: calibrate board [--board NAME] FILE\n"
-    "       calibrate guide [--board NAME] [--camera DEVICE] DIR\n"
+    "       calibrate guide [--board NAME] [--camera DEVICE [--size WxH]] DIR\n"
     "       calibrate solve [--board NAME] [--near MM] [--far MM]\n"
     "                       [--middle FILE:U,V] --out OUT DIR\n"
     "From pictures of a printed board to rig.json: docs/calibration.md has the steps.\n"
@@ -24,6 +24,8 @@ const char *const options_help = /* at most 80 columns */
     "  --camera DEVICE  take pictures into DIR, beside those that are there: a\n"
     "                   camera's number or device, or a film; each pose twice,\n"
     "                   laser off and on\n"
+    "  --size WxH       the size of the camera's frames (default: that of DIR's\n"
+    "                   pictures, else as the camera gives them)\n"
     "  --near MM, --far MM   the working range in Z that rig.json tells (default 400,\n"
     "                   2600)\n"
     "  --middle FILE:U,V     the pattern's middle dot is at pixel U,V of a picture\n"
@@ -36,7 +38,7 @@ const char *const options_help = /* at most 80 columns */
     "Exit status: 0 done; 1 pictures that cannot be read, or that cannot support a\n"
     "calibration; 2 wrong usage.\n";
 
-enum OptionId { opt_board = tool::opt_help + 1, opt_camera, opt_near, opt_far, opt_middle, opt_out };
+enum OptionId { opt_board = tool::opt_help + 1, opt_camera, opt_size, opt_near, opt_far, opt_middle, opt_out };
 
 static bool complain(const std::string &what)
 {
@@ -69,6 +71,16 @@ static bool belongs_to_solve(const char *name, const Options &options)
     return options.verb == Verb::solve || complain(std::string("--") + name + " belongs to solve");
 }
 
+static bool read_size(const std::string &value, cv::Size &size)
+{
+    int length = 0;
+    if (std::sscanf(value.c_str(), "%4dx%4d%n", &size.width, &size.height, &length) != 2 ||
+        value.size() != static_cast<size_t>(length) || size.width < 320 || size.height < 240 || size.width > 1280 ||
+        size.height > 800)
+        return complain("--size " + value + ": must be WxH from 320x240 to 1280x800");
+    return true;
+}
+
 static bool take(int id, const char *value, Options &options)
 {
     if (*value == '\0')
@@ -80,6 +92,8 @@ static bool take(int id, const char *value, Options &options)
     case opt_camera:
         options.camera = value;
         return options.verb == Verb::guide || complain("--camera belongs to guide");
+    case opt_size:
+        return read_size(value, options.size);
     case opt_near:
         return belongs_to_solve("near", options) && read_mm("near", value, options.range.near_mm);
     case opt_far:
@@ -102,16 +116,23 @@ static bool check(const Options &options)
                                                     : "one DIR is needed; see calibrate --help");
     if (solve != !options.out.empty())
         return complain("--out belongs to solve, which needs it; see calibrate --help");
+    if (!options.size.empty() && options.camera.empty())
+        return complain("--size belongs to guide --camera");
     return options.range.near_mm < options.range.far_mm || complain("--near must be less than --far");
 }
 
 bool options_parse(int argc, char **argv, Options &options)
 {
     static const struct option long_options[] = {
-        {"board", required_argument, nullptr, opt_board},   {"camera", required_argument, nullptr, opt_camera},
-        {"near", required_argument, nullptr, opt_near},     {"far", required_argument, nullptr, opt_far},
-        {"middle", required_argument, nullptr, opt_middle}, {"out", required_argument, nullptr, opt_out},
-        {"help", no_argument, nullptr, tool::opt_help},     {nullptr, 0, nullptr, 0},
+        {"board", required_argument, nullptr, opt_board},
+        {"camera", required_argument, nullptr, opt_camera},
+        {"near", required_argument, nullptr, opt_near},
+        {"far", required_argument, nullptr, opt_far},
+        {"middle", required_argument, nullptr, opt_middle},
+        {"out", required_argument, nullptr, opt_out},
+        {"size", required_argument, nullptr, opt_size},
+        {"help", no_argument, nullptr, tool::opt_help},
+        {nullptr, 0, nullptr, 0},
     };
     std::string verb = tool::options_verb(argc, argv);
     if (verb == "--help")

@@ -16,6 +16,7 @@ struct Options {
     std::string target; /* the PDF, or the directory of pictures */
     std::string out;    /* solve: where rig.json and the report go */
     std::string camera; /* guide: what cv::VideoCapture opens; empty: look at the directory only */
+    cv::Size size;      /* guide: of the camera's frames; empty: as it gives them */
     Range range{400.0, 2600.0};
     MiddleDot middle;
 };
