@@ -30,7 +30,7 @@ ARCH ?= arm64
 .DEFAULT_GOAL := help
 .PHONY: help sim frames sanitize test fuzz coverage ranges exhaustive mutation accept eval bench \
   bench-instructions bench-grow bench-worst test-bench bits cortexm longrun size vectors learn view figures \
-  test-view test-report export board board-gpiod2 deb image flash calibrate test-calibration \
+  test-view test-report live-pictures export board board-gpiod2 deb image flash calibrate test-calibration \
   test-calibration-short test-deb test-board test-image format formatted lint clean
 
 help: ## this list
@@ -71,6 +71,12 @@ test-report: sim ## the report page in a browser; pictures of it in build/test_r
 	@tools/setup.sh test-report
 	@/usr/bin/python3 -B tests/report/report.py --host-sim $(BUILD)/host/sim/host_sim --frames frames \
 	  --keep $(BUILD)/test_report
+
+live-pictures: sanitize ## the live view's page in a browser: docs/live.png and docs/live_phone.png anew
+	@tools/setup.sh test-report
+	@cmake --build --preset sanitize --parallel 2 --target live_loop isohead_live
+	@/usr/bin/python3 -B tests/board/live_page.py $(BUILD)/sanitize/tests/live_loop \
+	  $(BUILD)/sanitize/firmware/lib/isohead/isohead_live frames/sequence2 docs
 
 coverage: sim ## the core's lines and branches that its own tests run, against the limits
 	@tools/setup.sh coverage

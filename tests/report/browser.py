@@ -116,8 +116,9 @@ class Browser:
     # --- what a user does ------------------------------------------------------------------------
 
     def open(self, path):
+        """A file's path, or http://..."""
         self.loaded = False
-        self.call("Page.navigate", url="file://" + path)
+        self.call("Page.navigate", url=path if path.startswith("http://") else "file://" + path)
         deadline = time.monotonic() + TIMEOUT_S
         while not self.loaded:
             self.receive(deadline)

@@ -1,0 +1,117 @@
+#!/usr/bin/env python3
+"""The live view's page in a browser, on a desk and on a phone: does it show what the board sees?
+
+live_page.py LIVE_LOOP ISOHEAD_LIVE FRAMES [PICTURES]      exit status 1 if something is wrong
+
+PICTURES: a folder for live.png and live_phone.png, of one frame that has something of everything.
+"""
+
+import os
+import subprocess
+import sys
+import tempfile
+
+ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..")
+sys.path.insert(0, os.path.join(ROOT, "tests", "report"))
+
+import browser as devtools
+from browser import Browser
+
+# The view has a processor only when nobody else wants it.
+devtools.TIMEOUT_S = 180
+# Frames of sequence 2: a hand comes before the face. Slow enough for a picture to be taken of one.
+SHOWN, WANTED, RATE = range(16, 25), "000022.pgm", 2
+SCREENS = {"live": (640, 800, 1, False), "live_phone": (360, 780, 1, True)}  # width, height, scale, phone
+COLOURS = {"heads": 0xffb000, "dots": 0xff3d9a, "contours": 0x35c2ff, "others": 0xff8a5c}  # app_live.css
+# Pixels of the canvas that are nearly of a colour.
+COUNT = """(() => { const c = document.getElementById("picture"); let count = 0;
+  const data = c.getContext("2d").getImageData(0, 0, c.width, c.height).data;
+  for (let i = 0; i < data.length; i += 4)
+    count += Math.max(Math.abs(data[i] - %d), Math.abs(data[i + 1] - %d), Math.abs(data[i + 2] - %d)) < 24;
+  return count; })()"""
+TEXT = 'document.getElementById("%s").textContent'
+
+failures = []
+
+
+def check(condition, text):
+    if not condition:
+        failures.append(text)
+        print("FAIL", text, flush=True)
+
+
+def frames_of(source, folder):
+    for name in ["rig.json"] + ["%06d.pgm" % index for index in SHOWN]:
+        os.symlink(os.path.join(os.path.abspath(source), name), os.path.join(folder, name))
+
+
+def check_screen(browser, name, width):
+    head, dots, rate, state = (browser.value(TEXT % id) for id in ("head", "dots", "rate", "state"))
+    check(head.count("mm") >= 2 and "score" in head, f"{name}: head: {head}")
+    check("of 361 labelled" in dots and int(dots.split(",")[0]) > 200, f"{name}: dots: {dots}")
+    check("frames/s on the board" in rate and state == "live", f"{name}: rate: {rate}; state: {state}")
+    needs = browser.value("document.documentElement.scrollWidth")
+    check(needs <= width, f"{name}: {needs} pixels wide, the screen {width}")
+    label = browser.value('document.getElementById("picture").getAttribute("aria-label")')
+    check(label.startswith("camera image; head: "), f"{name}: a screen reader is told: {label}")
+
+
+def check_boxes(browser, name):
+    """Each box takes its own colour from the picture and gives it back; the page draws from the frame that it has."""
+    browser.value("next = () => new Promise(() => { window.stands = true; }), 0")  # once it has the frame that it asked for
+    browser.until("window.stands === true")
+    for what, colour in COLOURS.items():
+        count = COUNT % (colour >> 16, colour >> 8 & 255, colour & 255)
+        with_it = browser.value(count)
+        browser.click("#show-" + what)
+        without = browser.value(count)
+        browser.click("#show-" + what)
+        check(with_it > 20 and without < with_it / 4 and browser.value(count) == with_it,
+              f"{name}: {what}: {with_it} pixels, {without} without it, then {browser.value(count)}")
+
+
+def watch(browser, url, pictures):
+    for name, (width, height, scale, phone) in SCREENS.items():
+        browser.size(width, height, scale, phone)
+        browser.open(url)
+        there = TEXT % "state" + ' === "live" && ' + TEXT % "head" + '.includes("mm away") && ' + \
+            TEXT % "rejected" + '.includes("mm away") && !' + TEXT % "rate" + '.includes("–")'
+        if pictures:
+            there += " && %s === '%s'" % (TEXT % "frame", WANTED)
+        browser.until(there)
+        if pictures:
+            path = os.path.join(pictures, name + ".png")
+            browser.screenshot(path, "main")
+            while not browser.value(there):  # the next frame was sooner
+                browser.until(there)
+                browser.screenshot(path, "main")
+        check_screen(browser, name, width)
+        check_boxes(browser, name)
+
+
+def main():
+    live_loop, isohead_live, source = sys.argv[1:4]
+    pictures = sys.argv[4] if len(sys.argv) > 4 else None
+    with tempfile.TemporaryDirectory() as work:
+        folder = os.path.join(work, "frames")
+        os.makedirs(folder)
+        frames_of(source, folder)
+        loop = subprocess.Popen([live_loop, folder, "0", str(RATE), isohead_live, "0"], stdin=subprocess.PIPE,
+                                stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+        try:
+            url = loop.stderr.readline().strip()
+            with Browser(work) as browser:
+                watch(browser, url, pictures)
+            strange = [asked for asked in browser.requests if not asked.startswith((url, "data:", "about:"))]
+            check(not strange, f"asked elsewhere: {strange}")
+            check(not browser.errors, f"errors: {browser.errors}")
+            messages = loop.communicate()[1]
+            check(loop.returncode == 0, f"the loop's end: {messages}")
+        finally:
+            loop.kill()
+    print(f"live page: {len(failures)} failures")
+    return 1 if failures else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
