@@ -200,19 +200,20 @@ def judge(bench, index, kind, output, table):
 
 
 def refuse(bench, name, pictures, status, wanted, *more):
-    """The message must match; no rig.json may be there afterwards."""
+    """The message must match; nothing of an earlier run may be there afterwards."""
     out = bench.path("refused")
     os.makedirs(out, exist_ok=True)
-    with open(out + "/rig.json", "w", encoding="utf-8") as file:
-        file.write("of an earlier calibration")
+    for file_name in ("rig.json", "report.html"):
+        with open(os.path.join(out, file_name), "w", encoding="utf-8") as file:
+            file.write("of an earlier calibration")
     got, _, err = bench.solve(pictures, out, *more)
     reason = None
     if got != status:
         reason = "status %d instead of %d: %s" % (got, status, err.strip())
     elif not re.search(wanted, err):
         reason = "says: " + err.strip().replace("\n", "; ")
-    elif status == 1 and os.path.exists(out + "/rig.json"):
-        reason = "a rig.json is left"
+    elif status == 1 and os.listdir(out):
+        reason = "%s is left" % os.listdir(out)
     result(name, reason)
 
 

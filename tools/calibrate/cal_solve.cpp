@@ -136,16 +136,18 @@ static void tell_projector(const Projector &projector)
     std::printf("\n");
 }
 
-/* A calibration that fails leaves no rig.json of an earlier one behind. */
+/* A calibration that fails leaves no files of an earlier one behind. */
 static void make_out(const std::string &out)
 {
     std::error_code failed;
     std::filesystem::create_directories(out, failed);
     if (failed)
         throw Error(out + ": " + failed.message());
-    std::filesystem::remove(out + "/rig.json", failed);
-    if (failed)
-        throw Error(out + "/rig.json: " + failed.message());
+    for (const char *name : {"/rig.json", "/report.html"}) {
+        std::filesystem::remove(out + name, failed);
+        if (failed)
+            throw Error(out + name + ": " + failed.message());
+    }
 }
 
 void solve_run(const Options &options)
