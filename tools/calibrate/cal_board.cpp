@@ -13,9 +13,18 @@ static constexpr double marker_share = 0.8;
 static constexpr int dictionary = cv::aruco::DICT_4X4_100;
 static constexpr int markers_max = 100;
 
-cv::Point3d Board::corner_mm(int corner) const
+cv::Point3d Board::corner_mm(int vertex) const
 {
-    return {(corner % (columns - 1) + 1) * square_mm, (corner / (columns - 1) + 1) * square_mm, 0.0};
+    int column = vertex % (columns - 1) + 1, row = vertex / (columns - 1) + 1, beyond = vertex - corner_count();
+    if (beyond >= 0 && beyond < 2 * (columns + 1)) { /* the upper side, then the lower one */
+        column = beyond % (columns + 1);
+        row = beyond <= columns ? 0 : rows;
+    } else if (beyond >= 0) { /* what is left of the two other ones */
+        int side = beyond - 2 * (columns + 1);
+        column = side % 2 == 0 ? 0 : columns;
+        row = side / 2 + 1;
+    }
+    return {column * square_mm, row * square_mm, 0.0};
 }
 
 cv::Point2d Board::sheet_origin_mm() const

@@ -29,7 +29,12 @@ struct Board {
     {
         return (columns - 1) * (rows - 1);
     }
-    cv::Point3d corner_mm(int corner) const;
+    /* Corners and those on the pattern's outline, which are counted on. */
+    int vertex_count() const
+    {
+        return corner_count() + 2 * (columns + rows);
+    }
+    cv::Point3d corner_mm(int vertex) const;
     cv::Point2d middle_mm() const
     {
         return {0.5 * columns * square_mm, 0.5 * rows * square_mm};

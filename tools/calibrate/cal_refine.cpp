@@ -17,14 +17,16 @@ static constexpr double miss_max = 0.12, contrast_min_grey = 12.0;
 /* Pixels at the sensor's limit do not count, nor what is so many times the usual residual (a Gaussian's, from the mean
  * absolute one) above the print, at least so many grey values: dots of the laser. So much of the patch must be left. */
 static constexpr double saturated_grey = 248.0, extra_times = 3.0, extra_min_grey = 4.0, used_share = 0.6;
+/* Of a patch at the picture's or the sheet's border so much must be there. */
+static constexpr double visible_share = 0.35;
 static constexpr double mean_to_sigma = 1.2533;
 static constexpr int passes = 4;
 /* An edge's rise over its steepest slope is this many standard deviations of its blur. */
 static constexpr double edge_sigmas = 2.5066, pixel_sigma_px = 0.29, blur_min_px = 0.4;
 
 /* Gain; ground, its slopes and curves (a lamp's mirror image is a hill); shift. */
-using Unknowns = cv::Matx<double, 9, 1>;
-static constexpr int shift_u = 7, shift_v = 8;
+static constexpr int unknowns = 9, shift_u = 7, shift_v = 8;
+using Unknowns = cv::Matx<double, unknowns, 1>;
 
 /* From tangents X/Z, Y/Z to samples of the print. */
 static cv::Matx33d onto_print(const Board &board, const cv::Vec3d &turn, const cv::Vec3d &shift)
@@ -64,10 +66,15 @@ static Sight sight_of(const cv::Mat &tangents, cv::Point2d px)
     return {here + (px.x - u) * right + (px.y - v) * down, right, down};
 }
 
+static bool on_sheet(const cv::Mat &print, int left, int top)
+{
+    return left >= 0 && top >= 0 && left + 1 < print.cols && top + 1 < print.rows;
+}
+
 static double sample(const cv::Mat &print, double x, double y)
 {
     int left = cvFloor(x), top = cvFloor(y);
-    if (left < 0 || top < 0 || left + 1 >= print.cols || top + 1 >= print.rows)
+    if (!on_sheet(print, left, top))
         return 1.0;
     double fx = x - left, fy = y - top;
     const uchar *upper = print.ptr<uchar>(top) + left, *lower = print.ptr<uchar>(top + 1) + left;
@@ -83,11 +90,17 @@ struct Drawing {
     int sub_samples; /* along each side of a pixel */
 };
 
-/* 0 dark to 1 white: pixels from -half to half around `middle_px` (and a border for the blur), all moved by `moved_px`. */
-static cv::Mat draw_patch(const Drawing &drawing, cv::Point middle_px, cv::Point2d moved_px, int half)
+/* 0 dark to 1 white, and CV_8U: what nothing beyond the sheet had a part in. */
+struct Drawn {
+    cv::Mat light, sheet;
+};
+
+/* Pixels from -half to half around `middle_px` (and a border for the blur), all moved by `moved_px`. */
+static Drawn draw_patch(const Drawing &drawing, cv::Point middle_px, cv::Point2d moved_px, int half)
 {
-    int side = 2 * (half + blur_reach_px) + 1;
-    cv::Mat drawn(side, side, CV_64F), soft;
+    int side = 2 * (half + blur_reach_px) + 1, reach = 2 * blur_reach_px + 1;
+    cv::Mat sharp(side, side, CV_64F), sheet(side, side, CV_8U);
+    Drawn drawn;
     int parts = drawing.sub_samples;
     cv::Point2d first = cv::Point2d(middle_px) - moved_px - cv::Point2d(half + blur_reach_px, half + blur_reach_px);
     for (int row = 0; row < side; row++) {
@@ -100,11 +113,15 @@ static cv::Mat draw_patch(const Drawing &drawing, cv::Point middle_px, cv::Point
                 cv::Vec3d at = drawing.map * cv::Vec3d(tangent[0], tangent[1], 1.0);
                 sum += sample(drawing.print, at[0] / at[2], at[1] / at[2]);
             }
-            drawn.at<double>(row, column) = sum / (parts * parts);
+            cv::Vec3d middle = drawing.map * cv::Vec3d(sight.at[0], sight.at[1], 1.0);
+            sharp.at<double>(row, column) = sum / (parts * parts);
+            sheet.at<uchar>(row, column) =
+                on_sheet(drawing.print, cvFloor(middle[0] / middle[2]), cvFloor(middle[1] / middle[2]));
         }
     }
-    cv::GaussianBlur(drawn, soft, {2 * blur_reach_px + 1, 2 * blur_reach_px + 1}, drawing.blur_px);
-    return soft;
+    cv::GaussianBlur(sharp, drawn.light, {reach, reach}, drawing.blur_px);
+    cv::erode(sheet, drawn.sheet, cv::Mat::ones(reach, reach, CV_8U));
+    return drawn;
 }
 
 /* What a pixel of the patch adds to the equations. */
@@ -114,17 +131,23 @@ struct Pixel {
     bool used;
 };
 
-static std::vector<Pixel> list_pixels(const cv::Mat &grey, const cv::Mat &drawn, cv::Point middle_px, int half)
+/* Those of the patch that are in the picture and on the sheet. */
+static std::vector<Pixel> list_pixels(const cv::Mat &grey, const Drawn &drawn, cv::Point middle_px, int half)
 {
     std::vector<Pixel> pixels;
+    cv::Rect frame(0, 0, grey.cols, grey.rows);
+    const cv::Mat &light = drawn.light;
     for (int dv = -half; dv <= half; dv++) {
         for (int du = -half; du <= half; du++) {
+            cv::Point at = middle_px + cv::Point(du, dv);
             int row = dv + half + blur_reach_px, column = du + half + blur_reach_px;
-            double slope_u = 0.5 * (drawn.at<double>(row, column + 1) - drawn.at<double>(row, column - 1));
-            double slope_v = 0.5 * (drawn.at<double>(row + 1, column) - drawn.at<double>(row - 1, column));
+            if (!frame.contains(at) || drawn.sheet.at<uchar>(row, column) == 0)
+                continue;
+            double slope_u = 0.5 * (light.at<double>(row, column + 1) - light.at<double>(row, column - 1));
+            double slope_v = 0.5 * (light.at<double>(row + 1, column) - light.at<double>(row - 1, column));
             double x = static_cast<double>(du) / half, y = static_cast<double>(dv) / half;
-            double seen = static_cast<double>(grey.at<float>(middle_px.y + dv, middle_px.x + du));
-            pixels.push_back({{drawn.at<double>(row, column), 1.0, x, y, x * x, x * y, y * y, -slope_u, -slope_v},
+            double seen = static_cast<double>(grey.at<float>(at));
+            pixels.push_back({{light.at<double>(row, column), 1.0, x, y, x * x, x * y, y * y, -slope_u, -slope_v},
                               seen,
                               seen < saturated_grey});
         }
@@ -162,7 +185,7 @@ struct Match {
 static bool match(std::vector<Pixel> &pixels, Match &result)
 {
     for (int pass = 0; pass < passes; pass++) {
-        cv::Matx<double, 9, 9> normal = cv::Matx<double, 9, 9>::zeros();
+        cv::Matx<double, unknowns, unknowns> normal = cv::Matx<double, unknowns, unknowns>::zeros();
         Unknowns right = Unknowns::zeros();
         double square_sum = 0.0;
         int used = 0;
@@ -175,11 +198,12 @@ static bool match(std::vector<Pixel> &pixels, Match &result)
             used++;
         }
         bool solved = false;
-        cv::Matx<double, 9, 9> inverse = normal.inv(cv::DECOMP_CHOLESKY, &solved);
+        cv::Matx<double, unknowns, unknowns> inverse = normal.inv(cv::DECOMP_CHOLESKY, &solved);
         if (used < used_share * static_cast<double>(pixels.size()) || !solved)
             return false;
         result.found = inverse * right;
-        result.miss = std::sqrt(std::max(0.0, square_sum - right.dot(result.found)) / used) / result.found(0);
+        result.miss =
+            std::sqrt(std::max(0.0, square_sum - right.dot(result.found)) / (used - unknowns)) / result.found(0);
         result.sigma_px = result.miss * std::sqrt(0.5 * (inverse(shift_u, shift_u) + inverse(shift_v, shift_v)));
         if (!drop_lit(pixels, result.found))
             break;
@@ -193,11 +217,10 @@ static bool refine_one(const Drawing &drawing, const cv::Mat &grey, int half, cv
     Match result{{}, 1.0, 0.0};
     for (int step = 0; step < steps; step++) {
         cv::Point middle(cvRound(corner_px.x), cvRound(corner_px.y));
-        if (middle.x < half || middle.y < half || middle.x >= grey.cols - half || middle.y >= grey.rows - half)
-            return false;
         std::vector<Pixel> pixels =
             list_pixels(grey, draw_patch(drawing, middle, corner_px - start, half), middle, half);
-        if (!match(pixels, result))
+        double whole = (2.0 * half + 1.0) * (2.0 * half + 1.0);
+        if (static_cast<double>(pixels.size()) < visible_share * whole || !match(pixels, result))
             return false;
         cv::Point2d move(result.found(shift_u), result.found(shift_v));
         move *= 1.0 / result.found(0);
@@ -229,14 +252,14 @@ void corners_refine(const Board &board, const cv::Mat &print, const cv::Mat &tan
     std::vector<cv::Point3d> places;
     std::vector<cv::Point2d> expected;
     double half_square = 0.5 * board.square_mm;
-    for (int id = 0; id < board.corner_count(); id++) {
+    for (int id = 0; id < board.vertex_count(); id++) {
         places.push_back(board.corner_mm(id));
         places.push_back(places.back() + cv::Point3d(half_square, 0.0, 0.0));
         places.push_back(places[places.size() - 2] + cv::Point3d(0.0, half_square, 0.0));
     }
     cv::projectPoints(places, turn, shift, camera, distortion, expected);
     Drawing drawing{print, tangents, onto_print(board, turn, shift), blur_of(corners.edge_px), sub_samples_max};
-    for (int id = 0; id < board.corner_count(); id++) {
+    for (int id = 0; id < board.vertex_count(); id++) {
         const cv::Point2d *seen = &expected[3 * static_cast<size_t>(id)];
         double shorter_px = std::min(cv::norm(seen[1] - seen[0]), cv::norm(seen[2] - seen[0]));
         int half = std::clamp(cvRound(2.0 * patch_share * shorter_px), patch_min_px, patch_max_px);
@@ -244,7 +267,8 @@ void corners_refine(const Board &board, const cv::Mat &print, const cv::Mat &tan
             std::clamp(cvCeil(half_square * refine_px_per_mm / shorter_px), sub_samples_min, sub_samples_max);
         cv::Point2d corner_px = seen[0];
         double sigma_px;
-        if (refine_one(drawing, grey, half, corner_px, sigma_px)) {
+        if (cv::Rect2d(0.0, 0.0, grey.cols, grey.rows).contains(corner_px) &&
+            refine_one(drawing, grey, half, corner_px, sigma_px)) {
             refined.ids.push_back(id);
             refined.px.emplace_back(corner_px);
             refined.sigma_px.push_back(sigma_px);
