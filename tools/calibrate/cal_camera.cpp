@@ -140,8 +140,10 @@ static bool clean(const Board &board, const Camera &camera, std::vector<View> &v
             if (cv::norm(residuals[i]) <= limit_px) {
                 kept.ids.push_back(view.corners.ids[i]);
                 kept.px.push_back(view.corners.px[i]);
-                if (!view.corners.sigma_px.empty())
+                if (!view.corners.sigma_px.empty()) {
                     kept.sigma_px.push_back(view.corners.sigma_px[i]);
+                    kept.dark_share.push_back(view.corners.dark_share[i]);
+                }
             }
         }
         size_t dropped = residuals.size() - kept.ids.size();
@@ -213,8 +215,8 @@ static void check_trust(const Camera &camera)
 /* All corners anew, by the camera as it is known now. */
 static void refine(const Board &board, const Camera &camera, std::vector<View> &views)
 {
-    cv::Mat print = board_bitmap(board, refine_px_per_mm);
-    cv::Mat tangents = refine_tangents(camera.size, camera.matrix, camera.distortion);
+    cv::Mat print = board_bitmap(board, draw_px_per_mm);
+    cv::Mat tangents = draw_tangents(camera.size, camera.matrix, camera.distortion);
     for (View &view : views) {
         view.left_out = 0;
         if (!view.good())

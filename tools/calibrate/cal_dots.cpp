@@ -3,17 +3,18 @@
 #include <algorithm>
 #include <opencv2/imgproc.hpp>
 
+#include "cal_pictures.hpp"
+
 namespace cal
 {
 static constexpr double inner_px = 1.0, outer_px = 3.0;
 static constexpr double noise_times = 5.0, peak_min_grey = 2.5;
 static constexpr double saturated_grey = 250.0;
-static constexpr int window_px = 4;
 static constexpr double sigma_min_px = 0.5, sigma_max_px = 3.2, moved_max_px = 1.5;
 static constexpr int fit_steps = 20, used_min = 40;
 static constexpr double damping = 1e-2;
-/* A sensor's black level, roughly, and the least light that tells how light a surface is. */
-static constexpr double black_grey = 4.0, light_min_grey = 12.0;
+/* The least light that tells how light a surface is. */
+static constexpr double light_min_grey = 12.0;
 
 static double noise_of(const cv::Mat &band, const cv::Mat &where)
 {
@@ -52,19 +53,18 @@ static void add_pixel(const cv::Matx<double, 5, 1> &p, int u, int v, double grey
     right += slope * (grey - p(0) * bell - p(4));
 }
 
-/* Peak, place, width and ground of a Gaussian, by damped Gauss-Newton over the window; pixels of `lit` that are at the
- * sensor's limit do not count. False: no round dot there. */
-static bool fit_dot(const cv::Mat &picture, const cv::Mat &lit, int u0, int v0, Dot &dot)
+bool dot_fit(const cv::Mat &window, const cv::Mat &lit, Dot &dot)
 {
-    cv::Matx<double, 5, 1> p(static_cast<double>(picture.at<float>(v0, u0)), u0, v0, 1.3, 0.0);
+    cv::Matx<double, 5, 1> p(static_cast<double>(window.at<float>(dot_reach_px, dot_reach_px)), 0.0, 0.0, 1.3, 0.0);
     for (int step = 0; step < fit_steps; step++) {
         cv::Matx<double, 5, 5> normal = cv::Matx<double, 5, 5>::zeros();
         cv::Matx<double, 5, 1> right = cv::Matx<double, 5, 1>::zeros(), change;
         int used = 0;
-        for (int v = v0 - window_px; v <= v0 + window_px; v++) {
-            for (int u = u0 - window_px; u <= u0 + window_px; u++) {
+        for (int v = 0; v < window.rows; v++) {
+            for (int u = 0; u < window.cols; u++) {
                 if (static_cast<double>(lit.at<float>(v, u)) < saturated_grey) {
-                    add_pixel(p, u, v, static_cast<double>(picture.at<float>(v, u)), normal, right);
+                    add_pixel(p, u - dot_reach_px, v - dot_reach_px, static_cast<double>(window.at<float>(v, u)),
+                              normal, right);
                     used++;
                 }
             }
@@ -74,12 +74,22 @@ static bool fit_dot(const cv::Mat &picture, const cv::Mat &lit, int u0, int v0, 
         if (used < used_min || !cv::solve(normal, right, change, cv::DECOMP_CHOLESKY))
             return false;
         p += change;
-        if (!(p(3) > 0.3 && p(3) < 6.0) || std::abs(p(1) - u0) > window_px || std::abs(p(2) - v0) > window_px)
+        if (!(p(3) > 0.3 && p(3) < 6.0) || std::abs(p(1)) > dot_reach_px || std::abs(p(2)) > dot_reach_px)
             return false;
     }
     dot = {{p(1), p(2)}, p(0), p(3)};
-    return p(0) > peak_min_grey && p(3) >= sigma_min_px && p(3) <= sigma_max_px && std::abs(p(1) - u0) < moved_max_px &&
-           std::abs(p(2) - v0) < moved_max_px;
+    return true;
+}
+
+/* A dot around a pixel. */
+static bool find_dot(const cv::Mat &picture, const cv::Mat &lit, int u, int v, Dot &dot)
+{
+    cv::Rect window = dot_window({u, v});
+    bool round = dot_fit(picture(window), lit(window), dot) && dot.peak_grey > peak_min_grey &&
+                 dot.sigma_px >= sigma_min_px && dot.sigma_px <= sigma_max_px && std::abs(dot.px.x) < moved_max_px &&
+                 std::abs(dot.px.y) < moved_max_px;
+    dot.px += cv::Point2d(u, v);
+    return round;
 }
 
 /* Where the surface alone is at the sensor's limit nothing can be seen on it. */
@@ -101,12 +111,12 @@ std::vector<Dot> dots_find(const cv::Mat &lit, const cv::Mat &dark, const cv::Ma
     cv::dilate(band, highest, cv::Mat::ones(5, 5, CV_8U));
     double limit = std::max(noise_times * noise_of(band, where), 0.4 * peak_min_grey);
     cv::Mat fitted = dark.empty() ? lit : evened(lit, dark, where);
-    for (int v = window_px + 1; v < lit.rows - window_px - 1; v++) {
-        for (int u = window_px + 1; u < lit.cols - window_px - 1; u++) {
+    for (int v = dot_reach_px + 1; v < lit.rows - dot_reach_px - 1; v++) {
+        for (int u = dot_reach_px + 1; u < lit.cols - dot_reach_px - 1; u++) {
             float value = band.at<float>(v, u);
             Dot dot;
             if (where.at<uchar>(v, u) != 0 && static_cast<double>(value) > limit && value >= highest.at<float>(v, u) &&
-                !is_dazzled(dark, u, v) && fit_dot(fitted, lit, u, v, dot))
+                !is_dazzled(dark, u, v) && find_dot(fitted, lit, u, v, dot))
                 dots.push_back(dot);
         }
     }

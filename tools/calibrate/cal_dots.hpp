@@ -16,6 +16,18 @@ struct Dot {
     double peak_grey, sigma_px;
 };
 
+/* A dot is fitted in this many pixels to each side. */
+constexpr int dot_reach_px = 4, dot_side_px = 2 * dot_reach_px + 1;
+
+inline cv::Rect dot_window(cv::Point middle_px)
+{
+    return {middle_px.x - dot_reach_px, middle_px.y - dot_reach_px, dot_side_px, dot_side_px};
+}
+
+/* Peak, place from the window's middle, width and ground of a Gaussian, by damped Gauss-Newton over a window (CV_32F);
+ * pixels of `lit` that are at the sensor's limit do not count. False: there is none. */
+bool dot_fit(const cv::Mat &window, const cv::Mat &lit, Dot &dot);
+
 /* `dark` is the twin, or empty. `where` (CV_8U, not 0) says where dots are looked for. */
 std::vector<Dot> dots_find(const cv::Mat &lit, const cv::Mat &dark, const cv::Mat &where);
 } // namespace cal

@@ -12,6 +12,9 @@
 
 namespace cal
 {
+/* A sensor's black level, roughly. */
+constexpr double black_grey = 4.0;
+
 struct Picture {
     std::string file;
     cv::Mat grey; /* CV_32F, 0 .. 255 whatever the file's bits are */

@@ -4,6 +4,8 @@
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "cal_pictures.hpp"
+
 namespace cal
 {
 /* Half side of the patch in squares, and its bounds. */
@@ -28,64 +30,10 @@ static constexpr double edge_sigmas = 2.5066, pixel_sigma_px = 0.29, blur_min_px
 static constexpr int unknowns = 9, shift_u = 7, shift_v = 8;
 using Unknowns = cv::Matx<double, unknowns, 1>;
 
-/* From tangents X/Z, Y/Z to samples of the print. */
-static cv::Matx33d onto_print(const Board &board, const cv::Vec3d &turn, const cv::Vec3d &shift)
-{
-    cv::Matx33d rotation;
-    cv::Point2d sheet = board.sheet_origin_mm();
-    double scale = refine_px_per_mm;
-    cv::Rodrigues(turn, rotation);
-    cv::Matx33d from_board(rotation(0, 0), rotation(0, 1), shift[0], rotation(1, 0), rotation(1, 1), shift[1],
-                           rotation(2, 0), rotation(2, 1), shift[2]);
-    cv::Matx33d to_print(scale, 0.0, -scale * sheet.x - 0.5, 0.0, scale, -scale * sheet.y - 0.5, 0.0, 0.0, 1.0);
-    return to_print * from_board.inv();
-}
-
-cv::Mat refine_tangents(cv::Size size, const cv::Mat &camera, const cv::Mat &distortion)
-{
-    cv::Mat px(size, CV_64FC2), tangents;
-    for (int v = 0; v < size.height; v++) {
-        for (int u = 0; u < size.width; u++)
-            px.at<cv::Vec2d>(v, u) = {static_cast<double>(u), static_cast<double>(v)};
-    }
-    cv::undistortPoints(px.reshape(2, 1), tangents, camera, distortion, cv::noArray(), cv::noArray(),
-                        {cv::TermCriteria::COUNT + cv::TermCriteria::EPS, 50, 1e-9});
-    return tangents.reshape(2, size.height);
-}
-
-/* What the camera looks at in a pixel, and how that changes to the right and downwards. */
-struct Sight {
-    cv::Vec2d at, right, down;
-};
-
-static Sight sight_of(const cv::Mat &tangents, cv::Point2d px)
-{
-    int u = std::clamp(cvFloor(px.x), 0, tangents.cols - 2), v = std::clamp(cvFloor(px.y), 0, tangents.rows - 2);
-    cv::Vec2d here = tangents.at<cv::Vec2d>(v, u), right = tangents.at<cv::Vec2d>(v, u + 1) - here;
-    cv::Vec2d down = tangents.at<cv::Vec2d>(v + 1, u) - here;
-    return {here + (px.x - u) * right + (px.y - v) * down, right, down};
-}
-
-static bool on_sheet(const cv::Mat &print, int left, int top)
-{
-    return left >= 0 && top >= 0 && left + 1 < print.cols && top + 1 < print.rows;
-}
-
-static double sample(const cv::Mat &print, double x, double y)
-{
-    int left = cvFloor(x), top = cvFloor(y);
-    if (!on_sheet(print, left, top))
-        return 1.0;
-    double fx = x - left, fy = y - top;
-    const uchar *upper = print.ptr<uchar>(top) + left, *lower = print.ptr<uchar>(top + 1) + left;
-    return ((1.0 - fy) * ((1.0 - fx) * upper[0] + fx * upper[1]) + fy * ((1.0 - fx) * lower[0] + fx * lower[1])) /
-           255.0;
-}
-
 /* What draws the print as the camera sees it. */
 struct Drawing {
     const cv::Mat &print, &tangents;
-    cv::Matx33d map; /* onto_print */
+    cv::Matx33d map; /* draw_map */
     double blur_px;
     int sub_samples; /* along each side of a pixel */
 };
@@ -105,18 +53,16 @@ static Drawn draw_patch(const Drawing &drawing, cv::Point middle_px, cv::Point2d
     cv::Point2d first = cv::Point2d(middle_px) - moved_px - cv::Point2d(half + blur_reach_px, half + blur_reach_px);
     for (int row = 0; row < side; row++) {
         for (int column = 0; column < side; column++) {
-            Sight sight = sight_of(drawing.tangents, first + cv::Point2d(column, row));
+            Sight sight = draw_sight(drawing.tangents, first + cv::Point2d(column, row));
             double sum = 0.0;
             for (int i = 0; i < parts * parts; i++) {
                 double right = (i % parts + 0.5) / parts - 0.5, down = (i / parts + 0.5) / parts - 0.5;
-                cv::Vec2d tangent = sight.at + right * sight.right + down * sight.down;
-                cv::Vec3d at = drawing.map * cv::Vec3d(tangent[0], tangent[1], 1.0);
-                sum += sample(drawing.print, at[0] / at[2], at[1] / at[2]);
+                sum += draw_sample(drawing.print, drawing.map * sight.beside(right, down));
             }
-            cv::Vec3d middle = drawing.map * cv::Vec3d(sight.at[0], sight.at[1], 1.0);
+            cv::Vec3d middle = drawing.map * sight.beside(0.0, 0.0);
             sharp.at<double>(row, column) = sum / (parts * parts);
             sheet.at<uchar>(row, column) =
-                on_sheet(drawing.print, cvFloor(middle[0] / middle[2]), cvFloor(middle[1] / middle[2]));
+                draw_on_sheet(drawing.print, cvFloor(middle[0] / middle[2]), cvFloor(middle[1] / middle[2]));
         }
     }
     cv::GaussianBlur(sharp, drawn.light, {reach, reach}, drawing.blur_px);
@@ -211,7 +157,8 @@ static bool match(std::vector<Pixel> &pixels, Match &result)
     return result.found(0) >= contrast_min_grey;
 }
 
-static bool refine_one(const Drawing &drawing, const cv::Mat &grey, int half, cv::Point2d &corner_px, double &sigma_px)
+static bool refine_one(const Drawing &drawing, const cv::Mat &grey, int half, cv::Point2d &corner_px, double &sigma_px,
+                       double &dark_share)
 {
     cv::Point2d start = corner_px;
     Match result{{}, 1.0, 0.0};
@@ -230,6 +177,8 @@ static bool refine_one(const Drawing &drawing, const cv::Mat &grey, int half, cv
         if (cv::norm(move) < 0.003)
             break;
     }
+    double ground = std::max(0.0, result.found(1) - black_grey);
+    dark_share = ground / (ground + result.found(0));
     sigma_px = std::max(result.sigma_px, sigma_floor_px);
     return result.miss < miss_max;
 }
@@ -258,20 +207,21 @@ void corners_refine(const Board &board, const cv::Mat &print, const cv::Mat &tan
         places.push_back(places[places.size() - 2] + cv::Point3d(0.0, half_square, 0.0));
     }
     cv::projectPoints(places, turn, shift, camera, distortion, expected);
-    Drawing drawing{print, tangents, onto_print(board, turn, shift), blur_of(corners.edge_px), sub_samples_max};
+    Drawing drawing{print, tangents, draw_map(board, turn, shift), blur_of(corners.edge_px), sub_samples_max};
     for (int id = 0; id < board.vertex_count(); id++) {
         const cv::Point2d *seen = &expected[3 * static_cast<size_t>(id)];
         double shorter_px = std::min(cv::norm(seen[1] - seen[0]), cv::norm(seen[2] - seen[0]));
         int half = std::clamp(cvRound(2.0 * patch_share * shorter_px), patch_min_px, patch_max_px);
         drawing.sub_samples =
-            std::clamp(cvCeil(half_square * refine_px_per_mm / shorter_px), sub_samples_min, sub_samples_max);
+            std::clamp(cvCeil(half_square * draw_px_per_mm / shorter_px), sub_samples_min, sub_samples_max);
         cv::Point2d corner_px = seen[0];
-        double sigma_px;
+        double sigma_px, dark_share;
         if (cv::Rect2d(0.0, 0.0, grey.cols, grey.rows).contains(corner_px) &&
-            refine_one(drawing, grey, half, corner_px, sigma_px)) {
+            refine_one(drawing, grey, half, corner_px, sigma_px, dark_share)) {
             refined.ids.push_back(id);
             refined.px.emplace_back(corner_px);
             refined.sigma_px.push_back(sigma_px);
+            refined.dark_share.push_back(dark_share);
         }
     }
     corners = refined;

@@ -6,17 +6,13 @@
 #ifndef CAL_REFINE_HPP
 #define CAL_REFINE_HPP
 
+#include "cal_draw.hpp"
 #include "cal_find.hpp"
 
 namespace cal
 {
-constexpr int refine_px_per_mm = 4;
-
-/* What the camera looks at in each pixel: X/Z, Y/Z, CV_64FC2. */
-cv::Mat refine_tangents(cv::Size size, const cv::Mat &camera, const cv::Mat &distortion);
-
 /* Sets the corners anew, all that are in the picture (CV_32F) and look as they should. `print` is board_bitmap with
- * refine_px_per_mm, `tangents` is refine_tangents. */
+ * draw_px_per_mm, `tangents` is draw_tangents. */
 void corners_refine(const Board &board, const cv::Mat &print, const cv::Mat &tangents, const cv::Mat &grey,
                     const cv::Mat &camera, const cv::Mat &distortion, Corners &corners);
 } // namespace cal

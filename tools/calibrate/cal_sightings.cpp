@@ -60,20 +60,22 @@ static bool clear_of_edges(const Camera &camera, const Board &board, const cv::M
     return mm * px_per_mm >= edge_apart_px;
 }
 
+void sighting_place(const Camera &camera, const View &view, cv::Point2d px, Sighting &sighting)
+{
+    cv::Vec3d normal = view.normal();
+    sighting.px = px;
+    sighting.tangent = camera.tangents({px}).front();
+    cv::Vec3d sight(sighting.tangent.x, sighting.tangent.y, 1.0);
+    sighting.place_mm = sight * (normal.dot(view.shift) / normal.dot(sight));
+}
+
 void sightings_find(const Board &board, const Camera &camera, const cv::Mat &grey, const cv::Mat &dark, Lit &lit)
 {
-    std::vector<cv::Point2d> px;
-    for (const Dot &dot : dots_find(grey, dark, sheet_mask(camera, board, lit.view)))
-        px.push_back(dot.px);
-    std::vector<cv::Point2d> tangents = camera.tangents(px);
-    cv::Vec3d normal = lit.view.normal();
     cv::Mat distances = edge_distances(board);
-    for (size_t i = 0; i < px.size(); i++) {
-        cv::Vec3d sight(tangents[i].x, tangents[i].y, 1.0);
+    for (const Dot &dot : dots_find(grey, dark, sheet_mask(camera, board, lit.view))) {
         Sighting sighting;
-        sighting.px = px[i];
-        sighting.tangent = tangents[i];
-        sighting.place_mm = sight * (normal.dot(lit.view.shift) / normal.dot(sight));
+        sighting.wide_px = dot.sigma_px;
+        sighting_place(camera, lit.view, dot.px, sighting);
         if (!dark.empty() || clear_of_edges(camera, board, distances, lit.view, sighting))
             lit.sightings.push_back(sighting);
     }

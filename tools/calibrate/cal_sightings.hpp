@@ -14,6 +14,7 @@ constexpr int no_slot = -1;
 
 struct Sighting {
     cv::Point2d px, tangent; /* as in the frame; undistorted X/Z, Y/Z */
+    double wide_px;          /* standard deviation of the dot's light */
     cv::Vec3d place_mm;      /* camera frame */
     cv::Vec2i step;          /* column, row in this picture's own lattice */
     bool in_lattice = false;
@@ -29,6 +30,9 @@ struct Lit {
     std::vector<Sighting> sightings;
     std::string refused; /* why nothing of it is used; empty: it is used */
 };
+
+/* Where a sighting at a pixel is: sets px, tangent and place. */
+void sighting_place(const Camera &camera, const View &view, cv::Point2d px, Sighting &sighting);
 
 /* The board's pose in `lit.view` must be known. */
 void sightings_find(const Board &board, const Camera &camera, const cv::Mat &grey, const cv::Mat &dark, Lit &lit);

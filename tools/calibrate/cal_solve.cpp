@@ -4,9 +4,11 @@
 #include <filesystem>
 
 #include "cal_coverage.hpp"
+#include "cal_draw.hpp"
 #include "cal_error.hpp"
 #include "cal_lattice.hpp"
 #include "cal_report.hpp"
+#include "cal_spot.hpp"
 #include "cal_twins.hpp"
 #include "tool_progress.hpp"
 
@@ -86,6 +88,39 @@ static void check_lit(const std::vector<Lit> &pictures)
         throw Error(
             "no dots of the laser are seen on the board in any picture that should have it on: are those with and "
             "without it mixed up in frames.jsonl, or in the files' names? Add:\n  - pictures with the laser on");
+}
+
+/* How light the print's dark is: the median over all corners. */
+static double dark_share(const std::vector<View> &views)
+{
+    std::vector<double> shares;
+    for (const View &view : views) {
+        if (view.good())
+            shares.insert(shares.end(), view.corners.dark_share.begin(), view.corners.dark_share.end());
+    }
+    auto middle = shares.begin() + static_cast<std::ptrdiff_t>(shares.size() / 2);
+    std::nth_element(shares.begin(), middle, shares.end());
+    return *middle;
+}
+
+/* The dots' places once more, by what the print does to them. */
+static void place_dots(const std::vector<Picture> &pictures, const std::vector<int> &twins, Result &result)
+{
+    const Camera &camera = result.camera;
+    Spots spots{result.board,
+                camera,
+                board_bitmap(result.board, draw_px_per_mm),
+                draw_tangents(camera.size, camera.matrix, camera.distortion),
+                spot_lens_px(result.lit),
+                dark_share(result.views)};
+    size_t next = 0;
+    for (size_t i = 0; i < pictures.size(); i++) {
+        if (!pictures[i].laser)
+            continue;
+        Lit &lit = result.lit[next++];
+        if (lit.refused.empty() && twins[i] >= 0)
+            spots_place(spots, pictures[i].grey, pictures[static_cast<size_t>(twins[i])].grey, lit);
+    }
 }
 
 static void tell_pictures(const Result &result)
@@ -177,6 +212,8 @@ void solve_run(const Options &options)
         result.camera = camera_solve(result.board, pictures.front().grey.size(), result.views);
         result.lit = find_dots(result, pictures, twins, progress);
         check_lit(result.lit);
+        progress.show("placing the dots");
+        place_dots(pictures, twins, result);
         progress.show("solving for the projector");
         cv::Vec3d origin_mm = index_assign(result.board, result.camera, result.lit, options.middle);
         result.projector = rays_solve(result.camera, result.lit, origin_mm);

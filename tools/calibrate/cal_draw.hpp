@@ -1,0 +1,37 @@
+/* cal_draw - the print as a camera sees it: from pixels to places of the sheet, through the lens.
+ */
+#ifndef CAL_DRAW_HPP
+#define CAL_DRAW_HPP
+
+#include "cal_board.hpp"
+
+namespace cal
+{
+constexpr int draw_px_per_mm = 4; /* of the print's bitmap */
+
+/* What the camera looks at in each pixel: X/Z, Y/Z, CV_64FC2. */
+cv::Mat draw_tangents(cv::Size size, const cv::Mat &camera, const cv::Mat &distortion);
+
+/* From tangents X/Z, Y/Z to samples of the print, for a board's pose. */
+cv::Matx33d draw_map(const Board &board, const cv::Vec3d &turn, const cv::Vec3d &shift);
+
+/* What the camera looks at in a pixel, and how that changes to the right and downwards. */
+struct Sight {
+    cv::Vec2d at, right, down;
+
+    cv::Vec3d beside(double right_px, double down_px) const
+    {
+        cv::Vec2d tangent = at + right_px * right + down_px * down;
+        return {tangent[0], tangent[1], 1.0};
+    }
+};
+
+Sight draw_sight(const cv::Mat &tangents, cv::Point2d px);
+
+bool draw_on_sheet(const cv::Mat &print, int left, int top);
+
+/* 0 dark to 1 white, which is also what is beyond the sheet. `at` is homogeneous. */
+double draw_sample(const cv::Mat &print, const cv::Vec3d &at);
+} // namespace cal
+
+#endif

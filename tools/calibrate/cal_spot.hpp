@@ -1,0 +1,30 @@
+/* cal_spot - where a dot really is that falls on an edge of the print.
+ * White sends more of the laser back than dark, so a dot's picture leans towards white; and dividing by how light the
+ * paper looks leans it too far to the other side, because the lens softens edges that the beam still met sharp. So the
+ * dot is drawn as the camera would see it: a beam on the print, then the lens; and moved until a fit of the drawing says
+ * the same as a fit of the picture. What the lens adds to a dot's width is told by the dots: a beam looks narrower the
+ * farther off it is, the lens' part stays.
+ */
+#ifndef CAL_SPOT_HPP
+#define CAL_SPOT_HPP
+
+#include "cal_sightings.hpp"
+
+namespace cal
+{
+/* Standard deviation of the lens' blur, from all sightings. */
+double spot_lens_px(const std::vector<Lit> &pictures);
+
+/* What of the print and of the camera is the same in all pictures. */
+struct Spots {
+    const Board &board;
+    const Camera &camera;
+    cv::Mat print, tangents;    /* board_bitmap with draw_px_per_mm; draw_tangents */
+    double lens_px, dark_share; /* how light the print's dark is, white is 1 */
+};
+
+/* Sets the places of a picture's sightings anew; `dark` is its twin. Those that no dot can be fitted to stay. */
+void spots_place(const Spots &spots, const cv::Mat &grey, const cv::Mat &dark, Lit &lit);
+} // namespace cal
+
+#endif
