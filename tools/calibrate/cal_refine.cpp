@@ -26,8 +26,9 @@ static constexpr int passes = 4;
 /* An edge's rise over its steepest slope is this many standard deviations of its blur. */
 static constexpr double edge_sigmas = 2.5066, pixel_sigma_px = 0.29, blur_min_px = 0.4;
 
-/* Gain; ground, its slopes and curves (a lamp's mirror image is a hill); shift. */
-static constexpr int unknowns = 9, shift_u = 7, shift_v = 8;
+/* Gain; ground, its slopes and curves (a lamp's mirror image is a hill); how much softer the picture is than the drawing,
+ * without which a patch that is not the same on both sides is pushed aside; shift. */
+static constexpr int unknowns = 10, shift_u = 8, shift_v = 9;
 using Unknowns = cv::Matx<double, unknowns, 1>;
 
 /* What draws the print as the camera sees it. */
@@ -91,11 +92,13 @@ static std::vector<Pixel> list_pixels(const cv::Mat &grey, const Drawn &drawn, c
                 continue;
             double slope_u = 0.5 * (light.at<double>(row, column + 1) - light.at<double>(row, column - 1));
             double slope_v = 0.5 * (light.at<double>(row + 1, column) - light.at<double>(row - 1, column));
+            double here = light.at<double>(row, column);
+            double soft = light.at<double>(row, column + 1) + light.at<double>(row, column - 1) +
+                          light.at<double>(row + 1, column) + light.at<double>(row - 1, column) - 4.0 * here;
             double x = static_cast<double>(du) / half, y = static_cast<double>(dv) / half;
             double seen = static_cast<double>(grey.at<float>(at));
-            pixels.push_back({{light.at<double>(row, column), 1.0, x, y, x * x, x * y, y * y, -slope_u, -slope_v},
-                              seen,
-                              seen < saturated_grey});
+            pixels.push_back(
+                {{here, 1.0, x, y, x * x, x * y, y * y, soft, -slope_u, -slope_v}, seen, seen < saturated_grey});
         }
     }
     return pixels;
