@@ -45,7 +45,7 @@ help: ## this list
 sim: ## build host_sim, and render frames/ if they are not there
 	@tools/setup.sh sim
 	@cmake --preset host > $(BUILD)/host.log 2>&1 || { cat $(BUILD)/host.log; exit 1; }
-	@cmake --build --preset host --parallel
+	@cmake --build --preset host --parallel 2
 	@$(MAKE) frames
 
 frames: frames/sequence1/rig.json frames/sequence2/rig.json
@@ -64,7 +64,7 @@ sanitize: sim
 	  > $(BUILD)/sanitize.log 2>&1 || { cat $(BUILD)/sanitize.log; exit 1; }
 
 test: sanitize ## every test: units against float64, sanitizers, bad input, rules of the core, same bits
-	@cmake --build --preset sanitize --parallel
+	@cmake --build --preset sanitize --parallel 2
 	@ctest --test-dir $(BUILD)/sanitize --output-on-failure --parallel 2
 
 test-report: sim ## the report page in a browser; pictures of it in build/test_report

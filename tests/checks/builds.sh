@@ -30,7 +30,7 @@ builds_make() {
     name=$1
     shift
     mkdir -p "$builds/$name"
-    { builds_configure "$name" && cmake --build "$builds/$name" --parallel --target "$@"; } \
+    { builds_configure "$name" && cmake --build "$builds/$name" --parallel 2 --target "$@"; } \
         >"$builds/$name/log" 2>&1 || {
         tail -n 30 "$builds/$name/log" >&2
         echo "$builds/$name does not build" >&2
