@@ -126,7 +126,7 @@ void ih_basis_roots(const uint64_t *square_q32, int32_t count, uint32_t *root_q2
 static inline int32_t near_root(uint64_t square_q32)
 {
     const uint32_t high = (uint32_t)(square_q32 >> 14);
-    const uint32_t rest = ((uint32_t)square_q32 & 0x3fff)
+    const uint32_t rest = (uint32_t)(square_q32 & 0x3fff)
                           << 17; /* the bits below, from bit 30 on */
     const uint32_t e = ((uint32_t)__builtin_clz(high) - 1) / 2;
     const uint32_t m = high << 2 * e | rest >> (31 - 2 * e);

@@ -22,18 +22,23 @@ static int64_t dot_q60(const int32_t *a_q30, const int32_t *b_q30, int32_t count
     return sum;
 }
 
-/* The same of two rows at once, so that each entry of the third is read for two products. */
-static void two_dots_q60(const int32_t *a_q30, const int32_t *b_q30, const int32_t *with_q30,
-                         int32_t count, int64_t sum_q60[2])
+/* The same of two rows with two others: each entry is read for two products. */
+static void four_dots_q60(const int32_t *const a_q30[2], const int32_t *const b_q30[2],
+                          int32_t count, int64_t sum_q60[2][2])
 {
-    int64_t sum_a = 0;
-    int64_t sum_b = 0;
+    const int32_t *a_0 = a_q30[0], *a_1 = a_q30[1], *b_0 = b_q30[0], *b_1 = b_q30[1];
+    int64_t sum_00 = 0, sum_01 = 0, sum_10 = 0, sum_11 = 0;
+#pragma GCC unroll 2
     for (int32_t k = 0; k < count; k++) {
-        sum_a += (int64_t)a_q30[k] * with_q30[k];
-        sum_b += (int64_t)b_q30[k] * with_q30[k];
+        sum_00 += (int64_t)a_0[k] * b_0[k];
+        sum_10 += (int64_t)a_1[k] * b_0[k];
+        sum_01 += (int64_t)a_0[k] * b_1[k];
+        sum_11 += (int64_t)a_1[k] * b_1[k];
     }
-    sum_q60[0] = sum_a;
-    sum_q60[1] = sum_b;
+    sum_q60[0][0] = sum_00;
+    sum_q60[0][1] = sum_01;
+    sum_q60[1][0] = sum_10;
+    sum_q60[1][1] = sum_11;
 }
 
 /* L_ij from A_ij and what the entries before it take away. */
@@ -53,6 +58,25 @@ static bool set_pivot(int32_t *row_q30, int32_t i)
     return row_q30[i] != 0;
 }
 
+/* Entries j and j + 1 of two rows, which may be the same row twice. */
+static void set_four(const int32_t *a_q30, int32_t n, int32_t j, int32_t *const row_q30[2])
+{
+    const int32_t *const column_q30[2] = {row_of(a_q30, j), row_of(a_q30, j + 1)};
+    int64_t taken_q60[2][2];
+    four_dots_q60((const int32_t *const[2]){row_q30[0], row_q30[1]}, column_q30, j, taken_q60);
+    int32_t here_q30[2], next_q30[2];
+    for (int m = 0; m < 2; m++) {
+        here_q30[m] = entry_q30(row_q30[m][j], taken_q60[m][0], column_q30[0][j], n);
+        const int64_t more_q60 = (int64_t)here_q30[m] * column_q30[1][j];
+        next_q30[m] =
+            entry_q30(row_q30[m][j + 1], taken_q60[m][1] + more_q60, column_q30[1][j + 1], n);
+    }
+    for (int m = 0; m < 2; m++) {
+        row_q30[m][j] = here_q30[m];
+        row_q30[m][j + 1] = next_q30[m];
+    }
+}
+
 /* Two rows at a time: all entries but the last three first. */
 enum ih_err ih_cholesky_factor(int32_t *a_q30, int32_t n, int32_t *bad_pivot)
 {
@@ -61,13 +85,8 @@ enum ih_err ih_cholesky_factor(int32_t *a_q30, int32_t n, int32_t *bad_pivot)
         const bool is_last = i + 1 == n;
         int32_t *row = &a_q30[IH_CHOLESKY_PACKED(i)];
         int32_t *next = &a_q30[IH_CHOLESKY_PACKED(is_last ? i : i + 1)]; /* or the same again */
-        for (int32_t j = 0; j < i; j++) {
-            const int32_t *other = row_of(a_q30, j);
-            int64_t taken_q60[2];
-            two_dots_q60(row, next, other, j, taken_q60);
-            const int32_t entry = entry_q30(row[j], taken_q60[0], other[j], n);
-            next[j] = entry_q30(next[j], taken_q60[1], other[j], n);
-            row[j] = entry;
+        for (int32_t j = 0; j < i; j += 2) {
+            set_four(a_q30, n, j, (int32_t *const[2]){row, next});
         }
         if (!set_pivot(row, i)) {
             *bad_pivot = i;

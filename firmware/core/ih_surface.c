@@ -54,14 +54,17 @@ static void fill_row(struct ih_surface_scratch *scratch, const struct ih_sample 
     IH_IN_RANGE(row_q20[0], 1 << 20, IH_RANGE_BASIS_Q20);
 }
 
-/* Put the sample's row, which stands in basis_q20, weighted among the rows to be summed, at number `at`. */
+/* Weigh the sample's row, which stands in basis_q20, and put it among the rows to be summed, at number
+ * `at`. */
 static void weigh_row(struct ih_surface_scratch *scratch, int32_t root_weight_q15, int32_t at)
 {
+    uint32_t *basis_q20 = scratch->basis_q20;
     bool is_one = root_weight_q15 == 1 << 15; /* as nearly all are: nothing to round */
+    for (int32_t i = 0; !is_one && i < TERMS; i++) {
+        basis_q20[i] = (uint32_t)ih_mul_shift(basis_q20[i], root_weight_q15, 15);
+    }
     for (int32_t i = 0; i < TERMS; i++) {
-        const uint32_t basis_q20 = scratch->basis_q20[i];
-        scratch->row_q20[at][i] =
-            is_one ? basis_q20 : (uint32_t)ih_mul_shift(basis_q20, root_weight_q15, 15);
+        scratch->row_q20[at][i] = basis_q20[i];
     }
 }
 
@@ -73,14 +76,14 @@ static void clear_rows(struct ih_surface_scratch *scratch, int32_t count)
     }
 }
 
-/* What row number `at` brings to the right side. */
+/* What the weighted row in basis_q20 brings to the right side. */
 static void add_right(struct ih_surface_scratch *scratch, const struct ih_sample *sample,
-                      int32_t mean_mm_q8, int32_t root_weight_q15, int32_t at)
+                      int32_t mean_mm_q8, int32_t root_weight_q15)
 {
     const int32_t off_mm_q8 =
         (int32_t)ih_mul_shift((int64_t)sample->depth_mm_q8 - mean_mm_q8, root_weight_q15, 15);
     for (int32_t i = 0; i < TERMS; i++) {
-        scratch->right_q28[i] += (int64_t)(int32_t)scratch->row_q20[at][i] * off_mm_q8;
+        scratch->right_q28[i] += (int64_t)(int32_t)scratch->basis_q20[i] * off_mm_q8;
     }
 }
 
@@ -199,8 +202,8 @@ static int32_t depth_of_sum(const struct ih_surface_scratch *scratch, int32_t me
     return ih_saturate_s32(mean_mm_q8 + depth_q8);
 }
 
-/* Huber step: a sample that is too far from the surface gets less weight. basis_q20 is its row. False
- * when it is near enough. */
+/* Huber step: a sample that is too far from the surface gets less weight. basis_q20 is its row, not
+ * yet weighted. False when it is near enough. */
 static bool reweight(const struct ih_surface_scratch *scratch, const struct ih_sample *sample,
                      const struct ih_surface_params *params, int32_t mean_mm_q8,
                      int32_t *root_weight_q15)
@@ -239,7 +242,7 @@ static int32_t sum_all(const struct ih_samples *samples, const struct ih_surface
             lighter +=
                 huber != NULL && reweight(scratch, sample, huber, out->mean_mm_q8, root_weight_q15);
             weigh_row(scratch, *root_weight_q15, at);
-            add_right(scratch, sample, out->mean_mm_q8, *root_weight_q15, at);
+            add_right(scratch, sample, out->mean_mm_q8, *root_weight_q15);
         }
         clear_rows(scratch, count);
         if (huber == NULL) {
