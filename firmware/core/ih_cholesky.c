@@ -28,7 +28,6 @@ static void four_dots_q60(const int32_t *const a_q30[2], const int32_t *const b_
 {
     const int32_t *a_0 = a_q30[0], *a_1 = a_q30[1], *b_0 = b_q30[0], *b_1 = b_q30[1];
     int64_t sum_00 = 0, sum_01 = 0, sum_10 = 0, sum_11 = 0;
-#pragma GCC unroll 2
     for (int32_t k = 0; k < count; k++) {
         sum_00 += (int64_t)a_0[k] * b_0[k];
         sum_10 += (int64_t)a_1[k] * b_0[k];

@@ -6,6 +6,7 @@
 
 #define TERMS IH_SURFACE_TERMS
 #define KEPT IH_SURFACE_KEPT
+#define HALF_CENTRES IH_SURFACE_HALF_CENTRES
 /* Scale factors are 0.995 * 2^SCALE_SHIFT / sqrt(N_ii): with N_ii of 2^40 (a single sample, weight
  * 1, B = 1) to 2^61.5 they lie between 2^20 and 2^31. */
 #define SCALE_SHIFT 51
@@ -13,7 +14,8 @@
 #define SCALE_MAX 0x7fffffff
 /* The right side keeps its norm below this, so that the forward solve stays within int32. */
 #define RIGHT_BITS 30
-/* Coefficients below 2^28, basis below 2^26.5, 144 terms: sums below 2^61.7. */
+/* Coefficients below 2^28, basis below 2^26.5, 144 terms: sums below 2^61.7, twice that where they are
+ * folded. */
 #define SOLUTION_BITS 28
 
 void ih_surface_params_default(struct ih_surface_params *params)
@@ -105,7 +107,7 @@ static int32_t mean_depth_mm_q8(const struct ih_samples *samples)
 static const uint64_t *line_of(const struct ih_surface_scratch *scratch, int32_t i)
 {
     const int32_t at = ih_normal_line(i);
-    return i < KEPT ? &scratch->kept_q40[at] : &scratch->of.others_q40[at - IH_NORMAL_LINE(KEPT)];
+    return i < KEPT ? &scratch->kept.q40[at] : &scratch->of.others_q40[at - IH_NORMAL_LINE(KEPT)];
 }
 
 /* Scale factors from N's diagonal. */
@@ -246,7 +248,7 @@ static int32_t sum_all(const struct ih_samples *samples, const struct ih_surface
         }
         clear_rows(scratch, count);
         if (huber == NULL) {
-            ih_normal_add(scratch->row_q20, 0, KEPT, scratch->kept_q40);
+            ih_normal_add(scratch->row_q20, 0, KEPT, scratch->kept.q40);
         }
         ih_normal_add(scratch->row_q20, KEPT, TERMS, scratch->of.others_q40);
     }
@@ -269,7 +271,7 @@ static void sum_changed(const struct ih_samples *samples, const struct ih_surfac
         }
         if (count == IH_NORMAL_ROWS || (count > 0 && i + 1 == samples->sample_count)) {
             clear_rows(scratch, count);
-            ih_normal_add(scratch->row_q20, 0, KEPT, scratch->kept_q40);
+            ih_normal_add(scratch->row_q20, 0, KEPT, scratch->kept.q40);
             count = 0;
         }
     }
@@ -287,9 +289,9 @@ static void turn_bits(uint64_t *value, int32_t count)
 static void change_kept(const struct ih_samples *samples, const struct ih_surface *out,
                         struct ih_surface_scratch *scratch)
 {
-    turn_bits(scratch->kept_q40, IH_NORMAL_LINE(KEPT));
+    turn_bits(scratch->kept.q40, IH_NORMAL_LINE(KEPT));
     sum_changed(samples, out, true, scratch);
-    turn_bits(scratch->kept_q40, IH_NORMAL_LINE(KEPT));
+    turn_bits(scratch->kept.q40, IH_NORMAL_LINE(KEPT));
     sum_changed(samples, out, false, scratch);
 }
 
@@ -297,7 +299,7 @@ static void change_kept(const struct ih_samples *samples, const struct ih_surfac
 static bool fit_first(const struct ih_samples *samples, const struct ih_surface_params *params,
                       struct ih_surface_scratch *scratch, struct ih_surface *out)
 {
-    memset(scratch->kept_q40, 0, sizeof scratch->kept_q40);
+    memset(scratch->kept.q40, 0, sizeof scratch->kept.q40);
     sum_all(samples, NULL, scratch, out);
     scale_lines(params, scratch);
     return solve(samples, out->mean_mm_q8, scratch);
@@ -350,24 +352,63 @@ static int32_t centre_node(int32_t centre)
            IH_SURFACE_STEPS_PER_CENTRE * centre;
 }
 
-/* sum_n c_n B_n along a row of nodes. */
-static void sum_row(const struct ih_surface_scratch *scratch, int32_t y,
-                    int64_t sum[IH_SURFACE_GRID])
+/* Centres k and CENTRES - 1 - k of a row stand alike on both sides of the middle, and so do nodes x and
+ * GRID - 1 - x: with p and q what a centre's basis is at both nodes, c and d the coefficients of both
+ * centres, c p + d q at the one and c q + d p at the other are half of (c + d) (p + q) plus and less
+ * (c - d) (p - q). */
+static void fold_table(struct ih_surface_scratch *scratch)
 {
-    memset(sum, 0, IH_SURFACE_GRID * sizeof *sum);
-    for (int32_t row = 0; row < IH_SURFACE_CENTRES; row++) {
-        const int32_t *table = scratch->of.table_q20[ih_abs_s32(y - centre_node(row))];
-        for (int32_t k = 0; k < IH_SURFACE_CENTRES; k++) {
-            const int32_t coefficient = scratch->solution[row * IH_SURFACE_CENTRES + k];
-            const int32_t *basis = &table[IH_SURFACE_STEPS - 1 - centre_node(k)];
-            for (int32_t x = 0; x < IH_SURFACE_GRID; x++) {
-                sum[x] += (int64_t)coefficient * basis[x];
+    for (int32_t b = 0; b < IH_SURFACE_STEPS; b++) {
+        const int32_t *middle = &scratch->of.table_q20[b][IH_SURFACE_STEPS - 1];
+        for (int32_t k = 0; k < HALF_CENTRES; k++) {
+            const int32_t *here = &middle[-centre_node(k)];
+            const int32_t *there = &middle[-centre_node(IH_SURFACE_CENTRES - 1 - k)];
+            for (int32_t x = 0; x < IH_SURFACE_HALF; x++) {
+                scratch->kept.folded.sum_q20[b][k][x] = here[x] + there[x];
+                scratch->kept.folded.difference_q20[b][k][x] = here[x] - there[x];
             }
         }
     }
 }
 
-static void evaluate(const struct ih_samples *samples, const struct ih_surface_scratch *scratch,
+/* Add what a row of centres brings, folded, to half a row of nodes. */
+static void add_half(const int32_t coefficient[HALF_CENTRES],
+                     int32_t basis_q20[HALF_CENTRES][IH_SURFACE_HALF], int64_t sum[IH_SURFACE_HALF])
+{
+    for (int32_t x = 0; x < IH_SURFACE_HALF; x++) {
+        int64_t here = sum[x];
+#pragma GCC unroll 6
+        for (int32_t k = 0; k < HALF_CENTRES; k++) {
+            here += (int64_t)coefficient[k] * basis_q20[k][x];
+        }
+        sum[x] = here;
+    }
+}
+
+/* sum_n c_n B_n along a row of nodes. */
+static void sum_row(struct ih_surface_scratch *scratch, int32_t y, int64_t sum[IH_SURFACE_GRID])
+{
+    int64_t even[IH_SURFACE_HALF] = {0};
+    int64_t odd[IH_SURFACE_HALF] = {0};
+    for (int32_t row = 0; row < IH_SURFACE_CENTRES; row++) {
+        const int32_t *solution = &scratch->solution[row * IH_SURFACE_CENTRES];
+        const int32_t b = ih_abs_s32(y - centre_node(row));
+        int32_t both[HALF_CENTRES];
+        int32_t between[HALF_CENTRES];
+        for (int32_t k = 0; k < HALF_CENTRES; k++) {
+            both[k] = solution[k] + solution[IH_SURFACE_CENTRES - 1 - k];
+            between[k] = solution[k] - solution[IH_SURFACE_CENTRES - 1 - k];
+        }
+        add_half(both, scratch->kept.folded.sum_q20[b], even);
+        add_half(between, scratch->kept.folded.difference_q20[b], odd);
+    }
+    for (int32_t x = 0; x < IH_SURFACE_HALF; x++) {
+        sum[x] = (even[x] + odd[x]) / 2; /* without a rest */
+        sum[IH_SURFACE_GRID - 1 - x] = (even[x] - odd[x]) / 2;
+    }
+}
+
+static void evaluate(const struct ih_samples *samples, struct ih_surface_scratch *scratch,
                      struct ih_surface *out)
 {
     int32_t least_q8 = least_depth_mm_q8(samples);
@@ -401,6 +442,7 @@ void ih_surface_fit(const struct ih_samples *samples, const struct ih_field *fie
         return;
     }
     fill_table(scratch);
+    fold_table(scratch);
     evaluate(samples, scratch, out);
     out->valid = true;
 }

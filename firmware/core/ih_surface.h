@@ -15,7 +15,7 @@
  * Error: within 0.2 mm of the float64 solution of the same system, everywhere on the grid, for
  *        depths that span up to 1.5 m (ih_samples clips them); it grows with the span.
  * Cost:  samples x 288 square roots; samples x 10,944 multiply-adds, and once more about half of
- *        that; two factorisations of n = 144; grid x 144 multiply-adds.
+ *        that; two factorisations of n = 144; grid x 72 multiply-adds.
  */
 #ifndef IH_SURFACE_H
 #define IH_SURFACE_H
@@ -65,8 +65,18 @@ struct ih_surface {
  * that is scaled in place is never in the way of one that is not yet. */
 #define IH_SURFACE_KEPT 120
 
+/* The grid is evaluated in two halves that are mirrored, with the middle one, and so are the centres. */
+#define IH_SURFACE_HALF ((IH_SURFACE_GRID + 1) / 2)
+#define IH_SURFACE_HALF_CENTRES (IH_SURFACE_CENTRES / 2)
+
 struct ih_surface_scratch {
-    uint64_t kept_q40[IH_NORMAL_LINE(IH_SURFACE_KEPT)]; /* lower triangle, line by line */
+    union {
+        uint64_t q40[IH_NORMAL_LINE(IH_SURFACE_KEPT)]; /* lower triangle, line by line */
+        struct {
+            int32_t sum_q20[IH_SURFACE_STEPS][IH_SURFACE_HALF_CENTRES][IH_SURFACE_HALF];
+            int32_t difference_q20[IH_SURFACE_STEPS][IH_SURFACE_HALF_CENTRES][IH_SURFACE_HALF];
+        } folded; /* of table_q20 */
+    } kept;
     union {
         uint64_t others_q40[IH_NORMAL_LINE(IH_SURFACE_TERMS) - IH_NORMAL_LINE(IH_SURFACE_KEPT)];
         int32_t factor_q30[IH_CHOLESKY_PACKED(IH_SURFACE_TERMS)]; /* scaled, then factored */
