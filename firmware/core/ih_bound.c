@@ -210,78 +210,110 @@ static void find_columns(const struct ih_bound_rays *rays, const struct place *p
 }
 
 /* Sums of values, in 64ths, and how many rays they are of, at least and at most. */
-struct sums {
-    int32_t inside, inside_least, inside_most;
-    int32_t around, around_least, around_most;
+struct lanes {
+    lane inside, inside_least, inside_most;
+    lane around, around_least, around_most;
 };
 
-/* A loop without a branch: compilers turn it into vectors. */
+/* How a ray passes. */
+struct pass {
+    lane ex_q11, ey_q11; /* at the centre's depth */
+    lane gx_q15, gy_q15;
+    lane t_q11, inverse_q15, radius2_q10;
+    lane near; /* within reach */
+    lane seen, depth_q1;
+};
+
+/* A ray beside or above the head, by its nearest place. */
+static inline void add_around(const struct place *place, const struct pass *pass, lane unseen,
+                              struct lanes *sums)
+{
+    const lane margin = place->margin_q10;
+    const lane t_q12 = low(pass->t_q11 * 2);
+    const lane x_q12 = low(low(pass->ex_q11 - high(t_q12, pass->gx_q15)) * 2);
+    const lane y_q11 = low(pass->ey_q11 - high(t_q12, pass->gy_q15));
+    const lane beside_q11 = low(high(size(x_q12), X_OVER_Y_Q15) - y_q11);
+    const lane is_open = is_above(pass->depth_q1, place->open_mm_q1);
+    const lane value = low((pick(is_open, AROUND_OPEN, AROUND_NEAR) & pass->seen) | unseen);
+    const lane may = low(pass->near & is_above(pass->radius2_q10, low(RING_INNER2_Q10 - margin)) &
+                         is_above(low(RING_OUTER2_Q10 + margin), pass->radius2_q10) &
+                         is_above(beside_q11, low(-margin)));
+    const lane must = low(pass->near & is_above(pass->radius2_q10, low(RING_INNER2_Q10 + margin)) &
+                          is_above(low(RING_OUTER2_Q10 - margin), pass->radius2_q10) &
+                          is_above(beside_q11, margin));
+    sums->around = low(sums->around + low((most(value, 0) & may) + (least(value, 0) & must)));
+    sums->around_least = low(sums->around_least - must);
+    sums->around_most = low(sums->around_most - may);
+}
+
+/* A ray through it: how far the point is behind the entry. */
+static inline void add_inside(const struct place *place, const struct pass *pass, lane unseen,
+                              struct lanes *sums)
+{
+    const lane margin = place->margin_q10;
+    const lane dz_q1 = within(low(pass->depth_q1 - place->depth_mm_q1), DEPTH_CUT_Q1);
+    const lane dz_q11 = low(low(dz_q1 * DEPTH_WHOLE) + high(dz_q1, DEPTH_PART_Q16));
+    const lane before_q11 = low(-low(dz_q11 + pass->t_q11));
+    const lane root2_q10 =
+        low(high(low(low(1024 - pass->radius2_q10) * 16), pass->inverse_q15) >> 3);
+    const lane nearer = low(least(most(low(before_q11 + NEARER_Q11), 0), ROOT_CUT_Q11) * 4);
+    const lane behind = low(least(most(low(before_q11 + BEHIND_Q11), 0), ROOT_CUT_Q11) * 4);
+    const lane far = low(least(most(low(before_q11 + FAR_Q11), 0), ROOT_CUT_Q11) * 4);
+    const lane may_touch = is_above(low(root2_q10 + margin), high(nearer, nearer));
+    const lane is_behind = is_above(low(root2_q10 - margin), high(behind, behind));
+    const lane is_far = is_above(low(root2_q10 - margin), high(far, far));
+    lane value = pick(may_touch, pick(is_behind, pick(is_far, VALUE_FAR, VALUE_BEHIND), VALUE_ON),
+                      VALUE_NEARER);
+    value = low((value & pass->seen) | unseen);
+    const lane may = low(pass->near & is_above(low(1024 + margin), pass->radius2_q10));
+    lane must = low(pass->near & is_above(low(1024 - margin), pass->radius2_q10));
+    must = low(must | (may & is_above(value, 0))); /* a value of 1 lowers no mean */
+    sums->inside = low(sums->inside + (value & must));
+    sums->inside_least = low(sums->inside_least - must);
+    sums->inside_most = low(sums->inside_most - may);
+}
+
+/* A loop without a branch where there are vectors: compilers turn it into them. */
 static void add_rays(const struct ih_bound_rays *rays, const struct place *at, int32_t begin,
-                     int32_t end, struct sums *out)
+                     int32_t end, struct lanes *out)
 {
     const struct place place = *at;
-    const lane margin = place.margin_q10;
-    lane inside = 0, inside_least = 0, inside_most = 0;
-    lane around = 0, around_least = 0, around_most = 0;
+    struct lanes sums = {0, 0, 0, 0, 0, 0};
     for (int32_t i = begin; i < end; i++) {
-        /* Where the ray passes the centre's depth. */
-        lane dx = within(low(rays->slope_q14[0][i] - place.direction_q14[0]), place.cut[0]);
-        lane dy = within(low(rays->slope_q14[1][i] - place.direction_q14[1]), place.cut[1]);
-        lane ex_q11 = high(low(dx * place.times[0]), place.share[0]);
-        lane ey_q11 = high(low(dy * place.times[1]), place.share[1]);
-        lane ex_q13 = low(ex_q11 * 4);
-        lane ey_q13 = low(ey_q11 * 4);
-        lane ee_q10 = low(high(ex_q13, ex_q13) + high(ey_q13, ey_q13));
-        lane near = is_above(rays->reach_q10[i], ee_q10);
-        if (ONE_BY_ONE && near == 0) {
+        struct pass pass;
+        lane dx = low(rays->slope_q14[0][i] - place.direction_q14[0]);
+        lane dy = low(rays->slope_q14[1][i] - place.direction_q14[1]);
+        if (ONE_BY_ONE && (size(dx) > place.cut[0] || size(dy) > place.cut[1])) {
             continue;
         }
-        lane gx_q15 = rays->g_q15[0][i];
-        lane gy_q15 = rays->g_q15[1][i];
-        lane eg_q12 = low(high(ex_q13, gx_q15) + high(ey_q13, gy_q15));
-        lane t_q11 = high(eg_q12, rays->inverse_q15[i]);
-        lane radius2_q10 = low(ee_q10 - high(low(eg_q12 * 2), low(t_q11 * 4)));
-        lane seen = rays->seen[i];
-
-        /* Around the head: beside or above, by the ray's nearest place. */
-        lane x_q12 = low(low(ex_q11 - high(low(t_q11 * 2), gx_q15)) * 2);
-        lane y_q11 = low(ey_q11 - high(low(t_q11 * 2), gy_q15));
-        lane beside_q11 = low(high(size(x_q12), X_OVER_Y_Q15) - y_q11);
-        lane is_open = is_above(rays->depth_mm_q1[i], place.open_mm_q1);
-        lane ring = low((pick(is_open, AROUND_OPEN, AROUND_NEAR) & seen) | rays->around[i]);
-        lane may = low(near & is_above(radius2_q10, low(RING_INNER2_Q10 - margin)) &
-                       is_above(low(RING_OUTER2_Q10 + margin), radius2_q10) &
-                       is_above(beside_q11, low(-margin)));
-        lane must = low(near & is_above(radius2_q10, low(RING_INNER2_Q10 + margin)) &
-                        is_above(low(RING_OUTER2_Q10 - margin), radius2_q10) &
-                        is_above(beside_q11, margin));
-        around = low(around + low((most(ring, 0) & may) + (least(ring, 0) & must)));
-        around_least = low(around_least - must);
-        around_most = low(around_most - may);
-
-        /* Through it: how far the point is behind the entry. */
-        lane dz_q1 = within(low(rays->depth_mm_q1[i] - place.depth_mm_q1), DEPTH_CUT_Q1);
-        lane dz_q11 = low(low(dz_q1 * DEPTH_WHOLE) + high(dz_q1, DEPTH_PART_Q16));
-        lane before_q11 = low(-low(dz_q11 + t_q11));
-        lane root2_q10 = low(high(low(low(1024 - radius2_q10) * 16), rays->inverse_q15[i]) >> 3);
-        lane nearer = low(least(most(low(before_q11 + NEARER_Q11), 0), ROOT_CUT_Q11) * 4);
-        lane behind = low(least(most(low(before_q11 + BEHIND_Q11), 0), ROOT_CUT_Q11) * 4);
-        lane far = low(least(most(low(before_q11 + FAR_Q11), 0), ROOT_CUT_Q11) * 4);
-        lane may_touch = is_above(low(root2_q10 + margin), high(nearer, nearer));
-        lane is_behind = is_above(low(root2_q10 - margin), high(behind, behind));
-        lane is_far = is_above(low(root2_q10 - margin), high(far, far));
-        lane value =
-            pick(may_touch, pick(is_behind, pick(is_far, VALUE_FAR, VALUE_BEHIND), VALUE_ON),
-                 VALUE_NEARER);
-        value = low((value & seen) | rays->inside[i]);
-        may = low(near & is_above(low(1024 + margin), radius2_q10));
-        must = low(near & is_above(low(1024 - margin), radius2_q10));
-        must = low(must | (may & is_above(value, 0))); /* a value of 1 lowers no mean */
-        inside = low(inside + (value & must));
-        inside_least = low(inside_least - must);
-        inside_most = low(inside_most - may);
+        dx = within(dx, place.cut[0]);
+        dy = within(dy, place.cut[1]);
+        pass.ex_q11 = high(low(dx * place.times[0]), place.share[0]);
+        pass.ey_q11 = high(low(dy * place.times[1]), place.share[1]);
+        const lane ex_q13 = low(pass.ex_q11 * 4);
+        const lane ey_q13 = low(pass.ey_q11 * 4);
+        const lane ee_q10 = low(high(ex_q13, ex_q13) + high(ey_q13, ey_q13));
+        pass.near = is_above(rays->reach_q10[i], ee_q10);
+        if (ONE_BY_ONE && pass.near == 0) {
+            continue;
+        }
+        pass.gx_q15 = rays->g_q15[0][i];
+        pass.gy_q15 = rays->g_q15[1][i];
+        pass.inverse_q15 = rays->inverse_q15[i];
+        const lane eg_q12 = low(high(ex_q13, pass.gx_q15) + high(ey_q13, pass.gy_q15));
+        pass.t_q11 = high(eg_q12, pass.inverse_q15);
+        pass.radius2_q10 = low(ee_q10 - high(low(eg_q12 * 2), low(pass.t_q11 * 4)));
+        pass.seen = rays->seen[i];
+        pass.depth_q1 = rays->depth_mm_q1[i];
+        const bool is_outside = pass.radius2_q10 > 1024 + place.margin_q10;
+        if (!ONE_BY_ONE || is_outside) {
+            add_around(&place, &pass, rays->around[i], &sums);
+        }
+        if (!ONE_BY_ONE || !is_outside) {
+            add_inside(&place, &pass, rays->inside[i], &sums);
+        }
     }
-    *out = (struct sums){inside, inside_least, inside_most, around, around_least, around_most};
+    *out = sums;
 }
 
 /* A mean is greatest over the fewest rays when the sum is positive, over the most when it is not;
@@ -296,7 +328,7 @@ int32_t ih_bound_score_q12(const struct ih_space *space, const struct ih_bound_r
                            const int32_t centre_mm_q8[3])
 {
     struct place place;
-    struct sums sums;
+    struct lanes sums;
     int32_t begin, end;
     if (!rays->is_usable || !set_place(&place, space, centre_mm_q8)) {
         return IH_BOUND_MOST_Q12;
