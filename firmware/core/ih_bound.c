@@ -54,29 +54,35 @@ typedef int32_t lane;
 #endif
 
 /* Arithmetic of lanes, which wraps as vectors do. */
-static inline lane low(int32_t value)
+static inline lane wrap(int32_t value)
 {
     return IH_WRAPS(lane, value);
 }
 
-static inline lane high(lane a, lane b)
+static inline lane high_half(lane a, lane b)
 {
-    return low((int32_t)a * b >> 16);
+    return wrap((int32_t)a * b >> 16);
 }
 
 static inline lane least(lane a, lane b)
 {
-    return a < b ? a : b;
+    if (a < b) {
+        return a;
+    }
+    return b;
 }
 
 static inline lane most(lane a, lane b)
 {
-    return a > b ? a : b;
+    if (a > b) {
+        return a;
+    }
+    return b;
 }
 
 static inline lane within(lane value, lane limit)
 {
-    return most(least(value, limit), low(-limit));
+    return most(least(value, limit), wrap(-limit));
 }
 
 /* All bits or none. */
@@ -88,12 +94,12 @@ static inline lane is_above(lane a, lane b)
 static inline lane size(lane value)
 {
     const lane sign = is_above(0, value);
-    return low(low(value ^ sign) - sign);
+    return wrap(wrap(value ^ sign) - sign);
 }
 
 static inline lane pick(lane mask, lane yes, lane no)
 {
-    return low((yes & mask) | (no & ~mask));
+    return wrap((yes & mask) | (no & ~mask));
 }
 
 static int16_t saturate_s16(int64_t value)
@@ -107,7 +113,7 @@ static void fill_value(const struct ih_ray *ray, struct ih_bound_rays *out, int3
     const bool is_empty = ray->state == IH_RAY_EMPTY;
     out->seen[at] = is_seen ? -1 : 0;
     out->depth_mm_q1[at] = saturate_s16(ray->point_mm_q8[2] >> 7);
-    out->inside[at] = is_seen ? 0 : is_empty ? VALUE_EMPTY : VALUE_UNKNOWN;
+    out->inside[at] = (int16_t)(is_seen ? 0 : is_empty ? VALUE_EMPTY : VALUE_UNKNOWN);
     out->around[at] = is_empty ? AROUND_EMPTY : 0;
 }
 
@@ -141,10 +147,12 @@ void ih_bound_prepare(const struct ih_space *space, struct ih_bound_rays *out)
             const struct ih_ray *ray = &space->ray[row * IH_GRID + column];
             out->is_usable = fill_ray(ray, mean.semi_mm_q8, out, at) && out->is_usable;
             const int16_t slope_q14 = out->slope_q14[0][at];
-            out->least_q14[column] =
-                slope_q14 < out->least_q14[column] ? slope_q14 : out->least_q14[column];
-            out->most_q14[column] =
-                slope_q14 > out->most_q14[column] ? slope_q14 : out->most_q14[column];
+            if (slope_q14 < out->least_q14[column]) {
+                out->least_q14[column] = slope_q14;
+            }
+            if (slope_q14 > out->most_q14[column]) {
+                out->most_q14[column] = slope_q14;
+            }
         }
     }
 }
@@ -165,9 +173,9 @@ static bool set_axis(struct place *place, int axis, int64_t off_q8, int32_t dept
 {
     const int64_t direction_q14 = (off_q8 * ONE_Q14 - (off_q8 < 0 ? depth_q8 - 1 : 0)) / depth_q8;
     const int32_t share = depth_q8 * 32 / semi_mm; /* the depth over the semi-axis, Q13 */
-    const int shift = ih_bits_u64((uint64_t)share) - 15;
+    const int shift = ih_max_s32(ih_bits_u64((uint64_t)share) - 15, 0);
     place->times[axis] = (int16_t)(1 << shift);
-    place->share[axis] = (int16_t)(share >> shift);
+    place->share[axis] = (int16_t)ih_max_s32(share >> shift, 1);
     place->cut[axis] = (int16_t)(((int64_t)CUT_Q11 << 16) / ((int64_t)place->share[axis] << shift));
     place->direction_q14[axis] = saturate_s16(direction_q14);
     return ih_abs_s64(direction_q14) < ONE_Q14;
@@ -229,21 +237,21 @@ static inline void add_around(const struct place *place, const struct pass *pass
                               struct lanes *sums)
 {
     const lane margin = place->margin_q10;
-    const lane t_q12 = low(pass->t_q11 * 2);
-    const lane x_q12 = low(low(pass->ex_q11 - high(t_q12, pass->gx_q15)) * 2);
-    const lane y_q11 = low(pass->ey_q11 - high(t_q12, pass->gy_q15));
-    const lane beside_q11 = low(high(size(x_q12), X_OVER_Y_Q15) - y_q11);
+    const lane t_q12 = wrap(pass->t_q11 * 2);
+    const lane x_q12 = wrap(wrap(pass->ex_q11 - high_half(t_q12, pass->gx_q15)) * 2);
+    const lane y_q11 = wrap(pass->ey_q11 - high_half(t_q12, pass->gy_q15));
+    const lane beside_q11 = wrap(high_half(size(x_q12), X_OVER_Y_Q15) - y_q11);
     const lane is_open = is_above(pass->depth_q1, place->open_mm_q1);
-    const lane value = low((pick(is_open, AROUND_OPEN, AROUND_NEAR) & pass->seen) | unseen);
-    const lane may = low(pass->near & is_above(pass->radius2_q10, low(RING_INNER2_Q10 - margin)) &
-                         is_above(low(RING_OUTER2_Q10 + margin), pass->radius2_q10) &
-                         is_above(beside_q11, low(-margin)));
-    const lane must = low(pass->near & is_above(pass->radius2_q10, low(RING_INNER2_Q10 + margin)) &
-                          is_above(low(RING_OUTER2_Q10 - margin), pass->radius2_q10) &
-                          is_above(beside_q11, margin));
-    sums->around = low(sums->around + low((most(value, 0) & may) + (least(value, 0) & must)));
-    sums->around_least = low(sums->around_least - must);
-    sums->around_most = low(sums->around_most - may);
+    const lane value = wrap((pick(is_open, AROUND_OPEN, AROUND_NEAR) & pass->seen) | unseen);
+    const lane may = wrap(pass->near & is_above(pass->radius2_q10, wrap(RING_INNER2_Q10 - margin)) &
+                          is_above(wrap(RING_OUTER2_Q10 + margin), pass->radius2_q10) &
+                          is_above(beside_q11, wrap(-margin)));
+    const lane must = wrap(
+        pass->near & is_above(pass->radius2_q10, wrap(RING_INNER2_Q10 + margin)) &
+        is_above(wrap(RING_OUTER2_Q10 - margin), pass->radius2_q10) & is_above(beside_q11, margin));
+    sums->around = wrap(sums->around + wrap((most(value, 0) & may) + (least(value, 0) & must)));
+    sums->around_least = wrap(sums->around_least - must);
+    sums->around_most = wrap(sums->around_most - may);
 }
 
 /* A ray through it: how far the point is behind the entry. */
@@ -251,26 +259,26 @@ static inline void add_inside(const struct place *place, const struct pass *pass
                               struct lanes *sums)
 {
     const lane margin = place->margin_q10;
-    const lane dz_q1 = within(low(pass->depth_q1 - place->depth_mm_q1), DEPTH_CUT_Q1);
-    const lane dz_q11 = low(low(dz_q1 * DEPTH_WHOLE) + high(dz_q1, DEPTH_PART_Q16));
-    const lane before_q11 = low(-low(dz_q11 + pass->t_q11));
+    const lane dz_q1 = within(wrap(pass->depth_q1 - place->depth_mm_q1), DEPTH_CUT_Q1);
+    const lane dz_q11 = wrap(wrap(dz_q1 * DEPTH_WHOLE) + high_half(dz_q1, DEPTH_PART_Q16));
+    const lane before_q11 = wrap(-wrap(dz_q11 + pass->t_q11));
     const lane root2_q10 =
-        low(high(low(low(1024 - pass->radius2_q10) * 16), pass->inverse_q15) >> 3);
-    const lane nearer = low(least(most(low(before_q11 + NEARER_Q11), 0), ROOT_CUT_Q11) * 4);
-    const lane behind = low(least(most(low(before_q11 + BEHIND_Q11), 0), ROOT_CUT_Q11) * 4);
-    const lane far = low(least(most(low(before_q11 + FAR_Q11), 0), ROOT_CUT_Q11) * 4);
-    const lane may_touch = is_above(low(root2_q10 + margin), high(nearer, nearer));
-    const lane is_behind = is_above(low(root2_q10 - margin), high(behind, behind));
-    const lane is_far = is_above(low(root2_q10 - margin), high(far, far));
+        wrap(high_half(wrap(wrap(1024 - pass->radius2_q10) * 16), pass->inverse_q15) >> 3);
+    const lane nearer = wrap(least(most(wrap(before_q11 + NEARER_Q11), 0), ROOT_CUT_Q11) * 4);
+    const lane behind = wrap(least(most(wrap(before_q11 + BEHIND_Q11), 0), ROOT_CUT_Q11) * 4);
+    const lane far = wrap(least(most(wrap(before_q11 + FAR_Q11), 0), ROOT_CUT_Q11) * 4);
+    const lane may_touch = is_above(wrap(root2_q10 + margin), high_half(nearer, nearer));
+    const lane is_behind = is_above(wrap(root2_q10 - margin), high_half(behind, behind));
+    const lane is_far = is_above(wrap(root2_q10 - margin), high_half(far, far));
     lane value = pick(may_touch, pick(is_behind, pick(is_far, VALUE_FAR, VALUE_BEHIND), VALUE_ON),
                       VALUE_NEARER);
-    value = low((value & pass->seen) | unseen);
-    const lane may = low(pass->near & is_above(low(1024 + margin), pass->radius2_q10));
-    lane must = low(pass->near & is_above(low(1024 - margin), pass->radius2_q10));
-    must = low(must | (may & is_above(value, 0))); /* a value of 1 lowers no mean */
-    sums->inside = low(sums->inside + (value & must));
-    sums->inside_least = low(sums->inside_least - must);
-    sums->inside_most = low(sums->inside_most - may);
+    value = wrap((value & pass->seen) | unseen);
+    const lane may = wrap(pass->near & is_above(wrap(1024 + margin), pass->radius2_q10));
+    lane must = wrap(pass->near & is_above(wrap(1024 - margin), pass->radius2_q10));
+    must = wrap(must | (may & is_above(value, 0))); /* a value of 1 lowers no mean */
+    sums->inside = wrap(sums->inside + (value & must));
+    sums->inside_least = wrap(sums->inside_least - must);
+    sums->inside_most = wrap(sums->inside_most - may);
 }
 
 /* A loop without a branch where there are vectors: compilers turn it into them. */
@@ -281,18 +289,18 @@ static void add_rays(const struct ih_bound_rays *rays, const struct place *at, i
     struct lanes sums = {0, 0, 0, 0, 0, 0};
     for (int32_t i = begin; i < end; i++) {
         struct pass pass;
-        lane dx = low(rays->slope_q14[0][i] - place.direction_q14[0]);
-        lane dy = low(rays->slope_q14[1][i] - place.direction_q14[1]);
+        lane dx = wrap(rays->slope_q14[0][i] - place.direction_q14[0]);
+        lane dy = wrap(rays->slope_q14[1][i] - place.direction_q14[1]);
         if (ONE_BY_ONE && (size(dx) > place.cut[0] || size(dy) > place.cut[1])) {
             continue;
         }
         dx = within(dx, place.cut[0]);
         dy = within(dy, place.cut[1]);
-        pass.ex_q11 = high(low(dx * place.times[0]), place.share[0]);
-        pass.ey_q11 = high(low(dy * place.times[1]), place.share[1]);
-        const lane ex_q13 = low(pass.ex_q11 * 4);
-        const lane ey_q13 = low(pass.ey_q11 * 4);
-        const lane ee_q10 = low(high(ex_q13, ex_q13) + high(ey_q13, ey_q13));
+        pass.ex_q11 = high_half(wrap(dx * place.times[0]), place.share[0]);
+        pass.ey_q11 = high_half(wrap(dy * place.times[1]), place.share[1]);
+        const lane ex_q13 = wrap(pass.ex_q11 * 4);
+        const lane ey_q13 = wrap(pass.ey_q11 * 4);
+        const lane ee_q10 = wrap(high_half(ex_q13, ex_q13) + high_half(ey_q13, ey_q13));
         pass.near = is_above(rays->reach_q10[i], ee_q10);
         if (ONE_BY_ONE && pass.near == 0) {
             continue;
@@ -300,16 +308,15 @@ static void add_rays(const struct ih_bound_rays *rays, const struct place *at, i
         pass.gx_q15 = rays->g_q15[0][i];
         pass.gy_q15 = rays->g_q15[1][i];
         pass.inverse_q15 = rays->inverse_q15[i];
-        const lane eg_q12 = low(high(ex_q13, pass.gx_q15) + high(ey_q13, pass.gy_q15));
-        pass.t_q11 = high(eg_q12, pass.inverse_q15);
-        pass.radius2_q10 = low(ee_q10 - high(low(eg_q12 * 2), low(pass.t_q11 * 4)));
+        const lane eg_q12 = wrap(high_half(ex_q13, pass.gx_q15) + high_half(ey_q13, pass.gy_q15));
+        pass.t_q11 = high_half(eg_q12, pass.inverse_q15);
+        pass.radius2_q10 = wrap(ee_q10 - high_half(wrap(eg_q12 * 2), wrap(pass.t_q11 * 4)));
         pass.seen = rays->seen[i];
         pass.depth_q1 = rays->depth_mm_q1[i];
-        const bool is_outside = pass.radius2_q10 > 1024 + place.margin_q10;
-        if (!ONE_BY_ONE || is_outside) {
+        if (!ONE_BY_ONE || pass.radius2_q10 > 1024 + place.margin_q10) {
             add_around(&place, &pass, rays->around[i], &sums);
         }
-        if (!ONE_BY_ONE || !is_outside) {
+        if (!ONE_BY_ONE || pass.radius2_q10 <= 1024 + place.margin_q10) {
             add_inside(&place, &pass, rays->inside[i], &sums);
         }
     }
