@@ -13,7 +13,7 @@
 #define TWIN_PX_Q12 (3 * 4096)
 #define RING_PLACES 16
 /* So many pixels are passed over at once where none is above its threshold. */
-#define MARKS 32
+#define GROUP 32
 
 void ih_dots_params_default(struct ih_dots_params *params)
 {
@@ -40,7 +40,6 @@ void ih_dots_begin(struct ih_dots_scratch *scratch, struct ih_dots *out,
         scratch->noise = *noise;
     }
     memset(scratch->rows.finding.response, 0, sizeof scratch->rows.finding.response);
-    memset(scratch->rows.finding.mark, 0, sizeof scratch->rows.finding.mark);
     out->dot_count = 0;
     out->edge_count = 0;
     out->hot_count = 0;
@@ -182,7 +181,8 @@ static void judge(struct ih_dots_scratch *scratch, struct ih_dots *out, int32_t 
     insert_dot(out, dot);
 }
 
-/* What no threshold of row v is below; it changes from block to block. */
+/* What no threshold of row v is below; it changes from block to block. Nothing behind the frame is
+ * above. */
 static void lay_least(struct ih_dots_scratch *scratch, int32_t v)
 {
     int16_t *least = scratch->rows.finding.least;
@@ -197,14 +197,20 @@ static void lay_least(struct ih_dots_scratch *scratch, int32_t v)
             least[u] = (int16_t)ih_clamp_s32(threshold, INT16_MIN, INT16_MAX);
         }
     }
+    for (; u < IH_FRAME_WIDTH_MAX; u++) {
+        least[u] = INT16_MAX;
+    }
 }
 
-static void mark_above(const int16_t *response, const int16_t *least, int32_t width,
-                       uint8_t *restrict mark)
+/* Is one of GROUP pixels above what no threshold is below? */
+static bool is_any_above(const int16_t response[GROUP], const int16_t least[GROUP])
 {
-    for (int32_t u = 0; u < width; u++) {
-        mark[u] = response[u] > least[u] ? UINT8_MAX : 0;
+    uint16_t any = 0;
+    for (int32_t i = 0; i < GROUP; i++) {
+        const uint16_t above = response[i] > least[i] ? UINT16_MAX : 0;
+        any = any | above;
     }
+    return any != 0;
 }
 
 static int16_t greater(int16_t a, int16_t b)
@@ -212,19 +218,18 @@ static int16_t greater(int16_t a, int16_t b)
     return (int16_t)(a > b ? a : b);
 }
 
-/* Marks stay on maxima; of equal neighbours the first in reading order is one: it is greater than all
- * that are read before it and than one less than those after it. */
-static void keep_maxima(const int16_t *above, const int16_t *middle, const int16_t *below,
-                        uint8_t *restrict mark)
+/* Which of GROUP pixels are maxima above the least threshold. Of equal neighbours the first in reading
+ * order is one: it is greater than all that are read before it and than one less than those after it. */
+static void mark_maxima(const int16_t *above, const int16_t *middle, const int16_t *below,
+                        const int16_t *least, uint8_t *restrict mark)
 {
-    for (int32_t u = 0; u < MARKS; u++) {
+    for (int32_t u = 0; u < GROUP; u++) {
         const int16_t before =
             greater(greater(above[u - 1], above[u]), greater(above[u + 1], middle[u - 1]));
         const int16_t after =
             greater(greater(below[u - 1], below[u]), greater(below[u + 1], middle[u + 1]));
-        const uint8_t is_maximum =
-            middle[u] > greater(before, (int16_t)(after - 1)) ? UINT8_MAX : 0;
-        mark[u] = mark[u] & is_maximum;
+        const int16_t limit = greater(greater(before, (int16_t)(after - 1)), least[u]);
+        mark[u] = middle[u] > limit ? UINT8_MAX : 0;
     }
 }
 
@@ -235,59 +240,41 @@ static uint64_t eight_marks(const uint8_t *mark)
     return word;
 }
 
-/* Is one of the next MARKS pixels marked? Behind the frame none is. */
-static bool is_any_marked(const uint8_t mark[MARKS])
+/* Of GROUP pixels of row v from first on. */
+static void judge_marked(struct ih_dots_scratch *scratch, struct ih_dots *out,
+                         const uint8_t mark[GROUP], int32_t first, int32_t v)
 {
-    return (eight_marks(mark) | eight_marks(&mark[8]) | eight_marks(&mark[16]) |
-            eight_marks(&mark[24])) != 0;
-}
-
-static int32_t next_marked(const uint8_t *mark, int32_t first, int32_t width)
-{
-    int32_t u = first;
-    while (u < width && !is_any_marked(&mark[u])) {
-        u += MARKS;
-    }
-    return u;
-}
-
-/* Maxima of row v among MARKS pixels. */
-static void judge_marked(struct ih_dots_scratch *scratch, struct ih_dots *out, int32_t first,
-                         int32_t v)
-{
-    const uint8_t *mark = scratch->rows.finding.mark;
-    const int16_t *response = response_row(scratch, v);
-    int32_t u = first;
-    while (u < first + MARKS) {
-        if (u % 8 == 0 && eight_marks(&mark[u]) == 0) {
-            u += 8;
+    const int16_t *response = &response_row(scratch, v)[first];
+    int32_t i = 0;
+    while (i < GROUP) {
+        if (i % 8 == 0 && eight_marks(&mark[i]) == 0) {
+            i += 8;
             continue;
         }
-        if (mark[u] != 0 &&
-            response[u] > threshold_of(&scratch->params, ih_noise_at(&scratch->noise, u, v))) {
-            judge(scratch, out, u, v);
+        if (mark[i] != 0 && response[i] > threshold_of(&scratch->params,
+                                                       ih_noise_at(&scratch->noise, first + i, v))) {
+            judge(scratch, out, first + i, v);
         }
-        u++;
+        i++;
     }
 }
 
-/* Row v has all its neighbours in the ring. Most of its pixels are not above any threshold. */
+/* Row v has all its neighbours in the ring. Most of its groups have nothing above any threshold, most
+ * of the others no maximum. */
 static void find_dots(struct ih_dots_scratch *scratch, struct ih_dots *out, int32_t v)
 {
-    const int32_t width = scratch->width;
     const int16_t *above = response_row(scratch, v - 1);
     const int16_t *middle = response_row(scratch, v);
     const int16_t *below = response_row(scratch, v + 1);
-    uint8_t *mark = scratch->rows.finding.mark;
+    const int16_t *least = scratch->rows.finding.least;
     if (v % IH_NOISE_BLOCK == IH_NOISE_BLOCK / 2 || v == 0) {
         lay_least(scratch, v);
     }
-    mark_above(middle, scratch->rows.finding.least, width, mark);
-    for (int32_t first = next_marked(mark, 0, width); first < width;
-         first = next_marked(mark, first + MARKS, width)) {
-        keep_maxima(&above[first], &middle[first], &below[first], &mark[first]);
-        if (is_any_marked(&mark[first])) {
-            judge_marked(scratch, out, first, v);
+    for (int32_t u = 0; u < scratch->width; u += GROUP) {
+        if (is_any_above(&middle[u], &least[u])) {
+            uint8_t mark[GROUP];
+            mark_maxima(&above[u], &middle[u], &below[u], &least[u], mark);
+            judge_marked(scratch, out, mark, u, v);
         }
     }
 }

@@ -88,9 +88,7 @@ struct ih_dots_scratch {
             struct ih_band band;
             /* Ring; row v is at (v + IH_DOTS_REACH) % IH_DOTS_ROWS. Zeros around the frame. */
             int16_t response[IH_DOTS_ROWS][IH_FRAME_WIDTH_MAX + 2 * IH_DOTS_REACH];
-            /* No threshold of the row that is looked at is lower; 1 where R is above it. */
-            int16_t least[IH_FRAME_WIDTH_MAX];
-            uint8_t mark[IH_FRAME_WIDTH_MAX];
+            int16_t least[IH_FRAME_WIDTH_MAX]; /* no threshold of the row is lower */
         } finding;
     } rows;
 };
