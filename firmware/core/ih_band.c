@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "ih_fix.h"
+#include "ih_words.h"
 
 #define INNER_WEIGHT 81 /* the outer box has 81 pixels, the inner kernel weight 16: */
 #define OUTER_WEIGHT 16 /* 81 inner - 16 outer has no response to a constant */
@@ -66,6 +67,39 @@ struct pairs {
     const uint16_t *ago_1, *ago_3, *ago_4, *ago_5, *ago_7;
 };
 
+#if IH_WORDS
+/* Both of the next for so many pixels as there are whole words; how many. */
+static int32_t join_words(const uint8_t *row, int32_t width, uint16_t *newest, uint16_t *pair)
+{
+    int32_t u = 0;
+    for (; u + 2 <= width; u += 2) {
+        const uint32_t grey = ih_word_of_bytes(&row[u]);
+        ih_word_put(ih_word(&newest[u]) + grey, &pair[u]);
+        ih_word_put(grey, &newest[u]);
+    }
+    return u;
+}
+
+static int32_t sum_words(const uint16_t *newest, const struct pairs *pairs, int32_t width,
+                         uint16_t *inner, uint16_t *column)
+{
+    const uint16_t *ago_1 = pairs->ago_1;
+    const uint16_t *ago_3 = pairs->ago_3;
+    const uint16_t *ago_4 = pairs->ago_4;
+    const uint16_t *ago_5 = pairs->ago_5;
+    const uint16_t *ago_7 = pairs->ago_7;
+    int32_t u = 0;
+    for (; u + 2 <= width; u += 2) {
+        const uint32_t middle = ih_word(&ago_3[u]);
+        ih_word_put(middle + ih_word(&ago_4[u]), &inner[u]);
+        ih_word_put(ih_word(&newest[u]) + ih_word(&ago_1[u]) + middle + ih_word(&ago_5[u]) +
+                        ih_word(&ago_7[u]),
+                    &column[u]);
+    }
+    return u;
+}
+#endif
+
 /* A row joins the one before, which gives way to it. Sums of the ring's rows: 1-2-1 of the three in
  * the middle, and of all nine. */
 static void take_bytes(const uint8_t *row, const struct pairs *pairs, struct ih_band *restrict band,
@@ -80,7 +114,12 @@ static void take_bytes(const uint8_t *row, const struct pairs *pairs, struct ih_
     const uint16_t *ago_4 = pairs->ago_4;
     const uint16_t *ago_5 = pairs->ago_5;
     const uint16_t *ago_7 = pairs->ago_7;
-    for (int32_t u = 0; u < width; u++) {
+    int32_t u = 0;
+#if IH_WORDS
+    (void)join_words(row, width, newest, pair);
+    u = sum_words(newest, pairs, width, inner, column);
+#endif
+    for (; u < width; u++) {
         const uint16_t grey = row[u];
         pair[u] = (uint16_t)(newest[u] + grey);
         newest[u] = grey;
@@ -134,7 +173,13 @@ static void add_bytes(const uint8_t *above, const uint8_t *below, int32_t width,
 
 static void add_row(const uint16_t *row, int32_t width, uint16_t *restrict sum)
 {
-    for (int32_t u = 0; u < width; u++) {
+    int32_t u = 0;
+#if IH_WORDS
+    for (; u + 2 <= width; u += 2) {
+        ih_word_put(ih_word(&sum[u]) + ih_word(&row[u]), &sum[u]);
+    }
+#endif
+    for (; u < width; u++) {
         sum[u] = (uint16_t)(sum[u] + row[u]);
     }
 }
@@ -147,6 +192,30 @@ static void repeat_edges(uint16_t *sums, int32_t width, int32_t reach)
         sums[reach + width + i] = sums[reach + width - 1];
     }
 }
+
+#if IH_WORDS
+/* R of so many pixels as there are whole words; how many. The box's sum runs along the row. */
+static int32_t respond_words(const uint16_t *inner, const uint16_t *column, int32_t width,
+                             int16_t *response)
+{
+    /* Less the columns of both boxes, but for the last two of each. */
+    uint32_t raised = IH_WORD_BOTH(0x8000);
+    int32_t u = 0;
+    for (int32_t i = 0; i < IH_BAND_ROWS - 2; i++) {
+        raised -= ih_word(&column[i]);
+    }
+    for (; u + 2 <= width; u += 2) {
+        const uint32_t sum =
+            ih_word(&inner[u]) + 2 * ih_word(&inner[u + 1]) + ih_word(&inner[u + 2]);
+        const uint32_t sixteenth =
+            (sum + IH_WORD_BOTH(OUTER_WEIGHT / 2)) / OUTER_WEIGHT & IH_WORD_BOTH(0x0fff);
+        raised -= ih_word(&column[u + 7]) + ih_word(&column[u + 8]);
+        ih_word_put_signed(INNER_WEIGHT / OUTER_WEIGHT * sum + sixteenth + raised, &response[u]);
+        raised += ih_word(&column[u]) + ih_word(&column[u + 1]);
+    }
+    return u;
+}
+#endif
 
 /* Of grey levels of 8 bits everything is below 2^16, the sixteenth of 81 i as 5 i + i / 16. */
 static void respond_bytes(const uint16_t *inner, const uint16_t *three, int32_t width,
@@ -186,6 +255,18 @@ static void sum_threes_grey(const uint16_t *column_q4, int32_t count, uint32_t *
     }
 }
 
+/* All of a row of bytes. */
+static void filter_bytes(struct ih_band *band, int16_t *response)
+{
+    int32_t first = 0;
+#if IH_WORDS
+    first = respond_words(band->inner, band->column, band->width, response);
+#endif
+    sum_threes_bytes(&band->column[first], band->width - first + 2 * IH_BAND_REACH - 2,
+                     band->three.of_bytes);
+    respond_bytes(&band->inner[first], band->three.of_bytes, band->width - first, &response[first]);
+}
+
 /* R of the row whose sums are there. */
 static void filter(struct ih_band *band, int16_t *response)
 {
@@ -194,8 +275,7 @@ static void filter(struct ih_band *band, int16_t *response)
     repeat_edges(band->inner, width, 1);
     repeat_edges(band->column, width, IH_BAND_REACH);
     if (band->is_bytes) {
-        sum_threes_bytes(band->column, threes, band->three.of_bytes);
-        respond_bytes(band->inner, band->three.of_bytes, width, response);
+        filter_bytes(band, response);
     } else {
         sum_threes_grey(band->column, threes, band->three.of_grey_q4);
         respond_grey(band->inner, band->three.of_grey_q4, width, response);

@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "ih_fix.h"
+#include "ih_words.h"
 
 /* The centre is taken over so many pixels on each side of the peak, */
 #define CENTRE_REACH 2
@@ -205,14 +206,41 @@ static void lay_least(struct ih_dots_scratch *scratch, int32_t v)
 /* Is one of GROUP pixels above what no threshold is below? */
 static bool is_any_above(const int16_t response[GROUP], const int16_t least[GROUP])
 {
+#if IH_WORDS
+    int32_t below = 0; /* negative differences */
+    for (int32_t i = 0; i < GROUP; i += 4) {
+        below |= least[i] - response[i];
+        below |= least[i + 1] - response[i + 1];
+        below |= least[i + 2] - response[i + 2];
+        below |= least[i + 3] - response[i + 3];
+    }
+    return below < 0;
+#else
     uint16_t any = 0;
     for (int32_t i = 0; i < GROUP; i++) {
         const uint16_t above = response[i] > least[i] ? UINT16_MAX : 0;
         any = any | above;
     }
     return any != 0;
+#endif
 }
 
+#if IH_WORDS
+/* The same as below, where most pixels are passed over after one look. */
+static void mark_maxima(const int16_t *above, const int16_t *middle, const int16_t *below,
+                        const int16_t *least, uint8_t *mark)
+{
+    for (int32_t u = 0; u < GROUP; u++) {
+        const int16_t peak = middle[u];
+        mark[u] = 0;
+        if (peak > least[u] && peak > middle[u - 1] && peak >= middle[u + 1] &&
+            peak > above[u - 1] && peak > above[u] && peak > above[u + 1] && peak >= below[u - 1] &&
+            peak >= below[u] && peak >= below[u + 1]) {
+            mark[u] = UINT8_MAX;
+        }
+    }
+}
+#else
 static int16_t greater(int16_t a, int16_t b)
 {
     return (int16_t)(a > b ? a : b);
@@ -232,11 +260,12 @@ static void mark_maxima(const int16_t *above, const int16_t *middle, const int16
         mark[u] = middle[u] > limit ? UINT8_MAX : 0;
     }
 }
+#endif
 
 static uint64_t eight_marks(const uint8_t *mark)
 {
     uint64_t word = 0;
-    memcpy(&word, mark, sizeof word);
+    __builtin_memcpy(&word, mark, sizeof word); /* no call, in freestanding builds either */
     return word;
 }
 
@@ -251,8 +280,9 @@ static void judge_marked(struct ih_dots_scratch *scratch, struct ih_dots *out,
             i += 8;
             continue;
         }
-        if (mark[i] != 0 && response[i] > threshold_of(&scratch->params,
-                                                       ih_noise_at(&scratch->noise, first + i, v))) {
+        if (mark[i] != 0 &&
+            response[i] >
+                threshold_of(&scratch->params, ih_noise_at(&scratch->noise, first + i, v))) {
             judge(scratch, out, first + i, v);
         }
         i++;

@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "ih_fix.h"
+#include "ih_words.h"
 
 /* All of the ambient light is taken away. */
 #define WHOLE_Q12 4096
@@ -28,14 +29,23 @@ static int32_t between(int32_t low, int32_t high, int32_t part)
     return low + (int32_t)ih_shift_round((int64_t)(high - low) * part, 6);
 }
 
-/* How many of the values of a block are at most so large. */
+/* How many of the values of a block are at most so large; all are below 2^15. */
 static int32_t at_most(const uint16_t value[SAMPLES_MAX], uint16_t limit)
 {
+#if IH_WORDS
+    const uint32_t raised = IH_WORD_BOTH(limit) + IH_WORD_BOTH(0x8000);
+    uint32_t count = 0;
+    for (int32_t i = 0; i < SAMPLES_MAX; i += 2) {
+        count += (raised - ih_word(&value[i])) >> 15 & IH_WORD_BOTH(1);
+    }
+    return (int32_t)((count & UINT16_MAX) + (count >> 16));
+#else
     uint16_t count = 0;
     for (int32_t i = 0; i < SAMPLES_MAX; i++) {
         count = (uint16_t)(count + (value[i] <= limit));
     }
     return count;
+#endif
 }
 
 /* The value of rank count / 2, from 0: the k-th smallest by halving the range of values, most often
@@ -46,7 +56,7 @@ static uint16_t median_of(const uint16_t value[SAMPLES_MAX], int32_t count)
     int32_t high = MOSTLY_BELOW;
     if (at_most(value, MOSTLY_BELOW) <= count / 2) {
         low = MOSTLY_BELOW + 1;
-        high = UINT16_MAX;
+        high = INT16_MAX;
     }
     while (low < high) { /* the median is in low..high */
         int32_t middle = (low + high) / 2;
@@ -72,7 +82,7 @@ static uint16_t block_median(const struct ih_noise_scratch *scratch, int32_t col
         }
     }
     for (int32_t i = count; i < SAMPLES_MAX; i++) {
-        value[i] = UINT16_MAX;
+        value[i] = INT16_MAX;
     }
     return median_of(value, count);
 }
