@@ -64,7 +64,7 @@ static void check_roots(const uint64_t square_q32[IH_BASIS_GROUP])
         const int64_t rest = (int64_t)(square_q32[i] << 8) - root * root;
 
         if (rest > root || rest <= -root) {
-            IH_TEST_WITHIN(0.5, sqrt(ldexp((double)square_q32[i], 8)), root, "root", i);
+            IH_TEST_WITHIN(0.5, sqrt(ldexp((double)square_q32[i], 8)), (double)root, "root", i);
         }
     }
     TEST_ASSERT_EQUAL_UINT32(77, root_q20[IH_BASIS_GROUP]);

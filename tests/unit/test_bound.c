@@ -5,6 +5,8 @@
 #include "ih_test.h"
 #include "ih_test_scene.h"
 
+static const double pi = 3.14159265358979323846;
+
 static struct ih_scan_params params;
 static struct ih_scan_scratch scratch;
 static struct ih_scan scan;
@@ -112,8 +114,8 @@ static void rays_that_pass_at_a_limit(void)
         const int32_t kind = (int32_t)ih_test_between(&random, 0, 4);
         const double angle = kind == 4
                                  ? atan2(78, 113) * (ih_test_between(&random, 0, 1) == 0 ? 1 : -1) +
-                                       (ih_test_between(&random, 0, 1) == 0 ? 0 : M_PI)
-                                 : random_in(&random, -M_PI, M_PI);
+                                       (ih_test_between(&random, 0, 1) == 0 ? 0 : pi)
+                                 : random_in(&random, -pi, pi);
         int32_t centre[3];
         double reach = radius[kind];
 
@@ -160,7 +162,7 @@ static void points_at_a_limit_of_depth(void)
 
     for (pass = 0; pass < 4000; pass++) {
         const double behind = limit_mm[ih_test_between(&random, 0, 2)];
-        const double angle = random_in(&random, -M_PI, M_PI);
+        const double angle = random_in(&random, -pi, pi);
         const double reach = pass % 3 == 0 ? random_in(&random, 0.97, 1) : random_in(&random, 0, 1);
         int32_t centre[3];
 
