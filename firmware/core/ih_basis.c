@@ -1,5 +1,10 @@
 #include "ih_basis.h"
 
+/* Eight at once; compilers do not look up tables with vectors by themselves. */
+#ifdef __AVX2__
+#include <immintrin.h>
+#endif
+
 /* 2^30 / sqrt(m) for m in 2^29 .. 2^31, in spans of 2^23: the value at a span's beginning, lowered by half of
  * what a chord lies above the curve, Q3 with a half for rounding, times 2^12, plus the fall over the span, Q3.
  * What is read between entries and cut to a whole number is at most 2^-15 of it off. Written by
@@ -44,9 +49,6 @@ static const uint32_t inverse_root[] = {
 #define MORE_ROUNDING 32768 /* 2^14, and as much for what was cut off the lack */
 
 #ifdef __AVX2__
-
-/* Eight at once; compilers do not look up tables with vectors by themselves. */
-#include <immintrin.h>
 
 #define EACH(value) _mm256_set1_epi32(value)
 
@@ -100,7 +102,7 @@ static inline __m256i lower_halves(__m256i a, __m256i b)
 static inline void roots_of_eight(const uint64_t *square_q32, uint32_t *root_q20)
 {
     const __m256i a = _mm256_loadu_si256((const __m256i *)square_q32);
-    const __m256i b = _mm256_loadu_si256((const __m256i *)(square_q32 + 4));
+    const __m256i b = _mm256_loadu_si256((const __m256i *)&square_q32[4]);
     const __m256i low = lower_halves(a, b);
     const __m256i n =
         near_root(lower_halves(_mm256_srli_epi64(a, 14), _mm256_srli_epi64(b, 14)), low);

@@ -1,5 +1,11 @@
 #include "ih_normal.h"
 
+/* Compilers do not find the multiplication of lower halves by themselves: they see one of 64 bits, which
+ * takes three of them. */
+#if defined __x86_64__ && defined __SSE2__
+#include <immintrin.h>
+#endif
+
 #define ROWS IH_NORMAL_ROWS
 #define TERMS IH_NORMAL_TERMS
 #define GROUP IH_NORMAL_GROUP
@@ -19,10 +25,6 @@ int32_t ih_normal_line(int32_t i)
 
 #if defined __x86_64__ && defined __SSE2__
 #define BY_LINES 1
-
-/* Compilers do not find the multiplication of lower halves by themselves: they see one of 64 bits, which
- * takes three of them. */
-#include <immintrin.h>
 
 #if defined __AVX2__
 #define LANES 4
@@ -81,9 +83,10 @@ static inline void add_line(ih_normal_entry row[ROWS][TERMS], int32_t i, int32_t
 
 void ih_normal_add(ih_normal_entry row[ROWS][TERMS], int32_t first, int32_t last, uint64_t *line)
 {
+    uint64_t *at = line;
     for (int32_t i = first; i < last; i++) {
-        add_line(row, i, length_of(i), line);
-        line += length_of(i);
+        add_line(row, i, length_of(i), at);
+        at = &at[length_of(i)];
     }
 }
 
@@ -91,9 +94,10 @@ void ih_normal_add(ih_normal_entry row[ROWS][TERMS], int32_t first, int32_t last
 
 /* Add the products of two columns with two others: each entry that is read is for two products, and there
  * are as many sums as a Cortex-M can hold in registers. */
-static void add_square(const ih_normal_entry *a, const ih_normal_entry *b, uint64_t *here,
+static void add_square(ih_normal_entry row[ROWS][TERMS], int32_t i, int32_t j, uint64_t *here,
                        uint64_t *next)
 {
+    const ih_normal_entry *a = &row[0][i], *b = &row[0][j];
     uint64_t sum_00 = here[0], sum_01 = here[1], sum_10 = next[0], sum_11 = next[1];
 /* More at once would need more registers. */
 #pragma GCC unroll 2
@@ -104,8 +108,8 @@ static void add_square(const ih_normal_entry *a, const ih_normal_entry *b, uint6
         sum_10 += (uint64_t)a_1 * b_0;
         sum_01 += (uint64_t)a_0 * b_1;
         sum_11 += (uint64_t)a_1 * b_1;
-        a += TERMS;
-        b += TERMS;
+        a = &a[TERMS];
+        b = &b[TERMS];
     }
     here[0] = sum_00;
     here[1] = sum_01;
@@ -115,12 +119,13 @@ static void add_square(const ih_normal_entry *a, const ih_normal_entry *b, uint6
 
 void ih_normal_add(ih_normal_entry row[ROWS][TERMS], int32_t first, int32_t last, uint64_t *line)
 {
+    uint64_t *at = line;
     for (int32_t i = first; i < last; i += 2) {
         const int32_t length = length_of(i);
         for (int32_t j = 0; j <= i; j += 2) {
-            add_square(&row[0][i], &row[0][j], &line[j], &line[length + j]);
+            add_square(row, i, j, &at[j], &at[length + j]);
         }
-        line += 2 * length;
+        at = &at[2 * length];
     }
 }
 

@@ -229,8 +229,8 @@ static bool reweight(const struct ih_surface_scratch *scratch, const struct ih_s
 /* The normal equations of all samples: all lines, or with huber only those that are not kept, and then
  * samples that are too far from the surface that was solved last get less weight first. Returns how
  * many do. */
-static int32_t sum_all(const struct ih_samples *samples, const struct ih_surface_params *huber,
-                       struct ih_surface_scratch *scratch, struct ih_surface *out)
+static int32_t sum_rows(const struct ih_samples *samples, const struct ih_surface_params *huber,
+                        struct ih_surface_scratch *scratch, struct ih_surface *out)
 {
     int32_t lighter = 0;
     memset(scratch->of.others_q40, 0, sizeof scratch->of.others_q40);
@@ -300,7 +300,7 @@ static bool fit_first(const struct ih_samples *samples, const struct ih_surface_
                       struct ih_surface_scratch *scratch, struct ih_surface *out)
 {
     memset(scratch->kept.q40, 0, sizeof scratch->kept.q40);
-    sum_all(samples, NULL, scratch, out);
+    sum_rows(samples, NULL, scratch, out);
     scale_lines(params, scratch);
     return solve(samples, out->mean_mm_q8, scratch);
 }
@@ -309,7 +309,7 @@ static bool fit_first(const struct ih_samples *samples, const struct ih_surface_
 static bool fit_again(const struct ih_samples *samples, const struct ih_surface_params *params,
                       struct ih_surface_scratch *scratch, struct ih_surface *out)
 {
-    out->downweighted_count = sum_all(samples, params, scratch, out);
+    out->downweighted_count = sum_rows(samples, params, scratch, out);
     if (out->downweighted_count == 0) {
         return true;
     }
