@@ -301,20 +301,18 @@ static void summarise(const struct tally *tally, const struct ih_evidence_nest *
         nest->present ? (int32_t)ih_shift_round(nest->upright_q16, 8) : 256;
 }
 
-void ih_evidence_collect(const struct ih_space *space, const struct ih_ellipsoid *ellipsoid,
-                         const int32_t start_mm_q8[3], const struct ih_evidence_nest *nest,
-                         struct ih_evidence *out)
+void ih_evidence_collect(const struct ih_space *space, const int32_t slope_most_q20[2],
+                         const struct ih_ellipsoid *ellipsoid, const int32_t start_mm_q8[3],
+                         const struct ih_evidence_nest *nest, struct ih_evidence *out)
 {
     struct tally tally;
-    struct candidate candidate = {
+    const struct candidate candidate = {
         .ellipsoid = ellipsoid,
         .origin_mm_q8 = space->origin_mm_q8,
         .depth_mm_q8 = ellipsoid->centre_mm_q8[2] - space->origin_mm_q8[2],
         .shares = ih_ellipsoid_shares(ellipsoid->semi_mm_q8),
+        .box = ih_ellipsoid_box(ellipsoid, slope_most_q20, INSIDE_Q14),
     };
-    int32_t slope_most_q20[2];
-    ih_space_slope_most(space, slope_most_q20);
-    candidate.box = ih_ellipsoid_box(ellipsoid, slope_most_q20, INSIDE_Q14);
     memset(&tally, 0, sizeof tally);
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
         struct view view;

@@ -59,9 +59,10 @@ struct ih_evidence {
     int32_t through_count, hit_count, front_count;
 };
 
-void ih_evidence_collect(const struct ih_space *space, const struct ih_ellipsoid *ellipsoid,
-                         const int32_t start_mm_q8[3], const struct ih_evidence_nest *nest,
-                         struct ih_evidence *out);
+/* slope_most_q20: as from ih_space_slope_most. */
+void ih_evidence_collect(const struct ih_space *space, const int32_t slope_most_q20[2],
+                         const struct ih_ellipsoid *ellipsoid, const int32_t start_mm_q8[3],
+                         const struct ih_evidence_nest *nest, struct ih_evidence *out);
 
 /* A word for a kind, for tables and traces. */
 const char *ih_evidence_text(enum ih_evidence_kind kind);

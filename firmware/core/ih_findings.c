@@ -127,7 +127,8 @@ static void try_start(const struct work *work, const struct ih_ellipsoid *start,
     }
     struct ih_evidence_nest nest =
         nest_at(work->heads, finding.head.centre_mm_q8, params->nest_near_mm);
-    ih_evidence_collect(work->space, &finding.head, start->centre_mm_q8, &nest, &finding.evidence);
+    ih_evidence_collect(work->space, work->rows->rays.slope_most_q20, &finding.head,
+                        start->centre_mm_q8, &nest, &finding.evidence);
     ih_score_rate(&finding.evidence, &score);
     finding.logit_q10 = score.logit_q10;
     if (work->rig->calibration.kind == IH_RIG_RANGE) {
@@ -144,12 +145,13 @@ static void try_place(const struct work *work, const int32_t centre_mm_q8[3], en
     try_start(work, &start, source);
 }
 
-static void view_expected(const struct ih_space *space, const struct ih_ellipsoid *head,
+static void view_expected(const struct work *work, const struct ih_ellipsoid *head,
                           struct ih_view *view)
 {
     const struct ih_evidence_nest no_nest = {.present = false};
     struct ih_evidence evidence;
-    ih_evidence_collect(space, head, head->centre_mm_q8, &no_nest, &evidence);
+    ih_evidence_collect(work->space, work->rows->rays.slope_most_q20, head, head->centre_mm_q8,
+                        &no_nest, &evidence);
     view->through += evidence.through_count;
     view->hit += evidence.hit_count;
     view->front += evidence.front_count;
@@ -178,6 +180,6 @@ void ih_findings_add(const struct ih_points *points, const struct ih_dots *dots,
         if (i < params->expected_max) {
             try_start(&work, &expected->head[i], IH_SOURCE_EXPECTED);
         }
-        view_expected(&scratch->space, &expected->head[i], &out->view[i]);
+        view_expected(&work, &expected->head[i], &out->view[i]);
     }
 }

@@ -89,7 +89,8 @@ static void hash_start(struct isohead *head, const int32_t centre_mm_q8[3],
     struct ih_score score;
     ih_fit_ellipsoid(space, &head->params.findings.fit, &start, &head->scratch.findings.rows,
                      &fitted);
-    ih_evidence_collect(space, &fitted, centre_mm_q8, &nest, &evidence);
+    ih_evidence_collect(space, head->scratch.findings.rows.rays.slope_most_q20, &fitted,
+                        centre_mm_q8, &nest, &evidence);
     ih_score_rate(&evidence, &score);
     hash[GOLDEN_FIT] = golden_add_words(hash[GOLDEN_FIT], &fitted, sizeof fitted);
     hash[GOLDEN_EVIDENCE] = golden_add_words(hash[GOLDEN_EVIDENCE], &evidence, sizeof evidence);

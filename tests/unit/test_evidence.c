@@ -29,6 +29,15 @@ static struct ih_space space;
 static struct ih_evidence evidence;
 static const struct ih_evidence_nest no_nest = {.present = false};
 
+static void collect(const struct ih_ellipsoid *head, const int32_t start_mm_q8[3],
+                    const struct ih_evidence_nest *nest)
+{
+    int32_t slope_most_q20[2];
+
+    ih_space_slope_most(&space, slope_most_q20);
+    ih_evidence_collect(&space, slope_most_q20, head, start_mm_q8, nest, &evidence);
+}
+
 void setUp(void)
 {
     memset(&space, 0, sizeof space);
@@ -61,7 +70,7 @@ static void use_scene(const struct vector_scene *scene)
         }
         ray->point_mm_q8[2] = scene->ray[slot].depth_mm_q8;
     }
-    ih_evidence_collect(&space, &scene->head, scene->start_mm_q8, &scene->nest, &evidence);
+    collect(&scene->head, scene->start_mm_q8, &scene->nest);
 }
 
 /* Counts are exact: no ray is near a limit. Shares are cut to 1/256. A point's place has 2^-14 of
@@ -254,7 +263,7 @@ static void bulges_match_the_best_plane(void)
             }
             count++;
         }
-        ih_evidence_collect(&space, &head, centre, &no_nest, &evidence);
+        collect(&head, centre, &no_nest);
         if (evidence.hit_count != count) {
             continue; /* a ray along the edge */
         }
@@ -290,7 +299,7 @@ static void a_line_has_no_bulge(void)
             ray->slope_y_q20 = (int32_t)lround(ldexp(at[1] * 113 / z, 20));
             ray->state = IH_RAY_SEEN;
         }
-        ih_evidence_collect(&space, &head, centre, &no_nest, &evidence);
+        collect(&head, centre, &no_nest);
         IH_TEST_EQUAL(9, evidence.hit_count, "on", pass);
         IH_TEST_RANGE(0, 35 << 8,
                       evidence.value_q8[IH_EVIDENCE_BULGE] + evidence.value_q8[IH_EVIDENCE_ROUGH],
@@ -343,7 +352,7 @@ static void collect_ball(void)
     static const struct ih_ellipsoid ball = {.centre_mm_q8 = {0, 0, BALL_Z_MM_Q8},
                                              .semi_mm_q8 = {BALL_MM_Q8, BALL_MM_Q8, BALL_MM_Q8}};
 
-    ih_evidence_collect(&space, &ball, ball.centre_mm_q8, &no_nest, &evidence);
+    collect(&ball, ball.centre_mm_q8, &no_nest);
 }
 
 /* A head twice as high as the mean one is 100 per cent taller, to the last unit; one as high as that is not. */
@@ -357,7 +366,7 @@ static void tallness_is_in_hundredths_of_the_mean(void)
 
         head.semi_mm_q8[1] *= times[i];
         forget_rays();
-        ih_evidence_collect(&space, &head, head.centre_mm_q8, &no_nest, &evidence);
+        collect(&head, head.centre_mm_q8, &no_nest);
         IH_TEST_EQUAL(100 * (times[i] - 1) << 8, evidence.value_q8[IH_EVIDENCE_TALL], "tall", i);
     }
 }
@@ -562,7 +571,7 @@ static void extremes_do_not_overflow(void)
                 ray->slope_y_q20 = 0;
             }
         }
-        ih_evidence_collect(&space, &head, start, &nest, &evidence);
+        collect(&head, start, &nest);
         IH_TEST_RANGE(0, 256, evidence.value_q8[IH_EVIDENCE_ABOVE], "share", pass);
         IH_TEST_RANGE(0, IH_SLOTS << 8, evidence.value_q8[IH_EVIDENCE_ON], "count", pass);
         IH_TEST_RANGE(0, 30 << 8, evidence.value_q8[IH_EVIDENCE_BODY_RAYS], "count", pass);
