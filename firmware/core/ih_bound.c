@@ -192,7 +192,7 @@ static bool set_place(struct place *place, const struct ih_space *space,
     const int32_t depth_mm = (int32_t)depth_q8 >> 8;
     place->depth_mm_q1 = (int16_t)(centre_mm_q8[2] >> 7);
     place->open_mm_q1 = (int16_t)(place->depth_mm_q1 + 2 * BEHIND_CENTRE_MM - 1);
-    place->margin_q10 = (int16_t)(IH_BOUND_MARGIN_Q10 + depth_mm / 128);
+    place->margin_q10 = (int16_t)(IH_BOUND_MARGIN_Q10 + depth_mm / 200);
     return set_axis(place, 0, (int64_t)centre_mm_q8[0] - space->origin_mm_q8[0], (int32_t)depth_q8,
                     SEMI_X_MM) &&
            set_axis(place, 1, (int64_t)centre_mm_q8[1] - space->origin_mm_q8[1], (int32_t)depth_q8,

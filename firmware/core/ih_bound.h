@@ -19,7 +19,7 @@
  * Error: with D the depth in mm: e within 7.9e-7 D + 0.0009, radius2 within 4.3e-6 D + 0.0130, where
  *        the ray's nearest place is within 1.95 radii: IH_BOUND_MARGIN_Q10. A point's depth against
  *        the entry: 0.0076 + 5.6e-7 D of the semi-axis, 1.6 mm: IH_BOUND_DEPTH_MM. Places beside and
- *        below: 2.6e-6 D + 0.0046 of a semi-axis, half of the margin.
+ *        below: 2.0e-6 D + 0.0046 of a semi-axis, half of the margin.
  * Overflow: lanes have 16 bits. e is cut at 3.99 in Q11; rays within the limit have e below 2.74,
  *        e.g and t below that. Beyond the limit e.g may wrap: such rays are masked. Sums of 361
  *        values of at most 64: 23104.
@@ -32,8 +32,8 @@
 
 /* The slots in whole vectors. */
 #define IH_BOUND_RAYS ((IH_SLOTS + 15) / 16 * 16)
-/* Added to limits of radius2 and taken from them: this and the depth in mm over 128. */
-#define IH_BOUND_MARGIN_Q10 16
+/* Added to limits of radius2 and taken from them: this and the depth in mm over 200. */
+#define IH_BOUND_MARGIN_Q10 15
 /* Added to limits of depth. */
 #define IH_BOUND_DEPTH_MM 2
 /* No score is greater: 1 + 0.6. */
