@@ -282,22 +282,21 @@ static inline void add_inside(const struct place *place, const struct pass *pass
 }
 
 /* A loop without a branch where there are vectors: compilers turn it into them. */
-static void add_rays(const struct ih_bound_rays *rays, const struct place *at, int32_t begin,
+static void add_rays(const struct ih_bound_rays *rays, const struct place *place, int32_t begin,
                      int32_t end, struct lanes *out)
 {
-    const struct place place = *at;
     struct lanes sums = {0, 0, 0, 0, 0, 0};
     for (int32_t i = begin; i < end; i++) {
         struct pass pass;
-        lane dx = wrap(rays->slope_q14[0][i] - place.direction_q14[0]);
-        lane dy = wrap(rays->slope_q14[1][i] - place.direction_q14[1]);
-        if (ONE_BY_ONE && (size(dx) > place.cut[0] || size(dy) > place.cut[1])) {
+        lane dx = wrap(rays->slope_q14[0][i] - place->direction_q14[0]);
+        lane dy = wrap(rays->slope_q14[1][i] - place->direction_q14[1]);
+        if (ONE_BY_ONE && (size(dx) > place->cut[0] || size(dy) > place->cut[1])) {
             continue;
         }
-        dx = within(dx, place.cut[0]);
-        dy = within(dy, place.cut[1]);
-        pass.ex_q11 = high_half(wrap(dx * place.times[0]), place.share[0]);
-        pass.ey_q11 = high_half(wrap(dy * place.times[1]), place.share[1]);
+        dx = within(dx, place->cut[0]);
+        dy = within(dy, place->cut[1]);
+        pass.ex_q11 = high_half(wrap(dx * place->times[0]), place->share[0]);
+        pass.ey_q11 = high_half(wrap(dy * place->times[1]), place->share[1]);
         const lane ex_q13 = wrap(pass.ex_q11 * 4);
         const lane ey_q13 = wrap(pass.ey_q11 * 4);
         const lane ee_q10 = wrap(high_half(ex_q13, ex_q13) + high_half(ey_q13, ey_q13));
@@ -313,11 +312,11 @@ static void add_rays(const struct ih_bound_rays *rays, const struct place *at, i
         pass.radius2_q10 = wrap(ee_q10 - high_half(wrap(eg_q12 * 2), wrap(pass.t_q11 * 4)));
         pass.seen = rays->seen[i];
         pass.depth_q1 = rays->depth_mm_q1[i];
-        if (!ONE_BY_ONE || pass.radius2_q10 > 1024 + place.margin_q10) {
-            add_around(&place, &pass, rays->around[i], &sums);
+        if (!ONE_BY_ONE || pass.radius2_q10 > 1024 + place->margin_q10) {
+            add_around(place, &pass, rays->around[i], &sums);
         }
-        if (!ONE_BY_ONE || pass.radius2_q10 <= 1024 + place.margin_q10) {
-            add_inside(&place, &pass, rays->inside[i], &sums);
+        if (!ONE_BY_ONE || pass.radius2_q10 <= 1024 + place->margin_q10) {
+            add_inside(place, &pass, rays->inside[i], &sums);
         }
     }
     *out = sums;

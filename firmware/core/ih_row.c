@@ -257,45 +257,45 @@ static void begin_step(struct step *step, const struct ih_row_rays *rays)
 }
 
 /* From here to there, both included. */
-struct span {
+struct interval {
     int16_t low, high;
 };
 
-static struct span span_of(int64_t low, int64_t high)
+static struct interval interval_of(int64_t low, int64_t high)
 {
-    return (struct span){saturate_s16(low), saturate_s16(high)};
+    return (struct interval){saturate_s16(low), saturate_s16(high)};
 }
 
 /* Slopes of the rays that pass within half of the centre; all where it is too near to the origin's
  * depth. Slopes and directions are rounded down, which is a step on either side, and half by one. */
-static struct span slopes_within(const struct step *step, int axis)
+static struct interval slopes_within(const struct step *step, int axis)
 {
     const int64_t depth_q8 = (int64_t)step->ellipsoid->centre_mm_q8[2] - step->origin_mm_q8[2];
     const int64_t off_q8 = (int64_t)step->ellipsoid->centre_mm_q8[axis] - step->origin_mm_q8[axis];
     if (depth_q8 < 256) {
-        return span_of(INT16_MIN, INT16_MAX);
+        return interval_of(INT16_MIN, INT16_MAX);
     }
     const int64_t half_q8 = (int64_t)step->box.half_mm_q8[axis] + 1;
-    return span_of((off_q8 - half_q8) * 4096 / depth_q8 - 2,
-                   (off_q8 + half_q8) * 4096 / depth_q8 + 2);
+    return interval_of((off_q8 - half_q8) * 4096 / depth_q8 - 2,
+                       (off_q8 + half_q8) * 4096 / depth_q8 + 2);
 }
 
 /* A loop without a branch: compilers turn it into vectors. */
 static void flag_rays(const struct step *step, struct ih_row_scratch *scratch)
 {
     const struct ih_row_rays *rays = &scratch->rays;
-    const struct span dx = slopes_within(step, 0);
-    const struct span dy = slopes_within(step, 1);
+    const struct interval dx = slopes_within(step, 0);
+    const struct interval dy = slopes_within(step, 1);
     const int16_t front = saturate_s16(step->front_mm_q8 >> 7);
-    struct span reach[3];
+    struct interval reach[3];
     for (int axis = 0; axis < 3; axis++) {
         const int32_t centre_q8 = step->ellipsoid->centre_mm_q8[axis];
-        reach[axis] = span_of((centre_q8 - step->reach_mm_q8[axis]) >> 7,
-                              (centre_q8 + step->reach_mm_q8[axis]) >> 7);
+        reach[axis] = interval_of((centre_q8 - step->reach_mm_q8[axis]) >> 7,
+                                  (centre_q8 + step->reach_mm_q8[axis]) >> 7);
     }
-    const struct span x = reach[0];
-    const struct span y = reach[1];
-    const struct span z = reach[2];
+    const struct interval x = reach[0];
+    const struct interval y = reach[1];
+    const struct interval z = reach[2];
     for (int32_t slot = 0; slot < IH_ROW_RAYS; slot++) {
         const int16_t at_x = rays->point_mm_q1[0][slot];
         const int16_t at_y = rays->point_mm_q1[1][slot];
