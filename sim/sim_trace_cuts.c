@@ -14,30 +14,25 @@ static bool is_same(const struct ih_ellipse *a, const struct ih_ellipse *b)
            a->merit_q8 == b->merit_q8;
 }
 
-/* Where the search's sums have their origin; the place is a node: a whole number of steps. */
-struct origin {
-    int32_t x_q8, y_q8;
-};
-
 /* Has the stretch from..to, closed by its chord, the ellipse's area and centre? The area is the
  * core's to the last bit, the centre within 1/256 step. */
-static bool has_moments(const struct ih_hypotheses_scratch *scratch, int32_t from, int32_t to,
-                        const struct origin *origin, const struct ih_ellipse *ellipse)
+static bool has_moments(const struct ih_parts *parts, int32_t from, int32_t to,
+                        const struct ih_ellipse *ellipse)
 {
-    const struct ih_parts *parts = &scratch->parts;
-    const struct ih_moments *after = &scratch->ellipse.prefix[to];
-    const struct ih_moments *before = &scratch->ellipse.prefix[from];
-    int64_t px = parts->x_q8[to] - origin->x_q8, py = parts->y_q8[to] - origin->y_q8;
-    int64_t qx = parts->x_q8[from] - origin->x_q8, qy = parts->y_q8[from] - origin->y_q8;
-    int64_t w = px * qy - qx * py;
-    int64_t area2_q16 = after->area2_q16 - before->area2_q16 + w;
+    const struct ih_parts_sums *sums = &parts->sums;
+    const int64_t px = parts->dx_q8[to], py = parts->dy_q8[to];
+    const int64_t qx = parts->dx_q8[from], qy = parts->dy_q8[from];
+    const int64_t w = px * qy - qx * py;
+    const uint32_t wrapped = sums->area2_q16[to] - sums->area2_q16[from] + (uint32_t)w;
+    const int64_t area2_q16 = (int32_t)wrapped;
     if (area2_q16 / 2 != ellipse->area_q16 || area2_q16 <= 0) {
         return false;
     }
-    int64_t x_q8 = (after->x_q24 - before->x_q24 + w * (px + qx)) / (3 * area2_q16);
-    int64_t y_q8 = (after->y_q24 - before->y_q24 + w * (py + qy)) / (3 * area2_q16);
-    return llabs(x_q8 + origin->x_q8 - ellipse->x_q16 / 256) <= 1 &&
-           llabs(y_q8 + origin->y_q8 - ellipse->y_q16 / 256) <= 1;
+    /* About the middle of the outline. */
+    const int64_t x_q8 = (sums->x_q24[to] - sums->x_q24[from] + w * (px + qx)) / (3 * area2_q16);
+    const int64_t y_q8 = (sums->y_q24[to] - sums->y_q24[from] + w * (py + qy)) / (3 * area2_q16);
+    return llabs(x_q8 + parts->x_q8[0] - parts->dx_q8[0] - ellipse->x_q16 / 256) <= 1 &&
+           llabs(y_q8 + parts->y_q8[0] - parts->dy_q8[0] - ellipse->y_q16 / 256) <= 1;
 }
 
 static void copy_stretch(const struct ih_parts *parts, int32_t from, int32_t to, struct part *out)
@@ -60,10 +55,9 @@ static bool find_part(struct ih_hypotheses_scratch *scratch, const struct ih_nes
         !is_same(&ellipse, &slice->ellipse)) {
         return false;
     }
-    struct origin origin = {nest->minimum.x_q9 / 2, nest->minimum.y_q9 / 2};
     for (int32_t from = 0; from < IH_PARTS_POINTS; from++) {
         for (int32_t to = from + 1; to < parts->count && to < from + IH_PARTS_POINTS; to++) {
-            if (has_moments(scratch, from, to, &origin, &ellipse)) {
+            if (has_moments(parts, from, to, &ellipse)) {
                 copy_stretch(parts, from, to, out);
                 return true;
             }

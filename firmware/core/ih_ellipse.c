@@ -8,13 +8,6 @@
  * stay below 2^58. */
 #define GRID_Q16 ((int64_t)IH_SURFACE_GRID << 16)
 #define VARIANCE_MAX_Q16 ((int64_t)IH_SURFACE_GRID * IH_SURFACE_GRID << 16)
-/* The weights of chord and shape in a part's merit. */
-#define CHORD_COST_Q8 410 /* 1.6 */
-#define SHAPE_COST 8
-/* No simple polygon has a shape below 1, the ellipse's: less means that the chord crosses the arc.
- * 1 / 256 is left for rounding. */
-#define SHAPE_MIN_Q16 65280
-
 /* How the edge p -> q crosses the positive x axis. */
 static int32_t winding_of_edge(int64_t px, int64_t py, int64_t qx, int64_t qy)
 {
@@ -38,7 +31,6 @@ static void add_edge(struct ih_moments *m, int64_t px, int64_t py, int64_t qx, i
     m->xx_q32 += w * (px * px + px * qx + qx * qx);
     m->yy_q32 += w * (py * py + py * qy + qy * qy);
     m->xy_q32 += w * (2 * px * py + px * qy + qx * py + 2 * qx * qy) / 2;
-    m->winding += winding_of_edge(px, py, qx, qy);
 }
 
 /* Axis ratio from the covariance; 0 when it is not positive definite. */
@@ -169,111 +161,107 @@ static struct spot seen_from(const struct ih_parts *parts, int32_t k, struct ih_
                          parts->y_q8[k] - half_q9(place.y_q9)};
 }
 
-/* Prefix sums of the moments. */
-static void accumulate(const struct ih_parts *parts, struct ih_vertex place,
-                       struct ih_ellipse_scratch *scratch)
+static void accumulate_winding(const struct ih_parts *parts, struct ih_vertex place,
+                               struct ih_ellipse_scratch *scratch)
 {
-    struct ih_moments m = {0};
+    int32_t winding = 0;
     struct spot p = seen_from(parts, 0, place);
-    scratch->prefix[0] = m;
+    scratch->winding[0] = 0;
     for (int32_t k = 1; k < parts->count; k++) {
         struct spot q = seen_from(parts, k, place);
-        add_edge(&m, p.x_q8, p.y_q8, q.x_q8, q.y_q8);
-        scratch->prefix[k] = m;
+        winding += winding_of_edge(p.x_q8, p.y_q8, q.x_q8, q.y_q8);
+        scratch->winding[k] = winding;
         p = q;
     }
 }
 
-/* Do the points from..to, closed by their chord, wind round the place once? */
-static bool winds_round(const struct ih_parts *parts, int32_t from, int32_t to,
+/* Does the part, closed by its chord, wind round the place once? */
+static bool winds_round(const struct ih_parts *parts, const struct ih_part *part,
                         struct ih_vertex place, const struct ih_ellipse_scratch *scratch)
 {
+    const int32_t from = part->from, to = part->from + part->steps;
     const struct spot p = seen_from(parts, to, place);
     const struct spot q = seen_from(parts, from, place);
-    return scratch->prefix[to].winding - scratch->prefix[from].winding +
+    return scratch->winding[to] - scratch->winding[from] +
                winding_of_edge(p.x_q8, p.y_q8, q.x_q8, q.y_q8) ==
            1;
 }
 
-/* Moments of the points from..to closed by their chord. */
-static struct ih_moments part_moments(const struct ih_parts *parts, int32_t from, int32_t to,
-                                      struct ih_vertex place,
-                                      const struct ih_ellipse_scratch *scratch)
+/* Moments of the part, closed by its chord, about the place. */
+static struct ih_moments part_moments(const struct ih_parts *parts, const struct ih_part *part,
+                                      struct ih_vertex place)
 {
-    const struct ih_moments *after = &scratch->prefix[to];
-    const struct ih_moments *before = &scratch->prefix[from];
-    const struct spot p = seen_from(parts, to, place);
-    const struct spot q = seen_from(parts, from, place);
-    struct ih_moments m = {
-        .area2_q16 = after->area2_q16 - before->area2_q16,
-        .x_q24 = after->x_q24 - before->x_q24,
-        .y_q24 = after->y_q24 - before->y_q24,
-        .xx_q32 = after->xx_q32 - before->xx_q32,
-        .xy_q32 = after->xy_q32 - before->xy_q32,
-        .yy_q32 = after->yy_q32 - before->yy_q32,
-    };
-    add_edge(&m, p.x_q8, p.y_q8, q.x_q8, q.y_q8);
+    struct ih_moments m = {0};
+    struct spot p = seen_from(parts, part->from + part->steps, place);
+    for (int32_t k = part->from; k <= part->from + part->steps; k++) {
+        const struct spot q = seen_from(parts, k, place);
+        add_edge(&m, p.x_q8, p.y_q8, q.x_q8, q.y_q8);
+        p = q;
+    }
     return m;
 }
 
-/* A part's merit. */
-static int32_t merit_q8(int32_t arc_q8, int32_t chord_q8, int32_t shape_q16)
+/* Is the part, which winds round the place, an ellipse? */
+static bool measure_part(const struct ih_parts *parts, const struct ih_part *part,
+                         struct ih_vertex place, const struct ih_ellipse_params *params,
+                         struct ih_ellipse *out)
 {
-    int64_t shape_cost_q8 = ih_mul_shift((int64_t)SHAPE_COST * (shape_q16 - 65536), arc_q8, 16);
-    return ih_saturate_s32(arc_q8 - ih_mul_shift(CHORD_COST_Q8, chord_q8, 8) - shape_cost_q8);
-}
-
-/* Is the part an ellipse around the place, of at least so much merit? With the best shape it must
- * have that much: else no more is worked out. */
-static bool test_part(const struct ih_parts *parts, int32_t from, int32_t steps, int32_t least_q8,
-                      struct ih_vertex place, const struct ih_ellipse_params *params,
-                      const struct ih_ellipse_scratch *scratch, struct ih_ellipse *out)
-{
-    const int32_t to = from + steps;
-    const int32_t arc_q8 = parts->arc_q8[steps];
-    if (!winds_round(parts, from, to, place, scratch)) {
-        return false;
-    }
-    const int32_t chord_q8 = (int32_t)ih_isqrt_u64((uint64_t)ih_parts_chord2_q16(parts, from, to));
-    if (merit_q8(arc_q8, chord_q8, SHAPE_MIN_Q16) < least_q8) {
-        return false;
-    }
-    const struct ih_moments m = part_moments(parts, from, to, place, scratch);
+    const struct ih_moments m = part_moments(parts, part, place);
     if (!ellipse_of_moments(&m, half_q9(place.x_q9), half_q9(place.y_q9), out) ||
-        out->area_q16 <= 0 || out->shape_q16 < SHAPE_MIN_Q16 ||
+        out->area_q16 <= 0 || out->shape_q16 < IH_PARTS_SHAPE_MIN_Q16 ||
         out->shape_q16 > params->shape_max_q16 || !set_ratio(out) ||
         out->ratio_q16 > params->ratio_part_max_q16) {
         return false;
     }
-    out->merit_q8 = merit_q8(arc_q8, chord_q8, out->shape_q16);
-    return out->merit_q8 >= least_q8;
+    const int32_t chord2_q16 = ih_parts_chord2_q16(parts, part->from, part->from + part->steps);
+    out->merit_q8 = ih_parts_merit_q8(parts->arc_q8[part->steps],
+                                      (int32_t)ih_isqrt_u64((uint64_t)chord2_q16), out->shape_q16);
+    IH_IN_RANGE(out->merit_q8, INT32_MIN, part->merit_max_q8);
+    return true;
+}
+
+/* The part that may have the most merit of those that wind round the place; IH_NONE when none does. */
+static int32_t most_promising(const struct ih_parts *parts, struct ih_vertex place,
+                              const struct ih_ellipse_scratch *scratch)
+{
+    int32_t most = IH_NONE;
+    for (int32_t i = 0; i < parts->part_count; i++) {
+        const struct ih_part *part = &parts->part[i];
+        if ((most == IH_NONE || part->merit_max_q8 > parts->part[most].merit_max_q8) &&
+            winds_round(parts, part, place, scratch)) {
+            most = i;
+        }
+    }
+    return most;
 }
 
 bool ih_ellipse_of_part(const struct ih_parts *parts, struct ih_vertex place,
                         const struct ih_ellipse_params *params, struct ih_ellipse_scratch *scratch,
                         struct ih_ellipse *out)
 {
-    if (!parts->has_parts) {
+    if (parts->part_count == 0) {
         return false;
     }
-    accumulate(parts, place, scratch);
-    bool found = false;
-    /* Of equal ones the first, the shortest of those, is taken. Long ones, which have more merit,
-     * are looked at first. */
-    for (int32_t from = 0; from < IH_PARTS_POINTS; from++) {
-        bool found_here = false;
-        uint64_t left = parts->may_be[from];
-        while (left != 0) {
-            const int32_t steps = ih_bits_u64(left) - 1;
-            int32_t least_q8 = !found ? INT32_MIN : out->merit_q8 + (found_here ? 0 : 1);
-            struct ih_ellipse ellipse;
-            if (test_part(parts, from, steps, least_q8, place, params, scratch, &ellipse)) {
-                *out = ellipse;
-                found = true;
-                found_here = true;
-            }
-            left ^= (uint64_t)1 << steps;
+    accumulate_winding(parts, place, scratch);
+    const int32_t first = most_promising(parts, place, scratch);
+    if (first == IH_NONE) {
+        return false;
+    }
+    int32_t found = measure_part(parts, &parts->part[first], place, params, out) ? first : IH_NONE;
+    for (int32_t i = 0; i < parts->part_count; i++) {
+        const struct ih_part *part = &parts->part[i];
+        struct ih_ellipse ellipse;
+        if (i != first && (found == IH_NONE || part->merit_max_q8 >= out->merit_q8) &&
+            winds_round(parts, part, place, scratch) &&
+            measure_part(parts, part, place, params, &ellipse) &&
+            (found == IH_NONE || ellipse.merit_q8 > out->merit_q8 ||
+             (ellipse.merit_q8 == out->merit_q8 && i < found))) {
+            *out = ellipse;
+            found = i;
         }
     }
-    return found;
+    if (found != IH_NONE) {
+        scratch->part = parts->part[found];
+    }
+    return found != IH_NONE;
 }

@@ -4,10 +4,11 @@
  * In:    a polygon on the grid; for the part its outline, and a place that it must surround.
  * Out:   area, centre and second moments; shape = 4 pi sqrt(det) / area, det that of the
  *        covariance: 1 for an ellipse and greater for everything else.
- * Way:   moments are sums over the edges, so prefix sums give those of any part closed by its
- *        chord. Of all parts that the outline leaves (IH_PARTS_STEPS_MIN of its steps at least,
- *        chord <= chord_max arc), that wind round the place and are elliptical, the one with the
- *        greatest arc - 1.6 chord - 8 (shape - 1) arc is taken.
+ * Way:   moments are sums over the edges. Of all parts (IH_PARTS_STEPS_MIN of the outline's steps at
+ *        least, chord <= chord_max arc) that wind round the place and are elliptical, the one with the
+ *        greatest arc - 1.6 chord - 8 (shape - 1) arc is taken, of equal ones the first, the shortest
+ *        of those. ih_parts says which may be some and what they can have at the most: the most
+ *        promising one is measured first, then only those that may have as much.
  *        No simple polygon has a shape below 1: a part with less (1/256 is left for rounding)
  *        crosses its own chord and is refused, as is an area below half a grid cell.
  * Scaling and overflow: coordinates relative to the place, Q8 steps: |p| below 46 * 256 * 1.42 =
@@ -36,11 +37,11 @@ struct ih_moments {
     int64_t area2_q16;              /* twice the area */
     int64_t x_q24, y_q24;           /* 6 times the first moments */
     int64_t xx_q32, xy_q32, yy_q32; /* 12 times the second moments */
-    int32_t winding;
 };
 
 struct ih_ellipse_scratch {
-    struct ih_moments prefix[2 * IH_PARTS_POINTS]; /* of an outline's edges before each point */
+    int32_t winding[2 * IH_PARTS_POINTS]; /* of an outline's edges before each point */
+    struct ih_part part;                  /* the one that was found */
 };
 
 /* Moments of a closed contour. False when it has no area. */

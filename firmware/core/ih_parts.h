@@ -1,25 +1,36 @@
 /* ih_parts - a contour as a polygon of equal steps, and which of its parts may be ellipses.
  *
  * In:    a contour.
- * Out:   a box around it; IH_PARTS_POINTS points at equal steps along it; for each pair of them
- *        whether the part between, closed by its chord, is worth a closer look.
+ * Out:   a box around it; IH_PARTS_POINTS points at equal steps along it; of the parts between two of
+ *        them, closed by their chords, those that are worth a closer look, each with the most merit
+ *        that it can have.
  * Way:   what is the same for all minima that a contour may surround is worked out here once;
- *        ih_ellipse measures what is left. A part is left out when its chord is longer than
- *        chord_max, or when its outline is too spread for its area: an ellipse of axis ratio r and
- *        area A has a trace of its second moments of (r + 1 / r) A / 4 pi, and a polygon of shape s
- *        has s times that. Both limits together bound the trace, so that no root and no division
- *        is needed. 1/64 of it is left for what is rounded here and there.
- *        All sums of a part are relative to its first point: then the chord adds nothing to them.
- * Scaling and overflow: points differ by at most 46 * 256 = 2^13.53 in Q8 on each axis, 2^14.03 in
- *        all; a step is at most IH_PARTS_VERTICES_MAX / 55 * 1.42 grid steps = 2^12.4. An edge's
- *        cross product is below 2^26.5, its second-order term below 2^56.1: 112 of them 2^62.9.
- *        Area twice, a: b bits. With first moments (6 times) shifted by b - 15 and second ones (12
- *        times) by twice that, those of a simple polygon stay below 2^30.2 and 2^(60.7 - b); others
- *        are not judged here, nor are those with a trace below 0. 3 a times the trace and twice the
- *        squares of the others: not negative, below 2^62.7, so their difference fits.
- * Error: of the trace at most 3 units of Q16 here and 98 in ih_ellipse, of at least 43,600 for parts
- *        of 4 grid cells; smaller ones are not judged by it. That is a fourth of the 1/64.
- * Cost:  a square root for each vertex; 56 x 55 edges' sums at the very most.
+ *        ih_ellipse measures what is left. Sums over the edges about the middle of the outline give
+ *        those of any part. One is left out when its chord is longer than chord_max; when it is too
+ *        spread for its area: an ellipse of axis ratio r and area A has a trace of its second moments
+ *        of (r + 1 / r) A / 4 pi, and a polygon of shape s has s times that; and when its shape or
+ *        its ratio is beyond the limit. None of it needs a root, and what is rounded is allowed for.
+ *        A part that grows at its end, by triangles that all add area, has no less spread times area
+ *        than before (the least of the squares' integral over all centres grows with what is
+ *        integrated): while its area is too small for that, it is not looked at.
+ * Scaling and overflow: the outline lies within 2^h of its middle on each axis, h at most 13. The
+ *        edges' cross products must have absolute values that sum up to at most 2^(2h + 5), else (it
+ *        is tangled) no part is judged; nor is a part of more area, twice, than the box,
+ *        which is 2^(2h + 3). So first moments, six times, are below 2^(3h + 6.2), second ones, twelve
+ *        times, below 2^(4h + 7.8). Shifted by 3h - 24, and by twice that, they are below 2^30.2 and
+ *        2^29.8 (of small outlines nothing is shifted, and they are smaller). Products of two first
+ *        moments, and three times a second one with the area, are below 2^60.4: four of those fit.
+ *        What is not judged is a part that may have any shape. Sums of areas are kept modulo 2^32:
+ *        twice the area of a part is less. What a curve of length L surrounds w times counts w times;
+ *        where it is at least w times round has an area of at most s^2 in a square of side s, and a
+ *        border of at least 3.54 times its area over s. Borders add up to L, below 2^18.2, so areas to
+ *        at most s L / 3.54, with s below 2^13.6: twice that is below 2^31.
+ * Error: a spread is 18 a^2 times a second moment, for twice the area a: 3 a times a sum less twice a
+ *        product of first moments. A part that ih_ellipse accepts has its centre within 93 * 256 of
+ *        the outline's middle, so what the shift takes from first moments is at most 12 a 93 * 256 >>
+ *        shift of a spread, what it takes from second ones 3 a. ih_ellipse rounds second moments by at
+ *        most 49 units of Q16: 882 a^2. All three are left to a part beside the limits.
+ * Cost:  a square root for each vertex; 56 x 48 chords in lanes; an area for each short one.
  */
 #ifndef IH_PARTS_H
 #define IH_PARTS_H
@@ -29,10 +40,16 @@
 #define IH_PARTS_POINTS 56
 /* A part has at least this many of the steps: fewer are no ellipse's outline. */
 #define IH_PARTS_STEPS_MIN 8
+/* All that there are: from each point over each number of steps. */
+#define IH_PARTS_MAX (IH_PARTS_POINTS * (IH_PARTS_POINTS - IH_PARTS_STEPS_MIN))
 /* Longer contours are not searched for an elliptical part; it bounds the sums. */
 #define IH_PARTS_VERTICES_MAX 768
 /* A part must have this much area, twice: half a grid cell. */
 #define IH_PARTS_AREA2_MIN_Q16 65536
+
+/* No simple polygon has a shape below 1, the ellipse's: less means that the chord crosses the arc.
+ * 1 / 256 is left for rounding. */
+#define IH_PARTS_SHAPE_MIN_Q16 65280
 
 struct ih_ellipse_params {
     int32_t shape_max_q16;        /* most that shape may be for an ellipse, at least 1 */
@@ -46,16 +63,35 @@ struct ih_box {
     int32_t left_q9, right_q9, top_q9, bottom_q9;
 };
 
+/* From point `from` over the steps. */
+struct ih_part {
+    int32_t merit_max_q8; /* none that ih_ellipse measures is greater */
+    uint8_t from, steps;
+};
+
+/* [k]: sums over the edges before point k, about the outline's middle. */
+struct ih_parts_sums {
+    uint32_t area2_q16[2 * IH_PARTS_POINTS]; /* twice; modulo 2^32, see above */
+    int64_t x_q24[2 * IH_PARTS_POINTS], y_q24[2 * IH_PARTS_POINTS];   /* 6 times */
+    int64_t trace_q32[2 * IH_PARTS_POINTS];                           /* 12 times, x and y */
+    int64_t xx_q32[2 * IH_PARTS_POINTS], xy_q32[2 * IH_PARTS_POINTS]; /* 12 and 24 times */
+};
+
 struct ih_parts {
     bool closed;
-    bool has_parts; /* any bit of may_be is set */
-    int32_t count;  /* points in use: a closed contour goes round twice */
+    int32_t count; /* points in use: a closed contour goes round twice */
     int32_t x_q8[2 * IH_PARTS_POINTS], y_q8[2 * IH_PARTS_POINTS]; /* places on the grid */
-    /* By steps: length of a part; square of its longest chord, and one more. */
-    int32_t arc_q8[IH_PARTS_POINTS];
+    int32_t arc_q8[IH_PARTS_POINTS];                              /* length of a part, by steps */
+    int32_t part_count;
+    struct ih_part part[IH_PARTS_MAX]; /* by point, then by steps */
+    /* scratch: of edges, their lengths; of points, the place from the middle and the square of its distance; square of the longest
+     * chord, and one more, by steps; bit k of [from]: the chord over k steps is short enough */
+    int32_t length_q9[IH_PARTS_VERTICES_MAX];
+    int32_t dx_q8[2 * IH_PARTS_POINTS], dy_q8[2 * IH_PARTS_POINTS];
+    int32_t square_q16[2 * IH_PARTS_POINTS];
     int32_t chord2_end_q16[IH_PARTS_POINTS];
-    /* [from], bit k: the part from point `from` over k steps may be an ellipse. */
-    uint64_t may_be[IH_PARTS_POINTS];
+    uint32_t short_low[IH_PARTS_POINTS], short_high[IH_PARTS_POINTS];
+    struct ih_parts_sums sums;
 };
 
 void ih_ellipse_params_default(struct ih_ellipse_params *params);
@@ -73,6 +109,9 @@ static inline int32_t ih_parts_chord2_q16(const struct ih_parts *parts, int32_t 
     int32_t dy = parts->y_q8[to] - parts->y_q8[from];
     return dx * dx + dy * dy; /* at most 2 (46 * 256)^2 = 2^28.1 */
 }
+
+/* A part's merit: arc - 1.6 chord - 8 (shape - 1) arc. */
+int32_t ih_parts_merit_q8(int32_t arc_q8, int32_t chord_q8, int32_t shape_q16);
 
 /* False when the contour is not searched: too few vertices, or too many. */
 bool ih_parts_make(const struct ih_cuts *cuts, const struct ih_contour *contour,

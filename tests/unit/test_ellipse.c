@@ -492,6 +492,133 @@ static void limits_may_be_reached(void)
     }
 }
 
+/* One part by itself, whatever ih_parts says of it. */
+static bool is_ellipse(int32_t from, int32_t steps, struct ih_vertex place, struct ih_ellipse *out)
+{
+    static struct ih_parts one;
+
+    one = parts;
+    one.part_count = 1;
+    one.part[0] = (struct ih_part){INT32_MAX, (uint8_t)from, (uint8_t)steps};
+    return ih_ellipse_of_part(&one, place, &params, &scratch, out);
+}
+
+/* The most merit that ih_parts gives the part; INT32_MIN when it is none. */
+static int32_t promised_merit(int32_t from, int32_t steps)
+{
+    int32_t i;
+
+    for (i = 0; i < parts.part_count; i++) {
+        if (parts.part[i].from == from && parts.part[i].steps == steps) {
+            return parts.part[i].merit_max_q8;
+        }
+    }
+    return INT32_MIN;
+}
+
+/* Every part with a short enough chord is measured; the first and shortest of the best is taken. */
+static void compare_with_all_parts(struct ih_vertex place, int64_t at, int32_t *ellipse_count)
+{
+    struct ih_ellipse best = {0}, other;
+    struct ih_part part = {0};
+    bool found = false;
+    int32_t from, k;
+
+    if (!ih_parts_make(&cuts, &contour, &params, &parts)) {
+        return;
+    }
+    for (from = 0; from < IH_PARTS_POINTS; from++) {
+        for (k = IH_PARTS_STEPS_MIN; k < IH_PARTS_POINTS && from + k < parts.count; k++) {
+            const int64_t most_q8 = (int64_t)params.chord_max_q16 * parts.arc_q8[k] / 65536;
+
+            if (ih_parts_chord2_q16(&parts, from, from + k) >= (most_q8 + 1) * (most_q8 + 1) ||
+                !is_ellipse(from, k, place, &other)) {
+                continue;
+            }
+            ++*ellipse_count;
+            if (promised_merit(from, k) < other.merit_q8) {
+                IH_TEST_EQUAL(other.merit_q8, promised_merit(from, k), "promised merit", at);
+            }
+            if (!found || other.merit_q8 > best.merit_q8) {
+                best = other;
+                part = (struct ih_part){0, (uint8_t)from, (uint8_t)k};
+                found = true;
+            }
+        }
+    }
+    IH_TEST_EQUAL(found, ih_ellipse_of_part(&parts, place, &params, &scratch, &other), "found", at);
+    if (found) {
+        IH_TEST_EQUAL(0, memcmp(&best, &other, sizeof best), "the best", at);
+        IH_TEST_EQUAL(part.from, scratch.part.from, "its beginning", at);
+        IH_TEST_EQUAL(part.steps, scratch.part.steps, "its steps", at);
+    }
+}
+
+/* Outlines of all sizes, open and closed, round and lobed, smooth and rough, with limits of all kinds. */
+static void no_part_is_missed_that_looking_at_all_would_find(void)
+{
+    static struct ih_vertex vertex[IH_PARTS_VERTICES_MAX];
+    struct ih_test_random random = {85};
+    int32_t ellipse_count = 0, pass, i;
+
+    for (pass = 0; pass < 150; pass++) {
+        const int32_t count = 40 + pass * 4;
+        const double radius = 0.7 + pow((double)ih_test_between(&random, 0, 1000) / 1000, 2) * 21;
+        const double wide = 0.6 + (double)ih_test_between(&random, 0, 100) / 100;
+        const double lobe = pass % 3 == 0 ? 0 : (double)ih_test_between(&random, 0, 50) / 100;
+        const double rough = pass % 5 == 0 ? radius / 10 : 0.01;
+        const double x = (double)ih_test_between(&random, 0, 46);
+        const double y = (double)ih_test_between(&random, 0, 46);
+        const struct ih_vertex place = {(int16_t)(x * UNIT), (int16_t)(y * UNIT)};
+
+        for (i = 0; i < count; i++) {
+            const double angle = (pass % 2 == 0 ? 2 : 1.8) * acos(-1.0) * i / count;
+            const double noise = (double)ih_test_between(&random, -100, 100) / 100 * rough;
+            const double r = radius * (1 + lobe * cos((1 + pass % 4) * angle + pass)) + noise;
+
+            vertex[i] = (struct ih_vertex){
+                (int16_t)lround(fmax(0, fmin(46, x + r * wide * cos(angle))) * UNIT),
+                (int16_t)lround(fmax(0, fmin(46, y + r * sin(angle))) * UNIT)};
+        }
+        ih_ellipse_params_default(&params);
+        if (pass % 4 == 1) {
+            params.shape_max_q16 += 2000 * (pass % 16);
+            params.ratio_part_max_q16 += 3000 * (pass % 32);
+            params.chord_max_q16 += 500 * (pass % 64);
+        }
+        take(vertex, count, pass % 2 == 0);
+        compare_with_all_parts(place, pass, &ellipse_count);
+    }
+    TEST_ASSERT_GREATER_THAN(5000, ellipse_count);
+}
+
+/* The eight of a walk all over the grid, whose parts cross themselves: what passes then is an accident. */
+static void no_part_of_a_walk_is_missed(void)
+{
+    static struct ih_vertex vertex[IH_PARTS_VERTICES_MAX];
+    struct ih_test_random random = {86};
+    int32_t ellipse_count = 0, pass, i;
+
+    for (pass = 0; pass < 60; pass++) {
+        const int32_t stride = 1 << ih_test_between(&random, 3, 9);
+        const int32_t count = pass % 2 == 0 ? IH_PARTS_VERTICES_MAX : 90;
+        int32_t x = 23 * UNIT, y = 23 * UNIT;
+
+        for (i = 0; i < count; i++) {
+            x += (int32_t)ih_test_between(&random, -stride, stride);
+            y += (int32_t)ih_test_between(&random, -stride, stride);
+            x = x < 0 ? 0 : x > 46 * UNIT ? 46 * UNIT : x;
+            y = y < 0 ? 0 : y > 46 * UNIT ? 46 * UNIT : y;
+            vertex[i] = (struct ih_vertex){(int16_t)x, (int16_t)y};
+        }
+        take(vertex, count, pass % 3 == 0);
+        compare_with_all_parts((struct ih_vertex){(int16_t)(vertex[count / 2].x_q9 & ~1),
+                                                  (int16_t)(vertex[count / 2].y_q9 & ~1)},
+                               pass, &ellipse_count);
+    }
+    TEST_ASSERT_GREATER_THAN(100, ellipse_count);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -505,6 +632,8 @@ int main(void)
     RUN_TEST(the_best_part_matches_the_float_search);
     RUN_TEST(limits_are_obeyed);
     RUN_TEST(limits_may_be_reached);
+    RUN_TEST(no_part_is_missed_that_looking_at_all_would_find);
+    RUN_TEST(no_part_of_a_walk_is_missed);
     RUN_TEST(areas_and_ratios_have_their_limits);
     RUN_TEST(contours_have_eight_to_768_vertices);
     RUN_TEST(what_crosses_itself_is_no_ellipse);
