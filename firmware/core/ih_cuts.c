@@ -1,18 +1,25 @@
 #include "ih_cuts.h"
 
+#include <string.h>
+
 #include "ih_fix.h"
 
 #define CELLS (IH_SURFACE_GRID - 1)
 /* Cells of a row, bit by bit; those at the border. */
 #define ALL_CELLS (((uint64_t)1 << CELLS) - 1)
 #define BORDER_CELLS ((uint64_t)1 << (CELLS - 1) | 1)
-/* Nodes of a row are looked at eight at a time. */
-#define EIGHTS ((IH_SURFACE_GRID + 7) / 8)
+/* Nodes compared at once: no row has any left. */
+#define LANES 32
+_Static_assert(IH_SURFACE_GRID >= LANES, "a row of nodes fills the lanes");
 /* Its product with eight bytes of 0 or 1 has them as bits in its highest byte: none meets another. */
+#if __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__
 #define GATHER UINT64_C(0x0102040810204080)
+#else
+#define GATHER UINT64_C(0x8040201008040201)
+#endif
 /* With a rise below this a crossing is worked out in 32 bits. */
 #define RISE_NARROW (1 << 22)
-_Static_assert(EIGHTS * 8 <= 64, "a row of nodes has a bit each in 64");
+_Static_assert(IH_CUTS_ROW_BYTES <= 64, "a row of nodes has a bit each in 64");
 
 /* Corners of a cell clockwise on the screen; edge i runs from corner i to corner i + 1. A contour
  * walks with the inside on its right, so it enters through an edge whose corner i is inside and
@@ -155,32 +162,76 @@ static void start_in_cell(const struct ih_surface *surface, struct ih_cuts *cuts
     for (int32_t half = 0; half < 2; half++) {
         const bool between_inside = (cuts->inside[y + half] >> (x + 1 - half) & 1u) != 0;
         const int32_t edge = 2 * half + (between_inside ? 1 : 0);
-        const bool on_border = !is_cell(x + beyond_x[edge], y + beyond_y[edge]);
+        const int32_t across = edge % 2 == 0 ? y : x;
+        const bool on_border = across == (edge == 1 || edge == 2 ? CELLS - 1 : 0);
         if ((cuts->entrance[half][y] >> x & 1u) != 0 && (on_border || !border)) {
             trace(surface, cuts, (struct walker){x, y, edge});
         }
     }
 }
 
-/* Bit x = node x of a row is inside. */
-static uint64_t inside_nodes(const int32_t depth_mm_q8[IH_SURFACE_GRID], int32_t level_mm_q8)
+/* A byte for each node; loaded eight at a time. */
+static void compare_nodes(const struct ih_surface *surface, struct ih_cuts *cuts)
 {
-    uint8_t is_inside[EIGHTS * 8];
-    for (int32_t x = 0; x < IH_SURFACE_GRID; x++) {
-        is_inside[x] = depth_mm_q8[x] < level_mm_q8;
+    const int32_t level_mm_q8 = cuts->level_mm_q8;
+    for (int32_t y = 0; y < IH_SURFACE_GRID; y++) {
+        const int32_t *depth_mm_q8 = surface->depth_mm_q8[y];
+        uint8_t *is_inside = cuts->is_inside[y];
+        for (int32_t block = 0; block < IH_SURFACE_GRID; block += LANES) {
+            const int32_t first = ih_min_s32(block, IH_SURFACE_GRID - LANES); /* some twice */
+            for (int32_t x = first; x < first + LANES; x++) {
+                is_inside[x] = depth_mm_q8[x] < level_mm_q8;
+            }
+        }
+        for (int32_t x = IH_SURFACE_GRID; x < IH_CUTS_ROW_BYTES; x++) {
+            is_inside[x] = 0;
+        }
     }
-    for (int32_t x = IH_SURFACE_GRID; x < EIGHTS * 8; x++) {
-        is_inside[x] = 0;
+}
+
+static void find_inside(const struct ih_surface *surface, struct ih_cuts *cuts)
+{
+    compare_nodes(surface, cuts);
+    for (int32_t y = 0; y < IH_SURFACE_GRID; y++) {
+        uint64_t nodes = 0;
+        for (int32_t x = 0; x < IH_CUTS_ROW_BYTES; x += 8) {
+            uint64_t eight;
+            memcpy(&eight, &cuts->is_inside[y][x], sizeof eight);
+            nodes |= IH_WRAPS(uint64_t, eight * GATHER) >> 56 << x;
+        }
+        cuts->inside[y] = nodes;
     }
-    uint64_t nodes = 0;
-    for (int32_t i = 0; i < EIGHTS; i++) {
-        const uint8_t *b = &is_inside[8 * i]; /* one load, where the lowest byte comes first */
-        const uint64_t eight = (uint64_t)b[0] | (uint64_t)b[1] << 8 | (uint64_t)b[2] << 16 |
-                               (uint64_t)b[3] << 24 | (uint64_t)b[4] << 32 | (uint64_t)b[5] << 40 |
-                               (uint64_t)b[6] << 48 | (uint64_t)b[7] << 56;
-        nodes |= IH_WRAPS(uint64_t, eight * GATHER) >> 56 << (8 * i);
+}
+
+static int32_t count_bits(uint64_t bits)
+{
+    const uint64_t twos = bits - (bits >> 1 & UINT64_C(0x5555555555555555));
+    const uint64_t fours =
+        (twos & UINT64_C(0x3333333333333333)) + (twos >> 2 & UINT64_C(0x3333333333333333));
+    const uint64_t eights = (fours + (fours >> 4)) & UINT64_C(0x0f0f0f0f0f0f0f0f);
+    return (int32_t)(IH_WRAPS(uint64_t, eights * UINT64_C(0x0101010101010101)) >> 56);
+}
+
+/* An open contour has two vertices at the border, a closed one has four at least. */
+bool ih_cuts_surely_fit(const struct ih_surface *surface, int32_t level_mm_q8,
+                        struct ih_cuts *scratch)
+{
+    const uint64_t *inside = scratch->inside;
+    int32_t vertices = 0, at_border = 0;
+    scratch->level_mm_q8 = level_mm_q8;
+    find_inside(surface, scratch);
+    for (int32_t y = 0; y < IH_SURFACE_GRID; y++) {
+        const int32_t across = count_bits((inside[y] ^ inside[y] >> 1) & ALL_CELLS);
+        vertices += across;
+        at_border += y == 0 || y == CELLS ? across : 0;
+        if (y > 0) {
+            const uint64_t down = inside[y - 1] ^ inside[y];
+            vertices += count_bits(down);
+            at_border += (int32_t)(down & 1u) + (int32_t)(down >> CELLS);
+        }
     }
-    return nodes;
+    return vertices <= IH_CUTS_VERTICES_MAX &&
+           at_border / 2 + (vertices - at_border) / 4 <= IH_CUTS_CONTOURS_MAX;
 }
 
 /* Which cells a contour enters through edge 0 or 1, and which through 2 or 3. */
@@ -213,9 +264,7 @@ void ih_cuts_level(const struct ih_surface *surface, int32_t level_mm_q8, struct
     out->contour_count = 0;
     out->vertex_count = 0;
     out->contours_dropped = 0;
-    for (int32_t y = 0; y < IH_SURFACE_GRID; y++) {
-        out->inside[y] = inside_nodes(surface->depth_mm_q8[y], level_mm_q8);
-    }
+    find_inside(surface, out);
     find_entrances(out);
     start_contours(surface, out, true);
     start_contours(surface, out, false);

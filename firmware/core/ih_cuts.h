@@ -22,6 +22,9 @@
 #define IH_CUTS_VERTICES_MAX 2048
 #define IH_CUTS_CONTOURS_MAX 64
 
+/* Nodes of a row, filled up to whole eights. */
+#define IH_CUTS_ROW_BYTES ((IH_SURFACE_GRID + 7) / 8 * 8)
+
 /* A place on the grid: 0 .. IH_SURFACE_GRID - 1 in steps, Q9. */
 struct ih_vertex {
     int16_t x_q9, y_q9;
@@ -41,8 +44,14 @@ struct ih_cuts {
     /* scratch, bit x of row y: node x is nearer; cell x is still to be entered by a contour, through its
      * upper or right edge, through its lower or left one */
     uint64_t inside[IH_SURFACE_GRID];
+    uint8_t is_inside[IH_SURFACE_GRID][IH_CUTS_ROW_BYTES]; /* the same, a byte each */
     uint64_t entrance[2][IH_SURFACE_GRID];
 };
+
+/* Does ih_cuts_level surely leave out no contour at this level? For a fourth of its work; what was in
+ * scratch is lost. */
+bool ih_cuts_surely_fit(const struct ih_surface *surface, int32_t level_mm_q8,
+                        struct ih_cuts *scratch);
 
 void ih_cuts_level(const struct ih_surface *surface, int32_t level_mm_q8, struct ih_cuts *out);
 

@@ -246,14 +246,22 @@ static void extend_nest(const struct ih_surface *surface, int32_t level_mm_q8,
     add_slice(&slice, level_mm_q8, params, nest);
 }
 
+/* Which nests want a support at this level? False: none. */
+static bool open_nests(int32_t level_mm_q8, const struct ih_hypotheses_params *params,
+                       struct ih_support support[IH_HYPOTHESES_MAX], struct ih_hypotheses *out)
+{
+    bool any = false;
+    for (int32_t i = 0; i < out->nest_count; i++) {
+        support[i] = (struct ih_support){.wanted = is_open(level_mm_q8, params, &out->nest[i])};
+        any = any || support[i].wanted;
+    }
+    return any;
+}
+
 static void extend_nests(const struct ih_surface *surface, int32_t level_mm_q8,
                          const struct ih_hypotheses_params *params,
                          struct ih_hypotheses_scratch *scratch, struct ih_hypotheses *out)
 {
-    for (int32_t i = 0; i < out->nest_count; i++) {
-        scratch->support[i] =
-            (struct ih_support){.wanted = is_open(level_mm_q8, params, &out->nest[i])};
-    }
     find_supports(out, &params->ellipse, scratch);
     for (int32_t i = 0; i < out->nest_count; i++) {
         if (scratch->support[i].wanted) {
@@ -295,6 +303,10 @@ void ih_hypotheses_find(const struct ih_surface *surface, const struct ih_hypoth
     int32_t level_mm_q8;
     for (int32_t index = 0;
          ih_hypotheses_level(surface, params, index, &level_mm_q8) && any_alive(out); index++) {
+        const bool is_wanted = open_nests(level_mm_q8, params, scratch->support, out);
+        if (!is_wanted && ih_cuts_surely_fit(surface, level_mm_q8, &scratch->cuts)) {
+            continue; /* between two nests; what is left out is counted at such a level too */
+        }
         ih_cuts_level(surface, level_mm_q8, &scratch->cuts);
         out->contours_dropped += scratch->cuts.contours_dropped;
         extend_nests(surface, level_mm_q8, params, scratch, out);

@@ -474,6 +474,69 @@ static void the_ends_of_the_range_do_not_overflow(void)
     TEST_ASSERT_TRUE(cuts.contour_count > 0);
 }
 
+/* A crossing is worked out in 32 bits or in 64, by the rise; cut() compares both with float64. */
+static void rises_of_all_sizes_are_crossed_where_they_should_be(void)
+{
+    int32_t bits, i, offset;
+
+    for (bits = 1; bits < 31; bits++) {
+        for (offset = -2; offset <= 2; offset++) {
+            const int64_t rise = (INT64_C(1) << bits) + offset;
+
+            for (i = 0; i < SIDE * SIDE; i++) {
+                surface.depth_mm_q8[i / SIDE][i % SIDE] =
+                    (i + i / SIDE) % 2 == 0 ? 100
+                                            : (int32_t)(100 + (rise > 0 ? rise : 1) - i % 3 / 2);
+            }
+            cut((int32_t)(101 + ih_test_between(&random_source, 0, rise > 0 ? rise - 1 : 0)));
+        }
+    }
+}
+
+/* Rough and smooth surfaces: what is said to fit does, and it is said of the smooth ones. */
+static void what_surely_fits_is_not_dropped(void)
+{
+    static struct ih_cuts other;
+    int32_t sure = 0, dropped = 0, pass, i;
+
+    for (pass = 0; pass < 400; pass++) {
+        const int64_t spread = INT64_C(1) << (1 + pass % 18);
+        const int32_t level = (860 + pass % 60) << 8;
+        bool fits;
+
+        for (i = 0; i < SIDE * SIDE; i++) {
+            surface.depth_mm_q8[i / SIDE][i % SIDE] =
+                (int32_t)lround(256 * hills(i % SIDE, (double)(i / SIDE))) +
+                (int32_t)ih_test_between(&random_source, -spread, spread);
+        }
+        fits = ih_cuts_surely_fit(&surface, level, &other);
+        ih_cuts_level(&surface, level, &cuts);
+        if (fits) {
+            IH_TEST_EQUAL(0, cuts.contours_dropped, "dropped", pass);
+        }
+        if (cuts.vertex_count <= 128 && cuts.contours_dropped == 0) {
+            IH_TEST_EQUAL(true, fits, "few", pass);
+        }
+        sure += fits;
+        dropped += cuts.contours_dropped > 0;
+    }
+    TEST_ASSERT_GREATER_THAN(100, sure);
+    TEST_ASSERT_GREATER_THAN(20, dropped);
+}
+
+/* As many diamonds as there is room for, then one more. */
+static void what_surely_fits_may_fill_the_table(void)
+{
+    int32_t count;
+
+    flat_at(1000);
+    for (count = 1; count <= IH_CUTS_CONTOURS_MAX + 1; count++) {
+        surface.depth_mm_q8[2 + (count - 1) / 20 * 3][2 + (count - 1) % 20 * 2] = 0;
+        IH_TEST_EQUAL(count <= IH_CUTS_CONTOURS_MAX, ih_cuts_surely_fit(&surface, 500, &cuts),
+                      "diamonds", count);
+    }
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -490,5 +553,8 @@ int main(void)
     RUN_TEST(contours_that_do_not_fit_are_counted);
     RUN_TEST(a_contour_longer_than_the_table_is_left_out_whole);
     RUN_TEST(the_ends_of_the_range_do_not_overflow);
+    RUN_TEST(rises_of_all_sizes_are_crossed_where_they_should_be);
+    RUN_TEST(what_surely_fits_is_not_dropped);
+    RUN_TEST(what_surely_fits_may_fill_the_table);
     return UNITY_END();
 }
