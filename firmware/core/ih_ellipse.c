@@ -9,22 +9,23 @@
 #define GRID_Q16 ((int64_t)IH_SURFACE_GRID << 16)
 #define VARIANCE_MAX_Q16 ((int64_t)IH_SURFACE_GRID * IH_SURFACE_GRID << 16)
 /* How the edge p -> q crosses the positive x axis. */
-static int32_t winding_of_edge(int64_t px, int64_t py, int64_t qx, int64_t qy)
+static int32_t winding_of_edge(int32_t px, int32_t py, int32_t qx, int32_t qy)
 {
     if ((py <= 0) == (qy <= 0)) {
         return 0;
     }
-    int64_t w = px * qy - qx * py;
+    int64_t w = (int64_t)px * qy - (int64_t)qx * py;
     return py <= 0 ? w > 0 : -(w < 0);
 }
 
 /* Add the edge p -> q. Green's theorem: with w = px qy - qx py,
  *   2 area = sum w                        6 int x  = sum w (px + qx)
  *   12 int x^2 = sum w (px^2 + px qx + qx^2)
- *   12 int x y = sum w (2 px py + px qy + qx py + 2 qx qy) / 2 */
-static void add_edge(struct ih_moments *m, int64_t px, int64_t py, int64_t qx, int64_t qy)
+ *   12 int x y = sum w (2 px py + px qy + qx py + 2 qx qy) / 2
+ * Coordinates are below 2^13.6, so w and its factors are below 2^29.9. */
+static void add_edge(struct ih_moments *m, int32_t px, int32_t py, int32_t qx, int32_t qy)
 {
-    int64_t w = px * qy - qx * py;
+    const int64_t w = px * qy - qx * py;
     m->area2_q16 += w;
     m->x_q24 += w * (px + qx);
     m->y_q24 += w * (py + qy);
@@ -152,7 +153,7 @@ int32_t ih_ellipse_winding(const struct ih_cuts *cuts, const struct ih_contour *
 
 /* A point of the outline, seen from a place. */
 struct spot {
-    int64_t x_q8, y_q8;
+    int32_t x_q8, y_q8;
 };
 
 static struct spot seen_from(const struct ih_parts *parts, int32_t k, struct ih_vertex place)
@@ -164,14 +165,17 @@ static struct spot seen_from(const struct ih_parts *parts, int32_t k, struct ih_
 static void accumulate_winding(const struct ih_parts *parts, struct ih_vertex place,
                                struct ih_ellipse_scratch *scratch)
 {
+    const int32_t y_q8 = half_q9(place.y_q9);
     int32_t winding = 0;
-    struct spot p = seen_from(parts, 0, place);
-    scratch->winding[0] = 0;
-    for (int32_t k = 1; k < parts->count; k++) {
-        struct spot q = seen_from(parts, k, place);
-        winding += winding_of_edge(p.x_q8, p.y_q8, q.x_q8, q.y_q8);
+    bool was_above = parts->y_q8[0] <= y_q8;
+    for (int32_t k = 0; k < parts->count; k++) {
+        const bool is_above = parts->y_q8[k] <= y_q8;
+        if (is_above != was_above) { /* else nothing is crossed */
+            const struct spot p = seen_from(parts, k - 1, place), q = seen_from(parts, k, place);
+            winding += winding_of_edge(p.x_q8, p.y_q8, q.x_q8, q.y_q8);
+            was_above = is_above;
+        }
         scratch->winding[k] = winding;
-        p = q;
     }
 }
 

@@ -7,12 +7,16 @@
  * centre from the middle of the outline; 18 times 49 units of Q16 of a second moment in ih_ellipse. */
 #define CENTRE_ERROR (12 * 93 * 256)
 #define MOMENT_ERROR 882
-/* Rounded in ih_ellipse, with some more. */
-#define SHAPE_ROUNDED_Q16 16
+/* Rounded of a shape in ih_ellipse: a unit, and one of the determinant's root, which is the shape's share of
+ * twice the area over 8 pi; with some more. */
+#define SHAPE_ROUNDED_Q16 3
+#define ROOT_ROUNDED_Q32 (1 << 21)
 /* 18 / 8 pi, rounded up: see limits_of. */
 #define CIRCLE_Q16 46938
 /* Limits of the spread beyond this would overflow; then nothing is left out. */
 #define SPREAD_LIMIT_MAX_Q16 (8 << 16)
+/* No part has so little area, twice. */
+#define AREA2_NONE_Q16 (IH_PARTS_AREA2_MIN_Q16 - 1)
 /* An outline whose edges' cross products sum up to more than this many times the square of its greatest
  * distance from its middle is not judged; nor is a part of more area, twice, than that many. */
 #define TANGLED_BITS 5
@@ -246,8 +250,8 @@ struct look {
     int32_t from, to;
     int64_t area2_q16; /* twice */
     int64_t x, y;
-    int64_t spread;              /* the trace of the second moments, times 18 area2^2 */
-    int64_t spread_limit, error; /* over the area */
+    int64_t spread;       /* the trace of the second moments, times 18 area2^2 */
+    int64_t spread_limit; /* over the area */
 };
 
 /* Where all parts of a sifting begin: its place from the middle, and the sums up to it. */
@@ -307,7 +311,8 @@ static bool look_at_shape(const struct ih_parts *parts, const struct limits *lim
     const int64_t yy = look->spread - xx;
     const int64_t most = look->spread_limit * area2;
     const int64_t square = area2 * area2 >> shift;
-    const int64_t error = area2 * look->error;
+    const int64_t error = 4 * (ih_abs_s64(look->x) + ih_abs_s64(look->y)) + 3 * area2 + 8 +
+                          (square * MOMENT_ERROR >> shift);
     if (xx < -error || yy < -error || ih_abs_s64(xy) > most + error) {
         return false;
     }
@@ -343,7 +348,8 @@ static int32_t least_shape_q16(const struct ih_parts *parts, const struct limits
     }
     /* sqrt(1 + u) >= 1 + u / 2 - u^2 / 8 */
     const int64_t u_q16 = ih_min_s32(ih_saturate_s32(above / ((r.cube2 >> 16) + 1)), 1 << 16);
-    return (int32_t)(65536 + u_q16 / 2 - (u_q16 * u_q16 >> 19) - SHAPE_ROUNDED_Q16);
+    return (int32_t)(65536 + u_q16 / 2 - (u_q16 * u_q16 >> 19) - SHAPE_ROUNDED_Q16 -
+                     ROOT_ROUNDED_Q32 / (int32_t)look->area2_q16);
 }
 
 int32_t ih_parts_merit_q8(int32_t arc_q8, int32_t chord_q8, int32_t shape_q16)
@@ -377,14 +383,32 @@ static void find_areas(const struct ih_parts *parts, int32_t from, int32_t area2
     }
 }
 
-/* How spread may the part be, over its area, with what is rounded? */
-static void limit_spread(const struct limits *limits, struct look *look)
+/* What may be rounded of a spread, over the area. */
+static int64_t spread_error(const struct limits *limits, int64_t area2)
 {
-    const int64_t area2 = look->area2_q16;
+    return limits->error + (area2 * MOMENT_ERROR >> (2 * limits->shift));
+}
+
+/* How spread may the part be, over its area, with what is rounded? */
+static int64_t spread_limit(const struct limits *limits, int64_t area2)
+{
     const int shift = limits->shift;
-    look->error = limits->error + (area2 * MOMENT_ERROR >> (2 * shift));
-    look->spread_limit =
-        ((area2 * area2 >> shift) * limits->spread_q16 >> (16 + shift)) + look->error;
+    return ((area2 * area2 >> shift) * limits->spread_q16 >> (16 + shift)) +
+           spread_error(limits, area2);
+}
+
+/* Up to which area are parts too spread, when this one is, and the next ones hold it? Over the area they
+ * are as spread at least, and the limit grows with the area's square at most. So it is the root of what
+ * this one is above the limit, for which stands 2 t / (1 + t), which is less. */
+static int64_t spread_until(const struct look *look, const struct limits *limits)
+{
+    const int64_t error = spread_error(limits, look->area2_q16);
+    const int64_t most = look->spread_limit * look->area2_q16;
+    const int64_t least = look->spread - error * look->area2_q16;
+    if (least <= most) {
+        return look->area2_q16;
+    }
+    return look->area2_q16 * (2 * least / ((least + most) / 65536 + 1)) / 65536;
 }
 
 /* Of the parts from a point whose chords are short enough those that may be ellipses. */
@@ -392,32 +416,30 @@ static void sift(struct ih_parts *parts, int32_t from, const struct limits *limi
 {
     const uint64_t short_ones =
         (uint64_t)parts->short_high[from] << 32 | (uint64_t)parts->short_low[from];
-    int64_t before_q16 = 0;
-    int64_t spread_least = 0; /* over the area, of all that follow while it grows */
     if (short_ones == 0) {
         return;
     }
     int32_t area2_q16[POINTS];
     find_areas(parts, from, area2_q16);
     const struct beginning beginning = begin_at(parts, from);
+    int64_t before_q16 = 0;
+    int64_t none_until_q16 = AREA2_NONE_Q16; /* while it grows */
     for (int32_t k = __builtin_ctzll(short_ones); short_ones >> k != 0; k++) {
-        struct look look = {.from = from, .to = from + k, .area2_q16 = area2_q16[k]};
-        spread_least = look.area2_q16 < before_q16 ? 0 : spread_least;
-        before_q16 = look.area2_q16;
-        if ((short_ones >> k & 1) == 0 || look.area2_q16 < IH_PARTS_AREA2_MIN_Q16) {
+        const int64_t area2 = area2_q16[k];
+        none_until_q16 = area2 < before_q16 ? AREA2_NONE_Q16 : none_until_q16;
+        before_q16 = area2;
+        if (area2 <= none_until_q16 || (short_ones >> k & 1) == 0) {
             continue;
         }
-        if (look.area2_q16 > limits->area2_most_q16) {
+        if (area2 > limits->area2_most_q16) {
             add_part(parts, from, k, IH_PARTS_SHAPE_MIN_Q16);
             continue;
         }
-        limit_spread(limits, &look);
-        if (spread_least > look.spread_limit) {
-            continue;
-        }
+        struct look look = {.from = from, .to = from + k, .area2_q16 = area2};
+        look.spread_limit = spread_limit(limits, area2);
         look_at_spread(parts, &beginning, limits->shift, &look);
-        if (look.spread > look.spread_limit * look.area2_q16) {
-            spread_least = look.spread / look.area2_q16 - look.error;
+        if (look.spread > look.spread_limit * area2) {
+            none_until_q16 = spread_until(&look, limits);
             continue;
         }
         const int32_t shape_q16 = least_shape_q16(parts, limits, &look);
