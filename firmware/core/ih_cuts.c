@@ -11,11 +11,11 @@
 /* Nodes compared at once: no row has any left. */
 #define LANES 32
 _Static_assert(IH_SURFACE_GRID >= LANES, "a row of nodes fills the lanes");
-/* Its product with eight bytes of 0 or 1 has them as bits in its highest byte: none meets another. */
+/* Its product with four bytes of 0 or 1 has them as bits from the 24th on: none meets another. */
 #if __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__
-#define GATHER UINT64_C(0x0102040810204080)
+#define GATHER 0x01020408u
 #else
-#define GATHER UINT64_C(0x8040201008040201)
+#define GATHER 0x08040201u
 #endif
 /* With a rise below this a crossing is worked out in 32 bits. */
 #define RISE_NARROW (1 << 22)
@@ -170,7 +170,7 @@ static void start_in_cell(const struct ih_surface *surface, struct ih_cuts *cuts
     }
 }
 
-/* A byte for each node; loaded eight at a time. */
+/* A byte for each node. */
 static void compare_nodes(const struct ih_surface *surface, struct ih_cuts *cuts)
 {
     const int32_t level_mm_q8 = cuts->level_mm_q8;
@@ -194,10 +194,10 @@ static void find_inside(const struct ih_surface *surface, struct ih_cuts *cuts)
     compare_nodes(surface, cuts);
     for (int32_t y = 0; y < IH_SURFACE_GRID; y++) {
         uint64_t nodes = 0;
-        for (int32_t x = 0; x < IH_CUTS_ROW_BYTES; x += 8) {
-            uint64_t eight;
-            memcpy(&eight, &cuts->is_inside[y][x], sizeof eight);
-            nodes |= IH_WRAPS(uint64_t, eight * GATHER) >> 56 << x;
+        for (int32_t x = 0; x < IH_CUTS_ROW_BYTES; x += 4) {
+            uint32_t four;
+            memcpy(&four, &cuts->is_inside[y][x], sizeof four);
+            nodes |= ((uint64_t)four * GATHER >> 24 & 15u) << x;
         }
         cuts->inside[y] = nodes;
     }
@@ -209,7 +209,9 @@ static int32_t count_bits(uint64_t bits)
     const uint64_t fours =
         (twos & UINT64_C(0x3333333333333333)) + (twos >> 2 & UINT64_C(0x3333333333333333));
     const uint64_t eights = (fours + (fours >> 4)) & UINT64_C(0x0f0f0f0f0f0f0f0f);
-    return (int32_t)(IH_WRAPS(uint64_t, eights * UINT64_C(0x0101010101010101)) >> 56);
+    const uint64_t halves = eights + (eights >> 32);
+    const uint64_t quarters = halves + (halves >> 16);
+    return (int32_t)((quarters + (quarters >> 8)) & 0x7fu);
 }
 
 /* An open contour has two vertices at the border, a closed one has four at least. */

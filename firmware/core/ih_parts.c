@@ -204,7 +204,7 @@ static void measure_extent(const struct ih_ellipse_params *params, struct ih_par
 }
 
 /* Sums over the edges, of a closed outline twice round. When it is too tangled none is judged. */
-static void sum_edges(struct ih_parts *parts, struct limits *limits)
+IH_WRAPPING static void sum_edges(struct ih_parts *parts, struct limits *limits)
 {
     struct ih_parts_sums *s = &parts->sums;
     uint32_t area2 = 0;
@@ -369,8 +369,8 @@ static void add_part(struct ih_parts *parts, int32_t from, int32_t steps, int32_
     };
 }
 
-/* Twice the areas of all parts from a point. */
-static void find_areas(const struct ih_parts *parts, int32_t from, int32_t area2_q16[POINTS])
+/* Twice the areas of all parts from a point: they fit into 32 bits, the sums they are of need not. */
+IH_WRAPPING static void find_areas(const struct ih_parts *parts, int32_t from, int32_t area2_q16[POINTS])
 {
     const int32_t x0 = parts->dx_q8[from], y0 = parts->dy_q8[from];
     const uint32_t before = parts->sums.area2_q16[from];
