@@ -370,7 +370,8 @@ static void add_part(struct ih_parts *parts, int32_t from, int32_t steps, int32_
 }
 
 /* Twice the areas of all parts from a point: they fit into 32 bits, the sums they are of need not. */
-IH_WRAPPING static void find_areas(const struct ih_parts *parts, int32_t from, int32_t area2_q16[POINTS])
+IH_WRAPPING static void find_areas(const struct ih_parts *parts, int32_t from,
+                                   int32_t area2_q16[POINTS])
 {
     const int32_t x0 = parts->dx_q8[from], y0 = parts->dy_q8[from];
     const uint32_t before = parts->sums.area2_q16[from];
