@@ -8,16 +8,15 @@
  *        1. More than half of the dots without a label, or labels as far from their lines as chance puts
  *           them: maybe the lines are wrong. Over IH_HEALTH_SEARCH frames the dots vote for a turn
  *           (ih_turn), which is tried. If it gives neither a quarter more labels nor better ones it is
- *           taken back.
- *        2. Else the turn that explains the labelled dots' distances from their lines: weighted
- *           least squares (Tukey, 0.3 px), three parameters, sums since the rig last changed. It is
- *           taken when it is more than 0.02 degrees and 5 times its uncertainty.
- *        A turn that was taken is refined from the next 4, 4 and 32 frames, then whenever twice as many
- *        are there as it was had from. A knock is so found and corrected within 49 of the frames that
- *        are looked at.
- *        The uncertainty counts dots that err in the same way in each frame, by 0.12 px: rays of the
- *        calibration, and what stands still. So it does not vanish with many frames. A
- *        prior as wide as the turn itself keeps what is hardly seen near 0.
+ *           taken back; if its labels are poor the search is repeated at once.
+ *        2. Else the turn that explains the labelled dots' distances from their lines, with all frames
+ *           since the rig last changed (ih_places). It is taken when it is more than 0.02 degrees
+ *           and 5 times its uncertainty.
+ *        A turn that was taken is refined from the next 4, 4 and 32 frames; from then on frames add up, and
+ *        it is refined whenever a quarter more are there. A knock is so found and corrected within 49
+ *        of the frames that are looked at.
+ *        A turn across the baseline, which is depth and which dots hardly show, is corrected for only
+ *        when it is known to IH_PLACES_SIGMA_MAX: what votes say of it alone is taken back.
  * Limits: within IH_TURN_MAX_RAD_Q30 about each axis. Not seen, and not corrected: a shift of the
  *        projector along the baseline. A shift across it is taken for a turn. docs/health.md
  * Cost:  361 slots a frame; ih_turn's while searching, and ih_rig_init when the rig changes.
@@ -27,8 +26,7 @@
 #ifndef IH_HEALTH_H
 #define IH_HEALTH_H
 
-#include "ih_labels.h"
-#include "ih_turn.h"
+#include "ih_places.h"
 
 /* Frames of a look, and of a search. */
 #define IH_HEALTH_LOOK 6
@@ -46,15 +44,6 @@ enum ih_health_state {
                            * limit helps */
 };
 
-/* Sums over labelled dots since the rig changed; weights are in Q8. */
-struct ih_health_sums {
-    int32_t frame_count;
-    int64_t normal_q16[6]; /* weight times slope times slope: xx, xy, xz, yy, yz, zz */
-    int64_t right_q24[3];  /* weight times slope times distance */
-    int64_t square_q32;    /* weight times distance squared */
-    int64_t weight_q8, rise_q8;
-};
-
 /* What the last frames of a look showed. */
 struct ih_health_look {
     int32_t frame_count, dot_count, labelled_count;
@@ -68,19 +57,24 @@ struct ih_health {
     int32_t across_px_q12;    /* mean distance of the last look's labelled dots; -1: none */
     int32_t turn_rad_q30[3];  /* of the rig against the calibration; camera axes */
     int32_t sigma_rad_q30[3]; /* its uncertainty, one standard deviation; 0 before the first one */
+    bool is_weak_known;       /* the turn across the baseline; if not, it is 0 */
     int32_t dot_count, labelled_count; /* of the last look, in all its frames */
     /* Its own. */
     struct ih_calibration nominal;
     struct ih_turn_slopes slopes;
     enum ih_health_stage stage;
-    int32_t step;  /* of searching or settling */
-    int32_t pause; /* looks */
-    struct ih_health_sums sums;
+    int32_t step;         /* of searching or settling */
+    int32_t pause;        /* looks */
+    int32_t search_count; /* one after the other */
     struct ih_health_look look;
     int32_t basis_count;          /* frames that the turn was had from */
-    struct ih_health_look before; /* a search, and the turn then */
+    struct ih_health_look before; /* a search, and what was known then */
     int32_t before_rad_q30[3];
-    struct ih_turn_votes votes;
+    bool was_weak_known;
+    union {
+        struct ih_places places;    /* since the rig last changed by more than a refinement */
+        struct ih_turn_votes votes; /* while searching */
+    } seen;
 };
 
 struct ih_health_scratch {

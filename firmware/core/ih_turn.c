@@ -108,8 +108,7 @@ static void look_across(const struct ih_dots *dots, const struct ih_line *line,
     }
 }
 
-/* The lattice's axes in the camera frame: along the middle dot's line, across it, and Z. */
-static void lattice_axes(const struct ih_rig *rig, int32_t axis_q30[2][2])
+void ih_turn_axes(const struct ih_rig *rig, int32_t axis_q30[2][2])
 {
     const struct ih_line *middle = &rig->line[IH_SLOTS / 2];
     axis_q30[0][0] = middle->dir_u_q30;
@@ -148,7 +147,7 @@ void ih_turn_vote(const struct ih_dots *dots, const struct ih_rig *rig,
     int64_t margin_px_q12 =
         ih_mul_shift(ih_max_s32(c->fx_px_q16, c->fy_px_q16), IH_TURN_MAX_RAD_Q30, 34);
     int32_t axis_q30[2][2];
-    lattice_axes(rig, axis_q30);
+    ih_turn_axes(rig, axis_q30);
     undistort_dots(dots, rig, scratch);
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
         const int32_t *slope = slopes->px_q4[slot];
@@ -178,7 +177,7 @@ void ih_turn_elect(const struct ih_turn_votes *votes, const struct ih_rig *rig,
     int64_t along_rad_q30 = along * step_rad_q30(IH_TURN_STEPS_ALONG);
     int64_t across_rad_q30 = across * step_rad_q30(IH_TURN_STEPS_ACROSS);
     int32_t axis_q30[2][2];
-    lattice_axes(rig, axis_q30);
+    ih_turn_axes(rig, axis_q30);
     for (int k = 0; k < 2; k++) {
         out->turn_rad_q30[k] = (int32_t)ih_shift_round(
             along_rad_q30 * axis_q30[0][k] + across_rad_q30 * axis_q30[1][k], 30);

@@ -53,6 +53,10 @@ struct ih_turn_winner {
     int32_t vote, vote_of_none; /* its own, and those of no turn at all */
 };
 
+/* The axes in the camera's X and Y along the middle dot's line, about which a turn is seen best, and
+ * across it, about which it is seen worst. */
+void ih_turn_axes(const struct ih_rig *rig, int32_t axis_q30[2][2]);
+
 void ih_turn_slopes(const struct ih_rig *rig, struct ih_turn_slopes *out);
 
 /* The nominal calibration with its rays turned. */

@@ -1,8 +1,8 @@
 /* knock DIR - the frames of a directory through ih_health, as isohead_board does it.
  *
  * Out:   per lit frame a line of JSON: the state, whether the rig was turned after it, turn and
- *        uncertainty, dots, labels and their mean distance of the last look; raw integers of struct
- *        ih_health.
+ *        uncertainty, dots, labels and their mean distance of the last look, frames that the turn was
+ *        had from; raw integers of struct ih_health.
  * Exit status: 0 every frame was processed, 1 something could not be read, 2 wrong usage.
  */
 #include <inttypes.h>
@@ -41,8 +41,9 @@ static void print_line(const char *name, bool has_changed)
            has_changed ? "true" : "false");
     print_vector("turn_rad_q30", health.turn_rad_q30);
     print_vector("sigma_rad_q30", health.sigma_rad_q30);
-    printf(",\"dots\":%" PRId32 ",\"labelled\":%" PRId32 ",\"across_px_q12\":%" PRId32 "}\n",
-           health.dot_count, health.labelled_count, health.across_px_q12);
+    printf(",\"dots\":%" PRId32 ",\"labelled\":%" PRId32 ",\"across_px_q12\":%" PRId32
+           ",\"basis\":%" PRId32 "}\n",
+           health.dot_count, health.labelled_count, health.across_px_q12, health.basis_count);
 }
 
 static enum ih_err use_frame(const struct hal_frame *frame, const struct ih_frame *ambient)

@@ -5,7 +5,7 @@
                                0.3 degrees and of a shift by 0.3 mm, across and along the lines; how well 50 frames
                                with that truth's dots show each of the six when all are unknown, when only turns are
 
-The rig is turned exactly (Rodrigues); equations and weights are the core's (firmware/core/ih_health.h), iterated to the
+The rig is turned exactly (Rodrigues); equations and weights are the core's (firmware/core/ih_places.h), iterated to the
 end, over all frames at once.
 """
 
@@ -19,6 +19,11 @@ import sys
 import numpy as np
 
 REACH_PX = 0.3
+MOVE_PX = 0.6  # along its line: another place
+FRAMES_OF_PLACE = 20  # most that frames on one place count
+MANY_FRAMES = 5  # that show the error of a place
+SLOT_PX = 0.03
+SLOTS = 361
 NOISE_PX = 0.12  # of a dot, across its line
 TURN_RAD = np.radians(0.3)
 SHIFT_MM = 0.3
@@ -96,37 +101,101 @@ def true_turn(folder):
 
 
 def labelled(folder, rig, host_sim, work):
-    """Slots and undistorted places of all labelled dots of host_sim with this rig; what it prints."""
+    """Of host_sim with this rig: frame, slot, undistorted u, v of all labelled dots; what it prints."""
     shutil.rmtree(work, ignore_errors=True)
     os.makedirs(work)
     rig.save(os.path.join(work, "rig.json"))
     out = subprocess.run([host_sim, "--rig", os.path.join(work, "rig.json"), "--trace", work, folder], check=True,
                          stdout=subprocess.PIPE, text=True).stdout
-    slots, places = [], []
-    for directory, _, names in os.walk(work):
-        for name in (n for n in names if n.endswith(".json") and n != "rig.json"):
-            with open(os.path.join(directory, name), encoding="utf-8") as file:
-                trace = json.load(file)
-            for slot, label in enumerate(trace["labels"]["slot"]):
-                if label is not None:
-                    slots.append(slot)
-                    places.append([trace["dots"][key][label["dot"]] / 4096 for key in ("u_px_q12", "v_px_q12")])
-    return np.array(slots), rig.undistorted(np.array(places)), out
+    paths = [os.path.join(directory, name) for directory, _, names in os.walk(work) for name in names
+             if name.endswith(".json") and name != "rig.json"]
+    rows = []
+    for frame, path in enumerate(sorted(paths)):
+        with open(path, encoding="utf-8") as file:
+            trace = json.load(file)
+        u, v = trace["dots"]["u_px_q12"], trace["dots"]["v_px_q12"]
+        rows += [(frame, slot, u[label["dot"]] / 4096, v[label["dot"]] / 4096)
+                 for slot, label in enumerate(trace["labels"]["slot"]) if label is not None]
+    rows = np.array(rows)
+    rows[:, 2:] = rig.undistorted(rows[:, 2:])
+    return rows, out
 
 
-def estimate(folder, host_sim, work, start):
-    """The turn that fits the dots best that host_sim labels with the rig turned by start; what host_sim prints."""
-    rig = Rig(os.path.join(folder, "rig.json"))
-    slots, places, out = labelled(folder, rig.turned(start), host_sim, work)
-    turn = np.array(start, float)
-    for _ in range(100):
-        infinity, direction, across, _ = rig.turned(turn).lines()
-        off, way = places - infinity[slots], direction[slots]
-        distance = off[:, 1] * way[:, 0] - off[:, 0] * way[:, 1]
+def distances(rig, rows):
+    """From the line, and along it."""
+    infinity, direction, _, _ = rig.lines()
+    slots = rows[:, 1].astype(int)
+    off, way = rows[:, 2:] - infinity[slots], direction[slots]
+    return off[:, 1] * way[:, 0] - off[:, 0] * way[:, 1], (off * way).sum(axis=1)
+
+
+def places(rig, rows):
+    """Number of the place of each dot: a slot's frames one after the other, until it is MOVE_PX away from where it began."""
+    distance, along = distances(rig, rows)
+    out, now, begun = np.full(len(rows), -1), np.full(SLOTS, -1), np.zeros(SLOTS)
+    count = 0
+    for i, slot in enumerate(rows[:, 1].astype(int)):
+        if abs(distance[i]) >= REACH_PX:
+            continue
+        if now[slot] < 0 or abs(along[i] - begun[slot]) > MOVE_PX:
+            now[slot], begun[slot], count = count, along[i], count + 1
+        out[i] = now[slot]
+    return out, count
+
+
+def fit(rig, rows, turn):
+    """The turn that fits the dots best, from this one on, and its uncertainty."""
+    slots, turn = rows[:, 1].astype(int), np.array(turn, float)
+    number, count = places(rig.turned(turn), rows)
+    number = np.where(number < 0, count, number)
+    for _ in range(50):
+        now = rig.turned(turn)
+        slope = now.lines()[2]
+        distance, _ = distances(now, rows)
         weight = np.clip(1 - (distance / REACH_PX)**2, 0, None)**2
-        scaled = across[slots] * weight[:, None]
-        turn = turn + np.linalg.solve(scaled.T @ across[slots], scaled.T @ distance)
-    return turn, out
+        frames = np.bincount(number, weight, count + 1)
+        weight = weight / (1 + frames / FRAMES_OF_PLACE)[number]
+        sums = np.bincount(slots, weight, SLOTS)
+        inverse = np.linalg.inv((slope * sums[:, None]).T @ slope)
+        pull = np.bincount(slots, weight * distance, SLOTS)
+        turn = turn + inverse @ slope.T @ pull
+    lever = slope @ inverse
+    # The mean moves by less than all dots do, as their weights move, too.
+    near = np.abs(distance) < REACH_PX
+    ratio = (distance[near] / REACH_PX)**2
+    pull = pull * ((1 - ratio)**2).sum() / ((1 - ratio) * (1 - 5 * ratio)).sum()
+    sigma = np.sqrt((lever**2 * (pull**2 + (SLOT_PX * sums)**2)[:, None]).sum(axis=0))
+    return turn, sigma
+
+
+def estimate(folder, host_sim, work, start, frames):
+    """fit to what host_sim labels in these frames (a slice) with the rig turned by start; what host_sim prints."""
+    rig = Rig(os.path.join(folder, "rig.json"))
+    rows, out = labelled(folder, rig.turned(start), host_sim, work)
+    turn, sigma = fit(rig, rows[(rows[:, 0] >= frames.start) & (rows[:, 0] < frames.stop)], start)
+    return turn, sigma, out
+
+
+def bound(folder, host_sim, work, truth, frame_count):
+    """Cramer-Rao bound of the three turns' uncertainty, from that many of the folder's first frames, if a dot's distance is
+    normal noise of its own in each frame plus a normal error of its place, each as large as it is with the true rig; the
+    two errors in px."""
+    rig = Rig(os.path.join(folder, "rig.json")).turned(truth)
+    rows, _ = labelled(folder, rig, host_sim, work)
+    rows = rows[rows[:, 0] < frame_count]
+    number, count = places(rig, rows)
+    rows, number = rows[number >= 0], number[number >= 0]
+    distance, _ = distances(rig, rows)
+    frames = np.bincount(number, minlength=count)
+    mean = np.bincount(number, distance, count) / frames
+    noise = ((distance - mean[number])**2).sum() / (frames - 1).sum()
+    many = frames >= MANY_FRAMES
+    place = max((mean[many]**2 - noise / frames[many]).mean(), 0.0)
+    slot_of = np.zeros(count, int)
+    slot_of[number] = rows[:, 1].astype(int)
+    slope = rig.lines()[2][slot_of]
+    information = (slope / (place + noise / frames)[:, None]).T @ slope
+    return np.sqrt(np.diag(np.linalg.inv(information))), np.sqrt(noise), np.sqrt(place)
 
 
 def observable(folder):

@@ -1,0 +1,457 @@
+#include "ih_places.h"
+
+#include <string.h>
+
+#include "ih_fix.h"
+
+/* The place is wherever the next dot is. */
+#define ANYWHERE INT32_MIN
+/* What any number of frames on one place counts at most. */
+#define FRAMES_OF_PLACE_Q8 (20 << 8)
+/* What an estimate needs: dots, and slots, whose scatter is the uncertainty. */
+#define WEIGHT_MIN_Q8 (200 << 8)
+#define SLOTS_MIN 40
+/* How far a slot errs in every frame alike: what is counted when a turn is told, and when it is asked
+ * whether there is one at all. */
+#define SLOT_PX_Q12 123  /* 0.03 px */
+#define DOUBT_PX_Q12 492 /* 0.12 px */
+#define SURE 5
+/* The prior is at least as wide as this. */
+#define PRIOR_MIN_RAD_Q30 107374 /* 0.1 mrad */
+/* Least determinant of the correlations: below it an axis is not seen at all. */
+#define DETERMINANT_MIN_Q30 (1 << 20)
+/* Beyond this distance known places are of no use for a turned rig. */
+#define TURN_MOST_PX_Q12 4096
+#define PIN_MOST_PX_Q12 8192
+#define PULL_MOST_Q20 (1 << 30)
+/* Row and column of a packed entry. */
+static const int8_t packed[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
+
+/* Sums over slots, each with its weight. */
+struct totals {
+    int64_t normal_q16[6]; /* weight times slope times slope: xx, xy, xz, yy, yz, zz */
+    int64_t right_q24[3];  /* weight times slope times distance */
+    int64_t whole_q8;      /* see whole */
+    int32_t slot_count;
+};
+
+/* The equations in units in which the diagonal is 1, and their cofactors. */
+struct equations {
+    int64_t root_q8[3]; /* of the diagonal: px per rad and root of the dots' number */
+    int64_t right_px_q16[3];
+    int64_t cofactor_q30[3][3];
+    int64_t determinant_q30;
+};
+
+void ih_places_clear(struct ih_places *places)
+{
+    memset(places, 0, sizeof *places);
+    for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
+        places->slot[slot].t_px_q12 = ANYWHERE;
+    }
+}
+
+/* Slopes of 2^14 px per rad are those of dots at 45 degrees with the longest focal length; steeper ones
+ * of wider patterns are left out. */
+static bool is_steep(const int32_t slope_px_q4[3])
+{
+    return ih_abs_s32(slope_px_q4[0]) > IH_RANGE_HEALTH_SLOPE_PX_Q4 ||
+           ih_abs_s32(slope_px_q4[1]) > IH_RANGE_HEALTH_SLOPE_PX_Q4 ||
+           ih_abs_s32(slope_px_q4[2]) > IH_RANGE_HEALTH_SLOPE_PX_Q4;
+}
+
+/* Tukey's weight (1 - r)^2 of r = (e / reach)^2, and the derivative (1 - r) (1 - 5 r) of weight times e;
+ * 0 beyond the reach. */
+static void weigh(int64_t across_px_q12, int64_t reach_px_q12, int64_t *weight_q8, int64_t *rise_q8)
+{
+    int64_t ratio_q16 = across_px_q12 * across_px_q12 * 65536 / (reach_px_q12 * reach_px_q12);
+    int64_t rest_q16 = ratio_q16 < 65536 ? 65536 - ratio_q16 : 0;
+    *weight_q8 = ih_mul_shift(rest_q16, rest_q16, 24);
+    *rise_q8 = ih_mul_shift(rest_q16, 65536 - 5 * ratio_q16, 24);
+}
+
+/* Of n frames on a place, n / (1 + n / 20); the same share of their pull. */
+static void of_place(const struct ih_place *place, int32_t *weight_q8, int32_t *pull_q20)
+{
+    int64_t n_q8 = place->here_weight_q8;
+    *weight_q8 = (int32_t)ih_div_round(n_q8 * FRAMES_OF_PLACE_Q8, n_q8 + FRAMES_OF_PLACE_Q8);
+    *pull_q20 = (int32_t)ih_div_round((int64_t)place->here_pull_q20 * FRAMES_OF_PLACE_Q8,
+                                      n_q8 + FRAMES_OF_PLACE_Q8);
+}
+
+static void leave_place(struct ih_place *place)
+{
+    int32_t weight_q8, pull_q20;
+    of_place(place, &weight_q8, &pull_q20);
+    place->weight_q8 += weight_q8;
+    place->pull_q20 += pull_q20;
+    place->here_weight_q8 = 0;
+    place->here_pull_q20 = 0;
+}
+
+/* A dot's weight is at most 2^8, times its distance at most 0.29 of the reach: in IH_PLACES_FRAMES_MAX
+ * frames 2^17 and 2^25.4 with a reach of 0.3 px. */
+static void add_dot(struct ih_place *place, int32_t t_px_q12, int64_t across_px_q12,
+                    int64_t weight_q8)
+{
+    if (place->t_px_q12 == ANYWHERE) {
+        place->t_px_q12 = t_px_q12;
+    } else if (ih_abs_s64((int64_t)t_px_q12 - place->t_px_q12) > IH_PLACES_MOVE_PX_Q12) {
+        leave_place(place);
+        place->t_px_q12 = t_px_q12;
+    }
+    place->here_weight_q8 += (int32_t)weight_q8;
+    place->here_pull_q20 += (int32_t)(weight_q8 * across_px_q12);
+}
+
+void ih_places_add(struct ih_places *places, const struct ih_labels *labels,
+                   const struct ih_turn_slopes *slopes, int32_t reach_px_q12)
+{
+    for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
+        if (labels->dot_of_slot[slot] == IH_NONE || is_steep(slopes->px_q4[slot])) {
+            continue;
+        }
+        int64_t across_px_q12 = labels->perp_px_q12[slot];
+        int64_t weight_q8, rise_q8;
+        weigh(across_px_q12, reach_px_q12, &weight_q8, &rise_q8);
+        if (weight_q8 > 0) {
+            add_dot(&places->slot[slot], labels->t_px_q12[slot], across_px_q12, weight_q8);
+        }
+        places->square_q32 += weight_q8 * across_px_q12 * across_px_q12;
+        places->weight_q8 += weight_q8;
+        places->rise_q8 += rise_q8;
+    }
+    places->frame_count++;
+}
+
+void ih_places_forget(struct ih_places *places)
+{
+    if (places->frame_count < IH_PLACES_FRAMES_MAX) {
+        return;
+    }
+    places->frame_count /= 2;
+    places->square_q32 /= 2;
+    places->weight_q8 /= 2;
+    places->rise_q8 /= 2;
+    for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
+        struct ih_place *place = &places->slot[slot];
+        place->here_weight_q8 /= 2;
+        place->here_pull_q20 /= 2;
+        place->weight_q8 /= 2;
+        place->pull_q20 /= 2;
+    }
+}
+
+/* What a turn moves a dot across its line. Slopes of 2^18, turns of 2^24.5: 2^44.1. */
+static int64_t move_px_q12(const int32_t slope_px_q4[3], const int32_t turn_rad_q30[3])
+{
+    int64_t sum_q34 = 0;
+    for (int i = 0; i < 3; i++) {
+        sum_q34 += (int64_t)slope_px_q4[i] * turn_rad_q30[i];
+    }
+    return ih_shift_round(sum_q34, 22);
+}
+
+static int64_t limited(int64_t value, int64_t most)
+{
+    return value > most ? most : value < -most ? -most : value;
+}
+
+/* Everything known of a slot. */
+static void sum_of(const struct ih_place *place, int32_t *weight_q8, int32_t *pull_q20)
+{
+    of_place(place, weight_q8, pull_q20);
+    *weight_q8 += place->weight_q8;
+    *pull_q20 += place->pull_q20;
+}
+
+/* Where all dots move by d, their weighted mean moves by less, as the weights move too: by rise / weight.
+ * At least a third, else the weights have lost the dots. */
+static int64_t share_q8(const struct ih_places *places)
+{
+    int64_t rise_q8 =
+        places->rise_q8 * 3 > places->weight_q8 ? places->rise_q8 : places->weight_q8 / 3;
+    return ih_div_round(rise_q8 * 256, places->weight_q8);
+}
+
+static int64_t whole(int64_t value, int64_t share)
+{
+    return ih_div_round(value * 256, share);
+}
+
+/* Weights of a slot are at most 2^17, slopes 2^18, slots 2^8.5: 2^61.5; of the right side, with pulls of
+ * 2^25.4, 2^51.9, and 2^59.9 on its way through whole. */
+static void add_up(const struct ih_places *places, const struct ih_turn_slopes *slopes,
+                   struct totals *out)
+{
+    memset(out, 0, sizeof *out);
+    out->whole_q8 = share_q8(places);
+    for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
+        const int32_t *slope = slopes->px_q4[slot];
+        int32_t weight_q8, pull_q20;
+        sum_of(&places->slot[slot], &weight_q8, &pull_q20);
+        for (int row = 0; weight_q8 > 0 && row < 3; row++) {
+            out->right_q24[row] += (int64_t)pull_q20 * slope[row];
+            for (int column = row; column < 3; column++) {
+                out->normal_q16[packed[row][column]] +=
+                    (int64_t)weight_q8 * slope[row] * slope[column];
+            }
+        }
+        out->slot_count += weight_q8 > 0;
+    }
+    for (int row = 0; row < 3; row++) {
+        out->right_q24[row] = whole(out->right_q24[row], out->whole_q8);
+    }
+}
+
+/* Holds the turn about an axis in the camera's X and Y where offset puts it; the rest is then against
+ * that. A quarter of what is known of X and Y holds what is hardly seen, and no more. Moves are limited to
+ * 2 px: sums of 2^56.5. */
+static void pin(const struct ih_places *places, const struct ih_turn_slopes *slopes,
+                const int32_t axis_q30[2], const int32_t offset_rad_q30[3], struct totals *sums)
+{
+    int64_t hold_q36 = (sums->normal_q16[0] / 4 + sums->normal_q16[3] / 4) >> 20;
+    for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
+        const int32_t *slope = slopes->px_q4[slot];
+        int64_t move = limited(move_px_q12(slope, offset_rad_q30), PIN_MOST_PX_Q12);
+        int32_t weight_q8, pull_q20;
+        sum_of(&places->slot[slot], &weight_q8, &pull_q20);
+        for (int row = 0; weight_q8 > 0 && row < 3; row++) {
+            sums->right_q24[row] -= weight_q8 * move * slope[row];
+        }
+    }
+    for (int row = 0; row < 2; row++) {
+        for (int column = row; column < 2; column++) {
+            int64_t both_q20 = ih_mul_shift(axis_q30[row], axis_q30[column], 40);
+            sums->normal_q16[packed[row][column]] += hold_q36 * both_q20;
+        }
+    }
+}
+
+static void fill_cofactors(const int64_t c_q30[3][3], struct equations *out)
+{
+    for (int row = 0; row < 3; row++) {
+        int r1 = (row + 1) % 3;
+        int r2 = (row + 2) % 3;
+        for (int column = 0; column < 3; column++) {
+            int c1 = (column + 1) % 3;
+            int c2 = (column + 2) % 3;
+            out->cofactor_q30[row][column] =
+                ih_shift_round(c_q30[r1][c1] * c_q30[r2][c2] - c_q30[r1][c2] * c_q30[r2][c1], 30);
+        }
+    }
+    out->determinant_q30 = 0;
+    for (int column = 0; column < 3; column++) {
+        out->determinant_q30 += ih_mul_shift(c_q30[0][column], out->cofactor_q30[0][column], 30);
+    }
+}
+
+/* Sums with a prior of that precision about the calibration, from which the rig is turned already. An
+ * entry of the matrix is at most the product of its roots, so entries over roots stay below 2^31. */
+static void scale(const struct totals *sums, int64_t precision_q16, const int32_t turned_rad_q30[3],
+                  struct equations *out)
+{
+    int64_t c_q30[3][3];
+    for (int i = 0; i < 3; i++) {
+        int64_t diagonal_q16 = sums->normal_q16[packed[i][i]] + precision_q16;
+        int64_t pull_q24 = ih_mul_shift(precision_q16 >> 8, turned_rad_q30[i], 14);
+        out->root_q8[i] = (int64_t)ih_isqrt_u64((uint64_t)diagonal_q16) + 1;
+        out->right_px_q16[i] = ih_div_round(sums->right_q24[i] - pull_q24, out->root_q8[i]);
+    }
+    for (int row = 0; row < 3; row++) {
+        c_q30[row][row] = (int64_t)1 << 30;
+        for (int column = row + 1; column < 3; column++) {
+            int64_t part_q8 =
+                ih_div_round(sums->normal_q16[packed[row][column]], out->root_q8[row]);
+            c_q30[row][column] = ih_div_round(part_q8 * ((int64_t)1 << 30), out->root_q8[column]);
+            c_q30[column][row] = c_q30[row][column];
+        }
+    }
+    fill_cofactors(c_q30, out);
+}
+
+/* Right sides are below 2^7.5 px times the root of the dots' number, 2^24 in Q16; three products with
+ * cofactors of up to 2 in Q30: 2^57. */
+static void solve(const struct equations *e, int32_t turn_rad_q30[3])
+{
+    for (int i = 0; i < 3; i++) {
+        int64_t sum_q46 = 0;
+        for (int k = 0; k < 3; k++) {
+            sum_q46 += e->cofactor_q30[i][k] * e->right_px_q16[k];
+        }
+        int64_t part_px_q16 = ih_div_round(sum_q46, e->determinant_q30);
+        turn_rad_q30[i] =
+            ih_clamp_s32(ih_saturate_s32(ih_div_round(part_px_q16 * (1 << 22), e->root_q8[i])),
+                         -2 * IH_TURN_MAX_RAD_Q30, 2 * IH_TURN_MAX_RAD_Q30);
+    }
+}
+
+static int64_t length_rad_q30(const int32_t a_rad_q30[3], const int32_t b_rad_q30[3])
+{
+    int64_t sum = 0;
+    for (int i = 0; i < 3; i++) {
+        int64_t part = (int64_t)a_rad_q30[i] + b_rad_q30[i];
+        sum += part * part;
+    }
+    return (int64_t)ih_isqrt_u64((uint64_t)sum);
+}
+
+/* How much a slot's distance, weighted, turns the solution about an axis, in units of its root. A weight is
+ * at least a step, so slopes over roots are at most 16; with cofactors of 2 in Q30: 2^62.6 for three. */
+static int64_t lever_q26(const struct equations *e, const int32_t slope_px_q4[3], int axis)
+{
+    int64_t sum_q56 = 0;
+    for (int k = 0; k < 3; k++) {
+        int64_t part_q26 = ih_div_round(slope_px_q4[k] * ((int64_t)1 << 30), e->root_q8[k]);
+        sum_q56 += e->cofactor_q30[axis][k] * part_q26;
+    }
+    return limited(ih_div_round(sum_q56, e->determinant_q30), (int64_t)1 << 32);
+}
+
+/* Root of the sum of squares, px in Q16 below 2^31. */
+static int64_t with_standing_q16(uint64_t square_q32, uint64_t weight_q32, int64_t standing_px_q12)
+{
+    int64_t standing_q16 = ih_mul_shift(ih_isqrt_u64(weight_q32), standing_px_q12, 12);
+    return (int64_t)ih_isqrt_u64(square_q32 + (uint64_t)(standing_q16 * standing_q16)) + 1;
+}
+
+/* What slots leave unexplained is below 2^17 times 2^13 in Q20, times a lever of 2^32: 2^62. Squares of
+ * 2^26 add up to 2^60.5. */
+static void judge(const struct ih_places *places, const struct ih_turn_slopes *slopes,
+                  const struct equations *e, int64_t share, const int32_t offset_rad_q30[3],
+                  struct ih_places_turn *out)
+{
+    int32_t turn_rad_q30[3];
+    uint64_t square_q32[3] = {0, 0, 0};
+    uint64_t weight_q32[3] = {0, 0, 0};
+    for (int i = 0; i < 3; i++) {
+        turn_rad_q30[i] = out->turn_rad_q30[i] + offset_rad_q30[i];
+    }
+    for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
+        const int32_t *slope = slopes->px_q4[slot];
+        int32_t weight_q8, pull_q20;
+        sum_of(&places->slot[slot], &weight_q8, &pull_q20);
+        for (int i = 0; weight_q8 > 0 && i < 3; i++) {
+            int64_t lever = lever_q26(e, slope, i);
+            int64_t left_q20 =
+                limited(whole(pull_q20, share) - weight_q8 * move_px_q12(slope, turn_rad_q30),
+                        (int64_t)1 << 30);
+            int64_t left_q16 = limited(ih_shift_round(left_q20 * lever, 30), 1 << 26);
+            int64_t own_q16 = limited(ih_shift_round(weight_q8 * lever, 18), 1 << 26);
+            square_q32[i] += (uint64_t)(left_q16 * left_q16);
+            weight_q32[i] += (uint64_t)(own_q16 * own_q16);
+        }
+    }
+    out->is_sure = false;
+    for (int i = 0; i < 3; i++) {
+        int64_t sigma_q16 = with_standing_q16(square_q32[i], weight_q32[i], SLOT_PX_Q12);
+        int64_t doubt_q16 = with_standing_q16(square_q32[i], weight_q32[i], DOUBT_PX_Q12);
+        int64_t doubt_rad_q30 = ih_div_round(doubt_q16 * (1 << 22), e->root_q8[i]);
+        out->sigma_rad_q30[i] = ih_saturate_s32(ih_div_round(sigma_q16 * (1 << 22), e->root_q8[i]));
+        out->is_sure = out->is_sure || ih_abs_s32(out->turn_rad_q30[i]) >= SURE * doubt_rad_q30;
+    }
+}
+
+/* The prior is wide at first, then as wide as the whole turn that was found with it. False: an axis is not
+ * seen, or less certain than it may be. */
+static bool estimate(const struct ih_places *places, const struct ih_turn_slopes *slopes,
+                     const struct totals *sums, const int32_t turned_rad_q30[3],
+                     const int32_t offset_rad_q30[3], struct ih_places_turn *out)
+{
+    const int32_t none[3] = {0, 0, 0};
+    const int32_t limit[3] = {IH_TURN_MAX_RAD_Q30, IH_TURN_MAX_RAD_Q30, IH_TURN_MAX_RAD_Q30};
+    int64_t noise_q12 =
+        (int64_t)ih_isqrt_u64((uint64_t)(places->square_q32 / places->weight_q8)) + 1;
+    int64_t prior_rad_q30 = length_rad_q30(limit, none);
+    int32_t from_rad_q30[3];
+    struct equations equations;
+    for (int i = 0; i < 3; i++) {
+        from_rad_q30[i] = turned_rad_q30[i] + offset_rad_q30[i];
+    }
+    for (int i = 0; i < 3; i++) {
+        int64_t root_q8 = ih_div_round(noise_q12 * (1 << 26), prior_rad_q30);
+        scale(sums, root_q8 * root_q8, from_rad_q30, &equations);
+        if (equations.determinant_q30 < DETERMINANT_MIN_Q30) {
+            return false;
+        }
+        solve(&equations, out->turn_rad_q30);
+        prior_rad_q30 = length_rad_q30(from_rad_q30, out->turn_rad_q30);
+        prior_rad_q30 = prior_rad_q30 > PRIOR_MIN_RAD_Q30 ? prior_rad_q30 : PRIOR_MIN_RAD_Q30;
+    }
+    judge(places, slopes, &equations, sums->whole_q8, offset_rad_q30, out);
+    for (int i = 0; i < 3; i++) {
+        out->turn_rad_q30[i] += offset_rad_q30[i];
+    }
+    return out->sigma_rad_q30[0] <= IH_PLACES_SIGMA_MAX_RAD_Q30 &&
+           out->sigma_rad_q30[1] <= IH_PLACES_SIGMA_MAX_RAD_Q30 &&
+           out->sigma_rad_q30[2] <= IH_PLACES_SIGMA_MAX_RAD_Q30;
+}
+
+void ih_places_hold(const struct ih_rig *rig, const int32_t turned_rad_q30[3],
+                    int32_t back_rad_q30[3])
+{
+    int32_t axis_q30[2][2];
+    ih_turn_axes(rig, axis_q30);
+    int64_t part_rad_q30 = -ih_shift_round((int64_t)axis_q30[1][0] * turned_rad_q30[0] +
+                                               (int64_t)axis_q30[1][1] * turned_rad_q30[1],
+                                           30);
+    back_rad_q30[0] = (int32_t)ih_mul_shift(part_rad_q30, axis_q30[1][0], 30);
+    back_rad_q30[1] = (int32_t)ih_mul_shift(part_rad_q30, axis_q30[1][1], 30);
+    back_rad_q30[2] = 0;
+}
+
+bool ih_places_find(const struct ih_places *places, const struct ih_rig *rig,
+                    const struct ih_turn_slopes *slopes, const int32_t turned_rad_q30[3],
+                    bool is_weak_known, struct ih_places_turn *out)
+{
+    const int32_t none[3] = {0, 0, 0};
+    int32_t offset_rad_q30[3] = {0, 0, 0};
+    int32_t axis_q30[2][2];
+    struct totals sums;
+    if (places->weight_q8 < WEIGHT_MIN_Q8) {
+        return false;
+    }
+    add_up(places, slopes, &sums);
+    if (sums.slot_count < SLOTS_MIN) {
+        return false;
+    }
+    out->is_weak_seen = estimate(places, slopes, &sums, turned_rad_q30, none, out);
+    if (out->is_weak_seen) {
+        return true;
+    }
+    ih_turn_axes(rig, axis_q30);
+    if (!is_weak_known) {
+        ih_places_hold(rig, turned_rad_q30, offset_rad_q30);
+    }
+    pin(places, slopes, axis_q30[1], offset_rad_q30, &sums);
+    return estimate(places, slopes, &sums, turned_rad_q30, offset_rad_q30, out);
+}
+
+static int32_t pulled(int32_t pull_q20, int32_t weight_q8, int64_t move_px_q12, int64_t share)
+{
+    int64_t left_q20 = pull_q20 - ih_shift_round(weight_q8 * move_px_q12 * share, 8);
+    return (int32_t)limited(left_q20, PULL_MOST_Q20);
+}
+
+void ih_places_turn(struct ih_places *places, const struct ih_turn_slopes *slopes,
+                    const int32_t by_rad_q30[3])
+{
+    if (places->weight_q8 == 0) {
+        return;
+    }
+    int64_t share = share_q8(places);
+    for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
+        struct ih_place *place = &places->slot[slot];
+        if (place->weight_q8 == 0 && place->here_weight_q8 == 0) {
+            continue;
+        }
+        int64_t move = move_px_q12(slopes->px_q4[slot], by_rad_q30);
+        if (ih_abs_s64(move) > TURN_MOST_PX_Q12) {
+            ih_places_clear(places);
+            return;
+        }
+        place->pull_q20 = pulled(place->pull_q20, place->weight_q8, move, share);
+        place->here_pull_q20 = pulled(place->here_pull_q20, place->here_weight_q8, move, share);
+        place->t_px_q12 = ANYWHERE; /* along the line everything has moved, too */
+    }
+}

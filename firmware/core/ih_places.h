@@ -1,0 +1,84 @@
+/* ih_places - the turn of a projector that labelled dots of many frames show, and how sure that is.
+ *
+ * In:    labels, and what a turn does to each slot's dot (ih_turn_slopes); frame by frame.
+ * Out:   a turn against the rig that gave the labels, its uncertainty, and whether it is more than
+ *        chance.
+ * Way:   Least squares of the dots' distances from their lines, three parameters, Tukey's weights.
+ *        A dot's distance has two parts: noise that is another in each frame, and what the surface
+ *        below it does to its centre, which is the same as long as the dot stays on its place: 0.2
+ *        to 0.6 of the noise. Where walls stand still, and the pattern's corners, which alone show
+ *        a turn across the baseline, mostly lie on walls, frames add nothing to the second part. So
+ *        of each slot the frames of one place are taken together, as one distance with the weight
+ *        n / (1 + n / 20) of n frames, the best linear estimate where a place errs by 0.22 of the noise.
+ *        A dot that is IH_PLACES_MOVE away along its line is on a new place.
+ *        Uncertainty: from what each slot's own distance leaves unexplained, with nothing assumed
+ *        of how slots err but that they do so independently (the sandwich of White, 1980); so
+ *        it counts rays that were calibrated badly, too. 0.03 px that no frame shows are added.
+ *        A prior as wide as the turn itself keeps what is hardly seen near 0. If the turn across the
+ *        baseline is less certain than IH_PLACES_SIGMA_MAX it is not estimated but held where it is
+ *        known to be, else at the calibration's, and the others are estimated with that.
+ * Cost:  adding, 361 slots; finding, three sums over them and 3x3 equations.
+ * Error: against float64 on the same frames (tools/oracle/knock.py): docs/numerics.md.
+ * Memory: constant, 7 kB; IH_PLACES_FRAMES_MAX frames, then older ones count half.
+ */
+#ifndef IH_PLACES_H
+#define IH_PLACES_H
+
+#include "ih_labels.h"
+#include "ih_turn.h"
+
+/* So far along its line a dot is on another place of the surface. */
+#define IH_PLACES_MOVE_PX_Q12 2458 /* 0.6 px */
+/* No axis may be less certain than this: 45 mm of depth at 800 mm with a baseline of 12.5 mm. */
+#define IH_PLACES_SIGMA_MAX_RAD_Q30 937004 /* 0.05 degrees */
+/* Sums are halved at so many frames. */
+#define IH_PLACES_FRAMES_MAX 480
+
+/* Sums over a slot's labelled dots. Weights in Q8, weight times distance in Q20 px. */
+struct ih_place {
+    int32_t t_px_q12; /* of the first dot on the place where the dot is now */
+    int32_t here_weight_q8, here_pull_q20;
+    int32_t weight_q8, pull_q20; /* of the places before, each with its weight */
+};
+
+struct ih_places {
+    int32_t frame_count;
+    int64_t weight_q8, rise_q8, square_q32; /* of all dots, places or not */
+    struct ih_place slot[IH_SLOTS];
+};
+
+struct ih_places_turn {
+    int32_t turn_rad_q30[3]; /* against the rig of the labels */
+    int32_t
+        sigma_rad_q30[3]; /* one standard deviation; of no use across the baseline if not seen */
+    bool
+        is_weak_seen; /* the turn across the baseline; if not, it is held where it is known to be, or at
+                        * the calibration's */
+    bool is_sure;     /* some axis is 5 times its uncertainty, with 0.12 px for each slot */
+};
+
+void ih_places_clear(struct ih_places *places);
+
+/* Dots farther from their line than reach say nothing. */
+void ih_places_add(struct ih_places *places, const struct ih_labels *labels,
+                   const struct ih_turn_slopes *slopes, int32_t reach_px_q12);
+
+/* False: too few dots, or they do not show the turn along the baseline or about the camera's axis.
+ * turned: the rig against its calibration, about which the prior is; is_weak_known: also across the
+ * baseline, from earlier frames. */
+bool ih_places_find(const struct ih_places *places, const struct ih_rig *rig,
+                    const struct ih_turn_slopes *slopes, const int32_t turned_rad_q30[3],
+                    bool is_weak_known, struct ih_places_turn *out);
+
+/* What takes the part of a turn across the baseline back. */
+void ih_places_hold(const struct ih_rig *rig, const int32_t turned_rad_q30[3],
+                    int32_t back_rad_q30[3]);
+
+/* The rig was turned by so much: what is known stays, against the new lines. */
+void ih_places_turn(struct ih_places *places, const struct ih_turn_slopes *slopes,
+                    const int32_t by_rad_q30[3]);
+
+/* What was long ago counts less: the rig may drift. */
+void ih_places_forget(struct ih_places *places);
+
+#endif
