@@ -1,13 +1,20 @@
 #include "app_health.h"
 
 #include <inttypes.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "app_text.h"
+#include "ih_fix.h"
 
 /* A turn that differs by more than this from what was told is told again. */
 #define TOLD_RAD_Q30 374802 /* 0.02 degrees */
 #define DEG_PER_RAD_Q10 58671
+#define MM2_PER_M2 1000000
+
+struct depth_text {
+    char text[80];
+};
 
 void app_health_begin(struct app_loop *loop)
 {
@@ -22,17 +29,35 @@ static struct app_decimal degrees(int32_t angle_rad_q30)
     return app_text_fixed((int64_t)angle_rad_q30 * DEG_PER_RAD_Q10 / 1024, 30, 3);
 }
 
+/* What one standard deviation of the turn is in depth at 1 m, in words. */
+static struct depth_text depth_doubt(const struct app_loop *loop)
+{
+    const struct ih_health *health = &loop->health;
+    const int32_t *origin_mm_q16 = loop->head->rig.calibration.origin_mm_q16;
+    struct depth_text out = {"the turn across the baseline is not known, nor is depth"};
+    if (health->is_weak_known) {
+        int64_t x = origin_mm_q16[0];
+        int64_t y = origin_mm_q16[1];
+        int64_t baseline_mm_q16 = (int64_t)ih_isqrt_u64((uint64_t)(x * x + y * y)) + 1;
+        int64_t turn_rad_q30 = ih_max_s32(health->sigma_rad_q30[0], health->sigma_rad_q30[1]);
+        int64_t depth_mm_q4 = ih_div_round(turn_rad_q30 * MM2_PER_M2 / 1024, baseline_mm_q16);
+        snprintf(out.text, sizeof out.text, "that is %s mm of depth at 1 m",
+                 app_text_fixed(depth_mm_q4, 4, 1).text);
+    }
+    return out;
+}
+
 static void tell_turn(struct app_loop *loop)
 {
     const struct ih_health *health = &loop->health;
     const int32_t *turn = health->turn_rad_q30;
     const int32_t *sigma = health->sigma_rad_q30;
     app_log_say(loop->log, APP_LOG_WARNING,
-                "%s: the projector is turned by (%s, %s, %s) +-(%s, %s, %s) degrees about X, Y, Z; "
-                "corrected for until the end, calibrate again",
+                "%s: the projector is turned by (%s, %s, %s) +-(%s, %s, %s) degrees about X, Y, Z, "
+                "%s; corrected for until the end, calibrate again",
                 loop->config->rig, degrees(turn[0]).text, degrees(turn[1]).text,
                 degrees(turn[2]).text, degrees(sigma[0]).text, degrees(sigma[1]).text,
-                degrees(sigma[2]).text);
+                degrees(sigma[2]).text, depth_doubt(loop).text);
     memcpy(loop->told_turn_rad_q30, turn, sizeof loop->told_turn_rad_q30);
 }
 
@@ -109,10 +134,13 @@ static void check(struct app_loop *loop)
                     loop->config->rig, health->dot_count, health->labelled_count);
     } else {
         app_log_say(loop->log, APP_LOG_INFO,
-                    "%s: checked %" PRId32 " frames, %s; dots lie %s px beside their lines",
+                    "%s: checked %" PRId32 " frames, %s; dots lie %s px beside their lines; "
+                    "of a turn (%s, %s, %s) degrees about X, Y, Z may be left, %s",
                     loop->config->rig, loop->checked_count,
                     health->state == IH_HEALTH_FITS ? "it fits" : "it does not fit",
-                    app_text_fixed(health->across_px_q12, 12, 2).text);
+                    app_text_fixed(health->across_px_q12, 12, 2).text,
+                    degrees(health->sigma_rad_q30[0]).text, degrees(health->sigma_rad_q30[1]).text,
+                    degrees(health->sigma_rad_q30[2]).text, depth_doubt(loop).text);
     }
     app_loop_end(loop, health->state == IH_HEALTH_FITS ? APP_EXIT_GOOD : APP_EXIT_FAILED);
 }
