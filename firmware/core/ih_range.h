@@ -5,7 +5,7 @@
  * the program with file, line, value and range; arguments must have no side effects.
  *
  * That build also checks each cast to an integer type. IH_WRAPS(type, value) is one that may change the
- * value, on purpose; before a function, IH_WRAPPING says that its unsigned sums pass 2^n on purpose.
+ * value, on purpose. IH_WRAPPING, before a function, says that its unsigned sums pass 2^n on purpose.
  *
  * The constants are the greatest sizes that docs/numerics.md argues for, rounded up, in the unit and
  * format of their names; tests/checks/ranges_doc.py compares them with it. They hold for rigs that
@@ -21,10 +21,15 @@
 void ih_range_check(int64_t value, int64_t low, int64_t high, const char *file, int line);
 #define IH_IN_RANGE(value, low, high) ih_range_check((value), (low), (high), __FILE__, __LINE__)
 #define IH_WRAPS(type, value) ((__typeof__(type))(value))
-#define IH_WRAPPING __attribute__((no_sanitize("unsigned-integer-overflow")))
 #else
 #define IH_IN_RANGE(value, low, high) ((void)sizeof((value) + (low) + (high)))
 #define IH_WRAPS(type, value) ((type)(value))
+#endif
+
+/* Only clang has a check of what C defines, and the fuzzers' builds use it too. */
+#ifdef __clang__
+#define IH_WRAPPING __attribute__((no_sanitize("unsigned-integer-overflow")))
+#else
 #define IH_WRAPPING
 #endif
 
