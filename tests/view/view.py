@@ -538,7 +538,10 @@ def stopped(number, ready, *words, ignored=False):
     """Starts view, sends it a signal once ready(process, its children so far) is true; what it said, its status, and
     whether a child is left."""
     environment = dict(os.environ, TMPDIR=at("tmp"))
-    prepare_child = (lambda: signal.signal(number, signal.SIG_IGN)) if ignored else None
+
+    def prepare_child():  # whoever started this test may ignore the signal, and children inherit that
+        signal.signal(number, signal.SIG_IGN if ignored else signal.SIG_DFL)
+
     with subprocess.Popen([options.view, *words], stdin=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
                           env=environment, preexec_fn=prepare_child) as process:
         seen = set()
