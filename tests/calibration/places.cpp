@@ -23,18 +23,19 @@ static void result(const char *name, bool good, double found, double limit)
 }
 
 /* A camera without a lens' bend, and a board that leans before it. */
-static constexpr int width = 640, height = 480, fine = 5, finest = 10, sheet_px_per_mm = 8;
+static constexpr int width = 640, height = 480, fine = 5, finest = 10, sheet_px_per_mm = 20;
 static constexpr double focal_px = 700.0, centre_u = 325.3, centre_v = 236.8;
 static constexpr double dark_grey = 44.0, white_grey = 124.0, black = 4.0;
 
 struct Stage {
-    cal::Board board = cal::board_parse("charuco-9x6-30");
-    cv::Mat sheet = cal::board_bitmap(board, sheet_px_per_mm);
+    cal::Board board;
+    cv::Mat sheet;
     cal::Camera camera;
     cal::View view;
     cv::Matx33d rotation;
 
-    Stage()
+    explicit Stage(const char *name = "charuco-9x6-30")
+        : board(cal::board_parse(name)), sheet(cal::board_bitmap(board, sheet_px_per_mm))
     {
         camera.size = {width, height};
         camera.matrix =
@@ -117,7 +118,7 @@ struct Stage {
  * and how many are found. */
 static double corner_error(const Stage &stage, double blur_px, double told_blur_px, size_t &count)
 {
-    cv::Mat print = cal::board_bitmap(stage.board, cal::draw_px_per_mm);
+    cv::Mat print = cal::board_picture(stage.board, cal::draw_px_per_mm);
     cv::Mat tangents =
         cal::draw_tangents(stage.camera.size, stage.camera.matrix, stage.camera.distortion);
     cal::Corners corners;
@@ -153,6 +154,12 @@ static void check_corners()
            static_cast<double>(count), 70.0);
     most = corner_error(stage, 0.8, 0.6, count);
     result("corners of a picture softer than it is told", most < 0.01 && count == 70, most, 0.01);
+    /* Edges between the samples of the drawing. */
+    for (const char *name : {"charuco-8x6-27.3", "chessboard-9x6-25.1"}) {
+        Stage other(name);
+        most = corner_error(other, 0.8, 0.8, count);
+        result(name, most < 0.02 && count > 60, most, 0.02);
+    }
     stage.view.shift += cv::Vec3d(150.0, 0.0, 0.0); /* the right side is out of the frame */
     most = corner_error(stage, 0.8, 0.8, count);
     result("corners of a board at the frame's border", most < 0.01 && count > 45 && count < 70,
@@ -168,7 +175,7 @@ static void check_dots()
     cal::Spots spots{
         stage.board,
         stage.camera,
-        cal::board_bitmap(stage.board, cal::draw_px_per_mm),
+        cal::board_picture(stage.board, cal::draw_px_per_mm),
         cal::draw_tangents(stage.camera.size, stage.camera.matrix, stage.camera.distortion),
         lens_px,
         (dark_grey - black) / (white_grey - black)};

@@ -12,6 +12,8 @@ static constexpr double margin_mm = 8.0;
 static constexpr double marker_share = 0.8;
 static constexpr int dictionary = cv::aruco::DICT_4X4_100;
 static constexpr int markers_max = 100;
+/* So many samples along each side of one of board_picture's. */
+static constexpr int finer = 5;
 
 cv::Point3d Board::corner_mm(int vertex) const
 {
@@ -97,5 +99,12 @@ cv::Mat board_bitmap(const Board &board, int px_per_mm)
         }
     }
     return sheet;
+}
+
+cv::Mat board_picture(const Board &board, int px_per_mm)
+{
+    cv::Mat picture;
+    cv::resize(board_bitmap(board, finer * px_per_mm), picture, {}, 1.0 / finer, 1.0 / finer, cv::INTER_AREA);
+    return picture;
 }
 } // namespace cal

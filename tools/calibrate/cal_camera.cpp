@@ -215,7 +215,7 @@ static void check_trust(const Camera &camera)
 /* All corners anew, by the camera as it is known now. */
 static void refine(const Board &board, const Camera &camera, std::vector<View> &views)
 {
-    cv::Mat print = board_bitmap(board, draw_px_per_mm);
+    cv::Mat print = board_picture(board, draw_px_per_mm);
     cv::Mat tangents = draw_tangents(camera.size, camera.matrix, camera.distortion);
     for (View &view : views) {
         view.left_out = 0;

@@ -24,7 +24,7 @@ static bool ends_with(const std::string &name, const char *end)
 
 static void write_bitmap(const Board &board, const std::string &path)
 {
-    cv::Mat sheet = board_bitmap(board, bitmap_px_per_mm), albedo;
+    cv::Mat sheet = board_picture(board, bitmap_px_per_mm), albedo;
     sheet.convertTo(albedo, CV_8U, white_albedo - dark_albedo, 255.0 * dark_albedo);
     std::ofstream file(path, std::ios::binary);
     file << "P5\n" << albedo.cols << ' ' << albedo.rows << "\n255\n";

@@ -11,7 +11,7 @@
 
 namespace cal
 {
-/* Sets the corners anew, all that are in the picture (CV_32F) and look as they should. `print` is board_bitmap with
+/* Sets the corners anew, all that are in the picture (CV_32F) and look as they should. `print` is board_picture with
  * draw_px_per_mm, `tangents` is draw_tangents. */
 void corners_refine(const Board &board, const cv::Mat &print, const cv::Mat &tangents, const cv::Mat &grey,
                     const cv::Mat &camera, const cv::Mat &distortion, Corners &corners);

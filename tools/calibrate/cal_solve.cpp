@@ -109,7 +109,7 @@ static void place_dots(const std::vector<Picture> &pictures, const std::vector<i
     const Camera &camera = result.camera;
     Spots spots{result.board,
                 camera,
-                board_bitmap(result.board, draw_px_per_mm),
+                board_picture(result.board, draw_px_per_mm),
                 draw_tangents(camera.size, camera.matrix, camera.distortion),
                 spot_lens_px(result.lit),
                 dark_share(result.views)};

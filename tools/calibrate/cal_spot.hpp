@@ -19,7 +19,7 @@ double spot_lens_px(const std::vector<Lit> &pictures);
 struct Spots {
     const Board &board;
     const Camera &camera;
-    cv::Mat print, tangents;    /* board_bitmap with draw_px_per_mm; draw_tangents */
+    cv::Mat print, tangents;    /* board_picture with draw_px_per_mm; draw_tangents */
     double lens_px, dark_share; /* how light the print's dark is, white is 1 */
 };
 
