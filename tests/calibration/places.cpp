@@ -212,6 +212,16 @@ static void check_lens()
     }
     double error = std::abs(cal::spot_lens_px({lit}) - 0.9);
     result("the lens' part of a dot's width", error < 0.03, error, 0.03);
+    /* Dots of 1.2 px, a few of them, all as far off: by chance the farther ones are the wider. */
+    lit.sightings.clear();
+    for (int i = -20; i < 20; i++) {
+        cal::Sighting sighting{};
+        sighting.place_mm = {0.0, 0.0, 600.0 + 0.5 * i};
+        sighting.wide_px = 1.2 + 0.005 * i;
+        lit.sightings.push_back(sighting);
+    }
+    double lens_px = cal::spot_lens_px({lit});
+    result("it is no more than the width", lens_px < 1.2, lens_px, 1.2);
 }
 
 /* Noise of a sensor on white paper, on which the old limit left every pixel but a few out; and dots. */

@@ -16,18 +16,30 @@ static constexpr double lens_min_px = 0.4, beam_min_px = 0.35, moved_max_px = 1.
 static constexpr int line_rounds = 10;
 static constexpr double huber_sigmas = 1.5;
 
-/* A straight line through squares of widths over squares of nearness, with Huber's weights; where it begins. */
+static double median_of(std::vector<double> values)
+{
+    auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    return *middle;
+}
+
+/* A straight line through squares of widths over squares of nearness, with Huber's weights; where it begins. Dots that are
+ * all as far off do not tell it: but the lens does not make more than all of their width. */
 double spot_lens_px(const std::vector<Lit> &pictures)
 {
     std::vector<cv::Vec2d> points;
+    std::vector<double> squares;
     for (const Lit &lit : pictures) {
-        for (const Sighting &sighting : lit.sightings)
-            points.emplace_back(1e6 / (sighting.place_mm[2] * sighting.place_mm[2]),
-                                sighting.wide_px * sighting.wide_px);
+        for (const Sighting &sighting : lit.sightings) {
+            squares.push_back(sighting.wide_px * sighting.wide_px);
+            points.emplace_back(1e6 / (sighting.place_mm[2] * sighting.place_mm[2]), squares.back());
+        }
     }
+    if (points.empty())
+        return lens_min_px;
     cv::Vec2d line(0.0, 0.0);
     double limit = 1e9;
-    for (int round = 0; round < line_rounds && !points.empty(); round++) {
+    for (int round = 0; round < line_rounds; round++) {
         cv::Matx22d normal = cv::Matx22d::zeros();
         cv::Vec2d right(0.0, 0.0);
         std::vector<double> sizes;
@@ -41,11 +53,10 @@ double spot_lens_px(const std::vector<Lit> &pictures)
         line = normal.inv() * right;
         for (const cv::Vec2d &point : points)
             sizes.push_back(std::abs(point[1] - line[0] - line[1] * point[0]));
-        auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
-        std::nth_element(sizes.begin(), middle, sizes.end());
-        limit = huber_sigmas * 1.4826 * *middle;
+        limit = huber_sigmas * 1.4826 * median_of(sizes);
     }
-    return std::sqrt(std::max(line[0], lens_min_px * lens_min_px));
+    double most = median_of(squares) - beam_min_px * beam_min_px;
+    return std::sqrt(std::max(std::min(line[0], most), lens_min_px * lens_min_px));
 }
 
 /* From the window's middle to the middle of a fine sample. */
