@@ -445,7 +445,7 @@ def check_usage(bench):
                           (("guide", "--far", "900", "a"), "--far belongs to solve"),
                           (("guide", "--middle", "a:1,2", "a"), "--middle belongs to solve")]:
         status, out, err = run(bench.calibrate, *words)
-        fine = status == 2 and not out and wanted in err and len(err.splitlines()) == 1
+        fine = status == 2 and not out and err.startswith("calibrate: ") and wanted in err and len(err.splitlines()) == 1
         result("usage: calibrate " + " ".join(words), None if fine else "status %d: %s%s" % (status, out, err))
     for words in [("--help",), ("guide", "--help", "a", "b"), ("solve", "a", "--help", "--colour")]:
         status, out, err = run(bench.calibrate, *words)

@@ -487,7 +487,7 @@ def case_bad_input():
     refuse("no verb", "the first word must be", "picture", made, wanted=2)
     refuse("a wrong count", "--count 0: must be a whole number", "contours", "--count", "0", made, wanted=2)
     refuse("an empty argument", "argument is empty", "contours", "--trace", "", made, wanted=2)
-    refuse("an unknown option", "unrecognized option", "contours", "--colour", made, wanted=2)
+    refuse("an unknown option", "^view: unrecognized option", "contours", "--colour", made, wanted=2)
     status, _, err = run("contours", made)
     result("refused: no FILE", None if status == 2 and "FILE are needed" in err else err)
     wrong = scene.rig()

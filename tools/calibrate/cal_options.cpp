@@ -142,7 +142,8 @@ bool options_parse(int argc, char **argv, Options &options)
     options.verb = verb == "board" ? Verb::board : verb == "guide" ? Verb::guide : Verb::solve;
     std::vector<std::string> words;
     auto parsed = tool::options_walk(
-        argc, argv, long_options, [&](int id, const char *value) { return take(id, value, options); }, words);
+        "calibrate", argc, argv, long_options, [&](int id, const char *value) { return take(id, value, options); },
+        words);
     if (parsed == tool::Parsed::help)
         options.verb = Verb::help;
     if (parsed != tool::Parsed::words)

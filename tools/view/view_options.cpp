@@ -95,7 +95,7 @@ bool options_parse(int argc, char **argv, Options &options)
         return false;
     std::vector<std::string> words;
     auto parsed = tool::options_walk(
-        argc, argv, long_options, [&](int id, const char *value) { return take(id, value, options); }, words);
+        "view", argc, argv, long_options, [&](int id, const char *value) { return take(id, value, options); }, words);
     if (parsed == tool::Parsed::help)
         options.verb = Verb::help;
     if (parsed != tool::Parsed::words)
