@@ -277,6 +277,7 @@ def check_corrupt(bench):
     refuse(bench, "no such directory", bench.path("nowhere"), 1, "nowhere")
     refuse(bench, "a board that is none", good, 1, "charuco-9x6-30 or chessboard", "--board", "dots")
     refuse(bench, "a board that is too large", good, 1, "fit into", "--board", "charuco-12x6-30")
+    refuse(bench, "another kind of board", good, 1, "cannot support a calibration(.*\n)*  - 10 more pictures", "--board", "chessboard-9x6-30")
     refuse(bench, "near beyond far", good, 2, "--near", "--near", "900", "--far", "800")
     refuse(bench, "a middle without a place", good, 2, "FILE:U,V", "--middle", "000000.pgm")
 

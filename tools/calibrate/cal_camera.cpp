@@ -94,6 +94,14 @@ static double median_of(std::vector<double> values)
     return *middle;
 }
 
+static void refuse(const std::vector<std::string> &missing)
+{
+    std::string message = "the pictures cannot support a calibration. Add:";
+    for (const std::string &sentence : missing)
+        message += "\n  - " + sentence;
+    throw Error(message);
+}
+
 /* A start: every corner counts the same, and the lens has no third radial term. */
 static void fit(const Board &board, std::vector<View> &views, Camera &camera)
 {
@@ -107,6 +115,8 @@ static void fit(const Board &board, std::vector<View> &views, Camera &camera)
             used.push_back(&view);
         }
     }
+    if (used.empty()) /* each has been refused meanwhile */
+        refuse(coverage_missing(views, camera.size, coverage_least));
     std::vector<cv::Mat> turns, shifts;
     camera.distortion = cv::Mat::zeros(1, 5, CV_64F);
     cv::calibrateCamera(places, seen, camera.size, camera.matrix, camera.distortion, turns, shifts, cv::CALIB_FIX_K3);
@@ -182,14 +192,6 @@ static void fill_regions(const Board &board, const std::vector<View> &views, Cam
             region.rms_px = std::sqrt(region.rms_px / region.corner_count);
         }
     }
-}
-
-static void refuse(const std::vector<std::string> &missing)
-{
-    std::string message = "the pictures cannot support a calibration. Add:";
-    for (const std::string &sentence : missing)
-        message += "\n  - " + sentence;
-    throw Error(message);
 }
 
 static void check_trust(const Camera &camera)
