@@ -49,7 +49,7 @@ static bool read_count(const std::string &value, long &count)
 
 static bool take(int id, const char *value, Options &options)
 {
-    if (value != nullptr && *value == '\0')
+    if (*value == '\0') /* each option has one */
         return complain("an option's argument is empty; see view --help");
     switch (id) {
     case opt_from:
