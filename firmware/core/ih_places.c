@@ -352,8 +352,23 @@ static void judge(const struct ih_places *places, const struct ih_turn_slopes *s
     }
 }
 
-/* The prior is wide at first, then as wide as the whole turn that was found with it. False: an axis is not
- * seen, or less certain than it may be. */
+/* The turn with a prior of that width about the calibration. False: an axis is not seen at all. */
+static bool solve_with(const struct totals *sums, int64_t noise_px_q12, int64_t prior_rad_q30,
+                       const int32_t from_rad_q30[3], struct equations *equations,
+                       int32_t turn_rad_q30[3])
+{
+    int64_t root_q8 = ih_div_round(noise_px_q12 * (1 << 26), prior_rad_q30);
+    scale(sums, root_q8 * root_q8, from_rad_q30, equations);
+    if (equations->determinant_q30 < DETERMINANT_MIN_Q30) {
+        return false;
+    }
+    solve(equations, turn_rad_q30);
+    return true;
+}
+
+/* The prior is wide at first, then as wide as the whole turn that was found with it. It is judged with the
+ * wide one: a narrow one holds what no dot shows near 0, where it scatters little and may be all wrong.
+ * False: an axis is not seen, or less certain than it may be. */
 static bool estimate(const struct ih_places *places, const struct ih_turn_slopes *slopes,
                      const struct totals *sums, const int32_t turned_rad_q30[3],
                      const int32_t offset_rad_q30[3], struct ih_places_turn *out)
@@ -362,23 +377,23 @@ static bool estimate(const struct ih_places *places, const struct ih_turn_slopes
     const int32_t limit[3] = {IH_TURN_MAX_RAD_Q30, IH_TURN_MAX_RAD_Q30, IH_TURN_MAX_RAD_Q30};
     int64_t noise_q12 =
         (int64_t)ih_isqrt_u64((uint64_t)(places->square_q32 / places->weight_q8)) + 1;
-    int64_t prior_rad_q30 = length_rad_q30(limit, none);
     int32_t from_rad_q30[3];
-    struct equations equations;
+    struct equations wide, narrow;
     for (int i = 0; i < 3; i++) {
         from_rad_q30[i] = turned_rad_q30[i] + offset_rad_q30[i];
     }
-    for (int i = 0; i < 3; i++) {
-        int64_t root_q8 = ih_div_round(noise_q12 * (1 << 26), prior_rad_q30);
-        scale(sums, root_q8 * root_q8, from_rad_q30, &equations);
-        if (equations.determinant_q30 < DETERMINANT_MIN_Q30) {
-            return false;
-        }
-        solve(&equations, out->turn_rad_q30);
-        prior_rad_q30 = length_rad_q30(from_rad_q30, out->turn_rad_q30);
+    bool is_solved = solve_with(sums, noise_q12, length_rad_q30(limit, none), from_rad_q30, &wide,
+                                out->turn_rad_q30);
+    for (int i = 0; is_solved && i < 2; i++) {
+        int64_t prior_rad_q30 = length_rad_q30(from_rad_q30, out->turn_rad_q30);
         prior_rad_q30 = prior_rad_q30 > PRIOR_MIN_RAD_Q30 ? prior_rad_q30 : PRIOR_MIN_RAD_Q30;
+        is_solved =
+            solve_with(sums, noise_q12, prior_rad_q30, from_rad_q30, &narrow, out->turn_rad_q30);
     }
-    judge(places, slopes, &equations, sums->whole_q8, offset_rad_q30, out);
+    if (!is_solved) {
+        return false;
+    }
+    judge(places, slopes, &wide, sums->whole_q8, offset_rad_q30, out);
     for (int i = 0; i < 3; i++) {
         out->turn_rad_q30[i] += offset_rad_q30[i];
     }

@@ -14,9 +14,10 @@
  *        Uncertainty: from what each slot's own distance leaves unexplained, with nothing assumed
  *        of how slots err but that they do so independently (the sandwich of White, 1980); so
  *        it counts rays that were calibrated badly, too. 0.03 px that no frame shows are added.
- *        A prior as wide as the turn itself keeps what is hardly seen near 0. If the turn across the
- *        baseline is less certain than IH_PLACES_SIGMA_MAX it is not estimated but held where it is
- *        known to be, else at the calibration's, and the others are estimated with that.
+ *        A prior as wide as the turn itself keeps what is hardly seen near 0; the uncertainty is that
+ *        with a prior as wide as the limit, so that what is only held is not taken for seen. If the
+ *        turn across the baseline is less certain than IH_PLACES_SIGMA_MAX it is not estimated but held
+ *        where it is known to be, else at the calibration's, and the others are estimated with that.
  * Cost:  adding, 361 slots; finding, three sums over them and 3x3 equations.
  * Error: against float64 on the same frames (tools/oracle/knock.py): docs/numerics.md.
  * Memory: constant, 7 kB; IH_PLACES_FRAMES_MAX frames, then older ones count half.

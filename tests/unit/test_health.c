@@ -106,6 +106,24 @@ static void a_knock_is_found_within_fifty_frames(void)
     }
 }
 
+/* Only dots of the middle row and columns. */
+static void run_middle(const double turn_deg[3], int frames)
+{
+    for (int frame = 0; frame < frames; frame++) {
+        see_dots(&vector_rigs[0], turn_deg, WALL_MM, 0.1, &random_source, &dots);
+        TEST_ASSERT_EQUAL_INT32(IH_SLOTS, dots.dot_count);
+        dots.dot_count = 0;
+        for (int slot = 0; slot < IH_SLOTS; slot++) {
+            int row = slot / IH_GRID - IH_GRID / 2;
+            int column = slot % IH_GRID - IH_GRID / 2;
+            if (row == 0 || abs(column) <= 1) {
+                dots.dot[dots.dot_count++] = dots.dot[slot];
+            }
+        }
+        look();
+    }
+}
+
 /* Dots of the middle row and columns hardly show a turn about Y. Nothing that votes made up of it may stay, and it
  * is said. */
 static void what_dots_do_not_show_is_not_taken(void)
@@ -114,25 +132,30 @@ static void what_dots_do_not_show_is_not_taken(void)
 
     for (int i = 0; i < IH_TEST_COUNT(turns_deg); i++) {
         use_calibration(&vector_rigs[0]);
-        for (int frame = 0; frame < 2 * FRAMES_TO_FIND; frame++) {
-            see_dots(&vector_rigs[0], turns_deg[i], WALL_MM, 0.1, &random_source, &dots);
-            TEST_ASSERT_EQUAL_INT32(IH_SLOTS, dots.dot_count);
-            dots.dot_count = 0;
-            for (int slot = 0; slot < IH_SLOTS; slot++) {
-                int row = slot / IH_GRID - IH_GRID / 2;
-                int column = slot % IH_GRID - IH_GRID / 2;
-                if (row == 0 || abs(column) <= 1) {
-                    dots.dot[dots.dot_count++] = dots.dot[slot];
-                }
-            }
-            look();
-        }
+        run_middle(turns_deg[i], 2 * FRAMES_TO_FIND);
         TEST_ASSERT_EQUAL_INT(IH_HEALTH_TURNED, health.state);
         TEST_ASSERT_FALSE(health.is_weak_known);
         IH_TEST_WITHIN(0.003, turns_deg[i][0], health.turn_rad_q30[0] / Q30 / DEG, "turn", i);
         IH_TEST_WITHIN(0.001, 0, health.turn_rad_q30[1] / Q30 / DEG, "across", i);
         IH_TEST_WITHIN(0.01, turns_deg[i][2], health.turn_rad_q30[2] / Q30 / DEG, "turn", 20 + i);
         IH_TEST_WITHIN(0.001, 0.6, health.sigma_rad_q30[1] / Q30 / DEG, "sigma", i);
+    }
+}
+
+/* However small the turn that they show: what is near the calibration is not known to be there. */
+static void a_small_turn_makes_nothing_else_known(void)
+{
+    static const double turns_deg[][3] = {
+        {0, 0, 0}, {0, 0.1, 0}, {0.02, 0.3, 0}, {0.03, -0.3, 0}, {0.045, 0.3, 0}};
+
+    for (int i = 0; i < IH_TEST_COUNT(turns_deg); i++) {
+        for (int seed = 0; seed < 6; seed++) {
+            random_source.state = (uint64_t)seed;
+            use_calibration(&vector_rigs[0]);
+            run_middle(turns_deg[i], 2 * FRAMES_TO_FIND);
+            TEST_ASSERT_FALSE(health.is_weak_known);
+            IH_TEST_WITHIN(0.001, 0.6, health.sigma_rad_q30[1] / Q30 / DEG, "sigma", 10 * i + seed);
+        }
     }
 }
 
@@ -253,6 +276,7 @@ int main(void)
     RUN_TEST(a_rig_that_fits_is_left_alone);
     RUN_TEST(a_knock_is_found_within_fifty_frames);
     RUN_TEST(what_dots_do_not_show_is_not_taken);
+    RUN_TEST(a_small_turn_makes_nothing_else_known);
     RUN_TEST(more_frames_make_it_better);
     RUN_TEST(a_second_knock_and_one_back);
     RUN_TEST(a_turn_beyond_the_limit_is_told_and_not_taken);
