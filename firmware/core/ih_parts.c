@@ -11,7 +11,7 @@
  * twice the area over 8 pi; with some more. */
 #define SHAPE_ROUNDED_Q16 3
 #define ROOT_ROUNDED_Q32 (1 << 21)
-/* 18 / 8 pi, rounded up: see limits_of. */
+/* 18 / 8 pi, rounded up: see limit_shapes. */
 #define CIRCLE_Q16 46938
 /* Limits of the spread beyond this would overflow; then nothing is left out. */
 #define SPREAD_LIMIT_MAX_Q16 (8 << 16)

@@ -84,12 +84,11 @@ struct ih_parts {
     int32_t arc_q8[IH_PARTS_POINTS];                              /* length of a part, by steps */
     int32_t part_count;
     struct ih_part part[IH_PARTS_MAX]; /* by point, then by steps */
-    /* scratch: of edges, their lengths; of points, the place from the middle and the square of its distance; square of the longest
-     * chord, and one more, by steps; bit k of [from]: the chord over k steps is short enough */
+    /* scratch: of edges, their lengths; of points, the place from the middle and the square of its
+     * distance; bit k of [from]: the chord over k steps is short enough */
     int32_t length_q9[IH_PARTS_VERTICES_MAX];
     int32_t dx_q8[2 * IH_PARTS_POINTS], dy_q8[2 * IH_PARTS_POINTS];
     int32_t square_q16[2 * IH_PARTS_POINTS];
-    int32_t chord2_end_q16[IH_PARTS_POINTS];
     uint32_t short_low[IH_PARTS_POINTS], short_high[IH_PARTS_POINTS];
     struct ih_parts_sums sums;
 };

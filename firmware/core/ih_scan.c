@@ -1,6 +1,5 @@
 #include "ih_scan.h"
 
-#include <stddef.h>
 #include <string.h>
 
 #include "ih_fix.h"
