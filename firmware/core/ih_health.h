@@ -14,7 +14,10 @@
  *           and 5 times its uncertainty.
  *        A turn that was taken is refined from the next 4, 4 and 32 frames; from then on frames add up, and
  *        it is refined whenever a quarter more are there. A knock is so found and corrected within 49
- *        of the frames that are looked at.
+ *        of the frames that are looked at, if it was soon after the start, or if it moves dots by more than
+ *        0.25 px in the mean, as 0.1 degrees along the baseline do. Of a smaller one after a long peace the
+ *        frames before it hide what is new: 100 to 200 are needed. Until then the uncertainty that is said
+ *        is that of the turn before.
  *        A turn across the baseline, which is depth and which dots hardly show, is corrected for only
  *        when it is known to IH_PLACES_SIGMA_MAX: what votes say of it alone is taken back.
  * Limits: within IH_TURN_MAX_RAD_Q30 about each axis. Not seen, and not corrected: a shift of the
