@@ -39,8 +39,8 @@ static void inverse_roots_lie_between_chord_and_curve(void)
     for (span = SPANS_BELOW; span < 256; span++) {
         const uint32_t entry = inverse_root[span - SPANS_BELOW];
 
-        IH_TEST_EQUAL(floor(8 * (root_inverse(span) - chord_above(span) / 2) + 0.5) + 4, entry >> 12,
-                      "beginning", span);
+        IH_TEST_EQUAL(floor(8 * (root_inverse(span) - chord_above(span) / 2) + 0.5) + 4,
+                      entry >> 12, "beginning", span);
         IH_TEST_EQUAL(floor(8 * fall_over(span) + 0.5), entry & 4095, "fall", span);
     }
 }
