@@ -122,9 +122,9 @@ def check_page(loop):
 def check_refusals(loop):
     token = loop.url.path.strip("/")
     check(re.fullmatch("[0-9a-f]{32}", token), f"the token is {token}")
-    other = "0" if token[-1] != "0" else "1"
-    wrong = ["", "/", "/frame", "/live.js", "/favicon.ico", f"/{token}", f"/{token[:-1]}/", f"/{token[:-1]}{other}/",
-             f"/{other}{token[1:]}/frame", f"/{token}0/", f"/{token.upper()}x/", f"//{token}/", f"/{'0' * 32}/frame",
+    first, last = ["0" if figure != "0" else "1" for figure in (token[0], token[-1])]
+    wrong = ["", "/", "/frame", "/live.js", "/favicon.ico", f"/{token}", f"/{token[:-1]}/", f"/{token[:-1]}{last}/",
+             f"/{first}{token[1:]}/frame", f"/{token}0/", f"/{token.upper()}x/", f"//{token}/", f"/{'0' * 32}/frame",
              f"/{token}%00/", "/../" + token + "/", f"/?token={token}", "/%2e%2e/etc/passwd"]
     for path in wrong:
         status, _, body = loop.ask(path or "*")
