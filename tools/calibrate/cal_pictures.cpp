@@ -9,10 +9,11 @@
 #include <nlohmann/json.hpp>
 
 #include "cal_error.hpp"
+#include "tool_file.hpp"
 
 namespace cal
 {
-static constexpr int width_min = 320, height_min = 240, width_max = 1280, height_max = 800;
+const char *const picture_sizes = "320x240 to 1280x800 pixels";
 
 cv::Mat Picture::grey8() const
 {
@@ -36,10 +37,15 @@ static int header_number(std::istream &file, const std::string &path)
     return value;
 }
 
+bool picture_size_fits(cv::Size size)
+{
+    return size.width >= width_min && size.height >= height_min && size.width <= width_max && size.height <= height_max;
+}
+
 void picture_check_size(const std::string &where, int width, int height)
 {
-    if (width < width_min || height < height_min || width > width_max || height > height_max)
-        throw Error(where + text(": %dx%d pixels; must be from 320x240 to 1280x800", width, height));
+    if (!picture_size_fits({width, height}))
+        throw Error(where + text(": %dx%d pixels; must be from ", width, height) + picture_sizes);
 }
 
 cv::Mat picture_read(const std::string &path)
@@ -74,11 +80,8 @@ cv::Mat picture_read(const std::string &path)
 void picture_write(const std::string &path, const cv::Mat &grey8)
 {
     cv::Mat whole = grey8.isContinuous() ? grey8 : grey8.clone();
-    std::ofstream file(path, std::ios::binary);
-    file << "P5\n" << whole.cols << ' ' << whole.rows << "\n255\n";
-    file.write(reinterpret_cast<const char *>(whole.data), static_cast<std::streamsize>(whole.total()));
-    if (!file.flush())
-        throw Error(path + ": could not be written");
+    tool::file_write(path,
+                     text("P5\n%d %d\n255\n", whole.cols, whole.rows).append(whole.begin<uchar>(), whole.end<uchar>()));
 }
 
 static bool ends_with(const std::string &name, const std::string &end)
@@ -92,6 +95,8 @@ static std::map<std::string, bool> read_list(const std::string &path)
     std::map<std::string, bool> lasers;
     std::ifstream list(path);
     std::string line;
+    if (!list && std::filesystem::exists(path))
+        throw Error(path + ": " + std::strerror(errno));
     for (int number = 1; std::getline(list, line); number++) {
         if (line.find_first_not_of(" \t\r") == std::string::npos)
             continue;
@@ -100,11 +105,15 @@ static std::map<std::string, bool> read_list(const std::string &path)
             bool laser = entry.at("laser").get<bool>();
             if (!lasers.emplace(entry.at("file").get<std::string>(), laser).second)
                 throw Error(path + text(":%d: names a file that an earlier line names", number));
-        } catch (const nlohmann::json::exception &error) {
-            throw Error(path + text(":%d: must have a \"file\" and a \"laser\" that is true or false: ", number) +
-                        error.what());
+        } catch (const nlohmann::json::parse_error &) {
+            throw Error(path + text(":%d: is no JSON; must be like {\"file\":\"000000.pgm\",\"laser\":true}", number));
+        } catch (const nlohmann::json::exception &) {
+            throw Error(path +
+                        text(":%d: must have a \"file\" in quotes and a \"laser\" that is true or false", number));
         }
     }
+    if (list.bad())
+        throw Error(path + ": could not be read: " + std::strerror(errno));
     return lasers;
 }
 
@@ -133,18 +142,17 @@ static void check_told(const std::string &dir, const std::vector<std::string> &n
                     "/frames.jsonl, or name the files NAME-on.pgm and NAME-off.pgm");
 }
 
-static std::vector<std::string> list_names(const std::string &dir)
+std::vector<std::string> pictures_list(const std::string &dir)
 {
     std::vector<std::string> names;
     std::error_code failed;
     for (const auto &entry : std::filesystem::directory_iterator(dir, failed)) {
-        if (entry.path().extension() == ".pgm")
-            names.push_back(entry.path().filename());
+        std::string name = entry.path().filename();
+        if (name.front() != '.' && entry.path().extension() == ".pgm")
+            names.push_back(name);
     }
     if (failed)
         throw Error(dir + ": " + failed.message());
-    if (names.empty())
-        throw Error(dir + ": no *.pgm in it; pictures of other kinds must be made binary PGM first");
     std::sort(names.begin(), names.end());
     return names;
 }
@@ -152,7 +160,9 @@ static std::vector<std::string> list_names(const std::string &dir)
 std::vector<Picture> pictures_read(const std::string &dir)
 {
     std::vector<Picture> pictures;
-    std::vector<std::string> names = list_names(dir);
+    std::vector<std::string> names = pictures_list(dir);
+    if (names.empty())
+        throw Error(dir + ": no *.pgm in it; pictures of other kinds must be made binary PGM first");
     std::map<std::string, bool> list = read_list(dir + "/frames.jsonl");
     check_told(dir, names, list);
     std::string faults;

@@ -1,7 +1,7 @@
 /* cal_pictures - a frames directory as docs/contract.md describes it: binary PGM files, and frames.jsonl, which says in
  * which of them the laser was on. Without frames.jsonl the names say it: NAME-on.pgm and NAME-off.pgm.
- * Whatever cannot be read, is cut short or has another size than the rest is an error; so is a file that is named in
- * frames.jsonl twice, or named there and not there.
+ * Other files may lie beside them. A *.pgm that cannot be read, is cut short or has another size than the rest is an
+ * error; so is a file that is named in frames.jsonl twice, or named there and not there.
  */
 #ifndef CAL_PICTURES_HPP
 #define CAL_PICTURES_HPP
@@ -23,14 +23,22 @@ struct Picture {
     cv::Mat grey8() const;
 };
 
-/* Throws cal::Error, which begins with `where`, unless host_sim and the board could use frames of that size. */
+/* Frames that host_sim and the board can use. */
+constexpr int width_min = 320, height_min = 240, width_max = 1280, height_max = 800;
+extern const char *const picture_sizes; /* the same in words */
+bool picture_size_fits(cv::Size size);
+
+/* Throws cal::Error, which begins with `where`, unless the size fits. */
 void picture_check_size(const std::string &where, int width, int height);
+
+/* The names of *.pgm, sorted; those of hidden files are left out. Throws cal::Error. */
+std::vector<std::string> pictures_list(const std::string &dir);
 
 /* One file. Throws cal::Error. */
 cv::Mat picture_read(const std::string &path);
 void picture_write(const std::string &path, const cv::Mat &grey8);
 
-/* All of them in the order of their names. Throws cal::Error; one that stands for all unreadable files. */
+/* All of them in the order of their names, at least one. Throws cal::Error; one that stands for all unreadable files. */
 std::vector<Picture> pictures_read(const std::string &dir);
 } // namespace cal
 

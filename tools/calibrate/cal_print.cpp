@@ -2,9 +2,10 @@
 
 #include <cairo-pdf.h>
 #include <cairo.h>
-#include <fstream>
 
 #include "cal_error.hpp"
+#include "cal_pictures.hpp"
+#include "tool_file.hpp"
 
 namespace cal
 {
@@ -26,11 +27,7 @@ static void write_bitmap(const Board &board, const std::string &path)
 {
     cv::Mat sheet = board_picture(board, bitmap_px_per_mm), albedo;
     sheet.convertTo(albedo, CV_8U, white_albedo - dark_albedo, 255.0 * dark_albedo);
-    std::ofstream file(path, std::ios::binary);
-    file << "P5\n" << albedo.cols << ' ' << albedo.rows << "\n255\n";
-    file.write(reinterpret_cast<const char *>(albedo.data), static_cast<std::streamsize>(albedo.total()));
-    if (!file.flush())
-        throw Error(path + ": could not be written");
+    picture_write(path, albedo);
 }
 
 /* All dark areas as rectangles: runs of dark samples in a row, continued downwards as long as they are the same. */
@@ -81,10 +78,17 @@ static void draw_ruler(const Board &board, cairo_t *page)
                     text("must measure 100 mm: print without scaling. isohead board %s", board.name.c_str()).c_str());
 }
 
+static cairo_status_t take(void *bytes, const unsigned char *data, unsigned int count)
+{
+    static_cast<std::string *>(bytes)->append(reinterpret_cast<const char *>(data), count);
+    return CAIRO_STATUS_SUCCESS;
+}
+
 static void write_pdf(const Board &board, const std::string &path)
 {
-    cairo_surface_t *surface =
-        cairo_pdf_surface_create(path.c_str(), sheet_width_mm * points_per_mm, sheet_height_mm * points_per_mm);
+    std::string bytes;
+    cairo_surface_t *surface = cairo_pdf_surface_create_for_stream(take, &bytes, sheet_width_mm * points_per_mm,
+                                                                   sheet_height_mm * points_per_mm);
     cairo_t *page = cairo_create(surface);
     cairo_scale(page, points_per_mm, points_per_mm);
     draw_areas(board_bitmap(board, area_px_per_mm), page);
@@ -98,15 +102,19 @@ static void write_pdf(const Board &board, const std::string &path)
     cairo_surface_destroy(surface);
     if (status != CAIRO_STATUS_SUCCESS)
         throw Error(path + ": " + cairo_status_to_string(status));
+    tool::file_write(path, bytes);
+}
+
+bool board_prints(const std::string &path)
+{
+    return ends_with(path, ".pdf") || ends_with(path, ".pgm");
 }
 
 void board_print(const Board &board, const std::string &path)
 {
     if (ends_with(path, ".pgm"))
         write_bitmap(board, path);
-    else if (ends_with(path, ".pdf"))
-        write_pdf(board, path);
     else
-        throw Error(path + ": a board's file must end in .pdf or .pgm");
+        write_pdf(board, path);
 }
 } // namespace cal

@@ -1,11 +1,12 @@
 #include "cal_report.hpp"
 
 #include <algorithm>
-#include <fstream>
+#include <sstream>
 
 #include "cal_chart.hpp"
 #include "cal_epipolar.hpp"
 #include "cal_error.hpp"
+#include "tool_file.hpp"
 
 namespace cal
 {
@@ -253,7 +254,7 @@ void report_write(const std::string &path, const Result &result)
     scatter.points(residuals.along_across, blue, 1.3);
     Chart across("Across the line, by distance", "distance, mm", "across, px", {300.0, -limit, 1400.0, 2.0 * limit});
     across.points(residuals.by_depth, blue, 1.3);
-    std::ofstream file(path);
+    std::ostringstream file;
     file << head << "<p>Board " << escaped(result.board.name) << ", frames of " << result.camera.size.width << "x"
          << result.camera.size.height << " pixels.</p>\n<h2>Camera</h2>\n"
          << text("<p>Corners: rms %.3f px.</p>", result.camera.rms_px) << camera_table(result.camera)
@@ -275,7 +276,6 @@ void report_write(const std::string &path, const Result &result)
             "used<th>not "
             "used<th>rms, px<th></tr>"
          << lit_rows(result) << "</table></html>\n";
-    if (!file.flush())
-        throw Error(path + ": could not be written");
+    tool::file_write(path, file.str());
 }
 } // namespace cal

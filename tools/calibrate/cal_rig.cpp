@@ -1,8 +1,9 @@
 #include "cal_rig.hpp"
 
-#include <fstream>
+#include <sstream>
 
 #include "cal_error.hpp"
+#include "tool_file.hpp"
 
 namespace cal
 {
@@ -32,7 +33,7 @@ void rig_write(const std::string &path, const Camera &camera, const Projector &p
     std::vector<double> rays;
     for (const cv::Vec3d &ray : projector.rays)
         rays.insert(rays.end(), {ray[0], ray[1], ray[2]});
-    std::ofstream file(path);
+    std::ostringstream file;
     file << "{\n  \"kind\":\"dots\",\n  \"image_width\":" << camera.size.width
          << ",\n  \"image_height\":" << camera.size.height << ",\n";
     write_matrix(file, "camera_matrix", 3, 3, values_of(camera.matrix));
@@ -44,7 +45,6 @@ void rig_write(const std::string &path, const Camera &camera, const Projector &p
     for (size_t slot = 0; slot < slot_count; slot++)
         file << (slot > 0 ? "," : "") << projector.seen[slot];
     file << "],\n  \"near_mm\":" << number(range.near_mm) << ",\n  \"far_mm\":" << number(range.far_mm) << "\n}\n";
-    if (!file.flush())
-        throw Error(path + ": could not be written");
+    tool::file_write(path, file.str());
 }
 } // namespace cal

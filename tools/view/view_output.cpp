@@ -10,6 +10,7 @@
 #include <opencv2/videoio.hpp>
 #include <unistd.h>
 
+#include "tool_file.hpp"
 #include "view_error.hpp"
 #include "view_png.hpp"
 
@@ -41,19 +42,6 @@ static cv::Mat3b draw_pixels(cv::Size size, const Drawing &draw, const std::stri
     return picture;
 }
 
-static void write_whole(const std::string &path, const void *bytes, size_t count)
-{
-    std::string other = path + ".part";
-    std::ofstream file(other, std::ios::binary);
-    file.write(static_cast<const char *>(bytes), static_cast<std::streamsize>(count));
-    file.close();
-    if (!file || std::rename(other.c_str(), path.c_str()) != 0) {
-        std::string reason = std::strerror(errno);
-        std::remove(other.c_str());
-        throw Error(path + ": could not be written: " + reason);
-    }
-}
-
 class Png : public Output
 {
   public:
@@ -63,7 +51,7 @@ class Png : public Output
     void page(cv::Size size, const Drawing &draw) override
     {
         std::string bytes = png_encode(draw_pixels(size, draw, path_), path_);
-        write_whole(path_, bytes.data(), bytes.size());
+        tool::file_write(path_, bytes);
     }
     void finish() override
     {
@@ -99,7 +87,7 @@ class Pdf : public Output
     {
         cairo_surface_finish(surface_.get());
         check(cairo_surface_status(surface_.get()), path_);
-        write_whole(path_, bytes_.data(), bytes_.size());
+        tool::file_write(path_, bytes_);
     }
 
   private:
