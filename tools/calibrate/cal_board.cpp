@@ -50,14 +50,13 @@ Board board_parse(const std::string &name)
     if (std::sscanf(name.c_str(), "%15[a-z]-%3dx%3d-%lf%n", kind, &columns, &rows, &square_mm, &length) != 4 ||
         name[static_cast<size_t>(length)] != '\0' ||
         (std::strcmp(kind, "charuco") != 0 && std::strcmp(kind, "chessboard") != 0))
-        throw Error("--board " + name +
-                    ": must be like charuco-9x6-30 or chessboard-9x6-30 (squares across, down, mm)");
+        throw Error(name + ": must be like charuco-9x6-30 or chessboard-9x6-30 (squares across, down, mm)");
     if (columns < 4 || rows < 4 || !(square_mm >= 5.0) || columns * square_mm > sheet_width_mm - 2 * margin_mm ||
         rows * square_mm > sheet_height_mm - 2 * margin_mm)
-        throw Error("--board " + name + ": must have at least 4x4 squares of at least 5 mm and fit into 281x194 mm");
+        throw Error(name + ": must have at least 4x4 squares of at least 5 mm and fit into 281x194 mm");
     Board board{std::strcmp(kind, "charuco") == 0, columns, rows, square_mm, name, {}};
     if (board.charuco && columns * rows / 2 > markers_max)
-        throw Error("--board " + name + ": has more than 100 white squares");
+        throw Error(name + ": has more than 100 white squares");
     if (board.charuco)
         board.markers = cv::aruco::CharucoBoard::create(columns, rows, static_cast<float>(square_mm),
                                                         static_cast<float>(marker_share * square_mm),

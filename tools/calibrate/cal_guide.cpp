@@ -86,7 +86,7 @@ static int count_pairs(const std::vector<Picture> &pictures, const std::vector<V
 
 bool guide_directory(const Options &options)
 {
-    Board board = board_parse(options.board);
+    const Board &board = options.board;
     std::vector<Picture> pictures = pictures_read(options.target);
     std::vector<View> views, dark;
     tool::Progress progress(true);
@@ -244,8 +244,8 @@ static cv::Mat take_lit(const Board &board, cv::VideoCapture &camera, const View
     return grey8;
 }
 
-/* Pairs that were taken before, without the laser. */
-static std::vector<View> views_before(const Board &board, const std::string &dir, int &pair_count)
+/* Pairs that were taken before, without the laser. `size` is the one that is wanted, if any; theirs afterwards. */
+static std::vector<View> views_before(const Board &board, const std::string &dir, cv::Size &size, int &pair_count)
 {
     std::error_code failed;
     std::vector<View> views, dark;
@@ -255,10 +255,16 @@ static std::vector<View> views_before(const Board &board, const std::string &dir
     if (std::filesystem::exists(dir + "/frames.jsonl"))
         throw Error(dir +
                     ": has a frames.jsonl, which would not know of new pictures: take them into another directory");
-    if (std::filesystem::is_empty(dir))
+    if (pictures_list(dir).empty())
         return {};
     tool::Progress progress;
     std::vector<Picture> pictures = pictures_read(dir);
+    cv::Size there = pictures.front().grey.size();
+    if (!size.empty() && size != there)
+        throw Error(text("--size %dx%d: but the pictures in %s have %dx%d pixels: leave --size out, or take the others "
+                         "into another directory",
+                         size.width, size.height, dir.c_str(), there.width, there.height));
+    size = there;
     for (const Picture &picture : pictures) {
         progress.show("looking at the pictures that are there", views.size(), pictures.size());
         views.push_back(look(board, picture.file, picture.grey8()));
@@ -280,13 +286,25 @@ static std::string free_name(const std::string &dir)
     }
 }
 
+/* Both or none. */
+static void write_pair(const std::string &name, const cv::Mat &dark, const cv::Mat &lit)
+{
+    picture_write(name + "-off.pgm", dark);
+    try {
+        picture_write(name + "-on.pgm", lit);
+    } catch (const Error &) {
+        std::filesystem::remove(name + "-off.pgm");
+        throw;
+    }
+}
+
 bool guide_camera(const Options &options)
 {
-    Board board = board_parse(options.board);
+    const Board &board = options.board;
     cv::VideoCapture camera = open_camera(options.camera);
     int pair_count = 0;
-    std::vector<View> views = views_before(board, options.target, pair_count);
-    cv::Size wanted = views.empty() ? options.size : views.front().grey8.size();
+    cv::Size wanted = options.size;
+    std::vector<View> views = views_before(board, options.target, wanted, pair_count);
     if (!wanted.empty()) {
         camera.set(cv::CAP_PROP_FRAME_WIDTH, wanted.width);
         camera.set(cv::CAP_PROP_FRAME_HEIGHT, wanted.height);
@@ -297,8 +315,7 @@ bool guide_camera(const Options &options)
         if (lit.empty())
             continue;
         std::string name = free_name(options.target);
-        picture_write(name + "-off.pgm", taken.grey8);
-        picture_write(name + "-on.pgm", lit);
+        write_pair(name, taken.grey8, lit);
         std::printf("taken: %s-off.pgm and %s-on.pgm; switch the laser off again\n", name.c_str(), name.c_str());
         views.push_back(taken);
         pair_count++;

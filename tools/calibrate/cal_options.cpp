@@ -1,7 +1,12 @@
 #include "cal_options.hpp"
 
+#include <cmath>
 #include <cstdlib>
+#include <filesystem>
 
+#include "cal_error.hpp"
+#include "cal_pictures.hpp"
+#include "cal_print.hpp"
 #include "tool_options.hpp"
 
 namespace cal
@@ -24,10 +29,10 @@ const char *const options_help = /* at most 80 columns */
     "  --camera DEVICE  take pictures into DIR, beside those that are there: a\n"
     "                   camera's number or device, or a film; each pose twice,\n"
     "                   laser off and on\n"
-    "  --size WxH       the size of the camera's frames (default: that of DIR's\n"
-    "                   pictures, else as the camera gives them)\n"
+    "  --size WxH       the size of the camera's frames in pixels (default: that of\n"
+    "                   DIR's pictures, else as the camera gives them)\n"
     "  --near MM, --far MM   the working range in Z that rig.json tells (default 400,\n"
-    "                   2600)\n"
+    "                   2600; from 100 to 16000)\n"
     "  --middle FILE:U,V     the pattern's middle dot is at pixel U,V of a picture\n"
     "                   with the laser on; needed only where the pattern's edges are\n"
     "                   not seen on the board\n"
@@ -45,12 +50,26 @@ static bool complain(const std::string &what)
     return tool::complain("calibrate", what);
 }
 
+/* What the core takes (firmware/core/ih_config.h). */
+static constexpr double depth_min_mm = 100.0, depth_max_mm = 16000.0;
+
+static bool read_board(const std::string &value, Board &board)
+{
+    try {
+        board = board_parse(value);
+    } catch (const Error &error) {
+        return complain(std::string("--board ") + error.what());
+    }
+    return true;
+}
+
 static bool read_mm(const char *name, const char *value, double &mm)
 {
     char *end;
     mm = std::strtod(value, &end);
-    if (end == value || *end != '\0' || !(mm >= 50.0 && mm <= 20000.0))
-        return complain(std::string("--") + name + " " + value + ": must be a number from 50 to 20000");
+    if (end == value || *end != '\0' || !(mm >= depth_min_mm && mm <= depth_max_mm))
+        return complain(
+            text("--%s %s: must be a number of mm from %.0f to %.0f", name, value, depth_min_mm, depth_max_mm));
     return true;
 }
 
@@ -61,7 +80,10 @@ static bool read_middle(const std::string &value, MiddleDot &middle)
     if (colon == std::string::npos || colon == 0 ||
         std::sscanf(value.c_str() + colon + 1, "%lf,%lf%n", &middle.px.x, &middle.px.y, &length) != 2 ||
         value.size() != colon + 1 + static_cast<size_t>(length))
-        return complain("--middle " + value + ": must be FILE:U,V");
+        return complain("--middle " + value + ": must be FILE:U,V, U and V in pixels");
+    if (!(middle.px.x >= 0.0 && middle.px.x < width_max && middle.px.y >= 0.0 && middle.px.y < height_max))
+        return complain("--middle " + value +
+                        text(": U must be from 0 to %d px, V from 0 to %d", width_max - 1, height_max - 1));
     middle.file = value.substr(0, colon);
     return true;
 }
@@ -75,9 +97,8 @@ static bool read_size(const std::string &value, cv::Size &size)
 {
     int length = 0;
     if (std::sscanf(value.c_str(), "%4dx%4d%n", &size.width, &size.height, &length) != 2 ||
-        value.size() != static_cast<size_t>(length) || size.width < 320 || size.height < 240 || size.width > 1280 ||
-        size.height > 800)
-        return complain("--size " + value + ": must be WxH from 320x240 to 1280x800");
+        value.size() != static_cast<size_t>(length) || !picture_size_fits(size))
+        return complain("--size " + value + ": must be WxH, from " + picture_sizes);
     return true;
 }
 
@@ -87,8 +108,7 @@ static bool take(int id, const char *value, Options &options)
         return complain("an option's argument is empty; see calibrate --help");
     switch (id) {
     case opt_board:
-        options.board = value;
-        return true;
+        return read_board(value, options.board);
     case opt_camera:
         options.camera = value;
         return options.verb == Verb::guide || complain("--camera belongs to guide");
@@ -114,8 +134,13 @@ static bool check(const Options &options)
     if (options.target.empty())
         return complain(options.verb == Verb::board ? "one FILE is needed; see calibrate --help"
                                                     : "one DIR is needed; see calibrate --help");
+    if (options.verb == Verb::board && !board_prints(options.target))
+        return complain(options.target + ": a board's file must end in .pdf or .pgm");
     if (solve != !options.out.empty())
         return complain("--out belongs to solve, which needs it; see calibrate --help");
+    std::error_code unknown; /* of a directory that is not there: that is told later */
+    if (solve && std::filesystem::equivalent(options.out, options.target, unknown))
+        return complain("--out must be another directory than the pictures': a rig.json there would be lost");
     if (!options.size.empty() && options.camera.empty())
         return complain("--size belongs to guide --camera");
     return options.range.near_mm < options.range.far_mm || complain("--near must be less than --far");

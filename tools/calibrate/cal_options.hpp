@@ -12,8 +12,8 @@ enum class Verb { board, guide, solve, help };
 
 struct Options {
     Verb verb = Verb::help;
-    std::string board = "charuco-9x6-30";
-    std::string target; /* the PDF, or the directory of pictures */
+    Board board = board_parse("charuco-9x6-30");
+    std::string target; /* the file to print to, or the directory of pictures */
     std::string out;    /* solve: where rig.json and the report go */
     std::string camera; /* guide: what cv::VideoCapture opens; empty: look at the directory only */
     cv::Size size;      /* guide: of the camera's frames; empty: as it gives them */

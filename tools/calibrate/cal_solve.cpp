@@ -190,7 +190,7 @@ void solve_run(const Options &options)
     Result result;
     tool::Progress progress;
     make_out(options.out);
-    result.board = board_parse(options.board);
+    result.board = options.board;
     result.range = options.range;
     std::vector<Picture> pictures = pictures_read(options.target);
     auto lit_count = std::count_if(pictures.begin(), pictures.end(), [](const Picture &p) { return p.laser; });

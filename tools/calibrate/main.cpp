@@ -4,33 +4,51 @@
  */
 #include <cstdio>
 #include <exception>
+#include <new>
 
+#include "cal_error.hpp"
 #include "cal_guide.hpp"
 #include "cal_options.hpp"
 #include "cal_print.hpp"
 #include "cal_solve.hpp"
 
+/* What was told must have arrived. */
+static int told(int status)
+{
+    if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0)
+        return status;
+    throw cal::Error("standard output could not be written");
+}
+
 int main(int argc, char **argv)
 {
-    cal::Options options;
-    if (!cal::options_parse(argc, argv, options))
-        return 2;
     try {
+        cal::Options options;
+        if (!cal::options_parse(argc, argv, options))
+            return 2;
         switch (options.verb) {
         case cal::Verb::help:
             std::fputs(cal::options_help, stdout);
-            return 0;
+            return told(0);
         case cal::Verb::board:
-            cal::board_print(cal::board_parse(options.board), options.target);
+            cal::board_print(options.board, options.target);
             return 0;
         case cal::Verb::guide:
-            return (options.camera.empty() ? cal::guide_directory(options) : cal::guide_camera(options)) ? 0 : 1;
+            return told((options.camera.empty() ? cal::guide_directory(options) : cal::guide_camera(options)) ? 0 : 1);
         case cal::Verb::solve:
             cal::solve_run(options);
-            return 0;
+            return told(0);
         }
-    } catch (const std::exception &error) {
+    } catch (const cal::Error &error) {
         std::fprintf(stderr, "calibrate: %s\n", error.what());
+    } catch (const std::bad_alloc &) {
+        std::fprintf(stderr, "calibrate: out of memory\n");
+    } catch (const std::exception &error) {
+        std::fprintf(
+            stderr,
+            "calibrate: could not go on with these pictures, and ought to have said why: please report it, with "
+            "this: %s\n",
+            error.what());
     }
     return 1;
 }
