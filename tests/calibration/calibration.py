@@ -200,7 +200,7 @@ def judge(bench, index, kind, output, table):
 
 
 def refuse(bench, name, pictures, status, wanted, *more):
-    """The message must match; nothing of an earlier run may be there afterwards."""
+    """The message must match; nothing of an earlier run may be there afterwards, unless it was wrong usage: then all."""
     out = bench.path("refused")
     os.makedirs(out, exist_ok=True)
     for file_name in ("rig.json", "report.html"):
@@ -214,6 +214,8 @@ def refuse(bench, name, pictures, status, wanted, *more):
         reason = "says: " + err.strip().replace("\n", "; ")
     elif status == 1 and os.listdir(out):
         reason = "%s is left" % os.listdir(out)
+    elif status == 2 and len(os.listdir(out)) != 2:
+        reason = "only %s is left" % os.listdir(out)
     result(name, reason)
 
 
@@ -250,8 +252,42 @@ def spoil(path, change):
         file.write(change(data))
 
 
+def check_unused(bench):
+    """Pictures with the laser of which none can be used: why, each by its name, and what to add."""
+    good, blurred, made = bench.path("rig0", "good"), bench.path("rig0", "blurred"), bench.path("made")
+    dark = range(1, 2 * PAIRS, 2)
+    # Lit ones between their own kind have no twin.
+    for name, lit, wanted in [
+            ("all blurred", [(blurred, range(0, 2 * BLURRED, 2))], "%s: not used: (blurred: edges|no board found|no corner)"),
+            ("all without dots", [(good, dark[:5])], "%s: its dots are not used: only 0 dots in a lattice on the board, 8 are needed")]:
+        copy_pictures([(good, dark)] + lit, made)
+        first = len(dark)
+        relabel(made, first)
+        status, out, err = bench.solve(made, bench.path("refused"))
+        missing = [frame for frame in range(first, first + 5) if not re.search("^" + wanted % ("%06d.pgm" % frame), out, re.M)]
+        says = status == 1 and re.search(
+            r"none of the 5 pictures with the laser on can be used, for the reasons above. Add:\n  - pictures with the laser on, "
+            r"each beside one|no dots of the laser are seen on the board", err)
+        result("pictures with the laser: " + name, None if says and not missing else "%s: %s%s" % (missing, out, err))
+
+
+def relabel(directory, first):
+    """The laser is on from this frame on, they say."""
+    with open(directory + "/frames.jsonl", "w", encoding="utf-8") as file:
+        for frame in range(sum(name.endswith(".pgm") for name in os.listdir(directory))):
+            file.write(json.dumps({"file": "%06d.pgm" % frame, "laser": frame >= first}) + "\n")
+
+
 def check_corrupt(bench):
     good, made = bench.path("rig0", "good"), bench.path("made")
+    # What else may lie beside the pictures.
+    copy_pictures([(good, range(2 * PAIRS))], made)
+    for name in ("README", "thumbs.db", "000007.png", ".hidden.pgm", "._000007.pgm", "notes.pgm.txt"):
+        with open(made + "/" + name, "w", encoding="utf-8") as file:
+            file.write("no picture")
+    os.mkdir(made + "/more")
+    status, out, err = run(bench.calibrate, "guide", made)
+    result("other files beside the pictures", None if status == 0 and not err else out[-300:] + err)
     cases = [
         ("cut short", "000007.pgm", lambda data: data[:len(data) // 2], "000007.pgm: cut short"),
         ("empty", "000007.pgm", lambda data: b"", "000007.pgm: no binary PGM"),
@@ -259,7 +295,14 @@ def check_corrupt(bench):
         ("a PNG by another name", "000007.pgm", lambda data: b"\x89PNG\r\n" + data, "000007.pgm: no binary PGM"),
         ("another size", "000007.pgm", lambda data: b"P5\n320 240\n255\n" + bytes(320 * 240), "000007.pgm: has another size"),
         ("beyond its maxval", "000007.pgm", lambda data: data.replace(b"255", b"100", 1), "000007.pgm: sample"),
-        ("a list that is no JSON", "frames.jsonl", lambda data: data + b"{\n", "frames.jsonl:51: must have"),
+        ("a list that is no JSON", "frames.jsonl", lambda data: data + b"{\n", "frames.jsonl:51: is no JSON; must be like [^\n]*\n$"),
+        ("a list of numbers", "frames.jsonl", lambda data: data + b"7\n", "frames.jsonl:51: must have [^\n]*\n$"),
+        ("a list with a laser that is none", "frames.jsonl", lambda data: data + b'{"file":"a.pgm","laser":1}\n',
+         "frames.jsonl:51: must have [^\n]*\n$"),
+        ("a list with a file that is none", "frames.jsonl", lambda data: data + b'{"file":7,"laser":true}\n',
+         "frames.jsonl:51: must have [^\n]*\n$"),
+        ("a list that is not UTF-8", "frames.jsonl", lambda data: data + b'{"file":"\xff.pgm","laser":true}\n',
+         "frames.jsonl:51: is no JSON"),
         ("a list without a laser", "frames.jsonl", lambda data: data + b'{"file":"a.pgm"}\n', "frames.jsonl:51: must have"),
         ("a list with a file that is not there", "frames.jsonl", lambda data: data + b'{"file":"a.pgm","laser":true}\n',
          "a.pgm, which is not there"),
@@ -275,11 +318,11 @@ def check_corrupt(bench):
     os.remove(made + "/frames.jsonl")
     refuse(bench, "nobody says where the laser was on", made, 1, r"^calibrate: [^\n]*in which pictures was the laser on[^\n]*\n$")
     refuse(bench, "no such directory", bench.path("nowhere"), 1, "nowhere")
-    refuse(bench, "a board that is none", good, 1, "charuco-9x6-30 or chessboard", "--board", "dots")
-    refuse(bench, "a board that is too large", good, 1, "fit into", "--board", "charuco-12x6-30")
     refuse(bench, "another kind of board", good, 1, "cannot support a calibration(.*\n)*  - 10 more pictures", "--board", "chessboard-9x6-30")
-    refuse(bench, "near beyond far", good, 2, "--near", "--near", "900", "--far", "800")
-    refuse(bench, "a middle without a place", good, 2, "FILE:U,V", "--middle", "000000.pgm")
+    for file, wanted in [("000002.pgm:10,10", "there is no 000002.pgm in "), ("000001.pgm:10,10", "000001.pgm has the laser off"),
+                         ("000000.pgm:752,10", "752,10 is outside of 000000.pgm, which has 752x582 pixels")]:
+        copy_pictures([(good, range(2))], made)
+        refuse(bench, "a middle in the wrong place: " + file, made, 1, "--middle: " + wanted, "--middle", file)
 
 
 def middle_seen(directory, step):
@@ -393,8 +436,14 @@ def check_camera(bench):
     film_of(bench, [(7, 9), (6, 3)])
     shutil.copytree(before, taken)
     take("goes on where there are pictures", None, "\n", 1, 4, "3 pictures without the laser are there already", "003-on.pgm", kept=True)
+    status, _, err = run(bench.calibrate, "guide", "--size", "640x480", "--camera", bench.path("film/%03d.pgm"), taken, typed="\n")
+    result("guide: --size beside pictures of another", None if status == 1 and "the pictures in %s have 752x582 pixels" % taken in err
+           else err)
     film_of(bench, [(7, 20)])
-    for size, status, wanted in [("640x480", 1, "752x582 pixels, not 640x480"), ("640", 2, "--size 640: must be WxH"),
+    os.makedirs(taken)
+    with open(taken + "/README", "w", encoding="utf-8") as file:
+        file.write("pictures of the board")
+    for size, status, wanted in [("640x480", 1, "752x582 pixels, not 640x480 as --size"), ("640", 2, "--size 640: must be WxH"),
                                  ("1920x1080", 2, "--size 1920x1080: must be WxH")]:
         got, _, err = run(bench.calibrate, "guide", "--size", size, "--camera", bench.path("film/%03d.pgm"), taken, typed="\n")
         result("guide: --size " + size, None if got == status and wanted in err else err)
@@ -428,9 +477,41 @@ def check_print(bench):
     fine = abs(page[2] * mm - 297) < 0.01 and abs(page[3] * mm - 210) < 0.01 and \
         all(abs(side - 30) < 0.01 for side in sides)
     result("the board is printed in true size", None if fine else "page %s, square %s mm" % (page, sides))
-    for name in ("board.txt", "no/board.pdf", "no/board.pgm"):
+    for name in ("no/board.pdf", "no/board.pgm"):
         status, _, err = run(bench.calibrate, "board", bench.path(name))
-        result("a board into " + name, None if status == 1 and err else "status %d" % status)
+        fine = status == 1 and "could not be written: No such file" in err
+        result("a board into " + name, None if fine else "status %d: %s" % (status, err))
+
+
+def check_values(bench):
+    """An option's value that cannot be: told before anything is read, written or removed."""
+    good = bench.path("rig0", "good")
+    ranges = "must be a number of mm from 100 to 16000"
+    for option, value, wanted in [
+            ("--board", "dots", "charuco-9x6-30 or chessboard"), ("--board", "charuco-9x6", "charuco-9x6-30 or chessboard"),
+            ("--board", "charuco-9x6-30mm", "charuco-9x6-30 or chessboard"), ("--board", "charuco-12x6-30", "fit into 281x194 mm"),
+            ("--board", "chessboard-9x6-inf", "fit into 281x194 mm"), ("--board", "chessboard-9x6-nan", "of at least 5 mm"),
+            ("--board", "charuco-3x6-30", "at least 4x4 squares"), ("--board", "charuco-9x-6-30", "at least 4x4 squares"),
+            ("--board", "charuco-20x20-9", "more than 100 white squares"),
+            ("--near", "99", ranges), ("--near", "nan", ranges), ("--near", "400mm", ranges), ("--near", "-400", ranges),
+            ("--far", "16001", ranges), ("--far", "inf", ranges), ("--far", "1e999", ranges), ("--far", "400", "--near must be less"),
+            ("--middle", "000000.pgm", "must be FILE:U,V, U and V in pixels"), ("--middle", ":1,2", "must be FILE:U,V"),
+            ("--middle", "000000.pgm:1", "must be FILE:U,V"), ("--middle", "000000.pgm:1,2,3", "must be FILE:U,V"),
+            ("--middle", "000000.pgm:nan,2", "U must be from 0 to 1279 px"), ("--middle", "000000.pgm:2,inf", "V from 0 to 799"),
+            ("--middle", "000000.pgm:-1,2", "U must be from 0"), ("--middle", "000000.pgm:2,800", "V from 0 to 799"),
+            ("--middle", "000000.pgm:1280,2", "U must be from 0 to 1279 px")]:
+        refuse(bench, "%s %s" % (option, value), good, 2, "^calibrate: .*%s[^\n]*\n$" % wanted, option, value)
+    # The pictures' own rig.json, the truth here, would be taken for an earlier result.
+    status, _, err = bench.solve(good, bench.path("rig0", "..", "rig0", "good"))
+    fine = status == 2 and "--out must be another directory" in err and os.path.exists(good + "/rig.json")
+    result("--out into the pictures", None if fine else "status %d: %s" % (status, err))
+    for verb in ("board", "guide"):
+        status, _, err = run(bench.calibrate, verb, "--board", "dots", bench.path("new.pdf"))
+        result("--board dots with " + verb, None if status == 2 and "--board dots: must be like" in err else err)
+    # The range's ends are such that host_sim takes the rig.
+    for option, value in (("--near", "100"), ("--far", "16000")):
+        status, _, err = run(bench.calibrate, "solve", option, value, "--out", bench.path("new"), bench.path("nowhere"))
+        result("%s %s" % (option, value), None if status == 1 and "nowhere: No such" in err else err)
 
 
 def check_usage(bench):
@@ -441,7 +522,8 @@ def check_usage(bench):
                           (("solve", "--colour", "a"), "unrecognized option"), (("solve", "--near"), "requires an argument"),
                           (("solve", "--near", "abc", "--out", "o", "a"), "--near abc: must be a number"),
                           (("board", "--camera", "0", "a.pdf"), "--camera belongs to guide"),
-                          (("guide", "--camera", "", "a"), "argument is empty"),
+                          (("guide", "--camera", "", "a"), "argument is empty"), (("board", "a.txt"), "must end in .pdf or .pgm"),
+                          (("board", "pdf"), "must end in .pdf or .pgm"),
                           (("guide", "--size", "640x480", "a"), "--size belongs to guide --camera"),
                           (("guide", "--far", "900", "a"), "--far belongs to solve"),
                           (("guide", "--middle", "a:1,2", "a"), "--middle belongs to solve")]:
@@ -527,11 +609,13 @@ def main():
     if not options.short:
         check_refusals(bench)
         check_corrupt(bench)
+        check_unused(bench)
         check_alone(bench)
         check_middle(bench)
         check_guide(bench)
     check_camera(bench)
     check_usage(bench)
+    check_values(bench)
     check_progress(bench)
     check_print(bench)
     check_report(bench)

@@ -68,6 +68,8 @@ static std::vector<Lit> find_dots(const Result &result, const std::vector<Pictur
         }
         lit.view = *view;
         lit.refused = view->corners.refused;
+        if (!lit.refused.empty() && !lit.twin.empty())
+            lit.refused = "its twin " + lit.twin + " is no good: " + lit.refused;
         if (lit.refused.empty()) {
             sightings_find(result.board, result.camera, pictures[i].grey, dark, lit);
             lattice_grow(lit.sightings);
@@ -77,14 +79,25 @@ static std::vector<Lit> find_dots(const Result &result, const std::vector<Pictur
     return all;
 }
 
+/* Each picture's reason is told beside this. */
+static void check_used(const std::vector<Lit> &pictures)
+{
+    auto used = std::count_if(pictures.begin(), pictures.end(), [](const Lit &lit) { return lit.refused.empty(); });
+    if (used == 0 && !pictures.empty())
+        throw Error(text("none of the %zu pictures with the laser on can be used, for the reasons above. Add:\n"
+                         "  - pictures with the laser on, each beside one without it: the board found in both, sharp, "
+                         "held still, and many dots on it",
+                         pictures.size()));
+}
+
 /* Not even one dot among its neighbours: the pictures are not what their names say. */
 static void check_lit(const std::vector<Lit> &pictures)
 {
-    bool looked = std::any_of(pictures.begin(), pictures.end(), [](const Lit &lit) { return lit.refused.empty(); });
+    check_used(pictures);
     bool seen = std::any_of(pictures.begin(), pictures.end(), [](const Lit &lit) {
         return std::any_of(lit.sightings.begin(), lit.sightings.end(), [](const Sighting &s) { return s.in_lattice; });
     });
-    if (looked && !seen)
+    if (!seen)
         throw Error(
             "no dots of the laser are seen on the board in any picture that should have it on: are those with and "
             "without it mixed up in frames.jsonl, or in the files' names? Add:\n  - pictures with the laser on");
@@ -130,8 +143,10 @@ static void tell_pictures(const Result &result)
             std::printf("%s: not used: %s\n", view.file.c_str(), view.corners.refused.c_str());
     }
     for (const Lit &lit : result.lit) {
-        if (!lit.refused.empty() && view_of(result.views, lit.file) == nullptr)
-            std::printf("%s: not used: %s\n", lit.file.c_str(), lit.refused.c_str());
+        const View *view = view_of(result.views, lit.file);
+        if (!lit.refused.empty() && (view == nullptr || view->good()))
+            std::printf("%s: %s: %s\n", lit.file.c_str(), view == nullptr ? "not used" : "its dots are not used",
+                        lit.refused.c_str());
     }
 }
 
@@ -171,7 +186,22 @@ static void tell_projector(const Projector &projector)
     std::printf("\n");
 }
 
-/* A calibration that fails leaves no files of an earlier one behind. */
+static void check_middle(const MiddleDot &middle, const std::string &dir, const std::vector<Picture> &pictures)
+{
+    auto named =
+        std::find_if(pictures.begin(), pictures.end(), [&](const Picture &p) { return p.file == middle.file; });
+    if (middle.file.empty())
+        return;
+    if (named == pictures.end())
+        throw Error("--middle: there is no " + middle.file + " in " + dir);
+    if (!named->laser)
+        throw Error("--middle: " + middle.file + " has the laser off: name one with it on");
+    if (middle.px.x >= named->grey.cols || middle.px.y >= named->grey.rows)
+        throw Error(text("--middle: %g,%g is outside of ", middle.px.x, middle.px.y) + middle.file +
+                    text(", which has %dx%d pixels", named->grey.cols, named->grey.rows));
+}
+
+/* A calibration that fails leaves no files behind, also none of an earlier one. */
 static void make_out(const std::string &out)
 {
     std::error_code failed;
@@ -185,6 +215,17 @@ static void make_out(const std::string &out)
     }
 }
 
+static void write_out(const std::string &out, const Result &result)
+{
+    report_write(out + "/report.html", result);
+    try {
+        rig_write(out + "/rig.json", result.camera, result.projector, result.range);
+    } catch (const Error &) {
+        std::filesystem::remove(out + "/report.html");
+        throw;
+    }
+}
+
 void solve_run(const Options &options)
 {
     Result result;
@@ -193,6 +234,7 @@ void solve_run(const Options &options)
     result.board = options.board;
     result.range = options.range;
     std::vector<Picture> pictures = pictures_read(options.target);
+    check_middle(options.middle, options.target, pictures);
     auto lit_count = std::count_if(pictures.begin(), pictures.end(), [](const Picture &p) { return p.laser; });
     if (lit_count < lit_min)
         throw Error(text(
@@ -220,6 +262,7 @@ void solve_run(const Options &options)
     } catch (const Error &) {
         progress.clear();
         tell_pictures(result);
+        check_used(result.lit);
         throw;
     }
     progress.clear();
@@ -227,8 +270,7 @@ void solve_run(const Options &options)
     tell_camera(result.camera);
     tell_uncovered(result.camera);
     tell_projector(result.projector);
-    report_write(options.out + "/report.html", result);
-    rig_write(options.out + "/rig.json", result.camera, result.projector, result.range);
+    write_out(options.out, result);
     std::printf("%s/rig.json and %s/report.html are written\n", options.out.c_str(), options.out.c_str());
 }
 } // namespace cal
