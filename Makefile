@@ -241,7 +241,8 @@ calibrate: sim ## build tools/calibrate, from pictures of a board to rig.json: b
 test-calibration: calibrate ## calibrate five rendered rigs, compare with the truth; what is refused; ten minutes
 	@/usr/bin/python3 tests/calibration/calibration.py --calibrate $(BUILD)/calibrate/tools/calibrate/calibrate \
 	  --render $(BUILD)/calibrate/tools/render/render --host-sim $(BUILD)/calibrate/sim/host_sim \
-	  --undistort $(BUILD)/calibrate/tests/calibration/test_undistort --work $(BUILD)/test_calibration
+	  --undistort $(BUILD)/calibrate/tests/calibration/test_undistort \
+	  --fake-camera $(BUILD)/calibrate/tests/calibration/libfake_camera.so --work $(BUILD)/test_calibration
 	@/usr/bin/python3 tests/knock/knock.py --knock $(BUILD)/calibrate/tests/knock/knock \
 	  --render $(BUILD)/calibrate/tools/render/render --host-sim $(BUILD)/calibrate/sim/host_sim \
 	  --work $(BUILD)/test_knock --seeds 4 --frames 250

@@ -1,7 +1,8 @@
 #!/usr/bin/python3
 """Calibrates rigs that tools/calibrate does not know, from rendered pictures, and compares with the truth.
 
-    calibration.py --calibrate PROGRAM --render PROGRAM --host-sim PROGRAM --undistort PROGRAM --work DIR [--short]
+    calibration.py --calibrate PROGRAM --render PROGRAM --host-sim PROGRAM --undistort PROGRAM --fake-camera LIBRARY
+        --work DIR [--short]
 
 Five rigs, both baselines, three focal lengths, with distortion: each from 25 good pairs of pictures (laser on and off),
 and from 25 pairs with 30 % of the dots missing and a lamp mirrored in the board, among them five blurred pairs and two
@@ -51,8 +52,9 @@ def result(name, reason=None):
     print("%s %d - %s%s" % ("not ok" if reason else "ok", number, name, "\n# " + reason if reason else ""), flush=True)
 
 
-def run(*command, typed=""):
-    done = subprocess.run([str(word) for word in command], capture_output=True, text=True, input=typed, check=False)
+def run(*command, typed="", **environment):
+    done = subprocess.run([str(word) for word in command], capture_output=True, text=True, input=typed, check=False,
+                          env={**os.environ, **environment})
     return done.returncode, done.stdout, done.stderr
 
 
@@ -78,7 +80,7 @@ class Bench:
     def __init__(self, options):
         self.calibrate, self.render = options.calibrate, options.render
         self.host_sim, self.undistort = options.host_sim, options.undistort
-        self.work = options.work
+        self.work, self.fake_camera = options.work, os.path.abspath(options.fake_camera)
         self.board = self.path("board.pgm")
         self.other = self.path("other.pgm")
 
@@ -234,7 +236,7 @@ def check_refusals(bench):
     refuse(bench, "six pairs: too few", made, 1, r"Add:\n(.*\n)*?  - \d more pictures of the board")
     copy_pictures([(good, [0, 1] * 14)], made)
     refuse(bench, "the same pose again and again", made, 1, r"Add:\n(.*\n)*  - the board turned 20 to 45 degrees(.*\n)*"
-           r"  - other distances(.*\n)*  - the board in these parts of the frame: ")
+           r"  - other distances(.*\n)*  - the board in all parts of the frame: \d of 12 have enough corners")
     depths = board_depths(good)
     level = [frame for frame in depths if 700 < depths[frame] < 830]
     copy_pictures([(good, sorted(set(range(1, 2 * PAIRS, 2)) | set(level)))], made)
@@ -463,6 +465,37 @@ def check_camera(bench):
     result("guide: never beside a frames.jsonl", None if status == 1 and "has a frames.jsonl" in err else err)
 
 
+def check_device(bench):
+    """A camera of V4L2 (fake_camera.c): its size, its samples, and what becomes of it."""
+    taken = bench.path("taken")
+
+    def take(name, status, *wanted, size=("--size", "752x582"), typed="\n\n", names=4, **camera):
+        shutil.rmtree(taken, ignore_errors=True)
+        camera = {"FAKE_CAMERA_" + key.upper(): value for key, value in camera.items()}
+        got, out, err = run(bench.calibrate, "guide", "--camera", "7", *size, taken, typed=typed, LD_PRELOAD=bench.fake_camera,
+                            FAKE_CAMERA_FRAMES=bench.path("film"), OPENCV_VIDEOIO_V4L_SELECT_TIMEOUT="4", **camera)
+        there = len(os.listdir(taken)) if os.path.isdir(taken) else 0
+        missing = [words for words in wanted if words not in out + err]
+        fine = got == status and there == names and not missing
+        result("guide: a device: " + name, None if fine else "status %d, %d pictures: %s%s" % (got, there, out, err))
+
+    film_of(bench, [(1, 9), (0, 3), (3, 9), (2, 3)])
+    for samples_format in ("GREY", "YUYV"):
+        take("two pairs, " + samples_format, 1, "no more frames from 7", format=samples_format)
+        same = all(samples(taken + "/%03d-%s.pgm" % (i // 2, "off" if i % 2 else "on")) ==
+                   samples(bench.path("rig0", "good", "%06d.pgm" % i)) for i in range(4))
+        result("guide: a device: samples as they are, " + samples_format, None if same else "others")
+    take("in its own size", 1, "no more frames", size=())
+    with open(taken + "/000-on.pgm", "rb") as file:
+        header = file.read(15)
+    result("guide: a device: its own size is kept", None if header == b"P5\n640 480\n255\n" else str(header))
+    take("a size that it has not", 1, "640x480 pixels, not 800x600 as --size", size=("--size", "800x600"), names=0)
+    take("that gives no more frames", 1, "no more frames from 7", end="still")
+    take("that another program has", 1, "/dev/video7: is no camera, or another program has it", busy="1", names=0)
+    film_of(bench, [])
+    take("that never gives a frame", 1, "no more frames from 7", names=0)
+
+
 def check_print(bench):
     """The page's size, and the first square's, in points of 1/72 inch."""
     path = bench.path("board.pdf")
@@ -590,7 +623,7 @@ def check_report(bench):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    for name in ("--calibrate", "--render", "--host-sim", "--undistort", "--work"):
+    for name in ("--calibrate", "--render", "--host-sim", "--undistort", "--fake-camera", "--work"):
         parser.add_argument(name, required=True)
     parser.add_argument("--short", action="store_true")
     options = parser.parse_args()
@@ -614,6 +647,7 @@ def main():
         check_middle(bench)
         check_guide(bench)
     check_camera(bench)
+    check_device(bench)
     check_usage(bench)
     check_values(bench)
     check_progress(bench)

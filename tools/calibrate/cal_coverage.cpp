@@ -11,15 +11,19 @@ static constexpr double tilted_deg = 20.0;
 /* Field of view of a camera that nobody knows yet: focal length in widths. */
 static constexpr double guessed_focal = 1.2;
 static constexpr size_t views_for_guess = 5;
+static constexpr int regions = region_columns * region_rows;
+/* When more than these lack corners, all parts are as good to name. */
+static constexpr int regions_named_max = regions / 2;
 
 const char *const coverage_region_names[region_columns * region_rows] = {
     "top left",    "top, left of the middle",    "top, right of the middle",    "top right",
     "left",        "middle, a little left",      "middle, a little right",      "right",
     "bottom left", "bottom, left of the middle", "bottom, right of the middle", "bottom right"};
 
+/* What to do about parts of the frame without corners; empty: nothing. */
 static std::string missing_regions(const std::vector<View> &views, cv::Size size, const CoverageLimits &limits)
 {
-    int counts[region_columns * region_rows] = {};
+    int counts[regions] = {};
     std::string names;
     for (const View &view : views) {
         for (const cv::Point2f &px : view.corners.px) {
@@ -29,14 +33,18 @@ static std::string missing_regions(const std::vector<View> &views, cv::Size size
         }
     }
     int without = 0;
-    for (int i = 0; i < region_columns * region_rows; i++) {
+    for (int i = 0; i < regions; i++) {
         if (counts[i] < limits.region_corners) {
             names += (names.empty() ? "" : "; ") +
                      text("%s (%d corners of %d)", coverage_region_names[i], counts[i], limits.region_corners);
             without++;
         }
     }
-    return without > limits.regions_without ? names : "";
+    if (without <= limits.regions_without)
+        return "";
+    if (without > regions_named_max)
+        return text("the board in all parts of the frame: %d of %d have enough corners", regions - without, regions);
+    return "the board in these parts of the frame: " + names;
 }
 
 std::vector<std::string> coverage_missing(const std::vector<View> &views, cv::Size size, const CoverageLimits &limits)
@@ -69,11 +77,11 @@ std::vector<std::string> coverage_missing(const std::vector<View> &views, cv::Si
             text("other distances: the boards are %.0f to %.0f mm away, the farthest should be %.1f times "
                  "as far as the nearest",
                  nearest, farthest, limits.distance_ratio));
-    std::string regions = missing_regions(views, size, limits);
+    std::string lacking = missing_regions(views, size, limits);
     if (good == 0)
         missing.push_back("the board in all parts of the frame");
-    else if (!regions.empty())
-        missing.push_back("the board in these parts of the frame: " + regions);
+    else if (!lacking.empty())
+        missing.push_back(lacking);
     return missing;
 }
 

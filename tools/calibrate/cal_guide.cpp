@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <chrono>
 #include <cstring>
 #include <fcntl.h>
 #include <filesystem>
@@ -22,7 +23,10 @@ namespace cal
 /* A board is held still when its corners move less than this from one frame to the next; it is shown in a new way when
  * they are this far from where they were in every picture, in parts of the frame's width. */
 static constexpr double still_px = 0.5, new_share = 0.06;
-static constexpr int still_frames = 3, grab_failures_max = 30;
+static constexpr int still_frames = 3;
+/* A frame that fails may be followed by a good one. A camera that gives none lets each wait for seconds. */
+static constexpr int grab_failures_max = 30;
+static constexpr std::chrono::seconds grab_wait_max{3};
 /* So many dots between two twins are the laser's. */
 static constexpr size_t dots_min = 8;
 /* A driver hands over what it queued before the laser was on: four frames or more. In so many there must be dots. */
@@ -131,6 +135,14 @@ static std::string device_of(const std::string &name)
     return number ? "/dev/video" + name : name.compare(0, 5, "/dev/") == 0 ? name : "";
 }
 
+/* Luma as the camera gives it, as the board's program takes it: made of colours its lightest and darkest would be lost. */
+static void take_luma(cv::VideoCapture &camera)
+{
+    int code = static_cast<int>(camera.get(cv::CAP_PROP_FOURCC));
+    if (code == cv::VideoWriter::fourcc('Y', 'U', 'Y', 'V') || code == cv::VideoWriter::fourcc('G', 'R', 'E', 'Y'))
+        camera.set(cv::CAP_PROP_CONVERT_RGB, 0.0);
+}
+
 static cv::VideoCapture open_camera(const std::string &name)
 {
     cv::VideoCapture camera;
@@ -145,18 +157,25 @@ static cv::VideoCapture open_camera(const std::string &name)
         throw Error("--camera " + name + ": " + device + ": is no camera, or another program has it");
     if (device.empty() && !camera.open(name))
         throw Error("--camera " + name + ": is neither a camera's number or device nor a film that can be read");
+    if (!device.empty())
+        take_luma(camera);
     return camera;
 }
 
-/* False: the film is at its end. Throws where frames are too large or too small to be used later. */
+/* False: the film is at its end, or the camera gone. Throws where frames are too large or too small to be used later. */
 static bool next_frame(cv::VideoCapture &camera, cv::Mat &grey8)
 {
     cv::Mat frame;
+    auto began = std::chrono::steady_clock::now();
     for (int failures = 0; failures < grab_failures_max; failures++) {
+        if (failures > 0 && std::chrono::steady_clock::now() - began > grab_wait_max)
+            break;
         if (camera.read(frame) && !frame.empty()) {
             picture_check_size("the camera's frames", frame.cols, frame.rows);
             if (frame.channels() == 3)
                 cv::cvtColor(frame, grey8, cv::COLOR_BGR2GRAY);
+            else if (frame.channels() == 2)
+                cv::extractChannel(frame, grey8, 0);
             else
                 grey8 = frame.clone();
             return true;
