@@ -1,5 +1,6 @@
 #include "cal_print.hpp"
 
+#include <algorithm>
 #include <cairo-pdf.h>
 #include <cairo.h>
 
@@ -61,7 +62,9 @@ static void draw_areas(const cv::Mat &sheet, cairo_t *page)
 
 static void draw_ruler(const Board &board, cairo_t *page)
 {
-    double left_mm = 10.0, y_mm = sheet_height_mm - 5.0;
+    /* As far from the sheet's edge, which printers leave white, as there is room below the board. */
+    double below_mm = 0.5 * (sheet_height_mm - board.rows * board.square_mm);
+    double left_mm = 10.0, y_mm = sheet_height_mm - std::clamp(below_mm - 4.0, 5.0, 10.0);
     cairo_set_source_rgb(page, 0.0, 0.0, 0.0);
     cairo_set_line_width(page, 0.15);
     for (int cm = 0; cm <= 10; cm++) {

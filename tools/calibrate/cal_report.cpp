@@ -62,10 +62,23 @@ static std::string corner_chart(const Result &result)
     return chart.svg();
 }
 
+static std::string across_chart(const Residuals &residuals, double limit)
+{
+    double nearest = 1e9, farthest = 0.0;
+    for (const cv::Point2d &dot : residuals.by_depth) {
+        nearest = std::min(nearest, dot.x);
+        farthest = std::max(farthest, dot.x);
+    }
+    Chart chart("Across the line, by distance", "distance, mm", "across, px",
+                {0.95 * nearest, -limit, 1.05 * farthest - 0.95 * nearest, 2.0 * limit});
+    chart.points(residuals.by_depth, blue, 1.3);
+    return chart.svg();
+}
+
 static std::string seen_chart(const Result &result)
 {
-    Chart chart("How often each dot was seen", "column", "row", {-1.0, -1.0, pattern_side + 1.0, pattern_side + 1.0},
-                true);
+    Chart chart("How often each dot was seen (red: never)", "column", "row",
+                {-1.0, -1.0, pattern_side + 1.0, pattern_side + 1.0}, true);
     for (int slot = 0; slot < slot_count; slot++) {
         cv::Point2d place(slot % pattern_side, slot / pattern_side);
         int seen = result.projector.seen[static_cast<size_t>(slot)];
@@ -134,12 +147,12 @@ static std::string picture_rows(const Result &result)
     std::string rows;
     for (const View &view : result.views) {
         if (view.good())
-            rows += text("<tr><td>%s<td>%zu<td>%d<td>%.3f<td>%.0f<td>%.0f<td>%.1f<td></tr>\n",
-                         escaped(view.file).c_str(), view.corners.ids.size(), view.left_out, view.rms_px, view.shift[2],
-                         view.tilt_deg(), view.corners.edge_px);
+            rows += text("<tr><td>%s<td>%zu<td>%d<td>%.3f<td>%.0f<td>%.0f<td>%.1f</tr>\n", escaped(view.file).c_str(),
+                         view.corners.ids.size(), view.left_out, view.rms_px, view.shift[2], view.tilt_deg(),
+                         view.corners.edge_px);
         else
-            rows += "<tr class='bad'><td>" + escaped(view.file) + "<td colspan='6'><td>" +
-                    escaped(view.corners.refused) + "</tr>\n";
+            rows += "<tr class='bad'><td>" + escaped(view.file) +
+                    "<td colspan='6'>not used: " + escaped(view.corners.refused) + "</tr>\n";
     }
     return rows;
 }
@@ -155,13 +168,19 @@ static std::string lit_rows(const Result &result)
             out += sighting.slot == no_slot || !sighting.fits;
             sum += sighting.slot != no_slot && sighting.fits ? sighting.residual_px.ddot(sighting.residual_px) : 0.0;
         }
-        rows += lit.refused.empty() ? text("<tr><td>%s<td>%s<td>%d<td>%d<td>%.3f<td></tr>\n", escaped(lit.file).c_str(),
+        rows += lit.refused.empty() ? text("<tr><td>%s<td>%s<td>%d<td>%d<td>%.3f</tr>\n", escaped(lit.file).c_str(),
                                            lit.twin.empty() ? "alone" : escaped(lit.twin).c_str(), used, out,
                                            std::sqrt(sum / std::max(1, used)))
-                                    : "<tr class='bad'><td>" + escaped(lit.file) + "<td colspan='4'><td>" +
-                                          escaped(lit.refused) + "</tr>\n";
+                                    : "<tr class='bad'><td>" + escaped(lit.file) +
+                                          "<td colspan='4'>not used: " + escaped(lit.refused) + "</tr>\n";
     }
     return rows;
+}
+
+/* -0.0002 would be printed as -0.000. */
+static double no_minus(double px)
+{
+    return std::abs(px) < 0.0005 ? 0.0 : px;
 }
 
 static std::string region_table(const Camera &camera)
@@ -172,7 +191,7 @@ static std::string region_table(const Camera &camera)
         for (int column = 0; column < region_columns; column++) {
             const Region &region = camera.regions[static_cast<size_t>(row * region_columns + column)];
             table += text("<td>%d corners<br>rms %.3f px<br>mean (%+.3f, %+.3f)", region.corner_count, region.rms_px,
-                          region.mean_px.x, region.mean_px.y);
+                          no_minus(region.mean_px.x), no_minus(region.mean_px.y));
         }
         table += "</tr>\n";
     }
@@ -210,9 +229,10 @@ static std::string projector_words(const Projector &projector)
     const cv::Vec3d &o = projector.origin_mm, &s = projector.origin_sigma_mm;
     std::string words =
         text("<p>Origin (%.2f, %.2f, %.2f) mm in the camera's frame, standard deviations (%.2f, %.2f, %.2f). "
-             "%d sightings with an rms of %.3f px, %d further ones did not fit. The lattice's step is %.3f "
+             "%d sightings with an rms of %.3f px (under 0.4 px is good), %d further ones did not fit. The lattice's "
+             "step is %.3f "
              "degrees, its rows are turned by %.2f degrees; rays differ from it by %.3f degrees (each "
-             "component).</p><p>%d of %d dots were seen.",
+             "component).</p><p>%d of %d dots were seen (over 350 is good).",
              o[0], o[1], o[2], s[0], s[1], s[2], projector.sighting_count - projector.outlier_count, projector.rms_px,
              projector.outlier_count, projector.pitch_deg, projector.turn_deg, projector.nominal_sigma_deg, seen,
              slot_count);
@@ -252,15 +272,15 @@ void report_write(const std::string &path, const Result &result)
     Chart scatter("Dots: seen less expected", "along the epipolar line, px", "across it, px",
                   {-limit, -limit, 2.0 * limit, 2.0 * limit});
     scatter.points(residuals.along_across, blue, 1.3);
-    Chart across("Across the line, by distance", "distance, mm", "across, px", {300.0, -limit, 1400.0, 2.0 * limit});
-    across.points(residuals.by_depth, blue, 1.3);
     std::ostringstream file;
     file << head << "<p>Board " << escaped(result.board.name) << ", frames of " << result.camera.size.width << "x"
-         << result.camera.size.height << " pixels.</p>\n<h2>Camera</h2>\n"
-         << text("<p>Corners: rms %.3f px.</p>", result.camera.rms_px) << camera_table(result.camera)
-         << "<h3>Residuals by part of the frame</h3>" << region_table(result.camera) << corner_chart(result)
-         << "\n<h2>Projector</h2>\n"
-         << projector_words(result.projector) << seen_chart(result) << scatter.svg() << across.svg()
+         << result.camera.size.height
+         << " pixels. What the figures mean, and what to do about those that are not good: docs/calibration.md, step 4."
+         << "</p>\n<h2>Camera</h2>\n"
+         << text("<p>Corners: rms %.3f px; of a real print, under 0.3 px is good.</p>", result.camera.rms_px)
+         << camera_table(result.camera) << "<h3>Residuals by part of the frame</h3>" << region_table(result.camera)
+         << corner_chart(result) << "\n<h2>Projector</h2>\n"
+         << projector_words(result.projector) << seen_chart(result) << scatter.svg() << across_chart(residuals, limit)
          << text("<p>Residuals of the dots: %.3f px along their epipolar lines, %.3f px across (rms). Across tells how "
                  "well "
                  "the rig fits: along, a dot may be anywhere.</p>",
@@ -270,11 +290,11 @@ void report_write(const std::string &path, const Result &result)
          << turn_words(turns, now, result.range)
          << "\n<h2>Pictures of the board</h2>\n<table><tr><th>picture<th>corners<th>left out<th>rms, px<th>distance, "
             "mm<th>tilt, "
-            "degrees<th>edges, px<th></tr>"
+            "degrees<th>edges, px</tr>"
          << picture_rows(result)
          << "</table>\n<h2>Pictures with the laser</h2>\n<table><tr><th>picture<th>twin without laser<th>dots "
             "used<th>not "
-            "used<th>rms, px<th></tr>"
+            "used<th>rms, px</tr>"
          << lit_rows(result) << "</table></html>\n";
     tool::file_write(path, file.str());
 }
