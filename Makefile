@@ -258,13 +258,17 @@ formatted: ## fail when make format would change something
 	@tools/setup.sh format
 	@git ls-files '*.c' '*.h' '*.cpp' '*.hpp' | xargs clang-format --dry-run --Werror
 
-lint: sanitize ## clang-tidy, cppcheck, MISRA C and gcc -fanalyzer; what they may find: docs/misra.md
+lint: sanitize ## clang-tidy, cppcheck, MISRA C, gcc -fanalyzer; what they may find: docs/misra.md
 	@tools/setup.sh lint
 	@/usr/bin/python3 tests/checks/static.py --self-test > $(BUILD)/static.log || { cat $(BUILD)/static.log; exit 1; }
 	@/usr/bin/python3 tests/checks/static.py $(BUILD)/sanitize
 	@/usr/bin/python3 tests/checks/lint_commands.py $(BUILD)/sanitize $(BUILD)/lint
 	@git ls-files 'firmware/*.c' 'hal/*.c' 'sim/*.c' 'tools/*.c' ':!tools/size' ':!tools/bench/worst_count.c' | \
 	  xargs -P 2 -n 1 clang-tidy --quiet -p $(BUILD)/lint 2> $(BUILD)/lint.log || \
+	  { grep -v 'warnings* generated' $(BUILD)/lint.log; exit 1; }
+	@cmake --preset lint-tools > $(BUILD)/lint.log 2>&1 || { cat $(BUILD)/lint.log; exit 1; }
+	@git ls-files 'tools/common/*.cpp' 'tools/calibrate/*.cpp' 'tools/view/*.cpp' | \
+	  xargs -P 2 -n 1 clang-tidy --quiet -p $(BUILD)/lint-tools 2> $(BUILD)/lint.log || \
 	  { grep -v 'warnings* generated' $(BUILD)/lint.log; exit 1; }
 
 # A test that was killed may have left a file system mounted below the build: never into that.

@@ -101,6 +101,15 @@ need_gpio() {
     need_python pip python3-pip
 }
 
+need_calibrate() {
+    need_sim
+    need_program g++ g++
+    need_header opencv4/opencv2/core/version.hpp libopencv-dev
+    [ -e /usr/include/opencv4/opencv2/aruco/charuco.hpp ] || lacks libopencv-contrib-dev
+    need_header cairo/cairo-pdf.h libcairo2-dev
+    [ -e /usr/include/nlohmann/json.hpp ] || lacks nlohmann-json3-dev
+}
+
 need_view() {
     need_sim
     need_program g++ g++
@@ -277,12 +286,7 @@ cortexm | size)
     need_python json python3
     ;;
 calibrate)
-    need_sim
-    need_program g++ g++
-    need_header opencv4/opencv2/core/version.hpp libopencv-dev
-    [ -e /usr/include/opencv4/opencv2/aruco/charuco.hpp ] || lacks libopencv-contrib-dev
-    need_header cairo/cairo-pdf.h libcairo2-dev
-    [ -e /usr/include/nlohmann/json.hpp ] || lacks nlohmann-json3-dev
+    need_calibrate
     need_python numpy python3-numpy
     ;;
 view) need_view ;;
@@ -308,6 +312,8 @@ lint)
     need_program gcc gcc
     need_header libv4l2.h libv4l-dev
     need_header microhttpd.h libmicrohttpd-dev
+    need_calibrate
+    need_view
     ;;
 *)
     sed -n '4,11s/^# \{0,1\}//p' "$0" >&2

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """What make lint runs beside clang-tidy, over the commands of a build:
 
-  cppcheck   over all C sources (of the tests only warnings and what is not portable)
+  cppcheck   over all C sources (of the tests only warnings and what is not portable), and the C++ tools
   misra      cppcheck's MISRA C:2012 addon over firmware/core
   gcc        -fanalyzer over all C sources but the tests'
 
@@ -82,8 +82,8 @@ def findings_of(pattern, output, root):
             yield Finding(match["name"], file, int(match["line"]), match["text"])
 
 
-def cppcheck(options, files, root):
-    command = ["cppcheck", "--std=c11", "--quiet", "--force", "--library=posix", "--suppress=missingIncludeSystem",
+def cppcheck(options, files, root, language="c11"):
+    command = ["cppcheck", "--std=" + language, "--quiet", "--force", "--library=posix", "--suppress=missingIncludeSystem",
                "--template={file}:{line}: {id}: {message}"] + options + files
     done = subprocess.run(command, cwd=root, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
                           check=False)
@@ -133,22 +133,26 @@ def tracked(root, *patterns):
                           stdout=subprocess.PIPE).stdout.split()
 
 
-def includes(root):
+def includes(root, *headers):
     """Every folder with a header."""
-    return ["-I" + folder for folder in sorted({os.path.dirname(path) for path in tracked(root, "*.h")})]
+    return ["-I" + folder for folder in sorted({os.path.dirname(path) for path in tracked(root, *headers)})]
 
 
 def everything(build):
     """All findings, from the slowest tool on."""
     sources = tracked(ROOT, "*.c")
     tests = [path for path in sources if path.startswith("tests/unit/")]
-    folders = includes(ROOT)
+    folders = includes(ROOT, "*.h")
+    tools = ["tools/common/", "tools/calibrate/", "tools/view/"]
     with concurrent.futures.ThreadPoolExecutor(2) as pool:
         results = [
             pool.submit(misra, tracked(ROOT, "firmware/core/*.c"), ROOT, "firmware/core"),
             pool.submit(lambda: list(analyze(build, 1))),
             pool.submit(cppcheck, ["--enable=warning,style,performance,portability"] + folders,
                         [path for path in sources if path not in tests], ROOT),
+            pool.submit(cppcheck, ["--enable=warning,style,performance,portability"] +
+                        includes(ROOT, *[folder + "*.hpp" for folder in tools]),
+                        tracked(ROOT, *[folder + "*.cpp" for folder in tools]), ROOT, "c++17"),
             pool.submit(cppcheck, ["--enable=warning,portability"] + folders, tests, ROOT),
         ]
         return [finding for result in results for finding in result.result()]

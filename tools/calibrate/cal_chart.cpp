@@ -18,7 +18,7 @@ static double tick_step(double span)
 Chart::Chart(const std::string &title, const std::string &x_name, const std::string &y_name, cv::Rect2d data, bool down)
     : data_(data), down_(down)
 {
-    body_ = text("<text x='%g' y='17' text-anchor='middle' font-weight='bold'>%s</text>", 0.5 * (width + left),
+    body_ += text("<text x='%g' y='17' text-anchor='middle' font-weight='bold'>%s</text>", 0.5 * (width + left),
                  title.c_str());
     body_ += text("<text x='%g' y='%g' text-anchor='middle'>%s</text>", 0.5 * (width + left - right), height - 8.0,
                   x_name.c_str());

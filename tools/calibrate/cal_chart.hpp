@@ -17,7 +17,7 @@ class Chart
           bool down = false);
     void points(const std::vector<cv::Point2d> &places, const std::string &colour, double radius);
     void line(const std::vector<cv::Point2d> &places, const std::string &colour);
-    void words(cv::Point2d place, const std::string &text);
+    void words(cv::Point2d place, const std::string &words);
     std::string svg() const;
 
   private:

@@ -115,6 +115,8 @@ class Film : public Output
             std::remove(part_path_.c_str());
         }
     }
+    Film(const Film &) = delete;
+    Film &operator=(const Film &) = delete;
     void page(cv::Size size, const Drawing &draw) override
     {
         if (!writer_.isOpened())

@@ -30,7 +30,7 @@ class Stop
   private:
     static constexpr int numbers_[] = {SIGHUP, SIGINT, SIGTERM};
     static constexpr size_t count_ = sizeof numbers_ / sizeof *numbers_;
-    struct sigaction before_[count_];
+    struct sigaction before_[count_] = {};
 };
 
 /* Throws view::Stopped when a signal has come. */

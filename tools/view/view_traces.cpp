@@ -107,10 +107,10 @@ TemporaryFolder::~TemporaryFolder()
 
 void TemporaryFolder::make()
 {
-    std::string path = (fs::temp_directory_path() / "view-XXXXXX").string();
-    if (mkdtemp(path.data()) == nullptr)
-        throw Error(path + ": " + std::strerror(errno));
-    path_ = path;
+    std::string made = (fs::temp_directory_path() / "view-XXXXXX").string();
+    if (mkdtemp(made.data()) == nullptr)
+        throw Error(made + ": " + std::strerror(errno));
+    path_ = made;
 }
 
 void Traces::run_host_sim(const Options &options)
