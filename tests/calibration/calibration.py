@@ -261,7 +261,7 @@ def check_unused(bench):
     # Lit ones between their own kind have no twin.
     for name, lit, wanted in [
             ("all blurred", [(blurred, range(0, 2 * BLURRED, 2))], "%s: not used: (blurred: edges|no board found|no corner)"),
-            ("all without dots", [(good, dark[:5])], "%s: its dots are not used: only 0 dots in a lattice on the board, 8 are needed")]:
+            ("all without dots", [(good, dark[:5])], "%s: its dots are not used: only \d dots in a lattice on the board, 8 are needed")]:
         copy_pictures([(good, dark)] + lit, made)
         first = len(dark)
         relabel(made, first)

@@ -33,7 +33,7 @@ static int header_number(std::istream &file, const std::string &path)
         file >> std::ws;
     }
     if (!(file >> value))
-        throw Error(path + ": the header of a binary PGM ends too soon");
+        throw Error(path + ": the header of a binary PGM must have three numbers: width, height, maxval");
     return value;
 }
 
