@@ -15,7 +15,7 @@ using PoseTerms = cv::Matx<double, pose_terms, 1>;
 
 /* One picture's part of the normal equations. */
 struct Block {
-    View *view;
+    View *view = nullptr;
     cv::Matx<double, camera_terms, camera_terms> camera = cv::Matx<double, camera_terms, camera_terms>::zeros();
     cv::Matx<double, pose_terms, pose_terms> pose = cv::Matx<double, pose_terms, pose_terms>::zeros();
     cv::Matx<double, camera_terms, pose_terms> mixed = cv::Matx<double, camera_terms, pose_terms>::zeros();

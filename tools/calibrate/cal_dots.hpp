@@ -13,7 +13,7 @@ namespace cal
 {
 struct Dot {
     cv::Point2d px;
-    double peak_grey, sigma_px;
+    double peak_grey = 0.0, sigma_px = 0.0;
 };
 
 /* A dot is fitted in this many pixels to each side. */

@@ -35,8 +35,8 @@ using Unknowns = cv::Matx<double, unknowns, 1>;
 struct Drawing {
     const cv::Mat &print, &tangents;
     cv::Matx33d map; /* draw_map */
-    double blur_px;
-    int sub_samples; /* along each side of a pixel */
+    double blur_px = 0.0;
+    int sub_samples = 1; /* along each side of a pixel */
 };
 
 /* 0 dark to 1 white, and CV_8U: what nothing beyond the sheet had a part in. */
@@ -127,8 +127,8 @@ static bool drop_lit(std::vector<Pixel> &pixels, const Unknowns &found)
  * equations are linear in that). */
 struct Match {
     Unknowns found;
-    double miss;     /* what is left, as a part of the gain */
-    double sigma_px; /* of the shift, one component */
+    double miss = 0.0;     /* what is left, as a part of the gain */
+    double sigma_px = 0.0; /* of the shift, one component */
 };
 
 static bool match(std::vector<Pixel> &pixels, Match &result)

@@ -14,7 +14,7 @@ constexpr int no_slot = -1;
 
 struct Sighting {
     cv::Point2d px, tangent; /* as in the frame; undistorted X/Z, Y/Z */
-    double wide_px;          /* standard deviation of the dot's light */
+    double wide_px = 0.0;    /* standard deviation of the dot's light */
     cv::Vec3d place_mm;      /* camera frame */
     cv::Vec2i step;          /* column, row in this picture's own lattice */
     bool in_lattice = false;

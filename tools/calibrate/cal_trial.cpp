@@ -64,10 +64,10 @@ static void add_candidates(const Lit &a, const Lit &b, std::vector<cv::Vec3d> &c
     for (int row = -2 * pattern_side; row <= 2 * pattern_side; row++) {
         for (int column = -2 * pattern_side; column <= 2 * pattern_side; column++) {
             std::vector<std::pair<cv::Vec3d, cv::Vec3d>> lines;
-            for (const auto &[step, place] : places_a) {
+            for (const auto &[step, from] : places_a) {
                 auto other = places_b.find({step.first + column, step.second + row});
                 if (other != places_b.end())
-                    lines.emplace_back(place, other->second);
+                    lines.emplace_back(from, other->second);
             }
             cv::Vec3d point;
             if (static_cast<int>(lines.size()) >= common_min && meet(lines, point) &&
@@ -129,7 +129,7 @@ static Placing place(const Trial &trial, const Lit &lit, double step_length)
     placing.predicted = static_cast<int>(shifts.size());
     if (shifts.empty())
         return placing;
-    auto most = std::max_element(votes.begin(), votes.end(), [](auto &a, auto &b) { return a.second < b.second; });
+    auto most = std::max_element(votes.begin(), votes.end(), [](const auto &a, const auto &b) { return a.second < b.second; });
     placing.shift = {most->first.first, most->first.second};
     for (const cv::Point2d &shift : shifts) {
         cv::Point2d off(shift.x - placing.shift[0], shift.y - placing.shift[1]);
