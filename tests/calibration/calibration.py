@@ -569,6 +569,28 @@ def check_usage(bench):
         result("usage: calibrate " + " ".join(words), None if fine else "status %d: %s%s" % (status, out, err))
 
 
+def check_full(bench):
+    """A disk that is full, for which a limit on the size of files stands: told, and no half file is left."""
+    out, taken, board = bench.path("full"), bench.path("taken"), bench.path("kept.pdf")
+    with open(board, "w", encoding="utf-8") as file:
+        file.write("an earlier one")
+    film_of(bench, [(1, 9), (0, 3)])
+    for path, left, command in [(board, ["kept.pdf"], ("board", board)), (bench.path("new.pgm"), [], ("board", bench.path("new.pgm"))),
+                                (out, [], ("solve", "--out", out, bench.path("rig0", "good"))),
+                                (taken, [], ("guide", "--camera", bench.path("film/%03d.pgm"), taken))]:
+        status, _, err = run("sh", "-c", "ulimit -f 2; trap '' XFSZ; exec \"$@\"", "sh", bench.calibrate, *command, typed="\n")
+        there = os.listdir(path) if os.path.isdir(path) else [name for name in os.listdir(bench.work)
+                                                              if name.startswith(os.path.basename(path))]
+        fine = status == 1 and "could not be written: File too large" in err and there == left
+        result("a full disk: calibrate " + command[0], None if fine else "status %d, %s: %s" % (status, there, err))
+    with open(board, encoding="utf-8") as file:
+        result("a full disk: an earlier file stays", None if file.read() == "an earlier one" else "it does not")
+    with open("/dev/full", "w", encoding="utf-8") as full:
+        done = subprocess.run([bench.calibrate, "--help"], stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    fine = done.returncode == 1 and "standard output could not be written" in done.stderr
+    result("a full disk: standard output", None if fine else "status %d: %s" % (done.returncode, done.stderr))
+
+
 def on_terminal(*command):
     """Exit status, what came on standard output (a pipe), and what a terminal got as standard error."""
     ours, theirs = pty.openpty()
@@ -650,6 +672,7 @@ def main():
     check_device(bench)
     check_usage(bench)
     check_values(bench)
+    check_full(bench)
     check_progress(bench)
     check_print(bench)
     check_report(bench)
