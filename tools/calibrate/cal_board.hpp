@@ -19,9 +19,9 @@ constexpr double sheet_width_mm = 297.0, sheet_height_mm = 210.0;
 constexpr double white_albedo = 0.9, dark_albedo = 0.3;
 
 struct Board {
-    bool charuco;
-    int columns, rows; /* squares */
-    double square_mm;
+    bool charuco = true;
+    int columns = 0, rows = 0; /* squares */
+    double square_mm = 0.0;
     std::string name;                         /* as it was given */
     cv::Ptr<cv::aruco::CharucoBoard> markers; /* ChArUco only */
 

@@ -14,7 +14,7 @@ struct Result {
     std::vector<Lit> lit;
     Camera camera;
     Projector projector;
-    Range range;
+    Range range{};
 };
 
 /* Prints what it finds on standard output. Throws cal::Error. */
