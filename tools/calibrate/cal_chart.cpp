@@ -19,7 +19,7 @@ Chart::Chart(const std::string &title, const std::string &x_name, const std::str
     : data_(data), down_(down)
 {
     body_ += text("<text x='%g' y='17' text-anchor='middle' font-weight='bold'>%s</text>", 0.5 * (width + left),
-                 title.c_str());
+                  title.c_str());
     body_ += text("<text x='%g' y='%g' text-anchor='middle'>%s</text>", 0.5 * (width + left - right), height - 8.0,
                   x_name.c_str());
     body_ += text("<text transform='translate(14,%g) rotate(-90)' text-anchor='middle'>%s</text>",
