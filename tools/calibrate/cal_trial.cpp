@@ -129,7 +129,8 @@ static Placing place(const Trial &trial, const Lit &lit, double step_length)
     placing.predicted = static_cast<int>(shifts.size());
     if (shifts.empty())
         return placing;
-    auto most = std::max_element(votes.begin(), votes.end(), [](const auto &a, const auto &b) { return a.second < b.second; });
+    auto most =
+        std::max_element(votes.begin(), votes.end(), [](const auto &a, const auto &b) { return a.second < b.second; });
     placing.shift = {most->first.first, most->first.second};
     for (const cv::Point2d &shift : shifts) {
         cv::Point2d off(shift.x - placing.shift[0], shift.y - placing.shift[1]);
