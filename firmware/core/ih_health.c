@@ -27,10 +27,17 @@ static void start_look(struct ih_health *health)
     health->look = (struct ih_health_look){.frame_count = 0};
 }
 
+static void clear_late(struct ih_health *health)
+{
+    ih_places_clear(&health->seen.lines.late);
+    health->is_doubted = false;
+}
+
 /* Nothing that was seen before counts any more. */
 static void start_over(struct ih_health *health)
 {
-    ih_places_clear(&health->seen.places);
+    ih_places_clear(&health->seen.lines.all);
+    clear_late(health);
     start_look(health);
 }
 
@@ -57,7 +64,8 @@ static void add_frame(struct ih_health *health, const struct ih_dots *dots,
     look->dot_count += dots->dot_count;
     look->labelled_count += labels->labelled_count;
     look->frame_count++;
-    ih_places_add(&health->seen.places, labels, &health->slopes, reach_px_q12);
+    ih_places_add(&health->seen.lines.all, labels, &health->slopes, reach_px_q12);
+    ih_places_add(&health->seen.lines.late, labels, &health->slopes, reach_px_q12);
 }
 
 /* Turn the rig; false: beyond the limit, and the rig is as it was. */
@@ -125,6 +133,7 @@ static void begin_search(struct ih_health *health)
     health->search_count++;
     health->before = health->look;
     memcpy(health->before_rad_q30, health->turn_rad_q30, sizeof health->before_rad_q30);
+    health->before_basis_count = health->basis_count;
     health->was_weak_known = health->is_weak_known;
     memset(&health->seen.votes, 0, sizeof health->seen.votes);
     begin_stage(health, IH_HEALTH_SEARCHING);
@@ -145,7 +154,7 @@ static bool search(struct ih_health *health, const struct ih_dots *dots, struct 
                    struct ih_health_scratch *scratch)
 {
     struct ih_turn_winner winner;
-    ih_turn_vote(dots, rig, &health->slopes, &scratch->turn, &health->seen.votes);
+    ih_turn_vote(dots, rig, &health->slopes, &scratch->at.turn, &health->seen.votes);
     health->step++;
     if (health->step < IH_HEALTH_SEARCH) {
         return false;
@@ -165,7 +174,7 @@ static bool search(struct ih_health *health, const struct ih_dots *dots, struct 
 static bool find(const struct ih_health *health, const struct ih_rig *rig,
                  struct ih_places_turn *out)
 {
-    return ih_places_find(&health->seen.places, rig, &health->slopes, health->turn_rad_q30,
+    return ih_places_find(&health->seen.lines.all, rig, &health->slopes, health->turn_rad_q30,
                           health->is_weak_known, out);
 }
 
@@ -191,30 +200,49 @@ static void keep_sigma(struct ih_health *health, const struct ih_rig *rig,
 static bool take(struct ih_health *health, const struct ih_places_turn *found, struct ih_rig *rig,
                  struct ih_health_scratch *scratch)
 {
-    ih_places_turn(&health->seen.places, &health->slopes, found->turn_rad_q30);
+    ih_places_turn(&health->seen.lines.all, &health->slopes, found->turn_rad_q30);
+    ih_places_turn(&health->seen.lines.late, &health->slopes, found->turn_rad_q30);
     if (!turn_by(health, found->turn_rad_q30, rig, scratch)) {
         start_over(health);
         return false;
     }
     keep_sigma(health, rig, found);
-    health->basis_count = health->seen.places.frame_count;
+    health->basis_count = health->seen.lines.all.frame_count;
     return true;
 }
 
 /* More than chance, and than what does no harm. */
 static bool is_worth_it(const struct ih_places_turn *found)
 {
-    int64_t sum = 0;
-    for (int i = 0; i < 3; i++) {
-        sum += (int64_t)found->turn_rad_q30[i] * found->turn_rad_q30[i];
+    return found->sure_rad_q30 >= TURN_MIN_RAD_Q30;
+}
+
+/* Two looks one after the other that both differ from what was seen before: from now on they alone count. */
+static bool is_knocked(struct ih_health *health, const struct ih_rig *rig,
+                       struct ih_health_scratch *scratch)
+{
+    struct ih_places_turn change;
+    bool was_doubted = health->is_doubted;
+    bool is_doubted = ih_places_change(&health->seen.lines.late, &health->seen.lines.all, rig,
+                                       &health->slopes, &scratch->at.change, &change) &&
+                      is_worth_it(&change);
+    if (is_doubted && was_doubted) {
+        health->seen.lines.all = health->seen.lines.late;
+        health->basis_count = 0;
+        health->is_weak_known = false;
     }
-    return found->is_sure && sum >= (int64_t)TURN_MIN_RAD_Q30 * TURN_MIN_RAD_Q30;
+    if (!is_doubted || was_doubted) {
+        clear_late(health);
+    } else {
+        health->is_doubted = true;
+    }
+    return is_doubted && was_doubted;
 }
 
 /* Of a rig that is turned: more is known by a quarter, or for the first time. */
 static bool is_refined(const struct ih_health *health, const struct ih_places_turn *found)
 {
-    int32_t frame_count = health->seen.places.frame_count;
+    int32_t frame_count = health->seen.lines.all.frame_count;
     return is_turned(health) &&
            (frame_count * 4 >= health->basis_count * 5 || frame_count >= IH_PLACES_FRAMES_MAX ||
             (found->is_weak_seen && !health->is_weak_known));
@@ -230,8 +258,13 @@ static bool watch(struct ih_health *health, struct ih_rig *rig, struct ih_health
         begin_search(health);
         return false;
     }
+    bool is_late = is_knocked(health, rig, scratch);
     bool is_known = find(health, rig, &found);
-    bool is_new = is_known && is_worth_it(&found);
+    bool is_new = is_known && (is_late || is_worth_it(&found));
+    if (is_new && health->is_weak_known) {
+        health->is_weak_known = false; /* nor is what is known across the baseline true any more */
+        is_known = find(health, rig, &found);
+    }
     if (is_new || (is_known && is_refined(health, &found))) {
         has_changed = take(health, &found, rig, scratch);
     } else if (is_known) {
@@ -247,7 +280,7 @@ static bool watch(struct ih_health *health, struct ih_rig *rig, struct ih_health
         health->search_count = 0;
         start_over(health);
     }
-    ih_places_forget(&health->seen.places);
+    ih_places_forget(&health->seen.lines.all);
     return has_changed;
 }
 
@@ -282,6 +315,7 @@ static bool settle(struct ih_health *health, struct ih_rig *rig, struct ih_healt
         start_over(health);
         begin_stage(health, IH_HEALTH_WATCHING);
         health->is_weak_known = health->was_weak_known;
+        health->basis_count = health->before_basis_count;
         return turn_to(health, health->before_rad_q30, rig, scratch);
     }
     bool is_known = find(health, rig, &found);
@@ -293,6 +327,7 @@ static bool settle(struct ih_health *health, struct ih_rig *rig, struct ih_healt
         has_changed =
             is_known || health->is_weak_known ? has_changed : drop_weak(health, rig, scratch);
         conclude(health, &look, is_known && health->is_weak_known);
+        clear_late(health);
         begin_stage(health, IH_HEALTH_WATCHING);
     } else {
         health->step++;

@@ -71,17 +71,25 @@ struct ih_health {
     int32_t search_count; /* one after the other */
     struct ih_health_look look;
     int32_t basis_count;          /* frames that the turn was had from */
+    bool is_doubted;              /* the last look differed from those before */
     struct ih_health_look before; /* a search, and what was known then */
     int32_t before_rad_q30[3];
+    int32_t before_basis_count;
     bool was_weak_known;
     union {
-        struct ih_places places;    /* since the rig last changed by more than a refinement */
+        struct {
+            struct ih_places all;   /* since the rig last changed by more than a refinement */
+            struct ih_places late;  /* of the last look, or the last two */
+        } lines;
         struct ih_turn_votes votes; /* while searching */
     } seen;
 };
 
 struct ih_health_scratch {
-    struct ih_turn_scratch turn;
+    union {
+        struct ih_turn_scratch turn;
+        struct ih_places change;
+    } at;
     struct ih_calibration calibration;
     struct ih_rig rig;
 };

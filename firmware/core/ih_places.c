@@ -11,10 +11,11 @@
 /* What an estimate needs: dots, and slots, whose scatter is the uncertainty. */
 #define WEIGHT_MIN_Q8 (200 << 8)
 #define SLOTS_MIN 40
-/* How far a slot errs in every frame alike: what is counted when a turn is told, and when it is asked
- * whether there is one at all. */
-#define SLOT_PX_Q12 123  /* 0.03 px */
-#define DOUBT_PX_Q12 492 /* 0.12 px */
+/* How far a slot errs in every frame alike: what is counted when a turn is told; when it is asked whether
+ * there is one at all; and whether it has changed, where what was calibrated badly is in both. */
+#define SLOT_PX_Q12 123   /* 0.03 px */
+#define DOUBT_PX_Q12 492  /* 0.12 px */
+#define CHANGE_PX_Q12 246 /* 0.06 px */
 #define SURE 5
 /* The prior is at least as wide as this. */
 #define PRIOR_MIN_RAD_Q30 107374 /* 0.1 mrad */
@@ -33,6 +34,7 @@ struct totals {
     int64_t right_q24[3];  /* weight times slope times distance */
     int64_t whole_q8;      /* see whole */
     int32_t slot_count;
+    int32_t doubt_px_q12; /* how far a slot may err, before a turn is sure */
 };
 
 /* The equations in units in which the diagonal is 1, and their cofactors. */
@@ -318,8 +320,8 @@ static int64_t with_standing_q16(uint64_t square_q32, uint64_t weight_q32, int64
 /* What slots leave unexplained is below 2^17 times 2^13 in Q20, times a lever of 2^32: 2^62. Squares of
  * 2^26 add up to 2^60.5. */
 static void judge(const struct ih_places *places, const struct ih_turn_slopes *slopes,
-                  const struct equations *e, int64_t share, const int32_t offset_rad_q30[3],
-                  struct ih_places_turn *out)
+                  const struct equations *e, const struct totals *sums,
+                  const int32_t offset_rad_q30[3], struct ih_places_turn *out)
 {
     int32_t turn_rad_q30[3];
     uint64_t square_q32[3] = {0, 0, 0};
@@ -334,7 +336,7 @@ static void judge(const struct ih_places *places, const struct ih_turn_slopes *s
         for (int i = 0; weight_q8 > 0 && i < 3; i++) {
             int64_t lever = lever_q26(e, slope, i);
             int64_t left_q20 =
-                limited(whole(pull_q20, share) - weight_q8 * move_px_q12(slope, turn_rad_q30),
+                limited(whole(pull_q20, sums->whole_q8) - weight_q8 * move_px_q12(slope, turn_rad_q30),
                         (int64_t)1 << 30);
             int64_t left_q16 = limited(ih_shift_round(left_q20 * lever, 30), 1 << 26);
             int64_t own_q16 = limited(ih_shift_round(weight_q8 * lever, 18), 1 << 26);
@@ -342,14 +344,16 @@ static void judge(const struct ih_places *places, const struct ih_turn_slopes *s
             weight_q32[i] += (uint64_t)(own_q16 * own_q16);
         }
     }
-    out->is_sure = false;
+    int64_t sure = 0;
     for (int i = 0; i < 3; i++) {
         int64_t sigma_q16 = with_standing_q16(square_q32[i], weight_q32[i], SLOT_PX_Q12);
-        int64_t doubt_q16 = with_standing_q16(square_q32[i], weight_q32[i], DOUBT_PX_Q12);
+        int64_t doubt_q16 = with_standing_q16(square_q32[i], weight_q32[i], sums->doubt_px_q12);
         int64_t doubt_rad_q30 = ih_div_round(doubt_q16 * (1 << 22), e->root_q8[i]);
+        int64_t part_rad_q30 = ih_abs_s32(out->turn_rad_q30[i]);
         out->sigma_rad_q30[i] = ih_saturate_s32(ih_div_round(sigma_q16 * (1 << 22), e->root_q8[i]));
-        out->is_sure = out->is_sure || ih_abs_s32(out->turn_rad_q30[i]) >= SURE * doubt_rad_q30;
+        sure += part_rad_q30 >= SURE * doubt_rad_q30 ? part_rad_q30 * part_rad_q30 : 0;
     }
+    out->sure_rad_q30 = (int32_t)ih_isqrt_u64((uint64_t)sure);
 }
 
 /* The turn with a prior of that width about the calibration. False: an axis is not seen at all. */
@@ -393,7 +397,7 @@ static bool estimate(const struct ih_places *places, const struct ih_turn_slopes
     if (!is_solved) {
         return false;
     }
-    judge(places, slopes, &wide, sums->whole_q8, offset_rad_q30, out);
+    judge(places, slopes, &wide, sums, offset_rad_q30, out);
     for (int i = 0; i < 3; i++) {
         out->turn_rad_q30[i] += offset_rad_q30[i];
     }
@@ -415,9 +419,9 @@ void ih_places_hold(const struct ih_rig *rig, const int32_t turned_rad_q30[3],
     back_rad_q30[2] = 0;
 }
 
-bool ih_places_find(const struct ih_places *places, const struct ih_rig *rig,
-                    const struct ih_turn_slopes *slopes, const int32_t turned_rad_q30[3],
-                    bool is_weak_known, struct ih_places_turn *out)
+static bool find(const struct ih_places *places, const struct ih_rig *rig,
+                 const struct ih_turn_slopes *slopes, const int32_t turned_rad_q30[3],
+                 bool is_weak_known, int32_t doubt_px_q12, struct ih_places_turn *out)
 {
     const int32_t none[3] = {0, 0, 0};
     int32_t offset_rad_q30[3] = {0, 0, 0};
@@ -427,6 +431,7 @@ bool ih_places_find(const struct ih_places *places, const struct ih_rig *rig,
         return false;
     }
     add_up(places, slopes, &sums);
+    sums.doubt_px_q12 = doubt_px_q12;
     if (sums.slot_count < SLOTS_MIN) {
         return false;
     }
@@ -440,6 +445,45 @@ bool ih_places_find(const struct ih_places *places, const struct ih_rig *rig,
     }
     pin(places, slopes, axis_q30[1], offset_rad_q30, &sums);
     return estimate(places, slopes, &sums, turned_rad_q30, offset_rad_q30, out);
+}
+
+bool ih_places_find(const struct ih_places *places, const struct ih_rig *rig,
+                    const struct ih_turn_slopes *slopes, const int32_t turned_rad_q30[3],
+                    bool is_weak_known, struct ih_places_turn *out)
+{
+    return find(places, rig, slopes, turned_rad_q30, is_weak_known, DOUBT_PX_Q12, out);
+}
+
+/* The difference of two means has the weight w v / (w + v). Weights of 2^17, pulls of 2^30: 2^48. */
+static void subtract(const struct ih_place *late, const struct ih_place *all, struct ih_place *out)
+{
+    int32_t late_weight_q8, late_pull_q20, all_weight_q8, all_pull_q20;
+    sum_of(late, &late_weight_q8, &late_pull_q20);
+    sum_of(all, &all_weight_q8, &all_pull_q20);
+    *out = (struct ih_place){.t_px_q12 = ANYWHERE};
+    if (late_weight_q8 > 0 && all_weight_q8 > 0) {
+        int64_t both_q8 = (int64_t)late_weight_q8 + all_weight_q8;
+        int64_t pull_q28 =
+            (int64_t)late_pull_q20 * all_weight_q8 - (int64_t)all_pull_q20 * late_weight_q8;
+        out->weight_q8 =
+            (int32_t)ih_div_round((int64_t)late_weight_q8 * all_weight_q8, both_q8);
+        out->pull_q20 = (int32_t)limited(ih_div_round(pull_q28, both_q8), PULL_MOST_Q20);
+    }
+}
+
+bool ih_places_change(const struct ih_places *late, const struct ih_places *all,
+                      const struct ih_rig *rig, const struct ih_turn_slopes *slopes,
+                      struct ih_places *scratch, struct ih_places_turn *out)
+{
+    const int32_t none[3] = {0, 0, 0};
+    scratch->frame_count = late->frame_count;
+    scratch->weight_q8 = late->weight_q8;
+    scratch->rise_q8 = late->rise_q8;
+    scratch->square_q32 = late->square_q32;
+    for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
+        subtract(&late->slot[slot], &all->slot[slot], &scratch->slot[slot]);
+    }
+    return find(scratch, rig, slopes, none, true, CHANGE_PX_Q12, out);
 }
 
 static int32_t pulled(int32_t pull_q20, int32_t weight_q8, int64_t move_px_q12, int64_t share)

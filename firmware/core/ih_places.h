@@ -56,7 +56,8 @@ struct ih_places_turn {
     bool
         is_weak_seen; /* the turn across the baseline; if not, it is held where it is known to be, or at
                         * the calibration's */
-    bool is_sure;     /* some axis is 5 times its uncertainty, with 0.12 px for each slot */
+    int32_t sure_rad_q30; /* the turn about those axes where it is 5 times its uncertainty, with 0.12 px
+                           * for each slot (of a change 0.06 px); 0: none */
 };
 
 void ih_places_clear(struct ih_places *places);
@@ -71,6 +72,13 @@ void ih_places_add(struct ih_places *places, const struct ih_labels *labels,
 bool ih_places_find(const struct ih_places *places, const struct ih_rig *rig,
                     const struct ih_turn_slopes *slopes, const int32_t turned_rad_q30[3],
                     bool is_weak_known, struct ih_places_turn *out);
+
+/* How late frames differ from all, among which they are, as a turn; what slots err by in both, from
+ * calibration or because they stand still, is not counted. A turn that late dots do not show is 0. False: as
+ * above. */
+bool ih_places_change(const struct ih_places *late, const struct ih_places *all,
+                      const struct ih_rig *rig, const struct ih_turn_slopes *slopes,
+                      struct ih_places *scratch, struct ih_places_turn *out);
 
 /* What takes the part of a turn across the baseline back. */
 void ih_places_hold(const struct ih_rig *rig, const int32_t turned_rad_q30[3],
