@@ -12,12 +12,14 @@
  * wrong ones that searches came to 0.2 px. Such a search is repeated with other frames. */
 #define POOR_ACROSS_PX_Q12 655 /* 0.16 px */
 #define SEARCHES_MAX 3
+/* Looks until a search that was in vain is repeated: twice as many each time, up to IH_HEALTH_PAUSE. */
+#define PAUSE_FIRST 2
 /* A turn that is worth a correction. */
 #define TURN_MIN_RAD_Q30 374802 /* 0.02 degrees */
 /* Frames of each step of settling. Dots farther from their line than reach say nothing about a turn. */
 #define SETTLE_STEPS 3
-static const int32_t settle_frames[SETTLE_STEPS] = {4, 4, 32};
-/* What another search takes, which the last step then has less: a rig is told of after 49 frames. */
+static const int32_t settle_frames[SETTLE_STEPS] = {4, 4, 28};
+/* What another search takes, which the last step then has less: a rig is told of after 45 frames. */
 #define SEARCH_AGAIN_FRAMES (IH_HEALTH_SEARCH + 4 + 4)
 static const int32_t settle_reach_px_q12[SETTLE_STEPS] = {4915, 2458, 1229};
 #define REACH_PX_Q12 1229 /* 0.3 px */
@@ -29,14 +31,14 @@ static void start_look(struct ih_health *health)
 
 static void clear_late(struct ih_health *health)
 {
-    ih_places_clear(&health->seen.lines.late);
+    ih_places_clear(&health->now.late);
     health->is_doubted = false;
 }
 
 /* Nothing that was seen before counts any more. */
 static void start_over(struct ih_health *health)
 {
-    ih_places_clear(&health->seen.lines.all);
+    ih_places_clear(&health->all);
     clear_late(health);
     start_look(health);
 }
@@ -46,16 +48,14 @@ void ih_health_init(struct ih_health *health, const struct ih_rig *rig)
     memset(health, 0, sizeof *health);
     health->nominal = rig->calibration;
     health->across_px_q12 = -1;
+    health->next_pause = PAUSE_FIRST;
     ih_turn_slopes(rig, &health->slopes);
     start_over(health);
 }
 
-static void add_frame(struct ih_health *health, const struct ih_dots *dots,
-                      const struct ih_labels *labels)
+static void add_look(struct ih_health_look *look, const struct ih_dots *dots,
+                     const struct ih_labels *labels)
 {
-    struct ih_health_look *look = &health->look;
-    int32_t reach_px_q12 =
-        health->stage == IH_HEALTH_SETTLING ? settle_reach_px_q12[health->step] : REACH_PX_Q12;
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
         if (labels->dot_of_slot[slot] != IH_NONE) {
             look->across_px_q12 += ih_abs_s32(labels->perp_px_q12[slot]);
@@ -64,8 +64,19 @@ static void add_frame(struct ih_health *health, const struct ih_dots *dots,
     look->dot_count += dots->dot_count;
     look->labelled_count += labels->labelled_count;
     look->frame_count++;
-    ih_places_add(&health->seen.lines.all, labels, &health->slopes, reach_px_q12);
-    ih_places_add(&health->seen.lines.late, labels, &health->slopes, reach_px_q12);
+}
+
+/* What a search's turn shows is apart until it is proven. */
+static void add_frame(struct ih_health *health, const struct ih_dots *dots,
+                      const struct ih_labels *labels)
+{
+    bool is_settling = health->stage == IH_HEALTH_SETTLING;
+    int32_t reach_px_q12 = is_settling ? settle_reach_px_q12[health->step] : REACH_PX_Q12;
+    add_look(&health->look, dots, labels);
+    ih_places_add(&health->now.late, labels, &health->slopes, reach_px_q12);
+    if (!is_settling || health->step > 0) {
+        ih_places_add(&health->all, labels, &health->slopes, reach_px_q12);
+    }
 }
 
 /* Turn the rig; false: beyond the limit, and the rig is as it was. */
@@ -119,24 +130,39 @@ static bool is_lost(const struct ih_health_look *look)
             look->across_px_q12 > (int64_t)LOST_ACROSS_PX_Q12 * look->labelled_count);
 }
 
-/* Most dots without a label, or labels that are no better than chance; and no search was in vain lately. */
+static bool is_poor(const struct ih_health_look *look)
+{
+    return look->across_px_q12 > (int64_t)POOR_ACROSS_PX_Q12 * look->labelled_count;
+}
+
+/* Most dots without a label, or poor labels; and no search was in vain lately. */
 static bool is_search_due(struct ih_health *health)
 {
     const struct ih_health_look *look = &health->look;
+    bool is_needed = look->dot_count >= DOTS_MIN * look->frame_count &&
+                     (look->labelled_count * 2 < look->dot_count || is_poor(look));
     health->pause = ih_max_s32(health->pause - 1, 0);
-    return health->pause == 0 && look->dot_count >= DOTS_MIN * look->frame_count &&
-           (look->labelled_count * 2 < look->dot_count || is_lost(look));
+    health->next_pause = is_needed ? health->next_pause : PAUSE_FIRST;
+    return is_needed && health->pause == 0;
 }
 
 static void begin_search(struct ih_health *health)
 {
     health->search_count++;
-    health->before = health->look;
     memcpy(health->before_rad_q30, health->turn_rad_q30, sizeof health->before_rad_q30);
     health->before_basis_count = health->basis_count;
     health->was_weak_known = health->is_weak_known;
-    memset(&health->seen.votes, 0, sizeof health->seen.votes);
+    memset(&health->now.votes, 0, sizeof health->now.votes);
     begin_stage(health, IH_HEALTH_SEARCHING);
+}
+
+/* A search was in vain: what was known before it holds. */
+static void give_up(struct ih_health *health)
+{
+    clear_late(health);
+    health->pause = health->next_pause;
+    health->next_pause = ih_min_s32(2 * health->next_pause, IH_HEALTH_PAUSE);
+    begin_stage(health, IH_HEALTH_WATCHING);
 }
 
 static void conclude(struct ih_health *health, const struct ih_health_look *look, bool is_known)
@@ -150,31 +176,50 @@ static void conclude(struct ih_health *health, const struct ih_health_look *look
     }
 }
 
-static bool search(struct ih_health *health, const struct ih_dots *dots, struct ih_rig *rig,
-                   struct ih_health_scratch *scratch)
+/* Chance gives every turn its votes, with a wide baseline half of what the right one has. Beyond the mean the
+ * winner needs half of it, and an eighth more than no turn has; where a search is repeated, any more. */
+static bool is_elected(const struct ih_turn_winner *winner, int32_t search_count)
+{
+    int32_t least = search_count > 1 ? 8 : 9;
+    return winner->vote * 2 > winner->vote_mean * 3 &&
+           (winner->vote - winner->vote_mean) * 8 >
+               (winner->vote_of_none - winner->vote_mean) * least;
+}
+
+/* The turn that most votes are for goes on trial. The frames of the votes say what it has to be better than: the
+ * last look may have begun before a knock. */
+static bool elect(struct ih_health *health, struct ih_rig *rig, struct ih_health_scratch *scratch)
 {
     struct ih_turn_winner winner;
-    ih_turn_vote(dots, rig, &health->slopes, &scratch->at.turn, &health->seen.votes);
-    health->step++;
-    if (health->step < IH_HEALTH_SEARCH) {
-        return false;
-    }
-    ih_turn_elect(&health->seen.votes, rig, &winner);
-    int64_t least = health->search_count > 1 ? 4 : 5; /* quarters of what no turn has */
-    bool is_turned_now = (int64_t)winner.vote * 4 > winner.vote_of_none * least &&
-                         turn_by(health, winner.turn_rad_q30, rig, scratch);
-    health->pause = IH_HEALTH_PAUSE;
+    ih_turn_elect(&health->now.votes, rig, &winner);
+    bool is_turned_now =
+        is_elected(&winner, health->search_count) && turn_by(health, winner.turn_rad_q30, rig, scratch);
+    health->before = health->look;
     health->is_weak_known = health->is_weak_known && !is_turned_now;
     health->basis_count = is_turned_now ? 0 : health->basis_count;
-    start_over(health);
-    begin_stage(health, is_turned_now ? IH_HEALTH_SETTLING : IH_HEALTH_WATCHING);
+    clear_late(health);
+    if (is_turned_now) {
+        begin_stage(health, IH_HEALTH_SETTLING);
+    } else {
+        give_up(health);
+    }
     return is_turned_now;
+}
+
+static bool search(struct ih_health *health, const struct ih_dots *dots,
+                   const struct ih_labels *labels, struct ih_rig *rig,
+                   struct ih_health_scratch *scratch)
+{
+    add_look(&health->look, dots, labels);
+    ih_turn_vote(dots, rig, &health->slopes, &scratch->at.turn, &health->now.votes);
+    health->step++;
+    return health->step >= IH_HEALTH_SEARCH && elect(health, rig, scratch);
 }
 
 static bool find(const struct ih_health *health, const struct ih_rig *rig,
                  struct ih_places_turn *out)
 {
-    return ih_places_find(&health->seen.lines.all, rig, &health->slopes, health->turn_rad_q30,
+    return ih_places_find(&health->all, rig, &health->slopes, health->turn_rad_q30,
                           health->is_weak_known, out);
 }
 
@@ -200,14 +245,14 @@ static void keep_sigma(struct ih_health *health, const struct ih_rig *rig,
 static bool take(struct ih_health *health, const struct ih_places_turn *found, struct ih_rig *rig,
                  struct ih_health_scratch *scratch)
 {
-    ih_places_turn(&health->seen.lines.all, &health->slopes, found->turn_rad_q30);
-    ih_places_turn(&health->seen.lines.late, &health->slopes, found->turn_rad_q30);
+    ih_places_turn(&health->all, &health->slopes, found->turn_rad_q30);
+    ih_places_turn(&health->now.late, &health->slopes, found->turn_rad_q30);
     if (!turn_by(health, found->turn_rad_q30, rig, scratch)) {
         start_over(health);
         return false;
     }
     keep_sigma(health, rig, found);
-    health->basis_count = health->seen.lines.all.frame_count;
+    health->basis_count = health->all.frame_count;
     return true;
 }
 
@@ -217,32 +262,31 @@ static bool is_worth_it(const struct ih_places_turn *found)
     return found->sure_rad_q30 >= TURN_MIN_RAD_Q30;
 }
 
-/* Two looks one after the other that both differ from what was seen before: from now on they alone count. */
+/* Two looks one after the other both differ surely from what was seen before: from now on the second alone
+ * counts. Dots' noise is another in each look, so that chance does not do it twice. */
 static bool is_knocked(struct ih_health *health, const struct ih_rig *rig,
                        struct ih_health_scratch *scratch)
 {
     struct ih_places_turn change;
     bool was_doubted = health->is_doubted;
-    bool is_doubted = ih_places_change(&health->seen.lines.late, &health->seen.lines.all, rig,
-                                       &health->slopes, &scratch->at.change, &change) &&
+    bool is_doubted = ih_places_change(&health->now.late, &health->all, rig, &health->slopes,
+                                       &scratch->at.change, &change) &&
                       is_worth_it(&change);
-    if (is_doubted && was_doubted) {
-        health->seen.lines.all = health->seen.lines.late;
+    bool is_sure = is_doubted && was_doubted;
+    if (is_sure) {
+        health->all = health->now.late;
         health->basis_count = 0;
         health->is_weak_known = false;
     }
-    if (!is_doubted || was_doubted) {
-        clear_late(health);
-    } else {
-        health->is_doubted = true;
-    }
-    return is_doubted && was_doubted;
+    clear_late(health);
+    health->is_doubted = is_doubted && !is_sure;
+    return is_sure;
 }
 
 /* Of a rig that is turned: more is known by a quarter, or for the first time. */
 static bool is_refined(const struct ih_health *health, const struct ih_places_turn *found)
 {
-    int32_t frame_count = health->seen.lines.all.frame_count;
+    int32_t frame_count = health->all.frame_count;
     return is_turned(health) &&
            (frame_count * 4 >= health->basis_count * 5 || frame_count >= IH_PLACES_FRAMES_MAX ||
             (found->is_weak_seen && !health->is_weak_known));
@@ -280,7 +324,7 @@ static bool watch(struct ih_health *health, struct ih_rig *rig, struct ih_health
         health->search_count = 0;
         start_over(health);
     }
-    ih_places_forget(&health->seen.lines.all);
+    ih_places_forget(&health->all);
     return has_changed;
 }
 
@@ -312,16 +356,18 @@ static bool settle(struct ih_health *health, struct ih_rig *rig, struct ih_healt
     struct ih_places_turn found;
     bool is_last = health->step == SETTLE_STEPS - 1;
     if (health->step == 0 && !is_proven(&health->before, &look)) {
-        start_over(health);
-        begin_stage(health, IH_HEALTH_WATCHING);
+        give_up(health);
         health->is_weak_known = health->was_weak_known;
         health->basis_count = health->before_basis_count;
         return turn_to(health, health->before_rad_q30, rig, scratch);
     }
+    if (health->step == 0) {
+        health->all = health->now.late;
+    }
     bool is_known = find(health, rig, &found);
     bool has_changed = is_known && take(health, &found, rig, scratch);
     if (health->step == 1 && health->search_count > 0 && health->search_count < SEARCHES_MAX &&
-        look.across_px_q12 > (int64_t)POOR_ACROSS_PX_Q12 * look.labelled_count) {
+        is_poor(&look)) {
         begin_search(health);
     } else if (is_last) {
         has_changed =
@@ -351,7 +397,7 @@ bool ih_health_frame(struct ih_health *health, const struct ih_dots *dots,
 {
     const struct ih_health_look *look = &health->look;
     if (health->stage == IH_HEALTH_SEARCHING) {
-        return search(health, dots, rig, scratch);
+        return search(health, dots, labels, rig, scratch);
     }
     add_frame(health, dots, labels);
     if (look->frame_count < look_frames(health)) {

@@ -34,7 +34,7 @@
 /* Frames of a look, and of a search. */
 #define IH_HEALTH_LOOK 6
 #define IH_HEALTH_SEARCH 3
-/* Looks until a search that found nothing is repeated. */
+/* Most looks until a search that found nothing is repeated. */
 #define IH_HEALTH_PAUSE 50
 /* Frames after which everything known about a rig that stays is as good as new, or as a check needs. */
 #define IH_HEALTH_ENOUGH 60
@@ -67,22 +67,21 @@ struct ih_health {
     struct ih_turn_slopes slopes;
     enum ih_health_stage stage;
     int32_t step;         /* of searching or settling */
-    int32_t pause;        /* looks */
+    int32_t pause;        /* looks until the next search, and after it if it is in vain */
+    int32_t next_pause;
     int32_t search_count; /* one after the other */
     struct ih_health_look look;
     int32_t basis_count;          /* frames that the turn was had from */
     bool is_doubted;              /* the last look differed from those before */
-    struct ih_health_look before; /* a search, and what was known then */
+    struct ih_health_look before; /* while searching, and what was known then */
     int32_t before_rad_q30[3];
     int32_t before_basis_count;
     bool was_weak_known;
+    struct ih_places all; /* since the rig last changed by more than a refinement */
     union {
-        struct {
-            struct ih_places all;   /* since the rig last changed by more than a refinement */
-            struct ih_places late;  /* of the last look, or the last two */
-        } lines;
+        struct ih_places late;      /* of the last look, or two; of a turn on trial */
         struct ih_turn_votes votes; /* while searching */
-    } seen;
+    } now;
 };
 
 struct ih_health_scratch {

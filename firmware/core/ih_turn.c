@@ -121,7 +121,7 @@ void ih_turn_axes(const struct ih_rig *rig, int32_t axis_q30[2][2])
 static void add_votes(const struct ih_turn_scratch *scratch, const int64_t step_px_q34[3],
                       struct ih_turn_votes *votes)
 {
-    int32_t *vote = votes->vote;
+    uint16_t *vote = votes->vote;
     for (int32_t roll = -(IH_TURN_STEPS_ROLL / 2); roll <= IH_TURN_STEPS_ROLL / 2; roll++) {
         for (int32_t across = -(IH_TURN_STEPS_ACROSS / 2); across <= IH_TURN_STEPS_ACROSS / 2;
              across++) {
@@ -130,7 +130,7 @@ static void add_votes(const struct ih_turn_scratch *scratch, const int64_t step_
             for (int32_t along = 0; along < IH_TURN_STEPS_ALONG; along++) {
                 int64_t bin = (place_px_q34 >> (34 - 12 + BIN_SHIFT)) + IH_TURN_REACH;
                 if (bin >= 0 && bin < 2 * IH_TURN_REACH) {
-                    *vote += scratch->there[bin];
+                    *vote = (uint16_t)(*vote + scratch->there[bin]);
                 }
                 vote++;
                 place_px_q34 += step_px_q34[0];
@@ -168,8 +168,10 @@ void ih_turn_elect(const struct ih_turn_votes *votes, const struct ih_rig *rig,
                    struct ih_turn_winner *out)
 {
     int32_t best = 0;
-    for (int32_t i = 1; i < IH_TURN_VOTES; i++) {
+    int32_t sum = 0;
+    for (int32_t i = 0; i < IH_TURN_VOTES; i++) {
         best = votes->vote[i] > votes->vote[best] ? i : best;
+        sum += votes->vote[i];
     }
     int64_t along = best % IH_TURN_STEPS_ALONG - IH_TURN_STEPS_ALONG / 2;
     int64_t across = best / IH_TURN_STEPS_ALONG % IH_TURN_STEPS_ACROSS - IH_TURN_STEPS_ACROSS / 2;
@@ -185,4 +187,5 @@ void ih_turn_elect(const struct ih_turn_votes *votes, const struct ih_rig *rig,
     out->turn_rad_q30[2] = roll * step_rad_q30(IH_TURN_STEPS_ROLL);
     out->vote = votes->vote[best];
     out->vote_of_none = votes->vote[IH_TURN_VOTES / 2];
+    out->vote_mean = sum / IH_TURN_VOTES;
 }

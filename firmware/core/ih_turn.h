@@ -40,7 +40,7 @@ struct ih_turn_slopes {
 };
 
 struct ih_turn_votes {
-    int32_t vote[IH_TURN_VOTES]; /* roll by roll, then across, then along */
+    uint16_t vote[IH_TURN_VOTES]; /* roll by roll, then across, then along */
 };
 
 struct ih_turn_scratch {
@@ -50,7 +50,7 @@ struct ih_turn_scratch {
 
 struct ih_turn_winner {
     int32_t turn_rad_q30[3];
-    int32_t vote, vote_of_none; /* its own, and those of no turn at all */
+    int32_t vote, vote_of_none, vote_mean; /* its own, those of no turn at all, all turns' */
 };
 
 /* The axes in the camera's X and Y along the middle dot's line, about which a turn is seen best, and
@@ -63,7 +63,7 @@ void ih_turn_slopes(const struct ih_rig *rig, struct ih_turn_slopes *out);
 void ih_turn_calibration(const struct ih_calibration *nominal, const int32_t turn_rad_q30[3],
                          struct ih_calibration *out);
 
-/* Add a frame's dots to the votes, which are all 0 at first; up to 1000 frames. */
+/* Add a frame's dots to the votes, which are all 0 at first; up to 11 frames: 16 points of each slot. */
 void ih_turn_vote(const struct ih_dots *dots, const struct ih_rig *rig,
                   const struct ih_turn_slopes *slopes, struct ih_turn_scratch *scratch,
                   struct ih_turn_votes *votes);
