@@ -13,7 +13,7 @@
 #define POOR_ACROSS_PX_Q12 655 /* 0.16 px */
 #define SEARCHES_MAX 3
 /* Looks until a search that was in vain is repeated: twice as many each time, up to IH_HEALTH_PAUSE. */
-#define PAUSE_FIRST 2
+#define PAUSE_FIRST 1
 /* A turn that is worth a correction. */
 #define TURN_MIN_RAD_Q30 374802 /* 0.02 degrees */
 /* Frames of each step of settling. Dots farther from their line than reach say nothing about a turn. */
@@ -29,17 +29,12 @@ static void start_look(struct ih_health *health)
     health->look = (struct ih_health_look){.frame_count = 0};
 }
 
-static void clear_late(struct ih_health *health)
-{
-    ih_places_clear(&health->now.late);
-    health->is_doubted = false;
-}
-
 /* Nothing that was seen before counts any more. */
 static void start_over(struct ih_health *health)
 {
     ih_places_clear(&health->all);
-    clear_late(health);
+    ih_places_clear(&health->now.late);
+    health->is_doubted = false;
     start_look(health);
 }
 
@@ -135,14 +130,22 @@ static bool is_poor(const struct ih_health_look *look)
     return look->across_px_q12 > (int64_t)POOR_ACROSS_PX_Q12 * look->labelled_count;
 }
 
-/* Most dots without a label, or poor labels; and no search was in vain lately. */
+/* Lost now, or a quarter less labels among the dots. */
+static bool is_worse(const struct ih_health_look *look, const struct ih_health_look *before)
+{
+    return (is_lost(look) && !is_lost(before)) || look->labelled_count * before->dot_count * 4 <
+                                                      before->labelled_count * look->dot_count * 3;
+}
+
+/* Most dots without a label, or poor labels; and no search was in vain lately when things were as they are. */
 static bool is_search_due(struct ih_health *health)
 {
     const struct ih_health_look *look = &health->look;
     bool is_needed = look->dot_count >= DOTS_MIN * look->frame_count &&
                      (look->labelled_count * 2 < look->dot_count || is_poor(look));
-    health->pause = ih_max_s32(health->pause - 1, 0);
-    health->next_pause = is_needed ? health->next_pause : PAUSE_FIRST;
+    bool is_other = !is_needed || is_worse(look, &health->before);
+    health->pause = is_other ? 0 : ih_max_s32(health->pause - 1, 0);
+    health->next_pause = is_other ? PAUSE_FIRST : health->next_pause;
     return is_needed && health->pause == 0;
 }
 
@@ -159,7 +162,7 @@ static void begin_search(struct ih_health *health)
 /* A search was in vain: what was known before it holds. */
 static void give_up(struct ih_health *health)
 {
-    clear_late(health);
+    ih_places_clear(&health->now.late);
     health->pause = health->next_pause;
     health->next_pause = ih_min_s32(2 * health->next_pause, IH_HEALTH_PAUSE);
     begin_stage(health, IH_HEALTH_WATCHING);
@@ -197,7 +200,7 @@ static bool elect(struct ih_health *health, struct ih_rig *rig, struct ih_health
     health->before = health->look;
     health->is_weak_known = health->is_weak_known && !is_turned_now;
     health->basis_count = is_turned_now ? 0 : health->basis_count;
-    clear_late(health);
+    ih_places_clear(&health->now.late);
     if (is_turned_now) {
         begin_stage(health, IH_HEALTH_SETTLING);
     } else {
@@ -278,7 +281,7 @@ static bool is_knocked(struct ih_health *health, const struct ih_rig *rig,
         health->basis_count = 0;
         health->is_weak_known = false;
     }
-    clear_late(health);
+    ih_places_clear(&health->now.late);
     health->is_doubted = is_doubted && !is_sure;
     return is_sure;
 }
@@ -297,12 +300,12 @@ static bool watch(struct ih_health *health, struct ih_rig *rig, struct ih_health
     const struct ih_health_look look = health->look;
     struct ih_places_turn found;
     bool has_changed = false;
-    if (is_search_due(health)) {
+    bool is_late = is_knocked(health, rig, scratch);
+    if (is_search_due(health) && !is_late) {
         health->search_count = 0;
         begin_search(health);
         return false;
     }
-    bool is_late = is_knocked(health, rig, scratch);
     bool is_known = find(health, rig, &found);
     bool is_new = is_known && (is_late || is_worth_it(&found));
     if (is_new && health->is_weak_known) {
@@ -373,7 +376,7 @@ static bool settle(struct ih_health *health, struct ih_rig *rig, struct ih_healt
         has_changed =
             is_known || health->is_weak_known ? has_changed : drop_weak(health, rig, scratch);
         conclude(health, &look, is_known && health->is_weak_known);
-        clear_late(health);
+        ih_places_clear(&health->now.late);
         begin_stage(health, IH_HEALTH_WATCHING);
     } else {
         health->step++;
