@@ -9,6 +9,7 @@
 
 #define WALL_MM 1200.0
 #define FRAMES_TO_FIND 50
+#define PEACE_FRAMES 470
 
 static struct ih_rig rig, before;
 static struct ih_labels_params params;
@@ -175,6 +176,82 @@ static void more_frames_make_it_better(void)
     }
 }
 
+/* However long the peace, and wherever in a look the knock. */
+static void a_knock_after_a_long_peace_is_found_as_soon(void)
+{
+    static const double turns_deg[][3] = {{0, 0.1, 0},     {0, -0.1, 0},   {0, 0, 0.05},
+                                          {0, 0, -0.1},    {0, 0, 0.2},    {0.03, 0, 0},
+                                          {-0.1, 0, 0},    {0, 0.3, 0},    {0.05, 0.05, 0.05},
+                                          {0.02, 0.02, 0}, {0, 0.06, 0.06}};
+    static struct ih_health peaceful;
+
+    for (int which = 0; which < 2; which++) {
+        use_calibration(&vector_rigs[which]);
+        run(&vector_rigs[which], straight_deg, PEACE_FRAMES);
+        assert_untouched();
+        for (int i = 0; i < IH_TEST_COUNT(turns_deg); i++) {
+            peaceful = health;
+            run(&vector_rigs[which], turns_deg[i], FRAMES_TO_FIND);
+            assert_turn(turns_deg[i], 20 * which + i);
+            TEST_ASSERT_TRUE(health.is_weak_known);
+            health = peaceful;
+            rig = before;
+            run(&vector_rigs[which], straight_deg, 1);
+        }
+        changed_count = 0;
+    }
+}
+
+/* What was known across the baseline is not known after a knock that does not show it. */
+static void a_knock_makes_what_is_not_seen_unknown(void)
+{
+    for (int seed = 0; seed < 3; seed++) {
+        random_source.state = (uint64_t)seed;
+        use_calibration(&vector_rigs[0]);
+        run(&vector_rigs[0], (const double[3]){0, 0.2, 0}, 100);
+        TEST_ASSERT_TRUE(health.is_weak_known);
+        run_middle((const double[3]){0, 0.2, 0.1}, 2 * FRAMES_TO_FIND);
+        TEST_ASSERT_FALSE(health.is_weak_known);
+        TEST_ASSERT_EQUAL_INT(IH_HEALTH_TURNED, health.state);
+        IH_TEST_WITHIN(0.001, 0, health.turn_rad_q30[1] / Q30 / DEG, "across", seed);
+        IH_TEST_WITHIN(0.02, 0.1, health.turn_rad_q30[2] / Q30 / DEG, "turn", seed);
+        IH_TEST_WITHIN(0.001, 0.6, health.sigma_rad_q30[1] / Q30 / DEG, "sigma", seed);
+    }
+}
+
+/* Frames of another turn while the dots vote, none when it is tried: everything is as before, and what was seen
+ * before still counts. */
+static void a_search_in_vain_leaves_what_was_known(void)
+{
+    static const double turn_deg[3] = {-0.2, 0.2, 0.1};
+    static const double other_deg[3] = {0.1, 0.2, 0.1};
+    static struct ih_health known;
+
+    use_calibration(&vector_rigs[0]);
+    run(&vector_rigs[0], turn_deg, 150);
+    while (health.look.frame_count != 0) {
+        run(&vector_rigs[0], turn_deg, 1);
+    }
+    known = health;
+    before = rig;
+    for (int i = 0; i < 30 && health.stage != IH_HEALTH_SETTLING; i++) {
+        run(&vector_rigs[0], other_deg, 1);
+    }
+    TEST_ASSERT_EQUAL_INT(IH_HEALTH_SETTLING, health.stage);
+    TEST_ASSERT_FALSE(health.is_weak_known);
+    for (int i = 0; i < 30 && health.stage != IH_HEALTH_WATCHING; i++) {
+        run(&vector_rigs[0], turn_deg, 1);
+    }
+    TEST_ASSERT_EQUAL_MEMORY(&before, &rig, sizeof rig);
+    TEST_ASSERT_EQUAL_INT32(known.basis_count, health.basis_count);
+    TEST_ASSERT_TRUE(health.is_weak_known);
+    TEST_ASSERT_EQUAL_INT32_ARRAY(known.sigma_rad_q30, health.sigma_rad_q30, 3);
+    TEST_ASSERT_GREATER_OR_EQUAL_INT32(known.all.frame_count, health.all.frame_count);
+    /* No turn of few frames comes instead. */
+    run(&vector_rigs[0], turn_deg, 2 * IH_HEALTH_LOOK);
+    TEST_ASSERT_GREATER_OR_EQUAL_INT32(known.basis_count, health.basis_count);
+}
+
 static void a_second_knock_and_one_back(void)
 {
     static const double turns_deg[][3] = {{0.2, 0.05, 0}, {-0.1, 0, 0.2}, {0.01, 0, 0}};
@@ -278,6 +355,9 @@ int main(void)
     RUN_TEST(what_dots_do_not_show_is_not_taken);
     RUN_TEST(a_small_turn_makes_nothing_else_known);
     RUN_TEST(more_frames_make_it_better);
+    RUN_TEST(a_knock_after_a_long_peace_is_found_as_soon);
+    RUN_TEST(a_knock_makes_what_is_not_seen_unknown);
+    RUN_TEST(a_search_in_vain_leaves_what_was_known);
     RUN_TEST(a_second_knock_and_one_back);
     RUN_TEST(a_turn_beyond_the_limit_is_told_and_not_taken);
     RUN_TEST(chance_turns_nothing);

@@ -255,6 +255,66 @@ static void a_straight_rig_is_not_surely_turned(void)
     TEST_ASSERT_GREATER_THAN_INT32(0, found.sure_rad_q30);
 }
 
+/* Rays that were calibrated wrong by 0.1 px each are in both; that every slot is on another place is chance. */
+static void a_change_is_found_and_chance_is_none(void)
+{
+    static struct ih_places late, difference;
+    const double turns_deg[][3] = {{0, 0, 0}, {0, 0.1, 0}, {0, 0, -0.03}, {0.005, 0, 0}};
+    double square[3] = {0, 0, 0};
+
+    for (int run = 0; run < 80; run++) {
+        const double *turn_deg = turns_deg[run % 4];
+        double own_px[IH_SLOTS];
+        setUp();
+        random_source.state = (uint64_t)run;
+        for (int slot = 0; slot < IH_SLOTS; slot++) {
+            own_px[slot] = 0.1 * ih_test_normal(&random_source);
+            standing_px[slot] = own_px[slot] + PLACE_PX * ih_test_normal(&random_source);
+        }
+        for (int frame = 0; frame < 200; frame++) {
+            add_frame(straight_deg);
+        }
+        ih_places_clear(&late);
+        for (int slot = 0; slot < IH_SLOTS; slot++) {
+            move(slot);
+            standing_px[slot] += own_px[slot];
+        }
+        for (int frame = 0; frame < 6; frame++) {
+            add_frame(turn_deg);
+            ih_places_add(&late, &labels, &slopes, REACH_PX_Q12);
+        }
+        memset(&difference, IH_TEST_FILL, sizeof difference);
+        TEST_ASSERT_TRUE(ih_places_change(&late, &places, &rig, &slopes, &difference, &found));
+        TEST_ASSERT_TRUE(found.is_weak_seen);
+        TEST_ASSERT_TRUE((found.sure_rad_q30 > 0) == (run % 4 > 0));
+        for (int axis = 0; axis < 3; axis++) {
+            double part_deg = deg_of(found.turn_rad_q30[axis]);
+            if (run % 4 == 0) {
+                square[axis] += pow(part_deg / deg_of(found.sigma_rad_q30[axis]), 2) / 20;
+            } else if (turn_deg[axis] != 0) {
+                /* Tukey's weights are not linear: half too much, which settling takes back. */
+                IH_TEST_WITHIN(0.45, 1.25, part_deg / turn_deg[axis], "share", run);
+            }
+        }
+    }
+    for (int axis = 0; axis < 3; axis++) {
+        IH_TEST_WITHIN(0.4, 0.9, sqrt(square[axis]), "sigmas", axis);
+    }
+}
+
+/* Only axes that are sure count: one that hardly shows may be anywhere. */
+static void what_is_sure_is_told_apart(void)
+{
+    const double turn_deg[3] = {0.01, 0.03, 0};
+
+    for (int frame = 0; frame < 60; frame++) {
+        add_frame(turn_deg);
+    }
+    find(straight, false);
+    TEST_ASSERT_GREATER_THAN_INT32(found.turn_rad_q30[0], found.turn_rad_q30[1]);
+    TEST_ASSERT_INT32_WITHIN(1, found.turn_rad_q30[0], found.sure_rad_q30);
+}
+
 static void few_dots_say_nothing(void)
 {
     TEST_ASSERT_FALSE(ih_places_find(&places, &rig, &slopes, straight, false, &found));
@@ -278,6 +338,8 @@ int main(void)
     RUN_TEST(a_great_turn_starts_anew);
     RUN_TEST(frames_of_long_ago_count_half);
     RUN_TEST(a_straight_rig_is_not_surely_turned);
+    RUN_TEST(a_change_is_found_and_chance_is_none);
+    RUN_TEST(what_is_sure_is_told_apart);
     RUN_TEST(few_dots_say_nothing);
     return UNITY_END();
 }
