@@ -179,13 +179,14 @@ static void conclude(struct ih_health *health, const struct ih_health_look *look
     }
 }
 
-/* Chance gives every turn its votes, with a wide baseline half of what the right one has. Beyond the mean the
- * winner needs half of it, and an eighth more than no turn has; where a search is repeated, any more. */
+/* Chance gives every turn its votes, with a wide baseline half of what the right one has. The winner needs three
+ * quarters more than the mean; and of what is beyond the mean a quarter more than no turn has, or, where a search is
+ * repeated, any more. */
 static bool is_elected(const struct ih_turn_winner *winner, int32_t search_count)
 {
-    int32_t least = search_count > 1 ? 8 : 9;
-    return winner->vote * 2 > winner->vote_mean * 3 &&
-           (winner->vote - winner->vote_mean) * 8 >
+    int32_t least = search_count > 1 ? 4 : 5;
+    return winner->vote * 4 > winner->vote_mean * 7 &&
+           (winner->vote - winner->vote_mean) * 4 >
                (winner->vote_of_none - winner->vote_mean) * least;
 }
 
@@ -331,13 +332,19 @@ static bool watch(struct ih_health *health, struct ih_rig *rig, struct ih_health
     return has_changed;
 }
 
-/* A search's turn has to give labels that are better than chance, and by a quarter more than before or
- * nearer to their lines, unless those were not. */
+/* So many quarters of the labels before. */
+static bool has_labels(const struct ih_health_look *look, const struct ih_health_look *before,
+                       int32_t quarters)
+{
+    return look->labelled_count * before->frame_count * 4 >=
+           before->labelled_count * look->frame_count * quarters;
+}
+
+/* A search's turn has to give labels that are better than chance, unless those before were not: nearer to their
+ * lines by a quarter, or more by a quarter; poor ones, as chance finds them in sunlight, twice as many. */
 static bool is_proven(const struct ih_health_look *before, const struct ih_health_look *look)
 {
-    return !is_lost(look) && (is_lost(before) ||
-                              look->labelled_count * before->frame_count * 4 >=
-                                  before->labelled_count * look->frame_count * 5 ||
+    return !is_lost(look) && (is_lost(before) || has_labels(look, before, is_poor(look) ? 8 : 5) ||
                               look->across_px_q12 * before->labelled_count * 4 <=
                                   before->across_px_q12 * look->labelled_count * 3);
 }

@@ -1,4 +1,5 @@
-/* knock DIR - the frames of a directory through ih_health, as isohead_board does it.
+/* knock DIR... - the frames of directories, one after the other, through ih_health, as isohead_board does it; the
+ * rig is the first one's.
  *
  * Out:   per lit frame a line of JSON: the state, whether the rig was turned after it, turn and
  *        uncertainty, dots, labels and their mean distance of the last look, frames that the turn was
@@ -57,9 +58,8 @@ static enum ih_err use_frame(const struct hal_frame *frame, const struct ih_fram
     return err;
 }
 
-static int play(const char *dir, struct hal_replay *replay)
+static int play_frames(const char *dir, const struct hal_camera *camera)
 {
-    const struct hal_camera *camera = &replay->camera;
     struct hal_frame frame;
     struct hal_frame dark = {.samples = NULL};
     struct ih_frame ambient;
@@ -84,16 +84,28 @@ static int play(const char *dir, struct hal_replay *replay)
     return next == HAL_NEXT_BAD ? fail(dir, error.text) : 0;
 }
 
-int main(int argument_count, char **arguments)
+static int play(const char *dir)
 {
     const struct hal_log log = {.error = log_error};
-    struct ih_calibration calibration;
     struct hal_error error;
     struct hal_replay replay;
+    if (!hal_replay_open(&replay, dir, false, &log, &error)) {
+        return fail(dir, error.text);
+    }
+    int status = play_frames(dir, &replay.camera);
+    hal_replay_close(&replay);
+    return status;
+}
+
+int main(int argument_count, char **arguments)
+{
+    struct ih_calibration calibration;
+    struct hal_error error;
     char path[4096];
     int32_t bad_slot;
-    if (argument_count != 2) {
-        fputs("Usage: knock DIR\n", stderr);
+    int status = 0;
+    if (argument_count < 2) {
+        fputs("Usage: knock DIR...\n", stderr);
         return 2;
     }
     const char *dir = arguments[1];
@@ -108,11 +120,9 @@ int main(int argument_count, char **arguments)
     if (err != IH_OK) {
         return fail(path, ih_err_text(err));
     }
-    if (!hal_replay_open(&replay, dir, false, &log, &error)) {
-        return fail(dir, error.text);
-    }
     ih_health_init(&health, &head.rig);
-    int status = play(dir, &replay);
-    hal_replay_close(&replay);
+    for (int i = 1; i < argument_count && status == 0; i++) {
+        status = play(arguments[i]);
+    }
     return status;
 }
