@@ -132,6 +132,10 @@ static void check(struct app_loop *loop)
                     "%s: cannot be told: of %" PRId32 " dots in the last frames %" PRId32
                     " have a label, expected 200 and more",
                     loop->config->rig, health->dot_count, health->labelled_count);
+    } else if (health->state == IH_HEALTH_LOST) {
+        app_log_say(loop->log, APP_LOG_INFO,
+                    "%s: checked %" PRId32 " frames, it does not fit; no turn is known that mends it",
+                    loop->config->rig, loop->checked_count);
     } else {
         app_log_say(loop->log, APP_LOG_INFO,
                     "%s: checked %" PRId32 " frames, %s; dots lie %s px beside their lines; "

@@ -18,8 +18,9 @@
 #define TURN_MIN_RAD_Q30 374802 /* 0.02 degrees */
 /* Frames of each step of settling. Dots farther from their line than reach say nothing about a turn. */
 #define SETTLE_STEPS 3
-static const int32_t settle_frames[SETTLE_STEPS] = {4, 4, 28};
-/* What another search takes, which the last step then has less: a rig is told of after 45 frames. */
+static const int32_t settle_frames[SETTLE_STEPS] = {4, 4, 24};
+/* What another search takes, which the last step then has less, down to a look: a rig is told of after 41 frames, with
+ * two more searches 45. */
 #define SEARCH_AGAIN_FRAMES (IH_HEALTH_SEARCH + 4 + 4)
 static const int32_t settle_reach_px_q12[SETTLE_STEPS] = {4915, 2458, 1229};
 #define REACH_PX_Q12 1229 /* 0.3 px */
@@ -397,8 +398,11 @@ static int32_t look_frames(const struct ih_health *health)
     if (health->stage != IH_HEALTH_SETTLING) {
         return IH_HEALTH_LOOK;
     }
-    int32_t again_count = health->step == SETTLE_STEPS - 1 ? health->search_count - 1 : 0;
-    return settle_frames[health->step] - SEARCH_AGAIN_FRAMES * ih_max_s32(again_count, 0);
+    bool is_last = health->step == SETTLE_STEPS - 1;
+    int32_t again_count = health->search_count - 1;
+    int32_t again_frames = SEARCH_AGAIN_FRAMES * ih_max_s32(again_count, 0);
+    return is_last ? ih_max_s32(settle_frames[health->step] - again_frames, IH_HEALTH_LOOK)
+                   : settle_frames[health->step];
 }
 
 bool ih_health_frame(struct ih_health *health, const struct ih_dots *dots,

@@ -5,19 +5,23 @@
  * Out:   the mean distance of labelled dots from their lines, the turn with its uncertainty, a
  *        state; and the rig, turned when there is reason to.
  * Way:   Every IH_HEALTH_LOOK frames:
- *        1. More than half of the dots without a label, or labels as far from their lines as chance puts
- *           them: maybe the lines are wrong. Over IH_HEALTH_SEARCH frames the dots vote for a turn
- *           (ih_turn), which is tried. If it gives neither a quarter more labels nor better ones it is
- *           taken back; if its labels are poor the search is repeated at once.
- *        2. Else the turn that explains the labelled dots' distances from their lines, with all frames
- *           since the rig last changed (ih_places). It is taken when it is more than 0.02 degrees
- *           and 5 times its uncertainty.
- *        A turn that was taken is refined from the next 4, 4 and 32 frames; from then on frames add up, and
- *        it is refined whenever a quarter more are there. A knock is so found and corrected within 49
- *        of the frames that are looked at, if it was soon after the start, or if it moves dots by more than
- *        0.25 px in the mean, as 0.1 degrees along the baseline do. Of a smaller one after a long peace the
- *        frames before it hide what is new: 100 to 200 are needed. Until then the uncertainty that is said
- *        is that of the turn before.
+ *        1. The look against all frames since the rig last changed, slot by slot (ih_places): when two looks
+ *           one after the other differ by more than 0.02 degrees and 5 times its uncertainty, the second
+ *           alone counts from then on, and its turn is taken. What a slot errs by in all frames, from
+ *           calibration or because it stands still, is in both and drops out.
+ *        2. More than half of the dots without a label, or labels 0.16 px from their lines and more: maybe
+ *           the lines are wrong. Over IH_HEALTH_SEARCH frames the dots vote for a turn (ih_turn), which is
+ *           tried. If it gives neither a quarter more labels nor better ones than those frames had, it is
+ *           taken back, with all that was known; if its labels are poor the search is repeated at once. One
+ *           in vain is repeated after 1, 2, 4 .. IH_HEALTH_PAUSE looks, or when it gets worse.
+ *        3. Else the turn that explains the labelled dots' distances from their lines, with all frames
+ *           since the rig last changed. It is taken when it is more than 0.02 degrees and 5 times its
+ *           uncertainty, about axes for which both hold.
+ *        A turn that was taken is refined from the next 4 (after a search), 4 and 24 frames; from then on
+ *        frames add up, and it is refined whenever a quarter more are there. A knock is so told within 46 of
+ *        the frames that are looked at, however long the peace was and wherever in a look it came: at the end
+ *        of 1 (then refined), of 2 after settling; within 50 if two searches had to be repeated.
+ *        Not noticed: what dots do not show, docs/health.md has how much.
  *        A turn across the baseline, which is depth and which dots hardly show, is corrected for only
  *        when it is known to IH_PLACES_SIGMA_MAX: what votes say of it alone is taken back.
  * Limits: within IH_TURN_MAX_RAD_Q30 about each axis. Not seen, and not corrected: a shift of the
@@ -59,7 +63,8 @@ struct ih_health {
     enum ih_health_state state;
     int32_t across_px_q12;    /* mean distance of the last look's labelled dots; -1: none */
     int32_t turn_rad_q30[3];  /* of the rig against the calibration; camera axes */
-    int32_t sigma_rad_q30[3]; /* its uncertainty, one standard deviation; 0 before the first one */
+    int32_t sigma_rad_q30[3]; /* its uncertainty, one standard deviation; 0 before the first one. While the
+                               * rig is lost that of the turn before: of no use */
     bool is_weak_known;       /* the turn across the baseline; if not, it is 0 */
     int32_t dot_count, labelled_count; /* of the last look, in all its frames */
     /* Its own. */
