@@ -9,6 +9,7 @@
 
 #define WALL_MM 1200.0
 #define FRAMES_TO_FIND 50
+#define FRAMES_TO_SETTLE 20
 #define PEACE_FRAMES 470
 
 static struct ih_rig rig, before;
@@ -192,6 +193,8 @@ static void a_knock_after_a_long_peace_is_found_as_soon(void)
         for (int i = 0; i < IH_TEST_COUNT(turns_deg); i++) {
             peaceful = health;
             run(&vector_rigs[which], turns_deg[i], FRAMES_TO_FIND);
+            TEST_ASSERT_EQUAL_INT_MESSAGE(IH_HEALTH_TURNED, health.state, "told");
+            run(&vector_rigs[which], turns_deg[i], FRAMES_TO_SETTLE);
             assert_turn(turns_deg[i], 20 * which + i);
             TEST_ASSERT_TRUE(health.is_weak_known);
             health = peaceful;
