@@ -134,7 +134,8 @@ static void check(struct app_loop *loop)
                     loop->config->rig, health->dot_count, health->labelled_count);
     } else if (health->state == IH_HEALTH_LOST) {
         app_log_say(loop->log, APP_LOG_INFO,
-                    "%s: checked %" PRId32 " frames, it does not fit; no turn is known that mends it",
+                    "%s: checked %" PRId32
+                    " frames, it does not fit; no turn is known that mends it",
                     loop->config->rig, loop->checked_count);
     } else {
         app_log_say(loop->log, APP_LOG_INFO,

@@ -197,8 +197,8 @@ static bool elect(struct ih_health *health, struct ih_rig *rig, struct ih_health
 {
     struct ih_turn_winner winner;
     ih_turn_elect(&health->now.votes, rig, &winner);
-    bool is_turned_now =
-        is_elected(&winner, health->search_count) && turn_by(health, winner.turn_rad_q30, rig, scratch);
+    bool is_turned_now = is_elected(&winner, health->search_count) &&
+                         turn_by(health, winner.turn_rad_q30, rig, scratch);
     health->before = health->look;
     health->is_weak_known = health->is_weak_known && !is_turned_now;
     health->basis_count = is_turned_now ? 0 : health->basis_count;

@@ -61,18 +61,19 @@ enum ih_health_stage { IH_HEALTH_WATCHING, IH_HEALTH_SEARCHING, IH_HEALTH_SETTLI
 
 struct ih_health {
     enum ih_health_state state;
-    int32_t across_px_q12;    /* mean distance of the last look's labelled dots; -1: none */
-    int32_t turn_rad_q30[3];  /* of the rig against the calibration; camera axes */
-    int32_t sigma_rad_q30[3]; /* its uncertainty, one standard deviation; 0 before the first one. While the
+    int32_t across_px_q12;   /* mean distance of the last look's labelled dots; -1: none */
+    int32_t turn_rad_q30[3]; /* of the rig against the calibration; camera axes */
+    int32_t sigma_rad_q30
+        [3]; /* its uncertainty, one standard deviation; 0 before the first one. While the
                                * rig is lost that of the turn before: of no use */
-    bool is_weak_known;       /* the turn across the baseline; if not, it is 0 */
+    bool is_weak_known;                /* the turn across the baseline; if not, it is 0 */
     int32_t dot_count, labelled_count; /* of the last look, in all its frames */
     /* Its own. */
     struct ih_calibration nominal;
     struct ih_turn_slopes slopes;
     enum ih_health_stage stage;
-    int32_t step;         /* of searching or settling */
-    int32_t pause;        /* looks until the next search, and after it if it is in vain */
+    int32_t step;  /* of searching or settling */
+    int32_t pause; /* looks until the next search, and after it if it is in vain */
     int32_t next_pause;
     int32_t search_count; /* one after the other */
     struct ih_health_look look;

@@ -335,9 +335,9 @@ static void judge(const struct ih_places *places, const struct ih_turn_slopes *s
         sum_of(&places->slot[slot], &weight_q8, &pull_q20);
         for (int i = 0; weight_q8 > 0 && i < 3; i++) {
             int64_t lever = lever_q26(e, slope, i);
-            int64_t left_q20 =
-                limited(whole(pull_q20, sums->whole_q8) - weight_q8 * move_px_q12(slope, turn_rad_q30),
-                        (int64_t)1 << 30);
+            int64_t left_q20 = limited(whole(pull_q20, sums->whole_q8) -
+                                           weight_q8 * move_px_q12(slope, turn_rad_q30),
+                                       (int64_t)1 << 30);
             int64_t left_q16 = limited(ih_shift_round(left_q20 * lever, 30), 1 << 26);
             int64_t own_q16 = limited(ih_shift_round(weight_q8 * lever, 18), 1 << 26);
             square_q32[i] += (uint64_t)(left_q16 * left_q16);
@@ -465,8 +465,7 @@ static void subtract(const struct ih_place *late, const struct ih_place *all, st
         int64_t both_q8 = (int64_t)late_weight_q8 + all_weight_q8;
         int64_t pull_q28 =
             (int64_t)late_pull_q20 * all_weight_q8 - (int64_t)all_pull_q20 * late_weight_q8;
-        out->weight_q8 =
-            (int32_t)ih_div_round((int64_t)late_weight_q8 * all_weight_q8, both_q8);
+        out->weight_q8 = (int32_t)ih_div_round((int64_t)late_weight_q8 * all_weight_q8, both_q8);
         out->pull_q20 = (int32_t)limited(ih_div_round(pull_q28, both_q8), PULL_MOST_Q20);
     }
 }

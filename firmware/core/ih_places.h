@@ -56,7 +56,8 @@ struct ih_places_turn {
     bool
         is_weak_seen; /* the turn across the baseline; if not, it is held where it is known to be, or at
                         * the calibration's */
-    int32_t sure_rad_q30; /* the turn about those axes where it is 5 times its uncertainty, with 0.12 px
+    int32_t
+        sure_rad_q30; /* the turn about those axes where it is 5 times its uncertainty, with 0.12 px
                            * for each slot (of a change 0.06 px); 0: none */
 };
 
