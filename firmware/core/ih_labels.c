@@ -464,6 +464,16 @@ static int32_t growth_error(const struct ih_candidate *candidate,
     return (int32_t)ih_isqrt_u64((uint64_t)(along * along + perp * perp));
 }
 
+static bool has_free_candidate(const struct ih_labels_scratch *scratch, int32_t slot)
+{
+    for (int32_t i = 0; i < scratch->candidate_count[slot]; i++) {
+        if (scratch->slot_of_dot[candidate_of(scratch, slot, i)->dot] == IH_NONE) {
+            return true;
+        }
+    }
+    return false;
+}
+
 /* The best free candidate of an open slot; false when none is below epsilon. */
 static bool find_offer(const struct ih_labels_scratch *scratch, const struct ih_rig *rig,
                        int32_t slot, int32_t epsilon_px_q12, struct ih_labels_offer *out)
@@ -494,7 +504,7 @@ static int32_t grow_once(const struct ih_rig *rig, struct ih_labels_scratch *scr
 {
     int32_t count = 0;
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
-        if (scratch->choice[slot] == IH_NONE &&
+        if (scratch->choice[slot] == IH_NONE && has_free_candidate(scratch, slot) &&
             find_offer(scratch, rig, slot, epsilon_px_q12, &scratch->offer[count])) {
             count++;
         }

@@ -15,7 +15,8 @@
  *           5, epsilon grows by half, up to epsilon_max. What is left then is not labelled: of
  *           what 40 px instead of 8 would add half is wrong, and seeds have bridged the edges.
  * Cost:  361 x the dots in the rows of a line: a few each where lines lie along rows, all where they
- *        stand upright; growing visits the open slots a few dozen times. Seeding tries the
+ *        stand upright; growing visits the open slots that
+ *        have a free candidate a few dozen times. Seeding tries the
  *        candidates of three slots with each other, and of the fourth those that are near where
  *        it should be: 324 x 16^3 at the very worst, which a frame made for it can bring about, a
  *        thousand for a real one.
