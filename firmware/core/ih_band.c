@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "ih_fix.h"
+#include "ih_lanes.h"
 #include "ih_words.h"
 
 #define INNER_WEIGHT 81 /* the outer box has 81 pixels, the inner kernel weight 16: */
@@ -53,105 +54,339 @@ void ih_row_grey(const struct ih_row *row, int32_t width, uint16_t *grey_q4)
     }
 }
 
+/* How many sums of three pixels of a row the loops work out. */
+static int32_t sums_of(const struct ih_band *band)
+{
+    return (band->width + 2 * IH_BAND_SIDE + IH_BAND_STEP - 1) / IH_BAND_STEP * IH_BAND_STEP;
+}
+
 void ih_band_begin(struct ih_band *band, int32_t width, bool is_bytes)
 {
     band->width = width;
     band->rows_in = 0;
     band->is_bytes = is_bytes;
-    memset(band->newest, 0, sizeof band->newest); /* before the first row */
-    memset(band->pair, 0, sizeof band->pair);
+    const size_t count = (size_t)sums_of(band);
+    for (int32_t row = 0; row < IH_BAND_ROWS; row++) { /* before the first row */
+        memset(band->three[row], 0, count * sizeof band->three[0][0]);
+    }
+    memset(&band->nine, 0,
+           count * (is_bytes ? sizeof band->nine.of_bytes[0] : sizeof band->nine.of_grey_q4[0]));
 }
 
-/* Sums of rows of the ring: so many rows ago and the one before it. */
-struct pairs {
-    const uint16_t *ago_1, *ago_3, *ago_4, *ago_5, *ago_7;
+/* The rings' rows of the newest row, or of so many rows before it; where the sums begin. */
+static uint16_t *three_of(struct ih_band *band)
+{
+    return band->three[(uint32_t)band->rows_in % IH_BAND_ROWS];
+}
+
+static uint16_t *binomial_of(struct ih_band *band, int32_t ago)
+{
+    return &band->binomial[(uint32_t)(band->rows_in + IH_BAND_KEPT - ago) % IH_BAND_KEPT][1];
+}
+
+#ifdef __AVX2__
+static inline __m256i load(const uint16_t *sums)
+{
+    return _mm256_loadu_si256((const __m256i *)(const void *)sums);
+}
+
+static inline void store(__m256i value, void *at)
+{
+    _mm256_storeu_si256(at, value);
+}
+
+static inline __m256i load_bytes(const uint8_t *pixel)
+{
+    return _mm256_cvtepu8_epi16(_mm_loadu_si128((const __m128i *)(const void *)pixel));
+}
+
+/* take_bytes of IH_LANES pixels; gcc 12 takes bytes by twice as many and halves them. */
+static inline void take_lanes(const uint8_t *pixel, uint16_t *three, uint16_t *binomial,
+                              uint16_t *nine)
+{
+    const __m256i middle = load_bytes(&pixel[1]);
+    const __m256i sum =
+        _mm256_add_epi16(_mm256_add_epi16(load_bytes(pixel), middle), load_bytes(&pixel[2]));
+    store(_mm256_sub_epi16(_mm256_add_epi16(sum, load(nine)), load(three)), nine);
+    store(sum, three);
+    store(_mm256_add_epi16(sum, middle), binomial);
+}
+
+/* respond_bytes of IH_LANES pixels: (2048 i + 2^14) / 2^15 is (i + 8) / 16. */
+static inline void respond_lanes(const uint16_t *above, const uint16_t *middle,
+                                 const uint16_t *below, const uint16_t *nine, int16_t *response)
+{
+    const __m256i row = load(middle);
+    const __m256i sum =
+        _mm256_add_epi16(_mm256_add_epi16(_mm256_add_epi16(row, load(above)), load(below)), row);
+    const __m256i fives = _mm256_mullo_epi16(sum, _mm256_set1_epi16(INNER_WEIGHT / OUTER_WEIGHT));
+    const __m256i sixteenth = _mm256_mulhrs_epi16(sum, _mm256_set1_epi16(32768 / OUTER_WEIGHT));
+    const __m256i inside = _mm256_add_epi16(fives, sixteenth);
+    const __m256i less = _mm256_sub_epi16(inside, load(nine));
+    store(_mm256_sub_epi16(_mm256_sub_epi16(less, load(&nine[IH_BAND_SIDE])),
+                           load(&nine[2 * IH_BAND_SIDE])),
+          response);
+}
+#endif
+
+#if IH_WORDS
+/* take_bytes of four pixels, which are the second to the fifth of p0 .. p5. */
+static inline void take_four(const uint8_t *pixel, uint16_t *three, uint16_t *binomial,
+                             uint16_t *nine)
+{
+    const uint32_t p0123 = ih_word_of_bytes(pixel);
+    const uint32_t p2345 = ih_word_of_bytes(&pixel[2]);
+    const uint32_t p13 = ih_word_even(p0123 >> 8);
+    const uint32_t both = ih_word_add_even(p13, p2345); /* p1 + p2, p3 + p4 */
+    const uint32_t even = ih_word_add_even(both, p0123);
+    const uint32_t odd = ih_word_add_even(both, p2345 >> 8);
+    const uint32_t even_binomial = even + p13;
+    const uint32_t odd_binomial = ih_word_add_even(odd, p2345);
+    const uint32_t first = ih_word_first(even, odd);
+    const uint32_t second = ih_word_second(even, odd);
+    ih_word_put(ih_word(nine) + first - ih_word(three), nine);
+    ih_word_put(ih_word(&nine[2]) + second - ih_word(&three[2]), &nine[2]);
+    ih_word_put(first, three);
+    ih_word_put(second, &three[2]);
+    ih_word_put(ih_word_first(even_binomial, odd_binomial), binomial);
+    ih_word_put(ih_word_second(even_binomial, odd_binomial), &binomial[2]);
+}
+#endif
+
+/* A row joins the sums of nine, and the one that is in its place in the ring leaves them. Sums begin
+ * with the three pixels that are given; a whole number of IH_BAND_STEP. */
+static void take_bytes(const uint8_t *pixel, int32_t count, uint16_t *restrict three,
+                       uint16_t *restrict binomial, uint16_t *restrict nine)
+{
+    int32_t i = 0;
+#if IH_WORDS
+    for (; i < count; i += 8) {
+        take_four(&pixel[i], &three[i], &binomial[i], &nine[i]);
+        take_four(&pixel[i + 4], &three[i + 4], &binomial[i + 4], &nine[i + 4]);
+    }
+#elif defined __AVX2__
+    for (; i < count; i += 2 * IH_LANES) {
+        take_lanes(&pixel[i], &three[i], &binomial[i], &nine[i]);
+        take_lanes(&pixel[i + IH_LANES], &three[i + IH_LANES], &binomial[i + IH_LANES],
+                   &nine[i + IH_LANES]);
+    }
+#endif
+    for (; i < count; i++) {
+        const uint16_t middle = pixel[i + 1];
+        const uint16_t sum = (uint16_t)(pixel[i] + middle + pixel[i + 2]);
+        nine[i] = (uint16_t)(nine[i] + sum - three[i]);
+        three[i] = sum;
+        binomial[i] = (uint16_t)(sum + middle);
+    }
+}
+
+/* Pixels that are copied from a row's end. */
+#define END (IH_BAND_STEP + 2)
+
+/* All of a row of bytes; its edges with the edge pixels repeated outside. */
+static void take_row_bytes(struct ih_band *band, const uint8_t *row)
+{
+    uint8_t edge[END + 2 * IH_BAND_STEP + 2];
+    uint16_t *three = three_of(band);
+    uint16_t *binomial = binomial_of(band, 0);
+    uint16_t *nine = band->nine.of_bytes;
+    const int32_t width = band->width;
+    /* Where the first step begins that needs pixels behind the row; each needs 2 more than it has sums,
+     * and the first one begins IH_BAND_REACH before the row. */
+    const int32_t last = (width + IH_BAND_REACH - 2) / IH_BAND_STEP * IH_BAND_STEP;
+    const int32_t rest = width + IH_BAND_REACH - last; /* pixels from there on, less than END */
+    memset(edge, row[0], IH_BAND_REACH);
+    memcpy(&edge[IH_BAND_REACH], row, IH_BAND_STEP + 2 - IH_BAND_REACH);
+    take_bytes(edge, IH_BAND_STEP, three, binomial, nine);
+    take_bytes(&row[IH_BAND_STEP - IH_BAND_REACH], last - IH_BAND_STEP, &three[IH_BAND_STEP],
+               &binomial[IH_BAND_STEP], &nine[IH_BAND_STEP]);
+    memset(edge, row[width - 1], sizeof edge);
+    memcpy(&edge[rest], &row[width - END], END);
+    take_bytes(&edge[END], sums_of(band) - last, &three[last], &binomial[last], &nine[last]);
+}
+
+static void take_row_grey(struct ih_band *band, const uint16_t *row_q4)
+{
+    uint16_t *restrict three_q4 = three_of(band);
+    uint16_t *restrict binomial_q4 = binomial_of(band, 0);
+    uint32_t *restrict nine_q4 = band->nine.of_grey_q4;
+    const int32_t width = band->width;
+    for (int32_t i = 0; i < width + 2 * IH_BAND_SIDE; i++) {
+        const int32_t u = i - IH_BAND_SIDE;
+        const uint16_t middle_q4 = row_q4[ih_clamp_s32(u, 0, width - 1)];
+        const uint16_t sum_q4 = (uint16_t)(row_q4[ih_clamp_s32(u - 1, 0, width - 1)] + middle_q4 +
+                                           row_q4[ih_clamp_s32(u + 1, 0, width - 1)]);
+        nine_q4[i] = nine_q4[i] + sum_q4 - three_q4[i];
+        three_q4[i] = sum_q4;
+        binomial_q4[i] = (uint16_t)(sum_q4 + middle_q4);
+    }
+}
+
+/* The newest row once more. */
+static void take_again(struct ih_band *band)
+{
+    const uint16_t *newest = band->three[(band->rows_in + IH_BAND_ROWS - 1) % IH_BAND_ROWS];
+    uint16_t *three = three_of(band);
+    const int32_t count = sums_of(band);
+    for (int32_t i = 0; i < count; i++) {
+        if (band->is_bytes) {
+            band->nine.of_bytes[i] = (uint16_t)(band->nine.of_bytes[i] + newest[i] - three[i]);
+        } else {
+            band->nine.of_grey_q4[i] = band->nine.of_grey_q4[i] + newest[i] - three[i];
+        }
+        three[i] = newest[i];
+    }
+    memcpy(binomial_of(band, 0), binomial_of(band, 1), (size_t)count * sizeof three[0]);
+}
+
+#if IH_WORDS
+/* respond_bytes of two pixels. */
+static inline void respond_two(const uint16_t *above, const uint16_t *middle, const uint16_t *below,
+                               const uint16_t *nine, int16_t *response)
+{
+    const uint32_t sum = ih_word(above) + 2 * ih_word(middle) + ih_word(below);
+    const uint32_t sixteenth =
+        (sum + IH_WORD_BOTH(OUTER_WEIGHT / 2)) / OUTER_WEIGHT & IH_WORD_BOTH(0x0fff);
+    const uint32_t box =
+        ih_word(nine) + ih_word(&nine[IH_BAND_SIDE]) + ih_word(&nine[2 * IH_BAND_SIDE]);
+    ih_word_put(ih_word_less(INNER_WEIGHT / OUTER_WEIGHT * sum + sixteenth, box), response);
+}
+#endif
+
+/* Rows of 1-2-1, above, of and below a row. */
+struct rows {
+    const uint16_t *above, *middle, *below;
 };
 
-#if IH_WORDS
-/* Both of the next for so many pixels as there are whole words; how many. */
-static int32_t join_words(const uint8_t *row, int32_t width, uint16_t *newest, uint16_t *pair)
+/* Of grey levels of 8 bits everything is below 2^16, the sixteenth of 81 i as 5 i + i / 16. */
+static void respond_bytes(const struct rows *rows, const uint16_t *nine, int32_t width,
+                          int16_t *restrict response)
 {
-    int32_t u = 0;
-    for (; u + 2 <= width; u += 2) {
-        const uint32_t grey = ih_word_of_bytes(&row[u]);
-        ih_word_put(ih_word(&newest[u]) + grey, &pair[u]);
-        ih_word_put(grey, &newest[u]);
-    }
-    return u;
-}
-
-static int32_t sum_words(const uint16_t *newest, const struct pairs *pairs, int32_t width,
-                         uint16_t *inner, uint16_t *column)
-{
-    const uint16_t *ago_1 = pairs->ago_1;
-    const uint16_t *ago_3 = pairs->ago_3;
-    const uint16_t *ago_4 = pairs->ago_4;
-    const uint16_t *ago_5 = pairs->ago_5;
-    const uint16_t *ago_7 = pairs->ago_7;
-    int32_t u = 0;
-    for (; u + 2 <= width; u += 2) {
-        const uint32_t middle = ih_word(&ago_3[u]);
-        ih_word_put(middle + ih_word(&ago_4[u]), &inner[u]);
-        ih_word_put(ih_word(&newest[u]) + ih_word(&ago_1[u]) + middle + ih_word(&ago_5[u]) +
-                        ih_word(&ago_7[u]),
-                    &column[u]);
-    }
-    return u;
-}
-#endif
-
-/* A row joins the one before, which gives way to it. Sums of the ring's rows: 1-2-1 of the three in
- * the middle, and of all nine. */
-static void take_bytes(const uint8_t *row, const struct pairs *pairs, struct ih_band *restrict band,
-                       uint16_t *restrict pair)
-{
-    const int32_t width = band->width;
-    uint16_t *restrict newest = band->newest;
-    uint16_t *restrict inner = &band->inner[1];
-    uint16_t *restrict column = &band->column[IH_BAND_REACH];
-    const uint16_t *ago_1 = pairs->ago_1;
-    const uint16_t *ago_3 = pairs->ago_3;
-    const uint16_t *ago_4 = pairs->ago_4;
-    const uint16_t *ago_5 = pairs->ago_5;
-    const uint16_t *ago_7 = pairs->ago_7;
+    const uint16_t *above = rows->above;
+    const uint16_t *middle = rows->middle;
+    const uint16_t *below = rows->below;
     int32_t u = 0;
 #if IH_WORDS
-    (void)join_words(row, width, newest, pair);
-    u = sum_words(newest, pairs, width, inner, column);
+    for (; u + 8 <= width; u += 8) { /* unrolled: gcc 12 does not at -O2 */
+        respond_two(&above[u], &middle[u], &below[u], &nine[u], &response[u]);
+        respond_two(&above[u + 2], &middle[u + 2], &below[u + 2], &nine[u + 2], &response[u + 2]);
+        respond_two(&above[u + 4], &middle[u + 4], &below[u + 4], &nine[u + 4], &response[u + 4]);
+        respond_two(&above[u + 6], &middle[u + 6], &below[u + 6], &nine[u + 6], &response[u + 6]);
+    }
+#elif defined __AVX2__
+    for (; u + 2 * IH_LANES <= width; u += 2 * IH_LANES) {
+        respond_lanes(&above[u], &middle[u], &below[u], &nine[u], &response[u]);
+        const int32_t next = u + IH_LANES;
+        respond_lanes(&above[next], &middle[next], &below[next], &nine[next], &response[next]);
+    }
+    while (u < width) { /* the last ones end with the row, and some of them are there already */
+        const int32_t at = ih_min_s32(u, width - IH_LANES);
+        respond_lanes(&above[at], &middle[at], &below[at], &nine[at], &response[at]);
+        u = at + IH_LANES;
+    }
 #endif
     for (; u < width; u++) {
-        const uint16_t grey = row[u];
-        pair[u] = (uint16_t)(newest[u] + grey);
-        newest[u] = grey;
-        inner[u] = (uint16_t)(ago_3[u] + ago_4[u]);
-        column[u] = (uint16_t)(grey + ago_1[u] + ago_3[u] + ago_5[u] + ago_7[u]);
+        const uint16_t sum = (uint16_t)(above[u] + 2 * middle[u] + below[u]);
+        const uint16_t half_up = (uint16_t)(sum + OUTER_WEIGHT / 2);
+        const uint16_t box =
+            (uint16_t)(nine[u] + nine[u + IH_BAND_SIDE] + nine[u + 2 * IH_BAND_SIDE]);
+        response[u] = (int16_t)(INNER_WEIGHT / OUTER_WEIGHT * sum + half_up / OUTER_WEIGHT - box);
     }
 }
 
-static void take_grey(const uint16_t *row_q4, const struct pairs *pairs,
-                      struct ih_band *restrict band, uint16_t *restrict pair_q4)
+static void respond_grey(const struct rows *rows_q4, const uint32_t *nine_q4, int32_t width,
+                         int16_t *restrict response)
 {
-    const int32_t width = band->width;
-    uint16_t *restrict newest_q4 = band->newest;
-    uint16_t *restrict inner_q4 = &band->inner[1];
-    uint16_t *restrict column_q4 = &band->column[IH_BAND_REACH];
-    const uint16_t *ago_1 = pairs->ago_1;
-    const uint16_t *ago_3 = pairs->ago_3;
-    const uint16_t *ago_4 = pairs->ago_4;
-    const uint16_t *ago_5 = pairs->ago_5;
-    const uint16_t *ago_7 = pairs->ago_7;
     for (int32_t u = 0; u < width; u++) {
-        const uint16_t grey = row_q4[u];
-        pair_q4[u] = (uint16_t)(newest_q4[u] + grey);
-        newest_q4[u] = grey;
-        inner_q4[u] = (uint16_t)(ago_3[u] + ago_4[u]);
-        column_q4[u] = (uint16_t)(grey + ago_1[u] + ago_3[u] + ago_5[u] + ago_7[u]);
+        const int32_t sum = rows_q4->above[u] + 2 * rows_q4->middle[u] + rows_q4->below[u];
+        const int32_t box =
+            (int32_t)(nine_q4[u] + nine_q4[u + IH_BAND_SIDE] + nine_q4[u + 2 * IH_BAND_SIDE]);
+        response[u] =
+            (int16_t)((INNER_WEIGHT * sum - OUTER_WEIGHT * box + (1 << (RESPONSE_SHIFT - 1))) >>
+                      RESPONSE_SHIFT);
     }
 }
 
-/* The same of rows that are given: the middle three, and then two more. */
-static void sum_middle(const struct ih_row row[IH_BAND_ROWS], int32_t width,
-                       uint16_t *restrict inner, uint16_t *restrict column)
+/* The newest row has joined the sums. */
+static bool finish_row(struct ih_band *band, int16_t *response)
+{
+    const struct rows rows = {
+        .above = &binomial_of(band, IH_BAND_REACH + 1)[IH_BAND_SIDE],
+        .middle = &binomial_of(band, IH_BAND_REACH)[IH_BAND_SIDE],
+        .below = &binomial_of(band, IH_BAND_REACH - 1)[IH_BAND_SIDE],
+    };
+    band->rows_in++;
+    if (band->rows_in < IH_BAND_ROWS) {
+        return false;
+    }
+    if (band->is_bytes) {
+        respond_bytes(&rows, band->nine.of_bytes, band->width, response);
+    } else {
+        respond_grey(&rows, band->nine.of_grey_q4, band->width, response);
+    }
+    return true;
+}
+
+bool ih_band_push_bytes(struct ih_band *band, const uint8_t *row, int16_t *response)
+{
+    take_row_bytes(band, row);
+    return finish_row(band, response);
+}
+
+bool ih_band_push_grey(struct ih_band *band, const uint16_t *row_q4, int16_t *response)
+{
+    take_row_grey(band, row_q4);
+    return finish_row(band, response);
+}
+
+bool ih_band_repeat(struct ih_band *band, int16_t *response)
+{
+    take_again(band);
+    return finish_row(band, response);
+}
+
+void ih_band_columns(const struct ih_band *band, int32_t rows, uint16_t *sum)
+{
+    memset(sum, 0, (size_t)band->width * sizeof sum[0]);
+    for (int32_t row = band->rows_in - rows; row < band->rows_in; row++) {
+        const uint16_t *binomial = &band->binomial[row % IH_BAND_KEPT][1 + IH_BAND_SIDE];
+        const uint16_t *three = &band->three[row % IH_BAND_ROWS][IH_BAND_SIDE];
+        for (int32_t u = 0; u < band->width; u++) {
+            sum[u] = (uint16_t)(sum[u] + binomial[u] - three[u]);
+        }
+    }
+}
+
+bool ih_band_is_any_above(const struct ih_band *band, int32_t limit)
+{
+    const uint16_t *oldest = band->three[band->rows_in % IH_BAND_ROWS];
+    const uint16_t *nine = band->nine.of_bytes;
+    const int32_t count = sums_of(band);
+    if (!band->is_bytes) {
+        return true;
+    }
+#if IH_WORDS
+    /* All are below 2^13: with a limit below it the sign says which is above. */
+    const uint32_t least = IH_WORD_BOTH(0x7fff - ih_clamp_s32(limit, 0, 0x1fff));
+    uint32_t any = 0;
+    for (int32_t i = 0; i < count; i += 4) {
+        any |= ih_word(&nine[i]) - ih_word(&oldest[i]) + least;
+        any |= ih_word(&nine[i + 2]) - ih_word(&oldest[i + 2]) + least;
+    }
+    return (any & IH_WORD_SIGNS) != 0;
+#else
+    uint16_t most = 0;
+    for (int32_t i = 0; i < count; i++) {
+        const uint16_t eight = (uint16_t)(nine[i] - oldest[i]);
+        most = eight > most ? eight : most;
+    }
+    return most > limit;
+#endif
+}
+
+/* Sums of nine rows that are given, and 1-2-1 of those in the middle. */
+static void sum_rows(const struct ih_row row[IH_BAND_ROWS], int32_t width, uint16_t *restrict inner,
+                     uint16_t *restrict column)
 {
     const uint8_t *above = row[IH_BAND_REACH - 1].samples;
     const uint8_t *middle = row[IH_BAND_REACH].samples;
@@ -163,195 +398,59 @@ static void sum_middle(const struct ih_row row[IH_BAND_ROWS], int32_t width,
     }
 }
 
-static void add_bytes(const uint8_t *above, const uint8_t *below, int32_t width,
-                      uint16_t *restrict column)
+static void add_rows(const uint8_t *above, const uint8_t *below, int32_t width,
+                     uint16_t *restrict column)
 {
-    for (int32_t u = 0; u < width; u++) {
+    int32_t u = 0;
+#if IH_WORDS
+    for (; u + 4 <= width; u += 4) {
+        const uint32_t over = ih_word_of_bytes(&above[u]);
+        const uint32_t under = ih_word_of_bytes(&below[u]);
+        const uint32_t even = ih_word_add_even(ih_word_even(over), under);
+        const uint32_t odd = ih_word_add_even(ih_word_even(over >> 8), under >> 8);
+        ih_word_put(ih_word(&column[u]) + ih_word_first(even, odd), &column[u]);
+        ih_word_put(ih_word(&column[u + 2]) + ih_word_second(even, odd), &column[u + 2]);
+    }
+#endif
+    for (; u < width; u++) {
         column[u] = (uint16_t)(column[u] + above[u] + below[u]);
     }
 }
 
-static void add_row(const uint16_t *row, int32_t width, uint16_t *restrict sum)
-{
-    int32_t u = 0;
-#if IH_WORDS
-    for (; u + 2 <= width; u += 2) {
-        ih_word_put(ih_word(&sum[u]) + ih_word(&row[u]), &sum[u]);
-    }
-#endif
-    for (; u < width; u++) {
-        sum[u] = (uint16_t)(sum[u] + row[u]);
-    }
-}
-
-/* Sums of a row, edge pixels repeated outside. */
-static void repeat_edges(uint16_t *sums, int32_t width, int32_t reach)
+/* Sums of a row, edge pixels repeated outside as far as the loops read. */
+static void repeat_edges(uint16_t *sums, int32_t width, int32_t reach, int32_t end)
 {
     for (int32_t i = 0; i < reach; i++) {
         sums[i] = sums[reach];
-        sums[reach + width + i] = sums[reach + width - 1];
+    }
+    for (int32_t i = reach + width; i < end; i++) {
+        sums[i] = sums[reach + width - 1];
     }
 }
 
-#if IH_WORDS
-/* R of so many pixels as there are whole words; how many. The box's sum runs along the row. */
-static int32_t respond_words(const uint16_t *inner, const uint16_t *column, int32_t width,
-                             int16_t *response)
-{
-    /* Less the columns of both boxes, but for the last two of each. */
-    uint32_t raised = IH_WORD_BOTH(0x8000);
-    int32_t u = 0;
-    for (int32_t i = 0; i < IH_BAND_ROWS - 2; i++) {
-        raised -= ih_word(&column[i]);
-    }
-    for (; u + 2 <= width; u += 2) {
-        const uint32_t sum =
-            ih_word(&inner[u]) + 2 * ih_word(&inner[u + 1]) + ih_word(&inner[u + 2]);
-        const uint32_t sixteenth =
-            (sum + IH_WORD_BOTH(OUTER_WEIGHT / 2)) / OUTER_WEIGHT & IH_WORD_BOTH(0x0fff);
-        raised -= ih_word(&column[u + 7]) + ih_word(&column[u + 8]);
-        ih_word_put_signed(INNER_WEIGHT / OUTER_WEIGHT * sum + sixteenth + raised, &response[u]);
-        raised += ih_word(&column[u]) + ih_word(&column[u + 1]);
-    }
-    return u;
-}
-#endif
-
-/* Of grey levels of 8 bits everything is below 2^16, the sixteenth of 81 i as 5 i + i / 16. */
-static void respond_bytes(const uint16_t *inner, const uint16_t *three, int32_t width,
-                          int16_t *restrict response)
-{
-    for (int32_t u = 0; u < width; u++) {
-        uint16_t sum = (uint16_t)(inner[u] + 2 * inner[u + 1] + inner[u + 2]);
-        uint16_t half_up = (uint16_t)(sum + OUTER_WEIGHT / 2);
-        uint16_t box = (uint16_t)(three[u] + three[u + 3] + three[u + 6]);
-        response[u] = (int16_t)(INNER_WEIGHT / OUTER_WEIGHT * sum + half_up / OUTER_WEIGHT - box);
-    }
-}
-
-static void respond_grey(const uint16_t *inner_q4, const uint32_t *three_q4, int32_t width,
-                         int16_t *restrict response)
-{
-    for (int32_t u = 0; u < width; u++) {
-        int32_t sum = inner_q4[u] + 2 * inner_q4[u + 1] + inner_q4[u + 2];
-        int32_t box = (int32_t)(three_q4[u] + three_q4[u + 3] + three_q4[u + 6]);
-        response[u] =
-            (int16_t)((INNER_WEIGHT * sum - OUTER_WEIGHT * box + (1 << (RESPONSE_SHIFT - 1))) >>
-                      RESPONSE_SHIFT);
-    }
-}
-
-static void sum_threes_bytes(const uint16_t *column, int32_t count, uint16_t *restrict three)
+static void sum_threes(const uint16_t *column, int32_t count, uint16_t *restrict nine)
 {
     for (int32_t i = 0; i < count; i++) {
-        three[i] = (uint16_t)(column[i] + column[i + 1] + column[i + 2]);
-    }
-}
-
-static void sum_threes_grey(const uint16_t *column_q4, int32_t count, uint32_t *restrict three_q4)
-{
-    for (int32_t i = 0; i < count; i++) {
-        three_q4[i] = (uint32_t)column_q4[i] + column_q4[i + 1] + column_q4[i + 2];
-    }
-}
-
-/* All of a row of bytes. */
-static void filter_bytes(struct ih_band *band, int16_t *response)
-{
-    int32_t first = 0;
-#if IH_WORDS
-    first = respond_words(band->inner, band->column, band->width, response);
-#endif
-    sum_threes_bytes(&band->column[first], band->width - first + 2 * IH_BAND_REACH - 2,
-                     band->three.of_bytes);
-    respond_bytes(&band->inner[first], band->three.of_bytes, band->width - first, &response[first]);
-}
-
-/* R of the row whose sums are there. */
-static void filter(struct ih_band *band, int16_t *response)
-{
-    const int32_t width = band->width;
-    const int32_t threes = width + 2 * IH_BAND_REACH - 2;
-    repeat_edges(band->inner, width, 1);
-    repeat_edges(band->column, width, IH_BAND_REACH);
-    if (band->is_bytes) {
-        filter_bytes(band, response);
-    } else {
-        sum_threes_grey(band->column, threes, band->three.of_grey_q4);
-        respond_grey(band->inner, band->three.of_grey_q4, width, response);
-    }
-}
-
-/* Sums of a row and the one before it, the newest or so many rows ago. */
-static uint16_t *pair_of(struct ih_band *band, int32_t ago)
-{
-    return band->pair[(band->rows_in + IH_BAND_PAIRS - ago) % IH_BAND_PAIRS];
-}
-
-static struct pairs pairs_of(struct ih_band *band)
-{
-    return (struct pairs){
-        .ago_1 = pair_of(band, 1),
-        .ago_3 = pair_of(band, 3),
-        .ago_4 = pair_of(band, 4),
-        .ago_5 = pair_of(band, 5),
-        .ago_7 = pair_of(band, 7),
-    };
-}
-
-/* The sums are those of the row before the newest one IH_BAND_REACH rows ago. */
-static bool finish_row(struct ih_band *band, int16_t *response)
-{
-    band->rows_in++;
-    if (band->rows_in < IH_BAND_ROWS) {
-        return false;
-    }
-    filter(band, response);
-    return true;
-}
-
-bool ih_band_push_bytes(struct ih_band *band, const uint8_t *row, int16_t *response)
-{
-    const struct pairs pairs = pairs_of(band);
-    take_bytes(row, &pairs, band, pair_of(band, 0));
-    return finish_row(band, response);
-}
-
-bool ih_band_push_grey(struct ih_band *band, const uint16_t *row_q4, int16_t *response)
-{
-    const struct pairs pairs = pairs_of(band);
-    take_grey(row_q4, &pairs, band, pair_of(band, 0));
-    return finish_row(band, response);
-}
-
-bool ih_band_repeat(struct ih_band *band, int16_t *response)
-{
-    const struct pairs pairs = pairs_of(band);
-    memcpy(band->three.of_bytes, band->newest, (size_t)band->width * sizeof band->newest[0]);
-    take_grey(band->three.of_bytes, &pairs, band, pair_of(band, 0));
-    return finish_row(band, response);
-}
-
-void ih_band_columns(const struct ih_band *band, int32_t rows, uint16_t *sum)
-{
-    memset(sum, 0, (size_t)band->width * sizeof sum[0]);
-    if (rows % 2 != 0) {
-        add_row(band->newest, band->width, sum);
-    }
-    for (int32_t row = band->rows_in - 1 - rows % 2; row >= band->rows_in - rows; row -= 2) {
-        add_row(band->pair[row % IH_BAND_PAIRS], band->width, sum);
+        nine[i] = (uint16_t)(column[i] + column[i + 1] + column[i + 2]);
     }
 }
 
 void ih_band_bytes(struct ih_band *band, const struct ih_row row[IH_BAND_ROWS], int32_t width,
                    int16_t *response)
 {
-    uint16_t *column = &band->column[IH_BAND_REACH];
+    uint16_t *inner = band->three[0];
+    uint16_t *column = band->binomial[0];
     band->width = width;
     band->is_bytes = true;
-    sum_middle(row, width, &band->inner[1], column);
+    const int32_t count = sums_of(band);
+    sum_rows(row, width, &inner[1], &column[IH_BAND_REACH]);
     for (int32_t i = 2; i <= IH_BAND_REACH; i++) {
-        add_bytes(row[IH_BAND_REACH - i].samples, row[IH_BAND_REACH + i].samples, width, column);
+        add_rows(row[IH_BAND_REACH - i].samples, row[IH_BAND_REACH + i].samples, width,
+                 &column[IH_BAND_REACH]);
     }
-    filter(band, response);
+    repeat_edges(inner, width, 1, width + 2);
+    repeat_edges(column, width, IH_BAND_REACH, count + 2);
+    sum_threes(column, count, band->nine.of_bytes);
+    const struct rows rows = {.above = &inner[0], .middle = &inner[1], .below = &inner[2]};
+    respond_bytes(&rows, band->nine.of_bytes, width, response);
 }

@@ -8,14 +8,14 @@
  *        level of 8 bits. Rows of bytes with 255 as full scale are summed as they are: with the sums
  *        i = I / 16 and b = B / 16 of theirs R = (81 i + 8) / 16 - b, rounded down, and that is
  *        5 i + (i + 8) / 16 - b.
- *        Each row is added to the one before. Two neighbouring such pairs are 1-2-1, four pairs and a
- *        row are nine rows.
+ *        A row's sums of three pixels join those of the eight rows before in a running sum per pixel:
+ *        three of them, three pixels apart, are B. Its sums 1-2-1 of three rows, 1-2-1 again, are I.
  * Range: grey <= 4080, 4144 after an ambient frame was subtracted (ih_noise). I <= 66,304, so
  *        81 I <= 2^22.4, less what the nine bright pixels add to the box: |R| <= 18,648, 16 bits.
- *        Sums of nine rows <= 37,296, 16 bits without sign; over 81 <= 335,664. Of bytes
- *        81 i / 16 and b <= 20,655: everything is in 16 bits.
- * Cost:  13 rows of 16 bits; about 25 operations per pixel of 16 bits, none of which waits for its
- *        neighbour's, so that vectors take 8 or 16 at once.
+ *        Sums of three pixels of nine rows <= 111,888; over 81 <= 335,664. Of bytes 81 i / 16 and
+ *        b <= 20,655: everything is in 16 bits.
+ * Cost:  19 rows of 16 bits; about 22 operations per pixel of 16 bits, none of which waits for its
+ *        neighbour's, so that vectors take 8 or 16 at once; two pixels a word 20 a pixel.
  * Error: R within half a unit (0.006 grey levels) of the exact filter; samples deeper than 8 bits are
  *        rounded to 12 bits before.
  */
@@ -43,23 +43,26 @@ struct ih_row {
     int32_t maximum;
 };
 
-/* Sums of a row and the one before it that are kept. */
-#define IH_BAND_PAIRS (IH_BAND_ROWS - 1)
+/* Rows of 1-2-1 that are kept. */
+#define IH_BAND_KEPT 8
+/* Pixels that the loops take at once; what they find behind a row's end is not used. */
+#define IH_BAND_STEP 32
+/* Sums of three pixels to the left and right of a row of R. */
+#define IH_BAND_SIDE (IH_BAND_REACH - 1)
+#define IH_BAND_SUMS (IH_FRAME_WIDTH_MAX + IH_BAND_STEP)
 
 struct ih_band {
     int32_t width;
     int32_t rows_in; /* pushed so far, repeated ones included */
     bool is_bytes;   /* sums of bytes, else of 12 bits */
-    uint16_t newest[IH_FRAME_WIDTH_MAX];
-    uint16_t pair[IH_BAND_PAIRS][IH_FRAME_WIDTH_MAX]; /* ring */
-    /* Of the row whose R is worked out, edge pixels repeated outside: 1-2-1 of three rows, nine rows,
-     * three pixels of nine rows. */
-    uint16_t inner[IH_FRAME_WIDTH_MAX + 2];
-    uint16_t column[IH_FRAME_WIDTH_MAX + 2 * IH_BAND_REACH];
+    /* Of three pixels around each, from IH_BAND_SIDE to the left of the frame on, edge pixels repeated
+     * outside: rings of sums and of 1-2-1, and sums of the newest nine rows. */
+    uint16_t three[IH_BAND_ROWS][IH_BAND_SUMS];
+    uint16_t binomial[IH_BAND_KEPT][IH_BAND_SUMS + 2]; /* from [1] on: pixel 0's is aligned */
     union {
-        uint16_t of_bytes[IH_FRAME_WIDTH_MAX + 2 * IH_BAND_REACH];
-        uint32_t of_grey_q4[IH_FRAME_WIDTH_MAX + 2 * IH_BAND_REACH];
-    } three;
+        uint16_t of_bytes[IH_BAND_SUMS];
+        uint32_t of_grey_q4[IH_BAND_SUMS];
+    } nine;
 };
 
 struct ih_row ih_frame_row(const struct ih_frame *frame, int32_t v);
@@ -77,8 +80,12 @@ void ih_band_begin(struct ih_band *band, int32_t width, bool is_bytes);
 bool ih_band_push_bytes(struct ih_band *band, const uint8_t *row, int16_t *response);
 bool ih_band_push_grey(struct ih_band *band, const uint16_t *row_q4, int16_t *response);
 
-/* Sums of the columns of the newest rows, at most IH_BAND_PAIRS of them. */
+/* Sums of the columns of the newest rows, at most IH_BAND_KEPT of them. */
 void ih_band_columns(const struct ih_band *band, int32_t rows, uint16_t *sum);
+
+/* False only if no sum of three neighbouring columns, edge pixels repeated, of the newest IH_BAND_KEPT
+ * rows is greater than the limit. At least IH_BAND_ROWS have been pushed. */
+bool ih_band_is_any_above(const struct ih_band *band, int32_t limit);
 
 /* R of the middle one of nine rows of bytes; nothing is pushed. */
 void ih_band_bytes(struct ih_band *band, const struct ih_row row[IH_BAND_ROWS], int32_t width,

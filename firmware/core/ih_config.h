@@ -12,7 +12,7 @@
 /* Slots of the dot table; slot = row * IH_GRID + column. */
 #define IH_SLOTS (IH_GRID * IH_GRID)
 
-/* Frame sizes that are accepted. The widest frame costs 61 * IH_FRAME_WIDTH_MAX bytes
+/* Frame sizes that are accepted. The widest frame costs 72 * IH_FRAME_WIDTH_MAX bytes
  * of row buffer in ih_dots. Range images may be smaller than camera frames. */
 #define IH_FRAME_WIDTH_MIN 320
 #define IH_FRAME_HEIGHT_MIN 240

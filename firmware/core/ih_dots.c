@@ -5,6 +5,8 @@
 #include "ih_fix.h"
 #include "ih_words.h"
 
+#include "ih_lanes.h"
+
 /* The centre is taken over so many pixels on each side of the peak, */
 #define CENTRE_REACH 2
 /* of a plateau over so many; */
@@ -28,6 +30,17 @@ void ih_dots_params_default(struct ih_dots_params *params)
     };
 }
 
+/* What of a row of the ring no row of R is laid over: zeros around the frame. */
+static void clear_outside(struct ih_dots_scratch *scratch, int32_t row)
+{
+    int16_t *response = scratch->rows.finding.response[row];
+    const int32_t end =
+        row < IH_DOTS_REACH ? 0 : IH_DOTS_REACH + scratch->width; /* above the frame all of it */
+    memset(response, 0, IH_DOTS_REACH * sizeof response[0]);
+    memset(&response[end], 0,
+           sizeof scratch->rows.finding.response[0] - (size_t)end * sizeof response[0]);
+}
+
 void ih_dots_begin(struct ih_dots_scratch *scratch, struct ih_dots *out,
                    const struct ih_dots_params *params, int32_t width, int32_t height,
                    const struct ih_noise *noise)
@@ -40,7 +53,9 @@ void ih_dots_begin(struct ih_dots_scratch *scratch, struct ih_dots *out,
     if (noise != &scratch->noise) {
         scratch->noise = *noise;
     }
-    memset(scratch->rows.finding.response, 0, sizeof scratch->rows.finding.response);
+    for (int32_t row = 0; row < IH_DOTS_ROWS; row++) {
+        clear_outside(scratch, row);
+    }
     out->dot_count = 0;
     out->edge_count = 0;
     out->hot_count = 0;
@@ -203,21 +218,50 @@ static void lay_least(struct ih_dots_scratch *scratch, int32_t v)
     }
 }
 
-/* Is one of GROUP pixels above what no threshold is below? */
-static bool is_any_above(const int16_t response[GROUP], const int16_t least[GROUP])
+#if IH_LANES && !IH_WORDS
+/* What of IH_LANES pixels is above. */
+static inline ih_lanes is_above(const int16_t *response, const int16_t *least)
+{
+    return ih_lanes_greater(ih_lanes_load(response), ih_lanes_load(least));
+}
+
+/* Maxima above the least threshold: as great as all that are read later, greater than all before. */
+static inline ih_lanes maxima_of(const int16_t *above, const int16_t *middle, const int16_t *below,
+                                 const int16_t *least)
+{
+    const ih_lanes peak = ih_lanes_load(middle);
+    const ih_lanes before =
+        ih_lanes_greatest(ih_lanes_greatest(ih_lanes_load(above - 1), ih_lanes_load(above)),
+                          ih_lanes_greatest(ih_lanes_load(above + 1), ih_lanes_load(middle - 1)));
+    const ih_lanes after =
+        ih_lanes_greatest(ih_lanes_greatest(ih_lanes_load(below - 1), ih_lanes_load(below)),
+                          ih_lanes_greatest(ih_lanes_load(below + 1), ih_lanes_load(middle + 1)));
+    const ih_lanes passed = ih_lanes_greater(peak, ih_lanes_greatest(before, ih_lanes_load(least)));
+    return ih_lanes_without(passed, ih_lanes_greater(after, peak));
+}
+#endif
+
+/* Is one of so many pixels above what no threshold is below? */
+static inline bool is_any_above(const int16_t *response, const int16_t *least, int32_t count)
 {
 #if IH_WORDS
-    int32_t below = 0; /* negative differences */
-    for (int32_t i = 0; i < GROUP; i += 4) {
-        below |= least[i] - response[i];
-        below |= least[i + 1] - response[i + 1];
-        below |= least[i + 2] - response[i + 2];
-        below |= least[i + 3] - response[i + 3];
+    uint32_t above = 0;
+    for (int32_t i = 0; i < count; i += 8) {
+        above |= ih_word_below(ih_word(&least[i]), ih_word(&response[i]));
+        above |= ih_word_below(ih_word(&least[i + 2]), ih_word(&response[i + 2]));
+        above |= ih_word_below(ih_word(&least[i + 4]), ih_word(&response[i + 4]));
+        above |= ih_word_below(ih_word(&least[i + 6]), ih_word(&response[i + 6]));
     }
-    return below < 0;
+    return (above & IH_WORD_SIGNS) != 0;
+#elif IH_LANES
+    ih_lanes any = is_above(response, least);
+    for (int32_t i = IH_LANES; i < count; i += IH_LANES) {
+        any = ih_lanes_or(any, is_above(&response[i], &least[i]));
+    }
+    return ih_lanes_is_any(any);
 #else
     uint16_t any = 0;
-    for (int32_t i = 0; i < GROUP; i++) {
+    for (int32_t i = 0; i < count; i++) {
         const uint16_t above = response[i] > least[i] ? UINT16_MAX : 0;
         any = any | above;
     }
@@ -225,86 +269,95 @@ static bool is_any_above(const int16_t response[GROUP], const int16_t least[GROU
 #endif
 }
 
-#if IH_WORDS
-/* The same as below, where most pixels are passed over after one look. */
-static void mark_maxima(const int16_t *above, const int16_t *middle, const int16_t *below,
-                        const int16_t *least, uint8_t *mark)
+#if !IH_LANES || IH_WORDS
+/* Of equal neighbours the first in reading order is a maximum. */
+static bool is_maximum(const int16_t *above, const int16_t *middle, const int16_t *below,
+                       int16_t least)
 {
-    for (int32_t u = 0; u < GROUP; u++) {
-        const int16_t peak = middle[u];
-        mark[u] = 0;
-        if (peak > least[u] && peak > middle[u - 1] && peak >= middle[u + 1] &&
-            peak > above[u - 1] && peak > above[u] && peak > above[u + 1] && peak >= below[u - 1] &&
-            peak >= below[u] && peak >= below[u + 1]) {
-            mark[u] = UINT8_MAX;
-        }
-    }
-}
-#else
-static int16_t greater(int16_t a, int16_t b)
-{
-    return (int16_t)(a > b ? a : b);
-}
-
-/* Which of GROUP pixels are maxima above the least threshold. Of equal neighbours the first in reading
- * order is one: it is greater than all that are read before it and than one less than those after it. */
-static void mark_maxima(const int16_t *above, const int16_t *middle, const int16_t *below,
-                        const int16_t *least, uint8_t *restrict mark)
-{
-    for (int32_t u = 0; u < GROUP; u++) {
-        const int16_t before =
-            greater(greater(above[u - 1], above[u]), greater(above[u + 1], middle[u - 1]));
-        const int16_t after =
-            greater(greater(below[u - 1], below[u]), greater(below[u + 1], middle[u + 1]));
-        const int16_t limit = greater(greater(before, (int16_t)(after - 1)), least[u]);
-        mark[u] = middle[u] > limit ? UINT8_MAX : 0;
-    }
+    const int16_t peak = middle[0];
+    return peak > least && peak > middle[-1] && peak >= middle[1] && peak > above[-1] &&
+           peak > above[0] && peak > above[1] && peak >= below[-1] && peak >= below[0] &&
+           peak >= below[1];
 }
 #endif
 
-static uint64_t eight_marks(const uint8_t *mark)
+/* Which of GROUP pixels are maxima above the least threshold, the first of them in the lowest bit. */
+static uint32_t mark_maxima(const int16_t *above, const int16_t *middle, const int16_t *below,
+                            const int16_t *least)
 {
-    uint64_t word = 0;
-    __builtin_memcpy(&word, mark, sizeof word); /* no call, in freestanding builds either */
-    return word;
-}
-
-/* Of GROUP pixels of row v from first on. */
-static void judge_marked(struct ih_dots_scratch *scratch, struct ih_dots *out,
-                         const uint8_t mark[GROUP], int32_t first, int32_t v)
-{
-    const int16_t *response = &response_row(scratch, v)[first];
-    int32_t i = 0;
-    while (i < GROUP) {
-        if (i % 8 == 0 && eight_marks(&mark[i]) == 0) {
-            i += 8;
-            continue;
+    uint32_t maxima = 0;
+#if IH_WORDS
+    for (int32_t u = 0; u < GROUP; u += 2) {
+        if ((ih_word_below(ih_word(&least[u]), ih_word(&middle[u])) & IH_WORD_SIGNS) != 0) {
+            maxima |= (uint32_t)is_maximum(&above[u], &middle[u], &below[u], least[u]) << u;
+            maxima |=
+                (uint32_t)is_maximum(&above[u + 1], &middle[u + 1], &below[u + 1], least[u + 1])
+                << (u + 1);
         }
-        if (mark[i] != 0 &&
-            response[i] >
-                threshold_of(&scratch->params, ih_noise_at(&scratch->noise, first + i, v))) {
-            judge(scratch, out, first + i, v);
-        }
-        i++;
     }
+#elif IH_LANES
+    if (is_any_above(middle, least, GROUP)) {
+        for (int32_t u = 0; u < GROUP; u += 2 * IH_LANES) {
+            const int32_t next = u + IH_LANES;
+            maxima |=
+                ih_lanes_bits(maxima_of(&above[u], &middle[u], &below[u], &least[u]),
+                              maxima_of(&above[next], &middle[next], &below[next], &least[next]))
+                << u;
+        }
+    }
+#else
+    for (int32_t u = 0; u < GROUP; u++) {
+        maxima |= (uint32_t)is_maximum(&above[u], &middle[u], &below[u], least[u]) << u;
+    }
+#endif
+    return maxima;
 }
 
-/* Row v has all its neighbours in the ring. Most of its groups have nothing above any threshold, most
- * of the others no maximum. */
-static void find_dots(struct ih_dots_scratch *scratch, struct ih_dots *out, int32_t v)
+/* Groups of a row that have maxima. */
+struct marked {
+    int32_t count;
+    int16_t first[IH_FRAME_WIDTH_MAX / GROUP];
+    uint32_t maxima[IH_FRAME_WIDTH_MAX / GROUP];
+};
+
+/* Most groups have nothing above any threshold, most of the others no maximum. */
+static void mark_row(struct ih_dots_scratch *scratch, int32_t v, struct marked *out)
 {
     const int16_t *above = response_row(scratch, v - 1);
     const int16_t *middle = response_row(scratch, v);
     const int16_t *below = response_row(scratch, v + 1);
     const int16_t *least = scratch->rows.finding.least;
+    const int32_t width = scratch->width;
+    int32_t count = 0;
+    for (int32_t first = 0; first < width; first += 2 * GROUP) {
+        if (!is_any_above(&middle[first], &least[first], 2 * GROUP)) {
+            continue;
+        }
+        for (int32_t u = first; u < first + 2 * GROUP; u += GROUP) {
+            const uint32_t maxima = mark_maxima(&above[u], &middle[u], &below[u], &least[u]);
+            out->first[count] = (int16_t)u;
+            out->maxima[count] = maxima;
+            count += maxima != 0;
+        }
+    }
+    out->count = count;
+}
+
+/* Row v has all its neighbours in the ring. */
+static void find_dots(struct ih_dots_scratch *scratch, struct ih_dots *out, int32_t v)
+{
+    const int16_t *response = response_row(scratch, v);
+    struct marked marked;
     if (v % IH_NOISE_BLOCK == IH_NOISE_BLOCK / 2 || v == 0) {
         lay_least(scratch, v);
     }
-    for (int32_t u = 0; u < scratch->width; u += GROUP) {
-        if (is_any_above(&middle[u], &least[u])) {
-            uint8_t mark[GROUP];
-            mark_maxima(&above[u], &middle[u], &below[u], &least[u], mark);
-            judge_marked(scratch, out, mark, u, v);
+    mark_row(scratch, v, &marked);
+    for (int32_t i = 0; i < marked.count; i++) {
+        for (uint32_t maxima = marked.maxima[i]; maxima != 0; maxima &= maxima - 1) {
+            const int32_t u = marked.first[i] + __builtin_ctz(maxima);
+            if (response[u] > threshold_of(&scratch->params, ih_noise_at(&scratch->noise, u, v))) {
+                judge(scratch, out, u, v);
+            }
         }
     }
 }
@@ -367,11 +420,14 @@ static void finish_blocks(struct ih_dots_scratch *scratch, struct ih_dots *out, 
     const struct ih_band *band = &scratch->rows.finding.band;
     const int32_t rows = v % IH_DOTS_BLOCK + 1;
     const int32_t grey = band->is_bytes ? 1 : 16; /* one level of 8 bits */
+    const int32_t limit = scratch->params.bright_grey * grey * rows;
+    if (is_in_band && rows == IH_DOTS_BLOCK && !ih_band_is_any_above(band, 2 * limit)) {
+        return;
+    }
     if (is_in_band) {
         ih_band_columns(band, rows, scratch->bright_column);
     }
-    mark_bright(out, v / IH_DOTS_BLOCK, scratch->bright_column, scratch->width,
-                scratch->params.bright_grey * grey * rows);
+    mark_bright(out, v / IH_DOTS_BLOCK, scratch->bright_column, scratch->width, limit);
 }
 
 static void repeat_row(struct ih_dots_scratch *scratch, struct ih_dots *out)

@@ -20,7 +20,7 @@
  *        Of two centres less than 3 px apart in u and v the first stays.
  *        The threshold falls with the place's own noise, so that dots in quiet places are not lost
  *        to texture elsewhere; tests 2 and 3 keep what is no dot out, so that it can be low.
- * Cost:  one pass; ih_band's rows and 13 of R. About 35 operations of 16 bits per pixel, a few
+ * Cost:  one pass; ih_band's rows and 13 of R. About 26 operations of 16 bits per pixel, a few
  *        hundred for each of some thousand maxima.
  * Error: centres within 0.01 px of the float64 reference.
  * A full table drops and counts: dots_dropped.

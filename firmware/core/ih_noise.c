@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "ih_fix.h"
+#include "ih_lanes.h"
 #include "ih_words.h"
 
 /* All of the ambient light is taken away. */
@@ -19,14 +20,15 @@
 
 /* Twice the distance of a pixel from the first block's centre, limited to between the outermost
  * centres; a block is 2 * IH_NOISE_BLOCK of it. */
-static int32_t twice_offset(int32_t pixel, int32_t blocks)
+static uint32_t twice_offset(int32_t pixel, int32_t blocks)
 {
-    return ih_clamp_s32(2 * pixel - (IH_NOISE_BLOCK - 1), 0, 2 * IH_NOISE_BLOCK * (blocks - 1));
+    return (uint32_t)ih_clamp_s32(2 * pixel - (IH_NOISE_BLOCK - 1), 0,
+                                  2 * IH_NOISE_BLOCK * (blocks - 1));
 }
 
 static int32_t between(int32_t low, int32_t high, int32_t part)
 {
-    return low + (int32_t)ih_shift_round((int64_t)(high - low) * part, 6);
+    return low + (((high - low) * part + 32) >> 6);
 }
 
 /* How many of the values of a block are at most so large; all are below 2^15. */
@@ -39,6 +41,15 @@ static int32_t at_most(const uint16_t value[SAMPLES_MAX], uint16_t limit)
         count += (raised - ih_word(&value[i])) >> 15 & IH_WORD_BOTH(1);
     }
     return (int32_t)((count & UINT16_MAX) + (count >> 16));
+#elif defined __AVX2__
+    const ih_lanes last = ih_lanes_all((int16_t)limit);
+    int32_t greater = 0;
+    for (int32_t i = 0; i < SAMPLES_MAX; i += 2 * IH_LANES) {
+        greater += __builtin_popcount(
+            ih_lanes_bits(ih_lanes_greater(ih_lanes_load(&value[i]), last),
+                          ih_lanes_greater(ih_lanes_load(&value[i + IH_LANES]), last)));
+    }
+    return SAMPLES_MAX - greater;
 #else
     uint16_t count = 0;
     for (int32_t i = 0; i < SAMPLES_MAX; i++) {
@@ -122,8 +133,8 @@ static void subtract_span(const uint16_t *ambient_q4, uint16_t *grey_q4, int32_t
 void ih_noise_subtract(const struct ih_noise *noise, int32_t v, int32_t width,
                        const uint16_t *ambient_q4, uint16_t *grey_q4)
 {
-    const int32_t offset_v = twice_offset(v, noise->rows);
-    const int32_t above = offset_v / (2 * IH_NOISE_BLOCK);
+    const uint32_t offset_v = twice_offset(v, noise->rows);
+    const int32_t above = (int32_t)(offset_v / (2 * IH_NOISE_BLOCK));
     const int32_t below = ih_min_s32(above + 1, noise->rows - 1);
     if (!is_any_subtracted(noise, above, below)) {
         return;
@@ -132,7 +143,7 @@ void ih_noise_subtract(const struct ih_noise *noise, int32_t v, int32_t width,
     int32_t first = 0;
     for (int32_t column = 0; column < noise->columns; column++) {
         int32_t here_q12 = between(share_q12(noise, above, column), share_q12(noise, below, column),
-                                   offset_v % (2 * IH_NOISE_BLOCK));
+                                   (int32_t)(offset_v % (2 * IH_NOISE_BLOCK)));
         int32_t end = ih_min_s32(width, column * IH_NOISE_BLOCK + IH_NOISE_BLOCK / 2);
         subtract_span(ambient_q4, grey_q4, first, end, column == 0 ? here_q12 : before_q12,
                       here_q12, 1);
@@ -316,17 +327,17 @@ struct cell {
 
 static struct cell cell_of(const struct ih_noise *noise, int32_t u, int32_t v)
 {
-    const int32_t offset_u = twice_offset(u, noise->columns);
-    const int32_t offset_v = twice_offset(v, noise->rows);
-    const int32_t left = offset_u / (2 * IH_NOISE_BLOCK);
-    const int32_t above = offset_v / (2 * IH_NOISE_BLOCK);
+    const uint32_t offset_u = twice_offset(u, noise->columns);
+    const uint32_t offset_v = twice_offset(v, noise->rows);
+    const int32_t left = (int32_t)(offset_u / (2 * IH_NOISE_BLOCK));
+    const int32_t above = (int32_t)(offset_v / (2 * IH_NOISE_BLOCK));
     return (struct cell){
         .left = left,
         .right = ih_min_s32(left + 1, noise->columns - 1),
         .above = above,
         .below = ih_min_s32(above + 1, noise->rows - 1),
-        .part_u = offset_u % (2 * IH_NOISE_BLOCK),
-        .part_v = offset_v % (2 * IH_NOISE_BLOCK),
+        .part_u = (int32_t)(offset_u % (2 * IH_NOISE_BLOCK)),
+        .part_v = (int32_t)(offset_v % (2 * IH_NOISE_BLOCK)),
     };
 }
 

@@ -15,8 +15,8 @@
  *        levels are left; what is below 0 then, the dark ghost of something that moved, is 0. The
  *        noise is that of what is left, in these blocks 19/16 of it: it is white, and has more
  *        lonely maxima than texture.
- * Cost:  half of the frame's rows through ih_band's pairs, a sixteenth through its filter; three
- *        times that with an ambient frame.
+ * Cost:  sums of half of the frame's rows, ih_band's response of a sixteenth; three times that with an
+ *        ambient frame.
  * Range: as R; 19/16 of it 22,145. Whole units of R.
  */
 #ifndef IH_NOISE_H

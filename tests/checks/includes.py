@@ -33,6 +33,7 @@ CORE_HEADERS = {
     "ih_range.h": set(),
     "ih_fix.h": {"ih_range.h"},
     "ih_words.h": set(),
+    "ih_lanes.h": set(),
     "ih_rig.h": {"ih_config.h", "ih_types.h"},
     "ih_blob.h": CORE_SHARED,
     "ih_cholesky.h": {"ih_config.h", "ih_types.h"},
@@ -71,8 +72,9 @@ CORE_HEADERS = {
     "isohead.h": CORE_SHARED | {"ih_result.h"},
 }
 CORE_SYSTEM = {"stdbool.h", "stddef.h", "stdint.h", "string.h"}
-# The vectors of x86, for files that have the same without.
-CORE_VECTORS = {("ih_normal.c", "immintrin.h"), ("ih_basis.c", "immintrin.h")}
+# The vectors of x86 and the pairs of a Cortex-M, for files that have the same without.
+CORE_VECTORS = {("ih_normal.c", "immintrin.h"), ("ih_basis.c", "immintrin.h"), ("ih_lanes.h", "immintrin.h"),
+                ("ih_words.h", "arm_acle.h")}
 
 INCLUDE = re.compile(r'^\s*#\s*include\s*(["<])([^">]+)[">]')
 
@@ -85,7 +87,7 @@ def allowed_in_core(name):
         return {own}
     if name == "ih_score.c":
         return {own, "ih_fix.h", "ih_score_weights.h"}
-    return {own, "ih_fix.h", "ih_range.h", "ih_words.h"} if own in CORE_HEADERS else None
+    return {own, "ih_fix.h", "ih_range.h", "ih_words.h", "ih_lanes.h"} if own in CORE_HEADERS else None
 
 
 def judge_core(path, quoted, target):

@@ -241,6 +241,35 @@ static void columns_are_sums_of_rows(void)
     }
 }
 
+/* The greatest sum of three columns is found, one of them may be outside. */
+static void the_brightest_columns_are_known(void)
+{
+    static uint16_t sum[IH_FRAME_WIDTH_MAX];
+    int32_t u, v;
+
+    fill_hard(333, 240, 78);
+    ih_band_begin(&band, frame.width, true);
+    for (v = 0; v < 40; v++) {
+        int32_t most = 0;
+
+        (void)push(v, response[0]);
+        if (v < IH_BAND_ROWS) {
+            continue;
+        }
+        ih_band_columns(&band, IH_BAND_KEPT, sum);
+        for (u = 0; u < frame.width; u++) {
+            const int32_t three =
+                sum[u > 0 ? u - 1 : 0] + sum[u] + sum[u + 1 < frame.width ? u + 1 : u];
+
+            most = three > most ? three : most;
+        }
+        most = 3 * sum[0] > most ? 3 * sum[0] : most;
+        most = 3 * sum[frame.width - 1] > most ? 3 * sum[frame.width - 1] : most;
+        TEST_ASSERT_TRUE(ih_band_is_any_above(&band, most - 1));
+        TEST_ASSERT_FALSE(ih_band_is_any_above(&band, most));
+    }
+}
+
 /* Nothing of the frame before is left. */
 static void a_second_frame_starts_afresh(void)
 {
@@ -262,7 +291,7 @@ static void pixels_beyond_the_width_do_not_matter(void)
 {
     fill8(320, 240, 77);
     filter();
-    IH_TEST_UNTOUCHED(&band.inner[322], sizeof band.inner[0], "sums");
+    IH_TEST_UNTOUCHED(&band.three[0][352], sizeof band.three[0][0], "sums");
     IH_TEST_UNTOUCHED(&response[3][320], sizeof response[0][0], "response");
 }
 
@@ -275,6 +304,7 @@ int main(void)
     RUN_TEST(the_greatest_responses_fit);
     RUN_TEST(all_ways_give_what_the_header_says);
     RUN_TEST(columns_are_sums_of_rows);
+    RUN_TEST(the_brightest_columns_are_known);
     RUN_TEST(a_second_frame_starts_afresh);
     RUN_TEST(pixels_beyond_the_width_do_not_matter);
     return UNITY_END();
