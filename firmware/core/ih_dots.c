@@ -231,11 +231,11 @@ static inline ih_lanes maxima_of(const int16_t *above, const int16_t *middle, co
 {
     const ih_lanes peak = ih_lanes_load(middle);
     const ih_lanes before =
-        ih_lanes_greatest(ih_lanes_greatest(ih_lanes_load(above - 1), ih_lanes_load(above)),
-                          ih_lanes_greatest(ih_lanes_load(above + 1), ih_lanes_load(middle - 1)));
+        ih_lanes_greatest(ih_lanes_greatest(ih_lanes_load(&above[-1]), ih_lanes_load(above)),
+                          ih_lanes_greatest(ih_lanes_load(&above[1]), ih_lanes_load(&middle[-1])));
     const ih_lanes after =
-        ih_lanes_greatest(ih_lanes_greatest(ih_lanes_load(below - 1), ih_lanes_load(below)),
-                          ih_lanes_greatest(ih_lanes_load(below + 1), ih_lanes_load(middle + 1)));
+        ih_lanes_greatest(ih_lanes_greatest(ih_lanes_load(&below[-1]), ih_lanes_load(below)),
+                          ih_lanes_greatest(ih_lanes_load(&below[1]), ih_lanes_load(&middle[1])));
     const ih_lanes passed = ih_lanes_greater(peak, ih_lanes_greatest(before, ih_lanes_load(least)));
     return ih_lanes_without(passed, ih_lanes_greater(after, peak));
 }
@@ -253,7 +253,7 @@ static inline bool is_any_above(const int16_t *response, const int16_t *least, i
         above |= ih_word_below(ih_word(&least[i + 6]), ih_word(&response[i + 6]));
     }
     return (above & IH_WORD_SIGNS) != 0;
-#elif IH_LANES
+#elif IH_LANES != 0
     ih_lanes any = is_above(response, least);
     for (int32_t i = IH_LANES; i < count; i += IH_LANES) {
         any = ih_lanes_or(any, is_above(&response[i], &least[i]));
@@ -295,7 +295,7 @@ static uint32_t mark_maxima(const int16_t *above, const int16_t *middle, const i
                 << (u + 1);
         }
     }
-#elif IH_LANES
+#elif IH_LANES != 0
     if (is_any_above(middle, least, GROUP)) {
         for (int32_t u = 0; u < GROUP; u += 2 * IH_LANES) {
             const int32_t next = u + IH_LANES;

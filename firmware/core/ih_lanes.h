@@ -9,9 +9,11 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#if defined __AVX2__
-
+#if defined __x86_64__ && defined __SSE2__
 #include <immintrin.h>
+#endif
+
+#if defined __AVX2__
 
 #define IH_LANES 16
 typedef __m256i ih_lanes;
@@ -60,8 +62,6 @@ static inline uint32_t ih_lanes_bits(ih_lanes a, ih_lanes b)
 }
 
 #elif defined __x86_64__ && defined __SSE2__
-
-#include <immintrin.h>
 
 #define IH_LANES 8
 typedef __m128i ih_lanes;
