@@ -1,25 +1,19 @@
 #include "ih_cuts.h"
 
-#include <string.h>
-
 #include "ih_fix.h"
+
+/* No plain loop becomes the bits of a comparison. */
+#if defined __x86_64__ && defined __SSE2__
+#include <immintrin.h>
+#endif
 
 #define CELLS (IH_SURFACE_GRID - 1)
 /* Cells of a row, bit by bit; those at the border. */
 #define ALL_CELLS (((uint64_t)1 << CELLS) - 1)
 #define BORDER_CELLS ((uint64_t)1 << (CELLS - 1) | 1)
-/* Nodes compared at once: no row has any left. */
-#define LANES 32
-_Static_assert(IH_SURFACE_GRID >= LANES, "a row of nodes fills the lanes");
-/* Its product with four bytes of 0 or 1 has them as bits from the 24th on: none meets another. */
-#if __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__
-#define GATHER 0x01020408u
-#else
-#define GATHER 0x08040201u
-#endif
 /* With a rise below this a crossing is worked out in 32 bits. */
 #define RISE_NARROW (1 << 22)
-_Static_assert(IH_CUTS_ROW_BYTES <= 64, "a row of nodes has a bit each in 64");
+_Static_assert(IH_SURFACE_GRID <= 64, "a row of nodes has a bit each in 64");
 
 /* Corners of a cell clockwise on the screen; edge i runs from corner i to corner i + 1. A contour
  * walks with the inside on its right, so it enters through an edge whose corner i is inside and
@@ -170,36 +164,53 @@ static void start_in_cell(const struct ih_surface *surface, struct ih_cuts *cuts
     }
 }
 
-/* A byte for each node. */
-static void compare_nodes(const struct ih_surface *surface, struct ih_cuts *cuts)
+#if defined __x86_64__ && defined __SSE2__
+#define LANES 16
+_Static_assert(IH_SURFACE_GRID >= LANES, "a row of nodes fills the lanes");
+
+static uint64_t nodes_inside(const int32_t *depth_mm_q8, int32_t level_mm_q8)
 {
-    const int32_t level_mm_q8 = cuts->level_mm_q8;
-    for (int32_t y = 0; y < IH_SURFACE_GRID; y++) {
-        const int32_t *depth_mm_q8 = surface->depth_mm_q8[y];
-        uint8_t *is_inside = cuts->is_inside[y];
-        for (int32_t block = 0; block < IH_SURFACE_GRID; block += LANES) {
-            const int32_t first = ih_min_s32(block, IH_SURFACE_GRID - LANES); /* some twice */
-            for (int32_t x = first; x < first + LANES; x++) {
-                is_inside[x] = depth_mm_q8[x] < level_mm_q8;
-            }
+    const __m128i level = _mm_set1_epi32(level_mm_q8);
+    uint64_t nodes = 0;
+    for (int32_t block = 0; block < IH_SURFACE_GRID; block += LANES) {
+        const int32_t first = ih_min_s32(block, IH_SURFACE_GRID - LANES); /* some twice */
+        const __m128i *four = (const __m128i *)(const void *)&depth_mm_q8[first];
+        __m128i is_inside[4];
+        for (int i = 0; i < 4; i++) {
+            is_inside[i] = _mm_cmpgt_epi32(level, _mm_loadu_si128(&four[i]));
         }
-        for (int32_t x = IH_SURFACE_GRID; x < IH_CUTS_ROW_BYTES; x++) {
-            is_inside[x] = 0;
-        }
+        const __m128i bytes = _mm_packs_epi16(_mm_packs_epi32(is_inside[0], is_inside[1]),
+                                              _mm_packs_epi32(is_inside[2], is_inside[3]));
+        nodes |= (uint64_t)(uint32_t)_mm_movemask_epi8(bytes) << first;
     }
+    return nodes;
 }
+#else
+/* In two words: shifts of 64 bits are long on small processors. */
+#define WORD_NODES 32
+_Static_assert(IH_SURFACE_GRID > WORD_NODES, "a row of nodes fills more than a word");
+
+static uint32_t bits_inside(const int32_t *depth_mm_q8, int32_t count, int32_t level_mm_q8)
+{
+    uint32_t bits = 0;
+    for (int32_t x = count - 1; x >= 0; x--) {
+        bits = bits << 1 | (depth_mm_q8[x] < level_mm_q8);
+    }
+    return bits;
+}
+
+static uint64_t nodes_inside(const int32_t *depth_mm_q8, int32_t level_mm_q8)
+{
+    const uint64_t high =
+        bits_inside(&depth_mm_q8[WORD_NODES], IH_SURFACE_GRID - WORD_NODES, level_mm_q8);
+    return high << WORD_NODES | bits_inside(depth_mm_q8, WORD_NODES, level_mm_q8);
+}
+#endif
 
 static void find_inside(const struct ih_surface *surface, struct ih_cuts *cuts)
 {
-    compare_nodes(surface, cuts);
     for (int32_t y = 0; y < IH_SURFACE_GRID; y++) {
-        uint64_t nodes = 0;
-        for (int32_t x = 0; x < IH_CUTS_ROW_BYTES; x += 4) {
-            uint32_t four;
-            memcpy(&four, &cuts->is_inside[y][x], sizeof four);
-            nodes |= ((uint64_t)four * GATHER >> 24 & 15u) << x;
-        }
-        cuts->inside[y] = nodes;
+        cuts->inside[y] = nodes_inside(surface->depth_mm_q8[y], cuts->level_mm_q8);
     }
 }
 

@@ -8,8 +8,8 @@
  *        for all, so contours never cross. Every contour runs with the inside (nearer) on its
  *        right as seen on a screen (x right, y down): its signed area, sum(x0 y1 - x1 y0) / 2, is
  *        positive around a minimum of depth and negative around a maximum.
- * Cost:  one comparison per node; one division per vertex. Nodes and cells are bits of a row, so that
- *        only cells that a contour passes are looked at.
+ * Cost:  one comparison per node, of 16 at once on x86; one division per vertex. Nodes and cells are
+ *        bits of a row, so that only cells that a contour passes are looked at.
  * Full tables drop and count: a contour that does not fit is left out whole, contours_dropped.
  */
 #ifndef IH_CUTS_H
@@ -21,9 +21,6 @@
  * 2 x 46 x 46 segments would be the worst checkerboard. */
 #define IH_CUTS_VERTICES_MAX 2048
 #define IH_CUTS_CONTOURS_MAX 64
-
-/* Nodes of a row, filled up to whole eights. */
-#define IH_CUTS_ROW_BYTES ((IH_SURFACE_GRID + 7) / 8 * 8)
 
 /* A place on the grid: 0 .. IH_SURFACE_GRID - 1 in steps, Q9. */
 struct ih_vertex {
@@ -44,7 +41,6 @@ struct ih_cuts {
     /* scratch, bit x of row y: node x is nearer; cell x is still to be entered by a contour, through its
      * upper or right edge, through its lower or left one */
     uint64_t inside[IH_SURFACE_GRID];
-    uint8_t is_inside[IH_SURFACE_GRID][IH_CUTS_ROW_BYTES]; /* the same, a byte each */
     uint64_t entrance[2][IH_SURFACE_GRID];
 };
 
