@@ -4,6 +4,11 @@
 
 #include "ih_fix.h"
 
+/* Compilers do not find the multiplication of lower halves by themselves, see ih_normal. */
+#if defined __x86_64__ && defined __SSE2__
+#include <immintrin.h>
+#endif
+
 #define ONE_Q14 (1 << 14)
 #define ONE_Q16 (1 << 16)
 /* Points farther than this many robust scales weigh less than 1/4000 and are passed over. */
@@ -22,8 +27,12 @@
 #define GRADIENT_MM 64
 #define FLAG_POINT 1
 #define FLAG_PUSH 2
-/* Added to products before a shift, so that they are positive: vectors shift those alone. */
-#define BIAS_BITS 40
+/* Added to slopes and residuals, and to weighted slopes: then none is negative. Of a product these are whole
+ * numbers after its shift by 14 or 8 bits, which can be taken away from the sum. */
+#define LIFT (1 << 16)
+#define LIFT_WEIGHTED (1 << 18)
+/* Rows are summed by this many. */
+#define GROUP 4
 
 static int16_t saturate_s16(int64_t value)
 {
@@ -138,61 +147,179 @@ static int32_t square_part_q14(const struct inverse *inverse, int64_t square)
     return (int32_t)((square * inverse->by_25_q62 + ((int64_t)1 << 43)) >> 44);
 }
 
-/* The lower triangle and the right side, of whole vectors of rows. */
+#if defined __x86_64__ && defined __SSE2__
+#if defined __AVX2__
+#define LANES 4
+typedef __m256i lanes;
+#define LOAD(from) _mm256_loadu_si256((const lanes *)(const void *)(from))
+#define STORE(to, value) _mm256_storeu_si256((lanes *)(void *)(to), value)
+#define ALL(value) _mm256_set1_epi64x(value)
+#define PRODUCT(a, b) _mm256_mul_epu32(a, b)
+#define SUM(a, b) _mm256_add_epi64(a, b)
+#define SHIFT(a, bits) _mm256_srli_epi64(a, bits)
+#else
+#define LANES 2
+typedef __m128i lanes;
+#define LOAD(from) _mm_loadu_si128((const lanes *)(const void *)(from))
+#define STORE(to, value) _mm_storeu_si128((lanes *)(void *)(to), value)
+#define ALL(value) _mm_set1_epi64x(value)
+#define PRODUCT(a, b) _mm_mul_epu32(a, b)
+#define SUM(a, b) _mm_add_epi64(a, b)
+#define SHIFT(a, bits) _mm_srli_epi64(a, bits)
+#endif
+_Static_assert(GROUP % LANES == 0, "rows are whole vectors");
+
+static inline uint64_t sum_lanes(lanes value)
+{
+    uint64_t lane[LANES], sum = 0;
+    STORE(lane, value);
+    for (int k = 0; k < LANES; k++) {
+        sum += lane[k];
+    }
+    return sum;
+}
+
+static uint64_t sum_entries(const ih_row_entry *entry, int32_t count)
+{
+    lanes sum = ALL(0);
+    for (int32_t k = 0; k < count; k += LANES) {
+        sum = SUM(sum, LOAD(&entry[k]));
+    }
+    return sum_lanes(sum);
+}
+
+/* Sums of the weighted entries' products with the first slopes, and with the residuals behind them. */
+static inline __attribute__((always_inline)) void
+sum_products(const struct ih_rows *rows, int32_t count, int i, uint64_t sum[IH_FIT_UNKNOWNS + 1])
+{
+    const lanes half_q30 = ALL(1 << 13);
+    const lanes half_q24 = ALL(1 << 7);
+    lanes part[IH_FIT_UNKNOWNS];
+    lanes residual = ALL(0);
+    for (int j = 0; j <= i; j++) {
+        part[j] = ALL(0);
+    }
+    for (int32_t k = 0; k < count; k += LANES) {
+        const lanes weighted = LOAD(&rows->weighted_q16[i][k]);
+        for (int j = 0; j <= i; j++) {
+            const lanes product = PRODUCT(weighted, LOAD(&rows->slope_q14[j][k]));
+            part[j] = SUM(part[j], SHIFT(SUM(product, half_q30), 14));
+        }
+        const lanes product = PRODUCT(weighted, LOAD(&rows->slope_q14[IH_FIT_UNKNOWNS][k]));
+        residual = SUM(residual, SHIFT(SUM(product, half_q24), 8));
+    }
+    for (int j = 0; j <= i; j++) {
+        sum[j] = sum_lanes(part[j]);
+    }
+    sum[IH_FIT_UNKNOWNS] = sum_lanes(residual);
+}
+#else
+static uint64_t sum_entries(const ih_row_entry *entry, int32_t count)
+{
+    uint32_t sum = 0; /* of 128 that are below 2^19 */
+    for (int32_t k = 0; k < count; k++) {
+        sum += entry[k];
+    }
+    return sum;
+}
+
+/* Sums of the weighted entries' products with the first slopes, and with the residuals behind them. A
+ * product is below 2^36: 128 of them, shifted by 14, below 2^29. */
+static inline void sum_products(const struct ih_rows *rows, int32_t count, int i,
+                                uint64_t sum[IH_FIT_UNKNOWNS + 1])
+{
+    const ih_row_entry *weighted = rows->weighted_q16[i];
+    for (int j = 0; j <= i; j++) {
+        const ih_row_entry *slope = rows->slope_q14[j];
+        uint32_t part = 0;
+        for (int32_t k = 0; k < count; k++) {
+            part += (uint32_t)(((uint64_t)weighted[k] * slope[k] + (1 << 13)) >> 14);
+        }
+        sum[j] = part;
+    }
+    const ih_row_entry *residual = rows->slope_q14[IH_FIT_UNKNOWNS];
+    sum[IH_FIT_UNKNOWNS] = 0;
+    for (int32_t k = 0; k < count; k++) {
+        sum[IH_FIT_UNKNOWNS] += ((uint64_t)weighted[k] * residual[k] + (1 << 7)) >> 8;
+    }
+}
+#endif
+
+/* What the lifts bring into a sum of shifted products, from the sums of their factors. */
+static int64_t lifted(int64_t weighted, int64_t slopes, int32_t count, int shift)
+{
+    return weighted * (LIFT >> shift) + slopes * (LIFT_WEIGHTED >> shift) -
+           (int64_t)count * (LIFT_WEIGHTED >> shift) * LIFT;
+}
+
+/* A line of the lower triangle, and its right side. */
+static inline __attribute__((always_inline)) void sum_line(const struct ih_rows *rows,
+                                                           int32_t count, int i,
+                                                           const int64_t slopes[],
+                                                           struct ih_row_system *system)
+{
+    const int64_t weighted = (int64_t)sum_entries(rows->weighted_q16[i], count);
+    uint64_t sum[IH_FIT_UNKNOWNS + 1];
+    sum_products(rows, count, i, sum);
+    for (int j = 0; j <= i; j++) {
+        system->normal_q16[i * (i + 1) / 2 + j] +=
+            (int64_t)sum[j] - lifted(weighted, slopes[j], count, 14);
+    }
+    system->right_q16[i] -=
+        (int64_t)sum[IH_FIT_UNKNOWNS] - lifted(weighted, slopes[IH_FIT_UNKNOWNS], count, 8);
+}
+
+/* Of whole groups of rows. Line by line, so that compilers keep a line's sums in registers. */
 static void sum_rows(const struct ih_rows *rows, int32_t count, struct ih_row_system *system)
 {
-    const int64_t bias_q30 = ((int64_t)1 << BIAS_BITS) + (1 << 13);
-    const int64_t bias_q24 = ((int64_t)1 << BIAS_BITS) + (1 << 7);
-    int32_t at = 0;
-    for (int i = 0; i < IH_FIT_UNKNOWNS; i++) {
-        const int32_t *weighted_q16 = rows->weighted_q16[i];
-        for (int j = 0; j <= i; j++) {
-            const int32_t *slope_q14 = rows->slope_q14[j];
-            uint64_t sum = 0;
-            for (int32_t k = 0; k < count; k++) {
-                const int64_t product = (int64_t)weighted_q16[k] * slope_q14[k];
-                sum += (uint64_t)(product + bias_q30) >> 14;
-            }
-            system->normal_q16[at++] += (int64_t)sum - ((int64_t)count << (BIAS_BITS - 14));
-        }
-        uint64_t sum = 0;
-        for (int32_t k = 0; k < count; k++) {
-            const int64_t product = (int64_t)weighted_q16[k] * rows->residual_mm_q8[k];
-            sum += (uint64_t)(product + bias_q24) >> 8;
-        }
-        system->right_q16[i] -= (int64_t)sum - ((int64_t)count << (BIAS_BITS - 8));
+    int64_t slopes[IH_FIT_UNKNOWNS + 1];
+    for (int i = 0; i <= IH_FIT_UNKNOWNS; i++) {
+        slopes[i] = (int64_t)sum_entries(rows->slope_q14[i], count);
     }
+    sum_line(rows, count, 0, slopes, system);
+    sum_line(rows, count, 1, slopes, system);
+    sum_line(rows, count, 2, slopes, system);
+    sum_line(rows, count, 3, slopes, system);
+    sum_line(rows, count, 4, slopes, system);
+    sum_line(rows, count, 5, slopes, system);
 }
 
 static void flush_rows(struct ih_rows *rows, struct ih_row_system *system)
 {
-    const int32_t count = (rows->count + 7) / 8 * 8;
+    const int32_t count = (rows->count + GROUP - 1) / GROUP * GROUP;
     for (int32_t k = rows->count; k < count; k++) { /* rows of nothing add nothing */
         for (int i = 0; i < IH_FIT_UNKNOWNS; i++) {
-            rows->slope_q14[i][k] = 0;
-            rows->weighted_q16[i][k] = 0;
+            rows->slope_q14[i][k] = LIFT;
+            rows->weighted_q16[i][k] = LIFT_WEIGHTED;
         }
-        rows->residual_mm_q8[k] = 0;
+        rows->slope_q14[IH_FIT_UNKNOWNS][k] = LIFT;
     }
     sum_rows(rows, count, system);
     rows->count = 0;
 }
 
+/* A weight times a slope, lifted: what the slope's own lift brings in is taken away before the shift. */
 static void add_row(struct ih_rows *rows, struct ih_row_system *system, const struct gradient *g,
                     const struct inverse *inverse, const int32_t place_q14[3],
                     int32_t residual_mm_q8, int32_t weight_q16)
 {
     const int32_t at = rows->count++;
+    const uint32_t weight = (uint32_t)weight_q16;
+    const uint64_t lift_q30 =
+        ((uint64_t)LIFT_WEIGHTED << 14) + (1 << 13) - (uint64_t)weight * LIFT;
+    uint32_t lifted_q14[IH_FIT_UNKNOWNS];
     for (int axis = 0; axis < 3; axis++) {
         const int64_t s2_q14 = ih_mul_shift(place_q14[axis], place_q14[axis], 14);
-        rows->slope_q14[axis][at] = -part_q14(inverse, g->component_q14[axis]);
-        rows->slope_q14[3 + axis][at] = -square_part_q14(inverse, s2_q14);
+        lifted_q14[axis] = (uint32_t)(LIFT - part_q14(inverse, g->component_q14[axis]));
+        lifted_q14[3 + axis] = (uint32_t)(LIFT - square_part_q14(inverse, s2_q14));
     }
     for (int i = 0; i < IH_FIT_UNKNOWNS; i++) {
-        IH_IN_RANGE(rows->slope_q14[i][at], -IH_RANGE_SLOPE_Q14, IH_RANGE_SLOPE_Q14);
-        rows->weighted_q16[i][at] = (int32_t)ih_mul_shift(weight_q16, rows->slope_q14[i][at], 14);
+        IH_IN_RANGE((int32_t)lifted_q14[i] - LIFT, -IH_RANGE_SLOPE_Q14, IH_RANGE_SLOPE_Q14);
+        rows->slope_q14[i][at] = lifted_q14[i];
+        rows->weighted_q16[i][at] =
+            (uint32_t)(((uint64_t)weight * lifted_q14[i] + lift_q30) >> 14);
     }
-    rows->residual_mm_q8[at] = residual_mm_q8;
+    rows->slope_q14[IH_FIT_UNKNOWNS][at] = (uint32_t)(residual_mm_q8 + LIFT);
     if (rows->count == IH_ROW_MAX) {
         flush_rows(rows, system);
     }

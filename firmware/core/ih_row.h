@@ -20,8 +20,8 @@
 #include "ih_ellipsoid.h"
 
 #define IH_FIT_UNKNOWNS 6
-/* Rows that are summed at once; each costs 52 bytes. */
-#define IH_ROW_MAX 64
+/* Rows that are summed at once; each costs 52 bytes, twice as many on x86-64. */
+#define IH_ROW_MAX 128
 /* The slots in whole vectors. */
 #define IH_ROW_RAYS ((IH_SLOTS + 15) / 16 * 16)
 
@@ -33,11 +33,18 @@ struct ih_row_rays {
     uint8_t seen[IH_ROW_RAYS];
 };
 
+/* An entry of a row, made positive, is below 2^32; on x86-64 it is as wide as its product, see ih_normal. */
+#if defined __x86_64__
+typedef uint64_t ih_row_entry;
+#else
+typedef uint32_t ih_row_entry;
+#endif
+
 struct ih_rows {
     int32_t count;
-    int32_t slope_q14[IH_FIT_UNKNOWNS][IH_ROW_MAX];
-    int32_t weighted_q16[IH_FIT_UNKNOWNS][IH_ROW_MAX];
-    int32_t residual_mm_q8[IH_ROW_MAX];
+    /* By unknown, then the residual in mm Q8; each with its lift (ih_row.c). */
+    ih_row_entry slope_q14[IH_FIT_UNKNOWNS + 1][IH_ROW_MAX];
+    ih_row_entry weighted_q16[IH_FIT_UNKNOWNS][IH_ROW_MAX];
 };
 
 struct ih_row_scratch {
