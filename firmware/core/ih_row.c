@@ -29,7 +29,8 @@
 #define FLAG_PUSH 2
 /* Added to slopes and residuals, and to weighted slopes: then none is negative. Of a product these are whole
  * numbers after its shift by 14 or 8 bits, which can be taken away from the sum. */
-#define LIFT (1 << 16)
+#define LIFT_BITS 16
+#define LIFT (1 << LIFT_BITS)
 #define LIFT_WEIGHTED (1 << 18)
 /* Rows are summed by this many. */
 #define GROUP 4
@@ -116,16 +117,14 @@ bool ih_row_distance(const struct ih_ellipsoid *ellipsoid, const int32_t place_q
  * squares of places s^2 < 2^19.1. */
 struct inverse {
     int64_t by_25_q62; /* 2^62 / (25 L) */
-    int64_t whole_q62; /* 2^62 / L */
-    int64_t whole_q58;
+    int64_t whole_q58; /* 2^58 / L */
 };
 
 static struct inverse invert(int32_t length_q14)
 {
     struct inverse inverse;
     inverse.by_25_q62 = (int64_t)(((uint64_t)1 << 62) / ((uint32_t)length_q14 * 25U)) + 1;
-    inverse.whole_q62 = inverse.by_25_q62 * 25;
-    inverse.whole_q58 = (inverse.whole_q62 >> 4) + 1;
+    inverse.whole_q58 = (inverse.by_25_q62 * 25 >> 4) + 1;
     return inverse;
 }
 
@@ -133,18 +132,6 @@ static struct inverse invert(int32_t length_q14)
 static int32_t by_length_q8(const struct inverse *inverse, int64_t over)
 {
     return (int32_t)((over * inverse->whole_q58 + ((int64_t)1 << 43)) >> 44);
-}
-
-/* ih_div_round(component * 2^14, L), |component| <= L: off by 25 |component| / 2^48 < 1 / (2 L). */
-static int32_t part_q14(const struct inverse *inverse, int32_t component)
-{
-    return (int32_t)((component * inverse->whole_q62 + ((int64_t)1 << 47)) >> 48);
-}
-
-/* ih_div_round(square * 2^20, 100 L) = square * 2^18 / (25 L): off by square / 2^44 < 1 / (50 L). */
-static int32_t square_part_q14(const struct inverse *inverse, int64_t square)
-{
-    return (int32_t)((square * inverse->by_25_q62 + ((int64_t)1 << 43)) >> 44);
 }
 
 #if defined __x86_64__ && defined __SSE2__
@@ -157,6 +144,11 @@ typedef __m256i lanes;
 #define PRODUCT(a, b) _mm256_mul_epu32(a, b)
 #define SUM(a, b) _mm256_add_epi64(a, b)
 #define SHIFT(a, bits) _mm256_srli_epi64(a, bits)
+#define SHIFT_UP(a, bits) _mm256_slli_epi64(a, bits)
+#define REST(a, b) _mm256_sub_epi64(a, b)
+#define FLIP(a, b) _mm256_xor_si256(a, b)
+/* All bits where it is negative, if 32 bits hold it: both halves are the upper one. */
+#define SIGN(a) _mm256_shuffle_epi32(a, 0xf5)
 #else
 #define LANES 2
 typedef __m128i lanes;
@@ -166,8 +158,50 @@ typedef __m128i lanes;
 #define PRODUCT(a, b) _mm_mul_epu32(a, b)
 #define SUM(a, b) _mm_add_epi64(a, b)
 #define SHIFT(a, bits) _mm_srli_epi64(a, bits)
+#define SHIFT_UP(a, bits) _mm_slli_epi64(a, bits)
+#define REST(a, b) _mm_sub_epi64(a, b)
+#define FLIP(a, b) _mm_xor_si128(a, b)
+#define SIGN(a) _mm_shuffle_epi32(a, 0xf5)
 #endif
 _Static_assert(GROUP % LANES == 0, "rows are whole vectors");
+
+/* (a * b + 2^(bits - 1)) / 2^bits of an a below 2^32, all below 2^64. */
+static inline lanes product_shift(lanes a, lanes b, int bits)
+{
+    const lanes high = SHIFT_UP(PRODUCT(a, SHIFT(b, 32)), 32);
+    return SHIFT(SUM(SUM(PRODUCT(a, b), high), ALL((int64_t)1 << (bits - 1))), bits);
+}
+
+/* The lifted slope of unknown i in whole vectors, and what its weighted one is. */
+static inline void set_slope(struct ih_rows *rows, int32_t k, int i, lanes slope, lanes weight,
+                             lanes lift_q30)
+{
+    const lanes lifted = REST(ALL(LIFT), slope);
+    STORE(&rows->slope_q14[i][k], lifted);
+    STORE(&rows->weighted_q16[i][k], SHIFT(SUM(PRODUCT(weight, lifted), lift_q30), 14));
+}
+
+static void find_slopes(struct ih_rows *rows, int32_t count)
+{
+    for (int32_t k = 0; k < count; k += LANES) {
+        const lanes by_25 = LOAD(&rows->by_25_q62[k]);
+        const lanes whole = SUM(SUM(SHIFT_UP(by_25, 4), SHIFT_UP(by_25, 3)), by_25);
+        const lanes weight = LOAD(&rows->weight_q16[k]);
+        const lanes lift_q30 =
+            REST(ALL(((int64_t)LIFT_WEIGHTED << 14) + (1 << 13)), SHIFT_UP(weight, LIFT_BITS));
+        for (int axis = 0; axis < 3; axis++) {
+            const lanes component = LOAD(&rows->component_q14[axis][k]);
+            const lanes sign = SIGN(component);
+            const lanes part = product_shift(REST(FLIP(component, sign), sign), whole, 48);
+            set_slope(rows, k, axis, REST(FLIP(part, sign), sign), weight, lift_q30);
+            const lanes place = LOAD(&rows->place_q14[axis][k]);
+            const lanes place_sign = SIGN(place);
+            const lanes size = REST(FLIP(place, place_sign), place_sign);
+            const lanes square = SHIFT(SUM(PRODUCT(size, size), ALL(1 << 13)), 14);
+            set_slope(rows, k, 3 + axis, product_shift(square, by_25, 44), weight, lift_q30);
+        }
+    }
+}
 
 static inline uint64_t sum_lanes(lanes value)
 {
@@ -214,6 +248,43 @@ sum_products(const struct ih_rows *rows, int32_t count, int i, uint64_t sum[IH_F
     sum[IH_FIT_UNKNOWNS] = sum_lanes(residual);
 }
 #else
+/* ih_div_round(component * 2^14, L), |component| <= L: off by 25 |component| / 2^48 < 1 / (2 L). */
+static int32_t part_q14(int64_t whole_q62, int32_t component)
+{
+    return (int32_t)((component * whole_q62 + ((int64_t)1 << 47)) >> 48);
+}
+
+/* ih_div_round(square * 2^20, 100 L) = square * 2^18 / (25 L): off by square / 2^44 < 1 / (50 L). */
+static int32_t square_part_q14(int64_t by_25_q62, int64_t square)
+{
+    return (int32_t)((square * by_25_q62 + ((int64_t)1 << 43)) >> 44);
+}
+
+static void set_slope(struct ih_rows *rows, int32_t k, int i, int32_t slope_q14, uint64_t lift_q30)
+{
+    const uint32_t lifted = (uint32_t)(LIFT - slope_q14);
+    IH_IN_RANGE(slope_q14, -IH_RANGE_SLOPE_Q14, IH_RANGE_SLOPE_Q14);
+    rows->slope_q14[i][k] = lifted;
+    rows->weighted_q16[i][k] =
+        (ih_row_entry)(((uint64_t)rows->weight_q16[k] * lifted + lift_q30) >> 14);
+}
+
+static void find_slopes(struct ih_rows *rows, int32_t count)
+{
+    for (int32_t k = 0; k < count; k++) {
+        const int64_t by_25 = (int64_t)rows->by_25_q62[k];
+        const uint64_t lift_q30 = ((uint64_t)LIFT_WEIGHTED << 14) + (1 << 13) -
+                                  ((uint64_t)rows->weight_q16[k] << LIFT_BITS);
+        for (int axis = 0; axis < 3; axis++) {
+            const int32_t place = (int32_t)rows->place_q14[axis][k];
+            const int32_t component = (int32_t)rows->component_q14[axis][k];
+            const int64_t s2_q14 = ih_mul_shift(place, place, 14);
+            set_slope(rows, k, axis, part_q14(by_25 * 25, component), lift_q30);
+            set_slope(rows, k, 3 + axis, square_part_q14(by_25, s2_q14), lift_q30);
+        }
+    }
+}
+
 static uint64_t sum_entries(const ih_row_entry *entry, int32_t count)
 {
     uint32_t sum = 0; /* of 128 that are below 2^19 */
@@ -288,37 +359,30 @@ static void flush_rows(struct ih_rows *rows, struct ih_row_system *system)
 {
     const int32_t count = (rows->count + GROUP - 1) / GROUP * GROUP;
     for (int32_t k = rows->count; k < count; k++) { /* rows of nothing add nothing */
-        for (int i = 0; i < IH_FIT_UNKNOWNS; i++) {
-            rows->slope_q14[i][k] = LIFT;
-            rows->weighted_q16[i][k] = LIFT_WEIGHTED;
+        for (int axis = 0; axis < 3; axis++) {
+            rows->place_q14[axis][k] = 0;
+            rows->component_q14[axis][k] = 0;
         }
+        rows->by_25_q62[k] = 0;
+        rows->weight_q16[k] = 0;
         rows->slope_q14[IH_FIT_UNKNOWNS][k] = LIFT;
     }
+    find_slopes(rows, count);
     sum_rows(rows, count, system);
     rows->count = 0;
 }
 
-/* A weight times a slope, lifted: what the slope's own lift brings in is taken away before the shift. */
 static void add_row(struct ih_rows *rows, struct ih_row_system *system, const struct gradient *g,
                     const struct inverse *inverse, const int32_t place_q14[3],
                     int32_t residual_mm_q8, int32_t weight_q16)
 {
     const int32_t at = rows->count++;
-    const uint32_t weight = (uint32_t)weight_q16;
-    const uint64_t lift_q30 =
-        ((uint64_t)LIFT_WEIGHTED << 14) + (1 << 13) - (uint64_t)weight * LIFT;
-    uint32_t lifted_q14[IH_FIT_UNKNOWNS];
     for (int axis = 0; axis < 3; axis++) {
-        const int64_t s2_q14 = ih_mul_shift(place_q14[axis], place_q14[axis], 14);
-        lifted_q14[axis] = (uint32_t)(LIFT - part_q14(inverse, g->component_q14[axis]));
-        lifted_q14[3 + axis] = (uint32_t)(LIFT - square_part_q14(inverse, s2_q14));
+        rows->place_q14[axis][at] = place_q14[axis];
+        rows->component_q14[axis][at] = g->component_q14[axis];
     }
-    for (int i = 0; i < IH_FIT_UNKNOWNS; i++) {
-        IH_IN_RANGE((int32_t)lifted_q14[i] - LIFT, -IH_RANGE_SLOPE_Q14, IH_RANGE_SLOPE_Q14);
-        rows->slope_q14[i][at] = lifted_q14[i];
-        rows->weighted_q16[i][at] =
-            (uint32_t)(((uint64_t)weight * lifted_q14[i] + lift_q30) >> 14);
-    }
+    rows->by_25_q62[at] = (uint64_t)inverse->by_25_q62;
+    rows->weight_q16[at] = (uint32_t)weight_q16;
     rows->slope_q14[IH_FIT_UNKNOWNS][at] = (uint32_t)(residual_mm_q8 + LIFT);
     if (rows->count == IH_ROW_MAX) {
         flush_rows(rows, system);

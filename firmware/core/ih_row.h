@@ -20,7 +20,7 @@
 #include "ih_ellipsoid.h"
 
 #define IH_FIT_UNKNOWNS 6
-/* Rows that are summed at once; each costs 52 bytes, twice as many on x86-64. */
+/* Rows that are summed at once; each costs 88 bytes, twice as many on x86-64. */
 #define IH_ROW_MAX 128
 /* The slots in whole vectors. */
 #define IH_ROW_RAYS ((IH_SLOTS + 15) / 16 * 16)
@@ -36,12 +36,19 @@ struct ih_row_rays {
 /* An entry of a row, made positive, is below 2^32; on x86-64 it is as wide as its product, see ih_normal. */
 #if defined __x86_64__
 typedef uint64_t ih_row_entry;
+typedef int64_t ih_row_number;
 #else
 typedef uint32_t ih_row_entry;
+typedef int32_t ih_row_number;
 #endif
 
 struct ih_rows {
     int32_t count;
+    /* What a row is made of: a place in semi-axes, and over them again (ih_row.c); 2^62 over 25 times the
+     * gradient's length. */
+    ih_row_number place_q14[3][IH_ROW_MAX], component_q14[3][IH_ROW_MAX];
+    uint64_t by_25_q62[IH_ROW_MAX];
+    ih_row_entry weight_q16[IH_ROW_MAX];
     /* By unknown, then the residual in mm Q8; each with its lift (ih_row.c). */
     ih_row_entry slope_q14[IH_FIT_UNKNOWNS + 1][IH_ROW_MAX];
     ih_row_entry weighted_q16[IH_FIT_UNKNOWNS][IH_ROW_MAX];
