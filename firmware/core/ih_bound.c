@@ -237,10 +237,17 @@ static inline void add_around(const struct place *place, const struct pass *pass
                               struct lanes *sums)
 {
     const lane margin = place->margin_q10;
+    if (ONE_BY_ONE && (pass->radius2_q10 <= RING_INNER2_Q10 - margin ||
+                       pass->radius2_q10 >= RING_OUTER2_Q10 + margin)) {
+        return;
+    }
     const lane t_q12 = wrap(pass->t_q11 * 2);
     const lane x_q12 = wrap(wrap(pass->ex_q11 - high_half(t_q12, pass->gx_q15)) * 2);
     const lane y_q11 = wrap(pass->ey_q11 - high_half(t_q12, pass->gy_q15));
     const lane beside_q11 = wrap(high_half(size(x_q12), X_OVER_Y_Q15) - y_q11);
+    if (ONE_BY_ONE && beside_q11 <= -margin) {
+        return;
+    }
     const lane is_open = is_above(pass->depth_q1, place->open_mm_q1);
     const lane value = wrap((pick(is_open, AROUND_OPEN, AROUND_NEAR) & pass->seen) | unseen);
     const lane may = wrap(pass->near & is_above(pass->radius2_q10, wrap(RING_INNER2_Q10 - margin)) &
@@ -254,9 +261,8 @@ static inline void add_around(const struct place *place, const struct pass *pass
     sums->around_most = wrap(sums->around_most - may);
 }
 
-/* A ray through it: how far the point is behind the entry. */
-static inline void add_inside(const struct place *place, const struct pass *pass, lane unseen,
-                              struct lanes *sums)
+/* How far a ray's point is behind the entry says what it is worth. */
+static inline lane depth_value(const struct place *place, const struct pass *pass)
 {
     const lane margin = place->margin_q10;
     const lane dz_q1 = within(wrap(pass->depth_q1 - place->depth_mm_q1), DEPTH_CUT_Q1);
@@ -265,14 +271,30 @@ static inline void add_inside(const struct place *place, const struct pass *pass
     const lane root2_q10 =
         wrap(high_half(wrap(wrap(1024 - pass->radius2_q10) * 16), pass->inverse_q15) >> 3);
     const lane nearer = wrap(least(most(wrap(before_q11 + NEARER_Q11), 0), ROOT_CUT_Q11) * 4);
-    const lane behind = wrap(least(most(wrap(before_q11 + BEHIND_Q11), 0), ROOT_CUT_Q11) * 4);
-    const lane far = wrap(least(most(wrap(before_q11 + FAR_Q11), 0), ROOT_CUT_Q11) * 4);
     const lane may_touch = is_above(wrap(root2_q10 + margin), high_half(nearer, nearer));
+    if (ONE_BY_ONE && may_touch == 0) {
+        return VALUE_NEARER;
+    }
+    const lane behind = wrap(least(most(wrap(before_q11 + BEHIND_Q11), 0), ROOT_CUT_Q11) * 4);
     const lane is_behind = is_above(wrap(root2_q10 - margin), high_half(behind, behind));
+    if (ONE_BY_ONE && is_behind == 0) {
+        return VALUE_ON;
+    }
+    const lane far = wrap(least(most(wrap(before_q11 + FAR_Q11), 0), ROOT_CUT_Q11) * 4);
     const lane is_far = is_above(wrap(root2_q10 - margin), high_half(far, far));
-    lane value = pick(may_touch, pick(is_behind, pick(is_far, VALUE_FAR, VALUE_BEHIND), VALUE_ON),
-                      VALUE_NEARER);
-    value = wrap((value & pass->seen) | unseen);
+    return pick(may_touch, pick(is_behind, pick(is_far, VALUE_FAR, VALUE_BEHIND), VALUE_ON),
+                VALUE_NEARER);
+}
+
+/* A ray through it. */
+static inline void add_inside(const struct place *place, const struct pass *pass, lane unseen,
+                              struct lanes *sums)
+{
+    const lane margin = place->margin_q10;
+    lane value = unseen;
+    if (!ONE_BY_ONE || pass->seen != 0) {
+        value = wrap((depth_value(place, pass) & pass->seen) | unseen);
+    }
     const lane may = wrap(pass->near & is_above(wrap(1024 + margin), pass->radius2_q10));
     lane must = wrap(pass->near & is_above(wrap(1024 - margin), pass->radius2_q10));
     must = wrap(must | (may & is_above(value, 0))); /* a value of 1 lowers no mean */
