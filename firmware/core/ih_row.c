@@ -32,8 +32,6 @@
 #define LIFT_BITS 16
 #define LIFT (1 << LIFT_BITS)
 #define LIFT_WEIGHTED (1 << 18)
-/* Rows are summed by this many. */
-#define GROUP 4
 
 static int16_t saturate_s16(int64_t value)
 {
@@ -110,31 +108,8 @@ bool ih_row_distance(const struct ih_ellipsoid *ellipsoid, const int32_t place_q
     return true;
 }
 
-/* Quotients by a gradient's length L, 151 and more: 25 L once, and products that are rounded as
- * ih_div_round does. With v, too great by less than 1, instead of 2^62 / (25 L), a quotient n / d is
- * too great by n' v / 2^k - n / d < n' / 2^k (n' and k as below); it must stay below 1 / (2 d), what it
- * is away from a half at least if not on it. For f up to 5.8, the most that has a weight, L < 2^17.3 and
- * squares of places s^2 < 2^19.1. */
-struct inverse {
-    int64_t by_25_q62; /* 2^62 / (25 L) */
-    int64_t whole_q58; /* 2^58 / L */
-};
-
-static struct inverse invert(int32_t length_q14)
-{
-    struct inverse inverse;
-    inverse.by_25_q62 = (int64_t)(((uint64_t)1 << 62) / ((uint32_t)length_q14 * 25U)) + 1;
-    inverse.whole_q58 = (inverse.by_25_q62 * 25 >> 4) + 1;
-    return inverse;
-}
-
-/* ih_div_round(over * 2^14, L), |over| < 2^19.4 and 15 L: off by 2.6 |over| / 2^44 < 1 / (2 L). */
-static int32_t by_length_q8(const struct inverse *inverse, int64_t over)
-{
-    return (int32_t)((over * inverse->whole_q58 + ((int64_t)1 << 43)) >> 44);
-}
-
 #if defined __x86_64__ && defined __SSE2__
+#define ALWAYS_INLINE inline __attribute__((always_inline))
 #if defined __AVX2__
 #define LANES 4
 typedef __m256i lanes;
@@ -163,7 +138,38 @@ typedef __m128i lanes;
 #define FLIP(a, b) _mm_xor_si128(a, b)
 #define SIGN(a) _mm_shuffle_epi32(a, 0xf5)
 #endif
-_Static_assert(GROUP % LANES == 0, "rows are whole vectors");
+
+/* Quotients by a gradient's length L, 151 and more: 25 L once, and products that are rounded as
+ * ih_div_round does. With v, too great by less than 1, instead of 2^62 / (25 L), a quotient n / d is
+ * too great by n' v / 2^k - n / d < n' / 2^k (n' and k as below); it must stay below 1 / (2 d), what it
+ * is away from a half at least if not on it. For f up to 5.8, the most that has a weight, L < 2^17.3 and
+ * squares of places s^2 < 2^19.1. */
+struct inverse {
+    int64_t by_25_q62; /* 2^62 / (25 L) */
+    int64_t whole_q58; /* 2^58 / L */
+};
+
+static struct inverse invert(int32_t length_q14)
+{
+    struct inverse inverse;
+    inverse.by_25_q62 = (int64_t)(((uint64_t)1 << 62) / ((uint32_t)length_q14 * 25U)) + 1;
+    inverse.whole_q58 = (inverse.by_25_q62 * 25 >> 4) + 1;
+    return inverse;
+}
+
+/* ih_div_round(over * 2^14, L), |over| < 2^19.4 and 15 L: off by 2.6 |over| / 2^44 < 1 / (2 L). */
+static int32_t by_length_q8(const struct inverse *inverse, int64_t over)
+{
+    return (int32_t)((over * inverse->whole_q58 + ((int64_t)1 << 43)) >> 44);
+}
+
+/* A gradient's residual; of its length what find_slopes divides by. */
+static int32_t find_residual(const struct gradient *g, ih_row_entry *length)
+{
+    const struct inverse inverse = invert(g->length_q14);
+    *length = (uint64_t)inverse.by_25_q62;
+    return by_length_q8(&inverse, over_q14(g));
+}
 
 /* (a * b + 2^(bits - 1)) / 2^bits of an a below 2^32, all below 2^64. */
 static inline lanes product_shift(lanes a, lanes b, int bits)
@@ -184,7 +190,7 @@ static inline void set_slope(struct ih_rows *rows, int32_t k, int i, lanes slope
 static void find_slopes(struct ih_rows *rows, int32_t count)
 {
     for (int32_t k = 0; k < count; k += LANES) {
-        const lanes by_25 = LOAD(&rows->by_25_q62[k]);
+        const lanes by_25 = LOAD(&rows->length[k]);
         const lanes whole = SUM(SUM(SHIFT_UP(by_25, 4), SHIFT_UP(by_25, 3)), by_25);
         const lanes weight = LOAD(&rows->weight_q16[k]);
         const lanes lift_q30 =
@@ -223,8 +229,8 @@ static uint64_t sum_entries(const ih_row_entry *entry, int32_t count)
 }
 
 /* Sums of the weighted entries' products with the first slopes, and with the residuals behind them. */
-static inline __attribute__((always_inline)) void
-sum_products(const struct ih_rows *rows, int32_t count, int i, uint64_t sum[IH_FIT_UNKNOWNS + 1])
+static ALWAYS_INLINE void sum_products(const struct ih_rows *rows, int32_t count, int i,
+                                       uint64_t sum[IH_FIT_UNKNOWNS + 1])
 {
     const lanes half_q30 = ALL(1 << 13);
     const lanes half_q24 = ALL(1 << 7);
@@ -248,16 +254,29 @@ sum_products(const struct ih_rows *rows, int32_t count, int i, uint64_t sum[IH_F
     sum[IH_FIT_UNKNOWNS] = sum_lanes(residual);
 }
 #else
-/* ih_div_round(component * 2^14, L), |component| <= L: off by 25 |component| / 2^48 < 1 / (2 L). */
-static int32_t part_q14(int64_t whole_q62, int32_t component)
+#define ALWAYS_INLINE
+#define LANES 1
+/* n * 2^(first + second) / d, rounded, in 32 bits: n * 2^first, d * 2^second and what comes out must fit. */
+static uint32_t quotient(uint32_t n, int first, int second, uint32_t d)
 {
-    return (int32_t)((component * whole_q62 + ((int64_t)1 << 47)) >> 48);
+    const uint32_t high = n << first;
+    const uint32_t whole = high / d;
+    return (whole << second) + (((high - whole * d) << second) + d / 2) / d;
 }
 
-/* ih_div_round(square * 2^20, 100 L) = square * 2^18 / (25 L): off by square / 2^44 < 1 / (50 L). */
-static int32_t square_part_q14(int64_t by_25_q62, int64_t square)
+/* As a number that is rounded away from zero on either side. */
+static int32_t with_sign(uint32_t size, int64_t number)
 {
-    return (int32_t)((square * by_25_q62 + ((int64_t)1 << 43)) >> 44);
+    return number < 0 ? -(int32_t)size : (int32_t)size;
+}
+
+/* (f - 1) f over the gradient's length, mm; for f up to 5.9 the one is below 2^19, the other below
+ * 2^17.4. */
+static int32_t find_residual(const struct gradient *g, ih_row_entry *length)
+{
+    const int64_t over = over_q14(g);
+    *length = (uint32_t)g->length_q14;
+    return with_sign(quotient((uint32_t)ih_abs_s64(over), 12, 2, (uint32_t)g->length_q14), over);
 }
 
 static void set_slope(struct ih_rows *rows, int32_t k, int i, int32_t slope_q14, uint64_t lift_q30)
@@ -272,15 +291,17 @@ static void set_slope(struct ih_rows *rows, int32_t k, int i, int32_t slope_q14,
 static void find_slopes(struct ih_rows *rows, int32_t count)
 {
     for (int32_t k = 0; k < count; k++) {
-        const int64_t by_25 = (int64_t)rows->by_25_q62[k];
+        const uint32_t length = (uint32_t)rows->length[k];
         const uint64_t lift_q30 = ((uint64_t)LIFT_WEIGHTED << 14) + (1 << 13) -
                                   ((uint64_t)rows->weight_q16[k] << LIFT_BITS);
         for (int axis = 0; axis < 3; axis++) {
             const int32_t place = (int32_t)rows->place_q14[axis][k];
             const int32_t component = (int32_t)rows->component_q14[axis][k];
-            const int64_t s2_q14 = ih_mul_shift(place, place, 14);
-            set_slope(rows, k, axis, part_q14(by_25 * 25, component), lift_q30);
-            set_slope(rows, k, 3 + axis, square_part_q14(by_25, s2_q14), lift_q30);
+            /* a component is at most the length, below 2^17.4; a square below 2^19.2 */
+            const uint32_t part = (((uint32_t)ih_abs_s32(component) << 14) + length / 2) / length;
+            const uint32_t square = (uint32_t)ih_mul_shift(place, place, 14);
+            set_slope(rows, k, axis, with_sign(part, component), lift_q30);
+            set_slope(rows, k, 3 + axis, (int32_t)quotient(square, 12, 6, 25 * length), lift_q30);
         }
     }
 }
@@ -296,8 +317,8 @@ static uint64_t sum_entries(const ih_row_entry *entry, int32_t count)
 
 /* Sums of the weighted entries' products with the first slopes, and with the residuals behind them. A
  * product is below 2^36: 128 of them, shifted by 14, below 2^29. */
-static inline void sum_products(const struct ih_rows *rows, int32_t count, int i,
-                                uint64_t sum[IH_FIT_UNKNOWNS + 1])
+static void sum_products(const struct ih_rows *rows, int32_t count, int i,
+                         uint64_t sum[IH_FIT_UNKNOWNS + 1])
 {
     const ih_row_entry *weighted = rows->weighted_q16[i];
     for (int j = 0; j <= i; j++) {
@@ -324,46 +345,50 @@ static int64_t lifted(int64_t weighted, int64_t slopes, int32_t count, int shift
 }
 
 /* A line of the lower triangle, and its right side. */
-static inline __attribute__((always_inline)) void sum_line(const struct ih_rows *rows,
-                                                           int32_t count, int i,
-                                                           const int64_t slopes[],
-                                                           struct ih_row_system *system)
+static ALWAYS_INLINE void sum_line(const struct ih_rows *rows, int32_t count, int i,
+                                   const int64_t slopes[], struct ih_row_system *system)
 {
     const int64_t weighted = (int64_t)sum_entries(rows->weighted_q16[i], count);
+    int64_t *line = &system->normal_q16[IH_CHOLESKY_PACKED(i)];
     uint64_t sum[IH_FIT_UNKNOWNS + 1];
     sum_products(rows, count, i, sum);
     for (int j = 0; j <= i; j++) {
-        system->normal_q16[i * (i + 1) / 2 + j] +=
-            (int64_t)sum[j] - lifted(weighted, slopes[j], count, 14);
+        line[j] += (int64_t)sum[j] - lifted(weighted, slopes[j], count, 14);
     }
     system->right_q16[i] -=
         (int64_t)sum[IH_FIT_UNKNOWNS] - lifted(weighted, slopes[IH_FIT_UNKNOWNS], count, 8);
 }
 
-/* Of whole groups of rows. Line by line, so that compilers keep a line's sums in registers. */
+/* Of whole groups of rows. */
 static void sum_rows(const struct ih_rows *rows, int32_t count, struct ih_row_system *system)
 {
     int64_t slopes[IH_FIT_UNKNOWNS + 1];
     for (int i = 0; i <= IH_FIT_UNKNOWNS; i++) {
         slopes[i] = (int64_t)sum_entries(rows->slope_q14[i], count);
     }
-    sum_line(rows, count, 0, slopes, system);
+#if defined __x86_64__ && defined __SSE2__
+    sum_line(rows, count, 0, slopes, system); /* one by one: then a line's sums are in registers */
     sum_line(rows, count, 1, slopes, system);
     sum_line(rows, count, 2, slopes, system);
     sum_line(rows, count, 3, slopes, system);
     sum_line(rows, count, 4, slopes, system);
     sum_line(rows, count, 5, slopes, system);
+#else
+    for (int i = 0; i < IH_FIT_UNKNOWNS; i++) {
+        sum_line(rows, count, i, slopes, system);
+    }
+#endif
 }
 
 static void flush_rows(struct ih_rows *rows, struct ih_row_system *system)
 {
-    const int32_t count = (rows->count + GROUP - 1) / GROUP * GROUP;
+    const int32_t count = (rows->count + LANES - 1) / LANES * LANES;
     for (int32_t k = rows->count; k < count; k++) { /* rows of nothing add nothing */
         for (int axis = 0; axis < 3; axis++) {
             rows->place_q14[axis][k] = 0;
             rows->component_q14[axis][k] = 0;
         }
-        rows->by_25_q62[k] = 0;
+        rows->length[k] = 0;
         rows->weight_q16[k] = 0;
         rows->slope_q14[IH_FIT_UNKNOWNS][k] = LIFT;
     }
@@ -373,21 +398,47 @@ static void flush_rows(struct ih_rows *rows, struct ih_row_system *system)
 }
 
 static void add_row(struct ih_rows *rows, struct ih_row_system *system, const struct gradient *g,
-                    const struct inverse *inverse, const int32_t place_q14[3],
-                    int32_t residual_mm_q8, int32_t weight_q16)
+                    ih_row_entry length, const int32_t place_q14[3], int32_t residual_mm_q8,
+                    int32_t weight_q16)
 {
     const int32_t at = rows->count++;
     for (int axis = 0; axis < 3; axis++) {
         rows->place_q14[axis][at] = place_q14[axis];
         rows->component_q14[axis][at] = g->component_q14[axis];
     }
-    rows->by_25_q62[at] = (uint64_t)inverse->by_25_q62;
+    rows->length[at] = length;
     rows->weight_q16[at] = (uint32_t)weight_q16;
     rows->slope_q14[IH_FIT_UNKNOWNS][at] = (uint32_t)(residual_mm_q8 + LIFT);
     if (rows->count == IH_ROW_MAX) {
         flush_rows(rows, system);
     }
 }
+
+#if UINTPTR_MAX > UINT32_MAX
+/* s^-2, rounded. */
+static int32_t inverse_square_q16(uint64_t s_q16)
+{
+    const uint64_t square_q32 = s_q16 * s_q16;
+    return (int32_t)((((uint64_t)1 << 48) + square_q32 / 2) / square_q32);
+}
+#else
+/* The same for s from 1 to 65 without a division of 64 bits, which is a long one here. 2^40 / s less than
+ * 1 too small has a square that is, over 2^32, up to 2^-15 times the root of the result too small, and by
+ * what is cut off: less than 2. */
+static int32_t inverse_square_q16(uint32_t s_q16)
+{
+    const uint32_t high = (1U << 31) / s_q16;
+    const uint32_t inverse_q24 = (high << 9) + ((((1U << 31) - high * s_q16) << 9) / s_q16);
+    const uint64_t square_q32 = (uint64_t)s_q16 * s_q16;
+    uint32_t result = (uint32_t)((uint64_t)inverse_q24 * inverse_q24 >> 32);
+    uint64_t rest = ((uint64_t)1 << 48) + square_q32 / 2 - result * square_q32;
+    while (rest >= square_q32) {
+        rest -= square_q32;
+        result++;
+    }
+    return (int32_t)result;
+}
+#endif
 
 /* (1 + (r / k)^2)^-2; 0 where that is next to nothing. */
 static int32_t robust_weight_q16(int32_t residual_mm_q8, int32_t scale_mm)
@@ -398,9 +449,7 @@ static int32_t robust_weight_q16(int32_t residual_mm_q8, int32_t scale_mm)
     }
     const uint32_t scale2 = (uint32_t)(scale_mm * scale_mm);
     const uint32_t ratio2_q16 = ((uint32_t)size_q8 * (uint32_t)size_q8 + scale2 / 2) / scale2;
-    const uint64_t sum_q16 = (uint64_t)ONE_Q16 + ratio2_q16;
-    const uint64_t sum2_q32 = sum_q16 * sum_q16;
-    return (int32_t)((((uint64_t)1 << 48) + sum2_q32 / 2) / sum2_q32);
+    return inverse_square_q16(ONE_Q16 + ratio2_q16);
 }
 
 /* A weight, less for what is low on the head. */
@@ -522,11 +571,11 @@ static void add_point(const struct step *step, const struct ih_ray *ray, struct 
     if (radius2_q28 > step->reach2_q28 || !find_gradient(component_q14, radius2_q28, &g)) {
         return;
     }
-    const struct inverse inverse = invert(g.length_q14);
-    const int32_t residual_mm_q8 = by_length_q8(&inverse, over_q14(&g));
+    ih_row_entry length;
+    const int32_t residual_mm_q8 = find_residual(&g, &length);
     const int32_t weight_q16 = robust_weight_q16(residual_mm_q8, step->scale_mm);
     if (weight_q16 > 0) {
-        add_row(rows, system, &g, &inverse, place_q14, residual_mm_q8,
+        add_row(rows, system, &g, length, place_q14, residual_mm_q8,
                 lowered_q16(weight_q16, place_q14[1]));
     }
 }
@@ -550,9 +599,9 @@ static void add_push(const struct step *step, const struct ih_ray *ray, struct i
         component_q14[axis] = ih_share(step->shares.share_q50[axis], crossing.nearest_q14[axis]);
     }
     if (find_gradient(component_q14, square_q28(crossing.nearest_q14), &g)) {
-        const struct inverse inverse = invert(g.length_q14);
-        const int32_t residual_mm_q8 = by_length_q8(&inverse, over_q14(&g));
-        add_row(rows, system, &g, &inverse, crossing.nearest_q14,
+        ih_row_entry length;
+        const int32_t residual_mm_q8 = find_residual(&g, &length);
+        add_row(rows, system, &g, length, crossing.nearest_q14,
                 ih_max_s32(residual_mm_q8, -PUSH_MAX_MM_Q8), PUSH_WEIGHT_Q16);
     }
 }

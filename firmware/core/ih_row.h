@@ -7,8 +7,8 @@
  *        vectors of 16 bits, for more rather than for fewer; of what is left each is looked at as
  *        ih_fit.h says. Rows are kept until there are IH_ROW_MAX, then their products are summed in
  *        vectors; sums are whole numbers, their order is nobody's business.
- *        Quotients by a semi-axis or by the gradient's length are products with an inverse that is
- *        worked out once, equal to ih_div_round's to the last bit (ih_share, ih_row.c).
+ *        Quotients by a semi-axis, and on x86-64 by the gradient's length, are products with an inverse
+ *        that is worked out once, equal to ih_div_round's to the last bit (ih_share, ih_row.c).
  * Overflow: as in ih_fit.h; a product with 2^40 added is below 2^41.
  * Cost:  5 comparisons of 16 bits twice for each of 361 rays, a step; a division and two roots for a
  *        point in reach; 27 products for one with a weight.
@@ -20,7 +20,7 @@
 #include "ih_ellipsoid.h"
 
 #define IH_FIT_UNKNOWNS 6
-/* Rows that are summed at once; each costs 88 bytes, twice as many on x86-64. */
+/* Rows that are summed at once; each costs 84 bytes, twice as many on x86-64. */
 #define IH_ROW_MAX 128
 /* The slots in whole vectors. */
 #define IH_ROW_RAYS ((IH_SLOTS + 15) / 16 * 16)
@@ -44,10 +44,9 @@ typedef int32_t ih_row_number;
 
 struct ih_rows {
     int32_t count;
-    /* What a row is made of: a place in semi-axes, and over them again (ih_row.c); 2^62 over 25 times the
-     * gradient's length. */
+    /* What a row is made of: a place in semi-axes, and over them again, the gradient's length (ih_row.c). */
     ih_row_number place_q14[3][IH_ROW_MAX], component_q14[3][IH_ROW_MAX];
-    uint64_t by_25_q62[IH_ROW_MAX];
+    ih_row_entry length[IH_ROW_MAX];
     ih_row_entry weight_q16[IH_ROW_MAX];
     /* By unknown, then the residual in mm Q8; each with its lift (ih_row.c). */
     ih_row_entry slope_q14[IH_FIT_UNKNOWNS + 1][IH_ROW_MAX];
