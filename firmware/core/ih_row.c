@@ -520,22 +520,32 @@ static struct interval slopes_within(const struct step *step, int axis)
                        (off_q8 + half_q8) * 4096 / depth_q8 + 2);
 }
 
-/* A loop without a branch: compilers turn it into vectors. */
-static void flag_rays(const struct step *step, struct ih_row_scratch *scratch)
+/* What a ray must be within, to be looked at. */
+struct bounds {
+    struct interval point[3], slope[2];
+    int16_t front; /* of a point that pushes, at least */
+};
+
+static struct bounds bounds_of(const struct step *step)
 {
-    const struct ih_row_rays *rays = &scratch->rays;
-    const struct interval dx = slopes_within(step, 0);
-    const struct interval dy = slopes_within(step, 1);
-    const int16_t front = saturate_s16(step->front_mm_q8 >> 7);
-    struct interval reach[3];
+    struct bounds bounds = {.slope = {slopes_within(step, 0), slopes_within(step, 1)},
+                            .front = saturate_s16(step->front_mm_q8 >> 7)};
     for (int axis = 0; axis < 3; axis++) {
         const int32_t centre_q8 = step->ellipsoid->centre_mm_q8[axis];
-        reach[axis] = interval_of((centre_q8 - step->reach_mm_q8[axis]) >> 7,
-                                  (centre_q8 + step->reach_mm_q8[axis]) >> 7);
+        bounds.point[axis] = interval_of((centre_q8 - step->reach_mm_q8[axis]) >> 7,
+                                         (centre_q8 + step->reach_mm_q8[axis]) >> 7);
     }
-    const struct interval x = reach[0];
-    const struct interval y = reach[1];
-    const struct interval z = reach[2];
+    return bounds;
+}
+
+#if defined __SSE2__ || defined __ARM_NEON
+/* A loop without a branch: compilers turn it into vectors. */
+static void flag_rays(const struct bounds *bounds, struct ih_row_scratch *scratch)
+{
+    const struct ih_row_rays *rays = &scratch->rays;
+    const struct interval x = bounds->point[0], y = bounds->point[1], z = bounds->point[2];
+    const struct interval dx = bounds->slope[0], dy = bounds->slope[1];
+    const int16_t front = bounds->front;
     for (int32_t slot = 0; slot < IH_ROW_RAYS; slot++) {
         const int16_t at_x = rays->point_mm_q1[0][slot];
         const int16_t at_y = rays->point_mm_q1[1][slot];
@@ -551,6 +561,34 @@ static void flag_rays(const struct step *step, struct ih_row_scratch *scratch)
         scratch->flag[slot] |= (uint8_t)((seen & may_push) << 1);
     }
 }
+#else
+static bool is_within(int16_t value, const struct interval *interval)
+{
+    return value >= interval->low && value <= interval->high;
+}
+
+/* Where there are no vectors, most rays are told by one comparison. */
+static void flag_rays(const struct bounds *bounds, struct ih_row_scratch *scratch)
+{
+    const struct ih_row_rays *rays = &scratch->rays;
+    const struct interval *point = bounds->point, *slope = bounds->slope;
+    for (int32_t slot = 0; slot < IH_ROW_RAYS; slot++) {
+        uint8_t flag = 0;
+        if (rays->seen[slot] != 0) {
+            const int16_t at_z = rays->point_mm_q1[2][slot];
+            if (is_within(rays->point_mm_q1[0][slot], &point[0]) &&
+                is_within(rays->point_mm_q1[1][slot], &point[1]) && is_within(at_z, &point[2])) {
+                flag = FLAG_POINT;
+            }
+            if (is_within(rays->slope_q12[0][slot], &slope[0]) &&
+                is_within(rays->slope_q12[1][slot], &slope[1]) && at_z >= bounds->front) {
+                flag |= FLAG_PUSH;
+            }
+        }
+        scratch->flag[slot] = flag;
+    }
+}
+#endif
 
 static void add_point(const struct step *step, const struct ih_ray *ray, struct ih_rows *rows,
                       struct ih_row_system *system)
@@ -615,7 +653,8 @@ void ih_row_collect(const struct ih_space *space, const struct ih_ellipsoid *ell
                         .scale_mm = scale_mm,
                         .see_through_mm = see_through_mm};
     begin_step(&step, &scratch->rays);
-    flag_rays(&step, scratch);
+    const struct bounds bounds = bounds_of(&step);
+    flag_rays(&bounds, scratch);
     memset(out, 0, sizeof *out);
     scratch->rows.count = 0;
     for (int32_t first = 0; first < IH_SLOTS; first += 8) {
