@@ -36,7 +36,7 @@ struct candidate {
     struct ih_ellipsoid_box box; /* rays through it pass here */
 };
 
-/* One ray against the candidate. */
+/* One ray against the candidate; its state is known. */
 struct view {
     const struct ih_ray *ray;
     bool may_hit;
@@ -45,7 +45,7 @@ struct view {
     int32_t below_chin_mm_q8; /* y less the semi-axis up */
     int32_t dz_mm_q8;         /* of its point, against the centre */
     int64_t distance2_q28;    /* of the offset, in semi-axes */
-    bool is_seen, is_telling, is_open, is_body;
+    bool is_seen, is_open, is_body;
 };
 
 struct tally {
@@ -96,10 +96,9 @@ static bool make_view(const struct candidate *candidate, const struct ih_ray *ra
     view->below_chin_mm_q8 = view->y_mm_q8 - ellipsoid->semi_mm_q8[1];
     view->distance2_q28 = (int64_t)at_q14[0] * at_q14[0] + (int64_t)at_q14[1] * at_q14[1];
     view->is_seen = view->ray->state == IH_RAY_SEEN;
-    view->is_telling = view->ray->state != IH_RAY_UNKNOWN;
     view->dz_mm_q8 =
         view->is_seen ? view->ray->point_mm_q8[2] - ellipsoid->centre_mm_q8[2] : INT32_MAX;
-    view->is_open = view->is_telling && view->dz_mm_q8 > OPEN_MM_Q8;
+    view->is_open = view->dz_mm_q8 > OPEN_MM_Q8;
     view->is_body =
         view->is_seen && view->dz_mm_q8 > BODY_BEFORE_MM_Q8 && view->dz_mm_q8 < BODY_BEHIND_MM_Q8;
     return true;
@@ -159,9 +158,6 @@ static void look_around(const struct view *view, struct tally *tally)
 {
     int64_t ex = view->at_q14[0];
     int64_t ey = view->at_q14[1];
-    if (!view->is_telling) {
-        return;
-    }
     if (ey < -HIGH_FROM_Q14 && ih_abs_s64(ex) < HIGH_WIDE_Q14) {
         count(&tally->high, view->is_open);
     }
@@ -191,9 +187,6 @@ static void look_below(const struct view *view, const struct ih_ellipsoid *ellip
 {
     int32_t aside_q8 = ih_abs_s32(view->x_mm_q8);
     int32_t chin_q8 = view->below_chin_mm_q8;
-    if (!view->is_telling) {
-        return;
-    }
     if (between_mm(chin_q8, 40, 260) && aside_q8 < 180 << 8) {
         count(&tally->body, view->is_body);
         tally->body_dz_q8 += view->is_body ? view->dz_mm_q8 : 0;
@@ -316,7 +309,8 @@ void ih_evidence_collect(const struct ih_space *space, const int32_t slope_most_
     memset(&tally, 0, sizeof tally);
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
         struct view view;
-        if (!make_view(&candidate, &space->ray[slot], &view)) {
+        if (space->ray[slot].state == IH_RAY_UNKNOWN ||
+            !make_view(&candidate, &space->ray[slot], &view)) {
             continue;
         }
         look_inside(&candidate, &view, &tally);

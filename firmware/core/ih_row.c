@@ -627,8 +627,12 @@ static void add_push(const struct step *step, const struct ih_ray *ray, struct i
     struct ih_crossing crossing;
     struct gradient g;
     if (ray->point_mm_q8[2] < step->front_mm_q8 ||
-        !ih_ellipsoid_in_box(ellipsoid, &step->box, step->origin_mm_q8, ray) ||
-        !ih_ellipsoid_cross(ellipsoid, step->origin_mm_q8, ray, &crossing) ||
+        !ih_ellipsoid_in_box(ellipsoid, &step->box, step->origin_mm_q8, ray)) {
+        return;
+    }
+    const struct ih_aim aim = ih_ellipsoid_aim(ellipsoid->semi_mm_q8, ray);
+    if (!ih_ellipsoid_cross_aimed(ellipsoid, &step->shares, step->origin_mm_q8, ray, &aim,
+                                  &crossing) ||
         crossing.radius2_q14 >= ONE_Q14 ||
         ray->point_mm_q8[2] - step->see_through_mm * 256 <= crossing.entry_mm_q8) {
         return;

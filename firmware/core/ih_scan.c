@@ -96,10 +96,11 @@ struct sums {
 };
 
 static void add_ray(const struct ih_space *space, const struct ih_ellipsoid *head,
-                    const struct ih_ray *ray, const struct ih_aim *aim, struct sums *sums)
+                    const struct ih_shares *shares, const struct ih_ray *ray,
+                    const struct ih_aim *aim, struct sums *sums)
 {
     struct ih_crossing crossing;
-    if (!ih_ellipsoid_cross_aimed(head, space->origin_mm_q8, ray, aim, &crossing)) {
+    if (!ih_ellipsoid_cross_aimed(head, shares, space->origin_mm_q8, ray, aim, &crossing)) {
         return;
     }
     if (crossing.radius2_q14 < 1 << 14) {
@@ -115,13 +116,14 @@ static int32_t score_q12(const struct ih_space *space, struct ih_scan_scratch *s
                          const struct ih_ellipsoid *head)
 {
     struct sums sums = {0};
+    const struct ih_shares shares = ih_ellipsoid_shares(head->semi_mm_q8);
     flag_near(space, head->centre_mm_q8, scratch);
     for (int32_t first = 0; first < IH_SLOTS; first += 8) {
         uint64_t any; /* of eight slots */
         memcpy(&any, &scratch->near[first], sizeof any);
         for (int32_t slot = first; any != 0 && slot < ih_min_s32(first + 8, IH_SLOTS); slot++) {
             if (scratch->near[slot] != 0) {
-                add_ray(space, head, &space->ray[slot], &scratch->aim[slot], &sums);
+                add_ray(space, head, &shares, &space->ray[slot], &scratch->aim[slot], &sums);
             }
         }
     }
