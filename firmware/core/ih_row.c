@@ -115,7 +115,7 @@ bool ih_row_distance(const struct ih_ellipsoid *ellipsoid, const int32_t place_q
 typedef __m256i lanes;
 #define LOAD(from) _mm256_loadu_si256((const lanes *)(const void *)(from))
 #define STORE(to, value) _mm256_storeu_si256((lanes *)(void *)(to), value)
-#define ALL(value) _mm256_set1_epi64x(value)
+#define ALL(value) _mm256_set1_epi64x((long long)(value))
 #define PRODUCT(a, b) _mm256_mul_epu32(a, b)
 #define SUM(a, b) _mm256_add_epi64(a, b)
 #define SHIFT(a, bits) _mm256_srli_epi64(a, bits)
@@ -129,7 +129,7 @@ typedef __m256i lanes;
 typedef __m128i lanes;
 #define LOAD(from) _mm_loadu_si128((const lanes *)(const void *)(from))
 #define STORE(to, value) _mm_storeu_si128((lanes *)(void *)(to), value)
-#define ALL(value) _mm_set1_epi64x(value)
+#define ALL(value) _mm_set1_epi64x((long long)(value))
 #define PRODUCT(a, b) _mm_mul_epu32(a, b)
 #define SUM(a, b) _mm_add_epi64(a, b)
 #define SHIFT(a, bits) _mm_srli_epi64(a, bits)
@@ -138,6 +138,7 @@ typedef __m128i lanes;
 #define FLIP(a, b) _mm_xor_si128(a, b)
 #define SIGN(a) _mm_shuffle_epi32(a, 0xf5)
 #endif
+_Static_assert(IH_ROW_MAX % LANES == 0, "rows fill whole vectors");
 
 /* Quotients by a gradient's length L, 151 and more: 25 L once, and products that are rounded as
  * ih_div_round does. With v, too great by less than 1, instead of 2^62 / (25 L), a quotient n / d is
@@ -310,7 +311,7 @@ static uint64_t sum_entries(const ih_row_entry *entry, int32_t count)
 {
     uint32_t sum = 0; /* of 128 that are below 2^19 */
     for (int32_t k = 0; k < count; k++) {
-        sum += entry[k];
+        sum += (uint32_t)entry[k];
     }
     return sum;
 }

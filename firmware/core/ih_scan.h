@@ -21,7 +21,7 @@
  *        be counted either way (9250 scores, one in ten has such a ray); centres within 0.003 mm
  *        for slopes up to 1/2.
  * Cost:  a bound for each point (ih_bound), and for what seems best the score: some 30 times 361 x 2
- *        products in 32 bits and a crossing for the rays near by, about a hundred. 1.6 million
+ *        products in 32 bits and a crossing for the rays near by, about a hundred. 1.5 million
  *        instructions for 320 points (x86-64-v3, gcc -O3, frames of both sequences).
  */
 #ifndef IH_SCAN_H
