@@ -181,7 +181,8 @@ static uint64_t nodes_inside(const int32_t *depth_mm_q8, int32_t level_mm_q8)
         }
         const __m128i bytes = _mm_packs_epi16(_mm_packs_epi32(is_inside[0], is_inside[1]),
                                               _mm_packs_epi32(is_inside[2], is_inside[3]));
-        nodes |= (uint64_t)(uint32_t)_mm_movemask_epi8(bytes) << first;
+        const uint32_t sixteen = (uint32_t)_mm_movemask_epi8(bytes);
+        nodes |= (uint64_t)sixteen << first;
     }
     return nodes;
 }

@@ -4,8 +4,10 @@
 
 #include "ih_fix.h"
 
-/* Compilers do not find the multiplication of lower halves by themselves, see ih_normal. */
-#if defined __x86_64__ && defined __SSE2__
+/* Compilers do not find the multiplication of lower halves by themselves, see ih_normal. Ranges are checked
+ * without vectors. */
+#if defined __x86_64__ && defined __SSE2__ && !defined ISOHEAD_RANGE_CHECKS
+#define BY_VECTORS
 #include <immintrin.h>
 #endif
 
@@ -108,7 +110,7 @@ bool ih_row_distance(const struct ih_ellipsoid *ellipsoid, const int32_t place_q
     return true;
 }
 
-#if defined __x86_64__ && defined __SSE2__
+#ifdef BY_VECTORS
 #define ALWAYS_INLINE inline __attribute__((always_inline))
 #if defined __AVX2__
 #define LANES 4
@@ -367,7 +369,7 @@ static void sum_rows(const struct ih_rows *rows, int32_t count, struct ih_row_sy
     for (int i = 0; i <= IH_FIT_UNKNOWNS; i++) {
         slopes[i] = (int64_t)sum_entries(rows->slope_q14[i], count);
     }
-#if defined __x86_64__ && defined __SSE2__
+#ifdef BY_VECTORS
     sum_line(rows, count, 0, slopes, system); /* one by one: then a line's sums are in registers */
     sum_line(rows, count, 1, slopes, system);
     sum_line(rows, count, 2, slopes, system);
