@@ -197,7 +197,8 @@ static inline int32_t odd_half(int32_t px, int32_t py, int32_t qx, int32_t qy)
 {
     const int32_t w = px * qy - qx * py;
     const int32_t beside = 2 * (px * py + qx * qy) + px * qy + qx * py;
-    return (((w ^ beside) >> 31) | 1) & -(w & 1);
+    const int32_t sign = (w ^ beside) < 0 ? -1 : 1;
+    return (w & 1) != 0 ? sign : 0;
 }
 
 /* All that is cut off for a part; compilers turn the loop into vectors. */
@@ -205,7 +206,8 @@ static int32_t odd_halves(const struct ih_parts *parts, const struct ih_part *pa
                           struct ih_vertex place)
 {
     const int32_t x_q8 = half_q9(place.x_q9), y_q8 = half_q9(place.y_q9);
-    const int32_t *x = &parts->x_q8[part->from], *y = &parts->y_q8[part->from];
+    const int32_t *x = &parts->x_q8[part->from];
+    const int32_t *y = &parts->y_q8[part->from];
     const int32_t steps = part->steps;
     int32_t sum = odd_half(x[steps] - x_q8, y[steps] - y_q8, x[0] - x_q8, y[0] - y_q8);
     for (int32_t k = 0; k < steps; k++) {

@@ -185,9 +185,9 @@ static inline lanes product_shift(lanes a, lanes b, int bits)
 static inline void set_slope(struct ih_rows *rows, int32_t k, int i, lanes slope, lanes weight,
                              lanes lift_q30)
 {
-    const lanes lifted = REST(ALL(LIFT), slope);
-    STORE(&rows->slope_q14[i][k], lifted);
-    STORE(&rows->weighted_q16[i][k], SHIFT(SUM(PRODUCT(weight, lifted), lift_q30), 14));
+    const lanes raised = REST(ALL(LIFT), slope);
+    STORE(&rows->slope_q14[i][k], raised);
+    STORE(&rows->weighted_q16[i][k], SHIFT(SUM(PRODUCT(weight, raised), lift_q30), 14));
 }
 
 static void find_slopes(struct ih_rows *rows, int32_t count)
@@ -284,11 +284,11 @@ static int32_t find_residual(const struct gradient *g, ih_row_entry *length)
 
 static void set_slope(struct ih_rows *rows, int32_t k, int i, int32_t slope_q14, uint64_t lift_q30)
 {
-    const uint32_t lifted = (uint32_t)(LIFT - slope_q14);
+    const uint32_t raised = (uint32_t)(LIFT - slope_q14);
     IH_IN_RANGE(slope_q14, -IH_RANGE_SLOPE_Q14, IH_RANGE_SLOPE_Q14);
-    rows->slope_q14[i][k] = lifted;
+    rows->slope_q14[i][k] = raised;
     rows->weighted_q16[i][k] =
-        (ih_row_entry)(((uint64_t)rows->weight_q16[k] * lifted + lift_q30) >> 14);
+        (ih_row_entry)(((uint64_t)rows->weight_q16[k] * raised + lift_q30) >> 14);
 }
 
 static void find_slopes(struct ih_rows *rows, int32_t count)
