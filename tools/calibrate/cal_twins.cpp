@@ -2,38 +2,61 @@
 
 #include <algorithm>
 #include <array>
-#include <map>
 #include <opencv2/imgproc.hpp>
 
 namespace cal
 {
-static constexpr double still_px = 0.6;
-static constexpr size_t common_min = 6;
+/* Half side of what is compared around a corner, and how far it may have moved. */
+static constexpr int around_corner_px = 8, moved_px = 3;
+static constexpr int common_min = 6;
+static constexpr double still_part = 0.5, same_share = 0.25;
 /* A dot, or an edge that moved, is where the difference of the two pictures, seen through a dot's own width, is so many
  * times its noise; so is what is around. The noise is told by what became darker, which dots do not, for each lightness. */
 static constexpr double dot_px = 1.5, noise_times = 3.5;
 static constexpr int around_px = 3;
 static constexpr int level_grey = 16, levels = 256 / level_grey;
 static constexpr size_t level_pixels_min = 300;
+/* A drop beyond this is no noise; nor is what a sensor at its limit shows. */
+static constexpr double drop_max_grey = 25.0, full_grey = 240.0;
+static constexpr double noise_least = 0.1; /* a sensor's steps alone make so much */
 
-/* Whether two pictures show the board in the same place. */
-static bool same_place(const Corners &a, const Corners &b)
+/* How much darker than in `dark` a part of the picture is in `lit` at a place beside it: the laser makes nothing darker. */
+static double darker(const cv::Mat &dark, const cv::Mat &lit, const cv::Rect &part, cv::Point beside)
 {
-    std::map<int, cv::Point2f> places;
-    std::vector<double> apart;
-    for (size_t i = 0; i < a.ids.size(); i++)
-        places[a.ids[i]] = a.px[i];
-    for (size_t i = 0; i < b.ids.size(); i++) {
-        auto other = places.find(b.ids[i]);
-        if (other != places.end())
-            apart.push_back(cv::norm(other->second - b.px[i]));
+    cv::Mat drop = dark(part) - lit(part + beside);
+    return cv::sum(cv::max(drop, 0.0))[0];
+}
+
+/* Whether what is around a corner is where it was: beside it is much that became darker, there is little. */
+static bool is_still(const cv::Mat &dark, const cv::Mat &lit, const cv::Rect &part)
+{
+    double here = darker(dark, lit, part, {0, 0}), sum = 0.0;
+    constexpr int side = 2 * moved_px + 1;
+    for (int i = 0; i < side * side; i++) {
+        double there = darker(dark, lit, part, {i % side - moved_px, i / side - moved_px});
+        if (there < here)
+            return false;
+        sum += there / (side * side);
     }
-    if (apart.size() < common_min)
-        return false;
-    /* Dots on the board push some of its corners aside; a board that moves takes all along. */
-    auto quarter = apart.begin() + static_cast<std::ptrdiff_t>(apart.size() / 4);
-    std::nth_element(apart.begin(), quarter, apart.end());
-    return *quarter < still_px;
+    return here < still_part * sum;
+}
+
+/* Whether the board that `dark` shows is in the same place in `lit`. It is not looked for anew: on a near one, dots cover its
+ * markers. They may cover what is around some corners; a board that moves takes all along. */
+static bool same_place(const Picture &dark, const Corners &corners, const Picture &lit)
+{
+    int looked = 0, same = 0;
+    cv::Rect frame({0, 0}, dark.grey.size());
+    for (const cv::Point2f &px : corners.px) {
+        cv::Rect part(cvRound(px.x) - around_corner_px, cvRound(px.y) - around_corner_px, 2 * around_corner_px + 1,
+                      2 * around_corner_px + 1);
+        cv::Rect around(part.tl() - cv::Point(moved_px, moved_px), part.size() + cv::Size(2 * moved_px, 2 * moved_px));
+        if ((around & frame) != around)
+            continue;
+        looked++;
+        same += is_still(dark.grey, lit.grey, part);
+    }
+    return same >= common_min && same >= same_share * looked;
 }
 
 std::vector<int> twins_find(const std::vector<Picture> &pictures, const std::vector<View> &views)
@@ -46,7 +69,7 @@ std::vector<int> twins_find(const std::vector<Picture> &pictures, const std::vec
             if (!pictures[here].laser || twins[here] >= 0 || other < 0 || other >= count)
                 continue;
             size_t there = static_cast<size_t>(other);
-            if (!pictures[there].laser && same_place(views[here].corners, views[there].corners))
+            if (!pictures[there].laser && same_place(pictures[there], views[there].corners, pictures[here]))
                 twins[here] = other;
         }
     }
@@ -100,5 +123,40 @@ cv::Mat twins_mean(const cv::Mat &dark, const cv::Mat &lit)
     cv::erode(same, same, cv::Mat::ones(2 * around_px + 1, 2 * around_px + 1, CV_8U));
     mean.copyTo(result, same);
     return result;
+}
+
+/* By what became darker, which dots do not; for each lightness, then a straight line through all. */
+Noise twins_noise(const std::vector<Picture> &pictures, const std::vector<int> &twins)
+{
+    std::array<double, levels> counts{}, squares{};
+    for (size_t i = 0; i < pictures.size(); i++) {
+        if (twins[i] < 0)
+            continue;
+        const cv::Mat &dark = pictures[static_cast<size_t>(twins[i])].grey;
+        for (int v = 0; v < dark.rows; v++) {
+            for (int u = 0; u < dark.cols; u++) {
+                double drop = static_cast<double>(dark.at<float>(v, u) - pictures[i].grey.at<float>(v, u));
+                size_t level = static_cast<size_t>(level_of(dark, v, u));
+                if (drop < 0.0 || drop > drop_max_grey || static_cast<double>(dark.at<float>(v, u)) > full_grey)
+                    continue;
+                counts[level] += drop > 0.0 ? 1.0 : 0.5; /* half of those that are the same might be darker */
+                squares[level] += drop * drop;
+            }
+        }
+    }
+    cv::Matx22d normal = cv::Matx22d::zeros();
+    cv::Vec2d right(0.0, 0.0);
+    for (size_t level = 0; level < levels; level++) {
+        if (counts[level] < static_cast<double>(level_pixels_min))
+            continue;
+        cv::Vec2d terms(1.0, (static_cast<double>(level) + 0.5) * level_grey);
+        normal += terms * terms.t();
+        right += terms * (0.5 * squares[level] / counts[level]);
+    }
+    cv::Vec2d line;
+    if (!cv::solve(normal, right, line, cv::DECOMP_CHOLESKY))
+        return {};
+    double slope = std::max(line[1], 0.0);
+    return {std::max(line[0], noise_least), slope};
 }
 } // namespace cal

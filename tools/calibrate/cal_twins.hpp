@@ -14,6 +14,17 @@ std::vector<int> twins_find(const std::vector<Picture> &pictures, const std::vec
 
 /* The picture without the laser, with less noise: the mean of both where the laser lit nothing. CV_32F. */
 cv::Mat twins_mean(const cv::Mat &dark, const cv::Mat &lit);
+
+/* Variance of a pixel by the sensor, grey values squared: grows with the light. What it is without twins is usual. */
+struct Noise {
+    double dark = 2.0, by_light = 0.05;
+
+    double at(double grey) const
+    {
+        return dark + by_light * grey;
+    }
+};
+Noise twins_noise(const std::vector<Picture> &pictures, const std::vector<int> &twins);
 } // namespace cal
 
 #endif
