@@ -178,7 +178,8 @@ static void check_dots()
         cal::board_picture(stage.board, cal::draw_px_per_mm),
         cal::draw_tangents(stage.camera.size, stage.camera.matrix, stage.camera.distortion),
         lens_px,
-        (dark_grey - black) / (white_grey - black)};
+        (dark_grey - black) / (white_grey - black),
+        {}};
     double divided = 0.0, drawn = 0.0;
     for (int i = 0; i < 12; i++) {
         cv::Point2d px =

@@ -17,7 +17,7 @@ struct Dot {
 };
 
 /* A dot is fitted in this many pixels to each side. */
-constexpr int dot_reach_px = 4, dot_side_px = 2 * dot_reach_px + 1;
+constexpr int dot_reach_px = 5, dot_side_px = 2 * dot_reach_px + 1;
 
 inline cv::Rect dot_window(cv::Point middle_px)
 {

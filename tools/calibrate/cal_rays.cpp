@@ -9,7 +9,8 @@ namespace cal
 {
 static constexpr int steps = 25, rounds = 5;
 static constexpr double huber_sigmas = 1.5, outlier_sigmas = 4.5;
-static constexpr double sigma_floor_px = 0.02;
+/* How much larger residuals are than the sightings tell: at least. */
+static constexpr double scale_floor = 0.2;
 static constexpr int slots_min = 180;
 static constexpr double origin_sigma_max_mm = 1.0;
 
@@ -75,9 +76,9 @@ static bool is_seen(const Blocks &blocks, size_t slot)
 }
 
 /* Every ray leans on the lattice: as much as its sightings are worth less than the lattice is. */
-static void add_nominal(const Nominal &nominal, double sigma_px, const State &state, Blocks &blocks)
+static void add_nominal(const Nominal &nominal, double scale, const State &state, Blocks &blocks)
 {
-    double weight = (sigma_px * sigma_px) / (nominal.sigma * nominal.sigma);
+    double weight = (scale * scale) / (nominal.sigma * nominal.sigma);
     for (size_t slot = 0; slot < slot_count; slot++) {
         blocks.ray[slot] += weight * cv::Matx22d::eye();
         blocks.ray_right[slot] += weight * (nominal.tangents[slot] - state.tangents[slot]);
@@ -113,8 +114,15 @@ static double step(const Blocks &blocks, State &state)
     return cv::norm(change);
 }
 
-/* One component's standard deviation, by the median; a ray seen once fits by itself and tells nothing. */
-static double usual_size(const Camera &camera, const State &state, const std::vector<Equation> &equations)
+/* A residual's size in the sighting's own standard deviations. */
+static double size_of(const Camera &camera, const State &state, const Equation &equation)
+{
+    return cv::norm(residual(camera, state, equation)) / equation.sighting->sigma_px;
+}
+
+/* One component's standard deviation against what the sightings tell of theirs, by the median; a ray seen once fits by
+ * itself and tells nothing. */
+static double usual_scale(const Camera &camera, const State &state, const std::vector<Equation> &equations)
 {
     std::vector<double> sizes;
     std::array<int, slot_count> seen{};
@@ -123,20 +131,25 @@ static double usual_size(const Camera &camera, const State &state, const std::ve
     for (const Equation &equation : equations) {
         double free = 1.0 - 1.0 / seen[equation.slot];
         if (free > 0.0)
-            sizes.push_back(cv::norm(residual(camera, state, equation)) / std::sqrt(free));
+            sizes.push_back(size_of(camera, state, equation) / std::sqrt(free));
     }
     if (sizes.empty())
-        return sigma_floor_px;
+        return scale_floor;
     auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
     std::nth_element(sizes.begin(), middle, sizes.end());
-    return std::max(*middle / 1.1774, sigma_floor_px); /* a Rayleigh distribution's median */
+    return std::max(*middle / 1.1774, scale_floor); /* a Rayleigh distribution's median */
 }
 
-static double weight_of(double size_px, double sigma_px)
+static double certainty(const Equation &equation)
 {
-    if (size_px > outlier_sigmas * sigma_px)
+    return 1.0 / (equation.sighting->sigma_px * equation.sighting->sigma_px);
+}
+
+static double weight_of(double size, double scale)
+{
+    if (size > outlier_sigmas * scale)
         return 0.0;
-    return size_px > huber_sigmas * sigma_px ? huber_sigmas * sigma_px / size_px : 1.0;
+    return size > huber_sigmas * scale ? huber_sigmas * scale / size : 1.0;
 }
 
 static std::vector<Equation> list_equations(std::vector<Lit> &pictures)
@@ -173,10 +186,10 @@ static State start_state(const std::vector<Equation> &equations, const cv::Vec3d
 }
 
 /* Standard deviations from the equations' curvature at the solution. */
-static void tell_sigmas(const Blocks &blocks, double sigma_px, Projector &projector)
+static void tell_sigmas(const Blocks &blocks, double scale, Projector &projector)
 {
     cv::Vec3d right;
-    cv::Matx33d origin = reduced(blocks, right).inv() * (sigma_px * sigma_px);
+    cv::Matx33d origin = reduced(blocks, right).inv() * (scale * scale);
     for (int axis = 0; axis < 3; axis++)
         projector.origin_sigma_mm[axis] = std::sqrt(origin(axis, axis));
     for (size_t slot = 0; slot < slot_count; slot++) {
@@ -184,14 +197,14 @@ static void tell_sigmas(const Blocks &blocks, double sigma_px, Projector &projec
             continue;
         cv::Matx22d inverse = blocks.ray[slot].inv();
         cv::Matx<double, 2, 3> with_origin = inverse * blocks.mixed[slot].t();
-        cv::Matx22d spread = inverse * (sigma_px * sigma_px) + with_origin * origin * with_origin.t();
+        cv::Matx22d spread = inverse * (scale * scale) + with_origin * origin * with_origin.t();
         projector.sigma_deg[slot] = std::sqrt(0.5 * (spread(0, 0) + spread(1, 1))) * 180.0 / CV_PI;
     }
 }
 
 /* `nominal`: null where rays stand alone. */
 static Projector projector_of(const Camera &camera, const State &state, const std::vector<Equation> &equations,
-                              double sigma_px, const Nominal *nominal)
+                              double scale, const Nominal *nominal)
 {
     Projector projector;
     Blocks blocks;
@@ -200,11 +213,11 @@ static Projector projector_of(const Camera &camera, const State &state, const st
     for (const Equation &equation : equations) {
         cv::Vec2d miss = residual(camera, state, equation);
         equation.sighting->residual_px = {miss[0], miss[1]};
-        equation.sighting->fits = cv::norm(miss) <= outlier_sigmas * sigma_px;
+        equation.sighting->fits = size_of(camera, state, equation) <= outlier_sigmas * scale;
         projector.sighting_count++;
         projector.outlier_count += !equation.sighting->fits;
         if (equation.sighting->fits) {
-            add(camera, state, equation, 1.0, blocks);
+            add(camera, state, equation, certainty(equation), blocks);
             projector.seen[equation.slot]++;
             sum += miss.dot(miss);
         }
@@ -214,32 +227,32 @@ static Projector projector_of(const Camera &camera, const State &state, const st
     for (size_t slot = 0; slot < slot_count; slot++)
         projector.rays[slot] = cv::normalize(cv::Vec3d(state.tangents[slot][0], state.tangents[slot][1], 1.0));
     if (nominal != nullptr)
-        add_nominal(*nominal, sigma_px, state, blocks);
-    tell_sigmas(blocks, sigma_px, projector);
+        add_nominal(*nominal, scale, state, blocks);
+    tell_sigmas(blocks, scale, projector);
     return projector;
 }
 
-/* Origin and rays, with the lattice or without. Returns the usual size of a residual's component. */
+/* Origin and rays, with the lattice or without. Returns the residuals' scale. */
 static double improve(const Camera &camera, const std::vector<Equation> &equations, const Nominal *nominal,
                       State &state)
 {
-    double sigma_px = usual_size(camera, state, equations);
+    double scale = usual_scale(camera, state, equations);
     for (int i = 0; i < steps; i++) {
         Blocks blocks;
         for (const Equation &equation : equations) {
-            double weight = weight_of(cv::norm(residual(camera, state, equation)), sigma_px);
+            double weight = weight_of(size_of(camera, state, equation), scale);
             if (weight > 0.0)
-                add(camera, state, equation, weight, blocks);
+                add(camera, state, equation, weight * certainty(equation), blocks);
         }
         if (nominal != nullptr)
-            add_nominal(*nominal, sigma_px, state, blocks);
+            add_nominal(*nominal, scale, state, blocks);
         double moved_mm = step(blocks, state);
         if (nominal == nullptr)
-            sigma_px = usual_size(camera, state, equations);
+            scale = usual_scale(camera, state, equations);
         if (moved_mm < 1e-7)
             break;
     }
-    return sigma_px;
+    return scale;
 }
 
 static void check(const Projector &projector)
@@ -264,13 +277,13 @@ Projector rays_solve(const Camera &camera, std::vector<Lit> &pictures, const cv:
     if (equations.empty())
         throw Error("no dot of the laser was found on the board");
     State state = start_state(equations, origin_mm);
-    double sigma_px = improve(camera, equations, nullptr, state);
-    Projector projector = projector_of(camera, state, equations, sigma_px, nullptr);
+    double scale = improve(camera, equations, nullptr, state);
+    Projector projector = projector_of(camera, state, equations, scale, nullptr);
     check(projector);
     Nominal nominal = nominal_fit(projector);
     for (int round = 0; round < rounds; round++) {
         improve(camera, equations, &nominal, state);
-        projector = projector_of(camera, state, equations, sigma_px, &nominal);
+        projector = projector_of(camera, state, equations, scale, &nominal);
         double sigma = nominal.sigma;
         nominal = nominal_fit(projector);
         nominal.sigma = sigma; /* rays that lean on the lattice would make it smaller each time */

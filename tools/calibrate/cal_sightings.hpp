@@ -11,12 +11,15 @@ namespace cal
 {
 constexpr int pattern_side = 19, slot_count = pattern_side * pattern_side;
 constexpr int no_slot = -1;
+/* A place is known this well where nothing better is told. */
+constexpr double usual_sigma_px = 0.1;
 
 struct Sighting {
-    cv::Point2d px, tangent; /* as in the frame; undistorted X/Z, Y/Z */
-    double wide_px = 0.0;    /* standard deviation of the dot's light */
-    cv::Vec3d place_mm;      /* camera frame */
-    cv::Vec2i step;          /* column, row in this picture's own lattice */
+    cv::Point2d px, tangent;          /* as in the frame; undistorted X/Z, Y/Z */
+    double wide_px = 0.0;             /* standard deviation of the dot's light */
+    double sigma_px = usual_sigma_px; /* of the place, one component; against other sightings */
+    cv::Vec3d place_mm;               /* camera frame */
+    cv::Vec2i step;                   /* column, row in this picture's own lattice */
     bool in_lattice = false;
     int slot = no_slot;      /* row * 19 + column */
     cv::Point2d residual_px; /* seen less expected, undistorted pixels; set by rays_solve */

@@ -125,7 +125,8 @@ static void place_dots(const std::vector<Picture> &pictures, const std::vector<i
                 board_picture(result.board, draw_px_per_mm),
                 draw_tangents(camera.size, camera.matrix, camera.distortion),
                 spot_lens_px(result.lit),
-                dark_share(result.views)};
+                dark_share(result.views),
+                twins_noise(pictures, twins)};
     size_t next = 0;
     for (size_t i = 0; i < pictures.size(); i++) {
         if (!pictures[i].laser)

@@ -1,14 +1,15 @@
-/* cal_spot - where a dot really is that falls on an edge of the print.
+/* cal_spot - where a dot really is on the print, and how well that is known.
  * White sends more of the laser back than dark, so a dot's picture leans towards white; and dividing by how light the
  * paper looks leans it too far to the other side, because the lens softens edges that the beam still met sharp. So the
- * dot is drawn as the camera would see it: a beam on the print, then the lens; and moved until a fit of the drawing says
- * the same as a fit of the picture. What the lens adds to a dot's width is told by the dots: a beam looks narrower the
- * farther off it is, the lens' part stays.
+ * dot is drawn as the camera would see it, a beam on the print, then the lens, and moved until it looks like the dot
+ * (cal_beam). What the lens adds to a dot's width is told by the dots: a beam looks narrower the farther off it is, the
+ * lens' part stays.
  */
 #ifndef CAL_SPOT_HPP
 #define CAL_SPOT_HPP
 
 #include "cal_sightings.hpp"
+#include "cal_twins.hpp"
 
 namespace cal
 {
@@ -21,6 +22,7 @@ struct Spots {
     const Camera &camera;
     cv::Mat print, tangents;    /* board_picture with draw_px_per_mm; draw_tangents */
     double lens_px, dark_share; /* how light the print's dark is, white is 1 */
+    Noise noise;
 };
 
 /* Sets the places of a picture's sightings anew; `dark` is its twin. Those that no dot can be fitted to stay. */

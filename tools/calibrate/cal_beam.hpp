@@ -1,0 +1,42 @@
+/* cal_beam - where a beam of the laser meets the print, by a fit that knows what makes a dot uneven.
+ * Model: a round beam on the print, as light as that is there, through the lens, on a level ground. What is seen differs from
+ * it by the sensor's noise and by speckle: rough paper makes the beam grainy before the lens softens it, so neighbouring
+ * pixels err together, most where the beam is bright. Generalised least squares with both; that moves a dot less by its
+ * grains than a fit to which all pixels are the same, and says how well each dot is known.
+ */
+#ifndef CAL_BEAM_HPP
+#define CAL_BEAM_HPP
+
+#include "cal_dots.hpp"
+
+namespace cal
+{
+/* The surface is drawn this fine, and as far around the window as the lens' blur reaches. */
+constexpr int beam_parts = 3, beam_around_px = 3;
+constexpr int beam_side = beam_parts * (dot_side_px + 2 * beam_around_px);
+
+/* From the window's middle to the middle of a fine sample. */
+constexpr double beam_sample_px(int sample)
+{
+    return (sample + 0.5) / beam_parts - 0.5 * beam_side / beam_parts;
+}
+
+/* What is seen around a dot. */
+struct BeamWindow {
+    cv::Mat surface;   /* CV_64F, beam_side: how light the sheet is */
+    cv::Mat rise, lit; /* CV_32F, dot_side_px: with the laser less without it; with it */
+    cv::Mat noise;     /* CV_64F, dot_side_px: variance of `rise` by the sensor */
+    double lens_px;    /* standard deviation of the lens' blur */
+};
+
+struct Beam {
+    cv::Point2d px;  /* from the window's middle */
+    double width_px; /* standard deviation of the beam on the surface */
+    double sigma_px; /* standard deviation of the place, one component */
+};
+
+/* `beam` has a start for place and width. False: no beam fits. */
+bool beam_fit(const BeamWindow &window, Beam &beam);
+} // namespace cal
+
+#endif
