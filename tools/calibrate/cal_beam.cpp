@@ -5,12 +5,13 @@
 
 namespace cal
 {
-static constexpr int rounds = 8;
+static constexpr int rounds = 8, rounds_min = 2;
 /* Variance of a beam's relative lightness in a patch as large as its own sigma squared: grains whose contrast is a third in
  * a beam of fifteen. Half or twice of it moves no dot's error by more than 2 %; the rays' residuals set the scale. */
 static constexpr double speckle = 0.1;
 static constexpr double width_min_px = 0.35, width_max_px = 3.0, still_px = 1e-3, step_max_px = 0.5;
-static constexpr int used_min = 40;
+static constexpr size_t used_min = 40;
+static constexpr double light_kept = 0.3; /* of the light, in one step */
 static constexpr int pixels = dot_side_px * dot_side_px;
 static constexpr double cell_px2 = 1.0 / (beam_parts * beam_parts);
 /* Samples that are this many of the beam's widths from its middle have no speckle to speak of. */
@@ -46,16 +47,16 @@ static cv::Mat lens_of(double lens_px)
 }
 
 /* The beam on the surface, before the lens, and its derivatives. */
-struct Lit_surface {
+struct LitSurface {
     cv::Mat light, by_u, by_v, by_square;
 };
 
-static Lit_surface light_up(const cv::Mat &surface, const Beam &beam)
+static LitSurface light_up(const cv::Mat &surface, const Beam &beam)
 {
     Row across = bell(beam.px.x, beam.width_px), down = bell(beam.px.y, beam.width_px);
     double square = beam.width_px * beam.width_px;
-    Lit_surface lit{cv::Mat(surface.size(), CV_64F), cv::Mat(surface.size(), CV_64F), cv::Mat(surface.size(), CV_64F),
-                    cv::Mat(surface.size(), CV_64F)};
+    LitSurface lit{cv::Mat(surface.size(), CV_64F), cv::Mat(surface.size(), CV_64F), cv::Mat(surface.size(), CV_64F),
+                   cv::Mat(surface.size(), CV_64F)};
     for (int row = 0; row < beam_side; row++) {
         double dv = beam_sample_px(row) - beam.px.y;
         for (int column = 0; column < beam_side; column++) {
@@ -152,86 +153,110 @@ static void whiten(const cv::Mat &lower, cv::Mat &columns)
     }
 }
 
+/* What is free besides the beam, and what does not change while it is fitted. */
+struct Fit {
+    std::vector<int> used; /* pixels that are not at the sensor's limit */
+    cv::Mat lens;
+    double light, ground;
+};
+
 /* Light and ground that fit best for a drawing, all pixels alike: what a fit begins with. */
-static bool start_light(const cv::Mat &drawn, const cv::Mat &rise, const std::vector<int> &used, double &light,
-                        double &ground)
+static bool start_light(const cv::Mat &drawn, const cv::Mat &rise, Fit &fit)
 {
     cv::Matx22d normal = cv::Matx22d::zeros();
-    cv::Vec2d right(0.0, 0.0);
-    for (int pixel : used) {
-        cv::Vec2d terms(drawn.at<double>(pixel / dot_side_px, pixel % dot_side_px), 1.0);
+    cv::Vec2d right(0.0, 0.0), found;
+    for (int pixel : fit.used) {
+        int row = pixel / dot_side_px, column = pixel % dot_side_px;
+        cv::Vec2d terms(drawn.at<double>(row, column), 1.0);
         normal += terms * terms.t();
-        right += terms * static_cast<double>(rise.at<float>(pixel / dot_side_px, pixel % dot_side_px));
+        right += terms * static_cast<double>(rise.at<float>(row, column));
     }
-    cv::Vec2d found;
     bool solved = cv::solve(normal, right, found, cv::DECOMP_CHOLESKY);
-    light = found[0];
-    ground = found[1];
-    return solved && light > 0.0;
+    fit.light = found[0];
+    fit.ground = found[1];
+    return solved && fit.light > 0.0;
+}
+
+/* Each pixel's derivatives and residual, made to have variance 1 and no correlation. */
+static bool whitened(const BeamWindow &window, const Fit &fit, const Beam &beam, const LitSurface &lit,
+                     const cv::Mat &drawn, cv::Mat &columns)
+{
+    int count = static_cast<int>(fit.used.size());
+    cv::Mat by_u = fit.lens * lit.by_u * fit.lens.t(), by_v = fit.lens * lit.by_v * fit.lens.t();
+    cv::Mat by_square = fit.lens * lit.by_square * fit.lens.t();
+    cv::Mat grain = grain_covariance(lit.light, fit.lens, beam, fit.light), covariance(count, count, CV_64F);
+    columns.create(count, unknowns + 1, CV_64F);
+    for (int i = 0; i < count; i++) {
+        int pixel = fit.used[static_cast<size_t>(i)], row = pixel / dot_side_px, column = pixel % dot_side_px;
+        for (int k = 0; k <= i; k++)
+            covariance.at<double>(i, k) = grain.at<double>(pixel, fit.used[static_cast<size_t>(k)]);
+        covariance.at<double>(i, i) += window.noise.at<double>(row, column);
+        double *terms = columns.ptr<double>(i);
+        terms[0] = drawn.at<double>(row, column);
+        terms[1] = fit.light * by_u.at<double>(row, column);
+        terms[2] = fit.light * by_v.at<double>(row, column);
+        terms[3] = fit.light * by_square.at<double>(row, column);
+        terms[4] = 1.0;
+        terms[unknowns] = static_cast<double>(window.rise.at<float>(row, column)) - fit.light * terms[0] - fit.ground;
+    }
+    if (!factor(covariance))
+        return false;
+    whiten(covariance, columns);
+    return true;
+}
+
+/* One step of least squares. False: the pixels do not tell all unknowns. */
+static bool improve(const cv::Mat &columns, Fit &fit, Beam &beam, double &moved_px)
+{
+    Curvature normal = Curvature::zeros();
+    Unknowns right = Unknowns::zeros();
+    for (int i = 0; i < columns.rows; i++) {
+        const double *all = columns.ptr<double>(i);
+        Unknowns terms(all);
+        normal += terms * terms.t();
+        right += terms * all[unknowns];
+    }
+    bool solved = false;
+    Curvature inverse = normal.inv(cv::DECOMP_CHOLESKY, &solved);
+    if (!solved)
+        return false;
+    Unknowns change = inverse * right;
+    cv::Point2d move(change(1), change(2));
+    double square = beam.width_px * beam.width_px;
+    moved_px = cv::norm(move);
+    beam.px += move * std::min(1.0, step_max_px / std::max(moved_px, 1e-9));
+    square += std::clamp(change(3), -0.5 * square, square);
+    beam.width_px = std::clamp(std::sqrt(square), width_min_px, width_max_px);
+    fit.light = std::max(fit.light + change(0), light_kept * fit.light);
+    fit.ground += change(4);
+    beam.sigma_px = std::sqrt(0.5 * (inverse(1, 1) + inverse(2, 2)));
+    return true;
+}
+
+double beam_speckle_px(double width_px)
+{
+    return std::sqrt(speckle / (8.0 * CV_PI)) * std::max(width_px, width_min_px);
 }
 
 bool beam_fit(const BeamWindow &window, Beam &beam)
 {
-    static constexpr double saturated_grey = 250.0;
-    std::vector<int> used;
+    Fit fit{{}, lens_of(window.lens_px), 0.0, 0.0};
     for (int pixel = 0; pixel < pixels; pixel++) {
         if (static_cast<double>(window.lit.at<float>(pixel / dot_side_px, pixel % dot_side_px)) < saturated_grey)
-            used.push_back(pixel);
+            fit.used.push_back(pixel);
     }
-    int count = static_cast<int>(used.size());
-    if (count < used_min)
+    if (fit.used.size() < used_min)
         return false;
-    cv::Mat lens = lens_of(window.lens_px);
-    double light = 0.0, ground = 0.0;
     beam.width_px = std::clamp(beam.width_px, width_min_px, width_max_px);
     for (int round = 0; round < rounds; round++) {
-        Lit_surface lit = light_up(window.surface, beam);
-        cv::Mat drawn[4] = {lens * lit.light * lens.t(), lens * lit.by_u * lens.t(), lens * lit.by_v * lens.t(),
-                            lens * lit.by_square * lens.t()};
-        if (round == 0 && !start_light(drawn[0], window.rise, used, light, ground))
+        LitSurface lit = light_up(window.surface, beam);
+        cv::Mat drawn = fit.lens * lit.light * fit.lens.t(), columns;
+        double moved_px;
+        if ((round == 0 && !start_light(drawn, window.rise, fit)) ||
+            !whitened(window, fit, beam, lit, drawn, columns) || !improve(columns, fit, beam, moved_px))
             return false;
-        cv::Mat grain = grain_covariance(lit.light, lens, beam, light);
-        cv::Mat covariance(count, count, CV_64F), columns(count, unknowns + 1, CV_64F);
-        for (int i = 0; i < count; i++) {
-            int row = used[static_cast<size_t>(i)] / dot_side_px, column = used[static_cast<size_t>(i)] % dot_side_px;
-            for (int k = 0; k <= i; k++)
-                covariance.at<double>(i, k) =
-                    grain.at<double>(used[static_cast<size_t>(i)], used[static_cast<size_t>(k)]);
-            covariance.at<double>(i, i) += window.noise.at<double>(row, column);
-            double *terms = columns.ptr<double>(i);
-            for (int k = 0; k < 4; k++)
-                terms[k] = drawn[k].at<double>(row, column) * (k == 0 ? 1.0 : light);
-            terms[4] = 1.0;
-            terms[5] = static_cast<double>(window.rise.at<float>(row, column)) - light * terms[0] - ground;
-        }
-        if (!factor(covariance))
-            return false;
-        whiten(covariance, columns);
-        Curvature normal = Curvature::zeros();
-        Unknowns right = Unknowns::zeros();
-        for (int i = 0; i < count; i++) {
-            const double *terms = columns.ptr<double>(i);
-            for (int a = 0; a < unknowns; a++) {
-                right(a) += terms[a] * terms[unknowns];
-                for (int b = 0; b < unknowns; b++)
-                    normal(a, b) += terms[a] * terms[b];
-            }
-        }
-        bool solved = false;
-        Curvature inverse = normal.inv(cv::DECOMP_CHOLESKY, &solved);
-        if (!solved)
-            return false;
-        Unknowns change = inverse * right;
-        cv::Point2d move(change(1), change(2));
-        double long_px = cv::norm(move), square = beam.width_px * beam.width_px;
-        beam.px += move * std::min(1.0, step_max_px / std::max(long_px, 1e-9));
-        beam.width_px = std::sqrt(std::clamp(square + std::clamp(change(3), -0.5 * square, square),
-                                             width_min_px * width_min_px, width_max_px * width_max_px));
-        light = std::max(light + change(0), 0.3 * light);
-        ground += change(4);
-        beam.sigma_px = std::sqrt(0.5 * (inverse(1, 1) + inverse(2, 2)));
-        if (round > 1 && long_px < still_px)
-            return true;
+        if (round >= rounds_min && moved_px < still_px)
+            break;
     }
     return true;
 }

@@ -35,6 +35,9 @@ struct Beam {
     double sigma_px; /* standard deviation of the place, one component */
 };
 
+/* How far a beam's light is off its middle by speckle alone, one component. */
+double beam_speckle_px(double width_px);
+
 /* `beam` has a start for place and width. False: no beam fits. */
 bool beam_fit(const BeamWindow &window, Beam &beam);
 } // namespace cal

@@ -9,7 +9,6 @@ namespace cal
 {
 static constexpr double inner_px = 1.0, outer_px = 3.0;
 static constexpr double noise_times = 5.0, peak_min_grey = 2.5;
-static constexpr double saturated_grey = 250.0;
 static constexpr double sigma_min_px = 0.5, sigma_max_px = 3.2, moved_max_px = 1.5;
 static constexpr int fit_steps = 20, used_min = 40;
 static constexpr double damping = 1e-2;

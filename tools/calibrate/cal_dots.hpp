@@ -16,6 +16,9 @@ struct Dot {
     double peak_grey = 0.0, sigma_px = 0.0;
 };
 
+/* A pixel of this lightness and more tells nothing: the sensor's limit is near. */
+constexpr double saturated_grey = 250.0;
+
 /* A dot is fitted in this many pixels to each side. */
 constexpr int dot_reach_px = 5, dot_side_px = 2 * dot_reach_px + 1;
 

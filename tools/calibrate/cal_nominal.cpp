@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <opencv2/calib3d.hpp>
 
+#include "cal_error.hpp"
+
 namespace cal
 {
 static constexpr int steps = 12;
@@ -88,11 +90,16 @@ static double ray_variance(const Projector &projector, const Lattice &lattice)
         noise += square(projector.sigma_deg[slot] * CV_PI / 180.0);
     }
     if (squares.size() < well_seen_min)
-        return 1.0;
+        return square(nominal_unknown);
     auto half = squares.begin() + static_cast<std::ptrdiff_t>(squares.size() / 2);
     std::nth_element(squares.begin(), half, squares.end());
     double total = *half / 1.386; /* an exponential distribution's median, two components */
     return std::max(total - noise / static_cast<double>(squares.size()), square(least_sigma));
+}
+
+std::string nominal_words(double sigma_deg)
+{
+    return sigma_deg > 0.0 ? text("%.3f degrees", sigma_deg) : "an angle that so few sightings do not tell";
 }
 
 Nominal nominal_fit(const Projector &projector)

@@ -15,6 +15,12 @@ struct Nominal {
     double pitch_deg = 0.0, turn_deg = 0.0;     /* its step, and its turn against the image's rows */
 };
 
+/* What `sigma` is where too few rays are known well enough to tell it: rays then lean on the lattice hardly at all. */
+constexpr double nominal_unknown = 1.0;
+
+/* An angle in words, of a projector's `nominal_sigma_deg`. */
+std::string nominal_words(double sigma_deg);
+
 /* By the rays that were seen (`seen`, `rays`), and how well those seen often are known (`sigma_deg`). */
 Nominal nominal_fit(const Projector &projector);
 } // namespace cal

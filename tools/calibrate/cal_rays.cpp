@@ -288,7 +288,7 @@ Projector rays_solve(const Camera &camera, std::vector<Lit> &pictures, const cv:
         nominal = nominal_fit(projector);
         nominal.sigma = sigma; /* rays that lean on the lattice would make it smaller each time */
     }
-    projector.nominal_sigma_deg = nominal.sigma * 180.0 / CV_PI;
+    projector.nominal_sigma_deg = nominal.sigma < nominal_unknown ? nominal.sigma * 180.0 / CV_PI : 0.0;
     projector.pitch_deg = nominal.pitch_deg;
     projector.turn_deg = nominal.turn_deg;
     return projector;

@@ -20,7 +20,7 @@ struct Projector {
     std::array<double, slot_count> sigma_deg{}; /* standard deviation of one component */
     int sighting_count = 0, outlier_count = 0;
     double rms_px = 0.0;
-    double nominal_sigma_deg = 0.0; /* how far rays are from the nominal lattice, one component */
+    double nominal_sigma_deg = 0.0; /* how far rays are from the nominal lattice, one component; 0: not known */
     double pitch_deg = 0.0,
            turn_deg = 0.0; /* of the nominal lattice: its step, and its turn against the image's rows */
 };

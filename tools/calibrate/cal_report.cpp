@@ -6,6 +6,7 @@
 #include "cal_chart.hpp"
 #include "cal_epipolar.hpp"
 #include "cal_error.hpp"
+#include "cal_nominal.hpp"
 #include "tool_file.hpp"
 
 namespace cal
@@ -231,11 +232,11 @@ static std::string projector_words(const Projector &projector)
         text("<p>Origin (%.2f, %.2f, %.2f) mm in the camera's frame, standard deviations (%.2f, %.2f, %.2f). "
              "%d sightings with an rms of %.3f px (under 0.4 px is good), %d further ones did not fit. The lattice's "
              "step is %.3f "
-             "degrees, its rows are turned by %.2f degrees; rays differ from it by %.3f degrees (each "
+             "degrees, its rows are turned by %.2f degrees; rays differ from it by %s (each "
              "component).</p><p>%d of %d dots were seen (over 350 is good).",
              o[0], o[1], o[2], s[0], s[1], s[2], projector.sighting_count - projector.outlier_count, projector.rms_px,
-             projector.outlier_count, projector.pitch_deg, projector.turn_deg, projector.nominal_sigma_deg, seen,
-             slot_count);
+             projector.outlier_count, projector.pitch_deg, projector.turn_deg,
+             nominal_words(projector.nominal_sigma_deg).c_str(), seen, slot_count);
     return words + (filled.empty() ? "</p>" : " By the lattice alone:" + filled + ".</p>");
 }
 

@@ -7,14 +7,18 @@
 #include "cal_draw.hpp"
 #include "cal_error.hpp"
 #include "cal_lattice.hpp"
+#include "cal_nominal.hpp"
 #include "cal_report.hpp"
 #include "cal_spot.hpp"
 #include "cal_twins.hpp"
+#include "cal_wall.hpp"
 #include "tool_progress.hpp"
 
 namespace cal
 {
 static constexpr int lit_min = 5;
+/* Rays and wall in turn: each time a third of the change is left. */
+static constexpr int wall_rounds = 6;
 
 static std::vector<View> find_boards(const Board &board, const std::vector<Picture> &pictures, tool::Progress &progress)
 {
@@ -137,6 +141,27 @@ static void place_dots(const std::vector<Picture> &pictures, const std::vector<i
     }
 }
 
+/* Origin and rays by the board; then with what is behind it, too. */
+static void find_rays(const std::vector<Picture> &pictures, const std::vector<int> &twins, const cv::Vec3d &origin_mm,
+                      Result &result)
+{
+    result.projector = rays_solve(result.camera, result.lit, origin_mm);
+    Lit wall = wall_find(result.board, result.camera, pictures, twins, result.lit, twins_noise(pictures, twins),
+                         spot_lens_px(result.lit));
+    if (!wall_lay(result.camera, result.projector, wall))
+        return;
+    result.lit.push_back(wall);
+    for (int round = 0; round < wall_rounds; round++) {
+        result.projector = rays_solve(result.camera, result.lit, result.projector.origin_mm);
+        if (!wall_lay(result.camera, result.projector, result.lit.back())) {
+            result.lit.pop_back();
+            result.projector = rays_solve(result.camera, result.lit, result.projector.origin_mm);
+            return;
+        }
+    }
+    result.projector = rays_solve(result.camera, result.lit, result.projector.origin_mm);
+}
+
 static void tell_pictures(const Result &result)
 {
     for (const View &view : result.views) {
@@ -179,7 +204,8 @@ static void tell_projector(const Projector &projector)
                 projector.origin_sigma_mm[1], projector.origin_sigma_mm[2]);
     std::printf("dots: %d of %d seen", static_cast<int>(seen), slot_count);
     if (seen < slot_count)
-        std::printf("; by the nominal lattice, which the others keep to %.3f degrees:", projector.nominal_sigma_deg);
+        std::printf("; by the nominal lattice, which the others keep to %s:",
+                    nominal_words(projector.nominal_sigma_deg).c_str());
     for (int slot = 0; slot < slot_count; slot++) {
         if (projector.seen[static_cast<size_t>(slot)] == 0)
             std::printf(" %d", slot);
@@ -259,7 +285,7 @@ void solve_run(const Options &options)
         place_dots(pictures, twins, result);
         progress.show("solving for the projector");
         cv::Vec3d origin_mm = index_assign(result.board, result.camera, result.lit, options.middle);
-        result.projector = rays_solve(result.camera, result.lit, origin_mm);
+        find_rays(pictures, twins, origin_mm, result);
     } catch (const Error &) {
         progress.clear();
         tell_pictures(result);

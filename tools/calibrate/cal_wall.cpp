@@ -1,0 +1,223 @@
+#include "cal_wall.hpp"
+
+#include <algorithm>
+#include <opencv2/calib3d.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "cal_beam.hpp"
+#include "cal_epipolar.hpp"
+
+namespace cal
+{
+/* So many pictures must show a place without the board; so far around the sheet is what holds it. */
+static constexpr size_t shown_min = 5, shown_max = 255;
+static constexpr int around_sheet_px = 24;
+/* A dot is so near to its line, and so far from all others, somewhere in this range. */
+static constexpr double on_line_px = 1.0, alone_px = 4.0, near_mm = 800.0, far_mm = 8000.0;
+/* A wall has so many dots, and this share of those that are seen. */
+static constexpr size_t wall_min = 60;
+static constexpr double wall_share = 0.5;
+/* A dot is on the wall up to so many times the usual distance from it. */
+static constexpr double on_wall_sigmas = 3.0;
+static constexpr int rounds = 30;
+static constexpr size_t trimmed_part = 6;        /* one in so many at each end */
+static constexpr double trimmed_variance = 1.08; /* of such a mean, against the whole one */
+static constexpr double noise_of_place = 0.8; /* px, of a Gaussian whose peak is as high as the noise: sqrt(2 / pi) */
+
+static double median_of(std::vector<double> values)
+{
+    auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    return *middle;
+}
+
+/* Where the sheet and what holds it are not. */
+static cv::Mat beside_sheet(const Board &board, const Camera &camera, const View &view)
+{
+    cv::Point2d first = board.sheet_origin_mm();
+    std::vector<cv::Point3d> outline;
+    std::vector<cv::Point2d> seen;
+    std::vector<cv::Point> hull;
+    for (int i = 0; i < 4; i++)
+        outline.emplace_back(first.x + (i == 1 || i == 2 ? sheet_width_mm : 0.0),
+                             first.y + (i >= 2 ? sheet_height_mm : 0.0), 0.0);
+    cv::projectPoints(outline, view.turn, view.shift, camera.matrix, camera.distortion, seen);
+    for (const cv::Point2d &px : seen)
+        hull.emplace_back(cvRound(px.x), cvRound(px.y));
+    cv::Mat mask(camera.size, CV_8U, cv::Scalar(255));
+    cv::fillConvexPoly(mask, hull, cv::Scalar(0));
+    cv::polylines(mask, hull, true, cv::Scalar(0), 2 * around_sheet_px);
+    return mask;
+}
+
+/* The mean of what is left without the largest and the smallest: somebody may have walked there. */
+static float trimmed_mean(std::vector<float> &values)
+{
+    size_t cut = (values.size() + trimmed_part - 1) / trimmed_part;
+    std::sort(values.begin(), values.end());
+    float sum = 0.0f;
+    for (size_t i = cut; i < values.size() - cut; i++)
+        sum += values[i];
+    return sum / static_cast<float>(values.size() - 2 * cut);
+}
+
+/* What the laser adds behind the board, over all twins; CV_32F. `counts` (CV_8U): over how many, 0 where too few. */
+static cv::Mat still_rise(const std::vector<cv::Mat> &rises, const std::vector<cv::Mat> &masks, cv::Mat &counts)
+{
+    cv::Size size = rises.front().size();
+    cv::Mat still = cv::Mat::zeros(size, CV_32F);
+    counts = cv::Mat::zeros(size, CV_8U);
+    std::vector<float> values;
+    for (int v = 0; v < size.height; v++) {
+        for (int u = 0; u < size.width; u++) {
+            values.clear();
+            for (size_t i = 0; i < rises.size() && values.size() < shown_max; i++) {
+                if (masks[i].at<uchar>(v, u) != 0)
+                    values.push_back(rises[i].at<float>(v, u));
+            }
+            if (values.size() < shown_min)
+                continue;
+            counts.at<uchar>(v, u) = static_cast<uchar>(values.size());
+            still.at<float>(v, u) = trimmed_mean(values);
+        }
+    }
+    return still;
+}
+
+Lit wall_find(const Board &board, const Camera &camera, const std::vector<Picture> &pictures,
+              const std::vector<int> &twins, const std::vector<Lit> &lit, const Noise &noise, double lens_px)
+{
+    std::vector<cv::Mat> rises, masks;
+    cv::Mat light = cv::Mat::zeros(camera.size, CV_32F), counts; /* of both twins together */
+    size_t next = 0;
+    Lit wall;
+    wall.file = "behind the board";
+    wall.twin = "all pictures";
+    for (size_t i = 0; i < pictures.size(); i++) {
+        if (!pictures[i].laser)
+            continue;
+        const Lit &here = lit[next++];
+        if (!here.refused.empty() || twins[i] < 0)
+            continue;
+        const cv::Mat &grey = pictures[i].grey, &dark = pictures[static_cast<size_t>(twins[i])].grey;
+        rises.push_back(grey - dark);
+        masks.push_back(beside_sheet(board, camera, here.view));
+        cv::accumulate(grey + dark, light, masks.back());
+    }
+    if (rises.size() < shown_min)
+        return wall;
+    cv::Mat still = still_rise(rises, masks, counts);
+    for (const Dot &dot : dots_find(still, {}, counts > 0)) {
+        Sighting sighting;
+        cv::Point at(cvRound(dot.px.x), cvRound(dot.px.y));
+        sighting.wide_px = dot.sigma_px;
+        sighting.px = dot.px;
+        sighting.tangent = camera.tangents({dot.px}).front();
+        double beam_px = std::sqrt(std::max(dot.sigma_px * dot.sigma_px - lens_px * lens_px, 0.0));
+        double count = counts.at<uchar>(at), both_grey = static_cast<double>(light.at<float>(at)) / count;
+        double noise_grey = std::sqrt(trimmed_variance * 2.0 * noise.at(0.5 * both_grey) / count);
+        sighting.sigma_px = std::hypot(noise_of_place * noise_grey / dot.peak_grey, beam_speckle_px(beam_px));
+        wall.sightings.push_back(sighting);
+    }
+    return wall;
+}
+
+/* A dot on a line: nearness 1/Z, and how that is known. */
+struct Place {
+    Sighting *sighting;
+    double nearness, sigma; /* 1/mm */
+    double move_px;         /* for a change of the nearness by 1/mm */
+};
+
+/* Labels the dots; those that might be two, or none, get no slot. */
+static std::vector<Place> label(const Camera &camera, const Projector &projector, Lit &wall)
+{
+    auto lines = epipolar_lines(camera, projector.origin_mm, projector.rays);
+    std::vector<Place> places;
+    for (Sighting &sighting : wall.sightings) {
+        cv::Point2d px = camera.undistorted_px(sighting.tangent);
+        double best_px = 1e9, next_px = 1e9;
+        Place place{&sighting, 0.0, 0.0, 0.0};
+        sighting.slot = no_slot;
+        for (size_t slot = 0; slot < slot_count; slot++) {
+            cv::Point2d way = px - lines[slot].infinity_px, move = lines[slot].move_px_mm;
+            double nearness = std::clamp(way.dot(move) / move.dot(move), 1.0 / far_mm, 1.0 / near_mm);
+            double off_px = cv::norm(way - move * nearness);
+            if (off_px < best_px) {
+                next_px = best_px;
+                best_px = off_px;
+                double ray_px = projector.sigma_deg[slot] * CV_PI / 180.0 * camera.focal_px();
+                place.nearness = way.dot(move) / move.dot(move);
+                place.move_px = cv::norm(move);
+                place.sigma = std::hypot(sighting.sigma_px, ray_px) / place.move_px;
+                sighting.slot = projector.seen[slot] > 0 ? static_cast<int>(slot) : no_slot;
+            } else {
+                next_px = std::min(next_px, off_px);
+            }
+        }
+        if (best_px > on_line_px || next_px < alone_px)
+            sighting.slot = no_slot;
+        if (sighting.slot != no_slot)
+            places.push_back(place);
+    }
+    return places;
+}
+
+/* A plane m . X = 1 has nearness m . (tangent, 1). From a start that holds for most, those on it. */
+static cv::Vec3d lay_plane(const std::vector<Place> &places, double &scale)
+{
+    cv::Vec3d plane(0.0, 0.0, 0.0);
+    std::vector<double> sizes;
+    for (const Place &place : places)
+        sizes.push_back(place.nearness);
+    plane[2] = median_of(sizes);
+    for (int round = 0; round < rounds; round++) {
+        sizes.clear();
+        for (const Place &place : places)
+            sizes.push_back(std::abs(place.nearness -
+                                     plane.dot(cv::Vec3d(place.sighting->tangent.x, place.sighting->tangent.y, 1.0))) /
+                            place.sigma);
+        scale = std::max(1.4826 * median_of(sizes), 1e-3);
+        cv::Matx33d normal = cv::Matx33d::zeros();
+        cv::Vec3d right(0.0, 0.0, 0.0);
+        for (size_t i = 0; i < places.size(); i++) {
+            double size = sizes[i] / (on_wall_sigmas * scale);
+            if (size >= 1.0)
+                continue;
+            double weight = (1.0 - size * size) * (1.0 - size * size) / (places[i].sigma * places[i].sigma);
+            cv::Vec3d terms(places[i].sighting->tangent.x, places[i].sighting->tangent.y, 1.0);
+            normal += weight * (terms * terms.t());
+            right += weight * places[i].nearness * terms;
+        }
+        plane = normal.inv(cv::DECOMP_SVD) * right;
+    }
+    return plane;
+}
+
+bool wall_lay(const Camera &camera, const Projector &projector, Lit &wall)
+{
+    std::vector<Place> places = label(camera, projector, wall);
+    if (places.size() < wall_min)
+        return false;
+    double scale;
+    cv::Vec3d plane = lay_plane(places, scale);
+    double height_mm = 1.0 / cv::norm(plane);
+    cv::Vec3d normal = plane * height_mm, across = cv::normalize(normal.cross(cv::Vec3d(0.0, 1.0, 0.0)));
+    cv::Vec3d down = normal.cross(across);
+    cv::Matx33d rotation(across[0], down[0], normal[0], across[1], down[1], normal[1], across[2], down[2], normal[2]);
+    cv::Rodrigues(rotation, wall.view.turn);
+    wall.view.shift = normal * height_mm;
+    size_t on_wall = 0;
+    for (Place &place : places) {
+        Sighting &sighting = *place.sighting;
+        double off = place.nearness - plane.dot(cv::Vec3d(sighting.tangent.x, sighting.tangent.y, 1.0));
+        if (std::abs(off) > on_wall_sigmas * scale * place.sigma) {
+            sighting.slot = no_slot;
+            continue;
+        }
+        sighting_place(camera, wall.view, sighting.px, sighting);
+        on_wall++;
+    }
+    return on_wall >= wall_min && static_cast<double>(on_wall) >= wall_share * static_cast<double>(places.size());
+}
+} // namespace cal
