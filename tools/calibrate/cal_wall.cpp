@@ -19,6 +19,8 @@ static constexpr size_t wall_min = 60;
 static constexpr double wall_share = 0.5;
 /* A dot is on the wall up to so many times the usual distance from it. */
 static constexpr double on_wall_sigmas = 3.0;
+/* What is so many times less even than its dots are known is no wall. */
+static constexpr double uneven_max = 3.0;
 static constexpr int rounds = 30;
 static constexpr size_t trimmed_part = 6;        /* one in so many at each end */
 static constexpr double trimmed_variance = 1.08; /* of such a mean, against the whole one */
@@ -201,6 +203,8 @@ bool wall_lay(const Camera &camera, const Projector &projector, Lit &wall)
         return false;
     double scale;
     cv::Vec3d plane = lay_plane(places, scale);
+    if (scale > uneven_max)
+        return false;
     double height_mm = 1.0 / cv::norm(plane);
     cv::Vec3d normal = plane * height_mm, across = cv::normalize(normal.cross(cv::Vec3d(0.0, 1.0, 0.0)));
     cv::Vec3d down = normal.cross(across);
@@ -216,6 +220,7 @@ bool wall_lay(const Camera &camera, const Projector &projector, Lit &wall)
             continue;
         }
         sighting_place(camera, wall.view, sighting.px, sighting);
+        sighting.sigma_px *= std::max(scale, 1.0); /* an uneven wall tells less */
         on_wall++;
     }
     return on_wall >= wall_min && static_cast<double>(on_wall) >= wall_share * static_cast<double>(places.size());

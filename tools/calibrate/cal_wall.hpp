@@ -2,6 +2,8 @@
  * Dots that miss the board land there in every picture, so the mean of all pictures shows them with little noise, and the
  * grains of a beam are finest where it is far away. Where the wall is, nobody measured: it is laid through the places that
  * the rays tell, each time they are known better. How even it is, is told by how well it fits; what is not on it is left out.
+ * A dot behind the board is told by its epipolar line alone, so this is for projectors near the camera: beside a wide
+ * baseline the lines of neighbours lie upon each other, and such dots are not used.
  */
 #ifndef CAL_WALL_HPP
 #define CAL_WALL_HPP
