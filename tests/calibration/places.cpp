@@ -7,10 +7,11 @@
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "cal_dots.hpp"
+#include "cal_beam.hpp"
 #include "cal_refine.hpp"
 #include "cal_spot.hpp"
 #include "cal_twins.hpp"
+#include "cal_wall.hpp"
 
 static int number, failed;
 
@@ -254,12 +255,169 @@ static void check_twins()
     result("and nowhere else", leaked == 0.0, leaked, 0.0);
 }
 
+/* Light that fades to the right, as in a room with one window. */
+static void check_fading()
+{
+    Stage stage;
+    cv::Mat print = cal::board_picture(stage.board, cal::draw_px_per_mm), grey = stage.picture(0.8);
+    cv::Mat tangents =
+        cal::draw_tangents(stage.camera.size, stage.camera.matrix, stage.camera.distortion);
+    for (int v = 0; v < height; v++) {
+        for (int u = 0; u < width; u++)
+            grey.at<float>(v, u) *= 1.5f - 1.0f * static_cast<float>(u) / width;
+    }
+    cal::Corners corners;
+    for (int id = 0; id < stage.board.corner_count(); id++) {
+        corners.ids.push_back(id);
+        corners.px.emplace_back(stage.seen(stage.board.corner_mm(id)));
+    }
+    corners.edge_px = 2.5066 * std::hypot(0.8, 0.29);
+    cal::corners_refine(stage.board, print, tangents, grey, stage.camera.matrix,
+                        stage.camera.distortion, corners);
+    double most = 0.0;
+    for (size_t i = 0; i < corners.ids.size(); i++)
+        most = std::max(most, cv::norm(cv::Point2d(corners.px[i]) -
+                                       stage.seen(stage.board.corner_mm(corners.ids[i]))));
+    result("corners in light that fades", most < 0.006 && corners.ids.size() > 60, most, 0.006);
+}
+
+/* Dots whose beams are grainy: the fit that knows of grains errs less than the one to which all pixels are alike, and
+ * tells its error. */
+static void check_grains()
+{
+    constexpr double beam_px = 0.9, lens_px = 0.9, noise_grey = 3.0, contrast = 0.45;
+    constexpr int count = 200, side = cal::dot_side_px;
+    cv::RNG random(11);
+    double plain = 0.0, knowing = 0.0, told = 0.0;
+    for (int n = 0; n < count; n++) {
+        cv::Mat light(cal::beam_side, cal::beam_side, CV_64F), lens(side, cal::beam_side, CV_64F),
+            rise;
+        cv::Point2d px(random.uniform(-0.5, 0.5), random.uniform(-0.5, 0.5));
+        for (int i = 0; i < cal::beam_side * cal::beam_side; i++) {
+            double x = cal::beam_sample_px(i % cal::beam_side) - px.x,
+                   y = cal::beam_sample_px(i / cal::beam_side) - px.y;
+            /* A sample is a ninth of a px^2; grains of 0.1 of the beam's square have 0.9 of its light's variance. */
+            double grain = 1.0 + contrast / 0.45 * beam_px * random.gaussian(std::sqrt(0.1 * 9.0));
+            light.at<double>(i / cal::beam_side, i % cal::beam_side) =
+                grain * std::exp(-0.5 * (x * x + y * y) / (beam_px * beam_px));
+        }
+        for (int i = 0; i < side * cal::beam_side; i++) {
+            double away =
+                (i / cal::beam_side - cal::dot_reach_px - cal::beam_sample_px(i % cal::beam_side)) /
+                lens_px;
+            lens.at<double>(i / cal::beam_side, i % cal::beam_side) =
+                2.0 * std::exp(-0.5 * away * away);
+        }
+        cv::Mat(lens * light * lens.t()).convertTo(rise, CV_32F);
+        cv::Mat noise(rise.size(), CV_32F);
+        random.fill(noise, cv::RNG::NORMAL, 0.0, noise_grey);
+        rise += noise;
+        cal::Dot dot{};
+        cal::Beam beam{{0.0, 0.0}, 0.7, 0.0};
+        cal::BeamWindow window{cv::Mat(light.size(), CV_64F, cv::Scalar(1.0)), rise, rise,
+                               cv::Mat(rise.size(), CV_64F, cv::Scalar(noise_grey * noise_grey)),
+                               lens_px};
+        if (!cal::dot_fit(rise, rise, dot) || !cal::beam_fit(window, beam)) {
+            result("a grainy dot is fitted", false, n, count);
+            return;
+        }
+        plain += (dot.px - px).ddot(dot.px - px) / (2 * count);
+        knowing += (beam.px - px).ddot(beam.px - px) / (2 * count);
+        told += beam.sigma_px * beam.sigma_px / count;
+    }
+    double better = std::sqrt(knowing / plain), honest = std::sqrt(knowing / told);
+    result("grains move a fit that knows of them less", better < 0.95, better, 0.95);
+    result("and it tells its error", honest > 0.8 && honest < 1.25, honest, 1.25);
+}
+
+/* A near board under many bright dots, and the same a pixel aside. */
+static void check_pair()
+{
+    Stage stage;
+    cv::Mat dark = stage.picture(0.8), lit = dark.clone();
+    for (int v = 10; v < height; v += 20) {
+        for (int u = 10; u < width; u += 20)
+            cv::circle(lit, {u, v}, 5, cv::Scalar(255.0), cv::FILLED);
+    }
+    cal::View view, none;
+    for (int id = 0; id < stage.board.corner_count(); id++)
+        view.corners.px.emplace_back(stage.seen(stage.board.corner_mm(id)));
+    cv::Mat aside, move = (cv::Mat_<double>(2, 3) << 1.0, 0.0, 1.0, 0.0, 1.0, 0.4);
+    cv::warpAffine(lit, aside, move, lit.size());
+    int same = cal::twins_find({{"a", dark, false}, {"b", lit, true}}, {view, none})[1];
+    int moved = cal::twins_find({{"a", dark, false}, {"b", aside, true}}, {view, none})[1];
+    result("a board under dots stands still", same == 0, same, 0.0);
+    result("and a pixel aside it does not", moved == -1, moved, -1.0);
+}
+
+/* A projector beside the camera, and dots on a wall of which some are on things before it. */
+static void check_wall()
+{
+    Stage stage;
+    cv::RNG random(5);
+    cal::Projector projector;
+    cal::Lit wall;
+    cv::Vec3d normal = cv::normalize(cv::Vec3d(0.2, -0.1, 1.0));
+    constexpr double height_mm = 2200.0, noise_px = 0.05;
+    size_t before = 0;
+    projector.origin_mm = {12.0, 1.0, 2.0};
+    for (size_t slot = 0; slot < cal::slot_count; slot++) {
+        double column = static_cast<double>(slot % 19) - 9.0,
+               row = static_cast<double>(slot / 19) - 9.0;
+        cv::Vec3d ray = cv::normalize(
+            cv::Vec3d(0.03 * column - 0.0016 * row, 0.03 * row + 0.0016 * column, 1.0));
+        projector.rays[slot] = ray;
+        projector.seen[slot] = 5;
+        projector.sigma_deg[slot] = 0.003;
+        double along = (height_mm - normal.dot(projector.origin_mm)) / normal.dot(ray);
+        bool is_before = slot % 5 == 2;
+        cv::Vec3d place = projector.origin_mm + ray * (is_before ? 0.6 * along : along);
+        cal::Sighting sighting{};
+        sighting.sigma_px = noise_px;
+        sighting.px = {centre_u + focal_px * place[0] / place[2] + random.gaussian(noise_px),
+                       centre_v + focal_px * place[1] / place[2] + random.gaussian(noise_px)};
+        sighting.tangent = stage.camera.tangents({sighting.px}).front();
+        before += is_before;
+        wall.sightings.push_back(sighting);
+    }
+    bool laid = cal::wall_lay(stage.camera, projector, wall);
+    double off_mm = 0.0;
+    size_t wrong = 0, used = 0;
+    for (size_t slot = 0; slot < cal::slot_count; slot++) {
+        const cal::Sighting &sighting = wall.sightings[slot];
+        used += sighting.slot != cal::no_slot;
+        wrong += sighting.slot != cal::no_slot &&
+                 (sighting.slot != static_cast<int>(slot) || slot % 5 == 2);
+        cv::Vec3d place = wall.view.shift;
+        off_mm = std::max(off_mm, std::abs(normal.dot(place) - height_mm));
+    }
+    result("a wall behind the board", laid && used > 270 && off_mm < 10.0, off_mm, 10.0);
+    result("without the things before it", wrong == 0, static_cast<double>(wrong), 0.0);
+    for (cal::Sighting &sighting : wall.sightings) {
+        double along = random.uniform(900.0, 4000.0);
+        size_t slot = static_cast<size_t>(&sighting - wall.sightings.data());
+        cv::Vec3d place = projector.origin_mm + projector.rays[slot] * along;
+        sighting.px = {centre_u + focal_px * place[0] / place[2],
+                       centre_v + focal_px * place[1] / place[2]};
+        sighting.tangent = stage.camera.tangents({sighting.px}).front();
+    }
+    laid = cal::wall_lay(stage.camera, projector, wall);
+    size_t kept = static_cast<size_t>(
+        std::count_if(wall.sightings.begin(), wall.sightings.end(),
+                      [](const cal::Sighting &s) { return s.slot != cal::no_slot; }));
+    result("a heap of things is no wall", !laid, static_cast<double>(kept), 0.0);
+}
+
 int main()
 {
     check_corners();
     check_dots();
     check_lens();
     check_twins();
+    check_fading();
+    check_grains();
+    check_pair();
+    check_wall();
     std::printf("1..%d\n", number);
     return failed == 0 ? 0 : 1;
 }

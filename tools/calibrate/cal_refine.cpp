@@ -26,9 +26,10 @@ static constexpr int passes = 4;
 /* An edge's rise over its steepest slope is this many standard deviations of its blur. */
 static constexpr double edge_sigmas = 2.5066, pixel_sigma_px = 0.29, blur_min_px = 0.4;
 
-/* Gain; ground, its slopes and curves (a lamp's mirror image is a hill); how much softer the picture is than the drawing,
- * without which a patch that is not the same on both sides is pushed aside; shift. */
-static constexpr int unknowns = 10, shift_u = 8, shift_v = 9;
+/* Gain and its slopes, because light that fades across the sheet would push a corner aside, and the farther off the sheet
+ * is, the more; ground, its slopes and curves (a lamp's mirror image is a hill); how much softer the picture is than the
+ * drawing, without which a patch that is not the same on both sides is pushed aside; shift. */
+static constexpr int unknowns = 12, shift_u = 10, shift_v = 11;
 using Unknowns = cv::Matx<double, unknowns, 1>;
 
 /* What draws the print as the camera sees it. */
@@ -97,8 +98,9 @@ static std::vector<Pixel> list_pixels(const cv::Mat &grey, const Drawn &drawn, c
                           light.at<double>(row + 1, column) + light.at<double>(row - 1, column) - 4.0 * here;
             double x = static_cast<double>(du) / half, y = static_cast<double>(dv) / half;
             double seen = static_cast<double>(grey.at<float>(at));
-            pixels.push_back(
-                {{here, 1.0, x, y, x * x, x * y, y * y, soft, -slope_u, -slope_v}, seen, seen < saturated_grey});
+            pixels.push_back({{here, 1.0, x, y, x * x, x * y, y * y, soft, here * x, here * y, -slope_u, -slope_v},
+                              seen,
+                              seen < saturated_grey});
         }
     }
     return pixels;
