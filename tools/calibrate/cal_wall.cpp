@@ -19,6 +19,8 @@ static constexpr size_t wall_min = 60;
 static constexpr double wall_share = 0.5;
 /* A dot is on the wall up to so many times the usual distance from it. */
 static constexpr double on_wall_sigmas = 3.0;
+/* Up to this much more than its dots' own noise a wall is even: the rays' noise is not known better. */
+static constexpr double even_scale = 1.25;
 /* What is so many times less even than its dots are known is no wall. */
 static constexpr double uneven_max = 3.0;
 static constexpr int rounds = 30;
@@ -220,7 +222,7 @@ bool wall_lay(const Camera &camera, const Projector &projector, Lit &wall)
             continue;
         }
         sighting_place(camera, wall.view, sighting.px, sighting);
-        sighting.sigma_px *= std::max(scale, 1.0); /* an uneven wall tells less */
+        sighting.sigma_px *= scale > even_scale ? scale : 1.0; /* an uneven wall tells less */
         on_wall++;
     }
     return on_wall >= wall_min && static_cast<double>(on_wall) >= wall_share * static_cast<double>(places.size());
