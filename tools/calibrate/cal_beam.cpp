@@ -6,8 +6,8 @@
 namespace cal
 {
 static constexpr int rounds = 8, rounds_min = 2;
-/* Variance of a beam's relative lightness in a patch as large as its own sigma squared: grains whose contrast is a third in
- * a beam of fifteen. Half or twice of it moves no dot's error by more than 2 %; the rays' residuals set the scale. */
+/* Variance of a beam's relative lightness in a patch as large as its own sigma squared: grains whose contrast is a
+ * third. Half or twice of it changes the dots' errors by 3 % at most; the rays' residuals set the scale. */
 static constexpr double speckle = 0.1;
 static constexpr double width_min_px = 0.35, width_max_px = 3.0, still_px = 1e-3, step_max_px = 0.5;
 static constexpr size_t used_min = 40;
@@ -73,8 +73,8 @@ static LitSurface light_up(const cv::Mat &surface, const Beam &beam)
     return lit;
 }
 
-/* Covariance of the window's pixels by speckle, for a beam `bright` times `light`: grains of the surface through the lens. The lens is
- * the same along both axes, so first columns are summed, then rows. */
+/* Covariance of the window's pixels by speckle, for a beam `bright` times `light`: grains of the surface through the
+ * lens. The lens is the same along both axes, so first columns are summed, then rows. */
 static cv::Mat grain_covariance(const cv::Mat &light, const cv::Mat &lens, const Beam &beam, double bright)
 {
     constexpr int side = dot_side_px, pairs = side * side;

@@ -1,7 +1,7 @@
 /* cal_beam - where a beam of the laser meets the print, by a fit that knows what makes a dot uneven.
- * Model: a round beam on the print, as light as that is there, through the lens, on a level ground. What is seen differs from
- * it by the sensor's noise and by speckle: rough paper makes the beam grainy before the lens softens it, so neighbouring
- * pixels err together, most where the beam is bright. Generalised least squares with both; that moves a dot less by its
+ * Model: a round beam on the print, as light as that is there, through the lens, on a level ground. What is seen differs
+ * from it by the sensor's noise and by speckle: rough paper makes the beam grainy before the lens softens it, so
+ * neighbouring pixels err together, most where the beam is bright. Generalised least squares with both; that moves a dot less by its
  * grains than a fit to which all pixels are the same, and says how well each dot is known.
  */
 #ifndef CAL_BEAM_HPP

@@ -26,9 +26,9 @@ static constexpr int passes = 4;
 /* An edge's rise over its steepest slope is this many standard deviations of its blur. */
 static constexpr double edge_sigmas = 2.5066, pixel_sigma_px = 0.29, blur_min_px = 0.4;
 
-/* Gain and its slopes, because light that fades across the sheet would push a corner aside, and the farther off the sheet
- * is, the more; ground, its slopes and curves (a lamp's mirror image is a hill); how much softer the picture is than the
- * drawing, without which a patch that is not the same on both sides is pushed aside; shift. */
+/* In this order: gain; ground, its slopes and curves (a lamp's mirror image is a hill); how much softer the picture is
+ * than the drawing, without which a patch that is not the same on both sides is pushed aside; the gain's slopes, because
+ * light that fades across the sheet pushes corners aside, too; shift. */
 static constexpr int unknowns = 12, shift_u = 10, shift_v = 11;
 using Unknowns = cv::Matx<double, unknowns, 1>;
 

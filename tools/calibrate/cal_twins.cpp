@@ -20,7 +20,7 @@ static constexpr size_t level_pixels_min = 300;
 static constexpr double drop_max_grey = 25.0, full_grey = 240.0;
 static constexpr double noise_least = 0.1; /* a sensor's steps alone make so much */
 
-/* How much darker than in `dark` a part of the picture is in `lit` at a place beside it: the laser makes nothing darker. */
+/* How much darker than in `dark` a part of the picture is in `lit` at a place beside it; the laser darkens nothing. */
 static double darker(const cv::Mat &dark, const cv::Mat &lit, const cv::Rect &part, cv::Point beside)
 {
     cv::Mat drop = dark(part) - lit(part + beside);
@@ -41,8 +41,8 @@ static bool is_still(const cv::Mat &dark, const cv::Mat &lit, const cv::Rect &pa
     return here < still_part * sum;
 }
 
-/* Whether the board that `dark` shows is in the same place in `lit`. It is not looked for anew: on a near one, dots cover its
- * markers. They may cover what is around some corners; a board that moves takes all along. */
+/* Whether the board that `dark` shows is in the same place in `lit`. It is not looked for anew: on a near one, dots
+ * cover its markers. They may cover what is around some corners; a board that moves takes all along. */
 static bool same_place(const Picture &dark, const Corners &corners, const Picture &lit)
 {
     int looked = 0, same = 0;

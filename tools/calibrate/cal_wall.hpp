@@ -1,7 +1,8 @@
 /* cal_wall - what stands still behind the board, if it is a wall: one more plane that the rays meet.
- * Dots that miss the board land there in every picture, so the mean of all pictures shows them with little noise, and the
- * grains of a beam are finest where it is far away. Where the wall is, nobody measured: it is laid through the places that
- * the rays tell, each time they are known better. How even it is, is told by how well it fits; what is not on it is left out.
+ * Dots that miss the board land there in every picture, so the mean of all pictures shows them with little noise, and
+ * the grains of a beam are finest where it is far away. Where the wall is, nobody measured: it is laid through the places
+ * that the rays tell, each time they are known better. How even it is, is told by how well it fits; what is not on it is
+ * left out.
  * A dot behind the board is told by its epipolar line alone, so this is for projectors near the camera: beside a wide
  * baseline the lines of neighbours lie upon each other, and such dots are not used.
  */
