@@ -69,7 +69,8 @@ std::vector<int> twins_find(const std::vector<Picture> &pictures, const std::vec
             if (!pictures[here].laser || twins[here] >= 0 || other < 0 || other >= count)
                 continue;
             size_t there = static_cast<size_t>(other);
-            if (!pictures[there].laser && same_place(pictures[there], views[there].corners, pictures[here]))
+            if (!pictures[there].laser && views[there].good() &&
+                same_place(pictures[there], views[there].corners, pictures[here]))
                 twins[here] = other;
         }
     }

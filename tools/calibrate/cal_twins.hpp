@@ -9,7 +9,7 @@
 namespace cal
 {
 /* Index of each laser-on picture's twin among the pictures: the one before or after it, where the board has not moved;
- * -1: it has none. */
+ * -1: it has none, or one that is no good. */
 std::vector<int> twins_find(const std::vector<Picture> &pictures, const std::vector<View> &views);
 
 /* The picture without the laser, with less noise: the mean of both where the laser lit nothing. CV_32F. */
