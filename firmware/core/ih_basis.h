@@ -1,10 +1,11 @@
-/* ih_basis - the surface's multiquadrics: sqrt(dx^2 + dy^2 + 1).
+/* ih_basis - the surface's multiquadrics sqrt(dx^2 + dy^2 + 1), and sums of them.
  *
- * In:    squares, Q32: 1 and more, below 2^13.
- * Out:   their roots, Q20, rounded to nearest, exactly.
- * Way:   a table, one correction, and a look at the square; 32 bits all the way, so that eight fit into a
- *        vector. There is a second way of the same steps for processors without such vectors.
- * Cost:  about 8 instructions a root with vectors, 45 without.
+ * In:    squares, Q18: 1 and more, below 2^13; coefficients.
+ * Out:   their roots, Q20, cut off to a whole step; sums of products, exact.
+ * Way:   a table of parabolas; 32 bits all the way, so that eight fit into a vector. The same steps, and bits,
+ *        on processors without such vectors.
+ * Error: relative 2^-22.2, and one step down.
+ * Cost:  5 instructions a root with vectors, 20 without.
  */
 #ifndef IH_BASIS_H
 #define IH_BASIS_H
@@ -14,10 +15,19 @@
 #include "ih_config.h"
 #include "ih_types.h"
 
-/* So many at once. */
-#define IH_BASIS_GROUP 8
+/* Squares in a line. */
+#define IH_BASIS_ACROSS 12
+/* Entries of a sample's row. */
+#define IH_BASIS_TERMS (IH_BASIS_ACROSS * IH_BASIS_ACROSS)
 
-/* count: a multiple of IH_BASIS_GROUP. */
-void ih_basis_roots(const uint64_t *square_q32, int32_t count, uint32_t *root_q20);
+/* The roots of across[i] + down[k], line by line: one line for each of down, whose count is even. */
+void ih_basis_roots(const uint32_t *across_q18, const uint32_t *down_q18, int32_t down_count,
+                    uint32_t *root_q20);
+
+/* The sum of basis[i] * coefficient[i]; both sums of positive and of negative products are below 2^62. */
+int64_t ih_basis_sum(const uint32_t *basis_q20, const int32_t *coefficient);
+
+/* Add basis[i] * factor to sum[i]. */
+void ih_basis_add(const uint32_t *basis_q20, int32_t factor, int64_t *sum);
 
 #endif

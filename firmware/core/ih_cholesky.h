@@ -7,8 +7,10 @@
  *        stays below 2^60 + n 2^30 and the 64-bit accumulator needs no guard. A pivot (of A)
  *        that is not at least 2^-60 is zero or negative: IH_ERR_NOT_POSITIVE, *bad_pivot says
  *        which.
- * Error: a residual of about n 2^-31; docs/numerics.md has the measured figure.
- * Cost:  n^3/6 multiply-adds, n^2/2 divisions, n square roots.
+ * Way:   entries are divided by a pivot by its inverse of 31 bits. x86 has several products of 32 bits an
+ *        instruction; all processors give the same bits.
+ * Error: a residual of about n 2^-30; docs/numerics.md has the measured figure.
+ * Cost:  n^3/6 multiply-adds, n^2/2 products, n square roots and divisions.
  */
 #ifndef IH_CHOLESKY_H
 #define IH_CHOLESKY_H
@@ -27,7 +29,7 @@ enum ih_err ih_cholesky_factor(int32_t *a_q30, int32_t n, int32_t *bad_pivot)
     __attribute__((warn_unused_result));
 
 /* Solve L L^T x = b. b: any common scale, |b_i| <= 2^31 - 1, and so small that |L^-1 b| stays
- * within int32 (true when b = R^T y with |y| in range: see ih_surface). x: mantissas below 2^25 with
+ * within int32 (see ih_surface; else it is saturated). x: mantissas below 2^25 with
  * x_i = mantissa_i * 2^exponent in b's unit, exponent >= 0 as small as that allows. b and x may be
  * the same array. */
 void ih_cholesky_solve(const int32_t *l_q30, int32_t n, const int32_t *b, int32_t *x_mantissa,

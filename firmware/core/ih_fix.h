@@ -78,6 +78,11 @@ static inline int32_t ih_min_s32(int32_t a, int32_t b)
     return a < b ? a : b;
 }
 
+static inline int64_t ih_min_s64(int64_t a, int64_t b)
+{
+    return a < b ? a : b;
+}
+
 static inline int32_t ih_max_s32(int32_t a, int32_t b)
 {
     return a > b ? a : b;
@@ -86,6 +91,12 @@ static inline int32_t ih_max_s32(int32_t a, int32_t b)
 static inline int32_t ih_clamp_s32(int32_t value, int32_t low, int32_t high)
 {
     return ih_min_s32(ih_max_s32(value, low), high);
+}
+
+/* value limited to -most .. most. */
+static inline int64_t ih_clamp_s64(int64_t value, int64_t most)
+{
+    return value < -most ? -most : value > most ? most : value;
 }
 
 static inline int64_t ih_abs_s64(int64_t value)

@@ -64,10 +64,9 @@ void ih_range_check(int64_t value, int64_t low, int64_t high, const char *file, 
 #define IH_RANGE_ROOT_WEIGHT_Q15 (1 << 15)
 
 /* Surface. */
-#define IH_RANGE_BASIS_Q20 88980803
-#define IH_RANGE_NORMAL_Q40 2858247572211456049 /* 361 times the basis squared */
-#define IH_RANGE_RIGHT_Q28 133627810713280000   /* 361 times the basis times a sample's depth */
-#define IH_RANGE_SCALED_Q30 1063100000          /* entry of the scaled equations */
+#define IH_RANGE_BASIS_Q20 88980826
+#define IH_RANGE_NORM_Q38 714570000000000000 /* 361 times the basis squared */
+#define IH_RANGE_SCALED_Q30 1063100000       /* entry of the scaled equations */
 #define IH_RANGE_COEFFICIENT (1 << 28)
 #define IH_RANGE_MANTISSA (1 << 25) /* of a solution */
 #define IH_RANGE_EXPONENT 62

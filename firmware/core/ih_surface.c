@@ -5,18 +5,46 @@
 #include "ih_fix.h"
 
 #define TERMS IH_SURFACE_TERMS
-#define KEPT IH_SURFACE_KEPT
+#define CENTRES IH_SURFACE_CENTRES
 #define HALF_CENTRES IH_SURFACE_HALF_CENTRES
-/* Scale factors are 0.995 * 2^SCALE_SHIFT / sqrt(N_ii): with N_ii of 2^40 (a single sample, weight
- * 1, B = 1) to 2^61.5 they lie between 2^20 and 2^31. */
-#define SCALE_SHIFT 51
+
+/* Short rows: the basis scaled column by column to IH_NORMAL_MOST, less one step that rounding and the roots'
+ * errors may add. The scale in Q17 is below 2^31, as no bound is below 1. */
+#define ROW_MOST (IH_NORMAL_MOST - 1)
+#define ROW_SCALE_BITS 17
+/* Scale factors of the sums are 0.995 * 2^43 / sqrt(sum), 2^27.4 and more, for sums of 2^22 and more. */
+#define SCALE_SHIFT 43
 #define SCALE_NUMERATOR ((((int64_t)1 << SCALE_SHIFT) / 1000) * 995)
-#define SCALE_MAX 0x7fffffff
-/* The right side keeps its norm below this, so that the forward solve stays within int32. */
-#define RIGHT_BITS 30
+/* A product with two of them is shifted in two steps to Q30. */
+#define SCALE_STEP ((2 * SCALE_SHIFT - 30) / 2)
+/* Scales of short rows and of sums together: unknown_scale_q29. */
+#define UNKNOWN_SCALE_BITS 29
+/* Residuals times their weights are limited to 2^OFF_BITS, which is four times what the farthest sample is off
+ * the mean. They have 11 fraction bits or more, as samples are no farther than 16 m. Where a weight is small
+ * the surface may be farther off. */
+#define OFF_BITS 27
+#define OFF_FRACTION_MAX 24
+#define OFF_MAX ((int64_t)1 << 31)
+/* Entries of the right side stay below this. |L^-1 b| is at most 12 * 2^18 / 2.6e-3, which int32 holds. */
+#define RIGHT_BITS 18
 /* Coefficients below 2^28, basis below 2^26.5, 144 terms: sums below 2^61.7, twice that where they are
  * folded. */
 #define SOLUTION_BITS 28
+/* A correction leaves an error that is to it as it is to the one before. Another one is made while the sum of
+ * that error's squares may be above 2^-6, so often at the most. The unknowns are measured, not what they change
+ * at the samples: the less a direction is seen by samples, the more it counts. What only decides about weights
+ * may be farther off. In frames one correction nearly always is enough, and the worst node is 0.02 mm off. */
+#define SQUARES_LOG2_ENOUGH (-6)
+#define SQUARES_LOG2_FOR_WEIGHTS 6
+#define CORRECTIONS_MAX 8
+#define CORRECTIONS_FEW 3
+#define SQUARES_LOG2_NONE (-1000)
+/* Steps of the table, filled up to whole lines of ih_basis. */
+#define TABLE_WIDTH (4 * IH_BASIS_ACROSS)
+
+_Static_assert(CENTRES == IH_BASIS_ACROSS && CENTRES % 2 == 0, "lines of ih_basis");
+_Static_assert(TERMS == IH_NORMAL_TERMS && TERMS <= IH_CHOLESKY_MAX, "one system");
+_Static_assert(TABLE_WIDTH >= IH_SURFACE_STEPS && IH_SURFACE_STEPS % 2 == 0, "all steps");
 
 void ih_surface_params_default(struct ih_surface_params *params)
 {
@@ -29,71 +57,49 @@ void ih_surface_params_default(struct ih_surface_params *params)
 /* Places of a row or column of centres: (2 k - 11) * 20 / 11 field units. */
 static void place_centres(struct ih_surface_scratch *scratch)
 {
-    for (int32_t k = 0; k < IH_SURFACE_CENTRES; k++) {
-        int64_t place_q16 = (int64_t)(2 * k - (IH_SURFACE_CENTRES - 1)) * 20 * 65536;
-        scratch->centre_q16[k] = (int32_t)ih_div_round(place_q16, IH_SURFACE_CENTRES - 1);
+    for (int32_t k = 0; k < CENTRES; k++) {
+        int64_t place_q16 = (int64_t)(2 * k - (CENTRES - 1)) * 20 * 65536;
+        scratch->centre_q16[k] = (int32_t)ih_div_round(place_q16, CENTRES - 1);
     }
 }
 
-/* The sample's row of the basis: sqrt(dx^2 + dy^2 + 1), Q20, rounded. dx, dy < 60 in Q16: the radicand in
- * Q32 is below 2^45. */
+/* Squares of a place's distances from the centres of a row, Q18: below 60^2. */
+static void square_distances(const struct ih_surface_scratch *scratch, int32_t place_q16,
+                             uint32_t square_q18[CENTRES])
+{
+    for (int32_t k = 0; k < CENTRES; k++) {
+        const int64_t d_q16 = (int64_t)place_q16 - scratch->centre_q16[k];
+        square_q18[k] = (uint32_t)(d_q16 * d_q16 >> 14);
+    }
+}
+
+/* The sample's row of the basis: sqrt(dx^2 + dy^2 + 1), Q20. */
 static void fill_row(struct ih_surface_scratch *scratch, const struct ih_sample *sample,
                      uint32_t row_q20[TERMS])
 {
-    uint64_t dx2_q32[IH_SURFACE_CENTRES];
-    for (int32_t k = 0; k < IH_SURFACE_CENTRES; k++) {
-        int64_t dx = (int64_t)sample->x_q16 - scratch->centre_q16[k];
-        dx2_q32[k] = (uint64_t)(dx * dx) + ((uint64_t)1 << 32);
+    uint32_t dx2_q18[CENTRES];
+    uint32_t dy2_q18[CENTRES];
+    square_distances(scratch, sample->x_q16, dx2_q18);
+    square_distances(scratch, sample->y_q16, dy2_q18);
+    for (int32_t k = 0; k < CENTRES; k++) {
+        dx2_q18[k] += 1 << 18;
     }
-    for (int32_t k = 0; k < IH_SURFACE_CENTRES; k++) {
-        int64_t dy = (int64_t)sample->y_q16 - scratch->centre_q16[k];
-        uint64_t dy2_q32 = (uint64_t)(dy * dy);
-        for (int32_t column = 0; column < IH_SURFACE_CENTRES; column++) {
-            scratch->square_q32[k * IH_SURFACE_CENTRES + column] = dx2_q32[column] + dy2_q32;
-        }
-    }
-    ih_basis_roots(scratch->square_q32, TERMS, row_q20);
-    IH_IN_RANGE(row_q20[0], 1 << 20, IH_RANGE_BASIS_Q20);
+    ih_basis_roots(dx2_q18, dy2_q18, CENTRES, row_q20);
+    IH_IN_RANGE(row_q20[0], (1 << 20) - 1, IH_RANGE_BASIS_Q20);
 }
 
-/* Weigh the sample's row, which stands in basis_q20, and put it among the rows to be summed, at number
- * `at`. */
-static void weigh_row(struct ih_surface_scratch *scratch, int32_t root_weight_q15, int32_t at)
+/* value * 2^up, or / 2^-up, rounded, limited to 2^62. */
+static int64_t shift_by(int64_t value, int up)
 {
-    uint32_t *basis_q20 = scratch->basis_q20;
-    bool is_one = root_weight_q15 == 1 << 15; /* as nearly all are: nothing to round */
-    for (int32_t i = 0; !is_one && i < TERMS; i++) {
-        basis_q20[i] = (uint32_t)ih_mul_shift(basis_q20[i], root_weight_q15, 15);
+    const int64_t most = (int64_t)1 << 62;
+    if (up <= 0) {
+        return ih_shift_round(value, ih_min_s32(-up, 62));
     }
-    for (int32_t i = 0; i < TERMS; i++) {
-        scratch->row_q20[at][i] = basis_q20[i];
+    if (ih_bits_u64((uint64_t)ih_abs_s64(value)) + up > 62) {
+        return value < 0 ? -most : value > 0 ? most : 0;
     }
+    return value * ((int64_t)1 << up);
 }
-
-/* Rows from `count` on add nothing. */
-static void clear_rows(struct ih_surface_scratch *scratch, int32_t count)
-{
-    for (int32_t at = count; at < IH_NORMAL_ROWS; at++) {
-        memset(scratch->row_q20[at], 0, sizeof scratch->row_q20[at]);
-    }
-}
-
-/* What the weighted row in basis_q20 brings to the right side. */
-static void add_right(struct ih_surface_scratch *scratch, const struct ih_sample *sample,
-                      int32_t mean_mm_q8, int32_t root_weight_q15)
-{
-    const int32_t off_mm_q8 =
-        (int32_t)ih_mul_shift((int64_t)sample->depth_mm_q8 - mean_mm_q8, root_weight_q15, 15);
-    for (int32_t i = 0; i < TERMS; i++) {
-        scratch->right_q28[i] += (int64_t)(int32_t)scratch->basis_q20[i] * off_mm_q8;
-    }
-}
-
-_Static_assert(TERMS == IH_NORMAL_TERMS && KEPT % IH_NORMAL_GROUP == 0, "lines of ih_normal");
-/* The last line is the nearest to where its scaled one begins. */
-_Static_assert(2 * (IH_NORMAL_LINE(TERMS) - TERMS - IH_NORMAL_LINE(KEPT)) <=
-                   IH_CHOLESKY_PACKED(TERMS - 1),
-               "a line that is scaled must not be in the way of one that is not yet");
 
 static int32_t mean_depth_mm_q8(const struct ih_samples *samples)
 {
@@ -104,218 +110,426 @@ static int32_t mean_depth_mm_q8(const struct ih_samples *samples)
     return (int32_t)ih_div_round(sum, samples->sample_count);
 }
 
-static const uint64_t *line_of(const struct ih_surface_scratch *scratch, int32_t i)
+/* A weight's square, as much enlarged as all are: 2^30 and less. */
+static int64_t weight_q30(const struct ih_surface_scratch *scratch, int32_t root_weight_q15)
 {
-    const int32_t at = ih_normal_line(i);
-    return i < KEPT ? &scratch->kept.q40[at] : &scratch->of.others_q40[at - IH_NORMAL_LINE(KEPT)];
+    const int64_t root_q15 = (int64_t)root_weight_q15 << scratch->weight_shift;
+    return root_q15 * root_q15;
 }
 
-/* Scale factors from N's diagonal. */
-static void set_scale(struct ih_surface_scratch *scratch)
+/* How much weights are enlarged. False when there are none. */
+static bool set_weight_shift(struct ih_surface_scratch *scratch, const int32_t *root_weight_q15,
+                             int32_t count)
 {
+    int32_t most_q15 = 0;
+    for (int32_t i = 0; i < count; i++) {
+        most_q15 = ih_max_s32(most_q15, root_weight_q15[i]);
+    }
+    scratch->weight_shift = ih_max_s32(0, 15 - ih_bits_u64((uint64_t)most_q15));
+    return most_q15 > 0;
+}
+
+/* Diagonal of R^T W R: sums of weight * (dx^2 + dy^2 + 1), from the samples' moments. */
+static void set_norms(struct ih_surface_scratch *scratch, const struct ih_samples *samples,
+                      const int32_t *root_weight_q15)
+{
+    int64_t sum_q30 = 0, x_q46 = 0, y_q46 = 0, square_q42 = 0;
+    for (int32_t i = 0; i < samples->sample_count; i++) {
+        const int64_t x_q16 = samples->sample[i].x_q16, y_q16 = samples->sample[i].y_q16;
+        const int64_t weight = weight_q30(scratch, root_weight_q15[i]);
+        sum_q30 += weight;
+        x_q46 += weight * x_q16;
+        y_q46 += weight * y_q16;
+        square_q42 += weight * ((x_q16 * x_q16 + y_q16 * y_q16) >> 20);
+    }
     for (int32_t i = 0; i < TERMS; i++) {
-        const int64_t diagonal = (int64_t)line_of(scratch, i)[i];
-        IH_IN_RANGE(diagonal, 0, IH_RANGE_NORMAL_Q40);
-        int64_t root = (int64_t)ih_isqrt_u64((uint64_t)diagonal) + 1; /* it stays < 1 */
-        int64_t scale = SCALE_NUMERATOR / root;
-        scratch->scale[i] = (uint32_t)(scale < SCALE_MAX ? scale : SCALE_MAX);
+        const int64_t x_q16 = scratch->centre_q16[i % CENTRES];
+        const int64_t y_q16 = scratch->centre_q16[i / CENTRES];
+        const int64_t centre_q16 = ((x_q16 * x_q16 + y_q16 * y_q16) >> 16) + (1 << 16);
+        const int64_t mixed_q42 = 2 * (x_q16 * (x_q46 >> 20) + y_q16 * (y_q46 >> 20));
+        const int64_t norm_q38 = (sum_q30 >> 8) * centre_q16 - (mixed_q42 >> 4) + (square_q42 >> 4);
+        IH_IN_RANGE(norm_q38, 0, IH_RANGE_NORM_Q38);
+        scratch->norm_q10[i] = (uint32_t)(norm_q38 >> 28);
     }
 }
 
-/* N scaled to diagonal 0.99, with ridge, in Q30, in the place of the lines of N that are not kept: from
- * the last one on, so that none is written over that is still to be read. They are copied because the
- * same bytes change type. */
+/* Scales of short rows: no entry is greater than the basis at the farthest corner of the box around the
+ * samples, nor than the root of all squares' sum. */
+static void set_row_scale(struct ih_surface_scratch *scratch, const struct ih_samples *samples)
+{
+    uint32_t far_q18[2][CENTRES] = {{0}};
+    for (int32_t i = 0; i < samples->sample_count; i++) {
+        uint32_t square_q18[2][CENTRES];
+        square_distances(scratch, samples->sample[i].x_q16, square_q18[0]);
+        square_distances(scratch, samples->sample[i].y_q16, square_q18[1]);
+        for (int32_t k = 0; k < CENTRES; k++) {
+            for (int axis = 0; axis < 2; axis++) {
+                const uint32_t here = square_q18[axis][k];
+                far_q18[axis][k] = here > far_q18[axis][k] ? here : far_q18[axis][k];
+            }
+        }
+    }
+    for (int32_t i = 0; i < TERMS; i++) {
+        /* Two steps more than what was cut off. */
+        const uint32_t box_q10 =
+            ((far_q18[0][i % CENTRES] + far_q18[1][i / CENTRES]) >> 8) + (1 << 10) + 2;
+        const uint32_t norm_q10 = scratch->norm_q10[i] + 2;
+        const uint32_t least_q10 = box_q10 < norm_q10 ? box_q10 : norm_q10;
+        const uint64_t most_q10 = least_q10 < 1 << 10 ? 1 << 10 : least_q10;
+        const uint64_t most_q16 = (uint64_t)ih_isqrt_u54(most_q10 << 22) + 1;
+        scratch->row_scale_q17[i] =
+            (uint32_t)(((uint64_t)ROW_MOST << (ROW_SCALE_BITS + 16)) / most_q16);
+    }
+}
+
+/* The sample's row, which stands in basis_q20, as a short one, weighted: into the lower or the upper half of
+ * the words of a pair, which is the first or the second row. */
+static void put_row(const struct ih_surface_scratch *scratch, int32_t root_weight_q15,
+                    bool is_second, uint32_t pair[TERMS])
+{
+    const int shift = 20 + ROW_SCALE_BITS;
+    const uint32_t root_q15 = (uint32_t)root_weight_q15 << scratch->weight_shift;
+    const uint32_t *basis_q20 = scratch->basis_q20, *scale_q17 = scratch->row_scale_q17;
+    uint32_t weighted_q20[TERMS];
+    if (root_q15 != 1 << 15) {
+        for (int32_t i = 0; i < TERMS; i++) {
+            weighted_q20[i] = (uint32_t)((uint64_t)basis_q20[i] * root_q15 >> 15);
+        }
+        basis_q20 = weighted_q20;
+    }
+    for (int32_t i = 0; i < TERMS; i++) {
+        const uint64_t entry = (uint64_t)basis_q20[i] * scale_q17[i] + ((uint64_t)1 << (shift - 1));
+        pair[i] =
+            is_second ? pair[i] | (uint32_t)(entry >> shift) << 16 : (uint32_t)(entry >> shift);
+    }
+}
+
+/* Fraction bits of residuals: as many as leave the farthest sample from the mean, and four times that, below
+ * 2^OFF_BITS. */
+static void set_off_fraction(struct ih_surface_scratch *scratch, const struct ih_samples *samples,
+                             int32_t mean_mm_q8)
+{
+    int32_t most_mm_q8 = 0;
+    for (int32_t i = 0; i < samples->sample_count; i++) {
+        most_mm_q8 =
+            ih_max_s32(most_mm_q8, ih_abs_s32(samples->sample[i].depth_mm_q8 - mean_mm_q8));
+    }
+    scratch->off_fraction =
+        ih_min_s32(8 + OFF_BITS - 2 - ih_bits_u64((uint64_t)most_mm_q8), OFF_FRACTION_MAX);
+}
+
+/* How far the sample, whose row stands in basis_q20, is behind the surface: off_fraction bits. */
+static int64_t off_of(const struct ih_surface_scratch *scratch, const struct ih_sample *sample,
+                      int32_t mean_mm_q8)
+{
+    const int32_t fraction = scratch->off_fraction;
+    const int64_t off =
+        ((int64_t)sample->depth_mm_q8 - mean_mm_q8) * ((int64_t)1 << (fraction - 8));
+    const int64_t sum = ih_basis_sum(scratch->basis_q20, scratch->coefficient);
+    return off - ih_clamp_s64(shift_by(sum, fraction - 20 - scratch->coefficient_shift), OFF_MAX);
+}
+
+/* What the row in basis_q20 brings to the right side. */
+static void add_right(struct ih_surface_scratch *scratch, int64_t off, int32_t root_weight_q15)
+{
+    const int64_t push = ih_mul_shift(off, weight_q30(scratch, root_weight_q15), 30);
+    ih_basis_add(scratch->basis_q20, (int32_t)ih_clamp_s64(push, (int64_t)1 << OFF_BITS),
+                 scratch->right);
+}
+
+/* Pairs from row number `count` on add nothing. */
+static void clear_pairs(struct ih_surface_scratch *scratch, int32_t count)
+{
+    for (int32_t at = (count + 1) / 2; at < IH_NORMAL_PAIRS; at++) {
+        memset(scratch->pair[at], 0, sizeof scratch->pair[at]);
+    }
+}
+
+/* The sums of all samples, and the right side if the coefficients are all 0. */
+static void sum_all(const struct ih_samples *samples, struct ih_surface_scratch *scratch,
+                    const struct ih_surface *out, bool is_right_wanted)
+{
+    const int32_t calls = (samples->sample_count + IH_NORMAL_ROWS - 1) / IH_NORMAL_ROWS;
+    scratch->normal_shift = ih_bits_u64((uint64_t)(2 * calls - 1));
+    memset(scratch->of.system.normal, 0, sizeof scratch->of.system.normal);
+    for (int32_t i = 0; i < samples->sample_count; i++) {
+        const struct ih_sample *sample = &samples->sample[i];
+        const int32_t at = i % IH_NORMAL_ROWS;
+        fill_row(scratch, sample, scratch->basis_q20);
+        put_row(scratch, out->root_weight_q15[i], at % 2 != 0, scratch->pair[at / 2]);
+        if (is_right_wanted) {
+            add_right(scratch, off_of(scratch, sample, out->mean_mm_q8), out->root_weight_q15[i]);
+        }
+        if (at + 1 == IH_NORMAL_ROWS || i + 1 == samples->sample_count) {
+            clear_pairs(scratch, at + 1);
+            ih_normal_add(scratch->pair, scratch->normal_shift, scratch->of.system.normal);
+        }
+    }
+}
+
+/* Scale factors from the sums' diagonal. */
+static void set_scale(struct ih_surface_scratch *scratch, uint32_t scale[TERMS])
+{
+    for (int32_t i = 0; i < TERMS; i++) {
+        const int32_t sum = scratch->of.system.normal[ih_normal_line(i) + i];
+        const uint64_t root_q11 =
+            (uint64_t)ih_isqrt_u54((uint64_t)ih_max_s32(sum, 1) << 22) + 1; /* it stays < 1 */
+        const uint64_t value = ((uint64_t)SCALE_NUMERATOR << 11) / root_q11;
+        scale[i] = (uint32_t)(value < UINT32_MAX ? value : UINT32_MAX);
+        scratch->unknown_scale_q29[i] =
+            (uint32_t)((uint64_t)scratch->row_scale_q17[i] * scale[i] >>
+                       (ROW_SCALE_BITS + SCALE_SHIFT - UNKNOWN_SCALE_BITS));
+    }
+}
+
+/* The sums scaled to diagonal 0.99, with ridge, in Q30. */
 static void scale_lines(const struct ih_surface_params *params, struct ih_surface_scratch *scratch)
 {
-    int32_t scaled[TERMS];
-    set_scale(scratch);
-    for (int32_t i = TERMS - 1; i >= 0; i--) {
-        const uint64_t *line = line_of(scratch, i);
+    uint32_t scale[TERMS];
+    set_scale(scratch, scale);
+    for (int32_t i = 0; i < TERMS; i++) {
+        const int32_t *line = &scratch->of.system.normal[ih_normal_line(i)];
+        int32_t *scaled_q30 = &scratch->of.system.factor_q30[IH_CHOLESKY_PACKED(i)];
         for (int32_t j = 0; j <= i; j++) {
-            /* |N_ij| <= root_i root_j: after the first step below 2^47 */
-            int64_t half = ih_mul_wide_shift((int64_t)line[j], scratch->scale[i], 36);
-            scaled[j] = ih_saturate_s32(
-                ih_mul_wide_shift(half, scratch->scale[j], 2 * SCALE_SHIFT - 36 - 30));
+            /* Of no products' sum, rounding may leave a step below 0. */
+            const uint32_t sum = (uint32_t)ih_max_s32(line[j], 0);
+            /* sum <= root_i root_j: below 2^30.6 */
+            const uint32_t half = (uint32_t)((uint64_t)sum * scale[i] >> SCALE_STEP);
+            scaled_q30[j] = (int32_t)((uint64_t)half * scale[j] >> SCALE_STEP);
         }
-        scaled[i] += (int32_t)ih_mul_shift(scaled[i], params->ridge_q30, 30);
-        IH_IN_RANGE(scaled[i], 0, IH_RANGE_SCALED_Q30);
-        memcpy(&scratch->of.factor_q30[IH_CHOLESKY_PACKED(i)], scaled,
-               (size_t)(i + 1) * sizeof scaled[0]);
+        scaled_q30[i] += (int32_t)ih_mul_shift(scaled_q30[i], params->ridge_q30, 30);
+        IH_IN_RANGE(scaled_q30[i], 0, IH_RANGE_SCALED_Q30);
     }
 }
 
-/* The right side in int32: fraction bits as many as its norm, sqrt(sum of z^2) at the most, allows.
- * Returns them. */
-static int scale_right(const struct ih_samples *samples, int32_t mean_mm_q8,
-                       struct ih_surface_scratch *scratch)
+static bool factor(const struct ih_surface_params *params, struct ih_surface_scratch *scratch)
 {
-    uint64_t norm2_q16 = 1;
-    for (int32_t i = 0; i < samples->sample_count; i++) {
-        int64_t depth_q8 = (int64_t)samples->sample[i].depth_mm_q8 - mean_mm_q8;
-        norm2_q16 += (uint64_t)(depth_q8 * depth_q8);
-    }
-    int bits = ih_bits_u64(ih_isqrt_u64(norm2_q16)); /* of the norm in Q8 */
-    int fraction = ih_min_s32(8 + RIGHT_BITS - bits, 24);
+    int32_t bad_pivot;
+    scale_lines(params, scratch);
+    return ih_cholesky_factor(scratch->of.system.factor_q30, TERMS, &bad_pivot) == IH_OK;
+}
+
+/* Take the ridge's share, ridge * N_ii * c_i, from the right side. */
+static void take_ridge(const struct ih_surface_params *params, struct ih_surface_scratch *scratch)
+{
     for (int32_t i = 0; i < TERMS; i++) {
-        scratch->solution[i] = ih_saturate_s32(ih_mul_wide_shift(
-            scratch->right_q28[i], scratch->scale[i], SCALE_SHIFT + 8 - fraction));
-        IH_IN_RANGE(scratch->right_q28[i], -IH_RANGE_RIGHT_Q28, IH_RANGE_RIGHT_Q28);
+        /* 2^58 times 2^31.4 over 2^32; in Q8 more than the coefficients */
+        const int64_t share = ih_mul_wide_shift(
+            (int64_t)scratch->coefficient[i] * params->ridge_q30, scratch->norm_q10[i], 32);
+        const int to_right = 20 + scratch->off_fraction - 8 - scratch->coefficient_shift;
+        scratch->right[i] = ih_clamp_s64(scratch->right[i], (int64_t)1 << 61) -
+                            ih_clamp_s64(shift_by(share, to_right), (int64_t)1 << 61);
     }
-    return fraction;
 }
 
-/* Undo the scaling of the unknowns: coefficient_i = x_i * scale_i / 2^31 with fraction bits. */
-static void unscale_solution(struct ih_surface_scratch *scratch, int fraction)
+/* The right side of the scaled system, entries below 2^RIGHT_BITS. Returns its fraction bits; the unit is that
+ * of the right side over 2^normal_shift. */
+static int scale_right(struct ih_surface_scratch *scratch)
 {
-    uint64_t largest = 0;
+    int64_t scaled[TERMS];
+    uint64_t most = 0;
     for (int32_t i = 0; i < TERMS; i++) {
-        int64_t product = (int64_t)scratch->solution[i] * scratch->scale[i]; /* < 2^56 */
-        largest |= (uint64_t)ih_abs_s64(product);
+        most |= (uint64_t)ih_abs_s64(scratch->right[i]);
     }
-    int shift = ih_max_s32(0, ih_bits_u64(largest) - SOLUTION_BITS);
+    const int first = ih_max_s32(0, ih_bits_u64(most) - 30);
+    most = 0;
     for (int32_t i = 0; i < TERMS; i++) {
-        int64_t product = (int64_t)scratch->solution[i] * scratch->scale[i];
-        scratch->solution[i] = (int32_t)ih_shift_round(product, shift);
-        IH_IN_RANGE(scratch->solution[i], -IH_RANGE_COEFFICIENT, IH_RANGE_COEFFICIENT);
+        scaled[i] =
+            ih_shift_round(scratch->right[i], first) * (int64_t)scratch->unknown_scale_q29[i];
+        most |= (uint64_t)ih_abs_s64(scaled[i]);
     }
-    scratch->solution_shift = fraction + (SCALE_SHIFT - 20) - shift;
+    const int second = ih_max_s32(0, ih_bits_u64(most) - RIGHT_BITS);
+    for (int32_t i = 0; i < TERMS; i++) {
+        scratch->solution[i] = (int32_t)ih_shift_round(scaled[i], second);
+    }
+    return 20 + scratch->off_fraction - first + UNKNOWN_SCALE_BITS - second;
 }
 
-static bool solve(const struct ih_samples *samples, int32_t mean_mm_q8,
-                  struct ih_surface_scratch *scratch)
+/* Add the solution, with `fraction` bits, to the coefficients: both in the finer of the two formats that hold
+ * them. */
+static void add_solution(struct ih_surface_scratch *scratch, int fraction)
 {
-    int32_t bad_pivot, exponent;
-    int32_t *factor = scratch->of.factor_q30;
-    if (ih_cholesky_factor(factor, TERMS, &bad_pivot) != IH_OK) {
-        return false;
+    uint64_t most = 0, most_before = 0;
+    for (int32_t i = 0; i < TERMS; i++) {
+        const int64_t product = (int64_t)scratch->solution[i] * scratch->unknown_scale_q29[i];
+        most |= (uint64_t)ih_abs_s64(product); /* < 2^57 */
+        most_before |= (uint64_t)ih_abs_s32(scratch->coefficient[i]);
     }
-    int fraction = scale_right(samples, mean_mm_q8, scratch);
-    ih_cholesky_solve(factor, TERMS, scratch->solution, scratch->solution, &exponent);
-    unscale_solution(scratch, fraction - exponent);
-    return true;
+    const int product_shift = fraction + UNKNOWN_SCALE_BITS;
+    const int own = product_shift - ih_bits_u64(most) + SOLUTION_BITS - 1;
+    const int before = scratch->coefficient_shift - ih_bits_u64(most_before) + SOLUTION_BITS - 1;
+    const int shift = most_before == 0 ? own : ih_min_s32(own, before);
+    for (int32_t i = 0; i < TERMS; i++) {
+        const int64_t product = (int64_t)scratch->solution[i] * scratch->unknown_scale_q29[i];
+        scratch->coefficient[i] =
+            (int32_t)(shift_by(scratch->coefficient[i], shift - scratch->coefficient_shift) +
+                      shift_by(product, shift - product_shift));
+        IH_IN_RANGE(scratch->coefficient[i], -IH_RANGE_COEFFICIENT, IH_RANGE_COEFFICIENT);
+    }
+    scratch->coefficient_shift = shift;
 }
 
-/* sum_n c_n B_n in Q8 from a sum in Q(20 + solution_shift). */
-static int32_t depth_of_sum(const struct ih_surface_scratch *scratch, int32_t mean_mm_q8,
-                            int64_t sum)
+/* Solve for a correction of the coefficients from what is left on the right side. squares_log2: of the sum of
+ * the unknowns' squares, over the samples' number, as normal_shift knows it. */
+static void correct(const struct ih_surface_params *params, struct ih_surface_scratch *scratch)
 {
-    int shift = 20 + scratch->solution_shift - 8;
-    int64_t depth_q8 = shift >= 0 ? ih_shift_round(sum, ih_min_s32(shift, 62)) : INT32_MAX;
-    return ih_saturate_s32(mean_mm_q8 + depth_q8);
+    int32_t exponent;
+    take_ridge(params, scratch);
+    /* A x = b is (right side) / 2^normal_shift: x and b have as many fraction bits more. */
+    const int fraction = scale_right(scratch) + scratch->normal_shift;
+    ih_cholesky_solve(scratch->of.system.factor_q30, TERMS, scratch->solution, scratch->solution,
+                      &exponent);
+    int64_t squares = 0; /* 144 * 2^50 */
+    for (int32_t i = 0; i < TERMS; i++) {
+        squares += (int64_t)scratch->solution[i] * scratch->solution[i];
+    }
+    scratch->squares_log2 = squares == 0 ? SQUARES_LOG2_NONE
+                                         : ih_bits_u64((uint64_t)squares) -
+                                               2 * (fraction - exponent) - scratch->normal_shift;
+    add_solution(scratch, fraction - exponent);
 }
 
-/* Huber step: a sample that is too far from the surface gets less weight. basis_q20 is its row, not
- * yet weighted. False when it is near enough. */
-static bool reweight(const struct ih_surface_scratch *scratch, const struct ih_sample *sample,
-                     const struct ih_surface_params *params, int32_t mean_mm_q8,
-                     int32_t *root_weight_q15)
+/* Work out all rows again, and correct the coefficients by what they leave, until that is enough. */
+static void refine(const struct ih_samples *samples, const struct ih_surface_params *params,
+                   const struct ih_surface *out, int32_t enough_log2,
+                   struct ih_surface_scratch *scratch)
 {
-    int64_t limit_q8 = (int64_t)params->huber_mm << 8;
-    int64_t sum = 0;
-    for (int32_t k = 0; k < TERMS; k++) {
-        sum += (int64_t)scratch->solution[k] * (int32_t)scratch->basis_q20[k];
-    }
-    int64_t off_q8 =
-        ih_abs_s64((int64_t)sample->depth_mm_q8 - depth_of_sum(scratch, mean_mm_q8, sum));
-    if (off_q8 <= limit_q8) {
-        return false;
+    /* What fewer samples than unknowns do not see is found slowly. */
+    const int32_t least = samples->sample_count < TERMS ? CORRECTIONS_FEW : 1;
+    int32_t before;
+    int32_t count = 0;
+    do {
+        before = scratch->squares_log2;
+        memset(scratch->right, 0, sizeof scratch->right);
+        for (int32_t i = 0; i < samples->sample_count; i++) {
+            const struct ih_sample *sample = &samples->sample[i];
+            fill_row(scratch, sample, scratch->basis_q20);
+            add_right(scratch, off_of(scratch, sample, out->mean_mm_q8), out->root_weight_q15[i]);
+        }
+        correct(params, scratch);
+        count++;
+    } while (count < least ||
+             (2 * scratch->squares_log2 - before > enough_log2 && count < CORRECTIONS_MAX));
+}
+
+/* Huber step: a sample that is too far from the surface gets less weight. Returns its weight's root. */
+static int32_t reweight(const struct ih_sample *sample, const struct ih_surface_params *params,
+                        int64_t off_mm_q11)
+{
+    const int64_t limit_q11 = (int64_t)params->huber_mm << 11;
+    const int64_t off_q11 = ih_abs_s64(off_mm_q11);
+    if (off_q11 <= limit_q11) {
+        return sample->root_weight_q15;
     }
     /* sqrt(limit / off) in Q15 */
-    int64_t root_q15 = ih_isqrt_u64((uint64_t)ih_div_round(limit_q8 * (1 << 30), off_q8));
-    *root_weight_q15 = (int32_t)ih_mul_shift(sample->root_weight_q15, root_q15, 15);
-    return true;
+    const int64_t root_q15 = ih_isqrt_u64((uint64_t)ih_div_round(limit_q11 * (1 << 30), off_q11));
+    return (int32_t)ih_mul_shift(sample->root_weight_q15, root_q15, 15);
 }
 
-/* The normal equations of all samples: all lines, or with huber only those that are not kept, and then
- * samples that are too far from the surface that was solved last get less weight first. Returns how
- * many do. */
-static int32_t sum_rows(const struct ih_samples *samples, const struct ih_surface_params *huber,
-                        struct ih_surface_scratch *scratch, struct ih_surface *out)
+/* Weights by the distance from the surface, the right side with them; what samples whose weight changed had
+ * brought to the sums is exchanged. Returns how many changed. */
+static int32_t change_weights(const struct ih_samples *samples,
+                              const struct ih_surface_params *params,
+                              struct ih_surface_scratch *scratch, struct ih_surface *out)
 {
     int32_t lighter = 0;
-    memset(scratch->of.others_q40, 0, sizeof scratch->of.others_q40);
-    memset(scratch->right_q28, 0, sizeof scratch->right_q28);
-    for (int32_t first = 0; first < samples->sample_count; first += IH_NORMAL_ROWS) {
-        const int32_t count = ih_min_s32(samples->sample_count - first, IH_NORMAL_ROWS);
-        for (int32_t at = 0; at < count; at++) {
-            const struct ih_sample *sample = &samples->sample[first + at];
-            int32_t *root_weight_q15 = &out->root_weight_q15[first + at];
-            fill_row(scratch, sample, scratch->basis_q20);
-            lighter +=
-                huber != NULL && reweight(scratch, sample, huber, out->mean_mm_q8, root_weight_q15);
-            weigh_row(scratch, *root_weight_q15, at);
-            add_right(scratch, sample, out->mean_mm_q8, *root_weight_q15);
+    memset(scratch->right, 0, sizeof scratch->right);
+    for (int32_t i = 0; i < samples->sample_count; i++) {
+        const struct ih_sample *sample = &samples->sample[i];
+        fill_row(scratch, sample, scratch->basis_q20);
+        const int64_t off = off_of(scratch, sample, out->mean_mm_q8);
+        const int32_t root_q15 =
+            reweight(sample, params, ih_shift_round(off, scratch->off_fraction - 11));
+        out->root_weight_q15[i] = root_q15;
+        add_right(scratch, off, root_q15);
+        if (root_q15 != sample->root_weight_q15) {
+            uint32_t *pair = scratch->pair[lighter % IH_NORMAL_PAIRS];
+            put_row(scratch, root_q15, false, pair);
+            put_row(scratch, sample->root_weight_q15, true, pair);
+            lighter++;
+            if (lighter % IH_NORMAL_PAIRS == 0) {
+                ih_normal_change(scratch->pair, scratch->normal_shift, scratch->of.system.normal);
+            }
         }
-        clear_rows(scratch, count);
-        if (huber == NULL) {
-            ih_normal_add(scratch->row_q20, 0, KEPT, scratch->kept.q40);
-        }
-        ih_normal_add(scratch->row_q20, KEPT, TERMS, scratch->of.others_q40);
+    }
+    if (lighter % IH_NORMAL_PAIRS != 0) {
+        clear_pairs(scratch, lighter % IH_NORMAL_PAIRS * 2);
+        ih_normal_change(scratch->pair, scratch->normal_shift, scratch->of.system.normal);
     }
     return lighter;
-}
-
-/* Add those samples whose weight changed to the lines that are kept, with the weight that they had before
- * or with the one that they have now. */
-static void sum_changed(const struct ih_samples *samples, const struct ih_surface *out,
-                        bool is_before, struct ih_surface_scratch *scratch)
-{
-    int32_t count = 0;
-    for (int32_t i = 0; i < samples->sample_count; i++) {
-        const int32_t before_q15 = samples->sample[i].root_weight_q15;
-        const int32_t now_q15 = out->root_weight_q15[i];
-        if (now_q15 != before_q15) {
-            fill_row(scratch, &samples->sample[i], scratch->basis_q20);
-            weigh_row(scratch, is_before ? before_q15 : now_q15, count);
-            count++;
-        }
-        if (count == IH_NORMAL_ROWS || (count > 0 && i + 1 == samples->sample_count)) {
-            clear_rows(scratch, count);
-            ih_normal_add(scratch->row_q20, 0, KEPT, scratch->kept.q40);
-            count = 0;
-        }
-    }
-}
-
-static void turn_bits(uint64_t *value, int32_t count)
-{
-    for (int32_t i = 0; i < count; i++) {
-        value[i] = ~value[i];
-    }
-}
-
-/* Lines that are kept: samples whose weight changed are taken away with the one that they had, and added
- * with the one that they have. */
-static void change_kept(const struct ih_samples *samples, const struct ih_surface *out,
-                        struct ih_surface_scratch *scratch)
-{
-    turn_bits(scratch->kept.q40, IH_NORMAL_LINE(KEPT));
-    sum_changed(samples, out, true, scratch);
-    turn_bits(scratch->kept.q40, IH_NORMAL_LINE(KEPT));
-    sum_changed(samples, out, false, scratch);
 }
 
 /* Solve for the surface. */
 static bool fit_first(const struct ih_samples *samples, const struct ih_surface_params *params,
                       struct ih_surface_scratch *scratch, struct ih_surface *out)
 {
-    memset(scratch->kept.q40, 0, sizeof scratch->kept.q40);
-    sum_rows(samples, NULL, scratch, out);
-    scale_lines(params, scratch);
-    return solve(samples, out->mean_mm_q8, scratch);
+    if (!set_weight_shift(scratch, out->root_weight_q15, samples->sample_count)) {
+        return false;
+    }
+    memset(scratch->coefficient, 0, sizeof scratch->coefficient);
+    scratch->coefficient_shift = 0;
+    memset(scratch->right, 0, sizeof scratch->right);
+    set_norms(scratch, samples, out->root_weight_q15);
+    set_row_scale(scratch, samples);
+    set_off_fraction(scratch, samples, out->mean_mm_q8);
+    sum_all(samples, scratch, out, true);
+    if (!factor(params, scratch)) {
+        return false;
+    }
+    correct(params, scratch);
+    refine(samples, params, out, SQUARES_LOG2_FOR_WEIGHTS, scratch);
+    return true;
+}
+
+/* Have the weights fallen so far that short rows would be too short? */
+static bool is_light(const struct ih_surface_scratch *scratch,
+                     const uint32_t norm_before_q10[TERMS])
+{
+    bool is_less = false;
+    for (int32_t i = 0; i < TERMS; i++) {
+        is_less |= scratch->norm_q10[i] < norm_before_q10[i] / 4;
+    }
+    return is_less;
+}
+
+/* Sum all rows again, and scale the right side to the weights as they are enlarged now. */
+static bool sum_again(const struct ih_samples *samples, struct ih_surface_scratch *scratch,
+                      const struct ih_surface *out)
+{
+    const int32_t before = scratch->weight_shift;
+    if (!set_weight_shift(scratch, out->root_weight_q15, samples->sample_count)) {
+        return false;
+    }
+    for (int32_t i = 0; i < TERMS; i++) {
+        scratch->right[i] = shift_by(scratch->right[i], 2 * (scratch->weight_shift - before));
+    }
+    set_norms(scratch, samples, out->root_weight_q15);
+    set_row_scale(scratch, samples);
+    sum_all(samples, scratch, out, false);
+    return true;
 }
 
 /* Again, with less weight for the samples that are far from it, if any. */
 static bool fit_again(const struct ih_samples *samples, const struct ih_surface_params *params,
                       struct ih_surface_scratch *scratch, struct ih_surface *out)
 {
-    out->downweighted_count = sum_rows(samples, params, scratch, out);
+    uint32_t norm_before_q10[TERMS];
+    memcpy(norm_before_q10, scratch->norm_q10, sizeof norm_before_q10);
+    out->downweighted_count = change_weights(samples, params, scratch, out);
     if (out->downweighted_count == 0) {
+        correct(params, scratch); /* the right side is there */
         return true;
     }
-    change_kept(samples, out, scratch);
-    scale_lines(params, scratch);
-    return solve(samples, out->mean_mm_q8, scratch);
+    set_norms(scratch, samples, out->root_weight_q15);
+    if (is_light(scratch, norm_before_q10) && !sum_again(samples, scratch, out)) {
+        return false;
+    }
+    if (!factor(params, scratch)) {
+        return false;
+    }
+    correct(params, scratch);
+    refine(samples, params, out, SQUARES_LOG2_ENOUGH, scratch);
+    return true;
 }
 
 /* B for whole grid steps: sqrt((a^2 + b^2) 100 / 121 + 1) in Q20, b down and a to both sides, so that
@@ -324,15 +538,34 @@ static void fill_table(struct ih_surface_scratch *scratch)
 {
     const int64_t numerator2 = IH_SURFACE_STEP_NUMERATOR * IH_SURFACE_STEP_NUMERATOR;
     const int64_t denominator2 = IH_SURFACE_STEP_DENOMINATOR * IH_SURFACE_STEP_DENOMINATOR;
-    for (int64_t b = 0; b < IH_SURFACE_STEPS; b++) {
-        int32_t *middle = &scratch->of.table_q20[b][IH_SURFACE_STEPS - 1];
-        for (int64_t a = 0; a < IH_SURFACE_STEPS; a++) {
-            int64_t radicand_q42 = ih_div_round(
-                ((a * a + b * b) * numerator2 + denominator2) * ((int64_t)1 << 42), denominator2);
-            middle[a] = (int32_t)((ih_isqrt_u64((uint64_t)radicand_q42) + 1) >> 1);
-            middle[-a] = middle[a];
+    uint32_t square_q18[TABLE_WIDTH], one_more_q18[TABLE_WIDTH];
+    for (int64_t a = 0; a < TABLE_WIDTH; a++) {
+        square_q18[a] = (uint32_t)ih_div_round(a * a * numerator2 * (1 << 18), denominator2);
+        one_more_q18[a] = square_q18[a] + (1 << 18);
+    }
+    for (int32_t b = 0; b < IH_SURFACE_STEPS; b += 2) {
+        for (int32_t first = 0; first < TABLE_WIDTH; first += IH_BASIS_ACROSS) {
+            const int32_t count = ih_min_s32(IH_BASIS_ACROSS, IH_SURFACE_STEPS - first);
+            uint32_t root_q20[2][IH_BASIS_ACROSS];
+            ih_basis_roots(&square_q18[first], &one_more_q18[b], 2, root_q20[0]);
+            for (int32_t k = 0; k < 2; k++) {
+                int32_t *middle = &scratch->of.grid.table_q20[b + k][IH_SURFACE_STEPS - 1];
+                for (int32_t a = 0; a < count; a++) {
+                    middle[first + a] = (int32_t)root_q20[k][a];
+                    middle[-first - a] = (int32_t)root_q20[k][a];
+                }
+            }
         }
     }
+}
+
+/* sum_n c_n B_n in Q8 from a sum in Q(20 + coefficient_shift). */
+static int32_t depth_of_sum(const struct ih_surface_scratch *scratch, int32_t mean_mm_q8,
+                            int64_t sum)
+{
+    int shift = 20 + scratch->coefficient_shift - 8;
+    int64_t depth_q8 = shift >= 0 ? ih_shift_round(sum, ih_min_s32(shift, 62)) : INT32_MAX;
+    return ih_saturate_s32(mean_mm_q8 + depth_q8);
 }
 
 /* Nearer than this no node can be: see IH_SURFACE_OVERSHOOT_MM. */
@@ -359,13 +592,13 @@ static int32_t centre_node(int32_t centre)
 static void fold_table(struct ih_surface_scratch *scratch)
 {
     for (int32_t b = 0; b < IH_SURFACE_STEPS; b++) {
-        const int32_t *middle = &scratch->of.table_q20[b][IH_SURFACE_STEPS - 1];
+        const int32_t *middle = &scratch->of.grid.table_q20[b][IH_SURFACE_STEPS - 1];
         for (int32_t k = 0; k < HALF_CENTRES; k++) {
             const int32_t *here = &middle[-centre_node(k)];
             const int32_t *there = &middle[-centre_node(IH_SURFACE_CENTRES - 1 - k)];
             for (int32_t x = 0; x < IH_SURFACE_HALF; x++) {
-                scratch->kept.folded.sum_q20[b][k][x] = here[x] + there[x];
-                scratch->kept.folded.difference_q20[b][k][x] = here[x] - there[x];
+                scratch->of.grid.sum_q20[b][k][x] = here[x] + there[x];
+                scratch->of.grid.difference_q20[b][k][x] = here[x] - there[x];
             }
         }
     }
@@ -391,7 +624,7 @@ static void sum_row(struct ih_surface_scratch *scratch, int32_t y, int64_t sum[I
     int64_t even[IH_SURFACE_HALF] = {0};
     int64_t odd[IH_SURFACE_HALF] = {0};
     for (int32_t row = 0; row < IH_SURFACE_CENTRES; row++) {
-        const int32_t *solution = &scratch->solution[row * IH_SURFACE_CENTRES];
+        const int32_t *solution = &scratch->coefficient[row * IH_SURFACE_CENTRES];
         const int32_t b = ih_abs_s32(y - centre_node(row));
         int32_t both[HALF_CENTRES];
         int32_t between[HALF_CENTRES];
@@ -399,8 +632,8 @@ static void sum_row(struct ih_surface_scratch *scratch, int32_t y, int64_t sum[I
             both[k] = solution[k] + solution[IH_SURFACE_CENTRES - 1 - k];
             between[k] = solution[k] - solution[IH_SURFACE_CENTRES - 1 - k];
         }
-        add_half(both, scratch->kept.folded.sum_q20[b], even);
-        add_half(between, scratch->kept.folded.difference_q20[b], odd);
+        add_half(both, scratch->of.grid.sum_q20[b], even);
+        add_half(between, scratch->of.grid.difference_q20[b], odd);
     }
     for (int32_t x = 0; x < IH_SURFACE_HALF; x++) {
         sum[x] = (even[x] + odd[x]) / 2; /* without a rest */

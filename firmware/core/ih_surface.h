@@ -8,14 +8,21 @@
  *        least squares by normal equations N = R^T R, R's rows being the basis rows times the root
  *        weight; ridge: N's diagonal times (1 + 1e-5). Then one Huber step: samples off by more
  *        than huber_mm get the weight huber / |residual| and the system is solved again.
+ *        N is summed from rows of 14 bits, scaled column by column, and only leads to the solution: what
+ *        is left, R^T W (z - B c) less the ridge's share, is worked out from rows of full precision,
+ *        solved for and added to c, once or more often after each of both systems, until it is small.
+ *        The second N is made from the first by exchanging what samples brought whose weight changed.
  * Scaling and overflow: field units, samples within IH_SAMPLES_REACH, centres within 20: dx and
- *        dy below 60, B below 85 = 2^6.5, in Q20 below 2^26.5; products below 2^53, sums over 361
- *        rows below 2^61.5. N is scaled by r_i r_j (r = 0.995 / sqrt(N_ii)) to diagonal 0.99 and
- *        rounded to Q30; the ridge keeps the least pivot above 3e-3.
+ *        dy below 60, B below 85 = 2^6.5, in Q20 below 2^26.5. Short rows: the farthest corner of the box
+ *        around the samples is 2^14 - 2; ih_normal has their sums. Weights are enlarged until the
+ *        greatest is 1/2 or more. Residuals times weights are limited to 2^27, their products with B
+ *        sum below 2^62. N is scaled by 0.995 / sqrt(N_ii) each way to diagonal 0.99 in Q30; the ridge keeps
+ *        the least pivot above 3e-3. docs/numerics.md goes on.
  * Error: within 0.2 mm of the float64 solution of the same system, everywhere on the grid, for
- *        depths that span up to 1.5 m (ih_samples clips them); it grows with the span.
- * Cost:  samples x 288 square roots; samples x 10,944 multiply-adds, and once more about half of
- *        that; two factorisations of n = 144; grid x 72 multiply-adds.
+ *        depths that span up to 1.5 m (ih_samples clips them); it grows with the span. 0.02 mm on frames.
+ * Cost:  samples x 576 roots of ih_basis, as often multiplied twice; samples x 10,944 short multiply-adds,
+ *        and again twice those whose weight changed; two factorisations of n = 144, four solutions; grid
+ *        x 72 multiply-adds.
  */
 #ifndef IH_SURFACE_H
 #define IH_SURFACE_H
@@ -59,36 +66,38 @@ struct ih_surface {
     int32_t depth_mm_q8[IH_SURFACE_GRID][IH_SURFACE_GRID]; /* [y][x] */
 };
 
-/* Lines of the normal equations that outlive the first factor: for the second, only the samples whose
- * weight changed are taken away from them and added again. The other lines are summed anew, the factor
- * stands in their place. 8 lines more cost 8 kB and save a tenth of the second sum; from 104 on a line
- * that is scaled in place is never in the way of one that is not yet. */
-#define IH_SURFACE_KEPT 120
-
 /* The grid is evaluated in two halves that are mirrored, with the middle one, and so are the centres. */
 #define IH_SURFACE_HALF ((IH_SURFACE_GRID + 1) / 2)
 #define IH_SURFACE_HALF_CENTRES (IH_SURFACE_CENTRES / 2)
 
 struct ih_surface_scratch {
     union {
-        uint64_t q40[IH_NORMAL_LINE(IH_SURFACE_KEPT)]; /* lower triangle, line by line */
         struct {
+            int32_t normal[IH_NORMAL_LINE(IH_SURFACE_TERMS)]; /* sums of products of short rows */
+            int32_t factor_q30[IH_CHOLESKY_PACKED(IH_SURFACE_TERMS)]; /* scaled, then factored */
+        } system;
+        struct {
+            int32_t table_q20[IH_SURFACE_STEPS][2 * IH_SURFACE_STEPS - 1];
             int32_t sum_q20[IH_SURFACE_STEPS][IH_SURFACE_HALF_CENTRES][IH_SURFACE_HALF];
             int32_t difference_q20[IH_SURFACE_STEPS][IH_SURFACE_HALF_CENTRES][IH_SURFACE_HALF];
-        } folded; /* of table_q20 */
-    } kept;
-    union {
-        uint64_t others_q40[IH_NORMAL_LINE(IH_SURFACE_TERMS) - IH_NORMAL_LINE(IH_SURFACE_KEPT)];
-        int32_t factor_q30[IH_CHOLESKY_PACKED(IH_SURFACE_TERMS)]; /* scaled, then factored */
-        int32_t table_q20[IH_SURFACE_STEPS][2 * IH_SURFACE_STEPS - 1];
+        } grid; /* the basis in whole steps, and folded */
     } of;
-    int64_t right_q28[IH_SURFACE_TERMS];
-    uint64_t square_q32[IH_SURFACE_TERMS]; /* of its distances from the centres, and 1 */
-    uint32_t basis_q20[IH_SURFACE_TERMS];  /* a sample's row */
-    ih_normal_entry row_q20[IH_NORMAL_ROWS][IH_SURFACE_TERMS]; /* such rows, weighted */
-    uint32_t scale[IH_SURFACE_TERMS];   /* 0.995 * 2^51 / sqrt(N_ii), N in Q40 */
-    int32_t solution[IH_SURFACE_TERMS]; /* the right side before */
-    int32_t solution_shift; /* coefficient = solution / 2^solution_shift, mm per field unit */
+    int64_t
+        right[IH_SURFACE_TERMS]; /* R^T W (z - B c), less the ridge's share: Q20 more than off */
+    uint32_t basis_q20[IH_SURFACE_TERMS]; /* a sample's row */
+    /* Such rows, weighted and short. */
+    _Alignas(IH_NORMAL_ALIGNMENT) uint32_t pair[IH_NORMAL_PAIRS][IH_SURFACE_TERMS];
+    uint32_t row_scale_q17[IH_SURFACE_TERMS];     /* of a short row */
+    uint32_t norm_q10[IH_SURFACE_TERMS];          /* diagonal of R^T W R */
+    uint32_t unknown_scale_q29[IH_SURFACE_TERMS]; /* coefficient = unknown * scale */
+    int32_t solution[IH_SURFACE_TERMS];           /* the right side before */
+    int32_t coefficient[IH_SURFACE_TERMS];        /* times 2^coefficient_shift, mm per field unit */
+    int32_t coefficient_shift;
+    int32_t
+        weight_shift; /* weights are taken for 2^weight_shift times as great: the greatest is 1/2 .. 1 */
+    int32_t normal_shift;                   /* a unit of normal[] is 2^normal_shift */
+    int32_t off_fraction;                   /* fraction bits of z - B c, mm */
+    int32_t squares_log2;                   /* of the last correction, see ih_surface.c */
     int32_t centre_q16[IH_SURFACE_CENTRES]; /* places of the centres in a row, field units */
 };
 

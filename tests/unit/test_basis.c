@@ -8,7 +8,9 @@
 #include "ih_surface.c"
 
 #define PLACE_MOST ((IH_SAMPLES_REACH << 16) - 1)
-#define CENTRES IH_SURFACE_CENTRES
+#define SQUARE_MOST (7201 << 18)
+/* Of ih_basis.h. */
+#define RELATIVE ldexp(1, -21) * 0.536
 
 static struct ih_surface_scratch scratch;
 static bool is_all;
@@ -25,15 +27,17 @@ void tearDown(void)
 {
 }
 
-/* Half a step, and what is left of double's 53 bits. The squares are exact in double. */
+/* One step down, the table's error, and what was cut off both squares, of Q18, as of one. */
 static void check_basis(int64_t dx_q16, int64_t dy_q16, uint32_t basis_q20)
 {
     const double square_q32 = (double)(dx_q16 * dx_q16) + (double)(dy_q16 * dy_q16) + 4294967296.0;
-    const double off_steps = fabs(basis_q20 - sqrt(square_q32) * 16.0);
+    const double exact_q20 = sqrt(square_q32) * 16.0;
+    const double off_steps = basis_q20 - exact_q20;
+    const double squares_steps = 2 * 16384.0 * 128 / exact_q20;
 
-    worst_steps = fmax(worst_steps, off_steps);
-    if (off_steps > 0.5 + 1e-6) {
-        IH_TEST_WITHIN(0.5 + 1e-6, sqrt(square_q32) * 16.0, basis_q20, "basis, dx", dx_q16);
+    worst_steps = fmax(worst_steps, fabs(off_steps));
+    if (off_steps > RELATIVE * exact_q20 || off_steps < -1 - RELATIVE * exact_q20 - squares_steps) {
+        IH_TEST_WITHIN(1 + RELATIVE * exact_q20, exact_q20, basis_q20, "basis, dx", dx_q16);
     }
 }
 
@@ -50,58 +54,114 @@ static void check_row(int32_t x_q16, int32_t y_q16)
     }
 }
 
-/* Is it the nearest whole number to 16 sqrt(square)? In whole numbers: the square of a root less or more a
- * half. */
-static void check_roots(const uint64_t square_q32[IH_BASIS_GROUP])
+static void check_roots(const uint32_t square_q18[IH_BASIS_ACROSS])
 {
-    uint32_t root_q20[IH_BASIS_GROUP + 1];
+    static const uint32_t down_q18[2] = {0, 0};
+    uint32_t root_q20[2 * IH_BASIS_ACROSS + 1];
     int i;
 
-    root_q20[IH_BASIS_GROUP] = 77;
-    ih_basis_roots(square_q32, IH_BASIS_GROUP, root_q20);
-    for (i = 0; i < IH_BASIS_GROUP; i++) {
-        const int64_t root = root_q20[i];
-        const int64_t rest = (int64_t)(square_q32[i] << 8) - root * root;
+    root_q20[2 * IH_BASIS_ACROSS] = 77;
+    ih_basis_roots(square_q18, down_q18, 2, root_q20);
+    for (i = 0; i < 2 * IH_BASIS_ACROSS; i++) {
+        const double exact_q20 = sqrt(square_q18[i % IH_BASIS_ACROSS]) * 2048;
+        const double off_steps = root_q20[i] - exact_q20;
 
-        if (rest > root || rest <= -root) {
-            IH_TEST_WITHIN(0.5, sqrt(ldexp((double)square_q32[i], 8)), (double)root, "root", i);
+        if (off_steps > RELATIVE * exact_q20 || off_steps < -1 - RELATIVE * exact_q20) {
+            IH_TEST_WITHIN(1 + RELATIVE * exact_q20, exact_q20, root_q20[i], "root",
+                           square_q18[i % IH_BASIS_ACROSS]);
         }
     }
-    TEST_ASSERT_EQUAL_UINT32(77, root_q20[IH_BASIS_GROUP]);
+    TEST_ASSERT_EQUAL_UINT32(77, root_q20[2 * IH_BASIS_ACROSS]);
 }
 
-/* Where the root changes from one whole number to the next: the squares before and behind each such
- * place, for all roots that there are. */
-static void roots_change_half_way_between_squares(void)
+/* Squares from end to end. */
+static void every_square_has_its_root(void)
 {
-    uint64_t square_q32[IH_BASIS_GROUP];
-    int64_t root;
+    uint32_t square_q18[IH_BASIS_ACROSS];
+    int64_t square;
     int i;
 
-    for (root = 1 << 20; root <= IH_RANGE_BASIS_Q20; root += is_all ? 1 : 499) {
-        for (i = 0; i < IH_BASIS_GROUP; i++) {
-            square_q32[i] = (uint64_t)((root * root + root) / 256 + i - IH_BASIS_GROUP / 2 + 1);
+    for (square = 1 << 18; square <= SQUARE_MOST; square += is_all ? IH_BASIS_ACROSS : 9973) {
+        for (i = 0; i < IH_BASIS_ACROSS; i++) {
+            square_q18[i] = (uint32_t)(square + i < SQUARE_MOST ? square + i : SQUARE_MOST);
         }
-        check_roots(square_q32);
+        check_roots(square_q18);
     }
 }
 
 /* Places where the number of leading zeros changes, and entries of the table; the least and the greatest. */
 static void roots_hold_at_the_ends_of_spans(void)
 {
-    const uint64_t most = (uint64_t)7201 << 32;
-    uint64_t square_q32[IH_BASIS_GROUP];
+    uint32_t square_q18[IH_BASIS_ACROSS];
     uint64_t span;
     int bit, i;
 
-    for (bit = 32; bit <= 44; bit++) {
-        for (span = 0; span < 64; span++) {
-            for (i = 0; i < IH_BASIS_GROUP; i++) {
-                const uint64_t at = ((64 + span) << (bit - 6)) + (uint64_t)i - IH_BASIS_GROUP / 2;
+    for (bit = 18; bit <= 30; bit++) {
+        for (span = 0; span < 512; span++) {
+            for (i = 0; i < IH_BASIS_ACROSS; i++) {
+                const uint64_t at = ((512 + span) << bit >> 9) + (uint64_t)i - IH_BASIS_ACROSS / 2;
 
-                square_q32[i] = at < (uint64_t)1 << 32 ? (uint64_t)1 << 32 : at > most ? most : at;
+                square_q18[i] = (uint32_t)(at < 1 << 18       ? 1 << 18
+                                           : at > SQUARE_MOST ? SQUARE_MOST
+                                                              : at);
             }
-            check_roots(square_q32);
+            check_roots(square_q18);
+        }
+    }
+}
+
+/* Each line has its own second square. */
+static void lines_are_roots_of_sums(void)
+{
+    uint32_t across_q18[IH_BASIS_ACROSS], down_q18[4], together_q18[IH_BASIS_ACROSS];
+    uint32_t root_q20[4][IH_BASIS_ACROSS], expected_q20[2 * IH_BASIS_ACROSS];
+    static const uint32_t none[2] = {0, 0};
+    int32_t i, k;
+
+    for (i = 0; i < IH_BASIS_ACROSS; i++) {
+        across_q18[i] = (uint32_t)((i + 1) * (i + 1)) << 20;
+    }
+    for (k = 0; k < 4; k++) {
+        down_q18[k] = (uint32_t)(k * k) << 21;
+    }
+    ih_basis_roots(across_q18, down_q18, 4, root_q20[0]);
+    for (k = 0; k < 4; k++) {
+        for (i = 0; i < IH_BASIS_ACROSS; i++) {
+            together_q18[i] = across_q18[i] + down_q18[k];
+        }
+        ih_basis_roots(together_q18, none, 2, expected_q20);
+        TEST_ASSERT_EQUAL_UINT32_ARRAY(expected_q20, root_q20[k], IH_BASIS_ACROSS);
+    }
+}
+
+/* Sums of products against whole numbers one by one, at both ends of their factors. */
+static void sums_are_exact(void)
+{
+    static uint32_t basis_q20[IH_BASIS_TERMS];
+    static int32_t coefficient[IH_BASIS_TERMS];
+    static int64_t sum[IH_BASIS_TERMS], expected[IH_BASIS_TERMS];
+    struct ih_test_random random = {.state = 5};
+    int round, i;
+
+    for (round = 0; round < 200; round++) {
+        const int32_t most = round % 4 == 0 ? 1 << 28 : 1 << (round % 28);
+        const int32_t factor = (int32_t)ih_test_between(&random, -(1 << 27), 1 << 27);
+        int64_t expected_sum = 0;
+
+        for (i = 0; i < IH_BASIS_TERMS; i++) {
+            basis_q20[i] = (uint32_t)ih_test_between(&random, 1 << 20, IH_RANGE_BASIS_Q20);
+            coefficient[i] = (int32_t)ih_test_between(&random, -most, most);
+            if (round % 5 == 0) {
+                basis_q20[i] = IH_RANGE_BASIS_Q20;
+                coefficient[i] = round % 2 == 0 ? most : -most;
+            }
+            expected_sum += (int64_t)basis_q20[i] * coefficient[i];
+            expected[i] = sum[i] + (int64_t)basis_q20[i] * factor;
+        }
+        IH_TEST_EQUAL(expected_sum, ih_basis_sum(basis_q20, coefficient), "sum", round);
+        ih_basis_add(basis_q20, factor, sum);
+        for (i = 0; i < IH_BASIS_TERMS; i++) {
+            IH_TEST_EQUAL(expected[i], sum[i], "added", i);
         }
     }
 }
@@ -163,10 +223,11 @@ static void the_table_is_the_basis_at_whole_steps(void)
     fill_table(&scratch);
     for (b = 0; b < IH_SURFACE_STEPS; b++) {
         for (a = 1 - IH_SURFACE_STEPS; a < IH_SURFACE_STEPS; a++) {
-            const double exact = sqrt((a * a + b * b) * 100.0 / 121 + 1);
+            const double exact_q20 = ldexp(sqrt((a * a + b * b) * 100.0 / 121 + 1), 20);
 
-            IH_TEST_WITHIN(0.5 + 1e-6, ldexp(exact, 20),
-                           scratch.of.table_q20[b][IH_SURFACE_STEPS - 1 + a], "table", b);
+            /* Half a step of both squares, as of one; one down; the table's error. */
+            IH_TEST_WITHIN(0.5 + RELATIVE * exact_q20 + 4194304 / exact_q20, exact_q20 - 0.5,
+                           scratch.of.grid.table_q20[b][IH_SURFACE_STEPS - 1 + a], "table", b);
         }
     }
 }
@@ -175,8 +236,10 @@ int main(int count, char **arguments)
 {
     is_all = count == 2 && strcmp(arguments[1], "--all") == 0;
     UNITY_BEGIN();
-    RUN_TEST(roots_change_half_way_between_squares);
+    RUN_TEST(every_square_has_its_root);
     RUN_TEST(roots_hold_at_the_ends_of_spans);
+    RUN_TEST(lines_are_roots_of_sums);
+    RUN_TEST(sums_are_exact);
     RUN_TEST(centres_stand_evenly);
     RUN_TEST(every_place_has_its_basis);
     RUN_TEST(any_place_has_its_basis);

@@ -3,18 +3,21 @@
 
 #include "ih_test.h"
 
+#define PAIRS IH_NORMAL_PAIRS
 #define ROWS IH_NORMAL_ROWS
 #define TERMS IH_NORMAL_TERMS
 #define ENTRIES IH_NORMAL_LINE(TERMS)
-#define MARK 0x123456789ABCDEF0u
+#define MARK 0x12345678
 
-static ih_normal_entry row[ROWS][TERMS];
-static uint64_t normal[ENTRIES + 1], expected[ENTRIES + 1];
+static int32_t row[ROWS][TERMS];
+static _Alignas(IH_NORMAL_ALIGNMENT) uint32_t pair[PAIRS][TERMS];
+static int32_t normal[ENTRIES + 1], expected[ENTRIES + 1];
 static struct ih_test_random random_source;
 
 void setUp(void)
 {
     random_source.state = 91;
+    memset(row, 0, sizeof row);
     memset(normal, 0, sizeof normal);
     memset(expected, 0, sizeof expected);
 }
@@ -23,51 +26,59 @@ void tearDown(void)
 {
 }
 
-static void fill_rows(uint32_t most)
+static void fill_rows(int32_t least, int32_t most)
 {
     int32_t k, i;
 
     for (k = 0; k < ROWS; k++) {
         for (i = 0; i < TERMS; i++) {
-            row[k][i] = (uint32_t)ih_test_between(&random_source, 0, most);
+            row[k][i] = (int32_t)ih_test_between(&random_source, least, most);
         }
     }
 }
 
-static uint64_t product_sum(int32_t i, int32_t j)
+static void pair_rows(void)
 {
-    uint64_t sum = 0;
+    int32_t k, i;
+
+    for (k = 0; k < PAIRS; k++) {
+        for (i = 0; i < TERMS; i++) {
+            pair[k][i] = (uint32_t)row[2 * k][i] | (uint32_t)row[2 * k + 1][i] << 16;
+        }
+    }
+}
+
+/* The sum over all rows to its nearest unit, halves up; second: what a pair's second row counts. */
+static int32_t product_sum(int32_t i, int32_t j, int second, int shift)
+{
+    int64_t sum = 0;
     int32_t k;
 
     for (k = 0; k < ROWS; k++) {
-        sum += (uint64_t)row[k][i] * row[k][j];
+        sum += (k % 2 == 0 ? 1 : second) * (int64_t)row[k][i] * row[k][j];
     }
-    return sum;
+    return (int32_t)floor(ldexp((double)sum, -shift) + 0.5);
 }
 
 /* Entries up to the diagonal; what stands behind it is nobody's business. */
-static void check_lines(const char *what)
+static void check(int second, int shift, const char *what)
 {
     int32_t i, j;
 
+    pair_rows();
+    if (second > 0) {
+        ih_normal_add(pair, shift, normal);
+    } else {
+        ih_normal_change(pair, shift, normal);
+    }
     for (i = 0; i < TERMS; i++) {
         for (j = 0; j <= i; j++) {
             const int32_t at = ih_normal_line(i) + j;
 
+            expected[at] += product_sum(i, j, second, shift);
             if (normal[at] != expected[at]) {
-                IH_TEST_EQUAL((int64_t)expected[at], (int64_t)normal[at], what, at);
+                IH_TEST_EQUAL(expected[at], normal[at], what, at);
             }
-        }
-    }
-}
-
-static void expect_rows(int32_t first, int32_t last)
-{
-    int32_t i, j;
-
-    for (i = first; i < last; i++) {
-        for (j = 0; j <= i; j++) {
-            expected[ih_normal_line(i) + j] += product_sum(i, j);
         }
     }
 }
@@ -88,100 +99,120 @@ static void lines_follow_each_other(void)
     IH_TEST_RANGE(ih_normal_line(TERMS - 1) + TERMS, ENTRIES, ENTRIES, "size", 0);
 }
 
-static void sums_are_exact(void)
+static void sums_are_rounded_once_a_call(void)
 {
-    int32_t round;
+    int shift;
 
-    for (round = 0; round < 5; round++) {
-        fill_rows(88980803); /* the surface's greatest basis value */
-        expect_rows(0, TERMS);
-        ih_normal_add(row, 0, TERMS, normal);
-        check_lines("sum");
+    for (shift = 1; shift <= IH_NORMAL_SHIFT_MOST; shift++) {
+        setUp();
+        fill_rows(0, IH_NORMAL_MOST >> (shift == 1));
+        check(1, shift, "sum");
+        fill_rows(0, 100);
+        check(1, shift, "small sum");
     }
 }
 
-/* All bits of an entry count, and what is greater than 2^32 when it is multiplied. */
-static void greatest_entries_are_multiplied_whole(void)
+/* 16 times the greatest square, as often as the header allows. */
+static void greatest_sums_hold(void)
 {
-    int32_t i;
+    int32_t call;
 
-    memset(row, 0, sizeof row);
-    for (i = 0; i < TERMS; i++) {
-        row[ROWS - 1][i] = UINT32_MAX - (uint32_t)i;
+    for (call = 0; call < 16; call++) {
+        fill_rows(IH_NORMAL_MOST, IH_NORMAL_MOST);
+        check(1, 5, "greatest");
     }
-    expect_rows(0, TERMS);
-    ih_normal_add(row, 0, TERMS, normal);
-    check_lines("greatest");
+    TEST_ASSERT_TRUE(normal[0] > 2147000000);
+}
+
+static void changes_take_the_second_rows_away(void)
+{
+    int round;
+
+    for (round = 0; round < 5; round++) {
+        fill_rows(0, IH_NORMAL_MOST);
+        check(-1, 6, "change");
+    }
+}
+
+/* The greatest products added and nothing taken away, and the other way round. */
+static void greatest_changes_hold(void)
+{
+    int32_t first, k, i;
+
+    for (first = 0; first < 2; first++) {
+        for (k = 0; k < ROWS; k++) {
+            for (i = 0; i < TERMS; i++) {
+                row[k][i] = k % 2 == first ? IH_NORMAL_MOST : 0;
+            }
+        }
+        check(-1, 1, "greatest change");
+        check(-1, IH_NORMAL_SHIFT_MOST, "greatest change, shifted");
+    }
 }
 
 /* Each row at each place: none is left out, none is taken twice. */
 static void every_row_counts_once(void)
 {
-    int32_t k, i;
+    int32_t k, i, second;
 
-    for (k = 0; k < ROWS; k++) {
-        memset(row, 0, sizeof row);
-        for (i = 0; i < TERMS; i++) {
-            row[k][i] = (uint32_t)(i + 1);
-        }
-        expect_rows(0, TERMS);
-        ih_normal_add(row, 0, TERMS, normal);
-        check_lines("one row");
-    }
-}
-
-static void only_the_lines_asked_for_are_touched(void)
-{
-    static const int32_t part[][2] = {{0, 8}, {8, 120}, {120, TERMS}, {64, 64}, {0, TERMS}};
-    int i;
-    int32_t at;
-
-    fill_rows(1 << 26);
-    for (i = 0; i < IH_TEST_COUNT(part); i++) {
-        const int32_t first = part[i][0], last = part[i][1];
-
-        for (at = 0; at <= ENTRIES; at++) {
-            normal[at] = expected[at] = MARK;
-        }
-        expect_rows(first, last);
-        ih_normal_add(row, first, last, &normal[IH_NORMAL_LINE(first)]);
-        check_lines("part");
-        for (at = 0; at <= ENTRIES; at++) {
-            if (at < IH_NORMAL_LINE(first) || at >= IH_NORMAL_LINE(last)) {
-                IH_TEST_EQUAL((int64_t)MARK, (int64_t)normal[at], "outside", at);
+    for (second = -1; second <= 1; second += 2) {
+        for (k = 0; k < ROWS; k++) {
+            memset(row, 0, sizeof row);
+            for (i = 0; i < TERMS; i++) {
+                row[k][i] = 2 * i + 1;
             }
+            check(second, 1, "one row");
         }
     }
 }
 
-/* As the header says it: with all bits turned round, adding is taking away. */
+/* What was added and is taken away leaves no more than each rounding's half. */
 static void what_was_added_can_be_taken_away(void)
 {
-    int32_t at;
+    int32_t k, i;
 
-    fill_rows(88980803);
-    expect_rows(0, TERMS);
-    ih_normal_add(row, 0, TERMS, normal);
-    fill_rows(88980803);
-    ih_normal_add(row, 0, TERMS, normal);
-    for (at = 0; at < ENTRIES; at++) {
-        normal[at] = ~normal[at];
+    for (k = 0; k < 20; k++) {
+        fill_rows(0, IH_NORMAL_MOST);
+        for (i = 0; i < TERMS; i++) {
+            int32_t n;
+
+            for (n = 1; n < ROWS; n += 2) {
+                row[n][i] = 0;
+            }
+        }
+        check(1, 6, "added");
+        for (i = 0; i < ROWS; i += 2) {
+            memcpy(row[i + 1], row[i], sizeof row[i]);
+            memset(row[i], 0, sizeof row[i]);
+        }
+        check(-1, 6, "taken away");
     }
-    ih_normal_add(row, 0, TERMS, normal);
-    for (at = 0; at < ENTRIES; at++) {
-        normal[at] = ~normal[at];
+    for (i = 0; i < TERMS; i++) {
+        for (k = 0; k <= i; k++) {
+            IH_TEST_RANGE(-20, 20, normal[ih_normal_line(i) + k], "what is left", i);
+        }
     }
-    check_lines("taken away");
+}
+
+static void nothing_behind_the_lines_is_touched(void)
+{
+    normal[ENTRIES] = MARK;
+    fill_rows(1, IH_NORMAL_MOST);
+    check(1, 6, "sum");
+    check(-1, 6, "change");
+    IH_TEST_EQUAL(MARK, normal[ENTRIES], "behind", ENTRIES);
 }
 
 int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(lines_follow_each_other);
-    RUN_TEST(sums_are_exact);
-    RUN_TEST(greatest_entries_are_multiplied_whole);
+    RUN_TEST(sums_are_rounded_once_a_call);
+    RUN_TEST(greatest_sums_hold);
+    RUN_TEST(changes_take_the_second_rows_away);
+    RUN_TEST(greatest_changes_hold);
     RUN_TEST(every_row_counts_once);
-    RUN_TEST(only_the_lines_asked_for_are_touched);
     RUN_TEST(what_was_added_can_be_taken_away);
+    RUN_TEST(nothing_behind_the_lines_is_touched);
     return UNITY_END();
 }

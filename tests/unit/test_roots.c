@@ -1,7 +1,9 @@
-/* ih_basis's table against its definition: an entry's last place shows in no root. */
+/* ih_basis's table against its definition: chords of a root's curve, raised by half of what they lie below it. */
 #include "ih_basis.c"
 
 #include "ih_test.h"
+
+#define LAST_SPAN 1024
 
 void setUp(void)
 {
@@ -11,43 +13,54 @@ void tearDown(void)
 {
 }
 
-/* 2^30 / sqrt(m), m in spans of 2^23. */
-static double root_inverse(double spans)
+/* sqrt(m) * 2^16, m in spans of 2^22. */
+static double root(double at)
 {
-    return ldexp(1, 30) / sqrt(ldexp(spans, 23));
+    return ldexp(sqrt(at), 11 + 16);
 }
 
-static double fall_over(int span)
+/* How far the curve lies above the chord over a span at the most: where it is as steep. */
+static double curve_above(int span)
 {
-    return root_inverse(span) - root_inverse(span + 1);
+    const double rise = root(span + 1) - root(span);
+    const double at = pow(root(1) / (2 * rise), 2);
+
+    return root(at) - root(span) - (at - span) * rise;
 }
 
-/* How far the chord over a span lies above the curve at the most: where the curve is as steep as it. */
-static double chord_above(int span)
+/* Places and products are cut off, by 64 of 2^22 and by one: half a step of each, and one of rounding. */
+static void entries_are_chords_raised_by_half(void)
 {
-    const double fall = fall_over(span);
-    const double at = pow(root_inverse(1) / (2 * fall), 2.0 / 3);
+    int at;
 
-    return root_inverse(span) - (at - span) * fall - root_inverse(at);
+    TEST_ASSERT_EQUAL_INT(LAST_SPAN - SPANS_BELOW, IH_TEST_COUNT(spans));
+    for (at = SPANS_BELOW; at < LAST_SPAN; at++) {
+        const struct span *entry = &spans[at - SPANS_BELOW];
+        const double rise = root(at + 1) - root(at);
+        const double lost = at + 1 == LAST_SPAN ? 64 : 0; /* so that no root passes 2^32 */
+
+        IH_TEST_WITHIN(0.5, rise / 64, entry->rise, "rise", at);
+        IH_TEST_WITHIN(rise / 65536 + 32 + 1 + lost, root(at) + curve_above(at) / 2, entry->value,
+                       "value", at);
+    }
 }
 
-static void inverse_roots_lie_between_chord_and_curve(void)
+static void no_root_passes_32_bits(void)
 {
-    int span;
+    int at;
 
-    TEST_ASSERT_EQUAL_INT(256 - SPANS_BELOW, IH_TEST_COUNT(inverse_root));
-    for (span = SPANS_BELOW; span < 256; span++) {
-        const uint32_t entry = inverse_root[span - SPANS_BELOW];
+    for (at = 0; at < IH_TEST_COUNT(spans); at++) {
+        const uint64_t most = (uint64_t)spans[at].rise * 65535;
 
-        IH_TEST_EQUAL(floor(8 * (root_inverse(span) - chord_above(span) / 2) + 0.5) + 4,
-                      entry >> 12, "beginning", span);
-        IH_TEST_EQUAL(floor(8 * fall_over(span) + 0.5), entry & 4095, "fall", span);
+        TEST_ASSERT_TRUE(most <= UINT32_MAX);
+        TEST_ASSERT_TRUE(spans[at].value + (most >> RISE_SHIFT) <= UINT32_MAX);
     }
 }
 
 int main(void)
 {
     UNITY_BEGIN();
-    RUN_TEST(inverse_roots_lie_between_chord_and_curve);
+    RUN_TEST(entries_are_chords_raised_by_half);
+    RUN_TEST(no_root_passes_32_bits);
     return UNITY_END();
 }

@@ -316,14 +316,14 @@ static void the_same_samples_give_the_same_bytes(void)
                              (size_t)samples.sample_count * sizeof first.root_weight_q15[0]);
 }
 
-/* The second system is made from the first by exchanging what some samples brought to it. It must be, to
- * the last bit, the one that these weights give from the beginning. */
+/* The second system is made from the first by exchanging what some samples brought to it. It must be as good as
+ * the one that these weights give from the beginning: both are within 0.2 mm of the same. */
 static void changed_weights_give_what_they_give_at_once(void)
 {
     static const int32_t outliers[] = {1, 7, 8, 9, 15, 16, 17, 33, 150};
-    static struct ih_surface again;
+    static double again_mm[NODES];
     int i;
-    int32_t k;
+    int32_t k, lighter;
 
     for (i = 0; i < IH_TEST_COUNT(outliers); i++) {
         samples.sample_count = 0;
@@ -338,16 +338,21 @@ static void changed_weights_give_what_they_give_at_once(void)
         }
         params.huber_mm = VECTOR_HUBER_MM;
         fit();
-        again = surface;
-        IH_TEST_RANGE(outliers[i], samples.sample_count, again.downweighted_count, "lighter", i);
+        lighter = surface.downweighted_count;
+        IH_TEST_RANGE(outliers[i], samples.sample_count, lighter, "lighter", i);
+        for (k = 0; k < NODES; k++) {
+            again_mm[k] = node_mm(k);
+        }
         for (k = 0; k < samples.sample_count; k++) {
-            samples.sample[k].root_weight_q15 = again.root_weight_q15[k];
+            samples.sample[k].root_weight_q15 = surface.root_weight_q15[k];
         }
         params.huber_mm = 100000;
         memset(&scratch, IH_TEST_FILL, sizeof scratch);
         fit();
         IH_TEST_EQUAL(0, surface.downweighted_count, "lighter at once", i);
-        TEST_ASSERT_EQUAL_MEMORY(surface.depth_mm_q8, again.depth_mm_q8, sizeof again.depth_mm_q8);
+        for (k = 0; k < NODES; k++) {
+            IH_TEST_WITHIN(TOLERANCE_MM, again_mm[k], node_mm(k), "node", k);
+        }
     }
 }
 
