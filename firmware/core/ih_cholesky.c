@@ -147,44 +147,45 @@ static inline void dots_q60(const struct row a[2], const struct row b[WIDE], int
 
 #endif
 
-/* 2^(30 + shift) / pivot, between 2^30 and 2^31, for division by products. */
-struct inverse {
-    int32_t value;
-    int shift; /* 1..31 */
-};
-
-static struct inverse inverse_of(int32_t pivot_q30)
+/* Bits of a pivot, 1..31. */
+static inline int bits_of(int32_t pivot_q30)
 {
-    const int shift = ih_bits_u64((uint64_t)pivot_q30);
-    const int64_t value = ((int64_t)1 << (30 + shift)) / pivot_q30; /* 2^31 for a power of 2 */
-    return (struct inverse){(int32_t)ih_min_s64(value, INT32_MAX), shift};
+    return 32 - __builtin_clz((uint32_t)pivot_q30);
+}
+
+/* 2^(30 + its bits) / pivot, between 2^30 and 2^31, for division by products. */
+static int32_t inverse_of(int32_t pivot_q30)
+{
+    const int64_t value = ((int64_t)1 << (30 + bits_of(pivot_q30))) / pivot_q30;
+    return (int32_t)ih_min_s64(value, INT32_MAX); /* 2^31 for a power of 2 */
 }
 
 /* L_ij from A_ij and what the entries before it take away. The rest in Q30: half a step of it is no more than
  * half a step of A. It is at most 1, with a pivot of the same size or more: Cauchy-Schwarz. */
-static inline int32_t entry_q30(int32_t a_q30, int64_t taken_q60, struct inverse pivot, int32_t n)
+static inline int32_t entry_q30(int32_t a_q30, int64_t taken_q60, int32_t pivot_q30,
+                                int32_t inverse, int32_t n)
 {
     const int64_t rest_q30 = a_q30 - ih_shift_round(taken_q60, 30);
-    const int32_t entry = ih_saturate_s32(ih_mul_shift(rest_q30, pivot.value, pivot.shift));
+    const int32_t entry = ih_saturate_s32(ih_mul_shift(rest_q30, inverse, bits_of(pivot_q30)));
     IH_IN_RANGE(entry, -(1 << 30) - n, (1 << 30) + n);
     return entry;
 }
 
 /* The last entry of a row whose others are done. */
-static bool set_pivot(int32_t *row_q30, int32_t i, struct inverse *pivot)
+static bool set_pivot(int32_t *row_q30, int32_t i, int32_t *inverse)
 {
     int64_t pivot_q60 = (int64_t)row_q30[i] * (1 << 30) - dot_q60(row_q30, row_q30, i);
     row_q30[i] = pivot_q60 > 0 ? (int32_t)ih_isqrt_u64((uint64_t)pivot_q60) : 0;
     if (row_q30[i] == 0) {
         return false;
     }
-    *pivot = inverse_of(row_q30[i]);
+    *inverse = inverse_of(row_q30[i]);
     return true;
 }
 
 /* Entries j .. j + WIDE - 1 of two rows, which may be the same row twice. */
-static inline void set_tile(const struct row column[WIDE], const struct inverse pivot[WIDE],
-                            int32_t n, int32_t j, struct row row[2], int32_t *const row_q30[2])
+static inline void set_tile(const struct row column[WIDE], const int32_t inverse[WIDE], int32_t n,
+                            int32_t j, struct row row[2], int32_t *const row_q30[2])
 {
     int64_t taken_q60[2][WIDE];
     dots_q60(row, column, j, taken_q60);
@@ -195,7 +196,7 @@ static inline void set_tile(const struct row column[WIDE], const struct inverse 
             for (int32_t d = 0; d < c; d++) {
                 taken += (int64_t)entry[m][d] * column[c].q30[j + d];
             }
-            entry[m][c] = entry_q30(row_q30[m][j + c], taken, pivot[c], n);
+            entry[m][c] = entry_q30(row_q30[m][j + c], taken, column[c].q30[j + c], inverse[c], n);
             row[m].sum_q30 += WITH_SUMS ? entry[m][c] : 0;
         }
     }
@@ -207,7 +208,7 @@ static inline void set_tile(const struct row column[WIDE], const struct inverse 
 /* All whole tiles of rows i and `next`. before: sums of the entries of each row up to its last whole tile; these
  * rows' are set. Returns the first column that is left. */
 static inline int32_t set_tiles(int32_t *a_q30, int32_t n, int32_t i, int32_t next,
-                                const struct inverse *pivot, int64_t *before)
+                                const int32_t *inverse, int64_t *before)
 {
     int32_t *const row_q30[2] = {&a_q30[IH_CHOLESKY_PACKED(i)], &a_q30[IH_CHOLESKY_PACKED(next)]};
     struct row row[2] = {{row_q30[0], 0}, {row_q30[1], 0}};
@@ -217,7 +218,7 @@ static inline int32_t set_tiles(int32_t *a_q30, int32_t n, int32_t i, int32_t ne
         for (int32_t c = 0; c < WIDE; c++) {
             column[c] = (struct row){row_of(a_q30, j + c), WITH_SUMS ? before[j + c] : 0};
         }
-        set_tile(column, &pivot[j], n, j, row, row_q30);
+        set_tile(column, &inverse[j], n, j, row, row_q30);
     }
     if (WITH_SUMS) {
         before[i] = row[0].sum_q30;
@@ -227,26 +228,28 @@ static inline int32_t set_tiles(int32_t *a_q30, int32_t n, int32_t i, int32_t ne
 }
 
 /* Entries from j on of a row, one by one, and the last. */
-static bool end_row(int32_t *a_q30, int32_t n, int32_t i, int32_t j, struct inverse *pivot)
+static bool end_row(int32_t *a_q30, int32_t n, int32_t i, int32_t j, int32_t *inverse)
 {
     int32_t *row_q30 = &a_q30[IH_CHOLESKY_PACKED(i)];
     for (int32_t k = j; k < i; k++) {
-        row_q30[k] = entry_q30(row_q30[k], dot_q60(row_q30, row_of(a_q30, k), k), pivot[k], n);
+        const int32_t *column_q30 = row_of(a_q30, k);
+        row_q30[k] =
+            entry_q30(row_q30[k], dot_q60(row_q30, column_q30, k), column_q30[k], inverse[k], n);
     }
-    return set_pivot(row_q30, i, &pivot[i]);
+    return set_pivot(row_q30, i, &inverse[i]);
 }
 
 /* Two rows at a time: all whole tiles first. */
 enum ih_err ih_cholesky_factor(int32_t *a_q30, int32_t n, int32_t *bad_pivot)
 {
-    struct inverse pivot[IH_CHOLESKY_MAX];
+    int32_t inverse[IH_CHOLESKY_MAX];
     int64_t before[WITH_SUMS ? IH_CHOLESKY_MAX : 1];
     *bad_pivot = IH_NONE;
     for (int32_t i = 0; i < n; i += 2) {
         const int32_t next = ih_min_s32(i + 1, n - 1); /* or the same again */
-        const int32_t j = set_tiles(a_q30, n, i, next, pivot, before);
+        const int32_t j = set_tiles(a_q30, n, i, next, inverse, before);
         for (int32_t at = i; at <= next; at++) {
-            if (!end_row(a_q30, n, at, j, pivot)) {
+            if (!end_row(a_q30, n, at, j, inverse)) {
                 *bad_pivot = at;
                 return IH_ERR_NOT_POSITIVE;
             }
