@@ -124,7 +124,7 @@ IH_WRAPPING static inline void dots_q60(const struct row a[2], const struct row 
             const int64_t both = (a[m].sum_q30 + b[n].sum_q30) * ((int64_t)1 << 20);
             uint64_t part[2];
             _mm_storeu_si128((__m128i *)part, sum[m][n]);
-            sum_q60[m][n] = IH_WRAPS(int64_t, part[0] + part[1] - (IH_WRAPS(uint64_t, both) << 11));
+            sum_q60[m][n] = IH_WRAPS(int64_t, part[0] + part[1] - IH_WRAPS(uint64_t, both) * 2048);
         }
     }
 }

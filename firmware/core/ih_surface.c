@@ -129,8 +129,9 @@ static bool set_weight_shift(struct ih_surface_scratch *scratch, const int32_t *
     return most_q15 > 0;
 }
 
-/* Diagonal of R^T W R: sums of weight * (dx^2 + dy^2 + 1), from the samples' moments. */
-static void set_norms(struct ih_surface_scratch *scratch, const struct ih_samples *samples,
+/* Diagonal of R^T W R: sums of weight * (dx^2 + dy^2 + 1), from the samples' moments. Returns whether one is
+ * below a quarter of what it was: then short rows would be too short. */
+static bool set_norms(struct ih_surface_scratch *scratch, const struct ih_samples *samples,
                       const int32_t *root_weight_q15)
 {
     int64_t sum_q30 = 0, x_q46 = 0, y_q46 = 0, square_q42 = 0;
@@ -142,6 +143,7 @@ static void set_norms(struct ih_surface_scratch *scratch, const struct ih_sample
         y_q46 += weight * y_q16;
         square_q42 += weight * ((x_q16 * x_q16 + y_q16 * y_q16) >> 20);
     }
+    bool is_light = false;
     for (int32_t i = 0; i < TERMS; i++) {
         const int64_t x_q16 = scratch->centre_q16[i % CENTRES];
         const int64_t y_q16 = scratch->centre_q16[i / CENTRES];
@@ -149,8 +151,11 @@ static void set_norms(struct ih_surface_scratch *scratch, const struct ih_sample
         const int64_t mixed_q42 = 2 * (x_q16 * (x_q46 >> 20) + y_q16 * (y_q46 >> 20));
         const int64_t norm_q38 = (sum_q30 >> 8) * centre_q16 - (mixed_q42 >> 4) + (square_q42 >> 4);
         IH_IN_RANGE(norm_q38, 0, IH_RANGE_NORM_Q38);
-        scratch->norm_q10[i] = (uint32_t)(norm_q38 >> 28);
+        const uint32_t norm_q10 = (uint32_t)(norm_q38 >> 28);
+        is_light |= norm_q10 < scratch->norm_q10[i] / 4;
+        scratch->norm_q10[i] = norm_q10;
     }
+    return is_light;
 }
 
 /* Scales of short rows: no entry is greater than the basis at the farthest corner of the box around the
@@ -326,21 +331,20 @@ static void take_ridge(const struct ih_surface_params *params, struct ih_surface
  * of the right side over 2^normal_shift. */
 static int scale_right(struct ih_surface_scratch *scratch)
 {
-    int64_t scaled[TERMS];
+    int64_t *right = scratch->right; /* scaled in place: it has served */
     uint64_t most = 0;
     for (int32_t i = 0; i < TERMS; i++) {
-        most |= (uint64_t)ih_abs_s64(scratch->right[i]);
+        most |= (uint64_t)ih_abs_s64(right[i]);
     }
     const int first = ih_max_s32(0, ih_bits_u64(most) - 30);
     most = 0;
     for (int32_t i = 0; i < TERMS; i++) {
-        scaled[i] =
-            ih_shift_round(scratch->right[i], first) * (int64_t)scratch->unknown_scale_q29[i];
-        most |= (uint64_t)ih_abs_s64(scaled[i]);
+        right[i] = ih_shift_round(right[i], first) * (int64_t)scratch->unknown_scale_q29[i];
+        most |= (uint64_t)ih_abs_s64(right[i]);
     }
     const int second = ih_max_s32(0, ih_bits_u64(most) - RIGHT_BITS);
     for (int32_t i = 0; i < TERMS; i++) {
-        scratch->solution[i] = (int32_t)ih_shift_round(scaled[i], second);
+        scratch->solution[i] = (int32_t)ih_shift_round(right[i], second);
     }
     return 20 + scratch->off_fraction - first + UNKNOWN_SCALE_BITS - second;
 }
@@ -468,8 +472,9 @@ static bool fit_first(const struct ih_samples *samples, const struct ih_surface_
     }
     memset(scratch->coefficient, 0, sizeof scratch->coefficient);
     scratch->coefficient_shift = 0;
+    memset(scratch->norm_q10, 0, sizeof scratch->norm_q10);
     memset(scratch->right, 0, sizeof scratch->right);
-    set_norms(scratch, samples, out->root_weight_q15);
+    (void)set_norms(scratch, samples, out->root_weight_q15);
     set_row_scale(scratch, samples);
     set_off_fraction(scratch, samples, out->mean_mm_q8);
     sum_all(samples, scratch, out, true);
@@ -479,17 +484,6 @@ static bool fit_first(const struct ih_samples *samples, const struct ih_surface_
     correct(params, scratch);
     refine(samples, params, out, SQUARES_LOG2_FOR_WEIGHTS, scratch);
     return true;
-}
-
-/* Have the weights fallen so far that short rows would be too short? */
-static bool is_light(const struct ih_surface_scratch *scratch,
-                     const uint32_t norm_before_q10[TERMS])
-{
-    bool is_less = false;
-    for (int32_t i = 0; i < TERMS; i++) {
-        is_less |= scratch->norm_q10[i] < norm_before_q10[i] / 4;
-    }
-    return is_less;
 }
 
 /* Sum all rows again, and scale the right side to the weights as they are enlarged now. */
@@ -503,7 +497,7 @@ static bool sum_again(const struct ih_samples *samples, struct ih_surface_scratc
     for (int32_t i = 0; i < TERMS; i++) {
         scratch->right[i] = shift_by(scratch->right[i], 2 * (scratch->weight_shift - before));
     }
-    set_norms(scratch, samples, out->root_weight_q15);
+    (void)set_norms(scratch, samples, out->root_weight_q15);
     set_row_scale(scratch, samples);
     sum_all(samples, scratch, out, false);
     return true;
@@ -513,15 +507,13 @@ static bool sum_again(const struct ih_samples *samples, struct ih_surface_scratc
 static bool fit_again(const struct ih_samples *samples, const struct ih_surface_params *params,
                       struct ih_surface_scratch *scratch, struct ih_surface *out)
 {
-    uint32_t norm_before_q10[TERMS];
-    memcpy(norm_before_q10, scratch->norm_q10, sizeof norm_before_q10);
     out->downweighted_count = change_weights(samples, params, scratch, out);
     if (out->downweighted_count == 0) {
         correct(params, scratch); /* the right side is there */
         return true;
     }
-    set_norms(scratch, samples, out->root_weight_q15);
-    if (is_light(scratch, norm_before_q10) && !sum_again(samples, scratch, out)) {
+    const bool is_light = set_norms(scratch, samples, out->root_weight_q15);
+    if (is_light && !sum_again(samples, scratch, out)) {
         return false;
     }
     if (!factor(params, scratch)) {
