@@ -139,7 +139,7 @@ def check(arguments):
         sizes, ram_max = ram.sizes(["gcc"], "nm", directory)
         check_limit("size", "struct isohead", sizes[ram.WHOLE], bounds["ram_bytes"])
         check_limit("size", "IH_RAM_MAX", ram_max, bounds["ram_bytes"])
-        check_limit("size", "code and constants", sum(total.values()), bounds["flash_bytes"])
+        check_limit("size", "code and constants", sum(total.values()), bounds["x86_code_bytes"])
         if arguments.compile_commands:
             check_commands(arguments.compile_commands)
         print("calls outside the core: %s" % (", ".join(symbols) or "none"))

@@ -4,7 +4,7 @@ import os
 import re
 
 PATH = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "tests", "limits.conf")
-NAMES = {"ram_bytes", "flash_bytes", "stack_bytes", "x86_stack_bytes", "cortexm7_frame_instructions",
+NAMES = {"ram_bytes", "flash_bytes", "stack_bytes", "x86_stack_bytes", "x86_code_bytes", "cortexm7_frame_instructions",
          "bench_frame_instructions", "bench_dots_instructions", "bench_labels_instructions",
          "bench_surface_instructions", "bench_nests_instructions", "bench_findings_instructions"}
 
