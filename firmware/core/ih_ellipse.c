@@ -205,7 +205,8 @@ static inline int32_t odd_half(int32_t px, int32_t py, int32_t qx, int32_t qy)
 static int32_t odd_halves(const struct ih_parts *parts, const struct ih_part *part,
                           struct ih_vertex place)
 {
-    const int32_t x_q8 = half_q9(place.x_q9), y_q8 = half_q9(place.y_q9);
+    const int32_t x_q8 = half_q9(place.x_q9);
+    const int32_t y_q8 = half_q9(place.y_q9);
     const int32_t *x = &parts->x_q8[part->from];
     const int32_t *y = &parts->y_q8[part->from];
     const int32_t steps = part->steps;
