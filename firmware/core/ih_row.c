@@ -6,9 +6,11 @@
 
 /* Compilers do not find the multiplication of lower halves by themselves, see ih_normal. Ranges are checked
  * without vectors. */
-#if defined __x86_64__ && defined __SSE2__ && !defined ISOHEAD_RANGE_CHECKS
+#if defined __x86_64__ && defined __SSE2__
+#ifndef ISOHEAD_RANGE_CHECKS
 #define BY_VECTORS
 #include <immintrin.h>
+#endif
 #endif
 
 #define ONE_Q14 (1 << 14)
@@ -385,15 +387,16 @@ static void sum_rows(const struct ih_rows *rows, int32_t count, struct ih_row_sy
 
 static void flush_rows(struct ih_rows *rows, struct ih_row_system *system)
 {
-    const int32_t count = (rows->count + LANES - 1) / LANES * LANES;
-    for (int32_t k = rows->count; k < count; k++) { /* rows of nothing add nothing */
+    int32_t count = rows->count;
+    while (count % LANES != 0) { /* rows of nothing add nothing */
         for (int axis = 0; axis < 3; axis++) {
-            rows->place_q14[axis][k] = 0;
-            rows->component_q14[axis][k] = 0;
+            rows->place_q14[axis][count] = 0;
+            rows->component_q14[axis][count] = 0;
         }
-        rows->length[k] = 0;
-        rows->weight_q16[k] = 0;
-        rows->slope_q14[IH_FIT_UNKNOWNS][k] = LIFT;
+        rows->length[count] = 0;
+        rows->weight_q16[count] = 0;
+        rows->slope_q14[IH_FIT_UNKNOWNS][count] = LIFT;
+        count++;
     }
     find_slopes(rows, count);
     sum_rows(rows, count, system);
@@ -417,7 +420,7 @@ static void add_row(struct ih_rows *rows, struct ih_row_system *system, const st
     }
 }
 
-#if UINTPTR_MAX > UINT32_MAX
+#ifdef __LP64__
 /* s^-2, rounded. */
 static int32_t inverse_square_q16(uint64_t s_q16)
 {
@@ -430,8 +433,9 @@ static int32_t inverse_square_q16(uint64_t s_q16)
  * what is cut off: less than 2. */
 static int32_t inverse_square_q16(uint32_t s_q16)
 {
-    const uint32_t high = (1U << 31) / s_q16;
-    const uint32_t inverse_q24 = (high << 9) + ((((1U << 31) - high * s_q16) << 9) / s_q16);
+    const uint32_t one_q31 = (uint32_t)1 << 31;
+    const uint32_t high = one_q31 / s_q16;
+    const uint32_t inverse_q24 = (high << 9) + (((one_q31 - high * s_q16) << 9) / s_q16);
     const uint64_t square_q32 = (uint64_t)s_q16 * s_q16;
     uint32_t result = (uint32_t)((uint64_t)inverse_q24 * inverse_q24 >> 32);
     uint64_t rest = ((uint64_t)1 << 48) + square_q32 / 2 - result * square_q32;
@@ -529,16 +533,17 @@ struct bounds {
     int16_t front; /* of a point that pushes, at least */
 };
 
-static struct bounds bounds_of(const struct step *step)
+static void find_bounds(const struct step *step, struct bounds *out)
 {
-    struct bounds bounds = {.slope = {slopes_within(step, 0), slopes_within(step, 1)},
-                            .front = saturate_s16(step->front_mm_q8 >> 7)};
+    for (int axis = 0; axis < 2; axis++) {
+        out->slope[axis] = slopes_within(step, axis);
+    }
+    out->front = saturate_s16(step->front_mm_q8 >> 7);
     for (int axis = 0; axis < 3; axis++) {
         const int32_t centre_q8 = step->ellipsoid->centre_mm_q8[axis];
-        bounds.point[axis] = interval_of((centre_q8 - step->reach_mm_q8[axis]) >> 7,
-                                         (centre_q8 + step->reach_mm_q8[axis]) >> 7);
+        out->point[axis] = interval_of((centre_q8 - step->reach_mm_q8[axis]) >> 7,
+                                       (centre_q8 + step->reach_mm_q8[axis]) >> 7);
     }
-    return bounds;
 }
 
 #if defined __SSE2__ || defined __ARM_NEON
@@ -660,7 +665,8 @@ void ih_row_collect(const struct ih_space *space, const struct ih_ellipsoid *ell
                         .scale_mm = scale_mm,
                         .see_through_mm = see_through_mm};
     begin_step(&step, &scratch->rays);
-    const struct bounds bounds = bounds_of(&step);
+    struct bounds bounds;
+    find_bounds(&step, &bounds);
     flag_rays(&bounds, scratch);
     memset(out, 0, sizeof *out);
     scratch->rows.count = 0;
