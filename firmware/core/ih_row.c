@@ -388,7 +388,7 @@ static void sum_rows(const struct ih_rows *rows, int32_t count, struct ih_row_sy
 static void flush_rows(struct ih_rows *rows, struct ih_row_system *system)
 {
     int32_t count = rows->count;
-    while (count % LANES != 0) { /* rows of nothing add nothing */
+    while ((count & (LANES - 1)) != 0) { /* rows of nothing add nothing; LANES is a power of two */
         for (int axis = 0; axis < 3; axis++) {
             rows->place_q14[axis][count] = 0;
             rows->component_q14[axis][count] = 0;
