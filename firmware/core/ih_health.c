@@ -181,13 +181,16 @@ static void conclude(struct ih_health *health, const struct ih_health_look *look
 }
 
 /* Chance gives every turn its votes, with a wide baseline half of what the right one has. The winner needs three
- * quarters more than the mean; and of what is beyond the mean a quarter more than no turn has, or, where a search is
- * repeated, any more. */
-static bool is_elected(const struct ih_turn_winner *winner, int32_t search_count)
+ * quarters more than the mean; and of what is beyond the mean half more than no turn has: chance in sunlight gives a
+ * quarter more. Where labels are poor or hardly there, there is nothing to keep, and rigs that fit give a fortieth
+ * more: an eighth, as to a rig turned by a step, or by 0.5 px, no turn still gives four fifths of the winner's votes.
+ * Where a search is repeated, any more. */
+static bool is_elected(const struct ih_turn_winner *winner, const struct ih_health_look *look,
+                       int32_t search_count)
 {
-    int32_t least = search_count > 1 ? 4 : 5;
+    int32_t least = search_count > 1 ? 8 : is_poor(look) || is_lost(look) ? 9 : 12;
     return winner->vote * 4 > winner->vote_mean * 7 &&
-           (winner->vote - winner->vote_mean) * 4 >
+           (winner->vote - winner->vote_mean) * 8 >
                (winner->vote_of_none - winner->vote_mean) * least;
 }
 
@@ -197,7 +200,7 @@ static bool elect(struct ih_health *health, struct ih_rig *rig, struct ih_health
 {
     struct ih_turn_winner winner;
     ih_turn_elect(&health->now.votes, rig, &winner);
-    bool is_turned_now = is_elected(&winner, health->search_count) &&
+    bool is_turned_now = is_elected(&winner, &health->look, health->search_count) &&
                          turn_by(health, winner.turn_rad_q30, rig, scratch);
     health->before = health->look;
     health->is_weak_known = health->is_weak_known && !is_turned_now;

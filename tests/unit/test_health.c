@@ -180,10 +180,10 @@ static void more_frames_make_it_better(void)
 /* However long the peace, and wherever in a look the knock. */
 static void a_knock_after_a_long_peace_is_found_as_soon(void)
 {
-    static const double turns_deg[][3] = {{0, 0.1, 0},     {0, -0.1, 0},   {0, 0, 0.05},
-                                          {0, 0, -0.1},    {0, 0, 0.2},    {0.03, 0, 0},
-                                          {-0.1, 0, 0},    {0, 0.3, 0},    {0.05, 0.05, 0.05},
-                                          {0.02, 0.02, 0}, {0, 0.06, 0.06}};
+    static const double turns_deg[][3] = {
+        {0, 0.1, 0},     {0, -0.1, 0},          {0, 0, 0.05}, {0, 0, -0.1},       {0, 0, 0.2},
+        {0.03, 0, 0},    {-0.1, 0, 0},          {0, 0.3, 0},  {0.05, 0.05, 0.05}, {0.02, 0.02, 0},
+        {0, 0.06, 0.06}, {-0.03, -0.09, 0.025}, {-0.03, 0, 0}};
     static struct ih_health peaceful;
 
     for (int which = 0; which < 2; which++) {
@@ -299,6 +299,33 @@ static void chance_turns_nothing(void)
     }
 }
 
+/* Dots of a few rows, and more where the sun makes some, which stand still. */
+static void sunlight_turns_nothing(void)
+{
+    static struct ih_dots sun;
+
+    for (int seed = 0; seed < 24; seed++) {
+        setUp();
+        random_source.state = (uint64_t)seed;
+        use_calibration(&vector_rigs[seed % 2]);
+        int32_t kept_count = 45 + 5 * (seed % 5);
+        sun.dot_count = 75;
+        for (int32_t k = 0; k < sun.dot_count; k++) {
+            sun.dot[k].u_px_q12 = (int32_t)ih_test_between(&random_source, 0, 751 * 4096);
+            sun.dot[k].v_px_q12 = (int32_t)ih_test_between(&random_source, 0, 581 * 4096);
+        }
+        for (int i = 0; i < 200; i++) {
+            see_dots(&vector_rigs[seed % 2], straight_deg, WALL_MM, 0.1, &random_source, &dots);
+            dots.dot_count = kept_count;
+            for (int32_t k = 0; k < sun.dot_count; k++) {
+                dots.dot[dots.dot_count++] = sun.dot[k];
+            }
+            look();
+        }
+        assert_untouched();
+    }
+}
+
 static void few_dots_say_nothing(void)
 {
     use_calibration(&vector_rigs[0]);
@@ -364,6 +391,7 @@ int main(void)
     RUN_TEST(a_second_knock_and_one_back);
     RUN_TEST(a_turn_beyond_the_limit_is_told_and_not_taken);
     RUN_TEST(chance_turns_nothing);
+    RUN_TEST(sunlight_turns_nothing);
     RUN_TEST(few_dots_say_nothing);
     RUN_TEST(a_calibrations_errors_are_no_turn);
     RUN_TEST(anything_labelled_is_survived);
