@@ -20,7 +20,7 @@
  *        A turn that was taken is refined from the next 4 (after a search), 4 and 24 frames; from then on
  *        frames add up, and it is refined whenever a quarter more are there. A knock is so told within 46 of
  *        the frames that are looked at, however long the peace was and wherever in a look it came: at the end
- *        of 1 (then refined), of 2 after settling; later where a search is in vain first (52 seen).
+ *        of 1 (then refined), of 2 after settling; later where a search is in vain first (63 seen).
  *        Not noticed: what dots do not show, docs/health.md has how much.
  *        A turn across the baseline, which is depth and which dots hardly show, is corrected for only
  *        when it is known to IH_PLACES_SIGMA_MAX: what votes say of it alone is taken back.
