@@ -135,9 +135,10 @@ static inline __m256i roots_of_eight(__m256i square)
     const __m256i e = zeros_halved(square);
     const __m256i m = _mm256_sllv_epi32(square, _mm256_add_epi32(e, e));
     const __m256i at = _mm256_sub_epi32(_mm256_srli_epi32(m, SPAN_BITS), EACH(SPANS_BELOW));
-    const int *first = (const int *)roots;
+    const int *first = (const int *)&roots[0];
+    const int *second = (const int *)&roots[1];
     const __m256i value = _mm256_i32gather_epi32(first, at, sizeof roots[0]);
-    const __m256i next = _mm256_i32gather_epi32(first + 1, at, sizeof roots[0]);
+    const __m256i next = _mm256_i32gather_epi32(second, at, sizeof roots[0]);
     const __m256i rise = _mm256_srli_epi32(_mm256_sub_epi32(next, value), RISE_SHIFT);
     const __m256i g = _mm256_and_si256(_mm256_srli_epi32(m, SPAN_BITS - 16), EACH(0xffff));
     const __m256i more = _mm256_srli_epi32(_mm256_mullo_epi32(rise, g), PART_SHIFT);
@@ -152,7 +153,8 @@ void ih_basis_roots(const uint32_t *across_q18, const uint32_t *down_q18, int32_
     const __m256i middle = _mm256_permute2x128_si256(last, first, 0x21);
     __m256i *at = (__m256i *)root_q20;
     for (int32_t k = 0; k < down_count; k += 2) {
-        const __m256i here = EACH((int32_t)down_q18[k]), next = EACH((int32_t)down_q18[k + 1]);
+        const __m256i here = EACH((int32_t)down_q18[k]);
+        const __m256i next = EACH((int32_t)down_q18[k + 1]);
         const __m256i both = _mm256_blend_epi32(here, next, 0xf0);
         _mm256_storeu_si256(&at[0], roots_of_eight(_mm256_add_epi32(first, here)));
         _mm256_storeu_si256(&at[1], roots_of_eight(_mm256_add_epi32(middle, both)));
@@ -224,8 +226,10 @@ void ih_basis_add(const uint32_t *basis_q20, int32_t factor, int64_t *sum)
  * the basis times 2^31 takes away again. Both pass 2^64, together they do not. */
 int64_t ih_basis_sum(const uint32_t *basis_q20, const int32_t *coefficient)
 {
-    const __m128i more = _mm_set1_epi32(INT32_MIN), lower = _mm_set_epi32(0, -1, 0, -1);
-    __m128i sum = _mm_setzero_si128(), plain = sum;
+    const __m128i more = _mm_set1_epi32(INT32_MIN);
+    const __m128i lower = _mm_set_epi32(0, -1, 0, -1);
+    __m128i sum = _mm_setzero_si128();
+    __m128i plain = sum;
 #pragma GCC unroll 4
     for (int32_t i = 0; i < IH_BASIS_TERMS; i += 4) {
         const __m128i basis = _mm_loadu_si128((const __m128i *)&basis_q20[i]);

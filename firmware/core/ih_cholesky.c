@@ -36,7 +36,7 @@ static int64_t dot_q60(const int32_t *a_q30, const int32_t *b_q30, int32_t count
 #endif
 
 /* The vectors of SSE2 have products of numbers without a sign only, and need the sum of each row's entries. */
-#if defined __SSE2__ && WIDE == 4 && !defined __AVX2__
+#if WIDE == 4 && !defined __AVX2__
 #define WITH_SUMS 1
 #else
 #define WITH_SUMS 0
@@ -48,7 +48,7 @@ struct row {
 };
 
 /* The same of two rows with WIDE others: each entry is read for several products. count: a multiple of WIDE. */
-#if defined __AVX2__
+#if WIDE == 4 && defined __AVX2__
 
 static inline __m256i four_q30(const int32_t *from_q30)
 {
@@ -60,10 +60,12 @@ static inline void dots_q60(const struct row a[2], const struct row b[WIDE], int
 {
     __m256i sum[2][WIDE];
     for (int n = 0; n < WIDE; n++) {
-        sum[0][n] = sum[1][n] = _mm256_setzero_si256();
+        sum[0][n] = _mm256_setzero_si256();
+        sum[1][n] = sum[0][n];
     }
     for (int32_t k = 0; k < count; k += 4) {
-        const __m256i a_0 = four_q30(&a[0].q30[k]), a_1 = four_q30(&a[1].q30[k]);
+        const __m256i a_0 = four_q30(&a[0].q30[k]);
+        const __m256i a_1 = four_q30(&a[1].q30[k]);
         for (int n = 0; n < WIDE; n++) {
             const __m256i b_n = four_q30(&b[n].q30[k]);
             sum[0][n] = _mm256_add_epi64(sum[0][n], _mm256_mul_epi32(a_0, b_n));
@@ -108,10 +110,12 @@ IH_WRAPPING static inline void dots_q60(const struct row a[2], const struct row 
 {
     __m128i sum[2][WIDE];
     for (int n = 0; n < WIDE; n++) {
-        sum[0][n] = sum[1][n] = _mm_setzero_si128();
+        sum[0][n] = _mm_setzero_si128();
+        sum[1][n] = sum[0][n];
     }
     for (int32_t k = 0; k < count; k += 4) {
-        const struct four a_0 = four_more(&a[0].q30[k]), a_1 = four_more(&a[1].q30[k]);
+        const struct four a_0 = four_more(&a[0].q30[k]);
+        const struct four a_1 = four_more(&a[1].q30[k]);
         for (int n = 0; n < WIDE; n++) {
             const struct four b_n = four_more(&b[n].q30[k]);
             sum[0][n] = with_products(sum[0][n], a_0, b_n);

@@ -4,8 +4,8 @@
  *        second in its upper half. A row that is not there is zero.
  * Out:   lines of N's lower triangle, in units of 2^shift: the sum over 16 rows is exact, then rounded and
  *        added. So it does not depend on the processor, but on which rows come together.
- * Overflow: 16 products are below 2^32 with the rounding; the difference of 8 and 8 is within 2^31. Sums of
- *        g calls without changes stay below 2^31 if 2 g <= 2^shift.
+ * Overflow: 16 products are below 2^32 with the rounding; the difference of 8 and 8 is within 2^31. Sums
+ *        stay below 2^31 if the greatest column's squares over 2^shift do, with half a unit a call.
  * Error: half a unit a call.
  * Cost:  rows x 10,944 multiply-adds, of which x86 does 16 or 8 with one instruction, Cortex-M with DSP two.
  */

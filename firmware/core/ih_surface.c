@@ -159,10 +159,13 @@ static bool set_norms(struct ih_surface_scratch *scratch, const struct ih_sample
 }
 
 /* Scales of short rows: no entry is greater than the basis at the farthest corner of the box around the
- * samples, nor than the root of all squares' sum. */
+ * samples, nor than the root of all squares' sum. And the unit of the rows' sums: no square's sum is above ratio *
+ * 2^28, with what was rounded, so that in that unit all are below 2^31. */
 static void set_row_scale(struct ih_surface_scratch *scratch, const struct ih_samples *samples)
 {
-    uint32_t far_q18[2][CENTRES] = {{0}};
+    uint32_t far_q18[2][CENTRES];
+    uint32_t ratio = 0;
+    memset(far_q18, 0, sizeof far_q18);
     for (int32_t i = 0; i < samples->sample_count; i++) {
         uint32_t square_q18[2][CENTRES];
         square_distances(scratch, samples->sample[i].x_q16, square_q18[0]);
@@ -182,9 +185,12 @@ static void set_row_scale(struct ih_surface_scratch *scratch, const struct ih_sa
         const uint32_t least_q10 = box_q10 < norm_q10 ? box_q10 : norm_q10;
         const uint64_t most_q10 = least_q10 < 1 << 10 ? 1 << 10 : least_q10;
         const uint64_t most_q16 = (uint64_t)ih_isqrt_u54(most_q10 << 22) + 1;
+        const uint32_t here = (uint32_t)(norm_q10 / most_q10) + 2;
         scratch->row_scale_q17[i] =
             (uint32_t)(((uint64_t)ROW_MOST << (ROW_SCALE_BITS + 16)) / most_q16);
+        ratio = here > ratio ? here : ratio;
     }
+    scratch->normal_shift = ih_max_s32(1, ih_bits_u64(ratio) - 3);
 }
 
 /* The sample's row, which stands in basis_q20, as a short one, weighted: into the lower or the upper half of
@@ -254,8 +260,6 @@ static void clear_pairs(struct ih_surface_scratch *scratch, int32_t count)
 static void sum_all(const struct ih_samples *samples, struct ih_surface_scratch *scratch,
                     const struct ih_surface *out, bool is_right_wanted)
 {
-    const int32_t calls = (samples->sample_count + IH_NORMAL_ROWS - 1) / IH_NORMAL_ROWS;
-    scratch->normal_shift = ih_bits_u64((uint64_t)(2 * calls - 1));
     memset(scratch->of.system.normal, 0, sizeof scratch->of.system.normal);
     for (int32_t i = 0; i < samples->sample_count; i++) {
         const struct ih_sample *sample = &samples->sample[i];

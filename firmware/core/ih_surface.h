@@ -86,7 +86,7 @@ struct ih_surface_scratch {
         right[IH_SURFACE_TERMS]; /* R^T W (z - B c), less the ridge's share: Q20 more than off */
     uint32_t basis_q20[IH_SURFACE_TERMS]; /* a sample's row */
     /* Such rows, weighted and short. */
-    _Alignas(IH_NORMAL_ALIGNMENT) uint32_t pair[IH_NORMAL_PAIRS][IH_SURFACE_TERMS];
+    uint32_t pair[IH_NORMAL_PAIRS][IH_SURFACE_TERMS] __attribute__((aligned(IH_NORMAL_ALIGNMENT)));
     uint32_t row_scale_q17[IH_SURFACE_TERMS];     /* of a short row */
     uint32_t norm_q10[IH_SURFACE_TERMS];          /* diagonal of R^T W R */
     uint32_t unknown_scale_q29[IH_SURFACE_TERMS]; /* coefficient = unknown * scale */

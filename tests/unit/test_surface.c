@@ -301,6 +301,28 @@ static void the_ends_of_all_ranges_are_survived(void)
     check_nearest();
 }
 
+/* However little others weigh beside a few: the sums have the bits that the ridge needs. */
+static void light_samples_beside_heavy_ones_make_a_surface(void)
+{
+    static const int32_t heavy[] = {1, 2, 5, 12, 30, 50};
+    static const double light[] = {0.1, 0.03, 0.01, 0.003, 0.001, 0.0003, 0.0001};
+    int i, j;
+    int32_t k;
+
+    for (i = 0; i < IH_TEST_COUNT(heavy); i++) {
+        for (j = 0; j < IH_TEST_COUNT(light); j++) {
+            samples.sample_count = 0;
+            for (k = 0; k < IH_SLOTS; k++) {
+                add_sample(2.0 * (k % IH_GRID - 9), 2.0 * (k / IH_GRID - 9),
+                           1000 + 100 * ih_test_unit(&random_source),
+                           k * heavy[i] / IH_SLOTS != (k + 1) * heavy[i] / IH_SLOTS ? 1 : light[j]);
+            }
+            fit();
+            IH_TEST_EQUAL(true, surface.valid, "valid", i * IH_TEST_COUNT(light) + j);
+        }
+    }
+}
+
 static void the_same_samples_give_the_same_bytes(void)
 {
     static struct ih_surface first;
@@ -384,6 +406,7 @@ int main(void)
     RUN_TEST(samples_at_one_place_are_survived);
     RUN_TEST(samples_without_weight_make_no_surface);
     RUN_TEST(the_ends_of_all_ranges_are_survived);
+    RUN_TEST(light_samples_beside_heavy_ones_make_a_surface);
     RUN_TEST(the_same_samples_give_the_same_bytes);
     RUN_TEST(changed_weights_give_what_they_give_at_once);
     RUN_TEST(the_field_is_passed_on);
