@@ -538,6 +538,17 @@ def check_values(bench):
     status, _, err = bench.solve(good, bench.path("rig0", "..", "rig0", "good"))
     fine = status == 2 and "--out must be another directory" in err and os.path.exists(good + "/rig.json")
     result("--out into the pictures", None if fine else "status %d: %s" % (status, err))
+    # Swapped words: the same, whatever the pictures are known by.
+    for kind in ("frames.jsonl", "000-on.pgm"):
+        made = bench.path("made")
+        shutil.rmtree(made, ignore_errors=True)
+        os.makedirs(made)
+        for file_name in (kind, "rig.json", "report.html"):
+            with open(os.path.join(made, file_name), "w", encoding="utf-8") as file:
+                file.write("of others")
+        status, _, err = bench.solve(bench.path("new"), made)
+        fine = status == 2 and "has pictures in it" in err and len(os.listdir(made)) == 3
+        result("--out and DIR swapped, with " + kind, None if fine else "status %d: %s" % (status, err))
     for verb in ("board", "guide"):
         status, _, err = run(bench.calibrate, verb, "--board", "dots", bench.path("new.pdf"))
         result("--board dots with " + verb, None if status == 2 and "--board dots: must be like" in err else err)

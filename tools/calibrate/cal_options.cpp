@@ -128,6 +128,14 @@ static bool take(int id, const char *value, Options &options)
     }
 }
 
+/* Pictures may have a rig.json of their own, which is no result of ours. Throws Error of a directory that is shut. */
+static bool has_pictures(const std::string &dir)
+{
+    std::error_code unknown; /* of a directory that is not there: it will be made */
+    return std::filesystem::is_directory(dir, unknown) &&
+           (std::filesystem::exists(dir + "/frames.jsonl", unknown) || !pictures_list(dir).empty());
+}
+
 static bool check(const Options &options)
 {
     bool solve = options.verb == Verb::solve;
@@ -141,6 +149,8 @@ static bool check(const Options &options)
     std::error_code unknown; /* of a directory that is not there: that is told later */
     if (solve && std::filesystem::equivalent(options.out, options.target, unknown))
         return complain("--out must be another directory than the pictures': a rig.json there would be lost");
+    if (solve && has_pictures(options.out))
+        return complain("--out " + options.out + ": has pictures in it: a rig.json there would be lost; is it DIR?");
     if (!options.size.empty() && options.camera.empty())
         return complain("--size belongs to guide --camera");
     return options.range.near_mm < options.range.far_mm || complain("--near must be less than --far");
