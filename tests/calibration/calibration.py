@@ -201,8 +201,9 @@ def judge(bench, index, kind, output, table):
         result(title + ": blurred and wrong ones are named", "not named: %s" % unnamed if unnamed else None)
 
 
-def refuse(bench, name, pictures, status, wanted, *more):
-    """The message must match; nothing of an earlier run may be there afterwards, unless it was wrong usage: then all."""
+def refuse(bench, name, pictures, status, wanted, *more, kept=False):
+    """The message must match; nothing of an earlier run may be there afterwards, unless it was wrong usage or a wrong name
+    (kept): then all."""
     out = bench.path("refused")
     os.makedirs(out, exist_ok=True)
     for file_name in ("rig.json", "report.html"):
@@ -214,9 +215,9 @@ def refuse(bench, name, pictures, status, wanted, *more):
         reason = "status %d instead of %d: %s" % (got, status, err.strip())
     elif not re.search(wanted, err):
         reason = "says: " + err.strip().replace("\n", "; ")
-    elif status == 1 and os.listdir(out):
+    elif status == 1 and not kept and os.listdir(out):
         reason = "%s is left" % os.listdir(out)
-    elif status == 2 and len(os.listdir(out)) != 2:
+    elif (status == 2 or kept) and len(os.listdir(out)) != 2:
         reason = "only %s is left" % os.listdir(out)
     result(name, reason)
 
@@ -319,12 +320,15 @@ def check_corrupt(bench):
         refuse(bench, "corrupt: " + name, made, 1, wanted)
     os.remove(made + "/frames.jsonl")
     refuse(bench, "nobody says where the laser was on", made, 1, r"^calibrate: [^\n]*in which pictures was the laser on[^\n]*\n$")
-    refuse(bench, "no such directory", bench.path("nowhere"), 1, "nowhere")
+    os.makedirs(bench.path("nothing"), exist_ok=True)
+    refuse(bench, "no such directory", bench.path("nowhere"), 1, "nowhere: No such", kept=True)
+    refuse(bench, "a directory without pictures", bench.path("nothing"), 1, r"no \*.pgm in it", kept=True)
     refuse(bench, "another kind of board", good, 1, "cannot support a calibration(.*\n)*  - 10 more pictures", "--board", "chessboard-9x6-30")
     for file, wanted in [("000002.pgm:10,10", "there is no 000002.pgm in "), ("000001.pgm:10,10", "000001.pgm has the laser off"),
                          ("000000.pgm:752,10", "752,10 is outside of 000000.pgm, which has 752x582 pixels")]:
         copy_pictures([(good, range(2))], made)
-        refuse(bench, "a middle in the wrong place: " + file, made, 1, "--middle: " + wanted, "--middle", file)
+        refuse(bench, "a middle in the wrong place: " + file, made, 1, "--middle: " + wanted, "--middle", file,
+               kept="there is no" in wanted)
 
 
 def middle_seen(directory, step):

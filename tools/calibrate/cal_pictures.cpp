@@ -157,12 +157,18 @@ std::vector<std::string> pictures_list(const std::string &dir)
     return names;
 }
 
-std::vector<Picture> pictures_read(const std::string &dir)
+std::vector<std::string> pictures_required(const std::string &dir)
 {
-    std::vector<Picture> pictures;
     std::vector<std::string> names = pictures_list(dir);
     if (names.empty())
         throw Error(dir + ": no *.pgm in it; pictures of other kinds must be made binary PGM first");
+    return names;
+}
+
+std::vector<Picture> pictures_read(const std::string &dir)
+{
+    std::vector<Picture> pictures;
+    std::vector<std::string> names = pictures_required(dir);
     std::map<std::string, bool> list = read_list(dir + "/frames.jsonl");
     check_told(dir, names, list);
     std::string faults;

@@ -34,6 +34,9 @@ void picture_check_size(const std::string &where, int width, int height);
 /* The names of *.pgm, sorted; those of hidden files are left out. Throws cal::Error. */
 std::vector<std::string> pictures_list(const std::string &dir);
 
+/* The same, at least one. Throws cal::Error. */
+std::vector<std::string> pictures_required(const std::string &dir);
+
 /* One file. Throws cal::Error. */
 cv::Mat picture_read(const std::string &path);
 void picture_write(const std::string &path, const cv::Mat &grey8);

@@ -213,14 +213,20 @@ static void tell_projector(const Projector &projector)
     std::printf("\n");
 }
 
-static void check_middle(const MiddleDot &middle, const std::string &dir, const std::vector<Picture> &pictures)
+/* Names that may be mistyped: looked at before an earlier calibration is given up. */
+static void check_names(const std::string &dir, const MiddleDot &middle)
+{
+    std::vector<std::string> names = pictures_required(dir);
+    if (!middle.file.empty() && !std::binary_search(names.begin(), names.end(), middle.file))
+        throw Error("--middle: there is no " + middle.file + " in " + dir);
+}
+
+static void check_middle(const MiddleDot &middle, const std::vector<Picture> &pictures)
 {
     auto named =
         std::find_if(pictures.begin(), pictures.end(), [&](const Picture &p) { return p.file == middle.file; });
-    if (middle.file.empty())
-        return;
     if (named == pictures.end())
-        throw Error("--middle: there is no " + middle.file + " in " + dir);
+        return;
     if (!named->laser)
         throw Error("--middle: " + middle.file + " has the laser off: name one with it on");
     if (middle.px.x >= named->grey.cols || middle.px.y >= named->grey.rows)
@@ -257,11 +263,12 @@ void solve_run(const Options &options)
 {
     Result result;
     tool::Progress progress;
+    check_names(options.target, options.middle);
     make_out(options.out);
     result.board = options.board;
     result.range = options.range;
     std::vector<Picture> pictures = pictures_read(options.target);
-    check_middle(options.middle, options.target, pictures);
+    check_middle(options.middle, pictures);
     auto lit_count = std::count_if(pictures.begin(), pictures.end(), [](const Picture &p) { return p.laser; });
     if (lit_count < lit_min)
         throw Error(text(
