@@ -52,9 +52,13 @@ def result(name, reason=None):
     print("%s %d - %s%s" % ("not ok" if reason else "ok", number, name, "\n# " + reason if reason else ""), flush=True)
 
 
-def run(*command, typed="", **environment):
-    done = subprocess.run([str(word) for word in command], capture_output=True, text=True, input=typed, check=False,
-                          env={**os.environ, **environment})
+def run(*command, typed="", seconds=600, **environment):
+    """Exit status (None: it was ended, as it did not in so many seconds), standard output, standard error."""
+    try:
+        done = subprocess.run([str(word) for word in command], capture_output=True, text=True, input=typed, check=False,
+                              timeout=seconds, env={**os.environ, **environment})
+    except subprocess.TimeoutExpired:
+        return None, "", "takes more than %d s" % seconds
     return done.returncode, done.stdout, done.stderr
 
 
@@ -175,7 +179,7 @@ def judge(bench, index, kind, output, table):
     status, out, err = output
     title = "%s, %s pictures" % (name, kind)
     if status != 0:
-        result(title, "status %d: %s" % (status, (err + out).strip().replace("\n", "; ")))
+        result(title, "status %s: %s" % (status, (err + out).strip().replace("\n", "; ")))
         return
     calibrated = bench.path("rig%d" % index, "from_" + kind)
     focal, origin, rays, straight, seen = errors(read_rig(bench.path("rig%d" % index, "good")), read_rig(calibrated))
@@ -212,7 +216,7 @@ def refuse(bench, name, pictures, status, wanted, *more, kept=False):
     got, _, err = bench.solve(pictures, out, *more)
     reason = None
     if got != status:
-        reason = "status %d instead of %d: %s" % (got, status, err.strip())
+        reason = "status %s instead of %d: %s" % (got, status, err.strip())
     elif not re.search(wanted, err):
         reason = "says: " + err.strip().replace("\n", "; ")
     elif status == 1 and not kept and os.listdir(out):
@@ -318,6 +322,17 @@ def check_corrupt(bench):
         copy_pictures([(good, range(2 * PAIRS))], made)
         spoil(made + "/" + file, change)
         refuse(bench, "corrupt: " + name, made, 1, wanted)
+    # What would be waited for, or cannot be looked at.
+    for name, file, make, wanted in [
+            ("a pipe for a picture", "000007.pgm", os.mkfifo, "000007.pgm: is no file, but a directory, device or pipe"),
+            ("a directory for a picture", "000007.pgm", os.mkdir, "000007.pgm: is no file, but a directory"),
+            ("a pipe for a list", "frames.jsonl", os.mkfifo, "frames.jsonl: is no file, but a directory, device or pipe"),
+            ("a list that leads to itself", "frames.jsonl", lambda path: os.symlink("frames.jsonl", path),
+             "frames.jsonl: Too many levels")]:
+        copy_pictures([(good, range(8))], made)
+        os.remove(made + "/" + file)
+        make(made + "/" + file)
+        refuse(bench, "corrupt: " + name, made, 1, wanted)
     os.remove(made + "/frames.jsonl")
     refuse(bench, "nobody says where the laser was on", made, 1, r"^calibrate: [^\n]*in which pictures was the laser on[^\n]*\n$")
     os.makedirs(bench.path("nothing"), exist_ok=True)
@@ -352,7 +367,7 @@ def check_alone(bench):
     result("only pictures with the laser on: a rig, or what to add", None if says else err)
     status, _, err = bench.solve(made, out, "--middle", "%s:%.0f,%.0f" % middle_seen(good, 2))
     if status != 0:
-        result("only pictures with the laser on, the middle dot named", "status %d: %s" % (status, err))
+        result("only pictures with the laser on, the middle dot named", "status %s: %s" % (status, err))
         return
     focal, origin, rays, _, seen = errors(read_rig(good), read_rig(out))
     p95 = np.percentile(rays[seen > 0], 95)
@@ -429,7 +444,7 @@ def check_camera(bench):
         expected = ["%03d-%s.pgm" % (i, laser) for i in range(names) for laser in ("off", "on")]
         missing = [words for words in wanted if words not in out + err]
         result("guide: " + name, None if got == status and there == expected and not missing else
-               "status %d, %s, lacks %s: %s%s" % (got, there, missing, out, err))
+               "status %s, %s, lacks %s: %s%s" % (got, there, missing, out, err))
 
     poses = [part for pose in (0, 2, 4) for part in ((pose + 1, 9), (pose, 3))]
     take("takes each pose once, with and without the laser", poses, "\n" * 3, 1, 3, "no more frames", "17 more pictures",
@@ -462,7 +477,7 @@ def check_camera(bench):
                            ("/dev/null", "/dev/null: is no camera")]:
         status, out, err = run(bench.calibrate, "guide", "--camera", device, taken)
         fine = status == 1 and wanted in err and len(err.splitlines()) == 1 and not out and not os.path.exists(taken)
-        result("guide: no camera: " + device, None if fine else "status %d: %s%s" % (status, out, err))
+        result("guide: no camera: " + device, None if fine else "status %s: %s%s" % (status, out, err))
     film_of(bench, [(1, 20)])
     shutil.copytree(bench.path("rig0", "good"), taken)
     status, _, err = run(bench.calibrate, "guide", "--camera", bench.path("film/%03d.pgm"), taken, typed="\n")
@@ -481,7 +496,7 @@ def check_device(bench):
         there = len(os.listdir(taken)) if os.path.isdir(taken) else 0
         missing = [words for words in wanted if words not in out + err]
         fine = got == status and there == names and not missing
-        result("guide: a device: " + name, None if fine else "status %d, %d pictures: %s%s" % (got, there, out, err))
+        result("guide: a device: " + name, None if fine else "status %s, %d pictures: %s%s" % (got, there, out, err))
 
     film_of(bench, [(1, 9), (0, 3), (3, 9), (2, 3)])
     for samples_format in ("GREY", "YUYV"):
@@ -517,7 +532,7 @@ def check_print(bench):
     for name in ("no/board.pdf", "no/board.pgm"):
         status, _, err = run(bench.calibrate, "board", bench.path(name))
         fine = status == 1 and "could not be written: No such file" in err
-        result("a board into " + name, None if fine else "status %d: %s" % (status, err))
+        result("a board into " + name, None if fine else "status %s: %s" % (status, err))
 
 
 def check_values(bench):
@@ -541,7 +556,7 @@ def check_values(bench):
     # The pictures' own rig.json, the truth here, would be taken for an earlier result.
     status, _, err = bench.solve(good, bench.path("rig0", "..", "rig0", "good"))
     fine = status == 2 and "--out must be another directory" in err and os.path.exists(good + "/rig.json")
-    result("--out into the pictures", None if fine else "status %d: %s" % (status, err))
+    result("--out into the pictures", None if fine else "status %s: %s" % (status, err))
     # Swapped words: the same, whatever the pictures are known by.
     for kind in ("frames.jsonl", "000-on.pgm"):
         made = bench.path("made")
@@ -552,7 +567,7 @@ def check_values(bench):
                 file.write("of others")
         status, _, err = bench.solve(bench.path("new"), made)
         fine = status == 2 and "has pictures in it" in err and len(os.listdir(made)) == 3
-        result("--out and DIR swapped, with " + kind, None if fine else "status %d: %s" % (status, err))
+        result("--out and DIR swapped, with " + kind, None if fine else "status %s: %s" % (status, err))
     for verb in ("board", "guide"):
         status, _, err = run(bench.calibrate, verb, "--board", "dots", bench.path("new.pdf"))
         result("--board dots with " + verb, None if status == 2 and "--board dots: must be like" in err else err)
@@ -577,11 +592,11 @@ def check_usage(bench):
                           (("guide", "--middle", "a:1,2", "a"), "--middle belongs to solve")]:
         status, out, err = run(bench.calibrate, *words)
         fine = status == 2 and not out and err.startswith("calibrate: ") and wanted in err and len(err.splitlines()) == 1
-        result("usage: calibrate " + " ".join(words), None if fine else "status %d: %s%s" % (status, out, err))
+        result("usage: calibrate " + " ".join(words), None if fine else "status %s: %s%s" % (status, out, err))
     for words in [("--help",), ("guide", "--help", "a", "b"), ("solve", "a", "--help", "--colour")]:
         status, out, err = run(bench.calibrate, *words)
         fine = status == 0 and out.startswith("Usage: ") and not err and max(map(len, out.splitlines())) <= 80
-        result("usage: calibrate " + " ".join(words), None if fine else "status %d: %s%s" % (status, out, err))
+        result("usage: calibrate " + " ".join(words), None if fine else "status %s: %s%s" % (status, out, err))
 
 
 def check_full(bench):
@@ -597,13 +612,13 @@ def check_full(bench):
         there = os.listdir(path) if os.path.isdir(path) else [name for name in os.listdir(bench.work)
                                                               if name.startswith(os.path.basename(path))]
         fine = status == 1 and "could not be written: File too large" in err and there == left
-        result("a full disk: calibrate " + command[0], None if fine else "status %d, %s: %s" % (status, there, err))
+        result("a full disk: calibrate " + command[0], None if fine else "status %s, %s: %s" % (status, there, err))
     with open(board, encoding="utf-8") as file:
         result("a full disk: an earlier file stays", None if file.read() == "an earlier one" else "it does not")
     with open("/dev/full", "w", encoding="utf-8") as full:
         done = subprocess.run([bench.calibrate, "--help"], stdout=full, stderr=subprocess.PIPE, text=True, check=False)
     fine = done.returncode == 1 and "standard output could not be written" in done.stderr
-    result("a full disk: standard output", None if fine else "status %d: %s" % (done.returncode, done.stderr))
+    result("a full disk: standard output", None if fine else "status %s: %s" % (done.returncode, done.stderr))
 
 
 def on_terminal(*command):

@@ -48,9 +48,19 @@ void picture_check_size(const std::string &where, int width, int height)
         throw Error(where + text(": %dx%d pixels; must be from ", width, height) + picture_sizes);
 }
 
+/* A pipe would be waited for. */
+static std::ifstream open_file(const std::string &path)
+{
+    std::error_code unknown; /* of a file that is not there or not to be seen: opening it says why */
+    auto kind = std::filesystem::status(path, unknown).type();
+    if (!unknown && kind != std::filesystem::file_type::regular && kind != std::filesystem::file_type::not_found)
+        throw Error(path + ": is no file, but a directory, device or pipe");
+    return std::ifstream(path, std::ios::binary);
+}
+
 cv::Mat picture_read(const std::string &path)
 {
-    std::ifstream file(path, std::ios::binary);
+    std::ifstream file = open_file(path);
     char magic[2] = {0, 0};
     if (!file)
         throw Error(path + ": " + std::strerror(errno));
@@ -93,9 +103,9 @@ static bool ends_with(const std::string &name, const std::string &end)
 static std::map<std::string, bool> read_list(const std::string &path)
 {
     std::map<std::string, bool> lasers;
-    std::ifstream list(path);
+    std::ifstream list = open_file(path);
     std::string line;
-    if (!list && std::filesystem::exists(path))
+    if (!list && errno != ENOENT)
         throw Error(path + ": " + std::strerror(errno));
     for (int number = 1; std::getline(list, line); number++) {
         if (line.find_first_not_of(" \t\r") == std::string::npos)
