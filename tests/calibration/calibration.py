@@ -599,6 +599,34 @@ def check_usage(bench):
         result("usage: calibrate " + " ".join(words), None if fine else "status %s: %s%s" % (status, out, err))
 
 
+def check_written(bench):
+    """What stands where a file goes, or its part: a link stays one, a file's rights stay, and nothing else is touched."""
+    place = bench.path("written")
+    shutil.rmtree(place, ignore_errors=True)
+    os.makedirs(place)
+    board, other, pipe = (os.path.join(place, name) for name in ("board.pgm", "other.pgm", "pipe.pgm"))
+    for path in (board + ".part", other):
+        with open(path, "w", encoding="utf-8") as file:
+            file.write("of others")
+    os.chmod(other, 0o600)
+    os.symlink("other.pgm", board)
+    os.mkfifo(pipe)
+    status, _, err = run(bench.calibrate, "board", board)
+    with open(board + ".part", encoding="utf-8") as file:
+        result("a part file of others stays", None if file.read() == "of others" else "it does not")
+    fine = status == 0 and os.path.islink(board) and os.path.getsize(other) > 10000
+    result("a link stays, and leads to what is new", None if fine else "status %s: %s" % (status, err))
+    mode = os.stat(other).st_mode & 0o777
+    result("a file's rights stay", None if mode == 0o600 else "%o" % mode)
+    status, _, err = run(bench.calibrate, "board", pipe)
+    fine = status == 1 and "pipe.pgm: could not be written: is no file" in err and not os.path.isfile(pipe)
+    result("a pipe stays one", None if fine else "status %s: %s" % (status, err))
+    # The shell's number becomes the program's.
+    status, _, err = run("sh", "-c", "ln -s other.pgm $1.$$.part; exec $0 board $1", bench.calibrate, place + "/new.pgm")
+    fine = status == 0 and not os.path.islink(place + "/new.pgm") and len(os.listdir(place)) == 5
+    result("a part file that is a link", None if fine else "status %s, %s: %s" % (status, os.listdir(place), err))
+
+
 def check_full(bench):
     """A disk that is full, for which a limit on the size of files stands: told, and no half file is left."""
     out, taken, board = bench.path("full"), bench.path("taken"), bench.path("kept.pdf")
@@ -702,6 +730,7 @@ def main():
     check_device(bench)
     check_usage(bench)
     check_values(bench)
+    check_written(bench)
     check_full(bench)
     check_progress(bench)
     check_print(bench)
