@@ -482,6 +482,11 @@ def check_camera(bench):
     shutil.copytree(bench.path("rig0", "good"), taken)
     status, _, err = run(bench.calibrate, "guide", "--camera", bench.path("film/%03d.pgm"), taken, typed="\n")
     result("guide: never beside a frames.jsonl", None if status == 1 and "has a frames.jsonl" in err else err)
+    os.remove(taken + "/frames.jsonl")
+    os.symlink("frames.jsonl", taken + "/frames.jsonl")
+    status, _, err = run(bench.calibrate, "guide", "--camera", bench.path("film/%03d.pgm"), taken, typed="\n")
+    fine = status == 1 and err.startswith("calibrate: %s/frames.jsonl: Too many levels" % taken)
+    result("guide: a frames.jsonl that leads to itself", None if fine else err)
 
 
 def check_device(bench):

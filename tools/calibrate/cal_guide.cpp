@@ -271,7 +271,10 @@ static std::vector<View> views_before(const Board &board, const std::string &dir
     std::filesystem::create_directories(dir, failed);
     if (failed)
         throw Error(dir + ": " + failed.message());
-    if (std::filesystem::exists(dir + "/frames.jsonl"))
+    bool has_list = std::filesystem::exists(dir + "/frames.jsonl", failed);
+    if (failed)
+        throw Error(dir + "/frames.jsonl: " + failed.message());
+    if (has_list)
         throw Error(dir +
                     ": has a frames.jsonl, which would not know of new pictures: take them into another directory");
     if (pictures_list(dir).empty())
@@ -298,21 +301,23 @@ static std::vector<View> views_before(const Board &board, const std::string &dir
 /* DIR/NNN, the first that is free. */
 static std::string free_name(const std::string &dir)
 {
+    std::error_code unknown; /* writing it says why */
     for (int number = 0;; number++) {
         std::string name = dir + text("/%03d", number);
-        if (!std::filesystem::exists(name + "-off.pgm") && !std::filesystem::exists(name + "-on.pgm"))
+        if (!std::filesystem::exists(name + "-off.pgm", unknown) && !std::filesystem::exists(name + "-on.pgm", unknown))
             return name;
     }
 }
 
-/* Both or none. */
+/* Both or none, unless it is killed. */
 static void write_pair(const std::string &name, const cv::Mat &dark, const cv::Mat &lit)
 {
     picture_write(name + "-off.pgm", dark);
     try {
         picture_write(name + "-on.pgm", lit);
     } catch (const Error &) {
-        std::filesystem::remove(name + "-off.pgm");
+        std::error_code failed; /* the first fault is the one to tell */
+        std::filesystem::remove(name + "-off.pgm", failed);
         throw;
     }
 }

@@ -156,9 +156,10 @@ std::vector<std::string> pictures_list(const std::string &dir)
 {
     std::vector<std::string> names;
     std::error_code failed;
-    for (const auto &entry : std::filesystem::directory_iterator(dir, failed)) {
-        std::string name = entry.path().filename();
-        if (name.front() != '.' && entry.path().extension() == ".pgm")
+    std::filesystem::directory_iterator entry(dir, failed), end;
+    for (; !failed && entry != end; entry.increment(failed)) {
+        std::string name = entry->path().filename();
+        if (name.front() != '.' && entry->path().extension() == ".pgm")
             names.push_back(name);
     }
     if (failed)

@@ -254,7 +254,8 @@ static void write_out(const std::string &out, const Result &result)
     try {
         rig_write(out + "/rig.json", result.camera, result.projector, result.range);
     } catch (const Error &) {
-        std::filesystem::remove(out + "/report.html");
+        std::error_code failed; /* the first fault is the one to tell */
+        std::filesystem::remove(out + "/report.html", failed);
         throw;
     }
 }

@@ -1,5 +1,5 @@
-/* tool_file - a file that is written whole or not at all: one of that name stays as it was until then. A link stays a link,
- * and a file's rights stay; what is no file is not written.
+/* tool_file - a file that is written whole or not at all, unless it is killed: one of that name stays as it was until then. A
+ * link stays a link, and a file's rights stay; what is no file is not written.
  */
 #ifndef TOOL_FILE_HPP
 #define TOOL_FILE_HPP
