@@ -493,11 +493,11 @@ def check_device(bench):
     """A camera of V4L2 (fake_camera.c): its size, its samples, and what becomes of it."""
     taken = bench.path("taken")
 
-    def take(name, status, *wanted, size=("--size", "752x582"), typed="\n\n", names=4, **camera):
+    def take(name, status, *wanted, size=("--size", "752x582"), typed="\n\n", names=4, seconds=600, **camera):
         shutil.rmtree(taken, ignore_errors=True)
         camera = {"FAKE_CAMERA_" + key.upper(): value for key, value in camera.items()}
-        got, out, err = run(bench.calibrate, "guide", "--camera", "7", *size, taken, typed=typed, LD_PRELOAD=bench.fake_camera,
-                            FAKE_CAMERA_FRAMES=bench.path("film"), OPENCV_VIDEOIO_V4L_SELECT_TIMEOUT="4", **camera)
+        got, out, err = run(bench.calibrate, "guide", "--camera", "7", *size, taken, typed=typed, seconds=seconds,
+                            LD_PRELOAD=bench.fake_camera, FAKE_CAMERA_FRAMES=bench.path("film"), OPENCV_VIDEOIO_V4L_SELECT_TIMEOUT="4", **camera)
         there = len(os.listdir(taken)) if os.path.isdir(taken) else 0
         missing = [words for words in wanted if words not in out + err]
         fine = got == status and there == names and not missing
@@ -514,7 +514,7 @@ def check_device(bench):
         header = file.read(15)
     result("guide: a device: its own size is kept", None if header == b"P5\n640 480\n255\n" else str(header))
     take("a size that it has not", 1, "640x480 pixels, not 800x600 as --size", size=("--size", "800x600"), names=0)
-    take("that gives no more frames", 1, "no more frames from 7", end="still")
+    take("that gives no more frames", 1, "no more frames from 7", end="still", seconds=60)
     take("that another program has", 1, "/dev/video7: is no camera, or another program has it", busy="1", names=0)
     film_of(bench, [])
     take("that never gives a frame", 1, "no more frames from 7", names=0)
@@ -652,6 +652,18 @@ def check_full(bench):
         done = subprocess.run([bench.calibrate, "--help"], stdout=full, stderr=subprocess.PIPE, text=True, check=False)
     fine = done.returncode == 1 and "standard output could not be written" in done.stderr
     result("a full disk: standard output", None if fine else "status %s: %s" % (done.returncode, done.stderr))
+    # The shell's number becomes the program's: a directory stands where its part file goes, when what is written first is there.
+    part = 'mkdir -p "$1.$$.part"; shift; exec "$@"'
+    for name, script, first, command in [
+            ("a pair's other half", part, taken + "/000-on.pgm", ("guide", "--camera", bench.path("film/%03d.pgm"), taken)),
+            ("a rig beside its report", part, out + "/rig.json", ("solve", "--out", out, bench.path("rig0", "good"))),
+            ("a rig of which nobody heard", 'shift; exec "$@" >/dev/full', "", ("solve", "--out", out, bench.path("rig0", "good")))]:
+        shutil.rmtree(taken, ignore_errors=True)
+        shutil.rmtree(out, ignore_errors=True)
+        status, _, err = run("sh", "-c", script, "sh", first, bench.calibrate, *command, typed="\n")
+        left = [file for file in os.listdir(command[-1] if command[0] == "guide" else out) if not file.endswith(".part")]
+        fine = status == 1 and "could not be written" in err and not left
+        result("not left alone: " + name, None if fine else "status %s, %s: %s" % (status, left, err))
 
 
 def on_terminal(*command):

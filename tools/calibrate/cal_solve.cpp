@@ -248,14 +248,20 @@ static void make_out(const std::string &out)
     }
 }
 
+static void remove_out(const std::string &out)
+{
+    std::error_code failed; /* the first fault is the one to tell */
+    for (const char *name : {"/rig.json", "/report.html"})
+        std::filesystem::remove(out + name, failed);
+}
+
 static void write_out(const std::string &out, const Result &result)
 {
     report_write(out + "/report.html", result);
     try {
         rig_write(out + "/rig.json", result.camera, result.projector, result.range);
     } catch (const Error &) {
-        std::error_code failed; /* the first fault is the one to tell */
-        std::filesystem::remove(out + "/report.html", failed);
+        remove_out(out);
         throw;
     }
 }
@@ -307,5 +313,7 @@ void solve_run(const Options &options)
     tell_projector(result.projector);
     write_out(options.out, result);
     std::printf("%s/rig.json and %s/report.html are written\n", options.out.c_str(), options.out.c_str());
+    if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0)
+        remove_out(options.out); /* main says why this failed */
 }
 } // namespace cal
