@@ -9,6 +9,7 @@
  * size gets 640x480, as drivers do.
  */
 #define _GNU_SOURCE
+#undef _FILE_OFFSET_BITS /* open and open64 are two */
 #include <dlfcn.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -194,12 +195,18 @@ static int open_memory(void)
     return file;
 }
 
+/* O_TMPFILE has the bit of O_DIRECTORY in it. */
+static bool has_mode(int flags)
+{
+    return (flags & O_CREAT) != 0 || (flags & O_TMPFILE) == O_TMPFILE;
+}
+
 int open(const char *path, int flags, ...)
 {
     int (*next)(const char *, int, ...) = (int (*)(const char *, int, ...))dlsym(RTLD_NEXT, "open");
     va_list rest;
     va_start(rest, flags);
-    mode_t mode = (flags & (O_CREAT | O_TMPFILE)) != 0 ? va_arg(rest, mode_t) : 0;
+    mode_t mode = has_mode(flags) ? va_arg(rest, mode_t) : 0;
     va_end(rest);
     return strcmp(path, DEVICE) == 0 ? open_memory() : next(path, flags, mode);
 }
@@ -208,7 +215,7 @@ int open64(const char *path, int flags, ...)
 {
     va_list rest;
     va_start(rest, flags);
-    mode_t mode = (flags & (O_CREAT | O_TMPFILE)) != 0 ? va_arg(rest, mode_t) : 0;
+    mode_t mode = has_mode(flags) ? va_arg(rest, mode_t) : 0;
     va_end(rest);
     return open(path, flags | O_LARGEFILE, mode);
 }
