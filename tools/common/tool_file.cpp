@@ -38,7 +38,7 @@ static bool put(int descriptor, const std::string &bytes)
 
 void file_write(const std::string &path, const std::string &bytes)
 {
-    struct stat there;
+    struct stat there = {};
     bool exists = stat(path.c_str(), &there) == 0;
     if (exists && !S_ISREG(there.st_mode))
         throw Error(path + ": could not be written: is no file, but a directory, device or pipe");
