@@ -272,11 +272,13 @@ static void solve_forward(const int32_t *l_q30, int32_t n, const int32_t *b, int
     }
 }
 
-/* Take what an unknown brings from the rests of those before it. */
+/* Take what an unknown brings from the rests of those before it. Here and below clang's analyzer does not see that
+ * the first n rests are set. */
 static void take_unknown(const int32_t *row_q30, int32_t count, int32_t unknown, int64_t *rest_q30)
 {
 #pragma GCC unroll 4
     for (int32_t k = 0; k < count; k++) {
+        /* NOLINTNEXTLINE(clang-analyzer-core.uninitialized.Assign) */
         rest_q30[k] -= (int64_t)row_q30[k] * unknown;
     }
 }
@@ -300,6 +302,7 @@ void ih_cholesky_solve(const int32_t *l_q30, int32_t n, const int32_t *b, int32_
                 x_mantissa[k] = (int32_t)ih_shift_round(x_mantissa[k], grow);
             }
             for (int32_t k = 0; k < i; k++) {
+                /* NOLINTNEXTLINE(clang-analyzer-core.CallAndMessage) */
                 rest_q30[k] = ih_shift_round(rest_q30[k], grow);
             }
         }
