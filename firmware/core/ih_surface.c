@@ -378,7 +378,7 @@ static void add_solution(struct ih_surface_scratch *scratch, int fraction)
 }
 
 /* Solve for a correction of the coefficients from what is left on the right side. squares_log2: of the sum of
- * the unknowns' squares, over the samples' number, as normal_shift knows it. */
+ * the unknowns' squares, where the samples' sums are 1, over the square of the samples' number. */
 static void correct(const struct ih_surface_params *params, struct ih_surface_scratch *scratch)
 {
     int32_t exponent;
@@ -391,9 +391,9 @@ static void correct(const struct ih_surface_params *params, struct ih_surface_sc
     for (int32_t i = 0; i < TERMS; i++) {
         squares += (int64_t)scratch->solution[i] * scratch->solution[i];
     }
-    scratch->squares_log2 = squares == 0 ? SQUARES_LOG2_NONE
-                                         : ih_bits_u64((uint64_t)squares) -
-                                               2 * (fraction - exponent) - scratch->normal_shift;
+    const int log2 = ih_bits_u64((uint64_t)squares) - 2 * (fraction - exponent);
+    scratch->squares_log2 =
+        squares == 0 ? SQUARES_LOG2_NONE : log2 + scratch->normal_shift - 2 * scratch->samples_log2;
     add_solution(scratch, fraction - exponent);
 }
 
@@ -481,6 +481,7 @@ static bool fit_first(const struct ih_samples *samples, const struct ih_surface_
     (void)set_norms(scratch, samples, out->root_weight_q15);
     set_row_scale(scratch, samples);
     set_off_fraction(scratch, samples, out->mean_mm_q8);
+    scratch->samples_log2 = ih_bits_u64((uint64_t)(samples->sample_count + 7) / 8);
     sum_all(samples, scratch, out, true);
     if (!factor(params, scratch)) {
         return false;

@@ -97,6 +97,7 @@ struct ih_surface_scratch {
         weight_shift; /* weights are taken for 2^weight_shift times as great: the greatest is 1/2 .. 1 */
     int32_t normal_shift;                   /* a unit of normal[] is 2^normal_shift */
     int32_t off_fraction;                   /* fraction bits of z - B c, mm */
+    int32_t samples_log2;                   /* an eighth of the samples: as many are below 2^it */
     int32_t squares_log2;                   /* of the last correction, see ih_surface.c */
     int32_t centre_q16[IH_SURFACE_CENTRES]; /* places of the centres in a row, field units */
 };
