@@ -17,7 +17,7 @@
  *        around the samples is 2^14 - 2; ih_normal has their sums. Weights are enlarged until the
  *        greatest is 1/2 or more. Residuals times weights are limited to 2^27, their products with B
  *        sum below 2^62. N is scaled by 0.995 / sqrt(N_ii) each way to diagonal 0.99 in Q30; the ridge keeps
- *        the least pivot above 3e-3. docs/numerics.md goes on.
+ *        the least pivot above 2.6e-3 where weights are as ih_samples makes them. docs/numerics.md goes on.
  * Error: within 0.2 mm of the float64 solution of the same system, everywhere on the grid, for
  *        depths that span up to 1.5 m (ih_samples clips them); it grows with the span. 0.02 mm on frames.
  * Cost:  samples x 576 roots of ih_basis, as often multiplied twice; samples x 10,944 short multiply-adds,
