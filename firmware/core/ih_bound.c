@@ -26,8 +26,15 @@
 #define SEMI_Y_MM 113
 #define SEMI_Z_MM 98
 #define X_OVER_Y_Q15 22619
+#define Z_OVER_X_Q14 20585
+#define Z_OVER_Y_Q14 14209
 /* Places are cut at this, 3.99. */
 #define CUT_Q11 8171
+/* Semi-axes as shares of CUT_Q11, rounded up: the ring's outer rim and a head's, a little larger; and
+ * how far down a nearest place can be that is in the ring and not more down than aside, in mm. */
+#define RING_Q12 1985    /* 1.93 */
+#define THROUGH_Q12 1049 /* 1.02 */
+#define BELOW_Q12 1142   /* 1.11; it is 1.08 */
 /* Depths against the centre's are cut at 4 semi-axes: Q1 mm. */
 #define DEPTH_CUT_Q1 (2 * 4 * SEMI_Z_MM)
 /* 2^11 / (2 SEMI_Z_MM), its whole and its part. */
@@ -38,20 +45,26 @@
 #define NEARER_Q11 (-((28 + IH_BOUND_DEPTH_MM) * 2048 / SEMI_Z_MM + 1))
 #define BEHIND_Q11 ((28 + IH_BOUND_DEPTH_MM) * 2048 / SEMI_Z_MM + 1)
 #define FAR_Q11 ((60 + IH_BOUND_DEPTH_MM) * 2048 / SEMI_Z_MM + 1)
+#define ON_Q11 ((28 - IH_BOUND_DEPTH_MM) * 2048 / SEMI_Z_MM) /* surely on it */
 /* A square root of what is below 1 is below this. */
 #define ROOT_CUT_Q11 3072
 #define ONE_Q14 (1 << 14)
+#define ONE_Q30 ((int64_t)1 << 30)
 #define DEPTH_LEAST_MM 227
 #define DEPTH_MOST_MM 16300
 
 /* Where there are no vectors, words are shorter to work with, and rays out of reach worth a branch. */
-#if defined(__SSE2__) || defined(__ARM_NEON)
+#if defined(__AVX2__)
 typedef int16_t lane;
-#define ONE_BY_ONE false
+#define LANES 16
+#elif defined(__SSE2__) || defined(__ARM_NEON)
+typedef int16_t lane;
+#define LANES 8
 #else
 typedef int32_t lane;
-#define ONE_BY_ONE true
+#define LANES 1
 #endif
+#define ONE_BY_ONE (LANES == 1)
 
 /* Arithmetic of lanes, which wraps as vectors do. */
 static inline lane wrap(int32_t value)
@@ -118,43 +131,62 @@ static void fill_value(const struct ih_ray *ray, struct ih_bound_rays *out, int3
 }
 
 /* False: the ray is too steep for 16 bits. */
-static bool fill_ray(const struct ih_ray *ray, const int32_t semi_mm_q8[3],
-                     struct ih_bound_rays *out, int32_t at)
+static bool fill_ray(const struct ih_ray *ray, struct ih_bound_rays *out, int32_t at)
 {
-    const struct ih_aim aim = ih_ellipsoid_aim(semi_mm_q8, ray);
-    const bool is_usable = aim.gg_q28 < (int64_t)1 << 29;
+    /* slopes below 2^22.1 times 2^14.4 */
+    const int64_t gx_q15 = ih_mul_shift(ray->slope_x_q20, Z_OVER_X_Q14, 19);
+    const int64_t gy_q15 = ih_mul_shift(ray->slope_y_q20, Z_OVER_Y_Q14, 19);
+    const int64_t gg_q30 = ONE_Q30 + gx_q15 * gx_q15 + gy_q15 * gy_q15;
+    const bool is_usable = gg_q30 < 2 * ONE_Q30;
+    const int32_t gg_q15 = is_usable ? (int32_t)(gg_q30 >> 15) : 2 << 15;
     out->slope_q14[0][at] = saturate_s16(ray->slope_x_q20 >> 6);
     out->slope_q14[1][at] = saturate_s16(ray->slope_y_q20 >> 6);
-    for (int axis = 0; axis < 2; axis++) {
-        out->g_q15[axis][at] = saturate_s16((int64_t)aim.g_q14[axis] * 2);
-    }
-    out->inverse_q15[at] = saturate_s16(((int64_t)1 << 43) / aim.gg_q28);
-    out->reach_q10[at] = saturate_s16((RING_OUTER2_Q10 * aim.gg_q28 >> 28) + REACH_MARGIN_Q10);
+    out->g_q15[0][at] = saturate_s16(gx_q15);
+    out->g_q15[1][at] = saturate_s16(gy_q15);
+    out->inverse_q15[at] = saturate_s16((1 << 30) / gg_q15);
+    out->reach_q10[at] = saturate_s16((RING_OUTER2_Q10 * gg_q15 >> 15) + REACH_MARGIN_Q10);
     fill_value(ray, out, at);
     return is_usable;
 }
 
+/* What may count is not farther aside, above, below: see ih_bound.h. */
+static void set_reach(const int32_t steep2_q14[2], int32_t both_q14, struct ih_bound_rays *out)
+{
+    const int32_t wide_q14 = ONE_Q14 + steep2_q14[0] / 2 + 1;
+    const int32_t high_q14 = ONE_Q14 + steep2_q14[1] / 2 + 1;
+    out->aside_q12 = RING_Q12 * wide_q14 >> 14;
+    out->above_q12 = RING_Q12 * high_q14 >> 14;
+    out->below_q12 = (BELOW_Q12 * (ONE_Q14 + steep2_q14[1] + 1) + RING_Q12 * both_q14) >> 14;
+    out->through_q12 = THROUGH_Q12 * wide_q14 >> 14;
+}
+
 void ih_bound_prepare(const struct ih_space *space, struct ih_bound_rays *out)
 {
-    const struct ih_ellipsoid mean = ih_ellipsoid_mean(space->origin_mm_q8);
-    memset(out, 0, sizeof *out); /* no ray behind the last is within a reach of 0 */
+    int32_t steep2_q14[2] = {0, 0};
+    int32_t both_q14 = 0;
+    memset(out, 0, sizeof *out);
     out->is_usable = true;
-    for (int32_t column = 0; column < IH_GRID; column++) {
-        out->least_q14[column] = INT16_MAX;
-        out->most_q14[column] = INT16_MIN;
-        for (int32_t row = 0; row < IH_GRID; row++) {
-            const int32_t at = column * IH_GRID + row;
-            const struct ih_ray *ray = &space->ray[row * IH_GRID + column];
-            out->is_usable = fill_ray(ray, mean.semi_mm_q8, out, at) && out->is_usable;
-            const int16_t slope_q14 = out->slope_q14[0][at];
-            if (slope_q14 < out->least_q14[column]) {
-                out->least_q14[column] = slope_q14;
-            }
-            if (slope_q14 > out->most_q14[column]) {
-                out->most_q14[column] = slope_q14;
-            }
-        }
+    for (int32_t at = 0; at < IH_BOUND_RAYS; at++) {
+        out->reach_q10[at] = -REACH_MARGIN_Q10; /* behind a column: no ray is within it */
     }
+    for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
+        const int32_t line[2] = {slot % IH_GRID, slot / IH_GRID};
+        const int32_t at = line[0] * IH_BOUND_COLUMN + line[1];
+        out->is_usable = fill_ray(&space->ray[slot], out, at) && out->is_usable;
+        for (int axis = 0; axis < 2; axis++) {
+            const int32_t g_q15 = out->g_q15[axis][at];
+            const int16_t slope_q14 = out->slope_q14[axis][at];
+            int16_t *least_q14 = &out->least_q14[axis][line[axis]];
+            int16_t *most_q14 = &out->most_q14[axis][line[axis]];
+            const bool is_first = line[1 - axis] == 0;
+            *least_q14 = is_first || slope_q14 < *least_q14 ? slope_q14 : *least_q14;
+            *most_q14 = is_first || slope_q14 > *most_q14 ? slope_q14 : *most_q14;
+            steep2_q14[axis] = ih_max_s32(steep2_q14[axis], (g_q15 * g_q15 >> 16) + 1);
+        }
+        const int32_t g2_q14 = out->g_q15[0][at] * out->g_q15[1][at] >> 16;
+        both_q14 = ih_max_s32(both_q14, ih_abs_s32(g2_q14) + 1);
+    }
+    set_reach(steep2_q14, both_q14, out);
 }
 
 /* A centre, as the loop needs it: e = (slope - direction) times share, in Q11. */
@@ -165,6 +197,7 @@ struct place {
     int16_t share[2]; /* 2^14 .. 2^15 */
     int16_t depth_mm_q1, open_mm_q1;
     int16_t margin_q10;
+    int32_t aside_q14, above_q14, below_q14, through_q14; /* slopes within which rays may count */
 };
 
 /* False: out of the limits. */
@@ -181,46 +214,87 @@ static bool set_axis(struct place *place, int axis, int64_t off_q8, int32_t dept
     return ih_abs_s64(direction_q14) < ONE_Q14;
 }
 
+/* A share of a cut, in slopes; 3 for what is rounded off it, off the slopes and the direction. */
+static int32_t reach_q14(int16_t cut_q14, int32_t share_q12)
+{
+    return (cut_q14 * share_q12 >> 12) + 3;
+}
+
 static bool set_place(struct place *place, const struct ih_space *space,
-                      const int32_t centre_mm_q8[3])
+                      const struct ih_bound_rays *rays, const int32_t centre_mm_q8[3])
 {
     const int64_t depth_q8 = (int64_t)centre_mm_q8[2] - space->origin_mm_q8[2];
-    if (depth_q8 < DEPTH_LEAST_MM << 8 || depth_q8 > DEPTH_MOST_MM << 8 || centre_mm_q8[2] < 0 ||
-        centre_mm_q8[2] > DEPTH_MOST_MM << 8) {
+    if (!rays->is_usable || depth_q8 < DEPTH_LEAST_MM << 8 || depth_q8 > DEPTH_MOST_MM << 8 ||
+        centre_mm_q8[2] < 0 || centre_mm_q8[2] > DEPTH_MOST_MM << 8) {
         return false;
     }
     const int32_t depth_mm = (int32_t)depth_q8 >> 8;
     place->depth_mm_q1 = (int16_t)(centre_mm_q8[2] >> 7);
     place->open_mm_q1 = (int16_t)(place->depth_mm_q1 + 2 * BEHIND_CENTRE_MM - 1);
     place->margin_q10 = (int16_t)(IH_BOUND_MARGIN_Q10 + depth_mm / 200);
-    return set_axis(place, 0, (int64_t)centre_mm_q8[0] - space->origin_mm_q8[0], (int32_t)depth_q8,
-                    SEMI_X_MM) &&
-           set_axis(place, 1, (int64_t)centre_mm_q8[1] - space->origin_mm_q8[1], (int32_t)depth_q8,
-                    SEMI_Y_MM);
+    if (!set_axis(place, 0, (int64_t)centre_mm_q8[0] - space->origin_mm_q8[0], (int32_t)depth_q8,
+                  SEMI_X_MM) ||
+        !set_axis(place, 1, (int64_t)centre_mm_q8[1] - space->origin_mm_q8[1], (int32_t)depth_q8,
+                  SEMI_Y_MM)) {
+        return false;
+    }
+    place->aside_q14 = reach_q14(place->cut[0], rays->aside_q12);
+    place->above_q14 = reach_q14(place->cut[1], rays->above_q12);
+    place->below_q14 = reach_q14(place->cut[1], rays->below_q12);
+    place->through_q14 = reach_q14(place->cut[0], rays->through_q12);
+    return true;
 }
 
-/* The rays of all columns that may be in reach, 2.74 of 3.99, in whole vectors. */
-static void find_columns(const struct ih_bound_rays *rays, const struct place *place,
-                         int32_t *begin, int32_t *end)
+/* Columns, or rows, from one to before another. */
+struct span {
+    int32_t begin, end;
+};
+
+/* The lines of a span that may have a ray between two slopes, and those between them. */
+static struct span find_span(const struct ih_bound_rays *rays, int axis, struct span span,
+                             int32_t low_q14, int32_t high_q14)
 {
-    const int32_t reach = place->cut[0] * 11 / 16 + 1;
-    int32_t first = IH_GRID;
-    int32_t last = -1;
-    for (int32_t column = 0; column < IH_GRID; column++) {
-        if (rays->most_q14[column] >= place->direction_q14[0] - reach &&
-            rays->least_q14[column] <= place->direction_q14[0] + reach) {
-            first = ih_min_s32(first, column);
-            last = column;
-        }
+    const int16_t *least_q14 = rays->least_q14[axis];
+    const int16_t *most_q14 = rays->most_q14[axis];
+    while (span.begin < span.end &&
+           (most_q14[span.begin] < low_q14 || least_q14[span.begin] > high_q14)) {
+        span.begin++;
     }
-    *begin = first * IH_GRID / 16 * 16;
-    *end = ((last + 1) * IH_GRID + 15) / 16 * 16;
+    while (span.begin < span.end &&
+           (most_q14[span.end - 1] < low_q14 || least_q14[span.end - 1] > high_q14)) {
+        span.end--;
+    }
+    return span;
+}
+
+/* Where rays are that may count: those through the head are in some of the columns only. Rows are whole
+ * vectors, which end behind a column's last ray at most. */
+struct box {
+    struct span columns, through, rows;
+};
+
+static struct box find_box(const struct ih_bound_rays *rays, const struct place *place)
+{
+    const int32_t x_q14 = place->direction_q14[0];
+    const int32_t y_q14 = place->direction_q14[1];
+    const struct span all = {0, IH_GRID};
+    struct box box;
+    box.columns = find_span(rays, 0, all, x_q14 - place->aside_q14, x_q14 + place->aside_q14);
+    box.through =
+        find_span(rays, 0, box.columns, x_q14 - place->through_q14, x_q14 + place->through_q14);
+    box.rows = find_span(rays, 1, all, y_q14 - place->above_q14, y_q14 + place->below_q14);
+    const int32_t count = (box.rows.end - box.rows.begin + LANES - 1) / LANES * LANES;
+    if (LANES > 1) {
+        box.rows.begin = ih_min_s32(box.rows.begin, IH_BOUND_COLUMN - count);
+    }
+    box.rows.end = box.rows.begin + count;
+    return box;
 }
 
 /* Sums of values, in 64ths, and how many rays they are of, at least and at most. */
-struct lanes {
-    lane inside, inside_least, inside_most;
-    lane around, around_least, around_most;
+struct sums {
+    lane inside[LANES], inside_least[LANES], inside_most[LANES];
+    lane around[LANES], around_least[LANES], around_most[LANES];
 };
 
 /* How a ray passes. */
@@ -228,120 +302,186 @@ struct pass {
     lane ex_q11, ey_q11; /* at the centre's depth */
     lane gx_q15, gy_q15;
     lane t_q11, inverse_q15, radius2_q10;
-    lane near; /* within reach */
+    lane room_q10; /* to the reach */
     lane seen, depth_q1;
 };
 
-/* A ray beside or above the head, by its nearest place. */
-static inline void add_around(const struct place *place, const struct pass *pass, lane unseen,
-                              struct lanes *sums)
+/* Where a ray passes the ring, by how much more it is aside than down, at its nearest place. */
+static inline lane beside_of(const struct pass *pass)
 {
-    const lane margin = place->margin_q10;
-    if (ONE_BY_ONE && (pass->radius2_q10 <= RING_INNER2_Q10 - margin ||
-                       pass->radius2_q10 >= RING_OUTER2_Q10 + margin)) {
-        return;
-    }
     const lane t_q12 = wrap(pass->t_q11 * 2);
     const lane x_q12 = wrap(wrap(pass->ex_q11 - high_half(t_q12, pass->gx_q15)) * 2);
     const lane y_q11 = wrap(pass->ey_q11 - high_half(t_q12, pass->gy_q15));
-    const lane beside_q11 = wrap(high_half(size(x_q12), X_OVER_Y_Q15) - y_q11);
+    return wrap(high_half(size(x_q12), X_OVER_Y_Q15) - y_q11);
+}
+
+/* How far a ray's place is from the next limit of where it counts: above the margin it surely does,
+ * below minus the margin it surely does not. e.e and radius2 in Q10, beside in Q11. */
+static inline lane room_in_ring(const struct pass *pass, lane beside_q11)
+{
+    const lane ring =
+        least(wrap(pass->radius2_q10 - RING_INNER2_Q10), wrap(RING_OUTER2_Q10 - pass->radius2_q10));
+    return least(least(ring, beside_q11), pass->room_q10);
+}
+
+static inline lane room_inside(const struct pass *pass)
+{
+    return least(wrap(1024 - pass->radius2_q10), pass->room_q10);
+}
+
+static inline bool is_off_ring(const struct pass *pass, lane margin)
+{
+    return pass->radius2_q10 <= RING_INNER2_Q10 - margin ||
+           pass->radius2_q10 >= RING_OUTER2_Q10 + margin;
+}
+
+/* A ray beside or above the head, by its nearest place. */
+static inline void add_around(const struct place *place, const struct pass *pass, lane unseen,
+                              struct sums *sums, int32_t k)
+{
+    const lane margin = place->margin_q10;
+    if (ONE_BY_ONE && is_off_ring(pass, margin)) {
+        return;
+    }
+    const lane beside_q11 = beside_of(pass);
     if (ONE_BY_ONE && beside_q11 <= -margin) {
         return;
     }
     const lane is_open = is_above(pass->depth_q1, place->open_mm_q1);
     const lane value = wrap((pick(is_open, AROUND_OPEN, AROUND_NEAR) & pass->seen) | unseen);
-    const lane may = wrap(pass->near & is_above(pass->radius2_q10, wrap(RING_INNER2_Q10 - margin)) &
-                          is_above(wrap(RING_OUTER2_Q10 + margin), pass->radius2_q10) &
-                          is_above(beside_q11, wrap(-margin)));
-    const lane must = wrap(
-        pass->near & is_above(pass->radius2_q10, wrap(RING_INNER2_Q10 + margin)) &
-        is_above(wrap(RING_OUTER2_Q10 - margin), pass->radius2_q10) & is_above(beside_q11, margin));
-    sums->around = wrap(sums->around + wrap((most(value, 0) & may) + (least(value, 0) & must)));
-    sums->around_least = wrap(sums->around_least - must);
-    sums->around_most = wrap(sums->around_most - may);
+    const lane room = room_in_ring(pass, beside_q11);
+    const lane may = is_above(room, wrap(-margin));
+    const lane must = is_above(room, margin);
+    sums->around[k] =
+        wrap(sums->around[k] + wrap((most(value, 0) & may) + (least(value, 0) & must)));
+    sums->around_least[k] = wrap(sums->around_least[k] - must);
+    sums->around_most[k] = wrap(sums->around_most[k] - may);
+}
+
+/* How far a ray's point is from where it enters: the square of half the way through the head, and what
+ * is compared with its root. */
+struct entry {
+    lane before_q11; /* how much nearer than the ray's nearest place the point is */
+    lane root2_q10;
+};
+
+static inline struct entry entry_of(const struct place *place, const struct pass *pass)
+{
+    const lane dz_q1 = within(wrap(pass->depth_q1 - place->depth_mm_q1), DEPTH_CUT_Q1);
+    const lane dz_q11 = wrap(wrap(dz_q1 * DEPTH_WHOLE) + high_half(dz_q1, DEPTH_PART_Q16));
+    return (struct entry){
+        .before_q11 = wrap(-wrap(dz_q11 + pass->t_q11)),
+        .root2_q10 =
+            wrap(high_half(wrap(wrap(1024 - pass->radius2_q10) * 16), pass->inverse_q15) >> 3),
+    };
+}
+
+/* Is the point, with its margin, farther behind the entry than this? */
+static inline lane is_behind(const struct entry *entry, lane behind_q11, lane margin)
+{
+    const lane root = wrap(least(most(wrap(entry->before_q11 + behind_q11), 0), ROOT_CUT_Q11) * 4);
+    return is_above(wrap(entry->root2_q10 + margin), high_half(root, root));
 }
 
 /* How far a ray's point is behind the entry says what it is worth. */
 static inline lane depth_value(const struct place *place, const struct pass *pass)
 {
     const lane margin = place->margin_q10;
-    const lane dz_q1 = within(wrap(pass->depth_q1 - place->depth_mm_q1), DEPTH_CUT_Q1);
-    const lane dz_q11 = wrap(wrap(dz_q1 * DEPTH_WHOLE) + high_half(dz_q1, DEPTH_PART_Q16));
-    const lane before_q11 = wrap(-wrap(dz_q11 + pass->t_q11));
-    const lane root2_q10 =
-        wrap(high_half(wrap(wrap(1024 - pass->radius2_q10) * 16), pass->inverse_q15) >> 3);
-    const lane nearer = wrap(least(most(wrap(before_q11 + NEARER_Q11), 0), ROOT_CUT_Q11) * 4);
-    const lane may_touch = is_above(wrap(root2_q10 + margin), high_half(nearer, nearer));
+    const struct entry entry = entry_of(place, pass);
+    const lane may_touch = is_behind(&entry, NEARER_Q11, margin);
     if (ONE_BY_ONE && may_touch == 0) {
         return VALUE_NEARER;
     }
-    const lane behind = wrap(least(most(wrap(before_q11 + BEHIND_Q11), 0), ROOT_CUT_Q11) * 4);
-    const lane is_behind = is_above(wrap(root2_q10 - margin), high_half(behind, behind));
-    if (ONE_BY_ONE && is_behind == 0) {
+    const lane behind = is_behind(&entry, BEHIND_Q11, wrap(-margin));
+    if (ONE_BY_ONE && behind == 0) {
         return VALUE_ON;
     }
-    const lane far = wrap(least(most(wrap(before_q11 + FAR_Q11), 0), ROOT_CUT_Q11) * 4);
-    const lane is_far = is_above(wrap(root2_q10 - margin), high_half(far, far));
-    return pick(may_touch, pick(is_behind, pick(is_far, VALUE_FAR, VALUE_BEHIND), VALUE_ON),
+    const lane far = is_behind(&entry, FAR_Q11, wrap(-margin));
+    return pick(may_touch, pick(behind, pick(far, VALUE_FAR, VALUE_BEHIND), VALUE_ON),
                 VALUE_NEARER);
 }
 
 /* A ray through it. */
 static inline void add_inside(const struct place *place, const struct pass *pass, lane unseen,
-                              struct lanes *sums)
+                              struct sums *sums, int32_t k)
 {
     const lane margin = place->margin_q10;
     lane value = unseen;
     if (!ONE_BY_ONE || pass->seen != 0) {
         value = wrap((depth_value(place, pass) & pass->seen) | unseen);
     }
-    const lane may = wrap(pass->near & is_above(wrap(1024 + margin), pass->radius2_q10));
-    lane must = wrap(pass->near & is_above(wrap(1024 - margin), pass->radius2_q10));
+    const lane room = room_inside(pass);
+    const lane may = is_above(room, wrap(-margin));
+    lane must = is_above(room, margin);
     must = wrap(must | (may & is_above(value, 0))); /* a value of 1 lowers no mean */
-    sums->inside = wrap(sums->inside + (value & must));
-    sums->inside_least = wrap(sums->inside_least - must);
-    sums->inside_most = wrap(sums->inside_most - may);
+    sums->inside[k] = wrap(sums->inside[k] + (value & must));
+    sums->inside_least[k] = wrap(sums->inside_least[k] - must);
+    sums->inside_most[k] = wrap(sums->inside_most[k] - may);
 }
 
-/* A loop without a branch where there are vectors: compilers turn it into them. */
-static void add_rays(const struct ih_bound_rays *rays, const struct place *place, int32_t begin,
-                     int32_t end, struct lanes *out)
+/* False, where rays are looked at one by one: it does not count. */
+static inline bool find_pass(const struct ih_bound_rays *rays, const struct place *place,
+                             int32_t at, struct pass *pass)
 {
-    struct lanes sums = {0, 0, 0, 0, 0, 0};
-    for (int32_t i = begin; i < end; i++) {
-        struct pass pass;
-        lane dx = wrap(rays->slope_q14[0][i] - place->direction_q14[0]);
-        lane dy = wrap(rays->slope_q14[1][i] - place->direction_q14[1]);
-        if (ONE_BY_ONE && (size(dx) > place->cut[0] || size(dy) > place->cut[1])) {
-            continue;
-        }
-        dx = within(dx, place->cut[0]);
-        dy = within(dy, place->cut[1]);
-        pass.ex_q11 = high_half(wrap(dx * place->times[0]), place->share[0]);
-        pass.ey_q11 = high_half(wrap(dy * place->times[1]), place->share[1]);
-        const lane ex_q13 = wrap(pass.ex_q11 * 4);
-        const lane ey_q13 = wrap(pass.ey_q11 * 4);
-        const lane ee_q10 = wrap(high_half(ex_q13, ex_q13) + high_half(ey_q13, ey_q13));
-        pass.near = is_above(rays->reach_q10[i], ee_q10);
-        if (ONE_BY_ONE && pass.near == 0) {
-            continue;
-        }
-        pass.gx_q15 = rays->g_q15[0][i];
-        pass.gy_q15 = rays->g_q15[1][i];
-        pass.inverse_q15 = rays->inverse_q15[i];
-        const lane eg_q12 = wrap(high_half(ex_q13, pass.gx_q15) + high_half(ey_q13, pass.gy_q15));
-        pass.t_q11 = high_half(eg_q12, pass.inverse_q15);
-        pass.radius2_q10 = wrap(ee_q10 - high_half(wrap(eg_q12 * 2), wrap(pass.t_q11 * 4)));
-        pass.seen = rays->seen[i];
-        pass.depth_q1 = rays->depth_mm_q1[i];
-        if (!ONE_BY_ONE || pass.radius2_q10 > 1024 + place->margin_q10) {
-            add_around(place, &pass, rays->around[i], &sums);
-        }
-        if (!ONE_BY_ONE || pass.radius2_q10 <= 1024 + place->margin_q10) {
-            add_inside(place, &pass, rays->inside[i], &sums);
+    lane dx = wrap(rays->slope_q14[0][at] - place->direction_q14[0]);
+    lane dy = wrap(rays->slope_q14[1][at] - place->direction_q14[1]);
+    if (ONE_BY_ONE && (size(dx) > place->cut[0] || size(dy) > place->cut[1])) {
+        return false;
+    }
+    dx = within(dx, place->cut[0]);
+    dy = within(dy, place->cut[1]);
+    pass->ex_q11 = high_half(wrap(dx * place->times[0]), place->share[0]);
+    pass->ey_q11 = high_half(wrap(dy * place->times[1]), place->share[1]);
+    const lane ex_q13 = wrap(pass->ex_q11 * 4);
+    const lane ey_q13 = wrap(pass->ey_q11 * 4);
+    const lane ee_q10 = wrap(high_half(ex_q13, ex_q13) + high_half(ey_q13, ey_q13));
+    pass->room_q10 = wrap(rays->reach_q10[at] - ee_q10);
+    if (ONE_BY_ONE && pass->room_q10 <= -place->margin_q10) {
+        return false;
+    }
+    pass->gx_q15 = rays->g_q15[0][at];
+    pass->gy_q15 = rays->g_q15[1][at];
+    pass->inverse_q15 = rays->inverse_q15[at];
+    const lane eg_q12 = wrap(high_half(ex_q13, pass->gx_q15) + high_half(ey_q13, pass->gy_q15));
+    pass->t_q11 = high_half(eg_q12, pass->inverse_q15);
+    pass->radius2_q10 = wrap(ee_q10 - high_half(wrap(eg_q12 * 2), wrap(pass->t_q11 * 4)));
+    pass->seen = rays->seen[at];
+    pass->depth_q1 = rays->depth_mm_q1[at];
+    return true;
+}
+
+/* Rays of some columns, around the head, through it or both. Loops of LANES turns become vectors. */
+static inline void add_rays(const struct ih_bound_rays *rays, const struct place *place,
+                            struct span columns, struct span rows, bool is_around, bool is_inside,
+                            struct sums *sums)
+{
+    for (int32_t row = rows.begin; row < rows.end; row += LANES) {
+        for (int32_t column = columns.begin; column < columns.end; column++) {
+            for (int32_t k = 0; k < LANES; k++) {
+                struct pass pass;
+                const int32_t at = column * IH_BOUND_COLUMN + row + k;
+                if (!find_pass(rays, place, at, &pass)) {
+                    continue;
+                }
+                const bool is_out = pass.radius2_q10 > 1024 + place->margin_q10;
+                if (is_around && (!ONE_BY_ONE || is_out)) {
+                    add_around(place, &pass, rays->around[at], sums, k);
+                }
+                if (is_inside && (!ONE_BY_ONE || !is_out)) {
+                    add_inside(place, &pass, rays->inside[at], sums, k);
+                }
+            }
         }
     }
-    *out = sums;
+}
+
+static int32_t total(const lane lanes[LANES])
+{
+    lane sum = 0;
+    for (int32_t k = 0; k < LANES; k++) {
+        sum = wrap(sum + lanes[k]);
+    }
+    return sum;
 }
 
 /* A mean is greatest over the fewest rays when the sum is positive, over the most when it is not;
@@ -356,16 +496,156 @@ int32_t ih_bound_score_q12(const struct ih_space *space, const struct ih_bound_r
                            const int32_t centre_mm_q8[3])
 {
     struct place place;
-    struct lanes sums;
-    int32_t begin, end;
-    if (!rays->is_usable || !set_place(&place, space, centre_mm_q8)) {
+    struct sums sums;
+    if (!set_place(&place, space, rays, centre_mm_q8)) {
         return IH_BOUND_MOST_Q12;
     }
-    find_columns(rays, &place, &begin, &end);
-    add_rays(rays, &place, begin, end, &sums);
+    const struct box box = find_box(rays, &place);
+    memset(&sums, 0, sizeof sums);
+    if (ONE_BY_ONE) {
+        add_rays(rays, &place, box.columns, box.rows, true, true, &sums);
+    } else {
+        add_rays(rays, &place, box.columns, box.rows, true, false, &sums);
+        add_rays(rays, &place, box.through, box.rows, false, true, &sums);
+    }
+    const int32_t around = total(sums.around);
+    const int32_t inside = total(sums.inside);
+    const int32_t around_least = total(sums.around_least);
+    const int32_t around_most = total(sums.around_most);
     /* 0.6 of 64 is 38.4 */
-    int32_t around_q12 = sums.around > 0
-                             ? mean_q12(sums.around * 3, sums.around_least, sums.around_most, 13)
-                             : mean_q12(sums.around, sums.around_least, sums.around_most, 38);
-    return mean_q12(sums.inside, sums.inside_least, sums.inside_most, 64) + around_q12 + CUT_Q12;
+    const int32_t around_q12 = around > 0 ? mean_q12(around * 3, around_least, around_most, 13)
+                                          : mean_q12(around, around_least, around_most, 38);
+    return mean_q12(inside, total(sums.inside_least), total(sums.inside_most), 64) + around_q12 +
+           CUT_Q12;
+}
+
+/* What rays count as, a lane for each of them. */
+struct counts {
+    lane on[LANES], nearer[LANES], empty[LANES], far[LANES];
+    lane open[LANES], open_empty[LANES], closed[LANES], unknown[LANES];
+};
+
+/* A ray beside or above: all bits when it may count, and that is not sure. */
+static inline lane judge_around(const struct ih_bound_rays *rays, const struct place *place,
+                                int32_t at, const struct pass *pass, struct counts *counts,
+                                int32_t k)
+{
+    const lane margin = place->margin_q10;
+    if (ONE_BY_ONE && is_off_ring(pass, margin)) {
+        return 0;
+    }
+    const lane beside_q11 = beside_of(pass);
+    const lane room = room_in_ring(pass, beside_q11);
+    const lane may = is_above(room, wrap(-margin));
+    const lane open = is_above(pass->depth_q1, wrap(place->open_mm_q1 + 1));
+    const lane closed = is_above(wrap(place->open_mm_q1 + 1), pass->depth_q1);
+    const lane must = wrap(is_above(room, margin) & (open | closed | ~pass->seen));
+    const lane seen = wrap(must & pass->seen);
+    const lane unseen = wrap(must & ~pass->seen);
+    const lane empty = is_above(rays->around[at], 0);
+    counts->open[k] = wrap(counts->open[k] - (seen & open));
+    counts->closed[k] = wrap(counts->closed[k] - (seen & closed));
+    counts->open_empty[k] = wrap(counts->open_empty[k] - (unseen & empty));
+    counts->unknown[k] = wrap(counts->unknown[k] - (unseen & ~empty));
+    return wrap(may & ~must);
+}
+
+/* A ray through it. */
+static inline lane judge_inside(const struct ih_bound_rays *rays, const struct place *place,
+                                int32_t at, const struct pass *pass, struct counts *counts,
+                                int32_t k)
+{
+    const lane margin = place->margin_q10;
+    const lane room = room_inside(pass);
+    const lane may = is_above(room, wrap(-margin));
+    const lane must = is_above(room, margin);
+    const lane unseen = wrap(must & ~pass->seen);
+    const lane empty = wrap(unseen & is_above(rays->around[at], 0));
+    const struct entry entry = entry_of(place, pass);
+    const lane seen = wrap(must & pass->seen);
+    const lane nearer = wrap(seen & ~is_behind(&entry, NEARER_Q11, margin));
+    const lane far = wrap(seen & is_behind(&entry, FAR_Q11, wrap(-margin)));
+    const lane on =
+        wrap(seen & is_behind(&entry, -ON_Q11, wrap(-margin)) & ~is_behind(&entry, ON_Q11, margin));
+    counts->on[k] = wrap(counts->on[k] - on);
+    counts->nearer[k] = wrap(counts->nearer[k] - nearer - (unseen & ~empty));
+    counts->empty[k] = wrap(counts->empty[k] - empty);
+    counts->far[k] = wrap(counts->far[k] - far);
+    return wrap(may & ~(unseen | nearer | far | on));
+}
+
+static inline void judge_rays(const struct ih_bound_rays *rays, const struct place *place,
+                              struct span columns, struct span rows, bool is_around, bool is_inside,
+                              struct counts *counts, int16_t unsure[IH_BOUND_RAYS])
+{
+    for (int32_t row = rows.begin; row < rows.end; row += LANES) {
+        for (int32_t column = columns.begin; column < columns.end; column++) {
+            for (int32_t k = 0; k < LANES; k++) {
+                struct pass pass;
+                const int32_t at = column * IH_BOUND_COLUMN + row + k;
+                lane is_unsure = is_around ? 0 : unsure[at];
+                if (!find_pass(rays, place, at, &pass)) {
+                    unsure[at] = 0;
+                    continue;
+                }
+                const bool is_out = pass.radius2_q10 > 1024 + place->margin_q10;
+                if (is_around && (!ONE_BY_ONE || is_out)) {
+                    is_unsure |= judge_around(rays, place, at, &pass, counts, k);
+                }
+                if (is_inside && (!ONE_BY_ONE || !is_out)) {
+                    is_unsure |= judge_inside(rays, place, at, &pass, counts, k);
+                }
+                unsure[at] = (int16_t)is_unsure;
+            }
+        }
+    }
+}
+
+/* The slots of unsure rays; where there are vectors, four are passed over at once. */
+static void list_unsure(const struct box *box, struct ih_bound_verdict *out)
+{
+    const int32_t step = ONE_BY_ONE ? 1 : 4;
+    for (int32_t column = box->columns.begin; column < box->columns.end; column++) {
+        for (int32_t row = box->rows.begin; row < box->rows.end; row += step) {
+            const int16_t *unsure = &out->is_unsure[column * IH_BOUND_COLUMN + row];
+            uint64_t any = 0;
+            memcpy(&any, unsure, (size_t)step * sizeof *unsure);
+            for (int32_t k = 0; any != 0 && k < step; k++) {
+                if (unsure[k] != 0) {
+                    out->unsure[out->unsure_count++] = (int16_t)((row + k) * IH_GRID + column);
+                }
+            }
+        }
+    }
+}
+
+void ih_bound_judge(const struct ih_space *space, const struct ih_bound_rays *rays,
+                    const int32_t centre_mm_q8[3], struct ih_bound_verdict *out)
+{
+    struct place place;
+    struct counts counts;
+    out->unsure_count = 0;
+    memset(&counts, 0, sizeof counts);
+    if (set_place(&place, space, rays, centre_mm_q8)) {
+        const struct box box = find_box(rays, &place);
+        if (ONE_BY_ONE) {
+            judge_rays(rays, &place, box.columns, box.rows, true, true, &counts, out->is_unsure);
+        } else {
+            judge_rays(rays, &place, box.columns, box.rows, true, false, &counts, out->is_unsure);
+            judge_rays(rays, &place, box.through, box.rows, false, true, &counts, out->is_unsure);
+        }
+        list_unsure(&box, out);
+    } else {
+        for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
+            out->unsure[out->unsure_count++] = (int16_t)slot;
+        }
+    }
+    out->on = total(counts.on);
+    out->nearer = total(counts.nearer);
+    out->empty = total(counts.empty);
+    out->far = total(counts.far);
+    out->open = total(counts.open);
+    out->open_empty = total(counts.open_empty);
+    out->closed = total(counts.closed);
+    out->unknown = total(counts.unknown);
 }

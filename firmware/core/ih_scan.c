@@ -1,22 +1,22 @@
 #include "ih_scan.h"
 
-#include <string.h>
-
 #include "ih_fix.h"
 
 #define ONE_Q12 4096
 #define ON_SURFACE_MM_Q8 (28 << 8)
 #define BEHIND_FULL_MM_Q8 (60 << 8)
 #define BEHIND_CENTRE_MM_Q8 (60 << 8)
-#define VALUE_NEARER_Q12 (-614)  /* -0.15 */
-#define VALUE_EMPTY_Q12 (-2458)  /* -0.6 */
-#define VALUE_UNKNOWN_Q12 (-614) /* -0.15 */
-#define RING_EMPTY_Q12 2867      /* 0.7 */
-#define RING_NEAR_Q12 (-2458)    /* -0.6 */
-#define RING_INNER2_Q14 27689    /* 1.3^2 */
-#define RING_OUTER2_Q14 59146    /* 1.9^2 */
+#define VALUE_NEARER_Q12 (-614) /* -0.15 */
+#define VALUE_EMPTY_Q12 (-2458) /* -0.6 */
+#define VALUE_UNKNOWN_Q12 VALUE_NEARER_Q12
+#define RING_EMPTY_Q12 2867   /* 0.7 */
+#define RING_NEAR_Q12 (-2458) /* -0.6 */
+#define RING_INNER2_Q14 27689 /* 1.3^2 */
+#define RING_OUTER2_Q14 59146 /* 1.9^2 */
 #define RING_SHARE_PERCENT 60
 #define RAYS_LEAST 8
+#define RANK_PLACES 512 /* more than there are places, a power of two */
+#define RANK_NONE INT32_MIN
 
 void ih_scan_params_default(struct ih_scan_params *params)
 {
@@ -59,36 +59,6 @@ static bool is_in_ring(const struct ih_crossing *crossing, const struct ih_ellip
            dy <= ih_abs_s64(dx);
 }
 
-/* ih_scan_half's shares are 2^this over the sides. */
-#define SHARE_BITS 20
-/* Slopes in 14 bits and whole mm: rounded down, they are off by 4 mm each at the limits, and by less
- * than a mm for the origin and the centre. */
-#define NEAR_MARGIN_MM 12
-/* 1 and what is rounded off a share and its square, Q20. */
-#define NEAR_Q20 ((1 << 20) + (1 << 14))
-
-/* Which rays pass through the ellipse in the box around a centre: those outside are farther away than
- * the ring's outer rim in any direction. A loop without a branch: compilers turn it into vectors.
- * Depths below 2^14.1 mm, slopes up to 2^14. */
-static void flag_near(const struct ih_space *space, const int32_t centre_mm_q8[3],
-                      struct ih_scan_scratch *scratch)
-{
-    const struct ih_scan_half *half = &scratch->half;
-    const int32_t depth_mm = (centre_mm_q8[2] - space->origin_mm_q8[2]) >> 8;
-    const int32_t x_mm = ((space->origin_mm_q8[0] - centre_mm_q8[0]) >> 8) + half->x_mm;
-    const int32_t y_mm = ((space->origin_mm_q8[1] - centre_mm_q8[1]) >> 8) + half->y_mm;
-    for (int32_t slot = 0; slot < IH_SCAN_FLAGS; slot++) {
-        int32_t off_x_mm = (depth_mm * scratch->slope_q12[0][slot] >> 12) + x_mm;
-        int32_t off_y_mm = (depth_mm * scratch->slope_q12[1][slot] >> 12) + y_mm;
-        uint8_t in_x = IH_WRAPS(uint32_t, off_x_mm) <= 2 * (uint32_t)half->x_mm;
-        uint8_t in_y = IH_WRAPS(uint32_t, off_y_mm) <= 2 * (uint32_t)half->y_mm;
-        int32_t x_q10 = (in_x ? off_x_mm - half->x_mm : 0) * half->x_share >> (SHARE_BITS - 10);
-        int32_t y_q10 = (in_y ? off_y_mm - half->y_mm : 0) * half->y_share >> (SHARE_BITS - 10);
-        uint8_t is_round = x_q10 * x_q10 + y_q10 * y_q10 <= NEAR_Q20;
-        scratch->near[slot] = in_x & in_y & is_round;
-    }
-}
-
 /* What the rays through a head and around it say. */
 struct sums {
     int32_t inside, inside_count;
@@ -96,11 +66,11 @@ struct sums {
 };
 
 static void add_ray(const struct ih_space *space, const struct ih_ellipsoid *head,
-                    const struct ih_shares *shares, const struct ih_ray *ray,
-                    const struct ih_aim *aim, struct sums *sums)
+                    const struct ih_shares *shares, const struct ih_ray *ray, struct sums *sums)
 {
+    const struct ih_aim aim = ih_ellipsoid_aim(head->semi_mm_q8, ray);
     struct ih_crossing crossing;
-    if (!ih_ellipsoid_cross_aimed(head, shares, space->origin_mm_q8, ray, aim, &crossing)) {
+    if (!ih_ellipsoid_cross_aimed(head, shares, space->origin_mm_q8, ray, &aim, &crossing)) {
         return;
     }
     if (crossing.radius2_q14 < 1 << 14) {
@@ -112,20 +82,24 @@ static void add_ray(const struct ih_space *space, const struct ih_ellipsoid *hea
     }
 }
 
+/* Rays of which the bound's 16 bits can tell what they are worth are counted by them; the others, some
+ * seven, are crossed with the head. */
 static int32_t score_q12(const struct ih_space *space, struct ih_scan_scratch *scratch,
                          const struct ih_ellipsoid *head)
 {
-    struct sums sums = {0};
+    struct ih_bound_verdict *sure = &scratch->verdict;
     const struct ih_shares shares = ih_ellipsoid_shares(head->semi_mm_q8);
-    flag_near(space, head->centre_mm_q8, scratch);
-    for (int32_t first = 0; first < IH_SLOTS; first += 8) {
-        uint64_t any; /* of eight slots */
-        memcpy(&any, &scratch->near[first], sizeof any);
-        for (int32_t slot = first; any != 0 && slot < ih_min_s32(first + 8, IH_SLOTS); slot++) {
-            if (scratch->near[slot] != 0) {
-                add_ray(space, head, &shares, &space->ray[slot], &scratch->aim[slot], &sums);
-            }
-        }
+    ih_bound_judge(space, &scratch->rays, head->centre_mm_q8, sure);
+    struct sums sums = {
+        .inside = (sure->on - sure->far) * ONE_Q12 + sure->nearer * VALUE_NEARER_Q12 +
+                  sure->empty * VALUE_EMPTY_Q12,
+        .inside_count = sure->on + sure->far + sure->nearer + sure->empty,
+        .ring =
+            sure->open * ONE_Q12 + sure->open_empty * RING_EMPTY_Q12 + sure->closed * RING_NEAR_Q12,
+        .ring_count = sure->open + sure->open_empty + sure->closed + sure->unknown,
+    };
+    for (int32_t i = 0; i < sure->unsure_count; i++) {
+        add_ray(space, head, &shares, &space->ray[sure->unsure[i]], &sums);
     }
     return sums.inside / ih_max_s32(sums.inside_count, RAYS_LEAST) +
            sums.ring * RING_SHARE_PERCENT / (100 * ih_max_s32(sums.ring_count, RAYS_LEAST));
@@ -147,22 +121,28 @@ static void centre_behind(const struct ih_ray *ray, int32_t deep_mm, int32_t cen
 static bool is_near(const int32_t a_mm_q8[3], const int32_t b_mm_q8[3], int32_t distance_mm)
 {
     int64_t limit = (int64_t)distance_mm << 8;
+    if (ih_abs_s32(a_mm_q8[0] - b_mm_q8[0]) > limit) {
+        return false; /* most are */
+    }
     return ih_distance2_s32(a_mm_q8, b_mm_q8) <= limit * limit;
 }
 
-/* Of what is left, the place that seems best, the first of equals; IH_NONE when nothing is left. */
+/* A score and a place's number in one, so that the greatest is the best, the first of equals. */
+static int32_t rank_of(int32_t score_q12, int32_t index)
+{
+    return score_q12 * RANK_PLACES + RANK_PLACES - 1 - index;
+}
+
+/* Of what is left, the place that seems best; IH_NONE when nothing is left. A loop without a branch:
+ * compilers turn it into vectors. */
 static int32_t best_left(const struct ih_scan_scratch *scratch, int32_t count)
 {
-    int32_t best = IH_NONE;
-    int32_t best_q12 = INT32_MIN;
+    int32_t best = RANK_NONE;
     for (int32_t i = 0; i < count; i++) {
-        const bool is_better = scratch->tried[i].score_q12 > best_q12;
-        if (is_better && scratch->state[i] != IH_SCAN_TAKEN) {
-            best = i;
-            best_q12 = scratch->tried[i].score_q12;
-        }
+        best = ih_max_s32(best, scratch->rank[i]);
     }
-    return best;
+    return best == RANK_NONE ? IH_NONE
+                             : RANK_PLACES - 1 - (int32_t)(IH_WRAPS(uint32_t, best) % RANK_PLACES);
 }
 
 /* A place is kept; nothing near it is looked at any more, nor is it itself. */
@@ -174,29 +154,9 @@ static void take(struct ih_scan_scratch *scratch, int32_t count, int32_t index, 
     for (int32_t i = 0; i < count; i++) {
         if (is_near(kept->centre_mm_q8, scratch->tried[i].centre_mm_q8, spacing_mm)) {
             scratch->state[i] = IH_SCAN_TAKEN;
+            scratch->rank[i] = RANK_NONE;
         }
     }
-}
-
-/* What is the same for all centres. */
-static void prepare(const struct ih_space *space, struct ih_scan_scratch *scratch)
-{
-    struct ih_scan_half *half = &scratch->half;
-    int32_t slope_most_q20[2];
-    ih_space_slope_most(space, slope_most_q20);
-    const struct ih_ellipsoid mean = ih_ellipsoid_mean(space->origin_mm_q8);
-    const struct ih_ellipsoid_box box = ih_ellipsoid_box(&mean, slope_most_q20, RING_OUTER2_Q14);
-    half->x_mm = (box.half_mm_q8[0] >> 8) + NEAR_MARGIN_MM;
-    half->y_mm = (box.half_mm_q8[1] >> 8) + NEAR_MARGIN_MM;
-    half->x_share = (1 << SHARE_BITS) / half->x_mm;
-    half->y_share = (1 << SHARE_BITS) / half->y_mm;
-    memset(scratch->slope_q12, 0, sizeof scratch->slope_q12); /* behind the last slot, too */
-    for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
-        scratch->slope_q12[0][slot] = space->ray[slot].slope_x_q20 >> 8;
-        scratch->slope_q12[1][slot] = space->ray[slot].slope_y_q20 >> 8;
-        scratch->aim[slot] = ih_ellipsoid_aim(mean.semi_mm_q8, &space->ray[slot]);
-    }
-    ih_bound_prepare(space, &scratch->rays);
 }
 
 int32_t ih_scan_score_q12(const struct ih_space *space, struct ih_scan_scratch *scratch,
@@ -214,12 +174,13 @@ void ih_scan_find(const struct ih_space *space, const struct ih_scan_params *par
                   struct ih_scan_scratch *scratch, struct ih_scan *out)
 {
     int32_t count = 0;
-    prepare(space, scratch);
+    ih_bound_prepare(space, &scratch->rays);
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
         if (space->ray[slot].state == IH_RAY_SEEN) {
             struct ih_scan_place *place = &scratch->tried[count];
             centre_behind(&space->ray[slot], params->deep_mm, place->centre_mm_q8);
             place->score_q12 = ih_bound_score_q12(space, &scratch->rays, place->centre_mm_q8);
+            scratch->rank[count] = rank_of(place->score_q12, count);
             scratch->state[count++] = IH_SCAN_BOUND;
         }
     }
@@ -234,6 +195,7 @@ void ih_scan_find(const struct ih_space *space, const struct ih_scan_params *par
         } else {
             struct ih_scan_place *place = &scratch->tried[best];
             place->score_q12 = ih_scan_score_q12(space, scratch, place->centre_mm_q8);
+            scratch->rank[best] = rank_of(place->score_q12, best);
             scratch->state[best] = IH_SCAN_RATED;
         }
     }

@@ -1,5 +1,6 @@
-/* ih_bound against ih_scan's scores: never below, in made scenes, at random, and where all rays are
- * alike and as good as on a limit, so that one of them on the wrong side would show. */
+/* ih_bound against ih_scan's scores: never below, and what it judges is judged as by crossing every
+ * ray, in made scenes, at random, and where all rays are alike and as good as on a limit, so that one
+ * of them on the wrong side would show. */
 #include "ih_scan.h"
 
 #include "ih_test.h"
@@ -22,11 +23,20 @@ void tearDown(void)
 {
 }
 
-/* By how much the bound of a place is above its score. */
+/* By how much the bound of a place is above its score, which is the same to the last bit when every
+ * ray is crossed with the head, as those are of which 16 bits cannot tell what they are worth. */
 static int32_t slack_q12(const int32_t centre_mm_q8[3])
 {
-    return ih_bound_score_q12(&space, &scratch.rays, centre_mm_q8) -
-           ih_scan_score_q12(&space, &scratch, centre_mm_q8);
+    const bool is_usable = scratch.rays.is_usable;
+    const int32_t bound_q12 = ih_bound_score_q12(&space, &scratch.rays, centre_mm_q8);
+    const int32_t score_q12 = ih_scan_score_q12(&space, &scratch, centre_mm_q8);
+
+    scratch.rays.is_usable = false;
+    IH_TEST_EQUAL(ih_scan_score_q12(&space, &scratch, centre_mm_q8), score_q12,
+                  "with all rays crossed", 0);
+    TEST_ASSERT_EQUAL_INT32(IH_SLOTS, scratch.verdict.unsure_count);
+    scratch.rays.is_usable = is_usable;
+    return bound_q12 - score_q12;
 }
 
 static void prepare(void)
