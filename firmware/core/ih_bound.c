@@ -53,67 +53,16 @@
 #define DEPTH_LEAST_MM 227
 #define DEPTH_MOST_MM 16300
 
-/* Where there are no vectors, words are shorter to work with, and rays out of reach worth a branch. */
-#if defined(__AVX2__)
-typedef int16_t lane;
+/* Where there are no vectors, rays are looked at one by one. */
+#if defined(IH_BOUND_ONE_BY_ONE)
+#define LANES 1
+#elif defined(__AVX2__)
 #define LANES 16
 #elif defined(__SSE2__) || defined(__ARM_NEON)
-typedef int16_t lane;
 #define LANES 8
 #else
-typedef int32_t lane;
 #define LANES 1
 #endif
-#define ONE_BY_ONE (LANES == 1)
-
-/* Arithmetic of lanes, which wraps as vectors do. */
-static inline lane wrap(int32_t value)
-{
-    return IH_WRAPS(lane, value);
-}
-
-static inline lane high_half(lane a, lane b)
-{
-    return wrap((int32_t)a * b >> 16);
-}
-
-static inline lane least(lane a, lane b)
-{
-    if (a < b) {
-        return a;
-    }
-    return b;
-}
-
-static inline lane most(lane a, lane b)
-{
-    if (a > b) {
-        return a;
-    }
-    return b;
-}
-
-static inline lane within(lane value, lane limit)
-{
-    return most(least(value, limit), wrap(-limit));
-}
-
-/* All bits or none. */
-static inline lane is_above(lane a, lane b)
-{
-    return a > b ? -1 : 0;
-}
-
-static inline lane size(lane value)
-{
-    const lane sign = is_above(0, value);
-    return wrap(wrap(value ^ sign) - sign);
-}
-
-static inline lane pick(lane mask, lane yes, lane no)
-{
-    return wrap((yes & mask) | (no & ~mask));
-}
 
 static int16_t saturate_s16(int64_t value)
 {
@@ -292,6 +241,73 @@ static struct box find_box(const struct ih_bound_rays *rays, const struct place 
 }
 
 /* Sums of values, in 64ths, and how many rays they are of, at least and at most. */
+struct found {
+    int32_t inside, inside_least, inside_most;
+    int32_t around, around_least, around_most;
+};
+
+/* A mean is greatest over the fewest rays when the sum is positive, over the most when it is not;
+ * rounded up. */
+static int32_t mean_q12(int32_t sum_q6, int32_t count_least, int32_t count_most, int32_t share_q6)
+{
+    int32_t count = ih_max_s32(sum_q6 > 0 ? count_least : count_most, RAYS_LEAST);
+    return sum_q6 * share_q6 / count + 1;
+}
+
+#if LANES > 1
+
+typedef int16_t lane;
+
+/* Arithmetic of lanes, which wraps as vectors do. */
+static inline lane wrap(int32_t value)
+{
+    return IH_WRAPS(lane, value);
+}
+
+static inline lane high_half(lane a, lane b)
+{
+    return wrap((int32_t)a * b >> 16);
+}
+
+static inline lane least(lane a, lane b)
+{
+    if (a < b) {
+        return a;
+    }
+    return b;
+}
+
+static inline lane most(lane a, lane b)
+{
+    if (a > b) {
+        return a;
+    }
+    return b;
+}
+
+static inline lane within(lane value, lane limit)
+{
+    return most(least(value, limit), wrap(-limit));
+}
+
+/* All bits or none. */
+static inline lane is_above(lane a, lane b)
+{
+    return a > b ? -1 : 0;
+}
+
+static inline lane size(lane value)
+{
+    const lane sign = is_above(0, value);
+    return wrap(wrap(value ^ sign) - sign);
+}
+
+static inline lane pick(lane mask, lane yes, lane no)
+{
+    return wrap((yes & mask) | (no & ~mask));
+}
+
+/* The same, a lane for each ray. */
 struct sums {
     lane inside[LANES], inside_least[LANES], inside_most[LANES];
     lane around[LANES], around_least[LANES], around_most[LANES];
@@ -329,27 +345,14 @@ static inline lane room_inside(const struct pass *pass)
     return least(wrap(1024 - pass->radius2_q10), pass->room_q10);
 }
 
-static inline bool is_off_ring(const struct pass *pass, lane margin)
-{
-    return pass->radius2_q10 <= RING_INNER2_Q10 - margin ||
-           pass->radius2_q10 >= RING_OUTER2_Q10 + margin;
-}
-
 /* A ray beside or above the head, by its nearest place. */
 static inline void add_around(const struct place *place, const struct pass *pass, lane unseen,
                               struct sums *sums, int32_t k)
 {
     const lane margin = place->margin_q10;
-    if (ONE_BY_ONE && is_off_ring(pass, margin)) {
-        return;
-    }
-    const lane beside_q11 = beside_of(pass);
-    if (ONE_BY_ONE && beside_q11 <= -margin) {
-        return;
-    }
     const lane is_open = is_above(pass->depth_q1, place->open_mm_q1);
     const lane value = wrap((pick(is_open, AROUND_OPEN, AROUND_NEAR) & pass->seen) | unseen);
-    const lane room = room_in_ring(pass, beside_q11);
+    const lane room = room_in_ring(pass, beside_of(pass));
     const lane may = is_above(room, wrap(-margin));
     const lane must = is_above(room, margin);
     sums->around[k] =
@@ -389,13 +392,7 @@ static inline lane depth_value(const struct place *place, const struct pass *pas
     const lane margin = place->margin_q10;
     const struct entry entry = entry_of(place, pass);
     const lane may_touch = is_behind(&entry, NEARER_Q11, margin);
-    if (ONE_BY_ONE && may_touch == 0) {
-        return VALUE_NEARER;
-    }
     const lane behind = is_behind(&entry, BEHIND_Q11, wrap(-margin));
-    if (ONE_BY_ONE && behind == 0) {
-        return VALUE_ON;
-    }
     const lane far = is_behind(&entry, FAR_Q11, wrap(-margin));
     return pick(may_touch, pick(behind, pick(far, VALUE_FAR, VALUE_BEHIND), VALUE_ON),
                 VALUE_NEARER);
@@ -406,10 +403,7 @@ static inline void add_inside(const struct place *place, const struct pass *pass
                               struct sums *sums, int32_t k)
 {
     const lane margin = place->margin_q10;
-    lane value = unseen;
-    if (!ONE_BY_ONE || pass->seen != 0) {
-        value = wrap((depth_value(place, pass) & pass->seen) | unseen);
-    }
+    const lane value = wrap((depth_value(place, pass) & pass->seen) | unseen);
     const lane room = room_inside(pass);
     const lane may = is_above(room, wrap(-margin));
     lane must = is_above(room, margin);
@@ -419,56 +413,45 @@ static inline void add_inside(const struct place *place, const struct pass *pass
     sums->inside_most[k] = wrap(sums->inside_most[k] - may);
 }
 
-/* False, where rays are looked at one by one: it does not count. */
-static inline bool find_pass(const struct ih_bound_rays *rays, const struct place *place,
-                             int32_t at, struct pass *pass)
+static inline struct pass find_pass(const struct ih_bound_rays *rays, const struct place *place,
+                                    int32_t at)
 {
+    struct pass pass;
     lane dx = wrap(rays->slope_q14[0][at] - place->direction_q14[0]);
     lane dy = wrap(rays->slope_q14[1][at] - place->direction_q14[1]);
-    if (ONE_BY_ONE && (size(dx) > place->cut[0] || size(dy) > place->cut[1])) {
-        return false;
-    }
     dx = within(dx, place->cut[0]);
     dy = within(dy, place->cut[1]);
-    pass->ex_q11 = high_half(wrap(dx * place->times[0]), place->share[0]);
-    pass->ey_q11 = high_half(wrap(dy * place->times[1]), place->share[1]);
-    const lane ex_q13 = wrap(pass->ex_q11 * 4);
-    const lane ey_q13 = wrap(pass->ey_q11 * 4);
+    pass.ex_q11 = high_half(wrap(dx * place->times[0]), place->share[0]);
+    pass.ey_q11 = high_half(wrap(dy * place->times[1]), place->share[1]);
+    const lane ex_q13 = wrap(pass.ex_q11 * 4);
+    const lane ey_q13 = wrap(pass.ey_q11 * 4);
     const lane ee_q10 = wrap(high_half(ex_q13, ex_q13) + high_half(ey_q13, ey_q13));
-    pass->room_q10 = wrap(rays->reach_q10[at] - ee_q10);
-    if (ONE_BY_ONE && pass->room_q10 <= -place->margin_q10) {
-        return false;
-    }
-    pass->gx_q15 = rays->g_q15[0][at];
-    pass->gy_q15 = rays->g_q15[1][at];
-    pass->inverse_q15 = rays->inverse_q15[at];
-    const lane eg_q12 = wrap(high_half(ex_q13, pass->gx_q15) + high_half(ey_q13, pass->gy_q15));
-    pass->t_q11 = high_half(eg_q12, pass->inverse_q15);
-    pass->radius2_q10 = wrap(ee_q10 - high_half(wrap(eg_q12 * 2), wrap(pass->t_q11 * 4)));
-    pass->seen = rays->seen[at];
-    pass->depth_q1 = rays->depth_mm_q1[at];
-    return true;
+    pass.room_q10 = wrap(rays->reach_q10[at] - ee_q10);
+    pass.gx_q15 = rays->g_q15[0][at];
+    pass.gy_q15 = rays->g_q15[1][at];
+    pass.inverse_q15 = rays->inverse_q15[at];
+    const lane eg_q12 = wrap(high_half(ex_q13, pass.gx_q15) + high_half(ey_q13, pass.gy_q15));
+    pass.t_q11 = high_half(eg_q12, pass.inverse_q15);
+    pass.radius2_q10 = wrap(ee_q10 - high_half(wrap(eg_q12 * 2), wrap(pass.t_q11 * 4)));
+    pass.seen = rays->seen[at];
+    pass.depth_q1 = rays->depth_mm_q1[at];
+    return pass;
 }
 
-/* Rays of some columns, around the head, through it or both. Loops of LANES turns become vectors. */
+/* Rays of some columns, around the head or through it. Loops of LANES turns become vectors. */
 static inline void add_rays(const struct ih_bound_rays *rays, const struct place *place,
-                            struct span columns, struct span rows, bool is_around, bool is_inside,
+                            struct span columns, struct span rows, bool is_inside,
                             struct sums *sums)
 {
     for (int32_t row = rows.begin; row < rows.end; row += LANES) {
         for (int32_t column = columns.begin; column < columns.end; column++) {
             for (int32_t k = 0; k < LANES; k++) {
-                struct pass pass;
                 const int32_t at = column * IH_BOUND_COLUMN + row + k;
-                if (!find_pass(rays, place, at, &pass)) {
-                    continue;
-                }
-                const bool is_out = pass.radius2_q10 > 1024 + place->margin_q10;
-                if (is_around && (!ONE_BY_ONE || is_out)) {
-                    add_around(place, &pass, rays->around[at], sums, k);
-                }
-                if (is_inside && (!ONE_BY_ONE || !is_out)) {
+                const struct pass pass = find_pass(rays, place, at);
+                if (is_inside) {
                     add_inside(place, &pass, rays->inside[at], sums, k);
+                } else {
+                    add_around(place, &pass, rays->around[at], sums, k);
                 }
             }
         }
@@ -484,41 +467,6 @@ static int32_t total(const lane lanes[LANES])
     return sum;
 }
 
-/* A mean is greatest over the fewest rays when the sum is positive, over the most when it is not;
- * rounded up. */
-static int32_t mean_q12(int32_t sum_q6, int32_t count_least, int32_t count_most, int32_t share_q6)
-{
-    int32_t count = ih_max_s32(sum_q6 > 0 ? count_least : count_most, RAYS_LEAST);
-    return sum_q6 * share_q6 / count + 1;
-}
-
-int32_t ih_bound_score_q12(const struct ih_space *space, const struct ih_bound_rays *rays,
-                           const int32_t centre_mm_q8[3])
-{
-    struct place place;
-    struct sums sums;
-    if (!set_place(&place, space, rays, centre_mm_q8)) {
-        return IH_BOUND_MOST_Q12;
-    }
-    const struct box box = find_box(rays, &place);
-    memset(&sums, 0, sizeof sums);
-    if (ONE_BY_ONE) {
-        add_rays(rays, &place, box.columns, box.rows, true, true, &sums);
-    } else {
-        add_rays(rays, &place, box.columns, box.rows, true, false, &sums);
-        add_rays(rays, &place, box.through, box.rows, false, true, &sums);
-    }
-    const int32_t around = total(sums.around);
-    const int32_t inside = total(sums.inside);
-    const int32_t around_least = total(sums.around_least);
-    const int32_t around_most = total(sums.around_most);
-    /* 0.6 of 64 is 38.4 */
-    const int32_t around_q12 = around > 0 ? mean_q12(around * 3, around_least, around_most, 13)
-                                          : mean_q12(around, around_least, around_most, 38);
-    return mean_q12(inside, total(sums.inside_least), total(sums.inside_most), 64) + around_q12 +
-           CUT_Q12;
-}
-
 /* What rays count as, a lane for each of them. */
 struct counts {
     lane on[LANES], nearer[LANES], empty[LANES], far[LANES];
@@ -531,11 +479,7 @@ static inline lane judge_around(const struct ih_bound_rays *rays, const struct p
                                 int32_t k)
 {
     const lane margin = place->margin_q10;
-    if (ONE_BY_ONE && is_off_ring(pass, margin)) {
-        return 0;
-    }
-    const lane beside_q11 = beside_of(pass);
-    const lane room = room_in_ring(pass, beside_q11);
+    const lane room = room_in_ring(pass, beside_of(pass));
     const lane may = is_above(room, wrap(-margin));
     const lane open = is_above(pass->depth_q1, wrap(place->open_mm_q1 + 1));
     const lane closed = is_above(wrap(place->open_mm_q1 + 1), pass->depth_q1);
@@ -575,42 +519,33 @@ static inline lane judge_inside(const struct ih_bound_rays *rays, const struct p
 }
 
 static inline void judge_rays(const struct ih_bound_rays *rays, const struct place *place,
-                              struct span columns, struct span rows, bool is_around, bool is_inside,
-                              struct counts *counts, int16_t unsure[IH_BOUND_RAYS])
+                              struct span columns, struct span rows, bool is_inside,
+                              struct counts *counts, int16_t is_unsure[IH_BOUND_RAYS])
 {
     for (int32_t row = rows.begin; row < rows.end; row += LANES) {
         for (int32_t column = columns.begin; column < columns.end; column++) {
             for (int32_t k = 0; k < LANES; k++) {
-                struct pass pass;
                 const int32_t at = column * IH_BOUND_COLUMN + row + k;
-                lane is_unsure = is_around ? 0 : unsure[at];
-                if (!find_pass(rays, place, at, &pass)) {
-                    unsure[at] = 0;
-                    continue;
+                const struct pass pass = find_pass(rays, place, at);
+                if (is_inside) {
+                    is_unsure[at] |= judge_inside(rays, place, at, &pass, counts, k);
+                } else {
+                    is_unsure[at] = judge_around(rays, place, at, &pass, counts, k);
                 }
-                const bool is_out = pass.radius2_q10 > 1024 + place->margin_q10;
-                if (is_around && (!ONE_BY_ONE || is_out)) {
-                    is_unsure |= judge_around(rays, place, at, &pass, counts, k);
-                }
-                if (is_inside && (!ONE_BY_ONE || !is_out)) {
-                    is_unsure |= judge_inside(rays, place, at, &pass, counts, k);
-                }
-                unsure[at] = (int16_t)is_unsure;
             }
         }
     }
 }
 
-/* The slots of unsure rays; where there are vectors, four are passed over at once. */
+/* The slots of unsure rays; four are passed over at once. */
 static void list_unsure(const struct box *box, struct ih_bound_verdict *out)
 {
-    const int32_t step = ONE_BY_ONE ? 1 : 4;
     for (int32_t column = box->columns.begin; column < box->columns.end; column++) {
-        for (int32_t row = box->rows.begin; row < box->rows.end; row += step) {
+        for (int32_t row = box->rows.begin; row < box->rows.end; row += 4) {
             const int16_t *unsure = &out->is_unsure[column * IH_BOUND_COLUMN + row];
-            uint64_t any = 0;
-            memcpy(&any, unsure, (size_t)step * sizeof *unsure);
-            for (int32_t k = 0; any != 0 && k < step; k++) {
+            uint64_t any;
+            memcpy(&any, unsure, sizeof any);
+            for (int32_t k = 0; any != 0 && k < 4; k++) {
                 if (unsure[k] != 0) {
                     out->unsure[out->unsure_count++] = (int16_t)((row + k) * IH_GRID + column);
                 }
@@ -619,27 +554,31 @@ static void list_unsure(const struct box *box, struct ih_bound_verdict *out)
     }
 }
 
-void ih_bound_judge(const struct ih_space *space, const struct ih_bound_rays *rays,
-                    const int32_t centre_mm_q8[3], struct ih_bound_verdict *out)
+static void sum_up(const struct ih_bound_rays *rays, const struct place *place,
+                   const struct box *box, struct found *out)
 {
-    struct place place;
+    struct sums sums;
+    memset(&sums, 0, sizeof sums);
+    add_rays(rays, place, box->columns, box->rows, false, &sums);
+    add_rays(rays, place, box->through, box->rows, true, &sums);
+    *out = (struct found){
+        .inside = total(sums.inside),
+        .inside_least = total(sums.inside_least),
+        .inside_most = total(sums.inside_most),
+        .around = total(sums.around),
+        .around_least = total(sums.around_least),
+        .around_most = total(sums.around_most),
+    };
+}
+
+static void judge(const struct ih_bound_rays *rays, const struct place *place,
+                  const struct box *box, struct ih_bound_verdict *out)
+{
     struct counts counts;
-    out->unsure_count = 0;
     memset(&counts, 0, sizeof counts);
-    if (set_place(&place, space, rays, centre_mm_q8)) {
-        const struct box box = find_box(rays, &place);
-        if (ONE_BY_ONE) {
-            judge_rays(rays, &place, box.columns, box.rows, true, true, &counts, out->is_unsure);
-        } else {
-            judge_rays(rays, &place, box.columns, box.rows, true, false, &counts, out->is_unsure);
-            judge_rays(rays, &place, box.through, box.rows, false, true, &counts, out->is_unsure);
-        }
-        list_unsure(&box, out);
-    } else {
-        for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
-            out->unsure[out->unsure_count++] = (int16_t)slot;
-        }
-    }
+    judge_rays(rays, place, box->columns, box->rows, false, &counts, out->is_unsure);
+    judge_rays(rays, place, box->through, box->rows, true, &counts, out->is_unsure);
+    list_unsure(box, out);
     out->on = total(counts.on);
     out->nearer = total(counts.nearer);
     out->empty = total(counts.empty);
@@ -648,4 +587,210 @@ void ih_bound_judge(const struct ih_space *space, const struct ih_bound_rays *ra
     out->open_empty = total(counts.open_empty);
     out->closed = total(counts.closed);
     out->unknown = total(counts.unknown);
+}
+
+#else
+
+/* What a ray is worth; twice that, and 1 more when it surely counts, is where it is counted. */
+enum worth {
+    ON,
+    NEARER,
+    BEHIND,
+    FAR,
+    EMPTY,
+    UNKNOWN,
+    AROUND_WORTHS, /* from here on beside and above */
+    OPEN = AROUND_WORTHS,
+    CLOSED,
+    OPEN_EMPTY,
+    OPEN_UNKNOWN,
+    WORTHS
+};
+#define NOTHING (2 * WORTHS) /* where rays are counted that do not count */
+
+/* How a ray passes. */
+struct pass {
+    int32_t ex_q11, ey_q11; /* at the centre's depth */
+    int32_t room_q10, t_q11, radius2_q10;
+};
+
+static inline int32_t beside_of(const struct ih_bound_rays *rays, int32_t at,
+                                const struct pass *pass)
+{
+    const int32_t x_q12 = 2 * (pass->ex_q11 - (pass->t_q11 * rays->g_q15[0][at] >> 15));
+    const int32_t y_q11 = pass->ey_q11 - (pass->t_q11 * rays->g_q15[1][at] >> 15);
+    return (ih_abs_s32(x_q12) * X_OVER_Y_Q15 >> 16) - y_q11;
+}
+
+static inline int32_t look_around(const struct ih_bound_rays *rays, const struct place *place,
+                                  int32_t at, const struct pass *pass, bool is_exact)
+{
+    const int32_t margin = place->margin_q10;
+    int32_t room =
+        ih_min_s32(pass->radius2_q10 - RING_INNER2_Q10, RING_OUTER2_Q10 - pass->radius2_q10);
+    room = ih_min_s32(room, pass->room_q10);
+    if (room <= -margin) {
+        return NOTHING;
+    }
+    room = ih_min_s32(room, beside_of(rays, at, pass));
+    if (room <= -margin) {
+        return NOTHING;
+    }
+    bool is_sure = room > margin;
+    enum worth worth = rays->around[at] > 0 ? OPEN_EMPTY : OPEN_UNKNOWN;
+    if (rays->seen[at] != 0) {
+        const int32_t behind = rays->depth_mm_q1[at] - place->open_mm_q1;
+        worth = behind > 0 ? OPEN : CLOSED;
+        is_sure = is_sure && !(is_exact && behind == 1);
+    }
+    return 2 * (int32_t)worth + is_sure;
+}
+
+/* Is a point, with its margin, farther behind the entry than this? */
+static inline bool is_behind(int32_t root2_q10, int32_t before_q11, int32_t behind_q11)
+{
+    const int32_t root_q11 = ih_min_s32(ih_max_s32(before_q11 + behind_q11, 0), ROOT_CUT_Q11);
+    return root2_q10 > root_q11 * root_q11 >> 12;
+}
+
+static inline int32_t look_inside(const struct ih_bound_rays *rays, const struct place *place,
+                                  int32_t at, const struct pass *pass, bool is_exact)
+{
+    const int32_t margin = place->margin_q10;
+    const bool is_sure = ih_min_s32(1024 - pass->radius2_q10, pass->room_q10) > margin;
+    if (rays->seen[at] == 0) {
+        return 2 * (int32_t)(rays->around[at] > 0 ? EMPTY : UNKNOWN) + is_sure;
+    }
+    const int32_t dz_q1 =
+        ih_clamp_s32(rays->depth_mm_q1[at] - place->depth_mm_q1, -DEPTH_CUT_Q1, DEPTH_CUT_Q1);
+    const int32_t before_q11 =
+        -((dz_q1 * (DEPTH_WHOLE * 65536 + DEPTH_PART_Q16) >> 16) + pass->t_q11);
+    const int32_t root2_q10 = (1024 - pass->radius2_q10) * 16 * rays->inverse_q15[at] >> 19;
+    enum worth worth = ON;
+    if (!is_behind(root2_q10 + margin, before_q11, NEARER_Q11)) {
+        worth = NEARER;
+    } else if (is_behind(root2_q10 - margin, before_q11, BEHIND_Q11)) {
+        worth = is_behind(root2_q10 - margin, before_q11, FAR_Q11) ? FAR : BEHIND;
+    } else if (is_exact && (!is_behind(root2_q10 - margin, before_q11, -ON_Q11) ||
+                            is_behind(root2_q10 + margin, before_q11, ON_Q11))) {
+        worth = BEHIND;
+    }
+    return 2 * (int32_t)worth + is_sure;
+}
+
+/* Where a ray is counted; exact: where it may be on either side of a limit, not as ON nor as sure. */
+static inline int32_t look(const struct ih_bound_rays *rays, const struct place *place, int32_t at,
+                           bool is_exact)
+{
+    struct pass pass;
+    const int32_t dx = rays->slope_q14[0][at] - place->direction_q14[0];
+    const int32_t dy = rays->slope_q14[1][at] - place->direction_q14[1];
+    if (ih_abs_s32(dx) > place->cut[0] || ih_abs_s32(dy) > place->cut[1]) {
+        return NOTHING;
+    }
+    pass.ex_q11 = dx * (place->times[0] * place->share[0]) >> 16;
+    pass.ey_q11 = dy * (place->times[1] * place->share[1]) >> 16;
+    const int32_t ee_q10 = (pass.ex_q11 * pass.ex_q11 >> 12) + (pass.ey_q11 * pass.ey_q11 >> 12);
+    pass.room_q10 = rays->reach_q10[at] - ee_q10;
+    if (pass.room_q10 <= -place->margin_q10) {
+        return NOTHING;
+    }
+    const int32_t eg_q12 =
+        (pass.ex_q11 * rays->g_q15[0][at] >> 14) + (pass.ey_q11 * rays->g_q15[1][at] >> 14);
+    pass.t_q11 = eg_q12 * rays->inverse_q15[at] >> 16;
+    pass.radius2_q10 = ee_q10 - (eg_q12 * pass.t_q11 >> 13);
+    return pass.radius2_q10 >= 1024 + place->margin_q10
+               ? look_around(rays, place, at, &pass, is_exact)
+               : look_inside(rays, place, at, &pass, is_exact);
+}
+
+static void sum_up(const struct ih_bound_rays *rays, const struct place *place,
+                   const struct box *box, struct found *out)
+{
+    static const int8_t value[WORTHS] = {
+        VALUE_ON,      VALUE_NEARER, VALUE_BEHIND, VALUE_FAR,    VALUE_EMPTY,
+        VALUE_UNKNOWN, AROUND_OPEN,  AROUND_NEAR,  AROUND_EMPTY, 0,
+    };
+    int32_t count[NOTHING + 1] = {0};
+    for (int32_t column = box->columns.begin; column < box->columns.end; column++) {
+        for (int32_t row = box->rows.begin; row < box->rows.end; row++) {
+            count[look(rays, place, column * IH_BOUND_COLUMN + row, false)]++;
+        }
+    }
+    *out = (struct found){0};
+    count[2 * ON + 1] += count[2 * ON]; /* a value of 1 lowers no mean */
+    count[2 * ON] = 0;
+    for (int32_t worth = 0; worth < WORTHS; worth++) {
+        const int32_t sure = count[2 * worth + 1];
+        const int32_t all = sure + count[2 * worth];
+        const int32_t sum = value[worth] * (value[worth] > 0 ? all : sure);
+        if (worth < (int32_t)AROUND_WORTHS) {
+            out->inside += sum;
+            out->inside_least += sure;
+            out->inside_most += all;
+        } else {
+            out->around += sum;
+            out->around_least += sure;
+            out->around_most += all;
+        }
+    }
+}
+
+static void judge(const struct ih_bound_rays *rays, const struct place *place,
+                  const struct box *box, struct ih_bound_verdict *out)
+{
+    int32_t count[NOTHING + 1] = {0};
+    for (int32_t column = box->columns.begin; column < box->columns.end; column++) {
+        for (int32_t row = box->rows.begin; row < box->rows.end; row++) {
+            const int32_t as = look(rays, place, column * IH_BOUND_COLUMN + row, true);
+            count[as]++;
+            if (as != NOTHING && (as % 2 == 0 || as == 2 * (int32_t)BEHIND + 1)) {
+                out->unsure[out->unsure_count++] = (int16_t)(row * IH_GRID + column);
+            }
+        }
+    }
+    out->on = count[2 * ON + 1];
+    out->nearer = count[2 * NEARER + 1] + count[2 * UNKNOWN + 1];
+    out->empty = count[2 * EMPTY + 1];
+    out->far = count[2 * FAR + 1];
+    out->open = count[2 * OPEN + 1];
+    out->open_empty = count[2 * OPEN_EMPTY + 1];
+    out->closed = count[2 * CLOSED + 1];
+    out->unknown = count[2 * OPEN_UNKNOWN + 1];
+}
+
+#endif
+
+int32_t ih_bound_score_q12(const struct ih_space *space, const struct ih_bound_rays *rays,
+                           const int32_t centre_mm_q8[3])
+{
+    struct place place;
+    struct found found;
+    if (!set_place(&place, space, rays, centre_mm_q8)) {
+        return IH_BOUND_MOST_Q12;
+    }
+    const struct box box = find_box(rays, &place);
+    sum_up(rays, &place, &box, &found);
+    /* 0.6 of 64 is 38.4 */
+    const int32_t around_q12 =
+        found.around > 0 ? mean_q12(found.around * 3, found.around_least, found.around_most, 13)
+                         : mean_q12(found.around, found.around_least, found.around_most, 38);
+    return mean_q12(found.inside, found.inside_least, found.inside_most, 64) + around_q12 + CUT_Q12;
+}
+
+void ih_bound_judge(const struct ih_space *space, const struct ih_bound_rays *rays,
+                    const int32_t centre_mm_q8[3], struct ih_bound_verdict *out)
+{
+    struct place place;
+    out->unsure_count = 0;
+    if (set_place(&place, space, rays, centre_mm_q8)) {
+        const struct box box = find_box(rays, &place);
+        judge(rays, &place, &box, out);
+        return;
+    }
+    out->on = out->nearer = out->empty = out->far = 0;
+    out->open = out->open_empty = out->closed = out->unknown = 0;
+    for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
+        out->unsure[out->unsure_count++] = (int16_t)slot;
+    }
 }
