@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "ih_fix.h"
+#include "ih_lane.h"
 
 /* Values of ih_scan in 64ths, rounded up. */
 #define VALUE_ON 64
@@ -56,12 +57,8 @@
 /* Where there are no vectors, rays are looked at one by one. */
 #if defined(IH_BOUND_ONE_BY_ONE)
 #define LANES 1
-#elif defined(__AVX2__)
-#define LANES 16
-#elif defined(__SSE2__) || defined(__ARM_NEON)
-#define LANES 8
 #else
-#define LANES 1
+#define LANES IH_LANE_COUNT
 #endif
 
 static int16_t saturate_s16(int64_t value)
@@ -256,183 +253,146 @@ static int32_t mean_q12(int32_t sum_q6, int32_t count_least, int32_t count_most,
 
 #if LANES > 1
 
-typedef int16_t lane;
-
-/* Arithmetic of lanes, which wraps as vectors do. */
-static inline lane wrap(int32_t value)
-{
-    return IH_WRAPS(lane, value);
-}
-
-static inline lane high_half(lane a, lane b)
-{
-    return wrap((int32_t)a * b >> 16);
-}
-
-static inline lane least(lane a, lane b)
-{
-    if (a < b) {
-        return a;
-    }
-    return b;
-}
-
-static inline lane most(lane a, lane b)
-{
-    if (a > b) {
-        return a;
-    }
-    return b;
-}
-
-static inline lane within(lane value, lane limit)
-{
-    return most(least(value, limit), wrap(-limit));
-}
-
-/* All bits or none. */
-static inline lane is_above(lane a, lane b)
-{
-    return a > b ? -1 : 0;
-}
-
-static inline lane size(lane value)
-{
-    const lane sign = is_above(0, value);
-    return wrap(wrap(value ^ sign) - sign);
-}
-
-static inline lane pick(lane mask, lane yes, lane no)
-{
-    return wrap((yes & mask) | (no & ~mask));
-}
-
 /* The same, a lane for each ray. */
 struct sums {
-    lane inside[LANES], inside_least[LANES], inside_most[LANES];
-    lane around[LANES], around_least[LANES], around_most[LANES];
+    ih_lane inside[LANES], inside_least[LANES], inside_most[LANES];
+    ih_lane around[LANES], around_least[LANES], around_most[LANES];
 };
 
 /* How a ray passes. */
 struct pass {
-    lane ex_q11, ey_q11; /* at the centre's depth */
-    lane gx_q15, gy_q15;
-    lane t_q11, inverse_q15, radius2_q10;
-    lane room_q10; /* to the reach */
-    lane seen, depth_q1;
+    ih_lane ex_q11, ey_q11; /* at the centre's depth */
+    ih_lane gx_q15, gy_q15;
+    ih_lane t_q11, inverse_q15, radius2_q10;
+    ih_lane room_q10; /* to the reach */
+    ih_lane seen, depth_q1;
 };
 
 /* Where a ray passes the ring, by how much more it is aside than down, at its nearest place. */
-static inline lane beside_of(const struct pass *pass)
+static inline ih_lane beside_of(const struct pass *pass)
 {
-    const lane t_q12 = wrap(pass->t_q11 * 2);
-    const lane x_q12 = wrap(wrap(pass->ex_q11 - high_half(t_q12, pass->gx_q15)) * 2);
-    const lane y_q11 = wrap(pass->ey_q11 - high_half(t_q12, pass->gy_q15));
-    return wrap(high_half(size(x_q12), X_OVER_Y_Q15) - y_q11);
+    const ih_lane t_q12 = ih_lane_wrap(pass->t_q11 * 2);
+    const ih_lane x_q12 =
+        ih_lane_wrap(ih_lane_wrap(pass->ex_q11 - ih_lane_high_half(t_q12, pass->gx_q15)) * 2);
+    const ih_lane y_q11 = ih_lane_wrap(pass->ey_q11 - ih_lane_high_half(t_q12, pass->gy_q15));
+    return ih_lane_wrap(ih_lane_high_half(ih_lane_size(x_q12), X_OVER_Y_Q15) - y_q11);
 }
 
 /* How far a ray's place is from the next limit of where it counts: above the margin it surely does,
  * below minus the margin it surely does not. e.e and radius2 in Q10, beside in Q11. */
-static inline lane room_in_ring(const struct pass *pass, lane beside_q11)
+static inline ih_lane room_in_ring(const struct pass *pass, ih_lane beside_q11)
 {
-    const lane ring =
-        least(wrap(pass->radius2_q10 - RING_INNER2_Q10), wrap(RING_OUTER2_Q10 - pass->radius2_q10));
-    return least(least(ring, beside_q11), pass->room_q10);
+    const ih_lane ring = ih_lane_least(ih_lane_wrap(pass->radius2_q10 - RING_INNER2_Q10),
+                                       ih_lane_wrap(RING_OUTER2_Q10 - pass->radius2_q10));
+    return ih_lane_least(ih_lane_least(ring, beside_q11), pass->room_q10);
 }
 
-static inline lane room_inside(const struct pass *pass)
+static inline ih_lane room_inside(const struct pass *pass)
 {
-    return least(wrap(1024 - pass->radius2_q10), pass->room_q10);
+    return ih_lane_least(ih_lane_wrap(1024 - pass->radius2_q10), pass->room_q10);
 }
 
 /* A ray beside or above the head, by its nearest place. */
-static inline void add_around(const struct place *place, const struct pass *pass, lane unseen,
+static inline void add_around(const struct place *place, const struct pass *pass, ih_lane unseen,
                               struct sums *sums, int32_t k)
 {
-    const lane margin = place->margin_q10;
-    const lane is_open = is_above(pass->depth_q1, place->open_mm_q1);
-    const lane value = wrap((pick(is_open, AROUND_OPEN, AROUND_NEAR) & pass->seen) | unseen);
-    const lane room = room_in_ring(pass, beside_of(pass));
-    const lane may = is_above(room, wrap(-margin));
-    const lane must = is_above(room, margin);
+    const ih_lane margin = place->margin_q10;
+    const ih_lane is_open = ih_lane_is_above(pass->depth_q1, place->open_mm_q1);
+    const ih_lane value =
+        ih_lane_wrap((ih_lane_pick(is_open, AROUND_OPEN, AROUND_NEAR) & pass->seen) | unseen);
+    const ih_lane room = room_in_ring(pass, beside_of(pass));
+    const ih_lane may = ih_lane_is_above(room, ih_lane_wrap(-margin));
+    const ih_lane must = ih_lane_is_above(room, margin);
     sums->around[k] =
-        wrap(sums->around[k] + wrap((most(value, 0) & may) + (least(value, 0) & must)));
-    sums->around_least[k] = wrap(sums->around_least[k] - must);
-    sums->around_most[k] = wrap(sums->around_most[k] - may);
+        ih_lane_wrap(sums->around[k] + ih_lane_wrap((ih_lane_most(value, 0) & may) +
+                                                    (ih_lane_least(value, 0) & must)));
+    sums->around_least[k] = ih_lane_wrap(sums->around_least[k] - must);
+    sums->around_most[k] = ih_lane_wrap(sums->around_most[k] - may);
 }
 
 /* How far a ray's point is from where it enters: the square of half the way through the head, and what
  * is compared with its root. */
 struct entry {
-    lane before_q11; /* how much nearer than the ray's nearest place the point is */
-    lane root2_q10;
+    ih_lane before_q11; /* how much nearer than the ray's nearest place the point is */
+    ih_lane root2_q10;
 };
 
 static inline struct entry entry_of(const struct place *place, const struct pass *pass)
 {
-    const lane dz_q1 = within(wrap(pass->depth_q1 - place->depth_mm_q1), DEPTH_CUT_Q1);
-    const lane dz_q11 = wrap(wrap(dz_q1 * DEPTH_WHOLE) + high_half(dz_q1, DEPTH_PART_Q16));
+    const ih_lane dz_q1 =
+        ih_lane_within(ih_lane_wrap(pass->depth_q1 - place->depth_mm_q1), DEPTH_CUT_Q1);
+    const ih_lane dz_q11 =
+        ih_lane_wrap(ih_lane_wrap(dz_q1 * DEPTH_WHOLE) + ih_lane_high_half(dz_q1, DEPTH_PART_Q16));
     return (struct entry){
-        .before_q11 = wrap(-wrap(dz_q11 + pass->t_q11)),
-        .root2_q10 =
-            wrap(high_half(wrap(wrap(1024 - pass->radius2_q10) * 16), pass->inverse_q15) >> 3),
+        .before_q11 = ih_lane_wrap(-ih_lane_wrap(dz_q11 + pass->t_q11)),
+        .root2_q10 = ih_lane_wrap(
+            ih_lane_high_half(ih_lane_wrap(ih_lane_wrap(1024 - pass->radius2_q10) * 16),
+                              pass->inverse_q15) >>
+            3),
     };
 }
 
 /* Is the point, with its margin, farther behind the entry than this? */
-static inline lane is_behind(const struct entry *entry, lane behind_q11, lane margin)
+static inline ih_lane is_behind(const struct entry *entry, ih_lane behind_q11, ih_lane margin)
 {
-    const lane root = wrap(least(most(wrap(entry->before_q11 + behind_q11), 0), ROOT_CUT_Q11) * 4);
-    return is_above(wrap(entry->root2_q10 + margin), high_half(root, root));
+    const ih_lane root = ih_lane_wrap(
+        ih_lane_least(ih_lane_most(ih_lane_wrap(entry->before_q11 + behind_q11), 0), ROOT_CUT_Q11) *
+        4);
+    return ih_lane_is_above(ih_lane_wrap(entry->root2_q10 + margin), ih_lane_high_half(root, root));
 }
 
 /* How far a ray's point is behind the entry says what it is worth. */
-static inline lane depth_value(const struct place *place, const struct pass *pass)
+static inline ih_lane depth_value(const struct place *place, const struct pass *pass)
 {
-    const lane margin = place->margin_q10;
+    const ih_lane margin = place->margin_q10;
     const struct entry entry = entry_of(place, pass);
-    const lane may_touch = is_behind(&entry, NEARER_Q11, margin);
-    const lane behind = is_behind(&entry, BEHIND_Q11, wrap(-margin));
-    const lane far = is_behind(&entry, FAR_Q11, wrap(-margin));
-    return pick(may_touch, pick(behind, pick(far, VALUE_FAR, VALUE_BEHIND), VALUE_ON),
-                VALUE_NEARER);
+    const ih_lane may_touch = is_behind(&entry, NEARER_Q11, margin);
+    const ih_lane behind = is_behind(&entry, BEHIND_Q11, ih_lane_wrap(-margin));
+    const ih_lane far = is_behind(&entry, FAR_Q11, ih_lane_wrap(-margin));
+    return ih_lane_pick(may_touch,
+                        ih_lane_pick(behind, ih_lane_pick(far, VALUE_FAR, VALUE_BEHIND), VALUE_ON),
+                        VALUE_NEARER);
 }
 
 /* A ray through it. */
-static inline void add_inside(const struct place *place, const struct pass *pass, lane unseen,
+static inline void add_inside(const struct place *place, const struct pass *pass, ih_lane unseen,
                               struct sums *sums, int32_t k)
 {
-    const lane margin = place->margin_q10;
-    const lane value = wrap((depth_value(place, pass) & pass->seen) | unseen);
-    const lane room = room_inside(pass);
-    const lane may = is_above(room, wrap(-margin));
-    lane must = is_above(room, margin);
-    must = wrap(must | (may & is_above(value, 0))); /* a value of 1 lowers no mean */
-    sums->inside[k] = wrap(sums->inside[k] + (value & must));
-    sums->inside_least[k] = wrap(sums->inside_least[k] - must);
-    sums->inside_most[k] = wrap(sums->inside_most[k] - may);
+    const ih_lane margin = place->margin_q10;
+    const ih_lane value = ih_lane_wrap((depth_value(place, pass) & pass->seen) | unseen);
+    const ih_lane room = room_inside(pass);
+    const ih_lane may = ih_lane_is_above(room, ih_lane_wrap(-margin));
+    ih_lane must = ih_lane_is_above(room, margin);
+    must =
+        ih_lane_wrap(must | (may & ih_lane_is_above(value, 0))); /* a value of 1 lowers no mean */
+    sums->inside[k] = ih_lane_wrap(sums->inside[k] + (value & must));
+    sums->inside_least[k] = ih_lane_wrap(sums->inside_least[k] - must);
+    sums->inside_most[k] = ih_lane_wrap(sums->inside_most[k] - may);
 }
 
 static inline struct pass find_pass(const struct ih_bound_rays *rays, const struct place *place,
                                     int32_t at)
 {
     struct pass pass;
-    lane dx = wrap(rays->slope_q14[0][at] - place->direction_q14[0]);
-    lane dy = wrap(rays->slope_q14[1][at] - place->direction_q14[1]);
-    dx = within(dx, place->cut[0]);
-    dy = within(dy, place->cut[1]);
-    pass.ex_q11 = high_half(wrap(dx * place->times[0]), place->share[0]);
-    pass.ey_q11 = high_half(wrap(dy * place->times[1]), place->share[1]);
-    const lane ex_q13 = wrap(pass.ex_q11 * 4);
-    const lane ey_q13 = wrap(pass.ey_q11 * 4);
-    const lane ee_q10 = wrap(high_half(ex_q13, ex_q13) + high_half(ey_q13, ey_q13));
-    pass.room_q10 = wrap(rays->reach_q10[at] - ee_q10);
+    ih_lane dx = ih_lane_wrap(rays->slope_q14[0][at] - place->direction_q14[0]);
+    ih_lane dy = ih_lane_wrap(rays->slope_q14[1][at] - place->direction_q14[1]);
+    dx = ih_lane_within(dx, place->cut[0]);
+    dy = ih_lane_within(dy, place->cut[1]);
+    pass.ex_q11 = ih_lane_high_half(ih_lane_wrap(dx * place->times[0]), place->share[0]);
+    pass.ey_q11 = ih_lane_high_half(ih_lane_wrap(dy * place->times[1]), place->share[1]);
+    const ih_lane ex_q13 = ih_lane_wrap(pass.ex_q11 * 4);
+    const ih_lane ey_q13 = ih_lane_wrap(pass.ey_q11 * 4);
+    const ih_lane ee_q10 =
+        ih_lane_wrap(ih_lane_high_half(ex_q13, ex_q13) + ih_lane_high_half(ey_q13, ey_q13));
+    pass.room_q10 = ih_lane_wrap(rays->reach_q10[at] - ee_q10);
     pass.gx_q15 = rays->g_q15[0][at];
     pass.gy_q15 = rays->g_q15[1][at];
     pass.inverse_q15 = rays->inverse_q15[at];
-    const lane eg_q12 = wrap(high_half(ex_q13, pass.gx_q15) + high_half(ey_q13, pass.gy_q15));
-    pass.t_q11 = high_half(eg_q12, pass.inverse_q15);
-    pass.radius2_q10 = wrap(ee_q10 - high_half(wrap(eg_q12 * 2), wrap(pass.t_q11 * 4)));
+    const ih_lane eg_q12 = ih_lane_wrap(ih_lane_high_half(ex_q13, pass.gx_q15) +
+                                        ih_lane_high_half(ey_q13, pass.gy_q15));
+    pass.t_q11 = ih_lane_high_half(eg_q12, pass.inverse_q15);
+    pass.radius2_q10 = ih_lane_wrap(
+        ee_q10 - ih_lane_high_half(ih_lane_wrap(eg_q12 * 2), ih_lane_wrap(pass.t_q11 * 4)));
     pass.seen = rays->seen[at];
     pass.depth_q1 = rays->depth_mm_q1[at];
     return pass;
@@ -458,64 +418,65 @@ static inline void add_rays(const struct ih_bound_rays *rays, const struct place
     }
 }
 
-static int32_t total(const lane lanes[LANES])
+static int32_t total(const ih_lane lanes[LANES])
 {
-    lane sum = 0;
+    ih_lane sum = 0;
     for (int32_t k = 0; k < LANES; k++) {
-        sum = wrap(sum + lanes[k]);
+        sum = ih_lane_wrap(sum + lanes[k]);
     }
     return sum;
 }
 
 /* What rays count as, a lane for each of them. */
 struct counts {
-    lane on[LANES], nearer[LANES], empty[LANES], far[LANES];
-    lane open[LANES], open_empty[LANES], closed[LANES], unknown[LANES];
+    ih_lane on[LANES], nearer[LANES], empty[LANES], far[LANES];
+    ih_lane open[LANES], open_empty[LANES], closed[LANES], unknown[LANES];
 };
 
 /* A ray beside or above: all bits when it may count, and that is not sure. */
-static inline lane judge_around(const struct ih_bound_rays *rays, const struct place *place,
-                                int32_t at, const struct pass *pass, struct counts *counts,
-                                int32_t k)
+static inline ih_lane judge_around(const struct ih_bound_rays *rays, const struct place *place,
+                                   int32_t at, const struct pass *pass, struct counts *counts,
+                                   int32_t k)
 {
-    const lane margin = place->margin_q10;
-    const lane room = room_in_ring(pass, beside_of(pass));
-    const lane may = is_above(room, wrap(-margin));
-    const lane open = is_above(pass->depth_q1, wrap(place->open_mm_q1 + 1));
-    const lane closed = is_above(wrap(place->open_mm_q1 + 1), pass->depth_q1);
-    const lane must = wrap(is_above(room, margin) & (open | closed | ~pass->seen));
-    const lane seen = wrap(must & pass->seen);
-    const lane unseen = wrap(must & ~pass->seen);
-    const lane empty = is_above(rays->around[at], 0);
-    counts->open[k] = wrap(counts->open[k] - (seen & open));
-    counts->closed[k] = wrap(counts->closed[k] - (seen & closed));
-    counts->open_empty[k] = wrap(counts->open_empty[k] - (unseen & empty));
-    counts->unknown[k] = wrap(counts->unknown[k] - (unseen & ~empty));
-    return wrap(may & ~must);
+    const ih_lane margin = place->margin_q10;
+    const ih_lane room = room_in_ring(pass, beside_of(pass));
+    const ih_lane may = ih_lane_is_above(room, ih_lane_wrap(-margin));
+    const ih_lane open = ih_lane_is_above(pass->depth_q1, ih_lane_wrap(place->open_mm_q1 + 1));
+    const ih_lane closed = ih_lane_is_above(ih_lane_wrap(place->open_mm_q1 + 1), pass->depth_q1);
+    const ih_lane must =
+        ih_lane_wrap(ih_lane_is_above(room, margin) & (open | closed | ~pass->seen));
+    const ih_lane seen = ih_lane_wrap(must & pass->seen);
+    const ih_lane unseen = ih_lane_wrap(must & ~pass->seen);
+    const ih_lane empty = ih_lane_is_above(rays->around[at], 0);
+    counts->open[k] = ih_lane_wrap(counts->open[k] - (seen & open));
+    counts->closed[k] = ih_lane_wrap(counts->closed[k] - (seen & closed));
+    counts->open_empty[k] = ih_lane_wrap(counts->open_empty[k] - (unseen & empty));
+    counts->unknown[k] = ih_lane_wrap(counts->unknown[k] - (unseen & ~empty));
+    return ih_lane_wrap(may & ~must);
 }
 
 /* A ray through it. */
-static inline lane judge_inside(const struct ih_bound_rays *rays, const struct place *place,
-                                int32_t at, const struct pass *pass, struct counts *counts,
-                                int32_t k)
+static inline ih_lane judge_inside(const struct ih_bound_rays *rays, const struct place *place,
+                                   int32_t at, const struct pass *pass, struct counts *counts,
+                                   int32_t k)
 {
-    const lane margin = place->margin_q10;
-    const lane room = room_inside(pass);
-    const lane may = is_above(room, wrap(-margin));
-    const lane must = is_above(room, margin);
-    const lane unseen = wrap(must & ~pass->seen);
-    const lane empty = wrap(unseen & is_above(rays->around[at], 0));
+    const ih_lane margin = place->margin_q10;
+    const ih_lane room = room_inside(pass);
+    const ih_lane may = ih_lane_is_above(room, ih_lane_wrap(-margin));
+    const ih_lane must = ih_lane_is_above(room, margin);
+    const ih_lane unseen = ih_lane_wrap(must & ~pass->seen);
+    const ih_lane empty = ih_lane_wrap(unseen & ih_lane_is_above(rays->around[at], 0));
     const struct entry entry = entry_of(place, pass);
-    const lane seen = wrap(must & pass->seen);
-    const lane nearer = wrap(seen & ~is_behind(&entry, NEARER_Q11, margin));
-    const lane far = wrap(seen & is_behind(&entry, FAR_Q11, wrap(-margin)));
-    const lane on =
-        wrap(seen & is_behind(&entry, -ON_Q11, wrap(-margin)) & ~is_behind(&entry, ON_Q11, margin));
-    counts->on[k] = wrap(counts->on[k] - on);
-    counts->nearer[k] = wrap(counts->nearer[k] - nearer - (unseen & ~empty));
-    counts->empty[k] = wrap(counts->empty[k] - empty);
-    counts->far[k] = wrap(counts->far[k] - far);
-    return wrap(may & ~(unseen | nearer | far | on));
+    const ih_lane seen = ih_lane_wrap(must & pass->seen);
+    const ih_lane nearer = ih_lane_wrap(seen & ~is_behind(&entry, NEARER_Q11, margin));
+    const ih_lane far = ih_lane_wrap(seen & is_behind(&entry, FAR_Q11, ih_lane_wrap(-margin)));
+    const ih_lane on = ih_lane_wrap(seen & is_behind(&entry, -ON_Q11, ih_lane_wrap(-margin)) &
+                                    ~is_behind(&entry, ON_Q11, margin));
+    counts->on[k] = ih_lane_wrap(counts->on[k] - on);
+    counts->nearer[k] = ih_lane_wrap(counts->nearer[k] - nearer - (unseen & ~empty));
+    counts->empty[k] = ih_lane_wrap(counts->empty[k] - empty);
+    counts->far[k] = ih_lane_wrap(counts->far[k] - far);
+    return ih_lane_wrap(may & ~(unseen | nearer | far | on));
 }
 
 static inline void judge_rays(const struct ih_bound_rays *rays, const struct place *place,

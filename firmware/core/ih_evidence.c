@@ -23,10 +23,6 @@
 #define BEFORE_MM_Q8 (60 << 8)
 #define PLANE_POINTS_MIN 6
 
-struct share {
-    int32_t part, all;
-};
-
 /* The candidate, and what is the same for all rays. */
 struct candidate {
     const struct ih_ellipsoid *ellipsoid;
@@ -49,8 +45,8 @@ struct view {
 };
 
 struct tally {
-    struct share above, left, right, below, high, nothing, body, wide, level, shoulder[2];
-    int32_t on, before, through, hit, front;
+    struct ih_tally around;
+    int32_t on, through, hit, front;
     int64_t on_square_q16; /* sum of squared distances, mm^2 */
     int64_t body_dz_q8;
     /* For the plane through the points on the ellipsoid: sums of x, y, z and of their products,
@@ -104,7 +100,7 @@ static bool make_view(const struct candidate *candidate, const struct ih_ray *ra
     return true;
 }
 
-static void count(struct share *share, bool part)
+static void count(struct ih_tally_share *share, bool part)
 {
     share->all++;
     share->part += part;
@@ -181,20 +177,20 @@ static void look_around(const struct view *view, struct tally *tally)
     int64_t ex = view->at_q14[0];
     int64_t ey = view->at_q14[1];
     if (ey < -HIGH_FROM_Q14 && ih_abs_s64(ex) < HIGH_WIDE_Q14) {
-        count(&tally->high, view->is_open);
+        count(&tally->around.high, view->is_open);
     }
     if (view->distance2_q28 <= RING_INNER2_Q28 || view->distance2_q28 >= RING_OUTER2_Q28) {
         return;
     }
     if (10 * ey > 9 * ih_abs_s64(ex)) {
-        count(&tally->below, view->is_open);
+        count(&tally->around.below, view->is_open);
         return;
     }
-    count(&tally->nothing, view->ray->state == IH_RAY_EMPTY);
+    count(&tally->around.nothing, view->ray->state == IH_RAY_EMPTY);
     if (10 * ey < -8 * ih_abs_s64(ex)) {
-        count(&tally->above, view->is_open);
+        count(&tally->around.above, view->is_open);
     } else {
-        count(ex < 0 ? &tally->left : &tally->right, view->is_open);
+        count(ex < 0 ? &tally->around.left : &tally->around.right, view->is_open);
     }
 }
 
@@ -210,28 +206,28 @@ static void look_below(const struct view *view, const struct ih_ellipsoid *ellip
     int32_t aside_q8 = ih_abs_s32(view->x_mm_q8);
     int32_t chin_q8 = view->below_chin_mm_q8;
     if (between_mm(chin_q8, 40, 260) && aside_q8 < 180 << 8) {
-        count(&tally->body, view->is_body);
+        count(&tally->around.body, view->is_body);
         tally->body_dz_q8 += view->is_body ? view->dz_mm_q8 : 0;
     }
     if (between_mm(chin_q8, 40, 240) && aside_q8 > 300 << 8) {
-        count(&tally->wide, view->is_body);
+        count(&tally->around.wide, view->is_body);
     }
     if (ih_abs_s32(view->y_mm_q8) < ellipsoid->semi_mm_q8[1] && between_mm(aside_q8, 170, 330)) {
-        count(&tally->level, view->is_seen && ih_abs_s32(view->dz_mm_q8) < LEVEL_MM_Q8);
+        count(&tally->around.level, view->is_seen && ih_abs_s32(view->dz_mm_q8) < LEVEL_MM_Q8);
     }
     if (10 * (int64_t)view->y_mm_q8 > 9 * (int64_t)ellipsoid->semi_mm_q8[1] && chin_q8 < 160 << 8 &&
         between_mm(aside_q8, 100, 260)) {
-        count(&tally->shoulder[view->x_mm_q8 > 0], view->is_body);
+        count(&tally->around.shoulder[view->x_mm_q8 > 0], view->is_body);
     }
 }
 
 /* (part + 0.5) / (all + 1) */
-static int32_t careful_q8(struct share share)
+static int32_t careful_q8(struct ih_tally_share share)
 {
     return (2 * share.part + 1) * 128 / (share.all + 1);
 }
 
-static int32_t plain_q8(struct share share, int32_t least)
+static int32_t plain_q8(struct ih_tally_share share, int32_t least)
 {
     return share.part * 256 / ih_max_s32(share.all, least);
 }
@@ -297,26 +293,49 @@ static void summarise(const struct tally *tally, const struct ih_evidence_nest *
     value_q8[IH_EVIDENCE_ROUGH] = rough_q8;
     int32_t plane_q8 = tally->on >= PLANE_POINTS_MIN ? root_mm_q8(plane_rest_q8(tally) * 256) : 0;
     value_q8[IH_EVIDENCE_BULGE] = plane_q8 - rough_q8;
-    value_q8[IH_EVIDENCE_ABOVE] = careful_q8(tally->above);
-    value_q8[IH_EVIDENCE_BESIDE] = ih_min_s32(careful_q8(tally->left), careful_q8(tally->right));
-    value_q8[IH_EVIDENCE_BELOW] = careful_q8(tally->below);
-    value_q8[IH_EVIDENCE_HIGH] = careful_q8(tally->high);
-    value_q8[IH_EVIDENCE_NOTHING] = plain_q8(tally->nothing, 1);
-    value_q8[IH_EVIDENCE_BODY] = plain_q8(tally->body, 3);
-    value_q8[IH_EVIDENCE_BODY_RAYS] = ih_min_s32(tally->body.all, BODY_RAYS_MAX) << 8;
+    value_q8[IH_EVIDENCE_ABOVE] = careful_q8(tally->around.above);
+    value_q8[IH_EVIDENCE_BESIDE] =
+        ih_min_s32(careful_q8(tally->around.left), careful_q8(tally->around.right));
+    value_q8[IH_EVIDENCE_BELOW] = careful_q8(tally->around.below);
+    value_q8[IH_EVIDENCE_HIGH] = careful_q8(tally->around.high);
+    value_q8[IH_EVIDENCE_NOTHING] = plain_q8(tally->around.nothing, 1);
+    value_q8[IH_EVIDENCE_BODY] = plain_q8(tally->around.body, 3);
+    value_q8[IH_EVIDENCE_BODY_RAYS] = ih_min_s32(tally->around.body.all, BODY_RAYS_MAX) << 8;
     value_q8[IH_EVIDENCE_BODY_DEPTH] =
-        (int32_t)ih_div_round(tally->body_dz_q8, ih_max_s32(tally->body.part, 1));
-    value_q8[IH_EVIDENCE_WIDE] = plain_q8(tally->wide, 3);
-    value_q8[IH_EVIDENCE_LEVEL] = plain_q8(tally->level, 3);
+        (int32_t)ih_div_round(tally->body_dz_q8, ih_max_s32(tally->around.body.part, 1));
+    value_q8[IH_EVIDENCE_WIDE] = plain_q8(tally->around.wide, 3);
+    value_q8[IH_EVIDENCE_LEVEL] = plain_q8(tally->around.level, 3);
     value_q8[IH_EVIDENCE_SHOULDER] =
-        ih_min_s32(plain_q8(tally->shoulder[0], 2), plain_q8(tally->shoulder[1], 2));
-    value_q8[IH_EVIDENCE_BEFORE] = tally->before << 8;
+        ih_min_s32(plain_q8(tally->around.shoulder[0], 2), plain_q8(tally->around.shoulder[1], 2));
+    value_q8[IH_EVIDENCE_BEFORE] = tally->around.before << 8;
     value_q8[IH_EVIDENCE_EXTENT] = nest->present ? nest->extent_mm_q8 : 0;
     value_q8[IH_EVIDENCE_UPRIGHT] =
         nest->present ? (int32_t)ih_shift_round(nest->upright_q16, 8) : 256;
 }
 
-void ih_evidence_collect(const struct ih_space *space, const int32_t slope_most_q20[2],
+/* A ray that the tally leaves, or that may hit, or is a part of the body. */
+static void look(const struct candidate *candidate, const struct ih_ray *ray, int32_t flag,
+                 struct tally *tally)
+{
+    struct view view;
+    if ((flag & IH_TALLY_BODY) != 0) {
+        tally->body_dz_q8 += ray->point_mm_q8[2] - candidate->ellipsoid->centre_mm_q8[2];
+    }
+    if ((flag & (IH_TALLY_UNSURE | IH_TALLY_HIT)) == 0 || !make_view(candidate, ray, &view)) {
+        return;
+    }
+    if ((flag & IH_TALLY_HIT) != 0) {
+        look_inside(candidate, &view, tally);
+    }
+    if ((flag & IH_TALLY_UNSURE) != 0) {
+        look_around(&view, tally);
+        look_below(&view, candidate->ellipsoid, tally);
+        tally->around.before += view.is_seen && view.distance2_q28 < AROUND2_Q28 &&
+                                view.dz_mm_q8 < -candidate->ellipsoid->semi_mm_q8[2] - BEFORE_MM_Q8;
+    }
+}
+
+void ih_evidence_collect(const struct ih_space *space, struct ih_tally_scratch *scratch,
                          const struct ih_ellipsoid *ellipsoid, const int32_t start_mm_q8[3],
                          const struct ih_evidence_nest *nest, struct ih_evidence *out)
 {
@@ -326,20 +345,18 @@ void ih_evidence_collect(const struct ih_space *space, const int32_t slope_most_
         .origin_mm_q8 = space->origin_mm_q8,
         .depth_mm_q8 = ellipsoid->centre_mm_q8[2] - space->origin_mm_q8[2],
         .shares = ih_ellipsoid_shares(ellipsoid->semi_mm_q8),
-        .box = ih_ellipsoid_box(ellipsoid, slope_most_q20, INSIDE_Q14),
+        .box = ih_ellipsoid_box(ellipsoid, scratch->slope_most_q20, INSIDE_Q14),
     };
     memset(&tally, 0, sizeof tally);
-    for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
-        struct view view;
-        if (space->ray[slot].state == IH_RAY_UNKNOWN ||
-            !make_view(&candidate, &space->ray[slot], &view)) {
-            continue;
+    ih_tally_count(space, ellipsoid, &candidate.box, scratch, &tally.around);
+    for (int32_t first = 0; first < IH_TALLY_RAYS; first += 4) {
+        uint64_t any; /* of four */
+        memcpy(&any, &scratch->flag[first], sizeof any);
+        for (int32_t slot = first; any != 0 && slot < first + 4; slot++) {
+            if (scratch->flag[slot] != 0) {
+                look(&candidate, &space->ray[slot], scratch->flag[slot], &tally);
+            }
         }
-        look_inside(&candidate, &view, &tally);
-        look_around(&view, &tally);
-        look_below(&view, ellipsoid, &tally);
-        tally.before += view.is_seen && view.distance2_q28 < AROUND2_Q28 &&
-                        view.dz_mm_q8 < -ellipsoid->semi_mm_q8[2] - BEFORE_MM_Q8;
     }
     summarise(&tally, nest, out->value_q8);
     out->value_q8[IH_EVIDENCE_TALL] = taller_q8(ellipsoid);

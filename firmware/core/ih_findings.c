@@ -112,6 +112,7 @@ struct work {
     const struct ih_rig *rig;
     const struct ih_findings_params *params;
     struct ih_row_scratch *rows;
+    struct ih_tally_scratch *tally;
     struct ih_findings *out;
 };
 
@@ -127,8 +128,8 @@ static void try_start(const struct work *work, const struct ih_ellipsoid *start,
     }
     struct ih_evidence_nest nest =
         nest_at(work->heads, finding.head.centre_mm_q8, params->nest_near_mm);
-    ih_evidence_collect(work->space, work->rows->rays.slope_most_q20, &finding.head,
-                        start->centre_mm_q8, &nest, &finding.evidence);
+    ih_evidence_collect(work->space, work->tally, &finding.head, start->centre_mm_q8, &nest,
+                        &finding.evidence);
     ih_score_rate(&finding.evidence, &score);
     finding.logit_q10 = score.logit_q10;
     if (work->rig->calibration.kind == IH_RIG_RANGE) {
@@ -150,8 +151,7 @@ static void view_expected(const struct work *work, const struct ih_ellipsoid *he
 {
     const struct ih_evidence_nest no_nest = {.present = false};
     struct ih_evidence evidence;
-    ih_evidence_collect(work->space, work->rows->rays.slope_most_q20, head, head->centre_mm_q8,
-                        &no_nest, &evidence);
+    ih_evidence_collect(work->space, work->tally, head, head->centre_mm_q8, &no_nest, &evidence);
     view->through += evidence.through_count;
     view->hit += evidence.hit_count;
     view->front += evidence.front_count;
@@ -162,7 +162,8 @@ void ih_findings_add(const struct ih_points *points, const struct ih_dots *dots,
                      const struct ih_rig *rig, const struct ih_findings_params *params,
                      struct ih_findings_scratch *scratch, struct ih_findings *out)
 {
-    const struct work work = {&scratch->space, heads, rig, params, &scratch->rows, out};
+    const struct work work = {&scratch->space, heads,           rig, params,
+                              &scratch->rows,  &scratch->tally, out};
     if (points->seen_count == 0) {
         return;
     }
@@ -170,6 +171,7 @@ void ih_findings_add(const struct ih_points *points, const struct ih_dots *dots,
     ih_space_make(points, dots, rig, &params->space, &scratch->space);
     ih_scan_find(&scratch->space, &params->scan, &scratch->scan_scratch, &scratch->scan);
     ih_row_prepare(&scratch->space, &scratch->rows.rays);
+    ih_tally_prepare(&scratch->space, &scratch->tally);
     for (int32_t i = 0; i < scratch->scan.place_count; i++) {
         try_place(&work, scratch->scan.place[i].centre_mm_q8, IH_SOURCE_SCAN);
     }

@@ -86,6 +86,7 @@ struct ih_findings_scratch {
     struct ih_scan scan;
     struct ih_scan_scratch scan_scratch;
     struct ih_row_scratch rows;
+    struct ih_tally_scratch tally;
 };
 
 void ih_findings_params_default(struct ih_findings_params *params);

@@ -34,6 +34,7 @@ CORE_HEADERS = {
     "ih_fix.h": {"ih_range.h"},
     "ih_words.h": set(),
     "ih_lanes.h": set(),
+    "ih_lane.h": {"ih_range.h"},
     "ih_rig.h": {"ih_config.h", "ih_types.h"},
     "ih_blob.h": CORE_SHARED,
     "ih_cholesky.h": {"ih_config.h", "ih_types.h"},
@@ -63,7 +64,8 @@ CORE_HEADERS = {
     "ih_scan.h": CORE_SHARED | {"ih_bound.h"},
     "ih_row.h": CORE_SHARED | {"ih_ellipsoid.h", "ih_cholesky.h"},
     "ih_fit.h": CORE_SHARED | {"ih_row.h"},
-    "ih_evidence.h": CORE_SHARED | {"ih_fit.h"},
+    "ih_tally.h": CORE_SHARED | {"ih_ellipsoid.h"},
+    "ih_evidence.h": CORE_SHARED | {"ih_fit.h", "ih_tally.h"},
     "ih_score.h": CORE_SHARED | {"ih_evidence.h"},
     "ih_score_weights.h": {"ih_score.h"},
     "ih_findings.h": CORE_SHARED | {"ih_heads.h", "ih_scan.h", "ih_score.h"},
@@ -88,7 +90,7 @@ def allowed_in_core(name):
         return {own}
     if name == "ih_score.c":
         return {own, "ih_fix.h", "ih_score_weights.h"}
-    return {own, "ih_fix.h", "ih_range.h", "ih_words.h", "ih_lanes.h"} if own in CORE_HEADERS else None
+    return {own, "ih_fix.h", "ih_range.h", "ih_words.h", "ih_lanes.h", "ih_lane.h"} if own in CORE_HEADERS else None
 
 
 def judge_core(path, quoted, target):

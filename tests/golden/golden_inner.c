@@ -89,8 +89,8 @@ static void hash_start(struct isohead *head, const int32_t centre_mm_q8[3],
     struct ih_score score;
     ih_fit_ellipsoid(space, &head->params.findings.fit, &start, &head->scratch.findings.rows,
                      &fitted);
-    ih_evidence_collect(space, head->scratch.findings.rows.rays.slope_most_q20, &fitted,
-                        centre_mm_q8, &nest, &evidence);
+    ih_evidence_collect(space, &head->scratch.findings.tally, &fitted, centre_mm_q8, &nest,
+                        &evidence);
     ih_score_rate(&evidence, &score);
     hash[GOLDEN_FIT] = golden_add_words(hash[GOLDEN_FIT], &fitted, sizeof fitted);
     hash[GOLDEN_EVIDENCE] = golden_add_words(hash[GOLDEN_EVIDENCE], &evidence, sizeof evidence);
@@ -106,6 +106,7 @@ static void hash_candidates(struct isohead *head, uint64_t hash[GOLDEN_INNERS])
     ih_scan_find(&scratch->space, &head->params.findings.scan, &scratch->scan_scratch,
                  &scratch->scan);
     ih_row_prepare(&scratch->space, &scratch->rows.rays);
+    ih_tally_prepare(&scratch->space, &scratch->tally);
     hash[GOLDEN_SPACE] =
         golden_add_words(hash[GOLDEN_SPACE], &scratch->space, sizeof scratch->space);
     hash[GOLDEN_SCAN] = golden_add_word(hash[GOLDEN_SCAN], scan->place_count);

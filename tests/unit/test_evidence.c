@@ -26,16 +26,20 @@ _Static_assert(KINDS <= IH_EVIDENCE_COUNT && IH_EVIDENCE_UPRIGHT == KINDS - 1,
                "new kinds go to the end");
 
 static struct ih_space space;
-static struct ih_evidence evidence;
+static struct ih_tally_scratch scratch;
+static struct ih_evidence evidence, one_by_one;
 static const struct ih_evidence_nest no_nest = {.present = false};
 
+/* And the same when each ray is looked at by itself, as those are of which 16 bits cannot tell. */
 static void collect(const struct ih_ellipsoid *head, const int32_t start_mm_q8[3],
                     const struct ih_evidence_nest *nest)
 {
-    int32_t slope_most_q20[2];
-
-    ih_space_slope_most(&space, slope_most_q20);
-    ih_evidence_collect(&space, slope_most_q20, head, start_mm_q8, nest, &evidence);
+    memset(&scratch, IH_TEST_FILL, sizeof scratch);
+    ih_tally_prepare(&space, &scratch);
+    ih_evidence_collect(&space, &scratch, head, start_mm_q8, nest, &evidence);
+    scratch.is_usable = false;
+    ih_evidence_collect(&space, &scratch, head, start_mm_q8, nest, &one_by_one);
+    TEST_ASSERT_EQUAL_MEMORY(&one_by_one, &evidence, sizeof evidence);
 }
 
 void setUp(void)
