@@ -1,5 +1,6 @@
 #include "ih_bound.h"
 
+#include <stddef.h>
 #include <string.h>
 
 #include "ih_fix.h"
@@ -639,30 +640,47 @@ static inline int32_t look_inside(const struct ih_bound_rays *rays, const struct
     return 2 * (int32_t)worth + is_sure;
 }
 
-/* Where a ray is counted; exact: where it may be on either side of a limit, not as ON nor as sure. */
-static inline int32_t look(const struct ih_bound_rays *rays, const struct place *place, int32_t at,
-                           bool is_exact)
+/* Of all rays in a box: where they are counted; exact: what may be on either side of a limit is not ON
+ * nor sure. Then those that are not sure are listed, too. */
+static void walk(const struct ih_bound_rays *rays, const struct place *place, const struct box *box,
+                 struct ih_bound_verdict *exact, int32_t count[NOTHING + 1])
 {
-    struct pass pass;
-    const int32_t dx = rays->slope_q14[0][at] - place->direction_q14[0];
-    const int32_t dy = rays->slope_q14[1][at] - place->direction_q14[1];
-    if (ih_abs_s32(dx) > place->cut[0] || ih_abs_s32(dy) > place->cut[1]) {
-        return NOTHING;
+    const int32_t scale[2] = {place->times[0] * place->share[0], place->times[1] * place->share[1]};
+    const int32_t least_q14[2] = {place->direction_q14[0] - place->cut[0],
+                                  place->direction_q14[1] - place->cut[1]};
+    const uint32_t sides_q14[2] = {2 * (uint32_t)place->cut[0], 2 * (uint32_t)place->cut[1]};
+    const int32_t margin = place->margin_q10;
+    for (int32_t column = box->columns.begin; column < box->columns.end; column++) {
+        for (int32_t row = box->rows.begin; row < box->rows.end; row++) {
+            const int32_t at = column * IH_BOUND_COLUMN + row;
+            const int32_t x_q14 = rays->slope_q14[0][at] - least_q14[0];
+            const int32_t y_q14 = rays->slope_q14[1][at] - least_q14[1];
+            struct pass pass;
+            if (IH_WRAPS(uint32_t, x_q14) > sides_q14[0] ||
+                IH_WRAPS(uint32_t, y_q14) > sides_q14[1]) {
+                continue;
+            }
+            pass.ex_q11 = (x_q14 - place->cut[0]) * scale[0] >> 16;
+            pass.ey_q11 = (y_q14 - place->cut[1]) * scale[1] >> 16;
+            const int32_t ee_q10 =
+                (pass.ex_q11 * pass.ex_q11 >> 12) + (pass.ey_q11 * pass.ey_q11 >> 12);
+            pass.room_q10 = rays->reach_q10[at] - ee_q10;
+            if (pass.room_q10 <= -margin) {
+                continue;
+            }
+            const int32_t eg_q12 =
+                (pass.ex_q11 * rays->g_q15[0][at] >> 14) + (pass.ey_q11 * rays->g_q15[1][at] >> 14);
+            pass.t_q11 = eg_q12 * rays->inverse_q15[at] >> 16;
+            pass.radius2_q10 = ee_q10 - (eg_q12 * pass.t_q11 >> 13);
+            const int32_t as = pass.radius2_q10 >= 1024 + margin
+                                   ? look_around(rays, place, at, &pass, exact != NULL)
+                                   : look_inside(rays, place, at, &pass, exact != NULL);
+            count[as]++;
+            if (exact != NULL && as != NOTHING && (as % 2 == 0 || as == 2 * (int32_t)BEHIND + 1)) {
+                exact->unsure[exact->unsure_count++] = (int16_t)(row * IH_GRID + column);
+            }
+        }
     }
-    pass.ex_q11 = dx * (place->times[0] * place->share[0]) >> 16;
-    pass.ey_q11 = dy * (place->times[1] * place->share[1]) >> 16;
-    const int32_t ee_q10 = (pass.ex_q11 * pass.ex_q11 >> 12) + (pass.ey_q11 * pass.ey_q11 >> 12);
-    pass.room_q10 = rays->reach_q10[at] - ee_q10;
-    if (pass.room_q10 <= -place->margin_q10) {
-        return NOTHING;
-    }
-    const int32_t eg_q12 =
-        (pass.ex_q11 * rays->g_q15[0][at] >> 14) + (pass.ey_q11 * rays->g_q15[1][at] >> 14);
-    pass.t_q11 = eg_q12 * rays->inverse_q15[at] >> 16;
-    pass.radius2_q10 = ee_q10 - (eg_q12 * pass.t_q11 >> 13);
-    return pass.radius2_q10 >= 1024 + place->margin_q10
-               ? look_around(rays, place, at, &pass, is_exact)
-               : look_inside(rays, place, at, &pass, is_exact);
 }
 
 static void sum_up(const struct ih_bound_rays *rays, const struct place *place,
@@ -673,11 +691,7 @@ static void sum_up(const struct ih_bound_rays *rays, const struct place *place,
         VALUE_UNKNOWN, AROUND_OPEN,  AROUND_NEAR,  AROUND_EMPTY, 0,
     };
     int32_t count[NOTHING + 1] = {0};
-    for (int32_t column = box->columns.begin; column < box->columns.end; column++) {
-        for (int32_t row = box->rows.begin; row < box->rows.end; row++) {
-            count[look(rays, place, column * IH_BOUND_COLUMN + row, false)]++;
-        }
-    }
+    walk(rays, place, box, NULL, count);
     *out = (struct found){0};
     count[2 * ON + 1] += count[2 * ON]; /* a value of 1 lowers no mean */
     count[2 * ON] = 0;
@@ -701,15 +715,7 @@ static void judge(const struct ih_bound_rays *rays, const struct place *place,
                   const struct box *box, struct ih_bound_verdict *out)
 {
     int32_t count[NOTHING + 1] = {0};
-    for (int32_t column = box->columns.begin; column < box->columns.end; column++) {
-        for (int32_t row = box->rows.begin; row < box->rows.end; row++) {
-            const int32_t as = look(rays, place, column * IH_BOUND_COLUMN + row, true);
-            count[as]++;
-            if (as != NOTHING && (as % 2 == 0 || as == 2 * (int32_t)BEHIND + 1)) {
-                out->unsure[out->unsure_count++] = (int16_t)(row * IH_GRID + column);
-            }
-        }
-    }
+    walk(rays, place, box, out, count);
     out->on = count[2 * ON + 1];
     out->nearer = count[2 * NEARER + 1] + count[2 * UNKNOWN + 1];
     out->empty = count[2 * EMPTY + 1];
