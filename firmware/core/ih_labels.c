@@ -92,19 +92,18 @@ static void order_dots(int32_t count, struct ih_labels_scratch *scratch)
     }
 }
 
-/* How many dots lie above a row. */
-static int32_t dots_above(const struct ih_labels_scratch *scratch, int32_t count, int64_t v_px_q12)
+/* How many dots lie above a row, from a guess on: that of the slot before is seldom far off. */
+static int32_t dots_above(const struct ih_labels_scratch *scratch, int32_t count, int64_t v_px_q12,
+                          int32_t guess)
 {
-    int32_t low = 0, high = count;
-    while (low < high) {
-        int32_t middle = (low + high) / 2;
-        if (scratch->v_px_q12[scratch->by_row[middle]] < v_px_q12) {
-            low = middle + 1;
-        } else {
-            high = middle;
-        }
+    int32_t at = guess;
+    while (at > 0 && scratch->v_px_q12[scratch->by_row[at - 1]] >= v_px_q12) {
+        at--;
     }
-    return low;
+    while (at < count && scratch->v_px_q12[scratch->by_row[at]] < v_px_q12) {
+        at++;
+    }
+    return at;
 }
 
 /* Rows between which a line's candidates lie: those of its ends, which the margins move by at most
@@ -150,16 +149,22 @@ static void try_candidate(const struct ih_dots *dots, const struct ih_line *line
     add_candidate(dots, candidate, slot, scratch, out);
 }
 
-/* Candidates of one slot. */
+/* Dots in the order of rows, from one to before another. */
+struct dot_range {
+    int32_t begin, end;
+};
+
+/* Candidates of one slot. near: where those of the slot before were looked for; set to this slot's. */
 static void find_candidates(const struct ih_dots *dots, const struct ih_line *line, int32_t slot,
-                            const struct ih_labels_params *params,
+                            const struct ih_labels_params *params, struct dot_range *near,
                             struct ih_labels_scratch *scratch, struct ih_labels *out)
 {
     const struct row_range rows = rows_of_line(line, params);
-    const int32_t end = dots_above(scratch, dots->dot_count, rows.last_px_q12 + 1);
+    near->begin = dots_above(scratch, dots->dot_count, rows.first_px_q12, near->begin);
+    near->end = dots_above(scratch, dots->dot_count, rows.last_px_q12 + 1, near->end);
     scratch->candidate_count[slot] = 0;
     scratch->choice[slot] = IH_NONE;
-    for (int32_t i = dots_above(scratch, dots->dot_count, rows.first_px_q12); i < end; i++) {
+    for (int32_t i = near->begin; i < near->end; i++) {
         try_candidate(dots, line, slot, scratch->by_row[i], params, scratch, out);
     }
 }
@@ -555,11 +560,12 @@ void ih_labels_assign(const struct ih_dots *dots, const struct ih_rig *rig,
                       const struct ih_labels_params *params, struct ih_labels_scratch *scratch,
                       struct ih_labels *out)
 {
+    struct dot_range near = {0, 0};
     out->candidates_dropped = 0;
     undistort_dots(dots, rig, scratch);
     order_dots(dots->dot_count, scratch);
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
-        find_candidates(dots, &rig->line[slot], slot, params, scratch, out);
+        find_candidates(dots, &rig->line[slot], slot, params, &near, scratch, out);
     }
     seed(rig, params, scratch);
     out->seed_count = 0;

@@ -85,6 +85,7 @@ static void candidates_lie_on_their_line(void)
                            .length_px_mm_q8 = 10000 << 8,
                            .t_far_px_q12 = 40960,
                            .t_near_px_q12 = 57344};
+    struct dot_range near = {0, 0};
     int i, way;
 
     dots.dot_count = 1;
@@ -97,7 +98,7 @@ static void candidates_lie_on_their_line(void)
             line.dir_v_q30 = along_v * (1 << 30);
             scratch.u_px_q12[0] = 400000 + cases[i].t * along_u - cases[i].perp * along_v;
             scratch.v_px_q12[0] = 300000 + cases[i].t * along_v + cases[i].perp * along_u;
-            find_candidates(&dots, &line, 7, &params, &scratch, &labels);
+            find_candidates(&dots, &line, 7, &params, &near, &scratch, &labels);
             IH_TEST_EQUAL(cases[i].is_candidate, scratch.candidate_count[7], "candidate", i);
             if (cases[i].is_candidate) {
                 const struct ih_candidate *c = &scratch.candidate[7][0];
@@ -108,6 +109,28 @@ static void candidates_lie_on_their_line(void)
                                "inverse depth", i);
             }
         }
+    }
+}
+
+/* How many dots lie above a row, whatever the guess. */
+static void dots_above_a_row_are_counted(void)
+{
+    struct ih_test_random random = {29};
+    int pass, i;
+
+    for (pass = 0; pass < 2000; pass++) {
+        const int32_t count = (int32_t)ih_test_between(&random, 0, 12);
+        const int32_t row = (int32_t)ih_test_between(&random, -1, 9);
+        int32_t above = 0;
+
+        for (i = 0; i < count; i++) {
+            scratch.v_px_q12[i] = (int32_t)ih_test_between(&random, 0, 8);
+            above += scratch.v_px_q12[i] < row;
+        }
+        order_dots(count, &scratch);
+        IH_TEST_EQUAL(above,
+                      dots_above(&scratch, count, row, (int32_t)ih_test_between(&random, 0, count)),
+                      "above", pass);
     }
 }
 
@@ -436,6 +459,7 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(the_first_sixteen_candidates_stay);
     RUN_TEST(candidates_lie_on_their_line);
+    RUN_TEST(dots_above_a_row_are_counted);
     RUN_TEST(the_best_rectangle_is_the_seed);
     RUN_TEST(seeds_end_at_their_limits);
     RUN_TEST(offers_are_sorted_by_error_then_slot);
