@@ -126,8 +126,12 @@ void ih_bound_prepare(const struct ih_space *space, struct ih_bound_rays *out)
             int16_t *least_q14 = &out->least_q14[axis][line[axis]];
             int16_t *most_q14 = &out->most_q14[axis][line[axis]];
             const bool is_first = line[1 - axis] == 0;
-            *least_q14 = is_first || slope_q14 < *least_q14 ? slope_q14 : *least_q14;
-            *most_q14 = is_first || slope_q14 > *most_q14 ? slope_q14 : *most_q14;
+            if (is_first || slope_q14 < *least_q14) {
+                *least_q14 = slope_q14;
+            }
+            if (is_first || slope_q14 > *most_q14) {
+                *most_q14 = slope_q14;
+            }
             steep2_q14[axis] = ih_max_s32(steep2_q14[axis], (g_q15 * g_q15 >> 16) + 1);
         }
         const int32_t g2_q14 = out->g_q15[0][at] * out->g_q15[1][at] >> 16;
@@ -253,6 +257,15 @@ static int32_t mean_q12(int32_t sum_q6, int32_t count_least, int32_t count_most,
 }
 
 #if LANES > 1
+
+/* clang 14 takes so few turns for too few to make vectors of. */
+#if defined __clang__ && LANES == 16
+#define AS_VECTORS _Pragma("clang loop vectorize_width(16) interleave_count(1)")
+#elif defined __clang__
+#define AS_VECTORS _Pragma("clang loop vectorize_width(8) interleave_count(1)")
+#else
+#define AS_VECTORS
+#endif
 
 /* The same, a lane for each ray. */
 struct sums {
@@ -400,12 +413,14 @@ static inline struct pass find_pass(const struct ih_bound_rays *rays, const stru
 }
 
 /* Rays of some columns, around the head or through it. Loops of LANES turns become vectors. */
-static inline void add_rays(const struct ih_bound_rays *rays, const struct place *place,
-                            struct span columns, struct span rows, bool is_inside,
-                            struct sums *sums)
+__attribute__((always_inline)) static inline void add_rays(const struct ih_bound_rays *rays,
+                                                           const struct place *place,
+                                                           struct span columns, struct span rows,
+                                                           bool is_inside, struct sums *sums)
 {
     for (int32_t row = rows.begin; row < rows.end; row += LANES) {
         for (int32_t column = columns.begin; column < columns.end; column++) {
+            AS_VECTORS
             for (int32_t k = 0; k < LANES; k++) {
                 const int32_t at = column * IH_BOUND_COLUMN + row + k;
                 const struct pass pass = find_pass(rays, place, at);
@@ -480,17 +495,21 @@ static inline ih_lane judge_inside(const struct ih_bound_rays *rays, const struc
     return ih_lane_wrap(may & ~(unseen | nearer | far | on));
 }
 
-static inline void judge_rays(const struct ih_bound_rays *rays, const struct place *place,
-                              struct span columns, struct span rows, bool is_inside,
-                              struct counts *counts, int16_t is_unsure[IH_BOUND_RAYS])
+__attribute__((always_inline)) static inline void judge_rays(const struct ih_bound_rays *rays,
+                                                             const struct place *place,
+                                                             struct span columns, struct span rows,
+                                                             bool is_inside, struct counts *counts,
+                                                             int16_t is_unsure[IH_BOUND_RAYS])
 {
     for (int32_t row = rows.begin; row < rows.end; row += LANES) {
         for (int32_t column = columns.begin; column < columns.end; column++) {
+            AS_VECTORS
             for (int32_t k = 0; k < LANES; k++) {
                 const int32_t at = column * IH_BOUND_COLUMN + row + k;
                 const struct pass pass = find_pass(rays, place, at);
                 if (is_inside) {
-                    is_unsure[at] |= judge_inside(rays, place, at, &pass, counts, k);
+                    is_unsure[at] = ih_lane_wrap(is_unsure[at] |
+                                                 judge_inside(rays, place, at, &pass, counts, k));
                 } else {
                     is_unsure[at] = judge_around(rays, place, at, &pass, counts, k);
                 }

@@ -68,7 +68,7 @@ static struct scale scale_of(int32_t depth_q8, int32_t length_q8, int bits)
 {
     const int64_t all = ((int64_t)depth_q8 << (bits + 2)) / length_q8; /* below 2^27 */
     const int shift = ih_max_s32(ih_bits_u64((uint64_t)all) - 15, 0);
-    const int64_t share = all >> shift;
+    const int64_t share = all > 0 ? all >> shift : 1;
     return (struct scale){
         .cut = (int16_t)ih_min_s64(((int64_t)CUT << 16) / (share << shift), INT16_MAX),
         .times = (int16_t)(1 << shift),
