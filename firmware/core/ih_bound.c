@@ -258,7 +258,11 @@ static int32_t mean_q12(int32_t sum_q6, int32_t count_least, int32_t count_most,
 
 #if LANES > 1
 
-/* clang 14 takes so few turns for too few to make vectors of. */
+/* clang 14 takes so few turns for too few to make vectors of. Where a sanitizer is in the way there are
+ * none, and no need to say so. */
+#ifdef __clang__
+#pragma clang diagnostic ignored "-Wpass-failed"
+#endif
 #if defined __clang__ && LANES == 16
 #define AS_VECTORS _Pragma("clang loop vectorize_width(16) interleave_count(1)")
 #elif defined __clang__
@@ -266,6 +270,8 @@ static int32_t mean_q12(int32_t sum_q6, int32_t count_least, int32_t count_most,
 #else
 #define AS_VECTORS
 #endif
+/* Or clang makes one loop of those around and through the head, which then asks at each turn. */
+#define ALWAYS_INLINE inline __attribute__((always_inline))
 
 /* The same, a lane for each ray. */
 struct sums {
@@ -413,10 +419,9 @@ static inline struct pass find_pass(const struct ih_bound_rays *rays, const stru
 }
 
 /* Rays of some columns, around the head or through it. Loops of LANES turns become vectors. */
-__attribute__((always_inline)) static inline void add_rays(const struct ih_bound_rays *rays,
-                                                           const struct place *place,
-                                                           struct span columns, struct span rows,
-                                                           bool is_inside, struct sums *sums)
+static ALWAYS_INLINE void add_rays(const struct ih_bound_rays *rays, const struct place *place,
+                                   struct span columns, struct span rows, bool is_inside,
+                                   struct sums *sums)
 {
     for (int32_t row = rows.begin; row < rows.end; row += LANES) {
         for (int32_t column = columns.begin; column < columns.end; column++) {
@@ -495,11 +500,9 @@ static inline ih_lane judge_inside(const struct ih_bound_rays *rays, const struc
     return ih_lane_wrap(may & ~(unseen | nearer | far | on));
 }
 
-__attribute__((always_inline)) static inline void judge_rays(const struct ih_bound_rays *rays,
-                                                             const struct place *place,
-                                                             struct span columns, struct span rows,
-                                                             bool is_inside, struct counts *counts,
-                                                             int16_t is_unsure[IH_BOUND_RAYS])
+static ALWAYS_INLINE void judge_rays(const struct ih_bound_rays *rays, const struct place *place,
+                                     struct span columns, struct span rows, bool is_inside,
+                                     struct counts *counts, int16_t is_unsure[IH_BOUND_RAYS])
 {
     for (int32_t row = rows.begin; row < rows.end; row += LANES) {
         for (int32_t column = columns.begin; column < columns.end; column++) {
