@@ -5,11 +5,16 @@
 
 #include "ih_fix.h"
 
+/* After these, what is hopeless is not fitted any further. */
+#define FIRST_LOOK_STEPS 1
+
 void ih_findings_params_default(struct ih_findings_params *params)
 {
     ih_space_params_default(&params->space);
     ih_scan_params_default(&params->scan);
     ih_fit_params_default(&params->fit);
+    params->apart_mm = 30;
+    params->hopeless_logit_q10 = -4608;
     params->spacing_mm = 80;
     params->nest_near_mm = 90;
     params->range_prior_q10 = -1280;
@@ -111,29 +116,65 @@ struct work {
     const struct ih_heads *heads;
     const struct ih_rig *rig;
     const struct ih_findings_params *params;
-    struct ih_row_scratch *rows;
-    struct ih_tally_scratch *tally;
+    struct ih_findings_scratch *scratch;
     struct ih_findings *out;
 };
+
+/* How probable a candidate is where its fit is now. */
+static void rate(const struct work *work, const struct ih_fit *fit, struct ih_finding *finding)
+{
+    struct ih_score score;
+    finding->head = fit->ellipsoid;
+    struct ih_evidence_nest nest =
+        nest_at(work->heads, finding->head.centre_mm_q8, work->params->nest_near_mm);
+    ih_evidence_collect(work->space, work->scratch->rows.rays.slope_most_q20, &finding->head,
+                        fit->start_mm_q8, &nest, &finding->evidence);
+    ih_score_rate(&finding->evidence, &score);
+    finding->logit_q10 = score.logit_q10;
+    if (work->rig->calibration.kind == IH_RIG_RANGE) {
+        finding->logit_q10 += work->params->range_prior_q10;
+    }
+}
+
+static bool is_too_near(const struct work *work, const struct ih_ellipsoid *head)
+{
+    return head->centre_mm_q8[2] - head->semi_mm_q8[2] < work->params->front_least_mm << 8;
+}
+
+/* Remember a start, if none before it was as near as apart_mm. */
+static bool is_new_start(const struct work *work, const int32_t centre_mm_q8[3])
+{
+    struct ih_findings_starts *starts = &work->scratch->starts;
+    const int64_t apart2 = square_q16(work->params->apart_mm);
+    for (int32_t i = 0; i < starts->count; i++) {
+        if (ih_distance2_s32(starts->centre_mm_q8[i], centre_mm_q8) < apart2) {
+            return false;
+        }
+    }
+    memcpy(starts->centre_mm_q8[starts->count++], centre_mm_q8, 3 * sizeof *centre_mm_q8);
+    return true;
+}
 
 static void try_start(const struct work *work, const struct ih_ellipsoid *start,
                       enum ih_source source)
 {
     const struct ih_findings_params *params = work->params;
     struct ih_finding finding = {.source = (int32_t)source};
-    struct ih_score score;
-    ih_fit_ellipsoid(work->space, &params->fit, start, work->rows, &finding.head);
-    if (finding.head.centre_mm_q8[2] - finding.head.semi_mm_q8[2] < params->front_least_mm << 8) {
+    struct ih_fit fit;
+    if (!is_new_start(work, start->centre_mm_q8)) {
         return;
     }
-    struct ih_evidence_nest nest =
-        nest_at(work->heads, finding.head.centre_mm_q8, params->nest_near_mm);
-    ih_evidence_collect(work->space, work->tally, &finding.head, start->centre_mm_q8, &nest,
-                        &finding.evidence);
-    ih_score_rate(&finding.evidence, &score);
-    finding.logit_q10 = score.logit_q10;
-    if (work->rig->calibration.kind == IH_RIG_RANGE) {
-        finding.logit_q10 += params->range_prior_q10;
+    ih_fit_begin(start, &fit);
+    ih_fit_continue(work->space, &params->fit, FIRST_LOOK_STEPS, &work->scratch->rows, &fit);
+    rate(work, &fit, &finding);
+    if (finding.logit_q10 >= params->hopeless_logit_q10 &&
+        fit.step_index < params->fit.step_count) {
+        ih_fit_continue(work->space, &params->fit, params->fit.step_count, &work->scratch->rows,
+                        &fit);
+        rate(work, &fit, &finding);
+    }
+    if (is_too_near(work, &finding.head)) {
+        return;
     }
     finding.probability_q16 = ih_score_probability_q16(finding.logit_q10);
     ih_findings_outline(work->rig, &finding);
@@ -151,7 +192,8 @@ static void view_expected(const struct work *work, const struct ih_ellipsoid *he
 {
     const struct ih_evidence_nest no_nest = {.present = false};
     struct ih_evidence evidence;
-    ih_evidence_collect(work->space, work->tally, head, head->centre_mm_q8, &no_nest, &evidence);
+    ih_evidence_collect(work->space, work->scratch->rows.rays.slope_most_q20, head,
+                        head->centre_mm_q8, &no_nest, &evidence);
     view->through += evidence.through_count;
     view->hit += evidence.hit_count;
     view->front += evidence.front_count;
@@ -162,8 +204,7 @@ void ih_findings_add(const struct ih_points *points, const struct ih_dots *dots,
                      const struct ih_rig *rig, const struct ih_findings_params *params,
                      struct ih_findings_scratch *scratch, struct ih_findings *out)
 {
-    const struct work work = {&scratch->space, heads,           rig, params,
-                              &scratch->rows,  &scratch->tally, out};
+    const struct work work = {&scratch->space, heads, rig, params, scratch, out};
     if (points->seen_count == 0) {
         return;
     }
@@ -171,17 +212,17 @@ void ih_findings_add(const struct ih_points *points, const struct ih_dots *dots,
     ih_space_make(points, dots, rig, &params->space, &scratch->space);
     ih_scan_find(&scratch->space, &params->scan, &scratch->scan_scratch, &scratch->scan);
     ih_row_prepare(&scratch->space, &scratch->rows.rays);
-    ih_tally_prepare(&scratch->space, &scratch->tally);
-    for (int32_t i = 0; i < scratch->scan.place_count; i++) {
-        try_place(&work, scratch->scan.place[i].centre_mm_q8, IH_SOURCE_SCAN);
-    }
-    for (int32_t i = 0; i < ih_min_s32(heads->hypothesis_count, params->nest_max); i++) {
-        try_place(&work, heads->hypothesis[i].centre_mm_q8, IH_SOURCE_NEST);
-    }
+    scratch->starts.count = 0;
     for (int32_t i = 0; i < expected->count; i++) {
         if (i < params->expected_max) {
             try_start(&work, &expected->head[i], IH_SOURCE_EXPECTED);
         }
         view_expected(&work, &expected->head[i], &out->view[i]);
+    }
+    for (int32_t i = 0; i < ih_min_s32(heads->hypothesis_count, params->nest_max); i++) {
+        try_place(&work, heads->hypothesis[i].centre_mm_q8, IH_SOURCE_NEST);
+    }
+    for (int32_t i = 0; i < scratch->scan.place_count; i++) {
+        try_place(&work, scratch->scan.place[i].centre_mm_q8, IH_SOURCE_SCAN);
     }
 }

@@ -34,12 +34,14 @@ struct ih_findings_params {
     struct ih_space_params space;
     struct ih_scan_params scan;
     struct ih_fit_params fit;
-    int32_t spacing_mm;      /* of two findings */
-    int32_t nest_near_mm;    /* a nest this near is the candidate's own */
-    int32_t nest_max;        /* of them this many are candidates themselves */
-    int32_t expected_max;    /* of the expected heads this many are */
-    int32_t range_prior_q10; /* log-odds added with a range rig: most windows show no head */
-    int32_t front_least_mm;  /* nothing nearer than this is a head: the lens is there */
+    int32_t apart_mm;           /* a start nearer than this to one before is not tried */
+    int32_t hopeless_logit_q10; /* less probable after a first step: not fitted any further */
+    int32_t spacing_mm;         /* of two findings */
+    int32_t nest_near_mm;       /* a nest this near is the candidate's own */
+    int32_t nest_max;           /* of them this many are candidates themselves */
+    int32_t expected_max;       /* of the expected heads this many are */
+    int32_t range_prior_q10;    /* log-odds added with a range rig: most windows show no head */
+    int32_t front_least_mm;     /* nothing nearer than this is a head: the lens is there */
 };
 
 struct ih_finding {
@@ -81,7 +83,14 @@ struct ih_expected {
     struct ih_ellipsoid head[IH_FINDINGS_EXPECTED_MAX];
 };
 
+/* Places from where fits have begun. */
+struct ih_findings_starts {
+    int32_t count;
+    int32_t centre_mm_q8[IH_SCAN_MAX + IH_HYPOTHESES_MAX + IH_FINDINGS_EXPECTED_MAX][3];
+};
+
 struct ih_findings_scratch {
+    struct ih_findings_starts starts;
     struct ih_space space;
     struct ih_scan scan;
     struct ih_scan_scratch scan_scratch;

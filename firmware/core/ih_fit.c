@@ -20,21 +20,14 @@ void ih_fit_params_default(struct ih_fit_params *params)
     *params = (struct ih_fit_params){.see_through_mm = 60, .step_count = IH_FIT_STEPS};
 }
 
-/* The state of an iteration; the axes are the mean head's times exp(ln). */
-struct state {
-    struct ih_ellipsoid ellipsoid;
-    int32_t ln_q16[3]; /* hundredths */
-};
-
-static void add_priors(struct ih_row_system *system, const struct state *state,
-                       const struct ih_ellipsoid *start)
+static void add_priors(struct ih_row_system *system, const struct ih_fit *fit)
 {
     for (int axis = 0; axis < 3; axis++) {
-        int64_t moved_q8 = (int64_t)state->ellipsoid.centre_mm_q8[axis] - start->centre_mm_q8[axis];
+        int64_t moved_q8 = (int64_t)fit->ellipsoid.centre_mm_q8[axis] - fit->start_mm_q8[axis];
         system->normal_q16[IH_CHOLESKY_PACKED(axis + 1) - 1] += PRIOR_CENTRE_Q16;
         system->right_q16[axis] -= ih_mul_shift(PRIOR_CENTRE_Q16, moved_q8, 8);
         system->normal_q16[IH_CHOLESKY_PACKED(axis + 4) - 1] += PRIOR_AXES_Q16;
-        system->right_q16[3 + axis] -= ih_mul_shift(PRIOR_AXES_Q16, state->ln_q16[axis], 16);
+        system->right_q16[3 + axis] -= ih_mul_shift(PRIOR_AXES_Q16, fit->ln_q16[axis], 16);
     }
 }
 
@@ -75,19 +68,19 @@ static int32_t exp_q16(int32_t ln_q16)
     return (int32_t)ih_shift_round(sum_q24, 8);
 }
 
-static void take_step(struct state *state, const int32_t step_q16[IH_FIT_UNKNOWNS])
+static void take_step(struct ih_fit *fit, const int32_t step_q16[IH_FIT_UNKNOWNS])
 {
-    const struct ih_ellipsoid mean = ih_ellipsoid_mean(state->ellipsoid.centre_mm_q8);
+    const struct ih_ellipsoid mean = ih_ellipsoid_mean(fit->ellipsoid.centre_mm_q8);
     for (int axis = 0; axis < 3; axis++) {
         int32_t move_q16 = ih_clamp_s32(step_q16[axis], -STEP_MAX_MM_Q16, STEP_MAX_MM_Q16);
-        state->ellipsoid.centre_mm_q8[axis] += (int32_t)ih_shift_round(move_q16, 8);
+        fit->ellipsoid.centre_mm_q8[axis] += (int32_t)ih_shift_round(move_q16, 8);
         int32_t grow_q16 = ih_clamp_s32(step_q16[3 + axis], -STEP_MAX_LN_Q16, STEP_MAX_LN_Q16);
-        state->ln_q16[axis] = ih_clamp_s32(state->ln_q16[axis] + grow_q16, -LN_MAX_Q16, LN_MAX_Q16);
-        state->ellipsoid.semi_mm_q8[axis] =
-            (int32_t)ih_mul_shift(mean.semi_mm_q8[axis], exp_q16(state->ln_q16[axis]), 16);
-        IH_IN_RANGE(state->ellipsoid.centre_mm_q8[axis], -IH_RANGE_CENTRE_MM_Q8,
+        fit->ln_q16[axis] = ih_clamp_s32(fit->ln_q16[axis] + grow_q16, -LN_MAX_Q16, LN_MAX_Q16);
+        fit->ellipsoid.semi_mm_q8[axis] =
+            (int32_t)ih_mul_shift(mean.semi_mm_q8[axis], exp_q16(fit->ln_q16[axis]), 16);
+        IH_IN_RANGE(fit->ellipsoid.centre_mm_q8[axis], -IH_RANGE_CENTRE_MM_Q8,
                     IH_RANGE_CENTRE_MM_Q8);
-        IH_IN_RANGE(state->ellipsoid.semi_mm_q8[axis], IH_ELLIPSOID_SEMI_MIN_MM << 8,
+        IH_IN_RANGE(fit->ellipsoid.semi_mm_q8[axis], IH_ELLIPSOID_SEMI_MIN_MM << 8,
                     IH_ELLIPSOID_SEMI_MAX_MM << 8);
     }
 }
@@ -103,23 +96,37 @@ static int32_t ln_ratio_q16(int32_t a_mm_q8, int32_t m_mm_q8)
     return ih_clamp_s32(ih_saturate_s32(ln_q16), -LN_MAX_Q16, LN_MAX_Q16);
 }
 
+void ih_fit_begin(const struct ih_ellipsoid *start, struct ih_fit *out)
+{
+    const struct ih_ellipsoid mean = ih_ellipsoid_mean(start->centre_mm_q8);
+    *out = (struct ih_fit){.ellipsoid = *start};
+    for (int axis = 0; axis < 3; axis++) {
+        out->ln_q16[axis] = ln_ratio_q16(start->semi_mm_q8[axis], mean.semi_mm_q8[axis]);
+        out->start_mm_q8[axis] = start->centre_mm_q8[axis];
+    }
+}
+
+void ih_fit_continue(const struct ih_space *space, const struct ih_fit_params *params,
+                     int32_t step_count, struct ih_row_scratch *scratch, struct ih_fit *fit)
+{
+    const int32_t end = ih_min_s32(step_count, params->step_count);
+    for (; fit->step_index < end; fit->step_index++) {
+        struct ih_row_system system;
+        int32_t step_q16[IH_FIT_UNKNOWNS];
+        ih_row_collect(space, &fit->ellipsoid, robust_mm[fit->step_index], params->see_through_mm,
+                       scratch, &system);
+        add_priors(&system, fit);
+        solve(&system, step_q16);
+        take_step(fit, step_q16);
+    }
+}
+
 void ih_fit_ellipsoid(const struct ih_space *space, const struct ih_fit_params *params,
                       const struct ih_ellipsoid *start, struct ih_row_scratch *scratch,
                       struct ih_ellipsoid *out)
 {
-    const struct ih_ellipsoid mean = ih_ellipsoid_mean(start->centre_mm_q8);
-    struct state state = {.ellipsoid = *start};
-    for (int axis = 0; axis < 3; axis++) {
-        state.ln_q16[axis] = ln_ratio_q16(start->semi_mm_q8[axis], mean.semi_mm_q8[axis]);
-    }
-    for (int i = 0; i < params->step_count; i++) {
-        struct ih_row_system system;
-        int32_t step_q16[IH_FIT_UNKNOWNS];
-        ih_row_collect(space, &state.ellipsoid, robust_mm[i], params->see_through_mm, scratch,
-                       &system);
-        add_priors(&system, &state, start);
-        solve(&system, step_q16);
-        take_step(&state, step_q16);
-    }
-    *out = state.ellipsoid;
+    struct ih_fit fit;
+    ih_fit_begin(start, &fit);
+    ih_fit_continue(space, params, params->step_count, scratch, &fit);
+    *out = fit.ellipsoid;
 }

@@ -48,7 +48,22 @@ struct ih_fit_params {
 
 void ih_fit_params_default(struct ih_fit_params *params);
 
-/* scratch->rays must have been prepared from the space (ih_row_prepare). */
+/* A fit on its way: it may be looked at after any step, and be left there. */
+struct ih_fit {
+    struct ih_ellipsoid ellipsoid;
+    int32_t ln_q16[3]; /* the axes are the mean head's times exp(ln), hundredths */
+    int32_t start_mm_q8[3];
+    int32_t step_index; /* of the next step */
+};
+
+void ih_fit_begin(const struct ih_ellipsoid *start, struct ih_fit *out);
+
+/* Go on until so many steps are done, or params->step_count. scratch->rays must have been prepared from the
+ * space (ih_row_prepare). */
+void ih_fit_continue(const struct ih_space *space, const struct ih_fit_params *params,
+                     int32_t step_count, struct ih_row_scratch *scratch, struct ih_fit *fit);
+
+/* All steps. */
 void ih_fit_ellipsoid(const struct ih_space *space, const struct ih_fit_params *params,
                       const struct ih_ellipsoid *start, struct ih_row_scratch *scratch,
                       struct ih_ellipsoid *out);

@@ -39,7 +39,7 @@ FUNCTIONS = {
     "heads": ("ih_heads_select",),
     "findings": ("ih_findings_add",),
     ". scan": ("ih_scan_find",),
-    ". fit": ("ih_fit_ellipsoid",),
+    ". fit": ("ih_fit_continue",),
     ". evidence": ("ih_evidence_collect",),
     "tracks": ("ih_tracks_expect", "ih_tracks_update"),
 }

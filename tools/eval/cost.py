@@ -49,7 +49,7 @@ PARTS = (
     Part("findings", ("ih_findings_add",), ("ih_findings",), ("findings",), "findings"),
     Part(". space", ("ih_space_make",), ("ih_space",), inner=True),
     Part(". scan", ("ih_scan_find",), ("ih_scan",), inner=True),
-    Part(". fit", ("ih_fit_ellipsoid",), ("ih_fit",), inner=True),
+    Part(". fit", ("ih_fit_continue",), ("ih_fit",), inner=True),
     Part(". evidence", ("ih_evidence_collect",), ("ih_evidence",), inner=True),
     Part(". score", ("ih_score_rate",), ("ih_score",), inner=True),
     Part("tracks", ("ih_tracks_expect", "ih_tracks_update"), ("ih_tracks",), ("tracks",)),
