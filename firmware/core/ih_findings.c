@@ -13,7 +13,7 @@ void ih_findings_params_default(struct ih_findings_params *params)
     ih_space_params_default(&params->space);
     ih_scan_params_default(&params->scan);
     ih_fit_params_default(&params->fit);
-    params->apart_mm = 30;
+    params->apart_mm = 20;
     params->hopeless_logit_q10 = -4608;
     params->spacing_mm = 80;
     params->nest_near_mm = 90;
@@ -213,16 +213,16 @@ void ih_findings_add(const struct ih_points *points, const struct ih_dots *dots,
     ih_scan_find(&scratch->space, &params->scan, &scratch->scan_scratch, &scratch->scan);
     ih_row_prepare(&scratch->space, &scratch->rows.rays);
     scratch->starts.count = 0;
-    for (int32_t i = 0; i < expected->count; i++) {
-        if (i < params->expected_max) {
-            try_start(&work, &expected->head[i], IH_SOURCE_EXPECTED);
-        }
-        view_expected(&work, &expected->head[i], &out->view[i]);
-    }
     for (int32_t i = 0; i < ih_min_s32(heads->hypothesis_count, params->nest_max); i++) {
         try_place(&work, heads->hypothesis[i].centre_mm_q8, IH_SOURCE_NEST);
     }
     for (int32_t i = 0; i < scratch->scan.place_count; i++) {
         try_place(&work, scratch->scan.place[i].centre_mm_q8, IH_SOURCE_SCAN);
+    }
+    for (int32_t i = 0; i < expected->count; i++) {
+        if (i < params->expected_max) {
+            try_start(&work, &expected->head[i], IH_SOURCE_EXPECTED);
+        }
+        view_expected(&work, &expected->head[i], &out->view[i]);
     }
 }
