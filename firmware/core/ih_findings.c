@@ -13,6 +13,7 @@ void ih_findings_params_default(struct ih_findings_params *params)
     ih_space_params_default(&params->space);
     ih_scan_params_default(&params->scan);
     ih_fit_params_default(&params->fit);
+    params->promise_least_q8 = 256;
     params->apart_mm = 20;
     params->hopeless_logit_q10 = -4608;
     params->spacing_mm = 80;
@@ -183,7 +184,11 @@ static void try_start(const struct work *work, const struct ih_ellipsoid *start,
 
 static void try_place(const struct work *work, const int32_t centre_mm_q8[3], enum ih_source source)
 {
-    struct ih_ellipsoid start = ih_ellipsoid_mean(centre_mm_q8);
+    const struct ih_ellipsoid start = ih_ellipsoid_mean(centre_mm_q8);
+    if (ih_glance_promise_q8(&work->scratch->rows.rays, work->space->origin_mm_q8, centre_mm_q8) <
+        work->params->promise_least_q8) {
+        return;
+    }
     try_start(work, &start, source);
 }
 

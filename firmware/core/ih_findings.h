@@ -3,9 +3,12 @@
  * In:    nests and their hypotheses (ih_heads), points, dots, rig, and places from where a head is
  *        expected (tracks).
  * Out:   findings, the most probable first, at least spacing_mm apart.
- * Way:   candidates are the nests' centres, the places of the model scan and the expected ones; each
- *        is fitted (ih_fit), looked at (ih_evidence) and rated (ih_score). A range frame is looked at
- *        window by window: begin once a frame, add once a window.
+ * Way:   candidates are the nests' centres, the places of the model scan and the expected ones, in this
+ *        order. Nests and places of which a glance says nothing good (ih_glance), and starts within apart_mm
+ *        of one before, are passed over. Each other one is fitted for a step (ih_fit), looked at
+ *        (ih_evidence) and rated (ih_score); then what is not hopeless is fitted to the end, looked at and
+ *        rated again. Tracks take no finding below log-odds -3: hopeless is what lies 1.5 below that after
+ *        a step. A range frame is looked at window by window: begin once a frame, add once a window.
  *        Of an expected head that is not found it also says what its rays met (views): whether it is
  *        hidden, or gone.
  *        Of two within spacing_mm the more probable stays, of equals the first; it takes the place of
@@ -13,12 +16,13 @@
  * Full table: the least probable drop and count in dropped_count.
  * Overflow: points are below 2^25 in Q8 (16 m, slopes up to 8), nests' centres below 2^26.01, expected
  *        ones at most 2^26; a fit moves 240 mm: centres below 2^27, squares of differences 2^57.6.
- * Cost:  up to IH_SCAN_MAX + IH_HYPOTHESES_MAX + IH_FINDINGS_EXPECTED_MAX = 32 fits a window, usually
- *        about 13.
+ * Cost:  up to IH_SCAN_MAX + IH_HYPOTHESES_MAX + IH_FINDINGS_EXPECTED_MAX = 32 fits a window. Usually 12
+ *        candidates, of which 6 are fitted for a step and 3 to the end.
  */
 #ifndef IH_FINDINGS_H
 #define IH_FINDINGS_H
 
+#include "ih_glance.h"
 #include "ih_heads.h"
 #include "ih_scan.h"
 #include "ih_score.h"
@@ -34,7 +38,9 @@ struct ih_findings_params {
     struct ih_space_params space;
     struct ih_scan_params scan;
     struct ih_fit_params fit;
-    int32_t apart_mm;           /* a start nearer than this to one before is not tried */
+    int32_t
+        promise_least_q8; /* a nest or a place of the scan with less (ih_glance) is not fitted */
+    int32_t apart_mm;     /* a start nearer than this to one before is not tried */
     int32_t hopeless_logit_q10; /* less probable after a first step: not fitted any further */
     int32_t spacing_mm;         /* of two findings */
     int32_t nest_near_mm;       /* a nest this near is the candidate's own */

@@ -54,6 +54,15 @@ void ih_row_prepare(const struct ih_space *space, struct ih_row_rays *out)
         out->slope_q12[0][slot] = (int16_t)(ray->slope_x_q20 >> 8);
         out->slope_q12[1][slot] = (int16_t)(ray->slope_y_q20 >> 8);
         out->seen[slot] = ray->state == IH_RAY_SEEN;
+        if (ray->state == IH_RAY_EMPTY) {
+            out->point_mm_q1[2][slot] = IH_ROW_NOWHERE;
+        }
+        if (ray->state == IH_RAY_UNKNOWN) {
+            out->slope_q12[0][slot] = IH_ROW_NOWHERE;
+        }
+    }
+    for (int32_t slot = IH_SLOTS; slot < IH_ROW_RAYS; slot++) {
+        out->slope_q12[0][slot] = IH_ROW_NOWHERE;
     }
 }
 

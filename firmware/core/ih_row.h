@@ -28,6 +28,9 @@
 /* The slots in whole vectors. */
 #define IH_ROW_RAYS ((IH_SLOTS + 15) / 16 * 16)
 
+/* Where rays of which nothing is known pass, and how far the points of empty ones are. */
+#define IH_ROW_NOWHERE INT16_MAX
+
 /* All rays, rounded down; what does not fit is cut. Filled once for all fits. */
 struct ih_row_rays {
     int16_t point_mm_q1[3][IH_ROW_RAYS];
