@@ -2,143 +2,91 @@
 
 #include "ih_fix.h"
 
-/* mm around the centre of a mean head. */
-#define HIGH_FROM_MM 215
-#define HIGH_ASIDE_MM 125
-#define OPEN_MM 60
-#define BODY_FROM_MM 153
-#define BODY_TO_MM 373
-#define BODY_ASIDE_MM 180
-#define BODY_BEFORE_MM 220
-#define BODY_BEHIND_MM 200
-#define LEVEL_UP_MM 113
-#define LEVEL_FROM_MM 170
-#define LEVEL_TO_MM 330
-#define LEVEL_DEEP_MM 150
-/* Over a depth in Q8 it is a slope in Q12. */
-#define ONE_MM_Q20 (1 << 20)
 /* Rays of a share, at least. */
 #define LEAST 3
 /* Nearer to the origin's depth there is no telling where rays pass. */
-#define DEPTH_LEAST_MM_Q8 (1 << 8)
+#define DEPTH_LEAST_MM_Q8 (1 << 14)
+/* As far above as no ray is, and behind as far as what is empty. */
+#define NO_END_MM INT16_MAX
 
-/* Without its ends. */
-struct between {
-    int16_t low, high;
+/* mm from the centre of a mean head. */
+struct window {
+    int16_t aside_mm, gap_mm; /* within; farther than, if it is not below 0 */
+    int16_t above_mm, below_mm;
+    int16_t before_mm, behind_mm; /* points that are a part */
 };
 
+enum { HIGH, BODY, LEVEL, WINDOW_COUNT };
+
+static const struct window windows[WINDOW_COUNT] = {
+    [HIGH] = {125, -1, NO_END_MM, -215, -60, NO_END_MM},
+    [BODY] = {180, -1, -153, 373, 220, 200},
+    [LEVEL] = {330, 170, 113, 113, 150, 150},
+};
+
+/* From the first to the second of each: slopes in Q12, depths in Q1. */
 struct bounds {
-    struct between high_x, body_x, body_y, level_x, level_y, body_z, level_z;
-    struct between level_gap_x; /* too near for level */
-    int16_t high_y, open_z;
+    int16_t x[2], gap[2], y[2], z[2];
 };
 
 struct share {
     int32_t part, all;
 };
 
-struct shares {
-    struct share high, body, level;
-};
-
-static int16_t saturate_s16(int64_t value)
+static void set_range(int32_t middle, int32_t less, int32_t more, int16_t range[2])
 {
-    return (int16_t)(value > INT16_MAX ? INT16_MAX : value < INT16_MIN ? INT16_MIN : value);
+    range[0] = (int16_t)ih_clamp_s32(middle - less, INT16_MIN, INT16_MAX);
+    range[1] = (int16_t)ih_clamp_s32(middle + more, INT16_MIN, INT16_MAX);
 }
 
-/* Slopes of the rays that pass between two offsets, of which the middle's is given. */
-static struct between slopes(int64_t middle_q12, int32_t low_mm, int32_t high_mm,
-                             int32_t depth_mm_q8)
+/* Where the middle is, and what a mm is, as slopes. */
+static void find_bounds(const struct window *window, const int32_t middle_q12[2], int32_t mm_q20,
+                        int32_t depth_mm_q1, struct bounds *out)
 {
-    return (struct between){saturate_s16(middle_q12 + low_mm * ONE_MM_Q20 / depth_mm_q8),
-                            saturate_s16(middle_q12 + high_mm * ONE_MM_Q20 / depth_mm_q8)};
+    const int32_t aside_q12 = window->aside_mm * mm_q20 >> 8;
+    const int32_t gap_q12 = window->gap_mm * mm_q20 >> 8;
+    set_range(middle_q12[0], aside_q12, aside_q12, out->x);
+    set_range(middle_q12[0], gap_q12, gap_q12, out->gap);
+    set_range(middle_q12[1], window->above_mm * mm_q20 >> 8, window->below_mm * mm_q20 >> 8,
+              out->y);
+    set_range(depth_mm_q1, 2 * window->before_mm, 2 * window->behind_mm, out->z);
 }
 
-static struct between depths(int32_t centre_mm_q8, int32_t before_mm, int32_t behind_mm)
-{
-    return (struct between){saturate_s16((centre_mm_q8 >> 7) - 2 * before_mm),
-                            saturate_s16((centre_mm_q8 >> 7) + 2 * behind_mm)};
-}
-
-static void find_bounds(const int32_t origin_mm_q8[3], const int32_t centre_mm_q8[3],
-                        int32_t depth_mm_q8, struct bounds *out)
-{
-    const int64_t x_q12 = ((int64_t)centre_mm_q8[0] - origin_mm_q8[0]) * 4096 / depth_mm_q8;
-    const int64_t y_q12 = ((int64_t)centre_mm_q8[1] - origin_mm_q8[1]) * 4096 / depth_mm_q8;
-    out->high_x = slopes(x_q12, -HIGH_ASIDE_MM, HIGH_ASIDE_MM, depth_mm_q8);
-    out->high_y = slopes(y_q12, -HIGH_FROM_MM, 0, depth_mm_q8).low;
-    out->open_z = depths(centre_mm_q8[2], 0, OPEN_MM).high;
-    out->body_x = slopes(x_q12, -BODY_ASIDE_MM, BODY_ASIDE_MM, depth_mm_q8);
-    out->body_y = slopes(y_q12, BODY_FROM_MM, BODY_TO_MM, depth_mm_q8);
-    out->body_z = depths(centre_mm_q8[2], BODY_BEFORE_MM, BODY_BEHIND_MM);
-    out->level_x = slopes(x_q12, -LEVEL_TO_MM, LEVEL_TO_MM, depth_mm_q8);
-    out->level_gap_x = slopes(x_q12, -LEVEL_FROM_MM, LEVEL_FROM_MM, depth_mm_q8);
-    out->level_y = slopes(y_q12, -LEVEL_UP_MM, LEVEL_UP_MM, depth_mm_q8);
-    out->level_z = depths(centre_mm_q8[2], LEVEL_DEEP_MM, LEVEL_DEEP_MM);
-}
-
-/* What is nowhere, or has no end, is at IH_ROW_NOWHERE, which is between nothing. */
+/* Rays that pass between the bounds; of an unknown one x is at IH_ROW_NOWHERE, of an empty one's point z. */
 #if defined __SSE2__ || defined __ARM_NEON
 /* A loop without a branch: compilers turn it into vectors. */
-static void count_rays(const struct ih_row_rays *rays, const struct bounds *bounds,
-                       struct shares *out)
+static struct share count_rays(const struct ih_row_rays *rays, const struct bounds *bounds)
 {
     const struct bounds b = *bounds;
-    int16_t high_all = 0, high = 0, body_all = 0, body = 0, level_all = 0, level = 0;
+    int16_t part = 0, all = 0;
     for (int32_t slot = 0; slot < IH_ROW_RAYS; slot++) {
         const int16_t x = rays->slope_q12[0][slot];
         const int16_t y = rays->slope_q12[1][slot];
         const int16_t z = rays->point_mm_q1[2][slot];
-        const int16_t is_high = (x > b.high_x.low) & (x < b.high_x.high) & (y < b.high_y);
-        const int16_t is_below =
-            (x > b.body_x.low) & (x < b.body_x.high) & (y > b.body_y.low) & (y < b.body_y.high);
-        const int16_t is_beside = (x > b.level_x.low) & (x < b.level_x.high) &
-                                  ((x <= b.level_gap_x.low) | (x >= b.level_gap_x.high)) &
-                                  (y > b.level_y.low) & (y < b.level_y.high);
-        high_all = (int16_t)(high_all + is_high);
-        high = (int16_t)(high + (is_high & (z >= b.open_z)));
-        body_all = (int16_t)(body_all + is_below);
-        body = (int16_t)(body + (is_below & (z > b.body_z.low) & (z < b.body_z.high)));
-        level_all = (int16_t)(level_all + is_beside);
-        level = (int16_t)(level + (is_beside & (z > b.level_z.low) & (z < b.level_z.high)));
+        const int16_t is_there = (x > b.x[0]) & (x < b.x[1]) & (y > b.y[0]) & (y < b.y[1]) &
+                                 ((x <= b.gap[0]) | (x >= b.gap[1]));
+        const int16_t is_part = is_there & (z > b.z[0]) & (z <= b.z[1]);
+        all = (int16_t)(all + is_there);
+        part = (int16_t)(part + is_part);
     }
-    *out = (struct shares){{high, high_all}, {body, body_all}, {level, level_all}};
+    return (struct share){part, all};
 }
 #else
-static bool is_between(int16_t value, const struct between *between)
-{
-    return value > between->low && value < between->high;
-}
-
-static void count(struct share *share, bool part)
-{
-    share->all++;
-    share->part += part;
-}
-
 /* Where there are no vectors, most rays are told by one comparison or two. */
-static void count_rays(const struct ih_row_rays *rays, const struct bounds *b, struct shares *out)
+static struct share count_rays(const struct ih_row_rays *rays, const struct bounds *b)
 {
-    *out = (struct shares){.high = {0, 0}};
+    struct share share = {0, 0};
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
         const int16_t x = rays->slope_q12[0][slot];
-        if (!is_between(x, &b->level_x)) { /* the widest */
-            continue;
-        }
         const int16_t y = rays->slope_q12[1][slot];
-        const int16_t z = rays->point_mm_q1[2][slot];
-        if (y < b->high_y) {
-            if (is_between(x, &b->high_x)) {
-                count(&out->high, z >= b->open_z);
-            }
-        } else if (is_between(y, &b->level_y)) {
-            if (!is_between(x, &b->level_gap_x)) {
-                count(&out->level, is_between(z, &b->level_z));
-            }
-        } else if (is_between(y, &b->body_y) && is_between(x, &b->body_x)) {
-            count(&out->body, is_between(z, &b->body_z));
+        if (x > b->x[0] && x < b->x[1] && y > b->y[0] && y < b->y[1] &&
+            (x <= b->gap[0] || x >= b->gap[1])) {
+            const int16_t z = rays->point_mm_q1[2][slot];
+            share.all++;
+            share.part += z > b->z[0] && z <= b->z[1];
         }
     }
+    return share;
 }
 #endif
 
@@ -151,12 +99,20 @@ int32_t ih_glance_promise_q8(const struct ih_row_rays *rays, const int32_t origi
                              const int32_t centre_mm_q8[3])
 {
     const int32_t depth_mm_q8 = centre_mm_q8[2] - origin_mm_q8[2];
-    struct shares shares = {.high = {0, 0}};
+    struct share share[WINDOW_COUNT] = {{0, 0}};
     if (depth_mm_q8 >= DEPTH_LEAST_MM_Q8) {
-        struct bounds bounds;
-        find_bounds(origin_mm_q8, centre_mm_q8, depth_mm_q8, &bounds);
-        count_rays(rays, &bounds, &shares);
+        const int32_t mm_q20 = (1 << 28) / depth_mm_q8;
+        int32_t middle_q12[2];
+        for (int axis = 0; axis < 2; axis++) {
+            const int32_t off_mm_q8 = centre_mm_q8[axis] - origin_mm_q8[axis];
+            middle_q12[axis] = (int32_t)((int64_t)off_mm_q8 * 4096 / depth_mm_q8);
+        }
+        for (int i = 0; i < WINDOW_COUNT; i++) {
+            struct bounds bounds;
+            find_bounds(&windows[i], middle_q12, mm_q20, centre_mm_q8[2] >> 7, &bounds);
+            share[i] = count_rays(rays, &bounds);
+        }
     }
-    const int32_t high_q8 = (2 * shares.high.part + 1) * 128 / (shares.high.all + 1);
-    return 2 * high_q8 + 3 * plain_q8(shares.body) - 4 * plain_q8(shares.level);
+    const int32_t high_q8 = (2 * share[HIGH].part + 1) * 128 / (share[HIGH].all + 1);
+    return 2 * high_q8 + 3 * plain_q8(share[BODY]) - 4 * plain_q8(share[LEVEL]);
 }

@@ -557,6 +557,97 @@ static void outlines_end_a_millimetre_before_the_lens(void)
     }
 }
 
+/* Hopeless after a step: left there. Not hopeless: as if it had been fitted at once. */
+static void what_is_hopeless_is_fitted_for_a_step(void)
+{
+    static const int32_t hopeless_q10[] = {1 << 20, -(1 << 20)};
+    int pass;
+
+    make_points(true, false);
+    for (pass = 0; pass < 2; pass++) {
+        struct ih_findings once;
+
+        expected.count = 0;
+        expect_head();
+        expected.head[0].centre_mm_q8[0] += 30 << 8;
+        params.scan.place_max = 0;
+        params.hopeless_logit_q10 = hopeless_q10[pass];
+        params.fit.step_count = IH_FIT_STEPS;
+        ih_findings_begin(&findings);
+        look();
+        once = findings;
+        params.hopeless_logit_q10 = hopeless_q10[0];
+        params.fit.step_count = pass == 0 ? 1 : IH_FIT_STEPS;
+        ih_findings_begin(&findings);
+        look();
+        TEST_ASSERT_EQUAL_INT32(1, findings.finding_count);
+        TEST_ASSERT_EQUAL_INT32(1, once.finding_count);
+        IH_TEST_EQUAL(pass == 0,
+                      memcmp(&once.finding[0].head, &findings.finding[0].head,
+                             sizeof once.finding[0].head) == 0,
+                      "left after a step", pass);
+        if (pass == 1) { /* six steps are nearer than one */
+            struct ih_ellipsoid head;
+
+            ih_row_prepare(&scratch.space, &scratch.rows.rays);
+            ih_fit_ellipsoid(&scratch.space, &params.fit, &expected.head[0], &scratch.rows, &head);
+            TEST_ASSERT_EQUAL_MEMORY(&head, &once.finding[0].head, sizeof head);
+        }
+    }
+}
+
+/* Of two starts near each other the first is tried. */
+static void near_starts_are_tried_once(void)
+{
+    static const struct {
+        double off_mm;
+        int32_t count;
+    } cases[] = {{0, 1}, {19.9, 1}, {20.1, 2}};
+    int i;
+
+    make_points(true, false);
+    params.scan.place_max = 0;
+    params.spacing_mm = 0;
+    params.fit.step_count = 0;
+    for (i = 0; i < IH_TEST_COUNT(cases); i++) {
+        expected.count = 0;
+        expect_head();
+        expect_head();
+        expected.head[1].centre_mm_q8[1] += (int32_t)(cases[i].off_mm * 256);
+        ih_findings_begin(&findings);
+        look();
+        IH_TEST_EQUAL(cases[i].count, findings.finding_count, "starts", i);
+    }
+}
+
+/* Nests and places of the scan must promise something, expected heads need not. */
+static void what_promises_nothing_is_passed_over(void)
+{
+    int pass, i;
+
+    make_points(true, false);
+    heads.hypothesis_count = 1;
+    for (i = 0; i < 3; i++) {
+        heads.hypothesis[0].centre_mm_q8[i] = (int32_t)(head_mm[i] * 256);
+    }
+    expect_head();
+    expected.head[0].centre_mm_q8[0] += 60 << 8;
+    params.spacing_mm = 0;
+    for (pass = 0; pass < 2; pass++) {
+        int32_t count[3] = {0, 0, 0};
+
+        params.promise_least_q8 = pass == 0 ? -4 * 256 : 5 * 256 + 1;
+        ih_findings_begin(&findings);
+        look();
+        for (i = 0; i < findings.finding_count; i++) {
+            count[findings.finding[i].source]++;
+        }
+        IH_TEST_EQUAL(pass == 0, count[IH_SOURCE_SCAN] > 0, "scan", pass);
+        IH_TEST_EQUAL(pass == 0, count[IH_SOURCE_NEST], "nest", pass);
+        IH_TEST_EQUAL(1, count[IH_SOURCE_EXPECTED], "expected", pass);
+    }
+}
+
 static void no_points_give_no_findings(void)
 {
     rig.calibration.kind = IH_RIG_RANGE;
@@ -587,6 +678,9 @@ int main(void)
     RUN_TEST(findings_are_rated_by_their_evidence);
     RUN_TEST(a_front_may_be_as_near_as_its_limit);
     RUN_TEST(outlines_end_a_millimetre_before_the_lens);
+    RUN_TEST(what_is_hopeless_is_fitted_for_a_step);
+    RUN_TEST(near_starts_are_tried_once);
+    RUN_TEST(what_promises_nothing_is_passed_over);
     RUN_TEST(no_points_give_no_findings);
     return UNITY_END();
 }
