@@ -4,8 +4,7 @@
 
 #include "ih_fix.h"
 
-/* Compilers do not find the multiplication of lower halves by themselves, see ih_normal. Ranges are checked
- * without vectors. */
+/* Ranges are checked without vectors. */
 #if defined __x86_64__ && defined __SSE2__
 #ifndef ISOHEAD_RANGE_CHECKS
 #define BY_VECTORS
@@ -31,11 +30,13 @@
 #define GRADIENT_MM 64
 #define FLAG_POINT 1
 #define FLAG_PUSH 2
-/* Added to slopes and residuals, and to weighted slopes: then none is negative. Of a product these are whole
- * numbers after its shift by 14 or 8 bits, which can be taken away from the sum. */
-#define LIFT_BITS 16
-#define LIFT (1 << LIFT_BITS)
-#define LIFT_WEIGHTED (1 << 18)
+/* Bits of a row's slopes by the centre, at most 1, and by ln of the axes, below 3.6; of its weighted residual. */
+#define CENTRE_BITS 14
+#define LN_BITS 13
+#define RESIDUAL_BITS 10
+/* Of what stands for ln, in GRADIENT_MM. */
+#define LN_HUNDREDTH_Q16 (GRADIENT_MM * 65536 / 100)
+#define CENTRE_MOST ((1 << CENTRE_BITS) - 1)
 
 static int16_t saturate_s16(int64_t value)
 {
@@ -121,309 +122,258 @@ bool ih_row_distance(const struct ih_ellipsoid *ellipsoid, const int32_t place_q
     return true;
 }
 
+/* What a row is divided by: 2^31 / L, of a gradient's length L, 151 and more; below 2^17.4 where there is a
+ * weight. It is short by up to 1, 2^-13.6 of it, on the surface 2^-17. */
+static uint32_t inverse_q31(const struct gradient *g)
+{
+    return ((uint32_t)1 << 31) / (uint32_t)g->length_q14;
+}
+
+/* (f - 1) f over the gradient's length, mm; for f up to 5.9 that is below 2^19.4 in Q14. */
+static int32_t find_residual(const struct gradient *g, uint32_t inverse)
+{
+    return (int32_t)ih_mul_shift(over_q14(g), inverse, 17);
+}
+
 #ifdef BY_VECTORS
-#define ALWAYS_INLINE inline __attribute__((always_inline))
 #if defined __AVX2__
-#define LANES 4
+#define LANES 16
 typedef __m256i lanes;
 #define LOAD(from) _mm256_loadu_si256((const lanes *)(const void *)(from))
 #define STORE(to, value) _mm256_storeu_si256((lanes *)(void *)(to), value)
-#define ALL(value) _mm256_set1_epi64x((long long)(value))
-#define PRODUCT(a, b) _mm256_mul_epu32(a, b)
-#define SUM(a, b) _mm256_add_epi64(a, b)
-#define SHIFT(a, bits) _mm256_srli_epi64(a, bits)
-#define SHIFT_UP(a, bits) _mm256_slli_epi64(a, bits)
-#define REST(a, b) _mm256_sub_epi64(a, b)
+#define ALL_64(value) _mm256_set1_epi64x(value)
+#define ALL_16(value) _mm256_set1_epi16(value)
+#define SUM_64(a, b) _mm256_add_epi64(a, b)
+#define SUM_32(a, b) _mm256_add_epi32(a, b)
+#define REST_32(a, b) _mm256_sub_epi32(a, b)
+#define REST_16(a, b) _mm256_sub_epi16(a, b)
+#define UP_64(a, bits) _mm256_slli_epi64(a, bits)
+#define DOWN_64(a, bits) _mm256_srli_epi64(a, bits)
+#define SIGN_32(a) _mm256_srai_epi32(a, 31)
+#define BOTH(a, b) _mm256_or_si256(a, b)
 #define FLIP(a, b) _mm256_xor_si256(a, b)
-/* All bits where it is negative, if 32 bits hold it: both halves are the upper one. */
-#define SIGN(a) _mm256_shuffle_epi32(a, 0xf5)
+#define LEAST_16(a, b) _mm256_min_epi16(a, b)
+#define PRODUCT(a, b) _mm256_mul_epu32(a, b)
+#define HIGH_PRODUCT(a, b) _mm256_mulhi_epu16(a, b)
+#define PAIR_PRODUCT(a, b) _mm256_madd_epi16(a, b)
+#define PACK(a, b) _mm256_permute4x64_epi64(_mm256_packs_epi32(a, b), 0xd8)
+#define WIDE_LOW(a) _mm256_cvtepi32_epi64(_mm256_castsi256_si128(a))
+#define WIDE_HIGH(a) _mm256_cvtepi32_epi64(_mm256_extracti128_si256(a, 1))
 #else
-#define LANES 2
+#define LANES 8
 typedef __m128i lanes;
 #define LOAD(from) _mm_loadu_si128((const lanes *)(const void *)(from))
 #define STORE(to, value) _mm_storeu_si128((lanes *)(void *)(to), value)
-#define ALL(value) _mm_set1_epi64x((long long)(value))
-#define PRODUCT(a, b) _mm_mul_epu32(a, b)
-#define SUM(a, b) _mm_add_epi64(a, b)
-#define SHIFT(a, bits) _mm_srli_epi64(a, bits)
-#define SHIFT_UP(a, bits) _mm_slli_epi64(a, bits)
-#define REST(a, b) _mm_sub_epi64(a, b)
+#define ALL_64(value) _mm_set1_epi64x(value)
+#define ALL_16(value) _mm_set1_epi16(value)
+#define SUM_64(a, b) _mm_add_epi64(a, b)
+#define SUM_32(a, b) _mm_add_epi32(a, b)
+#define REST_32(a, b) _mm_sub_epi32(a, b)
+#define REST_16(a, b) _mm_sub_epi16(a, b)
+#define UP_64(a, bits) _mm_slli_epi64(a, bits)
+#define DOWN_64(a, bits) _mm_srli_epi64(a, bits)
+#define SIGN_32(a) _mm_srai_epi32(a, 31)
+#define BOTH(a, b) _mm_or_si128(a, b)
 #define FLIP(a, b) _mm_xor_si128(a, b)
-#define SIGN(a) _mm_shuffle_epi32(a, 0xf5)
+#define LEAST_16(a, b) _mm_min_epi16(a, b)
+#define PRODUCT(a, b) _mm_mul_epu32(a, b)
+#define HIGH_PRODUCT(a, b) _mm_mulhi_epu16(a, b)
+#define PAIR_PRODUCT(a, b) _mm_madd_epi16(a, b)
+#define PACK(a, b) _mm_packs_epi32(a, b)
+#define WIDE_LOW(a) _mm_unpacklo_epi32(a, SIGN_32(a))
+#define WIDE_HIGH(a) _mm_unpackhi_epi32(a, SIGN_32(a))
+#endif
+
+/* (a * b + 2^(bits - 1)) / 2^bits in lanes of 32 bits, which it must fit. */
+static inline lanes product_shift(lanes a, lanes b, int bits)
+{
+    const lanes half = ALL_64((int64_t)1 << (bits - 1));
+    const lanes even = DOWN_64(SUM_64(PRODUCT(a, b), half), bits);
+    const lanes odd = DOWN_64(SUM_64(PRODUCT(DOWN_64(a, 32), DOWN_64(b, 32)), half), bits);
+    return BOTH(even, UP_64(odd, 32));
+}
+
+static inline lanes size_of(lanes value)
+{
+    const lanes sign = SIGN_32(value);
+    return REST_32(FLIP(value, sign), sign);
+}
+
+/* Slopes of half a vector's rows as set_slope says. */
+static inline lanes ln_slopes(const int32_t *place_q14, const uint32_t *inverse)
+{
+    const lanes hundredth_q16 = ALL_64((int64_t)LN_HUNDREDTH_Q16 << 32 | (int64_t)LN_HUNDREDTH_Q16);
+    const lanes size = size_of(LOAD(place_q14));
+    return product_shift(product_shift(size, size, 14),
+                         product_shift(LOAD(inverse), hundredth_q16, 16), 18);
+}
+
+static void find_slopes(struct ih_rows *rows, int32_t count)
+{
+    for (int32_t k = 0; k < count; k += LANES) {
+        const int32_t next = k + LANES / 2;
+        const lanes weight = LOAD(&rows->weight_q16[k]);
+        const lanes inverse = LOAD(&rows->inverse[k]), inverse_next = LOAD(&rows->inverse[next]);
+        for (int axis = 0; axis < 3; axis++) {
+            const lanes component = LOAD(&rows->component_q14[axis][k]);
+            const lanes component_next = LOAD(&rows->component_q14[axis][next]);
+            const lanes sign = PACK(SIGN_32(component), SIGN_32(component_next));
+            const lanes size =
+                LEAST_16(PACK(product_shift(size_of(component), inverse, 17),
+                              product_shift(size_of(component_next), inverse_next, 17)),
+                         ALL_16(CENTRE_MOST));
+            STORE(&rows->slope[axis][k], REST_16(FLIP(size, sign), sign));
+            STORE(&rows->weighted[axis][k], REST_16(FLIP(HIGH_PRODUCT(size, weight), sign), sign));
+            const lanes ln_slope =
+                PACK(ln_slopes(&rows->place_q14[axis][k], &rows->inverse[k]),
+                     ln_slopes(&rows->place_q14[axis][next], &rows->inverse[next]));
+            STORE(&rows->slope[3 + axis][k], ln_slope);
+            STORE(&rows->weighted[3 + axis][k], HIGH_PRODUCT(ln_slope, weight));
+        }
+    }
+}
+
+/* Sums of products of rows, of which there are whole vectors. A product is below 2^28 in size, as a weight
+ * takes from the greater slopes: eight of them fit 32 bits. */
+static int64_t sum_products(const int16_t *a, const int16_t *b, int32_t count)
+{
+    lanes sum = ALL_64(0);
+    for (int32_t first = 0; first < count; first += 4 * LANES) {
+        const int32_t end = ih_min_s32(first + 4 * LANES, count);
+        lanes part = ALL_64(0);
+        for (int32_t k = first; k < end; k += LANES) {
+            part = SUM_32(part, PAIR_PRODUCT(LOAD(&a[k]), LOAD(&b[k])));
+        }
+        sum = SUM_64(sum, SUM_64(WIDE_LOW(part), WIDE_HIGH(part)));
+    }
+    int64_t lane[LANES / 4], total = 0;
+    STORE(lane, sum);
+    for (int i = 0; i < LANES / 4; i++) {
+        total += lane[i];
+    }
+    return total;
+}
+
+/* Rows of nothing add nothing. */
+static void clear_row(struct ih_rows *rows, int32_t at)
+{
+    for (int axis = 0; axis < 3; axis++) {
+        rows->place_q14[axis][at] = 0;
+        rows->component_q14[axis][at] = 0;
+    }
+    rows->inverse[at] = 0;
+    rows->weight_q16[at] = 0;
+    rows->residual_mm_q10[at] = 0;
+}
+
+static void set_slopes(struct ih_rows *rows, const struct gradient *g, uint32_t inverse,
+                       const int32_t place_q14[3], uint32_t weight_q16)
+{
+    for (int axis = 0; axis < 3; axis++) {
+        rows->place_q14[axis][rows->count] = place_q14[axis];
+        rows->component_q14[axis][rows->count] = g->component_q14[axis];
+    }
+    rows->inverse[rows->count] = inverse;
+    rows->weight_q16[rows->count] = (uint16_t)weight_q16;
+}
+#else
+#define LANES 4
+/* Made of what is positive, so that what is symmetric stays so. */
+static void set_slope(struct ih_rows *rows, int i, int32_t size, int32_t sign, uint32_t weight_q16)
+{
+    const int32_t weighted = (int32_t)((uint32_t)size * weight_q16 >> 16);
+    rows->slope[i][rows->count] = (int16_t)(sign * size);
+    rows->weighted[i][rows->count] = (int16_t)(sign * weighted);
+}
+
+static void set_slopes(struct ih_rows *rows, const struct gradient *g, uint32_t inverse,
+                       const int32_t place_q14[3], uint32_t weight_q16)
+{
+    const int64_t ln_inverse = ih_mul_shift(inverse, LN_HUNDREDTH_Q16, 16);
+    for (int axis = 0; axis < 3; axis++) {
+        const int32_t component_q14 = g->component_q14[axis];
+        const int32_t slope = (int32_t)ih_mul_shift(ih_abs_s32(component_q14), inverse, 17);
+        const int64_t square_q14 = ih_mul_shift(place_q14[axis], place_q14[axis], 14);
+        const int32_t ln_slope = (int32_t)ih_mul_shift(square_q14, ln_inverse, 18);
+        IH_IN_RANGE(ln_slope, 0, IH_RANGE_SLOPE_Q13);
+        set_slope(rows, axis, ih_min_s32(slope, CENTRE_MOST), component_q14 < 0 ? -1 : 1,
+                  weight_q16);
+        set_slope(rows, 3 + axis, ln_slope, 1, weight_q16);
+    }
+}
+
+static void find_slopes(struct ih_rows *rows, int32_t count)
+{
+    (void)rows;
+    (void)count;
+}
+
+static int64_t sum_products(const int16_t *a, const int16_t *b, int32_t count)
+{
+    int64_t sum = 0;
+    for (int32_t k = 0; k < count; k += LANES) {
+        sum += a[k] * b[k];
+        sum += a[k + 1] * b[k + 1];
+        sum += a[k + 2] * b[k + 2];
+        sum += a[k + 3] * b[k + 3];
+    }
+    return sum;
+}
+
+/* Rows of nothing add nothing. */
+static void clear_row(struct ih_rows *rows, int32_t at)
+{
+    for (int i = 0; i < IH_FIT_UNKNOWNS; i++) {
+        rows->slope[i][at] = 0;
+        rows->weighted[i][at] = 0;
+    }
+    rows->residual_mm_q10[at] = 0;
+}
 #endif
 _Static_assert(IH_ROW_MAX % LANES == 0, "rows fill whole vectors");
 
-/* Quotients by a gradient's length L, 151 and more: 25 L once, and products that are rounded as
- * ih_div_round does. With v, too great by less than 1, instead of 2^62 / (25 L), a quotient n / d is
- * too great by n' v / 2^k - n / d < n' / 2^k (n' and k as below); it must stay below 1 / (2 d), what it
- * is away from a half at least if not on it. For f up to 5.8, the most that has a weight, L < 2^17.3 and
- * squares of places s^2 < 2^19.1. */
-struct inverse {
-    int64_t by_25_q62; /* 2^62 / (25 L) */
-    int64_t whole_q58; /* 2^58 / L */
-};
-
-static struct inverse invert(int32_t length_q14)
+static int slope_bits(int unknown)
 {
-    struct inverse inverse;
-    inverse.by_25_q62 = (int64_t)(((uint64_t)1 << 62) / ((uint32_t)length_q14 * 25U)) + 1;
-    inverse.whole_q58 = (inverse.by_25_q62 * 25 >> 4) + 1;
-    return inverse;
+    return unknown < 3 ? CENTRE_BITS : LN_BITS;
 }
 
-/* ih_div_round(over * 2^14, L), |over| < 2^19.4 and 15 L: off by 2.6 |over| / 2^44 < 1 / (2 L). */
-static int32_t by_length_q8(const struct inverse *inverse, int64_t over)
-{
-    return (int32_t)((over * inverse->whole_q58 + ((int64_t)1 << 43)) >> 44);
-}
-
-/* A gradient's residual; of its length what find_slopes divides by. */
-static int32_t find_residual(const struct gradient *g, ih_row_entry *length)
-{
-    const struct inverse inverse = invert(g->length_q14);
-    *length = (uint64_t)inverse.by_25_q62;
-    return by_length_q8(&inverse, over_q14(g));
-}
-
-/* (a * b + 2^(bits - 1)) / 2^bits of an a below 2^32, all below 2^64. */
-static inline lanes product_shift(lanes a, lanes b, int bits)
-{
-    const lanes high = SHIFT_UP(PRODUCT(a, SHIFT(b, 32)), 32);
-    return SHIFT(SUM(SUM(PRODUCT(a, b), high), ALL((int64_t)1 << (bits - 1))), bits);
-}
-
-/* The lifted slope of unknown i in whole vectors, and what its weighted one is. */
-static inline void set_slope(struct ih_rows *rows, int32_t k, int i, lanes slope, lanes weight,
-                             lanes lift_q30)
-{
-    const lanes raised = REST(ALL(LIFT), slope);
-    STORE(&rows->slope_q14[i][k], raised);
-    STORE(&rows->weighted_q16[i][k], SHIFT(SUM(PRODUCT(weight, raised), lift_q30), 14));
-}
-
-static void find_slopes(struct ih_rows *rows, int32_t count)
-{
-    for (int32_t k = 0; k < count; k += LANES) {
-        const lanes by_25 = LOAD(&rows->length[k]);
-        const lanes whole = SUM(SUM(SHIFT_UP(by_25, 4), SHIFT_UP(by_25, 3)), by_25);
-        const lanes weight = LOAD(&rows->weight_q16[k]);
-        const lanes lift_q30 =
-            REST(ALL(((int64_t)LIFT_WEIGHTED << 14) + (1 << 13)), SHIFT_UP(weight, LIFT_BITS));
-        for (int axis = 0; axis < 3; axis++) {
-            const lanes component = LOAD(&rows->component_q14[axis][k]);
-            const lanes sign = SIGN(component);
-            const lanes part = product_shift(REST(FLIP(component, sign), sign), whole, 48);
-            set_slope(rows, k, axis, REST(FLIP(part, sign), sign), weight, lift_q30);
-            const lanes place = LOAD(&rows->place_q14[axis][k]);
-            const lanes place_sign = SIGN(place);
-            const lanes size = REST(FLIP(place, place_sign), place_sign);
-            const lanes square = SHIFT(SUM(PRODUCT(size, size), ALL(1 << 13)), 14);
-            set_slope(rows, k, 3 + axis, product_shift(square, by_25, 44), weight, lift_q30);
-        }
-    }
-}
-
-static inline uint64_t sum_lanes(lanes value)
-{
-    uint64_t lane[LANES], sum = 0;
-    STORE(lane, value);
-    for (int k = 0; k < LANES; k++) {
-        sum += lane[k];
-    }
-    return sum;
-}
-
-static uint64_t sum_entries(const ih_row_entry *entry, int32_t count)
-{
-    lanes sum = ALL(0);
-    for (int32_t k = 0; k < count; k += LANES) {
-        sum = SUM(sum, LOAD(&entry[k]));
-    }
-    return sum_lanes(sum);
-}
-
-/* Sums of the weighted entries' products with the first slopes, and with the residuals behind them. */
-static ALWAYS_INLINE void sum_products(const struct ih_rows *rows, int32_t count, int i,
-                                       uint64_t sum[IH_FIT_UNKNOWNS + 1])
-{
-    const lanes half_q30 = ALL(1 << 13);
-    const lanes half_q24 = ALL(1 << 7);
-    lanes part[IH_FIT_UNKNOWNS];
-    lanes residual = ALL(0);
-    for (int j = 0; j <= i; j++) {
-        part[j] = ALL(0);
-    }
-    for (int32_t k = 0; k < count; k += LANES) {
-        const lanes weighted = LOAD(&rows->weighted_q16[i][k]);
-        for (int j = 0; j <= i; j++) {
-            const lanes product = PRODUCT(weighted, LOAD(&rows->slope_q14[j][k]));
-            part[j] = SUM(part[j], SHIFT(SUM(product, half_q30), 14));
-        }
-        const lanes product = PRODUCT(weighted, LOAD(&rows->slope_q14[IH_FIT_UNKNOWNS][k]));
-        residual = SUM(residual, SHIFT(SUM(product, half_q24), 8));
-    }
-    for (int j = 0; j <= i; j++) {
-        sum[j] = sum_lanes(part[j]);
-    }
-    sum[IH_FIT_UNKNOWNS] = sum_lanes(residual);
-}
-#else
-#define ALWAYS_INLINE
-#define LANES 1
-/* n * 2^(first + second) / d, rounded, in 32 bits: n * 2^first, d * 2^second and what comes out must fit. */
-static uint32_t quotient(uint32_t n, int first, int second, uint32_t d)
-{
-    const uint32_t high = n << first;
-    const uint32_t whole = high / d;
-    return (whole << second) + (((high - whole * d) << second) + d / 2) / d;
-}
-
-/* As a number that is rounded away from zero on either side. */
-static int32_t with_sign(uint32_t size, int64_t number)
-{
-    return number < 0 ? -(int32_t)size : (int32_t)size;
-}
-
-/* (f - 1) f over the gradient's length, mm; for f up to 5.9 the one is below 2^19, the other below
- * 2^17.4. */
-static int32_t find_residual(const struct gradient *g, ih_row_entry *length)
-{
-    const int64_t over = over_q14(g);
-    *length = (uint32_t)g->length_q14;
-    return with_sign(quotient((uint32_t)ih_abs_s64(over), 12, 2, (uint32_t)g->length_q14), over);
-}
-
-static void set_slope(struct ih_rows *rows, int32_t k, int i, int32_t slope_q14, uint64_t lift_q30)
-{
-    const uint32_t raised = (uint32_t)(LIFT - slope_q14);
-    IH_IN_RANGE(slope_q14, -IH_RANGE_SLOPE_Q14, IH_RANGE_SLOPE_Q14);
-    rows->slope_q14[i][k] = raised;
-    rows->weighted_q16[i][k] =
-        (ih_row_entry)(((uint64_t)rows->weight_q16[k] * raised + lift_q30) >> 14);
-}
-
-static void find_slopes(struct ih_rows *rows, int32_t count)
-{
-    for (int32_t k = 0; k < count; k++) {
-        const uint32_t length = (uint32_t)rows->length[k];
-        const uint64_t lift_q30 = ((uint64_t)LIFT_WEIGHTED << 14) + (1 << 13) -
-                                  ((uint64_t)rows->weight_q16[k] << LIFT_BITS);
-        for (int axis = 0; axis < 3; axis++) {
-            const int32_t place = (int32_t)rows->place_q14[axis][k];
-            const int32_t component = (int32_t)rows->component_q14[axis][k];
-            /* a component is at most the length, below 2^17.4; a square below 2^19.2 */
-            const uint32_t part = (((uint32_t)ih_abs_s32(component) << 14) + length / 2) / length;
-            const uint32_t square = (uint32_t)ih_mul_shift(place, place, 14);
-            set_slope(rows, k, axis, with_sign(part, component), lift_q30);
-            set_slope(rows, k, 3 + axis, (int32_t)quotient(square, 12, 6, 25 * length), lift_q30);
-        }
-    }
-}
-
-static uint64_t sum_entries(const ih_row_entry *entry, int32_t count)
-{
-    uint32_t sum = 0; /* of 128 that are below 2^19 */
-    for (int32_t k = 0; k < count; k++) {
-        sum += (uint32_t)entry[k];
-    }
-    return sum;
-}
-
-/* Sums of the weighted entries' products with the first slopes, and with the residuals behind them. A
- * product is below 2^36: 128 of them, shifted by 14, below 2^29. */
-static void sum_products(const struct ih_rows *rows, int32_t count, int i,
-                         uint64_t sum[IH_FIT_UNKNOWNS + 1])
-{
-    const ih_row_entry *weighted = rows->weighted_q16[i];
-    for (int j = 0; j <= i; j++) {
-        const ih_row_entry *slope = rows->slope_q14[j];
-        uint32_t part = 0;
-        for (int32_t k = 0; k < count; k++) {
-            part += (uint32_t)(((uint64_t)weighted[k] * slope[k] + (1 << 13)) >> 14);
-        }
-        sum[j] = part;
-    }
-    const ih_row_entry *residual = rows->slope_q14[IH_FIT_UNKNOWNS];
-    sum[IH_FIT_UNKNOWNS] = 0;
-    for (int32_t k = 0; k < count; k++) {
-        sum[IH_FIT_UNKNOWNS] += ((uint64_t)weighted[k] * residual[k] + (1 << 7)) >> 8;
-    }
-}
-#endif
-
-/* What the lifts bring into a sum of shifted products, from the sums of their factors. */
-static int64_t lifted(int64_t weighted, int64_t slopes, int32_t count, int shift)
-{
-    return weighted * (LIFT >> shift) + slopes * (LIFT_WEIGHTED >> shift) -
-           (int64_t)count * (LIFT_WEIGHTED >> shift) * LIFT;
-}
-
-/* A line of the lower triangle, and its right side. */
-static ALWAYS_INLINE void sum_line(const struct ih_rows *rows, int32_t count, int i,
-                                   const int64_t slopes[], struct ih_row_system *system)
-{
-    const int64_t weighted = (int64_t)sum_entries(rows->weighted_q16[i], count);
-    int64_t *line = &system->normal_q16[IH_CHOLESKY_PACKED(i)];
-    uint64_t sum[IH_FIT_UNKNOWNS + 1];
-    sum_products(rows, count, i, sum);
-    for (int j = 0; j <= i; j++) {
-        line[j] += (int64_t)sum[j] - lifted(weighted, slopes[j], count, 14);
-    }
-    system->right_q16[i] -=
-        (int64_t)sum[IH_FIT_UNKNOWNS] - lifted(weighted, slopes[IH_FIT_UNKNOWNS], count, 8);
-}
-
-/* Of whole groups of rows. */
-static void sum_rows(const struct ih_rows *rows, int32_t count, struct ih_row_system *system)
-{
-    int64_t slopes[IH_FIT_UNKNOWNS + 1];
-    for (int i = 0; i <= IH_FIT_UNKNOWNS; i++) {
-        slopes[i] = (int64_t)sum_entries(rows->slope_q14[i], count);
-    }
-#ifdef BY_VECTORS
-    sum_line(rows, count, 0, slopes, system); /* one by one: then a line's sums are in registers */
-    sum_line(rows, count, 1, slopes, system);
-    sum_line(rows, count, 2, slopes, system);
-    sum_line(rows, count, 3, slopes, system);
-    sum_line(rows, count, 4, slopes, system);
-    sum_line(rows, count, 5, slopes, system);
-#else
-    for (int i = 0; i < IH_FIT_UNKNOWNS; i++) {
-        sum_line(rows, count, i, slopes, system);
-    }
-#endif
-}
-
+/* The sums keep the products' bits until all rows are in them. */
 static void flush_rows(struct ih_rows *rows, struct ih_row_system *system)
 {
     int32_t count = rows->count;
-    while ((count & (LANES - 1)) != 0) { /* rows of nothing add nothing; LANES is a power of two */
-        for (int axis = 0; axis < 3; axis++) {
-            rows->place_q14[axis][count] = 0;
-            rows->component_q14[axis][count] = 0;
-        }
-        rows->length[count] = 0;
-        rows->weight_q16[count] = 0;
-        rows->slope_q14[IH_FIT_UNKNOWNS][count] = LIFT;
-        count++;
+    while (count % LANES != 0) {
+        clear_row(rows, count++);
     }
     find_slopes(rows, count);
-    sum_rows(rows, count, system);
+    for (int i = 0; i < IH_FIT_UNKNOWNS; i++) {
+        for (int j = 0; j <= i; j++) {
+            system->normal_q16[IH_CHOLESKY_PACKED(i) + j] +=
+                sum_products(rows->weighted[i], rows->slope[j], count);
+        }
+        system->right_q16[i] += sum_products(rows->residual_mm_q10, rows->slope[i], count);
+    }
     rows->count = 0;
 }
 
+static void scale_system(struct ih_row_system *system)
+{
+    for (int i = 0; i < IH_FIT_UNKNOWNS; i++) {
+        for (int j = 0; j <= i; j++) {
+            int64_t *entry = &system->normal_q16[IH_CHOLESKY_PACKED(i) + j];
+            *entry = ih_shift_round(*entry, slope_bits(i) + slope_bits(j) - 16);
+        }
+        system->right_q16[i] =
+            ih_shift_round(system->right_q16[i], slope_bits(i) + RESIDUAL_BITS - 16);
+    }
+}
+
 static void add_row(struct ih_rows *rows, struct ih_row_system *system, const struct gradient *g,
-                    ih_row_entry length, const int32_t place_q14[3], int32_t residual_mm_q8,
+                    uint32_t inverse, const int32_t place_q14[3], int32_t residual_mm_q8,
                     int32_t weight_q16)
 {
-    const int32_t at = rows->count++;
-    for (int axis = 0; axis < 3; axis++) {
-        rows->place_q14[axis][at] = place_q14[axis];
-        rows->component_q14[axis][at] = g->component_q14[axis];
-    }
-    rows->length[at] = length;
-    rows->weight_q16[at] = (uint32_t)weight_q16;
-    rows->slope_q14[IH_FIT_UNKNOWNS][at] = (uint32_t)(residual_mm_q8 + LIFT);
+    set_slopes(rows, g, inverse, place_q14, (uint32_t)ih_min_s32(weight_q16, UINT16_MAX));
+    rows->residual_mm_q10[rows->count] = (int16_t)ih_mul_shift(weight_q16, residual_mm_q8, 14);
+    rows->count++;
     if (rows->count == IH_ROW_MAX) {
         flush_rows(rows, system);
     }
@@ -626,11 +576,11 @@ static void add_point(const struct step *step, const struct ih_ray *ray, struct 
     if (radius2_q28 > step->reach2_q28 || !find_gradient(component_q14, radius2_q28, &g)) {
         return;
     }
-    ih_row_entry length;
-    const int32_t residual_mm_q8 = find_residual(&g, &length);
+    const uint32_t inverse = inverse_q31(&g);
+    const int32_t residual_mm_q8 = find_residual(&g, inverse);
     const int32_t weight_q16 = robust_weight_q16(residual_mm_q8, step->scale_mm);
     if (weight_q16 > 0) {
-        add_row(rows, system, &g, length, place_q14, residual_mm_q8,
+        add_row(rows, system, &g, inverse, place_q14, residual_mm_q8,
                 lowered_q16(weight_q16, place_q14[1]));
     }
 }
@@ -658,9 +608,9 @@ static void add_push(const struct step *step, const struct ih_ray *ray, struct i
         component_q14[axis] = ih_share(step->shares.share_q50[axis], crossing.nearest_q14[axis]);
     }
     if (find_gradient(component_q14, square_q28(crossing.nearest_q14), &g)) {
-        ih_row_entry length;
-        const int32_t residual_mm_q8 = find_residual(&g, &length);
-        add_row(rows, system, &g, length, crossing.nearest_q14,
+        const uint32_t inverse = inverse_q31(&g);
+        const int32_t residual_mm_q8 = find_residual(&g, inverse);
+        add_row(rows, system, &g, inverse, crossing.nearest_q14,
                 ih_max_s32(residual_mm_q8, -PUSH_MAX_MM_Q8), PUSH_WEIGHT_Q16);
     }
 }
@@ -693,4 +643,5 @@ void ih_row_collect(const struct ih_space *space, const struct ih_ellipsoid *ell
         }
     }
     flush_rows(&scratch->rows, out);
+    scale_system(out);
 }

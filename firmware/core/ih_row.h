@@ -6,15 +6,15 @@
  * Way:   which points may have a weight, and which rays may hit the ellipsoid, is told for all in
  *        vectors of 16 bits, for more rather than for fewer; of what is left each is looked at as
  *        ih_fit.h says. Rows are kept until there are IH_ROW_MAX, then their products are summed in
- *        vectors; sums are whole numbers, their order is nobody's business.
- *        Quotients by a semi-axis, and on x86-64 by the gradient's length, are products with an inverse
- *        that is worked out once, equal to ih_div_round's to the last bit (ih_share, ih_row.c).
- * Overflow: as in ih_fit.h. Slopes and residuals are below 2^16 and are lifted by as much, weighted slopes
- *        below 2^18 and by 2^18: products are below 2^36.
+ *        vectors; sums are exact until all rows are in them: the order is nobody's business.
+ *        Quotients by a semi-axis are products with an inverse that is worked out once, equal to
+ *        ih_div_round's to the last bit (ih_share); by the gradient's length with one of 32 bits.
+ * Overflow: as in ih_fit.h. Rows have 16 bits: slopes by the centre are at most 1 (Q14), by ln below 3.6
+ *        (Q13), weighted residuals 15 mm at most, of a push (Q10). A product is below 1 * 1 in Q28, 2.6 in
+ *        Q26, 1.6 in Q27 or 15 in Q24: 2^28.
  * Cost:  5 comparisons of 16 bits twice for each of 361 rays, a step (without vectors most rays need one or
- *        two); a division and two roots for a point in reach; for one with a weight six quotients and 27
- *        products, which are vectors on x86-64. About 70 points a step are in reach, 60 have a weight: 29,000
- *        instructions (x86-64-v3).
+ *        two); two roots for a point in reach; for one with a weight three divisions, 12 products, and 27 of
+ *        16 bits. About 85 points a step are in reach, 70 have a weight.
  */
 #ifndef IH_ROW_H
 #define IH_ROW_H
@@ -23,7 +23,7 @@
 #include "ih_ellipsoid.h"
 
 #define IH_FIT_UNKNOWNS 6
-/* Rows that are summed at once; each costs 84 bytes, twice as many on x86-64. */
+/* Rows that are summed at once; each costs 26 bytes, on x86-64 56. */
 #define IH_ROW_MAX 128
 /* The slots in whole vectors. */
 #define IH_ROW_RAYS ((IH_SLOTS + 15) / 16 * 16)
@@ -39,24 +39,18 @@ struct ih_row_rays {
     uint8_t seen[IH_ROW_RAYS];
 };
 
-/* An entry of a row, made positive, is below 2^32; on x86-64 it is as wide as its product, see ih_normal. */
-#if defined __x86_64__
-typedef uint64_t ih_row_entry;
-typedef int64_t ih_row_number;
-#else
-typedef uint32_t ih_row_entry;
-typedef int32_t ih_row_number;
-#endif
-
 struct ih_rows {
     int32_t count;
-    /* What a row is made of: a place in semi-axes, and over them again, the gradient's length (ih_row.c). */
-    ih_row_number place_q14[3][IH_ROW_MAX], component_q14[3][IH_ROW_MAX];
-    ih_row_entry length[IH_ROW_MAX];
-    ih_row_entry weight_q16[IH_ROW_MAX];
-    /* By unknown, then the residual in mm Q8; each with its lift (ih_row.c). */
-    ih_row_entry slope_q14[IH_FIT_UNKNOWNS + 1][IH_ROW_MAX];
-    ih_row_entry weighted_q16[IH_FIT_UNKNOWNS][IH_ROW_MAX];
+#ifdef __x86_64__
+    /* What slopes are made of (ih_row.c), vectors at once. */
+    int32_t place_q14[3][IH_ROW_MAX], component_q14[3][IH_ROW_MAX];
+    uint32_t inverse[IH_ROW_MAX];
+    uint16_t weight_q16[IH_ROW_MAX];
+#endif
+    /* By unknown, with 14 bits by the centre and 13 by ln of the axes; and residuals. */
+    int16_t slope[IH_FIT_UNKNOWNS][IH_ROW_MAX];
+    int16_t weighted[IH_FIT_UNKNOWNS][IH_ROW_MAX];
+    int16_t residual_mm_q10[IH_ROW_MAX]; /* weighted */
 };
 
 struct ih_row_scratch {

@@ -38,31 +38,54 @@ static bool plain_gradient(const struct ih_ellipsoid *e, const int32_t place[3],
     return out->radius_q14 >= 819;
 }
 
-static int64_t plain_distance(const struct plain *g)
+static int64_t inverse_of(const struct plain *g)
 {
-    return ih_div_round(ih_mul_shift(g->radius_q14, g->radius_q14 - 16384, 14) * 16384,
-                        g->length_q14);
+    return (1LL << 31) / g->length_q14;
 }
 
+static int64_t plain_distance(const struct plain *g)
+{
+    return ih_mul_shift(ih_mul_shift(g->radius_q14, g->radius_q14 - 16384, 14), inverse_of(g), 17);
+}
+
+/* Sums with all bits of the products; the right side's are scaled by the caller. */
 static void plain_add(struct ih_row_system *system, const struct plain *g, const int32_t place[3],
                       int64_t residual, int64_t weight)
 {
+    const int64_t ln_inverse = ih_mul_shift(inverse_of(g), 41943, 16);
     int64_t slope[6];
     int i, j, at = 0;
 
     for (i = 0; i < 3; i++) {
         const int64_t s2 = ih_mul_shift(place[i], place[i], 14);
 
-        slope[i] = -ih_div_round(g->component_q14[i] * 16384, g->length_q14);
-        slope[3 + i] = -ih_div_round(s2 * 16384 * 64, g->length_q14 * 100);
+        slope[i] = ih_mul_shift(llabs(g->component_q14[i]), inverse_of(g), 17);
+        slope[i] = slope[i] > 16383 ? 16383 : slope[i];
+        slope[i] = g->component_q14[i] < 0 ? -slope[i] : slope[i];
+        slope[3 + i] = ih_mul_shift(s2, ln_inverse, 18);
     }
     for (i = 0; i < 6; i++) {
-        const int64_t weighted = ih_mul_shift(weight, slope[i], 14);
+        const int64_t size = (weight > 65535 ? 65535 : weight) * llabs(slope[i]) >> 16;
+        const int64_t weighted = slope[i] < 0 ? -size : size;
 
         for (j = 0; j <= i; j++) {
-            system->normal_q16[at++] += ih_mul_shift(weighted, slope[j], 14);
+            system->normal_q16[at++] += weighted * slope[j];
         }
-        system->right_q16[i] -= ih_mul_shift(weighted, residual, 8);
+        system->right_q16[i] += ih_mul_shift(weight, residual, 14) * slope[i];
+    }
+}
+
+static void plain_scale(struct ih_row_system *system)
+{
+    int i, j, at = 0;
+
+    for (i = 0; i < 6; i++) {
+        for (j = 0; j <= i; j++, at++) {
+            system->normal_q16[at] = ih_shift_round(system->normal_q16[at], i < 3   ? 12
+                                                                            : j < 3 ? 11
+                                                                                    : 10);
+        }
+        system->right_q16[i] = ih_shift_round(system->right_q16[i], i < 3 ? 8 : 7);
     }
 }
 
@@ -116,6 +139,7 @@ static int32_t plain_collect(const struct ih_ellipsoid *e, int32_t scale_mm, int
             count++;
         }
     }
+    plain_scale(out);
     return count;
 }
 
