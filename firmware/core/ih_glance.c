@@ -55,38 +55,42 @@ static void find_bounds(const struct window *window, const int32_t middle_q12[2]
 /* Rays that pass between the bounds; of an unknown one x is at IH_ROW_NOWHERE, of an empty one's point z. */
 #if defined __SSE2__ || defined __ARM_NEON
 /* A loop without a branch: compilers turn it into vectors. */
-static struct share count_rays(const struct ih_row_rays *rays, const struct bounds *bounds)
+static void count_rays(const struct ih_row_rays *rays, const struct bounds bounds[WINDOW_COUNT],
+                       struct share share[WINDOW_COUNT])
 {
-    const struct bounds b = *bounds;
-    int16_t part = 0, all = 0;
-    for (int32_t slot = 0; slot < IH_ROW_RAYS; slot++) {
-        const int16_t x = rays->slope_q12[0][slot];
-        const int16_t y = rays->slope_q12[1][slot];
-        const int16_t z = rays->point_mm_q1[2][slot];
-        const int16_t is_there = (x > b.x[0]) & (x < b.x[1]) & (y > b.y[0]) & (y < b.y[1]) &
-                                 ((x <= b.gap[0]) | (x >= b.gap[1]));
-        const int16_t is_part = is_there & (z > b.z[0]) & (z <= b.z[1]);
-        all = (int16_t)(all + is_there);
-        part = (int16_t)(part + is_part);
+    for (int i = 0; i < WINDOW_COUNT; i++) {
+        const struct bounds b = bounds[i];
+        int16_t part = 0, all = 0;
+        for (int32_t slot = 0; slot < IH_ROW_RAYS; slot++) {
+            const int16_t x = rays->slope_q12[0][slot];
+            const int16_t y = rays->slope_q12[1][slot];
+            const int16_t z = rays->point_mm_q1[2][slot];
+            const int16_t is_there = (x > b.x[0]) & (x < b.x[1]) & (y > b.y[0]) & (y < b.y[1]) &
+                                     ((x <= b.gap[0]) | (x >= b.gap[1]));
+            const int16_t is_part = is_there & (z > b.z[0]) & (z <= b.z[1]);
+            all = (int16_t)(all + is_there);
+            part = (int16_t)(part + is_part);
+        }
+        share[i] = (struct share){part, all};
     }
-    return (struct share){part, all};
 }
 #else
-/* Where there are no vectors, most rays are told by one comparison or two. */
-static struct share count_rays(const struct ih_row_rays *rays, const struct bounds *b)
+/* Where there are no vectors, a ray is told by its height: the windows lie one above the other. */
+static void count_rays(const struct ih_row_rays *rays, const struct bounds bounds[WINDOW_COUNT],
+                       struct share share[WINDOW_COUNT])
 {
-    struct share share = {0, 0};
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
-        const int16_t x = rays->slope_q12[0][slot];
         const int16_t y = rays->slope_q12[1][slot];
+        const int i = y < bounds[HIGH].y[1] ? HIGH : y < bounds[LEVEL].y[1] ? LEVEL : BODY;
+        const struct bounds *b = &bounds[i];
+        const int16_t x = rays->slope_q12[0][slot];
         if (x > b->x[0] && x < b->x[1] && y > b->y[0] && y < b->y[1] &&
             (x <= b->gap[0] || x >= b->gap[1])) {
             const int16_t z = rays->point_mm_q1[2][slot];
-            share.all++;
-            share.part += z > b->z[0] && z <= b->z[1];
+            share[i].all++;
+            share[i].part += z > b->z[0] && z <= b->z[1];
         }
     }
-    return share;
 }
 #endif
 
@@ -107,11 +111,11 @@ int32_t ih_glance_promise_q8(const struct ih_row_rays *rays, const int32_t origi
             const int32_t off_mm_q8 = centre_mm_q8[axis] - origin_mm_q8[axis];
             middle_q12[axis] = (int32_t)((int64_t)off_mm_q8 * 4096 / depth_mm_q8);
         }
+        struct bounds bounds[WINDOW_COUNT];
         for (int i = 0; i < WINDOW_COUNT; i++) {
-            struct bounds bounds;
-            find_bounds(&windows[i], middle_q12, mm_q20, centre_mm_q8[2] >> 7, &bounds);
-            share[i] = count_rays(rays, &bounds);
+            find_bounds(&windows[i], middle_q12, mm_q20, centre_mm_q8[2] >> 7, &bounds[i]);
         }
+        count_rays(rays, bounds, share);
     }
     const int32_t high_q8 = (2 * share[HIGH].part + 1) * 128 / (share[HIGH].all + 1);
     return 2 * high_q8 + 3 * plain_q8(share[BODY]) - 4 * plain_q8(share[LEVEL]);
