@@ -65,9 +65,9 @@ static void count_rays(const struct ih_row_rays *rays, const struct bounds bound
             const int16_t x = rays->slope_q12[0][slot];
             const int16_t y = rays->slope_q12[1][slot];
             const int16_t z = rays->point_mm_q1[2][slot];
-            const int16_t is_there = (x > b.x[0]) & (x < b.x[1]) & (y > b.y[0]) & (y < b.y[1]) &
-                                     ((x <= b.gap[0]) | (x >= b.gap[1]));
-            const int16_t is_part = is_there & (z > b.z[0]) & (z <= b.z[1]);
+            const bool is_there = (x > b.x[0]) & (x < b.x[1]) & (y > b.y[0]) & (y < b.y[1]) &
+                                  ((x <= b.gap[0]) | (x >= b.gap[1]));
+            const bool is_part = is_there & (z > b.z[0]) & (z <= b.z[1]);
             all = (int16_t)(all + is_there);
             part = (int16_t)(part + is_part);
         }

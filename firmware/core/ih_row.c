@@ -570,15 +570,10 @@ static void add_point(const struct step *step, const struct ih_ray *ray, struct 
             return;
         }
         place_q14[axis] = ih_share(step->shares.share_q50[axis], off_q8);
-    }
-    const uint64_t radius2_q28 = square_q28(place_q14);
-    if (radius2_q28 > step->reach2_q28) {
-        return;
-    }
-    for (int axis = 0; axis < 3; axis++) {
         component_q14[axis] = ih_share(step->shares.share_q50[axis], place_q14[axis]);
     }
-    if (!find_gradient(component_q14, radius2_q28, &g)) {
+    const uint64_t radius2_q28 = square_q28(place_q14);
+    if (radius2_q28 > step->reach2_q28 || !find_gradient(component_q14, radius2_q28, &g)) {
         return;
     }
     const uint32_t inverse = inverse_q31(&g);
