@@ -19,9 +19,8 @@
  *        What a step's points say is collected by ih_row. A step moves the centre at most 40 mm and
  *        a logarithm 0.15 on each axis; the logarithms stay within 0.35 of the mean's.
  * Units: unknowns are mm and hundredths of ln, so that all derivatives are of order one.
- * Overflow: derivatives of what has a weight are below 3.6, 2^15.9 in Q14: a product with a weight
- *        of 2^16 is below 2^31.9 before its shift, with another derivative 2^33.8, with a residual
- *        2^33.5. A point adds at most 2.6 to an entry of the diagonal, its push 1.3: 361 of both
+ * Overflow: derivatives of what has a weight are below 3.6; what rows may have is in ih_row.h. A point adds
+ *        at most 2.6 to an entry of the diagonal, its push 1.3: 361 of both
  *        1408, and scaled by 2^-11 to 0.69 in Q30. The right side's root mean square of weighted
  *        residuals is below 470 mm, in the solve's units 2^23.4.
  * Error: against the float64 reference, starts some 35 mm off a head in made scenes (330 fits):
@@ -31,7 +30,7 @@
  *        Against the truth in these scenes, starts 35 mm off: at most 5 mm for a mean head, 10 for
  *        one a tenth larger in every direction. A fifth of all dots anywhere between 0.5 and 2.5 m:
  *        17 mm (median of 30 fits; worst 56), because wrong dots behind the head push.
- * Cost:  steps x (ih_row, one Cholesky of 6). 0.2 million instructions a fit with 320 points
+ * Cost:  steps x (ih_row, one Cholesky of 6). 0.23 million instructions a fit of six steps with 320 points
  *        (x86-64-v3, gcc -O3, frames of both sequences).
  */
 #ifndef IH_FIT_H
