@@ -15,7 +15,7 @@ void ih_findings_params_default(struct ih_findings_params *params)
     ih_fit_params_default(&params->fit);
     params->promise_least_q8 = 256;
     params->apart_mm = 20;
-    params->hopeless_logit_q10 = -4608;
+    params->hopeless_logit_q10 = -5632;
     params->spacing_mm = 80;
     params->nest_near_mm = 90;
     params->range_prior_q10 = -1280;

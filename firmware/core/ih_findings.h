@@ -7,7 +7,7 @@
  *        order. Nests and places of which a glance says nothing good (ih_glance), and starts within apart_mm
  *        of one before, are passed over. Each other one is fitted for a step (ih_fit), looked at
  *        (ih_evidence) and rated (ih_score); then what is not hopeless is fitted to the end, looked at and
- *        rated again. Tracks take no finding below log-odds -3: hopeless is what lies 1.5 below that after
+ *        rated again. Tracks take no finding below log-odds -3: hopeless is what lies 2.5 below that after
  *        a step. A range frame is looked at window by window: begin once a frame, add once a window.
  *        Of an expected head that is not found it also says what its rays met (views): whether it is
  *        hidden, or gone.
