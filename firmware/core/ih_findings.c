@@ -128,8 +128,8 @@ static void rate(const struct work *work, const struct ih_fit *fit, struct ih_fi
     finding->head = fit->ellipsoid;
     struct ih_evidence_nest nest =
         nest_at(work->heads, finding->head.centre_mm_q8, work->params->nest_near_mm);
-    ih_evidence_collect(work->space, work->scratch->rows.rays.slope_most_q20, &finding->head,
-                        fit->start_mm_q8, &nest, &finding->evidence);
+    ih_evidence_collect(work->space, &work->scratch->tally, &finding->head, fit->start_mm_q8, &nest,
+                        &finding->evidence);
     ih_score_rate(&finding->evidence, &score);
     finding->logit_q10 = score.logit_q10;
     if (work->rig->calibration.kind == IH_RIG_RANGE) {
@@ -197,8 +197,8 @@ static void view_expected(const struct work *work, const struct ih_ellipsoid *he
 {
     const struct ih_evidence_nest no_nest = {.present = false};
     struct ih_evidence evidence;
-    ih_evidence_collect(work->space, work->scratch->rows.rays.slope_most_q20, head,
-                        head->centre_mm_q8, &no_nest, &evidence);
+    ih_evidence_collect(work->space, &work->scratch->tally, head, head->centre_mm_q8, &no_nest,
+                        &evidence);
     view->through += evidence.through_count;
     view->hit += evidence.hit_count;
     view->front += evidence.front_count;
@@ -217,6 +217,7 @@ void ih_findings_add(const struct ih_points *points, const struct ih_dots *dots,
     ih_space_make(points, dots, rig, &params->space, &scratch->space);
     ih_scan_find(&scratch->space, &params->scan, &scratch->scan_scratch, &scratch->scan);
     ih_row_prepare(&scratch->space, &scratch->rows.rays);
+    ih_tally_prepare(&scratch->space, &scratch->tally);
     scratch->starts.count = 0;
     for (int32_t i = 0; i < ih_min_s32(heads->hypothesis_count, params->nest_max); i++) {
         try_place(&work, heads->hypothesis[i].centre_mm_q8, IH_SOURCE_NEST);
