@@ -1,4 +1,4 @@
-/* ih_normal - the Gram matrix N = R^T R of small whole numbers, 16 rows at a time.
+/* ih_normal - the Gram matrix N = R^T R of small whole numbers, 16 rows at a time; the factor of such a matrix.
  *
  * In:    rows of IH_NORMAL_TERMS entries 0 .. IH_NORMAL_MOST, two to a word: the first in its lower half, the
  *        second in its upper half. A row that is not there is zero.
@@ -40,5 +40,29 @@ void ih_normal_add(uint32_t pair[IH_NORMAL_PAIRS][IH_NORMAL_TERMS], int shift, i
 
 /* Add those of each pair's first row, take away those of its second. */
 void ih_normal_change(uint32_t pair[IH_NORMAL_PAIRS][IH_NORMAL_TERMS], int shift, int32_t *normal);
+
+/* Factor A = F^T F: A in lines like N's, Q30, diagonal 0.995 at most; F in its place, Q27, row by row. Unknowns are
+ * eliminated from the last one on, so that what is left, and a row of F, always is the beginning of lines.
+ *
+ * Way:   blocks of 8 rows. Numbers of F are taken in two parts, 16 bits and 12 bits, whose products are those of 16
+ *        bits that processors do several of at once: upper by upper parts in pairs of rows, and both mixed products
+ *        of a row. That of lower parts is left out.
+ * Overflow: sums of products of columns are below 1 by Cauchy-Schwarz, 2^30; mixed ones below 2^29. Were A not
+ *        positive, numbers wrap around, on all processors alike.
+ * Error: a pivot's square below IH_NORMAL_PIVOT_Q30 counts as that: so there always is a factor. Else 2^-28 times the
+ *        pivot an entry, 2^-31 a block, and 2^-32 a row.
+ * Cost:  n^3/6 pairs of products, half as many more, n^2/2 products, n square roots and divisions.
+ */
+#define IH_NORMAL_BLOCK 8
+#define IH_NORMAL_WORK (IH_NORMAL_BLOCK / 2 + IH_NORMAL_BLOCK)
+#define IH_NORMAL_PIVOT_Q30 1024
+#define IH_NORMAL_FACTOR_BITS 27
+
+void ih_normal_factor(int32_t *line, uint32_t work[IH_NORMAL_WORK][IH_NORMAL_TERMS]);
+
+/* Solve F^T F x = b. b: so small that |F^-T b| stays within int32, else it is saturated. x: mantissas below 2^25 with
+ * x_i = mantissa_i * 2^exponent in b's unit, exponent >= 0 as small as that allows. b and x may be the same array. */
+void ih_normal_solve(const int32_t *line, const int32_t *b, int32_t *x_mantissa,
+                     int32_t *x_exponent);
 
 #endif

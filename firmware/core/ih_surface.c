@@ -43,7 +43,7 @@
 #define TABLE_WIDTH (4 * IH_BASIS_ACROSS)
 
 _Static_assert(CENTRES == IH_BASIS_ACROSS && CENTRES % 2 == 0, "lines of ih_basis");
-_Static_assert(TERMS == IH_NORMAL_TERMS && TERMS <= IH_CHOLESKY_MAX, "one system");
+_Static_assert(TERMS == IH_NORMAL_TERMS, "one system");
 _Static_assert(TABLE_WIDTH >= IH_SURFACE_STEPS && IH_SURFACE_STEPS % 2 == 0, "all steps");
 
 void ih_surface_params_default(struct ih_surface_params *params)
@@ -298,7 +298,7 @@ static void scale_lines(const struct ih_surface_params *params, struct ih_surfac
     set_scale(scratch, scale);
     for (int32_t i = 0; i < TERMS; i++) {
         const int32_t *line = &scratch->of.system.normal[ih_normal_line(i)];
-        int32_t *scaled_q30 = &scratch->of.system.factor_q30[IH_CHOLESKY_PACKED(i)];
+        int32_t *scaled_q30 = &scratch->of.system.factor[ih_normal_line(i)];
         for (int32_t j = 0; j <= i; j++) {
             /* Of no products' sum, rounding may leave a step below 0. */
             const uint32_t sum = (uint32_t)ih_max_s32(line[j], 0);
@@ -313,9 +313,9 @@ static void scale_lines(const struct ih_surface_params *params, struct ih_surfac
 
 static bool factor(const struct ih_surface_params *params, struct ih_surface_scratch *scratch)
 {
-    int32_t bad_pivot;
     scale_lines(params, scratch);
-    return ih_cholesky_factor(scratch->of.system.factor_q30, TERMS, &bad_pivot) == IH_OK;
+    ih_normal_factor(scratch->of.system.factor, scratch->pair);
+    return true;
 }
 
 /* Take the ridge's share, ridge * N_ii * c_i, from the right side. */
@@ -385,8 +385,7 @@ static void correct(const struct ih_surface_params *params, struct ih_surface_sc
     take_ridge(params, scratch);
     /* A x = b is (right side) / 2^normal_shift: x and b have as many fraction bits more. */
     const int fraction = scale_right(scratch) + scratch->normal_shift;
-    ih_cholesky_solve(scratch->of.system.factor_q30, TERMS, scratch->solution, scratch->solution,
-                      &exponent);
+    ih_normal_solve(scratch->of.system.factor, scratch->solution, scratch->solution, &exponent);
     int64_t squares = 0; /* 144 * 2^50 */
     for (int32_t i = 0; i < TERMS; i++) {
         squares += (int64_t)scratch->solution[i] * scratch->solution[i];

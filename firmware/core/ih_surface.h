@@ -28,7 +28,6 @@
 #define IH_SURFACE_H
 
 #include "ih_basis.h"
-#include "ih_cholesky.h"
 #include "ih_normal.h"
 #include "ih_samples.h"
 
@@ -74,7 +73,7 @@ struct ih_surface_scratch {
     union {
         struct {
             int32_t normal[IH_NORMAL_LINE(IH_SURFACE_TERMS)]; /* sums of products of short rows */
-            int32_t factor_q30[IH_CHOLESKY_PACKED(IH_SURFACE_TERMS)]; /* scaled, then factored */
+            int32_t factor[IH_NORMAL_LINE(IH_SURFACE_TERMS)]; /* scaled, Q30, then factored */
         } system;
         struct {
             int32_t table_q20[IH_SURFACE_STEPS][2 * IH_SURFACE_STEPS - 1];
@@ -86,7 +85,7 @@ struct ih_surface_scratch {
         right[IH_SURFACE_TERMS]; /* R^T W (z - B c), less the ridge's share: Q20 more than off */
     uint32_t basis_q20[IH_SURFACE_TERMS]; /* a sample's row */
     /* Such rows, weighted and short. */
-    uint32_t pair[IH_NORMAL_PAIRS][IH_SURFACE_TERMS] __attribute__((aligned(IH_NORMAL_ALIGNMENT)));
+    uint32_t pair[IH_NORMAL_WORK][IH_SURFACE_TERMS] __attribute__((aligned(IH_NORMAL_ALIGNMENT)));
     uint32_t row_scale_q17[IH_SURFACE_TERMS];     /* of a short row */
     uint32_t norm_q10[IH_SURFACE_TERMS];          /* diagonal of R^T W R */
     uint32_t unknown_scale_q29[IH_SURFACE_TERMS]; /* coefficient = unknown * scale */
