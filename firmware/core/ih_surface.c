@@ -39,6 +39,9 @@
 #define CORRECTIONS_MAX 8
 #define CORRECTIONS_FEW 3
 #define SQUARES_LOG2_NONE (-1000)
+/* Samples nearer to the surface than so many eighths of the limit keep their weight without being asked again after
+ * the last correction. */
+#define FAR_EIGHTHS 6
 /* Steps of the table, filled up to whole lines of ih_basis. */
 #define TABLE_WIDTH (4 * IH_BASIS_ACROSS)
 
@@ -248,6 +251,16 @@ static void add_right(struct ih_surface_scratch *scratch, int64_t off, int32_t r
                  scratch->right);
 }
 
+/* What it brings less with one weight than it did with another. */
+static void add_change(struct ih_surface_scratch *scratch, int64_t off, int32_t before_q15,
+                       int32_t root_weight_q15)
+{
+    const int64_t weight = weight_q30(scratch, root_weight_q15) - weight_q30(scratch, before_q15);
+    const int64_t push = ih_mul_shift(off, weight, 30);
+    ih_basis_add(scratch->basis_q20, (int32_t)ih_clamp_s64(push, (int64_t)1 << OFF_BITS),
+                 scratch->right);
+}
+
 /* Pairs from row number `count` on add nothing. */
 static void clear_pairs(struct ih_surface_scratch *scratch, int32_t count)
 {
@@ -318,16 +331,18 @@ static bool factor(const struct ih_surface_params *params, struct ih_surface_scr
     return true;
 }
 
-/* Take the ridge's share, ridge * N_ii * c_i, from the right side. */
-static void take_ridge(const struct ih_surface_params *params, struct ih_surface_scratch *scratch)
+/* Set the right side to the ridge's share, ridge * N_ii * c_i, or take it from what is there. */
+static void set_or_take_ridge(const struct ih_surface_params *params, bool is_taken,
+                              struct ih_surface_scratch *scratch)
 {
     for (int32_t i = 0; i < TERMS; i++) {
         /* 2^58 times 2^31.4 over 2^32; in Q8 more than the coefficients */
         const int64_t share = ih_mul_wide_shift(
             (int64_t)scratch->coefficient[i] * params->ridge_q30, scratch->norm_q10[i], 32);
         const int to_right = 20 + scratch->off_fraction - 8 - scratch->coefficient_shift;
-        scratch->right[i] = ih_clamp_s64(scratch->right[i], (int64_t)1 << 61) -
-                            ih_clamp_s64(shift_by(share, to_right), (int64_t)1 << 61);
+        const int64_t shifted = ih_clamp_s64(shift_by(share, to_right), (int64_t)1 << 61);
+        scratch->right[i] =
+            is_taken ? ih_clamp_s64(scratch->right[i], (int64_t)1 << 61) - shifted : shifted;
     }
 }
 
@@ -382,7 +397,7 @@ static void add_solution(struct ih_surface_scratch *scratch, int fraction)
 static void correct(const struct ih_surface_params *params, struct ih_surface_scratch *scratch)
 {
     int32_t exponent;
-    take_ridge(params, scratch);
+    set_or_take_ridge(params, true, scratch);
     /* A x = b is (right side) / 2^normal_shift: x and b have as many fraction bits more. */
     const int fraction = scale_right(scratch) + scratch->normal_shift;
     ih_normal_solve(scratch->of.system.factor, scratch->solution, scratch->solution, &exponent);
@@ -403,6 +418,7 @@ static void refine(const struct ih_samples *samples, const struct ih_surface_par
 {
     /* What fewer samples than unknowns do not see is found slowly. */
     const int32_t least = samples->sample_count < TERMS ? CORRECTIONS_FEW : 1;
+    const int64_t far = (int64_t)params->huber_mm * FAR_EIGHTHS << (scratch->off_fraction - 3);
     int32_t before;
     int32_t count = 0;
     do {
@@ -411,7 +427,9 @@ static void refine(const struct ih_samples *samples, const struct ih_surface_par
         for (int32_t i = 0; i < samples->sample_count; i++) {
             const struct ih_sample *sample = &samples->sample[i];
             fill_row(scratch, sample, scratch->basis_q20);
-            add_right(scratch, off_of(scratch, sample, out->mean_mm_q8), out->root_weight_q15[i]);
+            const int64_t off = off_of(scratch, sample, out->mean_mm_q8);
+            scratch->is_far[i] = ih_abs_s64(off) >= far;
+            add_right(scratch, off, out->root_weight_q15[i]);
         }
         correct(params, scratch);
         count++;
@@ -433,23 +451,27 @@ static int32_t reweight(const struct ih_sample *sample, const struct ih_surface_
     return (int32_t)ih_mul_shift(sample->root_weight_q15, root_q15, 15);
 }
 
-/* Weights by the distance from the surface, the right side with them; what samples whose weight changed had
- * brought to the sums is exchanged. Returns how many changed. */
+/* Weights by the distance from the surface, of those samples that were far from it before the last correction;
+ * what samples whose weight changed had brought to the sums is exchanged. The right side is that of the system that
+ * is solved, which leaves no more than the ridge's share, and what other weights change. Returns how many did. */
 static int32_t change_weights(const struct ih_samples *samples,
                               const struct ih_surface_params *params,
                               struct ih_surface_scratch *scratch, struct ih_surface *out)
 {
     int32_t lighter = 0;
-    memset(scratch->right, 0, sizeof scratch->right);
+    set_or_take_ridge(params, false, scratch);
     for (int32_t i = 0; i < samples->sample_count; i++) {
         const struct ih_sample *sample = &samples->sample[i];
+        if (!scratch->is_far[i]) {
+            continue;
+        }
         fill_row(scratch, sample, scratch->basis_q20);
         const int64_t off = off_of(scratch, sample, out->mean_mm_q8);
         const int32_t root_q15 =
             reweight(sample, params, ih_shift_round(off, scratch->off_fraction - 11));
         out->root_weight_q15[i] = root_q15;
-        add_right(scratch, off, root_q15);
         if (root_q15 != sample->root_weight_q15) {
+            add_change(scratch, off, sample->root_weight_q15, root_q15);
             uint32_t *pair = scratch->pair[lighter % IH_NORMAL_PAIRS];
             put_row(scratch, root_q15, false, pair);
             put_row(scratch, sample->root_weight_q15, true, pair);
@@ -513,7 +535,7 @@ static bool fit_again(const struct ih_samples *samples, const struct ih_surface_
 {
     out->downweighted_count = change_weights(samples, params, scratch, out);
     if (out->downweighted_count == 0) {
-        correct(params, scratch); /* the right side is there */
+        refine(samples, params, out, SQUARES_LOG2_ENOUGH, scratch);
         return true;
     }
     const bool is_light = set_norms(scratch, samples, out->root_weight_q15);

@@ -98,6 +98,7 @@ struct ih_surface_scratch {
     int32_t off_fraction;                   /* fraction bits of z - B c, mm */
     int32_t samples_log2;                   /* an eighth of the samples: as many are below 2^it */
     int32_t squares_log2;                   /* of the last correction, see ih_surface.c */
+    bool is_far[IH_SLOTS];                  /* before the last correction */
     int32_t centre_q16[IH_SURFACE_CENTRES]; /* places of the centres in a row, field units */
 };
 
