@@ -4,7 +4,7 @@
  *        second in its upper half. A row that is not there is zero.
  * Out:   lines of N's lower triangle, in units of 2^shift: the sum over 16 rows is exact, then rounded and
  *        added. So it does not depend on the processor, but on which rows come together.
- * Overflow: 16 products are below 2^32 with the rounding; the difference of 8 and 8 is within 2^31. Sums
+ * Overflow: 16 products are below 2^32 with the rounding. Sums
  *        stay below 2^31 if the greatest column's squares over 2^shift do, with half a unit a call.
  * Error: half a unit a call.
  * Cost:  rows x 10,944 multiply-adds, of which x86 does 16 or 8 with one instruction, Cortex-M with DSP two.
@@ -38,8 +38,8 @@ int32_t ih_normal_line(int32_t i);
 /* Add the products of all rows. shift 1..IH_NORMAL_SHIFT_MOST. */
 void ih_normal_add(uint32_t pair[IH_NORMAL_PAIRS][IH_NORMAL_TERMS], int shift, int32_t *normal);
 
-/* Add those of each pair's first row, take away those of its second. */
-void ih_normal_change(uint32_t pair[IH_NORMAL_PAIRS][IH_NORMAL_TERMS], int shift, int32_t *normal);
+/* Take them away. */
+void ih_normal_take(uint32_t pair[IH_NORMAL_PAIRS][IH_NORMAL_TERMS], int shift, int32_t *normal);
 
 /* Factor A = F^T F: A in lines like N's, Q30, diagonal 0.995 at most; F in its place, Q27, row by row. Unknowns are
  * eliminated from the last one on, so that what is left, and a row of F, always is the beginning of lines.

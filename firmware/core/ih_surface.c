@@ -451,8 +451,15 @@ static int32_t reweight(const struct ih_sample *sample, const struct ih_surface_
     return (int32_t)ih_mul_shift(sample->root_weight_q15, root_q15, 15);
 }
 
+/* Root of what a weight lost: a row of that weight is what is taken away from the sums. */
+static int32_t root_of_less_q15(int32_t before_q15, int32_t root_weight_q15)
+{
+    return (int32_t)ih_isqrt_u54(
+        (uint64_t)((int64_t)before_q15 * before_q15 - (int64_t)root_weight_q15 * root_weight_q15));
+}
+
 /* Weights by the distance from the surface, of those samples that were far from it before the last correction;
- * what samples whose weight changed had brought to the sums is exchanged. The right side is that of the system that
+ * what samples whose weight changed had brought more to the sums is taken away. The right side is that of the system that
  * is solved, which leaves no more than the ridge's share, and what other weights change. Returns how many did. */
 static int32_t change_weights(const struct ih_samples *samples,
                               const struct ih_surface_params *params,
@@ -472,18 +479,18 @@ static int32_t change_weights(const struct ih_samples *samples,
         out->root_weight_q15[i] = root_q15;
         if (root_q15 != sample->root_weight_q15) {
             add_change(scratch, off, sample->root_weight_q15, root_q15);
-            uint32_t *pair = scratch->pair[lighter % IH_NORMAL_PAIRS];
-            put_row(scratch, root_q15, false, pair);
-            put_row(scratch, sample->root_weight_q15, true, pair);
+            const int32_t at = lighter % IH_NORMAL_ROWS;
+            put_row(scratch, root_of_less_q15(sample->root_weight_q15, root_q15), at % 2 != 0,
+                    scratch->pair[at / 2]);
             lighter++;
-            if (lighter % IH_NORMAL_PAIRS == 0) {
-                ih_normal_change(scratch->pair, scratch->normal_shift, scratch->of.system.normal);
+            if (at + 1 == IH_NORMAL_ROWS) {
+                ih_normal_take(scratch->pair, scratch->normal_shift, scratch->of.system.normal);
             }
         }
     }
-    if (lighter % IH_NORMAL_PAIRS != 0) {
-        clear_pairs(scratch, lighter % IH_NORMAL_PAIRS * 2);
-        ih_normal_change(scratch->pair, scratch->normal_shift, scratch->of.system.normal);
+    if (lighter % IH_NORMAL_ROWS != 0) {
+        clear_pairs(scratch, lighter % IH_NORMAL_ROWS);
+        ih_normal_take(scratch->pair, scratch->normal_shift, scratch->of.system.normal);
     }
     return lighter;
 }
