@@ -12,6 +12,10 @@
 static int32_t row[ROWS][TERMS];
 static _Alignas(IH_NORMAL_ALIGNMENT) uint32_t pair[PAIRS][TERMS];
 static int32_t normal[ENTRIES + 1], expected[ENTRIES + 1];
+static int32_t kept[ROWS][TERMS];
+static int32_t factor[ENTRIES + 1];
+static _Alignas(IH_NORMAL_ALIGNMENT) uint32_t work[IH_NORMAL_WORK][TERMS];
+static double matrix[TERMS][TERMS];
 static struct ih_test_random random_source;
 
 void setUp(void)
@@ -48,34 +52,34 @@ static void pair_rows(void)
     }
 }
 
-/* The sum over all rows to its nearest unit, halves up; second: what a pair's second row counts. */
-static int32_t product_sum(int32_t i, int32_t j, int second, int shift)
+/* The sum over all rows to its nearest unit, halves up. */
+static int32_t product_sum(int32_t i, int32_t j, int shift)
 {
     int64_t sum = 0;
     int32_t k;
 
     for (k = 0; k < ROWS; k++) {
-        sum += (k % 2 == 0 ? 1 : second) * (int64_t)row[k][i] * row[k][j];
+        sum += (int64_t)row[k][i] * row[k][j];
     }
     return (int32_t)floor(ldexp((double)sum, -shift) + 0.5);
 }
 
 /* Entries up to the diagonal; what stands behind it is nobody's business. */
-static void check(int second, int shift, const char *what)
+static void check(int sign, int shift, const char *what)
 {
     int32_t i, j;
 
     pair_rows();
-    if (second > 0) {
+    if (sign > 0) {
         ih_normal_add(pair, shift, normal);
     } else {
-        ih_normal_change(pair, shift, normal);
+        ih_normal_take(pair, shift, normal);
     }
     for (i = 0; i < TERMS; i++) {
         for (j = 0; j <= i; j++) {
             const int32_t at = ih_normal_line(i) + j;
 
-            expected[at] += product_sum(i, j, second, shift);
+            expected[at] += sign * product_sum(i, j, shift);
             if (normal[at] != expected[at]) {
                 IH_TEST_EQUAL(expected[at], normal[at], what, at);
             }
@@ -124,73 +128,213 @@ static void greatest_sums_hold(void)
     TEST_ASSERT_TRUE(normal[0] > 2147000000);
 }
 
-static void changes_take_the_second_rows_away(void)
+static void sums_are_taken_away(void)
 {
     int round;
 
     for (round = 0; round < 5; round++) {
         fill_rows(0, IH_NORMAL_MOST);
-        check(-1, 6, "change");
+        check(-1, 6, "taken away");
     }
-}
-
-/* The greatest products added and nothing taken away, and the other way round. */
-static void greatest_changes_hold(void)
-{
-    int32_t first, k, i;
-
-    for (first = 0; first < 2; first++) {
-        for (k = 0; k < ROWS; k++) {
-            for (i = 0; i < TERMS; i++) {
-                row[k][i] = k % 2 == first ? IH_NORMAL_MOST : 0;
-            }
-        }
-        check(-1, 1, "greatest change");
-        check(-1, IH_NORMAL_SHIFT_MOST, "greatest change, shifted");
-    }
+    memset(normal, 0, sizeof normal);
+    memset(expected, 0, sizeof expected);
+    fill_rows(IH_NORMAL_MOST, IH_NORMAL_MOST);
+    check(-1, 2, "the most taken away");
+    check(1, 2, "and added again");
+    TEST_ASSERT_EQUAL_INT32(0, normal[0]);
 }
 
 /* Each row at each place: none is left out, none is taken twice. */
 static void every_row_counts_once(void)
 {
-    int32_t k, i, second;
+    int32_t k, i, sign;
 
-    for (second = -1; second <= 1; second += 2) {
+    for (sign = -1; sign <= 1; sign += 2) {
         for (k = 0; k < ROWS; k++) {
             memset(row, 0, sizeof row);
             for (i = 0; i < TERMS; i++) {
                 row[k][i] = 2 * i + 1;
             }
-            check(second, 1, "one row");
+            check(sign, 1, "one row");
         }
     }
 }
 
-/* What was added and is taken away leaves no more than each rounding's half. */
+/* What was added and is taken away in other company leaves no more than each rounding's half. */
 static void what_was_added_can_be_taken_away(void)
 {
     int32_t k, i;
 
     for (k = 0; k < 20; k++) {
-        fill_rows(0, IH_NORMAL_MOST);
-        for (i = 0; i < TERMS; i++) {
-            int32_t n;
+        int32_t half;
 
-            for (n = 1; n < ROWS; n += 2) {
-                row[n][i] = 0;
-            }
-        }
+        fill_rows(0, IH_NORMAL_MOST);
+        memcpy(kept, row, sizeof row);
         check(1, 6, "added");
-        for (i = 0; i < ROWS; i += 2) {
-            memcpy(row[i + 1], row[i], sizeof row[i]);
-            memset(row[i], 0, sizeof row[i]);
+        for (half = 0; half < 2; half++) {
+            memcpy(row, kept, sizeof row);
+            for (i = 0; i < ROWS / 2; i++) {
+                memset(row[2 * i + half], 0, sizeof row[0]);
+            }
+            check(-1, 6, "taken away");
         }
-        check(-1, 6, "taken away");
     }
     for (i = 0; i < TERMS; i++) {
         for (k = 0; k <= i; k++) {
-            IH_TEST_RANGE(-20, 20, normal[ih_normal_line(i) + k], "what is left", i);
+            IH_TEST_RANGE(-30, 30, normal[ih_normal_line(i) + k], "what is left", i);
         }
+    }
+}
+
+/* A = the Gram matrix of `columns` random numbers each, diagonal below 0.99, and a ridge. smooth: rows that are
+ * alike, as those of the surface are. */
+static void make_system(int32_t columns, double ridge, int smooth)
+{
+    static double part[TERMS][3 * TERMS], left[TERMS];
+    int32_t i, j, k;
+
+    for (i = 0; i < TERMS; i++) {
+        left[i] = 0;
+        for (k = 0; k < columns; k++) {
+            const double x = 12.0 * k / columns - i % 12,
+                         y = (k * 7 % columns) * 12.0 / columns - (double)(i / 12);
+
+            part[i][k] =
+                smooth != 0 ? sqrt(1 + x * x + y * y) : 2 * ih_test_unit(&random_source) - 1;
+            left[i] += part[i][k] * part[i][k];
+        }
+    }
+    for (i = 0; i < TERMS; i++) {
+        for (j = 0; j <= i; j++) {
+            double sum = 0;
+
+            for (k = 0; k < columns; k++) {
+                sum += part[i][k] * part[j][k];
+            }
+            matrix[i][j] =
+                (0.99 - 2 * ridge) * sum / sqrt(left[i] * left[j]) + (i == j ? ridge : 0);
+            factor[ih_normal_line(i) + j] = (int32_t)lround(ldexp(matrix[i][j], 30));
+            matrix[i][j] = matrix[j][i] = ldexp(factor[ih_normal_line(i) + j], -30);
+        }
+    }
+    factor[ENTRIES] = MARK;
+}
+
+/* F^T F = A: 18 blocks' roundings of 2^-31 and what lower parts leave out, 144 times 2^-32, and the rounding of F. */
+static void check_factor(const char *what)
+{
+    int32_t i, j, k;
+
+    ih_normal_factor(factor, work);
+    IH_TEST_EQUAL(MARK, factor[ENTRIES], what, ENTRIES);
+    for (i = 0; i < TERMS; i++) {
+        for (j = 0; j <= i; j++) {
+            double sum = 0;
+
+            for (k = i; k < TERMS; k++) {
+                sum += ldexp(factor[ih_normal_line(k) + i], -27) *
+                       ldexp(factor[ih_normal_line(k) + j], -27);
+            }
+            IH_TEST_WITHIN(18 * ldexp(1, -31) + 144 * ldexp(1, -32) + ldexp(1, -27), matrix[i][j],
+                           sum, what, i * TERMS + j);
+        }
+    }
+}
+
+static void systems_have_their_factor(void)
+{
+    setUp();
+    make_system(300, 1e-5, 0);
+    check_factor("random");
+    make_system(40, 1e-5, 0);
+    check_factor("fewer columns than rows");
+    make_system(300, 1e-5, 1);
+    check_factor("smooth");
+}
+
+/* A x = b but for what the factor is off, and 25 bits of x. */
+static void systems_are_solved(void)
+{
+    int smooth;
+
+    for (smooth = 0; smooth < 2; smooth++) {
+        static int32_t b[TERMS], x[TERMS];
+        int32_t exponent, i, j;
+        double most = 0;
+
+        make_system(300, smooth != 0 ? 1e-3 : 1e-5, smooth);
+        check_factor("to be solved");
+        for (i = 0; i < TERMS; i++) {
+            b[i] = (int32_t)ih_test_between(&random_source, -200000, 200000);
+        }
+        ih_normal_solve(factor, b, x, &exponent);
+        for (i = 0; i < TERMS; i++) {
+            most = fmax(most, fabs(ldexp(x[i], exponent)));
+        }
+        TEST_ASSERT_TRUE(exponent == 0 || most >= ldexp((1 << 24) - 1, exponent));
+        for (i = 0; i < TERMS; i++) {
+            double sum = 0;
+
+            for (j = 0; j < TERMS; j++) {
+                sum += matrix[i][j] * ldexp(x[j], exponent);
+            }
+            IH_TEST_WITHIN(TERMS * (ldexp(1, exponent) + most * ldexp(1, -26) + 1), b[i], sum,
+                           "solution", i);
+        }
+        ih_normal_solve(factor, b, b, &j);
+        IH_TEST_EQUAL(exponent, j, "in place", 0);
+        TEST_ASSERT_EQUAL_INT32_ARRAY(x, b, TERMS);
+        memset(b, 0, sizeof b);
+        ih_normal_solve(factor, b, x, &exponent);
+        TEST_ASSERT_EACH_EQUAL_INT32(0, x, TERMS);
+        IH_TEST_EQUAL(0, exponent, "of nothing", 0);
+    }
+}
+
+/* A diagonal of squares has its roots; what is not positive counts as the least pivot. */
+static void pivots_have_a_least_value(void)
+{
+    int32_t i;
+
+    memset(factor, 0, sizeof factor);
+    for (i = 0; i < TERMS; i++) {
+        factor[ih_normal_line(i) + i] = i % 3 == 0 ? 1 << 28 : i % 3 == 1 ? 0 : -(1 << 29);
+    }
+    ih_normal_factor(factor, work);
+    for (i = 0; i < TERMS; i++) {
+        IH_TEST_EQUAL(i % 3 == 0 ? 1 << 26 : 1 << 17, factor[ih_normal_line(i) + i], "root", i);
+    }
+}
+
+/* The same bits on all processors, also where a matrix is none that has a factor. */
+static void factors_have_the_same_bits(void)
+{
+    static const uint32_t expected_hash[] = {485617988, 0, 0};
+    int way;
+
+    for (way = 0; way < 3; way++) {
+        uint32_t hash = 2166136261u;
+        int32_t i, j;
+
+        memset(factor, 0, sizeof factor);
+        random_source.state = 7;
+        for (i = 0; i < TERMS; i++) {
+            for (j = 0; j < i; j++) {
+                const int32_t most = way == 0 ? 1 << 20 : way == 1 ? 1 << 24 : 1 << 29;
+
+                factor[ih_normal_line(i) + j] =
+                    (int32_t)ih_test_between(&random_source, -most, most);
+            }
+            factor[ih_normal_line(i) + i] = way == 2 ? -i : 1000000000 - i;
+        }
+        ih_normal_factor(factor, work);
+        for (i = 0; i < TERMS; i++) {
+            for (j = 0; j <= i; j++) {
+                hash = (uint32_t)((uint64_t)(hash ^ (uint32_t)factor[ih_normal_line(i) + j]) *
+                                  16777619u);
+            }
+        }
+        IH_TEST_EQUAL(expected_hash[way], hash, "hash", way);
     }
 }
 
@@ -209,10 +353,13 @@ int main(void)
     RUN_TEST(lines_follow_each_other);
     RUN_TEST(sums_are_rounded_once_a_call);
     RUN_TEST(greatest_sums_hold);
-    RUN_TEST(changes_take_the_second_rows_away);
-    RUN_TEST(greatest_changes_hold);
+    RUN_TEST(sums_are_taken_away);
     RUN_TEST(every_row_counts_once);
     RUN_TEST(what_was_added_can_be_taken_away);
     RUN_TEST(nothing_behind_the_lines_is_touched);
+    RUN_TEST(systems_have_their_factor);
+    RUN_TEST(systems_are_solved);
+    RUN_TEST(pivots_have_a_least_value);
+    RUN_TEST(factors_have_the_same_bits);
     return UNITY_END();
 }
