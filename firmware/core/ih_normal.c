@@ -16,16 +16,50 @@
 #define GROUP IH_NORMAL_GROUP
 
 /* Rows of a block: upper parts of two rows a word, then both parts of each row. */
-#define BLOCK IH_NORMAL_BLOCK
-#define BLOCK_PAIRS (IH_NORMAL_BLOCK / 2)
+#define BLOCK IH_NORMAL_ROWS
+#define PARTS PAIRS
+/* Blocks of rows that have a lower part. */
+#define FINE_FROM (TERMS - 2 * BLOCK)
 /* Numbers of the factor: an upper part with 15 fraction bits, and so many more. */
 #define FACTOR_BITS IH_NORMAL_FACTOR_BITS
 #define LOWER_BITS (FACTOR_BITS - 15)
+#define LOWER_HALF (1 << (LOWER_BITS - 1))
+/* What is left behind the fine blocks is enlarged as long as it stays below this. */
+#define LEFT_MOST 1030792151 /* 0.96 */
 /* Mantissas of a solution stay below this: 144 products with |F| <= 1 then sum below 2^(25 + 27 + 7.2). */
 #define MANTISSA_BITS 25
-#define LOWER_HALF (1 << (LOWER_BITS - 1))
 
 _Static_assert(TERMS % GROUP == 0 && TERMS % BLOCK == 0, "all groups and blocks are whole");
+_Static_assert(IH_NORMAL_WORK == PAIRS + BLOCK, "pairs of rows, and rows");
+
+/* What is done with the sum of 8 words' products: begin + sum, without a sign, over 2^shift, less `before`, is added
+ * to or taken from an entry. */
+struct way {
+    uint32_t begin;
+    int32_t before;
+    int shift;
+    bool is_taken;
+    bool is_mixed; /* lower by upper halves, and upper by lower ones */
+};
+
+/* Sums of products without a sign, rounded. */
+static inline struct way plain_way(int shift, bool is_taken)
+{
+    return (struct way){(uint32_t)1 << (shift - 1), 0, shift, is_taken, false};
+}
+
+/* Upper parts of two rows a word, with a sign: never negative with 2^31 more. */
+static inline struct way upper_way(void)
+{
+    return (struct way){(uint32_t)1 << 31, INT32_MIN, 0, true, false};
+}
+
+/* Both parts of a row a word, rounded. */
+static inline struct way mixed_way(void)
+{
+    return (struct way){((uint32_t)1 << 31) + LOWER_HALF, 1 << (31 - LOWER_BITS), LOWER_BITS, true,
+                        true};
+}
 
 /* Entries of line i, with its padding. */
 static int32_t length_of(int32_t i)
@@ -38,84 +72,12 @@ int32_t ih_normal_line(int32_t i)
     return IH_NORMAL_LINE(i - i % GROUP) + i % GROUP * length_of(i);
 }
 
-#if !(defined __x86_64__ && defined __SSE2__) && !defined __ARM_FEATURE_SIMD32
-
-static inline uint32_t add_products(uint32_t sum, uint32_t a, uint32_t b)
+static inline uint32_t turned(uint32_t word)
 {
-    return sum + (a & 0xffff) * (b & 0xffff) + (a >> 16) * (b >> 16);
+    return word << 16 | word >> 16;
 }
 
-static inline void add_lines(uint32_t pair[PAIRS][TERMS], int shift, bool is_taken, int32_t *normal)
-{
-    int32_t *line = normal;
-    for (int32_t i = 0; i < TERMS; i++) {
-        const int32_t length = length_of(i);
-        for (int32_t j = 0; j < length; j++) {
-            uint32_t sum = (uint32_t)1 << (shift - 1);
-            for (int32_t k = 0; k < PAIRS; k++) {
-                sum = add_products(sum, pair[k][i], pair[k][j]);
-            }
-            line[j] += is_taken ? -(int32_t)(sum >> shift) : (int32_t)(sum >> shift);
-        }
-        line = &line[length];
-    }
-}
-
-static inline int32_t lower_of(uint32_t word)
-{
-    return (int32_t)((word & 0xffff) ^ 0x8000) - 0x8000;
-}
-
-static inline int32_t upper_of(uint32_t word)
-{
-    return (int32_t)(word >> 16 ^ 0x8000) - 0x8000;
-}
-
-/* Products of lower by lower and upper by upper halves, added to a sum; and of lower by upper ones. */
-IH_WRAPPING static inline uint32_t add_alike(uint32_t a, uint32_t b, uint32_t sum)
-{
-    return sum + IH_WRAPS(uint32_t, lower_of(a) * lower_of(b)) +
-           IH_WRAPS(uint32_t, upper_of(a) * upper_of(b));
-}
-
-IH_WRAPPING static inline uint32_t add_mixed(uint32_t a, uint32_t b, uint32_t sum)
-{
-    return sum + IH_WRAPS(uint32_t, lower_of(a) * upper_of(b)) +
-           IH_WRAPS(uint32_t, upper_of(a) * lower_of(b));
-}
-
-/* An entry less both sums. */
-IH_WRAPPING static inline int32_t less(int32_t entry, uint32_t sum, uint32_t mixed)
-{
-    const uint32_t both = sum + IH_WRAPS(uint32_t, IH_WRAPS(int32_t, mixed) >> LOWER_BITS);
-    return IH_WRAPS(int32_t, IH_WRAPS(uint32_t, entry) - both);
-}
-
-/* What the first `done` rows of a block take away from line i. */
-static void take_from(uint32_t work[IH_NORMAL_WORK][TERMS], int32_t done, int32_t i, int32_t *line)
-{
-    for (int32_t j = 0; j <= i; j++) {
-        uint32_t sum = 0, mixed = LOWER_HALF;
-        for (int32_t k = 0; k < (done + 1) / 2; k++) {
-            sum = add_alike(work[k][i], work[k][j], sum);
-        }
-        for (int32_t k = BLOCK_PAIRS; k < BLOCK_PAIRS + done; k++) {
-            mixed = add_mixed(work[k][i], work[k][j], mixed);
-        }
-        line[j] = less(line[j], sum, mixed);
-    }
-}
-
-static void take_blocks(uint32_t work[IH_NORMAL_WORK][TERMS], int32_t first, int32_t *normal)
-{
-    for (int32_t i = 0; i < first; i++) {
-        take_from(work, BLOCK, i, &normal[ih_normal_line(i)]);
-    }
-}
-
-#else
-
-#if defined __x86_64__
+#if defined __x86_64__ && defined __SSE2__
 
 #if defined __AVX2__
 #define LANES 8
@@ -136,6 +98,7 @@ typedef __m256i lanes;
 #define ALL_64(value) _mm256_set1_epi64x(value)
 #define BOTH(even, odd) _mm256_blend_epi32(even, _mm256_slli_epi64(odd, 32), 0xaa)
 #define LIFTED(a, count) _mm256_slli_epi32(a, count)
+#define LIFTED_BY(a, count) _mm256_sll_epi32(a, count)
 #define XOR(a, b) _mm256_xor_si256(a, b)
 #define AND(a, b) _mm256_and_si256(a, b)
 #define OR(a, b) _mm256_or_si256(a, b)
@@ -159,213 +122,51 @@ typedef __m128i lanes;
 #define BOTH(even, odd) \
     _mm_or_si128(_mm_and_si128(even, _mm_set1_epi64x(UINT32_MAX)), _mm_slli_epi64(odd, 32))
 #define LIFTED(a, count) _mm_slli_epi32(a, count)
+#define LIFTED_BY(a, count) _mm_sll_epi32(a, count)
 #define XOR(a, b) _mm_xor_si128(a, b)
 #define AND(a, b) _mm_and_si128(a, b)
 #define OR(a, b) _mm_or_si128(a, b)
 #endif
 
-static inline void add_lines(uint32_t pair[PAIRS][TERMS], int shift, bool is_taken, int32_t *normal)
+/* Line i by all words. */
+static inline void add_line(uint32_t word[PAIRS][TERMS], struct way way, int32_t i, int32_t *line)
 {
-    const lanes begin = ALL((uint32_t)1 << (shift - 1));
-    const __m128i count = _mm_cvtsi32_si128(shift);
-    int32_t *line = normal;
-    for (int32_t i = 0; i < TERMS; i++) {
-        const int32_t length = length_of(i);
-        lanes factor[PAIRS];
-        for (int32_t k = 0; k < PAIRS; k++) {
-            factor[k] = ALL(pair[k][i]);
-        }
-        for (int32_t j = 0; j < length; j += LANES) {
-            lanes sum = begin;
-            for (int32_t k = 0; k < PAIRS; k++) {
-                sum = SUM(sum, PRODUCTS(factor[k], LOAD_ROW(&pair[k][j])));
-            }
-            sum = SHIFTED(sum, count);
-            STORE(&line[j], is_taken ? DIFFERENCE(LOAD(&line[j]), sum) : SUM(sum, LOAD(&line[j])));
-        }
-        line = &line[length];
-    }
-}
-
-/* What a block's rows take away from line i. */
-static inline void take_block(uint32_t work[IH_NORMAL_WORK][TERMS], int32_t i, int32_t *line)
-{
+    const lanes begin = ALL(way.begin), before = ALL(way.before);
+    const __m128i count = _mm_cvtsi32_si128(way.shift);
     const int32_t length = length_of(i);
-    lanes factor[IH_NORMAL_WORK];
-    for (int32_t k = 0; k < BLOCK_PAIRS; k++) {
-        factor[k] = ALL(work[k][i]);
-    }
-    for (int32_t k = BLOCK_PAIRS; k < IH_NORMAL_WORK; k++) {
-        factor[k] = ALL(work[k][i] << 16 | work[k][i] >> 16);
+    lanes factor[PAIRS];
+    for (int32_t k = 0; k < PAIRS; k++) {
+        factor[k] = ALL(way.is_mixed ? turned(word[k][i]) : word[k][i]);
     }
     for (int32_t j = 0; j < length; j += LANES) {
-        lanes sum = PRODUCTS(factor[0], LOAD_ROW(&work[0][j]));
-        lanes mixed = ALL(LOWER_HALF);
-        for (int32_t k = 1; k < BLOCK_PAIRS; k++) {
-            sum = SUM(sum, PRODUCTS(factor[k], LOAD_ROW(&work[k][j])));
+        lanes sum = begin;
+        for (int32_t k = 0; k < PAIRS; k++) {
+            sum = SUM(sum, PRODUCTS(factor[k], LOAD_ROW(&word[k][j])));
         }
-        for (int32_t k = BLOCK_PAIRS; k < IH_NORMAL_WORK; k++) {
-            mixed = SUM(mixed, PRODUCTS(factor[k], LOAD_ROW(&work[k][j])));
-        }
-        sum = SUM(sum, SHIFTED_SIGNED(mixed, LOWER_BITS));
-        STORE(&line[j], DIFFERENCE(LOAD(&line[j]), sum));
+        sum = DIFFERENCE(SHIFTED(sum, count), before);
+        STORE(&line[j], way.is_taken ? DIFFERENCE(LOAD(&line[j]), sum) : SUM(LOAD(&line[j]), sum));
     }
 }
 
-/* The same of rows that are done; those that are not are zero. */
-static void take_from(uint32_t work[IH_NORMAL_WORK][TERMS], int32_t done, int32_t i, int32_t *line)
-{
-    if (done > 0) {
-        take_block(work, i, line);
-    }
-}
-
-static void take_blocks(uint32_t work[IH_NORMAL_WORK][TERMS], int32_t first, int32_t *normal)
-{
-    for (int32_t i = 0; i < first; i++) {
-        take_block(work, i, &normal[ih_normal_line(i)]);
-    }
-}
-
-#else
-
-/* What such a sum adds to an entry. */
-static inline int32_t added(int32_t sum, int shift, bool is_taken)
-{
-    const int32_t value = (int32_t)(IH_WRAPS(uint32_t, sum) >> shift);
-    return is_taken ? -value : value;
-}
-
-/* Columns of two lines with four others: as many sums as a Cortex-M can hold in registers. They pass 2^31 as
- * whole numbers with a sign, and come back as such without. */
-static inline void add_tile(const uint32_t *a, const uint32_t *b, int shift, bool is_taken,
-                            int32_t *const line[2])
-{
-    const uint32_t begin = (uint32_t)1 << (shift - 1);
-    int32_t sum_00 = IH_WRAPS(int32_t, begin), sum_01 = sum_00, sum_02 = sum_00, sum_03 = sum_00;
-    int32_t sum_10 = sum_00, sum_11 = sum_00, sum_12 = sum_00, sum_13 = sum_00;
-#pragma GCC unroll 8
-    for (int32_t k = 0; k < PAIRS; k++) {
-        const int16x2_t a_0 = (int16x2_t)a[k * TERMS], a_1 = (int16x2_t)a[k * TERMS + 1];
-        const int16x2_t b_0 = (int16x2_t)b[k * TERMS];
-        sum_00 = __smlad(a_0, b_0, sum_00);
-        sum_10 = __smlad(a_1, b_0, sum_10);
-        const int16x2_t b_1 = (int16x2_t)b[k * TERMS + 1];
-        sum_01 = __smlad(a_0, b_1, sum_01);
-        sum_11 = __smlad(a_1, b_1, sum_11);
-        const int16x2_t b_2 = (int16x2_t)b[k * TERMS + 2];
-        sum_02 = __smlad(a_0, b_2, sum_02);
-        sum_12 = __smlad(a_1, b_2, sum_12);
-        const int16x2_t b_3 = (int16x2_t)b[k * TERMS + 3];
-        sum_03 = __smlad(a_0, b_3, sum_03);
-        sum_13 = __smlad(a_1, b_3, sum_13);
-    }
-    line[0][0] += added(sum_00, shift, is_taken);
-    line[0][1] += added(sum_01, shift, is_taken);
-    line[0][2] += added(sum_02, shift, is_taken);
-    line[0][3] += added(sum_03, shift, is_taken);
-    line[1][0] += added(sum_10, shift, is_taken);
-    line[1][1] += added(sum_11, shift, is_taken);
-    line[1][2] += added(sum_12, shift, is_taken);
-    line[1][3] += added(sum_13, shift, is_taken);
-}
-
-static inline void add_lines(uint32_t pair[PAIRS][TERMS], int shift, bool is_taken, int32_t *normal)
+/* The first `count` lines. */
+static inline void add_lines(uint32_t word[PAIRS][TERMS], struct way way, int32_t count,
+                             int32_t *normal)
 {
     int32_t *line = normal;
-    for (int32_t i = 0; i < TERMS; i += 2) {
-        const int32_t length = length_of(i);
-        for (int32_t j = 0; j <= i; j += 4) {
-            add_tile(&pair[0][i], &pair[0][j], shift, is_taken,
-                     (int32_t *const[2]){&line[j], &line[length + j]});
-        }
-        line = &line[2 * length];
+    for (int32_t i = 0; i < count; i++) {
+        add_line(word, way, i, line);
+        line = &line[length_of(i)];
     }
 }
 
-/* Products of lower by lower and upper by upper halves, added to a sum; and of lower by upper ones. */
-static inline uint32_t add_alike(uint32_t a, uint32_t b, uint32_t sum)
+/* Line i by the words that are not yet 0. */
+static void add_words(uint32_t word[PAIRS][TERMS], struct way way, int32_t words, int32_t i,
+                      int32_t *line)
 {
-    return IH_WRAPS(uint32_t, __smlad((int16x2_t)a, (int16x2_t)b, IH_WRAPS(int32_t, sum)));
-}
-
-static inline uint32_t add_mixed(uint32_t a, uint32_t b, uint32_t sum)
-{
-    return IH_WRAPS(uint32_t, __smladx((int16x2_t)a, (int16x2_t)b, IH_WRAPS(int32_t, sum)));
-}
-
-/* An entry less both sums. */
-IH_WRAPPING static inline int32_t less(int32_t entry, uint32_t sum, uint32_t mixed)
-{
-    const uint32_t both = sum + IH_WRAPS(uint32_t, IH_WRAPS(int32_t, mixed) >> LOWER_BITS);
-    return IH_WRAPS(int32_t, IH_WRAPS(uint32_t, entry) - both);
-}
-
-/* What the first `done` rows of a block take away from line i. */
-static void take_from(uint32_t work[IH_NORMAL_WORK][TERMS], int32_t done, int32_t i, int32_t *line)
-{
-    for (int32_t j = 0; j <= i; j++) {
-        uint32_t sum = 0, mixed = LOWER_HALF;
-        for (int32_t k = 0; k < (done + 1) / 2; k++) {
-            sum = add_alike(work[k][i], work[k][j], sum);
-        }
-        for (int32_t k = BLOCK_PAIRS; k < BLOCK_PAIRS + done; k++) {
-            mixed = add_mixed(work[k][i], work[k][j], mixed);
-        }
-        line[j] = less(line[j], sum, mixed);
+    if (words > 0) {
+        add_line(word, way, i, line);
     }
 }
-
-/* What a block's rows take away from columns j and j + 1 of two lines. */
-static inline void take_tile(const uint32_t *a, const uint32_t *b, int32_t *const line[2])
-{
-    uint32_t sum_00 = 0, sum_01 = 0, sum_10 = 0, sum_11 = 0;
-    uint32_t mixed_00 = LOWER_HALF, mixed_01 = LOWER_HALF;
-    uint32_t mixed_10 = LOWER_HALF, mixed_11 = LOWER_HALF;
-#pragma GCC unroll 4
-    for (int32_t k = 0; k < BLOCK_PAIRS; k++) {
-        const uint32_t a_0 = a[k * TERMS], a_1 = a[k * TERMS + 1];
-        const uint32_t b_0 = b[k * TERMS], b_1 = b[k * TERMS + 1];
-        sum_00 = add_alike(a_0, b_0, sum_00);
-        sum_01 = add_alike(a_0, b_1, sum_01);
-        sum_10 = add_alike(a_1, b_0, sum_10);
-        sum_11 = add_alike(a_1, b_1, sum_11);
-    }
-#pragma GCC unroll 8
-    for (int32_t k = BLOCK_PAIRS; k < IH_NORMAL_WORK; k++) {
-        const uint32_t a_0 = a[k * TERMS], a_1 = a[k * TERMS + 1];
-        const uint32_t b_0 = b[k * TERMS], b_1 = b[k * TERMS + 1];
-        mixed_00 = add_mixed(a_0, b_0, mixed_00);
-        mixed_01 = add_mixed(a_0, b_1, mixed_01);
-        mixed_10 = add_mixed(a_1, b_0, mixed_10);
-        mixed_11 = add_mixed(a_1, b_1, mixed_11);
-    }
-    line[0][0] = less(line[0][0], sum_00, mixed_00);
-    line[0][1] = less(line[0][1], sum_01, mixed_01);
-    line[1][0] = less(line[1][0], sum_10, mixed_10);
-    line[1][1] = less(line[1][1], sum_11, mixed_11);
-}
-
-/* The same of both lines up to their diagonals: i is even. */
-static void take_lines(uint32_t work[IH_NORMAL_WORK][TERMS], int32_t i, int32_t *line)
-{
-    const int32_t length = length_of(i);
-    for (int32_t j = 0; j <= i; j += 2) {
-        take_tile(&work[0][i], &work[0][j], (int32_t *const[2]){&line[j], &line[length + j]});
-    }
-}
-
-static void take_blocks(uint32_t work[IH_NORMAL_WORK][TERMS], int32_t first, int32_t *normal)
-{
-    for (int32_t i = 0; i < first; i += 2) {
-        take_lines(work, i, &normal[ih_normal_line(i)]);
-    }
-}
-
-#endif
-#endif
-
-#if defined __x86_64__ && defined __SSE2__
 
 /* What is left of a line, Q30, over its pivot: times its inverse, over 2^shift, at most 32. There are only products
  * without a sign on all of x86: numbers are taken for 2^31 more. */
@@ -382,22 +183,125 @@ static inline void divide_line(int32_t *line, int32_t length, int32_t inverse, i
     }
 }
 
-/* A row's numbers in two parts: into a half of the words of a pair, and both into one word. */
-static inline void split_line(const int32_t *line, int32_t length, bool is_second, uint32_t *pair,
-                              uint32_t *parts)
+/* A row's upper parts, into a half of the words of a pair; in its place the row of the factor. With parts, the lower
+ * parts stay there, and both are put into words. */
+static void split_line(int32_t *line, int32_t length, int enlarged, bool is_second, uint32_t *pair,
+                       uint32_t *parts)
 {
+    const __m128i lift = _mm_cvtsi32_si128(LOWER_BITS - enlarged);
     const lanes lower_half = ALL(LOWER_HALF), mask = ALL(0xffff);
     for (int32_t j = 0; j < length; j += LANES) {
         const lanes value = LOAD(&line[j]);
         const lanes upper = SHIFTED_SIGNED(SUM(value, lower_half), LOWER_BITS);
-        const lanes lower = DIFFERENCE(value, LIFTED(upper, LOWER_BITS));
         const lanes half = AND(upper, mask);
         STORE(&pair[j], is_second ? OR(LOAD(&pair[j]), LIFTED(half, 16)) : half);
-        STORE(&parts[j], OR(half, LIFTED(lower, 16)));
+        if (parts != NULL) {
+            const lanes lower = DIFFERENCE(value, LIFTED(upper, LOWER_BITS));
+            STORE(&parts[j], OR(half, LIFTED(lower, 16)));
+        } else {
+            STORE(&line[j], LIFTED_BY(upper, lift));
+        }
     }
 }
 
 #else
+
+#if defined __ARM_FEATURE_SIMD32
+
+static inline uint32_t add_products(uint32_t sum, uint32_t a, uint32_t b)
+{
+    return IH_WRAPS(uint32_t, __smlad((int16x2_t)a, (int16x2_t)b, IH_WRAPS(int32_t, sum)));
+}
+
+#else
+
+static inline int32_t lower_of(uint32_t word)
+{
+    return (int32_t)((word & 0xffff) ^ 0x8000) - 0x8000;
+}
+
+static inline int32_t upper_of(uint32_t word)
+{
+    return (int32_t)(word >> 16 ^ 0x8000) - 0x8000;
+}
+
+IH_WRAPPING static inline uint32_t add_products(uint32_t sum, uint32_t a, uint32_t b)
+{
+    return sum + IH_WRAPS(uint32_t, lower_of(a) * lower_of(b)) +
+           IH_WRAPS(uint32_t, upper_of(a) * upper_of(b));
+}
+
+#endif
+
+IH_WRAPPING static inline int32_t changed(int32_t entry, uint32_t sum, const struct way *way)
+{
+    const uint32_t value = (sum >> way->shift) - IH_WRAPS(uint32_t, way->before);
+    const uint32_t before = IH_WRAPS(uint32_t, entry);
+    return IH_WRAPS(int32_t, way->is_taken ? before - value : before + value);
+}
+
+/* Columns of two lines with four others: as many sums as a Cortex-M can hold in registers. */
+static inline void add_tile(const uint32_t *a, const uint32_t *b, const struct way *way,
+                            int32_t *const line[2])
+{
+    uint32_t sum_00 = way->begin, sum_01 = sum_00, sum_02 = sum_00, sum_03 = sum_00;
+    uint32_t sum_10 = sum_00, sum_11 = sum_00, sum_12 = sum_00, sum_13 = sum_00;
+#pragma GCC unroll 8
+    for (int32_t k = 0; k < PAIRS; k++) {
+        const uint32_t a_0 = a[2 * k], a_1 = a[2 * k + 1];
+        const uint32_t b_0 = b[k * TERMS];
+        sum_00 = add_products(sum_00, a_0, b_0);
+        sum_10 = add_products(sum_10, a_1, b_0);
+        const uint32_t b_1 = b[k * TERMS + 1];
+        sum_01 = add_products(sum_01, a_0, b_1);
+        sum_11 = add_products(sum_11, a_1, b_1);
+        const uint32_t b_2 = b[k * TERMS + 2];
+        sum_02 = add_products(sum_02, a_0, b_2);
+        sum_12 = add_products(sum_12, a_1, b_2);
+        const uint32_t b_3 = b[k * TERMS + 3];
+        sum_03 = add_products(sum_03, a_0, b_3);
+        sum_13 = add_products(sum_13, a_1, b_3);
+    }
+    line[0][0] = changed(line[0][0], sum_00, way);
+    line[0][1] = changed(line[0][1], sum_01, way);
+    line[0][2] = changed(line[0][2], sum_02, way);
+    line[0][3] = changed(line[0][3], sum_03, way);
+    line[1][0] = changed(line[1][0], sum_10, way);
+    line[1][1] = changed(line[1][1], sum_11, way);
+    line[1][2] = changed(line[1][2], sum_12, way);
+    line[1][3] = changed(line[1][3], sum_13, way);
+}
+
+/* The first `count` lines, an even number. */
+static void add_lines(uint32_t word[PAIRS][TERMS], struct way way, int32_t count, int32_t *normal)
+{
+    int32_t *line = normal;
+    for (int32_t i = 0; i < count; i += 2) {
+        const int32_t length = length_of(i);
+        uint32_t factor[2 * PAIRS];
+        for (int32_t k = 0; k < 2 * PAIRS; k++) {
+            const uint32_t here = word[k / 2][i + k % 2];
+            factor[k] = way.is_mixed ? turned(here) : here;
+        }
+        for (int32_t j = 0; j <= i; j += 4) {
+            add_tile(factor, &word[0][j], &way, (int32_t *const[2]){&line[j], &line[length + j]});
+        }
+        line = &line[2 * length];
+    }
+}
+
+/* Line i by the first words. */
+static void add_words(uint32_t word[PAIRS][TERMS], struct way way, int32_t words, int32_t i,
+                      int32_t *line)
+{
+    for (int32_t j = 0; j <= i && words > 0; j++) {
+        uint32_t sum = way.begin;
+        for (int32_t k = 0; k < words; k++) {
+            sum = add_products(sum, way.is_mixed ? turned(word[k][i]) : word[k][i], word[k][j]);
+        }
+        line[j] = changed(line[j], sum, &way);
+    }
+}
 
 /* What is left of a line, Q30, over its pivot: times its inverse, over 2^shift. */
 IH_WRAPPING static void divide_line(int32_t *line, int32_t length, int32_t inverse, int shift)
@@ -407,8 +311,9 @@ IH_WRAPPING static void divide_line(int32_t *line, int32_t length, int32_t inver
     }
 }
 
-/* A row's numbers in two parts: into a half of the words of a pair, and both into one word. */
-IH_WRAPPING static void split_line(const int32_t *line, int32_t length, bool is_second,
+/* A row's upper parts, into a half of the words of a pair; in its place the row of the factor. With parts, the lower
+ * parts stay there, and both are put into words. */
+IH_WRAPPING static void split_line(int32_t *line, int32_t length, int enlarged, bool is_second,
                                    uint32_t *pair, uint32_t *parts)
 {
     for (int32_t j = 0; j < length; j++) {
@@ -417,7 +322,11 @@ IH_WRAPPING static void split_line(const int32_t *line, int32_t length, bool is_
             IH_WRAPS(uint32_t, IH_WRAPS(int32_t, value + LOWER_HALF) >> LOWER_BITS);
         const uint32_t half = upper & 0xffff;
         pair[j] = is_second ? pair[j] | half << 16 : half;
-        parts[j] = half | (value - (upper << LOWER_BITS)) << 16;
+        if (parts != NULL) {
+            parts[j] = half | (value - (upper << LOWER_BITS)) << 16;
+        } else {
+            line[j] = IH_WRAPS(int32_t, upper << (LOWER_BITS - enlarged));
+        }
     }
 }
 
@@ -425,37 +334,75 @@ IH_WRAPPING static void split_line(const int32_t *line, int32_t length, bool is_
 
 void ih_normal_add(uint32_t pair[PAIRS][TERMS], int shift, int32_t *normal)
 {
-    add_lines(pair, shift, false, normal);
+    add_lines(pair, plain_way(shift, false), TERMS, normal);
 }
 
 void ih_normal_take(uint32_t pair[PAIRS][TERMS], int shift, int32_t *normal)
 {
-    add_lines(pair, shift, true, normal);
+    add_lines(pair, plain_way(shift, true), TERMS, normal);
 }
 
-/* Row p of the factor from what is left of line p, also in its two parts: row number `at` of a block. */
-static void finish_row(uint32_t work[IH_NORMAL_WORK][TERMS], int32_t at, int32_t p, int32_t *line)
+/* Row p of the factor from what is left of line p: row number `at` of a block. What is left was enlarged by
+ * 4^enlarged. */
+static void finish_row(uint32_t work[IH_NORMAL_WORK][TERMS], int32_t at, int32_t p, int enlarged,
+                       int32_t *line)
 {
-    const int32_t square_q30 = ih_clamp_s32(line[p], IH_NORMAL_PIVOT_Q30, (1 << 30) - 1);
-    const int32_t pivot = (int32_t)ih_isqrt_u54((uint64_t)square_q30 << (2 * FACTOR_BITS - 30));
+    const bool is_fine = p >= FINE_FROM;
+    const int32_t square_q30 =
+        ih_clamp_s32(line[p], IH_NORMAL_PIVOT_Q30 << (2 * enlarged), (1 << 30) - 1);
+    int32_t pivot = (int32_t)ih_isqrt_u54((uint64_t)square_q30 << (2 * FACTOR_BITS - 30));
+    if (!is_fine) {
+        pivot = ((pivot + LOWER_HALF) >> LOWER_BITS) << LOWER_BITS;
+    }
     const int bits = ih_bits_u64((uint64_t)pivot);
     const int32_t inverse = (int32_t)(((int64_t)1 << (29 + bits)) / pivot);
     divide_line(line, length_of(p), inverse, bits + 29 - (2 * FACTOR_BITS - 30));
     line[p] = pivot;
-    split_line(line, length_of(p), at % 2 != 0, work[at / 2], work[BLOCK_PAIRS + at]);
+    split_line(line, length_of(p), enlarged, at % 2 != 0, work[at / 2],
+               is_fine ? work[PARTS + at] : NULL);
+}
+
+/* Enlarge the first `count` lines by a power of 4, so that 16 bits have more of them. Returns its logarithm. */
+static int enlarge(int32_t count, int32_t *normal)
+{
+    int32_t most = IH_NORMAL_PIVOT_Q30;
+    for (int32_t i = 0; i < count; i++) {
+        most = ih_max_s32(most, normal[ih_normal_line(i) + i]);
+    }
+    int enlarged = 0;
+    while (most <= LEFT_MOST >> (2 * enlarged + 2)) {
+        enlarged++;
+    }
+    for (int32_t k = 0; k < IH_NORMAL_LINE(count) && enlarged > 0; k++) {
+        normal[k] = IH_WRAPS(int32_t, IH_WRAPS(uint32_t, normal[k]) << (2 * enlarged));
+    }
+    return enlarged;
 }
 
 void ih_normal_factor(int32_t *line, uint32_t work[IH_NORMAL_WORK][TERMS])
 {
+    int enlarged = 0;
     for (int32_t first = TERMS - BLOCK; first >= 0; first -= BLOCK) {
+        const bool is_fine = first >= FINE_FROM;
         memset(work[0], 0, IH_NORMAL_WORK * sizeof work[0]);
         for (int32_t at = 0; at < BLOCK; at++) {
             const int32_t p = first + BLOCK - 1 - at;
             int32_t *here = &line[ih_normal_line(p)];
-            take_from(work, at, p, here);
-            finish_row(work, at, p, here);
+            add_words(work, upper_way(), (at + 1) / 2, p, here);
+            if (is_fine) {
+                add_words(&work[PARTS], mixed_way(), ih_min_s32(at, PAIRS), p, here);
+                add_words(&work[PARTS + PAIRS], mixed_way(), at - PAIRS, p, here);
+            }
+            finish_row(work, at, p, enlarged, here);
         }
-        take_blocks(work, first, line);
+        add_lines(work, upper_way(), first, line);
+        if (is_fine) {
+            add_lines(&work[PARTS], mixed_way(), first, line);
+            add_lines(&work[PARTS + PAIRS], mixed_way(), first, line);
+        }
+        if (first == FINE_FROM) {
+            enlarged = enlarge(first, line);
+        }
     }
 }
 

@@ -53,8 +53,7 @@ void ih_normal_take(uint32_t pair[IH_NORMAL_PAIRS][IH_NORMAL_TERMS], int shift, 
  *        pivot an entry, 2^-31 a block, and 2^-32 a row.
  * Cost:  n^3/6 pairs of products, half as many more, n^2/2 products, n square roots and divisions.
  */
-#define IH_NORMAL_BLOCK 8
-#define IH_NORMAL_WORK (IH_NORMAL_BLOCK / 2 + IH_NORMAL_BLOCK)
+#define IH_NORMAL_WORK (IH_NORMAL_PAIRS + IH_NORMAL_ROWS)
 #define IH_NORMAL_PIVOT_Q30 1024
 #define IH_NORMAL_FACTOR_BITS 27
 
