@@ -79,6 +79,8 @@ static inline uint32_t turned(uint32_t word)
 
 #if defined __x86_64__ && defined __SSE2__
 
+#define WHOLE_LINES 1
+
 #if defined __AVX2__
 #define LANES 8
 typedef __m256i lanes;
@@ -101,6 +103,7 @@ typedef __m256i lanes;
 #define LIFTED_BY(a, count) _mm256_sll_epi32(a, count)
 #define XOR(a, b) _mm256_xor_si256(a, b)
 #define AND(a, b) _mm256_and_si256(a, b)
+#define ANDNOT(a, b) _mm256_andnot_si256(a, b)
 #define OR(a, b) _mm256_or_si256(a, b)
 #else
 #define LANES 4
@@ -125,6 +128,7 @@ typedef __m128i lanes;
 #define LIFTED_BY(a, count) _mm_sll_epi32(a, count)
 #define XOR(a, b) _mm_xor_si128(a, b)
 #define AND(a, b) _mm_and_si128(a, b)
+#define ANDNOT(a, b) _mm_andnot_si128(a, b)
 #define OR(a, b) _mm_or_si128(a, b)
 #endif
 
@@ -159,12 +163,39 @@ static inline void add_lines(uint32_t word[PAIRS][TERMS], struct way way, int32_
     }
 }
 
+/* Words of rows that are not there yet. */
+static void clear_words(uint32_t (*word)[TERMS], int32_t count)
+{
+    for (int32_t k = 0; k < count; k++) {
+        for (int32_t j = 0; j < TERMS; j += LANES) {
+            STORE(&word[k][j], ALL(0));
+        }
+    }
+}
+
 /* Line i by the words that are not yet 0. */
 static void add_words(uint32_t word[PAIRS][TERMS], struct way way, int32_t words, int32_t i,
                       int32_t *line)
 {
     if (words > 0) {
         add_line(word, way, i, line);
+    }
+}
+
+/* A line of sums times two scales. */
+static inline void scale_line(const int32_t *line, int32_t length, const uint32_t *scale,
+                              uint32_t own_scale, int step, int32_t *scaled)
+{
+    const lanes own = ALL(own_scale);
+    const __m128i count = _mm_cvtsi32_si128(step);
+    for (int32_t j = 0; j < length; j += LANES) {
+        const lanes here = LOAD(&line[j]);
+        const lanes sum = ANDNOT(SHIFTED_SIGNED(here, 31), here);
+        const lanes other = LOAD(&scale[j]);
+        const lanes even = SHIFTED_64(PRODUCT_64(sum, own), count);
+        const lanes odd = SHIFTED_64(PRODUCT_64(UPPER_64(sum), own), count);
+        STORE(&scaled[j], BOTH(SHIFTED_64(PRODUCT_64(even, other), count),
+                               SHIFTED_64(PRODUCT_64(odd, UPPER_64(other)), count)));
     }
 }
 
@@ -205,6 +236,8 @@ static void split_line(int32_t *line, int32_t length, int enlarged, bool is_seco
 }
 
 #else
+
+#define WHOLE_LINES 0
 
 #if defined __ARM_FEATURE_SIMD32
 
@@ -290,6 +323,13 @@ static void add_lines(uint32_t word[PAIRS][TERMS], struct way way, int32_t count
     }
 }
 
+/* Words of rows that are not there yet are not asked for. */
+static void clear_words(uint32_t (*word)[TERMS], int32_t count)
+{
+    (void)word;
+    (void)count;
+}
+
 /* Line i by the first words. */
 static void add_words(uint32_t word[PAIRS][TERMS], struct way way, int32_t words, int32_t i,
                       int32_t *line)
@@ -300,6 +340,17 @@ static void add_words(uint32_t word[PAIRS][TERMS], struct way way, int32_t words
             sum = add_products(sum, way.is_mixed ? turned(word[k][i]) : word[k][i], word[k][j]);
         }
         line[j] = changed(line[j], sum, &way);
+    }
+}
+
+/* A line of sums times two scales. */
+static inline void scale_line(const int32_t *line, int32_t length, const uint32_t *scale,
+                              uint32_t own_scale, int step, int32_t *scaled)
+{
+    for (int32_t j = 0; j < length; j++) {
+        const uint32_t sum = (uint32_t)ih_max_s32(line[j], 0);
+        const uint32_t half = (uint32_t)((uint64_t)sum * own_scale >> step);
+        scaled[j] = (int32_t)((uint64_t)half * scale[j] >> step);
     }
 }
 
@@ -340,6 +391,16 @@ void ih_normal_add(uint32_t pair[PAIRS][TERMS], int shift, int32_t *normal)
 void ih_normal_take(uint32_t pair[PAIRS][TERMS], int shift, int32_t *normal)
 {
     add_lines(pair, plain_way(shift, true), TERMS, normal);
+}
+
+void ih_normal_scale(const int32_t *normal, const uint32_t *scale, int step, int32_t *scaled)
+{
+    for (int32_t i = 0; i < TERMS; i++) {
+        const int32_t at = ih_normal_line(i);
+        /* Behind the diagonal nothing is asked for: there may be no sums. */
+        scale_line(&normal[at], WHOLE_LINES ? length_of(i) : i + 1, scale, scale[i], step,
+                   &scaled[at]);
+    }
 }
 
 /* Row p of the factor from what is left of line p: row number `at` of a block. What is left was enlarged by
@@ -384,7 +445,7 @@ void ih_normal_factor(int32_t *line, uint32_t work[IH_NORMAL_WORK][TERMS])
     int enlarged = 0;
     for (int32_t first = TERMS - BLOCK; first >= 0; first -= BLOCK) {
         const bool is_fine = first >= FINE_FROM;
-        memset(work[0], 0, IH_NORMAL_WORK * sizeof work[0]);
+        clear_words(work, is_fine ? IH_NORMAL_WORK : PAIRS);
         for (int32_t at = 0; at < BLOCK; at++) {
             const int32_t p = first + BLOCK - 1 - at;
             int32_t *here = &line[ih_normal_line(p)];
@@ -415,11 +476,11 @@ static void solve_first(const int32_t *line, int32_t *b)
     }
     for (int32_t p = TERMS - 1; p >= 0; p--) {
         const int32_t *row = &line[ih_normal_line(p)];
-        const int32_t v = ih_saturate_s32(ih_div_round(rest[p], row[p]));
+        const int32_t v = (int32_t)ih_clamp_s64(ih_div_round(rest[p], row[p]), INT32_MAX);
+        const int32_t less = -v;
         b[p] = v;
-#pragma GCC unroll 4
         for (int32_t k = 0; k < p; k++) {
-            rest[k] -= (int64_t)row[k] * v;
+            rest[k] += (int64_t)row[k] * less;
         }
     }
 }

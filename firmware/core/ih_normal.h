@@ -41,6 +41,10 @@ void ih_normal_add(uint32_t pair[IH_NORMAL_PAIRS][IH_NORMAL_TERMS], int shift, i
 /* Take them away. */
 void ih_normal_take(uint32_t pair[IH_NORMAL_PAIRS][IH_NORMAL_TERMS], int shift, int32_t *normal);
 
+/* Entries (i, j) times scale[i] and scale[j], each time over 2^step, cut off; below 0 as 0. Below 2^32 after the
+ * first. */
+void ih_normal_scale(const int32_t *normal, const uint32_t *scale, int step, int32_t *scaled);
+
 /* Factor A = F^T F: A in lines like N's, Q30, diagonal 0.995 at most; F in its place, Q27, row by row. Unknowns are
  * eliminated from the last one on, so that what is left, and a row of F, always is the beginning of lines.
  *

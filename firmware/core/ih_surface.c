@@ -309,18 +309,12 @@ static void scale_lines(const struct ih_surface_params *params, struct ih_surfac
 {
     uint32_t scale[TERMS];
     set_scale(scratch, scale);
+    /* |N_ij| <= root_i root_j: below 2^30.6. Of no products' sum, rounding may leave a step below 0. */
+    ih_normal_scale(scratch->of.system.normal, scale, SCALE_STEP, scratch->of.system.factor);
     for (int32_t i = 0; i < TERMS; i++) {
-        const int32_t *line = &scratch->of.system.normal[ih_normal_line(i)];
-        int32_t *scaled_q30 = &scratch->of.system.factor[ih_normal_line(i)];
-        for (int32_t j = 0; j <= i; j++) {
-            /* Of no products' sum, rounding may leave a step below 0. */
-            const uint32_t sum = (uint32_t)ih_max_s32(line[j], 0);
-            /* sum <= root_i root_j: below 2^30.6 */
-            const uint32_t half = (uint32_t)((uint64_t)sum * scale[i] >> SCALE_STEP);
-            scaled_q30[j] = (int32_t)((uint64_t)half * scale[j] >> SCALE_STEP);
-        }
-        scaled_q30[i] += (int32_t)ih_mul_shift(scaled_q30[i], params->ridge_q30, 30);
-        IH_IN_RANGE(scaled_q30[i], 0, IH_RANGE_SCALED_Q30);
+        int32_t *at_q30 = &scratch->of.system.factor[ih_normal_line(i) + i];
+        *at_q30 += (int32_t)ih_mul_shift(*at_q30, params->ridge_q30, 30);
+        IH_IN_RANGE(*at_q30, 0, IH_RANGE_SCALED_Q30);
     }
 }
 
