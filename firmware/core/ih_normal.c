@@ -132,19 +132,20 @@ typedef __m128i lanes;
 #define OR(a, b) _mm_or_si128(a, b)
 #endif
 
-/* Line i by all words. */
-static inline void add_line(uint32_t word[PAIRS][TERMS], struct way way, int32_t i, int32_t *line)
+/* Line i by the first words. */
+static inline void add_words(uint32_t word[PAIRS][TERMS], struct way way, int32_t words, int32_t i,
+                             int32_t *line)
 {
     const lanes begin = ALL(way.begin), before = ALL(way.before);
     const __m128i count = _mm_cvtsi32_si128(way.shift);
     const int32_t length = length_of(i);
     lanes factor[PAIRS];
-    for (int32_t k = 0; k < PAIRS; k++) {
+    for (int32_t k = 0; k < words; k++) {
         factor[k] = ALL(way.is_mixed ? turned(word[k][i]) : word[k][i]);
     }
     for (int32_t j = 0; j < length; j += LANES) {
         lanes sum = begin;
-        for (int32_t k = 0; k < PAIRS; k++) {
+        for (int32_t k = 0; k < words; k++) {
             sum = SUM(sum, PRODUCTS(factor[k], LOAD_ROW(&word[k][j])));
         }
         sum = DIFFERENCE(SHIFTED(sum, count), before);
@@ -158,27 +159,8 @@ static inline void add_lines(uint32_t word[PAIRS][TERMS], struct way way, int32_
 {
     int32_t *line = normal;
     for (int32_t i = 0; i < count; i++) {
-        add_line(word, way, i, line);
+        add_words(word, way, PAIRS, i, line);
         line = &line[length_of(i)];
-    }
-}
-
-/* Words of rows that are not there yet. */
-static void clear_words(uint32_t (*word)[TERMS], int32_t count)
-{
-    for (int32_t k = 0; k < count; k++) {
-        for (int32_t j = 0; j < TERMS; j += LANES) {
-            STORE(&word[k][j], ALL(0));
-        }
-    }
-}
-
-/* Line i by the words that are not yet 0. */
-static void add_words(uint32_t word[PAIRS][TERMS], struct way way, int32_t words, int32_t i,
-                      int32_t *line)
-{
-    if (words > 0) {
-        add_line(word, way, i, line);
     }
 }
 
@@ -323,18 +305,11 @@ static void add_lines(uint32_t word[PAIRS][TERMS], struct way way, int32_t count
     }
 }
 
-/* Words of rows that are not there yet are not asked for. */
-static void clear_words(uint32_t (*word)[TERMS], int32_t count)
-{
-    (void)word;
-    (void)count;
-}
-
 /* Line i by the first words. */
 static void add_words(uint32_t word[PAIRS][TERMS], struct way way, int32_t words, int32_t i,
                       int32_t *line)
 {
-    for (int32_t j = 0; j <= i && words > 0; j++) {
+    for (int32_t j = 0; j <= i; j++) {
         uint32_t sum = way.begin;
         for (int32_t k = 0; k < words; k++) {
             sum = add_products(sum, way.is_mixed ? turned(word[k][i]) : word[k][i], word[k][j]);
@@ -445,13 +420,16 @@ void ih_normal_factor(int32_t *line, uint32_t work[IH_NORMAL_WORK][TERMS])
     int enlarged = 0;
     for (int32_t first = TERMS - BLOCK; first >= 0; first -= BLOCK) {
         const bool is_fine = first >= FINE_FROM;
-        clear_words(work, is_fine ? IH_NORMAL_WORK : PAIRS);
         for (int32_t at = 0; at < BLOCK; at++) {
             const int32_t p = first + BLOCK - 1 - at;
             int32_t *here = &line[ih_normal_line(p)];
-            add_words(work, upper_way(), (at + 1) / 2, p, here);
-            if (is_fine) {
+            if (at > 0) {
+                add_words(work, upper_way(), (at + 1) / 2, p, here);
+            }
+            if (is_fine && at > 0) {
                 add_words(&work[PARTS], mixed_way(), ih_min_s32(at, PAIRS), p, here);
+            }
+            if (is_fine && at > PAIRS) {
                 add_words(&work[PARTS + PAIRS], mixed_way(), at - PAIRS, p, here);
             }
             finish_row(work, at, p, enlarged, here);

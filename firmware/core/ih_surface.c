@@ -39,6 +39,7 @@
 #define CORRECTIONS_MAX 8
 #define CORRECTIONS_FEW 3
 #define SQUARES_LOG2_NONE (-1000)
+#define SQUARES_LOG2_MOST 1000
 /* Samples nearer to the surface than so many eighths of the limit keep their weight without being asked again after
  * the last correction. */
 #define FAR_EIGHTHS 6
@@ -318,11 +319,11 @@ static void scale_lines(const struct ih_surface_params *params, struct ih_surfac
     }
 }
 
-static bool factor(const struct ih_surface_params *params, struct ih_surface_scratch *scratch)
+static void factor(const struct ih_surface_params *params, struct ih_surface_scratch *scratch)
 {
     scale_lines(params, scratch);
     ih_normal_factor(scratch->of.system.factor, scratch->pair);
-    return true;
+    scratch->squares_log2 = SQUARES_LOG2_MOST;
 }
 
 /* Set the right side to the ridge's share, ridge * N_ii * c_i, or take it from what is there. */
@@ -387,8 +388,9 @@ static void add_solution(struct ih_surface_scratch *scratch, int fraction)
 }
 
 /* Solve for a correction of the coefficients from what is left on the right side. squares_log2: of the sum of
- * the unknowns' squares, where the samples' sums are 1, over the square of the samples' number. */
-static void correct(const struct ih_surface_params *params, struct ih_surface_scratch *scratch)
+ * the unknowns' squares, where the samples' sums are 1, over the square of the samples' number. Returns false, and
+ * leaves all as it is, when it is greater than that of the correction before: then they do not come to rest. */
+static bool correct(const struct ih_surface_params *params, struct ih_surface_scratch *scratch)
 {
     int32_t exponent;
     set_or_take_ridge(params, true, scratch);
@@ -399,10 +401,14 @@ static void correct(const struct ih_surface_params *params, struct ih_surface_sc
     for (int32_t i = 0; i < TERMS; i++) {
         squares += (int64_t)scratch->solution[i] * scratch->solution[i];
     }
-    const int log2 = ih_bits_u64((uint64_t)squares) - 2 * (fraction - exponent);
-    scratch->squares_log2 =
-        squares == 0 ? SQUARES_LOG2_NONE : log2 + scratch->normal_shift - 2 * scratch->samples_log2;
+    const int log2 = ih_bits_u64((uint64_t)squares) - 2 * (fraction - exponent) +
+                     scratch->normal_shift - 2 * scratch->samples_log2;
+    if (squares != 0 && log2 > scratch->squares_log2) {
+        return false;
+    }
+    scratch->squares_log2 = squares == 0 ? SQUARES_LOG2_NONE : log2;
     add_solution(scratch, fraction - exponent);
+    return true;
 }
 
 /* Work out all rows again, and correct the coefficients by what they leave, until that is enough. */
@@ -425,10 +431,10 @@ static void refine(const struct ih_samples *samples, const struct ih_surface_par
             scratch->is_far[i] = ih_abs_s64(off) >= far;
             add_right(scratch, off, out->root_weight_q15[i]);
         }
-        correct(params, scratch);
         count++;
-    } while (count < least ||
-             (2 * scratch->squares_log2 - before > enough_log2 && count < CORRECTIONS_MAX));
+    } while (correct(params, scratch) &&
+             (count < least ||
+              (2 * scratch->squares_log2 - before > enough_log2 && count < CORRECTIONS_MAX)));
 }
 
 /* Huber step: a sample that is too far from the surface gets less weight. Returns its weight's root. */
@@ -505,10 +511,8 @@ static bool fit_first(const struct ih_samples *samples, const struct ih_surface_
     set_off_fraction(scratch, samples, out->mean_mm_q8);
     scratch->samples_log2 = ih_bits_u64((uint64_t)(samples->sample_count + 7) / 8);
     sum_all(samples, scratch, out, true);
-    if (!factor(params, scratch)) {
-        return false;
-    }
-    correct(params, scratch);
+    factor(params, scratch);
+    (void)correct(params, scratch);
     refine(samples, params, out, SQUARES_LOG2_FOR_WEIGHTS, scratch);
     return true;
 }
@@ -543,10 +547,8 @@ static bool fit_again(const struct ih_samples *samples, const struct ih_surface_
     if (is_light && !sum_again(samples, scratch, out)) {
         return false;
     }
-    if (!factor(params, scratch)) {
-        return false;
-    }
-    correct(params, scratch);
+    factor(params, scratch);
+    (void)correct(params, scratch);
     refine(samples, params, out, SQUARES_LOG2_ENOUGH, scratch);
     return true;
 }
