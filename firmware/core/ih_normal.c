@@ -18,8 +18,6 @@
 /* Rows of a block: upper parts of two rows a word, then both parts of each row. */
 #define BLOCK IH_NORMAL_ROWS
 #define PARTS PAIRS
-/* Blocks of rows that have a lower part. */
-#define FINE_FROM (TERMS - 2 * BLOCK)
 /* Numbers of the factor: an upper part with 15 fraction bits, and so many more. */
 #define FACTOR_BITS IH_NORMAL_FACTOR_BITS
 #define LOWER_BITS (FACTOR_BITS - 15)
@@ -74,7 +72,7 @@ int32_t ih_normal_line(int32_t i)
 
 static inline uint32_t turned(uint32_t word)
 {
-    return word << 16 | word >> 16;
+    return (word & 0xffff) << 16 | word >> 16;
 }
 
 #if defined __x86_64__ && defined __SSE2__
@@ -248,20 +246,27 @@ IH_WRAPPING static inline uint32_t add_products(uint32_t sum, uint32_t a, uint32
 
 #endif
 
-IH_WRAPPING static inline int32_t changed(int32_t entry, uint32_t sum, const struct way *way)
+/* sign: 1, or all ones to take away. */
+IH_WRAPPING static inline int32_t changed(int32_t entry, uint32_t sum, int shift, uint32_t before,
+                                          uint32_t sign)
 {
-    const uint32_t value = (sum >> way->shift) - IH_WRAPS(uint32_t, way->before);
-    const uint32_t before = IH_WRAPS(uint32_t, entry);
-    return IH_WRAPS(int32_t, way->is_taken ? before - value : before + value);
+    return IH_WRAPS(int32_t, IH_WRAPS(uint32_t, entry) + ((sum >> shift) - before) * sign);
+}
+
+static inline uint32_t sign_of(struct way way)
+{
+    return way.is_taken ? UINT32_MAX : 1;
 }
 
 /* Columns of two lines with four others: as many sums as a Cortex-M can hold in registers. */
-static inline void add_tile(const uint32_t *a, const uint32_t *b, const struct way *way,
+static inline void add_tile(const uint32_t *a, const uint32_t *b, struct way way,
                             int32_t *const line[2])
 {
-    uint32_t sum_00 = way->begin, sum_01 = sum_00, sum_02 = sum_00, sum_03 = sum_00;
+    const int shift = way.shift;
+    const uint32_t before = IH_WRAPS(uint32_t, way.before), sign = sign_of(way);
+    uint32_t sum_00 = way.begin, sum_01 = sum_00, sum_02 = sum_00, sum_03 = sum_00;
     uint32_t sum_10 = sum_00, sum_11 = sum_00, sum_12 = sum_00, sum_13 = sum_00;
-#pragma GCC unroll 8
+#pragma GCC unroll 2
     for (int32_t k = 0; k < PAIRS; k++) {
         const uint32_t a_0 = a[2 * k], a_1 = a[2 * k + 1];
         const uint32_t b_0 = b[k * TERMS];
@@ -277,14 +282,14 @@ static inline void add_tile(const uint32_t *a, const uint32_t *b, const struct w
         sum_03 = add_products(sum_03, a_0, b_3);
         sum_13 = add_products(sum_13, a_1, b_3);
     }
-    line[0][0] = changed(line[0][0], sum_00, way);
-    line[0][1] = changed(line[0][1], sum_01, way);
-    line[0][2] = changed(line[0][2], sum_02, way);
-    line[0][3] = changed(line[0][3], sum_03, way);
-    line[1][0] = changed(line[1][0], sum_10, way);
-    line[1][1] = changed(line[1][1], sum_11, way);
-    line[1][2] = changed(line[1][2], sum_12, way);
-    line[1][3] = changed(line[1][3], sum_13, way);
+    line[0][0] = changed(line[0][0], sum_00, shift, before, sign);
+    line[0][1] = changed(line[0][1], sum_01, shift, before, sign);
+    line[0][2] = changed(line[0][2], sum_02, shift, before, sign);
+    line[0][3] = changed(line[0][3], sum_03, shift, before, sign);
+    line[1][0] = changed(line[1][0], sum_10, shift, before, sign);
+    line[1][1] = changed(line[1][1], sum_11, shift, before, sign);
+    line[1][2] = changed(line[1][2], sum_12, shift, before, sign);
+    line[1][3] = changed(line[1][3], sum_13, shift, before, sign);
 }
 
 /* The first `count` lines, an even number. */
@@ -299,7 +304,7 @@ static void add_lines(uint32_t word[PAIRS][TERMS], struct way way, int32_t count
             factor[k] = way.is_mixed ? turned(here) : here;
         }
         for (int32_t j = 0; j <= i; j += 4) {
-            add_tile(factor, &word[0][j], &way, (int32_t *const[2]){&line[j], &line[length + j]});
+            add_tile(factor, &word[0][j], way, (int32_t *const[2]){&line[j], &line[length + j]});
         }
         line = &line[2 * length];
     }
@@ -314,7 +319,7 @@ static void add_words(uint32_t word[PAIRS][TERMS], struct way way, int32_t words
         for (int32_t k = 0; k < words; k++) {
             sum = add_products(sum, way.is_mixed ? turned(word[k][i]) : word[k][i], word[k][j]);
         }
-        line[j] = changed(line[j], sum, &way);
+        line[j] = changed(line[j], sum, way.shift, IH_WRAPS(uint32_t, way.before), sign_of(way));
     }
 }
 
@@ -349,9 +354,10 @@ IH_WRAPPING static void split_line(int32_t *line, int32_t length, int enlarged, 
         const uint32_t half = upper & 0xffff;
         pair[j] = is_second ? pair[j] | half << 16 : half;
         if (parts != NULL) {
-            parts[j] = half | (value - (upper << LOWER_BITS)) << 16;
+            const uint32_t lower = value - upper * (1u << LOWER_BITS);
+            parts[j] = half | (lower & 0xffff) << 16;
         } else {
-            line[j] = IH_WRAPS(int32_t, upper << (LOWER_BITS - enlarged));
+            line[j] = IH_WRAPS(int32_t, upper * (1u << (LOWER_BITS - enlarged)));
         }
     }
 }
@@ -380,10 +386,9 @@ void ih_normal_scale(const int32_t *normal, const uint32_t *scale, int step, int
 
 /* Row p of the factor from what is left of line p: row number `at` of a block. What is left was enlarged by
  * 4^enlarged. */
-static void finish_row(uint32_t work[IH_NORMAL_WORK][TERMS], int32_t at, int32_t p, int enlarged,
-                       int32_t *line)
+static void finish_row(uint32_t work[IH_NORMAL_WORK][TERMS], int32_t at, int32_t p, bool is_fine,
+                       int enlarged, int32_t *line)
 {
-    const bool is_fine = p >= FINE_FROM;
     const int32_t square_q30 =
         ih_clamp_s32(line[p], IH_NORMAL_PIVOT_Q30 << (2 * enlarged), (1 << 30) - 1);
     int32_t pivot = (int32_t)ih_isqrt_u54((uint64_t)square_q30 << (2 * FACTOR_BITS - 30));
@@ -410,16 +415,18 @@ static int enlarge(int32_t count, int32_t *normal)
         enlarged++;
     }
     for (int32_t k = 0; k < IH_NORMAL_LINE(count) && enlarged > 0; k++) {
-        normal[k] = IH_WRAPS(int32_t, IH_WRAPS(uint32_t, normal[k]) << (2 * enlarged));
+        normal[k] = IH_WRAPS(int32_t, (int64_t)normal[k] * (1 << (2 * enlarged)));
     }
     return enlarged;
 }
 
-void ih_normal_factor(int32_t *line, uint32_t work[IH_NORMAL_WORK][TERMS])
+bool ih_normal_factor(int32_t fine_from, int32_t least_q30, int32_t *line,
+                      uint32_t work[IH_NORMAL_WORK][TERMS])
 {
     int enlarged = 0;
+    bool is_good = true;
     for (int32_t first = TERMS - BLOCK; first >= 0; first -= BLOCK) {
-        const bool is_fine = first >= FINE_FROM;
+        const bool is_fine = first >= fine_from;
         for (int32_t at = 0; at < BLOCK; at++) {
             const int32_t p = first + BLOCK - 1 - at;
             int32_t *here = &line[ih_normal_line(p)];
@@ -432,44 +439,53 @@ void ih_normal_factor(int32_t *line, uint32_t work[IH_NORMAL_WORK][TERMS])
             if (is_fine && at > PAIRS) {
                 add_words(&work[PARTS + PAIRS], mixed_way(), at - PAIRS, p, here);
             }
-            finish_row(work, at, p, enlarged, here);
+            is_good &= here[p] >> (2 * enlarged) >= least_q30;
+            finish_row(work, at, p, is_fine, enlarged, here);
         }
         add_lines(work, upper_way(), first, line);
         if (is_fine) {
             add_lines(&work[PARTS], mixed_way(), first, line);
             add_lines(&work[PARTS + PAIRS], mixed_way(), first, line);
         }
-        if (first == FINE_FROM) {
+        if (first == fine_from) {
             enlarged = enlarge(first, line);
         }
     }
+    return is_good;
+}
+
+/* Numbers of a matrix that was not positive may be great: sums wrap around then, and quotients are limited. */
+static int64_t quotient(int64_t rest, int32_t pivot)
+{
+    return ih_div_round(ih_clamp_s64(rest, (int64_t)1 << 62), pivot);
 }
 
 /* F^T v = b, in b's unit: v in b's place. */
-static void solve_first(const int32_t *line, int32_t *b)
+IH_WRAPPING static void solve_first(const int32_t *line, int32_t *b)
 {
-    int64_t rest[TERMS];
+    uint64_t rest[TERMS];
     for (int32_t k = 0; k < TERMS; k++) {
-        rest[k] = (int64_t)b[k] * (1 << FACTOR_BITS);
+        rest[k] = IH_WRAPS(uint64_t, (int64_t)b[k] * (1 << FACTOR_BITS));
     }
     for (int32_t p = TERMS - 1; p >= 0; p--) {
         const int32_t *row = &line[ih_normal_line(p)];
-        const int32_t v = (int32_t)ih_clamp_s64(ih_div_round(rest[p], row[p]), INT32_MAX);
+        const int32_t v =
+            (int32_t)ih_clamp_s64(quotient(IH_WRAPS(int64_t, rest[p]), row[p]), INT32_MAX);
         const int32_t less = -v;
         b[p] = v;
         for (int32_t k = 0; k < p; k++) {
-            rest[k] += (int64_t)row[k] * less;
+            rest[k] += IH_WRAPS(uint64_t, (int64_t)row[k] * less);
         }
     }
 }
 
-static int64_t dot(const int32_t *a, const int32_t *b, int32_t count)
+IH_WRAPPING static int64_t dot(const int32_t *a, const int32_t *b, int32_t count)
 {
-    int64_t sum = 0;
+    uint64_t sum = 0;
     for (int32_t k = 0; k < count; k++) {
-        sum += (int64_t)a[k] * b[k];
+        sum += IH_WRAPS(uint64_t, (int64_t)a[k] * b[k]);
     }
-    return sum;
+    return IH_WRAPS(int64_t, sum);
 }
 
 void ih_normal_solve(const int32_t *line, const int32_t *b, int32_t *x_mantissa,
@@ -481,7 +497,8 @@ void ih_normal_solve(const int32_t *line, const int32_t *b, int32_t *x_mantissa,
     for (int32_t p = 0; p < TERMS; p++) { /* F x = v, in units of 2^exponent */
         const int32_t *row = &line[ih_normal_line(p)];
         const int64_t v = ih_shift_round((int64_t)x_mantissa[p] * (1 << FACTOR_BITS), exponent);
-        const int64_t value = ih_div_round(v - dot(row, x_mantissa, p), row[p]);
+        const int64_t taken = ih_clamp_s64(dot(row, x_mantissa, p), (int64_t)1 << 62);
+        const int64_t value = quotient(v - taken, row[p]);
         const int grow = ih_max_s32(0, ih_bits_u64((uint64_t)ih_abs_s64(value)) - MANTISSA_BITS);
         if (grow > 0) { /* move the binary point of what is solved so far */
             exponent += grow;

@@ -46,22 +46,27 @@ void ih_normal_take(uint32_t pair[IH_NORMAL_PAIRS][IH_NORMAL_TERMS], int shift, 
 void ih_normal_scale(const int32_t *normal, const uint32_t *scale, int step, int32_t *scaled);
 
 /* Factor A = F^T F: A in lines like N's, Q30, diagonal 0.995 at most; F in its place, Q27, row by row. Unknowns are
- * eliminated from the last one on, so that what is left, and a row of F, always is the beginning of lines.
+ * eliminated from the last one on, so that what is left, and a row of F, always is the beginning of lines. Returns
+ * whether the squares of all pivots were least_q30 at least.
  *
- * Way:   blocks of 8 rows. Numbers of F are taken in two parts, 16 bits and 12 bits, whose products are those of 16
- *        bits that processors do several of at once: upper by upper parts in pairs of rows, and both mixed products
- *        of a row. That of lower parts is left out.
- * Overflow: sums of products of columns are below 1 by Cauchy-Schwarz, 2^30; mixed ones below 2^29. Were A not
+ * Way:   blocks of 16 rows. Numbers of F have two parts, of 16 bits and of 12, whose products are those of 16 bits that
+ *        processors do several of at once: upper by upper parts in pairs of rows, and both mixed products of a row. That
+ *        of lower parts is left out. Rows before fine_from, a multiple of 16, have upper parts only: what is left for
+ *        them is enlarged by a power of 4 as far as it goes.
+ * Overflow: sums of products of columns are below 1 by Cauchy-Schwarz, 2^30; mixed ones below 2^30. Were A not
  *        positive, numbers wrap around, on all processors alike.
- * Error: a pivot's square below IH_NORMAL_PIVOT_Q30 counts as that: so there always is a factor. Else 2^-28 times the
- *        pivot an entry, 2^-31 a block, and 2^-32 a row.
- * Cost:  n^3/6 pairs of products, half as many more, n^2/2 products, n square roots and divisions.
+ * Error: of A: of an entry of a fine row 2^-28 times its pivot and 2^-32 a row, of another 2^-16 times its pivot, over
+ *        the root of what it was enlarged by; 2^-31 a block. So a matrix whose pivots do not soon become small has no
+ *        factor with coarse rows, though one that is positive has one with fine_from 0. A pivot's square below
+ *        IH_NORMAL_PIVOT_Q30 counts as that.
+ * Cost:  n^3/6 products, twice as many more of fine rows, n^2/2 products of 64 bits, n square roots and divisions.
  */
 #define IH_NORMAL_WORK (IH_NORMAL_PAIRS + IH_NORMAL_ROWS)
 #define IH_NORMAL_PIVOT_Q30 1024
 #define IH_NORMAL_FACTOR_BITS 27
 
-void ih_normal_factor(int32_t *line, uint32_t work[IH_NORMAL_WORK][IH_NORMAL_TERMS]);
+bool ih_normal_factor(int32_t fine_from, int32_t least_q30, int32_t *line,
+                      uint32_t work[IH_NORMAL_WORK][IH_NORMAL_TERMS]);
 
 /* Solve F^T F x = b. b: so small that |F^-T b| stays within int32, else it is saturated. x: mantissas below 2^25 with
  * x_i = mantissa_i * 2^exponent in b's unit, exponent >= 0 as small as that allows. b and x may be the same array. */

@@ -43,6 +43,8 @@
 /* Samples nearer to the surface than so many eighths of the limit keep their weight without being asked again after
  * the last correction. */
 #define FAR_EIGHTHS 6
+/* Rows of the factor from this one on have more bits: of samples on a lattice, the pivots of all others are small. */
+#define FINE_FROM (TERMS - 2 * IH_NORMAL_ROWS)
 /* Steps of the table, filled up to whole lines of ih_basis. */
 #define TABLE_WIDTH (4 * IH_BASIS_ACROSS)
 
@@ -319,10 +321,15 @@ static void scale_lines(const struct ih_surface_params *params, struct ih_surfac
     }
 }
 
+/* The ridge is the least that a pivot's square can be: one that is less has lost it to rounding. */
 static void factor(const struct ih_surface_params *params, struct ih_surface_scratch *scratch)
 {
+    const int32_t least_q30 = params->ridge_q30 - params->ridge_q30 / 4;
     scale_lines(params, scratch);
-    ih_normal_factor(scratch->of.system.factor, scratch->pair);
+    if (!ih_normal_factor(FINE_FROM, least_q30, scratch->of.system.factor, scratch->pair)) {
+        scale_lines(params, scratch);
+        (void)ih_normal_factor(0, least_q30, scratch->of.system.factor, scratch->pair);
+    }
     scratch->squares_log2 = SQUARES_LOG2_MOST;
 }
 

@@ -15,7 +15,7 @@ static int32_t normal[ENTRIES + 1], expected[ENTRIES + 1];
 static int32_t kept[ROWS][TERMS];
 static int32_t factor[ENTRIES + 1];
 static _Alignas(IH_NORMAL_ALIGNMENT) uint32_t work[IH_NORMAL_WORK][TERMS];
-static double matrix[TERMS][TERMS];
+static double matrix[TERMS][TERMS], product[TERMS][TERMS];
 static struct ih_test_random random_source;
 
 void setUp(void)
@@ -220,39 +220,73 @@ static void make_system(int32_t columns, double ridge, int smooth)
     factor[ENTRIES] = MARK;
 }
 
-/* F^T F = A: 18 blocks' roundings of 2^-31 and what lower parts leave out, 144 times 2^-32, and the rounding of F. */
-static void check_factor(const char *what)
+/* product = F^T F. */
+static void multiply_factor(void)
 {
     int32_t i, j, k;
 
-    ih_normal_factor(factor, work);
-    IH_TEST_EQUAL(MARK, factor[ENTRIES], what, ENTRIES);
     for (i = 0; i < TERMS; i++) {
         for (j = 0; j <= i; j++) {
             double sum = 0;
 
             for (k = i; k < TERMS; k++) {
-                sum += ldexp(factor[ih_normal_line(k) + i], -27) *
-                       ldexp(factor[ih_normal_line(k) + j], -27);
+                sum += ldexp((double)factor[ih_normal_line(k) + i] * factor[ih_normal_line(k) + j],
+                             -54);
             }
-            IH_TEST_WITHIN(18 * ldexp(1, -31) + 144 * ldexp(1, -32) + ldexp(1, -27), matrix[i][j],
-                           sum, what, i * TERMS + j);
+            product[i][j] = product[j][i] = sum;
+        }
+    }
+}
+
+/* F^T F = A: roundings of sums, 40 of 2^-31, what lower parts leave out, 32 times 2^-32, and the rounding of F times
+ * its row's pivot. */
+static void check_factor(int32_t fine_from, int32_t least_q30, const char *what)
+{
+    int32_t i, j;
+
+    TEST_ASSERT_TRUE_MESSAGE(ih_normal_factor(fine_from, least_q30, factor, work), what);
+    IH_TEST_EQUAL(MARK, factor[ENTRIES], what, ENTRIES);
+    multiply_factor();
+    for (i = 0; i < TERMS; i++) {
+        const double pivot = ldexp(factor[ih_normal_line(i) + i], -27);
+        const double rounding = pivot * ldexp(1, i >= fine_from ? -28 : -16);
+
+        for (j = 0; j <= i; j++) {
+            IH_TEST_WITHIN(40 * ldexp(1, -31) + 32 * ldexp(1, -32) +
+                               (i == j ? 2.1 : 1.01) * rounding,
+                           matrix[i][j], product[i][j], what, i * TERMS + j);
         }
     }
 }
 
 static void systems_have_their_factor(void)
 {
-    setUp();
-    make_system(300, 1e-5, 0);
-    check_factor("random");
+    static const int32_t fine_from[] = {0, 16, 112, 144};
+    static const int32_t columns[] = {300, 150};
+    int i, k;
+
+    for (i = 0; i < IH_TEST_COUNT(fine_from); i++) {
+        for (k = 0; k < IH_TEST_COUNT(columns); k++) {
+            make_system(columns[k], 1e-2, 0);
+            check_factor(fine_from[i], 1 << 20, "random");
+        }
+        make_system(300, fine_from[i] == 144 ? 1e-2 : 1e-5, 1);
+        check_factor(fine_from[i], 8000, "smooth");
+    }
     make_system(40, 1e-5, 0);
-    check_factor("fewer columns than rows");
-    make_system(300, 1e-5, 1);
-    check_factor("smooth");
+    check_factor(0, 8000, "fewer columns than rows");
 }
 
-/* A x = b but for what the factor is off, and 25 bits of x. */
+/* What 16 bits cannot hold: 40 great pivots, all others are the ridge's. */
+static void what_is_too_coarse_is_told(void)
+{
+    make_system(40, 1e-5, 0);
+    TEST_ASSERT_FALSE(ih_normal_factor(112, 8000, factor, work));
+    make_system(300, 1e-2, 0);
+    TEST_ASSERT_FALSE(ih_normal_factor(112, 1 << 30, factor, work));
+}
+
+/* F^T F x = b but for roundings of both steps, and 25 bits of x. */
 static void systems_are_solved(void)
 {
     int smooth;
@@ -262,8 +296,8 @@ static void systems_are_solved(void)
         int32_t exponent, i, j;
         double most = 0;
 
-        make_system(300, smooth != 0 ? 1e-3 : 1e-5, smooth);
-        check_factor("to be solved");
+        make_system(300, 1e-4, smooth);
+        check_factor(112, 8000, "to be solved");
         for (i = 0; i < TERMS; i++) {
             b[i] = (int32_t)ih_test_between(&random_source, -200000, 200000);
         }
@@ -276,7 +310,7 @@ static void systems_are_solved(void)
             double sum = 0;
 
             for (j = 0; j < TERMS; j++) {
-                sum += matrix[i][j] * ldexp(x[j], exponent);
+                sum += product[i][j] * ldexp(x[j], exponent);
             }
             IH_TEST_WITHIN(TERMS * (ldexp(1, exponent) + most * ldexp(1, -26) + 1), b[i], sum,
                            "solution", i);
@@ -300,7 +334,7 @@ static void pivots_have_a_least_value(void)
     for (i = 0; i < TERMS; i++) {
         factor[ih_normal_line(i) + i] = i % 3 == 0 ? 1 << 28 : i % 3 == 1 ? 0 : -(1 << 29);
     }
-    ih_normal_factor(factor, work);
+    TEST_ASSERT_FALSE(ih_normal_factor(0, 1, factor, work));
     for (i = 0; i < TERMS; i++) {
         IH_TEST_EQUAL(i % 3 == 0 ? 1 << 26 : 1 << 17, factor[ih_normal_line(i) + i], "root", i);
     }
@@ -309,7 +343,7 @@ static void pivots_have_a_least_value(void)
 /* The same bits on all processors, also where a matrix is none that has a factor. */
 static void factors_have_the_same_bits(void)
 {
-    static const uint32_t expected_hash[] = {485617988, 0, 0};
+    static const uint32_t expected_hash[] = {485617988, 2567137089, 3930756189};
     int way;
 
     for (way = 0; way < 3; way++) {
@@ -327,7 +361,7 @@ static void factors_have_the_same_bits(void)
             }
             factor[ih_normal_line(i) + i] = way == 2 ? -i : 1000000000 - i;
         }
-        ih_normal_factor(factor, work);
+        (void)ih_normal_factor(way == 0 ? 0 : 112, 1, factor, work);
         for (i = 0; i < TERMS; i++) {
             for (j = 0; j <= i; j++) {
                 hash = (uint32_t)((uint64_t)(hash ^ (uint32_t)factor[ih_normal_line(i) + j]) *
@@ -358,6 +392,7 @@ int main(void)
     RUN_TEST(what_was_added_can_be_taken_away);
     RUN_TEST(nothing_behind_the_lines_is_touched);
     RUN_TEST(systems_have_their_factor);
+    RUN_TEST(what_is_too_coarse_is_told);
     RUN_TEST(systems_are_solved);
     RUN_TEST(pivots_have_a_least_value);
     RUN_TEST(factors_have_the_same_bits);
