@@ -35,7 +35,7 @@
  * at the samples: the less a direction is seen by samples, the more it counts. What only decides about weights
  * may be farther off. In frames one correction nearly always is enough, and the worst node is 0.02 mm off. */
 #define SQUARES_LOG2_ENOUGH (-6)
-#define SQUARES_LOG2_FOR_WEIGHTS 6
+#define SQUARES_LOG2_FOR_WEIGHTS 4
 #define CORRECTIONS_MAX 8
 #define CORRECTIONS_FEW 3
 #define SQUARES_LOG2_NONE (-1000)

@@ -10,8 +10,12 @@
  *        than huber_mm get the weight huber / |residual| and the system is solved again.
  *        N is summed from rows of 14 bits, scaled column by column, and only leads to the solution: what
  *        is left, R^T W (z - B c) less the ridge's share, is worked out from rows of full precision,
- *        solved for and added to c, once or more often after each of both systems, until it is small.
- *        The second N is made from the first by exchanging what samples brought whose weight changed.
+ *        solved for and added to c, once or more often after each of both systems, until it is small or
+ *        does not become smaller. So its factor may be a little off too: all but 32 of its rows have
+ *        16 bits; where that is not enough, which pivots tell, it is made again with 27 bits in all.
+ *        Only samples that were farther off than 3/4 of huber_mm before the last correction are asked for
+ *        their weight. The second N is the first less what samples bring less whose weight changed, and
+ *        so is the right side, of which the first system left nothing but the ridge's share.
  * Scaling and overflow: field units, samples within IH_SAMPLES_REACH, centres within 20: dx and
  *        dy below 60, B below 85 = 2^6.5, in Q20 below 2^26.5. Short rows: the farthest corner of the box
  *        around the samples is 2^14 - 2; ih_normal has their sums. Weights are enlarged until the
@@ -20,9 +24,9 @@
  *        the least pivot above 2.6e-3 where weights are as ih_samples makes them. docs/numerics.md goes on.
  * Error: within 0.2 mm of the float64 solution of the same system, everywhere on the grid, for
  *        depths that span up to 1.5 m (ih_samples clips them); it grows with the span. 0.02 mm on frames.
- * Cost:  samples x 576 roots of ih_basis, as often multiplied twice; samples x 10,944 short multiply-adds,
- *        and again twice those whose weight changed; two factorisations of n = 144, four solutions; grid
- *        x 72 multiply-adds.
+ * Cost:  samples x 432 roots of ih_basis, and of the far ones 144 more, as often multiplied twice; samples
+ *        x 10,944 short multiply-adds, and again those whose weight changed; two factorisations of n = 144,
+ *        four solutions; grid x 72 multiply-adds.
  */
 #ifndef IH_SURFACE_H
 #define IH_SURFACE_H
@@ -56,7 +60,7 @@ struct ih_surface_params {
 };
 
 struct ih_surface {
-    bool valid; /* false: too few samples, or no positive definite system */
+    bool valid; /* false: too few samples, or none with weight */
     int32_t downweighted_count;
     int32_t mean_mm_q8;
     struct ih_field field;

@@ -52,7 +52,7 @@ CORE_HEADERS = {
     "ih_windows.h": CORE_SHARED,
     "ih_points.h": CORE_SHARED | {"ih_labels.h", "ih_windows.h"},
     "ih_samples.h": CORE_SHARED | {"ih_points.h"},
-    "ih_surface.h": CORE_SHARED | {"ih_samples.h", "ih_basis.h", "ih_cholesky.h", "ih_normal.h"},
+    "ih_surface.h": CORE_SHARED | {"ih_samples.h", "ih_basis.h", "ih_normal.h"},
     "ih_cuts.h": CORE_SHARED | {"ih_surface.h"},
     "ih_parts.h": CORE_SHARED | {"ih_cuts.h"},
     "ih_ellipse.h": CORE_SHARED | {"ih_parts.h"},
@@ -77,7 +77,7 @@ CORE_HEADERS = {
 CORE_SYSTEM = {"stdbool.h", "stddef.h", "stdint.h", "string.h"}
 # The vectors of x86 and the pairs of a Cortex-M, for files that have the same without.
 CORE_VECTORS = {("ih_normal.c", "immintrin.h"), ("ih_normal.c", "arm_acle.h"), ("ih_basis.c", "immintrin.h"),
-                ("ih_cholesky.c", "immintrin.h"), ("ih_lanes.h", "immintrin.h"), ("ih_cuts.c", "immintrin.h"),
+                ("ih_lanes.h", "immintrin.h"), ("ih_cuts.c", "immintrin.h"),
                 ("ih_row.c", "immintrin.h"), ("ih_words.h", "arm_acle.h")}
 
 INCLUDE = re.compile(r'^\s*#\s*include\s*(["<])([^">]+)[">]')

@@ -32,7 +32,7 @@ FUNCTIONS = {
     "labels": ("ih_labels_assign",),
     "points, samples": ("ih_points_from_labels", "ih_samples_select"),
     "surface": ("ih_surface_fit",),
-    ". Cholesky": ("ih_cholesky_factor", "ih_cholesky_solve"),
+    ". factor": ("ih_normal_factor", "ih_normal_solve"),
     "nests": ("ih_hypotheses_find",),
     ". cuts": ("ih_cuts_level",),
     ". parts": ("ih_ellipse_of_part",),

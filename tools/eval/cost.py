@@ -42,7 +42,7 @@ PARTS = (
     Part("windows", ("ih_windows_find",), ("ih_windows",), ("windows",), "windows"),
     Part("points", ("ih_points_from_labels", "ih_points_from_range"), ("ih_points",), ("points",)),
     Part("samples", ("ih_samples_select",), ("ih_samples",), ("samples",)),
-    Part("surface", ("ih_surface_fit",), ("ih_cholesky", "ih_surface"), ("surface",), "surface"),
+    Part("surface", ("ih_surface_fit",), ("ih_normal", "ih_surface"), ("surface",), "surface"),
     Part("cuts, hypotheses", ("ih_hypotheses_find",), ("ih_cuts", "ih_ellipse", "ih_hypotheses"),
          ("hypotheses",), "hypotheses"),
     Part("heads", ("ih_heads_select",), ("ih_heads",), ("heads",)),
