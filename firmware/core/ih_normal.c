@@ -420,6 +420,28 @@ static int enlarge(int32_t count, int32_t *normal)
     return enlarged;
 }
 
+/* What a block's rows that are done take from line p. */
+static void take_from_line(uint32_t work[IH_NORMAL_WORK][TERMS], bool is_fine, int32_t done,
+                           int32_t p, int32_t *line)
+{
+    if (done > 0) {
+        add_words(work, upper_way(), (done + 1) / 2, p, line);
+    }
+    for (int32_t at = 0; is_fine && at < done; at += PAIRS) {
+        add_words(&work[PARTS + at], mixed_way(), ih_min_s32(done - at, PAIRS), p, line);
+    }
+}
+
+/* What all of them take from the first `count` lines. */
+static void take_from_lines(uint32_t work[IH_NORMAL_WORK][TERMS], bool is_fine, int32_t count,
+                            int32_t *normal)
+{
+    add_lines(work, upper_way(), count, normal);
+    for (int32_t at = 0; is_fine && at < BLOCK; at += PAIRS) {
+        add_lines(&work[PARTS + at], mixed_way(), count, normal);
+    }
+}
+
 bool ih_normal_factor(int32_t fine_from, int32_t least_q30, int32_t *line,
                       uint32_t work[IH_NORMAL_WORK][TERMS])
 {
@@ -430,23 +452,11 @@ bool ih_normal_factor(int32_t fine_from, int32_t least_q30, int32_t *line,
         for (int32_t at = 0; at < BLOCK; at++) {
             const int32_t p = first + BLOCK - 1 - at;
             int32_t *here = &line[ih_normal_line(p)];
-            if (at > 0) {
-                add_words(work, upper_way(), (at + 1) / 2, p, here);
-            }
-            if (is_fine && at > 0) {
-                add_words(&work[PARTS], mixed_way(), ih_min_s32(at, PAIRS), p, here);
-            }
-            if (is_fine && at > PAIRS) {
-                add_words(&work[PARTS + PAIRS], mixed_way(), at - PAIRS, p, here);
-            }
+            take_from_line(work, is_fine, at, p, here);
             is_good &= here[p] >> (2 * enlarged) >= least_q30;
             finish_row(work, at, p, is_fine, enlarged, here);
         }
-        add_lines(work, upper_way(), first, line);
-        if (is_fine) {
-            add_lines(&work[PARTS], mixed_way(), first, line);
-            add_lines(&work[PARTS + PAIRS], mixed_way(), first, line);
-        }
+        take_from_lines(work, is_fine, first, line);
         if (first == fine_from) {
             enlarged = enlarge(first, line);
         }
