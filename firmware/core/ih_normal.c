@@ -28,7 +28,6 @@
 #define MANTISSA_BITS 25
 
 _Static_assert(TERMS % GROUP == 0 && TERMS % BLOCK == 0, "all groups and blocks are whole");
-_Static_assert(IH_NORMAL_WORK == PAIRS + BLOCK, "pairs of rows, and rows");
 
 /* What is done with the sum of 8 words' products: begin + sum, without a sign, over 2^shift, less `before`, is added
  * to or taken from an entry. */
