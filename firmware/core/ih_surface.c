@@ -265,10 +265,10 @@ static void add_change(struct ih_surface_scratch *scratch, int64_t off, int32_t 
 }
 
 /* Pairs from row number `count` on add nothing. */
-static void clear_pairs(struct ih_surface_scratch *scratch, int32_t count)
+static void clear_pairs(uint32_t pair[IH_NORMAL_PAIRS][TERMS], int32_t count)
 {
     for (int32_t at = (count + 1) / 2; at < IH_NORMAL_PAIRS; at++) {
-        memset(scratch->pair[at], 0, sizeof scratch->pair[at]);
+        memset(pair[at], 0, sizeof pair[at]);
     }
 }
 
@@ -286,7 +286,7 @@ static void sum_all(const struct ih_samples *samples, struct ih_surface_scratch 
             add_right(scratch, off_of(scratch, sample, out->mean_mm_q8), out->root_weight_q15[i]);
         }
         if (at + 1 == IH_NORMAL_ROWS || i + 1 == samples->sample_count) {
-            clear_pairs(scratch, at + 1);
+            clear_pairs(scratch->pair, at + 1);
             ih_normal_add(scratch->pair, scratch->normal_shift, scratch->of.system.normal);
         }
     }
@@ -458,15 +458,17 @@ static int32_t reweight(const struct ih_sample *sample, const struct ih_surface_
     return (int32_t)ih_mul_shift(sample->root_weight_q15, root_q15, 15);
 }
 
-/* Root of what a weight lost: a row of that weight is what is taken away from the sums. */
-static int32_t root_of_less_q15(int32_t before_q15, int32_t root_weight_q15)
+/* Exchange rows: those that stand in the first pairs for those in the pairs behind them, each of them as it was and is
+ * rounded. */
+static void exchange_pairs(struct ih_surface_scratch *scratch)
 {
-    return (int32_t)ih_isqrt_u54(
-        (uint64_t)((int64_t)before_q15 * before_q15 - (int64_t)root_weight_q15 * root_weight_q15));
+    ih_normal_take(scratch->pair, scratch->normal_shift, scratch->of.system.normal);
+    ih_normal_add(scratch->pair + IH_NORMAL_PAIRS, scratch->normal_shift,
+                  scratch->of.system.normal);
 }
 
 /* Weights by the distance from the surface, of those samples that were far from it before the last correction;
- * what samples whose weight changed had brought more to the sums is taken away. The right side is that of the system that
+ * what samples whose weight changed had brought to the sums is exchanged. The right side is that of the system that
  * is solved, which leaves no more than the ridge's share, and what other weights change. Returns how many did. */
 static int32_t change_weights(const struct ih_samples *samples,
                               const struct ih_surface_params *params,
@@ -487,17 +489,18 @@ static int32_t change_weights(const struct ih_samples *samples,
         if (root_q15 != sample->root_weight_q15) {
             add_change(scratch, off, sample->root_weight_q15, root_q15);
             const int32_t at = lighter % IH_NORMAL_ROWS;
-            put_row(scratch, root_of_less_q15(sample->root_weight_q15, root_q15), at % 2 != 0,
-                    scratch->pair[at / 2]);
+            put_row(scratch, sample->root_weight_q15, at % 2 != 0, scratch->pair[at / 2]);
+            put_row(scratch, root_q15, at % 2 != 0, scratch->pair[IH_NORMAL_PAIRS + at / 2]);
             lighter++;
             if (at + 1 == IH_NORMAL_ROWS) {
-                ih_normal_take(scratch->pair, scratch->normal_shift, scratch->of.system.normal);
+                exchange_pairs(scratch);
             }
         }
     }
     if (lighter % IH_NORMAL_ROWS != 0) {
-        clear_pairs(scratch, lighter % IH_NORMAL_ROWS);
-        ih_normal_take(scratch->pair, scratch->normal_shift, scratch->of.system.normal);
+        clear_pairs(scratch->pair, lighter % IH_NORMAL_ROWS);
+        clear_pairs(scratch->pair + IH_NORMAL_PAIRS, lighter % IH_NORMAL_ROWS);
+        exchange_pairs(scratch);
     }
     return lighter;
 }

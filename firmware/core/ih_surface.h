@@ -14,8 +14,8 @@
  *        does not become smaller. So its factor may be a little off too: all but 32 of its rows have
  *        16 bits; where that is not enough, which pivots tell, it is made again with 27 bits in all.
  *        Only samples that were farther off than 3/4 of huber_mm before the last correction are asked for
- *        their weight. The second N is the first less what samples bring less whose weight changed, and
- *        so is the right side, of which the first system left nothing but the ridge's share.
+ *        their weight. The second N is made from the first by exchanging what samples brought whose weight
+ *        changed, and so is the right side, of which the first system left nothing but the ridge's share.
  * Scaling and overflow: field units, samples within IH_SAMPLES_REACH, centres within 20: dx and
  *        dy below 60, B below 85 = 2^6.5, in Q20 below 2^26.5. Short rows: the farthest corner of the box
  *        around the samples is 2^14 - 2; ih_normal has their sums. Weights are enlarged until the
@@ -25,7 +25,7 @@
  * Error: within 0.2 mm of the float64 solution of the same system, everywhere on the grid, for
  *        depths that span up to 1.5 m (ih_samples clips them); it grows with the span. 0.02 mm on frames.
  * Cost:  samples x 432 roots of ih_basis, and of the far ones 144 more, as often multiplied twice; samples
- *        x 10,944 short multiply-adds, and again those whose weight changed; two factorisations of n = 144,
+ *        x 10,944 short multiply-adds, and again twice those whose weight changed; two factorisations of n = 144,
  *        four solutions; grid x 72 multiply-adds.
  */
 #ifndef IH_SURFACE_H
