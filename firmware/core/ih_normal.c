@@ -265,7 +265,9 @@ static inline void add_tile(const uint32_t *a, const uint32_t *b, struct way way
     const uint32_t before = IH_WRAPS(uint32_t, way.before), sign = sign_of(way);
     uint32_t sum_00 = way.begin, sum_01 = sum_00, sum_02 = sum_00, sum_03 = sum_00;
     uint32_t sum_10 = sum_00, sum_11 = sum_00, sum_12 = sum_00, sum_13 = sum_00;
+#ifdef __ARM_FEATURE_SIMD32
 #pragma GCC unroll 8
+#endif
     for (int32_t k = 0; k < PAIRS; k++) {
         const uint32_t a_0 = a[2 * k], a_1 = a[2 * k + 1];
         const uint32_t b_0 = b[k * TERMS];
