@@ -24,8 +24,13 @@ static constexpr double even_scale = 1.25;
 /* What is so many times less even than its dots are known is no wall. */
 static constexpr double uneven_max = 3.0;
 static constexpr int rounds = 30;
-static constexpr size_t trimmed_part = 6;        /* one in so many at each end */
-static constexpr double trimmed_variance = 1.08; /* of such a mean, against the whole one */
+static constexpr size_t trimmed_part = 6; /* one in so many at each end */
+/* A dot's place is found anew in the pictures that show its whole window: a mean over others at each pixel bends it.
+ * A dot is there where it is as high as usual, give or take this share, if it is so much higher than its noise. */
+static constexpr double shown_share = 0.5, peak_noises = 3.0;
+/* What else is in a dot's window may be so many times the usual. */
+static constexpr double rest_max_times = 2.0;
+static constexpr double place_max_px = 1.5;
 static constexpr double noise_of_place = 0.8; /* px, of a Gaussian whose peak is as high as the noise: sqrt(2 / pi) */
 
 static double median_of(std::vector<double> values)
@@ -88,11 +93,145 @@ static cv::Mat still_rise(const std::vector<cv::Mat> &rises, const std::vector<c
     return still;
 }
 
+/* A pair of twins and where the board is not in them. */
+struct Twins {
+    const cv::Mat *lit, *dark; /* CV_32F */
+    cv::Mat mask;
+};
+
+/* A Gaussian as `dot` is one, over the window around `middle`; CV_64F, its mean is 0. */
+static cv::Mat bell_of(const Dot &dot, cv::Point middle)
+{
+    cv::Mat bell(dot_side_px, dot_side_px, CV_64F);
+    for (int row = 0; row < dot_side_px; row++) {
+        for (int column = 0; column < dot_side_px; column++) {
+            double du = middle.x + column - dot_reach_px - dot.px.x, dv = middle.y + row - dot_reach_px - dot.px.y;
+            bell.at<double>(row, column) = std::exp(-0.5 * (du * du + dv * dv) / (dot.sigma_px * dot.sigma_px));
+        }
+    }
+    return bell - cv::mean(bell)[0];
+}
+
+static cv::Mat window_of(const cv::Mat &picture, cv::Rect window)
+{
+    cv::Mat part;
+    picture(window).convertTo(part, CV_64F);
+    return part;
+}
+
+/* A window of one pair, how high the dot in it is, and what is left without the dot. */
+struct Shown {
+    cv::Mat lit, dark;
+    double peak_grey, rest_grey;
+};
+
+static Shown show(const Twins &twins, cv::Rect window, const cv::Mat &bell)
+{
+    Shown shown;
+    shown.lit = window_of(*twins.lit, window);
+    shown.dark = window_of(*twins.dark, window);
+    cv::Mat rise = shown.lit - shown.dark;
+    shown.peak_grey = rise.dot(bell) / bell.dot(bell);
+    cv::Scalar mean, spread;
+    cv::meanStdDev(rise - shown.peak_grey * bell, mean, spread);
+    shown.rest_grey = spread[0];
+    return shown;
+}
+
+static double upper_quartile(const std::vector<Shown> &all)
+{
+    std::vector<double> peaks;
+    for (const Shown &shown : all)
+        peaks.push_back(shown.peak_grey);
+    auto at = peaks.begin() + static_cast<std::ptrdiff_t>(peaks.size() - 1 - peaks.size() / 4);
+    std::nth_element(peaks.begin(), at, peaks.end());
+    return *at;
+}
+
+/* All of a window's pictures, as means. `lit` are those with the dot; without it, those of the laser count as `dark` too. */
+struct Means {
+    cv::Mat lit = cv::Mat::zeros(dot_side_px, dot_side_px, CV_64F), dark = lit.clone(), lightest = lit.clone();
+    int lit_count = 0, dark_count = 0;
+};
+
+/* Pictures in which something else is are left out: they would bend the means. */
+static Means means_of(const std::vector<Shown> &all, double peak_noise_grey)
+{
+    std::vector<double> rests;
+    for (const Shown &shown : all)
+        rests.push_back(shown.rest_grey);
+    double usual = upper_quartile(all), rest_max = rest_max_times * median_of(rests);
+    bool tells = shown_share * usual > peak_noises * peak_noise_grey;
+    Means means;
+    for (const Shown &shown : all) {
+        double share = shown.peak_grey / usual;
+        if (shown.rest_grey > rest_max || (tells && share > 2.0 - shown_share))
+            continue;
+        means.dark += shown.dark;
+        means.dark_count++;
+        bool there = !tells || share > shown_share;
+        (there ? means.lit : means.dark) += shown.lit;
+        cv::max(means.lightest, shown.lit, means.lightest);
+        (there ? means.lit_count : means.dark_count)++;
+    }
+    means.lit /= std::max(1, means.lit_count);
+    means.dark /= std::max(1, means.dark_count);
+    return means;
+}
+
+/* What is left of a window without its level and its slopes. */
+static cv::Mat texture_of(const cv::Mat &window)
+{
+    cv::Mat texture = window - cv::mean(window)[0], across(window.size(), CV_64F);
+    for (int i = 0; i < dot_side_px; i++)
+        across.col(i).setTo(i - dot_reach_px);
+    for (const cv::Mat &slope : {across, cv::Mat(across.t())})
+        texture -= slope * (texture.dot(slope) / slope.dot(slope));
+    return texture;
+}
+
+/* A dot's place once more, from the pictures that show all of its window, and how well it is known. False: too few do. */
+static bool place(const std::vector<Twins> &pairs, const Noise &noise, double lens_px, const Dot &dot,
+                  Sighting &sighting)
+{
+    cv::Point middle(cvRound(dot.px.x), cvRound(dot.px.y));
+    cv::Rect window = dot_window(middle);
+    cv::Mat bell = bell_of(dot, middle);
+    std::vector<Shown> all;
+    for (const Twins &twins : pairs) {
+        if (cv::countNonZero(twins.mask(window)) == dot_side_px * dot_side_px)
+            all.push_back(show(twins, window, bell));
+    }
+    if (all.size() < shown_min)
+        return false;
+    double variance = noise.at(cv::mean(all.front().dark)[0]);
+    Means means = means_of(all, std::sqrt(2.0 * variance / bell.dot(bell)));
+    if (means.lit_count < static_cast<int>(shown_min))
+        return false;
+    double dark_variance = variance / means.dark_count;
+    variance = noise.at(cv::mean(means.lit)[0]) / means.lit_count;
+    cv::Mat texture = texture_of(means.dark), rise, lightest;
+    means.lightest.convertTo(lightest, CV_32F);
+    double seen = texture.dot(texture) / (dot_side_px * dot_side_px - 3.0);
+    double share = std::max(0.0, 1.0 - dark_variance / seen); /* of the texture that is no noise */
+    cv::Mat(means.lit - means.dark + texture * (1.0 - share)).convertTo(rise, CV_32F);
+    variance += share * dark_variance;
+    Dot better;
+    if (!dot_fit(rise, lightest, better) || cv::norm(better.px) > place_max_px)
+        return false;
+    sighting.wide_px = better.sigma_px;
+    sighting.px = better.px + cv::Point2d(middle);
+    double beam_px = std::sqrt(std::max(better.sigma_px * better.sigma_px - lens_px * lens_px, 0.0));
+    sighting.sigma_px = std::hypot(noise_of_place * std::sqrt(variance) / better.peak_grey, beam_speckle_px(beam_px));
+    return true;
+}
+
 Lit wall_find(const Board &board, const Camera &camera, const std::vector<Picture> &pictures,
               const std::vector<int> &twins, const std::vector<Lit> &lit, const Noise &noise, double lens_px)
 {
     std::vector<cv::Mat> rises, masks;
-    cv::Mat light = cv::Mat::zeros(camera.size, CV_32F), counts; /* of both twins together */
+    std::vector<Twins> pairs;
+    cv::Mat counts;
     size_t next = 0;
     Lit wall;
     wall.file = "behind the board";
@@ -101,26 +240,21 @@ Lit wall_find(const Board &board, const Camera &camera, const std::vector<Pictur
         if (!pictures[i].laser)
             continue;
         const Lit &here = lit[next++];
-        if (!here.refused.empty() || twins[i] < 0)
+        if (!here.view.good() || twins[i] < 0)
             continue;
         const cv::Mat &grey = pictures[i].grey, &dark = pictures[static_cast<size_t>(twins[i])].grey;
         rises.push_back(grey - dark);
         masks.push_back(beside_sheet(board, camera, here.view));
-        cv::accumulate(grey + dark, light, masks.back());
+        pairs.push_back({&grey, &dark, masks.back()});
     }
     if (rises.size() < shown_min)
         return wall;
     cv::Mat still = still_rise(rises, masks, counts);
     for (const Dot &dot : dots_find(still, {}, counts > 0)) {
         Sighting sighting;
-        cv::Point at(cvRound(dot.px.x), cvRound(dot.px.y));
-        sighting.wide_px = dot.sigma_px;
-        sighting.px = dot.px;
-        sighting.tangent = camera.tangents({dot.px}).front();
-        double beam_px = std::sqrt(std::max(dot.sigma_px * dot.sigma_px - lens_px * lens_px, 0.0));
-        double count = counts.at<uchar>(at), both_grey = static_cast<double>(light.at<float>(at)) / count;
-        double noise_grey = std::sqrt(trimmed_variance * 2.0 * noise.at(0.5 * both_grey) / count);
-        sighting.sigma_px = std::hypot(noise_of_place * noise_grey / dot.peak_grey, beam_speckle_px(beam_px));
+        if (!place(pairs, noise, lens_px, dot, sighting))
+            continue;
+        sighting.tangent = camera.tangents({sighting.px}).front();
         wall.sightings.push_back(sighting);
     }
     return wall;

@@ -1,6 +1,7 @@
 /* cal_wall - what stands still behind the board, if it is a wall: one more plane that the rays meet.
  * Dots that miss the board land there in every picture, so the mean of all pictures shows them with little noise, and
- * the grains of a beam are finest where it is far away. Where the wall is, nobody measured: it is laid through the places
+ * the grains of a beam are finest where it is far away. A picture in which a dot is missing, or something else is in its place,
+ * has no part in that dot's mean. Where the wall is, nobody measured: it is laid through the places
  * that the rays tell, each time they are known better. How even it is, is told by how well it fits; what is not on it is
  * left out.
  * A dot behind the board is told by its epipolar line alone, so this is for projectors near the camera: beside a wide
