@@ -146,7 +146,8 @@ cv::Vec3d index_assign(const Board &board, const Camera &camera, std::vector<Lit
     for (Lit &lit : pictures) {
         int count = static_cast<int>(
             std::count_if(lit.sightings.begin(), lit.sightings.end(), [](const Sighting &s) { return s.in_lattice; }));
-        if (lit.refused.empty() && count < lattice_min)
+        lit.sparse = lit.refused.empty() && count < lattice_min;
+        if (lit.sparse)
             lit.refused = text("only %d dots in a lattice on the board, %d are needed", count, lattice_min);
     }
     Trial trial = trial_best(pictures);

@@ -13,6 +13,10 @@ static constexpr double huber_sigmas = 1.5, outlier_sigmas = 4.5;
 static constexpr double scale_floor = 0.2;
 static constexpr int slots_min = 180;
 static constexpr double origin_sigma_max_mm = 1.0;
+/* Neighbours are ten times as far apart at the least. */
+static constexpr double join_max_px = 1.5;
+/* A picture's dots that are in no lattice are what they seem if so many of them are. */
+static constexpr int sparse_min = 3;
 
 /* A sighting as the equations need it: dot `slot` was seen at `tangent` on the plane normal . X = height. */
 struct Equation {
@@ -288,9 +292,83 @@ Projector rays_solve(const Camera &camera, std::vector<Lit> &pictures, const cv:
         nominal = nominal_fit(projector);
         nominal.sigma = sigma; /* rays that lean on the lattice would make it smaller each time */
     }
+    projector.scale = scale;
     projector.nominal_sigma_deg = nominal.sigma < nominal_unknown ? nominal.sigma * 180.0 / CV_PI : 0.0;
     projector.pitch_deg = nominal.pitch_deg;
     projector.turn_deg = nominal.turn_deg;
     return projector;
+}
+
+/* Where a ray is expected on a picture's board, undistorted pixels, and how well that is known. */
+struct Expected {
+    cv::Point2d px;
+    double sigma_px;
+};
+
+static std::vector<Expected> expect(const Camera &camera, const Projector &projector, const View &view)
+{
+    std::vector<Expected> all;
+    cv::Vec3d normal = view.normal();
+    double height_mm = normal.dot(view.shift) - normal.dot(projector.origin_mm);
+    for (size_t slot = 0; slot < slot_count; slot++) {
+        const cv::Vec3d &ray = projector.rays[slot];
+        cv::Vec3d place = projector.origin_mm + ray * (height_mm / normal.dot(ray));
+        double sigma_deg = projector.seen[slot] > 0 ? projector.sigma_deg[slot] : projector.nominal_sigma_deg;
+        all.push_back({camera.undistorted_px({place[0] / place[2], place[1] / place[2]}),
+                       sigma_deg * CV_PI / 180.0 * camera.focal_px()});
+    }
+    return all;
+}
+
+/* The slot whose ray is at a sighting, among those that the picture has not shown yet. */
+static int slot_at(const std::vector<Expected> &all, const std::vector<bool> &taken, cv::Point2d px, double sigma_px)
+{
+    for (size_t slot = 0; slot < slot_count; slot++) {
+        double near_px = outlier_sigmas * std::hypot(all[slot].sigma_px, sigma_px);
+        if (!taken[slot] && cv::norm(px - all[slot].px) <= std::min(near_px, join_max_px))
+            return static_cast<int>(slot);
+    }
+    return no_slot;
+}
+
+static int join(const Camera &camera, const Projector &projector, Lit &lit)
+{
+    std::vector<Expected> all = expect(camera, projector, lit.view);
+    std::vector<bool> taken(slot_count, false);
+    std::vector<Sighting *> joined;
+    int alone = 0;
+    for (const Sighting &sighting : lit.sightings) {
+        if (sighting.slot != no_slot)
+            taken[static_cast<size_t>(sighting.slot)] = true;
+    }
+    for (Sighting &sighting : lit.sightings) {
+        if (sighting.slot != no_slot)
+            continue;
+        alone++;
+        sighting.slot =
+            slot_at(all, taken, camera.undistorted_px(sighting.tangent), projector.scale * sighting.sigma_px);
+        if (sighting.slot == no_slot)
+            continue;
+        taken[static_cast<size_t>(sighting.slot)] = true;
+        joined.push_back(&sighting);
+    }
+    int count = static_cast<int>(joined.size());
+    if (lit.sparse && (count < sparse_min || 2 * count < alone)) {
+        for (Sighting *sighting : joined)
+            sighting->slot = no_slot;
+        return 0;
+    }
+    lit.refused.clear();
+    return count;
+}
+
+int rays_join(const Camera &camera, const Projector &projector, std::vector<Lit> &pictures)
+{
+    int count = 0;
+    for (Lit &lit : pictures) {
+        if (lit.refused.empty() || lit.sparse)
+            count += join(camera, projector, lit);
+    }
+    return count;
 }
 } // namespace cal

@@ -20,6 +20,7 @@ struct Projector {
     std::array<double, slot_count> sigma_deg{}; /* standard deviation of one component */
     int sighting_count = 0, outlier_count = 0;
     double rms_px = 0.0;
+    double scale = 1.0;             /* how much larger residuals are than the sightings' sigmas tell */
     double nominal_sigma_deg = 0.0; /* how far rays are from the nominal lattice, one component; 0: not known */
     double pitch_deg = 0.0,
            turn_deg = 0.0; /* of the nominal lattice: its step, and its turn against the image's rows */
@@ -27,6 +28,10 @@ struct Projector {
 
 /* Sets the residuals and `fits` of the sightings. Throws cal::Error where they do not support an origin. */
 Projector rays_solve(const Camera &camera, std::vector<Lit> &pictures, const cv::Vec3d &origin_mm);
+
+/* Gives slots to dots that have none: one without neighbours is in no lattice, but its ray says where it is. A picture
+ * that was refused as its dots are few is used if most of them are where rays are. Returns how many dots. */
+int rays_join(const Camera &camera, const Projector &projector, std::vector<Lit> &pictures);
 } // namespace cal
 
 #endif

@@ -32,6 +32,7 @@ struct Lit {
     View view;              /* the board's pose in it */
     std::vector<Sighting> sightings;
     std::string refused; /* why nothing of it is used; empty: it is used */
+    bool sparse = false; /* it is refused for having too few dots in its lattice, no more */
 };
 
 /* Where a sighting at a pixel is: sets px, tangent and place. */

@@ -141,11 +141,23 @@ static void place_dots(const std::vector<Picture> &pictures, const std::vector<i
     }
 }
 
+/* What is known of the board's dots against each other becomes what is known of them: the wall has a noise of its own. */
+static void scale_sigmas(double scale, std::vector<Lit> &pictures)
+{
+    for (Lit &lit : pictures) {
+        for (Sighting &sighting : lit.sightings)
+            sighting.sigma_px *= scale;
+    }
+}
+
 /* Origin and rays by the board; then with what is behind it, too. */
 static void find_rays(const std::vector<Picture> &pictures, const std::vector<int> &twins, const cv::Vec3d &origin_mm,
                       Result &result)
 {
     result.projector = rays_solve(result.camera, result.lit, origin_mm);
+    if (rays_join(result.camera, result.projector, result.lit) > 0)
+        result.projector = rays_solve(result.camera, result.lit, result.projector.origin_mm);
+    scale_sigmas(result.projector.scale, result.lit);
     Lit wall = wall_find(result.board, result.camera, pictures, twins, result.lit, twins_noise(pictures, twins),
                          spot_lens_px(result.lit));
     if (!wall_lay(result.camera, result.projector, wall))
