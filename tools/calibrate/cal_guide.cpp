@@ -135,7 +135,8 @@ static std::string device_of(const std::string &name)
     return number ? "/dev/video" + name : name.compare(0, 5, "/dev/") == 0 ? name : "";
 }
 
-/* Luma as the camera gives it, as the board's program takes it: made of colours its lightest and darkest would be lost. */
+/* Luma as the camera gives it, as the board's program takes it: made of colours its lightest and darkest would be lost.
+ * Once the size is set: a driver may have other samples for another one. */
 static void take_luma(cv::VideoCapture &camera)
 {
     int code = static_cast<int>(camera.get(cv::CAP_PROP_FOURCC));
@@ -157,8 +158,6 @@ static cv::VideoCapture open_camera(const std::string &name)
         throw Error("--camera " + name + ": " + device + ": is no camera, or another program has it");
     if (device.empty() && !camera.open(name))
         throw Error("--camera " + name + ": is neither a camera's number or device nor a film that can be read");
-    if (!device.empty())
-        take_luma(camera);
     return camera;
 }
 
@@ -221,16 +220,21 @@ static Picture as_picture(const std::string &file, const cv::Mat &grey8, bool la
     return picture;
 }
 
-/* The next frame but one that shows dots: the laser may have come on within the first. False: there is none. */
-static bool next_lit(cv::VideoCapture &camera, const cv::Mat &dark, cv::Mat &grey8)
+/* What became of a pose's picture with the laser. */
+enum class Taken { whole, again, no_frames };
+
+/* The next frame but one that shows dots: the laser may have come on within the first. again: there is none. */
+static Taken next_lit(cv::VideoCapture &camera, const cv::Mat &dark, cv::Mat &grey8)
 {
-    for (int i = 0; i < lit_frames_max && next_frame(camera, grey8); i++) {
+    for (int i = 0; i < lit_frames_max; i++) {
+        if (!next_frame(camera, grey8))
+            return Taken::no_frames;
         cv::Mat lit;
         grey8.convertTo(lit, CV_32F);
         if (count_dots(lit, dark) >= dots_min)
-            return next_frame(camera, grey8);
+            return next_frame(camera, grey8) ? Taken::whole : Taken::no_frames;
     }
-    return false;
+    return Taken::again;
 }
 
 static void wait_for_enter(const char *request)
@@ -242,25 +246,29 @@ static void wait_for_enter(const char *request)
         throw Error("nobody there to press Enter: standard input is at its end");
 }
 
-/* The same pose with the laser on. Empty: it could not be had, and the user has been told and has switched it off. */
-static cv::Mat take_lit(const Board &board, cv::VideoCapture &camera, const View &taken)
+/* The same pose with the laser on. again: it could not be had, and the user has been told and has switched it off;
+ * no_frames: he has been told to. */
+static Taken take_lit(const Board &board, cv::VideoCapture &camera, const View &taken, cv::Mat &grey8)
 {
-    cv::Mat grey8;
     Picture dark = as_picture(taken.file, taken.grey8, false);
     wait_for_enter("now switch the laser on, hold still");
-    if (!next_lit(camera, dark.grey, grey8)) {
+    Taken found = next_lit(camera, dark.grey, grey8);
+    if (found == Taken::no_frames)
+        std::printf("  no more frames come: switch the laser off\n");
+    if (found == Taken::again) {
         std::printf(
             "  no dots of the laser are seen but those that were there before: is it on, and was it off then?\n");
         wait_for_enter("this pose once more: switch the laser off");
-        return {};
     }
+    if (found != Taken::whole)
+        return found;
     Picture lit = as_picture("lit", grey8, true);
     if (twins_find({dark, lit}, {taken, look(board, lit.file, grey8)})[1] < 0) {
         std::printf("  the board has moved between the two pictures\n");
         wait_for_enter("this pose once more: switch the laser off");
-        return {};
+        return Taken::again;
     }
-    return grey8;
+    return Taken::whole;
 }
 
 /* Pairs that were taken before, without the laser. `size` is the one that is wanted, if any; theirs afterwards. */
@@ -333,10 +341,15 @@ bool guide_camera(const Options &options)
         camera.set(cv::CAP_PROP_FRAME_WIDTH, wanted.width);
         camera.set(cv::CAP_PROP_FRAME_HEIGHT, wanted.height);
     }
+    if (!device_of(options.camera).empty())
+        take_luma(camera);
     View taken;
     while (wait_for_board(board, camera, wanted, views, taken)) {
-        cv::Mat lit = take_lit(board, camera, taken);
-        if (lit.empty())
+        cv::Mat lit;
+        Taken found = take_lit(board, camera, taken, lit);
+        if (found == Taken::no_frames)
+            break;
+        if (found == Taken::again)
             continue;
         std::string name = free_name(options.target);
         write_pair(name, taken.grey8, lit);
