@@ -41,7 +41,8 @@ const char *const options_help = /* at most 80 columns */
     "DIR holds binary PGM files and frames.jsonl, which says in which the laser was\n"
     "on (docs/contract.md), or files named NAME-on.pgm and NAME-off.pgm.\n"
     "Exit status: 0 done; 1 pictures that cannot be read, or that cannot support a\n"
-    "calibration; 2 wrong usage.\n";
+    "calibration, a camera that cannot be used or gives no more frames, a file that\n"
+    "cannot be written; 2 wrong usage.\n";
 
 enum OptionId { opt_board = tool::opt_help + 1, opt_camera, opt_size, opt_near, opt_far, opt_middle, opt_out };
 

@@ -246,6 +246,15 @@ static void check_middle(const MiddleDot &middle, const std::vector<Picture> &pi
                     text(", which has %dx%d pixels", named->grey.cols, named->grey.rows));
 }
 
+/* Never a directory, which would go if it is empty: no calibration wrote that. */
+static void remove_file(const std::string &path, std::error_code &failed)
+{
+    if (std::filesystem::is_directory(std::filesystem::symlink_status(path, failed)))
+        failed = std::make_error_code(std::errc::is_a_directory);
+    else
+        std::filesystem::remove(path, failed);
+}
+
 /* A calibration that fails leaves no files behind, also none of an earlier one. */
 static void make_out(const std::string &out)
 {
@@ -254,7 +263,7 @@ static void make_out(const std::string &out)
     if (failed)
         throw Error(out + ": " + failed.message());
     for (const char *name : {"/rig.json", "/report.html"}) {
-        std::filesystem::remove(out + name, failed);
+        remove_file(out + name, failed);
         if (failed)
             throw Error(out + name + ": " + failed.message());
     }
@@ -264,7 +273,7 @@ static void remove_out(const std::string &out)
 {
     std::error_code failed; /* the first fault is the one to tell */
     for (const char *name : {"/rig.json", "/report.html"})
-        std::filesystem::remove(out + name, failed);
+        remove_file(out + name, failed);
 }
 
 static void write_out(const std::string &out, const Result &result)
