@@ -267,7 +267,7 @@ lint: sanitize ## clang-tidy, cppcheck, MISRA C, gcc -fanalyzer; what they may f
 	  xargs -P 2 -n 1 clang-tidy --quiet -p $(BUILD)/lint 2> $(BUILD)/lint.log || \
 	  { grep -v 'warnings* generated' $(BUILD)/lint.log; exit 1; }
 	@cmake --preset lint-tools > $(BUILD)/lint.log 2>&1 || { cat $(BUILD)/lint.log; exit 1; }
-	@git ls-files 'tools/common/*.cpp' 'tools/calibrate/*.cpp' 'tools/view/*.cpp' | \
+	@git ls-files 'tools/common/*.cpp' 'tools/calibrate/*.cpp' 'tools/view/*.cpp' 'tests/calibration/*.cpp' | \
 	  xargs -P 2 -n 1 clang-tidy --quiet -p $(BUILD)/lint-tools 2> $(BUILD)/lint.log || \
 	  { grep -v 'warnings* generated' $(BUILD)/lint.log; exit 1; }
 

@@ -23,7 +23,7 @@ static int32_t fixed(double value, int bits)
 
 struct Calibrated {
     cv::Mat camera, lens, origin, rays;
-    ih_calibration fixed_point;
+    ih_calibration fixed_point{};
 };
 
 static bool read_rig(const char *path, Calibrated &rig)
