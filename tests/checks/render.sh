@@ -75,11 +75,15 @@ small="--frames 2 --size 320x240"
     draw "two frames" one $small --seed 5
     draw "the same again" again $small --seed 5
     draw "another seed" other $small --seed 6
+    draw "a careless rig" careless $small --assembly 1 --seed 5
+    draw "others before the same rig" before $small --assembly 1 --rig-seed 5 --seed 6
 }
 [ "$(fingerprint one)" = "$(fingerprint again)" ] && reason= || reason="bytes differ"
 result "the same options give the same bytes" "$reason"
 [ "$(fingerprint one)" != "$(fingerprint other)" ] && reason= || reason="the same bytes"
 result "another seed gives other bytes" "$reason"
+cmp -s careless/rig.json before/rig.json && ! cmp -s careless/000000.pgm before/000000.pgm && reason= || reason="another rig, or the same picture"
+result "others before the same rig" "$reason"
 
 # --- every kind ----------------------------------------------------------------------------------
 draw "1280x800, 16 bits, wide rig, hands" large --frames 1 --size 1280x800 --bits 16 --rig wide --sequence 2
@@ -523,6 +527,7 @@ refuse "unknown option" 2 "unrecognized" --colour red a
 refuse "option without a value" 2 "requires an argument" a --seed
 refuse "seed that is no number" 2 "--seed" --seed five a
 refuse "negative seed" 2 "--seed" --seed -1 a
+refuse "rig's seed that is no number" 2 "--rig-seed" --rig-seed five a
 refuse "no frames" 2 "--frames" --frames 0 a
 refuse "too many frames" 2 "--frames" --frames 5001 a
 refuse "too small" 2 "--size" --size 319x240 a

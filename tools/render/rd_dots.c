@@ -30,7 +30,7 @@ struct spot {
 
 void rd_laser_make(struct rd_laser *laser, const struct rd_options *options, const struct rd_rig *rig)
 {
-    struct rd_rng rng = rd_rng_start(options->seed, RD_STREAM_LASER);
+    struct rd_rng rng = rd_rng_start(options->rig_seed, RD_STREAM_LASER);
     double zoom = options->width / 752.0;
     laser->power_grey = options->exposure * rd_rng_uniform(&rng, 105.0, 180.0);
     laser->optics_px = rd_rng_uniform(&rng, 0.80, 0.98) * fmax(0.9, sqrt(zoom));

@@ -15,6 +15,7 @@ enum option_id {
     OPT_SEQUENCE,
     OPT_RIG,
     OPT_SEED,
+    OPT_RIG_SEED,
     OPT_FRAMES,
     OPT_SIZE,
     OPT_BACKGROUND,
@@ -70,6 +71,8 @@ static const char help_text[] = /* at most 80 columns */
     "                     wide: 125 mm\n"
     "  --seed N           which person, room, light, motion (default 1); with\n"
     "                     --range: from where, 0 for the depth camera's own place\n"
+    "  --rig-seed N       which lens, assembly, laser and sensor (default: as --seed):\n"
+    "                     other people before the same rig\n"
     "  --frames N         1 to 5000 (default 50, four of them without the person; for\n"
     "                     a visit 100); with --range for each depth image (default 1)\n"
     "  --size WxH         320x240 to 1280x800 (default 752x582); the focal length\n"
@@ -237,6 +240,9 @@ static bool take_option(int id, const char *text, struct rd_options *options)
         return read_int("sequence", text, 1, 2, "1 or 2", &options->sequence);
     case OPT_SEED:
         return read_number("seed", text, 0, UINT64_MAX, "a whole number", &options->seed);
+    case OPT_RIG_SEED:
+        options->rig_seed_given = true;
+        return read_number("rig-seed", text, 0, UINT64_MAX, "a whole number", &options->rig_seed);
     case OPT_FRAMES:
         return read_int("frames", text, 1, FRAMES_MAX, "a whole number from 1 to 5000", &options->frame_count);
     case OPT_SIZE:
@@ -286,6 +292,7 @@ enum rd_options_result rd_options_parse(int argc, char **argv, struct rd_options
         {"sequence", required_argument, NULL, OPT_SEQUENCE},
         {"rig", required_argument, NULL, OPT_RIG},
         {"seed", required_argument, NULL, OPT_SEED},
+        {"rig-seed", required_argument, NULL, OPT_RIG_SEED},
         {"frames", required_argument, NULL, OPT_FRAMES},
         {"size", required_argument, NULL, OPT_SIZE},
         {"background", required_argument, NULL, OPT_BACKGROUND},
@@ -337,6 +344,8 @@ enum rd_options_result rd_options_parse(int argc, char **argv, struct rd_options
         fputs("render: --scene board, --board and --board-mm go together\n", stderr);
         return RD_OPTIONS_WRONG;
     }
+    if (!options->rig_seed_given)
+        options->rig_seed = options->seed;
     if (options->frame_count == 0)
         options->frame_count = options->range_dir != NULL ? 1 : options->scene == RD_SCENE_VISIT ? 100 : 50;
     options->out_dir = argv[optind];

@@ -47,9 +47,10 @@ struct rd_options {
     enum rd_background background;
     enum rd_distortion distortion;
     enum rd_ambient_kind ambient;
-    bool alternate;  /* every second frame without the laser */
-    double exposure; /* all light, relative */
-    uint64_t seed;
+    bool alternate;          /* every second frame without the laser */
+    double exposure;         /* all light, relative */
+    uint64_t seed, rig_seed; /* rig_seed: which rig, laser and sensor; as seed where not given */
+    bool rig_seed_given;
     int frame_count;          /* for each depth image, where there are any */
     double tilt_deg;          /* the camera looks up at people by this, or down */
     double knock_deg;         /* the projector's turn against what rig.json says */

@@ -36,7 +36,7 @@
 
 static void make_lens(struct rd_rig *rig, const struct rd_options *options)
 {
-    struct rd_rng rng = rd_rng_start(options->seed, RD_STREAM_RIG);
+    struct rd_rng rng = rd_rng_start(options->rig_seed, RD_STREAM_RIG);
     double k1 = rd_rng_uniform(&rng, -0.18, -0.14);
     double k2 = rd_rng_uniform(&rng, 0.045, 0.08);
     double p1 = rd_rng_uniform(&rng, -5.5e-4, 5.5e-4);
@@ -82,7 +82,7 @@ static struct rd_vec draw_normal_vec(struct rd_rng *rng)
 /* Draws what the hands that built the rig did not get quite right. */
 static void assemble(struct rd_rig *rig, const struct rd_options *options)
 {
-    struct rd_rng rng = rd_rng_start(options->seed, RD_STREAM_RIG + ((uint64_t)3 << 32));
+    struct rd_rng rng = rd_rng_start(options->rig_seed, RD_STREAM_RIG + ((uint64_t)3 << 32));
     double much = options->assembly, focal = 1.0 + much * BUILT_FOCAL * rd_rng_normal(&rng);
     rig->fx_px *= focal;
     rig->fy_px *= focal * (1.0 + 0.1 * much * BUILT_FOCAL * rd_rng_normal(&rng));
@@ -121,7 +121,7 @@ void rd_rig_make(struct rd_rig *rig, const struct rd_options *options)
 
 void rd_rig_knock(struct rd_rig *rig, const struct rd_options *options)
 {
-    struct rd_rng rng = rd_rng_start(options->seed, RD_STREAM_RIG + ((uint64_t)1 << 32));
+    struct rd_rng rng = rd_rng_start(options->rig_seed, RD_STREAM_RIG + ((uint64_t)1 << 32));
     struct rd_vec axis = rd_unit(draw_normal_vec(&rng));
     for (int i = 0; options->knock_deg > 0.0 && i < RD_DOT_COUNT; i++)
         rig->dot_rays[i] = rd_unit(turned(rig->dot_rays[i], axis, options->knock_deg * RD_RAD_PER_DEG));
@@ -129,7 +129,7 @@ void rd_rig_knock(struct rd_rig *rig, const struct rd_options *options)
 
 void rd_rig_misjudge(struct rd_rig *rig, const struct rd_options *options)
 {
-    struct rd_rng rng = rd_rng_start(options->seed, RD_STREAM_RIG + ((uint64_t)2 << 32));
+    struct rd_rng rng = rd_rng_start(options->rig_seed, RD_STREAM_RIG + ((uint64_t)2 << 32));
     double noise = options->calibration_noise;
     if (noise <= 0.0)
         return;

@@ -8,7 +8,7 @@
 
 void rd_sensor_make(struct rd_sensor *sensor, const struct rd_options *options)
 {
-    struct rd_rng rng = rd_rng_start(options->seed, RD_STREAM_SENSOR);
+    struct rd_rng rng = rd_rng_start(options->rig_seed, RD_STREAM_SENSOR);
     double read_grey = rd_rng_uniform(&rng, 1.0, 2.0);
     double photon_grey = rd_rng_uniform(&rng, 0.035, 0.065);
     sensor->offset_grey = (float)rd_rng_uniform(&rng, 2.0, 6.0);
