@@ -176,6 +176,66 @@ def estimate(folder, host_sim, work, start, frames):
     return turn, sigma, out
 
 
+class Sums:
+    """What the core keeps of each slot (struct ih_place), in float64."""
+
+    def __init__(self):
+        self.weight, self.pull, self.here_weight, self.here_pull = np.zeros((4, SLOTS))
+        self.begun = np.full(SLOTS, np.nan)
+        self.total = self.rise = 0.0
+
+    def of_place(self):
+        share = FRAMES_OF_PLACE / (self.here_weight + FRAMES_OF_PLACE)
+        return self.here_weight * share, self.here_pull * share
+
+    def add_frame(self, slots, distance, along):
+        ratio = (distance / REACH_PX)**2
+        near = ratio < 1
+        slots, distance, along, ratio = slots[near], distance[near], along[near], ratio[near]
+        weight = (1 - ratio)**2
+        self.total, self.rise = self.total + weight.sum(), self.rise + ((1 - ratio) * (1 - 5 * ratio)).sum()
+        left = slots[np.abs(along - self.begun[slots]) > MOVE_PX]
+        place_weight, place_pull = self.of_place()
+        self.weight[left] += place_weight[left]
+        self.pull[left] += place_pull[left]
+        self.here_weight[left] = self.here_pull[left] = 0
+        self.begun[left] = np.nan
+        self.begun[slots] = np.where(np.isnan(self.begun[slots]), along, self.begun[slots])
+        self.here_weight[slots] += weight
+        self.here_pull[slots] += weight * distance
+
+    def share(self):
+        return max(self.rise / self.total, 1 / 3)
+
+    def step(self, slope):
+        place_weight, place_pull = self.of_place()
+        sums = self.weight + place_weight
+        return np.linalg.solve((slope * sums[:, None]).T @ slope, slope.T @ (self.pull + place_pull)) / self.share()
+
+    def turn(self, move):
+        self.pull -= self.share() * self.weight * move
+        self.here_pull -= self.share() * self.here_weight * move
+        self.begun[:] = np.nan
+
+
+def follow(folder, host_sim, work, turns):
+    """The last turn as the core comes to it, which does not iterate: a frame's dots keep the labels and the weights that the
+    lines of its time gave them, and each time the rig is turned it is by one step. turns: first and last frame with a turn, that
+    turn, and the one that the core took then."""
+    rig, sums = Rig(os.path.join(folder, "rig.json")), Sums()
+    for first, last, before, after in turns:
+        now = rig.turned(before)
+        rows, _ = labelled(folder, now, host_sim, work)
+        distance, along = distances(now, rows)
+        for frame in range(first, last + 1):
+            here = rows[:, 0] == frame
+            sums.add_frame(rows[here, 1].astype(int), distance[here], along[here])
+        slope = now.lines()[2]
+        found = before + sums.step(slope)
+        sums.turn(slope @ (after - before))
+    return found
+
+
 def bound(folder, host_sim, work, truth, frame_count):
     """Cramer-Rao bound of the three turns' uncertainty, from that many of the folder's first frames, if a dot's distance is
     normal noise of its own in each frame plus a normal error of its place, each as large as it is with the true rig; the
