@@ -76,7 +76,7 @@ small="--frames 2 --size 320x240"
     draw "the same again" again $small --seed 5
     draw "another seed" other $small --seed 6
     draw "a careless rig" careless $small --assembly 1 --seed 5
-    draw "others before the same rig" before $small --assembly 1 --rig-seed 5 --seed 6
+    draw "other people, a rig of its own seed" before $small --assembly 1 --rig-seed 5 --seed 6
 }
 [ "$(fingerprint one)" = "$(fingerprint again)" ] && reason= || reason="bytes differ"
 result "the same options give the same bytes" "$reason"
