@@ -122,7 +122,7 @@ static cv::Mat window_of(const cv::Mat &picture, cv::Rect window)
 /* A window of one pair, how high the dot in it is, and what is left without the dot. */
 struct Shown {
     cv::Mat lit, dark;
-    double peak_grey, rest_grey;
+    double peak_grey = 0.0, rest_grey = 0.0;
 };
 
 static Shown show(const Twins &twins, cv::Rect window, const cv::Mat &bell)
