@@ -76,6 +76,22 @@ uint32_t ih_isqrt_u54(uint64_t value)
     return (uint32_t)root;
 }
 
+uint32_t ih_isqrt_u32(uint32_t value)
+{
+    if (value == 0) {
+        return 0;
+    }
+    /* As above, without a correction: at 2^15 .. 2^16 the root is short by 2^-13.7 and 2^-14 of it, 9, and what
+     * is cut off; of small values next to nothing is left of that. */
+    const int half = __builtin_clz(value) / 2;
+    const uint32_t shifted = value << (2 * half);
+    uint32_t root = ((shifted >> 16) * inverse_root_q15(shifted)) >> (15 + half);
+    for (uint32_t rest = value - root * root; rest > 2 * root; rest -= 2 * root - 1) {
+        root++;
+    }
+    return root;
+}
+
 /* atan(2^-i) in millionths of a degree. */
 static const int32_t atan_udeg[] = {45000000, 26565051, 14036243, 7125016, 3576334, 1789911,
                                     895174,   447614,   223811,   111906,  55953,   27976,

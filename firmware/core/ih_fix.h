@@ -126,6 +126,9 @@ uint32_t ih_isqrt_u64(uint64_t value);
 /* The same of values below 2^54, in half of the time. */
 uint32_t ih_isqrt_u54(uint64_t value);
 
+/* The same, where words have 32 bits, and of values below 2^24 the quickest. */
+uint32_t ih_isqrt_u32(uint32_t value);
+
 /* Number of bits needed for value; 0 for 0. */
 static inline int ih_bits_u64(uint64_t value)
 {

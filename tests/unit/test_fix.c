@@ -99,6 +99,18 @@ static void isqrt_of_54_bits_is_the_same(void)
     TEST_ASSERT_EQUAL_UINT32((1U << 27) - 1, ih_isqrt_u54(((uint64_t)1 << 54) - 1));
 }
 
+static void isqrt_of_32_bits_is_the_same(void)
+{
+    uint32_t i;
+
+    for (i = 1; i < 65536; i++) {
+        TEST_ASSERT_EQUAL_UINT32(i, ih_isqrt_u32(i * i));
+        TEST_ASSERT_EQUAL_UINT32(i - 1, ih_isqrt_u32(i * i - 1));
+    }
+    TEST_ASSERT_EQUAL_UINT32(0, ih_isqrt_u32(0));
+    TEST_ASSERT_EQUAL_UINT32(65535, ih_isqrt_u32(UINT32_MAX));
+}
+
 static void isqrt_is_exact_for_all_sizes(void)
 {
     int i;
@@ -493,6 +505,7 @@ int main(int count, char **arguments)
     RUN_TEST(isqrt_is_exact_around_squares);
     RUN_TEST(isqrt_is_exact_around_powers_of_two);
     RUN_TEST(isqrt_of_54_bits_is_the_same);
+    RUN_TEST(isqrt_of_32_bits_is_the_same);
     RUN_TEST(isqrt_is_exact_for_all_sizes);
     RUN_TEST(bits_counts_up_to_the_highest_one);
     RUN_TEST(shift_round_takes_halves_upwards);
