@@ -144,10 +144,32 @@ static void compare_all(bool simple, struct tally *tally)
     }
 }
 
+static int32_t bits_of(uint32_t bits)
+{
+    int32_t count = 0;
+
+    for (; bits != 0; bits &= bits - 1) {
+        count++;
+    }
+    return count;
+}
+
+/* Parts that are left by fans. */
+static int32_t count_promising(void)
+{
+    int32_t count = 0, from;
+
+    for (from = 0; from < IH_PARTS_POINTS; from++) {
+        count += bits_of(parts.low[from]) + bits_of(parts.high[from]);
+    }
+    return count;
+}
+
 static void the_sieve_drops_no_ellipse_and_keeps_little_else(void)
 {
     struct ih_test_random random = {7};
     struct tally tally = {0, 0, 0};
+    int32_t promising = 0;
     int i;
 
     for (i = 0; i < 300; i++) {
@@ -159,10 +181,12 @@ static void the_sieve_drops_no_ellipse_and_keeps_little_else(void)
                   radius, stretch, lobe, 1 + i % 5, i, 60 + i, i % 2 == 0);
         TEST_ASSERT_TRUE(make());
         compare_all(true, &tally);
+        promising += count_promising();
     }
     TEST_ASSERT_GREATER_THAN(2000, tally.ellipses);
     TEST_ASSERT_GREATER_THAN(100000, tally.dropped);
     TEST_ASSERT_LESS_THAN(8 * tally.ellipses, tally.kept);
+    TEST_ASSERT_LESS_THAN(2 * tally.kept, promising); /* else fans do not sift */
 }
 
 /* With looser limits more is kept; without any, all that has an area. */
