@@ -229,7 +229,7 @@ static const struct octave octaves[] = {{14, 1, 9, 9}, {28, 3, 12, 13}, {POINTS,
 /* Two numbers in the halves of a word, the first one lower. */
 static inline uint32_t pair_of(int32_t first, int32_t second)
 {
-    return (IH_WRAPS(uint32_t, first) & 0xffff) | IH_WRAPS(uint32_t, second) << 16;
+    return (IH_WRAPS(uint32_t, first) & 0xffff) | (IH_WRAPS(uint32_t, second) & 0xffff) << 16;
 }
 
 /* The places of the points, and what their cross product takes; behind the last one they stay. */
