@@ -215,39 +215,6 @@ static void find_inside(const struct ih_surface *surface, struct ih_cuts *cuts)
     }
 }
 
-static int32_t count_bits(uint64_t bits)
-{
-    const uint64_t twos = bits - (bits >> 1 & UINT64_C(0x5555555555555555));
-    const uint64_t fours =
-        (twos & UINT64_C(0x3333333333333333)) + (twos >> 2 & UINT64_C(0x3333333333333333));
-    const uint64_t eights = (fours + (fours >> 4)) & UINT64_C(0x0f0f0f0f0f0f0f0f);
-    const uint64_t halves = eights + (eights >> 32);
-    const uint64_t quarters = halves + (halves >> 16);
-    return (int32_t)((quarters + (quarters >> 8)) & 0x7fu);
-}
-
-/* An open contour has two vertices at the border, a closed one has four at least. */
-bool ih_cuts_surely_fit(const struct ih_surface *surface, int32_t level_mm_q8,
-                        struct ih_cuts *scratch)
-{
-    const uint64_t *inside = scratch->inside;
-    int32_t vertices = 0, at_border = 0;
-    scratch->level_mm_q8 = level_mm_q8;
-    find_inside(surface, scratch);
-    for (int32_t y = 0; y < IH_SURFACE_GRID; y++) {
-        const int32_t across = count_bits((inside[y] ^ inside[y] >> 1) & ALL_CELLS);
-        vertices += across;
-        at_border += y == 0 || y == CELLS ? across : 0;
-        if (y > 0) {
-            const uint64_t down = inside[y - 1] ^ inside[y];
-            vertices += count_bits(down);
-            at_border += (int32_t)(down & 1u) + (int32_t)(down >> CELLS);
-        }
-    }
-    return vertices <= IH_CUTS_VERTICES_MAX &&
-           at_border / 2 + (vertices - at_border) / 4 <= IH_CUTS_CONTOURS_MAX;
-}
-
 /* Which cells a contour enters through edge 0 or 1, and which through 2 or 3. */
 static void find_entrances(struct ih_cuts *cuts)
 {

@@ -44,11 +44,6 @@ struct ih_cuts {
     uint64_t entrance[2][IH_SURFACE_GRID];
 };
 
-/* Does ih_cuts_level surely leave out no contour at this level? For a fourth of its work; what was in
- * scratch is lost. */
-bool ih_cuts_surely_fit(const struct ih_surface *surface, int32_t level_mm_q8,
-                        struct ih_cuts *scratch);
-
 void ih_cuts_level(const struct ih_surface *surface, int32_t level_mm_q8, struct ih_cuts *out);
 
 #endif

@@ -303,9 +303,8 @@ void ih_hypotheses_find(const struct ih_surface *surface, const struct ih_hypoth
     int32_t level_mm_q8;
     for (int32_t index = 0;
          ih_hypotheses_level(surface, params, index, &level_mm_q8) && any_alive(out); index++) {
-        const bool is_wanted = open_nests(level_mm_q8, params, scratch->support, out);
-        if (!is_wanted && ih_cuts_surely_fit(surface, level_mm_q8, &scratch->cuts)) {
-            continue; /* between two nests; what is left out is counted at such a level too */
+        if (!open_nests(level_mm_q8, params, scratch->support, out)) {
+            continue; /* between two nests */
         }
         ih_cuts_level(surface, level_mm_q8, &scratch->cuts);
         out->contours_dropped += scratch->cuts.contours_dropped;

@@ -12,7 +12,8 @@
  *        falls below 0.6 of the slice before, when it jumps by more than 3.2 times and 2500 mm^2
  *        beyond end_depth, or after gap_max levels without support.
  * Cost:  levels x (cells + minima x contours); the chord search only where no whole ellipse is.
- * Full tables drop and count: minima_dropped (the farthest), contours_dropped.
+ * Full tables drop and count: minima_dropped (the farthest), contours_dropped (at levels
+ * that a nest waits for: others are not cut).
  */
 #ifndef IH_HYPOTHESES_H
 #define IH_HYPOTHESES_H

@@ -493,50 +493,6 @@ static void rises_of_all_sizes_are_crossed_where_they_should_be(void)
     }
 }
 
-/* Rough and smooth surfaces: what is said to fit does, and it is said of the smooth ones. */
-static void what_surely_fits_is_not_dropped(void)
-{
-    static struct ih_cuts other;
-    int32_t sure = 0, dropped = 0, pass, i;
-
-    for (pass = 0; pass < 400; pass++) {
-        const int64_t spread = INT64_C(1) << (1 + pass % 18);
-        const int32_t level = (860 + pass % 60) << 8;
-        bool fits;
-
-        for (i = 0; i < SIDE * SIDE; i++) {
-            surface.depth_mm_q8[i / SIDE][i % SIDE] =
-                (int32_t)lround(256 * hills(i % SIDE, (double)(i / SIDE))) +
-                (int32_t)ih_test_between(&random_source, -spread, spread);
-        }
-        fits = ih_cuts_surely_fit(&surface, level, &other);
-        ih_cuts_level(&surface, level, &cuts);
-        if (fits) {
-            IH_TEST_EQUAL(0, cuts.contours_dropped, "dropped", pass);
-        }
-        if (cuts.vertex_count <= 128 && cuts.contours_dropped == 0) {
-            IH_TEST_EQUAL(true, fits, "few", pass);
-        }
-        sure += fits;
-        dropped += cuts.contours_dropped > 0;
-    }
-    TEST_ASSERT_GREATER_THAN(100, sure);
-    TEST_ASSERT_GREATER_THAN(20, dropped);
-}
-
-/* As many diamonds as there is room for, then one more. */
-static void what_surely_fits_may_fill_the_table(void)
-{
-    int32_t count;
-
-    flat_at(1000);
-    for (count = 1; count <= IH_CUTS_CONTOURS_MAX + 1; count++) {
-        surface.depth_mm_q8[2 + (count - 1) / 20 * 3][2 + (count - 1) % 20 * 2] = 0;
-        IH_TEST_EQUAL(count <= IH_CUTS_CONTOURS_MAX, ih_cuts_surely_fit(&surface, 500, &cuts),
-                      "diamonds", count);
-    }
-}
-
 int main(void)
 {
     UNITY_BEGIN();
@@ -554,7 +510,5 @@ int main(void)
     RUN_TEST(a_contour_longer_than_the_table_is_left_out_whole);
     RUN_TEST(the_ends_of_the_range_do_not_overflow);
     RUN_TEST(rises_of_all_sizes_are_crossed_where_they_should_be);
-    RUN_TEST(what_surely_fits_is_not_dropped);
-    RUN_TEST(what_surely_fits_may_fill_the_table);
     return UNITY_END();
 }
