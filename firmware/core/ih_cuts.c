@@ -90,15 +90,15 @@ static int32_t part_of_edge_q9(int64_t from, int64_t to, int64_t level)
     return (int32_t)ih_div_round(up * 512, rise);
 }
 
-/* Where the level crosses an edge. */
-static struct ih_vertex crossing(const struct ih_surface *surface, int32_t level_mm_q8, int32_t x,
-                                 int32_t y, int32_t edge)
+/* Where the level crosses an edge of the cell. */
+static struct ih_vertex crossing(const struct ih_surface *surface, int32_t level_mm_q8,
+                                 const struct walker *at)
 {
-    const struct line *line = &line_of_edge[edge];
-    const int32_t *node = &surface->depth_mm_q8[0][0] + (y * IH_SURFACE_GRID + x);
+    const struct line *line = &line_of_edge[at->edge];
+    const int32_t *node = &surface->depth_mm_q8[0][0] + (at->y * IH_SURFACE_GRID + at->x);
     const int32_t part_q9 = part_of_edge_q9(node[line->from], node[line->to], level_mm_q8);
-    const int32_t x_q9 = x * 512 + line->x_q9 + line->step_x * part_q9;
-    const int32_t y_q9 = y * 512 + line->y_q9 + line->step_y * part_q9;
+    const int32_t x_q9 = at->x * 512 + line->x_q9 + line->step_x * part_q9;
+    const int32_t y_q9 = at->y * 512 + line->y_q9 + line->step_y * part_q9;
     IH_IN_RANGE(x_q9, 0, CELLS * 512);
     IH_IN_RANGE(y_q9, 0, CELLS * 512);
     return (struct ih_vertex){(int16_t)x_q9, (int16_t)y_q9};
@@ -122,21 +122,21 @@ static void trace(const struct ih_surface *surface, struct ih_cuts *cuts, struct
     struct ih_vertex *vertex = &cuts->vertex[cuts->vertex_count];
     int32_t count = 0;
     bool closed = true;
-    while (closed && enter(cuts, &at)) {
+    while (!closed || enter(cuts, &at)) {
         if (count < room) {
-            vertex[count] = crossing(surface, level_mm_q8, at.x, at.y, at.edge);
+            vertex[count] = crossing(surface, level_mm_q8, &at);
         }
         count++;
+        if (!closed) {
+            break; /* that was where it leaves the grid */
+        }
         const int32_t leave = exit_edge(surface, cuts, &at);
         const struct walker next = {at.x + beyond_x[leave], at.y + beyond_y[leave], leave ^ 2};
         closed = is_cell(next.x, next.y);
         if (closed) {
             at = next;
         } else {
-            if (count < room) {
-                vertex[count] = crossing(surface, level_mm_q8, at.x, at.y, leave);
-            }
-            count++;
+            at.edge = leave;
         }
     }
     if (count > room || cuts->contour_count == IH_CUTS_CONTOURS_MAX) {

@@ -209,6 +209,7 @@ static void measure_extent(const struct ih_ellipse_params *params, struct ih_par
 #define FAN_CHORD_MAX_Q16 (1 << 15)
 #define FAN_CURLS 10
 #define FAN_PLACE_MAX 1024
+#define FAN_PLACE_OUT 16384
 /* What is allowed for rounding: of twice an area, for each step; of the limit of the spread; of a chord. */
 #define FAN_ERROR 4
 #define FAN_SHARE 128
@@ -232,7 +233,7 @@ static inline uint32_t pair_of(int32_t first, int32_t second)
     return (IH_WRAPS(uint32_t, first) & 0xffff) | (IH_WRAPS(uint32_t, second) & 0xffff) << 16;
 }
 
-/* The places of the points, and what their cross product takes; behind the last one they stay. */
+/* The places of the points, and what their cross product takes. Behind the last one no chord is short. */
 static void scale_points(struct ih_parts *parts)
 {
     const int32_t arc_q8 = ih_max_s32(parts->arc_q8[POINTS - 1], 1);
@@ -247,8 +248,8 @@ static void scale_points(struct ih_parts *parts)
     }
     const int32_t end = ih_min_s32(parts->count + POINTS, IH_PARTS_FAN);
     for (int32_t k = parts->count; k < end; k++) {
-        parts->fan[k] = parts->fan[parts->count - 1];
-        parts->turned[k] = parts->turned[parts->count - 1];
+        parts->fan[k] = pair_of(FAN_PLACE_OUT, FAN_PLACE_OUT);
+        parts->turned[k] = 0;
     }
 }
 
@@ -492,19 +493,18 @@ static void find_promising(const struct ih_ellipse_params *params, const struct 
                            int32_t vertex_count, struct ih_parts *out)
 {
     const int32_t cube_q15 = limit_fans(params, limits, vertex_count, out);
-    const bool is_judged = cube_q15 > 0;
-    if (is_judged) {
+    if (cube_q15 > 0) {
         scale_points(out);
-    }
-    for (int32_t from = 0; from < POINTS && is_judged; from += FAN_LANES) {
-        find_fans(out, from, ih_min_s32(out->count - from, POINTS), cube_q15);
+        for (int32_t from = 0; from < POINTS; from += FAN_LANES) {
+            find_fans(out, from, ih_min_s32(out->count - from, POINTS), cube_q15);
+        }
+        return;
     }
     for (int32_t from = 0; from < POINTS; from++) {
         const int32_t end = ih_min_s32(out->count - from, POINTS);
-        const uint64_t all =
-            (((uint64_t)1 << end) - 1) & ~(uint64_t)((1 << IH_PARTS_STEPS_MIN) - 1);
-        out->low[from] = (is_judged ? out->low[from] : UINT32_MAX) & (uint32_t)(all & UINT32_MAX);
-        out->high[from] = (is_judged ? out->high[from] : UINT32_MAX) & (uint32_t)(all >> 32);
+        const uint64_t all = (((uint64_t)1 << end) - 1) >> IH_PARTS_STEPS_MIN << IH_PARTS_STEPS_MIN;
+        out->low[from] = (uint32_t)(all & UINT32_MAX);
+        out->high[from] = (uint32_t)(all >> 32);
     }
 }
 
