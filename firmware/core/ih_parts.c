@@ -330,7 +330,8 @@ static inline lanes are_spread(const struct fans *f, const struct octave *o, int
     const lanes y = OP(slli_epi32)(OP(srai_epi32)(f->sum_y, o->xy), 16);
     const lanes xy = BITS(or)(x, y);
     const lanes error = OP(set1_epi32)(area_error(o, k));
-    const lanes least = OP(sub_epi16)(area2, error), most = OP(add_epi16)(area2, error);
+    const lanes least = OP(sub_epi16)(area2, error);
+    const lanes most = OP(add_epi16)(area2, error);
     const lanes left = OP(madd_epi16)(OP(add_epi32)(OP(add_epi32)(trace, trace), trace), least);
     const lanes square = OP(srli_epi32)(OP(madd_epi16)(most, most), 15);
     const lanes share = OP(srli_epi32)(OP(madd_epi16)(most, OP(set1_epi32)(cube_q15)), 15);
@@ -340,7 +341,8 @@ static inline lanes are_spread(const struct fans *f, const struct octave *o, int
 
 static void find_fans(struct ih_parts *parts, int32_t from, int32_t end, int32_t cube_q15)
 {
-    const lanes start = load(&parts->fan[from]), start_turned = load(&parts->turned[from]);
+    const lanes start = load(&parts->fan[from]);
+    const lanes start_turned = load(&parts->turned[from]);
     const lanes none = BITS(setzero)();
     lanes low = none, high = none;
     struct fans f = {none, none, none, none, none, none, none};
@@ -382,7 +384,7 @@ struct fan {
 };
 
 /* The lower half, as products of vectors take it. */
-static inline int32_t lower(uint32_t value)
+static inline int32_t lower_half(uint32_t value)
 {
     return IH_WRAPS(int16_t, value);
 }
@@ -408,29 +410,29 @@ static inline int32_t cross_product_of(uint32_t a, uint32_t b)
     return __smusdx((int16x2_t)a, (int16x2_t)b);
 }
 #else
-static inline int32_t upper(uint32_t value)
+static inline int32_t upper_half(uint32_t value)
 {
-    return lower(value >> 16);
+    return lower_half(value >> 16);
 }
 
 static inline uint32_t sum_of(uint32_t a, uint32_t b)
 {
-    return pair_of(lower(a) + lower(b), upper(a) + upper(b));
+    return pair_of(lower_half(a) + lower_half(b), upper_half(a) + upper_half(b));
 }
 
 static inline uint32_t difference_of(uint32_t a, uint32_t b)
 {
-    return pair_of(lower(a) - lower(b), upper(a) - upper(b));
+    return pair_of(lower_half(a) - lower_half(b), upper_half(a) - upper_half(b));
 }
 
 static inline int32_t product_of(uint32_t a, uint32_t b)
 {
-    return lower(a) * lower(b) + upper(a) * upper(b);
+    return lower_half(a) * lower_half(b) + upper_half(a) * upper_half(b);
 }
 
 static inline int32_t cross_product_of(uint32_t a, uint32_t b)
 {
-    return lower(a) * upper(b) - upper(a) * lower(b);
+    return lower_half(a) * upper_half(b) - upper_half(a) * lower_half(b);
 }
 #endif
 
@@ -439,11 +441,11 @@ IH_WRAPPING static inline void extend_fan(struct fan *f, uint32_t place)
     const uint32_t sum = sum_of(f->place, place);
     const int32_t both = product_of(sum, sum) - product_of(f->place, place);
     const int32_t area2 = cross_product_of(f->place, place);
-    const int32_t w = lower(IH_WRAPS(uint32_t, area2));
+    const int32_t w = lower_half(IH_WRAPS(uint32_t, area2));
     f->area2 += IH_WRAPS(uint32_t, area2);
-    f->sum_x += IH_WRAPS(uint32_t, w * lower(sum));
-    f->sum_y += IH_WRAPS(uint32_t, w * lower(sum >> 16));
-    f->trace += IH_WRAPS(uint32_t, w * lower((uint32_t)both >> FAN_TRACE_BITS));
+    f->sum_x += IH_WRAPS(uint32_t, w * lower_half(sum));
+    f->sum_y += IH_WRAPS(uint32_t, w * lower_half(sum >> 16));
+    f->trace += IH_WRAPS(uint32_t, w * lower_half((uint32_t)both >> FAN_TRACE_BITS));
     f->place = place;
 }
 
@@ -451,13 +453,16 @@ IH_WRAPPING static inline bool is_spread(const struct fan *f, const struct octav
                                          int32_t cube_q15)
 {
     const int32_t area2 = IH_WRAPS(int32_t, f->area2);
-    const uint32_t part = IH_WRAPS(uint32_t, area2 >> o->area2), error = (uint32_t)area_error(o, k);
-    const int32_t trace = lower(3 * IH_WRAPS(uint32_t, IH_WRAPS(int32_t, f->trace) >> o->trace));
-    const int32_t x = lower(IH_WRAPS(uint32_t, IH_WRAPS(int32_t, f->sum_x) >> o->xy));
-    const int32_t y = lower(IH_WRAPS(uint32_t, IH_WRAPS(int32_t, f->sum_y) >> o->xy));
-    const int32_t least = lower(part - error), most = lower(part + error);
-    const int32_t square = lower((uint32_t)(most * most) >> 15);
-    const int32_t share = lower(IH_WRAPS(uint32_t, most * cube_q15) >> 15);
+    const uint32_t part = IH_WRAPS(uint32_t, area2 >> o->area2);
+    const uint32_t error = (uint32_t)area_error(o, k);
+    const int32_t trace =
+        lower_half(3 * IH_WRAPS(uint32_t, IH_WRAPS(int32_t, f->trace) >> o->trace));
+    const int32_t x = lower_half(IH_WRAPS(uint32_t, IH_WRAPS(int32_t, f->sum_x) >> o->xy));
+    const int32_t y = lower_half(IH_WRAPS(uint32_t, IH_WRAPS(int32_t, f->sum_y) >> o->xy));
+    const int32_t least = lower_half(part - error);
+    const int32_t most = lower_half(part + error);
+    const int32_t square = lower_half((uint32_t)(most * most) >> 15);
+    const int32_t share = lower_half(IH_WRAPS(uint32_t, most * cube_q15) >> 15);
     const uint32_t right =
         (uint32_t)(x * x) + (uint32_t)(y * y) + IH_WRAPS(uint32_t, square * share);
     return area2 <= 0 || trace * least > IH_WRAPS(int32_t, right);
@@ -626,7 +631,9 @@ static bool look_at_shape(const struct ih_parts *parts, const struct limits *lim
         return false;
     }
     const int drop = ih_max_s32(0, ih_bits_u64((uint64_t)most) - 29);
-    const int32_t p = (int32_t)(xx >> drop), q = (int32_t)(yy >> drop), m = (int32_t)(xy >> drop);
+    const int32_t p = (int32_t)(xx >> drop);
+    const int32_t q = (int32_t)(yy >> drop);
+    const int32_t m = (int32_t)(xy >> drop);
     const int32_t near = (int32_t)(error >> drop) + 2;
     const int first = ih_min_s32(shift, 10); /* then the product is below 2^62 */
     const int32_t cube = (int32_t)((look->area4 >> first) * area2 >> (shift - first + drop));
