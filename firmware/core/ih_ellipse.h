@@ -15,7 +15,7 @@
  *        2^14.1. An edge's cross product is at most |p| |edge|, its second-order factor at most
  *        3 * 2^27.1. Edges of a contour are shorter than 1.42 steps = 2^8.6: 2048 terms of
  *        2^(14.1 + 8.6 + 28.7) sum below 2^62.4. Edges of a resampled one are at most
- *        IH_PARTS_VERTICES_MAX / 47 * 1.42 steps = 2^12.6: 96 terms of 2^55.4 below 2^62.0. About the
+ *        IH_PARTS_VERTICES_MAX / 55 * 1.42 steps = 2^12.4: 112 terms of 2^55.2 below 2^62.1. About the
  *        middle of an outline, from where sums are moved to the place, coordinates are half as great.
  * Cost:  a closed contour: 40 operations a vertex. A part: some 100, 20 in 32 bits a step, and eight
  *        divisions.

@@ -50,10 +50,8 @@
 
 #include "ih_cuts.h"
 
-/* A whole number of vectors. With 32 to 60 points the paper's method alone is right in 1499 (32), 1514 (40),
- * 1521 (48), 1525 (56), 1521 (60) of 2051 fresh and recorded frames with a head, everything switched on in
- * 1831 to 1849 (48): as many from 48 on, and what there is to do grows with their square. */
-#define IH_PARTS_POINTS 48
+/* A whole number of vectors; what there is to do grows with its square. */
+#define IH_PARTS_POINTS 56
 /* A part has at least this many of the steps: fewer are no ellipse's outline. */
 #define IH_PARTS_STEPS_MIN 8
 /* All that there are: from each point over each number of steps. */

@@ -599,7 +599,7 @@ static void no_part_of_a_walk_is_missed(void)
     struct ih_test_random random = {86};
     int32_t ellipse_count = 0, pass, i;
 
-    for (pass = 0; pass < 80; pass++) {
+    for (pass = 0; pass < 60; pass++) {
         const int32_t stride = 1 << ih_test_between(&random, 3, 9);
         const int32_t count = pass % 2 == 0 ? IH_PARTS_VERTICES_MAX : 90;
         int32_t x = 23 * UNIT, y = 23 * UNIT;

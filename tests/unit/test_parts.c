@@ -206,10 +206,10 @@ static void limits_are_those_of_the_parameters(void)
     params.ratio_part_max_q16 = 200 << 16;
     take_blob(23, 23, 5, 4.5, 0, 1, 0, 200, true);
     TEST_ASSERT_TRUE(make());
-    TEST_ASSERT_TRUE(may_be[0] >> (IH_PARTS_POINTS - 6) & 1);
+    TEST_ASSERT_TRUE(may_be[0] >> 50 & 1);
     params.ratio_part_max_q16 = 0; /* as 1 */
     TEST_ASSERT_TRUE(make());
-    TEST_ASSERT_FALSE(may_be[0] >> (IH_PARTS_POINTS - 6) & 1);
+    TEST_ASSERT_FALSE(may_be[0] >> 50 & 1);
 }
 
 /* Walks all over the grid: their parts cross themselves as much as can be. */
@@ -274,7 +274,7 @@ static void loops_that_cancel_do_not_overflow(void)
     TEST_ASSERT_GREATER_THAN(10000, tally.dropped);
 }
 
-/* On a circle of many vertices the points are equal steps apart; an open one ends at its last
+/* On a circle of many vertices the points are 1/56 of its length apart; an open one ends at its last
  * vertex, a closed one goes round twice. */
 static void points_stand_at_equal_steps(void)
 {

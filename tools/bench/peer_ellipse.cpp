@@ -16,7 +16,7 @@ constexpr double CHORD_COST = 1.6;
 constexpr double SHAPE_COST = 8;
 constexpr double AREA_MIN = 0.5; /* grid cells */
 constexpr double LEAST = -1e9;   /* merit */
-constexpr int POINTS = 48;
+constexpr int POINTS = 56;
 constexpr int PART_EDGES_MIN = 8;
 constexpr double FOUR_PI = 4 * 3.14159265358979323846;
 

@@ -1,6 +1,6 @@
 """Float64 reference of polygon moments and of the search for a contour's elliptical part.
 
-Moments are taken triangle by triangle, the search tries every part of the 48 points by itself:
+Moments are taken triangle by triangle, the search tries every part of the 56 points by itself:
 neither uses the prefix sums of the firmware.
 """
 
@@ -8,7 +8,7 @@ import numpy as np
 
 import emit
 
-POINTS = 48
+POINTS = 56
 PART_EDGES_MIN = 8
 SHAPE_MAX, RATIO_PART_MAX, CHORD_MAX = 1.045, 1.75, 0.42
 SHAPE_MIN = 1 - 1 / 256  # less: no simple polygon, its chord crosses its arc
@@ -48,7 +48,7 @@ def winding(polygon, place):
 
 
 def resampled(vertices, closed):
-    """48 points at equal steps of arc, and the length of the contour."""
+    """56 points at equal steps of arc, and the length of the contour."""
     line = np.vstack([vertices, vertices[:1]]) if closed else vertices
     along = np.append(0, np.cumsum(np.hypot(*np.diff(line, axis=0).T)))
     target = np.linspace(0, along[-1], POINTS, endpoint=not closed)
