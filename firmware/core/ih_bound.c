@@ -243,7 +243,7 @@ static struct box find_box(const struct ih_bound_rays *rays, const struct place 
 }
 
 /* Sums of values, in 64ths, and how many rays they are of, at least and at most. */
-struct found {
+struct weighed {
     int32_t inside, inside_least, inside_most;
     int32_t around, around_least, around_most;
 };
@@ -539,13 +539,13 @@ static void list_unsure(const struct box *box, struct ih_bound_verdict *out)
 }
 
 static void sum_up(const struct ih_bound_rays *rays, const struct place *place,
-                   const struct box *box, struct found *out)
+                   const struct box *box, struct weighed *out)
 {
     struct sums sums;
     memset(&sums, 0, sizeof sums);
     add_rays(rays, place, box->columns, box->rows, false, &sums);
     add_rays(rays, place, box->through, box->rows, true, &sums);
-    *out = (struct found){
+    *out = (struct weighed){
         .inside = total(sums.inside),
         .inside_least = total(sums.inside_least),
         .inside_most = total(sums.inside_most),
@@ -706,7 +706,7 @@ static void walk(const struct ih_bound_rays *rays, const struct place *place, co
 }
 
 static void sum_up(const struct ih_bound_rays *rays, const struct place *place,
-                   const struct box *box, struct found *out)
+                   const struct box *box, struct weighed *out)
 {
     static const int8_t value[WORTHS] = {
         VALUE_ON,      VALUE_NEARER, VALUE_BEHIND, VALUE_FAR,    VALUE_EMPTY,
@@ -714,7 +714,7 @@ static void sum_up(const struct ih_bound_rays *rays, const struct place *place,
     };
     int32_t count[NOTHING + 1] = {0};
     walk(rays, place, box, NULL, count);
-    *out = (struct found){0};
+    *out = (struct weighed){0};
     count[2 * ON + 1] += count[2 * ON]; /* a value of 1 lowers no mean */
     count[2 * ON] = 0;
     for (int32_t worth = 0; worth < WORTHS; worth++) {
@@ -754,17 +754,19 @@ int32_t ih_bound_score_q12(const struct ih_space *space, const struct ih_bound_r
                            const int32_t centre_mm_q8[3])
 {
     struct place place;
-    struct found found;
+    struct weighed weighed;
     if (!set_place(&place, space, rays, centre_mm_q8)) {
         return IH_BOUND_MOST_Q12;
     }
     const struct box box = find_box(rays, &place);
-    sum_up(rays, &place, &box, &found);
+    sum_up(rays, &place, &box, &weighed);
     /* 0.6 of 64 is 38.4 */
     const int32_t around_q12 =
-        found.around > 0 ? mean_q12(found.around * 3, found.around_least, found.around_most, 13)
-                         : mean_q12(found.around, found.around_least, found.around_most, 38);
-    return mean_q12(found.inside, found.inside_least, found.inside_most, 64) + around_q12 + CUT_Q12;
+        weighed.around > 0
+            ? mean_q12(weighed.around * 3, weighed.around_least, weighed.around_most, 13)
+            : mean_q12(weighed.around, weighed.around_least, weighed.around_most, 38);
+    return mean_q12(weighed.inside, weighed.inside_least, weighed.inside_most, 64) + around_q12 +
+           CUT_Q12;
 }
 
 void ih_bound_judge(const struct ih_space *space, const struct ih_bound_rays *rays,
@@ -777,8 +779,7 @@ void ih_bound_judge(const struct ih_space *space, const struct ih_bound_rays *ra
         judge(rays, &place, &box, out);
         return;
     }
-    out->on = out->nearer = out->empty = out->far = 0;
-    out->open = out->open_empty = out->closed = out->unknown = 0;
+    *out = (struct ih_bound_verdict){.unsure_count = 0};
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
         out->unsure[out->unsure_count++] = (int16_t)slot;
     }

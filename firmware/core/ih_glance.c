@@ -25,7 +25,7 @@ static const struct window windows[WINDOW_COUNT] = {
 };
 
 /* From the first to the second of each: slopes in Q12, depths in Q1. */
-struct bounds {
+struct edges {
     int16_t x[2], gap[2], y[2], z[2];
 };
 
@@ -40,8 +40,8 @@ static void set_range(int32_t middle, int32_t less, int32_t more, int16_t range[
 }
 
 /* Where the middle is, and what a mm is, as slopes. */
-static void find_bounds(const struct window *window, const int32_t middle_q12[2], int32_t mm_q20,
-                        int32_t depth_mm_q1, struct bounds *out)
+static void find_edges(const struct window *window, const int32_t middle_q12[2], int32_t mm_q20,
+                       int32_t depth_mm_q1, struct edges *out)
 {
     const int32_t aside_q12 = window->aside_mm * mm_q20 >> 8;
     const int32_t gap_q12 = window->gap_mm * mm_q20 >> 8;
@@ -52,22 +52,22 @@ static void find_bounds(const struct window *window, const int32_t middle_q12[2]
     set_range(depth_mm_q1, 2 * window->before_mm, 2 * window->behind_mm, out->z);
 }
 
-/* Rays that pass between the bounds; of an unknown one x is at IH_ROW_NOWHERE, of an empty one's point z. */
+/* Rays that pass between the edges; of an unknown one x is at IH_ROW_NOWHERE, of an empty one's point z. */
 #if defined __SSE2__ || defined __ARM_NEON
 /* A loop without a branch: compilers turn it into vectors. */
-static void count_rays(const struct ih_row_rays *rays, const struct bounds bounds[WINDOW_COUNT],
+static void count_rays(const struct ih_row_rays *rays, const struct edges edges[WINDOW_COUNT],
                        struct share share[WINDOW_COUNT])
 {
     for (int i = 0; i < WINDOW_COUNT; i++) {
-        const struct bounds b = bounds[i];
+        const struct edges *b = &edges[i];
         int16_t part = 0, all = 0;
         for (int32_t slot = 0; slot < IH_ROW_RAYS; slot++) {
             const int16_t x = rays->slope_q12[0][slot];
             const int16_t y = rays->slope_q12[1][slot];
             const int16_t z = rays->point_mm_q1[2][slot];
-            const bool is_there = (x > b.x[0]) & (x < b.x[1]) & (y > b.y[0]) & (y < b.y[1]) &
-                                  ((x <= b.gap[0]) | (x >= b.gap[1]));
-            const bool is_part = is_there & (z > b.z[0]) & (z <= b.z[1]);
+            const bool is_there = (x > b->x[0]) & (x < b->x[1]) & (y > b->y[0]) & (y < b->y[1]) &
+                                  ((x <= b->gap[0]) | (x >= b->gap[1]));
+            const bool is_part = is_there & (z > b->z[0]) & (z <= b->z[1]);
             all = (int16_t)(all + is_there);
             part = (int16_t)(part + is_part);
         }
@@ -76,13 +76,13 @@ static void count_rays(const struct ih_row_rays *rays, const struct bounds bound
 }
 #else
 /* Where there are no vectors, a ray is told by its height: the windows lie one above the other. */
-static void count_rays(const struct ih_row_rays *rays, const struct bounds bounds[WINDOW_COUNT],
+static void count_rays(const struct ih_row_rays *rays, const struct edges edges[WINDOW_COUNT],
                        struct share share[WINDOW_COUNT])
 {
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
         const int16_t y = rays->slope_q12[1][slot];
-        const int i = y < bounds[HIGH].y[1] ? HIGH : y < bounds[LEVEL].y[1] ? LEVEL : BODY;
-        const struct bounds *b = &bounds[i];
+        const int i = y < edges[HIGH].y[1] ? HIGH : y < edges[LEVEL].y[1] ? LEVEL : BODY;
+        const struct edges *b = &edges[i];
         const int16_t x = rays->slope_q12[0][slot];
         if (x > b->x[0] && x < b->x[1] && y > b->y[0] && y < b->y[1] &&
             (x <= b->gap[0] || x >= b->gap[1])) {
@@ -103,7 +103,7 @@ int32_t ih_glance_promise_q8(const struct ih_row_rays *rays, const int32_t origi
                              const int32_t centre_mm_q8[3])
 {
     const int32_t depth_mm_q8 = centre_mm_q8[2] - origin_mm_q8[2];
-    struct share share[WINDOW_COUNT] = {{0, 0}};
+    struct share share[WINDOW_COUNT] = {[HIGH] = {0, 0}};
     if (depth_mm_q8 >= DEPTH_LEAST_MM_Q8) {
         const int32_t mm_q20 = (1 << 28) / depth_mm_q8;
         int32_t middle_q12[2];
@@ -111,11 +111,11 @@ int32_t ih_glance_promise_q8(const struct ih_row_rays *rays, const int32_t origi
             const int32_t off_mm_q8 = centre_mm_q8[axis] - origin_mm_q8[axis];
             middle_q12[axis] = (int32_t)((int64_t)off_mm_q8 * 4096 / depth_mm_q8);
         }
-        struct bounds bounds[WINDOW_COUNT];
+        struct edges edges[WINDOW_COUNT];
         for (int i = 0; i < WINDOW_COUNT; i++) {
-            find_bounds(&windows[i], middle_q12, mm_q20, centre_mm_q8[2] >> 7, &bounds[i]);
+            find_edges(&windows[i], middle_q12, mm_q20, centre_mm_q8[2] >> 7, &edges[i]);
         }
-        count_rays(rays, bounds, share);
+        count_rays(rays, edges, share);
     }
     const int32_t high_q8 = (2 * share[HIGH].part + 1) * 128 / (share[HIGH].all + 1);
     return 2 * high_q8 + 3 * plain_q8(share[BODY]) - 4 * plain_q8(share[LEVEL]);

@@ -133,7 +133,8 @@ typedef __m128i lanes;
 static inline void add_words(uint32_t word[PAIRS][TERMS], struct way way, int32_t words, int32_t i,
                              int32_t *line)
 {
-    const lanes begin = ALL(way.begin), before = ALL(way.before);
+    const lanes begin = ALL(way.begin);
+    const lanes before = ALL(way.before);
     const __m128i count = _mm_cvtsi32_si128(way.shift);
     const int32_t length = length_of(i);
     lanes factor[PAIRS];
@@ -182,7 +183,8 @@ static inline void scale_line(const int32_t *line, int32_t length, const uint32_
  * without a sign on all of x86: numbers are taken for 2^31 more. */
 static inline void divide_line(int32_t *line, int32_t length, int32_t inverse, int shift)
 {
-    const lanes factor = ALL(inverse), more = ALL(INT32_MIN);
+    const lanes factor = ALL(inverse);
+    const lanes more = ALL(INT32_MIN);
     const lanes less = ALL_64(((int64_t)1 << (shift - 1)) - ((int64_t)inverse << 31));
     const __m128i count = _mm_cvtsi32_si128(shift);
     for (int32_t j = 0; j < length; j += LANES) {

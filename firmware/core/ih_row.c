@@ -213,7 +213,8 @@ static void find_slopes(struct ih_rows *rows, int32_t count)
     for (int32_t k = 0; k < count; k += LANES) {
         const int32_t next = k + LANES / 2;
         const lanes weight = LOAD(&rows->weight_q16[k]);
-        const lanes inverse = LOAD(&rows->inverse[k]), inverse_next = LOAD(&rows->inverse[next]);
+        const lanes inverse = LOAD(&rows->inverse[k]);
+        const lanes inverse_next = LOAD(&rows->inverse[next]);
         for (int axis = 0; axis < 3; axis++) {
             const lanes component = LOAD(&rows->component_q14[axis][k]);
             const lanes component_next = LOAD(&rows->component_q14[axis][next]);

@@ -82,7 +82,7 @@ static int16_t limit_s16(int64_t value)
 }
 
 /* Is what is farther than this depth above it? */
-static int16_t depth_q1(int64_t mm_q8)
+static int16_t limit_depth_q1(int64_t mm_q8)
 {
     return limit_s16(mm_q8 >> 7);
 }
@@ -133,12 +133,12 @@ static void set_limits(struct frame *frame, const struct ih_ellipsoid *ellipsoid
     frame->wide_y = (int16_t)(frame->semi_y + 240 * 16);
     frame->shoulder_y = (int16_t)(semi_q8[1] * 9 / 160);
     frame->shoulder_most_y = (int16_t)(frame->semi_y + 160 * 16);
-    frame->open = depth_q1(centre_q8 + (60 << 8));
-    frame->body_least = depth_q1(centre_q8 - (220 << 8));
-    frame->body_most = depth_q1(centre_q8 + (200 << 8) - 1);
-    frame->level_least = depth_q1(centre_q8 - (150 << 8));
-    frame->level_most = depth_q1(centre_q8 + (150 << 8) - 1);
-    frame->before = depth_q1(centre_q8 - semi_q8[2] - (60 << 8) - 1);
+    frame->open = limit_depth_q1(centre_q8 + (60 << 8));
+    frame->body_least = limit_depth_q1(centre_q8 - (220 << 8));
+    frame->body_most = limit_depth_q1(centre_q8 + (200 << 8) - 1);
+    frame->level_least = limit_depth_q1(centre_q8 - (150 << 8));
+    frame->level_most = limit_depth_q1(centre_q8 + (150 << 8) - 1);
+    frame->before = limit_depth_q1(centre_q8 - semi_q8[2] - (60 << 8) - 1);
 }
 
 static inline ih_lane scaled(ih_lane difference, const struct scale *scale)
@@ -209,15 +209,15 @@ static inline void find_rooms_around(const struct frame *frame, const struct off
 {
     const ih_lane aside_q12 = ih_lane_wrap(ih_lane_size(at->ex_q11) * 2);
     const ih_lane up = ih_lane_wrap(
-        ih_lane_wrap(0 - ih_lane_wrap(at->ey_q11 + ih_lane_high_half(aside_q12, ABOVE_Q15))) >> 1);
-    const ih_lane beside = ih_lane_least(at->ring, ih_lane_wrap(0 - at->down));
-    const ih_lane side = ih_lane_least(beside, ih_lane_wrap(0 - up));
-    room[HIGH] = least3(ih_lane_wrap(0 - ih_lane_wrap(at->y + frame->high_y)),
+        ih_lane_wrap(-ih_lane_wrap(at->ey_q11 + ih_lane_high_half(aside_q12, ABOVE_Q15))) >> 1);
+    const ih_lane beside = ih_lane_least(at->ring, ih_lane_wrap(-at->down));
+    const ih_lane side = ih_lane_least(beside, ih_lane_wrap(-up));
+    room[HIGH] = least3(ih_lane_wrap(-ih_lane_wrap(at->y + frame->high_y)),
                         ih_lane_wrap(frame->high_x - ih_lane_size(at->x)),
                         ih_lane_wrap(frame->reach_q14[1] - ih_lane_size(at->dy_q14)));
     room[BELOW] = ih_lane_least(at->ring, at->down);
     room[ABOVE] = ih_lane_least(beside, up);
-    room[LEFT] = ih_lane_least(side, ih_lane_wrap(0 - at->ex_q11));
+    room[LEFT] = ih_lane_least(side, ih_lane_wrap(-at->ex_q11));
     room[RIGHT] = ih_lane_least(side, at->ex_q11);
     room[BEFORE] = ih_lane_wrap(ih_lane_wrap(AROUND2_Q10 - at->ee_q10) >> 2);
 }
@@ -237,7 +237,7 @@ static inline void find_rooms_below(const struct frame *frame, const struct offs
         ih_lane_wrap(frame->reach_q14[0] - ih_lane_size(at->dx_q14)));
     room[LEVEL] = least3(ih_lane_wrap(frame->semi_y - ih_lane_size(at->y)),
                          ih_lane_wrap(aside - MM(170)), ih_lane_wrap(MM(330) - aside));
-    room[SHOULDER_LEFT] = ih_lane_least(shoulder, ih_lane_wrap(0 - at->x));
+    room[SHOULDER_LEFT] = ih_lane_least(shoulder, ih_lane_wrap(-at->x));
     room[SHOULDER_RIGHT] = ih_lane_least(shoulder, at->x);
 }
 
@@ -298,7 +298,7 @@ static inline void add(struct sums *sums, enum place place, ih_lane room, ih_lan
 static void count_rays(const struct frame *frame, struct ih_tally_scratch *scratch,
                        struct sums *out)
 {
-    struct sums sums = {{0}, {0}, 0, 0};
+    struct sums sums = {.nothing = 0};
     ih_lane nothing = 0;
     ih_lane before = 0;
     const ih_lane margin = frame->margin;
@@ -312,8 +312,7 @@ static void count_rays(const struct frame *frame, struct ih_tally_scratch *scrat
         const ih_lane counts = ih_lane_wrap(answers.known & ~unsure);
         const ih_lane open = ih_lane_wrap(counts & answers.is_open);
         const ih_lane body = ih_lane_wrap(counts & answers.is_body);
-        const ih_lane beside =
-            ih_lane_is_above(ih_lane_least(at.ring, ih_lane_wrap(0 - at.down)), 0);
+        const ih_lane beside = ih_lane_is_above(ih_lane_least(at.ring, ih_lane_wrap(-at.down)), 0);
         const ih_lane around = ih_lane_is_above(room[BEFORE], 0);
         add(&sums, HIGH, room[HIGH], counts, open);
         add(&sums, BELOW, room[BELOW], counts, open);

@@ -191,8 +191,8 @@ static cv::Mat texture_of(const cv::Mat &window)
 }
 
 /* A dot's place once more, from the pictures that show all of its window, and how well it is known. False: too few do. */
-static bool place(const std::vector<Twins> &pairs, const Noise &noise, double lens_px, const Dot &dot,
-                  Sighting &sighting)
+static bool find_place(const std::vector<Twins> &pairs, const Noise &noise, double lens_px, const Dot &dot,
+                       Sighting &sighting)
 {
     cv::Point middle(cvRound(dot.px.x), cvRound(dot.px.y));
     cv::Rect window = dot_window(middle);
@@ -252,7 +252,7 @@ Lit wall_find(const Board &board, const Camera &camera, const std::vector<Pictur
     cv::Mat still = still_rise(rises, masks, counts);
     for (const Dot &dot : dots_find(still, {}, counts > 0)) {
         Sighting sighting;
-        if (!place(pairs, noise, lens_px, dot, sighting))
+        if (!find_place(pairs, noise, lens_px, dot, sighting))
             continue;
         sighting.tangent = camera.tangents({sighting.px}).front();
         wall.sightings.push_back(sighting);
