@@ -71,7 +71,7 @@ static const char help_text[] = /* at most 80 columns */
     "                     wide: 125 mm\n"
     "  --seed N           which person, room, light, motion (default 1); with\n"
     "                     --range: from where, 0 for the depth camera's own place\n"
-    "  --rig-seed N       which lens, assembly, laser and sensor (default: as --seed):\n"
+    "  --rig-seed N       lens, assembly, laser, sensor (default: as --seed):\n"
     "                     other people before the same rig\n"
     "  --frames N         1 to 5000 (default 50, four of them without the person; for\n"
     "                     a visit 100); with --range for each depth image (default 1)\n"
