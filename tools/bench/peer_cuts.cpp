@@ -12,6 +12,7 @@ constexpr int EDGES = 2 * DOWN;
 struct walker {
     const peer_grid *surface_mm;
     double level_mm;
+    /* Both are left as they were found: every contour is followed to its end. */
     int next[EDGES]; /* the edge that the contour leaves the cell through; -1: none */
     bool is_entered[EDGES];
     std::vector<int> edges; /* that a contour leaves from */
@@ -24,15 +25,23 @@ void link(walker &w, int from, int to)
     w.edges.push_back(from);
 }
 
+/* Which corners of the cells are nearer, a bit each; by the cell's first node. */
+void find_corners(const peer_grid &surface_mm, double level_mm, uchar corners[])
+{
+    static cv::Mat nearer;
+    const cv::Mat depth(1, DOWN, CV_64F, const_cast<double *>(surface_mm.data()));
+    cv::compare(depth, level_mm, nearer, cv::CMP_LT);
+    const uchar *n = nearer.data;
+    for (int i = 0; i < DOWN - PEER_NODES - 1; i++) {
+        corners[i] = static_cast<uchar>((n[i] & 1) | (n[i + 1] & 2) | (n[i + PEER_NODES + 1] & 4) |
+                                        (n[i + PEER_NODES] & 8));
+    }
+}
+
 /* What is nearer is on the right as one goes from edge to edge. */
-void cut_cell(walker &w, int y, int x)
+void cut_cell(walker &w, int y, int x, int corners)
 {
     const peer_grid &z = *w.surface_mm;
-    int corners = (z(y, x) < w.level_mm) | (z(y, x + 1) < w.level_mm) << 1 |
-                  (z(y + 1, x + 1) < w.level_mm) << 2 | (z(y + 1, x) < w.level_mm) << 3;
-    if (corners == 0 || corners == 15) {
-        return;
-    }
     const int at = y * PEER_NODES + x;
     const int edge[4] = {at, DOWN + at + 1, at + PEER_NODES, DOWN + at}; /* top right bottom left */
     static const signed char way[16][2] = {{-1, -1}, {0, 3}, {1, 0}, {1, 3},  {2, 1},   {-1, -1},
@@ -71,25 +80,36 @@ void follow(walker &w, int start, peer_contour &out)
         out.vertex.push_back(crossing(w, edge));
         int next = w.next[edge];
         w.next[edge] = -1;
+        w.is_entered[edge] = false;
         edge = next;
     } while (edge >= 0 && edge != start);
     out.closed = edge == start;
+}
+
+walker make_walker()
+{
+    walker w = {};
+    std::fill(w.next, w.next + EDGES, -1);
+    return w;
 }
 
 } // namespace
 
 void peer_cut(const peer_grid &surface_mm, double level_mm, std::vector<peer_contour> &out)
 {
-    static walker w;
+    static walker w = make_walker();
+    static uchar corners[DOWN];
     out.clear();
     w.surface_mm = &surface_mm;
     w.level_mm = level_mm;
     w.edges.clear();
-    std::fill(w.next, w.next + EDGES, -1);
-    std::fill(w.is_entered, w.is_entered + EDGES, false);
+    find_corners(surface_mm, level_mm, corners);
     for (int y = 0; y < PEER_NODES - 1; y++) {
         for (int x = 0; x < PEER_NODES - 1; x++) {
-            cut_cell(w, y, x);
+            const int here = corners[y * PEER_NODES + x];
+            if (here != 0 && here != 15) {
+                cut_cell(w, y, x, here);
+            }
         }
     }
     for (int open = 1; open >= 0; open--) { /* open ones first, from their beginnings */

@@ -15,14 +15,12 @@ constexpr double CHORD_MAX = 0.42;
 constexpr double CHORD_COST = 1.6;
 constexpr double SHAPE_COST = 8;
 constexpr double AREA_MIN = 0.5; /* grid cells */
-constexpr double LEAST = -1e9;   /* merit */
-constexpr int POINTS = 56;
+constexpr int POINTS = PEER_POINTS;
 constexpr int PART_EDGES_MIN = 8;
 constexpr double FOUR_PI = 4 * 3.14159265358979323846;
 
 struct sums {
     double area2, x, y, xx, xy, yy;
-    int winding;
 };
 
 /* How an edge crosses the ray from the origin along x. */
@@ -41,7 +39,6 @@ void add_edge(sums &m, double px, double py, double qx, double qy)
     m.xx += w * (px * px + px * qx + qx * qx);
     m.yy += w * (py * py + py * qy + qy * qy);
     m.xy += w * (2 * px * py + px * qy + qx * py + 2 * qx * qy);
-    m.winding += winding_of(w, py, qy);
 }
 
 struct shape {
@@ -49,7 +46,7 @@ struct shape {
     double shape, ratio;
 };
 
-bool shape_of_sums(const sums &m, cv::Point2f place, shape &out)
+bool shape_of_sums(const sums &m, shape &out)
 {
     if (m.area2 < 2 * AREA_MIN) {
         return false;
@@ -69,16 +66,16 @@ bool shape_of_sums(const sums &m, cv::Point2f place, shape &out)
     }
     out.shape = FOUR_PI * 2 * std::sqrt(determinant) / m.area2;
     out.ratio = std::sqrt((half + root) / (half - root));
-    out.ellipse = {m.area2 / 2, x + static_cast<double>(place.x), y + static_cast<double>(place.y)};
+    out.ellipse = {m.area2 / 2, x, y};
     return true;
 }
 
-sums sums_of_contour(const peer_contour &contour, cv::Point2f place)
+sums sums_of_contour(const peer_contour &contour)
 {
-    sums m = {0, 0, 0, 0, 0, 0, 0};
+    sums m = {0, 0, 0, 0, 0, 0};
     for (size_t i = 0; i < contour.vertex.size(); i++) {
-        cv::Point2f a = contour.vertex[i] - place;
-        cv::Point2f b = contour.vertex[i + 1 < contour.vertex.size() ? i + 1 : 0] - place;
+        cv::Point2f a = contour.vertex[i];
+        cv::Point2f b = contour.vertex[i + 1 < contour.vertex.size() ? i + 1 : 0];
         add_edge(m, static_cast<double>(a.x), static_cast<double>(a.y), static_cast<double>(b.x),
                  static_cast<double>(b.y));
     }
@@ -104,14 +101,6 @@ bool whole_by_fit(const peer_contour &contour, peer_ellipse &out)
     return true;
 }
 
-/* Points at equal steps, twice round where the contour is closed, and sums before each. */
-struct resampled {
-    double x[2 * POINTS], y[2 * POINTS];
-    sums before[2 * POINTS];
-    int count;
-    double length, step;
-};
-
 double edge_length(const peer_contour &contour, size_t edge)
 {
     cv::Point2f d =
@@ -119,14 +108,88 @@ double edge_length(const peer_contour &contour, size_t edge)
     return std::sqrt(static_cast<double>(d.dot(d)));
 }
 
-void resample(const peer_contour &contour, cv::Point2f place, resampled &r)
+sums sums_of_part(const peer_outline &r, int from, int to)
 {
-    size_t edges = contour.vertex.size() - (contour.closed ? 0 : 1);
-    r.length = 0;
-    for (size_t i = 0; i < edges; i++) {
-        r.length += edge_length(contour, i);
+    sums m = {r.area2[to] - r.area2[from], r.mx[to] - r.mx[from], r.my[to] - r.my[from],
+              r.xx[to] - r.xx[from],       r.xy[to] - r.xy[from], r.yy[to] - r.yy[from]};
+    add_edge(m, r.x[to], r.y[to], r.x[from], r.y[from]);
+    return m;
+}
+
+void add_part(const peer_outline &r, int from, int to, std::vector<peer_part> &out)
+{
+    double arc = (to - from) * r.step;
+    double dx = r.x[to] - r.x[from], dy = r.y[to] - r.y[from];
+    double chord2 = dx * dx + dy * dy;
+    shape found;
+    if (chord2 <= CHORD_MAX * CHORD_MAX * arc * arc &&
+        shape_of_sums(sums_of_part(r, from, to), found) && found.shape >= SHAPE_MIN &&
+        found.shape <= SHAPE_MAX && found.ratio <= RATIO_PART_MAX) {
+        double merit = arc - CHORD_COST * std::sqrt(chord2) - SHAPE_COST * (found.shape - 1) * arc;
+        out.push_back({from, to, merit, found.ellipse});
     }
-    r.step = r.length / (contour.closed ? POINTS : POINTS - 1);
+}
+
+/* Peer B: all parts of as many steps side by side; what passes without a root is looked at closely. */
+void add_parts_of(const peer_outline &r, int steps, std::vector<peer_part> &out)
+{
+    using lanes = Eigen::Array<double, POINTS, 1>;
+    const int count = std::min(r.count - steps, POINTS);
+    const auto x0 = r.x.head<POINTS>(), y0 = r.y.head<POINTS>();
+    const auto x1 = r.x.segment<POINTS>(steps), y1 = r.y.segment<POINTS>(steps);
+    const double chord = CHORD_MAX * steps * r.step;
+    const lanes over = (x1 - x0).square() + (y1 - y0).square() - chord * chord;
+    if (over.head(count).minCoeff() > 0) {
+        return;
+    }
+    const lanes w = x1 * y0 - x0 * y1;
+    const lanes area2 = r.area2.segment<POINTS>(steps) - r.area2.head<POINTS>() + w;
+    const lanes mx = r.mx.segment<POINTS>(steps) - r.mx.head<POINTS>() + w * (x0 + x1);
+    const lanes my = r.my.segment<POINTS>(steps) - r.my.head<POINTS>() + w * (y0 + y1);
+    const lanes mxx =
+        r.xx.segment<POINTS>(steps) - r.xx.head<POINTS>() + w * (x0 * x0 + x0 * x1 + x1 * x1);
+    const lanes myy =
+        r.yy.segment<POINTS>(steps) - r.yy.head<POINTS>() + w * (y0 * y0 + y0 * y1 + y1 * y1);
+    /* 18 area2^2 times the trace of the second moments; an ellipse of the greatest ratio has the most */
+    const lanes spread = 3 * area2 * (mxx + myy) - 2 * (mx * mx + my * my);
+    const double most = 18 * (RATIO_PART_MAX + 1 / RATIO_PART_MAX) * SHAPE_MAX / (2 * FOUR_PI);
+    /* every test as a number that is positive where it fails */
+    const lanes bad = over.max(2 * AREA_MIN - area2).max(spread - most * area2.cube());
+    for (int from = 0; from < count; from++) {
+        if (bad[from] <= 0) {
+            add_part(r, from, from + steps, out);
+        }
+    }
+}
+
+} // namespace
+
+/* A closed contour that is an ellipse. */
+bool peer_ellipse_whole(peer_kind kind, const peer_contour &contour, peer_ellipse &out)
+{
+    if (kind == peer_kind::a) {
+        return whole_by_fit(contour, out);
+    }
+    shape found;
+    if (!shape_of_sums(sums_of_contour(contour), found) || found.shape > SHAPE_MAX ||
+        found.ratio > RATIO_WHOLE_MAX) {
+        return false;
+    }
+    out = found.ellipse;
+    return true;
+}
+
+bool peer_outline_make(const peer_contour &contour, peer_outline &r)
+{
+    if (contour.vertex.size() < PART_EDGES_MIN) {
+        return false;
+    }
+    size_t edges = contour.vertex.size() - (contour.closed ? 0 : 1);
+    double whole = 0;
+    for (size_t i = 0; i < edges; i++) {
+        whole += edge_length(contour, i);
+    }
+    r.step = whole / (contour.closed ? POINTS : POINTS - 1);
     r.count = contour.closed ? 2 * POINTS : POINTS;
     size_t edge = 0;
     double before = 0, length = edge_length(contour, 0);
@@ -136,94 +199,64 @@ void resample(const peer_contour &contour, cv::Point2f place, resampled &r)
             before += length;
             length = edge_length(contour, ++edge);
         }
-        cv::Point2f a = contour.vertex[edge] - place;
-        cv::Point2f b = contour.vertex[edge + 1 < contour.vertex.size() ? edge + 1 : 0] - place;
+        cv::Point2f a = contour.vertex[edge];
+        cv::Point2f b = contour.vertex[edge + 1 < contour.vertex.size() ? edge + 1 : 0];
         double part = length > 0 ? std::min(target - before, length) / length : 0;
         r.x[k] = static_cast<double>(a.x) + part * static_cast<double>(b.x - a.x);
         r.y[k] = static_cast<double>(a.y) + part * static_cast<double>(b.y - a.y);
     }
-    for (int k = POINTS; k < r.count; k++) {
-        r.x[k] = r.x[k - POINTS];
-        r.y[k] = r.y[k - POINTS];
+    r.x.tail<POINTS>() = r.x.head<POINTS>();
+    r.y.tail<POINTS>() = r.y.head<POINTS>();
+    sums m = {0, 0, 0, 0, 0, 0};
+    for (int k = 0; k < 2 * POINTS; k++) {
+        if (k > 0) {
+            add_edge(m, r.x[k - 1], r.y[k - 1], r.x[k], r.y[k]);
+        }
+        r.area2[k] = m.area2;
+        r.mx[k] = m.x;
+        r.my[k] = m.y;
+        r.xx[k] = m.xx;
+        r.xy[k] = m.xy;
+        r.yy[k] = m.yy;
     }
-    r.before[0] = {0, 0, 0, 0, 0, 0, 0};
-    for (int k = 1; k < r.count; k++) {
-        r.before[k] = r.before[k - 1];
-        add_edge(r.before[k], r.x[k - 1], r.y[k - 1], r.x[k], r.y[k]);
-    }
-}
-
-/* Is the part from..to an ellipse, and of more merit than the best so far? */
-bool test_part(const resampled &r, int from, int to, cv::Point2f place, double best, shape &out,
-               double &merit)
-{
-    double arc = (to - from) * r.step;
-    double dx = r.x[to] - r.x[from], dy = r.y[to] - r.y[from];
-    double chord2 = dx * dx + dy * dy;
-    if (chord2 > CHORD_MAX * CHORD_MAX * arc * arc) {
-        return false;
-    }
-    double chord = std::sqrt(chord2);
-    if (arc - CHORD_COST * chord - SHAPE_COST * (SHAPE_MIN - 1) * arc <= best) {
-        return false;
-    }
-    const sums &b = r.before[from];
-    double w = r.x[to] * r.y[from] - r.x[from] * r.y[to];
-    if (r.before[to].winding - b.winding + winding_of(w, r.y[to], r.y[from]) != 1) {
-        return false;
-    }
-    sums m = r.before[to];
-    m = {m.area2 - b.area2,    m.x - b.x, m.y - b.y, m.xx - b.xx, m.xy - b.xy, m.yy - b.yy,
-         m.winding - b.winding};
-    add_edge(m, r.x[to], r.y[to], r.x[from], r.y[from]);
-    if (!shape_of_sums(m, place, out) || out.shape < SHAPE_MIN || out.shape > SHAPE_MAX ||
-        out.ratio > RATIO_PART_MAX) {
-        return false;
-    }
-    merit = arc - CHORD_COST * chord - SHAPE_COST * (out.shape - 1) * arc;
-    return merit > best;
-}
-
-} // namespace
-
-/* A closed contour that winds round the place and is an ellipse. */
-bool peer_ellipse_whole(peer_kind kind, const peer_contour &contour, cv::Point2f place,
-                        peer_ellipse &out)
-{
-    if (kind == peer_kind::a) {
-        return whole_by_fit(contour, out);
-    }
-    shape found;
-    if (!shape_of_sums(sums_of_contour(contour, place), place, found) || found.shape > SHAPE_MAX ||
-        found.ratio > RATIO_WHOLE_MAX) {
-        return false;
-    }
-    out = found.ellipse;
     return true;
 }
 
-/* The best elliptical part around the place; peer B does not look at what cannot be better. */
-bool peer_ellipse_part(peer_kind kind, const peer_contour &contour, cv::Point2f place,
-                       peer_ellipse &out, double &merit)
+void peer_parts(peer_kind kind, const peer_outline &outline, std::vector<peer_part> &out)
 {
-    static resampled r;
-    bool found = false;
-    merit = LEAST;
-    if (contour.vertex.size() < PART_EDGES_MIN) {
-        return false;
-    }
-    resample(contour, place, r);
-    for (int from = 0; from < POINTS; from++) {
-        for (int to = from + PART_EDGES_MIN; to <= std::min(r.count - 1, from + POINTS - 1); to++) {
-            shape part;
-            double part_merit;
-            double best = kind == peer_kind::a ? LEAST : merit;
-            if (test_part(r, from, to, place, best, part, part_merit) && part_merit > merit) {
-                out = part.ellipse;
-                merit = part_merit;
-                found = true;
-            }
+    out.clear();
+    for (int steps = PART_EDGES_MIN; steps < POINTS; steps++) {
+        if (kind == peer_kind::b) {
+            add_parts_of(outline, steps, out);
+            continue;
+        }
+        for (int from = 0; from < std::min(outline.count - steps, POINTS); from++) {
+            add_part(outline, from, from + steps, out);
         }
     }
-    return found;
+}
+
+const peer_part *peer_part_around(const peer_outline &r, const std::vector<peer_part> &parts,
+                                  cv::Point2f place)
+{
+    int before[2 * POINTS] = {0}; /* how often the edges before a point wind round the place */
+    const double x = static_cast<double>(place.x), y = static_cast<double>(place.y);
+    auto winding = [&r, x, y](int from, int to) {
+        double px = r.x[from] - x, py = r.y[from] - y, qx = r.x[to] - x, qy = r.y[to] - y;
+        return winding_of(px * qy - qx * py, py, qy);
+    };
+    if (parts.empty()) {
+        return nullptr;
+    }
+    for (int k = 1; k < r.count; k++) {
+        before[k] = before[k - 1] + winding(k - 1, k);
+    }
+    const peer_part *best = nullptr;
+    for (const peer_part &part : parts) {
+        if ((best == nullptr || part.merit > best->merit) &&
+            before[part.to] - before[part.from] + winding(part.to, part.from) == 1) {
+            best = &part;
+        }
+    }
+    return best;
 }

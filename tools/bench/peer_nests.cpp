@@ -54,32 +54,63 @@ void find_minima(peer &p)
     }
 }
 
-bool find_support(const peer &p, const peer_nest &nest, const std::vector<peer_contour> &contours,
-                  peer_ellipse &out)
+/* What supports a nest at a level. */
+struct support {
+    bool wanted, found, whole;
+    peer_ellipse ellipse;
+    double merit;
+};
+
+/* What a contour is for every nest that it surrounds; worked out when the first one asks. */
+struct study {
+    bool done, whole, outlined;
+    peer_ellipse ellipse;
+    peer_outline outline;
+    std::vector<peer_part> parts;
+};
+
+void study_contour(peer_kind kind, const peer_contour &contour, study &s)
 {
-    cv::Point2f place(static_cast<float>(nest.x), static_cast<float>(nest.y));
-    bool found = false;
-    double best = 0;
+    s.done = true;
+    s.whole = contour.closed && peer_ellipse_whole(kind, contour, s.ellipse);
+    s.outlined = !s.whole && peer_outline_make(contour, s.outline);
+    s.parts.clear();
+    if (s.outlined) {
+        peer_parts(kind, s.outline, s.parts);
+    }
+}
+
+void find_supports(const peer &p, const std::vector<peer_contour> &contours,
+                   std::vector<support> &supports)
+{
+    static study s;
     for (const peer_contour &contour : contours) {
-        peer_ellipse ellipse;
-        double merit;
-        if (contour.closed) {
-            if (cv::pointPolygonTest(contour.vertex, place, false) <= 0 ||
-                cv::contourArea(contour.vertex, true) <= 0) {
+        if (contour.closed && cv::contourArea(contour.vertex, true) <= 0) {
+            continue; /* around a maximum */
+        }
+        const cv::Rect box = cv::boundingRect(contour.vertex);
+        s.done = false;
+        for (size_t i = 0; i < p.nests.size(); i++) {
+            support &to = supports[i];
+            const cv::Point node(p.nests[i].x, p.nests[i].y);
+            if (!to.wanted || to.whole || !box.contains(node) ||
+                (contour.closed && cv::pointPolygonTest(contour.vertex, node, false) <= 0)) {
                 continue;
             }
-            if (peer_ellipse_whole(p.kind, contour, place, ellipse)) {
-                out = ellipse;
-                return true;
+            if (!s.done) {
+                study_contour(p.kind, contour, s);
+            }
+            if (s.whole) {
+                to = {true, true, true, s.ellipse, 0};
+                continue;
+            }
+            const peer_part *part =
+                s.outlined ? peer_part_around(s.outline, s.parts, node) : nullptr;
+            if (part != nullptr && (!to.found || part->merit > to.merit)) {
+                to = {true, true, false, part->ellipse, part->merit};
             }
         }
-        if (peer_ellipse_part(p.kind, contour, place, ellipse, merit) && (!found || merit > best)) {
-            out = ellipse;
-            best = merit;
-            found = true;
-        }
     }
-    return found;
 }
 
 bool continues(const peer_nest &nest, const peer_slice &slice)
@@ -115,25 +146,26 @@ void add_slice(peer_nest &nest, double level_mm, const peer_slice &found)
     }
 }
 
-void extend(const peer &p, double level_mm, const std::vector<peer_contour> &contours,
-            peer_nest &nest)
+/* Is the nest still open at this level? */
+bool is_open(double level_mm, peer_nest &nest)
 {
     if (level_mm <= nest.nearest_mm || nest.ended) {
-        return;
+        return false;
     }
-    if ((!nest.slice.empty() && level_mm - nest.front_mm > DEPTH_MAX_MM) ||
-        nest.slice.size() == SLICES_MAX) {
-        nest.ended = true;
-        return;
-    }
-    peer_slice slice;
-    if (!find_support(p, nest, contours, slice.ellipse)) {
+    nest.ended = (!nest.slice.empty() && level_mm - nest.front_mm > DEPTH_MAX_MM) ||
+                 nest.slice.size() == SLICES_MAX;
+    return !nest.ended;
+}
+
+void extend(const peer &p, double level_mm, const support &from, peer_nest &nest)
+{
+    if (!from.found) {
         nest.ended = ++nest.gap > GAP_MAX;
         return;
     }
     nest.gap = 0;
     double step_mm = level_mm * p.rig.field_unit * 10 / 11;
-    slice.area_mm2 = slice.ellipse.area * step_mm * step_mm;
+    peer_slice slice = {from.ellipse, 0, from.ellipse.area * step_mm * step_mm};
     add_slice(nest, level_mm, slice);
 }
 
@@ -142,6 +174,7 @@ void extend(const peer &p, double level_mm, const std::vector<peer_contour> &con
 void peer_find_nests(peer &p)
 {
     static std::vector<peer_contour> contours;
+    static std::vector<support> supports;
     p.nests.clear();
     if (!p.has_surface) {
         return;
@@ -154,9 +187,21 @@ void peer_find_nests(peer &p)
             return;
         }
         double level_mm = p.nearest_node_mm + level * LEVEL_STEP_MM;
+        bool wanted = false;
+        supports.assign(p.nests.size(), support());
+        for (size_t i = 0; i < p.nests.size(); i++) {
+            supports[i].wanted = is_open(level_mm, p.nests[i]);
+            wanted = wanted || supports[i].wanted;
+        }
+        if (!wanted) {
+            continue; /* between two nests */
+        }
         peer_cut(p.surface_mm, level_mm, contours);
-        for (peer_nest &nest : p.nests) {
-            extend(p, level_mm, contours, nest);
+        find_supports(p, contours, supports);
+        for (size_t i = 0; i < p.nests.size(); i++) {
+            if (supports[i].wanted) {
+                extend(p, level_mm, supports[i], p.nests[i]);
+            }
         }
     }
 }
