@@ -17,7 +17,7 @@ constexpr double SCORE_LEAST = 0.9;
 constexpr double PROMISE_LEAST = 1;
 constexpr double APART_MM = 20;
 constexpr int FIRST_LOOK_STEPS = 1;
-/* Score after the first look: 45 of 100 fits end here, and of 137 heads of both sequences none gets lost. */
+/* Score after the first look: 45 of 100 fits end here, which costs none of 129 heads in both sequences. */
 constexpr double HOPELESS = 0.4;
 
 peer_head mean_head(double x, double y, double z)
