@@ -321,14 +321,22 @@ static void scale_lines(const struct ih_surface_params *params, struct ih_surfac
     }
 }
 
-/* The ridge is the least that a pivot's square can be: one that is less has lost it to rounding. */
+/* With rows from fine_from on that have more bits. Returns whether it is good. The ridge is the least that a pivot's
+ * square can be: one that is less has lost it to rounding. */
+static bool try_factor(const struct ih_surface_params *params, int32_t fine_from,
+                       struct ih_surface_scratch *scratch)
+{
+    scale_lines(params, scratch);
+    scratch->is_fine = fine_from == 0;
+    scratch->limit_log2 = SQUARES_LOG2_MOST;
+    return ih_normal_factor(fine_from, params->ridge_q30 - params->ridge_q30 / 4,
+                            scratch->of.system.factor, scratch->pair);
+}
+
 static void factor(const struct ih_surface_params *params, struct ih_surface_scratch *scratch)
 {
-    const int32_t least_q30 = params->ridge_q30 - params->ridge_q30 / 4;
-    scale_lines(params, scratch);
-    if (!ih_normal_factor(FINE_FROM, least_q30, scratch->of.system.factor, scratch->pair)) {
-        scale_lines(params, scratch);
-        (void)ih_normal_factor(0, least_q30, scratch->of.system.factor, scratch->pair);
+    if (!try_factor(params, FINE_FROM, scratch)) {
+        (void)try_factor(params, 0, scratch);
     }
     scratch->squares_log2 = SQUARES_LOG2_MOST;
 }
@@ -396,7 +404,8 @@ static void add_solution(struct ih_surface_scratch *scratch, int fraction)
 
 /* Solve for a correction of the coefficients from what is left on the right side. squares_log2: of the sum of
  * the unknowns' squares, where the samples' sums are 1, over the square of the samples' number. Returns false, and
- * leaves all as it is, when it is greater than that of the correction before: then they do not come to rest. */
+ * leaves all as it is, when it is greater than limit_log2, that of the correction before: then they do not come to
+ * rest. */
 static bool correct(const struct ih_surface_params *params, struct ih_surface_scratch *scratch)
 {
     int32_t exponent;
@@ -410,11 +419,27 @@ static bool correct(const struct ih_surface_params *params, struct ih_surface_sc
     }
     const int log2 = ih_bits_u64((uint64_t)squares) - 2 * (fraction - exponent) +
                      scratch->normal_shift - 2 * scratch->samples_log2;
-    if (squares != 0 && log2 > scratch->squares_log2) {
+    if (squares != 0 && log2 > scratch->limit_log2) {
         return false;
     }
     scratch->squares_log2 = squares == 0 ? SQUARES_LOG2_NONE : log2;
+    scratch->limit_log2 = scratch->squares_log2;
     add_solution(scratch, fraction - exponent);
+    return true;
+}
+
+/* Corrections that grow with the coarse factor begin anew with the fine one, if that has not been tried: few samples'
+ * pivots do not tell that it is not good. Returns false when nothing is left to do. */
+static bool correct_or_refactor(const struct ih_surface_params *params,
+                                struct ih_surface_scratch *scratch)
+{
+    if (correct(params, scratch)) {
+        return true;
+    }
+    if (scratch->is_fine) {
+        return false;
+    }
+    (void)try_factor(params, 0, scratch);
     return true;
 }
 
@@ -439,7 +464,7 @@ static void refine(const struct ih_samples *samples, const struct ih_surface_par
             add_right(scratch, off, out->root_weight_q15[i]);
         }
         count++;
-    } while (correct(params, scratch) &&
+    } while (correct_or_refactor(params, scratch) &&
              (count < least ||
               (2 * scratch->squares_log2 - before > enough_log2 && count < CORRECTIONS_MAX)));
 }
@@ -557,8 +582,11 @@ static bool fit_again(const struct ih_samples *samples, const struct ih_surface_
     if (is_light && !sum_again(samples, scratch, out)) {
         return false;
     }
+    const int32_t left_log2 = scratch->squares_log2;
     factor(params, scratch);
     (void)correct(params, scratch);
+    /* What the first system still left is not on the right side: the next correction may be as great as its last. */
+    scratch->limit_log2 = ih_max_s32(scratch->limit_log2, left_log2);
     refine(samples, params, out, SQUARES_LOG2_ENOUGH, scratch);
     return true;
 }

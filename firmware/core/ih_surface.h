@@ -12,7 +12,7 @@
  *        is left, R^T W (z - B c) less the ridge's share, is worked out from rows of full precision,
  *        solved for and added to c, once or more often after each of both systems, until it is small or
  *        does not become smaller. So its factor may be a little off too: all but 32 of its rows have
- *        16 bits; where that is not enough, which pivots tell, it is made again with 27 bits in all.
+ *        16 bits; where that is not enough, which pivots or growing corrections tell, it is made again with 27 in all.
  *        Only samples that were farther off than 3/4 of huber_mm before the last correction are asked for
  *        their weight. The second N is made from the first by exchanging what samples brought whose weight
  *        changed, and so is the right side, of which the first system left nothing but the ridge's share.
@@ -102,6 +102,8 @@ struct ih_surface_scratch {
     int32_t off_fraction;                   /* fraction bits of z - B c, mm */
     int32_t samples_log2;                   /* an eighth of the samples: as many are below 2^it */
     int32_t squares_log2;                   /* of the last correction, see ih_surface.c */
+    int32_t limit_log2;                     /* of the next one, at the most */
+    bool is_fine;                           /* all rows of the factor have 27 bits */
     bool is_far[IH_SLOTS];                  /* before the last correction */
     int32_t centre_q16[IH_SURFACE_CENTRES]; /* places of the centres in a row, field units */
 };
