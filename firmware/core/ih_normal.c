@@ -24,6 +24,9 @@
 #define LOWER_HALF (1 << (LOWER_BITS - 1))
 /* What is left behind the fine blocks is enlarged as long as it stays below this. */
 #define LEFT_MOST 1030792151 /* 0.96 */
+/* What is left at a pivot is above this only where a matrix was not positive. Rounded to 16 bits its root stays below
+ * 2^27: quotients are shifted by 32 at the most. */
+#define PIVOT_MOST_Q30 ((1 << 30) - (1 << 16))
 /* Mantissas of a solution stay below this: 144 products with |F| <= 1 then sum below 2^(25 + 27 + 7.2). */
 #define MANTISSA_BITS 25
 
@@ -393,7 +396,7 @@ static void finish_row(uint32_t work[IH_NORMAL_WORK][TERMS], int32_t at, int32_t
                        int enlarged, int32_t *line)
 {
     const int32_t square_q30 =
-        ih_clamp_s32(line[p], IH_NORMAL_PIVOT_Q30 << (2 * enlarged), (1 << 30) - 1);
+        ih_clamp_s32(line[p], IH_NORMAL_PIVOT_Q30 << (2 * enlarged), PIVOT_MOST_Q30);
     int32_t pivot = (int32_t)ih_isqrt_u54((uint64_t)square_q30 << (2 * FACTOR_BITS - 30));
     if (!is_fine) {
         pivot = ((pivot + LOWER_HALF) >> LOWER_BITS) << LOWER_BITS;
