@@ -187,7 +187,7 @@ typedef __m128i lanes;
 /* (a * b + 2^(bits - 1)) / 2^bits in lanes of 32 bits, which it must fit. */
 static inline lanes product_shift(lanes a, lanes b, int bits)
 {
-    const lanes half = ALL_64((int64_t)1 << (bits - 1));
+    const lanes half = ALL_64((long long)1 << (bits - 1));
     const lanes even = DOWN_64(SUM_64(PRODUCT(a, b), half), bits);
     const lanes odd = DOWN_64(SUM_64(PRODUCT(DOWN_64(a, 32), DOWN_64(b, 32)), half), bits);
     return BOTH(even, UP_64(odd, 32));
