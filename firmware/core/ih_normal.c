@@ -32,11 +32,10 @@
 
 _Static_assert(TERMS % GROUP == 0 && TERMS % BLOCK == 0, "all groups and blocks are whole");
 
-/* What is done with the sum of 8 words' products: begin + sum, without a sign, over 2^shift, less `before`, is added
- * to or taken from an entry. */
+/* What is done with the sum of 8 words' products: begin + sum, without a sign, over 2^shift, is added to or taken from
+ * an entry. */
 struct way {
     uint32_t begin;
-    int32_t before;
     int shift;
     bool is_taken;
     bool is_mixed; /* lower by upper halves, and upper by lower ones */
@@ -45,31 +44,33 @@ struct way {
 /* Sums of products without a sign, rounded. */
 static inline struct way plain_way(int shift, bool is_taken)
 {
-    return (struct way){(uint32_t)1 << (shift - 1), 0, shift, is_taken, false};
+    return (struct way){(uint32_t)1 << (shift - 1), shift, is_taken, false};
 }
 
-/* Upper parts of two rows a word, with a sign: never negative with 2^31 more. */
-static inline struct way upper_way(void)
-{
-    return (struct way){(uint32_t)1 << 31, INT32_MIN, 0, true, false};
-}
+/* Both parts of a row a word, rounded. With a sign: never negative with 2^31 more, of which MIXED_MORE is left. */
+#define MIXED_MORE ((uint32_t)1 << (31 - LOWER_BITS))
 
-/* Both parts of a row a word, rounded. */
 static inline struct way mixed_way(void)
 {
-    return (struct way){((uint32_t)1 << 31) + LOWER_HALF, 1 << (31 - LOWER_BITS), LOWER_BITS, true,
-                        true};
+    return (struct way){((uint32_t)1 << 31) + LOWER_HALF, LOWER_BITS, true, true};
+}
+
+/* Upper parts of two rows a word; and what so many mixed sums take too much is given back. */
+IH_WRAPPING static inline struct way upper_way(int32_t mixed)
+{
+    return (struct way){0 - (uint32_t)mixed * MIXED_MORE, 0, true, false};
 }
 
 /* Entries of line i, with its padding. */
 static int32_t length_of(int32_t i)
 {
-    return (i / GROUP + 1) * GROUP;
+    return (i | (GROUP - 1)) + 1;
 }
 
 int32_t ih_normal_line(int32_t i)
 {
-    return IH_NORMAL_LINE(i - i % GROUP) + i % GROUP * length_of(i);
+    /* IH_NORMAL_LINE() of its group, and as many lengths as it has lines before it there. */
+    return (length_of(i) >> 1) * (i + (i & (GROUP - 1)));
 }
 
 static inline uint32_t turned(uint32_t word)
@@ -133,11 +134,10 @@ typedef __m128i lanes;
 #endif
 
 /* Line i by the first words. */
-static inline void add_words(uint32_t word[PAIRS][TERMS], struct way way, int32_t words, int32_t i,
-                             int32_t *line)
+__attribute__((always_inline)) static inline void
+add_words(uint32_t word[PAIRS][TERMS], struct way way, int32_t words, int32_t i, int32_t *line)
 {
     const lanes begin = ALL(way.begin);
-    const lanes before = ALL(way.before);
     const __m128i count = _mm_cvtsi32_si128(way.shift);
     const int32_t length = length_of(i);
     lanes factor[PAIRS];
@@ -149,14 +149,14 @@ static inline void add_words(uint32_t word[PAIRS][TERMS], struct way way, int32_
         for (int32_t k = 0; k < words; k++) {
             sum = SUM(sum, PRODUCTS(factor[k], LOAD_ROW(&word[k][j])));
         }
-        sum = DIFFERENCE(SHIFTED(sum, count), before);
+        sum = SHIFTED(sum, count);
         STORE(&line[j], way.is_taken ? DIFFERENCE(LOAD(&line[j]), sum) : SUM(LOAD(&line[j]), sum));
     }
 }
 
-/* The first `count` lines. */
-static inline void add_lines(uint32_t word[PAIRS][TERMS], struct way way, int32_t count,
-                             int32_t *normal)
+/* The first `count` lines: of each way by itself. */
+__attribute__((always_inline)) static inline void
+add_lines(uint32_t word[PAIRS][TERMS], struct way way, int32_t count, int32_t *normal)
 {
     int32_t *line = normal;
     for (int32_t i = 0; i < count; i++) {
@@ -223,11 +223,160 @@ static void split_line(int32_t *line, int32_t length, int enlarged, bool is_seco
 
 #define WHOLE_LINES 0
 
+/* 1, or all ones to take away. */
+static inline uint32_t sign_of(struct way way)
+{
+    return way.is_taken ? UINT32_MAX : 1;
+}
+
+IH_WRAPPING static inline int32_t changed(int32_t entry, uint32_t sum, int shift, uint32_t sign)
+{
+    return IH_WRAPS(int32_t, IH_WRAPS(uint32_t, entry) + (sum >> shift) * sign);
+}
+
 #if defined __ARM_FEATURE_SIMD32
 
 static inline uint32_t add_products(uint32_t sum, uint32_t a, uint32_t b)
 {
     return IH_WRAPS(uint32_t, __smlad((int16x2_t)a, (int16x2_t)b, IH_WRAPS(int32_t, sum)));
+}
+
+/* Compilers load all that they can before it is used, and then have no registers for the sums. Nothing is loaded
+ * across this; it is no instruction. */
+#define IN_ORDER() __atomic_signal_fence(__ATOMIC_SEQ_CST)
+
+/* Four columns' words, and what is done with the sums of their products: begin + sum over 2^shift, times `sign`, is
+ * added. */
+struct panel {
+    uint32_t column[4 * PAIRS];
+    uint32_t begin, sign;
+    int shift;
+    int32_t *line;
+};
+
+/* Two entries by their sums. */
+static inline void change(int32_t *entry, uint32_t sum_0, uint32_t sum_1, int shift, uint32_t sign)
+{
+    const int32_t first = entry[0], second = entry[1];
+    IN_ORDER();
+    entry[0] = changed(first, sum_0, shift, sign);
+    entry[1] = changed(second, sum_1, shift, sign);
+    IN_ORDER();
+}
+
+/* From line i on, two lines at a time by four columns: as many sums as a Cortex-M can hold in registers. own: the
+ * lines' words. Not a part of its caller, where what stands in the panel would be loaded once and stored again. */
+__attribute__((noinline)) static void add_panel(const uint32_t *own, struct panel *panel, int32_t i,
+                                                int32_t count)
+{
+    do {
+        const int32_t length = length_of(i);
+        const uint32_t *end = &own[length - i];
+        do {
+            IN_ORDER();
+            const uint32_t begin = panel->begin;
+            uint32_t sum_00 = begin, sum_01 = begin, sum_02 = begin, sum_03 = begin;
+            uint32_t sum_10 = begin, sum_11 = begin, sum_12 = begin, sum_13 = begin;
+#pragma GCC unroll 8
+            for (int32_t k = 0; k < PAIRS; k++) {
+                const uint32_t *column = &panel->column[4 * k];
+                IN_ORDER();
+                const uint32_t a_0 = own[k * TERMS], a_1 = own[k * TERMS + 1];
+                const uint32_t b_0 = column[0], b_1 = column[1];
+                IN_ORDER();
+                sum_00 = add_products(sum_00, a_0, b_0);
+                sum_10 = add_products(sum_10, a_1, b_0);
+                sum_01 = add_products(sum_01, a_0, b_1);
+                sum_11 = add_products(sum_11, a_1, b_1);
+                IN_ORDER();
+                const uint32_t b_2 = column[2], b_3 = column[3];
+                IN_ORDER();
+                sum_02 = add_products(sum_02, a_0, b_2);
+                sum_12 = add_products(sum_12, a_1, b_2);
+                sum_03 = add_products(sum_03, a_0, b_3);
+                sum_13 = add_products(sum_13, a_1, b_3);
+            }
+            IN_ORDER();
+            const int shift = panel->shift;
+            const uint32_t sign = panel->sign;
+            int32_t *line = panel->line;
+            change(&line[0], sum_00, sum_01, shift, sign);
+            change(&line[2], sum_02, sum_03, shift, sign);
+            line = &line[length];
+            change(&line[0], sum_10, sum_11, shift, sign);
+            change(&line[2], sum_12, sum_13, shift, sign);
+            panel->line = &line[length];
+            own = &own[2];
+        } while (own != end);
+        i = length; /* where the next group begins */
+    } while (i < count);
+}
+
+/* The first `count` lines, whole groups. */
+__attribute__((noinline)) static void add_lines(uint32_t word[PAIRS][TERMS], struct way way,
+                                                int32_t count, int32_t *normal)
+{
+    for (int32_t j = 0; j < count; j += 4) {
+        struct panel panel;
+        for (int32_t k = 0; k < PAIRS; k++) {
+            const uint32_t *from = &word[k][j];
+            uint32_t *to = &panel.column[4 * k];
+            IN_ORDER();
+            uint32_t w_0 = from[0], w_1 = from[1], w_2 = from[2], w_3 = from[3];
+            IN_ORDER();
+            if (way.is_mixed) {
+                w_0 = turned(w_0);
+                w_1 = turned(w_1);
+                w_2 = turned(w_2);
+                w_3 = turned(w_3);
+            }
+            to[0] = w_0;
+            to[1] = w_1;
+            to[2] = w_2;
+            to[3] = w_3;
+        }
+        panel.begin = way.begin;
+        panel.sign = sign_of(way);
+        panel.shift = way.shift;
+        panel.line = &normal[ih_normal_line(j) + j];
+        add_panel(&word[0][j], &panel, j, count);
+    }
+}
+
+/* Line i by the first words, and what of its padding is in the last four. */
+static void add_words(uint32_t word[PAIRS][TERMS], struct way way, int32_t words, int32_t i,
+                      int32_t *line)
+{
+    const int shift = way.shift;
+    const uint32_t sign = sign_of(way);
+    uint32_t own[PAIRS];
+    for (int32_t k = 0; k < words; k++) {
+        own[k] = way.is_mixed ? turned(word[k][i]) : word[k][i];
+    }
+    for (int32_t j = 0; j <= i; j += 4) {
+        const uint32_t *other = &word[0][j];
+        uint32_t sum_0 = way.begin, sum_1 = sum_0, sum_2 = sum_0, sum_3 = sum_0;
+        for (int32_t k = 0; k < words; k++) {
+            const uint32_t a = own[k];
+            IN_ORDER();
+            const uint32_t b_0 = other[0], b_1 = other[1], b_2 = other[2], b_3 = other[3];
+            IN_ORDER();
+            sum_0 = add_products(sum_0, a, b_0);
+            sum_1 = add_products(sum_1, a, b_1);
+            sum_2 = add_products(sum_2, a, b_2);
+            sum_3 = add_products(sum_3, a, b_3);
+            other = &other[TERMS];
+        }
+        change(&line[j], sum_0, sum_1, shift, sign);
+        change(&line[j + 2], sum_2, sum_3, shift, sign);
+    }
+}
+
+/* a * b / 2^step, which is below 2^32; step 1..31. Shifts of 64 bits by 32 and more would be asked for. */
+static inline uint32_t scaled_by(uint32_t a, uint32_t b, int step)
+{
+    const uint64_t product = (uint64_t)a * b;
+    return (uint32_t)(product >> 32) << (32 - step) | (uint32_t)(product & UINT32_MAX) >> step;
 }
 
 #else
@@ -248,31 +397,14 @@ IH_WRAPPING static inline uint32_t add_products(uint32_t sum, uint32_t a, uint32
            IH_WRAPS(uint32_t, upper_of(a) * upper_of(b));
 }
 
-#endif
-
-/* sign: 1, or all ones to take away. */
-IH_WRAPPING static inline int32_t changed(int32_t entry, uint32_t sum, int shift, uint32_t before,
-                                          uint32_t sign)
-{
-    return IH_WRAPS(int32_t, IH_WRAPS(uint32_t, entry) + ((sum >> shift) - before) * sign);
-}
-
-static inline uint32_t sign_of(struct way way)
-{
-    return way.is_taken ? UINT32_MAX : 1;
-}
-
-/* Columns of two lines with four others: as many sums as a Cortex-M can hold in registers. */
+/* Columns of two lines with four others. */
 static inline void add_tile(const uint32_t *a, const uint32_t *b, struct way way,
                             int32_t *const line[2])
 {
     const int shift = way.shift;
-    const uint32_t before = IH_WRAPS(uint32_t, way.before), sign = sign_of(way);
+    const uint32_t sign = sign_of(way);
     uint32_t sum_00 = way.begin, sum_01 = sum_00, sum_02 = sum_00, sum_03 = sum_00;
     uint32_t sum_10 = sum_00, sum_11 = sum_00, sum_12 = sum_00, sum_13 = sum_00;
-#ifdef __ARM_FEATURE_SIMD32
-#pragma GCC unroll 8
-#endif
     for (int32_t k = 0; k < PAIRS; k++) {
         const uint32_t a_0 = a[2 * k], a_1 = a[2 * k + 1];
         const uint32_t b_0 = b[k * TERMS];
@@ -288,14 +420,14 @@ static inline void add_tile(const uint32_t *a, const uint32_t *b, struct way way
         sum_03 = add_products(sum_03, a_0, b_3);
         sum_13 = add_products(sum_13, a_1, b_3);
     }
-    line[0][0] = changed(line[0][0], sum_00, shift, before, sign);
-    line[0][1] = changed(line[0][1], sum_01, shift, before, sign);
-    line[0][2] = changed(line[0][2], sum_02, shift, before, sign);
-    line[0][3] = changed(line[0][3], sum_03, shift, before, sign);
-    line[1][0] = changed(line[1][0], sum_10, shift, before, sign);
-    line[1][1] = changed(line[1][1], sum_11, shift, before, sign);
-    line[1][2] = changed(line[1][2], sum_12, shift, before, sign);
-    line[1][3] = changed(line[1][3], sum_13, shift, before, sign);
+    line[0][0] = changed(line[0][0], sum_00, shift, sign);
+    line[0][1] = changed(line[0][1], sum_01, shift, sign);
+    line[0][2] = changed(line[0][2], sum_02, shift, sign);
+    line[0][3] = changed(line[0][3], sum_03, shift, sign);
+    line[1][0] = changed(line[1][0], sum_10, shift, sign);
+    line[1][1] = changed(line[1][1], sum_11, shift, sign);
+    line[1][2] = changed(line[1][2], sum_12, shift, sign);
+    line[1][3] = changed(line[1][3], sum_13, shift, sign);
 }
 
 /* The first `count` lines, an even number. */
@@ -325,9 +457,17 @@ static void add_words(uint32_t word[PAIRS][TERMS], struct way way, int32_t words
         for (int32_t k = 0; k < words; k++) {
             sum = add_products(sum, way.is_mixed ? turned(word[k][i]) : word[k][i], word[k][j]);
         }
-        line[j] = changed(line[j], sum, way.shift, IH_WRAPS(uint32_t, way.before), sign_of(way));
+        line[j] = changed(line[j], sum, way.shift, sign_of(way));
     }
 }
+
+/* a * b / 2^step, which is below 2^32. */
+static inline uint32_t scaled_by(uint32_t a, uint32_t b, int step)
+{
+    return (uint32_t)((uint64_t)a * b >> step);
+}
+
+#endif
 
 /* A line of sums times two scales. */
 static inline void scale_line(const int32_t *line, int32_t length, const uint32_t *scale,
@@ -335,8 +475,7 @@ static inline void scale_line(const int32_t *line, int32_t length, const uint32_
 {
     for (int32_t j = 0; j < length; j++) {
         const uint32_t sum = (uint32_t)ih_max_s32(line[j], 0);
-        const uint32_t half = (uint32_t)((uint64_t)sum * own_scale >> step);
-        scaled[j] = (int32_t)((uint64_t)half * scale[j] >> step);
+        scaled[j] = (int32_t)scaled_by(scaled_by(sum, own_scale, step), scale[j], step);
     }
 }
 
@@ -431,7 +570,8 @@ static void take_from_line(uint32_t work[IH_NORMAL_WORK][TERMS], bool is_fine, i
                            int32_t p, int32_t *line)
 {
     if (done > 0) {
-        add_words(work, upper_way(), (done + 1) / 2, p, line);
+        const int32_t mixed = is_fine ? (done + PAIRS - 1) / PAIRS : 0;
+        add_words(work, upper_way(mixed), (done + 1) / 2, p, line);
     }
     for (int32_t at = 0; is_fine && at < done; at += PAIRS) {
         add_words(&work[PARTS + at], mixed_way(), ih_min_s32(done - at, PAIRS), p, line);
@@ -442,7 +582,7 @@ static void take_from_line(uint32_t work[IH_NORMAL_WORK][TERMS], bool is_fine, i
 static void take_from_lines(uint32_t work[IH_NORMAL_WORK][TERMS], bool is_fine, int32_t count,
                             int32_t *normal)
 {
-    add_lines(work, upper_way(), count, normal);
+    add_lines(work, upper_way(is_fine ? BLOCK / PAIRS : 0), count, normal);
     for (int32_t at = 0; is_fine && at < BLOCK; at += PAIRS) {
         add_lines(&work[PARTS + at], mixed_way(), count, normal);
     }
