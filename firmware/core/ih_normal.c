@@ -611,9 +611,15 @@ bool ih_normal_factor(int32_t fine_from, int32_t least_q30, int32_t *line,
 }
 
 /* Numbers of a matrix that was not positive may be great: sums wrap around then, and quotients are limited. */
-static int64_t quotient(int64_t rest, int32_t pivot)
+__attribute__((noinline)) static int64_t quotient(int64_t rest, int32_t pivot)
 {
     return ih_div_round(ih_clamp_s64(rest, (int64_t)1 << 62), pivot);
+}
+
+/* An unknown from what is left of the right side. */
+static int32_t solved(uint64_t rest, int32_t pivot)
+{
+    return (int32_t)ih_clamp_s64(quotient(IH_WRAPS(int64_t, rest), pivot), INT32_MAX);
 }
 
 /* F^T v = b, in b's unit: v in b's place. */
@@ -623,14 +629,17 @@ IH_WRAPPING static void solve_first(const int32_t *line, int32_t *b)
     for (int32_t k = 0; k < TERMS; k++) {
         rest[k] = IH_WRAPS(uint64_t, (int64_t)b[k] * (1 << FACTOR_BITS));
     }
-    for (int32_t p = TERMS - 1; p >= 0; p--) {
-        const int32_t *row = &line[ih_normal_line(p)];
-        const int32_t v =
-            (int32_t)ih_clamp_s64(quotient(IH_WRAPS(int64_t, rest[p]), row[p]), INT32_MAX);
-        const int32_t less = -v;
-        b[p] = v;
-        for (int32_t k = 0; k < p; k++) {
-            rest[k] += IH_WRAPS(uint64_t, (int64_t)row[k] * less);
+    /* Two at a time: what is left is loaded and stored half as often. */
+    for (int32_t p = TERMS - 1; p > 0; p -= 2) {
+        const int32_t *row = &line[ih_normal_line(p)], *next = &line[ih_normal_line(p - 1)];
+        b[p] = solved(rest[p], row[p]);
+        const int32_t less = -b[p];
+        b[p - 1] =
+            solved(rest[p - 1] + IH_WRAPS(uint64_t, (int64_t)row[p - 1] * less), next[p - 1]);
+        const int32_t next_less = -b[p - 1];
+        for (int32_t k = 0; k < p - 1; k++) {
+            rest[k] += IH_WRAPS(uint64_t, (int64_t)row[k] * less) +
+                       IH_WRAPS(uint64_t, (int64_t)next[k] * next_less);
         }
     }
 }
