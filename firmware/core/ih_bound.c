@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "ih_fix.h"
-#include "ih_lane.h"
+#include "ih_lane16.h"
 
 /* Values of ih_scan in 64ths, rounded up. */
 #define VALUE_ON 64

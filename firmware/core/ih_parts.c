@@ -10,6 +10,8 @@
 #endif
 
 #define POINTS IH_PARTS_POINTS
+/* What fans sum up fits its bits up to here, with 1 % to spare: docs/numerics.md. */
+_Static_assert(POINTS <= 56, "second moments of fans need more bits");
 /* What is rounded of spreads, see Error in the header: 12 times the greatest distance of an ellipse's
  * centre from the middle of the outline; 18 times 49 units of Q16 of a second moment in ih_ellipse. */
 #define CENTRE_ERROR (12 * 93 * 256)

@@ -3,7 +3,7 @@
 #include <string.h>
 
 #include "ih_fix.h"
-#include "ih_lane.h"
+#include "ih_lane16.h"
 
 #define DEPTH_LEAST_MM 227
 #define DEPTH_MOST_MM 16300

@@ -34,7 +34,7 @@ CORE_HEADERS = {
     "ih_fix.h": {"ih_range.h"},
     "ih_words.h": set(),
     "ih_lanes.h": set(),
-    "ih_lane.h": {"ih_range.h"},
+    "ih_lane16.h": {"ih_range.h"},
     "ih_rig.h": {"ih_config.h", "ih_types.h"},
     "ih_blob.h": CORE_SHARED,
     "ih_cholesky.h": {"ih_config.h", "ih_types.h"},
@@ -92,7 +92,7 @@ def allowed_in_core(name):
         return {own}
     if name == "ih_score.c":
         return {own, "ih_fix.h", "ih_score_weights.h"}
-    return {own, "ih_fix.h", "ih_range.h", "ih_words.h", "ih_lanes.h", "ih_lane.h"} if own in CORE_HEADERS else None
+    return {own, "ih_fix.h", "ih_range.h", "ih_words.h", "ih_lanes.h", "ih_lane16.h"} if own in CORE_HEADERS else None
 
 
 def judge_core(path, quoted, target):

@@ -2,7 +2,7 @@
  * as on a limit, so that one of them on the wrong side would show; and that few rays are left. */
 #include "ih_evidence.h"
 
-#include "ih_lane.h"
+#include "ih_lane16.h"
 
 #include "ih_test.h"
 

@@ -1,10 +1,10 @@
-/* ih_lane - arithmetic of one 16-bit number with sign, as vectors have it, for loops without a branch
+/* ih_lane16 - arithmetic of one 16-bit number with sign, as vectors have it, for loops without a branch
  * that compilers turn into them: with AVX2 16 at once, with SSE2 and NEON 8.
  *
  * Everything wraps; a mask is all bits or none.
  */
-#ifndef IH_LANE_H
-#define IH_LANE_H
+#ifndef IH_LANE16_H
+#define IH_LANE16_H
 
 #include <stdint.h>
 
