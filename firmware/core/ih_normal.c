@@ -653,7 +653,7 @@ IH_WRAPPING static int64_t dot(const int32_t *a, const int32_t *b, int32_t count
     return IH_WRAPS(int64_t, sum);
 }
 
-void ih_normal_solve(const int32_t *line, const int32_t *b, int32_t *x_mantissa,
+bool ih_normal_solve(const int32_t *line, const int32_t *b, int32_t *x_mantissa,
                      int32_t *x_exponent)
 {
     int exponent = 0;
@@ -667,6 +667,9 @@ void ih_normal_solve(const int32_t *line, const int32_t *b, int32_t *x_mantissa,
         const int grow = ih_max_s32(0, ih_bits_u64((uint64_t)ih_abs_s64(value)) - MANTISSA_BITS);
         if (grow > 0) { /* move the binary point of what is solved so far */
             exponent += grow;
+            if (exponent > IH_NORMAL_EXPONENT_MOST) {
+                return false;
+            }
             for (int32_t k = 0; k < p; k++) {
                 x_mantissa[k] = (int32_t)ih_shift_round(x_mantissa[k], grow);
             }
@@ -676,4 +679,5 @@ void ih_normal_solve(const int32_t *line, const int32_t *b, int32_t *x_mantissa,
     }
     IH_IN_RANGE(exponent, 0, IH_RANGE_EXPONENT);
     *x_exponent = exponent;
+    return true;
 }

@@ -69,8 +69,10 @@ bool ih_normal_factor(int32_t fine_from, int32_t least_q30, int32_t *line,
                       uint32_t work[IH_NORMAL_WORK][IH_NORMAL_TERMS]);
 
 /* Solve F^T F x = b. b: so small that |F^-T b| stays within int32, else it is saturated. x: mantissas below 2^25 with
- * x_i = mantissa_i * 2^exponent in b's unit, exponent >= 0 as small as that allows. b and x may be the same array. */
-void ih_normal_solve(const int32_t *line, const int32_t *b, int32_t *x_mantissa,
+ * x_i = mantissa_i * 2^exponent in b's unit, exponent >= 0 as small as that allows. b and x may be the same array. False: the
+ * exponent would be greater than IH_NORMAL_EXPONENT_MOST, which no factor of a positive matrix gives; then x is nothing. */
+#define IH_NORMAL_EXPONENT_MOST 62
+bool ih_normal_solve(const int32_t *line, const int32_t *b, int32_t *x_mantissa,
                      int32_t *x_exponent);
 
 #endif

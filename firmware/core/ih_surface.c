@@ -404,15 +404,18 @@ static void add_solution(struct ih_surface_scratch *scratch, int fraction)
 
 /* Solve for a correction of the coefficients from what is left on the right side. squares_log2: of the sum of
  * the unknowns' squares, where the samples' sums are 1, over the square of the samples' number. Returns false, and
- * leaves all as it is, when it is greater than limit_log2, that of the correction before: then they do not come to
- * rest. */
+ * leaves all as it is, when there is none, or when it is greater than limit_log2, that of the correction before: then they
+ * do not come to rest. */
 static bool correct(const struct ih_surface_params *params, struct ih_surface_scratch *scratch)
 {
     int32_t exponent;
     set_or_take_ridge(params, true, scratch);
     /* A x = b is (right side) / 2^normal_shift: x and b have as many fraction bits more. */
     const int fraction = scale_right(scratch) + scratch->normal_shift;
-    ih_normal_solve(scratch->of.system.factor, scratch->solution, scratch->solution, &exponent);
+    if (!ih_normal_solve(scratch->of.system.factor, scratch->solution, scratch->solution,
+                         &exponent)) {
+        return false;
+    }
     int64_t squares = 0; /* 144 * 2^50 */
     for (int32_t i = 0; i < TERMS; i++) {
         squares += (int64_t)scratch->solution[i] * scratch->solution[i];

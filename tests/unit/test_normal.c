@@ -301,7 +301,7 @@ static void systems_are_solved(void)
         for (i = 0; i < TERMS; i++) {
             b[i] = (int32_t)ih_test_between(&random_source, -200000, 200000);
         }
-        ih_normal_solve(factor, b, x, &exponent);
+        TEST_ASSERT_TRUE(ih_normal_solve(factor, b, x, &exponent));
         for (i = 0; i < TERMS; i++) {
             most = fmax(most, fabs(ldexp(x[i], exponent)));
         }
@@ -315,14 +315,31 @@ static void systems_are_solved(void)
             IH_TEST_WITHIN(TERMS * (ldexp(1, exponent) + most * ldexp(1, -26) + 1), b[i], sum,
                            "solution", i);
         }
-        ih_normal_solve(factor, b, b, &j);
+        TEST_ASSERT_TRUE(ih_normal_solve(factor, b, b, &j));
         IH_TEST_EQUAL(exponent, j, "in place", 0);
         TEST_ASSERT_EQUAL_INT32_ARRAY(x, b, TERMS);
         memset(b, 0, sizeof b);
-        ih_normal_solve(factor, b, x, &exponent);
+        TEST_ASSERT_TRUE(ih_normal_solve(factor, b, x, &exponent));
         TEST_ASSERT_EACH_EQUAL_INT32(0, x, TERMS);
         IH_TEST_EQUAL(0, exponent, "of nothing", 0);
     }
+}
+
+/* Unknowns that grow by 2^13 from one to the next have no common exponent: that is told before it gets too great. */
+static void what_has_no_solution_is_told(void)
+{
+    static int32_t b[TERMS], x[TERMS];
+    int32_t exponent, i;
+
+    memset(factor, 0, sizeof factor);
+    for (i = 0; i < TERMS; i++) {
+        b[i] = i == 0;
+        factor[ih_normal_line(i) + i] = 1 << 14;
+        if (i > 0) {
+            factor[ih_normal_line(i) + i - 1] = 1 << 27;
+        }
+    }
+    TEST_ASSERT_FALSE(ih_normal_solve(factor, b, x, &exponent));
 }
 
 /* A diagonal of squares has its roots; what is not positive counts as the least pivot. */
@@ -412,6 +429,7 @@ int main(void)
     RUN_TEST(systems_have_their_factor);
     RUN_TEST(what_is_too_coarse_is_told);
     RUN_TEST(systems_are_solved);
+    RUN_TEST(what_has_no_solution_is_told);
     RUN_TEST(pivots_have_a_least_value);
     RUN_TEST(a_pivot_of_one_keeps_signs);
     RUN_TEST(factors_have_the_same_bits);
