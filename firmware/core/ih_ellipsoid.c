@@ -64,17 +64,9 @@ struct ih_aim ih_ellipsoid_aim(const int32_t semi_mm_q8[3], const struct ih_ray 
     return aim;
 }
 
-bool ih_ellipsoid_cross(const struct ih_ellipsoid *ellipsoid, const int32_t origin_mm_q8[3],
-                        const struct ih_ray *ray, struct ih_crossing *out)
-{
-    const struct ih_shares shares = ih_ellipsoid_shares(ellipsoid->semi_mm_q8);
-    const struct ih_aim aim = ih_ellipsoid_aim(ellipsoid->semi_mm_q8, ray);
-    return ih_ellipsoid_cross_aimed(ellipsoid, &shares, origin_mm_q8, ray, &aim, out);
-}
-
-bool ih_ellipsoid_cross_aimed(const struct ih_ellipsoid *ellipsoid, const struct ih_shares *shares,
-                              const int32_t origin_mm_q8[3], const struct ih_ray *ray,
-                              const struct ih_aim *aim, struct ih_crossing *out)
+bool ih_ellipsoid_cross(const struct ih_ellipsoid *ellipsoid, const struct ih_shares *shares,
+                        const int32_t origin_mm_q8[3], const struct ih_ray *ray,
+                        const struct ih_aim *aim, struct ih_crossing *out)
 {
     const int32_t slope_q20[2] = {ray->slope_x_q20, ray->slope_y_q20};
     const int64_t g_q14[2] = {aim->g_q14[0], aim->g_q14[1]};
@@ -125,16 +117,18 @@ struct ih_shares ih_ellipsoid_shares(const int32_t semi_mm_q8[3])
     return shares;
 }
 
-bool ih_ellipsoid_place(const struct ih_ellipsoid *ellipsoid, const int32_t point_mm_q8[3],
-                        int32_t place_q14[3])
+bool ih_ellipsoid_place(const struct ih_ellipsoid *ellipsoid, const struct ih_shares *shares,
+                        const int32_t point_mm_q8[3], int32_t place_q14[3])
 {
     for (int axis = 0; axis < 3; axis++) {
-        int64_t offset_q8 = (int64_t)point_mm_q8[axis] - ellipsoid->centre_mm_q8[axis];
-        int64_t place = ih_div_round(offset_q8 * (1 << 14), ellipsoid->semi_mm_q8[axis]);
-        if (!in_reach(place)) {
+        const int64_t offset_q8 = (int64_t)point_mm_q8[axis] - ellipsoid->centre_mm_q8[axis];
+        if (ih_abs_s64(offset_q8) > IH_SHARE_MOST) {
             return false;
         }
-        place_q14[axis] = (int32_t)place;
+        place_q14[axis] = ih_share(shares->share_q50[axis], (int32_t)offset_q8);
+        if (!in_reach(place_q14[axis])) {
+            return false;
+        }
     }
     return true;
 }

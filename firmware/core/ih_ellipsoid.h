@@ -57,10 +57,6 @@ struct ih_aim {
 
 struct ih_aim ih_ellipsoid_aim(const int32_t semi_mm_q8[3], const struct ih_ray *ray);
 
-/* False: far away, *out is not set. */
-bool ih_ellipsoid_cross(const struct ih_ellipsoid *ellipsoid, const int32_t origin_mm_q8[3],
-                        const struct ih_ray *ray, struct ih_crossing *out);
-
 /* The box through which every ray passes that comes nearer than radius, with slopes up to slope_most
  * (as from ih_space_slope_most): radius2 >= e.e / (1 + g.g). The errors above are allowed for. */
 struct ih_ellipsoid_box ih_ellipsoid_box(const struct ih_ellipsoid *ellipsoid,
@@ -89,13 +85,13 @@ static inline int32_t ih_share(int64_t share_q50, int32_t offset)
     return (int32_t)((offset * share_q50 + ((int64_t)1 << 35)) >> 36);
 }
 
-/* ih_ellipsoid_cross with the aim, and the shares of the semi-axes, worked out before. */
-bool ih_ellipsoid_cross_aimed(const struct ih_ellipsoid *ellipsoid, const struct ih_shares *shares,
-                              const int32_t origin_mm_q8[3], const struct ih_ray *ray,
-                              const struct ih_aim *aim, struct ih_crossing *out);
+/* shares and aim: of this size. False: far away, *out is not set. */
+bool ih_ellipsoid_cross(const struct ih_ellipsoid *ellipsoid, const struct ih_shares *shares,
+                        const int32_t origin_mm_q8[3], const struct ih_ray *ray,
+                        const struct ih_aim *aim, struct ih_crossing *out);
 
 /* A point in the ellipsoid's units. False when beyond the reach on any axis. */
-bool ih_ellipsoid_place(const struct ih_ellipsoid *ellipsoid, const int32_t point_mm_q8[3],
-                        int32_t place_q14[3]);
+bool ih_ellipsoid_place(const struct ih_ellipsoid *ellipsoid, const struct ih_shares *shares,
+                        const int32_t point_mm_q8[3], int32_t place_q14[3]);
 
 #endif

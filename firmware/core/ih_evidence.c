@@ -123,24 +123,6 @@ static void add_on(const struct view *view, const struct ih_ellipsoid *ellipsoid
     }
 }
 
-/* ih_ellipsoid_place with the shares of the semi-axes worked out before: the same places. */
-static bool find_place(const struct candidate *candidate, const int32_t point_mm_q8[3],
-                       int32_t place_q14[3])
-{
-    for (int axis = 0; axis < 3; axis++) {
-        const int64_t off_q8 =
-            (int64_t)point_mm_q8[axis] - candidate->ellipsoid->centre_mm_q8[axis];
-        if (ih_abs_s64(off_q8) > IH_SHARE_MOST) {
-            return false;
-        }
-        place_q14[axis] = ih_share(candidate->shares.share_q50[axis], (int32_t)off_q8);
-        if (ih_abs_s32(place_q14[axis]) > IH_ELLIPSOID_REACH << 14) {
-            return false;
-        }
-    }
-    return true;
-}
-
 /* Rays through the head. */
 static void look_inside(const struct candidate *candidate, const struct view *view,
                         struct tally *tally)
@@ -152,8 +134,8 @@ static void look_inside(const struct candidate *candidate, const struct view *vi
         return;
     }
     const struct ih_aim aim = ih_ellipsoid_aim(ellipsoid->semi_mm_q8, view->ray);
-    if (!ih_ellipsoid_cross_aimed(ellipsoid, &candidate->shares, candidate->origin_mm_q8, view->ray,
-                                  &aim, &crossing) ||
+    if (!ih_ellipsoid_cross(ellipsoid, &candidate->shares, candidate->origin_mm_q8, view->ray, &aim,
+                            &crossing) ||
         crossing.radius2_q14 >= INSIDE_Q14) {
         return;
     }
@@ -164,7 +146,7 @@ static void look_inside(const struct candidate *candidate, const struct view *vi
     int32_t behind_q8 = view->ray->point_mm_q8[2] - crossing.entry_mm_q8;
     tally->through += behind_q8 > THROUGH_MM_Q8;
     tally->front += behind_q8 < -FRONT_MM_Q8;
-    if (find_place(candidate, view->ray->point_mm_q8, place_q14) &&
+    if (ih_ellipsoid_place(ellipsoid, &candidate->shares, view->ray->point_mm_q8, place_q14) &&
         ih_row_distance(ellipsoid, place_q14, &off_q8) && ih_abs_s32(off_q8) < ON_MM_Q8) {
         tally->hit++;
         add_on(view, ellipsoid, off_q8, tally);

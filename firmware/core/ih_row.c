@@ -599,8 +599,7 @@ static void add_push(const struct step *step, const struct ih_ray *ray, struct i
         return;
     }
     const struct ih_aim aim = ih_ellipsoid_aim(ellipsoid->semi_mm_q8, ray);
-    if (!ih_ellipsoid_cross_aimed(ellipsoid, &step->shares, step->origin_mm_q8, ray, &aim,
-                                  &crossing) ||
+    if (!ih_ellipsoid_cross(ellipsoid, &step->shares, step->origin_mm_q8, ray, &aim, &crossing) ||
         crossing.radius2_q14 >= ONE_Q14 ||
         ray->point_mm_q8[2] - step->see_through_mm * 256 <= crossing.entry_mm_q8) {
         return;

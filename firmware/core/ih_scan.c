@@ -70,7 +70,7 @@ static void add_ray(const struct ih_space *space, const struct ih_ellipsoid *hea
 {
     const struct ih_aim aim = ih_ellipsoid_aim(head->semi_mm_q8, ray);
     struct ih_crossing crossing;
-    if (!ih_ellipsoid_cross_aimed(head, shares, space->origin_mm_q8, ray, &aim, &crossing)) {
+    if (!ih_ellipsoid_cross(head, shares, space->origin_mm_q8, ray, &aim, &crossing)) {
         return;
     }
     if (crossing.radius2_q14 < 1 << 14) {

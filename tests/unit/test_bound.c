@@ -4,6 +4,7 @@
 #include "ih_scan.h"
 
 #include "ih_test.h"
+#include "ih_test_cross.h"
 #include "ih_test_scene.h"
 
 static const double pi = 3.14159265358979323846;
@@ -140,7 +141,7 @@ static void rays_that_pass_at_a_limit(void)
             const struct ih_ellipsoid mean = ih_ellipsoid_mean(centre);
 
             aim_at(0, centre, reach * cos(angle), reach * sin(angle));
-            if (!ih_ellipsoid_cross(&mean, space.origin_mm_q8, &space.ray[0], &crossing)) {
+            if (!ih_test_cross(&mean, space.origin_mm_q8, &space.ray[0], &crossing)) {
                 break;
             }
             reach *= radius[kind] / sqrt(crossing.radius2_q14 / 16384.0);
@@ -187,7 +188,7 @@ static void points_at_a_limit_of_depth(void)
 
             aim_at(slot, centre, (reach + random_in(&random, -0.004, 0.004)) * cos(angle),
                    reach * sin(angle));
-            if (ih_ellipsoid_cross(&mean, space.origin_mm_q8, &space.ray[slot], &crossing)) {
+            if (ih_test_cross(&mean, space.origin_mm_q8, &space.ray[slot], &crossing)) {
                 see(slot, (int32_t)(crossing.entry_mm_q8 +
                                     256 * (behind + random_in(&random, -0.6, 0.6))));
             }

@@ -4,6 +4,7 @@
 #include "ih_fix.h"
 
 #include "ih_test.h"
+#include "ih_test_cross.h"
 
 struct vector_crossing {
     bool is_wild; /* slopes up to 4 and any semi-axes; else a head and slopes up to 0.5 */
@@ -63,7 +64,7 @@ static void crossings_match_float64(void)
 
         memcpy(ellipsoid.centre_mm_q8, v->centre_mm_q8, sizeof v->centre_mm_q8);
         memcpy(ellipsoid.semi_mm_q8, v->semi_mm_q8, sizeof v->semi_mm_q8);
-        IH_TEST_EQUAL(v->in_reach, ih_ellipsoid_cross(&ellipsoid, v->origin_mm_q8, &ray, &crossing),
+        IH_TEST_EQUAL(v->in_reach, ih_test_cross(&ellipsoid, v->origin_mm_q8, &ray, &crossing),
                       "reach", i);
         if (!v->in_reach) {
             continue;
@@ -96,7 +97,7 @@ static void a_ball_straight_ahead(void)
         const struct ih_ellipsoid at = ball(x, 0, 1000, 100);
         const double depth = x > -100 && x < 100 ? 1000 - sqrt(10000.0 - x * x) : 1000;
 
-        TEST_ASSERT_TRUE(ih_ellipsoid_cross(&at, zero, &ray, &crossing));
+        TEST_ASSERT_TRUE(ih_test_cross(&at, zero, &ray, &crossing));
         IH_TEST_WITHIN(1e-4, -x / 100.0, ih_test_from_q(crossing.at_q14[0], 14), "at", x);
         IH_TEST_WITHIN(1e-4, -x / 100.0, ih_test_from_q(crossing.nearest_q14[0], 14), "near", x);
         IH_TEST_EQUAL(0, crossing.nearest_q14[1], "up", x);
@@ -117,10 +118,10 @@ static void what_passes_far_away_is_not_looked_at(void)
         struct ih_ellipsoid at = ball(0, 0, 1000, 100);
 
         at.centre_mm_q8[i % 2] = step * 800 * 256;
-        TEST_ASSERT_TRUE(ih_ellipsoid_cross(&at, zero, &ray, &crossing));
+        TEST_ASSERT_TRUE(ih_test_cross(&at, zero, &ray, &crossing));
         at.centre_mm_q8[i % 2] += step;
         memset(&crossing, IH_TEST_FILL, sizeof crossing);
-        TEST_ASSERT_FALSE(ih_ellipsoid_cross(&at, zero, &ray, &crossing));
+        TEST_ASSERT_FALSE(ih_test_cross(&at, zero, &ray, &crossing));
         IH_TEST_UNTOUCHED(&crossing, sizeof crossing, "a far crossing");
     }
 }
@@ -140,8 +141,8 @@ static void a_mirror_changes_the_sign_alone(void)
         struct ih_crossing a, b;
 
         mirrored.centre_mm_q8[0] = -at.centre_mm_q8[0];
-        TEST_ASSERT_TRUE(ih_ellipsoid_cross(&at, zero, &ray, &a));
-        TEST_ASSERT_TRUE(ih_ellipsoid_cross(&mirrored, zero, &back, &b));
+        TEST_ASSERT_TRUE(ih_test_cross(&at, zero, &ray, &a));
+        TEST_ASSERT_TRUE(ih_test_cross(&mirrored, zero, &back, &b));
         IH_TEST_RANGE(-3, 3, a.at_q14[0] + b.at_q14[0], "at", i);
         IH_TEST_RANGE(-3, 3, a.nearest_q14[0] + b.nearest_q14[0], "nearest", i);
         IH_TEST_RANGE(-3, 3, a.nearest_q14[2] - b.nearest_q14[2], "deep", i);
@@ -152,21 +153,22 @@ static void a_mirror_changes_the_sign_alone(void)
 static void places_are_in_semi_axes(void)
 {
     const struct ih_ellipsoid head = ih_ellipsoid_mean((const int32_t[3]){100, -200, 300});
+    const struct ih_shares shares = ih_ellipsoid_shares(head.semi_mm_q8);
     int32_t point[3], place[3], axis;
 
     for (axis = 0; axis < 3; axis++) {
         memcpy(point, head.centre_mm_q8, sizeof point);
         point[axis] += head.semi_mm_q8[axis];
-        TEST_ASSERT_TRUE(ih_ellipsoid_place(&head, point, place));
+        TEST_ASSERT_TRUE(ih_ellipsoid_place(&head, &shares, point, place));
         TEST_ASSERT_EQUAL_INT32(1 << 14, place[axis]);
         TEST_ASSERT_EQUAL_INT32(0, place[(axis + 1) % 3] | place[(axis + 2) % 3]);
         point[axis] += 7 * head.semi_mm_q8[axis];
-        TEST_ASSERT_TRUE(ih_ellipsoid_place(&head, point, place));
+        TEST_ASSERT_TRUE(ih_ellipsoid_place(&head, &shares, point, place));
         TEST_ASSERT_EQUAL_INT32(8 << 14, place[axis]);
         point[axis] += 2;
-        TEST_ASSERT_FALSE(ih_ellipsoid_place(&head, point, place));
+        TEST_ASSERT_FALSE(ih_ellipsoid_place(&head, &shares, point, place));
         point[axis] = INT32_MIN;
-        TEST_ASSERT_FALSE(ih_ellipsoid_place(&head, point, place));
+        TEST_ASSERT_FALSE(ih_ellipsoid_place(&head, &shares, point, place));
     }
 }
 
@@ -208,7 +210,7 @@ static void the_extremes_do_not_overflow(void)
             }
             at.centre_mm_q8[2] += (int32_t)ih_test_any_size(&random, 10);
         }
-        if (!ih_ellipsoid_cross(&at, origin, &ray, &crossing)) {
+        if (!ih_test_cross(&at, origin, &ray, &crossing)) {
             continue;
         }
         hits += crossing.radius2_q14 < 1 << 14;
@@ -258,8 +260,7 @@ static void the_box_misses_nothing(void)
         const struct ih_ellipsoid_box box = ih_ellipsoid_box(&at, slope_most, radius2_q14);
         const bool in_box = ih_ellipsoid_in_box(&at, &box, origin, &ray);
 
-        if (ih_ellipsoid_cross(&at, origin, &ray, &crossing) &&
-            crossing.radius2_q14 < radius2_q14) {
+        if (ih_test_cross(&at, origin, &ray, &crossing) && crossing.radius2_q14 < radius2_q14) {
             TEST_ASSERT_TRUE(in_box);
             near++;
         } else if (i % 2 == 0) {

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 
 #include "ih_test.h"
+#include "ih_test_cross.h"
 #include "ih_test_scene.h"
 
 static struct ih_row_scratch scratch;
@@ -103,6 +104,24 @@ static int64_t plain_weight(int64_t residual, int64_t scale, int32_t down)
     return ih_mul_shift(ih_div_round((int64_t)1 << 48, sum * sum), low, 16);
 }
 
+/* In the ellipsoid's units, by divisions. */
+static bool plain_place(const struct ih_ellipsoid *e, const int32_t point_mm_q8[3],
+                        int32_t place[3])
+{
+    int axis;
+
+    for (axis = 0; axis < 3; axis++) {
+        const int64_t offset = (int64_t)point_mm_q8[axis] - e->centre_mm_q8[axis];
+        const int64_t quotient = ih_div_round(offset * 16384, e->semi_mm_q8[axis]);
+
+        if (quotient < -8 * 16384 || quotient > 8 * 16384) {
+            return false;
+        }
+        place[axis] = (int32_t)quotient;
+    }
+    return true;
+}
+
 /* Rows that it added. */
 static int32_t plain_collect(const struct ih_ellipsoid *e, int32_t scale_mm, int32_t see_through_mm,
                              struct ih_row_system *out)
@@ -119,7 +138,7 @@ static int32_t plain_collect(const struct ih_ellipsoid *e, int32_t scale_mm, int
         if (ray->state != IH_RAY_SEEN) {
             continue;
         }
-        if (ih_ellipsoid_place(e, ray->point_mm_q8, place) && plain_gradient(e, place, &g)) {
+        if (plain_place(e, ray->point_mm_q8, place) && plain_gradient(e, place, &g)) {
             const int64_t residual = plain_distance(&g);
             const int64_t weight = plain_weight(residual, scale_mm, place[1]);
 
@@ -128,8 +147,7 @@ static int32_t plain_collect(const struct ih_ellipsoid *e, int32_t scale_mm, int
                 count++;
             }
         }
-        if (ih_ellipsoid_cross(e, space.origin_mm_q8, ray, &crossing) &&
-            crossing.radius2_q14 < 16384 &&
+        if (ih_test_cross(e, space.origin_mm_q8, ray, &crossing) && crossing.radius2_q14 < 16384 &&
             ray->point_mm_q8[2] - see_through_mm * 256 > crossing.entry_mm_q8 &&
             plain_gradient(e, crossing.nearest_q14, &g)) {
             const int64_t residual = plain_distance(&g);

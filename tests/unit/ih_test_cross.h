@@ -1,0 +1,17 @@
+/* Cross an ellipsoid with a ray, everything that the core works out before included. */
+#ifndef IH_TEST_CROSS_H
+#define IH_TEST_CROSS_H
+
+#include "ih_ellipsoid.h"
+
+static inline bool ih_test_cross(const struct ih_ellipsoid *ellipsoid,
+                                 const int32_t origin_mm_q8[3], const struct ih_ray *ray,
+                                 struct ih_crossing *out)
+{
+    const struct ih_shares shares = ih_ellipsoid_shares(ellipsoid->semi_mm_q8);
+    const struct ih_aim aim = ih_ellipsoid_aim(ellipsoid->semi_mm_q8, ray);
+
+    return ih_ellipsoid_cross(ellipsoid, &shares, origin_mm_q8, ray, &aim, out);
+}
+
+#endif
