@@ -62,7 +62,9 @@ static bool start_core(struct run *run, const char *dir)
     bool good = path != NULL && app_rig_load(path, &calibration, &error);
     if (good) {
         enum ih_err err = isohead_init(run->head, &calibration, &bad_slot);
-        run->head->params.is_paper = run->options->paper;
+        if (run->options->paper) {
+            ih_params_paper(&run->head->params);
+        }
         sim_without_apply(run->options->without, &run->head->params);
         good = err == IH_OK;
         if (!good) {

@@ -61,7 +61,9 @@ static bool load_rig(struct app_loop *loop, struct hal_error *error)
         return hal_fail(error, "kind: range, expected a rig with a laser: dots");
     }
     enum ih_err err = isohead_init(loop->head, &calibration, &bad_slot);
-    loop->head->params.is_paper = loop->config->paper;
+    if (loop->config->paper) {
+        ih_params_paper(&loop->head->params);
+    }
     if (err != IH_OK) {
         app_rig_explain(&calibration, err, bad_slot, error);
         return false;

@@ -61,6 +61,12 @@ void ih_params_default(struct ih_params *params)
     ih_tracks_params_default(&params->tracks);
 }
 
+void ih_params_paper(struct ih_params *params)
+{
+    ih_params_default(params);
+    params->is_paper = true;
+}
+
 enum ih_err isohead_init(struct isohead *head, const struct ih_calibration *calibration,
                          int32_t *bad_slot)
 {

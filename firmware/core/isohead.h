@@ -67,6 +67,8 @@ struct isohead {
 };
 
 void ih_params_default(struct ih_params *params);
+/* The paper's method alone: as the default, with is_paper set. */
+void ih_params_paper(struct ih_params *params);
 
 /* Check the calibration, derive the rig, set default parameters. After an error every frame is
  * refused. */

@@ -262,7 +262,9 @@ static void start(struct canvas *canvas, struct fuzz_input *input)
     uint8_t flags = fuzz_byte(input);
     memset(canvas, 0, sizeof *canvas);
     core = *fuzz_rig_dots_core(flags & 3);
-    core.params.is_paper = (flags & 4) != 0;
+    if ((flags & 4) != 0) {
+        ih_params_paper(&core.params);
+    }
     core.params.tracks.side =
         (flags & 8) != 0 ? fuzz_within(input, IH_SIDE_MIDDLE, IH_SIDE_RIGHT) : IH_SIDE_MIDDLE;
     canvas->core = &core;

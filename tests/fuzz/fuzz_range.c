@@ -138,7 +138,9 @@ static void start(struct image *image, struct fuzz_input *input)
     uint8_t flags = fuzz_byte(input);
     memset(image, 0, sizeof *image);
     core = *fuzz_rig_range_core(flags & 1);
-    core.params.is_paper = (flags & 4) != 0;
+    if ((flags & 4) != 0) {
+        ih_params_paper(&core.params);
+    }
     core.params.tracks.side =
         (flags & 8) != 0 ? fuzz_within(input, IH_SIDE_MIDDLE, IH_SIDE_RIGHT) : IH_SIDE_MIDDLE;
     image->core = &core;

@@ -483,7 +483,7 @@ static void the_tracks_follow_the_frames_times(void)
     TEST_ASSERT_GREATER_THAN_INT32(0, head.expected.count);
     TEST_ASSERT_EQUAL_INT32(id, head.tracks.selected_id);
     start(&head, vector_busts[1].rig);
-    head.params.is_paper = true;
+    ih_params_paper(&head.params);
     TEST_ASSERT_EQUAL_INT(IH_OK, isohead_frame(&head, &frame, NULL, 40000));
     TEST_ASSERT_FALSE(head.tracks.has_time);
 }
@@ -535,7 +535,7 @@ static void the_paper_alone_judges_each_frame_by_its_nests(void)
     process();
     TEST_ASSERT_TRUE(head.result.entry_count > 0 && head.result.entry[0].has_probability);
     paint_bust(bust);
-    head.params.is_paper = true;
+    ih_params_paper(&head.params);
     for (pass = 0; pass < 2; pass++) {
         TEST_ASSERT_EQUAL_INT(IH_OK, isohead_frame(&head, &frame, NULL, pass * 40000));
         expect_the_nests(bust->x_mm, bust->y_mm, bust->z_mm);
@@ -555,7 +555,9 @@ static void the_paper_alone_takes_the_best_window(void)
 
     for (pass = 0; pass < 2; pass++) {
         start_range(640, 480);
-        head.params.is_paper = pass == 0;
+        if (pass == 0) {
+            ih_params_paper(&head.params);
+        }
         render_range(-330, -60, 900, 1700);
         memcpy(left, grey16, sizeof left);
         render_range(330, -60, 900, 1700);
@@ -645,14 +647,21 @@ static void defaults_fill_every_parameter(void)
     static struct ih_params params;
     int32_t word[sizeof params / sizeof(int32_t)];
     size_t i;
+    int pass;
 
     _Static_assert(sizeof params % sizeof(int32_t) == 0, "parameters are whole words");
-    memset(&params, IH_TEST_FILL, sizeof params);
-    ih_params_default(&params);
-    TEST_ASSERT_FALSE(params.is_paper);
-    memcpy(word, &params, sizeof params);
-    for (i = 1; i < sizeof word / sizeof word[0]; i++) { /* the first holds is_paper alone */
-        TEST_ASSERT_FALSE(word[i] == (int32_t)(0x01010101u * IH_TEST_FILL));
+    for (pass = 0; pass < 2; pass++) {
+        memset(&params, IH_TEST_FILL, sizeof params);
+        if (pass == 0) {
+            ih_params_default(&params);
+        } else {
+            ih_params_paper(&params);
+        }
+        TEST_ASSERT_EQUAL_INT(pass, params.is_paper);
+        memcpy(word, &params, sizeof params);
+        for (i = 1; i < sizeof word / sizeof word[0]; i++) { /* the first holds is_paper alone */
+            TEST_ASSERT_FALSE(word[i] == (int32_t)(0x01010101u * IH_TEST_FILL));
+        }
     }
 }
 
