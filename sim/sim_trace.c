@@ -118,6 +118,7 @@ static void write_surface(struct app_write *write, const struct ih_surface *surf
     app_write_key(write, "valid");
     app_write_bool(write, surface->valid);
     if (surface->valid) {
+        app_write_int_field(write, "centres", surface->centres);
         app_write_int_field(write, "downweighted_count", surface->downweighted_count);
         app_write_int_field(write, "mean_mm_q8", surface->mean_mm_q8);
         app_write_int_field(write, "nearest_mm_q8", surface->nearest_mm_q8);

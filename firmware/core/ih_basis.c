@@ -145,11 +145,12 @@ static inline __m256i roots_of_eight(__m256i square)
     return _mm256_srlv_epi32(_mm256_add_epi32(value, more), _mm256_add_epi32(e, EACH(ROOT_SHIFT)));
 }
 
-void ih_basis_roots(const uint32_t *across_q18, const uint32_t *down_q18, int32_t down_count,
-                    uint32_t *root_q20)
+/* Lines of 12: two of them are three vectors. */
+static void roots_by_twelve(const uint32_t *across_q18, const uint32_t *down_q18,
+                            int32_t down_count, uint32_t *root_q20)
 {
     const __m256i first = _mm256_loadu_si256((const __m256i *)across_q18);
-    const __m256i last = _mm256_loadu_si256((const __m256i *)&across_q18[IH_BASIS_ACROSS - 8]);
+    const __m256i last = _mm256_loadu_si256((const __m256i *)&across_q18[4]);
     const __m256i middle = _mm256_permute2x128_si256(last, first, 0x21);
     __m256i *at = (__m256i *)root_q20;
     for (int32_t k = 0; k < down_count; k += 2) {
@@ -160,6 +161,20 @@ void ih_basis_roots(const uint32_t *across_q18, const uint32_t *down_q18, int32_
         _mm256_storeu_si256(&at[1], roots_of_eight(_mm256_add_epi32(middle, both)));
         _mm256_storeu_si256(&at[2], roots_of_eight(_mm256_add_epi32(last, next)));
         at = &at[3];
+    }
+}
+
+void ih_basis_roots(const uint32_t *across_q18, int32_t across_count, const uint32_t *down_q18,
+                    int32_t down_count, uint32_t *root_q20)
+{
+    if (across_count != 8) {
+        roots_by_twelve(across_q18, down_q18, down_count, root_q20);
+        return;
+    }
+    const __m256i across = _mm256_loadu_si256((const __m256i *)across_q18);
+    for (int32_t k = 0; k < down_count; k++) {
+        _mm256_storeu_si256((__m256i *)&root_q20[8 * k],
+                            roots_of_eight(_mm256_add_epi32(across, EACH((int32_t)down_q18[k]))));
     }
 }
 
@@ -175,13 +190,13 @@ static inline uint32_t root_of(uint32_t square_q18)
     return (root[0] + (rise * g >> PART_SHIFT)) >> (ROOT_SHIFT + zeros / 2);
 }
 
-void ih_basis_roots(const uint32_t *across_q18, const uint32_t *down_q18, int32_t down_count,
-                    uint32_t *root_q20)
+void ih_basis_roots(const uint32_t *across_q18, int32_t across_count, const uint32_t *down_q18,
+                    int32_t down_count, uint32_t *root_q20)
 {
     for (int32_t k = 0; k < down_count; k++) {
         const uint32_t here_q18 = down_q18[k];
-        uint32_t *line_q20 = &root_q20[k * IH_BASIS_ACROSS];
-        for (int32_t i = 0; i < IH_BASIS_ACROSS; i++) {
+        uint32_t *line_q20 = &root_q20[k * across_count];
+        for (int32_t i = 0; i < across_count; i++) {
             line_q20[i] = root_of(across_q18[i] + here_q18);
         }
     }
@@ -191,11 +206,11 @@ void ih_basis_roots(const uint32_t *across_q18, const uint32_t *down_q18, int32_
 
 #if defined __AVX2__
 
-int64_t ih_basis_sum(const uint32_t *basis_q20, const int32_t *coefficient)
+int64_t ih_basis_sum(const uint32_t *basis_q20, const int32_t *coefficient, int32_t term_count)
 {
     __m256i sum = _mm256_setzero_si256();
 #pragma GCC unroll 4
-    for (int32_t i = 0; i < IH_BASIS_TERMS; i += 4) {
+    for (int32_t i = 0; i < term_count; i += 4) {
         const __m256i basis =
             _mm256_cvtepu32_epi64(_mm_loadu_si128((const __m128i *)&basis_q20[i]));
         const __m256i other =
@@ -207,11 +222,11 @@ int64_t ih_basis_sum(const uint32_t *basis_q20, const int32_t *coefficient)
     return part[0] + part[1] + part[2] + part[3];
 }
 
-void ih_basis_add(const uint32_t *basis_q20, int32_t factor, int64_t *sum)
+void ih_basis_add(const uint32_t *basis_q20, int32_t factor, int64_t *sum, int32_t term_count)
 {
     const __m256i each = EACH(factor);
 #pragma GCC unroll 4
-    for (int32_t i = 0; i < IH_BASIS_TERMS; i += 4) {
+    for (int32_t i = 0; i < term_count; i += 4) {
         const __m256i basis =
             _mm256_cvtepu32_epi64(_mm_loadu_si128((const __m128i *)&basis_q20[i]));
         __m256i *at = (__m256i *)&sum[i];
@@ -224,14 +239,14 @@ void ih_basis_add(const uint32_t *basis_q20, int32_t factor, int64_t *sum)
 
 /* There are only products of numbers without a sign: coefficients are taken for 2^31 more, which the sum of
  * the basis times 2^31 takes away again. Both pass 2^64, together they do not. */
-int64_t ih_basis_sum(const uint32_t *basis_q20, const int32_t *coefficient)
+int64_t ih_basis_sum(const uint32_t *basis_q20, const int32_t *coefficient, int32_t term_count)
 {
     const __m128i more = _mm_set1_epi32(INT32_MIN);
     const __m128i lower = _mm_set_epi32(0, -1, 0, -1);
     __m128i sum = _mm_setzero_si128();
     __m128i plain = sum;
 #pragma GCC unroll 4
-    for (int32_t i = 0; i < IH_BASIS_TERMS; i += 4) {
+    for (int32_t i = 0; i < term_count; i += 4) {
         const __m128i basis = _mm_loadu_si128((const __m128i *)&basis_q20[i]);
         const __m128i other =
             _mm_xor_si128(_mm_loadu_si128((const __m128i *)&coefficient[i]), more);
@@ -252,11 +267,11 @@ static inline __m128i changed(const int64_t *sum, __m128i by, bool is_less)
 }
 
 static inline void add_products(const uint32_t *basis_q20, uint32_t factor, bool is_less,
-                                int64_t *sum)
+                                int64_t *sum, int32_t term_count)
 {
     const __m128i each = _mm_set1_epi32((int32_t)factor);
 #pragma GCC unroll 4
-    for (int32_t i = 0; i < IH_BASIS_TERMS; i += 4) {
+    for (int32_t i = 0; i < term_count; i += 4) {
         const __m128i basis = _mm_loadu_si128((const __m128i *)&basis_q20[i]);
         const __m128i even = _mm_mul_epu32(basis, each);
         const __m128i odd = _mm_mul_epu32(_mm_srli_epi64(basis, 32), each);
@@ -268,31 +283,31 @@ static inline void add_products(const uint32_t *basis_q20, uint32_t factor, bool
 }
 
 /* Products without a sign; what a negative factor brings is taken away. */
-void ih_basis_add(const uint32_t *basis_q20, int32_t factor, int64_t *sum)
+void ih_basis_add(const uint32_t *basis_q20, int32_t factor, int64_t *sum, int32_t term_count)
 {
     if (factor < 0) {
-        add_products(basis_q20, (uint32_t)-factor, true, sum);
+        add_products(basis_q20, (uint32_t)-factor, true, sum, term_count);
     } else {
-        add_products(basis_q20, (uint32_t)factor, false, sum);
+        add_products(basis_q20, (uint32_t)factor, false, sum, term_count);
     }
 }
 
 #else
 
-int64_t ih_basis_sum(const uint32_t *basis_q20, const int32_t *coefficient)
+int64_t ih_basis_sum(const uint32_t *basis_q20, const int32_t *coefficient, int32_t term_count)
 {
     int64_t sum = 0;
 #pragma GCC unroll 4
-    for (int32_t i = 0; i < IH_BASIS_TERMS; i++) {
+    for (int32_t i = 0; i < term_count; i++) {
         sum += (int64_t)(int32_t)basis_q20[i] * coefficient[i];
     }
     return sum;
 }
 
-void ih_basis_add(const uint32_t *basis_q20, int32_t factor, int64_t *sum)
+void ih_basis_add(const uint32_t *basis_q20, int32_t factor, int64_t *sum, int32_t term_count)
 {
 #pragma GCC unroll 4
-    for (int32_t i = 0; i < IH_BASIS_TERMS; i++) {
+    for (int32_t i = 0; i < term_count; i++) {
         sum[i] += (int64_t)(int32_t)basis_q20[i] * factor;
     }
 }

@@ -15,19 +15,20 @@
 #include "ih_config.h"
 #include "ih_types.h"
 
-/* Squares in a line. */
-#define IH_BASIS_ACROSS 12
-/* Entries of a sample's row. */
-#define IH_BASIS_TERMS (IH_BASIS_ACROSS * IH_BASIS_ACROSS)
+/* Squares in a line: 8 or 12. Vectors have 4 or 8. */
+#define IH_BASIS_ACROSS_MAX 12
+/* Entries of a sample's row at the most. */
+#define IH_BASIS_TERMS_MAX (IH_BASIS_ACROSS_MAX * IH_BASIS_ACROSS_MAX)
 
 /* The roots of across[i] + down[k], line by line: one line for each of down, whose count is even. */
-void ih_basis_roots(const uint32_t *across_q18, const uint32_t *down_q18, int32_t down_count,
-                    uint32_t *root_q20);
+void ih_basis_roots(const uint32_t *across_q18, int32_t across_count, const uint32_t *down_q18,
+                    int32_t down_count, uint32_t *root_q20);
 
-/* The sum of basis[i] * coefficient[i]; both sums of positive and of negative products are below 2^62. */
-int64_t ih_basis_sum(const uint32_t *basis_q20, const int32_t *coefficient);
+/* The sum of basis[i] * coefficient[i], i below term_count, a multiple of 16; both sums of positive and of negative
+ * products are below 2^62. */
+int64_t ih_basis_sum(const uint32_t *basis_q20, const int32_t *coefficient, int32_t term_count);
 
 /* Add basis[i] * factor to sum[i]. */
-void ih_basis_add(const uint32_t *basis_q20, int32_t factor, int64_t *sum);
+void ih_basis_add(const uint32_t *basis_q20, int32_t factor, int64_t *sum, int32_t term_count);
 
 #endif

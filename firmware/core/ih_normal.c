@@ -12,7 +12,7 @@
 #endif
 
 #define PAIRS IH_NORMAL_PAIRS
-#define TERMS IH_NORMAL_TERMS
+#define TERMS_MAX IH_NORMAL_TERMS_MAX
 #define GROUP IH_NORMAL_GROUP
 
 /* Rows of a block: upper parts of two rows a word, then both parts of each row. */
@@ -30,7 +30,7 @@
 /* Mantissas of a solution stay below this: 144 products with |F| <= 1 then sum below 2^(25 + 27 + 7.2). */
 #define MANTISSA_BITS 25
 
-_Static_assert(TERMS % GROUP == 0 && TERMS % BLOCK == 0, "all groups and blocks are whole");
+_Static_assert(BLOCK % GROUP == 0, "all groups of whole blocks are whole");
 
 /* What is done with the sum of 8 words' products: begin + sum, without a sign, over 2^shift, is added to or taken from
  * an entry. */
@@ -135,7 +135,7 @@ typedef __m128i lanes;
 
 /* Line i by the first words. */
 __attribute__((always_inline)) static inline void
-add_words(uint32_t word[PAIRS][TERMS], struct way way, int32_t words, int32_t i, int32_t *line)
+add_words(uint32_t word[PAIRS][TERMS_MAX], struct way way, int32_t words, int32_t i, int32_t *line)
 {
     const lanes begin = ALL(way.begin);
     const __m128i count = _mm_cvtsi32_si128(way.shift);
@@ -156,7 +156,7 @@ add_words(uint32_t word[PAIRS][TERMS], struct way way, int32_t words, int32_t i,
 
 /* The first `count` lines: of each way by itself. */
 __attribute__((always_inline)) static inline void
-add_lines(uint32_t word[PAIRS][TERMS], struct way way, int32_t count, int32_t *normal)
+add_lines(uint32_t word[PAIRS][TERMS_MAX], struct way way, int32_t count, int32_t *normal)
 {
     int32_t *line = normal;
     for (int32_t i = 0; i < count; i++) {
@@ -281,7 +281,7 @@ __attribute__((noinline)) static void add_panel(const uint32_t *own, struct pane
             for (int32_t k = 0; k < PAIRS; k++) {
                 const uint32_t *column = &panel->column[4 * k];
                 IN_ORDER();
-                const uint32_t a_0 = own[k * TERMS], a_1 = own[k * TERMS + 1];
+                const uint32_t a_0 = own[k * TERMS_MAX], a_1 = own[k * TERMS_MAX + 1];
                 const uint32_t b_0 = column[0], b_1 = column[1];
                 IN_ORDER();
                 sum_00 = add_products(sum_00, a_0, b_0);
@@ -313,7 +313,7 @@ __attribute__((noinline)) static void add_panel(const uint32_t *own, struct pane
 }
 
 /* The first `count` lines, whole groups. */
-__attribute__((noinline)) static void add_lines(uint32_t word[PAIRS][TERMS], struct way way,
+__attribute__((noinline)) static void add_lines(uint32_t word[PAIRS][TERMS_MAX], struct way way,
                                                 int32_t count, int32_t *normal)
 {
     for (int32_t j = 0; j < count; j += 4) {
@@ -344,7 +344,7 @@ __attribute__((noinline)) static void add_lines(uint32_t word[PAIRS][TERMS], str
 }
 
 /* Line i by the first words, and what of its padding is in the last four. */
-static void add_words(uint32_t word[PAIRS][TERMS], struct way way, int32_t words, int32_t i,
+static void add_words(uint32_t word[PAIRS][TERMS_MAX], struct way way, int32_t words, int32_t i,
                       int32_t *line)
 {
     const int shift = way.shift;
@@ -365,7 +365,7 @@ static void add_words(uint32_t word[PAIRS][TERMS], struct way way, int32_t words
             sum_1 = add_products(sum_1, a, b_1);
             sum_2 = add_products(sum_2, a, b_2);
             sum_3 = add_products(sum_3, a, b_3);
-            other = &other[TERMS];
+            other = &other[TERMS_MAX];
         }
         change(&line[j], sum_0, sum_1, shift, sign);
         change(&line[j + 2], sum_2, sum_3, shift, sign);
@@ -407,16 +407,16 @@ static inline void add_tile(const uint32_t *a, const uint32_t *b, struct way way
     uint32_t sum_10 = sum_00, sum_11 = sum_00, sum_12 = sum_00, sum_13 = sum_00;
     for (int32_t k = 0; k < PAIRS; k++) {
         const uint32_t a_0 = a[2 * k], a_1 = a[2 * k + 1];
-        const uint32_t b_0 = b[k * TERMS];
+        const uint32_t b_0 = b[k * TERMS_MAX];
         sum_00 = add_products(sum_00, a_0, b_0);
         sum_10 = add_products(sum_10, a_1, b_0);
-        const uint32_t b_1 = b[k * TERMS + 1];
+        const uint32_t b_1 = b[k * TERMS_MAX + 1];
         sum_01 = add_products(sum_01, a_0, b_1);
         sum_11 = add_products(sum_11, a_1, b_1);
-        const uint32_t b_2 = b[k * TERMS + 2];
+        const uint32_t b_2 = b[k * TERMS_MAX + 2];
         sum_02 = add_products(sum_02, a_0, b_2);
         sum_12 = add_products(sum_12, a_1, b_2);
-        const uint32_t b_3 = b[k * TERMS + 3];
+        const uint32_t b_3 = b[k * TERMS_MAX + 3];
         sum_03 = add_products(sum_03, a_0, b_3);
         sum_13 = add_products(sum_13, a_1, b_3);
     }
@@ -431,7 +431,8 @@ static inline void add_tile(const uint32_t *a, const uint32_t *b, struct way way
 }
 
 /* The first `count` lines, an even number. */
-static void add_lines(uint32_t word[PAIRS][TERMS], struct way way, int32_t count, int32_t *normal)
+static void add_lines(uint32_t word[PAIRS][TERMS_MAX], struct way way, int32_t count,
+                      int32_t *normal)
 {
     int32_t *line = normal;
     for (int32_t i = 0; i < count; i += 2) {
@@ -449,7 +450,7 @@ static void add_lines(uint32_t word[PAIRS][TERMS], struct way way, int32_t count
 }
 
 /* Line i by the first words. */
-static void add_words(uint32_t word[PAIRS][TERMS], struct way way, int32_t words, int32_t i,
+static void add_words(uint32_t word[PAIRS][TERMS_MAX], struct way way, int32_t words, int32_t i,
                       int32_t *line)
 {
     for (int32_t j = 0; j <= i; j++) {
@@ -509,19 +510,20 @@ IH_WRAPPING static void split_line(int32_t *line, int32_t length, int enlarged, 
 
 #endif
 
-void ih_normal_add(uint32_t pair[PAIRS][TERMS], int shift, int32_t *normal)
+void ih_normal_add(uint32_t pair[PAIRS][TERMS_MAX], int32_t term_count, int shift, int32_t *normal)
 {
-    add_lines(pair, plain_way(shift, false), TERMS, normal);
+    add_lines(pair, plain_way(shift, false), term_count, normal);
 }
 
-void ih_normal_take(uint32_t pair[PAIRS][TERMS], int shift, int32_t *normal)
+void ih_normal_take(uint32_t pair[PAIRS][TERMS_MAX], int32_t term_count, int shift, int32_t *normal)
 {
-    add_lines(pair, plain_way(shift, true), TERMS, normal);
+    add_lines(pair, plain_way(shift, true), term_count, normal);
 }
 
-void ih_normal_scale(const int32_t *normal, const uint32_t *scale, int step, int32_t *scaled)
+void ih_normal_scale(const int32_t *normal, int32_t term_count, const uint32_t *scale, int step,
+                     int32_t *scaled)
 {
-    for (int32_t i = 0; i < TERMS; i++) {
+    for (int32_t i = 0; i < term_count; i++) {
         const int32_t at = ih_normal_line(i);
         /* Behind the diagonal nothing is asked for: there may be no sums. */
         scale_line(&normal[at], WHOLE_LINES ? length_of(i) : i + 1, scale, scale[i], step,
@@ -531,8 +533,8 @@ void ih_normal_scale(const int32_t *normal, const uint32_t *scale, int step, int
 
 /* Row p of the factor from what is left of line p: row number `at` of a block. What is left was enlarged by
  * 4^enlarged. */
-static void finish_row(uint32_t work[IH_NORMAL_WORK][TERMS], int32_t at, int32_t p, bool is_fine,
-                       int enlarged, int32_t *line)
+static void finish_row(uint32_t work[IH_NORMAL_WORK][TERMS_MAX], int32_t at, int32_t p,
+                       bool is_fine, int enlarged, int32_t *line)
 {
     const int32_t square_q30 =
         ih_clamp_s32(line[p], IH_NORMAL_PIVOT_Q30 << (2 * enlarged), PIVOT_MOST_Q30);
@@ -566,7 +568,7 @@ static int enlarge(int32_t count, int32_t *normal)
 }
 
 /* What a block's rows that are done take from line p. */
-static void take_from_line(uint32_t work[IH_NORMAL_WORK][TERMS], bool is_fine, int32_t done,
+static void take_from_line(uint32_t work[IH_NORMAL_WORK][TERMS_MAX], bool is_fine, int32_t done,
                            int32_t p, int32_t *line)
 {
     if (done > 0) {
@@ -579,7 +581,7 @@ static void take_from_line(uint32_t work[IH_NORMAL_WORK][TERMS], bool is_fine, i
 }
 
 /* What all of them take from the first `count` lines. */
-static void take_from_lines(uint32_t work[IH_NORMAL_WORK][TERMS], bool is_fine, int32_t count,
+static void take_from_lines(uint32_t work[IH_NORMAL_WORK][TERMS_MAX], bool is_fine, int32_t count,
                             int32_t *normal)
 {
     add_lines(work, upper_way(is_fine ? BLOCK / PAIRS : 0), count, normal);
@@ -588,12 +590,12 @@ static void take_from_lines(uint32_t work[IH_NORMAL_WORK][TERMS], bool is_fine, 
     }
 }
 
-bool ih_normal_factor(int32_t fine_from, int32_t least_q30, int32_t *line,
-                      uint32_t work[IH_NORMAL_WORK][TERMS])
+bool ih_normal_factor(int32_t term_count, int32_t fine_from, int32_t least_q30, int32_t *line,
+                      uint32_t work[IH_NORMAL_WORK][TERMS_MAX])
 {
     int enlarged = 0;
     bool is_good = true;
-    for (int32_t first = TERMS - BLOCK; first >= 0; first -= BLOCK) {
+    for (int32_t first = term_count - BLOCK; first >= 0; first -= BLOCK) {
         const bool is_fine = first >= fine_from;
         for (int32_t at = 0; at < BLOCK; at++) {
             const int32_t p = first + BLOCK - 1 - at;
@@ -623,14 +625,14 @@ static int32_t solved(uint64_t rest, int32_t pivot)
 }
 
 /* F^T v = b, in b's unit: v in b's place. */
-IH_WRAPPING static void solve_first(const int32_t *line, int32_t *b)
+IH_WRAPPING static void solve_first(const int32_t *line, int32_t term_count, int32_t *b)
 {
-    uint64_t rest[TERMS];
-    for (int32_t k = 0; k < TERMS; k++) {
+    uint64_t rest[TERMS_MAX];
+    for (int32_t k = 0; k < term_count; k++) {
         rest[k] = IH_WRAPS(uint64_t, (int64_t)b[k] * (1 << FACTOR_BITS));
     }
     /* Two at a time: what is left is loaded and stored half as often. */
-    for (int32_t p = TERMS - 1; p > 0; p -= 2) {
+    for (int32_t p = term_count - 1; p > 0; p -= 2) {
         const int32_t *row = &line[ih_normal_line(p)], *next = &line[ih_normal_line(p - 1)];
         b[p] = solved(rest[p], row[p]);
         const int32_t less = -b[p];
@@ -653,13 +655,13 @@ IH_WRAPPING static int64_t dot(const int32_t *a, const int32_t *b, int32_t count
     return IH_WRAPS(int64_t, sum);
 }
 
-bool ih_normal_solve(const int32_t *line, const int32_t *b, int32_t *x_mantissa,
+bool ih_normal_solve(const int32_t *line, int32_t term_count, const int32_t *b, int32_t *x_mantissa,
                      int32_t *x_exponent)
 {
     int exponent = 0;
-    memmove(x_mantissa, b, TERMS * sizeof *b);
-    solve_first(line, x_mantissa);
-    for (int32_t p = 0; p < TERMS; p++) { /* F x = v, in units of 2^exponent */
+    memmove(x_mantissa, b, (size_t)term_count * sizeof *b);
+    solve_first(line, term_count, x_mantissa);
+    for (int32_t p = 0; p < term_count; p++) { /* F x = v, in units of 2^exponent */
         const int32_t *row = &line[ih_normal_line(p)];
         const int64_t v = ih_shift_round((int64_t)x_mantissa[p] * (1 << FACTOR_BITS), exponent);
         const int64_t taken = ih_clamp_s64(dot(row, x_mantissa, p), (int64_t)1 << 62);

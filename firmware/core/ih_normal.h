@@ -1,13 +1,13 @@
 /* ih_normal - the Gram matrix N = R^T R of small whole numbers, 16 rows at a time; the factor of such a matrix.
  *
- * In:    rows of IH_NORMAL_TERMS entries 0 .. IH_NORMAL_MOST, two to a word: the first in its lower half, the
+ * In:    rows of term_count entries 0 .. IH_NORMAL_MOST, two to a word: the first in its lower half, the
  *        second in its upper half. A row that is not there is zero.
  * Out:   lines of N's lower triangle, in units of 2^shift: the sum over 16 rows is exact, then rounded and
  *        added. So it does not depend on the processor, but on which rows come together.
  * Overflow: 16 products are below 2^32 with the rounding. Sums
  *        stay below 2^31 if the greatest column's squares over 2^shift do, with half a unit a call.
  * Error: half a unit a call.
- * Cost:  rows x 10,944 multiply-adds, of which x86 does 16 or 8 with one instruction, Cortex-M with DSP two.
+ * Cost:  rows x n (n + 8) / 2 multiply-adds, n = term_count, of which x86 does 16 or 8 with one instruction, Cortex-M with DSP two.
  */
 #ifndef IH_NORMAL_H
 #define IH_NORMAL_H
@@ -18,7 +18,8 @@
 #include "ih_config.h"
 #include "ih_types.h"
 
-#define IH_NORMAL_TERMS 144
+/* term_count: a multiple of 16 up to this. What is kept of it grows with its square. */
+#define IH_NORMAL_TERMS_MAX 144
 #define IH_NORMAL_PAIRS 8
 #define IH_NORMAL_ROWS (2 * IH_NORMAL_PAIRS)
 #define IH_NORMAL_MOST 16383 /* 16 of its squares, and 2^15 for rounding, are below 2^32 */
@@ -26,7 +27,7 @@
 /* Lines of N are padded to whole groups of so many entries, which fill the widest vectors: what stands
  * behind the diagonal is not used, but loops need no end of their own for what is left of a group. */
 #define IH_NORMAL_GROUP 8
-/* Where line i of N begins, i a multiple of IH_NORMAL_GROUP; line IH_NORMAL_TERMS: the size of N. */
+/* Where line i of N begins, i a multiple of IH_NORMAL_GROUP; line term_count: the size of N. */
 #define IH_NORMAL_LINE(i) ((i) * ((i) + IH_NORMAL_GROUP) / 2)
 
 /* Where entry (i, 0) of N stands. */
@@ -36,14 +37,17 @@ int32_t ih_normal_line(int32_t i);
 #define IH_NORMAL_ALIGNMENT 16
 
 /* Add the products of all rows. shift 1..IH_NORMAL_SHIFT_MOST. */
-void ih_normal_add(uint32_t pair[IH_NORMAL_PAIRS][IH_NORMAL_TERMS], int shift, int32_t *normal);
+void ih_normal_add(uint32_t pair[IH_NORMAL_PAIRS][IH_NORMAL_TERMS_MAX], int32_t term_count,
+                   int shift, int32_t *normal);
 
 /* Take them away. */
-void ih_normal_take(uint32_t pair[IH_NORMAL_PAIRS][IH_NORMAL_TERMS], int shift, int32_t *normal);
+void ih_normal_take(uint32_t pair[IH_NORMAL_PAIRS][IH_NORMAL_TERMS_MAX], int32_t term_count,
+                    int shift, int32_t *normal);
 
 /* Entries (i, j) times scale[i] and scale[j], each time over 2^step, cut off; below 0 as 0. Below 2^32 after the
  * first. */
-void ih_normal_scale(const int32_t *normal, const uint32_t *scale, int step, int32_t *scaled);
+void ih_normal_scale(const int32_t *normal, int32_t term_count, const uint32_t *scale, int step,
+                     int32_t *scaled);
 
 /* Factor A = F^T F: A in lines like N's, Q30, diagonal 0.995 at most; F in its place, Q27, row by row. Unknowns are
  * eliminated from the last one on, so that what is left, and a row of F, always is the beginning of lines. Returns
@@ -65,14 +69,14 @@ void ih_normal_scale(const int32_t *normal, const uint32_t *scale, int step, int
 #define IH_NORMAL_PIVOT_Q30 1024
 #define IH_NORMAL_FACTOR_BITS 27
 
-bool ih_normal_factor(int32_t fine_from, int32_t least_q30, int32_t *line,
-                      uint32_t work[IH_NORMAL_WORK][IH_NORMAL_TERMS]);
+bool ih_normal_factor(int32_t term_count, int32_t fine_from, int32_t least_q30, int32_t *line,
+                      uint32_t work[IH_NORMAL_WORK][IH_NORMAL_TERMS_MAX]);
 
 /* Solve F^T F x = b. b: so small that |F^-T b| stays within int32, else it is saturated. x: mantissas below 2^25 with
  * x_i = mantissa_i * 2^exponent in b's unit, exponent >= 0 as small as that allows. b and x may be the same array. False: the
  * exponent would be greater than IH_NORMAL_EXPONENT_MOST, which no factor of a positive matrix gives; then x is nothing. */
 #define IH_NORMAL_EXPONENT_MOST 62
-bool ih_normal_solve(const int32_t *line, const int32_t *b, int32_t *x_mantissa,
+bool ih_normal_solve(const int32_t *line, int32_t term_count, const int32_t *b, int32_t *x_mantissa,
                      int32_t *x_exponent);
 
 #endif

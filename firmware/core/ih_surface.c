@@ -4,9 +4,9 @@
 
 #include "ih_fix.h"
 
-#define TERMS IH_SURFACE_TERMS
-#define CENTRES IH_SURFACE_CENTRES
-#define HALF_CENTRES IH_SURFACE_HALF_CENTRES
+#define TERMS_MAX IH_SURFACE_TERMS_MAX
+#define CENTRES_MAX IH_SURFACE_CENTRES_MAX
+#define HALF_CENTRES_MAX IH_SURFACE_HALF_CENTRES_MAX
 
 /* Short rows: the basis scaled column by column to IH_NORMAL_MOST, less one step that rounding and the roots'
  * errors may add. The scale in Q17 is below 2^31, as no bound is below 1. */
@@ -31,10 +31,10 @@
  * folded. */
 #define SOLUTION_BITS 28
 /* A correction leaves an error that is to it as it is to the one before. Another one is made while the sum of
- * that error's squares may be above 2^-6, so often at the most. The unknowns are measured, not what they change
+ * that error's squares may be above 2^-8, so often at the most. The unknowns are measured, not what they change
  * at the samples: the less a direction is seen by samples, the more it counts. What only decides about weights
  * may be farther off. In frames one correction nearly always is enough, and the worst node is 0.02 mm off. */
-#define SQUARES_LOG2_ENOUGH (-6)
+#define SQUARES_LOG2_ENOUGH (-8)
 #define SQUARES_LOG2_FOR_WEIGHTS 4
 #define CORRECTIONS_MAX 8
 #define CORRECTIONS_FEW 3
@@ -43,13 +43,15 @@
 /* Samples nearer to the surface than so many eighths of the limit keep their weight without being asked again after
  * the last correction. */
 #define FAR_EIGHTHS 6
-/* Rows of the factor from this one on have more bits: of samples on a lattice, the pivots of all others are small. */
-#define FINE_FROM (TERMS - 2 * IH_NORMAL_ROWS)
+/* So many rows of the factor, the last ones, have more bits: of samples on a lattice, the pivots of all others are
+ * small. */
+#define FINE_ROWS (2 * IH_NORMAL_ROWS)
 /* Steps of the table, filled up to whole lines of ih_basis. */
-#define TABLE_WIDTH (4 * IH_BASIS_ACROSS)
+#define TABLE_LINE IH_BASIS_ACROSS_MAX
+#define TABLE_WIDTH (4 * TABLE_LINE)
 
-_Static_assert(CENTRES == IH_BASIS_ACROSS && CENTRES % 2 == 0, "lines of ih_basis");
-_Static_assert(TERMS == IH_NORMAL_TERMS, "one system");
+_Static_assert(CENTRES_MAX == IH_BASIS_ACROSS_MAX && TERMS_MAX == IH_NORMAL_TERMS_MAX,
+               "one system");
 _Static_assert(TABLE_WIDTH >= IH_SURFACE_STEPS && IH_SURFACE_STEPS % 2 == 0, "all steps");
 
 void ih_surface_params_default(struct ih_surface_params *params)
@@ -57,41 +59,78 @@ void ih_surface_params_default(struct ih_surface_params *params)
     *params = (struct ih_surface_params){
         .ridge_q30 = 10737, /* 1e-5 */
         .huber_mm = 60,
+        .centres = IH_SURFACE_CENTRES_FEW,
     };
 }
 
-/* Places of a row or column of centres: (2 k - 11) * 20 / 11 field units. */
-static void place_centres(struct ih_surface_scratch *scratch)
+/* Steps of the grid between two centres. */
+static int32_t steps_of(const struct ih_surface_scratch *scratch)
 {
-    for (int32_t k = 0; k < CENTRES; k++) {
-        int64_t place_q16 = (int64_t)(2 * k - (CENTRES - 1)) * 20 * 65536;
-        scratch->centre_q16[k] = (int32_t)ih_div_round(place_q16, CENTRES - 1);
+    return IH_SURFACE_CENTRES_STEPS / scratch->centres;
+}
+
+/* Where what belongs to so many centres stands, and their places in a row or column, field units. */
+static void set_centres(int32_t centres, struct ih_surface_scratch *scratch)
+{
+    const bool is_few = centres == IH_SURFACE_CENTRES_FEW;
+    scratch->centres = centres;
+    scratch->terms = centres * centres;
+    scratch->normal = is_few ? scratch->of.few.normal : scratch->of.many.normal;
+    scratch->factor = is_few ? scratch->of.few.factor : scratch->of.many.factor;
+    scratch->kept_count = is_few ? IH_SURFACE_ROWS_KEPT : 0;
+    for (int32_t k = 0; k < centres; k++) {
+        const int64_t half_steps = (2 * k - (centres - 1)) * steps_of(scratch);
+        scratch->centre_q16[k] = (int32_t)ih_div_round(
+            half_steps * IH_SURFACE_STEP_NUMERATOR * 65536, 2 * IH_SURFACE_STEP_DENOMINATOR);
     }
+}
+
+/* Terms are a multiple of 16, centres one of 4: compilers that know make whole vectors alone. */
+static inline int32_t whole_blocks(int32_t terms)
+{
+    return terms & ~15;
 }
 
 /* Squares of a place's distances from the centres of a row, Q18: below 60^2. */
 static void square_distances(const struct ih_surface_scratch *scratch, int32_t place_q16,
-                             uint32_t square_q18[CENTRES])
+                             uint32_t *restrict square_q18)
 {
-    for (int32_t k = 0; k < CENTRES; k++) {
-        const int64_t d_q16 = (int64_t)place_q16 - scratch->centre_q16[k];
-        square_q18[k] = (uint32_t)(d_q16 * d_q16 >> 14);
+    const int32_t centres = scratch->centres & ~3;
+    for (int32_t k = 0; k < centres; k++) {
+        const int32_t d_q16 = place_q16 - scratch->centre_q16[k];
+        square_q18[k] = (uint32_t)((int64_t)d_q16 * d_q16 >> 14);
     }
 }
 
 /* The sample's row of the basis: sqrt(dx^2 + dy^2 + 1), Q20. */
 static void fill_row(struct ih_surface_scratch *scratch, const struct ih_sample *sample,
-                     uint32_t row_q20[TERMS])
+                     uint32_t *row_q20)
 {
-    uint32_t dx2_q18[CENTRES];
-    uint32_t dy2_q18[CENTRES];
+    uint32_t dx2_q18[CENTRES_MAX];
+    uint32_t dy2_q18[CENTRES_MAX];
     square_distances(scratch, sample->x_q16, dx2_q18);
     square_distances(scratch, sample->y_q16, dy2_q18);
-    for (int32_t k = 0; k < CENTRES; k++) {
+    for (int32_t k = 0; k < scratch->centres; k++) {
         dx2_q18[k] += 1 << 18;
     }
-    ih_basis_roots(dx2_q18, dy2_q18, CENTRES, row_q20);
+    ih_basis_roots(dx2_q18, scratch->centres, dy2_q18, scratch->centres, row_q20);
     IH_IN_RANGE(row_q20[0], (1 << 20) - 1, IH_RANGE_BASIS_Q20);
+}
+
+/* Work out the row of sample i, into the place where it is kept, if there is one. */
+static const uint32_t *new_row(const struct ih_samples *samples, int32_t i,
+                               struct ih_surface_scratch *scratch)
+{
+    uint32_t *row_q20 = i < scratch->kept_count ? scratch->of.few.row_q20[i] : scratch->basis_q20;
+    fill_row(scratch, &samples->sample[i], row_q20);
+    return row_q20;
+}
+
+/* The row of sample i once the rows of all have been worked out. */
+static const uint32_t *row_of(const struct ih_samples *samples, int32_t i,
+                              struct ih_surface_scratch *scratch)
+{
+    return i < scratch->kept_count ? scratch->of.few.row_q20[i] : new_row(samples, i, scratch);
 }
 
 /* value * 2^up, or / 2^-up, rounded, limited to 2^62. */
@@ -150,9 +189,9 @@ static bool set_norms(struct ih_surface_scratch *scratch, const struct ih_sample
         square_q42 += weight * ((x_q16 * x_q16 + y_q16 * y_q16) >> 20);
     }
     bool is_light = false;
-    for (int32_t i = 0; i < TERMS; i++) {
-        const int64_t x_q16 = scratch->centre_q16[i % CENTRES];
-        const int64_t y_q16 = scratch->centre_q16[i / CENTRES];
+    for (int32_t i = 0; i < scratch->terms; i++) {
+        const int64_t x_q16 = scratch->centre_q16[i % scratch->centres];
+        const int64_t y_q16 = scratch->centre_q16[i / scratch->centres];
         const int64_t centre_q16 = ((x_q16 * x_q16 + y_q16 * y_q16) >> 16) + (1 << 16);
         const int64_t mixed_q42 = 2 * (x_q16 * (x_q46 >> 20) + y_q16 * (y_q46 >> 20));
         const int64_t norm_q38 = (sum_q30 >> 8) * centre_q16 - (mixed_q42 >> 4) + (square_q42 >> 4);
@@ -169,24 +208,25 @@ static bool set_norms(struct ih_surface_scratch *scratch, const struct ih_sample
  * 2^28, with what was rounded, so that in that unit all are below 2^31. */
 static void set_row_scale(struct ih_surface_scratch *scratch, const struct ih_samples *samples)
 {
-    uint32_t far_q18[2][CENTRES];
+    uint32_t far_q18[2][CENTRES_MAX];
     uint32_t ratio = 0;
     memset(far_q18, 0, sizeof far_q18);
     for (int32_t i = 0; i < samples->sample_count; i++) {
-        uint32_t square_q18[2][CENTRES];
+        uint32_t square_q18[2][CENTRES_MAX];
         square_distances(scratch, samples->sample[i].x_q16, square_q18[0]);
         square_distances(scratch, samples->sample[i].y_q16, square_q18[1]);
-        for (int32_t k = 0; k < CENTRES; k++) {
+        for (int32_t k = 0; k < scratch->centres; k++) {
             for (int axis = 0; axis < 2; axis++) {
                 const uint32_t here = square_q18[axis][k];
                 far_q18[axis][k] = here > far_q18[axis][k] ? here : far_q18[axis][k];
             }
         }
     }
-    for (int32_t i = 0; i < TERMS; i++) {
+    for (int32_t i = 0; i < scratch->terms; i++) {
         /* Two steps more than what was cut off. */
         const uint32_t box_q10 =
-            ((far_q18[0][i % CENTRES] + far_q18[1][i / CENTRES]) >> 8) + (1 << 10) + 2;
+            ((far_q18[0][i % scratch->centres] + far_q18[1][i / scratch->centres]) >> 8) +
+            (1 << 10) + 2;
         const uint32_t norm_q10 = scratch->norm_q10[i] + 2;
         const uint32_t least_q10 = box_q10 < norm_q10 ? box_q10 : norm_q10;
         const uint64_t most_q10 = least_q10 < 1 << 10 ? 1 << 10 : least_q10;
@@ -199,23 +239,24 @@ static void set_row_scale(struct ih_surface_scratch *scratch, const struct ih_sa
     scratch->normal_shift = ih_max_s32(1, ih_bits_u64(ratio) - 3);
 }
 
-/* The sample's row, which stands in basis_q20, as a short one, weighted: into the lower or the upper half of
+/* A sample's row as a short one, weighted: into the lower or the upper half of
  * the words of a pair, which is the first or the second row. */
-static void put_row(const struct ih_surface_scratch *scratch, int32_t root_weight_q15,
-                    bool is_second, uint32_t pair[TERMS])
+static void put_row(const struct ih_surface_scratch *scratch, const uint32_t *row_q20,
+                    int32_t root_weight_q15, bool is_second, uint32_t *restrict pair)
 {
     const int shift = 20 + ROW_SCALE_BITS;
+    const int32_t terms = whole_blocks(scratch->terms);
     const uint32_t root_q15 = (uint32_t)root_weight_q15 << scratch->weight_shift;
-    const uint32_t *basis_q20 = scratch->basis_q20, *scale_q17 = scratch->row_scale_q17;
-    uint32_t weighted_q20[TERMS];
+    const uint32_t *scale_q17 = scratch->row_scale_q17;
+    uint32_t weighted_q20[TERMS_MAX];
     if (root_q15 != 1 << 15) {
-        for (int32_t i = 0; i < TERMS; i++) {
-            weighted_q20[i] = (uint32_t)((uint64_t)basis_q20[i] * root_q15 >> 15);
+        for (int32_t i = 0; i < terms; i++) {
+            weighted_q20[i] = (uint32_t)((uint64_t)row_q20[i] * root_q15 >> 15);
         }
-        basis_q20 = weighted_q20;
+        row_q20 = weighted_q20;
     }
-    for (int32_t i = 0; i < TERMS; i++) {
-        const uint64_t entry = (uint64_t)basis_q20[i] * scale_q17[i] + ((uint64_t)1 << (shift - 1));
+    for (int32_t i = 0; i < terms; i++) {
+        const uint64_t entry = (uint64_t)row_q20[i] * scale_q17[i] + ((uint64_t)1 << (shift - 1));
         pair[i] =
             is_second ? pair[i] | (uint32_t)(entry >> shift) << 16 : (uint32_t)(entry >> shift);
     }
@@ -235,37 +276,38 @@ static void set_off_fraction(struct ih_surface_scratch *scratch, const struct ih
         ih_min_s32(8 + OFF_BITS - 2 - ih_bits_u64((uint64_t)most_mm_q8), OFF_FRACTION_MAX);
 }
 
-/* How far the sample, whose row stands in basis_q20, is behind the surface: off_fraction bits. */
-static int64_t off_of(const struct ih_surface_scratch *scratch, const struct ih_sample *sample,
-                      int32_t mean_mm_q8)
+/* How far the sample is behind the surface: off_fraction bits. */
+static int64_t off_of(const struct ih_surface_scratch *scratch, const uint32_t *row_q20,
+                      const struct ih_sample *sample, int32_t mean_mm_q8)
 {
     const int32_t fraction = scratch->off_fraction;
     const int64_t off =
         ((int64_t)sample->depth_mm_q8 - mean_mm_q8) * ((int64_t)1 << (fraction - 8));
-    const int64_t sum = ih_basis_sum(scratch->basis_q20, scratch->coefficient);
+    const int64_t sum = ih_basis_sum(row_q20, scratch->coefficient, scratch->terms);
     return off - ih_clamp_s64(shift_by(sum, fraction - 20 - scratch->coefficient_shift), OFF_MAX);
 }
 
-/* What the row in basis_q20 brings to the right side. */
-static void add_right(struct ih_surface_scratch *scratch, int64_t off, int32_t root_weight_q15)
+/* What a row brings to the right side. */
+static void add_right(struct ih_surface_scratch *scratch, const uint32_t *row_q20, int64_t off,
+                      int32_t root_weight_q15)
 {
     const int64_t push = ih_mul_shift(off, weight_q30(scratch, root_weight_q15), 30);
-    ih_basis_add(scratch->basis_q20, (int32_t)ih_clamp_s64(push, (int64_t)1 << OFF_BITS),
-                 scratch->right);
+    ih_basis_add(row_q20, (int32_t)ih_clamp_s64(push, (int64_t)1 << OFF_BITS), scratch->right,
+                 scratch->terms);
 }
 
 /* What it brings less with one weight than it did with another. */
-static void add_change(struct ih_surface_scratch *scratch, int64_t off, int32_t before_q15,
-                       int32_t root_weight_q15)
+static void add_change(struct ih_surface_scratch *scratch, const uint32_t *row_q20, int64_t off,
+                       int32_t before_q15, int32_t root_weight_q15)
 {
     const int64_t weight = weight_q30(scratch, root_weight_q15) - weight_q30(scratch, before_q15);
     const int64_t push = ih_mul_shift(off, weight, 30);
-    ih_basis_add(scratch->basis_q20, (int32_t)ih_clamp_s64(push, (int64_t)1 << OFF_BITS),
-                 scratch->right);
+    ih_basis_add(row_q20, (int32_t)ih_clamp_s64(push, (int64_t)1 << OFF_BITS), scratch->right,
+                 scratch->terms);
 }
 
 /* Pairs from row number `count` on add nothing. */
-static void clear_pairs(uint32_t pair[IH_NORMAL_PAIRS][TERMS], int32_t count)
+static void clear_pairs(uint32_t pair[IH_NORMAL_PAIRS][TERMS_MAX], int32_t count)
 {
     for (int32_t at = (count + 1) / 2; at < IH_NORMAL_PAIRS; at++) {
         memset(pair[at], 0, sizeof pair[at]);
@@ -276,27 +318,28 @@ static void clear_pairs(uint32_t pair[IH_NORMAL_PAIRS][TERMS], int32_t count)
 static void sum_all(const struct ih_samples *samples, struct ih_surface_scratch *scratch,
                     const struct ih_surface *out, bool is_right_wanted)
 {
-    memset(scratch->of.system.normal, 0, sizeof scratch->of.system.normal);
+    memset(scratch->normal, 0, (size_t)IH_NORMAL_LINE(scratch->terms) * sizeof *scratch->normal);
     for (int32_t i = 0; i < samples->sample_count; i++) {
         const struct ih_sample *sample = &samples->sample[i];
         const int32_t at = i % IH_NORMAL_ROWS;
-        fill_row(scratch, sample, scratch->basis_q20);
-        put_row(scratch, out->root_weight_q15[i], at % 2 != 0, scratch->pair[at / 2]);
+        const uint32_t *row_q20 = new_row(samples, i, scratch);
+        put_row(scratch, row_q20, out->root_weight_q15[i], at % 2 != 0, scratch->pair[at / 2]);
         if (is_right_wanted) {
-            add_right(scratch, off_of(scratch, sample, out->mean_mm_q8), out->root_weight_q15[i]);
+            add_right(scratch, row_q20, off_of(scratch, row_q20, sample, out->mean_mm_q8),
+                      out->root_weight_q15[i]);
         }
         if (at + 1 == IH_NORMAL_ROWS || i + 1 == samples->sample_count) {
             clear_pairs(scratch->pair, at + 1);
-            ih_normal_add(scratch->pair, scratch->normal_shift, scratch->of.system.normal);
+            ih_normal_add(scratch->pair, scratch->terms, scratch->normal_shift, scratch->normal);
         }
     }
 }
 
 /* Scale factors from the sums' diagonal. */
-static void set_scale(struct ih_surface_scratch *scratch, uint32_t scale[TERMS])
+static void set_scale(struct ih_surface_scratch *scratch, uint32_t scale[TERMS_MAX])
 {
-    for (int32_t i = 0; i < TERMS; i++) {
-        const int32_t sum = scratch->of.system.normal[ih_normal_line(i) + i];
+    for (int32_t i = 0; i < scratch->terms; i++) {
+        const int32_t sum = scratch->normal[ih_normal_line(i) + i];
         const uint64_t root_q11 =
             (uint64_t)ih_isqrt_u54((uint64_t)ih_max_s32(sum, 1) << 22) + 1; /* it stays < 1 */
         const uint64_t value = ((uint64_t)SCALE_NUMERATOR << 11) / root_q11;
@@ -310,12 +353,12 @@ static void set_scale(struct ih_surface_scratch *scratch, uint32_t scale[TERMS])
 /* The sums scaled to diagonal 0.99, with ridge, in Q30. */
 static void scale_lines(const struct ih_surface_params *params, struct ih_surface_scratch *scratch)
 {
-    uint32_t scale[TERMS];
+    uint32_t scale[TERMS_MAX];
     set_scale(scratch, scale);
     /* |N_ij| <= root_i root_j: below 2^30.6. Of no products' sum, rounding may leave a step below 0. */
-    ih_normal_scale(scratch->of.system.normal, scale, SCALE_STEP, scratch->of.system.factor);
-    for (int32_t i = 0; i < TERMS; i++) {
-        int32_t *at_q30 = &scratch->of.system.factor[ih_normal_line(i) + i];
+    ih_normal_scale(scratch->normal, scratch->terms, scale, SCALE_STEP, scratch->factor);
+    for (int32_t i = 0; i < scratch->terms; i++) {
+        int32_t *at_q30 = &scratch->factor[ih_normal_line(i) + i];
         *at_q30 += (int32_t)ih_mul_shift(*at_q30, params->ridge_q30, 30);
         IH_IN_RANGE(*at_q30, 0, IH_RANGE_SCALED_Q30);
     }
@@ -329,13 +372,13 @@ static bool try_factor(const struct ih_surface_params *params, int32_t fine_from
     scale_lines(params, scratch);
     scratch->is_fine = fine_from == 0;
     scratch->limit_log2 = SQUARES_LOG2_MOST;
-    return ih_normal_factor(fine_from, params->ridge_q30 - params->ridge_q30 / 4,
-                            scratch->of.system.factor, scratch->pair);
+    return ih_normal_factor(scratch->terms, fine_from, params->ridge_q30 - params->ridge_q30 / 4,
+                            scratch->factor, scratch->pair);
 }
 
 static void factor(const struct ih_surface_params *params, struct ih_surface_scratch *scratch)
 {
-    if (!try_factor(params, FINE_FROM, scratch)) {
+    if (!try_factor(params, scratch->terms - FINE_ROWS, scratch)) {
         (void)try_factor(params, 0, scratch);
     }
     scratch->squares_log2 = SQUARES_LOG2_MOST;
@@ -345,7 +388,7 @@ static void factor(const struct ih_surface_params *params, struct ih_surface_scr
 static void set_or_take_ridge(const struct ih_surface_params *params, bool is_taken,
                               struct ih_surface_scratch *scratch)
 {
-    for (int32_t i = 0; i < TERMS; i++) {
+    for (int32_t i = 0; i < scratch->terms; i++) {
         /* 2^58 times 2^31.4 over 2^32; in Q8 more than the coefficients */
         const int64_t share = ih_mul_wide_shift(
             (int64_t)scratch->coefficient[i] * params->ridge_q30, scratch->norm_q10[i], 32);
@@ -362,17 +405,17 @@ static int scale_right(struct ih_surface_scratch *scratch)
 {
     int64_t *right = scratch->right; /* scaled in place: it has served */
     uint64_t most = 0;
-    for (int32_t i = 0; i < TERMS; i++) {
+    for (int32_t i = 0; i < scratch->terms; i++) {
         most |= (uint64_t)ih_abs_s64(right[i]);
     }
     const int first = ih_max_s32(0, ih_bits_u64(most) - 30);
     most = 0;
-    for (int32_t i = 0; i < TERMS; i++) {
+    for (int32_t i = 0; i < scratch->terms; i++) {
         right[i] = ih_shift_round(right[i], first) * (int64_t)scratch->unknown_scale_q29[i];
         most |= (uint64_t)ih_abs_s64(right[i]);
     }
     const int second = ih_max_s32(0, ih_bits_u64(most) - RIGHT_BITS);
-    for (int32_t i = 0; i < TERMS; i++) {
+    for (int32_t i = 0; i < scratch->terms; i++) {
         scratch->solution[i] = (int32_t)ih_shift_round(right[i], second);
     }
     return 20 + scratch->off_fraction - first + UNKNOWN_SCALE_BITS - second;
@@ -383,7 +426,7 @@ static int scale_right(struct ih_surface_scratch *scratch)
 static void add_solution(struct ih_surface_scratch *scratch, int fraction)
 {
     uint64_t most = 0, most_before = 0;
-    for (int32_t i = 0; i < TERMS; i++) {
+    for (int32_t i = 0; i < scratch->terms; i++) {
         const int64_t product = (int64_t)scratch->solution[i] * scratch->unknown_scale_q29[i];
         most |= (uint64_t)ih_abs_s64(product); /* < 2^57 */
         most_before |= (uint64_t)ih_abs_s32(scratch->coefficient[i]);
@@ -392,7 +435,7 @@ static void add_solution(struct ih_surface_scratch *scratch, int fraction)
     const int own = product_shift - ih_bits_u64(most) + SOLUTION_BITS - 1;
     const int before = scratch->coefficient_shift - ih_bits_u64(most_before) + SOLUTION_BITS - 1;
     const int shift = most_before == 0 ? own : ih_min_s32(own, before);
-    for (int32_t i = 0; i < TERMS; i++) {
+    for (int32_t i = 0; i < scratch->terms; i++) {
         const int64_t product = (int64_t)scratch->solution[i] * scratch->unknown_scale_q29[i];
         scratch->coefficient[i] =
             (int32_t)(shift_by(scratch->coefficient[i], shift - scratch->coefficient_shift) +
@@ -412,12 +455,12 @@ static bool correct(const struct ih_surface_params *params, struct ih_surface_sc
     set_or_take_ridge(params, true, scratch);
     /* A x = b is (right side) / 2^normal_shift: x and b have as many fraction bits more. */
     const int fraction = scale_right(scratch) + scratch->normal_shift;
-    if (!ih_normal_solve(scratch->of.system.factor, scratch->solution, scratch->solution,
+    if (!ih_normal_solve(scratch->factor, scratch->terms, scratch->solution, scratch->solution,
                          &exponent)) {
         return false;
     }
     int64_t squares = 0; /* 144 * 2^50 */
-    for (int32_t i = 0; i < TERMS; i++) {
+    for (int32_t i = 0; i < scratch->terms; i++) {
         squares += (int64_t)scratch->solution[i] * scratch->solution[i];
     }
     const int log2 = ih_bits_u64((uint64_t)squares) - 2 * (fraction - exponent) +
@@ -452,7 +495,7 @@ static void refine(const struct ih_samples *samples, const struct ih_surface_par
                    struct ih_surface_scratch *scratch)
 {
     /* What fewer samples than unknowns do not see is found slowly. */
-    const int32_t least = samples->sample_count < TERMS ? CORRECTIONS_FEW : 1;
+    const int32_t least = samples->sample_count < scratch->terms ? CORRECTIONS_FEW : 1;
     const int64_t far = (int64_t)params->huber_mm * FAR_EIGHTHS << (scratch->off_fraction - 3);
     int32_t before;
     int32_t count = 0;
@@ -461,10 +504,10 @@ static void refine(const struct ih_samples *samples, const struct ih_surface_par
         memset(scratch->right, 0, sizeof scratch->right);
         for (int32_t i = 0; i < samples->sample_count; i++) {
             const struct ih_sample *sample = &samples->sample[i];
-            fill_row(scratch, sample, scratch->basis_q20);
-            const int64_t off = off_of(scratch, sample, out->mean_mm_q8);
+            const uint32_t *row_q20 = row_of(samples, i, scratch);
+            const int64_t off = off_of(scratch, row_q20, sample, out->mean_mm_q8);
             scratch->is_far[i] = ih_abs_s64(off) >= far;
-            add_right(scratch, off, out->root_weight_q15[i]);
+            add_right(scratch, row_q20, off, out->root_weight_q15[i]);
         }
         count++;
     } while (correct_or_refactor(params, scratch) &&
@@ -490,9 +533,9 @@ static int32_t reweight(const struct ih_sample *sample, const struct ih_surface_
  * rounded. */
 static void exchange_pairs(struct ih_surface_scratch *scratch)
 {
-    ih_normal_take(scratch->pair, scratch->normal_shift, scratch->of.system.normal);
-    ih_normal_add(scratch->pair + IH_NORMAL_PAIRS, scratch->normal_shift,
-                  scratch->of.system.normal);
+    ih_normal_take(scratch->pair, scratch->terms, scratch->normal_shift, scratch->normal);
+    ih_normal_add(scratch->pair + IH_NORMAL_PAIRS, scratch->terms, scratch->normal_shift,
+                  scratch->normal);
 }
 
 /* Weights by the distance from the surface, of those samples that were far from it before the last correction;
@@ -509,16 +552,17 @@ static int32_t change_weights(const struct ih_samples *samples,
         if (!scratch->is_far[i]) {
             continue;
         }
-        fill_row(scratch, sample, scratch->basis_q20);
-        const int64_t off = off_of(scratch, sample, out->mean_mm_q8);
+        const uint32_t *row_q20 = row_of(samples, i, scratch);
+        const int64_t off = off_of(scratch, row_q20, sample, out->mean_mm_q8);
         const int32_t root_q15 =
             reweight(sample, params, ih_shift_round(off, scratch->off_fraction - 11));
         out->root_weight_q15[i] = root_q15;
         if (root_q15 != sample->root_weight_q15) {
-            add_change(scratch, off, sample->root_weight_q15, root_q15);
+            add_change(scratch, row_q20, off, sample->root_weight_q15, root_q15);
             const int32_t at = lighter % IH_NORMAL_ROWS;
-            put_row(scratch, sample->root_weight_q15, at % 2 != 0, scratch->pair[at / 2]);
-            put_row(scratch, root_q15, at % 2 != 0, scratch->pair[IH_NORMAL_PAIRS + at / 2]);
+            put_row(scratch, row_q20, sample->root_weight_q15, at % 2 != 0, scratch->pair[at / 2]);
+            put_row(scratch, row_q20, root_q15, at % 2 != 0,
+                    scratch->pair[IH_NORMAL_PAIRS + at / 2]);
             lighter++;
             if (at + 1 == IH_NORMAL_ROWS) {
                 exchange_pairs(scratch);
@@ -563,7 +607,7 @@ static bool sum_again(const struct ih_samples *samples, struct ih_surface_scratc
     if (!set_weight_shift(scratch, out->root_weight_q15, samples->sample_count)) {
         return false;
     }
-    for (int32_t i = 0; i < TERMS; i++) {
+    for (int32_t i = 0; i < scratch->terms; i++) {
         scratch->right[i] = shift_by(scratch->right[i], 2 * (scratch->weight_shift - before));
     }
     (void)set_norms(scratch, samples, out->root_weight_q15);
@@ -606,10 +650,10 @@ static void fill_table(struct ih_surface_scratch *scratch)
         one_more_q18[a] = square_q18[a] + (1 << 18);
     }
     for (int32_t b = 0; b < IH_SURFACE_STEPS; b += 2) {
-        for (int32_t first = 0; first < TABLE_WIDTH; first += IH_BASIS_ACROSS) {
-            const int32_t count = ih_min_s32(IH_BASIS_ACROSS, IH_SURFACE_STEPS - first);
-            uint32_t root_q20[2][IH_BASIS_ACROSS];
-            ih_basis_roots(&square_q18[first], &one_more_q18[b], 2, root_q20[0]);
+        for (int32_t first = 0; first < TABLE_WIDTH; first += TABLE_LINE) {
+            const int32_t count = ih_min_s32(TABLE_LINE, IH_SURFACE_STEPS - first);
+            uint32_t root_q20[2][TABLE_LINE];
+            ih_basis_roots(&square_q18[first], TABLE_LINE, &one_more_q18[b], 2, root_q20[0]);
             for (int32_t k = 0; k < 2; k++) {
                 int32_t *middle = &scratch->of.grid.table_q20[b + k][IH_SURFACE_STEPS - 1];
                 for (int32_t a = 0; a < count; a++) {
@@ -641,13 +685,13 @@ static int32_t least_depth_mm_q8(const struct ih_samples *samples)
 }
 
 /* Centre k is at so many grid steps from the grid's first node. */
-static int32_t centre_node(int32_t centre)
+static int32_t centre_node(const struct ih_surface_scratch *scratch, int32_t centre)
 {
-    return (IH_SURFACE_GRID - 1) / 2 - IH_SURFACE_STEPS_PER_CENTRE * (IH_SURFACE_CENTRES - 1) / 2 +
-           IH_SURFACE_STEPS_PER_CENTRE * centre;
+    const int32_t steps = steps_of(scratch);
+    return (IH_SURFACE_GRID - 1) / 2 - steps * (scratch->centres - 1) / 2 + steps * centre;
 }
 
-/* Centres k and CENTRES - 1 - k of a row stand alike on both sides of the middle, and so do nodes x and
+/* Centres k and centres - 1 - k of a row stand alike on both sides of the middle, and so do nodes x and
  * GRID - 1 - x: with p and q what a centre's basis is at both nodes, c and d the coefficients of both
  * centres, c p + d q at the one and c q + d p at the other are half of (c + d) (p + q) plus and less
  * (c - d) (p - q). */
@@ -655,9 +699,9 @@ static void fold_table(struct ih_surface_scratch *scratch)
 {
     for (int32_t b = 0; b < IH_SURFACE_STEPS; b++) {
         const int32_t *middle = &scratch->of.grid.table_q20[b][IH_SURFACE_STEPS - 1];
-        for (int32_t k = 0; k < HALF_CENTRES; k++) {
-            const int32_t *here = &middle[-centre_node(k)];
-            const int32_t *there = &middle[-centre_node(IH_SURFACE_CENTRES - 1 - k)];
+        for (int32_t k = 0; k < scratch->centres / 2; k++) {
+            const int32_t *here = &middle[-centre_node(scratch, k)];
+            const int32_t *there = &middle[-centre_node(scratch, scratch->centres - 1 - k)];
             for (int32_t x = 0; x < IH_SURFACE_HALF; x++) {
                 scratch->of.grid.sum_q20[b][k][x] = here[x] + there[x];
                 scratch->of.grid.difference_q20[b][k][x] = here[x] - there[x];
@@ -666,36 +710,52 @@ static void fold_table(struct ih_surface_scratch *scratch)
     }
 }
 
-/* Add what a row of centres brings, folded, to half a row of nodes. */
-static void add_half(const int32_t coefficient[HALF_CENTRES],
-                     int32_t basis_q20[HALF_CENTRES][IH_SURFACE_HALF], int64_t sum[IH_SURFACE_HALF])
+/* Add what `count` centres of a row bring, folded, to half a row of nodes. */
+__attribute__((always_inline)) static inline void
+add_half(const int32_t coefficient[HALF_CENTRES_MAX],
+         int32_t basis_q20[HALF_CENTRES_MAX][IH_SURFACE_HALF], int32_t count,
+         int64_t sum[IH_SURFACE_HALF])
 {
     for (int32_t x = 0; x < IH_SURFACE_HALF; x++) {
         int64_t here = sum[x];
 #pragma GCC unroll 6
-        for (int32_t k = 0; k < HALF_CENTRES; k++) {
+        for (int32_t k = 0; k < count; k++) {
             here += (int64_t)coefficient[k] * basis_q20[k][x];
         }
         sum[x] = here;
     }
 }
 
+/* Loops over a number that compilers know have all of a place's products in registers. */
+static void add_row(const int32_t coefficient[HALF_CENTRES_MAX],
+                    int32_t basis_q20[HALF_CENTRES_MAX][IH_SURFACE_HALF], int32_t count,
+                    int64_t sum[IH_SURFACE_HALF])
+{
+    if (count == IH_SURFACE_CENTRES_FEW / 2) {
+        add_half(coefficient, basis_q20, IH_SURFACE_CENTRES_FEW / 2, sum);
+    } else {
+        add_half(coefficient, basis_q20, HALF_CENTRES_MAX, sum);
+    }
+}
+
 /* sum_n c_n B_n along a row of nodes. */
 static void sum_row(struct ih_surface_scratch *scratch, int32_t y, int64_t sum[IH_SURFACE_GRID])
 {
+    const int32_t last = scratch->centres - 1;
+    const int32_t half = scratch->centres / 2;
     int64_t even[IH_SURFACE_HALF] = {0};
     int64_t odd[IH_SURFACE_HALF] = {0};
-    for (int32_t row = 0; row < IH_SURFACE_CENTRES; row++) {
-        const int32_t *solution = &scratch->coefficient[row * IH_SURFACE_CENTRES];
-        const int32_t b = ih_abs_s32(y - centre_node(row));
-        int32_t both[HALF_CENTRES];
-        int32_t between[HALF_CENTRES];
-        for (int32_t k = 0; k < HALF_CENTRES; k++) {
-            both[k] = solution[k] + solution[IH_SURFACE_CENTRES - 1 - k];
-            between[k] = solution[k] - solution[IH_SURFACE_CENTRES - 1 - k];
+    for (int32_t row = 0; row < scratch->centres; row++) {
+        const int32_t *solution = &scratch->coefficient[row * scratch->centres];
+        const int32_t b = ih_abs_s32(y - centre_node(scratch, row));
+        int32_t both[HALF_CENTRES_MAX];
+        int32_t between[HALF_CENTRES_MAX];
+        for (int32_t k = 0; k < half; k++) {
+            both[k] = solution[k] + solution[last - k];
+            between[k] = solution[k] - solution[last - k];
         }
-        add_half(both, scratch->of.grid.sum_q20[b], even);
-        add_half(between, scratch->of.grid.difference_q20[b], odd);
+        add_row(both, scratch->of.grid.sum_q20[b], half, even);
+        add_row(between, scratch->of.grid.difference_q20[b], half, odd);
     }
     for (int32_t x = 0; x < IH_SURFACE_HALF; x++) {
         sum[x] = (even[x] + odd[x]) / 2; /* without a rest */
@@ -728,7 +788,8 @@ void ih_surface_fit(const struct ih_samples *samples, const struct ih_field *fie
     if (samples->sample_count < IH_SURFACE_SAMPLES_MIN) {
         return;
     }
-    place_centres(scratch);
+    set_centres(params->centres, scratch);
+    out->centres = params->centres;
     out->mean_mm_q8 = mean_depth_mm_q8(samples);
     for (int32_t i = 0; i < samples->sample_count; i++) {
         out->root_weight_q15[i] = samples->sample[i].root_weight_q15;

@@ -65,6 +65,7 @@ void ih_params_paper(struct ih_params *params)
 {
     ih_params_default(params);
     params->is_paper = true;
+    params->surface.centres = IH_SURFACE_CENTRES_MAX;
 }
 
 enum ih_err isohead_init(struct isohead *head, const struct ih_calibration *calibration,

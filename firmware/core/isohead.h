@@ -67,7 +67,7 @@ struct isohead {
 };
 
 void ih_params_default(struct ih_params *params);
-/* The paper's method alone: as the default, with is_paper set. */
+/* The paper's method alone: as the default, with is_paper set, and the finer surface that its nests need. */
 void ih_params_paper(struct ih_params *params);
 
 /* Check the calibration, derive the rig, set default parameters. After an error every frame is

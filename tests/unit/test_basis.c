@@ -15,12 +15,14 @@
 static struct ih_surface_scratch scratch;
 static bool is_all;
 static double worst_steps;
+/* Centres in a row: every test is made with many and with few. */
+static int32_t centres = IH_SURFACE_CENTRES_MAX;
 
 void setUp(void)
 {
     memset(&scratch, 0, sizeof scratch);
     worst_steps = 0;
-    place_centres(&scratch);
+    set_centres(centres, &scratch);
 }
 
 void tearDown(void)
@@ -44,45 +46,45 @@ static void check_basis(int64_t dx_q16, int64_t dy_q16, uint32_t basis_q20)
 static void check_row(int32_t x_q16, int32_t y_q16)
 {
     const struct ih_sample sample = {.x_q16 = x_q16, .y_q16 = y_q16};
-    uint32_t row_q20[TERMS];
+    uint32_t row_q20[TERMS_MAX];
     int32_t i;
 
     fill_row(&scratch, &sample, row_q20);
-    for (i = 0; i < TERMS; i++) {
-        check_basis((int64_t)x_q16 - scratch.centre_q16[i % CENTRES],
-                    (int64_t)y_q16 - scratch.centre_q16[i / CENTRES], row_q20[i]);
+    for (i = 0; i < centres * centres; i++) {
+        check_basis((int64_t)x_q16 - scratch.centre_q16[i % centres],
+                    (int64_t)y_q16 - scratch.centre_q16[i / centres], row_q20[i]);
     }
 }
 
-static void check_roots(const uint32_t square_q18[IH_BASIS_ACROSS])
+static void check_roots(const uint32_t square_q18[IH_BASIS_ACROSS_MAX])
 {
     static const uint32_t down_q18[2] = {0, 0};
-    uint32_t root_q20[2 * IH_BASIS_ACROSS + 1];
+    uint32_t root_q20[2 * IH_BASIS_ACROSS_MAX + 1];
     int i;
 
-    root_q20[2 * IH_BASIS_ACROSS] = 77;
-    ih_basis_roots(square_q18, down_q18, 2, root_q20);
-    for (i = 0; i < 2 * IH_BASIS_ACROSS; i++) {
-        const double exact_q20 = sqrt(square_q18[i % IH_BASIS_ACROSS]) * 2048;
+    root_q20[2 * centres] = 77;
+    ih_basis_roots(square_q18, centres, down_q18, 2, root_q20);
+    for (i = 0; i < 2 * centres; i++) {
+        const double exact_q20 = sqrt(square_q18[i % centres]) * 2048;
         const double off_steps = root_q20[i] - exact_q20;
 
         if (off_steps > RELATIVE * exact_q20 || off_steps < -1 - RELATIVE * exact_q20) {
             IH_TEST_WITHIN(1 + RELATIVE * exact_q20, exact_q20, root_q20[i], "root",
-                           square_q18[i % IH_BASIS_ACROSS]);
+                           square_q18[i % centres]);
         }
     }
-    TEST_ASSERT_EQUAL_UINT32(77, root_q20[2 * IH_BASIS_ACROSS]);
+    TEST_ASSERT_EQUAL_UINT32(77, root_q20[2 * centres]);
 }
 
 /* Squares from end to end. */
 static void every_square_has_its_root(void)
 {
-    uint32_t square_q18[IH_BASIS_ACROSS];
+    uint32_t square_q18[IH_BASIS_ACROSS_MAX];
     int64_t square;
     int i;
 
-    for (square = 1 << 18; square <= SQUARE_MOST; square += is_all ? IH_BASIS_ACROSS : 9973) {
-        for (i = 0; i < IH_BASIS_ACROSS; i++) {
+    for (square = 1 << 18; square <= SQUARE_MOST; square += is_all ? centres : 9973) {
+        for (i = 0; i < centres; i++) {
             square_q18[i] = (uint32_t)(square + i < SQUARE_MOST ? square + i : SQUARE_MOST);
         }
         check_roots(square_q18);
@@ -92,14 +94,15 @@ static void every_square_has_its_root(void)
 /* Places where the number of leading zeros changes, and entries of the table; the least and the greatest. */
 static void roots_hold_at_the_ends_of_spans(void)
 {
-    uint32_t square_q18[IH_BASIS_ACROSS];
+    uint32_t square_q18[IH_BASIS_ACROSS_MAX];
     uint64_t span;
     int bit, i;
 
     for (bit = 18; bit <= 30; bit++) {
         for (span = 0; span < 512; span++) {
-            for (i = 0; i < IH_BASIS_ACROSS; i++) {
-                const uint64_t at = ((512 + span) << bit >> 9) + (uint64_t)i - IH_BASIS_ACROSS / 2;
+            for (i = 0; i < centres; i++) {
+                const uint64_t at =
+                    ((512 + span) << bit >> 9) + (uint64_t)i - (uint64_t)(centres / 2);
 
                 square_q18[i] = (uint32_t)(at < 1 << 18       ? 1 << 18
                                            : at > SQUARE_MOST ? SQUARE_MOST
@@ -113,33 +116,33 @@ static void roots_hold_at_the_ends_of_spans(void)
 /* Each line has its own second square. */
 static void lines_are_roots_of_sums(void)
 {
-    uint32_t across_q18[IH_BASIS_ACROSS], down_q18[4], together_q18[IH_BASIS_ACROSS];
-    uint32_t root_q20[4][IH_BASIS_ACROSS], expected_q20[2 * IH_BASIS_ACROSS];
+    uint32_t across_q18[IH_BASIS_ACROSS_MAX], down_q18[4], together_q18[IH_BASIS_ACROSS_MAX];
+    uint32_t root_q20[4 * IH_BASIS_ACROSS_MAX], expected_q20[2 * IH_BASIS_ACROSS_MAX];
     static const uint32_t none[2] = {0, 0};
     int32_t i, k;
 
-    for (i = 0; i < IH_BASIS_ACROSS; i++) {
+    for (i = 0; i < centres; i++) {
         across_q18[i] = (uint32_t)((i + 1) * (i + 1)) << 20;
     }
     for (k = 0; k < 4; k++) {
         down_q18[k] = (uint32_t)(k * k) << 21;
     }
-    ih_basis_roots(across_q18, down_q18, 4, root_q20[0]);
+    ih_basis_roots(across_q18, centres, down_q18, 4, root_q20);
     for (k = 0; k < 4; k++) {
-        for (i = 0; i < IH_BASIS_ACROSS; i++) {
+        for (i = 0; i < centres; i++) {
             together_q18[i] = across_q18[i] + down_q18[k];
         }
-        ih_basis_roots(together_q18, none, 2, expected_q20);
-        TEST_ASSERT_EQUAL_UINT32_ARRAY(expected_q20, root_q20[k], IH_BASIS_ACROSS);
+        ih_basis_roots(together_q18, centres, none, 2, expected_q20);
+        TEST_ASSERT_EQUAL_UINT32_ARRAY(expected_q20, &root_q20[k * centres], (uint32_t)centres);
     }
 }
 
 /* Sums of products against whole numbers one by one, at both ends of their factors. */
 static void sums_are_exact(void)
 {
-    static uint32_t basis_q20[IH_BASIS_TERMS];
-    static int32_t coefficient[IH_BASIS_TERMS];
-    static int64_t sum[IH_BASIS_TERMS], expected[IH_BASIS_TERMS];
+    static uint32_t basis_q20[IH_BASIS_TERMS_MAX];
+    static int32_t coefficient[IH_BASIS_TERMS_MAX];
+    static int64_t sum[IH_BASIS_TERMS_MAX], expected[IH_BASIS_TERMS_MAX];
     struct ih_test_random random = {.state = 5};
     int round, i;
 
@@ -148,7 +151,7 @@ static void sums_are_exact(void)
         const int32_t factor = (int32_t)ih_test_between(&random, -(1 << 27), 1 << 27);
         int64_t expected_sum = 0;
 
-        for (i = 0; i < IH_BASIS_TERMS; i++) {
+        for (i = 0; i < centres * centres; i++) {
             basis_q20[i] = (uint32_t)ih_test_between(&random, 1 << 20, IH_RANGE_BASIS_Q20);
             coefficient[i] = (int32_t)ih_test_between(&random, -most, most);
             if (round % 5 == 0) {
@@ -158,9 +161,10 @@ static void sums_are_exact(void)
             expected_sum += (int64_t)basis_q20[i] * coefficient[i];
             expected[i] = sum[i] + (int64_t)basis_q20[i] * factor;
         }
-        IH_TEST_EQUAL(expected_sum, ih_basis_sum(basis_q20, coefficient), "sum", round);
-        ih_basis_add(basis_q20, factor, sum);
-        for (i = 0; i < IH_BASIS_TERMS; i++) {
+        IH_TEST_EQUAL(expected_sum, ih_basis_sum(basis_q20, coefficient, centres * centres), "sum",
+                      round);
+        ih_basis_add(basis_q20, factor, sum, centres * centres);
+        for (i = 0; i < centres * centres; i++) {
             IH_TEST_EQUAL(expected[i], sum[i], "added", i);
         }
     }
@@ -170,8 +174,9 @@ static void centres_stand_evenly(void)
 {
     int32_t k;
 
-    for (k = 0; k < CENTRES; k++) {
-        IH_TEST_WITHIN(0.5, (2.0 * k - 11) * 20 * 65536 / 11, scratch.centre_q16[k], "centre", k);
+    for (k = 0; k < centres; k++) {
+        IH_TEST_WITHIN(0.5, (2.0 * k - (centres - 1)) * (24.0 / centres) * 65536 * 10 / 11,
+                       scratch.centre_q16[k], "centre", k);
     }
 }
 
@@ -209,9 +214,9 @@ static void places_near_centres_have_their_basis(void)
 {
     int32_t k, off;
 
-    for (k = 0; k < CENTRES; k++) {
+    for (k = 0; k < centres; k++) {
         for (off = -300; off <= 300; off++) {
-            check_row(scratch.centre_q16[k] + off, scratch.centre_q16[CENTRES - 1 - k] - off);
+            check_row(scratch.centre_q16[k] + off, scratch.centre_q16[centres - 1 - k] - off);
         }
     }
 }
@@ -238,12 +243,13 @@ static void changed_sums_are_those_of_the_new_weights(void)
 {
     static struct ih_samples samples;
     static struct ih_surface out;
-    static int32_t changed[IH_NORMAL_LINE(TERMS)];
+    static int32_t changed[IH_NORMAL_LINE(TERMS_MAX)];
     struct ih_surface_params params;
     struct ih_test_random source = {5};
     int32_t i, calls;
 
     ih_surface_params_default(&params);
+    params.centres = centres;
     samples.sample_count = 340;
     out.mean_mm_q8 = 1000 << 8;
     for (i = 0; i < samples.sample_count; i++) {
@@ -259,33 +265,38 @@ static void changed_sums_are_those_of_the_new_weights(void)
     calls =
         (change_weights(&samples, &params, &scratch, &out) + IH_NORMAL_PAIRS - 1) / IH_NORMAL_PAIRS;
     IH_TEST_RANGE(2, 40, calls, "calls that change", 0);
-    memcpy(changed, scratch.of.system.normal, sizeof changed);
+    memcpy(changed, scratch.normal, (size_t)IH_NORMAL_LINE(scratch.terms) * sizeof changed[0]);
     sum_all(&samples, &scratch, &out, false);
     calls += 2 * ((samples.sample_count + IH_NORMAL_ROWS - 1) / IH_NORMAL_ROWS);
-    for (i = 0; i < TERMS; i++) {
-        const int32_t *line = &scratch.of.system.normal[ih_normal_line(i)];
+    for (i = 0; i < scratch.terms; i++) {
+        const int32_t *line = &scratch.normal[ih_normal_line(i)];
         int32_t j;
 
         for (j = 0; j <= i; j++) {
             IH_TEST_WITHIN(calls / 2.0, line[j], changed[ih_normal_line(i) + j], "sum",
-                           i * TERMS + j);
+                           i * scratch.terms + j);
         }
     }
 }
 
 int main(int count, char **arguments)
 {
+    int pass;
+
     is_all = count == 2 && strcmp(arguments[1], "--all") == 0;
     UNITY_BEGIN();
-    RUN_TEST(every_square_has_its_root);
-    RUN_TEST(roots_hold_at_the_ends_of_spans);
-    RUN_TEST(lines_are_roots_of_sums);
-    RUN_TEST(sums_are_exact);
-    RUN_TEST(centres_stand_evenly);
-    RUN_TEST(every_place_has_its_basis);
-    RUN_TEST(any_place_has_its_basis);
-    RUN_TEST(places_near_centres_have_their_basis);
-    RUN_TEST(the_table_is_the_basis_at_whole_steps);
-    RUN_TEST(changed_sums_are_those_of_the_new_weights);
+    for (pass = 0; pass < 2; pass++) {
+        centres = pass == 0 ? IH_SURFACE_CENTRES_MAX : IH_SURFACE_CENTRES_FEW;
+        RUN_TEST(every_square_has_its_root);
+        RUN_TEST(roots_hold_at_the_ends_of_spans);
+        RUN_TEST(lines_are_roots_of_sums);
+        RUN_TEST(sums_are_exact);
+        RUN_TEST(centres_stand_evenly);
+        RUN_TEST(every_place_has_its_basis);
+        RUN_TEST(any_place_has_its_basis);
+        RUN_TEST(places_near_centres_have_their_basis);
+        RUN_TEST(the_table_is_the_basis_at_whole_steps);
+        RUN_TEST(changed_sums_are_those_of_the_new_weights);
+    }
     return UNITY_END();
 }

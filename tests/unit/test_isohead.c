@@ -98,29 +98,29 @@ static void process(void)
     TEST_ASSERT_EQUAL_INT(IH_OK, isohead_frame(&head, &frame, NULL, 0));
 }
 
-static double miss_mm(const struct ih_hypothesis *hypothesis, double x, double y, double z)
+static double miss_mm(const int32_t centre_mm_q8[3], double x, double y, double z)
 {
-    const double dx = hypothesis->centre_mm_q8[0] / 256.0 - x;
-    const double dy = hypothesis->centre_mm_q8[1] / 256.0 - y;
-    const double dz = hypothesis->centre_mm_q8[2] / 256.0 - z;
+    const double dx = centre_mm_q8[0] / 256.0 - x;
+    const double dy = centre_mm_q8[1] / 256.0 - y;
+    const double dz = centre_mm_q8[2] / 256.0 - z;
 
     return sqrt(dx * dx + dy * dy + dz * dz);
 }
 
-/* Says what became of the best hypothesis when there is not just one head. */
+/* Says what became of the best nest when there is not just one head. */
 static void check_one_head(const char *name, int index)
 {
     const struct ih_hypothesis *best = &head.heads.hypothesis[0];
     char text[160];
 
-    if (head.heads.head_count == 1) {
-        IH_TEST_EQUAL(0, head.heads.head[0], name, index);
+    if (head.result.head_count == 1) {
+        IH_TEST_EQUAL(0, head.result.head[0], name, index);
         return;
     }
     snprintf(text, sizeof text,
              "%s [%d]: %d heads; best %s, %d mm^2, inside %d, above %d/%d, beside %d/%d, below "
              "%d/%d",
-             name, index, (int)head.heads.head_count,
+             name, index, (int)head.result.head_count,
              head.heads.hypothesis_count == 0 ? "none"
              : best->rejected == IH_ACCEPTED  ? "accepted"
                                               : ih_reject_text(best->rejected),
@@ -135,11 +135,13 @@ static void check_one_head(const char *name, int index)
  * edge of a head, and overshoots by a part of that. */
 #define MISS_MAX_MM (10 + 48 / 2.0)
 
+/* By the paper's method alone: nobody learnt the score of busts like these. */
 static void check_bust(const struct vector_bust *bust, int index)
 {
-    const struct ih_hypothesis *best = &head.heads.hypothesis[0];
+    const int32_t *centre_mm_q8 = head.result.entry[0].centre_mm_q8;
 
     paint_bust(bust);
+    ih_params_paper(&head.params);
     process();
     /* At an outline two dots may be one blob. */
     IH_TEST_RANGE(bust->dot_count * 98 / 100, bust->dot_count, head.dots.dot_count, bust->name,
@@ -149,10 +151,10 @@ static void check_bust(const struct vector_bust *bust, int index)
                   index);
     TEST_ASSERT_TRUE(head.surface.valid);
     check_one_head(bust->name, index);
-    IH_TEST_WITHIN(MISS_MAX_MM, 0, miss_mm(best, bust->x_mm, bust->y_mm, bust->z_mm), bust->name,
-                   index);
+    IH_TEST_WITHIN(MISS_MAX_MM, 0, miss_mm(centre_mm_q8, bust->x_mm, bust->y_mm, bust->z_mm),
+                   bust->name, index);
     /* Sideways a surface is no worse on one side than on the other: half of that. */
-    IH_TEST_WITHIN(12, bust->x_mm, best->centre_mm_q8[0] / 256.0, bust->name, index);
+    IH_TEST_WITHIN(12, bust->x_mm, centre_mm_q8[0] / 256.0, bust->name, index);
 }
 
 static void a_bust_before_a_wall_has_one_head(void)
@@ -246,12 +248,13 @@ static void check_range_image(int32_t width, int32_t height, double z_mm, double
     int32_t slot;
 
     start_range(width, height);
+    ih_params_paper(&head.params);
     render_range(30, -60, z_mm, wall_mm);
     process();
     check_one_head("range image", width);
     /* As for dots. */
-    IH_TEST_WITHIN(MISS_MAX_MM, 0, miss_mm(&head.heads.hypothesis[0], 30, -60, z_mm), "centre",
-                   width);
+    IH_TEST_WITHIN(MISS_MAX_MM, 0, miss_mm(head.result.entry[0].centre_mm_q8, 30, -60, z_mm),
+                   "centre", width);
     TEST_ASSERT_EQUAL_INT32(0, head.dots.dot_count);
     for (slot = 0; slot < IH_SLOTS; slot++) {
         IH_TEST_EQUAL(IH_NONE, head.labels.dot_of_slot[slot], "labels of a range image", slot);
@@ -320,7 +323,7 @@ static void expect_error(enum ih_err err, const char *what)
 
     paint_bust(&vector_busts[0]);
     process();
-    TEST_ASSERT_EQUAL_INT32(1, head.heads.head_count);
+    TEST_ASSERT_EQUAL_INT32(1, head.result.head_count);
     IH_TEST_EQUAL(err, isohead_frame(&head, &wrong, NULL, 0), what, 0);
     check_empty(what);
     TEST_ASSERT_FALSE(head.surface.valid);
@@ -392,7 +395,7 @@ static void ambient_frames_are_checked(void)
     memset(grey16, 0, sizeof grey16);
     ambient = (struct ih_frame){grey16, frame.width, frame.height, 2 * frame.width, 2, 1023};
     TEST_ASSERT_EQUAL_INT(IH_OK, isohead_frame(&head, &frame, &ambient, 0));
-    TEST_ASSERT_EQUAL_INT32(1, head.heads.head_count);
+    TEST_ASSERT_EQUAL_INT32(1, head.result.head_count);
     ambient.height--;
     TEST_ASSERT_EQUAL_INT(IH_ERR_SIZE, isohead_frame(&head, &frame, &ambient, 0));
     check_empty("ambient frame of another size");
@@ -521,7 +524,7 @@ static void expect_the_nests(double x_mm, double y_mm, double z_mm)
         IH_TEST_EQUAL(false, r->entry[i].has_probability, "no probability", i);
         IH_TEST_EQUAL(0, r->entry[i].track_id, "no track", i);
     }
-    IH_TEST_WITHIN(MISS_MAX_MM, 0, miss_mm(&head.heads.hypothesis[0], x_mm, y_mm, z_mm), "head", 0);
+    IH_TEST_WITHIN(MISS_MAX_MM, 0, miss_mm(r->entry[0].centre_mm_q8, x_mm, y_mm, z_mm), "head", 0);
     TEST_ASSERT_EQUAL_INT32(0, head.findings.finding_count);
     TEST_ASSERT_EQUAL_INT32(0, head.tracks.track_count);
 }

@@ -32,10 +32,11 @@ def differences(frame, ridge, huber_mm):
     mean_mm = surface.mean_of(samples["depth_mm_q8"])
     grid_mm = np.array(frame["surface"]["depth_mm_q8"], dtype=float) / 256
     final = column(samples, "final_root_weight_q15", 15)
-    once = surface.on_grid(surface.solve(places, depth_mm, final, mean_mm, ridge), mean_mm,
+    centres = frame["surface"]["centres"]
+    once = surface.on_grid(surface.solve(places, depth_mm, final, mean_mm, ridge, centres), mean_mm,
                            depth_mm)
-    twice, _ = surface.fit(places, depth_mm, column(samples, "root_weight_q15", 15), mean_mm, ridge,
-                           huber_mm)
+    twice, _ = surface.fit(places, depth_mm, column(samples, "root_weight_q15", 15), mean_mm,
+                           centres, ridge, huber_mm)
     return np.abs(grid_mm - once).max(), np.abs(grid_mm - twice).max()
 
 

@@ -6,32 +6,33 @@ from scipy.linalg import cho_factor, cho_solve
 import emit
 from rig import to_q, from_q
 
-CENTRES = 12
+MANY, FEW = 12, 8  # centres in a row: for the paper's nests, by default
 GRID = 47
 STEP = 10 / 11  # of the grid, in field units
+CENTRES_STEPS = 48  # of the grid: all centres' steps together
 OVERSHOOT_MM, DEPTH_MAX_MM = 200, 32000
 SAMPLES_MIN = 16
 RIDGE_Q30 = 10737
 HUBER_MM = 60
 
-CENTRE_LINE = (np.arange(CENTRES) - (CENTRES - 1) / 2) * 4 * STEP
-CENTRE_PLACES = np.stack(np.meshgrid(CENTRE_LINE, CENTRE_LINE), axis=-1).reshape(-1, 2)
 GRID_LINE = (np.arange(GRID) - (GRID - 1) / 2) * STEP
 GRID_PLACES = np.stack(np.meshgrid(GRID_LINE, GRID_LINE), axis=-1).reshape(-1, 2)
 
 
-def basis(places):
+def basis(places, centres=MANY):
     """B of every centre at every place: sqrt(dx^2 + dy^2 + 1), field units."""
-    away = places[:, None, :] - CENTRE_PLACES[None, :, :]
+    line = (np.arange(centres) - (centres - 1) / 2) * (CENTRES_STEPS / centres) * STEP
+    centre_places = np.stack(np.meshgrid(line, line), axis=-1).reshape(-1, 2)
+    away = places[:, None, :] - centre_places[None, :, :]
     return np.sqrt((away**2).sum(axis=2) + 1)
 
 
-GRID_BASIS = basis(GRID_PLACES)
+GRID_BASIS = {centres: basis(GRID_PLACES, centres) for centres in (MANY, FEW)}
 
 
-def solve(places, depth_mm, root_weight, mean_mm, ridge):
+def solve(places, depth_mm, root_weight, mean_mm, ridge, centres):
     """Coefficients of z - mean, for rows scaled by the root weight."""
-    rows = basis(places) * root_weight[:, None]
+    rows = basis(places, centres) * root_weight[:, None]
     normal = rows.T @ rows
     normal += ridge * np.diag(np.diag(normal))
     scale = 1 / np.sqrt(np.diag(normal))
@@ -43,21 +44,25 @@ def solve(places, depth_mm, root_weight, mean_mm, ridge):
 def on_grid(coefficients, mean_mm, depth_mm):
     """The surface on the grid, limited to OVERSHOOT_MM before the nearest sample."""
     least_mm = max(depth_mm.min() - OVERSHOOT_MM, 1)
-    grid = (mean_mm + GRID_BASIS @ coefficients).reshape(GRID, GRID)
+    grid_basis = GRID_BASIS[round(len(coefficients)**0.5)]
+    grid = (mean_mm + grid_basis @ coefficients).reshape(GRID, GRID)
     return np.clip(grid, least_mm, DEPTH_MAX_MM)
 
 
 def huber(places, depth_mm, coefficients, mean_mm, huber_mm):
     """Root of the weight huber / |residual| of samples that are off by more than huber."""
-    residual = np.abs(mean_mm + basis(places) @ coefficients - depth_mm)
+    rows = basis(places, round(len(coefficients)**0.5))
+    residual = np.abs(mean_mm + rows @ coefficients - depth_mm)
     return np.where(residual > huber_mm, np.sqrt(huber_mm / np.maximum(residual, 1e-9)), 1.0)
 
 
-def fit(places, depth_mm, root_weight, mean_mm, ridge=RIDGE_Q30 / 2**30, huber_mm=HUBER_MM):
+def fit(places, depth_mm, root_weight, mean_mm, centres, ridge=RIDGE_Q30 / 2**30,
+        huber_mm=HUBER_MM):
     """Both passes. Returns the grid and the root weights of the second pass."""
-    first = solve(places, depth_mm, root_weight, mean_mm, ridge)
+    first = solve(places, depth_mm, root_weight, mean_mm, ridge, centres)
     final = root_weight * huber(places, depth_mm, first, mean_mm, huber_mm)
-    return on_grid(solve(places, depth_mm, final, mean_mm, ridge), mean_mm, depth_mm), final
+    second = solve(places, depth_mm, final, mean_mm, ridge, centres)
+    return on_grid(second, mean_mm, depth_mm), final
 
 
 def mean_of(depth_mm_q8):
@@ -117,15 +122,17 @@ def write_vectors(directory):
         places_q16, depth_q8 = to_q(places, 16), to_q(depth_mm, 8)
         weight_q15 = to_q(root_weight, 15)
         mean_mm = mean_of(depth_q8)
-        grid, final = fit(from_q(places_q16, 16), from_q(depth_q8, 8), from_q(weight_q15, 15),
-                          mean_mm)
         samples = ["{%d, %d, %d, %d, %d, false}" % (x, y, d, w, i) for i, ((x, y), d, w)
                    in enumerate(zip(places_q16, depth_q8, weight_q15))]
         inc.raw("\nstatic const struct ih_sample vector_%s_samples[] = {\n%s};\n"
                 % (name, emit.wrap(samples)))
-        inc.array("double", "vector_%s_root_weight" % name, final, 6)
-        inc.array("double", "vector_%s_grid" % name, grid.ravel(), 3)
-        rows.append('"%s", %d, %s, vector_%s_samples, vector_%s_root_weight, vector_%s_grid'
-                    % (name, len(places), emit.number(mean_mm, 4), name, name, name))
+        for centres in (MANY, FEW):
+            grid, final = fit(from_q(places_q16, 16), from_q(depth_q8, 8), from_q(weight_q15, 15),
+                              mean_mm, centres)
+            own = "%s_%d" % (name, centres)
+            inc.array("double", "vector_%s_root_weight" % own, final, 6)
+            inc.array("double", "vector_%s_grid" % own, grid.ravel(), 3)
+            rows.append('"%s", %d, %d, %s, vector_%s_samples, vector_%s_root_weight, vector_%s_grid'
+                        % (own, centres, len(places), emit.number(mean_mm, 4), name, own, own))
     inc.struct_array("vector_surface", "vector_surfaces", rows)
     return inc.write(directory, "surface.inc")
