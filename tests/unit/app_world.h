@@ -164,7 +164,13 @@ enum ih_err isohead_init(struct isohead *head, const struct ih_calibration *cali
 {
     *bad_slot = IH_NONE;
     head->rig.calibration = *calibration;
+    head->params.is_paper = false;
     return IH_OK;
+}
+
+void ih_params_paper(struct ih_params *params)
+{
+    params->is_paper = true;
 }
 
 enum ih_err isohead_label(struct isohead *head, const struct ih_frame *frame,

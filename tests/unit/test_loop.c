@@ -220,6 +220,18 @@ static void test_reload(void)
     TEST_ASSERT_EQUAL_INT(11, world.lit_count);
 }
 
+/* The paper's method alone, if it is asked for, also after the rig has been read again. */
+static void test_paper(void)
+{
+    static const enum world_act acts[] = {FIVE, WORLD_RELOAD, FIVE};
+    for (int paper = 0; paper < 2; paper++) {
+        world_init(APP_STROBE_GATED, acts, COUNT(acts));
+        world.config.paper = paper == 1;
+        TEST_ASSERT_EQUAL_INT(APP_EXIT_GOOD, world_run());
+        TEST_ASSERT_EQUAL_INT(paper, world_head.params.is_paper);
+    }
+}
+
 /* Not to be read, of another kind, or of another size: laser off, no records. */
 static void test_reload_bad(void)
 {
@@ -526,6 +538,7 @@ int main(void)
     RUN_TEST(test_unplugged);
     RUN_TEST(test_plugged_in_late);
     RUN_TEST(test_reload);
+    RUN_TEST(test_paper);
     RUN_TEST(test_reload_bad);
     RUN_TEST(test_reload_good_again);
     RUN_TEST(test_no_rig);
