@@ -5,7 +5,7 @@
 /* An arc; its chord leads from the last point back to the first. */
 struct part {
     int32_t vertex_count;
-    struct ih_vertex vertex[IH_PARTS_POINTS];
+    struct ih_vertex vertex[IH_PARTS_POINTS_MAX];
 };
 
 static bool is_same(const struct ih_ellipse *a, const struct ih_ellipse *b)
@@ -55,8 +55,8 @@ static bool find_part(struct ih_hypotheses_scratch *scratch, const struct ih_nes
         !is_same(&ellipse, &slice->ellipse)) {
         return false;
     }
-    for (int32_t from = 0; from < IH_PARTS_POINTS; from++) {
-        for (int32_t to = from + 1; to < parts->count && to < from + IH_PARTS_POINTS; to++) {
+    for (int32_t from = 0; from < parts->point_count; from++) {
+        for (int32_t to = from + 1; to < parts->count && to < from + parts->point_count; to++) {
             if (has_moments(parts, from, to, &ellipse)) {
                 copy_stretch(parts, from, to, out);
                 return true;

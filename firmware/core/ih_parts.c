@@ -9,9 +9,8 @@
 #include <arm_acle.h>
 #endif
 
-#define POINTS IH_PARTS_POINTS
 /* What fans sum up fits its bits up to here, with 1 % to spare: docs/numerics.md. */
-_Static_assert(POINTS <= 56, "second moments of fans need more bits");
+_Static_assert(IH_PARTS_POINTS_MAX <= 56, "second moments of fans need more bits");
 /* What is rounded of spreads, see Error in the header: 12 times the greatest distance of an ellipse's
  * centre from the middle of the outline; 18 times 49 units of Q16 of a second moment in ih_ellipse. */
 #define CENTRE_ERROR (12 * 93 * 256)
@@ -41,6 +40,7 @@ _Static_assert(POINTS <= 56, "second moments of fans need more bits");
 void ih_ellipse_params_default(struct ih_ellipse_params *params)
 {
     *params = (struct ih_ellipse_params){
+        .point_count = 32,
         .shape_max_q16 = 68485,         /* 1.045 */
         .ratio_closed_max_q16 = 124518, /* 1.9 */
         .ratio_part_max_q16 = 114688,   /* 1.75 */
@@ -90,9 +90,9 @@ static int32_t measure_edges(const struct ih_vertex *vertex, int32_t vertex_coun
 }
 
 /* A length that a part of the steps has: both below 2^24.7, their product below 2^30.5. */
-static int32_t length_of_steps(int32_t total, int32_t steps, bool closed)
+static int32_t length_of_steps(int32_t total, int32_t steps, const struct ih_parts *parts)
 {
-    return closed ? total * steps / POINTS : total * steps / (POINTS - 1);
+    return total * steps / (parts->closed ? parts->point_count : parts->point_count - 1);
 }
 
 /* From p towards q, both Q9, by so much of the edge's length. In 32 bits: a difference is below 2^14.6, a
@@ -114,9 +114,9 @@ static void resample(const struct ih_cuts *cuts, const struct ih_contour *contou
     const int32_t total_q9 = measure_edges(vertex, contour->vertex_count, out);
     int32_t edge = 0;
     int32_t before_q9 = 0; /* length up to the edge */
-    for (int32_t k = 0; k < POINTS; k++) {
-        const int32_t target_q9 = length_of_steps(total_q9, k, contour->closed);
-        out->arc_q8[k] = length_of_steps(total_q9 / 2, k, contour->closed);
+    for (int32_t k = 0; k < out->point_count; k++) {
+        const int32_t target_q9 = length_of_steps(total_q9, k, out);
+        out->arc_q8[k] = length_of_steps(total_q9 / 2, k, out);
         while (edge < edges - 1 && before_q9 + out->length_q9[edge] < target_q9) {
             before_q9 += out->length_q9[edge];
             edge++;
@@ -130,8 +130,8 @@ static void resample(const struct ih_cuts *cuts, const struct ih_contour *contou
         IH_IN_RANGE(out->x_q8[k], 0, IH_RANGE_OFFSET_Q8);
         IH_IN_RANGE(out->y_q8[k], 0, IH_RANGE_OFFSET_Q8);
     }
-    out->count = POINTS;
-    for (int32_t k = 0; k < POINTS && out->closed; k++) {
+    out->count = out->point_count;
+    for (int32_t k = 0; k < out->point_count && out->closed; k++) {
         out->x_q8[out->count] = out->x_q8[k];
         out->y_q8[out->count++] = out->y_q8[k];
     }
@@ -140,7 +140,7 @@ static void resample(const struct ih_cuts *cuts, const struct ih_contour *contou
 /* Chords of parts must be shorter. They are below 2^14.1: a limit beyond 2^15 is none. */
 static void limit_chords(const struct ih_ellipse_params *params, struct ih_parts *out)
 {
-    for (int32_t k = IH_PARTS_STEPS_MIN; k < POINTS; k++) {
+    for (int32_t k = IH_PARTS_STEPS_MIN; k < out->point_count; k++) {
         const int64_t most_q8 = (int64_t)params->chord_max_q16 * out->arc_q8[k] >> 16;
         const int32_t end_q8 = most_q8 < 1 << 15 ? (int32_t)most_q8 + 1 : 1 << 15;
         out->chord2_end_q16[k] = end_q8 * end_q8;
@@ -182,7 +182,7 @@ static void measure_extent(const struct ih_ellipse_params *params, struct ih_par
                            struct limits *out)
 {
     int32_t left = parts->x_q8[0], right = left, top = parts->y_q8[0], bottom = top;
-    for (int32_t k = 0; k < POINTS; k++) {
+    for (int32_t k = 0; k < parts->point_count; k++) {
         left = ih_min_s32(left, parts->x_q8[k]);
         right = ih_max_s32(right, parts->x_q8[k]);
         top = ih_min_s32(top, parts->y_q8[k]);
@@ -226,7 +226,8 @@ struct octave {
     int32_t end;
     int area2, xy, trace;
 };
-static const struct octave octaves[] = {{14, 1, 9, 9}, {28, 3, 12, 13}, {POINTS, 5, 15, 17}};
+static const struct octave octaves[] = {
+    {14, 1, 9, 9}, {28, 3, 12, 13}, {IH_PARTS_POINTS_MAX, 5, 15, 17}};
 #define OCTAVES ((int)(sizeof octaves / sizeof octaves[0]))
 
 /* Two numbers in the halves of a word, the first one lower. */
@@ -238,8 +239,8 @@ static inline uint32_t pair_of(int32_t first, int32_t second)
 /* The places of the points, and what their cross product takes. Behind the last one no chord is short. */
 static void scale_points(struct ih_parts *parts)
 {
-    const int32_t arc_q8 = ih_max_s32(parts->arc_q8[POINTS - 1], 1);
-    const int32_t scale_q16 = FAN_STEP * (POINTS - 1) * 65536 / arc_q8;
+    const int32_t steps = parts->point_count - 1;
+    const int32_t scale_q16 = FAN_STEP * steps * 65536 / ih_max_s32(parts->arc_q8[steps], 1);
     for (int32_t k = 0; k < parts->count; k++) {
         const int32_t x = (parts->dx_q8[k] * scale_q16 + 32768) >> 16;
         const int32_t y = (parts->dy_q8[k] * scale_q16 + 32768) >> 16;
@@ -248,7 +249,7 @@ static void scale_points(struct ih_parts *parts)
         parts->fan[k] = pair_of(x, y);
         parts->turned[k] = pair_of(-y, x);
     }
-    const int32_t end = ih_min_s32(parts->count + POINTS, IH_PARTS_FAN);
+    const int32_t end = ih_min_s32(parts->count + parts->point_count, IH_PARTS_FAN);
     for (int32_t k = parts->count; k < end; k++) {
         parts->fan[k] = pair_of(FAN_PLACE_OUT, FAN_PLACE_OUT);
         parts->turned[k] = 0;
@@ -260,7 +261,7 @@ static void scale_points(struct ih_parts *parts)
 static int32_t limit_fans(const struct ih_ellipse_params *params, const struct limits *limits,
                           int32_t vertex_count, struct ih_parts *out)
 {
-    const int32_t arc_q8 = out->arc_q8[POINTS - 1];
+    const int32_t arc_q8 = out->arc_q8[out->point_count - 1];
     if (limits->area2_most_q16 == 0 || params->chord_max_q16 > FAN_CHORD_MAX_Q16 ||
         limits->half_q8 * FAN_CURLS < arc_q8 ||
         arc_q8 < 2 * vertex_count) { /* edges of a few units, whose lengths are cut off */
@@ -268,7 +269,7 @@ static int32_t limit_fans(const struct ih_ellipse_params *params, const struct l
     }
     const int64_t cube_q15 = limits->spread_q16 / 4 + limits->spread_q16 / (4 * FAN_SHARE);
     const int32_t chord_q16 = ih_max_s32(params->chord_max_q16, 0);
-    for (int32_t k = IH_PARTS_STEPS_MIN; k < POINTS; k++) {
+    for (int32_t k = IH_PARTS_STEPS_MIN; k < out->point_count; k++) {
         const int32_t chord = (chord_q16 * FAN_STEP >> 8) * k / 256 + FAN_CHORD_ERROR;
         out->chord2_end[k] = chord * chord;
     }
@@ -502,13 +503,13 @@ static void find_promising(const struct ih_ellipse_params *params, const struct 
     const int32_t cube_q15 = limit_fans(params, limits, vertex_count, out);
     if (cube_q15 > 0) {
         scale_points(out);
-        for (int32_t from = 0; from < POINTS; from += FAN_LANES) {
-            find_fans(out, from, ih_min_s32(out->count - from, POINTS), cube_q15);
+        for (int32_t from = 0; from < out->point_count; from += FAN_LANES) {
+            find_fans(out, from, ih_min_s32(out->count - from, out->point_count), cube_q15);
         }
         return;
     }
-    for (int32_t from = 0; from < POINTS; from++) {
-        const int32_t end = ih_min_s32(out->count - from, POINTS);
+    for (int32_t from = 0; from < out->point_count; from++) {
+        const int32_t end = ih_min_s32(out->count - from, out->point_count);
         const uint64_t all = (((uint64_t)1 << end) - 1) >> IH_PARTS_STEPS_MIN << IH_PARTS_STEPS_MIN;
         out->low[from] = (uint32_t)(all & UINT32_MAX);
         out->high[from] = (uint32_t)(all >> 32);
@@ -521,7 +522,8 @@ IH_WRAPPING static void sum_edges(struct ih_parts *parts, struct limits *limits)
     struct ih_parts_sums *s = &parts->sums;
     uint32_t area2 = 0;
     int64_t x = 0, y = 0, trace = 0, xx = 0, xy = 0, tangle = 0;
-    const int32_t edges = parts->closed ? POINTS : POINTS - 1;
+    const int32_t points = parts->point_count;
+    const int32_t edges = parts->closed ? points : points - 1;
     for (int32_t k = 0; k <= edges; k++) {
         s->area2_q16[k] = area2;
         s->x_q24[k] = x;
@@ -544,13 +546,13 @@ IH_WRAPPING static void sum_edges(struct ih_parts *parts, struct limits *limits)
         xx += w * in_x;
         xy += w * (2 * (px * py + qx * qy) + px * qy + qx * py);
     }
-    for (int32_t k = POINTS + 1; k < parts->count; k++) {
-        s->area2_q16[k] = area2 + s->area2_q16[k - POINTS];
-        s->x_q24[k] = x + s->x_q24[k - POINTS];
-        s->y_q24[k] = y + s->y_q24[k - POINTS];
-        s->trace_q32[k] = trace + s->trace_q32[k - POINTS];
-        s->xx_q32[k] = xx + s->xx_q32[k - POINTS];
-        s->xy_q32[k] = xy + s->xy_q32[k - POINTS];
+    for (int32_t k = points + 1; k < parts->count; k++) {
+        s->area2_q16[k] = area2 + s->area2_q16[k - points];
+        s->x_q24[k] = x + s->x_q24[k - points];
+        s->y_q24[k] = y + s->y_q24[k - points];
+        s->trace_q32[k] = trace + s->trace_q32[k - points];
+        s->xx_q32[k] = xx + s->xx_q32[k - points];
+        s->xy_q32[k] = xy + s->xy_q32[k - points];
     }
     if (tangle >> (TANGLED_BITS - AREA2_BITS) > limits->area2_most_q16) {
         limits->area2_most_q16 = 0;
@@ -733,13 +735,15 @@ bool ih_parts_make(const struct ih_cuts *cuts, const struct ih_contour *contour,
     }
     struct limits limits = {0};
     out->closed = contour->closed;
+    out->point_count =
+        ih_clamp_s32(params->point_count, IH_PARTS_POINTS_MIN, IH_PARTS_POINTS_MAX) & ~7;
     out->part_count = 0;
     resample(cuts, contour, out);
     limit_chords(params, out);
     measure_extent(params, out, &limits);
     find_promising(params, &limits, contour->vertex_count, out);
     sum_edges(out, &limits);
-    for (int32_t from = 0; from < POINTS; from++) {
+    for (int32_t from = 0; from < out->point_count; from++) {
         sift(out, from, &limits);
     }
     return true;

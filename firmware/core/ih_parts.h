@@ -1,7 +1,7 @@
 /* ih_parts - a contour as a polygon of equal steps, and which of its parts may be ellipses.
  *
  * In:    a contour.
- * Out:   a box around it; IH_PARTS_POINTS points at equal steps along it; of the parts between two of
+ * Out:   a box around it; point_count points at equal steps along it; of the parts between two of
  *        them, closed by their chords, those that are worth a closer look, each with the most merit
  *        that it can have.
  * Way:   what is the same for all minima that a contour may surround is worked out here once;
@@ -37,6 +37,8 @@
  *        twelve times, of 79,200 k^4: a disc's, and 0.3 more. Within the border nothing is farther from
  *        its first point than 18 k, so that a triangle's cross product is below 2^15. What is summed up
  *        modulo 2^32 for longer chords is not used.
+ *        All of it is by the number of steps, not by that of points: of fewer points parts have fewer of
+ *        the longer steps, and each step has the same 24 units; whatever is shown for 55 steps holds.
  *        Rounding moves a place by 0.41 of such a unit (one standard deviation), and twice the area by 14
  *        root k; 4 k, a 128th of the limit, and what second moments lack as they are cut off, which is
  *        more the shorter a part is, are together 4.6 standard deviations of the spread or more. It is no
@@ -50,14 +52,15 @@
 
 #include "ih_cuts.h"
 
-/* A whole number of vectors; what there is to do grows with its square. */
-#define IH_PARTS_POINTS 56
+/* Points on a contour: a whole number of vectors; what there is to do grows with its square. */
+#define IH_PARTS_POINTS_MAX 56
+#define IH_PARTS_POINTS_MIN 16
 /* A part has at least this many of the steps: fewer are no ellipse's outline. */
 #define IH_PARTS_STEPS_MIN 8
 /* All that there are: from each point over each number of steps. */
-#define IH_PARTS_MAX (IH_PARTS_POINTS * (IH_PARTS_POINTS - IH_PARTS_STEPS_MIN))
+#define IH_PARTS_MAX (IH_PARTS_POINTS_MAX * (IH_PARTS_POINTS_MAX - IH_PARTS_STEPS_MIN))
 /* Lanes of a vector reach beyond the points. */
-#define IH_PARTS_FAN (2 * IH_PARTS_POINTS + 8)
+#define IH_PARTS_FAN (2 * IH_PARTS_POINTS_MAX + 8)
 /* Longer contours are not searched for an elliptical part; it bounds the sums. */
 #define IH_PARTS_VERTICES_MAX 768
 /* A part must have this much area, twice: half a grid cell. */
@@ -68,6 +71,9 @@
 #define IH_PARTS_SHAPE_MIN_Q16 65280
 
 struct ih_ellipse_params {
+    /* On a contour, taken down to a multiple of 8 between IH_PARTS_POINTS_MIN and _MAX. A head found
+     * by itself takes 56; where other evidence is weighed with it, 32 find as many. */
+    int32_t point_count;
     int32_t shape_max_q16;        /* most that shape may be for an ellipse, at least 1 */
     int32_t ratio_closed_max_q16; /* axis ratio of a closed contour, of a cut part */
     int32_t ratio_part_max_q16;
@@ -87,17 +93,18 @@ struct ih_part {
 
 /* [k]: sums over the edges before point k, about the outline's middle. */
 struct ih_parts_sums {
-    uint32_t area2_q16[2 * IH_PARTS_POINTS]; /* twice; modulo 2^32, see above */
-    int64_t x_q24[2 * IH_PARTS_POINTS], y_q24[2 * IH_PARTS_POINTS];   /* 6 times */
-    int64_t trace_q32[2 * IH_PARTS_POINTS];                           /* 12 times, x and y */
-    int64_t xx_q32[2 * IH_PARTS_POINTS], xy_q32[2 * IH_PARTS_POINTS]; /* 12 and 24 times */
+    uint32_t area2_q16[2 * IH_PARTS_POINTS_MAX]; /* twice; modulo 2^32, see above */
+    int64_t x_q24[2 * IH_PARTS_POINTS_MAX], y_q24[2 * IH_PARTS_POINTS_MAX]; /* 6 times */
+    int64_t trace_q32[2 * IH_PARTS_POINTS_MAX];                             /* 12 times, x and y */
+    int64_t xx_q32[2 * IH_PARTS_POINTS_MAX], xy_q32[2 * IH_PARTS_POINTS_MAX]; /* 12 and 24 times */
 };
 
 struct ih_parts {
     bool closed;
-    int32_t count; /* points in use: a closed contour goes round twice */
-    int32_t x_q8[2 * IH_PARTS_POINTS], y_q8[2 * IH_PARTS_POINTS]; /* places on the grid */
-    int32_t arc_q8[IH_PARTS_POINTS];                              /* length of a part, by steps */
+    int32_t point_count; /* at equal steps along the contour */
+    int32_t count;       /* points in use: a closed contour goes round twice */
+    int32_t x_q8[2 * IH_PARTS_POINTS_MAX], y_q8[2 * IH_PARTS_POINTS_MAX]; /* places on the grid */
+    int32_t arc_q8[IH_PARTS_POINTS_MAX]; /* length of a part, by steps */
     int32_t part_count;
     struct ih_part part[IH_PARTS_MAX]; /* by point, then by steps */
     /* scratch: of edges, their lengths; of points, the place from the middle and the square of its
@@ -105,11 +112,11 @@ struct ih_parts {
      * points, the place in a fan as a pair of 16 bits, x lower, and (-y, x); bit k of [from], low
      * and high: the part over k steps is worth a closer look */
     int32_t length_q9[IH_PARTS_VERTICES_MAX];
-    int32_t dx_q8[2 * IH_PARTS_POINTS], dy_q8[2 * IH_PARTS_POINTS];
-    int32_t square_q16[2 * IH_PARTS_POINTS];
-    uint32_t low[IH_PARTS_POINTS], high[IH_PARTS_POINTS];
+    int32_t dx_q8[2 * IH_PARTS_POINTS_MAX], dy_q8[2 * IH_PARTS_POINTS_MAX];
+    int32_t square_q16[2 * IH_PARTS_POINTS_MAX];
+    uint32_t low[IH_PARTS_POINTS_MAX], high[IH_PARTS_POINTS_MAX];
     uint32_t fan[IH_PARTS_FAN], turned[IH_PARTS_FAN];
-    int32_t chord2_end[IH_PARTS_POINTS], chord2_end_q16[IH_PARTS_POINTS];
+    int32_t chord2_end[IH_PARTS_POINTS_MAX], chord2_end_q16[IH_PARTS_POINTS_MAX];
     struct ih_parts_sums sums;
 };
 

@@ -67,7 +67,8 @@ struct isohead {
 };
 
 void ih_params_default(struct ih_params *params);
-/* The paper's method alone: as the default, with is_paper set, and the finer surface that its nests need. */
+/* The paper's method alone: as the default, with is_paper set, the finer surface, and as many points on a contour as
+ * there may be: nests have to be heads by themselves. */
 void ih_params_paper(struct ih_params *params);
 
 /* Check the calibration, derive the rig, set default parameters. After an error every frame is

@@ -9,14 +9,16 @@
 static struct ih_cuts cuts;
 static struct ih_contour contour;
 static struct ih_parts parts;
-static uint64_t may_be[IH_PARTS_POINTS]; /* bit k: from this point over k steps */
+static uint64_t may_be[IH_PARTS_POINTS_MAX]; /* bit k: from this point over k steps */
 static struct ih_ellipse_params params;
+static int32_t points; /* on a contour: every test is run with the most and with fewer */
 
 void setUp(void)
 {
     memset(&cuts, IH_TEST_FILL, sizeof cuts);
     memset(&parts, IH_TEST_FILL, sizeof parts);
     ih_ellipse_params_default(&params);
+    params.point_count = points;
 }
 
 void tearDown(void)
@@ -39,7 +41,7 @@ static bool make(void)
     for (i = 0; is_made && i < parts.part_count; i++) {
         const struct ih_part *part = &parts.part[i];
 
-        IH_TEST_RANGE(last + 1, IH_PARTS_POINTS * 100, part->from * 100 + part->steps, "order", i);
+        IH_TEST_RANGE(last + 1, points * 100, part->from * 100 + part->steps, "order", i);
         last = part->from * 100 + part->steps;
         may_be[part->from] |= UINT64_C(1) << part->steps;
     }
@@ -71,7 +73,7 @@ struct measured {
 
 static struct measured measure(int32_t from, int32_t steps)
 {
-    double x[IH_PARTS_POINTS] = {0}, y[IH_PARTS_POINTS] = {0};
+    double x[IH_PARTS_POINTS_MAX] = {0}, y[IH_PARTS_POINTS_MAX] = {0};
     double mx = 0, my = 0, area = 0, cx = 0, cy = 0, xx = 0, xy = 0, yy = 0, root;
     struct measured out;
     int32_t k;
@@ -121,9 +123,9 @@ static void compare_all(bool simple, struct tally *tally)
     const double trace_max = (ratio_max + 1 / ratio_max) * shape_max / (4 * acos(-1.0));
     int32_t from, k;
 
-    for (from = 0; from < IH_PARTS_POINTS; from++) {
-        TEST_ASSERT_TRUE(may_be[from] >> IH_PARTS_POINTS == 0);
-        for (k = 1; k < IH_PARTS_POINTS && from + k < parts.count; k++) {
+    for (from = 0; from < points; from++) {
+        TEST_ASSERT_TRUE(may_be[from] >> points == 0);
+        for (k = 1; k < points && from + k < parts.count; k++) {
             const struct measured m = measure(from, k);
             const double chord_max =
                 ih_test_from_q(params.chord_max_q16, 16) * ih_test_from_q(parts.arc_q8[k], 8);
@@ -159,10 +161,16 @@ static int32_t count_promising(void)
 {
     int32_t count = 0, from;
 
-    for (from = 0; from < IH_PARTS_POINTS; from++) {
+    for (from = 0; from < points; from++) {
         count += bits_of(parts.low[from]) + bits_of(parts.high[from]);
     }
     return count;
+}
+
+/* Of so many parts of 56 points: their number grows with the square. */
+static int32_t share_of(int32_t count)
+{
+    return count * points * points / (IH_PARTS_POINTS_MAX * IH_PARTS_POINTS_MAX);
 }
 
 static void the_sieve_drops_no_ellipse_and_keeps_little_else(void)
@@ -183,8 +191,8 @@ static void the_sieve_drops_no_ellipse_and_keeps_little_else(void)
         compare_all(true, &tally);
         promising += count_promising();
     }
-    TEST_ASSERT_GREATER_THAN(2000, tally.ellipses);
-    TEST_ASSERT_GREATER_THAN(100000, tally.dropped);
+    TEST_ASSERT_GREATER_THAN(share_of(2000), tally.ellipses);
+    TEST_ASSERT_GREATER_THAN(share_of(100000), tally.dropped);
     TEST_ASSERT_LESS_THAN(8 * tally.ellipses, tally.kept);
     TEST_ASSERT_LESS_THAN(2 * tally.kept, promising); /* else fans do not sift */
 }
@@ -206,10 +214,10 @@ static void limits_are_those_of_the_parameters(void)
     params.ratio_part_max_q16 = 200 << 16;
     take_blob(23, 23, 5, 4.5, 0, 1, 0, 200, true);
     TEST_ASSERT_TRUE(make());
-    TEST_ASSERT_TRUE(may_be[0] >> 50 & 1);
+    TEST_ASSERT_TRUE(may_be[0] >> (points - 6) & 1);
     params.ratio_part_max_q16 = 0; /* as 1 */
     TEST_ASSERT_TRUE(make());
-    TEST_ASSERT_FALSE(may_be[0] >> 50 & 1);
+    TEST_ASSERT_FALSE(may_be[0] >> (points - 6) & 1);
 }
 
 /* Walks all over the grid: their parts cross themselves as much as can be. */
@@ -234,7 +242,7 @@ static void walks_do_not_overflow(void)
         TEST_ASSERT_TRUE(make());
         compare_all(false, &tally);
     }
-    TEST_ASSERT_GREATER_THAN(10000, tally.dropped);
+    TEST_ASSERT_GREATER_THAN(share_of(10000), tally.dropped);
 }
 
 static int16_t on_grid_q9(double steps)
@@ -271,25 +279,25 @@ static void loops_that_cancel_do_not_overflow(void)
         TEST_ASSERT_TRUE(make());
         compare_all(false, &tally);
     }
-    TEST_ASSERT_GREATER_THAN(10000, tally.dropped);
+    TEST_ASSERT_GREATER_THAN(share_of(10000), tally.dropped);
 }
 
-/* On a circle of many vertices the points are 1/56 of its length apart; an open one ends at its last
+/* On a circle of many vertices the points are equal shares of its length apart; an open one ends at its last
  * vertex, a closed one goes round twice. */
 static void points_stand_at_equal_steps(void)
 {
-    const double step = 2 * acos(-1.0) * 20 / IH_PARTS_POINTS;
+    const double step = 2 * acos(-1.0) * 20 / points;
     int32_t k;
 
     take_blob(23, 23, 20, 1, 0, 1, 0, 700, true);
     TEST_ASSERT_TRUE(make());
-    TEST_ASSERT_EQUAL(2 * IH_PARTS_POINTS, parts.count);
+    TEST_ASSERT_EQUAL(2 * points, parts.count);
     for (k = 0; k < parts.count; k++) {
-        const double angle = 2 * acos(-1.0) * k / IH_PARTS_POINTS;
+        const double angle = 2 * acos(-1.0) * k / points;
 
         IH_TEST_WITHIN(0.08, 23 + 20 * cos(angle), ih_test_from_q(parts.x_q8[k], 8), "x", k);
         IH_TEST_WITHIN(0.08, 23 + 20 * sin(angle), ih_test_from_q(parts.y_q8[k], 8), "y", k);
-        if (k < IH_PARTS_POINTS) {
+        if (k < points) {
             IH_TEST_WITHIN(0.01 * step * k + 0.01, step * k, ih_test_from_q(parts.arc_q8[k], 8),
                            "arc", k);
         }
@@ -297,11 +305,11 @@ static void points_stand_at_equal_steps(void)
     TEST_ASSERT_EQUAL(parts.x_q8[0] * 2, cuts.vertex[100].x_q9);
     take_blob(23, 23, 20, 1, 0, 1, 0, 700, false);
     TEST_ASSERT_TRUE(make());
-    TEST_ASSERT_EQUAL(IH_PARTS_POINTS, parts.count);
-    IH_TEST_WITHIN(0.03, cuts.vertex[799].x_q9 / 512.0,
-                   ih_test_from_q(parts.x_q8[IH_PARTS_POINTS - 1], 8), "last x", 0);
-    IH_TEST_WITHIN(0.03, cuts.vertex[799].y_q9 / 512.0,
-                   ih_test_from_q(parts.y_q8[IH_PARTS_POINTS - 1], 8), "last y", 0);
+    TEST_ASSERT_EQUAL(points, parts.count);
+    IH_TEST_WITHIN(0.03, cuts.vertex[799].x_q9 / 512.0, ih_test_from_q(parts.x_q8[points - 1], 8),
+                   "last x", 0);
+    IH_TEST_WITHIN(0.03, cuts.vertex[799].y_q9 / 512.0, ih_test_from_q(parts.y_q8[points - 1], 8),
+                   "last y", 0);
 }
 
 static void a_box_holds_what_is_in_it_and_a_step_more(void)
@@ -336,14 +344,37 @@ static void too_few_or_too_many_vertices_are_not_searched(void)
     TEST_ASSERT_FALSE(make());
 }
 
+/* The number of points is a whole number of vectors within its bounds, whatever is asked for. */
+static void the_number_of_points_is_bounded(void)
+{
+    static const int32_t asked[] = {INT32_MIN, 0, 15, 16, 23, 31, 32, 39, 55, 56, 57, INT32_MAX};
+    static const int32_t given[] = {16, 16, 16, 16, 16, 24, 32, 32, 48, 56, 56, 56};
+    int i;
+
+    for (i = 0; i < IH_TEST_COUNT(asked); i++) {
+        params.point_count = asked[i];
+        take_blob(23, 23, 20, 1, 0, 1, 0, 200, false);
+        TEST_ASSERT_TRUE(ih_parts_make(&cuts, &contour, &params, &parts));
+        IH_TEST_EQUAL(given[i], parts.point_count, "points", asked[i]);
+        IH_TEST_EQUAL(given[i], parts.count, "in use", asked[i]);
+    }
+}
+
 int main(void)
 {
+    static const int32_t counts[] = {IH_PARTS_POINTS_MAX, 32, IH_PARTS_POINTS_MIN};
+    int i;
+
     UNITY_BEGIN();
-    RUN_TEST(the_sieve_drops_no_ellipse_and_keeps_little_else);
-    RUN_TEST(limits_are_those_of_the_parameters);
-    RUN_TEST(walks_do_not_overflow);
-    RUN_TEST(loops_that_cancel_do_not_overflow);
-    RUN_TEST(points_stand_at_equal_steps);
+    for (i = 0; i < IH_TEST_COUNT(counts); i++) {
+        points = counts[i];
+        RUN_TEST(the_sieve_drops_no_ellipse_and_keeps_little_else);
+        RUN_TEST(limits_are_those_of_the_parameters);
+        RUN_TEST(walks_do_not_overflow);
+        RUN_TEST(loops_that_cancel_do_not_overflow);
+        RUN_TEST(points_stand_at_equal_steps);
+    }
+    RUN_TEST(the_number_of_points_is_bounded);
     RUN_TEST(a_box_holds_what_is_in_it_and_a_step_more);
     RUN_TEST(too_few_or_too_many_vertices_are_not_searched);
     return UNITY_END();

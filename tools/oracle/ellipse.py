@@ -1,6 +1,6 @@
 """Float64 reference of polygon moments and of the search for a contour's elliptical part.
 
-Moments are taken triangle by triangle, the search tries every part of the 56 points by itself:
+Moments are taken triangle by triangle, the search tries every part of 56 or 32 points by itself:
 neither uses the prefix sums of the firmware.
 """
 
@@ -8,7 +8,7 @@ import numpy as np
 
 import emit
 
-POINTS = 56
+POINTS = (56, 32)  # on a contour: the paper's method alone, and as part of everything
 PART_EDGES_MIN = 8
 SHAPE_MAX, RATIO_PART_MAX, CHORD_MAX = 1.045, 1.75, 0.42
 SHAPE_MIN = 1 - 1 / 256  # less: no simple polygon, its chord crosses its arc
@@ -47,24 +47,24 @@ def winding(polygon, place):
     return int(np.rint((turn - 2 * np.pi * np.rint(turn / (2 * np.pi))).sum() / (2 * np.pi)))
 
 
-def resampled(vertices, closed):
-    """56 points at equal steps of arc, and the length of the contour."""
+def resampled(vertices, closed, count):
+    """Points at equal steps of arc, and the length of the contour."""
     line = np.vstack([vertices, vertices[:1]]) if closed else vertices
     along = np.append(0, np.cumsum(np.hypot(*np.diff(line, axis=0).T)))
-    target = np.linspace(0, along[-1], POINTS, endpoint=not closed)
+    target = np.linspace(0, along[-1], count, endpoint=not closed)
     return np.column_stack([np.interp(target, along, line[:, k]) for k in (0, 1)]), along[-1]
 
 
-def best_part(vertices, closed, place):
+def best_part(vertices, closed, place, count):
     """(merit, area, centre) of the best elliptical part round the place, or None."""
-    points, length = resampled(vertices, closed)
-    steps = POINTS if closed else POINTS - 1
+    points, length = resampled(vertices, closed, count)
+    steps = count if closed else count - 1
     best = None
-    for first in range(POINTS):
-        for edges in range(PART_EDGES_MIN, POINTS):
-            if not closed and first + edges >= POINTS:
+    for first in range(count):
+        for edges in range(PART_EDGES_MIN, count):
+            if not closed and first + edges >= count:
                 break
-            part = points[(first + np.arange(edges + 1)) % POINTS]
+            part = points[(first + np.arange(edges + 1)) % count]
             arc = length * edges / steps
             chord = np.hypot(*(part[-1] - part[0]))
             if chord > CHORD_MAX * arc or winding(part, place) != 1:
@@ -170,11 +170,12 @@ def write_vectors(directory):
     rows = []
     for name, closed, vertices, place in contours():
         q9 = finely(vertices, closed)
-        best = best_part(q9 / 512, closed, np.array(place, float))
         vertices_text(inc, "part_" + name, q9)
-        found = best if best else (0, 0, (0, 0))
-        rows.append('"%s", %d, %d, vector_part_%s, {%d, %d}, %d, %s' % (
-            name, closed, len(q9), name, place[0] * 512, place[1] * 512, best is not None,
-            ", ".join(emit.numbers((found[0], found[1], *found[2]), 4))))
+        for count in POINTS:
+            best = best_part(q9 / 512, closed, np.array(place, float), count)
+            found = best if best else (0, 0, (0, 0))
+            rows.append('"%s", %d, %d, %d, vector_part_%s, {%d, %d}, %d, %s' % (
+                name, count, closed, len(q9), name, place[0] * 512, place[1] * 512, best is not None,
+                ", ".join(emit.numbers((found[0], found[1], *found[2]), 4))))
     inc.struct_array("vector_part", "vector_parts", rows)
     return inc.write(directory, "ellipse.inc")
