@@ -73,14 +73,13 @@ static void fill_surface(struct fuzz_input *input, struct ih_surface *surface)
 }
 
 /* Every contour of a level, as an ellipse and in parts, around a place anywhere on the grid. */
-static void cut(struct fuzz_input *input, const struct ih_surface *surface)
+static void cut(struct fuzz_input *input, const struct ih_surface *surface,
+                const struct ih_ellipse_params *params)
 {
     static struct ih_cuts cuts;
     static struct ih_parts parts;
     static struct ih_ellipse_scratch scratch;
-    struct ih_ellipse_params params;
     struct ih_ellipse ellipse;
-    ih_ellipse_params_default(&params);
     int64_t level = surface->nearest_mm_q8 + (int64_t)fuzz_within(input, -256, 2000 << 8);
     ih_cuts_level(surface, (int32_t)(level > MOST_Q8 ? MOST_Q8 : level), &cuts);
     fuzz_check_cuts(&cuts);
@@ -94,10 +93,10 @@ static void cut(struct fuzz_input *input, const struct ih_surface *surface)
             FUZZ_CHECK(ellipse.area_q16 != 0 && ellipse.shape_q16 > 0);
             FUZZ_CHECK(ellipse.ratio_q16 >= 65535 && ellipse.ratio_q16 <= 255 << 16);
         }
-        if (ih_parts_make(&cuts, contour, &params, &parts) &&
-            ih_ellipse_of_part(&parts, place, &params, &scratch, &ellipse)) {
-            FUZZ_CHECK(ellipse.area_q16 > 0 && ellipse.shape_q16 <= params.shape_max_q16);
-            FUZZ_CHECK(ellipse.ratio_q16 <= params.ratio_part_max_q16);
+        if (ih_parts_make(&cuts, contour, params, &parts) &&
+            ih_ellipse_of_part(&parts, place, params, &scratch, &ellipse)) {
+            FUZZ_CHECK(ellipse.area_q16 > 0 && ellipse.shape_q16 <= params->shape_max_q16);
+            FUZZ_CHECK(ellipse.ratio_q16 <= params->ratio_part_max_q16);
         }
     }
 }
@@ -111,14 +110,22 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     static struct ih_heads heads;
     struct fuzz_input input = {data, size};
     struct ih_params params;
-    ih_params_default(&params);
     const struct ih_rig *rig = fuzz_tables_rig(&input);
     fill_surface(&input, &surface);
-    cut(&input, &surface);
-    ih_hypotheses_find(&surface, &params.hypotheses, &scratch, &hypotheses);
-    fuzz_check_hypotheses(&hypotheses, &surface, &params.hypotheses);
-    fuzz_tables_samples(&input, &samples);
-    ih_heads_select(&hypotheses, &surface, &samples, rig, &params.heads, &heads);
-    fuzz_check_heads(&heads, &hypotheses, &samples);
+    const struct fuzz_input rest = input;
+    for (int way = 0; way < 2; way++) {
+        if (way == 0) {
+            ih_params_default(&params);
+        } else {
+            ih_params_paper(&params);
+        }
+        input = rest;
+        cut(&input, &surface, &params.hypotheses.ellipse);
+        ih_hypotheses_find(&surface, &params.hypotheses, &scratch, &hypotheses);
+        fuzz_check_hypotheses(&hypotheses, &surface, &params.hypotheses);
+        fuzz_tables_samples(&input, &samples);
+        ih_heads_select(&hypotheses, &surface, &samples, rig, &params.heads, &heads);
+        fuzz_check_heads(&heads, &hypotheses, &samples);
+    }
     return 0;
 }

@@ -1,4 +1,5 @@
-/* The surface through any samples, its cuts, hypotheses and heads. Input: rig, field, samples. */
+/* The surface through any samples, its cuts, hypotheses and heads, as by default and as the paper's method needs it.
+ * Input: rig, field, samples. */
 #include <string.h>
 
 #include "fuzz_check.h"
@@ -15,16 +16,22 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     struct fuzz_input input = {data, size};
     struct ih_params params;
     struct ih_field field;
-    ih_params_default(&params);
     const struct ih_rig *rig = fuzz_tables_rig(&input);
     fuzz_tables_field(&input, &field);
     fuzz_tables_samples(&input, &samples);
-    memset(&surface_scratch, 0xa5, sizeof surface_scratch);
-    ih_surface_fit(&samples, &field, &params.surface, &surface_scratch, &surface);
-    fuzz_check_surface(&surface, &samples);
-    ih_hypotheses_find(&surface, &params.hypotheses, &hypotheses_scratch, &hypotheses);
-    fuzz_check_hypotheses(&hypotheses, &surface, &params.hypotheses);
-    ih_heads_select(&hypotheses, &surface, &samples, rig, &params.heads, &heads);
-    fuzz_check_heads(&heads, &hypotheses, &samples);
+    for (int way = 0; way < 2; way++) {
+        if (way == 0) {
+            ih_params_default(&params);
+        } else {
+            ih_params_paper(&params);
+        }
+        memset(&surface_scratch, 0xa5, sizeof surface_scratch);
+        ih_surface_fit(&samples, &field, &params.surface, &surface_scratch, &surface);
+        fuzz_check_surface(&surface, &samples);
+        ih_hypotheses_find(&surface, &params.hypotheses, &hypotheses_scratch, &hypotheses);
+        fuzz_check_hypotheses(&hypotheses, &surface, &params.hypotheses);
+        ih_heads_select(&hypotheses, &surface, &samples, rig, &params.heads, &heads);
+        fuzz_check_heads(&heads, &hypotheses, &samples);
+    }
     return 0;
 }

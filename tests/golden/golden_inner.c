@@ -120,11 +120,21 @@ static void hash_candidates(struct isohead *head, uint64_t hash[GOLDEN_INNERS])
     }
 }
 
-static uint64_t hash_paper(const struct ih_heads *heads)
+static uint64_t hash_paper(struct isohead *head)
 {
-    struct ih_result result;
-    ih_result_from_heads(heads, &result);
-    uint64_t hash = golden_add_word(GOLDEN_FNV_START, result.entry_count);
+    static struct ih_params params;
+    static struct ih_result result;
+    ih_params_paper(&params);
+    ih_surface_fit(&head->samples, &head->points.field, &params.surface, &head->scratch.surface,
+                   &head->surface);
+    ih_hypotheses_find(&head->surface, &params.hypotheses, &head->scratch.hypotheses,
+                       &head->hypotheses);
+    ih_heads_select(&head->hypotheses, &head->surface, &head->samples, &head->rig, &params.heads,
+                    &head->heads);
+    ih_result_from_heads(&head->heads, &result);
+    uint64_t hash = golden_add_words(GOLDEN_FNV_START, head->surface.depth_mm_q8,
+                                     sizeof head->surface.depth_mm_q8);
+    hash = golden_add_word(hash, result.entry_count);
     hash = golden_add_word(hash, result.selected);
     for (int32_t i = 0; i < result.entry_count; i++) {
         const struct ih_result_entry *entry = &result.entry[i];
@@ -161,5 +171,5 @@ void golden_inner_hash(struct isohead *head, const struct ih_frame *frame,
     }
     hash_levels(head, hash);
     hash_candidates(head, hash);
-    hash[GOLDEN_PAPER] = hash_paper(&head->heads);
+    hash[GOLDEN_PAPER] = hash_paper(head);
 }

@@ -3,10 +3,11 @@
  * In:    the state after a frame, and the frame.
  * Out:   one number each for the map of noise and the next exposure (dots only), the contours of all
  *        levels, the ellipses of all closed contours, the rays, the places of the scan, the ellipsoids
- *        fitted there and at the nests, what speaks for them, their scores, and the answer of the
- *        paper's method alone.
+ *        fitted there and at the nests, what speaks for them, their scores, and the surface and the
+ *        answer of the paper's method alone.
  * Way:   each stage is run once more on the outputs that the state keeps, in the state's own working
- *        memory. Of a depth image these are those of its best window.
+ *        memory. Of a depth image these are those of its best window. The paper's method has other
+ *        parameters from the surface on: its stages are run last, in place of the outputs.
  */
 #ifndef GOLDEN_INNER_H
 #define GOLDEN_INNER_H
@@ -30,8 +31,8 @@ enum golden_inner {
 
 extern const char *const golden_inner_name[GOLDEN_INNERS];
 
-/* exposure: goes on from frame to frame; golden_inner_start before a rig's first. Of head only the
- * scratch is written to. */
+/* exposure: goes on from frame to frame; golden_inner_start before a rig's first. Of head the
+ * scratch is written to, and last the surface, the hypotheses and the heads. */
 void golden_inner_start(struct ih_exposure *exposure);
 void golden_inner_hash(struct isohead *head, const struct ih_frame *frame,
                        const struct ih_frame *ambient, struct ih_exposure *exposure,
