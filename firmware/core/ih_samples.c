@@ -19,36 +19,43 @@ void ih_samples_params_default(struct ih_samples_params *params)
     };
 }
 
-/* The value of a rank, from 0: the range of values is halved until one is left. None is negative. */
-static int32_t value_of_rank(const int32_t *value, int32_t count, int32_t rank)
+/* Depths are looked at eight bits at a time, the highest first. */
+#define DIGIT_BITS 8
+#define DIGITS (1 << DIGIT_BITS)
+
+_Static_assert(IH_DEPTH_MAX_MM << 8 < 1 << (3 * DIGIT_BITS), "depths have three digits");
+
+/* The next digit of the depth of a rank, from 0, among those that begin as it does; the rank becomes that
+ * among those which have this digit, too. No depth is negative. */
+static int32_t next_digit(const struct ih_points *points, int32_t begin, int shift, int32_t *rank)
 {
-    int32_t low = 0;
-    int32_t high = INT32_MAX; /* it is in low..high */
-    while (low < high) {
-        int32_t middle = low + (high - low) / 2;
-        int32_t at_most = 0;
-        for (int32_t i = 0; i < count; i++) {
-            at_most += value[i] <= middle;
-        }
-        if (at_most > rank) {
-            high = middle;
-        } else {
-            low = middle + 1;
+    uint16_t count[DIGITS] = {0};
+    for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
+        const struct ih_point *point = &points->point[slot];
+        const int32_t digits = point->depth_mm_q8 >> shift;
+        if (digits >> DIGIT_BITS == begin && point->state == IH_POINT_SEEN) {
+            count[digits % DIGITS]++;
         }
     }
-    return low;
+    int32_t digit = 0;
+    while (digit < DIGITS - 1 && *rank >= count[digit]) {
+        *rank -= count[digit++];
+    }
+    return digit;
 }
 
 int32_t ih_samples_near_mm_q8(const struct ih_points *points)
 {
-    int32_t depth_mm_q8[IH_SLOTS];
     int32_t count = 0;
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
-        if (points->point[slot].state == IH_POINT_SEEN) {
-            depth_mm_q8[count++] = points->point[slot].depth_mm_q8;
-        }
+        count += points->point[slot].state == IH_POINT_SEEN;
     }
-    return count == 0 ? 0 : value_of_rank(depth_mm_q8, count, count * PERCENTILE / 100);
+    int32_t depth_mm_q8 = 0;
+    int32_t rank = count * PERCENTILE / 100;
+    for (int shift = 2 * DIGIT_BITS; count > 0 && shift >= 0; shift -= DIGIT_BITS) {
+        depth_mm_q8 = depth_mm_q8 * DIGITS + next_digit(points, depth_mm_q8, shift, &rank);
+    }
+    return depth_mm_q8;
 }
 
 /* A slot's neighbour by row and column; NULL beyond the pattern's edge. */
@@ -61,29 +68,41 @@ static const struct ih_point *neighbour(const struct ih_points *points, int32_t 
     return inside ? &points->point[row * IH_GRID + column] : NULL;
 }
 
-struct surroundings {
-    int32_t seen;    /* of the 8 neighbours */
-    int32_t friends; /* of those, at nearly the same depth */
+/* From the least to the most, both included. */
+struct depths {
+    int32_t least_q8, most_q8;
 };
 
-static struct surroundings look_around(const struct ih_points *points, int32_t slot,
-                                       int32_t clip_q8, int32_t isolated_q8)
+static const struct depths any_depth = {0, INT32_MAX};
+
+/* How many of the 8 neighbours are seen, and of those stand within so much of a depth; no more than most are
+ * counted. */
+static int32_t count_around(const struct ih_points *points, int32_t slot, int32_t clip_q8,
+                            struct depths depths, int32_t most)
 {
-    struct surroundings s = {0, 0};
-    int32_t own = ih_min_s32(points->point[slot].depth_mm_q8, clip_q8);
+    int32_t count = 0;
     for (int32_t d_row = -1; d_row <= 1; d_row++) {
-        for (int32_t d_column = -1; d_column <= 1; d_column++) {
+        for (int32_t d_column = -1; d_column <= 1 && count < most; d_column++) {
             const struct ih_point *other = neighbour(points, slot, d_row, d_column);
-            bool self = d_row == 0 && d_column == 0;
-            if (self || other == NULL || other->state != IH_POINT_SEEN) {
-                continue;
+            if (other != NULL && other != &points->point[slot] && other->state == IH_POINT_SEEN) {
+                const int32_t depth_q8 = ih_min_s32(other->depth_mm_q8, clip_q8);
+                count += depth_q8 >= depths.least_q8 && depth_q8 <= depths.most_q8;
             }
-            int32_t depth = ih_min_s32(other->depth_mm_q8, clip_q8);
-            s.seen++;
-            s.friends += ih_abs_s32(depth - own) <= isolated_q8;
         }
     }
-    return s;
+    return count;
+}
+
+/* Differs from all but one neighbour. Most points do not, which two neighbours tell. */
+static bool is_isolated(const struct ih_points *points, int32_t slot, int32_t clip_q8,
+                        int32_t isolated_q8)
+{
+    const int32_t own_q8 = ih_min_s32(points->point[slot].depth_mm_q8, clip_q8);
+    const struct depths near = {own_q8 - isolated_q8, own_q8 + isolated_q8};
+    return count_around(points, slot, clip_q8, near, ISOLATED_FRIENDS_MAX + 1) <=
+               ISOLATED_FRIENDS_MAX &&
+           count_around(points, slot, clip_q8, any_depth, ISOLATED_NEIGHBOURS_MIN) ==
+               ISOLATED_NEIGHBOURS_MIN;
 }
 
 static bool in_field(int64_t x_q16, int64_t y_q16)
@@ -121,10 +140,12 @@ static bool place_is_visible(const struct ih_rig *rig, const struct ih_dots *dot
 
 static void fill_missing(const struct ih_points *points, const struct ih_dots *dots,
                          const struct ih_rig *rig, const struct ih_samples_params *params,
-                         int32_t slot, const struct surroundings *around, struct ih_samples *out)
+                         int32_t slot, struct ih_samples *out)
 {
     const struct ih_point *point = &points->point[slot];
-    if (params->fill_root_weight_q15 == 0 || around->seen >= params->fill_neighbours) {
+    if (params->fill_root_weight_q15 == 0 ||
+        count_around(points, slot, out->clip_mm_q8, any_depth, params->fill_neighbours) >=
+            params->fill_neighbours) {
         return;
     }
     int32_t depth_q8 = out->clip_mm_q8;
@@ -142,11 +163,11 @@ static void fill_missing(const struct ih_points *points, const struct ih_dots *d
     }
 }
 
-static void take_seen(const struct ih_points *points, const struct surroundings *around,
-                      int32_t slot, struct ih_samples *out)
+static void take_seen(const struct ih_points *points, int32_t isolated_q8, int32_t slot,
+                      struct ih_samples *out)
 {
     const struct ih_point *point = &points->point[slot];
-    if (around->seen >= ISOLATED_NEIGHBOURS_MIN && around->friends <= ISOLATED_FRIENDS_MAX) {
+    if (is_isolated(points, slot, out->clip_mm_q8, isolated_q8)) {
         out->isolated_count++;
         return;
     }
@@ -172,12 +193,10 @@ void ih_samples_select(const struct ih_points *points, const struct ih_dots *dot
         out->clip_mm_q8 = ih_max_s32(out->clip_mm_q8, params->clip_least_mm << 8);
     }
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
-        struct surroundings around =
-            look_around(points, slot, out->clip_mm_q8, params->isolated_mm << 8);
         if (points->point[slot].state == IH_POINT_SEEN) {
-            take_seen(points, &around, slot, out);
+            take_seen(points, params->isolated_mm << 8, slot, out);
         } else if (points->point[slot].state == IH_POINT_MISSING) {
-            fill_missing(points, dots, rig, params, slot, &around, out);
+            fill_missing(points, dots, rig, params, slot, out);
         }
     }
 }
