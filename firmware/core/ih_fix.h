@@ -83,6 +83,11 @@ static inline int64_t ih_min_s64(int64_t a, int64_t b)
     return a < b ? a : b;
 }
 
+static inline int64_t ih_max_s64(int64_t a, int64_t b)
+{
+    return a > b ? a : b;
+}
+
 static inline int32_t ih_max_s32(int32_t a, int32_t b)
 {
     return a > b ? a : b;

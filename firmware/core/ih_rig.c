@@ -8,6 +8,11 @@
 /* Enough for a lens whose iteration gains only a third a step; usual ones need five. */
 #define UNDISTORT_STEPS 64
 #define BROWN_MAX 16
+#define RADIAL_LEAST_Q28 (ONE_Q28 / 8)
+#define NEWTON_STEPS 5
+#define NEWTON_MOST_Q28 (1 << 25)
+#define NEWTON_LAST_Q28 (1 << 9)
+#define TAN_MAX_Q28 (IH_RIG_TAN_MAX * ONE_Q28)
 /* Probes of the lens along each side of the frame, and how well they must come back. */
 #define LENS_PROBES 65
 #define LENS_ERROR_MAX_PX_Q12 20 /* 0.005 px */
@@ -15,7 +20,7 @@
 #define RAY_FORWARD_MIN_Q30 (1 << 28)
 #define RAY_LENGTH_TOLERANCE_Q30 (1 << 16) /* 6e-5 */
 
-static int64_t product_q28(int64_t a_q28, int64_t b_q28)
+static int64_t product_q28(int32_t a_q28, int32_t b_q28)
 {
     return ih_mul_shift(a_q28, b_q28, 28);
 }
@@ -26,26 +31,39 @@ static int64_t clamp_brown_q28(int64_t value_q28)
     return value_q28 > limit ? limit : value_q28 < -limit ? -limit : value_q28;
 }
 
-/* OpenCV's Brown model. |x|, |y| <= 2, so r2 <= 8 = 2^31 in Q28, r4 <= 64 = 2^31 in Q25 and
- * r6 <= 512 = 2^31 in Q22: times a coefficient in int32 each stays below 2^62. A lens that needs
- * more than BROWN_MAX anywhere is limited to it, and then does not come back in check_lens. */
-static void brown(const struct ih_calibration *c, int64_t x_q28, int64_t y_q28, int64_t *radial_q28,
-                  int64_t *dx_q28, int64_t *dy_q28)
+/* What is not radial, of x^2, y^2 and x y. */
+static void across(const struct ih_calibration *c, int64_t xx, int64_t yy, int64_t xy,
+                   int64_t *dx_q28, int64_t *dy_q28)
 {
-    int64_t xx = product_q28(x_q28, x_q28);
-    int64_t yy = product_q28(y_q28, y_q28);
-    int64_t xy = product_q28(x_q28, y_q28);
-    int64_t r2 = xx + yy;
-    int64_t r4_q25 = ih_mul_shift(r2, r2, 31);
-    int64_t r6_q22 = ih_mul_shift(r4_q25, r2, 31);
-    *radial_q28 =
-        clamp_brown_q28(ONE_Q28 + ih_mul_shift(r2, c->k1_q24, 24) +
-                        ih_mul_shift(r4_q25, c->k2_q24, 21) + ih_mul_shift(r6_q22, c->k3_q24, 18));
+    const int64_t r2 = xx + yy;
     /* 2 xy <= 8; (r2 + 2 xx) / 2 <= 8 */
     *dx_q28 = clamp_brown_q28(ih_mul_shift(2 * xy, c->p1_q24, 24) +
                               ih_mul_shift(r2 / 2 + xx, c->p2_q24, 23));
     *dy_q28 = clamp_brown_q28(ih_mul_shift(r2 / 2 + yy, c->p1_q24, 23) +
                               ih_mul_shift(2 * xy, c->p2_q24, 24));
+}
+
+/* What is radial, of the square of the radius. */
+static int64_t radial_at(const struct ih_calibration *c, uint32_t r2_q28)
+{
+    const int64_t r2 = r2_q28;
+    const int64_t r4_q25 = ih_mul_shift(r2, r2, 31);
+    const int64_t r6_q22 = ih_mul_shift(r4_q25, r2, 31);
+    return clamp_brown_q28(ONE_Q28 + ih_mul_shift(r2, c->k1_q24, 24) +
+                           ih_mul_shift(r4_q25, c->k2_q24, 21) +
+                           ih_mul_shift(r6_q22, c->k3_q24, 18));
+}
+
+/* OpenCV's Brown model. |x|, |y| <= 2, so r2 <= 8 = 2^31 in Q28, r4 <= 64 = 2^31 in Q25 and
+ * r6 <= 512 = 2^31 in Q22: times a coefficient in int32 each stays below 2^62. A lens that needs
+ * more than BROWN_MAX anywhere is limited to it, and then does not come back in check_lens. */
+static void brown(const struct ih_calibration *c, int32_t x_q28, int32_t y_q28, int64_t *radial_q28,
+                  int64_t *dx_q28, int64_t *dy_q28)
+{
+    const int64_t xx = product_q28(x_q28, x_q28);
+    const int64_t yy = product_q28(y_q28, y_q28);
+    *radial_q28 = radial_at(c, (uint32_t)(xx + yy));
+    across(c, xx, yy, product_q28(x_q28, y_q28), dx_q28, dy_q28);
 }
 
 static int32_t limit_tan_q28(int64_t value_q28)
@@ -62,33 +80,109 @@ static int32_t distorted_q28(int32_t px_q12, int32_t principal_px_q16, int32_t f
     return limit_tan_q28(ih_div_round((px_q16 - principal_px_q16) * ONE_Q28, focal_px_q16));
 }
 
-void ih_rig_undistort(const struct ih_rig *rig, int32_t u_px_q12, int32_t v_px_q12, int32_t *x_q28,
-                      int32_t *y_q28)
+/* Fixed-point iteration x <- (xd - dx(x)) / radial(x); each step gains a factor of about the distortion
+ * itself. It stops when nothing moves any more. */
+static void undistort_slowly(const struct ih_calibration *c, int32_t xd, int32_t yd, int32_t *x_q28,
+                             int32_t *y_q28)
 {
-    const struct ih_calibration *c = &rig->calibration;
-    int64_t xd = distorted_q28(u_px_q12, c->cx_px_q16, c->fx_px_q16);
-    int64_t yd = distorted_q28(v_px_q12, c->cy_px_q16, c->fy_px_q16);
-    int64_t x = xd;
-    int64_t y = yd;
-    /* Fixed-point iteration x <- (xd - dx(x)) / radial(x); each step gains a factor of about the
-     * distortion itself. It stops when nothing moves any more. */
+    int32_t x = xd;
+    int32_t y = yd;
     for (int i = 0; i < UNDISTORT_STEPS; i++) {
         int64_t radial, dx, dy;
         brown(c, x, y, &radial, &dx, &dy);
-        if (radial < ONE_Q28 / 8) {
-            radial = ONE_Q28 / 8;
-        }
-        int64_t next_x = limit_tan_q28(ih_div_round((xd - dx) * ONE_Q28, radial));
-        int64_t next_y = limit_tan_q28(ih_div_round((yd - dy) * ONE_Q28, radial));
-        bool still = next_x == x && next_y == y;
+        radial = radial < RADIAL_LEAST_Q28 ? RADIAL_LEAST_Q28 : radial;
+        const int32_t next_x = limit_tan_q28(ih_div_round((xd - dx) * ONE_Q28, radial));
+        const int32_t next_y = limit_tan_q28(ih_div_round((yd - dy) * ONE_Q28, radial));
+        const bool still = next_x == x && next_y == y;
         x = next_x;
         y = next_y;
         if (still) {
             break;
         }
     }
-    *x_q28 = (int32_t)x;
-    *y_q28 = (int32_t)y;
+    *x_q28 = x;
+    *y_q28 = y;
+}
+
+/* The lens backwards, radially: a place that is seen at r2 was at scale times that; rise: of the scale, by r2. */
+struct backwards {
+    int32_t scale_q28, rise_q28;
+};
+
+static struct backwards backwards_at(const int32_t back_q24[3], int32_t r2_q28)
+{
+    const int32_t cubic = (int32_t)product_q28(back_q24[2], r2_q28); /* below 2^30 */
+    const int64_t square = product_q28(back_q24[1] + cubic, r2_q28);
+    const int32_t all = ih_saturate_s32(back_q24[0] + square);
+    const int64_t rise_q24 = back_q24[0] + 2 * square + product_q28(cubic, r2_q28);
+    return (struct backwards){
+        .scale_q28 = ih_saturate_s32(ONE_Q28 + ih_mul_shift(all, r2_q28, 24)),
+        .rise_q28 = ih_saturate_s32(rise_q24 * 16),
+    };
+}
+
+/* Newton's steps from where the series says, less what is not radial, with the series' slopes: scale, and twice
+ * its rise along the radius. One or two are usual; what is left of a step is what the slopes are off, at the
+ * corners of usual lenses a hundredth. False when no step is small, as where the lens folds the picture. */
+static bool undistort_quickly(const struct ih_rig *rig, int32_t xd, int32_t yd, int32_t *x_q28,
+                              int32_t *y_q28)
+{
+    const int64_t xx = product_q28(xd, xd);
+    const int64_t yy = product_q28(yd, yd);
+    const struct backwards back = backwards_at(rig->back_q24, ih_saturate_s32(xx + yy));
+    int64_t radial, dx, dy;
+    across(&rig->calibration, xx, yy, product_q28(xd, yd), &dx, &dy);
+    int32_t x = limit_tan_q28(product_q28(limit_tan_q28(xd - dx), back.scale_q28));
+    int32_t y = limit_tan_q28(product_q28(limit_tan_q28(yd - dy), back.scale_q28));
+    for (int i = 0; i < NEWTON_STEPS; i++) {
+        brown(&rig->calibration, x, y, &radial, &dx, &dy);
+        const int64_t off_x = xd - dx - ih_mul_shift(x, radial, 28);
+        const int64_t off_y = yd - dy - ih_mul_shift(y, radial, 28);
+        if (radial < RADIAL_LEAST_Q28 ||
+            ih_max_s64(ih_abs_s64(off_x), ih_abs_s64(off_y)) > NEWTON_MOST_Q28) {
+            return false;
+        }
+        const int64_t out = 2 * (product_q28(xd, (int32_t)off_x) + product_q28(yd, (int32_t)off_y));
+        const int32_t risen = ih_saturate_s32(product_q28((int32_t)out, back.rise_q28));
+        const int64_t step_x = product_q28((int32_t)off_x, back.scale_q28) + product_q28(risen, xd);
+        const int64_t step_y = product_q28((int32_t)off_y, back.scale_q28) + product_q28(risen, yd);
+        x = limit_tan_q28(x + step_x);
+        y = limit_tan_q28(y + step_y);
+        if (ih_max_s64(ih_abs_s64(step_x), ih_abs_s64(step_y)) < NEWTON_LAST_Q28) {
+            *x_q28 = x;
+            *y_q28 = y;
+            return true;
+        }
+    }
+    return false;
+}
+
+void ih_rig_undistort(const struct ih_rig *rig, int32_t u_px_q12, int32_t v_px_q12, int32_t *x_q28,
+                      int32_t *y_q28)
+{
+    const struct ih_calibration *c = &rig->calibration;
+    const int32_t xd = distorted_q28(u_px_q12, c->cx_px_q16, c->fx_px_q16);
+    const int32_t yd = distorted_q28(v_px_q12, c->cy_px_q16, c->fy_px_q16);
+    if (!undistort_quickly(rig, xd, yd, x_q28, y_q28)) {
+        undistort_slowly(c, xd, yd, x_q28, y_q28);
+    }
+}
+
+/* The series of the radial part backwards: r = rd (1 + b0 rd^2 + b1 rd^4 + b2 rd^6). A lens so strong that it
+ * does not fit starts from where it is seen. */
+static void fill_back(struct ih_rig *rig)
+{
+    const int64_t most = (int64_t)8 << 24;
+    const int64_t k1 = rig->calibration.k1_q24;
+    const int64_t k2 = rig->calibration.k2_q24;
+    if (ih_abs_s64(k1) > 1 << 24 || ih_abs_s64(k2) > 1 << 24) {
+        return;
+    }
+    const int64_t k1k1 = ih_mul_shift(k1, k1, 24);
+    rig->back_q24[0] = (int32_t)-k1;
+    rig->back_q24[1] = (int32_t)(3 * k1k1 - k2);
+    rig->back_q24[2] = (int32_t)ih_clamp_s64(
+        ih_mul_shift(k1, 8 * k2 - 12 * k1k1, 24) - rig->calibration.k3_q24, most);
 }
 
 void ih_rig_to_pixel(const struct ih_rig *rig, int32_t x_q28, int32_t y_q28, int32_t *u_px_q12,
@@ -105,13 +199,13 @@ void ih_rig_distort(const struct ih_rig *rig, int32_t x_q28, int32_t y_q28, int3
                     int32_t *v_px_q12)
 {
     const struct ih_calibration *c = &rig->calibration;
-    int64_t x = limit_tan_q28(x_q28);
-    int64_t y = limit_tan_q28(y_q28);
+    const int32_t x = limit_tan_q28(x_q28);
+    const int32_t y = limit_tan_q28(y_q28);
     int64_t radial, dx, dy;
     brown(c, x, y, &radial, &dx, &dy);
     /* Far outside the frame a strong lens can go anywhere: keep the result in the format. */
-    ih_rig_to_pixel(rig, limit_tan_q28(product_q28(x, radial) + dx),
-                    limit_tan_q28(product_q28(y, radial) + dy), u_px_q12, v_px_q12);
+    ih_rig_to_pixel(rig, limit_tan_q28(ih_mul_shift(x, radial, 28) + dx),
+                    limit_tan_q28(ih_mul_shift(y, radial, 28) + dy), u_px_q12, v_px_q12);
 }
 
 bool ih_rig_inside(const struct ih_rig *rig, int32_t u_px_q12, int32_t v_px_q12)
@@ -300,6 +394,7 @@ enum ih_err ih_rig_init(struct ih_rig *rig, const struct ih_calibration *calibra
     rig->calibration = *calibration;
     enum ih_err err = check_camera(calibration);
     if (err == IH_OK) {
+        fill_back(rig);
         err = check_lens(rig);
     }
     if (err != IH_OK || calibration->kind == IH_RIG_RANGE) {

@@ -567,6 +567,58 @@ static void use_range_rig(int32_t width, int32_t height, int32_t focal_px)
     calibration.far_mm = 8000;
 }
 
+/* Brown's model in float64, pixels. */
+static void distort_float64(const struct ih_calibration *c, double x, double y, double *u,
+                            double *v)
+{
+    const double k1 = ldexp(c->k1_q24, -24), k2 = ldexp(c->k2_q24, -24), k3 = ldexp(c->k3_q24, -24);
+    const double p1 = ldexp(c->p1_q24, -24), p2 = ldexp(c->p2_q24, -24), r2 = x * x + y * y;
+    const double radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3));
+
+    *u = (c->cx_px_q16 + c->fx_px_q16 * (x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x))) /
+         65536;
+    *v = (c->cy_px_q16 + c->fy_px_q16 * (y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y)) /
+         65536;
+}
+
+/* Lenses up to nearly folding the picture, over the whole frame: 0.001 px. */
+static void strong_lenses_are_undone_all_over_the_frame(void)
+{
+    static const struct {
+        double k1, k2, p1, p2, k3;
+    } lenses[] = {{0, 0, 0, 0, 0},
+                  {-0.16, 0.06, 4e-5, 3.5e-4, 0},
+                  {-0.4, 0.17, 0.002, -0.003, -0.03},
+                  {0.3, -0.1, -0.01, 0.01, 0},
+                  {0.4, 0.2, 0, 0, 0.1},
+                  {-0.27, 0, 0, 0, 0},
+                  {0, 0, 0.03, -0.03, 0},
+                  {-0.5, 0.3, 0, 0.002, -0.1}};
+    int i, row, column;
+
+    for (i = 0; i < IH_TEST_COUNT(lenses); i++) {
+        use_range_rig(1025, 1025, 1024);
+        calibration.k1_q24 = (int32_t)lround(ldexp(lenses[i].k1, 24));
+        calibration.k2_q24 = (int32_t)lround(ldexp(lenses[i].k2, 24));
+        calibration.p1_q24 = (int32_t)lround(ldexp(lenses[i].p1, 24));
+        calibration.p2_q24 = (int32_t)lround(ldexp(lenses[i].p2, 24));
+        calibration.k3_q24 = (int32_t)lround(ldexp(lenses[i].k3, 24));
+        calibration.cx_px_q16 = 500 << 16;
+        IH_TEST_EQUAL(IH_OK, ih_rig_init(&rig, &calibration, &bad_slot), "a strong lens", i);
+        for (row = 0; row <= 1024; row += 13) {
+            for (column = 0; column <= 1024; column += 11) {
+                double u, v;
+                int32_t x, y;
+
+                ih_rig_undistort(&rig, column * 4096, row * 4096, &x, &y);
+                distort_float64(&calibration, ldexp(x, -28), ldexp(y, -28), &u, &v);
+                IH_TEST_WITHIN(0.001, column, u, "u", i);
+                IH_TEST_WITHIN(0.001, row, v, "v", i);
+            }
+        }
+    }
+}
+
 static void sizes_may_be_as_large_as_their_limits(void)
 {
     use_range_rig(IH_FRAME_WIDTH_MAX, IH_FRAME_WIDTH_MAX, 1000);
@@ -733,6 +785,7 @@ int main(void)
     RUN_TEST(all_directions_are_unit_vectors);
     RUN_TEST(a_line_gives_the_dot_at_any_depth);
     RUN_TEST(undistort_matches_the_exact_inverse);
+    RUN_TEST(strong_lenses_are_undone_all_over_the_frame);
     RUN_TEST(undistort_survives_any_pixel);
     RUN_TEST(without_distortion_undistort_is_a_division);
     RUN_TEST(distort_matches_float64);
