@@ -17,6 +17,7 @@
 #define RAYS_LEAST 8
 #define RANK_PLACES 512 /* more than there are places, a power of two */
 #define RANK_NONE INT32_MIN
+#define BLOCKS ((IH_GRID + 1) / 2) /* of two by two slots, along a side */
 
 void ih_scan_params_default(struct ih_scan_params *params)
 {
@@ -150,7 +151,11 @@ static void take(struct ih_scan_scratch *scratch, int32_t count, int32_t index, 
                  struct ih_scan *out)
 {
     const struct ih_scan_place *kept = &scratch->tried[index];
-    out->place[out->place_count++] = *kept;
+    int32_t at = out->place_count++;
+    for (; at > 0 && out->place[at - 1].score_q12 < kept->score_q12; at--) {
+        out->place[at] = out->place[at - 1]; /* what is found late may be better */
+    }
+    out->place[at] = *kept;
     for (int32_t i = 0; i < count; i++) {
         if (is_near(kept->centre_mm_q8, scratch->tried[i].centre_mm_q8, spacing_mm)) {
             scratch->state[i] = IH_SCAN_TAKEN;
@@ -168,22 +173,67 @@ int32_t ih_scan_score_q12(const struct ih_space *space, struct ih_scan_scratch *
     return score;
 }
 
-/* Bounds first: the score itself is worked out of what seems best and is not yet rated. What is rated
- * and still seems best is the best. */
-void ih_scan_find(const struct ih_space *space, const struct ih_scan_params *params,
-                  struct ih_scan_scratch *scratch, struct ih_scan *out)
+static void bound(const struct ih_space *space, struct ih_scan_scratch *scratch, int32_t index)
 {
+    struct ih_scan_place *place = &scratch->tried[index];
+    place->score_q12 = ih_bound_score_q12(space, &scratch->rays, place->centre_mm_q8);
+    scratch->rank[index] = rank_of(place->score_q12, index);
+    scratch->state[index] = IH_SCAN_BOUND;
+}
+
+/* Places behind all seen points, of which the first of each block of two by two slots is bounded. */
+static int32_t begin(const struct ih_space *space, const struct ih_scan_params *params,
+                     struct ih_scan_scratch *scratch)
+{
+    bool is_begun[BLOCKS * BLOCKS] = {false};
     int32_t count = 0;
-    ih_bound_prepare(space, &scratch->rays);
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
+        const int32_t block = slot / IH_GRID / 2 * BLOCKS + slot % IH_GRID / 2;
+        scratch->index[slot] = IH_NONE;
         if (space->ray[slot].state == IH_RAY_SEEN) {
             struct ih_scan_place *place = &scratch->tried[count];
             centre_behind(&space->ray[slot], params->deep_mm, place->centre_mm_q8);
-            place->score_q12 = ih_bound_score_q12(space, &scratch->rays, place->centre_mm_q8);
-            scratch->rank[count] = rank_of(place->score_q12, count);
-            scratch->state[count++] = IH_SCAN_BOUND;
+            place->score_q12 = IH_BOUND_MOST_Q12;
+            scratch->rank[count] = RANK_NONE;
+            scratch->state[count] = IH_SCAN_LEFT;
+            scratch->slot[count] = (int16_t)slot;
+            scratch->index[slot] = (int16_t)count;
+            if (!is_begun[block]) {
+                is_begun[block] = true;
+                bound(space, scratch, count);
+            }
+            count++;
         }
     }
+    return count;
+}
+
+/* A place is worth its score, and the up to 8 places around it a bound. */
+static void rate(const struct ih_space *space, struct ih_scan_scratch *scratch, int32_t index)
+{
+    struct ih_scan_place *place = &scratch->tried[index];
+    place->score_q12 = ih_scan_score_q12(space, scratch, place->centre_mm_q8);
+    scratch->rank[index] = rank_of(place->score_q12, index);
+    scratch->state[index] = IH_SCAN_RATED;
+    const int32_t row = scratch->slot[index] / IH_GRID;
+    const int32_t column = scratch->slot[index] % IH_GRID;
+    for (int32_t y = ih_max_s32(row - 1, 0); y <= ih_min_s32(row + 1, IH_GRID - 1); y++) {
+        for (int32_t x = ih_max_s32(column - 1, 0); x <= ih_min_s32(column + 1, IH_GRID - 1); x++) {
+            const int32_t other = scratch->index[y * IH_GRID + x];
+            if (other != IH_NONE && scratch->state[other] == IH_SCAN_LEFT) {
+                bound(space, scratch, other);
+            }
+        }
+    }
+}
+
+/* Bounds first: the score itself is worked out of what seems best and is not yet rated. What is rated
+ * and still seems best is the best of those that were looked at. */
+void ih_scan_find(const struct ih_space *space, const struct ih_scan_params *params,
+                  struct ih_scan_scratch *scratch, struct ih_scan *out)
+{
+    ih_bound_prepare(space, &scratch->rays);
+    const int32_t count = begin(space, params, scratch);
     out->place_count = 0;
     while (out->place_count < params->place_max) {
         const int32_t best = best_left(scratch, count);
@@ -193,10 +243,7 @@ void ih_scan_find(const struct ih_space *space, const struct ih_scan_params *par
         if (scratch->state[best] == IH_SCAN_RATED) {
             take(scratch, count, best, params->spacing_mm, out);
         } else {
-            struct ih_scan_place *place = &scratch->tried[best];
-            place->score_q12 = ih_scan_score_q12(space, scratch, place->centre_mm_q8);
-            scratch->rank[best] = rank_of(place->score_q12, best);
-            scratch->state[best] = IH_SCAN_RATED;
+            rate(space, scratch, best);
         }
     }
 }

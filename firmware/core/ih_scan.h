@@ -13,15 +13,16 @@
  *        radii away, and not more down than aside, in mm) of
  *            1 where the surface lies more than 60 mm behind the centre, 0.7 where the ray is empty,
  *            0 where it is unknown, else -0.6.
- *        Either mean: fewer than 8 rays count as 8. No place is rated whose bound says that it will
- *        not be kept.
+ *        Either mean: fewer than 8 rays count as 8. Of each block of two by two slots the first place
+ *        is looked at, then those around whatever is rated: what seems best of those that were looked
+ *        at, until it is. No place is rated whose bound says that it will not be kept.
  * Overflow: sums of 361 values within +-1 in Q12, times 60: 2^26.4. A centre is a point plus at
  *        most deep_mm on an axis; squares of distances 2^53.6.
  * Error: a score within 0.0005 of the float64 reference, but that a ray as good as on a limit may
  *        be counted either way (9250 scores, one in ten has such a ray); centres within 0.003 mm
  *        for slopes up to 1/2.
- * Cost:  a bound for each point (ih_bound), and for what seems best the score: of some 21 places the
- *        rays that 16 bits can tell are counted, seven each are crossed with the head. 0.87 million
+ * Cost:  a bound (ih_bound) for half of the points, and for what seems best the score: of some 21 places
+ *        the rays that 16 bits can tell are counted, seven each are crossed with the head. 0.6 million
  *        instructions for 320 points (x86-64-v3, gcc -O3, frames of both sequences).
  */
 #ifndef IH_SCAN_H
@@ -48,11 +49,13 @@ struct ih_scan {
     struct ih_scan_place place[IH_SCAN_MAX];
 };
 
-enum ih_scan_state { IH_SCAN_BOUND, IH_SCAN_RATED, IH_SCAN_TAKEN };
+enum ih_scan_state { IH_SCAN_LEFT, IH_SCAN_BOUND, IH_SCAN_RATED, IH_SCAN_TAKEN };
 
 struct ih_scan_scratch {
     struct ih_scan_place tried[IH_SLOTS]; /* with its score, or with the bound of it */
     uint8_t state[IH_SLOTS];              /* enum ih_scan_state */
+    int16_t slot[IH_SLOTS];               /* of a place */
+    int16_t index[IH_SLOTS];              /* of a slot's place, or IH_NONE */
     struct ih_bound_rays rays;
     struct ih_bound_verdict verdict;
     int32_t rank[IH_SLOTS]; /* of what is left, by its score */

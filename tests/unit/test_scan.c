@@ -1,6 +1,8 @@
 /* ih_scan against float64, on made scenes with a known head, and at the extremes. */
 #include "ih_scan.h"
 
+#include <stdlib.h>
+
 #include "ih_test.h"
 #include "ih_test_scene.h"
 
@@ -72,37 +74,109 @@ static bool apart(const int32_t a[3], const int32_t b[3])
     return distance_mm(a, b_mm) > params.spacing_mm;
 }
 
-/* What was tried, chosen a second time: strike out what is near, take the best that is left, of
- * equal ones the first. */
-static void check_choice(void)
+/* The slots of what was tried. */
+static int32_t tried_slots(int32_t of[IH_SLOTS])
 {
-    static bool struck[IH_SLOTS];
-    const int32_t count = seen_count();
-    int32_t i, k;
+    int32_t slot, count = 0;
 
-    memset(struck, 0, sizeof struck);
-    for (i = 0; i < IH_SCAN_MAX; i++) {
-        int32_t best = IH_NONE;
-
-        for (k = count - 1; k >= 0; k--) {
-            if (!struck[k] &&
-                (best == IH_NONE || scratch.tried[k].score_q12 >= scratch.tried[best].score_q12)) {
-                best = k;
-            }
-        }
-        if (best == IH_NONE) {
-            break;
-        }
-        TEST_ASSERT_TRUE(i < scan.place_count);
-        TEST_ASSERT_EQUAL_MEMORY(&scratch.tried[best], &scan.place[i], sizeof scan.place[i]);
-        for (k = 0; k < count; k++) {
-            struck[k] |= !apart(scratch.tried[k].centre_mm_q8, scan.place[i].centre_mm_q8);
+    for (slot = 0; slot < IH_SLOTS; slot++) {
+        if (space.ray[slot].state == IH_RAY_SEEN) {
+            of[count++] = slot;
         }
     }
-    TEST_ASSERT_EQUAL_INT32(i, scan.place_count);
-    IH_TEST_UNTOUCHED(&scratch.tried[count], (size_t)(IH_SLOTS - count) * sizeof scratch.tried[0],
+    return count;
+}
+
+static bool is_around(int32_t slot, int32_t other)
+{
+    return abs(slot / IH_GRID - other / IH_GRID) <= 1 && abs(slot % IH_GRID - other % IH_GRID) <= 1;
+}
+
+static bool same_block(int32_t slot, int32_t other)
+{
+    return slot / IH_GRID / 2 == other / IH_GRID / 2 && slot % IH_GRID / 2 == other % IH_GRID / 2;
+}
+
+/* A second scan, with what find() has rated: what is known of a place is nothing, its bound or its score. */
+struct second {
+    int32_t count, slot[IH_SLOTS];
+    bool is_known[IH_SLOTS], is_rated[IH_SLOTS], is_struck[IH_SLOTS];
+    int32_t value[IH_SLOTS];
+};
+
+static void know(struct second *second, int32_t k)
+{
+    if (!second->is_known[k]) {
+        second->is_known[k] = true;
+        second->value[k] = ih_bound_score_q12(&space, &scratch.rays, scratch.tried[k].centre_mm_q8);
+    }
+}
+
+/* The best of what is known and not struck out, of equal ones the first. */
+static int32_t best_of(const struct second *second)
+{
+    int32_t best = IH_NONE, k;
+
+    for (k = second->count - 1; k >= 0; k--) {
+        if (second->is_known[k] && !second->is_struck[k] &&
+            (best == IH_NONE || second->value[k] >= second->value[best])) {
+            best = k;
+        }
+    }
+    return best;
+}
+
+/* The first of each block is known; the best is rated, and what is around it known; or it is taken, and what is
+ * near it struck out. Those taken come best first. */
+static void check_choice(void)
+{
+    static struct second second;
+    static bool is_found[IH_SCAN_MAX];
+    int32_t taken = 0, k, j, best;
+
+    memset(&second, 0, sizeof second);
+    memset(is_found, 0, sizeof is_found);
+    second.count = tried_slots(second.slot);
+    for (k = 0; k < second.count; k++) {
+        bool is_first = true;
+
+        for (j = 0; j < k; j++) {
+            is_first = is_first && !same_block(second.slot[k], second.slot[j]);
+        }
+        if (is_first) {
+            know(&second, k);
+        }
+    }
+    while (taken < IH_SCAN_MAX && (best = best_of(&second)) != IH_NONE) {
+        if (second.is_rated[best]) {
+            for (k = 0; k < scan.place_count; k++) {
+                is_found[k] |=
+                    memcmp(&scratch.tried[best], &scan.place[k], sizeof scan.place[k]) == 0;
+            }
+            for (k = 0; k < second.count; k++) {
+                second.is_struck[k] |=
+                    !apart(scratch.tried[k].centre_mm_q8, scratch.tried[best].centre_mm_q8);
+            }
+            taken++;
+            continue;
+        }
+        second.is_rated[best] = true;
+        second.value[best] = scratch.tried[best].score_q12;
+        for (k = 0; k < second.count; k++) {
+            if (is_around(second.slot[k], second.slot[best])) {
+                know(&second, k);
+            }
+        }
+    }
+    TEST_ASSERT_EQUAL_INT32(taken, scan.place_count);
+    for (k = 0; k < scan.place_count; k++) {
+        TEST_ASSERT_TRUE(is_found[k]);
+        TEST_ASSERT_TRUE(k == 0 || scan.place[k].score_q12 <= scan.place[k - 1].score_q12);
+    }
+    IH_TEST_UNTOUCHED(&scratch.tried[second.count],
+                      (size_t)(IH_SLOTS - second.count) * sizeof scratch.tried[0],
                       "beyond what was tried");
-    IH_TEST_UNTOUCHED(&scan.place[i], (size_t)(IH_SCAN_MAX - i) * sizeof scan.place[0],
+    IH_TEST_UNTOUCHED(&scan.place[taken], (size_t)(IH_SCAN_MAX - taken) * sizeof scan.place[0],
                       "beyond the places");
 }
 
@@ -359,19 +433,22 @@ static void places_are_farther_apart_than_the_spacing(void)
 /* Most places are told by their bound: as many scores are worked out as a frame can afford. */
 static void few_places_are_rated(void)
 {
-    int32_t i, k, tried = 0, rated = 0;
+    int32_t i, k, tried = 0, bounded = 0, rated = 0;
 
     for (i = 0; i < SCENE_COUNT; i++) {
         make_scene(&vector_scenes[i]);
         ih_scan_find(&space, &params, &scratch, &scan);
         for (k = 0; k < seen_count(); k++) {
             tried++;
-            rated += scratch.tried[k].score_q12 !=
-                     ih_bound_score_q12(&space, &scratch.rays, scratch.tried[k].centre_mm_q8);
+            bounded += scratch.tried[k].score_q12 != IH_BOUND_MOST_Q12;
+            rated += scratch.tried[k].score_q12 != IH_BOUND_MOST_Q12 &&
+                     scratch.tried[k].score_q12 !=
+                         ih_bound_score_q12(&space, &scratch.rays, scratch.tried[k].centre_mm_q8);
         }
     }
     TEST_ASSERT_TRUE(rated > 0);
     TEST_ASSERT_TRUE(rated < tried / 5);
+    TEST_ASSERT_TRUE(bounded < tried * 2 / 3);
 }
 
 static void no_point_one_point_and_equal_points(void)
