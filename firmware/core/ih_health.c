@@ -64,14 +64,14 @@ static void add_look(struct ih_health_look *look, const struct ih_dots *dots,
 
 /* What a search's turn shows is apart until it is proven. */
 static void add_frame(struct ih_health *health, const struct ih_dots *dots,
-                      const struct ih_labels *labels)
+                      const struct ih_labels *labels, const struct ih_rig *rig)
 {
     bool is_settling = health->stage == IH_HEALTH_SETTLING;
     int32_t reach_px_q12 = is_settling ? settle_reach_px_q12[health->step] : REACH_PX_Q12;
     add_look(&health->look, dots, labels);
-    ih_places_add(&health->now.late, labels, &health->slopes, reach_px_q12);
+    ih_places_add(&health->now.late, labels, rig, &health->slopes, reach_px_q12);
     if (!is_settling || health->step > 0) {
-        ih_places_add(&health->all, labels, &health->slopes, reach_px_q12);
+        ih_places_add(&health->all, labels, rig, &health->slopes, reach_px_q12);
     }
 }
 
@@ -416,7 +416,7 @@ bool ih_health_frame(struct ih_health *health, const struct ih_dots *dots,
     if (health->stage == IH_HEALTH_SEARCHING) {
         return search(health, dots, labels, rig, scratch);
     }
-    add_frame(health, dots, labels);
+    add_frame(health, dots, labels, rig);
     if (look->frame_count < look_frames(health)) {
         return false;
     }

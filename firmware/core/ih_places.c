@@ -49,7 +49,7 @@ void ih_places_clear(struct ih_places *places)
 {
     memset(places, 0, sizeof *places);
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
-        places->slot[slot].t_px_q12 = ANYWHERE;
+        places->slot[slot].along_px_q12 = ANYWHERE;
     }
 }
 
@@ -93,21 +93,34 @@ static void leave_place(struct ih_place *place)
 
 /* A dot's weight is at most 2^8, times its distance at most 0.29 of the reach: in IH_PLACES_FRAMES_MAX
  * frames 2^17 and 2^25.4 with a reach of 0.3 px. */
-static void add_dot(struct ih_place *place, int32_t t_px_q12, int64_t across_px_q12,
+static void add_dot(struct ih_place *place, int32_t along_px_q12, int64_t across_px_q12,
                     int64_t weight_q8)
 {
-    if (place->t_px_q12 == ANYWHERE) {
-        place->t_px_q12 = t_px_q12;
-    } else if (ih_abs_s64((int64_t)t_px_q12 - place->t_px_q12) > IH_PLACES_MOVE_PX_Q12) {
+    if (place->along_px_q12 == ANYWHERE) {
+        place->along_px_q12 = along_px_q12;
+    } else if (ih_abs_s64((int64_t)along_px_q12 - place->along_px_q12) > IH_PLACES_MOVE_PX_Q12) {
         leave_place(place);
-        place->t_px_q12 = t_px_q12;
+        place->along_px_q12 = along_px_q12;
     }
     place->here_weight_q8 += (int32_t)weight_q8;
     place->here_pull_q20 += (int32_t)(weight_q8 * across_px_q12);
 }
 
+/* Where in the image, in the line's direction: where the line begins, and t from there. Unlike t it stays as it is
+ * when the rig is turned, which moves no dot. Beginnings of 2^27.6 on each axis times a unit vector: 2^58.1, or
+ * 2^28.1 px; with t below 2^29. */
+static int32_t along_image(const struct ih_line *line, int32_t t_px_q12)
+{
+    int64_t begin_q42 = (int64_t)line->infinity_u_px_q12 * line->dir_u_q30 +
+                        (int64_t)line->infinity_v_px_q12 * line->dir_v_q30;
+    int32_t along_px_q12 = (int32_t)ih_shift_round(begin_q42, 30) + t_px_q12;
+    IH_IN_RANGE(along_px_q12, -IH_RANGE_ALONG_PX_Q12, IH_RANGE_ALONG_PX_Q12);
+    return along_px_q12;
+}
+
 void ih_places_add(struct ih_places *places, const struct ih_labels *labels,
-                   const struct ih_turn_slopes *slopes, int32_t reach_px_q12)
+                   const struct ih_rig *rig, const struct ih_turn_slopes *slopes,
+                   int32_t reach_px_q12)
 {
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
         if (labels->dot_of_slot[slot] == IH_NONE || is_steep(slopes->px_q4[slot])) {
@@ -117,7 +130,8 @@ void ih_places_add(struct ih_places *places, const struct ih_labels *labels,
         int64_t weight_q8, rise_q8;
         weigh(across_px_q12, reach_px_q12, &weight_q8, &rise_q8);
         if (weight_q8 > 0) {
-            add_dot(&places->slot[slot], labels->t_px_q12[slot], across_px_q12, weight_q8);
+            add_dot(&places->slot[slot], along_image(&rig->line[slot], labels->t_px_q12[slot]),
+                    across_px_q12, weight_q8);
         }
         places->square_q32 += weight_q8 * across_px_q12 * across_px_q12;
         places->weight_q8 += weight_q8;
@@ -460,7 +474,7 @@ static void subtract(const struct ih_place *late, const struct ih_place *all, st
     int32_t late_weight_q8, late_pull_q20, all_weight_q8, all_pull_q20;
     sum_of(late, &late_weight_q8, &late_pull_q20);
     sum_of(all, &all_weight_q8, &all_pull_q20);
-    *out = (struct ih_place){.t_px_q12 = ANYWHERE};
+    *out = (struct ih_place){.along_px_q12 = ANYWHERE};
     if (late_weight_q8 > 0 && all_weight_q8 > 0) {
         int64_t both_q8 = (int64_t)late_weight_q8 + all_weight_q8;
         int64_t pull_q28 =
@@ -510,6 +524,5 @@ void ih_places_turn(struct ih_places *places, const struct ih_turn_slopes *slope
         }
         place->pull_q20 = pulled(place->pull_q20, place->weight_q8, move, share);
         place->here_pull_q20 = pulled(place->here_pull_q20, place->here_weight_q8, move, share);
-        place->t_px_q12 = ANYWHERE; /* along the line everything has moved, too */
     }
 }

@@ -10,7 +10,8 @@
  *        a turn across the baseline, mostly lie on walls, frames add nothing to the second part. So
  *        of each slot the frames of one place are taken together, as one distance with the weight
  *        n / (1 + n / 20) of n frames, the best linear estimate where a place errs by 0.22 of the noise.
- *        A dot that is IH_PLACES_MOVE away along its line is on a new place.
+ *        A dot that is IH_PLACES_MOVE away along its line is on a new place, in the image, where no turn of the
+ *        rig moves it: where places began is known for as long as the frames on them are.
  *        Uncertainty: from what each slot's own distance leaves unexplained, with nothing assumed
  *        of how slots err but that they do so independently (the sandwich of White, 1980); so
  *        it counts rays that were calibrated badly, too. 0.03 px that no frame shows are added.
@@ -38,7 +39,7 @@
 
 /* Sums over a slot's labelled dots. Weights in Q8, weight times distance in Q20 px. */
 struct ih_place {
-    int32_t t_px_q12; /* of the first dot on the place where the dot is now */
+    int32_t along_px_q12; /* in the image, of the first dot on the place where the dot is now */
     int32_t here_weight_q8, here_pull_q20;
     int32_t weight_q8, pull_q20; /* of the places before, each with its weight */
 };
@@ -63,9 +64,10 @@ struct ih_places_turn {
 
 void ih_places_clear(struct ih_places *places);
 
-/* Dots farther from their line than reach say nothing. */
+/* rig: of the labels, as the slopes are. Dots farther from their line than reach say nothing. */
 void ih_places_add(struct ih_places *places, const struct ih_labels *labels,
-                   const struct ih_turn_slopes *slopes, int32_t reach_px_q12);
+                   const struct ih_rig *rig, const struct ih_turn_slopes *slopes,
+                   int32_t reach_px_q12);
 
 /* False: too few dots, or they do not show the turn along the baseline or about the camera's axis.
  * turned: the rig against its calibration, about which the prior is; is_weak_known: also across the

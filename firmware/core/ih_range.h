@@ -54,6 +54,7 @@ void ih_range_check(int64_t value, int64_t low, int64_t high, const char *file, 
 /* Turn, health. */
 #define IH_RANGE_TURN_SLOPE_PX_Q4 (1 << 22)
 #define IH_RANGE_HEALTH_SLOPE_PX_Q4 (1 << 18) /* of a dot whose distance counts */
+#define IH_RANGE_ALONG_PX_Q12 (1 << 29)       /* in the image, in a line's direction */
 
 /* Windows. */
 #define IH_RANGE_SCALE_Q16 5368710 /* cells per mm */

@@ -63,7 +63,7 @@ static void add_frame(const double turn_deg[3])
     for (int slot = 0; slot < IH_SLOTS; slot++) {
         label(slot, turn_deg, NOISE_PX * ih_test_normal(&random_source));
     }
-    ih_places_add(&places, &labels, &slopes, REACH_PX_Q12);
+    ih_places_add(&places, &labels, &rig, &slopes, REACH_PX_Q12);
 }
 
 /* A dot that goes on has another place's error from now on. */
@@ -191,12 +191,57 @@ static void a_turn_that_is_taken_leaves_nothing(void)
         IH_TEST_WITHIN(0.02 * first.sigma_rad_q30[axis], first.sigma_rad_q30[axis],
                        found.sigma_rad_q30[axis], "sigma", axis);
     }
-    /* Dots along their lines are elsewhere now, but on the places that they were on. */
+}
+
+/* The same dots in the image on the lines of a turned rig, and then further along by that. */
+static void relabel(const struct ih_rig *now, double further_px)
+{
     for (int slot = 0; slot < IH_SLOTS; slot++) {
-        labels.t_px_q12[slot] += 8192;
+        const struct ih_line *from = &rig.line[slot];
+        const struct ih_line *to = &now->line[slot];
+        double du_px = (from->infinity_u_px_q12 - (double)to->infinity_u_px_q12) / 4096;
+        double dv_px = (from->infinity_v_px_q12 - (double)to->infinity_v_px_q12) / 4096;
+        double along_px = (du_px * to->dir_u_q30 + dv_px * to->dir_v_q30) / Q30 + further_px;
+        labels.t_px_q12[slot] += (int32_t)lround(4096 * along_px);
+    }
+    rig = *now;
+    ih_turn_slopes(&rig, &slopes);
+}
+
+static int32_t slots_that_left(void)
+{
+    int32_t count = 0;
+
+    for (int slot = 0; slot < IH_SLOTS; slot++) {
+        count += places.slot[slot].weight_q8 > 0;
+    }
+    return count;
+}
+
+/* By 0.05 degrees about Y all lines begin 0.8 px further along. No dot is elsewhere for that; and those that went
+ * 0.4 px before it and go as far after it are, as without it. */
+static void a_turn_moves_no_dot_to_another_place(void)
+{
+    static struct ih_calibration turned;
+    static struct ih_rig now;
+    int32_t turn_rad_q30[3];
+    int32_t bad_slot;
+
+    add_frame(straight_deg);
+    turn_of((const double[3]){0, 0.05, 0}, turn_rad_q30);
+    ih_turn_calibration(&rig.calibration, turn_rad_q30, &turned);
+    TEST_ASSERT_EQUAL_INT(IH_OK, ih_rig_init(&now, &turned, &bad_slot));
+    for (int slot = 0; slot < IH_SLOTS; slot++) {
+        labels.t_px_q12[slot] += 1638;
     }
     add_frame(straight_deg);
-    TEST_ASSERT_EQUAL_INT32(0, places.slot[0].weight_q8);
+    ih_places_turn(&places, &slopes, turn_rad_q30);
+    relabel(&now, 0);
+    add_frame(straight_deg);
+    TEST_ASSERT_EQUAL_INT32(0, slots_that_left());
+    relabel(&now, 0.4);
+    add_frame(straight_deg);
+    TEST_ASSERT_GREATER_THAN_INT32(IH_SLOTS * 9 / 10, slots_that_left());
 }
 
 /* Beyond a pixel nothing is kept. */
@@ -281,7 +326,7 @@ static void a_change_is_found_and_chance_is_none(void)
         }
         for (int frame = 0; frame < 6; frame++) {
             add_frame(turn_deg);
-            ih_places_add(&late, &labels, &slopes, REACH_PX_Q12);
+            ih_places_add(&late, &labels, &rig, &slopes, REACH_PX_Q12);
         }
         memset(&difference, IH_TEST_FILL, sizeof difference);
         TEST_ASSERT_TRUE(ih_places_change(&late, &places, &rig, &slopes, &difference, &found));
@@ -335,6 +380,7 @@ int main(void)
     RUN_TEST(uncertainties_are_what_errors_come_to);
     RUN_TEST(what_is_not_seen_is_held);
     RUN_TEST(a_turn_that_is_taken_leaves_nothing);
+    RUN_TEST(a_turn_moves_no_dot_to_another_place);
     RUN_TEST(a_great_turn_starts_anew);
     RUN_TEST(frames_of_long_ago_count_half);
     RUN_TEST(a_straight_rig_is_not_surely_turned);

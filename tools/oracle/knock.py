@@ -19,7 +19,9 @@ import sys
 import numpy as np
 
 REACH_PX = 0.3
-MOVE_PX = 0.6  # along its line: another place
+WEIGHT_MIN = 1 / 512  # half a step of the core's: a dot with less is none, and begins no place
+STEPS_OF_PX = 4096  # of the core's figures
+MOVE_PX = 2458 / STEPS_OF_PX  # along its line: another place
 FRAMES_OF_PLACE = 20  # most that frames on one place count
 MANY_FRAMES = 5  # that show the error of a place
 SLOT_PX = 0.03
@@ -101,7 +103,8 @@ def true_turn(folder):
 
 
 def labelled(folder, rig, host_sim, work):
-    """Of host_sim with this rig: frame, slot, undistorted u, v of all labelled dots; what it prints."""
+    """Of host_sim with this rig: frame, slot, undistorted u, v of all labelled dots, and the core's own distance from the line
+    and place along it; what it prints."""
     shutil.rmtree(work, ignore_errors=True)
     os.makedirs(work)
     rig.save(os.path.join(work, "rig.json"))
@@ -114,10 +117,10 @@ def labelled(folder, rig, host_sim, work):
         with open(path, encoding="utf-8") as file:
             trace = json.load(file)
         u, v = trace["dots"]["u_px_q12"], trace["dots"]["v_px_q12"]
-        rows += [(frame, slot, u[label["dot"]] / 4096, v[label["dot"]] / 4096)
-                 for slot, label in enumerate(trace["labels"]["slot"]) if label is not None]
+        rows += [(frame, slot, u[label["dot"]] / STEPS_OF_PX, v[label["dot"]] / STEPS_OF_PX, label["perp_px_q12"] / STEPS_OF_PX,
+                  label["t_px_q12"] / STEPS_OF_PX) for slot, label in enumerate(trace["labels"]["slot"]) if label is not None]
     rows = np.array(rows)
-    rows[:, 2:] = rig.undistorted(rows[:, 2:])
+    rows[:, 2:4] = rig.undistorted(rows[:, 2:4])
     return rows, out
 
 
@@ -125,17 +128,22 @@ def distances(rig, rows):
     """From the line, and along it."""
     infinity, direction, _, _ = rig.lines()
     slots = rows[:, 1].astype(int)
-    off, way = rows[:, 2:] - infinity[slots], direction[slots]
+    off, way = rows[:, 2:4] - infinity[slots], direction[slots]
     return off[:, 1] * way[:, 0] - off[:, 0] * way[:, 1], (off * way).sum(axis=1)
+
+
+def weight_of(distance):
+    """Tukey's."""
+    return np.clip(1 - (distance / REACH_PX)**2, 0, None)**2
 
 
 def places(rig, rows):
     """Number of the place of each dot: a slot's frames one after the other, until it is MOVE_PX away from where it began."""
     distance, along = distances(rig, rows)
     out, now, begun = np.full(len(rows), -1), np.full(SLOTS, -1), np.zeros(SLOTS)
-    count = 0
+    count, counts = 0, weight_of(distance) >= WEIGHT_MIN
     for i, slot in enumerate(rows[:, 1].astype(int)):
-        if abs(distance[i]) >= REACH_PX:
+        if not counts[i]:
             continue
         if now[slot] < 0 or abs(along[i] - begun[slot]) > MOVE_PX:
             now[slot], begun[slot], count = count, along[i], count + 1
@@ -152,7 +160,7 @@ def fit(rig, rows, turn):
         now = rig.turned(turn)
         slope = now.lines()[2]
         distance, _ = distances(now, rows)
-        weight = np.clip(1 - (distance / REACH_PX)**2, 0, None)**2
+        weight = weight_of(distance)
         frames = np.bincount(number, weight, count + 1)
         weight = weight / (1 + frames / FRAMES_OF_PLACE)[number]
         sums = np.bincount(slots, weight, SLOTS)
@@ -189,10 +197,7 @@ class Sums:
         return self.here_weight * share, self.here_pull * share
 
     def add_frame(self, slots, distance, along):
-        ratio = (distance / REACH_PX)**2
-        near = ratio < 1
-        slots, distance, along, ratio = slots[near], distance[near], along[near], ratio[near]
-        weight = (1 - ratio)**2
+        weight, ratio = weight_of(distance), (distance / REACH_PX)**2
         self.total, self.rise = self.total + weight.sum(), self.rise + ((1 - ratio) * (1 - 5 * ratio)).sum()
         left = slots[np.abs(along - self.begun[slots]) > MOVE_PX]
         place_weight, place_pull = self.of_place()
@@ -215,22 +220,26 @@ class Sums:
     def turn(self, move):
         self.pull -= self.share() * self.weight * move
         self.here_pull -= self.share() * self.here_weight * move
-        self.begun[:] = np.nan
 
 
 def follow(folder, host_sim, work, turns):
     """The last turn as the core comes to it, which does not iterate: a frame's dots keep the labels and the weights that the
-    lines of its time gave them, and each time the rig is turned it is by one step. turns: first and last frame with a turn, that
-    turn, and the one that the core took then."""
+    lines of its time gave them, and each time the rig is turned it is by one step. Places are told apart in the image, where no
+    turn of the rig moves them; which dots count and when one is on another place is decided with the core's own figures: a dot
+    at the limit may begin a place or not, and one place more of a corner is a twentieth of the uncertainty. turns: first and
+    last frame with a turn, that turn, and the one that the core took then."""
     rig, sums = Rig(os.path.join(folder, "rig.json")), Sums()
     for first, last, before, after in turns:
         now = rig.turned(before)
         rows, _ = labelled(folder, now, host_sim, work)
-        distance, along = distances(now, rows)
+        rows = rows[weight_of(rows[:, 4]) >= WEIGHT_MIN]
+        infinity, direction, slope, _ = now.lines()
+        distance, _ = distances(now, rows)
+        begins = ((infinity * direction).sum(axis=1) * STEPS_OF_PX).round() / STEPS_OF_PX
+        along = rows[:, 5] + begins[rows[:, 1].astype(int)]
         for frame in range(first, last + 1):
             here = rows[:, 0] == frame
             sums.add_frame(rows[here, 1].astype(int), distance[here], along[here])
-        slope = now.lines()[2]
         found = before + sums.step(slope)
         sums.turn(slope @ (after - before))
     return found
