@@ -29,7 +29,7 @@ ARCH ?= arm64
 
 .DEFAULT_GOAL := help
 .PHONY: help sim frames sanitize test fuzz coverage ranges exhaustive mutation accept eval bench \
-  bench-instructions bench-grow bench-worst test-bench bits cortexm longrun size vectors learn view figures \
+  bench-instructions bench-peers bench-grow bench-worst test-bench bits cortexm longrun size vectors learn view figures \
   test-view test-report live-pictures export board board-gpiod2 deb image flash calibrate test-calibration \
   test-calibration-short test-deb test-board test-image format formatted lint clean
 
@@ -141,6 +141,10 @@ bench: sim ## time isohead against the same work by OpenCV and Eigen: build/benc
 bench-instructions: sim ## instructions of each stage, by callgrind, with both compilers
 	@tools/setup.sh bench
 	@/usr/bin/python3 tools/bench/counts.py
+
+bench-peers: sim ## instructions of isohead beside those of the same work by OpenCV and Eigen
+	@tools/setup.sh bench
+	@/usr/bin/python3 tools/bench/counts.py --peers
 
 bench-grow: sim ## how the instructions of a frame grow with its size, dots, centres, grid, levels
 	@tools/setup.sh bench

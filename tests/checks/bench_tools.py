@@ -93,7 +93,8 @@ class Bounds(unittest.TestCase):
     def test_lines_of_callgrind(self):
         for line, name, number in (
                 ("2,124,025,497 (99.36%)  ???:isohead_frame [/b/bench_isohead]", "isohead_frame", "2,124,025,497"),
-                ("  7 ( 0.00%)  /core/ih_dots.c:ih_dots_find'2 [/b/bench_isohead]", "ih_dots_find", "7")):
+                ("  7 ( 0.00%)  /core/ih_dots.c:ih_dots_find'2 [/b/bench_isohead]", "ih_dots_find", "7"),
+                ("297,336,008 (62.21%)  ???:peer_find_dots [/b/bench_peer]", "peer_find_dots", "297,336,008")):
             found = counts.LINE.match(line)
             self.assertEqual((found[2], found[1]), (name, number))
 
