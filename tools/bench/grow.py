@@ -1,8 +1,11 @@
 #!/usr/bin/env python3
-"""How a frame's cost grows: with frame size, dots, baseline, centres, grid, levels; and RAM.
+"""How a frame's cost grows: with frame size, dots, baseline, centres, grid, levels, points; and RAM.
+
+    grow.py [frames|constants]    all tables, or those of the one kind
 
 Instructions of gcc -O2 for x86-64, counted by callgrind, the mean of four rendered frames. What is a constant
-of the core (centres, grid, levels, widest frame) is changed in a copy of the sources below build/bench/grow.
+or a default of the core (centres, grid, levels, points on a contour, widest frame) is changed in a copy of the
+sources below build/bench/grow. One row of each such table must be the core as it is.
 """
 
 import json
@@ -22,13 +25,14 @@ import counts
 WORK = os.path.join(builds.WORK, "grow")
 STAGES = ("frame", "dots", "labels", "surface", "nests", "findings")
 FIRST, COUNT = 12, 4
+CORE = os.path.join("firmware", "core")
 PARTS = ("firmware", "hal", "sim", "tools", "tests", "cmake", "CMakeLists.txt")
 SIZES = ((320, 240), (640, 480), (752, 582), (1024, 768), (1280, 800))
 DOTS = (50, 100, 200, 300, 361)
-CENTRES = (8, 10, 12, 14, 16)
-# Even; and small once the step is in lowest terms, because the table's radicand has 64 bits.
-STEPS_PER_CENTRE = (2, 4, 8)
+CENTRES = (4, 8, 12)
+GRIDS = (31, 47, 63)  # 4, 6 and 8 steps from centre to centre
 LEVEL_STEPS_MM = (5, 10, 20, 40)
+POINTS = (24, 32, 40, 48, 56)
 
 
 def render(name, options):
@@ -89,43 +93,77 @@ def with_dots(source, count):
     return folder, round(kept / len(truth))
 
 
+def edited(edits):
+    """Of each file that the edits (file, pattern, replacement) change its new text."""
+    texts = {}
+    for file, pattern, replacement in edits:
+        if file not in texts:
+            with open(os.path.join(builds.ROOT, CORE, file), encoding="utf-8") as opened:
+                texts[file] = (opened.read(),) * 2
+        before, text = texts[file]
+        text, number = re.subn(pattern, replacement, text)
+        if number != 1:
+            builds.fail("%s: '%s' stands there %d times, expected once: tools/bench/grow.py changes it"
+                        % (file, pattern, number))
+        texts[file] = (before, text)
+    return {file: text for file, (before, text) in texts.items() if text != before}
+
+
 def variant(name, edits):
-    """A copy of the sources with some constants changed; (file, pattern, replacement)."""
-    folder = os.path.join(WORK, name)
+    """The folder of a copy of the sources with some constants changed; that of the sources if none is."""
+    texts = edited(edits)
+    if not texts:
+        return builds.ROOT
+    folder = os.path.join(WORK, re.sub(r"\W+", "-", name))
     shutil.rmtree(folder, ignore_errors=True)
     os.makedirs(folder)
     for part in PARTS:
         source = os.path.join(builds.ROOT, part)
         copy = shutil.copytree if os.path.isdir(source) else shutil.copy
         copy(source, os.path.join(folder, part))
-    for file, pattern, replacement in edits:
-        path = os.path.join(folder, "firmware", "core", file)
-        with open(path, encoding="utf-8") as opened:
-            text = opened.read()
-        changed, number = re.subn(pattern, replacement, text)
-        if number != 1:
-            builds.fail("%s: '%s' stands there %d times, expected once: tools/bench/grow.py changes it"
-                        % (file, pattern, number))
-        with open(path, "w", encoding="utf-8") as opened:
-            opened.write(changed)
+    for file, text in texts.items():
+        with open(os.path.join(folder, CORE, file), "w", encoding="utf-8") as opened:
+            opened.write(text)
     return folder
 
 
 def define(file, name, value):
-    return (file, r"(?m)^#define %s .*$" % name, "#define %s %s" % (name, value))
+    return (file, r"(?m)^#define %s( .*)$" % name, "#define %s %s" % (name, value))
 
 
-def surface(centres, steps):
-    """centres in a row, grid steps per centre: the grid spans the same, its step is 40 / (centres - 1) / steps."""
-    common = math.gcd(40, steps * (centres - 1))
-    edits = [define("ih_surface.h", "IH_SURFACE_CENTRES", centres),
-             define("ih_surface.h", "IH_SURFACE_GRID", steps * (centres - 1) + 3),
-             define("ih_surface.h", "IH_SURFACE_STEPS_PER_CENTRE", steps),
-             define("ih_surface.h", "IH_SURFACE_STEP_NUMERATOR", 40 // common),
-             define("ih_surface.h", "IH_SURFACE_STEP_DENOMINATOR", steps * (centres - 1) // common),
-             define("ih_surface.h", "IH_SURFACE_KEPT", -(-centres * centres * 5 // 48) * 8),
-             define("ih_normal.h", "IH_NORMAL_TERMS", centres * centres),
-             define("isohead.h", "IH_RAM_MAX", "(1024 * 1024)")]
+def fraction(numerator, denominator):
+    common = math.gcd(numerator, denominator)
+    return numerator // common, denominator // common
+
+
+def centres(count, only=False):
+    """So many centres in a row where no scan and fit are left out; only: there is room for no more."""
+    if count == 12:
+        return [("ih_surface.c", r"centres = IH_SURFACE_CENTRES_FEW,", "centres = IH_SURFACE_CENTRES_MAX,")]
+    edits = [define("ih_surface.h", "IH_SURFACE_CENTRES_FEW", count)]
+    if count * count <= 32:
+        edits.append(define("ih_surface.c", "FINE_ROWS", "IH_NORMAL_ROWS"))
+    if only:
+        edits.append(define("ih_surface.h", "IH_SURFACE_CENTRES_MAX", count))
+    return edits
+
+
+def grid(nodes):
+    """A grid of so many nodes that spans as much, on which the centres stand where they did."""
+    steps = nodes + 1
+    numerator, denominator = fraction(10 * 48, 11 * steps)
+    return [define("ih_surface.h", "IH_SURFACE_CENTRES_STEPS", steps),
+            define("ih_surface.h", "IH_SURFACE_GRID", nodes),
+            define("ih_surface.h", "IH_SURFACE_STEP_NUMERATOR", numerator),
+            define("ih_surface.h", "IH_SURFACE_STEP_DENOMINATOR", denominator),
+            define("ih_surface.c", "TABLE_WIDTH", "(%d * TABLE_LINE)" % -(-(nodes - 1) // 12)),
+            define("isohead.h", "IH_RAM_MAX", "(%d * 1024)" % (192 if nodes <= 47 else 1024))]
+
+
+def points(count, only=False):
+    edits = [("ih_parts.c", r"\.point_count = 32,", ".point_count = %d," % count)]
+    if only:
+        edits.append(define("ih_parts.h", "IH_PARTS_POINTS_MAX", count))
     return edits
 
 
@@ -186,26 +224,31 @@ def grow_frames(base):
 
 def grow_constants(base):
     arguments = arguments_of(base)
-    shipped = measure(builds.ROOT, arguments)
     for title, variants in (
-            ("centres, grid", [("%d, %dx%d" % (c * c, 4 * c - 1, 4 * c - 1), surface(c, 4)) for c in CENTRES]),
-            ("grid, 144 centres", [("%dx%d" % (11 * s + 3, 11 * s + 3), surface(12, s)) for s in STEPS_PER_CENTRE]),
-            ("mm between levels", [(str(mm), levels(mm)) for mm in LEVEL_STEPS_MM])):
-        rows = []
-        for name, edits in variants:
-            source = variant(re.sub(r"\W+", "-", title + " " + name), edits)
-            rows.append((name, measure(source, arguments), {"RAM": ram_bytes(source)}))
-        if sum(stages == shipped for _, stages, _ in rows) != 1:
-            builds.fail("%s: no variant costs what the core as it is does: one of them should be it" % title)
+            ("centres", [("%d" % (c * c), centres(c), centres(c, True)) for c in CENTRES]),
+            ("grid", [("%dx%d" % (n, n), grid(n), grid(n)) for n in GRIDS]),
+            ("mm between levels", [(str(mm), levels(mm), levels(mm)) for mm in LEVEL_STEPS_MM]),
+            ("points on a contour", [(str(p), points(p), points(p, True)) for p in POINTS])):
+        shipped, rows = 0, []
+        for name, edits, only in variants:
+            source = variant(title + " " + name, edits)
+            shipped += source == builds.ROOT
+            rows.append((name, measure(source, arguments),
+                         {"RAM": ram_bytes(source), "with room for no more": ram_bytes(variant("only", only))}))
+        if shipped != 1:
+            builds.fail("%s: %d variants are the core as it is: one of them should be it" % (title, shipped))
         table(title, rows)
 
 
 def main():
+    kinds = {"frames": grow_frames, "constants": grow_constants}
+    if len(sys.argv) > 2 or not set(sys.argv[1:]) <= set(kinds):
+        builds.fail("usage: grow.py [frames|constants]")
     os.makedirs(WORK, exist_ok=True)
     base = render("752x582", ["--size", "752x582"])
     print("Thousand instructions of a frame, and bytes.\n")
-    #    grow_frames(base)
-    grow_constants(base)
+    for kind in sys.argv[1:] or kinds:
+        kinds[kind](base)
 
 
 if __name__ == "__main__":
