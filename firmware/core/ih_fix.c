@@ -7,7 +7,7 @@ _Static_assert((-3 >> 1) == -2, "right shift of negative values must be arithmet
 /* 1 / sqrt(m) in Q15 at m = 64/256, 65/256 .. 256/256, lowered by as much as a chord between two of
  * them lies above the curve: what is read between them is never too great, and at most 2^-13.7 too
  * small. Written by tools/oracle/isqrt_table.py. */
-static const uint16_t root_inverse_q15[] = {
+const uint16_t ih_root_inverse_q15[193] = {
     65534, 65028, 64533, 64050, 63577, 63115, 62663, 62220, 61786, 61362, 60946, 60538, 60138,
     59747, 59362, 58986, 58616, 58253, 57897, 57547, 57203, 56866, 56534, 56208, 55888, 55573,
     55264, 54959, 54660, 54365, 54075, 53790, 53509, 53232, 52960, 52692, 52428, 52168, 51911,
@@ -25,16 +25,6 @@ static const uint16_t root_inverse_q15[] = {
     33427, 33359, 33292, 33225, 33158, 33092, 33026, 32961, 32896, 32832, 32767,
 };
 
-/* 1 / sqrt(m), m in Q32 from 1/4 on. */
-static uint32_t inverse_root_q15(uint32_t m_q32)
-{
-    uint32_t at = (m_q32 >> 24) - 64;
-    uint32_t part_q16 = m_q32 >> 8 & 0xffff;
-    uint32_t here = root_inverse_q15[at];
-    /* the fall rounded up: never too great */
-    return here - (((here - root_inverse_q15[at + 1]) * part_q16 + 0xffff) >> 16);
-}
-
 uint32_t ih_isqrt_u64(uint64_t value)
 {
     if (value == 0) {
@@ -47,7 +37,7 @@ uint32_t ih_isqrt_u64(uint64_t value)
      * by what its own rounding takes, less than 1. */
     const int half = (64 - ih_bits_u64(value)) / 2;
     const uint64_t square = value << (2 * half);
-    const uint64_t r_q15 = inverse_root_q15((uint32_t)(square >> 32));
+    const uint64_t r_q15 = ih_inverse_root_q15((uint32_t)(square >> 32));
     uint64_t root = ((square >> 32) * r_q15) >> 15;
     root += ((square - root * root) >> 16) * r_q15 >> 32;
     root += (square - root * root) * r_q15 >> 48;
@@ -66,7 +56,7 @@ uint32_t ih_isqrt_u54(uint64_t value)
      * the value is small enough for 36 / 2^5 and 1 of that to be left. */
     const int half = (64 - ih_bits_u64(value)) / 2;
     const uint64_t shifted = value << (2 * half);
-    const uint64_t r_q15 = inverse_root_q15((uint32_t)(shifted >> 32));
+    const uint64_t r_q15 = ih_inverse_root_q15((uint32_t)(shifted >> 32));
     uint64_t wide = ((shifted >> 32) * r_q15) >> 15;
     wide += ((shifted - wide * wide) >> 16) * r_q15 >> 32;
     uint64_t root = wide >> half;
@@ -85,7 +75,7 @@ uint32_t ih_isqrt_u32(uint32_t value)
      * is cut off; of small values next to nothing is left of that. */
     const int half = __builtin_clz(value) / 2;
     const uint32_t shifted = value << (2 * half);
-    uint32_t root = ((shifted >> 16) * inverse_root_q15(shifted)) >> (15 + half);
+    uint32_t root = ((shifted >> 16) * ih_inverse_root_q15(shifted)) >> (15 + half);
     for (uint32_t rest = value - root * root; rest > 2 * root; rest -= 2 * root - 1) {
         root++;
     }

@@ -134,6 +134,19 @@ uint32_t ih_isqrt_u54(uint64_t value);
 /* The same, where words have 32 bits, and of values below 2^24 the quickest. */
 uint32_t ih_isqrt_u32(uint32_t value);
 
+/* Of 64/256, 65/256 .. 256/256. */
+extern const uint16_t ih_root_inverse_q15[193];
+
+/* 1 / sqrt(m), m in Q32 from 1/4 on: never too great, and at most 2^-13.7 of it too small. */
+static inline uint32_t ih_inverse_root_q15(uint32_t m_q32)
+{
+    const uint32_t at = (m_q32 >> 24) - 64;
+    const uint32_t part_q16 = m_q32 >> 8 & 0xffff;
+    const uint32_t here = ih_root_inverse_q15[at];
+    /* the fall rounded up: never too great */
+    return here - (((here - ih_root_inverse_q15[at + 1]) * part_q16 + 0xffff) >> 16);
+}
+
 /* Number of bits needed for value; 0 for 0. */
 static inline int ih_bits_u64(uint64_t value)
 {

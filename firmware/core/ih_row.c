@@ -17,10 +17,10 @@
 /* Points farther than this many robust scales weigh less than 1/4000 and are passed over. */
 #define ROBUST_REACH 8
 /* Places nearer to the centre than this have no direction. */
-#define RADIUS_LEAST_Q14 819 /* 0.05 */
-#define LOW_FROM_Q14 8192    /* 0.5 */
-#define LOW_SPAN_Q14 4915    /* 0.3 */
-#define LOW_LOSS_Q16 32768   /* 0.5 */
+#define RADIUS_LEAST2_Q22 10481 /* 0.05 squared */
+#define LOW_FROM_Q14 8192       /* 0.5 */
+#define LOW_SPAN_Q14 4915       /* 0.3 */
+#define LOW_LOSS_Q16 32768      /* 0.5 */
 #define PUSH_MAX_MM_Q8 (30 << 8)
 #define PUSH_WEIGHT_Q16 32768 /* 0.5 */
 /* An entry may be off by this, see ih_ellipsoid. */
@@ -67,72 +67,91 @@ void ih_row_prepare(const struct ih_space *space, struct ih_row_rays *out)
     }
 }
 
-/* The gradient's direction and length at a place. */
-struct gradient {
-    int32_t radius_q14;
-    int32_t component_q14[3]; /* s / a, per GRADIENT_MM */
-    int32_t length_q14;
+/* a * b / 2^bits, rounded; the result must fit. */
+static inline uint32_t product_of(uint32_t a, uint32_t b, int bits)
+{
+    return (uint32_t)(((uint64_t)a * b + ((uint64_t)1 << (bits - 1))) >> bits);
+}
+
+static inline int32_t signed_as(uint32_t size, int32_t sign)
+{
+    return sign < 0 ? -(int32_t)size : (int32_t)size;
+}
+
+/* By the semi-axes: 2^45 / a, what makes an offset in Q8 a place, and a place s / a per GRADIENT_MM. */
+struct inverses {
+    uint32_t axis[3];
 };
 
-/* False: it has no direction. */
-static bool find_gradient(const int32_t component_q14[3], uint64_t radius2_q28,
-                          struct gradient *out)
+static struct inverses inverses_of(const struct ih_ellipsoid *ellipsoid)
 {
-    uint64_t length2_q28 = 0;
+    struct inverses inverses;
     for (int axis = 0; axis < 3; axis++) {
-        const int64_t component = component_q14[axis];
-        out->component_q14[axis] = component_q14[axis];
-        length2_q28 += (uint64_t)(component * component);
+        inverses.axis[axis] =
+            (uint32_t)(((uint64_t)1 << 45) / (uint32_t)ellipsoid->semi_mm_q8[axis]);
     }
-    out->radius_q14 = (int32_t)ih_isqrt_u54(radius2_q28);
-    out->length_q14 = (int32_t)ih_isqrt_u54(length2_q28);
-    return out->radius_q14 >= RADIUS_LEAST_Q14;
+    return inverses;
 }
 
-static uint64_t square_q28(const int32_t place_q14[3])
+/* A place's gradient is along s / a; squares of both: within 8 semi-axes below 2^32. */
+struct gradient {
+    int32_t component_q14[3]; /* s / a, per GRADIENT_MM */
+    uint32_t radius2_q22, length2_q22;
+};
+
+static struct gradient gradient_at(const struct inverses *inverses, const int32_t place_q14[3])
 {
-    uint64_t sum = 0;
+    struct gradient g = {.radius2_q22 = 0};
     for (int axis = 0; axis < 3; axis++) {
-        sum += (uint64_t)((int64_t)place_q14[axis] * place_q14[axis]);
+        const uint32_t place = (uint32_t)ih_abs_s32(place_q14[axis]);
+        const uint32_t component = product_of(place, inverses->axis[axis], 31);
+        g.radius2_q22 += product_of(place, place, 6);
+        g.length2_q22 += product_of(component, component, 6);
+        g.component_q14[axis] = signed_as(component, place_q14[axis]);
     }
-    return sum;
+    return g;
 }
 
-/* (f - 1) f */
-static int64_t over_q14(const struct gradient *g)
+/* How far a place is out, and what its row is divided by. */
+struct distance {
+    int32_t residual_mm_q8;
+    uint32_t inverse; /* 2^17 over the gradient's length; below 2^17.4 where there is a weight */
+};
+
+/* Roots from a table: of a square v 2^n from 2^30 on. With r a little below 1 / root, v r is the root but for
+ * 2^-13.7 of it, and half of what its square is short by, times r, is nearly all of that. For 1 over a length r
+ * itself is good enough: a row's slopes have 14 bits. False: the place has no direction. */
+static inline bool find_distance(uint32_t radius2_q22, uint32_t length2_q22, struct distance *out)
 {
-    return ih_mul_shift(g->radius_q14, (int64_t)g->radius_q14 - ONE_Q14, 14);
+    if (radius2_q22 < RADIUS_LEAST2_Q22) {
+        return false;
+    }
+    const int half = __builtin_clz(radius2_q22) / 2;
+    const uint32_t square = radius2_q22 << (2 * half);
+    const uint32_t r_q15 = ih_inverse_root_q15(square);
+    const uint32_t root_q16 = (square >> 16) * r_q15 >> 15;
+    const uint32_t rest = square - root_q16 * root_q16; /* below 2^19.7: the root is short by 10 */
+    const uint32_t root_q20 = root_q16 * 16 + (uint32_t)((uint64_t)rest * r_q15 >> 28);
+    const int32_t radius_q14 = (int32_t)(((root_q20 >> half) + 1) / 2);
+    const int length_half = __builtin_clz(length2_q22) / 2;
+    out->inverse = (ih_inverse_root_q15(length2_q22 << (2 * length_half)) << length_half) >> 3;
+    /* (f - 1) / |grad f|, grad f = (s / a) / f: (f - 1) f over the length, for f up to 5.9 below 2^19.4 */
+    const int64_t over_q14 = ih_mul_shift(radius_q14, radius_q14 - ONE_Q14, 14);
+    out->residual_mm_q8 = (int32_t)ih_mul_shift(over_q14, out->inverse, 17);
+    return true;
 }
 
 bool ih_row_distance(const struct ih_ellipsoid *ellipsoid, const int32_t place_q14[3],
                      int32_t *distance_mm_q8)
 {
-    struct gradient g;
-    int32_t component_q14[3];
-    for (int axis = 0; axis < 3; axis++) {
-        component_q14[axis] = (int32_t)ih_div_round((int64_t)place_q14[axis] * (GRADIENT_MM << 8),
-                                                    ellipsoid->semi_mm_q8[axis]);
-    }
-    if (!find_gradient(component_q14, square_q28(place_q14), &g)) {
+    const struct inverses inverses = inverses_of(ellipsoid);
+    const struct gradient g = gradient_at(&inverses, place_q14);
+    struct distance distance;
+    if (!find_distance(g.radius2_q22, g.length2_q22, &distance)) {
         return false;
     }
-    /* (f - 1) / |grad f|, grad f = (s / a) / f. */
-    *distance_mm_q8 =
-        ih_saturate_s32(ih_div_round(over_q14(&g) * (GRADIENT_MM << 8), g.length_q14));
+    *distance_mm_q8 = distance.residual_mm_q8;
     return true;
-}
-
-/* What a row is divided by: 2^31 / L, of a gradient's length L, 151 and more; below 2^17.4 where there is a
- * weight. It is short by up to 1, 2^-13.6 of it, on the surface 2^-17. */
-static uint32_t inverse_q31(const struct gradient *g)
-{
-    return ((uint32_t)1 << 31) / (uint32_t)g->length_q14;
-}
-
-/* (f - 1) f over the gradient's length, mm; for f up to 5.9 that is below 2^19.4 in Q14. */
-static int32_t find_residual(const struct gradient *g, uint32_t inverse)
-{
-    return (int32_t)ih_mul_shift(over_q14(g), inverse, 17);
 }
 
 #ifdef BY_VECTORS
@@ -208,6 +227,28 @@ static inline lanes ln_slopes(const int32_t *place_q14, const uint32_t *inverse)
                          product_shift(LOAD(inverse), hundredth_q16, 16), 18);
 }
 
+/* What gradient_at and place_of say of offsets, which their places take. */
+static void find_gradients(const struct inverses *inverses, struct ih_rows *rows, int32_t count)
+{
+    for (int32_t k = 0; k < count; k += LANES / 2) {
+        lanes radius2 = ALL_64(0), length2 = ALL_64(0);
+        for (int axis = 0; axis < 3; axis++) {
+            const int64_t inverse = inverses->axis[axis];
+            const lanes all = ALL_64((int64_t)((uint64_t)inverse << 32) | inverse);
+            const lanes off = LOAD(&rows->place_q14[axis][k]);
+            const lanes sign = SIGN_32(off);
+            const lanes place = product_shift(size_of(off), all, 31);
+            const lanes component = product_shift(place, all, 31);
+            radius2 = SUM_32(radius2, product_shift(place, place, 6));
+            length2 = SUM_32(length2, product_shift(component, component, 6));
+            STORE(&rows->place_q14[axis][k], REST_32(FLIP(place, sign), sign));
+            STORE(&rows->component_q14[axis][k], REST_32(FLIP(component, sign), sign));
+        }
+        STORE(&rows->radius2_q22[k], radius2);
+        STORE(&rows->length2_q22[k], length2);
+    }
+}
+
 static void find_slopes(struct ih_rows *rows, int32_t count)
 {
     for (int32_t k = 0; k < count; k += LANES) {
@@ -267,12 +308,12 @@ static void clear_row(struct ih_rows *rows, int32_t at)
     rows->residual_mm_q10[at] = 0;
 }
 
-static void set_slopes(struct ih_rows *rows, const struct gradient *g, uint32_t inverse,
+static void set_slopes(struct ih_rows *rows, const int32_t component_q14[3], uint32_t inverse,
                        const int32_t place_q14[3], uint32_t weight_q16)
 {
     for (int axis = 0; axis < 3; axis++) {
         rows->place_q14[axis][rows->count] = place_q14[axis];
-        rows->component_q14[axis][rows->count] = g->component_q14[axis];
+        rows->component_q14[axis][rows->count] = component_q14[axis];
     }
     rows->inverse[rows->count] = inverse;
     rows->weight_q16[rows->count] = (uint16_t)weight_q16;
@@ -287,17 +328,17 @@ static void set_slope(struct ih_rows *rows, int i, int32_t size, int32_t sign, u
     rows->weighted[i][rows->count] = (int16_t)(sign * weighted);
 }
 
-static void set_slopes(struct ih_rows *rows, const struct gradient *g, uint32_t inverse,
+static void set_slopes(struct ih_rows *rows, const int32_t component_q14[3], uint32_t inverse,
                        const int32_t place_q14[3], uint32_t weight_q16)
 {
-    const int64_t ln_inverse = ih_mul_shift(inverse, LN_HUNDREDTH_Q16, 16);
+    const uint32_t ln_inverse = product_of(inverse, LN_HUNDREDTH_Q16, 16);
     for (int axis = 0; axis < 3; axis++) {
-        const int32_t component_q14 = g->component_q14[axis];
-        const int32_t slope = (int32_t)ih_mul_shift(ih_abs_s32(component_q14), inverse, 17);
-        const int64_t square_q14 = ih_mul_shift(place_q14[axis], place_q14[axis], 14);
-        const int32_t ln_slope = (int32_t)ih_mul_shift(square_q14, ln_inverse, 18);
+        const uint32_t size = (uint32_t)ih_abs_s32(component_q14[axis]);
+        const uint32_t place = (uint32_t)ih_abs_s32(place_q14[axis]);
+        const int32_t slope = (int32_t)product_of(size, inverse, 17);
+        const int32_t ln_slope = (int32_t)product_of(product_of(place, place, 14), ln_inverse, 18);
         IH_IN_RANGE(ln_slope, 0, IH_RANGE_SLOPE_Q13);
-        set_slope(rows, axis, ih_min_s32(slope, CENTRE_MOST), component_q14 < 0 ? -1 : 1,
+        set_slope(rows, axis, ih_min_s32(slope, CENTRE_MOST), component_q14[axis] < 0 ? -1 : 1,
                   weight_q16);
         set_slope(rows, 3 + axis, ln_slope, 1, weight_q16);
     }
@@ -368,12 +409,18 @@ static void scale_system(struct ih_row_system *system)
     }
 }
 
-static void add_row(struct ih_rows *rows, struct ih_row_system *system, const struct gradient *g,
-                    uint32_t inverse, const int32_t place_q14[3], int32_t residual_mm_q8,
-                    int32_t weight_q16)
+static int16_t residual_of(int32_t weight_q16, int32_t residual_mm_q8)
 {
-    set_slopes(rows, g, inverse, place_q14, (uint32_t)ih_min_s32(weight_q16, UINT16_MAX));
-    rows->residual_mm_q10[rows->count] = (int16_t)ih_mul_shift(weight_q16, residual_mm_q8, 14);
+    return (int16_t)ih_mul_shift(weight_q16, residual_mm_q8, 14);
+}
+
+static void add_row(struct ih_rows *rows, struct ih_row_system *system,
+                    const int32_t component_q14[3], const struct distance *distance,
+                    const int32_t place_q14[3], int32_t weight_q16)
+{
+    set_slopes(rows, component_q14, distance->inverse, place_q14,
+               (uint32_t)ih_min_s32(weight_q16, UINT16_MAX));
+    rows->residual_mm_q10[rows->count] = residual_of(weight_q16, distance->residual_mm_q8);
     rows->count++;
     if (rows->count == IH_ROW_MAX) {
         flush_rows(rows, system);
@@ -435,10 +482,11 @@ struct step {
     const struct ih_ellipsoid *ellipsoid;
     const int32_t *origin_mm_q8;
     struct ih_shares shares;
+    struct inverses inverses;
     struct ih_ellipsoid_box box; /* rays that may hit it pass through */
     int32_t scale_mm, see_through_mm;
     int32_t reach_mm_q8[3]; /* points farther from the centre have no weight */
-    uint64_t reach2_q28;    /* nor has what is farther in semi-axes, squared */
+    uint32_t reach2_q22;    /* nor has what is farther in semi-axes, squared */
     int32_t front_mm_q8;    /* nothing is entered before */
 };
 
@@ -454,11 +502,12 @@ static void begin_step(struct step *step, const struct ih_row_rays *rays)
         ih_div_round((int64_t)ROBUST_REACH * step->scale_mm * (ONE_Q14 << 8), shortest_q8);
     most_q14 += most_q14 / 64;
     step->shares = ih_ellipsoid_shares(semi_mm_q8);
+    step->inverses = inverses_of(ellipsoid);
     step->box = ih_ellipsoid_box(ellipsoid, rays->slope_most_q20, ONE_Q14);
     for (int axis = 0; axis < 3; axis++) {
         step->reach_mm_q8[axis] = (int32_t)ih_mul_shift(most_q14, semi_mm_q8[axis], 14);
     }
-    step->reach2_q28 = (uint64_t)(most_q14 * most_q14);
+    step->reach2_q22 = (uint32_t)(most_q14 * most_q14 >> 6);
     step->front_mm_q8 =
         ellipsoid->centre_mm_q8[2] - semi_mm_q8[2] - FRONT_MM_Q8 + step->see_through_mm * 256;
 }
@@ -558,32 +607,77 @@ static void flag_rays(const struct bounds *bounds, struct ih_row_scratch *scratc
 }
 #endif
 
+#ifdef BY_VECTORS
+/* What points weigh of which rows have the offsets. Of what has no weight nothing is left. */
+static void weigh_points(const struct step *step, struct ih_rows *rows)
+{
+    find_gradients(&step->inverses, rows, rows->count);
+    for (int32_t k = 0; k < rows->count; k++) {
+        struct distance distance = {0, 0};
+        int32_t weight_q16 = 0;
+        if (rows->radius2_q22[k] <= step->reach2_q22 &&
+            find_distance(rows->radius2_q22[k], rows->length2_q22[k], &distance)) {
+            weight_q16 = lowered_q16(robust_weight_q16(distance.residual_mm_q8, step->scale_mm),
+                                     rows->place_q14[1][k]);
+        }
+        rows->inverse[k] = weight_q16 > 0 ? distance.inverse : 0;
+        rows->weight_q16[k] = (uint16_t)ih_min_s32(weight_q16, UINT16_MAX);
+        rows->residual_mm_q10[k] =
+            weight_q16 > 0 ? residual_of(weight_q16, distance.residual_mm_q8) : (int16_t)0;
+    }
+}
+
+static void add_offset(const struct step *step, const int32_t off_q8[3], struct ih_rows *rows,
+                       struct ih_row_system *system)
+{
+    for (int axis = 0; axis < 3; axis++) {
+        rows->place_q14[axis][rows->count] = off_q8[axis];
+    }
+    rows->count++;
+    if (rows->count == IH_ROW_MAX) {
+        weigh_points(step, rows);
+        flush_rows(rows, system);
+    }
+}
+#else
+static void weigh_points(const struct step *step, struct ih_rows *rows)
+{
+    (void)step;
+    (void)rows;
+}
+
+static void add_offset(const struct step *step, const int32_t off_q8[3], struct ih_rows *rows,
+                       struct ih_row_system *system)
+{
+    int32_t place_q14[3];
+    struct distance distance;
+    for (int axis = 0; axis < 3; axis++) {
+        const uint32_t off = (uint32_t)ih_abs_s32(off_q8[axis]);
+        place_q14[axis] = signed_as(product_of(off, step->inverses.axis[axis], 31), off_q8[axis]);
+    }
+    const struct gradient g = gradient_at(&step->inverses, place_q14);
+    if (g.radius2_q22 <= step->reach2_q22 &&
+        find_distance(g.radius2_q22, g.length2_q22, &distance)) {
+        const int32_t weight_q16 = robust_weight_q16(distance.residual_mm_q8, step->scale_mm);
+        if (weight_q16 > 0) {
+            add_row(rows, system, g.component_q14, &distance, place_q14,
+                    lowered_q16(weight_q16, place_q14[1]));
+        }
+    }
+}
+#endif
+
 static void add_point(const struct step *step, const struct ih_ray *ray, struct ih_rows *rows,
                       struct ih_row_system *system)
 {
-    const struct ih_ellipsoid *ellipsoid = step->ellipsoid;
-    int32_t place_q14[3];
-    int32_t component_q14[3];
-    struct gradient g;
+    int32_t off_q8[3];
     for (int axis = 0; axis < 3; axis++) {
-        const int32_t off_q8 = ray->point_mm_q8[axis] - ellipsoid->centre_mm_q8[axis];
-        if (ih_abs_s32(off_q8) > step->reach_mm_q8[axis]) {
+        off_q8[axis] = ray->point_mm_q8[axis] - step->ellipsoid->centre_mm_q8[axis];
+        if (ih_abs_s32(off_q8[axis]) > step->reach_mm_q8[axis]) {
             return;
         }
-        place_q14[axis] = ih_share(step->shares.share_q50[axis], off_q8);
-        component_q14[axis] = ih_share(step->shares.share_q50[axis], place_q14[axis]);
     }
-    const uint64_t radius2_q28 = square_q28(place_q14);
-    if (radius2_q28 > step->reach2_q28 || !find_gradient(component_q14, radius2_q28, &g)) {
-        return;
-    }
-    const uint32_t inverse = inverse_q31(&g);
-    const int32_t residual_mm_q8 = find_residual(&g, inverse);
-    const int32_t weight_q16 = robust_weight_q16(residual_mm_q8, step->scale_mm);
-    if (weight_q16 > 0) {
-        add_row(rows, system, &g, inverse, place_q14, residual_mm_q8,
-                lowered_q16(weight_q16, place_q14[1]));
-    }
+    add_offset(step, off_q8, rows, system);
 }
 
 /* A point seen behind the ellipsoid, through it. */
@@ -591,9 +685,7 @@ static void add_push(const struct step *step, const struct ih_ray *ray, struct i
                      struct ih_row_system *system)
 {
     const struct ih_ellipsoid *ellipsoid = step->ellipsoid;
-    int32_t component_q14[3];
     struct ih_crossing crossing;
-    struct gradient g;
     if (ray->point_mm_q8[2] < step->front_mm_q8 ||
         !ih_ellipsoid_in_box(ellipsoid, &step->box, step->origin_mm_q8, ray)) {
         return;
@@ -604,15 +696,20 @@ static void add_push(const struct step *step, const struct ih_ray *ray, struct i
         ray->point_mm_q8[2] - step->see_through_mm * 256 <= crossing.entry_mm_q8) {
         return;
     }
-    for (int axis = 0; axis < 3; axis++) {
-        component_q14[axis] = ih_share(step->shares.share_q50[axis], crossing.nearest_q14[axis]);
+    const struct gradient g = gradient_at(&step->inverses, crossing.nearest_q14);
+    struct distance distance;
+    if (find_distance(g.radius2_q22, g.length2_q22, &distance)) {
+        distance.residual_mm_q8 = ih_max_s32(distance.residual_mm_q8, -PUSH_MAX_MM_Q8);
+        add_row(rows, system, g.component_q14, &distance, crossing.nearest_q14, PUSH_WEIGHT_Q16);
     }
-    if (find_gradient(component_q14, square_q28(crossing.nearest_q14), &g)) {
-        const uint32_t inverse = inverse_q31(&g);
-        const int32_t residual_mm_q8 = find_residual(&g, inverse);
-        add_row(rows, system, &g, inverse, crossing.nearest_q14,
-                ih_max_s32(residual_mm_q8, -PUSH_MAX_MM_Q8), PUSH_WEIGHT_Q16);
-    }
+}
+
+/* Of eight rays, a byte each. */
+static uint64_t flags_of(const struct ih_row_scratch *scratch, int32_t first, uint8_t flag)
+{
+    uint64_t flags;
+    memcpy(&flags, &scratch->flag[first], sizeof flags);
+    return flags & flag * (UINT64_MAX / UINT8_MAX);
 }
 
 void ih_row_collect(const struct ih_space *space, const struct ih_ellipsoid *ellipsoid,
@@ -623,21 +720,25 @@ void ih_row_collect(const struct ih_space *space, const struct ih_ellipsoid *ell
                         .origin_mm_q8 = space->origin_mm_q8,
                         .scale_mm = scale_mm,
                         .see_through_mm = see_through_mm};
-    begin_step(&step, &scratch->rays);
     struct bounds bounds;
+    begin_step(&step, &scratch->rays);
     find_bounds(&step, &bounds);
     flag_rays(&bounds, scratch);
     memset(out, 0, sizeof *out);
     scratch->rows.count = 0;
-    for (int32_t first = 0; first < IH_SLOTS; first += 8) {
-        uint64_t any; /* of eight slots */
-        memcpy(&any, &scratch->flag[first], sizeof any);
-        for (int32_t slot = first; any != 0 && slot < ih_min_s32(first + 8, IH_SLOTS); slot++) {
-            const uint8_t flag = scratch->flag[slot];
-            if ((flag & FLAG_POINT) != 0) {
+    for (int32_t first = 0; first < IH_ROW_RAYS; first += 8) {
+        const uint64_t points = flags_of(scratch, first, FLAG_POINT);
+        for (int32_t slot = first; points != 0 && slot < first + 8; slot++) {
+            if ((scratch->flag[slot] & FLAG_POINT) != 0) {
                 add_point(&step, &space->ray[slot], &scratch->rows, out);
             }
-            if ((flag & FLAG_PUSH) != 0) {
+        }
+    }
+    weigh_points(&step, &scratch->rows);
+    for (int32_t first = 0; first < IH_ROW_RAYS; first += 8) {
+        const uint64_t pushes = flags_of(scratch, first, FLAG_PUSH);
+        for (int32_t slot = first; pushes != 0 && slot < first + 8; slot++) {
+            if ((scratch->flag[slot] & FLAG_PUSH) != 0) {
                 add_push(&step, &space->ray[slot], &scratch->rows, out);
             }
         }

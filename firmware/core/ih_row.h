@@ -7,14 +7,15 @@
  *        vectors of 16 bits, for more rather than for fewer; of what is left each is looked at as
  *        ih_fit.h says. Rows are kept until there are IH_ROW_MAX, then their products are summed in
  *        vectors; sums are exact until all rows are in them: the order is nobody's business.
- *        Quotients by a semi-axis are products with an inverse that is worked out once, equal to
- *        ih_div_round's to the last bit (ih_share); by the gradient's length with one of 32 bits.
+ *        Quotients by a semi-axis are products with an inverse of 32 bits. The root of a place's square and
+ *        one over the gradient's length come from the table of ih_fix, the root with one correction: within
+ *        a unit of Q14, 2^-13.7.
  * Overflow: as in ih_fit.h. Rows have 16 bits: slopes by the centre are at most 1 (Q14), by ln below 3.6
  *        (Q13), weighted residuals 15 mm at most, of a push (Q10). A product is below 1 * 1 in Q28, 2.6 in
  *        Q26, 1.6 in Q27 or 15 in Q24: 2^28.
  * Cost:  5 comparisons of 16 bits twice for each of 361 rays, a step (without vectors most rays need one or
- *        two); two roots for a point in reach; for one with a weight three divisions, 12 products, and 27 of
- *        16 bits. About 85 points a step are in reach, 70 have a weight.
+ *        two); 12 products of 32 bits, in vectors, and two roots for a point in reach; for one with a weight
+ *        three divisions, 12 products, and 27 of 16 bits. About 85 points a step are in reach, 70 have a weight.
  */
 #ifndef IH_ROW_H
 #define IH_ROW_H
@@ -23,7 +24,7 @@
 #include "ih_ellipsoid.h"
 
 #define IH_FIT_UNKNOWNS 6
-/* Rows that are summed at once; each costs 26 bytes, on x86-64 56. */
+/* Rows that are summed at once; each costs 26 bytes, on x86-64 64. */
 #define IH_ROW_MAX 128
 /* The slots in whole vectors. */
 #define IH_ROW_RAYS ((IH_SLOTS + 15) / 16 * 16)
@@ -44,7 +45,7 @@ struct ih_rows {
 #ifdef __x86_64__
     /* What slopes are made of (ih_row.c), vectors at once. */
     int32_t place_q14[3][IH_ROW_MAX], component_q14[3][IH_ROW_MAX];
-    uint32_t inverse[IH_ROW_MAX];
+    uint32_t radius2_q22[IH_ROW_MAX], length2_q22[IH_ROW_MAX], inverse[IH_ROW_MAX];
     uint16_t weight_q16[IH_ROW_MAX];
 #endif
     /* By unknown, with 14 bits by the centre and 13 by ln of the axes; and residuals. */

@@ -1,5 +1,5 @@
-/* ih_row against the plain way: every point, divisions, whole roots, one product after the other. To
- * the last bit. */
+/* ih_row against the plain way: every point, one product after the other, without vectors. To the last
+ * bit. */
 #include "ih_row.h"
 
 #include <stdlib.h>
@@ -19,48 +19,67 @@ void tearDown(void)
 {
 }
 
+/* a b / 2^bits, rounded, of sizes. */
+static int64_t plain_product(int64_t a, int64_t b, int bits)
+{
+    return (llabs(a) * llabs(b) + (1LL << (bits - 1))) >> bits;
+}
+
 /* One point's or push's row, from its place and gradient. */
 struct plain {
-    int64_t radius_q14, length_q14, component_q14[3];
+    int64_t component_q14[3], residual_mm_q8, inverse;
 };
+
+/* What is put before a root of 32 bits, twice as many zeros as this. */
+static int zeros_of(int64_t square)
+{
+    int half = 0;
+
+    while (square << (2 * half) < 1LL << 30) {
+        half++;
+    }
+    return half;
+}
 
 static bool plain_gradient(const struct ih_ellipsoid *e, const int32_t place[3], struct plain *out)
 {
-    int64_t radius2 = 0, length2 = 0;
-    int axis;
+    int64_t radius2 = 0, length2 = 0, square, r, root, radius;
+    int axis, half;
 
     for (axis = 0; axis < 3; axis++) {
-        out->component_q14[axis] = ih_div_round((int64_t)place[axis] * 16384, e->semi_mm_q8[axis]);
-        radius2 += (int64_t)place[axis] * place[axis];
-        length2 += out->component_q14[axis] * out->component_q14[axis];
+        const int64_t size = plain_product(place[axis], (1LL << 45) / e->semi_mm_q8[axis], 31);
+
+        out->component_q14[axis] = place[axis] < 0 ? -size : size;
+        radius2 += plain_product(place[axis], place[axis], 6);
+        length2 += plain_product(size, size, 6);
     }
-    out->radius_q14 = ih_isqrt_u64((uint64_t)radius2);
-    out->length_q14 = ih_isqrt_u64((uint64_t)length2);
-    return out->radius_q14 >= 819;
-}
-
-static int64_t inverse_of(const struct plain *g)
-{
-    return (1LL << 31) / g->length_q14;
-}
-
-static int64_t plain_distance(const struct plain *g)
-{
-    return ih_mul_shift(ih_mul_shift(g->radius_q14, g->radius_q14 - 16384, 14), inverse_of(g), 17);
+    if (radius2 < 10481) {
+        return false;
+    }
+    half = zeros_of(radius2);
+    square = radius2 << (2 * half);
+    r = ih_inverse_root_q15((uint32_t)square);
+    root = (square >> 16) * r >> 15;
+    radius = ((root * 16 + ((square - root * root) * r >> 28)) >> half) + 1;
+    radius /= 2;
+    half = zeros_of(length2);
+    out->inverse = (int64_t)ih_inverse_root_q15((uint32_t)(length2 << (2 * half))) << half >> 3;
+    out->residual_mm_q8 = ih_mul_shift(ih_mul_shift(radius, radius - 16384, 14), out->inverse, 17);
+    return true;
 }
 
 /* Sums with all bits of the products; the right side's are scaled by the caller. */
 static void plain_add(struct ih_row_system *system, const struct plain *g, const int32_t place[3],
                       int64_t residual, int64_t weight)
 {
-    const int64_t ln_inverse = ih_mul_shift(inverse_of(g), 41943, 16);
+    const int64_t ln_inverse = ih_mul_shift(g->inverse, 41943, 16);
     int64_t slope[6];
     int i, j, at = 0;
 
     for (i = 0; i < 3; i++) {
         const int64_t s2 = ih_mul_shift(place[i], place[i], 14);
 
-        slope[i] = ih_mul_shift(llabs(g->component_q14[i]), inverse_of(g), 17);
+        slope[i] = ih_mul_shift(llabs(g->component_q14[i]), g->inverse, 17);
         slope[i] = slope[i] > 16383 ? 16383 : slope[i];
         slope[i] = g->component_q14[i] < 0 ? -slope[i] : slope[i];
         slope[3 + i] = ih_mul_shift(s2, ln_inverse, 18);
@@ -104,7 +123,7 @@ static int64_t plain_weight(int64_t residual, int64_t scale, int32_t down)
     return ih_mul_shift(ih_div_round((int64_t)1 << 48, sum * sum), low, 16);
 }
 
-/* In the ellipsoid's units, by divisions. */
+/* In the ellipsoid's units. */
 static bool plain_place(const struct ih_ellipsoid *e, const int32_t point_mm_q8[3],
                         int32_t place[3])
 {
@@ -112,12 +131,14 @@ static bool plain_place(const struct ih_ellipsoid *e, const int32_t point_mm_q8[
 
     for (axis = 0; axis < 3; axis++) {
         const int64_t offset = (int64_t)point_mm_q8[axis] - e->centre_mm_q8[axis];
-        const int64_t quotient = ih_div_round(offset * 16384, e->semi_mm_q8[axis]);
+        const int64_t size = llabs(offset) > 1 << 23
+                                 ? INT32_MAX
+                                 : plain_product(offset, (1LL << 45) / e->semi_mm_q8[axis], 31);
 
-        if (quotient < -8 * 16384 || quotient > 8 * 16384) {
+        if (size > 8 * 16384) {
             return false;
         }
-        place[axis] = (int32_t)quotient;
+        place[axis] = (int32_t)(offset < 0 ? -size : size);
     }
     return true;
 }
@@ -139,7 +160,7 @@ static int32_t plain_collect(const struct ih_ellipsoid *e, int32_t scale_mm, int
             continue;
         }
         if (plain_place(e, ray->point_mm_q8, place) && plain_gradient(e, place, &g)) {
-            const int64_t residual = plain_distance(&g);
+            const int64_t residual = g.residual_mm_q8;
             const int64_t weight = plain_weight(residual, scale_mm, place[1]);
 
             if (weight > 0) {
@@ -150,7 +171,7 @@ static int32_t plain_collect(const struct ih_ellipsoid *e, int32_t scale_mm, int
         if (ih_test_cross(e, space.origin_mm_q8, ray, &crossing) && crossing.radius2_q14 < 16384 &&
             ray->point_mm_q8[2] - see_through_mm * 256 > crossing.entry_mm_q8 &&
             plain_gradient(e, crossing.nearest_q14, &g)) {
-            const int64_t residual = plain_distance(&g);
+            const int64_t residual = g.residual_mm_q8;
 
             plain_add(out, &g, crossing.nearest_q14, residual < -30 * 256 ? -30 * 256 : residual,
                       32768);

@@ -32,12 +32,12 @@ static void inverse_roots_are_as_close_as_may_be(void)
 {
     int i;
 
-    TEST_ASSERT_EQUAL_INT(193, IH_TEST_COUNT(root_inverse_q15));
+    TEST_ASSERT_EQUAL_INT(193, IH_TEST_COUNT(ih_root_inverse_q15));
     for (i = 64; i <= 256; i++) {
         const double before = i > 64 ? chord_above(i - 1) : 0;
         const double behind = i < 256 ? chord_above(i) : 0;
 
-        IH_TEST_EQUAL(floor(root_inverse(i) - fmax(before, behind)), root_inverse_q15[i - 64],
+        IH_TEST_EQUAL(floor(root_inverse(i) - fmax(before, behind)), ih_root_inverse_q15[i - 64],
                       "entry", i);
     }
 }
@@ -49,11 +49,11 @@ static void inverse_roots_are_never_too_great(void)
     uint32_t i;
 
     for (i = 64; i < 256; i++) { /* an entry is read as it stands */
-        IH_TEST_EQUAL(root_inverse_q15[i - 64], inverse_root_q15(i << 24), "entry", i);
+        IH_TEST_EQUAL(ih_root_inverse_q15[i - 64], ih_inverse_root_q15(i << 24), "entry", i);
     }
     for (m_q32 = UINT64_C(1) << 30; m_q32 <= UINT32_MAX; m_q32 += 4093) {
         const double exact = 32768 / sqrt(ldexp((double)m_q32, -32));
-        const double off = 1 - inverse_root_q15((uint32_t)m_q32) / exact;
+        const double off = 1 - ih_inverse_root_q15((uint32_t)m_q32) / exact;
 
         if (off < 0 || off > exp2(-13.7)) {
             IH_TEST_WITHIN(exp2(-14.7), exp2(-14.7), off, "inverse root too small", (int64_t)m_q32);

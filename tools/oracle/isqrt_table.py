@@ -52,7 +52,7 @@ def main():
         print(", ".join(str(entry) for entry in table()))
         return 0
     with open(sys.argv[2], encoding="utf-8") as file:
-        found = re.search(r"root_inverse_q15\[\] = \{(.*?)\}", file.read(), re.S)
+        found = re.search(r"root_inverse_q15\[193\] = \{(.*?)\}", file.read(), re.S)
     entries = [int(word) for word in re.findall(r"\d+", found[1])]
     most, least = worst_shortness(entries)
     print("isqrt_table: %d entries, short by %.3g to %.3g (2^%.2f)" % (len(entries), least, most, np.log2(most)))
