@@ -23,7 +23,30 @@ void ih_hypotheses_params_default(struct ih_hypotheses_params *params)
     params->tip_max_mm = 70;
     params->depth_max_mm = 110;
     params->end_depth_mm = 50;
+    params->gap_max = 3;
+    params->free_mm = 200;
+    params->free_behind_mm = 80;
+    params->is_tip_any = true;
+    params->is_merging = true;
+}
+
+void ih_hypotheses_params_paper(struct ih_hypotheses_params *params)
+{
+    ih_hypotheses_params_default(params);
+    params->ellipse.point_count = IH_PARTS_POINTS_MAX;
     params->gap_max = 8;
+    params->free_mm = 0;
+    params->is_tip_any = false;
+    params->is_merging = false;
+}
+
+/* A grid step at a depth. Depth below 2^23 and unit below 2^26 (a pitch of half a radian): below
+ * 2^29. */
+static int64_t step_mm_q16(const struct ih_surface *surface, int32_t depth_mm_q8)
+{
+    return ih_div_round(ih_mul_shift(depth_mm_q8, surface->field.unit_q28, 20) *
+                            IH_SURFACE_STEP_NUMERATOR,
+                        IH_SURFACE_STEP_DENOMINATOR);
 }
 
 /* A minimum is nearer than its 8 neighbours; of equal nodes the first in reading order. */
@@ -65,47 +88,83 @@ static void add_nest(struct ih_hypotheses *out, int32_t x, int32_t y, int32_t de
     nest->tip_level_mm_q8 = depth_mm_q8;
 }
 
-static void find_minima(const struct ih_surface *surface, struct ih_hypotheses *out)
+/* Does the surface fall off this way from the node, or end, within the steps? */
+static bool falls_off(const struct ih_surface *surface, int32_t x, int32_t y, int32_t right,
+                      int32_t down, int32_t steps, int32_t behind_mm_q8)
+{
+    const int32_t limit_mm_q8 = surface->depth_mm_q8[y][x] + behind_mm_q8;
+    int32_t i = 1;
+    for (; i <= steps; i++) {
+        x += right;
+        y += down;
+        if (x < 0 || x == IH_SURFACE_GRID || y < 0 || surface->depth_mm_q8[y][x] > limit_mm_q8) {
+            break;
+        }
+    }
+    return i <= steps;
+}
+
+/* May a head be in front here? */
+static bool is_free(const struct ih_surface *surface, int32_t x, int32_t y,
+                    const struct ih_hypotheses_params *params)
+{
+    if (params->free_mm == 0) {
+        return true;
+    }
+    const int64_t step_q16 = step_mm_q16(surface, surface->depth_mm_q8[y][x]);
+    const int64_t reach = ((int64_t)params->free_mm << 16) / (step_q16 > 0 ? step_q16 : 1);
+    const int32_t steps = ih_min_s32(ih_saturate_s32(reach), IH_SURFACE_GRID);
+    const int32_t behind_mm_q8 = params->free_behind_mm << 8;
+    return falls_off(surface, x, y, -1, 0, steps, behind_mm_q8) &&
+           falls_off(surface, x, y, 1, 0, steps, behind_mm_q8) &&
+           falls_off(surface, x, y, 0, -1, steps, behind_mm_q8);
+}
+
+static void find_minima(const struct ih_surface *surface, const struct ih_hypotheses_params *params,
+                        struct ih_hypotheses *out)
 {
     for (int32_t y = 1; y < IH_SURFACE_GRID - 1; y++) {
         for (int32_t x = 1; x < IH_SURFACE_GRID - 1; x++) {
-            if (is_minimum(surface, x, y)) {
+            if (is_minimum(surface, x, y) && is_free(surface, x, y, params)) {
                 add_nest(out, x, y, surface->depth_mm_q8[y][x]);
             }
         }
     }
 }
 
-/* Area of an ellipse at a depth in mm^2. One grid step is depth * unit * 10 / 11. Depth below
- * 2^23 and unit below 2^26 (a pitch of half a radian): the step below 2^29 in Q16, its square in
- * Q16 below 2^42 for areas below 2^(11 + 16). Real ones are 2^20 times smaller. */
+/* Area of an ellipse at a depth in mm^2: the square of a step below 2^42 in Q16, for areas below
+ * 2^(11 + 16). Real ones are 2^20 times smaller. */
 static int32_t area_mm2(const struct ih_surface *surface, int32_t level_mm_q8, int64_t area_q16)
 {
-    int64_t step_q16 = ih_div_round(ih_mul_shift(level_mm_q8, surface->field.unit_q28, 20) *
-                                        IH_SURFACE_STEP_NUMERATOR,
-                                    IH_SURFACE_STEP_DENOMINATOR);
+    int64_t step_q16 = step_mm_q16(surface, level_mm_q8);
     int64_t square_q16 = ih_mul_shift(step_q16, step_q16, 16);
     return ih_saturate_s32(ih_mul_wide_shift(square_q16, (uint32_t)area_q16, 32));
 }
 
 /* What a contour is for every nest that it surrounds. */
 struct study {
-    bool whole; /* a closed contour that is an ellipse */
+    bool whole;  /* a closed contour that is an ellipse */
+    bool is_tip; /* a closed contour that may have any shape, but supports a nest's tip alone */
     bool is_searched;
     struct ih_ellipse ellipse;
 };
 
-static struct study study_contour(const struct ih_contour *contour,
-                                  const struct ih_ellipse_params *params,
+static struct study study_contour(const struct ih_surface *surface,
+                                  const struct ih_contour *contour,
+                                  const struct ih_hypotheses_params *params,
                                   struct ih_hypotheses_scratch *scratch)
 {
     struct study study = {.is_searched = false};
-    study.whole = contour->closed &&
-                  ih_ellipse_of_contour(&scratch->cuts, contour, &study.ellipse) &&
-                  study.ellipse.shape_q16 <= params->shape_max_q16 &&
-                  study.ellipse.ratio_q16 <= params->ratio_closed_max_q16;
-    if (!study.whole) {
-        study.is_searched = ih_parts_make(&scratch->cuts, contour, params, &scratch->parts);
+    if (contour->closed && ih_ellipse_of_contour(&scratch->cuts, contour, &study.ellipse)) {
+        study.whole = study.ellipse.shape_q16 <= params->ellipse.shape_max_q16 &&
+                      study.ellipse.ratio_q16 <= params->ellipse.ratio_closed_max_q16;
+        study.is_tip = !study.whole && params->is_tip_any && study.ellipse.area_q16 > 0 &&
+                       area_mm2(surface, scratch->cuts.level_mm_q8, study.ellipse.area_q16) <
+                           params->blunt_mm2;
+    }
+    if (!study.whole && !study.is_tip) {
+        study.is_searched =
+            ih_parts_make(&scratch->cuts, contour, &params->ellipse, &scratch->parts);
     }
     return study;
 }
@@ -118,25 +177,32 @@ static bool surrounds(const struct ih_cuts *cuts, const struct ih_contour *conto
            (!contour->closed || ih_ellipse_winding(cuts, contour, minimum) == 1);
 }
 
-static void take_support(const struct study *study, const struct ih_ellipse_params *params,
-                         struct ih_hypotheses_scratch *scratch, struct ih_vertex minimum,
+static void take_support(const struct study *study, int32_t contour,
+                         const struct ih_hypotheses_params *params,
+                         struct ih_hypotheses_scratch *scratch, const struct ih_nest *nest,
                          struct ih_support *support)
 {
     struct ih_ellipse part;
-    if (study->whole) {
-        *support = (struct ih_support){
-            .wanted = true, .found = true, .whole = true, .ellipse = study->ellipse};
+    if (study->whole || (study->is_tip && nest->slice_count == 0)) {
+        *support = (struct ih_support){.wanted = true,
+                                       .found = true,
+                                       .whole = true,
+                                       .contour = contour,
+                                       .ellipse = study->ellipse};
     } else if (study->is_searched &&
-               ih_ellipse_of_part(&scratch->parts, minimum, params, &scratch->ellipse, &part) &&
+               ih_ellipse_of_part(&scratch->parts, nest->minimum, &params->ellipse,
+                                  &scratch->ellipse, &part) &&
                (!support->found || part.merit_q8 > support->ellipse.merit_q8)) {
-        *support = (struct ih_support){.wanted = true, .found = true, .ellipse = part};
+        *support =
+            (struct ih_support){.wanted = true, .found = true, .contour = contour, .ellipse = part};
     }
 }
 
 /* The ellipses that support the nests at this level: the closed contour around a minimum when it is
  * one, else the best elliptical part of that contour or of an open one. A contour is studied when
  * the first nest asks for it. */
-static void find_supports(const struct ih_hypotheses *nests, const struct ih_ellipse_params *params,
+static void find_supports(const struct ih_surface *surface, const struct ih_hypotheses *nests,
+                          const struct ih_hypotheses_params *params,
                           struct ih_hypotheses_scratch *scratch)
 {
     const struct ih_cuts *cuts = &scratch->cuts;
@@ -147,15 +213,16 @@ static void find_supports(const struct ih_hypotheses *nests, const struct ih_ell
         bool is_studied = false;
         for (int32_t i = 0; i < nests->nest_count; i++) {
             struct ih_support *support = &scratch->support[i];
-            const struct ih_vertex minimum = nests->nest[i].minimum;
-            if (!support->wanted || support->whole || !surrounds(cuts, contour, &box, minimum)) {
+            const struct ih_nest *nest = &nests->nest[i];
+            if (!support->wanted || support->whole ||
+                !surrounds(cuts, contour, &box, nest->minimum)) {
                 continue;
             }
             if (!is_studied) {
-                study = study_contour(contour, params, scratch);
+                study = study_contour(surface, contour, params, scratch);
                 is_studied = true;
             }
-            take_support(&study, params, scratch, minimum, support);
+            take_support(&study, c, params, scratch, nest, support);
         }
     }
 }
@@ -258,15 +325,41 @@ static bool open_nests(int32_t level_mm_q8, const struct ih_hypotheses_params *p
     return any;
 }
 
+/* Has the level the same ellipse for both? A part has the same area about any place. */
+static bool are_same(const struct ih_support *a, const struct ih_support *b)
+{
+    return a->found && b->found && a->contour == b->contour &&
+           a->ellipse.area_q16 == b->ellipse.area_q16;
+}
+
+/* Nests are sorted by depth: the first of several goes on. */
+static void merge_nests(const struct ih_support support[IH_HYPOTHESES_MAX],
+                        struct ih_hypotheses *out)
+{
+    for (int32_t i = 1; i < out->nest_count; i++) {
+        struct ih_nest *nest = &out->nest[i];
+        for (int32_t k = 0; k < i && !nest->ended; k++) {
+            if (!out->nest[k].ended && are_same(&support[i], &support[k])) {
+                nest->ended = true;
+                nest->slice_count = 0;
+                nest->front_mm_q8 = nest->nearest_mm_q8;
+            }
+        }
+    }
+}
+
 static void extend_nests(const struct ih_surface *surface, int32_t level_mm_q8,
                          const struct ih_hypotheses_params *params,
                          struct ih_hypotheses_scratch *scratch, struct ih_hypotheses *out)
 {
-    find_supports(out, &params->ellipse, scratch);
+    find_supports(surface, out, params, scratch);
     for (int32_t i = 0; i < out->nest_count; i++) {
         if (scratch->support[i].wanted) {
             extend_nest(surface, level_mm_q8, params, &scratch->support[i], &out->nest[i]);
         }
+    }
+    if (params->is_merging) {
+        merge_nests(scratch->support, out);
     }
 }
 
@@ -299,7 +392,7 @@ void ih_hypotheses_find(const struct ih_surface *surface, const struct ih_hypoth
     if (!surface->valid) {
         return;
     }
-    find_minima(surface, out);
+    find_minima(surface, params, out);
     int32_t level_mm_q8;
     for (int32_t index = 0;
          ih_hypotheses_level(surface, params, index, &level_mm_q8) && any_alive(out); index++) {

@@ -11,6 +11,12 @@
  *        where the area grows past blunt_mm2. A nest ends depth_max behind its front, when its area
  *        falls below 0.6 of the slice before, when it jumps by more than 3.2 times and 2500 mm^2
  *        beyond end_depth, or after gap_max levels without support.
+ * Fewer: ours; with everything on a nest is one candidate and one piece of evidence of many, so less will
+ *        do (not with ih_hypotheses_params_paper). A head stands out: to the left, to the right and above a
+ *        minimum the surface falls off, or ends, within free_mm, else it is a fold of clothes or the
+ *        background's, and starts no nest. A closed contour smaller than blunt_mm2 is the tip's whatever
+ *        its shape, and no part of it is searched for. Nests that have come to the same ellipse are the
+ *        same thing from there on: the nearest goes on, the others end without slices. And gap_max is 3.
  * Cost:  levels x (cells + minima x contours); the chord search only where no whole ellipse is.
  * Full tables drop and count: minima_dropped (the farthest), contours_dropped (at levels
  * that a nest waits for: others are not cut).
@@ -33,6 +39,12 @@ struct ih_hypotheses_params {
     int32_t depth_max_mm;     /* a nest reaches this far behind its front */
     int32_t end_depth_mm;     /* from here a jump in area ends the nest */
     int32_t gap_max;          /* levels in a row */
+    /* Ours, to leave out what only nests that must be heads by themselves need: see Fewer. */
+    int32_t
+        free_mm; /* a minimum is free to the left, the right and above within this; 0: may lie anywhere */
+    int32_t free_behind_mm; /* free: so far behind the minimum */
+    bool is_tip_any;        /* the tip's contours may have any shape */
+    bool is_merging;        /* of nests with the same ellipse the nearest goes on */
 };
 
 struct ih_slice {
@@ -62,7 +74,8 @@ struct ih_hypotheses {
 /* What supports a nest at a level. */
 struct ih_support {
     bool wanted, found;
-    bool whole; /* the last word: a closed contour */
+    bool whole;      /* the last word: a closed contour */
+    int32_t contour; /* of the level */
     struct ih_ellipse ellipse;
 };
 
@@ -74,6 +87,8 @@ struct ih_hypotheses_scratch {
 };
 
 void ih_hypotheses_params_default(struct ih_hypotheses_params *params);
+/* For nests that must be heads by themselves. */
+void ih_hypotheses_params_paper(struct ih_hypotheses_params *params);
 
 void ih_hypotheses_find(const struct ih_surface *surface, const struct ih_hypotheses_params *params,
                         struct ih_hypotheses_scratch *scratch, struct ih_hypotheses *out);

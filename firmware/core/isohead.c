@@ -66,7 +66,7 @@ void ih_params_paper(struct ih_params *params)
     ih_params_default(params);
     params->is_paper = true;
     params->surface.centres = IH_SURFACE_CENTRES_MAX;
-    params->hypotheses.ellipse.point_count = IH_PARTS_POINTS_MAX;
+    ih_hypotheses_params_paper(&params->hypotheses);
 }
 
 enum ih_err isohead_init(struct isohead *head, const struct ih_calibration *calibration,

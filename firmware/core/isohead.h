@@ -67,8 +67,7 @@ struct isohead {
 };
 
 void ih_params_default(struct ih_params *params);
-/* The paper's method alone: as the default, with is_paper set, the finer surface, and as many points on a contour as
- * there may be: nests have to be heads by themselves. */
+/* The paper's method alone: is_paper set, a finer surface, and nests that must be heads by themselves. */
 void ih_params_paper(struct ih_params *params);
 
 /* Check the calibration, derive the rig, set default parameters. After an error every frame is

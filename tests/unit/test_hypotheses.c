@@ -1,6 +1,8 @@
 /* ih_hypotheses on surfaces whose cuts are known in closed form. */
 #include "ih_hypotheses.h"
 
+#include <stdlib.h>
+
 #include "ih_test.h"
 
 #define SIDE IH_SURFACE_GRID
@@ -22,7 +24,7 @@ void setUp(void)
     memset(&surface, 0, sizeof surface);
     memset(&scratch, IH_TEST_FILL, sizeof scratch);
     memset(&hypotheses, IH_TEST_FILL, sizeof hypotheses);
-    ih_hypotheses_params_default(&params);
+    ih_hypotheses_params_paper(&params); /* what leaves nests out has tests of its own */
     surface.valid = true;
     surface.field.unit_q28 = UNIT_Q28;
 }
@@ -867,6 +869,168 @@ static void extreme_depths_are_survived(void)
     put_ellipsoid(&head);
     find();
     IH_TEST_EQUAL(1, hypotheses.nest_count, "nests", 0);
+    ih_hypotheses_params_default(&params);
+    find();
+    IH_TEST_EQUAL(1, hypotheses.nest_count, "nests", 1);
+}
+
+/* Fewer nests: a minimum at (23, 23) with walls where they are wanted, 11.6 mm a step at 850 mm. */
+static void put_minimum_between(int32_t left, int32_t right, int32_t above, double behind_mm)
+{
+    int32_t x, y;
+
+    for (y = 0; y < SIDE; y++) {
+        for (x = 0; x < SIDE; x++) {
+            const bool falls = x <= 23 - left || x >= 23 + right || y <= 23 - above;
+
+            surface.depth_mm_q8[y][x] =
+                256 * 850 + 256 * (x == 23 && y == 23 ? 0 : 1) +
+                (falls ? (int32_t)lround(256 * (behind_mm - 1)) : abs(x - 23) + y);
+        }
+    }
+    find();
+}
+
+static int32_t nests_at_the_middle(void)
+{
+    return nest_at(23, 23) != NULL;
+}
+
+/* A step is 850 mm * 0.015 * 10 / 11 = 11.59 mm: 17 of them are less than 200 mm, 18 are more. */
+static void a_minimum_must_be_free_on_three_sides(void)
+{
+    ih_hypotheses_params_default(&params);
+    TEST_ASSERT_EQUAL_INT32(200, params.free_mm);
+    TEST_ASSERT_EQUAL_INT32(80, params.free_behind_mm);
+    put_minimum_between(17, 17, 17, 80.1);
+    TEST_ASSERT_EQUAL_INT32(1, nests_at_the_middle());
+    put_minimum_between(18, 17, 17, 80.1);
+    TEST_ASSERT_EQUAL_INT32(0, nests_at_the_middle());
+    put_minimum_between(17, 18, 17, 80.1);
+    TEST_ASSERT_EQUAL_INT32(0, nests_at_the_middle());
+    put_minimum_between(17, 17, 18, 80.1);
+    TEST_ASSERT_EQUAL_INT32(0, nests_at_the_middle());
+    put_minimum_between(17, 17, 17, 80);
+    TEST_ASSERT_EQUAL_INT32(0, nests_at_the_middle());
+    params.free_mm = 0; /* then it may be anywhere */
+    find();
+    TEST_ASSERT_EQUAL_INT32(1, nests_at_the_middle());
+    params.free_mm = 300; /* beyond the border, too, nothing is known to be in the way */
+    put_minimum_between(24, 24, 24, 80);
+    TEST_ASSERT_EQUAL_INT32(1, nests_at_the_middle());
+    params.free_mm = 250;
+    put_minimum_between(24, 24, 24, 80);
+    TEST_ASSERT_EQUAL_INT32(0, nests_at_the_middle());
+}
+
+/* A cross that widens to a head: no contour of the cross is an ellipse, nor has it an elliptical part
+ * around the minimum; its arms are so long that the tip is soon at the limit. */
+static void put_cross_on_head(double arm, double half)
+{
+    const struct half_ellipsoid head = {23, 23, 19, 19, 880, 98};
+    int32_t x, y;
+
+    surface.field.unit_q28 = FINE_UNIT_Q28;
+    set_plane(1250, 0, 0);
+    put_ellipsoid(&head);
+    for (y = 0; y < SIDE; y++) {
+        for (x = 0; x < SIDE; x++) {
+            const double dx = abs(x - 23), dy = abs(y - 23);
+            const double low = fmin(dx, dy), high = fmax(dx, dy);
+
+            if (high < 2 * arm) {
+                put_nearer(x, y, 850 + 30 * fmax(low / half, high / arm));
+            }
+        }
+    }
+    find();
+    check_nests();
+}
+
+/* With any shape the cross is a tip: 20 mm of it make no gap, and its area places the front. */
+static void a_tip_may_have_any_shape(void)
+{
+    const struct ih_nest *nest;
+    int32_t tip_mm2;
+
+    params.gap_max = 1;
+    put_cross_on_head(7, 2);
+    TEST_ASSERT_NOT_NULL(nest_at(23, 23));
+    TEST_ASSERT_EQUAL_INT32(0, nest_at(23, 23)->slice_count);
+    params.is_tip_any = true;
+    put_cross_on_head(7, 2);
+    nest = nest_at(23, 23);
+    TEST_ASSERT_NOT_NULL(nest);
+    TEST_ASSERT_TRUE(nest->slice_count >= 4);
+    TEST_ASSERT_EQUAL_INT32(880 << 8, nest->tip_level_mm_q8);
+    tip_mm2 = nest->tip_area_mm2;
+    IH_TEST_RANGE(params.blunt_mm2 / 2, params.blunt_mm2 - 1, tip_mm2, "area of the tip", 0);
+    params.blunt_mm2 = tip_mm2; /* not smaller than that: no tip any more */
+    put_cross_on_head(7, 2);
+    TEST_ASSERT_TRUE(nest_at(23, 23)->tip_level_mm_q8 < 880 << 8);
+}
+
+/* Two bumps on one ellipsoid: once a cut goes round both it is one thing. */
+static void nests_of_one_ellipse_are_merged(void)
+{
+    static const struct half_ellipsoid body = {23, 23, 9, 11, 850, 98};
+    static const struct half_ellipsoid left = {19, 23, 3.5, 3.5, 842, 30};
+    static const struct half_ellipsoid right = {27, 23, 3.5, 3.5, 838, 30};
+    int32_t apart, i;
+
+    set_plane(1250, 0, 0);
+    put_ellipsoid(&body);
+    put_ellipsoid(&left);
+    put_ellipsoid(&right);
+    find();
+    TEST_ASSERT_EQUAL_INT32(3, hypotheses.nest_count); /* the third is between them */
+    for (i = 0; i < 3; i++) {
+        IH_TEST_RANGE(5, IH_HYPOTHESES_SLICES_MAX, hypotheses.nest[i].slice_count, "apart", i);
+    }
+    apart = hypotheses.nest[0].slice_count;
+    params.is_merging = true;
+    find();
+    check_nests();
+    TEST_ASSERT_EQUAL_INT32(3, hypotheses.nest_count);
+    TEST_ASSERT_TRUE(nest_at(right.x, right.y) == &hypotheses.nest[0]); /* the nearer */
+    TEST_ASSERT_EQUAL_INT32(apart, hypotheses.nest[0].slice_count);
+    for (i = 1; i < 3; i++) {
+        TEST_ASSERT_TRUE(hypotheses.nest[i].ended);
+        IH_TEST_EQUAL(0, hypotheses.nest[i].slice_count, "merged", i);
+    }
+    /* what is side by side stays two */
+    set_plane(1250, 0, 0);
+    for (i = 0; i < 2; i++) {
+        const struct half_ellipsoid one = {i == 0 ? 12 : 34, 23, 8, 9, 850, 98};
+
+        put_ellipsoid(&one);
+    }
+    find();
+    TEST_ASSERT_EQUAL_INT32(2, hypotheses.nest_count);
+    TEST_ASSERT_TRUE(hypotheses.nest[0].slice_count >= 5);
+    TEST_ASSERT_TRUE(hypotheses.nest[1].slice_count >= 5);
+}
+
+/* All that holds for nests holds with everything left out that may be. */
+static void rough_surfaces_are_survived_by_fewer_nests(void)
+{
+    struct ih_test_random random = {92};
+    int32_t pass, i, nests = 0;
+
+    ih_hypotheses_params_default(&params);
+    for (pass = 0; pass < 40; pass++) {
+        for (i = 0; i < SIDE * SIDE; i++) {
+            const double x = i % SIDE - 23, y = i / SIDE - 23.0;
+
+            surface.depth_mm_q8[i / SIDE][i % SIDE] =
+                (int32_t)(256 * (1000 + (x * x + y * y) * (pass % 4) / 4)) +
+                (int32_t)ih_test_any_size(&random, 6 + pass % 12);
+        }
+        find();
+        check_nests();
+        nests += hypotheses.nest_count;
+    }
+    TEST_ASSERT_GREATER_THAN(40, nests);
 }
 
 int main(void)
@@ -897,5 +1061,9 @@ int main(void)
     RUN_TEST(levels_go_back_from_the_nearest_node);
     RUN_TEST(rough_surfaces_are_survived);
     RUN_TEST(extreme_depths_are_survived);
+    RUN_TEST(a_minimum_must_be_free_on_three_sides);
+    RUN_TEST(a_tip_may_have_any_shape);
+    RUN_TEST(nests_of_one_ellipse_are_merged);
+    RUN_TEST(rough_surfaces_are_survived_by_fewer_nests);
     return UNITY_END();
 }
