@@ -21,7 +21,7 @@ void ih_hypotheses_params_default(struct ih_hypotheses_params *params)
     params->levels_behind_mm = 700;
     params->blunt_mm2 = 2000;
     params->tip_max_mm = 70;
-    params->depth_max_mm = 110;
+    params->depth_max_mm = 80;
     params->end_depth_mm = 50;
     params->gap_max = 3;
     params->free_mm = 200;
@@ -34,6 +34,7 @@ void ih_hypotheses_params_paper(struct ih_hypotheses_params *params)
 {
     ih_hypotheses_params_default(params);
     params->ellipse.point_count = IH_PARTS_POINTS_MAX;
+    params->depth_max_mm = 110;
     params->gap_max = 8;
     params->free_mm = 0;
     params->is_tip_any = false;
@@ -49,21 +50,18 @@ static int64_t step_mm_q16(const struct ih_surface *surface, int32_t depth_mm_q8
                         IH_SURFACE_STEP_DENOMINATOR);
 }
 
-/* A minimum is nearer than its 8 neighbours; of equal nodes the first in reading order. */
+/* A minimum is nearer than its 8 neighbours; of equal nodes the first in reading order. Most nodes are none
+ * by the two beside them. */
 static bool is_minimum(const struct ih_surface *surface, int32_t x, int32_t y)
 {
-    int32_t depth = surface->depth_mm_q8[y][x];
-    for (int32_t dy = -1; dy <= 1; dy++) {
-        for (int32_t dx = -1; dx <= 1; dx++) {
-            int32_t other = surface->depth_mm_q8[y + dy][x + dx];
-            bool earlier = dy < 0 || (dy == 0 && dx < 0);
-            bool self = dx == 0 && dy == 0;
-            if (!self && (earlier ? other <= depth : other < depth)) {
-                return false;
-            }
-        }
+    const int32_t *row = &surface->depth_mm_q8[y][x];
+    const int32_t depth = row[0];
+    if (row[-1] <= depth || row[1] < depth) {
+        return false;
     }
-    return true;
+    const int32_t *above = row - IH_SURFACE_GRID, *below = row + IH_SURFACE_GRID;
+    return above[0] > depth && below[0] >= depth && above[-1] > depth && above[1] > depth &&
+           below[-1] >= depth && below[1] >= depth;
 }
 
 /* Keep the nearest minima, sorted by depth. */

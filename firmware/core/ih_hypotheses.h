@@ -16,7 +16,8 @@
  *        minimum the surface falls off, or ends, within free_mm, else it is a fold of clothes or the
  *        background's, and starts no nest. A closed contour smaller than blunt_mm2 is the tip's whatever
  *        its shape, and no part of it is searched for. Nests that have come to the same ellipse are the
- *        same thing from there on: the nearest goes on, the others end without slices. And gap_max is 3.
+ *        same thing from there on: the nearest goes on, the others end without slices. And gap_max is 3
+ *        instead of 8, depth_max 80 mm instead of 110: what is wider there is the neck's and the body's.
  * Cost:  levels x (cells + minima x contours); the chord search only where no whole ellipse is.
  * Full tables drop and count: minima_dropped (the farthest), contours_dropped (at levels
  * that a nest waits for: others are not cut).
