@@ -147,7 +147,7 @@ static void look_inside(const struct candidate *candidate, const struct view *vi
     tally->through += behind_q8 > THROUGH_MM_Q8;
     tally->front += behind_q8 < -FRONT_MM_Q8;
     if (ih_ellipsoid_place(ellipsoid, &candidate->shares, view->ray->point_mm_q8, place_q14) &&
-        ih_row_distance(ellipsoid, place_q14, &off_q8) && ih_abs_s32(off_q8) < ON_MM_Q8) {
+        ih_row_distance(&candidate->shares, place_q14, &off_q8) && ih_abs_s32(off_q8) < ON_MM_Q8) {
         tally->hit++;
         add_on(view, ellipsoid, off_q8, tally);
     }

@@ -67,10 +67,13 @@ void ih_row_prepare(const struct ih_space *space, struct ih_row_rays *out)
     }
 }
 
-/* a * b / 2^bits, rounded; the result must fit. */
+/* a * b / 2^bits, rounded, where a 2^((33 - bits) / 2) and b 2^((32 - bits) / 2) are below 2^31: the upper
+ * word of their product, which small processors have in one instruction. */
 static inline uint32_t product_of(uint32_t a, uint32_t b, int bits)
 {
-    return (uint32_t)(((uint64_t)a * b + ((uint64_t)1 << (bits - 1))) >> bits);
+    const int64_t a_up = (int32_t)(a << ((33 - bits) / 2));
+    const int64_t b_up = (int32_t)(b << ((32 - bits) / 2));
+    return (uint32_t)((a_up * b_up + ((int64_t)1 << 31)) >> 32);
 }
 
 static inline int32_t signed_as(uint32_t size, int32_t sign)
@@ -78,38 +81,43 @@ static inline int32_t signed_as(uint32_t size, int32_t sign)
     return sign < 0 ? -(int32_t)size : (int32_t)size;
 }
 
-/* By the semi-axes: 2^45 / a, what makes an offset in Q8 a place, and a place s / a per GRADIENT_MM. */
+/* By the semi-axes: 2^43 / a, what makes an offset in Q8 a place, and a place s / a per GRADIENT_MM. */
 struct inverses {
     uint32_t axis[3];
 };
 
-static struct inverses inverses_of(const struct ih_ellipsoid *ellipsoid)
+static struct inverses inverses_of(const struct ih_shares *shares)
 {
     struct inverses inverses;
     for (int axis = 0; axis < 3; axis++) {
-        inverses.axis[axis] =
-            (uint32_t)(((uint64_t)1 << 45) / (uint32_t)ellipsoid->semi_mm_q8[axis]);
+        inverses.axis[axis] = (uint32_t)(shares->share_q50[axis] >> 7);
     }
     return inverses;
 }
 
 /* A place's gradient is along s / a; squares of both: within 8 semi-axes below 2^32. */
-struct gradient {
-    int32_t component_q14[3]; /* s / a, per GRADIENT_MM */
-    uint32_t radius2_q22, length2_q22;
-};
-
-static struct gradient gradient_at(const struct inverses *inverses, const int32_t place_q14[3])
+static inline uint32_t radius2_at(const int32_t place_q14[3])
 {
-    struct gradient g = {.radius2_q22 = 0};
+    uint32_t sum_q22 = 0;
     for (int axis = 0; axis < 3; axis++) {
         const uint32_t place = (uint32_t)ih_abs_s32(place_q14[axis]);
-        const uint32_t component = product_of(place, inverses->axis[axis], 31);
-        g.radius2_q22 += product_of(place, place, 6);
-        g.length2_q22 += product_of(component, component, 6);
-        g.component_q14[axis] = signed_as(component, place_q14[axis]);
+        sum_q22 += product_of(place, place, 6);
     }
-    return g;
+    return sum_q22;
+}
+
+/* The components are s / a, per GRADIENT_MM. */
+static inline uint32_t gradient_at(const struct inverses *inverses, const int32_t place_q14[3],
+                                   int32_t component_q14[3])
+{
+    uint32_t sum_q22 = 0;
+    for (int axis = 0; axis < 3; axis++) {
+        const uint32_t place = (uint32_t)ih_abs_s32(place_q14[axis]);
+        const uint32_t component = product_of(place, inverses->axis[axis], 29);
+        sum_q22 += product_of(component, component, 6);
+        component_q14[axis] = signed_as(component, place_q14[axis]);
+    }
+    return sum_q22;
 }
 
 /* How far a place is out, and what its row is divided by. */
@@ -141,13 +149,14 @@ static inline bool find_distance(uint32_t radius2_q22, uint32_t length2_q22, str
     return true;
 }
 
-bool ih_row_distance(const struct ih_ellipsoid *ellipsoid, const int32_t place_q14[3],
+bool ih_row_distance(const struct ih_shares *shares, const int32_t place_q14[3],
                      int32_t *distance_mm_q8)
 {
-    const struct inverses inverses = inverses_of(ellipsoid);
-    const struct gradient g = gradient_at(&inverses, place_q14);
+    const struct inverses inverses = inverses_of(shares);
+    int32_t component_q14[3];
     struct distance distance;
-    if (!find_distance(g.radius2_q22, g.length2_q22, &distance)) {
+    const uint32_t length2_q22 = gradient_at(&inverses, place_q14, component_q14);
+    if (!find_distance(radius2_at(place_q14), length2_q22, &distance)) {
         return false;
     }
     *distance_mm_q8 = distance.residual_mm_q8;
@@ -237,8 +246,8 @@ static void find_gradients(const struct inverses *inverses, struct ih_rows *rows
             const lanes all = ALL_64((int64_t)((uint64_t)inverse << 32) | inverse);
             const lanes off = LOAD(&rows->place_q14[axis][k]);
             const lanes sign = SIGN_32(off);
-            const lanes place = product_shift(size_of(off), all, 31);
-            const lanes component = product_shift(place, all, 31);
+            const lanes place = product_shift(size_of(off), all, 29);
+            const lanes component = product_shift(place, all, 29);
             radius2 = SUM_32(radius2, product_shift(place, place, 6));
             length2 = SUM_32(length2, product_shift(component, component, 6));
             STORE(&rows->place_q14[axis][k], REST_32(FLIP(place, sign), sign));
@@ -502,7 +511,7 @@ static void begin_step(struct step *step, const struct ih_row_rays *rays)
         ih_div_round((int64_t)ROBUST_REACH * step->scale_mm * (ONE_Q14 << 8), shortest_q8);
     most_q14 += most_q14 / 64;
     step->shares = ih_ellipsoid_shares(semi_mm_q8);
-    step->inverses = inverses_of(ellipsoid);
+    step->inverses = inverses_of(&step->shares);
     step->box = ih_ellipsoid_box(ellipsoid, rays->slope_most_q20, ONE_Q14);
     for (int axis = 0; axis < 3; axis++) {
         step->reach_mm_q8[axis] = (int32_t)ih_mul_shift(most_q14, semi_mm_q8[axis], 14);
@@ -649,18 +658,21 @@ static void weigh_points(const struct step *step, struct ih_rows *rows)
 static void add_offset(const struct step *step, const int32_t off_q8[3], struct ih_rows *rows,
                        struct ih_row_system *system)
 {
-    int32_t place_q14[3];
+    int32_t place_q14[3], component_q14[3];
     struct distance distance;
     for (int axis = 0; axis < 3; axis++) {
         const uint32_t off = (uint32_t)ih_abs_s32(off_q8[axis]);
-        place_q14[axis] = signed_as(product_of(off, step->inverses.axis[axis], 31), off_q8[axis]);
+        place_q14[axis] = signed_as(product_of(off, step->inverses.axis[axis], 29), off_q8[axis]);
     }
-    const struct gradient g = gradient_at(&step->inverses, place_q14);
-    if (g.radius2_q22 <= step->reach2_q22 &&
-        find_distance(g.radius2_q22, g.length2_q22, &distance)) {
+    const uint32_t radius2_q22 = radius2_at(place_q14);
+    if (radius2_q22 > step->reach2_q22) {
+        return;
+    }
+    const uint32_t length2_q22 = gradient_at(&step->inverses, place_q14, component_q14);
+    if (find_distance(radius2_q22, length2_q22, &distance)) {
         const int32_t weight_q16 = robust_weight_q16(distance.residual_mm_q8, step->scale_mm);
         if (weight_q16 > 0) {
-            add_row(rows, system, g.component_q14, &distance, place_q14,
+            add_row(rows, system, component_q14, &distance, place_q14,
                     lowered_q16(weight_q16, place_q14[1]));
         }
     }
@@ -696,11 +708,12 @@ static void add_push(const struct step *step, const struct ih_ray *ray, struct i
         ray->point_mm_q8[2] - step->see_through_mm * 256 <= crossing.entry_mm_q8) {
         return;
     }
-    const struct gradient g = gradient_at(&step->inverses, crossing.nearest_q14);
+    int32_t component_q14[3];
     struct distance distance;
-    if (find_distance(g.radius2_q22, g.length2_q22, &distance)) {
+    const uint32_t length2_q22 = gradient_at(&step->inverses, crossing.nearest_q14, component_q14);
+    if (find_distance(radius2_at(crossing.nearest_q14), length2_q22, &distance)) {
         distance.residual_mm_q8 = ih_max_s32(distance.residual_mm_q8, -PUSH_MAX_MM_Q8);
-        add_row(rows, system, g.component_q14, &distance, crossing.nearest_q14, PUSH_WEIGHT_Q16);
+        add_row(rows, system, component_q14, &distance, crossing.nearest_q14, PUSH_WEIGHT_Q16);
     }
 }
 

@@ -75,7 +75,7 @@ void ih_row_collect(const struct ih_space *space, const struct ih_ellipsoid *ell
 
 /* A place in the ellipsoid's units to its distance from the surface, to first order; negative
  * inside. False at the centre, where there is none. */
-bool ih_row_distance(const struct ih_ellipsoid *ellipsoid, const int32_t place_q14[3],
+bool ih_row_distance(const struct ih_shares *shares, const int32_t place_q14[3],
                      int32_t *distance_mm_q8);
 
 #endif

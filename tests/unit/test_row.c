@@ -47,7 +47,8 @@ static bool plain_gradient(const struct ih_ellipsoid *e, const int32_t place[3],
     int axis, half;
 
     for (axis = 0; axis < 3; axis++) {
-        const int64_t size = plain_product(place[axis], (1LL << 45) / e->semi_mm_q8[axis], 31);
+        const int64_t size =
+            plain_product(place[axis], ((1LL << 50) / e->semi_mm_q8[axis] + 1) >> 7, 29);
 
         out->component_q14[axis] = place[axis] < 0 ? -size : size;
         radius2 += plain_product(place[axis], place[axis], 6);
@@ -131,9 +132,10 @@ static bool plain_place(const struct ih_ellipsoid *e, const int32_t point_mm_q8[
 
     for (axis = 0; axis < 3; axis++) {
         const int64_t offset = (int64_t)point_mm_q8[axis] - e->centre_mm_q8[axis];
-        const int64_t size = llabs(offset) > 1 << 23
-                                 ? INT32_MAX
-                                 : plain_product(offset, (1LL << 45) / e->semi_mm_q8[axis], 31);
+        const int64_t size =
+            llabs(offset) > 1 << 23
+                ? INT32_MAX
+                : plain_product(offset, ((1LL << 50) / e->semi_mm_q8[axis] + 1) >> 7, 29);
 
         if (size > 8 * 16384) {
             return false;
