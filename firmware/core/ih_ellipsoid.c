@@ -51,15 +51,16 @@ static bool in_reach(int64_t place_q14)
     return ih_abs_s64(place_q14) <= REACH_Q14;
 }
 
-struct ih_aim ih_ellipsoid_aim(const int32_t semi_mm_q8[3], const struct ih_ray *ray)
+struct ih_aim ih_ellipsoid_aim(const int32_t semi_mm_q8[3], const struct ih_shares *shares,
+                               const struct ih_ray *ray)
 {
     const int32_t slope_q20[2] = {ray->slope_x_q20, ray->slope_y_q20};
     struct ih_aim aim = {.gg_q28 = (int64_t)1 << 28};
     for (int axis = 0; axis < 2; axis++) {
-        int64_t g_q14 = ih_div_round(ih_shift_round((int64_t)slope_q20[axis] * semi_mm_q8[2], 6),
-                                     semi_mm_q8[axis]);
-        aim.g_q14[axis] = (int32_t)g_q14;
-        aim.gg_q28 += g_q14 * g_q14;
+        /* deep over this semi-axis, at most 5: no division for a ray */
+        const int32_t ratio_q24 = (int32_t)(semi_mm_q8[2] * shares->share_q50[axis] >> 26);
+        aim.g_q14[axis] = (int32_t)ih_mul_shift(slope_q20[axis], ratio_q24, 30);
+        aim.gg_q28 += (int64_t)aim.g_q14[axis] * aim.g_q14[axis];
     }
     return aim;
 }

@@ -16,8 +16,7 @@
  *        on a head, slopes up to 1: places within 2^-12.5 of the exact ones, radius2 within
  *        2^-10.6, entry depth within 0.05 mm where radius2 < 0.99 and within 0.25 mm at the rim.
  *        At the limits of slopes and semi-axes: places 2^-10.8, radius2 2^-8.1, entry 0.1 mm.
- * Cost:  3 divisions, 3 less with what is worked out before but one; one more and a square root where the ray
- *        hits.
+ * Cost:  a division, one more and a square root where the ray hits; and three for the shares.
  */
 #ifndef IH_ELLIPSOID_H
 #define IH_ELLIPSOID_H
@@ -49,14 +48,6 @@ struct ih_ellipsoid_box {
 /* The mean adult head, hair included. */
 struct ih_ellipsoid ih_ellipsoid_mean(const int32_t centre_mm_q8[3]);
 
-/* What a crossing needs of the ray's direction: the same wherever an ellipsoid of this size stands. */
-struct ih_aim {
-    int32_t g_q14[2];
-    int64_t gg_q28; /* 1 + g.g */
-};
-
-struct ih_aim ih_ellipsoid_aim(const int32_t semi_mm_q8[3], const struct ih_ray *ray);
-
 /* The box through which every ray passes that comes nearer than radius, with slopes up to slope_most
  * (as from ih_space_slope_most): radius2 >= e.e / (1 + g.g). The errors above are allowed for. */
 struct ih_ellipsoid_box ih_ellipsoid_box(const struct ih_ellipsoid *ellipsoid,
@@ -84,6 +75,15 @@ static inline int32_t ih_share(int64_t share_q50, int32_t offset)
 {
     return (int32_t)((offset * share_q50 + ((int64_t)1 << 35)) >> 36);
 }
+
+/* What a crossing needs of the ray's direction: the same wherever an ellipsoid of this size stands. */
+struct ih_aim {
+    int32_t g_q14[2];
+    int64_t gg_q28; /* 1 + g.g */
+};
+
+struct ih_aim ih_ellipsoid_aim(const int32_t semi_mm_q8[3], const struct ih_shares *shares,
+                               const struct ih_ray *ray);
 
 /* shares and aim: of this size. False: far away, *out is not set. */
 bool ih_ellipsoid_cross(const struct ih_ellipsoid *ellipsoid, const struct ih_shares *shares,

@@ -133,7 +133,8 @@ static void look_inside(const struct candidate *candidate, const struct view *vi
     if (!view->may_hit) {
         return;
     }
-    const struct ih_aim aim = ih_ellipsoid_aim(ellipsoid->semi_mm_q8, view->ray);
+    const struct ih_aim aim =
+        ih_ellipsoid_aim(ellipsoid->semi_mm_q8, &candidate->shares, view->ray);
     if (!ih_ellipsoid_cross(ellipsoid, &candidate->shares, candidate->origin_mm_q8, view->ray, &aim,
                             &crossing) ||
         crossing.radius2_q14 >= INSIDE_Q14) {

@@ -702,7 +702,7 @@ static void add_push(const struct step *step, const struct ih_ray *ray, struct i
         !ih_ellipsoid_in_box(ellipsoid, &step->box, step->origin_mm_q8, ray)) {
         return;
     }
-    const struct ih_aim aim = ih_ellipsoid_aim(ellipsoid->semi_mm_q8, ray);
+    const struct ih_aim aim = ih_ellipsoid_aim(ellipsoid->semi_mm_q8, &step->shares, ray);
     if (!ih_ellipsoid_cross(ellipsoid, &step->shares, step->origin_mm_q8, ray, &aim, &crossing) ||
         crossing.radius2_q14 >= ONE_Q14 ||
         ray->point_mm_q8[2] - step->see_through_mm * 256 <= crossing.entry_mm_q8) {

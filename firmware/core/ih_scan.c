@@ -69,7 +69,7 @@ struct sums {
 static void add_ray(const struct ih_space *space, const struct ih_ellipsoid *head,
                     const struct ih_shares *shares, const struct ih_ray *ray, struct sums *sums)
 {
-    const struct ih_aim aim = ih_ellipsoid_aim(head->semi_mm_q8, ray);
+    const struct ih_aim aim = ih_ellipsoid_aim(head->semi_mm_q8, shares, ray);
     struct ih_crossing crossing;
     if (!ih_ellipsoid_cross(head, shares, space->origin_mm_q8, ray, &aim, &crossing)) {
         return;

@@ -9,7 +9,7 @@ static inline bool ih_test_cross(const struct ih_ellipsoid *ellipsoid,
                                  struct ih_crossing *out)
 {
     const struct ih_shares shares = ih_ellipsoid_shares(ellipsoid->semi_mm_q8);
-    const struct ih_aim aim = ih_ellipsoid_aim(ellipsoid->semi_mm_q8, ray);
+    const struct ih_aim aim = ih_ellipsoid_aim(ellipsoid->semi_mm_q8, &shares, ray);
 
     return ih_ellipsoid_cross(ellipsoid, &shares, origin_mm_q8, ray, &aim, out);
 }
