@@ -103,7 +103,8 @@ bool ih_ellipsoid_cross(const struct ih_ellipsoid *ellipsoid, const struct ih_sh
     int64_t enter_q14 = tau_q14;
     int64_t inside_q28 = ((int64_t)1 << 28) - radius2_q28;
     if (inside_q28 > 0) {
-        enter_q14 -= ih_isqrt_u64((uint64_t)ih_div_round(inside_q28 * (1 << 28), gg_q28));
+        enter_q14 -=
+            ih_isqrt_u32((uint32_t)ih_div_round(inside_q28 * (1 << 28), gg_q28)); /* 2^28 */
     }
     out->entry_mm_q8 = ellipsoid->centre_mm_q8[2] + (int32_t)ih_mul_shift(enter_q14, deep_q8, 14);
     return true;

@@ -111,7 +111,7 @@ static void centre_behind(const struct ih_ray *ray, int32_t deep_mm, int32_t cen
 {
     int64_t x = ray->slope_x_q20;
     int64_t y = ray->slope_y_q20;
-    int64_t length_q20 = ih_isqrt_u64((uint64_t)(x * x + y * y) + ((uint64_t)1 << 40));
+    int64_t length_q20 = ih_isqrt_u54((uint64_t)(x * x + y * y) + ((uint64_t)1 << 40));
     int64_t deep_q8 = (int64_t)deep_mm << 8;
     int64_t step_q8 = ih_div_round(deep_q8 * (1 << 20), length_q20);
     centre_mm_q8[0] = ray->point_mm_q8[0] + (int32_t)ih_mul_shift(step_q8, x, 20);
