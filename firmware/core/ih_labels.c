@@ -296,11 +296,15 @@ static bool find_seed(const struct ih_rig *rig, const struct ih_labels_scratch *
             }
         }
     }
-    int64_t best = ih_isqrt_u64(search.best2);
-    int64_t second = ih_isqrt_u64(search.second2);
+    const int64_t most = ih_max_s32(params->seed_max_px_q12, 0);
+    if (search.best2 >= (uint64_t)(most * most)) {
+        return false;
+    }
+    const int64_t best = ih_isqrt_u64(search.best2);
+    const int64_t least = ih_max_s64(best + params->seed_margin_px_q12 + 1, 0); /* of the second */
     memcpy(out->choice, search.choice, sizeof out->choice);
-    out->error_px_q12 = (int32_t)(best < INT32_MAX ? best : INT32_MAX);
-    return best < params->seed_max_px_q12 && second - best > params->seed_margin_px_q12;
+    out->error_px_q12 = (int32_t)best;
+    return search.second2 >= (uint64_t)(least * least);
 }
 
 /* Shell sort by error, then slot: the order of equal errors must not depend on anything else. */
