@@ -134,7 +134,7 @@ static bool undistort_quickly(const struct ih_rig *rig, int32_t xd, int32_t yd, 
     across(&rig->calibration, xx, yy, product_q28(xd, yd), &dx, &dy);
     int32_t x = limit_tan_q28(product_q28(limit_tan_q28(xd - dx), back.scale_q28));
     int32_t y = limit_tan_q28(product_q28(limit_tan_q28(yd - dy), back.scale_q28));
-    for (int i = 0; i < NEWTON_STEPS; i++) {
+    for (int i = 0; i < rig->newton_steps; i++) {
         brown(&rig->calibration, x, y, &radial, &dx, &dy);
         const int64_t off_x = xd - dx - ih_mul_shift(x, radial, 28);
         const int64_t off_y = yd - dy - ih_mul_shift(y, radial, 28);
@@ -275,8 +275,8 @@ static enum ih_err check_camera(const struct ih_calibration *c)
     return IH_OK;
 }
 
-/* Undistort and distort again over the whole frame: what does not come back cannot be measured. */
-static enum ih_err check_lens(const struct ih_rig *rig)
+/* Undistort and distort again over the whole frame: does it come back? */
+static bool comes_back(const struct ih_rig *rig)
 {
     const struct ih_calibration *c = &rig->calibration;
     for (int32_t row = 0; row < LENS_PROBES; row++) {
@@ -288,11 +288,23 @@ static enum ih_err check_lens(const struct ih_rig *rig)
             ih_rig_distort(rig, x, y, &back_u, &back_v);
             if (ih_abs_s32(back_u - u) > LENS_ERROR_MAX_PX_Q12 ||
                 ih_abs_s32(back_v - v) > LENS_ERROR_MAX_PX_Q12) {
-                return IH_ERR_DISTORTION;
+                return false;
             }
         }
     }
-    return IH_OK;
+    return true;
+}
+
+/* What does not come back cannot be measured. Where a great k3 makes steps of r^6 in Q22 longer than the probes may
+ * miss, as with long focal lengths, Newton's steps stop beside what distorts to the pixel, and the slow way does not. */
+static enum ih_err check_lens(struct ih_rig *rig)
+{
+    rig->newton_steps = NEWTON_STEPS;
+    if (comes_back(rig)) {
+        return IH_OK;
+    }
+    rig->newton_steps = 0;
+    return comes_back(rig) ? IH_OK : IH_ERR_DISTORTION;
 }
 
 static enum ih_err check_projector(const struct ih_calibration *c, int32_t *bad_slot)

@@ -5,7 +5,7 @@
  *        its epipolar line, for the surface the field of view in units of half a dot pitch.
  * Error: each check has its own code; index says which dot. A rig that passes is safe for all
  *        stages: no later stage divides by zero or overflows because of it.
- * Cost:  once per rig. 361 lines, and 65 x 65 probes of the lens. ih_rig_undistort: one or two of Newton's
+ * Cost:  once per rig. 361 lines, and 65 x 65 probes of the lens, rarely twice. ih_rig_undistort: one or two of Newton's
  *        steps from a series, without a division.
  *
  * The camera frame is OpenCV's: X right, Y down, Z forward, mm. Normalised coordinates are
@@ -63,7 +63,8 @@ struct ih_field {
 struct ih_rig {
     struct ih_calibration calibration;
     struct ih_field field;
-    int32_t back_q24[3]; /* the lens backwards, from where ih_rig_undistort starts */
+    int32_t back_q24[3];  /* the lens backwards, from where ih_rig_undistort starts */
+    int32_t newton_steps; /* at the most; 0: they end beside the pixel, slow iteration does not */
     struct ih_line line[IH_SLOTS];
 };
 

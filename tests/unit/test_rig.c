@@ -619,6 +619,39 @@ static void strong_lenses_are_undone_all_over_the_frame(void)
     }
 }
 
+/* Mild lenses with so great a k3 that r^6 in Q22 has steps of up to 0.015 px: Newton's steps end within one of them,
+ * not where the lens comes back. */
+static void lenses_of_great_k3_are_no_reason_to_refuse(void)
+{
+    static const struct {
+        int32_t width, height, focal_px;
+        double cx_px, k1, k2, k3;
+    } lenses[] = {{877, 764, 2936, 494, 0.28, -0.245, -128},
+                  {1090, 653, 4172, -390, -0.038, -0.71, -17.5},
+                  {1280, 537, 4051, 555, 0.029, -3.57, -128}};
+    int i, row, column;
+
+    for (i = 0; i < IH_TEST_COUNT(lenses); i++) {
+        use_range_rig(lenses[i].width, lenses[i].height, lenses[i].focal_px);
+        calibration.cx_px_q16 = (int32_t)(lenses[i].cx_px * 65536);
+        calibration.k1_q24 = (int32_t)lround(ldexp(lenses[i].k1, 24));
+        calibration.k2_q24 = (int32_t)lround(ldexp(lenses[i].k2, 24));
+        calibration.k3_q24 = (int32_t)fmax(INT32_MIN, ldexp(lenses[i].k3, 24));
+        IH_TEST_EQUAL(IH_OK, ih_rig_init(&rig, &calibration, &bad_slot), "a great k3", i);
+        for (row = 0; row < lenses[i].height; row += 13) {
+            for (column = 0; column < lenses[i].width; column += 11) {
+                double u, v;
+                int32_t x, y;
+
+                ih_rig_undistort(&rig, column * 4096, row * 4096, &x, &y);
+                distort_float64(&calibration, ldexp(x, -28), ldexp(y, -28), &u, &v);
+                IH_TEST_WITHIN(0.02, column, u, "u", i);
+                IH_TEST_WITHIN(0.02, row, v, "v", i);
+            }
+        }
+    }
+}
+
 static void sizes_may_be_as_large_as_their_limits(void)
 {
     use_range_rig(IH_FRAME_WIDTH_MAX, IH_FRAME_WIDTH_MAX, 1000);
@@ -786,6 +819,7 @@ int main(void)
     RUN_TEST(a_line_gives_the_dot_at_any_depth);
     RUN_TEST(undistort_matches_the_exact_inverse);
     RUN_TEST(strong_lenses_are_undone_all_over_the_frame);
+    RUN_TEST(lenses_of_great_k3_are_no_reason_to_refuse);
     RUN_TEST(undistort_survives_any_pixel);
     RUN_TEST(without_distortion_undistort_is_a_division);
     RUN_TEST(distort_matches_float64);
