@@ -345,12 +345,19 @@ static void mark_row(struct ih_dots_scratch *scratch, int32_t v, struct marked *
     const int16_t *least = scratch->rows.finding.least;
     const int32_t width = scratch->width;
     int32_t count = 0;
+#if IH_WORDS
+    for (int32_t u = 0; u < width; u += GROUP) {
+        const uint32_t maxima = mark_maxima(&above[u], &middle[u], &below[u], &least[u]);
+        if (maxima != 0) {
+            out->first[count] = (int16_t)u;
+            out->maxima[count++] = maxima;
+        }
+    }
+#else
     for (int32_t first = 0; first < width; first += 2 * GROUP) {
-#if !IH_WORDS
         if (!is_any_above(&middle[first], &least[first], 2 * GROUP)) {
             continue;
         }
-#endif
         for (int32_t u = first; u < first + 2 * GROUP; u += GROUP) {
             const uint32_t maxima = mark_maxima(&above[u], &middle[u], &below[u], &least[u]);
             out->first[count] = (int16_t)u;
@@ -358,6 +365,7 @@ static void mark_row(struct ih_dots_scratch *scratch, int32_t v, struct marked *
             count += maxima != 0;
         }
     }
+#endif
     out->count = count;
 }
 
