@@ -394,7 +394,25 @@ static void sum_rows(const struct ih_row row[IH_BAND_ROWS], int32_t width, uint1
     const uint8_t *above = row[IH_BAND_REACH - 1].samples;
     const uint8_t *middle = row[IH_BAND_REACH].samples;
     const uint8_t *below = row[IH_BAND_REACH + 1].samples;
-    for (int32_t u = 0; u < width; u++) {
+    int32_t u = 0;
+#if IH_WORDS
+    for (; u + 4 <= width; u += 4) {
+        const uint32_t over = ih_word_of_bytes(&above[u]);
+        const uint32_t here = ih_word_of_bytes(&middle[u]);
+        const uint32_t under = ih_word_of_bytes(&below[u]);
+        const uint32_t even = ih_word_even(here);
+        const uint32_t odd = ih_word_odd(here);
+        const uint32_t even_sum = ih_word_add_even(ih_word_add_even(even, over), under);
+        const uint32_t odd_sum = ih_word_add_odd(ih_word_add_odd(odd, over), under);
+        const uint32_t even_inner = even_sum + even;
+        const uint32_t odd_inner = odd_sum + odd;
+        ih_word_put(ih_word_first(even_inner, odd_inner), &inner[u]);
+        ih_word_put(ih_word_second(even_inner, odd_inner), &inner[u + 2]);
+        ih_word_put(ih_word_first(even_sum, odd_sum), &column[u]);
+        ih_word_put(ih_word_second(even_sum, odd_sum), &column[u + 2]);
+    }
+#endif
+    for (; u < width; u++) {
         const uint16_t sum = (uint16_t)(above[u] + middle[u] + below[u]);
         inner[u] = (uint16_t)(sum + middle[u]);
         column[u] = sum;
@@ -433,9 +451,16 @@ static void repeat_edges(uint16_t *sums, int32_t width, int32_t reach, int32_t e
 
 static void sum_threes(const uint16_t *column, int32_t count, uint16_t *restrict nine)
 {
+#if IH_WORDS
+    for (int32_t i = 0; i < count; i += 2) {
+        ih_word_put(ih_word(&column[i]) + ih_word(&column[i + 1]) + ih_word(&column[i + 2]),
+                    &nine[i]);
+    }
+#else
     for (int32_t i = 0; i < count; i++) {
         nine[i] = (uint16_t)(column[i] + column[i + 1] + column[i + 2]);
     }
+#endif
 }
 
 void ih_band_bytes(struct ih_band *band, const struct ih_row row[IH_BAND_ROWS], int32_t width,

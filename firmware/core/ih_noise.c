@@ -35,13 +35,14 @@ static int32_t between(int32_t low, int32_t high, int32_t part)
 static int32_t at_most(const uint16_t value[SAMPLES_MAX], uint16_t limit)
 {
 #if IH_WORDS
+    const uint32_t one = ih_word_kept(IH_WORD_BOTH(1));
     const uint32_t raised = IH_WORD_BOTH(limit) + IH_WORD_BOTH(0x8000);
     uint32_t count = 0;
     for (int32_t i = 0; i < SAMPLES_MAX; i += 8) { /* unrolled: gcc 12 does not at -O2 */
-        count += (raised - ih_word(&value[i])) >> 15 & IH_WORD_BOTH(1);
-        count += (raised - ih_word(&value[i + 2])) >> 15 & IH_WORD_BOTH(1);
-        count += (raised - ih_word(&value[i + 4])) >> 15 & IH_WORD_BOTH(1);
-        count += (raised - ih_word(&value[i + 6])) >> 15 & IH_WORD_BOTH(1);
+        count += (raised - ih_word(&value[i])) >> 15 & one;
+        count += (raised - ih_word(&value[i + 2])) >> 15 & one;
+        count += (raised - ih_word(&value[i + 4])) >> 15 & one;
+        count += (raised - ih_word(&value[i + 6])) >> 15 & one;
     }
     return (int32_t)((count & UINT16_MAX) + (count >> 16));
 #elif defined __AVX2__
