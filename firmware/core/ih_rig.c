@@ -148,7 +148,9 @@ static bool undistort_quickly(const struct ih_rig *rig, int32_t xd, int32_t yd, 
         const int64_t step_y = product_q28((int32_t)off_y, back.scale_q28) + product_q28(risen, yd);
         x = limit_tan_q28(x + step_x);
         y = limit_tan_q28(y + step_y);
-        if (ih_max_s64(ih_abs_s64(step_x), ih_abs_s64(step_y)) < NEWTON_LAST_Q28) {
+        /* Where the series' slope is 0, as of lenses that pull the corners out, no step is a long one. */
+        if (ih_max_s64(ih_abs_s64(step_x), ih_abs_s64(step_y)) < NEWTON_LAST_Q28 &&
+            ih_max_s64(ih_abs_s64(off_x), ih_abs_s64(off_y)) < 2 * NEWTON_LAST_Q28) {
             *x_q28 = x;
             *y_q28 = y;
             return true;

@@ -619,6 +619,44 @@ static void strong_lenses_are_undone_all_over_the_frame(void)
     }
 }
 
+/* The slope of the series that Newton's steps begin with, of the square of the radius. */
+static double slope_of_series(double k1, double r2)
+{
+    return 1 + r2 * (-3 * k1 + r2 * (15 * k1 * k1 - r2 * 84 * k1 * k1 * k1));
+}
+
+/* Where the series has slope 0 there are no steps, however far off its place is: 0.2 px about that ring. */
+static void no_pixel_is_left_where_the_series_has_no_slope(void)
+{
+    const double k1 = 0.386, focal_px = 750;
+    double low = 0.2, high = 1;
+    int32_t middle, u_q12;
+    int i;
+
+    for (i = 0; i < 50; i++) {
+        const double r2 = (low + high) / 2;
+
+        if (slope_of_series(k1, r2) > 0) {
+            low = r2;
+        } else {
+            high = r2;
+        }
+    }
+    use_range_rig(1280, 1280, (int32_t)focal_px);
+    calibration.k1_q24 = (int32_t)lround(ldexp(k1, 24));
+    TEST_ASSERT_EQUAL_INT(IH_OK, ih_rig_init(&rig, &calibration, &bad_slot));
+    middle = (int32_t)lround((640 + focal_px * sqrt(low)) * 4096);
+    IH_TEST_RANGE(640 * 4096, 1279 * 4096, middle, "in the frame", 0);
+    for (u_q12 = middle - 820; u_q12 <= middle + 820; u_q12++) {
+        double u, v;
+        int32_t x, y;
+
+        ih_rig_undistort(&rig, u_q12, 640 * 4096, &x, &y);
+        distort_float64(&calibration, ldexp(x, -28), ldexp(y, -28), &u, &v);
+        IH_TEST_WITHIN(0.001, ldexp(u_q12, -12), u, "u", u_q12 - middle);
+    }
+}
+
 /* Mild lenses with so great a k3 that r^6 in Q22 has steps of up to 0.015 px: Newton's steps end within one of them,
  * not where the lens comes back. */
 static void lenses_of_great_k3_are_no_reason_to_refuse(void)
@@ -819,6 +857,7 @@ int main(void)
     RUN_TEST(a_line_gives_the_dot_at_any_depth);
     RUN_TEST(undistort_matches_the_exact_inverse);
     RUN_TEST(strong_lenses_are_undone_all_over_the_frame);
+    RUN_TEST(no_pixel_is_left_where_the_series_has_no_slope);
     RUN_TEST(lenses_of_great_k3_are_no_reason_to_refuse);
     RUN_TEST(undistort_survives_any_pixel);
     RUN_TEST(without_distortion_undistort_is_a_division);
