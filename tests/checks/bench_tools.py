@@ -31,7 +31,7 @@ def good():
     dots = [[20.0 * (i % 10) + 5.25, 20.0 * (i // 10) + 7.5] for i in range(100)]
     truth = {"dots": [[i, u, v, 800.0] for i, (u, v) in enumerate(dots)]}
     result = {"dots": dots, "labels": [[i, i, 800.0] for i in range(100)], "surface": [800.0] * NODES,
-              "head": [0.0, 0.0, 900.0]}
+              "centres": 8, "points": 32, "head": [0.0, 0.0, 900.0]}
     return result, truth
 
 
@@ -70,11 +70,12 @@ class Agreement(unittest.TestCase):
         self.refused("head_mm", lambda r: r.update(head=[30.0, 0.0, 900.0]))
         self.refused("head_mm", lambda r: r.update(head=None))
 
-    def test_no_surface_ends_it(self):
-        found = copy.deepcopy(good()[0])
-        found["surface"] = []
-        with self.assertRaises(SystemExit):
-            complaints(found)
+    def test_other_work_ends_it(self):
+        for key, other in (("surface", []), ("centres", 12), ("points", 56)):
+            found = copy.deepcopy(good()[0])
+            found[key] = other
+            with self.assertRaises(SystemExit):
+                complaints(found)
 
 
 class Bounds(unittest.TestCase):

@@ -4,7 +4,8 @@
  *   --turns    for every line of standard input a line of JSON: nanoseconds a frame, the whole frame
  *              without timers inside and, from a second run, each stage
  *   --once     runs once, to be counted from outside; prints each frame's count of dots and labels
- *   --results  what was found, a line of JSON a frame: dots, labels, nodes of the surface, the head
+ *   --results  what was found, a line of JSON a frame: dots, labels, nodes of the surface,
+ *              its centres in a row, points on a contour, the head
  */
 #include <math.h>
 #include <stdio.h>
@@ -107,7 +108,8 @@ static void print_result(void)
             printf("%s%.2f", x + y > 0 ? "," : "", ldexp(head.surface.depth_mm_q8[y][x], -8));
         }
     }
-    printf("],\"head\":");
+    printf("],\"centres\":%d,\"points\":%d,\"head\":", (int)head.surface.centres,
+           (int)head.params.hypotheses.ellipse.point_count);
     if (head.result.selected == IH_NONE) {
         puts("null}");
         return;

@@ -5,25 +5,28 @@
  *      2.5), connectedComponentsWithStats, weighted centres; the surface in double, its normal
  *      equations summed anew for the second robust pass; whole contours by fitEllipseDirect.
  *   B  the fastest composition of library calls that was found: an 8-bit Gaussian 3x3 less an 8-bit
- *      box 13x13, findContours, weighted centres; the surface in double too (in float its worst node is 5
- *      to 11 mm off, the median 0.5 mm, in 20 made-up scenes: its normal equations have a condition
- *      number of 10^7), but the second robust pass only takes away what its changed rows weigh less;
+ *      box 13x13, findContours, weighted centres; the surface's normal equations and their factor in float,
+ *      of which the second robust pass only takes away what its changed rows weigh less, with two solutions
+ *      each for what is left in double (without the second one its worst node is 6 to 14 mm off in frames, as
+ *      the condition number is beyond 10^6; with it 0.14 mm at most);
  *      whole contours by their moments; parts of as many steps side by side, in vectors of double, and
  *      only what passes without a root is looked at closely; scan and fits in vectors of float over all
- *      rays that matter (with gcc -O3, v3, a third of what A's cost, ray by ray and in double).
+ *      rays that matter (with gcc -O3, v3, 0.4 of what A's cost, ray by ray and in double).
  *
  * What both do, as isohead does it in its default mode and with the same numbers: dots of the whole
  * frame; undistortPoints; candidates on the 361 lines, seeds by affine rectangles, growing; points;
- * samples (clip, lonely points, missing dots filled in); 144 multiquadrics, weighted least squares
+ * samples (clip, lonely points, missing dots filled in); 64 multiquadrics, weighted least squares
  * with a ridge, one Huber step, Eigen's LLT; 47x47 nodes from a table of the basis that is filled
- * once; contours by marching squares every 10 mm at levels that a nest waits for; nests of ellipses, whole
- * or cut by the best of all chords, where a contour is studied once for all the nests that it surrounds, when
- * the first one asks; the scan of a mean head behind every point; of nests and places of the scan, in this
+ * once; contours by marching squares every 10 mm at levels that a nest waits for; nests, from minima that are
+ * free on three sides, of ellipses, whole or cut by the best of all chords between 32 points, where a contour
+ * is studied once for all the nests that it surrounds, when the first one asks, and a tip's may have any shape;
+ * nests with one ellipse merged; the scan of a mean head behind one point of four, and behind those around
+ * whatever seems best; of nests and places of the scan, in this
  * order, those that a glance promises something; starts 20 mm apart, and last frame's head; a Gauss-Newton
  * step of an ellipsoid and its score, then five more steps and a score for what is not hopeless.
  * What isohead does and here brings nothing: asking only samples that were far off for their new weight
- * (in floating point no correction needs residuals, so that all of them are asked for once; that is a hundredth
- * of the surface); a bound before the scan's scores (isohead's has lanes of 16 bits; in B's vectors of float a
+ * (A works out what samples are off for that alone, a hundredth of the surface, and B has it from its
+ * corrections); a bound before the scan's scores (isohead's has lanes of 16 bits; in B's vectors of float a
  * bound would cross the rays as the score itself does, and A is what is written first).
  * What they do not do, which is in their favour: a threshold that follows the noise of the place (one
  * for the frame instead), tests for edges and hot pixels, over-exposed plateaus, the paper's tests of
@@ -46,7 +49,7 @@
 
 constexpr int PEER_GRID = 19; /* dots in a row of the pattern */
 constexpr int PEER_SLOTS = PEER_GRID * PEER_GRID;
-constexpr int PEER_CENTRES = 12; /* of the surface, in a row */
+constexpr int PEER_CENTRES = 8; /* of the surface, in a row */
 constexpr int PEER_TERMS = PEER_CENTRES * PEER_CENTRES;
 constexpr int PEER_NODES = 47; /* of the surface's grid, in a row */
 
@@ -98,7 +101,7 @@ struct peer_contour {
 };
 
 /* A contour at equal steps, twice round where it is closed. */
-constexpr int PEER_POINTS = 56;
+constexpr int PEER_POINTS = 32;
 using peer_along = Eigen::Array<double, 2 * PEER_POINTS, 1>;
 struct peer_outline {
     peer_along x, y;

@@ -1,5 +1,7 @@
 #include "peer.hpp"
 
+#include <cstring>
+
 #include <opencv2/imgproc.hpp>
 
 namespace
@@ -8,6 +10,7 @@ namespace
 /* Edges of cells: those from a node to the right, then those from a node down. */
 constexpr int DOWN = PEER_NODES * PEER_NODES;
 constexpr int EDGES = 2 * DOWN;
+constexpr int WORD = 8; /* cells that are passed over at once */
 
 struct walker {
     const peer_grid *surface_mm;
@@ -25,7 +28,8 @@ void link(walker &w, int from, int to)
     w.edges.push_back(from);
 }
 
-/* Which corners of the cells are nearer, a bit each; by the cell's first node. */
+/* Which corners of the cells are nearer, a bit each; by the cell's first node. The last node of a row has no
+ * cell: none of its corners counts. */
 void find_corners(const peer_grid &surface_mm, double level_mm, uchar corners[])
 {
     static cv::Mat nearer;
@@ -36,6 +40,17 @@ void find_corners(const peer_grid &surface_mm, double level_mm, uchar corners[])
         corners[i] = static_cast<uchar>((n[i] & 1) | (n[i + 1] & 2) | (n[i + PEER_NODES + 1] & 4) |
                                         (n[i + PEER_NODES] & 8));
     }
+    for (int y = 0; y < PEER_NODES; y++) {
+        corners[y * PEER_NODES + PEER_NODES - 1] = 0;
+    }
+}
+
+/* Is one of the cells of a word neither all nearer nor all farther? */
+bool is_cut(const uchar corners[WORD])
+{
+    uint64_t word;
+    std::memcpy(&word, corners, sizeof word);
+    return word != 0 && word != 0x0f0f0f0f0f0f0f0f;
 }
 
 /* What is nearer is on the right as one goes from edge to edge. */
@@ -98,17 +113,20 @@ walker make_walker()
 void peer_cut(const peer_grid &surface_mm, double level_mm, std::vector<peer_contour> &out)
 {
     static walker w = make_walker();
-    static uchar corners[DOWN];
+    static uchar corners[(DOWN + WORD - 1) / WORD * WORD]; /* 0 behind the last cell */
     out.clear();
     w.surface_mm = &surface_mm;
     w.level_mm = level_mm;
     w.edges.clear();
     find_corners(surface_mm, level_mm, corners);
-    for (int y = 0; y < PEER_NODES - 1; y++) {
-        for (int x = 0; x < PEER_NODES - 1; x++) {
-            const int here = corners[y * PEER_NODES + x];
+    for (int first = 0; first < DOWN; first += WORD) {
+        if (!is_cut(corners + first)) {
+            continue;
+        }
+        for (int at = first; at < first + WORD; at++) {
+            const int here = corners[at];
             if (here != 0 && here != 15) {
-                cut_cell(w, y, x, here);
+                cut_cell(w, at / PEER_NODES, at % PEER_NODES, here);
             }
         }
     }

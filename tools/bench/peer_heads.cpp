@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <queue>
 
 namespace
 {
@@ -10,6 +11,7 @@ constexpr double MEAN_SEMI_MM[3] = {78, 113, 98};
 constexpr double DEEP_MM = 98;
 constexpr double SPACING_MM = 80;
 constexpr size_t PLACES_MAX = 8;
+constexpr int BLOCKS = (PEER_GRID + 1) / 2; /* of two by two slots, along a side */
 constexpr double CENTRE_DEPTH_MM = 30;
 constexpr double CENTRE_BEHIND_MM = 108;
 constexpr double FRONT_LEAST_MM = 150;
@@ -31,33 +33,95 @@ double distance_mm(const peer_head &a, const peer_head &b)
                       a.centre_mm[2] - b.centre_mm[2]);
 }
 
-/* The best places of a mean head behind each point. */
+/* A mean head behind a slot's point. */
+struct place {
+    peer_head head;
+    bool is_there, is_scored, is_spread;
+};
+
+struct scored {
+    double score;
+    int slot;
+    bool operator<(const scored &other) const
+    {
+        return score < other.score;
+    }
+};
+
+struct scanner {
+    std::array<place, PEER_SLOTS> places;
+    std::priority_queue<scored> best; /* of those that have a score */
+};
+
+void score_place(const peer &p, scanner &s, int slot)
+{
+    place &at = s.places[static_cast<size_t>(slot)];
+    if (at.is_there && !at.is_scored) {
+        at.is_scored = true;
+        at.head.score = peer_scan_score(p, at.head);
+        s.best.push({at.head.score, slot});
+    }
+}
+
+/* Places behind all points, of which the first of each block of two by two slots gets a score. */
+void begin_scan(const peer &p, scanner &s)
+{
+    std::array<bool, BLOCKS *BLOCKS> is_begun = {};
+    s.best = {};
+    for (int slot = 0; slot < PEER_SLOTS; slot++) {
+        const peer_ray &ray = p.rays[static_cast<size_t>(slot)];
+        place &at = s.places[static_cast<size_t>(slot)];
+        at.is_there = ray.state == peer_ray_state::seen;
+        if (!at.is_there) {
+            continue;
+        }
+        const double deep = DEEP_MM / std::hypot(ray.slope_x, ray.slope_y, 1.0);
+        at.head = mean_head(ray.point_mm[0] + deep * ray.slope_x,
+                            ray.point_mm[1] + deep * ray.slope_y, ray.point_mm[2] + deep);
+        at.is_scored = at.is_spread = false;
+        bool &block =
+            is_begun[static_cast<size_t>(slot / PEER_GRID / 2 * BLOCKS + slot % PEER_GRID / 2)];
+        if (!block) {
+            block = true;
+            score_place(p, s, slot);
+        }
+    }
+}
+
+void score_around(const peer &p, scanner &s, int slot)
+{
+    const int row = slot / PEER_GRID, column = slot % PEER_GRID;
+    for (int y = std::max(row - 1, 0); y <= std::min(row + 1, PEER_GRID - 1); y++) {
+        for (int x = std::max(column - 1, 0); x <= std::min(column + 1, PEER_GRID - 1); x++) {
+            score_place(p, s, y * PEER_GRID + x);
+        }
+    }
+}
+
+/* The best places: what seems best is taken when those around it have their scores too. */
 void scan(const peer &p, std::vector<peer_head> &out)
 {
-    static std::vector<peer_head> tried;
-    tried.clear();
-    for (const peer_ray &ray : p.rays) {
-        if (ray.state == peer_ray_state::seen) {
-            double length = std::hypot(ray.slope_x, ray.slope_y, 1.0);
-            double deep = DEEP_MM / length;
-            peer_head head =
-                mean_head(ray.point_mm[0] + deep * ray.slope_x,
-                          ray.point_mm[1] + deep * ray.slope_y, ray.point_mm[2] + deep);
-            head.score = peer_scan_score(p, head);
-            tried.push_back(head);
+    static scanner s;
+    const size_t first = out.size();
+    begin_scan(p, s);
+    while (out.size() < first + PLACES_MAX && !s.best.empty()) {
+        const scored best = s.best.top();
+        place &at = s.places[static_cast<size_t>(best.slot)];
+        if (at.is_there && !at.is_spread) {
+            at.is_spread = true;
+            score_around(p, s, best.slot);
+            continue;
+        }
+        s.best.pop();
+        if (at.is_there) {
+            out.push_back(at.head);
+            for (place &other : s.places) {
+                other.is_there = other.is_there && distance_mm(at.head, other.head) > SPACING_MM;
+            }
         }
     }
-    std::sort(tried.begin(), tried.end(),
+    std::sort(out.begin() + static_cast<std::ptrdiff_t>(first), out.end(),
               [](const peer_head &a, const peer_head &b) { return a.score > b.score; });
-    size_t first = out.size();
-    for (const peer_head &head : tried) {
-        bool is_free = std::none_of(
-            out.begin() + static_cast<std::ptrdiff_t>(first), out.end(),
-            [&head](const peer_head &other) { return distance_mm(head, other) <= SPACING_MM; });
-        if (is_free && out.size() < first + PLACES_MAX) {
-            out.push_back(head);
-        }
-    }
 }
 
 /* The centre of a nest: on the ray through the middle of its deeper ellipses, behind its front. */

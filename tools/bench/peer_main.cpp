@@ -47,11 +47,12 @@ void print_result(const peer &p)
     for (Eigen::Index i = 0; p.has_surface && i < p.surface_mm.size(); i++) {
         std::printf("%s%.2f", i > 0 ? "," : "", p.surface_mm.data()[i]);
     }
+    std::printf("],\"centres\":%d,\"points\":%d,\"head\":", PEER_CENTRES, PEER_POINTS);
     if (p.has_head) {
         const double *c = p.head.centre_mm;
-        std::printf("],\"head\":[%.2f,%.2f,%.2f]}\n", c[0], c[1], c[2]);
+        std::printf("[%.2f,%.2f,%.2f]}\n", c[0], c[1], c[2]);
     } else {
-        std::puts("],\"head\":null}");
+        std::puts("null}");
     }
 }
 

@@ -14,7 +14,10 @@ constexpr double BLUNT_MM2 = 2000;
 constexpr double TIP_MAX_MM = 70;
 constexpr double DEPTH_MAX_MM = 110;
 constexpr double END_DEPTH_MM = 50;
-constexpr int GAP_MAX = 8;
+constexpr int GAP_MAX = 3;
+constexpr double FREE_MM = 200;
+constexpr double FREE_BEHIND_MM = 80;
+constexpr double AREA_MIN = 0.5; /* grid cells */
 constexpr double SHRINK_MIN = 0.6;
 constexpr double JUMP = 3.2;
 constexpr double JUMP_MM2 = 2500;
@@ -36,12 +39,41 @@ bool is_minimum(const peer_grid &z, int y, int x)
     return true;
 }
 
+double step_at(const peer &p, double depth_mm)
+{
+    return depth_mm * p.rig.field_unit * 10 / 11;
+}
+
+/* Does the surface fall off this way from the node, or end, within the steps? */
+bool falls_off(const peer_grid &z, int y, int x, int down, int right, int steps)
+{
+    const double limit = z(y, x) + FREE_BEHIND_MM;
+    for (int i = 0; i < steps; i++) {
+        x += right;
+        y += down;
+        if (x < 0 || x == PEER_NODES || y < 0 || z(y, x) > limit) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* May a head be in front here? */
+bool is_free(const peer &p, int y, int x)
+{
+    const peer_grid &z = p.surface_mm;
+    const int steps =
+        static_cast<int>(std::min(FREE_MM / step_at(p, z(y, x)), static_cast<double>(PEER_NODES)));
+    return falls_off(z, y, x, 0, -1, steps) && falls_off(z, y, x, 0, 1, steps) &&
+           falls_off(z, y, x, -1, 0, steps);
+}
+
 void find_minima(peer &p)
 {
     p.nests.clear();
     for (int y = 1; y < PEER_NODES - 1; y++) {
         for (int x = 1; x < PEER_NODES - 1; x++) {
-            if (is_minimum(p.surface_mm, y, x)) {
+            if (is_minimum(p.surface_mm, y, x) && is_free(p, y, x)) {
                 double depth = p.surface_mm(y, x);
                 p.nests.push_back({x, y, depth, depth, depth, 0, 0, false, {}});
             }
@@ -57,35 +89,44 @@ void find_minima(peer &p)
 /* What supports a nest at a level. */
 struct support {
     bool wanted, found, whole;
+    const peer_contour *contour;
     peer_ellipse ellipse;
     double merit;
 };
 
 /* What a contour is for every nest that it surrounds; worked out when the first one asks. */
 struct study {
-    bool done, whole, outlined;
+    bool done, whole, is_tip, outlined; /* a tip's contour may have any shape */
     peer_ellipse ellipse;
     peer_outline outline;
     std::vector<peer_part> parts;
 };
 
-void study_contour(peer_kind kind, const peer_contour &contour, study &s)
+/* area: of a closed contour, grid cells; step_mm: of the grid at the level. */
+void study_contour(peer_kind kind, const peer_contour &contour, double area, double step_mm,
+                   study &s)
 {
     s.done = true;
     s.whole = contour.closed && peer_ellipse_whole(kind, contour, s.ellipse);
-    s.outlined = !s.whole && peer_outline_make(contour, s.outline);
+    s.is_tip =
+        contour.closed && !s.whole && area >= AREA_MIN && area * step_mm * step_mm < BLUNT_MM2;
+    if (s.is_tip) {
+        s.ellipse = {area, 0, 0}; /* no place is asked of a tip */
+    }
+    s.outlined = !s.whole && !s.is_tip && peer_outline_make(contour, s.outline);
     s.parts.clear();
     if (s.outlined) {
         peer_parts(kind, s.outline, s.parts);
     }
 }
 
-void find_supports(const peer &p, const std::vector<peer_contour> &contours,
+void find_supports(const peer &p, const std::vector<peer_contour> &contours, double step_mm,
                    std::vector<support> &supports)
 {
     static study s;
     for (const peer_contour &contour : contours) {
-        if (contour.closed && cv::contourArea(contour.vertex, true) <= 0) {
+        const double area = contour.closed ? cv::contourArea(contour.vertex, true) : 0;
+        if (contour.closed && area <= 0) {
             continue; /* around a maximum */
         }
         const cv::Rect box = cv::boundingRect(contour.vertex);
@@ -98,16 +139,16 @@ void find_supports(const peer &p, const std::vector<peer_contour> &contours,
                 continue;
             }
             if (!s.done) {
-                study_contour(p.kind, contour, s);
+                study_contour(p.kind, contour, area, step_mm, s);
             }
-            if (s.whole) {
-                to = {true, true, true, s.ellipse, 0};
+            if (s.whole || (s.is_tip && p.nests[i].slice.empty())) {
+                to = {true, true, true, &contour, s.ellipse, 0};
                 continue;
             }
             const peer_part *part =
                 s.outlined ? peer_part_around(s.outline, s.parts, node) : nullptr;
             if (part != nullptr && (!to.found || part->merit > to.merit)) {
-                to = {true, true, false, part->ellipse, part->merit};
+                to = {true, true, false, &contour, part->ellipse, part->merit};
             }
         }
     }
@@ -164,9 +205,24 @@ void extend(const peer &p, double level_mm, const support &from, peer_nest &nest
         return;
     }
     nest.gap = 0;
-    double step_mm = level_mm * p.rig.field_unit * 10 / 11;
+    const double step_mm = step_at(p, level_mm);
     peer_slice slice = {from.ellipse, 0, from.ellipse.area * step_mm * step_mm};
     add_slice(nest, level_mm, slice);
+}
+
+/* Of nests that have come to the same ellipse the nearest goes on. */
+void merge_nests(const std::vector<support> &supports, std::vector<peer_nest> &nests)
+{
+    for (size_t i = 1; i < nests.size(); i++) {
+        for (size_t k = 0; k < i && !nests[i].ended; k++) {
+            const support &a = supports[i], &b = supports[k];
+            if (!nests[k].ended && a.found && b.found && a.contour == b.contour &&
+                a.ellipse.area == b.ellipse.area) {
+                nests[i].ended = true;
+                nests[i].slice.clear();
+            }
+        }
+    }
 }
 
 } // namespace
@@ -197,11 +253,12 @@ void peer_find_nests(peer &p)
             continue; /* between two nests */
         }
         peer_cut(p.surface_mm, level_mm, contours);
-        find_supports(p, contours, supports);
+        find_supports(p, contours, step_at(p, level_mm), supports);
         for (size_t i = 0; i < p.nests.size(); i++) {
             if (supports[i].wanted) {
                 extend(p, level_mm, supports[i], p.nests[i]);
             }
         }
+        merge_nests(supports, p.nests);
     }
 }

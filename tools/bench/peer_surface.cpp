@@ -9,8 +9,8 @@ constexpr double RIDGE = 1e-5;
 constexpr double HUBER_MM = 60;
 constexpr double OVERSHOOT_MM = 200;
 constexpr size_t SAMPLES_MIN = 16;
+constexpr int CENTRES_STEPS = 48;
 
-using matrix = Eigen::MatrixXd; /* too large for Eigen's fixed sizes */
 using vector = Eigen::Matrix<double, PEER_TERMS, 1>;
 
 /* Rows of the basis at places (x, y) in field units. */
@@ -27,64 +27,125 @@ void fill_basis(const Eigen::ArrayXd &x, const Eigen::ArrayXd &y, peer_basis &ba
 }
 
 struct problem {
-    peer_basis basis, weighted;
-    Eigen::VectorXd off_mm, root_weight;
-    matrix normal; /* the lower half, without ridge */
-    vector right;
+    peer_basis basis;
+    Eigen::VectorXd off_mm, root_weight, residual_mm;
+    vector coefficients;
 };
 
-void assemble(problem &q)
+/* The normal equations, in A's double or in B's float. */
+template <typename real> struct equations {
+    using matrix = Eigen::Matrix<real, PEER_TERMS, PEER_TERMS>;
+    using rows = Eigen::Matrix<real, Eigen::Dynamic, PEER_TERMS>;
+    rows weighted;
+    matrix normal, ridged; /* the lower half */
+    Eigen::LLT<Eigen::Ref<matrix>, Eigen::Lower> factor{ridged};
+};
+
+template <typename real> void assemble(const problem &q, equations<real> &e)
 {
-    q.weighted = q.root_weight.asDiagonal() * q.basis;
-    q.normal.setZero(PEER_TERMS, PEER_TERMS);
-    q.normal.selfadjointView<Eigen::Lower>().rankUpdate(q.weighted.transpose());
-    q.right = q.weighted.transpose() * (q.root_weight.cwiseProduct(q.off_mm));
+    e.weighted = (q.root_weight.asDiagonal() * q.basis).template cast<real>();
+    e.normal.setZero();
+    e.normal.template selfadjointView<Eigen::Lower>().rankUpdate(e.weighted.transpose());
 }
 
-bool solve(const problem &q, vector &coefficients)
+template <typename real> bool factorise(equations<real> &e)
 {
-    static matrix ridged;
-    static Eigen::LLT<matrix, Eigen::Lower> factor;
-    ridged = q.normal;
-    ridged.diagonal() *= 1 + RIDGE;
-    factor.compute(ridged);
-    if (factor.info() != Eigen::Success) {
-        return false;
-    }
-    coefficients = factor.solve(q.right);
-    return true;
+    e.ridged = e.normal;
+    e.ridged.diagonal() *= static_cast<real>(1 + RIDGE);
+    e.factor.compute(e.ridged);
+    return e.factor.info() == Eigen::Success;
 }
 
 /* Root weights after the Huber step, and whose changed. */
-std::vector<int> reweigh(const problem &q, const vector &coefficients, Eigen::VectorXd &root_weight)
+std::vector<int> reweigh(const problem &q, Eigen::VectorXd &root_weight)
 {
-    Eigen::VectorXd residual = q.basis * coefficients - q.off_mm;
     std::vector<int> changed;
     root_weight = q.root_weight;
-    for (int i = 0; i < residual.size(); i++) {
-        if (std::abs(residual[i]) > HUBER_MM) {
-            root_weight[i] *= std::sqrt(HUBER_MM / std::abs(residual[i]));
+    for (int i = 0; i < root_weight.size(); i++) {
+        const double off_mm = std::abs(q.residual_mm[i]);
+        if (off_mm > HUBER_MM) {
+            root_weight[i] *= std::sqrt(HUBER_MM / off_mm);
             changed.push_back(i);
         }
     }
     return changed;
 }
 
-/* Take away what the changed rows weigh less now. */
-void update(problem &q, const std::vector<int> &changed, const Eigen::VectorXd &root_weight)
+/* Peer A: solved in double, summed anew for other weights. */
+void solve_directly(problem &q, const equations<double> &e)
 {
-    peer_basis less(changed.size(), PEER_TERMS);
-    Eigen::VectorXd less_mm(changed.size());
+    q.coefficients = e.factor.solve(e.weighted.transpose() * q.root_weight.cwiseProduct(q.off_mm));
+}
+
+bool fit_directly(problem &q)
+{
+    static equations<double> e;
+    Eigen::VectorXd root_weight;
+    assemble(q, e);
+    if (!factorise(e)) {
+        return false;
+    }
+    solve_directly(q, e);
+    q.residual_mm = q.off_mm - q.basis * q.coefficients;
+    if (!reweigh(q, root_weight).empty()) {
+        q.root_weight = root_weight;
+        assemble(q, e);
+        if (!factorise(e)) {
+            return false;
+        }
+        solve_directly(q, e);
+    }
+    return true;
+}
+
+/* Peer B: what is left is worked out in double, solved for in float and added, so often for each factor. */
+constexpr int CORRECTIONS = 2;
+
+void correct(problem &q, const equations<float> &e)
+{
+    for (int i = 0; i < CORRECTIONS; i++) {
+        vector right = q.basis.transpose() * q.root_weight.cwiseAbs2().cwiseProduct(q.residual_mm);
+        right -= RIDGE * e.normal.diagonal().cast<double>().cwiseProduct(q.coefficients);
+        q.coefficients += e.factor.solve(right.cast<float>()).cast<double>();
+        q.residual_mm = q.off_mm - q.basis * q.coefficients;
+    }
+}
+
+/* Take away what the changed rows weigh less now. */
+void update(problem &q, const std::vector<int> &changed, const Eigen::VectorXd &root_weight,
+            equations<float> &e)
+{
+    e.weighted.resize(static_cast<Eigen::Index>(changed.size()), PEER_TERMS);
     for (size_t i = 0; i < changed.size(); i++) {
-        int from = changed[i], to = static_cast<int>(i);
+        int from = changed[i];
         double root = std::sqrt(q.root_weight[from] * q.root_weight[from] -
                                 root_weight[from] * root_weight[from]);
-        less.row(to) = root * q.basis.row(from);
-        less_mm[to] = root * q.off_mm[from];
+        e.weighted.row(static_cast<int>(i)) = (root * q.basis.row(from)).cast<float>();
     }
-    q.normal.selfadjointView<Eigen::Lower>().rankUpdate(less.transpose(), -1.0);
-    q.right.noalias() -= less.transpose() * less_mm;
+    e.normal.selfadjointView<Eigen::Lower>().rankUpdate(e.weighted.transpose(), -1.0F);
     q.root_weight = root_weight;
+}
+
+bool fit_by_corrections(problem &q)
+{
+    static equations<float> e;
+    Eigen::VectorXd root_weight;
+    assemble(q, e);
+    if (!factorise(e)) {
+        return false;
+    }
+    q.coefficients.setZero();
+    q.residual_mm = q.off_mm;
+    correct(q, e);
+    std::vector<int> changed = reweigh(q, root_weight);
+    if (!changed.empty()) {
+        update(q, changed, root_weight, e);
+        if (!factorise(e)) {
+            return false;
+        }
+        correct(q, e);
+    }
+    return true;
 }
 
 } // namespace
@@ -94,9 +155,11 @@ double peer_node_place(int node)
     return (node - (PEER_NODES - 1) / 2) * 10.0 / 11.0;
 }
 
+/* Centres stand on nodes, as far apart as there are steps for each, as many on both sides of the middle. */
 double peer_centre_place(int centre)
 {
-    return (2 * centre - (PEER_CENTRES - 1)) * 20.0 / (PEER_CENTRES - 1);
+    const int steps = CENTRES_STEPS / PEER_CENTRES;
+    return peer_node_place((PEER_NODES - 1) / 2 + steps * centre - steps * (PEER_CENTRES - 1) / 2);
 }
 
 void peer_begin(peer &p, peer_kind kind, const peer_rig &rig)
@@ -116,7 +179,6 @@ void peer_begin(peer &p, peer_kind kind, const peer_rig &rig)
 void peer_fit_surface(peer &p)
 {
     static problem q;
-    static Eigen::VectorXd root_weight;
     int count = static_cast<int>(p.samples.size());
     Eigen::ArrayXd x(count), y(count);
     p.has_surface = false;
@@ -135,25 +197,11 @@ void peer_fit_surface(peer &p)
     double mean_mm = q.off_mm.mean();
     q.off_mm.array() -= mean_mm;
     fill_basis(x, y, q.basis);
-    vector coefficients;
-    assemble(q);
-    if (!solve(q, coefficients)) {
+    if (!(p.kind == peer_kind::a ? fit_directly(q) : fit_by_corrections(q))) {
         return;
     }
-    std::vector<int> changed = reweigh(q, coefficients, root_weight);
-    if (!changed.empty()) {
-        if (p.kind == peer_kind::a) {
-            q.root_weight = root_weight;
-            assemble(q);
-        } else {
-            update(q, changed, root_weight);
-        }
-        if (!solve(q, coefficients)) {
-            return;
-        }
-    }
     Eigen::Map<Eigen::VectorXd>(p.surface_mm.data(), PEER_NODES * PEER_NODES).noalias() =
-        p.node_basis * coefficients;
+        p.node_basis * q.coefficients;
     p.surface_mm =
         (p.surface_mm.array() + mean_mm).max(std::max(p.nearest_sample_mm - OVERSHOOT_MM, 1.0));
     p.nearest_node_mm = p.surface_mm.minCoeff();
