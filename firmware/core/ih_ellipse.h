@@ -14,8 +14,10 @@
  * Scaling and overflow: coordinates relative to the place, Q8 steps: |p| below 46 * 256 * 1.42 =
  *        2^14.1. An edge's cross product is at most |p| |edge|, its second-order factor at most
  *        3 * 2^27.1. Edges of a contour are shorter than 1.42 steps = 2^8.6: 2048 terms of
- *        2^(14.1 + 8.6 + 28.7) sum below 2^62.4. However many points a resampled one has, its edges, twice round, add up
- *        to at most 2 IH_PARTS_VERTICES_MAX 1.42 steps = 2^19.1: terms below 2^61.9. About the middle of an outline, from where sums are moved to the place, coordinates are half as great.
+ *        2^(14.1 + 8.6 + 28.7) sum below 2^62.4. However many points a resampled one has, its edges,
+ *        twice round, add up to at most 2 IH_PARTS_VERTICES_MAX 1.42 steps = 2^19.1: terms below
+ *        2^61.9. About the middle of an outline, from where sums are moved to the place, coordinates
+ *        are half as great.
  * Cost:  a closed contour: 40 operations a vertex. A part: some 100, 20 in 32 bits a step, and eight
  *        divisions.
  */
