@@ -17,13 +17,13 @@
 void ih_hypotheses_params_default(struct ih_hypotheses_params *params)
 {
     ih_ellipse_params_default(&params->ellipse);
-    params->level_step_mm = 10;
+    params->level_step_mm = 20;
     params->levels_behind_mm = 700;
     params->blunt_mm2 = 2000;
     params->tip_max_mm = 70;
     params->depth_max_mm = 80;
     params->end_depth_mm = 50;
-    params->gap_max = 3;
+    params->gap_max = 2;
     params->free_mm = 200;
     params->free_behind_mm = 80;
     params->is_tip_any = true;
@@ -34,6 +34,7 @@ void ih_hypotheses_params_paper(struct ih_hypotheses_params *params)
 {
     ih_hypotheses_params_default(params);
     params->ellipse.point_count = IH_PARTS_POINTS_MAX;
+    params->level_step_mm = 10;
     params->depth_max_mm = 110;
     params->gap_max = 8;
     params->free_mm = 0;
