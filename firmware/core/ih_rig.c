@@ -12,7 +12,6 @@
 #define NEWTON_STEPS 5
 #define NEWTON_MOST_Q28 (1 << 25)
 #define NEWTON_LAST_Q28 (1 << 9)
-#define TAN_MAX_Q28 (IH_RIG_TAN_MAX * ONE_Q28)
 /* Probes of the lens along each side of the frame, and how well they must come back. */
 #define LENS_PROBES 65
 #define LENS_ERROR_MAX_PX_Q12 20 /* 0.005 px */

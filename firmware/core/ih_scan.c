@@ -1,5 +1,7 @@
 #include "ih_scan.h"
 
+#include <string.h>
+
 #include "ih_fix.h"
 
 #define ONE_Q12 4096
@@ -185,8 +187,9 @@ static void bound(const struct ih_space *space, struct ih_scan_scratch *scratch,
 static int32_t begin(const struct ih_space *space, const struct ih_scan_params *params,
                      struct ih_scan_scratch *scratch)
 {
-    bool is_begun[BLOCKS * BLOCKS] = {false};
+    bool is_begun[BLOCKS * BLOCKS];
     int32_t count = 0;
+    memset(is_begun, 0, sizeof is_begun);
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
         const int32_t block = slot / IH_GRID / 2 * BLOCKS + slot % IH_GRID / 2;
         scratch->index[slot] = IH_NONE;

@@ -79,9 +79,10 @@ static void set_centres(int32_t centres, struct ih_surface_scratch *scratch)
     scratch->factor = is_few ? scratch->of.few.factor : scratch->of.many.factor;
     scratch->kept_count = is_few ? IH_SURFACE_ROWS_KEPT : 0;
     for (int32_t k = 0; k < centres; k++) {
-        const int64_t half_steps = (2 * k - (centres - 1)) * steps_of(scratch);
-        scratch->centre_q16[k] = (int32_t)ih_div_round(
-            half_steps * IH_SURFACE_STEP_NUMERATOR * 65536, 2 * IH_SURFACE_STEP_DENOMINATOR);
+        const int32_t half_steps = (2 * k - (centres - 1)) * steps_of(scratch);
+        scratch->centre_q16[k] =
+            (int32_t)ih_div_round((int64_t)half_steps * IH_SURFACE_STEP_NUMERATOR * 65536,
+                                  2 * IH_SURFACE_STEP_DENOMINATOR);
     }
 }
 
@@ -248,15 +249,16 @@ static void put_row(const struct ih_surface_scratch *scratch, const uint32_t *ro
     const int32_t terms = whole_blocks(scratch->terms);
     const uint32_t root_q15 = (uint32_t)root_weight_q15 << scratch->weight_shift;
     const uint32_t *scale_q17 = scratch->row_scale_q17;
+    const uint32_t *taken_q20 = row_q20;
     uint32_t weighted_q20[TERMS_MAX];
     if (root_q15 != 1 << 15) {
         for (int32_t i = 0; i < terms; i++) {
             weighted_q20[i] = (uint32_t)((uint64_t)row_q20[i] * root_q15 >> 15);
         }
-        row_q20 = weighted_q20;
+        taken_q20 = weighted_q20;
     }
     for (int32_t i = 0; i < terms; i++) {
-        const uint64_t entry = (uint64_t)row_q20[i] * scale_q17[i] + ((uint64_t)1 << (shift - 1));
+        const uint64_t entry = (uint64_t)taken_q20[i] * scale_q17[i] + ((uint64_t)1 << (shift - 1));
         pair[i] =
             is_second ? pair[i] | (uint32_t)(entry >> shift) << 16 : (uint32_t)(entry >> shift);
     }
