@@ -108,7 +108,7 @@ static void add_dot(struct ih_place *place, int32_t along_px_q12, int64_t across
 
 /* Where in the image, in the line's direction: where the line begins, and t from there. Unlike t it stays as it is
  * when the rig is turned, which moves no dot. Beginnings of 2^27.6 on each axis times a unit vector: 2^58.1, or
- * 2^28.1 px; with t below 2^29. */
+ * 2^28.1; with t of 2^27.9 below 2^29. */
 static int32_t along_image(const struct ih_line *line, int32_t t_px_q12)
 {
     int64_t begin_q42 = (int64_t)line->infinity_u_px_q12 * line->dir_u_q30 +
