@@ -168,7 +168,7 @@ def points(count, only=False):
 
 
 def levels(step_mm):
-    return [("ih_hypotheses.c", r"level_step_mm = 10;", "level_step_mm = %d;" % step_mm),
+    return [("ih_hypotheses.c", r"level_step_mm = 20;", "level_step_mm = %d;" % step_mm),
             define("ih_hypotheses.h", "IH_HYPOTHESES_SLICES_MAX", max(16, 110 // step_mm + 2))]
 
 

@@ -17,7 +17,7 @@
  * frame; undistortPoints; candidates on the 361 lines, seeds by affine rectangles, growing; points;
  * samples (clip, lonely points, missing dots filled in); 64 multiquadrics, weighted least squares
  * with a ridge, one Huber step, Eigen's LLT; 47x47 nodes from a table of the basis that is filled
- * once; contours by marching squares every 10 mm at levels that a nest waits for; nests, from minima that are
+ * once; contours by marching squares every 20 mm at levels that a nest waits for; nests, from minima that are
  * free on three sides, of ellipses, whole or cut by the best of all chords between 32 points, where a contour
  * is studied once for all the nests that it surrounds, when the first one asks, and a tip's may have any shape;
  * nests with one ellipse merged; the scan of a mean head behind one point of four, and behind those around

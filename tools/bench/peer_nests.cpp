@@ -8,13 +8,13 @@
 namespace
 {
 
-constexpr double LEVEL_STEP_MM = 10;
-constexpr int LEVELS = 70;
+constexpr double LEVEL_STEP_MM = 20;
+constexpr int LEVELS = 35;
 constexpr double BLUNT_MM2 = 2000;
 constexpr double TIP_MAX_MM = 70;
 constexpr double DEPTH_MAX_MM = 110;
 constexpr double END_DEPTH_MM = 50;
-constexpr int GAP_MAX = 3;
+constexpr int GAP_MAX = 2;
 constexpr double FREE_MM = 200;
 constexpr double FREE_BEHIND_MM = 80;
 constexpr double AREA_MIN = 0.5; /* grid cells */
