@@ -667,12 +667,10 @@ static void fill_table(struct ih_surface_scratch *scratch)
     }
 }
 
-/* sum_n c_n B_n in Q8 from a sum in Q(20 + coefficient_shift). */
-static int32_t depth_of_sum(const struct ih_surface_scratch *scratch, int32_t mean_mm_q8,
-                            int64_t sum)
+/* sum_n c_n B_n in Q8 from a sum in Q(8 + shift). */
+static inline int32_t depth_of_sum(int shift, int32_t mean_mm_q8, int64_t sum)
 {
-    int shift = 20 + scratch->coefficient_shift - 8;
-    int64_t depth_q8 = shift >= 0 ? ih_shift_round(sum, ih_min_s32(shift, 62)) : INT32_MAX;
+    const int64_t depth_q8 = shift >= 0 ? ih_shift_round(sum, shift) : INT32_MAX;
     return ih_saturate_s32(mean_mm_q8 + depth_q8);
 }
 
@@ -712,31 +710,22 @@ static void fold_table(struct ih_surface_scratch *scratch)
     }
 }
 
-/* Add what `count` centres of a row bring, folded, to half a row of nodes. */
-__attribute__((always_inline)) static inline void
-add_half(const int32_t coefficient[HALF_CENTRES_MAX],
-         int32_t basis_q20[HALF_CENTRES_MAX][IH_SURFACE_HALF], int32_t count,
-         int64_t sum[IH_SURFACE_HALF])
+/* Add what four centres of a row bring, folded, to half a row of nodes: two of them are added to the others' two. */
+static void add_two(const int32_t *coefficient, int32_t basis_q20[2][IH_SURFACE_HALF],
+                    int64_t sum[IH_SURFACE_HALF])
 {
+    const int32_t first = coefficient[0], second = coefficient[1];
     for (int32_t x = 0; x < IH_SURFACE_HALF; x++) {
-        int64_t here = sum[x];
-#pragma GCC unroll 6
-        for (int32_t k = 0; k < count; k++) {
-            here += (int64_t)coefficient[k] * basis_q20[k][x];
-        }
-        sum[x] = here;
+        sum[x] += (int64_t)first * basis_q20[0][x] + (int64_t)second * basis_q20[1][x];
     }
 }
 
-/* Loops over a number that compilers know have all of a place's products in registers. */
 static void add_row(const int32_t coefficient[HALF_CENTRES_MAX],
                     int32_t basis_q20[HALF_CENTRES_MAX][IH_SURFACE_HALF], int32_t count,
                     int64_t sum[IH_SURFACE_HALF])
 {
-    if (count == IH_SURFACE_CENTRES_FEW / 2) {
-        add_half(coefficient, basis_q20, IH_SURFACE_CENTRES_FEW / 2, sum);
-    } else {
-        add_half(coefficient, basis_q20, HALF_CENTRES_MAX, sum);
+    for (int32_t k = 0; k < count; k += 2) {
+        add_two(&coefficient[k], &basis_q20[k], sum);
     }
 }
 
@@ -768,17 +757,21 @@ static void sum_row(struct ih_surface_scratch *scratch, int32_t y, int64_t sum[I
 static void evaluate(const struct ih_samples *samples, struct ih_surface_scratch *scratch,
                      struct ih_surface *out)
 {
-    int32_t least_q8 = least_depth_mm_q8(samples);
-    out->nearest_mm_q8 = INT32_MAX;
+    const int shift = ih_min_s32(20 + scratch->coefficient_shift - 8, 62);
+    const int32_t least_q8 = least_depth_mm_q8(samples);
+    const int32_t mean_mm_q8 = out->mean_mm_q8;
+    int32_t nearest_q8 = INT32_MAX;
     for (int32_t y = 0; y < IH_SURFACE_GRID; y++) {
         int64_t sum[IH_SURFACE_GRID];
         sum_row(scratch, y, sum);
         for (int32_t x = 0; x < IH_SURFACE_GRID; x++) {
-            int32_t depth_q8 = depth_of_sum(scratch, out->mean_mm_q8, sum[x]);
-            out->depth_mm_q8[y][x] = ih_clamp_s32(depth_q8, least_q8, IH_SURFACE_DEPTH_MAX_MM << 8);
-            out->nearest_mm_q8 = ih_min_s32(out->nearest_mm_q8, out->depth_mm_q8[y][x]);
+            const int32_t depth_q8 = ih_clamp_s32(depth_of_sum(shift, mean_mm_q8, sum[x]), least_q8,
+                                                  IH_SURFACE_DEPTH_MAX_MM << 8);
+            out->depth_mm_q8[y][x] = depth_q8;
+            nearest_q8 = ih_min_s32(nearest_q8, depth_q8);
         }
     }
+    out->nearest_mm_q8 = nearest_q8;
 }
 
 void ih_surface_fit(const struct ih_samples *samples, const struct ih_field *field,
