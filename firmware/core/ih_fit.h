@@ -8,7 +8,7 @@
  *        place s in the ellipsoid's units and f = |s|, its residual is its distance to first order,
  *        r = (f - 1) / |grad f| = (f - 1) f / |s/a|. Its derivatives are those of f over |grad f|:
  *        -(s/a) / |s/a| by the centre, -s_i^2 / |s/a| by ln a_i. Robust weight (1 + (r / k)^2)^-2,
- *        0 beyond 8 k, k = 24, 16 and then 8 mm; points low on the head count less, linearly from
+ *        0 beyond 5 k, k = 24, 16 and then 8 mm; points low on the head count less, linearly from
  *        all at s_y = 0.5 to half at 0.8 and below: there the neck begins. Points within 0.05 of
  *        the centre have no direction, points out of IH_ELLIPSOID_REACH no say.
  *        A ray that hits the ellipsoid although its point lies more than see_through_mm behind the

@@ -15,7 +15,7 @@
 #define ONE_Q14 (1 << 14)
 #define ONE_Q16 (1 << 16)
 /* Points farther than this many robust scales weigh less than 1/4000 and are passed over. */
-#define ROBUST_REACH 8
+#define ROBUST_REACH 5
 /* Places nearer to the centre than this have no direction. */
 #define RADIUS_LEAST2_Q22 10481 /* 0.05 squared */
 #define LOW_FROM_Q14 8192       /* 0.5 */
@@ -499,7 +499,7 @@ struct step {
     int32_t front_mm_q8;    /* nothing is entered before */
 };
 
-/* A residual is at least (f - 1) times the shortest semi-axis: it has no weight from f = 1 + 8 k / a
+/* A residual is at least (f - 1) times the shortest semi-axis: it has no weight from f = 1 + 5 k / a
  * on. A 64th more for what is rounded. */
 static void begin_step(struct step *step, const struct ih_row_rays *rays)
 {

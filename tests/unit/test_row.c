@@ -114,7 +114,7 @@ static int64_t plain_weight(int64_t residual, int64_t scale, int32_t down)
 {
     int64_t ratio2, sum, low, over;
 
-    if (llabs(residual) > 8 * scale * 256) {
+    if (llabs(residual) > 5 * scale * 256) {
         return 0;
     }
     ratio2 = ih_div_round(residual * residual, scale * scale);
@@ -285,7 +285,7 @@ static void points_around_give_the_plain_sums(void)
                     ray->point_mm_q8[axis] = e.centre_mm_q8[axis];
                 }
                 ray->point_mm_q8[slot % 3] +=
-                    semi_q8 + 8 * scale_mm * 256 + (int32_t)ih_test_between(&random, -9, 9);
+                    semi_q8 + 5 * scale_mm * 256 + (int32_t)ih_test_between(&random, -9, 9);
             }
         }
         count = check(&e, scale_mm, "around", pass);

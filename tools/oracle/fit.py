@@ -13,7 +13,7 @@ from ellipsoid import MEAN_SEMI_MM
 from rig import from_q, to_q
 
 ROBUST_MM = (24, 16, 8, 8, 8, 8)
-ROBUST_REACH = 8
+ROBUST_REACH = 5
 RADIUS_LEAST = 0.05
 LOW_FROM, LOW_TO, LOW_WEIGHT = 0.5, 0.8, 0.5
 SEE_THROUGH_MM, PUSH_MAX_MM, PUSH_WEIGHT = 60, 30, 0.5
