@@ -92,15 +92,14 @@ static bool falls_off(const struct ih_surface *surface, int32_t x, int32_t y, in
                       int32_t down, int32_t steps, int32_t behind_mm_q8)
 {
     const int32_t limit_mm_q8 = surface->depth_mm_q8[y][x] + behind_mm_q8;
-    int32_t i = 1;
-    for (; i <= steps; i++) {
-        x += right;
-        y += down;
-        if (x < 0 || x == IH_SURFACE_GRID || y < 0 || surface->depth_mm_q8[y][x] > limit_mm_q8) {
-            break;
-        }
+    bool is_behind = false;
+    for (int32_t i = 1; i <= steps && !is_behind; i++) {
+        const int32_t u = x + i * right;
+        const int32_t v = y + i * down;
+        is_behind =
+            u < 0 || u == IH_SURFACE_GRID || v < 0 || surface->depth_mm_q8[v][u] > limit_mm_q8;
     }
-    return i <= steps;
+    return is_behind;
 }
 
 /* May a head be in front here? */

@@ -240,7 +240,8 @@ static inline lanes ln_slopes(const int32_t *place_q14, const uint32_t *inverse)
 static void find_gradients(const struct inverses *inverses, struct ih_rows *rows, int32_t count)
 {
     for (int32_t k = 0; k < count; k += LANES / 2) {
-        lanes radius2 = ALL_64(0), length2 = ALL_64(0);
+        lanes radius2 = ALL_64(0);
+        lanes length2 = ALL_64(0);
         for (int axis = 0; axis < 3; axis++) {
             const int64_t inverse = inverses->axis[axis];
             const lanes all = ALL_64((int64_t)((uint64_t)inverse << 32) | inverse);

@@ -739,8 +739,8 @@ static void sum_row(struct ih_surface_scratch *scratch, int32_t y, int64_t sum[I
     for (int32_t row = 0; row < scratch->centres; row++) {
         const int32_t *solution = &scratch->coefficient[row * scratch->centres];
         const int32_t b = ih_abs_s32(y - centre_node(scratch, row));
-        int32_t both[HALF_CENTRES_MAX];
-        int32_t between[HALF_CENTRES_MAX];
+        int32_t both[HALF_CENTRES_MAX] = {0};
+        int32_t between[HALF_CENTRES_MAX] = {0};
         for (int32_t k = 0; k < half; k++) {
             both[k] = solution[k] + solution[last - k];
             between[k] = solution[k] - solution[last - k];

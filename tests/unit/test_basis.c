@@ -269,7 +269,7 @@ static void changed_sums_are_those_of_the_new_weights(void)
     sum_all(&samples, &scratch, &out, false);
     calls += 2 * ((samples.sample_count + IH_NORMAL_ROWS - 1) / IH_NORMAL_ROWS);
     for (i = 0; i < scratch.terms; i++) {
-        const int32_t *line = &scratch.normal[ih_normal_line(i)];
+        const int32_t *line = scratch.normal + ih_normal_line(i);
         int32_t j;
 
         for (j = 0; j <= i; j++) {
