@@ -627,12 +627,13 @@ static int32_t solved(uint64_t rest, int32_t pivot)
 /* F^T v = b, in b's unit: v in b's place. */
 IH_WRAPPING static void solve_first(const int32_t *line, int32_t term_count, int32_t *b)
 {
+    const int32_t last = term_count - 1;
     uint64_t rest[TERMS_MAX];
-    for (int32_t k = 0; k < term_count; k++) {
+    for (int32_t k = 0; k <= last; k++) {
         rest[k] = IH_WRAPS(uint64_t, (int64_t)b[k] * (1 << FACTOR_BITS));
     }
     /* Two at a time: what is left is loaded and stored half as often. */
-    for (int32_t p = term_count - 1; p > 0; p -= 2) {
+    for (int32_t p = last; p > 0; p -= 2) {
         const int32_t *row = &line[ih_normal_line(p)], *next = &line[ih_normal_line(p - 1)];
         b[p] = solved(rest[p], row[p]);
         const int32_t less = -b[p];

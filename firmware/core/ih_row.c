@@ -632,8 +632,8 @@ static void weigh_points(const struct step *step, struct ih_rows *rows)
         }
         rows->inverse[k] = weight_q16 > 0 ? distance.inverse : 0;
         rows->weight_q16[k] = (uint16_t)ih_min_s32(weight_q16, UINT16_MAX);
-        rows->residual_mm_q10[k] =
-            weight_q16 > 0 ? residual_of(weight_q16, distance.residual_mm_q8) : (int16_t)0;
+        const int16_t residual = residual_of(weight_q16, distance.residual_mm_q8);
+        rows->residual_mm_q10[k] = residual; /* 0 without weight */
     }
 }
 
