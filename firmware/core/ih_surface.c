@@ -213,7 +213,7 @@ static void set_row_scale(struct ih_surface_scratch *scratch, const struct ih_sa
     uint32_t ratio = 0;
     memset(far_q18, 0, sizeof far_q18);
     for (int32_t i = 0; i < samples->sample_count; i++) {
-        uint32_t square_q18[2][CENTRES_MAX] = {{0}};
+        uint32_t square_q18[2][CENTRES_MAX] = {{0}, {0}};
         square_distances(scratch, samples->sample[i].x_q16, square_q18[0]);
         square_distances(scratch, samples->sample[i].y_q16, square_q18[1]);
         for (int32_t k = 0; k < scratch->centres; k++) {
