@@ -33,7 +33,7 @@
 /* A correction leaves an error that is to it as it is to the one before. Another one is made while the sum of
  * that error's squares may be above 2^-8, so often at the most. The unknowns are measured, not what they change
  * at the samples: the less a direction is seen by samples, the more it counts. What only decides about weights
- * may be farther off. In frames one correction nearly always is enough, and the worst node is 0.02 mm off. */
+ * may be farther off. In frames one correction nearly always is enough, and the worst node is 0.05 mm off. */
 #define SQUARES_LOG2_ENOUGH (-8)
 #define SQUARES_LOG2_FOR_WEIGHTS 4
 #define CORRECTIONS_MAX 8

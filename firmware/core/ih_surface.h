@@ -23,7 +23,7 @@
  *        sum below 2^62. N is scaled by 0.995 / sqrt(N_ii) each way to diagonal 0.99 in Q30; the ridge keeps
  *        the least pivot above 2.6e-3 where weights are as ih_samples makes them. docs/numerics.md goes on.
  * Error: within 0.2 mm of the float64 solution of the same system, everywhere on the grid, for
- *        depths that span up to 1.5 m (ih_samples clips them); it grows with the span. 0.04 mm on frames.
+ *        depths that span up to 1.5 m (ih_samples clips them); it grows with the span. 0.05 mm on frames.
  * Cost:  n = centres^2: samples x 3 n roots of ih_basis, and of the far ones n more, as often multiplied twice;
  *        samples x n (n + 8) / 2 short multiply-adds, and again twice those whose weight changed; two
  *        factorisations, four solutions; grid x n / 2 multiply-adds. So 64 centres cost a third of 144.
