@@ -233,7 +233,7 @@ def case_trace(records):
         if (trace["result"]["head"], trace["result"]["selected"]) != (record["heads"], record["head"]):
             problems.append("frame %d: the result is not the record's" % index)
     result("trace: a part per slice that is not whole, with its moments; the record's findings and result",
-           "; ".join(problems) or (None if whole > 20 and parts > 20 else "hardly any slices"))
+           "; ".join(problems) or (None if whole > 5 and parts > 20 else "hardly any slices: %d, %d" % (whole, parts)))
 
 
 def pdf_words(path, *how):
