@@ -92,14 +92,14 @@ static inline int32_t whole_blocks(int32_t terms)
     return terms & ~15;
 }
 
-/* Squares of a place's distances from the centres of a row, Q18: below 60^2. */
+/* Squares of a place's distances from the centres of a row, Q18: below 60^2; and `more`. */
 static void square_distances(const struct ih_surface_scratch *scratch, int32_t place_q16,
-                             uint32_t *restrict square_q18)
+                             uint32_t more_q18, uint32_t *restrict square_q18)
 {
     const int32_t centres = scratch->centres & ~3;
     for (int32_t k = 0; k < centres; k++) {
         const int32_t d_q16 = place_q16 - scratch->centre_q16[k];
-        square_q18[k] = (uint32_t)((int64_t)d_q16 * d_q16 >> 14);
+        square_q18[k] = (uint32_t)((int64_t)d_q16 * d_q16 >> 14) + more_q18;
     }
 }
 
@@ -109,11 +109,8 @@ static void fill_row(struct ih_surface_scratch *scratch, const struct ih_sample 
 {
     uint32_t dx2_q18[CENTRES_MAX];
     uint32_t dy2_q18[CENTRES_MAX];
-    square_distances(scratch, sample->x_q16, dx2_q18);
-    square_distances(scratch, sample->y_q16, dy2_q18);
-    for (int32_t k = 0; k < scratch->centres; k++) {
-        dx2_q18[k] += 1 << 18;
-    }
+    square_distances(scratch, sample->x_q16, 1 << 18, dx2_q18);
+    square_distances(scratch, sample->y_q16, 0, dy2_q18);
     ih_basis_roots(dx2_q18, scratch->centres, dy2_q18, scratch->centres, row_q20);
     IH_IN_RANGE(row_q20[0], (1 << 20) - 1, IH_RANGE_BASIS_Q20);
 }
@@ -214,8 +211,8 @@ static void set_row_scale(struct ih_surface_scratch *scratch, const struct ih_sa
     memset(far_q18, 0, sizeof far_q18);
     for (int32_t i = 0; i < samples->sample_count; i++) {
         uint32_t square_q18[2][CENTRES_MAX] = {{0}, {0}};
-        square_distances(scratch, samples->sample[i].x_q16, square_q18[0]);
-        square_distances(scratch, samples->sample[i].y_q16, square_q18[1]);
+        square_distances(scratch, samples->sample[i].x_q16, 0, square_q18[0]);
+        square_distances(scratch, samples->sample[i].y_q16, 0, square_q18[1]);
         for (int32_t k = 0; k < scratch->centres; k++) {
             for (int axis = 0; axis < 2; axis++) {
                 const uint32_t here = square_q18[axis][k];
