@@ -9,8 +9,8 @@ from frames import as_of_host, host_records
 from run import LASER, SOON_S, expect
 
 FRAMES = 20
-# What a slow line carries in the time of a frame, at most; a record has about 1000.
-SLOW_BYTES = 200
+# What a slow line carries in the time of a frame, at most; a record has 250 to 600.
+SLOW_BYTES = 50
 SERIAL = "/dev/ttyS0"
 # A port without a receiver.
 NOBODY = "udp:127.0.0.1:9"
