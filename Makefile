@@ -150,7 +150,7 @@ bench-grow: sim ## how the instructions of a frame grow with its size, dots, cen
 	@tools/setup.sh bench
 	@/usr/bin/python3 tools/bench/grow.py
 
-bench-worst: sim ## which of 10,000 frames costs most, and why; an hour
+bench-worst: sim ## which of 10,000 frames costs most, and why; up to 20 minutes
 	@tools/setup.sh size
 	@tools/setup.sh bench
 	@/usr/bin/python3 tools/bench/worst.py --plugin-header $(QEMU_PLUGIN_DIR)
