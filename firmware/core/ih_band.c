@@ -112,16 +112,15 @@ static inline void take_lanes(const uint8_t *pixel, uint16_t *three, uint16_t *b
     store(_mm256_add_epi16(sum, middle), binomial);
 }
 
-/* respond_bytes of IH_LANES pixels: (2048 i + 2^14) / 2^15 is (i + 8) / 16. */
+/* respond_bytes of IH_LANES pixels: (8 i 20736 + 2^14) / 2^15 is (81 i + 8) / 16. */
 static inline void respond_lanes(const uint16_t *above, const uint16_t *middle,
                                  const uint16_t *below, const uint16_t *nine, int16_t *response)
 {
     const __m256i row = load(middle);
     const __m256i sum =
         _mm256_add_epi16(_mm256_add_epi16(_mm256_add_epi16(row, load(above)), load(below)), row);
-    const __m256i fives = _mm256_mullo_epi16(sum, _mm256_set1_epi16(INNER_WEIGHT / OUTER_WEIGHT));
-    const __m256i sixteenth = _mm256_mulhrs_epi16(sum, _mm256_set1_epi16(32768 / OUTER_WEIGHT));
-    const __m256i inside = _mm256_add_epi16(fives, sixteenth);
+    const __m256i inside =
+        _mm256_mulhrs_epi16(_mm256_slli_epi16(sum, 3), _mm256_set1_epi16(INNER_WEIGHT * 256));
     const __m256i less = _mm256_sub_epi16(inside, load(nine));
     store(_mm256_sub_epi16(_mm256_sub_epi16(less, load(&nine[IH_BAND_SIDE])),
                            load(&nine[2 * IH_BAND_SIDE])),
