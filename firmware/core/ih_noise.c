@@ -102,6 +102,91 @@ static uint16_t block_median(const struct ih_noise_scratch *scratch, int32_t col
     return median_of(value, count);
 }
 
+#if !IH_WORDS
+/* Blocks whose medians are looked for at once: each step of one waits for the step before. */
+#define ABREAST 8
+
+/* How many of the values of a block are at most so large. */
+static int32_t at_most_of_bytes(const uint8_t value[SAMPLES_MAX], uint8_t limit)
+{
+#ifdef __AVX2__
+    const __m256i last = _mm256_set1_epi8((char)limit);
+    int32_t count = 0;
+    for (int32_t i = 0; i < SAMPLES_MAX; i += 32) {
+        const __m256i some = _mm256_loadu_si256((const __m256i *)(const void *)&value[i]);
+        const __m256i is_at_most = _mm256_cmpeq_epi8(_mm256_max_epu8(some, last), last);
+        count += __builtin_popcount((uint32_t)_mm256_movemask_epi8(is_at_most));
+    }
+    return count;
+#elif IH_LANES != 0
+    const __m128i last = _mm_set1_epi8((char)limit);
+    __m128i count = _mm_setzero_si128();
+    for (int32_t i = 0; i < SAMPLES_MAX; i += 16) {
+        const __m128i some = _mm_loadu_si128((const __m128i *)(const void *)&value[i]);
+        count = _mm_sub_epi8(count, _mm_cmpeq_epi8(_mm_max_epu8(some, last), last));
+    }
+    const __m128i halves = _mm_sad_epu8(count, _mm_setzero_si128());
+    return _mm_cvtsi128_si32(_mm_add_epi32(halves, _mm_unpackhi_epi64(halves, halves)));
+#else
+    uint8_t count = 0;
+    for (int32_t i = 0; i < SAMPLES_MAX; i++) {
+        count = (uint8_t)(count + (value[i] <= limit));
+    }
+    return count;
+#endif
+}
+
+/* |R| of a block's pixels, limited to 8 bits, and how many they are; what is missing is as large as any. */
+static int32_t limit_block(const struct ih_noise_scratch *scratch, int32_t column, int32_t rows,
+                           uint8_t limited[SAMPLES_MAX])
+{
+    const int32_t first = column * IH_NOISE_BLOCK;
+    const int32_t width = ih_min_s32(IH_NOISE_BLOCK, scratch->band.width - first);
+    memset(limited, UINT8_MAX, SAMPLES_MAX);
+    for (int32_t row = 0; row < rows; row++) {
+        const int16_t *response = &scratch->response[row][first];
+        for (int32_t u = 0; u < width; u++) {
+            const int16_t size = (int16_t)(response[u] < 0 ? -response[u] : response[u]);
+            limited[row * IH_NOISE_BLOCK + u] = (uint8_t)(size < UINT8_MAX ? size : UINT8_MAX);
+        }
+    }
+    return rows * width;
+}
+
+/* Medians of a row of blocks. Nearly all are small: they are looked for in 8 bits. */
+static void block_medians(const struct ih_noise_scratch *scratch, int32_t columns, int32_t rows,
+                          uint16_t *median)
+{
+    for (int32_t first = 0; first < columns; first += ABREAST) {
+        const int32_t abreast = ih_min_s32(ABREAST, columns - first);
+        uint8_t limited[ABREAST][SAMPLES_MAX];
+        int32_t count[ABREAST];
+        int32_t low[ABREAST] = {0};
+        for (int32_t i = 0; i < abreast; i++) {
+            count[i] = limit_block(scratch, first + i, rows, limited[i]);
+        }
+        for (int32_t half = (UINT8_MAX + 1) / 2; half > 0; half /= 2) {
+            for (int32_t i = 0; i < abreast; i++) {
+                const uint8_t last = (uint8_t)(low[i] + half - 1);
+                low[i] += at_most_of_bytes(limited[i], last) > count[i] / 2 ? 0 : half;
+            }
+        }
+        for (int32_t i = 0; i < abreast; i++) {
+            median[first + i] =
+                low[i] < UINT8_MAX ? (uint16_t)low[i] : block_median(scratch, first + i, rows);
+        }
+    }
+}
+#else
+static void block_medians(const struct ih_noise_scratch *scratch, int32_t columns, int32_t rows,
+                          uint16_t *median)
+{
+    for (int32_t column = 0; column < columns; column++) {
+        median[column] = block_median(scratch, column, rows);
+    }
+}
+#endif
+
 static bool is_any_subtracted(const struct ih_noise *noise, int32_t above, int32_t below)
 {
     uint32_t any = 0;
@@ -225,9 +310,7 @@ static void measure(const struct ih_frame *frame, const struct ih_frame *ambient
                 filter_grey(frame, ambient, v, out, scratch, response);
             }
         }
-        for (int32_t column = 0; column < out->columns; column++) {
-            out->median[block_row][column] = block_median(scratch, column, count);
-        }
+        block_medians(scratch, out->columns, count, out->median[block_row]);
     }
 }
 
