@@ -81,7 +81,7 @@ static uint16_t *three_of(struct ih_band *band)
 
 static uint16_t *binomial_of(struct ih_band *band, int32_t ago)
 {
-    return &band->binomial[(uint32_t)(band->rows_in + IH_BAND_KEPT - ago) % IH_BAND_KEPT][1];
+    return band->binomial[(uint32_t)(band->rows_in + IH_BAND_KEPT - ago) % IH_BAND_KEPT];
 }
 
 #ifdef __AVX2__
@@ -351,7 +351,7 @@ void ih_band_columns(const struct ih_band *band, int32_t rows, uint16_t *sum)
 {
     memset(sum, 0, (size_t)band->width * sizeof sum[0]);
     for (int32_t row = band->rows_in - rows; row < band->rows_in; row++) {
-        const uint16_t *binomial = &band->binomial[row % IH_BAND_KEPT][1 + IH_BAND_SIDE];
+        const uint16_t *binomial = &band->binomial[row % IH_BAND_KEPT][IH_BAND_SIDE];
         const uint16_t *three = &band->three[row % IH_BAND_ROWS][IH_BAND_SIDE];
         for (int32_t u = 0; u < band->width; u++) {
             sum[u] = (uint16_t)(sum[u] + binomial[u] - three[u]);

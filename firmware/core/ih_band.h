@@ -57,9 +57,9 @@ struct ih_band {
     bool is_bytes;   /* sums of bytes, else of 12 bits */
     /* Of three pixels around each, from IH_BAND_SIDE to the left of the frame on, edge pixels repeated
      * outside: rings of sums and of 1-2-1, and sums of the newest nine rows. */
-    uint16_t three[IH_BAND_ROWS][IH_BAND_SUMS];
-    uint16_t binomial[IH_BAND_KEPT][IH_BAND_SUMS + 2]; /* from [1] on: pixel 0's is aligned */
-    union {
+    _Alignas(IH_ALIGNMENT) uint16_t three[IH_BAND_ROWS][IH_BAND_SUMS];
+    _Alignas(IH_ALIGNMENT) uint16_t binomial[IH_BAND_KEPT][IH_BAND_SUMS + IH_ALIGNMENT / 2];
+    _Alignas(IH_ALIGNMENT) union {
         uint16_t of_bytes[IH_BAND_SUMS];
         uint32_t of_grey_q4[IH_BAND_SUMS];
     } nine;

@@ -12,6 +12,10 @@
 /* Slots of the dot table; slot = row * IH_GRID + column. */
 #define IH_SLOTS (IH_GRID * IH_GRID)
 
+/* Rows of pixels begin at multiples of this many bytes, the greatest vector's size: what lies across two
+ * of a processor's cache lines takes twice as long to store. Costs less than so many bytes a table. */
+#define IH_ALIGNMENT 32
+
 /* Frame sizes that are accepted. The widest frame costs 72 * IH_FRAME_WIDTH_MAX bytes
  * of row buffer in ih_dots. Range images may be smaller than camera frames. */
 #define IH_FRAME_WIDTH_MIN 320
