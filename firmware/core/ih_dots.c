@@ -13,8 +13,14 @@
 #define PLATEAU_REACH 4
 /* and its ring is at most so far from the peak. */
 #define SHIFT_MAX 2
+/* Columns that are worked out for a centre: those that it needs, or as many as vectors have lanes. */
+#define CENTRE_SIDE (2 * CENTRE_REACH + 1)
+#if IH_LANES != 0
+#define CENTRE_COLUMNS 8
+#else
+#define CENTRE_COLUMNS CENTRE_SIDE
+#endif
 #define TWIN_PX_Q12 (3 * 4096)
-#define RING_PLACES 16
 /* So many pixels are passed over at once where none is above its threshold. */
 #define GROUP 32
 
@@ -35,8 +41,8 @@ static void clear_outside(struct ih_dots_scratch *scratch, int32_t row)
 {
     int16_t *response = scratch->rows.finding.response[row];
     const int32_t end =
-        row < IH_DOTS_REACH ? 0 : IH_DOTS_REACH + scratch->width; /* above the frame all of it */
-    memset(response, 0, IH_DOTS_REACH * sizeof response[0]);
+        row < IH_DOTS_REACH ? 0 : IH_DOTS_SIDE + scratch->width; /* above the frame all of it */
+    memset(response, 0, IH_DOTS_SIDE * sizeof response[0]);
     memset(&response[end], 0,
            sizeof scratch->rows.finding.response[0] - (size_t)end * sizeof response[0]);
 }
@@ -99,62 +105,128 @@ static void insert_dot(struct ih_dots *out, struct ih_dot dot)
 static int16_t *response_row(struct ih_dots_scratch *scratch, int32_t v)
 {
     const uint32_t row = (uint32_t)(v + IH_DOTS_REACH);
-    return &scratch->rows.finding.response[row % IH_DOTS_ROWS][IH_DOTS_REACH];
+    return &scratch->rows.finding.response[row % IH_DOTS_ROWS][IH_DOTS_SIDE];
 }
 
-static bool stands_alone(struct ih_dots_scratch *scratch, int32_t u, int32_t v, int32_t limit)
+/* Rows of R around one row, which is in the middle; pixel 0 of each. */
+struct near {
+    const int16_t *row[IH_DOTS_ROWS];
+};
+
+static void lay_near(struct ih_dots_scratch *scratch, int32_t v, struct near *out)
 {
-    static const int8_t ring[RING_PLACES][2] = {
-        {4, 0},  {4, 2},   {3, 3},   {2, 4},   {0, 4},  {-2, 4}, {-3, 3}, {-4, 2},
-        {-4, 0}, {-4, -2}, {-3, -3}, {-2, -4}, {0, -4}, {2, -4}, {3, -3}, {4, -2},
-    };
-    for (int32_t i = 0; i < RING_PLACES; i++) {
-        if (response_row(scratch, v + ring[i][1])[u + ring[i][0]] > limit) {
-            return false;
-        }
+    uint32_t row = (uint32_t)v % IH_DOTS_ROWS;
+    for (int32_t i = 0; i < IH_DOTS_ROWS; i++) {
+        out->row[i] = &scratch->rows.finding.response[row][IH_DOTS_SIDE];
+        row = row + 1 == IH_DOTS_ROWS ? 0 : row + 1;
     }
-    return true;
+}
+
+static const int16_t *near_row(const struct near *near, int32_t dv)
+{
+    return near->row[IH_DOTS_REACH + dv];
+}
+
+/* The greatest of two places to both sides of a pixel. */
+static inline int32_t beside_at(const int16_t *pixel, int32_t distance)
+{
+    return ih_max_s32(pixel[-distance], pixel[distance]);
+}
+
+/* Around a pixel of row dv. Nothing is left out when one is above the limit: which one cannot be
+ * foreseen, and a wrong guess costs a processor more than all of them. */
+static bool stands_alone(const struct near *near, int32_t u, int32_t dv, int32_t limit)
+{
+    const int16_t *top = &near_row(near, dv - 4)[u];
+    const int16_t *bottom = &near_row(near, dv + 4)[u];
+    int32_t most = ih_max_s32(top[0], bottom[0]);
+    most = ih_max_s32(most, beside_at(top, 2));
+    most = ih_max_s32(most, beside_at(bottom, 2));
+    most = ih_max_s32(most, beside_at(&near_row(near, dv - 3)[u], 3));
+    most = ih_max_s32(most, beside_at(&near_row(near, dv + 3)[u], 3));
+    most = ih_max_s32(most, beside_at(&near_row(near, dv - 2)[u], 4));
+    most = ih_max_s32(most, beside_at(&near_row(near, dv)[u], 4));
+    most = ih_max_s32(most, beside_at(&near_row(near, dv + 2)[u], 4));
+    return most <= limit;
 }
 
 /* Sum of R over the four pixels beside a peak; one outside the frame counts as the one opposite. */
-static int32_t beside(struct ih_dots_scratch *scratch, int32_t u, int32_t v)
+static int32_t beside(const struct ih_dots_scratch *scratch, const struct near *near, int32_t u,
+                      int32_t v)
 {
-    const int32_t width = scratch->width;
-    const int16_t *middle = response_row(scratch, v);
-    int32_t left = u > 0 ? u - 1 : u + 1;
-    int32_t right = u + 1 < width ? u + 1 : u - 1;
-    int32_t above = v > 0 ? v - 1 : v + 1;
-    int32_t below = v + 1 < scratch->height ? v + 1 : v - 1;
-    return middle[left] + middle[right] + response_row(scratch, above)[u] +
-           response_row(scratch, below)[u];
+    const int16_t *middle = near_row(near, 0);
+    const int32_t left = u > 0 ? u - 1 : u + 1;
+    const int32_t right = u + 1 < scratch->width ? u + 1 : u - 1;
+    const int32_t above = v > 0 ? -1 : 1;
+    const int32_t below = v + 1 < scratch->height ? 1 : -1;
+    return middle[left] + middle[right] + near_row(near, above)[u] + near_row(near, below)[u];
 }
 
-/* Weights: R <= 18,648, squared 2^28.4; of a row of nine 2^31.6, of 81 2^34.8; offsets of 4 in Q12
- * 2^49. */
-static inline struct ih_dot centred(struct ih_dots_scratch *scratch, int32_t u, int32_t v,
-                                    int32_t reach)
+/* A row's weights: (R - least)^2 where that is positive. */
+static inline int32_t weight(int16_t response, int32_t least)
 {
-    const int32_t peak = response_row(scratch, v)[u];
-    const int32_t least = peak / 4;
-    int64_t weight_sum = 0;
-    int64_t sum_u = 0;
-    int64_t sum_v = 0;
-    for (int32_t dv = -reach; dv <= reach; dv++) {
-        const int16_t *row = &response_row(scratch, v + dv)[u];
-        uint32_t row_sum = 0;
-        for (int32_t du = -reach; du <= reach; du++) {
-            const int32_t above = ih_max_s32(0, row[du] - least);
-            row_sum += (uint32_t)(above * above);
-            sum_u += above * above * du;
-        }
-        weight_sum += row_sum;
-        sum_v += (int64_t)row_sum * dv;
-    }
+    const int32_t above = ih_max_s32(0, response - least);
+    return above * above;
+}
+
+static struct ih_dot dot_at(const struct near *near, int32_t u, int32_t v, int64_t weight_sum,
+                            int64_t sum_u, int64_t sum_v)
+{
     return (struct ih_dot){
         .u_px_q12 = u * 4096 + (int32_t)ih_div_round(sum_u * 4096, weight_sum),
         .v_px_q12 = v * 4096 + (int32_t)ih_div_round(sum_v * 4096, weight_sum),
-        .peak = peak,
+        .peak = near_row(near, 0)[u],
     };
+}
+
+/* R <= 18,648, less a quarter of the peak and squared 2^27.6; five of them 2^30. Columns behind the
+ * fifth are there for vectors and do not count. */
+static struct ih_dot centred(const struct near *near, int32_t u, int32_t v)
+{
+    const int16_t *row[CENTRE_SIDE];
+    int32_t column[CENTRE_COLUMNS];
+    int32_t moment[CENTRE_COLUMNS];
+    for (int32_t i = 0; i < CENTRE_SIDE; i++) {
+        row[i] = &near_row(near, i - CENTRE_REACH)[u - CENTRE_REACH];
+    }
+    const int32_t least = row[CENTRE_REACH][CENTRE_REACH] / 4;
+    for (int32_t i = 0; i < CENTRE_COLUMNS; i++) {
+        const int32_t first = weight(row[0][i], least);
+        const int32_t second = weight(row[1][i], least);
+        const int32_t fourth = weight(row[3][i], least);
+        const int32_t fifth = weight(row[4][i], least);
+        column[i] = first + second + weight(row[2][i], least) + fourth + fifth;
+        moment[i] = 2 * (fifth - first) + fourth - second;
+    }
+    int64_t weight_sum = 0;
+    int64_t sum_v = 0;
+    for (int32_t i = 0; i < CENTRE_SIDE; i++) {
+        weight_sum += column[i];
+        sum_v += moment[i];
+    }
+    const int64_t sum_u = 2 * ((int64_t)column[4] - column[0]) + column[3] - column[1];
+    return dot_at(near, u, v, weight_sum, sum_u, sum_v);
+}
+
+/* Of a row of nine 2^30.8, of 81 2^34; offsets of 4 in Q12 2^48. */
+static struct ih_dot centred_plateau(const struct near *near, int32_t u, int32_t v)
+{
+    const int32_t least = near_row(near, 0)[u] / 4;
+    int64_t weight_sum = 0;
+    int64_t sum_u = 0;
+    int64_t sum_v = 0;
+    for (int32_t dv = -PLATEAU_REACH; dv <= PLATEAU_REACH; dv++) {
+        const int16_t *row = &near_row(near, dv)[u];
+        int64_t row_sum = 0;
+        for (int32_t du = -PLATEAU_REACH; du <= PLATEAU_REACH; du++) {
+            const int32_t one = weight(row[du], least);
+            row_sum += one;
+            sum_u += (int64_t)one * du;
+        }
+        weight_sum += row_sum;
+        sum_v += row_sum * dv;
+    }
+    return dot_at(near, u, v, weight_sum, sum_u, sum_v);
 }
 
 /* The pixel of a plateau's centre, near the peak's. */
@@ -171,24 +243,24 @@ static int32_t threshold_of(const struct ih_dots_params *params, int32_t noise)
 }
 
 /* A maximum above its threshold: a dot, or why not. */
-static void judge(struct ih_dots_scratch *scratch, struct ih_dots *out, int32_t u, int32_t v)
+static void judge(const struct ih_dots_scratch *scratch, struct ih_dots *out,
+                  const struct near *near, int32_t u, int32_t v)
 {
     const struct ih_dots_params *params = &scratch->params;
-    const int32_t peak = response_row(scratch, v)[u];
+    const int32_t peak = near_row(near, 0)[u];
     const int32_t ring_max = (int32_t)ih_mul_shift(peak, params->ring_max_q8, 8);
-    const int64_t beside_q6 = (int64_t)beside(scratch, u, v) * 64;
+    const int64_t beside_q6 = (int64_t)beside(scratch, near, u, v) * 64;
     const bool flat = beside_q6 >= (int64_t)peak * params->flat_min_q8;
     if (beside_q6 < (int64_t)peak * params->side_min_q8) {
         out->hot_count++;
         return;
     }
-    if (!flat && !stands_alone(scratch, u, v, ring_max)) {
+    if (!flat && !stands_alone(near, u, 0, ring_max)) {
         out->edge_count++;
         return;
     }
-    const struct ih_dot dot =
-        flat ? centred(scratch, u, v, PLATEAU_REACH) : centred(scratch, u, v, CENTRE_REACH);
-    if ((flat && !stands_alone(scratch, ring_place(dot.u_px_q12, u), ring_place(dot.v_px_q12, v),
+    const struct ih_dot dot = flat ? centred_plateau(near, u, v) : centred(near, u, v);
+    if ((flat && !stands_alone(near, ring_place(dot.u_px_q12, u), ring_place(dot.v_px_q12, v) - v,
                                ring_max)) ||
         has_twin(out, &dot)) {
         out->edge_count++;
@@ -245,8 +317,8 @@ static inline ih_lanes maxima_of(const int16_t *above, const int16_t *middle, co
 /* The least threshold is the same for so many pixels from a multiple of them on. */
 #define SPAN (IH_NOISE_BLOCK / 2)
 
-/* Is one of SPAN pixels above it? Unrolled: gcc 12 does not at -O2. */
-static inline bool is_any_above(const int16_t *response, const int16_t *least)
+/* Unrolled: gcc 12 does not at -O2. */
+static inline bool is_any_of_span_above(const int16_t *response, const int16_t *least)
 {
     const uint32_t limit = ih_word(least);
     uint32_t above = ih_word_below(limit, ih_word(response));
@@ -259,26 +331,29 @@ static inline bool is_any_above(const int16_t *response, const int16_t *least)
     above |= ih_word_below(limit, ih_word(&response[14]));
     return (above & IH_WORD_SIGNS) != 0;
 }
-#else
-/* Is one of so many pixels above what no threshold is below? */
-static inline bool is_any_above(const int16_t *response, const int16_t *least, int32_t count)
+#endif
+
+/* Is one of GROUP pixels above what no threshold is below? */
+static inline bool is_any_above(const int16_t *response, const int16_t *least)
 {
-#if IH_LANES != 0
+#if IH_WORDS
+    return is_any_of_span_above(response, least) ||
+           is_any_of_span_above(&response[SPAN], &least[SPAN]);
+#elif IH_LANES != 0
     ih_lanes any = is_above(response, least);
-    for (int32_t i = IH_LANES; i < count; i += IH_LANES) {
+    for (int32_t i = IH_LANES; i < GROUP; i += IH_LANES) {
         any = ih_lanes_or(any, is_above(&response[i], &least[i]));
     }
     return ih_lanes_is_any(any);
 #else
     uint16_t any = 0;
-    for (int32_t i = 0; i < count; i++) {
+    for (int32_t i = 0; i < GROUP; i++) {
         const uint16_t above = response[i] > least[i] ? UINT16_MAX : 0;
         any = any | above;
     }
     return any != 0;
 #endif
 }
-#endif
 
 #if !IH_LANES || IH_WORDS
 /* Of equal neighbours the first in reading order is a maximum. */
@@ -298,28 +373,20 @@ static uint32_t mark_maxima(const int16_t *above, const int16_t *middle, const i
 {
     uint32_t maxima = 0;
 #if IH_WORDS
-    for (int32_t first = 0; first < GROUP; first += SPAN) {
-        if (!is_any_above(&middle[first], &least[first])) {
-            continue;
-        }
-        for (int32_t u = first; u < first + SPAN; u += 2) {
-            if ((ih_word_below(ih_word(&least[u]), ih_word(&middle[u])) & IH_WORD_SIGNS) != 0) {
-                maxima |= (uint32_t)is_maximum(&above[u], &middle[u], &below[u], least[u]) << u;
-                maxima |=
-                    (uint32_t)is_maximum(&above[u + 1], &middle[u + 1], &below[u + 1], least[u + 1])
-                    << (u + 1);
-            }
+    for (int32_t u = 0; u < GROUP; u += 2) {
+        if ((ih_word_below(ih_word(&least[u]), ih_word(&middle[u])) & IH_WORD_SIGNS) != 0) {
+            const int32_t next = u + 1;
+            maxima |= (uint32_t)is_maximum(&above[u], &middle[u], &below[u], least[u]) << u;
+            maxima |= (uint32_t)is_maximum(&above[next], &middle[next], &below[next], least[next])
+                      << next;
         }
     }
 #elif IH_LANES != 0
-    if (is_any_above(middle, least, GROUP)) {
-        for (int32_t u = 0; u < GROUP; u += 2 * IH_LANES) {
-            const int32_t next = u + IH_LANES;
-            maxima |=
-                ih_lanes_bits(maxima_of(&above[u], &middle[u], &below[u], &least[u]),
-                              maxima_of(&above[next], &middle[next], &below[next], &least[next]))
-                << u;
-        }
+    for (int32_t u = 0; u < GROUP; u += 2 * IH_LANES) {
+        const int32_t next = u + IH_LANES;
+        maxima |= ih_lanes_bits(maxima_of(&above[u], &middle[u], &below[u], &least[u]),
+                                maxima_of(&above[next], &middle[next], &below[next], &least[next]))
+                  << u;
     }
 #else
     for (int32_t u = 0; u < GROUP; u++) {
@@ -336,7 +403,8 @@ struct marked {
     uint32_t maxima[IH_FRAME_WIDTH_MAX / GROUP];
 };
 
-/* Most groups have nothing above any threshold, most of the others no maximum. */
+/* Most groups have nothing above any threshold, most of the others no maximum. Which ones cannot be
+ * foreseen, and a wrong guess costs a processor more than a group: they are put down without asking. */
 static void mark_row(struct ih_dots_scratch *scratch, int32_t v, struct marked *out)
 {
     const int16_t *above = response_row(scratch, v - 1);
@@ -344,28 +412,20 @@ static void mark_row(struct ih_dots_scratch *scratch, int32_t v, struct marked *
     const int16_t *below = response_row(scratch, v + 1);
     const int16_t *least = scratch->rows.finding.least;
     const int32_t width = scratch->width;
+    int32_t candidates = 0;
+    for (int32_t first = 0; first < width; first += GROUP) {
+        out->first[candidates] = (int16_t)first; /* the next one's place if it is none */
+        candidates += is_any_above(&middle[first], &least[first]);
+    }
     int32_t count = 0;
-#if IH_WORDS
-    for (int32_t u = 0; u < width; u += GROUP) {
-        const uint32_t maxima = mark_maxima(&above[u], &middle[u], &below[u], &least[u]);
-        if (maxima != 0) {
-            out->first[count] = (int16_t)u;
-            out->maxima[count++] = maxima;
-        }
+    for (int32_t i = 0; i < candidates; i++) {
+        const int16_t first = out->first[i];
+        const uint32_t maxima =
+            mark_maxima(&above[first], &middle[first], &below[first], &least[first]);
+        out->first[count] = first;
+        out->maxima[count] = maxima;
+        count += maxima != 0;
     }
-#else
-    for (int32_t first = 0; first < width; first += 2 * GROUP) {
-        if (!is_any_above(&middle[first], &least[first], 2 * GROUP)) {
-            continue;
-        }
-        for (int32_t u = first; u < first + 2 * GROUP; u += GROUP) {
-            const uint32_t maxima = mark_maxima(&above[u], &middle[u], &below[u], &least[u]);
-            out->first[count] = (int16_t)u;
-            out->maxima[count] = maxima;
-            count += maxima != 0;
-        }
-    }
-#endif
     out->count = count;
 }
 
@@ -374,15 +434,20 @@ static void find_dots(struct ih_dots_scratch *scratch, struct ih_dots *out, int3
 {
     const int16_t *response = response_row(scratch, v);
     struct marked marked;
+    struct near near;
     if (v % IH_NOISE_BLOCK == IH_NOISE_BLOCK / 2 || v == 0) {
         lay_least(scratch, v);
     }
     mark_row(scratch, v, &marked);
+    if (marked.count == 0) {
+        return;
+    }
+    lay_near(scratch, v, &near);
     for (int32_t i = 0; i < marked.count; i++) {
         for (uint32_t maxima = marked.maxima[i]; maxima != 0; maxima &= maxima - 1) {
             const int32_t u = marked.first[i] + __builtin_ctz(maxima);
             if (response[u] > threshold_of(&scratch->params, ih_noise_at(&scratch->noise, u, v))) {
-                judge(scratch, out, u, v);
+                judge(scratch, out, &near, u, v);
             }
         }
     }
