@@ -86,8 +86,8 @@ void ih_range_check(int64_t value, int64_t low, int64_t high, const char *file, 
 /* Space, ellipsoid, scan, fit. */
 #define IH_RANGE_POINT_MM_Q8 32768000
 #define IH_RANGE_PASS_Q14 185400 /* of a ray's nearest place, from the centre */
-#define IH_RANGE_SCAN_MIN_Q12 (-5571)
-#define IH_RANGE_SCAN_MAX_Q12 6554
+#define IH_RANGE_RATING_MIN_Q12 (-5555)
+#define IH_RANGE_RATING_MAX_Q12 6553
 #define IH_RANGE_SLOPE_Q13 29491         /* derivative by ln of what has a weight */
 #define IH_RANGE_FIT_NORMAL_Q16 95000000 /* diagonal of the fit's equations */
 

@@ -60,8 +60,8 @@ CORE_HEADERS = {
     "ih_heads.h": CORE_SHARED | {"ih_hypotheses.h"},
     "ih_space.h": CORE_SHARED | {"ih_samples.h"},
     "ih_ellipsoid.h": CORE_SHARED | {"ih_space.h"},
-    "ih_bound.h": CORE_SHARED | {"ih_ellipsoid.h"},
-    "ih_scan.h": CORE_SHARED | {"ih_bound.h"},
+    "ih_rating.h": CORE_SHARED | {"ih_ellipsoid.h"},
+    "ih_scan.h": CORE_SHARED | {"ih_rating.h"},
     "ih_row.h": CORE_SHARED | {"ih_ellipsoid.h", "ih_cholesky.h"},
     "ih_glance.h": CORE_SHARED | {"ih_row.h"},
     "ih_fit.h": CORE_SHARED | {"ih_row.h"},
@@ -78,7 +78,7 @@ CORE_SYSTEM = {"stdbool.h", "stddef.h", "stdint.h", "string.h"}
 # The vectors of x86 and the pairs of a Cortex-M, for files that have the same without.
 CORE_VECTORS = {("ih_normal.c", "immintrin.h"), ("ih_normal.c", "arm_acle.h"), ("ih_basis.c", "immintrin.h"),
                 ("ih_lanes.h", "immintrin.h"), ("ih_cuts.c", "immintrin.h"),
-                ("ih_row.c", "immintrin.h"), ("ih_words.h", "arm_acle.h"), ("ih_parts.c", "immintrin.h"),
+                ("ih_row.c", "immintrin.h"), ("ih_rating.c", "immintrin.h"), ("ih_rating.c", "arm_neon.h"), ("ih_words.h", "arm_acle.h"), ("ih_parts.c", "immintrin.h"),
                 ("ih_parts.c", "arm_acle.h")}
 
 INCLUDE = re.compile(r'^\s*#\s*include\s*(["<])([^">]+)[">]')

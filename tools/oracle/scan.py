@@ -1,7 +1,7 @@
 """Float64 reference of the scan: a mean head behind every point, every ray against each.
 
-Most of a score is counting, and a ray that is as good as on a limit may be counted either way. What
-such rays can make of a score is its slack: the test allows it on top of rounding."""
+Most of a rating is counting, and a ray that is nearer to a limit than 16 bits tell may be counted either
+way. So a rating is an interval: what the least and the most favourable of such rays make of it."""
 
 import numpy as np
 
@@ -11,13 +11,13 @@ import scenes
 from ellipsoid import MEAN_SEMI_MM
 
 DEEP_MM, SPACING_MM = 98, 80
-ON_SURFACE_MM, BEHIND_FULL_MM, BEHIND_CENTRE_MM = 28, 60, 60
-NEARER, EMPTY, UNKNOWN = -0.15, -0.6, -0.15
+ON_SURFACE_MM, BEHIND_CENTRE_MM = 32, 60
+NEARER, BEHIND, EMPTY = -10 / 64, -1, -38 / 64
 RING_INNER, RING_OUTER = 1.3, 1.9
-RING_EMPTY, RING_NEAR, RING_SHARE = 0.7, -0.6, 0.6
+RING_EMPTY, RING_NEAR, RING_SHARE = 45 / 64, -38 / 64, 0.6
 RAYS_LEAST = 8
-# Closer to a limit than the firmware's error is neither side.
-CLOSE_MM, CLOSE_RIM_MM, CLOSE_RADIUS2, CLOSE_SIDE_MM = 0.06, 0.3, 1e-3, 0.05
+# What 16 bits may be off by, with the depth in mm: see ih_rating.h.
+ERROR_E, ERROR_RADIUS2, ERROR_DEPTH_MM = (7.9e-7, 0.0009), (4.3e-6, 0.0130), 1.6
 
 
 def centres_behind(space):
@@ -27,56 +27,66 @@ def centres_behind(space):
     return space.point[seen] + DEEP_MM * ahead / np.linalg.norm(ahead, axis=1)[:, None]
 
 
-def mean_of(values, weights):
-    return values.sum() / max(weights, RAYS_LEAST)
+def mean_of(total, count):
+    return total / max(count, RAYS_LEAST)
 
 
-def score(space, centre):
-    """Score of a head there, and its slack."""
+def extreme_mean(sure, unsure, values, sign):
+    """Of rays that surely count and those that may, each worth its value: the mean farthest to one side."""
+    total, count = values[sure].sum(), sure.sum()
+    means = [mean_of(total, count)]
+    for value in sorted(values[unsure & ~sure] * sign, reverse=True):
+        total, count = total + sign * value, count + 1
+        means.append(mean_of(total, count))
+    return max(means, key=lambda mean: sign * mean)
+
+
+def rating(space, centre):
+    """The least and the greatest that 16 bits may make of a head there."""
     semi = np.array(MEAN_SEMI_MM, float)
-    _, nearest, radius2, entry, near = ellipsoid.cross(centre, semi, space.origin, space.slope)
+    at, nearest, radius2, _, near = ellipsoid.cross(centre, semi, space.origin, space.slope)
+    away = centre[2] - space.origin[2]
+    error_e, error2 = [per_mm * away + fixed for per_mm, fixed in (ERROR_E, ERROR_RADIUS2)]
     seen, empty = space.state == scenes.SEEN, space.state == scenes.EMPTY
     depth = space.point[:, 2]
-    behind = depth - entry
-    value = np.where(behind < 0, NEARER, -np.minimum(behind / BEHIND_FULL_MM, 1))
-    value = np.where(np.abs(behind) < ON_SURFACE_MM, 1, value)
-    value = np.where(seen, value, np.where(empty, EMPTY, UNKNOWN))
-    inside = near & (radius2 < 1)
-    close = np.where(radius2 > 0.99, CLOSE_RIM_MM, CLOSE_MM)
-    unsure_inside = near & (np.abs(radius2 - 1) < CLOSE_RADIUS2) \
-        | inside & seen & (np.abs(np.abs(behind) - ON_SURFACE_MM) < close)
+    steep = 1 + ((space.slope * semi[2] / semi[:2])**2).sum(axis=1)
+    near = near & (steep < 2)
+    behind = [(depth - centre[2]) / semi[2] - nearest[:, 2]
+              + np.sqrt(np.maximum(0, 1 - radius2 + off) / steep) for off in (-error2, error2)]
+    behind = [semi[2] * behind[0] - ERROR_DEPTH_MM, semi[2] * behind[1] + ERROR_DEPTH_MM]
+    aside = np.abs(at[:, 0] * semi[0]) - at[:, 1] * semi[1]  # more down when negative
+    off_mm = error_e * (semi[0] + semi[1])
+    ends = []
+    for sign in (-1, 1):
+        # Through the head: what is on the surface is best, what is behind it worst.
+        on = np.where(sign > 0, (behind[1] > -ON_SURFACE_MM) & (behind[0] < ON_SURFACE_MM),
+                      (behind[0] > -ON_SURFACE_MM) & (behind[1] < ON_SURFACE_MM))
+        far = np.where(sign > 0, behind[0] >= ON_SURFACE_MM, behind[1] >= ON_SURFACE_MM)
+        value = np.where(on, 1, np.where(far, BEHIND, NEARER))
+        value = np.where(seen, value, np.where(empty, EMPTY, NEARER))
+        total = extreme_mean(near & (radius2 < 1 - error2), near & (radius2 < 1 + error2), value, sign)
 
-    aside = np.abs(nearest[:, 0] * semi[0]) - nearest[:, 1] * semi[1]  # below when negative
-    place = np.where(depth > centre[2] + BEHIND_CENTRE_MM, 1, RING_NEAR)
-    place = np.where(seen, place, np.where(empty, RING_EMPTY, 0))
-    ring = near & (radius2 > RING_INNER**2) & (radius2 < RING_OUTER**2) & (aside >= 0)
-    around = near & (radius2 > RING_INNER**2 - 0.01) & (radius2 < RING_OUTER**2 + 0.01) \
-        & (aside > -1)
-    unsure_ring = around & ((np.abs(radius2 - RING_INNER**2) < CLOSE_RADIUS2)
-                            | (np.abs(radius2 - RING_OUTER**2) < CLOSE_RADIUS2)
-                            | (np.abs(aside) < CLOSE_SIDE_MM)
-                            | seen & (np.abs(depth - centre[2] - BEHIND_CENTRE_MM) < CLOSE_MM))
-    total = mean_of(value[inside], inside.sum()) \
-        + RING_SHARE * mean_of(place[ring], ring.sum())
-    # One ray more, less or of the other value: at most its value and the mean's, 2 each in all.
-    slack = 2 * unsure_inside.sum() / max(inside.sum() - 1, RAYS_LEAST) \
-        + RING_SHARE * 2 * unsure_ring.sum() / max(ring.sum() - 1, RAYS_LEAST)
-    return total, slack
+        far = depth > centre[2] + BEHIND_CENTRE_MM - sign * 1.01
+        value = np.where(seen, np.where(far, 1, RING_NEAR), np.where(empty, RING_EMPTY, 0))
+        sure, unsure = [near & (radius2 > RING_INNER**2 + off) & (radius2 < RING_OUTER**2 - off)
+                        & (aside > side) for off, side in ((error2, off_mm), (-error2, -off_mm))]
+        ends.append(total + RING_SHARE * extreme_mean(sure, unsure, value, sign))
+    return ends
 
 
 def write_vectors(directory):
-    inc = emit.Inc("Places behind the seen points of the scenes in scenes.inc, and the scores of a\n"
-                   " * mean head there with their slack, in float64.")
+    inc = emit.Inc("Places behind the seen points of the scenes in scenes.inc, and the least and the greatest\n"
+                   " * rating of a mean head there, by float64 and what 16 bits may be off by.")
     inc.raw("\n")
-    for name in ("DEEP_MM", "SPACING_MM", "ON_SURFACE_MM", "BEHIND_FULL_MM", "BEHIND_CENTRE_MM",
-                 "NEARER", "EMPTY", "UNKNOWN", "RING_EMPTY", "RING_NEAR", "RING_SHARE"):
+    for name in ("DEEP_MM", "SPACING_MM", "ON_SURFACE_MM", "BEHIND_CENTRE_MM", "NEARER", "BEHIND",
+                 "EMPTY", "RING_EMPTY", "RING_NEAR", "RING_SHARE"):
         inc.raw("#define VECTOR_%s (%s)\n" % (name, globals()[name]))
     rows = []
     for scene, space, _ in scenes.spaces():
         tried = []
         for centre in centres_behind(space):
             tried.append("{{%s}, %s}" % (", ".join(emit.numbers(centre, 3)),
-                                         ", ".join(emit.numbers(score(space, centre), 4))))
+                                         ", ".join(emit.numbers(rating(space, centre), 4))))
         inc.raw("\nstatic const struct vector_place vector_tried_%s[] = {\n%s};\n"
                 % (scene.name, emit.wrap(tried)))
         rows.append("%d, vector_tried_%s" % (len(tried), scene.name))
