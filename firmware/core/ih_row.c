@@ -9,6 +9,9 @@
 #ifndef ISOHEAD_RANGE_CHECKS
 #define BY_VECTORS
 #include <immintrin.h>
+#ifdef __AVX2__
+#define WEIGHED_BY_VECTORS
+#endif
 #endif
 #endif
 
@@ -18,9 +21,12 @@
 #define ROBUST_REACH 5
 /* Places nearer to the centre than this have no direction. */
 #define RADIUS_LEAST2_Q22 10481 /* 0.05 squared */
-#define LOW_FROM_Q14 8192       /* 0.5 */
-#define LOW_SPAN_Q14 4915       /* 0.3 */
-#define LOW_LOSS_Q16 32768      /* 0.5 */
+/* No row is farther out than this many radii, 3.35: of a fit's axes none would have a weight. */
+#define RADIUS_MOST_Q14 54886
+#define LOW_FROM_Q14 8192 /* 0.5 */
+#define LOW_SPAN_Q14 4915 /* 0.3 */
+/* 0.5 over 0.3: Q16 of what is lost for a step of the place, in steps of Q16, rounded up. */
+#define LOW_SLOPE_Q16 436926
 #define PUSH_MAX_MM_Q8 (30 << 8)
 #define PUSH_WEIGHT_Q16 32768 /* 0.5 */
 /* An entry may be off by this, see ih_ellipsoid. */
@@ -139,7 +145,7 @@ static inline bool find_distance(uint32_t radius2_q22, uint32_t length2_q22, str
     const uint32_t r_q15 = ih_inverse_root_q15(square);
     const uint32_t root_q16 = (square >> 16) * r_q15 >> 15;
     const uint32_t rest = square - root_q16 * root_q16; /* below 2^19.7: the root is short by 10 */
-    const uint32_t root_q20 = root_q16 * 16 + (uint32_t)((uint64_t)rest * r_q15 >> 28);
+    const uint32_t root_q20 = root_q16 * 16 + ((rest >> 4) * r_q15 >> 24);
     const int32_t radius_q14 = (int32_t)(((root_q20 >> half) + 1) / 2);
     const int length_half = __builtin_clz(length2_q22) / 2;
     out->inverse = (ih_inverse_root_q15(length2_q22 << (2 * length_half)) << length_half) >> 3;
@@ -437,54 +443,33 @@ static void add_row(struct ih_rows *rows, struct ih_row_system *system,
     }
 }
 
-#ifdef __LP64__
-/* s^-2, rounded. */
-static int32_t inverse_square_q16(uint64_t s_q16)
+/* (1 + (r / k)^2)^-2, rounded; 0 where that is next to nothing. One over the sum is the square of one over its
+ * root, from the table, and what that is short by to first order: 2^-25 of it. */
+static inline int32_t robust_weight_q16(int32_t residual_mm_q8, int32_t scale_mm)
 {
-    const uint64_t square_q32 = s_q16 * s_q16;
-    return (int32_t)((((uint64_t)1 << 48) + square_q32 / 2) / square_q32);
-}
-#else
-/* The same for s from 1 to 65 without a division of 64 bits, which is a long one here. 2^40 / s less than
- * 1 too small has a square that is, over 2^32, up to 2^-15 times the root of the result too small, and by
- * what is cut off: less than 2. */
-static int32_t inverse_square_q16(uint32_t s_q16)
-{
-    const uint32_t one_q31 = (uint32_t)1 << 31;
-    const uint32_t high = one_q31 / s_q16;
-    const uint32_t inverse_q24 = (high << 9) + (((one_q31 - high * s_q16) << 9) / s_q16);
-    const uint64_t square_q32 = (uint64_t)s_q16 * s_q16;
-    uint32_t result = (uint32_t)((uint64_t)inverse_q24 * inverse_q24 >> 32);
-    uint64_t rest = ((uint64_t)1 << 48) + square_q32 / 2 - result * square_q32;
-    while (rest >= square_q32) {
-        rest -= square_q32;
-        result++;
-    }
-    return (int32_t)result;
-}
-#endif
-
-/* (1 + (r / k)^2)^-2; 0 where that is next to nothing. */
-static int32_t robust_weight_q16(int32_t residual_mm_q8, int32_t scale_mm)
-{
-    const int32_t size_q8 = ih_abs_s32(residual_mm_q8);
-    if (size_q8 > ROBUST_REACH * scale_mm << 8) {
+    const uint32_t size_q8 = (uint32_t)ih_abs_s32(residual_mm_q8);
+    const uint32_t scale2 = (uint32_t)(scale_mm * scale_mm);
+    if (size_q8 > (uint32_t)(ROBUST_REACH * scale_mm << 8)) {
         return 0;
     }
-    const uint32_t scale2 = (uint32_t)(scale_mm * scale_mm);
-    const uint32_t ratio2_q16 = ((uint32_t)size_q8 * (uint32_t)size_q8 + scale2 / 2) / scale2;
-    return inverse_square_q16(ONE_Q16 + ratio2_q16);
+    const uint32_t sum_q16 = ONE_Q16 + (size_q8 * size_q8 + scale2 / 2) / scale2; /* up to 26 */
+    const int half = 7 - (sum_q16 >= 1U << 18) - (sum_q16 >= 1U << 20);
+    const uint32_t sum = sum_q16 << (2 * half);
+    const uint32_t r_q15 = ih_inverse_root_q15(sum);
+    const uint32_t root_q32 = (uint32_t)((uint64_t)sum * r_q15 >> 15);
+    const uint32_t rest_q32 = UINT32_MAX - (uint32_t)((uint64_t)root_q32 * r_q15 >> 15);
+    uint32_t inverse_q29 = r_q15 * r_q15 >> 1;
+    inverse_q29 += (inverse_q29 >> 16) * (rest_q32 >> 4) >> 12;
+    const uint64_t square_q58 = (uint64_t)inverse_q29 * inverse_q29;
+    return (int32_t)((square_q58 + ((uint64_t)1 << (73 - 4 * half))) >> (74 - 4 * half));
 }
 
 /* A weight, less for what is low on the head. */
-static int32_t lowered_q16(int32_t weight_q16, int32_t down_q14)
+static inline int32_t lowered_q16(int32_t weight_q16, int32_t down_q14)
 {
-    if (down_q14 <= LOW_FROM_Q14) {
-        return weight_q16;
-    }
-    const uint32_t over = (uint32_t)ih_min_s32(down_q14 - LOW_FROM_Q14, LOW_SPAN_Q14);
-    const int32_t low_q16 = ONE_Q16 - (int32_t)(LOW_LOSS_Q16 * over / LOW_SPAN_Q14);
-    return (int32_t)ih_mul_shift(weight_q16, low_q16, 16);
+    const int32_t over = ih_clamp_s32(down_q14 - LOW_FROM_Q14, 0, LOW_SPAN_Q14);
+    const uint32_t lost_q16 = (uint32_t)over * LOW_SLOPE_Q16 >> 16;
+    return weight_q16 - (int32_t)(((uint32_t)weight_q16 * lost_q16 + (1U << 15) - 1) >> 16);
 }
 
 /* What a step's ellipsoid is asked for at every ray. */
@@ -510,7 +495,7 @@ static void begin_step(struct step *step, const struct ih_row_rays *rays)
     int64_t most_q14 =
         ONE_Q14 +
         ih_div_round((int64_t)ROBUST_REACH * step->scale_mm * (ONE_Q14 << 8), shortest_q8);
-    most_q14 += most_q14 / 64;
+    most_q14 = ih_min_s64(most_q14 + most_q14 / 64, RADIUS_MOST_Q14);
     step->shares = ih_ellipsoid_shares(semi_mm_q8);
     step->inverses = inverses_of(&step->shares);
     step->box = ih_ellipsoid_box(ellipsoid, rays->slope_most_q20, ONE_Q14);
@@ -618,6 +603,160 @@ static void flag_rays(const struct bounds *bounds, struct ih_row_scratch *scratc
 #endif
 
 #ifdef BY_VECTORS
+#ifdef WEIGHED_BY_VECTORS
+/* Squares from 2^30 on, as find_distance has them by counting zeros: moved up by twice as much as *half. */
+static inline lanes square_of(lanes value, lanes *half)
+{
+    lanes square = _mm256_max_epu32(value, _mm256_set1_epi32(1));
+    *half = _mm256_setzero_si256();
+    for (int bits = 16; bits > 1; bits /= 2) {
+        const lanes is_small =
+            _mm256_cmpeq_epi32(_mm256_srli_epi32(square, 32 - bits), _mm256_setzero_si256());
+        const lanes up = _mm256_and_si256(is_small, _mm256_set1_epi32(bits));
+        square = _mm256_sllv_epi32(square, up);
+        *half = _mm256_add_epi32(*half, _mm256_srli_epi32(up, 1));
+    }
+    return square;
+}
+
+/* ih_inverse_root_q15 of eight. An entry and the next are one word. */
+static inline lanes inverse_root(lanes square)
+{
+    const lanes at = _mm256_sub_epi32(_mm256_srli_epi32(square, 24), _mm256_set1_epi32(64));
+    const lanes both =
+        _mm256_i32gather_epi32((const int *)(const void *)ih_root_inverse_q15, at, 2);
+    const lanes here = _mm256_and_si256(both, _mm256_set1_epi32(0xffff));
+    const lanes fall = _mm256_sub_epi32(here, _mm256_srli_epi32(both, 16));
+    const lanes part = _mm256_and_si256(_mm256_srli_epi32(square, 8), _mm256_set1_epi32(0xffff));
+    return _mm256_sub_epi32(
+        here, _mm256_srli_epi32(
+                  _mm256_add_epi32(_mm256_mullo_epi32(fall, part), _mm256_set1_epi32(0xffff)), 16));
+}
+
+/* product_shift of a number with a sign, in 32 bits. */
+static inline lanes signed_product_shift(lanes a, lanes b, int bits)
+{
+    const lanes half = ALL_64((long long)1 << (bits - 1));
+    const lanes even = DOWN_64(SUM_64(_mm256_mul_epi32(a, b), half), bits);
+    const lanes odd = DOWN_64(SUM_64(_mm256_mul_epi32(DOWN_64(a, 32), DOWN_64(b, 32)), half), bits);
+    return _mm256_blend_epi32(even, UP_64(odd, 32), 0xaa);
+}
+
+/* a * b / 2^bits, cut off. */
+static inline lanes cut_product(lanes a, lanes b, int bits)
+{
+    const lanes even = DOWN_64(PRODUCT(a, b), bits);
+    const lanes odd = DOWN_64(PRODUCT(DOWN_64(a, 32), DOWN_64(b, 32)), bits);
+    return _mm256_blend_epi32(even, UP_64(odd, 32), 0xaa);
+}
+
+static inline lanes all_32(int32_t value)
+{
+    return _mm256_set1_epi32(value);
+}
+
+/* What a step's residuals are divided by: a quotient of less than 2^30 is a product. */
+struct divisor {
+    lanes factor, half;
+    int bits;
+};
+
+/* The least power of two from the divisor on, times 2^30, over it, and rounded up: too great by less than one,
+ * times 2^30 less than that power. */
+static struct divisor divisor_of(uint32_t value)
+{
+    const int bits = 30 + 32 - __builtin_clz(value);
+    const uint64_t factor = (((uint64_t)1 << bits) + value - 1) / value;
+    return (struct divisor){all_32((int32_t)factor), all_32((int32_t)(value / 2)), bits};
+}
+
+/* robust_weight_q16 of eight; those that are not to be looked at as if on the surface. */
+static inline lanes robust_weights(const struct divisor *scale2, lanes size, lanes is_of_use)
+{
+    const lanes near = _mm256_and_si256(size, is_of_use);
+    const lanes ratio2 = cut_product(SUM_32(_mm256_mullo_epi32(near, near), scale2->half),
+                                     scale2->factor, scale2->bits);
+    const lanes sum_q16 = SUM_32(ratio2, all_32(ONE_Q16));
+    const lanes half = SUM_32(SUM_32(all_32(7), _mm256_cmpgt_epi32(sum_q16, all_32((1 << 18) - 1))),
+                              _mm256_cmpgt_epi32(sum_q16, all_32((1 << 20) - 1)));
+    const lanes sum = _mm256_sllv_epi32(sum_q16, _mm256_slli_epi32(half, 1));
+    const lanes r = inverse_root(sum);
+    const lanes rest = _mm256_xor_si256(cut_product(cut_product(sum, r, 15), r, 15), all_32(-1));
+    lanes inverse = _mm256_srli_epi32(_mm256_mullo_epi32(r, r), 1);
+    inverse = SUM_32(inverse, _mm256_srli_epi32(_mm256_mullo_epi32(_mm256_srli_epi32(inverse, 16),
+                                                                   _mm256_srli_epi32(rest, 4)),
+                                                12));
+    /* A place more than is wanted, then that one rounded. */
+    const lanes bits = REST_32(all_32(73), _mm256_slli_epi32(half, 2));
+    const lanes odd = DOWN_64(inverse, 32);
+    const lanes even_square =
+        _mm256_srlv_epi64(PRODUCT(inverse, inverse), _mm256_and_si256(bits, ALL_64(UINT32_MAX)));
+    const lanes odd_square = _mm256_srlv_epi64(PRODUCT(odd, odd), DOWN_64(bits, 32));
+    const lanes twice = _mm256_blend_epi32(even_square, UP_64(odd_square, 32), 0xaa);
+    return _mm256_srli_epi32(SUM_32(twice, all_32(1)), 1);
+}
+
+/* find_distance of eight rows: what they are divided by, and their residuals. */
+static inline lanes find_distances(const struct ih_rows *rows, int32_t k, lanes *residual)
+{
+    lanes half, length_half;
+    const lanes square = square_of(LOAD(&rows->radius2_q22[k]), &half);
+    const lanes length_square = square_of(LOAD(&rows->length2_q22[k]), &length_half);
+    const lanes r = inverse_root(square);
+    const lanes root = _mm256_srli_epi32(_mm256_mullo_epi32(_mm256_srli_epi32(square, 16), r), 15);
+    const lanes rest = REST_32(square, _mm256_mullo_epi32(root, root));
+    const lanes root_q20 =
+        SUM_32(_mm256_slli_epi32(root, 4),
+               _mm256_srli_epi32(_mm256_mullo_epi32(_mm256_srli_epi32(rest, 4), r), 24));
+    const lanes radius = _mm256_srli_epi32(SUM_32(_mm256_srlv_epi32(root_q20, half), all_32(1)), 1);
+    const lanes over = _mm256_mullo_epi32(radius, REST_32(radius, all_32(ONE_Q14)));
+    const lanes inverse =
+        _mm256_srli_epi32(_mm256_sllv_epi32(inverse_root(length_square), length_half), 3);
+    *residual =
+        signed_product_shift(_mm256_srai_epi32(SUM_32(over, all_32(1 << 13)), 14), inverse, 17);
+    return inverse;
+}
+
+/* The weights of eight rows; *residual with them. */
+static inline lanes weigh_eight(const struct step *step, const struct divisor *scale2,
+                                struct ih_rows *rows, int32_t k, lanes *residual)
+{
+    const lanes inverse = find_distances(rows, k, residual);
+    const lanes radius2 = LOAD(&rows->radius2_q22[k]);
+    const lanes size = size_of(*residual);
+    const lanes is_out =
+        _mm256_or_si256(_mm256_cmpgt_epi32(size, all_32(ROBUST_REACH * step->scale_mm << 8)),
+                        _mm256_cmpgt_epi32(radius2, all_32((int32_t)step->reach2_q22)));
+    const lanes is_of_use =
+        _mm256_andnot_si256(is_out, _mm256_cmpgt_epi32(radius2, all_32(RADIUS_LEAST2_Q22 - 1)));
+    const lanes robust = robust_weights(scale2, size, is_of_use);
+    const lanes down = REST_32(LOAD(&rows->place_q14[1][k]), all_32(LOW_FROM_Q14));
+    const lanes over = _mm256_min_epi32(_mm256_max_epi32(down, all_32(0)), all_32(LOW_SPAN_Q14));
+    const lanes lost = _mm256_srli_epi32(_mm256_mullo_epi32(over, all_32(LOW_SLOPE_Q16)), 16);
+    const lanes less =
+        _mm256_srli_epi32(SUM_32(_mm256_mullo_epi32(robust, lost), all_32((1 << 15) - 1)), 16);
+    const lanes weight = _mm256_and_si256(is_of_use, REST_32(robust, less));
+    STORE(&rows->inverse[k], _mm256_andnot_si256(_mm256_cmpeq_epi32(weight, all_32(0)), inverse));
+    *residual =
+        _mm256_srai_epi32(SUM_32(_mm256_mullo_epi32(weight, *residual), all_32(1 << 13)), 14);
+    return weight;
+}
+
+/* What points weigh of which rows have the offsets. Of what has no weight nothing is left. */
+static void weigh_points(const struct step *step, struct ih_rows *rows)
+{
+    const struct divisor scale2 = divisor_of((uint32_t)(step->scale_mm * step->scale_mm));
+    find_gradients(&step->inverses, rows, rows->count);
+    for (int32_t k = 0; k < rows->count; k += LANES) {
+        lanes residual, residual_next;
+        const lanes weight = weigh_eight(step, &scale2, rows, k, &residual);
+        const lanes weight_next = weigh_eight(step, &scale2, rows, k + LANES / 2, &residual_next);
+        STORE(&rows->weight_q16[k],
+              _mm256_permute4x64_epi64(_mm256_packus_epi32(weight, weight_next), 0xd8));
+        STORE(&rows->residual_mm_q10[k], PACK(residual, residual_next));
+    }
+}
+#else
 /* What points weigh of which rows have the offsets. Of what has no weight nothing is left. */
 static void weigh_points(const struct step *step, struct ih_rows *rows)
 {
@@ -636,6 +775,8 @@ static void weigh_points(const struct step *step, struct ih_rows *rows)
         rows->residual_mm_q10[k] = residual; /* 0 without weight */
     }
 }
+
+#endif
 
 static void add_offset(const struct step *step, const int32_t off_q8[3], struct ih_rows *rows,
                        struct ih_row_system *system)

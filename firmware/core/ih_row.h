@@ -9,13 +9,15 @@
  *        vectors; sums are exact until all rows are in them: the order is nobody's business.
  *        Quotients by a semi-axis are products with an inverse of 32 bits. The root of a place's square and
  *        one over the gradient's length come from the table of ih_fix, the root with one correction: within
- *        a unit of Q14, 2^-13.7.
+ *        a unit of Q14, 2^-13.7. So does a weight, one over a sum squared: the table's root squared, and
+ *        corrected once. Scales up to 24 mm.
  * Overflow: as in ih_fit.h. Rows have 16 bits: slopes by the centre are at most 1 (Q14), by ln below 3.6
  *        (Q13), weighted residuals 15 mm at most, of a push (Q10). A product is below 1 * 1 in Q28, 2.6 in
  *        Q26, 1.6 in Q27 or 15 in Q24: 2^28.
  * Cost:  5 comparisons of 16 bits twice for each of 361 rays, a step (without vectors most rays need one or
- *        two); 12 products of 32 bits, in vectors, and two roots for a point in reach; for one with a weight
- *        three divisions, 12 products, and 27 of 16 bits. About 85 points a step are in reach, 70 have a weight.
+ *        two); for a point in reach 12 products of 32 bits, two roots and a weight, with AVX2 eight points at
+ *        once ; for one with a weight 12 products, and 27 of 16 bits. About 85 points a
+ *        step are in reach, 70 have a weight.
  */
 #ifndef IH_ROW_H
 #define IH_ROW_H

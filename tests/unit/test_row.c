@@ -61,7 +61,7 @@ static bool plain_gradient(const struct ih_ellipsoid *e, const int32_t place[3],
     square = radius2 << (2 * half);
     r = ih_inverse_root_q15((uint32_t)square);
     root = (square >> 16) * r >> 15;
-    radius = ((root * 16 + ((square - root * root) * r >> 28)) >> half) + 1;
+    radius = ((root * 16 + (((square - root * root) >> 4) * r >> 24)) >> half) + 1;
     radius /= 2;
     half = zeros_of(length2);
     out->inverse = (int64_t)ih_inverse_root_q15((uint32_t)(length2 << (2 * half))) << half >> 3;
@@ -110,18 +110,29 @@ static void plain_scale(struct ih_row_system *system)
     }
 }
 
+/* By one over a root, squared twice, and what is low on the head; near what float64 says. */
 static int64_t plain_weight(int64_t residual, int64_t scale, int32_t down)
 {
-    int64_t ratio2, sum, low, over;
+    const double ratio = (double)residual / (double)(scale * 256);
+    const double lowered = down < 8192 ? 0 : down > 8192 + 4915 ? 0.3 : (down - 8192) / 16384.0;
+    const double exact = (1 - lowered * 0.5 / 0.3) / ((1 + ratio * ratio) * (1 + ratio * ratio));
+    int64_t sum, low, over, r, inverse, weight;
+    int half;
 
     if (llabs(residual) > 5 * scale * 256) {
         return 0;
     }
-    ratio2 = ih_div_round(residual * residual, scale * scale);
-    sum = 65536 + ratio2;
+    sum = 65536 + ih_div_round(residual * residual, scale * scale);
+    half = zeros_of(sum);
+    sum <<= 2 * half;
+    r = ih_inverse_root_q15((uint32_t)sum);
+    inverse = r * r >> 1;
+    inverse += (inverse >> 16) * ((4294967295 - ((sum * r >> 15) * r >> 15)) >> 4) >> 12;
     over = down < 8192 ? 0 : down > 8192 + 4915 ? 4915 : down - 8192;
-    low = 65536 - 32768 * over / 4915;
-    return ih_mul_shift(ih_div_round((int64_t)1 << 48, sum * sum), low, 16);
+    low = 65536 - (over * 436926 >> 16);
+    weight = ih_mul_shift(ih_shift_round(inverse * inverse, 74 - 4 * half), low, 16);
+    IH_TEST_WITHIN(0.00005, exact, ih_test_from_q(weight, 16), "weight", residual);
+    return weight;
 }
 
 /* In the ellipsoid's units. */
