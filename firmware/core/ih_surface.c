@@ -60,6 +60,7 @@ void ih_surface_params_default(struct ih_surface_params *params)
         .ridge_q30 = 10737, /* 1e-5 */
         .huber_mm = 60,
         .centres = IH_SURFACE_CENTRES_FEW,
+        .is_moving = true,
     };
 }
 
@@ -275,13 +276,18 @@ static void set_off_fraction(struct ih_surface_scratch *scratch, const struct ih
         ih_min_s32(8 + OFF_BITS - 2 - ih_bits_u64((uint64_t)most_mm_q8), OFF_FRACTION_MAX);
 }
 
-/* How far the sample is behind the surface: off_fraction bits. */
+/* A depth as residuals are: off_fraction bits. */
+static int64_t off_of_depth(const struct ih_surface_scratch *scratch, int32_t depth_mm_q8)
+{
+    return depth_mm_q8 * ((int64_t)1 << (scratch->off_fraction - 8));
+}
+
+/* How far a sample at that depth behind the mean is behind the surface. */
 static int64_t off_of(const struct ih_surface_scratch *scratch, const uint32_t *row_q20,
-                      const struct ih_sample *sample, int32_t mean_mm_q8)
+                      int32_t depth_mm_q8)
 {
     const int32_t fraction = scratch->off_fraction;
-    const int64_t off =
-        ((int64_t)sample->depth_mm_q8 - mean_mm_q8) * ((int64_t)1 << (fraction - 8));
+    const int64_t off = off_of_depth(scratch, depth_mm_q8);
     const int64_t sum = ih_basis_sum(row_q20, scratch->coefficient, scratch->terms);
     return off - ih_clamp_s64(shift_by(sum, fraction - 20 - scratch->coefficient_shift), OFF_MAX);
 }
@@ -324,7 +330,8 @@ static void sum_all(const struct ih_samples *samples, struct ih_surface_scratch 
         const uint32_t *row_q20 = new_row(samples, i, scratch);
         put_row(scratch, row_q20, out->root_weight_q15[i], at % 2 != 0, scratch->pair[at / 2]);
         if (is_right_wanted) {
-            add_right(scratch, row_q20, off_of(scratch, row_q20, sample, out->mean_mm_q8),
+            add_right(scratch, row_q20,
+                      off_of_depth(scratch, sample->depth_mm_q8 - out->mean_mm_q8),
                       out->root_weight_q15[i]);
         }
         if (at + 1 == IH_NORMAL_ROWS || i + 1 == samples->sample_count) {
@@ -504,9 +511,11 @@ static void refine(const struct ih_samples *samples, const struct ih_surface_par
         for (int32_t i = 0; i < samples->sample_count; i++) {
             const struct ih_sample *sample = &samples->sample[i];
             const uint32_t *row_q20 = row_of(samples, i, scratch);
-            const int64_t off = off_of(scratch, row_q20, sample, out->mean_mm_q8);
+            const int64_t off = off_of(
+                scratch, row_q20, sample->depth_mm_q8 - out->mean_mm_q8 - scratch->moved_mm_q8[i]);
             scratch->is_far[i] = ih_abs_s64(off) >= far;
-            add_right(scratch, row_q20, off, out->root_weight_q15[i]);
+            add_right(scratch, row_q20, off,
+                      params->is_moving ? sample->root_weight_q15 : out->root_weight_q15[i]);
         }
         count++;
     } while (correct_or_refactor(params, scratch) &&
@@ -537,12 +546,36 @@ static void exchange_pairs(struct ih_surface_scratch *scratch)
                   scratch->normal);
 }
 
-/* Weights by the distance from the surface, of those samples that were far from it before the last correction;
- * what samples whose weight changed had brought to the sums is exchanged. The right side is that of the system that
- * is solved, which leaves no more than the ridge's share, and what other weights change. Returns how many did. */
-static int32_t change_weights(const struct ih_samples *samples,
-                              const struct ih_surface_params *params,
-                              struct ih_surface_scratch *scratch, struct ih_surface *out)
+/* Exchange what sample number `at` of those whose weight changed had brought to the sums. */
+static void exchange_sample(struct ih_surface_scratch *scratch, const uint32_t *row_q20, int32_t at,
+                            int32_t before_q15, int32_t root_weight_q15)
+{
+    put_row(scratch, row_q20, before_q15, at % 2 != 0, scratch->pair[at / 2]);
+    put_row(scratch, row_q20, root_weight_q15, at % 2 != 0,
+            scratch->pair[IH_NORMAL_PAIRS + at / 2]);
+    if (at + 1 == IH_NORMAL_ROWS) {
+        exchange_pairs(scratch);
+    }
+}
+
+/* Move sample i, which is too far off, to where it is off by huber_mm. */
+static void move_sample(const struct ih_sample *sample, const struct ih_surface_params *params,
+                        struct ih_surface_scratch *scratch, int32_t i, const uint32_t *row_q20,
+                        int64_t off)
+{
+    const int64_t limit = (int64_t)params->huber_mm << scratch->off_fraction;
+    const int64_t beyond = off - ih_clamp_s64(off, limit);
+    scratch->moved_mm_q8[i] = (int32_t)ih_shift_round(beyond, scratch->off_fraction - 8);
+    add_right(scratch, row_q20, -off_of_depth(scratch, scratch->moved_mm_q8[i]),
+              sample->root_weight_q15);
+}
+
+/* Weights by the distance from the surface, of those samples that were far from it before the last correction.
+ * Those whose weight changed are moved, or what they had brought to the sums is exchanged. The right side is that of
+ * the system that is solved, which leaves no more than the ridge's share, and what is changed. Returns of how many
+ * samples. */
+static int32_t change_far(const struct ih_samples *samples, const struct ih_surface_params *params,
+                          struct ih_surface_scratch *scratch, struct ih_surface *out)
 {
     int32_t lighter = 0;
     set_or_take_ridge(params, false, scratch);
@@ -552,23 +585,23 @@ static int32_t change_weights(const struct ih_samples *samples,
             continue;
         }
         const uint32_t *row_q20 = row_of(samples, i, scratch);
-        const int64_t off = off_of(scratch, row_q20, sample, out->mean_mm_q8);
+        const int64_t off = off_of(scratch, row_q20, sample->depth_mm_q8 - out->mean_mm_q8);
         const int32_t root_q15 =
             reweight(sample, params, ih_shift_round(off, scratch->off_fraction - 11));
         out->root_weight_q15[i] = root_q15;
-        if (root_q15 != sample->root_weight_q15) {
-            add_change(scratch, row_q20, off, sample->root_weight_q15, root_q15);
-            const int32_t at = lighter % IH_NORMAL_ROWS;
-            put_row(scratch, row_q20, sample->root_weight_q15, at % 2 != 0, scratch->pair[at / 2]);
-            put_row(scratch, row_q20, root_q15, at % 2 != 0,
-                    scratch->pair[IH_NORMAL_PAIRS + at / 2]);
-            lighter++;
-            if (at + 1 == IH_NORMAL_ROWS) {
-                exchange_pairs(scratch);
-            }
+        if (root_q15 == sample->root_weight_q15) {
+            continue;
         }
+        if (params->is_moving) {
+            move_sample(sample, params, scratch, i, row_q20, off);
+        } else {
+            add_change(scratch, row_q20, off, sample->root_weight_q15, root_q15);
+            exchange_sample(scratch, row_q20, lighter % IH_NORMAL_ROWS, sample->root_weight_q15,
+                            root_q15);
+        }
+        lighter++;
     }
-    if (lighter % IH_NORMAL_ROWS != 0) {
+    if (!params->is_moving && lighter % IH_NORMAL_ROWS != 0) {
         clear_pairs(scratch->pair, lighter % IH_NORMAL_ROWS);
         clear_pairs(scratch->pair + IH_NORMAL_PAIRS, lighter % IH_NORMAL_ROWS);
         exchange_pairs(scratch);
@@ -583,6 +616,7 @@ static bool fit_first(const struct ih_samples *samples, const struct ih_surface_
     if (!set_weight_shift(scratch, out->root_weight_q15, samples->sample_count)) {
         return false;
     }
+    memset(scratch->moved_mm_q8, 0, sizeof scratch->moved_mm_q8);
     memset(scratch->coefficient, 0, sizeof scratch->coefficient);
     scratch->coefficient_shift = 0;
     memset(scratch->norm_q10, 0, sizeof scratch->norm_q10);
@@ -615,24 +649,34 @@ static bool sum_again(const struct ih_samples *samples, struct ih_surface_scratc
     return true;
 }
 
-/* Again, with less weight for the samples that are far from it, if any. */
-static bool fit_again(const struct ih_samples *samples, const struct ih_surface_params *params,
-                      struct ih_surface_scratch *scratch, struct ih_surface *out)
+/* The system of the weights as they are now, and its factor. */
+static bool factor_again(const struct ih_samples *samples, const struct ih_surface_params *params,
+                         struct ih_surface_scratch *scratch, const struct ih_surface *out)
 {
-    out->downweighted_count = change_weights(samples, params, scratch, out);
-    if (out->downweighted_count == 0) {
-        refine(samples, params, out, SQUARES_LOG2_ENOUGH, scratch);
-        return true;
-    }
     const bool is_light = set_norms(scratch, samples, out->root_weight_q15);
     if (is_light && !sum_again(samples, scratch, out)) {
         return false;
     }
-    const int32_t left_log2 = scratch->squares_log2;
     factor(params, scratch);
-    (void)correct(params, scratch);
-    /* What the first system still left is not on the right side: the next correction may be as great as its last. */
-    scratch->limit_log2 = ih_max_s32(scratch->limit_log2, left_log2);
+    return true;
+}
+
+/* Again, with less weight for the samples that are far from it, or with those moved, if any. */
+static bool fit_again(const struct ih_samples *samples, const struct ih_surface_params *params,
+                      struct ih_surface_scratch *scratch, struct ih_surface *out)
+{
+    const int32_t left_log2 = scratch->squares_log2;
+    out->downweighted_count = change_far(samples, params, scratch, out);
+    if (out->downweighted_count > 0) {
+        if (params->is_moving) {
+            scratch->limit_log2 = SQUARES_LOG2_MOST;
+        } else if (!factor_again(samples, params, scratch, out)) {
+            return false;
+        }
+        (void)correct(params, scratch);
+        /* What the first system still left is not on the right side: the next correction may be as great as its last. */
+        scratch->limit_log2 = ih_max_s32(scratch->limit_log2, left_log2);
+    }
     refine(samples, params, out, SQUARES_LOG2_ENOUGH, scratch);
     return true;
 }

@@ -7,7 +7,9 @@
  *        centres^2 centres; mean is the plain mean of the samples' depths. Weighted
  *        least squares by normal equations N = R^T R, R's rows being the basis rows times the root
  *        weight; ridge: N's diagonal times (1 + 1e-5). Then one Huber step: samples off by more
- *        than huber_mm get the weight huber / |residual| and the system is solved again.
+ *        than huber_mm get the weight huber / |residual| and the system is solved again. Or, by default, they
+ *        are moved to where they are off by huber_mm, which pushes as much: then N and its factor stay as they are,
+ *        and as many heads are found; the paper's nests alone lose some of them (226 instead of 231 of 276).
  *        N is summed from rows of 14 bits, scaled column by column, and only leads to the solution: what
  *        is left, R^T W (z - B c) less the ridge's share, is worked out from rows of full precision,
  *        solved for and added to c, once or more often after each of both systems, until it is small or
@@ -15,7 +17,8 @@
  *        16 bits; where that is not enough, which pivots or growing corrections tell, it is made again with 27 in all.
  *        Only samples that were farther off than 3/4 of huber_mm before the last correction are asked for
  *        their weight. The second N is made from the first by exchanging what samples brought whose weight
- *        changed, and so is the right side, of which the first system left nothing but the ridge's share.
+ *        changed, and so is the right side, of which the first system left nothing but the ridge's share. Of moved samples
+ *        the right side alone changes.
  * Scaling and overflow: field units, samples within IH_SAMPLES_REACH, centres within 20: dx and
  *        dy below 60, B below 85 = 2^6.5, in Q20 below 2^26.5. Short rows: the farthest corner of the box
  *        around the samples is 2^14 - 2; ih_normal has their sums. Weights are enlarged until the
@@ -25,8 +28,9 @@
  * Error: within 0.2 mm of the float64 solution of the same system, everywhere on the grid, for
  *        depths that span up to 1.5 m (ih_samples clips them); it grows with the span. 0.05 mm on frames.
  * Cost:  n = centres^2: samples x 3 n roots of ih_basis, and of the far ones n more, as often multiplied twice;
- *        samples x n (n + 8) / 2 short multiply-adds, and again twice those whose weight changed; two
- *        factorisations, four solutions; grid x n / 2 multiply-adds. So 64 centres cost a third of 144.
+ *        samples x n (n + 8) / 2 short multiply-adds, a factorisation, four solutions; grid x n / 2 multiply-adds.
+ *        With weights instead of moves twice as many multiply-adds of samples whose weight changed, and a second
+ *        factorisation. So 64 centres cost a third of 144.
  */
 #ifndef IH_SURFACE_H
 #define IH_SURFACE_H
@@ -62,8 +66,9 @@
 struct ih_surface_params {
     int32_t ridge_q30; /* added to the diagonal, relative */
     int32_t huber_mm;
-    int32_t
-        centres; /* in a row and in a column: IH_SURFACE_CENTRES_MAX or IH_SURFACE_CENTRES_FEW */
+    /* in a row and in a column: IH_SURFACE_CENTRES_MAX or IH_SURFACE_CENTRES_FEW */
+    int32_t centres;
+    bool is_moving; /* samples that are too far off are moved, instead of getting less weight */
 };
 
 struct ih_surface {
@@ -72,8 +77,9 @@ struct ih_surface {
     int32_t downweighted_count;
     int32_t mean_mm_q8;
     struct ih_field field;
-    int32_t nearest_mm_q8;                                 /* least node of the grid */
-    int32_t root_weight_q15[IH_SLOTS];                     /* by sample, after the Huber step */
+    int32_t nearest_mm_q8; /* least node of the grid */
+    /* By sample, after the Huber step. Of a moved one, the weight with which it would push as much where it was. */
+    int32_t root_weight_q15[IH_SLOTS];
     int32_t depth_mm_q8[IH_SURFACE_GRID][IH_SURFACE_GRID]; /* [y][x] */
 };
 
@@ -120,14 +126,15 @@ struct ih_surface_scratch {
     int32_t coefficient_shift;
     /* Weights are taken for 2^weight_shift times as great: the greatest is 1/2 .. 1. */
     int32_t weight_shift;
-    int32_t normal_shift;   /* a unit of normal[] is 2^normal_shift */
-    int32_t off_fraction;   /* fraction bits of z - B c, mm */
-    int32_t samples_log2;   /* an eighth of the samples: as many are below 2^it */
-    int32_t squares_log2;   /* of the last correction, see ih_surface.c */
-    int32_t limit_log2;     /* of the next one, at the most */
-    bool is_fine;           /* all rows of the factor have 27 bits */
-    bool is_far[IH_SLOTS];  /* before the last correction */
-    int32_t centres, terms; /* in a row, and all */
+    int32_t normal_shift;          /* a unit of normal[] is 2^normal_shift */
+    int32_t off_fraction;          /* fraction bits of z - B c, mm */
+    int32_t samples_log2;          /* an eighth of the samples: as many are below 2^it */
+    int32_t squares_log2;          /* of the last correction, see ih_surface.c */
+    int32_t limit_log2;            /* of the next one, at the most */
+    bool is_fine;                  /* all rows of the factor have 27 bits */
+    bool is_far[IH_SLOTS];         /* before the last correction */
+    int32_t moved_mm_q8[IH_SLOTS]; /* what is taken from a sample's depth */
+    int32_t centres, terms;        /* in a row, and all */
     int32_t centre_q16[IH_SURFACE_CENTRES_MAX]; /* places of the centres in a row, field units */
 };
 

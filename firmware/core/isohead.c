@@ -66,6 +66,7 @@ void ih_params_paper(struct ih_params *params)
     ih_params_default(params);
     params->is_paper = true;
     params->surface.centres = IH_SURFACE_CENTRES_MAX;
+    params->surface.is_moving = false;
     ih_hypotheses_params_paper(&params->hypotheses);
 }
 

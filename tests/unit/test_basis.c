@@ -250,6 +250,7 @@ static void changed_sums_are_those_of_the_new_weights(void)
 
     ih_surface_params_default(&params);
     params.centres = centres;
+    params.is_moving = false;
     samples.sample_count = 340;
     out.mean_mm_q8 = 1000 << 8;
     for (i = 0; i < samples.sample_count; i++) {
@@ -262,8 +263,7 @@ static void changed_sums_are_those_of_the_new_weights(void)
         out.root_weight_q15[i] = samples.sample[i].root_weight_q15;
     }
     TEST_ASSERT_TRUE(fit_first(&samples, &params, &scratch, &out));
-    calls =
-        (change_weights(&samples, &params, &scratch, &out) + IH_NORMAL_PAIRS - 1) / IH_NORMAL_PAIRS;
+    calls = (change_far(&samples, &params, &scratch, &out) + IH_NORMAL_PAIRS - 1) / IH_NORMAL_PAIRS;
     IH_TEST_RANGE(2, 40, calls, "calls that change", 0);
     memcpy(changed, scratch.normal, (size_t)IH_NORMAL_LINE(scratch.terms) * sizeof changed[0]);
     sum_all(&samples, &scratch, &out, false);

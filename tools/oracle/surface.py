@@ -14,6 +14,7 @@ OVERSHOOT_MM, DEPTH_MAX_MM = 200, 32000
 SAMPLES_MIN = 16
 RIDGE_Q30 = 10737
 HUBER_MM = 60
+MOVING = {MANY: False, FEW: True}  # samples that are too far off are moved, instead of getting less weight
 
 GRID_LINE = (np.arange(GRID) - (GRID - 1) / 2) * STEP
 GRID_PLACES = np.stack(np.meshgrid(GRID_LINE, GRID_LINE), axis=-1).reshape(-1, 2)
@@ -49,19 +50,30 @@ def on_grid(coefficients, mean_mm, depth_mm):
     return np.clip(grid, least_mm, DEPTH_MAX_MM)
 
 
-def huber(places, depth_mm, coefficients, mean_mm, huber_mm):
-    """Root of the weight huber / |residual| of samples that are off by more than huber."""
+def residuals(places, depth_mm, coefficients, mean_mm):
+    """How far the samples are behind the surface."""
     rows = basis(places, round(len(coefficients)**0.5))
-    residual = np.abs(mean_mm + rows @ coefficients - depth_mm)
-    return np.where(residual > huber_mm, np.sqrt(huber_mm / np.maximum(residual, 1e-9)), 1.0)
+    return depth_mm - mean_mm - rows @ coefficients
 
 
-def fit(places, depth_mm, root_weight, mean_mm, centres, ridge=RIDGE_Q30 / 2**30,
+def huber(residual_mm, huber_mm):
+    """Root of the weight huber / |residual| of samples that are off by more than huber."""
+    off_mm = np.abs(residual_mm)
+    return np.where(off_mm > huber_mm, np.sqrt(huber_mm / np.maximum(off_mm, 1e-9)), 1.0)
+
+
+def fit(places, depth_mm, root_weight, mean_mm, centres, is_moving, ridge=RIDGE_Q30 / 2**30,
         huber_mm=HUBER_MM):
-    """Both passes. Returns the grid and the root weights of the second pass."""
+    """Both passes. Returns the grid and the root weights of the second one, or with which moved samples would push as
+    they do."""
     first = solve(places, depth_mm, root_weight, mean_mm, ridge, centres)
-    final = root_weight * huber(places, depth_mm, first, mean_mm, huber_mm)
-    second = solve(places, depth_mm, final, mean_mm, ridge, centres)
+    residual_mm = residuals(places, depth_mm, first, mean_mm)
+    final = root_weight * huber(residual_mm, huber_mm)
+    if is_moving:
+        moved_mm = residual_mm - np.clip(residual_mm, -huber_mm, huber_mm)
+        second = solve(places, depth_mm - moved_mm, root_weight, mean_mm, ridge, centres)
+    else:
+        second = solve(places, depth_mm, final, mean_mm, ridge, centres)
     return on_grid(second, mean_mm, depth_mm), final
 
 
@@ -128,11 +140,11 @@ def write_vectors(directory):
                 % (name, emit.wrap(samples)))
         for centres in (MANY, FEW):
             grid, final = fit(from_q(places_q16, 16), from_q(depth_q8, 8), from_q(weight_q15, 15),
-                              mean_mm, centres)
+                              mean_mm, centres, MOVING[centres])
             own = "%s_%d" % (name, centres)
             inc.array("double", "vector_%s_root_weight" % own, final, 6)
             inc.array("double", "vector_%s_grid" % own, grid.ravel(), 3)
-            rows.append('"%s", %d, %d, %s, vector_%s_samples, vector_%s_root_weight, vector_%s_grid'
-                        % (own, centres, len(places), emit.number(mean_mm, 4), name, own, own))
+            rows.append('"%s", %d, %s, %d, %s, vector_%s_samples, vector_%s_root_weight, vector_%s_grid'
+                        % (own, centres, str(MOVING[centres]).lower(), len(places), emit.number(mean_mm, 4), name, own, own))
     inc.struct_array("vector_surface", "vector_surfaces", rows)
     return inc.write(directory, "surface.inc")
