@@ -120,14 +120,15 @@ static const uint32_t roots[] = {
 
 #define EACH(value) _mm256_set1_epi32(value)
 
-/* e: half of the leading zeros of s, which is below 2^31. */
+/* e: half of the leading zeros of s, which is 2^18 and more, and below 2^31. */
 static inline __m256i zeros_halved(__m256i square)
 {
-    __m256i below = _mm256_cmpgt_epi32(EACH(1 << 30), square); /* -1 where it is */
-    for (int bit = 28; bit >= 20; bit -= 2) {
-        below = _mm256_add_epi32(below, _mm256_cmpgt_epi32(EACH(1 << bit), square));
+    __m256i e = EACH(6);
+    for (int bit = 20; bit <= 30; bit += 2) {
+        e = _mm256_add_epi32(e,
+                             _mm256_cmpgt_epi32(square, EACH((1 << bit) - 1))); /* -1 where it is */
     }
-    return _mm256_sub_epi32(_mm256_setzero_si256(), below);
+    return e;
 }
 
 static inline __m256i roots_of_eight(__m256i square)
@@ -206,6 +207,10 @@ void ih_basis_roots(const uint32_t *across_q18, int32_t across_count, const uint
 
 #if defined __AVX2__
 
+/* Vectors of half a row of nodes that are summed together, and their nodes. */
+#define LINE_VECTORS 3
+#define LINE_LANES 8
+
 int64_t ih_basis_sum(const uint32_t *basis_q20, const int32_t *coefficient, int32_t term_count)
 {
     __m256i sum = _mm256_setzero_si256();
@@ -235,9 +240,100 @@ void ih_basis_add(const uint32_t *basis_q20, int32_t factor, int64_t *sum, int32
     }
 }
 
+/* `vectors` of nodes side by side, which the compiler knows. */
+__attribute__((always_inline)) static inline void
+sum_lines(const int32_t *coefficient, const int32_t *const *line_q20, int32_t line_count,
+          int32_t count, int32_t width, int32_t vectors, int32_t x, int64_t *sum)
+{
+    __m256i even[LINE_VECTORS], odd[LINE_VECTORS];
+    for (int32_t v = 0; v < vectors; v++) {
+        even[v] = odd[v] = _mm256_setzero_si256();
+    }
+    for (int32_t k = 0; k < line_count; k++) {
+        const int32_t *basis_q20 = &line_q20[k][x];
+        for (int32_t i = 0; i < count; i++) {
+            const __m256i factor = EACH(coefficient[i]);
+            for (int32_t v = 0; v < vectors; v++) {
+                const __m256i basis = _mm256_loadu_si256((const __m256i *)&basis_q20[8 * v]);
+                const __m256i next = _mm256_shuffle_epi32(basis, 0xf5); /* 1 1 3 3 */
+                even[v] = _mm256_add_epi64(even[v], _mm256_mul_epi32(basis, factor));
+                odd[v] = _mm256_add_epi64(odd[v], _mm256_mul_epi32(next, factor));
+            }
+            basis_q20 = &basis_q20[width];
+        }
+        coefficient = &coefficient[count];
+    }
+    for (int32_t v = 0; v < vectors; v++) {
+        const __m256i first = _mm256_unpacklo_epi64(even[v], odd[v]); /* 0 1, 4 5 */
+        const __m256i other = _mm256_unpackhi_epi64(even[v], odd[v]); /* 2 3, 6 7 */
+        __m256i *to = (__m256i *)&sum[x + 8 * v];
+        _mm256_storeu_si256(&to[0], _mm256_permute2x128_si256(first, other, 0x20));
+        _mm256_storeu_si256(&to[1], _mm256_permute2x128_si256(first, other, 0x31));
+    }
+}
+
 #elif defined __x86_64__ && defined __SSE2__
 
-/* There are only products of numbers without a sign: coefficients are taken for 2^31 more, which the sum of
+/* There are only products of numbers without a sign. Here lines are taken for so much more, which the sum of the
+ * coefficients times it takes away again. */
+#define LINE_MORE (1 << 27)
+#define LINE_VECTORS 6
+#define LINE_LANES 4
+
+static inline __m128i changed_by(__m128i sum, __m128i product, bool is_less)
+{
+    return is_less ? _mm_sub_epi64(sum, product) : _mm_add_epi64(sum, product);
+}
+
+/* What one coefficient of that size brings. */
+__attribute__((always_inline)) static inline void sum_line(const int32_t *basis_q20, __m128i size,
+                                                           bool is_less, int32_t vectors,
+                                                           __m128i even[LINE_VECTORS],
+                                                           __m128i odd[LINE_VECTORS])
+{
+    const __m128i more = _mm_set1_epi32(LINE_MORE);
+    for (int32_t v = 0; v < vectors; v++) {
+        const __m128i basis =
+            _mm_add_epi32(_mm_loadu_si128((const __m128i *)&basis_q20[4 * v]), more);
+        const __m128i next = _mm_srli_epi64(basis, 32);
+        even[v] = changed_by(even[v], _mm_mul_epu32(basis, size), is_less);
+        odd[v] = changed_by(odd[v], _mm_mul_epu32(next, size), is_less);
+    }
+}
+
+/* `vectors` of nodes side by side, which the compiler knows. */
+__attribute__((always_inline)) static inline void
+sum_lines(const int32_t *coefficient, const int32_t *const *line_q20, int32_t line_count,
+          int32_t count, int32_t width, int32_t vectors, int32_t x, int64_t *sum)
+{
+    __m128i even[LINE_VECTORS], odd[LINE_VECTORS];
+    int64_t total = 0;
+    for (int32_t i = 0; i < line_count * count; i++) {
+        total += coefficient[i];
+    }
+    for (int32_t v = 0; v < vectors; v++) {
+        even[v] = odd[v] = _mm_set1_epi64x(-total * LINE_MORE);
+    }
+    for (int32_t k = 0; k < line_count; k++) {
+        const int32_t *basis_q20 = &line_q20[k][x];
+        for (int32_t i = 0; i < count; i++) {
+            if (coefficient[i] < 0) {
+                sum_line(basis_q20, _mm_set1_epi32(-coefficient[i]), true, vectors, even, odd);
+            } else {
+                sum_line(basis_q20, _mm_set1_epi32(coefficient[i]), false, vectors, even, odd);
+            }
+            basis_q20 = &basis_q20[width];
+        }
+        coefficient = &coefficient[count];
+    }
+    for (int32_t v = 0; v < vectors; v++) {
+        __m128i *to = (__m128i *)&sum[x + 4 * v];
+        _mm_storeu_si128(&to[0], _mm_unpacklo_epi64(even[v], odd[v]));
+        _mm_storeu_si128(&to[1], _mm_unpackhi_epi64(even[v], odd[v]));
+    }
+}
+
+/* Coefficients are taken for 2^31 more, which the sum of
  * the basis times 2^31 takes away again. Both pass 2^64, together they do not. */
 int64_t ih_basis_sum(const uint32_t *basis_q20, const int32_t *coefficient, int32_t term_count)
 {
@@ -294,6 +390,23 @@ void ih_basis_add(const uint32_t *basis_q20, int32_t factor, int64_t *sum, int32
 
 #else
 
+/* Two centres at a time: sums are loaded and stored half as often. */
+void ih_basis_lines(const int32_t *coefficient, const int32_t *const *line_q20, int32_t line_count,
+                    int32_t count, int32_t width, int64_t *sum)
+{
+    for (int32_t x = 0; x < width; x++) {
+        sum[x] = 0;
+    }
+    for (int32_t i = 0; i < line_count * count; i += 2) {
+        const int32_t *here_q20 = &line_q20[i / count][i % count * width];
+        const int32_t *next_q20 = &here_q20[width];
+        const int32_t first = coefficient[i], second = coefficient[i + 1];
+        for (int32_t x = 0; x < width; x++) {
+            sum[x] += (int64_t)first * here_q20[x] + (int64_t)second * next_q20[x];
+        }
+    }
+}
+
 int64_t ih_basis_sum(const uint32_t *basis_q20, const int32_t *coefficient, int32_t term_count)
 {
     int64_t sum = 0;
@@ -312,4 +425,19 @@ void ih_basis_add(const uint32_t *basis_q20, int32_t factor, int64_t *sum, int32
     }
 }
 
+#endif
+
+#ifdef LINE_VECTORS
+/* A grid of 47 nodes: all at once. */
+void ih_basis_lines(const int32_t *coefficient, const int32_t *const *line_q20, int32_t line_count,
+                    int32_t count, int32_t width, int64_t *sum)
+{
+    int32_t x = 0;
+    for (; x + LINE_VECTORS * LINE_LANES <= width; x += LINE_VECTORS * LINE_LANES) {
+        sum_lines(coefficient, line_q20, line_count, count, width, LINE_VECTORS, x, sum);
+    }
+    for (; x < width; x += LINE_LANES) {
+        sum_lines(coefficient, line_q20, line_count, count, width, 1, x, sum);
+    }
+}
 #endif

@@ -28,6 +28,12 @@ void ih_basis_roots(const uint32_t *across_q18, int32_t across_count, const uint
  * products are below 2^62. */
 int64_t ih_basis_sum(const uint32_t *basis_q20, const int32_t *coefficient, int32_t term_count);
 
+/* Sums along half a row of nodes, `width` of them, a multiple of 8: of coefficient[k * count + i] * line[k][i * width + x],
+ * k below line_count and i below count, an even number. Lines are -2^27 .. 2^28; the sums below 2^63, and so are those
+ * of the coefficients alone, times 2^27. */
+void ih_basis_lines(const int32_t *coefficient, const int32_t *const *line_q20, int32_t line_count,
+                    int32_t count, int32_t width, int64_t *sum);
+
 /* Add basis[i] * factor to sum[i]. */
 void ih_basis_add(const uint32_t *basis_q20, int32_t factor, int64_t *sum, int32_t term_count);
 

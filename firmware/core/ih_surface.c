@@ -202,21 +202,38 @@ static bool set_norms(struct ih_surface_scratch *scratch, const struct ih_sample
     return is_light;
 }
 
+/* The samples' least and greatest places along x and y. */
+struct box {
+    int32_t end_q16[2][2];
+};
+
+static struct box box_of(const struct ih_samples *samples)
+{
+    struct box box = {{{INT32_MAX, INT32_MIN}, {INT32_MAX, INT32_MIN}}};
+    for (int32_t i = 0; i < samples->sample_count; i++) {
+        const struct ih_sample *sample = &samples->sample[i];
+        box.end_q16[0][0] = ih_min_s32(box.end_q16[0][0], sample->x_q16);
+        box.end_q16[0][1] = ih_max_s32(box.end_q16[0][1], sample->x_q16);
+        box.end_q16[1][0] = ih_min_s32(box.end_q16[1][0], sample->y_q16);
+        box.end_q16[1][1] = ih_max_s32(box.end_q16[1][1], sample->y_q16);
+    }
+    return box;
+}
+
 /* Scales of short rows: no entry is greater than the basis at the farthest corner of the box around the
  * samples, nor than the root of all squares' sum. And the unit of the rows' sums: no square's sum is above ratio *
  * 2^28, with what was rounded, so that in that unit all are below 2^31. */
 static void set_row_scale(struct ih_surface_scratch *scratch, const struct ih_samples *samples)
 {
-    uint32_t far_q18[2][CENTRES_MAX];
+    uint32_t far_q18[2][CENTRES_MAX] = {{0}, {0}};
     uint32_t ratio = 0;
-    memset(far_q18, 0, sizeof far_q18);
-    for (int32_t i = 0; i < samples->sample_count; i++) {
-        uint32_t square_q18[2][CENTRES_MAX] = {{0}, {0}};
-        square_distances(scratch, samples->sample[i].x_q16, 0, square_q18[0]);
-        square_distances(scratch, samples->sample[i].y_q16, 0, square_q18[1]);
-        for (int32_t k = 0; k < scratch->centres; k++) {
-            for (int axis = 0; axis < 2; axis++) {
-                const uint32_t here = square_q18[axis][k];
+    struct box box = box_of(samples);
+    for (int end = 0; end < 2; end++) {
+        for (int axis = 0; axis < 2; axis++) {
+            uint32_t square_q18[CENTRES_MAX] = {0};
+            square_distances(scratch, box.end_q16[axis][end], 0, square_q18);
+            for (int32_t k = 0; k < scratch->centres; k++) {
+                const uint32_t here = square_q18[k];
                 far_q18[axis][k] = here > far_q18[axis][k] ? here : far_q18[axis][k];
             }
         }
@@ -708,10 +725,10 @@ static void fill_table(struct ih_surface_scratch *scratch)
     }
 }
 
-/* sum_n c_n B_n in Q8 from a sum in Q(8 + shift). */
+/* sum_n c_n B_n in Q8 from twice the sum in Q(7 + shift). */
 static inline int32_t depth_of_sum(int shift, int32_t mean_mm_q8, int64_t sum)
 {
-    const int64_t depth_q8 = shift >= 0 ? ih_shift_round(sum, shift) : INT32_MAX;
+    const int64_t depth_q8 = shift > 0 ? ih_shift_round(sum, shift) : INT32_MAX;
     return ih_saturate_s32(mean_mm_q8 + depth_q8);
 }
 
@@ -751,65 +768,57 @@ static void fold_table(struct ih_surface_scratch *scratch)
     }
 }
 
-/* Add what four centres of a row bring, folded, to half a row of nodes: two of them are added to the others' two. */
-static void add_two(const int32_t *coefficient, int32_t basis_q20[2][IH_SURFACE_HALF],
-                    int64_t sum[IH_SURFACE_HALF])
+/* Sums and differences of the coefficients of both centres of a pair, where the solution was: it has served. */
+static void fold_coefficients(struct ih_surface_scratch *scratch, int32_t **between)
 {
-    const int32_t first = coefficient[0], second = coefficient[1];
-    for (int32_t x = 0; x < IH_SURFACE_HALF; x++) {
-        sum[x] += (int64_t)first * basis_q20[0][x] + (int64_t)second * basis_q20[1][x];
-    }
-}
-
-static void add_row(const int32_t coefficient[HALF_CENTRES_MAX],
-                    int32_t basis_q20[HALF_CENTRES_MAX][IH_SURFACE_HALF], int32_t count,
-                    int64_t sum[IH_SURFACE_HALF])
-{
-    for (int32_t k = 0; k < count; k += 2) {
-        add_two(&coefficient[k], &basis_q20[k], sum);
-    }
-}
-
-/* sum_n c_n B_n along a row of nodes. */
-static void sum_row(struct ih_surface_scratch *scratch, int32_t y, int64_t sum[IH_SURFACE_GRID])
-{
-    const int32_t last = scratch->centres - 1;
-    const int32_t half = scratch->centres / 2;
-    int64_t even[IH_SURFACE_HALF] = {0};
-    int64_t odd[IH_SURFACE_HALF] = {0};
-    for (int32_t row = 0; row < scratch->centres; row++) {
-        const int32_t *solution = &scratch->coefficient[row * scratch->centres];
-        const int32_t b = ih_abs_s32(y - centre_node(scratch, row));
-        int32_t both[HALF_CENTRES_MAX] = {0};
-        int32_t between[HALF_CENTRES_MAX] = {0};
+    const int32_t centres = scratch->centres, half = centres / 2;
+    int32_t *both = scratch->solution;
+    *between = &both[centres * half];
+    for (int32_t row = 0; row < centres; row++) {
+        const int32_t *coefficient = &scratch->coefficient[row * centres];
         for (int32_t k = 0; k < half; k++) {
-            both[k] = solution[k] + solution[last - k];
-            between[k] = solution[k] - solution[last - k];
+            const int32_t other = coefficient[centres - 1 - k];
+            both[row * half + k] = coefficient[k] + other;
+            (*between)[row * half + k] = coefficient[k] - other;
         }
-        add_row(both, scratch->of.grid.sum_q20[b], half, even);
-        add_row(between, scratch->of.grid.difference_q20[b], half, odd);
     }
-    for (int32_t x = 0; x < IH_SURFACE_HALF; x++) {
-        sum[x] = (even[x] + odd[x]) / 2; /* without a rest */
-        sum[IH_SURFACE_GRID - 1 - x] = (even[x] - odd[x]) / 2;
+}
+
+/* Twice sum_n c_n B_n along half a row of nodes, but for what changes its sign in the other half, and that. */
+static void sum_row(const struct ih_surface_scratch *scratch, const int32_t *between, int32_t y,
+                    int64_t even[IH_SURFACE_HALF], int64_t odd[IH_SURFACE_HALF])
+{
+    const int32_t centres = scratch->centres;
+    const int32_t *sum_q20[CENTRES_MAX], *difference_q20[CENTRES_MAX];
+    for (int32_t row = 0; row < centres; row++) {
+        const int32_t b = ih_abs_s32(y - centre_node(scratch, row));
+        sum_q20[row] = scratch->of.grid.sum_q20[b][0];
+        difference_q20[row] = scratch->of.grid.difference_q20[b][0];
     }
+    ih_basis_lines(scratch->solution, sum_q20, centres, centres / 2, IH_SURFACE_HALF, even);
+    ih_basis_lines(between, difference_q20, centres, centres / 2, IH_SURFACE_HALF, odd);
 }
 
 static void evaluate(const struct ih_samples *samples, struct ih_surface_scratch *scratch,
                      struct ih_surface *out)
 {
-    const int shift = ih_min_s32(20 + scratch->coefficient_shift - 8, 62);
-    const int32_t least_q8 = least_depth_mm_q8(samples);
+    const int shift = ih_min_s32(20 + scratch->coefficient_shift - 7, 62);
+    const int32_t least_q8 = least_depth_mm_q8(samples), most_q8 = IH_SURFACE_DEPTH_MAX_MM << 8;
     const int32_t mean_mm_q8 = out->mean_mm_q8;
+    int32_t *between;
     int32_t nearest_q8 = INT32_MAX;
+    fold_coefficients(scratch, &between);
     for (int32_t y = 0; y < IH_SURFACE_GRID; y++) {
-        int64_t sum[IH_SURFACE_GRID];
-        sum_row(scratch, y, sum);
-        for (int32_t x = 0; x < IH_SURFACE_GRID; x++) {
-            const int32_t depth_q8 = ih_clamp_s32(depth_of_sum(shift, mean_mm_q8, sum[x]), least_q8,
-                                                  IH_SURFACE_DEPTH_MAX_MM << 8);
-            out->depth_mm_q8[y][x] = depth_q8;
-            nearest_q8 = ih_min_s32(nearest_q8, depth_q8);
+        int64_t even[IH_SURFACE_HALF], odd[IH_SURFACE_HALF];
+        sum_row(scratch, between, y, even, odd);
+        for (int32_t x = 0; x < IH_SURFACE_HALF; x++) {
+            const int32_t left_q8 =
+                ih_clamp_s32(depth_of_sum(shift, mean_mm_q8, even[x] + odd[x]), least_q8, most_q8);
+            const int32_t right_q8 =
+                ih_clamp_s32(depth_of_sum(shift, mean_mm_q8, even[x] - odd[x]), least_q8, most_q8);
+            out->depth_mm_q8[y][x] = left_q8;
+            out->depth_mm_q8[y][IH_SURFACE_GRID - 1 - x] = right_q8;
+            nearest_q8 = ih_min_s32(nearest_q8, ih_min_s32(left_q8, right_q8));
         }
     }
     out->nearest_mm_q8 = nearest_q8;

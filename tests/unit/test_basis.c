@@ -170,6 +170,49 @@ static void sums_are_exact(void)
     }
 }
 
+/* Half a row of nodes, of widths with whole blocks of vectors and others. */
+static void sums_along_nodes_are_exact(void)
+{
+    static int32_t line_q20[CENTRES_MAX][HALF_CENTRES_MAX * 32], coefficient[TERMS_MAX / 2];
+    const int32_t *lines_q20[CENTRES_MAX];
+    struct ih_test_random random = {.state = 6};
+    const int32_t half = centres / 2;
+    int round, i, k, x;
+
+    for (round = 0; round < 100; round++) {
+        const int32_t width = 8 * (1 + round % 4);
+        const int32_t most = round % 4 == 0 ? 1 << 28 : 1 << (round % 28);
+        int64_t sum[33];
+
+        for (k = 0; k < centres; k++) {
+            lines_q20[k] = line_q20[k];
+            for (i = 0; i < half * width; i++) {
+                line_q20[k][i] = round % 5 == 0
+                                     ? (k % 2 == 0 ? 1 << 28 : -(1 << 27))
+                                     : (int32_t)ih_test_between(&random, -(1 << 27), 1 << 28);
+            }
+            for (i = 0; i < half; i++) {
+                coefficient[k * half + i] = round % 5 == 0
+                                                ? (k % 2 == 0 ? most : -most)
+                                                : (int32_t)ih_test_between(&random, -most, most);
+            }
+        }
+        sum[width] = 77;
+        ih_basis_lines(coefficient, lines_q20, centres, half, width, sum);
+        for (x = 0; x < width; x++) {
+            int64_t expected = 0;
+
+            for (k = 0; k < centres; k++) {
+                for (i = 0; i < half; i++) {
+                    expected += (int64_t)coefficient[k * half + i] * line_q20[k][i * width + x];
+                }
+            }
+            IH_TEST_EQUAL(expected, sum[x], "along nodes", x);
+        }
+        IH_TEST_EQUAL(77, sum[width], "behind the nodes", round);
+    }
+}
+
 static void centres_stand_evenly(void)
 {
     int32_t k;
@@ -291,6 +334,7 @@ int main(int count, char **arguments)
         RUN_TEST(roots_hold_at_the_ends_of_spans);
         RUN_TEST(lines_are_roots_of_sums);
         RUN_TEST(sums_are_exact);
+        RUN_TEST(sums_along_nodes_are_exact);
         RUN_TEST(centres_stand_evenly);
         RUN_TEST(every_place_has_its_basis);
         RUN_TEST(any_place_has_its_basis);
