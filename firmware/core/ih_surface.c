@@ -71,13 +71,14 @@ static int32_t steps_of(const struct ih_surface_scratch *scratch)
 }
 
 /* Where what belongs to so many centres stands, and their places in a row or column, field units. */
-static void set_centres(int32_t centres, struct ih_surface_scratch *scratch)
+static void set_centres(const struct ih_surface_params *params, struct ih_surface_scratch *scratch)
 {
-    const bool is_few = centres == IH_SURFACE_CENTRES_FEW;
+    const int32_t centres = params->centres;
+    const bool is_few = centres == IH_SURFACE_CENTRES_FEW && params->is_moving;
     scratch->centres = centres;
     scratch->terms = centres * centres;
     scratch->normal = is_few ? scratch->of.few.normal : scratch->of.many.normal;
-    scratch->factor = is_few ? scratch->of.few.factor : scratch->of.many.factor;
+    scratch->factor = is_few ? scratch->of.few.normal : scratch->of.many.factor;
     scratch->kept_count = is_few ? IH_SURFACE_ROWS_KEPT : 0;
     for (int32_t k = 0; k < centres; k++) {
         const int32_t half_steps = (2 * k - (centres - 1)) * steps_of(scratch);
@@ -328,6 +329,14 @@ static void add_change(struct ih_surface_scratch *scratch, const uint32_t *row_q
                  scratch->terms);
 }
 
+/* The root weight of sample i: of one that is moved it stays as it was. */
+static int32_t root_weight_of(const struct ih_samples *samples,
+                              const struct ih_surface_params *params, const struct ih_surface *out,
+                              int32_t i)
+{
+    return params->is_moving ? samples->sample[i].root_weight_q15 : out->root_weight_q15[i];
+}
+
 /* Pairs from row number `count` on add nothing. */
 static void clear_pairs(uint32_t pair[IH_NORMAL_PAIRS][TERMS_MAX], int32_t count)
 {
@@ -337,19 +346,20 @@ static void clear_pairs(uint32_t pair[IH_NORMAL_PAIRS][TERMS_MAX], int32_t count
 }
 
 /* The sums of all samples, and the right side if the coefficients are all 0. */
-static void sum_all(const struct ih_samples *samples, struct ih_surface_scratch *scratch,
-                    const struct ih_surface *out, bool is_right_wanted)
+static void sum_all(const struct ih_samples *samples, const struct ih_surface_params *params,
+                    struct ih_surface_scratch *scratch, const struct ih_surface *out,
+                    bool is_right_wanted)
 {
     memset(scratch->normal, 0, (size_t)IH_NORMAL_LINE(scratch->terms) * sizeof *scratch->normal);
     for (int32_t i = 0; i < samples->sample_count; i++) {
         const struct ih_sample *sample = &samples->sample[i];
         const int32_t at = i % IH_NORMAL_ROWS;
+        const int32_t root_q15 = root_weight_of(samples, params, out, i);
         const uint32_t *row_q20 = new_row(samples, i, scratch);
-        put_row(scratch, row_q20, out->root_weight_q15[i], at % 2 != 0, scratch->pair[at / 2]);
+        put_row(scratch, row_q20, root_q15, at % 2 != 0, scratch->pair[at / 2]);
         if (is_right_wanted) {
             add_right(scratch, row_q20,
-                      off_of_depth(scratch, sample->depth_mm_q8 - out->mean_mm_q8),
-                      out->root_weight_q15[i]);
+                      off_of_depth(scratch, sample->depth_mm_q8 - out->mean_mm_q8), root_q15);
         }
         if (at + 1 == IH_NORMAL_ROWS || i + 1 == samples->sample_count) {
             clear_pairs(scratch->pair, at + 1);
@@ -399,10 +409,21 @@ static bool try_factor(const struct ih_surface_params *params, int32_t fine_from
                             scratch->factor, scratch->pair);
 }
 
-static void factor(const struct ih_surface_params *params, struct ih_surface_scratch *scratch)
+/* With more bits in all rows. Where the sums have no room of their own they are made anew. */
+static void factor_fine(const struct ih_samples *samples, const struct ih_surface_params *params,
+                        const struct ih_surface *out, struct ih_surface_scratch *scratch)
+{
+    if (scratch->factor == scratch->normal) {
+        sum_all(samples, params, scratch, out, false);
+    }
+    (void)try_factor(params, 0, scratch);
+}
+
+static void factor(const struct ih_samples *samples, const struct ih_surface_params *params,
+                   const struct ih_surface *out, struct ih_surface_scratch *scratch)
 {
     if (!try_factor(params, scratch->terms - FINE_ROWS, scratch)) {
-        (void)try_factor(params, 0, scratch);
+        factor_fine(samples, params, out, scratch);
     }
     scratch->squares_log2 = SQUARES_LOG2_MOST;
 }
@@ -499,8 +520,9 @@ static bool correct(const struct ih_surface_params *params, struct ih_surface_sc
 
 /* Corrections that grow with the coarse factor begin anew with the fine one, if that has not been tried: few samples'
  * pivots do not tell that it is not good. Returns false when nothing is left to do. */
-static bool correct_or_refactor(const struct ih_surface_params *params,
-                                struct ih_surface_scratch *scratch)
+static bool correct_or_refactor(const struct ih_samples *samples,
+                                const struct ih_surface_params *params,
+                                const struct ih_surface *out, struct ih_surface_scratch *scratch)
 {
     if (correct(params, scratch)) {
         return true;
@@ -508,7 +530,7 @@ static bool correct_or_refactor(const struct ih_surface_params *params,
     if (scratch->is_fine) {
         return false;
     }
-    (void)try_factor(params, 0, scratch);
+    factor_fine(samples, params, out, scratch);
     return true;
 }
 
@@ -531,11 +553,10 @@ static void refine(const struct ih_samples *samples, const struct ih_surface_par
             const int64_t off = off_of(
                 scratch, row_q20, sample->depth_mm_q8 - out->mean_mm_q8 - scratch->moved_mm_q8[i]);
             scratch->is_far[i] = ih_abs_s64(off) >= far;
-            add_right(scratch, row_q20, off,
-                      params->is_moving ? sample->root_weight_q15 : out->root_weight_q15[i]);
+            add_right(scratch, row_q20, off, root_weight_of(samples, params, out, i));
         }
         count++;
-    } while (correct_or_refactor(params, scratch) &&
+    } while (correct_or_refactor(samples, params, out, scratch) &&
              (count < least ||
               (2 * scratch->squares_log2 - before > enough_log2 && count < CORRECTIONS_MAX)));
 }
@@ -642,16 +663,16 @@ static bool fit_first(const struct ih_samples *samples, const struct ih_surface_
     set_row_scale(scratch, samples);
     set_off_fraction(scratch, samples, out->mean_mm_q8);
     scratch->samples_log2 = ih_bits_u64((uint64_t)(samples->sample_count + 7) / 8);
-    sum_all(samples, scratch, out, true);
-    factor(params, scratch);
+    sum_all(samples, params, scratch, out, true);
+    factor(samples, params, out, scratch);
     (void)correct(params, scratch);
     refine(samples, params, out, SQUARES_LOG2_FOR_WEIGHTS, scratch);
     return true;
 }
 
 /* Sum all rows again, and scale the right side to the weights as they are enlarged now. */
-static bool sum_again(const struct ih_samples *samples, struct ih_surface_scratch *scratch,
-                      const struct ih_surface *out)
+static bool sum_again(const struct ih_samples *samples, const struct ih_surface_params *params,
+                      struct ih_surface_scratch *scratch, const struct ih_surface *out)
 {
     const int32_t before = scratch->weight_shift;
     if (!set_weight_shift(scratch, out->root_weight_q15, samples->sample_count)) {
@@ -662,7 +683,7 @@ static bool sum_again(const struct ih_samples *samples, struct ih_surface_scratc
     }
     (void)set_norms(scratch, samples, out->root_weight_q15);
     set_row_scale(scratch, samples);
-    sum_all(samples, scratch, out, false);
+    sum_all(samples, params, scratch, out, false);
     return true;
 }
 
@@ -671,10 +692,10 @@ static bool factor_again(const struct ih_samples *samples, const struct ih_surfa
                          struct ih_surface_scratch *scratch, const struct ih_surface *out)
 {
     const bool is_light = set_norms(scratch, samples, out->root_weight_q15);
-    if (is_light && !sum_again(samples, scratch, out)) {
+    if (is_light && !sum_again(samples, params, scratch, out)) {
         return false;
     }
-    factor(params, scratch);
+    factor(samples, params, out, scratch);
     return true;
 }
 
@@ -833,7 +854,7 @@ void ih_surface_fit(const struct ih_samples *samples, const struct ih_field *fie
     if (samples->sample_count < IH_SURFACE_SAMPLES_MIN) {
         return;
     }
-    set_centres(params->centres, scratch);
+    set_centres(params, scratch);
     out->centres = params->centres;
     out->mean_mm_q8 = mean_depth_mm_q8(samples);
     for (int32_t i = 0; i < samples->sample_count; i++) {

@@ -89,7 +89,7 @@ struct ih_surface {
 
 /* As many of the samples' rows as fill what the smaller system leaves of the other's room. */
 #define IH_SURFACE_ROWS_KEPT                                                             \
-    (2 * (IH_NORMAL_LINE(IH_SURFACE_TERMS_MAX) - IH_NORMAL_LINE(IH_SURFACE_TERMS_FEW)) / \
+    ((2 * IH_NORMAL_LINE(IH_SURFACE_TERMS_MAX) - IH_NORMAL_LINE(IH_SURFACE_TERMS_FEW)) / \
      IH_SURFACE_TERMS_FEW)
 
 struct ih_surface_scratch {
@@ -100,9 +100,8 @@ struct ih_surface_scratch {
         } many;
         struct {
             int32_t normal[IH_NORMAL_LINE(IH_SURFACE_TERMS_FEW)];
-            int32_t factor[IH_NORMAL_LINE(IH_SURFACE_TERMS_FEW)];
             uint32_t row_q20[IH_SURFACE_ROWS_KEPT][IH_SURFACE_TERMS_FEW];
-        } few; /* where the smaller system leaves room, samples' rows are kept */
+        } few; /* where samples are moved sums need not outlive the factor, and their rows are kept */
         struct {
             int32_t table_q20[IH_SURFACE_STEPS][2 * IH_SURFACE_STEPS - 1];
             int32_t sum_q20[IH_SURFACE_STEPS][IH_SURFACE_HALF_CENTRES_MAX][IH_SURFACE_HALF];
@@ -110,7 +109,7 @@ struct ih_surface_scratch {
         } grid; /* the basis in whole steps, and folded */
     } of;
     int32_t *normal;    /* sums of products of short rows: many's or few's */
-    int32_t *factor;    /* them, scaled, Q30, then factored */
+    int32_t *factor;    /* them, scaled, Q30, then factored: in few's in their place */
     int32_t kept_count; /* rows of the first samples that few.row_q20 has */
     /* R^T W (z - B c), less the ridge's share: Q20 more than off */
     int64_t right[IH_SURFACE_TERMS_MAX];

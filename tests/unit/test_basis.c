@@ -22,7 +22,7 @@ void setUp(void)
 {
     memset(&scratch, 0, sizeof scratch);
     worst_steps = 0;
-    set_centres(centres, &scratch);
+    set_centres(&(struct ih_surface_params){.centres = centres}, &scratch);
 }
 
 void tearDown(void)
@@ -309,7 +309,7 @@ static void changed_sums_are_those_of_the_new_weights(void)
     calls = (change_far(&samples, &params, &scratch, &out) + IH_NORMAL_PAIRS - 1) / IH_NORMAL_PAIRS;
     IH_TEST_RANGE(2, 40, calls, "calls that change", 0);
     memcpy(changed, scratch.normal, (size_t)IH_NORMAL_LINE(scratch.terms) * sizeof changed[0]);
-    sum_all(&samples, &scratch, &out, false);
+    sum_all(&samples, &params, &scratch, &out, false);
     calls += 2 * ((samples.sample_count + IH_NORMAL_ROWS - 1) / IH_NORMAL_ROWS);
     for (i = 0; i < scratch.terms; i++) {
         const int32_t *line = scratch.normal + ih_normal_line(i);
