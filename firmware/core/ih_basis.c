@@ -240,6 +240,52 @@ void ih_basis_add(const uint32_t *basis_q20, int32_t factor, int64_t *sum, int32
     }
 }
 
+static void sum_four(const uint32_t *basis_q20, const int32_t *coefficient, int32_t term_count,
+                     int64_t sum[IH_BASIS_ROWS])
+{
+    __m256i part[IH_BASIS_ROWS];
+    for (int32_t k = 0; k < IH_BASIS_ROWS; k++) {
+        part[k] = _mm256_setzero_si256();
+    }
+    for (int32_t i = 0; i < term_count; i += 8) {
+        const __m256i even = _mm256_loadu_si256((const __m256i *)&coefficient[i]);
+        const __m256i odd = _mm256_shuffle_epi32(even, 0xf5); /* 1 1 3 3 */
+        for (int32_t k = 0; k < IH_BASIS_ROWS; k++) {
+            const __m256i basis =
+                _mm256_loadu_si256((const __m256i *)&basis_q20[k * term_count + i]);
+            const __m256i next = _mm256_shuffle_epi32(basis, 0xf5);
+            part[k] = _mm256_add_epi64(part[k], _mm256_mul_epi32(basis, even));
+            part[k] = _mm256_add_epi64(part[k], _mm256_mul_epi32(next, odd));
+        }
+    }
+    const __m256i first = _mm256_add_epi64(_mm256_unpacklo_epi64(part[0], part[1]),
+                                           _mm256_unpackhi_epi64(part[0], part[1]));
+    const __m256i last = _mm256_add_epi64(_mm256_unpacklo_epi64(part[2], part[3]),
+                                          _mm256_unpackhi_epi64(part[2], part[3]));
+    _mm256_storeu_si256((__m256i *)sum,
+                        _mm256_add_epi64(_mm256_permute2x128_si256(first, last, 0x20),
+                                         _mm256_permute2x128_si256(first, last, 0x31)));
+}
+
+static void add_four(const uint32_t *basis_q20, const int32_t factor[IH_BASIS_ROWS], int64_t *sum,
+                     int32_t term_count)
+{
+    __m256i each[IH_BASIS_ROWS];
+    for (int32_t k = 0; k < IH_BASIS_ROWS; k++) {
+        each[k] = EACH(factor[k]);
+    }
+    for (int32_t i = 0; i < term_count; i += 4) {
+        __m256i *at = (__m256i *)&sum[i];
+        __m256i value = _mm256_loadu_si256(at);
+        for (int32_t k = 0; k < IH_BASIS_ROWS; k++) {
+            const uint32_t *four = &basis_q20[k * term_count + i];
+            const __m256i basis = _mm256_cvtepu32_epi64(_mm_loadu_si128((const __m128i *)four));
+            value = _mm256_add_epi64(value, _mm256_mul_epi32(basis, each[k]));
+        }
+        _mm256_storeu_si256(at, value);
+    }
+}
+
 /* `vectors` of nodes side by side, which the compiler knows. */
 __attribute__((always_inline)) static inline void
 sum_lines(const int32_t *coefficient, const int32_t *const *line_q20, int32_t line_count,
@@ -333,8 +379,82 @@ sum_lines(const int32_t *coefficient, const int32_t *const *line_q20, int32_t li
     }
 }
 
-/* Coefficients are taken for 2^31 more, which the sum of
- * the basis times 2^31 takes away again. Both pass 2^64, together they do not. */
+/* All ones where a number is negative, in both words of its half of the vector; its size. */
+struct signs {
+    __m128i even, odd;
+};
+
+static inline struct signs signs_of(__m128i value)
+{
+    const __m128i sign = _mm_srai_epi32(value, 31);
+    return (struct signs){_mm_shuffle_epi32(sign, 0xa0), _mm_shuffle_epi32(sign, 0xf5)};
+}
+
+static inline __m128i size_of(__m128i value)
+{
+    const __m128i sign = _mm_srai_epi32(value, 31);
+    return _mm_sub_epi32(_mm_xor_si128(value, sign), sign);
+}
+
+/* Products of sizes are turned where a factor is negative: they then are one less, which is added at the end. */
+static void sum_four(const uint32_t *basis_q20, const int32_t *coefficient, int32_t term_count,
+                     int64_t sum[IH_BASIS_ROWS])
+{
+    __m128i part[IH_BASIS_ROWS];
+    __m128i less = _mm_setzero_si128();
+    for (int32_t k = 0; k < IH_BASIS_ROWS; k++) {
+        part[k] = _mm_setzero_si128();
+    }
+    for (int32_t i = 0; i < term_count; i += 4) {
+        const __m128i value = _mm_loadu_si128((const __m128i *)&coefficient[i]);
+        const struct signs sign = signs_of(value);
+        const __m128i even = size_of(value);
+        const __m128i odd = _mm_srli_epi64(even, 32);
+        less = _mm_add_epi64(less, _mm_add_epi64(sign.even, sign.odd));
+        for (int32_t k = 0; k < IH_BASIS_ROWS; k++) {
+            const __m128i basis = _mm_loadu_si128((const __m128i *)&basis_q20[k * term_count + i]);
+            const __m128i here = _mm_mul_epu32(basis, even);
+            const __m128i next = _mm_mul_epu32(_mm_srli_epi64(basis, 32), odd);
+            part[k] = _mm_add_epi64(part[k], _mm_xor_si128(here, sign.even));
+            part[k] = _mm_add_epi64(part[k], _mm_xor_si128(next, sign.odd));
+        }
+    }
+    for (int32_t k = 0; k < IH_BASIS_ROWS; k++) {
+        int64_t both[2];
+        _mm_storeu_si128((__m128i *)both, _mm_sub_epi64(part[k], less));
+        sum[k] = both[0] + both[1];
+    }
+}
+
+static void add_four(const uint32_t *basis_q20, const int32_t factor[IH_BASIS_ROWS], int64_t *sum,
+                     int32_t term_count)
+{
+    __m128i each[IH_BASIS_ROWS], sign[IH_BASIS_ROWS];
+    __m128i less = _mm_setzero_si128();
+    for (int32_t k = 0; k < IH_BASIS_ROWS; k++) {
+        const __m128i value = _mm_set1_epi32(factor[k]);
+        each[k] = size_of(value);
+        sign[k] = _mm_srai_epi32(value, 31);
+        less = _mm_add_epi64(less, sign[k]);
+    }
+    for (int32_t i = 0; i < term_count; i += 4) {
+        __m128i even = _mm_sub_epi64(_mm_setzero_si128(), less);
+        __m128i odd = even;
+        for (int32_t k = 0; k < IH_BASIS_ROWS; k++) {
+            const __m128i basis = _mm_loadu_si128((const __m128i *)&basis_q20[k * term_count + i]);
+            const __m128i here = _mm_mul_epu32(basis, each[k]);
+            const __m128i next = _mm_mul_epu32(_mm_srli_epi64(basis, 32), each[k]);
+            even = _mm_add_epi64(even, _mm_xor_si128(here, sign[k]));
+            odd = _mm_add_epi64(odd, _mm_xor_si128(next, sign[k]));
+        }
+        __m128i *at = (__m128i *)&sum[i];
+        const __m128i first = _mm_unpacklo_epi64(even, odd), last = _mm_unpackhi_epi64(even, odd);
+        _mm_storeu_si128(&at[0], _mm_add_epi64(_mm_loadu_si128(&at[0]), first));
+        _mm_storeu_si128(&at[1], _mm_add_epi64(_mm_loadu_si128(&at[1]), last));
+    }
+}
+
+/* Coefficients are taken for 2^31 more, which the sum of the basis times 2^31 takes away again. Both pass 2^64, together they do not. */
 int64_t ih_basis_sum(const uint32_t *basis_q20, const int32_t *coefficient, int32_t term_count)
 {
     const __m128i more = _mm_set1_epi32(INT32_MIN);
@@ -397,12 +517,16 @@ void ih_basis_lines(const int32_t *coefficient, const int32_t *const *line_q20, 
     for (int32_t x = 0; x < width; x++) {
         sum[x] = 0;
     }
-    for (int32_t i = 0; i < line_count * count; i += 2) {
-        const int32_t *here_q20 = &line_q20[i / count][i % count * width];
-        const int32_t *next_q20 = &here_q20[width];
-        const int32_t first = coefficient[i], second = coefficient[i + 1];
-        for (int32_t x = 0; x < width; x++) {
-            sum[x] += (int64_t)first * here_q20[x] + (int64_t)second * next_q20[x];
+    for (int32_t k = 0; k < line_count; k++) {
+        const int32_t *here_q20 = line_q20[k];
+        for (int32_t i = 0; i < count; i += 2) {
+            const int32_t *next_q20 = &here_q20[width];
+            const int32_t first = coefficient[0], second = coefficient[1];
+            for (int32_t x = 0; x < width; x++) {
+                sum[x] += (int64_t)first * here_q20[x] + (int64_t)second * next_q20[x];
+            }
+            coefficient = &coefficient[2];
+            here_q20 = &next_q20[width];
         }
     }
 }
@@ -441,3 +565,31 @@ void ih_basis_lines(const int32_t *coefficient, const int32_t *const *line_q20, 
     }
 }
 #endif
+
+void ih_basis_sum_rows(const uint32_t *basis_q20, int32_t row_count, const int32_t *coefficient,
+                       int32_t term_count, int64_t sum[IH_BASIS_ROWS])
+{
+#ifdef LINE_VECTORS
+    if (row_count == IH_BASIS_ROWS) {
+        sum_four(basis_q20, coefficient, term_count, sum);
+        return;
+    }
+#endif
+    for (int32_t k = 0; k < row_count; k++) {
+        sum[k] = ih_basis_sum(&basis_q20[k * term_count], coefficient, term_count);
+    }
+}
+
+void ih_basis_add_rows(const uint32_t *basis_q20, int32_t row_count,
+                       const int32_t factor[IH_BASIS_ROWS], int64_t *sum, int32_t term_count)
+{
+#ifdef LINE_VECTORS
+    if (row_count == IH_BASIS_ROWS) {
+        add_four(basis_q20, factor, sum, term_count);
+        return;
+    }
+#endif
+    for (int32_t k = 0; k < row_count; k++) {
+        ih_basis_add(&basis_q20[k * term_count], factor[k], sum, term_count);
+    }
+}

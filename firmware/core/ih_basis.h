@@ -37,4 +37,13 @@ void ih_basis_lines(const int32_t *coefficient, const int32_t *const *line_q20, 
 /* Add basis[i] * factor to sum[i]. */
 void ih_basis_add(const uint32_t *basis_q20, int32_t factor, int64_t *sum, int32_t term_count);
 
+/* The same of up to IH_BASIS_ROWS rows that stand one behind the other: each one's sum; all of them added. */
+#define IH_BASIS_ROWS 4
+
+void ih_basis_sum_rows(const uint32_t *basis_q20, int32_t row_count, const int32_t *coefficient,
+                       int32_t term_count, int64_t sum[IH_BASIS_ROWS]);
+
+void ih_basis_add_rows(const uint32_t *basis_q20, int32_t row_count,
+                       const int32_t factor[IH_BASIS_ROWS], int64_t *sum, int32_t term_count);
+
 #endif

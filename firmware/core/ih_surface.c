@@ -117,20 +117,31 @@ static void fill_row(struct ih_surface_scratch *scratch, const struct ih_sample 
     IH_IN_RANGE(row_q20[0], (1 << 20) - 1, IH_RANGE_BASIS_Q20);
 }
 
-/* Work out the row of sample i, into the place where it is kept, if there is one. */
-static const uint32_t *new_row(const struct ih_samples *samples, int32_t i,
-                               struct ih_surface_scratch *scratch)
+/* How many samples from i on are worked on together: their rows stand one behind the other. */
+static int32_t rows_together(const struct ih_samples *samples,
+                             const struct ih_surface_scratch *scratch, int32_t i)
+{
+    const int32_t end = ih_min_s32(samples->sample_count, scratch->kept_count);
+    return i + IH_BASIS_ROWS <= end ? IH_BASIS_ROWS : 1;
+}
+
+/* Work out the rows of so many samples from i on, into the places where they are kept, if there are any: else of
+ * one. */
+static const uint32_t *new_rows(const struct ih_samples *samples, int32_t i, int32_t count,
+                                struct ih_surface_scratch *scratch)
 {
     uint32_t *row_q20 = i < scratch->kept_count ? scratch->of.few.row_q20[i] : scratch->basis_q20;
-    fill_row(scratch, &samples->sample[i], row_q20);
+    for (int32_t k = 0; k < count; k++) {
+        fill_row(scratch, &samples->sample[i + k], &row_q20[k * scratch->terms]);
+    }
     return row_q20;
 }
 
-/* The row of sample i once the rows of all have been worked out. */
-static const uint32_t *row_of(const struct ih_samples *samples, int32_t i,
-                              struct ih_surface_scratch *scratch)
+/* These rows once those of all samples have been worked out. */
+static const uint32_t *rows_of(const struct ih_samples *samples, int32_t i,
+                               struct ih_surface_scratch *scratch)
 {
-    return i < scratch->kept_count ? scratch->of.few.row_q20[i] : new_row(samples, i, scratch);
+    return i < scratch->kept_count ? scratch->of.few.row_q20[i] : new_rows(samples, i, 1, scratch);
 }
 
 /* value * 2^up, or / 2^-up, rounded, limited to 2^62. */
@@ -300,23 +311,20 @@ static int64_t off_of_depth(const struct ih_surface_scratch *scratch, int32_t de
     return depth_mm_q8 * ((int64_t)1 << (scratch->off_fraction - 8));
 }
 
-/* How far a sample at that depth behind the mean is behind the surface. */
-static int64_t off_of(const struct ih_surface_scratch *scratch, const uint32_t *row_q20,
-                      int32_t depth_mm_q8)
+/* How far a sample at that depth behind the mean is behind the surface, by the sum of its row. */
+static int64_t off_of_sum(const struct ih_surface_scratch *scratch, int64_t sum,
+                          int32_t depth_mm_q8)
 {
-    const int32_t fraction = scratch->off_fraction;
-    const int64_t off = off_of_depth(scratch, depth_mm_q8);
-    const int64_t sum = ih_basis_sum(row_q20, scratch->coefficient, scratch->terms);
-    return off - ih_clamp_s64(shift_by(sum, fraction - 20 - scratch->coefficient_shift), OFF_MAX);
+    const int up = scratch->off_fraction - 20 - scratch->coefficient_shift;
+    return off_of_depth(scratch, depth_mm_q8) - ih_clamp_s64(shift_by(sum, up), OFF_MAX);
 }
 
-/* What a row brings to the right side. */
-static void add_right(struct ih_surface_scratch *scratch, const uint32_t *row_q20, int64_t off,
-                      int32_t root_weight_q15)
+/* What a row is multiplied by for what it brings to the right side. */
+static int32_t push_of(const struct ih_surface_scratch *scratch, int64_t off,
+                       int32_t root_weight_q15)
 {
     const int64_t push = ih_mul_shift(off, weight_q30(scratch, root_weight_q15), 30);
-    ih_basis_add(row_q20, (int32_t)ih_clamp_s64(push, (int64_t)1 << OFF_BITS), scratch->right,
-                 scratch->terms);
+    return (int32_t)ih_clamp_s64(push, (int64_t)1 << OFF_BITS);
 }
 
 /* What it brings less with one weight than it did with another. */
@@ -345,25 +353,39 @@ static void clear_pairs(uint32_t pair[IH_NORMAL_PAIRS][TERMS_MAX], int32_t count
     }
 }
 
+/* Add sample i to the sums, 16 at a time. */
+static void sum_sample(struct ih_surface_scratch *scratch, const uint32_t *row_q20, int32_t i,
+                       bool is_last, int32_t root_weight_q15)
+{
+    const int32_t at = i % IH_NORMAL_ROWS;
+    put_row(scratch, row_q20, root_weight_q15, at % 2 != 0, scratch->pair[at / 2]);
+    if (at + 1 == IH_NORMAL_ROWS || is_last) {
+        clear_pairs(scratch->pair, at + 1);
+        ih_normal_add(scratch->pair, scratch->terms, scratch->normal_shift, scratch->normal);
+    }
+}
+
 /* The sums of all samples, and the right side if the coefficients are all 0. */
 static void sum_all(const struct ih_samples *samples, const struct ih_surface_params *params,
                     struct ih_surface_scratch *scratch, const struct ih_surface *out,
                     bool is_right_wanted)
 {
+    const int32_t last = samples->sample_count - 1;
+    int32_t count;
     memset(scratch->normal, 0, (size_t)IH_NORMAL_LINE(scratch->terms) * sizeof *scratch->normal);
-    for (int32_t i = 0; i < samples->sample_count; i++) {
-        const struct ih_sample *sample = &samples->sample[i];
-        const int32_t at = i % IH_NORMAL_ROWS;
-        const int32_t root_q15 = root_weight_of(samples, params, out, i);
-        const uint32_t *row_q20 = new_row(samples, i, scratch);
-        put_row(scratch, row_q20, root_q15, at % 2 != 0, scratch->pair[at / 2]);
-        if (is_right_wanted) {
-            add_right(scratch, row_q20,
-                      off_of_depth(scratch, sample->depth_mm_q8 - out->mean_mm_q8), root_q15);
+    for (int32_t first = 0; first <= last; first += count) {
+        count = rows_together(samples, scratch, first);
+        const uint32_t *row_q20 = new_rows(samples, first, count, scratch);
+        int32_t push[IH_BASIS_ROWS];
+        for (int32_t k = 0; k < count; k++) {
+            const int32_t i = first + k;
+            const int32_t root_q15 = root_weight_of(samples, params, out, i);
+            const int32_t depth_mm_q8 = samples->sample[i].depth_mm_q8 - out->mean_mm_q8;
+            sum_sample(scratch, &row_q20[k * scratch->terms], i, i == last, root_q15);
+            push[k] = push_of(scratch, off_of_depth(scratch, depth_mm_q8), root_q15);
         }
-        if (at + 1 == IH_NORMAL_ROWS || i + 1 == samples->sample_count) {
-            clear_pairs(scratch->pair, at + 1);
-            ih_normal_add(scratch->pair, scratch->terms, scratch->normal_shift, scratch->normal);
+        if (is_right_wanted) {
+            ih_basis_add_rows(row_q20, count, push, scratch->right, scratch->terms);
         }
     }
 }
@@ -534,6 +556,31 @@ static bool correct_or_refactor(const struct ih_samples *samples,
     return true;
 }
 
+/* The right side that the coefficients leave, and which samples are far from the surface. */
+static void leave(const struct ih_samples *samples, const struct ih_surface_params *params,
+                  const struct ih_surface *out, struct ih_surface_scratch *scratch)
+{
+    const int64_t far = (int64_t)params->huber_mm * FAR_EIGHTHS << (scratch->off_fraction - 3);
+    int32_t count;
+    memset(scratch->right, 0, sizeof scratch->right);
+    for (int32_t first = 0; first < samples->sample_count; first += count) {
+        count = rows_together(samples, scratch, first);
+        const uint32_t *row_q20 = rows_of(samples, first, scratch);
+        int64_t sum[IH_BASIS_ROWS];
+        int32_t push[IH_BASIS_ROWS];
+        ih_basis_sum_rows(row_q20, count, scratch->coefficient, scratch->terms, sum);
+        for (int32_t k = 0; k < count; k++) {
+            const int32_t i = first + k;
+            const int64_t off = off_of_sum(scratch, sum[k],
+                                           samples->sample[i].depth_mm_q8 - out->mean_mm_q8 -
+                                               scratch->moved_mm_q8[i]);
+            scratch->is_far[i] = ih_abs_s64(off) >= far;
+            push[k] = push_of(scratch, off, root_weight_of(samples, params, out, i));
+        }
+        ih_basis_add_rows(row_q20, count, push, scratch->right, scratch->terms);
+    }
+}
+
 /* Work out all rows again, and correct the coefficients by what they leave, until that is enough. */
 static void refine(const struct ih_samples *samples, const struct ih_surface_params *params,
                    const struct ih_surface *out, int32_t enough_log2,
@@ -541,20 +588,11 @@ static void refine(const struct ih_samples *samples, const struct ih_surface_par
 {
     /* What fewer samples than unknowns do not see is found slowly. */
     const int32_t least = samples->sample_count < scratch->terms ? CORRECTIONS_FEW : 1;
-    const int64_t far = (int64_t)params->huber_mm * FAR_EIGHTHS << (scratch->off_fraction - 3);
     int32_t before;
     int32_t count = 0;
     do {
         before = scratch->squares_log2;
-        memset(scratch->right, 0, sizeof scratch->right);
-        for (int32_t i = 0; i < samples->sample_count; i++) {
-            const struct ih_sample *sample = &samples->sample[i];
-            const uint32_t *row_q20 = row_of(samples, i, scratch);
-            const int64_t off = off_of(
-                scratch, row_q20, sample->depth_mm_q8 - out->mean_mm_q8 - scratch->moved_mm_q8[i]);
-            scratch->is_far[i] = ih_abs_s64(off) >= far;
-            add_right(scratch, row_q20, off, root_weight_of(samples, params, out, i));
-        }
+        leave(samples, params, out, scratch);
         count++;
     } while (correct_or_refactor(samples, params, out, scratch) &&
              (count < least ||
@@ -604,8 +642,9 @@ static void move_sample(const struct ih_sample *sample, const struct ih_surface_
     const int64_t limit = (int64_t)params->huber_mm << scratch->off_fraction;
     const int64_t beyond = off - ih_clamp_s64(off, limit);
     scratch->moved_mm_q8[i] = (int32_t)ih_shift_round(beyond, scratch->off_fraction - 8);
-    add_right(scratch, row_q20, -off_of_depth(scratch, scratch->moved_mm_q8[i]),
-              sample->root_weight_q15);
+    const int64_t less = -off_of_depth(scratch, scratch->moved_mm_q8[i]);
+    ih_basis_add(row_q20, push_of(scratch, less, sample->root_weight_q15), scratch->right,
+                 scratch->terms);
 }
 
 /* Weights by the distance from the surface, of those samples that were far from it before the last correction.
@@ -622,8 +661,9 @@ static int32_t change_far(const struct ih_samples *samples, const struct ih_surf
         if (!scratch->is_far[i]) {
             continue;
         }
-        const uint32_t *row_q20 = row_of(samples, i, scratch);
-        const int64_t off = off_of(scratch, row_q20, sample->depth_mm_q8 - out->mean_mm_q8);
+        const uint32_t *row_q20 = rows_of(samples, i, scratch);
+        const int64_t sum = ih_basis_sum(row_q20, scratch->coefficient, scratch->terms);
+        const int64_t off = off_of_sum(scratch, sum, sample->depth_mm_q8 - out->mean_mm_q8);
         const int32_t root_q15 =
             reweight(sample, params, ih_shift_round(off, scratch->off_fraction - 11));
         out->root_weight_q15[i] = root_q15;

@@ -170,6 +170,50 @@ static void sums_are_exact(void)
     }
 }
 
+/* Rows together are summed and added as they are one by one. */
+static void rows_together_are_rows(void)
+{
+    static uint32_t basis_q20[IH_BASIS_ROWS * IH_BASIS_TERMS_MAX];
+    static int32_t coefficient[IH_BASIS_TERMS_MAX];
+    static int64_t added[IH_BASIS_TERMS_MAX + 1], expected[IH_BASIS_TERMS_MAX];
+    struct ih_test_random random = {.state = 7};
+    const int32_t terms = centres * centres;
+    int round, i, k;
+
+    for (round = 0; round < 200; round++) {
+        const int32_t rows = 1 + round % IH_BASIS_ROWS;
+        const int32_t most = round % 8 == 3 ? 1 << 28 : 1 << (round % 28);
+        int64_t sum[IH_BASIS_ROWS];
+        int32_t factor[IH_BASIS_ROWS];
+
+        for (i = 0; i < rows * terms; i++) {
+            basis_q20[i] = round % 8 == 3
+                               ? IH_RANGE_BASIS_Q20
+                               : (uint32_t)ih_test_between(&random, 0, IH_RANGE_BASIS_Q20);
+        }
+        for (i = 0; i < terms; i++) {
+            coefficient[i] = round % 8 == 3 ? (round % 16 == 3 ? most : -most)
+                                            : (int32_t)ih_test_between(&random, -most, most);
+        }
+        for (k = 0; k < rows; k++) {
+            factor[k] = round % 8 == 3 ? (k - 1) * (1 << 26)
+                                       : (int32_t)ih_test_between(&random, -(1 << 27), 1 << 27);
+            ih_basis_add(&basis_q20[k * terms], factor[k], expected, terms);
+        }
+        added[terms] = 77;
+        ih_basis_add_rows(basis_q20, rows, factor, added, terms);
+        for (i = 0; i < terms; i++) {
+            IH_TEST_EQUAL(expected[i], added[i], "added", i);
+        }
+        IH_TEST_EQUAL(77, added[terms], "behind what was added", round);
+        ih_basis_sum_rows(basis_q20, rows, coefficient, terms, sum);
+        for (k = 0; k < rows; k++) {
+            IH_TEST_EQUAL(ih_basis_sum(&basis_q20[k * terms], coefficient, terms), sum[k], "sum",
+                          round);
+        }
+    }
+}
+
 /* Half a row of nodes, of widths with whole blocks of vectors and others. */
 static void sums_along_nodes_are_exact(void)
 {
@@ -334,6 +378,7 @@ int main(int count, char **arguments)
         RUN_TEST(roots_hold_at_the_ends_of_spans);
         RUN_TEST(lines_are_roots_of_sums);
         RUN_TEST(sums_are_exact);
+        RUN_TEST(rows_together_are_rows);
         RUN_TEST(sums_along_nodes_are_exact);
         RUN_TEST(centres_stand_evenly);
         RUN_TEST(every_place_has_its_basis);
