@@ -101,7 +101,7 @@ static void square_distances(const struct ih_surface_scratch *scratch, int32_t p
     const int32_t centres = scratch->centres & ~3;
     for (int32_t k = 0; k < centres; k++) {
         const int32_t d_q16 = place_q16 - scratch->centre_q16[k];
-        square_q18[k] = (uint32_t)((int64_t)d_q16 * d_q16 >> 14) + more_q18;
+        square_q18[k] = (uint32_t)((uint64_t)((int64_t)d_q16 * d_q16) >> 14) + more_q18;
     }
 }
 
