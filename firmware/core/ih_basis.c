@@ -211,7 +211,7 @@ void ih_basis_roots(const uint32_t *across_q18, int32_t across_count, const uint
 #define LINE_VECTORS 3
 #define LINE_LANES 8
 
-int64_t ih_basis_sum(const uint32_t *basis_q20, const int32_t *coefficient, int32_t term_count)
+static int64_t sum_one(const uint32_t *basis_q20, const int32_t *coefficient, int32_t term_count)
 {
     __m256i sum = _mm256_setzero_si256();
 #pragma GCC unroll 4
@@ -227,7 +227,7 @@ int64_t ih_basis_sum(const uint32_t *basis_q20, const int32_t *coefficient, int3
     return part[0] + part[1] + part[2] + part[3];
 }
 
-void ih_basis_add(const uint32_t *basis_q20, int32_t factor, int64_t *sum, int32_t term_count)
+static void add_one(const uint32_t *basis_q20, int32_t factor, int64_t *sum, int32_t term_count)
 {
     const __m256i each = EACH(factor);
 #pragma GCC unroll 4
@@ -455,7 +455,7 @@ static void add_four(const uint32_t *basis_q20, const int32_t factor[IH_BASIS_RO
 }
 
 /* Coefficients are taken for 2^31 more, which the sum of the basis times 2^31 takes away again. Both pass 2^64, together they do not. */
-int64_t ih_basis_sum(const uint32_t *basis_q20, const int32_t *coefficient, int32_t term_count)
+static int64_t sum_one(const uint32_t *basis_q20, const int32_t *coefficient, int32_t term_count)
 {
     const __m128i more = _mm_set1_epi32(INT32_MIN);
     const __m128i lower = _mm_set_epi32(0, -1, 0, -1);
@@ -499,7 +499,7 @@ static inline void add_products(const uint32_t *basis_q20, uint32_t factor, bool
 }
 
 /* Products without a sign; what a negative factor brings is taken away. */
-void ih_basis_add(const uint32_t *basis_q20, int32_t factor, int64_t *sum, int32_t term_count)
+static void add_one(const uint32_t *basis_q20, int32_t factor, int64_t *sum, int32_t term_count)
 {
     if (factor < 0) {
         add_products(basis_q20, (uint32_t)-factor, true, sum, term_count);
@@ -531,7 +531,7 @@ void ih_basis_lines(const int32_t *coefficient, const int32_t *const *line_q20, 
     }
 }
 
-int64_t ih_basis_sum(const uint32_t *basis_q20, const int32_t *coefficient, int32_t term_count)
+static int64_t sum_one(const uint32_t *basis_q20, const int32_t *coefficient, int32_t term_count)
 {
     int64_t sum = 0;
 #pragma GCC unroll 4
@@ -541,7 +541,7 @@ int64_t ih_basis_sum(const uint32_t *basis_q20, const int32_t *coefficient, int3
     return sum;
 }
 
-void ih_basis_add(const uint32_t *basis_q20, int32_t factor, int64_t *sum, int32_t term_count)
+static void add_one(const uint32_t *basis_q20, int32_t factor, int64_t *sum, int32_t term_count)
 {
 #pragma GCC unroll 4
     for (int32_t i = 0; i < term_count; i++) {
@@ -566,8 +566,8 @@ void ih_basis_lines(const int32_t *coefficient, const int32_t *const *line_q20, 
 }
 #endif
 
-void ih_basis_sum_rows(const uint32_t *basis_q20, int32_t row_count, const int32_t *coefficient,
-                       int32_t term_count, int64_t sum[IH_BASIS_ROWS])
+void ih_basis_sum(const uint32_t *basis_q20, int32_t row_count, const int32_t *coefficient,
+                  int32_t term_count, int64_t sum[IH_BASIS_ROWS])
 {
 #ifdef LINE_VECTORS
     if (row_count == IH_BASIS_ROWS) {
@@ -576,12 +576,12 @@ void ih_basis_sum_rows(const uint32_t *basis_q20, int32_t row_count, const int32
     }
 #endif
     for (int32_t k = 0; k < row_count; k++) {
-        sum[k] = ih_basis_sum(&basis_q20[k * term_count], coefficient, term_count);
+        sum[k] = sum_one(&basis_q20[k * term_count], coefficient, term_count);
     }
 }
 
-void ih_basis_add_rows(const uint32_t *basis_q20, int32_t row_count,
-                       const int32_t factor[IH_BASIS_ROWS], int64_t *sum, int32_t term_count)
+void ih_basis_add(const uint32_t *basis_q20, int32_t row_count, const int32_t factor[IH_BASIS_ROWS],
+                  int64_t *sum, int32_t term_count)
 {
 #ifdef LINE_VECTORS
     if (row_count == IH_BASIS_ROWS) {
@@ -590,6 +590,6 @@ void ih_basis_add_rows(const uint32_t *basis_q20, int32_t row_count,
     }
 #endif
     for (int32_t k = 0; k < row_count; k++) {
-        ih_basis_add(&basis_q20[k * term_count], factor[k], sum, term_count);
+        add_one(&basis_q20[k * term_count], factor[k], sum, term_count);
     }
 }

@@ -24,26 +24,22 @@
 void ih_basis_roots(const uint32_t *across_q18, int32_t across_count, const uint32_t *down_q18,
                     int32_t down_count, uint32_t *root_q20);
 
-/* The sum of basis[i] * coefficient[i], i below term_count, a multiple of 16; both sums of positive and of negative
- * products are below 2^62. */
-int64_t ih_basis_sum(const uint32_t *basis_q20, const int32_t *coefficient, int32_t term_count);
+/* Up to so many rows that stand one behind the other. */
+#define IH_BASIS_ROWS 4
+
+/* The sum of each row's basis[i] * coefficient[i], i below term_count, a multiple of 16; both sums of positive and of
+ * negative products are below 2^62. */
+void ih_basis_sum(const uint32_t *basis_q20, int32_t row_count, const int32_t *coefficient,
+                  int32_t term_count, int64_t sum[IH_BASIS_ROWS]);
+
+/* Add each row's basis[i] times its factor to sum[i]. */
+void ih_basis_add(const uint32_t *basis_q20, int32_t row_count, const int32_t factor[IH_BASIS_ROWS],
+                  int64_t *sum, int32_t term_count);
 
 /* Sums along half a row of nodes, `width` of them, a multiple of 8: of coefficient[k * count + i] * line[k][i * width + x],
  * k below line_count and i below count, an even number. Lines are -2^27 .. 2^28; the sums below 2^63, and so are those
  * of the coefficients alone, times 2^27. */
 void ih_basis_lines(const int32_t *coefficient, const int32_t *const *line_q20, int32_t line_count,
                     int32_t count, int32_t width, int64_t *sum);
-
-/* Add basis[i] * factor to sum[i]. */
-void ih_basis_add(const uint32_t *basis_q20, int32_t factor, int64_t *sum, int32_t term_count);
-
-/* The same of up to IH_BASIS_ROWS rows that stand one behind the other: each one's sum; all of them added. */
-#define IH_BASIS_ROWS 4
-
-void ih_basis_sum_rows(const uint32_t *basis_q20, int32_t row_count, const int32_t *coefficient,
-                       int32_t term_count, int64_t sum[IH_BASIS_ROWS]);
-
-void ih_basis_add_rows(const uint32_t *basis_q20, int32_t row_count,
-                       const int32_t factor[IH_BASIS_ROWS], int64_t *sum, int32_t term_count);
 
 #endif

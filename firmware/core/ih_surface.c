@@ -125,23 +125,20 @@ static int32_t rows_together(const struct ih_samples *samples,
     return i + IH_BASIS_ROWS <= end ? IH_BASIS_ROWS : 1;
 }
 
-/* Work out the rows of so many samples from i on, into the places where they are kept, if there are any: else of
- * one. */
-static const uint32_t *new_rows(const struct ih_samples *samples, int32_t i, int32_t count,
-                                struct ih_surface_scratch *scratch)
+/* Work out the row of sample i, into the place where it is kept, if there is one. */
+static const uint32_t *new_row(const struct ih_samples *samples, int32_t i,
+                               struct ih_surface_scratch *scratch)
 {
     uint32_t *row_q20 = i < scratch->kept_count ? scratch->of.few.row_q20[i] : scratch->basis_q20;
-    for (int32_t k = 0; k < count; k++) {
-        fill_row(scratch, &samples->sample[i + k], &row_q20[k * scratch->terms]);
-    }
+    fill_row(scratch, &samples->sample[i], row_q20);
     return row_q20;
 }
 
-/* These rows once those of all samples have been worked out. */
-static const uint32_t *rows_of(const struct ih_samples *samples, int32_t i,
-                               struct ih_surface_scratch *scratch)
+/* The row of sample i, and those of the others behind it, once the rows of all have been worked out. */
+static const uint32_t *row_of(const struct ih_samples *samples, int32_t i,
+                              struct ih_surface_scratch *scratch)
 {
-    return i < scratch->kept_count ? scratch->of.few.row_q20[i] : new_rows(samples, i, 1, scratch);
+    return i < scratch->kept_count ? scratch->of.few.row_q20[i] : new_row(samples, i, scratch);
 }
 
 /* value * 2^up, or / 2^-up, rounded, limited to 2^62. */
@@ -320,21 +317,17 @@ static int64_t off_of_sum(const struct ih_surface_scratch *scratch, int64_t sum,
 }
 
 /* What a row is multiplied by for what it brings to the right side. */
-static int32_t push_of(const struct ih_surface_scratch *scratch, int64_t off,
-                       int32_t root_weight_q15)
+static int32_t push_of(int64_t off, int64_t weight)
 {
-    const int64_t push = ih_mul_shift(off, weight_q30(scratch, root_weight_q15), 30);
-    return (int32_t)ih_clamp_s64(push, (int64_t)1 << OFF_BITS);
+    return (int32_t)ih_clamp_s64(ih_mul_shift(off, weight, 30), (int64_t)1 << OFF_BITS);
 }
 
-/* What it brings less with one weight than it did with another. */
-static void add_change(struct ih_surface_scratch *scratch, const uint32_t *row_q20, int64_t off,
-                       int32_t before_q15, int32_t root_weight_q15)
+/* Add to the right side what one row brings. */
+static void add_right(struct ih_surface_scratch *scratch, const uint32_t *row_q20, int64_t off,
+                      int64_t weight)
 {
-    const int64_t weight = weight_q30(scratch, root_weight_q15) - weight_q30(scratch, before_q15);
-    const int64_t push = ih_mul_shift(off, weight, 30);
-    ih_basis_add(row_q20, (int32_t)ih_clamp_s64(push, (int64_t)1 << OFF_BITS), scratch->right,
-                 scratch->terms);
+    const int32_t push[IH_BASIS_ROWS] = {push_of(off, weight)};
+    ih_basis_add(row_q20, 1, push, scratch->right, scratch->terms);
 }
 
 /* The root weight of sample i: of one that is moved it stays as it was. */
@@ -353,39 +346,20 @@ static void clear_pairs(uint32_t pair[IH_NORMAL_PAIRS][TERMS_MAX], int32_t count
     }
 }
 
-/* Add sample i to the sums, 16 at a time. */
-static void sum_sample(struct ih_surface_scratch *scratch, const uint32_t *row_q20, int32_t i,
-                       bool is_last, int32_t root_weight_q15)
-{
-    const int32_t at = i % IH_NORMAL_ROWS;
-    put_row(scratch, row_q20, root_weight_q15, at % 2 != 0, scratch->pair[at / 2]);
-    if (at + 1 == IH_NORMAL_ROWS || is_last) {
-        clear_pairs(scratch->pair, at + 1);
-        ih_normal_add(scratch->pair, scratch->terms, scratch->normal_shift, scratch->normal);
-    }
-}
-
-/* The sums of all samples, and the right side if the coefficients are all 0. */
+/* The sums of all samples. */
 static void sum_all(const struct ih_samples *samples, const struct ih_surface_params *params,
-                    struct ih_surface_scratch *scratch, const struct ih_surface *out,
-                    bool is_right_wanted)
+                    struct ih_surface_scratch *scratch, const struct ih_surface *out)
 {
     const int32_t last = samples->sample_count - 1;
-    int32_t count;
     memset(scratch->normal, 0, (size_t)IH_NORMAL_LINE(scratch->terms) * sizeof *scratch->normal);
-    for (int32_t first = 0; first <= last; first += count) {
-        count = rows_together(samples, scratch, first);
-        const uint32_t *row_q20 = new_rows(samples, first, count, scratch);
-        int32_t push[IH_BASIS_ROWS];
-        for (int32_t k = 0; k < count; k++) {
-            const int32_t i = first + k;
-            const int32_t root_q15 = root_weight_of(samples, params, out, i);
-            const int32_t depth_mm_q8 = samples->sample[i].depth_mm_q8 - out->mean_mm_q8;
-            sum_sample(scratch, &row_q20[k * scratch->terms], i, i == last, root_q15);
-            push[k] = push_of(scratch, off_of_depth(scratch, depth_mm_q8), root_q15);
-        }
-        if (is_right_wanted) {
-            ih_basis_add_rows(row_q20, count, push, scratch->right, scratch->terms);
+    for (int32_t i = 0; i <= last; i++) {
+        const int32_t at = i % IH_NORMAL_ROWS;
+        const uint32_t *row_q20 = new_row(samples, i, scratch);
+        put_row(scratch, row_q20, root_weight_of(samples, params, out, i), at % 2 != 0,
+                scratch->pair[at / 2]);
+        if (at + 1 == IH_NORMAL_ROWS || i == last) {
+            clear_pairs(scratch->pair, at + 1);
+            ih_normal_add(scratch->pair, scratch->terms, scratch->normal_shift, scratch->normal);
         }
     }
 }
@@ -436,7 +410,7 @@ static void factor_fine(const struct ih_samples *samples, const struct ih_surfac
                         const struct ih_surface *out, struct ih_surface_scratch *scratch)
 {
     if (scratch->factor == scratch->normal) {
-        sum_all(samples, params, scratch, out, false);
+        sum_all(samples, params, scratch, out);
     }
     (void)try_factor(params, 0, scratch);
 }
@@ -556,28 +530,30 @@ static bool correct_or_refactor(const struct ih_samples *samples,
     return true;
 }
 
-/* The right side that the coefficients leave, and which samples are far from the surface. */
+/* The right side that the coefficients leave, which at first are all 0, and which samples are far from the surface. */
 static void leave(const struct ih_samples *samples, const struct ih_surface_params *params,
-                  const struct ih_surface *out, struct ih_surface_scratch *scratch)
+                  const struct ih_surface *out, bool is_first, struct ih_surface_scratch *scratch)
 {
     const int64_t far = (int64_t)params->huber_mm * FAR_EIGHTHS << (scratch->off_fraction - 3);
     int32_t count;
     memset(scratch->right, 0, sizeof scratch->right);
     for (int32_t first = 0; first < samples->sample_count; first += count) {
         count = rows_together(samples, scratch, first);
-        const uint32_t *row_q20 = rows_of(samples, first, scratch);
-        int64_t sum[IH_BASIS_ROWS];
+        const uint32_t *row_q20 = row_of(samples, first, scratch);
+        int64_t sum[IH_BASIS_ROWS] = {0};
         int32_t push[IH_BASIS_ROWS];
-        ih_basis_sum_rows(row_q20, count, scratch->coefficient, scratch->terms, sum);
+        if (!is_first) {
+            ih_basis_sum(row_q20, count, scratch->coefficient, scratch->terms, sum);
+        }
         for (int32_t k = 0; k < count; k++) {
             const int32_t i = first + k;
             const int64_t off = off_of_sum(scratch, sum[k],
                                            samples->sample[i].depth_mm_q8 - out->mean_mm_q8 -
                                                scratch->moved_mm_q8[i]);
             scratch->is_far[i] = ih_abs_s64(off) >= far;
-            push[k] = push_of(scratch, off, root_weight_of(samples, params, out, i));
+            push[k] = push_of(off, weight_q30(scratch, root_weight_of(samples, params, out, i)));
         }
-        ih_basis_add_rows(row_q20, count, push, scratch->right, scratch->terms);
+        ih_basis_add(row_q20, count, push, scratch->right, scratch->terms);
     }
 }
 
@@ -592,7 +568,7 @@ static void refine(const struct ih_samples *samples, const struct ih_surface_par
     int32_t count = 0;
     do {
         before = scratch->squares_log2;
-        leave(samples, params, out, scratch);
+        leave(samples, params, out, false, scratch);
         count++;
     } while (correct_or_refactor(samples, params, out, scratch) &&
              (count < least ||
@@ -642,9 +618,8 @@ static void move_sample(const struct ih_sample *sample, const struct ih_surface_
     const int64_t limit = (int64_t)params->huber_mm << scratch->off_fraction;
     const int64_t beyond = off - ih_clamp_s64(off, limit);
     scratch->moved_mm_q8[i] = (int32_t)ih_shift_round(beyond, scratch->off_fraction - 8);
-    const int64_t less = -off_of_depth(scratch, scratch->moved_mm_q8[i]);
-    ih_basis_add(row_q20, push_of(scratch, less, sample->root_weight_q15), scratch->right,
-                 scratch->terms);
+    add_right(scratch, row_q20, -off_of_depth(scratch, scratch->moved_mm_q8[i]),
+              weight_q30(scratch, sample->root_weight_q15));
 }
 
 /* Weights by the distance from the surface, of those samples that were far from it before the last correction.
@@ -661,9 +636,10 @@ static int32_t change_far(const struct ih_samples *samples, const struct ih_surf
         if (!scratch->is_far[i]) {
             continue;
         }
-        const uint32_t *row_q20 = rows_of(samples, i, scratch);
-        const int64_t sum = ih_basis_sum(row_q20, scratch->coefficient, scratch->terms);
-        const int64_t off = off_of_sum(scratch, sum, sample->depth_mm_q8 - out->mean_mm_q8);
+        const uint32_t *row_q20 = row_of(samples, i, scratch);
+        int64_t sum[IH_BASIS_ROWS];
+        ih_basis_sum(row_q20, 1, scratch->coefficient, scratch->terms, sum);
+        const int64_t off = off_of_sum(scratch, sum[0], sample->depth_mm_q8 - out->mean_mm_q8);
         const int32_t root_q15 =
             reweight(sample, params, ih_shift_round(off, scratch->off_fraction - 11));
         out->root_weight_q15[i] = root_q15;
@@ -673,7 +649,8 @@ static int32_t change_far(const struct ih_samples *samples, const struct ih_surf
         if (params->is_moving) {
             move_sample(sample, params, scratch, i, row_q20, off);
         } else {
-            add_change(scratch, row_q20, off, sample->root_weight_q15, root_q15);
+            add_right(scratch, row_q20, off,
+                      weight_q30(scratch, root_q15) - weight_q30(scratch, sample->root_weight_q15));
             exchange_sample(scratch, row_q20, lighter % IH_NORMAL_ROWS, sample->root_weight_q15,
                             root_q15);
         }
@@ -698,12 +675,12 @@ static bool fit_first(const struct ih_samples *samples, const struct ih_surface_
     memset(scratch->coefficient, 0, sizeof scratch->coefficient);
     scratch->coefficient_shift = 0;
     memset(scratch->norm_q10, 0, sizeof scratch->norm_q10);
-    memset(scratch->right, 0, sizeof scratch->right);
     (void)set_norms(scratch, samples, out->root_weight_q15);
     set_row_scale(scratch, samples);
     set_off_fraction(scratch, samples, out->mean_mm_q8);
     scratch->samples_log2 = ih_bits_u64((uint64_t)(samples->sample_count + 7) / 8);
-    sum_all(samples, params, scratch, out, true);
+    sum_all(samples, params, scratch, out);
+    leave(samples, params, out, true, scratch);
     factor(samples, params, out, scratch);
     (void)correct(params, scratch);
     refine(samples, params, out, SQUARES_LOG2_FOR_WEIGHTS, scratch);
@@ -723,7 +700,7 @@ static bool sum_again(const struct ih_samples *samples, const struct ih_surface_
     }
     (void)set_norms(scratch, samples, out->root_weight_q15);
     set_row_scale(scratch, samples);
-    sum_all(samples, params, scratch, out, false);
+    sum_all(samples, params, scratch, out);
     return true;
 }
 
@@ -872,14 +849,13 @@ static void evaluate(const struct ih_samples *samples, struct ih_surface_scratch
     for (int32_t y = 0; y < IH_SURFACE_GRID; y++) {
         int64_t even[IH_SURFACE_HALF], odd[IH_SURFACE_HALF];
         sum_row(scratch, between, y, even, odd);
-        for (int32_t x = 0; x < IH_SURFACE_HALF; x++) {
-            const int32_t left_q8 =
-                ih_clamp_s32(depth_of_sum(shift, mean_mm_q8, even[x] + odd[x]), least_q8, most_q8);
-            const int32_t right_q8 =
-                ih_clamp_s32(depth_of_sum(shift, mean_mm_q8, even[x] - odd[x]), least_q8, most_q8);
-            out->depth_mm_q8[y][x] = left_q8;
-            out->depth_mm_q8[y][IH_SURFACE_GRID - 1 - x] = right_q8;
-            nearest_q8 = ih_min_s32(nearest_q8, ih_min_s32(left_q8, right_q8));
+        for (int32_t x = 0; x < IH_SURFACE_GRID; x++) {
+            const int32_t mirrored = IH_SURFACE_GRID - 1 - x;
+            const int64_t sum = x < mirrored ? even[x] + odd[x] : even[mirrored] - odd[mirrored];
+            const int32_t depth_q8 =
+                ih_clamp_s32(depth_of_sum(shift, mean_mm_q8, sum), least_q8, most_q8);
+            out->depth_mm_q8[y][x] = depth_q8;
+            nearest_q8 = ih_min_s32(nearest_q8, depth_q8);
         }
     }
     out->nearest_mm_q8 = nearest_q8;
