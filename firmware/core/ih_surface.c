@@ -4,6 +4,11 @@
 
 #include "ih_fix.h"
 
+/* Limits of 64 bits: compilers make no vectors of them by themselves. */
+#if defined __x86_64__ && defined __AVX2__
+#include <immintrin.h>
+#endif
+
 #define TERMS_MAX IH_SURFACE_TERMS_MAX
 #define CENTRES_MAX IH_SURFACE_CENTRES_MAX
 #define HALF_CENTRES_MAX IH_SURFACE_HALF_CENTRES_MAX
@@ -763,13 +768,6 @@ static void fill_table(struct ih_surface_scratch *scratch)
     }
 }
 
-/* sum_n c_n B_n in Q8 from twice the sum in Q(7 + shift). */
-static inline int32_t depth_of_sum(int shift, int32_t mean_mm_q8, int64_t sum)
-{
-    const int64_t depth_q8 = shift > 0 ? ih_shift_round(sum, shift) : INT32_MAX;
-    return ih_saturate_s32(mean_mm_q8 + depth_q8);
-}
-
 /* Nearer than this no node can be: see IH_SURFACE_OVERSHOOT_MM. */
 static int32_t least_depth_mm_q8(const struct ih_samples *samples)
 {
@@ -837,26 +835,112 @@ static void sum_row(const struct ih_surface_scratch *scratch, const int32_t *bet
     ih_basis_lines(between, difference_q20, centres, centres / 2, IH_SURFACE_HALF, odd);
 }
 
+/* How sums become depths: sum_n c_n B_n in Q8 is 2^-shift of one. */
+struct way {
+    int shift;
+    int32_t mean_mm_q8, least_mm_q8, most_mm_q8;
+};
+
+static inline int32_t depth_of_sum(const struct way *way, int64_t sum)
+{
+    const int64_t depth_q8 = way->shift > 0 ? ih_shift_round(sum, way->shift) : INT32_MAX;
+    return ih_clamp_s32(ih_saturate_s32(way->mean_mm_q8 + depth_q8), way->least_mm_q8,
+                        way->most_mm_q8);
+}
+
+#if defined __x86_64__ && defined __AVX2__
+/* With a greater shift 64 bits might not hold the limits beside the sums: below 2^60 they are, those below 2^62.7. */
+#define SHIFT_MOST 36
+_Static_assert(IH_SURFACE_HALF % 8 == 0, "vectors of eight nodes");
+
+/* Four sums, so much behind the least depth that they are never negative: Q8, limited. */
+static inline __m256i limited(const struct way *way, __m256i sum)
+{
+    const int64_t half = (int64_t)1 << (way->shift - 1);
+    const int64_t unit = (int64_t)1 << way->shift;
+    const __m256i more =
+        _mm256_set1_epi64x(half + ((int64_t)way->mean_mm_q8 - way->least_mm_q8) * unit);
+    const __m256i most = _mm256_set1_epi64x(((int64_t)way->most_mm_q8 - way->least_mm_q8) * unit);
+    const __m256i behind = _mm256_add_epi64(sum, more);
+    const __m256i least =
+        _mm256_andnot_si256(_mm256_cmpgt_epi64(_mm256_setzero_si256(), behind), behind);
+    const __m256i value = _mm256_blendv_epi8(least, most, _mm256_cmpgt_epi64(least, most));
+    return _mm256_srl_epi64(value, _mm_cvtsi32_si128(way->shift));
+}
+
+/* Eight nodes, in an order. */
+static inline __m256i depths_of(const struct way *way, __m256i first, __m256i last, __m256i order)
+{
+    const __m256i both =
+        _mm256_or_si256(limited(way, first), _mm256_slli_epi64(limited(way, last), 32));
+    return _mm256_add_epi32(_mm256_permutevar8x32_epi32(both, order),
+                            _mm256_set1_epi32(way->least_mm_q8));
+}
+
+/* The same as below. */
+static int32_t set_depths_of_vectors(const struct way *way, const int64_t even[IH_SURFACE_HALF],
+                                     const int64_t odd[IH_SURFACE_HALF], int32_t *depth_mm_q8)
+{
+    const __m256i forward = _mm256_setr_epi32(0, 2, 4, 6, 1, 3, 5, 7);
+    const __m256i back = _mm256_setr_epi32(7, 5, 3, 1, 6, 4, 2, 0);
+    __m256i nearest = _mm256_set1_epi32(INT32_MAX);
+    for (int32_t x = 0; x < IH_SURFACE_HALF; x += 8) {
+        const __m256i even_0 = _mm256_loadu_si256((const __m256i *)&even[x]);
+        const __m256i even_4 = _mm256_loadu_si256((const __m256i *)&even[x + 4]);
+        const __m256i odd_0 = _mm256_loadu_si256((const __m256i *)&odd[x]);
+        const __m256i odd_4 = _mm256_loadu_si256((const __m256i *)&odd[x + 4]);
+        const __m256i left = depths_of(way, _mm256_add_epi64(even_0, odd_0),
+                                       _mm256_add_epi64(even_4, odd_4), forward);
+        const __m256i right =
+            depths_of(way, _mm256_sub_epi64(even_0, odd_0), _mm256_sub_epi64(even_4, odd_4), back);
+        _mm256_storeu_si256((__m256i *)&depth_mm_q8[x], left);
+        _mm256_storeu_si256((__m256i *)&depth_mm_q8[IH_SURFACE_GRID - 8 - x], right);
+        nearest = _mm256_min_epi32(nearest, _mm256_min_epi32(left, right));
+    }
+    int32_t lane[8];
+    _mm256_storeu_si256((__m256i *)lane, nearest);
+    for (int32_t k = 1; k < 8; k++) {
+        lane[0] = ih_min_s32(lane[0], lane[k]);
+    }
+    return lane[0];
+}
+#endif
+
+/* A row of nodes from both halves' sums. Returns the nearest one. */
+static int32_t set_depths(const struct way *way, const int64_t even[IH_SURFACE_HALF],
+                          const int64_t odd[IH_SURFACE_HALF], int32_t *depth_mm_q8)
+{
+#ifdef SHIFT_MOST
+    if (way->shift >= 1 && way->shift <= SHIFT_MOST) {
+        return set_depths_of_vectors(way, even, odd, depth_mm_q8);
+    }
+#endif
+    int32_t nearest_q8 = INT32_MAX;
+    for (int32_t x = 0; x < IH_SURFACE_GRID; x++) {
+        const int32_t mirrored = IH_SURFACE_GRID - 1 - x;
+        const int64_t sum = x < mirrored ? even[x] + odd[x] : even[mirrored] - odd[mirrored];
+        depth_mm_q8[x] = depth_of_sum(way, sum);
+        nearest_q8 = ih_min_s32(nearest_q8, depth_mm_q8[x]);
+    }
+    return nearest_q8;
+}
+
 static void evaluate(const struct ih_samples *samples, struct ih_surface_scratch *scratch,
                      struct ih_surface *out)
 {
-    const int shift = ih_min_s32(20 + scratch->coefficient_shift - 7, 62);
-    const int32_t least_q8 = least_depth_mm_q8(samples), most_q8 = IH_SURFACE_DEPTH_MAX_MM << 8;
-    const int32_t mean_mm_q8 = out->mean_mm_q8;
+    const struct way way = {
+        .shift = ih_min_s32(20 + scratch->coefficient_shift - 7, 62), /* sums are twice as great */
+        .mean_mm_q8 = out->mean_mm_q8,
+        .least_mm_q8 = least_depth_mm_q8(samples),
+        .most_mm_q8 = IH_SURFACE_DEPTH_MAX_MM << 8,
+    };
     int32_t *between;
     int32_t nearest_q8 = INT32_MAX;
     fold_coefficients(scratch, &between);
     for (int32_t y = 0; y < IH_SURFACE_GRID; y++) {
         int64_t even[IH_SURFACE_HALF], odd[IH_SURFACE_HALF];
         sum_row(scratch, between, y, even, odd);
-        for (int32_t x = 0; x < IH_SURFACE_GRID; x++) {
-            const int32_t mirrored = IH_SURFACE_GRID - 1 - x;
-            const int64_t sum = x < mirrored ? even[x] + odd[x] : even[mirrored] - odd[mirrored];
-            const int32_t depth_q8 =
-                ih_clamp_s32(depth_of_sum(shift, mean_mm_q8, sum), least_q8, most_q8);
-            out->depth_mm_q8[y][x] = depth_q8;
-            nearest_q8 = ih_min_s32(nearest_q8, depth_q8);
-        }
+        nearest_q8 = ih_min_s32(nearest_q8, set_depths(&way, even, odd, out->depth_mm_q8[y]));
     }
     out->nearest_mm_q8 = nearest_q8;
 }
