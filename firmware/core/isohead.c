@@ -159,12 +159,13 @@ static enum ih_err look_at_windows(struct isohead *head, const struct ih_frame *
     return err;
 }
 
-/* What the tracks expect, before anything of this frame is looked at. */
+/* What the tracks expect, before anything of this frame is looked at; the paper's method expects and finds nothing. */
 static void begin(struct isohead *head, int64_t time_us)
 {
+    head->expected.count = 0;
+    ih_findings_begin(&head->findings);
     if (!head->params.is_paper) {
         ih_tracks_expect(&head->tracks, &head->params.tracks, time_us, &head->expected);
-        ih_findings_begin(&head->findings);
     }
 }
 
@@ -192,23 +193,28 @@ static enum ih_err frame_of_range(struct isohead *head, const struct ih_frame *f
     return err;
 }
 
-enum ih_err isohead_label(struct isohead *head, const struct ih_frame *frame,
-                          const struct ih_frame *ambient)
+/* Dots and labels; both stages set all of their outputs that count. The others are left as they are. */
+static enum ih_err label(struct isohead *head, const struct ih_frame *frame,
+                         const struct ih_frame *ambient)
 {
     const struct ih_params *params = &head->params;
-    enum ih_err err = head->rig.calibration.kind == IH_RIG_RANGE
-                          ? IH_ERR_KIND
-                          : check_frame(frame, &head->rig.calibration);
+    enum ih_err err = check_frame(frame, &head->rig.calibration);
     if (err == IH_OK && ambient != NULL) {
         err = check_frame(ambient, &head->rig.calibration);
     }
-    clear_outputs(head);
     if (err == IH_OK) {
         ih_dots_find(frame, ambient, &params->dots, &head->scratch.dots, &head->dots);
         ih_labels_assign(&head->dots, &head->rig, &params->labels, &head->scratch.labels,
                          &head->labels);
     }
     return err;
+}
+
+enum ih_err isohead_label(struct isohead *head, const struct ih_frame *frame,
+                          const struct ih_frame *ambient)
+{
+    clear_outputs(head);
+    return head->rig.calibration.kind == IH_RIG_RANGE ? IH_ERR_KIND : label(head, frame, ambient);
 }
 
 void isohead_find(struct isohead *head, int64_t time_us)
@@ -219,15 +225,18 @@ void isohead_find(struct isohead *head, int64_t time_us)
     conclude(head);
 }
 
+/* Nothing needs to be cleared for a frame of dots: each stage sets its own outputs, and windows has none. */
 enum ih_err isohead_frame(struct isohead *head, const struct ih_frame *frame,
                           const struct ih_frame *ambient, int64_t time_us)
 {
     if (head->rig.calibration.kind == IH_RIG_RANGE) {
         return frame_of_range(head, frame, time_us);
     }
-    enum ih_err err = isohead_label(head, frame, ambient);
+    enum ih_err err = label(head, frame, ambient);
     if (err == IH_OK) {
         isohead_find(head, time_us);
+    } else {
+        clear_outputs(head);
     }
     return err;
 }

@@ -2,6 +2,7 @@
 #include "isohead.h"
 #include "ih_exposure.h"
 
+#include <stddef.h>
 #include <stdlib.h>
 
 #include "ih_test.h"
@@ -410,19 +411,25 @@ static void ambient_frames_are_checked(void)
 
 /* All outputs of two states. Slices have gaps between their members, so nests are compared by what
  * they lead to and by their counts. */
-static void check_same(const struct isohead *a, const struct isohead *b)
+/* What a table has up to its count; the rest of it is anything. */
+#define CHECK_SAME_TABLE(a, b, count, table)                                    \
+    do {                                                                        \
+        TEST_ASSERT_EQUAL_INT32((a)->count, (b)->count);                        \
+        if ((a)->count > 0) {                                                   \
+            TEST_ASSERT_EQUAL_MEMORY((a)->table, (b)->table,                    \
+                                     (size_t)(a)->count * sizeof(a)->table[0]); \
+        }                                                                       \
+    } while (0)
+
+static void check_same_hypotheses(const struct ih_hypotheses *a, const struct ih_hypotheses *b)
 {
     int32_t i, k;
 
-    TEST_ASSERT_EQUAL_MEMORY(&a->dots, &b->dots, sizeof a->dots);
-    TEST_ASSERT_EQUAL_MEMORY(&a->labels, &b->labels, sizeof a->labels);
-    TEST_ASSERT_EQUAL_MEMORY(&a->points, &b->points, sizeof a->points);
-    TEST_ASSERT_EQUAL_MEMORY(&a->samples, &b->samples, sizeof a->samples);
-    TEST_ASSERT_EQUAL_MEMORY(&a->surface, &b->surface, sizeof a->surface);
-    TEST_ASSERT_EQUAL_MEMORY(&a->heads, &b->heads, sizeof a->heads);
-    TEST_ASSERT_EQUAL_INT32(a->hypotheses.nest_count, b->hypotheses.nest_count);
-    for (i = 0; i < a->hypotheses.nest_count; i++) {
-        const struct ih_nest *one = &a->hypotheses.nest[i], *two = &b->hypotheses.nest[i];
+    TEST_ASSERT_EQUAL_INT32(a->nest_count, b->nest_count);
+    TEST_ASSERT_EQUAL_INT32(a->minima_dropped, b->minima_dropped);
+    TEST_ASSERT_EQUAL_INT32(a->contours_dropped, b->contours_dropped);
+    for (i = 0; i < a->nest_count; i++) {
+        const struct ih_nest *one = &a->nest[i], *two = &b->nest[i];
 
         TEST_ASSERT_EQUAL_INT32(one->slice_count, two->slice_count);
         for (k = 0; k < one->slice_count; k++) {
@@ -433,6 +440,44 @@ static void check_same(const struct isohead *a, const struct isohead *b)
     }
 }
 
+static void check_same(const struct isohead *a, const struct isohead *b)
+{
+    CHECK_SAME_TABLE(&a->dots, &b->dots, dot_count, dot);
+    TEST_ASSERT_EQUAL_INT32(a->dots.edge_count, b->dots.edge_count);
+    TEST_ASSERT_EQUAL_INT32(a->dots.hot_count, b->dots.hot_count);
+    TEST_ASSERT_EQUAL_INT32(a->dots.dots_dropped, b->dots.dots_dropped);
+    TEST_ASSERT_EQUAL_MEMORY(a->dots.bright, b->dots.bright, sizeof a->dots.bright);
+    TEST_ASSERT_EQUAL_MEMORY(&a->labels, &b->labels, sizeof a->labels);
+    TEST_ASSERT_EQUAL_MEMORY(&a->points, &b->points, sizeof a->points);
+    TEST_ASSERT_EQUAL_MEMORY(&a->samples, &b->samples, offsetof(struct ih_samples, sample));
+    CHECK_SAME_TABLE(&a->samples, &b->samples, sample_count, sample);
+    TEST_ASSERT_EQUAL_MEMORY(&a->surface, &b->surface, sizeof a->surface);
+    check_same_hypotheses(&a->hypotheses, &b->hypotheses);
+    CHECK_SAME_TABLE(&a->heads, &b->heads, hypothesis_count, hypothesis);
+    CHECK_SAME_TABLE(&a->heads, &b->heads, head_count, head);
+    TEST_ASSERT_EQUAL_INT32(a->windows.window_count, b->windows.window_count);
+    TEST_ASSERT_EQUAL_INT32(a->findings.seen_count, b->findings.seen_count);
+}
+
+/* Stages set what they say they set, whatever is there: a frame clears nothing before. No stage of dots sets windows. */
+static void spoil_all(struct isohead *of)
+{
+    memset(&of->dots, 0x5A, sizeof of->dots);
+    memset(of->labels.dot_of_slot, 0x5A, sizeof of->labels.dot_of_slot);
+    memset(of->labels.t_px_q12, 0x5A, sizeof of->labels.t_px_q12);
+    memset(of->labels.perp_px_q12, 0x5A, sizeof of->labels.perp_px_q12);
+    of->labels.labelled_count = of->labels.seed_count = of->labels.candidates_dropped = 7;
+    memset(&of->expected, 0x5A, sizeof of->expected);
+    memset(&of->points, 0x5A, sizeof of->points);
+    memset(&of->samples, 0x5A, sizeof of->samples);
+    memset(&of->surface, 0x5A, sizeof of->surface);
+    memset(&of->hypotheses, 0x5A, sizeof of->hypotheses);
+    memset(&of->heads, 0x5A, sizeof of->heads);
+    memset(&of->findings, 0x5A, sizeof of->findings);
+    memset(&of->result, 0x5A, sizeof of->result);
+    memset(&of->scratch, 0x5A, sizeof of->scratch);
+}
+
 static void nothing_is_remembered_from_frame_to_frame(void)
 {
     static struct isohead first;
@@ -440,9 +485,16 @@ static void nothing_is_remembered_from_frame_to_frame(void)
     paint_bust(&vector_busts[1]);
     process();
     first = head;
-    memset(&head.scratch, 0x5A, sizeof head.scratch);
+    spoil_all(&head);
     process();
     check_same(&first, &head);
+    TEST_ASSERT_EQUAL_INT32(first.findings.finding_count, head.findings.finding_count);
+    ih_params_paper(&head.params);
+    spoil_all(&head);
+    process();
+    TEST_ASSERT_EQUAL_INT32(0, head.expected.count);
+    TEST_ASSERT_EQUAL_INT32(0, head.findings.finding_count);
+    ih_params_default(&head.params);
     memcpy(copy8, grey8, sizeof grey8);
     memset(grey8, 0, sizeof grey8); /* another scene in between */
     process();
