@@ -19,43 +19,49 @@ void ih_samples_params_default(struct ih_samples_params *params)
     };
 }
 
-/* Depths are looked at eight bits at a time, the highest first. */
+/* Depths are looked at eight bits at a time, the highest first; those that differ there are left out of the rest. */
 #define DIGIT_BITS 8
-#define DIGITS (1 << DIGIT_BITS)
+#define DIGITS (1u << DIGIT_BITS)
 
 _Static_assert(IH_DEPTH_MAX_MM << 8 < 1 << (3 * DIGIT_BITS), "depths have three digits");
 
-/* The next digit of the depth of a rank, from 0, among those that begin as it does; the rank becomes that
- * among those which have this digit, too. No depth is negative. */
-static int32_t next_digit(const struct ih_points *points, int32_t begin, int shift, int32_t *rank)
+/* The digit at a shift of the depth of a rank, from 0, among those given, which are the same before it. Those that
+ * have it stay, and the rank becomes that among them. No depth is negative. */
+static uint32_t next_digit(uint32_t depth_mm_q8[IH_SLOTS], int32_t *depth_count, int shift,
+                           int32_t *rank)
 {
     uint16_t count[DIGITS] = {0};
-    for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
-        const struct ih_point *point = &points->point[slot];
-        const int32_t digits = point->depth_mm_q8 >> shift;
-        if (digits >> DIGIT_BITS == begin && point->state == IH_POINT_SEEN) {
-            count[digits % DIGITS]++;
-        }
+    for (int32_t i = 0; i < *depth_count; i++) {
+        count[(depth_mm_q8[i] >> shift) % DIGITS]++;
     }
-    int32_t digit = 0;
+    uint32_t digit = 0;
     while (digit < DIGITS - 1 && *rank >= count[digit]) {
         *rank -= count[digit++];
     }
+    int32_t kept = 0;
+    for (int32_t i = 0; i < *depth_count; i++) {
+        const uint32_t depth = depth_mm_q8[i];
+        depth_mm_q8[kept] = depth;
+        kept += (depth >> shift) % DIGITS == digit;
+    }
+    *depth_count = kept;
     return digit;
 }
 
 int32_t ih_samples_near_mm_q8(const struct ih_points *points)
 {
+    uint32_t seen_mm_q8[IH_SLOTS];
     int32_t count = 0;
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
+        seen_mm_q8[count] = (uint32_t)points->point[slot].depth_mm_q8;
         count += points->point[slot].state == IH_POINT_SEEN;
     }
-    int32_t depth_mm_q8 = 0;
+    uint32_t depth_mm_q8 = 0;
     int32_t rank = count * PERCENTILE / 100;
     for (int shift = 2 * DIGIT_BITS; count > 0 && shift >= 0; shift -= DIGIT_BITS) {
-        depth_mm_q8 = depth_mm_q8 * DIGITS + next_digit(points, depth_mm_q8, shift, &rank);
+        depth_mm_q8 = depth_mm_q8 * DIGITS + next_digit(seen_mm_q8, &count, shift, &rank);
     }
-    return depth_mm_q8;
+    return (int32_t)depth_mm_q8;
 }
 
 /* A slot's neighbour by row and column; NULL beyond the pattern's edge. */
