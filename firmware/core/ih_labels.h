@@ -50,27 +50,39 @@ struct ih_labels {
 };
 
 struct ih_candidate {
-    int32_t inverse_depth_q36; /* 1/mm */
+    int32_t t_px_q12; /* on the slot's line */
     int16_t perp_px_q12;
-    int16_t dot;
+    int16_t dot; /* in the order of rows */
 };
 
-/* Something that may be assigned: a rectangle of four slots while seeding (slot is its first
- * corner), one slot while growing (choice[0] alone is used). */
+/* Something that may be assigned: a rectangle of four slots while seeding, one slot while growing (choice[0]
+ * alone is used). */
 struct ih_labels_offer {
-    int32_t error_px_q12;
-    int16_t slot;
-    int8_t choice[4]; /* candidates */
+    int32_t error_px_q12; /* INT32_MAX while growing: nothing is expected */
+    int8_t choice[4];     /* candidates */
 };
+
+/* The pattern with an edge of two slots, beside a row that of the next one. */
+#define IH_LABELS_EDGE 2
+#define IH_LABELS_LINE (IH_GRID + IH_LABELS_EDGE)
+#define IH_LABELS_NODES (IH_LABELS_LINE * (IH_GRID + 2 * IH_LABELS_EDGE) + IH_LABELS_EDGE)
 
 struct ih_labels_scratch {
-    int32_t u_px_q12[IH_DOTS_MAX], v_px_q12[IH_DOTS_MAX]; /* undistorted */
-    int16_t by_row[IH_DOTS_MAX];                          /* dots in the order of v_px_q12 */
+    /* Dots by row: undistorted places, their numbers in ih_dots. */
+    int32_t u_px_q12[IH_DOTS_MAX], v_px_q12[IH_DOTS_MAX];
+    int16_t by_row[IH_DOTS_MAX];
     int16_t slot_of_dot[IH_DOTS_MAX];
     int8_t candidate_count[IH_SLOTS];
     int8_t choice[IH_SLOTS]; /* candidate taken, or IH_NONE */
     struct ih_candidate candidate[IH_SLOTS][IH_LABELS_CANDIDATES_MAX];
-    struct ih_labels_offer offer[IH_SLOTS];
+    struct ih_labels_offer offer[IH_SLOTS]; /* by slot, of a rectangle by its first one */
+    uint32_t order[IH_SLOTS];               /* of the offers: error and slot */
+    uint32_t sorted[IH_SLOTS];
+    /* Growing: inverse depths of labels, 1/mm, else 0; what an open slot offered is no longer so; open slots. */
+    int32_t inverse_depth_q36[IH_LABELS_NODES];
+    bool is_stale[IH_LABELS_NODES];
+    int32_t open_count;
+    int16_t open[IH_SLOTS];
 };
 
 void ih_labels_params_default(struct ih_labels_params *params);

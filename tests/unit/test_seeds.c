@@ -24,6 +24,9 @@ void setUp(void)
     memset(&labels, 0, sizeof labels);
     memset(scratch.choice, 0xff, sizeof scratch.choice);
     memset(scratch.slot_of_dot, 0xff, sizeof scratch.slot_of_dot);
+    for (int16_t i = 0; i < IH_DOTS_MAX; i++) {
+        scratch.by_row[i] = i;
+    }
 }
 
 void tearDown(void)
@@ -104,9 +107,10 @@ static void candidates_lie_on_their_line(void)
                 const struct ih_candidate *c = &scratch.candidate[7][0];
 
                 IH_TEST_EQUAL(cases[i].perp, c->perp_px_q12, "perp", way);
+                IH_TEST_EQUAL(cases[i].t, c->t_px_q12, "t", way);
                 /* t = length / Z */
-                IH_TEST_WITHIN(0.51, ldexp(cases[i].t / 4096.0 / 10000, 36), c->inverse_depth_q36,
-                               "inverse depth", i);
+                IH_TEST_WITHIN(0.51, ldexp(cases[i].t / 4096.0 / 10000, 36),
+                               inverse_depth_q36(c, &line), "inverse depth", i);
             }
         }
     }
@@ -121,13 +125,22 @@ static void dots_above_a_row_are_counted(void)
     for (pass = 0; pass < 2000; pass++) {
         const int32_t count = (int32_t)ih_test_between(&random, 0, 12);
         const int32_t row = (int32_t)ih_test_between(&random, -1, 9);
-        int32_t above = 0;
+        int32_t v_px_q12[12], above = 0;
 
         for (i = 0; i < count; i++) {
-            scratch.v_px_q12[i] = (int32_t)ih_test_between(&random, 0, 8);
-            above += scratch.v_px_q12[i] < row;
+            v_px_q12[i] = (int32_t)ih_test_between(&random, 0, 8);
+            above += v_px_q12[i] < row;
+            place_dot(&scratch, i, 100 + i, v_px_q12[i]);
         }
-        order_dots(count, &scratch);
+        for (i = 0; i < count; i++) { /* by row; of one row by number */
+            const int32_t dot = scratch.by_row[i];
+
+            IH_TEST_EQUAL(v_px_q12[dot], scratch.v_px_q12[i], "v", pass);
+            IH_TEST_EQUAL(100 + dot, scratch.u_px_q12[i], "u", pass);
+            TEST_ASSERT_TRUE(
+                i == 0 || v_px_q12[scratch.by_row[i - 1]] < v_px_q12[dot] ||
+                (v_px_q12[scratch.by_row[i - 1]] == v_px_q12[dot] && scratch.by_row[i - 1] < dot));
+        }
         IH_TEST_EQUAL(above,
                       dots_above(&scratch, count, row, (int32_t)ih_test_between(&random, 0, count)),
                       "above", pass);
@@ -275,37 +288,41 @@ static void seeds_end_at_their_limits(void)
 
 /* --- order --- */
 
-static int compare_offers(const void *one, const void *two)
+static int compare_orders(const void *one, const void *two)
 {
-    const struct ih_labels_offer *a = one, *b = two;
+    const uint32_t *a = one, *b = two;
 
-    return a->error_px_q12 != b->error_px_q12 ? (a->error_px_q12 < b->error_px_q12 ? -1 : 1)
-                                              : a->slot - b->slot;
+    return *a < *b ? -1 : *a > *b;
 }
 
+/* Errors all in one bin, in a few, beyond the last one, beyond what counts. */
 static void offers_are_sorted_by_error_then_slot(void)
 {
-    static struct ih_labels_offer sorted[IH_SLOTS];
+    static const int32_t error_max[] = {0, 9, 4095, 100000, INT32_MAX};
+    static uint32_t sorted[IH_SLOTS];
     int32_t pass, i, count;
 
     for (pass = 0; pass < 400; pass++) {
         count = pass < 362 ? pass : between(300, 361);
         for (i = 0; i < count; i++) {
-            scratch.offer[i] =
-                (struct ih_labels_offer){between(0, pass % 3 == 0 ? 9 : 100000), (int16_t)i, {0}};
+            const int32_t error = between(0, error_max[pass % 5]);
+
+            scratch.order[i] = order_of(error, i);
+            IH_TEST_EQUAL(i, slot_in_order(scratch.order[i]), "slot", pass);
+            IH_TEST_EQUAL(error < 4194303 ? error : 4194303, scratch.order[i] >> 9, "error", pass);
         }
         for (i = count - 1; i > 0; i--) {
             const int32_t other = between(0, i);
-            const struct ih_labels_offer kept = scratch.offer[i];
+            const uint32_t kept = scratch.order[i];
 
-            scratch.offer[i] = scratch.offer[other];
-            scratch.offer[other] = kept;
+            scratch.order[i] = scratch.order[other];
+            scratch.order[other] = kept;
         }
-        memcpy(sorted, scratch.offer, sizeof sorted);
-        qsort(sorted, (size_t)count, sizeof sorted[0], compare_offers);
-        sort_offers(scratch.offer, count);
+        memcpy(sorted, scratch.order, sizeof sorted);
+        qsort(sorted, (size_t)count, sizeof sorted[0], compare_orders);
+        sort_order(scratch.order, count, scratch.sorted);
         for (i = 0; i < count; i++) {
-            IH_TEST_EQUAL(sorted[i].slot, scratch.offer[i].slot, "slot", pass);
+            TEST_ASSERT_EQUAL_UINT32(sorted[i], scratch.sorted[i]);
         }
     }
 }
@@ -316,8 +333,7 @@ static void label(int32_t row, int32_t column, int32_t inverse_depth_q36)
 {
     const int32_t slot = row * IH_GRID + column;
 
-    scratch.choice[slot] = 1;
-    scratch.candidate[slot][1].inverse_depth_q36 = inverse_depth_q36;
+    scratch.inverse_depth_q36[node_of(slot)] = inverse_depth_q36;
 }
 
 /* Some slots labelled near a plane of inverse depth, with steps. */
@@ -327,8 +343,8 @@ static void label_some(double share)
     const double y = between(-400000, 400000);
     int32_t slot;
 
+    memset(scratch.inverse_depth_q36, 0, sizeof scratch.inverse_depth_q36);
     for (slot = 0; slot < IH_SLOTS; slot++) {
-        scratch.choice[slot] = IH_NONE;
         if (ih_test_unit(&random_source) < share) {
             const double step = between(0, 3) == 0 ? 3000000 : 0;
 
@@ -352,13 +368,13 @@ static double plane_at(int32_t row, int32_t column)
             const double term[3] = {1, dx, dy};
 
             if ((dx == 0 && dy == 0) || r < 0 || c < 0 || r >= IH_GRID || c >= IH_GRID ||
-                scratch.choice[r * IH_GRID + c] == IH_NONE) {
+                *inverse_depth_at(&scratch, r * IH_GRID + c) == 0) {
                 continue;
             }
             for (i = 0; i < 3; i++) {
                 for (k = 0; k < 4; k++) {
                     const double value =
-                        k < 3 ? term[k] : scratch.candidate[r * IH_GRID + c][1].inverse_depth_q36;
+                        k < 3 ? term[k] : *inverse_depth_at(&scratch, r * IH_GRID + c);
 
                     m[i][k] += term[i] * value / (dx * dx + dy * dy);
                 }
@@ -402,17 +418,20 @@ static void neighbours_and_their_plane_are_expected(void)
         for (slot = 0; slot < IH_SLOTS; slot++) {
             const int32_t row = slot / IH_GRID, column = slot % IH_GRID;
             const double plane = plane_at(row, column);
+            const int32_t own_q36 = *inverse_depth_at(&scratch, slot);
             struct expectation is;
             int32_t count = 0;
 
+            scratch.inverse_depth_q36[node_of(slot)] = 0; /* open, as those that ask */
             expect(&scratch, slot, &is);
+            scratch.inverse_depth_q36[node_of(slot)] = own_q36;
             for (dy = -1; dy <= 1; dy++) {
                 for (dx = -1; dx <= 1; dx++) {
                     const int32_t r = row + dy, c = column + dx;
 
                     if ((dx != 0 || dy != 0) && r >= 0 && c >= 0 && r < IH_GRID && c < IH_GRID &&
-                        scratch.choice[r * IH_GRID + c] != IH_NONE) {
-                        IH_TEST_EQUAL(scratch.candidate[r * IH_GRID + c][1].inverse_depth_q36,
+                        *inverse_depth_at(&scratch, r * IH_GRID + c) != 0) {
+                        IH_TEST_EQUAL(*inverse_depth_at(&scratch, r * IH_GRID + c),
                                       is.value_q36[count], "neighbour", slot);
                         count++;
                     }
@@ -435,9 +454,12 @@ static void errors_are_those_of_the_nearest_expectation(void)
     int pass, i;
 
     for (pass = 0; pass < 20000; pass++) {
-        const struct ih_candidate candidate = {between(1, 1 << 28), (int16_t)between(-2458, 2458),
-                                               0};
         const int32_t length = between(1, 1 << (12 + pass % 19));
+        const struct ih_line line = {.length_px_mm_q8 = length};
+        /* an inverse depth of at most 2^28 */
+        const struct ih_candidate candidate = {between(1, ((int64_t)length >> 4) + 1),
+                                               (int16_t)between(-2458, 2458), 0};
+        const int32_t own_q36 = inverse_depth_q36(&candidate, &line);
         struct expectation expected = {.count = between(1, 9)};
         double off = 1e12, along;
 
@@ -445,13 +467,57 @@ static void errors_are_those_of_the_nearest_expectation(void)
             expected.value_q36[i] =
                 pass % 4 == 0
                     ? between(1 << 29, INT32_MAX) /* so far that its square must be limited */
-                    : candidate.inverse_depth_q36 + (int32_t)ih_test_any_size(&random_source, 27);
-            off = fmin(off, fabs((double)candidate.inverse_depth_q36 - expected.value_q36[i]));
+                    : own_q36 + (int32_t)ih_test_any_size(&random_source, 27);
+            off = fmin(off, fabs((double)own_q36 - expected.value_q36[i]));
         }
         along = fmin(floor(off * length / 4294967296.0 + 0.5), 1 << 28);
         IH_TEST_EQUAL(floor(hypot(along, 6.0 * candidate.perp_px_q12)),
-                      growth_error(&candidate, &expected, length), "error", pass);
+                      growth_error(&candidate, &expected, &line), "error", pass);
     }
+}
+
+/* Dots that are candidates of a few slots each, along depths that change slowly, some slots labelled. */
+static void put_growing_scene(void)
+{
+    int32_t slot, i;
+
+    memset(&scratch, 0, sizeof scratch);
+    memset(scratch.choice, 0xff, sizeof scratch.choice);
+    memset(scratch.slot_of_dot, 0xff, sizeof scratch.slot_of_dot);
+    for (slot = 0; slot < IH_SLOTS; slot++) {
+        rig.line[slot].length_px_mm_q8 = 10000 << 8;
+        scratch.candidate_count[slot] = (int8_t)between(0, 4);
+        for (i = 0; i < scratch.candidate_count[slot]; i++) {
+            scratch.candidate[slot][i] = (struct ih_candidate){
+                50000 + slot % IH_GRID * 100 + between(-20000, 20000) / (1 + i),
+                (int16_t)between(-2458, 2458), (int16_t)((slot + between(0, 6)) % IH_SLOTS)};
+        }
+        if (between(0, 9) == 0 && scratch.candidate_count[slot] > 0 && is_free(&scratch, slot, 0)) {
+            assign(&scratch, slot, 0);
+        }
+    }
+    begin_growing(&rig, &scratch);
+}
+
+/* An offer that is kept from pass to pass is what would be found again. */
+static void kept_offers_are_those_that_would_be_found(void)
+{
+    static struct ih_labels_scratch again;
+    int32_t pass, epsilon, labelled = 0;
+
+    for (pass = 0; pass < 100; pass++) {
+        put_growing_scene();
+        again = scratch;
+        for (epsilon = 2000; epsilon < 40000; epsilon += between(0, 1) * 2000) {
+            const int32_t grown = grow_once(&rig, &scratch, epsilon);
+
+            memset(again.is_stale, true, sizeof again.is_stale);
+            IH_TEST_EQUAL(grow_once(&rig, &again, epsilon), grown, "labelled", pass);
+            TEST_ASSERT_EQUAL_MEMORY(again.choice, scratch.choice, sizeof scratch.choice);
+            labelled += grown;
+        }
+    }
+    TEST_ASSERT_TRUE(labelled > 5000);
 }
 
 int main(void)
@@ -465,5 +531,6 @@ int main(void)
     RUN_TEST(offers_are_sorted_by_error_then_slot);
     RUN_TEST(neighbours_and_their_plane_are_expected);
     RUN_TEST(errors_are_those_of_the_nearest_expectation);
+    RUN_TEST(kept_offers_are_those_that_would_be_found);
     return UNITY_END();
 }
