@@ -11,10 +11,14 @@
 #define RADIAL_LEAST_Q28 (ONE_Q28 / 8)
 #define NEWTON_STEPS 5
 #define NEWTON_MOST_Q28 (1 << 25)
-#define NEWTON_LAST_Q28 (1 << 9)
+/* A step no longer than this is the last one: what it leaves is what the slopes are off, of usual lenses a hundredth
+ * of it. Where that is too much, and where slopes are far off, one that need not be right at all. */
+#define NEWTON_LAST_Q28 (1 << 14)
+#define NEWTON_LAST_SHORT_Q28 (1 << 9)
 /* Probes of the lens along each side of the frame, and how well they must come back. */
 #define LENS_PROBES 65
 #define LENS_ERROR_MAX_PX_Q12 20 /* 0.005 px */
+#define LENS_ERROR_FEW_PX_Q12 2  /* what is rounded alone is 1 */
 /* Rays steeper than this against the optical axis are no camera's business. */
 #define RAY_FORWARD_MIN_Q30 (1 << 28)
 #define RAY_LENGTH_TOLERANCE_Q30 (1 << 16) /* 6e-5 */
@@ -121,7 +125,7 @@ static struct backwards backwards_at(const int32_t back_q24[3], int32_t r2_q28)
 }
 
 /* Newton's steps from where the series says, less what is not radial, with the series' slopes: scale, and twice
- * its rise along the radius. One or two are usual; what is left of a step is what the slopes are off, at the
+ * its rise along the radius. One is usual; what is left of a step is what the slopes are off, at the
  * corners of usual lenses a hundredth. False when no step is small, as where the lens folds the picture. */
 static bool undistort_quickly(const struct ih_rig *rig, int32_t xd, int32_t yd, int32_t *x_q28,
                               int32_t *y_q28)
@@ -148,8 +152,8 @@ static bool undistort_quickly(const struct ih_rig *rig, int32_t xd, int32_t yd, 
         x = limit_tan_q28(x + step_x);
         y = limit_tan_q28(y + step_y);
         /* Where the series' slope is 0, as of lenses that pull the corners out, no step is a long one. */
-        if (ih_max_s64(ih_abs_s64(step_x), ih_abs_s64(step_y)) < NEWTON_LAST_Q28 &&
-            ih_max_s64(ih_abs_s64(off_x), ih_abs_s64(off_y)) < 2 * NEWTON_LAST_Q28) {
+        if (ih_max_s64(ih_abs_s64(step_x), ih_abs_s64(step_y)) < rig->newton_last_q28 &&
+            ih_max_s64(ih_abs_s64(off_x), ih_abs_s64(off_y)) < 2 * rig->newton_last_q28) {
             *x_q28 = x;
             *y_q28 = y;
             return true;
@@ -277,7 +281,7 @@ static enum ih_err check_camera(const struct ih_calibration *c)
 }
 
 /* Undistort and distort again over the whole frame: does it come back? */
-static bool comes_back(const struct ih_rig *rig)
+static bool comes_back(const struct ih_rig *rig, int32_t error_max_px_q12)
 {
     const struct ih_calibration *c = &rig->calibration;
     for (int32_t row = 0; row < LENS_PROBES; row++) {
@@ -287,8 +291,8 @@ static bool comes_back(const struct ih_rig *rig)
             int32_t x, y, back_u, back_v;
             ih_rig_undistort(rig, u, v, &x, &y);
             ih_rig_distort(rig, x, y, &back_u, &back_v);
-            if (ih_abs_s32(back_u - u) > LENS_ERROR_MAX_PX_Q12 ||
-                ih_abs_s32(back_v - v) > LENS_ERROR_MAX_PX_Q12) {
+            if (ih_abs_s32(back_u - u) > error_max_px_q12 ||
+                ih_abs_s32(back_v - v) > error_max_px_q12) {
                 return false;
             }
         }
@@ -301,11 +305,16 @@ static bool comes_back(const struct ih_rig *rig)
 static enum ih_err check_lens(struct ih_rig *rig)
 {
     rig->newton_steps = NEWTON_STEPS;
-    if (comes_back(rig)) {
+    rig->newton_last_q28 = NEWTON_LAST_Q28;
+    if (comes_back(rig, LENS_ERROR_FEW_PX_Q12)) {
+        return IH_OK;
+    }
+    rig->newton_last_q28 = NEWTON_LAST_SHORT_Q28;
+    if (comes_back(rig, LENS_ERROR_MAX_PX_Q12)) {
         return IH_OK;
     }
     rig->newton_steps = 0;
-    return comes_back(rig) ? IH_OK : IH_ERR_DISTORTION;
+    return comes_back(rig, LENS_ERROR_MAX_PX_Q12) ? IH_OK : IH_ERR_DISTORTION;
 }
 
 static enum ih_err check_projector(const struct ih_calibration *c, int32_t *bad_slot)

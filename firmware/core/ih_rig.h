@@ -5,8 +5,8 @@
  *        its epipolar line, for the surface the field of view in units of half a dot pitch.
  * Error: each check has its own code; index says which dot. A rig that passes is safe for all
  *        stages: no later stage divides by zero or overflows because of it.
- * Cost:  once per rig. 361 lines, and 65 x 65 probes of the lens, rarely twice. ih_rig_undistort: one or two of Newton's
- *        steps from a series, without a division.
+ * Cost:  once per rig. 361 lines, and 65 x 65 probes of the lens, rarely twice. ih_rig_undistort: nearly always one of
+ *        Newton's steps from a series, without a division: of a lens for which that is enough at all probes.
  *
  * The camera frame is OpenCV's: X right, Y down, Z forward, mm. Normalised coordinates are
  * x = X / Z and y = Y / Z after removal of the lens distortion; "undistorted pixels" are
@@ -65,6 +65,7 @@ struct ih_rig {
     struct ih_field field;
     int32_t back_q24[3];  /* the lens backwards, from where ih_rig_undistort starts */
     int32_t newton_steps; /* at the most; 0: they end beside the pixel, slow iteration does not */
+    int32_t newton_last_q28; /* no step is taken after one below this */
     struct ih_line line[IH_SLOTS];
 };
 
