@@ -40,11 +40,9 @@ static void place_dot(struct ih_labels_scratch *scratch, int32_t dot, int32_t u_
 static void undistort_dots(const struct ih_dots *dots, const struct ih_rig *rig,
                            struct ih_labels_scratch *scratch)
 {
+    ih_lens_undo(dots, rig, scratch->u_px_q12, scratch->v_px_q12);
     for (int32_t i = 0; i < dots->dot_count; i++) {
-        int32_t x_q28, y_q28, u_px_q12, v_px_q12;
-        ih_rig_undistort(rig, dots->dot[i].u_px_q12, dots->dot[i].v_px_q12, &x_q28, &y_q28);
-        ih_rig_to_pixel(rig, x_q28, y_q28, &u_px_q12, &v_px_q12);
-        place_dot(scratch, i, u_px_q12, v_px_q12);
+        place_dot(scratch, i, scratch->u_px_q12[i], scratch->v_px_q12[i]);
         scratch->slot_of_dot[i] = IH_NONE;
     }
 }

@@ -25,8 +25,7 @@
 #ifndef IH_LABELS_H
 #define IH_LABELS_H
 
-#include "ih_dots.h"
-#include "ih_rig.h"
+#include "ih_lens.h"
 
 /* Candidates kept per slot; each costs 8 bytes a slot. With a 125 mm baseline a line crosses the
  * places of about ten others. */

@@ -43,7 +43,8 @@ CORE_HEADERS = {
     "ih_band.h": {"ih_config.h", "ih_types.h"},
     "ih_noise.h": {"ih_config.h", "ih_types.h", "ih_band.h"},
     "ih_dots.h": CORE_SHARED | {"ih_noise.h"},
-    "ih_labels.h": CORE_SHARED | {"ih_dots.h"},
+    "ih_lens.h": CORE_SHARED | {"ih_dots.h"},
+    "ih_labels.h": CORE_SHARED | {"ih_lens.h"},
     "ih_exposure.h": CORE_SHARED | {"ih_labels.h"},
     "ih_turn.h": CORE_SHARED | {"ih_dots.h"},
     "ih_places.h": CORE_SHARED | {"ih_labels.h", "ih_turn.h"},
@@ -79,7 +80,7 @@ CORE_SYSTEM = {"stdbool.h", "stddef.h", "stdint.h", "string.h"}
 CORE_VECTORS = {("ih_normal.c", "immintrin.h"), ("ih_normal.c", "arm_acle.h"), ("ih_basis.c", "immintrin.h"),
                 ("ih_lanes.h", "immintrin.h"), ("ih_cuts.c", "immintrin.h"),
                 ("ih_row.c", "immintrin.h"), ("ih_rating.c", "immintrin.h"), ("ih_rating.c", "arm_neon.h"), ("ih_words.h", "arm_acle.h"), ("ih_parts.c", "immintrin.h"),
-                ("ih_parts.c", "arm_acle.h")}
+                ("ih_parts.c", "arm_acle.h"), ("ih_lens.c", "immintrin.h")}
 
 INCLUDE = re.compile(r'^\s*#\s*include\s*(["<])([^">]+)[">]')
 
