@@ -307,6 +307,25 @@ static void try_corners(const struct ih_rig *rig, const struct ih_labels_scratch
     }
 }
 
+/* One candidate a corner, as most rectangles have: far from where it should be, the last one's error is no seed's. */
+static void take_only_choice(const struct ih_labels_scratch *scratch, const int32_t slot[4],
+                             struct seed_search *out)
+{
+    const struct ih_candidate *first = candidate_of(scratch, slot[0], 0);
+    const struct ih_candidate *second = candidate_of(scratch, slot[1], 0);
+    const struct ih_candidate *third = candidate_of(scratch, slot[2], 0);
+    const struct ih_candidate *last = candidate_of(scratch, slot[3], 0);
+    const bool is_distinct = first->dot != second->dot && first->dot != third->dot &&
+                             first->dot != last->dot && second->dot != third->dot &&
+                             second->dot != last->dot && third->dot != last->dot;
+    const struct corners sum =
+        less_corner(less_corner(corner_of(scratch, first), corner_of(scratch, second)),
+                    corner_of(scratch, third));
+    out->best2 = is_distinct ? rectangle_error2(sum, corner_of(scratch, last)) : UINT64_MAX;
+    out->second2 = UINT64_MAX;
+    memset(out->choice, 0, sizeof out->choice);
+}
+
 /* The best choice of candidates for the rectangle of four slots. False when there is none below the
  * limit, or when another choice is nearly as good. */
 static bool find_seed(const struct ih_rig *rig, const struct ih_labels_scratch *scratch,
@@ -314,13 +333,19 @@ static bool find_seed(const struct ih_rig *rig, const struct ih_labels_scratch *
                       struct ih_labels_offer *out)
 {
     struct seed_search search;
+    int32_t many = 0;
     for (int k = 0; k < 4; k++) {
         if (scratch->candidate_count[slot[k]] == 0) {
             return false;
         }
+        many |= scratch->candidate_count[slot[k]] - 1;
     }
-    begin_search(scratch, &rig->line[slot[3]], slot[3], params, &search);
-    try_corners(rig, scratch, slot, &search);
+    if (many == 0) {
+        take_only_choice(scratch, slot, &search);
+    } else {
+        begin_search(scratch, &rig->line[slot[3]], slot[3], params, &search);
+        try_corners(rig, scratch, slot, &search);
+    }
     const int64_t most = ih_max_s32(params->seed_max_px_q12, 0);
     if (search.best2 >= (uint64_t)(most * most)) {
         return false;
