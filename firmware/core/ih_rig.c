@@ -346,6 +346,12 @@ static int32_t shift_at_depth_px_q12(int32_t length_px_mm_q8, int32_t depth_mm)
     return (int32_t)ih_div_round((int64_t)length_px_mm_q8 << 4, depth_mm);
 }
 
+/* Direction cosines in Q30 to a slope; a dot's ray points forward, its z is a quarter at least. */
+static int32_t slope_q20(const int32_t ray_q30[3], int axis)
+{
+    return (int32_t)ih_div_round((int64_t)ray_q30[axis] * (1 << 20), ray_q30[2]);
+}
+
 /* False when the projector sits on the camera's centre: the dot does not move with depth. */
 static bool fill_line(struct ih_rig *rig, int32_t slot)
 {
@@ -354,6 +360,9 @@ static bool fill_line(struct ih_rig *rig, int32_t slot)
     int64_t tan_q30[2], offset_mm_q16[2];
     ray_line(c, slot, 0, &tan_q30[0], &offset_mm_q16[0]);
     ray_line(c, slot, 1, &tan_q30[1], &offset_mm_q16[1]);
+
+    line->slope_x_q20 = slope_q20(c->ray_q30[slot], 0);
+    line->slope_y_q20 = slope_q20(c->ray_q30[slot], 1);
 
     /* tan below 4 in Q30, focal below 2^29 in Q16: products below 2^61. */
     line->infinity_u_px_q12 =

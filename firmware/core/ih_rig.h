@@ -50,6 +50,7 @@ struct ih_line {
     int32_t dir_u_q30, dir_v_q30;                 /* unit vector towards nearer depth */
     int32_t length_px_mm_q8;                      /* |e|: t = |e| / Z */
     int32_t t_far_px_q12, t_near_px_q12;          /* the working range, t_far <= t_near */
+    int32_t slope_x_q20, slope_y_q20;             /* of the dot's ray in space, by z */
 };
 
 /* The part of the image plane on which the surface stands, in normalised coordinates. */

@@ -26,16 +26,6 @@ static bool is_empty(const struct ih_rig *rig, const struct ih_dots *dots, int32
            (dots == NULL || !ih_dots_is_bright(dots, u_px_q12 >> 12, v_px_q12 >> 12));
 }
 
-/* Direction cosines in Q30 to a slope; a dot's ray points forward, its z is positive. */
-static void fill_dot_ray(const struct ih_rig *rig, int32_t slot, struct ih_ray *ray)
-{
-    const int32_t *direction = rig->calibration.ray_q30[slot];
-    ray->slope_x_q20 =
-        limited_slope_q20(ih_div_round((int64_t)direction[0] * (1 << 20), direction[2]));
-    ray->slope_y_q20 =
-        limited_slope_q20(ih_div_round((int64_t)direction[1] * (1 << 20), direction[2]));
-}
-
 void ih_space_make(const struct ih_points *points, const struct ih_dots *dots,
                    const struct ih_rig *rig, const struct ih_space_params *params,
                    struct ih_space *out)
@@ -54,7 +44,8 @@ void ih_space_make(const struct ih_points *points, const struct ih_dots *dots,
             ray->slope_x_q20 = limited_slope_q20(ih_shift_round(point->x_q28, 8));
             ray->slope_y_q20 = limited_slope_q20(ih_shift_round(point->y_q28, 8));
         } else {
-            fill_dot_ray(rig, slot, ray);
+            ray->slope_x_q20 = rig->line[slot].slope_x_q20;
+            ray->slope_y_q20 = rig->line[slot].slope_y_q20;
         }
         if (point->state == IH_POINT_SEEN) {
             ray->state = IH_RAY_SEEN;

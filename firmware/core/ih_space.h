@@ -12,7 +12,7 @@
  *        ih_points says "unknown" where it may only be outside.
  * Overflow: a slope is 2^22, a depth 2^22 in Q8 and a place 2^31 in Q28: points below 2^25.
  * Error: half a step of each format (docs/numerics.md).
- * Cost:  361 x 2 divisions, 4 more and the lens for a missing dot, one selection of 361 depths.
+ * Cost:  361 places, 4 divisions and the lens for a missing dot, one selection of 361 depths.
  */
 #ifndef IH_SPACE_H
 #define IH_SPACE_H

@@ -62,6 +62,7 @@ static void lines_match_float64(void)
         const struct vector_line *v = &vector_lines[i];
         const struct ih_line *line = &rigs[v->rig].line[v->slot];
         const double length = length_tolerance(&rigs[v->rig]);
+        const int32_t *ray = vector_rigs[v->rig].ray_q30[v->slot];
 
         IH_TEST_WITHIN(LSB_Q12, v->infinity_u, ih_test_from_q(line->infinity_u_px_q12, 12), "u", i);
         IH_TEST_WITHIN(LSB_Q12, v->infinity_v, ih_test_from_q(line->infinity_v_px_q12, 12), "v", i);
@@ -70,6 +71,8 @@ static void lines_match_float64(void)
                        "dir u", i);
         IH_TEST_WITHIN(2 * length / v->length, v->dir_v, ih_test_from_q(line->dir_v_q30, 30),
                        "dir v", i);
+        IH_TEST_WITHIN(0.51, ldexp((double)ray[0] / ray[2], 20), line->slope_x_q20, "slope x", i);
+        IH_TEST_WITHIN(0.51, ldexp((double)ray[1] / ray[2], 20), line->slope_y_q20, "slope y", i);
     }
 }
 

@@ -254,6 +254,10 @@ static void the_extremes_of_a_rig_do_not_overflow(void)
             c->ray_q30[slot][0] = (int32_t)lround(cos(turn) * aside * (1 << 30));
             c->ray_q30[slot][1] = (int32_t)lround(sin(turn) * aside * (1 << 30));
             c->ray_q30[slot][2] = (int32_t)lround(limited * (1 << 30));
+            rig.line[slot].slope_x_q20 =
+                (int32_t)lround(ldexp(c->ray_q30[slot][0], 20) / c->ray_q30[slot][2]);
+            rig.line[slot].slope_y_q20 =
+                (int32_t)lround(ldexp(c->ray_q30[slot][1], 20) / c->ray_q30[slot][2]);
             points.point[slot] = (struct ih_point){
                 (int32_t)ih_test_between(&random, INT32_MIN, INT32_MAX),
                 ih_test_between(&random, 0, 1) == 0 ? INT32_MIN : INT32_MAX,
