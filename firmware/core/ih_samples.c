@@ -19,33 +19,35 @@ void ih_samples_params_default(struct ih_samples_params *params)
     };
 }
 
-/* Depths are looked at eight bits at a time, the highest first; those that differ there are left out of the rest. */
-#define DIGIT_BITS 8
-#define DIGITS (1u << DIGIT_BITS)
+/* Depths are looked at seven bits at a time, the highest first, of which there are eight: 64 mm, which few share of
+ * those that are near. Those that differ there are left out of the rest. */
+#define DIGIT_BITS 7
+#define DIGITS_MAX 256
 
-_Static_assert(IH_DEPTH_MAX_MM << 8 < 1 << (3 * DIGIT_BITS), "depths have three digits");
+_Static_assert(IH_DEPTH_MAX_MM << 8 < DIGITS_MAX << (2 * DIGIT_BITS), "depths have three digits");
 
-/* The digit at a shift of the depth of a rank, from 0, among those given, which are the same before it. Those that
- * have it stay, and the rank becomes that among them. No depth is negative. */
-static uint32_t next_digit(uint32_t depth_mm_q8[IH_SLOTS], int32_t *depth_count, int shift,
-                           int32_t *rank)
+/* The digit at a shift of the depth of a rank, from 0, among those given, which begin as it does. Those that have the
+ * digit stay, and the rank becomes that among them. No depth is negative. */
+static uint32_t next_digit(uint32_t depth_mm_q8[IH_SLOTS], int32_t *depth_count, uint32_t begin,
+                           int shift, int32_t *rank)
 {
-    uint16_t count[DIGITS] = {0};
+    uint16_t count[DIGITS_MAX] = {0};
+    const uint32_t first = begin << DIGIT_BITS;
     for (int32_t i = 0; i < *depth_count; i++) {
-        count[(depth_mm_q8[i] >> shift) % DIGITS]++;
+        count[(depth_mm_q8[i] >> shift) - first]++;
     }
     uint32_t digit = 0;
-    while (digit < DIGITS - 1 && *rank >= count[digit]) {
+    while (digit < DIGITS_MAX - 1 && *rank >= count[digit]) {
         *rank -= count[digit++];
     }
     int32_t kept = 0;
     for (int32_t i = 0; i < *depth_count; i++) {
         const uint32_t depth = depth_mm_q8[i];
         depth_mm_q8[kept] = depth;
-        kept += (depth >> shift) % DIGITS == digit;
+        kept += depth >> shift == first + digit;
     }
     *depth_count = kept;
-    return digit;
+    return first + digit;
 }
 
 int32_t ih_samples_near_mm_q8(const struct ih_points *points)
@@ -59,19 +61,9 @@ int32_t ih_samples_near_mm_q8(const struct ih_points *points)
     uint32_t depth_mm_q8 = 0;
     int32_t rank = count * PERCENTILE / 100;
     for (int shift = 2 * DIGIT_BITS; count > 0 && shift >= 0; shift -= DIGIT_BITS) {
-        depth_mm_q8 = depth_mm_q8 * DIGITS + next_digit(seen_mm_q8, &count, shift, &rank);
+        depth_mm_q8 = next_digit(seen_mm_q8, &count, depth_mm_q8, shift, &rank);
     }
     return (int32_t)depth_mm_q8;
-}
-
-/* A slot's neighbour by row and column; NULL beyond the pattern's edge. */
-static const struct ih_point *neighbour(const struct ih_points *points, int32_t slot, int32_t d_row,
-                                        int32_t d_column)
-{
-    int32_t row = slot / IH_GRID + d_row;
-    int32_t column = slot % IH_GRID + d_column;
-    bool inside = row >= 0 && column >= 0 && row < IH_GRID && column < IH_GRID;
-    return inside ? &points->point[row * IH_GRID + column] : NULL;
 }
 
 /* From the least to the most, both included. */
@@ -81,19 +73,30 @@ struct depths {
 
 static const struct depths any_depth = {0, INT32_MAX};
 
+/* A neighbour that is seen, at a depth within so much. */
+static int32_t is_there(const struct ih_point *other, int32_t clip_q8, struct depths depths)
+{
+    const int32_t depth_q8 = ih_min_s32(other->depth_mm_q8, clip_q8);
+    return other->state == IH_POINT_SEEN && depth_q8 >= depths.least_q8 &&
+           depth_q8 <= depths.most_q8;
+}
+
 /* How many of the 8 neighbours are seen, and of those stand within so much of a depth; no more than most are
- * counted. */
+ * counted. Most slots have all 8; those beside, above and below are the likelier ones. */
 static int32_t count_around(const struct ih_points *points, int32_t slot, int32_t clip_q8,
                             struct depths depths, int32_t most)
 {
+    static const int8_t step[8] = {-1,           1,           -IH_GRID,   IH_GRID, -IH_GRID - 1,
+                                   -IH_GRID + 1, IH_GRID - 1, IH_GRID + 1};
+    const int32_t row = slot / IH_GRID;
+    const int32_t column = slot % IH_GRID;
+    const bool is_inside = row > 0 && column > 0 && row < IH_GRID - 1 && column < IH_GRID - 1;
     int32_t count = 0;
-    for (int32_t d_row = -1; d_row <= 1; d_row++) {
-        for (int32_t d_column = -1; d_column <= 1 && count < most; d_column++) {
-            const struct ih_point *other = neighbour(points, slot, d_row, d_column);
-            if (other != NULL && other != &points->point[slot] && other->state == IH_POINT_SEEN) {
-                const int32_t depth_q8 = ih_min_s32(other->depth_mm_q8, clip_q8);
-                count += depth_q8 >= depths.least_q8 && depth_q8 <= depths.most_q8;
-            }
+    for (int i = 0; i < 8 && count < most; i++) {
+        const int32_t at = slot + step[i];
+        /* beyond an edge a step leads out of the table, or to the other end of a row */
+        if (is_inside || (at >= 0 && at < IH_SLOTS && ih_abs_s32(at % IH_GRID - column) <= 1)) {
+            count += is_there(&points->point[at], clip_q8, depths);
         }
     }
     return count;

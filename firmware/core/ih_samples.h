@@ -15,7 +15,7 @@
  *           point at the clip depth, at the place where its ray shows there, with a small weight.
  *           Only where fewer than fill_neighbours of its 8 neighbours are seen (a hole inside a
  *           dark face is no hole), where its place is inside the picture and not over-exposed.
- * Cost:  a depth is counted once, those that share its first digit twice; of 8 neighbours two tell most points.
+ * Cost:  a depth is counted once, the few near the percentile again; of 8 neighbours two tell most points.
  */
 #ifndef IH_SAMPLES_H
 #define IH_SAMPLES_H
