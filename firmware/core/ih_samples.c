@@ -81,22 +81,35 @@ static int32_t is_there(const struct ih_point *other, int32_t clip_q8, struct de
            depth_q8 <= depths.most_q8;
 }
 
+/* The 8 around; those beside, above and below are the likelier ones. */
+static const int8_t step_around[8] = {-1,           1,           -IH_GRID,   IH_GRID, -IH_GRID - 1,
+                                      -IH_GRID + 1, IH_GRID - 1, IH_GRID + 1};
+
+/* Beyond an edge a step leads out of the table, or to the other end of a row. */
+static bool is_step_inside(int32_t slot, int32_t step)
+{
+    const int32_t at = slot + step;
+    return at >= 0 && at < IH_SLOTS && ih_abs_s32(at % IH_GRID - slot % IH_GRID) <= 1;
+}
+
+static bool is_at_edge(int32_t slot)
+{
+    const int32_t row = slot / IH_GRID;
+    const int32_t column = slot % IH_GRID;
+    return row == 0 || column == 0 || row == IH_GRID - 1 || column == IH_GRID - 1;
+}
+
 /* How many of the 8 neighbours are seen, and of those stand within so much of a depth; no more than most are
- * counted. Most slots have all 8; those beside, above and below are the likelier ones. */
+ * counted. */
 static int32_t count_around(const struct ih_points *points, int32_t slot, int32_t clip_q8,
                             struct depths depths, int32_t most)
 {
-    static const int8_t step[8] = {-1,           1,           -IH_GRID,   IH_GRID, -IH_GRID - 1,
-                                   -IH_GRID + 1, IH_GRID - 1, IH_GRID + 1};
-    const int32_t row = slot / IH_GRID;
-    const int32_t column = slot % IH_GRID;
-    const bool is_inside = row > 0 && column > 0 && row < IH_GRID - 1 && column < IH_GRID - 1;
+    const struct ih_point *point = &points->point[slot];
+    const bool is_edge = is_at_edge(slot);
     int32_t count = 0;
     for (int i = 0; i < 8 && count < most; i++) {
-        const int32_t at = slot + step[i];
-        /* beyond an edge a step leads out of the table, or to the other end of a row */
-        if (is_inside || (at >= 0 && at < IH_SLOTS && ih_abs_s32(at % IH_GRID - column) <= 1)) {
-            count += is_there(&points->point[at], clip_q8, depths);
+        if (!is_edge || is_step_inside(slot, step_around[i])) {
+            count += is_there(&point[step_around[i]], clip_q8, depths);
         }
     }
     return count;

@@ -4,7 +4,7 @@
 
 /* Structs that golden_add_words takes: a member of another type would change these sizes. */
 #define WORDS(n) ((n) * sizeof(int32_t))
-_Static_assert(sizeof(struct ih_line) == WORDS(7), "ih_line");
+_Static_assert(sizeof(struct ih_line) == WORDS(9), "ih_line");
 _Static_assert(sizeof(struct ih_field) == WORDS(3), "ih_field");
 _Static_assert(sizeof(struct ih_dot) == WORDS(3), "ih_dot");
 _Static_assert(sizeof(struct ih_window) == WORDS(5), "ih_window");
