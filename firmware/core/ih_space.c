@@ -63,11 +63,14 @@ void ih_space_make(const struct ih_points *points, const struct ih_dots *dots,
 
 void ih_space_slope_most(const struct ih_space *space, int32_t slope_most_q20[2])
 {
-    slope_most_q20[0] = 0;
-    slope_most_q20[1] = 0;
+    int32_t left = 0, right = 0, up = 0, down = 0;
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
         const struct ih_ray *ray = &space->ray[slot];
-        slope_most_q20[0] = ih_max_s32(slope_most_q20[0], ih_abs_s32(ray->slope_x_q20));
-        slope_most_q20[1] = ih_max_s32(slope_most_q20[1], ih_abs_s32(ray->slope_y_q20));
+        left = ih_min_s32(left, ray->slope_x_q20);
+        right = ih_max_s32(right, ray->slope_x_q20);
+        up = ih_min_s32(up, ray->slope_y_q20);
+        down = ih_max_s32(down, ray->slope_y_q20);
     }
+    slope_most_q20[0] = ih_max_s32(-left, right);
+    slope_most_q20[1] = ih_max_s32(-up, down);
 }
