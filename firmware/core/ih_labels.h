@@ -15,8 +15,8 @@
  *           5, epsilon grows by half, up to epsilon_max. What is left then is not labelled: of
  *           what 40 px instead of 8 would add half is wrong, and seeds have bridged the edges.
  * Cost:  361 x the dots in the rows of a line: a few each where lines lie along rows, all where they
- *        stand upright; growing visits the open slots that
- *        have a free candidate a few dozen times. Seeding tries the
+ *        stand upright; growing goes through the open slots that have a free candidate a few dozen
+ *        times, and asks again what is expected where something has changed. Seeding tries the
  *        candidates of three slots with each other, and of the fourth those that are near where
  *        it should be: 324 x 16^3 at the very worst, which a frame made for it can bring about, a
  *        thousand for a real one.
@@ -25,7 +25,9 @@
 #ifndef IH_LABELS_H
 #define IH_LABELS_H
 
+#include "ih_dots.h"
 #include "ih_lens.h"
+#include "ih_rig.h"
 
 /* Candidates kept per slot; each costs 8 bytes a slot. With a 125 mm baseline a line crosses the
  * places of about ten others. */

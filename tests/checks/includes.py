@@ -44,7 +44,7 @@ CORE_HEADERS = {
     "ih_noise.h": {"ih_config.h", "ih_types.h", "ih_band.h"},
     "ih_dots.h": CORE_SHARED | {"ih_noise.h"},
     "ih_lens.h": CORE_SHARED | {"ih_dots.h"},
-    "ih_labels.h": CORE_SHARED | {"ih_lens.h"},
+    "ih_labels.h": CORE_SHARED | {"ih_dots.h", "ih_lens.h"},
     "ih_exposure.h": CORE_SHARED | {"ih_labels.h"},
     "ih_turn.h": CORE_SHARED | {"ih_dots.h"},
     "ih_places.h": CORE_SHARED | {"ih_labels.h", "ih_turn.h"},
