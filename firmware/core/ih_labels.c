@@ -149,22 +149,16 @@ static void try_candidate(const struct ih_dots *dots, const struct ih_line *line
     add_candidate(dots, candidate, slot, scratch, out);
 }
 
-/* Dots in the order of rows, from one to before another. */
-struct dot_range {
-    int32_t begin, end;
-};
-
-/* Candidates of one slot. near: where those of the slot before were looked for; set to this slot's. */
+/* Candidates of one slot. first: where those of the slot before were looked for from; set to this slot's. */
 static void find_candidates(const struct ih_dots *dots, const struct ih_line *line, int32_t slot,
-                            const struct ih_labels_params *params, struct dot_range *near,
+                            const struct ih_labels_params *params, int32_t *first,
                             struct ih_labels_scratch *scratch, struct ih_labels *out)
 {
     const struct row_range rows = rows_of_line(line, params);
-    near->begin = dots_above(scratch, dots->dot_count, rows.first_px_q12, near->begin);
-    near->end = dots_above(scratch, dots->dot_count, rows.last_px_q12 + 1, near->end);
+    *first = dots_above(scratch, dots->dot_count, rows.first_px_q12, *first);
     scratch->candidate_count[slot] = 0;
     scratch->choice[slot] = IH_NONE;
-    for (int32_t i = near->begin; i < near->end; i++) {
+    for (int32_t i = *first; i < dots->dot_count && scratch->v_px_q12[i] <= rows.last_px_q12; i++) {
         try_candidate(dots, line, slot, i, params, scratch, out);
     }
 }
@@ -701,11 +695,11 @@ void ih_labels_assign(const struct ih_dots *dots, const struct ih_rig *rig,
                       const struct ih_labels_params *params, struct ih_labels_scratch *scratch,
                       struct ih_labels *out)
 {
-    struct dot_range near = {0, 0};
+    int32_t first = 0;
     out->candidates_dropped = 0;
     undistort_dots(dots, rig, scratch);
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
-        find_candidates(dots, &rig->line[slot], slot, params, &near, scratch, out);
+        find_candidates(dots, &rig->line[slot], slot, params, &first, scratch, out);
     }
     seed(rig, params, scratch);
     out->seed_count = 0;

@@ -88,7 +88,7 @@ static void candidates_lie_on_their_line(void)
                            .length_px_mm_q8 = 10000 << 8,
                            .t_far_px_q12 = 40960,
                            .t_near_px_q12 = 57344};
-    struct dot_range near = {0, 0};
+    int32_t first = 0;
     int i, way;
 
     dots.dot_count = 1;
@@ -101,7 +101,7 @@ static void candidates_lie_on_their_line(void)
             line.dir_v_q30 = along_v * (1 << 30);
             scratch.u_px_q12[0] = 400000 + cases[i].t * along_u - cases[i].perp * along_v;
             scratch.v_px_q12[0] = 300000 + cases[i].t * along_v + cases[i].perp * along_u;
-            find_candidates(&dots, &line, 7, &params, &near, &scratch, &labels);
+            find_candidates(&dots, &line, 7, &params, &first, &scratch, &labels);
             IH_TEST_EQUAL(cases[i].is_candidate, scratch.candidate_count[7], "candidate", i);
             if (cases[i].is_candidate) {
                 const struct ih_candidate *c = &scratch.candidate[7][0];
