@@ -545,8 +545,11 @@ static void find_bounds(const struct step *step, struct bounds *out)
     out->front = saturate_s16(step->front_mm_q8 >> 7);
     for (int axis = 0; axis < 3; axis++) {
         const int32_t centre_q8 = step->ellipsoid->centre_mm_q8[axis];
-        out->point[axis] = interval_of((centre_q8 - step->reach_mm_q8[axis]) >> 7,
-                                       (centre_q8 + step->reach_mm_q8[axis]) >> 7);
+        const int32_t low = (centre_q8 - step->reach_mm_q8[axis]) >> 7;
+        const int32_t high = (centre_q8 + step->reach_mm_q8[axis]) >> 7;
+        out->point[axis] = /* without those that are cut */
+            (struct interval){(int16_t)ih_clamp_s32(low, -INT16_MAX, INT16_MAX),
+                              (int16_t)ih_clamp_s32(high, INT16_MIN, INT16_MAX - 1)};
     }
 }
 
@@ -601,6 +604,14 @@ static void flag_rays(const struct bounds *bounds, struct ih_row_scratch *scratc
     }
 }
 #endif
+
+/* Of eight rays, a byte each. */
+static uint64_t flags_of(const struct ih_row_scratch *scratch, int32_t first, uint8_t flag)
+{
+    uint64_t flags;
+    memcpy(&flags, &scratch->flag[first], sizeof flags);
+    return flags & flag * (UINT64_MAX / UINT8_MAX);
+}
 
 #ifdef BY_VECTORS
 #ifdef WEIGHED_BY_VECTORS
@@ -778,25 +789,29 @@ static void weigh_points(const struct step *step, struct ih_rows *rows)
 
 #endif
 
-static void add_offset(const struct step *step, const int32_t off_q8[3], struct ih_rows *rows,
-                       struct ih_row_system *system)
+/* Offsets of all points that may have a weight; what they weigh says what is out of reach. */
+static void add_points(const struct step *step, const struct ih_space *space,
+                       struct ih_row_scratch *scratch, struct ih_row_system *system)
 {
-    for (int axis = 0; axis < 3; axis++) {
-        rows->place_q14[axis][rows->count] = off_q8[axis];
+    struct ih_rows *rows = &scratch->rows;
+    const int32_t *centre_mm_q8 = step->ellipsoid->centre_mm_q8;
+    for (int32_t first = 0; first < IH_ROW_RAYS; first += 8) {
+        for (uint64_t left = flags_of(scratch, first, FLAG_POINT); left != 0; left &= left - 1) {
+            const struct ih_ray *ray = &space->ray[first + __builtin_ctzll(left) / 8];
+            const int32_t at = rows->count;
+            rows->place_q14[0][at] = ray->point_mm_q8[0] - centre_mm_q8[0];
+            rows->place_q14[1][at] = ray->point_mm_q8[1] - centre_mm_q8[1];
+            rows->place_q14[2][at] = ray->point_mm_q8[2] - centre_mm_q8[2];
+            rows->count = at + 1;
+            if (rows->count == IH_ROW_MAX) {
+                weigh_points(step, rows);
+                flush_rows(rows, system);
+            }
+        }
     }
-    rows->count++;
-    if (rows->count == IH_ROW_MAX) {
-        weigh_points(step, rows);
-        flush_rows(rows, system);
-    }
+    weigh_points(step, rows);
 }
 #else
-static void weigh_points(const struct step *step, struct ih_rows *rows)
-{
-    (void)step;
-    (void)rows;
-}
-
 static void add_offset(const struct step *step, const int32_t off_q8[3], struct ih_rows *rows,
                        struct ih_row_system *system)
 {
@@ -819,7 +834,6 @@ static void add_offset(const struct step *step, const int32_t off_q8[3], struct 
         }
     }
 }
-#endif
 
 static void add_point(const struct step *step, const struct ih_ray *ray, struct ih_rows *rows,
                       struct ih_row_system *system)
@@ -833,6 +847,20 @@ static void add_point(const struct step *step, const struct ih_ray *ray, struct 
     }
     add_offset(step, off_q8, rows, system);
 }
+
+static void add_points(const struct step *step, const struct ih_space *space,
+                       struct ih_row_scratch *scratch, struct ih_row_system *system)
+{
+    for (int32_t first = 0; first < IH_ROW_RAYS; first += 8) {
+        const uint64_t points = flags_of(scratch, first, FLAG_POINT);
+        for (int32_t slot = first; points != 0 && slot < first + 8; slot++) {
+            if ((scratch->flag[slot] & FLAG_POINT) != 0) {
+                add_point(step, &space->ray[slot], &scratch->rows, system);
+            }
+        }
+    }
+}
+#endif
 
 /* A point seen behind the ellipsoid, through it. */
 static void add_push(const struct step *step, const struct ih_ray *ray, struct ih_rows *rows,
@@ -859,14 +887,6 @@ static void add_push(const struct step *step, const struct ih_ray *ray, struct i
     }
 }
 
-/* Of eight rays, a byte each. */
-static uint64_t flags_of(const struct ih_row_scratch *scratch, int32_t first, uint8_t flag)
-{
-    uint64_t flags;
-    memcpy(&flags, &scratch->flag[first], sizeof flags);
-    return flags & flag * (UINT64_MAX / UINT8_MAX);
-}
-
 void ih_row_collect(const struct ih_space *space, const struct ih_ellipsoid *ellipsoid,
                     int32_t scale_mm, int32_t see_through_mm, struct ih_row_scratch *scratch,
                     struct ih_row_system *out)
@@ -881,15 +901,7 @@ void ih_row_collect(const struct ih_space *space, const struct ih_ellipsoid *ell
     flag_rays(&bounds, scratch);
     memset(out, 0, sizeof *out);
     scratch->rows.count = 0;
-    for (int32_t first = 0; first < IH_ROW_RAYS; first += 8) {
-        const uint64_t points = flags_of(scratch, first, FLAG_POINT);
-        for (int32_t slot = first; points != 0 && slot < first + 8; slot++) {
-            if ((scratch->flag[slot] & FLAG_POINT) != 0) {
-                add_point(&step, &space->ray[slot], &scratch->rows, out);
-            }
-        }
-    }
-    weigh_points(&step, &scratch->rows);
+    add_points(&step, space, scratch, out);
     for (int32_t first = 0; first < IH_ROW_RAYS; first += 8) {
         const uint64_t pushes = flags_of(scratch, first, FLAG_PUSH);
         for (int32_t slot = first; pushes != 0 && slot < first + 8; slot++) {

@@ -15,9 +15,9 @@
  *        (Q13), weighted residuals 15 mm at most, of a push (Q10). A product is below 1 * 1 in Q28, 2.6 in
  *        Q26, 1.6 in Q27 or 15 in Q24: 2^28.
  * Cost:  5 comparisons of 16 bits twice for each of 361 rays, a step (without vectors most rays need one or
- *        two); for a point in reach 12 products of 32 bits, two roots and a weight, with AVX2 eight points at
- *        once ; for one with a weight 12 products, and 27 of 16 bits. About 85 points a
- *        step are in reach, 70 have a weight.
+ *        two); for a point in reach 12 products of 32 bits, two roots and a weight, with AVX2 of eight points
+ *        at once; for one with a weight 12 products, and 27 of 16 bits. About 85 points a step are in reach,
+ *        70 have a weight.
  */
 #ifndef IH_ROW_H
 #define IH_ROW_H
