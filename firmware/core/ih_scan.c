@@ -55,34 +55,37 @@ static int32_t rating_of(int32_t rank)
     return rank >> RANK_BITS;
 }
 
-/* Of what is rated and not taken, the slot whose place is the best; IH_NONE when there is none. A loop
- * without a branch: compilers turn it into vectors. */
-static int32_t best_left(const struct ih_scan_scratch *scratch)
+static int32_t slot_of(int32_t rank)
+{
+    return RANK_SLOTS - 1 - (int32_t)(IH_WRAPS(uint32_t, rank) % RANK_SLOTS);
+}
+
+/* Of what is rated and not out, the best; the least there is when there is nothing. A loop without a branch:
+ * compilers turn it into vectors. */
+static int32_t best_rank(const struct ih_scan_scratch *scratch)
 {
     int32_t best = RANK_NONE;
-    for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
-        best = ih_max_s32(best, scratch->rank[slot]);
+    for (int32_t i = 0; i < scratch->rank_count; i++) {
+        best = ih_max_s32(best, scratch->rank[i]);
     }
-    return best == RANK_NONE ? IH_NONE
-                             : RANK_SLOTS - 1 - (int32_t)(IH_WRAPS(uint32_t, best) % RANK_SLOTS);
+    return best;
 }
 
 /* A place is kept; nothing near it is looked at any more, nor is it itself. */
-static void take(struct ih_scan_scratch *scratch, int32_t slot, int32_t spacing_mm,
+static void take(struct ih_scan_scratch *scratch, int32_t rank, int32_t spacing_mm,
                  struct ih_scan *out)
 {
-    const int32_t *kept_mm_q8 = scratch->centre_mm_q8[slot];
-    const int32_t rating_q12 = rating_of(scratch->rank[slot]);
+    const int32_t *kept_mm_q8 = scratch->centre_mm_q8[slot_of(rank)];
+    const int32_t rating_q12 = rating_of(rank);
     int32_t at = out->place_count++;
     for (; at > 0 && out->place[at - 1].rating_q12 < rating_q12; at--) {
         out->place[at] = out->place[at - 1]; /* what is found late may be better */
     }
     out->place[at].rating_q12 = rating_q12;
     memcpy(out->place[at].centre_mm_q8, kept_mm_q8, sizeof out->place[at].centre_mm_q8);
-    for (int32_t i = 0; i < IH_SLOTS; i++) {
-        if (scratch->rank[i] != RANK_NONE &&
-            is_near(kept_mm_q8, scratch->centre_mm_q8[i], spacing_mm)) {
-            scratch->rank[i] = RANK_NONE;
+    for (int32_t i = scratch->rank_count - 1; i >= 0; i--) {
+        if (is_near(kept_mm_q8, scratch->centre_mm_q8[slot_of(scratch->rank[i])], spacing_mm)) {
+            scratch->rank[i] = scratch->rank[--scratch->rank_count];
         }
     }
 }
@@ -102,17 +105,18 @@ static void look_at(const struct ih_space *space, const struct ih_scan_params *p
             return;
         }
     }
-    scratch->rank[slot] = rank_of(ih_rating_q12(space, &scratch->rays, centre_mm_q8), slot);
+    scratch->rank[scratch->rank_count++] =
+        rank_of(ih_rating_q12(space, &scratch->rays, centre_mm_q8), slot);
 }
 
 /* The first seen point of each block of two by two slots. */
 static void begin(const struct ih_space *space, const struct ih_scan_params *params,
                   struct ih_scan_scratch *scratch, const struct ih_scan *out)
 {
+    scratch->rank_count = 0;
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
         scratch->state[slot] =
             space->ray[slot].state == IH_RAY_SEEN ? IH_SCAN_LEFT : IH_SCAN_NOTHING;
-        scratch->rank[slot] = RANK_NONE;
     }
     for (int32_t y = 0; y < IH_GRID; y += 2) {
         for (int32_t x = 0; x < IH_GRID; x += 2) {
@@ -151,14 +155,14 @@ void ih_scan_find(const struct ih_space *space, const struct ih_scan_params *par
     out->place_count = 0;
     begin(space, params, scratch, out);
     while (out->place_count < params->place_max) {
-        const int32_t best = best_left(scratch);
-        if (best == IH_NONE) {
+        const int32_t best = best_rank(scratch);
+        if (best == RANK_NONE) {
             break;
         }
-        if (scratch->state[best] == IH_SCAN_WIDENED) {
+        if (scratch->state[slot_of(best)] == IH_SCAN_WIDENED) {
             take(scratch, best, params->spacing_mm, out);
         } else {
-            widen(space, params, best, scratch, out);
+            widen(space, params, slot_of(best), scratch, out);
         }
     }
 }

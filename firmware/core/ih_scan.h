@@ -51,11 +51,11 @@ struct ih_scan {
 /* Slots without a point, those whose place is not looked at, or is, and where all around is, too. */
 enum ih_scan_state { IH_SCAN_NOTHING, IH_SCAN_LEFT, IH_SCAN_RATED, IH_SCAN_WIDENED };
 
-/* By slot. */
 struct ih_scan_scratch {
-    int32_t centre_mm_q8[IH_SLOTS][3]; /* of a place that is looked at */
-    int32_t rank[IH_SLOTS];  /* its rating and its slot in one; the least when it is out */
-    uint8_t state[IH_SLOTS]; /* enum ih_scan_state */
+    int32_t centre_mm_q8[IH_SLOTS][3]; /* by slot, of a place that is looked at */
+    uint8_t state[IH_SLOTS];           /* by slot: enum ih_scan_state */
+    int32_t rank_count;
+    int32_t rank[IH_SLOTS]; /* of what is rated and not out, in no order: rating and slot in one */
     struct ih_rating_rays rays;
 };
 
