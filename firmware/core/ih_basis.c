@@ -379,7 +379,7 @@ sum_lines(const int32_t *coefficient, const int32_t *const *line_q20, int32_t li
     }
 }
 
-/* All ones where a number is negative, in both words of its half of the vector; its size. */
+/* All ones in both words of a half where the first number of the half is negative, and where the second is. */
 struct signs {
     __m128i even, odd;
 };
@@ -387,9 +387,14 @@ struct signs {
 static inline struct signs signs_of(__m128i value)
 {
     const __m128i sign = _mm_srai_epi32(value, 31);
-    return (struct signs){_mm_shuffle_epi32(sign, 0xa0), _mm_shuffle_epi32(sign, 0xf5)};
+    const __m128i lower = _mm_set_epi32(0, -1, 0, -1);
+    return (struct signs){
+        _mm_or_si128(_mm_and_si128(sign, lower), _mm_slli_epi64(sign, 32)),
+        _mm_or_si128(_mm_andnot_si128(lower, sign), _mm_srli_epi64(sign, 32)),
+    };
 }
 
+/* Without their signs. */
 static inline __m128i size_of(__m128i value)
 {
     const __m128i sign = _mm_srai_epi32(value, 31);
