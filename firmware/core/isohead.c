@@ -105,14 +105,23 @@ static enum ih_err check_frame(const struct ih_frame *frame, const struct ih_cal
     return IH_OK;
 }
 
+/* The outputs behind labels: nothing. */
+static void clear_found(struct isohead *head)
+{
+    const size_t first = offsetof(struct isohead, expected);
+    memset((uint8_t *)head + first, 0, offsetof(struct isohead, scratch) - first);
+    ih_result_clear(&head->result);
+}
+
+/* All of them: those of an empty frame. */
 static void clear_outputs(struct isohead *head)
 {
-    size_t first = offsetof(struct isohead, dots);
-    memset((uint8_t *)head + first, 0, offsetof(struct isohead, scratch) - first);
+    memset(&head->dots, 0, sizeof head->dots);
+    memset(&head->labels, 0, sizeof head->labels);
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
         head->labels.dot_of_slot[slot] = IH_NONE;
     }
-    ih_result_clear(&head->result);
+    clear_found(head);
 }
 
 /* From points to hypotheses: the paper's method. */
@@ -213,8 +222,14 @@ static enum ih_err label(struct isohead *head, const struct ih_frame *frame,
 enum ih_err isohead_label(struct isohead *head, const struct ih_frame *frame,
                           const struct ih_frame *ambient)
 {
-    clear_outputs(head);
-    return head->rig.calibration.kind == IH_RIG_RANGE ? IH_ERR_KIND : label(head, frame, ambient);
+    const bool is_range = head->rig.calibration.kind == IH_RIG_RANGE;
+    const enum ih_err err = is_range ? IH_ERR_KIND : label(head, frame, ambient);
+    if (err == IH_OK) {
+        clear_found(head);
+    } else {
+        clear_outputs(head);
+    }
+    return err;
 }
 
 void isohead_find(struct isohead *head, int64_t time_us)
