@@ -74,7 +74,7 @@ struct depths {
 static const struct depths any_depth = {0, INT32_MAX};
 
 /* A neighbour that is seen, at a depth within so much. */
-static int32_t is_there(const struct ih_point *other, int32_t clip_q8, struct depths depths)
+static inline bool is_there(const struct ih_point *other, int32_t clip_q8, struct depths depths)
 {
     const int32_t depth_q8 = ih_min_s32(other->depth_mm_q8, clip_q8);
     return other->state == IH_POINT_SEEN && depth_q8 >= depths.least_q8 &&
@@ -115,12 +115,20 @@ static int32_t count_around(const struct ih_points *points, int32_t slot, int32_
     return count;
 }
 
-/* Differs from all but one neighbour. Most points do not, which two neighbours tell. */
+_Static_assert(ISOLATED_FRIENDS_MAX < 2, "two neighbours tell that a point is not isolated");
+
+/* Differs from all but one neighbour. Most points do not, which the two beside them tell. */
 static bool is_isolated(const struct ih_points *points, int32_t slot, int32_t clip_q8,
                         int32_t isolated_q8)
 {
-    const int32_t own_q8 = ih_min_s32(points->point[slot].depth_mm_q8, clip_q8);
+    const struct ih_point *point = &points->point[slot];
+    const int32_t own_q8 = ih_min_s32(point->depth_mm_q8, clip_q8);
     const struct depths near = {own_q8 - isolated_q8, own_q8 + isolated_q8};
+    const int32_t column = slot % IH_GRID;
+    if (column > 0 && column < IH_GRID - 1 && is_there(&point[-1], clip_q8, near) &&
+        is_there(&point[1], clip_q8, near)) {
+        return false;
+    }
     return count_around(points, slot, clip_q8, near, ISOLATED_FRIENDS_MAX + 1) <=
                ISOLATED_FRIENDS_MAX &&
            count_around(points, slot, clip_q8, any_depth, ISOLATED_NEIGHBOURS_MIN) ==
