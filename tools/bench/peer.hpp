@@ -2,13 +2,12 @@
  *
  * Two of them:
  *   A  what is written first: a difference of Gaussians in float by two GaussianBlur (sigma 1.0 and
- *      2.5), connectedComponentsWithStats, weighted centres; the surface in double, its normal
- *      equations summed anew for the second robust pass; whole contours by fitEllipseDirect.
+ *      2.5), connectedComponentsWithStats, weighted centres; the surface in double; whole contours by
+ *      fitEllipseDirect.
  *   B  the fastest composition of library calls that was found: an 8-bit Gaussian 3x3 less an 8-bit
  *      box 13x13, findContours, weighted centres; the surface's normal equations and their factor in float,
- *      of which the second robust pass only takes away what its changed rows weigh less, with two solutions
- *      each for what is left in double (without the second one its worst node is 6 to 14 mm off in frames, as
- *      the condition number is beyond 10^6; with it 0.14 mm at most);
+ *      with two solutions for each robust pass of what is left in double (without the second one its worst node is
+ *      6 to 14 mm off in frames, as the condition number is beyond 10^6; with it 0.14 mm at most);
  *      whole contours by their moments; parts of as many steps side by side, in vectors of double, and
  *      only what passes without a root is looked at closely; scan and fits in vectors of float over all
  *      rays that matter (with gcc -O3, v3, 0.4 of what A's cost, ray by ray and in double).
@@ -16,7 +15,7 @@
  * What both do, as isohead does it in its default mode and with the same numbers: dots of the whole
  * frame; undistortPoints; candidates on the 361 lines, seeds by affine rectangles, growing; points;
  * samples (clip, lonely points, missing dots filled in); 64 multiquadrics, weighted least squares
- * with a ridge, one Huber step, Eigen's LLT; 47x47 nodes from a table of the basis that is filled
+ * with a ridge, one Huber step that moves samples, Eigen's LLT; 47x47 nodes from a table of the basis that is filled
  * once; contours by marching squares every 20 mm at levels that a nest waits for; nests, from minima that are
  * free on three sides, of ellipses, whole or cut by the best of all chords between 32 points, where a contour
  * is studied once for all the nests that it surrounds, when the first one asks, and a tip's may have any shape;

@@ -56,22 +56,17 @@ template <typename real> bool factorise(equations<real> &e)
     return e.factor.info() == Eigen::Success;
 }
 
-/* Root weights after the Huber step, and whose changed. */
-std::vector<int> reweigh(const problem &q, Eigen::VectorXd &root_weight)
+/* The Huber step: what is farther off than that is moved to it, of which the matrix knows nothing. */
+bool move(problem &q)
 {
-    std::vector<int> changed;
-    root_weight = q.root_weight;
-    for (int i = 0; i < root_weight.size(); i++) {
-        const double off_mm = std::abs(q.residual_mm[i]);
-        if (off_mm > HUBER_MM) {
-            root_weight[i] *= std::sqrt(HUBER_MM / off_mm);
-            changed.push_back(i);
-        }
-    }
-    return changed;
+    const Eigen::VectorXd beyond_mm =
+        q.residual_mm - q.residual_mm.cwiseMax(-HUBER_MM).cwiseMin(HUBER_MM);
+    q.off_mm -= beyond_mm;
+    q.residual_mm -= beyond_mm;
+    return !beyond_mm.isZero(0);
 }
 
-/* Peer A: solved in double, summed anew for other weights. */
+/* Peer A: solved in double. */
 void solve_directly(problem &q, const equations<double> &e)
 {
     q.coefficients = e.factor.solve(e.weighted.transpose() * q.root_weight.cwiseProduct(q.off_mm));
@@ -80,25 +75,19 @@ void solve_directly(problem &q, const equations<double> &e)
 bool fit_directly(problem &q)
 {
     static equations<double> e;
-    Eigen::VectorXd root_weight;
     assemble(q, e);
     if (!factorise(e)) {
         return false;
     }
     solve_directly(q, e);
     q.residual_mm = q.off_mm - q.basis * q.coefficients;
-    if (!reweigh(q, root_weight).empty()) {
-        q.root_weight = root_weight;
-        assemble(q, e);
-        if (!factorise(e)) {
-            return false;
-        }
+    if (move(q)) {
         solve_directly(q, e);
     }
     return true;
 }
 
-/* Peer B: what is left is worked out in double, solved for in float and added, so often for each factor. */
+/* Peer B: what is left is worked out in double, solved for in float and added, so often before samples are moved and after. */
 constexpr int CORRECTIONS = 2;
 
 void correct(problem &q, const equations<float> &e)
@@ -111,25 +100,9 @@ void correct(problem &q, const equations<float> &e)
     }
 }
 
-/* Take away what the changed rows weigh less now. */
-void update(problem &q, const std::vector<int> &changed, const Eigen::VectorXd &root_weight,
-            equations<float> &e)
-{
-    e.weighted.resize(static_cast<Eigen::Index>(changed.size()), PEER_TERMS);
-    for (size_t i = 0; i < changed.size(); i++) {
-        int from = changed[i];
-        double root = std::sqrt(q.root_weight[from] * q.root_weight[from] -
-                                root_weight[from] * root_weight[from]);
-        e.weighted.row(static_cast<int>(i)) = (root * q.basis.row(from)).cast<float>();
-    }
-    e.normal.selfadjointView<Eigen::Lower>().rankUpdate(e.weighted.transpose(), -1.0F);
-    q.root_weight = root_weight;
-}
-
 bool fit_by_corrections(problem &q)
 {
     static equations<float> e;
-    Eigen::VectorXd root_weight;
     assemble(q, e);
     if (!factorise(e)) {
         return false;
@@ -137,12 +110,7 @@ bool fit_by_corrections(problem &q)
     q.coefficients.setZero();
     q.residual_mm = q.off_mm;
     correct(q, e);
-    std::vector<int> changed = reweigh(q, root_weight);
-    if (!changed.empty()) {
-        update(q, changed, root_weight, e);
-        if (!factorise(e)) {
-            return false;
-        }
+    if (move(q)) {
         correct(q, e);
     }
     return true;
