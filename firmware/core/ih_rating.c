@@ -63,7 +63,6 @@ typedef __m256i lanes;
 #define MOST(a, b) _mm256_max_epi16(a, b)
 #define ABOVE(a, b) _mm256_cmpgt_epi16(a, b)
 #define BOTH(a, b) _mm256_and_si256(a, b)
-#define EITHER(a, b) _mm256_or_si256(a, b)
 #define WITHOUT(a, b) _mm256_andnot_si256(b, a)
 #define FOLD(a) _mm_add_epi16(_mm256_castsi256_si128(a), _mm256_extracti128_si256(a, 1))
 #elif defined __SSE2__
@@ -81,7 +80,6 @@ typedef __m128i lanes;
 #define MOST(a, b) _mm_max_epi16(a, b)
 #define ABOVE(a, b) _mm_cmpgt_epi16(a, b)
 #define BOTH(a, b) _mm_and_si128(a, b)
-#define EITHER(a, b) _mm_or_si128(a, b)
 #define WITHOUT(a, b) _mm_andnot_si128(b, a)
 #define FOLD(a) (a)
 #elif defined __ARM_NEON
@@ -101,7 +99,6 @@ typedef int16x8_t lanes;
 #define MOST(a, b) vmaxq_s16(a, b)
 #define ABOVE(a, b) vreinterpretq_s16_u16(vcgtq_s16(a, b))
 #define BOTH(a, b) vandq_s16(a, b)
-#define EITHER(a, b) vorrq_s16(a, b)
 #define WITHOUT(a, b) vbicq_s16(a, b)
 #else
 #define LANES 1
@@ -132,9 +129,9 @@ static void fill_ray(const struct ih_ray *ray, struct ih_rating_rays *out, int32
     out->g_q15[0][at] = (int16_t)gx_q15;
     out->g_q15[1][at] = (int16_t)gy_q15;
     out->inverse_q15[at] = saturate_s16((int32_t)((1U << 30) / ((1U << 15) + (gg_q30 >> 15))));
-    out->depth_mm_q1[at] = is_seen ? saturate_s16(ray->point_mm_q8[2] >> 7) : NOWHERE_Q1;
-    out->inside[at] = is_empty ? VALUE_EMPTY : VALUE_NEARER;
-    out->around[at] = is_seen ? AROUND_NEAR : is_empty ? AROUND_EMPTY : 0;
+    out->depth_mm_q1[at] = saturate_s16(is_seen ? ray->point_mm_q8[2] >> 7 : NOWHERE_Q1);
+    out->inside[at] = (int16_t)(is_empty ? VALUE_EMPTY : VALUE_NEARER);
+    out->around[at] = (int16_t)(is_seen ? AROUND_NEAR : is_empty ? AROUND_EMPTY : 0);
 }
 
 /* The greatest slope up to a line, and the least from it on. */
@@ -309,7 +306,10 @@ static struct span find_span(const struct ih_rating_rays *rays, int axis, int32_
 /* Where rays are that may count: those through the head are in some of the columns only. Rows are whole
  * vectors, which end behind a column's last ray at most. */
 struct box {
-    struct span columns, through, rows;
+    struct span columns, rows;
+#if LANES > 1
+    struct span through;
+#endif
 };
 
 static struct box find_box(const struct ih_rating_rays *rays, const struct place *place)
@@ -318,20 +318,20 @@ static struct box find_box(const struct ih_rating_rays *rays, const struct place
     const int32_t x_q14 = place->direction_q14[0];
     const int32_t y_q14 = place->direction_q14[1];
     const int32_t aside_q14 = (place->cut[0] * rays->aside_q12 >> 12) + 3;
-    const int32_t through_q14 = (place->cut[0] * rays->through_q12 >> 12) + 3;
     const int32_t above_q14 = (place->cut[1] * rays->above_q12 >> 12) + 3;
     const int32_t below_q14 = (place->cut[1] * rays->below_q12 >> 12) + 3;
     struct box box = {
         .columns = find_span(rays, 0, x_q14 - aside_q14, x_q14 + aside_q14),
-        .through = find_span(rays, 0, x_q14 - through_q14, x_q14 + through_q14),
         .rows = find_span(rays, 1, y_q14 - above_q14, y_q14 + below_q14),
     };
+#if LANES > 1
+    const int32_t through_q14 = (place->cut[0] * rays->through_q12 >> 12) + 3;
     const uint32_t rows = (uint32_t)(box.rows.end - box.rows.begin);
     const int32_t count = (int32_t)((rows + LANES - 1) / LANES * LANES);
-    if (LANES > 1) {
-        box.rows.begin = ih_min_s32(box.rows.begin, IH_RATING_COLUMN - count);
-    }
+    box.through = find_span(rays, 0, x_q14 - through_q14, x_q14 + through_q14);
+    box.rows.begin = ih_min_s32(box.rows.begin, IH_RATING_COLUMN - count);
     box.rows.end = box.rows.begin + count;
+#endif
     return box;
 }
 
@@ -344,14 +344,14 @@ struct weighed {
 #if LANES > 1
 
 #if LANES == 16
-#define SAME(v)                                        \
-    {                                                  \
-        v, v, v, v, v, v, v, v, v, v, v, v, v, v, v, v \
+#define SAME(v)                                                                        \
+    {                                                                                  \
+        (v), (v), (v), (v), (v), (v), (v), (v), (v), (v), (v), (v), (v), (v), (v), (v) \
     }
 #else
-#define SAME(v)                \
-    {                          \
-        v, v, v, v, v, v, v, v \
+#define SAME(v)                                \
+    {                                          \
+        (v), (v), (v), (v), (v), (v), (v), (v) \
     }
 #endif
 /* What does not change, whole vectors: compilers make them anew for each turn otherwise. */

@@ -174,6 +174,8 @@ bool ih_row_distance(const struct ih_shares *shares, const int32_t place_q14[3],
 #define LANES 16
 typedef __m256i lanes;
 #define LOAD(from) _mm256_loadu_si256((const lanes *)(const void *)(from))
+/* Elements of 16 bits with those behind them. */
+#define TWO_AT(from, at) _mm256_i32gather_epi32((const int *)(const void *)(from), at, 2)
 #define STORE(to, value) _mm256_storeu_si256((lanes *)(void *)(to), value)
 #define ALL_64(value) _mm256_set1_epi64x(value)
 #define ALL_16(value) _mm256_set1_epi16(value)
@@ -634,8 +636,7 @@ static inline lanes square_of(lanes value, lanes *half)
 static inline lanes inverse_root(lanes square)
 {
     const lanes at = _mm256_sub_epi32(_mm256_srli_epi32(square, 24), _mm256_set1_epi32(64));
-    const lanes both =
-        _mm256_i32gather_epi32((const int *)(const void *)ih_root_inverse_q15, at, 2);
+    const lanes both = TWO_AT(ih_root_inverse_q15, at);
     const lanes here = _mm256_and_si256(both, _mm256_set1_epi32(0xffff));
     const lanes fall = _mm256_sub_epi32(here, _mm256_srli_epi32(both, 16));
     const lanes part = _mm256_and_si256(_mm256_srli_epi32(square, 8), _mm256_set1_epi32(0xffff));

@@ -85,7 +85,8 @@ static void take(struct ih_scan_scratch *scratch, int32_t rank, int32_t spacing_
     memcpy(out->place[at].centre_mm_q8, kept_mm_q8, sizeof out->place[at].centre_mm_q8);
     for (int32_t i = scratch->rank_count - 1; i >= 0; i--) {
         if (is_near(kept_mm_q8, scratch->centre_mm_q8[slot_of(scratch->rank[i])], spacing_mm)) {
-            scratch->rank[i] = scratch->rank[--scratch->rank_count];
+            scratch->rank_count--;
+            scratch->rank[i] = scratch->rank[scratch->rank_count];
         }
     }
 }
