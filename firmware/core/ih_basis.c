@@ -387,11 +387,9 @@ struct signs {
 static inline struct signs signs_of(__m128i value)
 {
     const __m128i sign = _mm_srai_epi32(value, 31);
-    const __m128i lower = _mm_set_epi32(0, -1, 0, -1);
-    return (struct signs){
-        _mm_or_si128(_mm_and_si128(sign, lower), _mm_slli_epi64(sign, 32)),
-        _mm_or_si128(_mm_andnot_si128(lower, sign), _mm_srli_epi64(sign, 32)),
-    };
+    const __m128i first = _mm_unpacklo_epi32(sign, sign); /* 0 0 1 1 */
+    const __m128i last = _mm_unpackhi_epi32(sign, sign);  /* 2 2 3 3 */
+    return (struct signs){_mm_unpacklo_epi64(first, last), _mm_unpackhi_epi64(first, last)};
 }
 
 /* Without their signs. */
