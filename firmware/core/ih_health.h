@@ -28,7 +28,7 @@
  *        projector along the baseline. A shift across it is taken for a turn. docs/health.md
  * Cost:  361 slots a frame; ih_turn's while searching, and ih_rig_init when the rig changes.
  * Error: against float64 on the same frames (tools/oracle/knock.py): docs/numerics.md.
- * Memory: the caller's; 55 kB with the scratch, beside struct isohead. A dot rig only.
+ * Memory: the caller's; 63 kB with the scratch, beside struct isohead. A dot rig only.
  */
 #ifndef IH_HEALTH_H
 #define IH_HEALTH_H

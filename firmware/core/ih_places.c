@@ -25,8 +25,23 @@
 #define TURN_MOST_PX_Q12 4096
 #define PIN_MOST_PX_Q12 8192
 #define PULL_MOST_Q20 (1 << 30)
+/* A slot whose mean is so far from what the turn says counts half: sqrt(3 s^2 + 0.3^2 / n) px with n frames, where
+ * slots scatter by s. Means are limited, too. */
+#define HALF_SCATTERS 3
+#define HALF_OF_ONE_PX_Q12 1229
+#define LEFT_MOST_PX_Q12 4096
+/* Of the trusted weight at least a third is taken to be left, see steepness_q8. */
+#define STEEP_MIN_Q12 1365
+/* Solutions one after the other: the first trusts all slots alike, the others as the one before says. */
+#define PASSES 4
 /* Row and column of a packed entry. */
 static const int8_t packed[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
+
+/* Once in flash, not wherever they are needed: this and limited. */
+__attribute__((noinline)) static int64_t div_round(int64_t numerator, int64_t denominator)
+{
+    return ih_div_round(numerator, denominator);
+}
 
 /* Sums over slots, each with its weight. */
 struct totals {
@@ -34,7 +49,9 @@ struct totals {
     int64_t right_q24[3];  /* weight times slope times distance */
     int64_t whole_q8;      /* see whole */
     int32_t slot_count;
-    int32_t doubt_px_q12; /* how far a slot may err, before a turn is sure */
+    int32_t doubt_px_q12;         /* how far a slot may err, before a turn is sure */
+    int64_t half_q24;             /* 3 s^2 */
+    const int32_t *about_rad_q30; /* the turn that says how far slots are trusted; NULL: all are */
 };
 
 /* The equations in units in which the diagonal is 1, and their cofactors. */
@@ -49,7 +66,8 @@ void ih_places_clear(struct ih_places *places)
 {
     memset(places, 0, sizeof *places);
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
-        places->slot[slot].along_px_q12 = ANYWHERE;
+        places->slot[slot].along_px_q12[0] = ANYWHERE;
+        places->slot[slot].along_px_q12[1] = ANYWHERE;
     }
 }
 
@@ -72,38 +90,47 @@ static void weigh(int64_t across_px_q12, int64_t reach_px_q12, int64_t *weight_q
     *rise_q8 = ih_mul_shift(rest_q16, 65536 - 5 * ratio_q16, 24);
 }
 
-/* Of n frames on a place, n / (1 + n / 20); the same share of their pull. */
-static void of_place(const struct ih_place *place, int32_t *weight_q8, int32_t *pull_q20)
+static void scale_sums(struct ih_place_sums *sums, int64_t part, int64_t whole)
 {
-    int64_t n_q8 = place->here_weight_q8;
-    *weight_q8 = (int32_t)ih_div_round(n_q8 * FRAMES_OF_PLACE_Q8, n_q8 + FRAMES_OF_PLACE_Q8);
-    *pull_q20 = (int32_t)ih_div_round((int64_t)place->here_pull_q20 * FRAMES_OF_PLACE_Q8,
-                                      n_q8 + FRAMES_OF_PLACE_Q8);
+    sums->weight_q8 = (int32_t)div_round(sums->weight_q8 * part, whole);
+    sums->pull_q20 = (int32_t)div_round(sums->pull_q20 * part, whole);
 }
 
-static void leave_place(struct ih_place *place)
+/* Of n frames on a place n / (1 + n / 20); the same share of the rest. */
+static void add_place(const struct ih_place_sums *place, struct ih_place_sums *to)
 {
-    int32_t weight_q8, pull_q20;
-    of_place(place, &weight_q8, &pull_q20);
-    place->weight_q8 += weight_q8;
-    place->pull_q20 += pull_q20;
-    place->here_weight_q8 = 0;
-    place->here_pull_q20 = 0;
+    struct ih_place_sums sums = *place;
+    scale_sums(&sums, FRAMES_OF_PLACE_Q8, FRAMES_OF_PLACE_Q8 + place->weight_q8);
+    to->weight_q8 += sums.weight_q8;
+    to->pull_q20 += sums.pull_q20;
 }
 
-/* A dot's weight is at most 2^8, times its distance at most 0.29 of the reach: in IH_PLACES_FRAMES_MAX
- * frames 2^17 and 2^25.4 with a reach of 0.3 px. */
-static void add_dot(struct ih_place *place, int32_t along_px_q12, int64_t across_px_q12,
-                    int64_t weight_q8)
+/* Everything known of a slot. */
+static struct ih_place_sums sum_of(const struct ih_place *place)
 {
-    if (place->along_px_q12 == ANYWHERE) {
-        place->along_px_q12 = along_px_q12;
-    } else if (ih_abs_s64((int64_t)along_px_q12 - place->along_px_q12) > IH_PLACES_MOVE_PX_Q12) {
-        leave_place(place);
-        place->along_px_q12 = along_px_q12;
+    struct ih_place_sums sum = place->at[IH_PLACES_KNOWN];
+    for (int i = 0; i < IH_PLACES_KNOWN; i++) {
+        add_place(&place->at[i], &sum);
     }
-    place->here_weight_q8 += (int32_t)weight_q8;
-    place->here_pull_q20 += (int32_t)(weight_q8 * across_px_q12);
+    return sum;
+}
+
+static bool is_at(const struct ih_place *place, int which, int32_t along_px_q12)
+{
+    return ih_abs_s64((int64_t)along_px_q12 - place->along_px_q12[which]) <= IH_PLACES_MOVE_PX_Q12;
+}
+
+/* A dot elsewhere begins a place instead of the one with fewer frames: a wall stays known while an arm passes. */
+static struct ih_place_sums *place_at(struct ih_place *place, int32_t along_px_q12)
+{
+    int which = !is_at(place, 0, along_px_q12) &&
+                (is_at(place, 1, along_px_q12) || place->at[1].weight_q8 < place->at[0].weight_q8);
+    if (!is_at(place, which, along_px_q12)) {
+        add_place(&place->at[which], &place->at[IH_PLACES_KNOWN]);
+        place->at[which] = (struct ih_place_sums){.weight_q8 = 0};
+        place->along_px_q12[which] = along_px_q12;
+    }
+    return &place->at[which];
 }
 
 /* Where in the image, in the line's direction: where the line begins, and t from there. Unlike t it stays as it is
@@ -122,6 +149,8 @@ void ih_places_add(struct ih_places *places, const struct ih_labels *labels,
                    const struct ih_rig *rig, const struct ih_turn_slopes *slopes,
                    int32_t reach_px_q12)
 {
+    /* A dot's weight is at most 2^8, times its distance at most 0.29 of the reach: in IH_PLACES_FRAMES_MAX
+     * frames 2^17.9 and 2^26.4 with a reach of 0.3 px. */
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
         if (labels->dot_of_slot[slot] == IH_NONE || is_steep(slopes->px_q4[slot])) {
             continue;
@@ -130,8 +159,10 @@ void ih_places_add(struct ih_places *places, const struct ih_labels *labels,
         int64_t weight_q8, rise_q8;
         weigh(across_px_q12, reach_px_q12, &weight_q8, &rise_q8);
         if (weight_q8 > 0) {
-            add_dot(&places->slot[slot], along_image(&rig->line[slot], labels->t_px_q12[slot]),
-                    across_px_q12, weight_q8);
+            struct ih_place_sums *place = place_at(
+                &places->slot[slot], along_image(&rig->line[slot], labels->t_px_q12[slot]));
+            place->weight_q8 += (int32_t)weight_q8;
+            place->pull_q20 += (int32_t)(weight_q8 * across_px_q12);
         }
         places->square_q32 += weight_q8 * across_px_q12 * across_px_q12;
         places->weight_q8 += weight_q8;
@@ -145,16 +176,15 @@ void ih_places_forget(struct ih_places *places)
     if (places->frame_count < IH_PLACES_FRAMES_MAX) {
         return;
     }
-    places->frame_count /= 2;
-    places->square_q32 /= 2;
-    places->weight_q8 /= 2;
-    places->rise_q8 /= 2;
+    places->frame_count -= places->frame_count / 4;
+    places->square_q32 -= places->square_q32 / 4;
+    places->weight_q8 -= places->weight_q8 / 4;
+    places->rise_q8 -= places->rise_q8 / 4;
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
         struct ih_place *place = &places->slot[slot];
-        place->here_weight_q8 /= 2;
-        place->here_pull_q20 /= 2;
-        place->weight_q8 /= 2;
-        place->pull_q20 /= 2;
+        for (int i = 0; i <= IH_PLACES_KNOWN; i++) {
+            scale_sums(&place->at[i], 3, 4);
+        }
     }
 }
 
@@ -168,17 +198,9 @@ static int64_t move_px_q12(const int32_t slope_px_q4[3], const int32_t turn_rad_
     return ih_shift_round(sum_q34, 22);
 }
 
-static int64_t limited(int64_t value, int64_t most)
+__attribute__((noinline)) static int64_t limited(int64_t value, int64_t most)
 {
     return value > most ? most : value < -most ? -most : value;
-}
-
-/* Everything known of a slot. */
-static void sum_of(const struct ih_place *place, int32_t *weight_q8, int32_t *pull_q20)
-{
-    of_place(place, weight_q8, pull_q20);
-    *weight_q8 += place->weight_q8;
-    *pull_q20 += place->pull_q20;
 }
 
 /* Where all dots move by d, their weighted mean moves by less, as the weights move too: by rise / weight.
@@ -187,33 +209,83 @@ static int64_t share_q8(const struct ih_places *places)
 {
     int64_t rise_q8 =
         places->rise_q8 * 3 > places->weight_q8 ? places->rise_q8 : places->weight_q8 / 3;
-    return ih_div_round(rise_q8 * 256, places->weight_q8);
+    return div_round(rise_q8 * 256, places->weight_q8);
 }
 
 static int64_t whole(int64_t value, int64_t share)
 {
-    return ih_div_round(value * 256, share);
+    return div_round(value * 256, share);
 }
 
-/* Weights of a slot are at most 2^17, slopes 2^18, slots 2^8.5: 2^61.5; of the right side, with pulls of
- * 2^25.4, 2^51.9, and 2^59.9 on its way through whole. */
+/* What a turn leaves of a slot's pull, as if the weights stayed. Weights of 2^18, moves of 2^22.7: 2^40.7. */
+static int64_t left_of_q20(const struct ih_place_sums *sum, const struct totals *totals,
+                           const int32_t slope_px_q4[3], const int32_t turn_rad_q30[3])
+{
+    return whole(sum->pull_q20, totals->whole_q8) -
+           sum->weight_q8 * move_px_q12(slope_px_q4, turn_rad_q30);
+}
+
+/* How far from what the turn says a slot's mean is, up to 1 px. */
+static int64_t mean_left_q12(const struct ih_place_sums *sum, const struct totals *totals,
+                             const int32_t slope_px_q4[3], const int32_t turn_rad_q30[3])
+{
+    return limited(div_round(left_of_q20(sum, totals, slope_px_q4, turn_rad_q30), sum->weight_q8),
+                   LEFT_MOST_PX_Q12);
+}
+
+/* Everything known of a slot, as far as it is trusted: of what the turn leaves of its mean, Cauchy's weight
+ * 1 / (1 + (r / h)^2). Pulls of 2^30 times h of 2^28.6, or 1229^2 in Q8: 2^58.6. */
+static struct ih_place_sums trusted_sum_of(const struct ih_place *place,
+                                           const int32_t slope_px_q4[3],
+                                           const struct totals *totals)
+{
+    const int64_t one_q32 = (int64_t)HALF_OF_ONE_PX_Q12 * HALF_OF_ONE_PX_Q12 * 256;
+    struct ih_place_sums sum = sum_of(place);
+    if (sum.weight_q8 > 0 && totals->about_rad_q30 != NULL) {
+        int64_t mean_q12 = mean_left_q12(&sum, totals, slope_px_q4, totals->about_rad_q30);
+        int64_t half_q24 = totals->half_q24 + div_round(one_q32, sum.weight_q8);
+        scale_sums(&sum, half_q24, half_q24 + mean_q12 * mean_q12);
+    }
+    return sum;
+}
+
+/* Mean square of what a turn leaves of slots' means. Weights of 2^17.9, squares of 2^24, slots: 2^50.4. */
+static int64_t scatter_q24(const struct ih_places *places, const struct ih_turn_slopes *slopes,
+                           const struct totals *totals, const int32_t turn_rad_q30[3])
+{
+    int64_t square_q32 = 0;
+    int64_t weight_q8 = 1;
+    for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
+        struct ih_place_sums sum = sum_of(&places->slot[slot]);
+        if (sum.weight_q8 > 0) {
+            int64_t mean_q12 = mean_left_q12(&sum, totals, slopes->px_q4[slot], turn_rad_q30);
+            square_q32 += sum.weight_q8 * mean_q12 * mean_q12;
+            weight_q8 += sum.weight_q8;
+        }
+    }
+    return div_round(square_q32, weight_q8);
+}
+
+/* Weights of a slot are at most 2^17.9, slopes 2^18, slots 2^8.5: 2^62.4; of the right side, with pulls of 2^30,
+ * 2^56.5. */
 static void add_up(const struct ih_places *places, const struct ih_turn_slopes *slopes,
                    struct totals *out)
 {
-    memset(out, 0, sizeof *out);
+    memset(out->normal_q16, 0, sizeof out->normal_q16);
+    memset(out->right_q24, 0, sizeof out->right_q24);
     out->whole_q8 = share_q8(places);
+    out->slot_count = 0;
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
         const int32_t *slope = slopes->px_q4[slot];
-        int32_t weight_q8, pull_q20;
-        sum_of(&places->slot[slot], &weight_q8, &pull_q20);
-        for (int row = 0; weight_q8 > 0 && row < 3; row++) {
-            out->right_q24[row] += (int64_t)pull_q20 * slope[row];
+        struct ih_place_sums sum = trusted_sum_of(&places->slot[slot], slope, out);
+        for (int row = 0; row < 3; row++) {
+            out->right_q24[row] += (int64_t)sum.pull_q20 * slope[row];
             for (int column = row; column < 3; column++) {
                 out->normal_q16[packed[row][column]] +=
-                    (int64_t)weight_q8 * slope[row] * slope[column];
+                    (int64_t)sum.weight_q8 * slope[row] * slope[column];
             }
         }
-        out->slot_count += weight_q8 > 0;
+        out->slot_count += sum.weight_q8 > 0;
     }
     for (int row = 0; row < 3; row++) {
         out->right_q24[row] = whole(out->right_q24[row], out->whole_q8);
@@ -221,8 +293,8 @@ static void add_up(const struct ih_places *places, const struct ih_turn_slopes *
 }
 
 /* Holds the turn about an axis in the camera's X and Y where offset puts it; the rest is then against
- * that. A quarter of what is known of X and Y holds what is hardly seen, and no more. Moves are limited to
- * 2 px: sums of 2^56.5. */
+ * that. A quarter of what is known of X and Y holds what is hardly seen, and no more: 2^62.9 with it. Moves are
+ * limited to 2 px: sums of 2^57.4. */
 static void pin(const struct ih_places *places, const struct ih_turn_slopes *slopes,
                 const int32_t axis_q30[2], const int32_t offset_rad_q30[3], struct totals *sums)
 {
@@ -230,10 +302,9 @@ static void pin(const struct ih_places *places, const struct ih_turn_slopes *slo
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
         const int32_t *slope = slopes->px_q4[slot];
         int64_t move = limited(move_px_q12(slope, offset_rad_q30), PIN_MOST_PX_Q12);
-        int32_t weight_q8, pull_q20;
-        sum_of(&places->slot[slot], &weight_q8, &pull_q20);
-        for (int row = 0; weight_q8 > 0 && row < 3; row++) {
-            sums->right_q24[row] -= weight_q8 * move * slope[row];
+        struct ih_place_sums sum = trusted_sum_of(&places->slot[slot], slope, sums);
+        for (int row = 0; row < 3; row++) {
+            sums->right_q24[row] -= sum.weight_q8 * move * slope[row];
         }
     }
     for (int row = 0; row < 2; row++) {
@@ -272,14 +343,13 @@ static void scale(const struct totals *sums, int64_t precision_q16, const int32_
         int64_t diagonal_q16 = sums->normal_q16[packed[i][i]] + precision_q16;
         int64_t pull_q24 = ih_mul_shift(precision_q16 >> 8, turned_rad_q30[i], 14);
         out->root_q8[i] = (int64_t)ih_isqrt_u64((uint64_t)diagonal_q16) + 1;
-        out->right_px_q16[i] = ih_div_round(sums->right_q24[i] - pull_q24, out->root_q8[i]);
+        out->right_px_q16[i] = div_round(sums->right_q24[i] - pull_q24, out->root_q8[i]);
     }
     for (int row = 0; row < 3; row++) {
         c_q30[row][row] = (int64_t)1 << 30;
         for (int column = row + 1; column < 3; column++) {
-            int64_t part_q8 =
-                ih_div_round(sums->normal_q16[packed[row][column]], out->root_q8[row]);
-            c_q30[row][column] = ih_div_round(part_q8 * ((int64_t)1 << 30), out->root_q8[column]);
+            int64_t part_q8 = div_round(sums->normal_q16[packed[row][column]], out->root_q8[row]);
+            c_q30[row][column] = div_round(part_q8 * ((int64_t)1 << 30), out->root_q8[column]);
             c_q30[column][row] = c_q30[row][column];
         }
     }
@@ -295,9 +365,9 @@ static void solve(const struct equations *e, int32_t turn_rad_q30[3])
         for (int k = 0; k < 3; k++) {
             sum_q46 += e->cofactor_q30[i][k] * e->right_px_q16[k];
         }
-        int64_t part_px_q16 = ih_div_round(sum_q46, e->determinant_q30);
+        int64_t part_px_q16 = div_round(sum_q46, e->determinant_q30);
         turn_rad_q30[i] =
-            ih_clamp_s32(ih_saturate_s32(ih_div_round(part_px_q16 * (1 << 22), e->root_q8[i])),
+            ih_clamp_s32(ih_saturate_s32(div_round(part_px_q16 * (1 << 22), e->root_q8[i])),
                          -2 * IH_TURN_MAX_RAD_Q30, 2 * IH_TURN_MAX_RAD_Q30);
     }
 }
@@ -318,10 +388,10 @@ static int64_t lever_q26(const struct equations *e, const int32_t slope_px_q4[3]
 {
     int64_t sum_q56 = 0;
     for (int k = 0; k < 3; k++) {
-        int64_t part_q26 = ih_div_round(slope_px_q4[k] * ((int64_t)1 << 30), e->root_q8[k]);
+        int64_t part_q26 = div_round(slope_px_q4[k] * ((int64_t)1 << 30), e->root_q8[k]);
         sum_q56 += e->cofactor_q30[axis][k] * part_q26;
     }
-    return limited(ih_div_round(sum_q56, e->determinant_q30), (int64_t)1 << 32);
+    return limited(div_round(sum_q56, e->determinant_q30), (int64_t)1 << 32);
 }
 
 /* Root of the sum of squares, px in Q16 below 2^31. */
@@ -331,8 +401,14 @@ static int64_t with_standing_q16(uint64_t square_q32, uint64_t weight_q32, int64
     return (int64_t)ih_isqrt_u64(square_q32 + (uint64_t)(standing_q16 * standing_q16)) + 1;
 }
 
-/* What slots leave unexplained is below 2^17 times 2^13 in Q20, times a lever of 2^32: 2^62. Squares of
- * 2^26 add up to 2^60.5. */
+/* Of a slot's trusted weight w v, what is left of it when its mean moves: v less as it falls, w v (2 v - 1). */
+static int64_t steepness_q8(int64_t weight_q8, int64_t trusted_q8)
+{
+    return weight_q8 > 0 ? div_round(2 * trusted_q8 * trusted_q8, weight_q8) - trusted_q8 : 0;
+}
+
+/* What slots leave unexplained is held below 2^30, times a lever of 2^32: 2^62. Squares of 2^26 add up to 2^60.5.
+ * Weights of 2^17.9 and slots in Q12: 2^38.4. */
 static void judge(const struct ih_places *places, const struct ih_turn_slopes *slopes,
                   const struct equations *e, const struct totals *sums,
                   const int32_t offset_rad_q30[3], struct ih_places_turn *out)
@@ -340,31 +416,36 @@ static void judge(const struct ih_places *places, const struct ih_turn_slopes *s
     int32_t turn_rad_q30[3];
     uint64_t square_q32[3] = {0, 0, 0};
     uint64_t weight_q32[3] = {0, 0, 0};
+    int64_t trusted_q8 = 0;
+    int64_t steep_q8 = 0;
     for (int i = 0; i < 3; i++) {
         turn_rad_q30[i] = out->turn_rad_q30[i] + offset_rad_q30[i];
     }
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
         const int32_t *slope = slopes->px_q4[slot];
-        int32_t weight_q8, pull_q20;
-        sum_of(&places->slot[slot], &weight_q8, &pull_q20);
-        for (int i = 0; weight_q8 > 0 && i < 3; i++) {
+        struct ih_place_sums sum = trusted_sum_of(&places->slot[slot], slope, sums);
+        steep_q8 += steepness_q8(sum_of(&places->slot[slot]).weight_q8, sum.weight_q8);
+        trusted_q8 += sum.weight_q8;
+        int64_t left_q20 =
+            limited(left_of_q20(&sum, sums, slope, turn_rad_q30), (int64_t)PULL_MOST_Q20);
+        for (int i = 0; sum.weight_q8 > 0 && i < 3; i++) {
             int64_t lever = lever_q26(e, slope, i);
-            int64_t left_q20 = limited(whole(pull_q20, sums->whole_q8) -
-                                           weight_q8 * move_px_q12(slope, turn_rad_q30),
-                                       (int64_t)1 << 30);
             int64_t left_q16 = limited(ih_shift_round(left_q20 * lever, 30), 1 << 26);
-            int64_t own_q16 = limited(ih_shift_round(weight_q8 * lever, 18), 1 << 26);
+            int64_t own_q16 = limited(ih_shift_round(sum.weight_q8 * lever, 18), 1 << 26);
             square_q32[i] += (uint64_t)(left_q16 * left_q16);
             weight_q32[i] += (uint64_t)(own_q16 * own_q16);
         }
     }
     int64_t sure = 0;
+    int64_t steep_q12 = div_round(steep_q8 * 4096, trusted_q8 + 1);
+    int64_t unit_q22 =
+        div_round((int64_t)1 << 34, steep_q12 > STEEP_MIN_Q12 ? steep_q12 : STEEP_MIN_Q12);
     for (int i = 0; i < 3; i++) {
         int64_t sigma_q16 = with_standing_q16(square_q32[i], weight_q32[i], SLOT_PX_Q12);
         int64_t doubt_q16 = with_standing_q16(square_q32[i], weight_q32[i], sums->doubt_px_q12);
-        int64_t doubt_rad_q30 = ih_div_round(doubt_q16 * (1 << 22), e->root_q8[i]);
+        int64_t doubt_rad_q30 = div_round(doubt_q16 * unit_q22, e->root_q8[i]);
         int64_t part_rad_q30 = ih_abs_s32(out->turn_rad_q30[i]);
-        out->sigma_rad_q30[i] = ih_saturate_s32(ih_div_round(sigma_q16 * (1 << 22), e->root_q8[i]));
+        out->sigma_rad_q30[i] = ih_saturate_s32(div_round(sigma_q16 * unit_q22, e->root_q8[i]));
         sure += part_rad_q30 >= SURE * doubt_rad_q30 ? part_rad_q30 * part_rad_q30 : 0;
     }
     out->sure_rad_q30 = (int32_t)ih_isqrt_u64((uint64_t)sure);
@@ -375,7 +456,7 @@ static bool solve_with(const struct totals *sums, int64_t noise_px_q12, int64_t 
                        const int32_t from_rad_q30[3], struct equations *equations,
                        int32_t turn_rad_q30[3])
 {
-    int64_t root_q8 = ih_div_round(noise_px_q12 * (1 << 26), prior_rad_q30);
+    int64_t root_q8 = div_round(noise_px_q12 * (1 << 26), prior_rad_q30);
     scale(sums, root_q8 * root_q8, from_rad_q30, equations);
     if (equations->determinant_q30 < DETERMINANT_MIN_Q30) {
         return false;
@@ -384,34 +465,58 @@ static bool solve_with(const struct totals *sums, int64_t noise_px_q12, int64_t 
     return true;
 }
 
-/* The prior is wide at first, then as wide as the whole turn that was found with it. It is judged with the
- * wide one: a narrow one holds what no dot shows near 0, where it scatters little and may be all wrong.
- * False: an axis is not seen, or less certain than it may be. */
-static bool estimate(const struct ih_places *places, const struct ih_turn_slopes *slopes,
-                     const struct totals *sums, const int32_t turned_rad_q30[3],
-                     const int32_t offset_rad_q30[3], struct ih_places_turn *out)
+/* The prior is wide at first, then as wide as the whole turn that was found with it. False: an axis is not seen. */
+static bool solve_twice(const struct totals *sums, int64_t noise_px_q12,
+                        const int32_t from_rad_q30[3], struct equations *wide,
+                        int32_t turn_rad_q30[3])
 {
     const int32_t none[3] = {0, 0, 0};
     const int32_t limit[3] = {IH_TURN_MAX_RAD_Q30, IH_TURN_MAX_RAD_Q30, IH_TURN_MAX_RAD_Q30};
+    struct equations narrow;
+    bool is_solved = solve_with(sums, noise_px_q12, length_rad_q30(limit, none), from_rad_q30, wide,
+                                turn_rad_q30);
+    for (int i = 0; is_solved && i < 2; i++) {
+        int64_t prior_rad_q30 = length_rad_q30(from_rad_q30, turn_rad_q30);
+        prior_rad_q30 = prior_rad_q30 > PRIOR_MIN_RAD_Q30 ? prior_rad_q30 : PRIOR_MIN_RAD_Q30;
+        is_solved =
+            solve_with(sums, noise_px_q12, prior_rad_q30, from_rad_q30, &narrow, turn_rad_q30);
+    }
+    return is_solved;
+}
+
+/* held: the axis about which the turn is what offset says, or NULL. Judged with the wide prior: a narrow one holds
+ * what no dot shows near 0, where it scatters little and may be all wrong. False: an axis is not seen, or less
+ * certain than it may be. */
+static bool estimate(const struct ih_places *places, const struct ih_turn_slopes *slopes,
+                     int32_t doubt_px_q12, const int32_t turned_rad_q30[3], const int32_t *held_q30,
+                     const int32_t offset_rad_q30[3], struct ih_places_turn *out)
+{
     int64_t noise_q12 =
         (int64_t)ih_isqrt_u64((uint64_t)(places->square_q32 / places->weight_q8)) + 1;
-    int32_t from_rad_q30[3];
-    struct equations wide, narrow;
+    int32_t from_rad_q30[3], about_rad_q30[3];
+    struct equations wide;
+    struct totals sums = {.about_rad_q30 = NULL, .doubt_px_q12 = doubt_px_q12};
     for (int i = 0; i < 3; i++) {
         from_rad_q30[i] = turned_rad_q30[i] + offset_rad_q30[i];
     }
-    bool is_solved = solve_with(sums, noise_q12, length_rad_q30(limit, none), from_rad_q30, &wide,
-                                out->turn_rad_q30);
-    for (int i = 0; is_solved && i < 2; i++) {
-        int64_t prior_rad_q30 = length_rad_q30(from_rad_q30, out->turn_rad_q30);
-        prior_rad_q30 = prior_rad_q30 > PRIOR_MIN_RAD_Q30 ? prior_rad_q30 : PRIOR_MIN_RAD_Q30;
-        is_solved =
-            solve_with(sums, noise_q12, prior_rad_q30, from_rad_q30, &narrow, out->turn_rad_q30);
+    for (int pass = 0; pass < PASSES; pass++) {
+        add_up(places, slopes, &sums);
+        if (held_q30 != NULL) {
+            pin(places, slopes, held_q30, offset_rad_q30, &sums);
+        }
+        if (sums.slot_count < SLOTS_MIN ||
+            !solve_twice(&sums, noise_q12, from_rad_q30, &wide, out->turn_rad_q30)) {
+            return false;
+        }
+        for (int i = 0; i < 3 && pass < PASSES - 1; i++) {
+            about_rad_q30[i] = out->turn_rad_q30[i] + offset_rad_q30[i];
+        }
+        if (pass == 0) {
+            sums.half_q24 = HALF_SCATTERS * scatter_q24(places, slopes, &sums, about_rad_q30);
+        }
+        sums.about_rad_q30 = about_rad_q30;
     }
-    if (!is_solved) {
-        return false;
-    }
-    judge(places, slopes, &wide, sums, offset_rad_q30, out);
+    judge(places, slopes, &wide, &sums, offset_rad_q30, out);
     for (int i = 0; i < 3; i++) {
         out->turn_rad_q30[i] += offset_rad_q30[i];
     }
@@ -440,16 +545,10 @@ static bool find(const struct ih_places *places, const struct ih_rig *rig,
     const int32_t none[3] = {0, 0, 0};
     int32_t offset_rad_q30[3] = {0, 0, 0};
     int32_t axis_q30[2][2];
-    struct totals sums;
     if (places->weight_q8 < WEIGHT_MIN_Q8) {
         return false;
     }
-    add_up(places, slopes, &sums);
-    sums.doubt_px_q12 = doubt_px_q12;
-    if (sums.slot_count < SLOTS_MIN) {
-        return false;
-    }
-    out->is_weak_seen = estimate(places, slopes, &sums, turned_rad_q30, none, out);
+    out->is_weak_seen = estimate(places, slopes, doubt_px_q12, turned_rad_q30, NULL, none, out);
     if (out->is_weak_seen) {
         return true;
     }
@@ -457,8 +556,7 @@ static bool find(const struct ih_places *places, const struct ih_rig *rig,
     if (!is_weak_known) {
         ih_places_hold(rig, turned_rad_q30, offset_rad_q30);
     }
-    pin(places, slopes, axis_q30[1], offset_rad_q30, &sums);
-    return estimate(places, slopes, &sums, turned_rad_q30, offset_rad_q30, out);
+    return estimate(places, slopes, doubt_px_q12, turned_rad_q30, axis_q30[1], offset_rad_q30, out);
 }
 
 bool ih_places_find(const struct ih_places *places, const struct ih_rig *rig,
@@ -468,19 +566,20 @@ bool ih_places_find(const struct ih_places *places, const struct ih_rig *rig,
     return find(places, rig, slopes, turned_rad_q30, is_weak_known, DOUBT_PX_Q12, out);
 }
 
-/* The difference of two means has the weight w v / (w + v). Weights of 2^17, pulls of 2^30: 2^48. */
+/* The difference of two means has the weight w v / (w + v). Weights of 2^18, pulls of 2^30: 2^49. */
 static void subtract(const struct ih_place *late, const struct ih_place *all, struct ih_place *out)
 {
-    int32_t late_weight_q8, late_pull_q20, all_weight_q8, all_pull_q20;
-    sum_of(late, &late_weight_q8, &late_pull_q20);
-    sum_of(all, &all_weight_q8, &all_pull_q20);
-    *out = (struct ih_place){.along_px_q12 = ANYWHERE};
-    if (late_weight_q8 > 0 && all_weight_q8 > 0) {
-        int64_t both_q8 = (int64_t)late_weight_q8 + all_weight_q8;
-        int64_t pull_q28 =
-            (int64_t)late_pull_q20 * all_weight_q8 - (int64_t)all_pull_q20 * late_weight_q8;
-        out->weight_q8 = (int32_t)ih_div_round((int64_t)late_weight_q8 * all_weight_q8, both_q8);
-        out->pull_q20 = (int32_t)limited(ih_div_round(pull_q28, both_q8), PULL_MOST_Q20);
+    struct ih_place_sums of_late = sum_of(late);
+    struct ih_place_sums of_all = sum_of(all);
+    *out = (struct ih_place){.along_px_q12 = {ANYWHERE, ANYWHERE}};
+    if (of_late.weight_q8 > 0 && of_all.weight_q8 > 0) {
+        int64_t both_q8 = (int64_t)of_late.weight_q8 + of_all.weight_q8;
+        int64_t pull_q28 = (int64_t)of_late.pull_q20 * of_all.weight_q8 -
+                           (int64_t)of_all.pull_q20 * of_late.weight_q8;
+        out->at[IH_PLACES_KNOWN].weight_q8 =
+            (int32_t)div_round((int64_t)of_late.weight_q8 * of_all.weight_q8, both_q8);
+        out->at[IH_PLACES_KNOWN].pull_q20 =
+            (int32_t)limited(div_round(pull_q28, both_q8), PULL_MOST_Q20);
     }
 }
 
@@ -499,12 +598,6 @@ bool ih_places_change(const struct ih_places *late, const struct ih_places *all,
     return find(scratch, rig, slopes, none, true, CHANGE_PX_Q12, out);
 }
 
-static int32_t pulled(int32_t pull_q20, int32_t weight_q8, int64_t move_px_q12, int64_t share)
-{
-    int64_t left_q20 = pull_q20 - ih_shift_round(weight_q8 * move_px_q12 * share, 8);
-    return (int32_t)limited(left_q20, PULL_MOST_Q20);
-}
-
 void ih_places_turn(struct ih_places *places, const struct ih_turn_slopes *slopes,
                     const int32_t by_rad_q30[3])
 {
@@ -514,7 +607,7 @@ void ih_places_turn(struct ih_places *places, const struct ih_turn_slopes *slope
     int64_t share = share_q8(places);
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
         struct ih_place *place = &places->slot[slot];
-        if (place->weight_q8 == 0 && place->here_weight_q8 == 0) {
+        if (sum_of(place).weight_q8 == 0) {
             continue;
         }
         int64_t move = move_px_q12(slopes->px_q4[slot], by_rad_q30);
@@ -522,7 +615,10 @@ void ih_places_turn(struct ih_places *places, const struct ih_turn_slopes *slope
             ih_places_clear(places);
             return;
         }
-        place->pull_q20 = pulled(place->pull_q20, place->weight_q8, move, share);
-        place->here_pull_q20 = pulled(place->here_pull_q20, place->here_weight_q8, move, share);
+        for (int i = 0; i <= IH_PLACES_KNOWN; i++) {
+            struct ih_place_sums *sums = &place->at[i];
+            int64_t left_q20 = sums->pull_q20 - ih_shift_round(sums->weight_q8 * move * share, 8);
+            sums->pull_q20 = (int32_t)limited(left_q20, PULL_MOST_Q20);
+        }
     }
 }

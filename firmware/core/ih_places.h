@@ -10,8 +10,11 @@
  *        a turn across the baseline, mostly lie on walls, frames add nothing to the second part. So
  *        of each slot the frames of one place are taken together, as one distance with the weight
  *        n / (1 + n / 20) of n frames, the best linear estimate where a place errs by 0.22 of the noise.
- *        A dot that is IH_PLACES_MOVE away along its line is on a new place, in the image, where no turn of the
- *        rig moves it: where places began is known for as long as the frames on them are.
+ *        A dot that is IH_PLACES_MOVE away along its line is on another place, in the image, where no turn of the
+ *        rig moves it. A slot remembers two, so that a wall is the same again when whoever passes has gone: with one,
+ *        walls counted ten times in 1000 frames.
+ *        Most slots err by 0.02 px, on edges some by 0.1 px and more: solved three times more, each slot with
+ *        Cauchy's weight of what the turn before left of its mean, against how far slots scatter.
  *        Uncertainty: from what each slot's own distance leaves unexplained, with nothing assumed
  *        of how slots err but that they do so independently (the sandwich of White, 1980); so
  *        it counts rays that were calibrated badly, too. 0.03 px that no frame shows are added.
@@ -19,9 +22,10 @@
  *        with a prior as wide as the limit, so that what is only held is not taken for seen. If the
  *        turn across the baseline is less certain than IH_PLACES_SIGMA_MAX it is not estimated but held
  *        where it is known to be, else at the calibration's, and the others are estimated with that.
- * Cost:  adding, 361 slots; finding, three sums over them and 3x3 equations.
+ *        As weights fall where what is left grows, the turn moves by more than they say: 1 / (2 v - 1) for weights v.
+ * Cost:  adding, 361 slots; finding, a dozen sums over them and 3x3 equations.
  * Error: against float64 on the same frames (tools/oracle/knock.py): docs/numerics.md.
- * Memory: constant, 7 kB; IH_PLACES_FRAMES_MAX frames, then older ones count half.
+ * Memory: constant, 12 kB; IH_PLACES_FRAMES_MAX frames, then older ones count three quarters.
  */
 #ifndef IH_PLACES_H
 #define IH_PLACES_H
@@ -30,18 +34,23 @@
 #include "ih_turn.h"
 
 /* So far along its line a dot is on another place of the surface. */
-#define IH_PLACES_MOVE_PX_Q12 2458 /* 0.6 px */
+#define IH_PLACES_MOVE_PX_Q12 1229 /* 0.3 px */
 /* No axis may be less certain than this: 45 mm of depth at 800 mm with a baseline of 12.5 mm. */
 #define IH_PLACES_SIGMA_MAX_RAD_Q30 937004 /* 0.05 degrees */
-/* Sums are halved at so many frames. More know a rig that stays better, but notice one that is knocked later:
- * by 0.1 degrees about the camera's axis after 470 frames, 198 frames later with 240 and 336 with 480. */
-#define IH_PLACES_FRAMES_MAX 240
+/* Sums are made less by a quarter at so many frames: 30 s at 30 frames/s. More would pass 64 bits. */
+#define IH_PLACES_FRAMES_MAX 900
 
-/* Sums over a slot's labelled dots. Weights in Q8, weight times distance in Q20 px. */
+/* Over dots: weight, and weight times distance in px. */
+struct ih_place_sums {
+    int32_t weight_q8, pull_q20;
+};
+
+/* Of a slot's labelled dots: the two places with most frames, by where in the image the first dot on each was; and
+ * last those that were left for others, each with its weight. */
+#define IH_PLACES_KNOWN 2
 struct ih_place {
-    int32_t along_px_q12; /* in the image, of the first dot on the place where the dot is now */
-    int32_t here_weight_q8, here_pull_q20;
-    int32_t weight_q8, pull_q20; /* of the places before, each with its weight */
+    int32_t along_px_q12[IH_PLACES_KNOWN];
+    struct ih_place_sums at[IH_PLACES_KNOWN + 1];
 };
 
 struct ih_places {

@@ -213,7 +213,7 @@ static int32_t slots_that_left(void)
     int32_t count = 0;
 
     for (int slot = 0; slot < IH_SLOTS; slot++) {
-        count += places.slot[slot].weight_q8 > 0;
+        count += places.slot[slot].at[IH_PLACES_KNOWN].weight_q8 > 0;
     }
     return count;
 }
@@ -244,6 +244,45 @@ static void a_turn_moves_no_dot_to_another_place(void)
     TEST_ASSERT_GREATER_THAN_INT32(IH_SLOTS * 9 / 10, slots_that_left());
 }
 
+static void move_all(double by_px)
+{
+    for (int slot = 0; slot < IH_SLOTS; slot++) {
+        labels.t_px_q12[slot] += (int32_t)lround(4096 * by_px);
+    }
+}
+
+/* Away for some frames and back the dots are where they were; a third place takes that of the fewer frames. */
+static void a_wall_stays_known_while_an_arm_passes(void)
+{
+    for (int frame = 0; frame < 30; frame++) {
+        bool is_arm = frame % 10 >= 7;
+        move_all(is_arm ? 8 : 0);
+        add_frame(straight_deg);
+        move_all(is_arm ? -8 : 0);
+    }
+    TEST_ASSERT_EQUAL_INT32(0, slots_that_left());
+    move_all(20);
+    add_frame(straight_deg);
+    TEST_ASSERT_GREATER_THAN_INT32(IH_SLOTS * 9 / 10, slots_that_left());
+    for (int slot = 0; slot < IH_SLOTS; slot++) {
+        TEST_ASSERT_LESS_THAN_INT32(9 << 8, places.slot[slot].at[IH_PLACES_KNOWN].weight_q8);
+    }
+}
+
+/* Of every twelfth slot the dots lie 0.2 px off for good, as if the rig were turned about Y: by 0.025 degrees,
+ * were they trusted as much as the others; 0.007 are left. */
+static void slots_that_are_far_off_hardly_count(void)
+{
+    for (int slot = 0; slot < IH_SLOTS; slot += 12) {
+        standing_px[slot] = slope_px(slot, 1) > 0 ? 0.2 : -0.2;
+    }
+    for (int frame = 0; frame < 100; frame++) {
+        add_frame(straight_deg);
+    }
+    find(straight, false);
+    IH_TEST_WITHIN(0.01, 0, deg_of(found.turn_rad_q30[1]), "turn", 1);
+}
+
 /* Beyond a pixel nothing is kept. */
 static void a_great_turn_starts_anew(void)
 {
@@ -256,7 +295,7 @@ static void a_great_turn_starts_anew(void)
     TEST_ASSERT_FALSE(ih_places_find(&places, &rig, &slopes, turn_rad_q30, true, &found));
 }
 
-static void frames_of_long_ago_count_half(void)
+static void frames_of_long_ago_count_less(void)
 {
     const double turn_deg[3] = {0.01, 0.02, 0.01};
     struct ih_places_turn before;
@@ -270,7 +309,7 @@ static void frames_of_long_ago_count_half(void)
     find(straight, false);
     before = found;
     ih_places_forget(&places);
-    TEST_ASSERT_EQUAL_INT32(IH_PLACES_FRAMES_MAX / 2, places.frame_count);
+    TEST_ASSERT_EQUAL_INT32(IH_PLACES_FRAMES_MAX * 3 / 4, places.frame_count);
     find(straight, false);
     for (int axis = 0; axis < 3; axis++) {
         IH_TEST_WITHIN(1e-3, deg_of(before.turn_rad_q30[axis]), deg_of(found.turn_rad_q30[axis]),
@@ -381,8 +420,10 @@ int main(void)
     RUN_TEST(what_is_not_seen_is_held);
     RUN_TEST(a_turn_that_is_taken_leaves_nothing);
     RUN_TEST(a_turn_moves_no_dot_to_another_place);
+    RUN_TEST(a_wall_stays_known_while_an_arm_passes);
+    RUN_TEST(slots_that_are_far_off_hardly_count);
     RUN_TEST(a_great_turn_starts_anew);
-    RUN_TEST(frames_of_long_ago_count_half);
+    RUN_TEST(frames_of_long_ago_count_less);
     RUN_TEST(a_straight_rig_is_not_surely_turned);
     RUN_TEST(a_change_is_found_and_chance_is_none);
     RUN_TEST(what_is_sure_is_told_apart);

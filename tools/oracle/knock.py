@@ -21,8 +21,14 @@ import numpy as np
 REACH_PX = 0.3
 WEIGHT_MIN = 1 / 512  # half a step of the core's: a dot with less is none, and begins no place
 STEPS_OF_PX = 4096  # of the core's figures
-MOVE_PX = 2458 / STEPS_OF_PX  # along its line: another place
+MOVE_PX = 1229 / STEPS_OF_PX  # along its line: another place
+PLACES = 2  # that a slot remembers
 FRAMES_OF_PLACE = 20  # most that frames on one place count
+SHARE_MIN = 1 / 3  # by which the dots' mean moves as they do
+HALF_SCATTERS, HALF_OF_ONE_PX = 3, 0.3  # at sqrt(3 s^2 + 0.3^2 / n) from what the turn says a slot counts half
+LEFT_MOST_PX = 1
+STEEP_MIN = 1 / 3
+PASSES = 4  # the core's solutions
 MANY_FRAMES = 5  # that show the error of a place
 SLOT_PX = 0.03
 SLOTS = 361
@@ -137,43 +143,71 @@ def weight_of(distance):
     return np.clip(1 - (distance / REACH_PX)**2, 0, None)**2
 
 
+def rise_of(distance):
+    """Derivative of weight times distance."""
+    ratio = np.minimum((distance / REACH_PX)**2, 1)
+    return (1 - ratio) * (1 - 5 * ratio)
+
+
 def places(rig, rows):
-    """Number of the place of each dot: a slot's frames one after the other, until it is MOVE_PX away from where it began."""
+    """Number of the place of each dot: within MOVE_PX of where one began. A slot remembers two; a dot elsewhere begins one
+    instead of the lighter."""
     distance, along = distances(rig, rows)
-    out, now, begun = np.full(len(rows), -1), np.full(SLOTS, -1), np.zeros(SLOTS)
-    count, counts = 0, weight_of(distance) >= WEIGHT_MIN
+    weight, out, count = weight_of(distance), np.full(len(rows), -1), 0
+    known = [[[None, 0.0, -1] for _ in range(PLACES)] for _ in range(SLOTS)]
     for i, slot in enumerate(rows[:, 1].astype(int)):
-        if not counts[i]:
+        if weight[i] < WEIGHT_MIN:
             continue
-        if now[slot] < 0 or abs(along[i] - begun[slot]) > MOVE_PX:
-            now[slot], begun[slot], count = count, along[i], count + 1
-        out[i] = now[slot]
+        place = next((p for p in known[slot] if p[0] is not None and abs(along[i] - p[0]) <= MOVE_PX), None)
+        if place is None:
+            place = min(known[slot], key=lambda p: p[1])
+            place[:], count = [along[i], 0.0, count], count + 1
+        place[1] += weight[i]
+        out[i] = place[2]
     return out, count
 
 
+class Trust:
+    """Cauchy's weights of slots by how far their means are from what a turn says, where the first one leaves scatter."""
+
+    def __init__(self):
+        self.scatter = None
+        self.weight = 1.0
+
+    def look(self, weight, mean):
+        some = np.maximum(weight, 1e-9)
+        square = np.minimum(np.abs(mean), LEFT_MOST_PX)**2
+        if self.scatter is None:
+            self.scatter = (weight * square).sum() / weight.sum()
+        self.weight = 1 / (1 + square / (HALF_SCATTERS * self.scatter + HALF_OF_ONE_PX**2 / some))
+
+    def steepness(self, weight):
+        """What is left of the trusted weights when means move, as trust falls with them."""
+        return max((weight * self.weight * (2 * self.weight - 1)).sum() / (weight * self.weight).sum(), STEEP_MIN)
+
+
 def fit(rig, rows, turn):
-    """The turn that fits the dots best, from this one on, and its uncertainty."""
-    slots, turn = rows[:, 1].astype(int), np.array(turn, float)
+    """The turn that fits the dots best, from this one on, and its uncertainty: least squares first, then with trust."""
+    slots, turn, trust = rows[:, 1].astype(int), np.array(turn, float), Trust()
     number, count = places(rig.turned(turn), rows)
     number = np.where(number < 0, count, number)
-    for _ in range(50):
+    for i in range(60):
         now = rig.turned(turn)
         slope = now.lines()[2]
         distance, _ = distances(now, rows)
         weight = weight_of(distance)
-        frames = np.bincount(number, weight, count + 1)
-        weight = weight / (1 + frames / FRAMES_OF_PLACE)[number]
+        # The mean moves by less than all dots do, as their weights move, too.
+        share = max(rise_of(distance).sum() / weight.sum(), SHARE_MIN)
+        weight = weight / (1 + np.bincount(number, weight, count + 1) / FRAMES_OF_PLACE)[number]
         sums = np.bincount(slots, weight, SLOTS)
-        inverse = np.linalg.inv((slope * sums[:, None]).T @ slope)
-        pull = np.bincount(slots, weight * distance, SLOTS)
-        turn = turn + inverse @ slope.T @ pull
+        pull = np.bincount(slots, weight * distance, SLOTS) / share
+        if i >= 20:
+            trust.look(sums, pull / np.maximum(sums, 1e-9))
+        inverse = np.linalg.inv((slope * (trust.weight * sums)[:, None]).T @ slope)
+        turn = turn + inverse @ slope.T @ (trust.weight * pull)
     lever = slope @ inverse
-    # The mean moves by less than all dots do, as their weights move, too.
-    near = np.abs(distance) < REACH_PX
-    ratio = (distance[near] / REACH_PX)**2
-    pull = pull * ((1 - ratio)**2).sum() / ((1 - ratio) * (1 - 5 * ratio)).sum()
-    sigma = np.sqrt((lever**2 * (pull**2 + (SLOT_PX * sums)**2)[:, None]).sum(axis=0))
-    return turn, sigma
+    sigma = np.sqrt((lever**2 * (trust.weight**2 * (pull**2 + (SLOT_PX * sums)**2))[:, None]).sum(axis=0))
+    return turn, sigma / trust.steepness(sums)
 
 
 def estimate(folder, host_sim, work, start, frames):
@@ -185,41 +219,45 @@ def estimate(folder, host_sim, work, start, frames):
 
 
 class Sums:
-    """What the core keeps of each slot (struct ih_place), in float64."""
+    """What the core keeps of each slot (struct ih_place), in float64: weight and pull of the places that it remembers, and of
+    those before."""
 
     def __init__(self):
-        self.weight, self.pull, self.here_weight, self.here_pull = np.zeros((4, SLOTS))
-        self.begun = np.full(SLOTS, np.nan)
+        self.at, self.before = np.zeros((PLACES, 2, SLOTS)), np.zeros((2, SLOTS))
+        self.begun = np.full((PLACES, SLOTS), np.nan)
         self.total = self.rise = 0.0
 
-    def of_place(self):
-        share = FRAMES_OF_PLACE / (self.here_weight + FRAMES_OF_PLACE)
-        return self.here_weight * share, self.here_pull * share
+    def scaled(self):
+        return self.at * FRAMES_OF_PLACE / (self.at[:, :1] + FRAMES_OF_PLACE)
 
     def add_frame(self, slots, distance, along):
-        weight, ratio = weight_of(distance), (distance / REACH_PX)**2
-        self.total, self.rise = self.total + weight.sum(), self.rise + ((1 - ratio) * (1 - 5 * ratio)).sum()
-        left = slots[np.abs(along - self.begun[slots]) > MOVE_PX]
-        place_weight, place_pull = self.of_place()
-        self.weight[left] += place_weight[left]
-        self.pull[left] += place_pull[left]
-        self.here_weight[left] = self.here_pull[left] = 0
-        self.begun[left] = np.nan
-        self.begun[slots] = np.where(np.isnan(self.begun[slots]), along, self.begun[slots])
-        self.here_weight[slots] += weight
-        self.here_pull[slots] += weight * distance
+        is_there = np.abs(along - self.begun[:, slots]) <= MOVE_PX
+        new = ~is_there.any(axis=0)
+        which = np.where(new, self.at[:, 0, slots].argmin(axis=0), is_there.argmax(axis=0))
+        left, lighter = slots[new], which[new]
+        self.before[:, left] += self.scaled()[lighter, :, left].T
+        self.at[lighter, :, left] = 0
+        self.begun[lighter, left] = along[new]
+        weight = weight_of(distance)
+        self.at[which, :, slots] += np.stack([weight, weight * distance], 1)
+        self.total, self.rise = self.total + weight.sum(), self.rise + rise_of(distance).sum()
 
     def share(self):
-        return max(self.rise / self.total, 1 / 3)
+        return max(self.rise / self.total, SHARE_MIN)
 
     def step(self, slope):
-        place_weight, place_pull = self.of_place()
-        sums = self.weight + place_weight
-        return np.linalg.solve((slope * sums[:, None]).T @ slope, slope.T @ (self.pull + place_pull)) / self.share()
+        weight, pull = self.before + self.scaled().sum(axis=0)
+        mean, trust, turn = pull / np.maximum(weight, 1e-9) / self.share(), Trust(), None
+        for _ in range(PASSES):
+            if turn is not None:
+                trust.look(weight, mean - slope @ turn)
+            trusted = trust.weight * weight
+            turn = np.linalg.solve((slope * trusted[:, None]).T @ slope, slope.T @ (trusted * mean))
+        return turn
 
     def turn(self, move):
-        self.pull -= self.share() * self.weight * move
-        self.here_pull -= self.share() * self.here_weight * move
+        self.before[1] -= self.share() * self.before[0] * move
+        self.at[:, 1] -= self.share() * self.at[:, 0] * move
 
 
 def follow(folder, host_sim, work, turns):
