@@ -24,7 +24,7 @@
 /* Beyond this distance known places are of no use for a turned rig. */
 #define TURN_MOST_PX_Q12 4096
 #define PIN_MOST_PX_Q12 8192
-#define PULL_MOST_Q20 (1 << 30)
+#define PULL_MOST_Q20 (1 << 28)
 /* A slot whose mean is so far from what the turn says counts half: sqrt(3 s^2 + 0.3^2 / n) px with n frames, where
  * slots scatter by s. Means are limited, too. */
 #define HALF_SCATTERS 3
@@ -234,7 +234,7 @@ static int64_t mean_left_q12(const struct ih_place_sums *sum, const struct total
 }
 
 /* Everything known of a slot, as far as it is trusted: of what the turn leaves of its mean, Cauchy's weight
- * 1 / (1 + (r / h)^2). Pulls of 2^30 times h of 2^28.6, or 1229^2 in Q8: 2^58.6. */
+ * 1 / (1 + (r / h)^2). Pulls of 2^28.4 times h of 2^28.6, or 1229^2 in Q8: 2^57. */
 static struct ih_place_sums trusted_sum_of(const struct ih_place *place,
                                            const int32_t slope_px_q4[3],
                                            const struct totals *totals)
@@ -266,8 +266,8 @@ static int64_t scatter_q24(const struct ih_places *places, const struct ih_turn_
     return div_round(square_q32, weight_q8);
 }
 
-/* Weights of a slot are at most 2^17.9, slopes 2^18, slots 2^8.5: 2^62.4; of the right side, with pulls of 2^30,
- * 2^56.5. */
+/* Weights of a slot are at most 2^17.9, slopes 2^18, slots 2^8.5: 2^62.4; of the right side, with pulls of 2^28.4,
+ * 2^54.9, and 2^62.9 on its way through whole. */
 static void add_up(const struct ih_places *places, const struct ih_turn_slopes *slopes,
                    struct totals *out)
 {
@@ -407,7 +407,7 @@ static int64_t steepness_q8(int64_t weight_q8, int64_t trusted_q8)
     return weight_q8 > 0 ? div_round(2 * trusted_q8 * trusted_q8, weight_q8) - trusted_q8 : 0;
 }
 
-/* What slots leave unexplained is held below 2^30, times a lever of 2^32: 2^62. Squares of 2^26 add up to 2^60.5.
+/* What slots leave unexplained is held below 2^28, times a lever of 2^32: 2^60. Squares of 2^26 add up to 2^60.5.
  * Weights of 2^17.9 and slots in Q12: 2^38.4. */
 static void judge(const struct ih_places *places, const struct ih_turn_slopes *slopes,
                   const struct equations *e, const struct totals *sums,
@@ -566,7 +566,7 @@ bool ih_places_find(const struct ih_places *places, const struct ih_rig *rig,
     return find(places, rig, slopes, turned_rad_q30, is_weak_known, DOUBT_PX_Q12, out);
 }
 
-/* The difference of two means has the weight w v / (w + v). Weights of 2^18, pulls of 2^30: 2^49. */
+/* The difference of two means has the weight w v / (w + v). Weights of 2^18, pulls of 2^28.4: 2^47.4. */
 static void subtract(const struct ih_place *late, const struct ih_place *all, struct ih_place *out)
 {
     struct ih_place_sums of_late = sum_of(late);
