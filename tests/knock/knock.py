@@ -7,9 +7,9 @@ Per rig and seed ordinary frames, the projector turned about another axis each: 
 told. What is found is compared with the turn in the truth, by what the core says that it does not know, and with the
 float64 reference (tools/oracle/knock.py) on the same frames: with one that goes the core's way, step by step, and with the least
 squares to which that way leads. Those it has not come to after 50 frames, most of which have the labels and weights of a
-turn from 4 frames: 0.5 times its uncertainty off was seen, 1 is allowed; from 250 frames on 0.16 and 0.2. The bound on what
+turn from 4 frames: 0.06 times its uncertainty off was seen, 0.3 is allowed; from 250 frames on 0.14 and 0.2. The bound on what
 can be known is printed. Depth errors on the same frames: with the true turn, without any correction, with the one found; the
-last is at most 5 times the first; with four seeds and 250 frames or more 1.3 times in the median. A rig that fits stays as it
+last is at most 5 times the first; with four seeds and 250 frames or more at most 1.3 times, with all rigs. A rig that fits stays as it
 is; knocked by 0.3, 0.2 or 0.1 degrees after a long peace it is told within as many frames as at the start. Prints TAP; exit
 status 1 when a case fails.
 """
@@ -27,21 +27,21 @@ sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."
 import knock as oracle
 
 SEED = 4202
-SEEDS_OF_MEDIAN = 4
+SEEDS_OF_ALL = 4
 FOUND_FRAMES = 50
-FRAMES_OF_MEDIAN = 250
+FRAMES_OF_ALL = 250
 KNOCK_DEG = 0.3
 PEACE_FRAMES = 473  # steady ones; the knock is inside of a look
 PEACE_KNOCKS_DEG = (0.3, 0.2, 0.1)
 PEACE_SEEDS = 3
 LATE_FRAMES = 65  # told within 50, then refined
-RATIO_MEDIAN, RATIO_MOST = 1.3, 5.0
+RATIO_OF_ALL, RATIO_MOST = 1.3, 5.0
 # Along the baseline (X) and about the camera's axis (Z) a turn moves dots across their lines; about Y hardly.
 ERROR_DEG = (0.002, 0.04, 0.01)
 ERROR_SIGMAS = 4
 STEPS_SIGMAS, STEPS_DEG = 0.05, 0.0001
 REFERENCE_SIGMAS, REFERENCE_DEG, REFERENCE_FRAMES = 0.2, 0.0005, 250
-REFERENCE_SIGMAS_SOON = 1.0
+REFERENCE_SIGMAS_SOON = 0.3
 FITS, TURNED = 1, 2
 
 number = failed = 0
@@ -178,10 +178,10 @@ def main():
                None if not found.any() and lines[-1]["state"] == FITS else "turned by %s" % np.degrees(found))
         for seed in range(SEED, SEED + min(options.seeds, PEACE_SEEDS)):
             after_peace(options, kind, seed)
-    middle = statistics.median(ratios)
-    is_judged = options.seeds >= SEEDS_OF_MEDIAN and options.frames >= FRAMES_OF_MEDIAN
-    result("depth errors are %s times those of a rig that fits" % ", ".join("%.2f" % r for r in ratios),
-           "median %.2f, expected at most %.1f" % (middle, RATIO_MEDIAN) if is_judged and middle > RATIO_MEDIAN else None)
+    is_judged = options.seeds >= SEEDS_OF_ALL and options.frames >= FRAMES_OF_ALL
+    result("depth errors are %s times those of a rig that fits, %.2f in the median" %
+           (", ".join("%.2f" % r for r in ratios), statistics.median(ratios)),
+           "expected at most %.1f" % RATIO_OF_ALL if is_judged and max(ratios) > RATIO_OF_ALL else None)
     print("1..%d" % number)
     return 1 if failed else 0
 
