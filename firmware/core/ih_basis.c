@@ -293,7 +293,8 @@ sum_lines(const int32_t *coefficient, const int32_t *const *line_q20, int32_t li
 {
     __m256i even[LINE_VECTORS], odd[LINE_VECTORS];
     for (int32_t v = 0; v < vectors; v++) {
-        even[v] = odd[v] = _mm256_setzero_si256();
+        even[v] = _mm256_setzero_si256();
+        odd[v] = _mm256_setzero_si256();
     }
     for (int32_t k = 0; k < line_count; k++) {
         const int32_t *basis_q20 = &line_q20[k][x];

@@ -11,7 +11,6 @@
 
 #define TERMS_MAX IH_SURFACE_TERMS_MAX
 #define CENTRES_MAX IH_SURFACE_CENTRES_MAX
-#define HALF_CENTRES_MAX IH_SURFACE_HALF_CENTRES_MAX
 
 /* Short rows: the basis scaled column by column to IH_NORMAL_MOST, less one step that rounding and the roots'
  * errors may add. The scale in Q17 is below 2^31, as no bound is below 1. */
@@ -217,13 +216,13 @@ static bool set_norms(struct ih_surface_scratch *scratch, const struct ih_sample
 }
 
 /* The samples' least and greatest places along x and y. */
-struct box {
+struct ends {
     int32_t end_q16[2][2];
 };
 
-static struct box box_of(const struct ih_samples *samples)
+static struct ends box_of(const struct ih_samples *samples)
 {
-    struct box box = {{{INT32_MAX, INT32_MIN}, {INT32_MAX, INT32_MIN}}};
+    struct ends box = {{{INT32_MAX, INT32_MIN}, {INT32_MAX, INT32_MIN}}};
     for (int32_t i = 0; i < samples->sample_count; i++) {
         const struct ih_sample *sample = &samples->sample[i];
         box.end_q16[0][0] = ih_min_s32(box.end_q16[0][0], sample->x_q16);
@@ -239,9 +238,10 @@ static struct box box_of(const struct ih_samples *samples)
  * 2^28, with what was rounded, so that in that unit all are below 2^31. */
 static void set_row_scale(struct ih_surface_scratch *scratch, const struct ih_samples *samples)
 {
-    uint32_t far_q18[2][CENTRES_MAX] = {{0}, {0}};
+    uint32_t far_q18[2][CENTRES_MAX];
     uint32_t ratio = 0;
-    struct box box = box_of(samples);
+    struct ends box = box_of(samples);
+    memset(far_q18, 0, sizeof far_q18);
     for (int end = 0; end < 2; end++) {
         for (int axis = 0; axis < 2; axis++) {
             uint32_t square_q18[CENTRES_MAX] = {0};
@@ -331,7 +331,8 @@ static int32_t push_of(int64_t off, int64_t weight)
 static void add_right(struct ih_surface_scratch *scratch, const uint32_t *row_q20, int64_t off,
                       int64_t weight)
 {
-    const int32_t push[IH_BASIS_ROWS] = {push_of(off, weight)};
+    int32_t push[IH_BASIS_ROWS] = {0};
+    push[0] = push_of(off, weight);
     ih_basis_add(row_q20, 1, push, scratch->right, scratch->terms);
 }
 
@@ -836,12 +837,12 @@ static void sum_row(const struct ih_surface_scratch *scratch, const int32_t *bet
 }
 
 /* How sums become depths: sum_n c_n B_n in Q8 is 2^-shift of one. */
-struct way {
+struct depth_way {
     int shift;
     int32_t mean_mm_q8, least_mm_q8, most_mm_q8;
 };
 
-static inline int32_t depth_of_sum(const struct way *way, int64_t sum)
+static inline int32_t depth_of_sum(const struct depth_way *way, int64_t sum)
 {
     const int64_t depth_q8 = way->shift > 0 ? ih_shift_round(sum, way->shift) : INT32_MAX;
     return ih_clamp_s32(ih_saturate_s32(way->mean_mm_q8 + depth_q8), way->least_mm_q8,
@@ -854,7 +855,7 @@ static inline int32_t depth_of_sum(const struct way *way, int64_t sum)
 _Static_assert(IH_SURFACE_HALF % 8 == 0, "vectors of eight nodes");
 
 /* Four sums, so much behind the least depth that they are never negative: Q8, limited. */
-static inline __m256i limited(const struct way *way, __m256i sum)
+static inline __m256i limited(const struct depth_way *way, __m256i sum)
 {
     const int64_t half = (int64_t)1 << (way->shift - 1);
     const int64_t unit = (int64_t)1 << way->shift;
@@ -869,7 +870,8 @@ static inline __m256i limited(const struct way *way, __m256i sum)
 }
 
 /* Eight nodes, in an order. */
-static inline __m256i depths_of(const struct way *way, __m256i first, __m256i last, __m256i order)
+static inline __m256i depths_of(const struct depth_way *way, __m256i first, __m256i last,
+                                __m256i order)
 {
     const __m256i both =
         _mm256_or_si256(limited(way, first), _mm256_slli_epi64(limited(way, last), 32));
@@ -878,7 +880,8 @@ static inline __m256i depths_of(const struct way *way, __m256i first, __m256i la
 }
 
 /* The same as below. */
-static int32_t set_depths_of_vectors(const struct way *way, const int64_t even[IH_SURFACE_HALF],
+static int32_t set_depths_of_vectors(const struct depth_way *way,
+                                     const int64_t even[IH_SURFACE_HALF],
                                      const int64_t odd[IH_SURFACE_HALF], int32_t *depth_mm_q8)
 {
     const __m256i forward = _mm256_setr_epi32(0, 2, 4, 6, 1, 3, 5, 7);
@@ -907,7 +910,7 @@ static int32_t set_depths_of_vectors(const struct way *way, const int64_t even[I
 #endif
 
 /* A row of nodes from both halves' sums. Returns the nearest one. */
-static int32_t set_depths(const struct way *way, const int64_t even[IH_SURFACE_HALF],
+static int32_t set_depths(const struct depth_way *way, const int64_t even[IH_SURFACE_HALF],
                           const int64_t odd[IH_SURFACE_HALF], int32_t *depth_mm_q8)
 {
 #ifdef SHIFT_MOST
@@ -916,11 +919,11 @@ static int32_t set_depths(const struct way *way, const int64_t even[IH_SURFACE_H
     }
 #endif
     int32_t nearest_q8 = INT32_MAX;
-    for (int32_t x = 0; x < IH_SURFACE_GRID; x++) {
+    for (int32_t x = 0; x < IH_SURFACE_HALF; x++) {
         const int32_t mirrored = IH_SURFACE_GRID - 1 - x;
-        const int64_t sum = x < mirrored ? even[x] + odd[x] : even[mirrored] - odd[mirrored];
-        depth_mm_q8[x] = depth_of_sum(way, sum);
-        nearest_q8 = ih_min_s32(nearest_q8, depth_mm_q8[x]);
+        depth_mm_q8[x] = depth_of_sum(way, even[x] + odd[x]);
+        depth_mm_q8[mirrored] = depth_of_sum(way, even[x] - odd[x]);
+        nearest_q8 = ih_min_s32(nearest_q8, ih_min_s32(depth_mm_q8[x], depth_mm_q8[mirrored]));
     }
     return nearest_q8;
 }
@@ -928,7 +931,7 @@ static int32_t set_depths(const struct way *way, const int64_t even[IH_SURFACE_H
 static void evaluate(const struct ih_samples *samples, struct ih_surface_scratch *scratch,
                      struct ih_surface *out)
 {
-    const struct way way = {
+    const struct depth_way way = {
         .shift = ih_min_s32(20 + scratch->coefficient_shift - 7, 62), /* sums are twice as great */
         .mean_mm_q8 = out->mean_mm_q8,
         .least_mm_q8 = least_depth_mm_q8(samples),
