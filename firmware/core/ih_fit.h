@@ -30,7 +30,7 @@
  *        Against the truth in these scenes, starts 35 mm off: at most 5 mm for a mean head, 10 for
  *        one a tenth larger in every direction. A fifth of all dots anywhere between 0.5 and 2.5 m:
  *        17 mm (median of 30 fits; worst 56), because wrong dots behind the head push.
- * Cost:  steps x (ih_row, one Cholesky of 6). 0.23 million instructions a fit of six steps with 320 points
+ * Cost:  steps x (ih_row, one Cholesky of 6). 0.12 million instructions a fit of six steps with 320 points
  *        (x86-64-v3, gcc -O3, frames of both sequences).
  */
 #ifndef IH_FIT_H

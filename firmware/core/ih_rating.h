@@ -22,7 +22,8 @@
  * Overflow: lanes have 16 bits. e is cut at 2.75 in Q11: then e.g is below 3.9, t below 1.95, and radius2 of
  *        what is cut above 3.7. Sums of 361 values of at most 64: 23104.
  * Cost:  56 instructions for 16 rays of a box of 150, 22 more for those in columns of the head, and 400 for
- *        the box, the place and the sums: 1100 (x86-64-v3). Without vectors a ray is left as soon as it does not count.
+ *        the box, the place and the sums: 1100 (x86-64-v3). Without vectors a ray is left as soon as it does
+ *        not count.
  */
 #ifndef IH_RATING_H
 #define IH_RATING_H

@@ -21,7 +21,7 @@
  * Error: a rating is what float64 says but for rays nearer to a limit than 16 bits tell (ih_rating.h),
  *        which may be counted either way: 0.1 on the average if all of them were. Centres within 0.003 mm
  *        for slopes up to 1/2.
- * Cost:  a rating for half of the points. 0.27 million instructions for 320 points (x86-64-v3, gcc -O3,
+ * Cost:  a rating for half of the points. 0.24 million instructions for 320 points (x86-64-v3, gcc -O3,
  *        frames of both sequences).
  */
 #ifndef IH_SCAN_H
