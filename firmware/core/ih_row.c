@@ -17,7 +17,7 @@
 
 #define ONE_Q14 (1 << 14)
 #define ONE_Q16 (1 << 16)
-/* Points farther than this many robust scales weigh less than 1/4000 and are passed over. */
+/* Points farther than this many robust scales weigh less than 1/676 and are passed over. */
 #define ROBUST_REACH 5
 /* Places nearer to the centre than this have no direction. */
 #define RADIUS_LEAST2_Q22 10481 /* 0.05 squared */
@@ -444,6 +444,9 @@ static void add_row(struct ih_rows *rows, struct ih_row_system *system,
         flush_rows(rows, system);
     }
 }
+
+/* The root's table is looked up at a sum of Q16 shifted by 10 bits at the least, which must fit 32. */
+_Static_assert(ROBUST_REACH * ROBUST_REACH + 1 < 64, "a sum of a robust weight is below 2^22");
 
 /* (1 + (r / k)^2)^-2, rounded; 0 where that is next to nothing. One over the sum is the square of one over its
  * root, from the table, and what that is short by to first order: 2^-25 of it. */
