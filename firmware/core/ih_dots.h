@@ -34,7 +34,7 @@
 #include "ih_config.h"
 #include "ih_noise.h"
 
-/* Most dots kept per frame. Each costs 12 bytes here and 10 in ih_labels. */
+/* Most dots kept per frame. Each costs 12 bytes here and 12 in ih_labels. */
 #ifndef IH_DOTS_MAX
 #define IH_DOTS_MAX 1024
 #endif

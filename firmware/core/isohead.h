@@ -9,7 +9,8 @@
  *
  * The frame is a camera frame for a dot rig, a depth image for a range rig. Integer arithmetic
  * only; the same frame gives the same bytes on every processor. Not thread-safe per struct; two
- * structs are independent.
+ * structs are independent. Rows in it begin where vectors do: who takes memory for it from a heap
+ * asks for _Alignof(struct isohead), 32, which is more than malloc gives.
  *
  * Method: M. Clabian, H. Roetzer, H. Bischof, W. G. Kropatsch, "Head detection and localization
  * from sparse 3D data", DAGM 2002. Each stage's header names its section.
