@@ -446,7 +446,10 @@ static void add_row(struct ih_rows *rows, struct ih_row_system *system,
 }
 
 /* The root's table is looked up at a sum of Q16 shifted by 10 bits at the least, which must fit 32. */
-_Static_assert(ROBUST_REACH * ROBUST_REACH + 1 < 64, "a sum of a robust weight is below 2^22");
+_Static_assert(1 + ROBUST_REACH * ROBUST_REACH < 64, "a sum of a robust weight is below 2^22");
+/* And with the greatest scale, 24 mm, vectors divide a square and what rounds it by a product. */
+_Static_assert((ROBUST_REACH * 24 << 8) * (ROBUST_REACH * 24 << 8) + 24 * 24 / 2 < 1 << 30,
+               "a quotient's dividend is below 2^30");
 
 /* (1 + (r / k)^2)^-2, rounded; 0 where that is next to nothing. One over the sum is the square of one over its
  * root, from the table, and what that is short by to first order: 2^-25 of it. */
