@@ -269,18 +269,18 @@ static void judge(const struct ih_dots_scratch *scratch, struct ih_dots *out,
     insert_dot(out, dot);
 }
 
-/* What no threshold of row v is below; it changes from block to block. Nothing behind the frame is
- * above. */
-static void lay_least(struct ih_dots_scratch *scratch, int32_t v)
+/* What no threshold of row v is below, and what none is above; they change from block to block. Nothing
+ * behind the frame is above. */
+static void lay_limits(struct ih_dots_scratch *scratch, int32_t v)
 {
     int16_t *least = scratch->rows.finding.least;
     int32_t u = 0;
-    while (u < scratch->width) {
-        const int32_t end = ih_min_s32((u + IH_NOISE_BLOCK / 2) / IH_NOISE_BLOCK * IH_NOISE_BLOCK +
-                                           IH_NOISE_BLOCK / 2,
-                                       scratch->width);
+    for (int32_t block = 0; u < scratch->width; block++) {
+        const int32_t end = ih_min_s32(block * IH_NOISE_BLOCK + IH_NOISE_BLOCK / 2, scratch->width);
         const int32_t threshold =
             threshold_of(&scratch->params, ih_noise_least(&scratch->noise, u, v));
+        scratch->rows.finding.most[block] =
+            threshold_of(&scratch->params, ih_noise_most(&scratch->noise, u, v));
         for (; u < end; u++) {
             least[u] = (int16_t)ih_clamp_s32(threshold, INT16_MIN, INT16_MAX);
         }
@@ -288,6 +288,14 @@ static void lay_least(struct ih_dots_scratch *scratch, int32_t v)
     for (; u < IH_FRAME_WIDTH_MAX; u++) {
         least[u] = INT16_MAX;
     }
+}
+
+/* Is R above the threshold of its place? Most often its neighbourhood tells. */
+static bool is_above_threshold(const struct ih_dots_scratch *scratch, int32_t response, int32_t u,
+                               int32_t v)
+{
+    return response > scratch->rows.finding.most[(u + IH_NOISE_BLOCK / 2) / IH_NOISE_BLOCK] ||
+           response > threshold_of(&scratch->params, ih_noise_at(&scratch->noise, u, v));
 }
 
 #if IH_LANES && !IH_WORDS
@@ -436,7 +444,7 @@ static void find_dots(struct ih_dots_scratch *scratch, struct ih_dots *out, int3
     struct marked marked;
     struct near near;
     if (v % IH_NOISE_BLOCK == IH_NOISE_BLOCK / 2 || v == 0) {
-        lay_least(scratch, v);
+        lay_limits(scratch, v);
     }
     mark_row(scratch, v, &marked);
     if (marked.count == 0) {
@@ -446,7 +454,7 @@ static void find_dots(struct ih_dots_scratch *scratch, struct ih_dots *out, int3
     for (int32_t i = 0; i < marked.count; i++) {
         for (uint32_t maxima = marked.maxima[i]; maxima != 0; maxima &= maxima - 1) {
             const int32_t u = marked.first[i] + __builtin_ctz(maxima);
-            if (response[u] > threshold_of(&scratch->params, ih_noise_at(&scratch->noise, u, v))) {
+            if (is_above_threshold(scratch, response[u], u, v)) {
                 judge(scratch, out, &near, u, v);
             }
         }

@@ -47,6 +47,7 @@
 #define IH_DOTS_ROWS (2 * IH_DOTS_REACH + 1)
 /* Zeros to the left of a row of R and to its right: IH_DOTS_REACH or more, so that rows are aligned. */
 #define IH_DOTS_SIDE (IH_ALIGNMENT / 2)
+#define IH_DOTS_ROW_SIZE (IH_FRAME_WIDTH_MAX + 2 * IH_DOTS_SIDE)
 /* Side of the blocks of the over-exposure map. */
 #define IH_DOTS_BLOCK 8
 #define IH_DOTS_BLOCKS_X (IH_FRAME_WIDTH_MAX / IH_DOTS_BLOCK)
@@ -89,10 +90,11 @@ struct ih_dots_scratch {
         struct {
             struct ih_band band;
             /* Ring; row v is at (v + IH_DOTS_REACH) % IH_DOTS_ROWS. Zeros around the frame. */
-            _Alignas(
-                IH_ALIGNMENT) int16_t response[IH_DOTS_ROWS][IH_FRAME_WIDTH_MAX + 2 * IH_DOTS_SIDE];
-            _Alignas(IH_ALIGNMENT)
-                int16_t least[IH_FRAME_WIDTH_MAX]; /* no threshold of the row is lower */
+            _Alignas(IH_ALIGNMENT) int16_t response[IH_DOTS_ROWS][IH_DOTS_ROW_SIZE];
+            /* No threshold of the row is lower; none between the centres of two blocks of noise is
+             * higher. */
+            _Alignas(IH_ALIGNMENT) int16_t least[IH_FRAME_WIDTH_MAX];
+            int32_t most[IH_NOISE_BLOCKS_X + 1];
         } finding;
     } rows;
 };

@@ -448,3 +448,12 @@ int32_t ih_noise_least(const struct ih_noise *noise, int32_t u, int32_t v)
     return ih_min_s32(ih_min_s32(above[cell.left], above[cell.right]),
                       ih_min_s32(below[cell.left], below[cell.right]));
 }
+
+int32_t ih_noise_most(const struct ih_noise *noise, int32_t u, int32_t v)
+{
+    const struct cell cell = cell_of(noise, u, v);
+    const uint16_t *above = noise->median[cell.above];
+    const uint16_t *below = noise->median[cell.below];
+    return ih_max_s32(ih_max_s32(above[cell.left], above[cell.right]),
+                      ih_max_s32(below[cell.left], below[cell.right]));
+}

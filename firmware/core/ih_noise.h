@@ -52,8 +52,9 @@ void ih_noise_subtract(const struct ih_noise *noise, int32_t v, int32_t width,
 /* The noise at a pixel. */
 int32_t ih_noise_at(const struct ih_noise *noise, int32_t u, int32_t v);
 
-/* No pixel between the centres of the same four blocks has less noise. u and v come between other
- * centres where they are IH_NOISE_BLOCK / 2 more than a multiple of IH_NOISE_BLOCK. */
+/* No pixel between the centres of the same four blocks has less noise, or more. u and v come between
+ * other centres where they are IH_NOISE_BLOCK / 2 more than a multiple of IH_NOISE_BLOCK. */
 int32_t ih_noise_least(const struct ih_noise *noise, int32_t u, int32_t v);
+int32_t ih_noise_most(const struct ih_noise *noise, int32_t u, int32_t v);
 
 #endif
