@@ -188,7 +188,8 @@ static void sums_are_exact(void)
 /* Half a row of nodes, of widths with whole blocks of vectors and others. */
 static void sums_along_nodes_are_exact(void)
 {
-    static int32_t line_q20[CENTRES_MAX][HALF_CENTRES_MAX * 32], coefficient[TERMS_MAX / 2];
+    static int32_t line_q20[CENTRES_MAX][IH_SURFACE_HALF_CENTRES_MAX * 32],
+        coefficient[TERMS_MAX / 2];
     const int32_t *lines_q20[CENTRES_MAX];
     struct ih_test_random random = {.state = 6};
     const int32_t half = centres / 2;
