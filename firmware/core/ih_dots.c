@@ -179,7 +179,7 @@ static struct ih_dot dot_at(const struct near *near, int32_t u, int32_t v, int64
     };
 }
 
-/* R <= 18,648, less a quarter of the peak and squared 2^27.6; five of them 2^30. Columns behind the
+/* R <= 18,648, and the peak is only the greatest of nine: squared 2^28.4, five of them 2^30.8. Columns behind the
  * fifth are there for vectors and do not count. */
 static struct ih_dot centred(const struct near *near, int32_t u, int32_t v)
 {
