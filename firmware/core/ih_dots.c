@@ -275,7 +275,8 @@ static void lay_limits(struct ih_dots_scratch *scratch, int32_t v)
 {
     int16_t *least = scratch->rows.finding.least;
     int32_t u = 0;
-    for (int32_t block = 0; u < scratch->width; block++) {
+    int32_t block = 0;
+    while (u < scratch->width) {
         const int32_t end = ih_min_s32(block * IH_NOISE_BLOCK + IH_NOISE_BLOCK / 2, scratch->width);
         const int32_t threshold =
             threshold_of(&scratch->params, ih_noise_least(&scratch->noise, u, v));
@@ -284,6 +285,7 @@ static void lay_limits(struct ih_dots_scratch *scratch, int32_t v)
         for (; u < end; u++) {
             least[u] = (int16_t)ih_clamp_s32(threshold, INT16_MIN, INT16_MAX);
         }
+        block++;
     }
     for (; u < IH_FRAME_WIDTH_MAX; u++) {
         least[u] = INT16_MAX;
