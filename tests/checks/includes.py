@@ -81,7 +81,7 @@ CORE_VECTORS = {("ih_normal.c", "immintrin.h"), ("ih_normal.c", "arm_acle.h"), (
                 ("ih_lanes.h", "immintrin.h"), ("ih_cuts.c", "immintrin.h"),
                 ("ih_row.c", "immintrin.h"), ("ih_rating.c", "immintrin.h"), ("ih_rating.c", "arm_neon.h"),
                 ("ih_words.h", "arm_acle.h"), ("ih_parts.c", "immintrin.h"),
-                ("ih_parts.c", "arm_acle.h"), ("ih_lens.c", "immintrin.h")}
+                ("ih_parts.c", "arm_acle.h"), ("ih_lens.c", "immintrin.h"), ("ih_surface.c", "immintrin.h")}
 
 INCLUDE = re.compile(r'^\s*#\s*include\s*(["<])([^">]+)[">]')
 

@@ -110,7 +110,7 @@ def check_fields(test, records):
                     and (h["rejected"] is None) == (index in record["heads"])
                     and (tracked or h["rejected"] == "score")):
                 bad.append((record["file"], index, h))
-            if tracked and not (h["track"] >= 1 and 0 < h["sigma_mm"] < 500):
+            if tracked and not (h["track"] >= 1 and 0 < h["sigma_mm"] <= 500):
                 bad.append((record["file"], index, h))
         scores = [record["hypotheses"][i]["score"] for i in record["heads"]]
         if scores != sorted(scores, reverse=True):
