@@ -27,6 +27,7 @@ import numpy as np
 import scene
 
 FRAMES = 12  # of the rendered sequence
+NESTED = 10  # the last frame that is taken of sequence1, whose first ones have whole contours in their nests
 VERMILION, BLACK, WHITE, BLUE = (213, 94, 0), (0, 0, 0), (255, 255, 255), (0, 114, 178)
 YELLOW, SKY = (240, 228, 66), (86, 180, 233)
 LIMIT_S = 60
@@ -205,8 +206,9 @@ def case_trace(records):
     """What the trace holds for pictures: parts that have their slice's moments, findings that the record has too."""
     whole = parts = 0
     problems = []
-    for index, record in enumerate(records):
-        trace = read_json(at("traces/short/%06d.json" % index))
+    for folder, record in records:
+        index = record["file"]
+        trace = read_json(at("traces/%s/%s.json" % (folder, index[:-len(".pgm")])))
         found = [(part["nest"], part["slice"], cut["level_mm_q8"], part["x_y_q9"])
                  for cut in trace["cuts"] for contour in cut["contour"] for part in contour["part"]]
         nests = trace["hypotheses"]["nest"]
@@ -215,7 +217,7 @@ def case_trace(records):
         whole += sum(slice_["whole"] for nest in nests for slice_ in nest["slice"])
         parts += len(wanted)
         if sorted(wanted) != sorted(item[:2] for item in found):
-            problems.append("frame %d: parts of %s, not of %s" % (index, sorted(found), wanted))
+            problems.append("frame %s: parts of %s, not of %s" % (index, sorted(found), wanted))
         for nest, slice_, level, places in found:
             of = nests[nest]["slice"][slice_]
             here = np.array(places) / 512
@@ -225,13 +227,13 @@ def case_trace(records):
             middle = ((here + after) * cross[:, None]).sum(axis=0) / (6 * area)
             off = [area - of["area_q16"] / 65536, *(middle - [of["x_q16"] / 65536, of["y_q16"] / 65536])]
             if np.abs(off).max() > 1e-3 or level != nests[nest]["front_mm_q8"] + of["behind_mm_q8"]:
-                problems.append("frame %d, nest %d, slice %d: off by %s" % (index, nest, slice_, off))
+                problems.append("frame %s, nest %d, slice %d: off by %s" % (index, nest, slice_, off))
         shown = [[f["u_px_q12"], f["v_px_q12"], f["a_px_q12"], f["b_px_q12"]] for f in trace["findings"]]
         said = [[value * 4096 for value in h["pixel"] + h["axes_px"]] for h in record["hypotheses"]]
         if len(shown) != len(said) or (shown and np.abs(np.subtract(shown, said)).max() > 0.006 * 4096):
-            problems.append("frame %d: findings are not the record's hypotheses" % index)
+            problems.append("frame %s: findings are not the record's hypotheses" % index)
         if (trace["result"]["head"], trace["result"]["selected"]) != (record["heads"], record["head"]):
-            problems.append("frame %d: the result is not the record's" % index)
+            problems.append("frame %s: the result is not the record's" % index)
     result("trace: a part per slice that is not whole, with its moments; the record's findings and result",
            "; ".join(problems) or (None if whole > 5 and parts > 20 else "hardly any slices: %d, %d" % (whole, parts)))
 
@@ -609,10 +611,11 @@ def prepare():
                          text=True, check=True).stdout
     one = os.path.join(options.work, "sequence1")
     os.makedirs(one)
-    for name in ("000009.pgm", "000010.pgm", "rig.json"):
+    for name in ["%06d.pgm" % index for index in range(NESTED + 1)] + ["rig.json"]:
         shutil.copy(os.path.join(options.frames, "sequence1", name), one)
-    subprocess.run([options.host_sim, "--json", "--trace", at("traces"), one], stdout=subprocess.DEVNULL, check=True)
-    return [json.loads(line) for line in out.splitlines()]
+    more = subprocess.run([options.host_sim, "--json", "--trace", at("traces"), one], capture_output=True, text=True,
+                          check=True).stdout
+    return [[json.loads(line) for line in lines.splitlines()] for lines in (out, more)]
 
 
 def main():
@@ -621,11 +624,11 @@ def main():
     for name in ("--view", "--host-sim", "--frames", "--work"):
         parser.add_argument(name, required=True, type=os.path.abspath)
     options = parser.parse_args()
-    records = prepare()
+    records, nested = prepare()
     case_bands(case_contours())
     case_control()
     case_real_residuals()
-    case_trace(records)
+    case_trace([("short", record) for record in records] + [("sequence1", record) for record in nested])
     case_words(records)
     case_reasons()
     case_sheet()
