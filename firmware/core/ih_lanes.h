@@ -23,11 +23,6 @@ static inline ih_lanes ih_lanes_load(const void *at)
     return _mm256_loadu_si256(at);
 }
 
-static inline ih_lanes ih_lanes_all(int16_t value)
-{
-    return _mm256_set1_epi16(value);
-}
-
 static inline ih_lanes ih_lanes_greatest(ih_lanes a, ih_lanes b)
 {
     return _mm256_max_epi16(a, b);

@@ -45,15 +45,6 @@ static int32_t at_most(const uint16_t value[SAMPLES_MAX], uint16_t limit)
         count += (raised - ih_word(&value[i + 6])) >> 15 & one;
     }
     return (int32_t)((count & UINT16_MAX) + (count >> 16));
-#elif defined __AVX2__
-    const ih_lanes last = ih_lanes_all((int16_t)limit);
-    int32_t greater = 0;
-    for (int32_t i = 0; i < SAMPLES_MAX; i += 2 * IH_LANES) {
-        greater += __builtin_popcount(
-            ih_lanes_bits(ih_lanes_greater(ih_lanes_load(&value[i]), last),
-                          ih_lanes_greater(ih_lanes_load(&value[i + IH_LANES]), last)));
-    }
-    return SAMPLES_MAX - greater;
 #else
     uint16_t count = 0;
     for (int32_t i = 0; i < SAMPLES_MAX; i++) {
@@ -351,10 +342,11 @@ static void choose(const struct ih_frame *frame, const struct ih_frame *ambient,
         }
         count++;
     }
+    uint16_t half_median[IH_NOISE_BLOCKS_X];
+    block_medians(scratch, out->columns, count, half_median);
     for (int32_t column = 0; column < out->columns; column++) {
         int32_t width = ih_min_s32(IH_NOISE_BLOCK, frame->width - column * IH_NOISE_BLOCK);
-        bool quieter =
-            16 * block_median(scratch, column, count) < 7 * out->median[block_row][column];
+        bool quieter = 16 * half_median[column] < 7 * out->median[block_row][column];
         bool darker = half_sum[column] < -(REST_Q4 / 4) * width * count;
         out->subtract[block_row][column] = quieter && !darker;
     }
