@@ -54,10 +54,22 @@ void ih_row_grey(const struct ih_row *row, int32_t width, uint16_t *grey_q4)
     }
 }
 
-/* How many sums of three pixels of a row the loops work out. */
-static int32_t sums_of(const struct ih_band *band)
+/* Sum 0 is that of the pixel so many to the left of the frame: sums begin where vectors do, and so does
+ * what a row of R is worked out from. */
+#define LEAD IH_BAND_LEAD
+/* The first sum that is worked out: the first that is needed, of pixel -IH_BAND_SIDE, or where a vector
+ * or a word begins. */
+#if IH_LANES != 0 && !IH_WORDS
+#define FIRST ((LEAD - IH_BAND_SIDE) / IH_LANES * IH_LANES)
+#else
+#define FIRST (LEAD - IH_BAND_REACH)
+#endif
+
+/* Where the sums of a row end: whole steps. */
+static int32_t end_of(const struct ih_band *band)
 {
-    return (band->width + 2 * IH_BAND_SIDE + IH_BAND_STEP - 1) / IH_BAND_STEP * IH_BAND_STEP;
+    const int32_t needed = band->width + LEAD + IH_BAND_SIDE - FIRST;
+    return FIRST + (needed + IH_BAND_STEP - 1) / IH_BAND_STEP * IH_BAND_STEP;
 }
 
 void ih_band_begin(struct ih_band *band, int32_t width, bool is_bytes)
@@ -65,7 +77,7 @@ void ih_band_begin(struct ih_band *band, int32_t width, bool is_bytes)
     band->width = width;
     band->rows_in = 0;
     band->is_bytes = is_bytes;
-    const size_t count = (size_t)sums_of(band);
+    const size_t count = (size_t)end_of(band);
     for (int32_t row = 0; row < IH_BAND_ROWS; row++) { /* before the first row */
         memset(band->three[row], 0, count * sizeof band->three[0][0]);
     }
@@ -179,29 +191,33 @@ static void take_bytes(const uint8_t *pixel, int32_t count, uint16_t *restrict t
     }
 }
 
-/* Pixels that are copied from a row's end. */
-#define END (IH_BAND_STEP + 2)
+/* Pixels that a step reads: a row's first ones, and those that are copied from its end. */
+#define STEP_PIXELS (IH_BAND_STEP + 2)
 
-/* All of a row of bytes; its edges with the edge pixels repeated outside. */
+/* All of a row of bytes; its edges with the edge pixels repeated outside. They come last: what was just
+ * stored byte by byte is not there yet for vectors. */
 static void take_row_bytes(struct ih_band *band, const uint8_t *row)
 {
-    uint8_t edge[END + 2 * IH_BAND_STEP + 2];
+    uint8_t left[STEP_PIXELS];
+    uint8_t right[STEP_PIXELS + 2 * IH_BAND_STEP + 2];
     uint16_t *three = three_of(band);
     uint16_t *binomial = binomial_of(band, 0);
     uint16_t *nine = band->nine.of_bytes;
     const int32_t width = band->width;
-    /* Where the first step begins that needs pixels behind the row; each needs 2 more than it has sums,
-     * and the first one begins IH_BAND_REACH before the row. */
-    const int32_t last = (width + IH_BAND_REACH - 2) / IH_BAND_STEP * IH_BAND_STEP;
-    const int32_t rest = width + IH_BAND_REACH - last; /* pixels from there on, less than END */
-    memset(edge, row[0], IH_BAND_REACH);
-    memcpy(&edge[IH_BAND_REACH], row, IH_BAND_STEP + 2 - IH_BAND_REACH);
-    take_bytes(edge, IH_BAND_STEP, three, binomial, nine);
-    take_bytes(&row[IH_BAND_STEP - IH_BAND_REACH], last - IH_BAND_STEP, &three[IH_BAND_STEP],
-               &binomial[IH_BAND_STEP], &nine[IH_BAND_STEP]);
-    memset(edge, row[width - 1], sizeof edge);
-    memcpy(&edge[rest], &row[width - END], END);
-    take_bytes(&edge[END], sums_of(band) - last, &three[last], &binomial[last], &nine[last]);
+    const int32_t before = LEAD + 1; /* the first pixel of sum i is i - before */
+    const int32_t first = FIRST + IH_BAND_STEP;
+    /* Where the first step begins that needs pixels behind the row. */
+    const int32_t last =
+        first + (width - IH_BAND_STEP - 2 + before - FIRST) / IH_BAND_STEP * IH_BAND_STEP;
+    const int32_t rest = width - (last - before); /* pixels from there on, less than STEP_PIXELS */
+    memset(left, row[0], before - FIRST);
+    memcpy(&left[before - FIRST], row, STEP_PIXELS - (before - FIRST));
+    memset(right, row[width - 1], sizeof right);
+    memcpy(&right[rest], &row[width - STEP_PIXELS], STEP_PIXELS);
+    take_bytes(&row[first - before], last - first, &three[first], &binomial[first], &nine[first]);
+    take_bytes(left, IH_BAND_STEP, &three[FIRST], &binomial[FIRST], &nine[FIRST]);
+    take_bytes(&right[STEP_PIXELS], end_of(band) - last, &three[last], &binomial[last],
+               &nine[last]);
 }
 
 static void take_row_grey(struct ih_band *band, const uint16_t *row_q4)
@@ -210,8 +226,8 @@ static void take_row_grey(struct ih_band *band, const uint16_t *row_q4)
     uint16_t *restrict binomial_q4 = binomial_of(band, 0);
     uint32_t *restrict nine_q4 = band->nine.of_grey_q4;
     const int32_t width = band->width;
-    for (int32_t i = 0; i < width + 2 * IH_BAND_SIDE; i++) {
-        const int32_t u = i - IH_BAND_SIDE;
+    for (int32_t i = LEAD - IH_BAND_SIDE; i < LEAD + width + IH_BAND_SIDE; i++) {
+        const int32_t u = i - LEAD;
         const uint16_t middle_q4 = row_q4[ih_clamp_s32(u, 0, width - 1)];
         const uint16_t sum_q4 = (uint16_t)(row_q4[ih_clamp_s32(u - 1, 0, width - 1)] + middle_q4 +
                                            row_q4[ih_clamp_s32(u + 1, 0, width - 1)]);
@@ -226,8 +242,8 @@ static void take_again(struct ih_band *band)
 {
     const uint16_t *newest = band->three[(band->rows_in + IH_BAND_ROWS - 1) % IH_BAND_ROWS];
     uint16_t *three = three_of(band);
-    const int32_t count = sums_of(band);
-    for (int32_t i = 0; i < count; i++) {
+    const int32_t end = end_of(band);
+    for (int32_t i = FIRST; i < end; i++) {
         if (band->is_bytes) {
             band->nine.of_bytes[i] = (uint16_t)(band->nine.of_bytes[i] + newest[i] - three[i]);
         } else {
@@ -235,7 +251,8 @@ static void take_again(struct ih_band *band)
         }
         three[i] = newest[i];
     }
-    memcpy(binomial_of(band, 0), binomial_of(band, 1), (size_t)count * sizeof three[0]);
+    memcpy(&binomial_of(band, 0)[FIRST], &binomial_of(band, 1)[FIRST],
+           (size_t)(end - FIRST) * sizeof three[0]);
 }
 
 #if IH_WORDS
@@ -313,18 +330,18 @@ static void respond_grey(const struct rows *rows_q4, const uint32_t *nine_q4, in
 static bool finish_row(struct ih_band *band, int16_t *response)
 {
     const struct rows rows = {
-        .above = &binomial_of(band, IH_BAND_REACH + 1)[IH_BAND_SIDE],
-        .middle = &binomial_of(band, IH_BAND_REACH)[IH_BAND_SIDE],
-        .below = &binomial_of(band, IH_BAND_REACH - 1)[IH_BAND_SIDE],
+        .above = &binomial_of(band, IH_BAND_REACH + 1)[LEAD],
+        .middle = &binomial_of(band, IH_BAND_REACH)[LEAD],
+        .below = &binomial_of(band, IH_BAND_REACH - 1)[LEAD],
     };
     band->rows_in++;
     if (band->rows_in < IH_BAND_ROWS) {
         return false;
     }
     if (band->is_bytes) {
-        respond_bytes(&rows, band->nine.of_bytes, band->width, response);
+        respond_bytes(&rows, &band->nine.of_bytes[LEAD - IH_BAND_SIDE], band->width, response);
     } else {
-        respond_grey(&rows, band->nine.of_grey_q4, band->width, response);
+        respond_grey(&rows, &band->nine.of_grey_q4[LEAD - IH_BAND_SIDE], band->width, response);
     }
     return true;
 }
@@ -351,8 +368,8 @@ void ih_band_columns(const struct ih_band *band, int32_t rows, uint16_t *sum)
 {
     memset(sum, 0, (size_t)band->width * sizeof sum[0]);
     for (int32_t row = band->rows_in - rows; row < band->rows_in; row++) {
-        const uint16_t *binomial = &band->binomial[row % IH_BAND_KEPT][IH_BAND_SIDE];
-        const uint16_t *three = &band->three[row % IH_BAND_ROWS][IH_BAND_SIDE];
+        const uint16_t *binomial = &band->binomial[row % IH_BAND_KEPT][LEAD];
+        const uint16_t *three = &band->three[row % IH_BAND_ROWS][LEAD];
         for (int32_t u = 0; u < band->width; u++) {
             sum[u] = (uint16_t)(sum[u] + binomial[u] - three[u]);
         }
@@ -363,7 +380,7 @@ bool ih_band_is_any_above(const struct ih_band *band, int32_t limit)
 {
     const uint16_t *oldest = band->three[band->rows_in % IH_BAND_ROWS];
     const uint16_t *nine = band->nine.of_bytes;
-    const int32_t count = sums_of(band);
+    const int32_t end = end_of(band);
     if (!band->is_bytes) {
         return true;
     }
@@ -371,14 +388,14 @@ bool ih_band_is_any_above(const struct ih_band *band, int32_t limit)
     /* All are below 2^13: with a limit below it the sign says which is above. */
     const uint32_t least = IH_WORD_BOTH(0x7fff - ih_clamp_s32(limit, 0, 0x1fff));
     uint32_t any = 0;
-    for (int32_t i = 0; i < count; i += 4) {
+    for (int32_t i = FIRST; i < end; i += 4) {
         any |= ih_word(&nine[i]) - ih_word(&oldest[i]) + least;
         any |= ih_word(&nine[i + 2]) - ih_word(&oldest[i + 2]) + least;
     }
     return (any & IH_WORD_SIGNS) != 0;
 #else
     uint16_t most = 0;
-    for (int32_t i = 0; i < count; i++) {
+    for (int32_t i = FIRST; i < end; i++) {
         const uint16_t eight = (uint16_t)(nine[i] - oldest[i]);
         most = eight > most ? eight : most;
     }
@@ -469,7 +486,8 @@ void ih_band_bytes(struct ih_band *band, const struct ih_row row[IH_BAND_ROWS], 
     uint16_t *column = band->binomial[0];
     band->width = width;
     band->is_bytes = true;
-    const int32_t count = sums_of(band);
+    const int32_t count =
+        (width + 2 * IH_BAND_SIDE + IH_BAND_STEP - 1) / IH_BAND_STEP * IH_BAND_STEP;
     sum_rows(row, width, &inner[1], &column[IH_BAND_REACH]);
     for (int32_t i = 2; i <= IH_BAND_REACH; i++) {
         add_rows(row[IH_BAND_REACH - i].samples, row[IH_BAND_REACH + i].samples, width,

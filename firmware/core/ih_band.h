@@ -47,18 +47,20 @@ struct ih_row {
 #define IH_BAND_KEPT 8
 /* Pixels that the loops take at once; what they find behind a row's end is not used. */
 #define IH_BAND_STEP 32
-/* Sums of three pixels to the left and right of a row of R. */
+/* Sums of three pixels that are needed to the left and right of a row of R, */
 #define IH_BAND_SIDE (IH_BAND_REACH - 1)
-#define IH_BAND_SUMS (IH_FRAME_WIDTH_MAX + IH_BAND_STEP)
+/* and those that there is room for to its left, so that a row's own are aligned. */
+#define IH_BAND_LEAD (IH_ALIGNMENT / 2)
+#define IH_BAND_SUMS (IH_BAND_LEAD + IH_FRAME_WIDTH_MAX + IH_BAND_STEP)
 
 struct ih_band {
     int32_t width;
     int32_t rows_in; /* pushed so far, repeated ones included */
     bool is_bytes;   /* sums of bytes, else of 12 bits */
-    /* Of three pixels around each, from IH_BAND_SIDE to the left of the frame on, edge pixels repeated
+    /* Of three pixels around each, from IH_BAND_LEAD to the left of the frame on, edge pixels repeated
      * outside: rings of sums and of 1-2-1, and sums of the newest nine rows. */
     _Alignas(IH_ALIGNMENT) uint16_t three[IH_BAND_ROWS][IH_BAND_SUMS];
-    _Alignas(IH_ALIGNMENT) uint16_t binomial[IH_BAND_KEPT][IH_BAND_SUMS + IH_ALIGNMENT / 2];
+    _Alignas(IH_ALIGNMENT) uint16_t binomial[IH_BAND_KEPT][IH_BAND_SUMS];
     _Alignas(IH_ALIGNMENT) union {
         uint16_t of_bytes[IH_BAND_SUMS];
         uint32_t of_grey_q4[IH_BAND_SUMS];
