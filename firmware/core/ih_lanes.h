@@ -17,6 +17,14 @@
 
 #define IH_LANES 16
 typedef __m256i ih_lanes;
+/* Intrinsics whose names differ by the width alone. */
+#define IH_LANES_OP(name) _mm256_##name
+#define IH_LANES_BITS(name) _mm256_##name##_si256
+
+static inline void ih_lanes_store(ih_lanes value, void *at)
+{
+    _mm256_storeu_si256(at, value);
+}
 
 static inline ih_lanes ih_lanes_load(const void *at)
 {
@@ -60,6 +68,14 @@ static inline uint32_t ih_lanes_bits(ih_lanes a, ih_lanes b)
 
 #define IH_LANES 8
 typedef __m128i ih_lanes;
+/* Intrinsics whose names differ by the width alone. */
+#define IH_LANES_OP(name) _mm_##name
+#define IH_LANES_BITS(name) _mm_##name##_si128
+
+static inline void ih_lanes_store(ih_lanes value, void *at)
+{
+    _mm_storeu_si128(at, value);
+}
 
 static inline ih_lanes ih_lanes_load(const void *at)
 {

@@ -31,6 +31,185 @@ static int32_t between(int32_t low, int32_t high, int32_t part)
     return low + (((high - low) * part + 32) >> 6);
 }
 
+#if IH_LANES != 0 && !IH_WORDS
+/* Blocks side by side in a vector, 8 bytes of each; those whose medians are looked for at once: each step
+ * waits for the step before. */
+#define SIDE (IH_LANES / 4)
+#define ABREAST (2 * SIDE)
+_Static_assert(IH_FRAME_WIDTH_MAX % (ABREAST * IH_NOISE_BLOCK) == 0,
+               "a row of R has room for whole groups of blocks");
+#define FINE_BITS 7
+
+/* Blocks side by side. */
+struct group {
+    const int16_t *above, *below; /* R of the first one */
+    ih_lanes rank;                /* in the lower half of a block's 64 bits */
+    ih_lanes size[SAMPLES_MAX / 8];
+    ih_lanes median;
+};
+
+/* |R|. */
+static inline ih_lanes sizes_of(ih_lanes response)
+{
+#ifdef __AVX2__
+    return _mm256_abs_epi16(response);
+#else
+    return _mm_max_epi16(response, _mm_sub_epi16(_mm_setzero_si128(), response));
+#endif
+}
+
+/* R of 8 pixels of each second block. */
+static inline ih_lanes load_apart(const int16_t *response)
+{
+#ifdef __AVX2__
+    const __m128i *first = (const __m128i *)(const void *)response;
+    const __m128i *third = (const __m128i *)(const void *)&response[2 * IH_NOISE_BLOCK];
+    return _mm256_inserti128_si256(_mm256_castsi128_si256(_mm_loadu_si128(first)),
+                                   _mm_loadu_si128(third), 1);
+#else
+    return ih_lanes_load(response);
+#endif
+}
+
+/* What is looked for in 8 bits with sign: |R| of 8 pixels of each block without its lowest bits, less what
+ * is given. */
+static inline ih_lanes limited_of(const int16_t *response, int bits, ih_lanes even_less,
+                                  ih_lanes odd_less)
+{
+    const ih_lanes even = sizes_of(load_apart(response));
+    const ih_lanes odd = sizes_of(load_apart(&response[IH_NOISE_BLOCK]));
+    return IH_LANES_OP(packs_epi16)(
+        IH_LANES_OP(sub_epi16)(IH_LANES_OP(srli_epi16)(even, bits), even_less),
+        IH_LANES_OP(sub_epi16)(IH_LANES_OP(srli_epi16)(odd, bits), odd_less));
+}
+
+static inline void limit(struct group *group, int bits, ih_lanes even_less, ih_lanes odd_less)
+{
+    for (int32_t i = 0; i < 4; i++) {
+        group->size[i] = limited_of(&group->above[8 * i], bits, even_less, odd_less);
+        group->size[i + 4] = limited_of(&group->below[8 * i], bits, even_less, odd_less);
+    }
+}
+
+static inline ih_lanes two_below(const ih_lanes size[2], ih_lanes limit)
+{
+    return IH_LANES_OP(add_epi8)(IH_LANES_OP(cmpgt_epi8)(limit, size[0]),
+                                 IH_LANES_OP(cmpgt_epi8)(limit, size[1]));
+}
+
+/* Of what may be the median, from low on, the upper half or the lower one. */
+static inline ih_lanes halved(const struct group *group, ih_lanes low, ih_lanes half)
+{
+    const ih_lanes zero = IH_LANES_BITS(setzero)();
+    const ih_lanes limit = IH_LANES_OP(add_epi8)(low, half);
+    const ih_lanes above =
+        IH_LANES_OP(add_epi8)(two_below(&group->size[0], limit), two_below(&group->size[2], limit));
+    const ih_lanes below =
+        IH_LANES_OP(add_epi8)(two_below(&group->size[4], limit), two_below(&group->size[6], limit));
+    const ih_lanes less = IH_LANES_OP(sub_epi8)(IH_LANES_OP(sub_epi8)(zero, above), below);
+    const ih_lanes is_lower =
+        IH_LANES_OP(cmpgt_epi32)(IH_LANES_OP(sad_epu8)(less, zero), group->rank);
+    return IH_LANES_OP(add_epi8)(
+        low, ih_lanes_without(half, IH_LANES_OP(shuffle_epi32)(is_lower, 0xa0)));
+}
+
+static inline void search(struct group group[2])
+{
+    const ih_lanes least = IH_LANES_OP(set1_epi8)(INT8_MIN);
+    ih_lanes half = least;
+    ih_lanes first = least;
+    ih_lanes second = least;
+    for (int32_t bit = 0; bit < 8; bit++) {
+        first = halved(&group[0], first, half);
+        second = halved(&group[1], second, half);
+        half = IH_LANES_OP(srli_epi16)(half, 1); /* nothing comes over from the byte above */
+    }
+    group[0].median = IH_LANES_OP(add_epi8)(first, least);
+    group[1].median = IH_LANES_OP(add_epi8)(second, least);
+}
+
+/* Medians without the lowest bits, then the lowest bits: what is above or below is limited. */
+static void large_medians(struct group group[2], uint16_t median[ABREAST])
+{
+    const ih_lanes zero = IH_LANES_BITS(setzero)();
+    const ih_lanes middle = IH_LANES_OP(set1_epi16)(128);
+    uint8_t coarse[2][8 * SIDE];
+    uint8_t fine[2][8 * SIDE];
+    for (int32_t i = 0; i < 2; i++) {
+        limit(&group[i], FINE_BITS, middle, middle);
+    }
+    search(group);
+    for (int32_t i = 0; i < 2; i++) {
+        const ih_lanes low = group[i].median;
+        const ih_lanes even =
+            IH_LANES_OP(slli_epi16)(IH_LANES_OP(unpacklo_epi8)(low, zero), FINE_BITS);
+        const ih_lanes odd =
+            IH_LANES_OP(slli_epi16)(IH_LANES_OP(unpackhi_epi8)(low, zero), FINE_BITS);
+        ih_lanes_store(low, coarse[i]);
+        limit(&group[i], 0, IH_LANES_OP(add_epi16)(even, middle),
+              IH_LANES_OP(add_epi16)(odd, middle));
+    }
+    search(group);
+    for (int32_t i = 0; i < 2; i++) {
+        ih_lanes_store(group[i].median, fine[i]);
+    }
+    for (int32_t i = 0; i < ABREAST; i++) {
+        const int32_t at = 8 * (i % SIDE);
+        median[i] = (uint16_t)((coarse[i / SIDE][at] << FINE_BITS) + fine[i / SIDE][at]);
+    }
+}
+
+/* What is missing is as large as any. */
+static void fill_up(struct ih_noise_scratch *scratch, int32_t columns, int32_t rows)
+{
+    const int32_t group = ABREAST * IH_NOISE_BLOCK;
+    const int32_t end = (columns + ABREAST - 1) / ABREAST * group;
+    for (int32_t row = 0; row < SAMPLED_ROWS; row++) {
+        for (int32_t u = row < rows ? scratch->band.width : 0; u < end; u++) {
+            scratch->response[row][u] = INT16_MAX;
+        }
+    }
+}
+
+/* Medians of a row of blocks. Nearly all are small: they are looked for in 8 bits. */
+static void block_medians(struct ih_noise_scratch *scratch, int32_t columns, int32_t rows,
+                          uint16_t *median)
+{
+    const ih_lanes middle = IH_LANES_OP(set1_epi16)(128);
+    fill_up(scratch, columns, rows);
+    for (int32_t first = 0; first < columns; first += ABREAST) {
+        const int32_t abreast = ih_min_s32(ABREAST, columns - first);
+        int32_t rank[2 * ABREAST];
+        uint8_t limited[2][8 * SIDE];
+        uint16_t large[ABREAST];
+        struct group group[2];
+        for (int32_t i = 0; i < ABREAST; i++) {
+            const int32_t width = scratch->band.width - (first + i) * IH_NOISE_BLOCK;
+            rank[2 * i] = width > 0 ? rows * ih_min_s32(IH_NOISE_BLOCK, width) / 2 : -1;
+            rank[2 * i + 1] = 0;
+        }
+        for (int32_t i = 0; i < 2; i++) {
+            const int32_t u = (first + i * SIDE) * IH_NOISE_BLOCK;
+            group[i].above = &scratch->response[0][u];
+            group[i].below = &scratch->response[1][u];
+            group[i].rank = ih_lanes_load(&rank[2 * i * SIDE]);
+            limit(&group[i], 0, middle, middle);
+        }
+        search(group);
+        const ih_lanes most = IH_LANES_OP(max_epu8)(group[0].median, group[1].median);
+        if (ih_lanes_is_any(IH_LANES_OP(cmpeq_epi8)(most, IH_LANES_OP(set1_epi8)(-1)))) {
+            large_medians(group, large);
+            memcpy(&median[first], large, (size_t)abreast * sizeof median[0]);
+            continue;
+        }
+        ih_lanes_store(group[0].median, limited[0]);
+        ih_lanes_store(group[1].median, limited[1]);
+        for (int32_t i = 0; i < abreast; i++) {
+            median[first + i] = limited[i / SIDE][8 * (i % SIDE)];
+        }
+    }
+}
+#else
 /* How many of the values of a block are at most so large; all are below 2^15. */
 static int32_t at_most(const uint16_t value[SAMPLES_MAX], uint16_t limit)
 {
@@ -100,31 +279,11 @@ static uint16_t block_median(const struct ih_noise_scratch *scratch, int32_t col
 /* How many of the values of a block are at most so large. */
 static int32_t at_most_of_bytes(const uint8_t value[SAMPLES_MAX], uint8_t limit)
 {
-#ifdef __AVX2__
-    const __m256i last = _mm256_set1_epi8((char)limit);
-    int32_t count = 0;
-    for (int32_t i = 0; i < SAMPLES_MAX; i += 32) {
-        const __m256i some = _mm256_loadu_si256((const __m256i *)(const void *)&value[i]);
-        const __m256i is_at_most = _mm256_cmpeq_epi8(_mm256_max_epu8(some, last), last);
-        count += __builtin_popcount((uint32_t)_mm256_movemask_epi8(is_at_most));
-    }
-    return count;
-#elif IH_LANES != 0
-    const __m128i last = _mm_set1_epi8((char)limit);
-    __m128i count = _mm_setzero_si128();
-    for (int32_t i = 0; i < SAMPLES_MAX; i += 16) {
-        const __m128i some = _mm_loadu_si128((const __m128i *)(const void *)&value[i]);
-        count = _mm_sub_epi8(count, _mm_cmpeq_epi8(_mm_max_epu8(some, last), last));
-    }
-    const __m128i halves = _mm_sad_epu8(count, _mm_setzero_si128());
-    return _mm_cvtsi128_si32(_mm_add_epi32(halves, _mm_unpackhi_epi64(halves, halves)));
-#else
     uint8_t count = 0;
     for (int32_t i = 0; i < SAMPLES_MAX; i++) {
         count = (uint8_t)(count + (value[i] <= limit));
     }
     return count;
-#endif
 }
 
 /* |R| of a block's pixels, limited to 8 bits, and how many they are; what is missing is as large as any. */
@@ -145,7 +304,7 @@ static int32_t limit_block(const struct ih_noise_scratch *scratch, int32_t colum
 }
 
 /* Medians of a row of blocks. Nearly all are small: they are looked for in 8 bits. */
-static void block_medians(const struct ih_noise_scratch *scratch, int32_t columns, int32_t rows,
+static void block_medians(struct ih_noise_scratch *scratch, int32_t columns, int32_t rows,
                           uint16_t *median)
 {
     for (int32_t first = 0; first < columns; first += ABREAST) {
@@ -169,13 +328,14 @@ static void block_medians(const struct ih_noise_scratch *scratch, int32_t column
     }
 }
 #else
-static void block_medians(const struct ih_noise_scratch *scratch, int32_t columns, int32_t rows,
+static void block_medians(struct ih_noise_scratch *scratch, int32_t columns, int32_t rows,
                           uint16_t *median)
 {
     for (int32_t column = 0; column < columns; column++) {
         median[column] = block_median(scratch, column, rows);
     }
 }
+#endif
 #endif
 
 static bool is_any_subtracted(const struct ih_noise *noise, int32_t above, int32_t below)
