@@ -403,13 +403,187 @@ bool ih_band_is_any_above(const struct ih_band *band, int32_t limit)
 #endif
 }
 
-/* Sums of nine rows that are given, and 1-2-1 of those in the middle. */
-static void sum_rows(const struct ih_row row[IH_BAND_ROWS], int32_t width, uint16_t *restrict inner,
-                     uint16_t *restrict column)
+#if IH_LANES != 0 && !IH_WORDS
+/* Sums of nine rows of bytes, those of even and of odd pixels apart, as they come from bytes without being
+ * spread; pairs are an even pixel's and the next one's. inner: 1-2-1 of the rows in the middle. */
+struct halves {
+    uint16_t *even, *odd, *pair;
+    uint16_t *inner_even, *inner_odd;
+};
+
+static inline ih_lanes sum_of(ih_lanes a, ih_lanes b)
 {
-    const uint8_t *above = row[IH_BAND_REACH - 1].samples;
-    const uint8_t *middle = row[IH_BAND_REACH].samples;
-    const uint8_t *below = row[IH_BAND_REACH + 1].samples;
+    return IH_LANES_OP(add_epi16)(a, b);
+}
+
+/* Both bytes of each 16 bits and the upper one alone are added up; without its sum what is left is the
+ * lower one's: everything is below 2^16. */
+static inline ih_lanes even_of(ih_lanes both, ih_lanes odd)
+{
+    return IH_LANES_OP(sub_epi16)(both, IH_LANES_OP(slli_epi16)(odd, 8));
+}
+
+static inline ih_lanes odd_of(ih_lanes bytes)
+{
+    return IH_LANES_OP(srli_epi16)(bytes, 8);
+}
+
+/* A row above and one below join. */
+static inline void join(const uint8_t *above, const uint8_t *below, ih_lanes *both, ih_lanes *odd)
+{
+    const ih_lanes over = ih_lanes_load(above);
+    const ih_lanes under = ih_lanes_load(below);
+    *both = sum_of(sum_of(*both, over), under);
+    *odd = sum_of(sum_of(*odd, odd_of(over)), odd_of(under));
+}
+
+/* Of 2 * IH_LANES pixels from u on, an even one. */
+static inline void sum_lanes(const uint8_t *const row[IH_BAND_ROWS], int32_t u,
+                             const struct halves *sums)
+{
+    const int32_t at = u / 2;
+    const ih_lanes middle = ih_lanes_load(&row[4][u]);
+    const ih_lanes middle_odd = odd_of(middle);
+    ih_lanes both = middle;
+    ih_lanes odd = middle_odd;
+    join(&row[3][u], &row[5][u], &both, &odd);
+    const ih_lanes inner_odd = sum_of(odd, middle_odd);
+    ih_lanes_store(even_of(sum_of(both, middle), inner_odd), &sums->inner_even[at]);
+    ih_lanes_store(inner_odd, &sums->inner_odd[at]);
+    join(&row[2][u], &row[6][u], &both, &odd);
+    join(&row[1][u], &row[7][u], &both, &odd);
+    join(&row[0][u], &row[8][u], &both, &odd);
+    const ih_lanes even = even_of(both, odd);
+    ih_lanes_store(even, &sums->even[at]);
+    ih_lanes_store(odd, &sums->odd[at]);
+    ih_lanes_store(sum_of(even, odd), &sums->pair[at]);
+}
+
+/* (81 i + 8) / 16 */
+static inline ih_lanes inside_of(ih_lanes sum)
+{
+#ifdef __AVX2__
+    return _mm256_mulhrs_epi16(_mm256_slli_epi16(sum, 3), _mm256_set1_epi16(INNER_WEIGHT * 256));
+#else
+    const __m128i half_up = _mm_add_epi16(sum, _mm_set1_epi16(OUTER_WEIGHT / 2));
+    return _mm_add_epi16(_mm_add_epi16(sum, _mm_slli_epi16(sum, 2)), _mm_srli_epi16(half_up, 4));
+#endif
+}
+
+/* R of 2 * IH_LANES pixels from u on. */
+static inline void respond_halves(const struct halves *sums, int32_t u, int16_t *response)
+{
+    const int32_t at = u / 2;
+    const ih_lanes pair = ih_lanes_load(&sums->pair[at]);
+    const ih_lanes near = sum_of(sum_of(pair, ih_lanes_load(&sums->pair[at - 1])),
+                                 ih_lanes_load(&sums->pair[at + 1]));
+    const ih_lanes even_box = sum_of(sum_of(near, ih_lanes_load(&sums->pair[at - 2])),
+                                     ih_lanes_load(&sums->even[at + 2]));
+    const ih_lanes odd_box =
+        sum_of(sum_of(near, ih_lanes_load(&sums->pair[at + 2])), ih_lanes_load(&sums->odd[at - 2]));
+    const ih_lanes even = ih_lanes_load(&sums->inner_even[at]);
+    const ih_lanes odd = ih_lanes_load(&sums->inner_odd[at]);
+    const ih_lanes inner = sum_of(even, odd);
+    const ih_lanes even_inner =
+        sum_of(sum_of(inner, even), ih_lanes_load(&sums->inner_odd[at - 1]));
+    const ih_lanes odd_inner = sum_of(sum_of(inner, odd), ih_lanes_load(&sums->inner_even[at + 1]));
+    const ih_lanes even_r = IH_LANES_OP(sub_epi16)(inside_of(even_inner), even_box);
+    const ih_lanes odd_r = IH_LANES_OP(sub_epi16)(inside_of(odd_inner), odd_box);
+    const ih_lanes low = IH_LANES_OP(unpacklo_epi16)(even_r, odd_r);
+    const ih_lanes high = IH_LANES_OP(unpackhi_epi16)(even_r, odd_r);
+#ifdef __AVX2__
+    __m128i *to = (__m128i *)(void *)&response[u];
+    _mm_storeu_si128(&to[0], _mm256_castsi256_si128(low));
+    _mm_storeu_si128(&to[1], _mm256_castsi256_si128(high));
+    _mm_storeu_si128(&to[2], _mm256_extracti128_si256(low, 1));
+    _mm_storeu_si128(&to[3], _mm256_extracti128_si256(high, 1));
+#else
+    ih_lanes_store(low, &response[u]);
+    ih_lanes_store(high, &response[u + IH_LANES]);
+#endif
+}
+
+/* Sums of the last column, as often as they are read behind the row. */
+static void repeat_last(const uint8_t *const row[IH_BAND_ROWS], int32_t width,
+                        const struct halves *sums)
+{
+    const int32_t end = width / 2;
+    uint16_t sum = 0;
+    uint16_t inner = 0;
+    for (int32_t i = 0; i < IH_BAND_ROWS; i++) {
+        const uint16_t pixel = row[i][width - 1];
+        sum = (uint16_t)(sum + pixel);
+        if (i >= IH_BAND_REACH - 1 && i <= IH_BAND_REACH + 1) {
+            inner = (uint16_t)(inner + (i == IH_BAND_REACH ? 2 * pixel : pixel));
+        }
+    }
+    for (int32_t i = 0; i < 3; i++) {
+        sums->even[end + i] = sum;
+        sums->pair[end + i] = (uint16_t)(2 * sum);
+    }
+    sums->inner_even[end] = inner;
+    sums->inner_odd[end] = inner;
+}
+
+#define LINE_BYTES 64 /* that a processor takes from memory at once */
+
+void ih_band_bytes(struct ih_band *band, const uint8_t *const row[IH_BAND_ROWS], int32_t width,
+                   size_t ahead, int16_t *response)
+{
+    const struct halves sums = {
+        .even = &band->three[0][LEAD],
+        .odd = &band->three[1][LEAD],
+        .pair = &band->three[2][LEAD],
+        .inner_even = &band->three[3][LEAD],
+        .inner_odd = &band->three[4][LEAD],
+    };
+    const int32_t step = 2 * IH_LANES;
+    const int32_t last = width / 2 * 2 - step; /* the last step ends with the row */
+    band->width = width;
+    band->is_bytes = true;
+    sum_lanes(row, 0, &sums);
+    for (int32_t i = 1; i <= 2; i++) { /* long before they are read by vectors */
+        sums.odd[-i] = sums.even[0];
+        sums.pair[-i] = (uint16_t)(2 * sums.even[0]);
+    }
+    sums.inner_odd[-1] = sums.inner_even[0];
+    for (int32_t u = step; u < last; u += step) {
+        sum_lanes(row, u, &sums);
+    }
+    sum_lanes(row, last, &sums);
+    repeat_last(row, width, &sums);
+    for (int32_t u = 0; u < last; u += step) {
+        if (u % LINE_BYTES == 0) {
+            const size_t next = ahead + (size_t)u;
+            __builtin_prefetch(&row[0][next]); /* no function: gcc 12 leaves out calls of it */
+            __builtin_prefetch(&row[1][next]);
+            __builtin_prefetch(&row[2][next]);
+            __builtin_prefetch(&row[3][next]);
+            __builtin_prefetch(&row[4][next]);
+            __builtin_prefetch(&row[5][next]);
+            __builtin_prefetch(&row[6][next]);
+            __builtin_prefetch(&row[7][next]);
+            __builtin_prefetch(&row[8][next]);
+        }
+        respond_halves(&sums, u, response);
+    }
+    respond_halves(&sums, last, response);
+    if (width % 2 != 0) {
+        const int32_t at = width / 2;
+        const int32_t inner = 3 * sums.inner_even[at] + sums.inner_odd[at - 1];
+        const int32_t box = sums.pair[at - 2] + sums.pair[at - 1] + 5 * sums.even[at];
+        response[width - 1] =
+            (int16_t)((INNER_WEIGHT * inner + OUTER_WEIGHT / 2) / OUTER_WEIGHT - box);
+    }
+}
+#else
+/* Sums of nine rows that are given, and 1-2-1 of those in the middle. */
+static void sum_rows(const uint8_t *const row[IH_BAND_ROWS], int32_t width,
+                     uint16_t *restrict inner, uint16_t *restrict column)
+{
+    const uint8_t *above = row[IH_BAND_REACH - 1];
+    const uint8_t *middle = row[IH_BAND_REACH];
+    const uint8_t *below = row[IH_BAND_REACH + 1];
     int32_t u = 0;
 #if IH_WORDS
     for (; u + 4 <= width; u += 4) {
@@ -479,9 +653,10 @@ static void sum_threes(const uint16_t *column, int32_t count, uint16_t *restrict
 #endif
 }
 
-void ih_band_bytes(struct ih_band *band, const struct ih_row row[IH_BAND_ROWS], int32_t width,
-                   int16_t *response)
+void ih_band_bytes(struct ih_band *band, const uint8_t *const row[IH_BAND_ROWS], int32_t width,
+                   size_t ahead, int16_t *response)
 {
+    (void)ahead;
     uint16_t *inner = band->three[0];
     uint16_t *column = band->binomial[0];
     band->width = width;
@@ -490,8 +665,7 @@ void ih_band_bytes(struct ih_band *band, const struct ih_row row[IH_BAND_ROWS], 
         (width + 2 * IH_BAND_SIDE + IH_BAND_STEP - 1) / IH_BAND_STEP * IH_BAND_STEP;
     sum_rows(row, width, &inner[1], &column[IH_BAND_REACH]);
     for (int32_t i = 2; i <= IH_BAND_REACH; i++) {
-        add_rows(row[IH_BAND_REACH - i].samples, row[IH_BAND_REACH + i].samples, width,
-                 &column[IH_BAND_REACH]);
+        add_rows(row[IH_BAND_REACH - i], row[IH_BAND_REACH + i], width, &column[IH_BAND_REACH]);
     }
     repeat_edges(inner, width, 1, width + 2);
     repeat_edges(column, width, IH_BAND_REACH, count + 2);
@@ -499,3 +673,4 @@ void ih_band_bytes(struct ih_band *band, const struct ih_row row[IH_BAND_ROWS], 
     const struct rows rows = {.above = &inner[0], .middle = &inner[1], .below = &inner[2]};
     respond_bytes(&rows, band->nine.of_bytes, width, response);
 }
+#endif

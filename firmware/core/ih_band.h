@@ -23,6 +23,7 @@
 #define IH_BAND_H
 
 #include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
 
 #include "ih_config.h"
@@ -89,9 +90,10 @@ void ih_band_columns(const struct ih_band *band, int32_t rows, uint16_t *sum);
  * rows is greater than the limit. At least IH_BAND_ROWS have been pushed. */
 bool ih_band_is_any_above(const struct ih_band *band, int32_t limit);
 
-/* R of the middle one of nine rows of bytes; nothing is pushed. */
-void ih_band_bytes(struct ih_band *band, const struct ih_row row[IH_BAND_ROWS], int32_t width,
-                   int16_t *response);
+/* R of the middle one of nine rows of bytes; nothing is pushed. ahead: so many bytes on from each of them
+ * is one that will be looked at next, or 0. */
+void ih_band_bytes(struct ih_band *band, const uint8_t *const row[IH_BAND_ROWS], int32_t width,
+                   size_t ahead, int16_t *response);
 
 /* The newest row once more, as is done at the frame's top and bottom. */
 bool ih_band_repeat(struct ih_band *band, int16_t *response);

@@ -419,11 +419,15 @@ static void take_rows(const struct ih_frame *frame, const struct ih_frame *ambie
 static void filter_bytes(const struct ih_frame *frame, int32_t v, struct ih_band *band,
                          int16_t *response)
 {
-    struct ih_row row[IH_BAND_ROWS];
+    const uint8_t *samples = frame->samples;
+    const uint8_t *row[IH_BAND_ROWS];
     for (int32_t i = 0; i < IH_BAND_ROWS; i++) {
-        row[i] = ih_frame_row(frame, ih_clamp_s32(v + i - IH_BAND_REACH, 0, frame->height - 1));
+        const int32_t at = ih_clamp_s32(v + i - IH_BAND_REACH, 0, frame->height - 1);
+        row[i] = &samples[(size_t)at * (size_t)frame->stride_bytes];
     }
-    ih_band_bytes(band, row, frame->width, response);
+    const bool is_last = v + IH_NOISE_STEP + IH_BAND_REACH >= frame->height;
+    ih_band_bytes(band, row, frame->width,
+                  is_last ? 0 : IH_NOISE_STEP * (size_t)frame->stride_bytes, response);
 }
 
 /* R of row v, without the ambient frame, if there is one, where the map says so. */

@@ -583,15 +583,15 @@ static int16_t plain[IH_FRAME_HEIGHT_MAX + 2][IH_FRAME_WIDTH_MAX + 2];
 static void filter_whole(void)
 {
     static struct ih_band band;
-    struct ih_row row[IH_BAND_ROWS];
+    const uint8_t *row[IH_BAND_ROWS];
     int32_t i, v;
 
     memset(plain, 0, sizeof plain);
     for (v = 0; v < frame.height; v++) {
         for (i = 0; i < IH_BAND_ROWS; i++) {
-            row[i] = ih_frame_row(&frame, ih_clamp_s32(v + i - 4, 0, frame.height - 1));
+            row[i] = ih_frame_row(&frame, ih_clamp_s32(v + i - 4, 0, frame.height - 1)).samples;
         }
-        ih_band_bytes(&band, row, frame.width, &plain[v + 1][1]);
+        ih_band_bytes(&band, row, frame.width, 0, &plain[v + 1][1]);
     }
 }
 
