@@ -171,6 +171,21 @@ static void fill_up(struct ih_noise_scratch *scratch, int32_t columns, int32_t r
     }
 }
 
+/* Of so many pixels a row; of blocks behind them less than 0, which ends the search for nothing at once. */
+static inline ih_lanes ranks_of(int32_t width, int32_t rows)
+{
+    int32_t rank[2 * SIDE];
+    if (width >= SIDE * IH_NOISE_BLOCK) {
+        return IH_LANES_OP(set1_epi32)(rows * IH_NOISE_BLOCK / 2);
+    }
+    for (int32_t i = 0; i < SIDE; i++) {
+        const int32_t own = ih_min_s32(IH_NOISE_BLOCK, width - i * IH_NOISE_BLOCK);
+        rank[2 * i] = own > 0 ? rows * own / 2 : -1;
+        rank[2 * i + 1] = rank[2 * i];
+    }
+    return ih_lanes_load(rank);
+}
+
 /* Medians of a row of blocks. Nearly all are small: they are looked for in 8 bits. */
 static void block_medians(struct ih_noise_scratch *scratch, int32_t columns, int32_t rows,
                           uint16_t *median)
@@ -179,20 +194,14 @@ static void block_medians(struct ih_noise_scratch *scratch, int32_t columns, int
     fill_up(scratch, columns, rows);
     for (int32_t first = 0; first < columns; first += ABREAST) {
         const int32_t abreast = ih_min_s32(ABREAST, columns - first);
-        int32_t rank[2 * ABREAST];
         uint8_t limited[2][8 * SIDE];
         uint16_t large[ABREAST];
         struct group group[2];
-        for (int32_t i = 0; i < ABREAST; i++) {
-            const int32_t width = scratch->band.width - (first + i) * IH_NOISE_BLOCK;
-            rank[2 * i] = width > 0 ? rows * ih_min_s32(IH_NOISE_BLOCK, width) / 2 : -1;
-            rank[2 * i + 1] = 0;
-        }
         for (int32_t i = 0; i < 2; i++) {
             const int32_t u = (first + i * SIDE) * IH_NOISE_BLOCK;
             group[i].above = &scratch->response[0][u];
             group[i].below = &scratch->response[1][u];
-            group[i].rank = ih_lanes_load(&rank[2 * i * SIDE]);
+            group[i].rank = ranks_of(scratch->band.width - u, rows);
             limit(&group[i], 0, middle, middle);
         }
         search(group);
