@@ -403,7 +403,8 @@ bool ih_band_is_any_above(const struct ih_band *band, int32_t limit)
 #endif
 }
 
-#if IH_LANES != 0 && !IH_WORDS
+/* Ranges are checked without vectors. */
+#if IH_LANES != 0 && !IH_WORDS && !defined ISOHEAD_RANGE_CHECKS
 /* Sums of nine rows of bytes, those of even and of odd pixels apart, as they come from bytes without being
  * spread; pairs are an even pixel's and the next one's. inner: 1-2-1 of the rows in the middle. */
 struct halves {
@@ -429,7 +430,8 @@ static inline ih_lanes odd_of(ih_lanes bytes)
 }
 
 /* A row above and one below join. */
-static inline void join(const uint8_t *above, const uint8_t *below, ih_lanes *both, ih_lanes *odd)
+static inline void join_rows(const uint8_t *above, const uint8_t *below, ih_lanes *both,
+                             ih_lanes *odd)
 {
     const ih_lanes over = ih_lanes_load(above);
     const ih_lanes under = ih_lanes_load(below);
@@ -446,13 +448,13 @@ static inline void sum_lanes(const uint8_t *const row[IH_BAND_ROWS], int32_t u,
     const ih_lanes middle_odd = odd_of(middle);
     ih_lanes both = middle;
     ih_lanes odd = middle_odd;
-    join(&row[3][u], &row[5][u], &both, &odd);
+    join_rows(&row[3][u], &row[5][u], &both, &odd);
     const ih_lanes inner_odd = sum_of(odd, middle_odd);
     ih_lanes_store(even_of(sum_of(both, middle), inner_odd), &sums->inner_even[at]);
     ih_lanes_store(inner_odd, &sums->inner_odd[at]);
-    join(&row[2][u], &row[6][u], &both, &odd);
-    join(&row[1][u], &row[7][u], &both, &odd);
-    join(&row[0][u], &row[8][u], &both, &odd);
+    join_rows(&row[2][u], &row[6][u], &both, &odd);
+    join_rows(&row[1][u], &row[7][u], &both, &odd);
+    join_rows(&row[0][u], &row[8][u], &both, &odd);
     const ih_lanes even = even_of(both, odd);
     ih_lanes_store(even, &sums->even[at]);
     ih_lanes_store(odd, &sums->odd[at]);

@@ -31,21 +31,22 @@ static int32_t between(int32_t low, int32_t high, int32_t part)
     return low + (((high - low) * part + 32) >> 6);
 }
 
-#if IH_LANES != 0 && !IH_WORDS
+/* Ranges are checked without vectors. */
+#if IH_LANES != 0 && !IH_WORDS && !defined ISOHEAD_RANGE_CHECKS
 /* Blocks side by side in a vector, 8 bytes of each; those whose medians are looked for at once: each step
  * waits for the step before. */
 #define SIDE (IH_LANES / 4)
 #define ABREAST (2 * SIDE)
 _Static_assert(IH_FRAME_WIDTH_MAX % (ABREAST * IH_NOISE_BLOCK) == 0,
                "a row of R has room for whole groups of blocks");
+/* Bits of a large median that are looked for last. */
 #define FINE_BITS 7
 
-/* Blocks side by side. */
 struct group {
-    const int16_t *above, *below; /* R of the first one */
-    ih_lanes rank;                /* in the lower half of a block's 64 bits */
+    const int16_t *above, *below; /* R of the first block in both rows */
+    ih_lanes rank;                /* of the median, in the lower half of a block's 64 bits */
     ih_lanes size[SAMPLES_MAX / 8];
-    ih_lanes median;
+    ih_lanes median; /* in each byte of a block */
 };
 
 /* |R|. */
@@ -71,8 +72,7 @@ static inline ih_lanes load_apart(const int16_t *response)
 #endif
 }
 
-/* What is looked for in 8 bits with sign: |R| of 8 pixels of each block without its lowest bits, less what
- * is given. */
+/* |R| of 8 pixels of each block without its lowest bits, less what is given, limited to 8 bits with sign. */
 static inline ih_lanes limited_of(const int16_t *response, int bits, ih_lanes even_less,
                                   ih_lanes odd_less)
 {
@@ -83,7 +83,7 @@ static inline ih_lanes limited_of(const int16_t *response, int bits, ih_lanes ev
         IH_LANES_OP(sub_epi16)(IH_LANES_OP(srli_epi16)(odd, bits), odd_less));
 }
 
-static inline void limit(struct group *group, int bits, ih_lanes even_less, ih_lanes odd_less)
+static inline void fill_group(struct group *group, int bits, ih_lanes even_less, ih_lanes odd_less)
 {
     for (int32_t i = 0; i < 4; i++) {
         group->size[i] = limited_of(&group->above[8 * i], bits, even_less, odd_less);
@@ -91,6 +91,7 @@ static inline void limit(struct group *group, int bits, ih_lanes even_less, ih_l
     }
 }
 
+/* How many of both are less in each byte, negative. */
 static inline ih_lanes two_below(const ih_lanes size[2], ih_lanes limit)
 {
     return IH_LANES_OP(add_epi8)(IH_LANES_OP(cmpgt_epi8)(limit, size[0]),
@@ -113,6 +114,7 @@ static inline ih_lanes halved(const struct group *group, ih_lanes low, ih_lanes 
         low, ih_lanes_without(half, IH_LANES_OP(shuffle_epi32)(is_lower, 0xa0)));
 }
 
+/* The size of that rank, from 0; -128 stands for 0. */
 static inline void search(struct group group[2])
 {
     const ih_lanes least = IH_LANES_OP(set1_epi8)(INT8_MIN);
@@ -128,15 +130,16 @@ static inline void search(struct group group[2])
     group[1].median = IH_LANES_OP(add_epi8)(second, least);
 }
 
-/* Medians without the lowest bits, then the lowest bits: what is above or below is limited. */
+/* Medians without their lowest bits, which are those of what has no lowest bits. Then the lowest bits: what
+ * is greater or less without them is limited, and stays on its side. */
 static void large_medians(struct group group[2], uint16_t median[ABREAST])
 {
     const ih_lanes zero = IH_LANES_BITS(setzero)();
     const ih_lanes middle = IH_LANES_OP(set1_epi16)(128);
-    uint8_t coarse[2][8 * SIDE];
-    uint8_t fine[2][8 * SIDE];
+    uint8_t coarse[8 * ABREAST];
+    uint8_t fine[8 * ABREAST];
     for (int32_t i = 0; i < 2; i++) {
-        limit(&group[i], FINE_BITS, middle, middle);
+        fill_group(&group[i], FINE_BITS, middle, middle);
     }
     search(group);
     for (int32_t i = 0; i < 2; i++) {
@@ -145,17 +148,16 @@ static void large_medians(struct group group[2], uint16_t median[ABREAST])
             IH_LANES_OP(slli_epi16)(IH_LANES_OP(unpacklo_epi8)(low, zero), FINE_BITS);
         const ih_lanes odd =
             IH_LANES_OP(slli_epi16)(IH_LANES_OP(unpackhi_epi8)(low, zero), FINE_BITS);
-        ih_lanes_store(low, coarse[i]);
-        limit(&group[i], 0, IH_LANES_OP(add_epi16)(even, middle),
-              IH_LANES_OP(add_epi16)(odd, middle));
+        ih_lanes_store(low, &coarse[8 * SIDE * i]);
+        fill_group(&group[i], 0, IH_LANES_OP(add_epi16)(even, middle),
+                   IH_LANES_OP(add_epi16)(odd, middle));
     }
     search(group);
     for (int32_t i = 0; i < 2; i++) {
-        ih_lanes_store(group[i].median, fine[i]);
+        ih_lanes_store(group[i].median, &fine[8 * SIDE * i]);
     }
     for (int32_t i = 0; i < ABREAST; i++) {
-        const int32_t at = 8 * (i % SIDE);
-        median[i] = (uint16_t)((coarse[i / SIDE][at] << FINE_BITS) + fine[i / SIDE][at]);
+        median[i] = (uint16_t)((coarse[8 * i] << FINE_BITS) + fine[8 * i]);
     }
 }
 
@@ -171,7 +173,7 @@ static void fill_up(struct ih_noise_scratch *scratch, int32_t columns, int32_t r
     }
 }
 
-/* Of so many pixels a row; of blocks behind them less than 0, which ends the search for nothing at once. */
+/* Of blocks with so many pixels a row in all; less than 0 behind them, so that these do not look large. */
 static inline ih_lanes ranks_of(int32_t width, int32_t rows)
 {
     int32_t rank[2 * SIDE];
@@ -194,27 +196,27 @@ static void block_medians(struct ih_noise_scratch *scratch, int32_t columns, int
     fill_up(scratch, columns, rows);
     for (int32_t first = 0; first < columns; first += ABREAST) {
         const int32_t abreast = ih_min_s32(ABREAST, columns - first);
-        uint8_t limited[2][8 * SIDE];
-        uint16_t large[ABREAST];
+        uint8_t small[8 * ABREAST];
         struct group group[2];
         for (int32_t i = 0; i < 2; i++) {
             const int32_t u = (first + i * SIDE) * IH_NOISE_BLOCK;
             group[i].above = &scratch->response[0][u];
             group[i].below = &scratch->response[1][u];
             group[i].rank = ranks_of(scratch->band.width - u, rows);
-            limit(&group[i], 0, middle, middle);
+            fill_group(&group[i], 0, middle, middle);
         }
         search(group);
         const ih_lanes most = IH_LANES_OP(max_epu8)(group[0].median, group[1].median);
         if (ih_lanes_is_any(IH_LANES_OP(cmpeq_epi8)(most, IH_LANES_OP(set1_epi8)(-1)))) {
+            uint16_t large[ABREAST];
             large_medians(group, large);
             memcpy(&median[first], large, (size_t)abreast * sizeof median[0]);
             continue;
         }
-        ih_lanes_store(group[0].median, limited[0]);
-        ih_lanes_store(group[1].median, limited[1]);
+        ih_lanes_store(group[0].median, &small[0]);
+        ih_lanes_store(group[1].median, &small[8 * SIDE]);
         for (int32_t i = 0; i < abreast; i++) {
-            median[first + i] = limited[i / SIDE][8 * (i % SIDE)];
+            median[first + i] = small[8 * i];
         }
     }
 }
