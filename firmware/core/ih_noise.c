@@ -130,34 +130,54 @@ static inline void search(struct group group[2])
     group[1].median = IH_LANES_OP(add_epi8)(second, least);
 }
 
-/* Medians without their lowest bits, which are those of what has no lowest bits. Then the lowest bits: what
- * is greater or less without them is limited, and stays on its side. */
+static inline bool is_any_large(const struct group group[2])
+{
+    const ih_lanes most = IH_LANES_OP(max_epu8)(group[0].median, group[1].median);
+    return ih_lanes_is_any(IH_LANES_OP(cmpeq_epi8)(most, IH_LANES_OP(set1_epi8)(-1)));
+}
+
+static inline void put_medians(const struct group group[2], uint8_t median[8 * ABREAST])
+{
+    ih_lanes_store(group[0].median, &median[0]);
+    ih_lanes_store(group[1].median, &median[8 * SIDE]);
+}
+
+/* What they are more than 8 bits hold, which most often is no more than that again. Else medians without
+ * their lowest bits, which are those of what has no lowest bits, and then the lowest bits. What is less or
+ * far greater than what is looked for is limited, and stays on its side. */
 static void large_medians(struct group group[2], uint16_t median[ABREAST])
 {
     const ih_lanes zero = IH_LANES_BITS(setzero)();
     const ih_lanes middle = IH_LANES_OP(set1_epi16)(128);
+    const ih_lanes more = IH_LANES_OP(set1_epi16)(128 + UINT8_MAX);
     uint8_t coarse[8 * ABREAST];
     uint8_t fine[8 * ABREAST];
-    for (int32_t i = 0; i < 2; i++) {
-        fill_group(&group[i], FINE_BITS, middle, middle);
-    }
+    int bits = 0;
+    put_medians(group, coarse);
+    fill_group(&group[0], 0, more, more);
+    fill_group(&group[1], 0, more, more);
     search(group);
-    for (int32_t i = 0; i < 2; i++) {
-        const ih_lanes low = group[i].median;
-        const ih_lanes even =
-            IH_LANES_OP(slli_epi16)(IH_LANES_OP(unpacklo_epi8)(low, zero), FINE_BITS);
-        const ih_lanes odd =
-            IH_LANES_OP(slli_epi16)(IH_LANES_OP(unpackhi_epi8)(low, zero), FINE_BITS);
-        ih_lanes_store(low, &coarse[8 * SIDE * i]);
-        fill_group(&group[i], 0, IH_LANES_OP(add_epi16)(even, middle),
-                   IH_LANES_OP(add_epi16)(odd, middle));
+    if (is_any_large(group)) {
+        bits = FINE_BITS;
+        for (int32_t i = 0; i < 2; i++) {
+            fill_group(&group[i], FINE_BITS, middle, middle);
+        }
+        search(group);
+        put_medians(group, coarse);
+        for (int32_t i = 0; i < 2; i++) {
+            const ih_lanes low = group[i].median;
+            const ih_lanes even =
+                IH_LANES_OP(slli_epi16)(IH_LANES_OP(unpacklo_epi8)(low, zero), FINE_BITS);
+            const ih_lanes odd =
+                IH_LANES_OP(slli_epi16)(IH_LANES_OP(unpackhi_epi8)(low, zero), FINE_BITS);
+            fill_group(&group[i], 0, IH_LANES_OP(add_epi16)(even, middle),
+                       IH_LANES_OP(add_epi16)(odd, middle));
+        }
+        search(group);
     }
-    search(group);
-    for (int32_t i = 0; i < 2; i++) {
-        ih_lanes_store(group[i].median, &fine[8 * SIDE * i]);
-    }
+    put_medians(group, fine);
     for (int32_t i = 0; i < ABREAST; i++) {
-        median[i] = (uint16_t)((coarse[8 * i] << FINE_BITS) + fine[8 * i]);
+        median[i] = (uint16_t)((coarse[8 * i] << bits) + fine[8 * i]);
     }
 }
 
@@ -206,15 +226,13 @@ static void block_medians(struct ih_noise_scratch *scratch, int32_t columns, int
             fill_group(&group[i], 0, middle, middle);
         }
         search(group);
-        const ih_lanes most = IH_LANES_OP(max_epu8)(group[0].median, group[1].median);
-        if (ih_lanes_is_any(IH_LANES_OP(cmpeq_epi8)(most, IH_LANES_OP(set1_epi8)(-1)))) {
+        if (is_any_large(group)) {
             uint16_t large[ABREAST];
             large_medians(group, large);
             memcpy(&median[first], large, (size_t)abreast * sizeof median[0]);
             continue;
         }
-        ih_lanes_store(group[0].median, &small[0]);
-        ih_lanes_store(group[1].median, &small[8 * SIDE]);
+        put_medians(group, small);
         for (int32_t i = 0; i < abreast; i++) {
             median[first + i] = small[8 * i];
         }
