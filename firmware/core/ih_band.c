@@ -519,7 +519,7 @@ static void repeat_last(const uint8_t *const row[IH_BAND_ROWS], int32_t width,
             inner = (uint16_t)(inner + (i == IH_BAND_REACH ? 2 * pixel : pixel));
         }
     }
-    for (int32_t i = 0; i < 3; i++) {
+    for (int32_t i = 0; i < 2; i++) {
         sums->even[end + i] = sum;
         sums->pair[end + i] = (uint16_t)(2 * sum);
     }

@@ -1,6 +1,8 @@
 /* ih_band against scipy.ndimage, on frames that both sides make by the same formula. */
 #include "ih_band.h"
 
+#include <stdlib.h>
+
 #include "ih_test_frame.h"
 
 struct vector_response {
@@ -218,6 +220,37 @@ static void all_ways_give_what_the_header_says(void)
     }
 }
 
+/* The address sanitizer sees a pixel outside of them. */
+static void nine_rows_are_read_to_their_ends(void)
+{
+    static const int32_t widths[] = {320, 321, 335, 751, 1280};
+    static int16_t together[IH_FRAME_WIDTH_MAX], apart[IH_FRAME_WIDTH_MAX];
+    const uint8_t *row[IH_BAND_ROWS];
+    uint8_t *copy[IH_BAND_ROWS];
+    int32_t i, k;
+
+    for (i = 0; i < IH_TEST_COUNT(widths); i++) {
+        const size_t bytes = (size_t)widths[i];
+
+        fill_hard(widths[i], 240, (uint32_t)i + 91);
+        for (k = 0; k < IH_BAND_ROWS; k++) {
+            row[k] = &grey8[k * widths[i]];
+        }
+        ih_band_bytes(&band, row, widths[i], 9 * bytes, together);
+        for (k = 0; k < IH_BAND_ROWS; k++) {
+            copy[k] = malloc(bytes);
+            TEST_ASSERT_NOT_NULL(copy[k]);
+            memcpy(copy[k], row[k], bytes);
+            row[k] = copy[k];
+        }
+        ih_band_bytes(&band, row, widths[i], 0, apart);
+        TEST_ASSERT_EQUAL_MEMORY(together, apart, bytes * sizeof apart[0]);
+        for (k = 0; k < IH_BAND_ROWS; k++) {
+            free(copy[k]);
+        }
+    }
+}
+
 /* Of the newest rows, whatever their count. */
 static void columns_are_sums_of_rows(void)
 {
@@ -305,6 +338,7 @@ int main(void)
     RUN_TEST(slopes_have_no_response);
     RUN_TEST(the_greatest_responses_fit);
     RUN_TEST(all_ways_give_what_the_header_says);
+    RUN_TEST(nine_rows_are_read_to_their_ends);
     RUN_TEST(columns_are_sums_of_rows);
     RUN_TEST(the_brightest_columns_are_known);
     RUN_TEST(a_second_frame_starts_afresh);
