@@ -124,19 +124,20 @@ static inline void take_lanes(const uint8_t *pixel, uint16_t *three, uint16_t *b
     store(_mm256_add_epi16(sum, middle), binomial);
 }
 
-/* respond_bytes of IH_LANES pixels: (8 i 20736 + 2^14) / 2^15 is (81 i + 8) / 16. */
-static inline void respond_lanes(const uint16_t *above, const uint16_t *middle,
-                                 const uint16_t *below, const uint16_t *nine, int16_t *response)
+/* respond_bytes of IH_LANES pixels, which are R: (8 i 20736 + 2^14) / 2^15 is (81 i + 8) / 16. */
+static inline __m256i respond_lanes(const uint16_t *above, const uint16_t *middle,
+                                    const uint16_t *below, const uint16_t *nine, int16_t *response)
 {
     const __m256i row = load(middle);
     const __m256i sum =
         _mm256_add_epi16(_mm256_add_epi16(_mm256_add_epi16(row, load(above)), load(below)), row);
     const __m256i inside =
         _mm256_mulhrs_epi16(_mm256_slli_epi16(sum, 3), _mm256_set1_epi16(INNER_WEIGHT * 256));
-    const __m256i less = _mm256_sub_epi16(inside, load(nine));
-    store(_mm256_sub_epi16(_mm256_sub_epi16(less, load(&nine[IH_BAND_SIDE])),
-                           load(&nine[2 * IH_BAND_SIDE])),
-          response);
+    const __m256i less =
+        _mm256_sub_epi16(_mm256_sub_epi16(inside, load(nine)), load(&nine[2 * IH_BAND_SIDE]));
+    const __m256i all = _mm256_sub_epi16(less, load(&nine[IH_BAND_SIDE]));
+    store(all, response);
+    return all;
 }
 #endif
 
@@ -268,19 +269,74 @@ static inline void respond_two(const uint16_t *above, const uint16_t *middle, co
 }
 #endif
 
+#if IH_WORDS
+/* The limit is the same for so many pixels from a multiple of them on. */
+#define SPAN 16
+
+/* Unrolled: gcc 12 does not at -O2. */
+static inline bool is_any_of_span_above(const int16_t *response, uint32_t most)
+{
+    uint32_t above = ih_word_below(most, ih_word(response));
+    above |= ih_word_below(most, ih_word(&response[2]));
+    above |= ih_word_below(most, ih_word(&response[4]));
+    above |= ih_word_below(most, ih_word(&response[6]));
+    above |= ih_word_below(most, ih_word(&response[8]));
+    above |= ih_word_below(most, ih_word(&response[10]));
+    above |= ih_word_below(most, ih_word(&response[12]));
+    above |= ih_word_below(most, ih_word(&response[14]));
+    return (above & IH_WORD_SIGNS) != 0;
+}
+#endif
+
+/* Is one pixel of a group above a limit? */
+static inline bool is_any_above(const int16_t *response, uint32_t limit)
+{
+#if IH_WORDS
+    return is_any_of_span_above(response, limit) || is_any_of_span_above(&response[SPAN], limit);
+#elif IH_LANES != 0
+    ih_lanes most = ih_lanes_load(response);
+    for (int32_t i = IH_LANES; i < IH_BAND_GROUP; i += IH_LANES) {
+        most = ih_lanes_greatest(most, ih_lanes_load(&response[i]));
+    }
+    return ih_lanes_is_any(ih_lanes_greater(most, ih_lanes_both(limit)));
+#else
+    uint16_t any = 0;
+    for (int32_t i = 0; i < IH_BAND_GROUP; i++) {
+        const uint16_t above = response[i] > (int16_t)(limit & INT16_MAX) ? UINT16_MAX : 0;
+        any = any | above;
+    }
+    return any != 0;
+#endif
+}
+
+/* Groups from pixel u on join those that are listed. Which ones no processor foresees, and a wrong guess
+ * costs more than a group: they are put down without asking. */
+static void list(struct ih_band_row *out, int32_t u, int32_t width, int32_t listed)
+{
+    int32_t count = listed;
+    if (out->limit == NULL) {
+        return;
+    }
+    for (int32_t first = u; first < width; first += IH_BAND_GROUP) {
+        out->first[count] = (int16_t)first; /* the next one's place if it is none */
+        count += is_any_above(&out->response[first], out->limit[first / IH_BAND_GROUP]);
+    }
+    out->count = count;
+}
+
 /* Rows of 1-2-1, above, of and below a row. */
 struct rows {
     const uint16_t *above, *middle, *below;
 };
 
-/* Of grey levels of 8 bits everything is below 2^16, the sixteenth of 81 i as 5 i + i / 16. */
-static void respond_bytes(const struct rows *rows, const uint16_t *nine, int32_t width,
-                          int16_t *restrict response)
+/* Pixels from one on. Of grey levels of 8 bits everything is below 2^16, the sixteenth of 81 i as 5 i + i / 16. */
+static void respond_bytes(const struct rows *rows, const uint16_t *nine, int32_t from,
+                          int32_t width, int16_t *restrict response)
 {
     const uint16_t *above = rows->above;
     const uint16_t *middle = rows->middle;
     const uint16_t *below = rows->below;
-    int32_t u = 0;
+    int32_t u = from;
 #if IH_WORDS
     const uint32_t mask = ih_word_kept(IH_WORD_BOTH(0x0fff)); /* so that its shift costs nothing */
     for (; u + 8 <= width; u += 8) {                          /* unrolled: gcc 12 does not at -O2 */
@@ -294,13 +350,14 @@ static void respond_bytes(const struct rows *rows, const uint16_t *nine, int32_t
     }
 #elif defined __AVX2__
     for (; u + 2 * IH_LANES <= width; u += 2 * IH_LANES) {
-        respond_lanes(&above[u], &middle[u], &below[u], &nine[u], &response[u]);
+        (void)respond_lanes(&above[u], &middle[u], &below[u], &nine[u], &response[u]);
         const int32_t next = u + IH_LANES;
-        respond_lanes(&above[next], &middle[next], &below[next], &nine[next], &response[next]);
+        (void)respond_lanes(&above[next], &middle[next], &below[next], &nine[next],
+                            &response[next]);
     }
     while (u < width) { /* the last ones end with the row, and some of them are there already */
         const int32_t at = ih_min_s32(u, width - IH_LANES);
-        respond_lanes(&above[at], &middle[at], &below[at], &nine[at], &response[at]);
+        (void)respond_lanes(&above[at], &middle[at], &below[at], &nine[at], &response[at]);
         u = at + IH_LANES;
     }
 #endif
@@ -311,6 +368,33 @@ static void respond_bytes(const struct rows *rows, const uint16_t *nine, int32_t
             (uint16_t)(nine[u] + nine[u + IH_BAND_SIDE] + nine[u + 2 * IH_BAND_SIDE]);
         response[u] = (int16_t)(INNER_WEIGHT / OUTER_WEIGHT * sum + half_up / OUTER_WEIGHT - box);
     }
+}
+
+/* respond_bytes of all pixels, and groups are listed: where there are vectors as they come, so that R need
+ * not be read again. */
+static void respond_and_list(const struct rows *rows, const uint16_t *nine, int32_t width,
+                             struct ih_band_row *out)
+{
+    int32_t u = 0;
+    int32_t listed = 0;
+#ifdef __AVX2__
+    const struct rows in = *rows;
+    const uint32_t *limit = out->limit;
+    int16_t *response = out->response;
+    int16_t *first = out->first;
+    for (; limit != NULL && u + IH_BAND_GROUP <= width; u += IH_BAND_GROUP) {
+        const ih_lanes left =
+            respond_lanes(&in.above[u], &in.middle[u], &in.below[u], &nine[u], &response[u]);
+        const int32_t half = u + IH_LANES;
+        const ih_lanes right = respond_lanes(&in.above[half], &in.middle[half], &in.below[half],
+                                             &nine[half], &response[half]);
+        const ih_lanes most = ih_lanes_greatest(left, right);
+        first[listed] = (int16_t)u; /* the next one's place if it is none */
+        listed += ih_lanes_is_any(ih_lanes_greater(most, ih_lanes_both(limit[u / IH_BAND_GROUP])));
+    }
+#endif
+    respond_bytes(rows, nine, u, width, out->response);
+    list(out, u, width, listed);
 }
 
 static void respond_grey(const struct rows *rows_q4, const uint32_t *nine_q4, int32_t width,
@@ -327,41 +411,43 @@ static void respond_grey(const struct rows *rows_q4, const uint32_t *nine_q4, in
 }
 
 /* The newest row has joined the sums. */
-static bool finish_row(struct ih_band *band, int16_t *response)
+static bool finish_row(struct ih_band *band, struct ih_band_row *out)
 {
     const struct rows rows = {
         .above = &binomial_of(band, IH_BAND_REACH + 1)[LEAD],
         .middle = &binomial_of(band, IH_BAND_REACH)[LEAD],
         .below = &binomial_of(band, IH_BAND_REACH - 1)[LEAD],
     };
+    const int32_t width = band->width;
     band->rows_in++;
     if (band->rows_in < IH_BAND_ROWS) {
         return false;
     }
-    if (band->is_bytes) {
-        respond_bytes(&rows, &band->nine.of_bytes[LEAD - IH_BAND_SIDE], band->width, response);
+    if (!band->is_bytes) {
+        respond_grey(&rows, &band->nine.of_grey_q4[LEAD - IH_BAND_SIDE], width, out->response);
+        list(out, 0, width, 0);
     } else {
-        respond_grey(&rows, &band->nine.of_grey_q4[LEAD - IH_BAND_SIDE], band->width, response);
+        respond_and_list(&rows, &band->nine.of_bytes[LEAD - IH_BAND_SIDE], width, out);
     }
     return true;
 }
 
-bool ih_band_push_bytes(struct ih_band *band, const uint8_t *row, int16_t *response)
+bool ih_band_push_bytes(struct ih_band *band, const uint8_t *row, struct ih_band_row *out)
 {
     take_row_bytes(band, row);
-    return finish_row(band, response);
+    return finish_row(band, out);
 }
 
-bool ih_band_push_grey(struct ih_band *band, const uint16_t *row_q4, int16_t *response)
+bool ih_band_push_grey(struct ih_band *band, const uint16_t *row_q4, struct ih_band_row *out)
 {
     take_row_grey(band, row_q4);
-    return finish_row(band, response);
+    return finish_row(band, out);
 }
 
-bool ih_band_repeat(struct ih_band *band, int16_t *response)
+bool ih_band_repeat(struct ih_band *band, struct ih_band_row *out)
 {
     take_again(band);
-    return finish_row(band, response);
+    return finish_row(band, out);
 }
 
 void ih_band_columns(const struct ih_band *band, int32_t rows, uint16_t *sum)
@@ -527,8 +613,6 @@ static void repeat_last(const uint8_t *const row[IH_BAND_ROWS], int32_t width,
     sums->inner_odd[end] = inner;
 }
 
-#define LINE_BYTES 64 /* that a processor takes from memory at once */
-
 void ih_band_bytes(struct ih_band *band, const uint8_t *const row[IH_BAND_ROWS], int32_t width,
                    size_t ahead, int16_t *response)
 {
@@ -555,7 +639,7 @@ void ih_band_bytes(struct ih_band *band, const uint8_t *const row[IH_BAND_ROWS],
     sum_lanes(row, last, &sums);
     repeat_last(row, width, &sums);
     for (int32_t u = 0; u < last; u += step) {
-        if (u % LINE_BYTES == 0) {
+        if (u % IH_LINE_BYTES == 0) {
             const size_t next = ahead + (size_t)u;
             __builtin_prefetch(&row[0][next]); /* no function: gcc 12 leaves out calls of it */
             __builtin_prefetch(&row[1][next]);
@@ -673,6 +757,6 @@ void ih_band_bytes(struct ih_band *band, const uint8_t *const row[IH_BAND_ROWS],
     repeat_edges(column, width, IH_BAND_REACH, count + 2);
     sum_threes(column, count, band->nine.of_bytes);
     const struct rows rows = {.above = &inner[0], .middle = &inner[1], .below = &inner[2]};
-    respond_bytes(&rows, band->nine.of_bytes, width, response);
+    respond_bytes(&rows, band->nine.of_bytes, 0, width, response);
 }
 #endif

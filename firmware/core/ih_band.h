@@ -1,7 +1,8 @@
 /* ih_band - rows of a frame through a band-pass that answers to spots of a dot's size.
  *
  * In:    rows from top to bottom, 8 to 16 bits a sample.
- * Out:   the response R of a row, IH_BAND_REACH rows later.
+ * Out:   the response R of a row, IH_BAND_REACH rows later; where it is above a limit, by groups of
+ *        IH_BAND_GROUP pixels: most have nothing, and need not be looked at again.
  * Way:   grey levels are brought to 12 bits (255 of an 8-bit sensor = 4080). With the 3x3 binomial
  *        sum I (weight 16) and the 9x9 box sum B (weight 81), edge pixels repeated outside,
  *        R = (81 I - 16 B) / 256, rounded. A constant gives 0; IH_BAND_UNIT units of R are one grey
@@ -76,12 +77,25 @@ bool ih_row_is_bytes(const struct ih_row *row);
 /* A row's samples in 12 bits. */
 void ih_row_grey(const struct ih_row *row, int32_t width, uint16_t *grey_q4);
 
+/* Pixels of a row that are listed together. */
+#define IH_BAND_GROUP 32
+#define IH_BAND_GROUPS (IH_FRAME_WIDTH_MAX / IH_BAND_GROUP)
+
+/* Where a row of R goes, and which of its groups have something above a limit. */
+struct ih_band_row {
+    int16_t *response; /* [0 .. width - 1]; the last group is read to its end */
+    /* Of each group, 0 to 32767 in both halves; or NULL: nothing is listed. */
+    const uint32_t *limit;
+    int32_t count;                     /* out: groups, from left to right, */
+    int16_t first[IH_BAND_GROUPS + 1]; /* and the first pixel of each */
+};
+
 /* is_bytes: all rows will be pushed as bytes, else as grey levels of 12 bits. */
 void ih_band_begin(struct ih_band *band, int32_t width, bool is_bytes);
 
-/* Push a row. True: response[0 .. width - 1] is that of the row IH_BAND_REACH pushes ago. */
-bool ih_band_push_bytes(struct ih_band *band, const uint8_t *row, int16_t *response);
-bool ih_band_push_grey(struct ih_band *band, const uint16_t *row_q4, int16_t *response);
+/* Push a row. True: out is that of the row IH_BAND_REACH pushes ago; else it is left as it is. */
+bool ih_band_push_bytes(struct ih_band *band, const uint8_t *row, struct ih_band_row *out);
+bool ih_band_push_grey(struct ih_band *band, const uint16_t *row_q4, struct ih_band_row *out);
 
 /* Sums of the columns of the newest rows, at most IH_BAND_KEPT of them. */
 void ih_band_columns(const struct ih_band *band, int32_t rows, uint16_t *sum);
@@ -96,6 +110,6 @@ void ih_band_bytes(struct ih_band *band, const uint8_t *const row[IH_BAND_ROWS],
                    size_t ahead, int16_t *response);
 
 /* The newest row once more, as is done at the frame's top and bottom. */
-bool ih_band_repeat(struct ih_band *band, int16_t *response);
+bool ih_band_repeat(struct ih_band *band, struct ih_band_row *out);
 
 #endif

@@ -16,7 +16,10 @@
  * of a processor's cache lines takes twice as long to store. Costs less than so many bytes a table. */
 #define IH_ALIGNMENT 32
 
-/* Frame sizes that are accepted. The widest frame costs 72 * IH_FRAME_WIDTH_MAX bytes
+/* What a processor's cache takes from memory at once: rows that will be needed are asked for in such steps. */
+#define IH_LINE_BYTES 64
+
+/* Frame sizes that are accepted. The widest frame costs 76 * IH_FRAME_WIDTH_MAX bytes
  * of row buffer in ih_dots. Range images may be smaller than camera frames. */
 #define IH_FRAME_WIDTH_MIN 320
 #define IH_FRAME_HEIGHT_MIN 240

@@ -21,8 +21,10 @@
 #define CENTRE_COLUMNS CENTRE_SIDE
 #endif
 #define TWIN_PX_Q12 (3 * 4096)
-/* So many pixels are passed over at once where none is above its threshold. */
-#define GROUP 32
+#define GROUP IH_BAND_GROUP
+_Static_assert(GROUP == IH_NOISE_BLOCK, "a group has one limit, that of its column of blocks");
+/* So many maxima are judged together at most. */
+#define CHUNK 64
 
 void ih_dots_params_default(struct ih_dots_params *params)
 {
@@ -45,28 +47,6 @@ static void clear_outside(struct ih_dots_scratch *scratch, int32_t row)
     memset(response, 0, IH_DOTS_SIDE * sizeof response[0]);
     memset(&response[end], 0,
            sizeof scratch->rows.finding.response[0] - (size_t)end * sizeof response[0]);
-}
-
-void ih_dots_begin(struct ih_dots_scratch *scratch, struct ih_dots *out,
-                   const struct ih_dots_params *params, int32_t width, int32_t height,
-                   const struct ih_noise *noise)
-{
-    scratch->params = *params;
-    scratch->width = width;
-    scratch->height = height;
-    scratch->rows_taken = 0;
-    scratch->response_rows = 0;
-    if (noise != &scratch->noise) {
-        scratch->noise = *noise;
-    }
-    for (int32_t row = 0; row < IH_DOTS_ROWS; row++) {
-        clear_outside(scratch, row);
-    }
-    out->dot_count = 0;
-    out->edge_count = 0;
-    out->hot_count = 0;
-    out->dots_dropped = 0;
-    memset(out->bright, 0, sizeof out->bright);
 }
 
 static bool has_twin(const struct ih_dots *dots, const struct ih_dot *dot)
@@ -108,24 +88,7 @@ static int16_t *response_row(struct ih_dots_scratch *scratch, int32_t v)
     return &scratch->rows.finding.response[row % IH_DOTS_ROWS][IH_DOTS_SIDE];
 }
 
-/* Rows of R around one row, which is in the middle; pixel 0 of each. */
-struct near {
-    const int16_t *row[IH_DOTS_ROWS];
-};
-
-static void lay_near(struct ih_dots_scratch *scratch, int32_t v, struct near *out)
-{
-    uint32_t row = (uint32_t)v % IH_DOTS_ROWS;
-    for (int32_t i = 0; i < IH_DOTS_ROWS; i++) {
-        out->row[i] = &scratch->rows.finding.response[row][IH_DOTS_SIDE];
-        row = row + 1 == IH_DOTS_ROWS ? 0 : row + 1;
-    }
-}
-
-static const int16_t *near_row(const struct near *near, int32_t dv)
-{
-    return near->row[IH_DOTS_REACH + dv];
-}
+/* Rows of R around some row are given as near[-IH_DOTS_REACH] to near[IH_DOTS_REACH], pixel 0 of each. */
 
 /* The greatest of two places to both sides of a pixel. */
 static inline int32_t beside_at(const int16_t *pixel, int32_t distance)
@@ -135,31 +98,31 @@ static inline int32_t beside_at(const int16_t *pixel, int32_t distance)
 
 /* Around a pixel of row dv. Nothing is left out when one is above the limit: which one cannot be
  * foreseen, and a wrong guess costs a processor more than all of them. */
-static bool stands_alone(const struct near *near, int32_t u, int32_t dv, int32_t limit)
+static bool stands_alone(const int16_t *const *near, int32_t u, int32_t dv, int32_t limit)
 {
-    const int16_t *top = &near_row(near, dv - 4)[u];
-    const int16_t *bottom = &near_row(near, dv + 4)[u];
+    const int16_t *top = &near[dv - 4][u];
+    const int16_t *bottom = &near[dv + 4][u];
     int32_t most = ih_max_s32(top[0], bottom[0]);
     most = ih_max_s32(most, beside_at(top, 2));
     most = ih_max_s32(most, beside_at(bottom, 2));
-    most = ih_max_s32(most, beside_at(&near_row(near, dv - 3)[u], 3));
-    most = ih_max_s32(most, beside_at(&near_row(near, dv + 3)[u], 3));
-    most = ih_max_s32(most, beside_at(&near_row(near, dv - 2)[u], 4));
-    most = ih_max_s32(most, beside_at(&near_row(near, dv)[u], 4));
-    most = ih_max_s32(most, beside_at(&near_row(near, dv + 2)[u], 4));
+    most = ih_max_s32(most, beside_at(&near[dv - 3][u], 3));
+    most = ih_max_s32(most, beside_at(&near[dv + 3][u], 3));
+    most = ih_max_s32(most, beside_at(&near[dv - 2][u], 4));
+    most = ih_max_s32(most, beside_at(&near[dv][u], 4));
+    most = ih_max_s32(most, beside_at(&near[dv + 2][u], 4));
     return most <= limit;
 }
 
 /* Sum of R over the four pixels beside a peak; one outside the frame counts as the one opposite. */
-static int32_t beside(const struct ih_dots_scratch *scratch, const struct near *near, int32_t u,
+static int32_t beside(const struct ih_dots_scratch *scratch, const int16_t *const *near, int32_t u,
                       int32_t v)
 {
-    const int16_t *middle = near_row(near, 0);
+    const int16_t *middle = near[0];
     const int32_t left = u > 0 ? u - 1 : u + 1;
     const int32_t right = u + 1 < scratch->width ? u + 1 : u - 1;
     const int32_t above = v > 0 ? -1 : 1;
     const int32_t below = v + 1 < scratch->height ? 1 : -1;
-    return middle[left] + middle[right] + near_row(near, above)[u] + near_row(near, below)[u];
+    return middle[left] + middle[right] + near[above][u] + near[below][u];
 }
 
 /* A row's weights: (R - least)^2 where that is positive. */
@@ -169,25 +132,25 @@ static inline int32_t weight(int16_t response, int32_t least)
     return above * above;
 }
 
-static struct ih_dot dot_at(const struct near *near, int32_t u, int32_t v, int64_t weight_sum,
+static struct ih_dot dot_at(const int16_t *const *near, int32_t u, int32_t v, int64_t weight_sum,
                             int64_t sum_u, int64_t sum_v)
 {
     return (struct ih_dot){
         .u_px_q12 = u * 4096 + (int32_t)ih_div_round(sum_u * 4096, weight_sum),
         .v_px_q12 = v * 4096 + (int32_t)ih_div_round(sum_v * 4096, weight_sum),
-        .peak = near_row(near, 0)[u],
+        .peak = near[0][u],
     };
 }
 
 /* R <= 18,648, and the peak is only the greatest of nine: squared 2^28.4, five of them 2^30.8. Columns behind the
  * fifth are there for vectors and do not count. */
-static struct ih_dot centred(const struct near *near, int32_t u, int32_t v)
+static struct ih_dot centred(const int16_t *const *near, int32_t u, int32_t v)
 {
     const int16_t *row[CENTRE_SIDE];
     int32_t column[CENTRE_COLUMNS];
     int32_t moment[CENTRE_COLUMNS];
     for (int32_t i = 0; i < CENTRE_SIDE; i++) {
-        row[i] = &near_row(near, i - CENTRE_REACH)[u - CENTRE_REACH];
+        row[i] = &near[i - CENTRE_REACH][u - CENTRE_REACH];
     }
     const int32_t least = row[CENTRE_REACH][CENTRE_REACH] / 4;
     for (int32_t i = 0; i < CENTRE_COLUMNS; i++) {
@@ -209,14 +172,14 @@ static struct ih_dot centred(const struct near *near, int32_t u, int32_t v)
 }
 
 /* Of a row of nine 2^30.8, of 81 2^34; offsets of 4 in Q12 2^48. */
-static struct ih_dot centred_plateau(const struct near *near, int32_t u, int32_t v)
+static struct ih_dot centred_plateau(const int16_t *const *near, int32_t u, int32_t v)
 {
-    const int32_t least = near_row(near, 0)[u] / 4;
+    const int32_t least = near[0][u] / 4;
     int64_t weight_sum = 0;
     int64_t sum_u = 0;
     int64_t sum_v = 0;
     for (int32_t dv = -PLATEAU_REACH; dv <= PLATEAU_REACH; dv++) {
-        const int16_t *row = &near_row(near, dv)[u];
+        const int16_t *row = &near[dv][u];
         int64_t row_sum = 0;
         for (int32_t du = -PLATEAU_REACH; du <= PLATEAU_REACH; du++) {
             const int32_t one = weight(row[du], least);
@@ -236,32 +199,67 @@ static int32_t ring_place(int32_t centre_px_q12, int32_t peak_px)
     return ih_clamp_s32(pixel, peak_px - SHIFT_MAX, peak_px + SHIFT_MAX);
 }
 
-static int32_t threshold_of(const struct ih_dots_params *params, int32_t noise)
+static int32_t threshold_of(const struct ih_dots_scratch *scratch, int32_t noise)
 {
-    int32_t floor = (int32_t)ih_mul_shift(params->floor_grey_q4, IH_BAND_UNIT, 4);
-    return ih_max_s32(floor, ih_saturate_s32(ih_mul_shift(noise, params->noise_gain_q8, 8)));
+    const int64_t wanted = ih_mul_shift(noise, scratch->params.noise_gain_q8, 8);
+    return ih_max_s32(scratch->floor, ih_saturate_s32(wanted));
 }
 
-/* A maximum above its threshold: a dot, or why not. */
-static void judge(const struct ih_dots_scratch *scratch, struct ih_dots *out,
-                  const struct near *near, int32_t u, int32_t v)
+/* A maximum above its threshold. */
+struct maximum {
+    int16_t u;
+    uint8_t row; /* of its batch */
+    bool is_flat;
+};
+
+/* Rows that are judged together. */
+struct batch {
+    const int16_t
+        *row[IH_DOTS_ROWS]; /* of R, pixel 0 of each: the first one's near[-IH_DOTS_REACH] first */
+    int32_t first_v;
+    int32_t count; /* maxima that wait */
+    struct maximum maximum[CHUNK];
+};
+
+static const int16_t *const *near_of(const struct batch *batch, int32_t row)
+{
+    return &batch->row[row + IH_DOTS_REACH];
+}
+
+/* Of the maxima that wait those stay that may be dots, the others are counted. Which are which no processor
+ * foresees, and a wrong guess costs it more than all that is asked: it is worked out for each of them. */
+static void sieve(const struct ih_dots_scratch *scratch, struct ih_dots *out, struct batch *batch)
 {
     const struct ih_dots_params *params = &scratch->params;
-    const int32_t peak = near_row(near, 0)[u];
-    const int32_t ring_max = (int32_t)ih_mul_shift(peak, params->ring_max_q8, 8);
-    const int64_t beside_q6 = (int64_t)beside(scratch, near, u, v) * 64;
-    const bool flat = beside_q6 >= (int64_t)peak * params->flat_min_q8;
-    if (beside_q6 < (int64_t)peak * params->side_min_q8) {
-        out->hot_count++;
-        return;
+    int32_t kept = 0;
+    for (int32_t i = 0; i < batch->count; i++) {
+        struct maximum one = batch->maximum[i];
+        const int16_t *const *near = near_of(batch, one.row);
+        const int32_t peak = near[0][one.u];
+        const int32_t ring_max = (int32_t)ih_mul_shift(peak, params->ring_max_q8, 8);
+        const int64_t beside_q6 =
+            (int64_t)beside(scratch, near, one.u, batch->first_v + one.row) * 64;
+        const uint32_t is_hot = beside_q6 < (int64_t)peak * params->side_min_q8;
+        const uint32_t is_flat = beside_q6 >= (int64_t)peak * params->flat_min_q8;
+        const uint32_t is_alone = stands_alone(near, one.u, 0, ring_max);
+        const uint32_t is_spot = (is_flat | is_alone) & (is_hot ^ 1u);
+        one.is_flat = is_flat != 0;
+        batch->maximum[kept] = one;
+        kept += (int32_t)is_spot;
+        out->hot_count += (int32_t)is_hot;
+        out->edge_count += (int32_t)((is_hot | is_spot) ^ 1u);
     }
-    if (!flat && !stands_alone(near, u, 0, ring_max)) {
-        out->edge_count++;
-        return;
-    }
-    const struct ih_dot dot = flat ? centred_plateau(near, u, v) : centred(near, u, v);
-    if ((flat && !stands_alone(near, ring_place(dot.u_px_q12, u), ring_place(dot.v_px_q12, v) - v,
-                               ring_max)) ||
+    batch->count = kept;
+}
+
+/* What the sieve left: a dot, or not after all. */
+static void place(const struct ih_dots_scratch *scratch, struct ih_dots *out,
+                  const int16_t *const *near, int32_t u, int32_t v, bool is_flat)
+{
+    const struct ih_dot dot = is_flat ? centred_plateau(near, u, v) : centred(near, u, v);
+    const int32_t ring_max = (int32_t)ih_mul_shift(dot.peak, scratch->params.ring_max_q8, 8);
+    if ((is_flat && !stands_alone(near, ring_place(dot.u_px_q12, u),
+                                  ring_place(dot.v_px_q12, v) - v, ring_max)) ||
         has_twin(out, &dot)) {
         out->edge_count++;
         return;
@@ -269,47 +267,47 @@ static void judge(const struct ih_dots_scratch *scratch, struct ih_dots *out,
     insert_dot(out, dot);
 }
 
-/* What no threshold of row v is below, and what none is above; they change from block to block. Nothing
- * behind the frame is above. */
-static void lay_limits(struct ih_dots_scratch *scratch, int32_t v)
+/* All that wait. */
+static void judge(const struct ih_dots_scratch *scratch, struct ih_dots *out, struct batch *batch)
 {
-    int16_t *least = scratch->rows.finding.least;
-    int32_t u = 0;
-    int32_t block = 0;
-    while (u < scratch->width) {
-        const int32_t end = ih_min_s32(block * IH_NOISE_BLOCK + IH_NOISE_BLOCK / 2, scratch->width);
-        const int32_t threshold =
-            threshold_of(&scratch->params, ih_noise_least(&scratch->noise, u, v));
-        scratch->rows.finding.most[block] =
-            threshold_of(&scratch->params, ih_noise_most(&scratch->noise, u, v));
-        for (; u < end; u++) {
-            least[u] = (int16_t)ih_clamp_s32(threshold, INT16_MIN, INT16_MAX);
-        }
-        block++;
+    sieve(scratch, out, batch);
+    for (int32_t i = 0; i < batch->count; i++) {
+        const struct maximum *one = &batch->maximum[i];
+        place(scratch, out, near_of(batch, one->row), one->u, batch->first_v + one->row,
+              one->is_flat);
     }
-    for (; u < IH_FRAME_WIDTH_MAX; u++) {
-        least[u] = INT16_MAX;
-    }
+    batch->count = 0;
 }
 
-/* Is R above the threshold of its place? Most often its neighbourhood tells. */
-static bool is_above_threshold(const struct ih_dots_scratch *scratch, int32_t response, int32_t u,
-                               int32_t v)
+/* Where row v of R goes, and what is listed of it. */
+static struct ih_band_row *listed_of(struct ih_dots_scratch *scratch, int32_t v)
 {
-    return response > scratch->rows.finding.most[(u + IH_NOISE_BLOCK / 2) / IH_NOISE_BLOCK] ||
-           response > threshold_of(&scratch->params, ih_noise_at(&scratch->noise, u, v));
+    return &scratch->rows.finding.listed[(uint32_t)v % IH_DOTS_ROWS];
+}
+
+/* What no threshold of row v is below, group by group, which are as wide as blocks of noise. It changes where v
+ * comes between other blocks' centres, and holds for the rows before until they are judged. Not below 0, so
+ * that nothing around the frame is above. */
+static uint32_t *limits_of(struct ih_dots_scratch *scratch, int32_t v)
+{
+    const uint32_t cell = (uint32_t)(v + IH_NOISE_BLOCK / 2) / IH_NOISE_BLOCK;
+    return scratch->rows.finding.limit[cell % 2];
+}
+
+static void lay_limits(struct ih_dots_scratch *scratch, int32_t v)
+{
+    const struct ih_noise_row row = ih_noise_row(&scratch->noise, v);
+    uint32_t *limit = limits_of(scratch, v);
+    for (int32_t i = 0; i < row.columns; i++) {
+        const int32_t threshold = threshold_of(scratch, ih_noise_least(&row, i));
+        limit[i] = IH_WORD_BOTH((uint32_t)ih_clamp_s32(threshold, 0, INT16_MAX));
+    }
 }
 
 #if IH_LANES && !IH_WORDS
-/* What of IH_LANES pixels is above. */
-static inline ih_lanes is_above(const int16_t *response, const int16_t *least)
-{
-    return ih_lanes_greater(ih_lanes_load(response), ih_lanes_load(least));
-}
-
-/* Maxima above the least threshold: as great as all that are read later, greater than all before. */
+/* Maxima above the limit: as great as all that are read later, greater than all before. */
 static inline ih_lanes maxima_of(const int16_t *above, const int16_t *middle, const int16_t *below,
-                                 const int16_t *least)
+                                 uint32_t limit)
 {
     const ih_lanes peak = ih_lanes_load(middle);
     const ih_lanes before =
@@ -318,89 +316,50 @@ static inline ih_lanes maxima_of(const int16_t *above, const int16_t *middle, co
     const ih_lanes after =
         ih_lanes_greatest(ih_lanes_greatest(ih_lanes_load(&below[-1]), ih_lanes_load(below)),
                           ih_lanes_greatest(ih_lanes_load(&below[1]), ih_lanes_load(&middle[1])));
-    const ih_lanes passed = ih_lanes_greater(peak, ih_lanes_greatest(before, ih_lanes_load(least)));
+    const ih_lanes passed = ih_lanes_greater(peak, ih_lanes_greatest(before, ih_lanes_both(limit)));
     return ih_lanes_without(passed, ih_lanes_greater(after, peak));
 }
 #endif
 
-#if IH_WORDS
-/* The least threshold is the same for so many pixels from a multiple of them on. */
-#define SPAN (IH_NOISE_BLOCK / 2)
-
-/* Unrolled: gcc 12 does not at -O2. */
-static inline bool is_any_of_span_above(const int16_t *response, const int16_t *least)
-{
-    const uint32_t limit = ih_word(least);
-    uint32_t above = ih_word_below(limit, ih_word(response));
-    above |= ih_word_below(limit, ih_word(&response[2]));
-    above |= ih_word_below(limit, ih_word(&response[4]));
-    above |= ih_word_below(limit, ih_word(&response[6]));
-    above |= ih_word_below(limit, ih_word(&response[8]));
-    above |= ih_word_below(limit, ih_word(&response[10]));
-    above |= ih_word_below(limit, ih_word(&response[12]));
-    above |= ih_word_below(limit, ih_word(&response[14]));
-    return (above & IH_WORD_SIGNS) != 0;
-}
-#endif
-
-/* Is one of GROUP pixels above what no threshold is below? */
-static inline bool is_any_above(const int16_t *response, const int16_t *least)
-{
-#if IH_WORDS
-    return is_any_of_span_above(response, least) ||
-           is_any_of_span_above(&response[SPAN], &least[SPAN]);
-#elif IH_LANES != 0
-    ih_lanes any = is_above(response, least);
-    for (int32_t i = IH_LANES; i < GROUP; i += IH_LANES) {
-        any = ih_lanes_or(any, is_above(&response[i], &least[i]));
-    }
-    return ih_lanes_is_any(any);
-#else
-    uint16_t any = 0;
-    for (int32_t i = 0; i < GROUP; i++) {
-        const uint16_t above = response[i] > least[i] ? UINT16_MAX : 0;
-        any = any | above;
-    }
-    return any != 0;
-#endif
-}
-
 #if !IH_LANES || IH_WORDS
 /* Of equal neighbours the first in reading order is a maximum. */
 static bool is_maximum(const int16_t *above, const int16_t *middle, const int16_t *below,
-                       int16_t least)
+                       int16_t limit)
 {
     const int16_t peak = middle[0];
-    return peak > least && peak > middle[-1] && peak >= middle[1] && peak > above[-1] &&
+    return peak > limit && peak > middle[-1] && peak >= middle[1] && peak > above[-1] &&
            peak > above[0] && peak > above[1] && peak >= below[-1] && peak >= below[0] &&
            peak >= below[1];
 }
 #endif
 
-/* Which of GROUP pixels are maxima above the least threshold, the first of them in the lowest bit. */
+/* Which of GROUP pixels are maxima above the limit, the first of them in the lowest bit. */
 static uint32_t mark_maxima(const int16_t *above, const int16_t *middle, const int16_t *below,
-                            const int16_t *least)
+                            uint32_t limit)
 {
     uint32_t maxima = 0;
+#if !IH_LANES || IH_WORDS
+    const int16_t one_limit = (int16_t)(limit & INT16_MAX);
+#endif
 #if IH_WORDS
     for (int32_t u = 0; u < GROUP; u += 2) {
-        if ((ih_word_below(ih_word(&least[u]), ih_word(&middle[u])) & IH_WORD_SIGNS) != 0) {
+        if ((ih_word_below(limit, ih_word(&middle[u])) & IH_WORD_SIGNS) != 0) {
             const int32_t next = u + 1;
-            maxima |= (uint32_t)is_maximum(&above[u], &middle[u], &below[u], least[u]) << u;
-            maxima |= (uint32_t)is_maximum(&above[next], &middle[next], &below[next], least[next])
+            maxima |= (uint32_t)is_maximum(&above[u], &middle[u], &below[u], one_limit) << u;
+            maxima |= (uint32_t)is_maximum(&above[next], &middle[next], &below[next], one_limit)
                       << next;
         }
     }
 #elif IH_LANES != 0
     for (int32_t u = 0; u < GROUP; u += 2 * IH_LANES) {
         const int32_t next = u + IH_LANES;
-        maxima |= ih_lanes_bits(maxima_of(&above[u], &middle[u], &below[u], &least[u]),
-                                maxima_of(&above[next], &middle[next], &below[next], &least[next]))
+        maxima |= ih_lanes_bits(maxima_of(&above[u], &middle[u], &below[u], limit),
+                                maxima_of(&above[next], &middle[next], &below[next], limit))
                   << u;
     }
 #else
     for (int32_t u = 0; u < GROUP; u++) {
-        maxima |= (uint32_t)is_maximum(&above[u], &middle[u], &below[u], least[u]) << u;
+        maxima |= (uint32_t)is_maximum(&above[u], &middle[u], &below[u], one_limit) << u;
     }
 #endif
     return maxima;
@@ -409,67 +368,85 @@ static uint32_t mark_maxima(const int16_t *above, const int16_t *middle, const i
 /* Groups of a row that have maxima. */
 struct marked {
     int32_t count;
-    int16_t first[IH_FRAME_WIDTH_MAX / GROUP];
-    uint32_t maxima[IH_FRAME_WIDTH_MAX / GROUP];
+    int16_t first[IH_BAND_GROUPS + 1];
+    uint32_t maxima[IH_BAND_GROUPS + 1];
 };
 
-/* Most groups have nothing above any threshold, most of the others no maximum. Which ones cannot be
- * foreseen, and a wrong guess costs a processor more than a group: they are put down without asking. */
+/* Of those that are listed; they are put down without asking. */
 static void mark_row(struct ih_dots_scratch *scratch, int32_t v, struct marked *out)
 {
+    const struct ih_band_row *listed = listed_of(scratch, v);
     const int16_t *above = response_row(scratch, v - 1);
     const int16_t *middle = response_row(scratch, v);
     const int16_t *below = response_row(scratch, v + 1);
-    const int16_t *least = scratch->rows.finding.least;
-    const int32_t width = scratch->width;
-    int32_t candidates = 0;
-    for (int32_t first = 0; first < width; first += GROUP) {
-        out->first[candidates] = (int16_t)first; /* the next one's place if it is none */
-        candidates += is_any_above(&middle[first], &least[first]);
-    }
     int32_t count = 0;
-    for (int32_t i = 0; i < candidates; i++) {
-        const int16_t first = out->first[i];
+    for (int32_t i = 0; i < listed->count; i++) {
+        const int16_t first = listed->first[i];
         const uint32_t maxima =
-            mark_maxima(&above[first], &middle[first], &below[first], &least[first]);
-        out->first[count] = first;
+            mark_maxima(&above[first], &middle[first], &below[first], listed->limit[first / GROUP]);
+        out->first[count] = first; /* the next one's place if it is none */
         out->maxima[count] = maxima;
         count += maxima != 0;
     }
     out->count = count;
 }
 
-/* Row v has all its neighbours in the ring. */
-static void find_dots(struct ih_dots_scratch *scratch, struct ih_dots *out, int32_t v)
+/* The maxima of a batch's row that are above their thresholds join those that wait. */
+static void find_maxima(struct ih_dots_scratch *scratch, struct ih_dots *out, struct batch *batch,
+                        int32_t row)
 {
+    const int32_t v = batch->first_v + row;
     const int16_t *response = response_row(scratch, v);
+    const struct ih_noise_row noise = ih_noise_row(&scratch->noise, v);
     struct marked marked;
-    struct near near;
-    if (v % IH_NOISE_BLOCK == IH_NOISE_BLOCK / 2 || v == 0) {
-        lay_limits(scratch, v);
-    }
     mark_row(scratch, v, &marked);
-    if (marked.count == 0) {
-        return;
-    }
-    lay_near(scratch, v, &near);
     for (int32_t i = 0; i < marked.count; i++) {
         for (uint32_t maxima = marked.maxima[i]; maxima != 0; maxima &= maxima - 1) {
             const int32_t u = marked.first[i] + __builtin_ctz(maxima);
-            if (is_above_threshold(scratch, response[u], u, v)) {
-                judge(scratch, out, &near, u, v);
+            if (batch->count == CHUNK) {
+                judge(scratch, out, batch);
             }
+            batch->maximum[batch->count] = (struct maximum){.u = (int16_t)u, .row = (uint8_t)row};
+            batch->count += response[u] > threshold_of(scratch, ih_noise_at(&noise, u));
         }
     }
+}
+
+/* Rows from v on, at most a batch, that have all their neighbours in the ring. */
+static void find_dots(struct ih_dots_scratch *scratch, struct ih_dots *out, int32_t v, int32_t rows)
+{
+    struct batch batch;
+    batch.first_v = v;
+    batch.count = 0;
+    for (int32_t i = 0; i < IH_DOTS_ROWS; i++) {
+        batch.row[i] = response_row(scratch, v + i - IH_DOTS_REACH);
+    }
+    for (int32_t row = 0; row < rows; row++) {
+        find_maxima(scratch, out, &batch, row);
+    }
+    judge(scratch, out, &batch);
 }
 
 /* The row of R after the last one in the ring is complete. */
 static void advance(struct ih_dots_scratch *scratch, struct ih_dots *out)
 {
-    int32_t v = scratch->response_rows++ - IH_DOTS_REACH;
-    if (v >= 0) {
-        find_dots(scratch, out, v);
+    const int32_t last = scratch->response_rows++ - IH_DOTS_REACH; /* has all its neighbours now */
+    const int32_t rows = last % IH_DOTS_BATCH + 1;
+    if (last >= 0 && (rows == IH_DOTS_BATCH || last == scratch->height - 1)) {
+        find_dots(scratch, out, last + 1 - rows, rows);
     }
+    if (scratch->response_rows % IH_NOISE_BLOCK == IH_NOISE_BLOCK / 2) {
+        lay_limits(scratch, scratch->response_rows);
+    }
+}
+
+/* Where the next row of R goes, with its limits. */
+static struct ih_band_row *next_row(struct ih_dots_scratch *scratch)
+{
+    struct ih_band_row *next = listed_of(scratch, scratch->response_rows);
+    next->response = response_row(scratch, scratch->response_rows);
+    next->limit = limits_of(scratch, scratch->response_rows);
+    return next;
 }
 
 static uint16_t greatest(const uint16_t *sum, int32_t count)
@@ -533,10 +510,33 @@ static void finish_blocks(struct ih_dots_scratch *scratch, struct ih_dots *out, 
 
 static void repeat_row(struct ih_dots_scratch *scratch, struct ih_dots *out)
 {
-    if (ih_band_repeat(&scratch->rows.finding.band,
-                       response_row(scratch, scratch->response_rows))) {
+    if (ih_band_repeat(&scratch->rows.finding.band, next_row(scratch))) {
         advance(scratch, out);
     }
+}
+
+void ih_dots_begin(struct ih_dots_scratch *scratch, struct ih_dots *out,
+                   const struct ih_dots_params *params, int32_t width, int32_t height,
+                   const struct ih_noise *noise)
+{
+    scratch->params = *params;
+    scratch->width = width;
+    scratch->height = height;
+    scratch->rows_taken = 0;
+    scratch->response_rows = 0;
+    if (noise != &scratch->noise) {
+        scratch->noise = *noise;
+    }
+    for (int32_t row = 0; row < IH_DOTS_ROWS; row++) {
+        clear_outside(scratch, row);
+    }
+    scratch->floor = (int32_t)ih_mul_shift(params->floor_grey_q4, IH_BAND_UNIT, 4);
+    lay_limits(scratch, 0);
+    out->dot_count = 0;
+    out->edge_count = 0;
+    out->hot_count = 0;
+    out->dots_dropped = 0;
+    memset(out->bright, 0, sizeof out->bright);
 }
 
 void ih_dots_row(struct ih_dots_scratch *scratch, struct ih_dots *out, const struct ih_row *row,
@@ -545,13 +545,12 @@ void ih_dots_row(struct ih_dots_scratch *scratch, struct ih_dots *out, const str
     struct ih_band *band = &scratch->rows.finding.band;
     const int32_t v = scratch->rows_taken++;
     const bool is_bytes = ambient == NULL && ih_row_is_bytes(row);
-    int16_t *response = response_row(scratch, scratch->response_rows);
     bool complete = false;
     if (v == 0) {
         ih_band_begin(band, scratch->width, is_bytes);
     }
     if (is_bytes) {
-        complete = ih_band_push_bytes(band, row->samples, response);
+        complete = ih_band_push_bytes(band, row->samples, next_row(scratch));
     } else {
         ih_row_grey(row, scratch->width, scratch->grey_q4);
         if (ambient != NULL) {
@@ -560,7 +559,7 @@ void ih_dots_row(struct ih_dots_scratch *scratch, struct ih_dots *out, const str
             ih_noise_subtract(&scratch->noise, v, scratch->width, scratch->ambient_q4,
                               scratch->grey_q4);
         }
-        complete = ih_band_push_grey(band, scratch->grey_q4, response);
+        complete = ih_band_push_grey(band, scratch->grey_q4, next_row(scratch));
     }
     if (v % IH_DOTS_BLOCK == IH_DOTS_BLOCK - 1 || v == scratch->height - 1) {
         finish_blocks(scratch, out, v, ambient == NULL);

@@ -31,6 +31,12 @@ static inline ih_lanes ih_lanes_load(const void *at)
     return _mm256_loadu_si256(at);
 }
 
+/* Two numbers of 16 bits, over and over. */
+static inline ih_lanes ih_lanes_both(uint32_t both)
+{
+    return _mm256_set1_epi32((int32_t)both);
+}
+
 static inline ih_lanes ih_lanes_greatest(ih_lanes a, ih_lanes b)
 {
     return _mm256_max_epi16(a, b);
@@ -80,6 +86,11 @@ static inline void ih_lanes_store(ih_lanes value, void *at)
 static inline ih_lanes ih_lanes_load(const void *at)
 {
     return _mm_loadu_si128(at);
+}
+
+static inline ih_lanes ih_lanes_both(uint32_t both)
+{
+    return _mm_set1_epi32((int32_t)both);
 }
 
 static inline ih_lanes ih_lanes_greatest(ih_lanes a, ih_lanes b)

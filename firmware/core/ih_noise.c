@@ -464,6 +464,7 @@ static void filter_grey(const struct ih_frame *frame, const struct ih_frame *amb
                         const struct ih_noise *noise, struct ih_noise_scratch *scratch,
                         int16_t *response)
 {
+    struct ih_band_row out = {.response = response};
     ih_band_begin(&scratch->band, frame->width, false);
     for (int32_t i = -IH_BAND_REACH; i <= IH_BAND_REACH; i++) {
         const int32_t at = ih_clamp_s32(v + i, 0, frame->height - 1);
@@ -474,7 +475,7 @@ static void filter_grey(const struct ih_frame *frame, const struct ih_frame *amb
             const struct ih_row row = ih_frame_row(frame, at);
             ih_row_grey(&row, frame->width, scratch->grey_q4);
         }
-        (void)ih_band_push_grey(&scratch->band, scratch->grey_q4, response);
+        (void)ih_band_push_grey(&scratch->band, scratch->grey_q4, &out);
     }
 }
 
@@ -524,6 +525,7 @@ static void choose(const struct ih_frame *frame, const struct ih_frame *ambient,
     int32_t count = 0;
     for (int32_t v = first_row(block_row, frame->height); is_sampled(count, v, frame->height);
          v += IH_NOISE_STEP) {
+        struct ih_band_row filtered = {.response = scratch->response[count]};
         ih_band_begin(&scratch->band, frame->width, false);
         for (int32_t at = v - IH_BAND_REACH; at <= v + IH_BAND_REACH; at++) {
             take_rows(frame, ambient, ih_clamp_s32(at, 0, frame->height - 1), scratch);
@@ -531,7 +533,7 @@ static void choose(const struct ih_frame *frame, const struct ih_frame *ambient,
             if (at == v) {
                 add_row(scratch->grey_q4, frame->width, half_sum);
             }
-            (void)ih_band_push_grey(&scratch->band, scratch->grey_q4, scratch->response[count]);
+            (void)ih_band_push_grey(&scratch->band, scratch->grey_q4, &filtered);
         }
         count++;
     }
@@ -591,54 +593,50 @@ void ih_noise_measure(const struct ih_frame *frame, const struct ih_frame *ambie
     }
 }
 
-/* The four blocks between whose centres a pixel lies, and how far on it is, in 64ths. */
+/* Two blocks of a column or row between whose centres a pixel lies, and how far on it is, in 64ths. */
 struct cell {
-    int32_t left, right, above, below;
-    int32_t part_u, part_v;
+    int32_t before, after;
+    int32_t part;
 };
 
-static struct cell cell_of(const struct ih_noise *noise, int32_t u, int32_t v)
+static struct cell cell_of(int32_t pixel, int32_t blocks)
 {
-    const uint32_t offset_u = twice_offset(u, noise->columns);
-    const uint32_t offset_v = twice_offset(v, noise->rows);
-    const int32_t left = (int32_t)(offset_u / (2 * IH_NOISE_BLOCK));
-    const int32_t above = (int32_t)(offset_v / (2 * IH_NOISE_BLOCK));
+    const uint32_t offset = twice_offset(pixel, blocks);
+    const int32_t before = (int32_t)(offset / (2 * IH_NOISE_BLOCK));
     return (struct cell){
-        .left = left,
-        .right = ih_min_s32(left + 1, noise->columns - 1),
-        .above = above,
-        .below = ih_min_s32(above + 1, noise->rows - 1),
-        .part_u = (int32_t)(offset_u % (2 * IH_NOISE_BLOCK)),
-        .part_v = (int32_t)(offset_v % (2 * IH_NOISE_BLOCK)),
+        .before = before,
+        .after = ih_min_s32(before + 1, blocks - 1),
+        .part = (int32_t)(offset % (2 * IH_NOISE_BLOCK)),
     };
 }
 
-int32_t ih_noise_at(const struct ih_noise *noise, int32_t u, int32_t v)
+struct ih_noise_row ih_noise_row(const struct ih_noise *noise, int32_t v)
 {
-    const struct cell cell = cell_of(noise, u, v);
-    const uint16_t *above = noise->median[cell.above];
-    const uint16_t *below = noise->median[cell.below];
-    const int32_t left = between(above[cell.left], below[cell.left], cell.part_v);
-    const int32_t right = between(above[cell.right], below[cell.right], cell.part_v);
+    const struct cell cell = cell_of(v, noise->rows);
+    return (struct ih_noise_row){
+        .above = noise->median[cell.before],
+        .below = noise->median[cell.after],
+        .part = cell.part,
+        .columns = noise->columns,
+    };
+}
+
+int32_t ih_noise_at(const struct ih_noise_row *row, int32_t u)
+{
+    const struct cell cell = cell_of(u, row->columns);
+    const int32_t left = between(row->above[cell.before], row->below[cell.before], row->part);
+    const int32_t right = between(row->above[cell.after], row->below[cell.after], row->part);
     IH_IN_RANGE(left, 0, IH_RANGE_NOISE);
     IH_IN_RANGE(right, 0, IH_RANGE_NOISE);
-    return between(left, right, cell.part_u);
+    return between(left, right, cell.part);
 }
 
-int32_t ih_noise_least(const struct ih_noise *noise, int32_t u, int32_t v)
+int32_t ih_noise_least(const struct ih_noise_row *row, int32_t block)
 {
-    const struct cell cell = cell_of(noise, u, v);
-    const uint16_t *above = noise->median[cell.above];
-    const uint16_t *below = noise->median[cell.below];
-    return ih_min_s32(ih_min_s32(above[cell.left], above[cell.right]),
-                      ih_min_s32(below[cell.left], below[cell.right]));
-}
-
-int32_t ih_noise_most(const struct ih_noise *noise, int32_t u, int32_t v)
-{
-    const struct cell cell = cell_of(noise, u, v);
-    const uint16_t *above = noise->median[cell.above];
-    const uint16_t *below = noise->median[cell.below];
-    return ih_max_s32(ih_max_s32(above[cell.left], above[cell.right]),
-                      ih_max_s32(below[cell.left], below[cell.right]));
+    const int32_t last = ih_min_s32(block + 1, row->columns - 1);
+    int32_t least = ih_min_s32(row->above[block], row->below[block]);
+    for (int32_t i = ih_max_s32(block - 1, 0); i <= last; i++) {
+        least = ih_min_s32(least, ih_min_s32(row->above[i], row->below[i]));
+    }
+    return least;
 }

@@ -35,6 +35,13 @@ struct ih_noise {
     uint8_t subtract[IH_NOISE_BLOCKS_Y][IH_NOISE_BLOCKS_X]; /* 1 = the ambient frame */
 };
 
+/* A row of pixels: the rows of blocks between whose centres it lies, and how far on it is, in 64ths. */
+struct ih_noise_row {
+    const uint16_t *above, *below;
+    int32_t part;
+    int32_t columns;
+};
+
 struct ih_noise_scratch {
     struct ih_band band;
     uint16_t grey_q4[IH_FRAME_WIDTH_MAX], ambient_q4[IH_FRAME_WIDTH_MAX];
@@ -49,12 +56,12 @@ void ih_noise_measure(const struct ih_frame *frame, const struct ih_frame *ambie
 void ih_noise_subtract(const struct ih_noise *noise, int32_t v, int32_t width,
                        const uint16_t *ambient_q4, uint16_t *grey_q4);
 
-/* The noise at a pixel. */
-int32_t ih_noise_at(const struct ih_noise *noise, int32_t u, int32_t v);
+/* The noise at a pixel of row v. */
+struct ih_noise_row ih_noise_row(const struct ih_noise *noise, int32_t v);
+int32_t ih_noise_at(const struct ih_noise_row *row, int32_t u);
 
-/* No pixel between the centres of the same four blocks has less noise, or more. u and v come between
- * other centres where they are IH_NOISE_BLOCK / 2 more than a multiple of IH_NOISE_BLOCK. */
-int32_t ih_noise_least(const struct ih_noise *noise, int32_t u, int32_t v);
-int32_t ih_noise_most(const struct ih_noise *noise, int32_t u, int32_t v);
+/* No pixel of a column of blocks has less noise in this row, nor in the others that lie between the centres of the
+ * same blocks: those change where v is IH_NOISE_BLOCK / 2 more than a multiple of IH_NOISE_BLOCK. */
+int32_t ih_noise_least(const struct ih_noise_row *row, int32_t block);
 
 #endif

@@ -1,5 +1,6 @@
 /* ih_band against scipy.ndimage, on frames that both sides make by the same formula. */
 #include "ih_band.h"
+#include "ih_fix.h"
 
 #include <stdlib.h>
 
@@ -21,10 +22,14 @@ struct vector_band {
 static struct ih_band band;
 static int16_t response[IH_FRAME_HEIGHT_MAX][IH_FRAME_WIDTH_MAX];
 
+static struct ih_band_row listed; /* of the newest row of R */
+
 void setUp(void)
 {
     memset(&band, IH_TEST_FILL, sizeof band);
     memset(response, IH_TEST_FILL, sizeof response);
+    memset(&listed, IH_TEST_FILL, sizeof listed);
+    listed.limit = NULL;
 }
 
 void tearDown(void)
@@ -37,11 +42,19 @@ static bool push(int32_t v, int16_t *out)
     static uint16_t grey_q4[IH_FRAME_WIDTH_MAX];
     const struct ih_row row = ih_frame_row(&frame, v);
 
+    listed.response = out;
     if (band.is_bytes) {
-        return ih_band_push_bytes(&band, row.samples, out);
+        return ih_band_push_bytes(&band, row.samples, &listed);
     }
     ih_row_grey(&row, frame.width, grey_q4);
-    return ih_band_push_grey(&band, grey_q4, out);
+    return ih_band_push_grey(&band, grey_q4, &listed);
+}
+
+/* The newest row once more. */
+static bool repeat(int16_t *out)
+{
+    listed.response = out;
+    return ih_band_repeat(&band, &listed);
 }
 
 /* The whole frame, its first and last row repeated outside. */
@@ -52,13 +65,13 @@ static void filter_as(bool is_bytes)
     ih_band_begin(&band, frame.width, is_bytes);
     TEST_ASSERT_FALSE(push(0, response[0]));
     for (v = 1; v <= IH_BAND_REACH; v++) {
-        TEST_ASSERT_FALSE(ih_band_repeat(&band, response[0]));
+        TEST_ASSERT_FALSE(repeat(response[0]));
     }
     for (v = 1; v < frame.height; v++) {
         rows += push(v, response[rows]);
     }
     for (v = 0; v < IH_BAND_REACH; v++) {
-        rows += ih_band_repeat(&band, response[rows]);
+        rows += repeat(response[rows]);
     }
     TEST_ASSERT_EQUAL_INT32(frame.height, rows);
 }
@@ -220,6 +233,67 @@ static void all_ways_give_what_the_header_says(void)
     }
 }
 
+/* For a row of R: what a group's greatest meets, which is not above, or exceeds by one. */
+static void lay_limits(const int16_t *row, int32_t turn, uint32_t *limit)
+{
+    int32_t most = 0, u;
+
+    for (u = 0; u < frame.width; u++) {
+        most = u % IH_BAND_GROUP == 0 || row[u] > most ? row[u] : most;
+        limit[u / IH_BAND_GROUP] =
+            (uint32_t)ih_max_s32(0, most - (u / IH_BAND_GROUP + turn) % 2) * 0x10001u;
+    }
+}
+
+/* Groups of a row that have something above their limit; behind the row nothing is. */
+static int32_t expect_groups(const int16_t *row, const uint32_t *limit, int16_t *first)
+{
+    int32_t count = 0, u;
+
+    for (u = 0; u < frame.width; u++) {
+        const int16_t group = (int16_t)(u / IH_BAND_GROUP * IH_BAND_GROUP);
+
+        if (row[u] > (int32_t)(limit[u / IH_BAND_GROUP] & 0xffff) &&
+            (count == 0 || first[count - 1] != group)) {
+            first[count++] = group;
+        }
+    }
+    return count;
+}
+
+/* Whatever the width, as rows are pushed and as they are repeated. */
+static void groups_above_their_limits_are_listed(void)
+{
+    static const int32_t widths[] = {320, 321, 335, 350, 367, 751, 1279, 1280};
+    static int16_t row[IH_FRAME_WIDTH_MAX + IH_BAND_GROUP];
+    uint32_t limit[IH_BAND_GROUPS];
+    int16_t first[IH_BAND_GROUPS + 1];
+    int32_t count, i, total, v;
+
+    for (i = 0; i < 2 * IH_TEST_COUNT(widths); i++) {
+        fill_hard(widths[i / 2], 240, (uint32_t)i);
+        listed.limit = NULL;
+        filter_as(i % 2 == 0);
+        ih_band_begin(&band, frame.width, i % 2 == 0);
+        listed.limit = limit;
+        memset(row, 0, sizeof row);
+        total = 0;
+        for (v = 0; v < 240 + IH_BAND_REACH; v++) {
+            const int32_t middle = v - IH_BAND_REACH;
+
+            lay_limits(response[ih_max_s32(0, middle)], v, limit);
+            if (!(v < 240 ? push(v, row) : repeat(row)) || middle < IH_BAND_REACH) {
+                continue;
+            }
+            count = expect_groups(response[middle], limit, first);
+            IH_TEST_EQUAL(count, listed.count, "groups", i * 1000 + v);
+            TEST_ASSERT_EQUAL_MEMORY(first, listed.first, (size_t)count * sizeof first[0]);
+            total += count;
+        }
+        IH_TEST_RANGE(1000, 236 * (frame.width / IH_BAND_GROUP), total, "all groups", i);
+    }
+}
+
 /* The address sanitizer sees a pixel outside of them. */
 static void nine_rows_are_read_to_their_ends(void)
 {
@@ -338,6 +412,7 @@ int main(void)
     RUN_TEST(slopes_have_no_response);
     RUN_TEST(the_greatest_responses_fit);
     RUN_TEST(all_ways_give_what_the_header_says);
+    RUN_TEST(groups_above_their_limits_are_listed);
     RUN_TEST(nine_rows_are_read_to_their_ends);
     RUN_TEST(columns_are_sums_of_rows);
     RUN_TEST(the_brightest_columns_are_known);

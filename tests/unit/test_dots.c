@@ -600,11 +600,12 @@ static int32_t plain_maxima(void)
     int32_t count = 0, i, u, v;
 
     for (v = 0; v < frame.height; v++) {
+        const struct ih_noise_row noise = ih_noise_row(&scratch.noise, v);
+
         for (u = 0; u < frame.width; u++) {
             const int16_t peak = plain[v + 1][u + 1];
             const int32_t floor = (params.floor_grey_q4 * IH_BAND_UNIT + 8) >> 4;
-            const int32_t noisy =
-                (ih_noise_at(&scratch.noise, u, v) * params.noise_gain_q8 + 128) >> 8;
+            const int32_t noisy = (ih_noise_at(&noise, u) * params.noise_gain_q8 + 128) >> 8;
             bool is_maximum = peak > floor && peak > noisy;
 
             for (i = 0; i < 9; i++) {
