@@ -25,6 +25,8 @@
 _Static_assert(GROUP == IH_NOISE_BLOCK, "a group has one limit, that of its column of blocks");
 /* So many maxima are judged together at most. */
 #define CHUNK 64
+/* Rows of the frame that are asked for before they are taken: most of the time memory needs is gone then. */
+#define ROWS_AHEAD 20
 
 void ih_dots_params_default(struct ih_dots_params *params)
 {
@@ -592,6 +594,13 @@ void ih_dots_find(const struct ih_frame *frame, const struct ih_frame *ambient,
     ih_noise_measure(frame, ambient, &scratch->rows.measuring, &scratch->noise);
     ih_dots_begin(scratch, out, params, frame->width, frame->height, &scratch->noise);
     for (int32_t v = 0; v < frame->height; v++) {
+        if (v + ROWS_AHEAD < frame->height) {
+            const struct ih_row ahead = ih_frame_row(frame, v + ROWS_AHEAD);
+            const uint8_t *samples = ahead.samples;
+            for (int32_t i = 0; i < frame->width; i += IH_LINE_BYTES) {
+                __builtin_prefetch(&samples[i]); /* no function: gcc 12 leaves out calls of it */
+            }
+        }
         struct ih_row row = ih_frame_row(frame, v);
         struct ih_row under = ih_frame_row(ambient != NULL ? ambient : frame, v);
         ih_dots_row(scratch, out, &row, ambient != NULL ? &under : NULL);
