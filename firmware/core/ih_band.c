@@ -194,6 +194,9 @@ static void take_bytes(const uint8_t *pixel, int32_t count, uint16_t *restrict t
 
 /* Pixels that a step reads: a row's first ones, and those that are copied from its end. */
 #define STEP_PIXELS (IH_BAND_STEP + 2)
+/* The first pixel of sum i is i - BEFORE; so many of the first step lie outside of the row. */
+#define BEFORE (LEAD + 1)
+#define OUTSIDE (BEFORE - FIRST)
 
 /* All of a row of bytes; its edges with the edge pixels repeated outside. They come last: what was just
  * stored byte by byte is not there yet for vectors. */
@@ -205,17 +208,15 @@ static void take_row_bytes(struct ih_band *band, const uint8_t *row)
     uint16_t *binomial = binomial_of(band, 0);
     uint16_t *nine = band->nine.of_bytes;
     const int32_t width = band->width;
-    const int32_t before = LEAD + 1; /* the first pixel of sum i is i - before */
     const int32_t first = FIRST + IH_BAND_STEP;
     /* Where the first step begins that needs pixels behind the row. */
-    const int32_t last =
-        first + (width - IH_BAND_STEP - 2 + before - FIRST) / IH_BAND_STEP * IH_BAND_STEP;
-    const int32_t rest = width - (last - before); /* pixels from there on, less than STEP_PIXELS */
-    memset(left, row[0], before - FIRST);
-    memcpy(&left[before - FIRST], row, STEP_PIXELS - (before - FIRST));
+    const int32_t last = first + (width - STEP_PIXELS + OUTSIDE) / IH_BAND_STEP * IH_BAND_STEP;
+    const int32_t rest = width - (last - BEFORE); /* pixels from there on, less than STEP_PIXELS */
+    memset(left, row[0], OUTSIDE);
+    memcpy(&left[OUTSIDE], row, STEP_PIXELS - OUTSIDE);
     memset(right, row[width - 1], sizeof right);
     memcpy(&right[rest], &row[width - STEP_PIXELS], STEP_PIXELS);
-    take_bytes(&row[first - before], last - first, &three[first], &binomial[first], &nine[first]);
+    take_bytes(&row[first - BEFORE], last - first, &three[first], &binomial[first], &nine[first]);
     take_bytes(left, IH_BAND_STEP, &three[FIRST], &binomial[FIRST], &nine[FIRST]);
     take_bytes(&right[STEP_PIXELS], end_of(band) - last, &three[last], &binomial[last],
                &nine[last]);
