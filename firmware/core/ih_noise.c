@@ -462,9 +462,8 @@ static void filter_bytes(const struct ih_frame *frame, int32_t v, struct ih_band
 /* R of row v, without the ambient frame, if there is one, where the map says so. */
 static void filter_grey(const struct ih_frame *frame, const struct ih_frame *ambient, int32_t v,
                         const struct ih_noise *noise, struct ih_noise_scratch *scratch,
-                        int16_t *response)
+                        struct ih_band_row *out)
 {
-    struct ih_band_row out = {.response = response};
     ih_band_begin(&scratch->band, frame->width, false);
     for (int32_t i = -IH_BAND_REACH; i <= IH_BAND_REACH; i++) {
         const int32_t at = ih_clamp_s32(v + i, 0, frame->height - 1);
@@ -475,7 +474,7 @@ static void filter_grey(const struct ih_frame *frame, const struct ih_frame *amb
             const struct ih_row row = ih_frame_row(frame, at);
             ih_row_grey(&row, frame->width, scratch->grey_q4);
         }
-        (void)ih_band_push_grey(&scratch->band, scratch->grey_q4, &out);
+        (void)ih_band_push_grey(&scratch->band, scratch->grey_q4, out);
     }
 }
 
@@ -488,11 +487,11 @@ static void measure(const struct ih_frame *frame, const struct ih_frame *ambient
         int32_t count = 0;
         for (int32_t v = first_row(block_row, frame->height); is_sampled(count, v, frame->height);
              v += IH_NOISE_STEP) {
-            int16_t *response = scratch->response[count++];
+            struct ih_band_row filtered = {.response = scratch->response[count++]};
             if (is_bytes) {
-                filter_bytes(frame, v, &scratch->band, response);
+                filter_bytes(frame, v, &scratch->band, filtered.response);
             } else {
-                filter_grey(frame, ambient, v, out, scratch, response);
+                filter_grey(frame, ambient, v, out, scratch, &filtered);
             }
         }
         block_medians(scratch, out->columns, count, out->median[block_row]);
