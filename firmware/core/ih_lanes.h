@@ -47,11 +47,6 @@ static inline ih_lanes ih_lanes_greater(ih_lanes a, ih_lanes b)
     return _mm256_cmpgt_epi16(a, b);
 }
 
-static inline ih_lanes ih_lanes_or(ih_lanes a, ih_lanes b)
-{
-    return _mm256_or_si256(a, b);
-}
-
 /* a where b is not. */
 static inline ih_lanes ih_lanes_without(ih_lanes a, ih_lanes b)
 {
@@ -101,11 +96,6 @@ static inline ih_lanes ih_lanes_greatest(ih_lanes a, ih_lanes b)
 static inline ih_lanes ih_lanes_greater(ih_lanes a, ih_lanes b)
 {
     return _mm_cmpgt_epi16(a, b);
-}
-
-static inline ih_lanes ih_lanes_or(ih_lanes a, ih_lanes b)
-{
-    return _mm_or_si128(a, b);
 }
 
 static inline ih_lanes ih_lanes_without(ih_lanes a, ih_lanes b)
