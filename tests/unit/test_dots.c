@@ -516,10 +516,12 @@ static void a_stride_skips_what_lies_between_rows(void)
     TEST_ASSERT_EQUAL_MEMORY(tight.bright, dots.bright, sizeof dots.bright);
 }
 
+/* All rows come in the same place. */
 static void row_by_row_is_the_same_as_the_whole_frame(void)
 {
     static struct ih_dots whole;
     static struct ih_noise noise;
+    static uint8_t newest[IH_FRAME_WIDTH_MAX];
     int32_t v;
 
     make(&frame_named("loud")->spec);
@@ -530,9 +532,12 @@ static void row_by_row_is_the_same_as_the_whole_frame(void)
     memset(&scratch, IH_TEST_FILL, sizeof scratch);
     ih_dots_begin(&scratch, &dots, &params, frame.width, frame.height, &noise);
     for (v = 0; v < frame.height; v++) {
-        const struct ih_row row = ih_frame_row(&frame, v);
+        struct ih_row row = ih_frame_row(&frame, v);
 
+        memcpy(newest, row.samples, (size_t)frame.width);
+        row.samples = newest;
         ih_dots_row(&scratch, &dots, &row, NULL);
+        memset(newest, v % 2 * 255, sizeof newest);
     }
     ih_dots_end(&scratch, &dots);
     TEST_ASSERT_EQUAL_INT32(whole.dot_count, dots.dot_count);
@@ -574,6 +579,29 @@ static void fill_hard(int32_t width, int32_t height, uint32_t seed)
                  : i % 9 == 3 ? height - 1
                               : spot_v,
                  1.2, 3 * i % 250);
+    }
+}
+
+/* Least and greatest R, and limits of all kinds, around the frame and where none of its rows came yet. */
+static void what_was_in_memory_does_not_matter(void)
+{
+    static const int32_t sizes[][2] = {{320, 240}, {333, 247}, {1279, 242}};
+    static const int32_t fills[] = {0, 1, 0x7f, 0x80, 0xff};
+    static struct ih_dots first;
+    int32_t i, k;
+
+    for (i = 0; i < IH_TEST_COUNT(sizes); i++) {
+        fill_hard(sizes[i][0], sizes[i][1], (uint32_t)i + 17);
+        for (k = 0; k < IH_TEST_COUNT(fills); k++) {
+            memset(&scratch, fills[k], sizeof scratch);
+            memset(&dots, 0, sizeof dots);
+            find();
+            if (k == 0) {
+                first = dots;
+            }
+            IH_TEST_EQUAL(first.edge_count, dots.edge_count, "edges", i * 1000 + fills[k]);
+            TEST_ASSERT_EQUAL_MEMORY(&first, &dots, sizeof dots);
+        }
     }
 }
 
@@ -801,6 +829,7 @@ int main(void)
     RUN_TEST(samples_above_the_maximum_are_full_scale);
     RUN_TEST(a_stride_skips_what_lies_between_rows);
     RUN_TEST(row_by_row_is_the_same_as_the_whole_frame);
+    RUN_TEST(what_was_in_memory_does_not_matter);
     RUN_TEST(no_maximum_is_passed_over);
     RUN_TEST(bright_blocks_are_those_of_a_bright_mean);
     RUN_TEST(a_turned_frame_has_turned_dots);
