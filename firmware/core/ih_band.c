@@ -268,13 +268,10 @@ static inline void respond_two(const uint16_t *above, const uint16_t *middle, co
         ih_word(nine) + ih_word(&nine[IH_BAND_SIDE]) + ih_word(&nine[2 * IH_BAND_SIDE]);
     ih_word_put(ih_word_less(INNER_WEIGHT / OUTER_WEIGHT * sum + sixteenth, box), response);
 }
-#endif
 
-#if IH_WORDS
-/* The limit is the same for so many pixels from a multiple of them on. */
+/* Pixels whose loop is unrolled: gcc 12 does not at -O2. */
 #define SPAN 16
 
-/* Unrolled: gcc 12 does not at -O2. */
 static inline bool is_any_of_span_above(const int16_t *response, uint32_t most)
 {
     uint32_t above = ih_word_below(most, ih_word(response));
@@ -378,7 +375,7 @@ static void respond_and_list(const struct rows *rows, const uint16_t *nine, int3
 {
     int32_t u = 0;
     int32_t listed = 0;
-#ifdef __AVX2__
+#if defined __AVX2__ && !IH_WORDS
     const struct rows in = *rows;
     const uint32_t *limit = out->limit;
     int16_t *response = out->response;
@@ -611,7 +608,6 @@ static void repeat_last(const uint8_t *const row[IH_BAND_ROWS], int32_t width,
         sums->pair[end + i] = (uint16_t)(2 * sum);
     }
     sums->inner_even[end] = inner;
-    sums->inner_odd[end] = inner;
 }
 
 void ih_band_bytes(struct ih_band *band, const uint8_t *const row[IH_BAND_ROWS], int32_t width,

@@ -83,11 +83,12 @@ void ih_row_grey(const struct ih_row *row, int32_t width, uint16_t *grey_q4);
 
 /* Where a row of R goes, and which of its groups have something above a limit. */
 struct ih_band_row {
-    int16_t *response; /* [0 .. width - 1]; the last group is read to its end */
+    /* [0 .. width - 1]; the last group is read to its end, and what is there already counts. */
+    int16_t *response;
     /* Of each group, 0 to 32767 in both halves; or NULL: nothing is listed. */
     const uint32_t *limit;
-    int32_t count;                     /* out: groups, from left to right, */
-    int16_t first[IH_BAND_GROUPS + 1]; /* and the first pixel of each */
+    int32_t count;                 /* out: groups, from left to right, */
+    int16_t first[IH_BAND_GROUPS]; /* and the first pixel of each */
 };
 
 /* is_bytes: all rows will be pushed as bytes, else as grey levels of 12 bits. */

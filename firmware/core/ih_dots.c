@@ -370,8 +370,8 @@ static uint32_t mark_maxima(const int16_t *above, const int16_t *middle, const i
 /* Groups of a row that have maxima. */
 struct marked {
     int32_t count;
-    int16_t first[IH_BAND_GROUPS + 1];
-    uint32_t maxima[IH_BAND_GROUPS + 1];
+    int16_t first[IH_BAND_GROUPS];
+    uint32_t maxima[IH_BAND_GROUPS];
 };
 
 /* Of those that are listed; they are put down without asking. */

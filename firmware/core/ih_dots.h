@@ -105,7 +105,7 @@ struct ih_dots_scratch {
 void ih_dots_params_default(struct ih_dots_params *params);
 
 /* Rows as they come: begin, then row height times, then end. noise as from ih_noise_measure, of
- * this frame or of the last one; it may be scratch->noise. */
+ * this frame or of the last one, which was of the same size; it may be scratch->noise. */
 void ih_dots_begin(struct ih_dots_scratch *scratch, struct ih_dots *out,
                    const struct ih_dots_params *params, int32_t width, int32_t height,
                    const struct ih_noise *noise);

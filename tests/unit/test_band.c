@@ -267,7 +267,7 @@ static void groups_above_their_limits_are_listed(void)
     static const int32_t widths[] = {320, 321, 335, 350, 367, 751, 1279, 1280};
     static int16_t row[IH_FRAME_WIDTH_MAX + IH_BAND_GROUP];
     uint32_t limit[IH_BAND_GROUPS];
-    int16_t first[IH_BAND_GROUPS + 1];
+    int16_t first[IH_BAND_GROUPS];
     int32_t count, i, total, v;
 
     for (i = 0; i < 2 * IH_TEST_COUNT(widths); i++) {
