@@ -10,6 +10,13 @@
 #define OUTER_WEIGHT 16 /* 81 inner - 16 outer has no response to a constant */
 #define RESPONSE_SHIFT 8
 
+/* Ranges are checked without vectors. */
+#if IH_LANES != 0 && !IH_WORDS && !defined ISOHEAD_RANGE_CHECKS
+#define BY_LANES 1
+#else
+#define BY_LANES 0
+#endif
+
 struct ih_row ih_frame_row(const struct ih_frame *frame, int32_t v)
 {
     return (struct ih_row){
@@ -59,7 +66,7 @@ void ih_row_grey(const struct ih_row *row, int32_t width, uint16_t *grey_q4)
 #define LEAD IH_BAND_LEAD
 /* The first sum that is worked out: the first that is needed, of pixel -IH_BAND_SIDE, or where a vector
  * or a word begins. */
-#if IH_LANES != 0 && !IH_WORDS
+#if BY_LANES
 #define FIRST ((LEAD - IH_BAND_SIDE) / IH_LANES * IH_LANES)
 #else
 #define FIRST (LEAD - IH_BAND_REACH)
@@ -96,18 +103,31 @@ static uint16_t *binomial_of(struct ih_band *band, int32_t ago)
     return band->binomial[(uint32_t)(band->rows_in + IH_BAND_KEPT - ago) % IH_BAND_KEPT];
 }
 
+#if BY_LANES
+static inline ih_lanes sum_of(ih_lanes a, ih_lanes b)
+{
+    return IH_LANES_OP(add_epi16)(a, b);
+}
+
+static inline ih_lanes less_of(ih_lanes a, ih_lanes b)
+{
+    return IH_LANES_OP(sub_epi16)(a, b);
+}
+
+/* (81 i + 8) / 16, with AVX2 as (8 i 20736 + 2^14) / 2^15. */
+static inline ih_lanes inside_of(ih_lanes sum)
+{
 #ifdef __AVX2__
-static inline __m256i load(const uint16_t *sums)
-{
-    return _mm256_loadu_si256((const __m256i *)(const void *)sums);
+    return _mm256_mulhrs_epi16(_mm256_slli_epi16(sum, 3), _mm256_set1_epi16(INNER_WEIGHT * 256));
+#else
+    const __m128i half_up = _mm_add_epi16(sum, _mm_set1_epi16(OUTER_WEIGHT / 2));
+    return _mm_add_epi16(_mm_add_epi16(sum, _mm_slli_epi16(sum, 2)), _mm_srli_epi16(half_up, 4));
+#endif
 }
+#endif
 
-static inline void store(__m256i value, void *at)
-{
-    _mm256_storeu_si256(at, value);
-}
-
-static inline __m256i load_bytes(const uint8_t *pixel)
+#if BY_LANES && defined __AVX2__
+static inline ih_lanes load_bytes(const uint8_t *pixel)
 {
     return _mm256_cvtepu8_epi16(_mm_loadu_si128((const __m128i *)(const void *)pixel));
 }
@@ -116,27 +136,24 @@ static inline __m256i load_bytes(const uint8_t *pixel)
 static inline void take_lanes(const uint8_t *pixel, uint16_t *three, uint16_t *binomial,
                               uint16_t *nine)
 {
-    const __m256i middle = load_bytes(&pixel[1]);
-    const __m256i sum =
-        _mm256_add_epi16(_mm256_add_epi16(load_bytes(pixel), middle), load_bytes(&pixel[2]));
-    store(_mm256_sub_epi16(_mm256_add_epi16(sum, load(nine)), load(three)), nine);
-    store(sum, three);
-    store(_mm256_add_epi16(sum, middle), binomial);
+    const ih_lanes middle = load_bytes(&pixel[1]);
+    const ih_lanes sum = sum_of(sum_of(load_bytes(pixel), middle), load_bytes(&pixel[2]));
+    ih_lanes_store(less_of(sum_of(sum, ih_lanes_load(nine)), ih_lanes_load(three)), nine);
+    ih_lanes_store(sum, three);
+    ih_lanes_store(sum_of(sum, middle), binomial);
 }
 
-/* respond_bytes of IH_LANES pixels, which are R: (8 i 20736 + 2^14) / 2^15 is (81 i + 8) / 16. */
-static inline __m256i respond_lanes(const uint16_t *above, const uint16_t *middle,
-                                    const uint16_t *below, const uint16_t *nine, int16_t *response)
+/* respond_bytes of IH_LANES pixels, which are R. */
+static inline ih_lanes respond_lanes(const uint16_t *above, const uint16_t *middle,
+                                     const uint16_t *below, const uint16_t *nine, int16_t *response)
 {
-    const __m256i row = load(middle);
-    const __m256i sum =
-        _mm256_add_epi16(_mm256_add_epi16(_mm256_add_epi16(row, load(above)), load(below)), row);
-    const __m256i inside =
-        _mm256_mulhrs_epi16(_mm256_slli_epi16(sum, 3), _mm256_set1_epi16(INNER_WEIGHT * 256));
-    const __m256i less =
-        _mm256_sub_epi16(_mm256_sub_epi16(inside, load(nine)), load(&nine[2 * IH_BAND_SIDE]));
-    const __m256i all = _mm256_sub_epi16(less, load(&nine[IH_BAND_SIDE]));
-    store(all, response);
+    const ih_lanes row = ih_lanes_load(middle);
+    const ih_lanes sum =
+        sum_of(sum_of(sum_of(row, ih_lanes_load(above)), ih_lanes_load(below)), row);
+    const ih_lanes less = less_of(less_of(inside_of(sum), ih_lanes_load(nine)),
+                                  ih_lanes_load(&nine[2 * IH_BAND_SIDE]));
+    const ih_lanes all = less_of(less, ih_lanes_load(&nine[IH_BAND_SIDE]));
+    ih_lanes_store(all, response);
     return all;
 }
 #endif
@@ -176,7 +193,7 @@ static void take_bytes(const uint8_t *pixel, int32_t count, uint16_t *restrict t
         take_four(&pixel[i], &three[i], &binomial[i], &nine[i]);
         take_four(&pixel[i + 4], &three[i + 4], &binomial[i + 4], &nine[i + 4]);
     }
-#elif defined __AVX2__
+#elif BY_LANES && defined __AVX2__
     for (; i < count; i += 2 * IH_LANES) {
         take_lanes(&pixel[i], &three[i], &binomial[i], &nine[i]);
         take_lanes(&pixel[i + IH_LANES], &three[i + IH_LANES], &binomial[i + IH_LANES],
@@ -346,7 +363,7 @@ static void respond_bytes(const struct rows *rows, const uint16_t *nine, int32_t
         respond_two(&above[u + 6], &middle[u + 6], &below[u + 6], &nine[u + 6], mask,
                     &response[u + 6]);
     }
-#elif defined __AVX2__
+#elif BY_LANES && defined __AVX2__
     for (; u + 2 * IH_LANES <= width; u += 2 * IH_LANES) {
         (void)respond_lanes(&above[u], &middle[u], &below[u], &nine[u], &response[u]);
         const int32_t next = u + IH_LANES;
@@ -375,7 +392,7 @@ static void respond_and_list(const struct rows *rows, const uint16_t *nine, int3
 {
     int32_t u = 0;
     int32_t listed = 0;
-#if defined __AVX2__ && !IH_WORDS
+#if BY_LANES && defined __AVX2__
     const struct rows in = *rows;
     const uint32_t *limit = out->limit;
     int16_t *response = out->response;
@@ -487,8 +504,7 @@ bool ih_band_is_any_above(const struct ih_band *band, int32_t limit)
 #endif
 }
 
-/* Ranges are checked without vectors. */
-#if IH_LANES != 0 && !IH_WORDS && !defined ISOHEAD_RANGE_CHECKS
+#if BY_LANES
 /* Sums of nine rows of bytes, those of even and of odd pixels apart, as they come from bytes without being
  * spread; pairs are an even pixel's and the next one's. inner: 1-2-1 of the rows in the middle. */
 struct halves {
@@ -496,16 +512,11 @@ struct halves {
     uint16_t *inner_even, *inner_odd;
 };
 
-static inline ih_lanes sum_of(ih_lanes a, ih_lanes b)
-{
-    return IH_LANES_OP(add_epi16)(a, b);
-}
-
 /* Both bytes of each 16 bits and the upper one alone are added up; without its sum what is left is the
  * lower one's: everything is below 2^16. */
 static inline ih_lanes even_of(ih_lanes both, ih_lanes odd)
 {
-    return IH_LANES_OP(sub_epi16)(both, IH_LANES_OP(slli_epi16)(odd, 8));
+    return less_of(both, IH_LANES_OP(slli_epi16)(odd, 8));
 }
 
 static inline ih_lanes odd_of(ih_lanes bytes)
@@ -545,17 +556,6 @@ static inline void sum_lanes(const uint8_t *const row[IH_BAND_ROWS], int32_t u,
     ih_lanes_store(sum_of(even, odd), &sums->pair[at]);
 }
 
-/* (81 i + 8) / 16 */
-static inline ih_lanes inside_of(ih_lanes sum)
-{
-#ifdef __AVX2__
-    return _mm256_mulhrs_epi16(_mm256_slli_epi16(sum, 3), _mm256_set1_epi16(INNER_WEIGHT * 256));
-#else
-    const __m128i half_up = _mm_add_epi16(sum, _mm_set1_epi16(OUTER_WEIGHT / 2));
-    return _mm_add_epi16(_mm_add_epi16(sum, _mm_slli_epi16(sum, 2)), _mm_srli_epi16(half_up, 4));
-#endif
-}
-
 /* R of 2 * IH_LANES pixels from u on. */
 static inline void respond_halves(const struct halves *sums, int32_t u, int16_t *response)
 {
@@ -573,8 +573,8 @@ static inline void respond_halves(const struct halves *sums, int32_t u, int16_t 
     const ih_lanes even_inner =
         sum_of(sum_of(inner, even), ih_lanes_load(&sums->inner_odd[at - 1]));
     const ih_lanes odd_inner = sum_of(sum_of(inner, odd), ih_lanes_load(&sums->inner_even[at + 1]));
-    const ih_lanes even_r = IH_LANES_OP(sub_epi16)(inside_of(even_inner), even_box);
-    const ih_lanes odd_r = IH_LANES_OP(sub_epi16)(inside_of(odd_inner), odd_box);
+    const ih_lanes even_r = less_of(inside_of(even_inner), even_box);
+    const ih_lanes odd_r = less_of(inside_of(odd_inner), odd_box);
     const ih_lanes low = IH_LANES_OP(unpacklo_epi16)(even_r, odd_r);
     const ih_lanes high = IH_LANES_OP(unpackhi_epi16)(even_r, odd_r);
 #ifdef __AVX2__
