@@ -597,7 +597,8 @@ void ih_dots_find(const struct ih_frame *frame, const struct ih_frame *ambient,
         if (v + ROWS_AHEAD < frame->height) {
             const struct ih_row ahead = ih_frame_row(frame, v + ROWS_AHEAD);
             const uint8_t *samples = ahead.samples;
-            for (int32_t i = 0; i < frame->width; i += IH_LINE_BYTES) {
+            const int32_t bytes = frame->width * frame->bytes_per_sample;
+            for (int32_t i = 0; i < bytes; i += IH_LINE_BYTES) {
                 __builtin_prefetch(&samples[i]); /* no function: gcc 12 leaves out calls of it */
             }
         }
