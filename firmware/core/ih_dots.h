@@ -95,7 +95,7 @@ struct ih_dots_scratch {
             struct ih_band band;
             /* Ring; row v is at (v + IH_DOTS_REACH) % IH_DOTS_ROWS. Zeros around the frame. */
             _Alignas(IH_ALIGNMENT) int16_t response[IH_DOTS_ROWS][IH_DOTS_ROW_SIZE];
-            struct ih_band_row listed[IH_DOTS_ROWS];
+            struct ih_band_row listed[IH_DOTS_ROWS]; /* row v is at v % IH_DOTS_ROWS */
             /* For the rows of R between two rows of blocks' centres, and for those between the next two. */
             uint32_t limit[2][IH_BAND_GROUPS];
         } finding;
