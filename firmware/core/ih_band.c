@@ -315,12 +315,11 @@ static inline bool is_any_above(const int16_t *response, uint32_t limit)
     }
     return ih_lanes_is_any(ih_lanes_greater(most, ih_lanes_both(limit)));
 #else
-    uint16_t any = 0;
+    int16_t most = 0;
     for (int32_t i = 0; i < IH_BAND_GROUP; i++) {
-        const uint16_t above = response[i] > (int16_t)(limit & INT16_MAX) ? UINT16_MAX : 0;
-        any = any | above;
+        most = response[i] > most ? response[i] : most;
     }
-    return any != 0;
+    return most > (int16_t)(limit & INT16_MAX);
 #endif
 }
 
