@@ -11,7 +11,7 @@
 #define RESPONSE_SHIFT 8
 
 /* Ranges are checked without vectors. */
-#if IH_LANES != 0 && !IH_WORDS && !defined ISOHEAD_RANGE_CHECKS
+#if defined IH_LANES_OP && !IH_WORDS && !defined ISOHEAD_RANGE_CHECKS
 #define BY_LANES 1
 #else
 #define BY_LANES 0

@@ -1,7 +1,8 @@
-/* ih_lanes - 16-bit numbers with sign side by side in a vector of x86, for what compilers make no
- * vectors of by themselves: comparisons that end in bits, and what leaves a loop early.
+/* ih_lanes - 16-bit numbers with sign side by side in a vector of x86 or of a 64-bit ARM, for what
+ * compilers make no vectors of by themselves: comparisons that end in bits, and what leaves a loop early.
  *
  * IH_LANES: how many; where there are none, 0, the same is written out beside, with the same result.
+ * IH_LANES_OP, on x86 alone: other instructions, as those of both widths differ by their names' beginning.
  */
 #ifndef IH_LANES_H
 #define IH_LANES_H
@@ -11,6 +12,8 @@
 
 #if defined __x86_64__ && defined __SSE2__
 #include <immintrin.h>
+#elif defined __aarch64__ && defined __ARM_NEON && __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__
+#include <arm_neon.h>
 #endif
 
 #if defined __AVX2__
@@ -111,6 +114,50 @@ static inline bool ih_lanes_is_any(ih_lanes a)
 static inline uint32_t ih_lanes_bits(ih_lanes a, ih_lanes b)
 {
     return (uint32_t)_mm_movemask_epi8(_mm_packs_epi16(a, b));
+}
+
+#elif defined __aarch64__ && defined __ARM_NEON && __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__
+
+#define IH_LANES 8
+typedef int16x8_t ih_lanes;
+
+static inline ih_lanes ih_lanes_load(const int16_t *at)
+{
+    return vld1q_s16(at);
+}
+
+static inline ih_lanes ih_lanes_both(uint32_t both)
+{
+    return vreinterpretq_s16_u32(vdupq_n_u32(both));
+}
+
+static inline ih_lanes ih_lanes_greatest(ih_lanes a, ih_lanes b)
+{
+    return vmaxq_s16(a, b);
+}
+
+static inline ih_lanes ih_lanes_greater(ih_lanes a, ih_lanes b)
+{
+    return vreinterpretq_s16_u16(vcgtq_s16(a, b));
+}
+
+static inline ih_lanes ih_lanes_without(ih_lanes a, ih_lanes b)
+{
+    return vbicq_s16(a, b);
+}
+
+static inline bool ih_lanes_is_any(ih_lanes a)
+{
+    return vmaxvq_u16(vreinterpretq_u16_s16(a)) != 0;
+}
+
+/* There is no instruction for it: each lane leaves its own bit of a byte, and all of a half are added. */
+static inline uint32_t ih_lanes_bits(ih_lanes a, ih_lanes b)
+{
+    const uint8x8_t bit = vcreate_u8(0x8040201008040201u);
+    const uint32_t first = vaddv_u8(vand_u8(vmovn_u16(vreinterpretq_u16_s16(a)), bit));
+    const uint32_t second = vaddv_u8(vand_u8(vmovn_u16(vreinterpretq_u16_s16(b)), bit));
+    return first | second << 8;
 }
 
 #else

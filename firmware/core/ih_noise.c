@@ -32,7 +32,7 @@ static int32_t between(int32_t low, int32_t high, int32_t part)
 }
 
 /* Ranges are checked without vectors. */
-#if IH_LANES != 0 && !IH_WORDS && !defined ISOHEAD_RANGE_CHECKS
+#if defined IH_LANES_OP && !IH_WORDS && !defined ISOHEAD_RANGE_CHECKS
 /* Blocks side by side in a vector, 8 bytes of each; those whose medians are looked for at once: each step
  * waits for the step before. */
 #define SIDE (IH_LANES / 4)

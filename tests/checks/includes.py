@@ -78,7 +78,7 @@ CORE_HEADERS = {
 CORE_SYSTEM = {"stdbool.h", "stddef.h", "stdint.h", "string.h"}
 # The vectors of x86 and the pairs of a Cortex-M, for files that have the same without.
 CORE_VECTORS = {("ih_normal.c", "immintrin.h"), ("ih_normal.c", "arm_acle.h"), ("ih_basis.c", "immintrin.h"),
-                ("ih_lanes.h", "immintrin.h"), ("ih_cuts.c", "immintrin.h"),
+                ("ih_lanes.h", "immintrin.h"), ("ih_lanes.h", "arm_neon.h"), ("ih_cuts.c", "immintrin.h"),
                 ("ih_row.c", "immintrin.h"), ("ih_rating.c", "immintrin.h"), ("ih_rating.c", "arm_neon.h"),
                 ("ih_words.h", "arm_acle.h"), ("ih_parts.c", "immintrin.h"),
                 ("ih_parts.c", "arm_acle.h"), ("ih_lens.c", "immintrin.h"), ("ih_surface.c", "immintrin.h")}
