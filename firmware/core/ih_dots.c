@@ -216,8 +216,7 @@ struct maximum {
 
 /* Rows that are judged together. */
 struct batch {
-    const int16_t
-        *row[IH_DOTS_ROWS]; /* of R, pixel 0 of each: the first one's near[-IH_DOTS_REACH] first */
+    const int16_t *row[IH_DOTS_ROWS]; /* pixel 0 of the first one's near[-IH_DOTS_REACH] and on */
     int32_t first_v;
     int32_t count; /* maxima that wait */
     struct maximum maximum[CHUNK];

@@ -45,7 +45,7 @@
 /* Radius of the ring and what it may be shifted by: rows of R above and below a maximum that are
  * needed. */
 #define IH_DOTS_REACH 6
-/* Rows whose maxima are judged together. */
+/* Rows whose maxima are judged together. Each more costs a row of R, IH_DOTS_ROW_SIZE numbers. */
 #define IH_DOTS_BATCH 4
 #define IH_DOTS_ROWS (2 * IH_DOTS_REACH + IH_DOTS_BATCH)
 /* Zeros to the left of a row of R and to its right: IH_DOTS_REACH or more, so that rows are aligned. */
