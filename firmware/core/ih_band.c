@@ -289,16 +289,16 @@ static inline void respond_two(const uint16_t *above, const uint16_t *middle, co
 /* Pixels whose loop is unrolled: gcc 12 does not at -O2. */
 #define SPAN 16
 
-static inline bool is_any_of_span_above(const int16_t *response, uint32_t most)
+static inline bool is_any_of_span_above(const int16_t *response, uint32_t limit)
 {
-    uint32_t above = ih_word_below(most, ih_word(response));
-    above |= ih_word_below(most, ih_word(&response[2]));
-    above |= ih_word_below(most, ih_word(&response[4]));
-    above |= ih_word_below(most, ih_word(&response[6]));
-    above |= ih_word_below(most, ih_word(&response[8]));
-    above |= ih_word_below(most, ih_word(&response[10]));
-    above |= ih_word_below(most, ih_word(&response[12]));
-    above |= ih_word_below(most, ih_word(&response[14]));
+    uint32_t above = ih_word_below(limit, ih_word(response));
+    above |= ih_word_below(limit, ih_word(&response[2]));
+    above |= ih_word_below(limit, ih_word(&response[4]));
+    above |= ih_word_below(limit, ih_word(&response[6]));
+    above |= ih_word_below(limit, ih_word(&response[8]));
+    above |= ih_word_below(limit, ih_word(&response[10]));
+    above |= ih_word_below(limit, ih_word(&response[12]));
+    above |= ih_word_below(limit, ih_word(&response[14]));
     return (above & IH_WORD_SIGNS) != 0;
 }
 #endif
