@@ -154,6 +154,7 @@ need_fuzz() {
     need_program make make
     need_clang_rt
     need_program afl-fuzz afl++
+    need_python json python3
 }
 
 need_test_board() {

@@ -7,8 +7,9 @@
 #   FUZZ_RUNS      or how many executions each does, whatever the time
 #   FUZZ_ENGINES   default "libfuzzer afl"
 #
-# Starts from tests/fuzz/corpus and from what earlier runs found (build/fuzz/TARGET/corpus). Inputs that
-# break something are left in build/fuzz/TARGET/findings; replay one by
+# Starts from tests/fuzz/corpus, unpacked into build/fuzz/TARGET/packed, and from what earlier runs found
+# (build/fuzz/TARGET/corpus). Inputs that break something are left in build/fuzz/TARGET/findings; replay
+# one by
 #   build/fuzz-libfuzzer/tests/fuzz/fuzz_TARGET FILE
 # Exit status 1 when there is any.
 set -eu
@@ -52,7 +53,7 @@ run_libfuzzer() {
     if [ -n "$runs" ]; then limit=-runs=$runs; else limit=-max_total_time=$seconds; fi
     nice "build/fuzz-libfuzzer/tests/fuzz/fuzz_$1" "$limit" ${words:+"-dict=$words"} -timeout=60 \
         -max_len=4096 -print_final_stats=1 -artifact_prefix="$work/findings/" "$work/corpus" \
-        "tests/fuzz/corpus/$1" >"$work/libfuzzer.log" 2>&1 || true
+        "$work/packed" >"$work/libfuzzer.log" 2>&1 || true
     executions=$(sed -n 's/^stat::number_of_executed_units: *//p' "$work/libfuzzer.log")
     edges=$(sed -n 's/.* cov: \([0-9]*\) .*/\1/p' "$work/libfuzzer.log" | tail -n 1)
     if [ -z "$executions" ]; then
@@ -78,7 +79,7 @@ run_afl() {
     if [ -n "$runs" ]; then limit="-E $runs"; else limit="-V $seconds"; fi
     # shellcheck disable=SC2086 # two words
     AFL_SKIP_CPUFREQ=1 AFL_I_DONT_CARE_ABOUT_MISSING_CRASHES=1 AFL_NO_AFFINITY=1 AFL_NO_UI=1 \
-        AFL_FAST_CAL=1 nice afl-fuzz -i "tests/fuzz/corpus/$1" -o "$work/afl" $limit \
+        AFL_FAST_CAL=1 nice afl-fuzz -i "$work/packed" -o "$work/afl" $limit \
         ${words:+-x "$words"} -t 20000 -m none -- "build/fuzz-afl/tests/fuzz/fuzz_$1" \
         >"$work/afl.log" 2>&1 || true
     stats=$work/afl/default/fuzzer_stats
@@ -98,7 +99,8 @@ row target engine executions edges findings
 for engine in $engines; do
     for target in $targets; do
         mkdir -p "$root/$target/corpus" "$root/$target/findings"
-        find "tests/fuzz/corpus/$target" -type f -exec cp -t "$root/$target/corpus" {} +
+        rm -rf "$root/$target/packed"
+        tests/fuzz/corpus.py unpack "tests/fuzz/corpus/$target.pack" "$root/$target/packed"
         before=$(find "$root/$target/findings" -type f | wc -l)
         "run_$engine" "$target"
         count=$(($(find "$root/$target/findings" -type f | wc -l) - before))
