@@ -5,6 +5,7 @@
 
 #include "app_view.h"
 #include "sim_report.h"
+#include "points/ih_cloud.h"
 
 static bool draw(struct sim_cloud *cloud, const struct hal_frame *frame, const struct ih_rig *rig,
                  struct hal_error *error)

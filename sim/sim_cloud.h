@@ -3,7 +3,8 @@
 #define SIM_CLOUD_H
 
 #include "hal.h"
-#include "ih_cloud.h"
+#include "base/ih_types.h"
+#include "rig/ih_rig.h"
 
 struct sim_cloud {
     uint16_t *depth_mm; /* NULL while no list came */

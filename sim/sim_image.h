@@ -9,7 +9,8 @@
 #define SIM_IMAGE_H
 
 #include "hal.h"
-#include "ih_rig.h"
+#include "base/ih_types.h"
+#include "rig/ih_rig.h"
 
 #define SIM_IMAGE_WIDTH_MAX 640
 

@@ -2,7 +2,7 @@
 
 #include <stdlib.h>
 
-#include "ih_fix.h"
+#include "base/ih_fix.h"
 #include "sim_report.h"
 
 static void add_value(struct sim_list *list, int32_t value)

@@ -8,6 +8,7 @@
 
 #include "hal_file.h"
 #include "sim_trace_cuts.h"
+#include "detect/ih_score.h"
 
 /* An int32_t member of an array of structs as a list of its own. */
 static void write_column(struct app_write *write, const char *key, const void *first, int32_t count,

@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "ih_config.h"
+#include "base/ih_config.h"
 #include "hal_file.h"
 #include "replay/hal_lines.h"
 

@@ -11,7 +11,6 @@
 #include "app_config.h"
 #include "app_log.h"
 #include "app_loop.h"
-#include "isohead.h"
 #include "linux/hal_clock.h"
 #include "linux/hal_events.h"
 #include "linux/hal_gpio.h"

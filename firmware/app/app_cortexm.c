@@ -10,7 +10,7 @@
 #include "app_view.h"
 #include "cortexm/hal_semihosting.h"
 #include "hal_text.h"
-#include "ih_blob.h"
+#include "rig/ih_blob.h"
 #include "replay/hal_pgm.h"
 
 #define FRAME_US 40000

@@ -5,7 +5,7 @@
 #include <string.h>
 
 #include "app_text.h"
-#include "ih_fix.h"
+#include "base/ih_fix.h"
 
 /* A turn that differs by more than this from what was told is told again. */
 #define TOLD_RAD_Q30 374802 /* 0.02 degrees */

@@ -34,9 +34,8 @@
 #include "app_record.h"
 #include "app_status.h"
 #include "hal.h"
-#include "ih_exposure.h"
-#include "ih_health.h"
-#include "isohead.h"
+#include "upkeep/ih_exposure.h"
+#include "upkeep/ih_health.h"
 
 /* After so many frame times without a frame, but not sooner than this, the camera is opened anew. */
 #define APP_LOOP_SILENT_FRAMES 10

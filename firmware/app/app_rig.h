@@ -11,7 +11,7 @@
 #define APP_RIG_H
 
 #include "hal.h"
-#include "ih_rig.h"
+#include "rig/ih_rig.h"
 
 /* Largest rig.json; 361 rays in full precision need 30 kB. */
 #define APP_RIG_FILE_MAX ((size_t)4 << 20)

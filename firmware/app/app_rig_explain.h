@@ -3,7 +3,8 @@
 #define APP_RIG_EXPLAIN_H
 
 #include "hal.h"
-#include "ih_rig.h"
+#include "base/ih_types.h"
+#include "rig/ih_rig.h"
 
 /* err and bad_slot as from ih_rig_init. *error names field, value and expectation. */
 void app_rig_explain(const struct ih_calibration *calibration, enum ih_err err, int32_t bad_slot,

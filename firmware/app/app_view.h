@@ -4,7 +4,8 @@
 #define APP_VIEW_H
 
 #include "hal.h"
-#include "ih_rig.h"
+#include "base/ih_types.h"
+#include "rig/ih_rig.h"
 
 /* Good for as long as the frame is held. */
 struct ih_frame app_view_of(const struct hal_frame *frame);

@@ -18,7 +18,22 @@
 #ifndef ISOHEAD_H
 #define ISOHEAD_H
 
-#include "ih_result.h"
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "base/ih_types.h"
+#include "detect/ih_findings.h"
+#include "dots/ih_dots.h"
+#include "labels/ih_labels.h"
+#include "nests/ih_heads.h"
+#include "nests/ih_hypotheses.h"
+#include "points/ih_points.h"
+#include "points/ih_windows.h"
+#include "rig/ih_rig.h"
+#include "surface/ih_samples.h"
+#include "surface/ih_surface.h"
+#include "tracks/ih_result.h"
+#include "tracks/ih_tracks.h"
 
 #define ISOHEAD_VERSION "0.1.0"
 

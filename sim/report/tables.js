@@ -102,7 +102,7 @@ const Tables = (() => {
     fillCards(into, "Hypotheses of this frame", head, hypotheses.map((_, i) => hypothesisRow(frame, i, chosen, choose)));
   }
 
-  /* Kinds of evidence (firmware/core/ih_evidence.h): what they are, unit, decimals. */
+  /* Kinds of evidence (firmware/core/detect/ih_evidence.h): what they are, unit, decimals. */
   const KINDS = {
     on: ["points on the ellipsoid", "", 0], rough: ["their distance from it", "mm", 1], bulge: ["rounder than a plane by", "mm", 1],
     tall: ["taller than the mean head by", "%", 0], moved: ["moved by the fit", "mm", 0], above: ["open above", "share", 2],
@@ -158,7 +158,7 @@ const Tables = (() => {
           element("tbody", {}, ...rows)))));
   }
 
-  /* The paper's tests of a nest, in their order (firmware/core/ih_heads.h). */
+  /* The paper's tests of a nest, in their order (firmware/core/nests/ih_heads.h). */
   function tests(h, l) {
     const share = (part, all, least) => [all === 0 ? "nothing there" : `${part} of ${all}`, `at least ${least} %`, part * 100 >= all * least];
     const o = h.outline;

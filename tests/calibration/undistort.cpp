@@ -11,7 +11,9 @@
 #include <opencv2/core.hpp>
 
 extern "C" {
-#include "ih_rig.h"
+#include "base/ih_config.h"
+#include "base/ih_types.h"
+#include "rig/ih_rig.h"
 }
 
 static const double limit_px = 0.02;

@@ -15,6 +15,7 @@ core_rules.py --self-test                  breaks each rule in a copy and sees i
 """
 
 import argparse
+import glob
 import json
 import os
 import re
@@ -62,7 +63,7 @@ def compile_one(source, directory):
 
 
 def core_sources():
-    return [os.path.join(CORE, name) for name in sorted(os.listdir(CORE)) if name.endswith(".c")]
+    return sorted(glob.glob(os.path.join(CORE, "**", "*.c"), recursive=True))
 
 
 def check_symbols(objects):

@@ -12,6 +12,7 @@ coverage.py --self-test     notices an untaken branch and a line that was never 
 
 import argparse
 import collections
+import glob
 import json
 import os
 import subprocess
@@ -52,7 +53,7 @@ def counts(build, core):
         sys.exit("coverage: no .gcda below %s: run the tests of a build with --coverage" % build)
     for path in found:
         for source, file in gcov(path):
-            if os.path.dirname(source) != core:
+            if not source.startswith(core + os.sep):
                 continue
             name = os.path.basename(source)
             for line in file["lines"]:
@@ -97,7 +98,9 @@ def left(lines, branches, core):
 
 def check(build):
     lines, branches = counts(build, CORE)
-    absent = sorted(name for name in os.listdir(CORE) if name.endswith(".c") and name not in lines)
+    absent = sorted(name for name in (os.path.basename(path) for path in
+                                      glob.glob(os.path.join(CORE, "**", "*.c"), recursive=True))
+                    if name not in lines)
     if absent:
         sys.exit("coverage: no test is linked with %s" % ", ".join(absent))
     lines_run, branches_taken = table(lines, branches)

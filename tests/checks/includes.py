@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 """Who may include whom: the rules of the source tree, read from the #include lines.
 
-  core     the stages form a chain; a stage's header includes the stage before it and the few
-           headers that all share, its source only its own header and the arithmetic. isohead.c sees
-           the stages through isohead.h alone. Of the system: fixed-width integers, bool, size_t and
-           string.h, nothing that does I/O, allocates or knows floating point.
+  core     its folders stand in an order, CORE_ORDER: a file includes what its own folder and those before
+           have, each header by its folder. Only isohead.h lists the stages. Of the system: fixed-width
+           integers, bool, size_t and string.h, nothing that does I/O, allocates or knows floating point;
+           a processor's vectors in simd alone.
   hal      hal.h, what all back ends share, its own files and the system; never firmware.
   app      core, hal.h, its own files; of the back ends only app_board and app_live_main know one,
            hal/linux, and app_cortexm one, hal/cortexm, with the decoder of PGM.
@@ -15,102 +15,48 @@
   bench    core, the app's rig, hal's files, its own files.
   tests    anything.
 
-includes.py [--self-test]      exit status 1 if a rule is broken, each with file and line
+includes.py      exit status 1 if a rule is broken, each with file and line
 """
 
-import argparse
 import os
 import re
 import sys
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 
-# Each core header and what it may include; CORE_SHARED goes without saying above ih_rig.h.
-CORE_SHARED = {"ih_config.h", "ih_types.h", "ih_rig.h"}
-CORE_HEADERS = {
-    "ih_config.h": set(),
-    "ih_types.h": set(),
-    "ih_range.h": set(),
-    "ih_fix.h": {"ih_range.h"},
-    "ih_words.h": set(),
-    "ih_lanes.h": set(),
-    "ih_lane16.h": {"ih_range.h"},
-    "ih_rig.h": {"ih_config.h", "ih_types.h"},
-    "ih_blob.h": CORE_SHARED,
-    "ih_cholesky.h": {"ih_config.h", "ih_types.h"},
-    "ih_normal.h": {"ih_config.h", "ih_types.h"},
-    "ih_basis.h": {"ih_config.h", "ih_types.h"},
-    "ih_band.h": {"ih_config.h", "ih_types.h"},
-    "ih_noise.h": {"ih_config.h", "ih_types.h", "ih_band.h"},
-    "ih_dots.h": CORE_SHARED | {"ih_noise.h"},
-    "ih_lens.h": CORE_SHARED | {"ih_dots.h"},
-    "ih_labels.h": CORE_SHARED | {"ih_dots.h", "ih_lens.h"},
-    "ih_exposure.h": CORE_SHARED | {"ih_labels.h"},
-    "ih_turn.h": CORE_SHARED | {"ih_dots.h"},
-    "ih_places.h": CORE_SHARED | {"ih_labels.h", "ih_turn.h"},
-    "ih_health.h": CORE_SHARED | {"ih_places.h"},
-    "ih_cloud.h": CORE_SHARED,
-    "ih_windows.h": CORE_SHARED,
-    "ih_points.h": CORE_SHARED | {"ih_labels.h", "ih_windows.h"},
-    "ih_samples.h": CORE_SHARED | {"ih_points.h"},
-    "ih_surface.h": CORE_SHARED | {"ih_samples.h", "ih_basis.h", "ih_normal.h"},
-    "ih_cuts.h": CORE_SHARED | {"ih_surface.h"},
-    "ih_parts.h": CORE_SHARED | {"ih_cuts.h"},
-    "ih_ellipse.h": CORE_SHARED | {"ih_parts.h"},
-    "ih_hypotheses.h": CORE_SHARED | {"ih_ellipse.h"},
-    "ih_heads.h": CORE_SHARED | {"ih_hypotheses.h"},
-    "ih_space.h": CORE_SHARED | {"ih_samples.h"},
-    "ih_ellipsoid.h": CORE_SHARED | {"ih_space.h"},
-    "ih_rating.h": CORE_SHARED | {"ih_ellipsoid.h"},
-    "ih_scan.h": CORE_SHARED | {"ih_rating.h"},
-    "ih_row.h": CORE_SHARED | {"ih_ellipsoid.h", "ih_cholesky.h"},
-    "ih_glance.h": CORE_SHARED | {"ih_row.h"},
-    "ih_fit.h": CORE_SHARED | {"ih_row.h"},
-    "ih_tally.h": CORE_SHARED | {"ih_ellipsoid.h"},
-    "ih_evidence.h": CORE_SHARED | {"ih_fit.h", "ih_tally.h"},
-    "ih_score.h": CORE_SHARED | {"ih_evidence.h"},
-    "ih_score_weights.h": {"ih_score.h"},
-    "ih_findings.h": CORE_SHARED | {"ih_glance.h", "ih_heads.h", "ih_scan.h", "ih_score.h"},
-    "ih_tracks.h": CORE_SHARED | {"ih_findings.h"},
-    "ih_result.h": CORE_SHARED | {"ih_tracks.h"},
-    "isohead.h": CORE_SHARED | {"ih_result.h"},
-}
+CORE_ORDER = ["base", "simd", "rig", "dots", "labels", "points", "surface", "nests", "detect", "tracks", "upkeep"]
 CORE_SYSTEM = {"stdbool.h", "stddef.h", "stdint.h", "string.h"}
-# The vectors of x86 and the pairs of a Cortex-M, for files that have the same without.
-CORE_VECTORS = {("ih_normal.c", "immintrin.h"), ("ih_normal.c", "arm_acle.h"), ("ih_basis.c", "immintrin.h"),
-                ("ih_lanes.h", "immintrin.h"), ("ih_lanes.h", "arm_neon.h"), ("ih_cuts.c", "immintrin.h"),
-                ("ih_row.c", "immintrin.h"), ("ih_rating.c", "immintrin.h"), ("ih_rating.c", "arm_neon.h"),
-                ("ih_words.h", "arm_acle.h"), ("ih_parts.c", "immintrin.h"),
-                ("ih_parts.c", "arm_acle.h"), ("ih_lens.c", "immintrin.h"), ("ih_surface.c", "immintrin.h")}
+# The vectors of x86 and the pairs of a Cortex-M, in files that are not yet on one vocabulary.
+VECTOR_HEADERS = {"immintrin.h", "emmintrin.h", "arm_neon.h", "arm_acle.h"}
+VECTOR_FILES = {"ih_normal.c", "ih_basis.c", "ih_cuts.c", "ih_row.c", "ih_rating.c", "ih_parts.c", "ih_lens.c",
+                "ih_surface.c"}
 
 INCLUDE = re.compile(r'^\s*#\s*include\s*(["<])([^">]+)[">]')
 
 
-def allowed_in_core(name):
-    if name in CORE_HEADERS:
-        return CORE_HEADERS[name]
-    own = name[:-len(".c")] + ".h"
-    if name == "isohead.c":
-        return {own}
-    if name == "ih_score.c":
-        return {own, "ih_fix.h", "ih_score_weights.h"}
-    return {own, "ih_fix.h", "ih_range.h", "ih_words.h", "ih_lanes.h", "ih_lane16.h"} if own in CORE_HEADERS else None
-
-
 def judge_core(path, quoted, target):
-    name = os.path.basename(path)
-    allowed = allowed_in_core(name)
-    if allowed is None:
-        return "this file stands in no rule: add it to tests/checks/includes.py"
+    parts = path.split("/")[2:]
+    folder = parts[0] if len(parts) == 2 else None
+    if folder is not None and folder not in CORE_ORDER:
+        return "this folder stands in no order: add it to CORE_ORDER in tests/checks/includes.py"
     if not quoted:
-        return None if target in CORE_SYSTEM or (name, target) in CORE_VECTORS else "the core does without <%s>" % target
-    if target in allowed:
-        return None
-    return "%s may include only %s" % (name, ", ".join(sorted(allowed)) or "nothing of ours")
+        if target in CORE_SYSTEM:
+            return None
+        if target in VECTOR_HEADERS and (folder == "simd" or parts[-1] in VECTOR_FILES):
+            return None
+        return "the core does without <%s>" % target
+    if "/" not in target:
+        if path.endswith("/isohead.c") and target == "isohead.h":
+            return None
+        return "a header is named with its folder; isohead.h is for isohead.c"
+    if target.split("/")[0] not in CORE_ORDER:
+        return "nothing of ours outside of the core"
+    before = CORE_ORDER[:CORE_ORDER.index(folder) + 1] if folder else CORE_ORDER
+    return None if target.split("/")[0] in before else "%s may include %s" % (folder, ", ".join(before))
 
 
 def is_core(target):
-    return os.path.basename(target) in CORE_HEADERS or target.startswith(("ih_", "isohead"))
+    return target == "isohead.h" or target.split("/")[0] in CORE_ORDER
 
 
 def judge_hal(path, quoted, target):
@@ -208,57 +154,5 @@ def check():
     return 1 if bad or not lines else 0
 
 
-def self_test():
-    """Lines that must be refused, and lines that must not."""
-    refused = [("firmware/core/ih_dots.h", '#include "ih_labels.h"'),
-               ("firmware/core/ih_points.h", '#include "ih_dots.h"'),
-               ("firmware/core/ih_dots.c", '#include "ih_rig.h"'),
-               ("firmware/core/ih_dots.c", "#include <stdio.h>"),
-               ("firmware/core/ih_dots.c", "#include <stdlib.h>"),
-               ("firmware/core/ih_dots.c", "#include <math.h>"),
-               ("firmware/core/isohead.c", '#include "ih_tracks.h"'),
-               ("firmware/core/ih_new.c", '#include "ih_new.h"'),
-               ("hal/replay/hal_pgm.c", '#include "ih_types.h"'),
-               ("hal/linux/hal_v4l2.c", '#include "replay/hal_pgm.h"'),
-               ("hal/hal.h", '#include "app_text.h"'),
-               ("sim/sim_run.c", '#include "rd_rig.h"'),
-               ("sim/sim_run.c", '#include "../firmware/core/isohead.h"'),
-               ("tools/render/main.c", '#include "isohead.h"'),
-               ("tools/render/main.c", "#include <hal.h>"),
-               ("tools/bench/bench_isohead.c", '#include "app_loop.h"'),
-               ("firmware/app/app_loop.c", '#include "linux/hal_gpio.h"'),
-               ("firmware/app/app_live.c", '#include "linux/hal_serve.h"'),
-               ("firmware/app/app_loop.c", '#include "sim_run.h"'),
-               ("sim/sim_run.c", '#include "app_laser.h"'),
-               ("tools/rigblob/main.c", '#include "app_record.h"'),
-               ("tools/size/count.c", '#include "isohead.h"'),
-               ("firmware/app/app_loop.c", '#include "cortexm/hal_semihosting.h"'),
-               ("firmware/app/app_cortexm.c", '#include "linux/hal_gpio.h"'),
-               ("firmware/other/main.c", '#include "isohead.h"')]
-    good = [("firmware/core/ih_labels.h", '#include "ih_dots.h"'),
-            ("firmware/core/ih_labels.c", '#include "ih_fix.h"'),
-            ("firmware/core/ih_labels.c", "#include <string.h>"),
-            ("hal/replay/hal_pgm.c", "#include <cjson/cJSON.h>"),
-            ("sim/sim_run.c", '#include "replay/hal_replay.h"'),
-            ("sim/sim_run.c", '#include "app_record.h"'),
-            ("firmware/app/app_board.c", '#include "linux/hal_gpio.h"'),
-            ("firmware/app/app_loop.c", '#include "isohead.h"'),
-            ("tools/render/main.c", '#include "rd_rig.h"'),
-            ("tools/bench/bench_isohead.c", '#include "isohead.h"')]
-    missed = [line for line in refused if judge(*line) is None]
-    missed += [line for line in good if judge(*line) is not None]
-    for path, line in missed:
-        print("judged wrongly: %s: %s" % (path, line))
-    print("includes: %d made-up lines, %d judged wrongly" % (len(refused + good), len(missed)))
-    return 1 if missed else 0
-
-
-def main():
-    parser = argparse.ArgumentParser(description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--self-test", action="store_true")
-    return self_test() if parser.parse_args().self_test else check()
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(check())

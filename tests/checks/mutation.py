@@ -44,7 +44,7 @@ CPU_TIMES = 6
 CPU_LEAST_S = 2
 RESULTS = ("no C", "equivalent", "caught", "golden", "alive")
 
-COMPILE_CORE = ["gcc", "-std=c11", "-O2", "-ffp-contract=off", "-mgeneral-regs-only", "-w", "-c"]
+COMPILE_CORE = ["gcc", "-std=c11", "-O2", "-ffp-contract=off", "-mgeneral-regs-only", "-w", "-I.", "-c"]
 # Tests see no vectors either: their headers say what the core can do.
 COMPILE_TEST = ["gcc", "-std=c11", "-O1", "-ffp-contract=off", "-U__SSE2__", "-w", "-c"]
 SANITIZERS = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
@@ -73,14 +73,12 @@ class Bench:
         self.seconds = {}
         self.linked = {}  # objects of the core, by test
         self.lock = threading.Lock()
-        os.makedirs(os.path.join(work, "core"))
-        for path in glob.glob(core + "/*.[ch]"):
-            shutil.copy(path, os.path.join(work, "core"))
-        self.sources = sorted(os.path.basename(path) for path in glob.glob(core + "/*.c"))
+        shutil.copytree(core, os.path.join(work, "core"))
+        self.sources = core_files(core, "*.c")
         for source in self.sources:
-            run(COMPILE_CORE + [source], os.path.join(work, "core"))
+            run(COMPILE_CORE + [source, "-o", source[:-2] + ".o"], os.path.join(work, "core"))
         self.library = os.path.join(work, "libcore.a")
-        run(["ar", "rcs", self.library] + sorted(glob.glob(work + "/core/*.o")))
+        run(["ar", "rcs", self.library] + [os.path.join(work, "core", source[:-2] + ".o") for source in self.sources])
         if unity:
             run(COMPILE_TEST + [unity + "/unity.c", "-o", work + "/unity.o"])
         for test in tests:
@@ -105,7 +103,7 @@ class Bench:
 
     def compile_test(self, test, core, output):
         own = os.path.dirname(test)
-        folders = [core, own, os.path.join(own, "../vectors")] + ([self.unity] if self.unity else [])
+        folders = [core, own, os.path.join(ROOT, "tests/unit"), os.path.join(ROOT, "tests/vectors")] + ([self.unity] if self.unity else [])
         return COMPILE_TEST + ["-I" + folder for folder in folders] + [test, "-o", output]
 
     def link(self, objects, output, library=None, options=()):
@@ -120,7 +118,7 @@ class Bench:
         self.linked[test] = set(re.findall(r"libcore\.a\W+(\w+)\.o", trace))
         included = included_source(test)
         if included:
-            self.linked[test].add(included[:-2])
+            self.linked[test].add(os.path.basename(included)[:-2])
         begin = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
         if subprocess.run([program], stdout=subprocess.DEVNULL, check=False).returncode:
             sys.exit("mutation: %s fails without any mutant" % os.path.basename(test))
@@ -142,17 +140,25 @@ class Bench:
         """Those that the source is linked with: its own, then the others, the quick ones first."""
         own = [test for test in self.tests if is_own(test, source)]
         others = [test for test in self.tests if test not in own and
-                  (source.endswith(".h") or source[:-2] in self.linked[test])]
+                  (source.endswith(".h") or stem_of(source) in self.linked[test])]
         return own + sorted(others, key=lambda test: self.seconds[test])
 
 
+def core_files(core, pattern):
+    return sorted(glob.glob("**/" + pattern, root_dir=core, recursive=True))
+
+
+def stem_of(source):
+    return os.path.basename(source)[:-2]
+
+
 def is_own(test, source):
-    return os.path.basename(test)[5:-2] == re.sub(r"^ih_", "", source[:-2])
+    return os.path.basename(test)[5:-2] == re.sub(r"^ih_", "", stem_of(source))
 
 
 def included_source(test):
     """The source of the core that a test includes, to reach its static functions."""
-    found = re.search(r'^#include "(\w+\.c)"', read(test), re.MULTILINE)
+    found = re.search(r'^#include "([\w/]+\.c)"', read(test), re.MULTILINE)
     return found[1] if found else None
 
 
@@ -187,11 +193,11 @@ class Trial:
         self.objects = [os.path.join(self.core, name[:-2] + ".o") for name in self.sources]
 
     def compile(self):
-        return all(subprocess.run(COMPILE_CORE + [name], cwd=self.core, stderr=subprocess.DEVNULL,
+        return all(subprocess.run(COMPILE_CORE + [name, "-o", name[:-2] + ".o"], cwd=self.core, stderr=subprocess.DEVNULL,
                                   check=False).returncode == 0 for name in self.sources)
 
     def is_equivalent(self):
-        return all(read(path, "rb") == read(os.path.join(self.bench.work, "core", os.path.basename(path)), "rb")
+        return all(read(path, "rb") == read(os.path.join(self.bench.work, "core", os.path.relpath(path, self.core)), "rb")
                    for path in self.objects)
 
     def put_into_library(self):
@@ -255,8 +261,8 @@ def try_one(bench, source, mutant):
 
 def mutated_sources(core):
     """Every source, and the headers that hold code."""
-    return sorted(os.path.basename(path) for path in glob.glob(core + "/*.[ch]")
-                  if path.endswith(".c") or "static inline" in read(path))
+    return [name for name in core_files(core, "*.[ch]")
+            if name.endswith(".c") or "static inline" in read(os.path.join(core, name))]
 
 
 def shares(weights, count):
@@ -317,13 +323,13 @@ def report(bench, quota, seed, jobs):
 
 
 def check(arguments):
-    tests = [path for path in sorted(glob.glob(ROOT + "/tests/unit/test_*.c")) if is_of_core(path)]
+    tests = [path for path in sorted(glob.glob(ROOT + "/tests/unit/**/test_*.c", recursive=True)) if is_of_core(path)]
     core = os.path.join(ROOT, "firmware", "core")
     quota = shares({name: len(sites.mutants(read(os.path.join(core, name))))
                     for name in mutated_sources(core)}, arguments.count)
     if arguments.stage:
         quota = {name: quota[name] for name in quota
-                 if re.sub(r"^ih_|\.[ch]$", "", name) in arguments.stage}
+                 if re.sub(r"^ih_", "", stem_of(name)) in arguments.stage}
     begin = time.monotonic()
     with tempfile.TemporaryDirectory() as work:
         bench = Bench(core, tests, arguments.unity, work, arguments.golden)
@@ -340,11 +346,11 @@ def check(arguments):
 def is_of_core(test):
     """A test of a source of the core by its name, or one that includes it."""
     stem = os.path.basename(test)[5:-2]
-    return any(name and os.path.exists(os.path.join(ROOT, "firmware", "core", name))
-               for name in (stem + ".c", "ih_" + stem + ".c", included_source(test)))
+    names = {os.path.basename(name) for name in core_files(os.path.join(ROOT, "firmware", "core"), "*.c")}
+    included = included_source(test)
+    return bool({stem + ".c", "ih_" + stem + ".c", included and os.path.basename(included)} & names)
 
 
-# A core of two stages, one of them with a test. It is known what becomes of these mutants.
 SAMPLE = """#include "ih_sample.h"
 int sample_sum(int count)
 {

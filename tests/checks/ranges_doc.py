@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The ranges of firmware/core/ih_range.h: the same in docs/numerics.md, used, and no code.
+"""The ranges of firmware/core/base/ih_range.h: the same in docs/numerics.md, used, and no code.
 
   doc     each IH_RANGE_ constant is named in docs/numerics.md, with its value, as `NAME` = 123; the
           document names no other
@@ -11,6 +11,7 @@ ranges_doc.py [--self-test]      exit status 1 if one of these does not hold
 """
 
 import argparse
+import glob
 import os
 import re
 import subprocess
@@ -19,6 +20,7 @@ import tempfile
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 CORE = os.path.join(ROOT, "firmware", "core")
+RANGE_HEADER = os.path.join("base", "ih_range.h")
 CHECK = re.compile(r"^[ \t]*IH_IN_RANGE\([^;]*;\n", re.M)
 COMPILE = ["gcc", "-std=c11", "-O0", "-I", ".", "-c", "-o"]
 
@@ -49,22 +51,26 @@ def check_use(header, sources):
             if not re.search(r"\b%s\b" % name, sources)]
 
 
+def core_files():
+    return sorted(glob.glob("**/*.[ch]", root_dir=CORE, recursive=True))
+
+
 def compile_core(directory, objects):
     """The core's objects; compiled in their folder, so that paths are the same."""
     os.mkdir(objects)
-    for name in sorted(os.listdir(directory)):
-        if name.endswith(".c"):
-            subprocess.run(COMPILE + [os.path.join(objects, name), name], cwd=directory, check=True)
+    for path in sorted(glob.glob("**/*.c", root_dir=directory, recursive=True)):
+        subprocess.run(COMPILE + [os.path.join(objects, os.path.basename(path)), path], cwd=directory, check=True)
 
 
 def check_code(change=lambda text: text):
     with tempfile.TemporaryDirectory() as work:
         for side, edit in (("with", change), ("without", lambda text: CHECK.sub("", text))):
-            os.mkdir(os.path.join(work, side))
-            for name in os.listdir(CORE):
-                text = read(os.path.join(CORE, name))
-                with open(os.path.join(work, side, name), "w", encoding="utf-8") as file:
-                    file.write(text if name == "ih_range.h" and side == "without" else edit(text))
+            for path in core_files():
+                text = read(os.path.join(CORE, path))
+                copy = os.path.join(work, side, path)
+                os.makedirs(os.path.dirname(copy), exist_ok=True)
+                with open(copy, "w", encoding="utf-8") as file:
+                    file.write(text if path == RANGE_HEADER and side == "without" else edit(text))
             compile_core(os.path.join(work, side), os.path.join(work, side + ".o"))
         names = sorted(os.listdir(os.path.join(work, "with.o")))
         return names, ["%s: an IH_IN_RANGE makes code" % name for name in names
@@ -73,12 +79,11 @@ def check_code(change=lambda text: text):
 
 
 def core_sources():
-    return "".join(read(os.path.join(CORE, name)) for name in sorted(os.listdir(CORE))
-                   if name != "ih_range.h" and name.endswith((".c", ".h")))
+    return "".join(read(os.path.join(CORE, path)) for path in core_files() if path != RANGE_HEADER)
 
 
 def check():
-    header, doc, sources = (read(os.path.join(CORE, "ih_range.h")),
+    header, doc, sources = (read(os.path.join(CORE, RANGE_HEADER)),
                             read(os.path.join(ROOT, "docs", "numerics.md")), core_sources())
     names, wrong = check_code()
     wrong += check_doc(header, doc) + check_use(header, sources)

@@ -3,7 +3,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-#include "ih_range.h"
+#include "base/ih_range.h"
 
 /* Called by the casts that ranges_cc.py makes. */
 __extension__ __int128 ih_range_cast(__int128 value, __int128 low, __int128 high, const char *what,

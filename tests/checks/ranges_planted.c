@@ -6,8 +6,10 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "ih_ellipsoid.h"
-#include "ih_fix.h"
+#include "base/ih_fix.h"
+#include "base/ih_range.h"
+#include "detect/ih_ellipsoid.h"
+#include "detect/ih_space.h"
 
 /* Nothing that a compiler knows. */
 static volatile int32_t big = 70000;

@@ -135,7 +135,8 @@ def tracked(root, *patterns):
 
 def includes(root, *headers):
     """Every folder with a header."""
-    return ["-I" + folder for folder in sorted({os.path.dirname(path) for path in tracked(root, *headers)})]
+    return ["-I" + folder for folder in sorted({os.path.dirname(path) for path in tracked(root, *headers)}
+                                               | {"firmware/core", "hal"})]
 
 
 def everything(build):

@@ -2,7 +2,7 @@
  * them. No engine finds a CRC: one flag has it put right, so that what lies behind it is reached. */
 #include <string.h>
 
-#include "ih_blob.h"
+#include "rig/ih_blob.h"
 
 #include "fuzz_rig.h"
 

@@ -2,7 +2,8 @@
  * from their lines and moving along them, for some frames; one slot; dots to vote. */
 #include <string.h>
 
-#include "ih_health.h"
+#include "upkeep/ih_health.h"
+#include "upkeep/ih_turn.h"
 
 #include "fuzz.h"
 #include "fuzz_rig.h"

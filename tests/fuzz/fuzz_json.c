@@ -3,7 +3,7 @@
  * .. f3.pgm, f1.xyz. */
 #include <string.h>
 
-#include "ih_config.h"
+#include "base/ih_config.h"
 #include "replay/hal_lines.h"
 #include "replay/hal_replay.h"
 #include "sim_truth.h"

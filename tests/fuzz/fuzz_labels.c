@@ -2,7 +2,7 @@
  * anywhere in the frame, or the pattern's dots at some depth, a little off. */
 #include <string.h>
 
-#include "ih_exposure.h"
+#include "upkeep/ih_exposure.h"
 
 #include "fuzz_check.h"
 #include "fuzz_rig.h"

@@ -8,7 +8,7 @@
  */
 #include <string.h>
 
-#include "ih_cloud.h"
+#include "points/ih_cloud.h"
 
 #include "fuzz_check.h"
 #include "fuzz_rig.h"

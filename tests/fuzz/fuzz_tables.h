@@ -2,8 +2,6 @@
 #ifndef FUZZ_TABLES_H
 #define FUZZ_TABLES_H
 
-#include "isohead.h"
-
 #include "fuzz_rig.h"
 
 /* A rig of either kind. */

@@ -4,6 +4,7 @@
 
 #include "fuzz_check.h"
 #include "fuzz_tables.h"
+#include "detect/ih_score.h"
 
 #define FRAMES_MAX 32
 #define FRONT_LEAST_MM 150

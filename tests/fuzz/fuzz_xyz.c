@@ -1,7 +1,7 @@
 /* Lists of points (hal/replay/hal_xyz), drawn into a depth image (ih_cloud). Input: the file. */
 #include <string.h>
 
-#include "ih_cloud.h"
+#include "points/ih_cloud.h"
 #include "replay/hal_xyz.h"
 
 #include "fuzz_rig.h"

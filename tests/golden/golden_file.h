@@ -12,7 +12,8 @@
 
 #include <stddef.h>
 
-#include "ih_rig.h"
+#include "base/ih_config.h"
+#include "rig/ih_rig.h"
 
 #define GOLDEN_MAGIC 0x31474849u /* "IHG1" */
 

@@ -3,6 +3,7 @@
 #include <stddef.h>
 
 #include "golden_fnv.h"
+#include "detect/ih_score.h"
 
 void golden_inner_start(struct ih_exposure *exposure)
 {

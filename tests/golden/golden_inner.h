@@ -12,8 +12,8 @@
 #ifndef GOLDEN_INNER_H
 #define GOLDEN_INNER_H
 
-#include "ih_exposure.h"
 #include "isohead.h"
+#include "upkeep/ih_exposure.h"
 
 enum golden_inner {
     GOLDEN_NOISE, /* of dots only, as the next */

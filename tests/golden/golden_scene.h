@@ -9,7 +9,8 @@
 #ifndef GOLDEN_SCENE_H
 #define GOLDEN_SCENE_H
 
-#include "ih_rig.h"
+#include "base/ih_types.h"
+#include "rig/ih_rig.h"
 
 /* Bytes of the largest frame that can be made or read, and of the largest ambient one. */
 #define GOLDEN_FRAME_BYTES (2 * 752 * 582)

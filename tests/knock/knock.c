@@ -11,8 +11,8 @@
 
 #include "app_rig.h"
 #include "app_view.h"
-#include "ih_health.h"
 #include "isohead.h"
+#include "upkeep/ih_health.h"
 #include "replay/hal_replay.h"
 
 static struct isohead head;

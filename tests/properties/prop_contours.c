@@ -1,7 +1,8 @@
 /* Contours of any surface: closed or ending at the border, never crossing each other, not at one level and
  * not at two; and nested: what a contour encloses lies within what the next level's enclose. In exact
  * integers of Q9 grid steps, apart from what ih_cuts itself reckons. */
-#include "ih_cuts.h"
+#include "nests/ih_cuts.h"
+#include "surface/ih_surface.h"
 #include "prop_scene.h"
 
 #include <stdlib.h>

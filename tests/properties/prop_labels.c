@@ -4,7 +4,7 @@
  * one slot, whatever is missing: none is ever labelled wrongly. With a long baseline it may be several,
  * and where the true dot of one of them is missing another may be taken for it: there the share of wrong
  * labels is bounded, no more. */
-#include "ih_labels.h"
+#include "labels/ih_labels.h"
 #include "prop_scene.h"
 
 #include "rigs.inc"

@@ -15,8 +15,10 @@
  * 26.5 and 19.4 mm, by 1.2 times that. With few centres they are 12.8, 13.6, 7.9 and 5.5 mm, and 41.6, 35.6,
  * 39.9 and 31.2 mm: what is coarser follows a head less. Points are moved anywhere in the range, and in every other scene before
  * the head. */
-#include "ih_labels.h"
-#include "ih_surface.h"
+#include "labels/ih_labels.h"
+#include "points/ih_points.h"
+#include "surface/ih_samples.h"
+#include "surface/ih_surface.h"
 #include "prop_scene.h"
 
 #include "rigs.inc"

@@ -10,8 +10,7 @@
  * 3. So a depth camera sees the same head twice as far away at half the size, as near as its pixels,
  *    which are twice as wide there, allow.
  * Not invariant: a rig's dots, twice as far apart on a head twice as far; clip_least_mm, 1100. */
-#include "ih_fix.h"
-#include "ih_hypotheses.h"
+#include "base/ih_fix.h"
 #include "isohead.h"
 #include "prop_scene.h"
 

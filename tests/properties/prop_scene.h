@@ -3,9 +3,9 @@
 #ifndef PROP_SCENE_H
 #define PROP_SCENE_H
 
-#include "ih_dots.h"
-#include "ih_points.h"
-#include "ih_rig.h"
+#include "base/ih_types.h"
+#include "dots/ih_dots.h"
+#include "rig/ih_rig.h"
 
 #include "ih_test.h"
 

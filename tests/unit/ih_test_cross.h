@@ -2,7 +2,8 @@
 #ifndef IH_TEST_CROSS_H
 #define IH_TEST_CROSS_H
 
-#include "ih_ellipsoid.h"
+#include "detect/ih_ellipsoid.h"
+#include "detect/ih_space.h"
 
 static inline bool ih_test_cross(const struct ih_ellipsoid *ellipsoid,
                                  const int32_t origin_mm_q8[3], const struct ih_ray *ray,

@@ -3,8 +3,8 @@
 #ifndef IH_TEST_FRAME_H
 #define IH_TEST_FRAME_H
 
-#include "ih_config.h"
-#include "ih_types.h"
+#include "base/ih_config.h"
+#include "base/ih_types.h"
 
 #include "ih_test.h"
 

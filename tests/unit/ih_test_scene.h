@@ -3,8 +3,9 @@
 #ifndef IH_TEST_SCENE_H
 #define IH_TEST_SCENE_H
 
-#include "ih_ellipsoid.h"
-#include "ih_fix.h"
+#include "base/ih_config.h"
+#include "base/ih_fix.h"
+#include "detect/ih_space.h"
 
 #include "ih_test.h"
 

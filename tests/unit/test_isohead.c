@@ -1,6 +1,6 @@
 /* The whole of isohead: frames in, heads out; wrong frames; nothing remembered, nothing touched. */
 #include "isohead.h"
-#include "ih_exposure.h"
+#include "upkeep/ih_exposure.h"
 
 #include <stddef.h>
 #include <stdlib.h>

@@ -3,8 +3,9 @@
 #ifndef TURNED_RIG_H
 #define TURNED_RIG_H
 
-#include "ih_dots.h"
-#include "ih_rig.h"
+#include "base/ih_config.h"
+#include "dots/ih_dots.h"
+#include "rig/ih_rig.h"
 #include "ih_test.h"
 
 #define Q30 1073741824.0

@@ -139,12 +139,12 @@ def fraction(numerator, denominator):
 def centres(count, only=False):
     """So many centres in a row where no scan and fit are left out; only: there is room for no more."""
     if count == 12:
-        return [("ih_surface.c", r"centres = IH_SURFACE_CENTRES_FEW,", "centres = IH_SURFACE_CENTRES_MAX,")]
-    edits = [define("ih_surface.h", "IH_SURFACE_CENTRES_FEW", count)]
+        return [("surface/ih_surface.c", r"centres = IH_SURFACE_CENTRES_FEW,", "centres = IH_SURFACE_CENTRES_MAX,")]
+    edits = [define("surface/ih_surface.h", "IH_SURFACE_CENTRES_FEW", count)]
     if count * count <= 32:
-        edits.append(define("ih_surface.c", "FINE_ROWS", "IH_NORMAL_ROWS"))
+        edits.append(define("surface/ih_surface.c", "FINE_ROWS", "IH_NORMAL_ROWS"))
     if only:
-        edits.append(define("ih_surface.h", "IH_SURFACE_CENTRES_MAX", count))
+        edits.append(define("surface/ih_surface.h", "IH_SURFACE_CENTRES_MAX", count))
     return edits
 
 
@@ -152,24 +152,24 @@ def grid(nodes):
     """A grid of so many nodes that spans as much, on which the centres stand where they did."""
     steps = nodes + 1
     numerator, denominator = fraction(10 * 48, 11 * steps)
-    return [define("ih_surface.h", "IH_SURFACE_CENTRES_STEPS", steps),
-            define("ih_surface.h", "IH_SURFACE_GRID", nodes),
-            define("ih_surface.h", "IH_SURFACE_STEP_NUMERATOR", numerator),
-            define("ih_surface.h", "IH_SURFACE_STEP_DENOMINATOR", denominator),
-            define("ih_surface.c", "TABLE_WIDTH", "(%d * TABLE_LINE)" % -(-(nodes - 1) // 12)),
+    return [define("surface/ih_surface.h", "IH_SURFACE_CENTRES_STEPS", steps),
+            define("surface/ih_surface.h", "IH_SURFACE_GRID", nodes),
+            define("surface/ih_surface.h", "IH_SURFACE_STEP_NUMERATOR", numerator),
+            define("surface/ih_surface.h", "IH_SURFACE_STEP_DENOMINATOR", denominator),
+            define("surface/ih_surface.c", "TABLE_WIDTH", "(%d * TABLE_LINE)" % -(-(nodes - 1) // 12)),
             define("isohead.h", "IH_RAM_MAX", "(%d * 1024)" % (192 if nodes <= 47 else 1024))]
 
 
 def points(count, only=False):
-    edits = [("ih_parts.c", r"\.point_count = 32,", ".point_count = %d," % count)]
+    edits = [("nests/ih_parts.c", r"\.point_count = 32,", ".point_count = %d," % count)]
     if only:
-        edits.append(define("ih_parts.h", "IH_PARTS_POINTS_MAX", count))
+        edits.append(define("nests/ih_parts.h", "IH_PARTS_POINTS_MAX", count))
     return edits
 
 
 def levels(step_mm):
-    return [("ih_hypotheses.c", r"level_step_mm = 20;", "level_step_mm = %d;" % step_mm),
-            define("ih_hypotheses.h", "IH_HYPOTHESES_SLICES_MAX", max(16, 110 // step_mm + 2))]
+    return [("nests/ih_hypotheses.c", r"level_step_mm = 20;", "level_step_mm = %d;" % step_mm),
+            define("nests/ih_hypotheses.h", "IH_HYPOTHESES_SLICES_MAX", max(16, 110 // step_mm + 2))]
 
 
 def ram_bytes(source):
@@ -201,8 +201,8 @@ def table(title, rows):
 
 def widest(size):
     """RAM of a core for frames of at most this size."""
-    return ram_bytes(variant("size-%dx%d" % size, [define("ih_config.h", "IH_FRAME_WIDTH_MAX", size[0]),
-                                                  define("ih_config.h", "IH_FRAME_HEIGHT_MAX", size[1])]))
+    return ram_bytes(variant("size-%dx%d" % size, [define("base/ih_config.h", "IH_FRAME_WIDTH_MAX", size[0]),
+                                                  define("base/ih_config.h", "IH_FRAME_HEIGHT_MAX", size[1])]))
 
 
 def grow_frames(base):

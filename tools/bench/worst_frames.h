@@ -13,7 +13,7 @@
 
 #include <stdint.h>
 
-#include "ih_rig.h"
+#include "rig/ih_rig.h"
 
 #define WORST_SEQUENCE 100
 

@@ -51,7 +51,7 @@ static bool complain(const std::string &what)
     return tool::complain("calibrate", what);
 }
 
-/* What the core takes (firmware/core/ih_config.h). */
+/* What the core takes (firmware/core/base/ih_config.h). */
 static constexpr double depth_min_mm = 100.0, depth_max_mm = 16000.0;
 
 static bool read_board(const std::string &value, Board &board)

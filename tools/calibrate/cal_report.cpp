@@ -8,6 +8,7 @@
 #include "cal_error.hpp"
 #include "cal_nominal.hpp"
 #include "tool_file.hpp"
+#include "detect/ih_score_weights.h"
 
 namespace cal
 {

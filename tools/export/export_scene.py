@@ -38,7 +38,7 @@ from google.protobuf.duration_pb2 import Duration
 from google.protobuf.timestamp_pb2 import Timestamp
 
 CAMERA = "camera"
-# Of a head that nobody measured, with --paper: the mean head of firmware/core/ih_ellipsoid.c.
+# Of a head that nobody measured, with --paper: the mean head of firmware/core/detect/ih_ellipsoid.c.
 MEAN_SEMI_AXES_MM = (78, 113, 98)
 OUTLINE_POINTS = 48
 FOREVER = Duration()  # until the next scene deletes it

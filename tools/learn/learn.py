@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Learn the score's curves (firmware/core/ih_score_weights.h) from rendered scenes.
+"""Learn the score's curves (firmware/core/detect/ih_score_weights.h) from rendered scenes.
 
 learn.py --render PROGRAM --host-sim PROGRAM --work DIR [--seeds A-B] [--out FILE] [--also DIR...]
 
@@ -77,7 +77,7 @@ def parse():
     parser.add_argument("--also", nargs="*", default=[], help="frames directories to report on")
     parser.add_argument("--limit", type=float, default=0.5, help="log-odds for the report")
     parser.add_argument("--jobs", type=int, default=2)
-    parser.add_argument("--out", default=os.path.join(ROOT, "firmware/core/ih_score_weights.h"))
+    parser.add_argument("--out", default=os.path.join(ROOT, "firmware/core/detect/ih_score_weights.h"))
     return parser.parse_args()
 
 

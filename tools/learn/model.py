@@ -92,7 +92,10 @@ def write(path, learnt, kinds, command):
 #ifndef IH_SCORE_WEIGHTS_H
 #define IH_SCORE_WEIGHTS_H
 
-#include "ih_score.h"
+#include <stdint.h>
+
+#include "detect/ih_evidence.h"
+#include "detect/ih_score.h"
 
 /* clang-format off */
 struct curve {

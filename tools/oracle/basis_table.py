@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The table of roots in firmware/core/ih_basis.c: sqrt(m) * 2^16 for m in 2^30 .. 2^32, in spans of 2^22. An
+"""The table of roots in firmware/core/surface/ih_basis.c: sqrt(m) * 2^16 for m in 2^30 .. 2^32, in spans of 2^22. An
 entry is the value at a span's beginning, raised by half of what the curve lies above its chord; the last one
 is that at the last span's end. With g the place in a span, 0 .. 65535, and rise the difference to the next
 entry >> 6, the root is value + (rise * g >> 10).

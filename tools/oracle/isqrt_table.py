@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The table of inverse roots in firmware/core/ih_fix.c.
+"""The table of inverse roots in firmware/core/base/ih_fix.c.
 
     isqrt_table.py               writes its lines
     isqrt_table.py --check FILE  exit status 1 when the table in FILE is another, or does not keep what is

@@ -5,7 +5,7 @@
                                0.3 degrees and of a shift by 0.3 mm, across and along the lines; how well 50 frames
                                with that truth's dots show each of the six when all are unknown, when only turns are
 
-The rig is turned exactly (Rodrigues); equations and weights are the core's (firmware/core/ih_places.h), iterated to the
+The rig is turned exactly (Rodrigues); equations and weights are the core's (firmware/core/upkeep/ih_places.h), iterated to the
 end, over all frames at once.
 """
 

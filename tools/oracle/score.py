@@ -68,7 +68,7 @@ def read_header(path):
 
 
 def kinds_of_firmware():
-    with open(os.path.join(ROOT, "firmware/core/ih_evidence.h"), encoding="utf-8") as file:
+    with open(os.path.join(ROOT, "firmware/core/detect/ih_evidence.h"), encoding="utf-8") as file:
         body = re.search(r"enum ih_evidence_kind \{(.*?)\}", file.read(), re.S)[1]
     return [k.lower() for k in re.findall(r"IH_EVIDENCE_(\w+),", body)]
 

@@ -10,7 +10,7 @@
 #include "app_rig.h"
 #include "app_rig_explain.h"
 #include "hal_file.h"
-#include "ih_blob.h"
+#include "rig/ih_blob.h"
 
 enum status { STATUS_GOOD = 0, STATUS_INPUT = 1, STATUS_USAGE = 2 };
 

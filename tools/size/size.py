@@ -244,10 +244,11 @@ def judge(found):
 
 
 def measure(arguments, directory):
-    objects = sorted(glob.glob(os.path.join(arguments.build, "firmware/core/CMakeFiles/isohead_core.dir/*.obj")))
+    objects = sorted(glob.glob(os.path.join(arguments.build, "firmware/core/CMakeFiles/isohead_core.dir/**/*.obj"),
+                               recursive=True))
     program = Program(os.path.join(arguments.build, "firmware/app/isohead_cortexm"))
     table = flash(objects)
-    if set(table) != {name for name in os.listdir(ram.CORE) if name.endswith(".c")}:
+    if set(table) != {os.path.basename(path) for path in glob.glob(os.path.join(ram.CORE, "**", "*.c"), recursive=True)}:
         raise Broken("build: %s: other objects than firmware/core has sources" % arguments.build)
     stack, callees = graph(objects, program)
     phases = count(program, arguments.plugin, arguments.rig, arguments.frames)

@@ -1,0 +1,100 @@
+/* ih_ellipsoid - a head as an upright ellipsoid, and how a dot's ray meets it (ours; the paper names
+ * a head model as its next step).
+ *
+ * In:    centre and semi-axes (across, up, deep: along the camera's X, Y, Z), a ray.
+ * Out:   everything in the ellipsoid's own units, in which it is the unit sphere: where the ray
+ *        passes the centre's depth (at), its nearest place to the centre (nearest) with the square
+ *        of its distance (radius2: below 1 the ray hits), and the depth where it enters.
+ * Way:   with e = offset at the centre's depth and g = (slope_x az / ax, slope_y az / ay), the ray is
+ *        (e + g tau, tau); tau = -(e.g) / (1 + g.g) is nearest, radius2 = e.e + (e.g) tau, and it
+ *        enters at tau - sqrt((1 - radius2) / (1 + g.g)).
+ *        The ray is a line without an end: what lies behind its origin is crossed too.
+ * Overflow: semi-axes IH_ELLIPSOID_SEMI_MIN..MAX, |e| <= IH_ELLIPSOID_REACH on both axes or the ray
+ *        is said to be far; |g| <= 4 * 5 = 20 on each axis: sums below 2^(2 * 4.4 + 28 + 1), tau
+ *        below 2^2.5. Centres and points: below 2^30 in Q8.
+ * Error: e, g and tau are rounded to Q14, and a steep ray multiplies what tau lost by g. Measured
+ *        on a head, slopes up to 1: places within 2^-12.5 of the exact ones, radius2 within
+ *        2^-10.6, entry depth within 0.05 mm where radius2 < 0.99 and within 0.25 mm at the rim.
+ *        At the limits of slopes and semi-axes: places 2^-10.8, radius2 2^-8.1, entry 0.1 mm.
+ * Cost:  a division, one more and a square root where the ray hits; and three for the shares.
+ */
+#ifndef IH_ELLIPSOID_H
+#define IH_ELLIPSOID_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "detect/ih_space.h"
+
+#define IH_ELLIPSOID_SEMI_MIN_MM 40
+#define IH_ELLIPSOID_SEMI_MAX_MM 200
+/* Rays that pass farther away than this many semi-axes are not looked at. */
+#define IH_ELLIPSOID_REACH 8
+
+struct ih_ellipsoid {
+    int32_t centre_mm_q8[3];
+    int32_t semi_mm_q8[3]; /* across, up, deep */
+};
+
+struct ih_crossing {
+    int32_t at_q14[2];
+    int32_t nearest_q14[3];
+    int32_t radius2_q14;
+    int32_t entry_mm_q8; /* Z; of a ray that passes: the depth of its nearest place */
+};
+
+/* Half sides of a box around an ellipsoid's centre, at its depth. */
+struct ih_ellipsoid_box {
+    int32_t half_mm_q8[2];
+};
+
+/* The mean adult head, hair included. */
+struct ih_ellipsoid ih_ellipsoid_mean(const int32_t centre_mm_q8[3]);
+
+/* The box through which every ray passes that comes nearer than radius, with slopes up to slope_most
+ * (as from ih_space_slope_most): radius2 >= e.e / (1 + g.g). The errors above are allowed for. */
+struct ih_ellipsoid_box ih_ellipsoid_box(const struct ih_ellipsoid *ellipsoid,
+                                         const int32_t slope_most_q20[2], int32_t radius2_q14);
+
+/* Does the ray pass through the box? Two products, for those that are not worth a crossing. */
+bool ih_ellipsoid_in_box(const struct ih_ellipsoid *ellipsoid, const struct ih_ellipsoid_box *box,
+                         const int32_t origin_mm_q8[3], const struct ih_ray *ray);
+
+/* Inverses of the semi-axes: what is divided by the same one many times is multiplied instead. */
+struct ih_shares {
+    int64_t share_q50[3]; /* 2^50 / semi, made greater by 1 at most, and by something */
+};
+
+struct ih_shares ih_ellipsoid_shares(const int32_t semi_mm_q8[3]);
+
+/* Offsets farther than this are out of reach: IH_ELLIPSOID_REACH of the greatest semi-axis are less. */
+#define IH_SHARE_MOST (1 << 19)
+
+/* ih_div_round(offset * 2^14, semi), to the last bit, for |offset| up to IH_SHARE_MOST. The product is
+ * too great by up to |offset|, 2^-17 of the quotient's last place, and a quotient that is not on a half
+ * is at least 1 / (2 semi), 2^-16.7, away from the next. One that is on a half comes out beyond it, on
+ * either side of zero: rounded away from zero, as there. */
+static inline int32_t ih_share(int64_t share_q50, int32_t offset)
+{
+    return (int32_t)((offset * share_q50 + ((int64_t)1 << 35)) >> 36);
+}
+
+/* What a crossing needs of the ray's direction: the same wherever an ellipsoid of this size stands. */
+struct ih_aim {
+    int32_t g_q14[2];
+    int64_t gg_q28; /* 1 + g.g */
+};
+
+struct ih_aim ih_ellipsoid_aim(const int32_t semi_mm_q8[3], const struct ih_shares *shares,
+                               const struct ih_ray *ray);
+
+/* shares and aim: of this size. False: far away, *out is not set. */
+bool ih_ellipsoid_cross(const struct ih_ellipsoid *ellipsoid, const struct ih_shares *shares,
+                        const int32_t origin_mm_q8[3], const struct ih_ray *ray,
+                        const struct ih_aim *aim, struct ih_crossing *out);
+
+/* A point in the ellipsoid's units. False when beyond the reach on any axis. */
+bool ih_ellipsoid_place(const struct ih_ellipsoid *ellipsoid, const struct ih_shares *shares,
+                        const int32_t point_mm_q8[3], int32_t place_q14[3]);
+
+#endif

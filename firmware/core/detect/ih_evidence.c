@@ -1,0 +1,352 @@
+#include "detect/ih_evidence.h"
+
+#include <stddef.h>
+#include <string.h>
+
+#include "base/ih_fix.h"
+#include "base/ih_range.h"
+#include "detect/ih_row.h"
+
+#define ONE_Q14 (1 << 14)
+#define INSIDE_Q14 14746 /* radius2 below 0.9: through the head, not along its edge */
+#define ON_MM_Q8 (20 << 8)
+#define OPEN_MM_Q8 (60 << 8)
+#define THROUGH_MM_Q8 (50 << 8)
+#define FRONT_MM_Q8 (30 << 8)
+#define RING_INNER2_Q28 419430400LL /* 1.25^2 */
+#define RING_OUTER2_Q28 969042657LL /* 1.9^2 */
+#define AROUND2_Q28 1677721600LL    /* 2.5^2 */
+#define HIGH_FROM_Q14 31130         /* 1.9 */
+#define HIGH_WIDE_Q14 26214         /* 1.6 */
+#define BODY_BEFORE_MM_Q8 (-220 * 256)
+#define BODY_BEHIND_MM_Q8 (200 << 8)
+#define BODY_RAYS_MAX 30
+#define LEVEL_MM_Q8 (150 << 8)
+#define BEFORE_MM_Q8 (60 << 8)
+#define PLANE_POINTS_MIN 6
+
+/* The candidate, and what is the same for all rays. */
+struct candidate {
+    const struct ih_ellipsoid *ellipsoid;
+    const int32_t *origin_mm_q8;
+    int32_t depth_mm_q8; /* of its centre, from the origin */
+    struct ih_shares shares;
+    struct ih_ellipsoid_box box; /* rays through it pass here */
+};
+
+/* One ray against the candidate; its state is known. */
+struct view {
+    const struct ih_ray *ray;
+    bool may_hit;
+    int32_t at_q14[2];        /* offset at the centre's depth, in semi-axes */
+    int32_t x_mm_q8, y_mm_q8; /* and in mm */
+    int32_t below_chin_mm_q8; /* y less the semi-axis up */
+    int32_t dz_mm_q8;         /* of its point, against the centre */
+    int64_t distance2_q28;    /* of the offset, in semi-axes */
+    bool is_seen, is_open, is_body;
+};
+
+struct tally {
+    struct ih_tally around;
+    int32_t on, through, hit, front;
+    int64_t on_square_q16; /* sum of squared distances, mm^2 */
+    int64_t body_dz_q8;
+    /* For the plane through the points on the ellipsoid: sums of x, y, z and of their products,
+     * mm in Q4 from the centre. */
+    int64_t sum_q4[3], product_q8[3][3];
+};
+
+const char *ih_evidence_text(enum ih_evidence_kind kind)
+{
+    static const char *const text[IH_EVIDENCE_COUNT] = {
+        "on",    "rough",    "bulge",   "tall",   "moved",     "above",      "beside",
+        "below", "high",     "nothing", "body",   "body_rays", "body_depth", "wide",
+        "level", "shoulder", "before",  "extent", "upright",
+    };
+    return (uint32_t)kind < IH_EVIDENCE_COUNT ? text[kind] : NULL;
+}
+
+/* False: farther away than IH_ELLIPSOID_REACH semi-axes. */
+static bool make_view(const struct candidate *candidate, const struct ih_ray *ray,
+                      struct view *view)
+{
+    const struct ih_ellipsoid *ellipsoid = candidate->ellipsoid;
+    const int32_t slope_q20[2] = {ray->slope_x_q20, ray->slope_y_q20};
+    view->ray = ray;
+    view->may_hit = true;
+    for (int axis = 0; axis < 2; axis++) {
+        const int64_t off_q8 = candidate->origin_mm_q8[axis] +
+                               ih_mul_shift(candidate->depth_mm_q8, slope_q20[axis], 20) -
+                               ellipsoid->centre_mm_q8[axis];
+        if (ih_abs_s64(off_q8) > IH_SHARE_MOST) {
+            return false;
+        }
+        const int32_t at_q14 = ih_share(candidate->shares.share_q50[axis], (int32_t)off_q8);
+        if (ih_abs_s32(at_q14) > IH_ELLIPSOID_REACH << 14) {
+            return false;
+        }
+        view->at_q14[axis] = at_q14;
+        view->may_hit = view->may_hit && ih_abs_s64(off_q8) <= candidate->box.half_mm_q8[axis];
+    }
+    const int32_t *at_q14 = view->at_q14;
+    view->x_mm_q8 = (int32_t)ih_mul_shift(at_q14[0], ellipsoid->semi_mm_q8[0], 14);
+    view->y_mm_q8 = (int32_t)ih_mul_shift(at_q14[1], ellipsoid->semi_mm_q8[1], 14);
+    view->below_chin_mm_q8 = view->y_mm_q8 - ellipsoid->semi_mm_q8[1];
+    view->distance2_q28 = (int64_t)at_q14[0] * at_q14[0] + (int64_t)at_q14[1] * at_q14[1];
+    view->is_seen = view->ray->state == IH_RAY_SEEN;
+    view->dz_mm_q8 =
+        view->is_seen ? view->ray->point_mm_q8[2] - ellipsoid->centre_mm_q8[2] : INT32_MAX;
+    view->is_open = view->dz_mm_q8 > OPEN_MM_Q8;
+    view->is_body =
+        view->is_seen && view->dz_mm_q8 > BODY_BEFORE_MM_Q8 && view->dz_mm_q8 < BODY_BEHIND_MM_Q8;
+    return true;
+}
+
+static void count(struct ih_tally_share *share, bool part)
+{
+    share->all++;
+    share->part += part;
+}
+
+static void add_on(const struct view *view, const struct ih_ellipsoid *ellipsoid, int32_t off_q8,
+                   struct tally *tally)
+{
+    int64_t at_q4[3];
+    tally->on++;
+    tally->on_square_q16 += (int64_t)off_q8 * off_q8;
+    for (int axis = 0; axis < 3; axis++) {
+        at_q4[axis] =
+            ih_shift_round(view->ray->point_mm_q8[axis] - ellipsoid->centre_mm_q8[axis], 4);
+        tally->sum_q4[axis] += at_q4[axis];
+        IH_IN_RANGE(at_q4[axis], -IH_RANGE_ON_MM_Q4, IH_RANGE_ON_MM_Q4);
+        for (int other = 0; other <= axis; other++) {
+            tally->product_q8[axis][other] += at_q4[axis] * at_q4[other];
+        }
+    }
+}
+
+/* Rays through the head. */
+static void look_inside(const struct candidate *candidate, const struct view *view,
+                        struct tally *tally)
+{
+    const struct ih_ellipsoid *ellipsoid = candidate->ellipsoid;
+    struct ih_crossing crossing;
+    int32_t place_q14[3], off_q8;
+    if (!view->may_hit) {
+        return;
+    }
+    const struct ih_aim aim =
+        ih_ellipsoid_aim(ellipsoid->semi_mm_q8, &candidate->shares, view->ray);
+    if (!ih_ellipsoid_cross(ellipsoid, &candidate->shares, candidate->origin_mm_q8, view->ray, &aim,
+                            &crossing) ||
+        crossing.radius2_q14 >= INSIDE_Q14) {
+        return;
+    }
+    if (!view->is_seen) {
+        tally->through += view->ray->state == IH_RAY_EMPTY;
+        return;
+    }
+    int32_t behind_q8 = view->ray->point_mm_q8[2] - crossing.entry_mm_q8;
+    tally->through += behind_q8 > THROUGH_MM_Q8;
+    tally->front += behind_q8 < -FRONT_MM_Q8;
+    if (ih_ellipsoid_place(ellipsoid, &candidate->shares, view->ray->point_mm_q8, place_q14) &&
+        ih_row_distance(&candidate->shares, place_q14, &off_q8) && ih_abs_s32(off_q8) < ON_MM_Q8) {
+        tally->hit++;
+        add_on(view, ellipsoid, off_q8, tally);
+    }
+}
+
+/* Rays around and above the head: is it open there? */
+static void look_around(const struct view *view, struct tally *tally)
+{
+    int64_t ex = view->at_q14[0];
+    int64_t ey = view->at_q14[1];
+    if (ey < -HIGH_FROM_Q14 && ih_abs_s64(ex) < HIGH_WIDE_Q14) {
+        count(&tally->around.high, view->is_open);
+    }
+    if (view->distance2_q28 <= RING_INNER2_Q28 || view->distance2_q28 >= RING_OUTER2_Q28) {
+        return;
+    }
+    if (10 * ey > 9 * ih_abs_s64(ex)) {
+        count(&tally->around.below, view->is_open);
+        return;
+    }
+    count(&tally->around.nothing, view->ray->state == IH_RAY_EMPTY);
+    if (10 * ey < -8 * ih_abs_s64(ex)) {
+        count(&tally->around.above, view->is_open);
+    } else {
+        count(ex < 0 ? &tally->around.left : &tally->around.right, view->is_open);
+    }
+}
+
+static bool between_mm(int32_t value_mm_q8, int32_t low_mm, int32_t high_mm)
+{
+    return value_mm_q8 > low_mm << 8 && value_mm_q8 < high_mm << 8;
+}
+
+/* What is below and beside: body, shoulders, table. */
+static void look_below(const struct view *view, const struct ih_ellipsoid *ellipsoid,
+                       struct tally *tally)
+{
+    int32_t aside_q8 = ih_abs_s32(view->x_mm_q8);
+    int32_t chin_q8 = view->below_chin_mm_q8;
+    if (between_mm(chin_q8, 40, 260) && aside_q8 < 180 << 8) {
+        count(&tally->around.body, view->is_body);
+        tally->body_dz_q8 += view->is_body ? view->dz_mm_q8 : 0;
+    }
+    if (between_mm(chin_q8, 40, 240) && aside_q8 > 300 << 8) {
+        count(&tally->around.wide, view->is_body);
+    }
+    if (ih_abs_s32(view->y_mm_q8) < ellipsoid->semi_mm_q8[1] && between_mm(aside_q8, 170, 330)) {
+        count(&tally->around.level, view->is_seen && ih_abs_s32(view->dz_mm_q8) < LEVEL_MM_Q8);
+    }
+    if (10 * (int64_t)view->y_mm_q8 > 9 * (int64_t)ellipsoid->semi_mm_q8[1] && chin_q8 < 160 << 8 &&
+        between_mm(aside_q8, 100, 260)) {
+        count(&tally->around.shoulder[view->x_mm_q8 > 0], view->is_body);
+    }
+}
+
+/* (part + 0.5) / (all + 1) */
+static int32_t careful_q8(struct ih_tally_share share)
+{
+    return (2 * share.part + 1) * 128 / (share.all + 1);
+}
+
+static int32_t plain_q8(struct ih_tally_share share, int32_t least)
+{
+    return share.part * 256 / ih_max_s32(share.all, least);
+}
+
+/* Variance of the points' depths that no plane explains, mm^2 in Q8: szz - b^T S^-1 b, S and b the
+ * central moments of x, y and with z, each below 2^24. */
+static int64_t plane_rest_q8(const struct tally *tally)
+{
+    int64_t c[3][3];
+    int64_t n = tally->on;
+    for (int axis = 0; axis < 3; axis++) {
+        for (int other = 0; other <= axis; other++) {
+            int64_t mean_q8 = ih_div_round(tally->sum_q4[axis] * tally->sum_q4[other], n);
+            c[axis][other] = ih_div_round(tally->product_q8[axis][other] - mean_q8, n);
+            IH_IN_RANGE(c[axis][other], -IH_RANGE_CENTRAL_Q8, IH_RANGE_CENTRAL_Q8);
+        }
+    }
+    int64_t det_q16 = c[0][0] * c[1][1] - c[1][0] * c[1][0];
+    if (det_q16 <= 0) {
+        return 0; /* all in a line: any plane through it fits */
+    }
+    int64_t zx = c[2][0];
+    int64_t zy = c[2][1];
+    int64_t top_x_q16 = zx * c[1][1] - zy * c[1][0];
+    int64_t top_y_q16 = zy * c[0][0] - zx * c[1][0];
+    /* slopes in Q12; a surface steeper than 64 is not looked at by a camera */
+    const int64_t steep = 64 << 12;
+    int drop = ih_max_s32(
+        0, ih_bits_u64((uint64_t)ih_abs_s64(top_x_q16) | (uint64_t)ih_abs_s64(top_y_q16)) - 50);
+    int64_t det = (det_q16 >> drop) + 1;
+    int64_t slope_x = ih_div_round((top_x_q16 >> drop) * 4096, det);
+    int64_t slope_y = ih_div_round((top_y_q16 >> drop) * 4096, det);
+    slope_x = slope_x > steep ? steep : slope_x < -steep ? -steep : slope_x;
+    slope_y = slope_y > steep ? steep : slope_y < -steep ? -steep : slope_y;
+    int64_t rest = c[2][2] - ih_shift_round(slope_x * zx + slope_y * zy, 12);
+    return rest > 0 ? rest : 0;
+}
+
+static int32_t root_mm_q8(int64_t square_q16)
+{
+    return (int32_t)ih_isqrt_u64((uint64_t)square_q16);
+}
+
+static int32_t moved_mm_q8(const struct ih_ellipsoid *ellipsoid, const int32_t start_mm_q8[3])
+{
+    int64_t distance2_q16 = ih_distance2_s32(ellipsoid->centre_mm_q8, start_mm_q8);
+    return ih_saturate_s32(ih_isqrt_u64((uint64_t)distance2_q16));
+}
+
+/* 100 (a - m) / m */
+static int32_t taller_q8(const struct ih_ellipsoid *ellipsoid)
+{
+    int32_t mean_q8 = ih_ellipsoid_mean(ellipsoid->centre_mm_q8).semi_mm_q8[1];
+    return (int32_t)ih_div_round((int64_t)(ellipsoid->semi_mm_q8[1] - mean_q8) * 25600, mean_q8);
+}
+
+static void summarise(const struct tally *tally, const struct ih_evidence_nest *nest,
+                      int32_t value_q8[])
+{
+    int32_t on = ih_max_s32(tally->on, 1);
+    int32_t rough_q8 = root_mm_q8(tally->on_square_q16 / on);
+    value_q8[IH_EVIDENCE_ON] = tally->on << 8;
+    value_q8[IH_EVIDENCE_ROUGH] = rough_q8;
+    int32_t plane_q8 = tally->on >= PLANE_POINTS_MIN ? root_mm_q8(plane_rest_q8(tally) * 256) : 0;
+    value_q8[IH_EVIDENCE_BULGE] = plane_q8 - rough_q8;
+    value_q8[IH_EVIDENCE_ABOVE] = careful_q8(tally->around.above);
+    value_q8[IH_EVIDENCE_BESIDE] =
+        ih_min_s32(careful_q8(tally->around.left), careful_q8(tally->around.right));
+    value_q8[IH_EVIDENCE_BELOW] = careful_q8(tally->around.below);
+    value_q8[IH_EVIDENCE_HIGH] = careful_q8(tally->around.high);
+    value_q8[IH_EVIDENCE_NOTHING] = plain_q8(tally->around.nothing, 1);
+    value_q8[IH_EVIDENCE_BODY] = plain_q8(tally->around.body, 3);
+    value_q8[IH_EVIDENCE_BODY_RAYS] = ih_min_s32(tally->around.body.all, BODY_RAYS_MAX) << 8;
+    value_q8[IH_EVIDENCE_BODY_DEPTH] =
+        (int32_t)ih_div_round(tally->body_dz_q8, ih_max_s32(tally->around.body.part, 1));
+    value_q8[IH_EVIDENCE_WIDE] = plain_q8(tally->around.wide, 3);
+    value_q8[IH_EVIDENCE_LEVEL] = plain_q8(tally->around.level, 3);
+    value_q8[IH_EVIDENCE_SHOULDER] =
+        ih_min_s32(plain_q8(tally->around.shoulder[0], 2), plain_q8(tally->around.shoulder[1], 2));
+    value_q8[IH_EVIDENCE_BEFORE] = tally->around.before << 8;
+    value_q8[IH_EVIDENCE_EXTENT] = nest->present ? nest->extent_mm_q8 : 0;
+    value_q8[IH_EVIDENCE_UPRIGHT] =
+        nest->present ? (int32_t)ih_shift_round(nest->upright_q16, 8) : 256;
+}
+
+/* A ray that the tally leaves, or that may hit, or is a part of the body. */
+static void look(const struct candidate *candidate, const struct ih_ray *ray, int32_t flag,
+                 struct tally *tally)
+{
+    struct view view;
+    if ((flag & IH_TALLY_BODY) != 0) {
+        tally->body_dz_q8 += ray->point_mm_q8[2] - candidate->ellipsoid->centre_mm_q8[2];
+    }
+    if ((flag & (IH_TALLY_UNSURE | IH_TALLY_HIT)) == 0 || !make_view(candidate, ray, &view)) {
+        return;
+    }
+    if ((flag & IH_TALLY_HIT) != 0) {
+        look_inside(candidate, &view, tally);
+    }
+    if ((flag & IH_TALLY_UNSURE) != 0) {
+        look_around(&view, tally);
+        look_below(&view, candidate->ellipsoid, tally);
+        tally->around.before += view.is_seen && view.distance2_q28 < AROUND2_Q28 &&
+                                view.dz_mm_q8 < -candidate->ellipsoid->semi_mm_q8[2] - BEFORE_MM_Q8;
+    }
+}
+
+void ih_evidence_collect(const struct ih_space *space, struct ih_tally_scratch *scratch,
+                         const struct ih_ellipsoid *ellipsoid, const int32_t start_mm_q8[3],
+                         const struct ih_evidence_nest *nest, struct ih_evidence *out)
+{
+    struct tally tally;
+    const struct candidate candidate = {
+        .ellipsoid = ellipsoid,
+        .origin_mm_q8 = space->origin_mm_q8,
+        .depth_mm_q8 = ellipsoid->centre_mm_q8[2] - space->origin_mm_q8[2],
+        .shares = ih_ellipsoid_shares(ellipsoid->semi_mm_q8),
+        .box = ih_ellipsoid_box(ellipsoid, scratch->slope_most_q20, INSIDE_Q14),
+    };
+    memset(&tally, 0, sizeof tally);
+    ih_tally_count(space, ellipsoid, &candidate.box, scratch, &tally.around);
+    for (int32_t first = 0; first < IH_TALLY_RAYS; first += 4) {
+        uint64_t any; /* of four */
+        memcpy(&any, &scratch->flag[first], sizeof any);
+        for (int32_t slot = first; any != 0 && slot < first + 4; slot++) {
+            if (scratch->flag[slot] != 0) {
+                look(&candidate, &space->ray[slot], scratch->flag[slot], &tally);
+            }
+        }
+    }
+    summarise(&tally, nest, out->value_q8);
+    out->value_q8[IH_EVIDENCE_TALL] = taller_q8(ellipsoid);
+    out->value_q8[IH_EVIDENCE_MOVED] = moved_mm_q8(ellipsoid, start_mm_q8);
+    out->through_count = tally.through;
+    out->hit_count = tally.hit;
+    out->front_count = tally.front;
+}

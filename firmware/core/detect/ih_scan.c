@@ -1,0 +1,171 @@
+#include "detect/ih_scan.h"
+
+#include <stdbool.h>
+#include <string.h>
+
+#include "base/ih_fix.h"
+#include "base/ih_range.h"
+
+#define RANK_BITS 9
+#define RANK_SLOTS (1 << RANK_BITS) /* more than there are slots */
+#define RANK_NONE INT32_MIN
+
+void ih_scan_params_default(struct ih_scan_params *params)
+{
+    *params = (struct ih_scan_params){
+        .deep_mm = 98,
+        .spacing_mm = 80,
+        .place_max = IH_SCAN_MAX,
+    };
+}
+
+/* The place `deep` behind a point, along its ray. */
+static void centre_behind(const struct ih_ray *ray, int32_t deep_mm, int32_t centre_mm_q8[3])
+{
+    const int64_t x = ray->slope_x_q20;
+    const int64_t y = ray->slope_y_q20;
+    const uint64_t length2_q40 = (uint64_t)(x * x + y * y) + ((uint64_t)1 << 40);
+    /* 1 over its root: from the table, and nearly all of what that is short by */
+    const int half = (33 - __builtin_clzll(length2_q40)) / 2; /* 5 to 7 */
+    const uint32_t square = (uint32_t)(length2_q40 >> (2 * half));
+    const uint64_t r_q15 = ih_inverse_root_q15(square);
+    const uint64_t rest_q32 = ((uint64_t)1 << 32) - ((square * r_q15 >> 15) * r_q15 >> 15);
+    const uint64_t inverse_q31 = (r_q15 << 16) + (r_q15 * rest_q32 >> 17);
+    const int64_t step_q8 = ih_mul_shift((int64_t)deep_mm << 8, (int64_t)inverse_q31, 27 + half);
+    centre_mm_q8[0] = ray->point_mm_q8[0] + (int32_t)ih_mul_shift(step_q8, x, 20);
+    centre_mm_q8[1] = ray->point_mm_q8[1] + (int32_t)ih_mul_shift(step_q8, y, 20);
+    centre_mm_q8[2] = ray->point_mm_q8[2] + (int32_t)step_q8;
+}
+
+static bool is_near(const int32_t a_mm_q8[3], const int32_t b_mm_q8[3], int32_t distance_mm)
+{
+    int64_t limit = (int64_t)distance_mm << 8;
+    if (ih_abs_s32(a_mm_q8[0] - b_mm_q8[0]) > limit) {
+        return false; /* most are */
+    }
+    return ih_distance2_s32(a_mm_q8, b_mm_q8) <= limit * limit;
+}
+
+/* A rating and a slot in one, so that the greatest is the best, the first of equals. */
+static int32_t rank_of(int32_t rating_q12, int32_t slot)
+{
+    return rating_q12 * RANK_SLOTS + RANK_SLOTS - 1 - slot;
+}
+
+static int32_t rating_of(int32_t rank)
+{
+    return rank >> RANK_BITS;
+}
+
+static int32_t slot_of(int32_t rank)
+{
+    return RANK_SLOTS - 1 - (int32_t)(IH_WRAPS(uint32_t, rank) % RANK_SLOTS);
+}
+
+/* Of what is rated and not out, the best; the least there is when there is nothing. A loop without a branch:
+ * compilers turn it into vectors. */
+static int32_t best_rank(const struct ih_scan_scratch *scratch)
+{
+    int32_t best = RANK_NONE;
+    for (int32_t i = 0; i < scratch->rank_count; i++) {
+        best = ih_max_s32(best, scratch->rank[i]);
+    }
+    return best;
+}
+
+/* A place is kept; nothing near it is looked at any more, nor is it itself. */
+static void take(struct ih_scan_scratch *scratch, int32_t rank, int32_t spacing_mm,
+                 struct ih_scan *out)
+{
+    const int32_t *kept_mm_q8 = scratch->centre_mm_q8[slot_of(rank)];
+    const int32_t rating_q12 = rating_of(rank);
+    int32_t at = out->place_count++;
+    for (; at > 0 && out->place[at - 1].rating_q12 < rating_q12; at--) {
+        out->place[at] = out->place[at - 1]; /* what is found late may be better */
+    }
+    out->place[at].rating_q12 = rating_q12;
+    memcpy(out->place[at].centre_mm_q8, kept_mm_q8, sizeof out->place[at].centre_mm_q8);
+    for (int32_t i = scratch->rank_count - 1; i >= 0; i--) {
+        if (is_near(kept_mm_q8, scratch->centre_mm_q8[slot_of(scratch->rank[i])], spacing_mm)) {
+            scratch->rank_count--;
+            scratch->rank[i] = scratch->rank[scratch->rank_count];
+        }
+    }
+}
+
+/* Rate the place behind a slot's point, if there is one and none is kept near it. */
+static void look_at(const struct ih_space *space, const struct ih_scan_params *params, int32_t slot,
+                    struct ih_scan_scratch *scratch, const struct ih_scan *out)
+{
+    if (scratch->state[slot] != IH_SCAN_LEFT) {
+        return;
+    }
+    int32_t *centre_mm_q8 = scratch->centre_mm_q8[slot];
+    scratch->state[slot] = IH_SCAN_RATED;
+    centre_behind(&space->ray[slot], params->deep_mm, centre_mm_q8);
+    for (int32_t i = 0; i < out->place_count; i++) {
+        if (is_near(out->place[i].centre_mm_q8, centre_mm_q8, params->spacing_mm)) {
+            return;
+        }
+    }
+    scratch->rank[scratch->rank_count++] =
+        rank_of(ih_rating_q12(space, &scratch->rays, centre_mm_q8), slot);
+}
+
+/* The first seen point of each block of two by two slots. */
+static void begin(const struct ih_space *space, const struct ih_scan_params *params,
+                  struct ih_scan_scratch *scratch, const struct ih_scan *out)
+{
+    scratch->rank_count = 0;
+    for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
+        scratch->state[slot] =
+            space->ray[slot].state == IH_RAY_SEEN ? IH_SCAN_LEFT : IH_SCAN_NOTHING;
+    }
+    for (int32_t y = 0; y < IH_GRID; y += 2) {
+        for (int32_t x = 0; x < IH_GRID; x += 2) {
+            for (int32_t i = 0; i < 4; i++) {
+                const int32_t row = y + i / 2;
+                const int32_t column = x + i % 2;
+                const int32_t slot = row * IH_GRID + column;
+                if (row < IH_GRID && column < IH_GRID && scratch->state[slot] == IH_SCAN_LEFT) {
+                    look_at(space, params, slot, scratch, out);
+                    break;
+                }
+            }
+        }
+    }
+}
+
+/* The up to 8 places around one are looked at. */
+static void widen(const struct ih_space *space, const struct ih_scan_params *params, int32_t slot,
+                  struct ih_scan_scratch *scratch, const struct ih_scan *out)
+{
+    const int32_t row = slot / IH_GRID;
+    const int32_t column = slot % IH_GRID;
+    scratch->state[slot] = IH_SCAN_WIDENED;
+    for (int32_t y = ih_max_s32(row - 1, 0); y <= ih_min_s32(row + 1, IH_GRID - 1); y++) {
+        for (int32_t x = ih_max_s32(column - 1, 0); x <= ih_min_s32(column + 1, IH_GRID - 1); x++) {
+            look_at(space, params, y * IH_GRID + x, scratch, out);
+        }
+    }
+}
+
+/* What is the best when all around it was looked at is the best of those that were looked at. */
+void ih_scan_find(const struct ih_space *space, const struct ih_scan_params *params,
+                  struct ih_scan_scratch *scratch, struct ih_scan *out)
+{
+    ih_rating_prepare(space, &scratch->rays);
+    out->place_count = 0;
+    begin(space, params, scratch, out);
+    while (out->place_count < params->place_max) {
+        const int32_t best = best_rank(scratch);
+        if (best == RANK_NONE) {
+            break;
+        }
+        if (scratch->state[slot_of(best)] == IH_SCAN_WIDENED) {
+            take(scratch, best, params->spacing_mm, out);
+        } else {
+            widen(space, params, slot_of(best), scratch, out);
+        }
+    }
+}

@@ -1,0 +1,49 @@
+#include "detect/ih_score.h"
+
+#include "base/ih_fix.h"
+#include "base/ih_range.h"
+#include "detect/ih_score_weights.h"
+
+/* 2^-x for x in [0, 1), Q16: a cubic through the ends, within 2^-13. */
+static int32_t power_q16(int32_t fraction_q16)
+{
+    int64_t x = fraction_q16;
+    int64_t sum = -ih_mul_shift(x, 2560, 16) + 15145; /* of exp(-x ln 2): x^3, x^2 */
+    sum = ih_mul_shift(sum, x, 16) - 45353;
+    return (int32_t)(65536 + ih_mul_shift(sum, x, 16));
+}
+
+int32_t ih_score_probability_q16(int32_t logit_q10)
+{
+    /* exp(-|logit|) = 2^-(|logit| / ln 2) */
+    int64_t power2_q16 = ih_mul_shift(ih_abs_s64(logit_q10), 94548, 10);
+    int64_t whole = power2_q16 >> 16;
+    int64_t small_q16 = whole > 30 ? 0 : power_q16((int32_t)(power2_q16 & 0xffff)) >> whole;
+    int64_t likely_q16 = ih_div_round((int64_t)1 << 32, 65536 + small_q16);
+    IH_IN_RANGE(likely_q16, 32768, 65536);
+    return (int32_t)(logit_q10 >= 0 ? likely_q16 : 65536 - likely_q16);
+}
+
+static int32_t curve_q10(const struct curve *curve, int32_t value_q8)
+{
+    int64_t place_q16 = ih_div_round(((int64_t)value_q8 - curve->first_q8) * 65536, curve->step_q8);
+    const int64_t last_q16 = (int64_t)(IH_SCORE_KNOTS - 1) << 16;
+    place_q16 = place_q16 < 0 ? 0 : place_q16 > last_q16 ? last_q16 : place_q16;
+    int32_t knot = (int32_t)(place_q16 >> 16);
+    if (knot == IH_SCORE_KNOTS - 1) {
+        return curve->at_q10[knot];
+    }
+    int64_t rise = (int64_t)curve->at_q10[knot + 1] - curve->at_q10[knot];
+    return curve->at_q10[knot] + (int32_t)ih_mul_shift(rise, place_q16 & 0xffff, 16);
+}
+
+void ih_score_rate(const struct ih_evidence *evidence, struct ih_score *out)
+{
+    out->logit_q10 = bias_q10;
+    for (int kind = 0; kind < IH_EVIDENCE_COUNT; kind++) {
+        out->part_q10[kind] = curve_q10(&curves[kind], evidence->value_q8[kind]);
+        out->logit_q10 += out->part_q10[kind];
+    }
+    IH_IN_RANGE(out->logit_q10, -IH_RANGE_LOGIT_Q10, IH_RANGE_LOGIT_Q10);
+    out->probability_q16 = ih_score_probability_q16(out->logit_q10);
+}

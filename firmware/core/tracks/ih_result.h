@@ -1,0 +1,51 @@
+/* ih_result - what isohead says about a frame: its hypotheses, which of them are heads, and which one
+ * is the head.
+ *
+ * In:    either the nests' hypotheses (the paper's method alone), or findings and tracks.
+ * Out:   one list in one form. Rejected hypotheses stay in it with the reason.
+ * With the paper's method alone no head is selected where several are accepted.
+ */
+#ifndef IH_RESULT_H
+#define IH_RESULT_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "detect/ih_findings.h"
+#include "nests/ih_heads.h"
+#include "tracks/ih_tracks.h"
+
+#define IH_RESULT_MAX (IH_FINDINGS_MAX + IH_FINDINGS_EXPECTED_MAX)
+
+struct ih_result_entry {
+    int32_t u_px_q12, v_px_q12; /* centre of the ellipse in the frame (distorted pixels) */
+    int32_t a_px_q12, b_px_q12; /* semi-axes, a >= b */
+    int32_t angle_mdeg;         /* of a, from +u towards +v, 0 .. 179999 */
+    int32_t distance_mm_q8;     /* camera's centre to the surface at the ellipse's centre */
+    int32_t centre_mm_q8[3];    /* of the head's volume, camera frame */
+    int32_t rejected;           /* enum ih_reject */
+    /* Not with the paper's method alone. */
+    bool has_probability;
+    int32_t probability_q16; /* that it is a head */
+    int32_t track_id;        /* 0: none */
+    int32_t sigma_mm_q8;     /* of the centre along each axis; with a track */
+    bool is_predicted;       /* not seen in this frame: its track says that it is there */
+};
+
+struct ih_result {
+    int32_t entry_count;
+    int32_t head_count;
+    int32_t head[IH_RESULT_MAX]; /* indices of the accepted ones, best first */
+    int32_t selected;            /* index of the head, or IH_NONE */
+    struct ih_result_entry entry[IH_RESULT_MAX];
+};
+
+/* Nothing. */
+void ih_result_clear(struct ih_result *out);
+
+void ih_result_from_heads(const struct ih_heads *heads, struct ih_result *out);
+
+void ih_result_from_tracks(const struct ih_findings *findings, const struct ih_tracks *tracks,
+                           struct ih_result *out);
+
+#endif

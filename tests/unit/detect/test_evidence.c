@@ -1,0 +1,621 @@
+/* ih_evidence against a float64 reference over scenes of simple bodies; each number must tell at
+ * least two of them apart. */
+#include "base/ih_config.h"
+#include "detect/ih_ellipsoid.h"
+#include "detect/ih_evidence.h"
+#include "detect/ih_space.h"
+#include "detect/ih_tally.h"
+
+#include "ih_test.h"
+
+#define KINDS 19 /* that the vectors have; later ones are not tested here */
+
+struct vector_ray {
+    int32_t depth_mm_q8, state;
+};
+
+struct vector_scene {
+    const char *name;
+    const struct vector_ray *ray;
+    struct ih_ellipsoid head;
+    int32_t start_mm_q8[3];
+    struct ih_evidence_nest nest;
+    double value[KINDS];
+    int32_t through, hit, front;
+};
+
+#include "evidence.inc"
+
+_Static_assert(KINDS <= IH_EVIDENCE_COUNT && IH_EVIDENCE_UPRIGHT == KINDS - 1,
+               "new kinds go to the end");
+
+static struct ih_space space;
+static struct ih_tally_scratch scratch;
+static struct ih_evidence evidence, one_by_one;
+static const struct ih_evidence_nest no_nest = {.present = false};
+
+/* And the same when each ray is looked at by itself, as those are of which 16 bits cannot tell. */
+static void collect(const struct ih_ellipsoid *head, const int32_t start_mm_q8[3],
+                    const struct ih_evidence_nest *nest)
+{
+    memset(&scratch, IH_TEST_FILL, sizeof scratch);
+    ih_tally_prepare(&space, &scratch);
+    ih_evidence_collect(&space, &scratch, head, start_mm_q8, nest, &evidence);
+    scratch.is_usable = false;
+    ih_evidence_collect(&space, &scratch, head, start_mm_q8, nest, &one_by_one);
+    TEST_ASSERT_EQUAL_MEMORY(&one_by_one, &evidence, sizeof evidence);
+}
+
+void setUp(void)
+{
+    memset(&space, 0, sizeof space);
+    memset(&evidence, IH_TEST_FILL, sizeof evidence);
+}
+
+void tearDown(void)
+{
+}
+
+static void use_scene(const struct vector_scene *scene)
+{
+    int slot, axis;
+
+    memcpy(space.origin_mm_q8, vector_origin_mm_q8, sizeof space.origin_mm_q8);
+    for (slot = 0; slot < IH_SLOTS; slot++) {
+        struct ih_ray *ray = &space.ray[slot];
+        const int64_t along = scene->ray[slot].depth_mm_q8 - space.origin_mm_q8[2];
+
+        *ray = (struct ih_ray){.slope_x_q20 = vector_slope_q20[slot][0],
+                               .slope_y_q20 = vector_slope_q20[slot][1],
+                               .state = scene->ray[slot].state};
+        if (ray->state != IH_RAY_SEEN) {
+            continue;
+        }
+        for (axis = 0; axis < 2; axis++) {
+            ray->point_mm_q8[axis] =
+                (int32_t)(space.origin_mm_q8[axis] +
+                          ((along * vector_slope_q20[slot][axis] + (1 << 19)) >> 20));
+        }
+        ray->point_mm_q8[2] = scene->ray[slot].depth_mm_q8;
+    }
+    collect(&scene->head, scene->start_mm_q8, &scene->nest);
+}
+
+/* Counts are exact: no ray is near a limit. Shares are cut to 1/256. A point's place has 2^-14 of
+ * an axis in it, 0.007 mm, and its distance about twice that. The plane: 0.05 mm, see below. */
+static double tolerance(int kind)
+{
+    switch (kind) {
+    case IH_EVIDENCE_ON:
+    case IH_EVIDENCE_BODY_RAYS:
+    case IH_EVIDENCE_BEFORE:
+    case IH_EVIDENCE_EXTENT:
+        return 0;
+    case IH_EVIDENCE_ROUGH:
+        return 0.03;
+    case IH_EVIDENCE_BULGE:
+        return 0.06;
+    default:
+        return 1.01 / 256;
+    }
+}
+
+static void scenes_match_float64(void)
+{
+    int i, kind;
+
+    for (i = 0; i < IH_TEST_COUNT(vector_scenes); i++) {
+        const struct vector_scene *scene = &vector_scenes[i];
+        char what[64];
+
+        use_scene(scene);
+        for (kind = 0; kind < KINDS; kind++) {
+            snprintf(what, sizeof what, "%s: %s", scene->name,
+                     ih_evidence_text((enum ih_evidence_kind)kind));
+            IH_TEST_WITHIN(tolerance(kind), scene->value[kind],
+                           ih_test_from_q(evidence.value_q8[kind], 8), what, kind);
+        }
+        IH_TEST_EQUAL(scene->through, evidence.through_count, scene->name, 100);
+        IH_TEST_EQUAL(scene->hit, evidence.hit_count, scene->name, 101);
+        IH_TEST_EQUAL(scene->front, evidence.front_count, scene->name, 102);
+    }
+}
+
+static double value_of(const char *name, int kind)
+{
+    int i;
+
+    for (i = 0; i < IH_TEST_COUNT(vector_scenes); i++) {
+        if (strcmp(vector_scenes[i].name, name) == 0) {
+            use_scene(&vector_scenes[i]);
+            return ih_test_from_q(evidence.value_q8[kind], 8);
+        }
+    }
+    TEST_FAIL_MESSAGE(name);
+    return 0;
+}
+
+static void every_number_tells_scenes_apart(void)
+{
+    static const struct {
+        int kind;
+        const char *less, *more;
+        double by;
+    } cases[] = {
+        {IH_EVIDENCE_ON, "dark", "head", 4},
+        {IH_EVIDENCE_ROUGH, "head", "rough", 3},
+        {IH_EVIDENCE_BULGE, "board", "head", 6},
+        {IH_EVIDENCE_TALL, "small", "head", 19},
+        {IH_EVIDENCE_MOVED, "head", "moved", 49},
+        {IH_EVIDENCE_ABOVE, "before_a_wall", "head", 0.5},
+        {IH_EVIDENCE_BESIDE, "before_a_wall", "head", 0.5},
+        {IH_EVIDENCE_BELOW, "headrest", "alone", 0.4},
+        {IH_EVIDENCE_HIGH, "before_a_wall", "head", 0.5},
+        {IH_EVIDENCE_NOTHING, "head", "before_nothing", 0.9},
+        {IH_EVIDENCE_BODY, "alone", "head", 0.9},
+        {IH_EVIDENCE_BODY_RAYS, "unknown", "head", 20},
+        {IH_EVIDENCE_BODY_DEPTH, "leaning", "head", 50},
+        {IH_EVIDENCE_WIDE, "head", "table", 0.9},
+        {IH_EVIDENCE_LEVEL, "head", "neighbours", 0.3},
+        {IH_EVIDENCE_SHOULDER, "alone", "head", 0.3},
+        {IH_EVIDENCE_BEFORE, "head", "hand", 3},
+        {IH_EVIDENCE_EXTENT, "head", "moved", 120},
+        {IH_EVIDENCE_UPRIGHT, "head", "moved", 0.6},
+    };
+    int i;
+
+    for (i = 0; i < IH_TEST_COUNT(cases); i++) {
+        const double less = value_of(cases[i].less, cases[i].kind);
+        const double more = value_of(cases[i].more, cases[i].kind);
+
+        IH_TEST_EQUAL(i, cases[i].kind, "every kind has its scenes", i);
+        if (more - less < cases[i].by) {
+            IH_TEST_WITHIN(0, cases[i].by, more - less, ih_evidence_text(cases[i].kind), i);
+        }
+    }
+}
+
+/* What the tracks ask: is the head there, hidden, or gone? */
+static void rays_through_a_head_tell_seen_hidden_and_gone(void)
+{
+    TEST_ASSERT_TRUE(value_of("head", 0) > 10);
+    TEST_ASSERT_TRUE(evidence.hit_count > 10 && evidence.through_count <= 1 &&
+                     evidence.front_count == 0);
+    value_of("hand", 0);
+    TEST_ASSERT_TRUE(evidence.front_count >= 3 && evidence.through_count <= 1);
+    value_of("gone", 0);
+    TEST_ASSERT_TRUE(evidence.hit_count == 0 && evidence.through_count > 10);
+    value_of("unknown", 0);
+    TEST_ASSERT_TRUE(evidence.hit_count + evidence.through_count + evidence.front_count == 0);
+}
+
+/* Nothing seen: every share says that it knows nothing. */
+static void without_rays_nothing_is_known(void)
+{
+    value_of("unknown", 0);
+    IH_TEST_EQUAL(128, evidence.value_q8[IH_EVIDENCE_ABOVE], "above", 0);
+    IH_TEST_EQUAL(128, evidence.value_q8[IH_EVIDENCE_BESIDE], "beside", 0);
+    IH_TEST_EQUAL(128, evidence.value_q8[IH_EVIDENCE_HIGH], "high", 0);
+    IH_TEST_EQUAL(0, evidence.value_q8[IH_EVIDENCE_BODY], "body", 0);
+    IH_TEST_EQUAL(0, evidence.value_q8[IH_EVIDENCE_BULGE], "bulge", 0);
+    IH_TEST_EQUAL(256, evidence.value_q8[IH_EVIDENCE_UPRIGHT], "upright", 0);
+}
+
+/* --- the plane -----------------------------------------------------------------------------------
+ */
+
+/* Root mean square distance along Z from the best plane: the three normal equations about the mean,
+ * in double. */
+static double plane_rms(int count, double p[][3])
+{
+    double mean[3] = {0}, c[3][3] = {{0}}, det, a, b;
+    int i, j, k;
+
+    for (i = 0; i < count; i++) {
+        for (j = 0; j < 3; j++) {
+            mean[j] += p[i][j] / count;
+        }
+    }
+    for (i = 0; i < count; i++) {
+        for (j = 0; j < 3; j++) {
+            for (k = 0; k < 3; k++) {
+                c[j][k] += (p[i][j] - mean[j]) * (p[i][k] - mean[k]) / count;
+            }
+        }
+    }
+    det = c[0][0] * c[1][1] - c[0][1] * c[0][1];
+    a = (c[0][2] * c[1][1] - c[1][2] * c[0][1]) / det;
+    b = (c[1][2] * c[0][0] - c[0][2] * c[0][1]) / det;
+    return sqrt(fmax(0, c[2][2] - a * c[0][2] - b * c[1][2]));
+}
+
+/* Random points on the front of random ellipsoids, 6 to 60 of them. */
+static void bulges_match_the_best_plane(void)
+{
+    struct ih_test_random random = {52};
+    int pass;
+
+    for (pass = 0; pass < 3000; pass++) {
+        const int32_t centre[3] = {(int32_t)ih_test_between(&random, -100000, 100000),
+                                   (int32_t)ih_test_between(&random, -100000, 100000), 400 << 8};
+        struct ih_ellipsoid head = ih_ellipsoid_mean(centre);
+        const int wanted = (int)ih_test_between(&random, 6, 60);
+        double point[60][3], rms, error;
+        int axis, count = 0;
+
+        for (axis = 0; axis < 3; axis++) {
+            head.semi_mm_q8[axis] = (int32_t)ih_test_between(&random, 50 << 8, 152 << 8);
+        }
+        memset(&space, 0, sizeof space);
+        while (count < wanted) {
+            struct ih_ray *ray = &space.ray[count];
+            double s[3], place[3], f;
+
+            s[0] = 1.6 * ih_test_unit(&random) - 0.8;
+            s[1] = 1.6 * ih_test_unit(&random) - 0.8;
+            f = 1 - s[0] * s[0] - s[1] * s[1];
+            if (f < 0.25) {
+                continue;
+            }
+            s[2] = -sqrt(f);
+            for (axis = 0; axis < 3; axis++) {
+                place[axis] = (centre[axis] + s[axis] * head.semi_mm_q8[axis]) / 256.0 +
+                              (axis == 2 ? ih_test_normal(&random) * 2 : 0);
+                ray->point_mm_q8[axis] = (int32_t)lround(place[axis] * 256);
+            }
+            ray->slope_x_q20 = (int32_t)lround(ldexp(place[0] / place[2], 20));
+            ray->slope_y_q20 = (int32_t)lround(ldexp(place[1] / place[2], 20));
+            ray->state = IH_RAY_SEEN;
+            for (axis = 0; axis < 3; axis++) {
+                point[count][axis] = (ray->point_mm_q8[axis] - centre[axis]) / 256.0;
+            }
+            count++;
+        }
+        collect(&head, centre, &no_nest);
+        if (evidence.hit_count != count) {
+            continue; /* a ray along the edge */
+        }
+        rms = plane_rms(count, point);
+        error =
+            ih_test_from_q(
+                evidence.value_q8[IH_EVIDENCE_BULGE] + evidence.value_q8[IH_EVIDENCE_ROUGH], 8) -
+            rms;
+        /* Measured: 0.024 mm at most. */
+        IH_TEST_WITHIN(0.05, rms, rms + error, "rms", pass);
+    }
+}
+
+/* Points in one line have a plane through all of them. */
+static void a_line_has_no_bulge(void)
+{
+    static const int32_t centre[3] = {0, 0, 700 << 8};
+    const struct ih_ellipsoid head = ih_ellipsoid_mean(centre);
+    int i, pass;
+
+    for (pass = 0; pass < 3; pass++) {
+        memset(&space, 0, sizeof space);
+        for (i = 0; i < 9; i++) {
+            struct ih_ray *ray = &space.ray[i * IH_GRID + i];
+            const double along = (i - 4) * 0.15;
+            const double at[2] = {pass == 1 ? 0 : along, pass == 0 ? 0 : along};
+            const double z = 700 - 98 * sqrt(1 - at[0] * at[0] - at[1] * at[1]);
+
+            ray->point_mm_q8[0] = (int32_t)lround(at[0] * 78 * 256);
+            ray->point_mm_q8[1] = (int32_t)lround(at[1] * 113 * 256);
+            ray->point_mm_q8[2] = (int32_t)lround(z * 256);
+            ray->slope_x_q20 = (int32_t)lround(ldexp(at[0] * 78 / z, 20));
+            ray->slope_y_q20 = (int32_t)lround(ldexp(at[1] * 113 / z, 20));
+            ray->state = IH_RAY_SEEN;
+        }
+        collect(&head, centre, &no_nest);
+        IH_TEST_EQUAL(9, evidence.hit_count, "on", pass);
+        IH_TEST_RANGE(0, 35 << 8,
+                      evidence.value_q8[IH_EVIDENCE_BULGE] + evidence.value_q8[IH_EVIDENCE_ROUGH],
+                      "plane", pass);
+    }
+}
+
+/* --- limits, to the last unit --------------------------------------------------------------------
+ */
+
+/* A ball of 64 mm, 1024 mm ahead: a slope of 4 n in Q20 passes its centre's depth n / 256 mm aside,
+ * which is n in semi-axes too, in Q14. */
+#define BALL_MM_Q8 (64 << 8)
+#define BALL_Z_MM_Q8 (1024 << 8)
+#define NO_POINT INT32_MAX
+
+struct limit {
+    const char *what;
+    int kind;
+    int32_t x_mm_q8, y_mm_q8, dz_mm_q8; /* of a ray and its point; NO_POINT: it is empty */
+    int32_t value_q8;
+};
+
+static void cast_ray(int32_t slot, int32_t x_mm_q8, int32_t y_mm_q8, int32_t dz_mm_q8)
+{
+    space.ray[slot] = (struct ih_ray){
+        .slope_x_q20 = 4 * x_mm_q8, .slope_y_q20 = 4 * y_mm_q8, .state = IH_RAY_EMPTY};
+    if (dz_mm_q8 != NO_POINT) {
+        const double depth = (double)BALL_Z_MM_Q8 + dz_mm_q8;
+
+        space.ray[slot].state = IH_RAY_SEEN;
+        space.ray[slot].point_mm_q8[0] = (int32_t)lround(x_mm_q8 * depth / BALL_Z_MM_Q8);
+        space.ray[slot].point_mm_q8[1] = (int32_t)lround(y_mm_q8 * depth / BALL_Z_MM_Q8);
+        space.ray[slot].point_mm_q8[2] = BALL_Z_MM_Q8 + dz_mm_q8;
+    }
+}
+
+static void forget_rays(void)
+{
+    int slot;
+
+    memset(&space, 0, sizeof space);
+    for (slot = 0; slot < IH_SLOTS; slot++) {
+        space.ray[slot].state = IH_RAY_UNKNOWN;
+    }
+}
+
+static void collect_ball(void)
+{
+    static const struct ih_ellipsoid ball = {.centre_mm_q8 = {0, 0, BALL_Z_MM_Q8},
+                                             .semi_mm_q8 = {BALL_MM_Q8, BALL_MM_Q8, BALL_MM_Q8}};
+
+    collect(&ball, ball.centre_mm_q8, &no_nest);
+}
+
+/* A head twice as high as the mean one is 100 per cent taller, to the last unit; one as high as that is not. */
+static void tallness_is_in_hundredths_of_the_mean(void)
+{
+    static const int32_t times[] = {1, 2, 3};
+    int i;
+
+    for (i = 0; i < IH_TEST_COUNT(times); i++) {
+        struct ih_ellipsoid head = ih_ellipsoid_mean((const int32_t[3]){0, 0, BALL_Z_MM_Q8});
+
+        head.semi_mm_q8[1] *= times[i];
+        forget_rays();
+        collect(&head, head.centre_mm_q8, &no_nest);
+        IH_TEST_EQUAL(100 * (times[i] - 1) << 8, evidence.value_q8[IH_EVIDENCE_TALL], "tall", i);
+    }
+}
+
+/* One ray each. A closed one makes a share of openness a quarter, none a half; one of body, of three
+ * rays at least, makes a third. */
+static void places_and_depths_have_their_limits(void)
+{
+    enum { MM = 256, CHIN = BALL_MM_Q8 };
+    static const struct limit limits[] = {
+        {"body, 40 mm", IH_EVIDENCE_BODY, 0, CHIN + 40 * MM, 0, 0},
+        {"body, beyond 40 mm", IH_EVIDENCE_BODY, 0, CHIN + 40 * MM + 1, 0, 85},
+        {"body, before 260 mm", IH_EVIDENCE_BODY, 0, CHIN + 260 * MM - 1, 0, 85},
+        {"body, 260 mm", IH_EVIDENCE_BODY, 0, CHIN + 260 * MM, 0, 0},
+        {"body, before 180 mm aside", IH_EVIDENCE_BODY, 180 * MM - 1, CHIN + 100 * MM, 0, 85},
+        {"body, 180 mm aside", IH_EVIDENCE_BODY, -180 * MM, CHIN + 100 * MM, 0, 0},
+        {"body, dz -220", IH_EVIDENCE_BODY, 0, CHIN + 100 * MM, -220 * MM, 0},
+        {"body, dz above -220", IH_EVIDENCE_BODY, 0, CHIN + 100 * MM, -220 * MM + 1, 85},
+        {"body, dz below 200", IH_EVIDENCE_BODY, 0, CHIN + 100 * MM, 200 * MM - 1, 85},
+        {"body, dz 200", IH_EVIDENCE_BODY, 0, CHIN + 100 * MM, 200 * MM, 0},
+        {"wide, 40 mm", IH_EVIDENCE_WIDE, 310 * MM, CHIN + 40 * MM, 0, 0},
+        {"wide, beyond 40 mm", IH_EVIDENCE_WIDE, 310 * MM, CHIN + 40 * MM + 1, 0, 85},
+        {"wide, before 240 mm", IH_EVIDENCE_WIDE, -310 * MM, CHIN + 240 * MM - 1, 0, 85},
+        {"wide, 240 mm", IH_EVIDENCE_WIDE, -310 * MM, CHIN + 240 * MM, 0, 0},
+        {"wide, 300 mm aside", IH_EVIDENCE_WIDE, 300 * MM, CHIN + 100 * MM, 0, 0},
+        {"wide, beyond 300 mm aside", IH_EVIDENCE_WIDE, -300 * MM - 1, CHIN + 100 * MM, 0, 85},
+        {"level, 170 mm aside", IH_EVIDENCE_LEVEL, 170 * MM, 0, 0, 0},
+        {"level, beyond 170 mm", IH_EVIDENCE_LEVEL, 170 * MM + 1, 0, 0, 85},
+        {"level, before 330 mm", IH_EVIDENCE_LEVEL, -330 * MM + 1, 0, 0, 85},
+        {"level, 330 mm", IH_EVIDENCE_LEVEL, -330 * MM, 0, 0, 0},
+        {"level, just below the top", IH_EVIDENCE_LEVEL, 200 * MM, 1 - BALL_MM_Q8, 0, 85},
+        {"level, at the top", IH_EVIDENCE_LEVEL, 200 * MM, -BALL_MM_Q8, 0, 0},
+        {"level, at the chin", IH_EVIDENCE_LEVEL, 200 * MM, BALL_MM_Q8, 0, 0},
+        {"level, dz 150", IH_EVIDENCE_LEVEL, 200 * MM, 0, 150 * MM, 0},
+        {"level, dz below 150", IH_EVIDENCE_LEVEL, 200 * MM, 0, 150 * MM - 1, 85},
+        {"level, dz above -150", IH_EVIDENCE_LEVEL, 200 * MM, 0, 1 - 150 * MM, 85},
+        {"level, dz -150", IH_EVIDENCE_LEVEL, 200 * MM, 0, -150 * MM, 0},
+        {"below, 9 in 10", IH_EVIDENCE_BELOW, 20000, 18000, 0, 128},
+        {"below, steeper", IH_EVIDENCE_BELOW, 20000, 18001, 0, 64},
+        {"right, 9 in 10 below", IH_EVIDENCE_BESIDE, 20000, 18000, 0, 64},
+        {"left, 8 in 10 above", IH_EVIDENCE_BESIDE, -20000, -16000, 0, 64},
+        {"above, 8 in 10", IH_EVIDENCE_ABOVE, -20000, -16000, 0, 128},
+        {"above, steeper", IH_EVIDENCE_ABOVE, -20000, -16001, 0, 64},
+        {"above, 1.25 semi-axes", IH_EVIDENCE_ABOVE, 0, -20480, 0, 128},
+        {"above, beyond 1.25 semi-axes", IH_EVIDENCE_ABOVE, 0, -20481, 0, 64},
+        {"above, before 1.9 semi-axes", IH_EVIDENCE_ABOVE, 0, -31129, 0, 64},
+        {"above, 1.9 semi-axes", IH_EVIDENCE_ABOVE, 0, -31130, 0, 128},
+        {"high, 1.9 semi-axes", IH_EVIDENCE_HIGH, 0, -31130, 0, 128},
+        {"high, beyond 1.9 semi-axes", IH_EVIDENCE_HIGH, 0, -31131, 0, 64},
+        {"high, before 1.6 semi-axes aside", IH_EVIDENCE_HIGH, 26213, -40000, 0, 64},
+        {"high, 1.6 semi-axes aside", IH_EVIDENCE_HIGH, -26214, -40000, 0, 128},
+        {"open, dz 60", IH_EVIDENCE_ABOVE, 0, -25000, 60 * MM, 64},
+        {"open, dz above 60", IH_EVIDENCE_ABOVE, 0, -25000, 60 * MM + 1, 192},
+        {"open, nothing", IH_EVIDENCE_ABOVE, 0, -25000, NO_POINT, 192},
+        {"nothing above", IH_EVIDENCE_NOTHING, 0, -25000, NO_POINT, 256},
+        {"something above", IH_EVIDENCE_NOTHING, 0, -25000, 0, 0},
+        {"nothing below", IH_EVIDENCE_NOTHING, 0, 25000, NO_POINT, 0},
+        {"before, 60 mm", IH_EVIDENCE_BEFORE, 0, 30000, -124 * MM, 0},
+        {"before, beyond 60 mm", IH_EVIDENCE_BEFORE, 0, 30000, -124 * MM - 1, 256},
+        {"before, just within 2.5 semi-axes", IH_EVIDENCE_BEFORE, 40959, 0, -200 * MM, 256},
+        {"before, 2.5 semi-axes", IH_EVIDENCE_BEFORE, 40960, 0, -200 * MM, 0},
+    };
+    int i;
+
+    for (i = 0; i < IH_TEST_COUNT(limits); i++) {
+        const struct limit *l = &limits[i];
+
+        forget_rays();
+        cast_ray(i % IH_SLOTS, l->x_mm_q8, l->y_mm_q8, l->dz_mm_q8);
+        collect_ball();
+        IH_TEST_EQUAL(l->value_q8, evidence.value_q8[l->kind], l->what, i);
+    }
+}
+
+/* Shoulders are the lesser of both sides, of two rays at least. */
+static void shoulders_have_their_limits(void)
+{
+    enum { MM = 256, LOW = BALL_MM_Q8 };
+    static const struct {
+        const char *what;
+        int32_t left_mm_q8, right_mm_q8, y_mm_q8, value_q8;
+    } cases[] = {
+        {"between", -150 * MM, 150 * MM, LOW, 128},
+        {"left, 100 mm", -100 * MM, 150 * MM, LOW, 0},
+        {"right, 100 mm", -150 * MM, 100 * MM, LOW, 0},
+        {"beyond 100 mm", -100 * MM - 1, 100 * MM + 1, LOW, 128},
+        {"before 260 mm", -260 * MM + 1, 260 * MM - 1, LOW, 128},
+        {"left, 260 mm", -260 * MM, 150 * MM, LOW, 0},
+        {"both on the left", -150 * MM, -160 * MM, LOW, 0},
+        {"0.9 semi-axes down", -150 * MM, 150 * MM, 14745, 0}, /* 0.9 of 16,384 is 14,745.6 */
+        {"beyond 0.9 semi-axes", -150 * MM, 150 * MM, 14746, 128},
+        {"before 160 mm below the chin", -150 * MM, 150 * MM, LOW + 160 * MM - 1, 128},
+        {"160 mm below the chin", -150 * MM, 150 * MM, LOW + 160 * MM, 0},
+    };
+    int i;
+
+    for (i = 0; i < IH_TEST_COUNT(cases); i++) {
+        forget_rays();
+        cast_ray(3, cases[i].left_mm_q8, cases[i].y_mm_q8, 0);
+        cast_ray(4, cases[i].right_mm_q8, cases[i].y_mm_q8, 0);
+        collect_ball();
+        IH_TEST_EQUAL(cases[i].value_q8, evidence.value_q8[IH_EVIDENCE_SHOULDER], cases[i].what, i);
+    }
+}
+
+/* n rays of body: shares are of three at least, the count is theirs up to 30. */
+static void few_rays_say_little(void)
+{
+    static const struct {
+        int kind;
+        int32_t x_mm_q8, y_mm_q8;
+    } places[] = {{IH_EVIDENCE_BODY, 0, 164 << 8},
+                  {IH_EVIDENCE_WIDE, 310 << 8, 164 << 8},
+                  {IH_EVIDENCE_LEVEL, 200 << 8, 0}};
+    int i, count;
+
+    for (i = 0; i < IH_TEST_COUNT(places); i++) {
+        forget_rays();
+        for (count = 1; count <= 33; count++) {
+            cast_ray(5 * count, places[i].x_mm_q8, places[i].y_mm_q8, 50 << 8);
+            collect_ball();
+            IH_TEST_EQUAL(count < 3 ? count * 256 / 3 : 256, evidence.value_q8[places[i].kind],
+                          "share", count);
+            if (places[i].kind == IH_EVIDENCE_BODY) {
+                IH_TEST_EQUAL((count < 30 ? count : 30) << 8,
+                              evidence.value_q8[IH_EVIDENCE_BODY_RAYS], "rays", count);
+                IH_TEST_EQUAL(50 << 8, evidence.value_q8[IH_EVIDENCE_BODY_DEPTH], "depth", count);
+            }
+        }
+        for (count = 0; count < 3; count++) { /* as many again that are no body */
+            cast_ray(2 + 5 * count, places[i].x_mm_q8, places[i].y_mm_q8, NO_POINT);
+        }
+        collect_ball();
+        IH_TEST_EQUAL(33 * 256 / 36, evidence.value_q8[places[i].kind], "of more", i);
+    }
+}
+
+/* A ray through the middle enters 64 mm before it. */
+static void rays_through_the_middle_have_their_limits(void)
+{
+    enum { MM = 256 };
+    static const struct {
+        int32_t dz_mm_q8, through, front, hit;
+    } cases[] = {
+        {-64 * MM, 0, 0, 1},           {-14 * MM, 0, 0, 0},           {-14 * MM + 1, 1, 0, 0},
+        {-94 * MM, 0, 0, 0},           {-94 * MM - 1, 0, 1, 0},       {-64 * MM - 19 * MM, 0, 0, 1},
+        {-64 * MM - 21 * MM, 0, 0, 0}, {-64 * MM + 19 * MM, 0, 0, 1}, {NO_POINT, 1, 0, 0},
+    };
+    int i;
+
+    for (i = 0; i < IH_TEST_COUNT(cases); i++) {
+        forget_rays();
+        cast_ray(180, 0, 0, cases[i].dz_mm_q8);
+        collect_ball();
+        IH_TEST_EQUAL(cases[i].through, evidence.through_count, "through", i);
+        IH_TEST_EQUAL(cases[i].front, evidence.front_count, "front", i);
+        IH_TEST_EQUAL(cases[i].hit, evidence.hit_count, "hit", i);
+        IH_TEST_EQUAL(cases[i].hit << 8, evidence.value_q8[IH_EVIDENCE_ON], "on", i);
+    }
+}
+
+/* --- extremes ------------------------------------------------------------------------------------
+ */
+
+/* Rays, points and ellipsoids as far as they can be: a point at most 16 m away at a slope of 8, a
+ * head as far as fits move it. The sanitizers watch. */
+static void extremes_do_not_overflow(void)
+{
+    struct ih_test_random random = {53};
+    int pass, slot, axis;
+
+    for (pass = 0; pass < 400; pass++) {
+        struct ih_ellipsoid head;
+        int32_t start[3];
+        const int32_t near = pass % 4 == 0 ? 300 << 8 : 1 << 25;
+        const struct ih_evidence_nest nest = {true, INT32_MAX, INT32_MAX};
+
+        for (axis = 0; axis < 3; axis++) {
+            head.centre_mm_q8[axis] = (int32_t)ih_test_between(&random, -near, near);
+            start[axis] = (int32_t)ih_test_between(&random, -(1 << 26), 1 << 26);
+            head.semi_mm_q8[axis] = pass % 2 == 0
+                                        ? (axis + pass) % 3 == 0 ? IH_ELLIPSOID_SEMI_MAX_MM << 8
+                                                                 : IH_ELLIPSOID_SEMI_MIN_MM << 8
+                                        : (int32_t)ih_test_between(&random, 40 << 8, 200 << 8);
+            space.origin_mm_q8[axis] = (int32_t)ih_test_between(&random, -256000, 256000);
+        }
+        for (slot = 0; slot < IH_SLOTS; slot++) {
+            struct ih_ray *ray = &space.ray[slot];
+
+            ray->slope_x_q20 = (int32_t)ih_test_between(&random, -(4 << 20), 4 << 20);
+            ray->slope_y_q20 = (int32_t)ih_test_between(&random, -(4 << 20), 4 << 20);
+            ray->state = (int32_t)ih_test_between(&random, 0, 2);
+            for (axis = 0; axis < 3; axis++) {
+                const int32_t away = (int32_t)ih_test_between(&random, -(220 << 8), 220 << 8);
+
+                ray->point_mm_q8[axis] =
+                    pass % 3 == 0 ? (int32_t)ih_test_between(&random, -(1 << 25), 1 << 25)
+                                  : head.centre_mm_q8[axis] + away;
+            }
+            if (pass % 5 == 0) { /* all on one side of it */
+                ray->slope_x_q20 = 0;
+                ray->slope_y_q20 = 0;
+            }
+        }
+        collect(&head, start, &nest);
+        IH_TEST_RANGE(0, 256, evidence.value_q8[IH_EVIDENCE_ABOVE], "share", pass);
+        IH_TEST_RANGE(0, IH_SLOTS << 8, evidence.value_q8[IH_EVIDENCE_ON], "count", pass);
+        IH_TEST_RANGE(0, 30 << 8, evidence.value_q8[IH_EVIDENCE_BODY_RAYS], "count", pass);
+    }
+}
+
+static void every_kind_has_a_word_of_its_own(void)
+{
+    int kind, other;
+
+    for (kind = 0; kind < IH_EVIDENCE_COUNT; kind++) {
+        TEST_ASSERT_NOT_NULL(ih_evidence_text((enum ih_evidence_kind)kind));
+        for (other = 0; other < kind; other++) {
+            TEST_ASSERT_TRUE(strcmp(ih_evidence_text((enum ih_evidence_kind)kind),
+                                    ih_evidence_text((enum ih_evidence_kind)other)) != 0);
+        }
+    }
+    TEST_ASSERT_NULL(ih_evidence_text(IH_EVIDENCE_COUNT));
+    TEST_ASSERT_NULL(ih_evidence_text((enum ih_evidence_kind) - 1));
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(scenes_match_float64);
+    RUN_TEST(every_number_tells_scenes_apart);
+    RUN_TEST(rays_through_a_head_tell_seen_hidden_and_gone);
+    RUN_TEST(without_rays_nothing_is_known);
+    RUN_TEST(bulges_match_the_best_plane);
+    RUN_TEST(a_line_has_no_bulge);
+    RUN_TEST(tallness_is_in_hundredths_of_the_mean);
+    RUN_TEST(places_and_depths_have_their_limits);
+    RUN_TEST(shoulders_have_their_limits);
+    RUN_TEST(few_rays_say_little);
+    RUN_TEST(rays_through_the_middle_have_their_limits);
+    RUN_TEST(extremes_do_not_overflow);
+    RUN_TEST(every_kind_has_a_word_of_its_own);
+    return UNITY_END();
+}

@@ -1,0 +1,145 @@
+/* ih_result: one form for both ways. */
+#include "base/ih_config.h"
+#include "detect/ih_findings.h"
+#include "nests/ih_heads.h"
+#include "nests/ih_hypotheses.h"
+#include "tracks/ih_result.h"
+#include "tracks/ih_tracks.h"
+
+#include "ih_test.h"
+
+static struct ih_heads heads;
+static struct ih_findings findings;
+static struct ih_tracks tracks;
+static struct ih_result result;
+
+void setUp(void)
+{
+    memset(&heads, 0, sizeof heads);
+    memset(&findings, 0, sizeof findings);
+    ih_tracks_init(&tracks);
+    memset(&result, IH_TEST_FILL, sizeof result);
+}
+
+void tearDown(void)
+{
+}
+
+static void nothing_is_nothing(void)
+{
+    ih_result_clear(&result);
+    TEST_ASSERT_EQUAL_INT32(0, result.entry_count);
+    TEST_ASSERT_EQUAL_INT32(0, result.head_count);
+    TEST_ASSERT_EQUAL_INT32(IH_NONE, result.selected);
+    memset(&result, IH_TEST_FILL, sizeof result);
+    ih_result_from_heads(&heads, &result);
+    TEST_ASSERT_EQUAL_INT32(0, result.entry_count);
+    TEST_ASSERT_EQUAL_INT32(IH_NONE, result.selected);
+    memset(&result, IH_TEST_FILL, sizeof result);
+    ih_result_from_tracks(&findings, &tracks, &result);
+    TEST_ASSERT_EQUAL_INT32(0, result.entry_count);
+    TEST_ASSERT_EQUAL_INT32(IH_NONE, result.selected);
+}
+
+/* The paper's method alone selects a head only where there is one. */
+static void nests_come_through_without_what_tracks_add(void)
+{
+    int i;
+
+    heads.hypothesis_count = IH_HYPOTHESES_MAX;
+    for (i = 0; i < IH_HYPOTHESES_MAX; i++) {
+        heads.hypothesis[i] = (struct ih_hypothesis){.u_px_q12 = 100 + i,
+                                                     .v_px_q12 = 200 + i,
+                                                     .a_px_q12 = 300 + i,
+                                                     .b_px_q12 = 290 + i,
+                                                     .angle_mdeg = 400 + i,
+                                                     .distance_mm_q8 = 500 + i,
+                                                     .centre_mm_q8 = {600 + i, 700 + i, 800 + i},
+                                                     .rejected = IH_REJECT_AREA};
+    }
+    heads.hypothesis[3].rejected = IH_ACCEPTED;
+    heads.head_count = 1;
+    heads.head[0] = 3;
+    ih_result_from_heads(&heads, &result);
+    TEST_ASSERT_EQUAL_INT32(IH_HYPOTHESES_MAX, result.entry_count);
+    for (i = 0; i < IH_HYPOTHESES_MAX; i++) {
+        const struct ih_result_entry *entry = &result.entry[i];
+
+        IH_TEST_EQUAL(100 + i, entry->u_px_q12, "u", i);
+        IH_TEST_EQUAL(200 + i, entry->v_px_q12, "v", i);
+        IH_TEST_EQUAL(300 + i, entry->a_px_q12, "a", i);
+        IH_TEST_EQUAL(290 + i, entry->b_px_q12, "b", i);
+        IH_TEST_EQUAL(400 + i, entry->angle_mdeg, "angle", i);
+        IH_TEST_EQUAL(500 + i, entry->distance_mm_q8, "distance", i);
+        IH_TEST_EQUAL(800 + i, entry->centre_mm_q8[2], "z", i);
+        IH_TEST_EQUAL(i == 3 ? IH_ACCEPTED : IH_REJECT_AREA, entry->rejected, "rejected", i);
+        IH_TEST_EQUAL(0, entry->has_probability || entry->is_predicted, "no probability", i);
+        IH_TEST_EQUAL(0, entry->track_id, "no track", i);
+    }
+    TEST_ASSERT_EQUAL_INT32(1, result.head_count);
+    TEST_ASSERT_EQUAL_INT32(3, result.selected);
+    heads.head_count = 2;
+    heads.head[1] = 5;
+    ih_result_from_heads(&heads, &result);
+    TEST_ASSERT_EQUAL_INT32(2, result.head_count);
+    TEST_ASSERT_EQUAL_INT32(5, result.head[1]);
+    TEST_ASSERT_EQUAL_INT32(IH_NONE, result.selected);
+}
+
+static void findings_come_through_up_to_a_full_table(void)
+{
+    int i;
+
+    findings.finding_count = IH_FINDINGS_MAX + IH_FINDINGS_EXPECTED_MAX;
+    for (i = 0; i < findings.finding_count; i++) {
+        struct ih_finding *finding = &findings.finding[i];
+
+        finding->u_px_q12 = 100 + i;
+        finding->v_px_q12 = 200 + i;
+        finding->a_px_q12 = 300 + i;
+        finding->b_px_q12 = 290 + i;
+        finding->angle_mdeg = 90000;
+        finding->distance_mm_q8 = 500 + i;
+        finding->head.centre_mm_q8[1] = 700 + i;
+        finding->probability_q16 = 1000 + i;
+        finding->track_id = i % 3;
+        finding->sigma_mm_q8 = 40 + i;
+        finding->is_head = i % 2 == 1;
+        finding->is_predicted = i >= IH_FINDINGS_MAX;
+    }
+    tracks.head_count = 2;
+    tracks.head[0] = 17;
+    tracks.head[1] = 3;
+    tracks.selected = 3;
+    ih_result_from_tracks(&findings, &tracks, &result);
+    TEST_ASSERT_EQUAL_INT32(IH_RESULT_MAX, result.entry_count);
+    for (i = 0; i < IH_RESULT_MAX; i++) {
+        const struct ih_result_entry *entry = &result.entry[i];
+
+        IH_TEST_EQUAL(100 + i, entry->u_px_q12, "u", i);
+        IH_TEST_EQUAL(200 + i, entry->v_px_q12, "v", i);
+        IH_TEST_EQUAL(300 + i, entry->a_px_q12, "a", i);
+        IH_TEST_EQUAL(290 + i, entry->b_px_q12, "b", i);
+        IH_TEST_EQUAL(90000, entry->angle_mdeg, "angle", i);
+        IH_TEST_EQUAL(500 + i, entry->distance_mm_q8, "distance", i);
+        IH_TEST_EQUAL(700 + i, entry->centre_mm_q8[1], "y", i);
+        IH_TEST_EQUAL(1, entry->has_probability, "has probability", i);
+        IH_TEST_EQUAL(1000 + i, entry->probability_q16, "probability", i);
+        IH_TEST_EQUAL(i % 3, entry->track_id, "track", i);
+        IH_TEST_EQUAL(40 + i, entry->sigma_mm_q8, "sigma", i);
+        IH_TEST_EQUAL(i % 2 == 1 ? IH_ACCEPTED : IH_REJECT_SCORE, entry->rejected, "rejected", i);
+        IH_TEST_EQUAL(i >= IH_FINDINGS_MAX, entry->is_predicted, "predicted", i);
+    }
+    TEST_ASSERT_EQUAL_INT32(2, result.head_count);
+    TEST_ASSERT_EQUAL_INT32(17, result.head[0]);
+    TEST_ASSERT_EQUAL_INT32(3, result.selected);
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(nothing_is_nothing);
+    RUN_TEST(nests_come_through_without_what_tracks_add);
+    RUN_TEST(findings_come_through_up_to_a_full_table);
+    return UNITY_END();
+}
