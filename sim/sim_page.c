@@ -211,7 +211,7 @@ static void write_limits(struct app_write *write, const struct ih_tracks_params 
     app_write_key(write, "limits");
     app_write_open(write, '{');
     app_write_int_field(write, "start_head_logit_q10", params->start_head_logit_q10);
-    app_write_int_field(write, "mature_findings", params->mature_findings);
+    app_write_int_field(write, "mature_findings", params->mature_detections);
     app_write_int_field(write, "accept_logit_q10", params->accept_logit_q10);
     app_write_int_field(write, "drop_logit_q10", params->drop_logit_q10);
     app_write_close(write, '}');

@@ -173,16 +173,16 @@ static void write_nest(struct app_write *write, const struct ih_nest *nest)
     app_write_close(write, '}');
 }
 
-static void write_hypotheses(struct app_write *write, const struct ih_hypotheses *hypotheses)
+static void write_hypotheses(struct app_write *write, const struct ih_nests *nests)
 {
     app_write_key(write, "hypotheses");
     app_write_open(write, '{');
-    app_write_int_field(write, "minima_dropped", hypotheses->minima_dropped);
-    app_write_int_field(write, "contours_dropped", hypotheses->contours_dropped);
+    app_write_int_field(write, "minima_dropped", nests->minima_dropped);
+    app_write_int_field(write, "contours_dropped", nests->contours_dropped);
     app_write_key(write, "nest");
     app_write_open(write, '[');
-    for (int32_t i = 0; i < hypotheses->nest_count; i++) {
-        write_nest(write, &hypotheses->nest[i]);
+    for (int32_t i = 0; i < nests->nest_count; i++) {
+        write_nest(write, &nests->nest[i]);
     }
     app_write_close(write, ']');
     app_write_close(write, '}');
@@ -225,7 +225,7 @@ static void write_candidate(struct app_write *write, const struct ih_hypothesis 
 }
 
 /* What the tests of hypotheses compare with. */
-static void write_limits(struct app_write *write, const struct ih_heads_params *params)
+static void write_limits(struct app_write *write, const struct ih_hypotheses_params *params)
 {
     app_write_key(write, "limits");
     app_write_open(write, '{');
@@ -242,54 +242,55 @@ static void write_limits(struct app_write *write, const struct ih_heads_params *
     app_write_close(write, '}');
 }
 
-static void write_heads(struct app_write *write, const struct ih_heads *heads,
-                        const struct ih_heads_params *params)
+static void write_heads(struct app_write *write, const struct ih_hypotheses *hypotheses,
+                        const struct ih_hypotheses_params *params)
 {
     app_write_key(write, "heads");
     app_write_open(write, '{');
     app_write_key(write, "hypothesis");
     app_write_open(write, '[');
-    for (int32_t i = 0; i < heads->hypothesis_count; i++) {
-        write_candidate(write, &heads->hypothesis[i]);
+    for (int32_t i = 0; i < hypotheses->hypothesis_count; i++) {
+        write_candidate(write, &hypotheses->hypothesis[i]);
     }
     app_write_close(write, ']');
-    write_column(write, "head", heads->head, heads->head_count, sizeof heads->head[0]);
+    write_column(write, "head", hypotheses->head, hypotheses->head_count,
+                 sizeof hypotheses->head[0]);
     write_limits(write, params);
     app_write_close(write, '}');
 }
 
-static void write_finding(struct app_write *write, const struct ih_finding *finding)
+static void write_detection(struct app_write *write, const struct ih_detection *detection)
 {
     struct ih_score score;
-    ih_score_rate(&finding->evidence, &score);
+    ih_score_rate(&detection->evidence, &score);
     app_write_open(write, '{');
-    write_column(write, "centre_mm_q8", finding->head.centre_mm_q8, 3, sizeof(int32_t));
-    write_column(write, "semi_mm_q8", finding->head.semi_mm_q8, 3, sizeof(int32_t));
-    app_write_int_field(write, "source", finding->source);
-    app_write_int_field(write, "track", finding->track_id);
+    write_column(write, "centre_mm_q8", detection->head.centre_mm_q8, 3, sizeof(int32_t));
+    write_column(write, "semi_mm_q8", detection->head.semi_mm_q8, 3, sizeof(int32_t));
+    app_write_int_field(write, "source", detection->source);
+    app_write_int_field(write, "track", detection->track_id);
     app_write_key(write, "predicted");
-    app_write_bool(write, finding->is_predicted);
+    app_write_bool(write, detection->is_predicted);
     app_write_key(write, "head");
-    app_write_bool(write, finding->is_head);
-    app_write_int_field(write, "logit_q10", finding->logit_q10);
-    app_write_int_field(write, "probability_q16", finding->probability_q16);
-    write_column(write, "evidence_q8", finding->evidence.value_q8, IH_EVIDENCE_COUNT,
+    app_write_bool(write, detection->is_head);
+    app_write_int_field(write, "logit_q10", detection->logit_q10);
+    app_write_int_field(write, "probability_q16", detection->probability_q16);
+    write_column(write, "evidence_q8", detection->evidence.value_q8, IH_EVIDENCE_COUNT,
                  sizeof(int32_t));
     write_column(write, "part_q10", score.part_q10, IH_EVIDENCE_COUNT, sizeof(int32_t));
-    app_write_int_field(write, "through_count", finding->evidence.through_count);
-    app_write_int_field(write, "hit_count", finding->evidence.hit_count);
-    app_write_int_field(write, "front_count", finding->evidence.front_count);
-    app_write_int_field(write, "sigma_mm_q8", finding->sigma_mm_q8);
-    app_write_int_field(write, "u_px_q12", finding->u_px_q12);
-    app_write_int_field(write, "v_px_q12", finding->v_px_q12);
-    app_write_int_field(write, "a_px_q12", finding->a_px_q12);
-    app_write_int_field(write, "b_px_q12", finding->b_px_q12);
-    app_write_int_field(write, "angle_mdeg", finding->angle_mdeg);
-    app_write_int_field(write, "distance_mm_q8", finding->distance_mm_q8);
+    app_write_int_field(write, "through_count", detection->evidence.through_count);
+    app_write_int_field(write, "hit_count", detection->evidence.hit_count);
+    app_write_int_field(write, "front_count", detection->evidence.front_count);
+    app_write_int_field(write, "sigma_mm_q8", detection->sigma_mm_q8);
+    app_write_int_field(write, "u_px_q12", detection->u_px_q12);
+    app_write_int_field(write, "v_px_q12", detection->v_px_q12);
+    app_write_int_field(write, "a_px_q12", detection->a_px_q12);
+    app_write_int_field(write, "b_px_q12", detection->b_px_q12);
+    app_write_int_field(write, "angle_mdeg", detection->angle_mdeg);
+    app_write_int_field(write, "distance_mm_q8", detection->distance_mm_q8);
     app_write_close(write, '}');
 }
 
-static void write_findings(struct app_write *write, const struct ih_findings *findings)
+static void write_detections(struct app_write *write, const struct ih_detections *detections)
 {
     app_write_key(write, "evidence");
     app_write_open(write, '[');
@@ -299,8 +300,8 @@ static void write_findings(struct app_write *write, const struct ih_findings *fi
     app_write_close(write, ']');
     app_write_key(write, "findings");
     app_write_open(write, '[');
-    for (int32_t i = 0; i < findings->finding_count; i++) {
-        write_finding(write, &findings->finding[i]);
+    for (int32_t i = 0; i < detections->detection_count; i++) {
+        write_detection(write, &detections->detection[i]);
     }
     app_write_close(write, ']');
 }
@@ -340,9 +341,9 @@ void sim_trace_write(struct app_write *write, const struct hal_frame *frame, str
     write_samples(write, &head->samples, &head->surface);
     write_surface(write, &head->surface);
     sim_trace_cuts(write, head);
-    write_hypotheses(write, &head->hypotheses);
-    write_heads(write, &head->heads, &head->params.heads);
-    write_findings(write, &head->findings);
+    write_hypotheses(write, &head->nests);
+    write_heads(write, &head->hypotheses, &head->params.hypotheses);
+    write_detections(write, &head->detections);
     write_result(write, head);
     app_write_close(write, '}');
     app_write_line_end(write);

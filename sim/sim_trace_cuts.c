@@ -5,7 +5,7 @@
 /* An arc; its chord leads from the last point back to the first. */
 struct part {
     int32_t vertex_count;
-    struct ih_vertex vertex[IH_PARTS_POINTS_MAX];
+    struct ih_vertex vertex[IH_ARCS_POINTS_MAX];
 };
 
 static bool is_same(const struct ih_ellipse *a, const struct ih_ellipse *b)
@@ -16,10 +16,10 @@ static bool is_same(const struct ih_ellipse *a, const struct ih_ellipse *b)
 
 /* Has the stretch from..to, closed by its chord, the ellipse's area and centre? The area is the
  * core's to the last bit, the centre within 1/256 step. */
-static bool has_moments(const struct ih_parts *parts, int32_t from, int32_t to,
+static bool has_moments(const struct ih_arcs *parts, int32_t from, int32_t to,
                         const struct ih_ellipse *ellipse)
 {
-    const struct ih_parts_sums *sums = &parts->sums;
+    const struct ih_arcs_sums *sums = &parts->sums;
     const int64_t px = parts->dx_q8[to], py = parts->dy_q8[to];
     const int64_t qx = parts->dx_q8[from], qy = parts->dy_q8[from];
     const int64_t w = px * qy - qx * py;
@@ -35,7 +35,7 @@ static bool has_moments(const struct ih_parts *parts, int32_t from, int32_t to,
            llabs(y_q8 + parts->y_q8[0] - parts->dy_q8[0] - ellipse->y_q16 / 256) <= 1;
 }
 
-static void copy_stretch(const struct ih_parts *parts, int32_t from, int32_t to, struct part *out)
+static void copy_stretch(const struct ih_arcs *parts, int32_t from, int32_t to, struct part *out)
 {
     out->vertex_count = to - from + 1;
     for (int32_t i = 0; i < out->vertex_count; i++) {
@@ -45,11 +45,11 @@ static void copy_stretch(const struct ih_parts *parts, int32_t from, int32_t to,
 }
 
 /* scratch->parts are the contour's. False: the slice's part is not of this contour. */
-static bool find_part(struct ih_hypotheses_scratch *scratch, const struct ih_nest *nest,
+static bool find_part(struct ih_nests_scratch *scratch, const struct ih_nest *nest,
                       const struct ih_slice *slice, const struct ih_ellipse_params *params,
                       struct part *out)
 {
-    const struct ih_parts *parts = &scratch->parts;
+    const struct ih_arcs *parts = &scratch->parts;
     struct ih_ellipse ellipse;
     if (!ih_ellipse_of_part(parts, nest->minimum, params, &scratch->ellipse, &ellipse) ||
         !is_same(&ellipse, &slice->ellipse)) {
@@ -83,15 +83,15 @@ static void write_vertices(struct app_write *write, const struct ih_vertex *vert
 static void write_parts(struct app_write *write, struct isohead *head,
                         const struct ih_contour *contour)
 {
-    struct ih_hypotheses_scratch *scratch = &head->scratch.hypotheses;
-    const struct ih_ellipse_params *params = &head->params.hypotheses.ellipse;
-    const struct ih_box box = ih_parts_box(&scratch->cuts, contour);
-    const bool is_searched = ih_parts_make(&scratch->cuts, contour, params, &scratch->parts);
+    struct ih_nests_scratch *scratch = &head->scratch.nests;
+    const struct ih_ellipse_params *params = &head->params.nests.ellipse;
+    const struct ih_box box = ih_arcs_box(&scratch->cuts, contour);
+    const bool is_searched = ih_arcs_make(&scratch->cuts, contour, params, &scratch->parts);
     struct part part;
     app_write_key(write, "part");
     app_write_open(write, '[');
-    for (int32_t i = 0; is_searched && i < head->hypotheses.nest_count; i++) {
-        const struct ih_nest *nest = &head->hypotheses.nest[i];
+    for (int32_t i = 0; is_searched && i < head->nests.nest_count; i++) {
+        const struct ih_nest *nest = &head->nests.nest[i];
         for (int32_t k = 0; k < nest->slice_count; k++) {
             const struct ih_slice *slice = &nest->slice[k];
             if (!slice->whole &&
@@ -115,23 +115,22 @@ static void write_contour(struct app_write *write, struct isohead *head,
     app_write_open(write, '{');
     app_write_key(write, "closed");
     app_write_bool(write, contour->closed);
-    write_vertices(write, &head->scratch.hypotheses.cuts.vertex[contour->first],
-                   contour->vertex_count);
+    write_vertices(write, &head->scratch.nests.cuts.vertex[contour->first], contour->vertex_count);
     write_parts(write, head, contour);
     app_write_close(write, '}');
 }
 
 void sim_trace_cuts(struct app_write *write, struct isohead *head)
 {
-    struct ih_cuts *cuts = &head->scratch.hypotheses.cuts;
+    struct ih_contours *cuts = &head->scratch.nests.cuts;
     int32_t level_mm_q8 = 0;
     app_write_key(write, "cuts");
     app_write_open(write, '[');
     for (int32_t index = 0;
          head->surface.valid &&
-         ih_hypotheses_level(&head->surface, &head->params.hypotheses, index, &level_mm_q8);
+         ih_nests_level(&head->surface, &head->params.nests, index, &level_mm_q8);
          index++) {
-        ih_cuts_level(&head->surface, level_mm_q8, cuts);
+        ih_contours_level(&head->surface, level_mm_q8, cuts);
         app_write_open(write, '{');
         app_write_int_field(write, "level_mm_q8", cuts->level_mm_q8);
         app_write_int_field(write, "contours_dropped", cuts->contours_dropped);

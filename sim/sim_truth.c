@@ -35,10 +35,10 @@ static bool read_numbers(const cJSON *array, int count, double limit, double *va
 static bool read_head(const cJSON *line, struct sim_truth_frame *frame, struct hal_error *error)
 {
     const cJSON *head = cJSON_GetObjectItemCaseSensitive(line, "head");
-    const cJSON *heads = cJSON_GetObjectItemCaseSensitive(line, "heads");
+    const cJSON *hypotheses = cJSON_GetObjectItemCaseSensitive(line, "heads");
     double centre_mm[AXES] = {0};
     double semi_axes_mm[AXES] = {0};
-    bool several = cJSON_IsArray(heads) && cJSON_GetArraySize(heads) > 0;
+    bool several = cJSON_IsArray(hypotheses) && cJSON_GetArraySize(hypotheses) > 0;
     if (cJSON_IsNull(head) || (head == NULL && several)) {
         frame->head = several ? SIM_TRUTH_UNSCORED : SIM_TRUTH_NOBODY;
         return true;

@@ -5,22 +5,22 @@
 
 static void without_scan(struct ih_params *params)
 {
-    params->findings.scan.place_max = 0;
+    params->detections.scan.place_max = 0;
 }
 
 static void without_nests(struct ih_params *params)
 {
-    params->findings.nest_max = 0;
+    params->detections.nest_max = 0;
 }
 
 static void without_expected(struct ih_params *params)
 {
-    params->findings.expected_max = 0;
+    params->detections.expected_max = 0;
 }
 
 static void without_fit(struct ih_params *params)
 {
-    params->findings.fit.step_count = 0;
+    params->detections.fit.step_count = 0;
 }
 
 static void without_tracks(struct ih_params *params)

@@ -1,5 +1,5 @@
 /* isohead_cortexm RIG FRAME... - the records of frames (docs/contract.md) on a Cortex-M that hangs on a
- * debugger or an emulator: RIG is a blob (ih_blob.h), each FRAME a binary PGM (P5), 40 ms after the one
+ * debugger or an emulator: RIG is a blob (ih_rig_blob.h), each FRAME a binary PGM (P5), 40 ms after the one
  * before. The names stand on the command line, apart by blanks.
  *
  * Exit status as host_sim's: 0 every frame was processed, 1 something was unreadable or wrong (told on
@@ -10,7 +10,7 @@
 #include "app_view.h"
 #include "cortexm/hal_semihosting.h"
 #include "hal_text.h"
-#include "rig/ih_blob.h"
+#include "rig/ih_rig_blob.h"
 #include "replay/hal_pgm.h"
 
 #define FRAME_US 40000
@@ -60,7 +60,7 @@ static char *next_word(char **line)
 
 static bool start_core(const char *name)
 {
-    static uint8_t blob[IH_BLOB_BYTES];
+    static uint8_t blob[IH_RIG_BLOB_BYTES];
     static struct ih_calibration calibration;
     struct hal_error error;
     size_t length = 0;
@@ -68,7 +68,7 @@ static bool start_core(const char *name)
     if (!hal_semihosting_load(name, blob, sizeof blob, &length, &error)) {
         return fail(name, error.text);
     }
-    enum ih_err err = ih_blob_decode(blob, length, &calibration);
+    enum ih_err err = ih_rig_blob_decode(blob, length, &calibration);
     if (err == IH_OK) {
         err = isohead_init(&head, &calibration, &bad_slot);
     }

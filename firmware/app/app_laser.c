@@ -259,7 +259,7 @@ static int64_t beat_wait_us(const struct app_laser *laser, int64_t now_us)
     return laser->is_on ? laser->beat_us + APP_LASER_BEAT_US - now_us : APP_LASER_NEVER_US;
 }
 
-static int64_t least(int64_t a, int64_t b)
+static int64_t min(int64_t a, int64_t b)
 {
     return a < b ? a : b;
 }
@@ -278,9 +278,9 @@ int64_t app_laser_tick(struct app_laser *laser, int64_t now_us)
         beat(laser);
     }
     /* Only now: what was switched on just now has limits too. */
-    int64_t wait_us = least(duty_wait_us(laser), silence_wait_us(laser));
-    wait_us = least(wait_us, interlock_wait_us(laser));
-    return least(wait_us, beat_wait_us(laser, now_us));
+    int64_t wait_us = min(duty_wait_us(laser), silence_wait_us(laser));
+    wait_us = min(wait_us, interlock_wait_us(laser));
+    return min(wait_us, beat_wait_us(laser, now_us));
 }
 
 const char *app_laser_block_text(unsigned blocks)

@@ -90,7 +90,7 @@ static void write_vertex(struct app_write *write, const struct isohead *head,
 }
 
 static void write_level(struct app_write *write, const struct isohead *head,
-                        const struct ih_cuts *cuts, void (*rest)(void))
+                        const struct ih_contours *cuts, void (*rest)(void))
 {
     for (int32_t i = 0; i < cuts->contour_count; i++) {
         const struct ih_contour *contour = &cuts->contour[i];
@@ -112,15 +112,15 @@ static void write_level(struct app_write *write, const struct isohead *head,
 
 static void write_contours(struct app_write *write, struct isohead *head, void (*rest)(void))
 {
-    struct ih_cuts *cuts = &head->scratch.hypotheses.cuts;
+    struct ih_contours *cuts = &head->scratch.nests.cuts;
     int32_t level_mm_q8 = 0;
     app_write_key(write, "contours");
     app_write_open(write, '[');
     for (int32_t index = 0;
          head->surface.valid &&
-         ih_hypotheses_level(&head->surface, &head->params.hypotheses, index, &level_mm_q8);
+         ih_nests_level(&head->surface, &head->params.nests, index, &level_mm_q8);
          index += LEVEL_STEP) {
-        ih_cuts_level(&head->surface, level_mm_q8, cuts);
+        ih_contours_level(&head->surface, level_mm_q8, cuts);
         rest();
         write_level(write, head, cuts, rest);
     }

@@ -78,12 +78,9 @@ static void write_dropped(struct app_write *write, const struct isohead *head)
         const char *key;
         int32_t count;
     } dropped[] = {
-        {"dots", head->dots.dots_dropped},
-        {"candidates", head->labels.candidates_dropped},
-        {"minima", head->hypotheses.minima_dropped},
-        {"contours", head->hypotheses.contours_dropped},
-        {"places", head->windows.places_dropped},
-        {"findings", head->findings.dropped_count},
+        {"dots", head->dots.dots_dropped},        {"candidates", head->labels.candidates_dropped},
+        {"minima", head->nests.minima_dropped},   {"contours", head->nests.contours_dropped},
+        {"places", head->windows.places_dropped}, {"findings", head->detections.dropped_count},
     };
     bool any = false;
     for (size_t i = 0; i < sizeof dropped / sizeof dropped[0]; i++) {

@@ -352,14 +352,14 @@ static int distance(const char *from, const char *to)
 int app_settings_nearest(const char *name)
 {
     int nearest = -1;
-    int least = DISTANCE_MAX + 1;
+    int min = DISTANCE_MAX + 1;
     if (strlen(name) > NAME_MAX_BYTES) {
         return -1;
     }
     for (int i = 0; i < APP_SETTINGS_COUNT; i++) {
         int letters = distance(name, app_settings[i].name);
-        if (letters < least && letters < (int)strlen(name)) {
-            least = letters;
+        if (letters < min && letters < (int)strlen(name)) {
+            min = letters;
             nearest = i;
         }
     }

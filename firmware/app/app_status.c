@@ -50,10 +50,10 @@ static void print_line(const struct app_status *status, int64_t passed_us, char 
     length +=
         (size_t)snprintf(text, room, "%" PRId64 ".%" PRId64 " frames/s", rate / 10, rate % 10);
     if (count > 0) {
-        int64_t heads = tenths(status->head_sum, count);
-        length += (size_t)snprintf(text + length, room - length,
-                                   ", %" PRId64 " dots, %" PRId64 ".%" PRId64 " heads",
-                                   (status->dot_sum + count / 2) / count, heads / 10, heads % 10);
+        int64_t hypotheses = tenths(status->head_sum, count);
+        length += (size_t)snprintf(
+            text + length, room - length, ", %" PRId64 " dots, %" PRId64 ".%" PRId64 " heads",
+            (status->dot_sum + count / 2) / count, hypotheses / 10, hypotheses % 10);
     }
     length += (size_t)snprintf(text + length, room - length,
                                ", lost %" PRId64 ", skipped %" PRId64 ", bad %" PRId64

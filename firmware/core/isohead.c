@@ -55,9 +55,9 @@ void ih_params_default(struct ih_params *params)
     ih_points_params_default(&params->points);
     ih_samples_params_default(&params->samples);
     ih_surface_params_default(&params->surface);
+    ih_nests_params_default(&params->nests);
     ih_hypotheses_params_default(&params->hypotheses);
-    ih_heads_params_default(&params->heads);
-    ih_findings_params_default(&params->findings);
+    ih_detections_params_default(&params->detections);
     ih_tracks_params_default(&params->tracks);
 }
 
@@ -67,7 +67,7 @@ void ih_params_paper(struct ih_params *params)
     params->is_paper = true;
     params->surface.centres = IH_SURFACE_CENTRES_MAX;
     params->surface.is_moving = false;
-    ih_hypotheses_params_paper(&params->hypotheses);
+    ih_nests_params_paper(&params->nests);
 }
 
 enum ih_err isohead_init(struct isohead *head, const struct ih_calibration *calibration,
@@ -132,10 +132,9 @@ static void find_nests(struct isohead *head, const struct ih_dots *dots)
     ih_samples_select(&head->points, dots, rig, &params->samples, &head->samples);
     ih_surface_fit(&head->samples, &head->points.field, &params->surface, &head->scratch.surface,
                    &head->surface);
-    ih_hypotheses_find(&head->surface, &params->hypotheses, &head->scratch.hypotheses,
-                       &head->hypotheses);
-    ih_heads_select(&head->hypotheses, &head->surface, &head->samples, rig, &params->heads,
-                    &head->heads);
+    ih_nests_find(&head->surface, &params->nests, &head->scratch.nests, &head->nests);
+    ih_hypotheses_select(&head->nests, &head->surface, &head->samples, rig, &params->hypotheses,
+                         &head->hypotheses);
 }
 
 /* And on to findings, unless the paper's method alone is wanted. */
@@ -143,8 +142,8 @@ static void look(struct isohead *head, const struct ih_dots *dots)
 {
     find_nests(head, dots);
     if (!head->params.is_paper) {
-        ih_findings_add(&head->points, dots, &head->heads, &head->expected, &head->rig,
-                        &head->params.findings, &head->scratch.findings, &head->findings);
+        ih_detections_add(&head->points, dots, &head->hypotheses, &head->expected, &head->rig,
+                          &head->params.detections, &head->scratch.detections, &head->detections);
     }
 }
 
@@ -172,7 +171,7 @@ static enum ih_err look_at_windows(struct isohead *head, const struct ih_frame *
 static void begin(struct isohead *head, int64_t time_us)
 {
     head->expected.count = 0;
-    ih_findings_begin(&head->findings);
+    ih_detections_begin(&head->detections);
     if (!head->params.is_paper) {
         ih_tracks_expect(&head->tracks, &head->params.tracks, time_us, &head->expected);
     }
@@ -182,10 +181,10 @@ static void begin(struct isohead *head, int64_t time_us)
 static void conclude(struct isohead *head)
 {
     if (head->params.is_paper) {
-        ih_result_from_heads(&head->heads, &head->result);
+        ih_result_from_heads(&head->hypotheses, &head->result);
     } else {
-        ih_tracks_update(&head->tracks, &head->params.tracks, &head->rig, &head->findings);
-        ih_result_from_tracks(&head->findings, &head->tracks, &head->result);
+        ih_tracks_update(&head->tracks, &head->params.tracks, &head->rig, &head->detections);
+        ih_result_from_tracks(&head->detections, &head->tracks, &head->result);
     }
 }
 

@@ -22,11 +22,11 @@
 #include <stdint.h>
 
 #include "base/ih_types.h"
-#include "detect/ih_findings.h"
+#include "detect/ih_detections.h"
 #include "dots/ih_dots.h"
 #include "labels/ih_labels.h"
-#include "nests/ih_heads.h"
 #include "nests/ih_hypotheses.h"
+#include "nests/ih_nests.h"
 #include "points/ih_points.h"
 #include "points/ih_windows.h"
 #include "rig/ih_rig.h"
@@ -48,9 +48,9 @@ struct ih_params {
     struct ih_points_params points;
     struct ih_samples_params samples;
     struct ih_surface_params surface;
+    struct ih_nests_params nests;
     struct ih_hypotheses_params hypotheses;
-    struct ih_heads_params heads;
-    struct ih_findings_params findings;
+    struct ih_detections_params detections;
     struct ih_tracks_params tracks;
 };
 
@@ -67,9 +67,9 @@ struct isohead {
     struct ih_points points;
     struct ih_samples samples;
     struct ih_surface surface;
+    struct ih_nests nests;
     struct ih_hypotheses hypotheses;
-    struct ih_heads heads;
-    struct ih_findings findings;
+    struct ih_detections detections;
     struct ih_result result;
     /* Working memory; stages never run at the same time, so they share it. */
     union {
@@ -77,8 +77,8 @@ struct isohead {
         struct ih_labels_scratch labels;
         struct ih_windows_scratch windows;
         struct ih_surface_scratch surface;
-        struct ih_hypotheses_scratch hypotheses;
-        struct ih_findings_scratch findings;
+        struct ih_nests_scratch nests;
+        struct ih_detections_scratch detections;
     } scratch;
 };
 

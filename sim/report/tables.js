@@ -158,7 +158,7 @@ const Tables = (() => {
           element("tbody", {}, ...rows)))));
   }
 
-  /* The paper's tests of a nest, in their order (firmware/core/nests/ih_heads.h). */
+  /* The paper's tests of a nest, in their order (firmware/core/nests/ih_hypotheses.h). */
   function tests(h, l) {
     const share = (part, all, least) => [all === 0 ? "nothing there" : `${part} of ${all}`, `at least ${least} %`, part * 100 >= all * least];
     const o = h.outline;

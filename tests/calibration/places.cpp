@@ -133,38 +133,38 @@ static double corner_error(const Stage &stage, double blur_px, double told_blur_
     corners.edge_px = 2.5066 * std::hypot(told_blur_px, 0.29);
     cal::corners_refine(stage.board, print, tangents, stage.picture(blur_px), stage.camera.matrix,
                         stage.camera.distortion, corners);
-    double most = 0.0;
+    double max = 0.0;
     for (size_t i = 0; i < corners.ids.size(); i++)
-        most = std::max(most, cv::norm(cv::Point2d(corners.px[i]) -
-                                       stage.seen(stage.board.corner_mm(corners.ids[i]))));
+        max = std::max(max, cv::norm(cv::Point2d(corners.px[i]) -
+                                     stage.seen(stage.board.corner_mm(corners.ids[i]))));
     count = corners.ids.size();
-    return most;
+    return max;
 }
 
 static void check_corners()
 {
     Stage stage;
     size_t count, expected = 0;
-    double most = corner_error(stage, 0.8, 0.8, count);
+    double max = corner_error(stage, 0.8, 0.8, count);
     for (int id = 0; id < stage.board.vertex_count(); id++) {
         cv::Point2d px = stage.seen(stage.board.corner_mm(id));
         expected += px.x > 0.0 && px.y > 0.0 && px.x < width - 1.0 && px.y < height - 1.0;
     }
-    result("corners, without noise", most < 0.01, most, 0.01);
+    result("corners, without noise", max < 0.01, max, 0.01);
     result("the outline's corners are among them", count == 70 && expected == 70,
            static_cast<double>(count), 70.0);
-    most = corner_error(stage, 0.8, 0.6, count);
-    result("corners of a picture softer than it is told", most < 0.01 && count == 70, most, 0.01);
+    max = corner_error(stage, 0.8, 0.6, count);
+    result("corners of a picture softer than it is told", max < 0.01 && count == 70, max, 0.01);
     /* Edges between the samples of the drawing. */
     for (const char *name : {"charuco-8x6-27.3", "chessboard-9x6-25.1"}) {
         Stage other(name);
-        most = corner_error(other, 0.8, 0.8, count);
-        result(name, most < 0.02 && count > 60, most, 0.02);
+        max = corner_error(other, 0.8, 0.8, count);
+        result(name, max < 0.02 && count > 60, max, 0.02);
     }
     stage.view.shift += cv::Vec3d(150.0, 0.0, 0.0); /* the right side is out of the frame */
-    most = corner_error(stage, 0.8, 0.8, count);
-    result("corners of a board at the frame's border", most < 0.01 && count > 45 && count < 70,
-           most, 0.01);
+    max = corner_error(stage, 0.8, 0.8, count);
+    result("corners of a board at the frame's border", max < 0.01 && count > 45 && count < 70, max,
+           0.01);
 }
 
 /* Dots on both sides of an edge, in steps, and where edges cross. */
@@ -274,11 +274,11 @@ static void check_fading()
     corners.edge_px = 2.5066 * std::hypot(0.8, 0.29);
     cal::corners_refine(stage.board, print, tangents, grey, stage.camera.matrix,
                         stage.camera.distortion, corners);
-    double most = 0.0;
+    double max = 0.0;
     for (size_t i = 0; i < corners.ids.size(); i++)
-        most = std::max(most, cv::norm(cv::Point2d(corners.px[i]) -
-                                       stage.seen(stage.board.corner_mm(corners.ids[i]))));
-    result("corners in light that fades", most < 0.006 && corners.ids.size() > 60, most, 0.006);
+        max = std::max(max, cv::norm(cv::Point2d(corners.px[i]) -
+                                     stage.seen(stage.board.corner_mm(corners.ids[i]))));
+    result("corners in light that fades", max < 0.006 && corners.ids.size() > 60, max, 0.006);
 }
 
 /* Dots whose beams are grainy: the fit that knows of grains errs less than the one to which all pixels are alike, and

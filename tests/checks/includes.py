@@ -28,7 +28,7 @@ CORE_ORDER = ["base", "simd", "rig", "dots", "labels", "points", "surface", "nes
 CORE_SYSTEM = {"stdbool.h", "stddef.h", "stdint.h", "string.h"}
 # The vectors of x86 and the pairs of a Cortex-M, in files that are not yet on one vocabulary.
 VECTOR_HEADERS = {"immintrin.h", "emmintrin.h", "arm_neon.h", "arm_acle.h"}
-VECTOR_FILES = {"ih_normal.c", "ih_basis.c", "ih_cuts.c", "ih_row.c", "ih_rating.c", "ih_parts.c", "ih_lens.c",
+VECTOR_FILES = {"ih_normal_equations.c", "ih_multiquadric.c", "ih_contours.c", "ih_fit_equations.c", "ih_template.c", "ih_arcs.c", "ih_undistort.c",
                 "ih_surface.c"}
 
 INCLUDE = re.compile(r'^\s*#\s*include\s*(["<])([^">]+)[">]')

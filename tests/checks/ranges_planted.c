@@ -9,7 +9,7 @@
 #include "base/ih_fix.h"
 #include "base/ih_range.h"
 #include "detect/ih_ellipsoid.h"
-#include "detect/ih_space.h"
+#include "detect/ih_rays.h"
 
 /* Nothing that a compiler knows. */
 static volatile int32_t big = 70000;
@@ -28,7 +28,7 @@ static void make_stage_fail(void)
     const int32_t origin_mm_q8[3] = {0};
     const struct ih_ray ray = {.state = IH_RAY_UNKNOWN};
     const struct ih_ellipsoid thin = {{0, 0, 1000 << 8}, {1 << 8, 100 << 8, 100 << 8}};
-    const struct ih_shares shares = ih_ellipsoid_shares(thin.semi_mm_q8);
+    const struct ih_fractions shares = ih_ellipsoid_fractions(thin.semi_mm_q8);
     const struct ih_aim aim = ih_ellipsoid_aim(thin.semi_mm_q8, &shares, &ray);
     struct ih_crossing crossing;
     (void)ih_ellipsoid_cross(&thin, &shares, origin_mm_q8, &ray, &aim, &crossing);

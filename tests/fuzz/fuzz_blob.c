@@ -1,13 +1,13 @@
-/* Rigs as blobs (firmware/core/ih_blob). Input: how the bytes come about, then they or what changes in
+/* Rigs as blobs (firmware/core/ih_rig_blob). Input: how the bytes come about, then they or what changes in
  * them. No engine finds a CRC: one flag has it put right, so that what lies behind it is reached. */
 #include <string.h>
 
-#include "rig/ih_blob.h"
+#include "rig/ih_rig_blob.h"
 
 #include "fuzz_rig.h"
 
 #define CHANGES_MAX 16
-#define SIZE_MAX_BYTES (IH_BLOB_BYTES + 64)
+#define SIZE_MAX_BYTES (IH_RIG_BLOB_BYTES + 64)
 
 static void put_word(uint8_t *at, uint32_t word)
 {
@@ -21,9 +21,9 @@ static void change(struct fuzz_input *input, uint8_t flags, uint8_t *blob)
 {
     const struct ih_rig *rig =
         (flags & 4) != 0 ? fuzz_rig_range(flags & 1) : fuzz_rig_dots(flags & 3);
-    FUZZ_CHECK(ih_blob_encode(&rig->calibration, blob) == IH_OK);
+    FUZZ_CHECK(ih_rig_blob_encode(&rig->calibration, blob) == IH_OK);
     for (int i = 0; i < CHANGES_MAX && input->left > 0; i++) {
-        int32_t at = fuzz_within(input, 0, IH_BLOB_BYTES - 1);
+        int32_t at = fuzz_within(input, 0, IH_RIG_BLOB_BYTES - 1);
         blob[at] = (uint8_t)(blob[at] ^ fuzz_byte(input));
     }
 }
@@ -32,10 +32,10 @@ static void change(struct fuzz_input *input, uint8_t flags, uint8_t *blob)
 static void check_accepted(const struct ih_calibration *calibration, const uint8_t *blob)
 {
     static struct ih_rig rig;
-    static uint8_t again[IH_BLOB_BYTES];
+    static uint8_t again[IH_RIG_BLOB_BYTES];
     int32_t bad_slot = IH_NONE;
     FUZZ_CHECK(calibration->kind == IH_RIG_DOTS || calibration->kind == IH_RIG_RANGE);
-    FUZZ_CHECK(ih_blob_encode(calibration, again) == IH_OK);
+    FUZZ_CHECK(ih_rig_blob_encode(calibration, again) == IH_OK);
     FUZZ_CHECK(memcmp(again, blob, sizeof again) == 0);
     enum ih_err err = ih_rig_init(&rig, calibration, &bad_slot);
     FUZZ_CHECK(err <= 0 && strcmp(ih_err_text(err), "unknown error") != 0);
@@ -64,19 +64,20 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         length = input.left < SIZE_MAX_BYTES ? input.left : SIZE_MAX_BYTES;
         memcpy(bytes, input.at, length);
     } else {
-        length = (flags & 16) != 0 ? (size_t)fuzz_within(&input, 0, SIZE_MAX_BYTES) : IH_BLOB_BYTES;
+        length =
+            (flags & 16) != 0 ? (size_t)fuzz_within(&input, 0, SIZE_MAX_BYTES) : IH_RIG_BLOB_BYTES;
         change(&input, flags, bytes);
     }
-    if ((flags & 32) != 0 && length >= IH_BLOB_BYTES) {
-        put_word(bytes + IH_BLOB_BYTES - 4, ih_blob_crc32(bytes, IH_BLOB_BYTES - 4));
+    if ((flags & 32) != 0 && length >= IH_RIG_BLOB_BYTES) {
+        put_word(bytes + IH_RIG_BLOB_BYTES - 4, ih_rig_blob_crc32(bytes, IH_RIG_BLOB_BYTES - 4));
     }
     uint8_t *exact = malloc(length > 0 ? length : 1); /* a read beyond it is seen */
     FUZZ_CHECK(exact != NULL);
     memcpy(exact, bytes, length);
     memset(&calibration, 0xa5, sizeof calibration);
-    enum ih_err err = ih_blob_decode(exact, length, &calibration);
+    enum ih_err err = ih_rig_blob_decode(exact, length, &calibration);
     if (err == IH_OK) {
-        FUZZ_CHECK(length == IH_BLOB_BYTES);
+        FUZZ_CHECK(length == IH_RIG_BLOB_BYTES);
         check_accepted(&calibration, exact);
     } else {
         check_refused(err, &calibration);

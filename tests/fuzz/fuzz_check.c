@@ -7,8 +7,8 @@
 #define SHARE_ONE_Q16 65536
 #define LOGIT_MAX_Q10 (1 << 20)
 /* Axes of a fitted head against the mean one's: e^0.35, and a little for rounding. */
-#define SEMI_LEAST_PERCENT 70
-#define SEMI_MOST_PERCENT 143
+#define SEMI_MIN_PERCENT 70
+#define SEMI_MAX_PERCENT 143
 
 void fuzz_check_dots(const struct ih_dots *dots, int32_t width, int32_t height)
 {
@@ -133,11 +133,11 @@ static bool on_border(const struct ih_vertex *vertex)
     return vertex->x_q9 == 0 || vertex->y_q9 == 0 || vertex->x_q9 == end || vertex->y_q9 == end;
 }
 
-void fuzz_check_cuts(const struct ih_cuts *cuts)
+void fuzz_check_cuts(const struct ih_contours *cuts)
 {
     int32_t used = 0;
-    FUZZ_CHECK(cuts->contour_count >= 0 && cuts->contour_count <= IH_CUTS_CONTOURS_MAX);
-    FUZZ_CHECK(cuts->vertex_count >= 0 && cuts->vertex_count <= IH_CUTS_VERTICES_MAX);
+    FUZZ_CHECK(cuts->contour_count >= 0 && cuts->contour_count <= IH_CONTOURS_CONTOURS_MAX);
+    FUZZ_CHECK(cuts->vertex_count >= 0 && cuts->vertex_count <= IH_CONTOURS_VERTICES_MAX);
     FUZZ_CHECK(cuts->contours_dropped >= 0);
     for (int32_t i = 0; i < cuts->vertex_count; i++) {
         const struct ih_vertex *vertex = &cuts->vertex[i];
@@ -157,7 +157,7 @@ void fuzz_check_cuts(const struct ih_cuts *cuts)
 }
 
 static void check_slice(const struct ih_nest *nest, int32_t index,
-                        const struct ih_hypotheses_params *params)
+                        const struct ih_nests_params *params)
 {
     const struct ih_slice *slice = &nest->slice[index];
     const struct ih_ellipse *ellipse = &slice->ellipse;
@@ -173,22 +173,22 @@ static void check_slice(const struct ih_nest *nest, int32_t index,
     FUZZ_CHECK(index == 0 || slice->behind_mm_q8 > nest->slice[index - 1].behind_mm_q8);
 }
 
-void fuzz_check_hypotheses(const struct ih_hypotheses *hypotheses, const struct ih_surface *surface,
-                           const struct ih_hypotheses_params *params)
+void fuzz_check_hypotheses(const struct ih_nests *nests, const struct ih_surface *surface,
+                           const struct ih_nests_params *params)
 {
-    FUZZ_CHECK(hypotheses->nest_count >= 0 && hypotheses->nest_count <= IH_HYPOTHESES_MAX);
-    FUZZ_CHECK(hypotheses->minima_dropped >= 0 && hypotheses->contours_dropped >= 0);
-    FUZZ_CHECK(hypotheses->minima_dropped == 0 || hypotheses->nest_count == IH_HYPOTHESES_MAX);
-    FUZZ_CHECK(surface->valid || hypotheses->nest_count == 0);
-    for (int32_t i = 0; i < hypotheses->nest_count; i++) {
-        const struct ih_nest *nest = &hypotheses->nest[i];
+    FUZZ_CHECK(nests->nest_count >= 0 && nests->nest_count <= IH_NESTS_MAX);
+    FUZZ_CHECK(nests->minima_dropped >= 0 && nests->contours_dropped >= 0);
+    FUZZ_CHECK(nests->minima_dropped == 0 || nests->nest_count == IH_NESTS_MAX);
+    FUZZ_CHECK(surface->valid || nests->nest_count == 0);
+    for (int32_t i = 0; i < nests->nest_count; i++) {
+        const struct ih_nest *nest = &nests->nest[i];
         int32_t x = nest->minimum.x_q9 / 512, y = nest->minimum.y_q9 / 512;
         FUZZ_CHECK(nest->minimum.x_q9 % 512 == 0 && nest->minimum.y_q9 % 512 == 0);
         FUZZ_CHECK(x > 0 && y > 0 && x < IH_SURFACE_GRID - 1 && y < IH_SURFACE_GRID - 1);
         FUZZ_CHECK(nest->nearest_mm_q8 == surface->depth_mm_q8[y][x]);
-        FUZZ_CHECK(i == 0 || hypotheses->nest[i - 1].nearest_mm_q8 <= nest->nearest_mm_q8);
+        FUZZ_CHECK(i == 0 || nests->nest[i - 1].nearest_mm_q8 <= nest->nearest_mm_q8);
         FUZZ_CHECK(nest->front_mm_q8 >= nest->nearest_mm_q8);
-        FUZZ_CHECK(nest->slice_count >= 0 && nest->slice_count <= IH_HYPOTHESES_SLICES_MAX);
+        FUZZ_CHECK(nest->slice_count >= 0 && nest->slice_count <= IH_NESTS_SLICES_MAX);
         for (int32_t k = 0; k < nest->slice_count; k++) {
             check_slice(nest, k, params);
         }
@@ -213,27 +213,27 @@ static void check_ellipse(int32_t a_px_q12, int32_t b_px_q12, int32_t angle_mdeg
     FUZZ_CHECK(distance_mm_q8 >= 0);
 }
 
-void fuzz_check_heads(const struct ih_heads *heads, const struct ih_hypotheses *hypotheses,
+void fuzz_check_heads(const struct ih_hypotheses *hypotheses, const struct ih_nests *nests,
                       const struct ih_samples *samples)
 {
     int32_t accepted = 0;
-    FUZZ_CHECK(heads->hypothesis_count >= 0);
-    FUZZ_CHECK(heads->hypothesis_count <= hypotheses->nest_count);
-    for (int32_t i = 0; i < heads->hypothesis_count; i++) {
-        const struct ih_hypothesis *h = &heads->hypothesis[i];
+    FUZZ_CHECK(hypotheses->hypothesis_count >= 0);
+    FUZZ_CHECK(hypotheses->hypothesis_count <= nests->nest_count);
+    for (int32_t i = 0; i < hypotheses->hypothesis_count; i++) {
+        const struct ih_hypothesis *h = &hypotheses->hypothesis[i];
         check_ellipse(h->a_px_q12, h->b_px_q12, h->angle_mdeg, h->distance_mm_q8);
-        FUZZ_CHECK(h->nest >= 0 && h->nest < hypotheses->nest_count);
-        FUZZ_CHECK(hypotheses->nest[h->nest].slice_count > 0);
+        FUZZ_CHECK(h->nest >= 0 && h->nest < nests->nest_count);
+        FUZZ_CHECK(nests->nest[h->nest].slice_count > 0);
         FUZZ_CHECK(h->area_mm2 >= 0 && h->extent_mm_q8 >= 0 && h->upright_q16 >= 0);
         FUZZ_CHECK(h->rejected >= IH_ACCEPTED && h->rejected < IH_REJECT_SCORE);
         FUZZ_CHECK((ih_reject_text(h->rejected) == NULL) == (h->rejected == IH_ACCEPTED));
         check_outline(&h->outline, samples);
         if (h->rejected == IH_ACCEPTED) {
-            FUZZ_CHECK(accepted < heads->head_count && heads->head[accepted] == i);
+            FUZZ_CHECK(accepted < hypotheses->head_count && hypotheses->head[accepted] == i);
             accepted++;
         }
     }
-    FUZZ_CHECK(heads->head_count == accepted);
+    FUZZ_CHECK(hypotheses->head_count == accepted);
 }
 
 static void check_head(const struct ih_ellipsoid *head)
@@ -242,21 +242,22 @@ static void check_head(const struct ih_ellipsoid *head)
     for (int axis = 0; axis < 3; axis++) {
         int32_t semi_mm_q8 = head->semi_mm_q8[axis];
         FUZZ_CHECK(abs(head->centre_mm_q8[axis]) <= 1 << 26);
-        FUZZ_CHECK(semi_mm_q8 >= mean_mm[axis] * 256 * SEMI_LEAST_PERCENT / 100);
-        FUZZ_CHECK(semi_mm_q8 <= mean_mm[axis] * 256 * SEMI_MOST_PERCENT / 100);
+        FUZZ_CHECK(semi_mm_q8 >= mean_mm[axis] * 256 * SEMI_MIN_PERCENT / 100);
+        FUZZ_CHECK(semi_mm_q8 <= mean_mm[axis] * 256 * SEMI_MAX_PERCENT / 100);
     }
 }
 
-void fuzz_check_findings(const struct ih_findings *findings)
+void fuzz_check_detections(const struct ih_detections *detections)
 {
-    FUZZ_CHECK(findings->finding_count >= 0 && findings->finding_count <= IH_FINDINGS_MAX);
-    FUZZ_CHECK(findings->dropped_count >= 0 && findings->seen_count >= 0);
-    for (int32_t i = 0; i < findings->finding_count; i++) {
-        const struct ih_finding *f = &findings->finding[i];
+    FUZZ_CHECK(detections->detection_count >= 0 &&
+               detections->detection_count <= IH_DETECTIONS_MAX);
+    FUZZ_CHECK(detections->dropped_count >= 0 && detections->seen_count >= 0);
+    for (int32_t i = 0; i < detections->detection_count; i++) {
+        const struct ih_detection *f = &detections->detection[i];
         const struct ih_evidence *e = &f->evidence;
         check_head(&f->head);
         check_ellipse(f->a_px_q12, f->b_px_q12, f->angle_mdeg, f->distance_mm_q8);
-        FUZZ_CHECK(i == 0 || findings->finding[i - 1].logit_q10 >= f->logit_q10);
+        FUZZ_CHECK(i == 0 || detections->detection[i - 1].logit_q10 >= f->logit_q10);
         FUZZ_CHECK(abs(f->logit_q10) <= LOGIT_MAX_Q10);
         FUZZ_CHECK(f->probability_q16 >= 0 && f->probability_q16 <= SHARE_ONE_Q16);
         FUZZ_CHECK(f->source >= IH_SOURCE_SCAN && f->source <= IH_SOURCE_EXPECTED);
@@ -269,23 +270,23 @@ void fuzz_check_findings(const struct ih_findings *findings)
         FUZZ_CHECK(e->value_q8[IH_EVIDENCE_ON] <= IH_SLOTS << 8);
         FUZZ_CHECK(e->value_q8[IH_EVIDENCE_ROUGH] >= 0 && e->value_q8[IH_EVIDENCE_MOVED] >= 0);
     }
-    for (int32_t i = 0; i < IH_FINDINGS_EXPECTED_MAX; i++) {
-        const struct ih_view *view = &findings->view[i];
+    for (int32_t i = 0; i < IH_DETECTIONS_EXPECTED_MAX; i++) {
+        const struct ih_view *view = &detections->view[i];
         FUZZ_CHECK(view->through >= 0 && view->hit >= 0 && view->front >= 0);
     }
 }
 
 static void check_track(const struct ih_tracks *tracks, int32_t index,
-                        const struct ih_findings *findings)
+                        const struct ih_detections *detections)
 {
     const struct ih_track *track = &tracks->track[index];
-    FUZZ_CHECK(track->id > 0 && track->finding_count >= 1);
+    FUZZ_CHECK(track->id > 0 && track->detection_count >= 1);
     for (int32_t i = 0; i < index; i++) {
         FUZZ_CHECK(tracks->track[i].id != track->id);
-        FUZZ_CHECK(tracks->track[i].finding != track->finding);
+        FUZZ_CHECK(tracks->track[i].detection != track->detection);
     }
-    FUZZ_CHECK(track->finding >= 0 && track->finding < findings->finding_count);
-    FUZZ_CHECK(findings->finding[track->finding].track_id == track->id);
+    FUZZ_CHECK(track->detection >= 0 && track->detection < detections->detection_count);
+    FUZZ_CHECK(detections->detection[track->detection].track_id == track->id);
     FUZZ_CHECK(track->place_q8 >= 0 && track->speed_q8 >= 0);
     FUZZ_CHECK(track->place_q8 <= (int64_t)500 * 500 * 256);
     FUZZ_CHECK(track->speed_q8 <= (int64_t)3000 * 3000 * 256);
@@ -295,26 +296,26 @@ static void check_track(const struct ih_tracks *tracks, int32_t index,
     FUZZ_CHECK(track->seen_us <= tracks->time_us);
 }
 
-void fuzz_check_tracks(const struct ih_tracks *tracks, const struct ih_findings *findings)
+void fuzz_check_tracks(const struct ih_tracks *tracks, const struct ih_detections *detections)
 {
-    int32_t heads = 0;
+    int32_t hypotheses = 0;
     FUZZ_CHECK(tracks->track_count >= 0 && tracks->track_count <= IH_TRACKS_MAX);
-    FUZZ_CHECK(findings->finding_count <= IH_FINDINGS_MAX + IH_FINDINGS_EXPECTED_MAX);
+    FUZZ_CHECK(detections->detection_count <= IH_DETECTIONS_MAX + IH_DETECTIONS_EXPECTED_MAX);
     for (int32_t i = 0; i < tracks->track_count; i++) {
-        check_track(tracks, i, findings);
-        heads += tracks->track[i].is_head;
+        check_track(tracks, i, detections);
+        hypotheses += tracks->track[i].is_head;
     }
-    FUZZ_CHECK(tracks->head_count == heads);
+    FUZZ_CHECK(tracks->head_count == hypotheses);
     bool is_listed = tracks->selected == IH_NONE;
-    for (int32_t i = 0; i < heads; i++) {
+    for (int32_t i = 0; i < hypotheses; i++) {
         int32_t index = tracks->head[i];
-        FUZZ_CHECK(index >= 0 && index < findings->finding_count);
-        FUZZ_CHECK(findings->finding[index].is_head);
-        FUZZ_CHECK(i == 0 || findings->finding[tracks->head[i - 1]].logit_q10 >=
-                                 findings->finding[index].logit_q10);
+        FUZZ_CHECK(index >= 0 && index < detections->detection_count);
+        FUZZ_CHECK(detections->detection[index].is_head);
+        FUZZ_CHECK(i == 0 || detections->detection[tracks->head[i - 1]].logit_q10 >=
+                                 detections->detection[index].logit_q10);
         is_listed = is_listed || index == tracks->selected;
     }
-    FUZZ_CHECK(is_listed && (tracks->selected == IH_NONE) == (heads == 0));
+    FUZZ_CHECK(is_listed && (tracks->selected == IH_NONE) == (hypotheses == 0));
     FUZZ_CHECK((tracks->selected == IH_NONE) == (tracks->selected_id == 0));
 }
 
@@ -361,11 +362,11 @@ void fuzz_check_core(const struct isohead *core)
         fuzz_check_points(&core->points, rig);
         fuzz_check_samples(&core->samples, &core->points);
         fuzz_check_surface(&core->surface, &core->samples);
-        fuzz_check_hypotheses(&core->hypotheses, &core->surface, &core->params.hypotheses);
-        fuzz_check_heads(&core->heads, &core->hypotheses, &core->samples);
+        fuzz_check_hypotheses(&core->nests, &core->surface, &core->params.nests);
+        fuzz_check_heads(&core->hypotheses, &core->nests, &core->samples);
     }
     if (!core->params.is_paper) {
-        fuzz_check_tracks(&core->tracks, &core->findings);
+        fuzz_check_tracks(&core->tracks, &core->detections);
     }
     fuzz_check_result(&core->result);
 }
@@ -374,8 +375,8 @@ void fuzz_check_empty(const struct isohead *core)
 {
     FUZZ_CHECK(core->dots.dot_count == 0 && core->labels.labelled_count == 0);
     FUZZ_CHECK(core->points.seen_count == 0 && core->samples.sample_count == 0);
-    FUZZ_CHECK(!core->surface.valid && core->hypotheses.nest_count == 0);
-    FUZZ_CHECK(core->heads.hypothesis_count == 0 && core->findings.finding_count == 0);
+    FUZZ_CHECK(!core->surface.valid && core->nests.nest_count == 0);
+    FUZZ_CHECK(core->hypotheses.hypothesis_count == 0 && core->detections.detection_count == 0);
     FUZZ_CHECK(core->result.entry_count == 0 && core->result.head_count == 0);
     FUZZ_CHECK(core->result.selected == IH_NONE);
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {

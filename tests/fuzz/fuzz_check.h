@@ -15,14 +15,14 @@ void fuzz_check_windows(const struct ih_windows *windows, const struct ih_rig *r
 void fuzz_check_points(const struct ih_points *points, const struct ih_rig *rig);
 void fuzz_check_samples(const struct ih_samples *samples, const struct ih_points *points);
 void fuzz_check_surface(const struct ih_surface *surface, const struct ih_samples *samples);
-void fuzz_check_cuts(const struct ih_cuts *cuts);
-void fuzz_check_hypotheses(const struct ih_hypotheses *hypotheses, const struct ih_surface *surface,
-                           const struct ih_hypotheses_params *params);
-void fuzz_check_heads(const struct ih_heads *heads, const struct ih_hypotheses *hypotheses,
+void fuzz_check_cuts(const struct ih_contours *cuts);
+void fuzz_check_hypotheses(const struct ih_nests *nests, const struct ih_surface *surface,
+                           const struct ih_nests_params *params);
+void fuzz_check_heads(const struct ih_hypotheses *hypotheses, const struct ih_nests *nests,
                       const struct ih_samples *samples);
-/* After ih_findings_add, before the tracks. */
-void fuzz_check_findings(const struct ih_findings *findings);
-void fuzz_check_tracks(const struct ih_tracks *tracks, const struct ih_findings *findings);
+/* After ih_detections_add, before the tracks. */
+void fuzz_check_detections(const struct ih_detections *detections);
+void fuzz_check_tracks(const struct ih_tracks *tracks, const struct ih_detections *detections);
 void fuzz_check_result(const struct ih_result *result);
 
 /* All of a core after isohead_frame. */

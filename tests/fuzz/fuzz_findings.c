@@ -5,7 +5,7 @@
 #include "fuzz_check.h"
 #include "fuzz_tables.h"
 
-#define NORMALISED_MOST_Q28 INT32_MAX
+#define NORMALISED_MAX_Q28 INT32_MAX
 #define CHANGES_MAX 64
 
 /* A scene of noise, plane and head, in slots; then points as the input says. */
@@ -35,8 +35,8 @@ static void fill_points(struct fuzz_input *input, const struct ih_rig *rig, stru
     }
     for (int32_t count = fuzz_byte(input) % CHANGES_MAX; count > 0; count--) {
         struct ih_point *point = &out->point[fuzz_within(input, 0, IH_SLOTS - 1)];
-        point->x_q28 = fuzz_within(input, -NORMALISED_MOST_Q28, NORMALISED_MOST_Q28);
-        point->y_q28 = fuzz_within(input, -NORMALISED_MOST_Q28, NORMALISED_MOST_Q28);
+        point->x_q28 = fuzz_within(input, -NORMALISED_MAX_Q28, NORMALISED_MAX_Q28);
+        point->y_q28 = fuzz_within(input, -NORMALISED_MAX_Q28, NORMALISED_MAX_Q28);
         point->state = fuzz_byte(input) % 3;
         point->depth_mm_q8 = point->state == IH_POINT_SEEN ? fuzz_within(input, 1 << 8, far_q8) : 0;
     }
@@ -45,10 +45,10 @@ static void fill_points(struct fuzz_input *input, const struct ih_rig *rig, stru
     }
 }
 
-static void fill_heads(struct fuzz_input *input, struct ih_heads *out)
+static void fill_heads(struct fuzz_input *input, struct ih_hypotheses *out)
 {
     memset(out, 0, sizeof *out);
-    out->hypothesis_count = fuzz_byte(input) % (IH_HYPOTHESES_MAX + 1);
+    out->hypothesis_count = fuzz_byte(input) % (IH_NESTS_MAX + 1);
     for (int32_t i = 0; i < out->hypothesis_count; i++) {
         struct ih_hypothesis *h = &out->hypothesis[i];
         struct ih_ellipsoid head;
@@ -74,31 +74,31 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     static struct ih_points points;
     static struct ih_dots dots;
-    static struct ih_heads heads;
-    static struct ih_findings_scratch scratch;
-    static struct ih_findings findings;
+    static struct ih_hypotheses hypotheses;
+    static struct ih_detections_scratch scratch;
+    static struct ih_detections detections;
     struct ih_expected expected = {0};
-    struct ih_findings_params params;
+    struct ih_detections_params params;
     struct fuzz_input input = {data, size};
     const struct ih_rig *rig = fuzz_tables_rig(&input);
     bool is_range = rig->calibration.kind == IH_RIG_RANGE;
     int32_t windows = is_range ? fuzz_within(&input, 1, 3) : 1;
-    ih_findings_params_default(&params);
-    expected.count = fuzz_byte(&input) % (IH_FINDINGS_EXPECTED_MAX + 1);
+    ih_detections_params_default(&params);
+    expected.count = fuzz_byte(&input) % (IH_DETECTIONS_EXPECTED_MAX + 1);
     for (int32_t i = 0; i < expected.count; i++) {
         fuzz_tables_head(&input, &expected.head[i]);
     }
-    memset(&findings, 0xa5, sizeof findings);
+    memset(&detections, 0xa5, sizeof detections);
     memset(&scratch, 0xa5, sizeof scratch);
     memset(&dots, fuzz_byte(&input) % 8 == 7 ? 0xff : 0, sizeof dots);
-    ih_findings_begin(&findings);
+    ih_detections_begin(&detections);
     for (int32_t i = 0; i < windows; i++) {
         fill_points(&input, rig, &points);
-        fill_heads(&input, &heads);
+        fill_heads(&input, &hypotheses);
         select_samples(&points, is_range ? NULL : &dots, rig);
-        ih_findings_add(&points, is_range ? NULL : &dots, &heads, &expected, rig, &params, &scratch,
-                        &findings);
-        fuzz_check_findings(&findings);
+        ih_detections_add(&points, is_range ? NULL : &dots, &hypotheses, &expected, rig, &params,
+                          &scratch, &detections);
+        fuzz_check_detections(&detections);
     }
     return 0;
 }

@@ -45,8 +45,8 @@ static int32_t height_of(const struct canvas *canvas)
 static void put(struct canvas *canvas, int32_t u, int32_t v, int32_t grey)
 {
     if (u >= 0 && v >= 0 && u < width_of(canvas) && v < height_of(canvas)) {
-        int32_t most = canvas->is_wide ? 65535 : 255;
-        canvas->grey[v * width_of(canvas) + u] = (uint16_t)(grey < most ? grey : most);
+        int32_t max = canvas->is_wide ? 65535 : 255;
+        canvas->grey[v * width_of(canvas) + u] = (uint16_t)(grey < max ? grey : max);
     }
 }
 

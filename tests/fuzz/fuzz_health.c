@@ -3,7 +3,7 @@
 #include <string.h>
 
 #include "upkeep/ih_health.h"
-#include "upkeep/ih_turn.h"
+#include "upkeep/ih_rotation_vote.h"
 
 #include "fuzz.h"
 #include "fuzz_rig.h"
@@ -67,7 +67,7 @@ static void check(const struct world *world, const struct ih_rig *nominal, bool 
     FUZZ_CHECK(health->across_px_q12 >= -1 && health->across_px_q12 <= ACROSS_MAX_PX_Q12);
     for (int i = 0; i < 3; i++) {
         int32_t turn = health->turn_rad_q30[i];
-        FUZZ_CHECK(turn >= -IH_TURN_MAX_RAD_Q30 && turn <= IH_TURN_MAX_RAD_Q30);
+        FUZZ_CHECK(turn >= -IH_ROTATION_VOTE_MAX_RAD_Q30 && turn <= IH_ROTATION_VOTE_MAX_RAD_Q30);
         FUZZ_CHECK(health->sigma_rad_q30[i] >= 0);
         is_turned = is_turned || turn != 0;
     }

@@ -5,22 +5,22 @@
 #include "fuzz_check.h"
 #include "fuzz_tables.h"
 
-#define LEAST_Q8 (1 << 8)
-#define MOST_Q8 (IH_SURFACE_DEPTH_MAX_MM << 8)
+#define MIN_Q8 (1 << 8)
+#define MAX_Q8 (IH_SURFACE_DEPTH_MAX_MM << 8)
 #define BUMPS_MAX 8
 #define NODES_MAX 64
 
 static void raise_node(struct ih_surface *surface, int32_t x, int32_t y, int64_t by_q8)
 {
     int64_t depth = surface->depth_mm_q8[y][x] + by_q8;
-    surface->depth_mm_q8[y][x] = (int32_t)(depth < LEAST_Q8  ? LEAST_Q8
-                                           : depth > MOST_Q8 ? MOST_Q8
-                                                             : depth);
+    surface->depth_mm_q8[y][x] = (int32_t)(depth < MIN_Q8   ? MIN_Q8
+                                           : depth > MAX_Q8 ? MAX_Q8
+                                                            : depth);
 }
 
 static void fill_plain(struct fuzz_input *input, struct ih_surface *surface)
 {
-    int32_t base = fuzz_within(input, LEAST_Q8, MOST_Q8);
+    int32_t base = fuzz_within(input, MIN_Q8, MAX_Q8);
     int32_t slope_x = fuzz_within(input, -8192, 8191), slope_y = fuzz_within(input, -8192, 8191);
     int32_t noise = fuzz_within(input, 0, 255 << 8), board = fuzz_within(input, 0, 255 << 8);
     uint32_t seed = fuzz_byte(input);
@@ -62,7 +62,7 @@ static void fill_surface(struct fuzz_input *input, struct ih_surface *surface)
     for (int32_t count = fuzz_byte(input) % (NODES_MAX + 1); count > 0; count--) {
         int32_t x = fuzz_within(input, 0, IH_SURFACE_GRID - 1);
         int32_t y = fuzz_within(input, 0, IH_SURFACE_GRID - 1);
-        surface->depth_mm_q8[y][x] = fuzz_within(input, LEAST_Q8, MOST_Q8);
+        surface->depth_mm_q8[y][x] = fuzz_within(input, MIN_Q8, MAX_Q8);
     }
     surface->valid = true;
     surface->nearest_mm_q8 = INT32_MAX;
@@ -76,12 +76,12 @@ static void fill_surface(struct fuzz_input *input, struct ih_surface *surface)
 static void cut(struct fuzz_input *input, const struct ih_surface *surface,
                 const struct ih_ellipse_params *params)
 {
-    static struct ih_cuts cuts;
-    static struct ih_parts parts;
+    static struct ih_contours cuts;
+    static struct ih_arcs parts;
     static struct ih_ellipse_scratch scratch;
     struct ih_ellipse ellipse;
     int64_t level = surface->nearest_mm_q8 + (int64_t)fuzz_within(input, -256, 2000 << 8);
-    ih_cuts_level(surface, (int32_t)(level > MOST_Q8 ? MOST_Q8 : level), &cuts);
+    ih_contours_level(surface, (int32_t)(level > MAX_Q8 ? MAX_Q8 : level), &cuts);
     fuzz_check_cuts(&cuts);
     struct ih_vertex place = {(int16_t)fuzz_within(input, 0, (IH_SURFACE_GRID - 1) * 512),
                               (int16_t)fuzz_within(input, 0, (IH_SURFACE_GRID - 1) * 512)};
@@ -93,7 +93,7 @@ static void cut(struct fuzz_input *input, const struct ih_surface *surface,
             FUZZ_CHECK(ellipse.area_q16 != 0 && ellipse.shape_q16 > 0);
             FUZZ_CHECK(ellipse.ratio_q16 >= 65535 && ellipse.ratio_q16 <= 255 << 16);
         }
-        if (ih_parts_make(&cuts, contour, params, &parts) &&
+        if (ih_arcs_make(&cuts, contour, params, &parts) &&
             ih_ellipse_of_part(&parts, place, params, &scratch, &ellipse)) {
             FUZZ_CHECK(ellipse.area_q16 > 0 && ellipse.shape_q16 <= params->shape_max_q16);
             FUZZ_CHECK(ellipse.ratio_q16 <= params->ratio_part_max_q16);
@@ -105,9 +105,9 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     static struct ih_surface surface;
     static struct ih_samples samples;
+    static struct ih_nests nests;
+    static struct ih_nests_scratch scratch;
     static struct ih_hypotheses hypotheses;
-    static struct ih_hypotheses_scratch scratch;
-    static struct ih_heads heads;
     struct fuzz_input input = {data, size};
     struct ih_params params;
     const struct ih_rig *rig = fuzz_tables_rig(&input);
@@ -120,12 +120,12 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
             ih_params_paper(&params);
         }
         input = rest;
-        cut(&input, &surface, &params.hypotheses.ellipse);
-        ih_hypotheses_find(&surface, &params.hypotheses, &scratch, &hypotheses);
-        fuzz_check_hypotheses(&hypotheses, &surface, &params.hypotheses);
+        cut(&input, &surface, &params.nests.ellipse);
+        ih_nests_find(&surface, &params.nests, &scratch, &nests);
+        fuzz_check_hypotheses(&nests, &surface, &params.nests);
         fuzz_tables_samples(&input, &samples);
-        ih_heads_select(&hypotheses, &surface, &samples, rig, &params.heads, &heads);
-        fuzz_check_heads(&heads, &hypotheses, &samples);
+        ih_hypotheses_select(&nests, &surface, &samples, rig, &params.hypotheses, &hypotheses);
+        fuzz_check_heads(&hypotheses, &nests, &samples);
     }
     return 0;
 }

@@ -10,9 +10,9 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     static struct ih_samples samples;
     static struct ih_surface surface;
     static struct ih_surface_scratch surface_scratch;
+    static struct ih_nests nests;
+    static struct ih_nests_scratch hypotheses_scratch;
     static struct ih_hypotheses hypotheses;
-    static struct ih_hypotheses_scratch hypotheses_scratch;
-    static struct ih_heads heads;
     struct fuzz_input input = {data, size};
     struct ih_params params;
     struct ih_field field;
@@ -28,10 +28,10 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         memset(&surface_scratch, 0xa5, sizeof surface_scratch);
         ih_surface_fit(&samples, &field, &params.surface, &surface_scratch, &surface);
         fuzz_check_surface(&surface, &samples);
-        ih_hypotheses_find(&surface, &params.hypotheses, &hypotheses_scratch, &hypotheses);
-        fuzz_check_hypotheses(&hypotheses, &surface, &params.hypotheses);
-        ih_heads_select(&hypotheses, &surface, &samples, rig, &params.heads, &heads);
-        fuzz_check_heads(&heads, &hypotheses, &samples);
+        ih_nests_find(&surface, &params.nests, &hypotheses_scratch, &nests);
+        fuzz_check_hypotheses(&nests, &surface, &params.nests);
+        ih_hypotheses_select(&nests, &surface, &samples, rig, &params.hypotheses, &hypotheses);
+        fuzz_check_heads(&hypotheses, &nests, &samples);
     }
     return 0;
 }

@@ -2,11 +2,11 @@
 
 #include <string.h>
 
-#define UNIT_LEAST_Q28 ((1 << 28) / 1000)
-#define UNIT_MOST_Q28 (1 << 25)
-#define CENTRE_MOST_Q28 (1 << 29)
+#define UNIT_MIN_Q28 ((1 << 28) / 1000)
+#define UNIT_MAX_Q28 (1 << 25)
+#define CENTRE_MAX_Q28 (1 << 29)
 /* Of a head's centre, 1/256 mm: nearly the header's 2^26. */
-#define PLACE_MOST_Q8 (60 << 20)
+#define PLACE_MAX_Q8 (60 << 20)
 
 const struct ih_rig *fuzz_tables_rig(struct fuzz_input *input)
 {
@@ -16,9 +16,9 @@ const struct ih_rig *fuzz_tables_rig(struct fuzz_input *input)
 
 void fuzz_tables_field(struct fuzz_input *input, struct ih_field *out)
 {
-    out->centre_x_q28 = fuzz_within(input, -CENTRE_MOST_Q28, CENTRE_MOST_Q28);
-    out->centre_y_q28 = fuzz_within(input, -CENTRE_MOST_Q28, CENTRE_MOST_Q28);
-    out->unit_q28 = fuzz_within(input, UNIT_LEAST_Q28, UNIT_MOST_Q28);
+    out->centre_x_q28 = fuzz_within(input, -CENTRE_MAX_Q28, CENTRE_MAX_Q28);
+    out->centre_y_q28 = fuzz_within(input, -CENTRE_MAX_Q28, CENTRE_MAX_Q28);
+    out->unit_q28 = fuzz_within(input, UNIT_MIN_Q28, UNIT_MAX_Q28);
 }
 
 static int32_t limited(int64_t value, int32_t low, int32_t high)
@@ -29,8 +29,8 @@ static int32_t limited(int64_t value, int32_t low, int32_t high)
 /* A place on a lattice of half the field, moved. */
 static int32_t place_q16(int32_t index, int32_t pitch_q16, int32_t noise_q16)
 {
-    const int32_t most = (IH_SAMPLES_REACH << 16) - 1;
-    return limited((int64_t)(index - (IH_GRID - 1) / 2) * pitch_q16 + noise_q16, -most, most);
+    const int32_t max = (IH_SAMPLES_REACH << 16) - 1;
+    return limited((int64_t)(index - (IH_GRID - 1) / 2) * pitch_q16 + noise_q16, -max, max);
 }
 
 void fuzz_tables_samples(struct fuzz_input *input, struct ih_samples *out)
@@ -84,9 +84,9 @@ void fuzz_tables_head(struct fuzz_input *input, struct ih_ellipsoid *out)
     static const int32_t mean_mm[3] = {78, 113, 98};
     bool is_near = fuzz_byte(input) % 4 != 0;
     for (int axis = 0; axis < 3; axis++) {
-        int32_t least = axis == 2 && is_near ? 200 << 8 : -(500 << 8);
-        out->centre_mm_q8[axis] = is_near ? fuzz_within(input, least, 1500 << 8)
-                                          : fuzz_within(input, -PLACE_MOST_Q8, PLACE_MOST_Q8);
+        int32_t min = axis == 2 && is_near ? 200 << 8 : -(500 << 8);
+        out->centre_mm_q8[axis] = is_near ? fuzz_within(input, min, 1500 << 8)
+                                          : fuzz_within(input, -PLACE_MAX_Q8, PLACE_MAX_Q8);
         /* e^-0.35 and e^0.35 of the mean */
         out->semi_mm_q8[axis] =
             fuzz_within(input, mean_mm[axis] * 256 * 71 / 100, mean_mm[axis] * 256 * 141 / 100);

@@ -7,8 +7,8 @@
 #include "detect/ih_score.h"
 
 #define FRAMES_MAX 32
-#define FRONT_LEAST_MM 150
-#define LOGIT_MOST_Q10 (1 << 14)
+#define FRONT_MIN_MM 150
+#define LOGIT_MAX_Q10 (1 << 14)
 
 static void fill_params(struct fuzz_input *input, struct ih_tracks_params *params)
 {
@@ -30,28 +30,28 @@ static void fill_params(struct fuzz_input *input, struct ih_tracks_params *param
     }
 }
 
-/* As ih_findings leaves them: sorted by their log-odds, none before front_least_mm. */
-static void fill_findings(struct fuzz_input *input, struct ih_findings *out)
+/* As ih_detections leaves them: sorted by their log-odds, none before front_min_mm. */
+static void fill_detections(struct fuzz_input *input, struct ih_detections *out)
 {
     memset(out, 0xa5, sizeof *out);
-    ih_findings_begin(out);
+    ih_detections_begin(out);
     out->seen_count = fuzz_within(input, 0, 8 * IH_SLOTS);
-    int32_t count = fuzz_byte(input) % (IH_FINDINGS_MAX + 1);
-    int32_t logit_q10 = LOGIT_MOST_Q10;
+    int32_t count = fuzz_byte(input) % (IH_DETECTIONS_MAX + 1);
+    int32_t logit_q10 = LOGIT_MAX_Q10;
     for (int32_t i = 0; i < count; i++) {
-        struct ih_finding *finding = &out->finding[out->finding_count++];
-        memset(finding, 0, sizeof *finding);
-        fuzz_tables_head(input, &finding->head);
-        int32_t nearest_q8 = FRONT_LEAST_MM * 256 + finding->head.semi_mm_q8[2];
-        if (finding->head.centre_mm_q8[2] < nearest_q8) {
-            finding->head.centre_mm_q8[2] = nearest_q8;
+        struct ih_detection *detection = &out->detection[out->detection_count++];
+        memset(detection, 0, sizeof *detection);
+        fuzz_tables_head(input, &detection->head);
+        int32_t nearest_q8 = FRONT_MIN_MM * 256 + detection->head.semi_mm_q8[2];
+        if (detection->head.centre_mm_q8[2] < nearest_q8) {
+            detection->head.centre_mm_q8[2] = nearest_q8;
         }
         logit_q10 -= fuzz_within(input, 0, 8 << 10);
-        finding->logit_q10 = logit_q10 > -LOGIT_MOST_Q10 ? logit_q10 : -LOGIT_MOST_Q10;
-        finding->probability_q16 = ih_score_probability_q16(finding->logit_q10);
-        finding->source = IH_SOURCE_SCAN;
+        detection->logit_q10 = logit_q10 > -LOGIT_MAX_Q10 ? logit_q10 : -LOGIT_MAX_Q10;
+        detection->probability_q16 = ih_score_probability_q16(detection->logit_q10);
+        detection->source = IH_SOURCE_SCAN;
     }
-    for (int32_t i = 0; i < IH_FINDINGS_EXPECTED_MAX; i++) {
+    for (int32_t i = 0; i < IH_DETECTIONS_EXPECTED_MAX; i++) {
         uint8_t rays = fuzz_byte(input);
         out->view[i] = (struct ih_view){rays % 8 * 5, rays / 8 % 8 * 5, rays / 64 * 10};
     }
@@ -69,7 +69,7 @@ static void check_expected(const struct ih_expected *expected, const struct ih_t
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     static struct ih_tracks tracks;
-    static struct ih_findings findings;
+    static struct ih_detections detections;
     static struct ih_result result;
     struct fuzz_input input = {data, size};
     struct ih_tracks_params params;
@@ -83,10 +83,10 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         time_us = fuzz_next_time_us(&input, time_us);
         ih_tracks_expect(&tracks, &params, time_us, &expected);
         check_expected(&expected, &tracks);
-        fill_findings(&input, &findings);
-        ih_tracks_update(&tracks, &params, rig, &findings);
-        fuzz_check_tracks(&tracks, &findings);
-        ih_result_from_tracks(&findings, &tracks, &result);
+        fill_detections(&input, &detections);
+        ih_tracks_update(&tracks, &params, rig, &detections);
+        fuzz_check_tracks(&tracks, &detections);
+        ih_result_from_tracks(&detections, &tracks, &result);
         fuzz_check_result(&result);
         FUZZ_CHECK(result.selected == tracks.selected);
     }

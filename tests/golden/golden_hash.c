@@ -123,12 +123,12 @@ static uint64_t add_slice(uint64_t hash, const struct ih_slice *slice)
 
 static uint64_t hash_hypotheses(const struct isohead *head)
 {
-    const struct ih_hypotheses *hypotheses = &head->hypotheses;
-    uint64_t hash = golden_add_word(GOLDEN_FNV_START, hypotheses->nest_count);
-    hash = golden_add_word(hash, hypotheses->minima_dropped);
-    hash = golden_add_word(hash, hypotheses->contours_dropped);
-    for (int32_t i = 0; i < hypotheses->nest_count; i++) {
-        const struct ih_nest *nest = &hypotheses->nest[i];
+    const struct ih_nests *nests = &head->nests;
+    uint64_t hash = golden_add_word(GOLDEN_FNV_START, nests->nest_count);
+    hash = golden_add_word(hash, nests->minima_dropped);
+    hash = golden_add_word(hash, nests->contours_dropped);
+    for (int32_t i = 0; i < nests->nest_count; i++) {
+        const struct ih_nest *nest = &nests->nest[i];
         hash = golden_add_word(hash, nest->minimum.x_q9);
         hash = golden_add_word(hash, nest->minimum.y_q9);
         hash = golden_add_word(hash, nest->nearest_mm_q8);
@@ -147,12 +147,14 @@ static uint64_t hash_hypotheses(const struct isohead *head)
 
 static uint64_t hash_heads(const struct isohead *head)
 {
-    const struct ih_heads *heads = &head->heads;
-    uint64_t hash = golden_add_word(GOLDEN_FNV_START, heads->hypothesis_count);
-    hash = golden_add_word(hash, heads->head_count);
-    hash = golden_add_words(hash, heads->head, (size_t)heads->head_count * sizeof heads->head[0]);
-    return golden_add_words(hash, heads->hypothesis,
-                            (size_t)heads->hypothesis_count * sizeof heads->hypothesis[0]);
+    const struct ih_hypotheses *hypotheses = &head->hypotheses;
+    uint64_t hash = golden_add_word(GOLDEN_FNV_START, hypotheses->hypothesis_count);
+    hash = golden_add_word(hash, hypotheses->head_count);
+    hash = golden_add_words(hash, hypotheses->head,
+                            (size_t)hypotheses->head_count * sizeof hypotheses->head[0]);
+    return golden_add_words(hash, hypotheses->hypothesis,
+                            (size_t)hypotheses->hypothesis_count *
+                                sizeof hypotheses->hypothesis[0]);
 }
 
 static uint64_t hash_expected(const struct isohead *head)
@@ -163,31 +165,31 @@ static uint64_t hash_expected(const struct isohead *head)
                             (size_t)expected->count * sizeof expected->head[0]);
 }
 
-static uint64_t hash_findings(const struct isohead *head)
+static uint64_t hash_detections(const struct isohead *head)
 {
-    const struct ih_findings *findings = &head->findings;
-    uint64_t hash = golden_add_word(GOLDEN_FNV_START, findings->finding_count);
-    hash = golden_add_word(hash, findings->dropped_count);
-    hash = golden_add_word(hash, findings->seen_count);
-    for (int32_t i = 0; i < findings->finding_count; i++) {
-        const struct ih_finding *finding = &findings->finding[i];
-        hash = golden_add_words(hash, &finding->head, sizeof finding->head);
-        hash = golden_add_words(hash, &finding->evidence, sizeof finding->evidence);
-        hash = golden_add_word(hash, finding->logit_q10);
-        hash = golden_add_word(hash, finding->probability_q16);
-        hash = golden_add_word(hash, finding->source);
-        hash = golden_add_word(hash, finding->track_id);
-        hash = golden_add_word(hash, finding->sigma_mm_q8);
-        hash = golden_add_word(hash, finding->is_head);
-        hash = golden_add_word(hash, finding->is_predicted);
-        hash = golden_add_word(hash, finding->u_px_q12);
-        hash = golden_add_word(hash, finding->v_px_q12);
-        hash = golden_add_word(hash, finding->a_px_q12);
-        hash = golden_add_word(hash, finding->b_px_q12);
-        hash = golden_add_word(hash, finding->angle_mdeg);
-        hash = golden_add_word(hash, finding->distance_mm_q8);
+    const struct ih_detections *detections = &head->detections;
+    uint64_t hash = golden_add_word(GOLDEN_FNV_START, detections->detection_count);
+    hash = golden_add_word(hash, detections->dropped_count);
+    hash = golden_add_word(hash, detections->seen_count);
+    for (int32_t i = 0; i < detections->detection_count; i++) {
+        const struct ih_detection *detection = &detections->detection[i];
+        hash = golden_add_words(hash, &detection->head, sizeof detection->head);
+        hash = golden_add_words(hash, &detection->evidence, sizeof detection->evidence);
+        hash = golden_add_word(hash, detection->logit_q10);
+        hash = golden_add_word(hash, detection->probability_q16);
+        hash = golden_add_word(hash, detection->source);
+        hash = golden_add_word(hash, detection->track_id);
+        hash = golden_add_word(hash, detection->sigma_mm_q8);
+        hash = golden_add_word(hash, detection->is_head);
+        hash = golden_add_word(hash, detection->is_predicted);
+        hash = golden_add_word(hash, detection->u_px_q12);
+        hash = golden_add_word(hash, detection->v_px_q12);
+        hash = golden_add_word(hash, detection->a_px_q12);
+        hash = golden_add_word(hash, detection->b_px_q12);
+        hash = golden_add_word(hash, detection->angle_mdeg);
+        hash = golden_add_word(hash, detection->distance_mm_q8);
     }
-    return golden_add_words(hash, findings->view, sizeof findings->view);
+    return golden_add_words(hash, detections->view, sizeof detections->view);
 }
 
 static uint64_t add_track(uint64_t hash, const struct ih_track *track)
@@ -201,8 +203,8 @@ static uint64_t add_track(uint64_t hash, const struct ih_track *track)
     hash = golden_add(hash, track->cross_q8, 8);
     hash = golden_add(hash, track->speed_q8, 8);
     hash = golden_add(hash, track->seen_us, 8);
-    hash = golden_add_word(hash, track->finding_count);
-    return golden_add_word(hash, track->finding);
+    hash = golden_add_word(hash, track->detection_count);
+    return golden_add_word(hash, track->detection);
 }
 
 static uint64_t hash_tracks(const struct isohead *head)
@@ -261,7 +263,7 @@ const struct golden_stage golden_stage[GOLDEN_STAGES] = {
     {"hypotheses", hash_hypotheses},
     {"heads", hash_heads},
     {"expected", hash_expected},
-    {"findings", hash_findings},
+    {"findings", hash_detections},
     {"tracks", hash_tracks},
     {"result", hash_result},
 };

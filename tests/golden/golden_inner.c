@@ -40,7 +40,7 @@ static uint64_t hash_exposure(const struct isohead *head, const struct ih_frame 
     return golden_add_words(hash, exposure, sizeof *exposure);
 }
 
-static uint64_t add_contours(uint64_t hash, const struct ih_cuts *cuts)
+static uint64_t add_contours(uint64_t hash, const struct ih_contours *cuts)
 {
     hash = golden_add_word(hash, cuts->contour_count);
     hash = golden_add_word(hash, cuts->contours_dropped);
@@ -56,7 +56,7 @@ static uint64_t add_contours(uint64_t hash, const struct ih_cuts *cuts)
     return hash;
 }
 
-static uint64_t add_ellipses(uint64_t hash, const struct ih_cuts *cuts)
+static uint64_t add_ellipses(uint64_t hash, const struct ih_contours *cuts)
 {
     for (int32_t i = 0; i < cuts->contour_count; i++) {
         struct ih_ellipse ellipse;
@@ -69,11 +69,10 @@ static uint64_t add_ellipses(uint64_t hash, const struct ih_cuts *cuts)
 
 static void hash_levels(struct isohead *head, uint64_t hash[GOLDEN_INNERS])
 {
-    struct ih_cuts *cuts = &head->scratch.hypotheses.cuts;
+    struct ih_contours *cuts = &head->scratch.nests.cuts;
     int32_t level_mm_q8 = 0;
-    for (int32_t i = 0;
-         ih_hypotheses_level(&head->surface, &head->params.hypotheses, i, &level_mm_q8); i++) {
-        ih_cuts_level(&head->surface, level_mm_q8, cuts);
+    for (int32_t i = 0; ih_nests_level(&head->surface, &head->params.nests, i, &level_mm_q8); i++) {
+        ih_contours_level(&head->surface, level_mm_q8, cuts);
         hash[GOLDEN_CUTS] = add_contours(golden_add_word(hash[GOLDEN_CUTS], level_mm_q8), cuts);
         hash[GOLDEN_ELLIPSES] = add_ellipses(hash[GOLDEN_ELLIPSES], cuts);
     }
@@ -83,14 +82,14 @@ static void hash_levels(struct isohead *head, uint64_t hash[GOLDEN_INNERS])
 static void hash_start(struct isohead *head, const int32_t centre_mm_q8[3],
                        uint64_t hash[GOLDEN_INNERS])
 {
-    const struct ih_space *space = &head->scratch.findings.space;
+    const struct ih_rays *space = &head->scratch.detections.space;
     const struct ih_evidence_nest nest = {.present = false};
     struct ih_ellipsoid start = ih_ellipsoid_mean(centre_mm_q8), fitted;
     struct ih_evidence evidence;
     struct ih_score score;
-    ih_fit_ellipsoid(space, &head->params.findings.fit, &start, &head->scratch.findings.rows,
+    ih_fit_ellipsoid(space, &head->params.detections.fit, &start, &head->scratch.detections.rows,
                      &fitted);
-    ih_evidence_collect(space, &head->scratch.findings.tally, &fitted, centre_mm_q8, &nest,
+    ih_evidence_collect(space, &head->scratch.detections.tally, &fitted, centre_mm_q8, &nest,
                         &evidence);
     ih_score_rate(&evidence, &score);
     hash[GOLDEN_FIT] = golden_add_words(hash[GOLDEN_FIT], &fitted, sizeof fitted);
@@ -101,13 +100,13 @@ static void hash_start(struct isohead *head, const int32_t centre_mm_q8[3],
 static void hash_candidates(struct isohead *head, uint64_t hash[GOLDEN_INNERS])
 {
     const struct ih_dots *dots = head->rig.calibration.kind == IH_RIG_DOTS ? &head->dots : NULL;
-    struct ih_findings_scratch *scratch = &head->scratch.findings;
+    struct ih_detections_scratch *scratch = &head->scratch.detections;
     const struct ih_scan *scan = &scratch->scan;
-    ih_space_make(&head->points, dots, &head->rig, &head->params.findings.space, &scratch->space);
-    ih_scan_find(&scratch->space, &head->params.findings.scan, &scratch->scan_scratch,
+    ih_rays_make(&head->points, dots, &head->rig, &head->params.detections.space, &scratch->space);
+    ih_scan_find(&scratch->space, &head->params.detections.scan, &scratch->scan_scratch,
                  &scratch->scan);
-    ih_row_prepare(&scratch->space, &scratch->rows.rays);
-    ih_tally_prepare(&scratch->space, &scratch->tally);
+    ih_fit_equations_prepare(&scratch->space, &scratch->rows.rays);
+    ih_ray_counts_prepare(&scratch->space, &scratch->tally);
     hash[GOLDEN_SPACE] =
         golden_add_words(hash[GOLDEN_SPACE], &scratch->space, sizeof scratch->space);
     hash[GOLDEN_SCAN] = golden_add_word(hash[GOLDEN_SCAN], scan->place_count);
@@ -116,8 +115,8 @@ static void hash_candidates(struct isohead *head, uint64_t hash[GOLDEN_INNERS])
     for (int32_t i = 0; i < scan->place_count; i++) {
         hash_start(head, scan->place[i].centre_mm_q8, hash);
     }
-    for (int32_t i = 0; i < head->heads.hypothesis_count; i++) {
-        hash_start(head, head->heads.hypothesis[i].centre_mm_q8, hash);
+    for (int32_t i = 0; i < head->hypotheses.hypothesis_count; i++) {
+        hash_start(head, head->hypotheses.hypothesis[i].centre_mm_q8, hash);
     }
 }
 
@@ -128,11 +127,10 @@ static uint64_t hash_paper(struct isohead *head)
     ih_params_paper(&params);
     ih_surface_fit(&head->samples, &head->points.field, &params.surface, &head->scratch.surface,
                    &head->surface);
-    ih_hypotheses_find(&head->surface, &params.hypotheses, &head->scratch.hypotheses,
-                       &head->hypotheses);
-    ih_heads_select(&head->hypotheses, &head->surface, &head->samples, &head->rig, &params.heads,
-                    &head->heads);
-    ih_result_from_heads(&head->heads, &result);
+    ih_nests_find(&head->surface, &params.nests, &head->scratch.nests, &head->nests);
+    ih_hypotheses_select(&head->nests, &head->surface, &head->samples, &head->rig,
+                         &params.hypotheses, &head->hypotheses);
+    ih_result_from_heads(&head->hypotheses, &result);
     uint64_t hash = golden_add_words(GOLDEN_FNV_START, head->surface.depth_mm_q8,
                                      sizeof head->surface.depth_mm_q8);
     hash = golden_add_word(hash, result.entry_count);
@@ -152,7 +150,7 @@ static uint64_t hash_paper(struct isohead *head)
 _Static_assert(sizeof(struct ih_exposure_look) == WORDS(4), "ih_exposure_look");
 _Static_assert(sizeof(struct ih_exposure) == WORDS(4), "ih_exposure");
 _Static_assert(sizeof(struct ih_ellipse) == WORDS(9), "ih_ellipse");
-_Static_assert(sizeof(struct ih_space) == WORDS(3 + 6 * IH_SLOTS), "ih_space");
+_Static_assert(sizeof(struct ih_rays) == WORDS(3 + 6 * IH_SLOTS), "ih_rays");
 _Static_assert(sizeof(struct ih_scan_place) == WORDS(4), "ih_scan_place");
 _Static_assert(sizeof(struct ih_score) == WORDS(2 + IH_EVIDENCE_COUNT), "ih_score");
 

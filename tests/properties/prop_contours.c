@@ -1,7 +1,7 @@
 /* Contours of any surface: closed or ending at the border, never crossing each other, not at one level and
  * not at two; and nested: what a contour encloses lies within what the next level's enclose. In exact
- * integers of Q9 grid steps, apart from what ih_cuts itself reckons. */
-#include "nests/ih_cuts.h"
+ * integers of Q9 grid steps, apart from what ih_contours itself reckons. */
+#include "nests/ih_contours.h"
 #include "surface/ih_surface.h"
 #include "prop_scene.h"
 
@@ -13,12 +13,12 @@
 #define LAST (CELLS * UNIT)
 #define KINDS 9
 #define LEVELS 4
-#define SEGMENTS_MAX (2 * IH_CUTS_VERTICES_MAX)
+#define SEGMENTS_MAX (2 * IH_CONTOURS_VERTICES_MAX)
 /* Segments of two levels in one cell: two each, and those on its border. */
 #define PER_CELL_MAX 16
 
 static struct ih_surface surface;
-static struct ih_cuts near_cuts, cuts;
+static struct ih_contours near_cuts, cuts;
 static struct ih_test_random random_source;
 
 struct segment {
@@ -130,7 +130,7 @@ static void add_segment(struct ih_vertex a, struct ih_vertex b, int32_t pass)
 }
 
 /* A contour is closed, or both of its ends are at the border. */
-static void add_contours(const struct ih_cuts *of, int32_t pass)
+static void add_contours(const struct ih_contours *of, int32_t pass)
 {
     for (int32_t i = 0; i < of->contour_count; i++) {
         const struct ih_contour *contour = &of->contour[i];
@@ -153,7 +153,7 @@ static void add_contours(const struct ih_cuts *of, int32_t pass)
 
 /* How often the closed contours wind round a place, clockwise on the screen. *touches: one passes
  * through it, and there is no telling. */
-static int32_t winding(const struct ih_cuts *of, struct ih_vertex place, bool *touches)
+static int32_t winding(const struct ih_contours *of, struct ih_vertex place, bool *touches)
 {
     int32_t sum = 0;
 
@@ -185,7 +185,7 @@ static int32_t winding(const struct ih_cuts *of, struct ih_vertex place, bool *t
 }
 
 /* All contours closed and none dropped: they wind once round what is nearer, and round nothing else. */
-static void check_inside(const struct ih_cuts *of, int32_t pass)
+static void check_inside(const struct ih_contours *of, int32_t pass)
 {
     for (int32_t y = 0; y < SIDE; y += 1 + pass % 3) {
         for (int32_t x = 0; x < SIDE; x += 1 + pass % 2) {
@@ -228,8 +228,8 @@ static void check_surface(int kind, bool is_closed, int32_t pass)
         const int32_t two = kind == 7 ? 900 * 256 + (int32_t)between(-2, 3) : level_of(i + 1);
 
         memset(cell_counts, 0, sizeof cell_counts);
-        ih_cuts_level(&surface, one < two ? one : two, &near_cuts);
-        ih_cuts_level(&surface, one < two ? two : one, &cuts);
+        ih_contours_level(&surface, one < two ? one : two, &near_cuts);
+        ih_contours_level(&surface, one < two ? two : one, &cuts);
         add_contours(&near_cuts, pass);
         if (one != two) {
             add_contours(&cuts, pass);

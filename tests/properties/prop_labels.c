@@ -64,7 +64,7 @@ static struct tally count(void)
 }
 
 /* share: of the dots that are left, at least and at most. */
-static struct tally try_subsets(int which, uint64_t seed, int32_t seeds, double least, double most)
+static struct tally try_subsets(int which, uint64_t seed, int32_t seeds, double min, double max)
 {
     struct ih_test_random random = {seed};
     struct tally sum = {0, 0, 0, 0};
@@ -75,7 +75,7 @@ static struct tally try_subsets(int which, uint64_t seed, int32_t seeds, double 
         const struct prop_scene scene = prop_random_person(&random, 150);
 
         prop_dots(&scene, &vector_rigs[which], &random, SIGMA_PX, &all, slot_of_all);
-        take_subset(&random, least + (most - least) * ih_test_unit(&random));
+        take_subset(&random, min + (max - min) * ih_test_unit(&random));
         const struct tally one = count();
 
         sum.dots += one.dots;
@@ -85,7 +85,7 @@ static struct tally try_subsets(int which, uint64_t seed, int32_t seeds, double 
     }
     printf("labels: rig %d, %3.0f to %3.0f %% of the dots left: %lld dots, %.2f %% labelled right, "
            "%.3f %% wrong; %.2f slots that a dot may belong to\n",
-           which, 100 * least, 100 * most, (long long)sum.dots,
+           which, 100 * min, 100 * max, (long long)sum.dots,
            100.0 * (double)sum.right / (double)sum.dots,
            100.0 * (double)sum.wrong / (double)sum.dots, (double)sum.candidates / (double)sum.dots);
     return sum;
@@ -100,12 +100,12 @@ static void with_a_short_baseline_no_subset_has_a_wrong_label(void)
     for (int i = 0; i < IH_TEST_COUNT(short_rigs); i++) {
         const struct tally few = try_subsets(short_rigs[i], 701, prop_seeds(250), 0, 0.5);
         const struct tally many = try_subsets(short_rigs[i], 702, prop_seeds(250), 0.5, 0.8);
-        const struct tally most = try_subsets(short_rigs[i], 703, prop_seeds(250), 0.8, 1);
+        const struct tally max = try_subsets(short_rigs[i], 703, prop_seeds(250), 0.8, 1);
 
-        TEST_ASSERT_EQUAL_INT64(0, few.wrong + many.wrong + most.wrong);
-        TEST_ASSERT_LESS_OR_EQUAL_INT64(most.dots, most.candidates);
+        TEST_ASSERT_EQUAL_INT64(0, few.wrong + many.wrong + max.wrong);
+        TEST_ASSERT_LESS_OR_EQUAL_INT64(max.dots, max.candidates);
         TEST_ASSERT_GREATER_OR_EQUAL_INT64(many.dots * 97 / 100, many.right);
-        TEST_ASSERT_GREATER_OR_EQUAL_INT64(most.dots * 995 / 1000, most.right);
+        TEST_ASSERT_GREATER_OR_EQUAL_INT64(max.dots * 995 / 1000, max.right);
     }
 }
 
@@ -114,12 +114,12 @@ static void with_a_long_baseline_few_labels_are_wrong(void)
 {
     const struct tally few = try_subsets(1, 711, prop_seeds(150), 0, 0.5);
     const struct tally many = try_subsets(1, 712, prop_seeds(150), 0.5, 0.8);
-    const struct tally most = try_subsets(1, 713, prop_seeds(150), 0.8, 1);
+    const struct tally max = try_subsets(1, 713, prop_seeds(150), 0.8, 1);
     const struct tally every = try_subsets(1, 714, prop_seeds(150), 1, 1);
 
     TEST_ASSERT_LESS_OR_EQUAL_INT64(few.dots * 35 / 1000, few.wrong);
     TEST_ASSERT_LESS_OR_EQUAL_INT64(many.dots * 35 / 1000, many.wrong);
-    TEST_ASSERT_LESS_OR_EQUAL_INT64(most.dots * 10 / 1000, most.wrong);
+    TEST_ASSERT_LESS_OR_EQUAL_INT64(max.dots * 10 / 1000, max.wrong);
     TEST_ASSERT_LESS_OR_EQUAL_INT64(every.dots * 2 / 1000, every.wrong);
     TEST_ASSERT_GREATER_OR_EQUAL_INT64(every.dots * 99 / 100, every.right);
 }

@@ -9,7 +9,7 @@
  *    away the scene is.
  * 3. So a depth camera sees the same head twice as far away at half the size, as near as its pixels,
  *    which are twice as wide there, allow.
- * Not invariant: a rig's dots, twice as far apart on a head twice as far; clip_least_mm, 1100. */
+ * Not invariant: a rig's dots, twice as far apart on a head twice as far; clip_min_mm, 1100. */
 #include "base/ih_fix.h"
 #include "isohead.h"
 #include "prop_scene.h"
@@ -20,7 +20,7 @@
 #define UNIT_Q28 4000000 /* half a pitch: 13 mm at 870 mm */
 /* Of a width in mm: what the fit's prior takes for one standard deviation. */
 #define SIZE_PERCENT 9
-#define FOUND_LEAST 0.8
+#define FOUND_MIN 0.8
 
 static struct ih_test_random random_source;
 
@@ -101,8 +101,8 @@ static void a_world_twice_as_large_looks_the_same(void)
 /* --- 2: a surface twice as far ------------------------------------------------------------------- */
 
 static struct ih_surface surfaces[2];
-static struct ih_hypotheses found[2];
-static struct ih_hypotheses_scratch scratch;
+static struct ih_nests found[2];
+static struct ih_nests_scratch scratch;
 
 /* A head, and waves around it; at a distance, on steps of a width. */
 static void make_surface(const double shape[6], int32_t distance_mm, int32_t unit_q28,
@@ -152,7 +152,7 @@ static int32_t compare_nests(const struct ih_nest *one, const struct ih_nest *tw
 }
 
 /* How many slices were compared. */
-static int32_t compare_surfaces(const struct ih_hypotheses_params *params, int32_t seeds)
+static int32_t compare_surfaces(const struct ih_nests_params *params, int32_t seeds)
 {
     int32_t compared = 0;
 
@@ -166,7 +166,7 @@ static int32_t compare_surfaces(const struct ih_hypotheses_params *params, int32
         make_surface(shape, distance_mm, UNIT_Q28, &surfaces[0]);
         make_surface(shape, 2 * distance_mm, UNIT_Q28 / 2, &surfaces[1]);
         for (int i = 0; i < 2; i++) {
-            ih_hypotheses_find(&surfaces[i], params, &scratch, &found[i]);
+            ih_nests_find(&surfaces[i], params, &scratch, &found[i]);
         }
         IH_TEST_EQUAL(found[0].nest_count, found[1].nest_count, "nests", seed);
         for (int32_t i = 0; i < found[0].nest_count; i++) {
@@ -183,11 +183,11 @@ static int32_t compare_surfaces(const struct ih_hypotheses_params *params, int32
 static void a_surface_twice_as_far_has_the_same_ellipses(void)
 {
     const int32_t seeds = prop_seeds(40);
-    struct ih_hypotheses_params params;
+    struct ih_nests_params params;
 
-    ih_hypotheses_params_paper(&params);
+    ih_nests_params_paper(&params);
     TEST_ASSERT_GREATER_THAN_INT32(4 * seeds, compare_surfaces(&params, seeds));
-    ih_hypotheses_params_default(&params);
+    ih_nests_params_default(&params);
     TEST_ASSERT_GREATER_THAN_INT32(2 * seeds, compare_surfaces(&params, seeds));
 }
 
@@ -240,7 +240,7 @@ static void a_person_twice_as_far_is_half_the_size(void)
             const double off = ih_test_from_q(entry->centre_mm_q8[axis], 8) -
                                ih_test_from_q(near.centre_mm_q8[axis], 8) - away[axis];
 
-            IH_TEST_WITHIN(head.params.findings.spacing_mm, 0, off, "centre", seed);
+            IH_TEST_WITHIN(head.params.detections.spacing_mm, 0, off, "centre", seed);
             off_sum_mm += fabs(off) / 3;
         }
         /* The sizes of both in mm: pixels times the centre's depth over the focal length. */
@@ -255,7 +255,7 @@ static void a_person_twice_as_far_is_half_the_size(void)
            "in mm "
            "by %.1f %% at most\n",
            (int)both, (int)seeds, off_sum_mm / both, worst_percent);
-    IH_TEST_RANGE((int64_t)(FOUND_LEAST * seeds), seeds, both, "persons found", 0);
+    IH_TEST_RANGE((int64_t)(FOUND_MIN * seeds), seeds, both, "persons found", 0);
 }
 
 int main(void)

@@ -3,7 +3,7 @@
  * Bounds. Across: both sides of a head stand before the wall, each outline known to within half the pitch
  * of the dots, so the middle between them too; of two places the errors differ by at most a pitch. Up and
  * down: the head goes on into the neck, and the fit has a second, lower optimum there. Whichever it takes,
- * two centres within spacing_mm are the same head to the method (ih_findings), no more is promised. Mostly
+ * two centres within spacing_mm are the same head to the method (ih_detections), no more is promised. Mostly
  * both fits are in the upper one, and the error is that of a dot's depth, a millimetre or two. */
 #include "isohead.h"
 #include "prop_scene.h"
@@ -13,7 +13,7 @@
 #include "rigs.inc"
 
 #define SCENES_MAX 2000
-#define FOUND_LEAST 0.6
+#define FOUND_MIN 0.6
 /* Half of all scenes move the head by what they moved themselves to within this, along each axis. */
 #define MEDIAN_MM 2.5
 
@@ -97,11 +97,11 @@ static void check(const struct ih_calibration *c, const char *name, uint64_t see
             off_mm[axis][found] = fabs(after[axis] - before[axis] - by_mm[axis]);
         }
         IH_TEST_WITHIN(pitch_mm(c, z), 0, off_mm[0][found], name, i);
-        IH_TEST_WITHIN(head.params.findings.spacing_mm, 0, off_mm[1][found], name, i);
-        IH_TEST_WITHIN(head.params.findings.spacing_mm, 0, off_mm[2][found], name, i);
+        IH_TEST_WITHIN(head.params.detections.spacing_mm, 0, off_mm[1][found], name, i);
+        IH_TEST_WITHIN(head.params.detections.spacing_mm, 0, off_mm[2][found], name, i);
         found++;
     }
-    IH_TEST_RANGE((int64_t)(FOUND_LEAST * scenes), scenes, found, name, scenes);
+    IH_TEST_RANGE((int64_t)(FOUND_MIN * scenes), scenes, found, name, scenes);
     printf("shift: %s, %d scenes, found in both %d; off by mm, median and worst:", name,
            (int)scenes, (int)found);
     for (int axis = 0; axis < 3; axis++) {

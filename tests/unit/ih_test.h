@@ -32,9 +32,9 @@ static inline uint64_t ih_test_u64(struct ih_test_random *random)
 /* Uniform in low..high, both included. */
 static inline int64_t ih_test_between(struct ih_test_random *random, int64_t low, int64_t high)
 {
-    const uint64_t most = (uint64_t)high - (uint64_t)low;
+    const uint64_t max = (uint64_t)high - (uint64_t)low;
     const uint64_t any = ih_test_u64(random);
-    const uint64_t step = most == UINT64_MAX ? any : any % (most + 1u);
+    const uint64_t step = max == UINT64_MAX ? any : any % (max + 1u);
 
     return (int64_t)((uint64_t)low + step);
 }

@@ -5,7 +5,7 @@
 
 #include "base/ih_config.h"
 #include "base/ih_fix.h"
-#include "detect/ih_space.h"
+#include "detect/ih_rays.h"
 
 #include "ih_test.h"
 
@@ -25,7 +25,7 @@ struct vector_scene {
 
 #define SCENE_COUNT IH_TEST_COUNT(vector_scenes)
 
-static struct ih_space space;
+static struct ih_rays space;
 
 /* The ray of a slot meets something at a depth. */
 static inline void see(int32_t slot, int32_t depth_mm_q8)

@@ -111,7 +111,7 @@ static double miss_mm(const int32_t centre_mm_q8[3], double x, double y, double 
 /* Says what became of the best nest when there is not just one head. */
 static void check_one_head(const char *name, int index)
 {
-    const struct ih_hypothesis *best = &head.heads.hypothesis[0];
+    const struct ih_hypothesis *best = &head.hypotheses.hypothesis[0];
     char text[160];
 
     if (head.result.head_count == 1) {
@@ -122,9 +122,9 @@ static void check_one_head(const char *name, int index)
              "%s [%d]: %d heads; best %s, %d mm^2, inside %d, above %d/%d, beside %d/%d, below "
              "%d/%d",
              name, index, (int)head.result.head_count,
-             head.heads.hypothesis_count == 0 ? "none"
-             : best->rejected == IH_ACCEPTED  ? "accepted"
-                                              : ih_reject_text(best->rejected),
+             head.hypotheses.hypothesis_count == 0 ? "none"
+             : best->rejected == IH_ACCEPTED       ? "accepted"
+                                                   : ih_reject_text(best->rejected),
              (int)best->area_mm2, (int)best->outline.inside, (int)best->outline.above_behind,
              (int)best->outline.above, (int)best->outline.beside_behind, (int)best->outline.beside,
              (int)best->outline.below_near, (int)best->outline.below);
@@ -290,9 +290,9 @@ static void check_empty(const char *what)
     IH_TEST_EQUAL(0, head.dots.dot_count, what, 0);
     IH_TEST_EQUAL(0, head.labels.labelled_count, what, 1);
     IH_TEST_EQUAL(0, head.points.seen_count, what, 2);
-    IH_TEST_EQUAL(0, head.hypotheses.nest_count, what, 3);
-    IH_TEST_EQUAL(0, head.heads.hypothesis_count, what, 4);
-    IH_TEST_EQUAL(0, head.heads.head_count, what, 5);
+    IH_TEST_EQUAL(0, head.nests.nest_count, what, 3);
+    IH_TEST_EQUAL(0, head.hypotheses.hypothesis_count, what, 4);
+    IH_TEST_EQUAL(0, head.hypotheses.head_count, what, 5);
     for (slot = 0; slot < IH_SLOTS; slot++) {
         IH_TEST_EQUAL(IH_NONE, head.labels.dot_of_slot[slot], what, slot);
     }
@@ -421,7 +421,7 @@ static void ambient_frames_are_checked(void)
         }                                                                       \
     } while (0)
 
-static void check_same_hypotheses(const struct ih_hypotheses *a, const struct ih_hypotheses *b)
+static void check_same_hypotheses(const struct ih_nests *a, const struct ih_nests *b)
 {
     int32_t i, k;
 
@@ -452,11 +452,11 @@ static void check_same(const struct isohead *a, const struct isohead *b)
     TEST_ASSERT_EQUAL_MEMORY(&a->samples, &b->samples, offsetof(struct ih_samples, sample));
     CHECK_SAME_TABLE(&a->samples, &b->samples, sample_count, sample);
     TEST_ASSERT_EQUAL_MEMORY(&a->surface, &b->surface, sizeof a->surface);
-    check_same_hypotheses(&a->hypotheses, &b->hypotheses);
-    CHECK_SAME_TABLE(&a->heads, &b->heads, hypothesis_count, hypothesis);
-    CHECK_SAME_TABLE(&a->heads, &b->heads, head_count, head);
+    check_same_hypotheses(&a->nests, &b->nests);
+    CHECK_SAME_TABLE(&a->hypotheses, &b->hypotheses, hypothesis_count, hypothesis);
+    CHECK_SAME_TABLE(&a->hypotheses, &b->hypotheses, head_count, head);
     TEST_ASSERT_EQUAL_INT32(a->windows.window_count, b->windows.window_count);
-    TEST_ASSERT_EQUAL_INT32(a->findings.seen_count, b->findings.seen_count);
+    TEST_ASSERT_EQUAL_INT32(a->detections.seen_count, b->detections.seen_count);
 }
 
 /* Stages set what they say they set, whatever is there: a frame clears nothing before. No stage of dots sets windows. */
@@ -471,9 +471,9 @@ static void spoil_all(struct isohead *of)
     memset(&of->points, 0x5A, sizeof of->points);
     memset(&of->samples, 0x5A, sizeof of->samples);
     memset(&of->surface, 0x5A, sizeof of->surface);
+    memset(&of->nests, 0x5A, sizeof of->nests);
     memset(&of->hypotheses, 0x5A, sizeof of->hypotheses);
-    memset(&of->heads, 0x5A, sizeof of->heads);
-    memset(&of->findings, 0x5A, sizeof of->findings);
+    memset(&of->detections, 0x5A, sizeof of->detections);
     memset(&of->result, 0x5A, sizeof of->result);
     memset(&of->scratch, 0x5A, sizeof of->scratch);
 }
@@ -488,17 +488,17 @@ static void nothing_is_remembered_from_frame_to_frame(void)
     spoil_all(&head);
     process();
     check_same(&first, &head);
-    TEST_ASSERT_EQUAL_INT32(first.findings.finding_count, head.findings.finding_count);
+    TEST_ASSERT_EQUAL_INT32(first.detections.detection_count, head.detections.detection_count);
     ih_params_paper(&head.params);
     spoil_all(&head);
     process();
     TEST_ASSERT_EQUAL_INT32(0, head.expected.count);
-    TEST_ASSERT_EQUAL_INT32(0, head.findings.finding_count);
+    TEST_ASSERT_EQUAL_INT32(0, head.detections.detection_count);
     ih_params_default(&head.params);
     memcpy(copy8, grey8, sizeof grey8);
     memset(grey8, 0, sizeof grey8); /* another scene in between */
     process();
-    TEST_ASSERT_EQUAL_INT32(0, head.heads.head_count);
+    TEST_ASSERT_EQUAL_INT32(0, head.hypotheses.head_count);
     memcpy(grey8, copy8, sizeof grey8);
     process();
     check_same(&first, &head);
@@ -569,15 +569,15 @@ static void expect_the_nests(double x_mm, double y_mm, double z_mm)
     TEST_ASSERT_EQUAL_INT32(1, r->head_count);
     TEST_ASSERT_EQUAL_INT32(0, r->head[0]);
     TEST_ASSERT_EQUAL_INT32(0, r->selected);
-    TEST_ASSERT_EQUAL_INT32(head.heads.hypothesis_count, r->entry_count);
+    TEST_ASSERT_EQUAL_INT32(head.hypotheses.hypothesis_count, r->entry_count);
     for (i = 0; i < r->entry_count; i++) {
-        IH_TEST_EQUAL(i == 0 ? IH_ACCEPTED : head.heads.hypothesis[i].rejected,
+        IH_TEST_EQUAL(i == 0 ? IH_ACCEPTED : head.hypotheses.hypothesis[i].rejected,
                       r->entry[i].rejected, "rejected", i);
         IH_TEST_EQUAL(false, r->entry[i].has_probability, "no probability", i);
         IH_TEST_EQUAL(0, r->entry[i].track_id, "no track", i);
     }
     IH_TEST_WITHIN(MISS_MAX_MM, 0, miss_mm(r->entry[0].centre_mm_q8, x_mm, y_mm, z_mm), "head", 0);
-    TEST_ASSERT_EQUAL_INT32(0, head.findings.finding_count);
+    TEST_ASSERT_EQUAL_INT32(0, head.detections.detection_count);
     TEST_ASSERT_EQUAL_INT32(0, head.tracks.track_count);
 }
 
@@ -641,7 +641,7 @@ static void two_states_are_independent(void)
     TEST_ASSERT_EQUAL_INT(IH_OK, isohead_frame(&other, &frame, NULL, 0));
     paint_bust(&vector_busts[0]);
     process();
-    TEST_ASSERT_TRUE(memcmp(&head.heads, &other.heads, sizeof head.heads) != 0);
+    TEST_ASSERT_TRUE(memcmp(&head.hypotheses, &other.hypotheses, sizeof head.hypotheses) != 0);
     random_source.state = 92; /* the same noise again */
     paint_bust(&vector_busts[2]);
     process();
@@ -682,7 +682,7 @@ static void noise_is_survived(void)
         IH_TEST_RANGE(0, IH_DOTS_MAX, head.dots.dot_count, "dots", pass);
         IH_TEST_RANGE(0, IH_SLOTS, head.labels.labelled_count, "labels", pass);
         IH_TEST_RANGE(0, IH_SLOTS, head.samples.sample_count, "samples", pass);
-        IH_TEST_RANGE(0, IH_HYPOTHESES_MAX, head.heads.hypothesis_count, "hypotheses", pass);
+        IH_TEST_RANGE(0, IH_NESTS_MAX, head.hypotheses.hypothesis_count, "hypotheses", pass);
     }
 }
 
@@ -743,13 +743,13 @@ static void defaults_are_those_of_the_references(void)
     TEST_ASSERT_EQUAL_INT32(lround(2.5 * 256), params.windows.width_min_q8);
     TEST_ASSERT_EQUAL_INT32(lround(1e-5 * (1 << 30)), params.surface.ridge_q30);
     TEST_ASSERT_EQUAL_INT32(60, params.surface.huber_mm);
-    TEST_ASSERT_EQUAL_INT32(lround(1.045 * 65536), params.hypotheses.ellipse.shape_max_q16);
-    TEST_ASSERT_EQUAL_INT32(lround(1.75 * 65536), params.hypotheses.ellipse.ratio_part_max_q16);
-    TEST_ASSERT_EQUAL_INT32(lround(0.42 * 65536), params.hypotheses.ellipse.chord_max_q16);
-    TEST_ASSERT_EQUAL_INT32(100, params.findings.space.probe_mm);
-    TEST_ASSERT_EQUAL_INT32(98, params.findings.scan.deep_mm);
-    TEST_ASSERT_EQUAL_INT32(80, params.findings.scan.spacing_mm);
-    TEST_ASSERT_EQUAL_INT32(60, params.findings.fit.see_through_mm);
+    TEST_ASSERT_EQUAL_INT32(lround(1.045 * 65536), params.nests.ellipse.shape_max_q16);
+    TEST_ASSERT_EQUAL_INT32(lround(1.75 * 65536), params.nests.ellipse.ratio_part_max_q16);
+    TEST_ASSERT_EQUAL_INT32(lround(0.42 * 65536), params.nests.ellipse.chord_max_q16);
+    TEST_ASSERT_EQUAL_INT32(100, params.detections.space.probe_mm);
+    TEST_ASSERT_EQUAL_INT32(98, params.detections.scan.deep_mm);
+    TEST_ASSERT_EQUAL_INT32(80, params.detections.scan.spacing_mm);
+    TEST_ASSERT_EQUAL_INT32(60, params.detections.fit.see_through_mm);
 }
 
 static void the_state_keeps_to_its_budget(void)

@@ -1,4 +1,4 @@
-/* turned_rig - dots that a turned projector casts on a bumpy wall, in double: what ih_turn and ih_health
+/* turned_rig - dots that a turned projector casts on a bumpy wall, in double: what ih_rotation_vote and ih_health
  * are tested with. Shares nothing with the core but its structs and the lens (ih_rig_distort). */
 #ifndef TURNED_RIG_H
 #define TURNED_RIG_H

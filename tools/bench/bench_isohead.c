@@ -77,7 +77,7 @@ static bool run_all(const struct bench_input *input, void (*handle)(void), int64
 static void print_counts(void)
 {
     printf("dots %d labels %d findings %d\n", (int)head.dots.dot_count,
-           (int)head.labels.labelled_count, (int)head.findings.finding_count);
+           (int)head.labels.labelled_count, (int)head.detections.detection_count);
 }
 
 static void print_dots(void)
@@ -109,7 +109,7 @@ static void print_result(void)
         }
     }
     printf("],\"centres\":%d,\"points\":%d,\"head\":", (int)head.surface.centres,
-           (int)head.params.hypotheses.ellipse.point_count);
+           (int)head.params.nests.ellipse.point_count);
     if (head.result.selected == IH_NONE) {
         puts("null}");
         return;

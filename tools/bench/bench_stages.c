@@ -59,26 +59,26 @@ WRAP(BENCH_SURFACE, ih_surface_fit,
       const struct ih_surface_params *params, struct ih_surface_scratch *scratch,
       struct ih_surface *out),
      (samples, field, params, scratch, out))
-WRAP(BENCH_HYPOTHESES, ih_hypotheses_find,
-     (const struct ih_surface *surface, const struct ih_hypotheses_params *params,
-      struct ih_hypotheses_scratch *scratch, struct ih_hypotheses *out),
+WRAP(BENCH_HYPOTHESES, ih_nests_find,
+     (const struct ih_surface *surface, const struct ih_nests_params *params,
+      struct ih_nests_scratch *scratch, struct ih_nests *out),
      (surface, params, scratch, out))
-WRAP(BENCH_HEADS, ih_heads_select,
-     (const struct ih_hypotheses *hypotheses, const struct ih_surface *surface,
+WRAP(BENCH_HEADS, ih_hypotheses_select,
+     (const struct ih_nests *nests, const struct ih_surface *surface,
       const struct ih_samples *samples, const struct ih_rig *rig,
-      const struct ih_heads_params *params, struct ih_heads *out),
-     (hypotheses, surface, samples, rig, params, out))
-WRAP(BENCH_FINDINGS, ih_findings_add,
-     (const struct ih_points *points, const struct ih_dots *dots, const struct ih_heads *heads,
-      const struct ih_expected *expected, const struct ih_rig *rig,
-      const struct ih_findings_params *params, struct ih_findings_scratch *scratch,
-      struct ih_findings *out),
-     (points, dots, heads, expected, rig, params, scratch, out))
+      const struct ih_hypotheses_params *params, struct ih_hypotheses *out),
+     (nests, surface, samples, rig, params, out))
+WRAP(BENCH_FINDINGS, ih_detections_add,
+     (const struct ih_points *points, const struct ih_dots *dots,
+      const struct ih_hypotheses *hypotheses, const struct ih_expected *expected,
+      const struct ih_rig *rig, const struct ih_detections_params *params,
+      struct ih_detections_scratch *scratch, struct ih_detections *out),
+     (points, dots, hypotheses, expected, rig, params, scratch, out))
 WRAP(BENCH_TRACKS, ih_tracks_expect,
      (const struct ih_tracks *tracks, const struct ih_tracks_params *params, int64_t time_us,
       struct ih_expected *out),
      (tracks, params, time_us, out))
 WRAP(BENCH_TRACKS, ih_tracks_update,
      (struct ih_tracks * tracks, const struct ih_tracks_params *params, const struct ih_rig *rig,
-      struct ih_findings *findings),
-     (tracks, params, rig, findings))
+      struct ih_detections *detections),
+     (tracks, params, rig, detections))

@@ -32,8 +32,8 @@ __attribute__((noinline)) enum ih_err bench_worst_frame(const struct ih_frame *f
 __attribute__((noinline)) void bench_worst_end(int32_t number, const char *kind)
 {
     int32_t slices = 0;
-    for (int32_t i = 0; i < head.hypotheses.nest_count; i++) {
-        slices += head.hypotheses.nest[i].slice_count;
+    for (int32_t i = 0; i < head.nests.nest_count; i++) {
+        slices += head.nests.nest[i].slice_count;
     }
     printf(
         "%d %s dots %d edges %d hot %d dropped %d labels %d lost %d samples %d nests %d slices %d "
@@ -41,7 +41,7 @@ __attribute__((noinline)) void bench_worst_end(int32_t number, const char *kind)
         (int)number, kind, (int)head.dots.dot_count, (int)head.dots.edge_count,
         (int)head.dots.hot_count, (int)head.dots.dots_dropped, (int)head.labels.labelled_count,
         (int)head.labels.candidates_dropped, (int)head.samples.sample_count,
-        (int)head.hypotheses.nest_count, (int)slices, (int)head.findings.finding_count,
+        (int)head.nests.nest_count, (int)slices, (int)head.detections.detection_count,
         (int)head.expected.count);
 }
 

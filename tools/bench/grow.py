@@ -142,7 +142,7 @@ def centres(count, only=False):
         return [("surface/ih_surface.c", r"centres = IH_SURFACE_CENTRES_FEW,", "centres = IH_SURFACE_CENTRES_MAX,")]
     edits = [define("surface/ih_surface.h", "IH_SURFACE_CENTRES_FEW", count)]
     if count * count <= 32:
-        edits.append(define("surface/ih_surface.c", "FINE_ROWS", "IH_NORMAL_ROWS"))
+        edits.append(define("surface/ih_surface.c", "FINE_ROWS", "IH_NORMAL_EQUATIONS_ROWS"))
     if only:
         edits.append(define("surface/ih_surface.h", "IH_SURFACE_CENTRES_MAX", count))
     return edits
@@ -161,15 +161,15 @@ def grid(nodes):
 
 
 def points(count, only=False):
-    edits = [("nests/ih_parts.c", r"\.point_count = 32,", ".point_count = %d," % count)]
+    edits = [("nests/ih_arcs.c", r"\.point_count = 32,", ".point_count = %d," % count)]
     if only:
-        edits.append(define("nests/ih_parts.h", "IH_PARTS_POINTS_MAX", count))
+        edits.append(define("nests/ih_arcs.h", "IH_ARCS_POINTS_MAX", count))
     return edits
 
 
 def levels(step_mm):
-    return [("nests/ih_hypotheses.c", r"level_step_mm = 20;", "level_step_mm = %d;" % step_mm),
-            define("nests/ih_hypotheses.h", "IH_HYPOTHESES_SLICES_MAX", max(16, 110 // step_mm + 2))]
+    return [("nests/ih_nests.c", r"level_step_mm = 20;", "level_step_mm = %d;" % step_mm),
+            define("nests/ih_nests.h", "IH_NESTS_SLICES_MAX", max(16, 110 // step_mm + 2))]
 
 
 def ram_bytes(source):

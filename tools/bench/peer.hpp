@@ -146,7 +146,7 @@ struct peer_ray_lanes {
     peer_lanes slope[2], point_mm[3];
     peer_lanes seen;         /* 1, 0 */
     peer_lanes inside, ring; /* what an empty or unknown ray is worth to the scan */
-    float least_y[PEER_GRID], most_y[PEER_GRID]; /* slopes of a row of the pattern */
+    float min_y[PEER_GRID], max_y[PEER_GRID]; /* slopes of a row of the pattern */
 };
 
 using peer_grid = Eigen::Matrix<double, PEER_NODES, PEER_NODES, Eigen::RowMajor>;

@@ -152,9 +152,9 @@ void add_parts_of(const peer_outline &r, int steps, std::vector<peer_part> &out)
         r.yy.segment<POINTS>(steps) - r.yy.head<POINTS>() + w * (y0 * y0 + y0 * y1 + y1 * y1);
     /* 18 area2^2 times the trace of the second moments; an ellipse of the greatest ratio has the most */
     const lanes spread = 3 * area2 * (mxx + myy) - 2 * (mx * mx + my * my);
-    const double most = 18 * (RATIO_PART_MAX + 1 / RATIO_PART_MAX) * SHAPE_MAX / (2 * FOUR_PI);
+    const double max = 18 * (RATIO_PART_MAX + 1 / RATIO_PART_MAX) * SHAPE_MAX / (2 * FOUR_PI);
     /* every test as a number that is positive where it fails */
-    const lanes bad = over.max(2 * AREA_MIN - area2).max(spread - most * area2.cube());
+    const lanes bad = over.max(2 * AREA_MIN - area2).max(spread - max * area2.cube());
     for (int from = 0; from < count; from++) {
         if (bad[from] <= 0) {
             add_part(r, from, from + steps, out);

@@ -10,7 +10,7 @@ namespace
 constexpr double MEAN_SEMI_MM[3] = {78, 113, 98};
 constexpr double REACH = 8; /* semi-axes */
 constexpr double ROBUST_MM[PEER_FIT_STEPS] = {24, 16, 8, 8, 8, 8};
-constexpr double RADIUS_LEAST = 0.05;
+constexpr double RADIUS_MIN = 0.05;
 constexpr double SEE_THROUGH_MM = 60;
 constexpr double PUSH_MAX_MM = 30;
 constexpr double PUSH_WEIGHT = 0.5;
@@ -76,7 +76,7 @@ bool distance_row(const peer_head &head, const double place[3], double &residual
         length2 += g[axis] * g[axis];
     }
     double f = std::sqrt(f2), length = std::sqrt(length2);
-    if (f < RADIUS_LEAST) {
+    if (f < RADIUS_MIN) {
         return false;
     }
     residual_mm = (f - 1) * f / length;
@@ -187,13 +187,13 @@ span rows_around(const peer &p, const peer_head &head)
     const double y = head.centre_mm[1] - p.rig.origin_mm[1];
     const double z = head.centre_mm[2] - p.rig.origin_mm[2];
     const double nearest = std::max(z - deep, 1.0), farthest = z + deep;
-    const double least = std::min((y - up) / nearest, (y - up) / farthest);
-    const double most = std::max((y + up) / nearest, (y + up) / farthest);
+    const double min = std::min((y - up) / nearest, (y - up) / farthest);
+    const double max = std::max((y + up) / nearest, (y + up) / farthest);
     int first = 0, last = PEER_GRID - 1;
-    while (first < last && static_cast<double>(p.lanes.most_y[first]) < least) {
+    while (first < last && static_cast<double>(p.lanes.max_y[first]) < min) {
         first++;
     }
-    while (last > first && static_cast<double>(p.lanes.least_y[last]) > most) {
+    while (last > first && static_cast<double>(p.lanes.min_y[last]) > max) {
         last--;
     }
     const Eigen::Index from = first * PEER_GRID / 8 * 8;
@@ -277,8 +277,7 @@ void add_rays_lanes(const peer &p, const peer_head &head, double scale_mm, norma
         static_cast<float>(REACH) - place[0].abs().max(place[1].abs()).max(place[2].abs());
     const peer_lanes valid =
         rays.seen *
-        above_0(
-            reach.min(8 * scale - residual.abs()).min(radius - static_cast<float>(RADIUS_LEAST)));
+        above_0(reach.min(8 * scale - residual.abs()).min(radius - static_cast<float>(RADIUS_MIN)));
     const peer_lanes low = 1 - ((place[1] - 0.5F) * (0.5F / 0.3F)).max(0.0F).min(0.5F);
     const peer_lanes robust = ((residual * (1 / scale)).square() + 1).inverse();
     add_rows(row, residual, valid * low * robust.square(), out);
@@ -291,7 +290,7 @@ void add_rays_lanes(const peer &p, const peer_head &head, double scale_mm, norma
     if (pushes.maxCoeff() > 0) {
         distance_rows(head, c.nearest, radius, residual, row);
         add_rows(row, residual.max(static_cast<float>(-PUSH_MAX_MM)),
-                 pushes * above_0(radius - static_cast<float>(RADIUS_LEAST)) *
+                 pushes * above_0(radius - static_cast<float>(RADIUS_MIN)) *
                      static_cast<float>(PUSH_WEIGHT),
                  out);
     }
@@ -332,14 +331,14 @@ void peer_fill_lanes(peer &p)
     lanes.inside.setZero();
     lanes.ring.setZero();
     for (int row = 0; row < PEER_GRID; row++) {
-        lanes.least_y[row] = std::numeric_limits<float>::max();
-        lanes.most_y[row] = std::numeric_limits<float>::lowest();
+        lanes.min_y[row] = std::numeric_limits<float>::max();
+        lanes.max_y[row] = std::numeric_limits<float>::lowest();
     }
     for (int slot = 0; slot < PEER_SLOTS; slot++) {
         const peer_ray &ray = p.rays[static_cast<size_t>(slot)];
-        float &least_y = lanes.least_y[slot / PEER_GRID], &most_y = lanes.most_y[slot / PEER_GRID];
-        least_y = std::min(least_y, static_cast<float>(ray.slope_y));
-        most_y = std::max(most_y, static_cast<float>(ray.slope_y));
+        float &min_y = lanes.min_y[slot / PEER_GRID], &max_y = lanes.max_y[slot / PEER_GRID];
+        min_y = std::min(min_y, static_cast<float>(ray.slope_y));
+        max_y = std::max(max_y, static_cast<float>(ray.slope_y));
         lanes.slope[0][slot] = static_cast<float>(ray.slope_x);
         lanes.slope[1][slot] = static_cast<float>(ray.slope_y);
         if (ray.state == peer_ray_state::seen) {

@@ -14,9 +14,9 @@ constexpr size_t PLACES_MAX = 8;
 constexpr int BLOCKS = (PEER_GRID + 1) / 2; /* of two by two slots, along a side */
 constexpr double CENTRE_DEPTH_MM = 30;
 constexpr double CENTRE_BEHIND_MM = 108;
-constexpr double FRONT_LEAST_MM = 150;
-constexpr double SCORE_LEAST = 0.9;
-constexpr double PROMISE_LEAST = 1;
+constexpr double FRONT_MIN_MM = 150;
+constexpr double SCORE_MIN = 0.9;
+constexpr double PROMISE_MIN = 1;
 constexpr double APART_MM = 20;
 constexpr int FIRST_LOOK_STEPS = 1;
 /* Score after the first look: 45 of 100 fits end here, which costs none of 129 heads in both sequences. */
@@ -161,7 +161,7 @@ void try_start(peer &p, const peer_head &start, std::vector<peer_head> &starts)
     }
     peer_fit_continue(p, PEER_FIT_STEPS, fit);
     fit.head.score = peer_scan_score(p, fit.head);
-    if (fit.head.centre_mm[2] - fit.head.semi_mm[2] >= FRONT_LEAST_MM &&
+    if (fit.head.centre_mm[2] - fit.head.semi_mm[2] >= FRONT_MIN_MM &&
         fit.head.score > p.head.score) {
         p.head = fit.head;
         p.has_head = true;
@@ -193,9 +193,9 @@ void peer_find_heads(peer &p)
     const bool had_head = p.has_head;
     const peer_head last = p.head;
     p.has_head = false;
-    p.head.score = SCORE_LEAST;
+    p.head.score = SCORE_MIN;
     for (const peer_head &place : places) {
-        if (peer_promise(p, place) >= PROMISE_LEAST) {
+        if (peer_promise(p, place) >= PROMISE_MIN) {
             try_start(p, place, starts);
         }
     }

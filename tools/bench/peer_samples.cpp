@@ -10,7 +10,7 @@ namespace
 
 constexpr double ISOLATED_MM = 60;
 constexpr double CLIP_BEHIND_MM = 250;
-constexpr double CLIP_LEAST_MM = 1100;
+constexpr double CLIP_MIN_MM = 1100;
 constexpr int FILL_NEIGHBOURS = 3;
 constexpr double FILL_WEIGHT = 0.3;
 constexpr double REACH = 40; /* field units */
@@ -104,7 +104,7 @@ static void fill_rays(peer &p, double near_mm)
 void peer_find_samples(peer &p)
 {
     double near_mm = peer_near_mm(p.points);
-    double clip_mm = std::max(near_mm + CLIP_BEHIND_MM, CLIP_LEAST_MM);
+    double clip_mm = std::max(near_mm + CLIP_BEHIND_MM, CLIP_MIN_MM);
     p.samples.clear();
     p.nearest_sample_mm = clip_mm;
     for (int slot = 0; slot < PEER_SLOTS; slot++) {

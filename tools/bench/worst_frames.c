@@ -21,9 +21,9 @@ static int32_t random_below(int32_t limit)
     return (int32_t)(((uint64_t)random_32() * (uint32_t)limit) >> 32);
 }
 
-static int32_t random_between(int32_t least, int32_t most)
+static int32_t random_between(int32_t min, int32_t max)
 {
-    return least + random_below(most - least + 1);
+    return min + random_below(max - min + 1);
 }
 
 struct picture {
@@ -164,11 +164,11 @@ static void draw_lattice(struct picture *p)
 /* Dots anywhere, of all strengths down to below the threshold. */
 static void draw_crowd(struct picture *p)
 {
-    int32_t count = random_between(100, 8000), most = random_between(4, 250);
+    int32_t count = random_between(100, 8000), max = random_between(4, 250);
     fill(p, random_below(150), 1 + random_below(10));
     for (int32_t i = 0; i < count; i++) {
         add_spot(p, random_below(p->width * ONE_Q12), random_below(p->height * ONE_Q12),
-                 random_between(4500, 20000), random_between(2, most));
+                 random_between(4500, 20000), random_between(2, max));
     }
 }
 

@@ -141,10 +141,10 @@ void bundle_solve(const Board &board, std::vector<View> &views, Camera &camera)
         CameraTerms change;
         covariance = solve(blocks, camera, change);
         move(blocks, change, camera);
-        double most = 0.0;
+        double max = 0.0;
         for (int i = 0; i < camera_terms; i++)
-            most = std::max(most, std::abs(change(i)) / std::sqrt(covariance(i, i)));
-        if (most < small_step)
+            max = std::max(max, std::abs(change(i)) / std::sqrt(covariance(i, i)));
+        if (max < small_step)
             break;
     }
     tell(list_blocks(board, camera, views), covariance, camera);

@@ -116,7 +116,7 @@ static void fit(const Board &board, std::vector<View> &views, Camera &camera)
         }
     }
     if (used.empty()) /* each has been refused meanwhile */
-        refuse(coverage_missing(views, camera.size, coverage_least));
+        refuse(coverage_missing(views, camera.size, coverage_min));
     std::vector<cv::Mat> turns, shifts;
     camera.distortion = cv::Mat::zeros(1, 5, CV_64F);
     cv::calibrateCamera(places, seen, camera.size, camera.matrix, camera.distortion, turns, shifts, cv::CALIB_FIX_K3);
@@ -235,7 +235,7 @@ Camera camera_solve(const Board &board, cv::Size size, std::vector<View> &views)
     Camera camera;
     camera.size = size;
     coverage_guess_poses(board, size, views);
-    std::vector<std::string> missing = coverage_missing(views, size, coverage_least);
+    std::vector<std::string> missing = coverage_missing(views, size, coverage_min);
     if (!missing.empty())
         refuse(missing);
     fit(board, views, camera);
@@ -258,7 +258,7 @@ Camera camera_solve(const Board &board, cv::Size size, std::vector<View> &views)
         fit(board, views, camera);
         bundle_solve(board, views, camera);
     }
-    missing = coverage_missing(views, size, coverage_least);
+    missing = coverage_missing(views, size, coverage_min);
     if (!missing.empty())
         refuse(missing);
     check_trust(camera);

@@ -16,7 +16,7 @@ struct CoverageLimits {
     double distance_ratio; /* farthest to nearest board */
 };
 
-constexpr CoverageLimits coverage_wanted{20, 12, 4, 0, 2.0}, coverage_least{10, 4, 2, 2, 1.4};
+constexpr CoverageLimits coverage_wanted{20, 12, 4, 0, 2.0}, coverage_min{10, 4, 2, 2, 1.4};
 
 /* Of the 4x3 parts, row by row. */
 extern const char *const coverage_region_names[region_columns * region_rows];

@@ -94,10 +94,10 @@ static bool find_dot(const cv::Mat &picture, const cv::Mat &lit, int u, int v, D
 /* Where the surface alone is at the sensor's limit nothing can be seen on it. */
 static bool is_dazzled(const cv::Mat &dark, int u, int v)
 {
-    double most = 0.0;
+    double max = 0.0;
     if (!dark.empty())
-        cv::minMaxLoc(dark(cv::Rect(u - 2, v - 2, 5, 5)), nullptr, &most);
-    return most >= saturated_grey;
+        cv::minMaxLoc(dark(cv::Rect(u - 2, v - 2, 5, 5)), nullptr, &max);
+    return max >= saturated_grey;
 }
 
 std::vector<Dot> dots_find(const cv::Mat &lit, const cv::Mat &dark, const cv::Mat &where)

@@ -5,7 +5,7 @@
 
 namespace cal
 {
-static constexpr double turn_most_deg = 5.0, turn_step_deg = 0.1;
+static constexpr double turn_max_deg = 5.0, turn_step_deg = 0.1;
 
 std::array<EpipolarLine, slot_count> epipolar_lines(const Camera &camera, const cv::Vec3d &origin_mm,
                                                     const std::array<cv::Vec3d, slot_count> &rays)
@@ -54,9 +54,9 @@ Turn epipolar_turned(const Camera &camera, const Projector &projector, const Ran
     Turn result{deg, 0, 1e9};
     for (size_t i = 0; i < slot_count; i++) {
         for (size_t k = i + 1; k < slot_count; k++) {
-            double least_px = apart(near_end[i], far_end[i], near_end[k], far_end[k]);
-            result.shared += least_px < share_px;
-            result.least_apart_px = std::min(result.least_apart_px, least_px);
+            double min_px = apart(near_end[i], far_end[i], near_end[k], far_end[k]);
+            result.shared += min_px < share_px;
+            result.min_apart_px = std::min(result.min_apart_px, min_px);
         }
     }
     return result;
@@ -65,7 +65,7 @@ Turn epipolar_turned(const Camera &camera, const Projector &projector, const Ran
 std::vector<Turn> epipolar_turns(const Camera &camera, const Projector &projector, const Range &range)
 {
     std::vector<Turn> turns;
-    int steps = cvRound(turn_most_deg / turn_step_deg);
+    int steps = cvRound(turn_max_deg / turn_step_deg);
     for (int step = -steps; step <= steps; step++)
         turns.push_back(epipolar_turned(camera, projector, range, step * turn_step_deg));
     return turns;

@@ -27,8 +27,8 @@ std::array<EpipolarLine, slot_count> epipolar_lines(const Camera &camera, const 
 /* The pattern turned about its middle ray by this angle, clockwise in the image where it is positive. */
 struct Turn {
     double deg;
-    int shared;            /* pairs of dots that share a line */
-    double least_apart_px; /* of all pairs */
+    int shared;          /* pairs of dots that share a line */
+    double min_apart_px; /* of all pairs */
 };
 
 Turn epipolar_turned(const Camera &camera, const Projector &projector, const Range &range, double deg);

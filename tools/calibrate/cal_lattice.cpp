@@ -47,11 +47,11 @@ static cv::Point2d usual_step(const std::vector<cv::Point2d> &ways)
         })));
     if (ways.empty())
         return {};
-    int most = *std::max_element(votes.begin(), votes.end());
+    int max = *std::max_element(votes.begin(), votes.end());
     cv::Point2d best;
     for (size_t i = 0; i < ways.size(); i++) {
-        if (votes[i] * 2 >= most && (best == cv::Point2d() || cv::norm(ways[i]) < 0.75 * cv::norm(best) ||
-                                     (votes[i] == most && cv::norm(ways[i]) < 1.3 * cv::norm(best))))
+        if (votes[i] * 2 >= max && (best == cv::Point2d() || cv::norm(ways[i]) < 0.75 * cv::norm(best) ||
+                                    (votes[i] == max && cv::norm(ways[i]) < 1.3 * cv::norm(best))))
             best = ways[i];
     }
     return best;
@@ -138,7 +138,7 @@ static int grow_from(std::vector<Sighting> &dots, size_t start, const Frame &usu
 static size_t best_start(const std::vector<Sighting> &dots, const Frame &usual)
 {
     size_t best = 0;
-    double least = 1e9;
+    double min = 1e9;
     for (size_t i = 0; i < dots.size(); i++) {
         double sum = 0.0;
         for (cv::Point2d step : {usual.across, -usual.across, usual.down, -usual.down}) {
@@ -147,8 +147,8 @@ static size_t best_start(const std::vector<Sighting> &dots, const Frame &usual)
                 away = std::min(away, cv::norm(other.tangent - dots[i].tangent - step) / cv::norm(step));
             sum += away;
         }
-        if (sum < least) {
-            least = sum;
+        if (sum < min) {
+            min = sum;
             best = i;
         }
     }

@@ -12,7 +12,7 @@ static constexpr double small = 1e-6;
 static constexpr int middle = pattern_side / 2;
 static constexpr int well_seen = 4;
 static constexpr size_t well_seen_min = 40;
-static constexpr double least_sigma = 1e-5;
+static constexpr double min_sigma = 1e-5;
 
 static double square(double value)
 {
@@ -94,7 +94,7 @@ static double ray_variance(const Projector &projector, const Lattice &lattice)
     auto half = squares.begin() + static_cast<std::ptrdiff_t>(squares.size() / 2);
     std::nth_element(squares.begin(), half, squares.end());
     double total = *half / 1.386; /* an exponential distribution's median, two components */
-    return std::max(total - noise / static_cast<double>(squares.size()), square(least_sigma));
+    return std::max(total - noise / static_cast<double>(squares.size()), square(min_sigma));
 }
 
 std::string nominal_words(double sigma_deg)

@@ -66,12 +66,12 @@ cv::Mat picture_read(const std::string &path)
         throw Error(path + ": " + std::strerror(errno));
     if (!file.read(magic, 2) || magic[0] != 'P' || magic[1] != '5')
         throw Error(path + ": no binary PGM (P5)");
-    int width = header_number(file, path), height = header_number(file, path), most = header_number(file, path);
+    int width = header_number(file, path), height = header_number(file, path), max = header_number(file, path);
     picture_check_size(path, width, height);
-    if (most < 1 || most > 65535)
-        throw Error(path + text(": maxval %d; must be from 1 to 65535", most));
+    if (max < 1 || max > 65535)
+        throw Error(path + text(": maxval %d; must be from 1 to 65535", max));
     file.get();
-    size_t sample_bytes = most > 255 ? 2 : 1, count = static_cast<size_t>(width) * static_cast<size_t>(height);
+    size_t sample_bytes = max > 255 ? 2 : 1, count = static_cast<size_t>(width) * static_cast<size_t>(height);
     std::vector<unsigned char> data(count * sample_bytes);
     file.read(reinterpret_cast<char *>(data.data()), static_cast<std::streamsize>(data.size()));
     if (static_cast<size_t>(file.gcount()) != data.size())
@@ -80,9 +80,9 @@ cv::Mat picture_read(const std::string &path)
     cv::Mat grey(height, width, CV_32F);
     for (size_t i = 0; i < count; i++) {
         int sample = sample_bytes == 2 ? data[2 * i] * 256 + data[2 * i + 1] : data[i];
-        if (sample > most)
-            throw Error(path + text(": sample %zu is %d, more than the maxval %d", i, sample, most));
-        grey.ptr<float>()[i] = static_cast<float>(sample) * 255.0f / static_cast<float>(most);
+        if (sample > max)
+            throw Error(path + text(": sample %zu is %d, more than the maxval %d", i, sample, max));
+        grey.ptr<float>()[i] = static_cast<float>(sample) * 255.0f / static_cast<float>(max);
     }
     return grey;
 }

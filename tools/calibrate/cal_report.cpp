@@ -106,41 +106,41 @@ static std::string depth_chart(const Result &result, double dot_sigma_px)
     return chart.svg();
 }
 
-static void tell_now(Chart &chart, double most)
+static void tell_now(Chart &chart, double max)
 {
-    chart.line({{0.0, 0.0}, {0.0, most}}, grey);
-    chart.words({0.08, 0.94 * most}, "now");
+    chart.line({{0.0, 0.0}, {0.0, max}}, grey);
+    chart.words({0.08, 0.94 * max}, "now");
 }
 
 static std::string turn_chart(const std::vector<Turn> &turns)
 {
     std::vector<cv::Point2d> curve;
-    double most = 5.0; /* pairs come whole: so do the axis' ticks */
+    double max = 5.0; /* pairs come whole: so do the axis' ticks */
     for (const Turn &turn : turns) {
         curve.emplace_back(turn.deg, turn.shared);
-        most = std::max(most, static_cast<double>(turn.shared));
+        max = std::max(max, static_cast<double>(turn.shared));
     }
     Chart chart("Pairs of dots that share a line", "pattern turned by, degrees", "pairs",
-                {turns.front().deg, 0.0, turns.back().deg - turns.front().deg, 1.05 * most});
+                {turns.front().deg, 0.0, turns.back().deg - turns.front().deg, 1.05 * max});
     chart.line(curve, blue);
-    tell_now(chart, most);
+    tell_now(chart, max);
     return chart.svg();
 }
 
 static std::string apart_chart(const std::vector<Turn> &turns)
 {
     std::vector<cv::Point2d> curve;
-    double most = share_px;
+    double max = share_px;
     for (const Turn &turn : turns) {
-        curve.emplace_back(turn.deg, turn.least_apart_px);
-        most = std::max(most, turn.least_apart_px);
+        curve.emplace_back(turn.deg, turn.min_apart_px);
+        max = std::max(max, turn.min_apart_px);
     }
     Chart chart("The two nearest lines", "pattern turned by, degrees", "apart, px",
-                {turns.front().deg, 0.0, turns.back().deg - turns.front().deg, 1.05 * most});
+                {turns.front().deg, 0.0, turns.back().deg - turns.front().deg, 1.05 * max});
     chart.line(curve, blue);
     chart.line({{turns.front().deg, share_px}, {turns.back().deg, share_px}}, red);
-    chart.words({turns.front().deg + 0.2, share_px + 0.02 * most}, "shared below this");
-    tell_now(chart, most);
+    chart.words({turns.front().deg + 0.2, share_px + 0.02 * max}, "shared below this");
+    tell_now(chart, max);
     return chart.svg();
 }
 
@@ -247,7 +247,7 @@ static std::string turn_words(const std::vector<Turn> &turns, const Turn &now, c
     std::string words =
         text("<p>Between %.0f and %.0f mm, <b>%d pairs of dots share an epipolar line</b> (come nearer than "
              "%.1f px); the nearest are %.2f px apart. ",
-             range.near_mm, range.far_mm, now.shared, share_px, now.least_apart_px);
+             range.near_mm, range.far_mm, now.shared, share_px, now.min_apart_px);
     if (now.shared == 0)
         return words + "The pattern's turn is good as it is.</p>";
     if (best.shared >= now.shared)

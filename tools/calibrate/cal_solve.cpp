@@ -200,7 +200,7 @@ static void tell_camera(const Camera &camera)
 static void tell_uncovered(const Camera &camera)
 {
     for (size_t i = 0; i < camera.regions.size(); i++) {
-        if (camera.regions[i].corner_count < coverage_least.region_corners)
+        if (camera.regions[i].corner_count < coverage_min.region_corners)
             std::printf("note: %d corners %s in the frame: the lens is a guess there\n", camera.regions[i].corner_count,
                         coverage_region_names[i]);
     }

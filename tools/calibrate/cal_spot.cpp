@@ -50,8 +50,8 @@ double spot_lens_px(const std::vector<Lit> &pictures)
             sizes.push_back(std::abs(point[1] - line[0] - line[1] * point[0]));
         limit = huber_sigmas * 1.4826 * median_of(sizes);
     }
-    double most = median_of(squares) - beam_min_px * beam_min_px;
-    return std::sqrt(std::max(std::min(line[0], most), lens_min_px * lens_min_px));
+    double max = median_of(squares) - beam_min_px * beam_min_px;
+    return std::sqrt(std::max(std::min(line[0], max), lens_min_px * lens_min_px));
 }
 
 /* How light the sheet is around a pixel, CV_64F. */

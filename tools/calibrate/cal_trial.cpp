@@ -129,9 +129,9 @@ static Placing place(const Trial &trial, const Lit &lit, double step_length)
     placing.predicted = static_cast<int>(shifts.size());
     if (shifts.empty())
         return placing;
-    auto most =
+    auto max =
         std::max_element(votes.begin(), votes.end(), [](const auto &a, const auto &b) { return a.second < b.second; });
-    placing.shift = {most->first.first, most->first.second};
+    placing.shift = {max->first.first, max->first.second};
     for (const cv::Point2d &shift : shifts) {
         cv::Point2d off(shift.x - placing.shift[0], shift.y - placing.shift[1]);
         if (std::max(std::abs(off.x), std::abs(off.y)) < on_lattice) {
@@ -204,12 +204,12 @@ static Trial try_origin(const std::vector<Lit> &pictures, size_t first, const cv
 static size_t richest(const std::vector<Lit> &pictures)
 {
     size_t best = 0;
-    int most = -1;
+    int max = -1;
     for (size_t i = 0; i < pictures.size(); i++) {
         int count = static_cast<int>(std::count_if(pictures[i].sightings.begin(), pictures[i].sightings.end(),
                                                    [](const Sighting &s) { return s.in_lattice; }));
-        if (pictures[i].refused.empty() && count > most) {
-            most = count;
+        if (pictures[i].refused.empty() && count > max) {
+            max = count;
             best = i;
         }
     }

@@ -18,7 +18,7 @@ static constexpr int level_grey = 16, levels = 256 / level_grey;
 static constexpr size_t level_pixels_min = 300;
 /* A drop beyond this is no noise; nor is what a sensor at its limit shows. */
 static constexpr double drop_max_grey = 25.0, full_grey = 240.0;
-static constexpr double noise_least = 0.1; /* a sensor's steps alone make so much */
+static constexpr double noise_min = 0.1; /* a sensor's steps alone make so much */
 
 /* How much darker than in `dark` a part of the picture is in `lit` at a place beside it; the laser darkens nothing. */
 static double darker(const cv::Mat &dark, const cv::Mat &lit, const cv::Rect &part, cv::Point beside)
@@ -158,6 +158,6 @@ Noise twins_noise(const std::vector<Picture> &pictures, const std::vector<int> &
     if (!cv::solve(normal, right, line, cv::DECOMP_CHOLESKY))
         return {};
     double slope = std::max(line[1], 0.0);
-    return {std::max(line[0], noise_least), slope};
+    return {std::max(line[0], noise_min), slope};
 }
 } // namespace cal

@@ -37,17 +37,17 @@ class Part:
 
 
 PARTS = (
-    Part("dots", ("ih_dots_find",), ("ih_band", "ih_noise", "ih_dots"), ("dots",), "dots"),
+    Part("dots", ("ih_dots_find",), ("ih_bandpass", "ih_noise", "ih_dots"), ("dots",), "dots"),
     Part("labels", ("ih_labels_assign",), ("ih_labels",), ("labels",), "labels"),
     Part("windows", ("ih_windows_find",), ("ih_windows",), ("windows",), "windows"),
     Part("points", ("ih_points_from_labels", "ih_points_from_range"), ("ih_points",), ("points",)),
     Part("samples", ("ih_samples_select",), ("ih_samples",), ("samples",)),
-    Part("surface", ("ih_surface_fit",), ("ih_normal", "ih_surface"), ("surface",), "surface"),
-    Part("cuts, hypotheses", ("ih_hypotheses_find",), ("ih_cuts", "ih_ellipse", "ih_hypotheses"),
+    Part("surface", ("ih_surface_fit",), ("ih_normal_equations", "ih_surface"), ("surface",), "surface"),
+    Part("cuts, hypotheses", ("ih_nests_find",), ("ih_contours", "ih_ellipse", "ih_nests"),
          ("hypotheses",), "hypotheses"),
-    Part("heads", ("ih_heads_select",), ("ih_heads",), ("heads",)),
-    Part("findings", ("ih_findings_add",), ("ih_findings",), ("findings",), "findings"),
-    Part(". space", ("ih_space_make",), ("ih_space",), inner=True),
+    Part("heads", ("ih_hypotheses_select",), ("ih_hypotheses",), ("heads",)),
+    Part("findings", ("ih_detections_add",), ("ih_detections",), ("findings",), "findings"),
+    Part(". space", ("ih_rays_make",), ("ih_rays",), inner=True),
     Part(". scan", ("ih_scan_find",), ("ih_scan",), inner=True),
     Part(". fit", ("ih_fit_continue",), ("ih_fit",), inner=True),
     Part(". evidence", ("ih_evidence_collect",), ("ih_evidence",), inner=True),

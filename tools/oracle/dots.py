@@ -3,7 +3,7 @@
 import numpy as np
 from scipy import ndimage
 
-import band
+import bandpass
 import emit
 import noise
 from frames import Frame, pairs, spec
@@ -60,9 +60,9 @@ def judge(response, padded, u, v, ring_max, side_min, flat_min):
 def find(frame, ambient=None, ring_max=128 / 256, side_min=138 / 256, flat_min=225 / 256):
     """dots (u, v, peak), maxima above the threshold that are edges or twins, and hot pixels."""
     left, block, _ = noise.measure(frame.grey_q4(), ambient and ambient.grey_q4(), True)
-    response = band.response(left)
+    response = bandpass.response(left)
     level = noise.spread(block, response.shape, True)
-    threshold = np.maximum(np.floor(frame.floor_q4 * band.UNIT / 16 + 0.5),
+    threshold = np.maximum(np.floor(frame.floor_q4 * bandpass.UNIT / 16 + 0.5),
                            np.floor(level * frame.gain_q8 / 256 + 0.5))
     padded = np.pad(response, EDGE)
     dots, refused = [], {"edge": 0, "hot": 0}

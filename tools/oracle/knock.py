@@ -5,7 +5,7 @@
                                0.3 degrees and of a shift by 0.3 mm, across and along the lines; how well 50 frames
                                with that truth's dots show each of the six when all are unknown, when only turns are
 
-The rig is turned exactly (Rodrigues); equations and weights are the core's (firmware/core/upkeep/ih_places.h), iterated to the
+The rig is turned exactly (Rodrigues); equations and weights are the core's (firmware/core/upkeep/ih_rotation_estimate.h), iterated to the
 end, over all frames at once.
 """
 
@@ -219,7 +219,7 @@ def estimate(folder, host_sim, work, start, frames):
 
 
 class Sums:
-    """What the core keeps of each slot (struct ih_place), in float64: weight and pull of the places that it remembers, and of
+    """What the core keeps of each slot (struct ih_dot_place), in float64: weight and pull of the places that it remembers, and of
     those before."""
 
     def __init__(self):

@@ -8,7 +8,7 @@ output. Seeds are fixed: the same files come out every time.
 import argparse
 import os
 
-import band
+import bandpass
 import cholesky
 import cloud
 import dots
@@ -25,15 +25,15 @@ import rig
 import samples
 import scan
 import score
-import space
+import rays
 import surface
 import tracks
 import windows
 
-STAGES = {"rig": rig, "band": band, "noise": noise, "dots": dots, "labels": labels,
+STAGES = {"rig": rig, "bandpass": bandpass, "noise": noise, "dots": dots, "labels": labels,
           "exposure": exposure, "cloud": cloud, "windows": windows, "points": points,
           "samples": samples, "cholesky": cholesky, "surface": surface, "ellipse": ellipse,
-          "space": space, "ellipsoid": ellipsoid, "scan": scan, "fit": fit, "evidence": evidence,
+          "rays": rays, "ellipsoid": ellipsoid, "scan": scan, "fit": fit, "evidence": evidence,
           "score": score, "tracks": tracks, "isohead": isohead}
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy import ndimage
 
-import band
+import bandpass
 import emit
 import frames
 
@@ -64,7 +64,7 @@ def choose(grey, ambient):
     """Is a block quieter, by an eighth, without the ambient light, and not darker by more than
     2 grey levels in the mean? On half of the difference, which needs no cutting off."""
     half = np.floor((grey + frames.FULL_Q4 - ambient) / 2)
-    quieter = 16 * medians(band.response(half)) < 7 * medians(band.response(grey))
+    quieter = 16 * medians(bandpass.response(half)) < 7 * medians(bandpass.response(grey))
     for i, j in np.argwhere(quieter):
         part = half[sampled(len(grey), i), j * BLOCK:(j + 1) * BLOCK] - frames.FULL_Q4 // 2
         quieter[i, j] = part.mean() >= -REST_Q4 / 4
@@ -74,11 +74,11 @@ def choose(grey, ambient):
 def measure(grey, ambient=None, whole=False):
     """What is left of a frame, its map of noise and what is subtracted."""
     if ambient is None:
-        block = medians(band.response(grey))
+        block = medians(bandpass.response(grey))
         return grey, smoothed(block, whole), np.zeros(block.shape, bool)
     subtract = choose(grey, ambient)
     left = rest(grey, ambient, subtract)
-    block = medians(band.response(left))
+    block = medians(bandpass.response(left))
     block = np.where(subtract, np.floor(block * WHITE + 0.5) if whole else block * WHITE, block)
     return left, smoothed(block, whole), subtract
 
@@ -91,7 +91,7 @@ def write_vectors(directory):
                   frames.Frame("odd", (339, 258), 1023, 300, 30, (0, 0), 2),
                   frames.Frame("low_last", (352, 259), 255, 100, 7, (0, 0), 3),
                   frames.Frame("loud", (640, 480), 255, 60, 1, (0, 0), 4, loud=40)):
-        response = band.response(frame.grey_q4())
+        response = bandpass.response(frame.grey_q4())
         block = smoothed(medians(response))
         noise = spread(block, response.shape)
         height, width = response.shape

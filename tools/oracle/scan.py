@@ -16,7 +16,7 @@ NEARER, BEHIND, EMPTY = -10 / 64, -1, -38 / 64
 RING_INNER, RING_OUTER = 1.3, 1.9
 RING_EMPTY, RING_NEAR, RING_SHARE = 45 / 64, -38 / 64, 0.6
 RAYS_LEAST = 8
-# What 16 bits may be off by, with the depth in mm: see ih_rating.h.
+# What 16 bits may be off by, with the depth in mm: see ih_template.h.
 ERROR_E, ERROR_RADIUS2, ERROR_DEPTH_MM = (7.9e-7, 0.0009), (4.3e-6, 0.0130), 1.6
 
 

@@ -40,7 +40,7 @@ def all_rays():
 
 
 class Space:
-    """struct ih_space in floats: origin, and per slot slope, point and state."""
+    """struct ih_rays in floats: origin, and per slot slope, point and state."""
 
     def __init__(self, rays, depth_q8, state):
         self.origin, self.slope, self.state = rays.origin, rays.slope, state

@@ -11,9 +11,9 @@
 
 static bool read_header(FILE *file, int *width, int *height)
 {
-    int most;
-    return fscanf(file, "P5 %5d %5d %5d", width, height, &most) == 3 && fgetc(file) != EOF && most == 255 &&
-           *width > 0 && *height > 0 && *width <= RD_BITMAP_SIDE_MAX && *height <= RD_BITMAP_SIDE_MAX;
+    int max;
+    return fscanf(file, "P5 %5d %5d %5d", width, height, &max) == 3 && fgetc(file) != EOF && max == 255 && *width > 0 &&
+           *height > 0 && *width <= RD_BITMAP_SIDE_MAX && *height <= RD_BITMAP_SIDE_MAX;
 }
 
 /* What is wrong, or NULL. */

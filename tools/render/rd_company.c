@@ -166,14 +166,14 @@ static void add_truth(struct rd_truth *truth, const struct rd_person *person, co
 
 void rd_company_choose(struct rd_truth *truth, const struct rd_rig *rig, double dots)
 {
-    double least = 1e9;
+    double min = 1e9;
     truth->head = RD_NOBODY;
     for (int i = 0; i < truth->head_count; i++) {
         double row, column;
         bool ahead = rd_rig_pattern_place(rig, truth->heads[i].centre_mm, &row, &column);
-        if (!ahead || fmax(fabs(row), fabs(column)) > dots || hypot(row, column) >= least)
+        if (!ahead || fmax(fabs(row), fabs(column)) > dots || hypot(row, column) >= min)
             continue;
-        least = hypot(row, column);
+        min = hypot(row, column);
         truth->head = i;
     }
 }

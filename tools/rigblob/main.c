@@ -1,4 +1,4 @@
-/* rigblob - a calibrated rig as the blob that a board without JSON reads (ih_blob.h). */
+/* rigblob - a calibrated rig as the blob that a board without JSON reads (ih_rig_blob.h). */
 #include <errno.h>
 #include <getopt.h>
 #include <stdio.h>
@@ -10,7 +10,7 @@
 #include "app_rig.h"
 #include "app_rig_explain.h"
 #include "hal_file.h"
-#include "rig/ih_blob.h"
+#include "rig/ih_rig_blob.h"
 
 enum status { STATUS_GOOD = 0, STATUS_INPUT = 1, STATUS_USAGE = 2 };
 
@@ -55,8 +55,8 @@ static bool put(const char *part, const char *path, const uint8_t *blob, struct 
     if (file == NULL) {
         return hal_fail(error, "%s", strerror(errno));
     }
-    bool good = fwrite(blob, 1, IH_BLOB_BYTES, file) == IH_BLOB_BYTES && fflush(file) == 0 &&
-                fsync(fileno(file)) == 0;
+    bool good = fwrite(blob, 1, IH_RIG_BLOB_BYTES, file) == IH_RIG_BLOB_BYTES &&
+                fflush(file) == 0 && fsync(fileno(file)) == 0;
     int reason = errno;
     if (fclose(file) != 0 && good) {
         good = false;
@@ -76,12 +76,12 @@ static bool put(const char *part, const char *path, const uint8_t *blob, struct 
 static enum status write_blob(const char *rig_path, const char *path)
 {
     static struct ih_calibration calibration;
-    static uint8_t blob[IH_BLOB_BYTES];
+    static uint8_t blob[IH_RIG_BLOB_BYTES];
     struct hal_error error;
     if (!app_rig_load(rig_path, &calibration, &error) || !check(&calibration, &error)) {
         return fail(rig_path, error.text);
     }
-    enum ih_err err = ih_blob_encode(&calibration, blob);
+    enum ih_err err = ih_rig_blob_encode(&calibration, blob);
     if (err != IH_OK) {
         return fail(rig_path, ih_err_text(err));
     }
@@ -136,10 +136,10 @@ static enum status show_blob(const char *path)
     struct hal_error error;
     uint8_t *blob = NULL;
     size_t size = 0;
-    if (!hal_file_read(path, 2 * IH_BLOB_BYTES, &blob, &size, &error)) {
+    if (!hal_file_read(path, 2 * IH_RIG_BLOB_BYTES, &blob, &size, &error)) {
         return fail(path, error.text);
     }
-    enum ih_err err = ih_blob_decode(blob, size, &calibration);
+    enum ih_err err = ih_rig_blob_decode(blob, size, &calibration);
     free(blob);
     if (err != IH_OK) {
         return fail(path, ih_err_text(err));

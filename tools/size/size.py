@@ -33,7 +33,7 @@ from program import PREFIX, Program, run
 BOARD = "mps2-an500"
 COMPILER = [PREFIX + "gcc", "-mcpu=cortex-m7", "-mthumb", "-mfloat-abi=soft"]
 MEASURED = 5
-DECODE, INIT, FRAME = "ih_blob_decode", "isohead_init", "isohead_frame"
+DECODE, INIT, FRAME = "ih_rig_blob_decode", "isohead_init", "isohead_frame"
 ENTRIES = (DECODE, INIT, FRAME)
 # Where the work of the core ends: what the program calls next.
 ENDS = ("app_record_frame", "app_record_error", "hal_semihosting_call")

@@ -10,8 +10,8 @@
 namespace view
 {
 static constexpr double margin = 20, plot_width = 820, plot_height = 820, title_height = 40;
-static constexpr double gap = 24, side_width = 440, side_least = 700, row = 24, words_size = 17;
-static constexpr double near_grey = 70, far_grey = 250, least_span_mm = 100;
+static constexpr double gap = 24, side_width = 440, side_min = 700, row = 24, words_size = 17;
+static constexpr double near_grey = 70, far_grey = 250, min_span_mm = 100;
 static constexpr double key_gap = 8;
 static constexpr int key_columns = 3;
 static constexpr double tag_radius = 11;
@@ -28,7 +28,7 @@ Shader::Shader(const Rig &rig, const Plot &plot) : size_(cvRound(plot.where.widt
 
 double band_far_mm(const Trace &trace)
 {
-    return std::max(trace.clip_mm, trace.surface.nearest_mm + least_span_mm);
+    return std::max(trace.clip_mm, trace.surface.nearest_mm + min_span_mm);
 }
 
 uint8_t band_grey(const Trace &trace, double depth_mm)
@@ -149,20 +149,20 @@ static void draw_tag(Canvas &canvas, const Plot &plot, const Hypothesis &hypothe
 static void draw_hypotheses(Canvas &canvas, const Plot &plot, const Trace &trace, const Rig &rig, double much)
 {
     Room room(plot.where);
-    for (const Finding &finding : trace.findings) {
-        if (!finding.is_head)
-            canvas.cross(plot.page(finding.ellipse.centre_px), 8 * much, stroke_place(much), false);
+    for (const Finding &detection : trace.detections) {
+        if (!detection.is_head)
+            canvas.cross(plot.page(detection.ellipse.centre_px), 8 * much, stroke_place(much), false);
     }
-    for (const Hypothesis &hypothesis : trace.hypotheses)
+    for (const Hypothesis &hypothesis : trace.nests)
         hypothesis_draw(canvas, plot, hypothesis.ellipse,
                         hypothesis.rejected.empty() ? stroke_accepted(much) : stroke_rejected(much));
-    for (const Hypothesis &hypothesis : trace.hypotheses) {
+    for (const Hypothesis &hypothesis : trace.nests) {
         if (hypothesis.rejected.empty())
             draw_support(canvas, plot, trace, rig, hypothesis.nest, much);
     }
     heads_draw(canvas, plot, trace, much);
-    for (size_t i = 0; i < trace.hypotheses.size(); i++)
-        draw_tag(canvas, plot, trace.hypotheses[i], i + 1, much, room);
+    for (size_t i = 0; i < trace.nests.size(); i++)
+        draw_tag(canvas, plot, trace.nests[i], i + 1, much, room);
 }
 
 void contours_draw_plot(Canvas &canvas, const Plot &plot, const Shader &shader, const Trace &trace, const Rig &rig,
@@ -192,7 +192,7 @@ cv::Size contours_page(const Rig &rig)
     Plot plot = contours_plot(rig);
     double key_bottom = plot.where.br().y + key_gap + row * std::ceil(1.0 * key_entries / key_columns);
     return {cvRound(margin + plot_width + gap + side_width + margin),
-            cvRound(std::max(key_bottom, title_height + margin + side_least) + margin)};
+            cvRound(std::max(key_bottom, title_height + margin + side_min) + margin)};
 }
 
 /* A bar of all bands with some of their depths; returns where it ends. */
@@ -225,15 +225,15 @@ static double draw_depths(Canvas &canvas, cv::Point2d at, const Trace &trace)
 static void draw_reasons(Canvas &canvas, cv::Point2d at, double bottom, const Trace &trace)
 {
     double indent = 2 * tag_radius + 10;
-    for (size_t i = 0; i < trace.hypotheses.size(); i++) {
-        std::vector<std::string> lines = reason_lines(trace.hypotheses[i], trace.limits);
-        bool last = i + 1 == trace.hypotheses.size();
+    for (size_t i = 0; i < trace.nests.size(); i++) {
+        std::vector<std::string> lines = reason_lines(trace.nests[i], trace.limits);
+        bool last = i + 1 == trace.nests.size();
         if (at.y + row * static_cast<double>(lines.size() + (last ? 0 : 1)) > bottom) {
-            canvas.text({at.x, at.y + row / 2},
-                        text("and %zu more for which there is no room", trace.hypotheses.size() - i), words_size);
+            canvas.text({at.x, at.y + row / 2}, text("and %zu more for which there is no room", trace.nests.size() - i),
+                        words_size);
             return;
         }
-        bool accepted = trace.hypotheses[i].rejected.empty();
+        bool accepted = trace.nests[i].rejected.empty();
         cv::Point2d tag(at.x + tag_radius, at.y + row / 2);
         canvas.disc(tag, tag_radius, accepted ? black : blue);
         canvas.disc(tag, tag_radius - 1.6, accepted ? black : white);
@@ -259,7 +259,7 @@ void contours_draw(Canvas &canvas, const Shader &shader, const Trace &trace, con
     canvas.text({at.x, margin + title_height / 2 - 6}, result_words(trace), 1.15 * words_size, Anchor::left, true);
     at.y = draw_depths(canvas, {at.x, margin + title_height}, trace);
     canvas.text({at.x, at.y + row / 2},
-                trace.hypotheses.empty() ? "no hypotheses" : "hypotheses: what was measured (limits)", words_size,
+                trace.nests.empty() ? "no hypotheses" : "hypotheses: what was measured (limits)", words_size,
                 Anchor::left, true);
     draw_reasons(canvas, {at.x, at.y + 1.3 * row}, bottom, trace);
 }

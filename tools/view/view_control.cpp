@@ -29,14 +29,14 @@ static cv::Mat1b to_few_greys(const cv::Mat1b &image)
     return few;
 }
 
-static cv::Mat1b stretch(const cv::Mat &samples, double least, double most)
+static cv::Mat1b stretch(const cv::Mat &samples, double min, double max)
 {
     cv::Mat1b grey(samples.size());
     cv::Mat values;
     samples.convertTo(values, CV_64F);
     for (int y = 0; y < grey.rows; y++) {
         for (int x = 0; x < grey.cols; x++) {
-            double part = std::clamp((values.at<double>(y, x) - least) / (most - least), 0.0, 1.0);
+            double part = std::clamp((values.at<double>(y, x) - min) / (max - min), 0.0, 1.0);
             grey(y, x) = static_cast<uint8_t>(cvRound(255 * std::pow(part, gamma)));
         }
     }

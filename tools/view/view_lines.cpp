@@ -49,12 +49,12 @@ void heads_draw(Canvas &canvas, const Plot &plot, const Trace &trace, double muc
 {
     if (trace.paper)
         return; /* then the accepted hypotheses are the heads */
-    for (const Finding &finding : trace.findings) {
-        if (finding.is_head)
-            hypothesis_draw(canvas, plot, finding.ellipse, stroke_head(much));
+    for (const Finding &detection : trace.detections) {
+        if (detection.is_head)
+            hypothesis_draw(canvas, plot, detection.ellipse, stroke_head(much));
     }
     if (trace.selected)
-        canvas.cross(plot.page(trace.findings[*trace.selected].ellipse.centre_px), 14 * much,
+        canvas.cross(plot.page(trace.detections[*trace.selected].ellipse.centre_px), 14 * much,
                      {vermilion, 4 * much, {}, false, 1.5 * much}, true);
 }
 
@@ -89,10 +89,10 @@ void key_draw(Canvas &canvas, cv::Point2d at, int columns, cv::Size2d cell, doub
 std::string head_words(const Trace &trace)
 {
     if (!trace.selected)
-        return trace.heads.empty() ? "no head" : text("%zu heads", trace.heads.size());
+        return trace.hypotheses.empty() ? "no head" : text("%zu heads", trace.hypotheses.size());
     if (trace.paper)
-        return text("head at %.0f mm", trace.hypotheses[*trace.selected].distance_mm);
-    const Finding &head = trace.findings[*trace.selected];
+        return text("head at %.0f mm", trace.nests[*trace.selected].distance_mm);
+    const Finding &head = trace.detections[*trace.selected];
     return text("head %s %.0f mm", head.is_predicted ? "near" : "at", head.distance_mm);
 }
 } // namespace view

@@ -11,12 +11,12 @@
 
 namespace view
 {
-static constexpr size_t shown_most = 40;
+static constexpr size_t shown_max = 40;
 
 void Node::complain(const std::string &expected) const
 {
     std::string is = value_->dump();
-    if (is.size() > shown_most)
+    if (is.size() > shown_max)
         is = std::string("a ") + value_->type_name() + text(" of %zu bytes", is.size());
     throw Error(file_ + ": " + (place_.empty() ? "the whole" : place_) + ": must be " + expected + ", is " + is);
 }
@@ -52,11 +52,11 @@ std::string Node::string() const
     return value_->get<std::string>();
 }
 
-int64_t Node::integer(int64_t least, int64_t most) const
+int64_t Node::integer(int64_t min, int64_t max) const
 {
     bool fits = value_->is_number_integer() && (!value_->is_number_unsigned() || value_->get<uint64_t>() <= INT64_MAX);
-    if (!fits || value_->get<int64_t>() < least || value_->get<int64_t>() > most)
-        complain("an integer from " + std::to_string(least) + " to " + std::to_string(most));
+    if (!fits || value_->get<int64_t>() < min || value_->get<int64_t>() > max)
+        complain("an integer from " + std::to_string(min) + " to " + std::to_string(max));
     return value_->get<int64_t>();
 }
 

@@ -27,7 +27,7 @@ class Node
     bool boolean() const;
     std::string string() const;
     /* An integer within bounds. */
-    int64_t integer(int64_t least, int64_t most) const;
+    int64_t integer(int64_t min, int64_t max) const;
     /* Any number that is finite. */
     double number() const;
     /* A raw integer of 32 bits with fraction_bits of them behind the point. */

@@ -14,8 +14,8 @@ static constexpr int grey_spread = 10;
 
 static int bin_of(const cv::Vec3b &pixel)
 {
-    auto [least, most] = std::minmax({pixel[0], pixel[1], pixel[2]});
-    if (most - least < grey_spread)
+    auto [min, max] = std::minmax({pixel[0], pixel[1], pixel[2]});
+    if (max - min < grey_spread)
         return ((pixel[0] + pixel[1] + pixel[2]) * (grey_count - 1) + 382) / 765;
     auto step = [](int value) { return (value * (side - 1) + 127) / 255; };
     return grey_count + (step(pixel[2]) * side + step(pixel[1])) * side + step(pixel[0]);

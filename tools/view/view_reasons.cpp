@@ -33,14 +33,14 @@ static std::string inside_words(const Hypothesis &h, const Limits &l)
     return text("dots on it %d (%d or more)", h.outline.inside, l.points_min);
 }
 
-static std::string share_words(const char *what, int of, int all, int least_percent)
+static std::string share_words(const char *what, int of, int all, int min_percent)
 {
-    return text("%s %d of %d (%d %% or more)", what, of, all, least_percent);
+    return text("%s %d of %d (%d %% or more)", what, of, all, min_percent);
 }
 
-static bool is_short(int of, int all, int least_percent)
+static bool is_short(int of, int all, int min_percent)
 {
-    return of * 100 < all * least_percent;
+    return of * 100 < all * min_percent;
 }
 
 /* Of the outline's four counts those that fail, or all. */
@@ -96,10 +96,10 @@ std::string result_words(const Trace &trace)
 {
     std::string words = head_words(trace);
     if (!trace.selected)
-        return words + (trace.heads.empty() ? "" : ", none selected");
+        return words + (trace.hypotheses.empty() ? "" : ", none selected");
     if (trace.paper)
         return words;
-    const Finding &head = trace.findings[*trace.selected];
+    const Finding &head = trace.detections[*trace.selected];
     words += text(", %.1f %% sure", 100 * head.probability) + (head.is_predicted ? ", by its track" : "");
     return words;
 }

@@ -66,10 +66,10 @@ static void read_projector(const Node &whole, Rig &rig)
 /* How far out the frame's corners are seen. */
 static double corner_reach(const Rig &rig)
 {
-    double width = rig.size_px.width - 1, height = rig.size_px.height - 1, most = 0;
+    double width = rig.size_px.width - 1, height = rig.size_px.height - 1, max = 0;
     for (cv::Point2d place : rig.places({{0, 0}, {width, 0}, {0, height}, {width, height}}))
-        most = std::max(most, cv::norm(place));
-    return most * reach_beyond;
+        max = std::max(max, cv::norm(place));
+    return max * reach_beyond;
 }
 
 Rig rig_read(const std::string &path)

@@ -16,7 +16,7 @@ namespace view
 {
 static constexpr size_t sheet_count = 9;
 /* A film of a single frame, or of frames without times. */
-static constexpr double usual_frames_per_s = 10, most_frames_per_s = 60;
+static constexpr double usual_frames_per_s = 10, max_frames_per_s = 60;
 
 static size_t count_wanted(const Options &options, Format format)
 {
@@ -56,7 +56,7 @@ static double frames_per_s(const std::vector<int64_t> &times_us)
         return usual_frames_per_s;
     std::nth_element(gaps_us.begin(), gaps_us.begin() + static_cast<std::ptrdiff_t>(gaps_us.size() / 2), gaps_us.end());
     int64_t gap_us = gaps_us[gaps_us.size() / 2];
-    return gap_us > 0 ? std::min(1e6 / static_cast<double>(gap_us), most_frames_per_s) : usual_frames_per_s;
+    return gap_us > 0 ? std::min(1e6 / static_cast<double>(gap_us), max_frames_per_s) : usual_frames_per_s;
 }
 
 static Plot shader_plot(Verb verb, const Rig &rig)

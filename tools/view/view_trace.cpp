@@ -137,11 +137,11 @@ static void read_hypotheses(const Node &list, Trace &trace)
     for (size_t i = 0; i < list.count(); i++) {
         Node node = list[i];
         Node rejected = node["rejected"];
-        trace.hypotheses.push_back({read_index(node["nest"], trace.nests.size()), read_ellipse(node),
-                                    node["distance_mm_q8"].fixed(8), node["area_mm2"].fixed(0),
-                                    node["curvature_mm_q8"].fixed(8), node["extent_mm_q8"].fixed(8),
-                                    node["upright_q16"].fixed(16), read_outline(node["outline"]),
-                                    rejected.is_null() ? "" : rejected.string()});
+        trace.nests.push_back({read_index(node["nest"], trace.nests.size()), read_ellipse(node),
+                               node["distance_mm_q8"].fixed(8), node["area_mm2"].fixed(0),
+                               node["curvature_mm_q8"].fixed(8), node["extent_mm_q8"].fixed(8),
+                               node["upright_q16"].fixed(16), read_outline(node["outline"]),
+                               rejected.is_null() ? "" : rejected.string()});
     }
 }
 
@@ -154,28 +154,28 @@ static Limits read_limits(const Node &node)
             read_count(node["beside_min_percent"]), read_count(node["below_min_percent"])};
 }
 
-static void read_findings(const Node &list, Trace &trace)
+static void read_detections(const Node &list, Trace &trace)
 {
     for (size_t i = 0; i < list.count(); i++) {
         Node node = list[i];
         Node centre = node["centre_mm_q8"];
         centre.must_count(3);
-        trace.findings.push_back({read_ellipse(node),
-                                  {centre[size_t{0}].fixed(8), centre[1].fixed(8), centre[2].fixed(8)},
-                                  node["distance_mm_q8"].fixed(8),
-                                  node["probability_q16"].fixed(16),
-                                  node["head"].boolean(),
-                                  node["predicted"].boolean()});
+        trace.detections.push_back({read_ellipse(node),
+                                    {centre[size_t{0}].fixed(8), centre[1].fixed(8), centre[2].fixed(8)},
+                                    node["distance_mm_q8"].fixed(8),
+                                    node["probability_q16"].fixed(16),
+                                    node["head"].boolean(),
+                                    node["predicted"].boolean()});
     }
 }
 
 static void read_result(const Node &node, Trace &trace)
 {
     trace.paper = node["paper"].boolean();
-    size_t end = trace.paper ? trace.hypotheses.size() : trace.findings.size();
-    Node heads = node["head"];
-    for (size_t i = 0; i < heads.count(); i++)
-        trace.heads.push_back(read_index(heads[i], end));
+    size_t end = trace.paper ? trace.nests.size() : trace.detections.size();
+    Node hypotheses = node["head"];
+    for (size_t i = 0; i < hypotheses.count(); i++)
+        trace.hypotheses.push_back(read_index(hypotheses[i], end));
     if (!node["selected"].is_null())
         trace.selected = read_index(node["selected"], end);
 }
@@ -199,7 +199,7 @@ Trace trace_read(const std::string &path)
     read_cuts(whole["cuts"], trace);
     read_hypotheses(whole["heads"]["hypothesis"], trace);
     trace.limits = read_limits(whole["heads"]["limits"]);
-    read_findings(whole["findings"], trace);
+    read_detections(whole["findings"], trace);
     read_result(whole["result"], trace);
     return trace;
 }

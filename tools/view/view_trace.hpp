@@ -95,11 +95,11 @@ struct Trace {
     Surface surface;
     std::vector<Cut> cuts;
     std::vector<std::vector<bool>> nests; /* is the slice a whole contour? */
-    std::vector<Hypothesis> hypotheses;
+    std::vector<Hypothesis> nests;
     Limits limits;
-    std::vector<Finding> findings;
+    std::vector<Finding> detections;
     bool paper;
-    std::vector<size_t> heads; /* of findings; of hypotheses with the paper's method alone */
+    std::vector<size_t> hypotheses; /* of findings; of hypotheses with the paper's method alone */
     std::optional<size_t> selected;
 
     int labelled_count() const;

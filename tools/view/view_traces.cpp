@@ -143,7 +143,7 @@ Traces::Traces(const Options &options)
     }
 }
 
-std::vector<std::string> Traces::chosen(const std::string &from, size_t most) const
+std::vector<std::string> Traces::chosen(const std::string &from, size_t max) const
 {
     auto first = paths_.begin();
     if (!from.empty()) {
@@ -156,6 +156,6 @@ std::vector<std::string> Traces::chosen(const std::string &from, size_t most) co
             throw Error(from_where_ + ": has no trace of a frame " + name.string());
     }
     auto left = static_cast<size_t>(paths_.end() - first);
-    return {first, first + static_cast<std::ptrdiff_t>(std::min(left, most))};
+    return {first, first + static_cast<std::ptrdiff_t>(std::min(left, max))};
 }
 } // namespace view

@@ -36,7 +36,7 @@ class Traces
     explicit Traces(const Options &options);
 
     /* Those from options.from on, `most` at most, in the order of their names. */
-    std::vector<std::string> chosen(const std::string &from, size_t most) const;
+    std::vector<std::string> chosen(const std::string &from, size_t max) const;
     /* host_sim could not use all frames; it has told which. */
     bool incomplete() const
     {

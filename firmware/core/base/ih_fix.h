@@ -99,9 +99,9 @@ static inline int32_t ih_clamp_s32(int32_t value, int32_t low, int32_t high)
 }
 
 /* value limited to -most .. most. */
-static inline int64_t ih_clamp_s64(int64_t value, int64_t most)
+static inline int64_t ih_clamp_s64(int64_t value, int64_t max)
 {
-    return value < -most ? -most : value > most ? most : value;
+    return value < -max ? -max : value > max ? max : value;
 }
 
 static inline int64_t ih_abs_s64(int64_t value)

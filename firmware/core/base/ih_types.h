@@ -18,7 +18,7 @@ enum ih_err {
     IH_ERR_RAY = -7,          /* a dot ray that is not a unit vector or does not point forward */
     IH_ERR_KIND = -8,         /* a range frame for a dot rig, or the other way round */
     IH_ERR_NOT_POSITIVE = -9, /* Cholesky met a pivot that is not positive */
-    /* A rig as bytes (ih_blob.h). */
+    /* A rig as bytes (ih_rig_blob.h). */
     IH_ERR_BLOB_SHORT = -10,   /* bytes are missing */
     IH_ERR_BLOB_LONG = -11,    /* bytes follow */
     IH_ERR_BLOB_MAGIC = -12,   /* something else */

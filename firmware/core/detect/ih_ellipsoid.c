@@ -18,20 +18,20 @@ struct ih_ellipsoid ih_ellipsoid_mean(const int32_t centre_mm_q8[3])
 #define BOX_MM_Q8 2
 
 struct ih_ellipsoid_box ih_ellipsoid_box(const struct ih_ellipsoid *ellipsoid,
-                                         const int32_t slope_most_q20[2], int32_t radius2_q14)
+                                         const int32_t slope_max_q20[2], int32_t radius2_q14)
 {
     uint64_t sum_q14 = 1 << 14; /* 1 + g.g; g is at most 20 on each axis */
     for (int axis = 0; axis < 2; axis++) {
-        int64_t g_q14 = ih_div_round(
-            ih_shift_round((int64_t)slope_most_q20[axis] * ellipsoid->semi_mm_q8[2], 6),
-            ellipsoid->semi_mm_q8[axis]);
+        int64_t g_q14 =
+            ih_div_round(ih_shift_round((int64_t)slope_max_q20[axis] * ellipsoid->semi_mm_q8[2], 6),
+                         ellipsoid->semi_mm_q8[axis]);
         sum_q14 += (uint64_t)(g_q14 * g_q14 >> 14) + 1;
     }
-    int64_t most_q14 =
+    int64_t max_q14 =
         (int64_t)ih_isqrt_u64((uint64_t)(radius2_q14 + BOX_RADIUS2_Q14) * sum_q14) + 1;
     struct ih_ellipsoid_box box;
     for (int axis = 0; axis < 2; axis++) {
-        int64_t half_q8 = ih_mul_shift(most_q14, ellipsoid->semi_mm_q8[axis], 14);
+        int64_t half_q8 = ih_mul_shift(max_q14, ellipsoid->semi_mm_q8[axis], 14);
         box.half_mm_q8[axis] = (int32_t)half_q8 + BOX_MM_Q8;
     }
     return box;
@@ -52,7 +52,7 @@ static bool in_reach(int64_t place_q14)
     return ih_abs_s64(place_q14) <= REACH_Q14;
 }
 
-struct ih_aim ih_ellipsoid_aim(const int32_t semi_mm_q8[3], const struct ih_shares *shares,
+struct ih_aim ih_ellipsoid_aim(const int32_t semi_mm_q8[3], const struct ih_fractions *shares,
                                const struct ih_ray *ray)
 {
     const int32_t slope_q20[2] = {ray->slope_x_q20, ray->slope_y_q20};
@@ -66,7 +66,7 @@ struct ih_aim ih_ellipsoid_aim(const int32_t semi_mm_q8[3], const struct ih_shar
     return aim;
 }
 
-bool ih_ellipsoid_cross(const struct ih_ellipsoid *ellipsoid, const struct ih_shares *shares,
+bool ih_ellipsoid_cross(const struct ih_ellipsoid *ellipsoid, const struct ih_fractions *shares,
                         const int32_t origin_mm_q8[3], const struct ih_ray *ray,
                         const struct ih_aim *aim, struct ih_crossing *out)
 {
@@ -79,10 +79,10 @@ bool ih_ellipsoid_cross(const struct ih_ellipsoid *ellipsoid, const struct ih_sh
     for (int axis = 0; axis < 2; axis++) {
         int64_t offset_q8 = origin_mm_q8[axis] + ih_mul_shift(depth_q8, slope_q20[axis], 20) -
                             ellipsoid->centre_mm_q8[axis];
-        if (ih_abs_s64(offset_q8) > IH_SHARE_MOST) {
+        if (ih_abs_s64(offset_q8) > IH_FRACTION_MAX) {
             return false;
         }
-        e_q14[axis] = ih_share(shares->share_q50[axis], (int32_t)offset_q8);
+        e_q14[axis] = ih_fraction(shares->share_q50[axis], (int32_t)offset_q8);
         if (!in_reach(e_q14[axis])) {
             return false;
         }
@@ -111,24 +111,24 @@ bool ih_ellipsoid_cross(const struct ih_ellipsoid *ellipsoid, const struct ih_sh
     return true;
 }
 
-struct ih_shares ih_ellipsoid_shares(const int32_t semi_mm_q8[3])
+struct ih_fractions ih_ellipsoid_fractions(const int32_t semi_mm_q8[3])
 {
-    struct ih_shares shares;
+    struct ih_fractions shares;
     for (int axis = 0; axis < 3; axis++) {
         shares.share_q50[axis] = ((int64_t)1 << 50) / semi_mm_q8[axis] + 1;
     }
     return shares;
 }
 
-bool ih_ellipsoid_place(const struct ih_ellipsoid *ellipsoid, const struct ih_shares *shares,
+bool ih_ellipsoid_place(const struct ih_ellipsoid *ellipsoid, const struct ih_fractions *shares,
                         const int32_t point_mm_q8[3], int32_t place_q14[3])
 {
     for (int axis = 0; axis < 3; axis++) {
         const int64_t offset_q8 = (int64_t)point_mm_q8[axis] - ellipsoid->centre_mm_q8[axis];
-        if (ih_abs_s64(offset_q8) > IH_SHARE_MOST) {
+        if (ih_abs_s64(offset_q8) > IH_FRACTION_MAX) {
             return false;
         }
-        place_q14[axis] = ih_share(shares->share_q50[axis], (int32_t)offset_q8);
+        place_q14[axis] = ih_fraction(shares->share_q50[axis], (int32_t)offset_q8);
         if (!in_reach(place_q14[axis])) {
             return false;
         }

@@ -24,7 +24,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "detect/ih_space.h"
+#include "detect/ih_rays.h"
 
 #define IH_ELLIPSOID_SEMI_MIN_MM 40
 #define IH_ELLIPSOID_SEMI_MAX_MM 200
@@ -51,30 +51,30 @@ struct ih_ellipsoid_box {
 /* The mean adult head, hair included. */
 struct ih_ellipsoid ih_ellipsoid_mean(const int32_t centre_mm_q8[3]);
 
-/* The box through which every ray passes that comes nearer than radius, with slopes up to slope_most
- * (as from ih_space_slope_most): radius2 >= e.e / (1 + g.g). The errors above are allowed for. */
+/* The box through which every ray passes that comes nearer than radius, with slopes up to slope_max
+ * (as from ih_rays_slope_max): radius2 >= e.e / (1 + g.g). The errors above are allowed for. */
 struct ih_ellipsoid_box ih_ellipsoid_box(const struct ih_ellipsoid *ellipsoid,
-                                         const int32_t slope_most_q20[2], int32_t radius2_q14);
+                                         const int32_t slope_max_q20[2], int32_t radius2_q14);
 
 /* Does the ray pass through the box? Two products, for those that are not worth a crossing. */
 bool ih_ellipsoid_in_box(const struct ih_ellipsoid *ellipsoid, const struct ih_ellipsoid_box *box,
                          const int32_t origin_mm_q8[3], const struct ih_ray *ray);
 
 /* Inverses of the semi-axes: what is divided by the same one many times is multiplied instead. */
-struct ih_shares {
+struct ih_fractions {
     int64_t share_q50[3]; /* 2^50 / semi, made greater by 1 at most, and by something */
 };
 
-struct ih_shares ih_ellipsoid_shares(const int32_t semi_mm_q8[3]);
+struct ih_fractions ih_ellipsoid_fractions(const int32_t semi_mm_q8[3]);
 
 /* Offsets farther than this are out of reach: IH_ELLIPSOID_REACH of the greatest semi-axis are less. */
-#define IH_SHARE_MOST (1 << 19)
+#define IH_FRACTION_MAX (1 << 19)
 
-/* ih_div_round(offset * 2^14, semi), to the last bit, for |offset| up to IH_SHARE_MOST. The product is
+/* ih_div_round(offset * 2^14, semi), to the last bit, for |offset| up to IH_FRACTION_MAX. The product is
  * too great by up to |offset|, 2^-17 of the quotient's last place, and a quotient that is not on a half
  * is at least 1 / (2 semi), 2^-16.7, away from the next. One that is on a half comes out beyond it, on
  * either side of zero: rounded away from zero, as there. */
-static inline int32_t ih_share(int64_t share_q50, int32_t offset)
+static inline int32_t ih_fraction(int64_t share_q50, int32_t offset)
 {
     return (int32_t)((offset * share_q50 + ((int64_t)1 << 35)) >> 36);
 }
@@ -85,16 +85,16 @@ struct ih_aim {
     int64_t gg_q28; /* 1 + g.g */
 };
 
-struct ih_aim ih_ellipsoid_aim(const int32_t semi_mm_q8[3], const struct ih_shares *shares,
+struct ih_aim ih_ellipsoid_aim(const int32_t semi_mm_q8[3], const struct ih_fractions *shares,
                                const struct ih_ray *ray);
 
 /* shares and aim: of this size. False: far away, *out is not set. */
-bool ih_ellipsoid_cross(const struct ih_ellipsoid *ellipsoid, const struct ih_shares *shares,
+bool ih_ellipsoid_cross(const struct ih_ellipsoid *ellipsoid, const struct ih_fractions *shares,
                         const int32_t origin_mm_q8[3], const struct ih_ray *ray,
                         const struct ih_aim *aim, struct ih_crossing *out);
 
 /* A point in the ellipsoid's units. False when beyond the reach on any axis. */
-bool ih_ellipsoid_place(const struct ih_ellipsoid *ellipsoid, const struct ih_shares *shares,
+bool ih_ellipsoid_place(const struct ih_ellipsoid *ellipsoid, const struct ih_fractions *shares,
                         const int32_t point_mm_q8[3], int32_t place_q14[3]);
 
 #endif

@@ -5,7 +5,7 @@
 
 #include "base/ih_fix.h"
 #include "base/ih_range.h"
-#include "detect/ih_row.h"
+#include "detect/ih_fit_equations.h"
 
 #define ONE_Q14 (1 << 14)
 #define INSIDE_Q14 14746 /* radius2 below 0.9: through the head, not along its edge */
@@ -30,7 +30,7 @@ struct candidate {
     const struct ih_ellipsoid *ellipsoid;
     const int32_t *origin_mm_q8;
     int32_t depth_mm_q8; /* of its centre, from the origin */
-    struct ih_shares shares;
+    struct ih_fractions shares;
     struct ih_ellipsoid_box box; /* rays through it pass here */
 };
 
@@ -47,7 +47,7 @@ struct view {
 };
 
 struct tally {
-    struct ih_tally around;
+    struct ih_ray_counts around;
     int32_t on, through, hit, front;
     int64_t on_square_q16; /* sum of squared distances, mm^2 */
     int64_t body_dz_q8;
@@ -78,10 +78,10 @@ static bool make_view(const struct candidate *candidate, const struct ih_ray *ra
         const int64_t off_q8 = candidate->origin_mm_q8[axis] +
                                ih_mul_shift(candidate->depth_mm_q8, slope_q20[axis], 20) -
                                ellipsoid->centre_mm_q8[axis];
-        if (ih_abs_s64(off_q8) > IH_SHARE_MOST) {
+        if (ih_abs_s64(off_q8) > IH_FRACTION_MAX) {
             return false;
         }
-        const int32_t at_q14 = ih_share(candidate->shares.share_q50[axis], (int32_t)off_q8);
+        const int32_t at_q14 = ih_fraction(candidate->shares.share_q50[axis], (int32_t)off_q8);
         if (ih_abs_s32(at_q14) > IH_ELLIPSOID_REACH << 14) {
             return false;
         }
@@ -102,7 +102,7 @@ static bool make_view(const struct candidate *candidate, const struct ih_ray *ra
     return true;
 }
 
-static void count(struct ih_tally_share *share, bool part)
+static void count(struct ih_ray_counts_share *share, bool part)
 {
     share->all++;
     share->part += part;
@@ -150,7 +150,8 @@ static void look_inside(const struct candidate *candidate, const struct view *vi
     tally->through += behind_q8 > THROUGH_MM_Q8;
     tally->front += behind_q8 < -FRONT_MM_Q8;
     if (ih_ellipsoid_place(ellipsoid, &candidate->shares, view->ray->point_mm_q8, place_q14) &&
-        ih_row_distance(&candidate->shares, place_q14, &off_q8) && ih_abs_s32(off_q8) < ON_MM_Q8) {
+        ih_fit_equations_distance(&candidate->shares, place_q14, &off_q8) &&
+        ih_abs_s32(off_q8) < ON_MM_Q8) {
         tally->hit++;
         add_on(view, ellipsoid, off_q8, tally);
     }
@@ -207,14 +208,14 @@ static void look_below(const struct view *view, const struct ih_ellipsoid *ellip
 }
 
 /* (part + 0.5) / (all + 1) */
-static int32_t careful_q8(struct ih_tally_share share)
+static int32_t careful_q8(struct ih_ray_counts_share share)
 {
     return (2 * share.part + 1) * 128 / (share.all + 1);
 }
 
-static int32_t plain_q8(struct ih_tally_share share, int32_t least)
+static int32_t plain_q8(struct ih_ray_counts_share share, int32_t min)
 {
-    return share.part * 256 / ih_max_s32(share.all, least);
+    return share.part * 256 / ih_max_s32(share.all, min);
 }
 
 /* Variance of the points' depths that no plane explains, mm^2 in Q8: szz - b^T S^-1 b, S and b the
@@ -303,16 +304,17 @@ static void look(const struct candidate *candidate, const struct ih_ray *ray, in
                  struct tally *tally)
 {
     struct view view;
-    if ((flag & IH_TALLY_BODY) != 0) {
+    if ((flag & IH_RAY_COUNTS_BODY) != 0) {
         tally->body_dz_q8 += ray->point_mm_q8[2] - candidate->ellipsoid->centre_mm_q8[2];
     }
-    if ((flag & (IH_TALLY_UNSURE | IH_TALLY_HIT)) == 0 || !make_view(candidate, ray, &view)) {
+    if ((flag & (IH_RAY_COUNTS_UNSURE | IH_RAY_COUNTS_HIT)) == 0 ||
+        !make_view(candidate, ray, &view)) {
         return;
     }
-    if ((flag & IH_TALLY_HIT) != 0) {
+    if ((flag & IH_RAY_COUNTS_HIT) != 0) {
         look_inside(candidate, &view, tally);
     }
-    if ((flag & IH_TALLY_UNSURE) != 0) {
+    if ((flag & IH_RAY_COUNTS_UNSURE) != 0) {
         look_around(&view, tally);
         look_below(&view, candidate->ellipsoid, tally);
         tally->around.before += view.is_seen && view.distance2_q28 < AROUND2_Q28 &&
@@ -320,7 +322,7 @@ static void look(const struct candidate *candidate, const struct ih_ray *ray, in
     }
 }
 
-void ih_evidence_collect(const struct ih_space *space, struct ih_tally_scratch *scratch,
+void ih_evidence_collect(const struct ih_rays *space, struct ih_ray_counts_scratch *scratch,
                          const struct ih_ellipsoid *ellipsoid, const int32_t start_mm_q8[3],
                          const struct ih_evidence_nest *nest, struct ih_evidence *out)
 {
@@ -329,12 +331,12 @@ void ih_evidence_collect(const struct ih_space *space, struct ih_tally_scratch *
         .ellipsoid = ellipsoid,
         .origin_mm_q8 = space->origin_mm_q8,
         .depth_mm_q8 = ellipsoid->centre_mm_q8[2] - space->origin_mm_q8[2],
-        .shares = ih_ellipsoid_shares(ellipsoid->semi_mm_q8),
-        .box = ih_ellipsoid_box(ellipsoid, scratch->slope_most_q20, INSIDE_Q14),
+        .shares = ih_ellipsoid_fractions(ellipsoid->semi_mm_q8),
+        .box = ih_ellipsoid_box(ellipsoid, scratch->slope_max_q20, INSIDE_Q14),
     };
     memset(&tally, 0, sizeof tally);
-    ih_tally_count(space, ellipsoid, &candidate.box, scratch, &tally.around);
-    for (int32_t first = 0; first < IH_TALLY_RAYS; first += 4) {
+    ih_ray_counts_count(space, ellipsoid, &candidate.box, scratch, &tally.around);
+    for (int32_t first = 0; first < IH_RAY_COUNTS_RAYS; first += 4) {
         uint64_t any; /* of four */
         memcpy(&any, &scratch->flag[first], sizeof any);
         for (int32_t slot = first; any != 0 && slot < first + 4; slot++) {

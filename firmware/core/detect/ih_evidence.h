@@ -15,7 +15,7 @@
  *        central ones 2^23.6, their determinants 2^48.2, times 2^12 2^60.2.
  * Error: counts are exact but where a ray passes within 2^-10 of a limit; rough within 0.03 mm, bulge
  *        within 0.06 mm.
- * Cost:  rays are counted in vectors (ih_tally), which leaves some 15 of 361; a crossing for some 33
+ * Cost:  rays are counted in vectors (ih_ray_counts), which leaves some 15 of 361; a crossing for some 33
  *        that may hit the ellipsoid: 33,000 instructions (x86-64-v3). Without vectors two products for
  *        each ray.
  */
@@ -26,8 +26,8 @@
 #include <stdint.h>
 
 #include "detect/ih_ellipsoid.h"
-#include "detect/ih_space.h"
-#include "detect/ih_tally.h"
+#include "detect/ih_rays.h"
+#include "detect/ih_ray_counts.h"
 
 enum ih_evidence_kind {
     IH_EVIDENCE_ON,         /* points within 20 mm of the ellipsoid: count */
@@ -66,8 +66,8 @@ struct ih_evidence {
     int32_t through_count, hit_count, front_count;
 };
 
-/* scratch must have been prepared from the space (ih_tally_prepare). */
-void ih_evidence_collect(const struct ih_space *space, struct ih_tally_scratch *scratch,
+/* scratch must have been prepared from the space (ih_ray_counts_prepare). */
+void ih_evidence_collect(const struct ih_rays *space, struct ih_ray_counts_scratch *scratch,
                          const struct ih_ellipsoid *ellipsoid, const int32_t start_mm_q8[3],
                          const struct ih_evidence_nest *nest, struct ih_evidence *out);
 

@@ -23,7 +23,7 @@ void ih_fit_params_default(struct ih_fit_params *params)
     *params = (struct ih_fit_params){.see_through_mm = 60, .step_count = IH_FIT_STEPS};
 }
 
-static void add_priors(struct ih_row_system *system, const struct ih_fit *fit)
+static void add_priors(struct ih_fit_equations_system *system, const struct ih_fit *fit)
 {
     for (int axis = 0; axis < 3; axis++) {
         int64_t moved_q8 = (int64_t)fit->ellipsoid.centre_mm_q8[axis] - fit->start_mm_q8[axis];
@@ -35,7 +35,7 @@ static void add_priors(struct ih_row_system *system, const struct ih_fit *fit)
 }
 
 /* Solve for the step, mm and hundredths of ln in Q16. */
-static void solve(const struct ih_row_system *system, int32_t step_q16[IH_FIT_UNKNOWNS])
+static void solve(const struct ih_fit_equations_system *system, int32_t step_q16[IH_FIT_UNKNOWNS])
 {
     int32_t a_q30[IH_CHOLESKY_PACKED(IH_FIT_UNKNOWNS)];
     int32_t right[IH_FIT_UNKNOWNS];
@@ -109,23 +109,24 @@ void ih_fit_begin(const struct ih_ellipsoid *start, struct ih_fit *out)
     }
 }
 
-void ih_fit_continue(const struct ih_space *space, const struct ih_fit_params *params,
-                     int32_t step_count, struct ih_row_scratch *scratch, struct ih_fit *fit)
+void ih_fit_continue(const struct ih_rays *space, const struct ih_fit_params *params,
+                     int32_t step_count, struct ih_fit_equations_scratch *scratch,
+                     struct ih_fit *fit)
 {
     const int32_t end = ih_min_s32(step_count, params->step_count);
     for (; fit->step_index < end; fit->step_index++) {
-        struct ih_row_system system;
+        struct ih_fit_equations_system system;
         int32_t step_q16[IH_FIT_UNKNOWNS];
-        ih_row_collect(space, &fit->ellipsoid, robust_mm[fit->step_index], params->see_through_mm,
-                       scratch, &system);
+        ih_fit_equations_collect(space, &fit->ellipsoid, robust_mm[fit->step_index],
+                                 params->see_through_mm, scratch, &system);
         add_priors(&system, fit);
         solve(&system, step_q16);
         take_step(fit, step_q16);
     }
 }
 
-void ih_fit_ellipsoid(const struct ih_space *space, const struct ih_fit_params *params,
-                      const struct ih_ellipsoid *start, struct ih_row_scratch *scratch,
+void ih_fit_ellipsoid(const struct ih_rays *space, const struct ih_fit_params *params,
+                      const struct ih_ellipsoid *start, struct ih_fit_equations_scratch *scratch,
                       struct ih_ellipsoid *out)
 {
     struct ih_fit fit;

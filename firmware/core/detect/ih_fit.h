@@ -16,10 +16,10 @@
  *        weight 0.5, not robust. A point may count both ways, as one on the ellipsoid's back does.
  *        Rays without a point say nothing here: hair is often dark. Priors: ln axes 0.09 around the
  *        mean head, centre 60 mm around the start on each axis, both against 6 mm for a point.
- *        What a step's points say is collected by ih_row. A step moves the centre at most 40 mm and
+ *        What a step's points say is collected by ih_scanline. A step moves the centre at most 40 mm and
  *        a logarithm 0.15 on each axis; the logarithms stay within 0.35 of the mean's.
  * Units: unknowns are mm and hundredths of ln, so that all derivatives are of order one.
- * Overflow: derivatives of what has a weight are below 3.6; what rows may have is in ih_row.h. A point adds
+ * Overflow: derivatives of what has a weight are below 3.6; what rows may have is in ih_fit_equations.h. A point adds
  *        at most 2.6 to an entry of the diagonal, its push 1.3: 361 of both
  *        1408, and scaled by 2^-11 to 0.69 in Q30. The right side's root mean square of weighted
  *        residuals is below 470 mm, in the solve's units 2^23.4.
@@ -30,7 +30,7 @@
  *        Against the truth in these scenes, starts 35 mm off: at most 5 mm for a mean head, 10 for
  *        one a tenth larger in every direction. A fifth of all dots anywhere between 0.5 and 2.5 m:
  *        17 mm (median of 30 fits; worst 56), because wrong dots behind the head push.
- * Cost:  steps x (ih_row, one Cholesky of 6). 0.12 million instructions a fit of six steps with 320 points
+ * Cost:  steps x (ih_scanline, one Cholesky of 6). 0.12 million instructions a fit of six steps with 320 points
  *        (x86-64-v3, gcc -O3, frames of both sequences).
  */
 #ifndef IH_FIT_H
@@ -39,8 +39,8 @@
 #include <stdint.h>
 
 #include "detect/ih_ellipsoid.h"
-#include "detect/ih_row.h"
-#include "detect/ih_space.h"
+#include "detect/ih_fit_equations.h"
+#include "detect/ih_rays.h"
 
 #define IH_FIT_STEPS 6
 
@@ -62,13 +62,14 @@ struct ih_fit {
 void ih_fit_begin(const struct ih_ellipsoid *start, struct ih_fit *out);
 
 /* Go on until so many steps are done, or params->step_count. scratch->rays must have been prepared from the
- * space (ih_row_prepare). */
-void ih_fit_continue(const struct ih_space *space, const struct ih_fit_params *params,
-                     int32_t step_count, struct ih_row_scratch *scratch, struct ih_fit *fit);
+ * space (ih_fit_equations_prepare). */
+void ih_fit_continue(const struct ih_rays *space, const struct ih_fit_params *params,
+                     int32_t step_count, struct ih_fit_equations_scratch *scratch,
+                     struct ih_fit *fit);
 
 /* All steps. */
-void ih_fit_ellipsoid(const struct ih_space *space, const struct ih_fit_params *params,
-                      const struct ih_ellipsoid *start, struct ih_row_scratch *scratch,
+void ih_fit_ellipsoid(const struct ih_rays *space, const struct ih_fit_params *params,
+                      const struct ih_ellipsoid *start, struct ih_fit_equations_scratch *scratch,
                       struct ih_ellipsoid *out);
 
 #endif

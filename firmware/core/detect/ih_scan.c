@@ -94,7 +94,7 @@ static void take(struct ih_scan_scratch *scratch, int32_t rank, int32_t spacing_
 }
 
 /* Rate the place behind a slot's point, if there is one and none is kept near it. */
-static void look_at(const struct ih_space *space, const struct ih_scan_params *params, int32_t slot,
+static void look_at(const struct ih_rays *space, const struct ih_scan_params *params, int32_t slot,
                     struct ih_scan_scratch *scratch, const struct ih_scan *out)
 {
     if (scratch->state[slot] != IH_SCAN_LEFT) {
@@ -109,11 +109,11 @@ static void look_at(const struct ih_space *space, const struct ih_scan_params *p
         }
     }
     scratch->rank[scratch->rank_count++] =
-        rank_of(ih_rating_q12(space, &scratch->rays, centre_mm_q8), slot);
+        rank_of(ih_template_score_q12(space, &scratch->rays, centre_mm_q8), slot);
 }
 
 /* The first seen point of each block of two by two slots. */
-static void begin(const struct ih_space *space, const struct ih_scan_params *params,
+static void begin(const struct ih_rays *space, const struct ih_scan_params *params,
                   struct ih_scan_scratch *scratch, const struct ih_scan *out)
 {
     scratch->rank_count = 0;
@@ -137,7 +137,7 @@ static void begin(const struct ih_space *space, const struct ih_scan_params *par
 }
 
 /* The up to 8 places around one are looked at. */
-static void widen(const struct ih_space *space, const struct ih_scan_params *params, int32_t slot,
+static void widen(const struct ih_rays *space, const struct ih_scan_params *params, int32_t slot,
                   struct ih_scan_scratch *scratch, const struct ih_scan *out)
 {
     const int32_t row = slot / IH_GRID;
@@ -151,10 +151,10 @@ static void widen(const struct ih_space *space, const struct ih_scan_params *par
 }
 
 /* What is the best when all around it was looked at is the best of those that were looked at. */
-void ih_scan_find(const struct ih_space *space, const struct ih_scan_params *params,
+void ih_scan_find(const struct ih_rays *space, const struct ih_scan_params *params,
                   struct ih_scan_scratch *scratch, struct ih_scan *out)
 {
-    ih_rating_prepare(space, &scratch->rays);
+    ih_template_prepare(space, &scratch->rays);
     out->place_count = 0;
     begin(space, params, scratch, out);
     while (out->place_count < params->place_max) {

@@ -12,13 +12,13 @@
  *        radii away, and which at the centre's depth are not more down than aside, in mm) of
  *            1 where the surface lies more than 60 mm behind the centre, 45/64 where the ray is empty,
  *            0 where it is unknown, else -38/64.
- *        Either mean: fewer than 8 rays count as 8. Ratings (ih_rating) are there to choose by: 16 bits
+ *        Either mean: fewer than 8 rays count as 8. Ratings (ih_template) are there to choose by: 16 bits
  *        will do. Of each block of two by two slots the
  *        first place is looked at, then those around what seems best of those that were looked at, until it
  *        is.
  * Overflow: ratings are below 2^13, times 512. A centre is a point plus at most deep_mm on an axis;
  *        squares of distances 2^53.6.
- * Error: a rating is what float64 says but for rays nearer to a limit than 16 bits tell (ih_rating.h),
+ * Error: a rating is what float64 says but for rays nearer to a limit than 16 bits tell (ih_template.h),
  *        which may be counted either way: 0.1 on the average if all of them were. Centres within 0.003 mm
  *        for slopes up to 1/2.
  * Cost:  a rating for half of the points. 0.24 million instructions for 320 points (x86-64-v3, gcc -O3,
@@ -30,8 +30,8 @@
 #include <stdint.h>
 
 #include "base/ih_config.h"
-#include "detect/ih_rating.h"
-#include "detect/ih_space.h"
+#include "detect/ih_template.h"
+#include "detect/ih_rays.h"
 
 /* Places kept; each later costs a fit. */
 #define IH_SCAN_MAX 8
@@ -60,12 +60,12 @@ struct ih_scan_scratch {
     uint8_t state[IH_SLOTS];           /* by slot: enum ih_scan_state */
     int32_t rank_count;
     int32_t rank[IH_SLOTS]; /* of what is rated and not out, in no order: rating and slot in one */
-    struct ih_rating_rays rays;
+    struct ih_template_rays rays;
 };
 
 void ih_scan_params_default(struct ih_scan_params *params);
 
-void ih_scan_find(const struct ih_space *space, const struct ih_scan_params *params,
+void ih_scan_find(const struct ih_rays *space, const struct ih_scan_params *params,
                   struct ih_scan_scratch *scratch, struct ih_scan *out);
 
 #endif

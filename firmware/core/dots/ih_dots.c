@@ -22,7 +22,7 @@
 #define CENTRE_COLUMNS CENTRE_SIDE
 #endif
 #define TWIN_PX_Q12 (3 * 4096)
-#define GROUP IH_BAND_GROUP
+#define GROUP IH_BANDPASS_GROUP
 _Static_assert(GROUP == IH_NOISE_BLOCK, "a group has one limit, that of its column of blocks");
 /* So many maxima are judged together at most. */
 #define CHUNK 64
@@ -44,12 +44,12 @@ void ih_dots_params_default(struct ih_dots_params *params)
 /* What of a row of the ring no row of R is laid over: zeros around the frame. */
 static void clear_outside(struct ih_dots_scratch *scratch, int32_t row)
 {
-    int16_t *response = scratch->rows.finding.response[row];
+    int16_t *response = scratch->rows.detection.response[row];
     const int32_t end =
         row < IH_DOTS_REACH ? 0 : IH_DOTS_SIDE + scratch->width; /* above the frame all of it */
     memset(response, 0, IH_DOTS_SIDE * sizeof response[0]);
     memset(&response[end], 0,
-           sizeof scratch->rows.finding.response[0] - (size_t)end * sizeof response[0]);
+           sizeof scratch->rows.detection.response[0] - (size_t)end * sizeof response[0]);
 }
 
 static bool has_twin(const struct ih_dots *dots, const struct ih_dot *dot)
@@ -88,7 +88,7 @@ static void insert_dot(struct ih_dots *out, struct ih_dot dot)
 static int16_t *response_row(struct ih_dots_scratch *scratch, int32_t v)
 {
     const uint32_t row = (uint32_t)(v + IH_DOTS_REACH);
-    return &scratch->rows.finding.response[row % IH_DOTS_ROWS][IH_DOTS_SIDE];
+    return &scratch->rows.detection.response[row % IH_DOTS_ROWS][IH_DOTS_SIDE];
 }
 
 /* Rows of R around some row are given as near[-IH_DOTS_REACH] to near[IH_DOTS_REACH], pixel 0 of each. */
@@ -105,15 +105,15 @@ static bool stands_alone(const int16_t *const *near, int32_t u, int32_t dv, int3
 {
     const int16_t *top = &near[dv - 4][u];
     const int16_t *bottom = &near[dv + 4][u];
-    int32_t most = ih_max_s32(top[0], bottom[0]);
-    most = ih_max_s32(most, beside_at(top, 2));
-    most = ih_max_s32(most, beside_at(bottom, 2));
-    most = ih_max_s32(most, beside_at(&near[dv - 3][u], 3));
-    most = ih_max_s32(most, beside_at(&near[dv + 3][u], 3));
-    most = ih_max_s32(most, beside_at(&near[dv - 2][u], 4));
-    most = ih_max_s32(most, beside_at(&near[dv][u], 4));
-    most = ih_max_s32(most, beside_at(&near[dv + 2][u], 4));
-    return most <= limit;
+    int32_t max = ih_max_s32(top[0], bottom[0]);
+    max = ih_max_s32(max, beside_at(top, 2));
+    max = ih_max_s32(max, beside_at(bottom, 2));
+    max = ih_max_s32(max, beside_at(&near[dv - 3][u], 3));
+    max = ih_max_s32(max, beside_at(&near[dv + 3][u], 3));
+    max = ih_max_s32(max, beside_at(&near[dv - 2][u], 4));
+    max = ih_max_s32(max, beside_at(&near[dv][u], 4));
+    max = ih_max_s32(max, beside_at(&near[dv + 2][u], 4));
+    return max <= limit;
 }
 
 /* Sum of R over the four pixels beside a peak; one outside the frame counts as the one opposite. */
@@ -129,9 +129,9 @@ static int32_t beside(const struct ih_dots_scratch *scratch, const int16_t *cons
 }
 
 /* A row's weights: (R - least)^2 where that is positive. */
-static inline int32_t weight(int16_t response, int32_t least)
+static inline int32_t weight(int16_t response, int32_t min)
 {
-    const int32_t above = ih_max_s32(0, response - least);
+    const int32_t above = ih_max_s32(0, response - min);
     return above * above;
 }
 
@@ -155,13 +155,13 @@ static struct ih_dot centred(const int16_t *const *near, int32_t u, int32_t v)
     for (int32_t i = 0; i < CENTRE_SIDE; i++) {
         row[i] = &near[i - CENTRE_REACH][u - CENTRE_REACH];
     }
-    const int32_t least = row[CENTRE_REACH][CENTRE_REACH] / 4;
+    const int32_t min = row[CENTRE_REACH][CENTRE_REACH] / 4;
     for (int32_t i = 0; i < CENTRE_COLUMNS; i++) {
-        const int32_t first = weight(row[0][i], least);
-        const int32_t second = weight(row[1][i], least);
-        const int32_t fourth = weight(row[3][i], least);
-        const int32_t fifth = weight(row[4][i], least);
-        column[i] = first + second + weight(row[2][i], least) + fourth + fifth;
+        const int32_t first = weight(row[0][i], min);
+        const int32_t second = weight(row[1][i], min);
+        const int32_t fourth = weight(row[3][i], min);
+        const int32_t fifth = weight(row[4][i], min);
+        column[i] = first + second + weight(row[2][i], min) + fourth + fifth;
         moment[i] = 2 * (fifth - first) + fourth - second;
     }
     int64_t weight_sum = 0;
@@ -177,7 +177,7 @@ static struct ih_dot centred(const int16_t *const *near, int32_t u, int32_t v)
 /* Of a row of nine 2^30.8, of 81 2^34; offsets of 4 in Q12 2^48. */
 static struct ih_dot centred_plateau(const int16_t *const *near, int32_t u, int32_t v)
 {
-    const int32_t least = near[0][u] / 4;
+    const int32_t min = near[0][u] / 4;
     int64_t weight_sum = 0;
     int64_t sum_u = 0;
     int64_t sum_v = 0;
@@ -185,7 +185,7 @@ static struct ih_dot centred_plateau(const int16_t *const *near, int32_t u, int3
         const int16_t *row = &near[dv][u];
         int64_t row_sum = 0;
         for (int32_t du = -PLATEAU_REACH; du <= PLATEAU_REACH; du++) {
-            const int32_t one = weight(row[du], least);
+            const int32_t one = weight(row[du], min);
             row_sum += one;
             sum_u += (int64_t)one * du;
         }
@@ -282,9 +282,9 @@ static void judge(const struct ih_dots_scratch *scratch, struct ih_dots *out, st
 }
 
 /* Where row v of R goes, and what is listed of it. */
-static struct ih_band_row *listed_of(struct ih_dots_scratch *scratch, int32_t v)
+static struct ih_bandpass_row *listed_of(struct ih_dots_scratch *scratch, int32_t v)
 {
-    return &scratch->rows.finding.listed[(uint32_t)v % IH_DOTS_ROWS];
+    return &scratch->rows.detection.listed[(uint32_t)v % IH_DOTS_ROWS];
 }
 
 /* What no threshold of row v is below, group by group, which are as wide as blocks of noise. It changes where v
@@ -293,7 +293,7 @@ static struct ih_band_row *listed_of(struct ih_dots_scratch *scratch, int32_t v)
 static uint32_t *limits_of(struct ih_dots_scratch *scratch, int32_t v)
 {
     const uint32_t cell = (uint32_t)(v + IH_NOISE_BLOCK / 2) / IH_NOISE_BLOCK;
-    return scratch->rows.finding.limit[cell % 2];
+    return scratch->rows.detection.limit[cell % 2];
 }
 
 static void lay_limits(struct ih_dots_scratch *scratch, int32_t v)
@@ -301,7 +301,7 @@ static void lay_limits(struct ih_dots_scratch *scratch, int32_t v)
     const struct ih_noise_row row = ih_noise_row(&scratch->noise, v);
     uint32_t *limit = limits_of(scratch, v);
     for (int32_t i = 0; i < row.columns; i++) {
-        const int32_t threshold = threshold_of(scratch, ih_noise_least(&row, i));
+        const int32_t threshold = threshold_of(scratch, ih_noise_min(&row, i));
         limit[i] = IH_WORD_BOTH((uint32_t)ih_clamp_s32(threshold, 0, INT16_MAX));
     }
 }
@@ -313,12 +313,12 @@ static inline ih_lanes maxima_of(const int16_t *above, const int16_t *middle, co
 {
     const ih_lanes peak = ih_lanes_load(middle);
     const ih_lanes before =
-        ih_lanes_greatest(ih_lanes_greatest(ih_lanes_load(&above[-1]), ih_lanes_load(above)),
-                          ih_lanes_greatest(ih_lanes_load(&above[1]), ih_lanes_load(&middle[-1])));
+        ih_lanes_max(ih_lanes_max(ih_lanes_load(&above[-1]), ih_lanes_load(above)),
+                     ih_lanes_max(ih_lanes_load(&above[1]), ih_lanes_load(&middle[-1])));
     const ih_lanes after =
-        ih_lanes_greatest(ih_lanes_greatest(ih_lanes_load(&below[-1]), ih_lanes_load(below)),
-                          ih_lanes_greatest(ih_lanes_load(&below[1]), ih_lanes_load(&middle[1])));
-    const ih_lanes passed = ih_lanes_greater(peak, ih_lanes_greatest(before, ih_lanes_both(limit)));
+        ih_lanes_max(ih_lanes_max(ih_lanes_load(&below[-1]), ih_lanes_load(below)),
+                     ih_lanes_max(ih_lanes_load(&below[1]), ih_lanes_load(&middle[1])));
+    const ih_lanes passed = ih_lanes_greater(peak, ih_lanes_max(before, ih_lanes_both(limit)));
     return ih_lanes_without(passed, ih_lanes_greater(after, peak));
 }
 #endif
@@ -370,14 +370,14 @@ static uint32_t mark_maxima(const int16_t *above, const int16_t *middle, const i
 /* Groups of a row that have maxima. */
 struct marked {
     int32_t count;
-    int16_t first[IH_BAND_GROUPS];
-    uint32_t maxima[IH_BAND_GROUPS];
+    int16_t first[IH_BANDPASS_GROUPS];
+    uint32_t maxima[IH_BANDPASS_GROUPS];
 };
 
 /* Of those that are listed; they are put down without asking. */
 static void mark_row(struct ih_dots_scratch *scratch, int32_t v, struct marked *out)
 {
-    const struct ih_band_row *listed = listed_of(scratch, v);
+    const struct ih_bandpass_row *listed = listed_of(scratch, v);
     const int16_t *above = response_row(scratch, v - 1);
     const int16_t *middle = response_row(scratch, v);
     const int16_t *below = response_row(scratch, v + 1);
@@ -443,21 +443,21 @@ static void advance(struct ih_dots_scratch *scratch, struct ih_dots *out)
 }
 
 /* Where the next row of R goes, with its limits. */
-static struct ih_band_row *next_row(struct ih_dots_scratch *scratch)
+static struct ih_bandpass_row *next_row(struct ih_dots_scratch *scratch)
 {
-    struct ih_band_row *next = listed_of(scratch, scratch->response_rows);
+    struct ih_bandpass_row *next = listed_of(scratch, scratch->response_rows);
     next->response = response_row(scratch, scratch->response_rows);
     next->limit = limits_of(scratch, scratch->response_rows);
     return next;
 }
 
-static uint16_t greatest(const uint16_t *sum, int32_t count)
+static uint16_t max(const uint16_t *sum, int32_t count)
 {
-    uint16_t most = 0;
+    uint16_t max = 0;
     for (int32_t i = 0; i < count; i++) {
-        most = sum[i] > most ? sum[i] : most;
+        max = sum[i] > max ? sum[i] : max;
     }
-    return most;
+    return max;
 }
 
 /* A row of blocks of which each column's sum is given, and what a bright column has more than. Where
@@ -465,7 +465,7 @@ static uint16_t greatest(const uint16_t *sum, int32_t count)
 static void mark_bright(struct ih_dots *out, int32_t block_row, const uint16_t *sum, int32_t width,
                         int32_t limit)
 {
-    if (greatest(sum, width) <= limit) {
+    if (max(sum, width) <= limit) {
         return;
     }
     for (int32_t first = 0; first < width; first += IH_DOTS_BLOCK) {
@@ -497,22 +497,22 @@ static void add_bright(struct ih_dots_scratch *scratch, int32_t v)
 static void finish_blocks(struct ih_dots_scratch *scratch, struct ih_dots *out, int32_t v,
                           bool is_in_band)
 {
-    const struct ih_band *band = &scratch->rows.finding.band;
+    const struct ih_bandpass *band = &scratch->rows.detection.band;
     const int32_t rows = v % IH_DOTS_BLOCK + 1;
     const int32_t grey = band->is_bytes ? 1 : 16; /* one level of 8 bits */
     const int32_t limit = scratch->params.bright_grey * grey * rows;
-    if (is_in_band && rows == IH_DOTS_BLOCK && !ih_band_is_any_above(band, 2 * limit)) {
+    if (is_in_band && rows == IH_DOTS_BLOCK && !ih_bandpass_is_any_above(band, 2 * limit)) {
         return;
     }
     if (is_in_band) {
-        ih_band_columns(band, rows, scratch->bright_column);
+        ih_bandpass_columns(band, rows, scratch->bright_column);
     }
     mark_bright(out, v / IH_DOTS_BLOCK, scratch->bright_column, scratch->width, limit);
 }
 
 static void repeat_row(struct ih_dots_scratch *scratch, struct ih_dots *out)
 {
-    if (ih_band_repeat(&scratch->rows.finding.band, next_row(scratch))) {
+    if (ih_bandpass_repeat(&scratch->rows.detection.band, next_row(scratch))) {
         advance(scratch, out);
     }
 }
@@ -532,7 +532,7 @@ void ih_dots_begin(struct ih_dots_scratch *scratch, struct ih_dots *out,
     for (int32_t row = 0; row < IH_DOTS_ROWS; row++) {
         clear_outside(scratch, row);
     }
-    scratch->floor = (int32_t)ih_mul_shift(params->floor_grey_q4, IH_BAND_UNIT, 4);
+    scratch->floor = (int32_t)ih_mul_shift(params->floor_grey_q4, IH_BANDPASS_UNIT, 4);
     lay_limits(scratch, 0);
     out->dot_count = 0;
     out->edge_count = 0;
@@ -541,27 +541,27 @@ void ih_dots_begin(struct ih_dots_scratch *scratch, struct ih_dots *out,
     memset(out->bright, 0, sizeof out->bright);
 }
 
-void ih_dots_row(struct ih_dots_scratch *scratch, struct ih_dots *out, const struct ih_row *row,
-                 const struct ih_row *ambient)
+void ih_dots_row(struct ih_dots_scratch *scratch, struct ih_dots *out,
+                 const struct ih_scanline *row, const struct ih_scanline *ambient)
 {
-    struct ih_band *band = &scratch->rows.finding.band;
+    struct ih_bandpass *band = &scratch->rows.detection.band;
     const int32_t v = scratch->rows_taken++;
-    const bool is_bytes = ambient == NULL && ih_row_is_bytes(row);
+    const bool is_bytes = ambient == NULL && ih_scanline_is_bytes(row);
     bool complete = false;
     if (v == 0) {
-        ih_band_begin(band, scratch->width, is_bytes);
+        ih_bandpass_begin(band, scratch->width, is_bytes);
     }
     if (is_bytes) {
-        complete = ih_band_push_bytes(band, row->samples, next_row(scratch));
+        complete = ih_bandpass_push_bytes(band, row->samples, next_row(scratch));
     } else {
-        ih_row_grey(row, scratch->width, scratch->grey_q4);
+        ih_scanline_grey(row, scratch->width, scratch->grey_q4);
         if (ambient != NULL) {
             add_bright(scratch, v);
-            ih_row_grey(ambient, scratch->width, scratch->ambient_q4);
+            ih_scanline_grey(ambient, scratch->width, scratch->ambient_q4);
             ih_noise_subtract(&scratch->noise, v, scratch->width, scratch->ambient_q4,
                               scratch->grey_q4);
         }
-        complete = ih_band_push_grey(band, scratch->grey_q4, next_row(scratch));
+        complete = ih_bandpass_push_grey(band, scratch->grey_q4, next_row(scratch));
     }
     if (v % IH_DOTS_BLOCK == IH_DOTS_BLOCK - 1 || v == scratch->height - 1) {
         finish_blocks(scratch, out, v, ambient == NULL);
@@ -569,20 +569,20 @@ void ih_dots_row(struct ih_dots_scratch *scratch, struct ih_dots *out, const str
     if (complete) {
         advance(scratch, out);
     }
-    for (int32_t i = 0; v == 0 && i < IH_BAND_REACH; i++) { /* repeat the first row upwards */
+    for (int32_t i = 0; v == 0 && i < IH_BANDPASS_REACH; i++) { /* repeat the first row upwards */
         repeat_row(scratch, out);
     }
 }
 
 void ih_dots_end(struct ih_dots_scratch *scratch, struct ih_dots *out)
 {
-    for (int32_t i = 0; i < IH_BAND_REACH; i++) { /* repeat the last row downwards */
+    for (int32_t i = 0; i < IH_BANDPASS_REACH; i++) { /* repeat the last row downwards */
         repeat_row(scratch, out);
     }
     for (int32_t i = 0; i < IH_DOTS_REACH; i++) { /* nothing below the frame */
-        memset(
-            scratch->rows.finding.response[(scratch->response_rows + IH_DOTS_REACH) % IH_DOTS_ROWS],
-            0, sizeof scratch->rows.finding.response[0]);
+        memset(scratch->rows.detection
+                   .response[(scratch->response_rows + IH_DOTS_REACH) % IH_DOTS_ROWS],
+               0, sizeof scratch->rows.detection.response[0]);
         advance(scratch, out);
     }
 }
@@ -595,15 +595,15 @@ void ih_dots_find(const struct ih_frame *frame, const struct ih_frame *ambient,
     ih_dots_begin(scratch, out, params, frame->width, frame->height, &scratch->noise);
     for (int32_t v = 0; v < frame->height; v++) {
         if (v + ROWS_AHEAD < frame->height) {
-            const struct ih_row ahead = ih_frame_row(frame, v + ROWS_AHEAD);
+            const struct ih_scanline ahead = ih_frame_scanline(frame, v + ROWS_AHEAD);
             const uint8_t *samples = ahead.samples;
             const int32_t bytes = frame->width * frame->bytes_per_sample;
             for (int32_t i = 0; i < bytes; i += IH_LINE_BYTES) {
                 __builtin_prefetch(&samples[i]); /* no function: gcc 12 leaves out calls of it */
             }
         }
-        struct ih_row row = ih_frame_row(frame, v);
-        struct ih_row under = ih_frame_row(ambient != NULL ? ambient : frame, v);
+        struct ih_scanline row = ih_frame_scanline(frame, v);
+        struct ih_scanline under = ih_frame_scanline(ambient != NULL ? ambient : frame, v);
         ih_dots_row(scratch, out, &row, ambient != NULL ? &under : NULL);
     }
     ih_dots_end(scratch, out);

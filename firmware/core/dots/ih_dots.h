@@ -5,7 +5,7 @@
  *        where the map says so, before anything but the map of over-exposed blocks.
  * Out:   dots by row, then column: sub-pixel centres in the frame's own (distorted) pixels; a map
  *        of over-exposed blocks; counters of what was refused or dropped.
- * Way:   a dot is a local maximum (3x3) of the band-pass's response R (ih_band) that
+ * Way:   a dot is a local maximum (3x3) of the band-pass's response R (ih_bandpass) that
  *        1. is above max(floor, gain * noise at that place);
  *        2. stands alone: none of 16 places on a ring of radius 4 around it has more than
  *           ring_max of it. Edges, stripes and texture fail here;
@@ -20,7 +20,7 @@
  *        Of two centres less than 3 px apart in u and v the first stays.
  *        The threshold falls with the place's own noise, so that dots in quiet places are not lost
  *        to texture elsewhere; tests 2 and 3 keep what is no dot out, so that it can be low.
- * Cost:  one pass; ih_band's rows and 16 of R. About 26 operations of 16 bits per pixel, a few
+ * Cost:  one pass; ih_bandpass's rows and 16 of R. About 26 operations of 16 bits per pixel, a few
  *        hundred for each of some thousand maxima. Of four rows the maxima are judged together, each by
  *        all tests but the last: what a processor cannot foresee it shall not guess.
  * Error: centres within 0.01 px of the float64 reference.
@@ -34,7 +34,7 @@
 
 #include "base/ih_config.h"
 #include "base/ih_types.h"
-#include "dots/ih_band.h"
+#include "dots/ih_bandpass.h"
 #include "dots/ih_noise.h"
 
 /* Most dots kept per frame. Each costs 12 bytes here and 12 in ih_labels. */
@@ -94,13 +94,13 @@ struct ih_dots_scratch {
     union {
         struct ih_noise_scratch measuring;
         struct {
-            struct ih_band band;
+            struct ih_bandpass band;
             /* Ring; row v is at (v + IH_DOTS_REACH) % IH_DOTS_ROWS. Zeros around the frame. */
             _Alignas(IH_ALIGNMENT) int16_t response[IH_DOTS_ROWS][IH_DOTS_ROW_SIZE];
-            struct ih_band_row listed[IH_DOTS_ROWS]; /* row v is at v % IH_DOTS_ROWS */
+            struct ih_bandpass_row listed[IH_DOTS_ROWS]; /* row v is at v % IH_DOTS_ROWS */
             /* For the rows of R between two rows of blocks' centres, and for those between the next two. */
-            uint32_t limit[2][IH_BAND_GROUPS];
-        } finding;
+            uint32_t limit[2][IH_BANDPASS_GROUPS];
+        } detection;
     } rows;
 };
 
@@ -112,8 +112,8 @@ void ih_dots_begin(struct ih_dots_scratch *scratch, struct ih_dots *out,
                    const struct ih_dots_params *params, int32_t width, int32_t height,
                    const struct ih_noise *noise);
 /* All rows have one format. ambient: the same row of the ambient frame; or NULL, for all rows. */
-void ih_dots_row(struct ih_dots_scratch *scratch, struct ih_dots *out, const struct ih_row *row,
-                 const struct ih_row *ambient);
+void ih_dots_row(struct ih_dots_scratch *scratch, struct ih_dots *out,
+                 const struct ih_scanline *row, const struct ih_scanline *ambient);
 void ih_dots_end(struct ih_dots_scratch *scratch, struct ih_dots *out);
 
 /* The whole frame in one call: noise, begin, rows, end. ambient: of the same width and height, or

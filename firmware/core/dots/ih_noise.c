@@ -120,23 +120,23 @@ static inline ih_lanes halved(const struct group *group, ih_lanes low, ih_lanes 
 /* The size of that rank, from 0; -128 stands for 0. */
 static inline void search(struct group group[2])
 {
-    const ih_lanes least = IH_LANES_OP(set1_epi8)(INT8_MIN);
-    ih_lanes half = least;
-    ih_lanes first = least;
-    ih_lanes second = least;
+    const ih_lanes min = IH_LANES_OP(set1_epi8)(INT8_MIN);
+    ih_lanes half = min;
+    ih_lanes first = min;
+    ih_lanes second = min;
     for (int32_t bit = 0; bit < 8; bit++) {
         first = halved(&group[0], first, half);
         second = halved(&group[1], second, half);
         half = IH_LANES_OP(srli_epi16)(half, 1); /* nothing comes over from the byte above */
     }
-    group[0].median = IH_LANES_OP(add_epi8)(first, least);
-    group[1].median = IH_LANES_OP(add_epi8)(second, least);
+    group[0].median = IH_LANES_OP(add_epi8)(first, min);
+    group[1].median = IH_LANES_OP(add_epi8)(second, min);
 }
 
 static inline bool is_any_large(const struct group group[2])
 {
-    const ih_lanes most = IH_LANES_OP(max_epu8)(group[0].median, group[1].median);
-    return ih_lanes_is_any(IH_LANES_OP(cmpeq_epi8)(most, IH_LANES_OP(set1_epi8)(-1)));
+    const ih_lanes max = IH_LANES_OP(max_epu8)(group[0].median, group[1].median);
+    return ih_lanes_is_any(IH_LANES_OP(cmpeq_epi8)(max, IH_LANES_OP(set1_epi8)(-1)));
 }
 
 static inline void put_medians(const struct group group[2], uint8_t median[8 * ABREAST])
@@ -428,7 +428,7 @@ void ih_noise_subtract(const struct ih_noise *noise, int32_t v, int32_t width,
 /* The first row that is looked at in a row of blocks, even if the frame ends above it. */
 static int32_t first_row(int32_t block_row, int32_t height)
 {
-    return ih_min_s32(block_row * IH_NOISE_BLOCK + IH_BAND_REACH, height - 1);
+    return ih_min_s32(block_row * IH_NOISE_BLOCK + IH_BANDPASS_REACH, height - 1);
 }
 
 /* Are there so many, and does the frame reach this one? */
@@ -441,56 +441,56 @@ static bool is_sampled(int32_t count, int32_t v, int32_t height)
 static void take_rows(const struct ih_frame *frame, const struct ih_frame *ambient, int32_t v,
                       struct ih_noise_scratch *scratch)
 {
-    struct ih_row row = ih_frame_row(frame, v);
-    struct ih_row under = ih_frame_row(ambient, v);
-    ih_row_grey(&row, frame->width, scratch->grey_q4);
-    ih_row_grey(&under, frame->width, scratch->ambient_q4);
+    struct ih_scanline row = ih_frame_scanline(frame, v);
+    struct ih_scanline under = ih_frame_scanline(ambient, v);
+    ih_scanline_grey(&row, frame->width, scratch->grey_q4);
+    ih_scanline_grey(&under, frame->width, scratch->ambient_q4);
 }
 
 /* R of row v as it is in the frame. */
-static void filter_bytes(const struct ih_frame *frame, int32_t v, struct ih_band *band,
+static void filter_bytes(const struct ih_frame *frame, int32_t v, struct ih_bandpass *band,
                          int16_t *response)
 {
     const uint8_t *samples = frame->samples;
-    const uint8_t *row[IH_BAND_ROWS];
-    for (int32_t i = 0; i < IH_BAND_ROWS; i++) {
-        const int32_t at = ih_clamp_s32(v + i - IH_BAND_REACH, 0, frame->height - 1);
+    const uint8_t *row[IH_BANDPASS_ROWS];
+    for (int32_t i = 0; i < IH_BANDPASS_ROWS; i++) {
+        const int32_t at = ih_clamp_s32(v + i - IH_BANDPASS_REACH, 0, frame->height - 1);
         row[i] = &samples[(size_t)at * (size_t)frame->stride_bytes];
     }
-    const bool is_last = v + IH_NOISE_STEP + IH_BAND_REACH >= frame->height;
-    ih_band_bytes(band, row, frame->width,
-                  is_last ? 0 : IH_NOISE_STEP * (size_t)frame->stride_bytes, response);
+    const bool is_last = v + IH_NOISE_STEP + IH_BANDPASS_REACH >= frame->height;
+    ih_bandpass_bytes(band, row, frame->width,
+                      is_last ? 0 : IH_NOISE_STEP * (size_t)frame->stride_bytes, response);
 }
 
 /* R of row v, without the ambient frame, if there is one, where the map says so. */
 static void filter_grey(const struct ih_frame *frame, const struct ih_frame *ambient, int32_t v,
                         const struct ih_noise *noise, struct ih_noise_scratch *scratch,
-                        struct ih_band_row *out)
+                        struct ih_bandpass_row *out)
 {
-    ih_band_begin(&scratch->band, frame->width, false);
-    for (int32_t i = -IH_BAND_REACH; i <= IH_BAND_REACH; i++) {
+    ih_bandpass_begin(&scratch->band, frame->width, false);
+    for (int32_t i = -IH_BANDPASS_REACH; i <= IH_BANDPASS_REACH; i++) {
         const int32_t at = ih_clamp_s32(v + i, 0, frame->height - 1);
         if (ambient != NULL) {
             take_rows(frame, ambient, at, scratch);
             ih_noise_subtract(noise, at, frame->width, scratch->ambient_q4, scratch->grey_q4);
         } else {
-            const struct ih_row row = ih_frame_row(frame, at);
-            ih_row_grey(&row, frame->width, scratch->grey_q4);
+            const struct ih_scanline row = ih_frame_scanline(frame, at);
+            ih_scanline_grey(&row, frame->width, scratch->grey_q4);
         }
-        (void)ih_band_push_grey(&scratch->band, scratch->grey_q4, out);
+        (void)ih_bandpass_push_grey(&scratch->band, scratch->grey_q4, out);
     }
 }
 
 static void measure(const struct ih_frame *frame, const struct ih_frame *ambient,
                     struct ih_noise_scratch *scratch, struct ih_noise *out)
 {
-    const struct ih_row row = ih_frame_row(frame, 0);
-    const bool is_bytes = ambient == NULL && ih_row_is_bytes(&row);
+    const struct ih_scanline row = ih_frame_scanline(frame, 0);
+    const bool is_bytes = ambient == NULL && ih_scanline_is_bytes(&row);
     for (int32_t block_row = 0; block_row < out->rows; block_row++) {
         int32_t count = 0;
         for (int32_t v = first_row(block_row, frame->height); is_sampled(count, v, frame->height);
              v += IH_NOISE_STEP) {
-            struct ih_band_row filtered = {.response = scratch->response[count++]};
+            struct ih_bandpass_row filtered = {.response = scratch->response[count++]};
             if (is_bytes) {
                 filter_bytes(frame, v, &scratch->band, filtered.response);
             } else {
@@ -506,7 +506,7 @@ static void halve_difference(struct ih_noise_scratch *scratch)
 {
     uint16_t *grey_q4 = scratch->grey_q4;
     for (int32_t u = 0; u < scratch->band.width; u++) {
-        grey_q4[u] = (uint16_t)((grey_q4[u] + IH_BAND_FULL_Q4 - scratch->ambient_q4[u]) >> 1);
+        grey_q4[u] = (uint16_t)((grey_q4[u] + IH_BANDPASS_FULL_Q4 - scratch->ambient_q4[u]) >> 1);
     }
 }
 
@@ -514,7 +514,7 @@ static void halve_difference(struct ih_noise_scratch *scratch)
 static void add_row(const uint16_t *grey_q4, int32_t width, int32_t sum[IH_NOISE_BLOCKS_X])
 {
     for (int32_t u = 0; u < width; u++) {
-        sum[u / IH_NOISE_BLOCK] += grey_q4[u] - IH_BAND_FULL_Q4 / 2;
+        sum[u / IH_NOISE_BLOCK] += grey_q4[u] - IH_BANDPASS_FULL_Q4 / 2;
     }
 }
 
@@ -527,15 +527,15 @@ static void choose(const struct ih_frame *frame, const struct ih_frame *ambient,
     int32_t count = 0;
     for (int32_t v = first_row(block_row, frame->height); is_sampled(count, v, frame->height);
          v += IH_NOISE_STEP) {
-        struct ih_band_row filtered = {.response = scratch->response[count]};
-        ih_band_begin(&scratch->band, frame->width, false);
-        for (int32_t at = v - IH_BAND_REACH; at <= v + IH_BAND_REACH; at++) {
+        struct ih_bandpass_row filtered = {.response = scratch->response[count]};
+        ih_bandpass_begin(&scratch->band, frame->width, false);
+        for (int32_t at = v - IH_BANDPASS_REACH; at <= v + IH_BANDPASS_REACH; at++) {
             take_rows(frame, ambient, ih_clamp_s32(at, 0, frame->height - 1), scratch);
             halve_difference(scratch);
             if (at == v) {
                 add_row(scratch->grey_q4, frame->width, half_sum);
             }
-            (void)ih_band_push_grey(&scratch->band, scratch->grey_q4, &filtered);
+            (void)ih_bandpass_push_grey(&scratch->band, scratch->grey_q4, &filtered);
         }
         count++;
     }
@@ -633,12 +633,12 @@ int32_t ih_noise_at(const struct ih_noise_row *row, int32_t u)
     return between(left, right, cell.part);
 }
 
-int32_t ih_noise_least(const struct ih_noise_row *row, int32_t block)
+int32_t ih_noise_min(const struct ih_noise_row *row, int32_t block)
 {
     const int32_t last = ih_min_s32(block + 1, row->columns - 1);
-    int32_t least = ih_min_s32(row->above[block], row->below[block]);
+    int32_t min = ih_min_s32(row->above[block], row->below[block]);
     for (int32_t i = ih_max_s32(block - 1, 0); i <= last; i++) {
-        least = ih_min_s32(least, ih_min_s32(row->above[i], row->below[i]));
+        min = ih_min_s32(min, ih_min_s32(row->above[i], row->below[i]));
     }
-    return least;
+    return min;
 }

@@ -3,7 +3,7 @@
  * In:    a frame; if there is one, the ambient frame, taken with the laser off shortly before.
  * Out:   a map of blocks of IH_NOISE_BLOCK pixels a side: the noise of the band-pass's response, and
  *        whether the ambient frame is subtracted there.
- * Way:   median of |R| (ih_band) over every pixel of the rows 4, 20, 36, ... that pass through a
+ * Way:   median of |R| (ih_bandpass) over every pixel of the rows 4, 20, 36, ... that pass through a
  *        block: a dot covers a fiftieth of it and does not move its median. Then 1-2-1 in both
  *        directions, outermost blocks repeated. Between the blocks' centres ih_noise_at goes
  *        linearly, so there are no seams.
@@ -15,7 +15,7 @@
  *        levels are left; what is below 0 then, the dark ghost of something that moved, is 0. The
  *        noise is that of what is left, in these blocks 19/16 of it: it is white, and has more
  *        lonely maxima than texture.
- * Cost:  sums of half of the frame's rows, ih_band's response of a sixteenth; three times that with an
+ * Cost:  sums of half of the frame's rows, ih_bandpass's response of a sixteenth; three times that with an
  *        ambient frame.
  * Range: as R; 19/16 of it 22,145. Whole units of R.
  */
@@ -26,7 +26,7 @@
 
 #include "base/ih_config.h"
 #include "base/ih_types.h"
-#include "dots/ih_band.h"
+#include "dots/ih_bandpass.h"
 
 #define IH_NOISE_BLOCK 32
 #define IH_NOISE_STEP 16 /* between the rows that are looked at */
@@ -47,7 +47,7 @@ struct ih_noise_row {
 };
 
 struct ih_noise_scratch {
-    struct ih_band band;
+    struct ih_bandpass band;
     uint16_t grey_q4[IH_FRAME_WIDTH_MAX], ambient_q4[IH_FRAME_WIDTH_MAX];
     int16_t response[IH_NOISE_BLOCK / IH_NOISE_STEP][IH_FRAME_WIDTH_MAX];
 };
@@ -66,6 +66,6 @@ int32_t ih_noise_at(const struct ih_noise_row *row, int32_t u);
 
 /* No pixel of a column of blocks has less noise in this row, nor in the others that lie between the centres of the
  * same blocks: those change where v is IH_NOISE_BLOCK / 2 more than a multiple of IH_NOISE_BLOCK. */
-int32_t ih_noise_least(const struct ih_noise_row *row, int32_t block);
+int32_t ih_noise_min(const struct ih_noise_row *row, int32_t block);
 
 #endif

@@ -4,7 +4,7 @@
 
 #include "base/ih_fix.h"
 #include "base/ih_range.h"
-#include "labels/ih_lens.h"
+#include "labels/ih_undistort.h"
 
 /* A dot's centre may be off by this along the line and still belong to the working range. */
 #define RANGE_MARGIN_PX_Q12 2048
@@ -42,7 +42,7 @@ static void place_dot(struct ih_labels_scratch *scratch, int32_t dot, int32_t u_
 static void undistort_dots(const struct ih_dots *dots, const struct ih_rig *rig,
                            struct ih_labels_scratch *scratch)
 {
-    ih_lens_undo(dots, rig, scratch->u_px_q12, scratch->v_px_q12);
+    ih_undistort_dots(dots, rig, scratch->u_px_q12, scratch->v_px_q12);
     for (int32_t i = 0; i < dots->dot_count; i++) {
         place_dot(scratch, i, scratch->u_px_q12[i], scratch->v_px_q12[i]);
         scratch->slot_of_dot[i] = IH_NONE;
@@ -342,16 +342,16 @@ static bool find_seed(const struct ih_rig *rig, const struct ih_labels_scratch *
         begin_search(scratch, &rig->line[slot[3]], slot[3], params, &search);
         try_corners(rig, scratch, slot, &search);
     }
-    const int64_t most = ih_max_s32(params->seed_max_px_q12, 0);
-    if (search.best2 >= (uint64_t)(most * most)) {
+    const int64_t max = ih_max_s32(params->seed_max_px_q12, 0);
+    if (search.best2 >= (uint64_t)(max * max)) {
         return false;
     }
     const int64_t best = search.best2 <= UINT32_MAX ? ih_isqrt_u32((uint32_t)search.best2)
                                                     : ih_isqrt_u64(search.best2);
-    const int64_t least = ih_max_s64(best + params->seed_margin_px_q12 + 1, 0); /* of the second */
+    const int64_t min = ih_max_s64(best + params->seed_margin_px_q12 + 1, 0); /* of the second */
     memcpy(out->choice, search.choice, sizeof out->choice);
     out->error_px_q12 = (int32_t)best;
-    return search.second2 >= (uint64_t)(least * least);
+    return search.second2 >= (uint64_t)(min * min);
 }
 
 /* The order of offers: by error, then slot, of which there are at most 2^9. Of errors beyond 1024 px the slot alone decides. */

@@ -69,7 +69,7 @@ static bool ellipse_of_moments(const struct ih_moments *m, int32_t x0_q8, int32_
 {
     int64_t sign = m->area2_q16 < 0 ? -1 : 1;
     int64_t area2_q16 = sign * m->area2_q16;
-    if (area2_q16 < IH_PARTS_AREA2_MIN_Q16) {
+    if (area2_q16 < IH_ARCS_AREA2_MIN_Q16) {
         return false;
     }
     int64_t x_q16 = quotient_q16(sign * m->x_q24, 3 * area2_q16);
@@ -115,7 +115,7 @@ static int32_t half_q9(int32_t value_q9)
     return (int32_t)ih_shift_round(value_q9, 1);
 }
 
-static struct ih_moments contour_moments(const struct ih_cuts *cuts,
+static struct ih_moments contour_moments(const struct ih_contours *cuts,
                                          const struct ih_contour *contour, struct ih_vertex place)
 {
     const struct ih_vertex *vertex = &cuts->vertex[contour->first];
@@ -129,7 +129,7 @@ static struct ih_moments contour_moments(const struct ih_cuts *cuts,
     return m;
 }
 
-bool ih_ellipse_of_contour(const struct ih_cuts *cuts, const struct ih_contour *contour,
+bool ih_ellipse_of_contour(const struct ih_contours *cuts, const struct ih_contour *contour,
                            struct ih_ellipse *out)
 {
     struct ih_vertex place = cuts->vertex[contour->first];
@@ -139,7 +139,7 @@ bool ih_ellipse_of_contour(const struct ih_cuts *cuts, const struct ih_contour *
     return ellipse_of_moments(&m, place.x_q9 / 2, place.y_q9 / 2, out) && set_ratio(out);
 }
 
-int32_t ih_ellipse_winding(const struct ih_cuts *cuts, const struct ih_contour *contour,
+int32_t ih_ellipse_winding(const struct ih_contours *cuts, const struct ih_contour *contour,
                            struct ih_vertex place)
 {
     const struct ih_vertex *vertex = &cuts->vertex[contour->first];
@@ -159,13 +159,13 @@ struct spot {
     int32_t x_q8, y_q8;
 };
 
-static struct spot seen_from(const struct ih_parts *parts, int32_t k, struct ih_vertex place)
+static struct spot seen_from(const struct ih_arcs *parts, int32_t k, struct ih_vertex place)
 {
     return (struct spot){parts->x_q8[k] - half_q9(place.x_q9),
                          parts->y_q8[k] - half_q9(place.y_q9)};
 }
 
-static void accumulate_winding(const struct ih_parts *parts, struct ih_vertex place,
+static void accumulate_winding(const struct ih_arcs *parts, struct ih_vertex place,
                                struct ih_ellipse_scratch *scratch)
 {
     const int32_t y_q8 = half_q9(place.y_q9);
@@ -183,7 +183,7 @@ static void accumulate_winding(const struct ih_parts *parts, struct ih_vertex pl
 }
 
 /* Does the part, closed by its chord, wind round the place once? */
-static bool winds_round(const struct ih_parts *parts, const struct ih_part *part,
+static bool winds_round(const struct ih_arcs *parts, const struct ih_arc *part,
                         struct ih_vertex place, const struct ih_ellipse_scratch *scratch)
 {
     const int32_t from = part->from, to = part->from + part->steps;
@@ -205,7 +205,7 @@ static inline int32_t odd_half(int32_t px, int32_t py, int32_t qx, int32_t qy)
 }
 
 /* All that is cut off for a part; compilers turn the loop into vectors. */
-static int32_t odd_halves(const struct ih_parts *parts, const struct ih_part *part,
+static int32_t odd_halves(const struct ih_arcs *parts, const struct ih_arc *part,
                           struct ih_vertex place)
 {
     const int32_t x_q8 = half_q9(place.x_q9);
@@ -222,10 +222,10 @@ static int32_t odd_halves(const struct ih_parts *parts, const struct ih_part *pa
 
 /* Moments of the part, closed by its chord, about the middle of the outline: but for x y, which is twice as
  * much. */
-IH_WRAPPING static struct ih_moments middle_moments(const struct ih_parts *parts,
-                                                    const struct ih_part *part)
+IH_WRAPPING static struct ih_moments middle_moments(const struct ih_arcs *parts,
+                                                    const struct ih_arc *part)
 {
-    const struct ih_parts_sums *s = &parts->sums;
+    const struct ih_arcs_sums *s = &parts->sums;
     const int32_t from = part->from, to = part->from + part->steps;
     const int64_t px = parts->dx_q8[to], py = parts->dy_q8[to];
     const int64_t qx = parts->dx_q8[from], qy = parts->dy_q8[from];
@@ -244,7 +244,7 @@ IH_WRAPPING static struct ih_moments middle_moments(const struct ih_parts *parts
 /* Moments of the part, closed by its chord, about the place: what add_edge sums up. The place is c from the
  * middle, as near as the outline, 2^12.6: with twice the area below 2^31 first moments are below 2^45.2, and
  * all terms together below 2^62. */
-static struct ih_moments part_moments(const struct ih_parts *parts, const struct ih_part *part,
+static struct ih_moments part_moments(const struct ih_arcs *parts, const struct ih_arc *part,
                                       struct ih_vertex place)
 {
     const struct ih_moments middle = middle_moments(parts, part);
@@ -263,40 +263,40 @@ static struct ih_moments part_moments(const struct ih_parts *parts, const struct
 }
 
 /* Is the part, which winds round the place, an ellipse? */
-static bool measure_part(const struct ih_parts *parts, const struct ih_part *part,
+static bool measure_part(const struct ih_arcs *parts, const struct ih_arc *part,
                          struct ih_vertex place, const struct ih_ellipse_params *params,
                          struct ih_ellipse *out)
 {
     const struct ih_moments m = part_moments(parts, part, place);
     if (!ellipse_of_moments(&m, half_q9(place.x_q9), half_q9(place.y_q9), out) ||
-        out->area_q16 <= 0 || out->shape_q16 < IH_PARTS_SHAPE_MIN_Q16 ||
+        out->area_q16 <= 0 || out->shape_q16 < IH_ARCS_SHAPE_MIN_Q16 ||
         out->shape_q16 > params->shape_max_q16 || !set_ratio(out) ||
         out->ratio_q16 > params->ratio_part_max_q16) {
         return false;
     }
-    const int32_t chord2_q16 = ih_parts_chord2_q16(parts, part->from, part->from + part->steps);
-    out->merit_q8 = ih_parts_merit_q8(parts->arc_q8[part->steps],
-                                      (int32_t)ih_isqrt_u64((uint64_t)chord2_q16), out->shape_q16);
+    const int32_t chord2_q16 = ih_arcs_chord2_q16(parts, part->from, part->from + part->steps);
+    out->merit_q8 = ih_arcs_merit_q8(parts->arc_q8[part->steps],
+                                     (int32_t)ih_isqrt_u64((uint64_t)chord2_q16), out->shape_q16);
     IH_IN_RANGE(out->merit_q8, INT32_MIN, part->merit_max_q8);
     return true;
 }
 
 /* The part that may have the most merit of those that wind round the place; IH_NONE when none does. */
-static int32_t most_promising(const struct ih_parts *parts, struct ih_vertex place,
-                              const struct ih_ellipse_scratch *scratch)
+static int32_t max_promising(const struct ih_arcs *parts, struct ih_vertex place,
+                             const struct ih_ellipse_scratch *scratch)
 {
-    int32_t most = IH_NONE;
+    int32_t max = IH_NONE;
     for (int32_t i = 0; i < parts->part_count; i++) {
-        const struct ih_part *part = &parts->part[i];
-        if ((most == IH_NONE || part->merit_max_q8 > parts->part[most].merit_max_q8) &&
+        const struct ih_arc *part = &parts->part[i];
+        if ((max == IH_NONE || part->merit_max_q8 > parts->part[max].merit_max_q8) &&
             winds_round(parts, part, place, scratch)) {
-            most = i;
+            max = i;
         }
     }
-    return most;
+    return max;
 }
 
-bool ih_ellipse_of_part(const struct ih_parts *parts, struct ih_vertex place,
+bool ih_ellipse_of_part(const struct ih_arcs *parts, struct ih_vertex place,
                         const struct ih_ellipse_params *params, struct ih_ellipse_scratch *scratch,
                         struct ih_ellipse *out)
 {
@@ -304,13 +304,13 @@ bool ih_ellipse_of_part(const struct ih_parts *parts, struct ih_vertex place,
         return false;
     }
     accumulate_winding(parts, place, scratch);
-    const int32_t first = most_promising(parts, place, scratch);
+    const int32_t first = max_promising(parts, place, scratch);
     if (first == IH_NONE) {
         return false;
     }
     int32_t found = measure_part(parts, &parts->part[first], place, params, out) ? first : IH_NONE;
     for (int32_t i = 0; i < parts->part_count; i++) {
-        const struct ih_part *part = &parts->part[i];
+        const struct ih_arc *part = &parts->part[i];
         struct ih_ellipse ellipse;
         if (i != first && (found == IH_NONE || part->merit_max_q8 >= out->merit_q8) &&
             winds_round(parts, part, place, scratch) &&

@@ -4,10 +4,10 @@
  * In:    a polygon on the grid; for the part its outline, and a place that it must surround.
  * Out:   area, centre and second moments; shape = 4 pi sqrt(det) / area, det that of the
  *        covariance: 1 for an ellipse and greater for everything else.
- * Way:   moments are sums over the edges. Of all parts (IH_PARTS_STEPS_MIN of the outline's steps at
+ * Way:   moments are sums over the edges. Of all parts (IH_ARCS_STEPS_MIN of the outline's steps at
  *        least, chord <= chord_max arc) that wind round the place and are elliptical, the one with the
  *        greatest arc - 1.6 chord - 8 (shape - 1) arc is taken, of equal ones the first, the shortest
- *        of those. ih_parts says which may be some and what they can have at the most: the most
+ *        of those. ih_arcs says which may be some and what they can have at the most: the most
  *        promising one is measured first, then only those that may have as much.
  *        No simple polygon has a shape below 1: a part with less (1/256 is left for rounding)
  *        crosses its own chord and is refused, as is an area below half a grid cell.
@@ -15,7 +15,7 @@
  *        2^14.1. An edge's cross product is at most |p| |edge|, its second-order factor at most
  *        3 * 2^27.1. Edges of a contour are shorter than 1.42 steps = 2^8.6: 2048 terms of
  *        2^(14.1 + 8.6 + 28.7) sum below 2^62.4. However many points a resampled one has, its edges,
- *        twice round, add up to at most 2 IH_PARTS_VERTICES_MAX 1.42 steps = 2^19.1: terms below
+ *        twice round, add up to at most 2 IH_ARCS_VERTICES_MAX 1.42 steps = 2^19.1: terms below
  *        2^61.9. About the middle of an outline, from where sums are moved to the place, coordinates
  *        are half as great.
  * Cost:  a closed contour: 40 operations a vertex. A part: some 100, 20 in 32 bits a step, and eight
@@ -27,8 +27,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "nests/ih_cuts.h"
-#include "nests/ih_parts.h"
+#include "nests/ih_contours.h"
+#include "nests/ih_arcs.h"
 
 /* In grid steps. Second moments are central, per area. */
 struct ih_ellipse {
@@ -48,22 +48,22 @@ struct ih_moments {
 };
 
 struct ih_ellipse_scratch {
-    int32_t winding[2 * IH_PARTS_POINTS_MAX]; /* of an outline's edges before each point */
-    struct ih_part part;                      /* the one that was found */
+    int32_t winding[2 * IH_ARCS_POINTS_MAX]; /* of an outline's edges before each point */
+    struct ih_arc part;                      /* the one that was found */
 };
 
 /* Moments of a closed contour. False when it has no area. */
-bool ih_ellipse_of_contour(const struct ih_cuts *cuts, const struct ih_contour *contour,
+bool ih_ellipse_of_contour(const struct ih_contours *cuts, const struct ih_contour *contour,
                            struct ih_ellipse *out);
 
 /* How often the contour, closed by a chord if it is open, winds round the place: 1 around a
  * minimum, -1 around a maximum, 0 beside. */
-int32_t ih_ellipse_winding(const struct ih_cuts *cuts, const struct ih_contour *contour,
+int32_t ih_ellipse_winding(const struct ih_contours *cuts, const struct ih_contour *contour,
                            struct ih_vertex place);
 
 /* The best elliptical part of an outline around the place, a whole number of Q8 as a node is; params
  * as the outline was made with. False when none. */
-bool ih_ellipse_of_part(const struct ih_parts *parts, struct ih_vertex place,
+bool ih_ellipse_of_part(const struct ih_arcs *parts, struct ih_vertex place,
                         const struct ih_ellipse_params *params, struct ih_ellipse_scratch *scratch,
                         struct ih_ellipse *out);
 

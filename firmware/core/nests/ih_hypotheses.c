@@ -1,405 +1,377 @@
 #include "nests/ih_hypotheses.h"
 
-#include <string.h>
+#include <stdbool.h>
+#include <stddef.h>
 
 #include "base/ih_fix.h"
 #include "base/ih_range.h"
+#include "nests/ih_ellipse.h"
 
-/* A slice's area as a part of the one before: below this the nest shrinks and ends. */
-#define SHRINK_MIN_Q16 39322 /* 0.6 */
-/* Beyond end_depth_mm a slice that is more than this many times, plus this many mm^2, larger than
- * the one before belongs to something else: the shoulders, a wall. */
-#define JUMP_Q16 209715 /* 3.2 */
-#define JUMP_MM2 2500
-/* An ellipsoid of a head's size grows by this area per mm of depth at its front: 2 pi a b / c for
- * semi-axes of 78, 113 and 98 mm. */
-#define FRONT_GROWTH_MM 565
+/* Slices up to this depth behind the front make the curvature. */
+#define CURVATURE_DEPTH_MM 70
+/* Slices from this depth on make the centre and the proportions: nearer ones are the nose's. */
+#define CENTRE_DEPTH_MM 30
+/* Ring around the last ellipse in which its surroundings are looked at: squares of the sizes,
+ * Q4. */
+#define RING_INNER2_Q4 23 /* 1.2^2 */
+#define RING_OUTER2_Q4 58 /* 1.9^2 */
 
 void ih_hypotheses_params_default(struct ih_hypotheses_params *params)
 {
-    ih_ellipse_params_default(&params->ellipse);
-    params->level_step_mm = 20;
-    params->levels_behind_mm = 700;
-    params->blunt_mm2 = 2000;
-    params->tip_max_mm = 70;
-    params->depth_max_mm = 80;
-    params->end_depth_mm = 50;
-    params->gap_max = 2;
-    params->free_mm = 200;
-    params->free_behind_mm = 80;
-    params->is_tip_any = true;
-    params->is_merging = true;
+    *params = (struct ih_hypotheses_params){
+        .area_min_mm2 = 12000,
+        .area_max_mm2 = 56000,
+        .curvature_min_mm = 60,
+        .curvature_max_mm = 800,
+        .extent_min_mm = 65,
+        .upright_min_q16 = 62259, /* 0.95 */
+        .points_min = 13,
+        .jump_mm = 75,
+        .above_min_percent = 76,
+        .beside_min_percent = 40,
+        .below_min_percent = 45,
+        .merge_mm = 80,
+        .centre_behind_mm = 108,
+    };
 }
 
-void ih_hypotheses_params_paper(struct ih_hypotheses_params *params)
+const char *ih_reject_text(int32_t reject)
 {
-    ih_hypotheses_params_default(params);
-    params->ellipse.point_count = IH_PARTS_POINTS_MAX;
-    params->level_step_mm = 10;
-    params->depth_max_mm = 110;
-    params->gap_max = 8;
-    params->free_mm = 0;
-    params->is_tip_any = false;
-    params->is_merging = false;
-}
-
-/* A grid step at a depth. Depth below 2^23 and unit below 2^26 (a pitch of half a radian): below
- * 2^29. */
-static int64_t step_mm_q16(const struct ih_surface *surface, int32_t depth_mm_q8)
-{
-    return ih_div_round(ih_mul_shift(depth_mm_q8, surface->field.unit_q28, 20) *
-                            IH_SURFACE_STEP_NUMERATOR,
-                        IH_SURFACE_STEP_DENOMINATOR);
-}
-
-/* A minimum is nearer than its 8 neighbours; of equal nodes the first in reading order. Most nodes are none
- * by the two beside them. */
-static bool is_minimum(const struct ih_surface *surface, int32_t x, int32_t y)
-{
-    const int32_t *row = &surface->depth_mm_q8[y][x];
-    const int32_t depth = row[0];
-    if (row[-1] <= depth || row[1] < depth) {
-        return false;
+    switch (reject) {
+    case IH_REJECT_AREA:
+        return "area";
+    case IH_REJECT_CURVATURE:
+        return "curvature";
+    case IH_REJECT_SHAPE:
+        return "shape";
+    case IH_REJECT_OUTLINE:
+        return "outline";
+    case IH_REJECT_SCORE:
+        return "score";
+    default:
+        return NULL;
     }
-    const int32_t *above = row - IH_SURFACE_GRID, *below = row + IH_SURFACE_GRID;
-    return above[0] > depth && below[0] >= depth && above[-1] > depth && above[1] > depth &&
-           below[-1] >= depth && below[1] >= depth;
 }
 
-/* Keep the nearest minima, sorted by depth. */
-static void add_nest(struct ih_hypotheses *out, int32_t x, int32_t y, int32_t depth_mm_q8)
+static int32_t widest_area_mm2(const struct ih_nest *nest)
 {
-    if (out->nest_count == IH_HYPOTHESES_MAX) {
-        out->minima_dropped++;
-        if (out->nest[IH_HYPOTHESES_MAX - 1].nearest_mm_q8 <= depth_mm_q8) {
-            return;
-        }
-        out->nest_count--;
+    int32_t area = 0;
+    for (int32_t i = 0; i < nest->slice_count; i++) {
+        area = ih_max_s32(area, nest->slice[i].area_mm2);
     }
-    int32_t at = out->nest_count++;
-    for (; at > 0 && out->nest[at - 1].nearest_mm_q8 > depth_mm_q8; at--) {
-        out->nest[at] = out->nest[at - 1];
-    }
-    struct ih_nest *nest = &out->nest[at];
-    memset(nest, 0, sizeof *nest);
-    nest->minimum = (struct ih_vertex){(int16_t)(x * 512), (int16_t)(y * 512)};
-    nest->nearest_mm_q8 = depth_mm_q8;
-    nest->front_mm_q8 = depth_mm_q8;
-    nest->tip_level_mm_q8 = depth_mm_q8;
+    return area;
 }
 
-/* Does the surface fall off this way from the node, or end, within the steps? */
-static bool falls_off(const struct ih_surface *surface, int32_t x, int32_t y, int32_t right,
-                      int32_t down, int32_t steps, int32_t behind_mm_q8)
+/* k = sum(A t) / sum(t^2): the slope of the line through the origin that fits A(t) best. A below
+ * 2^31, t below 2^15 in Q8, 16 slices: below 2^50. */
+static int32_t curvature_mm_q8(const struct ih_nest *nest)
 {
-    const int32_t limit_mm_q8 = surface->depth_mm_q8[y][x] + behind_mm_q8;
-    bool is_behind = false;
-    for (int32_t i = 1; i <= steps && !is_behind; i++) {
-        const int32_t u = x + i * right;
-        const int32_t v = y + i * down;
-        is_behind =
-            u < 0 || u == IH_SURFACE_GRID || v < 0 || surface->depth_mm_q8[v][u] > limit_mm_q8;
-    }
-    return is_behind;
-}
-
-/* May a head be in front here? */
-static bool is_free(const struct ih_surface *surface, int32_t x, int32_t y,
-                    const struct ih_hypotheses_params *params)
-{
-    if (params->free_mm == 0) {
-        return true;
-    }
-    const int64_t step_q16 = step_mm_q16(surface, surface->depth_mm_q8[y][x]);
-    const int64_t reach = ((int64_t)params->free_mm << 16) / (step_q16 > 0 ? step_q16 : 1);
-    const int32_t steps = ih_min_s32(ih_saturate_s32(reach), IH_SURFACE_GRID);
-    const int32_t behind_mm_q8 = params->free_behind_mm << 8;
-    return falls_off(surface, x, y, -1, 0, steps, behind_mm_q8) &&
-           falls_off(surface, x, y, 1, 0, steps, behind_mm_q8) &&
-           falls_off(surface, x, y, 0, -1, steps, behind_mm_q8);
-}
-
-static void find_minima(const struct ih_surface *surface, const struct ih_hypotheses_params *params,
-                        struct ih_hypotheses *out)
-{
-    for (int32_t y = 1; y < IH_SURFACE_GRID - 1; y++) {
-        for (int32_t x = 1; x < IH_SURFACE_GRID - 1; x++) {
-            if (is_minimum(surface, x, y) && is_free(surface, x, y, params)) {
-                add_nest(out, x, y, surface->depth_mm_q8[y][x]);
-            }
+    int64_t at_q8 = 0;
+    int64_t tt_q16 = 0;
+    for (int32_t i = 0; i < nest->slice_count; i++) {
+        int64_t t_q8 = nest->slice[i].behind_mm_q8;
+        if (t_q8 <= CURVATURE_DEPTH_MM << 8) {
+            at_q8 += nest->slice[i].area_mm2 * t_q8;
+            tt_q16 += t_q8 * t_q8;
         }
     }
+    /* slices at the front, or none in reach, must not divide by zero */
+    int64_t divisor = tt_q16 >> 3 > 0 ? tt_q16 >> 3 : 1;
+    return ih_saturate_s32(ih_div_round(at_q8 << 13, divisor));
 }
 
-/* Area of an ellipse at a depth in mm^2: the square of a step below 2^42 in Q16, for areas below
- * 2^(11 + 16). Real ones are 2^20 times smaller. */
-static int32_t area_mm2(const struct ih_surface *surface, int32_t level_mm_q8, int64_t area_q16)
+/* Do the slice's centre and proportions count? The last one always does. */
+static bool is_deep(const struct ih_nest *nest, int32_t index)
 {
-    int64_t step_q16 = step_mm_q16(surface, level_mm_q8);
-    int64_t square_q16 = ih_mul_shift(step_q16, step_q16, 16);
-    return ih_saturate_s32(ih_mul_wide_shift(square_q16, (uint32_t)area_q16, 32));
+    return nest->slice[index].behind_mm_q8 >= CENTRE_DEPTH_MM << 8 ||
+           index == nest->slice_count - 1;
 }
 
-/* What a contour is for every nest that it surrounds. */
-struct study {
-    bool whole;  /* a closed contour that is an ellipse */
-    bool is_tip; /* a closed contour that may have any shape, but supports a nest's tip alone */
-    bool is_searched;
-    struct ih_ellipse ellipse;
+/* Vertical over horizontal second moments, summed over the deeper slices: wide ones count most. */
+static int32_t upright_q16(const struct ih_nest *nest)
+{
+    int64_t vertical_q16 = 0;
+    int64_t horizontal_q16 = 1;
+    for (int32_t i = 0; i < nest->slice_count; i++) {
+        if (is_deep(nest, i)) {
+            vertical_q16 += nest->slice[i].ellipse.yy_q16;
+            horizontal_q16 += nest->slice[i].ellipse.xx_q16;
+        }
+    }
+    return ih_saturate_s32(ih_div_round(vertical_q16 * 65536, horizontal_q16));
+}
+
+/* Centre of the nest on the grid: mean over its deeper slices, by area. */
+static void nest_centre_q16(const struct ih_nest *nest, int32_t *x_q16, int32_t *y_q16)
+{
+    int64_t x = 0;
+    int64_t y = 0;
+    int64_t weight = 0;
+    for (int32_t i = 0; i < nest->slice_count; i++) {
+        if (is_deep(nest, i)) {
+            const struct ih_ellipse *ellipse = &nest->slice[i].ellipse;
+            int64_t area = (ellipse->area_q16 >> 8) + 1; /* below 2^22.8; never 0 */
+            x += area * ellipse->x_q16;
+            y += area * ellipse->y_q16;
+            weight += area;
+        }
+    }
+    *x_q16 = (int32_t)ih_div_round(x, weight);
+    *y_q16 = (int32_t)ih_div_round(y, weight);
+}
+
+/* A place on the grid (steps) to normalised coordinates. */
+static int32_t to_normalised_q28(int32_t place_q16, int32_t centre_q28, int32_t unit_q28)
+{
+    int64_t steps_q16 = (int64_t)place_q16 - ((IH_SURFACE_GRID - 1) / 2) * 65536;
+    int64_t offset = ih_div_round(steps_q16 * unit_q28 * IH_SURFACE_STEP_NUMERATOR,
+                                  (int64_t)IH_SURFACE_STEP_DENOMINATOR * 65536);
+    return ih_saturate_s32(centre_q28 + offset);
+}
+
+static int32_t surface_depth_mm_q8(const struct ih_surface *surface, int32_t x_q16, int32_t y_q16)
+{
+    int32_t x = ih_clamp_s32(x_q16, 0, (IH_SURFACE_GRID - 1) * 65536 - 1);
+    int32_t y = ih_clamp_s32(y_q16, 0, (IH_SURFACE_GRID - 1) * 65536 - 1);
+    int64_t fx = x & 0xffff;
+    int64_t fy = y & 0xffff;
+    const int32_t *near_row = &surface->depth_mm_q8[y >> 16][x >> 16];
+    const int32_t *far_row = &surface->depth_mm_q8[(y >> 16) + 1][x >> 16];
+    int64_t top = near_row[0] * (65536 - fx) + near_row[1] * fx;
+    int64_t bottom = far_row[0] * (65536 - fx) + far_row[1] * fx;
+    return (int32_t)ih_shift_round(
+        ih_shift_round(top, 16) * (65536 - fy) + ih_shift_round(bottom, 16) * fy, 16);
+}
+
+/* Semi-axis = 2 sqrt(variance); the variance in Q16 px^2 less drop bits, below 2^32. */
+static int32_t semi_axis_px_q12(int64_t variance, int drop)
+{
+    uint64_t variance_q24 = variance > 0 ? (uint64_t)variance << (8 + drop) : 0;
+    return ih_saturate_s32(2 * (int64_t)ih_isqrt_u64(variance_q24));
+}
+
+/* Covariance on the grid to an ellipse in pixels. */
+static void fill_axes(const struct ih_ellipse *ellipse, const struct ih_surface *surface,
+                      const struct ih_rig *rig, struct ih_hypothesis *out)
+{
+    const struct ih_calibration *c = &rig->calibration;
+    /* px per grid step in Q12: a unit below 2^25.5 (a pitch of a third of a radian) at 8192 px is
+     * below 2^11; a variance of 2^28 in Q16 times its square stays below 2^62 as it is scaled back
+     * in between. */
+    int64_t step_u = ih_div_round(ih_mul_shift(surface->field.unit_q28, c->fx_px_q16, 32) *
+                                      IH_SURFACE_STEP_NUMERATOR,
+                                  IH_SURFACE_STEP_DENOMINATOR);
+    int64_t step_v = ih_div_round(ih_mul_shift(surface->field.unit_q28, c->fy_px_q16, 32) *
+                                      IH_SURFACE_STEP_NUMERATOR,
+                                  IH_SURFACE_STEP_DENOMINATOR);
+    IH_IN_RANGE(step_u, 0, IH_RANGE_PX_PER_STEP_Q12);
+    IH_IN_RANGE(step_v, 0, IH_RANGE_PX_PER_STEP_Q12);
+    int64_t uu = ih_mul_shift(ih_mul_shift(ellipse->xx_q16, step_u, 12), step_u, 12);
+    int64_t uv = ih_mul_shift(ih_mul_shift(ellipse->xy_q16, step_u, 12), step_v, 12);
+    int64_t vv = ih_mul_shift(ih_mul_shift(ellipse->yy_q16, step_v, 12), step_v, 12);
+    /* Squares of the variances must fit: drop bits that a large ellipse does not need. */
+    uint64_t all = (uint64_t)ih_abs_s64(uu) | (uint64_t)ih_abs_s64(uv) | (uint64_t)ih_abs_s64(vv);
+    int drop = ih_max_s32(0, ih_bits_u64(all) - 30);
+    uu = ih_shift_round(uu, drop);
+    uv = ih_shift_round(uv, drop);
+    vv = ih_shift_round(vv, drop);
+    int64_t half = (uu - vv) / 2;
+    int64_t root = ih_isqrt_u64((uint64_t)(half * half + uv * uv));
+    out->a_px_q12 = semi_axis_px_q12((uu + vv) / 2 + root, drop);
+    out->b_px_q12 = semi_axis_px_q12((uu + vv) / 2 - root, drop);
+    int32_t angle = (int32_t)ih_div_round(ih_atan2_mdeg(2 * uv, uu - vv), 2);
+    out->angle_mdeg = angle < 0 ? angle + 180000 : angle;
+}
+
+/* Where a sample lies relative to an ellipse: the ellipse's normalised radius squared, Q4, and the
+ * offset in grid steps, Q8. With q = yy dx^2 - 2 xy dx dy + xx dy^2 and det = xx yy - xy^2 the
+ * radius squared is q / (4 det). Offsets below 2^15.3 in Q8, moments below 2^27.2 in Q16: the
+ * three terms below 2^59 each; only the ratio to 4 det matters, limited to 255. */
+struct placed {
+    int64_t dx_q8, dy_q8;
+    int32_t radius2_q4;
 };
 
-static struct study study_contour(const struct ih_surface *surface,
-                                  const struct ih_contour *contour,
-                                  const struct ih_hypotheses_params *params,
-                                  struct ih_hypotheses_scratch *scratch)
+static struct placed place_sample(const struct ih_sample *sample, const struct ih_ellipse *ellipse)
 {
-    struct study study = {.is_searched = false};
-    if (contour->closed && ih_ellipse_of_contour(&scratch->cuts, contour, &study.ellipse)) {
-        study.whole = study.ellipse.shape_q16 <= params->ellipse.shape_max_q16 &&
-                      study.ellipse.ratio_q16 <= params->ellipse.ratio_closed_max_q16;
-        study.is_tip = !study.whole && params->is_tip_any && study.ellipse.area_q16 > 0 &&
-                       area_mm2(surface, scratch->cuts.level_mm_q8, study.ellipse.area_q16) <
-                           params->blunt_mm2;
-    }
-    if (!study.whole && !study.is_tip) {
-        study.is_searched =
-            ih_parts_make(&scratch->cuts, contour, &params->ellipse, &scratch->parts);
-    }
-    return study;
+    const int32_t middle_q8 = (IH_SURFACE_GRID - 1) / 2 * 256;
+    struct placed p;
+    /* field units in Q16 to grid steps in Q8 */
+    p.dx_q8 = ih_div_round((int64_t)sample->x_q16 * IH_SURFACE_STEP_DENOMINATOR,
+                           IH_SURFACE_STEP_NUMERATOR * 256) +
+              middle_q8 - ih_shift_round(ellipse->x_q16, 8);
+    p.dy_q8 = ih_div_round((int64_t)sample->y_q16 * IH_SURFACE_STEP_DENOMINATOR,
+                           IH_SURFACE_STEP_NUMERATOR * 256) +
+              middle_q8 - ih_shift_round(ellipse->y_q16, 8);
+    int64_t xx = ellipse->xx_q16, xy = ellipse->xy_q16, yy = ellipse->yy_q16;
+    int64_t determinant_q32 = xx * yy - xy * xy;
+    int64_t q_q32 = yy * p.dx_q8 * p.dx_q8 - 2 * xy * p.dx_q8 * p.dy_q8 + xx * p.dy_q8 * p.dy_q8;
+    int64_t quarter = determinant_q32 / 4 + 1; /* 4 det in sixteenths */
+    p.radius2_q4 = (int32_t)(q_q32 / quarter > 4080 ? 4080 : q_q32 / quarter);
+    return p;
 }
 
-/* May the contour support a nest at this minimum? An open one winds round nothing by itself. */
-static bool surrounds(const struct ih_cuts *cuts, const struct ih_contour *contour,
-                      const struct ih_box *box, struct ih_vertex minimum)
+static void count_around(const struct placed *p, bool is_behind, struct ih_outline *out)
 {
-    return ih_box_holds(box, minimum) &&
-           (!contour->closed || ih_ellipse_winding(cuts, contour, minimum) == 1);
-}
-
-static void take_support(const struct study *study, int32_t contour,
-                         const struct ih_hypotheses_params *params,
-                         struct ih_hypotheses_scratch *scratch, const struct ih_nest *nest,
-                         struct ih_support *support)
-{
-    struct ih_ellipse part;
-    if (study->whole || (study->is_tip && nest->slice_count == 0)) {
-        *support = (struct ih_support){.wanted = true,
-                                       .found = true,
-                                       .whole = true,
-                                       .contour = contour,
-                                       .ellipse = study->ellipse};
-    } else if (study->is_searched &&
-               ih_ellipse_of_part(&scratch->parts, nest->minimum, &params->ellipse,
-                                  &scratch->ellipse, &part) &&
-               (!support->found || part.merit_q8 > support->ellipse.merit_q8)) {
-        *support =
-            (struct ih_support){.wanted = true, .found = true, .contour = contour, .ellipse = part};
-    }
-}
-
-/* The ellipses that support the nests at this level: the closed contour around a minimum when it is
- * one, else the best elliptical part of that contour or of an open one. A contour is studied when
- * the first nest asks for it. */
-static void find_supports(const struct ih_surface *surface, const struct ih_hypotheses *nests,
-                          const struct ih_hypotheses_params *params,
-                          struct ih_hypotheses_scratch *scratch)
-{
-    const struct ih_cuts *cuts = &scratch->cuts;
-    for (int32_t c = 0; c < cuts->contour_count; c++) {
-        const struct ih_contour *contour = &cuts->contour[c];
-        const struct ih_box box = ih_parts_box(cuts, contour);
-        struct study study;
-        bool is_studied = false;
-        for (int32_t i = 0; i < nests->nest_count; i++) {
-            struct ih_support *support = &scratch->support[i];
-            const struct ih_nest *nest = &nests->nest[i];
-            if (!support->wanted || support->whole ||
-                !surrounds(cuts, contour, &box, nest->minimum)) {
-                continue;
-            }
-            if (!is_studied) {
-                study = study_contour(surface, contour, params, scratch);
-                is_studied = true;
-            }
-            take_support(&study, c, params, scratch, nest, support);
-        }
-    }
-}
-
-/* Does the slice continue the nest? */
-static bool continues(const struct ih_nest *nest, const struct ih_slice *slice,
-                      const struct ih_hypotheses_params *params)
-{
-    if (nest->slice_count == 0) {
-        return true;
-    }
-    int64_t last = nest->slice[nest->slice_count - 1].area_mm2;
-    bool shrinks = slice->area_mm2 < ih_mul_shift(last, SHRINK_MIN_Q16, 16);
-    bool jumps = slice->behind_mm_q8 >= params->end_depth_mm << 8 &&
-                 slice->area_mm2 > ih_mul_shift(last, JUMP_Q16, 16) + JUMP_MM2;
-    return !shrinks && !jumps;
-}
-
-/* The first slice that is not the tip's: the front lies where the area passed blunt_mm2 on the way
- * here, less the depth that a head needs to grow so wide. */
-static void set_front(const struct ih_hypotheses_params *params, int32_t level_mm_q8,
-                      int32_t area_mm2_here, struct ih_nest *nest)
-{
-    /* tip_area < blunt <= area here, so the divisor is positive; spans below 2^15 in Q8 */
-    int64_t span_q8 = level_mm_q8 - nest->tip_level_mm_q8;
-    int64_t passed_q8 = ih_div_round(span_q8 * (params->blunt_mm2 - nest->tip_area_mm2),
-                                     area_mm2_here - nest->tip_area_mm2);
-    int64_t front_q8 = nest->tip_level_mm_q8 + passed_q8 -
-                       ih_div_round((int64_t)params->blunt_mm2 * 256, FRONT_GROWTH_MM);
-    nest->front_mm_q8 = ih_max_s32((int32_t)front_q8, nest->nearest_mm_q8);
-}
-
-/* Slices up to here belong to the tip; too long a tip ends the nest. */
-static void extend_tip(const struct ih_hypotheses_params *params, int32_t level_mm_q8,
-                       int32_t area_mm2_here, struct ih_nest *nest)
-{
-    nest->tip_level_mm_q8 = level_mm_q8;
-    nest->tip_area_mm2 = area_mm2_here;
-    nest->ended = level_mm_q8 - nest->nearest_mm_q8 > params->tip_max_mm << 8;
-}
-
-static void add_slice(struct ih_slice *slice, int32_t level_mm_q8,
-                      const struct ih_hypotheses_params *params, struct ih_nest *nest)
-{
-    if (nest->slice_count == 0) {
-        if (slice->area_mm2 < params->blunt_mm2) {
-            extend_tip(params, level_mm_q8, slice->area_mm2, nest);
-            return;
-        }
-        set_front(params, level_mm_q8, slice->area_mm2, nest);
-    }
-    slice->behind_mm_q8 = level_mm_q8 - nest->front_mm_q8;
-    IH_IN_RANGE(slice->behind_mm_q8, 0, params->depth_max_mm << 8);
-    if (continues(nest, slice, params)) {
-        nest->slice[nest->slice_count++] = *slice;
+    if (2 * p->dy_q8 < -ih_abs_s64(p->dx_q8)) {
+        out->above++;
+        out->above_behind += is_behind;
+    } else if (p->dy_q8 > ih_abs_s64(p->dx_q8)) {
+        out->below++;
+        out->below_near += !is_behind;
     } else {
-        nest->ended = true;
+        out->beside++;
+        out->beside_behind += is_behind;
     }
 }
 
-/* Is the nest still open at this level? One that has become too deep or too long ends here. */
-static bool is_open(int32_t level_mm_q8, const struct ih_hypotheses_params *params,
-                    struct ih_nest *nest)
+static void fill_outline(const struct ih_nest *nest, const struct ih_samples *samples,
+                         const struct ih_hypotheses_params *params, struct ih_outline *out)
 {
-    if (level_mm_q8 <= nest->nearest_mm_q8 || nest->ended) {
-        return false;
-    }
-    nest->ended =
-        (nest->slice_count > 0 && level_mm_q8 - nest->front_mm_q8 > params->depth_max_mm << 8) ||
-        nest->slice_count == IH_HYPOTHESES_SLICES_MAX;
-    return !nest->ended;
-}
-
-static void extend_nest(const struct ih_surface *surface, int32_t level_mm_q8,
-                        const struct ih_hypotheses_params *params, const struct ih_support *support,
-                        struct ih_nest *nest)
-{
-    if (!support->found) {
-        nest->gap++;
-        nest->ended = nest->gap > params->gap_max;
-        return;
-    }
-    nest->gap = 0;
-    struct ih_slice slice = {.ellipse = support->ellipse, .whole = support->whole};
-    IH_IN_RANGE(slice.ellipse.area_q16, 1, IH_RANGE_AREA_Q16);
-    IH_IN_RANGE(level_mm_q8, -IH_RANGE_LEVEL_MM_Q8, IH_RANGE_LEVEL_MM_Q8);
-    slice.area_mm2 = area_mm2(surface, level_mm_q8, slice.ellipse.area_q16);
-    add_slice(&slice, level_mm_q8, params, nest);
-}
-
-/* Which nests want a support at this level? False: none. */
-static bool open_nests(int32_t level_mm_q8, const struct ih_hypotheses_params *params,
-                       struct ih_support support[IH_HYPOTHESES_MAX], struct ih_hypotheses *out)
-{
-    bool any = false;
-    for (int32_t i = 0; i < out->nest_count; i++) {
-        support[i] = (struct ih_support){.wanted = is_open(level_mm_q8, params, &out->nest[i])};
-        any = any || support[i].wanted;
-    }
-    return any;
-}
-
-/* Has the level the same ellipse for both? A part has the same area about any place. */
-static bool are_same(const struct ih_support *a, const struct ih_support *b)
-{
-    return a->found && b->found && a->contour == b->contour &&
-           a->ellipse.area_q16 == b->ellipse.area_q16;
-}
-
-/* Nests are sorted by depth: the first of several goes on. */
-static void merge_nests(const struct ih_support support[IH_HYPOTHESES_MAX],
-                        struct ih_hypotheses *out)
-{
-    for (int32_t i = 1; i < out->nest_count; i++) {
-        struct ih_nest *nest = &out->nest[i];
-        for (int32_t k = 0; k < i && !nest->ended; k++) {
-            if (!out->nest[k].ended && are_same(&support[i], &support[k])) {
-                nest->ended = true;
-                nest->slice_count = 0;
-                nest->front_mm_q8 = nest->nearest_mm_q8;
-            }
+    const struct ih_slice *last = &nest->slice[nest->slice_count - 1];
+    int64_t behind_q8 = (int64_t)nest->front_mm_q8 + last->behind_mm_q8 + (params->jump_mm << 8);
+    for (int32_t i = 0; i < samples->sample_count; i++) {
+        const struct ih_sample *sample = &samples->sample[i];
+        struct placed p = place_sample(sample, &last->ellipse);
+        if (p.radius2_q4 < 16) {
+            out->inside += !sample->is_filled;
+        } else if (p.radius2_q4 > RING_INNER2_Q4 && p.radius2_q4 < RING_OUTER2_Q4) {
+            count_around(&p, sample->is_filled || sample->depth_mm_q8 > behind_q8, out);
         }
     }
 }
 
-static void extend_nests(const struct ih_surface *surface, int32_t level_mm_q8,
-                         const struct ih_hypotheses_params *params,
-                         struct ih_hypotheses_scratch *scratch, struct ih_hypotheses *out)
+/* Does what the samples show look like a head that stands out? */
+static bool stands_out(const struct ih_outline *o, const struct ih_hypotheses_params *params)
 {
-    find_supports(surface, out, params, scratch);
-    for (int32_t i = 0; i < out->nest_count; i++) {
-        if (scratch->support[i].wanted) {
-            extend_nest(surface, level_mm_q8, params, &scratch->support[i], &out->nest[i]);
-        }
-    }
-    if (params->is_merging) {
-        merge_nests(scratch->support, out);
-    }
+    return o->inside >= params->points_min &&
+           o->above_behind * 100 >= o->above * params->above_min_percent &&
+           o->beside_behind * 100 >= o->beside * params->beside_min_percent &&
+           o->below_near * 100 >= o->below * params->below_min_percent;
 }
 
-bool ih_hypotheses_level(const struct ih_surface *surface,
-                         const struct ih_hypotheses_params *params, int32_t index,
-                         int32_t *level_mm_q8)
+static int32_t ray_length_q28(int32_t x_q28, int32_t y_q28)
 {
-    int32_t behind_mm = (index + 1) * params->level_step_mm;
-    *level_mm_q8 = surface->nearest_mm_q8 + (behind_mm << 8);
-    return surface->valid && index >= 0 && behind_mm <= params->levels_behind_mm;
+    /* The field may reach beyond the frame: limited to 4, the root of 33 still fits Q28. */
+    int64_t x = ih_clamp_s32(x_q28, -(1 << 30), 1 << 30) / 4;
+    int64_t y = ih_clamp_s32(y_q28, -(1 << 30), 1 << 30) / 4;
+    int64_t root_q26 = ih_isqrt_u64((uint64_t)(x * x + y * y) + ((uint64_t)1 << 52));
+    return (int32_t)(root_q26 * 4);
 }
 
-/* Is any nest still waiting for this level or a later one? */
-static bool any_alive(const struct ih_hypotheses *hypotheses)
+static void fill_place(const struct ih_nest *nest, const struct ih_surface *surface,
+                       const struct ih_rig *rig, const struct ih_hypotheses_params *params,
+                       struct ih_hypothesis *out)
 {
-    for (int32_t i = 0; i < hypotheses->nest_count; i++) {
-        if (!hypotheses->nest[i].ended) {
-            return true;
-        }
-    }
-    return false;
+    int32_t x_q16, y_q16;
+    nest_centre_q16(nest, &x_q16, &y_q16);
+    int32_t x_q28 = to_normalised_q28(x_q16, surface->field.centre_x_q28, surface->field.unit_q28);
+    int32_t y_q28 = to_normalised_q28(y_q16, surface->field.centre_y_q28, surface->field.unit_q28);
+    ih_rig_distort(rig, x_q28, y_q28, &out->u_px_q12, &out->v_px_q12);
+    out->distance_mm_q8 = ih_saturate_s32(
+        ih_mul_shift(surface_depth_mm_q8(surface, x_q16, y_q16), ray_length_q28(x_q28, y_q28), 28));
+    int64_t depth_q8 = nest->front_mm_q8 + (int64_t)(params->centre_behind_mm << 8);
+    out->centre_mm_q8[0] = ih_saturate_s32(ih_mul_shift(depth_q8, x_q28, 28));
+    out->centre_mm_q8[1] = ih_saturate_s32(ih_mul_shift(depth_q8, y_q28, 28));
+    out->centre_mm_q8[2] = ih_saturate_s32(depth_q8);
+    IH_IN_RANGE(out->distance_mm_q8, 1, IH_RANGE_SURFACE_DISTANCE_MM_Q8);
+    IH_IN_RANGE(out->centre_mm_q8[0], -IH_RANGE_CENTRE_MM_Q8, IH_RANGE_CENTRE_MM_Q8);
+    IH_IN_RANGE(out->centre_mm_q8[1], -IH_RANGE_CENTRE_MM_Q8, IH_RANGE_CENTRE_MM_Q8);
+    IH_IN_RANGE(out->centre_mm_q8[2], -IH_RANGE_CENTRE_MM_Q8, IH_RANGE_CENTRE_MM_Q8);
 }
 
-void ih_hypotheses_find(const struct ih_surface *surface, const struct ih_hypotheses_params *params,
-                        struct ih_hypotheses_scratch *scratch, struct ih_hypotheses *out)
+static enum ih_reject test(const struct ih_hypothesis *h, const struct ih_hypotheses_params *params)
 {
-    out->nest_count = 0;
-    out->minima_dropped = 0;
-    out->contours_dropped = 0;
-    if (!surface->valid) {
-        return;
+    if (h->area_mm2 < params->area_min_mm2 || h->area_mm2 > params->area_max_mm2) {
+        return IH_REJECT_AREA;
     }
-    find_minima(surface, params, out);
-    int32_t level_mm_q8;
-    for (int32_t index = 0;
-         ih_hypotheses_level(surface, params, index, &level_mm_q8) && any_alive(out); index++) {
-        if (!open_nests(level_mm_q8, params, scratch->support, out)) {
-            continue; /* between two nests */
+    if (h->curvature_mm_q8 < params->curvature_min_mm << 8 ||
+        h->curvature_mm_q8 > params->curvature_max_mm << 8 ||
+        h->extent_mm_q8 < params->extent_min_mm << 8) {
+        return IH_REJECT_CURVATURE;
+    }
+    if (h->upright_q16 < params->upright_min_q16) {
+        return IH_REJECT_SHAPE;
+    }
+    return stands_out(&h->outline, params) ? IH_ACCEPTED : IH_REJECT_OUTLINE;
+}
+
+static struct ih_hypothesis judge(const struct ih_nest *nest, const struct ih_surface *surface,
+                                  const struct ih_samples *samples, const struct ih_rig *rig,
+                                  const struct ih_hypotheses_params *params)
+{
+    struct ih_hypothesis h = {0};
+    const struct ih_slice *last = &nest->slice[nest->slice_count - 1];
+    h.area_mm2 = widest_area_mm2(nest);
+    h.curvature_mm_q8 = curvature_mm_q8(nest);
+    h.extent_mm_q8 = last->behind_mm_q8;
+    fill_place(nest, surface, rig, params, &h);
+    fill_axes(&last->ellipse, surface, rig, &h);
+    fill_outline(nest, samples, params, &h.outline);
+    h.upright_q16 = upright_q16(nest);
+    h.rejected = (int32_t)test(&h, params);
+    return h;
+}
+
+/* Accepted before rejected, then the greater extent, then the nearer. */
+static bool is_better(const struct ih_hypothesis *a, const struct ih_hypothesis *b)
+{
+    bool a_accepted = a->rejected == IH_ACCEPTED;
+    bool b_accepted = b->rejected == IH_ACCEPTED;
+    if (a_accepted != b_accepted) {
+        return a_accepted;
+    }
+    if (a->extent_mm_q8 != b->extent_mm_q8) {
+        return a->extent_mm_q8 > b->extent_mm_q8;
+    }
+    return a->nest < b->nest;
+}
+
+static bool is_same_thing(const struct ih_hypothesis *a, const struct ih_hypothesis *b,
+                          int32_t merge_mm)
+{
+    int64_t limit = (int64_t)merge_mm << 8;
+    return ih_distance2_s32(a->centre_mm_q8, b->centre_mm_q8) < limit * limit;
+}
+
+/* Drop what lies too near to a better one; the list is sorted. */
+static void merge(struct ih_hypotheses *hypotheses, int32_t merge_mm)
+{
+    int32_t kept = 0;
+    for (int32_t i = 0; i < hypotheses->hypothesis_count; i++) {
+        bool same = false;
+        for (int32_t k = 0; k < kept && !same; k++) {
+            same = is_same_thing(&hypotheses->hypothesis[i], &hypotheses->hypothesis[k], merge_mm);
         }
-        ih_cuts_level(surface, level_mm_q8, &scratch->cuts);
-        out->contours_dropped += scratch->cuts.contours_dropped;
-        extend_nests(surface, level_mm_q8, params, scratch, out);
+        if (!same) {
+            hypotheses->hypothesis[kept++] = hypotheses->hypothesis[i];
+        }
+    }
+    hypotheses->hypothesis_count = kept;
+}
+
+void ih_hypotheses_select(const struct ih_nests *nests, const struct ih_surface *surface,
+                          const struct ih_samples *samples, const struct ih_rig *rig,
+                          const struct ih_hypotheses_params *params, struct ih_hypotheses *out)
+{
+    out->hypothesis_count = 0;
+    out->head_count = 0;
+    for (int32_t i = 0; i < nests->nest_count; i++) {
+        if (nests->nest[i].slice_count == 0) {
+            continue;
+        }
+        struct ih_hypothesis h = judge(&nests->nest[i], surface, samples, rig, params);
+        h.nest = i;
+        int32_t at = out->hypothesis_count++;
+        for (; at > 0 && is_better(&h, &out->hypothesis[at - 1]); at--) {
+            out->hypothesis[at] = out->hypothesis[at - 1];
+        }
+        out->hypothesis[at] = h;
+    }
+    merge(out, params->merge_mm);
+    for (int32_t i = 0; i < out->hypothesis_count; i++) {
+        if (out->hypothesis[i].rejected == IH_ACCEPTED) {
+            out->head[out->head_count++] = i;
+        }
     }
 }

@@ -1,108 +1,94 @@
-/* ih_hypotheses - nests of growing ellipses around the minima of depth (paper, section 3.2).
+/* ih_hypotheses - which hypotheses are heads? (paper, section 3.3)
  *
- * In:    the surface.
- * Out:   per minimum the sequence of ellipses (slices) that supports it.
- * Way:   every minimum of the grid starts a nest. Levels go from the nearest node back in steps
- *        of level_step; at each level the contour that winds round the minimum supports the nest:
- *        whole when it is closed and elliptical, else by its elliptical part. Contours around a
- *        maximum (shrinking) have negative area and support nothing. A head is blunt, the nearest
- *        node is often the tip of a nose, a finger or of noise: slices smaller than blunt_mm2 are
- *        the tip and are passed over, until it is longer than tip_max_mm; the front of the nest is
- *        where the area grows past blunt_mm2. A nest ends depth_max behind its front, when its area
- *        falls below 0.6 of the slice before, when it jumps by more than 3.2 times and 2500 mm^2
- *        beyond end_depth, or after gap_max levels without support.
- * Fewer: ours; with everything on a nest is one candidate and one piece of evidence of many, so less will
- *        do (not with ih_hypotheses_params_paper). A head stands out: to the left, to the right and above a
- *        minimum the surface falls off, or ends, within free_mm, else it is a fold of clothes or the
- *        background's, and starts no nest. A closed contour smaller than blunt_mm2 is the tip's whatever
- *        its shape, and no part of it is searched for. Nests that have come to the same ellipse are the
- *        same thing from there on: the nearest goes on, the others end without slices. And gap_max is 3
- *        instead of 8, depth_max 80 mm instead of 110: what is wider there is the neck's and the body's.
- * Cost:  levels x (cells + minima x contours); the chord search only where no whole ellipse is.
- * Full tables drop and count: minima_dropped (the farthest), contours_dropped (at levels
- * that a nest waits for: others are not cut).
+ * In:    nests, and the samples that the surface was fitted to.
+ * Out:   candidates in the frame's pixels and in mm, each accepted or with the first test that it
+ *        failed; the accepted ones in order, best first.
+ * Tests, none of them in absolute depth:
+ *        area       of the widest slice, in mm^2
+ *        curvature  k = sum(A t) / sum(t^2) over slices at most 70 mm behind the front: the
+ *                   growth of the area A with the depth t of the cut, mm^2/mm; and the extent, the
+ *                   depth over which the nest keeps growing
+ *        shape      a head is about as tall as wide, or taller: a headrest is not
+ *        outline    ours, not the paper's: the surface is smooth everywhere, the scene is not. At
+ *                   least points_min points carry the head, and around its last ellipse, between
+ *                   1.2 and 1.9 times its size, most points above it (2 dy < -|dx|) and beside it
+ *                   lie at least jump_mm behind it, or nothing was seen there, and most below it
+ *                   (dy > |dx|) do not: there the neck and the body are. Bowls on a table and
+ *                   bulges of a body end gently.
+ * Nests whose centres are within merge_mm of a better one are the same thing and are dropped.
+ * The centre of the head's volume lies centre_behind_mm behind the front, on the ray through the
+ * middle of its ellipses: the mean, by area, of those at least 30 mm behind the front; the last one
+ * always counts.
  */
 #ifndef IH_HYPOTHESES_H
 #define IH_HYPOTHESES_H
 
-#include <stdbool.h>
 #include <stdint.h>
 
-#include "nests/ih_cuts.h"
-#include "nests/ih_ellipse.h"
-#include "nests/ih_parts.h"
+#include "nests/ih_nests.h"
+#include "rig/ih_rig.h"
+#include "surface/ih_samples.h"
 #include "surface/ih_surface.h"
 
-/* Minima that are followed. Each nest costs 800 bytes, most of them slices. */
-#define IH_HYPOTHESES_MAX 16
-#define IH_HYPOTHESES_SLICES_MAX 16
+enum ih_reject {
+    IH_ACCEPTED = 0,
+    IH_REJECT_AREA,
+    IH_REJECT_CURVATURE,
+    IH_REJECT_SHAPE,
+    IH_REJECT_OUTLINE,
+    IH_REJECT_SCORE /* by ih_tracks: not probable enough */
+};
 
 struct ih_hypotheses_params {
-    struct ih_ellipse_params ellipse;
-    int32_t level_step_mm;
-    int32_t levels_behind_mm; /* last level: this far behind the nearest node */
-    int32_t blunt_mm2;        /* slices smaller than this belong to the tip */
-    int32_t tip_max_mm;       /* a longer tip is no head's */
-    int32_t depth_max_mm;     /* a nest reaches this far behind its front */
-    int32_t end_depth_mm;     /* from here a jump in area ends the nest */
-    int32_t gap_max;          /* levels in a row */
-    /* Ours, to leave out what only nests that must be heads by themselves need: see Fewer. */
-    int32_t
-        free_mm; /* a minimum is free to the left, the right and above within this; 0: may lie anywhere */
-    int32_t free_behind_mm; /* free: so far behind the minimum */
-    bool is_tip_any;        /* the tip's contours may have any shape */
-    bool is_merging;        /* of nests with the same ellipse the nearest goes on */
+    int32_t area_min_mm2, area_max_mm2;
+    int32_t curvature_min_mm, curvature_max_mm; /* mm^2 per mm */
+    int32_t extent_min_mm;
+    int32_t upright_min_q16; /* height^2 / width^2 over the deeper slices */
+    int32_t points_min;
+    int32_t jump_mm;
+    int32_t above_min_percent, beside_min_percent, below_min_percent;
+    int32_t merge_mm;
+    int32_t centre_behind_mm;
 };
 
-struct ih_slice {
-    struct ih_ellipse ellipse;
-    int32_t behind_mm_q8; /* depth of the cut behind the front */
-    int32_t area_mm2;
-    bool whole; /* a closed contour; false: an elliptical part */
+/* What the samples say about a hypothesis; counts of samples. */
+struct ih_outline {
+    int32_t inside;              /* seen, within the last ellipse */
+    int32_t above, above_behind; /* around it: all, and those that lie behind it */
+    int32_t beside, beside_behind;
+    int32_t below, below_near; /* all, and those that do not */
 };
 
-struct ih_nest {
-    struct ih_vertex minimum; /* a node */
-    int32_t nearest_mm_q8;    /* depth of the minimum */
-    int32_t front_mm_q8; /* depth at which the tip ends; the minimum's while there is no slice */
-    int32_t tip_level_mm_q8, tip_area_mm2; /* the last slice of the tip */
-    int32_t slice_count;
-    int32_t gap;
-    bool ended;
-    struct ih_slice slice[IH_HYPOTHESES_SLICES_MAX];
+struct ih_hypothesis {
+    int32_t u_px_q12, v_px_q12; /* centre of the ellipse in the frame (distorted pixels) */
+    int32_t a_px_q12, b_px_q12; /* semi-axes, a >= b */
+    int32_t angle_mdeg;         /* of a, from +u towards +v, 0 .. 179999 */
+    int32_t distance_mm_q8;     /* camera's centre to the surface at the ellipse's centre */
+    int32_t centre_mm_q8[3];    /* of the head's volume, camera frame */
+    int32_t area_mm2;           /* of the widest slice */
+    int32_t curvature_mm_q8;
+    int32_t extent_mm_q8;
+    int32_t upright_q16;
+    struct ih_outline outline;
+    int32_t rejected; /* enum ih_reject */
+    int32_t nest;     /* index into ih_nests.nest */
 };
 
 struct ih_hypotheses {
-    int32_t nest_count;
-    int32_t minima_dropped, contours_dropped;
-    struct ih_nest nest[IH_HYPOTHESES_MAX];
-};
-
-/* What supports a nest at a level. */
-struct ih_support {
-    bool wanted, found;
-    bool whole;      /* the last word: a closed contour */
-    int32_t contour; /* of the level */
-    struct ih_ellipse ellipse;
-};
-
-struct ih_hypotheses_scratch {
-    struct ih_cuts cuts;
-    struct ih_parts parts; /* of one contour at a time */
-    struct ih_ellipse_scratch ellipse;
-    struct ih_support support[IH_HYPOTHESES_MAX];
+    int32_t hypothesis_count;
+    int32_t head_count;
+    int32_t head[IH_NESTS_MAX]; /* indices of the accepted ones, best first */
+    struct ih_hypothesis hypothesis[IH_NESTS_MAX];
 };
 
 void ih_hypotheses_params_default(struct ih_hypotheses_params *params);
-/* For nests that must be heads by themselves. */
-void ih_hypotheses_params_paper(struct ih_hypotheses_params *params);
 
-void ih_hypotheses_find(const struct ih_surface *surface, const struct ih_hypotheses_params *params,
-                        struct ih_hypotheses_scratch *scratch, struct ih_hypotheses *out);
+void ih_hypotheses_select(const struct ih_nests *nests, const struct ih_surface *surface,
+                          const struct ih_samples *samples, const struct ih_rig *rig,
+                          const struct ih_hypotheses_params *params, struct ih_hypotheses *out);
 
-/* The depth of level number index for this surface; false beyond the last. For tracing. */
-bool ih_hypotheses_level(const struct ih_surface *surface,
-                         const struct ih_hypotheses_params *params, int32_t index,
-                         int32_t *level_mm_q8);
+/* The word that the record uses: "area", "curvature", "shape", "outline", "score"; NULL for an accepted
+ * one. */
+const char *ih_reject_text(int32_t reject);
 
 #endif

@@ -201,19 +201,18 @@ static void survey(const struct ih_frame *frame, const struct ih_rig *rig, int32
 static int32_t survey_frame(const struct ih_frame *frame, const struct ih_rig *rig,
                             struct ih_windows_scratch *s)
 {
-    int32_t least_px = 1;
-    while (((frame->width + least_px - 1) / least_px) *
-               ((frame->height + least_px - 1) / least_px) >
+    int32_t min_px = 1;
+    while (((frame->width + min_px - 1) / min_px) * ((frame->height + min_px - 1) / min_px) >
            IH_WINDOWS_CELLS_MAX) {
-        least_px++;
+        min_px++;
     }
-    int32_t cell_px = least_px;
+    int32_t cell_px = min_px;
     survey(frame, rig, cell_px, ih_max_s32(1, cell_px / 2), s);
     for (int32_t i = 0; i < DOUBLINGS_MAX && connected_percent(s) < CONNECTED_MIN_PERCENT; i++) {
         cell_px *= 2;
         survey(frame, rig, cell_px, cell_px / 2, s);
     }
-    if (cell_px == least_px) {
+    if (cell_px == min_px) {
         return 0;
     }
     survey(frame, rig, cell_px / 2, cell_px / 2, s);

@@ -9,9 +9,9 @@
 /* Enough for a lens whose iteration gains only a third a step; usual ones need five. */
 #define UNDISTORT_STEPS 64
 #define BROWN_MAX 16
-#define RADIAL_LEAST_Q28 (ONE_Q28 / 8)
+#define RADIAL_MIN_Q28 (ONE_Q28 / 8)
 #define NEWTON_STEPS 5
-#define NEWTON_MOST_Q28 (1 << 25)
+#define NEWTON_MAX_Q28 (1 << 25)
 /* A step no longer than this is the last one: what it leaves is what the slopes are off, of usual lenses a hundredth
  * of it. Where that is too much, and where slopes are far off, one that need not be right at all. */
 #define NEWTON_LAST_Q28 (1 << 14)
@@ -94,7 +94,7 @@ static void undistort_slowly(const struct ih_calibration *c, int32_t xd, int32_t
     for (int i = 0; i < UNDISTORT_STEPS; i++) {
         int64_t radial, dx, dy;
         brown(c, x, y, &radial, &dx, &dy);
-        radial = radial < RADIAL_LEAST_Q28 ? RADIAL_LEAST_Q28 : radial;
+        radial = radial < RADIAL_MIN_Q28 ? RADIAL_MIN_Q28 : radial;
         const int32_t next_x = limit_tan_q28(ih_div_round((xd - dx) * ONE_Q28, radial));
         const int32_t next_y = limit_tan_q28(ih_div_round((yd - dy) * ONE_Q28, radial));
         const bool still = next_x == x && next_y == y;
@@ -142,8 +142,8 @@ static bool undistort_quickly(const struct ih_rig *rig, int32_t xd, int32_t yd, 
         brown(&rig->calibration, x, y, &radial, &dx, &dy);
         const int64_t off_x = xd - dx - ih_mul_shift(x, radial, 28);
         const int64_t off_y = yd - dy - ih_mul_shift(y, radial, 28);
-        if (radial < RADIAL_LEAST_Q28 ||
-            ih_max_s64(ih_abs_s64(off_x), ih_abs_s64(off_y)) > NEWTON_MOST_Q28) {
+        if (radial < RADIAL_MIN_Q28 ||
+            ih_max_s64(ih_abs_s64(off_x), ih_abs_s64(off_y)) > NEWTON_MAX_Q28) {
             return false;
         }
         const int64_t out = 2 * (product_q28(xd, (int32_t)off_x) + product_q28(yd, (int32_t)off_y));
@@ -178,7 +178,7 @@ void ih_rig_undistort(const struct ih_rig *rig, int32_t u_px_q12, int32_t v_px_q
  * does not fit starts from where it is seen. */
 static void fill_back(struct ih_rig *rig)
 {
-    const int64_t most = (int64_t)8 << 24;
+    const int64_t max = (int64_t)8 << 24;
     const int64_t k1 = rig->calibration.k1_q24;
     const int64_t k2 = rig->calibration.k2_q24;
     if (ih_abs_s64(k1) > 1 << 24 || ih_abs_s64(k2) > 1 << 24) {
@@ -188,7 +188,7 @@ static void fill_back(struct ih_rig *rig)
     rig->back_q24[0] = (int32_t)-k1;
     rig->back_q24[1] = (int32_t)(3 * k1k1 - k2);
     rig->back_q24[2] = (int32_t)ih_clamp_s64(
-        ih_mul_shift(k1, 8 * k2 - 12 * k1k1, 24) - rig->calibration.k3_q24, most);
+        ih_mul_shift(k1, 8 * k2 - 12 * k1k1, 24) - rig->calibration.k3_q24, max);
 }
 
 void ih_rig_to_pixel(const struct ih_rig *rig, int32_t x_q28, int32_t y_q28, int32_t *u_px_q12,

@@ -31,7 +31,7 @@ static inline ih_lane ih_lane_high_half(ih_lane a, ih_lane b)
     return ih_lane_wrap((int32_t)a * b >> 16);
 }
 
-static inline ih_lane ih_lane_least(ih_lane a, ih_lane b)
+static inline ih_lane ih_lane_min(ih_lane a, ih_lane b)
 {
     if (a < b) {
         return a;
@@ -39,7 +39,7 @@ static inline ih_lane ih_lane_least(ih_lane a, ih_lane b)
     return b;
 }
 
-static inline ih_lane ih_lane_most(ih_lane a, ih_lane b)
+static inline ih_lane ih_lane_max(ih_lane a, ih_lane b)
 {
     if (a > b) {
         return a;
@@ -49,7 +49,7 @@ static inline ih_lane ih_lane_most(ih_lane a, ih_lane b)
 
 static inline ih_lane ih_lane_within(ih_lane value, ih_lane limit)
 {
-    return ih_lane_most(ih_lane_least(value, limit), ih_lane_wrap(-limit));
+    return ih_lane_max(ih_lane_min(value, limit), ih_lane_wrap(-limit));
 }
 
 static inline ih_lane ih_lane_is_above(ih_lane a, ih_lane b)

@@ -40,7 +40,7 @@ static inline ih_lanes ih_lanes_both(uint32_t both)
     return _mm256_set1_epi32((int32_t)both);
 }
 
-static inline ih_lanes ih_lanes_greatest(ih_lanes a, ih_lanes b)
+static inline ih_lanes ih_lanes_max(ih_lanes a, ih_lanes b)
 {
     return _mm256_max_epi16(a, b);
 }
@@ -91,7 +91,7 @@ static inline ih_lanes ih_lanes_both(uint32_t both)
     return _mm_set1_epi32((int32_t)both);
 }
 
-static inline ih_lanes ih_lanes_greatest(ih_lanes a, ih_lanes b)
+static inline ih_lanes ih_lanes_max(ih_lanes a, ih_lanes b)
 {
     return _mm_max_epi16(a, b);
 }
@@ -131,7 +131,7 @@ static inline ih_lanes ih_lanes_both(uint32_t both)
     return vreinterpretq_s16_u32(vdupq_n_u32(both));
 }
 
-static inline ih_lanes ih_lanes_greatest(ih_lanes a, ih_lanes b)
+static inline ih_lanes ih_lanes_max(ih_lanes a, ih_lanes b)
 {
     return vmaxq_s16(a, b);
 }

@@ -14,7 +14,7 @@ void ih_samples_params_default(struct ih_samples_params *params)
     *params = (struct ih_samples_params){
         .isolated_mm = 60,
         .clip_behind_mm = 250,
-        .clip_least_mm = 1100,
+        .clip_min_mm = 1100,
         .fill_neighbours = 3,
         .fill_root_weight_q15 = 17948, /* sqrt(0.3) */
     };
@@ -69,7 +69,7 @@ int32_t ih_samples_near_mm_q8(const struct ih_points *points)
 
 /* From the least to the most, both included. */
 struct depths {
-    int32_t least_q8, most_q8;
+    int32_t min_q8, max_q8;
 };
 
 static const struct depths any_depth = {0, INT32_MAX};
@@ -78,8 +78,7 @@ static const struct depths any_depth = {0, INT32_MAX};
 static inline bool is_there(const struct ih_point *other, int32_t clip_q8, struct depths depths)
 {
     const int32_t depth_q8 = ih_min_s32(other->depth_mm_q8, clip_q8);
-    return other->state == IH_POINT_SEEN && depth_q8 >= depths.least_q8 &&
-           depth_q8 <= depths.most_q8;
+    return other->state == IH_POINT_SEEN && depth_q8 >= depths.min_q8 && depth_q8 <= depths.max_q8;
 }
 
 /* The 8 around; those beside, above and below are the likelier ones. */
@@ -103,12 +102,12 @@ static bool is_at_edge(int32_t slot)
 /* How many of the 8 neighbours are seen, and of those stand within so much of a depth; no more than most are
  * counted. */
 static int32_t count_around(const struct ih_points *points, int32_t slot, int32_t clip_q8,
-                            struct depths depths, int32_t most)
+                            struct depths depths, int32_t max)
 {
     const struct ih_point *point = &points->point[slot];
     const bool is_edge = is_at_edge(slot);
     int32_t count = 0;
-    for (int i = 0; i < 8 && count < most; i++) {
+    for (int i = 0; i < 8 && count < max; i++) {
         if (!is_edge || is_step_inside(slot, step_around[i])) {
             count += is_there(&point[step_around[i]], clip_q8, depths);
         }
@@ -221,7 +220,7 @@ void ih_samples_select(const struct ih_points *points, const struct ih_dots *dot
     out->nearest_mm_q8 = INT32_MAX;
     out->clip_mm_q8 = ih_samples_near_mm_q8(points) + (params->clip_behind_mm << 8);
     if (rig->calibration.kind == IH_RIG_DOTS) {
-        out->clip_mm_q8 = ih_max_s32(out->clip_mm_q8, params->clip_least_mm << 8);
+        out->clip_mm_q8 = ih_max_s32(out->clip_mm_q8, params->clip_min_mm << 8);
     }
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
         if (points->point[slot].state == IH_POINT_SEEN) {

@@ -6,7 +6,7 @@
  * Way:   1. Clip: depth := min(depth, p8 + clip_behind), p8 the 8th percentile of the seen depths
  *           (the sorted depths' entry number count * 8 / 100): the surface has no business with the
  *           far wall, and the higher its step beside a head, the more it rings. With a dot rig the
- *           clip is at clip_least or farther: there the dots stand the denser the nearer they are,
+ *           clip is at clip_min or farther: there the dots stand the denser the nearer they are,
  *           and a near hand must not clip the head behind it. A range image's lattice has the same
  *           pitch at any depth.
  *        2. Isolated: a point with at least 3 of 8 neighbours whose clipped depth differs by more
@@ -30,7 +30,7 @@
 
 struct ih_samples_params {
     int32_t isolated_mm;
-    int32_t clip_behind_mm, clip_least_mm;
+    int32_t clip_behind_mm, clip_min_mm;
     int32_t fill_neighbours;
     int32_t fill_root_weight_q15; /* square root of the weight; 0 = missing dots are ignored */
 };

@@ -5,7 +5,7 @@
 
 #include "base/ih_fix.h"
 #include "base/ih_range.h"
-#include "surface/ih_basis.h"
+#include "surface/ih_multiquadric.h"
 
 /* Limits of 64 bits: compilers make no vectors of them by themselves. */
 #if defined __x86_64__ && defined __AVX2__
@@ -15,9 +15,9 @@
 #define TERMS_MAX IH_SURFACE_TERMS_MAX
 #define CENTRES_MAX IH_SURFACE_CENTRES_MAX
 
-/* Short rows: the basis scaled column by column to IH_NORMAL_MOST, less one step that rounding and the roots'
+/* Short rows: the basis scaled column by column to IH_NORMAL_EQUATIONS_MOST, less one step that rounding and the roots'
  * errors may add. The scale in Q17 is below 2^31, as no bound is below 1. */
-#define ROW_MOST (IH_NORMAL_MOST - 1)
+#define ROW_MAX (IH_NORMAL_EQUATIONS_MAX - 1)
 #define ROW_SCALE_BITS 17
 /* Scale factors of the sums are 0.995 * 2^43 / sqrt(sum), 2^27.4 and more, for sums of 2^22 and more. */
 #define SCALE_SHIFT 43
@@ -46,18 +46,19 @@
 #define CORRECTIONS_MAX 8
 #define CORRECTIONS_FEW 3
 #define SQUARES_LOG2_NONE (-1000)
-#define SQUARES_LOG2_MOST 1000
+#define SQUARES_LOG2_MAX 1000
 /* Samples nearer to the surface than so many eighths of the limit keep their weight without being asked again after
  * the last correction. */
 #define FAR_EIGHTHS 6
 /* So many rows of the factor, the last ones, have more bits: of samples on a lattice, the pivots of all others are
  * small. */
-#define FINE_ROWS (2 * IH_NORMAL_ROWS)
-/* Steps of the table, filled up to whole lines of ih_basis. */
-#define TABLE_LINE IH_BASIS_ACROSS_MAX
+#define FINE_ROWS (2 * IH_NORMAL_EQUATIONS_ROWS)
+/* Steps of the table, filled up to whole lines of ih_multiquadric. */
+#define TABLE_LINE IH_MULTIQUADRIC_ACROSS_MAX
 #define TABLE_WIDTH (4 * TABLE_LINE)
 
-_Static_assert(CENTRES_MAX == IH_BASIS_ACROSS_MAX && TERMS_MAX == IH_NORMAL_TERMS_MAX,
+_Static_assert(CENTRES_MAX == IH_MULTIQUADRIC_ACROSS_MAX &&
+                   TERMS_MAX == IH_NORMAL_EQUATIONS_TERMS_MAX,
                "one system");
 _Static_assert(TABLE_WIDTH >= IH_SURFACE_STEPS && IH_SURFACE_STEPS % 2 == 0, "all steps");
 
@@ -120,7 +121,7 @@ static void fill_row(struct ih_surface_scratch *scratch, const struct ih_sample 
     uint32_t dy2_q18[CENTRES_MAX];
     square_distances(scratch, sample->x_q16, 1 << 18, dx2_q18);
     square_distances(scratch, sample->y_q16, 0, dy2_q18);
-    ih_basis_roots(dx2_q18, scratch->centres, dy2_q18, scratch->centres, row_q20);
+    ih_multiquadric_roots(dx2_q18, scratch->centres, dy2_q18, scratch->centres, row_q20);
     IH_IN_RANGE(row_q20[0], (1 << 20) - 1, IH_RANGE_BASIS_Q20);
 }
 
@@ -129,7 +130,7 @@ static int32_t rows_together(const struct ih_samples *samples,
                              const struct ih_surface_scratch *scratch, int32_t i)
 {
     const int32_t end = ih_min_s32(samples->sample_count, scratch->kept_count);
-    return i + IH_BASIS_ROWS <= end ? IH_BASIS_ROWS : 1;
+    return i + IH_MULTIQUADRIC_ROWS <= end ? IH_MULTIQUADRIC_ROWS : 1;
 }
 
 /* Work out the row of sample i, into the place where it is kept, if there is one. */
@@ -151,12 +152,12 @@ static const uint32_t *row_of(const struct ih_samples *samples, int32_t i,
 /* value * 2^up, or / 2^-up, rounded, limited to 2^62. */
 static int64_t shift_by(int64_t value, int up)
 {
-    const int64_t most = (int64_t)1 << 62;
+    const int64_t max = (int64_t)1 << 62;
     if (up <= 0) {
         return ih_shift_round(value, ih_min_s32(-up, 62));
     }
     if (ih_bits_u64((uint64_t)ih_abs_s64(value)) + up > 62) {
-        return value < 0 ? -most : value > 0 ? most : 0;
+        return value < 0 ? -max : value > 0 ? max : 0;
     }
     return value * ((int64_t)1 << up);
 }
@@ -181,12 +182,12 @@ static int64_t weight_q30(const struct ih_surface_scratch *scratch, int32_t root
 static bool set_weight_shift(struct ih_surface_scratch *scratch, const int32_t *root_weight_q15,
                              int32_t count)
 {
-    int32_t most_q15 = 0;
+    int32_t max_q15 = 0;
     for (int32_t i = 0; i < count; i++) {
-        most_q15 = ih_max_s32(most_q15, root_weight_q15[i]);
+        max_q15 = ih_max_s32(max_q15, root_weight_q15[i]);
     }
-    scratch->weight_shift = ih_max_s32(0, 15 - ih_bits_u64((uint64_t)most_q15));
-    return most_q15 > 0;
+    scratch->weight_shift = ih_max_s32(0, 15 - ih_bits_u64((uint64_t)max_q15));
+    return max_q15 > 0;
 }
 
 /* Diagonal of R^T W R: sums of weight * (dx^2 + dy^2 + 1), from the samples' moments. Returns whether one is
@@ -261,12 +262,12 @@ static void set_row_scale(struct ih_surface_scratch *scratch, const struct ih_sa
             ((far_q18[0][i % scratch->centres] + far_q18[1][i / scratch->centres]) >> 8) +
             (1 << 10) + 2;
         const uint32_t norm_q10 = scratch->norm_q10[i] + 2;
-        const uint32_t least_q10 = box_q10 < norm_q10 ? box_q10 : norm_q10;
-        const uint64_t most_q10 = least_q10 < 1 << 10 ? 1 << 10 : least_q10;
-        const uint64_t most_q16 = (uint64_t)ih_isqrt_u54(most_q10 << 22) + 1;
-        const uint32_t here = (uint32_t)(norm_q10 / most_q10) + 2;
+        const uint32_t min_q10 = box_q10 < norm_q10 ? box_q10 : norm_q10;
+        const uint64_t max_q10 = min_q10 < 1 << 10 ? 1 << 10 : min_q10;
+        const uint64_t max_q16 = (uint64_t)ih_isqrt_u54(max_q10 << 22) + 1;
+        const uint32_t here = (uint32_t)(norm_q10 / max_q10) + 2;
         scratch->row_scale_q17[i] =
-            (uint32_t)(((uint64_t)ROW_MOST << (ROW_SCALE_BITS + 16)) / most_q16);
+            (uint32_t)(((uint64_t)ROW_MAX << (ROW_SCALE_BITS + 16)) / max_q16);
         ratio = here > ratio ? here : ratio;
     }
     scratch->normal_shift = ih_max_s32(1, ih_bits_u64(ratio) - 3);
@@ -301,13 +302,12 @@ static void put_row(const struct ih_surface_scratch *scratch, const uint32_t *ro
 static void set_off_fraction(struct ih_surface_scratch *scratch, const struct ih_samples *samples,
                              int32_t mean_mm_q8)
 {
-    int32_t most_mm_q8 = 0;
+    int32_t max_mm_q8 = 0;
     for (int32_t i = 0; i < samples->sample_count; i++) {
-        most_mm_q8 =
-            ih_max_s32(most_mm_q8, ih_abs_s32(samples->sample[i].depth_mm_q8 - mean_mm_q8));
+        max_mm_q8 = ih_max_s32(max_mm_q8, ih_abs_s32(samples->sample[i].depth_mm_q8 - mean_mm_q8));
     }
     scratch->off_fraction =
-        ih_min_s32(8 + OFF_BITS - 2 - ih_bits_u64((uint64_t)most_mm_q8), OFF_FRACTION_MAX);
+        ih_min_s32(8 + OFF_BITS - 2 - ih_bits_u64((uint64_t)max_mm_q8), OFF_FRACTION_MAX);
 }
 
 /* A depth as residuals are: off_fraction bits. */
@@ -334,9 +334,9 @@ static int32_t push_of(int64_t off, int64_t weight)
 static void add_right(struct ih_surface_scratch *scratch, const uint32_t *row_q20, int64_t off,
                       int64_t weight)
 {
-    int32_t push[IH_BASIS_ROWS] = {0};
+    int32_t push[IH_MULTIQUADRIC_ROWS] = {0};
     push[0] = push_of(off, weight);
-    ih_basis_add(row_q20, 1, push, scratch->right, scratch->terms);
+    ih_multiquadric_add(row_q20, 1, push, scratch->right, scratch->terms);
 }
 
 /* The root weight of sample i: of one that is moved it stays as it was. */
@@ -348,9 +348,9 @@ static int32_t root_weight_of(const struct ih_samples *samples,
 }
 
 /* Pairs from row number `count` on add nothing. */
-static void clear_pairs(uint32_t pair[IH_NORMAL_PAIRS][TERMS_MAX], int32_t count)
+static void clear_pairs(uint32_t pair[IH_NORMAL_EQUATIONS_PAIRS][TERMS_MAX], int32_t count)
 {
-    for (int32_t at = (count + 1) / 2; at < IH_NORMAL_PAIRS; at++) {
+    for (int32_t at = (count + 1) / 2; at < IH_NORMAL_EQUATIONS_PAIRS; at++) {
         memset(pair[at], 0, sizeof pair[at]);
     }
 }
@@ -360,15 +360,17 @@ static void sum_all(const struct ih_samples *samples, const struct ih_surface_pa
                     struct ih_surface_scratch *scratch, const struct ih_surface *out)
 {
     const int32_t last = samples->sample_count - 1;
-    memset(scratch->normal, 0, (size_t)IH_NORMAL_LINE(scratch->terms) * sizeof *scratch->normal);
+    memset(scratch->normal, 0,
+           (size_t)IH_NORMAL_EQUATIONS_LINE(scratch->terms) * sizeof *scratch->normal);
     for (int32_t i = 0; i <= last; i++) {
-        const int32_t at = i % IH_NORMAL_ROWS;
+        const int32_t at = i % IH_NORMAL_EQUATIONS_ROWS;
         const uint32_t *row_q20 = new_row(samples, i, scratch);
         put_row(scratch, row_q20, root_weight_of(samples, params, out, i), at % 2 != 0,
                 scratch->pair[at / 2]);
-        if (at + 1 == IH_NORMAL_ROWS || i == last) {
+        if (at + 1 == IH_NORMAL_EQUATIONS_ROWS || i == last) {
             clear_pairs(scratch->pair, at + 1);
-            ih_normal_add(scratch->pair, scratch->terms, scratch->normal_shift, scratch->normal);
+            ih_normal_equations_add(scratch->pair, scratch->terms, scratch->normal_shift,
+                                    scratch->normal);
         }
     }
 }
@@ -377,7 +379,7 @@ static void sum_all(const struct ih_samples *samples, const struct ih_surface_pa
 static void set_scale(struct ih_surface_scratch *scratch, uint32_t scale[TERMS_MAX])
 {
     for (int32_t i = 0; i < scratch->terms; i++) {
-        const int32_t sum = scratch->normal[ih_normal_line(i) + i];
+        const int32_t sum = scratch->normal[ih_normal_equations_line(i) + i];
         const uint64_t root_q11 =
             (uint64_t)ih_isqrt_u54((uint64_t)ih_max_s32(sum, 1) << 22) + 1; /* it stays < 1 */
         const uint64_t value = ((uint64_t)SCALE_NUMERATOR << 11) / root_q11;
@@ -394,9 +396,9 @@ static void scale_lines(const struct ih_surface_params *params, struct ih_surfac
     uint32_t scale[TERMS_MAX];
     set_scale(scratch, scale);
     /* |N_ij| <= root_i root_j: below 2^30.6. Of no products' sum, rounding may leave a step below 0. */
-    ih_normal_scale(scratch->normal, scratch->terms, scale, SCALE_STEP, scratch->factor);
+    ih_normal_equations_scale(scratch->normal, scratch->terms, scale, SCALE_STEP, scratch->factor);
     for (int32_t i = 0; i < scratch->terms; i++) {
-        int32_t *at_q30 = &scratch->factor[ih_normal_line(i) + i];
+        int32_t *at_q30 = &scratch->factor[ih_normal_equations_line(i) + i];
         *at_q30 += (int32_t)ih_mul_shift(*at_q30, params->ridge_q30, 30);
         IH_IN_RANGE(*at_q30, 0, IH_RANGE_SCALED_Q30);
     }
@@ -409,9 +411,10 @@ static bool try_factor(const struct ih_surface_params *params, int32_t fine_from
 {
     scale_lines(params, scratch);
     scratch->is_fine = fine_from == 0;
-    scratch->limit_log2 = SQUARES_LOG2_MOST;
-    return ih_normal_factor(scratch->terms, fine_from, params->ridge_q30 - params->ridge_q30 / 4,
-                            scratch->factor, scratch->pair);
+    scratch->limit_log2 = SQUARES_LOG2_MAX;
+    return ih_normal_equations_factor(scratch->terms, fine_from,
+                                      params->ridge_q30 - params->ridge_q30 / 4, scratch->factor,
+                                      scratch->pair);
 }
 
 /* With more bits in all rows. Where the sums have no room of their own they are made anew. */
@@ -430,7 +433,7 @@ static void factor(const struct ih_samples *samples, const struct ih_surface_par
     if (!try_factor(params, scratch->terms - FINE_ROWS, scratch)) {
         factor_fine(samples, params, out, scratch);
     }
-    scratch->squares_log2 = SQUARES_LOG2_MOST;
+    scratch->squares_log2 = SQUARES_LOG2_MAX;
 }
 
 /* Set the right side to the ridge's share, ridge * N_ii * c_i, or take it from what is there. */
@@ -453,17 +456,17 @@ static void set_or_take_ridge(const struct ih_surface_params *params, bool is_ta
 static int scale_right(struct ih_surface_scratch *scratch)
 {
     int64_t *right = scratch->right; /* scaled in place: it has served */
-    uint64_t most = 0;
+    uint64_t max = 0;
     for (int32_t i = 0; i < scratch->terms; i++) {
-        most |= (uint64_t)ih_abs_s64(right[i]);
+        max |= (uint64_t)ih_abs_s64(right[i]);
     }
-    const int first = ih_max_s32(0, ih_bits_u64(most) - 30);
-    most = 0;
+    const int first = ih_max_s32(0, ih_bits_u64(max) - 30);
+    max = 0;
     for (int32_t i = 0; i < scratch->terms; i++) {
         right[i] = ih_shift_round(right[i], first) * (int64_t)scratch->unknown_scale_q29[i];
-        most |= (uint64_t)ih_abs_s64(right[i]);
+        max |= (uint64_t)ih_abs_s64(right[i]);
     }
-    const int second = ih_max_s32(0, ih_bits_u64(most) - RIGHT_BITS);
+    const int second = ih_max_s32(0, ih_bits_u64(max) - RIGHT_BITS);
     for (int32_t i = 0; i < scratch->terms; i++) {
         scratch->solution[i] = (int32_t)ih_shift_round(right[i], second);
     }
@@ -474,16 +477,16 @@ static int scale_right(struct ih_surface_scratch *scratch)
  * them. */
 static void add_solution(struct ih_surface_scratch *scratch, int fraction)
 {
-    uint64_t most = 0, most_before = 0;
+    uint64_t max = 0, max_before = 0;
     for (int32_t i = 0; i < scratch->terms; i++) {
         const int64_t product = (int64_t)scratch->solution[i] * scratch->unknown_scale_q29[i];
-        most |= (uint64_t)ih_abs_s64(product); /* < 2^57 */
-        most_before |= (uint64_t)ih_abs_s32(scratch->coefficient[i]);
+        max |= (uint64_t)ih_abs_s64(product); /* < 2^57 */
+        max_before |= (uint64_t)ih_abs_s32(scratch->coefficient[i]);
     }
     const int product_shift = fraction + UNKNOWN_SCALE_BITS;
-    const int own = product_shift - ih_bits_u64(most) + SOLUTION_BITS - 1;
-    const int before = scratch->coefficient_shift - ih_bits_u64(most_before) + SOLUTION_BITS - 1;
-    const int shift = most_before == 0 ? own : ih_min_s32(own, before);
+    const int own = product_shift - ih_bits_u64(max) + SOLUTION_BITS - 1;
+    const int before = scratch->coefficient_shift - ih_bits_u64(max_before) + SOLUTION_BITS - 1;
+    const int shift = max_before == 0 ? own : ih_min_s32(own, before);
     for (int32_t i = 0; i < scratch->terms; i++) {
         const int64_t product = (int64_t)scratch->solution[i] * scratch->unknown_scale_q29[i];
         scratch->coefficient[i] =
@@ -504,8 +507,8 @@ static bool correct(const struct ih_surface_params *params, struct ih_surface_sc
     set_or_take_ridge(params, true, scratch);
     /* A x = b is (right side) / 2^normal_shift: x and b have as many fraction bits more. */
     const int fraction = scale_right(scratch) + scratch->normal_shift;
-    if (!ih_normal_solve(scratch->factor, scratch->terms, scratch->solution, scratch->solution,
-                         &exponent)) {
+    if (!ih_normal_equations_solve(scratch->factor, scratch->terms, scratch->solution,
+                                   scratch->solution, &exponent)) {
         return false;
     }
     int64_t squares = 0; /* 144 * 2^50 */
@@ -549,10 +552,10 @@ static void leave(const struct ih_samples *samples, const struct ih_surface_para
     for (int32_t first = 0; first < samples->sample_count; first += count) {
         count = rows_together(samples, scratch, first);
         const uint32_t *row_q20 = row_of(samples, first, scratch);
-        int64_t sum[IH_BASIS_ROWS] = {0};
-        int32_t push[IH_BASIS_ROWS];
+        int64_t sum[IH_MULTIQUADRIC_ROWS] = {0};
+        int32_t push[IH_MULTIQUADRIC_ROWS];
         if (!is_first) {
-            ih_basis_sum(row_q20, count, scratch->coefficient, scratch->terms, sum);
+            ih_multiquadric_sum(row_q20, count, scratch->coefficient, scratch->terms, sum);
         }
         for (int32_t k = 0; k < count; k++) {
             const int32_t i = first + k;
@@ -562,7 +565,7 @@ static void leave(const struct ih_samples *samples, const struct ih_surface_para
             scratch->is_far[i] = ih_abs_s64(off) >= far;
             push[k] = push_of(off, weight_q30(scratch, root_weight_of(samples, params, out, i)));
         }
-        ih_basis_add(row_q20, count, push, scratch->right, scratch->terms);
+        ih_multiquadric_add(row_q20, count, push, scratch->right, scratch->terms);
     }
 }
 
@@ -572,7 +575,7 @@ static void refine(const struct ih_samples *samples, const struct ih_surface_par
                    struct ih_surface_scratch *scratch)
 {
     /* What fewer samples than unknowns do not see is found slowly. */
-    const int32_t least = samples->sample_count < scratch->terms ? CORRECTIONS_FEW : 1;
+    const int32_t min = samples->sample_count < scratch->terms ? CORRECTIONS_FEW : 1;
     int32_t before;
     int32_t count = 0;
     do {
@@ -580,7 +583,7 @@ static void refine(const struct ih_samples *samples, const struct ih_surface_par
         leave(samples, params, out, false, scratch);
         count++;
     } while (correct_or_refactor(samples, params, out, scratch) &&
-             (count < least ||
+             (count < min ||
               (2 * scratch->squares_log2 - before > enough_log2 && count < CORRECTIONS_MAX)));
 }
 
@@ -602,9 +605,9 @@ static int32_t reweight(const struct ih_sample *sample, const struct ih_surface_
  * rounded. */
 static void exchange_pairs(struct ih_surface_scratch *scratch)
 {
-    ih_normal_take(scratch->pair, scratch->terms, scratch->normal_shift, scratch->normal);
-    ih_normal_add(scratch->pair + IH_NORMAL_PAIRS, scratch->terms, scratch->normal_shift,
-                  scratch->normal);
+    ih_normal_equations_take(scratch->pair, scratch->terms, scratch->normal_shift, scratch->normal);
+    ih_normal_equations_add(scratch->pair + IH_NORMAL_EQUATIONS_PAIRS, scratch->terms,
+                            scratch->normal_shift, scratch->normal);
 }
 
 /* Exchange what sample number `at` of those whose weight changed had brought to the sums. */
@@ -613,8 +616,8 @@ static void exchange_sample(struct ih_surface_scratch *scratch, const uint32_t *
 {
     put_row(scratch, row_q20, before_q15, at % 2 != 0, scratch->pair[at / 2]);
     put_row(scratch, row_q20, root_weight_q15, at % 2 != 0,
-            scratch->pair[IH_NORMAL_PAIRS + at / 2]);
-    if (at + 1 == IH_NORMAL_ROWS) {
+            scratch->pair[IH_NORMAL_EQUATIONS_PAIRS + at / 2]);
+    if (at + 1 == IH_NORMAL_EQUATIONS_ROWS) {
         exchange_pairs(scratch);
     }
 }
@@ -646,8 +649,8 @@ static int32_t change_far(const struct ih_samples *samples, const struct ih_surf
             continue;
         }
         const uint32_t *row_q20 = row_of(samples, i, scratch);
-        int64_t sum[IH_BASIS_ROWS];
-        ih_basis_sum(row_q20, 1, scratch->coefficient, scratch->terms, sum);
+        int64_t sum[IH_MULTIQUADRIC_ROWS];
+        ih_multiquadric_sum(row_q20, 1, scratch->coefficient, scratch->terms, sum);
         const int64_t off = off_of_sum(scratch, sum[0], sample->depth_mm_q8 - out->mean_mm_q8);
         const int32_t root_q15 =
             reweight(sample, params, ih_shift_round(off, scratch->off_fraction - 11));
@@ -660,14 +663,14 @@ static int32_t change_far(const struct ih_samples *samples, const struct ih_surf
         } else {
             add_right(scratch, row_q20, off,
                       weight_q30(scratch, root_q15) - weight_q30(scratch, sample->root_weight_q15));
-            exchange_sample(scratch, row_q20, lighter % IH_NORMAL_ROWS, sample->root_weight_q15,
-                            root_q15);
+            exchange_sample(scratch, row_q20, lighter % IH_NORMAL_EQUATIONS_ROWS,
+                            sample->root_weight_q15, root_q15);
         }
         lighter++;
     }
-    if (!params->is_moving && lighter % IH_NORMAL_ROWS != 0) {
-        clear_pairs(scratch->pair, lighter % IH_NORMAL_ROWS);
-        clear_pairs(scratch->pair + IH_NORMAL_PAIRS, lighter % IH_NORMAL_ROWS);
+    if (!params->is_moving && lighter % IH_NORMAL_EQUATIONS_ROWS != 0) {
+        clear_pairs(scratch->pair, lighter % IH_NORMAL_EQUATIONS_ROWS);
+        clear_pairs(scratch->pair + IH_NORMAL_EQUATIONS_PAIRS, lighter % IH_NORMAL_EQUATIONS_ROWS);
         exchange_pairs(scratch);
     }
     return lighter;
@@ -733,7 +736,7 @@ static bool fit_again(const struct ih_samples *samples, const struct ih_surface_
     out->downweighted_count = change_far(samples, params, scratch, out);
     if (out->downweighted_count > 0) {
         if (params->is_moving) {
-            scratch->limit_log2 = SQUARES_LOG2_MOST;
+            scratch->limit_log2 = SQUARES_LOG2_MAX;
         } else if (!factor_again(samples, params, scratch, out)) {
             return false;
         }
@@ -760,7 +763,7 @@ static void fill_table(struct ih_surface_scratch *scratch)
         for (int32_t first = 0; first < TABLE_WIDTH; first += TABLE_LINE) {
             const int32_t count = ih_min_s32(TABLE_LINE, IH_SURFACE_STEPS - first);
             uint32_t root_q20[2][TABLE_LINE];
-            ih_basis_roots(&square_q18[first], TABLE_LINE, &one_more_q18[b], 2, root_q20[0]);
+            ih_multiquadric_roots(&square_q18[first], TABLE_LINE, &one_more_q18[b], 2, root_q20[0]);
             for (int32_t k = 0; k < 2; k++) {
                 int32_t *middle = &scratch->of.grid.table_q20[b + k][IH_SURFACE_STEPS - 1];
                 for (int32_t a = 0; a < count; a++) {
@@ -773,7 +776,7 @@ static void fill_table(struct ih_surface_scratch *scratch)
 }
 
 /* Nearer than this no node can be: see IH_SURFACE_OVERSHOOT_MM. */
-static int32_t least_depth_mm_q8(const struct ih_samples *samples)
+static int32_t min_depth_mm_q8(const struct ih_samples *samples)
 {
     int32_t nearest_q8 = INT32_MAX;
     for (int32_t i = 0; i < samples->sample_count; i++) {
@@ -835,26 +838,26 @@ static void sum_row(const struct ih_surface_scratch *scratch, const int32_t *bet
         sum_q20[row] = scratch->of.grid.sum_q20[b][0];
         difference_q20[row] = scratch->of.grid.difference_q20[b][0];
     }
-    ih_basis_lines(scratch->solution, sum_q20, centres, centres / 2, IH_SURFACE_HALF, even);
-    ih_basis_lines(between, difference_q20, centres, centres / 2, IH_SURFACE_HALF, odd);
+    ih_multiquadric_lines(scratch->solution, sum_q20, centres, centres / 2, IH_SURFACE_HALF, even);
+    ih_multiquadric_lines(between, difference_q20, centres, centres / 2, IH_SURFACE_HALF, odd);
 }
 
 /* How sums become depths: sum_n c_n B_n in Q8 is 2^-shift of one. */
 struct depth_way {
     int shift;
-    int32_t mean_mm_q8, least_mm_q8, most_mm_q8;
+    int32_t mean_mm_q8, min_mm_q8, max_mm_q8;
 };
 
 static inline int32_t depth_of_sum(const struct depth_way *way, int64_t sum)
 {
     const int64_t depth_q8 = way->shift > 0 ? ih_shift_round(sum, way->shift) : INT32_MAX;
-    return ih_clamp_s32(ih_saturate_s32(way->mean_mm_q8 + depth_q8), way->least_mm_q8,
-                        way->most_mm_q8);
+    return ih_clamp_s32(ih_saturate_s32(way->mean_mm_q8 + depth_q8), way->min_mm_q8,
+                        way->max_mm_q8);
 }
 
 #if defined __x86_64__ && defined __AVX2__
 /* With a greater shift 64 bits might not hold the limits beside the sums: below 2^60 they are, those below 2^62.7. */
-#define SHIFT_MOST 36
+#define SHIFT_MAX 36
 _Static_assert(IH_SURFACE_HALF % 8 == 0, "vectors of eight nodes");
 
 /* Four sums, so much behind the least depth that they are never negative: Q8, limited. */
@@ -863,12 +866,12 @@ static inline __m256i limited(const struct depth_way *way, __m256i sum)
     const int64_t half = (int64_t)1 << (way->shift - 1);
     const int64_t unit = (int64_t)1 << way->shift;
     const __m256i more =
-        _mm256_set1_epi64x(half + ((int64_t)way->mean_mm_q8 - way->least_mm_q8) * unit);
-    const __m256i most = _mm256_set1_epi64x(((int64_t)way->most_mm_q8 - way->least_mm_q8) * unit);
+        _mm256_set1_epi64x(half + ((int64_t)way->mean_mm_q8 - way->min_mm_q8) * unit);
+    const __m256i max = _mm256_set1_epi64x(((int64_t)way->max_mm_q8 - way->min_mm_q8) * unit);
     const __m256i behind = _mm256_add_epi64(sum, more);
-    const __m256i least =
+    const __m256i min =
         _mm256_andnot_si256(_mm256_cmpgt_epi64(_mm256_setzero_si256(), behind), behind);
-    const __m256i value = _mm256_blendv_epi8(least, most, _mm256_cmpgt_epi64(least, most));
+    const __m256i value = _mm256_blendv_epi8(min, max, _mm256_cmpgt_epi64(min, max));
     return _mm256_srl_epi64(value, _mm_cvtsi32_si128(way->shift));
 }
 
@@ -879,7 +882,7 @@ static inline __m256i depths_of(const struct depth_way *way, __m256i first, __m2
     const __m256i both =
         _mm256_or_si256(limited(way, first), _mm256_slli_epi64(limited(way, last), 32));
     return _mm256_add_epi32(_mm256_permutevar8x32_epi32(both, order),
-                            _mm256_set1_epi32(way->least_mm_q8));
+                            _mm256_set1_epi32(way->min_mm_q8));
 }
 
 /* The same as below. */
@@ -916,8 +919,8 @@ static int32_t set_depths_of_vectors(const struct depth_way *way,
 static int32_t set_depths(const struct depth_way *way, const int64_t even[IH_SURFACE_HALF],
                           const int64_t odd[IH_SURFACE_HALF], int32_t *depth_mm_q8)
 {
-#ifdef SHIFT_MOST
-    if (way->shift >= 1 && way->shift <= SHIFT_MOST) {
+#ifdef SHIFT_MAX
+    if (way->shift >= 1 && way->shift <= SHIFT_MAX) {
         return set_depths_of_vectors(way, even, odd, depth_mm_q8);
     }
 #endif
@@ -937,8 +940,8 @@ static void evaluate(const struct ih_samples *samples, struct ih_surface_scratch
     const struct depth_way way = {
         .shift = ih_min_s32(20 + scratch->coefficient_shift - 7, 62), /* sums are twice as great */
         .mean_mm_q8 = out->mean_mm_q8,
-        .least_mm_q8 = least_depth_mm_q8(samples),
-        .most_mm_q8 = IH_SURFACE_DEPTH_MAX_MM << 8,
+        .min_mm_q8 = min_depth_mm_q8(samples),
+        .max_mm_q8 = IH_SURFACE_DEPTH_MAX_MM << 8,
     };
     int32_t *between;
     int32_t nearest_q8 = INT32_MAX;

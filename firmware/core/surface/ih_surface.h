@@ -21,13 +21,13 @@
  *        the right side alone changes.
  * Scaling and overflow: field units, samples within IH_SAMPLES_REACH, centres within 20: dx and
  *        dy below 60, B below 85 = 2^6.5, in Q20 below 2^26.5. Short rows: the farthest corner of the box
- *        around the samples is 2^14 - 2; ih_normal has their sums. Weights are enlarged until the
+ *        around the samples is 2^14 - 2; ih_normal_equations has their sums. Weights are enlarged until the
  *        greatest is 1/2 or more. Residuals times weights are limited to 2^27, their products with B
  *        sum below 2^62. N is scaled by 0.995 / sqrt(N_ii) each way to diagonal 0.99 in Q30; the ridge keeps
  *        the least pivot above 2.6e-3 where weights are as ih_samples makes them. docs/numerics.md goes on.
  * Error: within 0.2 mm of the float64 solution of the same system, everywhere on the grid, for
  *        depths that span up to 1.5 m (ih_samples clips them); it grows with the span. 0.05 mm on frames.
- * Cost:  n = centres^2: samples x 3 n roots of ih_basis, and of the far ones n more, as often multiplied twice;
+ * Cost:  n = centres^2: samples x 3 n roots of ih_multiquadric, and of the far ones n more, as often multiplied twice;
  *        samples x n (n + 8) / 2 short multiply-adds, a factorisation, four solutions; grid x n / 2 multiply-adds.
  *        With weights instead of moves twice as many multiply-adds of samples whose weight changed, and a second
  *        factorisation. So 64 centres cost a third of 144.
@@ -40,7 +40,7 @@
 
 #include "base/ih_config.h"
 #include "rig/ih_rig.h"
-#include "surface/ih_normal.h"
+#include "surface/ih_normal_equations.h"
 #include "surface/ih_samples.h"
 
 /* Nodes of the grid stand in steps of 10/11 field units: node k at (k - (IH_SURFACE_GRID - 1) / 2) steps. All
@@ -92,18 +92,19 @@ struct ih_surface {
 #define IH_SURFACE_HALF_CENTRES_MAX (IH_SURFACE_CENTRES_MAX / 2)
 
 /* As many of the samples' rows as fill what the smaller system leaves of the other's room. */
-#define IH_SURFACE_ROWS_KEPT                                                             \
-    ((2 * IH_NORMAL_LINE(IH_SURFACE_TERMS_MAX) - IH_NORMAL_LINE(IH_SURFACE_TERMS_FEW)) / \
+#define IH_SURFACE_ROWS_KEPT                               \
+    ((2 * IH_NORMAL_EQUATIONS_LINE(IH_SURFACE_TERMS_MAX) - \
+      IH_NORMAL_EQUATIONS_LINE(IH_SURFACE_TERMS_FEW)) /    \
      IH_SURFACE_TERMS_FEW)
 
 struct ih_surface_scratch {
     union {
         struct {
-            int32_t normal[IH_NORMAL_LINE(IH_SURFACE_TERMS_MAX)];
-            int32_t factor[IH_NORMAL_LINE(IH_SURFACE_TERMS_MAX)];
+            int32_t normal[IH_NORMAL_EQUATIONS_LINE(IH_SURFACE_TERMS_MAX)];
+            int32_t factor[IH_NORMAL_EQUATIONS_LINE(IH_SURFACE_TERMS_MAX)];
         } many;
         struct {
-            int32_t normal[IH_NORMAL_LINE(IH_SURFACE_TERMS_FEW)];
+            int32_t normal[IH_NORMAL_EQUATIONS_LINE(IH_SURFACE_TERMS_FEW)];
             uint32_t row_q20[IH_SURFACE_ROWS_KEPT][IH_SURFACE_TERMS_FEW];
         } few; /* where samples are moved sums need not outlive the factor, and their rows are kept */
         struct {
@@ -119,8 +120,8 @@ struct ih_surface_scratch {
     int64_t right[IH_SURFACE_TERMS_MAX];
     uint32_t basis_q20[IH_SURFACE_TERMS_MAX]; /* a sample's row that is not kept */
     /* Such rows, weighted and short. */
-    uint32_t pair[IH_NORMAL_WORK][IH_SURFACE_TERMS_MAX]
-        __attribute__((aligned(IH_NORMAL_ALIGNMENT)));
+    uint32_t pair[IH_NORMAL_EQUATIONS_WORK][IH_SURFACE_TERMS_MAX]
+        __attribute__((aligned(IH_NORMAL_EQUATIONS_ALIGNMENT)));
     uint32_t row_scale_q17[IH_SURFACE_TERMS_MAX];     /* of a short row */
     uint32_t norm_q10[IH_SURFACE_TERMS_MAX];          /* diagonal of R^T W R */
     uint32_t unknown_scale_q29[IH_SURFACE_TERMS_MAX]; /* coefficient = unknown * scale */

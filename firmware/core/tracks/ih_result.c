@@ -3,9 +3,9 @@
 #include <string.h>
 
 #include "base/ih_config.h"
-#include "nests/ih_hypotheses.h"
+#include "nests/ih_nests.h"
 
-_Static_assert(IH_RESULT_MAX >= IH_HYPOTHESES_MAX, "every nest must find room");
+_Static_assert(IH_RESULT_MAX >= IH_NESTS_MAX, "every nest must find room");
 
 void ih_result_clear(struct ih_result *out)
 {
@@ -13,11 +13,11 @@ void ih_result_clear(struct ih_result *out)
     out->selected = IH_NONE;
 }
 
-void ih_result_from_heads(const struct ih_heads *heads, struct ih_result *out)
+void ih_result_from_heads(const struct ih_hypotheses *hypotheses, struct ih_result *out)
 {
     ih_result_clear(out);
-    for (int32_t i = 0; i < heads->hypothesis_count; i++) {
-        const struct ih_hypothesis *h = &heads->hypothesis[i];
+    for (int32_t i = 0; i < hypotheses->hypothesis_count; i++) {
+        const struct ih_hypothesis *h = &hypotheses->hypothesis[i];
         out->entry[out->entry_count++] = (struct ih_result_entry){
             .u_px_q12 = h->u_px_q12,
             .v_px_q12 = h->v_px_q12,
@@ -29,18 +29,18 @@ void ih_result_from_heads(const struct ih_heads *heads, struct ih_result *out)
             .rejected = h->rejected,
         };
     }
-    for (int32_t i = 0; i < heads->head_count; i++) {
-        out->head[out->head_count++] = heads->head[i];
+    for (int32_t i = 0; i < hypotheses->head_count; i++) {
+        out->head[out->head_count++] = hypotheses->head[i];
     }
     out->selected = out->head_count == 1 ? out->head[0] : IH_NONE;
 }
 
-void ih_result_from_tracks(const struct ih_findings *findings, const struct ih_tracks *tracks,
+void ih_result_from_tracks(const struct ih_detections *detections, const struct ih_tracks *tracks,
                            struct ih_result *out)
 {
     ih_result_clear(out);
-    for (int32_t i = 0; i < findings->finding_count; i++) {
-        const struct ih_finding *f = &findings->finding[i];
+    for (int32_t i = 0; i < detections->detection_count; i++) {
+        const struct ih_detection *f = &detections->detection[i];
         const int32_t *centre = f->head.centre_mm_q8;
         out->entry[out->entry_count++] = (struct ih_result_entry){
             .u_px_q12 = f->u_px_q12,

@@ -11,11 +11,11 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "detect/ih_findings.h"
-#include "nests/ih_heads.h"
+#include "detect/ih_detections.h"
+#include "nests/ih_hypotheses.h"
 #include "tracks/ih_tracks.h"
 
-#define IH_RESULT_MAX (IH_FINDINGS_MAX + IH_FINDINGS_EXPECTED_MAX)
+#define IH_RESULT_MAX (IH_DETECTIONS_MAX + IH_DETECTIONS_EXPECTED_MAX)
 
 struct ih_result_entry {
     int32_t u_px_q12, v_px_q12; /* centre of the ellipse in the frame (distorted pixels) */
@@ -43,9 +43,9 @@ struct ih_result {
 /* Nothing. */
 void ih_result_clear(struct ih_result *out);
 
-void ih_result_from_heads(const struct ih_heads *heads, struct ih_result *out);
+void ih_result_from_heads(const struct ih_hypotheses *hypotheses, struct ih_result *out);
 
-void ih_result_from_tracks(const struct ih_findings *findings, const struct ih_tracks *tracks,
+void ih_result_from_tracks(const struct ih_detections *detections, const struct ih_tracks *tracks,
                            struct ih_result *out);
 
 #endif

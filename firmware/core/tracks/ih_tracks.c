@@ -39,14 +39,14 @@ void ih_tracks_params_default(struct ih_tracks_params *params)
         .gate_mm_per_s = 300,
         .start_logit_q10 = -1024,
         .start_head_logit_q10 = 1024,
-        .mature_findings = 3,
+        .mature_detections = 3,
         .accept_logit_q10 = 512,
         .drop_logit_q10 = -512,
         .keep_logit_q10 = -3072,
         .memory_q16 = 49152,
         .through_percent = 50,
         .front_percent = 30,
-        .seen_least = 30,
+        .seen_min = 30,
         .carry_us = 1000000,
         .gap_us = 2000000,
         .measured_mm = 12,
@@ -130,46 +130,48 @@ void ih_tracks_expect(struct ih_tracks *tracks, const struct ih_tracks_params *p
     for (int32_t i = 0; i < tracks->track_count; i++) {
         struct ih_track *track = &tracks->track[i];
         predict(track, step_us, params->acceleration_mm_s2);
-        track->finding = IH_NONE;
+        track->detection = IH_NONE;
         expected->head[i] = track->head;
     }
 }
 
 /* How well a finding continues a track, as log-odds; false: not at all. */
 static bool fits(const struct ih_tracks *tracks, const struct ih_tracks_params *params,
-                 const struct ih_track *track, const struct ih_finding *finding, int32_t *merit_q10)
+                 const struct ih_track *track, const struct ih_detection *detection,
+                 int32_t *merit_q10)
 {
     int64_t unseen_us = tracks->time_us - track->seen_us;
     int64_t gate_mm = params->gate_mm + ih_div_round(params->gate_mm_per_s * unseen_us, 1000000);
     int64_t gate2_q16 = gate_mm * gate_mm * 65536;
-    int64_t distance2 = ih_distance2_s32(track->head.centre_mm_q8, finding->head.centre_mm_q8);
-    if (finding->track_id != 0 || finding->logit_q10 < params->keep_logit_q10 ||
+    int64_t distance2 = ih_distance2_s32(track->head.centre_mm_q8, detection->head.centre_mm_q8);
+    if (detection->track_id != 0 || detection->logit_q10 < params->keep_logit_q10 ||
         distance2 > gate2_q16) {
         return false;
     }
     /* distances within the gate: the quotient is at most GATE_LOGIT */
     int64_t loss_q10 = ih_div_round((distance2 >> 10) * GATE_LOGIT_Q10, (gate2_q16 >> 10) + 1);
-    *merit_q10 = finding->logit_q10 - (int32_t)loss_q10;
+    *merit_q10 = detection->logit_q10 - (int32_t)loss_q10;
     return true;
 }
 
-static void correct(struct ih_track *track, const struct ih_finding *finding,
+static void correct(struct ih_track *track, const struct ih_detection *detection,
                     const struct ih_tracks_params *params)
 {
     int64_t noise_q8 = (int64_t)params->measured_mm * params->measured_mm * 256;
-    if (finding->logit_q10 < SURE_LOGIT_Q10) {
+    if (detection->logit_q10 < SURE_LOGIT_Q10) {
         noise_q8 *= UNSURE_FACTOR2;
     }
     int64_t sum_q8 = track->place_q8 + noise_q8;
     int64_t gain_q16 = ih_div_round(track->place_q8 * 65536, sum_q8);
     int64_t speed_gain_q16 = ih_div_round(track->cross_q8 * 65536, sum_q8); /* 1/s */
     for (int axis = 0; axis < 3; axis++) {
-        int64_t off_q8 = (int64_t)finding->head.centre_mm_q8[axis] - track->head.centre_mm_q8[axis];
+        int64_t off_q8 =
+            (int64_t)detection->head.centre_mm_q8[axis] - track->head.centre_mm_q8[axis];
         int64_t speed = track->velocity_mm_s_q8[axis] + ih_mul_shift(off_q8, speed_gain_q16, 16);
         track->velocity_mm_s_q8[axis] =
             ih_clamp_s32(ih_saturate_s32(speed), -SPEED_MAX_MM_S_Q8, SPEED_MAX_MM_S_Q8);
         track->head.centre_mm_q8[axis] += (int32_t)ih_mul_shift(off_q8, gain_q16, 16);
-        int64_t grown = (int64_t)finding->head.semi_mm_q8[axis] - track->head.semi_mm_q8[axis];
+        int64_t grown = (int64_t)detection->head.semi_mm_q8[axis] - track->head.semi_mm_q8[axis];
         track->head.semi_mm_q8[axis] += (int32_t)ih_mul_shift(grown, AXES_SHARE_Q16, 16);
     }
     track->speed_q8 -= ih_mul_shift(speed_gain_q16, track->cross_q8, 16);
@@ -192,32 +194,32 @@ static void judge(struct ih_track *track, const struct ih_tracks_params *params)
     int32_t limit_q10 = params->start_head_logit_q10;
     if (track->is_head) {
         limit_q10 = params->drop_logit_q10;
-    } else if (track->finding_count >= params->mature_findings) {
+    } else if (track->detection_count >= params->mature_detections) {
         limit_q10 = params->accept_logit_q10;
     }
     track->is_head = track->mean_logit_q10 > limit_q10;
 }
 
 static void give(struct ih_tracks *tracks, const struct ih_tracks_params *params,
-                 struct ih_track *track, struct ih_findings *findings, int32_t index)
+                 struct ih_track *track, struct ih_detections *detections, int32_t index)
 {
-    struct ih_finding *finding = &findings->finding[index];
-    finding->track_id = track->id;
-    track->finding = index;
+    struct ih_detection *detection = &detections->detection[index];
+    detection->track_id = track->id;
+    track->detection = index;
     track->seen_us = tracks->time_us;
-    track->finding_count = ih_min_s32(track->finding_count + 1, FINDING_COUNT_MAX);
-    correct(track, finding, params);
-    remember_logit(track, finding->logit_q10, params->memory_q16);
+    track->detection_count = ih_min_s32(track->detection_count + 1, FINDING_COUNT_MAX);
+    correct(track, detection, params);
+    remember_logit(track, detection->logit_q10, params->memory_q16);
     judge(track, params);
 }
 
 /* Do the rays go through where the head was, or is it out of the pattern? */
-static bool is_gone(const struct ih_findings *findings, int32_t track,
+static bool is_gone(const struct ih_detections *detections, int32_t track,
                     const struct ih_tracks_params *params)
 {
-    const struct ih_view *view = &findings->view[track];
+    const struct ih_view *view = &detections->view[track];
     int32_t rays = view->through + view->hit + view->front;
-    if (findings->seen_count < params->seen_least) {
+    if (detections->seen_count < params->seen_min) {
         return false;
     }
     if (rays < VIEW_RAYS_MIN) {
@@ -229,22 +231,22 @@ static bool is_gone(const struct ih_findings *findings, int32_t track,
 
 /* The best pair of a track without finding and a finding without track. */
 static bool best_pair(const struct ih_tracks *tracks, const struct ih_tracks_params *params,
-                      const struct ih_findings *findings, int32_t *track, int32_t *finding)
+                      const struct ih_detections *detections, int32_t *track, int32_t *detection)
 {
     int32_t best = INT32_MIN;
     for (int32_t t = 0; t < tracks->track_count; t++) {
-        bool gone = is_gone(findings, t, params);
-        for (int32_t f = 0; f < findings->finding_count; f++) {
+        bool gone = is_gone(detections, t, params);
+        for (int32_t f = 0; f < detections->detection_count; f++) {
             int32_t merit;
-            if (tracks->track[t].finding != IH_NONE ||
-                !fits(tracks, params, &tracks->track[t], &findings->finding[f], &merit) ||
-                (gone && findings->finding[f].logit_q10 < params->accept_logit_q10)) {
+            if (tracks->track[t].detection != IH_NONE ||
+                !fits(tracks, params, &tracks->track[t], &detections->detection[f], &merit) ||
+                (gone && detections->detection[f].logit_q10 < params->accept_logit_q10)) {
                 continue;
             }
             if (merit > best) {
                 best = merit;
                 *track = t;
-                *finding = f;
+                *detection = f;
             }
         }
     }
@@ -252,12 +254,12 @@ static bool best_pair(const struct ih_tracks *tracks, const struct ih_tracks_par
 }
 
 /* Could something before it hide the head, or was the frame lost? Else it would have been found. */
-static bool may_be_hidden(const struct ih_findings *findings, int32_t track,
+static bool may_be_hidden(const struct ih_detections *detections, int32_t track,
                           const struct ih_tracks_params *params)
 {
-    const struct ih_view *view = &findings->view[track];
+    const struct ih_view *view = &detections->view[track];
     int32_t rays = view->through + view->hit + view->front;
-    return findings->seen_count < params->seen_least ||
+    return detections->seen_count < params->seen_min ||
            view->front * 100 >= rays * params->front_percent;
 }
 
@@ -285,23 +287,23 @@ static bool is_double(const struct ih_tracks *tracks, int32_t kept, const struct
 /* Drop tracks whose head is gone, was not seen for too long, or is another track's. Those that no
  * finding continued and that are no heads are not carried. */
 static void prune(struct ih_tracks *tracks, const struct ih_tracks_params *params,
-                  struct ih_findings *findings)
+                  struct ih_detections *detections)
 {
     int32_t kept = 0;
     for (int32_t t = 0; t < tracks->track_count; t++) {
         struct ih_track *track = &tracks->track[t];
         int64_t unseen_us = tracks->time_us - track->seen_us;
-        bool seen = track->finding != IH_NONE;
-        if (!seen && !may_be_hidden(findings, t, params)) {
+        bool seen = track->detection != IH_NONE;
+        if (!seen && !may_be_hidden(detections, t, params)) {
             remember_logit(track, params->keep_logit_q10, params->memory_q16);
             judge(track, params);
         }
-        bool ended =
-            seen ? track->mean_logit_q10 < params->keep_logit_q10
-                 : !track->is_head || unseen_us > params->carry_us || is_gone(findings, t, params);
+        bool ended = seen ? track->mean_logit_q10 < params->keep_logit_q10
+                          : !track->is_head || unseen_us > params->carry_us ||
+                                is_gone(detections, t, params);
         if (ended || is_double(tracks, kept, track)) {
             if (seen) {
-                findings->finding[track->finding].track_id = 0;
+                detections->detection[track->detection].track_id = 0;
             }
             continue;
         }
@@ -334,75 +336,76 @@ static int32_t next_id(const struct ih_tracks *tracks)
 }
 
 static void start_track(struct ih_tracks *tracks, const struct ih_tracks_params *params,
-                        struct ih_findings *findings, int32_t index)
+                        struct ih_detections *detections, int32_t index)
 {
-    struct ih_finding *finding = &findings->finding[index];
+    struct ih_detection *detection = &detections->detection[index];
     struct ih_track *track = &tracks->track[tracks->track_count];
     *track = (struct ih_track){
         .id = next_id(tracks),
-        .mean_logit_q10 = ih_clamp_s32(finding->logit_q10, -LOGIT_MAX_Q10, LOGIT_MAX_Q10),
-        .head = finding->head,
+        .mean_logit_q10 = ih_clamp_s32(detection->logit_q10, -LOGIT_MAX_Q10, LOGIT_MAX_Q10),
+        .head = detection->head,
         .place_q8 = (int64_t)params->measured_mm * params->measured_mm * 256,
         .speed_q8 = (int64_t)START_SPEED_MM_S * START_SPEED_MM_S * 256,
         .seen_us = tracks->time_us,
-        .finding_count = 1,
-        .finding = index,
+        .detection_count = 1,
+        .detection = index,
     };
     if (is_double(tracks, tracks->track_count, track)) {
         return;
     }
     tracks->track_count++;
     tracks->last_id = track->id;
-    finding->track_id = track->id;
+    detection->track_id = track->id;
     judge(track, params);
 }
 
 static void start_tracks(struct ih_tracks *tracks, const struct ih_tracks_params *params,
-                         struct ih_findings *findings)
+                         struct ih_detections *detections)
 {
-    for (int32_t f = 0; f < findings->finding_count && tracks->track_count < IH_TRACKS_MAX; f++) {
-        const struct ih_finding *finding = &findings->finding[f];
-        if (finding->track_id == 0 && finding->logit_q10 > params->start_logit_q10) {
-            start_track(tracks, params, findings, f);
+    for (int32_t f = 0; f < detections->detection_count && tracks->track_count < IH_TRACKS_MAX;
+         f++) {
+        const struct ih_detection *detection = &detections->detection[f];
+        if (detection->track_id == 0 && detection->logit_q10 > params->start_logit_q10) {
+            start_track(tracks, params, detections, f);
         }
     }
 }
 
 /* A carried head among the findings. */
 static void append_predicted(const struct ih_rig *rig, struct ih_track *track,
-                             struct ih_findings *findings)
+                             struct ih_detections *detections)
 {
-    struct ih_finding *finding = &findings->finding[findings->finding_count];
-    memset(finding, 0, sizeof *finding);
-    finding->head = track->head;
-    finding->source = IH_SOURCE_EXPECTED;
-    finding->is_predicted = true;
-    finding->track_id = track->id;
-    ih_findings_outline(rig, finding);
-    track->finding = findings->finding_count++;
+    struct ih_detection *detection = &detections->detection[detections->detection_count];
+    memset(detection, 0, sizeof *detection);
+    detection->head = track->head;
+    detection->source = IH_SOURCE_EXPECTED;
+    detection->is_predicted = true;
+    detection->track_id = track->id;
+    ih_detections_outline(rig, detection);
+    track->detection = detections->detection_count++;
 }
 
 /* What a track knows goes into its finding. */
-static void mark(const struct ih_track *track, struct ih_findings *findings)
+static void mark(const struct ih_track *track, struct ih_detections *detections)
 {
-    struct ih_finding *finding = &findings->finding[track->finding];
-    finding->is_head = track->is_head;
-    finding->logit_q10 = track->mean_logit_q10;
-    finding->probability_q16 = ih_score_probability_q16(track->mean_logit_q10);
-    finding->sigma_mm_q8 = (int32_t)ih_isqrt_u64((uint64_t)track->place_q8 << 8);
+    struct ih_detection *detection = &detections->detection[track->detection];
+    detection->is_head = track->is_head;
+    detection->logit_q10 = track->mean_logit_q10;
+    detection->probability_q16 = ih_score_probability_q16(track->mean_logit_q10);
+    detection->sigma_mm_q8 = (int32_t)ih_isqrt_u64((uint64_t)track->place_q8 << 8);
 }
 
-static void list_heads(struct ih_tracks *tracks, const struct ih_findings *findings)
+static void list_heads(struct ih_tracks *tracks, const struct ih_detections *detections)
 {
     tracks->head_count = 0;
     for (int32_t t = 0; t < tracks->track_count; t++) {
         if (!tracks->track[t].is_head) {
             continue;
         }
-        int32_t own = tracks->track[t].finding;
+        int32_t own = tracks->track[t].detection;
         int32_t at = tracks->head_count++;
-        for (; at > 0 &&
-               findings->finding[tracks->head[at - 1]].logit_q10 < findings->finding[own].logit_q10;
+        for (; at > 0 && detections->detection[tracks->head[at - 1]].logit_q10 <
+                             detections->detection[own].logit_q10;
              at--) {
             tracks->head[at] = tracks->head[at - 1];
         }
@@ -423,10 +426,11 @@ static int64_t middle_x_mm_q8(const struct ih_rig *rig, int32_t depth_mm_q8)
 }
 
 /* How far from the wanted side, as a slope; less is better. */
-static int64_t aside_q28(const struct ih_finding *finding, const struct ih_rig *rig, int32_t side)
+static int64_t aside_q28(const struct ih_detection *detection, const struct ih_rig *rig,
+                         int32_t side)
 {
-    int32_t depth_q8 = ih_max_s32(finding->head.centre_mm_q8[2], 1 << 8);
-    int64_t x_q8 = finding->head.centre_mm_q8[0];
+    int32_t depth_q8 = ih_max_s32(detection->head.centre_mm_q8[2], 1 << 8);
+    int64_t x_q8 = detection->head.centre_mm_q8[0];
     if (side == IH_SIDE_MIDDLE) {
         x_q8 = ih_abs_s64(x_q8 - middle_x_mm_q8(rig, depth_q8));
     } else if (side == IH_SIDE_RIGHT) {
@@ -436,22 +440,22 @@ static int64_t aside_q28(const struct ih_finding *finding, const struct ih_rig *
 }
 
 static int32_t choose(const struct ih_tracks *tracks, const struct ih_tracks_params *params,
-                      const struct ih_rig *rig, const struct ih_findings *findings)
+                      const struct ih_rig *rig, const struct ih_detections *detections)
 {
-    const struct ih_finding *best = NULL;
+    const struct ih_detection *best = NULL;
     int32_t chosen = IH_NONE;
     for (int32_t i = 0; i < tracks->head_count; i++) {
-        const struct ih_finding *finding = &findings->finding[tracks->head[i]];
-        const struct ih_finding *first = &findings->finding[tracks->head[0]];
-        if (finding->logit_q10 < first->logit_q10 - CHOICE_LOGIT_Q10) {
+        const struct ih_detection *detection = &detections->detection[tracks->head[i]];
+        const struct ih_detection *first = &detections->detection[tracks->head[0]];
+        if (detection->logit_q10 < first->logit_q10 - CHOICE_LOGIT_Q10) {
             break;
         }
         bool is_better =
-            best == NULL || (best->is_predicted && !finding->is_predicted) ||
-            (best->is_predicted == finding->is_predicted &&
-             aside_q28(finding, rig, params->side) < aside_q28(best, rig, params->side));
+            best == NULL || (best->is_predicted && !detection->is_predicted) ||
+            (best->is_predicted == detection->is_predicted &&
+             aside_q28(detection, rig, params->side) < aside_q28(best, rig, params->side));
         if (is_better) {
-            best = finding;
+            best = detection;
             chosen = tracks->head[i];
         }
     }
@@ -460,17 +464,17 @@ static int32_t choose(const struct ih_tracks *tracks, const struct ih_tracks_par
 
 /* The head of the selected track stays selected until another was better for some frames. */
 static void select_head(struct ih_tracks *tracks, const struct ih_tracks_params *params,
-                        const struct ih_rig *rig, const struct ih_findings *findings)
+                        const struct ih_rig *rig, const struct ih_detections *detections)
 {
-    int32_t wanted = choose(tracks, params, rig, findings);
+    int32_t wanted = choose(tracks, params, rig, detections);
     int32_t current = IH_NONE;
     for (int32_t i = 0; i < tracks->head_count; i++) {
-        if (findings->finding[tracks->head[i]].track_id == tracks->selected_id) {
+        if (detections->detection[tracks->head[i]].track_id == tracks->selected_id) {
             current = tracks->head[i];
         }
     }
     if (current != IH_NONE && wanted != current) {
-        int32_t rival_id = findings->finding[wanted].track_id;
+        int32_t rival_id = detections->detection[wanted].track_id;
         tracks->rival_frames = rival_id == tracks->rival_id ? tracks->rival_frames + 1 : 1;
         tracks->rival_id = rival_id;
         if (tracks->rival_frames < params->switch_frames) {
@@ -481,24 +485,24 @@ static void select_head(struct ih_tracks *tracks, const struct ih_tracks_params 
         tracks->rival_id = 0;
     }
     tracks->selected = wanted;
-    tracks->selected_id = wanted == IH_NONE ? 0 : findings->finding[wanted].track_id;
+    tracks->selected_id = wanted == IH_NONE ? 0 : detections->detection[wanted].track_id;
 }
 
 void ih_tracks_update(struct ih_tracks *tracks, const struct ih_tracks_params *params,
-                      const struct ih_rig *rig, struct ih_findings *findings)
+                      const struct ih_rig *rig, struct ih_detections *detections)
 {
-    int32_t track, finding;
-    while (best_pair(tracks, params, findings, &track, &finding)) {
-        give(tracks, params, &tracks->track[track], findings, finding);
+    int32_t track, detection;
+    while (best_pair(tracks, params, detections, &track, &detection)) {
+        give(tracks, params, &tracks->track[track], detections, detection);
     }
-    prune(tracks, params, findings);
-    start_tracks(tracks, params, findings);
+    prune(tracks, params, detections);
+    start_tracks(tracks, params, detections);
     for (int32_t t = 0; t < tracks->track_count; t++) {
-        if (tracks->track[t].finding == IH_NONE) {
-            append_predicted(rig, &tracks->track[t], findings);
+        if (tracks->track[t].detection == IH_NONE) {
+            append_predicted(rig, &tracks->track[t], detections);
         }
-        mark(&tracks->track[t], findings);
+        mark(&tracks->track[t], detections);
     }
-    list_heads(tracks, findings);
-    select_head(tracks, params, rig, findings);
+    list_heads(tracks, detections);
+    select_head(tracks, params, rig, detections);
 }

@@ -13,7 +13,7 @@
  *        2. ends a track that found nothing convincing when more than through_percent of the rays
  *           through it go on and fewer than front_percent are stopped before it: the seat is empty;
  *           or when fewer than 4 rays meet it: it has left the pattern. A frame in which fewer than
- *           seen_least points were seen says neither: it is lost.
+ *           seen_min points were seen says neither: it is lost.
  *        3. carries the other heads, slowing down, for at most carry_us. If fewer than front_percent
  *           of the rays are stopped before it and the frame is not lost, nothing hides it: that
  *           counts as a finding with log-odds keep_logit. A track that is no head yet ends with the
@@ -44,24 +44,24 @@
 #include <stdint.h>
 
 #include "detect/ih_ellipsoid.h"
-#include "detect/ih_findings.h"
+#include "detect/ih_detections.h"
 #include "rig/ih_rig.h"
 
-#define IH_TRACKS_MAX IH_FINDINGS_EXPECTED_MAX
+#define IH_TRACKS_MAX IH_DETECTIONS_EXPECTED_MAX
 
 enum ih_side { IH_SIDE_MIDDLE, IH_SIDE_LEFT, IH_SIDE_RIGHT };
 
 struct ih_tracks_params {
-    int32_t gate_mm;                           /* a finding this near belongs to the track .. */
-    int32_t gate_mm_per_s;                     /* .. and farther, the longer it was not seen */
-    int32_t start_logit_q10;                   /* findings above this start a track */
-    int32_t start_head_logit_q10;              /* a new track above this is a head at once .. */
-    int32_t mature_findings, accept_logit_q10; /* .. later above this .. */
-    int32_t drop_logit_q10;                    /* .. until it falls below this */
-    int32_t keep_logit_q10;                    /* findings above this continue a track */
-    int32_t memory_q16;                        /* share of the old mean in the new one */
-    int32_t through_percent, front_percent;    /* of the rays that meet it: gone, hidden */
-    int32_t seen_least;                        /* points; a frame with fewer is lost */
+    int32_t gate_mm;                             /* a finding this near belongs to the track .. */
+    int32_t gate_mm_per_s;                       /* .. and farther, the longer it was not seen */
+    int32_t start_logit_q10;                     /* findings above this start a track */
+    int32_t start_head_logit_q10;                /* a new track above this is a head at once .. */
+    int32_t mature_detections, accept_logit_q10; /* .. later above this .. */
+    int32_t drop_logit_q10;                      /* .. until it falls below this */
+    int32_t keep_logit_q10;                      /* findings above this continue a track */
+    int32_t memory_q16;                          /* share of the old mean in the new one */
+    int32_t through_percent, front_percent;      /* of the rays that meet it: gone, hidden */
+    int32_t seen_min;                            /* points; a frame with fewer is lost */
     int32_t carry_us;
     int32_t gap_us;             /* up to 2 s; -1: every frame on its own */
     int32_t measured_mm;        /* standard deviation of a finding's centre; 4 .. 500 */
@@ -79,8 +79,8 @@ struct ih_track {
     /* covariance of place and velocity along each axis: mm^2, mm^2/s, mm^2/s^2 */
     int64_t place_q8, cross_q8, speed_q8;
     int64_t seen_us;
-    int32_t finding_count; /* so far, at most 1000 */
-    int32_t finding;       /* of this frame, or IH_NONE */
+    int32_t detection_count; /* so far, at most 1000 */
+    int32_t detection;       /* of this frame, or IH_NONE */
 };
 
 struct ih_tracks {
@@ -106,6 +106,6 @@ void ih_tracks_expect(struct ih_tracks *tracks, const struct ih_tracks_params *p
                       int64_t time_us, struct ih_expected *expected);
 
 void ih_tracks_update(struct ih_tracks *tracks, const struct ih_tracks_params *params,
-                      const struct ih_rig *rig, struct ih_findings *findings);
+                      const struct ih_rig *rig, struct ih_detections *detections);
 
 #endif

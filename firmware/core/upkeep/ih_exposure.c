@@ -5,7 +5,7 @@
 #include "base/ih_config.h"
 #include "base/ih_fix.h"
 #include "base/ih_range.h"
-#include "dots/ih_band.h"
+#include "dots/ih_bandpass.h"
 
 #define ONE_Q8 256
 #define STEP_MIN_Q8 205 /* 0.8 */
@@ -195,8 +195,8 @@ static bool can_shorten(const struct ih_exposure_params *params,
 void ih_exposure_next(const struct ih_exposure_params *params, const struct ih_exposure_look *look,
                       struct ih_exposure *state)
 {
-    const int32_t weak_aim = (int32_t)ih_mul_shift(params->weak_grey_q4, IH_BAND_UNIT, 4);
-    const int32_t strong_aim = (int32_t)ih_mul_shift(params->strong_grey_q4, IH_BAND_UNIT, 4);
+    const int32_t weak_aim = (int32_t)ih_mul_shift(params->weak_grey_q4, IH_BANDPASS_UNIT, 4);
+    const int32_t strong_aim = (int32_t)ih_mul_shift(params->strong_grey_q4, IH_BANDPASS_UNIT, 4);
     forget_ceiling(params, state);
     if (look->lost_count > params->lost_max && can_shorten(params, look, weak_aim, state)) {
         shorten(params, state);

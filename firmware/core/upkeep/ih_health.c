@@ -35,8 +35,8 @@ static void start_look(struct ih_health *health)
 /* Nothing that was seen before counts any more. */
 static void start_over(struct ih_health *health)
 {
-    ih_places_clear(&health->all);
-    ih_places_clear(&health->now.late);
+    ih_rotation_estimate_clear(&health->all);
+    ih_rotation_estimate_clear(&health->now.late);
     health->is_doubted = false;
     start_look(health);
 }
@@ -47,7 +47,7 @@ void ih_health_init(struct ih_health *health, const struct ih_rig *rig)
     health->nominal = rig->calibration;
     health->across_px_q12 = -1;
     health->next_pause = PAUSE_FIRST;
-    ih_turn_slopes(rig, &health->slopes);
+    ih_rotation_vote_slopes(rig, &health->slopes);
     start_over(health);
 }
 
@@ -71,9 +71,9 @@ static void add_frame(struct ih_health *health, const struct ih_dots *dots,
     bool is_settling = health->stage == IH_HEALTH_SETTLING;
     int32_t reach_px_q12 = is_settling ? settle_reach_px_q12[health->step] : REACH_PX_Q12;
     add_look(&health->look, dots, labels);
-    ih_places_add(&health->now.late, labels, rig, &health->slopes, reach_px_q12);
+    ih_rotation_estimate_add(&health->now.late, labels, rig, &health->slopes, reach_px_q12);
     if (!is_settling || health->step > 0) {
-        ih_places_add(&health->all, labels, rig, &health->slopes, reach_px_q12);
+        ih_rotation_estimate_add(&health->all, labels, rig, &health->slopes, reach_px_q12);
     }
 }
 
@@ -83,17 +83,17 @@ static bool turn_to(struct ih_health *health, const int32_t turn_rad_q30[3], str
 {
     int32_t bad_slot;
     for (int i = 0; i < 3; i++) {
-        if (ih_abs_s32(turn_rad_q30[i]) > IH_TURN_MAX_RAD_Q30) {
+        if (ih_abs_s32(turn_rad_q30[i]) > IH_ROTATION_VOTE_MAX_RAD_Q30) {
             return false;
         }
     }
-    ih_turn_calibration(&health->nominal, turn_rad_q30, &scratch->calibration);
+    ih_rotation_vote_calibration(&health->nominal, turn_rad_q30, &scratch->calibration);
     if (ih_rig_init(&scratch->rig, &scratch->calibration, &bad_slot) != IH_OK) {
         return false; /* a ray turned out of what a rig may have */
     }
     *rig = scratch->rig;
     memcpy(health->turn_rad_q30, turn_rad_q30, sizeof health->turn_rad_q30);
-    ih_turn_slopes(rig, &health->slopes);
+    ih_rotation_vote_slopes(rig, &health->slopes);
     return true;
 }
 
@@ -165,7 +165,7 @@ static void begin_search(struct ih_health *health)
 /* A search was in vain: what was known before it holds. */
 static void give_up(struct ih_health *health)
 {
-    ih_places_clear(&health->now.late);
+    ih_rotation_estimate_clear(&health->now.late);
     health->pause = health->next_pause;
     health->next_pause = ih_min_s32(2 * health->next_pause, IH_HEALTH_PAUSE);
     begin_stage(health, IH_HEALTH_WATCHING);
@@ -187,27 +187,27 @@ static void conclude(struct ih_health *health, const struct ih_health_look *look
  * quarter more. Where labels are poor or hardly there, there is nothing to keep, and rigs that fit give a fortieth
  * more: an eighth, as to a rig turned by a step, or by 0.5 px, no turn still gives four fifths of the winner's votes.
  * Where a search is repeated, any more. */
-static bool is_elected(const struct ih_turn_winner *winner, const struct ih_health_look *look,
-                       int32_t search_count)
+static bool is_elected(const struct ih_rotation_vote_winner *winner,
+                       const struct ih_health_look *look, int32_t search_count)
 {
-    int32_t least = search_count > 1 ? 8 : is_poor(look) || is_lost(look) ? 9 : 12;
+    int32_t min = search_count > 1 ? 8 : is_poor(look) || is_lost(look) ? 9 : 12;
     return winner->vote * 4 > winner->vote_mean * 7 &&
            (winner->vote - winner->vote_mean) * 8 >
-               (winner->vote_of_none - winner->vote_mean) * least;
+               (winner->vote_of_none - winner->vote_mean) * min;
 }
 
 /* The turn that most votes are for goes on trial. The frames of the votes say what it has to be better than: the
  * last look may have begun before a knock. */
 static bool elect(struct ih_health *health, struct ih_rig *rig, struct ih_health_scratch *scratch)
 {
-    struct ih_turn_winner winner;
-    ih_turn_elect(&health->now.votes, rig, &winner);
+    struct ih_rotation_vote_winner winner;
+    ih_rotation_vote_elect(&health->now.votes, rig, &winner);
     bool is_turned_now = is_elected(&winner, &health->look, health->search_count) &&
                          turn_by(health, winner.turn_rad_q30, rig, scratch);
     health->before = health->look;
     health->is_weak_known = health->is_weak_known && !is_turned_now;
     health->basis_count = is_turned_now ? 0 : health->basis_count;
-    ih_places_clear(&health->now.late);
+    ih_rotation_estimate_clear(&health->now.late);
     if (is_turned_now) {
         begin_stage(health, IH_HEALTH_SETTLING);
     } else {
@@ -221,42 +221,42 @@ static bool search(struct ih_health *health, const struct ih_dots *dots,
                    struct ih_health_scratch *scratch)
 {
     add_look(&health->look, dots, labels);
-    ih_turn_vote(dots, rig, &health->slopes, &scratch->at.turn, &health->now.votes);
+    ih_rotation_vote_vote(dots, rig, &health->slopes, &scratch->at.turn, &health->now.votes);
     health->step++;
     return health->step >= IH_HEALTH_SEARCH && elect(health, rig, scratch);
 }
 
 static bool find(const struct ih_health *health, const struct ih_rig *rig,
-                 struct ih_places_turn *out)
+                 struct ih_rotation_estimate_turn *out)
 {
-    return ih_places_find(&health->all, rig, &health->slopes, health->turn_rad_q30,
-                          health->is_weak_known, out);
+    return ih_rotation_estimate_find(&health->all, rig, &health->slopes, health->turn_rad_q30,
+                                     health->is_weak_known, out);
 }
 
 /* Uncertainties. Of a turn across the baseline that is not seen: as they were when it was, else the limit. */
 static void keep_sigma(struct ih_health *health, const struct ih_rig *rig,
-                       const struct ih_places_turn *found)
+                       const struct ih_rotation_estimate_turn *found)
 {
     int32_t axis_q30[2][2];
-    ih_turn_axes(rig, axis_q30);
+    ih_rotation_vote_axes(rig, axis_q30);
     health->is_weak_known = health->is_weak_known || found->is_weak_seen;
     for (int i = 0; i < 3; i++) {
         int64_t share_q30 = i < 2 ? ih_abs_s32(axis_q30[1][i]) : 0;
-        int32_t least = health->is_weak_known
-                            ? health->sigma_rad_q30[i]
-                            : (int32_t)ih_mul_shift(IH_TURN_MAX_RAD_Q30, share_q30, 30);
+        int32_t min = health->is_weak_known
+                          ? health->sigma_rad_q30[i]
+                          : (int32_t)ih_mul_shift(IH_ROTATION_VOTE_MAX_RAD_Q30, share_q30, 30);
         health->sigma_rad_q30[i] = found->is_weak_seen ? found->sigma_rad_q30[i]
-                                                       : ih_max_s32(found->sigma_rad_q30[i], least);
+                                                       : ih_max_s32(found->sigma_rad_q30[i], min);
     }
 }
 
 /* The turn as it now seems to be, into state and rig; what was seen stays, against the new lines.
  * False: not taken. */
-static bool take(struct ih_health *health, const struct ih_places_turn *found, struct ih_rig *rig,
-                 struct ih_health_scratch *scratch)
+static bool take(struct ih_health *health, const struct ih_rotation_estimate_turn *found,
+                 struct ih_rig *rig, struct ih_health_scratch *scratch)
 {
-    ih_places_turn(&health->all, &health->slopes, found->turn_rad_q30);
-    ih_places_turn(&health->now.late, &health->slopes, found->turn_rad_q30);
+    ih_rotation_estimate_turn(&health->all, &health->slopes, found->turn_rad_q30);
+    ih_rotation_estimate_turn(&health->now.late, &health->slopes, found->turn_rad_q30);
     if (!turn_by(health, found->turn_rad_q30, rig, scratch)) {
         start_over(health);
         return false;
@@ -267,7 +267,7 @@ static bool take(struct ih_health *health, const struct ih_places_turn *found, s
 }
 
 /* More than chance, and than what does no harm. */
-static bool is_worth_it(const struct ih_places_turn *found)
+static bool is_worth_it(const struct ih_rotation_estimate_turn *found)
 {
     return found->sure_rad_q30 >= TURN_MIN_RAD_Q30;
 }
@@ -277,10 +277,10 @@ static bool is_worth_it(const struct ih_places_turn *found)
 static bool is_knocked(struct ih_health *health, const struct ih_rig *rig,
                        struct ih_health_scratch *scratch)
 {
-    struct ih_places_turn change;
+    struct ih_rotation_estimate_turn change;
     bool was_doubted = health->is_doubted;
-    bool is_doubted = ih_places_change(&health->now.late, &health->all, rig, &health->slopes,
-                                       &scratch->at.change, &change) &&
+    bool is_doubted = ih_rotation_estimate_change(&health->now.late, &health->all, rig,
+                                                  &health->slopes, &scratch->at.change, &change) &&
                       is_worth_it(&change);
     bool is_sure = is_doubted && was_doubted;
     if (is_sure) {
@@ -288,24 +288,25 @@ static bool is_knocked(struct ih_health *health, const struct ih_rig *rig,
         health->basis_count = 0;
         health->is_weak_known = false;
     }
-    ih_places_clear(&health->now.late);
+    ih_rotation_estimate_clear(&health->now.late);
     health->is_doubted = is_doubted && !is_sure;
     return is_sure;
 }
 
 /* Of a rig that is turned: more is known by a quarter, or for the first time. */
-static bool is_refined(const struct ih_health *health, const struct ih_places_turn *found)
+static bool is_refined(const struct ih_health *health,
+                       const struct ih_rotation_estimate_turn *found)
 {
     int32_t frame_count = health->all.frame_count;
-    return is_turned(health) &&
-           (frame_count * 4 >= health->basis_count * 5 || frame_count >= IH_PLACES_FRAMES_MAX ||
-            (found->is_weak_seen && !health->is_weak_known));
+    return is_turned(health) && (frame_count * 4 >= health->basis_count * 5 ||
+                                 frame_count >= IH_ROTATION_ESTIMATE_FRAMES_MAX ||
+                                 (found->is_weak_seen && !health->is_weak_known));
 }
 
 static bool watch(struct ih_health *health, struct ih_rig *rig, struct ih_health_scratch *scratch)
 {
     const struct ih_health_look look = health->look;
-    struct ih_places_turn found;
+    struct ih_rotation_estimate_turn found;
     bool has_changed = false;
     bool is_late = is_knocked(health, rig, scratch);
     if (is_search_due(health) && !is_late) {
@@ -334,7 +335,7 @@ static bool watch(struct ih_health *health, struct ih_rig *rig, struct ih_health
         health->search_count = 0;
         start_over(health);
     }
-    ih_places_forget(&health->all);
+    ih_rotation_estimate_forget(&health->all);
     return has_changed;
 }
 
@@ -360,7 +361,7 @@ static bool drop_weak(struct ih_health *health, struct ih_rig *rig,
                       struct ih_health_scratch *scratch)
 {
     int32_t by_rad_q30[3];
-    ih_places_hold(rig, health->turn_rad_q30, by_rad_q30);
+    ih_rotation_estimate_hold(rig, health->turn_rad_q30, by_rad_q30);
     start_over(health);
     return turn_by(health, by_rad_q30, rig, scratch);
 }
@@ -369,7 +370,7 @@ static bool drop_weak(struct ih_health *health, struct ih_rig *rig,
 static bool settle(struct ih_health *health, struct ih_rig *rig, struct ih_health_scratch *scratch)
 {
     const struct ih_health_look look = health->look;
-    struct ih_places_turn found;
+    struct ih_rotation_estimate_turn found;
     bool is_last = health->step == SETTLE_STEPS - 1;
     if (health->step == 0 && !is_proven(&health->before, &look)) {
         give_up(health);
@@ -389,7 +390,7 @@ static bool settle(struct ih_health *health, struct ih_rig *rig, struct ih_healt
         has_changed =
             is_known || health->is_weak_known ? has_changed : drop_weak(health, rig, scratch);
         conclude(health, &look, is_known && health->is_weak_known);
-        ih_places_clear(&health->now.late);
+        ih_rotation_estimate_clear(&health->now.late);
         begin_stage(health, IH_HEALTH_WATCHING);
     } else {
         health->step++;

@@ -5,12 +5,12 @@
  * Out:   the mean distance of labelled dots from their lines, the turn with its uncertainty, a
  *        state; and the rig, turned when there is reason to.
  * Way:   Every IH_HEALTH_LOOK frames:
- *        1. The look against all frames since the rig last changed, slot by slot (ih_places): when two looks
+ *        1. The look against all frames since the rig last changed, slot by slot (ih_rotation_estimate): when two looks
  *           one after the other differ by more than 0.02 degrees and 5 times its uncertainty, the second
  *           alone counts from then on, and its turn is taken. What a slot errs by in all frames, from
  *           calibration or because it stands still, is in both and drops out.
  *        2. More than half of the dots without a label, or labels 0.16 px from their lines and more: maybe
- *           the lines are wrong. Over IH_HEALTH_SEARCH frames the dots vote for a turn (ih_turn), which is
+ *           the lines are wrong. Over IH_HEALTH_SEARCH frames the dots vote for a turn (ih_rotation_vote), which is
  *           tried. If it gives neither a quarter more labels nor better ones than those frames had, it is
  *           taken back, with all that was known; if its labels are poor the search is repeated at once. One
  *           in vain is repeated after 1, 2, 4 .. IH_HEALTH_PAUSE looks, or when it gets worse.
@@ -23,10 +23,10 @@
  *        of 1 (then refined), of 2 after settling; later where a search is in vain first (63 seen).
  *        Not noticed: what dots do not show, docs/health.md has how much.
  *        A turn across the baseline, which is depth and which dots hardly show, is corrected for only
- *        when it is known to IH_PLACES_SIGMA_MAX: what votes say of it alone is taken back.
- * Limits: within IH_TURN_MAX_RAD_Q30 about each axis. Not seen, and not corrected: a shift of the
+ *        when it is known to IH_ROTATION_ESTIMATE_SIGMA_MAX: what votes say of it alone is taken back.
+ * Limits: within IH_ROTATION_VOTE_MAX_RAD_Q30 about each axis. Not seen, and not corrected: a shift of the
  *        projector along the baseline. A shift across it is taken for a turn. docs/health.md
- * Cost:  361 slots a frame; ih_turn's while searching, and ih_rig_init when the rig changes.
+ * Cost:  361 slots a frame; ih_rotation_vote's while searching, and ih_rig_init when the rig changes.
  * Error: against float64 on the same frames (tools/oracle/knock.py): docs/numerics.md.
  * Memory: the caller's; 63 kB with the scratch, beside struct isohead. A dot rig only.
  */
@@ -39,8 +39,8 @@
 #include "dots/ih_dots.h"
 #include "labels/ih_labels.h"
 #include "rig/ih_rig.h"
-#include "upkeep/ih_places.h"
-#include "upkeep/ih_turn.h"
+#include "upkeep/ih_rotation_estimate.h"
+#include "upkeep/ih_rotation_vote.h"
 
 /* Frames of a look, and of a search. */
 #define IH_HEALTH_LOOK 6
@@ -77,7 +77,7 @@ struct ih_health {
     int32_t dot_count, labelled_count; /* of the last look, in all its frames */
     /* Its own. */
     struct ih_calibration nominal;
-    struct ih_turn_slopes slopes;
+    struct ih_rotation_vote_slopes slopes;
     enum ih_health_stage stage;
     int32_t step;  /* of searching or settling */
     int32_t pause; /* looks until the next search, and after it if it is in vain */
@@ -90,17 +90,17 @@ struct ih_health {
     int32_t before_rad_q30[3];
     int32_t before_basis_count;
     bool was_weak_known;
-    struct ih_places all; /* since the rig last changed by more than a refinement */
+    struct ih_rotation_estimate all; /* since the rig last changed by more than a refinement */
     union {
-        struct ih_places late;      /* of the last look, or two; of a turn on trial */
-        struct ih_turn_votes votes; /* while searching */
+        struct ih_rotation_estimate late;    /* of the last look, or two; of a turn on trial */
+        struct ih_rotation_vote_votes votes; /* while searching */
     } now;
 };
 
 struct ih_health_scratch {
     union {
-        struct ih_turn_scratch turn;
-        struct ih_places change;
+        struct ih_rotation_vote_scratch turn;
+        struct ih_rotation_estimate change;
     } at;
     struct ih_calibration calibration;
     struct ih_rig rig;

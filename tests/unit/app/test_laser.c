@@ -216,9 +216,9 @@ static void test_duty(void)
             for (int to = from + 1; to <= STEPS; to += 13) {
                 int64_t on_us = on_until_us[to] - on_until_us[from];
                 int64_t all_us = (int64_t)(to - from) * STEP_US;
-                int64_t most_us = duties[d] * (all_us + APP_LASER_BURST_US) / 100;
+                int64_t max_us = duties[d] * (all_us + APP_LASER_BURST_US) / 100;
                 /* a step of this test is as coarse as 2 ms */
-                TEST_ASSERT_LESS_OR_EQUAL_INT64(most_us + 2 * STEP_US, on_us);
+                TEST_ASSERT_LESS_OR_EQUAL_INT64(max_us + 2 * STEP_US, on_us);
             }
         }
         TEST_ASSERT_GREATER_THAN_INT64_MESSAGE((int64_t)duties[d] * STEPS / 2 * STEP_US / 200,
@@ -325,7 +325,7 @@ static void test_duty_while_busy(void)
     for (int d = 0; d < 5; d++) {
         int64_t now_us = 0, excess = 0;
         int busy_on_count = 0;
-        const int64_t most = (int64_t)duties[d] * APP_LASER_BURST_US;
+        const int64_t max = (int64_t)duties[d] * APP_LASER_BURST_US;
         start(true, duties[d]);
         app_laser_wish(&laser, true, now_us);
         for (int frame = 0; frame < 300; frame++) {
@@ -335,7 +335,7 @@ static void test_duty_while_busy(void)
                 wait_us = wait_us < left_us ? wait_us : left_us;
                 excess += wait_us * ((fake.line ? 100 : 0) - duties[d]);
                 excess = excess < 0 || frame == 0 ? 0 : excess;
-                TEST_ASSERT_LESS_OR_EQUAL_INT64(most + 100, excess);
+                TEST_ASSERT_LESS_OR_EQUAL_INT64(max + 100, excess);
                 now_us += wait_us;
                 passed_us += wait_us;
             }
@@ -344,7 +344,7 @@ static void test_duty_while_busy(void)
             busy_on_count += fake.line;
             excess += BUSY_US * ((fake.line ? 100 : 0) - duties[d]);
             excess = excess < 0 || frame == 0 ? 0 : excess;
-            TEST_ASSERT_LESS_OR_EQUAL_INT64(most + 100, excess);
+            TEST_ASSERT_LESS_OR_EQUAL_INT64(max + 100, excess);
             now_us += BUSY_US;
             app_laser_busy(&laser, false, now_us);
             app_laser_wish(&laser, true, now_us);

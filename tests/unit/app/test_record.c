@@ -79,8 +79,8 @@ static void the_longest_record_has_room(void)
     head.rig.calibration.kind = IH_RIG_RANGE;
     head.dots.dot_count = head.labels.labelled_count = head.points.seen_count = INT32_MIN;
     head.dots.dots_dropped = head.labels.candidates_dropped = INT32_MIN;
-    head.hypotheses.minima_dropped = head.hypotheses.contours_dropped = INT32_MIN;
-    head.windows.places_dropped = head.findings.dropped_count = INT32_MIN;
+    head.nests.minima_dropped = head.nests.contours_dropped = INT32_MIN;
+    head.windows.places_dropped = head.detections.dropped_count = INT32_MIN;
     head.result.entry_count = head.result.head_count = IH_RESULT_MAX;
     head.result.selected = IH_RESULT_MAX - 1;
     for (i = 0; i < IH_RESULT_MAX; i++) {

@@ -92,7 +92,7 @@ static void check_solution(const int32_t *a_q30, int32_t n, const int32_t *b, co
     }
 }
 
-static void check_exponent_is_least(int32_t n, const char *what)
+static void check_exponent_is_min(int32_t n, const char *what)
 {
     int64_t largest = 0;
     int32_t i;
@@ -140,7 +140,7 @@ static void solutions_match_scipy(void)
         ih_cholesky_solve(factor, v->n, v->b, mantissa, &exponent);
         IH_TEST_UNTOUCHED(&mantissa[v->n], GUARD * sizeof *mantissa, v->name);
         check_solution(v->a_q30, v->n, v->b, v->name);
-        check_exponent_is_least(v->n, v->name);
+        check_exponent_is_min(v->n, v->name);
         for (k = 0; k < v->n && v->x != NULL; k++) {
             largest = fmax(largest, fabs(v->x[k]));
         }
@@ -196,7 +196,7 @@ static void any_positive_matrix_has_its_factor(void)
         }
         ih_cholesky_solve(factor, n, right, mantissa, &exponent);
         check_solution(matrix, n, right, "random");
-        check_exponent_is_least(n, "random");
+        check_exponent_is_min(n, "random");
     }
 }
 
@@ -281,7 +281,7 @@ static void the_greatest_right_side_is_solved(void)
         right[0] = sign * (INT32_MAX / 2);
         right[2] = -sign * (INT32_MAX / 2);
         ih_cholesky_solve(factor, 3, right, mantissa, &exponent);
-        check_exponent_is_least(3, "quarter, greatest b");
+        check_exponent_is_min(3, "quarter, greatest b");
         check_solution(matrix, 3, right, "quarter, greatest b");
     }
 }

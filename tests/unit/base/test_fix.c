@@ -171,10 +171,10 @@ static void shift_round_is_exact_up_to_its_limits(void)
         IH_TEST_EQUAL(round_shift(value, shift), ih_shift_round(value, shift), "shift", shift);
     }
     for (i = 1; i <= 62; i++) {
-        const int64_t most = INT64_MAX - (INT64_C(1) << (i - 1));
+        const int64_t max = INT64_MAX - (INT64_C(1) << (i - 1));
 
-        IH_TEST_EQUAL(round_shift(most, i), ih_shift_round(most, i), "greatest", i);
-        IH_TEST_EQUAL(round_shift(-most, i), ih_shift_round(-most, i), "least", i);
+        IH_TEST_EQUAL(round_shift(max, i), ih_shift_round(max, i), "greatest", i);
+        IH_TEST_EQUAL(round_shift(-max, i), ih_shift_round(-max, i), "least", i);
     }
 }
 
@@ -406,11 +406,11 @@ static void isqrt_is_doubles_root_cut_off(void)
 /* Quotients of integers as small as these are exact in double where they are halves. */
 static void div_round_is_doubles_quotient_rounded(void)
 {
-    const int64_t most = is_all ? 20000 : 1000;
+    const int64_t max = is_all ? 20000 : 1000;
     int64_t n, d;
 
-    for (d = 1; d <= most; d++) {
-        for (n = -most; n <= most; n++) {
+    for (d = 1; d <= max; d++) {
+        for (n = -max; n <= max; n++) {
             if (ih_div_round(n, d) != llround((double)n / (double)d)) {
                 IH_TEST_EQUAL(llround((double)n / (double)d), ih_div_round(n, d), "quotient", d);
             }
@@ -444,12 +444,12 @@ static void div_round_is_exact_near_powers_of_two(void)
 
 static void shift_round_is_doubles_floor(void)
 {
-    const int64_t most = is_all ? 1 << 20 : 1 << 14;
+    const int64_t max = is_all ? 1 << 20 : 1 << 14;
     int64_t value;
     int shift;
 
     for (shift = 0; shift <= 24; shift++) {
-        for (value = -most; value <= most; value++) {
+        for (value = -max; value <= max; value++) {
             const double exact = floor(ldexp((double)value, -shift) + 0.5);
 
             if ((double)ih_shift_round(value, shift) != exact) {
@@ -486,11 +486,11 @@ static void products_are_exact_near_powers_of_two(void)
 /* Every direction that two integers of ten bits have; with --all, of twelve. */
 static void atan2_follows_libm_in_every_direction(void)
 {
-    const int64_t most = is_all ? 4095 : 400;
+    const int64_t max = is_all ? 4095 : 400;
     int64_t x, y;
 
-    for (y = -most; y <= most; y++) {
-        for (x = -most; x <= most; x++) {
+    for (y = -max; y <= max; y++) {
+        for (x = -max; x <= max; x++) {
             if (x != 0 || y != 0) {
                 check_angle(y, x);
             }

@@ -1,4 +1,4 @@
-/* The functions of one number in ih_fit, ih_row and ih_score over the whole range of their input, against
+/* The functions of one number in ih_fit, ih_scanline and ih_score over the whole range of their input, against
  * double: exp, ln, the robust weight, the probability. */
 #include "detect/ih_ellipsoid.h"
 #include "detect/ih_score.h"
@@ -7,7 +7,7 @@
 
 /* In its own words: they are static. */
 #include "detect/ih_fit.c"
-#include "detect/ih_row.c"
+#include "detect/ih_fit_equations.c"
 
 void setUp(void)
 {

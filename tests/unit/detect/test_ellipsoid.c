@@ -151,7 +151,7 @@ static void a_mirror_changes_the_sign_alone(void)
 static void places_are_in_semi_axes(void)
 {
     const struct ih_ellipsoid head = ih_ellipsoid_mean((const int32_t[3]){100, -200, 300});
-    const struct ih_shares shares = ih_ellipsoid_shares(head.semi_mm_q8);
+    const struct ih_fractions shares = ih_ellipsoid_fractions(head.semi_mm_q8);
     int32_t point[3], place[3], axis;
 
     for (axis = 0; axis < 3; axis++) {
@@ -175,7 +175,7 @@ static void places_are_in_semi_axes(void)
 static void the_extremes_do_not_overflow(void)
 {
     static const int32_t semi_mm[] = {IH_ELLIPSOID_SEMI_MIN_MM, IH_ELLIPSOID_SEMI_MAX_MM};
-    const int32_t slope_max = IH_SPACE_SLOPE_MAX << 20;
+    const int32_t slope_max = IH_RAYS_SLOPE_MAX << 20;
     struct ih_test_random random = {304};
     int32_t i, axis, hits = 0;
 
@@ -233,15 +233,15 @@ static void the_box_misses_nothing(void)
     int32_t i, axis, near = 0, far = 0, far_in_box = 0;
 
     for (i = 0; i < 100000; i++) {
-        const int32_t slope_max = i % 2 == 0 ? 1 << 19 : IH_SPACE_SLOPE_MAX << 20;
-        const int32_t slope_most[2] = {slope_max, slope_max / 2};
+        const int32_t steepest = i % 2 == 0 ? 1 << 19 : IH_RAYS_SLOPE_MAX << 20;
+        const int32_t slope_max[2] = {steepest, steepest / 2};
         const int32_t radius2_q14 = (int32_t)ih_test_between(&random, 1 << 12, 4 << 14);
         const int32_t origin[3] = {0, 12 << 8, (int32_t)ih_test_between(&random, -2000, 2000)};
         struct ih_ellipsoid at = {.centre_mm_q8[2] =
                                       (int32_t)ih_test_between(&random, 300 << 8, 4000 << 8)};
         const struct ih_ray ray =
-            ray_of((int32_t)ih_test_between(&random, -slope_most[0], slope_most[0]),
-                   (int32_t)ih_test_between(&random, -slope_most[1], slope_most[1]));
+            ray_of((int32_t)ih_test_between(&random, -slope_max[0], slope_max[0]),
+                   (int32_t)ih_test_between(&random, -slope_max[1], slope_max[1]));
         const int32_t slope[2] = {ray.slope_x_q20, ray.slope_y_q20};
         struct ih_crossing crossing;
 
@@ -255,7 +255,7 @@ static void the_box_misses_nothing(void)
                           ((int64_t)(at.centre_mm_q8[2] - origin[2]) * slope[axis] >> 20) +
                           ih_test_between(&random, -(600 << 8), 600 << 8));
         }
-        const struct ih_ellipsoid_box box = ih_ellipsoid_box(&at, slope_most, radius2_q14);
+        const struct ih_ellipsoid_box box = ih_ellipsoid_box(&at, slope_max, radius2_q14);
         const bool in_box = ih_ellipsoid_in_box(&at, &box, origin, &ray);
 
         if (ih_test_cross(&at, origin, &ray, &crossing) && crossing.radius2_q14 < radius2_q14) {
@@ -279,19 +279,19 @@ static void shares_are_the_quotients(void)
 
     for (semi = IH_ELLIPSOID_SEMI_MIN_MM << 8; semi <= IH_ELLIPSOID_SEMI_MAX_MM << 8; semi++) {
         const int32_t semis[3] = {semi, semi, semi};
-        const int64_t share = ih_ellipsoid_shares(semis).share_q50[semi % 3];
+        const int64_t share = ih_ellipsoid_fractions(semis).share_q50[semi % 3];
         const int32_t step = (semi & (semi - 1)) == 0 ? 1 : 20000;
 
-        for (i = -IH_SHARE_MOST; i <= IH_SHARE_MOST; i += step) {
+        for (i = -IH_FRACTION_MAX; i <= IH_FRACTION_MAX; i += step) {
             const int64_t half = 2 * ih_test_between(&random, 0, 1 << 17) + 1;
             const int32_t at = (int32_t)(half * semi / 32768);
 
-            TEST_ASSERT_EQUAL_INT64(ih_div_round((int64_t)i * 16384, semi), ih_share(share, i));
-            for (near = at - 1; near <= at + 1 && near <= IH_SHARE_MOST; near++) {
+            TEST_ASSERT_EQUAL_INT64(ih_div_round((int64_t)i * 16384, semi), ih_fraction(share, i));
+            for (near = at - 1; near <= at + 1 && near <= IH_FRACTION_MAX; near++) {
                 TEST_ASSERT_EQUAL_INT64(ih_div_round((int64_t)near * 16384, semi),
-                                        ih_share(share, near));
+                                        ih_fraction(share, near));
                 TEST_ASSERT_EQUAL_INT64(ih_div_round(-(int64_t)near * 16384, semi),
-                                        ih_share(share, -near));
+                                        ih_fraction(share, -near));
             }
         }
     }

@@ -3,8 +3,8 @@
 #include "base/ih_config.h"
 #include "detect/ih_ellipsoid.h"
 #include "detect/ih_evidence.h"
-#include "detect/ih_space.h"
-#include "detect/ih_tally.h"
+#include "detect/ih_rays.h"
+#include "detect/ih_ray_counts.h"
 
 #include "ih_test.h"
 
@@ -29,8 +29,8 @@ struct vector_scene {
 _Static_assert(KINDS <= IH_EVIDENCE_COUNT && IH_EVIDENCE_UPRIGHT == KINDS - 1,
                "new kinds go to the end");
 
-static struct ih_space space;
-static struct ih_tally_scratch scratch;
+static struct ih_rays space;
+static struct ih_ray_counts_scratch scratch;
 static struct ih_evidence evidence, one_by_one;
 static const struct ih_evidence_nest no_nest = {.present = false};
 
@@ -39,7 +39,7 @@ static void collect(const struct ih_ellipsoid *head, const int32_t start_mm_q8[3
                     const struct ih_evidence_nest *nest)
 {
     memset(&scratch, IH_TEST_FILL, sizeof scratch);
-    ih_tally_prepare(&space, &scratch);
+    ih_ray_counts_prepare(&space, &scratch);
     ih_evidence_collect(&space, &scratch, head, start_mm_q8, nest, &evidence);
     scratch.is_usable = false;
     ih_evidence_collect(&space, &scratch, head, start_mm_q8, nest, &one_by_one);

@@ -1,7 +1,7 @@
 /* ih_fit against float64, on made scenes with a known head, and at the extremes. */
 #include "detect/ih_ellipsoid.h"
 #include "detect/ih_fit.h"
-#include "detect/ih_row.h"
+#include "detect/ih_fit_equations.h"
 
 #include <stdlib.h>
 
@@ -23,7 +23,7 @@ struct vector_fit {
 #include "fit.inc"
 
 static struct ih_fit_params params;
-static struct ih_row_scratch scratch;
+static struct ih_fit_equations_scratch scratch;
 static struct ih_ellipsoid found;
 
 void setUp(void)
@@ -40,7 +40,7 @@ void tearDown(void)
 
 static void fit(const struct ih_ellipsoid *start)
 {
-    ih_row_prepare(&space, &scratch.rays);
+    ih_fit_equations_prepare(&space, &scratch.rays);
     ih_fit_ellipsoid(&space, &params, start, &scratch, &found);
 }
 
@@ -54,24 +54,24 @@ static struct ih_ellipsoid start_beside(const double centre_mm[3], double x, dou
     return ih_ellipsoid_mean(centre);
 }
 
-static double greatest_difference(const struct ih_ellipsoid *a, const struct ih_ellipsoid *b)
+static double max_difference(const struct ih_ellipsoid *a, const struct ih_ellipsoid *b)
 {
-    double greatest = 0;
+    double max = 0;
     int axis;
 
     for (axis = 0; axis < 3; axis++) {
-        greatest = fmax(greatest, abs(a->centre_mm_q8[axis] - b->centre_mm_q8[axis]) / 256.0);
-        greatest = fmax(greatest, abs(a->semi_mm_q8[axis] - b->semi_mm_q8[axis]) / 256.0);
+        max = fmax(max, abs(a->centre_mm_q8[axis] - b->centre_mm_q8[axis]) / 256.0);
+        max = fmax(max, abs(a->semi_mm_q8[axis] - b->semi_mm_q8[axis]) / 256.0);
     }
-    return greatest;
+    return max;
 }
 
 static bool distance_of(const struct ih_ellipsoid *ellipsoid, const int32_t place_q14[3],
                         int32_t *distance_mm_q8)
 {
-    const struct ih_shares shares = ih_ellipsoid_shares(ellipsoid->semi_mm_q8);
+    const struct ih_fractions shares = ih_ellipsoid_fractions(ellipsoid->semi_mm_q8);
 
-    return ih_row_distance(&shares, place_q14, distance_mm_q8);
+    return ih_fit_equations_distance(&shares, place_q14, distance_mm_q8);
 }
 
 static void distances_match_float64(void)
@@ -194,7 +194,7 @@ static void points_in_front_change_little(void)
     }
     TEST_ASSERT_TRUE(moved > 6);
     fit(&start);
-    IH_TEST_WITHIN(4, 0, greatest_difference(&clean, &found), "hand", moved);
+    IH_TEST_WITHIN(4, 0, max_difference(&clean, &found), "hand", moved);
 }
 
 /* A wall seen through the left half of where a head was thought to be, and nothing known of the
@@ -240,7 +240,7 @@ static void with_nothing_seen_only_the_prior_is_left(void)
         start.semi_mm_q8[2] = 138 << 8;
         fit(&start);
         TEST_ASSERT_EQUAL_INT32_ARRAY(centre, found.centre_mm_q8, 3);
-        IH_TEST_WITHIN(0.01, 0, greatest_difference(&mean, &found), "axes", pass);
+        IH_TEST_WITHIN(0.01, 0, max_difference(&mean, &found), "axes", pass);
     }
 }
 
@@ -296,7 +296,7 @@ static void a_mirrored_scene_gives_a_mirrored_fit(void)
         mirror_space();
         start.centre_mm_q8[0] = -start.centre_mm_q8[0];
         fit(&start);
-        IH_TEST_WITHIN(0.02 + v->slack_mm, 0, greatest_difference(&straight, &found), "mirror", i);
+        IH_TEST_WITHIN(0.02 + v->slack_mm, 0, max_difference(&straight, &found), "mirror", i);
     }
 }
 

@@ -1,6 +1,6 @@
 /* ih_scan against float64, on made scenes with a known head, and at the extremes. */
 #include "detect/ih_ellipsoid.h"
-#include "detect/ih_rating.h"
+#include "detect/ih_template.h"
 #include "detect/ih_scan.h"
 
 #include <stdlib.h>
@@ -44,7 +44,7 @@ static void find(void)
 
 static int32_t rating_of(int32_t slot)
 {
-    return ih_rating_q12(&space, &scratch.rays, scratch.centre_mm_q8[slot]);
+    return ih_template_score_q12(&space, &scratch.rays, scratch.centre_mm_q8[slot]);
 }
 
 static bool is_looked_at(int32_t slot)
@@ -568,7 +568,7 @@ static void random_input_stays_within_the_limits(void)
         find();
         check_choice();
         for (slot = 0; slot < IH_SLOTS; slot++) {
-            if (is_looked_at(slot) && rating_of(slot) != IH_RATING_NONE_Q12) {
+            if (is_looked_at(slot) && rating_of(slot) != IH_TEMPLATE_NONE_Q12) {
                 IH_TEST_RANGE(-4096 * 136 / 100 - 1, 4096 * 16 / 10, rating_of(slot), "rating",
                               slot);
             }

@@ -1,6 +1,6 @@
 /* ih_dots against scipy.ndimage, on frames that both sides make by the same formula. */
 #include "base/ih_fix.h"
-#include "dots/ih_band.h"
+#include "dots/ih_bandpass.h"
 #include "dots/ih_dots.h"
 #include "dots/ih_noise.h"
 
@@ -533,7 +533,7 @@ static void row_by_row_is_the_same_as_the_whole_frame(void)
     memset(&scratch, IH_TEST_FILL, sizeof scratch);
     ih_dots_begin(&scratch, &dots, &params, frame.width, frame.height, &noise);
     for (v = 0; v < frame.height; v++) {
-        struct ih_row row = ih_frame_row(&frame, v);
+        struct ih_scanline row = ih_frame_scanline(&frame, v);
 
         memcpy(newest, row.samples, (size_t)frame.width);
         row.samples = newest;
@@ -611,16 +611,17 @@ static int16_t plain[IH_FRAME_HEIGHT_MAX + 2][IH_FRAME_WIDTH_MAX + 2];
 
 static void filter_whole(void)
 {
-    static struct ih_band band;
-    const uint8_t *row[IH_BAND_ROWS];
+    static struct ih_bandpass band;
+    const uint8_t *row[IH_BANDPASS_ROWS];
     int32_t i, v;
 
     memset(plain, 0, sizeof plain);
     for (v = 0; v < frame.height; v++) {
-        for (i = 0; i < IH_BAND_ROWS; i++) {
-            row[i] = ih_frame_row(&frame, ih_clamp_s32(v + i - 4, 0, frame.height - 1)).samples;
+        for (i = 0; i < IH_BANDPASS_ROWS; i++) {
+            row[i] =
+                ih_frame_scanline(&frame, ih_clamp_s32(v + i - 4, 0, frame.height - 1)).samples;
         }
-        ih_band_bytes(&band, row, frame.width, 0, &plain[v + 1][1]);
+        ih_bandpass_bytes(&band, row, frame.width, 0, &plain[v + 1][1]);
     }
 }
 
@@ -633,7 +634,7 @@ static int32_t plain_maxima(void)
 
         for (u = 0; u < frame.width; u++) {
             const int16_t peak = plain[v + 1][u + 1];
-            const int32_t floor = (params.floor_grey_q4 * IH_BAND_UNIT + 8) >> 4;
+            const int32_t floor = (params.floor_grey_q4 * IH_BANDPASS_UNIT + 8) >> 4;
             const int32_t noisy = (ih_noise_at(&noise, u) * params.noise_gain_q8 + 128) >> 8;
             bool is_maximum = peak > floor && peak > noisy;
 

@@ -1,5 +1,5 @@
 /* ih_noise against NumPy, on frames that both sides make by the same formula. */
-#include "dots/ih_band.h"
+#include "dots/ih_bandpass.h"
 #include "dots/ih_noise.h"
 
 #include <stdlib.h>
@@ -168,7 +168,7 @@ static void flat_frames_have_no_noise(void)
  * seams. */
 static void there_are_no_seams(void)
 {
-    int32_t u, v, greatest = 0;
+    int32_t u, v, max = 0;
 
     make_frame(&vector_noises[IH_TEST_COUNT(vector_noises) - 1].spec);
     ih_noise_measure(&frame, NULL, &scratch, &noise);
@@ -176,13 +176,13 @@ static void there_are_no_seams(void)
         for (u = 0; u + 1 < noise.columns; u++) {
             const int32_t step = noise.median[v][u + 1] - noise.median[v][u];
 
-            greatest = step > greatest ? step : -step > greatest ? -step : greatest;
+            max = step > max ? step : -step > max ? -step : max;
         }
     }
-    TEST_ASSERT_GREATER_THAN_INT32(100, greatest);
+    TEST_ASSERT_GREATER_THAN_INT32(100, max);
     for (v = 0; v < frame.height; v += 13) {
         for (u = 0; u + 1 < frame.width; u++) {
-            IH_TEST_RANGE(-greatest / 32 - 2, greatest / 32 + 2, at(u + 1, v) - at(u, v), "step",
+            IH_TEST_RANGE(-max / 32 - 2, max / 32 + 2, at(u + 1, v) - at(u, v), "step",
                           v * frame.width + u);
         }
     }
@@ -207,16 +207,16 @@ static void no_pixel_of_a_block_has_less_than_its_least(void)
 
         for (u = 0; u < frame.width; u++) {
             const int32_t above = v < 16 ? 0 : (v - 16) / 32;
-            int32_t least = INT32_MAX;
+            int32_t min = INT32_MAX;
 
             for (i = 0; i < 6; i++) {
                 const int32_t column = u / 32 + i % 3 - 1;
                 const int32_t block = block_at(above + i / 3, column < 0 ? 0 : column);
 
-                least = block < least ? block : least;
+                min = block < min ? block : min;
             }
-            IH_TEST_EQUAL(least, ih_noise_least(&row, u / 32), "least", v * 10000 + u);
-            IH_TEST_RANGE(least, INT32_MAX, at(u, v), "noise", v * 10000 + u);
+            IH_TEST_EQUAL(min, ih_noise_min(&row, u / 32), "least", v * 10000 + u);
+            IH_TEST_RANGE(min, INT32_MAX, at(u, v), "noise", v * 10000 + u);
         }
     }
 }
@@ -233,8 +233,8 @@ static void medians_are_those_of_sorted_values(void)
 {
     static const int32_t heights[] = {1, 2, 5, 9, 17, 40, 100, 255};
     static int16_t out[IH_FRAME_WIDTH_MAX];
-    static struct ih_band band;
-    const uint8_t *row[IH_BAND_ROWS];
+    static struct ih_bandpass band;
+    const uint8_t *row[IH_BANDPASS_ROWS];
     struct ih_test_random random = {11};
     uint16_t value[64];
     int32_t i, k, u, v, period;
@@ -253,10 +253,10 @@ static void medians_are_those_of_sorted_values(void)
                 }
             }
             ih_noise_measure(&frame, NULL, &scratch, &noise);
-            for (k = 0; k < IH_BAND_ROWS; k++) {
+            for (k = 0; k < IH_BANDPASS_ROWS; k++) {
                 row[k] = &grey8[(96 + k) * 352];
             }
-            ih_band_bytes(&band, row, 352, 0, out);
+            ih_bandpass_bytes(&band, row, 352, 0, out);
             for (k = 0; k < 64; k++) {
                 value[k] = (uint16_t)abs(out[128 + k % 32]);
             }

@@ -1,8 +1,8 @@
 /* ih_ellipse against closed forms, against float64 moments by triangles, and its search against a
  * float64 search that tries every part. */
-#include "nests/ih_cuts.h"
+#include "nests/ih_contours.h"
 #include "nests/ih_ellipse.h"
-#include "nests/ih_parts.h"
+#include "nests/ih_arcs.h"
 
 #include "ih_test.h"
 
@@ -28,12 +28,12 @@ struct vector_part {
 
 #define UNIT 512
 
-static struct ih_cuts cuts;
+static struct ih_contours cuts;
 static struct ih_contour contour;
 static struct ih_ellipse ellipse;
 static struct ih_ellipse_params params;
 static int32_t points; /* on a contour: searches are tested with the most and with fewer */
-static struct ih_parts parts;
+static struct ih_arcs parts;
 static struct ih_ellipse_scratch scratch;
 
 static void set_params(void)
@@ -229,7 +229,7 @@ static void the_winding_follows_a_concave_contour(void)
 
 static bool find_part_around(struct ih_vertex place)
 {
-    return ih_parts_make(&cuts, &contour, &params, &parts) &&
+    return ih_arcs_make(&cuts, &contour, &params, &parts) &&
            ih_ellipse_of_part(&parts, place, &params, &scratch, &ellipse);
 }
 
@@ -281,7 +281,7 @@ static void limits_are_obeyed(void)
 
 static void contours_that_are_too_short_or_too_long_have_no_part(void)
 {
-    static struct ih_vertex longest[IH_CUTS_VERTICES_MAX];
+    static struct ih_vertex longest[IH_CONTOURS_VERTICES_MAX];
     const struct ih_vertex place = {23 * UNIT, 23 * UNIT};
     int32_t i, count;
 
@@ -289,13 +289,13 @@ static void contours_that_are_too_short_or_too_long_have_no_part(void)
         take(vector_parts[0].vertex, count, false);
         TEST_ASSERT_FALSE(find_part_around(vector_parts[0].place));
     }
-    for (i = 0; i < IH_CUTS_VERTICES_MAX; i++) {
-        const double angle = i * 2 * acos(-1.0) / (IH_PARTS_VERTICES_MAX + 1);
+    for (i = 0; i < IH_CONTOURS_VERTICES_MAX; i++) {
+        const double angle = i * 2 * acos(-1.0) / (IH_ARCS_VERTICES_MAX + 1);
 
         longest[i] = (struct ih_vertex){(int16_t)lround((23 + 20 * cos(angle)) * UNIT),
                                         (int16_t)lround((23 + 20 * sin(angle)) * UNIT)};
     }
-    contour = (struct ih_contour){0, IH_PARTS_VERTICES_MAX + 1, true};
+    contour = (struct ih_contour){0, IH_ARCS_VERTICES_MAX + 1, true};
     memcpy(cuts.vertex, longest, sizeof longest);
     TEST_ASSERT_FALSE(find_part_around(place));
 }
@@ -323,21 +323,21 @@ static void degenerate_contours_have_no_part(void)
 /* The largest sums: a contour as long as is searched, all over the grid, seen from a corner. */
 static void the_longest_contours_do_not_overflow(void)
 {
-    static struct ih_vertex vertex[IH_PARTS_VERTICES_MAX];
+    static struct ih_vertex vertex[IH_ARCS_VERTICES_MAX];
     struct ih_test_random random = {82};
     int32_t i, pass;
 
     for (pass = 0; pass < 40; pass++) {
         int32_t x = 23 * UNIT, y = 23 * UNIT;
 
-        for (i = 0; i < IH_PARTS_VERTICES_MAX; i++) { /* a walk in steps of at most one cell */
+        for (i = 0; i < IH_ARCS_VERTICES_MAX; i++) { /* a walk in steps of at most one cell */
             x += (int32_t)ih_test_between(&random, pass % 2 == 0 ? -UNIT : 0, UNIT);
             y += (int32_t)ih_test_between(&random, -UNIT, pass % 3 == 0 ? 0 : UNIT);
             x = x < 0 ? 0 : x > 46 * UNIT ? 46 * UNIT : x;
             y = y < 0 ? 0 : y > 46 * UNIT ? 46 * UNIT : y;
             vertex[i] = (struct ih_vertex){(int16_t)x, (int16_t)y};
         }
-        take(vertex, IH_PARTS_VERTICES_MAX, pass % 4 < 2);
+        take(vertex, IH_ARCS_VERTICES_MAX, pass % 4 < 2);
         if (find_part_around((struct ih_vertex){0, 0})) {
             IH_TEST_RANGE(0, 46 << 16, ellipse.x_q16, "x", pass);
         }
@@ -453,8 +453,8 @@ static void areas_and_ratios_have_their_limits(void)
 /* A regular polygon, its area n/2 r^2 sin(2 pi / n), from the fewest corners to the most. */
 static void contours_have_eight_to_768_vertices(void)
 {
-    static const int32_t counts[] = {7, 8, IH_PARTS_VERTICES_MAX, IH_PARTS_VERTICES_MAX + 1};
-    static struct ih_vertex vertex[IH_PARTS_VERTICES_MAX + 1];
+    static const int32_t counts[] = {7, 8, IH_ARCS_VERTICES_MAX, IH_ARCS_VERTICES_MAX + 1};
+    static struct ih_vertex vertex[IH_ARCS_VERTICES_MAX + 1];
     int32_t i, k;
 
     for (i = 0; i < IH_TEST_COUNT(counts); i++) {
@@ -506,18 +506,18 @@ static void limits_may_be_reached(void)
     }
 }
 
-/* One part by itself, whatever ih_parts says of it. */
+/* One part by itself, whatever ih_arcs says of it. */
 static bool is_ellipse(int32_t from, int32_t steps, struct ih_vertex place, struct ih_ellipse *out)
 {
-    static struct ih_parts one;
+    static struct ih_arcs one;
 
     one = parts;
     one.part_count = 1;
-    one.part[0] = (struct ih_part){INT32_MAX, (uint8_t)from, (uint8_t)steps};
+    one.part[0] = (struct ih_arc){INT32_MAX, (uint8_t)from, (uint8_t)steps};
     return ih_ellipse_of_part(&one, place, &params, &scratch, out);
 }
 
-/* The most merit that ih_parts gives the part; INT32_MIN when it is none. */
+/* The most merit that ih_arcs gives the part; INT32_MIN when it is none. */
 static int32_t promised_merit(int32_t from, int32_t steps)
 {
     int32_t i;
@@ -534,18 +534,18 @@ static int32_t promised_merit(int32_t from, int32_t steps)
 static void compare_with_all_parts(struct ih_vertex place, int64_t at, int32_t *ellipse_count)
 {
     struct ih_ellipse best = {0}, other;
-    struct ih_part part = {0};
+    struct ih_arc part = {0};
     bool found = false;
     int32_t from, k;
 
-    if (!ih_parts_make(&cuts, &contour, &params, &parts)) {
+    if (!ih_arcs_make(&cuts, &contour, &params, &parts)) {
         return;
     }
     for (from = 0; from < parts.point_count; from++) {
-        for (k = IH_PARTS_STEPS_MIN; k < parts.point_count && from + k < parts.count; k++) {
-            const int64_t most_q8 = (int64_t)params.chord_max_q16 * parts.arc_q8[k] / 65536;
+        for (k = IH_ARCS_STEPS_MIN; k < parts.point_count && from + k < parts.count; k++) {
+            const int64_t max_q8 = (int64_t)params.chord_max_q16 * parts.arc_q8[k] / 65536;
 
-            if (ih_parts_chord2_q16(&parts, from, from + k) >= (most_q8 + 1) * (most_q8 + 1) ||
+            if (ih_arcs_chord2_q16(&parts, from, from + k) >= (max_q8 + 1) * (max_q8 + 1) ||
                 !is_ellipse(from, k, place, &other)) {
                 continue;
             }
@@ -555,7 +555,7 @@ static void compare_with_all_parts(struct ih_vertex place, int64_t at, int32_t *
             }
             if (!found || other.merit_q8 > best.merit_q8) {
                 best = other;
-                part = (struct ih_part){0, (uint8_t)from, (uint8_t)k};
+                part = (struct ih_arc){0, (uint8_t)from, (uint8_t)k};
                 found = true;
             }
         }
@@ -571,7 +571,7 @@ static void compare_with_all_parts(struct ih_vertex place, int64_t at, int32_t *
 /* Outlines of all sizes, open and closed, round and lobed, smooth and rough, with limits of all kinds. */
 static void no_part_is_missed_that_looking_at_all_would_find(void)
 {
-    static struct ih_vertex vertex[IH_PARTS_VERTICES_MAX];
+    static struct ih_vertex vertex[IH_ARCS_VERTICES_MAX];
     struct ih_test_random random = {85};
     int32_t ellipse_count = 0, pass, i;
 
@@ -610,13 +610,13 @@ static void no_part_is_missed_that_looking_at_all_would_find(void)
 /* The eight of a walk all over the grid, whose parts cross themselves: what passes then is an accident. */
 static void no_part_of_a_walk_is_missed(void)
 {
-    static struct ih_vertex vertex[IH_PARTS_VERTICES_MAX];
+    static struct ih_vertex vertex[IH_ARCS_VERTICES_MAX];
     struct ih_test_random random = {86};
     int32_t ellipse_count = 0, pass, i;
 
     for (pass = 0; pass < 60; pass++) {
         const int32_t stride = 1 << ih_test_between(&random, 3, 9);
-        const int32_t count = pass % 2 == 0 ? IH_PARTS_VERTICES_MAX : 90;
+        const int32_t count = pass % 2 == 0 ? IH_ARCS_VERTICES_MAX : 90;
         int32_t x = 23 * UNIT, y = 23 * UNIT;
 
         for (i = 0; i < count; i++) {
@@ -631,12 +631,12 @@ static void no_part_of_a_walk_is_missed(void)
                                                   (int16_t)(vertex[count / 2].y_q9 & ~1)},
                                pass, &ellipse_count);
     }
-    TEST_ASSERT_GREATER_THAN(points == IH_PARTS_POINTS_MAX ? 100 : 5, ellipse_count);
+    TEST_ASSERT_GREATER_THAN(points == IH_ARCS_POINTS_MAX ? 100 : 5, ellipse_count);
 }
 
 int main(void)
 {
-    static const int32_t counts[] = {IH_PARTS_POINTS_MAX, 32, IH_PARTS_POINTS_MIN};
+    static const int32_t counts[] = {IH_ARCS_POINTS_MAX, 32, IH_ARCS_POINTS_MIN};
     int i;
 
     UNITY_BEGIN();

@@ -587,7 +587,7 @@ static void distort_float64(const struct ih_calibration *c, double x, double y, 
 }
 
 /* What was undistorted is distorted to where it was, over the frame. */
-static void check_undistorted(int32_t width, int32_t height, double most_px, int index)
+static void check_undistorted(int32_t width, int32_t height, double max_px, int index)
 {
     int32_t row, column;
 
@@ -598,8 +598,8 @@ static void check_undistorted(int32_t width, int32_t height, double most_px, int
 
             ih_rig_undistort(&rig, column * 4096, row * 4096, &x, &y);
             distort_float64(&calibration, ldexp(x, -28), ldexp(y, -28), &u, &v);
-            IH_TEST_WITHIN(most_px, column, u, "u", index);
-            IH_TEST_WITHIN(most_px, row, v, "v", index);
+            IH_TEST_WITHIN(max_px, column, u, "u", index);
+            IH_TEST_WITHIN(max_px, row, v, "v", index);
         }
     }
 }
@@ -715,31 +715,31 @@ static void sides_may_be_seen_at_the_widest_angle(void)
 
     for (axis = 0; axis < 2; axis++) {
         int32_t *principal_px_q16 = axis == 0 ? &calibration.cx_px_q16 : &calibration.cy_px_q16;
-        const int32_t least = (size_px[axis] - 2 * 200) * 65536, most = 2 * 200 << 16;
+        const int32_t min = (size_px[axis] - 2 * 200) * 65536, max = 2 * 200 << 16;
 
         use_range_rig(size_px[0], size_px[1], 200);
-        *principal_px_q16 = most;
+        *principal_px_q16 = max;
         expect(IH_OK, IH_NONE, "greatest principal point");
-        *principal_px_q16 = most + 1;
+        *principal_px_q16 = max + 1;
         expect(IH_ERR_PRINCIPAL, IH_NONE, "a greater one");
-        *principal_px_q16 = least;
+        *principal_px_q16 = min;
         expect(IH_OK, IH_NONE, "least principal point");
-        *principal_px_q16 = least - 1;
+        *principal_px_q16 = min - 1;
         expect(IH_ERR_PRINCIPAL, IH_NONE, "a lesser one");
     }
 }
 
 static void the_projector_may_be_a_metre_away(void)
 {
-    const int32_t most = IH_RIG_BASELINE_MAX_MM << 16;
+    const int32_t max = IH_RIG_BASELINE_MAX_MM << 16;
     int axis, sign;
 
     for (axis = 0; axis < 3; axis++) {
         for (sign = -1; sign <= 1; sign += 2) {
             calibration = vector_rigs[0];
-            calibration.origin_mm_q16[axis] = sign * most;
+            calibration.origin_mm_q16[axis] = sign * max;
             expect(IH_OK, IH_NONE, "a metre");
-            calibration.origin_mm_q16[axis] = sign * (most + 1);
+            calibration.origin_mm_q16[axis] = sign * (max + 1);
             expect(IH_ERR_BASELINE, IH_NONE, "more than a metre");
         }
     }
@@ -811,24 +811,24 @@ static void dots_must_move_by_a_tenth_of_a_pixel(void)
 /* Pixels beyond 16384 are taken for it. A principal point at 16000 is 384 px from there. */
 static void pixels_beyond_16384_are_limited(void)
 {
-    const int32_t most = 16384 * 4096;
+    const int32_t max = 16384 * 4096;
     int32_t x, y, off_x, off_y;
 
     use_range_rig(64, 64, IH_RIG_FOCAL_MAX_PX);
     calibration.cx_px_q16 = calibration.cy_px_q16 = 16000 << 16;
     expect(IH_OK, IH_NONE, "principal point far to the right");
-    ih_rig_undistort(&rig, most, most - 4096, &x, &y);
+    ih_rig_undistort(&rig, max, max - 4096, &x, &y);
     IH_TEST_WITHIN(1, ldexp(384.0 / 8192, 28), x, "x", 0);
     IH_TEST_WITHIN(1, ldexp(383.0 / 8192, 28), y, "y", 0);
-    ih_rig_undistort(&rig, most + 4096, INT32_MAX, &off_x, &off_y);
+    ih_rig_undistort(&rig, max + 4096, INT32_MAX, &off_x, &off_y);
     IH_TEST_EQUAL(x, off_x, "x beyond", 0);
     IH_TEST_EQUAL(x, off_y, "y beyond", 0);
     calibration.cx_px_q16 = calibration.cy_px_q16 = -16000 * 65536;
     expect(IH_OK, IH_NONE, "principal point far to the left");
-    ih_rig_undistort(&rig, -most, -most + 4096, &x, &y);
+    ih_rig_undistort(&rig, -max, -max + 4096, &x, &y);
     IH_TEST_WITHIN(1, ldexp(-384.0 / 8192, 28), x, "x", 1);
     IH_TEST_WITHIN(1, ldexp(-383.0 / 8192, 28), y, "y", 1);
-    ih_rig_undistort(&rig, -most - 4096, INT32_MIN, &off_x, &off_y);
+    ih_rig_undistort(&rig, -max - 4096, INT32_MIN, &off_x, &off_y);
     IH_TEST_EQUAL(x, off_x, "x beyond", 1);
     IH_TEST_EQUAL(x, off_y, "y beyond", 1);
 }

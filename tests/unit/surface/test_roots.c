@@ -1,5 +1,5 @@
-/* ih_basis's table against its definition: chords of a root's curve, raised by half of what they lie below it. */
-#include "surface/ih_basis.c"
+/* ih_multiquadric's table against its definition: chords of a root's curve, raised by half of what they lie below it. */
+#include "surface/ih_multiquadric.c"
 
 #include "ih_test.h"
 

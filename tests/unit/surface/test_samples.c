@@ -43,7 +43,7 @@ void setUp(void)
     /* What the expectations below were worked out with; the defaults may be tuned. */
     params.isolated_mm = 60;
     params.clip_behind_mm = 400;
-    params.clip_least_mm = 1100;
+    params.clip_min_mm = 1100;
     params.fill_neighbours = 3;
     params.fill_root_weight_q15 = 17948;
     memset(&samples, IH_TEST_FILL, sizeof samples);
@@ -345,7 +345,7 @@ static void nothing_seen_and_nothing_known_gives_nothing(void)
     }
     select_samples();
     TEST_ASSERT_EQUAL_INT32(0, samples.sample_count);
-    TEST_ASSERT_EQUAL_INT32(params.clip_least_mm << 8, samples.clip_mm_q8);
+    TEST_ASSERT_EQUAL_INT32(params.clip_min_mm << 8, samples.clip_mm_q8);
 }
 
 /* 8 in 100 points are nearer than it; alone it is the point itself. */

@@ -114,14 +114,14 @@ static void check_nearest(void)
 
 static double tolerance_mm(const struct vector_surface *v)
 {
-    int32_t least = INT32_MAX, most = INT32_MIN;
+    int32_t min = INT32_MAX, max = INT32_MIN;
     int32_t k;
 
     for (k = 0; k < v->sample_count; k++) {
-        least = v->sample[k].depth_mm_q8 < least ? v->sample[k].depth_mm_q8 : least;
-        most = v->sample[k].depth_mm_q8 > most ? v->sample[k].depth_mm_q8 : most;
+        min = v->sample[k].depth_mm_q8 < min ? v->sample[k].depth_mm_q8 : min;
+        max = v->sample[k].depth_mm_q8 > max ? v->sample[k].depth_mm_q8 : max;
     }
-    return TOLERANCE_MM * fmax(1, ih_test_from_q(most - least, 8) / SPREAD_MM);
+    return TOLERANCE_MM * fmax(1, ih_test_from_q(max - min, 8) / SPREAD_MM);
 }
 
 static void grids_match_float64(void)
@@ -377,9 +377,9 @@ static void weigh_two_places(struct two_places *two, bool is_again)
     two->depth_mm[1] /= two->weight[1];
 }
 
-static void check_two_places(struct two_places *two, double most_mm)
+static void check_two_places(struct two_places *two, double max_mm)
 {
-    const double least_mm = ih_test_from_q(surface.mean_mm_q8, 8);
+    const double min_mm = ih_test_from_q(surface.mean_mm_q8, 8);
     int32_t k, n;
 
     TEST_ASSERT_TRUE(surface.valid);
@@ -388,14 +388,14 @@ static void check_two_places(struct two_places *two, double most_mm)
     weigh_two_places(two, true);
     solve_two_places(two);
     for (k = 0; k < NODES; k++) {
-        double depth_mm = least_mm;
+        double depth_mm = min_mm;
 
         for (n = 0; n < centres * centres; n++) {
             depth_mm += two->coefficient[n] * basis_at(n, node_place(k % IH_SURFACE_GRID),
                                                        node_place(k / IH_SURFACE_GRID));
         }
         if (depth_mm > 1 && node_mm(k) > ih_test_from_q(surface.nearest_mm_q8, 8)) {
-            IH_TEST_WITHIN(most_mm, depth_mm, node_mm(k), "node", k);
+            IH_TEST_WITHIN(max_mm, depth_mm, node_mm(k), "node", k);
         }
     }
 }

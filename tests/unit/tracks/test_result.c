@@ -1,22 +1,22 @@
 /* ih_result: one form for both ways. */
 #include "base/ih_config.h"
-#include "detect/ih_findings.h"
-#include "nests/ih_heads.h"
+#include "detect/ih_detections.h"
 #include "nests/ih_hypotheses.h"
+#include "nests/ih_nests.h"
 #include "tracks/ih_result.h"
 #include "tracks/ih_tracks.h"
 
 #include "ih_test.h"
 
-static struct ih_heads heads;
-static struct ih_findings findings;
+static struct ih_hypotheses hypotheses;
+static struct ih_detections detections;
 static struct ih_tracks tracks;
 static struct ih_result result;
 
 void setUp(void)
 {
-    memset(&heads, 0, sizeof heads);
-    memset(&findings, 0, sizeof findings);
+    memset(&hypotheses, 0, sizeof hypotheses);
+    memset(&detections, 0, sizeof detections);
     ih_tracks_init(&tracks);
     memset(&result, IH_TEST_FILL, sizeof result);
 }
@@ -32,11 +32,11 @@ static void nothing_is_nothing(void)
     TEST_ASSERT_EQUAL_INT32(0, result.head_count);
     TEST_ASSERT_EQUAL_INT32(IH_NONE, result.selected);
     memset(&result, IH_TEST_FILL, sizeof result);
-    ih_result_from_heads(&heads, &result);
+    ih_result_from_heads(&hypotheses, &result);
     TEST_ASSERT_EQUAL_INT32(0, result.entry_count);
     TEST_ASSERT_EQUAL_INT32(IH_NONE, result.selected);
     memset(&result, IH_TEST_FILL, sizeof result);
-    ih_result_from_tracks(&findings, &tracks, &result);
+    ih_result_from_tracks(&detections, &tracks, &result);
     TEST_ASSERT_EQUAL_INT32(0, result.entry_count);
     TEST_ASSERT_EQUAL_INT32(IH_NONE, result.selected);
 }
@@ -46,23 +46,24 @@ static void nests_come_through_without_what_tracks_add(void)
 {
     int i;
 
-    heads.hypothesis_count = IH_HYPOTHESES_MAX;
-    for (i = 0; i < IH_HYPOTHESES_MAX; i++) {
-        heads.hypothesis[i] = (struct ih_hypothesis){.u_px_q12 = 100 + i,
-                                                     .v_px_q12 = 200 + i,
-                                                     .a_px_q12 = 300 + i,
-                                                     .b_px_q12 = 290 + i,
-                                                     .angle_mdeg = 400 + i,
-                                                     .distance_mm_q8 = 500 + i,
-                                                     .centre_mm_q8 = {600 + i, 700 + i, 800 + i},
-                                                     .rejected = IH_REJECT_AREA};
+    hypotheses.hypothesis_count = IH_NESTS_MAX;
+    for (i = 0; i < IH_NESTS_MAX; i++) {
+        hypotheses.hypothesis[i] =
+            (struct ih_hypothesis){.u_px_q12 = 100 + i,
+                                   .v_px_q12 = 200 + i,
+                                   .a_px_q12 = 300 + i,
+                                   .b_px_q12 = 290 + i,
+                                   .angle_mdeg = 400 + i,
+                                   .distance_mm_q8 = 500 + i,
+                                   .centre_mm_q8 = {600 + i, 700 + i, 800 + i},
+                                   .rejected = IH_REJECT_AREA};
     }
-    heads.hypothesis[3].rejected = IH_ACCEPTED;
-    heads.head_count = 1;
-    heads.head[0] = 3;
-    ih_result_from_heads(&heads, &result);
-    TEST_ASSERT_EQUAL_INT32(IH_HYPOTHESES_MAX, result.entry_count);
-    for (i = 0; i < IH_HYPOTHESES_MAX; i++) {
+    hypotheses.hypothesis[3].rejected = IH_ACCEPTED;
+    hypotheses.head_count = 1;
+    hypotheses.head[0] = 3;
+    ih_result_from_heads(&hypotheses, &result);
+    TEST_ASSERT_EQUAL_INT32(IH_NESTS_MAX, result.entry_count);
+    for (i = 0; i < IH_NESTS_MAX; i++) {
         const struct ih_result_entry *entry = &result.entry[i];
 
         IH_TEST_EQUAL(100 + i, entry->u_px_q12, "u", i);
@@ -78,40 +79,40 @@ static void nests_come_through_without_what_tracks_add(void)
     }
     TEST_ASSERT_EQUAL_INT32(1, result.head_count);
     TEST_ASSERT_EQUAL_INT32(3, result.selected);
-    heads.head_count = 2;
-    heads.head[1] = 5;
-    ih_result_from_heads(&heads, &result);
+    hypotheses.head_count = 2;
+    hypotheses.head[1] = 5;
+    ih_result_from_heads(&hypotheses, &result);
     TEST_ASSERT_EQUAL_INT32(2, result.head_count);
     TEST_ASSERT_EQUAL_INT32(5, result.head[1]);
     TEST_ASSERT_EQUAL_INT32(IH_NONE, result.selected);
 }
 
-static void findings_come_through_up_to_a_full_table(void)
+static void detections_come_through_up_to_a_full_table(void)
 {
     int i;
 
-    findings.finding_count = IH_FINDINGS_MAX + IH_FINDINGS_EXPECTED_MAX;
-    for (i = 0; i < findings.finding_count; i++) {
-        struct ih_finding *finding = &findings.finding[i];
+    detections.detection_count = IH_DETECTIONS_MAX + IH_DETECTIONS_EXPECTED_MAX;
+    for (i = 0; i < detections.detection_count; i++) {
+        struct ih_detection *detection = &detections.detection[i];
 
-        finding->u_px_q12 = 100 + i;
-        finding->v_px_q12 = 200 + i;
-        finding->a_px_q12 = 300 + i;
-        finding->b_px_q12 = 290 + i;
-        finding->angle_mdeg = 90000;
-        finding->distance_mm_q8 = 500 + i;
-        finding->head.centre_mm_q8[1] = 700 + i;
-        finding->probability_q16 = 1000 + i;
-        finding->track_id = i % 3;
-        finding->sigma_mm_q8 = 40 + i;
-        finding->is_head = i % 2 == 1;
-        finding->is_predicted = i >= IH_FINDINGS_MAX;
+        detection->u_px_q12 = 100 + i;
+        detection->v_px_q12 = 200 + i;
+        detection->a_px_q12 = 300 + i;
+        detection->b_px_q12 = 290 + i;
+        detection->angle_mdeg = 90000;
+        detection->distance_mm_q8 = 500 + i;
+        detection->head.centre_mm_q8[1] = 700 + i;
+        detection->probability_q16 = 1000 + i;
+        detection->track_id = i % 3;
+        detection->sigma_mm_q8 = 40 + i;
+        detection->is_head = i % 2 == 1;
+        detection->is_predicted = i >= IH_DETECTIONS_MAX;
     }
     tracks.head_count = 2;
     tracks.head[0] = 17;
     tracks.head[1] = 3;
     tracks.selected = 3;
-    ih_result_from_tracks(&findings, &tracks, &result);
+    ih_result_from_tracks(&detections, &tracks, &result);
     TEST_ASSERT_EQUAL_INT32(IH_RESULT_MAX, result.entry_count);
     for (i = 0; i < IH_RESULT_MAX; i++) {
         const struct ih_result_entry *entry = &result.entry[i];
@@ -128,7 +129,7 @@ static void findings_come_through_up_to_a_full_table(void)
         IH_TEST_EQUAL(i % 3, entry->track_id, "track", i);
         IH_TEST_EQUAL(40 + i, entry->sigma_mm_q8, "sigma", i);
         IH_TEST_EQUAL(i % 2 == 1 ? IH_ACCEPTED : IH_REJECT_SCORE, entry->rejected, "rejected", i);
-        IH_TEST_EQUAL(i >= IH_FINDINGS_MAX, entry->is_predicted, "predicted", i);
+        IH_TEST_EQUAL(i >= IH_DETECTIONS_MAX, entry->is_predicted, "predicted", i);
     }
     TEST_ASSERT_EQUAL_INT32(2, result.head_count);
     TEST_ASSERT_EQUAL_INT32(17, result.head[0]);
@@ -140,6 +141,6 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(nothing_is_nothing);
     RUN_TEST(nests_come_through_without_what_tracks_add);
-    RUN_TEST(findings_come_through_up_to_a_full_table);
+    RUN_TEST(detections_come_through_up_to_a_full_table);
     return UNITY_END();
 }

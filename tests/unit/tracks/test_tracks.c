@@ -4,7 +4,7 @@
 #include "base/ih_types.h"
 #include "detect/ih_ellipsoid.h"
 #include "detect/ih_evidence.h"
-#include "detect/ih_findings.h"
+#include "detect/ih_detections.h"
 #include "rig/ih_rig.h"
 #include "tracks/ih_tracks.h"
 
@@ -50,7 +50,7 @@ static struct ih_rig rig;
 static struct ih_tracks tracks;
 static struct ih_tracks_params params;
 static struct ih_expected expected;
-static struct ih_findings findings;
+static struct ih_detections detections;
 static struct ih_view view; /* of every expected head in the next frames */
 static int64_t time_us;
 
@@ -61,23 +61,23 @@ void setUp(void)
 
     TEST_ASSERT_EQUAL_INT(IH_OK, ih_rig_init(&rig, &vector_rigs[PLAIN_RIG], &bad_slot));
     memset(&tracks, IH_TEST_FILL, sizeof tracks);
-    memset(&findings, IH_TEST_FILL, sizeof findings);
-    ih_findings_begin(&findings);
+    memset(&detections, IH_TEST_FILL, sizeof detections);
+    ih_detections_begin(&detections);
     ih_tracks_init(&tracks);
     ih_tracks_params_default(&params);
     params.gate_mm = 90;
     params.gate_mm_per_s = 300;
     params.start_logit_q10 = -1024;
     params.start_head_logit_q10 = 1024;
-    params.mature_findings = 3;
+    params.mature_detections = 3;
     params.accept_logit_q10 = 512;
     params.drop_logit_q10 = -512;
     params.keep_logit_q10 = -3072;
     params.memory_q16 = 49152;
     params.through_percent = 50;
     params.front_percent = 30;
-    params.seen_least = 30;
-    findings.seen_count = 300;
+    params.seen_min = 30;
+    detections.seen_count = 300;
     params.carry_us = 1000000;
     params.gap_us = 2000000;
     params.measured_mm = 12;
@@ -95,16 +95,16 @@ void tearDown(void)
 /* --- frames --------------------------------------------------------------------------------------
  */
 
-static struct ih_finding *add(double x, double y, double z, double logit)
+static struct ih_detection *add(double x, double y, double z, double logit)
 {
-    struct ih_finding *finding = &findings.finding[findings.finding_count++];
+    struct ih_detection *detection = &detections.detection[detections.detection_count++];
     const int32_t centre[3] = {(int32_t)lround(x * 256), (int32_t)lround(y * 256),
                                (int32_t)lround(z * 256)};
 
-    memset(finding, 0, sizeof *finding);
-    finding->head = ih_ellipsoid_mean(centre);
-    finding->logit_q10 = (int32_t)lround(logit * 1024);
-    return finding;
+    memset(detection, 0, sizeof *detection);
+    detection->head = ih_ellipsoid_mean(centre);
+    detection->logit_q10 = (int32_t)lround(logit * 1024);
+    return detection;
 }
 
 /* What must hold after every frame. */
@@ -113,34 +113,34 @@ static void check_tracks(void)
     int32_t t, k;
 
     IH_TEST_RANGE(0, IH_TRACKS_MAX, tracks.track_count, "tracks", 0);
-    IH_TEST_RANGE(0, IH_FINDINGS_MAX + IH_FINDINGS_EXPECTED_MAX, findings.finding_count, "findings",
-                  0);
+    IH_TEST_RANGE(0, IH_DETECTIONS_MAX + IH_DETECTIONS_EXPECTED_MAX, detections.detection_count,
+                  "findings", 0);
     for (t = 0; t < tracks.track_count; t++) {
         const struct ih_track *track = &tracks.track[t];
-        const struct ih_finding *finding = &findings.finding[track->finding];
+        const struct ih_detection *detection = &detections.detection[track->detection];
 
         IH_TEST_RANGE(1, INT32_MAX, track->id, "id", t);
-        IH_TEST_RANGE(0, findings.finding_count - 1, track->finding, "its finding", t);
-        IH_TEST_EQUAL(track->id, finding->track_id, "the finding's track", t);
-        IH_TEST_EQUAL(track->is_head, finding->is_head, "the finding's verdict", t);
-        IH_TEST_RANGE(0, 500 << 8, finding->sigma_mm_q8, "sigma", t);
-        TEST_ASSERT_TRUE(track->is_head || !finding->is_predicted);
+        IH_TEST_RANGE(0, detections.detection_count - 1, track->detection, "its finding", t);
+        IH_TEST_EQUAL(track->id, detection->track_id, "the finding's track", t);
+        IH_TEST_EQUAL(track->is_head, detection->is_head, "the finding's verdict", t);
+        IH_TEST_RANGE(0, 500 << 8, detection->sigma_mm_q8, "sigma", t);
+        TEST_ASSERT_TRUE(track->is_head || !detection->is_predicted);
         for (k = 0; k < t; k++) {
             TEST_ASSERT_TRUE(tracks.track[k].id != track->id);
         }
     }
     for (k = 0; k < tracks.head_count; k++) {
-        TEST_ASSERT_TRUE(findings.finding[tracks.head[k]].is_head);
-        TEST_ASSERT_TRUE(k == 0 || findings.finding[tracks.head[k - 1]].logit_q10 >=
-                                       findings.finding[tracks.head[k]].logit_q10);
+        TEST_ASSERT_TRUE(detections.detection[tracks.head[k]].is_head);
+        TEST_ASSERT_TRUE(k == 0 || detections.detection[tracks.head[k - 1]].logit_q10 >=
+                                       detections.detection[tracks.head[k]].logit_q10);
     }
     if (tracks.selected == IH_NONE) {
         IH_TEST_EQUAL(0, tracks.head_count, "heads, none of them selected", 0);
         IH_TEST_EQUAL(0, tracks.selected_id, "selected id", 0);
     } else {
-        TEST_ASSERT_TRUE(findings.finding[tracks.selected].is_head);
-        IH_TEST_EQUAL(findings.finding[tracks.selected].track_id, tracks.selected_id, "selected id",
-                      0);
+        TEST_ASSERT_TRUE(detections.detection[tracks.selected].is_head);
+        IH_TEST_EQUAL(detections.detection[tracks.selected].track_id, tracks.selected_id,
+                      "selected id", 0);
     }
 }
 
@@ -156,14 +156,14 @@ static void frame_at(int64_t at_us)
     time_us = at_us;
     ih_tracks_expect(&tracks, &params, at_us, &expected);
     IH_TEST_EQUAL(tracks.track_count, expected.count, "expected", 0);
-    for (i = 0; i < IH_FINDINGS_EXPECTED_MAX; i++) {
-        findings.view[i] = i < expected.count ? view : nothing;
+    for (i = 0; i < IH_DETECTIONS_EXPECTED_MAX; i++) {
+        detections.view[i] = i < expected.count ? view : nothing;
     }
     before = tracks;
-    ih_tracks_update(&tracks, &params, &rig, &findings);
+    ih_tracks_update(&tracks, &params, &rig, &detections);
     check_tracks();
-    looked_at = findings.finding_count;
-    findings.finding_count = 0; /* they stay readable */
+    looked_at = detections.detection_count;
+    detections.detection_count = 0; /* they stay readable */
 }
 
 static void frame(void)
@@ -192,12 +192,12 @@ static void frames_without(int count)
 
 static double sigma_mm(int32_t track)
 {
-    return findings.finding[tracks.track[track].finding].sigma_mm_q8 / 256.0;
+    return detections.detection[tracks.track[track].detection].sigma_mm_q8 / 256.0;
 }
 
 static bool is_carried(int32_t track)
 {
-    return findings.finding[tracks.track[track].finding].is_predicted;
+    return detections.detection[tracks.track[track].detection].is_predicted;
 }
 
 static double from_q8(int64_t value)
@@ -235,7 +235,7 @@ static void check_state(const struct vector_sequence *sequence, int frame_index,
 
     IH_TEST_EQUAL(expected_state->id, track->id, name, frame_index);
     IH_TEST_EQUAL(expected_state->is_head, track->is_head, name, frame_index);
-    IH_TEST_EQUAL(!expected_state->seen, findings.finding[track->finding].is_predicted, name,
+    IH_TEST_EQUAL(!expected_state->seen, detections.detection[track->detection].is_predicted, name,
                   frame_index);
     for (axis = 0; axis < 3; axis++) {
         IH_TEST_WITHIN(0.05, expected_state->centre_mm[axis],
@@ -265,17 +265,18 @@ static void play(const struct vector_sequence *sequence)
         const struct vector_frame *now = &sequence->frame[i];
 
         for (k = 0; k < now->found_count; k++) {
-            struct ih_finding *finding = add(0, 0, 0, 0);
+            struct ih_detection *detection = add(0, 0, 0, 0);
 
-            memcpy(finding->head.centre_mm_q8, found[k].centre_mm_q8, sizeof found[k].centre_mm_q8);
-            memcpy(finding->head.semi_mm_q8, found[k].semi_mm_q8, sizeof found[k].semi_mm_q8);
-            finding->logit_q10 = found[k].logit_q10;
+            memcpy(detection->head.centre_mm_q8, found[k].centre_mm_q8,
+                   sizeof found[k].centre_mm_q8);
+            memcpy(detection->head.semi_mm_q8, found[k].semi_mm_q8, sizeof found[k].semi_mm_q8);
+            detection->logit_q10 = found[k].logit_q10;
         }
         view = now->view;
         frames_since_long = now->time_us - time_us > 300000 ? 0 : frames_since_long + 1;
         frame_at(now->time_us);
         for (k = 0; k < now->found_count; k++) {
-            IH_TEST_EQUAL(found[k].track_id, findings.finding[k].track_id, sequence->name, i);
+            IH_TEST_EQUAL(found[k].track_id, detections.detection[k].track_id, sequence->name, i);
         }
         IH_TEST_EQUAL(now->state_count, tracks.track_count, sequence->name, i);
         for (k = 0; k < now->state_count; k++) {
@@ -334,21 +335,21 @@ static void crossing_heads_keep_their_ids(void)
         }
         frame();
         TEST_ASSERT_EQUAL_INT32(2, tracks.track_count);
-        TEST_ASSERT_EQUAL_INT32(i % 2 == 0 ? 1 : 2, findings.finding[0].track_id);
-        TEST_ASSERT_EQUAL_INT32(i % 2 == 0 ? 2 : 1, findings.finding[1].track_id);
+        TEST_ASSERT_EQUAL_INT32(i % 2 == 0 ? 1 : 2, detections.detection[0].track_id);
+        TEST_ASSERT_EQUAL_INT32(i % 2 == 0 ? 2 : 1, detections.detection[1].track_id);
     }
 }
 
 /* Who gets what is a matter of places and log-odds. New ids follow the list, so all heads are there
  * already. */
-static void the_order_of_findings_does_not_matter(void)
+static void the_order_of_detections_does_not_matter(void)
 {
     struct ih_test_random random = {71};
     static struct ih_tracks start;
     int pass, i, k;
 
     for (pass = 0; pass < 300; pass++) {
-        struct ih_finding drawn[12];
+        struct ih_detection drawn[12];
         int32_t track_id[12], order[12];
 
         setUp();
@@ -368,7 +369,7 @@ static void the_order_of_findings_does_not_matter(void)
         }
         frame();
         for (i = 0; i < 12; i++) {
-            track_id[i] = findings.finding[i].track_id;
+            track_id[i] = detections.detection[i].track_id;
         }
         for (i = 11; i > 0; i--) {
             const int32_t other = (int32_t)ih_test_between(&random, 0, i), kept = order[i];
@@ -377,13 +378,13 @@ static void the_order_of_findings_does_not_matter(void)
             order[other] = kept;
         }
         tracks = start;
-        findings.finding_count = 12;
+        detections.detection_count = 12;
         for (i = 0; i < 12; i++) {
-            findings.finding[i] = drawn[order[i]];
+            detections.detection[i] = drawn[order[i]];
         }
         frame_at(time_us);
         for (k = 0; k < 12; k++) {
-            const int32_t one = track_id[order[k]], other = findings.finding[k].track_id;
+            const int32_t one = track_id[order[k]], other = detections.detection[k].track_id;
 
             if (one <= start.last_id || other <= start.last_id) {
                 IH_TEST_EQUAL(one > start.last_id ? 0 : one, other > start.last_id ? 0 : other,
@@ -405,17 +406,18 @@ static void a_full_table_takes_no_further_head(void)
         TEST_ASSERT_EQUAL_INT32(IH_TRACKS_MAX, tracks.track_count);
         TEST_ASSERT_EQUAL_INT32(IH_TRACKS_MAX, tracks.head_count);
         for (k = 0; k <= IH_TRACKS_MAX; k++) {
-            IH_TEST_EQUAL(k < IH_TRACKS_MAX ? k + 1 : 0, findings.finding[k].track_id, "track", k);
+            IH_TEST_EQUAL(k < IH_TRACKS_MAX ? k + 1 : 0, detections.detection[k].track_id, "track",
+                          k);
         }
     }
-    TEST_ASSERT_FALSE(findings.finding[IH_TRACKS_MAX].is_head);
+    TEST_ASSERT_FALSE(detections.detection[IH_TRACKS_MAX].is_head);
     /* One leaves: its place is free in the same frame. */
     view = through;
     for (k = 1; k <= IH_TRACKS_MAX; k++) {
         add(-800 + 200 * k, 0, 900, 5 - 0.4 * k);
     }
     frame();
-    TEST_ASSERT_EQUAL_INT32(IH_TRACKS_MAX + 1, findings.finding[IH_TRACKS_MAX - 1].track_id);
+    TEST_ASSERT_EQUAL_INT32(IH_TRACKS_MAX + 1, detections.detection[IH_TRACKS_MAX - 1].track_id);
     TEST_ASSERT_EQUAL_INT32(IH_TRACKS_MAX, tracks.track_count);
 }
 
@@ -428,14 +430,14 @@ static void carried_heads_have_room_beside_a_full_list(void)
         add(-3000 + 200 * k, 0, 900, 3);
     }
     frame();
-    for (k = 0; k < IH_FINDINGS_MAX; k++) {
+    for (k = 0; k < IH_DETECTIONS_MAX; k++) {
         add(200 * k, 0, 900, -0.5);
     }
     frame();
     TEST_ASSERT_EQUAL_INT32(IH_TRACKS_MAX, tracks.track_count);
-    TEST_ASSERT_EQUAL_INT32(IH_FINDINGS_MAX + IH_TRACKS_MAX, looked_at);
+    TEST_ASSERT_EQUAL_INT32(IH_DETECTIONS_MAX + IH_TRACKS_MAX, looked_at);
     for (k = 0; k < IH_TRACKS_MAX; k++) {
-        IH_TEST_EQUAL(IH_FINDINGS_MAX + k, tracks.track[k].finding, "carried", k);
+        IH_TEST_EQUAL(IH_DETECTIONS_MAX + k, tracks.track[k].detection, "carried", k);
         TEST_ASSERT_TRUE(is_carried(k));
     }
 }
@@ -487,7 +489,7 @@ static void of_two_tracks_at_one_place_the_older_stays(void)
 /* --- birth and end -------------------------------------------------------------------------------
  */
 
-static void a_weak_finding_becomes_a_head_after_evidence(void)
+static void a_weak_detection_becomes_a_head_after_evidence(void)
 {
     int frames = 0;
 
@@ -495,7 +497,7 @@ static void a_weak_finding_becomes_a_head_after_evidence(void)
     TEST_ASSERT_EQUAL_INT32(1, tracks.track_count);
     TEST_ASSERT_FALSE(tracks.track[0].is_head);
     TEST_ASSERT_EQUAL_INT32(IH_NONE, tracks.selected);
-    TEST_ASSERT_EQUAL_INT32(1, findings.finding[0].track_id);
+    TEST_ASSERT_EQUAL_INT32(1, detections.detection[0].track_id);
     while (!tracks.track[0].is_head && frames < 20) {
         frames_with(1, 0, 0, 800, 2);
         frames++;
@@ -506,12 +508,12 @@ static void a_weak_finding_becomes_a_head_after_evidence(void)
     TEST_ASSERT_EQUAL_INT32(0, tracks.selected);
 }
 
-static void an_improbable_finding_starts_nothing(void)
+static void an_improbable_detection_starts_nothing(void)
 {
     add(0, 0, 800, -1); /* start_logit itself */
     frame();
     TEST_ASSERT_EQUAL_INT32(0, tracks.track_count);
-    TEST_ASSERT_EQUAL_INT32(0, findings.finding[0].track_id);
+    TEST_ASSERT_EQUAL_INT32(0, detections.detection[0].track_id);
 }
 
 static void a_tentative_track_is_not_carried(void)
@@ -523,20 +525,20 @@ static void a_tentative_track_is_not_carried(void)
     TEST_ASSERT_EQUAL_INT32(0, looked_at);
 }
 
-static void a_rejected_finding_in_the_gate_is_accepted_again(void)
+static void a_rejected_detection_in_the_gate_is_accepted_again(void)
 {
     frames_with(5, 0, 0, 800, 3);
     add(10, 0, 800, -2.5); /* alone it would start nothing */
     frame();
-    TEST_ASSERT_EQUAL_INT32(1, findings.finding[0].track_id);
-    TEST_ASSERT_TRUE(findings.finding[0].is_head);
+    TEST_ASSERT_EQUAL_INT32(1, detections.detection[0].track_id);
+    TEST_ASSERT_TRUE(detections.detection[0].is_head);
     TEST_ASSERT_EQUAL_INT32(0, tracks.selected);
     TEST_ASSERT_FALSE(is_carried(0));
     /* Below keep_logit it is not: the head is carried, the finding stays rejected. */
     add(10, 0, 800, -3.01);
     frame();
-    TEST_ASSERT_EQUAL_INT32(0, findings.finding[0].track_id);
-    TEST_ASSERT_FALSE(findings.finding[0].is_head);
+    TEST_ASSERT_EQUAL_INT32(0, detections.detection[0].track_id);
+    TEST_ASSERT_FALSE(detections.detection[0].is_head);
     TEST_ASSERT_TRUE(is_carried(0));
     /* Nor outside the gate: 90 mm, and 12 mm for 40 ms. */
     frames_with(3, 0, 0, 800, 3);
@@ -593,7 +595,7 @@ static void a_seat_that_is_seen_through_ends_at_once(void)
 }
 
 /* Looked through, a convincing finding continues the track and any other does not. */
-static void what_is_seen_through_needs_a_convincing_finding(void)
+static void what_is_seen_through_needs_a_convincing_detection(void)
 {
     frames_with(5, 0, 0, 800, 5);
     view = through;
@@ -627,7 +629,7 @@ static void a_seat_is_empty_by_its_limits(void)
         setUp();
         frames_with(5, 0, 0, 800, 5);
         view = cases[i].view;
-        findings.seen_count = 29;
+        detections.seen_count = 29;
         frame();
         IH_TEST_EQUAL(1, tracks.track_count, "carried through a lost frame", i);
     }
@@ -710,11 +712,11 @@ static void hands_before_a_head_do_not_end_it(void)
         TEST_ASSERT_TRUE(is_carried(0));
         TEST_ASSERT_EQUAL_INT32(1, looked_at);
         TEST_ASSERT_EQUAL_INT32(0, tracks.selected);
-        TEST_ASSERT_EQUAL_INT32(1, findings.finding[0].track_id);
-        TEST_ASSERT_TRUE(findings.finding[0].is_head);
-        IH_TEST_WITHIN(0.1, 800, from_q8(findings.finding[0].head.centre_mm_q8[2]), "depth", i);
-        TEST_ASSERT_TRUE(findings.finding[0].a_px_q12 > 0);
-        TEST_ASSERT_TRUE(findings.finding[0].probability_q16 > 32768);
+        TEST_ASSERT_EQUAL_INT32(1, detections.detection[0].track_id);
+        TEST_ASSERT_TRUE(detections.detection[0].is_head);
+        IH_TEST_WITHIN(0.1, 800, from_q8(detections.detection[0].head.centre_mm_q8[2]), "depth", i);
+        TEST_ASSERT_TRUE(detections.detection[0].a_px_q12 > 0);
+        TEST_ASSERT_TRUE(detections.detection[0].probability_q16 > 32768);
     }
     view = hit;
     frames_with(1, 40, 0, 800, 3);
@@ -730,14 +732,14 @@ static void a_carried_head_has_no_evidence(void)
 
     frames_with(10, 0, 0, 800, 3);
     view = front;
-    memset(findings.finding, IH_TEST_FILL, sizeof findings.finding);
+    memset(detections.detection, IH_TEST_FILL, sizeof detections.detection);
     frame();
     TEST_ASSERT_TRUE(is_carried(0));
     for (kind = 0; kind < IH_EVIDENCE_COUNT; kind++) {
-        IH_TEST_EQUAL(0, findings.finding[0].evidence.value_q8[kind], "evidence", kind);
+        IH_TEST_EQUAL(0, detections.detection[0].evidence.value_q8[kind], "evidence", kind);
     }
-    IH_TEST_EQUAL(0, findings.finding[0].evidence.hit_count, "hits", 0);
-    IH_TEST_EQUAL(IH_SOURCE_EXPECTED, findings.finding[0].source, "source", 0);
+    IH_TEST_EQUAL(0, detections.detection[0].evidence.hit_count, "hits", 0);
+    IH_TEST_EQUAL(IH_SOURCE_EXPECTED, detections.detection[0].source, "source", 0);
 }
 
 static void a_head_is_carried_for_carry_us_at_most(void)
@@ -748,7 +750,7 @@ static void a_head_is_carried_for_carry_us_at_most(void)
         setUp();
         frames_with(10, 0, 0, 800, 5);
         view = i == 0 ? front : through;
-        findings.seen_count = i == 0 ? 300 : 10;
+        detections.seen_count = i == 0 ? 300 : 10;
         frames_without(25); /* 1 s */
         IH_TEST_EQUAL(1, tracks.track_count, "after carry_us", i);
         frame_at(time_us + 1);
@@ -789,14 +791,14 @@ static void the_gate_grows_while_carried(void)
     frames_without(1);
     add(170, 0, 800, -0.99); /* 90 + 300 * 0.08 */
     frame();
-    TEST_ASSERT_EQUAL_INT32(2, findings.finding[0].track_id);
+    TEST_ASSERT_EQUAL_INT32(2, detections.detection[0].track_id);
     setUp();
     frames_with(10, 0, 0, 800, 3);
     view = front;
     frames_without(9);
     add(170, 0, 800, -0.99); /* 90 + 300 * 0.4 */
     frame();
-    TEST_ASSERT_EQUAL_INT32(1, findings.finding[0].track_id);
+    TEST_ASSERT_EQUAL_INT32(1, detections.detection[0].track_id);
 }
 
 static void sigma_grows_while_carried_and_shrinks_when_seen(void)
@@ -832,11 +834,11 @@ static void a_frame_is_lost_with_fewer_points_than_its_limit(void)
 {
     int32_t seen;
 
-    params.seen_least = 100;
+    params.seen_min = 100;
     for (seen = 99; seen <= 100; seen++) {
         ih_tracks_init(&tracks);
         view = hit;
-        findings.seen_count = seen;
+        detections.seen_count = seen;
         frames_with(5, 0, 0, 800, 5);
         view = through;
         frame();
@@ -862,13 +864,14 @@ static void a_gate_reaches_as_far_as_it_says(void)
         frame();
         add(0, 34 + far_side / 256.0, 800, -2);
         frame();
-        IH_TEST_EQUAL(far_side == 0, findings.finding[0].track_id != 0, "in the gate", far_side);
+        IH_TEST_EQUAL(far_side == 0, detections.detection[0].track_id != 0, "in the gate",
+                      far_side);
     }
 }
 
 /* A finding at the gate's end is worth 4 less than one at its middle, in proportion to the square of the
  * distance: half way, 1 less. */
-static void a_near_finding_is_better_than_a_probable_one(void)
+static void a_near_detection_is_better_than_a_probable_one(void)
 {
     static const struct {
         double more, y_mm;
@@ -884,7 +887,7 @@ static void a_near_finding_is_better_than_a_probable_one(void)
         add(0, 0, 800, -2.5);
         add(0, cases[i].y_mm, 800, -2.5 + cases[i].more);
         frame();
-        IH_TEST_EQUAL(cases[i].own, tracks.track[0].finding, "finding", i);
+        IH_TEST_EQUAL(cases[i].own, tracks.track[0].detection, "finding", i);
     }
 }
 
@@ -897,7 +900,7 @@ static void two_tracks_may_be_as_near_as_80_mm(void)
     add(0, 0, 880, 4);
     frame();
     TEST_ASSERT_EQUAL_INT32(3, tracks.track_count);
-    TEST_ASSERT_EQUAL_INT32(0, findings.finding[2].track_id);
+    TEST_ASSERT_EQUAL_INT32(0, detections.detection[2].track_id);
 }
 
 /* Each verdict needs more than its limit. */
@@ -930,19 +933,19 @@ static void a_track_is_continued_down_to_its_limits(void)
     params.memory_q16 = 0;
     frames_with(1, 0, 0, 800, -3);
     TEST_ASSERT_EQUAL_INT32(1, tracks.track_count);
-    TEST_ASSERT_EQUAL_INT32(1, findings.finding[0].track_id);
+    TEST_ASSERT_EQUAL_INT32(1, detections.detection[0].track_id);
     ih_tracks_init(&tracks);
     frames_with(1, 0, 0, 800, 5);
     frames_with(1, 0, 0, 800, -3073.0 / 1024);
-    TEST_ASSERT_EQUAL_INT32(0, findings.finding[0].track_id);
+    TEST_ASSERT_EQUAL_INT32(0, detections.detection[0].track_id);
     ih_tracks_init(&tracks);
     params.memory_q16 = 49152;
     frames_with(1, 0, 0, 800, 5);
     view = through;
     frames_with(1, 0, 0, 800, 0.5);
-    TEST_ASSERT_EQUAL_INT32(1, findings.finding[0].track_id);
+    TEST_ASSERT_EQUAL_INT32(1, detections.detection[0].track_id);
     frames_with(1, 0, 0, 800, 511.0 / 1024);
-    TEST_ASSERT_EQUAL_INT32(2, findings.finding[0].track_id);
+    TEST_ASSERT_EQUAL_INT32(2, detections.detection[0].track_id);
 }
 
 /* A head is no more chosen for its place where it is 3 less probable than the best. */
@@ -961,13 +964,13 @@ static void a_head_is_chosen_for_its_place_within_three(void)
 }
 
 /* Findings are counted up to 1000. */
-static void findings_of_a_track_are_counted(void)
+static void detections_of_a_track_are_counted(void)
 {
     int i;
 
     for (i = 1; i <= 1002; i++) {
         frames_with(1, 0, 0, 800, 5);
-        IH_TEST_EQUAL(i < 1000 ? i : 1000, tracks.track[0].finding_count, "findings", i);
+        IH_TEST_EQUAL(i < 1000 ? i : 1000, tracks.track[0].detection_count, "findings", i);
     }
 }
 
@@ -976,14 +979,15 @@ static void uncertainty_has_its_limits(void)
 {
     params.acceleration_mm_s2 = 8191;
     params.carry_us = INT32_MAX;
-    findings.seen_count = 0; /* lost frames: it is carried */
+    detections.seen_count = 0; /* lost frames: it is carried */
     frames_with(1, 0, 0, 800, 5);
     frame_at(time_us + 2000000);
     frame_at(time_us + 2000000);
     TEST_ASSERT_EQUAL_INT32(1, tracks.track_count);
     TEST_ASSERT_TRUE(tracks.track[0].place_q8 == (int64_t)500 * 500 * 256);
     TEST_ASSERT_TRUE(tracks.track[0].speed_q8 == (int64_t)3000 * 3000 * 256);
-    IH_TEST_EQUAL(500 << 8, findings.finding[tracks.track[0].finding].sigma_mm_q8, "sigma", 0);
+    IH_TEST_EQUAL(500 << 8, detections.detection[tracks.track[0].detection].sigma_mm_q8, "sigma",
+                  0);
 }
 
 /* For a range camera the middle of two heads is the optical axis itself, to the last unit. */
@@ -1245,8 +1249,8 @@ static void a_head_that_runs_away_stays_in_the_format(void)
         IH_TEST_RANGE(-(1 << 26), 0, expected.head[0].centre_mm_q8[0], "x", i);
         IH_TEST_RANGE(800 << 8, 1 << 26, expected.head[0].centre_mm_q8[2], "z", i);
         add(0, 0, 0, 5)->head = expected.head[0];
-        ih_tracks_update(&tracks, &params, &rig, &findings);
-        findings.finding_count = 0;
+        ih_tracks_update(&tracks, &params, &rig, &detections);
+        detections.detection_count = 0;
     }
     IH_TEST_EQUAL(1 << 26, expected.head[0].centre_mm_q8[2], "z at its end", 0);
 }
@@ -1263,7 +1267,7 @@ static void rare_frames_keep_the_variances_positive(void)
         IH_TEST_EQUAL(1, tracks.selected_id, "id", i);
         TEST_ASSERT_TRUE(tracks.track[0].place_q8 > 0);
         TEST_ASSERT_TRUE(tracks.track[0].speed_q8 > 0);
-        IH_TEST_RANGE(1, 13 << 8, findings.finding[0].sigma_mm_q8, "sigma", i);
+        IH_TEST_RANGE(1, 13 << 8, detections.detection[0].sigma_mm_q8, "sigma", i);
         /* 5 mm in 2 s */
         IH_TEST_RANGE(-20 * 256, 20 * 256, tracks.track[0].velocity_mm_s_q8[0], "speed", i);
     }
@@ -1272,7 +1276,7 @@ static void rare_frames_keep_the_variances_positive(void)
 static void the_covariance_stays_positive(void)
 {
     struct ih_test_random random = {70};
-    double least = 1;
+    double min = 1;
     int i;
 
     for (i = 0; i < 100000; i++) {
@@ -1293,8 +1297,8 @@ static void the_covariance_stays_positive(void)
         }
         view = front;
         ih_tracks_expect(&tracks, &params, time_us += step, &expected);
-        ih_tracks_update(&tracks, &params, &rig, &findings);
-        findings.finding_count = 0;
+        ih_tracks_update(&tracks, &params, &rig, &detections);
+        detections.detection_count = 0;
         if (tracks.track_count == 0) {
             continue;
         }
@@ -1311,10 +1315,10 @@ static void the_covariance_stays_positive(void)
             if (place_more * speed_more < cross * cross) {
                 IH_TEST_WITHIN(0, place_more * speed_more, cross * cross, "determinant", i);
             }
-            least = fmin(least, place);
+            min = fmin(min, place);
         }
     }
-    TEST_ASSERT_TRUE(least >= 0);
+    TEST_ASSERT_TRUE(min >= 0);
 }
 
 int main(void)
@@ -1323,20 +1327,20 @@ int main(void)
     RUN_TEST(sequences_match_float64);
     RUN_TEST(a_moving_head_keeps_its_id);
     RUN_TEST(crossing_heads_keep_their_ids);
-    RUN_TEST(the_order_of_findings_does_not_matter);
+    RUN_TEST(the_order_of_detections_does_not_matter);
     RUN_TEST(a_full_table_takes_no_further_head);
     RUN_TEST(carried_heads_have_room_beside_a_full_list);
     RUN_TEST(ids_wrap_to_one);
     RUN_TEST(an_id_in_use_is_not_given_again);
     RUN_TEST(of_two_tracks_at_one_place_the_older_stays);
-    RUN_TEST(a_weak_finding_becomes_a_head_after_evidence);
-    RUN_TEST(an_improbable_finding_starts_nothing);
+    RUN_TEST(a_weak_detection_becomes_a_head_after_evidence);
+    RUN_TEST(an_improbable_detection_starts_nothing);
     RUN_TEST(a_tentative_track_is_not_carried);
-    RUN_TEST(a_rejected_finding_in_the_gate_is_accepted_again);
+    RUN_TEST(a_rejected_detection_in_the_gate_is_accepted_again);
     RUN_TEST(a_head_that_becomes_improbable_ends_as_one);
     RUN_TEST(one_frame_does_not_decide_for_long);
     RUN_TEST(a_seat_that_is_seen_through_ends_at_once);
-    RUN_TEST(what_is_seen_through_needs_a_convincing_finding);
+    RUN_TEST(what_is_seen_through_needs_a_convincing_detection);
     RUN_TEST(a_seat_is_empty_by_its_limits);
     RUN_TEST(a_head_in_plain_view_is_not_carried);
     RUN_TEST(hidden_begins_at_its_limit);
@@ -1347,12 +1351,12 @@ int main(void)
     RUN_TEST(a_carried_head_slows_down);
     RUN_TEST(a_frame_is_lost_with_fewer_points_than_its_limit);
     RUN_TEST(a_gate_reaches_as_far_as_it_says);
-    RUN_TEST(a_near_finding_is_better_than_a_probable_one);
+    RUN_TEST(a_near_detection_is_better_than_a_probable_one);
     RUN_TEST(two_tracks_may_be_as_near_as_80_mm);
     RUN_TEST(verdicts_need_more_than_their_limits);
     RUN_TEST(a_track_is_continued_down_to_its_limits);
     RUN_TEST(a_head_is_chosen_for_its_place_within_three);
-    RUN_TEST(findings_of_a_track_are_counted);
+    RUN_TEST(detections_of_a_track_are_counted);
     RUN_TEST(uncertainty_has_its_limits);
     RUN_TEST(the_middle_of_a_range_camera_is_its_axis);
     RUN_TEST(the_gate_grows_while_carried);

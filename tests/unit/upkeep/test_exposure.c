@@ -1,6 +1,6 @@
 /* ih_exposure: single steps against float64, and closed loops with a camera made of formulas. */
 #include "base/ih_config.h"
-#include "dots/ih_band.h"
+#include "dots/ih_bandpass.h"
 #include "dots/ih_dots.h"
 #include "labels/ih_labels.h"
 #include "upkeep/ih_exposure.h"
@@ -138,7 +138,7 @@ static void dots_at_the_edges_of_the_pattern_can_be_lost(void)
 
     for (i = 0; i < IH_TEST_COUNT(slots) * IH_TEST_COUNT(kept); i++) {
         const int32_t slot = slots[i / IH_TEST_COUNT(kept)];
-        const int32_t most = kept[i % IH_TEST_COUNT(kept)];
+        const int32_t max = kept[i % IH_TEST_COUNT(kept)];
         int32_t other, count = 0, u, v;
         double sum_u = 0, sum_v = 0;
 
@@ -149,7 +149,7 @@ static void dots_at_the_edges_of_the_pattern_can_be_lost(void)
                 abs(other / IH_GRID - slot / IH_GRID) > 2) {
                 continue;
             }
-            if (count == most) {
+            if (count == max) {
                 take_out(other);
                 continue;
             }
@@ -162,7 +162,7 @@ static void dots_at_the_edges_of_the_pattern_can_be_lost(void)
         memset(dots.bright, 0, sizeof dots.bright);
         dots.bright[v / 8][u / 8 / 32] |= 1u << (u / 8 % 32);
         ih_exposure_look(&dots, &labels, 640, 600, &look);
-        if (most == 2) {
+        if (max == 2) {
             IH_TEST_EQUAL(0, look.lost_count, "of two", slot);
         } else {
             IH_TEST_RANGE(1, 2, look.lost_count, "lost",
@@ -188,12 +188,12 @@ static void steps_begin_beyond_the_gaps(void)
     static const struct {
         int32_t weak, strong, step; /* less its limit by one, at it, ...; which way */
     } cases[] = {
-        {7 * IH_BAND_UNIT - 1, 70 * IH_BAND_UNIT - 1, 1},
-        {7 * IH_BAND_UNIT, 70 * IH_BAND_UNIT - 1, 0},
-        {7 * IH_BAND_UNIT - 1, 70 * IH_BAND_UNIT, 0},
-        {9 * IH_BAND_UNIT, 90 * IH_BAND_UNIT + 1, 0},
-        {9 * IH_BAND_UNIT + 1, 90 * IH_BAND_UNIT, 0},
-        {9 * IH_BAND_UNIT + 1, 90 * IH_BAND_UNIT + 1, -1},
+        {7 * IH_BANDPASS_UNIT - 1, 70 * IH_BANDPASS_UNIT - 1, 1},
+        {7 * IH_BANDPASS_UNIT, 70 * IH_BANDPASS_UNIT - 1, 0},
+        {7 * IH_BANDPASS_UNIT - 1, 70 * IH_BANDPASS_UNIT, 0},
+        {9 * IH_BANDPASS_UNIT, 90 * IH_BANDPASS_UNIT + 1, 0},
+        {9 * IH_BANDPASS_UNIT + 1, 90 * IH_BANDPASS_UNIT, 0},
+        {9 * IH_BANDPASS_UNIT + 1, 90 * IH_BANDPASS_UNIT + 1, -1},
     };
     int i;
 
@@ -214,7 +214,7 @@ static void steps_begin_beyond_the_gaps(void)
  * never more than there may be. */
 static void a_small_duty_grows_by_one(void)
 {
-    const int32_t weak_aim = params.weak_grey_q4 * IH_BAND_UNIT / 16;
+    const int32_t weak_aim = params.weak_grey_q4 * IH_BANDPASS_UNIT / 16;
     const struct ih_exposure_look look = {
         .labelled_count = IH_SLOTS, .weak = weak_aim * 8 / 10, .strong = 1};
 
@@ -233,7 +233,7 @@ static void a_small_duty_grows_by_one(void)
 /* Fewer than 24 labels say nothing about how high dots are. */
 static void twenty_four_labels_say_something(void)
 {
-    const int32_t weak_aim = params.weak_grey_q4 * IH_BAND_UNIT / 16;
+    const int32_t weak_aim = params.weak_grey_q4 * IH_BANDPASS_UNIT / 16;
     struct ih_exposure_look look;
     int32_t count, slot;
 
@@ -247,7 +247,7 @@ static void twenty_four_labels_say_something(void)
         /* Dots as high as they should be: nothing to do, unless too few say so. */
         look = (struct ih_exposure_look){.labelled_count = count,
                                          .weak = weak_aim,
-                                         .strong = params.strong_grey_q4 * IH_BAND_UNIT / 16};
+                                         .strong = params.strong_grey_q4 * IH_BANDPASS_UNIT / 16};
         ih_exposure_start(&params, 2000, 128, &state);
         ih_exposure_next(&params, &look, &state);
         IH_TEST_EQUAL(count < 24 ? 160 : 128, state.duty_q8, "duty", count); /* 1.25 times */
@@ -277,8 +277,9 @@ static void over_exposure_is_left_by_its_limits(void)
     params.weak_grey_q4 = 16 * 2; /* 2 levels: an even number */
     for (i = 0; i < IH_TEST_COUNT(cases); i++) {
         const struct ih_exposure_look look = {.labelled_count = IH_SLOTS,
-                                              .weak = IH_BAND_UNIT - cases[i].weak_less,
-                                              .strong = params.strong_grey_q4 * IH_BAND_UNIT / 16,
+                                              .weak = IH_BANDPASS_UNIT - cases[i].weak_less,
+                                              .strong =
+                                                  params.strong_grey_q4 * IH_BANDPASS_UNIT / 16,
                                               .lost_count = params.lost_max + cases[i].lost_more};
 
         ih_exposure_start(&params, 2000, cases[i].duty_q8, &state);
@@ -505,7 +506,7 @@ static void retries_are_rare(void)
 static void jitter_is_not_amplified(void)
 {
     struct ih_exposure_look look;
-    int32_t i, least = INT32_MAX, greatest = 0;
+    int32_t i, min = INT32_MAX, max = 0;
 
     make_scene(30.0, 0.5, 10.0, 0.3);
     scene.jitter = 0.03;
@@ -516,10 +517,10 @@ static void jitter_is_not_amplified(void)
 
         (void)run(1, &look);
         light = state.exposure_us * state.duty_q8;
-        least = light < least ? light : least;
-        greatest = light > greatest ? light : greatest;
+        min = light < min ? light : min;
+        max = light > max ? light : max;
     }
-    IH_TEST_RANGE(greatest * 3 / 4, greatest, least, "least light", greatest);
+    IH_TEST_RANGE(max * 3 / 4, max, min, "least light", max);
 }
 
 /* Somebody steps in from 3 m to 0.6 m and out again; the sun comes out. */

@@ -1,7 +1,7 @@
 /* ih_health on dots of turned projectors, labelled by the core as it goes. */
 #include "labels/ih_labels.h"
 #include "upkeep/ih_health.h"
-#include "upkeep/ih_turn.h"
+#include "upkeep/ih_rotation_vote.h"
 
 #include <stdlib.h>
 
@@ -275,7 +275,8 @@ static void a_turn_beyond_the_limit_is_told_and_not_taken(void)
         run(&vector_rigs[which], (const double[3]){1.1, 0, 0}, 200);
         TEST_ASSERT_TRUE(health.state != IH_HEALTH_FITS);
         for (int axis = 0; axis < 3; axis++) {
-            TEST_ASSERT_LESS_OR_EQUAL_INT32(IH_TURN_MAX_RAD_Q30, abs(health.turn_rad_q30[axis]));
+            TEST_ASSERT_LESS_OR_EQUAL_INT32(IH_ROTATION_VOTE_MAX_RAD_Q30,
+                                            abs(health.turn_rad_q30[axis]));
         }
     }
 }

@@ -1,0 +1,137 @@
+/* ih_detections - everything in the frame that may be a head, each with its probability (ours).
+ *
+ * In:    nests and their hypotheses (ih_hypotheses), points, dots, rig, and places from where a head is
+ *        expected (tracks).
+ * Out:   findings, the most probable first, at least spacing_mm apart.
+ * Way:   candidates are the nests' centres, the places of the model scan and the expected ones, in this
+ *        order. Nests and places of which a glance says nothing good (ih_prescreen), and starts within apart_mm
+ *        of one before, are passed over. Each other one is fitted for a step (ih_fit), looked at
+ *        (ih_evidence) and rated (ih_score); then what is not hopeless is fitted to the end, looked at and
+ *        rated again. Tracks take no finding below log-odds -3: hopeless is what lies 2.5 below that after
+ *        a step. A range frame is looked at window by window: begin once a frame, add once a window.
+ *        Of an expected head that is not found it also says what its rays met (views): whether it is
+ *        hidden, or gone.
+ *        Of two within spacing_mm the more probable stays, of equals the first; it takes the place of
+ *        all that are near it.
+ * Full table: the least probable drop and count in dropped_count.
+ * Overflow: points are below 2^25 in Q8 (16 m, slopes up to 8), nests' centres below 2^26.01, expected
+ *        ones at most 2^26; a fit moves 240 mm: centres below 2^27, squares of differences 2^57.6.
+ * Cost:  up to IH_SCAN_MAX + IH_NESTS_MAX + IH_DETECTIONS_EXPECTED_MAX = 32 fits a window. Usually 12
+ *        candidates, of which 6 are fitted for a step and 3 to the end.
+ */
+#ifndef IH_DETECTIONS_H
+#define IH_DETECTIONS_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "detect/ih_ellipsoid.h"
+#include "detect/ih_evidence.h"
+#include "detect/ih_fit.h"
+#include "detect/ih_fit_equations.h"
+#include "detect/ih_scan.h"
+#include "detect/ih_rays.h"
+#include "detect/ih_ray_counts.h"
+#include "dots/ih_dots.h"
+#include "nests/ih_hypotheses.h"
+#include "nests/ih_nests.h"
+#include "points/ih_points.h"
+#include "rig/ih_rig.h"
+
+/* Findings kept; each costs 160 bytes. */
+#define IH_DETECTIONS_MAX 16
+/* Expected places that are tried, and so the tracks; each costs a track and a finding. */
+#define IH_DETECTIONS_EXPECTED_MAX 8
+
+enum ih_source { IH_SOURCE_SCAN, IH_SOURCE_NEST, IH_SOURCE_EXPECTED };
+
+struct ih_detections_params {
+    struct ih_rays_params space;
+    struct ih_scan_params scan;
+    struct ih_fit_params fit;
+    int32_t
+        promise_min_q8; /* a nest or a place of the scan with less (ih_prescreen) is not fitted */
+    int32_t apart_mm;   /* a start nearer than this to one before is not tried */
+    int32_t hopeless_logit_q10; /* less probable after a first step: not fitted any further */
+    int32_t spacing_mm;         /* of two findings */
+    int32_t nest_near_mm;       /* a nest this near is the candidate's own */
+    int32_t nest_max;           /* of them this many are candidates themselves */
+    int32_t expected_max;       /* of the expected heads this many are */
+    int32_t range_prior_q10;    /* log-odds added with a range rig: most windows show no head */
+    int32_t front_min_mm;       /* nothing nearer than this is a head: the lens is there */
+};
+
+struct ih_detection {
+    struct ih_ellipsoid head;
+    struct ih_evidence evidence;
+    int32_t logit_q10;
+    int32_t probability_q16;
+    int32_t source; /* enum ih_source */
+    /* Set by ih_tracks. */
+    int32_t track_id;    /* 0: none */
+    int32_t sigma_mm_q8; /* of the centre along each axis; 0: unknown */
+    bool is_head;        /* accepted */
+    bool is_predicted;   /* not seen in this frame: where its track says that it is */
+    /* Its outline in the frame, as in ih_hypothesis. */
+    int32_t u_px_q12, v_px_q12;
+    int32_t a_px_q12, b_px_q12;
+    int32_t angle_mdeg;
+    int32_t distance_mm_q8;
+};
+
+/* What the rays through an expected head met: something behind it or nothing, its surface, something
+ * before it. Counts. */
+struct ih_view {
+    int32_t through, hit, front;
+};
+
+struct ih_detections {
+    int32_t detection_count;
+    int32_t dropped_count;
+    int32_t seen_count; /* points, over all windows */
+    /* The last IH_DETECTIONS_EXPECTED_MAX entries are for predicted ones. */
+    struct ih_detection detection[IH_DETECTIONS_MAX + IH_DETECTIONS_EXPECTED_MAX];
+    struct ih_view view[IH_DETECTIONS_EXPECTED_MAX]; /* by expected head, summed over windows */
+};
+
+/* Heads that are expected. */
+struct ih_expected {
+    int32_t count;
+    struct ih_ellipsoid head[IH_DETECTIONS_EXPECTED_MAX];
+};
+
+/* Places from where fits have begun. */
+struct ih_detections_starts {
+    int32_t count;
+    int32_t centre_mm_q8[IH_SCAN_MAX + IH_NESTS_MAX + IH_DETECTIONS_EXPECTED_MAX][3];
+};
+
+struct ih_detections_scratch {
+    struct ih_detections_starts starts;
+    struct ih_rays space;
+    struct ih_scan scan;
+    struct ih_scan_scratch scan_scratch;
+    struct ih_fit_equations_scratch rows;
+    struct ih_ray_counts_scratch tally;
+};
+
+void ih_detections_params_default(struct ih_detections_params *params);
+
+void ih_detections_begin(struct ih_detections *out);
+
+/* Add what one set of points shows. */
+void ih_detections_add(const struct ih_points *points, const struct ih_dots *dots,
+                       const struct ih_hypotheses *hypotheses, const struct ih_expected *expected,
+                       const struct ih_rig *rig, const struct ih_detections_params *params,
+                       struct ih_detections_scratch *scratch, struct ih_detections *out);
+
+/* The outline of an ellipsoid in the frame; fills the finding from u_px_q12 on. It is the ellipse of
+ * the cross-section at the centre's depth, which the true one exceeds: by 2 % at 500 mm and 0.6 % at
+ * 900 mm, and at a slope s from the axis by up to 0.8 s^2 more in that direction, 8 % at 0.3; there
+ * its long axis is tilted by up to 10 degrees, and its centre lies s (98 / Z)^2 of a focal length
+ * farther out (11 px at 500 mm, 3 px at 900 mm and s = 0.3). The lens bends the centre only. The
+ * distance takes the head to be as deep from every side: 2 mm short at s = 0.3; it is 0 where the
+ * camera would be inside the head. */
+void ih_detections_outline(const struct ih_rig *rig, struct ih_detection *detection);
+
+#endif

@@ -1,0 +1,43 @@
+/* ih_multiquadric - the surface's multiquadrics sqrt(dx^2 + dy^2 + 1), and sums of them.
+ *
+ * In:    squares, Q18: 1 and more, below 2^13; coefficients.
+ * Out:   their roots, Q20, cut off to a whole step; sums of products, exact.
+ * Way:   a table of chords; 32 bits all the way, so that eight fit into a vector. The same steps, and bits,
+ *        on processors without such vectors.
+ * Error: relative 2^-21.8, and one step down.
+ * Cost:  5 instructions a root with vectors, 20 without.
+ */
+#ifndef IH_MULTIQUADRIC_H
+#define IH_MULTIQUADRIC_H
+
+#include <stdint.h>
+
+/* Squares in a line: 8 or 12. Vectors have 4 or 8. */
+#define IH_MULTIQUADRIC_ACROSS_MAX 12
+/* Entries of a sample's row at the most. */
+#define IH_MULTIQUADRIC_TERMS_MAX (IH_MULTIQUADRIC_ACROSS_MAX * IH_MULTIQUADRIC_ACROSS_MAX)
+
+/* The roots of across[i] + down[k], line by line: one line for each of down, whose count is even. */
+void ih_multiquadric_roots(const uint32_t *across_q18, int32_t across_count,
+                           const uint32_t *down_q18, int32_t down_count, uint32_t *root_q20);
+
+/* Up to so many rows that stand one behind the other. */
+#define IH_MULTIQUADRIC_ROWS 4
+
+/* The sum of each row's basis[i] * coefficient[i], i below term_count, a multiple of 16; both sums of positive and of
+ * negative products are below 2^62. */
+void ih_multiquadric_sum(const uint32_t *basis_q20, int32_t row_count, const int32_t *coefficient,
+                         int32_t term_count, int64_t sum[IH_MULTIQUADRIC_ROWS]);
+
+/* Add each row's basis[i] times its factor to sum[i]. */
+void ih_multiquadric_add(const uint32_t *basis_q20, int32_t row_count,
+                         const int32_t factor[IH_MULTIQUADRIC_ROWS], int64_t *sum,
+                         int32_t term_count);
+
+/* Sums along half a row of nodes, `width` of them, a multiple of 8: of coefficient[k * count + i] * line[k][i * width + x],
+ * k below line_count and i below count, an even number. Lines are -2^27 .. 2^28; the sums below 2^63, and so are those
+ * of the coefficients alone, times 2^27. */
+void ih_multiquadric_lines(const int32_t *coefficient, const int32_t *const *line_q20,
+                           int32_t line_count, int32_t count, int32_t width, int64_t *sum);
+
+#endif
