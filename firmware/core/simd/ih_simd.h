@@ -1,0 +1,199 @@
+/* ih_simd - vectors of integers: one vocabulary for AVX2, SSE2 and NEON.
+ *
+ * Types: ih_u8, ih_i16, ih_u16, ih_i32, ih_u32, ih_i64, ih_u64, each as wide as a vector register. They are
+ *        C's own vectors, an extension that gcc and clang share.
+ * Lanes: IH_I16_LANES of them are 16 bits wide: 16 with AVX2, 8 with SSE2 or NEON. It is 0 where there are
+ *        no vectors, while ranges are checked (ISOHEAD_RANGE_CHECKS) and with ISOHEAD_PLAIN. A kernel
+ *        stands under #if IH_I16_LANES > 0 and has one plain twin with the same result under #else.
+ * Words: load and store take any address. all fills every lane. & | ~ and comparisons work lane by lane as
+ *        operators; a comparison gives all bits or none. Arithmetic goes through functions: it wraps, which
+ *        C's own operators on signed lanes may not. shift_right keeps the sign of signed lanes.
+ *
+ * Every function gives the same on all back ends; tests/unit/simd compares them with plain C.
+ */
+#ifndef IH_SIMD_H
+#define IH_SIMD_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#if defined ISOHEAD_PLAIN || defined ISOHEAD_RANGE_CHECKS
+#define IH_I16_LANES 0
+#elif defined __AVX2__
+#define IH_I16_LANES 16
+#elif defined __SSE2__ || (defined __ARM_NEON && __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__)
+#define IH_I16_LANES 8
+#else
+#define IH_I16_LANES 0
+#endif
+#define IH_U8_LANES (2 * IH_I16_LANES)
+#define IH_I32_LANES (IH_I16_LANES / 2)
+#define IH_I64_LANES (IH_I16_LANES / 4)
+#define IH_SIMD_BYTES (2 * IH_I16_LANES)
+
+#if IH_I16_LANES > 0
+
+typedef uint8_t ih_u8 __attribute__((vector_size(IH_SIMD_BYTES)));
+typedef int16_t ih_i16 __attribute__((vector_size(IH_SIMD_BYTES)));
+typedef uint16_t ih_u16 __attribute__((vector_size(IH_SIMD_BYTES)));
+typedef int32_t ih_i32 __attribute__((vector_size(IH_SIMD_BYTES)));
+typedef uint32_t ih_u32 __attribute__((vector_size(IH_SIMD_BYTES)));
+typedef int64_t ih_i64 __attribute__((vector_size(IH_SIMD_BYTES)));
+typedef uint64_t ih_u64 __attribute__((vector_size(IH_SIMD_BYTES)));
+
+/* 16 bits */
+
+static inline ih_i16 ih_i16_load(const int16_t *from)
+{
+    ih_i16 value;
+    __builtin_memcpy(&value, from, sizeof value);
+    return value;
+}
+
+static inline void ih_i16_store(int16_t *to, ih_i16 value)
+{
+    __builtin_memcpy(to, &value, sizeof value);
+}
+
+static inline ih_i16 ih_i16_all(int16_t value)
+{
+    return value - (ih_i16){0};
+}
+
+static inline ih_i16 ih_i16_add(ih_i16 a, ih_i16 b)
+{
+    return (ih_i16)((ih_u16)a + (ih_u16)b);
+}
+
+static inline ih_i16 ih_i16_sub(ih_i16 a, ih_i16 b)
+{
+    return (ih_i16)((ih_u16)a - (ih_u16)b);
+}
+
+static inline ih_i16 ih_i16_mul(ih_i16 a, ih_i16 b)
+{
+    return (ih_i16)((ih_u16)a * (ih_u16)b);
+}
+
+static inline ih_i16 ih_i16_shift_left(ih_i16 a, int bits)
+{
+    return (ih_i16)((ih_u16)a << bits);
+}
+
+static inline ih_i16 ih_i16_shift_right(ih_i16 a, int bits)
+{
+    return a >> bits;
+}
+
+/* Lanes of a where the mask has all bits, of b where it has none. */
+static inline ih_i16 ih_i16_pick(ih_i16 mask, ih_i16 a, ih_i16 b)
+{
+    return (mask & a) | (~mask & b);
+}
+
+/* 32 bits */
+
+static inline ih_i32 ih_i32_load(const int32_t *from)
+{
+    ih_i32 value;
+    __builtin_memcpy(&value, from, sizeof value);
+    return value;
+}
+
+static inline void ih_i32_store(int32_t *to, ih_i32 value)
+{
+    __builtin_memcpy(to, &value, sizeof value);
+}
+
+static inline ih_i32 ih_i32_all(int32_t value)
+{
+    return value - (ih_i32){0};
+}
+
+static inline ih_i32 ih_i32_add(ih_i32 a, ih_i32 b)
+{
+    return (ih_i32)((ih_u32)a + (ih_u32)b);
+}
+
+static inline ih_i32 ih_i32_sub(ih_i32 a, ih_i32 b)
+{
+    return (ih_i32)((ih_u32)a - (ih_u32)b);
+}
+
+/* The lower halves of the products. */
+static inline ih_i32 ih_i32_mul(ih_i32 a, ih_i32 b)
+{
+    return (ih_i32)((ih_u32)a * (ih_u32)b);
+}
+
+static inline ih_i32 ih_i32_shift_left(ih_i32 a, int bits)
+{
+    return (ih_i32)((ih_u32)a << bits);
+}
+
+static inline ih_i32 ih_i32_shift_right(ih_i32 a, int bits)
+{
+    return a >> bits;
+}
+
+static inline ih_u32 ih_u32_shift_right(ih_u32 a, int bits)
+{
+    return a >> bits;
+}
+
+static inline ih_i32 ih_i32_pick(ih_i32 mask, ih_i32 a, ih_i32 b)
+{
+    return (mask & a) | (~mask & b);
+}
+
+/* 64 bits */
+
+static inline ih_i64 ih_i64_load(const int64_t *from)
+{
+    ih_i64 value;
+    __builtin_memcpy(&value, from, sizeof value);
+    return value;
+}
+
+static inline void ih_i64_store(int64_t *to, ih_i64 value)
+{
+    __builtin_memcpy(to, &value, sizeof value);
+}
+
+static inline ih_i64 ih_i64_all(int64_t value)
+{
+    return value - (ih_i64){0};
+}
+
+static inline ih_i64 ih_i64_add(ih_i64 a, ih_i64 b)
+{
+    return (ih_i64)((ih_u64)a + (ih_u64)b);
+}
+
+static inline ih_i64 ih_i64_sub(ih_i64 a, ih_i64 b)
+{
+    return (ih_i64)((ih_u64)a - (ih_u64)b);
+}
+
+static inline ih_u64 ih_u64_shift_right(ih_u64 a, int bits)
+{
+    return a >> bits;
+}
+
+#if defined __AVX2__
+#include "simd/ih_simd_avx2.h"
+#elif defined __SSE2__
+#include "simd/ih_simd_sse2.h"
+#else
+#include "simd/ih_simd_neon.h"
+#endif
+
+/* value, or the limit nearer to it: -limit .. limit. */
+static inline ih_i16 ih_i16_clamp(ih_i16 value, int16_t limit)
+{
+    return ih_i16_max(ih_i16_min(value, ih_i16_all(limit)), ih_i16_all((int16_t)-limit));
+}
+
+#endif
+
+#endif

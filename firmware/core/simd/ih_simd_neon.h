@@ -1,0 +1,90 @@
+/* ih_simd_neon - the part of ih_simd's vocabulary that needs instructions by name, for NEON.
+ *
+ * 64-bit ARM has more of them than 32-bit ARM; both give the same.
+ */
+#ifndef IH_SIMD_NEON_H
+#define IH_SIMD_NEON_H
+
+#include <arm_neon.h>
+
+static inline ih_i16 ih_i16_min(ih_i16 a, ih_i16 b)
+{
+    return (ih_i16)vminq_s16((int16x8_t)a, (int16x8_t)b);
+}
+
+static inline ih_i16 ih_i16_max(ih_i16 a, ih_i16 b)
+{
+    return (ih_i16)vmaxq_s16((int16x8_t)a, (int16x8_t)b);
+}
+
+/* Half of the upper half of the doubled product; only INT16_MIN squared would saturate, which no kernel has. */
+static inline ih_i16 ih_i16_mul_high(ih_i16 a, ih_i16 b)
+{
+    return (ih_i16)vshrq_n_s16(vqdmulhq_s16((int16x8_t)a, (int16x8_t)b), 1);
+}
+
+static inline ih_i32 ih_i16_madd_pairs(ih_i16 a, ih_i16 b)
+{
+    const int32x4_t low = vmull_s16(vget_low_s16((int16x8_t)a), vget_low_s16((int16x8_t)b));
+#ifdef __aarch64__
+    return (ih_i32)vpaddq_s32(low, vmull_high_s16((int16x8_t)a, (int16x8_t)b));
+#else
+    const int32x4_t high = vmull_s16(vget_high_s16((int16x8_t)a), vget_high_s16((int16x8_t)b));
+    return (ih_i32)vcombine_s32(vpadd_s32(vget_low_s32(low), vget_high_s32(low)),
+                                vpadd_s32(vget_low_s32(high), vget_high_s32(high)));
+#endif
+}
+
+static inline ih_i32 ih_i32_min(ih_i32 a, ih_i32 b)
+{
+    return (ih_i32)vminq_s32((int32x4_t)a, (int32x4_t)b);
+}
+
+static inline ih_i32 ih_i32_max(ih_i32 a, ih_i32 b)
+{
+    return (ih_i32)vmaxq_s32((int32x4_t)a, (int32x4_t)b);
+}
+
+static inline ih_i64 ih_i32_mul_even(ih_i32 a, ih_i32 b)
+{
+    return (ih_i64)vmull_s32(vmovn_s64((int64x2_t)a), vmovn_s64((int64x2_t)b));
+}
+
+static inline ih_u64 ih_u32_mul_even(ih_u32 a, ih_u32 b)
+{
+    return (ih_u64)vmull_u32(vmovn_u64((uint64x2_t)a), vmovn_u64((uint64x2_t)b));
+}
+
+static inline bool ih_i16_any(ih_i16 a)
+{
+    const uint32x2_t half = vqmovn_u64((uint64x2_t)a);
+    return vget_lane_u64(vreinterpret_u64_u32(half), 0) != 0;
+}
+
+/* There is no instruction for it: each lane leaves its own bit of a byte, and all of a half are added. */
+static inline uint32_t ih_i16_bits(ih_i16 a, ih_i16 b)
+{
+    const uint8x8_t bit = vcreate_u8(0x8040201008040201u);
+    const uint8x8_t first = vand_u8(vmovn_u16((uint16x8_t)a), bit);
+    const uint8x8_t second = vand_u8(vmovn_u16((uint16x8_t)b), bit);
+#ifdef __aarch64__
+    return (uint32_t)vaddv_u8(first) | (uint32_t)vaddv_u8(second) << 8;
+#else
+    const uint8x8_t both = vpadd_u8(first, second);
+    const uint8x8_t four = vpadd_u8(both, both);
+    return vget_lane_u16(vreinterpret_u16_u8(vpadd_u8(four, four)), 0);
+#endif
+}
+
+static inline int32_t ih_i32_total(ih_i32 a)
+{
+    const int64x2_t sums = vpaddlq_s32((int32x4_t)a);
+    return (int32_t)(vgetq_lane_s64(sums, 0) + vgetq_lane_s64(sums, 1));
+}
+
+static inline int32_t ih_i16_total(ih_i16 a)
+{
+    return ih_i32_total((ih_i32)vpaddlq_s16((int16x8_t)a));
+}
+
+#endif

@@ -1,0 +1,71 @@
+/* ih_simd_sse2 - the part of ih_simd's vocabulary that needs instructions by name, for SSE2. */
+#ifndef IH_SIMD_SSE2_H
+#define IH_SIMD_SSE2_H
+
+#include <emmintrin.h>
+
+static inline ih_i16 ih_i16_min(ih_i16 a, ih_i16 b)
+{
+    return (ih_i16)_mm_min_epi16((__m128i)a, (__m128i)b);
+}
+
+static inline ih_i16 ih_i16_max(ih_i16 a, ih_i16 b)
+{
+    return (ih_i16)_mm_max_epi16((__m128i)a, (__m128i)b);
+}
+
+static inline ih_i16 ih_i16_mul_high(ih_i16 a, ih_i16 b)
+{
+    return (ih_i16)_mm_mulhi_epi16((__m128i)a, (__m128i)b);
+}
+
+static inline ih_i32 ih_i16_madd_pairs(ih_i16 a, ih_i16 b)
+{
+    return (ih_i32)_mm_madd_epi16((__m128i)a, (__m128i)b);
+}
+
+static inline ih_i32 ih_i32_min(ih_i32 a, ih_i32 b)
+{
+    return ih_i32_pick(a < b, a, b);
+}
+
+static inline ih_i32 ih_i32_max(ih_i32 a, ih_i32 b)
+{
+    return ih_i32_pick(a > b, a, b);
+}
+
+static inline ih_u64 ih_u32_mul_even(ih_u32 a, ih_u32 b)
+{
+    return (ih_u64)_mm_mul_epu32((__m128i)a, (__m128i)b);
+}
+
+/* SSE2 multiplies without sign alone: what a sign adds to the upper half is taken off. */
+static inline ih_i64 ih_i32_mul_even(ih_i32 a, ih_i32 b)
+{
+    const ih_i32 signs = ih_i32_add((a >> 31) & b, (b >> 31) & a);
+    return ih_i64_sub((ih_i64)ih_u32_mul_even((ih_u32)a, (ih_u32)b),
+                      (ih_i64)_mm_slli_epi64((__m128i)signs, 32));
+}
+
+static inline bool ih_i16_any(ih_i16 a)
+{
+    return _mm_movemask_epi8(_mm_cmpeq_epi8((__m128i)a, _mm_setzero_si128())) != 0xffff;
+}
+
+static inline uint32_t ih_i16_bits(ih_i16 a, ih_i16 b)
+{
+    return (uint32_t)_mm_movemask_epi8(_mm_packs_epi16((__m128i)a, (__m128i)b));
+}
+
+static inline int32_t ih_i32_total(ih_i32 a)
+{
+    const __m128i two = _mm_add_epi32((__m128i)a, _mm_shuffle_epi32((__m128i)a, 0x4e));
+    return _mm_cvtsi128_si32(_mm_add_epi32(two, _mm_shuffle_epi32(two, 0xb1)));
+}
+
+static inline int32_t ih_i16_total(ih_i16 a)
+{
+    return ih_i32_total(ih_i16_madd_pairs(a, ih_i16_all(1)));
+}
+
+#endif
