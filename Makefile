@@ -31,7 +31,7 @@ ARCH ?= arm64
 .PHONY: help sim frames sanitize test fuzz coverage ranges exhaustive mutation accept eval bench \
   bench-instructions bench-peers bench-grow bench-worst test-bench bits cortexm longrun size vectors learn view figures \
   test-view test-report live-pictures export board board-gpiod2 deb image flash calibrate test-calibration \
-  test-calibration-short test-deb test-board test-image format formatted lint clean
+  test-calibration-short test-deb test-board test-image format formatted words lint clean
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z_-]+:.*## / { \
@@ -261,6 +261,9 @@ format: ## clang-format over all C and C++ sources
 formatted: ## fail when make format would change something
 	@tools/setup.sh format
 	@git ls-files '*.c' '*.h' '*.cpp' '*.hpp' | xargs clang-format --dry-run --Werror
+
+words: ## old words of our own in names, comments, messages and documents, and the field's words for them
+	@/usr/bin/python3 tests/checks/words.py
 
 lint: sanitize ## clang-tidy, cppcheck, MISRA C, gcc -fanalyzer; what they may find: docs/misra.md
 	@tools/setup.sh lint
