@@ -9,8 +9,8 @@
  *
  * The frame is a camera frame for a dot rig, a depth image for a range rig. Integer arithmetic
  * only; the same frame gives the same bytes on every processor. Not thread-safe per struct; two
- * structs are independent. Rows in it begin where vectors do: who takes memory for it from a heap
- * asks for _Alignof(struct isohead), 32, which is more than malloc gives.
+ * structs are independent. It is aligned for vectors, to 32 bytes: allocate it on a heap with
+ * aligned_alloc, as malloc aligns to less. C++ can include this header.
  *
  * Method: M. Clabian, H. Roetzer, H. Bischof, W. G. Kropatsch, "Head detection and localization
  * from sparse 3D data", DAGM 2002. Each stage's header names its section.
@@ -21,6 +21,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "base/ih_config.h"
 #include "base/ih_types.h"
 #include "detect/ih_detections.h"
 #include "dots/ih_dots.h"
@@ -82,6 +83,8 @@ struct isohead {
     } scratch;
 };
 
+IH_BEGIN_DECLS
+
 void ih_params_default(struct ih_params *params);
 /* The paper's method alone: is_paper set, a finer surface, and nests that must be heads by themselves. */
 void ih_params_paper(struct ih_params *params);
@@ -108,5 +111,7 @@ enum ih_err isohead_frame(struct isohead *head, const struct ih_frame *frame,
 enum ih_err isohead_label(struct isohead *head, const struct ih_frame *frame,
                           const struct ih_frame *ambient) __attribute__((warn_unused_result));
 void isohead_find(struct isohead *head, int64_t time_us);
+
+IH_END_DECLS
 
 #endif

@@ -16,11 +16,14 @@
 
 #include <stdint.h>
 
+#include "base/ih_config.h"
 #include "base/ih_types.h"
 
 /* Largest system. The packed triangle costs n (n + 1) / 2 * 4 bytes: 41,760 for 144. */
 #define IH_CHOLESKY_MAX 144
 #define IH_CHOLESKY_PACKED(n) ((n) * ((n) + 1) / 2)
+
+IH_BEGIN_DECLS
 
 /* n 1..IH_CHOLESKY_MAX. */
 enum ih_err ih_cholesky_factor(int32_t *a_q30, int32_t n, int32_t *bad_pivot)
@@ -32,5 +35,7 @@ enum ih_err ih_cholesky_factor(int32_t *a_q30, int32_t n, int32_t *bad_pivot)
  * the same array. */
 void ih_cholesky_solve(const int32_t *l_q30, int32_t n, const int32_t *b, int32_t *x_mantissa,
                        int32_t *x_exponent);
+
+IH_END_DECLS
 
 #endif

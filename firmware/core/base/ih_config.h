@@ -1,4 +1,4 @@
-/* ih_config - the sizes that every stage shares.
+/* ih_config - the sizes that every stage shares, and what headers need for C++.
  *
  * A limit that belongs to one stage stands in that stage's header; here are only the few that
  * several stages must agree on. All are compile-time constants, so that the whole state is one
@@ -7,16 +7,25 @@
 #ifndef IH_CONFIG_H
 #define IH_CONFIG_H
 
+/* Around each header's declarations of functions: C++ links with the functions compiled as C. */
+#ifdef __cplusplus
+#define IH_BEGIN_DECLS extern "C" {
+#define IH_END_DECLS }
+#else
+#define IH_BEGIN_DECLS
+#define IH_END_DECLS
+#endif
+
 /* Dots in a row and in a column of the projected pattern (paper, section 2.1: 19x19). */
 #define IH_GRID 19
 /* Slots of the dot table; slot = row * IH_GRID + column. */
 #define IH_SLOTS (IH_GRID * IH_GRID)
 
-/* Rows of pixels begin at multiples of this many bytes, the greatest vector's size: what lies across two
- * of a processor's cache lines takes twice as long to store. Costs less than so many bytes a table. */
+/* Scanline tables begin at multiples of this many bytes, the size of the largest vector: a store across
+ * two cache lines takes twice as long. Padding costs at most this many bytes a table. */
 #define IH_ALIGNMENT 32
 
-/* What a processor's cache takes from memory at once: rows that will be needed are asked for in such steps. */
+/* A cache line; scanlines are prefetched in such steps. */
 #define IH_LINE_BYTES 64
 
 /* Frame sizes that are accepted. The widest frame costs 76 * IH_FRAME_WIDTH_MAX bytes

@@ -10,6 +10,7 @@
 
 #include <stdint.h>
 
+#include "base/ih_config.h"
 #include "base/ih_range.h"
 
 /* value / 2^shift, rounded. shift 0..62; |value| <= 2^63 - 1 - 2^(shift-1). */
@@ -125,6 +126,8 @@ static inline int64_t ih_distance2_s32(const int32_t a[3], const int32_t b[3])
     return sum;
 }
 
+IH_BEGIN_DECLS
+
 /* floor(sqrt(value)), exact for all 2^64 inputs. */
 uint32_t ih_isqrt_u64(uint64_t value);
 
@@ -156,5 +159,7 @@ static inline int ih_bits_u64(uint64_t value)
 /* Angle of (x, y) from +x towards +y in thousandths of a degree, (-180000, 180000]; 0 for (0, 0).
  * |x|, |y| <= 2^40. Within 2 mdeg of atan2. */
 int32_t ih_atan2_mdeg(int64_t y, int64_t x);
+
+IH_END_DECLS
 
 #endif

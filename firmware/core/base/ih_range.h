@@ -17,8 +17,12 @@
 
 #include <stdint.h>
 
+#include "base/ih_config.h"
+
 #ifdef ISOHEAD_RANGE_CHECKS
+IH_BEGIN_DECLS
 void ih_range_check(int64_t value, int64_t low, int64_t high, const char *file, int line);
+IH_END_DECLS
 #define IH_IN_RANGE(value, low, high) ih_range_check((value), (low), (high), __FILE__, __LINE__)
 #define IH_WRAPS(type, value) ((__typeof__(type))(value))
 #else

@@ -4,6 +4,8 @@
 
 #include <stdint.h>
 
+#include "base/ih_config.h"
+
 /* Every function that can fail returns one of these; 0 is success. Seeing nothing in a frame is
  * success, a full table is success and a counter. */
 enum ih_err {
@@ -28,6 +30,8 @@ enum ih_err {
     IH_ERR_BLOB_FIELD = -16,   /* a kind that does not exist, or a range rig with a projector */
 };
 
+IH_BEGIN_DECLS
+
 /* One line of English for a code, without a full stop; never NULL. */
 const char *ih_err_text(enum ih_err err);
 
@@ -44,5 +48,7 @@ struct ih_frame {
     int32_t bytes_per_sample;
     int32_t maximum;
 };
+
+IH_END_DECLS
 
 #endif

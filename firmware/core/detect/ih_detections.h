@@ -25,13 +25,14 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "base/ih_config.h"
 #include "detect/ih_ellipsoid.h"
 #include "detect/ih_evidence.h"
 #include "detect/ih_fit.h"
 #include "detect/ih_fit_equations.h"
-#include "detect/ih_scan.h"
-#include "detect/ih_rays.h"
 #include "detect/ih_ray_counts.h"
+#include "detect/ih_rays.h"
+#include "detect/ih_scan.h"
 #include "dots/ih_dots.h"
 #include "nests/ih_hypotheses.h"
 #include "nests/ih_nests.h"
@@ -115,6 +116,8 @@ struct ih_detections_scratch {
     struct ih_ray_counts_scratch tally;
 };
 
+IH_BEGIN_DECLS
+
 void ih_detections_params_default(struct ih_detections_params *params);
 
 void ih_detections_begin(struct ih_detections *out);
@@ -133,5 +136,7 @@ void ih_detections_add(const struct ih_points *points, const struct ih_dots *dot
  * distance takes the head to be as deep from every side: 2 mm short at s = 0.3; it is 0 where the
  * camera would be inside the head. */
 void ih_detections_outline(const struct ih_rig *rig, struct ih_detection *detection);
+
+IH_END_DECLS
 
 #endif

@@ -24,6 +24,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "base/ih_config.h"
 #include "detect/ih_rays.h"
 
 #define IH_ELLIPSOID_SEMI_MIN_MM 40
@@ -47,6 +48,8 @@ struct ih_crossing {
 struct ih_ellipsoid_box {
     int32_t half_mm_q8[2];
 };
+
+IH_BEGIN_DECLS
 
 /* The mean adult head, hair included. */
 struct ih_ellipsoid ih_ellipsoid_mean(const int32_t centre_mm_q8[3]);
@@ -96,5 +99,7 @@ bool ih_ellipsoid_cross(const struct ih_ellipsoid *ellipsoid, const struct ih_fr
 /* A point in the ellipsoid's units. False when beyond the reach on any axis. */
 bool ih_ellipsoid_place(const struct ih_ellipsoid *ellipsoid, const struct ih_fractions *shares,
                         const int32_t point_mm_q8[3], int32_t place_q14[3]);
+
+IH_END_DECLS
 
 #endif

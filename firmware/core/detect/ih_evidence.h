@@ -25,9 +25,10 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "base/ih_config.h"
 #include "detect/ih_ellipsoid.h"
-#include "detect/ih_rays.h"
 #include "detect/ih_ray_counts.h"
+#include "detect/ih_rays.h"
 
 enum ih_evidence_kind {
     IH_EVIDENCE_ON,         /* points within 20 mm of the ellipsoid: count */
@@ -66,6 +67,8 @@ struct ih_evidence {
     int32_t through_count, hit_count, front_count;
 };
 
+IH_BEGIN_DECLS
+
 /* scratch must have been prepared from the space (ih_ray_counts_prepare). */
 void ih_evidence_collect(const struct ih_rays *space, struct ih_ray_counts_scratch *scratch,
                          const struct ih_ellipsoid *ellipsoid, const int32_t start_mm_q8[3],
@@ -73,5 +76,7 @@ void ih_evidence_collect(const struct ih_rays *space, struct ih_ray_counts_scrat
 
 /* A word for a kind, for tables and traces. */
 const char *ih_evidence_text(enum ih_evidence_kind kind);
+
+IH_END_DECLS
 
 #endif

@@ -38,6 +38,7 @@
 
 #include <stdint.h>
 
+#include "base/ih_config.h"
 #include "detect/ih_ellipsoid.h"
 #include "detect/ih_fit_equations.h"
 #include "detect/ih_rays.h"
@@ -48,6 +49,8 @@ struct ih_fit_params {
     int32_t see_through_mm; /* a point this far behind the entry is seen through the ellipsoid */
     int32_t step_count;     /* up to IH_FIT_STEPS; 0: the start as it is */
 };
+
+IH_BEGIN_DECLS
 
 void ih_fit_params_default(struct ih_fit_params *params);
 
@@ -71,5 +74,7 @@ void ih_fit_continue(const struct ih_rays *space, const struct ih_fit_params *pa
 void ih_fit_ellipsoid(const struct ih_rays *space, const struct ih_fit_params *params,
                       const struct ih_ellipsoid *start, struct ih_fit_equations_scratch *scratch,
                       struct ih_ellipsoid *out);
+
+IH_END_DECLS
 
 #endif

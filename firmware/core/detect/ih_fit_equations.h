@@ -74,6 +74,8 @@ struct ih_fit_equations_system {
     int64_t right_q16[IH_FIT_UNKNOWNS]; /* mm */
 };
 
+IH_BEGIN_DECLS
+
 /* Once for a space, before any fit. */
 void ih_fit_equations_prepare(const struct ih_rays *space, struct ih_fit_equations_rays *out);
 
@@ -87,5 +89,7 @@ void ih_fit_equations_collect(const struct ih_rays *space, const struct ih_ellip
  * inside. False at the centre, where there is none. */
 bool ih_fit_equations_distance(const struct ih_fractions *shares, const int32_t place_q14[3],
                                int32_t *distance_mm_q8);
+
+IH_END_DECLS
 
 #endif

@@ -20,9 +20,14 @@
 
 #include <stdint.h>
 
+#include "base/ih_config.h"
 #include "detect/ih_fit_equations.h"
+
+IH_BEGIN_DECLS
 
 int32_t ih_prescreen_score_q8(const struct ih_fit_equations_rays *rays,
                               const int32_t origin_mm_q8[3], const int32_t centre_mm_q8[3]);
+
+IH_END_DECLS
 
 #endif

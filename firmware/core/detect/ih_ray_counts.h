@@ -61,6 +61,8 @@ struct ih_ray_counts_scratch {
     int16_t flag[IH_RAY_COUNTS_RAYS];
 };
 
+IH_BEGIN_DECLS
+
 /* Once for a space. */
 void ih_ray_counts_prepare(const struct ih_rays *space, struct ih_ray_counts_scratch *out);
 
@@ -68,5 +70,7 @@ void ih_ray_counts_prepare(const struct ih_rays *space, struct ih_ray_counts_scr
 void ih_ray_counts_count(const struct ih_rays *space, const struct ih_ellipsoid *ellipsoid,
                          const struct ih_ellipsoid_box *box, struct ih_ray_counts_scratch *scratch,
                          struct ih_ray_counts *out);
+
+IH_END_DECLS
 
 #endif

@@ -48,6 +48,8 @@ struct ih_rays_params {
     int32_t probe_mm; /* "near by" is this far behind the 8th percentile of the depths; above 0 */
 };
 
+IH_BEGIN_DECLS
+
 void ih_rays_params_default(struct ih_rays_params *params);
 
 void ih_rays_make(const struct ih_points *points, const struct ih_dots *dots,
@@ -56,5 +58,7 @@ void ih_rays_make(const struct ih_points *points, const struct ih_dots *dots,
 
 /* The greatest |slope| of all rays, x and y. */
 void ih_rays_slope_max(const struct ih_rays *space, int32_t slope_max_q20[2]);
+
+IH_END_DECLS
 
 #endif

@@ -30,8 +30,8 @@
 #include <stdint.h>
 
 #include "base/ih_config.h"
-#include "detect/ih_template.h"
 #include "detect/ih_rays.h"
+#include "detect/ih_template.h"
 
 /* Places kept; each later costs a fit. */
 #define IH_SCAN_MAX 8
@@ -63,9 +63,13 @@ struct ih_scan_scratch {
     struct ih_template_rays rays;
 };
 
+IH_BEGIN_DECLS
+
 void ih_scan_params_default(struct ih_scan_params *params);
 
 void ih_scan_find(const struct ih_rays *space, const struct ih_scan_params *params,
                   struct ih_scan_scratch *scratch, struct ih_scan *out);
+
+IH_END_DECLS
 
 #endif

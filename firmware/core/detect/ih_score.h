@@ -16,6 +16,7 @@
 
 #include <stdint.h>
 
+#include "base/ih_config.h"
 #include "detect/ih_evidence.h"
 
 #define IH_SCORE_KNOTS 7
@@ -26,9 +27,13 @@ struct ih_score {
     int32_t probability_q16;
 };
 
+IH_BEGIN_DECLS
+
 void ih_score_rate(const struct ih_evidence *evidence, struct ih_score *out);
 
 /* 1 / (1 + exp(-logit)). */
 int32_t ih_score_probability_q16(int32_t logit_q10);
+
+IH_END_DECLS
 
 #endif

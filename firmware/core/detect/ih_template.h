@@ -54,10 +54,14 @@ struct ih_template_rays {
     int32_t aside_q12, above_q12, below_q12, through_q12;
 };
 
+IH_BEGIN_DECLS
+
 void ih_template_prepare(const struct ih_rays *space, struct ih_template_rays *out);
 
 /* How well a mean head fits there; IH_TEMPLATE_NONE_Q12 out of the limits. */
 int32_t ih_template_score_q12(const struct ih_rays *space, const struct ih_template_rays *rays,
                               const int32_t centre_mm_q8[3]);
+
+IH_END_DECLS
 
 #endif

@@ -23,6 +23,7 @@
 #ifndef IH_BANDPASS_H
 #define IH_BANDPASS_H
 
+#include <stdalign.h>
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -61,13 +62,15 @@ struct ih_bandpass {
     bool is_bytes;   /* sums of bytes, else of 12 bits */
     /* Of three pixels around each, from IH_BANDPASS_LEAD to the left of the frame on, edge pixels repeated
      * outside: rings of sums and of 1-2-1, and sums of the newest nine rows. */
-    _Alignas(IH_ALIGNMENT) uint16_t three[IH_BANDPASS_ROWS][IH_BANDPASS_SUMS];
-    _Alignas(IH_ALIGNMENT) uint16_t binomial[IH_BANDPASS_KEPT][IH_BANDPASS_SUMS];
-    _Alignas(IH_ALIGNMENT) union {
+    alignas(IH_ALIGNMENT) uint16_t three[IH_BANDPASS_ROWS][IH_BANDPASS_SUMS];
+    alignas(IH_ALIGNMENT) uint16_t binomial[IH_BANDPASS_KEPT][IH_BANDPASS_SUMS];
+    alignas(IH_ALIGNMENT) union {
         uint16_t of_bytes[IH_BANDPASS_SUMS];
         uint32_t of_grey_q4[IH_BANDPASS_SUMS];
     } nine;
 };
+
+IH_BEGIN_DECLS
 
 struct ih_scanline ih_frame_scanline(const struct ih_frame *frame, int32_t v);
 
@@ -114,5 +117,7 @@ void ih_bandpass_bytes(struct ih_bandpass *band, const uint8_t *const row[IH_BAN
 
 /* The newest row once more, as is done at the frame's top and bottom. */
 bool ih_bandpass_repeat(struct ih_bandpass *band, struct ih_bandpass_row *out);
+
+IH_END_DECLS
 
 #endif

@@ -29,6 +29,7 @@
 #ifndef IH_DOTS_H
 #define IH_DOTS_H
 
+#include <stdalign.h>
 #include <stdbool.h>
 #include <stdint.h>
 
@@ -96,13 +97,15 @@ struct ih_dots_scratch {
         struct {
             struct ih_bandpass band;
             /* Ring; row v is at (v + IH_DOTS_REACH) % IH_DOTS_ROWS. Zeros around the frame. */
-            _Alignas(IH_ALIGNMENT) int16_t response[IH_DOTS_ROWS][IH_DOTS_ROW_SIZE];
+            alignas(IH_ALIGNMENT) int16_t response[IH_DOTS_ROWS][IH_DOTS_ROW_SIZE];
             struct ih_bandpass_row listed[IH_DOTS_ROWS]; /* row v is at v % IH_DOTS_ROWS */
             /* For the rows of R between two rows of blocks' centres, and for those between the next two. */
             uint32_t limit[2][IH_BANDPASS_GROUPS];
         } detection;
     } rows;
 };
+
+IH_BEGIN_DECLS
 
 void ih_dots_params_default(struct ih_dots_params *params);
 
@@ -124,5 +127,7 @@ void ih_dots_find(const struct ih_frame *frame, const struct ih_frame *ambient,
 
 /* Is the frame's block at this pixel over-exposed? Outside the frame: false. */
 bool ih_dots_is_bright(const struct ih_dots *dots, int32_t u_px, int32_t v_px);
+
+IH_END_DECLS
 
 #endif

@@ -52,6 +52,8 @@ struct ih_noise_scratch {
     int16_t response[IH_NOISE_BLOCK / IH_NOISE_STEP][IH_FRAME_WIDTH_MAX];
 };
 
+IH_BEGIN_DECLS
+
 /* ambient: of the frame's width and height, or NULL. */
 void ih_noise_measure(const struct ih_frame *frame, const struct ih_frame *ambient,
                       struct ih_noise_scratch *scratch, struct ih_noise *out);
@@ -67,5 +69,7 @@ int32_t ih_noise_at(const struct ih_noise_row *row, int32_t u);
 /* No pixel of a column of blocks has less noise in this row, nor in the others that lie between the centres of the
  * same blocks: those change where v is IH_NOISE_BLOCK / 2 more than a multiple of IH_NOISE_BLOCK. */
 int32_t ih_noise_min(const struct ih_noise_row *row, int32_t block);
+
+IH_END_DECLS
 
 #endif

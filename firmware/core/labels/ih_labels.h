@@ -89,10 +89,14 @@ struct ih_labels_scratch {
     int16_t open[IH_SLOTS];
 };
 
+IH_BEGIN_DECLS
+
 void ih_labels_params_default(struct ih_labels_params *params);
 
 void ih_labels_assign(const struct ih_dots *dots, const struct ih_rig *rig,
                       const struct ih_labels_params *params, struct ih_labels_scratch *scratch,
                       struct ih_labels *out);
+
+IH_END_DECLS
 
 #endif

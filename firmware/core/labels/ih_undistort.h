@@ -15,10 +15,15 @@
 
 #include <stdint.h>
 
+#include "base/ih_config.h"
 #include "dots/ih_dots.h"
 #include "rig/ih_rig.h"
 
+IH_BEGIN_DECLS
+
 void ih_undistort_dots(const struct ih_dots *dots, const struct ih_rig *rig,
                        int32_t u_px_q12[IH_DOTS_MAX], int32_t v_px_q12[IH_DOTS_MAX]);
+
+IH_END_DECLS
 
 #endif

@@ -53,6 +53,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "base/ih_config.h"
 #include "nests/ih_contours.h"
 
 /* Points on a contour: a whole number of vectors; what there is to do grows with its square. */
@@ -123,6 +124,8 @@ struct ih_arcs {
     struct ih_arcs_sums sums;
 };
 
+IH_BEGIN_DECLS
+
 void ih_ellipse_params_default(struct ih_ellipse_params *params);
 
 struct ih_box ih_arcs_box(const struct ih_contours *cuts, const struct ih_contour *contour);
@@ -145,5 +148,7 @@ int32_t ih_arcs_merit_q8(int32_t arc_q8, int32_t chord_q8, int32_t shape_q16);
 /* False when the contour is not searched: too few vertices, or too many. */
 bool ih_arcs_make(const struct ih_contours *cuts, const struct ih_contour *contour,
                   const struct ih_ellipse_params *params, struct ih_arcs *out);
+
+IH_END_DECLS
 
 #endif

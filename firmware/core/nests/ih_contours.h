@@ -18,6 +18,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "base/ih_config.h"
 #include "surface/ih_surface.h"
 
 /* Vertices of all contours of one level; 4 bytes each. Real surfaces need about 300 at the most;
@@ -47,7 +48,11 @@ struct ih_contours {
     uint64_t entrance[2][IH_SURFACE_GRID];
 };
 
+IH_BEGIN_DECLS
+
 void ih_contours_level(const struct ih_surface *surface, int32_t level_mm_q8,
                        struct ih_contours *out);
+
+IH_END_DECLS
 
 #endif

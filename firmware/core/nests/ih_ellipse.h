@@ -27,8 +27,9 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "nests/ih_contours.h"
+#include "base/ih_config.h"
 #include "nests/ih_arcs.h"
+#include "nests/ih_contours.h"
 
 /* In grid steps. Second moments are central, per area. */
 struct ih_ellipse {
@@ -52,6 +53,8 @@ struct ih_ellipse_scratch {
     struct ih_arc part;                      /* the one that was found */
 };
 
+IH_BEGIN_DECLS
+
 /* Moments of a closed contour. False when it has no area. */
 bool ih_ellipse_of_contour(const struct ih_contours *cuts, const struct ih_contour *contour,
                            struct ih_ellipse *out);
@@ -66,5 +69,7 @@ int32_t ih_ellipse_winding(const struct ih_contours *cuts, const struct ih_conto
 bool ih_ellipse_of_part(const struct ih_arcs *parts, struct ih_vertex place,
                         const struct ih_ellipse_params *params, struct ih_ellipse_scratch *scratch,
                         struct ih_ellipse *out);
+
+IH_END_DECLS
 
 #endif

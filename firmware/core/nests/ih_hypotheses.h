@@ -25,6 +25,7 @@
 
 #include <stdint.h>
 
+#include "base/ih_config.h"
 #include "nests/ih_nests.h"
 #include "rig/ih_rig.h"
 #include "surface/ih_samples.h"
@@ -81,6 +82,8 @@ struct ih_hypotheses {
     struct ih_hypothesis hypothesis[IH_NESTS_MAX];
 };
 
+IH_BEGIN_DECLS
+
 void ih_hypotheses_params_default(struct ih_hypotheses_params *params);
 
 void ih_hypotheses_select(const struct ih_nests *nests, const struct ih_surface *surface,
@@ -90,5 +93,7 @@ void ih_hypotheses_select(const struct ih_nests *nests, const struct ih_surface 
 /* The word that the record uses: "area", "curvature", "shape", "outline", "score"; NULL for an accepted
  * one. */
 const char *ih_reject_text(int32_t reject);
+
+IH_END_DECLS
 
 #endif

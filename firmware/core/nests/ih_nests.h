@@ -28,9 +28,10 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "base/ih_config.h"
+#include "nests/ih_arcs.h"
 #include "nests/ih_contours.h"
 #include "nests/ih_ellipse.h"
-#include "nests/ih_arcs.h"
 #include "surface/ih_surface.h"
 
 /* Minima that are followed. Each nest costs 800 bytes, most of them slices. */
@@ -93,6 +94,8 @@ struct ih_nests_scratch {
     struct ih_support support[IH_NESTS_MAX];
 };
 
+IH_BEGIN_DECLS
+
 void ih_nests_params_default(struct ih_nests_params *params);
 /* For nests that must be heads by themselves. */
 void ih_nests_params_paper(struct ih_nests_params *params);
@@ -103,5 +106,7 @@ void ih_nests_find(const struct ih_surface *surface, const struct ih_nests_param
 /* The depth of level number index for this surface; false beyond the last. For tracing. */
 bool ih_nests_level(const struct ih_surface *surface, const struct ih_nests_params *params,
                     int32_t index, int32_t *level_mm_q8);
+
+IH_END_DECLS
 
 #endif

@@ -15,6 +15,7 @@
 
 #include <stdint.h>
 
+#include "base/ih_config.h"
 #include "base/ih_types.h"
 #include "rig/ih_rig.h"
 
@@ -27,9 +28,13 @@ struct ih_cloud {
     int32_t outside; /* beside the image */
 };
 
+IH_BEGIN_DECLS
+
 /* depth_mm has room for width x height. IH_ERR_KIND when the rig is for no depth images. */
 enum ih_err ih_cloud_draw(const int32_t (*point_mm_q8)[3], int32_t point_count,
                           const struct ih_rig *rig, uint16_t *depth_mm, struct ih_cloud *out)
     __attribute__((warn_unused_result));
+
+IH_END_DECLS
 
 #endif

@@ -50,6 +50,8 @@ struct ih_points {
     struct ih_point point[IH_SLOTS];
 };
 
+IH_BEGIN_DECLS
+
 void ih_points_params_default(struct ih_points_params *params);
 
 void ih_points_from_labels(const struct ih_labels *labels, const struct ih_rig *rig,
@@ -59,5 +61,7 @@ enum ih_err ih_points_from_range(const struct ih_frame *frame, const struct ih_r
                                  const struct ih_points_params *params,
                                  const struct ih_window *window, struct ih_points *out)
     __attribute__((warn_unused_result));
+
+IH_END_DECLS
 
 #endif

@@ -37,6 +37,7 @@
 
 #include <stdint.h>
 
+#include "base/ih_config.h"
 #include "base/ih_types.h"
 #include "rig/ih_rig.h"
 
@@ -80,6 +81,8 @@ struct ih_windows_scratch {
     uint16_t depth_mm[IH_WINDOWS_CELLS_MAX];              /* row by row; 0 = nothing measured */
 };
 
+IH_BEGIN_DECLS
+
 void ih_windows_params_default(struct ih_windows_params *params);
 
 /* IH_ERR_KIND when it is no depth image, or the rig is for none. */
@@ -93,5 +96,7 @@ enum ih_err ih_windows_find(const struct ih_frame *frame, const struct ih_rig *r
  * and *v_px; 0 when there is none. (*u_px, *v_px) lies in the frame. */
 int32_t ih_windows_pixel(const struct ih_frame *frame, const struct ih_rig *rig, int32_t reach_px,
                          int32_t *u_px, int32_t *v_px);
+
+IH_END_DECLS
 
 #endif

@@ -70,6 +70,8 @@ struct ih_rig {
     struct ih_line line[IH_SLOTS];
 };
 
+IH_BEGIN_DECLS
+
 /* Check the calibration and fill the rig. *bad_slot is the dot that failed, or IH_NONE. */
 enum ih_err ih_rig_init(struct ih_rig *rig, const struct ih_calibration *calibration,
                         int32_t *bad_slot) __attribute__((warn_unused_result));
@@ -93,5 +95,7 @@ void ih_rig_dot_at(const struct ih_rig *rig, int32_t slot, int32_t depth_mm_q8, 
 
 /* Is the pixel's centre inside the frame? */
 bool ih_rig_inside(const struct ih_rig *rig, int32_t u_px_q12, int32_t v_px_q12);
+
+IH_END_DECLS
 
 #endif

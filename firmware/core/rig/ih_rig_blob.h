@@ -45,6 +45,8 @@
 #define IH_RIG_BLOB_VERSION 1
 #define IH_RIG_BLOB_BYTES (4 * (4 + 16 + 3 * IH_SLOTS + 1))
 
+IH_BEGIN_DECLS
+
 enum ih_err ih_rig_blob_decode(const uint8_t *blob, size_t size, struct ih_calibration *calibration)
     __attribute__((warn_unused_result));
 
@@ -54,5 +56,7 @@ enum ih_err ih_rig_blob_encode(const struct ih_calibration *calibration,
 
 /* The CRC alone, of all bytes but the last four. */
 uint32_t ih_rig_blob_crc32(const uint8_t *bytes, size_t count);
+
+IH_END_DECLS
 
 #endif

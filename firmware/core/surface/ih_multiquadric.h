@@ -12,10 +12,14 @@
 
 #include <stdint.h>
 
+#include "base/ih_config.h"
+
 /* Squares in a line: 8 or 12. Vectors have 4 or 8. */
 #define IH_MULTIQUADRIC_ACROSS_MAX 12
 /* Entries of a sample's row at the most. */
 #define IH_MULTIQUADRIC_TERMS_MAX (IH_MULTIQUADRIC_ACROSS_MAX * IH_MULTIQUADRIC_ACROSS_MAX)
+
+IH_BEGIN_DECLS
 
 /* The roots of across[i] + down[k], line by line: one line for each of down, whose count is even. */
 void ih_multiquadric_roots(const uint32_t *across_q18, int32_t across_count,
@@ -39,5 +43,7 @@ void ih_multiquadric_add(const uint32_t *basis_q20, int32_t row_count,
  * of the coefficients alone, times 2^27. */
 void ih_multiquadric_lines(const int32_t *coefficient, const int32_t *const *line_q20,
                            int32_t line_count, int32_t count, int32_t width, int64_t *sum);
+
+IH_END_DECLS
 
 #endif

@@ -15,6 +15,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "base/ih_config.h"
+
 /* term_count: a multiple of 16 up to this. What is kept of it grows with its square. */
 #define IH_NORMAL_EQUATIONS_TERMS_MAX 144
 #define IH_NORMAL_EQUATIONS_PAIRS 8
@@ -26,6 +28,8 @@
 #define IH_NORMAL_EQUATIONS_GROUP 8
 /* Where line i of N begins, i a multiple of IH_NORMAL_EQUATIONS_GROUP; line term_count: the size of N. */
 #define IH_NORMAL_EQUATIONS_LINE(i) ((i) * ((i) + IH_NORMAL_EQUATIONS_GROUP) / 2)
+
+IH_BEGIN_DECLS
 
 /* Where entry (i, 0) of N stands. */
 int32_t ih_normal_equations_line(int32_t i);
@@ -78,5 +82,7 @@ bool ih_normal_equations_factor(
 #define IH_NORMAL_EQUATIONS_EXPONENT_MAX 62
 bool ih_normal_equations_solve(const int32_t *line, int32_t term_count, const int32_t *b,
                                int32_t *x_mantissa, int32_t *x_exponent);
+
+IH_END_DECLS
 
 #endif

@@ -55,6 +55,8 @@ struct ih_samples {
 /* |x| and |y| of a sample in field units are below this, which bounds every basis value. */
 #define IH_SAMPLES_REACH 40
 
+IH_BEGIN_DECLS
+
 void ih_samples_params_default(struct ih_samples_params *params);
 
 /* The 8th percentile of the seen depths: what is near. 0 when nothing was seen. */
@@ -63,5 +65,7 @@ int32_t ih_samples_near_mm_q8(const struct ih_points *points);
 void ih_samples_select(const struct ih_points *points, const struct ih_dots *dots,
                        const struct ih_rig *rig, const struct ih_samples_params *params,
                        struct ih_samples *out);
+
+IH_END_DECLS
 
 #endif

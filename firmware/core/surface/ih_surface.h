@@ -142,10 +142,14 @@ struct ih_surface_scratch {
     int32_t centre_q16[IH_SURFACE_CENTRES_MAX]; /* places of the centres in a row, field units */
 };
 
+IH_BEGIN_DECLS
+
 void ih_surface_params_default(struct ih_surface_params *params);
 
 void ih_surface_fit(const struct ih_samples *samples, const struct ih_field *field,
                     const struct ih_surface_params *params, struct ih_surface_scratch *scratch,
                     struct ih_surface *out);
+
+IH_END_DECLS
 
 #endif

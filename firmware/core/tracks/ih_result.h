@@ -11,6 +11,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "base/ih_config.h"
 #include "detect/ih_detections.h"
 #include "nests/ih_hypotheses.h"
 #include "tracks/ih_tracks.h"
@@ -40,6 +41,8 @@ struct ih_result {
     struct ih_result_entry entry[IH_RESULT_MAX];
 };
 
+IH_BEGIN_DECLS
+
 /* Nothing. */
 void ih_result_clear(struct ih_result *out);
 
@@ -47,5 +50,7 @@ void ih_result_from_heads(const struct ih_hypotheses *hypotheses, struct ih_resu
 
 void ih_result_from_tracks(const struct ih_detections *detections, const struct ih_tracks *tracks,
                            struct ih_result *out);
+
+IH_END_DECLS
 
 #endif

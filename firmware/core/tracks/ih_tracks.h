@@ -43,8 +43,9 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "detect/ih_ellipsoid.h"
+#include "base/ih_config.h"
 #include "detect/ih_detections.h"
+#include "detect/ih_ellipsoid.h"
 #include "rig/ih_rig.h"
 
 #define IH_TRACKS_MAX IH_DETECTIONS_EXPECTED_MAX
@@ -97,6 +98,8 @@ struct ih_tracks {
     int32_t selected; /* index into findings, or IH_NONE */
 };
 
+IH_BEGIN_DECLS
+
 void ih_tracks_params_default(struct ih_tracks_params *params);
 
 /* No track; ids begin at 1. */
@@ -107,5 +110,7 @@ void ih_tracks_expect(struct ih_tracks *tracks, const struct ih_tracks_params *p
 
 void ih_tracks_update(struct ih_tracks *tracks, const struct ih_tracks_params *params,
                       const struct ih_rig *rig, struct ih_detections *detections);
+
+IH_END_DECLS
 
 #endif

@@ -28,6 +28,7 @@
 
 #include <stdint.h>
 
+#include "base/ih_config.h"
 #include "dots/ih_dots.h"
 #include "labels/ih_labels.h"
 
@@ -57,6 +58,8 @@ struct ih_exposure {
     int32_t ceiling_frames; /* for so many frames to come */
 };
 
+IH_BEGIN_DECLS
+
 void ih_exposure_params_default(struct ih_exposure_params *params);
 
 /* Where to begin; limited to the parameters' limits. */
@@ -69,5 +72,7 @@ void ih_exposure_look(const struct ih_dots *dots, const struct ih_labels *labels
 
 void ih_exposure_next(const struct ih_exposure_params *params, const struct ih_exposure_look *look,
                       struct ih_exposure *state);
+
+IH_END_DECLS
 
 #endif

@@ -36,6 +36,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "base/ih_config.h"
 #include "dots/ih_dots.h"
 #include "labels/ih_labels.h"
 #include "rig/ih_rig.h"
@@ -106,6 +107,8 @@ struct ih_health_scratch {
     struct ih_rig rig;
 };
 
+IH_BEGIN_DECLS
+
 /* rig: as ih_rig_init made it from the calibration. */
 void ih_health_init(struct ih_health *health, const struct ih_rig *rig);
 
@@ -114,5 +117,7 @@ void ih_health_init(struct ih_health *health, const struct ih_rig *rig);
 bool ih_health_frame(struct ih_health *health, const struct ih_dots *dots,
                      const struct ih_labels *labels, struct ih_rig *rig,
                      struct ih_health_scratch *scratch);
+
+IH_END_DECLS
 
 #endif

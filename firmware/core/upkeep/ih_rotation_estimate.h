@@ -76,6 +76,8 @@ struct ih_rotation_estimate_turn {
                            * for each slot (of a change 0.06 px); 0: none */
 };
 
+IH_BEGIN_DECLS
+
 void ih_rotation_estimate_clear(struct ih_rotation_estimate *places);
 
 /* rig: of the labels, as the slopes are. Dots farther from their line than reach say nothing. */
@@ -111,5 +113,7 @@ void ih_rotation_estimate_turn(struct ih_rotation_estimate *places,
 
 /* What was long ago counts less: the rig may drift. */
 void ih_rotation_estimate_forget(struct ih_rotation_estimate *places);
+
+IH_END_DECLS
 
 #endif

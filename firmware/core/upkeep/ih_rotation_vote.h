@@ -57,6 +57,8 @@ struct ih_rotation_vote_winner {
     int32_t vote, vote_of_none, vote_mean; /* its own, those of no turn at all, all turns' */
 };
 
+IH_BEGIN_DECLS
+
 /* The axes in the camera's X and Y along the middle dot's line, about which a turn is seen best, and
  * across it, about which it is seen worst. */
 void ih_rotation_vote_axes(const struct ih_rig *rig, int32_t axis_q30[2][2]);
@@ -76,5 +78,7 @@ void ih_rotation_vote_vote(const struct ih_dots *dots, const struct ih_rig *rig,
 /* Of equal ones the first. */
 void ih_rotation_vote_elect(const struct ih_rotation_vote_votes *votes, const struct ih_rig *rig,
                             struct ih_rotation_vote_winner *out);
+
+IH_END_DECLS
 
 #endif
