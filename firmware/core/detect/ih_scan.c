@@ -109,7 +109,7 @@ static void look_at(const struct ih_rays *space, const struct ih_scan_params *pa
         }
     }
     scratch->rank[scratch->rank_count++] =
-        rank_of(ih_template_score_q12(space, &scratch->rays, centre_mm_q8), slot);
+        rank_of(ih_template_score_q12(space, &scratch->table, centre_mm_q8), slot);
 }
 
 /* The first seen point of each block of two by two slots. */
@@ -154,7 +154,7 @@ static void widen(const struct ih_rays *space, const struct ih_scan_params *para
 void ih_scan_find(const struct ih_rays *space, const struct ih_scan_params *params,
                   struct ih_scan_scratch *scratch, struct ih_scan *out)
 {
-    ih_template_prepare(space, &scratch->rays);
+    ih_template_prepare(space, &scratch->table);
     out->place_count = 0;
     begin(space, params, scratch, out);
     while (out->place_count < params->place_max) {

@@ -60,7 +60,7 @@ struct ih_scan_scratch {
     uint8_t state[IH_SLOTS];           /* by slot: enum ih_scan_state */
     int32_t rank_count;
     int32_t rank[IH_SLOTS]; /* of what is rated and not out, in no order: rating and slot in one */
-    struct ih_template_rays rays;
+    struct ih_template_table table;
 };
 
 IH_BEGIN_DECLS

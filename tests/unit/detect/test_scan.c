@@ -44,7 +44,7 @@ static void find(void)
 
 static int32_t rating_of(int32_t slot)
 {
-    return ih_template_score_q12(&space, &scratch.rays, scratch.centre_mm_q8[slot]);
+    return ih_template_score_q12(&space, &scratch.table, scratch.centre_mm_q8[slot]);
 }
 
 static bool is_looked_at(int32_t slot)

@@ -11,7 +11,7 @@
 static const double pi = 3.14159265358979323846;
 static const double semi_mm[3] = {78, 113, 98};
 
-static struct ih_template_rays rays;
+static struct ih_template_table table;
 
 void setUp(void)
 {
@@ -24,8 +24,8 @@ void tearDown(void)
 
 static void prepare(void)
 {
-    memset(&rays, IH_TEST_FILL, sizeof rays);
-    ih_template_prepare(&space, &rays);
+    memset(&table, IH_TEST_FILL, sizeof table);
+    ih_template_prepare(&space, &table);
 }
 
 /* Values of rays: those that surely count, and then those that may, too. */
@@ -160,7 +160,7 @@ static double rating_end(const int32_t centre_mm_q8[3], int sign)
 static double check(const int32_t centre_mm_q8[3], int32_t index)
 {
     const double low = rating_end(centre_mm_q8, -1), high = rating_end(centre_mm_q8, 1);
-    const double rating = ih_test_from_q(ih_template_score_q12(&space, &rays, centre_mm_q8), 12);
+    const double rating = ih_test_from_q(ih_template_score_q12(&space, &table, centre_mm_q8), 12);
 
     IH_TEST_WITHIN((high - low) / 2 + 0.0005, (high + low) / 2, rating, "rating", index);
     return high - low;
@@ -342,7 +342,7 @@ static void points_beside_the_limit_of_what_is_open(void)
             see(slot, (1060 << 8) + off * 128);
         }
         prepare();
-        IH_TEST_EQUAL(off > 0 ? 2457 : -1459, ih_template_score_q12(&space, &rays, centre), "open",
+        IH_TEST_EQUAL(off > 0 ? 2457 : -1459, ih_template_score_q12(&space, &table, centre), "open",
                       off);
     }
 }
@@ -362,20 +362,20 @@ static void out_of_the_limits_there_is_no_rating(void)
         for (axis = 0; axis < 3; axis++) {
             centre[axis] = centre_mm[i][axis] * 256;
         }
-        IH_TEST_EQUAL(IH_TEMPLATE_NONE_Q12, ih_template_score_q12(&space, &rays, centre), "centre",
+        IH_TEST_EQUAL(IH_TEMPLATE_NONE_Q12, ih_template_score_q12(&space, &table, centre), "centre",
                       i);
     }
-    IH_TEST_EQUAL(-640, ih_template_score_q12(&space, &rays, ahead), "unknown", 0);
+    IH_TEST_EQUAL(-640, ih_template_score_q12(&space, &table, ahead), "unknown", 0);
     for (slot = 0; slot < IH_SLOTS; slot++) {
         space.ray[slot].slope_y_q20 = 1209000; /* g just below 1 */
     }
     prepare();
-    TEST_ASSERT_TRUE(ih_template_score_q12(&space, &rays, aside) != 0);
+    TEST_ASSERT_TRUE(ih_template_score_q12(&space, &table, aside) != 0);
     for (slot = 0; slot < IH_SLOTS; slot++) {
         space.ray[slot].slope_y_q20 = 1209400;
     }
     prepare();
-    IH_TEST_EQUAL(0, ih_template_score_q12(&space, &rays, aside), "steep rays", 0);
+    IH_TEST_EQUAL(0, ih_template_score_q12(&space, &table, aside), "steep rays", 0);
 }
 
 /* Rays, origins and depths of all sizes. */
@@ -407,7 +407,7 @@ static void random_spaces_are_rated(void)
             const int32_t *point = space.ray[slot].point_mm_q8;
             const int32_t centre[3] = {point[0], point[1], point[2] + (98 << 8)};
 
-            if (ih_template_score_q12(&space, &rays, centre) != IH_TEMPLATE_NONE_Q12) {
+            if (ih_template_score_q12(&space, &table, centre) != IH_TEMPLATE_NONE_Q12) {
                 check(centre, slot);
             }
         }
