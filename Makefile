@@ -28,10 +28,10 @@ LONGRUN_FRAMES ?= 100000
 ARCH ?= arm64
 
 .DEFAULT_GOAL := help
-.PHONY: help sim frames sanitize test fuzz coverage ranges exhaustive mutation accept eval bench \
+.PHONY: help sim frames sanitize test check unit fuzz coverage ranges exhaustive mutation accept eval bench \
   bench-instructions bench-peers bench-grow bench-worst test-bench bits cortexm longrun size vectors learn view figures \
   test-view test-report live-pictures export board board-gpiod2 deb image flash calibrate test-calibration \
-  test-calibration-short test-deb test-board test-image format formatted words lint clean
+  test-calibration-short test-deb test-board test-image format formatted words layout lint clean
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z_-]+:.*## / { \
@@ -66,6 +66,15 @@ sanitize: sim
 test: sanitize ## every test: units against float64, sanitizers, bad input, rules of the core, same bits
 	@cmake --build --preset sanitize --parallel 2
 	@ctest --test-dir $(BUILD)/sanitize --output-on-failure --parallel 2
+
+check: sanitize ## what to run every few minutes: unit tests, bad input, the rules of the tree; three minutes
+	@cmake --build --preset sanitize --parallel 2 --target check_programs
+	@ctest --test-dir $(BUILD)/sanitize --label-regex '^(unit|check)$$' --output-on-failure --parallel 2
+
+unit: sanitize ## one unit test: NAME=dots runs tests/unit/dots/test_dots.c
+	@[ -n "$(NAME)" ] || { echo "make unit NAME=dots: which test of tests/unit?" >&2; exit 2; }
+	@cmake --build --preset sanitize --parallel 2 --target test_$(NAME)
+	@$(BUILD)/sanitize/tests/test_$(NAME)
 
 test-report: sim ## the report page in a browser; pictures of it in build/test_report
 	@tools/setup.sh test-report
@@ -265,9 +274,11 @@ formatted: ## fail when make format would change something
 words: ## old words of our own in names, comments, messages and documents, and the field's words for them
 	@/usr/bin/python3 tests/checks/words.py
 
-lint: sanitize ## clang-tidy, cppcheck, MISRA C, gcc -fanalyzer; what they may find: docs/misra.md
+layout: ## files of at most 520 lines, vectors in simd alone, at most 1,000 files
+	@/usr/bin/python3 tests/checks/layout.py
+
+lint: sanitize layout ## clang-tidy, cppcheck, MISRA C, gcc -fanalyzer; what they may find: docs/misra.md
 	@tools/setup.sh lint
-	@/usr/bin/python3 tests/checks/static.py --self-test > $(BUILD)/static.log || { cat $(BUILD)/static.log; exit 1; }
 	@/usr/bin/python3 tests/checks/static.py $(BUILD)/sanitize
 	@/usr/bin/python3 tests/checks/lint_commands.py $(BUILD)/sanitize $(BUILD)/lint
 	@git ls-files 'firmware/*.c' 'hal/*.c' 'sim/*.c' 'tools/*.c' ':!tools/size' ':!tools/bench/worst_count.c' | \

@@ -697,6 +697,12 @@ def on_terminal(*command):
 
 def check_progress(bench):
     """On a terminal only, and nothing is left of it; standard output is the same."""
+    try:
+        for end in pty.openpty():
+            os.close(end)
+    except OSError as reason:
+        result("progress of calibrate # SKIP no terminal can be opened here, /dev/pts: %s" % reason.strerror)
+        return
     good, made, out = bench.path("rig0", "good"), bench.path("made"), bench.path("from_terminal")
     copy_pictures([(good, range(12))], made)
     for command, steps in [((bench.calibrate, "guide", made), ("looking for the board 0/12",)),

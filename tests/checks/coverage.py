@@ -7,7 +7,6 @@ and is run when any of them ran it.
 
 coverage.py BUILD           after the tests ran in a build with gcc --coverage -O0: the table, what
                             was not run, and exit status 1 below the limits
-coverage.py --self-test     notices an untaken branch and a line that was never reached
 """
 
 import argparse
@@ -17,7 +16,6 @@ import json
 import os
 import subprocess
 import sys
-import tempfile
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 CORE = os.path.join(ROOT, "firmware", "core")
@@ -114,52 +112,11 @@ def check(build):
 
 
 # Run without arguments: neither operand of && is ever false, and the first case is never reached.
-SAMPLE = """int main(int count, char **words)
-{
-    if (count > 0 && words != 0) {
-        switch (count) {
-        case 7:
-            return 1;
-        default:
-            break;
-        }
-    }
-    return 0;
-}
-"""
-SAMPLE_LEFT = ["sample.c:3: 2 of 4", "sample.c:4: 1 of 2", "sample.c:5: never run", "sample.c:6: never run"]
-
-
-def self_test():
-    with tempfile.TemporaryDirectory() as directory:
-        directory = os.path.realpath(directory)
-        with open(os.path.join(directory, "sample.c"), "w", encoding="utf-8") as file:
-            file.write(SAMPLE)
-        subprocess.run(["gcc", "-O0", "--coverage", "sample.c", "-o", "sample"], cwd=directory,
-                       check=True)
-        subprocess.run(["./sample"], cwd=directory, check=True)
-        lines, branches = counts(directory, directory)
-        seen = list(left(lines, branches, directory))
-        for line in seen:
-            print("noticed: " + line)
-        missed = [want for want in SAMPLE_LEFT if not any(line.startswith(want) for line in seen)]
-        if missed or len(seen) != len(SAMPLE_LEFT):
-            print("coverage: MISSED, or too much noticed: expected %s" % SAMPLE_LEFT)
-            return 1
-    return 0
-
-
 def main():
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("build", nargs="?")
-    parser.add_argument("--self-test", action="store_true")
-    arguments = parser.parse_args()
-    if arguments.self_test:
-        return self_test()
-    if not arguments.build:
-        parser.error("name the build")
-    return check(arguments.build)
+    parser.add_argument("build")
+    return check(parser.parse_args().build)
 
 
 if __name__ == "__main__":

@@ -17,8 +17,6 @@ mutation.py [--count N] [--least PERCENT] [--seed N] [--stage NAME]... [--jobs N
             the mutants that live, the table per stage, and exit status 1 when fewer than PERCENT
             of them are caught by tests alone. The mutants are drawn by the seed, of
             each source as many as is its share; a source that was not changed keeps its own.
-mutation.py --self-test
-            finds in a little program mutants of each kind
 """
 
 import argparse
@@ -351,70 +349,6 @@ def is_of_core(test):
     return bool({stem + ".c", "ih_" + stem + ".c", included and os.path.basename(included)} & names)
 
 
-SAMPLE = """#include "ih_sample.h"
-int sample_sum(int count)
-{
-    int sum = 0;
-    for (int i = 0; i < count; i++) {
-        sum += i;
-    }
-    return sum + 0;
-}
-int sample_unused(int value)
-{
-    return value + 3;
-}
-"""
-OTHER = """#include "ih_sample.h"
-int other_half(int value)
-{
-    return value / 2;
-}
-"""
-SAMPLE_HEADER = "int sample_sum(int count);\nint sample_unused(int value);\nint other_half(int value);\n"
-SAMPLE_TEST = """#include "ih_sample.h"
-int main(void)
-{
-    return sample_sum(5) == 10 && other_half(7) == 3 ? 0 : 1;
-}
-"""
-# source, line, what stands there, kind, what instead, the result
-SAMPLE_RESULTS = [
-    ("ih_sample.c", 5, "i < count", "comparison", "<=", "caught"),
-    ("ih_sample.c", 5, "i++", "arithmetic", "--", "caught"),  # runs on
-    ("ih_sample.c", 6, "sum += i", "arithmetic", "-=", "caught"),
-    ("ih_sample.c", 6, "sum += i", "statement", "", "caught"),
-    ("ih_sample.c", 8, "sum + 0", "arithmetic", "-", "equivalent"),
-    ("ih_sample.c", 8, "sum + 0", "constant", "1", "caught"),
-    ("ih_sample.c", 12, "value + 3", "arithmetic", "-", "alive"),
-    ("ih_sample.c", 12, "value + 3", "constant", "2", "alive"),
-    ("ih_other.c", 4, "value / 2", "arithmetic", "*", "caught"),  # by another stage's test
-]
-
-
-def self_test():
-    with tempfile.TemporaryDirectory() as directory:
-        files = {"core/ih_sample.c": SAMPLE, "core/ih_sample.h": SAMPLE_HEADER, "core/ih_other.c": OTHER,
-                 "test_sample.c": SAMPLE_TEST}
-        os.mkdir(os.path.join(directory, "core"))
-        for name, text in files.items():
-            with open(os.path.join(directory, name), "w", encoding="utf-8") as file:
-                file.write(text)
-        bench = Bench(os.path.join(directory, "core"), [os.path.join(directory, "test_sample.c")], None,
-                      os.path.join(directory, "work"))
-        missed = 0
-        for source, at, what, kind, new, expected in SAMPLE_RESULTS:
-            text = SAMPLE if source == "ih_sample.c" else OTHER
-            every = {(sites.line_of(text, m), m.kind, m.new): m for m in sites.mutants(text)}
-            mutant = every.get((at, kind, new))
-            was = try_one(bench, source, mutant)[1][0] if mutant else "not made"
-            missed += was != expected
-            print("%s: %s with %s '%s': %s" % ("right" if was == expected else "MISSED (%s)" % expected,
-                                               what, kind, new, was))
-        print("mutation: %d known mutants, %d wrong" % (len(SAMPLE_RESULTS), missed))
-        return 1 if missed else 0
-
-
 def main():
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -425,10 +359,9 @@ def main():
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--unity", default=os.path.join(ROOT, "build", "third_party", "unity", "src"))
     parser.add_argument("--golden", metavar="FILE", help="frames of golden_pack")
-    parser.add_argument("--self-test", action="store_true")
     arguments = parser.parse_args()
     os.nice(10)
-    return self_test() if arguments.self_test else check(arguments)
+    return check(arguments)
 
 
 if __name__ == "__main__":

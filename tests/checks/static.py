@@ -9,7 +9,6 @@ What they find and is meant to be stands in the tables of docs/misra.md, with it
 read here, nothing is listed twice. Everything else is an error, and so is a row that nothing needs.
 
 static.py BUILD        a folder with compile_commands.json
-static.py --self-test  sees a breach of a rule, a table's row that is not needed, a false free
 """
 
 import argparse
@@ -173,68 +172,11 @@ def check(build):
     return 0
 
 
-SAMPLE = """#include "sample.h"
-int32_t sample(int32_t *room, int32_t count)
-{
-    free(room);
-    if (count > 3)
-        goto end;
-    free(room);
-end:
-    return count;
-}
-int32_t sample_table(void)
-{
-    int32_t table[2] = {1, 2};
-    return table[2];
-}
-"""
-SAMPLE_HEADER = """#include <stdint.h>
-#include <stdlib.h>
-int32_t sample(int32_t *room, int32_t count);
-int32_t sample_table(void);
-"""
-SAMPLE_TABLE = """
-| 15.6 | braces | `sample.c` | `count > 3` | this row is needed |
-| 15.1 | goto | `other.c` | all | this is another file |
-"""
-# The leading words of what must be found; 15.6 must not.
-SAMPLE_FOUND = ["sample.c:6: misra-c2012-15.1", "sample.c:14: arrayIndexOutOfBounds",
-                "sample.c:7: analyzer-double-free"]
-
-
-def self_test():
-    with tempfile.TemporaryDirectory() as directory:
-        directory = os.path.realpath(directory)
-        for name, text in (("sample.c", SAMPLE), ("sample.h", SAMPLE_HEADER)):
-            with open(os.path.join(directory, name), "w", encoding="utf-8") as file:
-                file.write(text)
-        findings = misra(["sample.c"], directory, ".") + cppcheck(["--enable=warning"], ["sample.c"], directory)
-        command = {"command": "gcc -c sample.c -o sample.o", "directory": directory, "file": "sample.c"}
-        findings += findings_of(ANALYZER, analyzed(command), directory)
-        table = rows(SAMPLE_TABLE)
-        open_findings, unneeded = judge(findings, table, directory)
-        missed = [want for want in SAMPLE_FOUND if not any(line.startswith(want) for line in open_findings)]
-        missed += [line for line in open_findings if "15.6" in line]
-        missed += [] if len(unneeded) == 1 and "15.1" in unneeded[0] else ["a row that is not needed"]
-        for line in open_findings + unneeded:
-            print("noticed: " + line)
-        for line in missed:
-            print("MISSED: " + line)
-        return 1 if missed else 0
-
-
 def main():
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("build", nargs="?")
-    parser.add_argument("--self-test", action="store_true")
-    arguments = parser.parse_args()
-    if arguments.self_test:
-        return self_test()
-    if not arguments.build:
-        parser.error("name the build")
-    return check(arguments.build)
+    parser.add_argument("build")
+    return check(parser.parse_args().build)
 
 
 if __name__ == "__main__":

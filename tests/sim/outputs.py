@@ -34,7 +34,11 @@ def test_lines(program, folder):
 
 def test_progress(program, folder):
     ok(run(program, "--json", folder).stderr.count("\r") == 0, "no progress in a pipe")
-    ours, theirs = pty.openpty()
+    try:
+        ours, theirs = pty.openpty()
+    except OSError as reason:
+        ok(True, "progress on a terminal # SKIP no terminal can be opened here, /dev/pts: %s" % reason.strerror)
+        return
     with open(os.devnull, "w", encoding="utf-8") as null:
         process = subprocess.Popen([program, "--json", folder], stdout=null, stderr=theirs)
     os.close(theirs)
