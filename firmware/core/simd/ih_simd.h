@@ -180,6 +180,43 @@ static inline ih_u64 ih_u64_shift_right(ih_u64 a, int bits)
     return a >> bits;
 }
 
+/* Each lane shifted by its own count, below 32. One instruction where IH_SIMD_LANE_SHIFTS is 1. */
+static inline ih_u32 ih_u32_shift_left_each(ih_u32 a, ih_u32 bits)
+{
+    return a << bits;
+}
+
+static inline ih_u32 ih_u32_shift_right_each(ih_u32 a, ih_u32 bits)
+{
+    return a >> bits;
+}
+
+/* A 64-bit number for each lane of 32 bits. Which member holds which lane is the back end's own matter. */
+struct ih_wide {
+    ih_i64 a, b;
+};
+
+static inline struct ih_wide ih_wide_all(int64_t value)
+{
+    return (struct ih_wide){ih_i64_all(value), ih_i64_all(value)};
+}
+
+static inline struct ih_wide ih_wide_add(struct ih_wide x, struct ih_wide y)
+{
+    return (struct ih_wide){ih_i64_add(x.a, y.a), ih_i64_add(x.b, y.b)};
+}
+
+/* Zeros come in from the left. */
+static inline struct ih_wide ih_wide_shift_right(struct ih_wide x, int bits)
+{
+    return (struct ih_wide){(ih_i64)((ih_u64)x.a >> bits), (ih_i64)((ih_u64)x.b >> bits)};
+}
+
+/* Two vectors of 32 bits: neighbours of a table. */
+struct ih_u32_neighbours {
+    ih_u32 value, next;
+};
+
 #if defined __AVX2__
 #include "simd/ih_simd_avx2.h"
 #elif defined __SSE2__
@@ -192,6 +229,28 @@ static inline ih_u64 ih_u64_shift_right(ih_u64 a, int bits)
 static inline ih_i16 ih_i16_clamp(ih_i16 value, int16_t limit)
 {
     return ih_i16_max(ih_i16_min(value, ih_i16_all(limit)), ih_i16_all((int16_t)-limit));
+}
+
+/* Add each number to an array. */
+static inline void ih_wide_add_to(int64_t *to, struct ih_wide x)
+{
+    int64_t *next = &to[IH_I64_LANES];
+    const struct ih_wide ordered = ih_wide_in_order(x);
+    ih_i64_store(to, ih_i64_add(ih_i64_load(to), ordered.a));
+    ih_i64_store(next, ih_i64_add(ih_i64_load(next), ordered.b));
+}
+
+static inline void ih_wide_store(int64_t *to, struct ih_wide x)
+{
+    const struct ih_wide ordered = ih_wide_in_order(x);
+    ih_i64_store(to, ordered.a);
+    ih_i64_store(&to[IH_I64_LANES], ordered.b);
+}
+
+/* Sum of all numbers. */
+static inline int64_t ih_wide_total(struct ih_wide x)
+{
+    return ih_i64_total(ih_i64_add(x.a, x.b));
 }
 
 #endif

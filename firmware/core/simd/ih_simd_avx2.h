@@ -74,4 +74,106 @@ static inline int32_t ih_i16_total(ih_i16 a)
     return ih_i32_total(ih_i16_madd_pairs(a, ih_i16_all(1)));
 }
 
+/* Shifts of each lane by its own count and look-ups are instructions. */
+#define IH_SIMD_LANE_SHIFTS 1
+
+/* Sums of madd_pairs. */
+struct ih_pair_sums {
+    ih_i32 sum;
+};
+
+static inline struct ih_pair_sums ih_pair_sums_first(ih_i16 a, ih_i16 b)
+{
+    return (struct ih_pair_sums){ih_i16_madd_pairs(a, b)};
+}
+
+static inline struct ih_pair_sums ih_pair_sums_add(struct ih_pair_sums sums, ih_i16 a, ih_i16 b)
+{
+    return (struct ih_pair_sums){ih_i32_add(sums.sum, ih_i16_madd_pairs(a, b))};
+}
+
+static inline ih_i32 ih_pair_sums_total(struct ih_pair_sums sums)
+{
+    return sums.sum;
+}
+
+/* Here a has the even lanes of 32 bits and b the odd ones. */
+static inline ih_i32 ih_i32_odd(ih_i32 a)
+{
+    return (ih_i32)_mm256_shuffle_epi32((__m256i)a, 0xf5);
+}
+
+/* Whole products. */
+static inline struct ih_wide ih_i32_mul_wide(ih_i32 a, ih_i32 b)
+{
+    return (struct ih_wide){ih_i32_mul_even(a, b), ih_i32_mul_even(ih_i32_odd(a), ih_i32_odd(b))};
+}
+
+static inline struct ih_wide ih_u32_mul_wide(ih_u32 a, ih_u32 b)
+{
+    const ih_u32 a_odd = (ih_u32)ih_i32_odd((ih_i32)a), b_odd = (ih_u32)ih_i32_odd((ih_i32)b);
+    return (struct ih_wide){(ih_i64)ih_u32_mul_even(a, b), (ih_i64)ih_u32_mul_even(a_odd, b_odd)};
+}
+
+/* The lower halves, in the order of the lanes. */
+static inline ih_u32 ih_wide_low(struct ih_wide x)
+{
+    return (ih_u32)_mm256_blend_epi32((__m256i)x.a, _mm256_slli_epi64((__m256i)x.b, 32), 0xaa);
+}
+
+/* The numbers in the order of the lanes. */
+static inline struct ih_wide ih_wide_in_order(struct ih_wide x)
+{
+    const __m256i first = _mm256_unpacklo_epi64((__m256i)x.a, (__m256i)x.b); /* 0 1, 4 5 */
+    const __m256i last = _mm256_unpackhi_epi64((__m256i)x.a, (__m256i)x.b);  /* 2 3, 6 7 */
+    return (struct ih_wide){(ih_i64)_mm256_permute2x128_si256(first, last, 0x20),
+                            (ih_i64)_mm256_permute2x128_si256(first, last, 0x31)};
+}
+
+static inline int64_t ih_i64_total(ih_i64 a)
+{
+    const __m128i two =
+        _mm_add_epi64(_mm256_castsi256_si128((__m256i)a), _mm256_extracti128_si256((__m256i)a, 1));
+    return _mm_cvtsi128_si64(_mm_add_epi64(two, _mm_unpackhi_epi64(two, two)));
+}
+
+/* Sums of whole products. */
+struct ih_wide_sums {
+    struct ih_wide sum;
+};
+
+static inline struct ih_wide_sums ih_wide_sums_zero(void)
+{
+    return (struct ih_wide_sums){ih_wide_all(0)};
+}
+
+/* Add a * b; a below 2^31. */
+static inline struct ih_wide_sums ih_wide_sums_add(struct ih_wide_sums sums, ih_u32 a, ih_i32 b)
+{
+    return (struct ih_wide_sums){ih_wide_add(sums.sum, ih_i32_mul_wide((ih_i32)a, b))};
+}
+
+static inline struct ih_wide ih_wide_sums_total(struct ih_wide_sums sums)
+{
+    return sums.sum;
+}
+
+/* table[at] and table[at + 1] of each lane. */
+static inline struct ih_u32_neighbours ih_u32_look_up(const uint32_t *table, ih_u32 at)
+{
+    return (struct ih_u32_neighbours){
+        (ih_u32)_mm256_i32gather_epi32((const int *)table, (__m256i)at, 4),
+        (ih_u32)_mm256_i32gather_epi32((const int *)&table[1], (__m256i)at, 4)};
+}
+
+/* Half of the leading zeros, rounded down, of 2^18 .. 2^31 - 1. There is no instruction for it. */
+static inline ih_u32 ih_u32_zero_pairs(ih_u32 a)
+{
+    ih_i32 pairs = ih_i32_all(6);
+    for (int bit = 20; bit <= 30; bit += 2) {
+        pairs = ih_i32_add(pairs, (ih_i32)a > ih_i32_all((1 << bit) - 1));
+    }
+    return (ih_u32)pairs;
+}
+
 #endif

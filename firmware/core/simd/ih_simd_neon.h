@@ -87,4 +87,101 @@ static inline int32_t ih_i16_total(ih_i16 a)
     return ih_i32_total((ih_i32)vpaddlq_s16((int16x8_t)a));
 }
 
+#define IH_SIMD_LANE_SHIFTS 1
+
+/* The first half of the lanes and the second: their sums of pairs are added once, at the end. */
+struct ih_pair_sums {
+    int32x4_t first, second;
+};
+
+static inline struct ih_pair_sums ih_pair_sums_first(ih_i16 a, ih_i16 b)
+{
+    const int16x8_t x = (int16x8_t)a, y = (int16x8_t)b;
+    return (struct ih_pair_sums){vmull_s16(vget_low_s16(x), vget_low_s16(y)),
+                                 vmull_s16(vget_high_s16(x), vget_high_s16(y))};
+}
+
+static inline struct ih_pair_sums ih_pair_sums_add(struct ih_pair_sums sums, ih_i16 a, ih_i16 b)
+{
+    const int16x8_t x = (int16x8_t)a, y = (int16x8_t)b;
+    return (struct ih_pair_sums){vmlal_s16(sums.first, vget_low_s16(x), vget_low_s16(y)),
+                                 vmlal_s16(sums.second, vget_high_s16(x), vget_high_s16(y))};
+}
+
+static inline ih_i32 ih_pair_sums_total(struct ih_pair_sums sums)
+{
+#ifdef __aarch64__
+    return (ih_i32)vpaddq_s32(sums.first, sums.second);
+#else
+    return (ih_i32)vcombine_s32(vpadd_s32(vget_low_s32(sums.first), vget_high_s32(sums.first)),
+                                vpadd_s32(vget_low_s32(sums.second), vget_high_s32(sums.second)));
+#endif
+}
+
+/* Here a has the first half of the lanes of 32 bits and b the second. */
+static inline struct ih_wide ih_i32_mul_wide(ih_i32 a, ih_i32 b)
+{
+    const int32x4_t x = (int32x4_t)a, y = (int32x4_t)b;
+    return (struct ih_wide){(ih_i64)vmull_s32(vget_low_s32(x), vget_low_s32(y)),
+                            (ih_i64)vmull_s32(vget_high_s32(x), vget_high_s32(y))};
+}
+
+static inline struct ih_wide ih_u32_mul_wide(ih_u32 a, ih_u32 b)
+{
+    const uint32x4_t x = (uint32x4_t)a, y = (uint32x4_t)b;
+    return (struct ih_wide){(ih_i64)vmull_u32(vget_low_u32(x), vget_low_u32(y)),
+                            (ih_i64)vmull_u32(vget_high_u32(x), vget_high_u32(y))};
+}
+
+static inline ih_u32 ih_wide_low(struct ih_wide x)
+{
+    return (ih_u32)vcombine_s64((int64x1_t)vmovn_s64((int64x2_t)x.a),
+                                (int64x1_t)vmovn_s64((int64x2_t)x.b));
+}
+
+static inline struct ih_wide ih_wide_in_order(struct ih_wide x)
+{
+    return x;
+}
+
+static inline int64_t ih_i64_total(ih_i64 a)
+{
+    return (int64_t)(vgetq_lane_u64((uint64x2_t)a, 0) + vgetq_lane_u64((uint64x2_t)a, 1));
+}
+
+struct ih_wide_sums {
+    struct ih_wide sum;
+};
+
+static inline struct ih_wide_sums ih_wide_sums_zero(void)
+{
+    return (struct ih_wide_sums){ih_wide_all(0)};
+}
+
+static inline struct ih_wide_sums ih_wide_sums_add(struct ih_wide_sums sums, ih_u32 a, ih_i32 b)
+{
+    const int32x4_t x = (int32x4_t)a, y = (int32x4_t)b;
+    return (struct ih_wide_sums){
+        {(ih_i64)vmlal_s32((int64x2_t)sums.sum.a, vget_low_s32(x), vget_low_s32(y)),
+         (ih_i64)vmlal_s32((int64x2_t)sums.sum.b, vget_high_s32(x), vget_high_s32(y))}};
+}
+
+static inline struct ih_wide ih_wide_sums_total(struct ih_wide_sums sums)
+{
+    return sums.sum;
+}
+
+static inline struct ih_u32_neighbours ih_u32_look_up(const uint32_t *table, ih_u32 at)
+{
+    const uint32x4_t first = vcombine_u32(vld1_u32(&table[at[0]]), vld1_u32(&table[at[1]]));
+    const uint32x4_t last = vcombine_u32(vld1_u32(&table[at[2]]), vld1_u32(&table[at[3]]));
+    const uint32x4x2_t both = vuzpq_u32(first, last);
+    return (struct ih_u32_neighbours){(ih_u32)both.val[0], (ih_u32)both.val[1]};
+}
+
+static inline ih_u32 ih_u32_zero_pairs(ih_u32 a)
+{
+    return (ih_u32)vclzq_u32((uint32x4_t)a) >> 1;
+}
+
 #endif

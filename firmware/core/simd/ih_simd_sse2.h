@@ -68,4 +68,86 @@ static inline int32_t ih_i16_total(ih_i16 a)
     return ih_i32_total(ih_i16_madd_pairs(a, ih_i16_all(1)));
 }
 
+#define IH_SIMD_LANE_SHIFTS 0
+
+struct ih_pair_sums {
+    ih_i32 sum;
+};
+
+static inline struct ih_pair_sums ih_pair_sums_first(ih_i16 a, ih_i16 b)
+{
+    return (struct ih_pair_sums){ih_i16_madd_pairs(a, b)};
+}
+
+static inline struct ih_pair_sums ih_pair_sums_add(struct ih_pair_sums sums, ih_i16 a, ih_i16 b)
+{
+    return (struct ih_pair_sums){ih_i32_add(sums.sum, ih_i16_madd_pairs(a, b))};
+}
+
+static inline ih_i32 ih_pair_sums_total(struct ih_pair_sums sums)
+{
+    return sums.sum;
+}
+
+/* Here a has the even lanes of 32 bits and b the odd ones. */
+static inline ih_u32 ih_u32_odd(ih_u32 a)
+{
+    return (ih_u32)_mm_srli_epi64((__m128i)a, 32);
+}
+
+static inline struct ih_wide ih_u32_mul_wide(ih_u32 a, ih_u32 b)
+{
+    return (struct ih_wide){(ih_i64)ih_u32_mul_even(a, b),
+                            (ih_i64)ih_u32_mul_even(ih_u32_odd(a), ih_u32_odd(b))};
+}
+
+static inline struct ih_wide ih_i32_mul_wide(ih_i32 a, ih_i32 b)
+{
+    return (struct ih_wide){ih_i32_mul_even(a, b), ih_i32_mul_even((ih_i32)ih_u32_odd((ih_u32)a),
+                                                                   (ih_i32)ih_u32_odd((ih_u32)b))};
+}
+
+static inline ih_u32 ih_wide_low(struct ih_wide x)
+{
+    return ((ih_u32)x.a & (ih_u32)ih_i64_all(UINT32_MAX)) |
+           (ih_u32)_mm_slli_epi64((__m128i)x.b, 32);
+}
+
+static inline struct ih_wide ih_wide_in_order(struct ih_wide x)
+{
+    return (struct ih_wide){(ih_i64)_mm_unpacklo_epi64((__m128i)x.a, (__m128i)x.b),
+                            (ih_i64)_mm_unpackhi_epi64((__m128i)x.a, (__m128i)x.b)};
+}
+
+static inline int64_t ih_i64_total(ih_i64 a)
+{
+    int64_t lane[2];
+    ih_i64_store(lane, a);
+    return (int64_t)((uint64_t)lane[0] + (uint64_t)lane[1]);
+}
+
+/* Products without sign, and what they are too large by where b is negative: a times 2^32. */
+struct ih_wide_sums {
+    struct ih_wide sum;
+    ih_i32 excess;
+};
+
+static inline struct ih_wide_sums ih_wide_sums_zero(void)
+{
+    return (struct ih_wide_sums){ih_wide_all(0), ih_i32_all(0)};
+}
+
+static inline struct ih_wide_sums ih_wide_sums_add(struct ih_wide_sums sums, ih_u32 a, ih_i32 b)
+{
+    return (struct ih_wide_sums){ih_wide_add(sums.sum, ih_u32_mul_wide(a, (ih_u32)b)),
+                                 ih_i32_add(sums.excess, (b >> 31) & (ih_i32)a)};
+}
+
+static inline struct ih_wide ih_wide_sums_total(struct ih_wide_sums sums)
+{
+    const ih_i64 even = (ih_i64)_mm_slli_epi64((__m128i)sums.excess, 32);
+    const ih_i64 odd = (ih_i64)sums.excess & ih_i64_all(-((int64_t)1 << 32));
+    return (struct ih_wide){ih_i64_sub(sums.sum.a, even), ih_i64_sub(sums.sum.b, odd)};
+}
+
 #endif
