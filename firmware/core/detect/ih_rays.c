@@ -5,7 +5,7 @@
 
 #include "base/ih_fix.h"
 #include "base/ih_range.h"
-#include "surface/ih_samples.h"
+#include "points/ih_near_depth.h"
 
 void ih_rays_params_default(struct ih_rays_params *params)
 {
@@ -34,7 +34,7 @@ void ih_rays_make(const struct ih_points *points, const struct ih_dots *dots,
                   struct ih_rays *out)
 {
     bool is_range = rig->calibration.kind == IH_RIG_RANGE;
-    int32_t probe_mm_q8 = ih_samples_near_mm_q8(points) + (params->probe_mm << 8);
+    int32_t probe_mm_q8 = ih_near_depth_mm_q8(points) + (params->probe_mm << 8);
     for (int axis = 0; axis < 3; axis++) {
         out->origin_mm_q8[axis] =
             is_range ? 0 : (int32_t)ih_shift_round(rig->calibration.origin_mm_q16[axis], 8);

@@ -7,7 +7,7 @@
  *        image): at the depth Z it is at origin + (Z - origin_z) (slope_x, slope_y, 1). A seen
  *        point is where the camera saw it: its place times its depth. A dot that is missing is
  *        "empty" when a surface near by would have shown it: its place, probe_mm behind the 8th
- *        percentile of the seen depths (as in ih_samples; 0 when nothing was seen), is inside the
+ *        percentile of the seen depths (ih_near_depth; 0 when nothing was seen), is inside the
  *        picture and not over-exposed. A missing point of a range image is always "empty":
  *        ih_points says "unknown" where it may only be outside.
  * Overflow: a slope is 2^22, a depth 2^22 in Q8 and a place 2^31 in Q28: points below 2^25.

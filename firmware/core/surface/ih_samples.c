@@ -4,8 +4,8 @@
 
 #include "base/ih_fix.h"
 #include "base/ih_range.h"
+#include "points/ih_near_depth.h"
 
-#define PERCENTILE 8
 #define ISOLATED_NEIGHBOURS_MIN 3
 #define ISOLATED_FRIENDS_MAX 1
 
@@ -18,53 +18,6 @@ void ih_samples_params_default(struct ih_samples_params *params)
         .fill_neighbours = 3,
         .fill_root_weight_q15 = 17948, /* sqrt(0.3) */
     };
-}
-
-/* Depths are looked at seven bits at a time, the highest first, of which there are eight: 64 mm, which few share of
- * those that are near. Those that differ there are left out of the rest. */
-#define DIGIT_BITS 7
-#define DIGITS_MAX 256
-
-_Static_assert(IH_DEPTH_MAX_MM << 8 < DIGITS_MAX << (2 * DIGIT_BITS), "depths have three digits");
-
-/* The digit at a shift of the depth of a rank, from 0, among those given, which begin as it does. Those that have the
- * digit stay, and the rank becomes that among them. No depth is negative. */
-static uint32_t next_digit(uint32_t depth_mm_q8[IH_SLOTS], int32_t *depth_count, uint32_t begin,
-                           int shift, int32_t *rank)
-{
-    uint16_t count[DIGITS_MAX] = {0};
-    const uint32_t first = begin << DIGIT_BITS;
-    for (int32_t i = 0; i < *depth_count; i++) {
-        count[(depth_mm_q8[i] >> shift) - first]++;
-    }
-    uint32_t digit = 0;
-    while (digit < DIGITS_MAX - 1 && *rank >= count[digit]) {
-        *rank -= count[digit++];
-    }
-    int32_t kept = 0;
-    for (int32_t i = 0; i < *depth_count; i++) {
-        const uint32_t depth = depth_mm_q8[i];
-        depth_mm_q8[kept] = depth;
-        kept += depth >> shift == first + digit;
-    }
-    *depth_count = kept;
-    return first + digit;
-}
-
-int32_t ih_samples_near_mm_q8(const struct ih_points *points)
-{
-    uint32_t seen_mm_q8[IH_SLOTS];
-    int32_t count = 0;
-    for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
-        seen_mm_q8[count] = (uint32_t)points->point[slot].depth_mm_q8;
-        count += points->point[slot].state == IH_POINT_SEEN;
-    }
-    uint32_t depth_mm_q8 = 0;
-    int32_t rank = count * PERCENTILE / 100;
-    for (int shift = 2 * DIGIT_BITS; count > 0 && shift >= 0; shift -= DIGIT_BITS) {
-        depth_mm_q8 = next_digit(seen_mm_q8, &count, depth_mm_q8, shift, &rank);
-    }
-    return (int32_t)depth_mm_q8;
 }
 
 /* From the least to the most, both included. */
@@ -218,7 +171,7 @@ void ih_samples_select(const struct ih_points *points, const struct ih_dots *dot
     out->isolated_count = 0;
     out->outside_count = 0;
     out->nearest_mm_q8 = INT32_MAX;
-    out->clip_mm_q8 = ih_samples_near_mm_q8(points) + (params->clip_behind_mm << 8);
+    out->clip_mm_q8 = ih_near_depth_mm_q8(points) + (params->clip_behind_mm << 8);
     if (rig->calibration.kind == IH_RIG_DOTS) {
         out->clip_mm_q8 = ih_max_s32(out->clip_mm_q8, params->clip_min_mm << 8);
     }

@@ -59,9 +59,6 @@ IH_BEGIN_DECLS
 
 void ih_samples_params_default(struct ih_samples_params *params);
 
-/* The 8th percentile of the seen depths: what is near. 0 when nothing was seen. */
-int32_t ih_samples_near_mm_q8(const struct ih_points *points);
-
 void ih_samples_select(const struct ih_points *points, const struct ih_dots *dots,
                        const struct ih_rig *rig, const struct ih_samples_params *params,
                        struct ih_samples *out);

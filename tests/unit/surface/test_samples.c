@@ -348,30 +348,6 @@ static void nothing_seen_and_nothing_known_gives_nothing(void)
     TEST_ASSERT_EQUAL_INT32(params.clip_min_mm << 8, samples.clip_mm_q8);
 }
 
-/* 8 in 100 points are nearer than it; alone it is the point itself. */
-static void the_nearest_is_a_percentile(void)
-{
-    int32_t slot, count, nearer, near;
-
-    for (count = 0; count <= 60; count++) {
-        for (slot = 0; slot < IH_SLOTS; slot++) {
-            set_missing(slot);
-        }
-        for (slot = 0; slot < count; slot++) { /* in no order: 37 n modulo 61 is each number once */
-            points.point[slot * 5].state = IH_POINT_SEEN;
-            set_depth(slot * 5, 1000 + slot * 37 % 61);
-        }
-        nearer = 0;
-        near = ih_samples_near_mm_q8(&points) >> 8;
-        for (slot = 0; slot < count; slot++) {
-            nearer += 1000 + slot * 37 % 61 < near;
-        }
-        IH_TEST_EQUAL(count * 8 / 100, nearer, "nearer", count);
-        IH_TEST_EQUAL(near << 8, ih_samples_near_mm_q8(&points), "a point's own depth", count);
-        IH_TEST_EQUAL(count == 0, near == 0, "of none", count);
-    }
-}
-
 static void what_is_too_far_from_the_field_is_dropped(void)
 {
     const int32_t unit = vector_field.unit_q28;
@@ -420,7 +396,6 @@ int main(void)
     RUN_TEST(without_weight_nothing_is_filled);
     RUN_TEST(places_outside_the_picture_are_not_filled);
     RUN_TEST(nothing_seen_and_nothing_known_gives_nothing);
-    RUN_TEST(the_nearest_is_a_percentile);
     RUN_TEST(what_is_too_far_from_the_field_is_dropped);
     RUN_TEST(a_range_rig_fills_at_the_lattice_point);
     return UNITY_END();
