@@ -44,12 +44,12 @@ static void copy_stretch(const struct ih_arcs *parts, int32_t from, int32_t to, 
     }
 }
 
-/* scratch->parts are the contour's. False: the slice's part is not of this contour. */
+/* scratch->arcs are the contour's. False: the slice's part is not of this contour. */
 static bool find_part(struct ih_nests_scratch *scratch, const struct ih_nest *nest,
                       const struct ih_slice *slice, const struct ih_ellipse_params *params,
                       struct part *out)
 {
-    const struct ih_arcs *parts = &scratch->parts;
+    const struct ih_arcs *parts = &scratch->arcs;
     struct ih_ellipse ellipse;
     if (!ih_ellipse_of_part(parts, nest->minimum, params, &scratch->ellipse, &ellipse) ||
         !is_same(&ellipse, &slice->ellipse)) {
@@ -85,8 +85,8 @@ static void write_parts(struct app_write *write, struct isohead *head,
 {
     struct ih_nests_scratch *scratch = &head->scratch.nests;
     const struct ih_ellipse_params *params = &head->params.nests.ellipse;
-    const struct ih_box box = ih_arcs_box(&scratch->cuts, contour);
-    const bool is_searched = ih_arcs_make(&scratch->cuts, contour, params, &scratch->parts);
+    const struct ih_box box = ih_arcs_box(&scratch->contours, contour);
+    const bool is_searched = ih_arcs_make(&scratch->contours, contour, params, &scratch->arcs);
     struct part part;
     app_write_key(write, "part");
     app_write_open(write, '[');
@@ -95,7 +95,7 @@ static void write_parts(struct app_write *write, struct isohead *head,
         for (int32_t k = 0; k < nest->slice_count; k++) {
             const struct ih_slice *slice = &nest->slice[k];
             if (!slice->whole &&
-                nest->front_mm_q8 + slice->behind_mm_q8 == scratch->cuts.level_mm_q8 &&
+                nest->front_mm_q8 + slice->behind_mm_q8 == scratch->contours.level_mm_q8 &&
                 ih_box_holds(&box, nest->minimum) &&
                 find_part(scratch, nest, slice, params, &part)) {
                 app_write_open(write, '{');
@@ -115,14 +115,15 @@ static void write_contour(struct app_write *write, struct isohead *head,
     app_write_open(write, '{');
     app_write_key(write, "closed");
     app_write_bool(write, contour->closed);
-    write_vertices(write, &head->scratch.nests.cuts.vertex[contour->first], contour->vertex_count);
+    write_vertices(write, &head->scratch.nests.contours.vertex[contour->first],
+                   contour->vertex_count);
     write_parts(write, head, contour);
     app_write_close(write, '}');
 }
 
 void sim_trace_cuts(struct app_write *write, struct isohead *head)
 {
-    struct ih_contours *cuts = &head->scratch.nests.cuts;
+    struct ih_contours *cuts = &head->scratch.nests.contours;
     int32_t level_mm_q8 = 0;
     app_write_key(write, "cuts");
     app_write_open(write, '[');

@@ -112,7 +112,7 @@ static void write_level(struct app_write *write, const struct isohead *head,
 
 static void write_contours(struct app_write *write, struct isohead *head, void (*rest)(void))
 {
-    struct ih_contours *cuts = &head->scratch.nests.cuts;
+    struct ih_contours *cuts = &head->scratch.nests.contours;
     int32_t level_mm_q8 = 0;
     app_write_key(write, "contours");
     app_write_open(write, '[');

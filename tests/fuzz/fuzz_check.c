@@ -162,7 +162,7 @@ static void check_slice(const struct ih_nest *nest, int32_t index,
     const struct ih_slice *slice = &nest->slice[index];
     const struct ih_ellipse *ellipse = &slice->ellipse;
     int32_t ratio_max =
-        slice->whole ? params->ellipse.ratio_closed_max_q16 : params->ellipse.ratio_part_max_q16;
+        slice->whole ? params->ellipse.ratio_closed_max_q16 : params->ellipse.ratio_arc_max_q16;
     FUZZ_CHECK(ellipse->area_q16 > 0 && slice->area_mm2 >= 0);
     FUZZ_CHECK(index > 0 || slice->area_mm2 >= params->blunt_mm2);
     FUZZ_CHECK(ellipse->shape_q16 <= params->ellipse.shape_max_q16);

@@ -96,7 +96,7 @@ static void cut(struct fuzz_input *input, const struct ih_surface *surface,
         if (ih_arcs_make(&cuts, contour, params, &parts) &&
             ih_ellipse_of_part(&parts, place, params, &scratch, &ellipse)) {
             FUZZ_CHECK(ellipse.area_q16 > 0 && ellipse.shape_q16 <= params->shape_max_q16);
-            FUZZ_CHECK(ellipse.ratio_q16 <= params->ratio_part_max_q16);
+            FUZZ_CHECK(ellipse.ratio_q16 <= params->ratio_arc_max_q16);
         }
     }
 }

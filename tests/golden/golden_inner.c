@@ -69,7 +69,7 @@ static uint64_t add_ellipses(uint64_t hash, const struct ih_contours *cuts)
 
 static void hash_levels(struct isohead *head, uint64_t hash[GOLDEN_INNERS])
 {
-    struct ih_contours *cuts = &head->scratch.nests.cuts;
+    struct ih_contours *cuts = &head->scratch.nests.contours;
     int32_t level_mm_q8 = 0;
     for (int32_t i = 0; ih_nests_level(&head->surface, &head->params.nests, i, &level_mm_q8); i++) {
         ih_contours_level(&head->surface, level_mm_q8, cuts);

@@ -744,7 +744,7 @@ static void defaults_are_those_of_the_references(void)
     TEST_ASSERT_EQUAL_INT32(lround(1e-5 * (1 << 30)), params.surface.ridge_q30);
     TEST_ASSERT_EQUAL_INT32(60, params.surface.huber_mm);
     TEST_ASSERT_EQUAL_INT32(lround(1.045 * 65536), params.nests.ellipse.shape_max_q16);
-    TEST_ASSERT_EQUAL_INT32(lround(1.75 * 65536), params.nests.ellipse.ratio_part_max_q16);
+    TEST_ASSERT_EQUAL_INT32(lround(1.75 * 65536), params.nests.ellipse.ratio_arc_max_q16);
     TEST_ASSERT_EQUAL_INT32(lround(0.42 * 65536), params.nests.ellipse.chord_max_q16);
     TEST_ASSERT_EQUAL_INT32(100, params.detections.space.probe_mm);
     TEST_ASSERT_EQUAL_INT32(98, params.detections.scan.deep_mm);

@@ -115,10 +115,10 @@ static int32_t half_q9(int32_t value_q9)
     return (int32_t)ih_shift_round(value_q9, 1);
 }
 
-static struct ih_moments contour_moments(const struct ih_contours *cuts,
+static struct ih_moments contour_moments(const struct ih_contours *contours,
                                          const struct ih_contour *contour, struct ih_vertex place)
 {
-    const struct ih_vertex *vertex = &cuts->vertex[contour->first];
+    const struct ih_vertex *vertex = &contours->vertex[contour->first];
     struct ih_moments m = {0};
     for (int32_t i = 0; i < contour->vertex_count; i++) {
         struct ih_vertex p = vertex[i];
@@ -129,20 +129,20 @@ static struct ih_moments contour_moments(const struct ih_contours *cuts,
     return m;
 }
 
-bool ih_ellipse_of_contour(const struct ih_contours *cuts, const struct ih_contour *contour,
+bool ih_ellipse_of_contour(const struct ih_contours *contours, const struct ih_contour *contour,
                            struct ih_ellipse *out)
 {
-    struct ih_vertex place = cuts->vertex[contour->first];
+    struct ih_vertex place = contours->vertex[contour->first];
     place.x_q9 = (int16_t)(place.x_q9 & ~1); /* a whole Q8 number */
     place.y_q9 = (int16_t)(place.y_q9 & ~1);
-    struct ih_moments m = contour_moments(cuts, contour, place);
+    struct ih_moments m = contour_moments(contours, contour, place);
     return ellipse_of_moments(&m, place.x_q9 / 2, place.y_q9 / 2, out) && set_ratio(out);
 }
 
-int32_t ih_ellipse_winding(const struct ih_contours *cuts, const struct ih_contour *contour,
+int32_t ih_ellipse_winding(const struct ih_contours *contours, const struct ih_contour *contour,
                            struct ih_vertex place)
 {
-    const struct ih_vertex *vertex = &cuts->vertex[contour->first];
+    const struct ih_vertex *vertex = &contours->vertex[contour->first];
     struct ih_vertex p = vertex[contour->vertex_count - 1];
     int32_t winding = 0;
     for (int32_t i = 0; i < contour->vertex_count; i++) {
@@ -159,22 +159,21 @@ struct spot {
     int32_t x_q8, y_q8;
 };
 
-static struct spot seen_from(const struct ih_arcs *parts, int32_t k, struct ih_vertex place)
+static struct spot seen_from(const struct ih_arcs *arcs, int32_t k, struct ih_vertex place)
 {
-    return (struct spot){parts->x_q8[k] - half_q9(place.x_q9),
-                         parts->y_q8[k] - half_q9(place.y_q9)};
+    return (struct spot){arcs->x_q8[k] - half_q9(place.x_q9), arcs->y_q8[k] - half_q9(place.y_q9)};
 }
 
-static void accumulate_winding(const struct ih_arcs *parts, struct ih_vertex place,
+static void accumulate_winding(const struct ih_arcs *arcs, struct ih_vertex place,
                                struct ih_ellipse_scratch *scratch)
 {
     const int32_t y_q8 = half_q9(place.y_q9);
     int32_t winding = 0;
-    bool was_above = parts->y_q8[0] <= y_q8;
-    for (int32_t k = 0; k < parts->count; k++) {
-        const bool is_above = parts->y_q8[k] <= y_q8;
+    bool was_above = arcs->y_q8[0] <= y_q8;
+    for (int32_t k = 0; k < arcs->count; k++) {
+        const bool is_above = arcs->y_q8[k] <= y_q8;
         if (is_above != was_above) { /* else nothing is crossed */
-            const struct spot p = seen_from(parts, k - 1, place), q = seen_from(parts, k, place);
+            const struct spot p = seen_from(arcs, k - 1, place), q = seen_from(arcs, k, place);
             winding += winding_of_edge(p.x_q8, p.y_q8, q.x_q8, q.y_q8);
             was_above = is_above;
         }
@@ -182,13 +181,13 @@ static void accumulate_winding(const struct ih_arcs *parts, struct ih_vertex pla
     }
 }
 
-/* Does the part, closed by its chord, wind round the place once? */
-static bool winds_round(const struct ih_arcs *parts, const struct ih_arc *part,
+/* Does the arc, closed by its chord, wind round the place once? */
+static bool winds_round(const struct ih_arcs *arcs, const struct ih_arc *arc,
                         struct ih_vertex place, const struct ih_ellipse_scratch *scratch)
 {
-    const int32_t from = part->from, to = part->from + part->steps;
-    const struct spot p = seen_from(parts, to, place);
-    const struct spot q = seen_from(parts, from, place);
+    const int32_t from = arc->from, to = arc->from + arc->steps;
+    const struct spot p = seen_from(arcs, to, place);
+    const struct spot q = seen_from(arcs, from, place);
     return scratch->winding[to] - scratch->winding[from] +
                winding_of_edge(p.x_q8, p.y_q8, q.x_q8, q.y_q8) ==
            1;
@@ -204,15 +203,15 @@ static inline int32_t odd_half(int32_t px, int32_t py, int32_t qx, int32_t qy)
     return (w & 1) != 0 ? sign : 0;
 }
 
-/* All that is cut off for a part; compilers turn the loop into vectors. */
-static int32_t odd_halves(const struct ih_arcs *parts, const struct ih_arc *part,
+/* All that is cut off for an arc; compilers turn the loop into vectors. */
+static int32_t odd_halves(const struct ih_arcs *arcs, const struct ih_arc *arc,
                           struct ih_vertex place)
 {
     const int32_t x_q8 = half_q9(place.x_q9);
     const int32_t y_q8 = half_q9(place.y_q9);
-    const int32_t *x = &parts->x_q8[part->from];
-    const int32_t *y = &parts->y_q8[part->from];
-    const int32_t steps = part->steps;
+    const int32_t *x = &arcs->x_q8[arc->from];
+    const int32_t *y = &arcs->y_q8[arc->from];
+    const int32_t steps = arc->steps;
     int32_t sum = odd_half(x[steps] - x_q8, y[steps] - y_q8, x[0] - x_q8, y[0] - y_q8);
     for (int32_t k = 0; k < steps; k++) {
         sum += odd_half(x[k] - x_q8, y[k] - y_q8, x[k + 1] - x_q8, y[k + 1] - y_q8);
@@ -220,15 +219,15 @@ static int32_t odd_halves(const struct ih_arcs *parts, const struct ih_arc *part
     return sum;
 }
 
-/* Moments of the part, closed by its chord, about the middle of the outline: but for x y, which is twice as
+/* Moments of the arc, closed by its chord, about the middle of the outline: but for x y, which is twice as
  * much. */
-IH_WRAPPING static struct ih_moments middle_moments(const struct ih_arcs *parts,
-                                                    const struct ih_arc *part)
+IH_WRAPPING static struct ih_moments middle_moments(const struct ih_arcs *arcs,
+                                                    const struct ih_arc *arc)
 {
-    const struct ih_arcs_sums *s = &parts->sums;
-    const int32_t from = part->from, to = part->from + part->steps;
-    const int64_t px = parts->dx_q8[to], py = parts->dy_q8[to];
-    const int64_t qx = parts->dx_q8[from], qy = parts->dy_q8[from];
+    const struct ih_arcs_sums *s = &arcs->sums;
+    const int32_t from = arc->from, to = arc->from + arc->steps;
+    const int64_t px = arcs->dx_q8[to], py = arcs->dy_q8[to];
+    const int64_t qx = arcs->dx_q8[from], qy = arcs->dy_q8[from];
     const int64_t w = px * qy - qx * py;
     const int64_t in_x = px * (px + qx) + qx * qx, in_y = py * (py + qy) + qy * qy;
     struct ih_moments m;
@@ -241,15 +240,15 @@ IH_WRAPPING static struct ih_moments middle_moments(const struct ih_arcs *parts,
     return m;
 }
 
-/* Moments of the part, closed by its chord, about the place: what add_edge sums up. The place is c from the
+/* Moments of the arc, closed by its chord, about the place: what add_edge sums up. The place is c from the
  * middle, as near as the outline, 2^12.6: with twice the area below 2^31 first moments are below 2^45.2, and
  * all terms together below 2^62. */
-static struct ih_moments part_moments(const struct ih_arcs *parts, const struct ih_arc *part,
+static struct ih_moments part_moments(const struct ih_arcs *arcs, const struct ih_arc *arc,
                                       struct ih_vertex place)
 {
-    const struct ih_moments middle = middle_moments(parts, part);
-    const int64_t cx = half_q9(place.x_q9) - (parts->x_q8[0] - parts->dx_q8[0]);
-    const int64_t cy = half_q9(place.y_q9) - (parts->y_q8[0] - parts->dy_q8[0]);
+    const struct ih_moments middle = middle_moments(arcs, arc);
+    const int64_t cx = half_q9(place.x_q9) - (arcs->x_q8[0] - arcs->dx_q8[0]);
+    const int64_t cy = half_q9(place.y_q9) - (arcs->y_q8[0] - arcs->dy_q8[0]);
     const int64_t area2 = middle.area2_q16, x = middle.x_q24, y = middle.y_q24;
     const int64_t xy = middle.xy_q32 - 4 * (cx * y + cy * x) + 12 * cx * cy * area2;
     return (struct ih_moments){
@@ -258,63 +257,63 @@ static struct ih_moments part_moments(const struct ih_arcs *parts, const struct 
         .y_q24 = y - 3 * cy * area2,
         .xx_q32 = middle.xx_q32 - 4 * cx * x + 6 * cx * cx * area2,
         .yy_q32 = middle.yy_q32 - 4 * cy * y + 6 * cy * cy * area2,
-        .xy_q32 = (xy - odd_halves(parts, part, place)) / 2,
+        .xy_q32 = (xy - odd_halves(arcs, arc, place)) / 2,
     };
 }
 
-/* Is the part, which winds round the place, an ellipse? */
-static bool measure_part(const struct ih_arcs *parts, const struct ih_arc *part,
+/* Is the arc, which winds round the place, an ellipse? */
+static bool measure_part(const struct ih_arcs *arcs, const struct ih_arc *arc,
                          struct ih_vertex place, const struct ih_ellipse_params *params,
                          struct ih_ellipse *out)
 {
-    const struct ih_moments m = part_moments(parts, part, place);
+    const struct ih_moments m = part_moments(arcs, arc, place);
     if (!ellipse_of_moments(&m, half_q9(place.x_q9), half_q9(place.y_q9), out) ||
         out->area_q16 <= 0 || out->shape_q16 < IH_ARCS_SHAPE_MIN_Q16 ||
         out->shape_q16 > params->shape_max_q16 || !set_ratio(out) ||
-        out->ratio_q16 > params->ratio_part_max_q16) {
+        out->ratio_q16 > params->ratio_arc_max_q16) {
         return false;
     }
-    const int32_t chord2_q16 = ih_arcs_chord2_q16(parts, part->from, part->from + part->steps);
-    out->merit_q8 = ih_arcs_merit_q8(parts->arc_q8[part->steps],
+    const int32_t chord2_q16 = ih_arcs_chord2_q16(arcs, arc->from, arc->from + arc->steps);
+    out->merit_q8 = ih_arcs_merit_q8(arcs->length_q8[arc->steps],
                                      (int32_t)ih_isqrt_u64((uint64_t)chord2_q16), out->shape_q16);
-    IH_IN_RANGE(out->merit_q8, INT32_MIN, part->merit_max_q8);
+    IH_IN_RANGE(out->merit_q8, INT32_MIN, arc->merit_max_q8);
     return true;
 }
 
 /* The part that may have the most merit of those that wind round the place; IH_NONE when none does. */
-static int32_t max_promising(const struct ih_arcs *parts, struct ih_vertex place,
+static int32_t max_promising(const struct ih_arcs *arcs, struct ih_vertex place,
                              const struct ih_ellipse_scratch *scratch)
 {
     int32_t max = IH_NONE;
-    for (int32_t i = 0; i < parts->part_count; i++) {
-        const struct ih_arc *part = &parts->part[i];
-        if ((max == IH_NONE || part->merit_max_q8 > parts->part[max].merit_max_q8) &&
-            winds_round(parts, part, place, scratch)) {
+    for (int32_t i = 0; i < arcs->arc_count; i++) {
+        const struct ih_arc *arc = &arcs->arc[i];
+        if ((max == IH_NONE || arc->merit_max_q8 > arcs->arc[max].merit_max_q8) &&
+            winds_round(arcs, arc, place, scratch)) {
             max = i;
         }
     }
     return max;
 }
 
-bool ih_ellipse_of_part(const struct ih_arcs *parts, struct ih_vertex place,
+bool ih_ellipse_of_part(const struct ih_arcs *arcs, struct ih_vertex place,
                         const struct ih_ellipse_params *params, struct ih_ellipse_scratch *scratch,
                         struct ih_ellipse *out)
 {
-    if (parts->part_count == 0) {
+    if (arcs->arc_count == 0) {
         return false;
     }
-    accumulate_winding(parts, place, scratch);
-    const int32_t first = max_promising(parts, place, scratch);
+    accumulate_winding(arcs, place, scratch);
+    const int32_t first = max_promising(arcs, place, scratch);
     if (first == IH_NONE) {
         return false;
     }
-    int32_t found = measure_part(parts, &parts->part[first], place, params, out) ? first : IH_NONE;
-    for (int32_t i = 0; i < parts->part_count; i++) {
-        const struct ih_arc *part = &parts->part[i];
+    int32_t found = measure_part(arcs, &arcs->arc[first], place, params, out) ? first : IH_NONE;
+    for (int32_t i = 0; i < arcs->arc_count; i++) {
+        const struct ih_arc *arc = &arcs->arc[i];
         struct ih_ellipse ellipse;
-        if (i != first && (found == IH_NONE || part->merit_max_q8 >= out->merit_q8) &&
-            winds_round(parts, part, place, scratch) &&
-            measure_part(parts, part, place, params, &ellipse) &&
+        if (i != first && (found == IH_NONE || arc->merit_max_q8 >= out->merit_q8) &&
+            winds_round(arcs, arc, place, scratch) &&
+            measure_part(arcs, arc, place, params, &ellipse) &&
             (found == IH_NONE || ellipse.merit_q8 > out->merit_q8 ||
              (ellipse.merit_q8 == out->merit_q8 && i < found))) {
             *out = ellipse;
@@ -322,7 +321,7 @@ bool ih_ellipse_of_part(const struct ih_arcs *parts, struct ih_vertex place,
         }
     }
     if (found != IH_NONE) {
-        scratch->part = parts->part[found];
+        scratch->arc = arcs->arc[found];
     }
     return found != IH_NONE;
 }

@@ -4,7 +4,7 @@
  * In:    a polygon on the grid; for the part its outline, and a place that it must surround.
  * Out:   area, centre and second moments; shape = 4 pi sqrt(det) / area, det that of the
  *        covariance: 1 for an ellipse and greater for everything else.
- * Way:   moments are sums over the edges. Of all parts (IH_ARCS_STEPS_MIN of the outline's steps at
+ * Way:   moments are sums over the edges. Of all arcs (IH_ARCS_STEPS_MIN of the outline's steps at
  *        least, chord <= chord_max arc) that wind round the place and are elliptical, the one with the
  *        greatest arc - 1.6 chord - 8 (shape - 1) arc is taken, of equal ones the first, the shortest
  *        of those. ih_arcs says which may be some and what they can have at the most: the most
@@ -50,23 +50,23 @@ struct ih_moments {
 
 struct ih_ellipse_scratch {
     int32_t winding[2 * IH_ARCS_POINTS_MAX]; /* of an outline's edges before each point */
-    struct ih_arc part;                      /* the one that was found */
+    struct ih_arc arc;                       /* the one that was found */
 };
 
 IH_BEGIN_DECLS
 
 /* Moments of a closed contour. False when it has no area. */
-bool ih_ellipse_of_contour(const struct ih_contours *cuts, const struct ih_contour *contour,
+bool ih_ellipse_of_contour(const struct ih_contours *contours, const struct ih_contour *contour,
                            struct ih_ellipse *out);
 
 /* How often the contour, closed by a chord if it is open, winds round the place: 1 around a
  * minimum, -1 around a maximum, 0 beside. */
-int32_t ih_ellipse_winding(const struct ih_contours *cuts, const struct ih_contour *contour,
+int32_t ih_ellipse_winding(const struct ih_contours *contours, const struct ih_contour *contour,
                            struct ih_vertex place);
 
 /* The best elliptical part of an outline around the place, a whole number of Q8 as a node is; params
  * as the outline was made with. False when none. */
-bool ih_ellipse_of_part(const struct ih_arcs *parts, struct ih_vertex place,
+bool ih_ellipse_of_part(const struct ih_arcs *arcs, struct ih_vertex place,
                         const struct ih_ellipse_params *params, struct ih_ellipse_scratch *scratch,
                         struct ih_ellipse *out);
 

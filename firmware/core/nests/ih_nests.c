@@ -154,33 +154,33 @@ static struct study study_contour(const struct ih_surface *surface,
                                   struct ih_nests_scratch *scratch)
 {
     struct study study = {.is_searched = false};
-    if (contour->closed && ih_ellipse_of_contour(&scratch->cuts, contour, &study.ellipse)) {
+    if (contour->closed && ih_ellipse_of_contour(&scratch->contours, contour, &study.ellipse)) {
         study.whole = study.ellipse.shape_q16 <= params->ellipse.shape_max_q16 &&
                       study.ellipse.ratio_q16 <= params->ellipse.ratio_closed_max_q16;
         study.is_tip = !study.whole && params->is_tip_any && study.ellipse.area_q16 > 0 &&
-                       area_mm2(surface, scratch->cuts.level_mm_q8, study.ellipse.area_q16) <
+                       area_mm2(surface, scratch->contours.level_mm_q8, study.ellipse.area_q16) <
                            params->blunt_mm2;
     }
     if (!study.whole && !study.is_tip) {
         study.is_searched =
-            ih_arcs_make(&scratch->cuts, contour, &params->ellipse, &scratch->parts);
+            ih_arcs_make(&scratch->contours, contour, &params->ellipse, &scratch->arcs);
     }
     return study;
 }
 
 /* May the contour support a nest at this minimum? An open one winds round nothing by itself. */
-static bool surrounds(const struct ih_contours *cuts, const struct ih_contour *contour,
+static bool surrounds(const struct ih_contours *contours, const struct ih_contour *contour,
                       const struct ih_box *box, struct ih_vertex minimum)
 {
     return ih_box_holds(box, minimum) &&
-           (!contour->closed || ih_ellipse_winding(cuts, contour, minimum) == 1);
+           (!contour->closed || ih_ellipse_winding(contours, contour, minimum) == 1);
 }
 
 static void take_support(const struct study *study, int32_t contour,
                          const struct ih_nests_params *params, struct ih_nests_scratch *scratch,
                          const struct ih_nest *nest, struct ih_support *support)
 {
-    struct ih_ellipse part;
+    struct ih_ellipse arc;
     if (study->whole || (study->is_tip && nest->slice_count == 0)) {
         *support = (struct ih_support){.wanted = true,
                                        .found = true,
@@ -188,11 +188,11 @@ static void take_support(const struct study *study, int32_t contour,
                                        .contour = contour,
                                        .ellipse = study->ellipse};
     } else if (study->is_searched &&
-               ih_ellipse_of_part(&scratch->parts, nest->minimum, &params->ellipse,
-                                  &scratch->ellipse, &part) &&
-               (!support->found || part.merit_q8 > support->ellipse.merit_q8)) {
+               ih_ellipse_of_part(&scratch->arcs, nest->minimum, &params->ellipse,
+                                  &scratch->ellipse, &arc) &&
+               (!support->found || arc.merit_q8 > support->ellipse.merit_q8)) {
         *support =
-            (struct ih_support){.wanted = true, .found = true, .contour = contour, .ellipse = part};
+            (struct ih_support){.wanted = true, .found = true, .contour = contour, .ellipse = arc};
     }
 }
 
@@ -202,17 +202,17 @@ static void take_support(const struct study *study, int32_t contour,
 static void find_supports(const struct ih_surface *surface, const struct ih_nests *nests,
                           const struct ih_nests_params *params, struct ih_nests_scratch *scratch)
 {
-    const struct ih_contours *cuts = &scratch->cuts;
-    for (int32_t c = 0; c < cuts->contour_count; c++) {
-        const struct ih_contour *contour = &cuts->contour[c];
-        const struct ih_box box = ih_arcs_box(cuts, contour);
+    const struct ih_contours *contours = &scratch->contours;
+    for (int32_t c = 0; c < contours->contour_count; c++) {
+        const struct ih_contour *contour = &contours->contour[c];
+        const struct ih_box box = ih_arcs_box(contours, contour);
         struct study study;
         bool is_studied = false;
         for (int32_t i = 0; i < nests->nest_count; i++) {
             struct ih_support *support = &scratch->support[i];
             const struct ih_nest *nest = &nests->nest[i];
             if (!support->wanted || support->whole ||
-                !surrounds(cuts, contour, &box, nest->minimum)) {
+                !surrounds(contours, contour, &box, nest->minimum)) {
                 continue;
             }
             if (!is_studied) {
@@ -393,8 +393,8 @@ void ih_nests_find(const struct ih_surface *surface, const struct ih_nests_param
         if (!open_nests(level_mm_q8, params, scratch->support, out)) {
             continue; /* between two nests */
         }
-        ih_contours_level(surface, level_mm_q8, &scratch->cuts);
-        out->contours_dropped += scratch->cuts.contours_dropped;
+        ih_contours_level(surface, level_mm_q8, &scratch->contours);
+        out->contours_dropped += scratch->contours.contours_dropped;
         extend_nests(surface, level_mm_q8, params, scratch, out);
     }
 }

@@ -88,8 +88,8 @@ struct ih_support {
 };
 
 struct ih_nests_scratch {
-    struct ih_contours cuts;
-    struct ih_arcs parts; /* of one contour at a time */
+    struct ih_contours contours;
+    struct ih_arcs arcs; /* of one contour at a time */
     struct ih_ellipse_scratch ellipse;
     struct ih_support support[IH_NESTS_MAX];
 };

@@ -36,6 +36,12 @@ static inline ih_i32 ih_i32_max(ih_i32 a, ih_i32 b)
     return (ih_i32)_mm256_max_epi32((__m256i)a, (__m256i)b);
 }
 
+/* Products of the lower 16 bits of each lane, with sign; the upper 16 bits of b must be 0. */
+static inline ih_i32 ih_i32_mul_low(ih_i32 a, ih_i32 b)
+{
+    return ih_i16_madd_pairs((ih_i16)a, (ih_i16)b);
+}
+
 /* Whole products of the even lanes, 64 bits each. */
 static inline ih_i64 ih_i32_mul_even(ih_i32 a, ih_i32 b)
 {

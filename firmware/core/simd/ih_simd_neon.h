@@ -45,6 +45,11 @@ static inline ih_i32 ih_i32_max(ih_i32 a, ih_i32 b)
     return (ih_i32)vmaxq_s32((int32x4_t)a, (int32x4_t)b);
 }
 
+static inline ih_i32 ih_i32_mul_low(ih_i32 a, ih_i32 b)
+{
+    return (ih_i32)vmull_s16(vmovn_s32((int32x4_t)a), vmovn_s32((int32x4_t)b));
+}
+
 static inline ih_i64 ih_i32_mul_even(ih_i32 a, ih_i32 b)
 {
     return (ih_i64)vmull_s32(vmovn_s64((int64x2_t)a), vmovn_s64((int64x2_t)b));

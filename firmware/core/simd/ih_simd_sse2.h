@@ -34,6 +34,11 @@ static inline ih_i32 ih_i32_max(ih_i32 a, ih_i32 b)
     return ih_i32_pick(a > b, a, b);
 }
 
+static inline ih_i32 ih_i32_mul_low(ih_i32 a, ih_i32 b)
+{
+    return ih_i16_madd_pairs((ih_i16)a, (ih_i16)b);
+}
+
 static inline ih_u64 ih_u32_mul_even(ih_u32 a, ih_u32 b)
 {
     return (ih_u64)_mm_mul_epu32((__m128i)a, (__m128i)b);

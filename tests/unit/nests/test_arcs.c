@@ -7,17 +7,17 @@
 
 #define UNIT 512
 
-static struct ih_contours cuts;
+static struct ih_contours contours;
 static struct ih_contour contour;
-static struct ih_arcs parts;
+static struct ih_arcs arcs;
 static uint64_t may_be[IH_ARCS_POINTS_MAX]; /* bit k: from this point over k steps */
 static struct ih_ellipse_params params;
 static int32_t points; /* on a contour: every test is run with the most and with fewer */
 
 void setUp(void)
 {
-    memset(&cuts, IH_TEST_FILL, sizeof cuts);
-    memset(&parts, IH_TEST_FILL, sizeof parts);
+    memset(&contours, IH_TEST_FILL, sizeof contours);
+    memset(&arcs, IH_TEST_FILL, sizeof arcs);
     ih_ellipse_params_default(&params);
     params.point_count = points;
 }
@@ -29,7 +29,7 @@ void tearDown(void)
 static void take(const struct ih_vertex *vertex, int32_t count, bool closed)
 {
     contour = (struct ih_contour){100, (int16_t)count, closed};
-    memcpy(&cuts.vertex[100], vertex, (size_t)count * sizeof *vertex);
+    memcpy(&contours.vertex[100], vertex, (size_t)count * sizeof *vertex);
 }
 
 static bool make(void)
@@ -38,13 +38,13 @@ static bool make(void)
     bool is_made;
 
     memset(may_be, 0, sizeof may_be);
-    is_made = ih_arcs_make(&cuts, &contour, &params, &parts);
-    for (i = 0; is_made && i < parts.part_count; i++) {
-        const struct ih_arc *part = &parts.part[i];
+    is_made = ih_arcs_make(&contours, &contour, &params, &arcs);
+    for (i = 0; is_made && i < arcs.arc_count; i++) {
+        const struct ih_arc *arc = &arcs.arc[i];
 
-        IH_TEST_RANGE(last + 1, points * 100, part->from * 100 + part->steps, "order", i);
-        last = part->from * 100 + part->steps;
-        may_be[part->from] |= UINT64_C(1) << part->steps;
+        IH_TEST_RANGE(last + 1, points * 100, arc->from * 100 + arc->steps, "order", i);
+        last = arc->from * 100 + arc->steps;
+        may_be[arc->from] |= UINT64_C(1) << arc->steps;
     }
     return is_made;
 }
@@ -80,8 +80,8 @@ static struct measured measure(int32_t from, int32_t steps)
     int32_t k;
 
     for (k = 0; k <= steps; k++) {
-        x[k] = ih_test_from_q(parts.x_q8[from + k], 8);
-        y[k] = ih_test_from_q(parts.y_q8[from + k], 8);
+        x[k] = ih_test_from_q(arcs.x_q8[from + k], 8);
+        y[k] = ih_test_from_q(arcs.y_q8[from + k], 8);
         mx += x[k] / (steps + 1);
         my += y[k] / (steps + 1);
     }
@@ -118,7 +118,7 @@ struct tally {
 /* Every part against the sieve. What crosses itself may be kept. */
 static void compare_all(bool simple, struct tally *tally)
 {
-    const double ratio_max = ih_test_from_q(params.ratio_part_max_q16, 16);
+    const double ratio_max = ih_test_from_q(params.ratio_arc_max_q16, 16);
     const double shape_min = ih_test_from_q(IH_ARCS_SHAPE_MIN_Q16, 16);
     const double shape_max = ih_test_from_q(params.shape_max_q16, 16);
     const double trace_max = (ratio_max + 1 / ratio_max) * shape_max / (4 * acos(-1.0));
@@ -126,10 +126,10 @@ static void compare_all(bool simple, struct tally *tally)
 
     for (from = 0; from < points; from++) {
         TEST_ASSERT_TRUE(may_be[from] >> points == 0);
-        for (k = 1; k < points && from + k < parts.count; k++) {
+        for (k = 1; k < points && from + k < arcs.count; k++) {
             const struct measured m = measure(from, k);
             const double chord_max =
-                ih_test_from_q(params.chord_max_q16, 16) * ih_test_from_q(parts.arc_q8[k], 8);
+                ih_test_from_q(params.chord_max_q16, 16) * ih_test_from_q(arcs.length_q8[k], 8);
             const bool kept = (may_be[from] >> k & 1) != 0;
 
             if (k >= IH_ARCS_STEPS_MIN && m.chord < chord_max - 0.01 && m.area > 0.51 &&
@@ -163,12 +163,12 @@ static int32_t count_promising(void)
     int32_t count = 0, from;
 
     for (from = 0; from < points; from++) {
-        count += bits_of(parts.low[from]) + bits_of(parts.high[from]);
+        count += bits_of(arcs.low[from]) + bits_of(arcs.high[from]);
     }
     return count;
 }
 
-/* Of so many parts of 56 points: their number grows with the square. */
+/* Of so many arcs of 56 points: their number grows with the square. */
 static int32_t share_of(int32_t count)
 {
     return count * points * points / (IH_ARCS_POINTS_MAX * IH_ARCS_POINTS_MAX);
@@ -206,22 +206,22 @@ static void limits_are_those_of_the_parameters(void)
 
     for (i = 0; i < 4; i++) {
         params.shape_max_q16 = 65536 + (i << 13);
-        params.ratio_part_max_q16 = (4 + i) << 15;
+        params.ratio_arc_max_q16 = (4 + i) << 15;
         params.chord_max_q16 = (1 + i) << 14;
         take_blob(23, 23, 18, 1.1, 0.15, 3, 1, 200, true);
         TEST_ASSERT_TRUE(make());
         compare_all(true, &tally);
     }
-    params.ratio_part_max_q16 = 200 << 16;
+    params.ratio_arc_max_q16 = 200 << 16;
     take_blob(23, 23, 5, 4.5, 0, 1, 0, 200, true);
     TEST_ASSERT_TRUE(make());
     TEST_ASSERT_TRUE(may_be[0] >> (points - 6) & 1);
-    params.ratio_part_max_q16 = 0; /* as 1 */
+    params.ratio_arc_max_q16 = 0; /* as 1 */
     TEST_ASSERT_TRUE(make());
     TEST_ASSERT_FALSE(may_be[0] >> (points - 6) & 1);
 }
 
-/* Walks all over the grid: their parts cross themselves as much as can be. */
+/* Walks all over the grid: their arcs cross themselves as much as can be. */
 static void walks_do_not_overflow(void)
 {
     static struct ih_vertex vertex[IH_ARCS_VERTICES_MAX];
@@ -292,25 +292,25 @@ static void points_stand_at_equal_steps(void)
 
     take_blob(23, 23, 20, 1, 0, 1, 0, 700, true);
     TEST_ASSERT_TRUE(make());
-    TEST_ASSERT_EQUAL(2 * points, parts.count);
-    for (k = 0; k < parts.count; k++) {
+    TEST_ASSERT_EQUAL(2 * points, arcs.count);
+    for (k = 0; k < arcs.count; k++) {
         const double angle = 2 * acos(-1.0) * k / points;
 
-        IH_TEST_WITHIN(0.08, 23 + 20 * cos(angle), ih_test_from_q(parts.x_q8[k], 8), "x", k);
-        IH_TEST_WITHIN(0.08, 23 + 20 * sin(angle), ih_test_from_q(parts.y_q8[k], 8), "y", k);
+        IH_TEST_WITHIN(0.08, 23 + 20 * cos(angle), ih_test_from_q(arcs.x_q8[k], 8), "x", k);
+        IH_TEST_WITHIN(0.08, 23 + 20 * sin(angle), ih_test_from_q(arcs.y_q8[k], 8), "y", k);
         if (k < points) {
-            IH_TEST_WITHIN(0.01 * step * k + 0.01, step * k, ih_test_from_q(parts.arc_q8[k], 8),
+            IH_TEST_WITHIN(0.01 * step * k + 0.01, step * k, ih_test_from_q(arcs.length_q8[k], 8),
                            "arc", k);
         }
     }
-    TEST_ASSERT_EQUAL(parts.x_q8[0] * 2, cuts.vertex[100].x_q9);
+    TEST_ASSERT_EQUAL(arcs.x_q8[0] * 2, contours.vertex[100].x_q9);
     take_blob(23, 23, 20, 1, 0, 1, 0, 700, false);
     TEST_ASSERT_TRUE(make());
-    TEST_ASSERT_EQUAL(points, parts.count);
-    IH_TEST_WITHIN(0.03, cuts.vertex[799].x_q9 / 512.0, ih_test_from_q(parts.x_q8[points - 1], 8),
-                   "last x", 0);
-    IH_TEST_WITHIN(0.03, cuts.vertex[799].y_q9 / 512.0, ih_test_from_q(parts.y_q8[points - 1], 8),
-                   "last y", 0);
+    TEST_ASSERT_EQUAL(points, arcs.count);
+    IH_TEST_WITHIN(0.03, contours.vertex[799].x_q9 / 512.0,
+                   ih_test_from_q(arcs.x_q8[points - 1], 8), "last x", 0);
+    IH_TEST_WITHIN(0.03, contours.vertex[799].y_q9 / 512.0,
+                   ih_test_from_q(arcs.y_q8[points - 1], 8), "last y", 0);
 }
 
 static void a_box_holds_what_is_in_it_and_a_step_more(void)
@@ -324,7 +324,7 @@ static void a_box_holds_what_is_in_it_and_a_step_more(void)
     int i;
 
     take(vertex, 3, true);
-    box = ih_arcs_box(&cuts, &contour);
+    box = ih_arcs_box(&contours, &contour);
     for (i = 0; i < IH_TEST_COUNT(inside); i++) {
         IH_TEST_EQUAL(1, ih_box_holds(&box, inside[i]), "inside", i);
     }
@@ -355,9 +355,9 @@ static void the_number_of_points_is_bounded(void)
     for (i = 0; i < IH_TEST_COUNT(asked); i++) {
         params.point_count = asked[i];
         take_blob(23, 23, 20, 1, 0, 1, 0, 200, false);
-        TEST_ASSERT_TRUE(ih_arcs_make(&cuts, &contour, &params, &parts));
-        IH_TEST_EQUAL(given[i], parts.point_count, "points", asked[i]);
-        IH_TEST_EQUAL(given[i], parts.count, "in use", asked[i]);
+        TEST_ASSERT_TRUE(ih_arcs_make(&contours, &contour, &params, &arcs));
+        IH_TEST_EQUAL(given[i], arcs.point_count, "points", asked[i]);
+        IH_TEST_EQUAL(given[i], arcs.count, "in use", asked[i]);
     }
 }
 

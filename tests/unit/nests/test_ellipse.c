@@ -28,12 +28,12 @@ struct vector_part {
 
 #define UNIT 512
 
-static struct ih_contours cuts;
+static struct ih_contours contours;
 static struct ih_contour contour;
 static struct ih_ellipse ellipse;
 static struct ih_ellipse_params params;
 static int32_t points; /* on a contour: searches are tested with the most and with fewer */
-static struct ih_arcs parts;
+static struct ih_arcs arcs;
 static struct ih_ellipse_scratch scratch;
 
 static void set_params(void)
@@ -44,8 +44,8 @@ static void set_params(void)
 
 void setUp(void)
 {
-    memset(&cuts, IH_TEST_FILL, sizeof cuts);
-    memset(&parts, IH_TEST_FILL, sizeof parts);
+    memset(&contours, IH_TEST_FILL, sizeof contours);
+    memset(&arcs, IH_TEST_FILL, sizeof arcs);
     memset(&scratch, IH_TEST_FILL, sizeof scratch);
     memset(&ellipse, IH_TEST_FILL, sizeof ellipse);
     set_params();
@@ -59,7 +59,7 @@ void tearDown(void)
 static void take(const struct ih_vertex *vertex, int32_t count, bool closed)
 {
     contour = (struct ih_contour){100, (int16_t)count, closed};
-    memcpy(&cuts.vertex[100], vertex, (size_t)count * sizeof *vertex);
+    memcpy(&contours.vertex[100], vertex, (size_t)count * sizeof *vertex);
 }
 
 static double from_q16(int64_t value)
@@ -87,7 +87,7 @@ static void moments_match_float64(void)
          * times the distance to it over the area, the second moments by the distance squared; the
          * farthest vertex is at most 3 sigma away. */
         error = length / 512;
-        TEST_ASSERT_TRUE_MESSAGE(ih_ellipse_of_contour(&cuts, &contour, &ellipse), v->name);
+        TEST_ASSERT_TRUE_MESSAGE(ih_ellipse_of_contour(&contours, &contour, &ellipse), v->name);
         IH_TEST_WITHIN(error, v->area, from_q16(ellipse.area_q16), v->name, 0);
         error /= fabs(v->area);
         IH_TEST_WITHIN(error * 3 * size + 2e-5, v->x, from_q16(ellipse.x_q16), v->name, 1);
@@ -119,7 +119,7 @@ static void rectangles_match_the_closed_form(void)
         const struct ih_vertex corner[4] = {{x, y}, {x2, y}, {x2, y2}, {x, y2}};
 
         take(corner, 4, true);
-        TEST_ASSERT_TRUE(ih_ellipse_of_contour(&cuts, &contour, &ellipse));
+        TEST_ASSERT_TRUE(ih_ellipse_of_contour(&contours, &contour, &ellipse));
         /* Half a unit of Q16 each; the second moments take the square of the centre away. */
         IH_TEST_WITHIN(1.0 / 65536, w * h, from_q16(ellipse.area_q16), "area", i);
         IH_TEST_WITHIN(1.0 / 65536, box[i][0] + w / 2, from_q16(ellipse.x_q16), "x", i);
@@ -142,7 +142,7 @@ static void place_and_beginning_do_not_matter(void)
     int i;
 
     take(v->vertex, v->vertex_count, true);
-    TEST_ASSERT_TRUE(ih_ellipse_of_contour(&cuts, &contour, &first));
+    TEST_ASSERT_TRUE(ih_ellipse_of_contour(&contours, &contour, &first));
     for (i = 0; i < v->vertex_count; i++) {
         const struct ih_vertex from = v->vertex[(i + 37) % v->vertex_count];
 
@@ -150,7 +150,7 @@ static void place_and_beginning_do_not_matter(void)
             (struct ih_vertex){(int16_t)(from.x_q9 + 5 * UNIT), (int16_t)(from.y_q9 - 7 * UNIT)};
     }
     take(moved, v->vertex_count, true);
-    TEST_ASSERT_TRUE(ih_ellipse_of_contour(&cuts, &contour, &ellipse));
+    TEST_ASSERT_TRUE(ih_ellipse_of_contour(&contours, &contour, &ellipse));
     /* Another beginning is another origin: vertices are rounded the other way, up to 1/512 step. */
     IH_TEST_WITHIN(0.1, from_q16(first.area_q16), from_q16(ellipse.area_q16), "area", 0);
     IH_TEST_WITHIN(0.01, from_q16(first.x_q16) + 5, from_q16(ellipse.x_q16), "x", 0);
@@ -165,11 +165,11 @@ static void polygons_without_area_are_no_ellipse(void)
     static const struct ih_vertex two[] = {{0, 512}, {512, 0}};
 
     take(line, 3, true);
-    TEST_ASSERT_FALSE(ih_ellipse_of_contour(&cuts, &contour, &ellipse));
+    TEST_ASSERT_FALSE(ih_ellipse_of_contour(&contours, &contour, &ellipse));
     take(point, 4, true);
-    TEST_ASSERT_FALSE(ih_ellipse_of_contour(&cuts, &contour, &ellipse));
+    TEST_ASSERT_FALSE(ih_ellipse_of_contour(&contours, &contour, &ellipse));
     take(two, 2, true);
-    TEST_ASSERT_FALSE(ih_ellipse_of_contour(&cuts, &contour, &ellipse));
+    TEST_ASSERT_FALSE(ih_ellipse_of_contour(&contours, &contour, &ellipse));
 }
 
 /* Squares of 16 cells at both ends of the grid and one of -30 in the middle, on a thread: 2 cells of
@@ -183,7 +183,7 @@ static void a_polygon_whose_parts_cancel_is_no_ellipse(void)
         {23552, 12800}, {21504, 12800}, {21504, 10752}, {10240, 10496}};
 
     take(threaded, 16, true);
-    TEST_ASSERT_FALSE(ih_ellipse_of_contour(&cuts, &contour, &ellipse));
+    TEST_ASSERT_FALSE(ih_ellipse_of_contour(&contours, &contour, &ellipse));
 }
 
 static void the_winding_tells_inside_from_beside_and_minima_from_maxima(void)
@@ -198,17 +198,19 @@ static void the_winding_tells_inside_from_beside_and_minima_from_maxima(void)
     int i;
 
     take(box, 4, true);
-    TEST_ASSERT_EQUAL_INT32(1, ih_ellipse_winding(&cuts, &contour, (struct ih_vertex){7168, 7168}));
-    TEST_ASSERT_EQUAL_INT32(1,
-                            ih_ellipse_winding(&cuts, &contour, (struct ih_vertex){5122, 10238}));
+    TEST_ASSERT_EQUAL_INT32(
+        1, ih_ellipse_winding(&contours, &contour, (struct ih_vertex){7168, 7168}));
+    TEST_ASSERT_EQUAL_INT32(
+        1, ih_ellipse_winding(&contours, &contour, (struct ih_vertex){5122, 10238}));
     for (i = 0; i < IH_TEST_COUNT(beside); i++) {
-        IH_TEST_EQUAL(0, ih_ellipse_winding(&cuts, &contour, beside[i]), "beside", i);
+        IH_TEST_EQUAL(0, ih_ellipse_winding(&contours, &contour, beside[i]), "beside", i);
     }
     take(back, 4, true);
-    TEST_ASSERT_EQUAL_INT32(-1,
-                            ih_ellipse_winding(&cuts, &contour, (struct ih_vertex){7168, 7168}));
+    TEST_ASSERT_EQUAL_INT32(
+        -1, ih_ellipse_winding(&contours, &contour, (struct ih_vertex){7168, 7168}));
     take(box, 4, false); /* an open one is closed by its chord */
-    TEST_ASSERT_EQUAL_INT32(1, ih_ellipse_winding(&cuts, &contour, (struct ih_vertex){7168, 7168}));
+    TEST_ASSERT_EQUAL_INT32(
+        1, ih_ellipse_winding(&contours, &contour, (struct ih_vertex){7168, 7168}));
 }
 
 /* A horseshoe: its gap is not inside. */
@@ -219,18 +221,18 @@ static void the_winding_follows_a_concave_contour(void)
                                                  {7680, 15360},  {5120, 15360}};
 
     take(horseshoe, 8, true);
-    TEST_ASSERT_EQUAL_INT32(0,
-                            ih_ellipse_winding(&cuts, &contour, (struct ih_vertex){10240, 12800}));
-    TEST_ASSERT_EQUAL_INT32(1,
-                            ih_ellipse_winding(&cuts, &contour, (struct ih_vertex){10240, 6400}));
-    TEST_ASSERT_EQUAL_INT32(1,
-                            ih_ellipse_winding(&cuts, &contour, (struct ih_vertex){6400, 12800}));
+    TEST_ASSERT_EQUAL_INT32(
+        0, ih_ellipse_winding(&contours, &contour, (struct ih_vertex){10240, 12800}));
+    TEST_ASSERT_EQUAL_INT32(
+        1, ih_ellipse_winding(&contours, &contour, (struct ih_vertex){10240, 6400}));
+    TEST_ASSERT_EQUAL_INT32(
+        1, ih_ellipse_winding(&contours, &contour, (struct ih_vertex){6400, 12800}));
 }
 
 static bool find_part_around(struct ih_vertex place)
 {
-    return ih_arcs_make(&cuts, &contour, &params, &parts) &&
-           ih_ellipse_of_part(&parts, place, &params, &scratch, &ellipse);
+    return ih_arcs_make(&contours, &contour, &params, &arcs) &&
+           ih_ellipse_of_part(&arcs, place, &params, &scratch, &ellipse);
 }
 
 static bool find_part(const struct vector_part *v)
@@ -259,7 +261,7 @@ static void the_best_part_matches_the_float_search(void)
         IH_TEST_WITHIN(0.3, v->x, from_q16(ellipse.x_q16), v->name, i);
         IH_TEST_WITHIN(0.3, v->y, from_q16(ellipse.y_q16), v->name, i);
         TEST_ASSERT_TRUE(ellipse.shape_q16 <= params.shape_max_q16);
-        TEST_ASSERT_TRUE(ellipse.ratio_q16 <= params.ratio_part_max_q16);
+        TEST_ASSERT_TRUE(ellipse.ratio_q16 <= params.ratio_arc_max_q16);
     }
 }
 
@@ -272,7 +274,7 @@ static void limits_are_obeyed(void)
     params.shape_max_q16 = 65280;
     TEST_ASSERT_FALSE(find_part(v));
     set_params();
-    params.ratio_part_max_q16 = 65536;
+    params.ratio_arc_max_q16 = 65536;
     TEST_ASSERT_FALSE(find_part(v));
     set_params();
     params.chord_max_q16 = 0;
@@ -296,7 +298,7 @@ static void contours_that_are_too_short_or_too_long_have_no_part(void)
                                         (int16_t)lround((23 + 20 * sin(angle)) * UNIT)};
     }
     contour = (struct ih_contour){0, IH_ARCS_VERTICES_MAX + 1, true};
-    memcpy(cuts.vertex, longest, sizeof longest);
+    memcpy(contours.vertex, longest, sizeof longest);
     TEST_ASSERT_FALSE(find_part_around(place));
 }
 
@@ -341,7 +343,7 @@ static void the_longest_contours_do_not_overflow(void)
         if (find_part_around((struct ih_vertex){0, 0})) {
             IH_TEST_RANGE(0, 46 << 16, ellipse.x_q16, "x", pass);
         }
-        (void)ih_ellipse_of_contour(&cuts, &contour, &ellipse);
+        (void)ih_ellipse_of_contour(&contours, &contour, &ellipse);
     }
 }
 
@@ -393,7 +395,7 @@ static void what_crosses_itself_is_no_ellipse(void)
                                          {-n * x, -n * y, 2 + 5 * x, 2 + 5 * y, -1}};
 
             take_lobes(lobes, 3);
-            IH_TEST_EQUAL(cases[i].is_ellipse, ih_ellipse_of_contour(&cuts, &contour, &ellipse),
+            IH_TEST_EQUAL(cases[i].is_ellipse, ih_ellipse_of_contour(&contours, &contour, &ellipse),
                           "ellipse", 2 * i + axis);
             if (cases[i].is_ellipse) {
                 IH_TEST_WITHIN(1e-4, 2, from_q16(ellipse.area_q16), "area", i);
@@ -409,23 +411,23 @@ static void the_winding_does_not_depend_on_the_first_vertex(void)
 {
     static const struct ih_vertex shape[] = {{5120, 5120},  {9000, 4000},   {14000, 6000},
                                              {15000, 9000}, {12000, 14000}, {6000, 13000}};
-    struct ih_vertex turned[6];
+    struct ih_vertex normal[6];
     int i, k;
 
     for (i = 0; i < 6; i++) {
         for (k = 0; k < 6; k++) {
-            turned[k] = shape[(i + k) % 6];
+            normal[k] = shape[(i + k) % 6];
         }
-        take(turned, 6, true);
-        IH_TEST_EQUAL(1, ih_ellipse_winding(&cuts, &contour, (struct ih_vertex){10000, 9000}),
+        take(normal, 6, true);
+        IH_TEST_EQUAL(1, ih_ellipse_winding(&contours, &contour, (struct ih_vertex){10000, 9000}),
                       "inside", i);
-        IH_TEST_EQUAL(0, ih_ellipse_winding(&cuts, &contour, (struct ih_vertex){4000, 9000}),
+        IH_TEST_EQUAL(0, ih_ellipse_winding(&contours, &contour, (struct ih_vertex){4000, 9000}),
                       "left", i);
-        IH_TEST_EQUAL(0, ih_ellipse_winding(&cuts, &contour, (struct ih_vertex){16000, 9000}),
+        IH_TEST_EQUAL(0, ih_ellipse_winding(&contours, &contour, (struct ih_vertex){16000, 9000}),
                       "right", i);
-        IH_TEST_EQUAL(0, ih_ellipse_winding(&cuts, &contour, (struct ih_vertex){10000, 2000}),
+        IH_TEST_EQUAL(0, ih_ellipse_winding(&contours, &contour, (struct ih_vertex){10000, 2000}),
                       "above", i);
-        IH_TEST_EQUAL(0, ih_ellipse_winding(&cuts, &contour, (struct ih_vertex){10000, 15000}),
+        IH_TEST_EQUAL(0, ih_ellipse_winding(&contours, &contour, (struct ih_vertex){10000, 15000}),
                       "below", i);
     }
 }
@@ -442,11 +444,11 @@ static void take_box(int32_t width_q9, int32_t height_q9)
 static void areas_and_ratios_have_their_limits(void)
 {
     take_box(UNIT, UNIT / 2);
-    TEST_ASSERT_TRUE(ih_ellipse_of_contour(&cuts, &contour, &ellipse));
+    TEST_ASSERT_TRUE(ih_ellipse_of_contour(&contours, &contour, &ellipse));
     take_box(UNIT, UNIT / 2 - 2);
-    TEST_ASSERT_FALSE(ih_ellipse_of_contour(&cuts, &contour, &ellipse));
+    TEST_ASSERT_FALSE(ih_ellipse_of_contour(&contours, &contour, &ellipse));
     take_box(46 * UNIT - 1024, UNIT / 10);
-    TEST_ASSERT_TRUE(ih_ellipse_of_contour(&cuts, &contour, &ellipse));
+    TEST_ASSERT_TRUE(ih_ellipse_of_contour(&contours, &contour, &ellipse));
     TEST_ASSERT_EQUAL_INT32(255 << 16, ellipse.ratio_q16);
 }
 
@@ -494,13 +496,13 @@ static void limits_may_be_reached(void)
         }
         first = ellipse;
         params.shape_max_q16 = first.shape_q16;
-        params.ratio_part_max_q16 = first.ratio_q16;
+        params.ratio_arc_max_q16 = first.ratio_q16;
         TEST_ASSERT_TRUE(find_part(v));
         IH_TEST_EQUAL(first.merit_q8, ellipse.merit_q8, v->name, i);
         params.shape_max_q16--;
         IH_TEST_EQUAL(false, find_part(v) && ellipse.shape_q16 >= first.shape_q16, v->name, i);
         params.shape_max_q16++;
-        params.ratio_part_max_q16--;
+        params.ratio_arc_max_q16--;
         IH_TEST_EQUAL(false, find_part(v) && ellipse.ratio_q16 >= first.ratio_q16, v->name, i);
         set_params();
     }
@@ -511,20 +513,20 @@ static bool is_ellipse(int32_t from, int32_t steps, struct ih_vertex place, stru
 {
     static struct ih_arcs one;
 
-    one = parts;
-    one.part_count = 1;
-    one.part[0] = (struct ih_arc){INT32_MAX, (uint8_t)from, (uint8_t)steps};
+    one = arcs;
+    one.arc_count = 1;
+    one.arc[0] = (struct ih_arc){INT32_MAX, (uint8_t)from, (uint8_t)steps};
     return ih_ellipse_of_part(&one, place, &params, &scratch, out);
 }
 
-/* The most merit that ih_arcs gives the part; INT32_MIN when it is none. */
+/* The most merit that ih_arcs gives the arc; INT32_MIN when it is none. */
 static int32_t promised_merit(int32_t from, int32_t steps)
 {
     int32_t i;
 
-    for (i = 0; i < parts.part_count; i++) {
-        if (parts.part[i].from == from && parts.part[i].steps == steps) {
-            return parts.part[i].merit_max_q8;
+    for (i = 0; i < arcs.arc_count; i++) {
+        if (arcs.arc[i].from == from && arcs.arc[i].steps == steps) {
+            return arcs.arc[i].merit_max_q8;
         }
     }
     return INT32_MIN;
@@ -534,18 +536,18 @@ static int32_t promised_merit(int32_t from, int32_t steps)
 static void compare_with_all_parts(struct ih_vertex place, int64_t at, int32_t *ellipse_count)
 {
     struct ih_ellipse best = {0}, other;
-    struct ih_arc part = {0};
+    struct ih_arc arc = {0};
     bool found = false;
     int32_t from, k;
 
-    if (!ih_arcs_make(&cuts, &contour, &params, &parts)) {
+    if (!ih_arcs_make(&contours, &contour, &params, &arcs)) {
         return;
     }
-    for (from = 0; from < parts.point_count; from++) {
-        for (k = IH_ARCS_STEPS_MIN; k < parts.point_count && from + k < parts.count; k++) {
-            const int64_t max_q8 = (int64_t)params.chord_max_q16 * parts.arc_q8[k] / 65536;
+    for (from = 0; from < arcs.point_count; from++) {
+        for (k = IH_ARCS_STEPS_MIN; k < arcs.point_count && from + k < arcs.count; k++) {
+            const int64_t max_q8 = (int64_t)params.chord_max_q16 * arcs.length_q8[k] / 65536;
 
-            if (ih_arcs_chord2_q16(&parts, from, from + k) >= (max_q8 + 1) * (max_q8 + 1) ||
+            if (ih_arcs_chord2_q16(&arcs, from, from + k) >= (max_q8 + 1) * (max_q8 + 1) ||
                 !is_ellipse(from, k, place, &other)) {
                 continue;
             }
@@ -555,16 +557,16 @@ static void compare_with_all_parts(struct ih_vertex place, int64_t at, int32_t *
             }
             if (!found || other.merit_q8 > best.merit_q8) {
                 best = other;
-                part = (struct ih_arc){0, (uint8_t)from, (uint8_t)k};
+                arc = (struct ih_arc){0, (uint8_t)from, (uint8_t)k};
                 found = true;
             }
         }
     }
-    IH_TEST_EQUAL(found, ih_ellipse_of_part(&parts, place, &params, &scratch, &other), "found", at);
+    IH_TEST_EQUAL(found, ih_ellipse_of_part(&arcs, place, &params, &scratch, &other), "found", at);
     if (found) {
         IH_TEST_EQUAL(0, memcmp(&best, &other, sizeof best), "the best", at);
-        IH_TEST_EQUAL(part.from, scratch.part.from, "its beginning", at);
-        IH_TEST_EQUAL(part.steps, scratch.part.steps, "its steps", at);
+        IH_TEST_EQUAL(arc.from, scratch.arc.from, "its beginning", at);
+        IH_TEST_EQUAL(arc.steps, scratch.arc.steps, "its steps", at);
     }
 }
 
@@ -597,17 +599,17 @@ static void no_part_is_missed_that_looking_at_all_would_find(void)
         set_params();
         if (pass % 4 == 1) {
             params.shape_max_q16 += 2000 * (pass % 16);
-            params.ratio_part_max_q16 += 3000 * (pass % 32);
+            params.ratio_arc_max_q16 += 3000 * (pass % 32);
             params.chord_max_q16 += 500 * (pass % 64);
         }
         take(vertex, count, pass % 2 == 0);
         compare_with_all_parts(place, pass, &ellipse_count);
     }
-    /* The number of parts grows with the square of that of points. */
+    /* The number of arcs grows with the square of that of points. */
     TEST_ASSERT_GREATER_THAN(5000 * points * points / (56 * 56), ellipse_count);
 }
 
-/* The eight of a walk all over the grid, whose parts cross themselves: what passes then is an accident. */
+/* The eight of a walk all over the grid, whose arcs cross themselves: what passes then is an accident. */
 static void no_part_of_a_walk_is_missed(void)
 {
     static struct ih_vertex vertex[IH_ARCS_VERTICES_MAX];

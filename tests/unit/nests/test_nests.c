@@ -1,4 +1,4 @@
-/* ih_nests on surfaces whose cuts are known in closed form. */
+/* ih_nests on surfaces whose contours are known in closed form. */
 #include "nests/ih_contours.h"
 #include "nests/ih_ellipse.h"
 #include "nests/ih_nests.h"
@@ -121,7 +121,7 @@ static void check_nests(void)
             IH_TEST_RANGE(0, params.ellipse.shape_max_q16, slice->ellipse.shape_q16, "shape", k);
             IH_TEST_RANGE(65536 - 256,
                           slice->whole ? params.ellipse.ratio_closed_max_q16
-                                       : params.ellipse.ratio_part_max_q16,
+                                       : params.ellipse.ratio_arc_max_q16,
                           slice->ellipse.ratio_q16, "ratio", k);
             /* "when its area falls below 0.6 of the slice before"; 1 mm^2 for rounding */
             TEST_ASSERT_TRUE(k == 0 || slice->area_mm2 >= 0.6 * slice[-1].area_mm2 - 1);
@@ -157,12 +157,12 @@ static void check_slices(const struct ih_nest *nest, const struct half_ellipsoid
     for (k = 0; k < nest->slice_count; k++) {
         const struct ih_slice *slice = &nest->slice[k];
         const double level = ih_test_from_q(nest->front_mm_q8 + slice->behind_mm_q8, 8);
-        const double part = (level - e->front_mm) / e->depth_mm;
-        const double area = PI * e->a * e->b * (1 - (1 - part) * (1 - part));
+        const double fraction = (level - e->front_mm) / e->depth_mm;
+        const double area = PI * e->a * e->b * (1 - (1 - fraction) * (1 - fraction));
         const double small = sqrt(area / PI);
 
-        if (part > 0.5 || small < 2) {
-            continue; /* steep flanks and cuts of a few cells are not what the grid can show */
+        if (fraction > 0.5 || small < 2) {
+            continue; /* steep flanks and contours of a few cells are not what the grid can show */
         }
         TEST_ASSERT_TRUE(slice->whole);
         /* Linear interpolation moves a vertex inwards by up to f'' / (8 f') along the slope, 4 / 8
@@ -400,7 +400,7 @@ static void a_pit_in_a_bulge_is_no_slice(void)
 }
 
 /* A bump on the floor of a crater in a plate that comes nearer outwards, so that it has no minimum
- * of its own: the cuts of the crater run round the bump as well, the other way. */
+ * of its own: the contours of the crater run round the bump as well, the other way. */
 static void a_bump_in_a_crater_stands_on_its_own_contours(void)
 {
     static const struct half_ellipsoid bump = {23, 23, 7, 8, 900, 90};
@@ -441,7 +441,7 @@ static double lobed_depth_mm(double r, double angle)
     return t;
 }
 
-/* From 70 to 90 mm its cuts are no ellipses (shape 1.05 to 1.12) and have no part that is one. */
+/* From 70 to 90 mm its contours are no ellipses (shape 1.05 to 1.12) and have no part that is one. */
 static void a_nest_bridges_as_many_levels_as_it_may(void)
 {
     const struct ih_nest *nest = &nests.nest[0];
@@ -508,7 +508,7 @@ static void a_bridged_gap_is_forgotten(void)
     const struct ih_nest *nest = &nests.nest[0];
     int32_t t, k = 0, missing = 0;
 
-    params.ellipse.chord_max_q16 = 0; /* no parts: the closed contour or nothing */
+    params.ellipse.chord_max_q16 = 0; /* no arcs: the closed contour or nothing */
     params.depth_max_mm = 155;
     params.end_depth_mm = 1000; /* after a gap the area is three times as large */
     params.gap_max = 3;
@@ -572,7 +572,7 @@ static void a_head_on_shoulders_is_cut_out(void)
 {
     static const struct half_ellipsoid head = {23, 16, 6.5, 9, 850, 100};
     static const struct half_ellipsoid body = {23, 44, 19, 22, 870, 120};
-    int32_t k, parts = 0;
+    int32_t k, arcs = 0;
 
     set_plane(1400, 0, 0);
     put_ellipsoid(&body);
@@ -583,13 +583,13 @@ static void a_head_on_shoulders_is_cut_out(void)
     for (k = 0; k < nest_at(head.x, head.y)->slice_count; k++) {
         const struct ih_slice *slice = &nest_at(head.x, head.y)->slice[k];
 
-        parts += !slice->whole;
+        arcs += !slice->whole;
         /* Within the head, or its outline with a part of the neck. */
         IH_TEST_WITHIN(1, head.x, ih_test_from_q(slice->ellipse.x_q16, 16), "x", k);
         IH_TEST_WITHIN(3, head.y, ih_test_from_q(slice->ellipse.y_q16, 16), "y", k);
         TEST_ASSERT_TRUE(slice->ellipse.area_q16 < (int64_t)(65536 * 1.3 * PI * head.a * head.b));
     }
-    TEST_ASSERT_TRUE(parts >= 2);
+    TEST_ASSERT_TRUE(arcs >= 2);
 }
 
 /* Ellipses of width x 11 steps that grow out of a minimum near their upper end, whole at 45 mm; behind
@@ -622,22 +622,22 @@ static void put_egg_on_plate(double width, double top_row)
 /* The part of the level's contours that supports the nest best, mm^2; 0 when there is none. */
 static double part_mm2(const struct ih_nest *nest, double level_mm)
 {
-    static struct ih_contours cuts;
+    static struct ih_contours contours;
     static struct ih_arcs parts_of_contour;
     static struct ih_ellipse_scratch ellipse_scratch;
-    struct ih_ellipse part, best = {0};
-    int32_t i, parts = 0;
+    struct ih_ellipse arc, best = {0};
+    int32_t i, arcs = 0;
 
-    ih_contours_level(&surface, (int32_t)lround(256 * level_mm), &cuts);
-    for (i = 0; i < cuts.contour_count; i++) {
-        if (ih_arcs_make(&cuts, &cuts.contour[i], &params.ellipse, &parts_of_contour) &&
+    ih_contours_level(&surface, (int32_t)lround(256 * level_mm), &contours);
+    for (i = 0; i < contours.contour_count; i++) {
+        if (ih_arcs_make(&contours, &contours.contour[i], &params.ellipse, &parts_of_contour) &&
             ih_ellipse_of_part(&parts_of_contour, nest->minimum, &params.ellipse, &ellipse_scratch,
-                               &part)) {
-            best = part;
-            parts++;
+                               &arc)) {
+            best = arc;
+            arcs++;
         }
     }
-    TEST_ASSERT_TRUE(parts <= 1); /* else it would have to be the better one */
+    TEST_ASSERT_TRUE(arcs <= 1); /* else it would have to be the better one */
     return ih_test_from_q(best.area_q16, 16) * step_mm(level_mm) * step_mm(level_mm);
 }
 
@@ -652,7 +652,7 @@ static void a_nest_that_shrinks_ends(void)
     params.ellipse.shape_max_q16 = 70779; /* 1.08: half an ellipse has 1.058 */
     for (i = 0; i < 25 * 32; i++) {
         const struct ih_nest *nest;
-        double part, proportion;
+        double arc, proportion;
 
         put_egg_on_plate(6 + 0.05 * (i / 32), 22 + i % 32 / 16.0);
         find();
@@ -661,9 +661,9 @@ static void a_nest_that_shrinks_ends(void)
         TEST_ASSERT_NOT_NULL(nest);
         TEST_ASSERT_TRUE(nest->slice_count >= 5); /* 10 .. 50 mm, the egg alone */
         TEST_ASSERT_TRUE(nest->slice[4].whole);
-        part = part_mm2(nest, 910);
-        proportion = part / nest->slice[4].area_mm2;
-        if (part <= 0 || fabs(proportion - 0.6) < 0.0005) {
+        arc = part_mm2(nest, 910);
+        proportion = arc / nest->slice[4].area_mm2;
+        if (arc <= 0 || fabs(proportion - 0.6) < 0.0005) {
             continue; /* areas are rounded to whole mm^2 of 16,000 to 35,000 */
         }
         IH_TEST_EQUAL(proportion < 0.6, nest->slice_count == 5, "shrinks",

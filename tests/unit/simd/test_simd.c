@@ -134,6 +134,7 @@ static void lanes_of_32_bits(void)
     CHECK(ih_i32, int32_t, ih_i32_add(a, b), ((int64_t)x + y));
     CHECK(ih_i32, int32_t, ih_i32_sub(a, b), ((int64_t)x - y));
     CHECK(ih_i32, int32_t, ih_i32_mul(a, b), ((int64_t)x * y));
+    CHECK(ih_i32, int32_t, ih_i32_mul_low(a, b & 0xffff), ((int16_t)x * (int16_t)y));
     CHECK(ih_i32, int32_t, ih_i32_min(a, b), MIN(x, y));
     CHECK(ih_i32, int32_t, ih_i32_max(a, b), MAX(x, y));
     CHECK(ih_i32, int32_t, ih_i32_pick(a > b, a, b), (x > y ? x : y));
