@@ -259,7 +259,8 @@ static void write_heads(struct app_write *write, const struct ih_hypotheses *hyp
     app_write_close(write, '}');
 }
 
-static void write_detection(struct app_write *write, const struct ih_detection *detection)
+static void write_detection(struct app_write *write, const struct ih_detection *detection,
+                            const struct ih_verdict *verdict, bool is_predicted)
 {
     struct ih_score score;
     ih_score_rate(&detection->evidence, &score);
@@ -267,20 +268,20 @@ static void write_detection(struct app_write *write, const struct ih_detection *
     write_column(write, "centre_mm_q8", detection->head.centre_mm_q8, 3, sizeof(int32_t));
     write_column(write, "semi_mm_q8", detection->head.semi_mm_q8, 3, sizeof(int32_t));
     app_write_int_field(write, "source", detection->source);
-    app_write_int_field(write, "track", detection->track_id);
+    app_write_int_field(write, "track", verdict->track_id);
     app_write_key(write, "predicted");
-    app_write_bool(write, detection->is_predicted);
+    app_write_bool(write, is_predicted);
     app_write_key(write, "head");
-    app_write_bool(write, detection->is_head);
-    app_write_int_field(write, "logit_q10", detection->logit_q10);
-    app_write_int_field(write, "probability_q16", detection->probability_q16);
+    app_write_bool(write, verdict->is_head);
+    app_write_int_field(write, "logit_q10", verdict->logit_q10);
+    app_write_int_field(write, "probability_q16", verdict->probability_q16);
     write_column(write, "evidence_q8", detection->evidence.value_q8, IH_EVIDENCE_COUNT,
                  sizeof(int32_t));
     write_column(write, "part_q10", score.part_q10, IH_EVIDENCE_COUNT, sizeof(int32_t));
     app_write_int_field(write, "through_count", detection->evidence.through_count);
     app_write_int_field(write, "hit_count", detection->evidence.hit_count);
     app_write_int_field(write, "front_count", detection->evidence.front_count);
-    app_write_int_field(write, "sigma_mm_q8", detection->sigma_mm_q8);
+    app_write_int_field(write, "sigma_mm_q8", verdict->sigma_mm_q8);
     app_write_int_field(write, "u_px_q12", detection->u_px_q12);
     app_write_int_field(write, "v_px_q12", detection->v_px_q12);
     app_write_int_field(write, "a_px_q12", detection->a_px_q12);
@@ -290,8 +291,9 @@ static void write_detection(struct app_write *write, const struct ih_detection *
     app_write_close(write, '}');
 }
 
-static void write_detections(struct app_write *write, const struct ih_detections *detections)
+static void write_detections(struct app_write *write, const struct isohead *head)
 {
+    const int32_t count = head->detections.detection_count;
     app_write_key(write, "evidence");
     app_write_open(write, '[');
     for (int kind = 0; kind < IH_EVIDENCE_COUNT; kind++) {
@@ -300,8 +302,10 @@ static void write_detections(struct app_write *write, const struct ih_detections
     app_write_close(write, ']');
     app_write_key(write, "findings");
     app_write_open(write, '[');
-    for (int32_t i = 0; i < detections->detection_count; i++) {
-        write_detection(write, &detections->detection[i]);
+    for (int32_t i = 0; i < count + head->predicted.count; i++) {
+        const struct ih_verdict verdict = ih_tracks_verdict(&head->tracks, &head->detections, i);
+        write_detection(write, ih_tracks_head(&head->detections, &head->predicted, i), &verdict,
+                        i >= count);
     }
     app_write_close(write, ']');
 }
@@ -343,7 +347,7 @@ void sim_trace_write(struct app_write *write, const struct hal_frame *frame, str
     sim_trace_cuts(write, head);
     write_hypotheses(write, &head->nests);
     write_heads(write, &head->hypotheses, &head->params.hypotheses);
-    write_detections(write, &head->detections);
+    write_detections(write, head);
     write_result(write, head);
     app_write_close(write, '}');
     app_write_line_end(write);

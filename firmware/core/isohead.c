@@ -105,15 +105,22 @@ static enum ih_err check_frame(const struct ih_frame *frame, const struct ih_cal
     return IH_OK;
 }
 
-/* The outputs behind labels: nothing. */
+/* The outputs of the stages after labels are those of an empty frame. */
 static void clear_found(struct isohead *head)
 {
-    const size_t first = offsetof(struct isohead, expected);
-    memset((uint8_t *)head + first, 0, offsetof(struct isohead, scratch) - first);
+    memset(&head->expected, 0, sizeof head->expected);
+    memset(&head->windows, 0, sizeof head->windows);
+    memset(&head->points, 0, sizeof head->points);
+    memset(&head->samples, 0, sizeof head->samples);
+    memset(&head->surface, 0, sizeof head->surface);
+    memset(&head->nests, 0, sizeof head->nests);
+    memset(&head->hypotheses, 0, sizeof head->hypotheses);
+    memset(&head->detections, 0, sizeof head->detections);
+    memset(&head->predicted, 0, sizeof head->predicted);
     ih_result_clear(&head->result);
 }
 
-/* All of them: those of an empty frame. */
+/* The outputs of all stages are those of an empty frame. */
 static void clear_outputs(struct isohead *head)
 {
     memset(&head->dots, 0, sizeof head->dots);
@@ -137,7 +144,7 @@ static void find_nests(struct isohead *head, const struct ih_dots *dots)
                          &head->hypotheses);
 }
 
-/* And on to findings, unless the paper's method alone is wanted. */
+/* From points to detections; the paper's method alone has none. */
 static void look(struct isohead *head, const struct ih_dots *dots)
 {
     find_nests(head, dots);
@@ -147,7 +154,7 @@ static void look(struct isohead *head, const struct ih_dots *dots)
     }
 }
 
-/* The best window comes last, so that the stages' outputs that stay are its own. */
+/* The best window comes last, so that the stages' outputs are those of this window. */
 static enum ih_err look_at_windows(struct isohead *head, const struct ih_frame *frame)
 {
     const struct ih_params *params = &head->params;
@@ -167,24 +174,26 @@ static enum ih_err look_at_windows(struct isohead *head, const struct ih_frame *
     return err;
 }
 
-/* What the tracks expect, before anything of this frame is looked at; the paper's method expects and finds nothing. */
+/* Empty lists, and the heads that the tracks expect; the paper's method expects none. */
 static void begin(struct isohead *head, int64_t time_us)
 {
     head->expected.count = 0;
     ih_detections_begin(&head->detections);
+    head->predicted.count = 0;
     if (!head->params.is_paper) {
         ih_tracks_expect(&head->tracks, &head->params.tracks, time_us, &head->expected);
     }
 }
 
-/* One answer from all that was found. */
+/* The result of all stages. */
 static void conclude(struct isohead *head)
 {
     if (head->params.is_paper) {
-        ih_result_from_heads(&head->hypotheses, &head->result);
+        ih_result_from_hypotheses(&head->hypotheses, &head->result);
     } else {
-        ih_tracks_update(&head->tracks, &head->params.tracks, &head->rig, &head->detections);
-        ih_result_from_tracks(&head->detections, &head->tracks, &head->result);
+        ih_tracks_update(&head->tracks, &head->params.tracks, &head->rig, &head->detections,
+                         &head->predicted);
+        ih_result_from_tracks(&head->detections, &head->tracks, &head->predicted, &head->result);
     }
 }
 
@@ -201,7 +210,7 @@ static enum ih_err frame_of_range(struct isohead *head, const struct ih_frame *f
     return err;
 }
 
-/* Dots and labels; both stages set all of their outputs that count. The others are left as they are. */
+/* Dots and labels; the other stages' outputs stay as they were. */
 static enum ih_err label(struct isohead *head, const struct ih_frame *frame,
                          const struct ih_frame *ambient)
 {
@@ -239,7 +248,7 @@ void isohead_find(struct isohead *head, int64_t time_us)
     conclude(head);
 }
 
-/* Nothing needs to be cleared for a frame of dots: each stage sets its own outputs, and windows has none. */
+/* A frame of dots needs no clearing: each stage sets its own outputs, and windows has none. */
 enum ih_err isohead_frame(struct isohead *head, const struct ih_frame *frame,
                           const struct ih_frame *ambient, int64_t time_us)
 {

@@ -71,6 +71,7 @@ struct isohead {
     struct ih_nests nests;
     struct ih_hypotheses hypotheses;
     struct ih_detections detections;
+    struct ih_predicted predicted; /* by the tracks */
     struct ih_result result;
     /* Working memory; stages never run at the same time, so they share it. */
     union {

@@ -261,7 +261,6 @@ void fuzz_check_detections(const struct ih_detections *detections)
         FUZZ_CHECK(abs(f->logit_q10) <= LOGIT_MAX_Q10);
         FUZZ_CHECK(f->probability_q16 >= 0 && f->probability_q16 <= SHARE_ONE_Q16);
         FUZZ_CHECK(f->source >= IH_SOURCE_SCAN && f->source <= IH_SOURCE_EXPECTED);
-        FUZZ_CHECK(f->track_id == 0 && !f->is_head && !f->is_predicted);
         FUZZ_CHECK(e->through_count >= 0 && e->hit_count >= 0 && e->front_count >= 0);
         /* A point on the ellipsoid's far side, seen through it, counts twice. */
         FUZZ_CHECK(e->through_count <= IH_SLOTS && e->hit_count <= IH_SLOTS);
@@ -276,43 +275,45 @@ void fuzz_check_detections(const struct ih_detections *detections)
     }
 }
 
-static void check_track(const struct ih_tracks *tracks, int32_t index,
-                        const struct ih_detections *detections)
+static void check_track(const struct ih_tracks *tracks, int32_t index, int32_t count)
 {
     const struct ih_track *track = &tracks->track[index];
+    const struct ih_kalman *filter = &track->filter;
     FUZZ_CHECK(track->id > 0 && track->detection_count >= 1);
     for (int32_t i = 0; i < index; i++) {
         FUZZ_CHECK(tracks->track[i].id != track->id);
-        FUZZ_CHECK(tracks->track[i].detection != track->detection);
+        FUZZ_CHECK(tracks->track[i].index != track->index);
     }
-    FUZZ_CHECK(track->detection >= 0 && track->detection < detections->detection_count);
-    FUZZ_CHECK(detections->detection[track->detection].track_id == track->id);
-    FUZZ_CHECK(track->place_q8 >= 0 && track->speed_q8 >= 0);
-    FUZZ_CHECK(track->place_q8 <= (int64_t)500 * 500 * 256);
-    FUZZ_CHECK(track->speed_q8 <= (int64_t)3000 * 3000 * 256);
+    FUZZ_CHECK(track->index >= 0 && track->index < count);
+    FUZZ_CHECK(filter->position_q8 >= 0 && filter->velocity_q8 >= 0);
+    FUZZ_CHECK(filter->position_q8 <= (int64_t)500 * 500 * 256);
+    FUZZ_CHECK(filter->velocity_q8 <= (int64_t)3000 * 3000 * 256);
     for (int axis = 0; axis < 3; axis++) {
-        FUZZ_CHECK(abs(track->velocity_mm_s_q8[axis]) <= 3000 << 8);
+        FUZZ_CHECK(abs(filter->velocity_mm_s_q8[axis]) <= 3000 << 8);
     }
     FUZZ_CHECK(track->seen_us <= tracks->time_us);
 }
 
-void fuzz_check_tracks(const struct ih_tracks *tracks, const struct ih_detections *detections)
+void fuzz_check_tracks(const struct ih_tracks *tracks, const struct ih_detections *detections,
+                       const struct ih_predicted *predicted)
 {
+    const int32_t count = detections->detection_count + predicted->count;
     int32_t hypotheses = 0;
     FUZZ_CHECK(tracks->track_count >= 0 && tracks->track_count <= IH_TRACKS_MAX);
-    FUZZ_CHECK(detections->detection_count <= IH_DETECTIONS_MAX + IH_DETECTIONS_EXPECTED_MAX);
+    FUZZ_CHECK(predicted->count >= 0 && predicted->count <= IH_TRACKS_MAX);
     for (int32_t i = 0; i < tracks->track_count; i++) {
-        check_track(tracks, i, detections);
+        check_track(tracks, i, count);
         hypotheses += tracks->track[i].is_head;
     }
     FUZZ_CHECK(tracks->head_count == hypotheses);
     bool is_listed = tracks->selected == IH_NONE;
+    int32_t before_q10 = INT32_MAX;
     for (int32_t i = 0; i < hypotheses; i++) {
         int32_t index = tracks->head[i];
-        FUZZ_CHECK(index >= 0 && index < detections->detection_count);
-        FUZZ_CHECK(detections->detection[index].is_head);
-        FUZZ_CHECK(i == 0 || detections->detection[tracks->head[i - 1]].logit_q10 >=
-                                 detections->detection[index].logit_q10);
+        FUZZ_CHECK(index >= 0 && index < count);
+        const struct ih_verdict verdict = ih_tracks_verdict(tracks, detections, index);
+        FUZZ_CHECK(verdict.is_head && verdict.logit_q10 <= before_q10);
+        before_q10 = verdict.logit_q10;
         is_listed = is_listed || index == tracks->selected;
     }
     FUZZ_CHECK(is_listed && (tracks->selected == IH_NONE) == (hypotheses == 0));
@@ -366,7 +367,7 @@ void fuzz_check_core(const struct isohead *core)
         fuzz_check_heads(&core->hypotheses, &core->nests, &core->samples);
     }
     if (!core->params.is_paper) {
-        fuzz_check_tracks(&core->tracks, &core->detections);
+        fuzz_check_tracks(&core->tracks, &core->detections, &core->predicted);
     }
     fuzz_check_result(&core->result);
 }

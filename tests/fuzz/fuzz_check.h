@@ -22,7 +22,8 @@ void fuzz_check_heads(const struct ih_hypotheses *hypotheses, const struct ih_ne
                       const struct ih_samples *samples);
 /* After ih_detections_add, before the tracks. */
 void fuzz_check_detections(const struct ih_detections *detections);
-void fuzz_check_tracks(const struct ih_tracks *tracks, const struct ih_detections *detections);
+void fuzz_check_tracks(const struct ih_tracks *tracks, const struct ih_detections *detections,
+                       const struct ih_predicted *predicted);
 void fuzz_check_result(const struct ih_result *result);
 
 /* All of a core after isohead_frame. */

@@ -17,7 +17,7 @@ static void fill_params(struct fuzz_input *input, struct ih_tracks_params *param
     params->side = fuzz_byte(input) % 3;
     if ((flags & 1) != 0) {
         params->gap_us = fuzz_within(input, -1, 2000000);
-        params->carry_us = fuzz_within(input, 0, 2000000);
+        params->coast_us = fuzz_within(input, 0, 2000000);
     }
     if ((flags & 2) != 0) {
         params->measured_mm = fuzz_within(input, 4, 500);
@@ -61,8 +61,8 @@ static void check_expected(const struct ih_expected *expected, const struct ih_t
 {
     FUZZ_CHECK(expected->count == tracks->track_count);
     for (int32_t i = 0; i < expected->count; i++) {
-        FUZZ_CHECK(memcmp(&expected->head[i], &tracks->track[i].head, sizeof expected->head[i]) ==
-                   0);
+        FUZZ_CHECK(memcmp(&expected->head[i], &tracks->track[i].filter.head,
+                          sizeof expected->head[i]) == 0);
     }
 }
 
@@ -70,6 +70,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     static struct ih_tracks tracks;
     static struct ih_detections detections;
+    static struct ih_predicted predicted;
     static struct ih_result result;
     struct fuzz_input input = {data, size};
     struct ih_tracks_params params;
@@ -84,9 +85,9 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         ih_tracks_expect(&tracks, &params, time_us, &expected);
         check_expected(&expected, &tracks);
         fill_detections(&input, &detections);
-        ih_tracks_update(&tracks, &params, rig, &detections);
-        fuzz_check_tracks(&tracks, &detections);
-        ih_result_from_tracks(&detections, &tracks, &result);
+        ih_tracks_update(&tracks, &params, rig, &detections, &predicted);
+        fuzz_check_tracks(&tracks, &detections, &predicted);
+        ih_result_from_tracks(&detections, &tracks, &predicted, &result);
         fuzz_check_result(&result);
         FUZZ_CHECK(result.selected == tracks.selected);
     }

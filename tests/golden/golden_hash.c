@@ -168,20 +168,23 @@ static uint64_t hash_expected(const struct isohead *head)
 static uint64_t hash_detections(const struct isohead *head)
 {
     const struct ih_detections *detections = &head->detections;
-    uint64_t hash = golden_add_word(GOLDEN_FNV_START, detections->detection_count);
+    const struct ih_predicted *predicted = &head->predicted;
+    const int32_t count = detections->detection_count + predicted->count;
+    uint64_t hash = golden_add_word(GOLDEN_FNV_START, count);
     hash = golden_add_word(hash, detections->dropped_count);
     hash = golden_add_word(hash, detections->seen_count);
-    for (int32_t i = 0; i < detections->detection_count; i++) {
-        const struct ih_detection *detection = &detections->detection[i];
+    for (int32_t i = 0; i < count; i++) {
+        const struct ih_detection *detection = ih_tracks_head(detections, predicted, i);
+        const struct ih_verdict verdict = ih_tracks_verdict(&head->tracks, detections, i);
         hash = golden_add_words(hash, &detection->head, sizeof detection->head);
         hash = golden_add_words(hash, &detection->evidence, sizeof detection->evidence);
-        hash = golden_add_word(hash, detection->logit_q10);
-        hash = golden_add_word(hash, detection->probability_q16);
+        hash = golden_add_word(hash, verdict.logit_q10);
+        hash = golden_add_word(hash, verdict.probability_q16);
         hash = golden_add_word(hash, detection->source);
-        hash = golden_add_word(hash, detection->track_id);
-        hash = golden_add_word(hash, detection->sigma_mm_q8);
-        hash = golden_add_word(hash, detection->is_head);
-        hash = golden_add_word(hash, detection->is_predicted);
+        hash = golden_add_word(hash, verdict.track_id);
+        hash = golden_add_word(hash, verdict.sigma_mm_q8);
+        hash = golden_add_word(hash, verdict.is_head);
+        hash = golden_add_word(hash, i >= detections->detection_count);
         hash = golden_add_word(hash, detection->u_px_q12);
         hash = golden_add_word(hash, detection->v_px_q12);
         hash = golden_add_word(hash, detection->a_px_q12);
@@ -194,17 +197,18 @@ static uint64_t hash_detections(const struct isohead *head)
 
 static uint64_t add_track(uint64_t hash, const struct ih_track *track)
 {
+    const struct ih_kalman *filter = &track->filter;
     hash = golden_add_word(hash, track->id);
     hash = golden_add_word(hash, track->is_head);
     hash = golden_add_word(hash, track->mean_logit_q10);
-    hash = golden_add_words(hash, &track->head, sizeof track->head);
-    hash = golden_add_words(hash, track->velocity_mm_s_q8, sizeof track->velocity_mm_s_q8);
-    hash = golden_add(hash, track->place_q8, 8);
-    hash = golden_add(hash, track->cross_q8, 8);
-    hash = golden_add(hash, track->speed_q8, 8);
+    hash = golden_add_words(hash, &filter->head, sizeof filter->head);
+    hash = golden_add_words(hash, filter->velocity_mm_s_q8, sizeof filter->velocity_mm_s_q8);
+    hash = golden_add(hash, filter->position_q8, 8);
+    hash = golden_add(hash, filter->cross_q8, 8);
+    hash = golden_add(hash, filter->velocity_q8, 8);
     hash = golden_add(hash, track->seen_us, 8);
     hash = golden_add_word(hash, track->detection_count);
-    return golden_add_word(hash, track->detection);
+    return golden_add_word(hash, track->index);
 }
 
 static uint64_t hash_tracks(const struct isohead *head)

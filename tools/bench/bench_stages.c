@@ -80,5 +80,5 @@ WRAP(BENCH_TRACKS, ih_tracks_expect,
      (tracks, params, time_us, out))
 WRAP(BENCH_TRACKS, ih_tracks_update,
      (struct ih_tracks * tracks, const struct ih_tracks_params *params, const struct ih_rig *rig,
-      struct ih_detections *detections),
-     (tracks, params, rig, detections))
+      const struct ih_detections *detections, struct ih_predicted *predicted),
+     (tracks, params, rig, detections, predicted))

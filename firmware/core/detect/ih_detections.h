@@ -39,7 +39,7 @@
 #include "points/ih_points.h"
 #include "rig/ih_rig.h"
 
-/* Findings kept; each costs 160 bytes. */
+/* Findings kept; each costs 148 bytes. */
 #define IH_DETECTIONS_MAX 16
 /* Expected places that are tried, and so the tracks; each costs a track and a finding. */
 #define IH_DETECTIONS_EXPECTED_MAX 8
@@ -68,11 +68,6 @@ struct ih_detection {
     int32_t logit_q10;
     int32_t probability_q16;
     int32_t source; /* enum ih_source */
-    /* Set by ih_tracks. */
-    int32_t track_id;    /* 0: none */
-    int32_t sigma_mm_q8; /* of the centre along each axis; 0: unknown */
-    bool is_head;        /* accepted */
-    bool is_predicted;   /* not seen in this frame: where its track says that it is */
     /* Its outline in the frame, as in ih_hypothesis. */
     int32_t u_px_q12, v_px_q12;
     int32_t a_px_q12, b_px_q12;
@@ -90,8 +85,7 @@ struct ih_detections {
     int32_t detection_count;
     int32_t dropped_count;
     int32_t seen_count; /* points, over all windows */
-    /* The last IH_DETECTIONS_EXPECTED_MAX entries are for predicted ones. */
-    struct ih_detection detection[IH_DETECTIONS_MAX + IH_DETECTIONS_EXPECTED_MAX];
+    struct ih_detection detection[IH_DETECTIONS_MAX];
     struct ih_view view[IH_DETECTIONS_EXPECTED_MAX]; /* by expected head, summed over windows */
 };
 

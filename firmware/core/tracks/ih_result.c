@@ -2,7 +2,6 @@
 
 #include <string.h>
 
-#include "base/ih_config.h"
 #include "nests/ih_nests.h"
 
 _Static_assert(IH_RESULT_MAX >= IH_NESTS_MAX, "every nest must find room");
@@ -13,7 +12,7 @@ void ih_result_clear(struct ih_result *out)
     out->selected = IH_NONE;
 }
 
-void ih_result_from_heads(const struct ih_hypotheses *hypotheses, struct ih_result *out)
+void ih_result_from_hypotheses(const struct ih_hypotheses *hypotheses, struct ih_result *out)
 {
     ih_result_clear(out);
     for (int32_t i = 0; i < hypotheses->hypothesis_count; i++) {
@@ -36,26 +35,28 @@ void ih_result_from_heads(const struct ih_hypotheses *hypotheses, struct ih_resu
 }
 
 void ih_result_from_tracks(const struct ih_detections *detections, const struct ih_tracks *tracks,
-                           struct ih_result *out)
+                           const struct ih_predicted *predicted, struct ih_result *out)
 {
     ih_result_clear(out);
-    for (int32_t i = 0; i < detections->detection_count; i++) {
-        const struct ih_detection *f = &detections->detection[i];
-        const int32_t *centre = f->head.centre_mm_q8;
-        out->entry[out->entry_count++] = (struct ih_result_entry){
-            .u_px_q12 = f->u_px_q12,
-            .v_px_q12 = f->v_px_q12,
-            .a_px_q12 = f->a_px_q12,
-            .b_px_q12 = f->b_px_q12,
-            .angle_mdeg = f->angle_mdeg,
-            .distance_mm_q8 = f->distance_mm_q8,
+    out->entry_count = detections->detection_count + predicted->count;
+    for (int32_t i = 0; i < out->entry_count; i++) {
+        const struct ih_detection *d = ih_tracks_head(detections, predicted, i);
+        const struct ih_verdict verdict = ih_tracks_verdict(tracks, detections, i);
+        const int32_t *centre = d->head.centre_mm_q8;
+        out->entry[i] = (struct ih_result_entry){
+            .u_px_q12 = d->u_px_q12,
+            .v_px_q12 = d->v_px_q12,
+            .a_px_q12 = d->a_px_q12,
+            .b_px_q12 = d->b_px_q12,
+            .angle_mdeg = d->angle_mdeg,
+            .distance_mm_q8 = d->distance_mm_q8,
             .centre_mm_q8 = {centre[0], centre[1], centre[2]},
-            .rejected = f->is_head ? IH_ACCEPTED : IH_REJECT_SCORE,
+            .rejected = verdict.is_head ? IH_ACCEPTED : IH_REJECT_SCORE,
             .has_probability = true,
-            .probability_q16 = f->probability_q16,
-            .track_id = f->track_id,
-            .sigma_mm_q8 = f->sigma_mm_q8,
-            .is_predicted = f->is_predicted,
+            .probability_q16 = verdict.probability_q16,
+            .track_id = verdict.track_id,
+            .sigma_mm_q8 = verdict.sigma_mm_q8,
+            .is_predicted = i >= detections->detection_count,
         };
     }
     for (int32_t i = 0; i < tracks->head_count; i++) {

@@ -1,7 +1,8 @@
-/* ih_result - what isohead says about a frame: its hypotheses, which of them are heads, and which one
- * is the head.
+/* ih_result - the result of a frame: its hypotheses, which of them are heads, and which one is
+ * selected.
  *
- * In:    either the nests' hypotheses (the paper's method alone), or findings and tracks.
+ * In:    either the nests' hypotheses (the paper's method alone), or detections and the tracks'
+ *        verdicts.
  * Out:   one list in one form. Rejected hypotheses stay in it with the reason.
  * With the paper's method alone no head is selected where several are accepted.
  */
@@ -16,7 +17,7 @@
 #include "nests/ih_hypotheses.h"
 #include "tracks/ih_tracks.h"
 
-#define IH_RESULT_MAX (IH_DETECTIONS_MAX + IH_DETECTIONS_EXPECTED_MAX)
+#define IH_RESULT_MAX (IH_DETECTIONS_MAX + IH_TRACKS_MAX)
 
 struct ih_result_entry {
     int32_t u_px_q12, v_px_q12; /* centre of the ellipse in the frame (distorted pixels) */
@@ -30,7 +31,7 @@ struct ih_result_entry {
     int32_t probability_q16; /* that it is a head */
     int32_t track_id;        /* 0: none */
     int32_t sigma_mm_q8;     /* of the centre along each axis; with a track */
-    bool is_predicted;       /* not seen in this frame: its track says that it is there */
+    bool is_predicted;       /* not detected in this frame, but predicted by its track */
 };
 
 struct ih_result {
@@ -46,10 +47,10 @@ IH_BEGIN_DECLS
 /* Nothing. */
 void ih_result_clear(struct ih_result *out);
 
-void ih_result_from_heads(const struct ih_hypotheses *hypotheses, struct ih_result *out);
+void ih_result_from_hypotheses(const struct ih_hypotheses *hypotheses, struct ih_result *out);
 
 void ih_result_from_tracks(const struct ih_detections *detections, const struct ih_tracks *tracks,
-                           struct ih_result *out);
+                           const struct ih_predicted *predicted, struct ih_result *out);
 
 IH_END_DECLS
 

@@ -1,4 +1,4 @@
-/* ih_result: one form for both ways. */
+/* ih_result: one form for both methods. */
 #include "base/ih_config.h"
 #include "detect/ih_detections.h"
 #include "nests/ih_hypotheses.h"
@@ -11,12 +11,14 @@
 static struct ih_hypotheses hypotheses;
 static struct ih_detections detections;
 static struct ih_tracks tracks;
+static struct ih_predicted predicted;
 static struct ih_result result;
 
 void setUp(void)
 {
     memset(&hypotheses, 0, sizeof hypotheses);
     memset(&detections, 0, sizeof detections);
+    memset(&predicted, 0, sizeof predicted);
     ih_tracks_init(&tracks);
     memset(&result, IH_TEST_FILL, sizeof result);
 }
@@ -25,18 +27,18 @@ void tearDown(void)
 {
 }
 
-static void nothing_is_nothing(void)
+static void empty_lists_give_an_empty_result(void)
 {
     ih_result_clear(&result);
     TEST_ASSERT_EQUAL_INT32(0, result.entry_count);
     TEST_ASSERT_EQUAL_INT32(0, result.head_count);
     TEST_ASSERT_EQUAL_INT32(IH_NONE, result.selected);
     memset(&result, IH_TEST_FILL, sizeof result);
-    ih_result_from_heads(&hypotheses, &result);
+    ih_result_from_hypotheses(&hypotheses, &result);
     TEST_ASSERT_EQUAL_INT32(0, result.entry_count);
     TEST_ASSERT_EQUAL_INT32(IH_NONE, result.selected);
     memset(&result, IH_TEST_FILL, sizeof result);
-    ih_result_from_tracks(&detections, &tracks, &result);
+    ih_result_from_tracks(&detections, &tracks, &predicted, &result);
     TEST_ASSERT_EQUAL_INT32(0, result.entry_count);
     TEST_ASSERT_EQUAL_INT32(IH_NONE, result.selected);
 }
@@ -61,7 +63,7 @@ static void nests_come_through_without_what_tracks_add(void)
     hypotheses.hypothesis[3].rejected = IH_ACCEPTED;
     hypotheses.head_count = 1;
     hypotheses.head[0] = 3;
-    ih_result_from_heads(&hypotheses, &result);
+    ih_result_from_hypotheses(&hypotheses, &result);
     TEST_ASSERT_EQUAL_INT32(IH_NESTS_MAX, result.entry_count);
     for (i = 0; i < IH_NESTS_MAX; i++) {
         const struct ih_result_entry *entry = &result.entry[i];
@@ -81,19 +83,27 @@ static void nests_come_through_without_what_tracks_add(void)
     TEST_ASSERT_EQUAL_INT32(3, result.selected);
     hypotheses.head_count = 2;
     hypotheses.head[1] = 5;
-    ih_result_from_heads(&hypotheses, &result);
+    ih_result_from_hypotheses(&hypotheses, &result);
     TEST_ASSERT_EQUAL_INT32(2, result.head_count);
     TEST_ASSERT_EQUAL_INT32(5, result.head[1]);
     TEST_ASSERT_EQUAL_INT32(IH_NONE, result.selected);
 }
 
-static void detections_come_through_up_to_a_full_table(void)
+static struct ih_detection *head_at(int32_t index)
+{
+    return index < detections.detection_count ? &detections.detection[index]
+                                              : &predicted.head[index - detections.detection_count];
+}
+
+/* Full tables; the tracks belong to every second detection, or to the predicted heads. */
+static void fill(bool is_predicted)
 {
     int i;
 
-    detections.detection_count = IH_DETECTIONS_MAX + IH_DETECTIONS_EXPECTED_MAX;
-    for (i = 0; i < detections.detection_count; i++) {
-        struct ih_detection *detection = &detections.detection[i];
+    detections.detection_count = IH_DETECTIONS_MAX;
+    predicted.count = is_predicted ? IH_TRACKS_MAX : 0;
+    for (i = 0; i < detections.detection_count + predicted.count; i++) {
+        struct ih_detection *detection = head_at(i);
 
         detection->u_px_q12 = 100 + i;
         detection->v_px_q12 = 200 + i;
@@ -103,44 +113,69 @@ static void detections_come_through_up_to_a_full_table(void)
         detection->distance_mm_q8 = 500 + i;
         detection->head.centre_mm_q8[1] = 700 + i;
         detection->probability_q16 = 1000 + i;
-        detection->track_id = i % 3;
-        detection->sigma_mm_q8 = 40 + i;
-        detection->is_head = i % 2 == 1;
-        detection->is_predicted = i >= IH_DETECTIONS_MAX;
+    }
+    tracks.track_count = IH_TRACKS_MAX;
+    for (i = 0; i < IH_TRACKS_MAX; i++) {
+        tracks.track[i] = (struct ih_track){.id = 10 + i,
+                                            .is_head = i % 2 == 1,
+                                            .mean_logit_q10 = 0, /* a probability of one half */
+                                            .index = is_predicted ? IH_DETECTIONS_MAX + i : 2 * i};
+        tracks.track[i].filter.position_q8 = (4 + i) * (4 + i) << 8;
     }
     tracks.head_count = 2;
-    tracks.head[0] = 17;
-    tracks.head[1] = 3;
-    tracks.selected = 3;
-    ih_result_from_tracks(&detections, &tracks, &result);
-    TEST_ASSERT_EQUAL_INT32(IH_RESULT_MAX, result.entry_count);
-    for (i = 0; i < IH_RESULT_MAX; i++) {
-        const struct ih_result_entry *entry = &result.entry[i];
+    tracks.head[0] = tracks.track[7].index;
+    tracks.head[1] = tracks.track[3].index;
+    tracks.selected = tracks.track[3].index;
+}
 
-        IH_TEST_EQUAL(100 + i, entry->u_px_q12, "u", i);
-        IH_TEST_EQUAL(200 + i, entry->v_px_q12, "v", i);
-        IH_TEST_EQUAL(300 + i, entry->a_px_q12, "a", i);
-        IH_TEST_EQUAL(290 + i, entry->b_px_q12, "b", i);
-        IH_TEST_EQUAL(90000, entry->angle_mdeg, "angle", i);
-        IH_TEST_EQUAL(500 + i, entry->distance_mm_q8, "distance", i);
-        IH_TEST_EQUAL(700 + i, entry->centre_mm_q8[1], "y", i);
-        IH_TEST_EQUAL(1, entry->has_probability, "has probability", i);
-        IH_TEST_EQUAL(1000 + i, entry->probability_q16, "probability", i);
-        IH_TEST_EQUAL(i % 3, entry->track_id, "track", i);
-        IH_TEST_EQUAL(40 + i, entry->sigma_mm_q8, "sigma", i);
-        IH_TEST_EQUAL(i % 2 == 1 ? IH_ACCEPTED : IH_REJECT_SCORE, entry->rejected, "rejected", i);
-        IH_TEST_EQUAL(i >= IH_DETECTIONS_MAX, entry->is_predicted, "predicted", i);
+static void expect_verdict(const struct ih_result_entry *entry, int index, int track)
+{
+    const bool is_tracked = track != IH_NONE;
+
+    IH_TEST_EQUAL(is_tracked ? 10 + track : 0, entry->track_id, "track", index);
+    IH_TEST_EQUAL(is_tracked ? (4 + track) << 8 : 0, entry->sigma_mm_q8, "sigma", index);
+    IH_TEST_EQUAL(is_tracked ? 32768 : 1000 + index, entry->probability_q16, "probability", index);
+    IH_TEST_EQUAL(is_tracked && track % 2 == 1 ? IH_ACCEPTED : IH_REJECT_SCORE, entry->rejected,
+                  "rejected", index);
+}
+
+static void full_tables_come_through(void)
+{
+    int pass, i;
+
+    for (pass = 0; pass < 2; pass++) {
+        setUp();
+        fill(pass == 1);
+        ih_result_from_tracks(&detections, &tracks, &predicted, &result);
+        TEST_ASSERT_EQUAL_INT32(pass == 1 ? IH_RESULT_MAX : IH_DETECTIONS_MAX, result.entry_count);
+        for (i = 0; i < result.entry_count; i++) {
+            const struct ih_result_entry *entry = &result.entry[i];
+            const bool is_predicted = i >= IH_DETECTIONS_MAX;
+            const int of_detection = pass == 0 && i % 2 == 0 ? i / 2 : IH_NONE;
+
+            IH_TEST_EQUAL(100 + i, entry->u_px_q12, "u", i);
+            IH_TEST_EQUAL(200 + i, entry->v_px_q12, "v", i);
+            IH_TEST_EQUAL(300 + i, entry->a_px_q12, "a", i);
+            IH_TEST_EQUAL(290 + i, entry->b_px_q12, "b", i);
+            IH_TEST_EQUAL(90000, entry->angle_mdeg, "angle", i);
+            IH_TEST_EQUAL(500 + i, entry->distance_mm_q8, "distance", i);
+            IH_TEST_EQUAL(700 + i, entry->centre_mm_q8[1], "y", i);
+            IH_TEST_EQUAL(1, entry->has_probability, "has probability", i);
+            IH_TEST_EQUAL(is_predicted, entry->is_predicted, "predicted", i);
+            expect_verdict(entry, i, is_predicted ? i - IH_DETECTIONS_MAX : of_detection);
+        }
+        TEST_ASSERT_EQUAL_INT32(2, result.head_count);
+        TEST_ASSERT_EQUAL_INT32(tracks.track[7].index, result.head[0]);
+        TEST_ASSERT_EQUAL_INT32(tracks.track[3].index, result.head[1]);
+        TEST_ASSERT_EQUAL_INT32(tracks.track[3].index, result.selected);
     }
-    TEST_ASSERT_EQUAL_INT32(2, result.head_count);
-    TEST_ASSERT_EQUAL_INT32(17, result.head[0]);
-    TEST_ASSERT_EQUAL_INT32(3, result.selected);
 }
 
 int main(void)
 {
     UNITY_BEGIN();
-    RUN_TEST(nothing_is_nothing);
+    RUN_TEST(empty_lists_give_an_empty_result);
     RUN_TEST(nests_come_through_without_what_tracks_add);
-    RUN_TEST(detections_come_through_up_to_a_full_table);
+    RUN_TEST(full_tables_come_through);
     return UNITY_END();
 }

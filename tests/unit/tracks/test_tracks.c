@@ -1,10 +1,10 @@
 /* ih_tracks against whole sequences of a float64 Kalman filter with its rules, and its behaviour:
- * what is carried, what ends, who is the head, whatever the times and the order of findings. */
+ * which tracks coast, which end, which head is selected, at any times and in any order of detections. */
 #include "base/ih_config.h"
 #include "base/ih_types.h"
+#include "detect/ih_detections.h"
 #include "detect/ih_ellipsoid.h"
 #include "detect/ih_evidence.h"
-#include "detect/ih_detections.h"
 #include "rig/ih_rig.h"
 #include "tracks/ih_tracks.h"
 
@@ -51,6 +51,7 @@ static struct ih_tracks tracks;
 static struct ih_tracks_params params;
 static struct ih_expected expected;
 static struct ih_detections detections;
+static struct ih_predicted predicted;
 static struct ih_view view; /* of every expected head in the next frames */
 static int64_t time_us;
 
@@ -62,6 +63,7 @@ void setUp(void)
     TEST_ASSERT_EQUAL_INT(IH_OK, ih_rig_init(&rig, &vector_rigs[PLAIN_RIG], &bad_slot));
     memset(&tracks, IH_TEST_FILL, sizeof tracks);
     memset(&detections, IH_TEST_FILL, sizeof detections);
+    memset(&predicted, IH_TEST_FILL, sizeof predicted);
     ih_detections_begin(&detections);
     ih_tracks_init(&tracks);
     ih_tracks_params_default(&params);
@@ -78,7 +80,7 @@ void setUp(void)
     params.front_percent = 30;
     params.seen_min = 30;
     detections.seen_count = 300;
-    params.carry_us = 1000000;
+    params.coast_us = 1000000;
     params.gap_us = 2000000;
     params.measured_mm = 12;
     params.acceleration_mm_s2 = 2500;
@@ -107,45 +109,49 @@ static struct ih_detection *add(double x, double y, double z, double logit)
     return detection;
 }
 
+static struct ih_verdict verdict(int32_t index)
+{
+    return ih_tracks_verdict(&tracks, &detections, index);
+}
+
 /* What must hold after every frame. */
 static void check_tracks(void)
 {
     int32_t t, k;
 
     IH_TEST_RANGE(0, IH_TRACKS_MAX, tracks.track_count, "tracks", 0);
-    IH_TEST_RANGE(0, IH_DETECTIONS_MAX + IH_DETECTIONS_EXPECTED_MAX, detections.detection_count,
-                  "findings", 0);
+    IH_TEST_RANGE(0, IH_TRACKS_MAX, predicted.count, "predicted heads", 0);
     for (t = 0; t < tracks.track_count; t++) {
         const struct ih_track *track = &tracks.track[t];
-        const struct ih_detection *detection = &detections.detection[track->detection];
+        const struct ih_verdict own = verdict(track->index);
 
         IH_TEST_RANGE(1, INT32_MAX, track->id, "id", t);
-        IH_TEST_RANGE(0, detections.detection_count - 1, track->detection, "its finding", t);
-        IH_TEST_EQUAL(track->id, detection->track_id, "the finding's track", t);
-        IH_TEST_EQUAL(track->is_head, detection->is_head, "the finding's verdict", t);
-        IH_TEST_RANGE(0, 500 << 8, detection->sigma_mm_q8, "sigma", t);
-        TEST_ASSERT_TRUE(track->is_head || !detection->is_predicted);
+        IH_TEST_RANGE(0, detections.detection_count + predicted.count - 1, track->index,
+                      "its index", t);
+        IH_TEST_EQUAL(track->id, own.track_id, "the verdict's track", t);
+        IH_TEST_EQUAL(track->is_head, own.is_head, "the verdict", t);
+        IH_TEST_RANGE(0, 500 << 8, own.sigma_mm_q8, "sigma", t);
+        TEST_ASSERT_TRUE(track->is_head || track->index < detections.detection_count);
         for (k = 0; k < t; k++) {
             TEST_ASSERT_TRUE(tracks.track[k].id != track->id);
         }
     }
     for (k = 0; k < tracks.head_count; k++) {
-        TEST_ASSERT_TRUE(detections.detection[tracks.head[k]].is_head);
-        TEST_ASSERT_TRUE(k == 0 || detections.detection[tracks.head[k - 1]].logit_q10 >=
-                                       detections.detection[tracks.head[k]].logit_q10);
+        TEST_ASSERT_TRUE(verdict(tracks.head[k]).is_head);
+        TEST_ASSERT_TRUE(k == 0 || verdict(tracks.head[k - 1]).logit_q10 >=
+                                       verdict(tracks.head[k]).logit_q10);
     }
     if (tracks.selected == IH_NONE) {
         IH_TEST_EQUAL(0, tracks.head_count, "heads, none of them selected", 0);
         IH_TEST_EQUAL(0, tracks.selected_id, "selected id", 0);
     } else {
-        TEST_ASSERT_TRUE(detections.detection[tracks.selected].is_head);
-        IH_TEST_EQUAL(detections.detection[tracks.selected].track_id, tracks.selected_id,
-                      "selected id", 0);
+        TEST_ASSERT_TRUE(verdict(tracks.selected).is_head);
+        IH_TEST_EQUAL(verdict(tracks.selected).track_id, tracks.selected_id, "selected id", 0);
     }
 }
 
-/* The findings that were added so far are those of a frame; what comes next belongs to another. */
-static int32_t looked_at;
+/* Detections and predicted heads of the last frame. */
+static int32_t listed_count;
 /* As they were before the frame's findings. */
 static struct ih_tracks before;
 
@@ -160,9 +166,9 @@ static void frame_at(int64_t at_us)
         detections.view[i] = i < expected.count ? view : nothing;
     }
     before = tracks;
-    ih_tracks_update(&tracks, &params, &rig, &detections);
+    ih_tracks_update(&tracks, &params, &rig, &detections, &predicted);
     check_tracks();
-    looked_at = detections.detection_count;
+    listed_count = detections.detection_count + predicted.count;
     detections.detection_count = 0; /* they stay readable */
 }
 
@@ -192,12 +198,12 @@ static void frames_without(int count)
 
 static double sigma_mm(int32_t track)
 {
-    return detections.detection[tracks.track[track].detection].sigma_mm_q8 / 256.0;
+    return verdict(tracks.track[track].index).sigma_mm_q8 / 256.0;
 }
 
-static bool is_carried(int32_t track)
+static bool is_coasting(int32_t track)
 {
-    return detections.detection[tracks.track[track].detection].is_predicted;
+    return tracks.track[track].index >= listed_count - predicted.count;
 }
 
 static double from_q8(int64_t value)
@@ -227,30 +233,31 @@ static void check_state(const struct vector_sequence *sequence, int frame_index,
 
     for (axis = 0; axis < before.track_count; axis++) {
         if (before.track[axis].id == track->id) {
-            gain_place = from_q8(before.track[axis].place_q8) / 65536;
-            gain_cross = fabs(from_q8(before.track[axis].cross_q8)) / 65536;
-            speed = from_q8(before.track[axis].speed_q8); /* what is left is a difference */
+            gain_place = from_q8(before.track[axis].filter.position_q8) / 65536;
+            gain_cross = fabs(from_q8(before.track[axis].filter.cross_q8)) / 65536;
+            speed =
+                from_q8(before.track[axis].filter.velocity_q8); /* what is left is a difference */
         }
     }
 
     IH_TEST_EQUAL(expected_state->id, track->id, name, frame_index);
     IH_TEST_EQUAL(expected_state->is_head, track->is_head, name, frame_index);
-    IH_TEST_EQUAL(!expected_state->seen, detections.detection[track->detection].is_predicted, name,
+    IH_TEST_EQUAL(!expected_state->seen, track->index >= listed_count - predicted.count, name,
                   frame_index);
     for (axis = 0; axis < 3; axis++) {
         IH_TEST_WITHIN(0.05, expected_state->centre_mm[axis],
-                       from_q8(track->head.centre_mm_q8[axis]), name, frame_index);
+                       from_q8(track->filter.head.centre_mm_q8[axis]), name, frame_index);
         IH_TEST_WITHIN(0.65, expected_state->velocity_mm_s[axis],
-                       from_q8(track->velocity_mm_s_q8[axis]), name, frame_index);
-        IH_TEST_WITHIN(0.02, expected_state->semi_mm[axis], from_q8(track->head.semi_mm_q8[axis]),
-                       name, frame_index);
+                       from_q8(track->filter.velocity_mm_s_q8[axis]), name, frame_index);
+        IH_TEST_WITHIN(0.02, expected_state->semi_mm[axis],
+                       from_q8(track->filter.head.semi_mm_q8[axis]), name, frame_index);
     }
     IH_TEST_WITHIN(0.05 + part * expected_state->place + gain_place, expected_state->place,
-                   from_q8(track->place_q8), name, frame_index);
+                   from_q8(track->filter.position_q8), name, frame_index);
     IH_TEST_WITHIN(1 + part * fabs(expected_state->cross) + gain_cross, expected_state->cross,
-                   from_q8(track->cross_q8), name, frame_index);
-    IH_TEST_WITHIN(1 + part * speed + gain_cross, expected_state->speed, from_q8(track->speed_q8),
-                   name, frame_index);
+                   from_q8(track->filter.cross_q8), name, frame_index);
+    IH_TEST_WITHIN(1 + part * speed + gain_cross, expected_state->speed,
+                   from_q8(track->filter.velocity_q8), name, frame_index);
     IH_TEST_WITHIN(0.003, expected_state->logit, ih_test_from_q(track->mean_logit_q10, 10), name,
                    frame_index);
 }
@@ -276,7 +283,7 @@ static void play(const struct vector_sequence *sequence)
         frames_since_long = now->time_us - time_us > 300000 ? 0 : frames_since_long + 1;
         frame_at(now->time_us);
         for (k = 0; k < now->found_count; k++) {
-            IH_TEST_EQUAL(found[k].track_id, detections.detection[k].track_id, sequence->name, i);
+            IH_TEST_EQUAL(found[k].track_id, verdict(k).track_id, sequence->name, i);
         }
         IH_TEST_EQUAL(now->state_count, tracks.track_count, sequence->name, i);
         for (k = 0; k < now->state_count; k++) {
@@ -312,11 +319,12 @@ static void a_moving_head_keeps_its_id(void)
         TEST_ASSERT_EQUAL_INT32(1, tracks.track_count);
         TEST_ASSERT_EQUAL_INT32(1, tracks.track[0].id);
         TEST_ASSERT_EQUAL_INT32(0, tracks.selected);
-        TEST_ASSERT_FALSE(is_carried(0));
+        TEST_ASSERT_FALSE(is_coasting(0));
     }
     /* The speed is known: an exact line has no error but the filter's own. */
-    IH_TEST_WITHIN(2, 500, from_q8(tracks.track[0].velocity_mm_s_q8[0]), "speed", 0);
-    IH_TEST_WITHIN(1, -500 + 20 * 49, from_q8(tracks.track[0].head.centre_mm_q8[0]), "place", 0);
+    IH_TEST_WITHIN(2, 500, from_q8(tracks.track[0].filter.velocity_mm_s_q8[0]), "speed", 0);
+    IH_TEST_WITHIN(1, -500 + 20 * 49, from_q8(tracks.track[0].filter.head.centre_mm_q8[0]), "place",
+                   0);
 }
 
 static void crossing_heads_keep_their_ids(void)
@@ -335,8 +343,8 @@ static void crossing_heads_keep_their_ids(void)
         }
         frame();
         TEST_ASSERT_EQUAL_INT32(2, tracks.track_count);
-        TEST_ASSERT_EQUAL_INT32(i % 2 == 0 ? 1 : 2, detections.detection[0].track_id);
-        TEST_ASSERT_EQUAL_INT32(i % 2 == 0 ? 2 : 1, detections.detection[1].track_id);
+        TEST_ASSERT_EQUAL_INT32(i % 2 == 0 ? 1 : 2, verdict(0).track_id);
+        TEST_ASSERT_EQUAL_INT32(i % 2 == 0 ? 2 : 1, verdict(1).track_id);
     }
 }
 
@@ -369,7 +377,7 @@ static void the_order_of_detections_does_not_matter(void)
         }
         frame();
         for (i = 0; i < 12; i++) {
-            track_id[i] = detections.detection[i].track_id;
+            track_id[i] = verdict(i).track_id;
         }
         for (i = 11; i > 0; i--) {
             const int32_t other = (int32_t)ih_test_between(&random, 0, i), kept = order[i];
@@ -384,7 +392,7 @@ static void the_order_of_detections_does_not_matter(void)
         }
         frame_at(time_us);
         for (k = 0; k < 12; k++) {
-            const int32_t one = track_id[order[k]], other = detections.detection[k].track_id;
+            const int32_t one = track_id[order[k]], other = verdict(k).track_id;
 
             if (one <= start.last_id || other <= start.last_id) {
                 IH_TEST_EQUAL(one > start.last_id ? 0 : one, other > start.last_id ? 0 : other,
@@ -406,23 +414,22 @@ static void a_full_table_takes_no_further_head(void)
         TEST_ASSERT_EQUAL_INT32(IH_TRACKS_MAX, tracks.track_count);
         TEST_ASSERT_EQUAL_INT32(IH_TRACKS_MAX, tracks.head_count);
         for (k = 0; k <= IH_TRACKS_MAX; k++) {
-            IH_TEST_EQUAL(k < IH_TRACKS_MAX ? k + 1 : 0, detections.detection[k].track_id, "track",
-                          k);
+            IH_TEST_EQUAL(k < IH_TRACKS_MAX ? k + 1 : 0, verdict(k).track_id, "track", k);
         }
     }
-    TEST_ASSERT_FALSE(detections.detection[IH_TRACKS_MAX].is_head);
+    TEST_ASSERT_FALSE(verdict(IH_TRACKS_MAX).is_head);
     /* One leaves: its place is free in the same frame. */
     view = through;
     for (k = 1; k <= IH_TRACKS_MAX; k++) {
         add(-800 + 200 * k, 0, 900, 5 - 0.4 * k);
     }
     frame();
-    TEST_ASSERT_EQUAL_INT32(IH_TRACKS_MAX + 1, detections.detection[IH_TRACKS_MAX - 1].track_id);
+    TEST_ASSERT_EQUAL_INT32(IH_TRACKS_MAX + 1, verdict(IH_TRACKS_MAX - 1).track_id);
     TEST_ASSERT_EQUAL_INT32(IH_TRACKS_MAX, tracks.track_count);
 }
 
-/* A full list of findings still has room for all that are carried. */
-static void carried_heads_have_room_beside_a_full_list(void)
+/* Beside a full list of detections there is room for all predicted heads. */
+static void predicted_heads_have_room_beside_a_full_list(void)
 {
     int k;
 
@@ -435,10 +442,10 @@ static void carried_heads_have_room_beside_a_full_list(void)
     }
     frame();
     TEST_ASSERT_EQUAL_INT32(IH_TRACKS_MAX, tracks.track_count);
-    TEST_ASSERT_EQUAL_INT32(IH_DETECTIONS_MAX + IH_TRACKS_MAX, looked_at);
+    TEST_ASSERT_EQUAL_INT32(IH_DETECTIONS_MAX + IH_TRACKS_MAX, listed_count);
     for (k = 0; k < IH_TRACKS_MAX; k++) {
-        IH_TEST_EQUAL(IH_DETECTIONS_MAX + k, tracks.track[k].detection, "carried", k);
-        TEST_ASSERT_TRUE(is_carried(k));
+        IH_TEST_EQUAL(IH_DETECTIONS_MAX + k, tracks.track[k].index, "coasting", k);
+        TEST_ASSERT_TRUE(is_coasting(k));
     }
 }
 
@@ -497,7 +504,7 @@ static void a_weak_detection_becomes_a_head_after_evidence(void)
     TEST_ASSERT_EQUAL_INT32(1, tracks.track_count);
     TEST_ASSERT_FALSE(tracks.track[0].is_head);
     TEST_ASSERT_EQUAL_INT32(IH_NONE, tracks.selected);
-    TEST_ASSERT_EQUAL_INT32(1, detections.detection[0].track_id);
+    TEST_ASSERT_EQUAL_INT32(1, verdict(0).track_id);
     while (!tracks.track[0].is_head && frames < 20) {
         frames_with(1, 0, 0, 800, 2);
         frames++;
@@ -513,16 +520,16 @@ static void an_improbable_detection_starts_nothing(void)
     add(0, 0, 800, -1); /* start_logit itself */
     frame();
     TEST_ASSERT_EQUAL_INT32(0, tracks.track_count);
-    TEST_ASSERT_EQUAL_INT32(0, detections.detection[0].track_id);
+    TEST_ASSERT_EQUAL_INT32(0, verdict(0).track_id);
 }
 
-static void a_tentative_track_is_not_carried(void)
+static void a_tentative_track_does_not_coast(void)
 {
     view = front;
     frames_with(2, 0, 0, 800, 0.5);
     frame();
     TEST_ASSERT_EQUAL_INT32(0, tracks.track_count);
-    TEST_ASSERT_EQUAL_INT32(0, looked_at);
+    TEST_ASSERT_EQUAL_INT32(0, listed_count);
 }
 
 static void a_rejected_detection_in_the_gate_is_accepted_again(void)
@@ -530,22 +537,22 @@ static void a_rejected_detection_in_the_gate_is_accepted_again(void)
     frames_with(5, 0, 0, 800, 3);
     add(10, 0, 800, -2.5); /* alone it would start nothing */
     frame();
-    TEST_ASSERT_EQUAL_INT32(1, detections.detection[0].track_id);
-    TEST_ASSERT_TRUE(detections.detection[0].is_head);
+    TEST_ASSERT_EQUAL_INT32(1, verdict(0).track_id);
+    TEST_ASSERT_TRUE(verdict(0).is_head);
     TEST_ASSERT_EQUAL_INT32(0, tracks.selected);
-    TEST_ASSERT_FALSE(is_carried(0));
-    /* Below keep_logit it is not: the head is carried, the finding stays rejected. */
+    TEST_ASSERT_FALSE(is_coasting(0));
+    /* Below keep_logit it is not: the track coasts, the detection stays rejected. */
     add(10, 0, 800, -3.01);
     frame();
-    TEST_ASSERT_EQUAL_INT32(0, detections.detection[0].track_id);
-    TEST_ASSERT_FALSE(detections.detection[0].is_head);
-    TEST_ASSERT_TRUE(is_carried(0));
+    TEST_ASSERT_EQUAL_INT32(0, verdict(0).track_id);
+    TEST_ASSERT_FALSE(verdict(0).is_head);
+    TEST_ASSERT_TRUE(is_coasting(0));
     /* Nor outside the gate: 90 mm, and 12 mm for 40 ms. */
     frames_with(3, 0, 0, 800, 3);
     add(110, 0, 800, -0.9);
     add(0, -110, 800, -2);
     frame();
-    TEST_ASSERT_TRUE(is_carried(0));
+    TEST_ASSERT_TRUE(is_coasting(0));
 }
 
 /* A head stays one until its mean falls below drop_logit, not accept_logit. */
@@ -586,7 +593,7 @@ static void a_seat_that_is_seen_through_ends_at_once(void)
     view = through;
     frame();
     TEST_ASSERT_EQUAL_INT32(0, tracks.track_count);
-    TEST_ASSERT_EQUAL_INT32(0, looked_at);
+    TEST_ASSERT_EQUAL_INT32(0, listed_count);
     TEST_ASSERT_EQUAL_INT32(IH_NONE, tracks.selected);
     /* The next one there is another. */
     view = hit;
@@ -625,18 +632,18 @@ static void a_seat_is_empty_by_its_limits(void)
         frames_with(5, 0, 0, 800, 5);
         view = cases[i].view;
         frame();
-        IH_TEST_EQUAL(!cases[i].gone, tracks.track_count, "carried", i);
+        IH_TEST_EQUAL(!cases[i].gone, tracks.track_count, "coasting", i);
         setUp();
         frames_with(5, 0, 0, 800, 5);
         view = cases[i].view;
         detections.seen_count = 29;
         frame();
-        IH_TEST_EQUAL(1, tracks.track_count, "carried through a lost frame", i);
+        IH_TEST_EQUAL(1, tracks.track_count, "coasts through a lost frame", i);
     }
 }
 
 /* What nothing hides, and nobody finds, is no head for long: 5, then 5 0.75^n - 3 (1 - 0.75^n). */
-static void a_head_in_plain_view_is_not_carried(void)
+static void a_head_in_plain_view_does_not_coast(void)
 {
     int frames = 0;
 
@@ -676,7 +683,7 @@ static void hidden_begins_at_its_limit(void)
         logit_q10 = tracks.track[0].mean_logit_q10;
         view = cases[i].view;
         frame();
-        IH_TEST_EQUAL(1, tracks.track_count, "carried", i);
+        IH_TEST_EQUAL(1, tracks.track_count, "coasting", i);
         IH_TEST_EQUAL(cases[i].hidden, tracks.track[0].mean_logit_q10 == logit_q10, "hidden", i);
     }
 }
@@ -697,7 +704,7 @@ static void evidence_makes_a_head(void)
     TEST_ASSERT_EQUAL_INT32(0, tracks.head_count);
 }
 
-/* --- carrying ------------------------------------------------------------------------------------
+/* --- coasting ------------------------------------------------------------------------------------
  */
 
 static void hands_before_a_head_do_not_end_it(void)
@@ -709,40 +716,39 @@ static void hands_before_a_head_do_not_end_it(void)
     for (i = 0; i < 3; i++) {
         frame();
         TEST_ASSERT_EQUAL_INT32(1, tracks.track_count);
-        TEST_ASSERT_TRUE(is_carried(0));
-        TEST_ASSERT_EQUAL_INT32(1, looked_at);
+        TEST_ASSERT_TRUE(is_coasting(0));
+        TEST_ASSERT_EQUAL_INT32(1, listed_count);
         TEST_ASSERT_EQUAL_INT32(0, tracks.selected);
-        TEST_ASSERT_EQUAL_INT32(1, detections.detection[0].track_id);
-        TEST_ASSERT_TRUE(detections.detection[0].is_head);
-        IH_TEST_WITHIN(0.1, 800, from_q8(detections.detection[0].head.centre_mm_q8[2]), "depth", i);
-        TEST_ASSERT_TRUE(detections.detection[0].a_px_q12 > 0);
-        TEST_ASSERT_TRUE(detections.detection[0].probability_q16 > 32768);
+        TEST_ASSERT_EQUAL_INT32(1, verdict(0).track_id);
+        TEST_ASSERT_TRUE(verdict(0).is_head);
+        IH_TEST_WITHIN(0.1, 800, from_q8(predicted.head[0].head.centre_mm_q8[2]), "depth", i);
+        TEST_ASSERT_TRUE(predicted.head[0].a_px_q12 > 0);
+        TEST_ASSERT_TRUE(verdict(0).probability_q16 > 32768);
     }
     view = hit;
     frames_with(1, 40, 0, 800, 3);
     TEST_ASSERT_EQUAL_INT32(1, tracks.selected_id);
-    TEST_ASSERT_FALSE(is_carried(0));
+    TEST_ASSERT_FALSE(is_coasting(0));
 }
 
-/* What stands in the list for a carried head is the track's alone: nothing of a finding that stood
- * there before. */
-static void a_carried_head_has_no_evidence(void)
+/* A predicted head has nothing of a detection that was in the table before. */
+static void a_predicted_head_has_no_evidence(void)
 {
     int kind;
 
     frames_with(10, 0, 0, 800, 3);
     view = front;
-    memset(detections.detection, IH_TEST_FILL, sizeof detections.detection);
+    memset(predicted.head, IH_TEST_FILL, sizeof predicted.head);
     frame();
-    TEST_ASSERT_TRUE(is_carried(0));
+    TEST_ASSERT_TRUE(is_coasting(0));
     for (kind = 0; kind < IH_EVIDENCE_COUNT; kind++) {
-        IH_TEST_EQUAL(0, detections.detection[0].evidence.value_q8[kind], "evidence", kind);
+        IH_TEST_EQUAL(0, predicted.head[0].evidence.value_q8[kind], "evidence", kind);
     }
-    IH_TEST_EQUAL(0, detections.detection[0].evidence.hit_count, "hits", 0);
-    IH_TEST_EQUAL(IH_SOURCE_EXPECTED, detections.detection[0].source, "source", 0);
+    IH_TEST_EQUAL(0, predicted.head[0].evidence.hit_count, "hits", 0);
+    IH_TEST_EQUAL(IH_SOURCE_EXPECTED, predicted.head[0].source, "source", 0);
 }
 
-static void a_head_is_carried_for_carry_us_at_most(void)
+static void a_track_coasts_for_coast_us_at_most(void)
 {
     int i;
 
@@ -752,14 +758,14 @@ static void a_head_is_carried_for_carry_us_at_most(void)
         view = i == 0 ? front : through;
         detections.seen_count = i == 0 ? 300 : 10;
         frames_without(25); /* 1 s */
-        IH_TEST_EQUAL(1, tracks.track_count, "after carry_us", i);
+        IH_TEST_EQUAL(1, tracks.track_count, "after coast_us", i);
         frame_at(time_us + 1);
         IH_TEST_EQUAL(0, tracks.track_count, "longer", i);
     }
 }
 
 /* It moves on, and slows down within 0.3 s. */
-static void a_carried_head_slows_down(void)
+static void a_coasting_track_slows_down(void)
 {
     double x, last = 0;
     int i;
@@ -769,39 +775,39 @@ static void a_carried_head_slows_down(void)
         frame();
     }
     view = front;
-    x = from_q8(tracks.track[0].head.centre_mm_q8[0]);
+    x = from_q8(tracks.track[0].filter.head.centre_mm_q8[0]);
     for (i = 0; i < 8; i++) {
         double moved;
 
         frame();
-        moved = from_q8(tracks.track[0].head.centre_mm_q8[0]) - x;
+        moved = from_q8(tracks.track[0].filter.head.centre_mm_q8[0]) - x;
         TEST_ASSERT_TRUE(i == 0 ? moved > 15 : moved < last || moved == 0);
         last = moved;
         x += moved;
     }
-    TEST_ASSERT_EQUAL_INT32(0, tracks.track[0].velocity_mm_s_q8[0]);
+    TEST_ASSERT_EQUAL_INT32(0, tracks.track[0].filter.velocity_mm_s_q8[0]);
     IH_TEST_RANGE(280 + 20, 280 + 100, (int64_t)x, "place", 0);
 }
 
 /* The longer it was not seen, the farther off it may be found. */
-static void the_gate_grows_while_carried(void)
+static void the_gate_grows_while_coasting(void)
 {
     frames_with(10, 0, 0, 800, 3);
     view = front;
     frames_without(1);
     add(170, 0, 800, -0.99); /* 90 + 300 * 0.08 */
     frame();
-    TEST_ASSERT_EQUAL_INT32(2, detections.detection[0].track_id);
+    TEST_ASSERT_EQUAL_INT32(2, verdict(0).track_id);
     setUp();
     frames_with(10, 0, 0, 800, 3);
     view = front;
     frames_without(9);
     add(170, 0, 800, -0.99); /* 90 + 300 * 0.4 */
     frame();
-    TEST_ASSERT_EQUAL_INT32(1, detections.detection[0].track_id);
+    TEST_ASSERT_EQUAL_INT32(1, verdict(0).track_id);
 }
 
-static void sigma_grows_while_carried_and_shrinks_when_seen(void)
+static void sigma_grows_while_coasting_and_shrinks_when_seen(void)
 {
     double last = 1000;
     int i;
@@ -842,7 +848,7 @@ static void a_frame_is_lost_with_fewer_points_than_its_limit(void)
         frames_with(5, 0, 0, 800, 5);
         view = through;
         frame();
-        IH_TEST_EQUAL(seen == 99, tracks.track_count, "carried, though seen through", seen);
+        IH_TEST_EQUAL(seen == 99, tracks.track_count, "coasts, though seen through", seen);
         ih_tracks_init(&tracks);
         view = hit;
         frames_with(1, 0, 0, 800, 5);
@@ -864,8 +870,7 @@ static void a_gate_reaches_as_far_as_it_says(void)
         frame();
         add(0, 34 + far_side / 256.0, 800, -2);
         frame();
-        IH_TEST_EQUAL(far_side == 0, detections.detection[0].track_id != 0, "in the gate",
-                      far_side);
+        IH_TEST_EQUAL(far_side == 0, verdict(0).track_id != 0, "in the gate", far_side);
     }
 }
 
@@ -887,7 +892,7 @@ static void a_near_detection_is_better_than_a_probable_one(void)
         add(0, 0, 800, -2.5);
         add(0, cases[i].y_mm, 800, -2.5 + cases[i].more);
         frame();
-        IH_TEST_EQUAL(cases[i].own, tracks.track[0].detection, "finding", i);
+        IH_TEST_EQUAL(cases[i].own, tracks.track[0].index, "finding", i);
     }
 }
 
@@ -900,7 +905,7 @@ static void two_tracks_may_be_as_near_as_80_mm(void)
     add(0, 0, 880, 4);
     frame();
     TEST_ASSERT_EQUAL_INT32(3, tracks.track_count);
-    TEST_ASSERT_EQUAL_INT32(0, detections.detection[2].track_id);
+    TEST_ASSERT_EQUAL_INT32(0, verdict(2).track_id);
 }
 
 /* Each verdict needs more than its limit. */
@@ -933,19 +938,19 @@ static void a_track_is_continued_down_to_its_limits(void)
     params.memory_q16 = 0;
     frames_with(1, 0, 0, 800, -3);
     TEST_ASSERT_EQUAL_INT32(1, tracks.track_count);
-    TEST_ASSERT_EQUAL_INT32(1, detections.detection[0].track_id);
+    TEST_ASSERT_EQUAL_INT32(1, verdict(0).track_id);
     ih_tracks_init(&tracks);
     frames_with(1, 0, 0, 800, 5);
     frames_with(1, 0, 0, 800, -3073.0 / 1024);
-    TEST_ASSERT_EQUAL_INT32(0, detections.detection[0].track_id);
+    TEST_ASSERT_EQUAL_INT32(0, verdict(0).track_id);
     ih_tracks_init(&tracks);
     params.memory_q16 = 49152;
     frames_with(1, 0, 0, 800, 5);
     view = through;
     frames_with(1, 0, 0, 800, 0.5);
-    TEST_ASSERT_EQUAL_INT32(1, detections.detection[0].track_id);
+    TEST_ASSERT_EQUAL_INT32(1, verdict(0).track_id);
     frames_with(1, 0, 0, 800, 511.0 / 1024);
-    TEST_ASSERT_EQUAL_INT32(2, detections.detection[0].track_id);
+    TEST_ASSERT_EQUAL_INT32(2, verdict(0).track_id);
 }
 
 /* A head is no more chosen for its place where it is 3 less probable than the best. */
@@ -978,16 +983,15 @@ static void detections_of_a_track_are_counted(void)
 static void uncertainty_has_its_limits(void)
 {
     params.acceleration_mm_s2 = 8191;
-    params.carry_us = INT32_MAX;
-    detections.seen_count = 0; /* lost frames: it is carried */
+    params.coast_us = INT32_MAX;
+    detections.seen_count = 0; /* lost frames: it coasts */
     frames_with(1, 0, 0, 800, 5);
     frame_at(time_us + 2000000);
     frame_at(time_us + 2000000);
     TEST_ASSERT_EQUAL_INT32(1, tracks.track_count);
-    TEST_ASSERT_TRUE(tracks.track[0].place_q8 == (int64_t)500 * 500 * 256);
-    TEST_ASSERT_TRUE(tracks.track[0].speed_q8 == (int64_t)3000 * 3000 * 256);
-    IH_TEST_EQUAL(500 << 8, detections.detection[tracks.track[0].detection].sigma_mm_q8, "sigma",
-                  0);
+    TEST_ASSERT_TRUE(tracks.track[0].filter.position_q8 == (int64_t)500 * 500 * 256);
+    TEST_ASSERT_TRUE(tracks.track[0].filter.velocity_q8 == (int64_t)3000 * 3000 * 256);
+    IH_TEST_EQUAL(500 << 8, verdict(tracks.track[0].index).sigma_mm_q8, "sigma", 0);
 }
 
 /* For a range camera the middle of two heads is the optical axis itself, to the last unit. */
@@ -1014,15 +1018,16 @@ static void the_same_time_again_is_another_look(void)
     int64_t place_q8;
 
     frames_with(5, 0, 0, 800, 3);
-    place_q8 = tracks.track[0].place_q8;
+    place_q8 = tracks.track[0].filter.position_q8;
     add(4, 0, 800, 3);
     frame_at(time_us);
     TEST_ASSERT_EQUAL_INT32(1, tracks.selected_id);
-    TEST_ASSERT_TRUE(tracks.track[0].place_q8 < place_q8); /* twice seen is better known */
-    IH_TEST_RANGE(0, 4 << 8, tracks.track[0].head.centre_mm_q8[0], "between", 0);
+    TEST_ASSERT_TRUE(tracks.track[0].filter.position_q8 <
+                     place_q8); /* twice seen is better known */
+    IH_TEST_RANGE(0, 4 << 8, tracks.track[0].filter.head.centre_mm_q8[0], "between", 0);
     view = front;
     frame_at(time_us);
-    TEST_ASSERT_TRUE(is_carried(0));
+    TEST_ASSERT_TRUE(is_coasting(0));
 }
 
 static void late_frames_keep_the_track(void)
@@ -1054,7 +1059,7 @@ static void a_step_back_or_a_long_gap_forgets(void)
         frames_with(5, 0, 0, 800, 3);
         view = front;
         frame_at(time_us + steps_us[i]);
-        IH_TEST_EQUAL(0, tracks.track_count, "nothing is carried over", i);
+        IH_TEST_EQUAL(0, tracks.track_count, "no track stays", i);
         IH_TEST_EQUAL(IH_NONE, tracks.selected, "selected", i);
     }
 }
@@ -1228,7 +1233,8 @@ static void extreme_places_do_not_overflow(void)
         }
         frame();
         TEST_ASSERT_TRUE(tracks.track_count >= 1);
-        IH_TEST_RANGE(-3000 * 256, 3000 * 256, tracks.track[0].velocity_mm_s_q8[0], "speed", i);
+        IH_TEST_RANGE(-3000 * 256, 3000 * 256, tracks.track[0].filter.velocity_mm_s_q8[0], "speed",
+                      i);
     }
     view = front;
     frames_without(20);
@@ -1241,15 +1247,15 @@ static void a_head_that_runs_away_stays_in_the_format(void)
 
     frames_with(5, 0, 0, 800, 5);
     TEST_ASSERT_EQUAL_INT(1, tracks.track_count);
-    tracks.track[0].velocity_mm_s_q8[0] = -(3000 << 8);
-    tracks.track[0].velocity_mm_s_q8[2] = 3000 << 8;
+    tracks.track[0].filter.velocity_mm_s_q8[0] = -(3000 << 8);
+    tracks.track[0].filter.velocity_mm_s_q8[2] = 3000 << 8;
     for (i = 0; i < 3000; i++) {
         ih_tracks_expect(&tracks, &params, time_us += 2000000, &expected);
         IH_TEST_EQUAL(1, expected.count, "expected", i);
         IH_TEST_RANGE(-(1 << 26), 0, expected.head[0].centre_mm_q8[0], "x", i);
         IH_TEST_RANGE(800 << 8, 1 << 26, expected.head[0].centre_mm_q8[2], "z", i);
         add(0, 0, 0, 5)->head = expected.head[0];
-        ih_tracks_update(&tracks, &params, &rig, &detections);
+        ih_tracks_update(&tracks, &params, &rig, &detections, &predicted);
         detections.detection_count = 0;
     }
     IH_TEST_EQUAL(1 << 26, expected.head[0].centre_mm_q8[2], "z at its end", 0);
@@ -1265,11 +1271,11 @@ static void rare_frames_keep_the_variances_positive(void)
         add(5 * (i % 2), 0, 800, 3);
         frame_at(time_us + 2000000);
         IH_TEST_EQUAL(1, tracks.selected_id, "id", i);
-        TEST_ASSERT_TRUE(tracks.track[0].place_q8 > 0);
-        TEST_ASSERT_TRUE(tracks.track[0].speed_q8 > 0);
-        IH_TEST_RANGE(1, 13 << 8, detections.detection[0].sigma_mm_q8, "sigma", i);
+        TEST_ASSERT_TRUE(tracks.track[0].filter.position_q8 > 0);
+        TEST_ASSERT_TRUE(tracks.track[0].filter.velocity_q8 > 0);
+        IH_TEST_RANGE(1, 13 << 8, verdict(0).sigma_mm_q8, "sigma", i);
         /* 5 mm in 2 s */
-        IH_TEST_RANGE(-20 * 256, 20 * 256, tracks.track[0].velocity_mm_s_q8[0], "speed", i);
+        IH_TEST_RANGE(-20 * 256, 20 * 256, tracks.track[0].filter.velocity_mm_s_q8[0], "speed", i);
     }
 }
 
@@ -1297,21 +1303,22 @@ static void the_covariance_stays_positive(void)
         }
         view = front;
         ih_tracks_expect(&tracks, &params, time_us += step, &expected);
-        ih_tracks_update(&tracks, &params, &rig, &detections);
+        ih_tracks_update(&tracks, &params, &rig, &detections, &predicted);
         detections.detection_count = 0;
         if (tracks.track_count == 0) {
             continue;
         }
         {
-            const double place = from_q8(track->place_q8), cross = from_q8(track->cross_q8);
-            const double speed = from_q8(track->speed_q8);
+            const double place = from_q8(track->filter.position_q8),
+                         cross = from_q8(track->filter.cross_q8);
+            const double speed = from_q8(track->filter.velocity_q8);
             /* Steps of Q8 collected over frames, the squared time's half step of 2^-21 s^2, and a
              * gain's of 2^-17. */
             const double place_more = place + 0.2 + speed / 1048576;
             const double speed_more = speed + 2 + fabs(cross) / 32768;
 
-            IH_TEST_RANGE(0, 250000 << 8, track->place_q8, "place", i);
-            IH_TEST_RANGE(0, (int64_t)9000000 << 8, track->speed_q8, "speed", i);
+            IH_TEST_RANGE(0, 250000 << 8, track->filter.position_q8, "place", i);
+            IH_TEST_RANGE(0, (int64_t)9000000 << 8, track->filter.velocity_q8, "speed", i);
             if (place_more * speed_more < cross * cross) {
                 IH_TEST_WITHIN(0, place_more * speed_more, cross * cross, "determinant", i);
             }
@@ -1329,26 +1336,26 @@ int main(void)
     RUN_TEST(crossing_heads_keep_their_ids);
     RUN_TEST(the_order_of_detections_does_not_matter);
     RUN_TEST(a_full_table_takes_no_further_head);
-    RUN_TEST(carried_heads_have_room_beside_a_full_list);
+    RUN_TEST(predicted_heads_have_room_beside_a_full_list);
     RUN_TEST(ids_wrap_to_one);
     RUN_TEST(an_id_in_use_is_not_given_again);
     RUN_TEST(of_two_tracks_at_one_place_the_older_stays);
     RUN_TEST(a_weak_detection_becomes_a_head_after_evidence);
     RUN_TEST(an_improbable_detection_starts_nothing);
-    RUN_TEST(a_tentative_track_is_not_carried);
+    RUN_TEST(a_tentative_track_does_not_coast);
     RUN_TEST(a_rejected_detection_in_the_gate_is_accepted_again);
     RUN_TEST(a_head_that_becomes_improbable_ends_as_one);
     RUN_TEST(one_frame_does_not_decide_for_long);
     RUN_TEST(a_seat_that_is_seen_through_ends_at_once);
     RUN_TEST(what_is_seen_through_needs_a_convincing_detection);
     RUN_TEST(a_seat_is_empty_by_its_limits);
-    RUN_TEST(a_head_in_plain_view_is_not_carried);
+    RUN_TEST(a_head_in_plain_view_does_not_coast);
     RUN_TEST(hidden_begins_at_its_limit);
     RUN_TEST(evidence_makes_a_head);
     RUN_TEST(hands_before_a_head_do_not_end_it);
-    RUN_TEST(a_carried_head_has_no_evidence);
-    RUN_TEST(a_head_is_carried_for_carry_us_at_most);
-    RUN_TEST(a_carried_head_slows_down);
+    RUN_TEST(a_predicted_head_has_no_evidence);
+    RUN_TEST(a_track_coasts_for_coast_us_at_most);
+    RUN_TEST(a_coasting_track_slows_down);
     RUN_TEST(a_frame_is_lost_with_fewer_points_than_its_limit);
     RUN_TEST(a_gate_reaches_as_far_as_it_says);
     RUN_TEST(a_near_detection_is_better_than_a_probable_one);
@@ -1359,8 +1366,8 @@ int main(void)
     RUN_TEST(detections_of_a_track_are_counted);
     RUN_TEST(uncertainty_has_its_limits);
     RUN_TEST(the_middle_of_a_range_camera_is_its_axis);
-    RUN_TEST(the_gate_grows_while_carried);
-    RUN_TEST(sigma_grows_while_carried_and_shrinks_when_seen);
+    RUN_TEST(the_gate_grows_while_coasting);
+    RUN_TEST(sigma_grows_while_coasting_and_shrinks_when_seen);
     RUN_TEST(the_same_time_again_is_another_look);
     RUN_TEST(late_frames_keep_the_track);
     RUN_TEST(a_step_back_or_a_long_gap_forgets);
