@@ -91,6 +91,8 @@ EXCEPTIONS = [
     (r".", r"TEST_ASSERT_\w+|is_less|std::less", "Unity's names; a comparison"),
     (r".", r"visible_share", "a key of truth.jsonl (docs/contract.md)"),
     (r"^tests/checks/(static|lint_commands)\.py$|^docs/misra\.md$", r"(?i).*findings?", "what a linter reports"),
+    (r"^docs/contract\.md$", r"findings", "a key of a record and of a trace"),
+    (r"^docs/trust\.md$", r"findings", "a target of the fuzzers, and their folder"),
     (r"^sim/report/.*\.js$", r"cuts|findings", "keys of a trace (docs/contract.md)"),
     (r"^tools/render/", r"(?i).*turn(ed)?.*", "a person turns"),
 ]
