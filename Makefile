@@ -31,7 +31,7 @@ ARCH ?= arm64
 .PHONY: help sim frames sanitize test check unit fuzz coverage ranges exhaustive mutation accept eval bench \
   bench-instructions bench-peers bench-grow bench-worst test-bench bits cortexm longrun size vectors learn view figures \
   test-view test-report live-pictures export board board-gpiod2 deb image flash calibrate test-calibration \
-  test-calibration-short test-deb test-board test-image format formatted words layout lint clean
+  test-calibration-short test-deb test-board test-image format formatted words layout links lint clean
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z_-]+:.*## / { \
@@ -277,7 +277,10 @@ words: ## old words of our own in names, comments, messages and documents, and t
 layout: ## files of at most 520 lines, vectors in simd alone, at most 1,000 files
 	@/usr/bin/python3 tests/checks/layout.py
 
-lint: sanitize layout ## clang-tidy, cppcheck, MISRA C, gcc -fanalyzer; what they may find: docs/misra.md
+links: ## links and names of files in the documents lead somewhere
+	@/usr/bin/python3 tests/checks/links.py
+
+lint: sanitize layout links ## clang-tidy, cppcheck, MISRA C, gcc -fanalyzer; what they may find: docs/misra.md
 	@tools/setup.sh lint
 	@/usr/bin/python3 tests/checks/static.py $(BUILD)/sanitize
 	@/usr/bin/python3 tests/checks/lint_commands.py $(BUILD)/sanitize $(BUILD)/lint
