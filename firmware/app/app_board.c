@@ -134,10 +134,10 @@ static enum app_exit run_loop(struct app_board *board, const struct app_config *
         .signal_fd = &board->signals.fd,
     };
     hal_events_init(&board->events, &events);
-    board->loop.config = config;
-    board->loop.log = &board->log;
-    board->loop.head = &board->head;
-    board->loop.hal = (struct app_hal){
+    board->state.config = config;
+    board->state.log = &board->log;
+    board->state.head = &board->head;
+    board->state.hal = (struct app_hal){
         .camera = &board->v4l2.camera,
         .strobe = &board->guard.strobe,
         .events = &board->events.events,
@@ -146,7 +146,7 @@ static enum app_exit run_loop(struct app_board *board, const struct app_config *
         .output = &board->output.output,
         .viewer = config->view_port[0] != 0 ? &board->viewer.viewer : NULL,
     };
-    return app_loop_run(&board->loop);
+    return app_loop_run(&board->state);
 }
 
 static enum app_exit run_with_output(struct app_board *board, const struct app_config *config)

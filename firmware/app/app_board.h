@@ -38,7 +38,7 @@ struct app_board {
     struct hal_output_state output;
     struct hal_viewer_process viewer;
     struct isohead head;
-    struct app_loop loop;
+    struct app_state state;
 };
 
 /* Frames in, records out, until asked to end. */

@@ -12,12 +12,12 @@
 #ifndef APP_HEALTH_H
 #define APP_HEALTH_H
 
-#include "app_loop.h"
+#include "app_state.h"
 
 /* The rig has just been made from its file. */
-void app_health_begin(struct app_loop *loop);
+void app_health_begin(struct app_state *state);
 
 /* A lit frame whose result is there and not yet in a record. */
-void app_health_frame(struct app_loop *loop);
+void app_health_frame(struct app_state *state);
 
 #endif

@@ -7,166 +7,154 @@
 #include "app_rig.h"
 #include "app_rig_explain.h"
 
-static int64_t now(const struct app_loop *loop)
-{
-    return loop->hal.clock->now_us(loop->hal.clock->context);
-}
-
-void app_loop_end(struct app_loop *loop, enum app_exit exit)
-{
-    app_laser_wish(&loop->laser, false, now(loop));
-    loop->is_over = true;
-    loop->exit = exit;
-}
-
 /* A strobe that failed ends the program, and is told even at its end: the laser may be on. */
-static void watch_fault(struct app_loop *loop)
+static void watch_fault(struct app_state *state)
 {
-    const struct app_laser *laser = &loop->laser;
-    if ((laser->blocks & APP_LASER_BLOCK_FAULT) != 0 && !loop->told_fault) {
-        loop->told_fault = true;
-        app_log_say(loop->log, APP_LOG_ERROR, "laser: %s", laser->failed.text);
-        app_loop_end(loop, APP_EXIT_FAILED);
+    const struct app_laser *laser = &state->laser;
+    if ((laser->blocks & APP_LASER_BLOCK_FAULT) != 0 && !state->told_fault) {
+        state->told_fault = true;
+        app_log_say(state->log, APP_LOG_ERROR, "laser: %s", laser->failed.text);
+        app_state_end(state, APP_EXIT_FAILED);
     }
 }
 
 /* Into the log and the sums: what became of the laser. */
-static void watch_laser(struct app_loop *loop)
+static void watch_laser(struct app_state *state)
 {
-    struct app_laser *laser = &loop->laser;
+    struct app_laser *laser = &state->laser;
     const unsigned quiet = APP_LASER_BLOCK_DISABLED | APP_LASER_BLOCK_DUTY;
     unsigned blocks = laser->blocks & ~quiet;
-    loop->status.laser_on_us = laser->on_us;
+    state->status.laser_on_us = laser->on_us;
     bool is_fault = (blocks & APP_LASER_BLOCK_FAULT) != 0; /* has a message of its own */
-    if (blocks != loop->told_blocks && laser->config.enabled && !is_fault) {
+    if (blocks != state->told_blocks && laser->config.enabled && !is_fault) {
         const char *why = app_laser_block_text(blocks);
         if (why != NULL) {
-            app_log_say(loop->log, APP_LOG_WARNING, "laser off: %s", why);
+            app_log_say(state->log, APP_LOG_WARNING, "laser off: %s", why);
         } else {
-            app_log_say(loop->log, APP_LOG_INFO, "laser allowed");
+            app_log_say(state->log, APP_LOG_INFO, "laser allowed");
         }
     }
-    loop->told_blocks = blocks;
-    watch_fault(loop);
+    state->told_blocks = blocks;
+    watch_fault(state);
 }
 
-static bool load_rig(struct app_loop *loop, struct hal_error *error)
+static bool load_rig(struct app_state *state, struct hal_error *error)
 {
     struct ih_calibration calibration;
     int32_t bad_slot = IH_NONE;
-    if (!app_rig_load(loop->config->rig, &calibration, error)) {
+    if (!app_rig_load(state->config->rig, &calibration, error)) {
         return false;
     }
     if (calibration.kind == IH_RIG_RANGE) {
         return hal_fail(error, "kind: range, expected a rig with a laser: dots");
     }
-    enum ih_err err = isohead_init(loop->head, &calibration, &bad_slot);
-    if (loop->config->paper) {
-        ih_params_paper(&loop->head->params);
+    enum ih_err err = isohead_init(state->head, &calibration, &bad_slot);
+    if (state->config->paper) {
+        ih_params_paper(&state->head->params);
     }
     if (err != IH_OK) {
         app_rig_explain(&calibration, err, bad_slot, error);
         return false;
     }
-    app_health_begin(loop);
+    app_health_begin(state);
     return true;
 }
 
 /* The camera was opened for the size of the first rig. */
-static void reload_rig(struct app_loop *loop)
+static void reload_rig(struct app_state *state)
 {
     struct hal_error error;
-    app_laser_rig(&loop->laser, false, now(loop));
-    loop->rig_is_valid = load_rig(loop, &error);
-    const struct ih_calibration *rig = &loop->head->rig.calibration;
-    if (loop->rig_is_valid && (rig->width != loop->width || rig->height != loop->height)) {
-        loop->rig_is_valid = hal_fail(&error,
-                                      "%" PRId32 "x%" PRId32 " px, expected %" PRId32 "x%" PRId32
-                                      " as before: for another size start anew",
-                                      rig->width, rig->height, loop->width, loop->height);
+    app_laser_rig(&state->laser, false, app_state_now_us(state));
+    state->rig_is_valid = load_rig(state, &error);
+    const struct ih_calibration *rig = &state->head->rig.calibration;
+    if (state->rig_is_valid && (rig->width != state->width || rig->height != state->height)) {
+        state->rig_is_valid = hal_fail(&error,
+                                       "%" PRId32 "x%" PRId32 " px, expected %" PRId32 "x%" PRId32
+                                       " as before: for another size start anew",
+                                       rig->width, rig->height, state->width, state->height);
     }
-    if (loop->rig_is_valid) {
-        app_log_say(loop->log, APP_LOG_INFO, "%s: reloaded", loop->config->rig);
-        app_laser_rig(&loop->laser, true, now(loop));
-        app_frame_light(loop);
+    if (state->rig_is_valid) {
+        app_log_say(state->log, APP_LOG_INFO, "%s: reloaded", state->config->rig);
+        app_laser_rig(&state->laser, true, app_state_now_us(state));
+        app_frame_light(state);
     } else {
-        app_log_say(loop->log, APP_LOG_ERROR, "%s: %s; no records until a good one is reloaded",
-                    loop->config->rig, error.text);
+        app_log_say(state->log, APP_LOG_ERROR, "%s: %s; no records until a good one is reloaded",
+                    state->config->rig, error.text);
     }
 }
 
-static int64_t silence_max_us(const struct app_loop *loop)
+static int64_t silence_max_us(const struct app_state *state)
 {
-    int64_t silence_us = APP_LOOP_SILENT_FRAMES * loop->frame_time_us;
+    int64_t silence_us = APP_LOOP_SILENT_FRAMES * state->frame_time_us;
     return silence_us > APP_LOOP_SILENT_MIN_US ? silence_us : APP_LOOP_SILENT_MIN_US;
 }
 
-static void close_camera(struct app_loop *loop)
+static void close_camera(struct app_state *state)
 {
-    const struct hal_camera *camera = loop->hal.camera;
-    app_laser_camera(&loop->laser, false, 0, now(loop));
-    app_frame_forget(loop);
+    const struct hal_camera *camera = state->hal.camera;
+    app_laser_camera(&state->laser, false, 0, app_state_now_us(state));
+    app_frame_forget(state);
     camera->close(camera->context);
-    loop->is_streaming = false;
+    state->is_streaming = false;
 }
 
 /* Laser off, and again later. */
-static void lose_camera(struct app_loop *loop, const char *why)
+static void lose_camera(struct app_state *state, const char *why)
 {
-    if (loop->is_streaming) {
-        loop->live.strobe = "reopened";
+    if (state->is_streaming) {
+        state->live.strobe = "reopened";
     }
-    close_camera(loop);
-    app_log_say(loop->log, APP_LOG_ERROR, "%s: %s; trying again", loop->config->device, why);
-    loop->retry_us = now(loop) + loop->retry_wait_us;
-    loop->retry_wait_us *= 2;
-    if (loop->retry_wait_us > APP_LOOP_RETRY_MAX_US) {
-        loop->retry_wait_us = APP_LOOP_RETRY_MAX_US;
+    close_camera(state);
+    app_log_say(state->log, APP_LOG_ERROR, "%s: %s; trying again", state->config->device, why);
+    state->retry_us = app_state_now_us(state) + state->retry_wait_us;
+    state->retry_wait_us *= 2;
+    if (state->retry_wait_us > APP_LOOP_RETRY_MAX_US) {
+        state->retry_wait_us = APP_LOOP_RETRY_MAX_US;
     }
 }
 
-static void open_camera(struct app_loop *loop)
+static void open_camera(struct app_state *state)
 {
-    const struct hal_camera *camera = loop->hal.camera;
+    const struct hal_camera *camera = state->hal.camera;
     struct hal_error error;
     if (!camera->open(camera->context, &error)) {
-        lose_camera(loop, error.text);
+        lose_camera(state, error.text);
         return;
     }
-    loop->is_streaming = true;
-    loop->frame_time_us = camera->frame_time_us(camera->context);
-    if (loop->frame_time_us <= 0) { /* it does not say, and then it took no rate either */
-        loop->frame_time_us = APP_LOOP_FRAME_TIME_US;
+    state->is_streaming = true;
+    state->frame_time_us = camera->frame_time_us(camera->context);
+    if (state->frame_time_us <= 0) { /* it does not say, and then it took no rate either */
+        state->frame_time_us = APP_LOOP_FRAME_TIME_US;
     }
-    loop->frame_us = now(loop);
-    app_frame_begin(loop);
-    app_log_say(loop->log, APP_LOG_INFO, "%s: open, a frame every %" PRId64 " us",
-                loop->config->device, loop->frame_time_us);
-    app_laser_camera(&loop->laser, true, loop->frame_time_us, now(loop));
-    app_frame_light(loop);
+    state->frame_us = app_state_now_us(state);
+    app_frame_begin(state);
+    app_log_say(state->log, APP_LOG_INFO, "%s: open, a frame every %" PRId64 " us",
+                state->config->device, state->frame_time_us);
+    app_laser_camera(&state->laser, true, state->frame_time_us, app_state_now_us(state));
+    app_frame_light(state);
 }
 
 /* A frame came, whatever becomes of it. */
-static void note_frame(struct app_loop *loop)
+static void note_frame(struct app_state *state)
 {
-    int64_t now_us = now(loop);
-    bool is_late = now_us - loop->frame_us > APP_LASER_SILENT_FRAMES * loop->frame_time_us;
-    if (loop->sequence >= 0 && is_late) {
-        loop->live.strobe = "late";
+    int64_t now_us = app_state_now_us(state);
+    bool is_late = now_us - state->frame_us > APP_LASER_SILENT_FRAMES * state->frame_time_us;
+    if (state->sequence >= 0 && is_late) {
+        state->live.strobe = "late";
     }
-    loop->frame_us = now_us;
-    loop->retry_wait_us = APP_LOOP_RETRY_MIN_US;
+    state->frame_us = now_us;
+    state->retry_wait_us = APP_LOOP_RETRY_MIN_US;
 }
 
 /* The newest frame that waits, or what is wrong. */
-static void take_frames(struct app_loop *loop)
+static void take_frames(struct app_state *state)
 {
-    const struct hal_camera *camera = loop->hal.camera;
+    const struct hal_camera *camera = state->hal.camera;
     struct hal_error error;
     struct hal_frame newest = {.samples = NULL};
     bool has_newest = false;
     enum hal_next next = HAL_NEXT_FRAME;
-    for (int i = 0; i < APP_LOOP_DRAIN_MAX && next != HAL_NEXT_NONE && loop->is_streaming; i++) {
+    for (int i = 0; i < APP_LOOP_DRAIN_MAX && next != HAL_NEXT_NONE && state->is_streaming; i++) {
         struct hal_frame frame;
         next = camera->next(camera->context, &frame, &error);
         if (next == HAL_NEXT_GONE || next == HAL_NEXT_END) {
@@ -175,15 +163,15 @@ static void take_frames(struct app_loop *loop)
         if (next == HAL_NEXT_NONE) {
             continue;
         }
-        note_frame(loop);
+        note_frame(state);
         if (next == HAL_NEXT_BAD) {
             /* The camera lives, but nobody has seen anything: no frame to the laser. */
-            app_frame_lose(loop, &frame, error.text);
+            app_frame_lose(state, &frame, error.text);
             continue;
         }
-        app_laser_frame(&loop->laser, now(loop));
+        app_laser_frame(&state->laser, app_state_now_us(state));
         if (has_newest) {
-            app_frame_skip(loop, &newest);
+            app_frame_skip(state, &newest);
         }
         newest = frame;
         has_newest = true;
@@ -192,136 +180,136 @@ static void take_frames(struct app_loop *loop)
         if (has_newest) {
             camera->release(camera->context, &newest);
         }
-        lose_camera(loop, next == HAL_NEXT_GONE ? error.text : "no more frames");
+        lose_camera(state, next == HAL_NEXT_GONE ? error.text : "no more frames");
     } else if (has_newest) {
-        app_laser_busy(&loop->laser, true, now(loop));
-        app_frame_use(loop, &newest);
-        app_laser_busy(&loop->laser, false, now(loop));
-        loop->frame_us = now(loop);
+        app_laser_busy(&state->laser, true, app_state_now_us(state));
+        app_frame_use(state, &newest);
+        app_laser_busy(&state->laser, false, app_state_now_us(state));
+        state->frame_us = app_state_now_us(state);
     }
 }
 
-static void reset(struct app_loop *loop)
+static void reset(struct app_state *state)
 {
-    const struct app_config *config = loop->config;
+    const struct app_config *config = state->config;
     const struct app_laser_config laser = {config->laser, config->duty_percent};
-    int64_t now_us = now(loop);
-    app_laser_init(&loop->laser, &laser, loop->hal.strobe, now_us);
-    app_phase_init(&loop->phase);
-    app_status_init(&loop->status, config->status_s, now_us);
-    loop->told_blocks = loop->laser.blocks;
-    loop->told_fault = false;
-    loop->light_wanted = false;
-    loop->on_frames = 0;
-    loop->is_streaming = false;
-    loop->retry_us = now_us;
-    loop->retry_wait_us = APP_LOOP_RETRY_MIN_US;
-    loop->sequence = -1;
-    loop->has_ambient = false;
-    loop->steers = false;
-    loop->live = (struct app_record_live){.lost_count = 0};
-    loop->result_count = 0;
-    loop->record.dir = NULL;
-    loop->is_over = false;
-    loop->exit = APP_EXIT_GOOD;
+    int64_t now_us = app_state_now_us(state);
+    app_laser_init(&state->laser, &laser, state->hal.strobe, now_us);
+    app_phase_init(&state->phase);
+    app_status_init(&state->status, config->status_s, now_us);
+    state->told_blocks = state->laser.blocks;
+    state->told_fault = false;
+    state->light_wanted = false;
+    state->on_frames = 0;
+    state->is_streaming = false;
+    state->retry_us = now_us;
+    state->retry_wait_us = APP_LOOP_RETRY_MIN_US;
+    state->sequence = -1;
+    state->has_ambient = false;
+    state->steers = false;
+    state->live = (struct app_record_live){.lost_count = 0};
+    state->result_count = 0;
+    state->record.dir = NULL;
+    state->is_over = false;
+    state->exit = APP_EXIT_GOOD;
 }
 
 /* A frame is due, or the camera is. */
-static int64_t camera_wait_us(const struct app_loop *loop, int64_t now_us)
+static int64_t camera_wait_us(const struct app_state *state, int64_t now_us)
 {
-    int64_t at_us = loop->is_streaming ? loop->frame_us + silence_max_us(loop) : loop->retry_us;
+    int64_t at_us = state->is_streaming ? state->frame_us + silence_max_us(state) : state->retry_us;
     return at_us > now_us ? at_us - now_us : 0;
 }
 
-static void run_camera(struct app_loop *loop, unsigned events)
+static void run_camera(struct app_state *state, unsigned events)
 {
-    if (!loop->is_streaming) {
-        if (now(loop) >= loop->retry_us) {
-            open_camera(loop);
+    if (!state->is_streaming) {
+        if (app_state_now_us(state) >= state->retry_us) {
+            open_camera(state);
         }
         return;
     }
     if ((events & HAL_EVENT_FRAME) != 0) {
-        take_frames(loop);
+        take_frames(state);
     }
-    if (loop->is_streaming && now(loop) - loop->frame_us >= silence_max_us(loop)) {
-        lose_camera(loop, "no frames");
+    if (state->is_streaming && app_state_now_us(state) - state->frame_us >= silence_max_us(state)) {
+        lose_camera(state, "no frames");
     }
 }
 
 /* False: time or something that cannot be mended. */
-static bool wait(struct app_loop *loop, unsigned *events)
+static bool wait(struct app_state *state, unsigned *events)
 {
-    const struct app_hal *hal = &loop->hal;
+    const struct app_hal *hal = &state->hal;
     struct hal_error error;
-    int64_t now_us = now(loop);
-    int64_t wait_us = app_laser_tick(&loop->laser, now_us);
-    int64_t camera_us = camera_wait_us(loop, now_us);
-    watch_laser(loop);
-    if (loop->is_over) {
+    int64_t now_us = app_state_now_us(state);
+    int64_t wait_us = app_laser_tick(&state->laser, now_us);
+    int64_t camera_us = camera_wait_us(state, now_us);
+    watch_laser(state);
+    if (state->is_over) {
         return false;
     }
     wait_us = camera_us < wait_us ? camera_us : wait_us;
     if (!hal->events->wait(hal->events->context, wait_us, events, &error)) {
-        app_log_say(loop->log, APP_LOG_ERROR, "waiting: %s", error.text);
-        app_loop_end(loop, APP_EXIT_FAILED);
+        app_log_say(state->log, APP_LOG_ERROR, "waiting: %s", error.text);
+        app_state_end(state, APP_EXIT_FAILED);
         return false;
     }
     if (!hal->watchdog->feed(hal->watchdog->context, &error)) {
-        app_log_say(loop->log, APP_LOG_ERROR, "watchdog: %s", error.text);
-        app_loop_end(loop, APP_EXIT_FAILED);
+        app_log_say(state->log, APP_LOG_ERROR, "watchdog: %s", error.text);
+        app_state_end(state, APP_EXIT_FAILED);
         return false;
     }
     return true;
 }
 
-static void turn(struct app_loop *loop)
+static void turn(struct app_state *state)
 {
     char line[APP_STATUS_TEXT_MAX];
     unsigned events = 0;
-    if (!wait(loop, &events)) {
+    if (!wait(state, &events)) {
         return;
     }
-    app_log_time(loop->log, now(loop));
+    app_log_time(state->log, app_state_now_us(state));
     if ((events & HAL_EVENT_STOP) != 0) {
-        app_loop_end(loop, APP_EXIT_GOOD);
+        app_state_end(state, APP_EXIT_GOOD);
         return;
     }
     if ((events & HAL_EVENT_INTERLOCK) != 0) {
-        app_laser_interlock(&loop->laser, now(loop));
+        app_laser_interlock(&state->laser, app_state_now_us(state));
     }
     if ((events & HAL_EVENT_RELOAD) != 0) {
-        reload_rig(loop);
+        reload_rig(state);
     }
-    run_camera(loop, events);
-    watch_laser(loop);
-    if (app_status_line(&loop->status, now(loop), line)) {
-        app_log_tell(loop->log, APP_LOG_INFO, line);
+    run_camera(state, events);
+    watch_laser(state);
+    if (app_status_line(&state->status, app_state_now_us(state), line)) {
+        app_log_tell(state->log, APP_LOG_INFO, line);
     }
 }
 
-enum app_exit app_loop_run(struct app_loop *loop)
+enum app_exit app_loop_run(struct app_state *state)
 {
     struct hal_error error;
-    reset(loop);
-    loop->rig_is_valid = load_rig(loop, &error);
-    if (!loop->rig_is_valid) {
-        app_log_say(loop->log, APP_LOG_ERROR, "%s: %s", loop->config->rig, error.text);
+    reset(state);
+    state->rig_is_valid = load_rig(state, &error);
+    if (!state->rig_is_valid) {
+        app_log_say(state->log, APP_LOG_ERROR, "%s: %s", state->config->rig, error.text);
         return APP_EXIT_USAGE;
     }
-    loop->width = loop->head->rig.calibration.width;
-    loop->height = loop->head->rig.calibration.height;
-    app_laser_rig(&loop->laser, true, now(loop));
-    if (app_laser_open(&loop->laser)) {
-        while (!loop->is_over) {
-            turn(loop);
+    state->width = state->head->rig.calibration.width;
+    state->height = state->head->rig.calibration.height;
+    app_laser_rig(&state->laser, true, app_state_now_us(state));
+    if (app_laser_open(&state->laser)) {
+        while (!state->is_over) {
+            turn(state);
         }
     } else {
-        watch_laser(loop);
+        watch_laser(state);
     }
-    close_camera(loop);
-    app_laser_close(&loop->laser, now(loop));
-    watch_fault(loop);
-    app_log_end(loop->log);
-    return loop->exit;
+    close_camera(state);
+    app_laser_close(&state->laser, app_state_now_us(state));
+    watch_fault(state);
+    app_log_end(state->log);
+    return state->exit;
 }

@@ -30,7 +30,7 @@ static struct hal_camera camera;
 static struct app_config config;
 static struct app_log messages;
 static struct isohead head;
-static struct app_loop loop;
+static struct app_state state;
 static struct hal_viewer_process viewer;
 static int64_t frame_count, given_count, period_us, next_us, passed_us, last_us;
 static bool is_due;
@@ -185,19 +185,19 @@ static void run(bool has_viewer)
                                  .release = camera_release,
                                  .frame_time_us = camera_frame_time};
     app_log_init(&messages, write_message, NULL, hal_clock.now_us(hal_clock.context));
-    loop.config = &config;
-    loop.log = &messages;
-    loop.head = &head;
-    loop.hal = (struct app_hal){.camera = &camera,
-                                .strobe = &strobe,
-                                .events = &events,
-                                .clock = &hal_clock,
-                                .watchdog = &watchdog,
-                                .output = &output,
-                                .viewer = has_viewer ? &viewer.viewer : NULL};
+    state.config = &config;
+    state.log = &messages;
+    state.head = &head;
+    state.hal = (struct app_hal){.camera = &camera,
+                                 .strobe = &strobe,
+                                 .events = &events,
+                                 .clock = &hal_clock,
+                                 .watchdog = &watchdog,
+                                 .output = &output,
+                                 .viewer = has_viewer ? &viewer.viewer : NULL};
     int64_t began_us = hal_clock.now_us(hal_clock.context), began_cpu_us = cpu_us();
     next_us = began_us;
-    if (app_loop_run(&loop) != APP_EXIT_GOOD) {
+    if (app_loop_run(&state) != APP_EXIT_GOOD) {
         die("loop", "did not end well");
     }
     fprintf(stderr, "frames %" PRId64 " cpu_us %" PRId64 " real_us %" PRId64 "\n", given_count,

@@ -118,7 +118,7 @@ struct world {
     /* The board program. */
     struct app_config config;
     struct app_log log;
-    struct app_loop loop;
+    struct app_state state;
     struct hal_camera camera;
     struct hal_strobe strobe;
     struct hal_events event_table;
@@ -654,10 +654,10 @@ static void world_init(enum app_strobe strobe, const enum world_act *act, int ac
     world.clock = (struct hal_clock){.now_us = world_now};
     world.watchdog = (struct hal_watchdog){.feed = world_feed};
     world.output = (struct hal_output){.send = world_send};
-    world.loop.config = &world.config;
-    world.loop.log = &world.log;
-    world.loop.head = &world_head;
-    world.loop.hal = (struct app_hal){
+    world.state.config = &world.config;
+    world.state.log = &world.log;
+    world.state.head = &world_head;
+    world.state.hal = (struct app_hal){
         .camera = &world.camera,
         .strobe = &world.strobe,
         .events = &world.event_table,
@@ -670,7 +670,7 @@ static void world_init(enum app_strobe strobe, const enum world_act *act, int ac
 /* Until it ends; then the line is low and nothing is held. */
 static enum app_exit world_run(void)
 {
-    enum app_exit exit = app_loop_run(&world.loop);
+    enum app_exit exit = app_loop_run(&world.state);
     TEST_ASSERT_FALSE_MESSAGE(world.line, "the laser is on at the end");
     TEST_ASSERT_FALSE_MESSAGE(world.line_taken, "the line is still taken at the end");
     TEST_ASSERT_FALSE_MESSAGE(world.camera_open, "the camera is open at the end");

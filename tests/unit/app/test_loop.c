@@ -321,11 +321,11 @@ static void test_on_for_long(void)
     const struct hal_frame frame = {.samples = &nothing, .width = 752, .height = 582, .name = ""};
     world_init(APP_STROBE_ALWAYS, acts, COUNT(acts));
     TEST_ASSERT_EQUAL_INT(APP_EXIT_GOOD, world_run());
-    world.loop.laser.is_on = world.loop.light_wanted = true;
-    world.loop.on_frames = INT32_MAX;
+    world.state.laser.is_on = world.state.light_wanted = true;
+    world.state.on_frames = INT32_MAX;
     world.held[0] = true;
-    app_frame_use(&world.loop, &frame);
-    TEST_ASSERT_GREATER_THAN_INT32(APP_PHASE_FLIGHT_MAX, world.loop.on_frames);
+    app_frame_use(&world.state, &frame);
+    TEST_ASSERT_GREATER_THAN_INT32(APP_PHASE_FLIGHT_MAX, world.state.on_frames);
     TEST_ASSERT_EQUAL_INT(1, world.dark_count);
 }
 
