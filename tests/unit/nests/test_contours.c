@@ -11,14 +11,14 @@
 #define LAST ((SIDE - 1) * UNIT)
 
 static struct ih_surface surface;
-static struct ih_contours cuts;
+static struct ih_contours contours;
 static struct ih_test_random random_source;
 
 void setUp(void)
 {
     random_source.state = 71;
     memset(&surface, 0, sizeof surface);
-    memset(&cuts, IH_TEST_FILL, sizeof cuts);
+    memset(&contours, IH_TEST_FILL, sizeof contours);
     surface.valid = true;
 }
 
@@ -108,7 +108,7 @@ static bool share_a_cell(struct ih_vertex a, struct ih_vertex b)
 
 static double signed_area(const struct ih_contour *contour)
 {
-    const struct ih_vertex *v = &cuts.vertex[contour->first];
+    const struct ih_vertex *v = &contours.vertex[contour->first];
     double sum = 0;
     int32_t i;
 
@@ -122,7 +122,7 @@ static double signed_area(const struct ih_contour *contour)
 
 static void check_contour(const struct ih_contour *contour, int32_t index)
 {
-    const struct ih_vertex *v = &cuts.vertex[contour->first];
+    const struct ih_vertex *v = &contours.vertex[contour->first];
     int32_t i;
 
     IH_TEST_RANGE(2, IH_CONTOURS_VERTICES_MAX, contour->vertex_count, "vertices of contour", index);
@@ -148,21 +148,21 @@ static void cut(int32_t level_mm_q8)
     const int32_t crossing_count = find_crossings(level_mm_q8);
     int32_t i, next = 0;
 
-    memset(&cuts, IH_TEST_FILL, sizeof cuts);
-    ih_contours_level(&surface, level_mm_q8, &cuts);
-    IH_TEST_EQUAL(level_mm_q8, cuts.level_mm_q8, "level", 0);
-    for (i = 0; i < cuts.contour_count; i++) {
-        IH_TEST_EQUAL(next, cuts.contour[i].first, "first", i);
-        check_contour(&cuts.contour[i], i);
-        next += cuts.contour[i].vertex_count;
+    memset(&contours, IH_TEST_FILL, sizeof contours);
+    ih_contours_level(&surface, level_mm_q8, &contours);
+    IH_TEST_EQUAL(level_mm_q8, contours.level_mm_q8, "level", 0);
+    for (i = 0; i < contours.contour_count; i++) {
+        IH_TEST_EQUAL(next, contours.contour[i].first, "first", i);
+        check_contour(&contours.contour[i], i);
+        next += contours.contour[i].vertex_count;
     }
-    IH_TEST_EQUAL(next, cuts.vertex_count, "vertices in all", 0);
-    if (cuts.contours_dropped == 0) {
-        IH_TEST_EQUAL(crossing_count, cuts.vertex_count, "crossings used", 0);
+    IH_TEST_EQUAL(next, contours.vertex_count, "vertices in all", 0);
+    if (contours.contours_dropped == 0) {
+        IH_TEST_EQUAL(crossing_count, contours.vertex_count, "crossings used", 0);
     }
-    IH_TEST_UNTOUCHED(&cuts.contour[cuts.contour_count],
-                      (size_t)(IH_CONTOURS_CONTOURS_MAX - cuts.contour_count) *
-                          sizeof cuts.contour[0],
+    IH_TEST_UNTOUCHED(&contours.contour[contours.contour_count],
+                      (size_t)(IH_CONTOURS_CONTOURS_MAX - contours.contour_count) *
+                          sizeof contours.contour[0],
                       "contours beyond the last");
 }
 
@@ -195,7 +195,7 @@ static void check_circle(const struct ih_contour *contour, double radius)
 
     TEST_ASSERT_TRUE(contour->closed);
     for (i = 0; i < contour->vertex_count; i++) {
-        const struct ih_vertex v = cuts.vertex[contour->first + i];
+        const struct ih_vertex v = contours.vertex[contour->first + i];
 
         IH_TEST_WITHIN(1 / (8 * radius) + 0.002, radius,
                        hypot(v.x_q9 / 512.0 - 21.3, v.y_q9 / 512.0 - 24.8), "radius", i);
@@ -209,10 +209,10 @@ static void a_cone_is_cut_in_circles(void)
     fill(cone);
     for (radius = 1.5; radius < 21; radius += 0.37) {
         cut((int32_t)lround(256 * (800 + 10 * radius)));
-        TEST_ASSERT_EQUAL_INT32(1, cuts.contour_count);
-        check_circle(&cuts.contour[0], radius);
+        TEST_ASSERT_EQUAL_INT32(1, contours.contour_count);
+        check_circle(&contours.contour[0], radius);
         /* A chord polygon with at least 4 R corners, positive around a minimum. */
-        IH_TEST_WITHIN(1.2, acos(-1.0) * radius * radius, signed_area(&cuts.contour[0]), "area",
+        IH_TEST_WITHIN(1.2, acos(-1.0) * radius * radius, signed_area(&contours.contour[0]), "area",
                        (int64_t)radius);
     }
 }
@@ -221,9 +221,9 @@ static void around_a_maximum_the_area_is_negative(void)
 {
     fill(pit);
     cut(880 << 8); /* radius 12; all outside it is nearer */
-    TEST_ASSERT_EQUAL_INT32(1, cuts.contour_count);
-    check_circle(&cuts.contour[0], 12);
-    IH_TEST_WITHIN(1.2, -acos(-1.0) * 144, signed_area(&cuts.contour[0]), "area", 0);
+    TEST_ASSERT_EQUAL_INT32(1, contours.contour_count);
+    check_circle(&contours.contour[0], 12);
+    IH_TEST_WITHIN(1.2, -acos(-1.0) * 144, signed_area(&contours.contour[0]), "area", 0);
 }
 
 static double tilted(double x, double y)
@@ -238,18 +238,18 @@ static void a_plane_is_cut_in_one_straight_open_line(void)
     fill(tilted);
     for (level_mm = 710; level_mm < 1060; level_mm += 17) {
         cut(level_mm << 8);
-        TEST_ASSERT_EQUAL_INT32(1, cuts.contour_count);
-        TEST_ASSERT_FALSE(cuts.contour[0].closed);
-        for (i = 0; i < cuts.vertex_count; i++) {
+        TEST_ASSERT_EQUAL_INT32(1, contours.contour_count);
+        TEST_ASSERT_FALSE(contours.contour[0].closed);
+        for (i = 0; i < contours.vertex_count; i++) {
             /* Half a unit of Q9 in each coordinate, times the slopes of 5 and 3 mm a step. */
             IH_TEST_WITHIN(0.5 / 512 * 5 + 1e-9, level_mm,
-                           tilted(cuts.vertex[i].x_q9 / 512.0, cuts.vertex[i].y_q9 / 512.0), "line",
-                           i);
+                           tilted(contours.vertex[i].x_q9 / 512.0, contours.vertex[i].y_q9 / 512.0),
+                           "line", i);
         }
         /* The nearer side, towards (0, 0), lies on the right: the line runs down on the left of the
          * screen, from the upper or right border to the left or lower one. */
-        TEST_ASSERT_TRUE(cuts.vertex[0].x_q9 > cuts.vertex[cuts.vertex_count - 1].x_q9);
-        TEST_ASSERT_TRUE(cuts.vertex[0].y_q9 < cuts.vertex[cuts.vertex_count - 1].y_q9);
+        TEST_ASSERT_TRUE(contours.vertex[0].x_q9 > contours.vertex[contours.vertex_count - 1].x_q9);
+        TEST_ASSERT_TRUE(contours.vertex[0].y_q9 < contours.vertex[contours.vertex_count - 1].y_q9);
     }
 }
 
@@ -303,12 +303,12 @@ static void signed_areas_add_up_to_what_is_nearer(void)
         double sum = 0;
 
         cut(level_mm << 8);
-        TEST_ASSERT_EQUAL_INT32(0, cuts.contours_dropped);
-        for (i = 0; i < cuts.contour_count; i++) {
-            TEST_ASSERT_TRUE(cuts.contour[i].closed);
-            sum += signed_area(&cuts.contour[i]);
+        TEST_ASSERT_EQUAL_INT32(0, contours.contours_dropped);
+        for (i = 0; i < contours.contour_count; i++) {
+            TEST_ASSERT_TRUE(contours.contour[i].closed);
+            sum += signed_area(&contours.contour[i]);
         }
-        /* A straight line instead of the bilinear surface's hyperbola, where the far border cuts
+        /* A straight line instead of the bilinear surface's hyperbola, where the far border contours
          * off a corner: up to a tenth of a cell in each of some 20 such cells. */
         IH_TEST_WITHIN(2, counted_area(level_mm << 8), sum, "area", level_mm);
     }
@@ -339,14 +339,14 @@ static void all_inside_and_all_outside_have_no_contour(void)
         surface.depth_mm_q8[i / SIDE][i % SIDE] = 1000;
     }
     cut(999);
-    TEST_ASSERT_EQUAL_INT32(0, cuts.contour_count);
+    TEST_ASSERT_EQUAL_INT32(0, contours.contour_count);
     cut(1000); /* strictly nearer: a node at the level is outside */
-    TEST_ASSERT_EQUAL_INT32(0, cuts.contour_count);
+    TEST_ASSERT_EQUAL_INT32(0, contours.contour_count);
     cut(1001);
-    TEST_ASSERT_EQUAL_INT32(0, cuts.contour_count);
+    TEST_ASSERT_EQUAL_INT32(0, contours.contour_count);
     cut(INT32_MAX);
     cut(INT32_MIN);
-    TEST_ASSERT_EQUAL_INT32(0, cuts.contour_count + cuts.contours_dropped);
+    TEST_ASSERT_EQUAL_INT32(0, contours.contour_count + contours.contours_dropped);
 }
 
 static void flat_at(int32_t depth)
@@ -368,10 +368,10 @@ static void one_near_node_is_a_diamond(void)
             flat_at(1000);
             surface.depth_mm_q8[y][x] = 0;
             cut(500);
-            TEST_ASSERT_EQUAL_INT32(1, cuts.contour_count);
-            TEST_ASSERT_EQUAL_INT32(4, cuts.vertex_count);
-            TEST_ASSERT_TRUE(cuts.contour[0].closed);
-            IH_TEST_WITHIN(1e-9, 0.5, signed_area(&cuts.contour[0]), "area", x);
+            TEST_ASSERT_EQUAL_INT32(1, contours.contour_count);
+            TEST_ASSERT_EQUAL_INT32(4, contours.vertex_count);
+            TEST_ASSERT_TRUE(contours.contour[0].closed);
+            IH_TEST_WITHIN(1e-9, 0.5, signed_area(&contours.contour[0]), "area", x);
         }
     }
 }
@@ -382,15 +382,15 @@ static void a_near_node_at_the_border_is_open(void)
     flat_at(1000);
     surface.depth_mm_q8[0][20] = 0;
     cut(500);
-    TEST_ASSERT_EQUAL_INT32(1, cuts.contour_count);
-    TEST_ASSERT_EQUAL_INT32(3, cuts.vertex_count);
-    TEST_ASSERT_FALSE(cuts.contour[0].closed);
+    TEST_ASSERT_EQUAL_INT32(1, contours.contour_count);
+    TEST_ASSERT_EQUAL_INT32(3, contours.vertex_count);
+    TEST_ASSERT_FALSE(contours.contour[0].closed);
     flat_at(1000);
     surface.depth_mm_q8[SIDE - 1][SIDE - 1] = 0;
     cut(500);
-    TEST_ASSERT_EQUAL_INT32(1, cuts.contour_count);
-    TEST_ASSERT_EQUAL_INT32(2, cuts.vertex_count);
-    TEST_ASSERT_FALSE(cuts.contour[0].closed);
+    TEST_ASSERT_EQUAL_INT32(1, contours.contour_count);
+    TEST_ASSERT_EQUAL_INT32(2, contours.vertex_count);
+    TEST_ASSERT_FALSE(contours.contour[0].closed);
 }
 
 /* Two near nodes across a cell: one contour when the mean of the four is nearer, else two. */
@@ -403,12 +403,12 @@ static void saddles_follow_the_mean(void)
         surface.depth_mm_q8[20][20 + turn] = 0;
         surface.depth_mm_q8[21][21 - turn] = 0; /* the mean is 500 */
         cut(501);
-        TEST_ASSERT_EQUAL_INT32(1, cuts.contour_count);
-        TEST_ASSERT_EQUAL_INT32(8, cuts.vertex_count);
+        TEST_ASSERT_EQUAL_INT32(1, contours.contour_count);
+        TEST_ASSERT_EQUAL_INT32(8, contours.vertex_count);
         cut(500);
-        TEST_ASSERT_EQUAL_INT32(2, cuts.contour_count);
-        TEST_ASSERT_EQUAL_INT32(4, cuts.contour[0].vertex_count);
-        TEST_ASSERT_EQUAL_INT32(4, cuts.contour[1].vertex_count);
+        TEST_ASSERT_EQUAL_INT32(2, contours.contour_count);
+        TEST_ASSERT_EQUAL_INT32(4, contours.contour[0].vertex_count);
+        TEST_ASSERT_EQUAL_INT32(4, contours.contour[1].vertex_count);
     }
 }
 
@@ -417,13 +417,13 @@ static void nodes_at_the_level_are_outside(void)
     flat_at(1000);
     surface.depth_mm_q8[20][20] = 0;
     cut(1000); /* the diamond reaches its four neighbours exactly */
-    TEST_ASSERT_EQUAL_INT32(1, cuts.contour_count);
-    IH_TEST_WITHIN(1e-9, 2.0, signed_area(&cuts.contour[0]), "area", 0);
+    TEST_ASSERT_EQUAL_INT32(1, contours.contour_count);
+    IH_TEST_WITHIN(1e-9, 2.0, signed_area(&contours.contour[0]), "area", 0);
     flat_at(0);
     surface.depth_mm_q8[20][20] = 1000;
     cut(1000); /* shrunk to the node itself: no area, but still one clean contour */
-    TEST_ASSERT_EQUAL_INT32(1, cuts.contour_count);
-    IH_TEST_WITHIN(1e-9, 0.0, signed_area(&cuts.contour[0]), "area", 0);
+    TEST_ASSERT_EQUAL_INT32(1, contours.contour_count);
+    IH_TEST_WITHIN(1e-9, 0.0, signed_area(&contours.contour[0]), "area", 0);
 }
 
 /* 24 x 24 separate near nodes: 576 contours. */
@@ -438,8 +438,8 @@ static void contours_that_do_not_fit_are_counted(void)
         }
     }
     cut(300);
-    TEST_ASSERT_EQUAL_INT32(IH_CONTOURS_CONTOURS_MAX, cuts.contour_count);
-    TEST_ASSERT_EQUAL_INT32(24 * 24 - IH_CONTOURS_CONTOURS_MAX, cuts.contours_dropped);
+    TEST_ASSERT_EQUAL_INT32(IH_CONTOURS_CONTOURS_MAX, contours.contour_count);
+    TEST_ASSERT_EQUAL_INT32(24 * 24 - IH_CONTOURS_CONTOURS_MAX, contours.contours_dropped);
 }
 
 /* A line that winds through the whole grid has more vertices than there is room for. */
@@ -457,9 +457,9 @@ static void a_contour_longer_than_the_table_is_left_out_whole(void)
         }
     }
     cut(500);
-    TEST_ASSERT_EQUAL_INT32(1, cuts.contours_dropped);
-    TEST_ASSERT_EQUAL_INT32(0, cuts.contour_count);
-    TEST_ASSERT_EQUAL_INT32(0, cuts.vertex_count);
+    TEST_ASSERT_EQUAL_INT32(1, contours.contours_dropped);
+    TEST_ASSERT_EQUAL_INT32(0, contours.contour_count);
+    TEST_ASSERT_EQUAL_INT32(0, contours.vertex_count);
     TEST_ASSERT_TRUE(find_crossings(500) > IH_CONTOURS_VERTICES_MAX);
 }
 
@@ -473,7 +473,7 @@ static void the_ends_of_the_range_do_not_overflow(void)
     cut(0);
     cut(INT32_MAX);
     cut(INT32_MIN + 1);
-    TEST_ASSERT_TRUE(cuts.contour_count > 0);
+    TEST_ASSERT_TRUE(contours.contour_count > 0);
 }
 
 /* A crossing is worked out in 32 bits or in 64, by the rise; cut() compares both with float64. */
