@@ -10,6 +10,6 @@ mkdir -p build/exhaustive
 for name in base/test_fix surface/test_multiquadric; do
     "${CC:-cc}" -std=c11 -O2 -ffp-contract=off -Ifirmware/core -Itests/unit -isystem "$unity" \
         "tests/unit/$name.c" "$unity/unity.c" firmware/core/base/ih_fix.c firmware/core/base/ih_cholesky.c \
-        firmware/core/surface/ih_normal_equations.c firmware/core/surface/ih_multiquadric.c -lm -o "build/exhaustive/${name#*/}"
+        firmware/core/surface/ih_normal_equations.c firmware/core/surface/ih_normal_solve.c firmware/core/surface/ih_multiquadric.c -lm -o "build/exhaustive/${name#*/}"
     "build/exhaustive/${name#*/}" --all
 done

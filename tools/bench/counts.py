@@ -34,7 +34,7 @@ FUNCTIONS = {
     "labels": ("ih_labels_assign",),
     "points, samples": ("ih_points_from_labels", "ih_samples_select"),
     "surface": ("ih_surface_fit",),
-    ". factor": ("ih_normal_equations_factor", "ih_normal_equations_solve"),
+    ". factor": ("ih_normal_equations_factor", "ih_normal_solve"),
     "nests": ("ih_nests_find",),
     ". cuts": ("ih_contours_level",),
     ". parts": ("ih_ellipse_of_part",),

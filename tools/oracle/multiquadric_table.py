@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The table of roots in firmware/core/surface/ih_multiquadric.c: sqrt(m) * 2^16 for m in 2^30 .. 2^32, in spans of 2^22. An
+"""The table of roots in firmware/core/surface/ih_multiquadric_table.h: sqrt(m) * 2^16 for m in 2^30 .. 2^32, in spans of 2^22. An
 entry is the value at a span's beginning, raised by half of what the curve lies above its chord; the last one
 is that at the last span's end. With g the place in a span, 0 .. 65535, and rise the difference to the next
 entry >> 6, the root is value + (rise * g >> 10).
@@ -55,7 +55,7 @@ def main():
         print(", ".join("%d" % each for each in table()))
         return 0
     with open(sys.argv[2], encoding="utf-8") as file:
-        found = re.search(r"roots\[\] = \{(.*?)\};", file.read(), re.S)
+        found = re.search(r"roots_q16\[\] = \{(.*?)\};", file.read(), re.S)
     entries = [int(word) for word in re.findall(r"\d+", found[1])]
     print("multiquadric_table: %d entries, at most 2^%.2f off" % (len(entries), np.log2(worst(entries))))
     good = entries == table() and worst(entries) <= WORST

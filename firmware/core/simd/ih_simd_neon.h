@@ -7,6 +7,16 @@
 
 #include <arm_neon.h>
 
+/* Products of the upper halves: only 64-bit ARM has them in one instruction. */
+#ifdef __aarch64__
+#define IH_NEON_MUL_UPPER(type, a, b) vmull_high_##type(a, b)
+#define IH_NEON_ADD_UPPER(type, sum, a, b) vmlal_high_##type(sum, a, b)
+#else
+#define IH_NEON_MUL_UPPER(type, a, b) vmull_##type(vget_high_##type(a), vget_high_##type(b))
+#define IH_NEON_ADD_UPPER(type, sum, a, b) \
+    vmlal_##type(sum, vget_high_##type(a), vget_high_##type(b))
+#endif
+
 static inline ih_i16 ih_i16_min(ih_i16 a, ih_i16 b)
 {
     return (ih_i16)vminq_s16((int16x8_t)a, (int16x8_t)b);
@@ -103,14 +113,14 @@ static inline struct ih_pair_sums ih_pair_sums_first(ih_i16 a, ih_i16 b)
 {
     const int16x8_t x = (int16x8_t)a, y = (int16x8_t)b;
     return (struct ih_pair_sums){vmull_s16(vget_low_s16(x), vget_low_s16(y)),
-                                 vmull_s16(vget_high_s16(x), vget_high_s16(y))};
+                                 IH_NEON_MUL_UPPER(s16, x, y)};
 }
 
 static inline struct ih_pair_sums ih_pair_sums_add(struct ih_pair_sums sums, ih_i16 a, ih_i16 b)
 {
     const int16x8_t x = (int16x8_t)a, y = (int16x8_t)b;
     return (struct ih_pair_sums){vmlal_s16(sums.first, vget_low_s16(x), vget_low_s16(y)),
-                                 vmlal_s16(sums.second, vget_high_s16(x), vget_high_s16(y))};
+                                 IH_NEON_ADD_UPPER(s16, sums.second, x, y)};
 }
 
 static inline ih_i32 ih_pair_sums_total(struct ih_pair_sums sums)
@@ -128,14 +138,14 @@ static inline struct ih_wide ih_i32_mul_wide(ih_i32 a, ih_i32 b)
 {
     const int32x4_t x = (int32x4_t)a, y = (int32x4_t)b;
     return (struct ih_wide){(ih_i64)vmull_s32(vget_low_s32(x), vget_low_s32(y)),
-                            (ih_i64)vmull_s32(vget_high_s32(x), vget_high_s32(y))};
+                            (ih_i64)IH_NEON_MUL_UPPER(s32, x, y)};
 }
 
 static inline struct ih_wide ih_u32_mul_wide(ih_u32 a, ih_u32 b)
 {
     const uint32x4_t x = (uint32x4_t)a, y = (uint32x4_t)b;
     return (struct ih_wide){(ih_i64)vmull_u32(vget_low_u32(x), vget_low_u32(y)),
-                            (ih_i64)vmull_u32(vget_high_u32(x), vget_high_u32(y))};
+                            (ih_i64)IH_NEON_MUL_UPPER(u32, x, y)};
 }
 
 static inline ih_u32 ih_wide_low(struct ih_wide x)
@@ -168,7 +178,7 @@ static inline struct ih_wide_sums ih_wide_sums_add(struct ih_wide_sums sums, ih_
     const int32x4_t x = (int32x4_t)a, y = (int32x4_t)b;
     return (struct ih_wide_sums){
         {(ih_i64)vmlal_s32((int64x2_t)sums.sum.a, vget_low_s32(x), vget_low_s32(y)),
-         (ih_i64)vmlal_s32((int64x2_t)sums.sum.b, vget_high_s32(x), vget_high_s32(y))}};
+         (ih_i64)IH_NEON_ADD_UPPER(s32, (int64x2_t)sums.sum.b, x, y)}};
 }
 
 static inline struct ih_wide ih_wide_sums_total(struct ih_wide_sums sums)
@@ -176,10 +186,21 @@ static inline struct ih_wide ih_wide_sums_total(struct ih_wide_sums sums)
     return sums.sum;
 }
 
+/* Loads of 64 bits scale an index by 8 or not at all: offsets in bytes take fewer instructions. */
+static inline uint32x2_t ih_neon_pair_at(const uint32_t *table, uint32_t offset)
+{
+    uint32x2_t pair;
+    __builtin_memcpy(&pair, (const uint8_t *)table + offset, sizeof pair);
+    return pair;
+}
+
 static inline struct ih_u32_neighbours ih_u32_look_up(const uint32_t *table, ih_u32 at)
 {
-    const uint32x4_t first = vcombine_u32(vld1_u32(&table[at[0]]), vld1_u32(&table[at[1]]));
-    const uint32x4_t last = vcombine_u32(vld1_u32(&table[at[2]]), vld1_u32(&table[at[3]]));
+    const ih_u32 offset = at << 2;
+    const uint32x4_t first =
+        vcombine_u32(ih_neon_pair_at(table, offset[0]), ih_neon_pair_at(table, offset[1]));
+    const uint32x4_t last =
+        vcombine_u32(ih_neon_pair_at(table, offset[2]), ih_neon_pair_at(table, offset[3]));
     const uint32x4x2_t both = vuzpq_u32(first, last);
     return (struct ih_u32_neighbours){(ih_u32)both.val[0], (ih_u32)both.val[1]};
 }

@@ -6,6 +6,7 @@
 #include "base/ih_fix.h"
 #include "base/ih_range.h"
 #include "surface/ih_multiquadric.h"
+#include "surface/ih_normal_solve.h"
 
 /* Limits of 64 bits: compilers make no vectors of them by themselves. */
 #if defined __x86_64__ && defined __AVX2__
@@ -54,8 +55,11 @@
  * small. */
 #define FINE_ROWS (2 * IH_NORMAL_EQUATIONS_ROWS)
 /* Steps of the table, filled up to whole lines of ih_multiquadric. */
-#define TABLE_LINE IH_MULTIQUADRIC_ACROSS_MAX
-#define TABLE_WIDTH (4 * TABLE_LINE)
+#define TABLE_LINE IH_SURFACE_CENTRES_FEW
+#define TABLE_WIDTH (6 * TABLE_LINE)
+
+/* Differences of the basis at two nodes are stored without sign: they are below the distance of the nodes, 2^25.4. */
+#define DIFFERENCE_BIAS_Q20 (1 << 26)
 
 _Static_assert(CENTRES_MAX == IH_MULTIQUADRIC_ACROSS_MAX &&
                    TERMS_MAX == IH_NORMAL_EQUATIONS_TERMS_MAX,
@@ -507,8 +511,8 @@ static bool correct(const struct ih_surface_params *params, struct ih_surface_sc
     set_or_take_ridge(params, true, scratch);
     /* A x = b is (right side) / 2^normal_shift: x and b have as many fraction bits more. */
     const int fraction = scale_right(scratch) + scratch->normal_shift;
-    if (!ih_normal_equations_solve(scratch->factor, scratch->terms, scratch->solution,
-                                   scratch->solution, &exponent)) {
+    if (!ih_normal_solve(scratch->factor, scratch->terms, scratch->solution, scratch->solution,
+                         &exponent)) {
         return false;
     }
     int64_t squares = 0; /* 144 * 2^50 */
@@ -605,7 +609,8 @@ static int32_t reweight(const struct ih_sample *sample, const struct ih_surface_
  * rounded. */
 static void exchange_pairs(struct ih_surface_scratch *scratch)
 {
-    ih_normal_equations_take(scratch->pair, scratch->terms, scratch->normal_shift, scratch->normal);
+    ih_normal_equations_subtract(scratch->pair, scratch->terms, scratch->normal_shift,
+                                 scratch->normal);
     ih_normal_equations_add(scratch->pair + IH_NORMAL_EQUATIONS_PAIRS, scratch->terms,
                             scratch->normal_shift, scratch->normal);
 }
@@ -804,8 +809,9 @@ static void fold_table(struct ih_surface_scratch *scratch)
             const int32_t *here = &middle[-centre_node(scratch, k)];
             const int32_t *there = &middle[-centre_node(scratch, scratch->centres - 1 - k)];
             for (int32_t x = 0; x < IH_SURFACE_HALF; x++) {
-                scratch->of.grid.sum_q20[b][k][x] = here[x] + there[x];
-                scratch->of.grid.difference_q20[b][k][x] = here[x] - there[x];
+                scratch->of.grid.sum_q20[b][k][x] = (uint32_t)(here[x] + there[x]);
+                scratch->of.grid.difference_q20[b][k][x] =
+                    (uint32_t)(here[x] - there[x] + DIFFERENCE_BIAS_Q20);
             }
         }
     }
@@ -828,18 +834,21 @@ static void fold_coefficients(struct ih_surface_scratch *scratch, int32_t **betw
 }
 
 /* Twice sum_n c_n B_n along half a row of nodes, but for what changes its sign in the other half, and that. */
-static void sum_row(const struct ih_surface_scratch *scratch, const int32_t *between, int32_t y,
-                    int64_t even[IH_SURFACE_HALF], int64_t odd[IH_SURFACE_HALF])
+static void sum_row(const struct ih_surface_scratch *scratch, const int32_t *between,
+                    int64_t odd_begin, int32_t y, int64_t even[IH_SURFACE_HALF],
+                    int64_t odd[IH_SURFACE_HALF])
 {
     const int32_t centres = scratch->centres;
-    const int32_t *sum_q20[CENTRES_MAX], *difference_q20[CENTRES_MAX];
+    const uint32_t *sum_q20[CENTRES_MAX], *difference_q20[CENTRES_MAX];
     for (int32_t row = 0; row < centres; row++) {
         const int32_t b = ih_abs_s32(y - centre_node(scratch, row));
         sum_q20[row] = scratch->of.grid.sum_q20[b][0];
         difference_q20[row] = scratch->of.grid.difference_q20[b][0];
     }
-    ih_multiquadric_lines(scratch->solution, sum_q20, centres, centres / 2, IH_SURFACE_HALF, even);
-    ih_multiquadric_lines(between, difference_q20, centres, centres / 2, IH_SURFACE_HALF, odd);
+    ih_multiquadric_lines(scratch->solution, sum_q20, centres, centres / 2, IH_SURFACE_HALF, 0,
+                          even);
+    ih_multiquadric_lines(between, difference_q20, centres, centres / 2, IH_SURFACE_HALF, odd_begin,
+                          odd);
 }
 
 /* How sums become depths: sum_n c_n B_n in Q8 is 2^-shift of one. */
@@ -934,6 +943,15 @@ static int32_t set_depths(const struct depth_way *way, const int64_t even[IH_SUR
     return nearest_q8;
 }
 
+static int64_t sum_of(const int32_t *number, int32_t count)
+{
+    int64_t sum = 0;
+    for (int32_t i = 0; i < count; i++) {
+        sum += number[i];
+    }
+    return sum;
+}
+
 static void evaluate(const struct ih_samples *samples, struct ih_surface_scratch *scratch,
                      struct ih_surface *out)
 {
@@ -946,9 +964,10 @@ static void evaluate(const struct ih_samples *samples, struct ih_surface_scratch
     int32_t *between;
     int32_t nearest_q8 = INT32_MAX;
     fold_coefficients(scratch, &between);
+    const int64_t odd_begin = -DIFFERENCE_BIAS_Q20 * sum_of(between, scratch->terms / 2);
     for (int32_t y = 0; y < IH_SURFACE_GRID; y++) {
         int64_t even[IH_SURFACE_HALF], odd[IH_SURFACE_HALF];
-        sum_row(scratch, between, y, even, odd);
+        sum_row(scratch, between, odd_begin, y, even, odd);
         nearest_q8 = ih_min_s32(nearest_q8, set_depths(&way, even, odd, out->depth_mm_q8[y]));
     }
     out->nearest_mm_q8 = nearest_q8;

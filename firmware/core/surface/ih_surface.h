@@ -109,8 +109,8 @@ struct ih_surface_scratch {
         } few; /* where samples are moved sums need not outlive the factor, and their rows are kept */
         struct {
             int32_t table_q20[IH_SURFACE_STEPS][2 * IH_SURFACE_STEPS - 1];
-            int32_t sum_q20[IH_SURFACE_STEPS][IH_SURFACE_HALF_CENTRES_MAX][IH_SURFACE_HALF];
-            int32_t difference_q20[IH_SURFACE_STEPS][IH_SURFACE_HALF_CENTRES_MAX][IH_SURFACE_HALF];
+            uint32_t sum_q20[IH_SURFACE_STEPS][IH_SURFACE_HALF_CENTRES_MAX][IH_SURFACE_HALF];
+            uint32_t difference_q20[IH_SURFACE_STEPS][IH_SURFACE_HALF_CENTRES_MAX][IH_SURFACE_HALF];
         } grid; /* the basis in whole steps, and folded */
     } of;
     int32_t *normal;    /* sums of products of short rows: many's or few's */

@@ -95,6 +95,11 @@ static void addresses_need_no_alignment(void)
         memset(to, 0, IH_SIMD_BYTES);
         ih_i16_store(to, ih_i16_load((const void *)&bytes[at]));
         TEST_ASSERT_EQUAL_MEMORY(bytes, copy, sizeof bytes);
+        if ((uintptr_t)&bytes[at] % 16 == 0) {
+            memset(to, 0, IH_SIMD_BYTES);
+            ih_i16_store(to, ih_i16_load_aligned((const void *)&bytes[at]));
+            TEST_ASSERT_EQUAL_MEMORY(bytes, copy, sizeof bytes);
+        }
         memset(to, 0, IH_SIMD_BYTES);
         ih_i32_store(to, ih_i32_load((const void *)&bytes[at]));
         TEST_ASSERT_EQUAL_MEMORY(bytes, copy, sizeof bytes);

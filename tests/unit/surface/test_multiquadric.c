@@ -194,9 +194,9 @@ static void sums_are_exact(void)
 /* Half a row of nodes, of widths with whole blocks of vectors and others. */
 static void sums_along_nodes_are_exact(void)
 {
-    static int32_t line_q20[CENTRES_MAX][IH_SURFACE_HALF_CENTRES_MAX * 32],
-        coefficient[TERMS_MAX / 2];
-    const int32_t *lines_q20[CENTRES_MAX];
+    static uint32_t line_q20[CENTRES_MAX][IH_SURFACE_HALF_CENTRES_MAX * 32];
+    static int32_t coefficient[TERMS_MAX / 2];
+    const uint32_t *lines_q20[CENTRES_MAX];
     struct ih_test_random random = {.state = 6};
     const int32_t half = centres / 2;
     int round, i, k, x;
@@ -204,14 +204,14 @@ static void sums_along_nodes_are_exact(void)
     for (round = 0; round < 100; round++) {
         const int32_t width = 8 * (1 + round % 4);
         const int32_t max = round % 4 == 0 ? 1 << 28 : 1 << (round % 28);
+        const int64_t begin = ih_test_between(&random, -((int64_t)1 << 60), (int64_t)1 << 60);
         int64_t sum[33];
 
         for (k = 0; k < centres; k++) {
             lines_q20[k] = line_q20[k];
             for (i = 0; i < half * width; i++) {
-                line_q20[k][i] = round % 5 == 0
-                                     ? (k % 2 == 0 ? 1 << 28 : -(1 << 27))
-                                     : (int32_t)ih_test_between(&random, -(1 << 27), 1 << 28);
+                line_q20[k][i] = round % 5 == 0 ? 1u << (28 - k % 2)
+                                                : (uint32_t)ih_test_between(&random, 0, 1 << 28);
             }
             for (i = 0; i < half; i++) {
                 coefficient[k * half + i] = round % 5 == 0
@@ -220,9 +220,9 @@ static void sums_along_nodes_are_exact(void)
             }
         }
         sum[width] = 77;
-        ih_multiquadric_lines(coefficient, lines_q20, centres, half, width, sum);
+        ih_multiquadric_lines(coefficient, lines_q20, centres, half, width, begin, sum);
         for (x = 0; x < width; x++) {
-            int64_t expected = 0;
+            int64_t expected = begin;
 
             for (k = 0; k < centres; k++) {
                 for (i = 0; i < half; i++) {

@@ -1,5 +1,6 @@
 /* ih_normal_equations against sums of products one by one. */
 #include "surface/ih_normal_equations.h"
+#include "surface/ih_normal_solve.h"
 
 #include "ih_test.h"
 
@@ -80,7 +81,7 @@ static void check(int sign, int shift, const char *what)
     if (sign > 0) {
         ih_normal_equations_add(pair, terms, shift, normal);
     } else {
-        ih_normal_equations_take(pair, terms, shift, normal);
+        ih_normal_equations_subtract(pair, terms, shift, normal);
     }
     for (i = 0; i < terms; i++) {
         for (j = 0; j <= i; j++) {
@@ -137,7 +138,7 @@ static void max_sums_hold(void)
     TEST_ASSERT_TRUE(normal[0] > 2147000000);
 }
 
-static void sums_are_taken_away(void)
+static void sums_are_subtracted(void)
 {
     int round;
 
@@ -170,7 +171,7 @@ static void every_row_counts_once(void)
 }
 
 /* What was added and is taken away in other company leaves no more than each rounding's half. */
-static void what_was_added_can_be_taken_away(void)
+static void what_was_added_can_be_subtracted(void)
 {
     int32_t k, i;
 
@@ -312,7 +313,7 @@ static void systems_are_solved(void)
         for (i = 0; i < terms; i++) {
             b[i] = (int32_t)ih_test_between(&random_source, -200000, 200000);
         }
-        TEST_ASSERT_TRUE(ih_normal_equations_solve(factor, terms, b, x, &exponent));
+        TEST_ASSERT_TRUE(ih_normal_solve(factor, terms, b, x, &exponent));
         for (i = 0; i < terms; i++) {
             max = fmax(max, fabs(ldexp(x[i], exponent)));
         }
@@ -326,11 +327,11 @@ static void systems_are_solved(void)
             IH_TEST_WITHIN(terms * (ldexp(1, exponent) + max * ldexp(1, -26) + 1), b[i], sum,
                            "solution", i);
         }
-        TEST_ASSERT_TRUE(ih_normal_equations_solve(factor, terms, b, b, &j));
+        TEST_ASSERT_TRUE(ih_normal_solve(factor, terms, b, b, &j));
         IH_TEST_EQUAL(exponent, j, "in place", 0);
         TEST_ASSERT_EQUAL_INT32_ARRAY(x, b, terms);
         memset(b, 0, sizeof b);
-        TEST_ASSERT_TRUE(ih_normal_equations_solve(factor, terms, b, x, &exponent));
+        TEST_ASSERT_TRUE(ih_normal_solve(factor, terms, b, x, &exponent));
         TEST_ASSERT_EACH_EQUAL_INT32(0, x, terms);
         IH_TEST_EQUAL(0, exponent, "of nothing", 0);
     }
@@ -350,7 +351,7 @@ static void what_has_no_solution_is_told(void)
             factor[ih_normal_equations_line(i) + i - 1] = 1 << 27;
         }
     }
-    TEST_ASSERT_FALSE(ih_normal_equations_solve(factor, terms, b, x, &exponent));
+    TEST_ASSERT_FALSE(ih_normal_solve(factor, terms, b, x, &exponent));
 }
 
 /* A diagonal of squares has its roots; what is not positive counts as the least pivot. */
@@ -445,9 +446,9 @@ int main(void)
         RUN_TEST(lines_follow_each_other);
         RUN_TEST(sums_are_rounded_once_a_call);
         RUN_TEST(max_sums_hold);
-        RUN_TEST(sums_are_taken_away);
+        RUN_TEST(sums_are_subtracted);
         RUN_TEST(every_row_counts_once);
-        RUN_TEST(what_was_added_can_be_taken_away);
+        RUN_TEST(what_was_added_can_be_subtracted);
         RUN_TEST(nothing_behind_the_lines_is_touched);
         RUN_TEST(systems_have_their_factor);
         RUN_TEST(what_is_too_coarse_is_told);

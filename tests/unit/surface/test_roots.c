@@ -1,5 +1,5 @@
 /* ih_multiquadric's table against its definition: chords of a root's curve, raised by half of what they lie below it. */
-#include "surface/ih_multiquadric.c"
+#include "surface/ih_multiquadric_table.h"
 
 #include "ih_test.h"
 
@@ -34,22 +34,27 @@ static void entries_are_chords_raised_by_half(void)
 {
     int at;
 
-    TEST_ASSERT_EQUAL_INT(LAST_SPAN - SPANS_BELOW + 1, IH_TEST_COUNT(roots));
-    for (at = SPANS_BELOW; at < LAST_SPAN; at++) {
-        IH_TEST_WITHIN(0.55, root(at) + curve_above(at) / 2 + 48, roots[at - SPANS_BELOW], "value",
-                       at);
+    TEST_ASSERT_EQUAL_INT(LAST_SPAN - IH_MULTIQUADRIC_SPANS_BELOW + 1,
+                          IH_TEST_COUNT(ih_multiquadric_roots_q16));
+    for (at = IH_MULTIQUADRIC_SPANS_BELOW; at < LAST_SPAN; at++) {
+        IH_TEST_WITHIN(0.55, root(at) + curve_above(at) / 2 + 48,
+                       ih_multiquadric_roots_q16[at - IH_MULTIQUADRIC_SPANS_BELOW], "value", at);
     }
-    TEST_ASSERT_EQUAL_HEX32(UINT32_MAX, roots[LAST_SPAN - SPANS_BELOW]); /* no root passes 2^32 */
+    TEST_ASSERT_EQUAL_HEX32(
+        UINT32_MAX,
+        ih_multiquadric_roots_q16[LAST_SPAN -
+                                  IH_MULTIQUADRIC_SPANS_BELOW]); /* no root passes 2^32 */
 }
 
 static void no_product_passes_32_bits(void)
 {
     int at;
 
-    for (at = 0; at + 1 < IH_TEST_COUNT(roots); at++) {
-        const uint64_t rise = (roots[at + 1] - roots[at]) >> RISE_SHIFT;
+    for (at = 0; at + 1 < IH_TEST_COUNT(ih_multiquadric_roots_q16); at++) {
+        const uint64_t rise = (ih_multiquadric_roots_q16[at + 1] - ih_multiquadric_roots_q16[at]) >>
+                              IH_MULTIQUADRIC_RISE_SHIFT;
 
-        TEST_ASSERT_TRUE(roots[at + 1] > roots[at]);
+        TEST_ASSERT_TRUE(ih_multiquadric_roots_q16[at + 1] > ih_multiquadric_roots_q16[at]);
         TEST_ASSERT_TRUE(rise * 65535 <= UINT32_MAX);
     }
 }
