@@ -10,11 +10,10 @@
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core.hpp>
 
-extern "C" {
 #include "base/ih_config.h"
 #include "base/ih_types.h"
+#include "rig/ih_camera.h"
 #include "rig/ih_rig.h"
-}
 
 static const double limit_px = 0.02;
 
@@ -78,7 +77,7 @@ static double largest_error_px(const Calibrated &calibrated, const ih_rig &rig, 
     undone_px = 0.0;
     for (size_t i = 0; i < places.size(); i++) {
         int32_t x_q28, y_q28;
-        ih_rig_undistort(&rig, fixed(places[i].x, 12), fixed(places[i].y, 12), &x_q28, &y_q28);
+        ih_camera_undistort(&rig, fixed(places[i].x, 12), fixed(places[i].y, 12), &x_q28, &y_q28);
         double du = fx * (std::ldexp(x_q28, -28) - expected[i].x),
                dv = fy * (std::ldexp(y_q28, -28) - expected[i].y);
         largest_px = std::max(largest_px, std::hypot(du, dv));

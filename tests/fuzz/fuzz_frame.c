@@ -15,6 +15,7 @@
 
 #include "fuzz_check.h"
 #include "fuzz_rig.h"
+#include "rig/ih_camera.h"
 
 /* Frames that one input may have looked at, and commands: bounds its time. */
 #define LOOKS_MAX 4
@@ -125,10 +126,10 @@ static void paint_pattern(struct canvas *canvas, struct fuzz_input *input)
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
         int32_t x_q28 = 0, y_q28 = 0, u = 0, v = 0;
         ih_rig_dot_at(rig, slot, depth_at(&scene, slot) * 256, &x_q28, &y_q28);
-        ih_rig_distort(rig, x_q28, y_q28, &u, &v);
+        ih_camera_distort(rig, x_q28, y_q28, &u, &v);
         u += off_px_q12 * (fuzz_noise(&seed) % 257 - 128) / 128;
         v += off_px_q12 * (fuzz_noise(&seed) % 257 - 128) / 128;
-        if (fuzz_noise(&seed) % 128 >= missing && ih_rig_inside(rig, u, v)) {
+        if (fuzz_noise(&seed) % 128 >= missing && ih_camera_sees(rig, u, v)) {
             draw_dot(canvas, u, v, height, radius_q4);
         }
     }

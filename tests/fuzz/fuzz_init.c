@@ -6,6 +6,7 @@
 #include "app_rig_explain.h"
 
 #include "fuzz_rig.h"
+#include "rig/ih_camera.h"
 
 #define WORDS (sizeof(struct ih_calibration) / sizeof(int32_t))
 /* Of words that are changed one by one. */
@@ -56,11 +57,11 @@ static void check_lens(const struct ih_rig *rig)
         int32_t u = (c->width + 20) * 4096 / PROBES * (i % PROBES) - 10 * 4096;
         int32_t v = (c->height + 20) * 4096 / PROBES * (i / PROBES) - 10 * 4096;
         int32_t x = 0, y = 0, back_u = 0, back_v = 0;
-        ih_rig_undistort(rig, u, v, &x, &y);
+        ih_camera_undistort(rig, u, v, &x, &y);
         FUZZ_CHECK(llabs(x) <= (int64_t)IH_RIG_TAN_MAX << 28);
         FUZZ_CHECK(llabs(y) <= (int64_t)IH_RIG_TAN_MAX << 28);
-        ih_rig_distort(rig, x, y, &back_u, &back_v);
-        (void)ih_rig_inside(rig, back_u, back_v);
+        ih_camera_distort(rig, x, y, &back_u, &back_v);
+        (void)ih_camera_sees(rig, back_u, back_v);
     }
 }
 

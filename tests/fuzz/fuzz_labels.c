@@ -2,6 +2,7 @@
  * anywhere in the frame, or the pattern's dots at some depth, a little off. */
 #include <string.h>
 
+#include "rig/ih_camera.h"
 #include "upkeep/ih_exposure.h"
 
 #include "fuzz_check.h"
@@ -12,7 +13,7 @@
 static void add_dot(struct ih_dots *dots, const struct ih_rig *rig, int32_t u, int32_t v,
                     int32_t peak)
 {
-    if (dots->dot_count < IH_DOTS_MAX && ih_rig_inside(rig, u, v)) {
+    if (dots->dot_count < IH_DOTS_MAX && ih_camera_sees(rig, u, v)) {
         dots->dot[dots->dot_count++] = (struct ih_dot){u, v, peak};
     }
 }
@@ -30,7 +31,7 @@ static void add_pattern(struct ih_dots *dots, const struct ih_rig *rig, struct f
         int32_t x_q28 = 0, y_q28 = 0, u = 0, v = 0;
         int32_t depth = depth_mm_q8 + slope_q8 * (slot % IH_GRID);
         ih_rig_dot_at(rig, slot, depth > 256 ? depth : 256, &x_q28, &y_q28);
-        ih_rig_distort(rig, x_q28, y_q28, &u, &v);
+        ih_camera_distort(rig, x_q28, y_q28, &u, &v);
         u += off_px_q12 * (fuzz_noise(&seed) % 257 - 128) / 128;
         v += off_px_q12 * (fuzz_noise(&seed) % 257 - 128) / 128;
         add_dot(dots, rig, u, v, 1 + fuzz_noise(&seed) % PEAK_MAX);

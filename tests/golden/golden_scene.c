@@ -2,6 +2,8 @@
 
 #include <string.h>
 
+#include "rig/ih_camera.h"
+
 #define DOT_HEIGHT 200
 #define DOT_REACH_PX 3
 #define DOT_RADIUS2_Q8 (5 * 256 / 2) /* (1.6 px)^2 */
@@ -85,7 +87,7 @@ static void draw_pattern(uint8_t *grey, const struct ih_frame *frame, const stru
         int32_t depth_mm = with_bump && bent_mm < 90 ? HEAD_MM + bent_mm : WALL_MM;
         int32_t x_q28 = 0, y_q28 = 0, u_px_q12 = 0, v_px_q12 = 0;
         ih_rig_dot_at(rig, slot, depth_mm * 256, &x_q28, &y_q28);
-        ih_rig_distort(rig, x_q28, y_q28, &u_px_q12, &v_px_q12);
+        ih_camera_distort(rig, x_q28, y_q28, &u_px_q12, &v_px_q12);
         draw_dot(grey, frame, u_px_q12, v_px_q12);
     }
 }

@@ -9,6 +9,9 @@
 #ifndef GOLDEN_SCENE_H
 #define GOLDEN_SCENE_H
 
+#include <stdbool.h>
+#include <stdint.h>
+
 #include "base/ih_types.h"
 #include "rig/ih_rig.h"
 

@@ -1,10 +1,11 @@
 /* turned_rig - dots that a turned projector casts on a bumpy wall, in double: what ih_rotation_vote and ih_health
- * are tested with. Shares nothing with the core but its structs and the lens (ih_rig_distort). */
+ * are tested with. Shares nothing with the core but its structs and the lens (ih_camera_distort). */
 #ifndef TURNED_RIG_H
 #define TURNED_RIG_H
 
 #include "base/ih_config.h"
 #include "dots/ih_dots.h"
+#include "rig/ih_camera.h"
 #include "rig/ih_rig.h"
 #include "ih_test.h"
 
@@ -69,9 +70,9 @@ static inline void see_dots(const struct ih_calibration *c, const double turn_de
         for (int axis = 0; axis < 3; axis++) {
             point[axis] = c->origin_mm_q16[axis] / 65536.0 + far * ray[axis];
         }
-        ih_rig_distort(&lens, (int32_t)lround(point[0] / point[2] * 268435456.0),
-                       (int32_t)lround(point[1] / point[2] * 268435456.0), &u, &v);
-        if (ih_rig_inside(&lens, u, v)) {
+        ih_camera_distort(&lens, (int32_t)lround(point[0] / point[2] * 268435456.0),
+                          (int32_t)lround(point[1] / point[2] * 268435456.0), &u, &v);
+        if (ih_camera_sees(&lens, u, v)) {
             struct ih_dot *dot = &out->dot[out->dot_count++];
             dot->u_px_q12 = u + (int32_t)lround(4096 * noise_px * ih_test_normal(random));
             dot->v_px_q12 = v + (int32_t)lround(4096 * noise_px * ih_test_normal(random));

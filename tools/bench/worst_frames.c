@@ -1,4 +1,5 @@
 #include "worst_frames.h"
+#include "rig/ih_camera.h"
 
 #include <stdbool.h>
 
@@ -80,7 +81,7 @@ static void add_dot(struct picture *p, int32_t slot, int32_t depth_mm, int32_t r
 {
     int32_t x_q28, y_q28, u_q12, v_q12;
     ih_rig_dot_at(p->rig, slot, depth_mm * 256, &x_q28, &y_q28);
-    ih_rig_distort(p->rig, x_q28, y_q28, &u_q12, &v_q12);
+    ih_camera_distort(p->rig, x_q28, y_q28, &u_q12, &v_q12);
     add_spot(p, u_q12, v_q12, radius_q12, grey);
 }
 
@@ -135,7 +136,7 @@ static void draw_rows(struct picture *p)
             int64_t depth_mm = near * far * 400 / (near * 400 + (far - near) * i);
             int32_t x_q28, y_q28, u_q12, v_q12;
             ih_rig_dot_at(p->rig, slot, (int32_t)depth_mm * 256, &x_q28, &y_q28);
-            ih_rig_distort(p->rig, x_q28, y_q28, &u_q12, &v_q12);
+            ih_camera_distort(p->rig, x_q28, y_q28, &u_q12, &v_q12);
             int32_t u = (u_q12 >> 12) + p->step, v = v_q12 >> 12;
             bool is_free = u >= 0 && v >= 0 && u < p->width && v < p->height &&
                            p->samples[v * p->width + u] < 60;

@@ -5,6 +5,7 @@
 #include "base/ih_fix.h"
 #include "detect/ih_prescreen.h"
 #include "detect/ih_score.h"
+#include "rig/ih_camera.h"
 
 /* After these, what is hopeless is not fitted any further. */
 #define FIRST_LOOK_STEPS 1
@@ -64,8 +65,8 @@ void ih_detections_outline(const struct ih_rig *rig, struct ih_detection *detect
     int64_t depth_q8 = ih_max_s32(head->centre_mm_q8[2], 1 << 8);
     int64_t x_q28 = ih_div_round((int64_t)head->centre_mm_q8[0] * (1 << 28), depth_q8);
     int64_t y_q28 = ih_div_round((int64_t)head->centre_mm_q8[1] * (1 << 28), depth_q8);
-    ih_rig_distort(rig, ih_saturate_s32(x_q28), ih_saturate_s32(y_q28), &detection->u_px_q12,
-                   &detection->v_px_q12);
+    ih_camera_distort(rig, ih_saturate_s32(x_q28), ih_saturate_s32(y_q28), &detection->u_px_q12,
+                      &detection->v_px_q12);
     int32_t across_q12 =
         ih_saturate_s32(ih_div_round(ih_mul_shift(head->semi_mm_q8[0], c->fx_px_q16, 4), depth_q8));
     int32_t up_q12 =

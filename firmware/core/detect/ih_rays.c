@@ -6,6 +6,7 @@
 #include "base/ih_fix.h"
 #include "base/ih_range.h"
 #include "points/ih_near_depth.h"
+#include "rig/ih_camera.h"
 
 void ih_rays_params_default(struct ih_rays_params *params)
 {
@@ -24,8 +25,8 @@ static bool is_empty(const struct ih_rig *rig, const struct ih_dots *dots, int32
 {
     int32_t x_q28, y_q28, u_px_q12, v_px_q12;
     ih_rig_dot_at(rig, slot, probe_mm_q8, &x_q28, &y_q28);
-    ih_rig_distort(rig, x_q28, y_q28, &u_px_q12, &v_px_q12);
-    return ih_rig_inside(rig, u_px_q12, v_px_q12) &&
+    ih_camera_distort(rig, x_q28, y_q28, &u_px_q12, &v_px_q12);
+    return ih_camera_sees(rig, u_px_q12, v_px_q12) &&
            (dots == NULL || !ih_dots_is_bright(dots, u_px_q12 >> 12, v_px_q12 >> 12));
 }
 

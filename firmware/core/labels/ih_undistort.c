@@ -3,6 +3,7 @@
 #include <stdbool.h>
 
 #include "base/ih_fix.h"
+#include "rig/ih_camera.h"
 
 #if defined __AVX2__
 #include <immintrin.h>
@@ -13,8 +14,8 @@ static void undo_one(const struct ih_dot *dot, const struct ih_rig *rig, int32_t
                      int32_t *v_px_q12)
 {
     int32_t x_q28, y_q28;
-    ih_rig_undistort(rig, dot->u_px_q12, dot->v_px_q12, &x_q28, &y_q28);
-    ih_rig_to_pixel(rig, x_q28, y_q28, u_px_q12, v_px_q12);
+    ih_camera_undistort(rig, dot->u_px_q12, dot->v_px_q12, &x_q28, &y_q28);
+    ih_camera_pixel(rig, x_q28, y_q28, u_px_q12, v_px_q12);
 }
 
 #ifdef LANES
@@ -125,7 +126,7 @@ static inline struct lens lens_of(const struct ih_rig *rig)
         .k3 = all(c->k3_q24),
         .p1 = all(c->p1_q24),
         .p2 = all(c->p2_q24),
-        .back = {all(rig->back_q24[0]), all(rig->back_q24[1]), all(rig->back_q24[2])},
+        .back = {all(rig->inverse_q24[0]), all(rig->inverse_q24[1]), all(rig->inverse_q24[2])},
         .last_q28 = rig->newton_last_q28,
     };
 }
@@ -209,7 +210,7 @@ static inline int undo_four(const struct lens *lens, lanes u_px_q12, lanes v_px_
     return _mm256_movemask_pd(_mm256_castsi256_pd(is_right));
 }
 
-/* ih_rig_to_pixel. */
+/* ih_camera_pixel. */
 static inline void store_pixels(lanes q28, int32_t focal_px_q16, int32_t principal_px_q16,
                                 int32_t px_q12[LANES])
 {

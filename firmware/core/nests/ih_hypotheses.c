@@ -6,6 +6,7 @@
 #include "base/ih_fix.h"
 #include "base/ih_range.h"
 #include "nests/ih_ellipse.h"
+#include "rig/ih_camera.h"
 
 /* Slices up to this depth behind the front make the curvature. */
 #define CURVATURE_DEPTH_MM 70
@@ -267,7 +268,7 @@ static void fill_place(const struct ih_nest *nest, const struct ih_surface *surf
     nest_centre_q16(nest, &x_q16, &y_q16);
     int32_t x_q28 = to_normalised_q28(x_q16, surface->field.centre_x_q28, surface->field.unit_q28);
     int32_t y_q28 = to_normalised_q28(y_q16, surface->field.centre_y_q28, surface->field.unit_q28);
-    ih_rig_distort(rig, x_q28, y_q28, &out->u_px_q12, &out->v_px_q12);
+    ih_camera_distort(rig, x_q28, y_q28, &out->u_px_q12, &out->v_px_q12);
     out->distance_mm_q8 = ih_saturate_s32(
         ih_mul_shift(surface_depth_mm_q8(surface, x_q16, y_q16), ray_length_q28(x_q28, y_q28), 28));
     int64_t depth_q8 = nest->front_mm_q8 + (int64_t)(params->centre_behind_mm << 8);

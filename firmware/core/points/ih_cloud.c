@@ -4,8 +4,8 @@
 #include <stddef.h>
 #include <string.h>
 
-#include "base/ih_config.h"
 #include "base/ih_fix.h"
+#include "rig/ih_camera.h"
 
 /* The pixel where a point in front of the camera is seen; IH_NONE outside the frame. */
 static int32_t pixel_of(const int32_t point_mm_q8[3], const struct ih_rig *rig)
@@ -17,7 +17,7 @@ static int32_t pixel_of(const int32_t point_mm_q8[3], const struct ih_rig *rig)
         return IH_NONE;
     }
     int32_t u_q12, v_q12;
-    ih_rig_distort(rig, (int32_t)x_q28, (int32_t)y_q28, &u_q12, &v_q12);
+    ih_camera_distort(rig, (int32_t)x_q28, (int32_t)y_q28, &u_q12, &v_q12);
     int64_t u = ih_shift_round(u_q12, 12);
     int64_t v = ih_shift_round(v_q12, 12);
     const struct ih_calibration *c = &rig->calibration;

@@ -4,6 +4,7 @@
 
 #include "base/ih_fix.h"
 #include "base/ih_range.h"
+#include "rig/ih_camera.h"
 
 /* Bounds the search for a measured pixel around a lattice point. */
 #define REACH_MAX_PX 32
@@ -101,7 +102,7 @@ static void measure(const struct ih_frame *frame, const struct ih_rig *rig,
         out->state = IH_POINT_SEEN;
         out->depth_mm_q8 = depth_mm << 8;
         if (du != 0 || dv != 0) {
-            ih_rig_undistort(rig, found_u * 4096, found_v * 4096, &out->x_q28, &out->y_q28);
+            ih_camera_undistort(rig, found_u * 4096, found_v * 4096, &out->x_q28, &out->y_q28);
         }
     }
 }
@@ -117,10 +118,10 @@ static void point_of_range(const struct ih_frame *frame, const struct ih_rig *ri
     out->depth_mm_q8 = 0;
     out->state = IH_POINT_UNKNOWN;
     int32_t u, v;
-    ih_rig_distort(rig, out->x_q28, out->y_q28, &u, &v);
+    ih_camera_distort(rig, out->x_q28, out->y_q28, &u, &v);
     bool in_view = ih_abs_s64(out->x_q28) < (int64_t)IH_RIG_TAN_MAX << 28 &&
                    ih_abs_s64(out->y_q28) < (int64_t)IH_RIG_TAN_MAX << 28;
-    if (in_view && ih_rig_inside(rig, u, v)) {
+    if (in_view && ih_camera_sees(rig, u, v)) {
         measure(frame, rig, reach, (int32_t)ih_shift_round(u, 12), (int32_t)ih_shift_round(v, 12),
                 out);
     }

@@ -3,9 +3,9 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-#include "base/ih_config.h"
 #include "base/ih_fix.h"
 #include "base/ih_range.h"
+#include "rig/ih_camera.h"
 
 #define HEAD_WIDTH_MM 150
 #define CONNECTED_MIN_PERCENT 70
@@ -401,8 +401,8 @@ static void place_window(const struct ih_windows_scratch *s, const struct ih_rig
             depth_mm += (int64_t)weight * place.depth_mm;
         }
     }
-    ih_rig_undistort(rig, mean_px_q12(u, weights, s), mean_px_q12(v, weights, s), &out->x_q28,
-                     &out->y_q28);
+    ih_camera_undistort(rig, mean_px_q12(u, weights, s), mean_px_q12(v, weights, s), &out->x_q28,
+                        &out->y_q28);
     out->depth_mm_q8 = (int32_t)ih_div_round(depth_mm * 256, weights);
     IH_IN_RANGE(out->depth_mm_q8, IH_DEPTH_MIN_MM << 8, IH_DEPTH_MAX_MM << 8);
     out->score = best->score;

@@ -1,25 +1,23 @@
 /* ih_rig - the calibrated camera and projector in fixed point, checked once (paper, section 2.1).
  *
  * In:    struct ih_calibration, the numbers of rig.json rounded to fixed point and nothing else.
- * Out:   struct ih_rig: the same, plus everything that is the same for every frame: for each dot
- *        its epipolar line, for the surface the field of view in units of half a dot pitch.
- * Error: each check has its own code; index says which dot. A rig that passes is safe for all
- *        stages: no later stage divides by zero or overflows because of it.
- * Cost:  once per rig. 361 lines, and 65 x 65 probes of the lens, rarely twice. ih_rig_undistort: nearly always one of
- *        Newton's steps from a series, without a division: of a lens for which that is enough at all probes.
+ * Out:   struct ih_rig: the same, and what does not change from frame to frame: the lens (ih_camera),
+ *        each dot's epipolar line, and for the surface the field of view in units of half a dot pitch.
+ * Error: each check has its own code; bad_slot says which dot. With a rig that passes no stage divides
+ *        by zero or overflows.
+ * Cost:  once per rig: 361 lines, and the lens.
  *
  * The camera frame is OpenCV's: X right, Y down, Z forward, mm. Normalised coordinates are
  * x = X / Z and y = Y / Z after removal of the lens distortion; "undistorted pixels" are
  * (fx x + cx, fy y + cy).
  *
- * Why a line is so simple: dot i is the ray O + s r from the projector. At depth Z it appears at
+ * A line is simple: dot i is the ray O + s r from the projector. At depth Z it appears at
  * X/Z = rx/rz + (Ox - Oz rx/rz) / Z, so in undistorted pixels it is at infinity + e / Z exactly:
- * its place on the line is linear in 1/Z and depth is one division.
+ * its position on the line is linear in 1/Z, and depth is one division.
  */
 #ifndef IH_RIG_H
 #define IH_RIG_H
 
-#include <stdbool.h>
 #include <stdint.h>
 
 #include "base/ih_config.h"
@@ -39,12 +37,12 @@ struct ih_calibration {
     int32_t fx_px_q16, fy_px_q16, cx_px_q16, cy_px_q16;
     int32_t k1_q24, k2_q24, p1_q24, p2_q24, k3_q24; /* OpenCV's order, |k| < 128 */
     int32_t near_mm, far_mm;
-    /* The rest is unused for a range rig. */
+    /* Not used for a range rig. */
     int32_t origin_mm_q16[3];
     int32_t ray_q30[IH_SLOTS][3];
 };
 
-/* One dot's epipolar line. A place on it is t, px from the dot's place at infinity along dir. */
+/* One dot's epipolar line. A position t on it is the distance along dir from the dot at infinity, px. */
 struct ih_line {
     int32_t infinity_u_px_q12, infinity_v_px_q12; /* undistorted pixels */
     int32_t dir_u_q30, dir_v_q30;                 /* unit vector towards nearer depth */
@@ -59,14 +57,15 @@ struct ih_field {
     int32_t unit_q28; /* one field unit = half a dot pitch */
 };
 
-/* Dots: centre at the middle dot's place at 900 mm (or the nearest depth in range), unit from the
- * four sides of the pattern at that depth. Fixed per rig. Range images choose theirs per frame. */
+/* field, of a dot rig: centred on the middle dot at 900 mm (or the nearest depth in range), the unit from
+ * the four sides of the pattern at that depth. A range rig has a field per frame. */
 struct ih_rig {
     struct ih_calibration calibration;
     struct ih_field field;
-    int32_t back_q24[3];  /* the lens backwards, from where ih_rig_undistort starts */
-    int32_t newton_steps; /* at the most; 0: they end beside the pixel, slow iteration does not */
-    int32_t newton_last_q28; /* no step is taken after one below this */
+    /* By ih_camera_init, for ih_camera_undistort. */
+    int32_t inverse_q24[3];  /* series of the inverse radial distortion */
+    int32_t newton_steps;    /* at most; 0: the iteration alone is accurate enough */
+    int32_t newton_last_q28; /* a step below this is the last one */
     struct ih_line line[IH_SLOTS];
 };
 
@@ -76,25 +75,9 @@ IH_BEGIN_DECLS
 enum ih_err ih_rig_init(struct ih_rig *rig, const struct ih_calibration *calibration,
                         int32_t *bad_slot) __attribute__((warn_unused_result));
 
-/* Frame pixel -> normalised coordinates. Inside the frame ih_rig_distort brings it back within
- * 0.005 px: ih_rig_init refuses a lens for which this does not hold. */
-void ih_rig_undistort(const struct ih_rig *rig, int32_t u_px_q12, int32_t v_px_q12, int32_t *x_q28,
-                      int32_t *y_q28);
-
-/* Normalised coordinates -> frame pixel. |x|, |y| are limited to IH_RIG_TAN_MAX first. */
-void ih_rig_distort(const struct ih_rig *rig, int32_t x_q28, int32_t y_q28, int32_t *u_px_q12,
-                    int32_t *v_px_q12);
-
-/* Normalised coordinates -> undistorted pixel (fx x + cx, fy y + cy). */
-void ih_rig_to_pixel(const struct ih_rig *rig, int32_t x_q28, int32_t y_q28, int32_t *u_px_q12,
-                     int32_t *v_px_q12);
-
 /* Normalised coordinates of a dot at a depth; depth_mm_q8 > 0. */
 void ih_rig_dot_at(const struct ih_rig *rig, int32_t slot, int32_t depth_mm_q8, int32_t *x_q28,
                    int32_t *y_q28);
-
-/* Is the pixel's centre inside the frame? */
-bool ih_rig_inside(const struct ih_rig *rig, int32_t u_px_q12, int32_t v_px_q12);
 
 IH_END_DECLS
 

@@ -5,6 +5,7 @@
 #include "base/ih_fix.h"
 #include "base/ih_range.h"
 #include "points/ih_near_depth.h"
+#include "rig/ih_camera.h"
 
 #define ISOLATED_NEIGHBOURS_MIN 3
 #define ISOLATED_FRIENDS_MAX 1
@@ -117,8 +118,9 @@ static bool place_is_visible(const struct ih_rig *rig, const struct ih_dots *dot
                              int32_t y_q28)
 {
     int32_t u, v;
-    ih_rig_distort(rig, x_q28, y_q28, &u, &v);
-    return ih_rig_inside(rig, u, v) && (dots == NULL || !ih_dots_is_bright(dots, u >> 12, v >> 12));
+    ih_camera_distort(rig, x_q28, y_q28, &u, &v);
+    return ih_camera_sees(rig, u, v) &&
+           (dots == NULL || !ih_dots_is_bright(dots, u >> 12, v >> 12));
 }
 
 static void fill_missing(const struct ih_points *points, const struct ih_dots *dots,

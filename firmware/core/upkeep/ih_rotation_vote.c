@@ -4,6 +4,7 @@
 
 #include "base/ih_fix.h"
 #include "base/ih_range.h"
+#include "rig/ih_camera.h"
 
 /* Points of a dot by quarters of a pixel from where it is said to be: 0.7 px of error still count. */
 #define NEAR_BINS 3
@@ -76,8 +77,8 @@ static void undistort_dots(const struct ih_dots *dots, const struct ih_rig *rig,
 {
     for (int32_t i = 0; i < dots->dot_count; i++) {
         int32_t x_q28, y_q28;
-        ih_rig_undistort(rig, dots->dot[i].u_px_q12, dots->dot[i].v_px_q12, &x_q28, &y_q28);
-        ih_rig_to_pixel(rig, x_q28, y_q28, &scratch->u_px_q12[i], &scratch->v_px_q12[i]);
+        ih_camera_undistort(rig, dots->dot[i].u_px_q12, dots->dot[i].v_px_q12, &x_q28, &y_q28);
+        ih_camera_pixel(rig, x_q28, y_q28, &scratch->u_px_q12[i], &scratch->v_px_q12[i]);
     }
 }
 

@@ -3,6 +3,7 @@
 #include "base/ih_types.h"
 #include "dots/ih_dots.h"
 #include "labels/ih_labels.h"
+#include "rig/ih_camera.h"
 #include "rig/ih_rig.h"
 
 #include <stdlib.h>
@@ -166,7 +167,7 @@ static void check_places(const char *what)
         if (dot == IH_NONE) {
             continue;
         }
-        ih_rig_undistort(&rig, dots.dot[dot].u_px_q12, dots.dot[dot].v_px_q12, &x, &y);
+        ih_camera_undistort(&rig, dots.dot[dot].u_px_q12, dots.dot[dot].v_px_q12, &x, &y);
         u = ih_test_from_q(x, 28) * ih_test_from_q(c->fx_px_q16, 16) +
             ih_test_from_q(c->cx_px_q16, 16) - ih_test_from_q(line->infinity_u_px_q12, 12);
         v = ih_test_from_q(y, 28) * ih_test_from_q(c->fy_px_q16, 16) +
@@ -548,8 +549,8 @@ static void dots_out_of_range_are_not_labelled(void)
         int32_t x, y, u, v;
 
         ih_rig_dot_at(&rig, slot, 16000 << 8, &x, &y); /* far is 2600 mm: 35 px nearer */
-        ih_rig_distort(&rig, x, y, &u, &v);
-        if (ih_rig_inside(&rig, u, v)) {
+        ih_camera_distort(&rig, x, y, &u, &v);
+        if (ih_camera_sees(&rig, u, v)) {
             add_dot(u, v, (int16_t)slot);
         }
     }

@@ -1,7 +1,8 @@
-/* ih_undistort against ih_rig_undistort for each dot: whatever the lens, wherever the dot, however many. */
+/* ih_undistort against ih_camera_undistort for each dot: whatever the lens, wherever the dot, however many. */
 #include "base/ih_types.h"
 #include "dots/ih_dots.h"
 #include "labels/ih_undistort.h"
+#include "rig/ih_camera.h"
 #include "rig/ih_rig.h"
 
 #include "ih_test.h"
@@ -60,8 +61,8 @@ static void check_dots(const char *what, int index)
     for (i = 0; i < dots.dot_count; i++) {
         int32_t x, y, u, v;
 
-        ih_rig_undistort(&rig, dots.dot[i].u_px_q12, dots.dot[i].v_px_q12, &x, &y);
-        ih_rig_to_pixel(&rig, x, y, &u, &v);
+        ih_camera_undistort(&rig, dots.dot[i].u_px_q12, dots.dot[i].v_px_q12, &x, &y);
+        ih_camera_pixel(&rig, x, y, &u, &v);
         IH_TEST_EQUAL(u, u_px_q12[i], what, index);
         IH_TEST_EQUAL(v, v_px_q12[i], what, index);
     }

@@ -4,6 +4,7 @@
 #include "nests/ih_ellipse.h"
 #include "nests/ih_hypotheses.h"
 #include "nests/ih_nests.h"
+#include "rig/ih_camera.h"
 #include "rig/ih_rig.h"
 #include "surface/ih_samples.h"
 #include "surface/ih_surface.h"
@@ -360,7 +361,7 @@ static void the_pixel_is_the_frames_own(void)
     select_heads();
     x = normalised(5, surface.field.centre_x_q28);
     y = normalised(40, surface.field.centre_y_q28);
-    ih_rig_distort(&rig, (int32_t)lround(ldexp(x, 28)), (int32_t)lround(ldexp(y, 28)), &u, &v);
+    ih_camera_distort(&rig, (int32_t)lround(ldexp(x, 28)), (int32_t)lround(ldexp(y, 28)), &u, &v);
     IH_TEST_RANGE(u - 2, u + 2, hypotheses.hypothesis[0].u_px_q12, "u", 0);
     IH_TEST_RANGE(v - 2, v + 2, hypotheses.hypothesis[0].v_px_q12, "v", 0);
 }

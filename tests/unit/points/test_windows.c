@@ -40,6 +40,7 @@ struct vector_tilted {
 #include "base/ih_fix.h"
 #include "base/ih_types.h"
 #include "points/ih_windows.h"
+#include "rig/ih_camera.h"
 #include "rig/ih_rig.h"
 
 #define PIXELS_MAX (IH_FRAME_WIDTH_MAX * IH_FRAME_WIDTH_MAX)
@@ -112,7 +113,7 @@ static void find(const char *what)
         IH_TEST_RANGE(params.score_min, 1000, w->score, what, i);
         IH_TEST_RANGE(windows.window[0].score - params.score_behind_max,
                       i == 0 ? 1000 : windows.window[i - 1].score, w->score, what, i);
-        ih_rig_distort(&rig, w->x_q28, w->y_q28, &u, &v);
+        ih_camera_distort(&rig, w->x_q28, w->y_q28, &u, &v);
         /* The last cell may reach beyond the frame by less than itself. */
         IH_TEST_RANGE(-8, (frame.width + guarded.scratch.cell_px) * 4096, u, what, i);
         IH_TEST_RANGE(-8, (frame.height + guarded.scratch.cell_px) * 4096, v, what, i);

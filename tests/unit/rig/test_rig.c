@@ -1,6 +1,7 @@
 /* ih_rig against float64: lens, epipolar lines, and every field that can be wrong. */
 #include "base/ih_config.h"
 #include "base/ih_types.h"
+#include "rig/ih_camera.h"
 #include "rig/ih_rig.h"
 
 #include "ih_test.h"
@@ -85,7 +86,7 @@ static void dot_in_frame(const struct ih_rig *of, int32_t slot, int32_t depth_mm
     int32_t x_q28, y_q28, u_px_q12, v_px_q12;
 
     ih_rig_dot_at(of, slot, depth_mm << 8, &x_q28, &y_q28);
-    ih_rig_distort(of, x_q28, y_q28, &u_px_q12, &v_px_q12);
+    ih_camera_distort(of, x_q28, y_q28, &u_px_q12, &v_px_q12);
     *u = ih_test_from_q(u_px_q12, 12);
     *v = ih_test_from_q(v_px_q12, 12);
 }
@@ -144,7 +145,7 @@ static void undistort_matches_the_exact_inverse(void)
         const double tolerance = 0.005 / focal_max(&rigs[v->rig]);
         int32_t x_q28, y_q28;
 
-        ih_rig_undistort(&rigs[v->rig], v->u_px_q12, v->v_px_q12, &x_q28, &y_q28);
+        ih_camera_undistort(&rigs[v->rig], v->u_px_q12, v->v_px_q12, &x_q28, &y_q28);
         IH_TEST_WITHIN(tolerance, v->x, ih_test_from_q(x_q28, 28), "x", i);
         IH_TEST_WITHIN(tolerance, v->y, ih_test_from_q(y_q28, 28), "y", i);
     }
@@ -158,8 +159,8 @@ static void distort_matches_float64(void)
         const struct vector_lens *v = &vector_lens[i];
         int32_t u_px_q12, v_px_q12;
 
-        ih_rig_distort(&rigs[v->rig], (int32_t)lround(ldexp(v->x, 28)),
-                       (int32_t)lround(ldexp(v->y, 28)), &u_px_q12, &v_px_q12);
+        ih_camera_distort(&rigs[v->rig], (int32_t)lround(ldexp(v->x, 28)),
+                          (int32_t)lround(ldexp(v->y, 28)), &u_px_q12, &v_px_q12);
         /* Two roundings to Q12, of the product and of the principal point; the Q28 terms add less
          * than 1400 px * 8 * 2^-28 = 0.2 units. */
         IH_TEST_RANGE(v->u_px_q12 - 2, v->u_px_q12 + 2, u_px_q12, "u", i);
@@ -180,8 +181,8 @@ static void distort_limits_what_is_far_outside(void)
                 const int32_t y = wild[j] > limit ? limit : wild[j] < -limit ? -limit : wild[j];
                 int32_t u, v, limited_u, limited_v;
 
-                ih_rig_distort(&rigs[k], wild[i], wild[j], &u, &v);
-                ih_rig_distort(&rigs[k], x, y, &limited_u, &limited_v);
+                ih_camera_distort(&rigs[k], wild[i], wild[j], &u, &v);
+                ih_camera_distort(&rigs[k], x, y, &limited_u, &limited_v);
                 IH_TEST_EQUAL(limited_u, u, "u", k);
                 IH_TEST_EQUAL(limited_v, v, "v", k);
             }
@@ -199,7 +200,7 @@ static void undistort_survives_any_pixel(void)
             for (j = 0; j < IH_TEST_COUNT(wild); j++) {
                 int32_t x, y;
 
-                ih_rig_undistort(&rigs[k], wild[i], wild[j], &x, &y);
+                ih_camera_undistort(&rigs[k], wild[i], wild[j], &x, &y);
                 IH_TEST_RANGE(-(IH_RIG_TAN_MAX << 28), IH_RIG_TAN_MAX << 28, x, "x", k);
                 IH_TEST_RANGE(-(IH_RIG_TAN_MAX << 28), IH_RIG_TAN_MAX << 28, y, "y", k);
             }
@@ -217,7 +218,7 @@ static void without_distortion_undistort_is_a_division(void)
     for (u = 0; u < c->width; u += 7) {
         int32_t x, y;
 
-        ih_rig_undistort(plain, u << 12, 50 << 12, &x, &y);
+        ih_camera_undistort(plain, u << 12, 50 << 12, &x, &y);
         /* Half a unit of Q28. */
         IH_TEST_WITHIN(0.51, ldexp((u * 65536.0 - c->cx_px_q16) / c->fx_px_q16, 28), x, "x", u);
         IH_TEST_WITHIN(0.51, ldexp((50 * 65536.0 - c->cy_px_q16) / c->fy_px_q16, 28), y, "y", u);
@@ -335,13 +336,13 @@ static void inside_ends_at_the_outer_pixel_centres(void)
     const int32_t right = (calibration.width - 1) * 4096;
     const int32_t bottom = (calibration.height - 1) * 4096;
 
-    TEST_ASSERT_TRUE(ih_rig_inside(&rigs[0], 0, 0));
-    TEST_ASSERT_TRUE(ih_rig_inside(&rigs[0], right, bottom));
-    TEST_ASSERT_FALSE(ih_rig_inside(&rigs[0], -1, 0));
-    TEST_ASSERT_FALSE(ih_rig_inside(&rigs[0], 0, -1));
-    TEST_ASSERT_FALSE(ih_rig_inside(&rigs[0], right + 1, 0));
-    TEST_ASSERT_FALSE(ih_rig_inside(&rigs[0], 0, bottom + 1));
-    TEST_ASSERT_FALSE(ih_rig_inside(&rigs[0], INT32_MIN, INT32_MAX));
+    TEST_ASSERT_TRUE(ih_camera_sees(&rigs[0], 0, 0));
+    TEST_ASSERT_TRUE(ih_camera_sees(&rigs[0], right, bottom));
+    TEST_ASSERT_FALSE(ih_camera_sees(&rigs[0], -1, 0));
+    TEST_ASSERT_FALSE(ih_camera_sees(&rigs[0], 0, -1));
+    TEST_ASSERT_FALSE(ih_camera_sees(&rigs[0], right + 1, 0));
+    TEST_ASSERT_FALSE(ih_camera_sees(&rigs[0], 0, bottom + 1));
+    TEST_ASSERT_FALSE(ih_camera_sees(&rigs[0], INT32_MIN, INT32_MAX));
 }
 
 /* Each of these sets one field of a good calibration and expects a code. */
@@ -596,7 +597,7 @@ static void check_undistorted(int32_t width, int32_t height, double max_px, int 
             double u, v;
             int32_t x, y;
 
-            ih_rig_undistort(&rig, column * 4096, row * 4096, &x, &y);
+            ih_camera_undistort(&rig, column * 4096, row * 4096, &x, &y);
             distort_float64(&calibration, ldexp(x, -28), ldexp(y, -28), &u, &v);
             IH_TEST_WITHIN(max_px, column, u, "u", index);
             IH_TEST_WITHIN(max_px, row, v, "v", index);
@@ -664,7 +665,7 @@ static void no_pixel_is_left_where_the_series_has_no_slope(void)
         double u, v;
         int32_t x, y;
 
-        ih_rig_undistort(&rig, u_q12, 640 * 4096, &x, &y);
+        ih_camera_undistort(&rig, u_q12, 640 * 4096, &x, &y);
         distort_float64(&calibration, ldexp(x, -28), ldexp(y, -28), &u, &v);
         IH_TEST_WITHIN(0.001, ldexp(u_q12, -12), u, "u", u_q12 - middle);
     }
@@ -817,18 +818,18 @@ static void pixels_beyond_16384_are_limited(void)
     use_range_rig(64, 64, IH_RIG_FOCAL_MAX_PX);
     calibration.cx_px_q16 = calibration.cy_px_q16 = 16000 << 16;
     expect(IH_OK, IH_NONE, "principal point far to the right");
-    ih_rig_undistort(&rig, max, max - 4096, &x, &y);
+    ih_camera_undistort(&rig, max, max - 4096, &x, &y);
     IH_TEST_WITHIN(1, ldexp(384.0 / 8192, 28), x, "x", 0);
     IH_TEST_WITHIN(1, ldexp(383.0 / 8192, 28), y, "y", 0);
-    ih_rig_undistort(&rig, max + 4096, INT32_MAX, &off_x, &off_y);
+    ih_camera_undistort(&rig, max + 4096, INT32_MAX, &off_x, &off_y);
     IH_TEST_EQUAL(x, off_x, "x beyond", 0);
     IH_TEST_EQUAL(x, off_y, "y beyond", 0);
     calibration.cx_px_q16 = calibration.cy_px_q16 = -16000 * 65536;
     expect(IH_OK, IH_NONE, "principal point far to the left");
-    ih_rig_undistort(&rig, -max, -max + 4096, &x, &y);
+    ih_camera_undistort(&rig, -max, -max + 4096, &x, &y);
     IH_TEST_WITHIN(1, ldexp(-384.0 / 8192, 28), x, "x", 1);
     IH_TEST_WITHIN(1, ldexp(-383.0 / 8192, 28), y, "y", 1);
-    ih_rig_undistort(&rig, -max - 4096, INT32_MIN, &off_x, &off_y);
+    ih_camera_undistort(&rig, -max - 4096, INT32_MIN, &off_x, &off_y);
     IH_TEST_EQUAL(x, off_x, "x beyond", 1);
     IH_TEST_EQUAL(x, off_y, "y beyond", 1);
 }
