@@ -55,7 +55,7 @@ enum hal_next {
                          * is held, close, and open again later. */
 };
 
-/* Frames that may be held, not released, while the next one is asked for. */
+/* Frames that may be held, not released, while the next one is taken. */
 #define HAL_CAMERA_HOLD_MAX 2
 
 struct hal_camera {
@@ -92,8 +92,8 @@ struct hal_strobe {
 enum hal_event {
     HAL_EVENT_FRAME = 1,     /* camera.next has something to say */
     HAL_EVENT_INTERLOCK = 2, /* the interlock opened or closed, perhaps several times */
-    HAL_EVENT_STOP = 4,      /* asked to end */
-    HAL_EVENT_RELOAD = 8,    /* asked to read the rig anew */
+    HAL_EVENT_STOP = 4,      /* end the program */
+    HAL_EVENT_RELOAD = 8,    /* read the rig again */
 };
 
 struct hal_events {
@@ -107,7 +107,7 @@ struct hal_clock {
     int64_t (*now_us)(void *context); /* never runs backwards; the clock of live frames */
 };
 
-/* Something that acts when it is not told for a while that the program is alive. */
+/* Acts when it has heard for a while no sign that the program is alive. */
 struct hal_watchdog {
     void *context;
     bool (*feed)(void *context, struct hal_error *error);
@@ -128,7 +128,7 @@ struct hal_output {
 enum hal_look {
     HAL_LOOK_NONE = 0,   /* nobody waits for a frame */
     HAL_LOOK_WANTED = 1, /* *room is to be filled, then show() called */
-    HAL_LOOK_GONE = -1   /* told once: nobody ever will; *error */
+    HAL_LOOK_GONE = -1   /* reported once: nobody ever will; *error */
 };
 
 /* Whoever wants to see what is going on; never waits. */

@@ -40,13 +40,13 @@ void hal_text_put_number(struct hal_text *to, int64_t number, int digits)
 {
     char digit[DIGITS_MAX];
     int at = DIGITS_MAX;
-    uint64_t rest = number < 0 ? (uint64_t) - (number + 1) + 1 : (uint64_t)number;
+    uint64_t remaining = number < 0 ? (uint64_t) - (number + 1) + 1 : (uint64_t)number;
     if (number < 0) {
         hal_text_put(to, "-");
     }
-    while (rest > 0 || (at > DIGITS_MAX - digits && at > 0)) {
-        digit[--at] = (char)('0' + rest % 10);
-        rest /= 10;
+    while (remaining > 0 || (at > DIGITS_MAX - digits && at > 0)) {
+        digit[--at] = (char)('0' + remaining % 10);
+        remaining /= 10;
     }
     hal_text_put_some(to, digit + at, (size_t)(DIGITS_MAX - at));
 }

@@ -29,7 +29,7 @@ static const struct option table[] = {
 
 static bool refuse(const char *reason, const char *subject)
 {
-    fprintf(stderr, "host_sim: %s%s; host_sim --help tells more\n", reason, subject);
+    fprintf(stderr, "host_sim: %s%s; see host_sim --help\n", reason, subject);
     return false;
 }
 
@@ -37,8 +37,9 @@ static bool take_without(struct sim_options *options, const char *list)
 {
     const char *unknown = sim_without_add(&options->without, list);
     if (unknown != NULL) {
-        fprintf(stderr, "host_sim: --without %s: no part '%.*s'; host_sim --help lists them\n",
-                list, (int)strcspn(unknown, ","), unknown);
+        fprintf(stderr,
+                "host_sim: --without %s: no part '%.*s'; see host_sim --help for the list\n", list,
+                (int)strcspn(unknown, ","), unknown);
     }
     return unknown == NULL;
 }

@@ -24,7 +24,7 @@ struct sim_options {
     int dir_count; /* at least 1, unless help or version is asked for */
 };
 
-/* False: wrong usage, told on standard error. */
+/* False: wrong usage, reported on standard error. */
 bool sim_options_parse(struct sim_options *options, int argument_count, char **arguments);
 
 /* The text of --help, on standard output. */

@@ -238,16 +238,16 @@ void sim_page_dir(struct sim_page *page, const struct sim_dir *dir, const struct
     page->dir_count++;
 }
 
-static void write_tally(struct app_write *write, const char *key, const struct sim_tally *tally)
+static void write_counts(struct app_write *write, const char *key, const struct sim_counts *counts)
 {
     app_write_key(write, key);
     app_write_open(write, '{');
-    app_write_int_field(write, "frames", tally->frame_count);
-    app_write_int_field(write, "detected", tally->detected_count);
-    app_write_int_field(write, "right", tally->selected_right_count);
+    app_write_int_field(write, "frames", counts->frame_count);
+    app_write_int_field(write, "detected", counts->detected_count);
+    app_write_int_field(write, "right", counts->selected_right_count);
     for (int outcome = 0; outcome < SIM_OUTCOMES; outcome++) {
         app_write_int_field(write, sim_table_outcome((enum sim_outcome)outcome),
-                            tally->outcome_count[outcome]);
+                            counts->outcome_count[outcome]);
     }
     app_write_close(write, '}');
 }
@@ -260,8 +260,8 @@ void sim_page_row(struct sim_page *page, const char *label, struct sim_score *sc
     app_write_open(&write, '{');
     app_write_key(&write, "label");
     app_write_string(&write, label);
-    write_tally(&write, "with_head", &score->with_head);
-    write_tally(&write, "empty", &score->empty);
+    write_counts(&write, "with_head", &score->with_head);
+    write_counts(&write, "empty", &score->empty);
     app_write_key(&write, "error_mm");
     app_write_open(&write, '[');
     for (size_t i = 0; score->error_mm_q8.count > 0 && i < sizeof percent / sizeof *percent; i++) {

@@ -23,7 +23,7 @@ void sim_report_error(struct sim_report *report, const char *subject, const char
     __attribute__((format(printf, 3, 4)));
 
 /* "NAME DONE/COUNT, RATE frames/s, TIME left" on the same line again and again, where it is shown: ten
- * times a second. The time that is left is told from the third second on. */
+ * times a second. The time that is left is shown from the third second on. */
 void sim_report_progress(struct sim_report *report, const char *name, size_t done, size_t count);
 void sim_report_progress_end(struct sim_report *report);
 

@@ -329,7 +329,7 @@ static void finish_page(struct run *run)
     }
 }
 
-/* False: the page cannot be written, which is told before any frame is processed. */
+/* False: the page cannot be written, which is reported before any frame is processed. */
 static bool start_page(struct run *run)
 {
     struct hal_error error;

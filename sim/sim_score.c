@@ -89,11 +89,11 @@ void sim_score_add(struct sim_score *score, const struct sim_verdict *verdict)
     if (!verdict->scored) {
         return;
     }
-    struct sim_tally *tally = verdict->head_there ? &score->with_head : &score->empty;
-    tally->frame_count++;
-    tally->detected_count += verdict->detected;
-    tally->selected_right_count += verdict->selected_right;
-    tally->outcome_count[verdict->outcome]++;
+    struct sim_counts *counts = verdict->head_there ? &score->with_head : &score->empty;
+    counts->frame_count++;
+    counts->detected_count += verdict->detected;
+    counts->selected_right_count += verdict->selected_right;
+    counts->outcome_count[verdict->outcome]++;
     if (verdict->error_known) {
         add_value(&score->error_mm_q8, verdict->error_mm_q8);
     }
@@ -141,20 +141,20 @@ static void merge_lists(struct sim_list *sum, const struct sim_list *list)
     }
 }
 
-static void merge_tallies(struct sim_tally *sum, const struct sim_tally *tally)
+static void merge_counts(struct sim_counts *sum, const struct sim_counts *counts)
 {
-    sum->frame_count += tally->frame_count;
-    sum->detected_count += tally->detected_count;
-    sum->selected_right_count += tally->selected_right_count;
+    sum->frame_count += counts->frame_count;
+    sum->detected_count += counts->detected_count;
+    sum->selected_right_count += counts->selected_right_count;
     for (int i = 0; i < SIM_OUTCOMES; i++) {
-        sum->outcome_count[i] += tally->outcome_count[i];
+        sum->outcome_count[i] += counts->outcome_count[i];
     }
 }
 
 void sim_score_merge(struct sim_score *sum, const struct sim_score *score)
 {
-    merge_tallies(&sum->with_head, &score->with_head);
-    merge_tallies(&sum->empty, &score->empty);
+    merge_counts(&sum->with_head, &score->with_head);
+    merge_counts(&sum->empty, &score->empty);
     merge_lists(&sum->error_mm_q8, &score->error_mm_q8);
     sum->true_dot_count += score->true_dot_count;
     sum->found_dot_count += score->found_dot_count;

@@ -39,13 +39,13 @@ struct sim_list {
 };
 
 /* Of frames with a head, or of those without. */
-struct sim_tally {
+struct sim_counts {
     int32_t frame_count, detected_count, selected_right_count;
     int32_t outcome_count[SIM_OUTCOMES];
 };
 
 struct sim_score {
-    struct sim_tally with_head, empty;
+    struct sim_counts with_head, empty;
     struct sim_list error_mm_q8;
     /* dots, where truth has them */
     int32_t true_dot_count, found_dot_count; /* visible ones; those of them detected */

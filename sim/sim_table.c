@@ -97,13 +97,14 @@ void sim_table_heading(FILE *file)
 
 static void print_head_row(FILE *file, struct sim_score *score)
 {
-    const struct sim_tally *tally = &score->with_head;
+    const struct sim_counts *counts = &score->with_head;
     fprintf(file, " %6" PRId32 " %4" PRId32 " %4" PRId32 " %7" PRId32 " %5" PRId32 " %5" PRId32,
-            tally->frame_count, tally->detected_count, tally->frame_count - tally->detected_count,
-            tally->outcome_count[SIM_OUTCOME_CORRECT], tally->outcome_count[SIM_OUTCOME_AMBIGUOUS],
-            tally->outcome_count[SIM_OUTCOME_WRONG]);
-    fprintf(file, " %5" PRId32 " %6" PRId32, tally->outcome_count[SIM_OUTCOME_NONE],
-            tally->selected_right_count);
+            counts->frame_count, counts->detected_count,
+            counts->frame_count - counts->detected_count,
+            counts->outcome_count[SIM_OUTCOME_CORRECT],
+            counts->outcome_count[SIM_OUTCOME_AMBIGUOUS], counts->outcome_count[SIM_OUTCOME_WRONG]);
+    fprintf(file, " %5" PRId32 " %6" PRId32, counts->outcome_count[SIM_OUTCOME_NONE],
+            counts->selected_right_count);
     if (score->error_mm_q8.count > 0) {
         fprintf(file, " %4s", app_text_fixed(sim_list_rank(&score->error_mm_q8, 50), 8, 0).text);
         fprintf(file, " %4s", app_text_fixed(sim_list_rank(&score->error_mm_q8, 90), 8, 0).text);
@@ -115,7 +116,7 @@ void sim_table_row(FILE *file, const char *label, struct sim_score *score)
 {
     char text[NAME_MAX_BYTES];
     const char *shown = shorten(text, sizeof text, label, LABEL_WIDTH);
-    const struct sim_tally *empty = &score->empty;
+    const struct sim_counts *empty = &score->empty;
     if (score->with_head.frame_count > 0) {
         fprintf(file, "%-*s", LABEL_WIDTH, shown);
         print_head_row(file, score);

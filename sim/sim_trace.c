@@ -7,7 +7,7 @@
 #include <sys/stat.h>
 
 #include "hal_file.h"
-#include "sim_trace_cuts.h"
+#include "sim_trace_contours.h"
 #include "detect/ih_score.h"
 
 /* An int32_t member of an array of structs as a list of its own. */
@@ -310,7 +310,7 @@ static void write_detections(struct app_write *write, const struct isohead *head
     app_write_close(write, ']');
 }
 
-/* Indices of findings, or with the paper's method alone of heads.hypothesis. */
+/* Indices of detections, or with the paper's method alone of heads.hypothesis. */
 static void write_result(struct app_write *write, const struct isohead *head)
 {
     const struct ih_result *result = &head->result;
@@ -344,7 +344,7 @@ void sim_trace_write(struct app_write *write, const struct hal_frame *frame, str
     write_points(write, &head->points);
     write_samples(write, &head->samples, &head->surface);
     write_surface(write, &head->surface);
-    sim_trace_cuts(write, head);
+    sim_trace_contours(write, head);
     write_hypotheses(write, &head->nests);
     write_heads(write, &head->hypotheses, &head->params.hypotheses);
     write_detections(write, head);
@@ -397,7 +397,7 @@ bool sim_trace_frame(const struct sim_trace *trace, const struct hal_frame *fram
         struct app_write write = {.take = take_text, .context = file};
         sim_trace_write(&write, frame, head);
         good = !ferror(file);
-        /* Closing writes the rest, so it too can fail; it must be done in any case. */
+        /* Closing writes what is buffered, so it can fail too; it must be done in any case. */
         good = fclose(file) == 0 && good;
     }
     if (!good) {

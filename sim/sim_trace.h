@@ -17,7 +17,7 @@ struct sim_trace {
     const char *label;
 };
 
-/* Uses head->scratch to cut the surface again. False: *error says why. */
+/* Uses head->scratch to trace the contours again. False: *error says why. */
 bool sim_trace_frame(const struct sim_trace *trace, const struct hal_frame *frame,
                      struct isohead *head, struct hal_error *error);
 

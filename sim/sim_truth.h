@@ -2,7 +2,7 @@
  *
  * In:    a JSON object per line (docs/contract.md): file, head, dots.
  * Out:   the frames sorted by name, in the core's units and formats.
- * Error: told in the report with file and line, and the other lines stay. A line is lost that is no
+ * Error: reported with file and line, and the other lines stay. A line is lost that is no
  *        JSON object, or names no frame of the directory or one that had a line before; one with a
  *        malformed head or dots leaves its frame unscored. A file that cannot be read is no truth.
  * Note:  a line with a "heads" list (several people) in place of a head says nothing about one

@@ -50,7 +50,7 @@ static bool load(int file, void *data, size_t size, size_t *length, struct hal_e
     int32_t count = hal_semihosting_call(SYS_FLEN, block);
     struct hal_text text = hal_text_begin(error->text, sizeof error->text);
     if (count < 0) {
-        hal_text_put(&text, "its length cannot be told");
+        hal_text_put(&text, "its length is unknown");
     } else if ((size_t)count > size) {
         hal_text_put_number(&text, count, 1);
         hal_text_put(&text, " bytes, expected at most ");

@@ -66,11 +66,11 @@ static bool fail_off(const struct hal_gpio *gpio, int reason, struct hal_error *
     static const char before[] = ": cannot be switched off: error ";
     char digits[12];
     size_t digit_count = 0, length = strnlen(gpio->what, sizeof gpio->what - 1);
-    unsigned rest = reason < 0 ? 0 : (unsigned)reason;
+    unsigned remaining = reason < 0 ? 0 : (unsigned)reason;
     do {
-        digits[digit_count++] = (char)('0' + rest % 10);
-        rest /= 10;
-    } while (rest > 0);
+        digits[digit_count++] = (char)('0' + remaining % 10);
+        remaining /= 10;
+    } while (remaining > 0);
     memcpy(error->text, gpio->what, length);
     memcpy(error->text + length, before, sizeof before - 1);
     length += sizeof before - 1;

@@ -7,16 +7,16 @@
  *        push-pull output of the controller; a bias is the board's business (docs/hardware.md).
  * Interlock: both edges are watched. interlock() says "closed" only when the line is closed now and
  *        nothing has happened to it since the call before: an opening between two calls is not lost,
- *        and a contact that chatters is open for as long as it does. One that has just closed is
- *        told as open once more; that is meant. The kernel keeps the events, so nothing is missed
+ *        and a bouncing contact is reported as open until it settles. One that has just closed is
+ *        reported as open once more, on purpose. The kernel keeps the events, so nothing is missed
  *        between.
  * Signals: set(false) is safe in a signal handler in fact, not by promise. gpiod_line_set_value of
  *        1.6.3 and gpiod_line_request_set_value of 2.2 and 2.3 compare fields of their own, fill a
  *        structure on the stack and call ioctl: no lock, no allocation, no stdio. (2.x has asserts
  *        that hold here.) On this side: one atomic pointer, which is NULL whenever the line is not
  *        taken, and an error text that is built without stdio. errno is changed.
- * Not taken: set(false) is true, as nothing here drives the line; the rest fails.
- * Off:   is tried HAL_GPIO_OFF_TRIES times before it is told as failed; close() tries as often, and
+ * Not taken: set(false) is true, as nothing here drives the line; all other calls fail.
+ * Off:   is tried HAL_GPIO_OFF_TRIES times before it is reported as failed; close() tries as often, and
  *        gives the line back whatever comes of it.
  * After: the kernel does not touch the level of a line that is given back. Most controllers go on
  *        driving it, low after close(); some make it an input (pinctrl drivers that mux the pin

@@ -10,7 +10,7 @@
 
 #include "linux/hal_gpio_lines.h"
 
-/* NULL: *error. To be closed by the caller; *info tells about it. */
+/* NULL: *error. To be closed by the caller; *info describes it. */
 struct gpiod_chip *hal_gpio_find_chip(const char *called, struct hal_gpio_chip_info *info,
                                       struct hal_error *error);
 

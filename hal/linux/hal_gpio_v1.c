@@ -41,7 +41,7 @@ bool hal_gpio_line_about(struct gpiod_chip *chip, unsigned offset, struct hal_gp
     return true;
 }
 
-/* This library does not tell the descriptor of an output. The kernel gives out the lowest free
+/* This library does not give the descriptor of an output. The kernel gives out the lowest free
  * number, and this process has one thread: what is free before the request is the line's after it.
  * That a line is there now is made sure of: the guard sets it when this process is dead. */
 static int lowest_free_fd(void)

@@ -60,7 +60,7 @@ static bool is_watching(struct hal_guard *guard)
     return count < 0 && errno == EAGAIN;
 }
 
-static bool tell(const struct hal_guard *guard, char byte)
+static bool send_byte(const struct hal_guard *guard, char byte)
 {
     return send(guard->socket_fd, &byte, 1, MSG_NOSIGNAL | MSG_DONTWAIT) == 1;
 }
@@ -70,7 +70,7 @@ static void stop(struct hal_guard *guard)
     if (guard->socket_fd < 0) {
         return;
     }
-    tell(guard, GUARD_DONE);
+    send_byte(guard, GUARD_DONE);
     shutdown(guard->socket_fd, SHUT_WR);
     /* It closes its end in ending; one that was stopped does not. */
     struct pollfd waiting = {.fd = guard->socket_fd};
@@ -140,7 +140,7 @@ bool hal_guard_feed(struct hal_guard *guard, struct hal_error *error)
     /* One that was stopped still has its socket open. */
     bool stands = waitid(P_PID, (id_t)guard->pid, &info, WSTOPPED | WNOHANG | WNOWAIT) == 0 &&
                   info.si_pid != 0;
-    if (stands || !is_watching(guard) || !tell(guard, GUARD_ALIVE)) {
+    if (stands || !is_watching(guard) || !send_byte(guard, GUARD_ALIVE)) {
         return fail_gone(guard, error);
     }
     return true;
@@ -181,14 +181,14 @@ static bool guard_set(void *context, bool on, struct hal_error *error)
             return false;
         }
         if (guard->socket_fd >= 0) {
-            tell(guard, GUARD_OFF); /* else it goes on to expect signs of life */
+            send_byte(guard, GUARD_OFF); /* else it goes on to expect signs of life */
         }
         return true;
     }
     if (guard->socket_fd < 0) {
         return hal_fail(error, "guard: none, expected an open strobe");
     }
-    if (is_watching(guard) && tell(guard, GUARD_ON)) {
+    if (is_watching(guard) && send_byte(guard, GUARD_ON)) {
         if (!strobe->set(strobe->context, true, error)) {
             return false;
         }

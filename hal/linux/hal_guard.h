@@ -6,9 +6,9 @@
  *        has given the old ones back before they are taken anew (else the kernel would say EBUSY).
  * The guard switches off and ends when
  *        - the socket to this process reads end of file: this process has died, by SIGKILL too;
- *        - it was not told for timeout_ms that this process lives (hal_guard_feed), with the laser on;
+ *        - no sign of life (hal_guard_feed) came for timeout_ms, with the laser on;
  *          while it is off a camera may take seconds to open;
- *        - it is told that all is done.
+ *        - this process reports that all is done.
  * It switches off, and goes on, when the interlock moves: this process may be busy with a frame for as
  *        long as a slow processor needs. The event stays for this process, and interlock() here says
  *        "open" once after the guard has switched off, so that nobody believes the laser to be on.
@@ -58,7 +58,7 @@ struct hal_guard {
     struct hal_guard_config config;
     int socket_fd; /* -1: there is no guard */
     pid_t pid;
-    bool moved; /* the guard has switched off, and nobody has been told yet */
+    bool moved; /* the guard has switched off; not reported yet */
 };
 
 /* What config points at lives as long as the guard. */

@@ -67,7 +67,7 @@ static int listen_to(int socket_fd, bool *on)
  * goes on every GUARD_LOOK_MS, since waiting for it would return at once. */
 static enum guard_exit wait_for_the_end(const struct hal_guard_config *config, int socket_fd)
 {
-    const char told = GUARD_MOVED;
+    const char message = GUARD_MOVED;
     int64_t end_ms = 0;
     bool moved = false, on = false;
     for (;;) {
@@ -83,8 +83,8 @@ static enum guard_exit wait_for_the_end(const struct hal_guard_config *config, i
         moved = waiting[1].revents != 0;
         if (moved) {
             switch_off(config->strobe);
-            /* Full: it has been told often enough. */
-            send(socket_fd, &told, 1, MSG_NOSIGNAL | MSG_DONTWAIT);
+            /* Full: the same message waits there already. */
+            send(socket_fd, &message, 1, MSG_NOSIGNAL | MSG_DONTWAIT);
         }
         if (waiting[0].revents != 0) {
             int why = listen_to(socket_fd, &on);

@@ -14,9 +14,9 @@
 
 /* The guard's exit status. */
 enum guard_exit {
-    GUARD_EXIT_DONE = 0,  /* it was told so */
+    GUARD_EXIT_DONE = 0,  /* the other process said so */
     GUARD_EXIT_GONE = 1,  /* the other process has died */
-    GUARD_EXIT_LATE = 2,  /* not told for too long that the other process lives */
+    GUARD_EXIT_LATE = 2,  /* no sign of life of the other process for too long */
     GUARD_EXIT_SETUP = 3, /* it never began */
     GUARD_EXIT_LINE = 4   /* the line could not be set */
 };

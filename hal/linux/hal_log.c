@@ -131,10 +131,11 @@ void hal_log_write(void *context, int level, const char *text)
 {
     struct hal_log_writer *writer = context;
     if (writer->dropped_count > 0) {
-        char told[64];
-        snprintf(told, sizeof told, "%" PRId64 " messages could not be told",
+        char reported[64];
+        snprintf(reported, sizeof reported,
+                 "%" PRId64 " messages were lost: the log was not read in time",
                  writer->dropped_count);
-        if (write_line(writer, LOG_WARNING, told)) {
+        if (write_line(writer, LOG_WARNING, reported)) {
             writer->dropped_count = 0;
         }
     }

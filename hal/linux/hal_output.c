@@ -44,12 +44,12 @@ static int write_some(const struct hal_output_state *state, const char *bytes, s
 }
 
 /* What is left of the last record; errno as above. */
-static int write_rest(struct hal_output_state *state)
+static int write_unsent(struct hal_output_state *state)
 {
     size_t done = 0;
-    int number = write_some(state, state->rest + state->rest_start, state->rest_count, &done);
-    state->rest_start += done;
-    state->rest_count -= done;
+    int number = write_some(state, state->unsent + state->unsent_start, state->unsent_count, &done);
+    state->unsent_start += done;
+    state->unsent_count -= done;
     return number;
 }
 
@@ -57,7 +57,7 @@ static int write_rest(struct hal_output_state *state)
 static int write_record(struct hal_output_state *state, const char *bytes, size_t count)
 {
     size_t done = 0;
-    int number = state->rest_count > 0 ? write_rest(state) : 0;
+    int number = state->unsent_count > 0 ? write_unsent(state) : 0;
     if (number != 0) {
         return number;
     }
@@ -65,9 +65,9 @@ static int write_record(struct hal_output_state *state, const char *bytes, size_
     if (done == 0 || number == 0) {
         return number;
     }
-    state->rest_start = 0;
-    state->rest_count = count - done;
-    memcpy(state->rest, bytes + done, state->rest_count);
+    state->unsent_start = 0;
+    state->unsent_count = count - done;
+    memcpy(state->unsent, bytes + done, state->unsent_count);
     /* What else is wrong shows when the rest is written. */
     return 0;
 }
@@ -169,7 +169,7 @@ static void shut(struct hal_output_state *state)
         close(state->descriptor);
     }
     state->descriptor = -1;
-    state->rest_count = 0;
+    state->unsent_count = 0;
 }
 
 /* Whoever is at the other end may have half a record of before: an empty line ends it. */
@@ -185,9 +185,9 @@ static bool open_serial(struct hal_output_state *state, struct hal_error *error)
         shut(state);
         return false;
     }
-    state->rest[0] = '\n';
-    state->rest_start = 0;
-    state->rest_count = 1;
+    state->unsent[0] = '\n';
+    state->unsent_start = 0;
+    state->unsent_count = 1;
     return true;
 }
 
@@ -297,8 +297,8 @@ bool hal_output_serial(struct hal_output_state *state, const char *path, int32_t
 
 void hal_output_close(struct hal_output_state *state)
 {
-    if (state->descriptor >= 0 && state->rest_count > 0) {
-        (void)write_rest(state);
+    if (state->descriptor >= 0 && state->unsent_count > 0) {
+        (void)write_unsent(state);
     }
     if (state->owned) {
         shut(state);

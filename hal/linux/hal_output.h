@@ -34,8 +34,8 @@ struct hal_output_state {
     int descriptor;           /* -1: none */
     bool owned;               /* not standard output: non-blocking, and to be closed */
     /* The rest of a record that is on its way. */
-    char rest[HAL_OUTPUT_RECORD_MAX];
-    size_t rest_start, rest_count;
+    char unsent[HAL_OUTPUT_RECORD_MAX];
+    size_t unsent_start, unsent_count;
     /* Serial. */
     char path[HAL_OUTPUT_PATH_MAX];
     int32_t baud;

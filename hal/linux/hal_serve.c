@@ -210,7 +210,7 @@ static void look_around(struct serve *serve)
 /* --- frames --- */
 
 /* If the loop wants to go on it does so now, and not at the next tick. */
-static void rest(void)
+static void refresh_done(void)
 {
     sched_yield();
 }
@@ -226,7 +226,8 @@ static void take_frame(struct serve *serve)
     unsigned char *bytes = malloc(room);
     size_t size = 0;
     if (bytes != NULL) {
-        size = serve->config->write(content, serve->mailbox.content_size, bytes, room, rest);
+        size =
+            serve->config->write(content, serve->mailbox.content_size, bytes, room, refresh_done);
     }
     hal_mailbox_done(&serve->mailbox);
     bool has_frame = bytes != NULL && hal_serve_answers_frame(&serve->answers, bytes, size);
@@ -272,7 +273,7 @@ static int serve_until_end(struct serve *serve)
 
 /* --- the beginning --- */
 
-static void tell(const char *text)
+static void report_start(const char *text)
 {
     send(HAL_VIEWER_SOCKET_FD, text, strlen(text), MSG_NOSIGNAL);
 }
@@ -309,9 +310,9 @@ int hal_serve_run(const struct hal_serve_config *config)
     static struct serve serve; /* for as long as the process lives */
     serve.config = config;
     if (!begin(&serve, &error)) {
-        tell(error.text);
+        report_start(error.text);
         return 1;
     }
-    tell(HAL_VIEWER_READY);
+    report_start(HAL_VIEWER_READY);
     return serve_until_end(&serve);
 }

@@ -46,11 +46,11 @@ struct hal_serve_config {
     /* The answer from a content of the mailbox, which may be changed. Its length; 0: it has none. It
      * calls rest() about every 100 us. */
     size_t (*write)(void *content, size_t content_size, unsigned char *answer, size_t size,
-                    void (*rest)(void));
+                    void (*refresh_done)(void));
     size_t answer_more; /* most bytes that an answer has more than a content */
 };
 
-/* Until the other process ends. What is wrong before it can serve is told to that one. The exit status. */
+/* Until the other process ends. What is wrong before it can serve is reported to that one. The exit status. */
 int hal_serve_run(const struct hal_serve_config *config);
 
 #endif

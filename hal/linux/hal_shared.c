@@ -26,8 +26,8 @@ static size_t terminal_piece(const char *bytes, size_t count)
 
 ssize_t hal_shared_write(int descriptor, const char *bytes, size_t count)
 {
-    struct pollfd asked = {.fd = descriptor, .events = POLLOUT};
-    int answers = poll(&asked, 1, 0);
+    struct pollfd requested = {.fd = descriptor, .events = POLLOUT};
+    int answers = poll(&requested, 1, 0);
     if (answers <= 0) {
         errno = answers == 0 ? EAGAIN : errno;
         return -1;

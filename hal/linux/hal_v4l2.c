@@ -27,7 +27,7 @@ static bool check_capabilities(int fd, struct hal_error *error)
     if (hal_v4l2_ioctl(fd, VIDIOC_QUERYCAP, &capability) != 0) {
         return hal_fail(error, "asking what it can do: %s", strerror(errno));
     }
-    /* what this node can do, where the driver tells it from what the whole device can */
+    /* what this node can do, where the driver distinguishes it from what the whole device can */
     const uint32_t has = (capability.capabilities & V4L2_CAP_DEVICE_CAPS) != 0
                              ? capability.device_caps
                              : capability.capabilities;
@@ -90,11 +90,11 @@ static bool map_buffer(struct hal_v4l2 *v4l2, uint32_t index, struct hal_error *
 
 static bool take_buffers(struct hal_v4l2 *v4l2, struct hal_error *error)
 {
-    struct v4l2_requestbuffers request = {.count = HAL_V4L2_BUFFERS_ASKED,
+    struct v4l2_requestbuffers request = {.count = HAL_V4L2_BUFFERS_REQUESTED,
                                           .type = V4L2_BUF_TYPE_VIDEO_CAPTURE,
                                           .memory = V4L2_MEMORY_MMAP};
     if (hal_v4l2_ioctl(v4l2->fd, VIDIOC_REQBUFS, &request) != 0) {
-        return hal_fail(error, "asking for %d buffers: %s", HAL_V4L2_BUFFERS_ASKED,
+        return hal_fail(error, "asking for %d buffers: %s", HAL_V4L2_BUFFERS_REQUESTED,
                         strerror(errno));
     }
     if (request.count < HAL_V4L2_BUFFERS_MIN) {

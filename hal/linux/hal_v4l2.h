@@ -56,7 +56,7 @@
 #include "linux/hal_v4l2_format.h"
 
 /* What the driver is asked for: one being filled, one filled, one to spare, and those held. */
-#define HAL_V4L2_BUFFERS_ASKED 6
+#define HAL_V4L2_BUFFERS_REQUESTED 6
 /* It may give fewer, but not fewer than this, or more; further ones are not used. */
 #define HAL_V4L2_BUFFERS_MIN 4
 #define HAL_V4L2_BUFFERS_MAX 32

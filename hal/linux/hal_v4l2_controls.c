@@ -12,12 +12,12 @@
 /* V4L2_CID_EXPOSURE_ABSOLUTE counts in these. */
 #define EXPOSURE_UNIT_NS 100000
 /* Longest text of what was asked, as "exposure 20000 us". */
-#define ASKED_MAX 40
+#define REQUEST_MAX 40
 
 enum found {
     FOUND_NOT = 0,
     FOUND = 1,
-    FOUND_ERROR = -1 /* the device could not even be asked; *error */
+    FOUND_ERROR = -1 /* the device could not be queried; *error */
 };
 
 static enum found find_control(int fd, uint32_t id, struct v4l2_queryctrl *control,
@@ -37,7 +37,7 @@ static enum found find_control(int fd, uint32_t id, struct v4l2_queryctrl *contr
 /* Set a control and read it back. A device may round to its steps. unit_ns: 0, or what a value of 1
  * is, for the text. */
 static bool set_control(int fd, const struct v4l2_queryctrl *control, int64_t value,
-                        const char *asked, int64_t unit_ns, struct hal_error *error)
+                        const char *requested, int64_t unit_ns, struct hal_error *error)
 {
     const char *name = (const char *)control->name;
     char units[48] = "";
@@ -45,22 +45,22 @@ static bool set_control(int fd, const struct v4l2_queryctrl *control, int64_t va
         snprintf(units, sizeof units, " (of %lld ns)", (long long)unit_ns);
     }
     if (value < control->minimum || value > control->maximum) {
-        return hal_fail(error, "%s: %.31s would be %lld%s, expected %d..%d", asked, name,
+        return hal_fail(error, "%s: %.31s would be %lld%s, expected %d..%d", requested, name,
                         (long long)value, units, control->minimum, control->maximum);
     }
     struct v4l2_control setting = {.id = control->id, .value = (int32_t)value};
     if (hal_v4l2_ioctl(fd, VIDIOC_S_CTRL, &setting) != 0) {
-        return hal_fail(error, "%s: setting %.31s to %lld%s: %s", asked, name, (long long)value,
+        return hal_fail(error, "%s: setting %.31s to %lld%s: %s", requested, name, (long long)value,
                         units, strerror(errno));
     }
     setting = (struct v4l2_control){.id = control->id};
     if (hal_v4l2_ioctl(fd, VIDIOC_G_CTRL, &setting) != 0) {
-        return hal_fail(error, "%s: reading %.31s back: %s", asked, name, strerror(errno));
+        return hal_fail(error, "%s: reading %.31s back: %s", requested, name, strerror(errno));
     }
     const int64_t beside = setting.value > value ? setting.value - value : value - setting.value;
     const int64_t step = control->step < 1 ? 1 : control->step;
     if (beside >= step) {
-        return hal_fail(error, "%s: %.31s set to %lld%s, the device says %d", asked, name,
+        return hal_fail(error, "%s: %.31s set to %lld%s, the device says %d", requested, name,
                         (long long)value, units, setting.value);
     }
     return true;
@@ -69,11 +69,11 @@ static bool set_control(int fd, const struct v4l2_queryctrl *control, int64_t va
 /* The first of two modes that the device takes: a device has one way or the other of being
  * automatic, or manual. */
 static bool set_exposure_mode(int fd, const struct v4l2_queryctrl *control, int32_t first,
-                              int32_t second, const char *asked, struct hal_error *error)
+                              int32_t second, const char *requested, struct hal_error *error)
 {
     struct hal_error unused;
-    return set_control(fd, control, first, asked, 0, error) ||
-           set_control(fd, control, second, asked, 0, &unused);
+    return set_control(fd, control, first, requested, 0, error) ||
+           set_control(fd, control, second, requested, 0, &unused);
 }
 
 bool hal_v4l2_exposure_auto(int fd, struct hal_error *error)
@@ -97,7 +97,7 @@ static int64_t read_wide(int fd, uint32_t id)
     return hal_v4l2_ioctl(fd, VIDIOC_G_EXT_CTRLS, &controls) == 0 ? control.value64 : 0;
 }
 
-/* The time of a sensor's row; 0 where the device does not tell. */
+/* The time of a sensor's row; 0 where the device does not report it. */
 static int64_t read_row_ns(int fd, int32_t width)
 {
     struct v4l2_control blank = {.id = V4L2_CID_HBLANK};
@@ -109,8 +109,8 @@ static int64_t read_row_ns(int fd, int32_t width)
 }
 
 /* The control that sets the exposure, and its unit. */
-static bool find_exposure(int fd, int32_t width, const char *asked, struct v4l2_queryctrl *control,
-                          int64_t *unit_ns, struct hal_error *error)
+static bool find_exposure(int fd, int32_t width, const char *requested,
+                          struct v4l2_queryctrl *control, int64_t *unit_ns, struct hal_error *error)
 {
     enum found found = find_control(fd, V4L2_CID_EXPOSURE_ABSOLUTE, control, error);
     *unit_ns = EXPOSURE_UNIT_NS;
@@ -118,36 +118,36 @@ static bool find_exposure(int fd, int32_t width, const char *asked, struct v4l2_
         found = find_control(fd, V4L2_CID_EXPOSURE, control, error);
         *unit_ns = found == FOUND ? read_row_ns(fd, width) : 0;
         if (found == FOUND_NOT) {
-            hal_fail(error, "%s: the device has no control of exposure", asked);
+            hal_fail(error, "%s: the device has no control of exposure", requested);
         } else if (found == FOUND && *unit_ns == 0) {
             return hal_fail(error,
-                            "%s: the device counts exposure in rows and does not tell how long a "
+                            "%s: the device counts exposure in rows and does not report how long a "
                             "row takes (controls pixel rate and horizontal blanking)",
-                            asked);
+                            requested);
         }
     }
     return found == FOUND;
 }
 
-static bool set_exposure_manual(int fd, const char *asked, struct hal_error *error)
+static bool set_exposure_manual(int fd, const char *requested, struct hal_error *error)
 {
     struct v4l2_queryctrl control;
     const enum found found = find_control(fd, V4L2_CID_EXPOSURE_AUTO, &control, error);
     return found == FOUND_NOT ||
            (found == FOUND && set_exposure_mode(fd, &control, V4L2_EXPOSURE_MANUAL,
-                                                V4L2_EXPOSURE_SHUTTER_PRIORITY, asked, error));
+                                                V4L2_EXPOSURE_SHUTTER_PRIORITY, requested, error));
 }
 
 bool hal_v4l2_exposure_set(int fd, int32_t width, int32_t exposure_us,
                            struct hal_v4l2_exposure *exposure, struct hal_error *error)
 {
     struct v4l2_queryctrl control;
-    char asked[ASKED_MAX];
-    snprintf(asked, sizeof asked, "exposure %d us", exposure_us);
+    char requested[REQUEST_MAX];
+    snprintf(requested, sizeof requested, "exposure %d us", exposure_us);
     if (!exposure->known) {
         int64_t unit_ns = 0;
-        if (!set_exposure_manual(fd, asked, error) ||
-            !find_exposure(fd, width, asked, &control, &unit_ns, error)) {
+        if (!set_exposure_manual(fd, requested, error) ||
+            !find_exposure(fd, width, requested, &control, &unit_ns, error)) {
             return false;
         }
         *exposure = (struct hal_v4l2_exposure){true, control.id, unit_ns};
@@ -155,23 +155,23 @@ bool hal_v4l2_exposure_set(int fd, int32_t width, int32_t exposure_us,
         const enum found found = find_control(fd, exposure->control, &control, error);
         if (found != FOUND) {
             return found == FOUND_NOT &&
-                   hal_fail(error, "%s: the device's control of exposure is gone", asked);
+                   hal_fail(error, "%s: the device's control of exposure is gone", requested);
         }
     }
     const int64_t value =
         ((int64_t)exposure_us * NS_PER_US + exposure->unit_ns / 2) / exposure->unit_ns;
-    return set_control(fd, &control, value, asked, exposure->unit_ns, error);
+    return set_control(fd, &control, value, requested, exposure->unit_ns, error);
 }
 
-static bool set_autogain(int fd, bool on, const char *asked, struct hal_error *error)
+static bool set_autogain(int fd, bool on, const char *requested, struct hal_error *error)
 {
     struct v4l2_queryctrl control;
     const enum found found = find_control(fd, V4L2_CID_AUTOGAIN, &control, error);
     if (found == FOUND_NOT && on) {
-        return hal_fail(error, "%s: the device has no automatic gain", asked);
+        return hal_fail(error, "%s: the device has no automatic gain", requested);
     }
     return found == FOUND_NOT ||
-           (found == FOUND && set_control(fd, &control, on ? 1 : 0, asked, 0, error));
+           (found == FOUND && set_control(fd, &control, on ? 1 : 0, requested, 0, error));
 }
 
 bool hal_v4l2_gain_auto(int fd, struct hal_error *error)
@@ -182,9 +182,9 @@ bool hal_v4l2_gain_auto(int fd, struct hal_error *error)
 bool hal_v4l2_gain_set(int fd, int32_t gain, struct hal_error *error)
 {
     struct v4l2_queryctrl control;
-    char asked[ASKED_MAX];
-    snprintf(asked, sizeof asked, "gain %d", gain);
-    if (!set_autogain(fd, false, asked, error)) {
+    char requested[REQUEST_MAX];
+    snprintf(requested, sizeof requested, "gain %d", gain);
+    if (!set_autogain(fd, false, requested, error)) {
         return false;
     }
     enum found found = find_control(fd, V4L2_CID_GAIN, &control, error);
@@ -192,7 +192,7 @@ bool hal_v4l2_gain_set(int fd, int32_t gain, struct hal_error *error)
         found = find_control(fd, V4L2_CID_ANALOGUE_GAIN, &control, error);
     }
     if (found == FOUND_NOT) {
-        hal_fail(error, "%s: the device has no control of gain", asked);
+        hal_fail(error, "%s: the device has no control of gain", requested);
     }
-    return found == FOUND && set_control(fd, &control, gain, asked, 0, error);
+    return found == FOUND && set_control(fd, &control, gain, requested, 0, error);
 }

@@ -164,8 +164,8 @@ static bool ask_format(int fd, const struct choice *choice, int32_t width, int32
     return true;
 }
 
-static bool is_as_asked(const struct v4l2_pix_format *given, const struct choice *choice,
-                        int32_t width, int32_t height)
+static bool is_as_requested(const struct v4l2_pix_format *given, const struct choice *choice,
+                            int32_t width, int32_t height)
 {
     return given->pixelformat == choice->fourcc && given->width == (uint32_t)width &&
            given->height == (uint32_t)height;
@@ -279,7 +279,7 @@ bool hal_v4l2_format_set(int fd, const char *wanted, int32_t width, int32_t heig
         if (!ask_format(fd, &choices[k], width, height, &given, error)) {
             return false;
         }
-        if (is_as_asked(&given, &choices[k], width, height)) {
+        if (is_as_requested(&given, &choices[k], width, height)) {
             return describe(&choices[k], &given, format, error);
         }
         if (!refused) { /* the best one's sizes are what the user should see */

@@ -41,7 +41,7 @@ static bool read_number(const char *text, int64_t *value)
     return errno == 0 && end != text && *end == 0 && *value > 0;
 }
 
-/* Is life wanted, and how often? */
+/* Are signs of life expected, and how often? */
 static bool read_period(struct hal_watchdog_feeder *feeder, struct hal_error *error)
 {
     const char *period = getenv("WATCHDOG_USEC");
@@ -56,7 +56,7 @@ static bool read_period(struct hal_watchdog_feeder *feeder, struct hal_error *er
     if (whose != NULL && !read_number(whose, &pid)) {
         return hal_fail(error, "WATCHDOG_PID: '%.40s', expected a process number", whose);
     }
-    feeder->wants_life = pid == getpid();
+    feeder->is_life_needed = pid == getpid();
     feeder->notify.step_us = period_us / 2;
     return true;
 }
@@ -90,30 +90,30 @@ static bool open_device(struct hal_watchdog_feeder *feeder, struct hal_error *er
     return true;
 }
 
-/* Is it this watcher's turn? */
-static bool is_due(const struct hal_watchdog_turn *turn, int64_t now_us)
+/* Is the next feed due? */
+static bool is_due(const struct hal_watchdog_schedule *schedule, int64_t now_us)
 {
-    return now_us >= turn->next_us;
+    return now_us >= schedule->next_us;
 }
 
-static void told(struct hal_watchdog_turn *turn, int64_t now_us)
+static void reported(struct hal_watchdog_schedule *schedule, int64_t now_us)
 {
-    turn->next_us = now_us + turn->step_us;
+    schedule->next_us = now_us + schedule->step_us;
 }
 
 static bool feed_notify(struct hal_watchdog_feeder *feeder, int64_t now_us, struct hal_error *error)
 {
     const char *text = feeder->ready ? "WATCHDOG=1" : "READY=1";
-    if (feeder->notify_fd < 0 || (feeder->ready && !feeder->wants_life) ||
+    if (feeder->notify_fd < 0 || (feeder->ready && !feeder->is_life_needed) ||
         !is_due(&feeder->notify, now_us)) {
         return true;
     }
     if (send(feeder->notify_fd, text, strlen(text), MSG_NOSIGNAL) < 0) {
         return errno == EAGAIN || errno == ENOBUFS ||
-               hal_fail(error, "NOTIFY_SOCKET: cannot be told: %s", strerror(errno));
+               hal_fail(error, "NOTIFY_SOCKET: cannot send to it: %s", strerror(errno));
     }
     feeder->ready = true;
-    told(&feeder->notify, now_us);
+    reported(&feeder->notify, now_us);
     return true;
 }
 
@@ -126,7 +126,7 @@ static bool feed_device(struct hal_watchdog_feeder *feeder, int64_t now_us, stru
         return hal_fail(error, "'%.120s' cannot be written: %s", feeder->config.path,
                         strerror(errno));
     }
-    told(&feeder->device, now_us);
+    reported(&feeder->device, now_us);
     return true;
 }
 
@@ -138,7 +138,7 @@ static bool feed_guard(struct hal_watchdog_feeder *feeder, int64_t now_us, struc
     if (!hal_guard_feed(feeder->config.guard, error)) {
         return false;
     }
-    told(&feeder->guard, now_us);
+    reported(&feeder->guard, now_us);
     return true;
 }
 
@@ -160,7 +160,7 @@ static bool watchdog_feed(void *context, struct hal_error *error)
     return true;
 }
 
-/* A guard with a short timeout wants to be told more often than the others. */
+/* A guard with a short timeout needs a feed more often than the others. */
 static int64_t guard_step_us(const struct hal_guard *guard)
 {
     int64_t quarter_us = guard == NULL ? INT64_MAX : (int64_t)guard->config.timeout_ms * 250;

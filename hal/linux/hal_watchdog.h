@@ -1,8 +1,8 @@
-/* hal_watchdog - tells whoever watches that the program lives: systemd, the machine's watchdog, the
+/* hal_watchdog - signs of life for whoever watches the program: systemd, the machine's watchdog, the
  * guard of the laser.
  *
  * feed() may be called as often as one likes, and has to be at least every HAL_WATCHDOG_STEP_US;
- * each watcher is told only as often as it needs:
+ * each watcher is fed only as often as it needs:
  * systemd:  where NOTIFY_SOCKET is set: READY=1 with the first feed, STOPPING=1 at the end. Where
  *           WATCHDOG_USEC is set too, and meant for this process (WATCHDOG_PID): WATCHDOG=1 as often
  *           as half of it. Both variables are removed from the environment, so that no child speaks
@@ -14,7 +14,7 @@
  *           two steps is too short for it.
  * guard:    hal_guard_feed each HAL_WATCHDOG_STEP_US, or four times per its timeout.
  *
- * Error:    all are told before one that failed is reported; the guard first. A full socket of systemd
+ * Error:    all are fed before one that failed is reported; the guard first. A full socket of systemd
  *           is no error: it is tried again with the next feed.
  */
 #ifndef HAL_WATCHDOG_H
@@ -30,8 +30,8 @@ struct hal_watchdog_config {
     const struct hal_clock *clock;
 };
 
-/* A watcher that is told at times. */
-struct hal_watchdog_turn {
+/* When a watcher is fed next. */
+struct hal_watchdog_schedule {
     int64_t step_us; /* 0: with each feed */
     int64_t next_us;
 };
@@ -42,8 +42,8 @@ struct hal_watchdog_feeder {
     struct hal_watchdog_config config;
     int device_fd, notify_fd; /* -1: none */
     bool ready;               /* READY=1 has been sent */
-    bool wants_life;          /* WATCHDOG=1 is asked for */
-    struct hal_watchdog_turn device, notify, guard;
+    bool is_life_needed;      /* systemd expects WATCHDOG=1 */
+    struct hal_watchdog_schedule device, notify, guard;
 };
 
 /* False: *error names the variable or device, what was found and expected; nothing is open. Opening

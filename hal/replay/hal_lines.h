@@ -1,6 +1,6 @@
 /* hal_lines - a file of JSON objects, one per line (JSON Lines), read line by line.
  *
- * Empty lines are skipped. Error: on opening as hal_file; a line that is no JSON object is told
+ * Empty lines are skipped. Error: on opening as hal_file; a line that is no JSON object is reported
  * with its number and beginning, and reading goes on behind it.
  */
 #ifndef HAL_LINES_H

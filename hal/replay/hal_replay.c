@@ -49,7 +49,7 @@ static const char *frame_names(const struct hal_replay *replay)
 }
 
 /* Index of the first entry whose name is not less. */
-static size_t find_place(const struct hal_replay *replay, const char *name)
+static size_t find_position(const struct hal_replay *replay, const char *name)
 {
     size_t low = 0;
     size_t high = replay->entry_count;
@@ -66,7 +66,7 @@ static size_t find_place(const struct hal_replay *replay, const char *name)
 
 static struct hal_replay_entry *find_entry(const struct hal_replay *replay, const char *name)
 {
-    size_t place = find_place(replay, name);
+    size_t place = find_position(replay, name);
     if (place < replay->entry_count && strcmp(replay->entry[place].name, name) == 0) {
         return &replay->entry[place];
     }
@@ -89,7 +89,7 @@ static struct hal_replay_entry *add_entry(struct hal_replay *replay, const char 
     if (copy == NULL) {
         return NULL;
     }
-    size_t place = find_place(replay, name);
+    size_t place = find_position(replay, name);
     struct hal_replay_entry *entry = &replay->entry[place];
     memmove(entry + 1, entry, (replay->entry_count - place) * sizeof *entry);
     *entry = (struct hal_replay_entry){.name = copy, .laser = true};

@@ -76,7 +76,7 @@ const Data = (() => {
     return [(camera.fx_px_q16 * xd + camera.cx_px_q16) / q16, (camera.fy_px_q16 * yd + camera.cy_px_q16) / q16];
   }
 
-  /* A place on the grid, in steps, to normalised coordinates. */
+  /* A position on the grid, in steps, to normalised coordinates. */
   function fromGrid(field, x, y) {
     const q28 = 1 << 28, unit = field.unit_q28 * STEP, middle = (NODES - 1) / 2;
     return [(field.centre_x_q28 + (x - middle) * unit) / q28, (field.centre_y_q28 + (y - middle) * unit) / q28];

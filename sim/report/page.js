@@ -26,7 +26,7 @@
     return `${head}: not right, ${!v.head_there ? "nobody is there" : frame.selected ? "it is elsewhere" : "there is one"} (${v.outcome})`;
   }
 
-  function tell(frame) {
+  function report(frame) {
     const state = Data.state(frame);
     const tag = Tables.element("span", { class: `tag ${state === "right" ? "good" : state === "wrong" || state === "lost" ? "bad" : "plain"}` }, stateText[state]);
     now.replaceChildren(tag, " ", Tables.element("span", {}, `Frame ${frame.index + 1} of ${frames.length}`), " ",
@@ -54,17 +54,17 @@
     Charts.show(frames.slice(own.first, own.first + own.count), go);
   }
 
-  let asked = 0;
+  let requested = 0;
   async function go(index) {
     const frame = frames[Math.min(Math.max(index, 0), frames.length - 1)];
     current = frame.index;
     slider.value = `${current}`;
-    tell(frame);
+    report(frame);
     showDir(frame);
     Charts.mark(frame.inDir);
-    const mine = ++asked;
+    const mine = ++requested;
     const next = await Data.load(current);
-    if (mine !== asked) return; /* another one was asked for meanwhile */
+    if (mine !== requested) return; /* another one was requested meanwhile */
     loaded = next;
     chosen = frame.selected ? frame.record.head : 0;
     Picture.show(frame, loaded, chosen);

@@ -3,7 +3,7 @@
  * camera frame's x, -y, -z. */
 const Space = (() => {
   const canvas = document.getElementById("space");
-  const DISTANCE = 1250, AIM_BEHIND_MM = 400, TURN = Math.PI / 24; /* mm; radians per key */
+  const DISTANCE = 1250, AIM_BEHIND_MM = 400, ROTATION = Math.PI / 24; /* mm; radians per key */
   let renderer = null;
   try {
     renderer = new THREE.WebGLRenderer({ canvas, antialias: true, preserveDrawingBuffer: true });
@@ -14,7 +14,7 @@ const Space = (() => {
   const scene = new THREE.Scene();
   const camera = new THREE.PerspectiveCamera(40, 4 / 3, 20, 12000);
   const controls = new THREE.OrbitControls(camera, canvas);
-  controls.enableKeys = false; /* those of this page turn */
+  controls.enableKeys = false; /* the keys of this page rotate */
   controls.enableZoom = false; /* until the view has the focus: a wheel is for the page first */
   controls.enablePan = false;
   controls.minDistance = 150;
@@ -109,8 +109,8 @@ const Space = (() => {
     const hypotheses = frame.record.hypotheses || [];
     hypotheses.forEach((h, i) => {
       if (h.rejected !== null && i !== chosen) return;
-      const finding = Data.dirs[frame.dir].paper ? null : trace.findings[i];
-      const semi = finding ? finding.semi_mm_q8.map((v) => v / 256) : MEAN_SEMI;
+      const detection = Data.dirs[frame.dir].paper ? null : trace.findings[i];
+      const semi = detection ? detection.semi_mm_q8.map((v) => v / 256) : MEAN_SEMI;
       group.add(makeEllipsoid(h.centre_mm, semi, h.rejected === null ? 0x00c98d : 0xff9d2e));
     });
     return group;
@@ -153,28 +153,28 @@ const Space = (() => {
     controls.target.set(median(q[0]), median(q[1]), -(near + AIM_BEHIND_MM));
   }
 
-  function turnTo(azimuth, elevation, distance = DISTANCE) {
+  function rotateTo(azimuth, elevation, distance = DISTANCE) {
     const offset = new THREE.Vector3().setFromSpherical(new THREE.Spherical(distance, Math.PI / 2 - elevation, azimuth));
     camera.position.copy(controls.target).add(offset);
     controls.update();
     draw();
   }
-  const home = () => turnTo(0.45, 0.25);
+  const home = () => rotateTo(0.45, 0.25);
 
-  function turnBy(azimuth, elevation, zoom) {
+  function rotateBy(azimuth, elevation, zoom) {
     const s = new THREE.Spherical().setFromVector3(camera.position.clone().sub(controls.target));
     const limit = Math.PI / 2 - 0.02;
-    turnTo(s.theta + azimuth, Math.min(Math.max(Math.PI / 2 - s.phi + elevation, -limit), limit), s.radius * zoom);
+    rotateTo(s.theta + azimuth, Math.min(Math.max(Math.PI / 2 - s.phi + elevation, -limit), limit), s.radius * zoom);
   }
 
   const moves = {
-    ArrowLeft: [-TURN, 0, 1], ArrowRight: [TURN, 0, 1], ArrowUp: [0, TURN, 1], ArrowDown: [0, -TURN, 1],
+    ArrowLeft: [-ROTATION, 0, 1], ArrowRight: [ROTATION, 0, 1], ArrowUp: [0, ROTATION, 1], ArrowDown: [0, -ROTATION, 1],
     "+": [0, 0, 1 / 1.15], "=": [0, 0, 1 / 1.15], "-": [0, 0, 1.15],
   };
   canvas.addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey) return;
     if (event.key === "0") home();
-    else if (moves[event.key]) turnBy(...moves[event.key]);
+    else if (moves[event.key]) rotateBy(...moves[event.key]);
     else return;
     event.preventDefault();
     event.stopPropagation();
@@ -239,9 +239,9 @@ const Space = (() => {
       draw();
     });
   }
-  document.getElementById("space-front").addEventListener("click", () => turnTo(0, 0));
-  document.getElementById("space-side").addEventListener("click", () => turnTo(Math.PI / 2, 0));
-  document.getElementById("space-top").addEventListener("click", () => turnTo(0, Math.PI / 2 - 0.02));
+  document.getElementById("space-front").addEventListener("click", () => rotateTo(0, 0));
+  document.getElementById("space-side").addEventListener("click", () => rotateTo(Math.PI / 2, 0));
+  document.getElementById("space-top").addEventListener("click", () => rotateTo(0, Math.PI / 2 - 0.02));
   new ResizeObserver(draw).observe(canvas);
   theme();
   return { show, choose, theme, draw };

@@ -62,7 +62,7 @@ const Tables = (() => {
     const h = record.hypotheses[index];
     const text = h.rejected !== null ? `rejected: ${h.rejected}` : index === record.head ? "the head" : "accepted";
     const tag = element("span", { class: `tag ${h.rejected === null ? "good" : "bad"}` }, text);
-    return element("td", { class: "text" }, tag, h.predicted ? element("small", {}, "carried: not seen here") : null);
+    return element("td", { class: "text" }, tag, h.predicted ? element("small", {}, "predicted: not seen here") : null);
   }
 
   function hypothesisRow(frame, index, chosen, choose) {
@@ -95,7 +95,7 @@ const Tables = (() => {
     }
     const odds = (q10) => (q10 / 1024).toFixed(1);
     text.textContent = dir.paper ? "The paper’s method alone: the tests are in the table of nests below."
-      : `The score is the probability of a head by all evidence together, of a followed one its mean over frames. A head starts ` +
+      : `The score is the probability of a head by all evidence together, of a track its mean over frames. A head starts ` +
         `above log-odds of ${odds(l.start_head_logit_q10)}, or ${odds(l.accept_logit_q10)} once it was found in ${l.mature_findings} frames, ` +
         `and stays one until they fall below ${odds(l.drop_logit_q10)} (a score of ${probability(l.drop_logit_q10 / 1024).toFixed(3)}).`;
     const head = ["No.", "Decision", ...(dir.paper ? [] : ["Score"]), "Centre x, y, z in mm", "Distance in mm", "Ellipse in pixels"];
@@ -105,11 +105,11 @@ const Tables = (() => {
   /* Kinds of evidence (firmware/core/detect/ih_evidence.h): what they are, unit, decimals. */
   const KINDS = {
     on: ["points on the ellipsoid", "", 0], rough: ["their distance from it", "mm", 1], bulge: ["rounder than a plane by", "mm", 1],
-    tall: ["taller than the mean head by", "%", 0], moved: ["moved by the fit", "mm", 0], above: ["open above", "share", 2],
-    beside: ["open beside", "share", 2], below: ["open below, at the neck", "share", 2], high: ["open farther above", "share", 2],
-    nothing: ["rays that meet nothing", "share", 2], body: ["body below", "share", 2], body_rays: ["rays below the chin", "", 0],
-    body_depth: ["depth of the body behind the centre", "mm", 0], wide: ["as wide as a table below", "share", 2],
-    level: ["things beside at its height", "share", 2], shoulder: ["a shoulder on the lesser side", "share", 2],
+    tall: ["taller than the mean head by", "%", 0], moved: ["moved by the fit", "mm", 0], above: ["open above", "fraction", 2],
+    beside: ["open beside", "fraction", 2], below: ["open below, at the neck", "fraction", 2], high: ["open farther above", "fraction", 2],
+    nothing: ["rays that meet nothing", "fraction", 2], body: ["body below", "fraction", 2], body_rays: ["rays below the chin", "", 0],
+    body_depth: ["depth of the body behind the centre", "mm", 0], wide: ["as wide as a table below", "fraction", 2],
+    level: ["things beside at its height", "fraction", 2], shoulder: ["a shoulder on the weaker side", "fraction", 2],
     before: ["points before it, as hands", "", 0], extent: ["extent of the nest there", "mm", 0], upright: ["height² / width² of that nest", "", 2],
   };
 
@@ -121,34 +121,34 @@ const Tables = (() => {
   }
 
   /* What was there before, without a value, has no bar: it is larger than all others, which would be too short
-   * to be told apart. */
-  function evidenceRow(name, value, part, most) {
+   * to be distinguished. */
+  function evidenceRow(name, value, part, largest) {
     const [text, unit, decimals] = KINDS[name] || [name, "", 2];
     const bar = value === null ? null : element("i", { class: part >= 0 ? "for" : "against", style: `width:${(Math.abs(part) / most * 48).toFixed(1)}%` });
     return element("tr", {}, element("th", { scope: "row" }, text),
-      element("td", {}, value === null ? "" : `${value.toFixed(decimals)}${unit && unit !== "share" ? `\u202f${unit}` : ""}`),
+      element("td", {}, value === null ? "" : `${value.toFixed(decimals)}${unit && unit !== "fraction" ? `\u202f${unit}` : ""}`),
       element("td", {}, `${part >= 0 ? "+" : ""}${part.toFixed(2)}`),
       element("td", { "aria-hidden": "true" }, bar && element("div", { class: "bar" }, bar)));
   }
 
-  /* Why a hypothesis has its score: each kind's part of the log-odds, the greatest first. */
+  /* Why a hypothesis has its score: each kind's part of the log-odds, the largest first. */
   function fillEvidence(frame, trace, chosen) {
     const into = document.getElementById("evidence");
-    const finding = trace && !Data.dirs[frame.dir].paper ? trace.findings[chosen] : null;
-    if (!finding) {
+    const detection = trace && !Data.dirs[frame.dir].paper ? trace.findings[chosen] : null;
+    if (!detection) {
       into.replaceChildren();
       return;
     }
-    const parts = finding.part_q10.map((p) => p / 1024);
+    const parts = detection.part_q10.map((p) => p / 1024);
     const order = parts.map((_, i) => i).sort((a, b) => Math.abs(parts[b]) - Math.abs(parts[a]));
     const base = baseOf(trace);
-    const most = Math.max(...parts.map(Math.abs), 0.01);
+    const largest = Math.max(...parts.map(Math.abs), 0.01);
     const h = frame.record.hypotheses[chosen];
-    const title = h.predicted ? `Hypothesis ${chosen} is carried by its track: it was not seen, so there is no evidence of this frame`
+    const title = h.predicted ? `Hypothesis ${chosen} is predicted by its track: it was not seen, so there is no evidence of this frame`
       : `Evidence for (right, green) and against (left) hypothesis ${chosen}: log-odds ${(finding.logit_q10 / 1024).toFixed(2)}` +
         `${finding.track === 0 ? "" : ", a mean over the frames of its track"}`;
-    const rows = h.predicted ? [] : order.map((i) => evidenceRow(trace.evidence[i], finding.evidence_q8[i] / 256, parts[i], most));
-    if (base !== null && rows.length > 0) rows.unshift(evidenceRow("before any evidence", null, base, most));
+    const rows = h.predicted ? [] : order.map((i) => evidenceRow(trace.evidence[i], detection.evidence_q8[i] / 256, parts[i], largest));
+    if (base !== null && rows.length > 0) rows.unshift(evidenceRow("before any evidence", null, base, largest));
     const head = ["Evidence", "Value", "Log-odds", ""];
     const open = into.querySelector("details") ? into.querySelector("details").open : true;
     into.replaceChildren(element("details", { open }, element("summary", {}, title),
@@ -160,7 +160,7 @@ const Tables = (() => {
 
   /* The paper's tests of a nest, in their order (firmware/core/nests/ih_hypotheses.h). */
   function tests(h, l) {
-    const share = (part, all, least) => [all === 0 ? "nothing there" : `${part} of ${all}`, `at least ${least} %`, part * 100 >= all * least];
+    const fraction = (part, all, min) => [all === 0 ? "nothing there" : `${part} of ${all}`, `at least ${least} %`, part * 100 >= all * min];
     const o = h.outline;
     return [
       [whole(h.area_mm2), `${whole(l.area_min_mm2)} to ${whole(l.area_max_mm2)}`, h.area_mm2 >= l.area_min_mm2 && h.area_mm2 <= l.area_max_mm2],
@@ -169,9 +169,9 @@ const Tables = (() => {
       [(h.extent_mm_q8 / 256).toFixed(1), `at least ${l.extent_min_mm}`, h.extent_mm_q8 >= l.extent_min_mm * 256],
       [(h.upright_q16 / 65536).toFixed(2), `at least ${(l.upright_min_q16 / 65536).toFixed(2)}`, h.upright_q16 >= l.upright_min_q16],
       [`${o.inside}`, `at least ${l.points_min}`, o.inside >= l.points_min],
-      share(o.above_behind, o.above, l.above_min_percent),
-      share(o.beside_behind, o.beside, l.beside_min_percent),
-      share(o.below_near, o.below, l.below_min_percent),
+      fraction(o.above_behind, o.above, l.above_min_percent),
+      fraction(o.beside_behind, o.beside, l.beside_min_percent),
+      fraction(o.below_near, o.below, l.below_min_percent),
     ];
   }
 

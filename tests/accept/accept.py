@@ -9,7 +9,7 @@ full/PART/NAME/records (host_sim --json, everything switched on). Nothing is tak
 the program's own score: the rules are docs/contract.md's, "Score", written once more; at the end the
 two are compared. Exit status 1 when a limit is missed or the two scores differ.
 
-Dots, per sequence: recall is the share of truth's visible dots with a detected dot within 1.5 px; the
+Dots, per sequence: recall is the fraction of truth's visible dots with a detected dot within 1.5 px; the
 centre error is the median distance to it. A label is right when truth has that dot and the labelled
 dot lies within 1.5 px of it; a label of a dot that truth does not have is wrong.
 """
@@ -105,8 +105,8 @@ class Dots:
         true = {int(dot[0]): np.array(dot[1:3]) for dot in truth["dots"]}
         dots = np.column_stack([trace["dots"]["u_px_q12"], trace["dots"]["v_px_q12"]]) / 4096.0
         self.true += len(true)
-        for place in true.values():
-            distance = np.hypot(*(dots - place).T).min() if len(dots) else np.inf
+        for position in true.values():
+            distance = np.hypot(*(dots - position).T).min() if len(dots) else np.inf
             self.table_found += distance <= TABLE_NEAR_PX
             if distance <= NEAR_PX:
                 self.found += 1

@@ -7,7 +7,7 @@
         board.send_frame(sequence, time_us, samples)
         record = board.record(5)
 
-QEMU's test socket tells of every edge of the GPIO chip's pins at once and drives its inputs; four
+QEMU's test socket reports every edge of the GPIO chip's pins at once and drives its inputs; four
 virtio-serial ports carry frames, records, the program's log and commands. A serial line (ttyS0) and
 a network (eth0; this machine is HOST on it) are there too. Nothing waits without a limit: BoardError
 says what did not come, and shows the end of the logs. Seconds throughout, of time.monotonic().
@@ -260,7 +260,7 @@ class Board:
                      f"echo mark >trace_marker; cd /; {then}")
 
     def mark(self):
-        """When watch_pins() was asked to do something, by the board's clock."""
+        """When watch_pins() was called to do something, by the board's clock."""
         text = self.command("cat /sys/kernel/tracing/trace")
         return float(re.search(r"([0-9.]+): tracing_mark_write: mark", text)[1])
 

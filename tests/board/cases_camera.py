@@ -34,9 +34,9 @@ def refused(run, options, text):
     plug_in(run)
     board, rises = run.board, run.board.rises[LASER]
     run.start_at(DEVICE, "small", "always", f"--format GREY --rate {RATE} {options}")
-    told = f"{DEVICE}: {text}; trying again"
-    board.wait(lambda: sum(told in line for line in board.log) >= 2, SOON_S,
-               f"second '{told}' for {options}")
+    reported = f"{DEVICE}: {text}; trying again"
+    board.wait(lambda: sum(reported in line for line in board.log) >= 2, SOON_S,
+               f"second '{reported}' for {options}")
     expect(board.rises[LASER] == rises, f"the laser went on with {options}")
     expect(not board.records, f"a record with {options}")
     run.stop()
@@ -61,8 +61,8 @@ def case_gain(run):
     refused(run, "--exposure 5000", "exposure 5000 us: the device has no control of exposure")
     refused(run, "--exposure auto", "exposure auto: the device has no automatic exposure")
     accepted(run, "--exposure steer")
-    told = [line for line in run.board.log if "it stays as it is" in line]
-    expect(len(told) == 1 and "no control of exposure" in told[0], f"steering: {run.board.log}")
+    reported = [line for line in run.board.log if "it stays as it is" in line]
+    expect(len(reported) == 1 and "no control of exposure" in reported[0], f"steering: {run.board.log}")
     run.stop()
     return "gain 37 is read back, 256 and an exposure refused with message and retry, laser off"
 

@@ -14,7 +14,7 @@ END = ("echo begin >/sys/kernel/tracing/trace_marker; kill -TERM $program; wait 
 
 
 def end_ms(run):
-    """From SIGTERM until the program is gone; it ends as asked, laser off."""
+    """From SIGTERM until the program is gone; it ends by itself, laser off."""
     board = run.board
     board.watch_pins()
     status = board.command(END)

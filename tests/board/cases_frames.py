@@ -16,9 +16,9 @@ def case_gated(run):
     begin = time.monotonic()
     gated_loop(run, len(expected))
     frame_ms = 1000 * (time.monotonic() - begin) / len(expected)
-    resident_kb, most_kb = run.board.memory_kb()
+    resident_kb, max_kb = run.board.memory_kb()
     run.stop()
-    run.facts.append(f"memory: {resident_kb} kB resident, at most {most_kb} kB")
+    run.facts.append(f"memory: {resident_kb} kB resident, at most {max_kb} kB")
     return f"{len(expected)} records identical to host_sim's, {frame_ms:.0f} ms each"
 
 
@@ -92,7 +92,7 @@ def case_kinds(run):
 
 
 def case_dropped(run):
-    """two frames lost on the way: a gap in the camera's numbers"""
+    """two frames lost in transfer: a gap in the camera's numbers"""
     indices = [0, 1, 2, 3, 6, 7, 8]
     frames = picked(run, "dropped", run.gated, [(i, run.gated.time_us(i)) for i in indices])
     expected = host_records(run, frames)

@@ -86,7 +86,7 @@ def case_unasked(run):
     return "a record without the laser; exit status 2 for the bad rig"
 
 
-# Signals and how the program ends: 0 as asked, else by the signal itself.
+# Signals and how the program ends: with status 0, else by the signal itself.
 SIGNALS = {"TERM": 0, "INT": 0, "QUIT": -3, "ILL": -4, "TRAP": -5, "ABRT": -6, "BUS": -7, "FPE": -8,
            "USR1": -10, "SEGV": -11, "USR2": -12, "ALRM": -14, "XCPU": -24, "SYS": -31}
 
@@ -176,26 +176,26 @@ def case_duty(run):
     run.stop()
     times = run.high_times()
     high_s = sum(fall_s - rise_s for rise_s, fall_s in times)
-    share = high_s / (times[-1][1] - times[0][0])
+    fraction = high_s / (times[-1][1] - times[0][0])
     # A burst of 100 ms is allowed at the start.
-    expect(0.2 < share < 0.4, f"the line was high for {100 * share:.0f} % of the time, expected 30")
-    return f"high for {100 * share:.0f} % of {times[-1][1] - times[0][0]:.1f} s"
+    expect(0.2 < fraction < 0.4, f"the line was high for {100 * fraction:.0f} % of the time, expected 30")
+    return f"high for {100 * fraction:.0f} % of {times[-1][1] - times[0][0]:.1f} s"
 
 
 def case_status(run):
-    """the status line's share of the laser, gated"""
+    """the status line's duty cycle of the laser, gated"""
     board, index = run.board, 0
     board.watch_pins()
     run.start(run.gated, "gated", "--status 1")
-    while not (told := [line for line in board.log if "laser on" in line]):
+    while not (reported := [line for line in board.log if "laser on" in line]):
         run.lit_frame(run.gated, index)
         index += 1
     run.stop()
     times = run.high_times()
-    share = 100 * sum(fall_s - rise_s for rise_s, fall_s in times) / (times[-1][1] - times[0][0])
-    percent = int(re.search(r"laser on (\d+) %", told[0])[1])
-    expect(abs(percent - share) < 5, f"told {percent} %, the line was high for {share:.1f} %")
-    return f"told {percent} %, the line was high for {share:.1f} %"
+    fraction = 100 * sum(fall_s - rise_s for rise_s, fall_s in times) / (times[-1][1] - times[0][0])
+    percent = int(re.search(r"laser on (\d+) %", reported[0])[1])
+    expect(abs(percent - fraction) < 5, f"reported {percent} %, the line was high for {fraction:.1f} %")
+    return f"reported {percent} %, the line was high for {fraction:.1f} %"
 
 
 CASES = [case_interlock, case_reload, case_unasked, case_signals, case_killed, case_all_killed,

@@ -80,9 +80,9 @@ def case_udp(run):
     more_ms = slower(loop(run, lambda index: None), with_ms)
     run.board.wait(lambda: unsent(run) >= FRAMES - 1, SOON_S, f"{FRAMES - 1} unsent records")
     run.stop()
-    told = unsent(run)
-    expect(told == FRAMES - 1, f"unsent {told} of {FRAMES}: all but the last, nobody says of it")
-    return (f"{FRAMES} datagrams identical; without a receiver {told} of {FRAMES} unsent, a frame "
+    reported = unsent(run)
+    expect(reported == FRAMES - 1, f"unsent {reported} of {FRAMES}: all but the last, nobody says of it")
+    return (f"{FRAMES} datagrams identical; without a receiver {reported} of {FRAMES} unsent, a frame "
             f"takes {more_ms:+.1f} ms")
 
 
@@ -113,9 +113,9 @@ def slow_line(run, name, slow_bytes, quick_ms):
     busy_ms = loop(run, lambda index: content.extend(run.board.take_serial(slow_bytes)))
     more_ms = slower(busy_ms, quick_ms)
     count = FRAMES
-    *found, rest = content.decode().split("\n")
+    *found, remainder = content.decode().split("\n")
     with run.board.serial_lines() as lines:
-        run.board.received["serial"] = rest.encode()
+        run.board.received["serial"] = remainder.encode()
         while len(found) + len(lines) + unsent(run) < count + 1 or count == FRAMES:
             expect(count < FRAMES + MORE_FRAMES, f"{name}: of {count} records {len(found)} and "
                    f"{len(lines)} lines came, unsent {unsent(run)}")

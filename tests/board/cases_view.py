@@ -90,8 +90,8 @@ def case_view(run):
     before_ms = results[0][1]
     for name, busy_ms, _ in results[1:]:
         expect(busy_ms < before_ms * (1 + MORE), f"{name}: {busy_ms:.2f} ms a frame, {before_ms:.2f} without a view")
-    told = ", ".join(f"{name} {busy_ms:.2f} ms a frame ({real_ms:.0f} closed loop)" for name, busy_ms, real_ms in results)
-    return (f"{told}; {in_time} of {FRAMES} frames watched, {len(watcher.answers) - in_time} of {PAUSED} "
+    reported = ", ".join(f"{name} {busy_ms:.2f} ms a frame ({real_ms:.0f} closed loop)" for name, busy_ms, real_ms in results)
+    return (f"{reported}; {in_time} of {FRAMES} frames watched, {len(watcher.answers) - in_time} of {PAUSED} "
             "with pauses; records as host_sim's")
 
 
@@ -124,8 +124,8 @@ def case_view_attacked(run):
     for index in range(FRAMES, FRAMES + AFTER):
         record = run.lit_frame(run.gated, index)
         expect(record == expected[index], f"frame {index}:\nboard    {record}\nhost_sim {expected[index]}")
-    told = [line for line in run.board.log if "view: its process" in line]
-    expect(len(told) == 1 and "signal 9" in told[0], f"messages of its death: {told}")
+    reported = [line for line in run.board.log if "view: its process" in line]
+    expect(len(reported) == 1 and "signal 9" in reported[0], f"messages of its death: {reported}")
     run.stop()
     attack.join(SOON_S)
     for sock in held:

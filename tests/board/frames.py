@@ -26,7 +26,7 @@ class Frames:
         return len(self.entries)
 
     def samples(self, index):
-        """As a camera gives them: a byte each, or two, the least significant first."""
+        """As a camera gives them: a byte each, or two, the least significant byte first."""
         with open(os.path.join(self.directory, self.entries[index]["file"]), "rb") as file:
             kind, _, maximum, content = file.read().split(b"\n", 3)
         if kind != b"P5":

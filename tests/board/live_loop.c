@@ -158,7 +158,7 @@ static void write_message(void *context, int level, const char *text)
     }
 }
 
-static void tell_error(void *context, const char *subject, const char *text)
+static void report_error(void *context, const char *subject, const char *text)
 {
     (void)context;
     die(subject, text);
@@ -208,7 +208,7 @@ int main(int argument_count, char **arguments)
 {
     static char rig[4096];
     struct hal_error error;
-    const struct hal_log log = {NULL, tell_error};
+    const struct hal_log log = {NULL, report_error};
     if (argument_count != 4 && argument_count != 6) {
         die("usage", "live_loop DIR COUNT RATE [PROGRAM PORT]");
     }

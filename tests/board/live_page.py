@@ -53,7 +53,7 @@ def check_screen(browser, name, width):
     needs = browser.value("document.documentElement.scrollWidth")
     check(needs <= width, f"{name}: {needs} pixels wide, the screen {width}")
     label = browser.value('document.getElementById("picture").getAttribute("aria-label")')
-    check(label.startswith("camera image; head: "), f"{name}: a screen reader is told: {label}")
+    check(label.startswith("camera image; head: "), f"{name}: a screen reader reads: {label}")
 
 
 def stand(browser, there):
@@ -103,8 +103,8 @@ def main():
             url = loop.stderr.readline().strip()
             with Browser(work) as browser:
                 watch(browser, url, pictures)
-            strange = [asked for asked in browser.requests if not asked.startswith((url, "data:", "about:"))]
-            check(not strange, f"asked elsewhere: {strange}")
+            strange = [request for request in browser.requests if not request.startswith((url, "data:", "about:"))]
+            check(not strange, f"requests elsewhere: {strange}")
             check(not browser.errors, f"errors: {browser.errors}")
             messages = loop.communicate()[1]
             check(loop.returncode == 0, f"the loop's end: {messages}")

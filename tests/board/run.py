@@ -1,4 +1,4 @@
-"""What the cases share: the program on the board, what is expected of it, and how that is told."""
+"""What the cases share: the program on the board, what is expected of it, and how that is reported."""
 
 import contextlib
 import json
@@ -127,7 +127,7 @@ class Run:
             f"--heartbeat-line {HEARTBEAT} --interlock-line {INTERLOCK} --output - {more}")
 
     def stop(self):
-        """By SIGTERM: ends as asked, laser off."""
+        """By SIGTERM: ends by itself, laser off."""
         self.board.signal("TERM")
         status = self.board.exit_status(SOON_S)
         expect(status == 0, f"exit status {status} after SIGTERM, not 0: {self.board.log[-3:]}")

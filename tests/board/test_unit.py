@@ -84,13 +84,13 @@ class Unit:
             raise Wrong(f"{error}\n{self.journal()}") from error
 
     def stop_post(self):
-        """What `isohead_board --laser-off` said after the last end, as systemd tells it."""
+        """What `isohead_board --laser-off` said after the last end, as systemd shows it."""
         return self.show("ExecStopPost")
 
 
 def boots_without_it(unit):
     """Installed, it neither runs nor is enabled, and the laser's line was never touched."""
-    expect(unit.show("ActiveState") == "inactive", "it runs without being asked")
+    expect(unit.show("ActiveState") == "inactive", "it runs without being enabled")
     expect(unit.show("UnitFileState") == "disabled", "it is enabled")
     expect(not unit.board.edges, "a pin moved")
     owner = unit.command("udevadm settle; stat -c %U:%G:%a /dev/gpiochip0 /dev/video0")
@@ -165,7 +165,7 @@ def stops(unit):
     unit.command("systemctl stop isohead")
     unit.wait_laser(0, SOON_S)
     expect(unit.show("ActiveState") == "inactive", "it did not stop")
-    expect(unit.show("Result") == "success", "it did not end as asked:\n" + unit.journal())
+    expect(unit.show("Result") == "success", "it did not end by itself:\n" + unit.journal())
     return "line low; ended with status 0"
 
 

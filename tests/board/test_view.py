@@ -255,7 +255,7 @@ def attack_slowly(loop):
                 cut_s = time.monotonic() - begin
         check(cut_s is not None and cut_s > REQUEST_S - 1, f"a dripping request was cut after {cut_s} s")
         check(ends(silent, SOON_S), "a silent connection is not cut")
-        # What was on its way before comes still, then the end.
+        # What was sent before still comes, then the end.
         check(ends(reading, SOON_S), "a slow reader is not cut")
     return cut_s
 
@@ -344,8 +344,8 @@ def fault(name, number):
     wait(lambda: loop.count() >= before + MORE, f"records after it was {name}")
     check(loop.end() == 0, f"{name}: the loop's end: {loop.messages}")
     watcher.stop()
-    told = loop.messages.count("view: ")
-    check(told == (1 if name == "killed" else 0), f"{name}: told {told} times: {loop.messages}")
+    reported = loop.messages.count("view: ")
+    check(reported == (1 if name == "killed" else 0), f"{name}: reported {reported} times: {loop.messages}")
     return loop.records()
 
 

@@ -7,7 +7,7 @@ import time
 
 
 class Watcher(threading.Thread):
-    """Asks for one frame after the other until told to stop."""
+    """Requests one frame after the other until stopped."""
 
     def __init__(self, host, port, path, timeout_s):
         super().__init__(daemon=True)

@@ -128,8 +128,8 @@ def errors(truth, rig):
     seen = np.array(rig["dot_sightings"])
     rays = np.degrees(np.linalg.norm(a - b, axis=1))
     u, _, v = np.linalg.svd(a[seen > 0].T @ b[seen > 0])
-    turn = u @ np.diag([1, 1, np.linalg.det(u @ v)]) @ v
-    straight = np.degrees(np.linalg.norm(a - b @ turn.T, axis=1))
+    rotation = u @ np.diag([1, 1, np.linalg.det(u @ v)]) @ v
+    straight = np.degrees(np.linalg.norm(a - b @ rotation.T, axis=1))
     return focal, origin, rays, straight, seen
 
 
@@ -320,7 +320,7 @@ def check_corrupt(bench):
         ("a file twice in the list", "frames.jsonl", lambda data: data + b'{"file":"000000.pgm","laser":false}\n',
          "frames.jsonl:51: names a file that an earlier line names"),
         ("a file that is not in the list", "frames.jsonl", lambda data: data[data.index(b"\n") + 1:],
-         "000000.pgm: stands not in frames.jsonl"),
+         "000000.pgm: is not listed in frames.jsonl"),
     ]
     for name, file, change, wanted in cases:
         copy_pictures([(good, range(2 * PAIRS))], made)
@@ -328,9 +328,9 @@ def check_corrupt(bench):
         refuse(bench, "corrupt: " + name, made, 1, wanted)
     # What would be waited for, or cannot be looked at.
     for name, file, make, wanted in [
-            ("a pipe for a picture", "000007.pgm", os.mkfifo, "000007.pgm: is no file, but a directory, device or pipe"),
-            ("a directory for a picture", "000007.pgm", os.mkdir, "000007.pgm: is no file, but a directory"),
-            ("a pipe for a list", "frames.jsonl", os.mkfifo, "frames.jsonl: is no file, but a directory, device or pipe"),
+            ("a pipe for a picture", "000007.pgm", os.mkfifo, "000007.pgm: is a directory, device or pipe"),
+            ("a directory for a picture", "000007.pgm", os.mkdir, "000007.pgm: is a directory, device or pipe"),
+            ("a pipe for a list", "frames.jsonl", os.mkfifo, "frames.jsonl: is a directory, device or pipe"),
             ("a list that leads to itself", "frames.jsonl", lambda path: os.symlink("frames.jsonl", path),
              "frames.jsonl: Too many levels")]:
         copy_pictures([(good, range(8))], made)
@@ -401,7 +401,7 @@ def check_guide(bench):
     fine = status == 1 and "17 more pictures" in out and "parts of the frame" in out and \
         re.search("00000[67].pgm: no good", out) and "3 of these beside one without" in out
     result("guide: tells what is missing", None if fine else out)
-    # What must be there of the laser is told before solve refuses.
+    # What must be there of the laser is reported before solve refuses.
     for name, frames, wanted in [("only pictures without the laser", range(1, 2 * PAIRS, 2), "15 more pictures with the laser on"),
                                  ("four pairs", [*range(8), *range(9, 2 * PAIRS, 2)], "11 more pictures with the laser on")]:
         copy_pictures([(good, frames)], made)
@@ -437,7 +437,7 @@ def film_of(bench, parts):
 
 def check_camera(bench):
     """A film instead of a camera. Frames that a driver queued before the laser was on come first; rendered frames with it
-    have even numbers, their twins are the next ones."""
+    have even numbers; their laser-on pictures are the next ones."""
     taken = bench.path("taken")
 
     def take(name, parts, typed, status, names, *wanted, kept=False):
@@ -620,10 +620,10 @@ def check_usage(bench):
 
 def check_written(bench):
     """What stands where a file goes, or its part: a link stays one, a file's rights stay, and nothing else is touched."""
-    place = bench.path("written")
-    shutil.rmtree(place, ignore_errors=True)
-    os.makedirs(place)
-    board, other, pipe = (os.path.join(place, name) for name in ("board.pgm", "other.pgm", "pipe.pgm"))
+    folder = bench.path("written")
+    shutil.rmtree(folder, ignore_errors=True)
+    os.makedirs(folder)
+    board, other, pipe = (os.path.join(folder, name) for name in ("board.pgm", "other.pgm", "pipe.pgm"))
     for path in (board + ".part", other):
         with open(path, "w", encoding="utf-8") as file:
             file.write("of others")
@@ -638,12 +638,12 @@ def check_written(bench):
     mode = os.stat(other).st_mode & 0o777
     result("a file's rights stay", None if mode == 0o600 else "%o" % mode)
     status, _, err = run(bench.calibrate, "board", pipe)
-    fine = status == 1 and "pipe.pgm: could not be written: is no file" in err and not os.path.isfile(pipe)
+    fine = status == 1 and "pipe.pgm: could not be written: it is a directory, device or pipe" in err and not os.path.isfile(pipe)
     result("a pipe stays one", None if fine else "status %s: %s" % (status, err))
     # The shell's number becomes the program's.
-    status, _, err = run("sh", "-c", "ln -s other.pgm $1.$$.part; exec $0 board $1", bench.calibrate, place + "/new.pgm")
-    fine = status == 0 and not os.path.islink(place + "/new.pgm") and len(os.listdir(place)) == 5
-    result("a part file that is a link", None if fine else "status %s, %s: %s" % (status, os.listdir(place), err))
+    status, _, err = run("sh", "-c", "ln -s other.pgm $1.$$.part; exec $0 board $1", bench.calibrate, folder + "/new.pgm")
+    fine = status == 0 and not os.path.islink(folder + "/new.pgm") and len(os.listdir(folder)) == 5
+    result("a part file that is a link", None if fine else "status %s, %s: %s" % (status, os.listdir(folder), err))
 
 
 def check_full(bench):

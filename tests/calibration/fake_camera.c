@@ -204,19 +204,19 @@ static bool has_mode(int flags)
 int open(const char *path, int flags, ...)
 {
     int (*next)(const char *, int, ...) = (int (*)(const char *, int, ...))dlsym(RTLD_NEXT, "open");
-    va_list rest;
-    va_start(rest, flags);
-    mode_t mode = has_mode(flags) ? va_arg(rest, mode_t) : 0;
-    va_end(rest);
+    va_list remainder;
+    va_start(remainder, flags);
+    mode_t mode = has_mode(flags) ? va_arg(remainder, mode_t) : 0;
+    va_end(remainder);
     return strcmp(path, DEVICE) == 0 ? open_memory() : next(path, flags, mode);
 }
 
 int open64(const char *path, int flags, ...)
 {
-    va_list rest;
-    va_start(rest, flags);
-    mode_t mode = has_mode(flags) ? va_arg(rest, mode_t) : 0;
-    va_end(rest);
+    va_list remainder;
+    va_start(remainder, flags);
+    mode_t mode = has_mode(flags) ? va_arg(remainder, mode_t) : 0;
+    va_end(remainder);
     return open(path, flags | O_LARGEFILE, mode);
 }
 
@@ -234,10 +234,10 @@ int ioctl(int file, unsigned long request, ...)
 {
     int (*next)(int, unsigned long, ...) =
         (int (*)(int, unsigned long, ...))dlsym(RTLD_NEXT, "ioctl");
-    va_list rest;
-    va_start(rest, request);
-    void *argument = va_arg(rest, void *);
-    va_end(rest);
+    va_list remainder;
+    va_start(remainder, request);
+    void *argument = va_arg(remainder, void *);
+    va_end(remainder);
     return is_camera(file) ? answer(file, request, argument) : next(file, request, argument);
 }
 

@@ -61,28 +61,28 @@ static bool read_rig(const char *path, Calibrated &rig)
 /* Every fourth pixel and the last ones, at places between pixel centres too. */
 static double largest_error_px(const Calibrated &calibrated, const ih_rig &rig, double &undone_px)
 {
-    std::vector<cv::Point2d> places, expected;
+    std::vector<cv::Point2d> positions, expected;
     int last_u = rig.calibration.width - 1, last_v = rig.calibration.height - 1;
     for (int v = 0; v <= last_v + 3; v += 4) {
         for (int u = 0; u <= last_u + 3; u += 4)
-            places.emplace_back(std::min<double>(u + 0.25 * (v % 3), last_u),
+            positions.emplace_back(std::min<double>(u + 0.25 * (v % 3), last_u),
                                 std::min<double>(v + 0.25 * (u % 3), last_v));
     }
-    cv::undistortPoints(places, expected, calibrated.camera, calibrated.lens, cv::noArray(),
+    cv::undistortPoints(positions, expected, calibrated.camera, calibrated.lens, cv::noArray(),
                         cv::noArray(),
                         {cv::TermCriteria::COUNT + cv::TermCriteria::EPS, 500, 1e-14});
     double largest_px = 0.0, fx = calibrated.camera.at<double>(0, 0),
            fy = calibrated.camera.at<double>(1, 1);
     double cx = calibrated.camera.at<double>(0, 2), cy = calibrated.camera.at<double>(1, 2);
     undone_px = 0.0;
-    for (size_t i = 0; i < places.size(); i++) {
+    for (size_t i = 0; i < positions.size(); i++) {
         int32_t x_q28, y_q28;
-        ih_camera_undistort(&rig, fixed(places[i].x, 12), fixed(places[i].y, 12), &x_q28, &y_q28);
+        ih_camera_undistort(&rig, fixed(positions[i].x, 12), fixed(positions[i].y, 12), &x_q28, &y_q28);
         double du = fx * (std::ldexp(x_q28, -28) - expected[i].x),
                dv = fy * (std::ldexp(y_q28, -28) - expected[i].y);
         largest_px = std::max(largest_px, std::hypot(du, dv));
-        undone_px = std::max(undone_px, std::hypot(fx * expected[i].x + cx - places[i].x,
-                                                   fy * expected[i].y + cy - places[i].y));
+        undone_px = std::max(undone_px, std::hypot(fx * expected[i].x + cx - positions[i].x,
+                                                   fy * expected[i].y + cy - positions[i].y));
     }
     return largest_px;
 }

@@ -1,6 +1,6 @@
 #!/bin/sh
 # tools/render on itself: the same options give the same bytes, another seed gives others, every
-# size and depth works, the truth fits the frames, wrong options and unwritable output are told.
+# size and depth works, the truth fits the frames, wrong options and unwritable output are reported.
 #
 #     render.sh RENDER
 #
@@ -186,7 +186,7 @@ cat >cast.py <<'PYTHON'
 import json
 from depths import ball, slope, F
 
-# --seed 0: the camera is the depth camera, so a dot's pixel tells which depth it must have.
+# --seed 0: the camera is the depth camera, so a dot's pixel says which depth it must have.
 rig = json.load(open("cast/rig.json"))
 m = rig["camera_matrix"]["data"]
 frames = [json.loads(line) for line in open("cast/frames.jsonl")]
@@ -217,7 +217,7 @@ PYTHON
 /usr/bin/python3 depths.py
 draw "depth images as they were taken" cast --range range --seed 0 --ambient dim --distortion none \
     --size 320x240
-draw "depth images from other places" moved --range range --seed 4 --frames 3 --size 320x240 --ambient dim
+draw "depth images from other positions" moved --range range --seed 4 --frames 3 --size 320x240 --ambient dim
 /usr/bin/python3 cast.py >out 2>&1 && reason= || reason=$(tail -n 1 out)
 result "dots lie on the measured surface, heads go with it" "$reason"
 refuse "depth images and a scene" 2 "--range" --range range --scene room a
@@ -264,7 +264,7 @@ assert min(max(map(abs, ends[0])), max(map(abs, ends[2]))) > max(map(abs, ends[1
 PYTHON
 draw "a visit" visit --scene visit --frames 40 --size 320x240
 /usr/bin/python3 visit.py >out 2>&1 && reason= || reason=$(tail -n 1 out)
-result "a visitor comes, is told while in the pattern, and goes" "$reason"
+result "a visitor comes, is in the truth while in the pattern, and goes" "$reason"
 
 # --- who, and what they do ---------------------------------------------------------------------------
 cat >people.py <<'PYTHON'
@@ -322,7 +322,7 @@ result "who does nothing keeps the hands down" "$reason"
 [ "$(fingerprint phone)" != "$(fingerprint anybody)" ] && reason= || reason="the same bytes"
 result "who telephones lifts a hand" "$reason"
 /usr/bin/python3 people.py >out 2>&1 && reason= || reason=$(tail -n 1 out)
-result "children are small, faces touched, heads turned, two told" "$reason"
+result "children are small, faces touched, heads turned, two in the truth" "$reason"
 
 # --- a rig that is not as it says, and sunlight ------------------------------------------------------
 cat >wrong.py <<'PYTHON'
@@ -367,11 +367,11 @@ PYTHON
     refuse "noise that is no number" 2 "--calibration-noise" --calibration-noise 1e a
 }
 cmp -s knocked/rig.json anybody/rig.json && reason= || reason="rig.json differs"
-result "rig.json knows nothing of the knock" "$reason"
+result "rig.json does not have the rotation" "$reason"
 cmp -s noisy/000002.pgm anybody/000002.pgm && reason= || reason="frame differs"
 result "errors of calibration change no frame" "$reason"
 /usr/bin/python3 wrong.py >out 2>&1 && reason= || reason=$(tail -n 1 out)
-result "knock, errors of calibration and sunlight are as large as asked for" "$reason"
+result "rotation, errors of calibration and sunlight are as large as given" "$reason"
 
 # --- laser off, exposure, a part of a sequence ---------------------------------------------------------
 cat >exposed.py <<'PYTHON'
@@ -412,7 +412,7 @@ PYTHON
     refuse "laser off" 2 "--laser" --laser off a
 }
 /usr/bin/python3 exposed.py >out 2>&1 && reason= || reason=$(tail -n 1 out)
-result "the laser is off where it is told, exposure scales the light" "$reason"
+result "the laser is off where frames.jsonl says so, exposure scales the light" "$reason"
 reason=
 [ "$(ls part)" = "$(printf '%s\n' 000001.pgm 000002.pgm frames.jsonl rig.json truth.jsonl)" ] || reason=$(ls part)
 for frame in 000001 000002; do

@@ -70,10 +70,10 @@ PROSE = {
     r"ratings?": "template score",
     r"share of": "fraction of",
     r"tall(?:y|ies)": "counts",
-    r"the least": "the smallest, the minimum",
+    r"the least(?! (?:squares|significant))": "the smallest, the minimum",
     r"twins": "laser-on/laser-off pairs",
     r"usual sort": "default kind",
-    r"Way:": "Method:, Rounding: or Output:",
+    r"\* Way:": "Method:, Rounding: or Output:",
 }
 
 # What is not read: data, what was written once and is not edited, and this table.
@@ -88,12 +88,14 @@ SKIPPED = (
 # Where an old word is the right one: a pattern of the path, of what stands there, and why.
 EXCEPTIONS = [
     (r".", r"(?i)at_(most|least)", "plain English"),
-    (r".", r"TEST_ASSERT_\w+|is_less|std::less", "Unity's names; a comparison"),
+    (r".", r"TEST_ASSERT_\w+|assertLess\w*|is_less", "names of Unity and unittest; a comparison"),
     (r".", r"visible_share", "a key of truth.jsonl (docs/contract.md)"),
     (r"^tests/checks/(static|lint_commands)\.py$|^docs/misra\.md$", r"(?i).*findings?", "what a linter reports"),
     (r"^docs/contract\.md$", r"findings", "a key of a record and of a trace"),
     (r"^docs/trust\.md$", r"findings", "a target of the fuzzers, and their folder"),
-    (r"^sim/report/.*\.js$", r"cuts|findings", "keys of a trace (docs/contract.md)"),
+    (r"^sim/report/.*\.js$", r"cuts|(mature_)?findings", "keys of a trace (docs/contract.md)"),
+    (r"^tests/limits\.conf$", r"bench_findings_instructions", "a key of build/bench.json"),
+    (r"^tools/bench/", r"(take_)?turns?", "programs that are timed take turns"),
     (r"^tools/render/", r"(?i).*turn(ed)?.*", "a person turns"),
 ]
 
@@ -102,7 +104,7 @@ IDENTIFIER = r"[A-Za-z_]\w*"
 C_LIKE = re.compile(r"(/\*.*?\*/|//[^\n]*)|(\"(?:\\.|[^\"\\\n])*\"|'(?:\\.|[^'\\\n])*'|`[^`]*`)|" + IDENTIFIER, re.S)
 PYTHON = re.compile(r"(#[^\n]*|\"\"\".*?\"\"\")|(\"(?:\\.|[^\"\\\n])*\"|'(?:\\.|[^'\\\n])*')|" + IDENTIFIER, re.S)
 BLANK = r"(?:\s|\n[ \t]*(?:\*|//|#|\.\\\")|\"\n\s*[a-z]{0,2}\")+"
-PHRASES = [(re.compile(r"\b(?:%s)(?!\w)" % phrase.replace(" ", BLANK), re.I), use) for phrase, use in PROSE.items()]
+PHRASES = [(re.compile(r"(?<!\w)(?:%s)(?!\w)" % phrase.replace(" ", BLANK), re.I), use) for phrase, use in PROSE.items()]
 WORD = re.compile(IDENTIFIER)
 # A name of so many parts is a sentence.
 SENTENCE_PARTS = 5

@@ -89,7 +89,7 @@ def make_range(name):
         rig[key].update(type_id="opencv-matrix", rows=rows, cols=len(rig[key]["data"]) // rows, dt="d")
     v, u = np.mgrid[:120, :160]
     x, y = (u - 79.5) / 150, (v - 59.5) / 150
-    # the nearer place where the ray (x, y, 1) meets a ball of 100 mm at 900 mm
+    # the nearer point where the ray (x, y, 1) meets a ball of 100 mm at 900 mm
     a, b = x * x + y * y + 1, -2 * 900.0
     inside = b * b - 4 * a * (900.0**2 - 100.0**2)
     body = np.where((y * BODY_MM > 110) & (np.abs(x * BODY_MM) < 220), BODY_MM, 2000)
@@ -223,8 +223,8 @@ def check_outlines(test, record, heads, rejected):
             places = np.array([[p.x - 0.5, p.y - 0.5] for p in line.points])
             np.testing.assert_allclose(places.mean(axis=0), h["pixel"], atol=1e-6)
             # an ellipse's points spread by a^2/2 along a, if they are even in its own angle
-            turn = np.radians(h["angle_deg"])
-            axes = np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
+            rotation = np.radians(h["angle_deg"])
+            axes = np.array([[np.cos(rotation), np.sin(rotation)], [-np.sin(rotation), np.cos(rotation)]])
             np.testing.assert_allclose(axes @ np.cov(places.T, bias=True) @ axes.T,
                                        np.diag(np.square(h["axes_px"]) / 2), rtol=1e-6, atol=1e-6)
 
@@ -295,11 +295,11 @@ class DotsFile(unittest.TestCase):
         self.assertEqual(parents["projector"].parent_frame_id, "camera")
         # forward is the rig's X, down its -Z
         q = parents["camera"].rotation
-        turn = np.array([[1 - 2 * (q.y**2 + q.z**2), 2 * (q.x * q.y - q.z * q.w), 2 * (q.x * q.z + q.y * q.w)],
+        rotation = np.array([[1 - 2 * (q.y**2 + q.z**2), 2 * (q.x * q.y - q.z * q.w), 2 * (q.x * q.z + q.y * q.w)],
                          [2 * (q.x * q.y + q.z * q.w), 1 - 2 * (q.x**2 + q.z**2), 2 * (q.y * q.z - q.x * q.w)],
                          [2 * (q.x * q.z - q.y * q.w), 2 * (q.y * q.z + q.x * q.w), 1 - 2 * (q.x**2 + q.y**2)]])
-        np.testing.assert_allclose(turn @ [0, 0, 1], [1, 0, 0], atol=1e-12)
-        np.testing.assert_allclose(turn @ [0, 1, 0], [0, 0, -1], atol=1e-12)
+        np.testing.assert_allclose(rotation @ [0, 0, 1], [1, 0, 0], atol=1e-12)
+        np.testing.assert_allclose(rotation @ [0, 1, 0], [0, 0, -1], atol=1e-12)
 
     def test_dots_and_labels(self):
         for record, trace, dots, labels in self.each("/camera/dots", "/camera/labels"):
@@ -337,7 +337,7 @@ class DotsFile(unittest.TestCase):
             self.assertEqual(len(shape.colors), len(nodes))
             corners = nodes[np.reshape(shape.indices, (-1, 3))]
             self.assertEqual(len(corners), 2 * 46 * 46)
-            # together the triangles cover the field once: all turn the same way, and their area is its own
+            # together the triangles cover the field once: all wind the same way, and their area is its own
             flat = corners[..., :2] / corners[..., 2:]
             area = np.cross(flat[:, 1] - flat[:, 0], flat[:, 2] - flat[:, 0]) / 2
             self.assertTrue((area > 0).all())

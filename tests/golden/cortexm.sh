@@ -1,6 +1,6 @@
 #!/bin/sh
 # The golden set on three emulated Cortex-M boards gives the host's hashes; and what the core takes
-# there: code and constants, state (struct isohead, without the frame), and from whom it wants anything.
+# there: code and constants, state (struct isohead, without the frame), and which symbols it needs from outside.
 #
 #     cortexm.sh CJSON_DIR FRAMES_DIR         as in golden.sh
 #

@@ -15,7 +15,7 @@ struct golden_stage {
 
 #define GOLDEN_STAGES 12
 
-/* In the order of a frame's way. */
+/* In the order of processing. */
 extern const struct golden_stage golden_stage[GOLDEN_STAGES];
 
 /* The rig as isohead_init derived it. */

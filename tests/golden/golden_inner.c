@@ -40,27 +40,28 @@ static uint64_t hash_exposure(const struct isohead *head, const struct ih_frame 
     return golden_add_words(hash, exposure, sizeof *exposure);
 }
 
-static uint64_t add_contours(uint64_t hash, const struct ih_contours *cuts)
+static uint64_t add_contours(uint64_t hash, const struct ih_contours *contours)
 {
-    hash = golden_add_word(hash, cuts->contour_count);
-    hash = golden_add_word(hash, cuts->contours_dropped);
-    for (int32_t i = 0; i < cuts->contour_count; i++) {
-        hash = golden_add_word(hash, cuts->contour[i].first);
-        hash = golden_add_word(hash, cuts->contour[i].vertex_count);
-        hash = golden_add_word(hash, cuts->contour[i].closed);
+    hash = golden_add_word(hash, contours->contour_count);
+    hash = golden_add_word(hash, contours->contours_dropped);
+    for (int32_t i = 0; i < contours->contour_count; i++) {
+        hash = golden_add_word(hash, contours->contour[i].first);
+        hash = golden_add_word(hash, contours->contour[i].vertex_count);
+        hash = golden_add_word(hash, contours->contour[i].closed);
     }
-    for (int32_t i = 0; i < cuts->vertex_count; i++) {
-        hash = golden_add_word(hash, cuts->vertex[i].x_q9);
-        hash = golden_add_word(hash, cuts->vertex[i].y_q9);
+    for (int32_t i = 0; i < contours->vertex_count; i++) {
+        hash = golden_add_word(hash, contours->vertex[i].x_q9);
+        hash = golden_add_word(hash, contours->vertex[i].y_q9);
     }
     return hash;
 }
 
-static uint64_t add_ellipses(uint64_t hash, const struct ih_contours *cuts)
+static uint64_t add_ellipses(uint64_t hash, const struct ih_contours *contours)
 {
-    for (int32_t i = 0; i < cuts->contour_count; i++) {
+    for (int32_t i = 0; i < contours->contour_count; i++) {
         struct ih_ellipse ellipse;
-        if (cuts->contour[i].closed && ih_ellipse_of_contour(cuts, &cuts->contour[i], &ellipse)) {
+        if (contours->contour[i].closed &&
+            ih_ellipse_of_contour(contours, &contours->contour[i], &ellipse)) {
             hash = golden_add_words(hash, &ellipse, sizeof ellipse);
         }
     }
@@ -69,12 +70,13 @@ static uint64_t add_ellipses(uint64_t hash, const struct ih_contours *cuts)
 
 static void hash_levels(struct isohead *head, uint64_t hash[GOLDEN_INNERS])
 {
-    struct ih_contours *cuts = &head->scratch.nests.contours;
+    struct ih_contours *contours = &head->scratch.nests.contours;
     int32_t level_mm_q8 = 0;
     for (int32_t i = 0; ih_nests_level(&head->surface, &head->params.nests, i, &level_mm_q8); i++) {
-        ih_contours_level(&head->surface, level_mm_q8, cuts);
-        hash[GOLDEN_CUTS] = add_contours(golden_add_word(hash[GOLDEN_CUTS], level_mm_q8), cuts);
-        hash[GOLDEN_ELLIPSES] = add_ellipses(hash[GOLDEN_ELLIPSES], cuts);
+        ih_contours_level(&head->surface, level_mm_q8, contours);
+        hash[GOLDEN_CONTOURS] =
+            add_contours(golden_add_word(hash[GOLDEN_CONTOURS], level_mm_q8), contours);
+        hash[GOLDEN_ELLIPSES] = add_ellipses(hash[GOLDEN_ELLIPSES], contours);
     }
 }
 
@@ -82,14 +84,14 @@ static void hash_levels(struct isohead *head, uint64_t hash[GOLDEN_INNERS])
 static void hash_start(struct isohead *head, const int32_t centre_mm_q8[3],
                        uint64_t hash[GOLDEN_INNERS])
 {
-    const struct ih_rays *space = &head->scratch.detections.space;
+    const struct ih_rays *rays = &head->scratch.detections.space;
     const struct ih_evidence_nest nest = {.present = false};
     struct ih_ellipsoid start = ih_ellipsoid_mean(centre_mm_q8), fitted;
     struct ih_evidence evidence;
     struct ih_score score;
-    ih_fit_ellipsoid(space, &head->params.detections.fit, &start, &head->scratch.detections.rows,
+    ih_fit_ellipsoid(rays, &head->params.detections.fit, &start, &head->scratch.detections.rows,
                      &fitted);
-    ih_evidence_collect(space, &head->scratch.detections.tally, &fitted, centre_mm_q8, &nest,
+    ih_evidence_collect(rays, &head->scratch.detections.tally, &fitted, centre_mm_q8, &nest,
                         &evidence);
     ih_score_rate(&evidence, &score);
     hash[GOLDEN_FIT] = golden_add_words(hash[GOLDEN_FIT], &fitted, sizeof fitted);
@@ -107,8 +109,7 @@ static void hash_candidates(struct isohead *head, uint64_t hash[GOLDEN_INNERS])
                  &scratch->scan);
     ih_fit_equations_prepare(&scratch->space, &scratch->rows.rays);
     ih_ray_counts_prepare(&scratch->space, &scratch->tally);
-    hash[GOLDEN_SPACE] =
-        golden_add_words(hash[GOLDEN_SPACE], &scratch->space, sizeof scratch->space);
+    hash[GOLDEN_RAYS] = golden_add_words(hash[GOLDEN_RAYS], &scratch->space, sizeof scratch->space);
     hash[GOLDEN_SCAN] = golden_add_word(hash[GOLDEN_SCAN], scan->place_count);
     hash[GOLDEN_SCAN] = golden_add_words(hash[GOLDEN_SCAN], scan->place,
                                          (size_t)scan->place_count * sizeof scan->place[0]);
@@ -130,7 +131,7 @@ static uint64_t hash_paper(struct isohead *head)
     ih_nests_find(&head->surface, &params.nests, &head->scratch.nests, &head->nests);
     ih_hypotheses_select(&head->nests, &head->surface, &head->samples, &head->rig,
                          &params.hypotheses, &head->hypotheses);
-    ih_result_from_hypotheses(&head->hypotheses, &result);
+    ih_result_from_heads(&head->hypotheses, &result);
     uint64_t hash = golden_add_words(GOLDEN_FNV_START, head->surface.depth_mm_q8,
                                      sizeof head->surface.depth_mm_q8);
     hash = golden_add_word(hash, result.entry_count);

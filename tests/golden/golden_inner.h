@@ -1,11 +1,11 @@
-/* golden_inner - hashes of what isohead_frame works out on its way and does not keep.
+/* golden_inner - hashes of intermediate results that isohead_frame does not keep.
  *
  * In:    the state after a frame, and the frame.
  * Out:   one number each for the map of noise and the next exposure (dots only), the contours of all
- *        levels, the ellipses of all closed contours, the rays, the places of the scan, the ellipsoids
+ *        levels, the ellipses of all closed contours, the rays, the candidates of the scan, the ellipsoids
  *        fitted there and at the nests, what speaks for them, their scores, and the surface and the
  *        answer of the paper's method alone.
- * Way:   each stage is run once more on the outputs that the state keeps, in the state's own working
+ * Method: each stage is run once more on the outputs that the state keeps, in the state's own working
  *        memory. Of a depth image these are those of its best window. The paper's method has other
  *        parameters from the surface on: its stages are run last, in place of the outputs.
  */
@@ -18,9 +18,9 @@
 enum golden_inner {
     GOLDEN_NOISE, /* of dots only, as the next */
     GOLDEN_EXPOSURE,
-    GOLDEN_CUTS,
+    GOLDEN_CONTOURS,
     GOLDEN_ELLIPSES,
-    GOLDEN_SPACE,
+    GOLDEN_RAYS,
     GOLDEN_SCAN,
     GOLDEN_FIT,
     GOLDEN_EVIDENCE,

@@ -7,7 +7,7 @@
  *
  * What a round gives must not depend on what was before it, nor on the clock: each has other times,
  * from the most negative to the last ones that 64 bits hold, and after the third round tracks have the
- * numbers before and after the greatest. So every round's records, times and numbers of tracks counted
+ * numbers before and after the largest. So every round's records, times and numbers of tracks counted
  * from its start, are compared with the first round's, and so are the hashes of the stages. At the end
  * each state is started anew and gives the first round's records as they are, to the byte.
  *
@@ -32,12 +32,12 @@
 #define SECOND_US 1000000
 /* Memory is compared with what it was after so many rounds. */
 #define WARM_ROUNDS 2
-/* In this round the numbers of tracks come to their greatest. */
+/* In this round the numbers of tracks come to their maximum. */
 #define WRAP_ROUND 3
 #define WRAP_IDS_LEFT 2
-/* Hashes of the stages before "findings", which holds numbers of tracks. */
+/* Hashes of the stages before the detections, which hold numbers of tracks. */
 #define STAGES 9
-#define TOLD_MAX 5
+#define REPORTED_MAX 5
 
 /* What the first round gave. */
 struct expected {
@@ -101,7 +101,7 @@ static void log_error(void *context, const char *subject, const char *text)
     fail(subject, text);
 }
 
-/* Numbers of tracks counted from the visit's start; after the greatest comes 1. */
+/* Numbers of tracks counted from the visit's start; after the largest comes 1. */
 static void count_tracks_from_start(const struct visit *visit, struct ih_result *result)
 {
     for (int32_t i = 0; i < result->entry_count; i++) {
@@ -131,11 +131,11 @@ static void keep(struct visit *visit, const uint64_t hash[STAGES])
     visit->sequence->frame_count = visit->index + 1;
 }
 
-static void tell(const struct visit *visit, const struct expected *expected, const char *what)
+static void report(const struct visit *visit, const struct expected *expected, const char *what)
 {
     const char *dir = visit->sequence->dir;
     visit->run->different_count++;
-    if (visit->run->different_count <= TOLD_MAX) {
+    if (visit->run->different_count <= REPORTED_MAX) {
         printf("%s, frame %d, round %" PRId64
                ": another %s; the first round's record and this one:\n",
                dir != NULL ? dir : "depth camera", (int)visit->index, visit->run->round + 1, what);
@@ -154,12 +154,12 @@ static void compare(const struct visit *visit, const uint64_t hash[STAGES])
     visit->run->compared_count++;
     if (expected->length != record.length ||
         memcmp(expected->record, record.text, record.length) != 0) {
-        tell(visit, expected, "record");
+        report(visit, expected, "record");
         return;
     }
     for (int32_t i = 0; i < STAGES; i++) {
         if (expected->hash[i] != hash[i]) {
-            tell(visit, expected, golden_stage[i].name);
+            report(visit, expected, golden_stage[i].name);
             return;
         }
     }

@@ -9,7 +9,7 @@ struct longrun_memory {
     long long resident_kb; /* anonymous pages in RAM; -1 where a sanitizer keeps what was freed */
 };
 
-/* False, with a message on standard error: the system does not tell. */
+/* False, with a message on standard error: the system does not report it. */
 bool longrun_memory(struct longrun_memory *out);
 
 #endif

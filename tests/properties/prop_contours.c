@@ -18,7 +18,7 @@
 #define PER_CELL_MAX 16
 
 static struct ih_surface surface;
-static struct ih_contours near_cuts, cuts;
+static struct ih_contours near_contours, contours;
 static struct ih_test_random random_source;
 
 struct segment {
@@ -74,13 +74,13 @@ static int32_t node_depth(int kind, int32_t x, int32_t y, int32_t scale)
  * is near: its contours must fit the tables. */
 static void make_surface(int kind, int32_t scale, bool is_closed)
 {
-    const int32_t part = kind < 3 ? SIDE : kind == 6 ? 18 : 10;
-    const int32_t left = (int32_t)between(0, SIDE - part), top = (int32_t)between(0, SIDE - part);
+    const int32_t arc = kind < 3 ? SIDE : kind == 6 ? 18 : 10;
+    const int32_t left = (int32_t)between(0, SIDE - arc), top = (int32_t)between(0, SIDE - arc);
 
     for (int32_t y = 0; y < SIDE; y++) {
         for (int32_t x = 0; x < SIDE; x++) {
             const bool border = x == 0 || y == 0 || x == SIDE - 1 || y == SIDE - 1;
-            const bool out = x < left || y < top || x >= left + part || y >= top + part;
+            const bool out = x < left || y < top || x >= left + arc || y >= top + arc;
             const int32_t depth = node_depth(kind, x, y, scale);
 
             surface.depth_mm_q8[y][x] = (border && is_closed) || out ? 32000 << 8 : depth;
@@ -151,7 +151,7 @@ static void add_contours(const struct ih_contours *of, int32_t pass)
     dropped_total += of->contours_dropped;
 }
 
-/* How often the closed contours wind round a place, clockwise on the screen. *touches: one passes
+/* How often the closed contours wind round a position, clockwise on the screen. *touches: one passes
  * through it, and there is no telling. */
 static int32_t winding(const struct ih_contours *of, struct ih_vertex place, bool *touches)
 {
@@ -175,7 +175,7 @@ static int32_t winding(const struct ih_contours *of, struct ih_vertex place, boo
                 place.y_q9 <= high_y) {
                 *touches = true;
             } else if (between_x && a.x_q9 < b.x_q9 && side > 0) {
-                sum++; /* to the right, the place below it */
+                sum++; /* to the right, the position below it */
             } else if (between_x && a.x_q9 > b.x_q9 && side < 0) {
                 sum--;
             }
@@ -205,9 +205,9 @@ static void check_inside(const struct ih_contours *of, int32_t pass)
 /* No vertex of the nearer level lies outside what the farther level's contours enclose. */
 static void check_nest(int32_t pass)
 {
-    for (int32_t i = 0; i < near_cuts.vertex_count; i += 3) {
+    for (int32_t i = 0; i < near_contours.vertex_count; i += 3) {
         bool touches;
-        const int32_t wound = winding(&cuts, near_cuts.vertex[i], &touches);
+        const int32_t wound = winding(&contours, near_contours.vertex[i], &touches);
 
         if (!touches) {
             IH_TEST_EQUAL(1, wound, "times that the next level winds round a contour", pass);
@@ -228,14 +228,14 @@ static void check_surface(int kind, bool is_closed, int32_t pass)
         const int32_t two = kind == 7 ? 900 * 256 + (int32_t)between(-2, 3) : level_of(i + 1);
 
         memset(cell_counts, 0, sizeof cell_counts);
-        ih_contours_level(&surface, one < two ? one : two, &near_cuts);
-        ih_contours_level(&surface, one < two ? two : one, &cuts);
-        add_contours(&near_cuts, pass);
+        ih_contours_level(&surface, one < two ? one : two, &near_contours);
+        ih_contours_level(&surface, one < two ? two : one, &contours);
+        add_contours(&near_contours, pass);
         if (one != two) {
-            add_contours(&cuts, pass);
+            add_contours(&contours, pass);
         }
-        if (is_closed && near_cuts.contours_dropped + cuts.contours_dropped == 0) {
-            check_inside(&near_cuts, pass);
+        if (is_closed && near_contours.contours_dropped + contours.contours_dropped == 0) {
+            check_inside(&near_contours, pass);
             check_nest(pass);
             nested_of_kind[kind]++;
         }

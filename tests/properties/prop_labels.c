@@ -2,7 +2,7 @@
  *
  * A dot gets no label but those of slots whose line it lies on. With the paper's short baseline that is
  * one slot, whatever is missing: none is ever labelled wrongly. With a long baseline it may be several,
- * and where the true dot of one of them is missing another may be taken for it: there the share of wrong
+ * and where the true dot of one of them is missing another may be taken for it: there the fraction of wrong
  * labels is bounded, no more. */
 #include "labels/ih_labels.h"
 #include "prop_scene.h"
@@ -19,7 +19,7 @@ static struct ih_labels labels;
 static struct ih_dots all, dots;
 static int16_t slot_of_all[IH_DOTS_MAX], slot_of_dot[IH_DOTS_MAX];
 
-struct tally {
+struct label_counts {
     int64_t dots, right, wrong;
     int64_t candidates; /* of slots, as many as there are for all dots */
 };
@@ -33,11 +33,11 @@ void tearDown(void)
 {
 }
 
-static void take_subset(struct ih_test_random *random, double share)
+static void take_subset(struct ih_test_random *random, double fraction)
 {
     dots.dot_count = 0;
     for (int32_t i = 0; i < all.dot_count; i++) {
-        if (ih_test_unit(random) < share) {
+        if (ih_test_unit(random) < fraction) {
             slot_of_dot[dots.dot_count] = slot_of_all[i];
             dots.dot[dots.dot_count++] = all.dot[i];
         }
@@ -45,29 +45,30 @@ static void take_subset(struct ih_test_random *random, double share)
 }
 
 /* Labels of one subset; the missing ones are what is left of dots. */
-static struct tally count(void)
+static struct label_counts count(void)
 {
-    struct tally tally = {dots.dot_count, 0, 0, 0};
+    struct label_counts counts = {dots.dot_count, 0, 0, 0};
 
     ih_labels_assign(&dots, &rig, &params, &scratch, &labels);
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
         const int32_t dot = labels.dot_of_slot[slot];
 
-        tally.candidates += scratch.candidate_count[slot];
+        counts.candidates += scratch.candidate_count[slot];
         if (dot != IH_NONE) {
-            tally.right += slot_of_dot[dot] == slot;
-            tally.wrong += slot_of_dot[dot] != slot;
+            counts.right += slot_of_dot[dot] == slot;
+            counts.wrong += slot_of_dot[dot] != slot;
         }
     }
-    IH_TEST_EQUAL(labels.labelled_count, tally.right + tally.wrong, "labels", 0);
-    return tally;
+    IH_TEST_EQUAL(labels.labelled_count, counts.right + counts.wrong, "labels", 0);
+    return counts;
 }
 
-/* share: of the dots that are left, at least and at most. */
-static struct tally try_subsets(int which, uint64_t seed, int32_t seeds, double min, double max)
+/* min, max: fraction of the dots that are left. */
+static struct label_counts try_subsets(int which, uint64_t seed, int32_t seeds, double min,
+                                       double max)
 {
     struct ih_test_random random = {seed};
-    struct tally sum = {0, 0, 0, 0};
+    struct label_counts sum = {0, 0, 0, 0};
     int32_t bad_slot;
 
     TEST_ASSERT_EQUAL_INT(IH_OK, ih_rig_init(&rig, &vector_rigs[which], &bad_slot));
@@ -76,7 +77,7 @@ static struct tally try_subsets(int which, uint64_t seed, int32_t seeds, double 
 
         prop_dots(&scene, &vector_rigs[which], &random, SIGMA_PX, &all, slot_of_all);
         take_subset(&random, min + (max - min) * ih_test_unit(&random));
-        const struct tally one = count();
+        const struct label_counts one = count();
 
         sum.dots += one.dots;
         sum.right += one.right;
@@ -98,9 +99,9 @@ static void with_a_short_baseline_no_subset_has_a_wrong_label(void)
     static const int short_rigs[] = {0, 3};
 
     for (int i = 0; i < IH_TEST_COUNT(short_rigs); i++) {
-        const struct tally few = try_subsets(short_rigs[i], 701, prop_seeds(250), 0, 0.5);
-        const struct tally many = try_subsets(short_rigs[i], 702, prop_seeds(250), 0.5, 0.8);
-        const struct tally max = try_subsets(short_rigs[i], 703, prop_seeds(250), 0.8, 1);
+        const struct label_counts few = try_subsets(short_rigs[i], 701, prop_seeds(250), 0, 0.5);
+        const struct label_counts many = try_subsets(short_rigs[i], 702, prop_seeds(250), 0.5, 0.8);
+        const struct label_counts max = try_subsets(short_rigs[i], 703, prop_seeds(250), 0.8, 1);
 
         TEST_ASSERT_EQUAL_INT64(0, few.wrong + many.wrong + max.wrong);
         TEST_ASSERT_LESS_OR_EQUAL_INT64(max.dots, max.candidates);
@@ -112,10 +113,10 @@ static void with_a_short_baseline_no_subset_has_a_wrong_label(void)
 /* 125 mm: bounds are twice what other seeds gave: 1.4, 1.8, 0.5 and 0.08 %. */
 static void with_a_long_baseline_few_labels_are_wrong(void)
 {
-    const struct tally few = try_subsets(1, 711, prop_seeds(150), 0, 0.5);
-    const struct tally many = try_subsets(1, 712, prop_seeds(150), 0.5, 0.8);
-    const struct tally max = try_subsets(1, 713, prop_seeds(150), 0.8, 1);
-    const struct tally every = try_subsets(1, 714, prop_seeds(150), 1, 1);
+    const struct label_counts few = try_subsets(1, 711, prop_seeds(150), 0, 0.5);
+    const struct label_counts many = try_subsets(1, 712, prop_seeds(150), 0.5, 0.8);
+    const struct label_counts max = try_subsets(1, 713, prop_seeds(150), 0.8, 1);
+    const struct label_counts every = try_subsets(1, 714, prop_seeds(150), 1, 1);
 
     TEST_ASSERT_LESS_OR_EQUAL_INT64(few.dots * 35 / 1000, few.wrong);
     TEST_ASSERT_LESS_OR_EQUAL_INT64(many.dots * 35 / 1000, many.wrong);

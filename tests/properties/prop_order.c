@@ -56,7 +56,7 @@ static void add_others(const struct ih_calibration *c, struct ih_test_random *ra
     }
 }
 
-/* For some slots two dots, one on each side of the line and as far from it, take the true one's place:
+/* For some slots two dots, one on each side of the line and as far from it, replace the true one:
  * where rounding leaves both as good, what decides? And for some slots more than its table holds. */
 static void add_rivals(const struct ih_calibration *c, struct ih_test_random *random)
 {
@@ -136,7 +136,7 @@ static void check_labels(int32_t seed)
 }
 
 /* "dots" and "labels" hold indices of dots; all others must not know in what order they came. */
-static void check_rest(void)
+static void check_others(void)
 {
     for (int32_t i = 2; i < GOLDEN_STAGES; i++) {
         TEST_ASSERT_EQUAL_HEX64_MESSAGE(golden_stage[i].hash(&first), golden_stage[i].hash(&other),
@@ -171,7 +171,7 @@ static void any_order_of_dots_gives_the_same_bytes(void)
             }
             find_all(&other, c);
             check_labels(seed);
-            check_rest();
+            check_others();
         }
     }
     printf("order: %d seeds, %lld labels, %lld candidates dropped\n", (int)seeds, (long long)labels,

@@ -81,7 +81,7 @@ static void check_twice(const struct ih_calibration *c, int32_t seed)
         const double length = ih_test_from_q(one_rig.line[slot].length_px_mm_q8, 8);
 
         IH_TEST_EQUAL(one_labels.dot_of_slot[slot], two_labels.dot_of_slot[slot], "label", seed);
-        /* The places of a dot and of its line are rounded to Q12: 4 steps of t, Z^2 / length each. */
+        /* The positions of a dot and of its line are rounded to Q12: 4 steps of t, Z^2 / length each. */
         IH_TEST_WITHIN(2 * 4 * depth * depth / length / 4096 + 0.02, 2 * depth,
                        ih_test_from_q(two_points.point[slot].depth_mm_q8, 8), "depth", slot);
     }
@@ -125,7 +125,7 @@ static void make_surface(const double shape[6], int32_t distance_mm, int32_t uni
     }
 }
 
-/* Slices of one level: the same ellipse, and an area that perspective alone tells apart. */
+/* Slices of one level: the same ellipse, and an area that differs by perspective alone. */
 static int32_t compare_nests(const struct ih_nest *one, const struct ih_nest *two, int32_t seed)
 {
     int32_t compared = 0;

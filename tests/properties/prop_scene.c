@@ -60,7 +60,7 @@ struct prop_scene prop_moved(const struct prop_scene *scene, const double by_mm[
     return out;
 }
 
-/* Where a line enters an ellipsoid: the least s > 0; HUGE_VAL where it does not. */
+/* Where a line enters an ellipsoid: the smallest s > 0; HUGE_VAL where it does not. */
 static double enter(const struct prop_body *body, const double from[3], const double towards[3])
 {
     double a = 0, b = 0, c = -1;

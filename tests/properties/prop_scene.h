@@ -20,7 +20,7 @@ struct prop_scene {
     double wall_mm;
 };
 
-/* A person whose head's centre and semi-axes are given, before a wall; for the rest a mean one. */
+/* A person whose head's centre and semi-axes are given, before a wall; otherwise a mean one. */
 struct prop_scene prop_person(double x_mm, double y_mm, double z_mm, double size, double wall_mm);
 
 /* A random one: head 650 to 1100 mm away, up to aside_mm from the axis, of 0.9 to 1.1 times the mean

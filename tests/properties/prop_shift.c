@@ -1,7 +1,7 @@
 /* A person moved sideways or up and down: the head that is found moves by the same.
  *
  * Bounds. Across: both sides of a head stand before the wall, each outline known to within half the pitch
- * of the dots, so the middle between them too; of two places the errors differ by at most a pitch. Up and
+ * of the dots, so the middle between them too; of two positions the errors differ by at most a pitch. Up and
  * down: the head goes on into the neck, and the fit has a second, lower optimum there. Whichever it takes,
  * two centres within spacing_mm are the same head to the method (ih_detections), no more is promised. Mostly
  * both fits are in the upper one, and the error is that of a dot's depth, a millimetre or two. */

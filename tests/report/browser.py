@@ -153,7 +153,7 @@ class Browser:
         self.call("Input.dispatchKeyEvent", type="keyDown", key=key, windowsVirtualKeyCode=code, **text)
         self.call("Input.dispatchKeyEvent", type="keyUp", key=key, windowsVirtualKeyCode=code)
 
-    def place(self, selector):
+    def position(self, selector):
         """The middle of an element, which is scrolled to."""
         return self.value("(() => { const e = document.querySelector(%s); e.scrollIntoView({block: 'center', behavior: 'instant'});"
                           " const r = e.getBoundingClientRect(); return [r.x + r.width / 2, r.y + r.height / 2]; })()"
@@ -163,7 +163,7 @@ class Browser:
         self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", buttons=buttons, clickCount=1)
 
     def drag(self, selector, dx, dy):
-        x, y = self.place(selector)
+        x, y = self.position(selector)
         self.mouse("mousePressed", x, y, 1)
         for step in range(1, 9):
             self.mouse("mouseMoved", x + dx * step / 8, y + dy * step / 8, 1)
@@ -175,7 +175,7 @@ class Browser:
     def screenshot(self, path, selector=None, whole=False):
         params = {"captureBeyondViewport": True} if whole or selector else {}
         if selector:
-            self.place(selector)
+            self.position(selector)
             params["clip"] = self.value(
                 "(() => { const r = document.querySelector(%s).getBoundingClientRect();"
                 " return {x: r.x + scrollX, y: r.y + scrollY, width: r.width, height: r.height, scale: 1}; })()" % json.dumps(selector))
@@ -186,6 +186,6 @@ class Browser:
             file.write(base64.b64decode(self.call("Page.captureScreenshot", format="png", **params)["data"]))
 
     def tree(self):
-        """What a screen reader is told: (role, name) of every node that is not ignored."""
+        """What a screen reader reads: (role, name) of every node that is not ignored."""
         nodes = self.call("Accessibility.getFullAXTree")["nodes"]
         return [(n["role"]["value"], n.get("name", {}).get("value", "")) for n in nodes if not n["ignored"]]

@@ -82,7 +82,7 @@ def cells(browser, selector):
 def expected_row(record, index):
     h = record["hypotheses"][index]
     text = "rejected: " + h["rejected"] if h["rejected"] else "the head" if record["head"] == index else "accepted"
-    row = ["%d" % index, text + ("|carried: not seen here" if h.get("predicted") else "")]
+    row = ["%d" % index, text + ("|predicted: not seen here" if h.get("predicted") else "")]
     if "score" in h:
         row.append("%.3f%s" % (h["score"], " ✗" if h["rejected"] else ""))
     row.append(", ".join("%.1f" % v for v in h["centre_mm"]) +
@@ -130,17 +130,17 @@ def test_nests(browser, trace):
 def test_evidence(browser, record, trace):
     """'' or what is wrong with the parts of the chosen hypothesis."""
     chosen = record["head"] if record["head"] is not None else 0
-    finding = trace["findings"][chosen]
+    detection = trace["findings"][chosen]
     rows = cells(browser, "#evidence tbody tr")
-    if finding["predicted"]:
+    if detection["predicted"]:
         return "" if rows == [] else "evidence of what was not seen"
     found = [float(row[2]) for row in rows]
     if rows[0][0] == "before any evidence":
-        if finding["track"] == 0 and abs(sum(found) - finding["logit_q10"] / 1024) > 0.11:
-            return "%r sum to %.2f, expected %.2f" % (found, sum(found), finding["logit_q10"] / 1024)
+        if detection["track"] == 0 and abs(sum(found) - detection["logit_q10"] / 1024) > 0.11:
+            return "%r sum to %.2f, expected %.2f" % (found, sum(found), detection["logit_q10"] / 1024)
         found = found[1:]
     found.sort()
-    wanted = sorted(round(p / 1024, 2) for p in finding["part_q10"])
+    wanted = sorted(round(p / 1024, 2) for p in detection["part_q10"])
     length = browser.value("[...document.querySelectorAll('#evidence .bar i')].map((e) => parseFloat(e.style.width))")
     value = [abs(float(row[2])) for row in rows if row[0] != "before any evidence"]
     if len(length) != len(value) or any(abs(l - 48 * v / max(value)) > 0.3 for l, v in zip(length, value)):
@@ -241,7 +241,7 @@ def test_keys(test, browser, records, right):
     test.ok(before != after, "key: h, the next hypothesis", (before, after))
     test.same(browser.value("document.querySelectorAll('#hypotheses [aria-pressed=true]').length"), 1, "one hypothesis is chosen")
     go(browser, 5)
-    x, y = browser.place("#chart-0")
+    x, y = browser.position("#chart-0")
     browser.mouse("mousePressed", x, y, 1)
     browser.mouse("mouseReleased", x, y)
     browser.until("%s !== '5'" % SHOWN)
@@ -253,21 +253,21 @@ PIXELS = "document.getElementById('%s').toDataURL()"
 
 def test_space(test, browser):
     go(browser, 6)
-    # Scroll first: the place is the same for both pictures.
-    browser.place("#space")
+    # Scroll first: the position is the same for both pictures.
+    browser.position("#space")
     first = browser.value(PIXELS % "space")
     test.ok(len(set(first)) > 20 and len(first) > 20000, "3-D: there is a picture", len(first))
     test.ok(browser.value(PIXELS % "space") == first, "3-D: it rests")
     browser.drag("#space", 90, 30)
-    turned = browser.value(PIXELS % "space")
-    test.ok(turned != first, "3-D: a drag turns it")
+    rotated = browser.value(PIXELS % "space")
+    test.ok(rotated != first, "3-D: a drag rotates it")
     browser.value("document.getElementById('space').focus()")
     browser.key("0")
     test.ok(browser.value(PIXELS % "space") == first, "3-D: 0 brings the first view back")
     browser.key("ArrowLeft")
     left = browser.value(PIXELS % "space")
     browser.key("ArrowRight")
-    test.ok(left != first, "3-D: an arrow key turns it")
+    test.ok(left != first, "3-D: an arrow key rotates it")
     test.same(browser.value(SHOWN), "6", "3-D: its arrow keys do not change the frame")
     browser.key("+")
     test.ok(browser.value(PIXELS % "space") not in (first, left), "3-D: + zooms")
@@ -292,7 +292,7 @@ def test_names(test, browser):
     bare = [role for role, name in tree if role in wanted and not name.strip()]
     test.same(bare, [], "every control, picture and table has a name for a screen reader")
     roles = [role for role, _ in tree]
-    test.ok("status" in roles, "the frame is told in a live region")
+    test.ok("status" in roles, "the frame is announced in a live region")
     images = [name for role, name in tree if role in ("image", "img")]
     test.ok(len(images) >= 5 and all(len(name) > 40 for name in images), "charts and pictures have their text", images)
     found = browser.value("Data.frames.slice(0, %d).filter((f) => f.selected).length" % len(TAKEN))
@@ -301,7 +301,7 @@ def test_names(test, browser):
     test.ok("a head in %d of %d frames" % (found, len(TAKEN)) in label, "a chart's text says what it shows", label)
     levels = browser.value("[...document.querySelectorAll('h1,h2,h3')].map((h) => Number(h.tagName[1]))")
     test.ok(levels[0] == 1 and all(b - a <= 1 for a, b in zip(levels, levels[1:])), "headings in order", levels)
-    test.same(browser.value("document.documentElement.lang"), "en", "the language is told")
+    test.same(browser.value("document.documentElement.lang"), "en", "the language is declared")
 
 
 def luminance(colour):
@@ -522,7 +522,7 @@ def main():
             test_names(test, browser)
             test_looks(test, browser, options.keep)
             test.same(browser.errors, [], "no error on the console")
-            test.same(browser.requests, ["file://" + page], "nothing is asked of the network")
+            test.same(browser.requests, ["file://" + page], "nothing is requested from the network")
             test_paper(test, browser, program, frames, work)
             test_range(test, browser, program, work)
             test_hostile(test, browser, program, frames, work)

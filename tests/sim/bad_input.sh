@@ -1,5 +1,5 @@
 #!/bin/sh
-# Bad inputs of host_sim, one after the other: each must be told with file and reason, must not
+# Bad inputs of host_sim, one after the other: each must be reported with file and reason, must not
 # harm what is beside it, and must not crash.
 #
 #     bad_input.sh HOST_SIM FRAMES_DIR

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Records over time: what tracking adds to them, ids, carried heads, lost and dark frames, an empty
+"""Records over time: what tracking adds to them, ids, predicted tracks, lost and dark frames, an empty
 seat; and that --paper knows nothing of all that.
 
     tracks.py HOST_SIM RENDER
@@ -136,7 +136,7 @@ def check_person(test, frames):
         test.path("dark"), names, lambda name, picture: black(picture)
         if names.index(name) in LOST else picture))
     carried = [dark[i]["hypotheses"] for i in LOST]
-    test.check("in the dark a head is carried",
+    test.check("in the dark a head is predicted",
                all(len(h) == 1 and h[0].get("predicted") is True and h[0]["track"] == own
                    and h[0]["rejected"] is None for h in carried), carried)
     test.check("and is the head", all(dark[i]["head"] == 0 for i in LOST))

@@ -62,19 +62,19 @@ def hypothesis(of, nest, rejected):
                 rejected=rejected)
 
 
-def places(steps):
+def positions(steps):
     return [[round(x * 512), round(y * 512)] for x, y in steps]
 
 
-def cuts():
+def levels():
     """Straight contours down the plane's columns, each 10 mm; at one level the open polygon and its part too."""
     levels = []
     for index in range(40):
-        contours = [{"closed": False, "x_y_q9": places([(index + 1, 0), (index + 1, 46)]), "part": []}]
+        contours = [{"closed": False, "x_y_q9": positions([(index + 1, 0), (index + 1, 46)]), "part": []}]
         if index in (8, 10):  # thin contours are drawn at every second one, not here
             part = EARLIER if index == 8 else PART
-            contours = [{"closed": False, "x_y_q9": places(OPEN if part is PART else EARLIER),
-                         "part": [{"nest": 0, "slice": (index - 8) // 2, "x_y_q9": places(part)}]}]
+            contours = [{"closed": False, "x_y_q9": positions(OPEN if part is PART else EARLIER),
+                         "part": [{"nest": 0, "slice": (index - 8) // 2, "x_y_q9": positions(part)}]}]
         levels.append({"level_mm_q8": (NEAREST_MM + 10 * (index + 1)) * 256, "contours_dropped": 0,
                        "contour": contours})
     return levels
@@ -95,7 +95,7 @@ def trace():
     limits = {"area_min_mm2": 12000, "area_max_mm2": 56000, "curvature_min_mm": 60, "curvature_max_mm": 800,
               "extent_min_mm": 65, "upright_min_q16": 62259, "points_min": 13, "above_min_percent": 76,
               "beside_min_percent": 40, "below_min_percent": 45}
-    finding = dict(ellipse(HEAD), centre_mm_q8=[0, 0, 830 * 256], semi_mm_q8=[1, 1, 1], head=True, predicted=False,
+    detection = dict(ellipse(HEAD), centre_mm_q8=[0, 0, 830 * 256], semi_mm_q8=[1, 1, 1], head=True, predicted=False,
                    probability_q16=65536 // 4 * 3)
     return {"file": FRAME, "time_us": 300000,
             "dots": {"u_px_q12": [round(px[0] * 4096) for _, px, _ in DOTS],
@@ -104,11 +104,11 @@ def trace():
             "points": {"x_q28": [0] * 361, "y_q28": [0] * 361, "state": [0] * 361},
             "samples": {"clip_mm_q8": CLIP_MM * 256},
             "surface": {"valid": True, "nearest_mm_q8": NEAREST_MM * 256, "field": field, "depth_mm_q8": depth},
-            "cuts": cuts(),
+            "cuts": levels(),
             "hypotheses": {"nest": [{"slice": [{"whole": False}] * 2}, {"slice": [{"whole": True}]}]},
             "heads": {"hypothesis": [hypothesis(ACCEPTED, 0, None), hypothesis(REJECTED, 1, "area")], "head": [0],
                       "limits": limits},
-            "findings": [finding], "result": {"paper": False, "head": [0], "selected": 0}}
+            "findings": [detection], "result": {"paper": False, "head": [0], "selected": 0}}
 
 
 def write(directory):

@@ -78,8 +78,8 @@ class Picture:
         self.pixels = cv2.imread(path)[..., ::-1].astype(int)
         self.corner, self.scale = corner, scale
 
-    def page(self, place):
-        return tuple(corner + (value + 0.5) * self.scale for corner, value in zip(self.corner, place))
+    def page(self, position):
+        return tuple(corner + (value + 0.5) * self.scale for corner, value in zip(self.corner, position))
 
     def near(self, page, colour, radius=2, off=60):
         """Is a pixel within so many of this place of that colour?"""
@@ -87,55 +87,55 @@ class Picture:
         around = self.pixels[max(y - radius, 0):y + radius + 1, max(x - radius, 0):x + radius + 1]
         return bool((np.abs(around - colour).max(axis=2) <= off).any())
 
-    def shows(self, place, colour, **how):
-        return self.near(self.page(place), colour, **how)
+    def shows(self, position, colour, **how):
+        return self.near(self.page(position), colour, **how)
 
-    def brightness(self, place):
-        x, y = (int(value) for value in self.page(place))
+    def brightness(self, position):
+        x, y = (int(value) for value in self.page(position))
         return self.pixels[y, x].mean()
 
 
 def around(of, times=1.0, count=120):
     """Places on an ellipse."""
-    turn = np.radians(of["angle"])
+    tilt = np.radians(of["angle"])
     for angle in np.linspace(0, 2 * np.pi, count, endpoint=False):
         x, y = of["a"] * times * np.cos(angle), of["b"] * times * np.sin(angle)
-        yield (of["centre"][0] + x * np.cos(turn) - y * np.sin(turn),
-               of["centre"][1] + x * np.sin(turn) + y * np.cos(turn))
+        yield (of["centre"][0] + x * np.cos(tilt) - y * np.sin(tilt),
+               of["centre"][1] + x * np.sin(tilt) + y * np.cos(tilt))
 
 
-def share(picture, places, colour, **how):
-    return np.mean([picture.shows(place, colour, **how) for place in places])
+def fraction(picture, positions, colour, **how):
+    return np.mean([picture.shows(position, colour, **how) for position in positions])
 
 
-def check_share(name, value, least, most=1.0):
-    result(name, None if least <= value <= most else "%.2f; %.2f to %.2f was expected" % (value, least, most))
+def check_fraction(name, value, low, high=1.0):
+    result(name, None if low <= value <= high else "%.2f; %.2f to %.2f was expected" % (value, low, high))
 
 
 def case_contours():
     must("contours", "--trace", at("trace"), at("made"), at("contours.png"))
     picture = Picture(at("contours.png"), (20, 60), 820 / scene.WIDTH)
-    solid = share(picture, around(scene.ACCEPTED), BLACK, radius=1)
-    check_share("contours: the accepted hypothesis is a black line", solid, 0.9)
-    dashed = share(picture, around(scene.REJECTED), BLUE, radius=0)
-    check_share("contours: the rejected one is blue and has gaps", dashed, 0.4, 0.85)
-    hollow = share(picture, around(scene.HEAD), WHITE, radius=1)
-    check_share("contours: the head's line is hollow ..", hollow, 0.85)
-    edge = share(picture, around(scene.HEAD, 1 + 2.7 / 820 * scene.WIDTH / scene.HEAD["a"]), VERMILION, radius=1)
-    check_share("contours: .. with vermilion beside the hollow", edge, 0.9)
+    solid = fraction(picture, around(scene.ACCEPTED), BLACK, radius=1)
+    check_fraction("contours: the accepted hypothesis is a black line", solid, 0.9)
+    dashed = fraction(picture, around(scene.REJECTED), BLUE, radius=0)
+    check_fraction("contours: the rejected one is blue and has gaps", dashed, 0.4, 0.85)
+    hollow = fraction(picture, around(scene.HEAD), WHITE, radius=1)
+    check_fraction("contours: the head's line is hollow ..", hollow, 0.85)
+    edge = fraction(picture, around(scene.HEAD, 1 + 2.7 / 820 * scene.WIDTH / scene.HEAD["a"]), VERMILION, radius=1)
+    check_fraction("contours: .. with vermilion beside the hollow", edge, 0.9)
     result("contours: a cross marks the head's centre",
            None if picture.shows(scene.HEAD["centre"], VERMILION, radius=0) else "no vermilion there")
     line = [scene.node_px(x, 40) for x in [*np.arange(8, 12, 0.1), *np.arange(24, 40, 0.1)]]
-    dark = np.mean([picture.shows(place, BLACK, radius=0) for place in line])
-    check_share("contours: the open polygon is dashed", dark, 0.45, 0.75)
+    dark = np.mean([picture.shows(position, BLACK, radius=0) for position in line])
+    check_fraction("contours: the open polygon is dashed", dark, 0.45, 0.75)
     part = [scene.node_px(x, y) for x in np.arange(30.5, 40, 0.25) for y in (5, 12)]
-    check_share("contours: its elliptical part is a light line ..", share(picture, part, WHITE, radius=1), 0.95)
+    check_fraction("contours: its elliptical part is a light line ..", fraction(picture, part, WHITE, radius=1), 0.95)
     chord = [scene.node_px(30, y) for y in np.arange(5.5, 12, 0.25)]
-    check_share("contours: .. closed by its chord ..", share(picture, chord, WHITE, radius=1), 0.95)
+    check_fraction("contours: .. closed by its chord ..", fraction(picture, chord, WHITE, radius=1), 0.95)
     earlier = [scene.node_px(x, y) for x in np.arange(4.5, 10, 0.25) for y in (5, 12)]
-    check_share("contours: no part of a slice before", share(picture, earlier, WHITE, radius=1), 0, 0.1)
+    check_fraction("contours: no part of a slice before", fraction(picture, earlier, WHITE, radius=1), 0, 0.1)
     beside = [(u, v - 2.2 * scene.WIDTH / 820) for u, v in part[::2]]
-    check_share("contours: .. between dark ones", share(picture, beside, BLACK, radius=1), 0.9)
+    check_fraction("contours: .. between dark ones", fraction(picture, beside, BLACK, radius=1), 0.9)
     return picture
 
 
@@ -156,8 +156,8 @@ def case_control():
     must("control", "--trace", at("trace/000003.json"), at("made"), at("control.png"))
     picture = Picture(at("control.png"), (20, 64), 1880 / scene.WIDTH)
     problems = []
-    for slot, place, residual_px in scene.DOTS:
-        u, v = picture.page(place)
+    for slot, position, residual_px in scene.DOTS:
+        u, v = picture.page(position)
         if slot is None:
             seen = picture.near((u + 3, v + 3), SKY), not picture.near((u, v + 8), YELLOW)
         else:
@@ -191,10 +191,10 @@ def case_real_residuals():
         if label is None or abs(label["perp_px_q12"]) < 0.25 * 4096:
             continue
         dot = np.array([trace["dots"][key][label["dot"]] / 4096 for key in ("u_px_q12", "v_px_q12")])
-        place = cv2.undistortPoints(dot.reshape(1, 1, 2), camera, lens)[0, 0]
+        position = cv2.undistortPoints(dot.reshape(1, 1, 2), camera, lens)[0, 0]
         infinity = rays[slot, :2] / rays[slot, 2]
-        way = origin[:2] - origin[2] * infinity
-        nearest = infinity + way * ((place - infinity) @ way) / (way @ way)
+        direction = origin[:2] - origin[2] * infinity
+        nearest = infinity + direction * ((position - infinity) @ direction) / (direction @ direction)
         on_line = cv2.projectPoints(np.array([[*nearest, 1.0]]), np.zeros(3), np.zeros(3), camera, lens)[0][0, 0]
         checked += 1
         there += picture.shows(dot + (dot - on_line) * 0.9 * 40, VERMILION, radius=3, off=80)
@@ -203,7 +203,7 @@ def case_real_residuals():
 
 
 def case_trace(records):
-    """What the trace holds for pictures: parts that have their slice's moments, findings that the record has too."""
+    """What the trace holds for pictures: parts that have their slice's moments, detections that the record has too."""
     whole = parts = 0
     problems = []
     for folder, record in records:
@@ -218,9 +218,9 @@ def case_trace(records):
         parts += len(wanted)
         if sorted(wanted) != sorted(item[:2] for item in found):
             problems.append("frame %s: parts of %s, not of %s" % (index, sorted(found), wanted))
-        for nest, slice_, level, places in found:
+        for nest, slice_, level, positions in found:
             of = nests[nest]["slice"][slice_]
-            here = np.array(places) / 512
+            here = np.array(positions) / 512
             after = np.roll(here, -1, axis=0)
             cross = here[:, 0] * after[:, 1] - after[:, 0] * here[:, 1]
             area = cross.sum() / 2
@@ -231,10 +231,10 @@ def case_trace(records):
         shown = [[f["u_px_q12"], f["v_px_q12"], f["a_px_q12"], f["b_px_q12"]] for f in trace["findings"]]
         said = [[value * 4096 for value in h["pixel"] + h["axes_px"]] for h in record["hypotheses"]]
         if len(shown) != len(said) or (shown and np.abs(np.subtract(shown, said)).max() > 0.006 * 4096):
-            problems.append("frame %s: findings are not the record's hypotheses" % index)
+            problems.append("frame %s: detections are not the record's hypotheses" % index)
         if (trace["result"]["head"], trace["result"]["selected"]) != (record["heads"], record["head"]):
             problems.append("frame %s: the result is not the record's" % index)
-    result("trace: a part per slice that is not whole, with its moments; the record's findings and result",
+    result("trace: a part per slice that is not whole, with its moments; the record's detections and result",
            "; ".join(problems) or (None if whole > 5 and parts > 20 else "hardly any slices: %d, %d" % (whole, parts)))
 
 
@@ -251,7 +251,7 @@ def pdf_pages(path):
 def case_words(records):
     """What stands in the PDFs, against the records and the trace."""
     must("sheet", "--trace", at("traces"), "--from", "000003", "--count", "9", at("short"), at("sheet.pdf"))
-    text = pdf_words(at("sheet.pdf")).replace("other place, no head", "")  # the key
+    text = pdf_words(at("sheet.pdf")).replace("other candidate, no head", "")  # the key
     words = re.findall(r"head (?:at|near) (\d+) mm|(no head)", text)
     chosen = records[3:12]
     expected = ["%.0f" % r["hypotheses"][r["head"]]["distance_mm"] if r["head"] is not None else "" for r in chosen]
@@ -339,7 +339,7 @@ def limit_files():
 
 
 def case_full_disk():
-    """An old film stays, nothing is left beside it, and it is told; a film's writer tells nothing of itself."""
+    """An old film stays, nothing is left beside it, and the message says so; a film's writer prints nothing of its own."""
     for name in ("full.mp4", "full.pdf", "full.png"):
         os.makedirs(at("full"), exist_ok=True)
         path = os.path.join(at("full"), name)
@@ -374,7 +374,7 @@ def case_straight():
     with open(at("holed/000001.pgm"), "wb") as file:
         file.write(b"P5\n7 7\n255\n")
     status, _, err = run("control", "--from", "000002", at("holed"), at("holed.png"))
-    result("straight from frames: a bad one among them is told, status 1, and the picture is there",
+    result("straight from frames: a bad one among them is reported, status 1, and the picture is there",
            None if status == 1 and "000001.pgm" in err and os.path.exists(at("holed.png")) else err)
 
 
@@ -396,7 +396,7 @@ def case_paper():
 
 def case_empty():
     trace = scene.trace()
-    trace.update(surface={"valid": False}, cuts=[], findings=[])
+    trace.update({"surface": {"valid": False}, "cuts": [], "findings": []})
     trace["hypotheses"]["nest"] = trace["heads"]["hypothesis"] = []
     trace["heads"]["head"] = trace["result"]["head"] = []
     trace["result"]["selected"] = None
@@ -458,19 +458,19 @@ def case_bad_traces():
     problems = []
     for _ in range(25):
         bad = bytearray(text.encode())
-        place = chance.randrange(len(bad))
-        bad[place:place + chance.choice((1, 1, 40))] = bytes([chance.randrange(256)])
+        position = chance.randrange(len(bad))
+        bad[position:position + chance.choice((1, 1, 40))] = bytes([chance.randrange(256)])
         with open(at("fuzzed.json"), "wb") as file:
             file.write(bad)
         status, _, err = run("pair", "--trace", at("fuzzed.json"), at("made"), at("fuzzed.png"))
         if status not in (0, 1) or (status == 1 and "fuzzed.json:" not in err and "/made/" not in err):
-            problems.append("byte %d: status %d: %s" % (place, status, err))
+            problems.append("byte %d: status %d: %s" % (position, status, err))
     result("25 traces with a wrong byte: drawn or refused by name", "; ".join(problems))
 
 
 def case_bad_input():
     trace, made = ("--trace", at("trace")), at("made")
-    refuse("no frames directory", "nowhere: is no frames directory", "contours", *trace, at("nowhere"))
+    refuse("no frames directory", "nowhere: not a directory; expected a frames directory", "contours", *trace, at("nowhere"))
     refuse("no rig", r"trace/rig\.json: No such file", "contours", *trace, at("trace"))
     refuse("a trace that is not there", "gone: is not there: host_sim --trace", "contours", "--trace", at("gone"), made)
     refuse("a folder without traces", "holds a trace", "contours", "--trace", at("tmp"), made)

@@ -18,7 +18,7 @@ import numpy as np
 import builds
 
 DOT_PX = 1.0  # farther from every true dot: not found
-LABEL_PX = 1.5  # farther from the true place of its slot: a wrong label
+LABEL_PX = 1.5  # farther from the true position of its slot: a wrong label
 LIMITS = {
     # name: (least, most) of every frame
     "found": (0.78, 1.0),
@@ -89,7 +89,7 @@ class Rig:
 
 
 def labelled(result):
-    """Place and depth by slot."""
+    """Position and depth by slot."""
     return {slot: (np.array(result["dots"][dot]), depth) for slot, dot, depth in result["labels"]}
 
 
@@ -138,9 +138,9 @@ def check(who, arguments, frames):
     bad = []
     for name, numbers in zip(names, frames):
         for key, value in numbers.items():
-            least, most = LIMITS[key]
-            if not least <= value <= most:
-                bad.append("%s, %s: %s is %.3f, expected %g to %g" % (who, name, key, value, least, most))
+            smallest, largest = LIMITS[key]
+            if not smallest <= value <= largest:
+                bad.append("%s, %s: %s is %.3f, expected %g to %g" % (who, name, key, value, smallest, largest))
     return bad
 
 

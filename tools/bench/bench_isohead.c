@@ -76,7 +76,7 @@ static bool run_all(const struct bench_input *input, void (*handle)(void), int64
 
 static void print_counts(void)
 {
-    printf("dots %d labels %d findings %d\n", (int)head.dots.dot_count,
+    printf("dots %d labels %d detections %d\n", (int)head.dots.dot_count,
            (int)head.labels.labelled_count, (int)head.detections.detection_count);
 }
 
@@ -118,7 +118,7 @@ static void print_result(void)
     printf("[%.2f,%.2f,%.2f]}\n", ldexp(centre[0], -8), ldexp(centre[1], -8), ldexp(centre[2], -8));
 }
 
-/* One turn: to get warm again after the others' turns, then the whole without timers inside, then the stages. */
+/* One turn: warm up after the others' turns, then the whole frame without timers inside, then the stages. */
 static bool take_turn(const struct bench_input *input)
 {
     int64_t cold_ns, whole_ns, timed_ns;
@@ -130,18 +130,18 @@ static bool take_turn(const struct bench_input *input)
     if (!run_all(input, NULL, &timed_ns)) {
         return false;
     }
-    int64_t rest_ns = timed_ns;
+    int64_t remaining_ns = timed_ns;
     printf("{\"whole\":%.0f", (double)whole_ns / input->frame_count);
     for (int i = 0; i < BENCH_STAGES; i++) {
         if (bench_times.calls[i] == 0) {
             fprintf(stderr, "bench_isohead: the stage %s was never called\n", bench_stage_name(i));
             return false;
         }
-        rest_ns -= bench_times.stage_ns[i];
+        remaining_ns -= bench_times.stage_ns[i];
         printf(",\"%s\":%.0f", bench_stage_name(i),
                (double)bench_times.stage_ns[i] / input->frame_count);
     }
-    printf(",\"rest\":%.0f}\n", (double)rest_ns / input->frame_count);
+    printf(",\"rest\":%.0f}\n", (double)remaining_ns / input->frame_count);
     return fflush(stdout) == 0;
 }
 

@@ -8,9 +8,9 @@ struct bench_times bench_times;
 const char *bench_stage_name(int stage)
 {
     static const char *const names[BENCH_STAGES] = {
-        [BENCH_DOTS] = "dots",         [BENCH_LABELS] = "labels",    [BENCH_POINTS] = "points",
-        [BENCH_SURFACE] = "surface",   [BENCH_HYPOTHESES] = "nests", [BENCH_HEADS] = "heads",
-        [BENCH_FINDINGS] = "findings", [BENCH_TRACKS] = "tracks",
+        [BENCH_DOTS] = "dots",           [BENCH_LABELS] = "labels", [BENCH_POINTS] = "points",
+        [BENCH_SURFACE] = "surface",     [BENCH_NESTS] = "nests",   [BENCH_HYPOTHESES] = "heads",
+        [BENCH_DETECTIONS] = "findings", [BENCH_TRACKS] = "tracks",
     };
     return names[stage];
 }
@@ -59,16 +59,16 @@ WRAP(BENCH_SURFACE, ih_surface_fit,
       const struct ih_surface_params *params, struct ih_surface_scratch *scratch,
       struct ih_surface *out),
      (samples, field, params, scratch, out))
-WRAP(BENCH_HYPOTHESES, ih_nests_find,
+WRAP(BENCH_NESTS, ih_nests_find,
      (const struct ih_surface *surface, const struct ih_nests_params *params,
       struct ih_nests_scratch *scratch, struct ih_nests *out),
      (surface, params, scratch, out))
-WRAP(BENCH_HEADS, ih_hypotheses_select,
+WRAP(BENCH_HYPOTHESES, ih_hypotheses_select,
      (const struct ih_nests *nests, const struct ih_surface *surface,
       const struct ih_samples *samples, const struct ih_rig *rig,
       const struct ih_hypotheses_params *params, struct ih_hypotheses *out),
      (nests, surface, samples, rig, params, out))
-WRAP(BENCH_FINDINGS, ih_detections_add,
+WRAP(BENCH_DETECTIONS, ih_detections_add,
      (const struct ih_points *points, const struct ih_dots *dots,
       const struct ih_hypotheses *hypotheses, const struct ih_expected *expected,
       const struct ih_rig *rig, const struct ih_detections_params *params,

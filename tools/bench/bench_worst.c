@@ -37,7 +37,7 @@ __attribute__((noinline)) void bench_worst_end(int32_t number, const char *kind)
     }
     printf(
         "%d %s dots %d edges %d hot %d dropped %d labels %d lost %d samples %d nests %d slices %d "
-        "findings %d expected %d\n",
+        "detections %d expected %d\n",
         (int)number, kind, (int)head.dots.dot_count, (int)head.dots.edge_count,
         (int)head.dots.hot_count, (int)head.dots.dots_dropped, (int)head.labels.labelled_count,
         (int)head.labels.candidates_dropped, (int)head.samples.sample_count,

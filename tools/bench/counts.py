@@ -52,7 +52,7 @@ BESIDE = {
     "points, samples": (("points, samples",), "peer_find_samples"),
     "surface": (("surface",), "peer_fit_surface"),
     "cuts, nests": (("nests",), "peer_find_nests"),
-    "heads to tracks": (("heads", "findings", "tracks"), "peer_find_heads"),
+    "heads to tracks": (("heads", "findings", "tracks"), "peer_find_hypotheses"),
     "whole frame": (("frame",), "peer_frame"),
 }
 BOUNDED = ("frame", "dots", "labels", "surface", "nests", "findings")

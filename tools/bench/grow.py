@@ -65,7 +65,7 @@ def write_pgm(path, image):
 
 
 def erase(image, u, v):
-    """Put what lies 6 to 8 px left and right of a dot in its place, row by row."""
+    """Put what lies 6 to 8 px left and right of a dot over it, row by row."""
     u, v = int(round(u)), int(round(v))
     for row in range(max(v - 5, 0), min(v + 6, image.shape[0])):
         around = np.concatenate([image[row, max(u - 8, 0):max(u - 5, 0)], image[row, u + 6:u + 9]])

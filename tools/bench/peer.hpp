@@ -14,7 +14,7 @@
  *
  * What both do, as isohead does it in its default mode and with the same numbers: dots of the whole
  * frame; undistortPoints; candidates on the 361 lines, seeds by affine rectangles, growing; points;
- * samples (clip, lonely points, missing dots filled in); 64 multiquadrics, weighted least squares
+ * samples (clip, isolated points, missing dots filled in); 64 multiquadrics, weighted least squares
  * with a ridge, one Huber step that moves samples, Eigen's LLT; 47x47 nodes from a table of the basis that is filled
  * once; contours by marching squares every 20 mm at levels that a nest waits for; nests, from minima that are
  * free on three sides, of ellipses, whole or cut by the best of all chords between 32 points, where a contour
@@ -27,7 +27,7 @@
  * (A works out what samples are off for that alone, a hundredth of the surface, and B has it from its
  * corrections); a bound before the scan's scores (isohead's has lanes of 16 bits; in B's vectors of float a
  * bound would cross the rays as the score itself does, and A is what is written first).
- * What they do not do, which is in their favour: a threshold that follows the noise of the place (one
+ * What they do not do, which is in their favour: a threshold that follows the local noise (one
  * for the frame instead), tests for edges and hot pixels, over-exposed plateaus, the paper's tests of
  * heads (area, curvature, shape, outline), evidence, learnt score, tracks: the scan's own score after a step
  * says what is hopeless, and the best of the fitted places by it is the head.
@@ -54,7 +54,7 @@ constexpr int PEER_NODES = 47; /* of the surface's grid, in a row */
 
 enum class peer_kind { a, b };
 
-/* One dot's epipolar line in undistorted pixels: place = infinity + t dir, t = length / Z. */
+/* One dot's epipolar line in undistorted pixels: position = infinity + t dir, t = length / Z. */
 struct peer_line {
     double infinity_u, infinity_v, dir_u, dir_v, length_px_mm, t_far_px, t_near_px;
 };
@@ -90,9 +90,9 @@ struct peer_ray {
     peer_ray_state state;
 };
 
-/* Place of node 0, .. and of a row of centres, field units. */
-double peer_node_place(int node);
-double peer_centre_place(int centre);
+/* Position of node 0, .. and of a row of centres, field units. */
+double peer_node_position(int node);
+double peer_centre_position(int centre);
 
 struct peer_contour {
     std::vector<cv::Point2f> vertex; /* grid steps; runs with what is nearer on its right */
@@ -115,7 +115,7 @@ struct peer_ellipse {
 };
 
 /* A part of an outline that is an ellipse. */
-struct peer_part {
+struct peer_arc {
     int from, to;
     double merit;
     peer_ellipse ellipse;
@@ -174,7 +174,7 @@ struct peer {
 
 /* Reads rig.json; throws std::runtime_error with what is wrong. */
 peer_rig peer_rig_read(const std::string &path);
-/* Normalised place of a slot's dot at a depth; its frame pixel. */
+/* Normalised position of a slot's dot at a depth; its frame pixel. */
 cv::Point2d peer_rig_dot_at(const peer_rig &rig, int slot, double depth_mm);
 cv::Point2d peer_rig_distort(const peer_rig &rig, cv::Point2d normalised);
 
@@ -189,25 +189,25 @@ void peer_find_labels(peer &p);
 void peer_find_samples(peer &p);
 void peer_fit_surface(peer &p);
 void peer_find_nests(peer &p);
-void peer_find_heads(peer &p);
+void peer_find_hypotheses(peer &p);
 }
 
 /* Parts of stages. */
-void peer_cut(const peer_grid &surface_mm, double level_mm, std::vector<peer_contour> &out);
+void peer_contours(const peer_grid &surface_mm, double level_mm, std::vector<peer_contour> &out);
 bool peer_ellipse_whole(peer_kind kind, const peer_contour &contour, peer_ellipse &out);
 bool peer_outline_make(const peer_contour &contour, peer_outline &out);
 /* All parts that are ellipses, wherever the minimum is. */
-void peer_parts(peer_kind kind, const peer_outline &outline, std::vector<peer_part> &out);
-/* The best of them that winds round the place; none: nullptr. */
-const peer_part *peer_part_around(const peer_outline &outline, const std::vector<peer_part> &parts,
-                                  cv::Point2f place);
+void peer_arcs(peer_kind kind, const peer_outline &outline, std::vector<peer_arc> &out);
+/* The best of them that winds round the position; none: nullptr. */
+const peer_arc *peer_arc_around(const peer_outline &outline, const std::vector<peer_arc> &arcs,
+                                cv::Point2f place);
 double peer_near_mm(const std::vector<peer_point> &points);
 bool peer_is_visible(const peer &p, cv::Point2d normalised);
 void peer_fill_lanes(peer &p);
 double peer_scan_score(const peer &p, const peer_head &head);
 double peer_promise(const peer &p, const peer_head &head);
 
-/* A fit on its way. */
+/* A fit in progress. */
 struct peer_fit {
     peer_head head, start;
     double ln[3];

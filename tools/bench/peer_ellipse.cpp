@@ -10,13 +10,13 @@ namespace
 constexpr double SHAPE_MAX = 1.045;
 constexpr double SHAPE_MIN = 0.996;
 constexpr double RATIO_WHOLE_MAX = 1.9;
-constexpr double RATIO_PART_MAX = 1.75;
+constexpr double RATIO_ARC_MAX = 1.75;
 constexpr double CHORD_MAX = 0.42;
 constexpr double CHORD_COST = 1.6;
 constexpr double SHAPE_COST = 8;
 constexpr double AREA_MIN = 0.5; /* grid cells */
 constexpr int POINTS = PEER_POINTS;
-constexpr int PART_EDGES_MIN = 8;
+constexpr int ARC_EDGES_MIN = 8;
 constexpr double FOUR_PI = 4 * 3.14159265358979323846;
 
 struct sums {
@@ -108,7 +108,7 @@ double edge_length(const peer_contour &contour, size_t edge)
     return std::sqrt(static_cast<double>(d.dot(d)));
 }
 
-sums sums_of_part(const peer_outline &r, int from, int to)
+sums sums_of_arc(const peer_outline &r, int from, int to)
 {
     sums m = {r.area2[to] - r.area2[from], r.mx[to] - r.mx[from], r.my[to] - r.my[from],
               r.xx[to] - r.xx[from],       r.xy[to] - r.xy[from], r.yy[to] - r.yy[from]};
@@ -116,22 +116,23 @@ sums sums_of_part(const peer_outline &r, int from, int to)
     return m;
 }
 
-void add_part(const peer_outline &r, int from, int to, std::vector<peer_part> &out)
+void add_arc(const peer_outline &r, int from, int to, std::vector<peer_arc> &out)
 {
-    double arc = (to - from) * r.step;
+    double length = (to - from) * r.step;
     double dx = r.x[to] - r.x[from], dy = r.y[to] - r.y[from];
     double chord2 = dx * dx + dy * dy;
     shape found;
-    if (chord2 <= CHORD_MAX * CHORD_MAX * arc * arc &&
-        shape_of_sums(sums_of_part(r, from, to), found) && found.shape >= SHAPE_MIN &&
-        found.shape <= SHAPE_MAX && found.ratio <= RATIO_PART_MAX) {
-        double merit = arc - CHORD_COST * std::sqrt(chord2) - SHAPE_COST * (found.shape - 1) * arc;
+    if (chord2 <= CHORD_MAX * CHORD_MAX * length * length &&
+        shape_of_sums(sums_of_arc(r, from, to), found) && found.shape >= SHAPE_MIN &&
+        found.shape <= SHAPE_MAX && found.ratio <= RATIO_ARC_MAX) {
+        double merit =
+            length - CHORD_COST * std::sqrt(chord2) - SHAPE_COST * (found.shape - 1) * length;
         out.push_back({from, to, merit, found.ellipse});
     }
 }
 
 /* Peer B: all parts of as many steps side by side; what passes without a root is looked at closely. */
-void add_parts_of(const peer_outline &r, int steps, std::vector<peer_part> &out)
+void add_arcs_of(const peer_outline &r, int steps, std::vector<peer_arc> &out)
 {
     using lanes = Eigen::Array<double, POINTS, 1>;
     const int count = std::min(r.count - steps, POINTS);
@@ -150,14 +151,14 @@ void add_parts_of(const peer_outline &r, int steps, std::vector<peer_part> &out)
         r.xx.segment<POINTS>(steps) - r.xx.head<POINTS>() + w * (x0 * x0 + x0 * x1 + x1 * x1);
     const lanes myy =
         r.yy.segment<POINTS>(steps) - r.yy.head<POINTS>() + w * (y0 * y0 + y0 * y1 + y1 * y1);
-    /* 18 area2^2 times the trace of the second moments; an ellipse of the greatest ratio has the most */
+    /* 18 area2^2 times the trace of the second moments; an ellipse of the largest ratio has the most */
     const lanes spread = 3 * area2 * (mxx + myy) - 2 * (mx * mx + my * my);
-    const double max = 18 * (RATIO_PART_MAX + 1 / RATIO_PART_MAX) * SHAPE_MAX / (2 * FOUR_PI);
+    const double max = 18 * (RATIO_ARC_MAX + 1 / RATIO_ARC_MAX) * SHAPE_MAX / (2 * FOUR_PI);
     /* every test as a number that is positive where it fails */
     const lanes bad = over.max(2 * AREA_MIN - area2).max(spread - max * area2.cube());
     for (int from = 0; from < count; from++) {
         if (bad[from] <= 0) {
-            add_part(r, from, from + steps, out);
+            add_arc(r, from, from + steps, out);
         }
     }
 }
@@ -181,7 +182,7 @@ bool peer_ellipse_whole(peer_kind kind, const peer_contour &contour, peer_ellips
 
 bool peer_outline_make(const peer_contour &contour, peer_outline &r)
 {
-    if (contour.vertex.size() < PART_EDGES_MIN) {
+    if (contour.vertex.size() < ARC_EDGES_MIN) {
         return false;
     }
     size_t edges = contour.vertex.size() - (contour.closed ? 0 : 1);
@@ -201,9 +202,9 @@ bool peer_outline_make(const peer_contour &contour, peer_outline &r)
         }
         cv::Point2f a = contour.vertex[edge];
         cv::Point2f b = contour.vertex[edge + 1 < contour.vertex.size() ? edge + 1 : 0];
-        double part = length > 0 ? std::min(target - before, length) / length : 0;
-        r.x[k] = static_cast<double>(a.x) + part * static_cast<double>(b.x - a.x);
-        r.y[k] = static_cast<double>(a.y) + part * static_cast<double>(b.y - a.y);
+        double arc = length > 0 ? std::min(target - before, length) / length : 0;
+        r.x[k] = static_cast<double>(a.x) + arc * static_cast<double>(b.x - a.x);
+        r.y[k] = static_cast<double>(a.y) + arc * static_cast<double>(b.y - a.y);
     }
     r.x.tail<POINTS>() = r.x.head<POINTS>();
     r.y.tail<POINTS>() = r.y.head<POINTS>();
@@ -222,40 +223,40 @@ bool peer_outline_make(const peer_contour &contour, peer_outline &r)
     return true;
 }
 
-void peer_parts(peer_kind kind, const peer_outline &outline, std::vector<peer_part> &out)
+void peer_arcs(peer_kind kind, const peer_outline &outline, std::vector<peer_arc> &out)
 {
     out.clear();
-    for (int steps = PART_EDGES_MIN; steps < POINTS; steps++) {
+    for (int steps = ARC_EDGES_MIN; steps < POINTS; steps++) {
         if (kind == peer_kind::b) {
-            add_parts_of(outline, steps, out);
+            add_arcs_of(outline, steps, out);
             continue;
         }
         for (int from = 0; from < std::min(outline.count - steps, POINTS); from++) {
-            add_part(outline, from, from + steps, out);
+            add_arc(outline, from, from + steps, out);
         }
     }
 }
 
-const peer_part *peer_part_around(const peer_outline &r, const std::vector<peer_part> &parts,
-                                  cv::Point2f place)
+const peer_arc *peer_arc_around(const peer_outline &r, const std::vector<peer_arc> &arcs,
+                                cv::Point2f place)
 {
-    int before[2 * POINTS] = {0}; /* how often the edges before a point wind round the place */
+    int before[2 * POINTS] = {0}; /* how often the edges before a point wind round the position */
     const double x = static_cast<double>(place.x), y = static_cast<double>(place.y);
     auto winding = [&r, x, y](int from, int to) {
         double px = r.x[from] - x, py = r.y[from] - y, qx = r.x[to] - x, qy = r.y[to] - y;
         return winding_of(px * qy - qx * py, py, qy);
     };
-    if (parts.empty()) {
+    if (arcs.empty()) {
         return nullptr;
     }
     for (int k = 1; k < r.count; k++) {
         before[k] = before[k - 1] + winding(k - 1, k);
     }
-    const peer_part *best = nullptr;
-    for (const peer_part &part : parts) {
-        if ((best == nullptr || part.merit > best->merit) &&
-            before[part.to] - before[part.from] + winding(part.to, part.from) == 1) {
-            best = &part;
+    const peer_arc *best = nullptr;
+    for (const peer_arc &arc : arcs) {
+        if ((best == nullptr || arc.merit > best->merit) &&
+            before[arc.to] - before[arc.from] + winding(arc.to, arc.from) == 1) {
+            best = &arc;
         }
     }
     return best;

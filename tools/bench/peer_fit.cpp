@@ -65,7 +65,7 @@ double ring_value(const peer_ray &ray, double centre_mm)
     return ray.point_mm[2] > centre_mm + 60 ? 1 : -0.6;
 }
 
-/* Distance to first order at a place in the ellipsoid's units, and its derivatives by centre and
+/* Distance to first order at a position in the ellipsoid's units, and its derivatives by centre and
  * logarithms of the semi-axes. */
 bool distance_row(const peer_head &head, const double place[3], double &residual_mm, vector6 &row)
 {
@@ -229,7 +229,7 @@ double scan_score_lanes(const peer &p, const peer_head &head)
 
 using rows = Eigen::Matrix<float, peer_lanes::SizeAtCompileTime, 6>;
 
-/* Residuals and derivatives of all rays at their places, in whose units the ellipsoid is a sphere. */
+/* Residuals and derivatives of all rays at their positions, in whose units the ellipsoid is a sphere. */
 template <typename T>
 void distance_rows(const peer_head &head, const T place[3], peer_lanes &radius,
                    peer_lanes &residual, rows &row)

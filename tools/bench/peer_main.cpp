@@ -26,7 +26,7 @@ struct stage {
 
 stage stages[] = {{"dots", peer_find_dots, 0},      {"labels", peer_find_labels, 0},
                   {"points", peer_find_samples, 0}, {"surface", peer_fit_surface, 0},
-                  {"nests", peer_find_nests, 0},    {"findings", peer_find_heads, 0}};
+                  {"nests", peer_find_nests, 0},    {"findings", peer_find_hypotheses, 0}};
 
 void print_result(const peer &p)
 {
@@ -94,7 +94,7 @@ int64_t timed_frames(const bench_input &input, std::vector<peer> &peers)
 
 void take_turn(const bench_input &input, std::vector<peer> &peers)
 {
-    static_cast<void>(timed_frames(input, peers)); // to get warm again after the others' turns
+    static_cast<void>(timed_frames(input, peers)); // warm up after the others' turns
     const int64_t whole_ns = timed_frames(input, peers);
     std::printf("{\"whole\":%.0f", static_cast<double>(whole_ns) / input.frame_count);
     for (const stage &s : stages) {

@@ -44,7 +44,7 @@ double step_at(const peer &p, double depth_mm)
     return depth_mm * p.rig.field_unit * 10 / 11;
 }
 
-/* Does the surface fall off this way from the node, or end, within the steps? */
+/* Does the surface fall off in this direction from the node, or end, within the steps? */
 bool falls_off(const peer_grid &z, int y, int x, int down, int right, int steps)
 {
     const double limit = z(y, x) + FREE_BEHIND_MM;
@@ -94,12 +94,12 @@ struct support {
     double merit;
 };
 
-/* What a contour is for every nest that it surrounds; worked out when the first one asks. */
+/* What a contour is for every nest that it surrounds; computed at first use. */
 struct study {
     bool done, whole, is_tip, outlined; /* a tip's contour may have any shape */
     peer_ellipse ellipse;
     peer_outline outline;
-    std::vector<peer_part> parts;
+    std::vector<peer_arc> arcs;
 };
 
 /* area: of a closed contour, grid cells; step_mm: of the grid at the level. */
@@ -111,12 +111,12 @@ void study_contour(peer_kind kind, const peer_contour &contour, double area, dou
     s.is_tip =
         contour.closed && !s.whole && area >= AREA_MIN && area * step_mm * step_mm < BLUNT_MM2;
     if (s.is_tip) {
-        s.ellipse = {area, 0, 0}; /* no place is asked of a tip */
+        s.ellipse = {area, 0, 0}; /* a tip may be anywhere */
     }
     s.outlined = !s.whole && !s.is_tip && peer_outline_make(contour, s.outline);
     s.parts.clear();
     if (s.outlined) {
-        peer_parts(kind, s.outline, s.parts);
+        peer_arcs(kind, s.outline, s.parts);
     }
 }
 
@@ -145,10 +145,9 @@ void find_supports(const peer &p, const std::vector<peer_contour> &contours, dou
                 to = {true, true, true, &contour, s.ellipse, 0};
                 continue;
             }
-            const peer_part *part =
-                s.outlined ? peer_part_around(s.outline, s.parts, node) : nullptr;
-            if (part != nullptr && (!to.found || part->merit > to.merit)) {
-                to = {true, true, false, &contour, part->ellipse, part->merit};
+            const peer_arc *arc = s.outlined ? peer_arc_around(s.outline, s.parts, node) : nullptr;
+            if (arc != nullptr && (!to.found || arc->merit > to.merit)) {
+                to = {true, true, false, &contour, arc->ellipse, arc->merit};
             }
         }
     }
@@ -252,7 +251,7 @@ void peer_find_nests(peer &p)
         if (!wanted) {
             continue; /* between two nests */
         }
-        peer_cut(p.surface_mm, level_mm, contours);
+        peer_contours(p.surface_mm, level_mm, contours);
         find_supports(p, contours, step_at(p, level_mm), supports);
         for (size_t i = 0; i < p.nests.size(); i++) {
             if (supports[i].wanted) {

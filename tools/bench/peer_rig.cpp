@@ -39,7 +39,7 @@ peer_line line_of(const peer_rig &rig, int slot)
 }
 
 /* Centre: the middle dot at 900 mm; unit: half the mean pitch there. */
-void place_field(peer_rig &rig)
+void set_field(peer_rig &rig)
 {
     double depth = std::min(std::max(FIELD_DEPTH_MM, rig.near_mm), rig.far_mm);
     const int ends[4][2] = {{0, PEER_GRID - 1},
@@ -67,7 +67,7 @@ cv::Point2d peer_rig_dot_at(const peer_rig &rig, int slot, double depth_mm)
             slope[1] + (rig.origin_mm[1] - rig.origin_mm[2] * slope[1]) / depth_mm};
 }
 
-/* OpenCV's lens model, for one place. */
+/* OpenCV's lens model, for one point. */
 cv::Point2d peer_rig_distort(const peer_rig &rig, cv::Point2d n)
 {
     const double *k = rig.distortion.ptr<double>();
@@ -103,6 +103,6 @@ peer_rig peer_rig_read(const std::string &path)
         rig.slope[slot][1] = ray[1] / ray[2];
         rig.line[static_cast<size_t>(slot)] = line_of(rig, slot);
     }
-    place_field(rig);
+    set_field(rig);
     return rig;
 }

@@ -13,15 +13,15 @@ constexpr int CENTRES_STEPS = 48;
 
 using vector = Eigen::Matrix<double, PEER_TERMS, 1>;
 
-/* Rows of the basis at places (x, y) in field units. */
+/* Rows of the basis at positions (x, y) in field units. */
 void fill_basis(const Eigen::ArrayXd &x, const Eigen::ArrayXd &y, peer_basis &basis)
 {
     basis.resize(x.size(), PEER_TERMS);
     for (int row = 0; row < PEER_CENTRES; row++) {
-        Eigen::ArrayXd dy2 = (y - peer_centre_place(row)).square() + 1;
+        Eigen::ArrayXd dy2 = (y - peer_centre_position(row)).square() + 1;
         for (int column = 0; column < PEER_CENTRES; column++) {
             basis.col(row * PEER_CENTRES + column) =
-                ((x - peer_centre_place(column)).square() + dy2).sqrt();
+                ((x - peer_centre_position(column)).square() + dy2).sqrt();
         }
     }
 }
@@ -118,16 +118,17 @@ bool fit_by_corrections(problem &q)
 
 } // namespace
 
-double peer_node_place(int node)
+double peer_node_position(int node)
 {
     return (node - (PEER_NODES - 1) / 2) * 10.0 / 11.0;
 }
 
 /* Centres stand on nodes, as far apart as there are steps for each, as many on both sides of the middle. */
-double peer_centre_place(int centre)
+double peer_centre_position(int centre)
 {
     const int steps = CENTRES_STEPS / PEER_CENTRES;
-    return peer_node_place((PEER_NODES - 1) / 2 + steps * centre - steps * (PEER_CENTRES - 1) / 2);
+    return peer_node_position((PEER_NODES - 1) / 2 + steps * centre -
+                              steps * (PEER_CENTRES - 1) / 2);
 }
 
 void peer_begin(peer &p, peer_kind kind, const peer_rig &rig)
@@ -138,8 +139,8 @@ void peer_begin(peer &p, peer_kind kind, const peer_rig &rig)
     p.has_head = false;
     Eigen::ArrayXd x(PEER_NODES * PEER_NODES), y(PEER_NODES * PEER_NODES);
     for (int i = 0; i < PEER_NODES * PEER_NODES; i++) {
-        x[i] = peer_node_place(i % PEER_NODES);
-        y[i] = peer_node_place(i / PEER_NODES);
+        x[i] = peer_node_position(i % PEER_NODES);
+        y[i] = peer_node_position(i / PEER_NODES);
     }
     fill_basis(x, y, p.node_basis);
 }

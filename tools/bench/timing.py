@@ -62,7 +62,7 @@ def summary(worker):
 
 
 def sum_complaint(worker):
-    """What is wrong with the sum of the stages; None when it is the whole. Quiet repetitions tell."""
+    """What is wrong with the sum of the stages; None when it is the whole. Quiet repetitions decide."""
     total = np.quantile(worker.us([key for _, keys in ROWS for key in keys]), 0.05)
     whole = np.quantile(worker.us(("whole",)), 0.05)
     if abs(total / whole - 1) <= SUM_TOLERANCE:

@@ -133,9 +133,9 @@ def main():
           "| --- | --- | --- | --- | --- |")
     for kind in sorted(by_kind, key=lambda k: -max(entry[0] for entry in by_kind[k])):
         numbers = [entry[0] for entry in by_kind[kind]]
-        most = max(by_kind[kind], key=lambda entry: entry[0])
-        print("| %s | %d | %d | %d | %s |" % (kind, len(numbers), statistics.median(numbers) / 1000, most[0] / 1000,
-                                              most[1].split(" ", 2)[2]))
+        largest = max(by_kind[kind], key=lambda entry: entry[0])
+        print("| %s | %d | %d | %d | %s |" % (kind, len(numbers), statistics.median(numbers) / 1000, largest[0] / 1000,
+                                              largest[1].split(" ", 2)[2]))
     target = os.path.join(builds.WORK, "worst.pgm")
     folder = builds.make(counts.CHECKED, ["bench_worst"])
     program = builds.program(folder, "bench_worst")

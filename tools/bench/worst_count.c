@@ -1,4 +1,4 @@
-/* worst_count - a plugin for QEMU: instructions between two places of a program, each time.
+/* worst_count - a plugin for QEMU: instructions between two addresses of a program, each time.
  *
  *     -plugin libworst_count.so,out=FILE,from=ADDRESS,to=ADDRESS
  *

@@ -55,8 +55,9 @@ static void add_spot(struct picture *p, int64_t u_q12, int64_t v_q12, int32_t ra
             int64_t du = u * ONE_Q12 - u_q12, dv = v * ONE_Q12 - v_q12;
             int64_t left_q24 = radius2_q24 - du * du - dv * dv;
             if (left_q24 > 0) {
-                int64_t share_q12 = left_q24 * ONE_Q12 / radius2_q24;
-                add_to_pixel(p, u, v, (int32_t)(grey * share_q12 / ONE_Q12 * share_q12 / ONE_Q12));
+                int64_t fraction_q12 = left_q24 * ONE_Q12 / radius2_q24;
+                add_to_pixel(p, u, v,
+                             (int32_t)(grey * fraction_q12 / ONE_Q12 * fraction_q12 / ONE_Q12));
             }
         }
     }

@@ -50,7 +50,7 @@ put 644 packaging/60-isohead.rules /lib/udev/rules.d/60-isohead.rules
 put 644 firmware/app/isohead.conf /etc/isohead/isohead.conf
 pack packaging/isohead_board.1 /usr/share/man/man1/isohead_board.1.gz
 pack packaging/isohead.conf.5 /usr/share/man/man5/isohead.conf.5.gz
-# Who has only the package shall be able to read what the settings tell him to.
+# Who has only the package must be able to read what the settings refer to.
 for text in safety hardware contract live; do
     put 644 "docs/$text.md" "/usr/share/doc/isohead/$text.md"
 done

@@ -30,7 +30,7 @@ rm -rf "$new"
 mkdir "$new"
 echo "$package==$version --hash=sha256:$sha256" >"$new/wanted"
 # Without build isolation: pip would fetch the newest of what builds the Python part, which is not
-# built here, only asked for its name.
+# built here, only its name is needed.
 /usr/bin/python3 -m pip download --quiet --disable-pip-version-check --no-deps --require-hashes \
     --no-build-isolation --no-binary "$package" --dest "$new" --requirement "$new/wanted" \
     >"$new/log" 2>&1 || { cat "$new/log" >&2; exit 1; }

@@ -6,7 +6,7 @@
 namespace cal
 {
 static constexpr int rounds = 8, rounds_min = 2;
-/* Variance of a beam's relative lightness in a patch as large as its own sigma squared: grains whose contrast is a
+/* Variance of a beam's relative lightness in a patch as large as its own sigma squared: speckle whose contrast is a
  * third. Half or twice of it changes the dots' errors by 3 % at most; the rays' residuals set the scale. */
 static constexpr double speckle = 0.1;
 static constexpr double width_min_px = 0.35, width_max_px = 3.0, still_px = 1e-3, step_max_px = 0.5;
@@ -17,7 +17,7 @@ static constexpr double cell_px2 = 1.0 / (beam_parts * beam_parts);
 /* Samples that are this many of the beam's widths from its middle have no speckle to speak of. */
 static constexpr double grainy_widths = 3.0;
 
-/* Light, its change with the place and with the width's square, ground. */
+/* Light, its derivatives by the position and by the width's square, background. */
 static constexpr int unknowns = 5;
 using Unknowns = cv::Matx<double, unknowns, 1>;
 using Curvature = cv::Matx<double, unknowns, unknowns>;
@@ -73,9 +73,9 @@ static LitSurface light_up(const cv::Mat &surface, const Beam &beam)
     return lit;
 }
 
-/* Covariance of the window's pixels by speckle, for a beam `bright` times `light`: grains of the surface through the
+/* Covariance of the window's pixels by speckle, for a beam `bright` times `light`: surface speckle seen through the
  * lens. The lens is the same along both axes, so first columns are summed, then rows. */
-static cv::Mat grain_covariance(const cv::Mat &light, const cv::Mat &lens, const Beam &beam, double bright)
+static cv::Mat speckle_covariance(const cv::Mat &light, const cv::Mat &lens, const Beam &beam, double bright)
 {
     constexpr int side = dot_side_px, pairs = side * side;
     double reach = grainy_widths * beam.width_px,
@@ -137,7 +137,7 @@ static bool factor(cv::Mat &matrix)
     return true;
 }
 
-/* Each column becomes what has variance 1 and no correlation. */
+/* Whitens each column: variance 1, no correlation. */
 static void whiten(const cv::Mat &lower, cv::Mat &columns)
 {
     for (int i = 0; i < columns.rows; i++) {
@@ -177,19 +177,19 @@ static bool start_light(const cv::Mat &drawn, const cv::Mat &rise, Fit &fit)
     return solved && fit.light > 0.0;
 }
 
-/* Each pixel's derivatives and residual, made to have variance 1 and no correlation. */
+/* Each pixel's derivatives and residual, whitened. */
 static bool whitened(const BeamWindow &window, const Fit &fit, const Beam &beam, const LitSurface &lit,
                      const cv::Mat &drawn, cv::Mat &columns)
 {
     int count = static_cast<int>(fit.used.size());
     cv::Mat by_u = fit.lens * lit.by_u * fit.lens.t(), by_v = fit.lens * lit.by_v * fit.lens.t();
     cv::Mat by_square = fit.lens * lit.by_square * fit.lens.t();
-    cv::Mat grain = grain_covariance(lit.light, fit.lens, beam, fit.light), covariance(count, count, CV_64F);
+    cv::Mat speckle_var = speckle_covariance(lit.light, fit.lens, beam, fit.light), covariance(count, count, CV_64F);
     columns.create(count, unknowns + 1, CV_64F);
     for (int i = 0; i < count; i++) {
         int pixel = fit.used[static_cast<size_t>(i)], row = pixel / dot_side_px, column = pixel % dot_side_px;
         for (int k = 0; k <= i; k++)
-            covariance.at<double>(i, k) = grain.at<double>(pixel, fit.used[static_cast<size_t>(k)]);
+            covariance.at<double>(i, k) = speckle_var.at<double>(pixel, fit.used[static_cast<size_t>(k)]);
         covariance.at<double>(i, i) += window.noise.at<double>(row, column);
         double *terms = columns.ptr<double>(i);
         terms[0] = drawn.at<double>(row, column);
@@ -205,7 +205,7 @@ static bool whitened(const BeamWindow &window, const Fit &fit, const Beam &beam,
     return true;
 }
 
-/* One step of least squares. False: the pixels do not tell all unknowns. */
+/* One step of least squares. False: the pixels do not determine all unknowns. */
 static bool improve(const cv::Mat &columns, Fit &fit, Beam &beam, double &moved_px)
 {
     Curvature normal = Curvature::zeros();

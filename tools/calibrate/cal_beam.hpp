@@ -1,8 +1,8 @@
 /* cal_beam - where a beam of the laser meets the print, by a fit that knows what makes a dot uneven.
  * Model: a round beam on the print, as light as that is there, through the lens, on a level ground. What is seen differs
  * from it by the sensor's noise and by speckle: rough paper makes the beam grainy before the lens softens it, so
- * neighbouring pixels err together, most where the beam is bright. Generalised least squares with both; that moves a dot less by its
- * grains than a fit to which all pixels are the same, and says how well each dot is known.
+ * neighbouring pixels err together, most where the beam is bright. Generalised least squares models both: speckle then moves a dot
+ * less than in an unweighted fit, and the covariance says how well each dot is known.
  */
 #ifndef CAL_BEAM_HPP
 #define CAL_BEAM_HPP
@@ -32,13 +32,13 @@ struct BeamWindow {
 struct Beam {
     cv::Point2d px;  /* from the window's middle */
     double width_px; /* standard deviation of the beam on the surface */
-    double sigma_px; /* standard deviation of the place, one component */
+    double sigma_px; /* standard deviation of the position, one component */
 };
 
 /* How far a beam's light is off its middle by speckle alone, one component. */
 double beam_speckle_px(double width_px);
 
-/* `beam` has a start for place and width. False: no beam fits. */
+/* `beam` has a start for position and width. False: no beam fits. */
 bool beam_fit(const BeamWindow &window, Beam &beam);
 } // namespace cal
 

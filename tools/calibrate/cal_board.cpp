@@ -9,7 +9,7 @@ namespace cal
 {
 /* The white that a printer leaves at the sheet's edges. */
 static constexpr double margin_mm = 8.0;
-static constexpr double marker_share = 0.8;
+static constexpr double marker_fraction = 0.8;
 static constexpr int dictionary = cv::aruco::DICT_4X4_100;
 static constexpr int markers_max = 100;
 /* So many samples along each side of one of board_picture's. */
@@ -59,7 +59,7 @@ Board board_parse(const std::string &name)
         throw Error(name + ": has more than 100 white squares");
     if (board.charuco)
         board.markers = cv::aruco::CharucoBoard::create(columns, rows, static_cast<float>(square_mm),
-                                                        static_cast<float>(marker_share * square_mm),
+                                                        static_cast<float>(marker_fraction * square_mm),
                                                         first_markers(columns * rows / 2));
     return board;
 }
@@ -76,12 +76,12 @@ static cv::Rect square_of(const Board &board, int px_per_mm, double x_mm, double
 
 static void draw_marker(const Board &board, int px_per_mm, int column, int row, int marker, cv::Mat &sheet)
 {
-    double side_mm = marker_share * board.square_mm, edge_mm = 0.5 * (board.square_mm - side_mm);
-    cv::Rect place =
+    double side_mm = marker_fraction * board.square_mm, edge_mm = 0.5 * (board.square_mm - side_mm);
+    cv::Rect position =
         square_of(board, px_per_mm, column * board.square_mm + edge_mm, row * board.square_mm + edge_mm, side_mm);
     cv::Mat drawn;
     cv::aruco::drawMarker(board.markers->dictionary, marker, board.markers->dictionary->markerSize + 2, drawn, 1);
-    cv::resize(drawn, sheet(place), place.size(), 0.0, 0.0, cv::INTER_NEAREST);
+    cv::resize(drawn, sheet(position), position.size(), 0.0, 0.0, cv::INTER_NEAREST);
 }
 
 cv::Mat board_bitmap(const Board &board, int px_per_mm)

@@ -24,7 +24,7 @@ struct Block {
     double square_sum = 0.0, weighted_sum = 0.0; /* of the residuals, px^2; of those in standard deviations */
 };
 
-/* A row of cv::projectPoints' derivatives: turn, shift, focal lengths, centre, lens. */
+/* A row of cv::projectPoints' derivatives: rotation, translation, focal lengths, centre, lens. */
 static void add_row(const cv::Mat &slopes, int row, double miss_px, double weight, const Camera &camera, Block &block)
 {
     const double *slope = slopes.ptr<double>(row);
@@ -46,13 +46,13 @@ static void add_row(const cv::Mat &slopes, int row, double miss_px, double weigh
 static Block block_of(const Board &board, const Camera &camera, View &view)
 {
     Block block;
-    std::vector<cv::Point3d> places;
+    std::vector<cv::Point3d> positions;
     std::vector<cv::Point2d> expected;
     cv::Mat slopes;
     block.view = &view;
     for (int id : view.corners.ids)
-        places.push_back(board.corner_mm(id));
-    cv::projectPoints(places, view.turn, view.shift, camera.matrix, camera.distortion, expected, slopes);
+        positions.push_back(board.corner_mm(id));
+    cv::projectPoints(positions, view.rvec, view.shift, camera.matrix, camera.distortion, expected, slopes);
     for (size_t i = 0; i < expected.size(); i++) {
         cv::Point2d miss = cv::Point2d(view.corners.px[i]) - expected[i];
         double weight = 1.0 / (view.corners.sigma_px[i] * view.corners.sigma_px[i]);
@@ -72,7 +72,7 @@ static std::vector<Block> list_blocks(const Board &board, const Camera &camera, 
     return blocks;
 }
 
-/* Corners miss by more than their patches say (a flat sheet is not): by how much, each picture tells itself. */
+/* Corners miss by more than their patches say (a flat sheet is not): by how much, each picture's residuals show. */
 static double weight_of(const Block &block)
 {
     double free = 2.0 * static_cast<double>(block.view->corners.ids.size()) - pose_terms;
@@ -111,13 +111,13 @@ static void move(const std::vector<Block> &blocks, const CameraTerms &change, Ca
         camera.distortion.at<double>(i) += change(4 + i);
     for (const Block &block : blocks) {
         PoseTerms moved = block.pose.inv() * (block.pose_right - block.mixed.t() * change);
-        block.view->turn += cv::Vec3d(moved(0), moved(1), moved(2));
+        block.view->rvec += cv::Vec3d(moved(0), moved(1), moved(2));
         block.view->shift += cv::Vec3d(moved(3), moved(4), moved(5));
     }
 }
 
-static void tell(const std::vector<Block> &blocks, const cv::Matx<double, camera_terms, camera_terms> &covariance,
-                 Camera &camera)
+static void report(const std::vector<Block> &blocks, const cv::Matx<double, camera_terms, camera_terms> &covariance,
+                   Camera &camera)
 {
     double sum = 0.0, count = 0.0;
     for (const Block &block : blocks) {
@@ -147,6 +147,6 @@ void bundle_solve(const Board &board, std::vector<View> &views, Camera &camera)
         if (max < small_step)
             break;
     }
-    tell(list_blocks(board, camera, views), covariance, camera);
+    report(list_blocks(board, camera, views), covariance, camera);
 }
 } // namespace cal

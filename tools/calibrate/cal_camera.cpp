@@ -15,7 +15,7 @@ namespace cal
 static constexpr double corner_sigmas = 4.5;
 /* Residuals that are good whatever the others are; rough: before the corners are refined. */
 static constexpr double rough_px = 3.0, fine_px = 0.06;
-static constexpr double kept_share = 0.6;
+static constexpr double kept_fraction = 0.6;
 static constexpr double rayleigh_median = 1.1774; /* in standard deviations of one component */
 static constexpr int rounds = 4;
 static constexpr int corners_min = 8;
@@ -23,19 +23,19 @@ static constexpr double lens_sigmas = 3.0;
 /* What the parameters' standard deviations may be at most. */
 static constexpr double focal_sigma_max = 0.003, centre_sigma_max_px = 3.0;
 
-cv::Vec3d View::in_camera(cv::Point3d place_mm) const
+cv::Vec3d View::in_camera(cv::Point3d position_mm) const
 {
     cv::Matx33d rotation;
-    cv::Rodrigues(turn, rotation);
-    return rotation * cv::Vec3d(place_mm.x, place_mm.y, place_mm.z) + shift;
+    cv::Rodrigues(rvec, rotation);
+    return rotation * cv::Vec3d(position_mm.x, position_mm.y, position_mm.z) + shift;
 }
 
-cv::Point2d View::on_board(const cv::Vec3d &place_mm) const
+cv::Point2d View::on_board(const cv::Vec3d &position_mm) const
 {
     cv::Matx33d rotation;
-    cv::Rodrigues(turn, rotation);
-    cv::Vec3d place = rotation.t() * (place_mm - shift);
-    return {place[0], place[1]};
+    cv::Rodrigues(rvec, rotation);
+    cv::Vec3d position = rotation.t() * (position_mm - shift);
+    return {position[0], position[1]};
 }
 
 cv::Vec3d View::normal() const
@@ -65,7 +65,7 @@ cv::Point2d Camera::undistorted_px(cv::Point2d tangent) const
 
 void camera_pose(const Camera &camera, const Board &board, View &view)
 {
-    cv::solvePnP(view.corners.places_mm(board), view.corners.px, camera.matrix, camera.distortion, view.turn,
+    cv::solvePnP(view.corners.positions_mm(board), view.corners.px, camera.matrix, camera.distortion, view.rvec,
                  view.shift);
 }
 
@@ -73,7 +73,8 @@ static std::vector<cv::Point2d> residuals_of(const Camera &camera, const Board &
 {
     std::vector<cv::Point2f> expected;
     std::vector<cv::Point2d> residuals;
-    cv::projectPoints(view.corners.places_mm(board), view.turn, view.shift, camera.matrix, camera.distortion, expected);
+    cv::projectPoints(view.corners.positions_mm(board), view.rvec, view.shift, camera.matrix, camera.distortion,
+                      expected);
     for (size_t i = 0; i < expected.size(); i++)
         residuals.emplace_back(view.corners.px[i] - expected[i]);
     return residuals;
@@ -105,24 +106,25 @@ static void refuse(const std::vector<std::string> &missing)
 /* A start: every corner counts the same, and the lens has no third radial term. */
 static void fit(const Board &board, std::vector<View> &views, Camera &camera)
 {
-    std::vector<std::vector<cv::Point3f>> places;
+    std::vector<std::vector<cv::Point3f>> positions;
     std::vector<std::vector<cv::Point2f>> seen;
     std::vector<View *> used;
     for (View &view : views) {
         if (view.good()) {
-            places.push_back(view.corners.places_mm(board));
+            positions.push_back(view.corners.positions_mm(board));
             seen.push_back(view.corners.px);
             used.push_back(&view);
         }
     }
     if (used.empty()) /* each has been refused meanwhile */
         refuse(coverage_missing(views, camera.size, coverage_min));
-    std::vector<cv::Mat> turns, shifts;
+    std::vector<cv::Mat> rvecs, shifts;
     camera.distortion = cv::Mat::zeros(1, 5, CV_64F);
-    cv::calibrateCamera(places, seen, camera.size, camera.matrix, camera.distortion, turns, shifts, cv::CALIB_FIX_K3);
+    cv::calibrateCamera(positions, seen, camera.size, camera.matrix, camera.distortion, rvecs, shifts,
+                        cv::CALIB_FIX_K3);
     camera.distortion = camera.distortion.reshape(1, 1).colRange(0, 5).clone();
     for (size_t i = 0; i < used.size(); i++) {
-        used[i]->turn = turns[i];
+        used[i]->rvec = rvecs[i];
         used[i]->shift = shifts[i];
         used[i]->rms_px = rms_of(residuals_of(camera, board, *used[i]));
     }
@@ -152,7 +154,7 @@ static bool clean(const Board &board, const Camera &camera, std::vector<View> &v
                 kept.px.push_back(view.corners.px[i]);
                 if (!view.corners.sigma_px.empty()) {
                     kept.sigma_px.push_back(view.corners.sigma_px[i]);
-                    kept.dark_share.push_back(view.corners.dark_share[i]);
+                    kept.dark_fraction.push_back(view.corners.dark_fraction[i]);
                 }
             }
         }
@@ -161,7 +163,7 @@ static bool clean(const Board &board, const Camera &camera, std::vector<View> &v
         view.left_out += static_cast<int>(dropped);
         view.corners = kept;
         if (static_cast<int>(kept.ids.size()) < corners_min ||
-            static_cast<double>(kept.ids.size()) < kept_share * static_cast<double>(residuals.size()))
+            static_cast<double>(kept.ids.size()) < kept_fraction * static_cast<double>(residuals.size()))
             view.corners.refused =
                 text("%zu of its %zu corners do not fit the camera that the others give (rms %.2f px, "
                      "usual is %.2f): another board, bent, or moved?",

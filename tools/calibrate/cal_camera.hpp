@@ -17,7 +17,7 @@ struct View {
     std::string file;
     cv::Mat grey8, grey; /* as taken, CV_8U; CV_32F, which corners are refined in: needed by camera_solve only */
     Corners corners;
-    cv::Vec3d turn, shift; /* board to camera: Rodrigues' vector; mm */
+    cv::Vec3d rvec, shift; /* board to camera: Rodrigues' vector; mm */
     double rms_px = 0.0;
     int left_out = 0; /* corners that did not fit */
 
@@ -26,8 +26,8 @@ struct View {
         return corners.refused.empty();
     }
     /* A point of the board in the camera's frame. */
-    cv::Vec3d in_camera(cv::Point3d place_mm) const;
-    cv::Point2d on_board(const cv::Vec3d &place_mm) const; /* and back */
+    cv::Vec3d in_camera(cv::Point3d position_mm) const;
+    cv::Point2d on_board(const cv::Vec3d &position_mm) const; /* and back */
     /* The board's own Z in the camera's frame, and its angle against the camera's. */
     cv::Vec3d normal() const;
     double tilt_deg() const;

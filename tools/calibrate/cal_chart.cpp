@@ -38,37 +38,37 @@ Chart::Chart(const std::string &title, const std::string &x_name, const std::str
     }
 }
 
-cv::Point2d Chart::on_page(cv::Point2d place) const
+cv::Point2d Chart::on_page(cv::Point2d position) const
 {
-    double x = (place.x - data_.x) / data_.width, y = (place.y - data_.y) / data_.height;
+    double x = (position.x - data_.x) / data_.width, y = (position.y - data_.y) / data_.height;
     return {left + x * (width - left - right),
             down_ ? top + y * (height - top - bottom) : height - bottom - y * (height - top - bottom)};
 }
 
-void Chart::points(const std::vector<cv::Point2d> &places, const std::string &colour, double radius)
+void Chart::points(const std::vector<cv::Point2d> &positions, const std::string &colour, double radius)
 {
     body_ += "<g fill='" + colour + "' fill-opacity='0.6'>";
-    for (const cv::Point2d &place : places) {
-        cv::Point2d at = on_page(place);
+    for (const cv::Point2d &position : positions) {
+        cv::Point2d at = on_page(position);
         if (at.x >= left && at.x <= width - right && at.y >= top && at.y <= height - bottom)
             body_ += text("<circle cx='%.1f' cy='%.1f' r='%.1f'/>", at.x, at.y, radius);
     }
     body_ += "</g>";
 }
 
-void Chart::line(const std::vector<cv::Point2d> &places, const std::string &colour)
+void Chart::line(const std::vector<cv::Point2d> &positions, const std::string &colour)
 {
     body_ += "<polyline fill='none' stroke='" + colour + "' stroke-width='1.6' points='";
-    for (const cv::Point2d &place : places) {
-        cv::Point2d at = on_page(place);
+    for (const cv::Point2d &position : positions) {
+        cv::Point2d at = on_page(position);
         body_ += text("%.1f,%.1f ", at.x, at.y);
     }
     body_ += "'/>";
 }
 
-void Chart::words(cv::Point2d place, const std::string &words)
+void Chart::words(cv::Point2d position, const std::string &words)
 {
-    cv::Point2d at = on_page(place);
+    cv::Point2d at = on_page(position);
     body_ += text("<text x='%.1f' y='%.1f'>%s</text>", at.x, at.y, words.c_str());
 }
 

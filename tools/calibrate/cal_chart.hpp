@@ -15,13 +15,13 @@ class Chart
     /* The rectangle of data that is shown; y grows upwards unless `down`. */
     Chart(const std::string &title, const std::string &x_name, const std::string &y_name, cv::Rect2d data,
           bool down = false);
-    void points(const std::vector<cv::Point2d> &places, const std::string &colour, double radius);
-    void line(const std::vector<cv::Point2d> &places, const std::string &colour);
-    void words(cv::Point2d place, const std::string &words);
+    void points(const std::vector<cv::Point2d> &positions, const std::string &colour, double radius);
+    void line(const std::vector<cv::Point2d> &positions, const std::string &colour);
+    void words(cv::Point2d position, const std::string &words);
     std::string svg() const;
 
   private:
-    cv::Point2d on_page(cv::Point2d place) const;
+    cv::Point2d on_page(cv::Point2d position) const;
     cv::Rect2d data_;
     bool down_;
     std::string body_;

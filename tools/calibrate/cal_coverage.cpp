@@ -88,11 +88,11 @@ std::vector<std::string> coverage_missing(const std::vector<View> &views, cv::Si
 void coverage_guess_poses(const Board &board, cv::Size size, std::vector<View> &views)
 {
     Camera guess;
-    std::vector<std::vector<cv::Point3f>> places;
+    std::vector<std::vector<cv::Point3f>> positions;
     std::vector<std::vector<cv::Point2f>> seen;
     for (const View &view : views) {
         if (view.good()) {
-            places.push_back(view.corners.places_mm(board));
+            positions.push_back(view.corners.positions_mm(board));
             seen.push_back(view.corners.px);
         }
     }
@@ -100,9 +100,9 @@ void coverage_guess_poses(const Board &board, cv::Size size, std::vector<View> &
     guess.matrix =
         (cv::Mat_<double>(3, 3) << focal, 0.0, 0.5 * size.width, 0.0, focal, 0.5 * size.height, 0.0, 0.0, 1.0);
     guess.distortion = cv::Mat::zeros(1, 5, CV_64F);
-    if (places.size() >= views_for_guess) {
-        cv::Mat turns, shifts, matrix = guess.matrix.clone(), distortion = guess.distortion.clone();
-        cv::calibrateCamera(places, seen, size, matrix, distortion, turns, shifts,
+    if (positions.size() >= views_for_guess) {
+        cv::Mat rvecs, shifts, matrix = guess.matrix.clone(), distortion = guess.distortion.clone();
+        cv::calibrateCamera(positions, seen, size, matrix, distortion, rvecs, shifts,
                             cv::CALIB_USE_INTRINSIC_GUESS | cv::CALIB_FIX_PRINCIPAL_POINT |
                                 cv::CALIB_ZERO_TANGENT_DIST | cv::CALIB_FIX_K2 | cv::CALIB_FIX_K3);
         double found = matrix.at<double>(0, 0);

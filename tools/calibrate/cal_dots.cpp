@@ -12,7 +12,7 @@ static constexpr double noise_times = 5.0, peak_min_grey = 2.5;
 static constexpr double sigma_min_px = 0.5, sigma_max_px = 3.2, moved_max_px = 1.5;
 static constexpr int fit_steps = 20, used_min = 40;
 static constexpr double damping = 1e-2;
-/* The least light that tells how light a surface is. */
+/* Below this light a surface's lightness cannot be determined. */
 static constexpr double light_min_grey = 12.0;
 
 static double noise_of(const cv::Mat &band, const cv::Mat &where)

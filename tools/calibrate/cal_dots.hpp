@@ -1,7 +1,7 @@
 /* cal_dots - the laser's dots in one picture, their centres in floating point; independent of the firmware.
- * Way:   the picture less its twin without the laser (or alone); a band-pass; its lonely maxima above the noise; to each a
- *        round Gaussian on a level ground, by least squares. Where there is a twin, what is lit is divided by how light
- *        the surface is: a dot half on a dark square would else lean out of it.
+ * Method: subtract the laser-off picture, if there is one; band-pass; isolated local maxima above the noise; to each fit a
+ *        round Gaussian on a level background by least squares. With a laser-off picture the difference is divided by the
+ *        surface's lightness, else a dot half on a dark square would be pushed out of it.
  */
 #ifndef CAL_DOTS_HPP
 #define CAL_DOTS_HPP
@@ -16,7 +16,7 @@ struct Dot {
     double peak_grey = 0.0, sigma_px = 0.0;
 };
 
-/* A pixel of this lightness and more tells nothing: the sensor's limit is near. */
+/* From this lightness on a pixel is saturated or nearly so: it is not used. */
 constexpr double saturated_grey = 250.0;
 
 /* A dot is fitted in this many pixels to each side. */
@@ -27,11 +27,11 @@ inline cv::Rect dot_window(cv::Point middle_px)
     return {middle_px.x - dot_reach_px, middle_px.y - dot_reach_px, dot_side_px, dot_side_px};
 }
 
-/* Peak, place from the window's middle, width and ground of a Gaussian, by damped Gauss-Newton over a window (CV_32F);
- * pixels of `lit` that are at the sensor's limit do not count. False: there is none. */
+/* Peak, position from the window's middle, width and background of a Gaussian, by damped Gauss-Newton over a window (CV_32F);
+ * pixels of `lit` that are at the sensor's limit are not used. False: there is none. */
 bool dot_fit(const cv::Mat &window, const cv::Mat &lit, Dot &dot);
 
-/* `dark` is the twin, or empty. `where` (CV_8U, not 0) says where dots are looked for. */
+/* `dark` is the laser-off picture, or empty. `where` (CV_8U, not 0) says where dots are looked for. */
 std::vector<Dot> dots_find(const cv::Mat &lit, const cv::Mat &dark, const cv::Mat &where);
 } // namespace cal
 

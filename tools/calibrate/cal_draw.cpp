@@ -5,12 +5,12 @@
 
 namespace cal
 {
-cv::Matx33d draw_map(const Board &board, const cv::Vec3d &turn, const cv::Vec3d &shift)
+cv::Matx33d draw_map(const Board &board, const cv::Vec3d &rvec, const cv::Vec3d &shift)
 {
     cv::Matx33d rotation;
     cv::Point2d sheet = board.sheet_origin_mm();
     double scale = draw_px_per_mm;
-    cv::Rodrigues(turn, rotation);
+    cv::Rodrigues(rvec, rotation);
     cv::Matx33d from_board(rotation(0, 0), rotation(0, 1), shift[0], rotation(1, 0), rotation(1, 1), shift[1],
                            rotation(2, 0), rotation(2, 1), shift[2]);
     cv::Matx33d to_print(scale, 0.0, -scale * sheet.x - 0.5, 0.0, scale, -scale * sheet.y - 0.5, 0.0, 0.0, 1.0);

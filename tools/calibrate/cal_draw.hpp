@@ -1,4 +1,4 @@
-/* cal_draw - the print as a camera sees it: from pixels to places of the sheet, through the lens.
+/* cal_draw - the print as a camera sees it: from pixels to positions on the sheet, through the lens.
  */
 #ifndef CAL_DRAW_HPP
 #define CAL_DRAW_HPP
@@ -13,7 +13,7 @@ constexpr int draw_px_per_mm = 4; /* of the print's bitmap */
 cv::Mat draw_tangents(cv::Size size, const cv::Mat &camera, const cv::Mat &distortion);
 
 /* From tangents X/Z, Y/Z to samples of the print, for a board's pose. */
-cv::Matx33d draw_map(const Board &board, const cv::Vec3d &turn, const cv::Vec3d &shift);
+cv::Matx33d draw_map(const Board &board, const cv::Vec3d &rvec, const cv::Vec3d &shift);
 
 /* What the camera looks at in a pixel, and how that changes to the right and downwards. */
 struct Sight {

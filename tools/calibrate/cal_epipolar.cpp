@@ -5,7 +5,7 @@
 
 namespace cal
 {
-static constexpr double turn_max_deg = 5.0, turn_step_deg = 0.1;
+static constexpr double rotation_max_deg = 5.0, rotation_step_deg = 0.1;
 
 std::array<EpipolarLine, slot_count> epipolar_lines(const Camera &camera, const cv::Vec3d &origin_mm,
                                                     const std::array<cv::Vec3d, slot_count> &rays)
@@ -22,9 +22,10 @@ std::array<EpipolarLine, slot_count> epipolar_lines(const Camera &camera, const 
 
 static double to_segment(cv::Point2d point, cv::Point2d a, cv::Point2d b)
 {
-    cv::Point2d way = b - a;
-    double square = way.ddot(way), along = square > 0.0 ? std::clamp((point - a).ddot(way) / square, 0.0, 1.0) : 0.0;
-    return cv::norm(point - (a + along * way));
+    cv::Point2d offset = b - a;
+    double square = offset.ddot(offset),
+           along = square > 0.0 ? std::clamp((point - a).ddot(offset) / square, 0.0, 1.0) : 0.0;
+    return cv::norm(point - (a + along * offset));
 }
 
 /* Segments that do not cross are nearest at an end of one of them. */
@@ -38,42 +39,42 @@ static double apart(cv::Point2d a, cv::Point2d b, cv::Point2d c, cv::Point2d d)
                     std::min(to_segment(c, a, b), to_segment(d, a, b)));
 }
 
-Turn epipolar_turned(const Camera &camera, const Projector &projector, const Range &range, double deg)
+Rotation epipolar_rotated(const Camera &camera, const Projector &projector, const Range &range, double deg)
 {
-    cv::Matx33d turn;
-    cv::Rodrigues(projector.rays[slot_count / 2] * (deg * CV_PI / 180.0), turn);
+    cv::Matx33d rotation;
+    cv::Rodrigues(projector.rays[slot_count / 2] * (deg * CV_PI / 180.0), rotation);
     std::array<cv::Vec3d, slot_count> rays;
     for (size_t slot = 0; slot < slot_count; slot++)
-        rays[slot] = turn * projector.rays[slot];
+        rays[slot] = rotation * projector.rays[slot];
     auto lines = epipolar_lines(camera, projector.origin_mm, rays);
     std::array<cv::Point2d, slot_count> near_end, far_end;
     for (size_t slot = 0; slot < slot_count; slot++) {
         near_end[slot] = lines[slot].at(range.near_mm);
         far_end[slot] = lines[slot].at(range.far_mm);
     }
-    Turn result{deg, 0, 1e9};
+    Rotation result{deg, 0, 1e9};
     for (size_t i = 0; i < slot_count; i++) {
         for (size_t k = i + 1; k < slot_count; k++) {
             double min_px = apart(near_end[i], far_end[i], near_end[k], far_end[k]);
-            result.shared += min_px < share_px;
+            result.shared += min_px < same_line_px;
             result.min_apart_px = std::min(result.min_apart_px, min_px);
         }
     }
     return result;
 }
 
-std::vector<Turn> epipolar_turns(const Camera &camera, const Projector &projector, const Range &range)
+std::vector<Rotation> epipolar_rotations(const Camera &camera, const Projector &projector, const Range &range)
 {
-    std::vector<Turn> turns;
-    int steps = cvRound(turn_max_deg / turn_step_deg);
+    std::vector<Rotation> rotations;
+    int steps = cvRound(rotation_max_deg / rotation_step_deg);
     for (int step = -steps; step <= steps; step++)
-        turns.push_back(epipolar_turned(camera, projector, range, step * turn_step_deg));
-    return turns;
+        rotations.push_back(epipolar_rotated(camera, projector, range, step * rotation_step_deg));
+    return rotations;
 }
 
-Turn epipolar_best(const std::vector<Turn> &turns)
+Rotation epipolar_best(const std::vector<Rotation> &rotations)
 {
-    return *std::min_element(turns.begin(), turns.end(), [](const Turn &a, const Turn &b) {
+    return *std::min_element(rotations.begin(), rotations.end(), [](const Rotation &a, const Rotation &b) {
         return a.shared != b.shared ? a.shared < b.shared : std::abs(a.deg) < std::abs(b.deg);
     });
 }

@@ -11,7 +11,7 @@
 
 namespace cal
 {
-constexpr double share_px = 1.2;
+constexpr double same_line_px = 1.2;
 
 struct EpipolarLine {
     cv::Point2d infinity_px, move_px_mm;
@@ -24,18 +24,18 @@ struct EpipolarLine {
 std::array<EpipolarLine, slot_count> epipolar_lines(const Camera &camera, const cv::Vec3d &origin_mm,
                                                     const std::array<cv::Vec3d, slot_count> &rays);
 
-/* The pattern turned about its middle ray by this angle, clockwise in the image where it is positive. */
-struct Turn {
+/* The pattern rotated about its middle ray by this angle, clockwise in the image where it is positive. */
+struct Rotation {
     double deg;
     int shared;          /* pairs of dots that share a line */
     double min_apart_px; /* of all pairs */
 };
 
-Turn epipolar_turned(const Camera &camera, const Projector &projector, const Range &range, double deg);
+Rotation epipolar_rotated(const Camera &camera, const Projector &projector, const Range &range, double deg);
 /* From -5 to 5 degrees in steps of 0.1. */
-std::vector<Turn> epipolar_turns(const Camera &camera, const Projector &projector, const Range &range);
-/* The turn to advise: the least one of those with the fewest shared lines. */
-Turn epipolar_best(const std::vector<Turn> &turns);
+std::vector<Rotation> epipolar_rotations(const Camera &camera, const Projector &projector, const Range &range);
+/* The rotation to advise: the smallest one of those with the fewest shared lines. */
+Rotation epipolar_best(const std::vector<Rotation> &rotations);
 
 /* Standard deviation of a depth, mm, by a dot's error along its line, px, in one frame, and by its ray's own error. */
 double depth_sigma_mm(const Camera &camera, const Projector &projector, double dot_sigma_px, double depth_mm);

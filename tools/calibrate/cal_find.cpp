@@ -12,24 +12,24 @@ namespace cal
 {
 static constexpr int corners_min = 8;
 static constexpr double edge_max_px = 3.5;
-/* A marker may lie off the board's plane by this part of a square: lenses bend. */
+/* A marker may lie off the board's plane by this fraction of a square: lenses bend. */
 static constexpr double marker_slack = 0.4;
-static constexpr double marker_good_share = 0.5;
+static constexpr double marker_good_fraction = 0.5;
 /* Small pictures of markers are looked at larger. */
-static constexpr double enlarge = 1.5, enlarge_more = 3.0, enough_share = 0.5;
+static constexpr double enlarge = 1.5, enlarge_more = 3.0, enough_fraction = 0.5;
 static constexpr size_t markers_min = 3;
 static constexpr int few_corners = 12;
-/* Windows of the search for a corner: this part of a square, within bounds. */
-static constexpr double window_share = 0.2;
+/* Windows of the search for a corner: this fraction of a square, within bounds. */
+static constexpr double window_fraction = 0.2;
 static constexpr int window_min_px = 3, window_max_px = 9;
 static constexpr double moved_max_px = 3.0;
 
-std::vector<cv::Point3f> Corners::places_mm(const Board &board) const
+std::vector<cv::Point3f> Corners::positions_mm(const Board &board) const
 {
-    std::vector<cv::Point3f> places;
+    std::vector<cv::Point3f> positions;
     for (int id : ids)
-        places.emplace_back(board.corner_mm(id));
-    return places;
+        positions.emplace_back(board.corner_mm(id));
+    return positions;
 }
 
 static double median(std::vector<double> values)
@@ -58,18 +58,18 @@ static std::vector<std::pair<size_t, size_t>> neighbours(const Board &board, con
     return pairs;
 }
 
-static double bilinear(const cv::Mat &grey8, cv::Point2d place)
+static double bilinear(const cv::Mat &grey8, cv::Point2d position)
 {
-    int x = static_cast<int>(place.x), y = static_cast<int>(place.y);
-    if (place.x < 0.0 || place.y < 0.0 || x + 1 >= grey8.cols || y + 1 >= grey8.rows)
+    int x = static_cast<int>(position.x), y = static_cast<int>(position.y);
+    if (position.x < 0.0 || position.y < 0.0 || x + 1 >= grey8.cols || y + 1 >= grey8.rows)
         return -1.0;
-    double fx = place.x - x, fy = place.y - y;
+    double fx = position.x - x, fy = position.y - y;
     double upper = (1.0 - fx) * grey8.at<uchar>(y, x) + fx * grey8.at<uchar>(y, x + 1);
     double lower = (1.0 - fx) * grey8.at<uchar>(y + 1, x) + fx * grey8.at<uchar>(y + 1, x + 1);
     return (1.0 - fy) * upper + fy * lower;
 }
 
-/* The width of the edge between two corners, across its middle; negative: not to be told. */
+/* The width of the edge between two corners, across its middle; negative: it cannot be determined. */
 static double edge_width(const cv::Mat &grey8, cv::Point2d a, cv::Point2d b)
 {
     constexpr double step_px = 0.5;
@@ -111,7 +111,7 @@ static void refine(const Board &board, const cv::Mat &grey8, Corners &corners)
 {
     if (corners.ids.empty())
         return;
-    int window = std::clamp(cvRound(window_share * square_px(board, corners)), window_min_px, window_max_px);
+    int window = std::clamp(cvRound(window_fraction * square_px(board, corners)), window_min_px, window_max_px);
     std::vector<cv::Point2f> start = corners.px;
     Corners kept;
     cv::cornerSubPix(grey8, corners.px, {window, window}, {-1, -1},
@@ -135,9 +135,9 @@ static bool keep_as_printed(const Board &board, std::vector<std::vector<cv::Poin
 {
     std::vector<cv::Point2f> printed, seen;
     for (size_t i = 0; i < ids.size(); i++) {
-        const auto &places = board.markers->objPoints[static_cast<size_t>(ids[i])];
+        const auto &positions = board.markers->objPoints[static_cast<size_t>(ids[i])];
         for (size_t k = 0; k < 4; k++) {
-            printed.emplace_back(places[k].x, places[k].y);
+            printed.emplace_back(positions[k].x, positions[k].y);
             seen.push_back(markers[i][k]);
         }
     }
@@ -151,7 +151,7 @@ static bool keep_as_printed(const Board &board, std::vector<std::vector<cv::Poin
             markers[kept++] = markers[i];
         }
     }
-    bool ours = static_cast<double>(kept) >= marker_good_share * static_cast<double>(ids.size());
+    bool ours = static_cast<double>(kept) >= marker_good_fraction * static_cast<double>(ids.size());
     ids.resize(kept);
     markers.resize(kept);
     return ours;
@@ -177,7 +177,7 @@ static void find_markers(const Board &board, const cv::Mat &grey8, std::vector<s
                          std::vector<int> &ids)
 {
     find_markers_at(board, grey8, enlarge, cv::aruco::DetectorParameters::create(), markers, ids);
-    if (static_cast<double>(ids.size()) >= enough_share * static_cast<double>(board.markers->ids.size()))
+    if (static_cast<double>(ids.size()) >= enough_fraction * static_cast<double>(board.markers->ids.size()))
         return;
     auto settings = cv::aruco::DetectorParameters::create();
     settings->adaptiveThreshWinSizeStep = 10;
@@ -198,8 +198,8 @@ static void predict_corners(const Board &board, const cv::Mat &grey8,
     std::vector<cv::Point2f> printed, seen, all, expected;
     for (size_t i = 0; i < ids.size(); i++) {
         for (size_t k = 0; k < 4; k++) {
-            cv::Point3f place = board.markers->objPoints[static_cast<size_t>(ids[i])][k];
-            printed.emplace_back(place.x, place.y);
+            cv::Point3f position = board.markers->objPoints[static_cast<size_t>(ids[i])][k];
+            printed.emplace_back(position.x, position.y);
             seen.push_back(markers[i][k]);
         }
     }

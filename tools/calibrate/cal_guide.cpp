@@ -15,27 +15,27 @@
 #include "cal_coverage.hpp"
 #include "cal_dots.hpp"
 #include "cal_error.hpp"
-#include "cal_twins.hpp"
+#include "cal_pairs.hpp"
 #include "tool_progress.hpp"
 
 namespace cal
 {
 /* A board is held still when its corners move less than this from one frame to the next; it is shown in a new way when
  * they are this far from where they were in every picture, in parts of the frame's width. */
-static constexpr double still_px = 0.5, new_share = 0.06;
+static constexpr double still_px = 0.5, new_fraction = 0.06;
 static constexpr int still_frames = 3;
 /* A frame that fails may be followed by a good one. A camera that gives none lets each wait for seconds. */
 static constexpr int grab_failures_max = 30;
 static constexpr std::chrono::seconds grab_wait_max{3};
-/* So many dots between two twins are the laser's. */
+/* So many dots in the difference of a pair are the laser's. */
 static constexpr size_t dots_min = 8;
 /* A driver hands over what it queued before the laser was on: four frames or more. In so many there must be dots. */
 static constexpr int lit_frames_max = 30;
 /* Pairs with and without the laser: some may be lost. */
 static constexpr int pairs_wanted = 15;
 
-/* pair_count: pictures with the laser whose twin shows that they have it. */
-static bool tell_missing(const Board &board, cv::Size size, std::vector<View> &dark, int pair_count)
+/* pair_count: pictures with the laser whose laser-off picture shows that they have it. */
+static bool report_missing(const Board &board, cv::Size size, std::vector<View> &dark, int pair_count)
 {
     coverage_guess_poses(board, size, dark);
     std::vector<std::string> missing = coverage_missing(dark, size, coverage_wanted);
@@ -64,16 +64,16 @@ static size_t count_dots(const cv::Mat &lit, const cv::Mat &dark)
     return dots_find(lit, dark, cv::Mat(lit.size(), CV_8U, cv::Scalar(255))).size();
 }
 
-/* How many pictures with the laser have a twin without it. Tells of those whose dots are not there, or in the other one. */
+/* How many laser-on pictures have a laser-off one. Reports those whose dots are missing, or are in the other one. */
 static int count_pairs(const std::vector<Picture> &pictures, const std::vector<View> &views, tool::Progress &progress)
 {
-    std::vector<int> twins = twins_find(pictures, views);
+    std::vector<int> dark_of = pairs_find(pictures, views);
     int pair_count = 0;
     for (size_t i = 0; i < pictures.size(); i++) {
         progress.show("looking for the laser's dots", i, pictures.size());
-        if (twins[i] < 0)
+        if (dark_of[i] < 0)
             continue;
-        const Picture &lit = pictures[i], &dark = pictures[static_cast<size_t>(twins[i])];
+        const Picture &lit = pictures[i], &dark = pictures[static_cast<size_t>(dark_of[i])];
         if (count_dots(lit.grey, dark.grey) >= dots_min) {
             pair_count++;
             continue;
@@ -110,22 +110,22 @@ bool guide_directory(const Options &options)
     std::printf(
         "%zu pictures without the laser, %zu with it, %d of these beside one without where the board did not move\n",
         dark.size(), pictures.size() - dark.size(), pair_count);
-    return tell_missing(board, pictures.front().grey.size(), dark, pair_count);
+    return report_missing(board, pictures.front().grey.size(), dark, pair_count);
 }
 
 /* How far corners that both show are apart, median; a large number where they share too few. */
 static double moved_px(const Corners &a, const Corners &b)
 {
-    std::vector<double> ways;
+    std::vector<double> offsets;
     for (size_t i = 0; i < a.ids.size(); i++) {
         auto other = std::find(b.ids.begin(), b.ids.end(), a.ids[i]);
         if (other != b.ids.end())
-            ways.push_back(cv::norm(a.px[i] - b.px[static_cast<size_t>(other - b.ids.begin())]));
+            offsets.push_back(cv::norm(a.px[i] - b.px[static_cast<size_t>(other - b.ids.begin())]));
     }
-    if (ways.size() < 4)
+    if (offsets.size() < 4)
         return 1e9;
-    std::nth_element(ways.begin(), ways.begin() + static_cast<std::ptrdiff_t>(ways.size() / 2), ways.end());
-    return ways[ways.size() / 2];
+    std::nth_element(offsets.begin(), offsets.begin() + static_cast<std::ptrdiff_t>(offsets.size() / 2), offsets.end());
+    return offsets[offsets.size() / 2];
 }
 
 /* A camera's number or device; else a film, or a film's frames as FFmpeg and OpenCV name them. */
@@ -188,7 +188,7 @@ static bool wait_for_board(const Board &board, cv::VideoCapture &camera, cv::Siz
                            const std::vector<View> &views, View &taken)
 {
     Corners before;
-    std::string told;
+    std::string reported;
     cv::Mat grey8;
     for (int still = 0; next_frame(camera, grey8);) {
         if (!wanted.empty() && grey8.size() != wanted)
@@ -196,17 +196,17 @@ static bool wait_for_board(const Board &board, cv::VideoCapture &camera, cv::Siz
                              grey8.cols, grey8.rows, wanted.width, wanted.height));
         taken = look(board, "", grey8);
         bool is_new = std::all_of(views.begin(), views.end(), [&](const View &view) {
-            return moved_px(view.corners, taken.corners) > new_share * grey8.cols;
+            return moved_px(view.corners, taken.corners) > new_fraction * grey8.cols;
         });
         still = taken.good() && moved_px(before, taken.corners) < still_px ? still + 1 : 0;
         std::string say = !taken.good() ? taken.corners.refused
                           : !is_new     ? "show the board elsewhere, nearer, farther or tilted"
                                         : "hold still";
         before = taken.corners;
-        if (say != told)
+        if (say != reported)
             std::printf("  %s\n", say.c_str());
         std::fflush(stdout);
-        told = say;
+        reported = say;
         if (taken.good() && is_new && still >= still_frames)
             return true;
     }
@@ -246,8 +246,8 @@ static void wait_for_enter(const char *request)
         throw Error("nobody there to press Enter: standard input is at its end");
 }
 
-/* The same pose with the laser on. again: it could not be had, and the user has been told and has switched it off;
- * no_frames: he has been told to. */
+/* The same pose with the laser on. again: it failed, the message is printed and the user has switched it off;
+ * no_frames: the message to do so is printed. */
 static Taken take_lit(const Board &board, cv::VideoCapture &camera, const View &taken, cv::Mat &grey8)
 {
     Picture dark = as_picture(taken.file, taken.grey8, false);
@@ -263,7 +263,7 @@ static Taken take_lit(const Board &board, cv::VideoCapture &camera, const View &
     if (found != Taken::whole)
         return found;
     Picture lit = as_picture("lit", grey8, true);
-    if (twins_find({dark, lit}, {taken, look(board, lit.file, grey8)})[1] < 0) {
+    if (pairs_find({dark, lit}, {taken, look(board, lit.file, grey8)})[1] < 0) {
         std::printf("  the board has moved between the two pictures\n");
         wait_for_enter("this pose once more: switch the laser off");
         return Taken::again;
@@ -356,7 +356,7 @@ bool guide_camera(const Options &options)
         std::printf("taken: %s-off.pgm and %s-on.pgm; switch the laser off again\n", name.c_str(), name.c_str());
         views.push_back(taken);
         pair_count++;
-        if (tell_missing(board, taken.grey8.size(), views, pair_count))
+        if (report_missing(board, taken.grey8.size(), views, pair_count))
             return true;
     }
     std::printf("no more frames from %s\n", options.camera.c_str());

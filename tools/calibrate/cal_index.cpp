@@ -12,23 +12,23 @@ namespace cal
 static constexpr int lattice_min = 8; /* dots of a picture in its lattice */
 /* A dot this near to the sheet's or the frame's edge may be missed. */
 static constexpr double edge_mm = 8.0, edge_px = 8.0;
-/* A line of dots is one when so many are seen, and this share of those that might be; it is none when it was looked at
+/* A line of dots is one when so many are seen, and this fraction of those that might be; it is none when it was looked at
  * so often and hardly any were. */
 static constexpr int line_seen_min = 3, void_looks_min = 6;
-static constexpr double line_share = 0.25, void_share = 0.08;
+static constexpr double line_fraction = 0.25, void_fraction = 0.08;
 
-/* A place of the lattice as a direction: as it was seen, or continued in a straight line from the next two. */
+/* A lattice position as a direction: as it was seen, or continued in a straight line from the next two. */
 static bool direction_at(const Trial &trial, Step step, cv::Point2d &direction)
 {
-    static constexpr int ways[4][2] = {{1, 0}, {-1, 0}, {0, 1}, {0, -1}};
+    static constexpr int offsets[4][2] = {{1, 0}, {-1, 0}, {0, 1}, {0, -1}};
     auto known = trial.known.find(step);
     if (known != trial.known.end()) {
         direction = known->second.direction;
         return true;
     }
-    for (const auto &way : ways) {
-        auto next = trial.known.find({step.first + way[0], step.second + way[1]});
-        auto after = trial.known.find({step.first + 2 * way[0], step.second + 2 * way[1]});
+    for (const auto &offset : offsets) {
+        auto next = trial.known.find({step.first + offset[0], step.second + offset[1]});
+        auto after = trial.known.find({step.first + 2 * offset[0], step.second + 2 * offset[1]});
         if (next != trial.known.end() && after != trial.known.end()) {
             direction = 2.0 * next->second.direction - after->second.direction;
             return true;
@@ -42,11 +42,11 @@ static bool is_on_board(const Board &board, const Camera &camera, const Lit &lit
                         cv::Point2d direction)
 {
     cv::Vec3d ray(direction.x, direction.y, 1.0), normal = lit.view.normal();
-    cv::Vec3d place = origin_mm + ray * ((normal.dot(lit.view.shift) - normal.dot(origin_mm)) / normal.dot(ray));
-    cv::Point2d sheet = lit.view.on_board(place) - board.sheet_origin_mm();
+    cv::Vec3d position = origin_mm + ray * ((normal.dot(lit.view.shift) - normal.dot(origin_mm)) / normal.dot(ray));
+    cv::Point2d sheet = lit.view.on_board(position) - board.sheet_origin_mm();
     std::vector<cv::Point2d> px;
-    cv::projectPoints(std::vector<cv::Point3d>{{place[0], place[1], place[2]}}, cv::Vec3d(), cv::Vec3d(), camera.matrix,
-                      camera.distortion, px);
+    cv::projectPoints(std::vector<cv::Point3d>{{position[0], position[1], position[2]}}, cv::Vec3d(), cv::Vec3d(),
+                      camera.matrix, camera.distortion, px);
     return sheet.x > edge_mm && sheet.y > edge_mm && sheet.x < sheet_width_mm - edge_mm &&
            sheet.y < sheet_height_mm - edge_mm && px[0].x > edge_px && px[0].y > edge_px &&
            px[0].x < camera.size.width - edge_px && px[0].y < camera.size.height - edge_px;
@@ -95,10 +95,10 @@ static int first_by_edges(const std::map<int, Line> &lines, int axis)
     auto is_void = [&](int at) {
         auto line = lines.find(at);
         return line != lines.end() && line->second.looked >= void_looks_min &&
-               line->second.seen < void_share * line->second.looked;
+               line->second.seen < void_fraction * line->second.looked;
     };
     for (const auto &[at, line] : lines) {
-        if (line.seen < line_seen_min || line.seen < line_share * line.looked)
+        if (line.seen < line_seen_min || line.seen < line_fraction * line.looked)
             continue;
         first = first > last ? at : first;
         last = at;
@@ -112,11 +112,11 @@ static int first_by_edges(const std::map<int, Line> &lines, int axis)
         return first;
     if (is_void(last + 1))
         return last - pattern_side + 1;
-    throw Error(
-        text("%d %s of dots are seen on the board, and no edge of the pattern: the middle dot cannot be told. Add:\n"
-             "  - pictures with the laser on and the board across the pattern's %s edge; or name the middle dot "
-             "in one picture with --middle FILE:U,V",
-             count, names, sides));
+    throw Error(text(
+        "%d %s of dots are seen on the board, and no edge of the pattern: the middle dot cannot be determined. Add:\n"
+        "  - pictures with the laser on and the board across the pattern's %s edge; or name the middle dot "
+        "in one picture with --middle FILE:U,V",
+        count, names, sides));
 }
 
 /* The same by the dot that the user points at. */

@@ -16,8 +16,8 @@ struct MiddleDot {
     cv::Point2d px;
 };
 
-/* Sets every sighting's slot, and refuses pictures whose dots fit into no place. Returns the projector's origin, roughly.
- * Throws cal::Error where that cannot be told, with what to add. */
+/* Sets every sighting's slot, and refuses pictures whose dots fit nowhere. Returns the projector's origin, roughly.
+ * Throws cal::Error where that cannot be determined, with what to add. */
 cv::Vec3d index_assign(const Board &board, const Camera &camera, std::vector<Lit> &pictures, const MiddleDot &middle);
 } // namespace cal
 

@@ -8,8 +8,8 @@ namespace cal
 {
 static constexpr size_t dots_min = 6;
 static constexpr size_t near_count = 8;
-/* Differences agree within this part of their length; a dot may be this part of a step from where it is expected. */
-static constexpr double same_part = 0.15, reach_part = 0.25;
+/* Differences agree within this fraction of their length; a dot may be this fraction of a step from where it is expected. */
+static constexpr double same_fraction = 0.15, reach_fraction = 0.25;
 static constexpr int local_steps = 3;
 
 using Grid = std::map<std::pair<int, int>, size_t>;
@@ -19,46 +19,46 @@ static void collect_steps(const std::vector<Sighting> &dots, std::vector<cv::Poi
                           std::vector<cv::Point2d> &down)
 {
     for (size_t i = 0; i < dots.size(); i++) {
-        std::vector<cv::Point2d> ways;
+        std::vector<cv::Point2d> offsets;
         for (size_t k = 0; k < dots.size(); k++) {
             if (k != i)
-                ways.push_back(dots[k].tangent - dots[i].tangent);
+                offsets.push_back(dots[k].tangent - dots[i].tangent);
         }
-        size_t kept = std::min(near_count, ways.size());
-        std::partial_sort(ways.begin(), ways.begin() + static_cast<std::ptrdiff_t>(kept), ways.end(),
+        size_t kept = std::min(near_count, offsets.size());
+        std::partial_sort(offsets.begin(), offsets.begin() + static_cast<std::ptrdiff_t>(kept), offsets.end(),
                           [](cv::Point2d a, cv::Point2d b) { return a.ddot(a) < b.ddot(b); });
-        ways.resize(kept);
-        for (cv::Point2d way : ways) {
-            if (std::abs(way.x) >= std::abs(way.y))
-                across.push_back(way.x > 0.0 ? way : -way);
+        offsets.resize(kept);
+        for (cv::Point2d offset : offsets) {
+            if (std::abs(offset.x) >= std::abs(offset.y))
+                across.push_back(offset.x > 0.0 ? offset : -offset);
             else
-                down.push_back(way.y > 0.0 ? way : -way);
+                down.push_back(offset.y > 0.0 ? offset : -offset);
         }
     }
 }
 
 /* The difference that most others agree with; of nearly as good ones the shortest. */
-static cv::Point2d usual_step(const std::vector<cv::Point2d> &ways)
+static cv::Point2d usual_step(const std::vector<cv::Point2d> &offsets)
 {
     std::vector<int> votes;
-    for (const cv::Point2d &way : ways)
-        votes.push_back(static_cast<int>(std::count_if(ways.begin(), ways.end(), [&](const cv::Point2d &other) {
-            return cv::norm(other - way) < same_part * cv::norm(way);
+    for (const cv::Point2d &offset : offsets)
+        votes.push_back(static_cast<int>(std::count_if(offsets.begin(), offsets.end(), [&](const cv::Point2d &other) {
+            return cv::norm(other - offset) < same_fraction * cv::norm(offset);
         })));
-    if (ways.empty())
+    if (offsets.empty())
         return {};
     int max = *std::max_element(votes.begin(), votes.end());
     cv::Point2d best;
-    for (size_t i = 0; i < ways.size(); i++) {
-        if (votes[i] * 2 >= max && (best == cv::Point2d() || cv::norm(ways[i]) < 0.75 * cv::norm(best) ||
-                                    (votes[i] == max && cv::norm(ways[i]) < 1.3 * cv::norm(best))))
-            best = ways[i];
+    for (size_t i = 0; i < offsets.size(); i++) {
+        if (votes[i] * 2 >= max && (best == cv::Point2d() || cv::norm(offsets[i]) < 0.75 * cv::norm(best) ||
+                                    (votes[i] == max && cv::norm(offsets[i]) < 1.3 * cv::norm(best))))
+            best = offsets[i];
     }
     return best;
 }
 
 struct Frame {
-    cv::Point2d place, across, down;
+    cv::Point2d position, across, down;
 };
 
 /* The lattice around a dot: an affine map to the dots that are known near it, held to the usual steps. */
@@ -73,10 +73,10 @@ static Frame local_frame(const std::vector<Sighting> &dots, const Grid &grid, cv
             if (known == grid.end())
                 continue;
             double weight = 1.0 / (1.0 + column * column + row * row);
-            cv::Point2d place = dots[known->second].tangent;
+            cv::Point2d position = dots[known->second].tangent;
             cv::Matx31d terms(1.0, column, row);
             normal += weight * (terms * terms.t());
-            right += weight * (terms * cv::Matx12d(place.x, place.y));
+            right += weight * (terms * cv::Matx12d(position.x, position.y));
         }
     }
     for (int axis = 0; axis < 2; axis++) {
@@ -89,11 +89,11 @@ static Frame local_frame(const std::vector<Sighting> &dots, const Grid &grid, cv
     return {{found(0, 0), found(0, 1)}, {found(1, 0), found(1, 1)}, {found(2, 0), found(2, 1)}};
 }
 
-static int nearest_free(const std::vector<Sighting> &dots, cv::Point2d place, double reach)
+static int nearest_free(const std::vector<Sighting> &dots, cv::Point2d position, double reach)
 {
     int best = -1;
     for (size_t i = 0; i < dots.size(); i++) {
-        double away = cv::norm(dots[i].tangent - place);
+        double away = cv::norm(dots[i].tangent - position);
         if (!dots[i].in_lattice && away < reach) {
             best = static_cast<int>(i);
             reach = away;
@@ -119,13 +119,13 @@ static int grow_from(std::vector<Sighting> &dots, size_t start, const Frame &usu
         cv::Vec2i at = open.front();
         open.pop_front();
         Frame frame = local_frame(dots, grid, at, usual);
-        double reach = reach_part * std::min(cv::norm(frame.across), cv::norm(frame.down));
+        double reach = reach_fraction * std::min(cv::norm(frame.across), cv::norm(frame.down));
         for (int row = -2; row <= 2; row++) {
             for (int column = -2; column <= 2; column++) {
                 cv::Vec2i step(at[0] + column, at[1] + row);
                 if (grid.count({step[0], step[1]}))
                     continue;
-                int found = nearest_free(dots, frame.place + column * frame.across + row * frame.down, reach);
+                int found = nearest_free(dots, frame.position + column * frame.across + row * frame.down, reach);
                 if (found >= 0)
                     take(dots, static_cast<size_t>(found), step, grid, open);
             }

@@ -19,16 +19,16 @@ static double square(double value)
     return value * value;
 }
 
-/* Turn of the grating's frame (Rodrigues), then what a column and a row add to x and y. */
+/* Rotation of the grating's frame (Rodrigues), then what a column and a row add to x and y. */
 using Lattice = cv::Vec<double, 7>;
 
 static cv::Vec3d ray_of(const Lattice &lattice, int slot)
 {
     double column = slot % pattern_side - middle, row = slot / pattern_side - middle;
     double x = lattice[3] * column + lattice[4] * row, y = lattice[5] * column + lattice[6] * row;
-    cv::Matx33d turn;
-    cv::Rodrigues(cv::Vec3d(lattice[0], lattice[1], lattice[2]), turn);
-    return turn * cv::Vec3d(x, y, std::sqrt(std::max(0.0, 1.0 - x * x - y * y)));
+    cv::Matx33d rotation;
+    cv::Rodrigues(cv::Vec3d(lattice[0], lattice[1], lattice[2]), rotation);
+    return rotation * cv::Vec3d(x, y, std::sqrt(std::max(0.0, 1.0 - x * x - y * y)));
 }
 
 /* A start: where the seen rays' middle is, and their mean steps. */
@@ -48,7 +48,7 @@ static Lattice start(const Projector &projector)
     return {-std::asin(found(0, 1)), std::asin(found(0, 0)), 0.0, found(1, 0), found(2, 0), found(1, 1), found(2, 1)};
 }
 
-/* The turn about the grating's own axis is in its steps already: 6 of the 7 are free. */
+/* The rotation about the grating's own axis is in its steps already: 6 of the 7 are free. */
 static Lattice improved(const Projector &projector, const Lattice &lattice)
 {
     static constexpr int free_index[6] = {0, 1, 3, 4, 5, 6};
@@ -76,7 +76,7 @@ static Lattice improved(const Projector &projector, const Lattice &lattice)
     return better;
 }
 
-/* How far rays that are known well are from their nominal ones: the variance of one component, less that of the
+/* How far rays that are known well are from their nominal ones: the variance of one component, minus that of the
  * measurement. */
 static double ray_variance(const Projector &projector, const Lattice &lattice)
 {
@@ -99,7 +99,7 @@ static double ray_variance(const Projector &projector, const Lattice &lattice)
 
 std::string nominal_words(double sigma_deg)
 {
-    return sigma_deg > 0.0 ? text("%.3f degrees", sigma_deg) : "an angle that so few sightings do not tell";
+    return sigma_deg > 0.0 ? text("%.3f degrees", sigma_deg) : "an angle that so few sightings do not determine";
 }
 
 Nominal nominal_fit(const Projector &projector)
@@ -114,7 +114,7 @@ Nominal nominal_fit(const Projector &projector)
     }
     nominal.sigma = std::sqrt(ray_variance(projector, lattice));
     nominal.pitch_deg = std::hypot(lattice[3], lattice[5]) * 180.0 / CV_PI;
-    nominal.turn_deg = std::atan2(lattice[5], lattice[3]) * 180.0 / CV_PI;
+    nominal.rotation_deg = std::atan2(lattice[5], lattice[3]) * 180.0 / CV_PI;
     return nominal;
 }
 } // namespace cal

@@ -31,7 +31,7 @@ const char *const options_help = /* at most 80 columns */
     "                   laser off and on\n"
     "  --size WxH       the size of the camera's frames in pixels (default: that of\n"
     "                   DIR's pictures, else as the camera gives them)\n"
-    "  --near MM, --far MM   the working range in Z that rig.json tells (default 400,\n"
+    "  --near MM, --far MM   the working range in Z, for rig.json (default 400,\n"
     "                   2600; from 100 to 16000)\n"
     "  --middle FILE:U,V     the pattern's middle dot is at pixel U,V of a picture\n"
     "                   with the laser on; needed only where the pattern's edges are\n"
@@ -147,7 +147,7 @@ static bool check(const Options &options)
         return complain(options.target + ": a board's file must end in .pdf or .pgm");
     if (solve != !options.out.empty())
         return complain("--out belongs to solve, which needs it; see calibrate --help");
-    std::error_code unknown; /* of a directory that is not there: that is told later */
+    std::error_code unknown; /* of a directory that is not there: that is reported later */
     if (solve && std::filesystem::equivalent(options.out, options.target, unknown))
         return complain("--out must be another directory than the pictures': a rig.json there would be lost");
     if (solve && has_pictures(options.out))

@@ -21,7 +21,7 @@ struct Options {
     MiddleDot middle;
 };
 
-/* What was wrong has been told on standard error when it returns false. */
+/* False: what was wrong is printed on standard error. */
 bool options_parse(int argc, char **argv, Options &options);
 extern const char *const options_help;
 } // namespace cal

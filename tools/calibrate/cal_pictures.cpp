@@ -54,7 +54,7 @@ static std::ifstream open_file(const std::string &path)
     std::error_code unknown; /* of a file that is not there or not to be seen: opening it says why */
     auto kind = std::filesystem::status(path, unknown).type();
     if (!unknown && kind != std::filesystem::file_type::regular && kind != std::filesystem::file_type::not_found)
-        throw Error(path + ": is no file, but a directory, device or pipe");
+        throw Error(path + ": is a directory, device or pipe, expected a file");
     return std::ifstream(path, std::ios::binary);
 }
 
@@ -133,21 +133,21 @@ static bool laser_of(const std::string &dir, const std::string &name, const std:
     if (entry != list.end())
         return entry->second;
     if (!list.empty())
-        throw Error(dir + "/" + name + ": stands not in frames.jsonl");
+        throw Error(dir + "/" + name + ": is not listed in frames.jsonl");
     if (!ends_with(name, "-on.pgm") && !ends_with(name, "-off.pgm"))
         throw Error(dir + "/" + name + ": was the laser on? Say it in frames.jsonl, or name the file NAME-on.pgm or " +
                     "NAME-off.pgm");
     return ends_with(name, "-on.pgm");
 }
 
-/* Neither a list nor any name tells: that is one fault, not one of each file. */
-static void check_told(const std::string &dir, const std::vector<std::string> &names,
-                       const std::map<std::string, bool> &list)
+/* Neither a list nor any name says it: that is one error, not one of each file. */
+static void check_listed(const std::string &dir, const std::vector<std::string> &names,
+                         const std::map<std::string, bool> &list)
 {
-    bool told = !list.empty() || std::any_of(names.begin(), names.end(), [](const std::string &name) {
+    bool reported = !list.empty() || std::any_of(names.begin(), names.end(), [](const std::string &name) {
         return ends_with(name, "-on.pgm") || ends_with(name, "-off.pgm");
     });
-    if (!told)
+    if (!reported)
         throw Error(dir + ": in which pictures was the laser on? Say it in " + dir +
                     "/frames.jsonl, or name the files NAME-on.pgm and NAME-off.pgm");
 }
@@ -181,7 +181,7 @@ std::vector<Picture> pictures_read(const std::string &dir)
     std::vector<Picture> pictures;
     std::vector<std::string> names = pictures_required(dir);
     std::map<std::string, bool> list = read_list(dir + "/frames.jsonl");
-    check_told(dir, names, list);
+    check_listed(dir, names, list);
     std::string faults;
     for (const auto &entry : list) {
         if (!std::binary_search(names.begin(), names.end(), entry.first))

@@ -1,6 +1,6 @@
 /* cal_pictures - a frames directory as docs/contract.md describes it: binary PGM files, and frames.jsonl, which says in
  * which of them the laser was on. Without frames.jsonl the names say it: NAME-on.pgm and NAME-off.pgm.
- * Other files may lie beside them. A *.pgm that cannot be read, is cut short or has another size than the rest is an
+ * Other files may lie beside them. A *.pgm that cannot be read, is cut short or has another size than the others is an
  * error; so is a file that is named in frames.jsonl twice, or named there and not there.
  */
 #ifndef CAL_PICTURES_HPP

@@ -9,11 +9,11 @@ namespace cal
 {
 static constexpr int steps = 25, rounds = 5;
 static constexpr double huber_sigmas = 1.5, outlier_sigmas = 4.5;
-/* How much larger residuals are than the sightings tell: at least. */
+/* How much larger residuals are than the sightings' sigmas: at least. */
 static constexpr double scale_floor = 0.2;
 static constexpr int slots_min = 180;
 static constexpr double origin_sigma_max_mm = 1.0;
-/* Neighbours are ten times as far apart at the least. */
+/* Neighbours are at least ten times as far apart. */
 static constexpr double join_max_px = 1.5;
 /* A picture's dots that are in no lattice are what they seem if so many of them are. */
 static constexpr int sparse_min = 3;
@@ -50,20 +50,21 @@ static cv::Vec3d meet_plane(const State &state, const Equation &equation, double
 static cv::Vec2d residual(const Camera &camera, const State &state, const Equation &equation)
 {
     double along_mm;
-    cv::Vec3d place = meet_plane(state, equation, along_mm);
-    return {camera.matrix.at<double>(0, 0) * (equation.sighting->tangent.x - place[0] / place[2]),
-            camera.matrix.at<double>(1, 1) * (equation.sighting->tangent.y - place[1] / place[2])};
+    cv::Vec3d position = meet_plane(state, equation, along_mm);
+    return {camera.matrix.at<double>(0, 0) * (equation.sighting->tangent.x - position[0] / position[2]),
+            camera.matrix.at<double>(1, 1) * (equation.sighting->tangent.y - position[1] / position[2])};
 }
 
 /* Adds one sighting to the normal equations: how its pixel moves with the origin and with its ray. */
 static void add(const Camera &camera, const State &state, const Equation &equation, double weight, Blocks &blocks)
 {
     double along_mm;
-    cv::Vec3d place = meet_plane(state, equation, along_mm), n = equation.normal;
+    cv::Vec3d position = meet_plane(state, equation, along_mm), n = equation.normal;
     cv::Vec2d tangent = state.tangents[equation.slot], miss = residual(camera, state, equation);
     cv::Vec3d ray(tangent[0], tangent[1], 1.0);
-    double facing = n.dot(ray), fx = camera.matrix.at<double>(0, 0), fy = camera.matrix.at<double>(1, 1), z = place[2];
-    cv::Matx<double, 2, 3> lens(fx / z, 0.0, -fx * place[0] / (z * z), 0.0, fy / z, -fy * place[1] / (z * z));
+    double facing = n.dot(ray), fx = camera.matrix.at<double>(0, 0), fy = camera.matrix.at<double>(1, 1),
+           z = position[2];
+    cv::Matx<double, 2, 3> lens(fx / z, 0.0, -fx * position[0] / (z * z), 0.0, fy / z, -fy * position[1] / (z * z));
     cv::Matx33d glide = cv::Matx33d::eye() - ray * n.t() * (1.0 / facing); /* along the plane */
     cv::Matx<double, 2, 3> by_origin = lens * glide;
     cv::Matx22d by_ray = (by_origin * along_mm).get_minor<2, 2>(0, 0);
@@ -79,7 +80,7 @@ static bool is_seen(const Blocks &blocks, size_t slot)
     return cv::determinant(blocks.ray[slot]) > 0.0;
 }
 
-/* Every ray leans on the lattice: as much as its sightings are worth less than the lattice is. */
+/* Every ray is regularised towards the lattice: the more, the less its sightings weigh against it. */
 static void add_nominal(const Nominal &nominal, double scale, const State &state, Blocks &blocks)
 {
     double weight = (scale * scale) / (nominal.sigma * nominal.sigma);
@@ -124,8 +125,8 @@ static double size_of(const Camera &camera, const State &state, const Equation &
     return cv::norm(residual(camera, state, equation)) / equation.sighting->sigma_px;
 }
 
-/* One component's standard deviation against what the sightings tell of theirs, by the median; a ray seen once fits by
- * itself and tells nothing. */
+/* One component's standard deviation against the sightings' own, by the median; a ray seen once fits exactly
+ * and says nothing. */
 static double usual_scale(const Camera &camera, const State &state, const std::vector<Equation> &equations)
 {
     std::vector<double> sizes;
@@ -175,9 +176,9 @@ static State start_state(const std::vector<Equation> &equations, const cv::Vec3d
     State state{origin_mm, {}};
     std::array<std::vector<double>, slot_count> xs, ys;
     for (const Equation &equation : equations) {
-        cv::Vec3d way = equation.sighting->place_mm - origin_mm;
-        xs[equation.slot].push_back(way[0] / way[2]);
-        ys[equation.slot].push_back(way[1] / way[2]);
+        cv::Vec3d offset = equation.sighting->position_mm - origin_mm;
+        xs[equation.slot].push_back(offset[0] / offset[2]);
+        ys[equation.slot].push_back(offset[1] / offset[2]);
     }
     for (size_t slot = 0; slot < slot_count; slot++) {
         if (xs[slot].empty())
@@ -190,7 +191,7 @@ static State start_state(const std::vector<Equation> &equations, const cv::Vec3d
 }
 
 /* Standard deviations from the equations' curvature at the solution. */
-static void tell_sigmas(const Blocks &blocks, double scale, Projector &projector)
+static void report_sigmas(const Blocks &blocks, double scale, Projector &projector)
 {
     cv::Vec3d right;
     cv::Matx33d origin = reduced(blocks, right).inv() * (scale * scale);
@@ -232,7 +233,7 @@ static Projector projector_of(const Camera &camera, const State &state, const st
         projector.rays[slot] = cv::normalize(cv::Vec3d(state.tangents[slot][0], state.tangents[slot][1], 1.0));
     if (nominal != nullptr)
         add_nominal(*nominal, scale, state, blocks);
-    tell_sigmas(blocks, scale, projector);
+    report_sigmas(blocks, scale, projector);
     return projector;
 }
 
@@ -290,12 +291,12 @@ Projector rays_solve(const Camera &camera, std::vector<Lit> &pictures, const cv:
         projector = projector_of(camera, state, equations, scale, &nominal);
         double sigma = nominal.sigma;
         nominal = nominal_fit(projector);
-        nominal.sigma = sigma; /* rays that lean on the lattice would make it smaller each time */
+        nominal.sigma = sigma; /* regularised rays would make it smaller each time */
     }
     projector.scale = scale;
     projector.nominal_sigma_deg = nominal.sigma < nominal_unknown ? nominal.sigma * 180.0 / CV_PI : 0.0;
     projector.pitch_deg = nominal.pitch_deg;
-    projector.turn_deg = nominal.turn_deg;
+    projector.rotation_deg = nominal.rotation_deg;
     return projector;
 }
 
@@ -312,9 +313,9 @@ static std::vector<Expected> expect(const Camera &camera, const Projector &proje
     double height_mm = normal.dot(view.shift) - normal.dot(projector.origin_mm);
     for (size_t slot = 0; slot < slot_count; slot++) {
         const cv::Vec3d &ray = projector.rays[slot];
-        cv::Vec3d place = projector.origin_mm + ray * (height_mm / normal.dot(ray));
+        cv::Vec3d position = projector.origin_mm + ray * (height_mm / normal.dot(ray));
         double sigma_deg = projector.seen[slot] > 0 ? projector.sigma_deg[slot] : projector.nominal_sigma_deg;
-        all.push_back({camera.undistorted_px({place[0] / place[2], place[1] / place[2]}),
+        all.push_back({camera.undistorted_px({position[0] / position[2], position[1] / position[2]}),
                        sigma_deg * CV_PI / 180.0 * camera.focal_px()});
     }
     return all;

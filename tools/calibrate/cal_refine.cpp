@@ -9,24 +9,24 @@
 namespace cal
 {
 /* Half side of the patch in squares, and its bounds. */
-static constexpr double patch_share = 0.48;
+static constexpr double patch_fraction = 0.48;
 static constexpr int patch_min_px = 4, patch_max_px = 30, blur_reach_px = 3;
 static constexpr int sub_samples_min = 3, sub_samples_max = 6; /* about one for each sample of the print */
 static constexpr int steps = 4;
 static constexpr double moved_max_px = 2.5, sigma_floor_px = 0.002;
-/* What is left may be this part of the contrast. */
+/* The residual may be this fraction of the contrast. */
 static constexpr double miss_max = 0.12, contrast_min_grey = 12.0;
-/* Pixels at the sensor's limit do not count, nor what is so many times the usual residual (a Gaussian's, from the mean
+/* Pixels at the sensor's limit are not used, nor what is so many times the usual residual (a Gaussian's, from the mean
  * absolute one) above the print, at least so many grey values: dots of the laser. So much of the patch must be left. */
-static constexpr double saturated_grey = 248.0, extra_times = 3.0, extra_min_grey = 4.0, used_share = 0.6;
+static constexpr double saturated_grey = 248.0, extra_times = 3.0, extra_min_grey = 4.0, used_fraction = 0.6;
 /* Of a patch at the picture's or the sheet's border so much must be there. */
-static constexpr double visible_share = 0.35;
+static constexpr double visible_fraction = 0.35;
 static constexpr double mean_to_sigma = 1.2533;
 static constexpr int passes = 4;
 /* An edge's rise over its steepest slope is this many standard deviations of its blur. */
 static constexpr double edge_sigmas = 2.5066, pixel_sigma_px = 0.29, blur_min_px = 0.4;
 
-/* In this order: gain; ground, its slopes and curves (a lamp's mirror image is a hill); how much softer the picture is
+/* In this order: gain; background, its slopes and curves (a lamp's mirror image is a hill); how much softer the picture is
  * than the drawing, without which a patch that is not the same on both sides is pushed aside; the gain's slopes, because
  * light that fades across the sheet pushes corners aside, too; shift. */
 static constexpr int unknowns = 12, shift_u = 10, shift_v = 11;
@@ -125,11 +125,11 @@ static bool drop_lit(std::vector<Pixel> &pixels, const Unknowns &found)
     return changed;
 }
 
-/* One step of least squares: gain, ground and how far the corner is from where it was drawn (shift times gain: the
+/* One step of least squares: gain, background and how far the corner is from where it was drawn (shift times gain: the
  * equations are linear in that). */
 struct Match {
     Unknowns found;
-    double miss = 0.0;     /* what is left, as a part of the gain */
+    double miss = 0.0;     /* the residual, as a fraction of the gain */
     double sigma_px = 0.0; /* of the shift, one component */
 };
 
@@ -150,7 +150,7 @@ static bool match(std::vector<Pixel> &pixels, Match &result)
         }
         bool solved = false;
         cv::Matx<double, unknowns, unknowns> inverse = normal.inv(cv::DECOMP_CHOLESKY, &solved);
-        if (used < used_share * static_cast<double>(pixels.size()) || !solved)
+        if (used < used_fraction * static_cast<double>(pixels.size()) || !solved)
             return false;
         result.found = inverse * right;
         result.miss =
@@ -163,7 +163,7 @@ static bool match(std::vector<Pixel> &pixels, Match &result)
 }
 
 static bool refine_one(const Drawing &drawing, const cv::Mat &grey, int half, cv::Point2d &corner_px, double &sigma_px,
-                       double &dark_share)
+                       double &dark_fraction)
 {
     cv::Point2d start = corner_px;
     Match result{{}, 1.0, 0.0};
@@ -172,7 +172,7 @@ static bool refine_one(const Drawing &drawing, const cv::Mat &grey, int half, cv
         std::vector<Pixel> pixels =
             list_pixels(grey, draw_patch(drawing, middle, corner_px - start, half), middle, half);
         double whole = (2.0 * half + 1.0) * (2.0 * half + 1.0);
-        if (static_cast<double>(pixels.size()) < visible_share * whole || !match(pixels, result))
+        if (static_cast<double>(pixels.size()) < visible_fraction * whole || !match(pixels, result))
             return false;
         cv::Point2d move(result.found(shift_u), result.found(shift_v));
         move *= 1.0 / result.found(0);
@@ -183,7 +183,7 @@ static bool refine_one(const Drawing &drawing, const cv::Mat &grey, int half, cv
             break;
     }
     double ground = std::max(0.0, result.found(1) - black_grey);
-    dark_share = ground / (ground + result.found(0));
+    dark_fraction = ground / (ground + result.found(0));
     sigma_px = std::max(result.sigma_px, sigma_floor_px);
     return result.miss < miss_max;
 }
@@ -198,35 +198,35 @@ static double blur_of(double edge_px)
 void corners_refine(const Board &board, const cv::Mat &print, const cv::Mat &tangents, const cv::Mat &grey,
                     const cv::Mat &camera, const cv::Mat &distortion, Corners &corners)
 {
-    cv::Vec3d turn, shift;
+    cv::Vec3d rvec, shift;
     Corners refined;
     refined.edge_px = corners.edge_px;
-    if (!cv::solvePnP(corners.places_mm(board), corners.px, camera, distortion, turn, shift))
+    if (!cv::solvePnP(corners.positions_mm(board), corners.px, camera, distortion, rvec, shift))
         return;
-    std::vector<cv::Point3d> places;
+    std::vector<cv::Point3d> positions;
     std::vector<cv::Point2d> expected;
     double half_square = 0.5 * board.square_mm;
     for (int id = 0; id < board.vertex_count(); id++) {
-        places.push_back(board.corner_mm(id));
-        places.push_back(places.back() + cv::Point3d(half_square, 0.0, 0.0));
-        places.push_back(places[places.size() - 2] + cv::Point3d(0.0, half_square, 0.0));
+        positions.push_back(board.corner_mm(id));
+        positions.push_back(positions.back() + cv::Point3d(half_square, 0.0, 0.0));
+        positions.push_back(positions[positions.size() - 2] + cv::Point3d(0.0, half_square, 0.0));
     }
-    cv::projectPoints(places, turn, shift, camera, distortion, expected);
-    Drawing drawing{print, tangents, draw_map(board, turn, shift), blur_of(corners.edge_px), sub_samples_max};
+    cv::projectPoints(positions, rvec, shift, camera, distortion, expected);
+    Drawing drawing{print, tangents, draw_map(board, rvec, shift), blur_of(corners.edge_px), sub_samples_max};
     for (int id = 0; id < board.vertex_count(); id++) {
         const cv::Point2d *seen = &expected[3 * static_cast<size_t>(id)];
         double shorter_px = std::min(cv::norm(seen[1] - seen[0]), cv::norm(seen[2] - seen[0]));
-        int half = std::clamp(cvRound(2.0 * patch_share * shorter_px), patch_min_px, patch_max_px);
+        int half = std::clamp(cvRound(2.0 * patch_fraction * shorter_px), patch_min_px, patch_max_px);
         drawing.sub_samples =
             std::clamp(cvCeil(half_square * draw_px_per_mm / shorter_px), sub_samples_min, sub_samples_max);
         cv::Point2d corner_px = seen[0];
-        double sigma_px, dark_share;
+        double sigma_px, dark_fraction;
         if (cv::Rect2d(0.0, 0.0, grey.cols, grey.rows).contains(corner_px) &&
-            refine_one(drawing, grey, half, corner_px, sigma_px, dark_share)) {
+            refine_one(drawing, grey, half, corner_px, sigma_px, dark_fraction)) {
             refined.ids.push_back(id);
             refined.px.emplace_back(corner_px);
             refined.sigma_px.push_back(sigma_px);
-            refined.dark_share.push_back(dark_share);
+            refined.dark_fraction.push_back(dark_fraction);
         }
     }
     corners = refined;

@@ -1,6 +1,6 @@
 /* cal_refine - corners to a fiftieth of a pixel, once it is known roughly how the camera sees the board.
  * Around each corner the print is drawn as the camera would see it, markers and all, and moved until it lies on the
- * picture, by least squares with its own gain and ground: all edges near the corner count, not only those that meet in it.
+ * picture, by least squares with its own gain and background: all edges near the corner are used, not only those that meet in it.
  * Dots of the laser on it are left out.
  */
 #ifndef CAL_REFINE_HPP

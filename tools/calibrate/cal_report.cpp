@@ -8,13 +8,12 @@
 #include "cal_error.hpp"
 #include "cal_nominal.hpp"
 #include "tool_file.hpp"
-#include "detect/ih_score_weights.h"
 
 namespace cal
 {
 static const char *const red = "#c03028", *const blue = "#2858a8", *const grey = "#888";
 
-/* Residuals of all dots that fit, turned: x along the epipolar line towards near, y across it. */
+/* Residuals of all dots that fit, rotated: x along the epipolar line towards near, y across it. */
 struct Residuals {
     std::vector<cv::Point2d> along_across, by_depth; /* by_depth: depth, across */
     double along_rms_px = 0.0, across_rms_px = 0.0;
@@ -28,7 +27,7 @@ static std::string escaped(const std::string &words)
     return out;
 }
 
-static Residuals turn_residuals(const Result &result)
+static Residuals rotation_residuals(const Result &result)
 {
     Residuals residuals;
     auto lines = epipolar_lines(result.camera, result.projector.origin_mm, result.projector.rays);
@@ -36,13 +35,13 @@ static Residuals turn_residuals(const Result &result)
         for (const Sighting &sighting : lit.sightings) {
             if (sighting.slot == no_slot || !sighting.fits)
                 continue;
-            cv::Point2d way = lines[static_cast<size_t>(sighting.slot)].move_px_mm;
-            way *= 1.0 / cv::norm(way);
-            cv::Point2d turned(sighting.residual_px.ddot(way), sighting.residual_px.cross(way));
-            residuals.along_across.push_back(turned);
-            residuals.by_depth.emplace_back(sighting.place_mm[2], turned.y);
-            residuals.along_rms_px += turned.x * turned.x;
-            residuals.across_rms_px += turned.y * turned.y;
+            cv::Point2d offset = lines[static_cast<size_t>(sighting.slot)].move_px_mm;
+            offset *= 1.0 / cv::norm(offset);
+            cv::Point2d rotated(sighting.residual_px.ddot(offset), sighting.residual_px.cross(offset));
+            residuals.along_across.push_back(rotated);
+            residuals.by_depth.emplace_back(sighting.position_mm[2], rotated.y);
+            residuals.along_rms_px += rotated.x * rotated.x;
+            residuals.across_rms_px += rotated.y * rotated.y;
         }
     }
     double count = std::max<double>(1.0, static_cast<double>(residuals.along_across.size()));
@@ -82,12 +81,12 @@ static std::string seen_chart(const Result &result)
     Chart chart("How often each dot was seen (red: never)", "column", "row",
                 {-1.0, -1.0, pattern_side + 1.0, pattern_side + 1.0}, true);
     for (int slot = 0; slot < slot_count; slot++) {
-        cv::Point2d place(slot % pattern_side, slot / pattern_side);
+        cv::Point2d position(slot % pattern_side, slot / pattern_side);
         int seen = result.projector.seen[static_cast<size_t>(slot)];
         if (seen == 0)
-            chart.points({place}, red, 4.0);
+            chart.points({position}, red, 4.0);
         else
-            chart.points({place}, blue, 1.0 + 0.5 * std::min(seen, 10));
+            chart.points({position}, blue, 1.0 + 0.5 * std::min(seen, 10));
     }
     return chart.svg();
 }
@@ -106,41 +105,41 @@ static std::string depth_chart(const Result &result, double dot_sigma_px)
     return chart.svg();
 }
 
-static void tell_now(Chart &chart, double max)
+static void report_now(Chart &chart, double max)
 {
     chart.line({{0.0, 0.0}, {0.0, max}}, grey);
     chart.words({0.08, 0.94 * max}, "now");
 }
 
-static std::string turn_chart(const std::vector<Turn> &turns)
+static std::string rotation_chart(const std::vector<Rotation> &rotations)
 {
     std::vector<cv::Point2d> curve;
     double max = 5.0; /* pairs come whole: so do the axis' ticks */
-    for (const Turn &turn : turns) {
-        curve.emplace_back(turn.deg, turn.shared);
-        max = std::max(max, static_cast<double>(turn.shared));
+    for (const Rotation &rotation : rotations) {
+        curve.emplace_back(rotation.deg, rotation.shared);
+        max = std::max(max, static_cast<double>(rotation.shared));
     }
-    Chart chart("Pairs of dots that share a line", "pattern turned by, degrees", "pairs",
-                {turns.front().deg, 0.0, turns.back().deg - turns.front().deg, 1.05 * max});
+    Chart chart("Pairs of dots that share a line", "pattern rotated by, degrees", "pairs",
+                {rotations.front().deg, 0.0, rotations.back().deg - rotations.front().deg, 1.05 * max});
     chart.line(curve, blue);
-    tell_now(chart, max);
+    report_now(chart, max);
     return chart.svg();
 }
 
-static std::string apart_chart(const std::vector<Turn> &turns)
+static std::string apart_chart(const std::vector<Rotation> &rotations)
 {
     std::vector<cv::Point2d> curve;
-    double max = share_px;
-    for (const Turn &turn : turns) {
-        curve.emplace_back(turn.deg, turn.min_apart_px);
-        max = std::max(max, turn.min_apart_px);
+    double max = same_line_px;
+    for (const Rotation &rotation : rotations) {
+        curve.emplace_back(rotation.deg, rotation.min_apart_px);
+        max = std::max(max, rotation.min_apart_px);
     }
-    Chart chart("The two nearest lines", "pattern turned by, degrees", "apart, px",
-                {turns.front().deg, 0.0, turns.back().deg - turns.front().deg, 1.05 * max});
+    Chart chart("The two nearest lines", "pattern rotated by, degrees", "apart, px",
+                {rotations.front().deg, 0.0, rotations.back().deg - rotations.front().deg, 1.05 * max});
     chart.line(curve, blue);
-    chart.line({{turns.front().deg, share_px}, {turns.back().deg, share_px}}, red);
-    chart.words({turns.front().deg + 0.2, share_px + 0.02 * max}, "shared below this");
-    tell_now(chart, max);
+    chart.line({{rotations.front().deg, same_line_px}, {rotations.back().deg, same_line_px}}, red);
+    chart.words({rotations.front().deg + 0.2, same_line_px + 0.02 * max}, "shared below this");
+    report_now(chart, max);
     return chart.svg();
 }
 
@@ -171,7 +170,7 @@ static std::string lit_rows(const Result &result)
             sum += sighting.slot != no_slot && sighting.fits ? sighting.residual_px.ddot(sighting.residual_px) : 0.0;
         }
         rows += lit.refused.empty() ? text("<tr><td>%s<td>%s<td>%d<td>%d<td>%.3f</tr>\n", escaped(lit.file).c_str(),
-                                           lit.twin.empty() ? "alone" : escaped(lit.twin).c_str(), used, out,
+                                           lit.dark_file.empty() ? "alone" : escaped(lit.dark_file).c_str(), used, out,
                                            std::sqrt(sum / std::max(1, used)))
                                     : "<tr class='bad'><td>" + escaped(lit.file) +
                                           "<td colspan='4'>not used: " + escaped(lit.refused) + "</tr>\n";
@@ -233,29 +232,29 @@ static std::string projector_words(const Projector &projector)
         text("<p>Origin (%.2f, %.2f, %.2f) mm in the camera's frame, standard deviations (%.2f, %.2f, %.2f). "
              "%d sightings with an rms of %.3f px (under 0.4 px is good), %d further ones did not fit. The lattice's "
              "step is %.3f "
-             "degrees, its rows are turned by %.2f degrees; rays differ from it by %s (each "
+             "degrees, its rows are rotated by %.2f degrees; rays differ from it by %s (each "
              "component).</p><p>%d of %d dots were seen (over 350 is good).",
              o[0], o[1], o[2], s[0], s[1], s[2], projector.sighting_count - projector.outlier_count, projector.rms_px,
-             projector.outlier_count, projector.pitch_deg, projector.turn_deg,
+             projector.outlier_count, projector.pitch_deg, projector.rotation_deg,
              nominal_words(projector.nominal_sigma_deg).c_str(), seen, slot_count);
     return words + (filled.empty() ? "</p>" : " By the lattice alone:" + filled + ".</p>");
 }
 
-static std::string turn_words(const std::vector<Turn> &turns, const Turn &now, const Range &range)
+static std::string rotation_words(const std::vector<Rotation> &rotations, const Rotation &now, const Range &range)
 {
-    Turn best = epipolar_best(turns);
+    Rotation best = epipolar_best(rotations);
     std::string words =
         text("<p>Between %.0f and %.0f mm, <b>%d pairs of dots share an epipolar line</b> (come nearer than "
              "%.1f px); the nearest are %.2f px apart. ",
-             range.near_mm, range.far_mm, now.shared, share_px, now.min_apart_px);
+             range.near_mm, range.far_mm, now.shared, same_line_px, now.min_apart_px);
     if (now.shared == 0)
-        return words + "The pattern's turn is good as it is.</p>";
+        return words + "The pattern's rotation is good as it is.</p>";
     if (best.shared >= now.shared)
-        return words + "No turn of the pattern within 5 degrees makes it better.</p>";
-    return words +
-           text("<b>A pattern turned by %.1f degrees more, %s in the image, would have %d</b>: the least turn with "
-                "so few.</p>",
-                std::abs(best.deg), best.deg > 0.0 ? "clockwise" : "anticlockwise", best.shared);
+        return words + "No rotation of the pattern within 5 degrees makes it better.</p>";
+    return words + text("<b>A pattern rotated by %.1f degrees more, %s in the image, would have %d</b>: the smallest "
+                        "rotation with "
+                        "so few.</p>",
+                        std::abs(best.deg), best.deg > 0.0 ? "clockwise" : "anticlockwise", best.shared);
 }
 
 static const char *const head =
@@ -267,11 +266,11 @@ static const char *const head =
 
 void report_write(const std::string &path, const Result &result)
 {
-    Residuals residuals = turn_residuals(result);
-    std::vector<Turn> turns = epipolar_turns(result.camera, result.projector, result.range);
-    Turn now = epipolar_turned(result.camera, result.projector, result.range, 0.0);
+    Residuals residuals = rotation_residuals(result);
+    std::vector<Rotation> rotations = epipolar_rotations(result.camera, result.projector, result.range);
+    Rotation now = epipolar_rotated(result.camera, result.projector, result.range, 0.0);
     double limit = 4.0 * std::max(residuals.along_rms_px, residuals.across_rms_px);
-    Chart scatter("Dots: seen less expected", "along the epipolar line, px", "across it, px",
+    Chart scatter("Dots: seen minus expected", "along the epipolar line, px", "across it, px",
                   {-limit, -limit, 2.0 * limit, 2.0 * limit});
     scatter.points(residuals.along_across, blue, 1.3);
     std::ostringstream file;
@@ -283,18 +282,18 @@ void report_write(const std::string &path, const Result &result)
          << camera_table(result.camera) << "<h3>Residuals by part of the frame</h3>" << region_table(result.camera)
          << corner_chart(result) << "\n<h2>Projector</h2>\n"
          << projector_words(result.projector) << seen_chart(result) << scatter.svg() << across_chart(residuals, limit)
-         << text("<p>Residuals of the dots: %.3f px along their epipolar lines, %.3f px across (rms). Across tells how "
-                 "well "
-                 "the rig fits: along, a dot may be anywhere.</p>",
+         << text("<p>Residuals of the dots: %.3f px along their epipolar lines, %.3f px across (rms). Across the line "
+                 "they show "
+                 "how well the rig fits; along it a dot may be anywhere.</p>",
                  residuals.along_rms_px, residuals.across_rms_px)
          << "\n<h2>What to expect</h2>\n"
-         << depth_chart(result, residuals.along_rms_px) << turn_chart(turns) << apart_chart(turns)
-         << turn_words(turns, now, result.range)
+         << depth_chart(result, residuals.along_rms_px) << rotation_chart(rotations) << apart_chart(rotations)
+         << rotation_words(rotations, now, result.range)
          << "\n<h2>Pictures of the board</h2>\n<table><tr><th>picture<th>corners<th>left out<th>rms, px<th>distance, "
             "mm<th>tilt, "
             "degrees<th>edges, px</tr>"
          << picture_rows(result)
-         << "</table>\n<h2>Pictures with the laser</h2>\n<table><tr><th>picture<th>twin without laser<th>dots "
+         << "</table>\n<h2>Pictures with the laser</h2>\n<table><tr><th>laser-on picture<th>laser-off picture<th>dots "
             "used<th>not "
             "used<th>rms, px</tr>"
          << lit_rows(result) << "</table></html>\n";

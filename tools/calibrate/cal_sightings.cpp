@@ -8,7 +8,7 @@
 namespace cal
 {
 static constexpr int bitmap_px_per_mm = 2;
-/* Without a twin a dot must be this far from every edge of the print, else the edge is measured with it. */
+/* Without a laser-off picture a dot must be this far from every edge of the print, else the edge is measured with it. */
 static constexpr double edge_apart_px = 2.0;
 static constexpr double border_mm = 3.0;
 
@@ -30,7 +30,7 @@ static cv::Mat sheet_mask(const Camera &camera, const Board &board, const View &
         outline.emplace_back(left, bottom - (bottom - top) * i / parts, 0.0);
     std::vector<cv::Point2d> seen;
     std::vector<cv::Point> whole;
-    cv::projectPoints(outline, view.turn, view.shift, camera.matrix, camera.distortion, seen);
+    cv::projectPoints(outline, view.rvec, view.shift, camera.matrix, camera.distortion, seen);
     for (const cv::Point2d &px : seen)
         whole.emplace_back(cvRound(px.x), cvRound(px.y));
     cv::Mat mask = cv::Mat::zeros(camera.size, CV_8U);
@@ -38,7 +38,7 @@ static cv::Mat sheet_mask(const Camera &camera, const Board &board, const View &
     return mask;
 }
 
-/* How far each place of the sheet is from the next edge of the print, in samples. */
+/* How far each point of the sheet is from the next edge of the print, in samples. */
 static cv::Mat edge_distances(const Board &board)
 {
     cv::Mat sheet = board_bitmap(board, bitmap_px_per_mm), wide, narrow, distances;
@@ -51,22 +51,22 @@ static cv::Mat edge_distances(const Board &board)
 static bool clear_of_edges(const Camera &camera, const Board &board, const cv::Mat &distances, const View &view,
                            const Sighting &sighting)
 {
-    cv::Point2d sheet = (view.on_board(sighting.place_mm) - board.sheet_origin_mm()) * bitmap_px_per_mm;
+    cv::Point2d sheet = (view.on_board(sighting.position_mm) - board.sheet_origin_mm()) * bitmap_px_per_mm;
     int x = cvFloor(sheet.x), y = cvFloor(sheet.y);
     if (x < 0 || y < 0 || x >= distances.cols || y >= distances.rows)
         return false;
     double mm = static_cast<double>(distances.at<float>(y, x)) / bitmap_px_per_mm;
-    double px_per_mm = camera.focal_px() / sighting.place_mm[2] * std::abs(view.normal()[2]);
+    double px_per_mm = camera.focal_px() / sighting.position_mm[2] * std::abs(view.normal()[2]);
     return mm * px_per_mm >= edge_apart_px;
 }
 
-void sighting_place(const Camera &camera, const View &view, cv::Point2d px, Sighting &sighting)
+void sighting_set(const Camera &camera, const View &view, cv::Point2d px, Sighting &sighting)
 {
     cv::Vec3d normal = view.normal();
     sighting.px = px;
     sighting.tangent = camera.tangents({px}).front();
     cv::Vec3d sight(sighting.tangent.x, sighting.tangent.y, 1.0);
-    sighting.place_mm = sight * (normal.dot(view.shift) / normal.dot(sight));
+    sighting.position_mm = sight * (normal.dot(view.shift) / normal.dot(sight));
 }
 
 void sightings_find(const Board &board, const Camera &camera, const cv::Mat &grey, const cv::Mat &dark, Lit &lit)
@@ -75,7 +75,7 @@ void sightings_find(const Board &board, const Camera &camera, const cv::Mat &gre
     for (const Dot &dot : dots_find(grey, dark, sheet_mask(camera, board, lit.view))) {
         Sighting sighting;
         sighting.wide_px = dot.sigma_px;
-        sighting_place(camera, lit.view, dot.px, sighting);
+        sighting_set(camera, lit.view, dot.px, sighting);
         if (!dark.empty() || clear_of_edges(camera, board, distances, lit.view, sighting))
             lit.sightings.push_back(sighting);
     }

@@ -10,14 +10,14 @@
 #include "cal_nominal.hpp"
 #include "cal_report.hpp"
 #include "cal_spot.hpp"
-#include "cal_twins.hpp"
+#include "cal_pairs.hpp"
 #include "cal_wall.hpp"
 #include "tool_progress.hpp"
 
 namespace cal
 {
 static constexpr int lit_min = 5;
-/* Rays and wall in turn: each time a third of the change is left. */
+/* Rays and wall alternate: each round leaves a third of the change. */
 static constexpr int wall_rounds = 6;
 
 static std::vector<View> find_boards(const Board &board, const std::vector<Picture> &pictures, tool::Progress &progress)
@@ -35,12 +35,12 @@ static std::vector<View> find_boards(const Board &board, const std::vector<Pictu
     return views;
 }
 
-/* What the camera is calibrated from: all pictures but those with the laser that have a good twin without it. */
-static std::vector<View> camera_views(const std::vector<View> &views, const std::vector<int> &twins)
+/* What the camera is calibrated from: all pictures but laser-on ones with a good laser-off one. */
+static std::vector<View> camera_views(const std::vector<View> &views, const std::vector<int> &dark_of)
 {
     std::vector<View> chosen;
     for (size_t i = 0; i < views.size(); i++) {
-        if (twins[i] < 0 || !views[static_cast<size_t>(twins[i])].good())
+        if (dark_of[i] < 0 || !views[static_cast<size_t>(dark_of[i])].good())
             chosen.push_back(views[i]);
     }
     return chosen;
@@ -53,7 +53,7 @@ static const View *view_of(const std::vector<View> &views, const std::string &fi
 }
 
 static std::vector<Lit> find_dots(const Result &result, const std::vector<Picture> &pictures,
-                                  const std::vector<int> &twins, tool::Progress &progress)
+                                  const std::vector<int> &dark_of, tool::Progress &progress)
 {
     std::vector<Lit> all;
     for (size_t i = 0; i < pictures.size(); i++) {
@@ -64,16 +64,16 @@ static std::vector<Lit> find_dots(const Result &result, const std::vector<Pictur
         lit.file = pictures[i].file;
         const View *view = view_of(result.views, lit.file);
         cv::Mat dark;
-        if (twins[i] >= 0) {
-            const Picture &twin = pictures[static_cast<size_t>(twins[i])];
-            lit.twin = twin.file;
-            dark = twin.grey;
-            view = view_of(result.views, lit.twin);
+        if (dark_of[i] >= 0) {
+            const Picture &dark_file = pictures[static_cast<size_t>(dark_of[i])];
+            lit.dark_file = dark_file.file;
+            dark = dark_file.grey;
+            view = view_of(result.views, lit.dark_file);
         }
         lit.view = *view;
         lit.refused = view->corners.refused;
-        if (!lit.refused.empty() && !lit.twin.empty())
-            lit.refused = "its twin " + lit.twin + " is no good: " + lit.refused;
+        if (!lit.refused.empty() && !lit.dark_file.empty())
+            lit.refused = "its laser-off picture " + lit.dark_file + " is refused: " + lit.refused;
         if (lit.refused.empty()) {
             sightings_find(result.board, result.camera, pictures[i].grey, dark, lit);
             lattice_grow(lit.sightings);
@@ -83,7 +83,7 @@ static std::vector<Lit> find_dots(const Result &result, const std::vector<Pictur
     return all;
 }
 
-/* Each picture's reason is told beside this. */
+/* Each picture's reason is printed beside this. */
 static void check_used(const std::vector<Lit> &pictures)
 {
     auto used = std::count_if(pictures.begin(), pictures.end(), [](const Lit &lit) { return lit.refused.empty(); });
@@ -108,20 +108,20 @@ static void check_lit(const std::vector<Lit> &pictures)
 }
 
 /* How light the print's dark is: the median over all corners. */
-static double dark_share(const std::vector<View> &views)
+static double dark_fraction(const std::vector<View> &views)
 {
-    std::vector<double> shares;
+    std::vector<double> fractions;
     for (const View &view : views) {
         if (view.good())
-            shares.insert(shares.end(), view.corners.dark_share.begin(), view.corners.dark_share.end());
+            fractions.insert(fractions.end(), view.corners.dark_fraction.begin(), view.corners.dark_fraction.end());
     }
-    auto middle = shares.begin() + static_cast<std::ptrdiff_t>(shares.size() / 2);
-    std::nth_element(shares.begin(), middle, shares.end());
+    auto middle = fractions.begin() + static_cast<std::ptrdiff_t>(fractions.size() / 2);
+    std::nth_element(fractions.begin(), middle, fractions.end());
     return *middle;
 }
 
-/* The dots' places once more, by what the print does to them. */
-static void place_dots(const std::vector<Picture> &pictures, const std::vector<int> &twins, Result &result)
+/* The dots' positions again, corrected for the print under them. */
+static void refine_dots(const std::vector<Picture> &pictures, const std::vector<int> &dark_of, Result &result)
 {
     const Camera &camera = result.camera;
     Spots spots{result.board,
@@ -129,15 +129,15 @@ static void place_dots(const std::vector<Picture> &pictures, const std::vector<i
                 board_picture(result.board, draw_px_per_mm),
                 draw_tangents(camera.size, camera.matrix, camera.distortion),
                 spot_lens_px(result.lit),
-                dark_share(result.views),
-                twins_noise(pictures, twins)};
+                dark_fraction(result.views),
+                pairs_noise(pictures, dark_of)};
     size_t next = 0;
     for (size_t i = 0; i < pictures.size(); i++) {
         if (!pictures[i].laser)
             continue;
         Lit &lit = result.lit[next++];
-        if (lit.refused.empty() && twins[i] >= 0)
-            spots_place(spots, pictures[i].grey, pictures[static_cast<size_t>(twins[i])].grey, lit);
+        if (lit.refused.empty() && dark_of[i] >= 0)
+            spots_refine(spots, pictures[i].grey, pictures[static_cast<size_t>(dark_of[i])].grey, lit);
     }
 }
 
@@ -151,14 +151,14 @@ static void scale_sigmas(double scale, std::vector<Lit> &pictures)
 }
 
 /* Origin and rays by the board; then with what is behind it, too. */
-static void find_rays(const std::vector<Picture> &pictures, const std::vector<int> &twins, const cv::Vec3d &origin_mm,
+static void find_rays(const std::vector<Picture> &pictures, const std::vector<int> &dark_of, const cv::Vec3d &origin_mm,
                       Result &result)
 {
     result.projector = rays_solve(result.camera, result.lit, origin_mm);
     if (rays_join(result.camera, result.projector, result.lit) > 0)
         result.projector = rays_solve(result.camera, result.lit, result.projector.origin_mm);
     scale_sigmas(result.projector.scale, result.lit);
-    Lit wall = wall_find(result.board, result.camera, pictures, twins, result.lit, twins_noise(pictures, twins),
+    Lit wall = wall_find(result.board, result.camera, pictures, dark_of, result.lit, pairs_noise(pictures, dark_of),
                          spot_lens_px(result.lit));
     if (!wall_lay(result.camera, result.projector, wall))
         return;
@@ -174,7 +174,7 @@ static void find_rays(const std::vector<Picture> &pictures, const std::vector<in
     result.projector = rays_solve(result.camera, result.lit, result.projector.origin_mm);
 }
 
-static void tell_pictures(const Result &result)
+static void report_pictures(const Result &result)
 {
     for (const View &view : result.views) {
         if (!view.good())
@@ -188,7 +188,7 @@ static void tell_pictures(const Result &result)
     }
 }
 
-static void tell_camera(const Camera &camera)
+static void report_camera(const Camera &camera)
 {
     std::printf("camera: rms %.3f px; fx %.2f +- %.2f, fy %.2f +- %.2f, cx %.2f +- %.2f, cy %.2f +- %.2f px\n",
                 camera.rms_px, camera.matrix.at<double>(0, 0), camera.sigma_px[0], camera.matrix.at<double>(1, 1),
@@ -197,7 +197,7 @@ static void tell_camera(const Camera &camera)
 }
 
 /* Parts of the frame where the lens is only continued from elsewhere. */
-static void tell_uncovered(const Camera &camera)
+static void report_uncovered(const Camera &camera)
 {
     for (size_t i = 0; i < camera.regions.size(); i++) {
         if (camera.regions[i].corner_count < coverage_min.region_corners)
@@ -206,7 +206,7 @@ static void tell_uncovered(const Camera &camera)
     }
 }
 
-static void tell_projector(const Projector &projector)
+static void report_projector(const Projector &projector)
 {
     auto seen = std::count_if(projector.seen.begin(), projector.seen.end(), [](int count) { return count > 0; });
     std::printf("projector: rms %.3f px of %d sightings, %d left out; origin (%.2f, %.2f, %.2f) mm, +- (%.2f, %.2f, "
@@ -271,7 +271,7 @@ static void make_out(const std::string &out)
 
 static void remove_out(const std::string &out)
 {
-    std::error_code failed; /* the first fault is the one to tell */
+    std::error_code failed; /* the first error is the one to report */
     for (const char *name : {"/rig.json", "/report.html"})
         remove_file(out + name, failed);
 }
@@ -301,37 +301,37 @@ void solve_run(const Options &options)
     if (lit_count < lit_min)
         throw Error(text(
             "too few pictures with the laser on. Add:\n  - pictures with the laser on: there are %d of at least %d, "
-            "better 25; calibrate guide tells what else is missing",
+            "better 25; calibrate guide says what else is missing",
             static_cast<int>(lit_count), lit_min));
     std::vector<View> views = find_boards(result.board, pictures, progress);
-    std::vector<int> twins = twins_find(pictures, views);
+    std::vector<int> dark_of = pairs_find(pictures, views);
     for (size_t i = 0; i < pictures.size(); i++) {
-        if (twins[i] >= 0)
-            views[static_cast<size_t>(twins[i])].grey =
-                twins_mean(pictures[static_cast<size_t>(twins[i])].grey, pictures[i].grey);
+        if (dark_of[i] >= 0)
+            views[static_cast<size_t>(dark_of[i])].grey =
+                pairs_mean(pictures[static_cast<size_t>(dark_of[i])].grey, pictures[i].grey);
     }
-    result.views = camera_views(views, twins);
+    result.views = camera_views(views, dark_of);
     try {
         progress.show("solving for the camera");
         result.camera = camera_solve(result.board, pictures.front().grey.size(), result.views);
-        result.lit = find_dots(result, pictures, twins, progress);
+        result.lit = find_dots(result, pictures, dark_of, progress);
         check_lit(result.lit);
-        progress.show("placing the dots");
-        place_dots(pictures, twins, result);
+        progress.show("locating the dots");
+        refine_dots(pictures, dark_of, result);
         progress.show("solving for the projector");
         cv::Vec3d origin_mm = index_assign(result.board, result.camera, result.lit, options.middle);
-        find_rays(pictures, twins, origin_mm, result);
+        find_rays(pictures, dark_of, origin_mm, result);
     } catch (const Error &) {
         progress.clear();
-        tell_pictures(result);
+        report_pictures(result);
         check_used(result.lit);
         throw;
     }
     progress.clear();
-    tell_pictures(result);
-    tell_camera(result.camera);
-    tell_uncovered(result.camera);
-    tell_projector(result.projector);
+    report_pictures(result);
+    report_camera(result.camera);
+    report_uncovered(result.camera);
+    report_projector(result.projector);
     write_out(options.out, result);
     std::printf("%s/rig.json and %s/report.html are written\n", options.out.c_str(), options.out.c_str());
     if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0)

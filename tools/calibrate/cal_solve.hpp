@@ -1,4 +1,4 @@
-/* cal_solve - the whole way: pictures, camera, projector, rig.json, report.
+/* cal_solve - all steps: pictures, camera, projector, rig.json, report.
  */
 #ifndef CAL_SOLVE_HPP
 #define CAL_SOLVE_HPP
@@ -10,7 +10,7 @@ namespace cal
 /* Everything that a calibration came to. */
 struct Result {
     Board board;
-    std::vector<View> views; /* by picture; a lit one whose twin is used is in `lit` only */
+    std::vector<View> views; /* by picture; a laser-on one whose laser-off picture is used is in `lit` only */
     std::vector<Lit> lit;
     Camera camera;
     Projector projector;

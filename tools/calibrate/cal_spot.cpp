@@ -19,7 +19,7 @@ static double median_of(std::vector<double> values)
 }
 
 /* A straight line through squares of widths over squares of nearness, with Huber's weights; where it begins. Dots that are
- * all as far off do not tell it: but the lens does not make more than all of their width. */
+ * all as far off do not determine it: but the lens does not make more than all of their width. */
 double spot_lens_px(const std::vector<Lit> &pictures)
 {
     std::vector<cv::Vec2d> points;
@@ -27,7 +27,7 @@ double spot_lens_px(const std::vector<Lit> &pictures)
     for (const Lit &lit : pictures) {
         for (const Sighting &sighting : lit.sightings) {
             squares.push_back(sighting.wide_px * sighting.wide_px);
-            points.emplace_back(1e6 / (sighting.place_mm[2] * sighting.place_mm[2]), squares.back());
+            points.emplace_back(1e6 / (sighting.position_mm[2] * sighting.position_mm[2]), squares.back());
         }
     }
     if (points.empty())
@@ -62,16 +62,16 @@ static cv::Mat draw_surface(const Spots &spots, const cv::Matx33d &map, cv::Poin
     for (int row = 0; row < beam_side; row++) {
         for (int column = 0; column < beam_side; column++) {
             double white = draw_sample(spots.print, map * sight.beside(beam_sample_px(column), beam_sample_px(row)));
-            surface.at<double>(row, column) = spots.dark_share + (1.0 - spots.dark_share) * white;
+            surface.at<double>(row, column) = spots.dark_fraction + (1.0 - spots.dark_fraction) * white;
         }
     }
     return surface;
 }
 
-void spots_place(const Spots &spots, const cv::Mat &grey, const cv::Mat &dark, Lit &lit)
+void spots_refine(const Spots &spots, const cv::Mat &grey, const cv::Mat &dark, Lit &lit)
 {
     cv::Mat rise = grey - dark;
-    cv::Matx33d map = draw_map(spots.board, lit.view.turn, lit.view.shift);
+    cv::Matx33d map = draw_map(spots.board, lit.view.rvec, lit.view.shift);
     for (Sighting &sighting : lit.sightings) {
         cv::Point middle(cvRound(sighting.px.x), cvRound(sighting.px.y));
         cv::Rect window = dot_window(middle);
@@ -84,7 +84,7 @@ void spots_place(const Spots &spots, const cv::Mat &grey, const cv::Mat &dark, L
         cv::Mat(grey(window) + dark(window)).convertTo(noise, CV_64F, spots.noise.by_light, 2.0 * spots.noise.dark);
         BeamWindow seen{draw_surface(spots, map, middle), rise(window), grey(window), noise, spots.lens_px};
         if (beam_fit(seen, beam) && cv::norm(beam.px - start) <= moved_max_px) {
-            sighting_place(spots.camera, lit.view, cv::Point2d(middle) + beam.px, sighting);
+            sighting_set(spots.camera, lit.view, cv::Point2d(middle) + beam.px, sighting);
             sighting.sigma_px = beam.sigma_px;
         }
     }

@@ -12,27 +12,27 @@ static constexpr double origin_max_mm = 600.0;
 static constexpr double ratio_min = 1.2; /* of the distances of a pair */
 static constexpr size_t pair_count = 6;
 static constexpr int support_min = 6;
-static constexpr double support_share = 0.7, on_lattice = 0.22;
+static constexpr double support_fraction = 0.7, on_lattice = 0.22;
 static constexpr size_t near_count = 10;
 static constexpr double near_steps = 2.2;
-/* Another place for the projector must be worse than this share of the best one's dots. */
-static constexpr double clear_share = 0.9;
+/* Another position of the projector must explain less than this fraction of the best one's dots. */
+static constexpr double clear_fraction = 0.9;
 static constexpr double same_origin_mm = 8.0;
 
-static cv::Point2d direction_of(const cv::Vec3d &origin_mm, const cv::Vec3d &place_mm)
+static cv::Point2d direction_of(const cv::Vec3d &origin_mm, const cv::Vec3d &position_mm)
 {
-    cv::Vec3d way = place_mm - origin_mm;
-    return {way[0] / way[2], way[1] / way[2]};
+    cv::Vec3d offset = position_mm - origin_mm;
+    return {offset[0] / offset[2], offset[1] / offset[2]};
 }
 
-static std::map<Step, cv::Vec3d> places_by_step(const Lit &lit)
+static std::map<Step, cv::Vec3d> positions_by_step(const Lit &lit)
 {
-    std::map<Step, cv::Vec3d> places;
+    std::map<Step, cv::Vec3d> positions;
     for (const Sighting &sighting : lit.sightings) {
         if (sighting.in_lattice)
-            places[{sighting.step[0], sighting.step[1]}] = sighting.place_mm;
+            positions[{sighting.step[0], sighting.step[1]}] = sighting.position_mm;
     }
-    return places;
+    return positions;
 }
 
 /* The point nearest to all lines; false: they do not meet. */
@@ -42,31 +42,31 @@ static bool meet(const std::vector<std::pair<cv::Vec3d, cv::Vec3d>> &lines, cv::
     cv::Vec3d right(0.0, 0.0, 0.0);
     double sum = 0.0;
     for (const auto &[from, to] : lines) {
-        cv::Vec3d way = cv::normalize(to - from);
-        cv::Matx33d across = cv::Matx33d::eye() - way * way.t();
+        cv::Vec3d offset = cv::normalize(to - from);
+        cv::Matx33d across = cv::Matx33d::eye() - offset * offset.t();
         normal += across;
         right += across * from;
     }
     if (!cv::solve(normal, right, point, cv::DECOMP_CHOLESKY))
         return false;
     for (const auto &[from, to] : lines) {
-        cv::Vec3d way = cv::normalize(to - from), away = point - from;
-        away -= way * way.dot(away);
+        cv::Vec3d offset = cv::normalize(to - from), away = point - from;
+        away -= offset * offset.dot(away);
         sum += away.dot(away);
     }
     return std::sqrt(sum / static_cast<double>(lines.size())) < meet_rms_mm && cv::norm(point) < origin_max_mm;
 }
 
-/* All places where the projector may be, by one pair of pictures. */
+/* All candidate positions of the projector, by one pair of pictures. */
 static void add_candidates(const Lit &a, const Lit &b, std::vector<cv::Vec3d> &candidates)
 {
-    std::map<Step, cv::Vec3d> places_a = places_by_step(a), places_b = places_by_step(b);
+    std::map<Step, cv::Vec3d> positions_a = positions_by_step(a), positions_b = positions_by_step(b);
     for (int row = -2 * pattern_side; row <= 2 * pattern_side; row++) {
         for (int column = -2 * pattern_side; column <= 2 * pattern_side; column++) {
             std::vector<std::pair<cv::Vec3d, cv::Vec3d>> lines;
-            for (const auto &[step, from] : places_a) {
-                auto other = places_b.find({step.first + column, step.second + row});
-                if (other != places_b.end())
+            for (const auto &[step, from] : positions_a) {
+                auto other = positions_b.find({step.first + column, step.second + row});
+                if (other != positions_b.end())
                     lines.emplace_back(from, other->second);
             }
             cv::Vec3d point;
@@ -93,8 +93,8 @@ static bool predict(const Trial &trial, cv::Point2d direction, double step_lengt
     cv::Matx33d normal = cv::Matx33d::zeros();
     cv::Matx<double, 3, 2> right = cv::Matx<double, 3, 2>::zeros();
     for (size_t i = 0; i < kept; i++) {
-        cv::Point2d way = (near[i].second->second.direction - direction) / step_length;
-        cv::Matx31d terms(1.0, way.x, way.y);
+        cv::Point2d offset = (near[i].second->second.direction - direction) / step_length;
+        cv::Matx31d terms(1.0, offset.x, offset.y);
         double weight = 1.0 / (0.1 + near[i].first * near[i].first);
         normal += weight * (terms * terms.t());
         right += weight * (terms * cv::Matx12d(near[i].second->first.first, near[i].second->first.second));
@@ -112,7 +112,7 @@ struct Placing {
     double square_sum = 0.0;
 };
 
-static Placing place(const Trial &trial, const Lit &lit, double step_length)
+static Placing position(const Trial &trial, const Lit &lit, double step_length)
 {
     std::vector<cv::Point2d> shifts;
     std::map<Step, int> votes;
@@ -120,7 +120,7 @@ static Placing place(const Trial &trial, const Lit &lit, double step_length)
     for (const Sighting &sighting : lit.sightings) {
         cv::Point2d step;
         if (!sighting.in_lattice ||
-            !predict(trial, direction_of(trial.origin_mm, sighting.place_mm), step_length, step))
+            !predict(trial, direction_of(trial.origin_mm, sighting.position_mm), step_length, step))
             continue;
         cv::Point2d shift(step.x - sighting.step[0], step.y - sighting.step[1]);
         shifts.push_back(shift);
@@ -148,7 +148,7 @@ static void add_picture(Trial &trial, const Lit &lit, size_t index, const Placin
         if (!sighting.in_lattice)
             continue;
         cv::Vec2i step = sighting.step + placing.shift;
-        cv::Point2d direction = direction_of(trial.origin_mm, sighting.place_mm);
+        cv::Point2d direction = direction_of(trial.origin_mm, sighting.position_mm);
         Known &known = trial.known.try_emplace({step[0], step[1]}, Known{direction, 0}).first->second;
         known.count++;
         known.direction += (direction - known.direction) / known.count;
@@ -161,11 +161,11 @@ static void add_picture(Trial &trial, const Lit &lit, size_t index, const Placin
 
 static double step_length_of(const Lit &lit, const cv::Vec3d &origin_mm)
 {
-    std::map<Step, cv::Vec3d> places = places_by_step(lit);
+    std::map<Step, cv::Vec3d> positions = positions_by_step(lit);
     std::vector<double> lengths;
-    for (const auto &[step, at] : places) {
-        auto next = places.find({step.first + 1, step.second});
-        if (next != places.end())
+    for (const auto &[step, at] : positions) {
+        auto next = positions.find({step.first + 1, step.second});
+        if (next != positions.end())
             lengths.push_back(cv::norm(direction_of(origin_mm, next->second) - direction_of(origin_mm, at)));
     }
     std::sort(lengths.begin(), lengths.end());
@@ -187,8 +187,8 @@ static Trial try_origin(const std::vector<Lit> &pictures, size_t first, const cv
         for (size_t i = 0; i < pictures.size(); i++) {
             if (trial.placed[i] || !pictures[i].refused.empty())
                 continue;
-            Placing placing = place(trial, pictures[i], step_length);
-            if (placing.support >= support_min && placing.support >= support_share * placing.predicted &&
+            Placing placing = position(trial, pictures[i], step_length);
+            if (placing.support >= support_min && placing.support >= support_fraction * placing.predicted &&
                 placing.support > best.support) {
                 best = placing;
                 best_index = i;
@@ -242,18 +242,19 @@ Trial trial_best(const std::vector<Lit> &pictures)
     size_t first = richest(pictures);
     std::vector<cv::Vec3d> candidates = all_candidates(pictures, first);
     if (candidates.empty())
-        throw Error(
-            "the projector's place cannot be told. Add:\n  - pictures with the laser on at other distances: the "
-            "board near (0.5 m) and far (1.2 m), with many dots on it");
+        throw Error("the projector's position cannot be determined. Add:\n  - pictures with the laser on at other "
+                    "distances: the "
+                    "board near (0.5 m) and far (1.2 m), with many dots on it");
     std::vector<Trial> trials;
     for (const cv::Vec3d &candidate : candidates)
         trials.push_back(try_origin(pictures, first, candidate));
     auto best = std::min_element(trials.begin(), trials.end(), better);
     for (const Trial &trial : trials) {
         bool elsewhere = cv::norm(trial.origin_mm - best->origin_mm) > same_origin_mm;
-        if (elsewhere && trial.dot_count > clear_share * best->dot_count && trial.square_sum < 2.0 * best->square_sum)
+        if (elsewhere && trial.dot_count > clear_fraction * best->dot_count &&
+            trial.square_sum < 2.0 * best->square_sum)
             throw Error(
-                text("the projector's place is not clear: (%.0f, %.0f, %.0f) mm explains the dots as well as "
+                text("the projector's position is ambiguous: (%.0f, %.0f, %.0f) mm explains the dots as well as "
                      "(%.0f, %.0f, %.0f). Add:\n  - pictures with the laser on at other distances, near and far",
                      best->origin_mm[0], best->origin_mm[1], best->origin_mm[2], trial.origin_mm[0], trial.origin_mm[1],
                      trial.origin_mm[2]));

@@ -2,7 +2,7 @@
  *
  * Every picture has a lattice of its own whose origin nobody knows. Two pictures at different distances, laid on each other
  * with some shift, give lines from dot to dot that meet nearly in one point whatever the shift is: the projector, if the
- * shift is right, else a place some centimetres beside it. Only with the right one do all other pictures fall on the same
+ * shift is right, else a point some centimetres beside it. Only with the right one do all other pictures fall on the same
  * lattice of directions as well; so every candidate is tried on all of them, and the one that takes in most dots wins.
  */
 #ifndef CAL_TRIAL_HPP
@@ -18,7 +18,7 @@ using Step = std::pair<int, int>; /* column, row of the common lattice */
 
 /* A dot of the common lattice. */
 struct Known {
-    cv::Point2d direction; /* tangents of the way from the projector's origin */
+    cv::Point2d direction; /* tangents, as seen from the projector's origin */
     int count;
 };
 
@@ -31,7 +31,7 @@ struct Trial {
     double square_sum = 0.0; /* of the dots' distances from the lattice, steps */
 };
 
-/* The best of all places. Pictures that are refused take no part. Throws cal::Error where there is none, or two. */
+/* The best of all positions. Pictures that are refused are not used. Throws cal::Error where there is none, or two. */
 Trial trial_best(const std::vector<Lit> &pictures);
 } // namespace cal
 

@@ -1,5 +1,5 @@
 /* calibrate - from pictures of a printed board to rig.json; see calibrate --help.
- * The way: pictures -> find (corners) -> camera -> sightings (dots on the board) -> lattice, index (which dot) -> rays ->
+ * Steps: pictures -> find (corners) -> camera -> sightings (dots on the board) -> lattice, index (which dot) -> rays ->
  * rig, report.
  */
 #include <cstdio>
@@ -12,8 +12,8 @@
 #include "cal_print.hpp"
 #include "cal_solve.hpp"
 
-/* What was told must have arrived. */
-static int told(int status)
+/* Output that was not written is an error. */
+static int finished(int status)
 {
     if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0)
         return status;
@@ -29,26 +29,25 @@ int main(int argc, char **argv)
         switch (options.verb) {
         case cal::Verb::help:
             std::fputs(cal::options_help, stdout);
-            return told(0);
+            return finished(0);
         case cal::Verb::board:
             cal::board_print(options.board, options.target);
             return 0;
         case cal::Verb::guide:
-            return told((options.camera.empty() ? cal::guide_directory(options) : cal::guide_camera(options)) ? 0 : 1);
+            return finished((options.camera.empty() ? cal::guide_directory(options) : cal::guide_camera(options)) ? 0
+                                                                                                                  : 1);
         case cal::Verb::solve:
             cal::solve_run(options);
-            return told(0);
+            return finished(0);
         }
     } catch (const cal::Error &error) {
         std::fprintf(stderr, "calibrate: %s\n", error.what());
     } catch (const std::bad_alloc &) {
         std::fprintf(stderr, "calibrate: out of memory\n");
     } catch (const std::exception &error) {
-        std::fprintf(
-            stderr,
-            "calibrate: could not go on with these pictures, and ought to have said why: please report it, with "
-            "this: %s\n",
-            error.what());
+        std::fprintf(stderr,
+                     "calibrate: an error in the program, not in the pictures; please report it with this text: %s\n",
+                     error.what());
     }
     return 1;
 }

@@ -24,7 +24,7 @@ static std::string file_of(const std::string &path)
     return file;
 }
 
-/* False: errno tells why. */
+/* False: errno says why. */
 static bool put(int descriptor, const std::string &bytes)
 {
     for (size_t done = 0; done < bytes.size();) {
@@ -41,7 +41,8 @@ void file_write(const std::string &path, const std::string &bytes)
     struct stat there = {};
     bool exists = stat(path.c_str(), &there) == 0;
     if (exists && !S_ISREG(there.st_mode))
-        throw Error(path + ": could not be written: is no file, but a directory, device or pipe");
+        throw Error(path +
+                    ": could not be written: it is a directory, device or pipe, expected a file");
     std::string file = file_of(path), part = file + "." + std::to_string(getpid()) + ".part";
     unlink(part.c_str()); /* of a process that was killed and had our number */
     int descriptor = open(part.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);

@@ -21,17 +21,17 @@ Parsed options_walk(const char *program, int argc, char **argv, const struct opt
 {
     /* getopt_long begins its messages with the word before the options: that is the verb. */
     std::string name = program;
-    std::vector<char *> rest(argv + 1, argv + argc);
-    rest.front() = name.data();
-    rest.push_back(nullptr);
+    std::vector<char *> remainder(argv + 1, argv + argc);
+    remainder.front() = name.data();
+    remainder.push_back(nullptr);
     int id, count = argc - 1;
-    while ((id = getopt_long(count, rest.data(), "", known, nullptr)) != -1) {
+    while ((id = getopt_long(count, remainder.data(), "", known, nullptr)) != -1) {
         if (id == opt_help)
             return Parsed::help;
-        if (id == '?' || !take(id, optarg)) /* getopt_long has told of the first */
+        if (id == '?' || !take(id, optarg)) /* getopt_long has reported the first */
             return Parsed::wrong;
     }
-    words.assign(rest.begin() + optind, rest.begin() + count);
+    words.assign(remainder.begin() + optind, remainder.begin() + count);
     return Parsed::words;
 }
 } // namespace tool

@@ -22,7 +22,7 @@ constexpr int opt_help = 1;
 enum class Parsed { words, help, wrong };
 
 /* Each option behind the verb is handed to take() with its argument, until --help or until take() returns false; then the
- * words that are no options are in `words`. wrong: take() or getopt_long, as `program`, has told why. */
+ * words that are no options are in `words`. wrong: take() or getopt_long, as `program`, has printed why. */
 Parsed options_walk(const char *program, int argc, char **argv, const struct option *known,
                     const std::function<bool(int, const char *)> &take,
                     std::vector<std::string> &words);

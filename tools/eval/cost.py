@@ -129,7 +129,7 @@ def text(programs, data):
                 + [state["struct isohead"], state["scratch"], sum(c[0] for c in code.values()),
                    sum(c[1] for c in code.values())])
     head = ("Thousands of instructions of a frame: %s, callgrind; the mean of six frames of "
-            "frames/sequence2, and of %d depth images. Parts of findings are in its instructions; all of the "
+            "frames/sequence2, and of %d depth images. Parts of detections are in its instructions; all of the "
             "memory of a run is %d bytes, `scratch` once included. The rest: %s.\n\n"
             % (platform.machine(), len(RANGE_FOLDERS) if counts[1] else 0, state["struct isohead"],
                ", ".join(others)))

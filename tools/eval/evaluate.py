@@ -35,7 +35,7 @@ def parse():
     return parser.parse_args()
 
 
-def tell(scene, result):
+def say(scene, result):
     counts = result.counts[runs.FULL]
     print("%-34s %3d of %3d right" % (scene.name, counts.right_count, counts.frame_count),
           file=sys.stderr, flush=True)
@@ -62,7 +62,7 @@ def main():
         print("evaluate: no scene of this kind", file=sys.stderr)
         return 2
     pictures = not (arguments.quick or arguments.no_pictures)
-    results = runs.run_all(programs, arguments.work, chosen, variants, pictures, arguments.jobs, tell)
+    results = runs.run_all(programs, arguments.work, chosen, variants, pictures, arguments.jobs, say)
     costs = ""
     if not (arguments.quick or arguments.no_costs):
         import cost  # pylint: disable=import-outside-toplevel

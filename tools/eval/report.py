@@ -131,7 +131,7 @@ def failure_counts(results):
             what = failure.what
             off = what.split(" mm off")
             if len(off) > 1:
-                what = "another place" + off[1]
+                what = "another position" + off[1]
             causes.setdefault(what, {}).setdefault(failure.scene.group, 0)
             causes[what][failure.scene.group] += 1
     groups = [g for g in scenes.GROUPS if g in names_of(results, "group")]

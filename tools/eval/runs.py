@@ -161,7 +161,7 @@ def run(programs, work, scene, variants, with_traces):
     return result
 
 
-def run_all(programs, work, scenes, variants, with_traces, jobs, told):
+def run_all(programs, work, scenes, variants, with_traces, jobs, reported):
     """By scene, in the order of scenes."""
     with open(programs["render"], "rb") as file:
         programs = dict(programs, stamp=hashlib.sha256(file.read()).hexdigest()[:16])
@@ -170,6 +170,6 @@ def run_all(programs, work, scenes, variants, with_traces, jobs, told):
         futures = [pool.submit(run, programs, work, scene, variants, with_traces) for scene in scenes]
         for scene, future in zip(scenes, futures):
             results[scene] = future.result()
-            told(scene, results[scene])
+            reported(scene, results[scene])
     shutil.rmtree(os.path.join(work, "scratch"), ignore_errors=True)
     return results

@@ -54,7 +54,7 @@ RENDERED = (
     ("light", "sunlight", 12, ("--rig paper --ambient sunlight", "--rig wide --ambient sunlight",
                                     "--rig paper --ambient sunlight --sequence 2")),
     ("light", "bright, dim", 12, ("--rig paper --ambient bright", "--rig wide --ambient dim")),
-    ("rig", "knocked rig", 12, ("--rig paper --knock 0.05", "--rig wide --knock 0.05",
+    ("rig", "rotated rig", 12, ("--rig paper --knock 0.05", "--rig wide --knock 0.05",
                                        "--rig paper --knock 0.1", "--rig wide --knock 0.1")),
     ("rig", "noisy calibration", 12, ("--rig paper --calibration-noise 1",
                                              "--rig wide --calibration-noise 1",

@@ -93,7 +93,7 @@ def people(record, centres_mm):
 
 
 def percentile(values, percent):
-    """The value that this share of them does not exceed; None of nothing."""
+    """The value that this fraction of them does not exceed; None of nothing."""
     if not values:
         return None
     return sorted(values)[max(1, math.ceil(len(values) * percent / 100)) - 1]
@@ -107,7 +107,7 @@ class Counts:
         self.detected = 0
         self.outcomes = {True: collections.Counter(), False: collections.Counter()}
         self.right = {True: 0, False: 0}
-        self.selected_wrong = 0  # a head is there, another place was selected
+        self.selected_wrong = 0  # a head is there, another position was selected
         self.errors_mm = []
         self.several = collections.Counter()  # frames, there, found, nobody, selected
 

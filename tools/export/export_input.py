@@ -1,6 +1,6 @@
 """What host_sim wrote and what it read, as docs/contract.md describes it: records, trace, rig, frames.
 
-Everything is checked before it is handed on, so that the writers can rely on it. What is wrong is told by
+Everything is checked before it is handed on, so that the writers can rely on it. What is wrong is reported by
 Refused: file, line where there are lines, what was found and what was expected.
 """
 
@@ -226,7 +226,7 @@ class Rig:
 # ---------------------------------------------------------------- a frame's picture
 
 class Picture:
-    """A binary PGM. data: 8 bits per pixel, or 16, the least significant byte first."""
+    """A binary PGM. data: 8 bits per pixel, or 16, the low byte first."""
 
     def __init__(self, path, rig):
         text = read_bytes(path)
@@ -342,15 +342,15 @@ class Trace:
     def read_semi_axes(self, count):
         """The fitted ellipsoids' semi-axes, a triple per hypothesis of the record. None with --paper, which
         has hypotheses without ellipsoids."""
-        findings = take(self.data, "findings", list_of(is_object), "a list of findings", self.path)
-        if not findings:
+        detections = take(self.data, "findings", list_of(is_object), "a list of detections", self.path)
+        if not detections:
             return None
-        if len(findings) != count:
-            raise Refused("%s: %d findings, but %d hypotheses in the record: not of the same run" %
-                          (self.path, len(findings), count))
-        return [[value / 256 for value in take(finding, "semi_mm_q8", list_of(is_raw, 3), "3 integers",
+        if len(detections) != count:
+            raise Refused("%s: %d detections, but %d hypotheses in the record: not of the same run" %
+                          (self.path, len(detections), count))
+        return [[value / 256 for value in take(detection, "semi_mm_q8", list_of(is_raw, 3), "3 integers",
                                                self.path, "findings[%d]." % index)]
-                for index, finding in enumerate(findings)]
+                for index, detection in enumerate(detections)]
 
 
 def trace_of(folder, record):

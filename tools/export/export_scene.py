@@ -1,10 +1,10 @@
 """One frame as messages of Foxglove's schemas: picture, dots, points, surface, heads.
 
 Lengths are metres, as Foxglove takes them to be; the frame "camera" is that of docs/contract.md (X right, Y
-down, Z forward), "rig" the same place with X forward and Z up. Foxglove counts pixels from the corner of the
+down, Z forward), "rig" the same origin with X forward and Z up. Foxglove counts pixels from the corner of the
 first one, the records from its centre: half a pixel is added.
 
-Colours tell the same in grey and to the colour-blind: depth from dark (near) over green to yellow (far);
+Colours can be distinguished in grey and by the colour-blind: depth from dark (near) over green to yellow (far);
 the head orange, other heads yellow, one that is only predicted sky blue, what was rejected grey.
 """
 
@@ -42,15 +42,15 @@ CAMERA = "camera"
 MEAN_SEMI_AXES_MM = (78, 113, 98)
 OUTLINE_POINTS = 48
 FOREVER = Duration()  # until the next scene deletes it
-NO_TURN = Quaternion(x=0, y=0, z=0, w=1)
+NO_ROTATION = Quaternion(x=0, y=0, z=0, w=1)
 # X right, Y down, Z forward, seen from X forward, Y left, Z up.
-CAMERA_TURN = Quaternion(x=-0.5, y=0.5, z=-0.5, w=0.5)
+CAMERA_ROTATION = Quaternion(x=-0.5, y=0.5, z=-0.5, w=0.5)
 
 HEAD = (0.84, 0.37, 0.00)
 OTHER_HEAD = (0.94, 0.89, 0.26)
 PREDICTED = (0.34, 0.71, 0.91)
 REJECTED = (0.60, 0.60, 0.60)
-# Near to far: lightness rises all the way.
+# Near to far: lightness rises monotonically.
 DEPTH_COLOURS = ((0.27, 0.00, 0.33), (0.23, 0.32, 0.55), (0.13, 0.57, 0.55), (0.37, 0.79, 0.38), (0.99, 0.91, 0.14))
 
 
@@ -67,22 +67,22 @@ def depth_colour(depth_mm, trace, rig, opacity=1.0):
     at = (depth_mm - near_mm) / (far_mm - near_mm) * (len(DEPTH_COLOURS) - 1)
     at = min(max(at, 0), len(DEPTH_COLOURS) - 1)
     first = min(int(at), len(DEPTH_COLOURS) - 2)
-    share = at - first
+    fraction = at - first
     low, high = DEPTH_COLOURS[first:first + 2]
-    return colour([a + (b - a) * share for a, b in zip(low, high)], opacity)
+    return colour([a + (b - a) * fraction for a, b in zip(low, high)], opacity)
 
 
 def time_of(time_us):
     return Timestamp(seconds=time_us // 1000000, nanos=time_us % 1000000 * 1000)
 
 
-def metres(place_mm):
-    return [float(value) / 1000 for value in place_mm]
+def metres(position_mm):
+    return [float(value) / 1000 for value in position_mm]
 
 
-def pose(place_mm):
-    x, y, z = metres(place_mm)
-    return Pose(position=Vector3(x=x, y=y, z=z), orientation=NO_TURN)
+def pose(position_mm):
+    x, y, z = metres(position_mm)
+    return Pose(position=Vector3(x=x, y=y, z=z), orientation=NO_ROTATION)
 
 
 def pixel(u_px, v_px):
@@ -93,11 +93,11 @@ def pixel(u_px, v_px):
 
 def transforms(rig, time):
     found = [FrameTransform(timestamp=time, parent_frame_id="rig", child_frame_id=CAMERA,
-                            translation=Vector3(), rotation=CAMERA_TURN)]
+                            translation=Vector3(), rotation=CAMERA_ROTATION)]
     if rig.projector_mm is not None:
         x, y, z = metres(rig.projector_mm)
         found.append(FrameTransform(timestamp=time, parent_frame_id=CAMERA, child_frame_id="projector",
-                                    translation=Vector3(x=x, y=y, z=z), rotation=NO_TURN))
+                                    translation=Vector3(x=x, y=y, z=z), rotation=NO_ROTATION))
     return found
 
 
@@ -147,7 +147,7 @@ def look(record, index):
 
 
 def words(record, index):
-    """What stands beside a hypothesis: its distance and who it is, or why it was rejected."""
+    """The label of a hypothesis: its distance and who it is, or why it was rejected."""
     h = record.hypotheses[index]
     score = "score %s" % h["score"] if "score" in h else None
     if index not in record.heads:
@@ -188,7 +188,7 @@ def points(trace, time):
     kind = PackedElementField
     fields = [kind(name=name, offset=4 * i, type=kind.FLOAT32) for i, name in enumerate("xyz")]
     fields.append(kind(name="slot", offset=12, type=kind.UINT32))
-    data = b"".join(struct.pack("<fffI", *metres(place), slot) for slot, *place in trace.points_mm)
+    data = b"".join(struct.pack("<fffI", *metres(position), slot) for slot, *position in trace.points_mm)
     return PointCloud(timestamp=time, frame_id=CAMERA, pose=pose((0, 0, 0)), point_stride=16, fields=fields, data=data)
 
 
@@ -211,10 +211,10 @@ def surface(trace, rig, time):
     scene = fresh_scene(time)
     if trace.surface_mm is None:
         return scene
-    nodes = [place for row in trace.surface_mm for place in row]
+    nodes = [position for row in trace.surface_mm for position in row]
     shape = TriangleListPrimitive(
         pose=pose((0, 0, 0)), points=[Point3(x=x, y=y, z=z) for x, y, z in map(metres, nodes)],
-        color=colour(REJECTED), colors=[depth_colour(place[2], trace, rig, 0.7) for place in nodes],
+        color=colour(REJECTED), colors=[depth_colour(position[2], trace, rig, 0.7) for position in nodes],
         indices=triangles(len(trace.surface_mm)))
     scene.entities.append(SceneEntity(timestamp=time, frame_id=CAMERA, id="surface", lifetime=FOREVER,
                                       triangles=[shape]))

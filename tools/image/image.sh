@@ -80,7 +80,7 @@ size=${SLOT_MIB}MiB, type=linux, name=isohead-a, uuid=$(identifier a)
 size=${SLOT_MIB}MiB, type=linux, name=isohead-b, uuid=$(identifier b)
 size=${DATA_MIB}MiB, type=EBD0A0A2-B9E5-4433-87C0-68B6B72699C7, name=isohead-data, uuid=$(identifier data)
 TABLE
-# put FILE MIB: at that place of the image
+# put FILE MIB: at that offset of the image
 put() { dd if="$1" of="$image" bs=1M seek="$2" conv=notrunc,sparse status=none; }
 put "$esp" 1
 put "$slot" $((1 + ESP_MIB))

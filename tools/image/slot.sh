@@ -82,7 +82,7 @@ busybox() {
     done
 }
 
-# What may differ from one working copy to the next; cpio and mksquashfs leave out the rest.
+# What may differ from one working copy to the next; cpio and mksquashfs leave out all else.
 level() {
     chmod -R u=rwX,go=rX "$1"
     find "$1" -exec touch -hd "@$SOURCE_DATE_EPOCH" {} +

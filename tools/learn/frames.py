@@ -33,7 +33,7 @@ def read_truth(directory):
 def read_trace(path):
     with open(path, encoding="utf-8") as file:
         trace = json.load(file)
-    found = [finding for finding in trace["findings"] if not finding["predicted"]]
+    found = [detection for detection in trace["findings"] if not detection["predicted"]]
     return {
         "file": trace["file"],
         "kinds": trace["evidence"],

@@ -5,8 +5,8 @@ learn.py --render PROGRAM --host-sim PROGRAM --work DIR [--seeds A-B] [--out FIL
 
 Renders every scene of scenes.py for every seed into DIR (those already there are kept), runs the
 firmware over them, and fits a logistic model: log-odds = bias + one piecewise linear curve per kind
-of evidence, with a penalty on curves that bend. A finding within 55 mm of a head is one, beyond
-100 mm it is none, between it is not used. Run it twice: which findings remain depends a little on
+of evidence, with a penalty on curves that bend. A detection within 55 mm of a head is one, beyond
+100 mm it is none, between it is not used. Run it twice: which detections remain depends a little on
 the curves that rated them.
 """
 
@@ -27,7 +27,7 @@ NO_HEAD_MM = 100
 
 
 def label(frame):
-    """Of every finding: 1 a head, 0 none, nan not to be used."""
+    """Of every detection: 1 a head, 0 none, nan not to be used."""
     count = len(frame["centre_mm"])
     if len(frame["heads"]) == 0:
         return numpy.zeros(count)
@@ -102,7 +102,7 @@ def main():
     seen = see(directories_of(arguments, arguments.seeds))
     kinds = seen[0]["kinds"]
     evidence, labels = gather(seen)
-    print("%d frames, %d findings, %d heads" % (len(seen), len(labels), labels.sum()))
+    print("%d frames, %d detections, %d heads" % (len(seen), len(labels), labels.sum()))
     learnt = model.fit(evidence, labels)
     model.write(arguments.out, learnt, kinds,
                 "tools/learn/learn.py --seeds %s" % arguments.seeds)

@@ -20,10 +20,10 @@ class Curves:
     bias_q10: int
 
     def logits(self, evidence):
-        place = (evidence * 256 - self.first_q8) / self.step_q8
-        place = numpy.clip(place, 0, KNOTS - 1)
-        knot = numpy.minimum(place.astype(int), KNOTS - 2)
-        part = place - knot
+        position = (evidence * 256 - self.first_q8) / self.step_q8
+        position = numpy.clip(position, 0, KNOTS - 1)
+        knot = numpy.minimum(position.astype(int), KNOTS - 2)
+        part = position - knot
         kind = numpy.arange(evidence.shape[1])
         low, high = self.at_q10[kind, knot], self.at_q10[kind, knot + 1]
         return ((low * (1 - part) + high * part).sum(axis=1) + self.bias_q10) / 1024
@@ -38,8 +38,8 @@ def make_knots(evidence):
 
 def hats(evidence, first_q8, step_q8):
     """Columns of the linear model: KNOTS hat functions per kind, and a one."""
-    place = numpy.clip((evidence * 256 - first_q8) / step_q8, 0, KNOTS - 1)
-    columns = [numpy.maximum(0, 1 - numpy.abs(place - knot)) for knot in range(KNOTS)]
+    position = numpy.clip((evidence * 256 - first_q8) / step_q8, 0, KNOTS - 1)
+    columns = [numpy.maximum(0, 1 - numpy.abs(position - knot)) for knot in range(KNOTS)]
     design = numpy.stack(columns, axis=2).reshape(len(evidence), -1)
     return numpy.concatenate([design, numpy.ones((len(evidence), 1))], axis=1)
 

@@ -33,13 +33,13 @@ def write_vectors(directory):
                   frames.Frame("spike", (320, 240), boxes=[(100, 60, 100, 60, 255)])):
         r = exact(frame.grey_q4())
         height, width = r.shape
-        places = [(u, v) for v in (0, 1, 3, 4, height - 5, height - 1) for u in (0, 2, 4, width - 1)]
-        places += [(99, 60), (100, 60), (101, 61), (104, 64), (105, 60)]
-        places += [(int(random.integers(width)), int(random.integers(height))) for _ in range(60)]
+        positions = [(u, v) for v in (0, 1, 3, 4, height - 5, height - 1) for u in (0, 2, 4, width - 1)]
+        positions += [(99, 60), (100, 60), (101, 61), (104, 64), (105, 60)]
+        positions += [(int(random.integers(width)), int(random.integers(height))) for _ in range(60)]
         inc.raw("\nstatic const struct vector_response vector_%s_responses[] = {\n%s};\n" % (
             frame.name + "_band", emit.wrap(["{%d, %d, %s}" % (u, v, emit.number(r[v, u], 4))
-                                             for u, v in places])))
+                                             for u, v in positions])))
         rows.append("{%s}, %d, vector_%s_band_responses" % (
-            frames.spec(inc, frame), len(places), frame.name))
+            frames.spec(inc, frame), len(positions), frame.name))
     inc.struct_array("vector_band", "vector_bands", rows)
     return inc.write(directory, "bandpass.inc")

@@ -56,9 +56,9 @@ def look(trace, grey):
     dots = trace["dots"]
     slots = [None if s is None else s["dot"] for s in trace["labels"]["slot"]]
     labelled = [d for d in slots if d is not None]
-    share = np.mean([bright(u, v) for v in range(0, len(grey), 8) for u in range(0, len(grey[0]), 8)])
+    fraction = np.mean([bright(u, v) for v in range(0, len(grey), 8) for u in range(0, len(grey[0]), 8)])
     if len(labelled) < exposure.LABELLED_MIN:
-        return len(labelled), 0, 0, int(share * 361 / 8)
+        return len(labelled), 0, 0, int(fraction * 361 / 8)
     peaks = sorted(dots["peak"][d] for d in labelled)
     lost = 0
     for slot in (s for s in range(361) if slots[s] is None):
@@ -67,7 +67,7 @@ def look(trace, grey):
                 for c in range(max(0, column - 2), min(19, column + 3)) if slots[r * 19 + c] is not None]
         if len(near) >= 3:
             lost += bright(*(np.mean([dots[k][d] for d in near]) / 4096 for k in ("u_px_q12", "v_px_q12")))
-    return len(peaks), peaks[len(peaks) // 4], peaks[len(peaks) * 9 // 10], max(lost, int(share * 361 / 8))
+    return len(peaks), peaks[len(peaks) // 4], peaks[len(peaks) * 9 // 10], max(lost, int(fraction * 361 / 8))
 
 
 def main():
@@ -80,15 +80,15 @@ def main():
     print("fixed:", ", ".join("%d us %d labels" % item for item in fixed.items()))
     good = True
     for start in (250, 1000, 4000, 16000):
-        state, way = (float(start), 256.0, 20000.0, 0), []
+        state, steps = (float(start), 256.0, 20000.0, 0), []
         for frame in range(FIRST, FIRST + FRAMES):
             seen = see(render, host_sim, options, frame, state[0])
-            way.append((round(state[0]), seen[0]))
+            steps.append((round(state[0]), seen[0]))
             state = exposure.proposed(state, seen, **LIMITS)
-        rest = [us for us, _ in way[-4:]]
-        ok = max(rest) <= 1.3 * min(rest) and way[-1][1] >= 0.9 * max(fixed.values())
+        settled = [us for us, _ in steps[-4:]]
+        ok = max(settled) <= 1.3 * min(settled) and steps[-1][1] >= 0.9 * max(fixed.values())
         good = good and ok
-        print("from %5d us:" % start, " ".join("%d:%d" % step for step in way), "good" if ok else "NOT GOOD")
+        print("from %5d us:" % start, " ".join("%d:%d" % step for step in steps), "good" if ok else "NOT GOOD")
     return 0 if good else 1
 
 

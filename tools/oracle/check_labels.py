@@ -4,9 +4,9 @@
 TRACE_DIR holds a directory of frames per sequence (host_sim --trace); DATA_DIR the sequences' own
 directories of the same names with truth.jsonl, whose "dots" are [index, u, v, z_mm] of every
 visible dot. Reported per sequence and for all:
-  recall   share of the true dots with a detected dot within 1.5 px
+  recall   fraction of the true dots with a detected dot within 1.5 px
   error    median distance of those to the nearest detected dot, px
-  right    share of the assigned labels whose dot lies within 1.5 px of the true dot of that index;
+  right    fraction of the assigned labels whose dot lies within 1.5 px of the true dot of that index;
            a label where no such dot is visible is wrong
 Exit status 1 if a limit given as an option is not kept, 2 if there was nothing to compare.
 """
@@ -24,7 +24,7 @@ import traces
 NEAR_PX = 1.5
 
 
-class Tally:
+class Counts:
     def __init__(self):
         self.frames = self.true = self.found = self.labels = self.right = 0
         self.error_px = []
@@ -43,13 +43,13 @@ class Tally:
         return float(np.median(self.error_px)) if self.error_px else float("nan")
 
     @property
-    def share(self):
+    def fraction(self):
         return self.right / self.labels if self.labels else float("nan")
 
     def as_dict(self):
         return {"frames": self.frames, "true_dots": self.true, "recall": self.recall,
                 "error_median_px": self.median_px, "labels": self.labels, "wrong_labels":
-                self.labels - self.right, "right": self.share}
+                self.labels - self.right, "right": self.fraction}
 
 
 def read_truth(path):
@@ -60,29 +60,29 @@ def read_truth(path):
 
 
 def check_frame(frame, truth):
-    tally = Tally()
-    tally.frames, tally.true = 1, len(truth)
+    counts = Counts()
+    counts.frames, counts.true = 1, len(truth)
     dots = np.array([frame["dots"]["u_px_q12"], frame["dots"]["v_px_q12"]], dtype=float).T / 4096
-    place = {int(t[0]): np.array(t[1:3]) for t in truth}
-    if len(dots) and place:
-        distance, _ = cKDTree(dots).query(np.array(list(place.values())))
+    position = {int(t[0]): np.array(t[1:3]) for t in truth}
+    if len(dots) and position:
+        distance, _ = cKDTree(dots).query(np.array(list(position.values())))
         near = distance[distance <= NEAR_PX]
-        tally.found, tally.error_px = len(near), near.tolist()
+        counts.found, counts.error_px = len(near), near.tolist()
     for slot, label in enumerate(frame["labels"]["slot"]):
         if label is not None:
-            tally.labels += 1
-            tally.right += bool(slot in place
-                                and np.hypot(*(dots[label["dot"]] - place[slot])) <= NEAR_PX)
-    return tally
+            counts.labels += 1
+            counts.right += bool(slot in position
+                                and np.hypot(*(dots[label["dot"]] - position[slot])) <= NEAR_PX)
+    return counts
 
 
 def check_sequence(trace_directory, truth_path):
-    tally = Tally()
+    counts = Counts()
     truth = read_truth(truth_path)
     for stem, frame in traces.frames(trace_directory):
         if stem in truth:
-            tally.add(check_frame(frame, truth[stem]))
-    return tally
+            counts.add(check_frame(frame, truth[stem]))
+    return counts
 
 
 def truth_of(data_dir, name):
@@ -94,16 +94,16 @@ def truth_of(data_dir, name):
     return None
 
 
-def within_limits(tally, arguments):
-    return ((arguments.min_recall is None or tally.recall >= arguments.min_recall)
-            and (arguments.max_error_px is None or tally.median_px <= arguments.max_error_px)
-            and (arguments.min_right is None or tally.share >= arguments.min_right))
+def within_limits(counts, arguments):
+    return ((arguments.min_recall is None or counts.recall >= arguments.min_recall)
+            and (arguments.max_error_px is None or counts.median_px <= arguments.max_error_px)
+            and (arguments.min_right is None or counts.fraction >= arguments.min_right))
 
 
-def report(name, tally):
+def report(name, counts):
     print("%-24s %4d frames  recall %.4f  error %.4f px  right %.4f (%d of %d labels wrong)"
-          % (name, tally.frames, tally.recall, tally.median_px, tally.share,
-             tally.labels - tally.right, tally.labels))
+          % (name, counts.frames, counts.recall, counts.median_px, counts.fraction,
+             counts.labels - counts.right, counts.labels))
 
 
 def parse():
@@ -121,25 +121,25 @@ def parse():
 
 def main():
     arguments = parse()
-    tallies = {}
+    by_sequence = {}
     for name, directory in traces.sequences(arguments.trace_dir):
         path = truth_of(arguments.data_dir, name)
         if path and (not arguments.sequence or os.path.basename(name) in arguments.sequence):
-            tally = check_sequence(directory, path)
-            if tally.frames:
-                tallies[name] = tally
-    overall = Tally()
-    for tally in tallies.values():
-        overall.add(tally)
+            counts = check_sequence(directory, path)
+            if counts.frames:
+                by_sequence[name] = counts
+    overall = Counts()
+    for counts in by_sequence.values():
+        overall.add(counts)
     if not overall.frames:
         print("no frame with true dots found", file=sys.stderr)
         return 2
     if arguments.json:
-        print(json.dumps({"sequences": {n: t.as_dict() for n, t in tallies.items()},
+        print(json.dumps({"sequences": {n: t.as_dict() for n, t in by_sequence.items()},
                           "overall": overall.as_dict()}))
     else:
-        for name, tally in tallies.items():
-            report(name, tally)
+        for name, counts in by_sequence.items():
+            report(name, counts)
         report("overall", overall)
     return 0 if within_limits(overall, arguments) else 1
 

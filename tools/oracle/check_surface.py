@@ -27,18 +27,18 @@ def column(table, key, fraction_bits):
 def differences(frame, ridge, huber_mm):
     """(weights, two-pass) of one valid frame."""
     samples = frame["samples"]
-    places = np.stack([column(samples, "x_q16", 16), column(samples, "y_q16", 16)], axis=1)
+    positions = np.stack([column(samples, "x_q16", 16), column(samples, "y_q16", 16)], axis=1)
     depth_mm = column(samples, "depth_mm_q8", 8)
     mean_mm = surface.mean_of(samples["depth_mm_q8"])
     grid_mm = np.array(frame["surface"]["depth_mm_q8"], dtype=float) / 256
     final = column(samples, "final_root_weight_q15", 15)
     centres = frame["surface"]["centres"]
-    own, _ = surface.fit(places, depth_mm, column(samples, "root_weight_q15", 15), mean_mm,
+    own, _ = surface.fit(positions, depth_mm, column(samples, "root_weight_q15", 15), mean_mm,
                          centres, surface.MOVING[centres], ridge, huber_mm)
     off_mm = np.abs(grid_mm - own).max()
     if surface.MOVING[centres]:
-        return off_mm, off_mm  # weights alone do not tell where samples were moved to
-    once = surface.on_grid(surface.solve(places, depth_mm, final, mean_mm, ridge, centres), mean_mm,
+        return off_mm, off_mm  # weights alone do not say where samples were moved to
+    once = surface.on_grid(surface.solve(positions, depth_mm, final, mean_mm, ridge, centres), mean_mm,
                            depth_mm)
     return np.abs(grid_mm - once).max(), off_mm
 

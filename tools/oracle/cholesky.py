@@ -8,7 +8,7 @@ import surface
 from rig import to_q, from_q
 
 DIAGONAL = 0.99
-# Beyond this condition nothing of L and x can be told from a rounding error of A; the test then
+# Beyond this condition L and x cannot be distinguished from rounding errors of A; the test then
 # looks at residuals alone.
 CONDITION_MAX = 1e4
 
@@ -32,8 +32,8 @@ def random_matrix(random, n, condition):
 
 def surface_matrix(random, ridge):
     """The normal equations of 300 dots on a 12x12 multiquadric basis."""
-    places = random.uniform(-18, 18, (300, 2))
-    rows = surface.basis(places)
+    positions = random.uniform(-18, 18, (300, 2))
+    rows = surface.basis(positions)
     normal = rows.T @ rows
     return scaled(normal + ridge * np.diag(np.diag(normal)))
 

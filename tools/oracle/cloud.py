@@ -14,7 +14,7 @@ def rigs():
                 (-0.21, 0.07, 0.001, -0.0007, -0.01), (300, 9000))]
 
 
-def place(rig, point):
+def position(rig, point):
     """Column and row of its pixel and its depth; None when it is not seen; "unclear" when that is
     a matter of rounding."""
     x, y, z = point
@@ -44,7 +44,7 @@ def write_vectors(directory):
             point_q8 = to_q([*random.normal(0, 0.5, 2) * abs(z), z], 8)
             if len(rows) % 15 == 0:
                 point_q8[:2] *= 40
-            seen = place(rig, from_q(point_q8, 8))
+            seen = position(rig, from_q(point_q8, 8))
             if seen != "unclear":
                 rows.append("%d, {%d, %d, %d}, %d, %d, %d" % (
                     index, *point_q8, *(seen or (-1, -1, 0))))

@@ -48,17 +48,17 @@ def judge(response, padded, u, v, ring_max, side_min, flat_min):
     if sides < 4 * side_min * peak:
         return "hot"
     flat = sides >= 4 * flat_min * peak
-    place = centre(padded, u, v, 4 if flat else 2)
+    position = centre(padded, u, v, 4 if flat else 2)
     ring_u, ring_v = u, v
     if flat:  # around the plateau's middle, at most 2 px from the peak
-        ring_u = int(np.clip(np.floor(place[0] + 0.5), u - 2, u + 2))
-        ring_v = int(np.clip(np.floor(place[1] + 0.5), v - 2, v + 2))
+        ring_u = int(np.clip(np.floor(position[0] + 0.5), u - 2, u + 2))
+        ring_v = int(np.clip(np.floor(position[1] + 0.5), v - 2, v + 2))
     ring = max(padded[ring_v + EDGE + dv, ring_u + EDGE + du] for du, dv in RING)
-    return "edge" if ring > np.floor(peak * ring_max + 0.5) else place
+    return "edge" if ring > np.floor(peak * ring_max + 0.5) else position
 
 
 def find(frame, ambient=None, ring_max=128 / 256, side_min=138 / 256, flat_min=225 / 256):
-    """dots (u, v, peak), maxima above the threshold that are edges or twins, and hot pixels."""
+    """dots (u, v, peak), maxima above the threshold that are edges or duplicates, and hot pixels."""
     left, block, _ = noise.measure(frame.grey_q4(), ambient and ambient.grey_q4(), True)
     response = bandpass.response(left)
     level = noise.spread(block, response.shape, True)
@@ -82,14 +82,14 @@ def find(frame, ambient=None, ring_max=128 / 256, side_min=138 / 256, flat_min=2
 
 
 def scattered(random, count, size, apart, radius, height):
-    """Spots at random sub-pixel places, at least so many pixels apart."""
-    places = []
-    while len(places) < count:
-        place = random.uniform(6, np.array(size) - 7)
-        if all(np.hypot(*(place - p)) >= apart for p in places):
-            places.append(place)
-    places = np.rint(np.array(places) * 16)
-    return np.column_stack([places, random.integers(radius[0], radius[1] + 1, count),
+    """Spots at random sub-pixel positions, at least so many pixels apart."""
+    positions = []
+    while len(positions) < count:
+        position = random.uniform(6, np.array(size) - 7)
+        if all(np.hypot(*(position - p)) >= apart for p in positions):
+            positions.append(position)
+    positions = np.rint(np.array(positions) * 16)
+    return np.column_stack([positions, random.integers(radius[0], radius[1] + 1, count),
                             random.integers(height[0], height[1] + 1, count)])
 
 
@@ -128,22 +128,22 @@ def shapes():
 
 def frames():
     random = np.random.default_rng(51)
-    least = (320, 240)
-    yield Frame("grey8", least, 255, 40, 2, (30, -20), 1,
-                scattered(random, 70, least, 14, (30, 70), (25, 140)))
+    smallest = (320, 240)
+    yield Frame("grey8", smallest, 255, 40, 2, (30, -20), 1,
+                scattered(random, 70, smallest, 14, (30, 70), (25, 140)))
     yield Frame("grey10", (331, 243), 1023, 160, 6, (-40, 90), 2,
                 scattered(random, 60, (331, 243), 14, (30, 70), (100, 560)))
-    yield Frame("grey16", least, 65535, 9000, 600, (900, 900), 3,
-                scattered(random, 60, least, 14, (30, 70), (5000, 30000)))
-    yield Frame("grey1", least, 1, 0, 0, (0, 0), 4,
-                scattered(random, 40, least, 14, (30, 60), (3, 3)))
-    yield Frame("border", least, spots=border_spots(*least))
-    yield Frame("shapes", least, 255, 10, boxes=shapes())
-    yield Frame("saturated", least, 255, 200, 3, (0, 0), 5,
-                scattered(random, 40, least, 16, (40, 70), (60, 400)))
+    yield Frame("grey16", smallest, 65535, 9000, 600, (900, 900), 3,
+                scattered(random, 60, smallest, 14, (30, 70), (5000, 30000)))
+    yield Frame("grey1", smallest, 1, 0, 0, (0, 0), 4,
+                scattered(random, 40, smallest, 14, (30, 60), (3, 3)))
+    yield Frame("border", smallest, spots=border_spots(*smallest))
+    yield Frame("shapes", smallest, 255, 10, boxes=shapes())
+    yield Frame("saturated", smallest, 255, 200, 3, (0, 0), 5,
+                scattered(random, 40, smallest, 16, (40, 70), (60, 400)))
     yield Frame("burnt", (400, 320), 255, 40, 2, (0, 0), 9,
                 scattered(random, 90, (400, 320), 24, (30, 80), (200, 2500)))
-    yield Frame("noise", least, 255, 100, 30, (0, 0), 6, gain_q8=800)
+    yield Frame("noise", smallest, 255, 100, 30, (0, 0), 6, gain_q8=800)
     yield Frame("loud", (640, 480), 255, 60, 1, (0, 0), 8,
                 scattered(random, 120, (640, 480), 20, (30, 70), (12, 80)), loud=15)
     row, column = np.divmod(np.arange(361), 19)

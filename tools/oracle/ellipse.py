@@ -39,12 +39,12 @@ def shape_and_ratio(area, second):
     return 4 * np.pi * np.sqrt(values[0] * values[1]) / abs(area), np.sqrt(values[1] / values[0])
 
 
-def winding(polygon, place):
-    """Turns of the polygon round the place, from the angles."""
-    away = polygon - place
+def winding(polygon, position):
+    """How often the polygon winds round the position, from the angles."""
+    away = polygon - position
     angle = np.arctan2(away[:, 1], away[:, 0])
-    turn = np.diff(np.append(angle, angle[0]))
-    return int(np.rint((turn - 2 * np.pi * np.rint(turn / (2 * np.pi))).sum() / (2 * np.pi)))
+    phase = np.diff(np.append(angle, angle[0]))
+    return int(np.rint((phase - 2 * np.pi * np.rint(phase / (2 * np.pi))).sum() / (2 * np.pi)))
 
 
 def resampled(vertices, closed, count):
@@ -55,8 +55,8 @@ def resampled(vertices, closed, count):
     return np.column_stack([np.interp(target, along, line[:, k]) for k in (0, 1)]), along[-1]
 
 
-def best_part(vertices, closed, place, count):
-    """(merit, area, centre) of the best elliptical part round the place, or None."""
+def best_part(vertices, closed, position, count):
+    """(merit, area, centre) of the best elliptical part round the position, or None."""
     points, length = resampled(vertices, closed, count)
     steps = count if closed else count - 1
     best = None
@@ -67,7 +67,7 @@ def best_part(vertices, closed, place, count):
             part = points[(first + np.arange(edges + 1)) % count]
             arc = length * edges / steps
             chord = np.hypot(*(part[-1] - part[0]))
-            if chord > CHORD_MAX * arc or winding(part, place) != 1:
+            if chord > CHORD_MAX * arc or winding(part, position) != 1:
                 continue
             area, centre, second = moments(part)
             shape, ratio = shape_and_ratio(area, second)
@@ -93,8 +93,8 @@ def finely(line, closed):
 
 def ellipse_exit(angle, ellipse, origin):
     """Distance from the origin along a direction to the far side of an ellipse; 0 if missed."""
-    x, y, a, b, turn = ellipse
-    c, s = np.cos(turn), np.sin(turn)
+    x, y, a, b, phase = ellipse
+    c, s = np.cos(phase), np.sin(phase)
     to_unit = np.array([[c / a, s / a], [-s / b, c / b]])
     o, d = to_unit @ (np.array(origin) - [x, y]), to_unit @ [np.cos(angle), np.sin(angle)]
     root = (o @ d)**2 - (d @ d) * (o @ o - 1)
@@ -116,7 +116,7 @@ def arc(x, y, a, b, first_deg, last_deg, count=60):
 
 
 def contours():
-    """name, closed, vertices, place. Minima run clockwise on the screen: area positive."""
+    """name, closed, vertices, position. Minima run clockwise on the screen: area positive."""
     yield "head", True, union([(22, 20, 6, 8, 0.1)]), (22, 20)
     yield "head_hand", True, union([(20, 20, 6, 8, 0), (27.5, 25, 4, 2.5, 0.4)]), (20, 19)
     yield "head_two_hands", True, union([(23, 18, 6, 7.5, 0), (31, 22, 5, 2.5, 0.3),
@@ -168,14 +168,14 @@ def write_vectors(directory):
             (area, *centre, second[0, 0], second[0, 1], second[1, 1], shape, ratio), 6))))
     inc.struct_array("vector_polygon", "vector_polygons", rows)
     rows = []
-    for name, closed, vertices, place in contours():
+    for name, closed, vertices, position in contours():
         q9 = finely(vertices, closed)
         vertices_text(inc, "part_" + name, q9)
         for count in POINTS:
-            best = best_part(q9 / 512, closed, np.array(place, float), count)
+            best = best_part(q9 / 512, closed, np.array(position, float), count)
             found = best if best else (0, 0, (0, 0))
             rows.append('"%s", %d, %d, %d, vector_part_%s, {%d, %d}, %d, %s' % (
-                name, count, closed, len(q9), name, place[0] * 512, place[1] * 512, best is not None,
+                name, count, closed, len(q9), name, position[0] * 512, position[1] * 512, best is not None,
                 ", ".join(emit.numbers((found[0], found[1], *found[2]), 4))))
     inc.struct_array("vector_part", "vector_parts", rows)
     return inc.write(directory, "ellipse.inc")

@@ -11,7 +11,7 @@ SEMI_MIN_MM, SEMI_MAX_MM, SLOPE_MAX = 40, 200, 4
 NOT_CLOSE = 0.01
 
 
-def place(centre, semi, point):
+def position(centre, semi, point):
     """Points in the ellipsoid's units, one a row."""
     return (np.asarray(point, float) - centre) / semi
 
@@ -20,7 +20,7 @@ def cross(centre, semi, origin, slope):
     """Lines from an origin, one slope a row: at, nearest, radius2, entry, is it in reach."""
     slope = np.atleast_2d(slope)
     ahead = np.column_stack([slope, np.ones(len(slope))])
-    at = place(centre, semi, origin + (centre[2] - origin[2]) * ahead)
+    at = position(centre, semi, origin + (centre[2] - origin[2]) * ahead)
     along = ahead / semi
     tau = -(at * along).sum(axis=1) / (along**2).sum(axis=1)
     nearest = at + tau[:, None] * along

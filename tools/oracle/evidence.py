@@ -18,7 +18,7 @@ KINDS = ("on rough bulge tall moved above beside below high nothing body body_ra
 
 
 def lattice():
-    """Slopes of all rays, Q20: a turned, slightly wavy lattice."""
+    """Slopes of all rays, Q20: a rotated, slightly wavy lattice."""
     index = np.arange(SLOTS)
     column, row = index % GRID - 9, index // GRID - 9
     x = PITCH * (column + 0.05 * row + 0.2 * np.sin(index)) - 0.07
@@ -37,8 +37,8 @@ def ellipsoid_depth(slope, centre, semi):
 
 def box_depth(slope, z, x_range, y_range):
     """A frontal rectangle."""
-    place = ORIGIN[:2] + (z - ORIGIN[2]) * slope
-    inside = ((place > [x_range[0], y_range[0]]) & (place < [x_range[1], y_range[1]])).all(1)
+    position = ORIGIN[:2] + (z - ORIGIN[2]) * slope
+    inside = ((position > [x_range[0], y_range[0]]) & (position < [x_range[1], y_range[1]])).all(1)
     return np.where(inside, z, np.nan)
 
 
@@ -80,9 +80,9 @@ def depth_of(body, slope):
         return ellipsoid_depth(slope, *body[1:])
     if body[0] == "box":
         return box_depth(slope, *body[1:])
-    place = ORIGIN[:2] + (body[1] - ORIGIN[2]) * slope
-    inside = (((place - CENTRE[:2]) / MEAN_SEMI[:2])**2).sum(1) < 1
-    return np.where(inside, body[1] + 0.3 * (place[:, 0] - CENTRE[0]), np.nan)
+    position = ORIGIN[:2] + (body[1] - ORIGIN[2]) * slope
+    inside = (((position - CENTRE[:2]) / MEAN_SEMI[:2])**2).sum(1) < 1
+    return np.where(inside, body[1] + 0.3 * (position[:, 0] - CENTRE[0]), np.nan)
 
 
 def make_scene(name, slope_q20, random):
@@ -104,12 +104,12 @@ def points_of(depth_q8, slope_q20):
     return np.column_stack([origin_q8[:2] + aside, depth_q8])
 
 
-def share(part, everything):
+def fraction(part, everything):
     return (part.sum() + 0.5) / (everything.sum() + 1)
 
 
-def plain(part, everything, least):
-    return part.sum() / max(everything.sum(), least)
+def plain(part, everything, smallest):
+    return part.sum() / max(everything.sum(), smallest)
 
 
 class Scene:
@@ -129,9 +129,9 @@ class Scene:
         inside = np.sqrt(np.maximum(1 - self.radius2, 0) / gg)
         self.entry = centre[2] + semi[2] * (-eg / gg - inside)
         self.dz = np.where(self.seen, self.point[:, 2] - centre[2], np.inf)
-        place = (self.point - centre) / semi
-        f = np.linalg.norm(place, axis=1)
-        self.distance = (f - 1) / (np.linalg.norm(place / semi, axis=1) / f)
+        position = (self.point - centre) / semi
+        f = np.linalg.norm(position, axis=1)
+        self.distance = (f - 1) / (np.linalg.norm(position / semi, axis=1) / f)
         self.margin = np.full(SLOTS, np.inf)
 
     def above(self, value, limit, step):
@@ -161,15 +161,15 @@ def look(s, start, nest):
     if on.sum() >= 6:
         p = s.point[on] - s.centre
         design = np.column_stack([p[:, :2], np.ones(len(p))])
-        rest = p[:, 2] - design @ np.linalg.lstsq(design, p[:, 2], rcond=None)[0]
-        bulge = np.sqrt((rest**2).mean())
+        residual = p[:, 2] - design @ np.linalg.lstsq(design, p[:, 2], rcond=None)[0]
+        bulge = np.sqrt((residual**2).mean())
     out["bulge"] = bulge - out["rough"]
     out["tall"] = 100 * (s.semi[1] - MEAN_SEMI[1]) / MEAN_SEMI[1]
     out["moved"] = np.linalg.norm(s.centre - start)
     is_open = telling & s.above(s.dz, 60, 0.02)
     body = seen & s.above(s.dz, -220, 0.02) & ~s.above(s.dz, 200, 0.02)
     high = telling & ~s.above(ey, -1.9, 1e-3) & ~s.above(np.abs(ex), 1.6, 1e-3)
-    out["high"] = share(is_open & high, high)
+    out["high"] = fraction(is_open & high, high)
     d2 = ex**2 + ey**2
     ring = telling & s.above(d2, 1.25**2, 4e-3) & ~s.above(d2, 1.9**2, 4e-3)
     low = ring & s.above(ey - 0.9 * np.abs(ex), 0, 1e-3)
@@ -177,10 +177,10 @@ def look(s, start, nest):
     top = ring & ~s.above(ey + 0.8 * np.abs(ex), 0, 1e-3)
     left = ring & ~top & ~s.above(ex, 0, 1e-3)
     right = ring & ~top & ~left
-    out["below"] = share(is_open & low, low)
+    out["below"] = fraction(is_open & low, low)
     out["nothing"] = plain(s.empty & ring, ring, 1)
-    out["above"] = share(is_open & top, top)
-    out["beside"] = min(share(is_open & left, left), share(is_open & right, right))
+    out["above"] = fraction(is_open & top, top)
+    out["beside"] = min(fraction(is_open & left, left), fraction(is_open & right, right))
     x, y = s.aside.T
     chin = y - s.semi[1]
     here = telling & s.between(chin, 40, 260) & ~s.above(np.abs(x), 180, 0.05)

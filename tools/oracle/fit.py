@@ -14,7 +14,7 @@ from rig import from_q, to_q
 
 ROBUST_MM = (24, 16, 8, 8, 8, 8)
 ROBUST_REACH = 5
-RADIUS_LEAST = 0.05
+RADIUS_MIN = 0.05
 LOW_FROM, LOW_TO, LOW_WEIGHT = 0.5, 0.8, 0.5
 SEE_THROUGH_MM, PUSH_MAX_MM, PUSH_WEIGHT = 60, 30, 0.5
 POINT_MM, PRIOR_CENTRE_MM, PRIOR_LN = 6, 60, 0.09
@@ -22,30 +22,30 @@ STEP_MAX_MM, STEP_MAX_LN, LN_MAX = 40, 0.15, 0.35
 ROUNDING_MM = 1 / 1024  # of the right side, half a step
 
 
-def rows(place, semi):
-    """Residuals and their derivatives by centre and ln semi-axes, of places one a row."""
-    f = np.linalg.norm(place, axis=1)
-    steep = place / semi  # f times the gradient of f
+def rows(position, semi):
+    """Residuals and their derivatives by centre and ln semi-axes, of positions, one a row."""
+    f = np.linalg.norm(position, axis=1)
+    steep = position / semi  # f times the gradient of f
     length = np.linalg.norm(steep, axis=1)
     residual = (f - 1) * f / length
-    return residual, np.hstack([-steep, -place**2]) / length[:, None]
+    return residual, np.hstack([-steep, -position**2]) / length[:, None]
 
 
-def observations(space, centre, semi, robust_mm):
+def observations(ray_table, centre, semi, robust_mm):
     """Residuals, derivatives and weights of all points and pushes."""
-    seen = space.state == scenes.SEEN
-    slope, point = space.slope[seen], space.point[seen]
+    seen = ray_table.state == scenes.SEEN
+    slope, point = ray_table.slope[seen], ray_table.point[seen]
     with np.errstate(invalid="ignore", divide="ignore"):
-        place = ellipsoid.place(centre, semi, point)
-        residual, derivative = rows(place, semi)
+        position = ellipsoid.position(centre, semi, point)
+        residual, derivative = rows(position, semi)
         weight = (1 + (residual / robust_mm)**2)**-2
-        weight *= np.interp(place[:, 1], (LOW_FROM, LOW_TO), (1, LOW_WEIGHT))
-        weight[(np.abs(place) > ellipsoid.REACH).any(axis=1)
-               | (np.linalg.norm(place, axis=1) < RADIUS_LEAST)
+        weight *= np.interp(position[:, 1], (LOW_FROM, LOW_TO), (1, LOW_WEIGHT))
+        weight[(np.abs(position) > ellipsoid.REACH).any(axis=1)
+               | (np.linalg.norm(position, axis=1) < RADIUS_MIN)
                | (np.abs(residual) > ROBUST_REACH * robust_mm)] = 0
-        _, nearest, radius2, entry, near = ellipsoid.cross(centre, semi, space.origin, slope)
+        _, nearest, radius2, entry, near = ellipsoid.cross(centre, semi, ray_table.origin, slope)
         pushes = near & (radius2 < 1) & (point[:, 2] > entry + SEE_THROUGH_MM) \
-            & (radius2 >= RADIUS_LEAST**2)
+            & (radius2 >= RADIUS_MIN**2)
         push_residual, push_derivative = rows(nearest, semi)
     used = weight > 0
     return (np.append(residual[used], np.maximum(push_residual[pushes], -PUSH_MAX_MM)),
@@ -53,7 +53,7 @@ def observations(space, centre, semi, robust_mm):
             np.append(weight[used], np.full(pushes.sum(), PUSH_WEIGHT)))
 
 
-def fit(space, start_centre, start_semi, rounding=lambda: 0):
+def fit(ray_table, start_centre, start_semi, rounding=lambda: 0):
     """Centre and semi-axes. rounding: what is added to the right sides."""
     start = np.concatenate([start_centre, np.log(np.divide(start_semi, MEAN_SEMI_MM))])
     prior_mean = np.append(start[:3], np.zeros(3))
@@ -61,7 +61,7 @@ def fit(space, start_centre, start_semi, rounding=lambda: 0):
     state = start.copy()
     for robust_mm in ROBUST_MM:
         semi = MEAN_SEMI_MM * np.exp(state[3:])
-        residual, derivative, weight = observations(space, state[:3], semi, robust_mm)
+        residual, derivative, weight = observations(ray_table, state[:3], semi, robust_mm)
         normal = derivative.T @ (weight[:, None] * derivative) + np.diag(prior)
         right = -derivative.T @ (weight * residual) - prior * (state - prior_mean)
         right += rounding()
@@ -71,17 +71,17 @@ def fit(space, start_centre, start_semi, rounding=lambda: 0):
     return state[:3], MEAN_SEMI_MM * np.exp(state[3:])
 
 
-def slack_of(random, space, centre, semi):
+def slack_of(random, ray_table, centre, semi):
     """What rounding can make of a fit, mm."""
     def rounding():  # derivatives by ln are a hundred times those by its hundredths
         return random.uniform(-ROUNDING_MM, ROUNDING_MM, 6) * np.repeat([1, 100], 3)
-    exact = np.concatenate(fit(space, centre, semi))
-    off = [np.concatenate(fit(space, centre, semi, rounding)) - exact for _ in range(12)]
-    return 8 * np.abs(off).max()  # places and sums are rounded too
+    exact = np.concatenate(fit(ray_table, centre, semi))
+    off = [np.concatenate(fit(ray_table, centre, semi, rounding)) - exact for _ in range(12)]
+    return 8 * np.abs(off).max()  # positions and sums are rounded too
 
 
 def starts(random, scene):
-    """Integers: a mean head some way off, and one of another size."""
+    """Integers: a mean head some distance off, and one of another size."""
     centre = np.array([0, 0, 1400]) if scene.centre is None else scene.centre
     for spread in (0.05, 0.3):
         semi = MEAN_SEMI_MM * np.exp(random.uniform(-spread, spread, 3))
@@ -90,13 +90,13 @@ def starts(random, scene):
 
 
 def distances(random):
-    """Places in an ellipsoid's units, and their distances to first order."""
+    """Positions in an ellipsoid's units, and their distances to first order."""
     for _ in range(40):
         semi = to_q(MEAN_SEMI_MM * np.exp(random.uniform(-LN_MAX, LN_MAX, 3)), 8)
         direction = random.normal(0, 1, 3)
-        place = to_q(direction / np.linalg.norm(direction) * random.uniform(0.06, 4), 14)
-        residual, _ = rows(from_q(place[None], 14), from_q(semi, 8))
-        yield place, semi, residual[0]
+        position = to_q(direction / np.linalg.norm(direction) * random.uniform(0.06, 4), 14)
+        residual, _ = rows(from_q(position[None], 14), from_q(semi, 8))
+        yield position, semi, residual[0]
 
 
 def write_vectors(directory):
@@ -106,13 +106,13 @@ def write_vectors(directory):
     inc.raw("\n#define VECTOR_SEE_THROUGH_MM %d\n#define VECTOR_LN_MAX %s\n"
             % (SEE_THROUGH_MM, emit.number(LN_MAX, 4)))
     inc.struct_array("vector_distance", "vector_distances", [
-        "{%d, %d, %d}, {%d, %d, %d}, %s" % (*place, *semi, emit.number(distance, 5))
-        for place, semi, distance in distances(random)])
+        "{%d, %d, %d}, {%d, %d, %d}, %s" % (*position, *semi, emit.number(distance, 5))
+        for position, semi, distance in distances(random)])
     lines = []
-    for index, (scene, space, _) in enumerate(scenes.spaces()):
+    for index, (scene, ray_table, _) in enumerate(scenes.spaces()):
         for centre_q8, semi_q8 in starts(random, scene):
-            centre, semi = fit(space, from_q(centre_q8, 8), from_q(semi_q8, 8))
-            slack = slack_of(random, space, from_q(centre_q8, 8), from_q(semi_q8, 8))
+            centre, semi = fit(ray_table, from_q(centre_q8, 8), from_q(semi_q8, 8))
+            slack = slack_of(random, ray_table, from_q(centre_q8, 8), from_q(semi_q8, 8))
             lines.append("%d, {{%d, %d, %d}, {%d, %d, %d}}, {%s}, {%s}, %s" % (
                 index, *centre_q8, *semi_q8, ", ".join(emit.numbers(centre, 4)),
                 ", ".join(emit.numbers(semi, 4)), emit.number(slack, 4)))

@@ -1,4 +1,4 @@
-"""Dots of a bust before a wall for the test of the whole: a head whose place is known."""
+"""Dots of a bust before a wall for the test of the whole: a head whose position is known."""
 
 import numpy as np
 

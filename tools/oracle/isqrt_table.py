@@ -13,7 +13,7 @@ import sys
 import numpy as np
 
 FIRST, LAST = 64, 256  # m in 256ths
-BETWEEN = 256  # places looked at between two entries
+BETWEEN = 256  # positions checked between two entries
 
 
 def exact_q15(m):
@@ -21,7 +21,7 @@ def exact_q15(m):
 
 
 def excess():
-    """By how much a chord lies above the curve, at the most, in each span."""
+    """By how much at most a chord lies above the curve, in each span."""
     part = np.linspace(0, 1, 65)[1:-1]
     for i in range(FIRST, LAST):
         chord = exact_q15(i / 256) * (1 - part) + exact_q15((i + 1) / 256) * part
@@ -35,11 +35,11 @@ def table():
 
 
 def worst_shortness(entries):
-    """The greatest relative lack, and the least: negative when anything is too great."""
+    """The largest relative lack, and the smallest: negative when anything is too large."""
     part_q16 = np.unique(np.append(np.arange(0, 65536, 65536 // BETWEEN), 65535))
     lacks = []
     for i, (here, after) in enumerate(zip(entries, entries[1:])):
-        # all m that share these 24 bits; the least of them has the greatest root, the last one the smallest
+        # all m that share these 24 bits; the smallest has the largest root, the last one the smallest
         read = here - (((here - after) * part_q16 + 0xffff) >> 16)
         for low_byte in (0, 255):
             m = ((FIRST + i) * 2**24 + part_q16 * 256 + low_byte) / 2.0**32
@@ -54,9 +54,9 @@ def main():
     with open(sys.argv[2], encoding="utf-8") as file:
         found = re.search(r"root_inverse_q15\[193\] = \{(.*?)\}", file.read(), re.S)
     entries = [int(word) for word in re.findall(r"\d+", found[1])]
-    most, least = worst_shortness(entries)
-    print("isqrt_table: %d entries, short by %.3g to %.3g (2^%.2f)" % (len(entries), least, most, np.log2(most)))
-    good = entries == table() and least >= 0 and most <= 2**-13.7
+    largest, smallest = worst_shortness(entries)
+    print("isqrt_table: %d entries, short by %.3g to %.3g (2^%.2f)" % (len(entries), smallest, largest, np.log2(largest)))
+    good = entries == table() and smallest >= 0 and largest <= 2**-13.7
     if not good:
         print("isqrt_table: %s has another table, or it does not keep its bounds" % sys.argv[2], file=sys.stderr)
     return 0 if good else 1

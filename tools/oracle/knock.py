@@ -1,11 +1,11 @@
 #!/usr/bin/python3
-"""Float64 reference of ih_health: a projector's turn from labelled dots, and what of a turn can be seen at all.
+"""Float64 reference of ih_health: a projector's rotation from labelled dots, and what of it can be seen at all.
 
-    knock.py FRAMES_DIR...     for the rig of each directory (with truth.jsonl): one dot's share, in px, of a turn by
+    knock.py FRAMES_DIR...     for the rig of each directory (with truth.jsonl): how far, in px, one dot moves by a rotation of
                                0.3 degrees and of a shift by 0.3 mm, across and along the lines; how well 50 frames
-                               with that truth's dots show each of the six when all are unknown, when only turns are
+                               with that truth's dots show each of the six when all are unknown, when only rotations are
 
-The rig is turned exactly (Rodrigues); equations and weights are the core's (firmware/core/upkeep/ih_rotation_estimate.h), iterated to the
+The rig is rotated exactly (Rodrigues); equations and weights are the core's (firmware/core/upkeep/ih_rotation_estimate.h), iterated to the
 end, over all frames at once.
 """
 
@@ -19,21 +19,21 @@ import sys
 import numpy as np
 
 REACH_PX = 0.3
-WEIGHT_MIN = 1 / 512  # half a step of the core's: a dot with less is none, and begins no place
+WEIGHT_MIN = 1 / 512  # half a step of the core's: a dot with less is none, and begins no position
 STEPS_OF_PX = 4096  # of the core's figures
-MOVE_PX = 1229 / STEPS_OF_PX  # along its line: another place
-PLACES = 2  # that a slot remembers
-FRAMES_OF_PLACE = 20  # most that frames on one place count
-SHARE_MIN = 1 / 3  # by which the dots' mean moves as they do
-HALF_SCATTERS, HALF_OF_ONE_PX = 3, 0.3  # at sqrt(3 s^2 + 0.3^2 / n) from what the turn says a slot counts half
-LEFT_MOST_PX = 1
+MOVE_PX = 1229 / STEPS_OF_PX  # along its line: another position
+POSITIONS = 2  # that a slot remembers
+FRAMES_OF_POSITION = 20  # most that frames at one position count
+FRACTION_MIN = 1 / 3  # by which the dots' mean moves as they do
+HALF_SCATTERS, HALF_OF_ONE_PX = 3, 0.3  # at sqrt(3 s^2 + 0.3^2 / n) from what the rotation says a slot counts half
+LEFT_MAX_PX = 1
 STEEP_MIN = 1 / 3
 PASSES = 4  # the core's solutions
-MANY_FRAMES = 5  # that show the error of a place
+MANY_FRAMES = 5  # that show the error of a position
 SLOT_PX = 0.03
 SLOTS = 361
 NOISE_PX = 0.12  # of a dot, across its line
-TURN_RAD = np.radians(0.3)
+ROTATION_RAD = np.radians(0.3)
 SHIFT_MM = 0.3
 
 
@@ -51,11 +51,11 @@ class Rig:
         self.lens = matrix("distortion_coefficients")[0]
         self.origin, self.rays = matrix("projector_origin")[:, 0], matrix("dot_rays")
 
-    def turned(self, turn):
+    def rotated(self, rotation):
         """By Rodrigues' formula, about the projector's origin."""
-        out, angle = copy.copy(self), np.linalg.norm(turn)
+        out, angle = copy.copy(self), np.linalg.norm(rotation)
         if angle > 0:
-            n = turn / angle
+            n = rotation / angle
             out.rays = (self.rays * np.cos(angle) + np.cross(n, self.rays) * np.sin(angle)
                         + np.outer(self.rays @ n, n) * (1 - np.cos(angle)))
         return out
@@ -66,8 +66,8 @@ class Rig:
         with open(path, "w", encoding="utf-8") as file:
             json.dump(out, file)
 
-    def undistorted(self, place):
-        target = (place - self.centre) / self.focal
+    def undistorted(self, position):
+        target = (position - self.centre) / self.focal
         x, (k1, k2, p1, p2, k3) = target.copy(), self.lens
         for _ in range(60):
             r2, xy = (x * x).sum(axis=1), x[:, 0] * x[:, 1]
@@ -76,7 +76,7 @@ class Rig:
         return x * self.focal + self.centre
 
     def lines(self):
-        """Place at infinity, direction, and slopes: px across and along the line per rad, per axis."""
+        """Position at infinity, direction, and slopes: px across and along the line per rad, per axis."""
         x, y = (self.rays[:, :2] / self.rays[:, 2:]).T
         shift = (self.origin[:2] - self.origin[2] * np.stack([x, y], 1)) * self.focal
         direction = shift / np.linalg.norm(shift, axis=1)[:, None]
@@ -93,19 +93,19 @@ def truths(folder):
         return [np.array(json.loads(line)["dots"], float).reshape(-1, 4) for line in file]
 
 
-def true_turn(folder):
-    """How the rays of the truth's dots are turned against those of rig.json: least squares."""
-    rig, turn = Rig(os.path.join(folder, "rig.json")), np.zeros(3)
+def true_rotation(folder):
+    """How the rays of the truth's dots are rotated against those of rig.json: least squares."""
+    rig, rotation = Rig(os.path.join(folder, "rig.json")), np.zeros(3)
     dots = np.concatenate(truths(folder)[::5])
     index, depth = dots[:, 0].astype(int), dots[:, 3:]
     normal = (rig.undistorted(dots[:, 1:3]) - rig.centre) / rig.focal
-    way = np.hstack([normal * depth, depth]) - rig.origin
-    way /= np.linalg.norm(way, axis=1)[:, None]
+    offset = np.hstack([normal * depth, depth]) - rig.origin
+    offset /= np.linalg.norm(offset, axis=1)[:, None]
     for _ in range(5):
-        rays = rig.turned(turn).rays[index]
+        rays = rig.rotated(rotation).rays[index]
         matrix = np.stack([np.cross(axis, rays) for axis in np.eye(3)], axis=2)
-        turn = turn + np.linalg.lstsq(matrix.reshape(-1, 3), (way - rays).ravel(), rcond=None)[0]
-    return turn
+        rotation = rotation + np.linalg.lstsq(matrix.reshape(-1, 3), (offset - rays).ravel(), rcond=None)[0]
+    return rotation
 
 
 def labelled(folder, rig, host_sim, work):
@@ -134,8 +134,8 @@ def distances(rig, rows):
     """From the line, and along it."""
     infinity, direction, _, _ = rig.lines()
     slots = rows[:, 1].astype(int)
-    off, way = rows[:, 2:4] - infinity[slots], direction[slots]
-    return off[:, 1] * way[:, 0] - off[:, 0] * way[:, 1], (off * way).sum(axis=1)
+    off, offset = rows[:, 2:4] - infinity[slots], direction[slots]
+    return off[:, 1] * offset[:, 0] - off[:, 0] * offset[:, 1], (off * offset).sum(axis=1)
 
 
 def weight_of(distance):
@@ -149,26 +149,26 @@ def rise_of(distance):
     return (1 - ratio) * (1 - 5 * ratio)
 
 
-def places(rig, rows):
-    """Number of the place of each dot: within MOVE_PX of where one began. A slot remembers two; a dot elsewhere begins one
+def positions(rig, rows):
+    """Number of the position of each dot: within MOVE_PX of where one began. A slot remembers two; a dot elsewhere begins one
     instead of the lighter."""
     distance, along = distances(rig, rows)
     weight, out, count = weight_of(distance), np.full(len(rows), -1), 0
-    known = [[[None, 0.0, -1] for _ in range(PLACES)] for _ in range(SLOTS)]
+    known = [[[None, 0.0, -1] for _ in range(POSITIONS)] for _ in range(SLOTS)]
     for i, slot in enumerate(rows[:, 1].astype(int)):
         if weight[i] < WEIGHT_MIN:
             continue
-        place = next((p for p in known[slot] if p[0] is not None and abs(along[i] - p[0]) <= MOVE_PX), None)
-        if place is None:
-            place = min(known[slot], key=lambda p: p[1])
-            place[:], count = [along[i], 0.0, count], count + 1
-        place[1] += weight[i]
-        out[i] = place[2]
+        position = next((p for p in known[slot] if p[0] is not None and abs(along[i] - p[0]) <= MOVE_PX), None)
+        if position is None:
+            position = min(known[slot], key=lambda p: p[1])
+            position[:], count = [along[i], 0.0, count], count + 1
+        position[1] += weight[i]
+        out[i] = position[2]
     return out, count
 
 
 class Trust:
-    """Cauchy's weights of slots by how far their means are from what a turn says, where the first one leaves scatter."""
+    """Cauchy's weights of slots by how far their means are from what a rotation says, where the first one leaves scatter."""
 
     def __init__(self):
         self.scatter = None
@@ -176,7 +176,7 @@ class Trust:
 
     def look(self, weight, mean):
         some = np.maximum(weight, 1e-9)
-        square = np.minimum(np.abs(mean), LEFT_MOST_PX)**2
+        square = np.minimum(np.abs(mean), LEFT_MAX_PX)**2
         if self.scatter is None:
             self.scatter = (weight * square).sum() / weight.sum()
         self.weight = 1 / (1 + square / (HALF_SCATTERS * self.scatter + HALF_OF_ONE_PX**2 / some))
@@ -186,49 +186,49 @@ class Trust:
         return max((weight * self.weight * (2 * self.weight - 1)).sum() / (weight * self.weight).sum(), STEEP_MIN)
 
 
-def fit(rig, rows, turn):
-    """The turn that fits the dots best, from this one on, and its uncertainty: least squares first, then with trust."""
-    slots, turn, trust = rows[:, 1].astype(int), np.array(turn, float), Trust()
-    number, count = places(rig.turned(turn), rows)
+def fit(rig, rows, rotation):
+    """The rotation that fits the dots best, from this one on, and its uncertainty: least squares first, then with trust."""
+    slots, rotation, trust = rows[:, 1].astype(int), np.array(rotation, float), Trust()
+    number, count = positions(rig.rotated(rotation), rows)
     number = np.where(number < 0, count, number)
     for i in range(60):
-        now = rig.turned(turn)
+        now = rig.rotated(rotation)
         slope = now.lines()[2]
         distance, _ = distances(now, rows)
         weight = weight_of(distance)
         # The mean moves by less than all dots do, as their weights move, too.
-        share = max(rise_of(distance).sum() / weight.sum(), SHARE_MIN)
-        weight = weight / (1 + np.bincount(number, weight, count + 1) / FRAMES_OF_PLACE)[number]
+        fraction = max(rise_of(distance).sum() / weight.sum(), FRACTION_MIN)
+        weight = weight / (1 + np.bincount(number, weight, count + 1) / FRAMES_OF_POSITION)[number]
         sums = np.bincount(slots, weight, SLOTS)
-        pull = np.bincount(slots, weight * distance, SLOTS) / share
+        pull = np.bincount(slots, weight * distance, SLOTS) / fraction
         if i >= 20:
             trust.look(sums, pull / np.maximum(sums, 1e-9))
         inverse = np.linalg.inv((slope * (trust.weight * sums)[:, None]).T @ slope)
-        turn = turn + inverse @ slope.T @ (trust.weight * pull)
+        rotation = rotation + inverse @ slope.T @ (trust.weight * pull)
     lever = slope @ inverse
     sigma = np.sqrt((lever**2 * (trust.weight**2 * (pull**2 + (SLOT_PX * sums)**2))[:, None]).sum(axis=0))
-    return turn, sigma / trust.steepness(sums)
+    return rotation, sigma / trust.steepness(sums)
 
 
 def estimate(folder, host_sim, work, start, frames):
-    """fit to what host_sim labels in these frames (a slice) with the rig turned by start; what host_sim prints."""
+    """fit to what host_sim labels in these frames (a slice) with the rig rotated by start; what host_sim prints."""
     rig = Rig(os.path.join(folder, "rig.json"))
-    rows, out = labelled(folder, rig.turned(start), host_sim, work)
-    turn, sigma = fit(rig, rows[(rows[:, 0] >= frames.start) & (rows[:, 0] < frames.stop)], start)
-    return turn, sigma, out
+    rows, out = labelled(folder, rig.rotated(start), host_sim, work)
+    rotation, sigma = fit(rig, rows[(rows[:, 0] >= frames.start) & (rows[:, 0] < frames.stop)], start)
+    return rotation, sigma, out
 
 
 class Sums:
-    """What the core keeps of each slot (struct ih_dot_place), in float64: weight and pull of the places that it remembers, and of
+    """What the core keeps of each slot (struct ih_dot_place), in float64: weight and pull of the positions that it remembers, and of
     those before."""
 
     def __init__(self):
-        self.at, self.before = np.zeros((PLACES, 2, SLOTS)), np.zeros((2, SLOTS))
-        self.begun = np.full((PLACES, SLOTS), np.nan)
+        self.at, self.before = np.zeros((POSITIONS, 2, SLOTS)), np.zeros((2, SLOTS))
+        self.begun = np.full((POSITIONS, SLOTS), np.nan)
         self.total = self.rise = 0.0
 
     def scaled(self):
-        return self.at * FRAMES_OF_PLACE / (self.at[:, :1] + FRAMES_OF_PLACE)
+        return self.at * FRAMES_OF_POSITION / (self.at[:, :1] + FRAMES_OF_POSITION)
 
     def add_frame(self, slots, distance, along):
         is_there = np.abs(along - self.begun[:, slots]) <= MOVE_PX
@@ -242,33 +242,33 @@ class Sums:
         self.at[which, :, slots] += np.stack([weight, weight * distance], 1)
         self.total, self.rise = self.total + weight.sum(), self.rise + rise_of(distance).sum()
 
-    def share(self):
-        return max(self.rise / self.total, SHARE_MIN)
+    def fraction(self):
+        return max(self.rise / self.total, FRACTION_MIN)
 
     def step(self, slope):
         weight, pull = self.before + self.scaled().sum(axis=0)
-        mean, trust, turn = pull / np.maximum(weight, 1e-9) / self.share(), Trust(), None
+        mean, trust, rotation = pull / np.maximum(weight, 1e-9) / self.fraction(), Trust(), None
         for _ in range(PASSES):
-            if turn is not None:
-                trust.look(weight, mean - slope @ turn)
+            if rotation is not None:
+                trust.look(weight, mean - slope @ rotation)
             trusted = trust.weight * weight
-            turn = np.linalg.solve((slope * trusted[:, None]).T @ slope, slope.T @ (trusted * mean))
-        return turn
+            rotation = np.linalg.solve((slope * trusted[:, None]).T @ slope, slope.T @ (trusted * mean))
+        return rotation
 
-    def turn(self, move):
-        self.before[1] -= self.share() * self.before[0] * move
-        self.at[:, 1] -= self.share() * self.at[:, 0] * move
+    def rotate(self, move):
+        self.before[1] -= self.fraction() * self.before[0] * move
+        self.at[:, 1] -= self.fraction() * self.at[:, 0] * move
 
 
-def follow(folder, host_sim, work, turns):
-    """The last turn as the core comes to it, which does not iterate: a frame's dots keep the labels and the weights that the
-    lines of its time gave them, and each time the rig is turned it is by one step. Places are told apart in the image, where no
-    turn of the rig moves them; which dots count and when one is on another place is decided with the core's own figures: a dot
-    at the limit may begin a place or not, and one place more of a corner is a twentieth of the uncertainty. turns: first and
-    last frame with a turn, that turn, and the one that the core took then."""
+def follow(folder, host_sim, work, rotations):
+    """The last rotation as the core computes it, without iteration: a frame's dots keep the labels and the weights that the
+    lines of its time gave them, and each correction of the rig is one step. Positions are distinguished in the image, where no
+    rotation of the rig moves them; which dots are used and when one is at another position is decided with the core's own figures:
+    a dot at the limit may begin a position or not, and one position more of a corner is a twentieth of the uncertainty.
+    rotations: first and last frame with a rotation, that rotation, and the one that the core took then."""
     rig, sums = Rig(os.path.join(folder, "rig.json")), Sums()
-    for first, last, before, after in turns:
-        now = rig.turned(before)
+    for first, last, before, after in rotations:
+        now = rig.rotated(before)
         rows, _ = labelled(folder, now, host_sim, work)
         rows = rows[weight_of(rows[:, 4]) >= WEIGHT_MIN]
         infinity, direction, slope, _ = now.lines()
@@ -279,51 +279,50 @@ def follow(folder, host_sim, work, turns):
             here = rows[:, 0] == frame
             sums.add_frame(rows[here, 1].astype(int), distance[here], along[here])
         found = before + sums.step(slope)
-        sums.turn(slope @ (after - before))
+        sums.rotate(slope @ (after - before))
     return found
 
 
 def bound(folder, host_sim, work, truth, frame_count):
-    """Cramer-Rao bound of the three turns' uncertainty, from that many of the folder's first frames, if a dot's distance is
-    normal noise of its own in each frame plus a normal error of its place, each as large as it is with the true rig; the
+    """Cramer-Rao bound of the uncertainty of the three rotations, from that many of the folder's first frames, if a dot's distance is
+    normal noise of its own in each frame plus a normal error of its position, each as large as it is with the true rig; the
     two errors in px."""
-    rig = Rig(os.path.join(folder, "rig.json")).turned(truth)
+    rig = Rig(os.path.join(folder, "rig.json")).rotated(truth)
     rows, _ = labelled(folder, rig, host_sim, work)
     rows = rows[rows[:, 0] < frame_count]
-    number, count = places(rig, rows)
+    number, count = positions(rig, rows)
     rows, number = rows[number >= 0], number[number >= 0]
     distance, _ = distances(rig, rows)
     frames = np.bincount(number, minlength=count)
     mean = np.bincount(number, distance, count) / frames
     noise = ((distance - mean[number])**2).sum() / (frames - 1).sum()
     many = frames >= MANY_FRAMES
-    place = max((mean[many]**2 - noise / frames[many]).mean(), 0.0)
+    position = max((mean[many]**2 - noise / frames[many]).mean(), 0.0)
     slot_of = np.zeros(count, int)
     slot_of[number] = rows[:, 1].astype(int)
     slope = rig.lines()[2][slot_of]
-    information = (slope / (place + noise / frames)[:, None]).T @ slope
-    return np.sqrt(np.diag(np.linalg.inv(information))), np.sqrt(noise), np.sqrt(place)
+    information = (slope / (position + noise / frames)[:, None]).T @ slope
+    return np.sqrt(np.diag(np.linalg.inv(information))), np.sqrt(noise), np.sqrt(position)
 
 
 def observable(folder):
-    """Rows of (name, rms px across, rms px along, sigma with all six, sigma with turns alone)."""
-    rig = Rig(os.path.join(folder, "rig.json"))
+    """Rows of (name, rms px across, rms px along, sigma with all six, sigma with rotations alone)."""    rig = Rig(os.path.join(folder, "rig.json"))
     dots = np.concatenate(truths(folder)[:50])
     index = dots[:, 0].astype(int)
     _, direction, across, along = rig.lines()
-    way, near = direction[index], 1 / dots[:, 3:]
+    offset, near = direction[index], 1 / dots[:, 3:]
     x = rig.rays[index, :2] / rig.rays[index, 2:]
     du = rig.focal[0] * np.hstack([near, 0 * near, -x[:, :1] * near])
     dv = rig.focal[1] * np.hstack([0 * near, near, -x[:, 1:] * near])
-    shift_across = way[:, :1] * dv - way[:, 1:] * du
-    shift_along = way[:, :1] * du + way[:, 1:] * dv
+    shift_across = offset[:, :1] * dv - offset[:, 1:] * du
+    shift_along = offset[:, :1] * du + offset[:, 1:] * dv
     matrix = np.hstack([across[index], shift_across])
-    scale = np.array([TURN_RAD] * 3 + [SHIFT_MM] * 3)
-    # Nothing is known of what is not seen at all: a prior of 100 times the knock keeps it finite.
+    scale = np.array([ROTATION_RAD] * 3 + [SHIFT_MM] * 3)
+    # Nothing is known of what is not seen at all: a prior of 100 times the rotation keeps it finite.
     six = np.linalg.inv((matrix * scale).T @ (matrix * scale) / NOISE_PX**2 + 1e-4 * np.eye(6))
     three = np.linalg.inv((matrix * scale)[:, :3].T @ (matrix * scale)[:, :3] / NOISE_PX**2)
     sides = np.hstack([along[index], shift_along])
-    names = ["turn X", "turn Y", "turn Z", "shift X", "shift Y", "shift Z"]
+    names = ["rot. X", "rot. Y", "rot. Z", "shift X", "shift Y", "shift Z"]
     for i, name in enumerate(names):
         yield (name, np.sqrt((matrix[:, i]**2).mean()) * scale[i], np.sqrt((sides[:, i]**2).mean()) * scale[i],
                np.sqrt(six[i, i]), np.sqrt(three[i, i]) if i < 3 else None)
@@ -331,8 +330,8 @@ def observable(folder):
 
 def main():
     for folder in sys.argv[1:]:
-        print("%s: of a turn by 0.3 degrees or a shift by 0.3 mm" % folder)
-        print("            px across   px along   sigma of six   of turns alone (shares of it, 50 frames)")
+        print("%s: of a rotation by 0.3 degrees or a shift by 0.3 mm" % folder)
+        print("            px across   px along   sigma of six   of rotations alone (fractions of it, 50 frames)")
         for name, across, along, six, three in observable(folder):
             print("  %-8s %10.3f %10.3f %14.4f %16s" % (name, across, along, six, "" if three is None else "%.4f" % three))
     return 0

@@ -39,7 +39,7 @@ def first_hit(surfaces, origin, ray):
 
 
 def see(rig, surfaces):
-    """Places in the frame (u, v), depth and visibility of all dots."""
+    """Positions in the frame (u, v), depth and visibility of all dots."""
     rays, origin = from_q(rig.rays_q30, 30), from_q(rig.origin_q16, 16)
     rays = rays / np.linalg.norm(rays, axis=1)[:, None]
     distance = first_hit(surfaces, origin, rays)
@@ -54,14 +54,14 @@ def see(rig, surfaces):
 
 def dots_of(rig, surfaces, random, jitter_px, missing, spurious):
     """Detected dots in the firmware's order: u and v in Q12, slot or -1."""
-    place, _, seen = see(rig, surfaces)
+    position, _, seen = see(rig, surfaces)
     slot = np.flatnonzero(seen & (random.uniform(size=rigs.SLOTS) >= missing))
-    place = place[slot] + random.normal(0, jitter_px, (len(slot), 2))
+    position = position[slot] + random.normal(0, jitter_px, (len(slot), 2))
     wrong = random.uniform(3, np.array([rig.width, rig.height]) - 4, (spurious, 2))
-    place_q12 = to_q(np.concatenate([place, wrong]), 12)
+    position_q12 = to_q(np.concatenate([position, wrong]), 12)
     slot = np.concatenate([slot, np.full(spurious, -1)])
-    order = np.lexsort((place_q12[:, 0], place_q12[:, 1]))
-    return np.column_stack([place_q12[order], slot[order]])
+    order = np.lexsort((position_q12[:, 0], position_q12[:, 1]))
+    return np.column_stack([position_q12[order], slot[order]])
 
 
 def scenes():

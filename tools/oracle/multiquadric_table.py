@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """The table of roots in firmware/core/surface/ih_multiquadric_table.h: sqrt(m) * 2^16 for m in 2^30 .. 2^32, in spans of 2^22. An
 entry is the value at a span's beginning, raised by half of what the curve lies above its chord; the last one
-is that at the last span's end. With g the place in a span, 0 .. 65535, and rise the difference to the next
+is that at the last span's end. With g the position in a span, 0 .. 65535, and rise the difference to the next
 entry >> 6, the root is value + (rise * g >> 10).
 
     multiquadric_table.py               writes its lines
@@ -16,7 +16,7 @@ import numpy as np
 
 FIRST, LAST = 256, 1024  # spans
 WORST = 2**-21.8  # relative
-# Of a place up to 63 of 2^22, of a rise 63 of 2^22 towards the end of a span, of the product 1: at the most, in the mean of
+# Of a position up to 63 of 2^22, of a rise 63 of 2^22 towards the end of a span, of the product 1: at most, in the mean of
 # both ends of the first span.
 CUT_OFF = 96
 
@@ -39,7 +39,7 @@ def table():
 
 
 def off(i, value, following):
-    """How far the root is off, at both ends of what is cut off of a place."""
+    """How far the root is off, at both ends of what is truncated of a position."""
     g = np.arange(0, 65536, 16)
     read = value + ((following - value >> 6) * g >> 10)
     return [read - exact(i * 2.0**22 + g * 64 + end) for end in (0, 63)]

@@ -10,7 +10,7 @@ import frames
 BLOCK = 32
 STEP = 16
 WHOLE = 4096
-REST_Q4 = 64
+DIFFERENCE_Q4 = 64
 WHITE = 19 / 16
 
 
@@ -34,7 +34,7 @@ def medians(response):
 
 
 def smoothed(block, whole=False):
-    """1-2-1 both ways. whole: in whole units after each, as the firmware rounds."""
+    """1-2-1 in both directions. whole: in whole units after each, as the firmware rounds."""
     for axis in (1, 0):
         block = ndimage.correlate1d(block, [0.25, 0.5, 0.25], axis=axis, mode="nearest")
         block = np.floor(block + 0.5) if whole else block
@@ -44,20 +44,20 @@ def smoothed(block, whole=False):
 def spread(block, shape, whole=False):
     """To every pixel: linear between the blocks' centres, constant outside."""
     def lines(values, size, axis):
-        place = np.clip((np.arange(size) - (BLOCK - 1) / 2) / BLOCK, 0, values.shape[axis] - 1)
-        low = np.floor(place).astype(int)
+        position = np.clip((np.arange(size) - (BLOCK - 1) / 2) / BLOCK, 0, values.shape[axis] - 1)
+        low = np.floor(position).astype(int)
         high = np.minimum(low + 1, values.shape[axis] - 1)
         a, b = np.take(values, low, axis), np.take(values, high, axis)
-        part = (place - low).reshape([-1, 1] if axis == 0 else [1, -1])
+        part = (position - low).reshape([-1, 1] if axis == 0 else [1, -1])
         step = (b - a) * part
         return a + (np.floor(step + 0.5) if whole else step)
     return lines(lines(block, shape[0], 0), shape[1], 1)
 
 
-def rest(grey, ambient, subtract):
+def difference(grey, ambient, subtract):
     """The lit frame less the ambient one as far as the map of blocks says."""
-    share = spread(np.where(subtract, WHOLE, 0).astype(float), grey.shape, True)
-    return np.maximum(grey - np.floor((ambient - REST_Q4) * share / WHOLE + 0.5), 0)
+    fraction = spread(np.where(subtract, WHOLE, 0).astype(float), grey.shape, True)
+    return np.maximum(grey - np.floor((ambient - DIFFERENCE_Q4) * fraction / WHOLE + 0.5), 0)
 
 
 def choose(grey, ambient):
@@ -67,7 +67,7 @@ def choose(grey, ambient):
     quieter = 16 * medians(bandpass.response(half)) < 7 * medians(bandpass.response(grey))
     for i, j in np.argwhere(quieter):
         part = half[sampled(len(grey), i), j * BLOCK:(j + 1) * BLOCK] - frames.FULL_Q4 // 2
-        quieter[i, j] = part.mean() >= -REST_Q4 / 4
+        quieter[i, j] = part.mean() >= -DIFFERENCE_Q4 / 4
     return quieter
 
 
@@ -77,7 +77,7 @@ def measure(grey, ambient=None, whole=False):
         block = medians(bandpass.response(grey))
         return grey, smoothed(block, whole), np.zeros(block.shape, bool)
     subtract = choose(grey, ambient)
-    left = rest(grey, ambient, subtract)
+    left = difference(grey, ambient, subtract)
     block = medians(bandpass.response(left))
     block = np.where(subtract, np.floor(block * WHITE + 0.5) if whole else block * WHITE, block)
     return left, smoothed(block, whole), subtract
@@ -95,14 +95,14 @@ def write_vectors(directory):
         block = smoothed(medians(response))
         noise = spread(block, response.shape)
         height, width = response.shape
-        places = [(u, v) for v in (0, 15, 16, height - 1) for u in (0, 15, 16, 47, 48, width - 1)]
-        places += [(int(random.integers(width)), int(random.integers(height))) for _ in range(40)]
+        positions = [(u, v) for v in (0, 15, 16, height - 1) for u in (0, 15, 16, 47, 48, width - 1)]
+        positions += [(int(random.integers(width)), int(random.integers(height))) for _ in range(40)]
         inc.raw("\nstatic const struct vector_place vector_%s_places[] = {\n%s};\n" % (
             frame.name, emit.wrap(["{%d, %d, %s}" % (u, v, emit.number(noise[v, u], 4))
-                                   for u, v in places])))
+                                   for u, v in positions])))
         inc.array("double", "vector_%s_blocks" % frame.name, block.ravel(), 4)
         rows.append("{%s}, %d, %d, vector_%s_blocks, %d, vector_%s_places" % (
-            frames.spec(inc, frame), block.shape[1], block.shape[0], frame.name, len(places),
+            frames.spec(inc, frame), block.shape[1], block.shape[0], frame.name, len(positions),
             frame.name))
     inc.struct_array("vector_noise", "vector_noises", rows)
     rows = []

@@ -59,15 +59,15 @@ class Rig:
         """Frame pixels -> normalised coordinates: the root of distort, followed outwards from the
         principal point so that it stays on the branch that the lens really has."""
         target = (np.array([u, v]) - self.principal) / self.focal
-        place = np.zeros(2)
+        position = np.zeros(2)
         for part in np.linspace(0, 1, 9)[1:]:
             def miss(p, goal=target * part):
                 uv = np.array(self.distort(p[0], p[1]))
                 return (uv - self.principal) / self.focal - goal
-            place, _, found, message = fsolve(miss, place, xtol=1e-14, full_output=True)
-            if found != 1 and np.abs(miss(place)).max() > 1e-12:
+            position, _, found, message = fsolve(miss, position, xtol=1e-14, full_output=True)
+            if found != 1 and np.abs(miss(position)).max() > 1e-12:
                 raise ValueError("%s: no inverse at %g, %g: %s" % (self.name, u, v, message))
-        return place
+        return position
 
     def tangents(self):
         """x and y of every dot at infinity, and its shift times depth."""
@@ -106,12 +106,12 @@ class Rig:
         return text
 
 
-def pattern(step=0.02967, turn_deg=3.0128, toe_in_rad=0.0156, tip_rad=0.0):
-    """Rays of a beam splitter: direction cosines on a square lattice that is turned in its plane,
+def pattern(step=0.02967, rotation_deg=3.0128, toe_in_rad=0.0156, tip_rad=0.0):
+    """Rays of a beam splitter: direction cosines on a square lattice that is rotated in its plane,
     then seen in the camera's frame."""
     index = np.arange(SLOTS)
     column, row = index % GRID - GRID // 2, index // GRID - GRID // 2
-    c, s = np.cos(np.radians(turn_deg)), np.sin(np.radians(turn_deg))
+    c, s = np.cos(np.radians(rotation_deg)), np.sin(np.radians(rotation_deg))
     x, y = step * (c * column - s * row), step * (s * column + c * row)
     rays = np.stack([x, y, np.sqrt(1 - x * x - y * y)], axis=1)
     c, s = np.cos(toe_in_rad), np.sin(toe_in_rad)
@@ -140,14 +140,14 @@ def dot_rigs():
         wide(),
         Rig("no distortion, least frame", (320, 240), (300, 310), (161.25, 118.75), (0,) * 5,
             (100, 16000), (-60, 2.5, -8), pattern(toe_in_rad=-0.05)),
-        Rig("barrel with k3, greatest frame", (1280, 800), (760, 757), (655.3, 391.1),
+        Rig("barrel with k3, largest frame", (1280, 800), (760, 757), (655.3, 391.1),
             (-0.30, 0.12, 0.0007, -0.0009, -0.02), (300, 6000), (30, -20, 4), pattern()),
         Rig("pincushion, tangential", (640, 480), (520, 530), (310, 250),
             (0.25, 0.05, 0.004, -0.003, 0.01), (250, 4000), (0, 75, 0),
-            pattern(turn_deg=-20, toe_in_rad=0, tip_rad=0.1)),
+            pattern(rotation_deg=-20, toe_in_rad=0, tip_rad=0.1)),
         Rig("principal point off centre", (800, 600), (1400, 1380), (150, 520),
             (-0.1, 0, 0, 0, 0), (500, 3000), (-20, -20, 10),
-            pattern(step=0.012, turn_deg=87, toe_in_rad=-0.1)),
+            pattern(step=0.012, rotation_deg=87, toe_in_rad=-0.1)),
         Rig("barrel near its fold", (1280, 800), (1000, 1000), (639.5, 399.5),
             (-0.25, 0, 0, 0, 0), (400, 2600), (50, 0, 0), pattern()),
     ]
@@ -156,8 +156,8 @@ def dot_rigs():
 PROBE_SLOTS = [0, 18, 342, 360] + list(range(7, SLOTS, 29))
 
 
-def probe_places(rig, random):
-    """Corners, a lattice and random places of the frame, Q12."""
+def probe_positions(rig, random):
+    """Corners, a lattice and random positions of the frame, Q12."""
     u = np.linspace(0, rig.width - 1, 7)
     v = np.linspace(0, rig.height - 1, 5)
     lattice = np.stack(np.meshgrid(u, v), axis=-1).reshape(-1, 2)
@@ -182,7 +182,7 @@ def write_vectors(directory):
                 emit.numbers(infinity[slot], 6) + emit.numbers(direction[slot], 10)
                 + [emit.number(length[slot], 5)] + emit.numbers(far[slot], 6)
                 + emit.numbers(near[slot], 6))))
-        for u, v in probe_places(rig, random):
+        for u, v in probe_positions(rig, random):
             x, y = rig.undistort(from_q(u, 12), from_q(v, 12))
             lens.append("%d, %d, %d, %s" % (index, u, v, ", ".join(emit.numbers((x, y), 11))))
     inc.struct_array("vector_line", "vector_lines", lines)

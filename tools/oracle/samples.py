@@ -16,7 +16,7 @@ NOT_CLOSE_PX = 1.5
 
 
 class Params:
-    isolated_mm, clip_behind_mm, clip_least_mm = 60, 400, 1100
+    isolated_mm, clip_behind_mm, clip_min_mm = 60, 400, 1100
     fill_neighbours, fill_root_weight_q15 = 3, 17948
 
 
@@ -34,7 +34,7 @@ def select(rig, field_q28, x, y, depth_mm, state, bright, params):
     seen = (state == SEEN).reshape(GRID, GRID)
     ordered = np.sort(depth_mm[state == SEEN])
     low = ordered[len(ordered) * 8 // 100] if len(ordered) else 0
-    clip = max(low + params.clip_behind_mm, params.clip_least_mm)
+    clip = max(low + params.clip_behind_mm, params.clip_min_mm)
     depth = np.where(seen, np.minimum(depth_mm.reshape(GRID, GRID), clip), np.nan)
     rows, count = [], dict(seen=0, filled=0, isolated=0, outside=0)
     for slot in range(SLOTS):
@@ -46,12 +46,12 @@ def select(rig, field_q28, x, y, depth_mm, state, bright, params):
             if len(near) >= 3 and alike.sum() <= 1:
                 count["isolated"] += 1
                 continue
-            kind, place, z, weight = "seen", (x[slot], y[slot]), depth[row, column], 32768
+            kind, position, z, weight = "seen", (x[slot], y[slot]), depth[row, column], 32768
         elif state[slot] == MISSING and len(near) < params.fill_neighbours \
                 and params.fill_root_weight_q15:
             z = clip
-            place = rig.dot_at(slot, z)
-            u, v = rig.distort(*place)
+            position = rig.dot_at(slot, z)
+            u, v = rig.distort(*position)
             edges = np.array([u, v, rig.width - 1 - u, rig.height - 1 - v, u - BRIGHT_U])
             if np.abs(edges).min() < NOT_CLOSE_PX:
                 raise ValueError("slot %d is too close to an edge to be a clear case" % slot)
@@ -60,7 +60,7 @@ def select(rig, field_q28, x, y, depth_mm, state, bright, params):
             kind, weight = "filled", params.fill_root_weight_q15
         else:
             continue
-        at = (np.array(place) - from_q(field_q28[:2], 28)) / from_q(field_q28[2], 28)
+        at = (np.array(position) - from_q(field_q28[:2], 28)) / from_q(field_q28[2], 28)
         if np.abs(at).max() >= REACH:
             count["outside"] += 1
             continue

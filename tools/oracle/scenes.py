@@ -30,8 +30,8 @@ class Rays:
     @staticmethod
     def of_lattice():
         index = np.arange(SLOTS)
-        place = np.stack([index % GRID - GRID // 2, index // GRID - GRID // 2], axis=1)
-        return Rays(np.zeros(3, np.int64), to_q(place * RANGE_PITCH_MM / RANGE_DEPTH_MM, 20))
+        position = np.stack([index % GRID - GRID // 2, index // GRID - GRID // 2], axis=1)
+        return Rays(np.zeros(3, np.int64), to_q(position * RANGE_PITCH_MM / RANGE_DEPTH_MM, 20))
 
 
 def all_rays():
@@ -39,7 +39,7 @@ def all_rays():
     return [Rays.of_dots(rigs.paper()), Rays.of_dots(rigs.wide()), Rays.of_lattice()]
 
 
-class Space:
+class RayTable:
     """struct ih_rays in floats: origin, and per slot slope, point and state."""
 
     def __init__(self, rays, depth_q8, state):
@@ -62,8 +62,8 @@ def meet_ellipsoid(rays, centre, semi):
 
 def meet_board(rays, depth, left, right, top, bottom):
     """An upright rectangle that faces the camera."""
-    place = rays.origin[:2] + (depth - rays.origin[2]) * rays.slope
-    x, y = place[:, 0], place[:, 1]
+    position = rays.origin[:2] + (depth - rays.origin[2]) * rays.slope
+    x, y = position[:, 0], position[:, 1]
     return np.where((x >= left) & (x <= right) & (y >= top) & (y <= bottom), depth, np.inf)
 
 
@@ -130,7 +130,7 @@ def spaces():
     rays = all_rays()
     for scene in all_scenes():
         depth_q8, state = scene.look(rays[scene.rays], random)
-        yield scene, Space(rays[scene.rays], depth_q8, state), depth_q8
+        yield scene, RayTable(rays[scene.rays], depth_q8, state), depth_q8
 
 
 def write_vectors(directory):
@@ -143,9 +143,9 @@ def write_vectors(directory):
         rows.append("{%d, %d, %d}, vector_slopes_%d" % (*rays.origin_q8, index))
     inc.struct_array("vector_rays", "vector_rays", rows)
     rows = []
-    for scene, space, depth_q8 in spaces():
+    for scene, ray_table, depth_q8 in spaces():
         inc.array("int32_t", "vector_depths_" + scene.name,
-                  np.where(space.state == EMPTY, -1, depth_q8))
+                  np.where(ray_table.state == EMPTY, -1, depth_q8))
         head = (0, 0, 0, 0, 0, 0) if scene.centre is None else (*scene.centre, *scene.semi)
         rows.append('"%s", &vector_rays[%d], vector_depths_%s, {%s}, {%s}' % (
             scene.name, scene.rays, scene.name, ", ".join(emit.numbers(head[:3], 3)),

@@ -31,10 +31,10 @@ def drawn_curves(random):
 
 def drawn_evidence(random, curves):
     """Within the knots, beyond them, and on them, in Q8."""
-    place = random.uniform(-1.5, model.KNOTS + 0.5, (CASES, KINDS))
-    on_knot = random.uniform(size=place.shape) < 0.3
-    place[on_knot] = np.round(place[on_knot])
-    evidence = np.rint(curves.first_q8 + place * curves.step_q8).astype(np.int64)
+    position = random.uniform(-1.5, model.KNOTS + 0.5, (CASES, KINDS))
+    on_knot = random.uniform(size=position.shape) < 0.3
+    position[on_knot] = np.round(position[on_knot])
+    evidence = np.rint(curves.first_q8 + position * curves.step_q8).astype(np.int64)
     evidence[0], evidence[1] = 2**31 - 1, -2**31
     return evidence
 

@@ -1,5 +1,5 @@
 """Float64 reference of the tracks: constant-velocity Kalman filters in matrix form, and the rules
-of ih_tracks.h for who gets which finding, what is carried, what ends and which head is the one.
+of ih_tracks.h for who gets which detection, what is predicted, what ends and which head is the one.
 
 Sequences are drawn anew until no decision in them is a matter of rounding.
 """
@@ -15,10 +15,10 @@ TRACKS_MAX = 8
 NONE = -1
 SEMI_MM = np.array([78.0, 113, 98])
 START_SPEED = 300.0
-PLACE_MAX, SPEED_MAX = 500.0, 3000.0
+POSITION_MAX, SPEED_MAX = 500.0, 3000.0
 LOGIT_MAX, GATE_LOGIT, SURE_LOGIT, CHOICE_LOGIT = 6.0, 4.0, 2.0, 3.0
 UNSURE_FACTOR2 = 4.0
-AXES_SHARE = 0.25
+AXES_FRACTION = 0.25
 SLOW_S = 0.3
 SAME_MM = 80.0
 VIEW_RAYS_MIN = 4
@@ -29,7 +29,7 @@ class Params:
 
     gate_mm, gate_mm_per_s = 90, 300
     start, start_head, accept, drop, keep = -1.0, 1.0, 0.5, -0.5, -3.0
-    mature_findings = 3
+    mature_detections = 3
     memory = 0.75
     through_percent, front_percent = 50, 30
     carry_s, gap_s = 1.0, 2.0
@@ -38,7 +38,7 @@ class Params:
 
 
 class Unclear(Exception):
-    """A decision that rounding could turn."""
+    """A decision that rounding could reverse."""
 
 
 def clear(difference, margin):
@@ -49,8 +49,8 @@ def clear(difference, margin):
 
 
 @dataclasses.dataclass
-class Finding:
-    place: np.ndarray
+class Detection:
+    position: np.ndarray
     logit: float
     semi: np.ndarray
     track: int = 0
@@ -59,40 +59,40 @@ class Finding:
 @dataclasses.dataclass
 class Track:
     id: int
-    state: np.ndarray  # place and velocity (2 x 3)
+    state: np.ndarray  # position and velocity (2 x 3)
     covariance: np.ndarray  # 2 x 2, the same along each axis
     semi: np.ndarray
     logit: float
     seen_s: float
     is_head: bool
-    finding: object = None
-    findings: int = 1
+    detection: object = None
+    detections: int = 1
 
     def predict(self, dt):
         move = np.array([[1, dt], [0, 1]])
         push = Params.acceleration * np.array([[dt * dt / 2], [dt]])
         self.state = move @ self.state
         self.covariance = move @ self.covariance @ move.T + push @ push.T
-        # Limited variances keep what the place says about the speed, and the other way round.
-        for at, limit in ((0, PLACE_MAX**2), (1, SPEED_MAX**2)):
-            share = min(1, limit / self.covariance[at, at])
-            self.covariance[at, at] *= share
-            self.covariance[0, 1] *= share
-            self.covariance[1, 0] *= share
+        # Limited variances keep the correlation of position and speed.
+        for at, limit in ((0, POSITION_MAX**2), (1, SPEED_MAX**2)):
+            fraction = min(1, limit / self.covariance[at, at])
+            self.covariance[at, at] *= fraction
+            self.covariance[0, 1] *= fraction
+            self.covariance[1, 0] *= fraction
 
-    def correct(self, finding):
+    def correct(self, detection):
         noise = Params.measured_mm**2
-        if not clear(finding.logit - SURE_LOGIT, 0.002):
+        if not clear(detection.logit - SURE_LOGIT, 0.002):
             noise *= UNSURE_FACTOR2
         see = np.array([[1.0, 0.0]])
         gain = self.covariance @ see.T / (see @ self.covariance @ see.T + noise)
-        self.state = self.state + gain @ (finding.place[None] - see @ self.state)
+        self.state = self.state + gain @ (detection.position[None] - see @ self.state)
         self.state[1] = np.clip(self.state[1], -SPEED_MAX, SPEED_MAX)
         self.covariance = (np.eye(2) - gain @ see) @ self.covariance
-        self.semi = self.semi + AXES_SHARE * (finding.semi - self.semi)
+        self.semi = self.semi + AXES_FRACTION * (detection.semi - self.semi)
 
     def judge(self):
-        limit = Params.start_head if self.findings < Params.mature_findings else Params.accept
+        limit = Params.start_head if self.detections < Params.mature_detections else Params.accept
         self.is_head = clear(self.logit - (Params.drop if self.is_head else limit), 0.004)
 
     def remember(self, logit):
@@ -113,70 +113,70 @@ class Tracks:
         self.time_s = time_s
         for track in self.tracks:
             track.predict(step)
-            track.finding = None
+            track.detection = None
         return self.tracks
 
-    def merit(self, track, finding, gone):
+    def merit(self, track, detection, gone):
         gate = Params.gate_mm + Params.gate_mm_per_s * (self.time_s - track.seen_s)
-        away = np.linalg.norm(track.state[0] - finding.place)
-        if clear(away - gate, 0.5) or not clear(finding.logit - Params.keep, 0.002):
+        away = np.linalg.norm(track.state[0] - detection.position)
+        if clear(away - gate, 0.5) or not clear(detection.logit - Params.keep, 0.002):
             return None
-        if gone and not clear(finding.logit - Params.accept, 0.002):
+        if gone and not clear(detection.logit - Params.accept, 0.002):
             return None
-        return finding.logit - GATE_LOGIT * (away / gate)**2
+        return detection.logit - GATE_LOGIT * (away / gate)**2
 
-    def associate(self, findings, gone):
+    def associate(self, detections, gone):
         """The best pair first."""
         while True:
             pairs = [(self.merit(t, f, g), t, f) for t, g in zip(self.tracks, gone)
-                     if t.finding is None for f in findings if f.track == 0]
+                     if t.detection is None for f in detections if f.track == 0]
             pairs = sorted([p for p in pairs if p[0] is not None], key=lambda p: -p[0])
             if not pairs:
                 return
             if len(pairs) > 1:
                 clear(pairs[0][0] - pairs[1][0], 0.02)
-            _, track, finding = pairs[0]
-            track.finding, finding.track, track.seen_s = finding, track.id, self.time_s
-            track.findings += 1
-            track.correct(finding)
-            track.remember(finding.logit)
+            _, track, detection = pairs[0]
+            track.detection, detection.track, track.seen_s = detection, track.id, self.time_s
+            track.detections += 1
+            track.correct(detection)
+            track.remember(detection.logit)
 
     def prune(self, gone, hidden):
         kept = []
         for track, is_gone, is_hidden in zip(self.tracks, gone, hidden):
             unseen = self.time_s - track.seen_s
-            if track.finding is None and not is_hidden:
+            if track.detection is None and not is_hidden:
                 track.remember(Params.keep)
-            if track.finding is not None:
+            if track.detection is not None:
                 ended = not clear(track.logit - Params.keep, 0.004)
             else:
                 ended = not track.is_head or clear(unseen - Params.carry_s, 1e-9) or is_gone
             near = [clear(SAME_MM - np.linalg.norm(t.state[0] - track.state[0]), 0.5)
                     for t in kept]
             if ended or any(near):
-                if track.finding is not None:
-                    track.finding.track = 0
+                if track.detection is not None:
+                    track.detection.track = 0
                 continue
-            if track.finding is None:
+            if track.detection is None:
                 track.state[1] *= 1 - min(unseen, SLOW_S) / SLOW_S
             kept.append(track)
         self.tracks = kept
 
-    def start(self, findings):
-        for finding in findings:
+    def start(self, detections):
+        for detection in detections:
             if len(self.tracks) == TRACKS_MAX:
                 return
-            if finding.track != 0 or not clear(finding.logit - Params.start, 0.002):
+            if detection.track != 0 or not clear(detection.logit - Params.start, 0.002):
                 continue
-            away = [np.linalg.norm(t.state[0] - finding.place) for t in self.tracks]
+            away = [np.linalg.norm(t.state[0] - detection.position) for t in self.tracks]
             if any(clear(SAME_MM - a, 0.5) for a in away):
                 continue
             self.last_id += 1
-            finding.track = self.last_id
-            track = Track(self.last_id, np.array([finding.place, np.zeros(3)]),
+            detection.track = self.last_id
+            track = Track(self.last_id, np.array([detection.position, np.zeros(3)]),
                           np.diag([Params.measured_mm**2, START_SPEED**2]).astype(float),
-                          finding.semi.copy(), np.clip(finding.logit, -LOGIT_MAX, LOGIT_MAX),
-                          self.time_s, False, finding)
+                          detection.semi.copy(), np.clip(detection.logit, -LOGIT_MAX, LOGIT_MAX),
+                          self.time_s, False, detection)
             track.judge()
             self.tracks.append(track)
 
@@ -184,7 +184,7 @@ class Tracks:
         """The head nearest the middle of those not much less probable than the best."""
         heads = sorted([t for t in self.tracks if t.is_head], key=lambda t: -t.logit)
         good = [t for t in heads if not clear(heads[0].logit - CHOICE_LOGIT - t.logit, 0.004)]
-        aside = sorted([(t.finding is None, abs(self.shown(t)[0] / self.shown(t)[2] - middle), t.id)
+        aside = sorted([(t.detection is None, abs(self.shown(t)[0] / self.shown(t)[2] - middle), t.id)
                         for t in good])
         if len(aside) > 1 and aside[0][0] == aside[1][0]:
             clear(aside[0][1] - aside[1][1], 1e-4)
@@ -200,26 +200,26 @@ class Tracks:
 
     @staticmethod
     def shown(track):
-        return track.state[0] if track.finding is None else track.finding.place
+        return track.state[0] if track.detection is None else track.detection.position
 
-    def update(self, findings, views, middle):
+    def update(self, detections, views, middle):
         gone, hidden = [], []
         for through, hit, front in views:
             rays = through + hit + front
             hidden.append(100 * front >= Params.front_percent * rays)
             gone.append(rays < VIEW_RAYS_MIN or
                         100 * through > Params.through_percent * rays and not hidden[-1])
-        self.associate(findings, gone)
+        self.associate(detections, gone)
         self.prune(gone, hidden)
-        self.start(findings)
+        self.start(detections)
         self.select(middle)
 
 
-def finding(random, place, logit, noise=6.0):
+def detection(random, position, logit, noise=6.0):
     """As the firmware gets it: rounded."""
-    place = np.asarray(place, float) + random.normal(0, noise, 3)
+    position = np.asarray(position, float) + random.normal(0, noise, 3)
     semi = SEMI_MM * np.exp(random.normal(0, 0.04, 3))
-    return Finding(from_q(to_q(place, 8), 8), float(from_q(to_q(logit, 10), 10)),
+    return Detection(from_q(to_q(position, 8), 8), float(from_q(to_q(logit, 10), 10)),
                    from_q(to_q(semi, 8), 8))
 
 
@@ -230,37 +230,37 @@ def walk(random):
     """Along, at 0.5 m/s, and back."""
     for k in range(60):
         x = -150 + 20 * min(k, 60 - k) / 2
-        yield 40000, [finding(random, (x, -40, 800), random.normal(3, 1))], HIT
+        yield 40000, [detection(random, (x, -40, 800), random.normal(3, 1))], HIT
 
 
 def crossing(random):
     """Two heads that change sides 300 mm apart in depth."""
     for k in range(50):
         x = -250 + 10 * k
-        two = [finding(random, (x, -40, 700), random.normal(4, 0.7)),
-               finding(random, (-x, -20, 1000), random.normal(2.5, 0.7))]
+        two = [detection(random, (x, -40, 700), random.normal(4, 0.7)),
+               detection(random, (-x, -20, 1000), random.normal(2.5, 0.7))]
         yield 40000, two[::1 if random.integers(2) else -1], HIT
 
 
 def hands(random):
     """Hands before a moving head in frames 10 to 17; then it leaves, and the seat is seen."""
     for k in range(34):
-        place = (4 * k, -60, 750)
+        position = (4 * k, -60, 750)
         seen = k < 10 or 18 <= k < 28
         view = HIT if seen else FRONT if k < 18 else THROUGH
-        yield 40000, [finding(random, place, random.normal(3, 0.5))] if seen else [], view
+        yield 40000, [detection(random, position, random.normal(3, 0.5))] if seen else [], view
 
 
 def weak(random):
-    """A finding that is never convincing, then one that is; then rejected ones inside the gate."""
+    """A detection that is never convincing, then one that is; then rejected ones inside the gate."""
     for k in range(40):
         logit = -0.4 if k < 6 else 3 if k < 20 else -1.7 if k < 26 else 2
-        yield 40000, [finding(random, (30, 0, 900 + 3 * k), random.normal(logit, 0.15))], HIT
+        yield 40000, [detection(random, (30, 0, 900 + 3 * k), random.normal(logit, 0.15))], HIT
 
 
 def crowd(random):
     """Six that come and go, frames late, lost and far apart."""
-    places = [np.array([x, y, z], float) for x, y, z in
+    positions = [np.array([x, y, z], float) for x, y, z in
               [(-420, 0, 900), (-210, -50, 800), (0, 10, 700), (200, 0, 1000), (410, -30, 1200),
                (30, -200, 1300)]]
     speeds = random.normal(0, 150, (6, 3))
@@ -268,12 +268,12 @@ def crowd(random):
         step = int(random.choice([0, 20000, 40000, 40000, 40000, 90000, 400000, 1500000, 2500000,
                                   -5000], p=[.03, .1, .25, .25, .18, .1, .04, .02, .02, .01]))
         there = []
-        for index, place in enumerate(places):
-            speeds[index] -= step / 1e6 * 1.5 * (place - [0, 0, 900]) * (np.abs(place - [
+        for index, position in enumerate(positions):
+            speeds[index] -= step / 1e6 * 1.5 * (position - [0, 0, 900]) * (np.abs(position - [
                 0, 0, 900]) > 450)
-            place += speeds[index] * max(step, 0) / 1e6
+            position += speeds[index] * max(step, 0) / 1e6
             if random.uniform() < 0.8:
-                there.append(finding(random, place, random.normal(2 - 0.4 * index, 1), 4))
+                there.append(detection(random, position, random.normal(2 - 0.4 * index, 1), 4))
         there.sort(key=lambda f: -f.logit)
         yield step, there, [HIT, FRONT, NOTHING, HIT][random.integers(4)]
 
@@ -281,7 +281,7 @@ def crowd(random):
 def slow(random):
     """A frame each 0.7 to 1.9 s: limited variances."""
     for k in range(30):
-        yield int(random.uniform(0.7e6, 1.9e6)), [finding(random, (20 * (k % 5), 0, 800), 3)], HIT
+        yield int(random.uniform(0.7e6, 1.9e6)), [detection(random, (20 * (k % 5), 0, 800), 3)], HIT
 
 
 SCENES = {"walk": walk, "crossing": crossing, "hands": hands, "weak": weak, "crowd": crowd,
@@ -289,23 +289,23 @@ SCENES = {"walk": walk, "crossing": crossing, "hands": hands, "weak": weak, "cro
 
 
 def play(scene, seed):
-    """Frames (time, findings, views) and what the tracks are after each."""
+    """Frames (time, detections, views) and what the tracks are after each."""
     random = np.random.default_rng(seed)
     tracks, time_us, frames = Tracks(), 1000000, []
-    for step_us, findings, view in SCENES[scene](random):
+    for step_us, detections, view in SCENES[scene](random):
         time_us += step_us
         tracks.expect(time_us / 1e6)
         views = [view] * len(tracks.tracks)
-        tracks.update(findings, views, 0.0)
-        after = [(t.id, t.is_head, t.finding is not None, *t.state[0], *t.state[1],
+        tracks.update(detections, views, 0.0)
+        after = [(t.id, t.is_head, t.detection is not None, *t.state[0], *t.state[1],
                   *t.semi, t.covariance[0, 0], t.covariance[0, 1], t.covariance[1, 1], t.logit)
                  for t in tracks.tracks]
-        frames.append((time_us, findings, view, after, tracks.selected))
+        frames.append((time_us, detections, view, after, tracks.selected))
     return frames
 
 
 def write_vectors(directory):
-    inc = emit.Inc("Sequences of findings, and the tracks after every frame.")
+    inc = emit.Inc("Sequences of detections, and the tracks after every frame.")
     rows = []
     for scene in SCENES:
         seed = 1
@@ -316,12 +316,12 @@ def write_vectors(directory):
             except Unclear:
                 seed += 1
         founds, states, lines = [], [], []
-        for time_us, findings, view, after, selected in frames:
+        for time_us, detections, view, after, selected in frames:
             lines.append("%d, %d, %d, {%d, %d, %d}, %d" % (
-                time_us, len(findings), len(after), *view, selected))
+                time_us, len(detections), len(after), *view, selected))
             founds += ["{{%d, %d, %d}, {%d, %d, %d}, %d, %d}" % (
-                *to_q(f.place, 8), *to_q(f.semi, 8), to_q(f.logit, 10), f.track)
-                       for f in findings]
+                *to_q(f.position, 8), *to_q(f.semi, 8), to_q(f.logit, 10), f.track)
+                       for f in detections]
             states += ["{%s, %s, %s, {%s, %s, %s}, {%s, %s, %s}, {%s, %s, %s}, %s, %s, %s, %s}" % (
                 *map(int, s[:3]), *emit.numbers(s[3:], 3)) for s in after]
         inc.raw("\nstatic const struct vector_found vector_%s_founds[] = {\n%s};\n" % (

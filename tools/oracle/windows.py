@@ -10,7 +10,7 @@ import emit
 NEAR_MM, FAR_MM = 400, 8000
 PLANE_OFF_MM = 40
 LARGE_FROM = 500  # of the seeds of Noise
-CELLS_MAX, PLACES_APART_MM, WINDOWS_MAX = 19200, 200, 8
+CELLS_MAX, POSITIONS_APART_MM, WINDOWS_MAX = 19200, 200, 8
 SCORE_MIN, SCORE_BEHIND_MAX, CELLS_MIN = 720, 130, 2.5
 INSIDE = [(0, 0), (-35, 0), (35, 0), (0, -45), (0, 45), (-40, -45), (40, 45), (-40, 45), (40, -45),
           (-58, 0), (58, 0), (0, -80), (0, 80)]
@@ -70,15 +70,15 @@ class Noise:
         return np.where(depth >= NEAR_MM, depth, 0).astype(float)
 
     def score(self):
-        """Of the place in the middle; None where a probe is too near to a cell's border, or the
+        """Of the position in the middle; None where a probe is too near to a cell's border, or the
         bulge is not a limit's."""
-        places, focal, scores = Places(self), self.focal, []
+        positions, focal, scores = Positions(self), self.focal, []
         for stretch in (1 - 2e-4, 1 + 2e-5, 1):
             self.focal = focal * stretch
-            scores.append(places.score(60, 80))
+            scores.append(positions.score(60, 80))
         self.focal = focal
-        inside = places.seen(60, 80, INSIDE)
-        behind = inside - places.depth[60, 80]
+        inside = positions.seen(60, 80, INSIDE)
+        behind = inside - positions.depth[60, 80]
         hit = (inside > 0) & (behind >= -40) & (behind <= 110)
         bulge = 99
         if hit[:5].any() and hit[5:].sum() >= 3:
@@ -101,11 +101,11 @@ class Tilted(Noise):
 
     def on_plane(self):
         """None where a probe is too near to a cell's border, or off by nearly what may be."""
-        places, focal, answers = Places(self), self.focal, []
+        positions, focal, answers = Positions(self), self.focal, []
         for stretch in (1 - 2e-4, 1 + 2e-5, 1):
             for limit in (38, 42, PLANE_OFF_MM):
                 self.focal = focal * stretch
-                answers.append(places.on_plane(60, 80, limit))
+                answers.append(positions.on_plane(60, 80, limit))
         self.focal = focal
         return answers[-1] if len(set(answers)) == 1 else None
 
@@ -130,17 +130,17 @@ def survey_frame(image):
     cell = 1
     while -(-image.shape[0] // cell) * -(-image.shape[1] // cell) > CELLS_MAX:
         cell += 1
-    least, cells = cell, survey(image, cell, max(1, cell // 2))
+    smallest, cells = cell, survey(image, cell, max(1, cell // 2))
     while (cells[:, 1:] > 0).any() and \
             ((cells[:, 1:] > 0) & (cells[:, :-1] > 0)).sum() < 0.7 * (cells[:, 1:] > 0).sum():
         cell *= 2
         cells = survey(image, cell, cell // 2)
-    if cell == least:
+    if cell == smallest:
         return cells, cell, 0
     return survey(image, cell // 2, cell // 2), cell // 2, cell
 
 
-class Places:
+class Positions:
     def __init__(self, scene):
         self.scene = scene
         self.depth, self.cell, self.spacing = survey_frame(scene.draw())
@@ -161,15 +161,15 @@ class Places:
             return 0
         inside, around, below = (self.seen(row, column, p) for p in (INSIDE, AROUND, BELOW))
         hit = (inside > 0) & (inside - z >= -40) & (inside - z <= 110)
-        share = np.select([np.isnan(inside), inside == 0, hit], [0.5, 0.3, 1], 0).mean() * 350
-        share += np.select([np.isnan(around), around == 0, around - z >= 90, around - z < -100],
+        fraction = np.select([np.isnan(inside), inside == 0, hit], [0.5, 0.3, 1], 0).mean() * 350
+        fraction += np.select([np.isnan(around), around == 0, around - z >= 90, around - z < -100],
                            [0.5, 0.7, 1, 0.4], 0).mean() * 400
-        share += np.select([np.isnan(below), below == 0, np.abs(below - z) < 150],
+        fraction += np.select([np.isnan(below), below == 0, np.abs(below - z) < 150],
                            [0.5, 0.3, 1], 0).mean() * 150
         bulge = 7.5
         if hit[:5].any() and hit[5:].sum() >= 3:
             bulge = np.clip(inside[5:][hit[5:]].mean() - inside[:5][hit[:5]].mean(), 0, 15)
-        return share + bulge / 15 * 100 - z * 0.02
+        return fraction + bulge / 15 * 100 - z * 0.02
 
     def on_plane(self, row, column, off_mm=PLANE_OFF_MM):
         beside, below = self.seen(row, column, BESIDE), self.seen(row, column, BELOW)
@@ -184,37 +184,37 @@ class Places:
         near = np.abs(there - below[known]) <= off_mm
         return known.sum() >= 2 and 3 * near.sum() >= 2 * known.sum()
 
-    def apart(self, place, rows, columns):
-        """mm from one place to others, in the image at the depth of the nearer one."""
-        z = np.minimum(self.depth[place], self.depth[rows, columns])
-        aside = np.hypot(rows - place[0], columns - place[1]) * self.cell * z / self.scene.focal
-        return np.hypot(aside, self.depth[rows, columns] - self.depth[place])
+    def apart(self, position, rows, columns):
+        """mm from one position to others, in the image at the depth of the nearer one."""
+        z = np.minimum(self.depth[position], self.depth[rows, columns])
+        aside = np.hypot(rows - position[0], columns - position[1]) * self.cell * z / self.scene.focal
+        return np.hypot(aside, self.depth[rows, columns] - self.depth[position])
 
-    def window(self, scores, place):
+    def window(self, scores, position):
         rows, columns = np.nonzero(scores)
-        reach = np.floor(70 * self.scene.focal / (self.depth[place] * self.cell) + 0.5)
-        weight = scores[rows, columns] - scores[place] + 80
-        good = (np.abs(rows - place[0]) <= reach) & (np.abs(columns - place[1]) <= reach) & \
-            (weight > 0) & (np.abs(self.depth[rows, columns] - self.depth[place]) <= 80)
+        reach = np.floor(70 * self.scene.focal / (self.depth[position] * self.cell) + 0.5)
+        weight = scores[rows, columns] - scores[position] + 80
+        good = (np.abs(rows - position[0]) <= reach) & (np.abs(columns - position[1]) <= reach) & \
+            (weight > 0) & (np.abs(self.depth[rows, columns] - self.depth[position]) <= 80)
         mean = [np.average(value[good], weights=weight[good])
                 for value in (columns, rows, self.depth[rows, columns])]
         middle = (np.array(self.scene.size) - 1) / 2
         pixel = np.array(mean[:2]) * self.cell + self.cell // 2
-        return [*((pixel - middle) / self.scene.focal), mean[2], scores[place]]
+        return [*((pixel - middle) / self.scene.focal), mean[2], scores[position]]
 
     def windows(self):
         scores = np.zeros_like(self.depth)
-        for place in np.ndindex(scores.shape):
-            scores[place] = self.score(*place)
+        for position in np.ndindex(scores.shape):
+            scores[position] = self.score(*position)
         left, out = np.where(scores >= SCORE_MIN, scores, 0), []
         while left.any() and len(out) < WINDOWS_MAX:
-            place = np.unravel_index(np.argmax(left), left.shape)
-            if scores[place] < left.max() or scores[place] < scores.max() - SCORE_BEHIND_MAX:
+            position = np.unravel_index(np.argmax(left), left.shape)
+            if scores[position] < left.max() or scores[position] < scores.max() - SCORE_BEHIND_MAX:
                 break
-            if not self.on_plane(*place):
-                out.append(self.window(scores, place))
+            if not self.on_plane(*position):
+                out.append(self.window(scores, position))
             rows, columns = np.nonzero(left)
-            near = self.apart(place, rows, columns) < PLACES_APART_MM
+            near = self.apart(position, rows, columns) < POSITIONS_APART_MM
             left[rows[near], columns[near]] = 0
         return out
 
@@ -245,8 +245,8 @@ def write_vectors(directory):
     inc = emit.Inc("Scenes, and the windows that they give in float64.")
     rows = []
     for index, scene in enumerate(SCENES):
-        places = Places(scene)
-        found = places.windows()
+        positions = Positions(scene)
+        found = positions.windows()
         inc.raw("\nstatic const struct vector_ellipsoid vector_%d_ellipsoids[] = {\n%s};\n" % (
             index, emit.wrap(["{{%s}, {%s}}" % tuple(", ".join(emit.numbers(p, 3)) for p in e)
                               for e in scene.ellipsoids or [((0, 0, 0), (1, 1, 1))]])))
@@ -257,7 +257,7 @@ def write_vectors(directory):
                     'vector_%d_windows' % (
                         scene.name, *scene.size, scene.focal,
                         *emit.numbers(scene.plane, 3), scene.every, len(scene.ellipsoids), index,
-                        places.cell, places.spacing, len(found), index))
+                        positions.cell, positions.spacing, len(found), index))
     inc.struct_array("vector_scene", "vector_scenes", rows)
     scores = ((noise, noise.score()) for noise in
               map(Noise, [*range(1, 120), *range(LARGE_FROM, LARGE_FROM + 240)]))

@@ -1,5 +1,5 @@
 /* render - draws synthetic frames directories: scene, light, laser dots, sensor; see render --help.
- * The way of a frame: stage (which shapes) -> ambient (grey picture) -> dots (laser) -> sensor (numbers) -> output.
+ * Steps of a frame: stage (which shapes) -> ambient (grey picture) -> dots (laser) -> sensor (numbers) -> output.
  */
 #define _POSIX_C_SOURCE 200809L
 
@@ -17,7 +17,7 @@
 #include "rd_stage.h"
 
 struct studio {
-    struct rd_rig rig, told_rig; /* as it is, and as rig.json has it */
+    struct rd_rig rig, written_rig; /* as it is, and as rig.json has it */
     struct rd_laser laser;
     struct rd_sensor sensor;
     struct rd_stage stage;
@@ -46,9 +46,9 @@ static struct studio *studio_new(const struct rd_options *options)
     if (studio == NULL)
         return NULL;
     rd_rig_make(&studio->rig, options);
-    studio->told_rig = studio->rig;
+    studio->written_rig = studio->rig;
     rd_rig_knock(&studio->rig, options);
-    rd_rig_misjudge(&studio->told_rig, options);
+    rd_rig_misjudge(&studio->written_rig, options);
     rd_laser_make(&studio->laser, options, &studio->rig);
     rd_sensor_make(&studio->sensor, options);
     studio->ambient = rd_ambient_new(&studio->rig);
@@ -91,7 +91,7 @@ static double now_s(void)
 }
 
 /* The frame that is begun; the rate, and the time that is left at it, once they mean something. */
-static void tell_progress(const char *dir, int done, int count, double run_s)
+static void report_progress(const char *dir, int done, int count, double run_s)
 {
     fprintf(stderr, "\r\033[Krender: %s %d/%d", dir, done + 1, count);
     if (done > 0 && run_s >= 2) {
@@ -111,13 +111,13 @@ static bool render_all(struct studio *studio, const struct rd_options *options)
     bool good = rd_output_open(&output, options->out_dir);
     for (int frame = first; good && frame < end; frame++) {
         if (talk)
-            tell_progress(options->out_dir, frame - first, end - first, now_s() - start_s);
+            report_progress(options->out_dir, frame - first, end - first, now_s() - start_s);
         good = render_frame(studio, &output, frame);
     }
     if (talk)
         fputc('\n', stderr);
     if (good)
-        good = rd_output_finish(&output, &studio->told_rig, first, end);
+        good = rd_output_finish(&output, &studio->written_rig, first, end);
     else
         rd_output_abandon(&output);
     return good;

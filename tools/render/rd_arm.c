@@ -4,26 +4,26 @@
 /* Part of the hand's length from the wrist to the middle of the palm. */
 #define PALM_FROM_WRIST 0.30
 
-/* The elbow's place: outwards and down as far as the lengths of the two bones leave it free. */
+/* The elbow's position: outwards and down as far as the lengths of the two bones leave it free. */
 static struct rd_vec elbow_of(struct rd_vec shoulder, struct rd_vec wrist, double upper_mm, double fore_mm,
                               struct rd_vec outwards)
 {
-    struct rd_vec way = rd_sub(wrist, shoulder);
-    double reach = rd_length(way);
-    struct rd_vec axis = rd_unit(way);
+    struct rd_vec offset = rd_sub(wrist, shoulder);
+    double reach = rd_length(offset);
+    struct rd_vec axis = rd_unit(offset);
     double along = (upper_mm * upper_mm - fore_mm * fore_mm + reach * reach) / (2.0 * reach);
     double aside = sqrt(fmax(0.0, upper_mm * upper_mm - along * along));
-    struct rd_vec free_way = rd_unit(rd_along(outwards, axis, -rd_dot(outwards, axis)));
-    return rd_along(rd_along(shoulder, axis, along), free_way, aside);
+    struct rd_vec free_direction = rd_unit(rd_along(outwards, axis, -rd_dot(outwards, axis)));
+    return rd_along(rd_along(shoulder, axis, along), free_direction, aside);
 }
 
-/* The wrist as near to where the hand wants it as the arm's length allows. */
+/* The wrist as near to where the hand should be as the arm's length allows. */
 static struct rd_vec reachable(struct rd_vec shoulder, struct rd_vec wrist, double upper_mm, double fore_mm)
 {
-    struct rd_vec way = rd_sub(wrist, shoulder);
-    double reach = rd_length(way);
+    struct rd_vec offset = rd_sub(wrist, shoulder);
+    double reach = rd_length(offset);
     double allowed = rd_clamp(reach, fabs(upper_mm - fore_mm) + 20.0, 0.985 * (upper_mm + fore_mm));
-    return rd_along(shoulder, rd_unit(way), allowed);
+    return rd_along(shoulder, rd_unit(offset), allowed);
 }
 
 /* Two bones, bent towards the palm (-Z of the hand's frame) as the hand curls. */

@@ -13,7 +13,7 @@
 /* Fractions of one cycle that no whole number of pictures repeats: the poses spread evenly. */
 #define GOLDEN 0.61803398874989484820
 #define PLASTIC 0.75487766624669276005
-/* The middle of the board is aimed at places within this part of the frame's half sides. */
+/* The middle of the board is aimed at points within this fraction of the frame's half sides. */
 #define AIM_PART 0.75
 #define DRAWS_MAX 100
 #define SAMPLES_SIDE 7
@@ -50,8 +50,8 @@ static double cycle(double value)
     return value - floor(value);
 }
 
-/* Share of the sheet that the frame shows. */
-static double share_seen(const struct rd_board *board, const struct rd_rig *rig, const struct rd_pose *pose)
+/* Fraction of the sheet that the frame shows. */
+static double fraction_seen(const struct rd_board *board, const struct rd_rig *rig, const struct rd_pose *pose)
 {
     int seen = 0;
     for (int i = 0; i < SAMPLES_SIDE * SAMPLES_SIDE; i++) {
@@ -78,7 +78,7 @@ static struct rd_pose draw_pose(const struct rd_rig *rig, struct rd_rng *rng, do
     return (struct rd_pose){turn, rd_scale(sight, distance_mm / sight.z)};
 }
 
-/* A lamp where a place of the sheet mirrors it into the camera. */
+/* A lamp where a point of the sheet mirrors it into the camera. */
 static void mirror_lamp(const struct rd_board *board, const struct rd_pose *pose, struct rd_rng *rng,
                         struct rd_light *light)
 {
@@ -103,7 +103,7 @@ void rd_board_show(const struct rd_board *board, const struct rd_options *option
                                 .bitmap = board->bitmap};
     for (int draw = 0; draw < DRAWS_MAX; draw++) {
         *pose = draw_pose(rig, &rng, start, picture);
-        if (share_seen(board, rig, pose) > 0.5)
+        if (fraction_seen(board, rig, pose) > 0.5)
             break;
     }
     rd_scene_clear(scene);

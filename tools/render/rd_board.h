@@ -1,6 +1,6 @@
 /* rd_board - somebody shows a printed board to the camera: the pictures of a calibration.
  * The board is flat, as large as the options say, its picture a bitmap. Picture k has a pose of its own, with its
- * distance (0.4 to 1.5 m, evenly in its logarithm), tilt (to 45 degrees) and place in the frame spread as somebody does it who was told to;
+ * distance (0.4 to 1.5 m, evenly in its logarithm), tilt (to 45 degrees) and position in the frame spread as by somebody who follows instructions;
  * at least half of the board is in the frame. Behind it is a room. With --laser alternate two frames in succession
  * show the same pose, the first with the laser.
  */
@@ -16,7 +16,7 @@ struct rd_board {
     double half_width_mm, half_height_mm;
 };
 
-/* The sheet, as the options name it. False: told. */
+/* The sheet, as the options name it. False: reported. */
 bool rd_board_make(struct rd_board *board, const struct rd_options *options);
 void rd_board_end(struct rd_board *board);
 

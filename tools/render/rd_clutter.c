@@ -17,7 +17,7 @@ struct clutter {
     struct rd_rng *rng;
     struct rd_rot camera; /* turns the room's vectors into the camera's frame */
     double floor_mm;      /* below the camera */
-    struct rd_vec places_mm[THINGS_MAX];
+    struct rd_vec positions_mm[THINGS_MAX];
     int count;
 };
 
@@ -34,17 +34,17 @@ static void put(const struct clutter *c, struct rd_shape shape)
 /* In the room's frame: somewhere in the pattern, not in the middle of what is there, if that can be found. */
 static struct rd_vec draw_place(const struct clutter *c, double nearest_mm)
 {
-    struct rd_vec place = {0.0, 0.0, FARTHEST_MM};
+    struct rd_vec position = {0.0, 0.0, FARTHEST_MM};
     for (int draw = 0; draw < PLACE_DRAWS; draw++) {
         double z = between(c, nearest_mm, FARTHEST_MM), x = between(c, -0.24, 0.24), y = between(c, -0.22, 0.20);
         bool is_free = true;
-        place = rd_turn_back(&c->camera, rd_v(x * z, y * z, z));
+        position = rd_turn_back(&c->camera, rd_v(x * z, y * z, z));
         for (int i = 0; i < c->count; i++)
-            is_free = is_free && rd_length(rd_sub(place, c->places_mm[i])) > 280.0;
-        if (is_free && place.y < c->floor_mm - 200.0)
+            is_free = is_free && rd_length(rd_sub(position, c->positions_mm[i])) > 280.0;
+        if (is_free && position.y < c->floor_mm - 200.0)
             break;
     }
-    return place;
+    return position;
 }
 
 /* A top of a table, a board, a stool or a post under a thing's foot. */
@@ -73,25 +73,25 @@ static void put_support(const struct clutter *c, struct rd_vec foot)
 
 static void add_thing(struct clutter *c)
 {
-    struct rd_vec place = draw_place(c, NEAREST_MM);
-    struct rd_pose foot = {rd_rot_euler(between(c, -RD_PI, RD_PI), 0.0, 0.0), place};
+    struct rd_vec position = draw_place(c, NEAREST_MM);
+    struct rd_pose foot = {rd_rot_euler(between(c, -RD_PI, RD_PI), 0.0, 0.0), position};
     int first = c->scene->shape_count;
     double high_mm = rd_thing_put(c->scene, c->rng, &foot);
-    /* Its middle belongs at the place, its foot on what carries it. */
-    struct rd_pose lower = rd_pose_at(rd_v(0.0, fmin(0.5 * high_mm, c->floor_mm - place.y), 0.0));
+    /* Its middle belongs at the position, its foot on what carries it. */
+    struct rd_pose lower = rd_pose_at(rd_v(0.0, fmin(0.5 * high_mm, c->floor_mm - position.y), 0.0));
     rd_scene_move(c->scene, first, &lower);
-    put_support(c, rd_add(place, lower.origin_mm));
-    c->places_mm[c->count++] = place;
+    put_support(c, rd_add(position, lower.origin_mm));
+    c->positions_mm[c->count++] = position;
 }
 
 static void add_tall(struct clutter *c)
 {
-    struct rd_vec place = draw_place(c, NEAREST_TALL_MM);
+    struct rd_vec position = draw_place(c, NEAREST_TALL_MM);
     bool from_behind = rd_rng_chance(c->rng, 0.15);
     double turn = between(c, -0.7, 0.7);
-    struct rd_pose top = {rd_rot_euler(from_behind ? turn + RD_PI : turn, 0.0, 0.0), place};
-    rd_thing_put_tall(c->scene, c->rng, &top, c->floor_mm - place.y);
-    c->places_mm[c->count++] = place;
+    struct rd_pose top = {rd_rot_euler(from_behind ? turn + RD_PI : turn, 0.0, 0.0), position};
+    rd_thing_put_tall(c->scene, c->rng, &top, c->floor_mm - position.y);
+    c->positions_mm[c->count++] = position;
 }
 
 static void add_walls(const struct clutter *c)

@@ -20,8 +20,8 @@ static void plan_absence(struct rd_company *company, const struct rd_options *op
     struct rd_rng rng = rd_rng_start(options->seed, RD_STREAM_SCHEDULE);
     int frame_count = options->frame_count;
     int empty_count = (frame_count * EMPTY_OF_50 + 25) / 50;
-    int place = rd_rng_pick(&rng, 3);
-    int first = place == 0 ? 0 : place == 1 ? frame_count / 2 : frame_count - empty_count;
+    int position = rd_rng_pick(&rng, 3);
+    int first = position == 0 ? 0 : position == 1 ? frame_count / 2 : frame_count - empty_count;
     company->empty_first = first;
     company->empty_end = first + empty_count;
     if (!sits(options)) {
@@ -99,7 +99,7 @@ static void make_neighbour(struct rd_company *company, const struct rd_options *
     rd_seat_build(scene, seat_rng, head_mm);
 }
 
-/* Draws the first one's place aside of the middle and returns the way from there to the second. */
+/* Draws the first one's position beside the middle and returns the offset from there to the second. */
 static struct rd_vec draw_neighbour(uint64_t seed, struct rd_vec *first_mm)
 {
     struct rd_rng rng = rd_rng_start(seed + SECOND_SEED, RD_STREAM_SEAT);

@@ -22,7 +22,7 @@
 struct rd_company {
     enum rd_scene_kind kind;
     bool tilted;
-    struct rd_pose tilt; /* everything turned about the first head's place at rest, for the option --tilt */
+    struct rd_pose tilt; /* everything turned about the first head's position at rest, for the option --tilt */
     const struct rd_rig *rig;
     struct rd_sitter {
         struct rd_person person;

@@ -4,22 +4,22 @@
 
 #include "rd_rng.h"
 
-/* The bundle: one ray in the middle and two rings. Radii (in sigmas) and shares reproduce a Gaussian's variance. */
+/* The bundle: one ray in the middle and two rings. Radii (in sigmas) and weights reproduce a Gaussian's variance. */
 #define INNER_COUNT 6
 #define OUTER_COUNT 8
 #define SUB_COUNT (1 + INNER_COUNT + OUTER_COUNT)
 #define INNER_SIGMAS 1.12
 #define OUTER_SIGMAS 2.13
-#define MIDDLE_SHARE 0.20
-#define INNER_SHARE 0.50
-#define OUTER_SHARE 0.30
+#define MIDDLE_FRACTION 0.20
+#define INNER_FRACTION 0.50
+#define OUTER_FRACTION 0.30
 /* The spot that power_grey speaks of. */
 #define NOMINAL_SIGMA_PX 1.2
 /* A spot is drawn out to this many pixels. */
 #define SPOT_REACH_PX 7
 /* Beam width is taken at this distance when the middle ray meets nothing. */
 #define NOWHERE_MM 1500.0
-/* Surfaces finer than this share their speckle pattern. */
+/* Surfaces finer than this have the same speckle pattern. */
 #define SPECKLE_MM 0.5
 
 struct spot {
@@ -71,7 +71,7 @@ static void draw_spot(const struct rd_rig *rig, const struct spot *spot, float *
     }
 }
 
-/* What the camera gets from one hit of a sub-ray. False: it does not see the place. */
+/* What the camera gets from one hit of a sub-ray. False: it does not see the point. */
 static bool spot_of(const struct rd_laser *laser, const struct rd_rig *rig, const struct rd_scene *scene,
                     const struct rd_hit *hit, double power, struct spot *spot)
 {
@@ -90,30 +90,30 @@ static bool spot_of(const struct rd_laser *laser, const struct rd_rig *rig, cons
 }
 
 /* Direction of sub-ray `sub`; sigma is the beam's angular width. Sub-ray 0 is the middle. */
-static struct rd_vec sub_ray(struct rd_vec dir, int sub, double sigma, double *share)
+static struct rd_vec sub_ray(struct rd_vec dir, int sub, double sigma, double *fraction)
 {
     if (sub == 0) {
-        *share = MIDDLE_SHARE;
+        *fraction = MIDDLE_FRACTION;
         return dir;
     }
     bool inner = sub <= INNER_COUNT;
     double angle = inner ? 2.0 * RD_PI * sub / INNER_COUNT : 2.0 * RD_PI * (sub + 0.5) / OUTER_COUNT;
     double away = sigma * (inner ? INNER_SIGMAS : OUTER_SIGMAS);
     struct rd_rot across = rd_rot_frame(dir, rd_v(1.0, 0.0, 0.0));
-    *share = inner ? INNER_SHARE / INNER_COUNT : OUTER_SHARE / OUTER_COUNT;
+    *fraction = inner ? INNER_FRACTION / INNER_COUNT : OUTER_FRACTION / OUTER_COUNT;
     dir = rd_along(dir, across.x, away * cos(angle));
     return rd_unit(rd_along(dir, across.z, away * sin(angle)));
 }
 
-/* A rough surface sends some sub-rays' light elsewhere; which ones depends on the place alone. */
+/* A rough surface sends some sub-rays' light elsewhere; which ones depends on the position alone. */
 static double speckle_gain(const struct rd_laser *laser, int dot, int sub, struct rd_vec point_mm)
 {
-    uint64_t place = (uint64_t)(int64_t)floor(point_mm.z / SPECKLE_MM);
-    double flat = rd_hash_unit(laser->seed + place, (uint64_t)dot, (uint64_t)sub);
+    uint64_t position = (uint64_t)(int64_t)floor(point_mm.z / SPECKLE_MM);
+    double flat = rd_hash_unit(laser->seed + position, (uint64_t)dot, (uint64_t)sub);
     return 1.0 - laser->speckle - laser->speckle * log(1.0 - flat);
 }
 
-/* The brightest of the 3x3 pixels around a place, as far as the sensor can show it. */
+/* The brightest of the 3x3 pixels around a position, as far as the sensor can show it. */
 static double peak_near(const struct rd_rig *rig, const float *grey, double u_px, double v_px)
 {
     int u0 = (int)floor(u_px + 0.5), v0 = (int)floor(v_px + 0.5);
@@ -127,7 +127,7 @@ static double peak_near(const struct rd_rig *rig, const float *grey, double u_px
     return fmin(peak, RD_FULL_GREY);
 }
 
-/* Does the place belong to one of the frame's pixels? */
+/* Does the position belong to one of the frame's pixels? */
 static bool in_frame(const struct rd_rig *rig, double u_px, double v_px)
 {
     return u_px >= -0.5 && v_px >= -0.5 && u_px <= rig->width - 0.5 && v_px <= rig->height - 0.5;
@@ -150,14 +150,14 @@ static bool cast_dot(const struct rd_laser *laser, const struct rd_rig *rig, con
     double sigma = beam_sigma(laser, scene, &ray), before_grey = 0.0;
     bool middle_seen = false;
     for (int sub = 0; sub < SUB_COUNT; sub++) {
-        double share;
+        double fraction;
         struct spot spot;
         struct rd_hit hit;
-        ray.dir = sub_ray(rig->dot_rays[index], sub, sigma, &share);
+        ray.dir = sub_ray(rig->dot_rays[index], sub, sigma, &fraction);
         if (!rd_scene_hit(scene, &ray, laser->reach_mm, &hit))
             continue;
-        share *= speckle_gain(laser, index, sub, hit.point_mm);
-        if (!spot_of(laser, rig, scene, &hit, share * power, &spot))
+        fraction *= speckle_gain(laser, index, sub, hit.point_mm);
+        if (!spot_of(laser, rig, scene, &hit, fraction * power, &spot))
             continue;
         if (sub == 0) {
             middle_seen = in_frame(rig, spot.u_px, spot.v_px);

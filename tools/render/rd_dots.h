@@ -1,6 +1,6 @@
 /* rd_dots - the laser's dots in the picture.
  * Each beam is a bundle of sub-rays with a Gaussian profile. Every sub-ray lands on the first surface in its way
- * and shows as a small spot if the camera sees that place. So dots widen on slanted surfaces, split at depth edges
+ * and shows as a small spot if the camera sees that point. So dots widen on slanted surfaces, split at depth edges
  * and go out where the camera's view is blocked. A spot's light falls with distance squared, with the cosine
  * towards the camera and with the albedo; speckle makes it uneven.
  */
@@ -24,8 +24,8 @@ struct rd_laser {
     double divergence;         /* growth of that, mm per mm */
     double reach_mm;           /* farther surfaces show no dots */
     double speckle;            /* 0 none .. 1 full */
-    double missing;            /* share of dots that are not there */
-    double gain[RD_DOT_COUNT]; /* the grating does not share the light evenly */
+    double missing;            /* fraction of dots that are not there */
+    double gain[RD_DOT_COUNT]; /* the grating does not split the light evenly */
     uint64_t seed;
 };
 
@@ -41,7 +41,7 @@ struct rd_dot_list {
 
 void rd_laser_make(struct rd_laser *laser, const struct rd_options *options, const struct rd_rig *rig);
 
-/* Adds all dots to `grey` and lists the visible ones with the true places of their middle rays. */
+/* Adds all dots to `grey` and lists the visible ones with the true positions of their middle rays. */
 void rd_dots_cast(const struct rd_laser *laser, const struct rd_rig *rig, const struct rd_scene *scene, int frame,
                   float *grey, struct rd_dot_list *visible);
 

@@ -104,10 +104,10 @@ static void put_plant(struct rd_scene *scene, struct rd_rng *rng, struct rd_vec 
                                  75.0 * size, clay));
     put(scene, rd_shape_cone(foot_mm, crown, 12.0 * size, 7.0 * size, green));
     for (int i = 0; i < LEAVES; i++) {
-        struct rd_vec way = draw_vec(rng, -1.0, 1.0);
+        struct rd_vec offset = draw_vec(rng, -1.0, 1.0);
         struct rd_vec hint = draw_vec(rng, -1.0, 1.0);
         double away_mm = size * rd_rng_uniform(rng, 40.0, 150.0);
-        struct rd_vec y = rd_unit(way);
+        struct rd_vec y = rd_unit(offset);
         struct rd_pose pose = {rd_rot_frame(y, hint), rd_along(crown, y, away_mm)};
         put(scene, rd_shape_ellipsoid(pose, rd_v(24.0 * size, 65.0 * size, 3.0), green));
     }

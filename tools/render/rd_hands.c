@@ -1,6 +1,6 @@
 #include "rd_hands.h"
 
-/* On the way from one place to the next the hand swings forward, round the head. */
+/* Between one position and the next the hand swings forward, round the head. */
 #define SWING_MM 70.0
 
 enum gesture_kind {
@@ -18,10 +18,10 @@ enum gesture_kind {
     KIND_COUNT
 };
 
-/* Whose frame the place is given in. */
+/* Whose frame the position is given in. */
 enum gesture_frame { OF_HEAD, OF_TORSO };
 
-struct place {
+struct position {
     enum gesture_frame frame;
     struct rd_vec at;      /* units of the head's semi-axes from the head's middle; X is outwards on the hand's side */
     struct rd_vec more_mm; /* added to that */
@@ -30,7 +30,7 @@ struct place {
     double weight; /* how often */
 };
 
-static const struct place places[KIND_COUNT] = {
+static const struct position positions[KIND_COUNT] = {
     [IN_LAP] = {OF_TORSO, {0, 0, 0}, {120, 560, -260}, {-0.3, 0.1, -1}, {0, 1, 0}, 25.0, 0.38},
     [ON_FACE] = {OF_HEAD, {0.1, 0.15, -1}, {0, 0, -40}, {-0.5, -1, 0.1}, {0, 0, 1}, 28.0, 0.16},
     [AT_CHEEK] = {OF_HEAD, {1, 0.15, -0.2}, {28, 0, 0}, {-0.1, -1, 0.2}, {-1, 0, 0.2}, 16.0, 0.08},
@@ -49,7 +49,7 @@ static int draw_kind(struct rd_rng *rng)
 {
     double left = rd_rng_uniform(rng, 0.0, 1.0);
     for (int kind = 0; kind < KIND_COUNT; kind++) {
-        left -= places[kind].weight;
+        left -= positions[kind].weight;
         if (left < 0.0)
             return kind;
     }
@@ -59,7 +59,7 @@ static int draw_kind(struct rd_rng *rng)
 static struct rd_gesture draw_gesture(struct rd_rng *rng, int kind)
 {
     struct rd_gesture g = {.kind = kind};
-    double scatter = places[kind].scatter_mm;
+    double scatter = positions[kind].scatter_mm;
     g.shift_mm.x = rd_rng_uniform(rng, -scatter, scatter);
     g.shift_mm.y = rd_rng_uniform(rng, -scatter, scatter);
     g.shift_mm.z = rd_rng_uniform(rng, -0.5 * scatter, 0.0);
@@ -89,7 +89,7 @@ static void plan_hand(struct rd_motion *motion, int index, struct rd_rng *rng)
 struct habit {
     const int *kinds;
     int kind_count;
-    double rest; /* how often it is in the lap instead */
+    double lap; /* how often it is in the lap instead */
     int stay_frames, stay_more;
 };
 
@@ -98,12 +98,12 @@ static void plan_habit(struct rd_motion *motion, int index, struct rd_rng *rng, 
     int count = 0;
     int frame = -rd_rng_pick(rng, 8);
     while (frame < motion->frame_count && count < RD_GESTURES_MAX) {
-        bool rests = rd_rng_chance(rng, habit->rest);
-        int kind = rests ? IN_LAP : habit->kinds[rd_rng_pick(rng, habit->kind_count)];
+        bool in_lap = rd_rng_chance(rng, habit->lap);
+        int kind = in_lap ? IN_LAP : habit->kinds[rd_rng_pick(rng, habit->kind_count)];
         struct rd_gesture g = draw_gesture(rng, kind);
         g.cross = false;
         g.arrive_frame = frame;
-        g.leave_frame = frame + 2 + (rests ? 0 : habit->stay_frames) + rd_rng_pick(rng, rests ? 4 : habit->stay_more);
+        g.leave_frame = frame + 2 + (in_lap ? 0 : habit->stay_frames) + rd_rng_pick(rng, in_lap ? 4 : habit->stay_more);
         frame = g.leave_frame + 2 + rd_rng_pick(rng, 3);
         motion->gestures[index][count++] = g;
     }
@@ -140,7 +140,7 @@ void rd_hands_plan(struct rd_motion *motion, uint64_t seed, enum rd_act act, boo
     plan_act(motion, seed, act);
 }
 
-/* X of every place is outwards; `side` makes it this hand's side, or the other one for a crossing hand. */
+/* X of every position is outwards; `side` makes it this hand's side, or the other one for a crossing hand. */
 static struct rd_vec on_side(struct rd_vec v, double side)
 {
     return rd_v(side * v.x, v.y, v.z);
@@ -149,19 +149,19 @@ static struct rd_vec on_side(struct rd_vec v, double side)
 static struct rd_hand hand_at(const struct rd_gesture *g, const struct rd_person *person, double side,
                               const struct rd_posture *posture)
 {
-    const struct place *place = &places[g->kind];
+    const struct position *position = &positions[g->kind];
     struct rd_pose frame = posture->head;
-    if (place->frame == OF_TORSO)
+    if (position->frame == OF_TORSO)
         frame.rot = posture->torso.rot;
     double towards = g->cross ? -0.6 * side : side;
     struct rd_vec axes = person->head_axes_mm;
-    struct rd_vec at = rd_v(place->at.x * axes.x, place->at.y * axes.y, place->at.z * axes.z);
-    at = rd_add(on_side(rd_add(at, place->more_mm), towards), g->shift_mm);
+    struct rd_vec at = rd_v(position->at.x * axes.x, position->at.y * axes.y, position->at.z * axes.z);
+    at = rd_add(on_side(rd_add(at, position->more_mm), towards), g->shift_mm);
     struct rd_rot tilt = rd_rot_euler(0.0, 0.0, g->tilt);
-    struct rd_vec fingers = rd_turn(&tilt, on_side(place->fingers, side));
+    struct rd_vec fingers = rd_turn(&tilt, on_side(position->fingers, side));
     struct rd_hand hand = {.palm_mm = rd_pose_out(&frame, at),
                            .fingers = rd_unit(rd_turn(&frame.rot, fingers)),
-                           .facing = rd_unit(rd_turn(&frame.rot, on_side(place->facing, side))),
+                           .facing = rd_unit(rd_turn(&frame.rot, on_side(position->facing, side))),
                            .curl = g->curl,
                            .spread = g->spread};
     return hand;

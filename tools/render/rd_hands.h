@@ -5,7 +5,7 @@
 
 #include "rd_motion.h"
 
-/* Fills the lists of gestures. Without `hands_move` both hands stay in the lap, but for what the act asks of them. */
+/* Fills the lists of gestures. Without `hands_move` both hands stay in the lap, but for what the act needs of them. */
 void rd_hands_plan(struct rd_motion *motion, uint64_t seed, enum rd_act act, bool hands_move);
 
 /* Sets posture->hands for a frame from the posture's head and torso. */

@@ -4,7 +4,7 @@
 
 /* A lamp of about 3 degrees, halo included. */
 #define GLARE_EXPONENT 4000.0
-/* No thing farther off throws a shadow; and none on the very place it hangs on. */
+/* No thing farther off throws a shadow; and none on the very point it hangs on. */
 #define SHADOW_MM 3000.0
 #define SHADOW_SLACK_MM 1.0
 
@@ -56,7 +56,7 @@ void rd_light_make(struct rd_light *light, const struct rd_options *options)
     light->nothing_grey *= options->exposure;
 }
 
-/* Share of the key light that reaches a point between the bars. */
+/* Fraction of the key light that reaches a point between the bars. */
 static double through_bars(const struct rd_light *light, struct rd_vec point_mm)
 {
     struct rd_rot across = rd_rot_frame(light->key_dir, rd_v(0.0, 1.0, 0.0));
@@ -84,13 +84,13 @@ double rd_light_grey(const struct rd_light *light, const struct rd_scene *scene,
         key *= through_bars(light, hit->point_mm);
     double metres = fmax(0.3, 1e-3 * hit->point_mm.z);
     double lamp = light->lamp_grey * fmax(0.0, -rd_dot(n, view)) / (metres * metres);
-    struct rd_vec place_m = rd_sub(rd_scale(hit->point_mm, 1e-3), rd_v(0.0, 0.0, 1.0));
-    double even = rd_clamp(1.0 + rd_dot(light->slope, place_m), 0.25, 2.0);
+    struct rd_vec position_m = rd_sub(rd_scale(hit->point_mm, 1e-3), rd_v(0.0, 0.0, 1.0));
+    double even = rd_clamp(1.0 + rd_dot(light->slope, position_m), 0.25, 2.0);
     double diffuse = hit->albedo * (sky + key * fmax(0.0, rd_dot(n, light->key_dir)) + lamp);
     double shine = 0.0;
     if (hit->gloss > 0.0) {
-        struct rd_vec half_way = rd_unit(rd_sub(light->key_dir, view));
-        double s = fmax(0.0, rd_dot(n, half_way));
+        struct rd_vec half_vector = rd_unit(rd_sub(light->key_dir, view));
+        double s = fmax(0.0, rd_dot(n, half_vector));
         s *= s;
         s *= s;
         s *= s;

@@ -27,9 +27,9 @@ static struct rd_look_back draw_look_back(uint64_t seed, bool often)
 {
     struct rd_rng rng = rd_rng_start(seed, RD_STREAM_MOTION + ((uint64_t)1 << 32));
     struct rd_look_back back = {.often = often};
-    back.way = rd_rng_uniform(&rng, 4.0, 7.0);
+    back.offset = rd_rng_uniform(&rng, 4.0, 7.0);
     back.stay = rd_rng_uniform(&rng, 3.0, 10.0);
-    back.period = 2.0 * back.way + back.stay + rd_rng_uniform(&rng, 4.0, 14.0);
+    back.period = 2.0 * back.offset + back.stay + rd_rng_uniform(&rng, 4.0, 14.0);
     back.start = rd_rng_uniform(&rng, 0.0, back.period);
     back.trunk = rd_rng_uniform(&rng, 40.0, 75.0) * RD_RAD_PER_DEG;
     back.head = rd_rng_uniform(&rng, 30.0, 60.0) * RD_RAD_PER_DEG;
@@ -42,8 +42,8 @@ static double look_back_at(const struct rd_look_back *back, int frame)
 {
     double turns = (frame + back->start) / back->period, into = (turns - floor(turns)) * back->period;
     double side = rd_hash_unit(back->seed, (uint64_t)turns, 0) < 0.5 ? -1.0 : 1.0;
-    double there = rd_smoothstep(0.0, back->way, into);
-    double returned = rd_smoothstep(back->way + back->stay, 2.0 * back->way + back->stay, into);
+    double there = rd_smoothstep(0.0, back->offset, into);
+    double returned = rd_smoothstep(back->offset + back->stay, 2.0 * back->offset + back->stay, into);
     return back->often ? side * (there - returned) : 0.0;
 }
 

@@ -22,15 +22,15 @@ struct rd_sway {
 /* Somebody who looks to the back seat: a turn there, a while there, the way back, and a while forward. */
 struct rd_look_back {
     bool often;
-    double period, start, way, stay; /* frames */
-    double trunk, head;              /* radians */
+    double period, start, offset, stay; /* frames */
+    double trunk, head;                 /* radians */
     uint64_t seed;
 };
 
 struct rd_gesture {
     int arrive_frame, leave_frame; /* there from .. to; on the way between two gestures */
     int kind;                      /* index into the table of gestures */
-    struct rd_vec shift_mm;        /* from the table's place */
+    struct rd_vec shift_mm;        /* from the table's position */
     bool cross;                    /* to the other side of the body */
     double tilt;                   /* of the fingers, radians */
     double curl, spread;
@@ -50,7 +50,7 @@ struct rd_motion {
     int gesture_count[2];
 };
 
-/* Plans a sequence around a place of the head at rest. */
+/* Plans a sequence around a position of the head at rest. */
 void rd_motion_make(struct rd_motion *motion, const struct rd_person *person, const struct rd_options *options,
                     uint64_t seed, struct rd_vec head_mm);
 

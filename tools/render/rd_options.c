@@ -70,7 +70,7 @@ static const char help_text[] = /* at most 80 columns */
     "  --rig KIND         paper (default): 12.5 mm between camera and projector;\n"
     "                     wide: 125 mm\n"
     "  --seed N           which person, room, light, motion (default 1); with\n"
-    "                     --range: from where, 0 for the depth camera's own place\n"
+    "                     --range: from where, 0 for the depth camera's own position\n"
     "  --rig-seed N       lens, assembly, laser, sensor (default: as --seed):\n"
     "                     other people before the same rig\n"
     "  --frames N         1 to 5000 (default 50, four of them without the person; for\n"
@@ -83,18 +83,18 @@ static const char help_text[] = /* at most 80 columns */
     "  --distortion KIND  normal (default), none, strong\n"
     "  --tilt DEG         -40 to 40 (default 0): the camera looks up at people by\n"
     "                     this, down where it is negative\n"
-    "  --knock DEG        0 (default) to 0.5: the projector is turned by this against\n"
-    "                     what rig.json says\n"
+    "  --knock DEG        0 (default) to 0.5: the projector is rotated by this\n"
+    "                     against what rig.json says\n"
     "  --calibration-noise X  0 (default) to 10: rig.json's errors, in typical ones:\n"
     "                     0.1 % of fx, 1 px of the centre, 0.01 degrees of each ray,\n"
-    "                     0.1 mm of the projector's place\n"
+    "                     0.1 mm of the projector's position\n"
     "  --focal X          0.5 to 2 (default 1): the focal length against the paper's\n"
     "  --assembly X       0 (default) to 10: how carelessly the rig was put together,\n"
     "                     in typical errors that rig.json knows of: 1 % of fx and fy,\n"
-    "                     6 px of the centre, 1 mm of the projector's place, 0.4\n"
-    "                     degrees of its direction and turn, 0.4 % of the pitch, 0.01\n"
-    "                     degrees of each ray\n"
-    "  --missing SHARE    0 (default) to 0.9: so many dots are not there, others in\n"
+    "                     6 px of the centre, 1 mm of the projector's position,\n"
+    "                     0.4 degrees of its direction and rotation, 0.4 % of the\n"
+    "                     pitch, 0.01 degrees of each ray\n"
+    "  --missing FRACTION 0 (default) to 0.9: so many dots are not there, others in\n"
     "                     each frame\n"
     "  --blur PX          0 (default) to 10: all frames out of focus, standard\n"
     "                     deviation\n"
@@ -176,9 +176,9 @@ static bool read_first_frame(const char *text, struct rd_options *options)
     int first, count = 0, length = 0;
     bool read = sscanf(text, "%4d%n", &first, &length) == 1;
     if (read && text[length] == '+') {
-        const char *rest = text + length + 1;
-        read = sscanf(rest, "%4d%n", &count, &length) == 1 && rest[0] >= '0' && rest[0] <= '9' && count > 0 &&
-               rest[length] == '\0';
+        const char *after = text + length + 1;
+        read = sscanf(after, "%4d%n", &count, &length) == 1 && after[0] >= '0' && after[0] <= '9' && count > 0 &&
+               after[length] == '\0';
     } else {
         read = read && text[length] == '\0';
     }

@@ -53,13 +53,13 @@ struct rd_options {
     bool rig_seed_given;
     int frame_count;          /* for each depth image, where there are any */
     double tilt_deg;          /* the camera looks up at people by this, or down */
-    double knock_deg;         /* the projector's turn against what rig.json says */
+    double knock_deg;         /* the projector's rotation against what rig.json says */
     double calibration_noise; /* rig.json's errors, in typical errors of a calibration */
     double focal;             /* the focal length against the paper's */
     double assembly;          /* the rig's own differences from the plan, in typical ones */
     const char *board_file;   /* what is printed on the board */
     double board_mm;          /* its width */
-    double missing;           /* share of the dots that are not there, others in each frame */
+    double missing;           /* fraction of the dots that are not there, others in each frame */
     double blur_px;           /* frames out of focus by this (sigma) */
     bool glare;               /* a lamp is mirrored in the board */
     int first_frame;

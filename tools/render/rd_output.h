@@ -1,6 +1,6 @@
 /* rd_output - a frames directory on disk.
  * rig.json is taken away first and written last: where it is, the directory is complete.
- * A function that returns false has told the file and the reason on standard error. Failed writes to the lists
+ * A function that returns false has printed the file and the reason on standard error. Failed writes to the lists
  * show when they are closed.
  */
 #ifndef RD_OUTPUT_H

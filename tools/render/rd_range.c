@@ -30,7 +30,7 @@ static char *join(const char *left, const char *right)
     return path;
 }
 
-/* The whole file with a zero after it; NULL: told. */
+/* The whole file with a zero after it; NULL: reported. */
 static char *read_all(const char *dir, const char *name, size_t *size)
 {
     char *path = join(dir, name), *text = NULL;
@@ -164,21 +164,21 @@ static struct rd_range_frame *find_frame(struct rd_range *range, int first, cons
 static bool read_truth(struct rd_range *range, int first, const char *dir)
 {
     size_t size = 0;
-    char *text = read_all(dir, "truth.jsonl", &size), *rest = NULL;
-    int told_count = 0;
+    char *text = read_all(dir, "truth.jsonl", &size), *position = NULL;
+    int described_count = 0;
     bool good = text != NULL;
-    for (char *row = good ? strtok_r(text, "\n", &rest) : NULL; good && row != NULL;
-         row = strtok_r(NULL, "\n", &rest)) {
+    for (char *row = good ? strtok_r(text, "\n", &position) : NULL; good && row != NULL;
+         row = strtok_r(NULL, "\n", &position)) {
         cJSON *line = cJSON_Parse(row);
         struct rd_range_frame *frame = find_frame(range, first, cJSON_GetObjectItemCaseSensitive(line, "file"));
         good = line != NULL && (frame == NULL || take_heads(line, frame));
-        told_count += frame != NULL;
+        described_count += frame != NULL;
         cJSON_Delete(line);
         if (!good)
             complain(dir, "truth.jsonl", "a line is no JSON or its heads are wrong");
     }
     free(text);
-    if (good && told_count != range->frame_count - first)
+    if (good && described_count != range->frame_count - first)
         return complain(dir, "truth.jsonl", "must have one line for each depth image");
     return good;
 }
@@ -296,7 +296,7 @@ static int header_number(const char **at, const char *end)
     return digit_count > 0 ? value : -1;
 }
 
-/* The depths within the working range; NULL: told. */
+/* The depths within the working range; NULL: reported. */
 static uint16_t *read_depths(const struct rd_range_frame *frame)
 {
     size_t size = 0;

@@ -1,6 +1,6 @@
 /* rd_range - range directories on disk: real depth images and whose heads they show.
  * A directory without rig.json stands for those of its subdirectories that have one, in order of their names.
- * A function that returns false or NULL has told the file and the reason on standard error.
+ * A function that returns false or NULL has printed the file and the reason on standard error.
  */
 #ifndef RD_RANGE_H
 #define RD_RANGE_H

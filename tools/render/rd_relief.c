@@ -342,12 +342,12 @@ struct rd_vec rd_relief_normal(const struct rd_relief *relief, struct rd_vec poi
     int u0 = (int)rd_clamp(floor(u), 0.0, c->width - 2.0), v0 = (int)rd_clamp(floor(v), 0.0, c->height - 2.0);
     for (int i = 0; i < 4; i++) {
         const struct sample *sample = &relief->samples[(v0 + i / 2) * c->width + u0 + i % 2];
-        double share = fmax(0.0, 1.0 - fabs(u0 + i % 2 - u)) * fmax(0.0, 1.0 - fabs(v0 + i / 2 - v));
+        double fraction = fmax(0.0, 1.0 - fabs(u0 + i % 2 - u)) * fmax(0.0, 1.0 - fabs(v0 + i / 2 - v));
         if (sample->w <= 0.0f || !close_enough((double)sample->w, w, FIT_STEPS))
             continue;
-        sum += share;
-        w_u += share * (double)sample->w_u;
-        w_v += share * (double)sample->w_v;
+        sum += fraction;
+        w_u += fraction * (double)sample->w_u;
+        w_v += fraction * (double)sample->w_v;
     }
     if (sum <= 0.0)
         return rd_unit(rd_scale(point_mm, -1.0));
@@ -358,18 +358,18 @@ struct rd_vec rd_relief_normal(const struct rd_relief *relief, struct rd_vec poi
     return rd_unit(rd_scale(n, -1.0));
 }
 
-bool rd_relief_at_pixel(const struct rd_relief *relief, double u_px, double v_px, struct rd_vec *place_mm)
+bool rd_relief_at_pixel(const struct rd_relief *relief, double u_px, double v_px, struct rd_vec *position_mm)
 {
     const struct rd_relief_camera *c = &relief->camera;
     int u = (int)floor(u_px + 0.5), v = (int)floor(v_px + 0.5);
     if (u < 0 || v < 0 || u >= c->width || v >= c->height || relief->samples[v * c->width + u].w <= 0.0f)
         return false;
     double z = 1.0 / (double)relief->samples[v * c->width + u].w;
-    *place_mm = rd_v((u - c->cx_px) / c->fx_px * z, (v - c->cy_px) / c->fy_px * z, z);
+    *position_mm = rd_v((u - c->cx_px) / c->fx_px * z, (v - c->cy_px) / c->fy_px * z, z);
     return true;
 }
 
-bool rd_relief_at_point(const struct rd_relief *relief, struct rd_vec point_mm, struct rd_vec *place_mm)
+bool rd_relief_at_point(const struct rd_relief *relief, struct rd_vec point_mm, struct rd_vec *position_mm)
 {
     double u, v, w;
     if (point_mm.z < 1.0)
@@ -377,5 +377,5 @@ bool rd_relief_at_point(const struct rd_relief *relief, struct rd_vec point_mm, 
     project(&relief->camera, point_mm, &u, &v, &w);
     if (fabs(u) > 1e6 || fabs(v) > 1e6)
         return false;
-    return rd_relief_at_pixel(relief, u, v, place_mm);
+    return rd_relief_at_pixel(relief, u, v, position_mm);
 }

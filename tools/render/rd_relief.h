@@ -1,7 +1,7 @@
 /* rd_relief - the surface that a depth image shows, as something a ray can meet.
  * In:    depth in mm by pixel, 0 = no measurement, and the pinhole camera that took it.
- * Out:   places and normals in that camera's frame.
- * Way:   Over the pixels a plane is linear in inverse depth, and so is a ray. Each pixel gets the plane that fits its
+ * Out:   points and normals in that camera's frame.
+ * Method: Over the pixels a plane is linear in inverse depth, and so is a ray. Each pixel gets the plane that fits its
  *        neighbourhood, which takes most of the sensor's noise away; neighbouring pixels whose inverse depths are
  *        close are joined by triangles, steps are not bridged. A ray walks over the image along its own projection:
  *        over blocks of pixels first, over the pixels of those whose depths it passes.
@@ -33,8 +33,8 @@ double rd_relief_hit(const struct rd_relief *relief, struct rd_vec origin_mm, st
 /* Unit normal at a point of the surface, towards the depth camera. */
 struct rd_vec rd_relief_normal(const struct rd_relief *relief, struct rd_vec point_mm);
 
-/* The surface's place in the line of sight of a pixel or of a point. False: nothing was measured there. */
-bool rd_relief_at_pixel(const struct rd_relief *relief, double u_px, double v_px, struct rd_vec *place_mm);
-bool rd_relief_at_point(const struct rd_relief *relief, struct rd_vec point_mm, struct rd_vec *place_mm);
+/* Where the line of sight of a pixel or of a point meets the surface. False: nothing was measured there. */
+bool rd_relief_at_pixel(const struct rd_relief *relief, double u_px, double v_px, struct rd_vec *position_mm);
+bool rd_relief_at_point(const struct rd_relief *relief, struct rd_vec point_mm, struct rd_vec *position_mm);
 
 #endif

@@ -29,7 +29,7 @@
 /* How rigs differ from their plan. */
 #define BUILT_FOCAL 0.01
 #define BUILT_CENTRE_PX 6.0
-#define BUILT_PLACE_MM 1.0
+#define BUILT_POSITION_MM 1.0
 #define BUILT_TURN_DEG 0.4
 #define BUILT_PITCH 0.004
 #define BUILT_RAY_DEG 0.01
@@ -88,7 +88,7 @@ static void assemble(struct rd_rig *rig, const struct rd_options *options)
     rig->fy_px *= focal * (1.0 + 0.1 * much * BUILT_FOCAL * rd_rng_normal(&rng));
     rig->cx_px += much * BUILT_CENTRE_PX * rd_rng_normal(&rng);
     rig->cy_px += much * BUILT_CENTRE_PX * rd_rng_normal(&rng);
-    rig->projector_mm = rd_along(rig->projector_mm, draw_normal_vec(&rng), much * BUILT_PLACE_MM);
+    rig->projector_mm = rd_along(rig->projector_mm, draw_normal_vec(&rng), much * BUILT_POSITION_MM);
     struct rd_vec turn = rd_scale(draw_normal_vec(&rng), much * BUILT_TURN_DEG * RD_RAD_PER_DEG);
     struct rd_vec middle = rig->dot_rays[RD_DOT_COUNT / 2];
     double pitch = 1.0 + much * BUILT_PITCH * rd_rng_normal(&rng);

@@ -25,7 +25,7 @@ struct rd_rig {
 
 void rd_rig_make(struct rd_rig *rig, const struct rd_options *options);
 
-/* Turns the projector by the options' angle about an axis by seed: what a knock does to a rig that was calibrated. */
+/* Turns the projector by the options' angle about an axis by seed: a calibrated rig that was knocked. */
 void rd_rig_knock(struct rd_rig *rig, const struct rd_options *options);
 /* Gives all numbers of a rig the errors of a calibration, as large as the options say. */
 void rd_rig_misjudge(struct rd_rig *rig, const struct rd_options *options);

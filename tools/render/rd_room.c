@@ -71,20 +71,20 @@ void rd_seat_build(struct rd_scene *scene, struct rd_rng *rng, struct rd_vec hea
     int metal = rd_room_paint(scene, rng, 0.2, 0.5);
     double gap_mm = rd_rng_uniform(rng, 40.0, 110.0);
     double tilt = rd_rng_uniform(rng, 0.08, 0.32);
-    double rest_y_mm = rd_rng_uniform(rng, -45.0, 25.0);
-    double rest_half_x_mm = rd_rng_uniform(rng, 95.0, 150.0);
-    double rest_half_y_mm = rd_rng_uniform(rng, 60.0, 105.0);
+    double headrest_y_mm = rd_rng_uniform(rng, -45.0, 25.0);
+    double headrest_half_x_mm = rd_rng_uniform(rng, 95.0, 150.0);
+    double headrest_half_y_mm = rd_rng_uniform(rng, 60.0, 105.0);
     double back_half_mm = rd_rng_uniform(rng, 200.0, 270.0);
     double back_top_mm = rd_rng_uniform(rng, 150.0, 200.0);
-    bool rest = rd_rng_chance(rng, 0.85);
+    bool headrest = rd_rng_chance(rng, 0.85);
     bool bolsters = rd_rng_chance(rng, 0.5);
     /* Leaning back as seats do; the frame's origin is the headrest's middle. */
     struct rd_pose seat = {rd_rot_euler(0.0, -tilt, 0.0),
-                           rd_add(head_mm, rd_v(rd_rng_uniform(rng, -25.0, 25.0), rest_y_mm, 145.0 + gap_mm))};
+                           rd_add(head_mm, rd_v(rd_rng_uniform(rng, -25.0, 25.0), headrest_y_mm, 145.0 + gap_mm))};
     int first = scene->shape_count;
-    if (rest) {
-        struct rd_shape cushion =
-            rd_shape_box(rd_pose_at(rd_v(0.0, 0.0, 0.0)), rd_v(rest_half_x_mm, rest_half_y_mm, 48.0), 40.0, cover);
+    if (headrest) {
+        struct rd_shape cushion = rd_shape_box(rd_pose_at(rd_v(0.0, 0.0, 0.0)),
+                                               rd_v(headrest_half_x_mm, headrest_half_y_mm, 48.0), 40.0, cover);
         rd_scene_add(scene, &cushion);
         for (double side = -1.0; side <= 1.0; side += 2.0) {
             struct rd_shape post = rd_shape_cylinder(rd_pose_at(rd_v(side * 55.0, 140.0, 5.0)), 7.0, 110.0, metal);
@@ -131,10 +131,10 @@ void rd_chair_build(const struct rd_chair *chair, struct rd_scene *scene, struct
     rd_scene_add(scene, &seat);
     if (chair->headrest) {
         struct rd_pose above = rd_pose_at(rd_v(0.0, -torso_mm - 130.0, chair->back_behind_mm + 60.0));
-        struct rd_shape rest = rd_shape_box(above, rd_v(125.0, 75.0, 32.0), 30.0, chair->cover);
+        struct rd_shape headrest = rd_shape_box(above, rd_v(125.0, 75.0, 32.0), 30.0, chair->cover);
         struct rd_shape bar = rd_shape_cylinder(rd_pose_at(rd_v(0.0, -torso_mm + 40.0, chair->back_behind_mm + 65.0)),
                                                 16.0, 160.0, chair->metal);
-        rd_scene_add(scene, &rest);
+        rd_scene_add(scene, &headrest);
         rd_scene_add(scene, &bar);
     }
     rd_scene_move(scene, first, &pose);

@@ -69,9 +69,9 @@ bool rd_scene_hit(const struct rd_scene *scene, const struct rd_ray *ray, double
 
 bool rd_scene_blocked(const struct rd_scene *scene, struct rd_vec from_mm, struct rd_vec to_mm)
 {
-    struct rd_vec way = rd_sub(to_mm, from_mm);
-    double length_mm = rd_length(way);
-    struct rd_ray ray = {from_mm, rd_scale(way, 1.0 / length_mm)};
+    struct rd_vec offset = rd_sub(to_mm, from_mm);
+    double length_mm = rd_length(offset);
+    struct rd_ray ray = {from_mm, rd_scale(offset, 1.0 / length_mm)};
     for (int i = 0; i < scene->shape_count; i++) {
         if (rd_shape_hit(&scene->shapes[i], &ray, length_mm - SIGHT_SLACK_MM) > 0.0)
             return true;

@@ -32,10 +32,10 @@ struct rd_stage {
     int64_t time_us;
 };
 
-/* The rig must outlive the stage. False: a file's fault has been told; rd_stage_end is due all the same. */
+/* The rig must outlive the stage. False: a file's error is reported; rd_stage_end is due all the same. */
 bool rd_stage_make(struct rd_stage *stage, const struct rd_options *options, const struct rd_rig *rig);
 /* Sets scene, truth, time, source and still_changed for a frame; frames come in order from the first that the options
- * ask for. False: told. */
+ * ask for. False: reported. */
 bool rd_stage_frame(struct rd_stage *stage, int frame);
 void rd_stage_end(struct rd_stage *stage);
 

@@ -62,13 +62,13 @@ static void make_seat(const struct tall *tall)
     double top_mm = half_y + between(tall, 0.0, 80.0), width_mm = between(tall, 190.0, 270.0);
     int kind = rd_rng_pick(tall->rng, 4);
     struct rd_rot lean = rd_rot_euler(0.0, between(tall, -0.3, 0.1), 0.0);
-    struct rd_pose rest = {lean, rd_v(0.0, 0.0, 0.0)};
+    struct rd_pose backrest = {lean, rd_v(0.0, 0.0, 0.0)};
     if (kind == 0)
-        put(tall, rd_shape_ellipsoid(rest, rd_v(half_x, half_y, deep), tall->paint));
+        put(tall, rd_shape_ellipsoid(backrest, rd_v(half_x, half_y, deep), tall->paint));
     else if (kind == 1)
-        put(tall, rd_shape_ellipsoid(rest, rd_v(0.8 * half_y + 40.0, half_y, deep), tall->paint2));
+        put(tall, rd_shape_ellipsoid(backrest, rd_v(0.8 * half_y + 40.0, half_y, deep), tall->paint2));
     else
-        put_box(tall, lean, rest.origin_mm, rd_v(half_x, half_y, kind == 2 ? 20.0 : deep), 0.8 * deep, tall->paint);
+        put_box(tall, lean, backrest.origin_mm, rd_v(half_x, half_y, kind == 2 ? 20.0 : deep), 0.8 * deep, tall->paint);
     if (kind == 3)
         put_wings(tall, half_x, 0.9 * half_y, 0.7 * half_y);
     for (double side = -1.0; side <= 1.0; side += 2.0)

@@ -226,9 +226,9 @@ static double make_plant(const struct kit *kit)
     for (int i = 0; i < LEAVES; i++) {
         double turn = between(kit, -RD_PI, RD_PI), up = between(kit, -1.0, 1.0), flap = between(kit, -1.0, 1.0);
         double side = sqrt(1.0 - up * up);
-        struct rd_vec way = rd_v(side * cos(turn), up, side * sin(turn));
-        struct rd_pose pose = {rd_rot_frame(way, rd_v(flap, 0.3, 1.0)),
-                               rd_scale(rd_along(rd_v(0.0, -middle, 0.0), way, 0.85 * radius), kit->size_mm)};
+        struct rd_vec offset = rd_v(side * cos(turn), up, side * sin(turn));
+        struct rd_pose pose = {rd_rot_frame(offset, rd_v(flap, 0.3, 1.0)),
+                               rd_scale(rd_along(rd_v(0.0, -middle, 0.0), offset, 0.85 * radius), kit->size_mm)};
         put(kit, rd_shape_ellipsoid(pose, sized(kit, 0.05, 0.11, 0.012), kit->paint));
     }
     return middle + 1.1 * radius;
@@ -288,11 +288,11 @@ static double make_towels(const struct kit *kit)
     bool upright = rd_rng_chance(kit->rng, 0.4);
     double radius = between(kit, 0.14, 0.24);
     for (int i = 0; i < count; i++) {
-        double place = 1.95 * radius * (i - 0.5 * (count - 1)), half = between(kit, 0.35, 0.5);
+        double position = 1.95 * radius * (i - 0.5 * (count - 1)), half = between(kit, 0.35, 0.5);
         bool on_top = !upright && i == 2;
-        struct rd_vec at = upright  ? rd_v(place, -half, 0.0)
+        struct rd_vec at = upright  ? rd_v(position, -half, 0.0)
                            : on_top ? rd_v(0.0, -2.7 * radius, 0.0)
-                                    : rd_v(place, -radius, 0.0);
+                                    : rd_v(position, -radius, 0.0);
         struct rd_pose pose = {rd_rot_euler(0.0, upright ? 0.0 : 0.5 * RD_PI, 0.0), rd_scale(at, kit->size_mm)};
         put(kit,
             rd_shape_cylinder(pose, radius * kit->size_mm, half * kit->size_mm, i == 1 ? kit->paint2 : kit->paint));

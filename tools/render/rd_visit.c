@@ -3,8 +3,8 @@
 #include "rd_rng.h"
 
 #define EDGE_OF_100 15
-#define WAY_FRAMES 10
-#define WAY_FRAMES_MORE 6
+#define WALK_FRAMES 10
+#define WALK_FRAMES_MORE 6
 /* Two visits need this many frames; then the first is over in the first half. */
 #define TWICE_FRAMES 100
 /* Half of what the camera sees, as a tangent, and half a body with its arms. */
@@ -21,10 +21,10 @@ static double draw_side(struct rd_rng *rng, const bool side_free[2])
 static struct rd_visit draw_visit(struct rd_rng *rng, int first, int end, const bool side_free[2])
 {
     struct rd_visit visit = {.come_frame = first};
-    int way_max = (end - first) / 3;
-    int come = WAY_FRAMES + rd_rng_pick(rng, WAY_FRAMES_MORE), go = WAY_FRAMES + rd_rng_pick(rng, WAY_FRAMES_MORE);
-    come = come < way_max ? come : way_max;
-    go = go < way_max ? go : way_max;
+    int walk_max = (end - first) / 3;
+    int come = WALK_FRAMES + rd_rng_pick(rng, WALK_FRAMES_MORE), go = WALK_FRAMES + rd_rng_pick(rng, WALK_FRAMES_MORE);
+    come = come < walk_max ? come : walk_max;
+    go = go < walk_max ? go : walk_max;
     int spare = (end - first - come - go) / 2;
     visit.come_frame += rd_rng_pick(rng, spare + 1);
     visit.sit_frame = visit.come_frame + come;

@@ -169,7 +169,7 @@ int main(int argument_count, char **arguments)
     if (help) {
         fputs(help_text, stdout);
     } else if (argument_count - optind != (show ? 1 : 2)) {
-        fputs("rigblob: expected RIG OUT, or --show BLOB; rigblob --help tells more\n", stderr);
+        fputs("rigblob: expected RIG OUT, or --show BLOB; see rigblob --help\n", stderr);
         return STATUS_USAGE;
     } else {
         status = show ? show_blob(path[0]) : write_blob(path[0], path[1]);

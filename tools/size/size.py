@@ -3,8 +3,8 @@
 
   flash         code and constants of every object of firmware/core
   RAM           sizeof struct isohead and of its members; writable static data: none
-  stack         the deepest chain of calls, from the frames that the compiler tells (-fcallgraph-info=su)
-                and the calls that it tells or that stand in the linked code; and the deepest store that
+  stack         the deepest chain of calls, from the frames that the compiler reports (-fcallgraph-info=su)
+                and the calls that it reports or that stand in the linked code; and the deepest store that
                 an emulator saw while the frames were processed
   instructions  executed in an emulator between entry and end of isohead_frame, by source file, most first
 
@@ -211,7 +211,7 @@ def print_ram(directory):
 
 def print_stack(stack, callees, program, phases):
     """Bytes of the worst of ENTRIES. What the emulator saw must not be more than the bound."""
-    # gcc also tells of calls that it thought of and left out; what is not linked nobody calls.
+    # gcc also reports calls that it removed; what is not linked is not called.
     outside = {name: program.stack_of(name) if name in program.code else 0
                for name in check_calls(stack, callees)}
     call_graph.check_all(stack, callees, outside)

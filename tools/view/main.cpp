@@ -1,5 +1,5 @@
 /* view - pictures of what host_sim finds in frames; see view --help.
- * The way: traces (host_sim's, or made now) -> trace, rig, image -> control, contours, sheet -> output.
+ * Steps: traces (host_sim's, or made now) -> trace, rig, image -> control, contours, sheet -> output.
  */
 #include <cstdio>
 #include <exception>

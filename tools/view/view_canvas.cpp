@@ -54,10 +54,10 @@ void Canvas::trace(const Stroke &stroke)
     cairo_new_path(cairo_);
 }
 
-void Canvas::line(const std::vector<cv::Point2d> &places, const Stroke &stroke, bool closed)
+void Canvas::line(const std::vector<cv::Point2d> &positions, const Stroke &stroke, bool closed)
 {
-    for (cv::Point2d place : places)
-        cairo_line_to(cairo_, place.x, place.y);
+    for (cv::Point2d position : positions)
+        cairo_line_to(cairo_, position.x, position.y);
     if (closed)
         cairo_close_path(cairo_);
     trace(stroke);
@@ -66,7 +66,7 @@ void Canvas::line(const std::vector<cv::Point2d> &places, const Stroke &stroke, 
 void Canvas::ellipse(cv::Point2d centre, double a, double b, double angle_deg, const Stroke &stroke)
 {
     if (a <= 0 || b <= 0)
-        return; /* nothing to be seen; cairo could not turn it */
+        return; /* nothing to be seen; cairo could not rotate it */
     cairo_save(cairo_);
     cairo_translate(cairo_, centre.x, centre.y);
     cairo_rotate(cairo_, angle_deg * CV_PI / 180.0);
@@ -81,9 +81,9 @@ void Canvas::cross(cv::Point2d centre, double radius, const Stroke &stroke, bool
 {
     cv::Point2d first = upright ? cv::Point2d(radius, 0) : cv::Point2d(radius, radius) * 0.7071;
     cv::Point2d second(-first.y, first.x);
-    for (cv::Point2d way : {first, second}) {
-        cairo_move_to(cairo_, centre.x - way.x, centre.y - way.y);
-        cairo_line_to(cairo_, centre.x + way.x, centre.y + way.y);
+    for (cv::Point2d offset : {first, second}) {
+        cairo_move_to(cairo_, centre.x - offset.x, centre.y - offset.y);
+        cairo_line_to(cairo_, centre.x + offset.x, centre.y + offset.y);
     }
     trace(stroke);
 }

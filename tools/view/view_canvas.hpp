@@ -15,7 +15,7 @@ struct Colour {
     double red, green, blue;
 };
 
-/* Colours that the colour-blind tell apart (Okabe and Ito); every line differs in its form as well. */
+/* Colours that the colour-blind can distinguish (Okabe and Ito); every line differs in its form as well. */
 constexpr Colour black{0, 0, 0}, white{1, 1, 1}, blue{0, 0.447, 0.698}, vermilion{0.835, 0.369, 0},
     yellow{0.941, 0.894, 0.259}, sky{0.337, 0.706, 0.914};
 
@@ -28,7 +28,7 @@ struct Stroke {
     Colour casing_colour = white;
 };
 
-/* The frame's place on the page. */
+/* Where the frame is on the page. */
 struct Plot {
     cv::Rect2d where;
     double scale;
@@ -40,7 +40,7 @@ struct Plot {
     }
 };
 
-/* As large as fits into the width and height, at the place's top left. */
+/* As large as fits into the width and height, from its top left on. */
 Plot plot_fit(cv::Size frame_px, cv::Rect2d room);
 
 enum class Anchor { left, middle, right };
@@ -53,7 +53,7 @@ class Canvas
     }
     void fill(cv::Rect2d where, Colour colour);
     void disc(cv::Point2d centre, double radius, Colour colour);
-    void line(const std::vector<cv::Point2d> &places, const Stroke &stroke, bool closed = false);
+    void line(const std::vector<cv::Point2d> &positions, const Stroke &stroke, bool closed = false);
     void ellipse(cv::Point2d centre, double a, double b, double angle_deg, const Stroke &stroke);
     void cross(cv::Point2d centre, double radius, const Stroke &stroke, bool upright);
     /* The text's middle stands at the height of `at`. With a halo it is readable on anything. */
@@ -62,7 +62,7 @@ class Canvas
     void text_with_halo(cv::Point2d at, const std::string &words, double size, Anchor anchor, Colour colour,
                         Colour halo);
     double text_width(const std::string &words, double size, bool bold = false);
-    /* 8-bit grey, stretched over the place. */
+    /* 8-bit grey, stretched over the rectangle. */
     void image(const cv::Mat1b &grey, cv::Rect2d where);
     void clip(cv::Rect2d where);
     void unclip();

@@ -23,7 +23,7 @@ Shader::Shader(const Rig &rig, const Plot &plot) : size_(cvRound(plot.where.widt
         for (int x = 0; x < size_.width; x++)
             pixels.emplace_back((x + 0.5) / plot.scale - 0.5, (y + 0.5) / plot.scale - 0.5);
     }
-    places_ = rig.places(pixels);
+    positions_ = rig.positions(pixels);
 }
 
 double band_far_mm(const Trace &trace)
@@ -35,14 +35,14 @@ uint8_t band_grey(const Trace &trace, double depth_mm)
 {
     double nearest = trace.surface.nearest_mm, span = band_far_mm(trace) - nearest;
     double middle = (std::floor((depth_mm - nearest) / band_mm) + 0.5) * band_mm;
-    double part = std::clamp(middle / span, 0.0, 1.0);
-    return static_cast<uint8_t>(cvRound(near_grey + (far_grey - near_grey) * std::pow(part, 0.8)));
+    double arc = std::clamp(middle / span, 0.0, 1.0);
+    return static_cast<uint8_t>(cvRound(near_grey + (far_grey - near_grey) * std::pow(arc, 0.8)));
 }
 
-/* Between the nodes, where the place lies among them. */
-static bool depth_at(const Surface &surface, cv::Point2d place, double &depth_mm)
+/* Interpolated between the nodes. */
+static bool depth_at(const Surface &surface, cv::Point2d position, double &depth_mm)
 {
-    cv::Point2d step = (place - surface.centre) / surface.step + cv::Point2d(1, 1) * (0.5 * (grid_nodes - 1));
+    cv::Point2d step = (position - surface.centre) / surface.step + cv::Point2d(1, 1) * (0.5 * (grid_nodes - 1));
     if (!(step.x >= 0 && step.y >= 0 && step.x <= grid_nodes - 1 && step.y <= grid_nodes - 1))
         return false;
     int x = std::min(static_cast<int>(step.x), grid_nodes - 2), y = std::min(static_cast<int>(step.y), grid_nodes - 2);
@@ -56,24 +56,24 @@ static bool depth_at(const Surface &surface, cv::Point2d place, double &depth_mm
 cv::Mat1b Shader::shade(const Trace &trace) const
 {
     cv::Mat1b grey(size_, 255);
-    for (size_t i = 0; trace.surface.valid && i < places_.size(); i++) {
+    for (size_t i = 0; trace.surface.valid && i < positions_.size(); i++) {
         double depth_mm;
-        if (depth_at(trace.surface, places_[i], depth_mm))
+        if (depth_at(trace.surface, positions_[i], depth_mm))
             grey.data[i] = band_grey(trace, depth_mm);
     }
     return grey;
 }
 
-/* Places on the depth grid to the page, in pieces: what the lens's polynomials cannot tell is left out. */
+/* From positions on the depth grid to the page, in pieces: what the lens's polynomials do not cover is left out. */
 static std::vector<std::vector<cv::Point2d>> on_page(const std::vector<cv::Point2d> &steps, const Plot &plot,
                                                      const Surface &surface, const Rig &rig)
 {
     std::vector<std::vector<cv::Point2d>> pieces(1);
     for (cv::Point2d step : steps) {
         cv::Point2d from_middle = step - cv::Point2d(1, 1) * (0.5 * (grid_nodes - 1));
-        cv::Point2d place = surface.centre + from_middle * surface.step;
-        if (cv::norm(place) <= rig.reach)
-            pieces.back().push_back(plot.page(rig.pixel(place)));
+        cv::Point2d position = surface.centre + from_middle * surface.step;
+        if (cv::norm(position) <= rig.reach)
+            pieces.back().push_back(plot.page(rig.pixel(position)));
         else if (!pieces.back().empty())
             pieces.emplace_back();
     }
@@ -89,27 +89,27 @@ static void draw_steps(Canvas &canvas, std::vector<cv::Point2d> steps, bool clos
         canvas.line(piece, stroke);
 }
 
-/* The cuts count from the nearest node: every n-th of them. */
+/* Levels count from the nearest node: every n-th of them. */
 static void draw_contours(Canvas &canvas, const Plot &plot, const Trace &trace, const Rig &rig, size_t every,
                           double much)
 {
-    for (size_t i = every - 1; i < trace.cuts.size(); i += every) {
-        for (const Contour &contour : trace.cuts[i].contours)
+    for (size_t i = every - 1; i < trace.levels.size(); i += every) {
+        for (const Contour &contour : trace.levels[i].contours)
             draw_steps(canvas, contour.steps, contour.closed, plot, trace, rig, stroke_contour(contour.closed, much));
     }
 }
 
-/* The last slice of the nest that is a part of an open polygon: that polygon dashed, the part solid. */
+/* The last slice of the nest that is an arc of an open polygon: that polygon dashed, the arc solid. */
 static void draw_support(Canvas &canvas, const Plot &plot, const Trace &trace, const Rig &rig, size_t nest, double much)
 {
     const Contour *last = nullptr;
-    const Part *last_part = nullptr;
-    for (const Cut &cut : trace.cuts) {
-        for (const Contour &contour : cut.contours) {
-            for (const Part &part : contour.parts) {
-                if (part.nest == nest && !contour.closed && (last_part == nullptr || part.slice > last_part->slice)) {
+    const Arc *last_part = nullptr;
+    for (const Level &level : trace.levels) {
+        for (const Contour &contour : level.contours) {
+            for (const Arc &arc : contour.arcs) {
+                if (arc.nest == nest && !contour.closed && (last_part == nullptr || arc.slice > last_part->slice)) {
                     last = &contour;
-                    last_part = &part;
+                    last_part = &arc;
                 }
             }
         }
@@ -117,13 +117,13 @@ static void draw_support(Canvas &canvas, const Plot &plot, const Trace &trace, c
     if (last == nullptr)
         return; /* all its slices are closed polygons */
     draw_steps(canvas, last->steps, false, plot, trace, rig, stroke_open(much));
-    draw_steps(canvas, last_part->steps, true, plot, trace, rig, stroke_part(much));
+    draw_steps(canvas, last_part->steps, true, plot, trace, rig, stroke_arc(much));
 }
 
-static cv::Point2d on_ellipse(const Ellipse &ellipse, double turn)
+static cv::Point2d on_ellipse(const Ellipse &ellipse, double phase)
 {
     double angle = ellipse.angle_deg * CV_PI / 180.0;
-    double x = ellipse.a_px * std::cos(turn), y = ellipse.b_px * std::sin(turn);
+    double x = ellipse.a_px * std::cos(phase), y = ellipse.b_px * std::sin(phase);
     return ellipse.centre_px +
            cv::Point2d(x * std::cos(angle) - y * std::sin(angle), x * std::sin(angle) + y * std::cos(angle));
 }
@@ -132,10 +132,10 @@ static cv::Point2d on_ellipse(const Ellipse &ellipse, double turn)
 static void draw_tag(Canvas &canvas, const Plot &plot, const Hypothesis &hypothesis, size_t number, double much,
                      Room &room)
 {
-    static constexpr int places = 24;
+    static constexpr int positions = 24;
     double radius = tag_radius * std::sqrt(much);
-    for (int i = 0; i < places; i++) {
-        cv::Point2d at = plot.page(on_ellipse(hypothesis.ellipse, 2 * CV_PI * i / places + 0.6));
+    for (int i = 0; i < positions; i++) {
+        cv::Point2d at = plot.page(on_ellipse(hypothesis.ellipse, 2 * CV_PI * i / positions + 0.6));
         if (room.take({at.x - radius, at.y - radius, 2 * radius, 2 * radius})) {
             bool accepted = hypothesis.rejected.empty();
             canvas.disc(at, radius, accepted ? black : blue);
@@ -149,20 +149,20 @@ static void draw_tag(Canvas &canvas, const Plot &plot, const Hypothesis &hypothe
 static void draw_hypotheses(Canvas &canvas, const Plot &plot, const Trace &trace, const Rig &rig, double much)
 {
     Room room(plot.where);
-    for (const Finding &detection : trace.detections) {
+    for (const Detection &detection : trace.detections) {
         if (!detection.is_head)
-            canvas.cross(plot.page(detection.ellipse.centre_px), 8 * much, stroke_place(much), false);
+            canvas.cross(plot.page(detection.ellipse.centre_px), 8 * much, stroke_position(much), false);
     }
-    for (const Hypothesis &hypothesis : trace.nests)
+    for (const Hypothesis &hypothesis : trace.hypotheses)
         hypothesis_draw(canvas, plot, hypothesis.ellipse,
                         hypothesis.rejected.empty() ? stroke_accepted(much) : stroke_rejected(much));
-    for (const Hypothesis &hypothesis : trace.nests) {
+    for (const Hypothesis &hypothesis : trace.hypotheses) {
         if (hypothesis.rejected.empty())
             draw_support(canvas, plot, trace, rig, hypothesis.nest, much);
     }
     heads_draw(canvas, plot, trace, much);
-    for (size_t i = 0; i < trace.nests.size(); i++)
-        draw_tag(canvas, plot, trace.nests[i], i + 1, much, room);
+    for (size_t i = 0; i < trace.hypotheses.size(); i++)
+        draw_tag(canvas, plot, trace.hypotheses[i], i + 1, much, room);
 }
 
 void contours_draw_plot(Canvas &canvas, const Plot &plot, const Shader &shader, const Trace &trace, const Rig &rig,
@@ -221,19 +221,19 @@ static double draw_depths(Canvas &canvas, cv::Point2d at, const Trace &trace)
     return at.y + bar + 68;
 }
 
-/* One after the other while there is room; what finds none is told. */
+/* One after the other while there is room; how many find none is said. */
 static void draw_reasons(Canvas &canvas, cv::Point2d at, double bottom, const Trace &trace)
 {
     double indent = 2 * tag_radius + 10;
-    for (size_t i = 0; i < trace.nests.size(); i++) {
-        std::vector<std::string> lines = reason_lines(trace.nests[i], trace.limits);
-        bool last = i + 1 == trace.nests.size();
+    for (size_t i = 0; i < trace.hypotheses.size(); i++) {
+        std::vector<std::string> lines = reason_lines(trace.hypotheses[i], trace.limits);
+        bool last = i + 1 == trace.hypotheses.size();
         if (at.y + row * static_cast<double>(lines.size() + (last ? 0 : 1)) > bottom) {
-            canvas.text({at.x, at.y + row / 2}, text("and %zu more for which there is no room", trace.nests.size() - i),
-                        words_size);
+            canvas.text({at.x, at.y + row / 2},
+                        text("and %zu more for which there is no room", trace.hypotheses.size() - i), words_size);
             return;
         }
-        bool accepted = trace.nests[i].rejected.empty();
+        bool accepted = trace.hypotheses[i].rejected.empty();
         cv::Point2d tag(at.x + tag_radius, at.y + row / 2);
         canvas.disc(tag, tag_radius, accepted ? black : blue);
         canvas.disc(tag, tag_radius - 1.6, accepted ? black : white);
@@ -259,7 +259,7 @@ void contours_draw(Canvas &canvas, const Shader &shader, const Trace &trace, con
     canvas.text({at.x, margin + title_height / 2 - 6}, result_words(trace), 1.15 * words_size, Anchor::left, true);
     at.y = draw_depths(canvas, {at.x, margin + title_height}, trace);
     canvas.text({at.x, at.y + row / 2},
-                trace.nests.empty() ? "no hypotheses" : "hypotheses: what was measured (limits)", words_size,
+                trace.hypotheses.empty() ? "no hypotheses" : "hypotheses: what was measured (limits)", words_size,
                 Anchor::left, true);
     draw_reasons(canvas, {at.x, at.y + 1.3 * row}, bottom, trace);
 }

@@ -1,7 +1,7 @@
 /* view_contours - the contour plot (the paper's figure 1): the surface in bands of grey, near is dark; contours, the
  * open ones dashed; the ellipse of every hypothesis with its number; of each the open polygon that supports it last,
- * dashed, and the elliptical part that was cut out of it.
- * The plot covers the frame: a place in it is a place in the frame.
+ * dashed, and its elliptical arc.
+ * The plot covers the frame: a position in it is a position in the frame.
  */
 #ifndef VIEW_CONTOURS_HPP
 #define VIEW_CONTOURS_HPP
@@ -20,7 +20,7 @@ class Shader
 
   private:
     cv::Size size_;
-    std::vector<cv::Point2d> places_; /* normalised, row by row */
+    std::vector<cv::Point2d> positions_; /* normalised, row by row */
 };
 
 /* Depth bands and thin contours are this far apart. */
@@ -30,7 +30,7 @@ uint8_t band_grey(const Trace &trace, double depth_mm);
 /* What is shown as white, and beyond. */
 double band_far_mm(const Trace &trace);
 
-/* Every how many cuts a contour is drawn. */
+/* Every how many levels a contour is drawn. */
 constexpr size_t contours_all = 2, contours_few = 4;
 
 void contours_draw_plot(Canvas &canvas, const Plot &plot, const Shader &shader, const Trace &trace, const Rig &rig,

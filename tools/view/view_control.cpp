@@ -15,7 +15,7 @@ namespace view
 static constexpr double margin = 20, image_width = 1880, image_height = 1880, title_height = 44, foot_height = 84;
 static constexpr double words_size = 26, label_size = 15, ring_radius = 5;
 /* So much of the image may be white; the scene behind stays dark, so that what is drawn on it shows. */
-static constexpr double white_share = 0.005, white_medians = 3;
+static constexpr double white_fraction = 0.005, white_medians = 3;
 static constexpr double gamma = 0.7;
 /* From grey to grey in a picture: finer ones are camera noise, and make the file large. */
 static constexpr int grey_step = 12;
@@ -36,19 +36,19 @@ static cv::Mat1b stretch(const cv::Mat &samples, double min, double max)
     samples.convertTo(values, CV_64F);
     for (int y = 0; y < grey.rows; y++) {
         for (int x = 0; x < grey.cols; x++) {
-            double part = std::clamp((values.at<double>(y, x) - min) / (max - min), 0.0, 1.0);
-            grey(y, x) = static_cast<uint8_t>(cvRound(255 * std::pow(part, gamma)));
+            double arc = std::clamp((values.at<double>(y, x) - min) / (max - min), 0.0, 1.0);
+            grey(y, x) = static_cast<uint8_t>(cvRound(255 * std::pow(arc, gamma)));
         }
     }
     return grey;
 }
 
-static double quantile(const cv::Mat &samples, double share)
+static double quantile(const cv::Mat &samples, double fraction)
 {
     cv::Mat values = samples.clone().reshape(1, 1);
     values.convertTo(values, CV_64F);
     double *begin = values.ptr<double>(), *end = begin + values.cols;
-    double *at = begin + static_cast<std::ptrdiff_t>(share * (values.cols - 1));
+    double *at = begin + static_cast<std::ptrdiff_t>(fraction * (values.cols - 1));
     std::nth_element(begin, at, end);
     return *at;
 }
@@ -61,13 +61,13 @@ cv::Mat1b control_image(const std::string &path, const Rig &rig)
         throw Error(path + ": " + std::strerror(errno));
     cv::Mat samples = cv::imread(path, cv::IMREAD_ANYDEPTH | cv::IMREAD_GRAYSCALE);
     if (samples.empty())
-        throw Error(path + ": no whole binary PGM");
+        throw Error(path + ": not a complete binary PGM");
     if (samples.size() != rig.size_px)
         throw Error(path + text(": has %dx%d pixels, the rig %dx%d", samples.cols, samples.rows, rig.size_px.width,
                                 rig.size_px.height));
     if (!rig.range)
         return stretch(samples, 0,
-                       std::max({1.0, quantile(samples, 1 - white_share), white_medians * quantile(samples, 0.5)}));
+                       std::max({1.0, quantile(samples, 1 - white_fraction), white_medians * quantile(samples, 0.5)}));
     cv::Mat1b grey = stretch(samples, rig.near_mm, rig.far_mm);
     grey.setTo(255, samples == 0); /* nothing was measured there */
     return grey;
@@ -77,11 +77,11 @@ static void draw_points(Canvas &canvas, const Plot &plot, const Trace &trace, co
 {
     for (const Point &point : trace.points) {
         if (point.seen)
-            canvas.ellipse(plot.page(rig.pixel(point.place)), radius, radius, 0, {yellow, 2, {}, false, 1, black});
+            canvas.ellipse(plot.page(rig.pixel(point.position)), radius, radius, 0, {yellow, 2, {}, false, 1, black});
     }
 }
 
-/* Which dots have a label; the others' places too. */
+/* Which dots have a label; the others' positions too. */
 static std::vector<bool> labelled_dots(const Trace &trace)
 {
     std::vector<bool> labelled(trace.dots_px.size());
@@ -146,15 +146,15 @@ static int draw_numbers(Canvas &canvas, const Plot &plot, const Trace &trace, Ro
         cv::Point2d at = plot.page(trace.dots_px[static_cast<size_t>(trace.labels[slot].dot)]);
         double width = canvas.text_width(number, label_size) + 2, height = 0.8 * label_size, off = ring_radius + 3;
         bool placed = false;
-        for (cv::Point2d way : {cv::Point2d(0.5, 0),
-                                {0, 0.5},
-                                {0, -0.5},
-                                {-0.5, 0},
-                                {0.5, 0.5},
-                                {0.5, -0.5},
-                                {-0.5, 0.5},
-                                {-0.5, -0.5}}) {
-            cv::Point2d middle = at + cv::Point2d(way.x * (width + 2 * off), way.y * (height + 2 * off));
+        for (cv::Point2d offset : {cv::Point2d(0.5, 0),
+                                   {0, 0.5},
+                                   {0, -0.5},
+                                   {-0.5, 0},
+                                   {0.5, 0.5},
+                                   {0.5, -0.5},
+                                   {-0.5, 0.5},
+                                   {-0.5, -0.5}}) {
+            cv::Point2d middle = at + cv::Point2d(offset.x * (width + 2 * off), offset.y * (height + 2 * off));
             if (room.take({middle.x - width / 2, middle.y - height / 2, width, height})) {
                 canvas.text_with_halo(middle, number, label_size, Anchor::middle, white, black);
                 placed = true;
@@ -193,7 +193,7 @@ static void draw_foot(Canvas &canvas, cv::Point2d at, const Trace &trace, int wi
     canvas.text({x + 20, at.y}, words, words_size);
     x += 60 + canvas.text_width(words, words_size);
     if (without > 0)
-        canvas.text({x, at.y}, text("%d numbers left out for want of room", without), words_size);
+        canvas.text({x, at.y}, text("%d numbers left out: no room", without), words_size);
     at.y += 40;
     canvas.line({at, {at.x + 40, at.y}}, {vermilion, 3.4, {}, false, 1.3, white});
     canvas.text({at.x + 55, at.y}, residual_words(trace), words_size);
@@ -223,7 +223,7 @@ void control_draw(Canvas &canvas, const cv::Mat1b &image, const Trace &trace, co
     canvas.unclip();
     cv::Point2d foot(margin, plot.where.br().y + 26);
     if (rig.range)
-        canvas.text(foot, "depth, near is dark; rings: the points that were taken from it", words_size);
+        canvas.text(foot, "depth, near is dark; rings: the points that were sampled from it", words_size);
     else
         draw_foot(canvas, foot, trace, without);
 }

@@ -24,12 +24,12 @@ Stroke stroke_open(double much)
     return {black, 2.6 * much, {13 * much, 8 * much}, false, 1.6 * much};
 }
 
-Stroke stroke_part(double much)
+Stroke stroke_arc(double much)
 {
     return {white, 2.4 * much, {}, false, 1.4 * much, black};
 }
 
-Stroke stroke_place(double much)
+Stroke stroke_position(double much)
 {
     return {blue, 2.4 * much, {}, false, 1.4 * much};
 }
@@ -49,7 +49,7 @@ void heads_draw(Canvas &canvas, const Plot &plot, const Trace &trace, double muc
 {
     if (trace.paper)
         return; /* then the accepted hypotheses are the heads */
-    for (const Finding &detection : trace.detections) {
+    for (const Detection &detection : trace.detections) {
         if (detection.is_head)
             hypothesis_draw(canvas, plot, detection.ellipse, stroke_head(much));
     }
@@ -67,12 +67,12 @@ void key_draw(Canvas &canvas, cv::Point2d at, int columns, cv::Size2d cell, doub
     };
     std::vector<Entry> entries = {
         {"accepted hypothesis", stroke_accepted(much), false}, {"rejected hypothesis", stroke_rejected(much), false},
-        {"open polygon ..", stroke_open(much), false},         {".. its elliptical part", stroke_part(much), false},
+        {"open polygon ..", stroke_open(much), false},         {".. its elliptical arc", stroke_arc(much), false},
         {"contour, closed", stroke_contour(true, 1), false},   {"contour, open", stroke_contour(false, 1), false},
     };
     if (!paper) {
         entries.insert(entries.begin(), {"head, whole method", stroke_head(much), false});
-        entries.push_back({"other place, no head", stroke_place(much), true});
+        entries.push_back({"other candidate, no head", stroke_position(much), true});
     }
     double sample = 2.8 * cell.height;
     for (size_t i = 0; i < entries.size(); i++) {
@@ -89,10 +89,10 @@ void key_draw(Canvas &canvas, cv::Point2d at, int columns, cv::Size2d cell, doub
 std::string head_words(const Trace &trace)
 {
     if (!trace.selected)
-        return trace.hypotheses.empty() ? "no head" : text("%zu heads", trace.hypotheses.size());
+        return trace.heads.empty() ? "no head" : text("%zu heads", trace.heads.size());
     if (trace.paper)
-        return text("head at %.0f mm", trace.nests[*trace.selected].distance_mm);
-    const Finding &head = trace.detections[*trace.selected];
+        return text("head at %.0f mm", trace.hypotheses[*trace.selected].distance_mm);
+    const Detection &head = trace.detections[*trace.selected];
     return text("head %s %.0f mm", head.is_predicted ? "near" : "at", head.distance_mm);
 }
 } // namespace view

@@ -13,9 +13,9 @@ namespace view
 Stroke stroke_accepted(double much);
 Stroke stroke_rejected(double much);
 Stroke stroke_head(double much);
-Stroke stroke_open(double much);  /* an open polygon that supports a hypothesis */
-Stroke stroke_part(double much);  /* the elliptical part that is cut out of it */
-Stroke stroke_place(double much); /* a place that was tried and has no score */
+Stroke stroke_open(double much);     /* an open polygon that supports a hypothesis */
+Stroke stroke_arc(double much);      /* its elliptical arc */
+Stroke stroke_position(double much); /* a candidate that was tried and has no score */
 Stroke stroke_contour(bool closed, double much);
 
 void hypothesis_draw(Canvas &canvas, const Plot &plot, const Ellipse &ellipse, const Stroke &stroke);

@@ -18,7 +18,7 @@ void Node::complain(const std::string &expected) const
     std::string is = value_->dump();
     if (is.size() > shown_max)
         is = std::string("a ") + value_->type_name() + text(" of %zu bytes", is.size());
-    throw Error(file_ + ": " + (place_.empty() ? "the whole" : place_) + ": must be " + expected + ", is " + is);
+    throw Error(file_ + ": " + (position_.empty() ? "the whole" : position_) + ": must be " + expected + ", is " + is);
 }
 
 Node Node::operator[](const char *key) const
@@ -27,15 +27,15 @@ Node Node::operator[](const char *key) const
         complain(std::string("an object with \"") + key + "\"");
     auto found = value_->find(key);
     if (found == value_->end())
-        throw Error(file_ + ": " + (place_.empty() ? "" : place_ + ": ") + "has no \"" + key + "\"");
-    return {*found, file_, place_.empty() ? key : place_ + "." + key};
+        throw Error(file_ + ": " + (position_.empty() ? "" : position_ + ": ") + "has no \"" + key + "\"");
+    return {*found, file_, position_.empty() ? key : position_ + "." + key};
 }
 
 Node Node::operator[](size_t index) const
 {
     if (index >= count())
         complain(text("a list of more than %zu entries", index));
-    return {(*value_)[index], file_, place_ + text("[%zu]", index)};
+    return {(*value_)[index], file_, position_ + text("[%zu]", index)};
 }
 
 bool Node::boolean() const
@@ -82,7 +82,7 @@ size_t Node::count() const
 void Node::must_count(size_t expected) const
 {
     if (count() != expected)
-        throw Error(file_ + ": " + place_ + text(": must have %zu entries, has %zu", expected, count()));
+        throw Error(file_ + ": " + position_ + text(": must have %zu entries, has %zu", expected, count()));
 }
 
 nlohmann::json json_read(const std::string &path)
@@ -100,7 +100,7 @@ nlohmann::json json_read(const std::string &path)
         size_t column = line_start == std::string::npos || line_start >= at ? at + 1 : at - line_start;
         throw Error(path + text(":%td:%zu: no JSON: ", std::count(bytes.begin(), end, '\n') + 1, column) +
                     (at == bytes.size() ? "it ends too soon" : "what stands here must not"));
-    } catch (const nlohmann::json::exception &error) { /* of what was read well, a number too large; no place */
+    } catch (const nlohmann::json::exception &error) { /* of what was read well, a number too large; no position */
         std::string what = error.what();
         throw Error(path + ": " + what.substr(what.find("] ") + 2));
     }

@@ -1,4 +1,4 @@
-/* view_node - a value of a JSON file together with its place, so that whatever is wrong with it can be told:
+/* view_node - a value of a JSON file together with its position, so that a message says where it is wrong:
  *     FILE: cuts[3].level_mm_q8: must be an integer from 0 to 4194304, is null
  * All members throw view::Error.
  */
@@ -14,8 +14,8 @@ namespace view
 class Node
 {
   public:
-    Node(const nlohmann::json &value, std::string file, std::string place)
-        : value_(&value), file_(std::move(file)), place_(std::move(place))
+    Node(const nlohmann::json &value, std::string file, std::string position)
+        : value_(&value), file_(std::move(file)), position_(std::move(position))
     {
     }
     Node operator[](const char *key) const;
@@ -39,10 +39,10 @@ class Node
 
   private:
     const nlohmann::json *value_;
-    std::string file_, place_;
+    std::string file_, position_;
 };
 
-/* A whole file. Bad syntax is told as FILE:LINE:COLUMN. */
+/* A whole file. Bad syntax is reported as FILE:LINE:COLUMN. */
 nlohmann::json json_read(const std::string &path);
 } // namespace view
 

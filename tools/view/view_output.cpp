@@ -150,7 +150,7 @@ void Film::open(cv::Size size)
                  path_.c_str());
 }
 
-/* The writer tells nobody when the disk is full: what it wrote is looked at. */
+/* The writer does not report a full disk: its file is checked. */
 void Film::finish()
 {
     writer_.release();

@@ -1,5 +1,5 @@
 /* view_output - pages into a file: one into a PNG, each onto a sheet of A4 of a PDF, each a frame of an MP4.
- * An MP4 is H.264 where OpenCV's FFmpeg has an encoder, else MPEG-4 part 2, which is told; without either it is an
+ * An MP4 is H.264 where OpenCV's FFmpeg has an encoder, else MPEG-4 part 2, and a message says so; without either it is an
  * error.
  * A file is there whole or not at all, but for an MP4, which is removed when something fails.
  */

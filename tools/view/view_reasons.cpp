@@ -33,7 +33,7 @@ static std::string inside_words(const Hypothesis &h, const Limits &l)
     return text("dots on it %d (%d or more)", h.outline.inside, l.points_min);
 }
 
-static std::string share_words(const char *what, int of, int all, int min_percent)
+static std::string fraction_words(const char *what, int of, int all, int min_percent)
 {
     return text("%s %d of %d (%d %% or more)", what, of, all, min_percent);
 }
@@ -51,11 +51,11 @@ static std::vector<std::string> outline_lines(const Hypothesis &h, const Limits 
     if (all || o.inside < l.points_min)
         lines.push_back(inside_words(h, l));
     if (all || is_short(o.above_behind, o.above, l.above_min_percent))
-        lines.push_back(share_words("behind it above:", o.above_behind, o.above, l.above_min_percent));
+        lines.push_back(fraction_words("behind it above:", o.above_behind, o.above, l.above_min_percent));
     if (all || is_short(o.beside_behind, o.beside, l.beside_min_percent))
-        lines.push_back(share_words("behind it beside:", o.beside_behind, o.beside, l.beside_min_percent));
+        lines.push_back(fraction_words("behind it beside:", o.beside_behind, o.beside, l.beside_min_percent));
     if (all || is_short(o.below_near, o.below, l.below_min_percent))
-        lines.push_back(share_words("not behind it below:", o.below_near, o.below, l.below_min_percent));
+        lines.push_back(fraction_words("not behind it below:", o.below_near, o.below, l.below_min_percent));
     return lines;
 }
 
@@ -96,10 +96,10 @@ std::string result_words(const Trace &trace)
 {
     std::string words = head_words(trace);
     if (!trace.selected)
-        return words + (trace.hypotheses.empty() ? "" : ", none selected");
+        return words + (trace.heads.empty() ? "" : ", none selected");
     if (trace.paper)
         return words;
-    const Finding &head = trace.detections[*trace.selected];
+    const Detection &head = trace.detections[*trace.selected];
     words += text(", %.1f %% sure", 100 * head.probability) + (head.is_predicted ? ", by its track" : "");
     return words;
 }

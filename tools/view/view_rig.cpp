@@ -11,32 +11,32 @@ namespace view
 /* Half a frame beyond the frame's corners. */
 static constexpr double reach_beyond = 1.5;
 
-cv::Point2d Rig::pixel(cv::Point2d place) const
+cv::Point2d Rig::pixel(cv::Point2d position) const
 {
-    double x = place.x, y = place.y, r2 = x * x + y * y;
+    double x = position.x, y = position.y, r2 = x * x + y * y;
     double radial = 1 + r2 * (lens[0] + r2 * (lens[1] + r2 * lens[4]));
     double u = x * radial + 2 * lens[2] * x * y + lens[3] * (r2 + 2 * x * x);
     double v = y * radial + lens[2] * (r2 + 2 * y * y) + 2 * lens[3] * x * y;
     return {camera(0, 0) * u + camera(0, 2), camera(1, 1) * v + camera(1, 2)};
 }
 
-std::vector<cv::Point2d> Rig::places(const std::vector<cv::Point2d> &pixels) const
+std::vector<cv::Point2d> Rig::positions(const std::vector<cv::Point2d> &pixels) const
 {
     static const cv::TermCriteria until(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 20, 1e-6);
-    std::vector<cv::Point2d> places;
-    cv::undistortPoints(pixels, places, camera, lens, cv::noArray(), cv::noArray(), until);
-    return places;
+    std::vector<cv::Point2d> positions;
+    cv::undistortPoints(pixels, positions, camera, lens, cv::noArray(), cv::noArray(), until);
+    return positions;
 }
 
 /* A dot is at ray + (O - O_z ray) / Z, normalised: so its line runs along O - O_z ray. */
 cv::Point2d Rig::across(size_t slot, cv::Point2d at_pixel) const
 {
     static constexpr double little = 1e-4;
-    cv::Point2d at = places({at_pixel}).front();
+    cv::Point2d at = positions({at_pixel}).front();
     cv::Vec3d ray = rays[slot] / rays[slot][2];
     cv::Point2d along(origin_mm[0] - origin_mm[2] * ray[0], origin_mm[1] - origin_mm[2] * ray[1]);
-    cv::Point2d way = pixel(at + along * (little / cv::norm(along))) - pixel(at);
-    return cv::Point2d(-way.y, way.x) / cv::norm(way);
+    cv::Point2d offset = pixel(at + along * (little / cv::norm(along))) - pixel(at);
+    return cv::Point2d(-offset.y, offset.x) / cv::norm(offset);
 }
 
 static std::vector<double> read_matrix(const Node &node, size_t count)
@@ -67,8 +67,8 @@ static void read_projector(const Node &whole, Rig &rig)
 static double corner_reach(const Rig &rig)
 {
     double width = rig.size_px.width - 1, height = rig.size_px.height - 1, max = 0;
-    for (cv::Point2d place : rig.places({{0, 0}, {width, 0}, {0, height}, {width, height}}))
-        max = std::max(max, cv::norm(place));
+    for (cv::Point2d position : rig.positions({{0, 0}, {width, 0}, {0, height}, {width, height}}))
+        max = std::max(max, cv::norm(position));
     return max * reach_beyond;
 }
 

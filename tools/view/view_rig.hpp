@@ -17,12 +17,12 @@ struct Rig {
     cv::Vec3d origin_mm;
     std::vector<cv::Vec3d> rays; /* none with a range rig */
     double near_mm, far_mm;
-    double reach; /* farther than this from the axis, normalised, the lens's polynomials are not to be trusted */
+    double reach; /* farther than this from the axis, normalised, the lens's polynomials are not valid */
 
-    /* A normalised place to the frame's pixel. */
-    cv::Point2d pixel(cv::Point2d place) const;
-    /* Pixels to normalised places. */
-    std::vector<cv::Point2d> places(const std::vector<cv::Point2d> &pixels) const;
+    /* From normalised coordinates to the frame's pixel. */
+    cv::Point2d pixel(cv::Point2d position) const;
+    /* From pixels to normalised coordinates. */
+    std::vector<cv::Point2d> positions(const std::vector<cv::Point2d> &pixels) const;
     /* Across the slot's epipolar line at this pixel, as a unit vector in the frame. */
     cv::Point2d across(size_t slot, cv::Point2d pixel) const;
 };

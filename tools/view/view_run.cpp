@@ -112,7 +112,7 @@ static void check(const Options &options, Format format)
 {
     std::error_code failed;
     if (!std::filesystem::is_directory(options.dir, failed))
-        throw Error(options.dir + ": is no frames directory");
+        throw Error(options.dir + ": not a directory; expected a frames directory");
     if (options.verb == Verb::sheet && format == Format::mp4)
         throw Error(options.out + ": a sheet is one picture: write a PNG or a PDF, or a film of pair");
     if (options.verb != Verb::sheet && format == Format::png && options.count > 1)

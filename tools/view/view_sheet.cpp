@@ -65,15 +65,15 @@ void sheet_draw(Canvas &canvas, const Shader &shader, const std::vector<Shown> &
 {
     Grid grid = grid_of(frames.size(), rig);
     int index = 0;
-    auto place = [&] {
+    auto position = [&] {
         cv::Point2d at(margin + index % grid.columns * grid.cell.width,
                        margin + index / grid.columns * grid.cell.height);
         index++;
         return at;
     };
     for (const Shown &frame : frames)
-        draw_cell(canvas, place(), shader, frame, rig);
-    key_draw(canvas, place(), 1, {cell_room, key_row}, small, frames.front().trace.paper);
+        draw_cell(canvas, position(), shader, frame, rig);
+    key_draw(canvas, position(), 1, {cell_room, key_row}, small, frames.front().trace.paper);
 }
 
 cv::Size pair_page(const Rig &rig)

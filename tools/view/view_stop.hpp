@@ -36,7 +36,7 @@ class Stop
 /* Throws view::Stopped when a signal has come. */
 void stop_check();
 
-/* Waits for a child's end; status as waitpid has it; false: errno tells. When a signal comes the child is ended by SIGTERM,
+/* Waits for a child's end; status as waitpid has it; false: errno says why. When a signal comes the child is ended by SIGTERM,
  * and view::Stopped thrown. */
 bool stop_wait(pid_t child, int &status);
 } // namespace view

@@ -86,34 +86,34 @@ static void read_nests(const Node &nests, Trace &trace)
     }
 }
 
-static std::vector<cv::Point2d> read_places(const Node &list)
+static std::vector<cv::Point2d> read_positions(const Node &list)
 {
-    std::vector<cv::Point2d> places;
+    std::vector<cv::Point2d> positions;
     for (size_t i = 0; i < list.count(); i++)
-        places.emplace_back(list[i][size_t{0}].fixed(9), list[i][size_t{1}].fixed(9));
-    return places;
+        positions.emplace_back(list[i][size_t{0}].fixed(9), list[i][size_t{1}].fixed(9));
+    return positions;
 }
 
 static Contour read_contour(const Node &node, const Trace &trace)
 {
-    Contour contour{node["closed"].boolean(), read_places(node["x_y_q9"]), {}};
-    Node parts = node["part"];
-    for (size_t i = 0; i < parts.count(); i++) {
-        size_t nest = read_index(parts[i]["nest"], trace.nests.size());
-        size_t slice = read_index(parts[i]["slice"], trace.nests[nest].size());
-        contour.parts.push_back({nest, slice, read_places(parts[i]["x_y_q9"])});
+    Contour contour{node["closed"].boolean(), read_positions(node["x_y_q9"]), {}};
+    Node arcs = node["part"];
+    for (size_t i = 0; i < arcs.count(); i++) {
+        size_t nest = read_index(arcs[i]["nest"], trace.nests.size());
+        size_t slice = read_index(arcs[i]["slice"], trace.nests[nest].size());
+        contour.arcs.push_back({nest, slice, read_positions(arcs[i]["x_y_q9"])});
     }
     return contour;
 }
 
-static void read_cuts(const Node &cuts, Trace &trace)
+static void read_levels(const Node &levels, Trace &trace)
 {
-    for (size_t i = 0; i < cuts.count(); i++) {
-        Cut cut{cuts[i]["level_mm_q8"].fixed(8), {}};
-        Node contours = cuts[i]["contour"];
+    for (size_t i = 0; i < levels.count(); i++) {
+        Level level{levels[i]["level_mm_q8"].fixed(8), {}};
+        Node contours = levels[i]["contour"];
         for (size_t k = 0; k < contours.count(); k++)
-            cut.contours.push_back(read_contour(contours[k], trace));
-        trace.cuts.push_back(std::move(cut));
+            level.contours.push_back(read_contour(contours[k], trace));
+        trace.levels.push_back(std::move(level));
     }
 }
 
@@ -137,11 +137,11 @@ static void read_hypotheses(const Node &list, Trace &trace)
     for (size_t i = 0; i < list.count(); i++) {
         Node node = list[i];
         Node rejected = node["rejected"];
-        trace.nests.push_back({read_index(node["nest"], trace.nests.size()), read_ellipse(node),
-                               node["distance_mm_q8"].fixed(8), node["area_mm2"].fixed(0),
-                               node["curvature_mm_q8"].fixed(8), node["extent_mm_q8"].fixed(8),
-                               node["upright_q16"].fixed(16), read_outline(node["outline"]),
-                               rejected.is_null() ? "" : rejected.string()});
+        trace.hypotheses.push_back({read_index(node["nest"], trace.nests.size()), read_ellipse(node),
+                                    node["distance_mm_q8"].fixed(8), node["area_mm2"].fixed(0),
+                                    node["curvature_mm_q8"].fixed(8), node["extent_mm_q8"].fixed(8),
+                                    node["upright_q16"].fixed(16), read_outline(node["outline"]),
+                                    rejected.is_null() ? "" : rejected.string()});
     }
 }
 
@@ -172,10 +172,10 @@ static void read_detections(const Node &list, Trace &trace)
 static void read_result(const Node &node, Trace &trace)
 {
     trace.paper = node["paper"].boolean();
-    size_t end = trace.paper ? trace.nests.size() : trace.detections.size();
-    Node hypotheses = node["head"];
-    for (size_t i = 0; i < hypotheses.count(); i++)
-        trace.hypotheses.push_back(read_index(hypotheses[i], end));
+    size_t end = trace.paper ? trace.hypotheses.size() : trace.detections.size();
+    Node heads = node["head"];
+    for (size_t i = 0; i < heads.count(); i++)
+        trace.heads.push_back(read_index(heads[i], end));
     if (!node["selected"].is_null())
         trace.selected = read_index(node["selected"], end);
 }
@@ -196,7 +196,7 @@ Trace trace_read(const std::string &path)
     trace.clip_mm = whole["samples"]["clip_mm_q8"].fixed(8);
     read_surface(whole["surface"], trace.surface);
     read_nests(whole["hypotheses"]["nest"], trace);
-    read_cuts(whole["cuts"], trace);
+    read_levels(whole["cuts"], trace);
     read_hypotheses(whole["heads"]["hypothesis"], trace);
     trace.limits = read_limits(whole["heads"]["limits"]);
     read_detections(whole["findings"], trace);

@@ -1,6 +1,6 @@
 /* view_trace - one frame's trace as host_sim --trace writes it, checked and in mm, pixels and grid steps.
  * Whatever is missing, of the wrong kind, or points to something that is not there is an error that names the file and
- * the place in it.
+ * where in it.
  */
 #ifndef VIEW_TRACE_HPP
 #define VIEW_TRACE_HPP
@@ -21,7 +21,7 @@ struct Label {
     double perp_px = 0;
 };
 
-/* A place of the depth grid in steps (0 .. 46) stands at centre + (place - 23) * step, normalised. */
+/* A position on the depth grid in steps (0 .. 46) stands at centre + (place - 23) * step, normalised. */
 struct Surface {
     bool valid = false;
     cv::Point2d centre;
@@ -31,7 +31,7 @@ struct Surface {
 };
 
 /* The stretch of a contour that supports a nest: an arc, closed by its chord. */
-struct Part {
+struct Arc {
     size_t nest;
     size_t slice;
     std::vector<cv::Point2d> steps;
@@ -40,10 +40,10 @@ struct Part {
 struct Contour {
     bool closed;
     std::vector<cv::Point2d> steps;
-    std::vector<Part> parts;
+    std::vector<Arc> arcs;
 };
 
-struct Cut {
+struct Level {
     double level_mm;
     std::vector<Contour> contours;
 };
@@ -54,7 +54,7 @@ struct Ellipse {
     double a_px, b_px, angle_deg;
 };
 
-/* What the samples show inside and around the last ellipse; counts. */
+/* Counts of samples inside and around the last ellipse. */
 struct Outline {
     int inside, above, above_behind, beside, beside_behind, below, below_near;
 };
@@ -72,7 +72,7 @@ struct Limits {
     int points_min, above_min_percent, beside_min_percent, below_min_percent;
 };
 
-struct Finding {
+struct Detection {
     Ellipse ellipse;
     cv::Point3d centre_mm;
     double distance_mm, probability;
@@ -80,7 +80,7 @@ struct Finding {
 };
 
 struct Point {
-    cv::Point2d place; /* normalised */
+    cv::Point2d position; /* normalised */
     bool seen;
 };
 
@@ -93,13 +93,13 @@ struct Trace {
     std::array<Point, slot_count> points;
     double clip_mm; /* nothing farther is shown to the surface; 0: nothing was seen */
     Surface surface;
-    std::vector<Cut> cuts;
+    std::vector<Level> levels;
     std::vector<std::vector<bool>> nests; /* is the slice a whole contour? */
-    std::vector<Hypothesis> nests;
+    std::vector<Hypothesis> hypotheses;
     Limits limits;
-    std::vector<Finding> detections;
+    std::vector<Detection> detections;
     bool paper;
-    std::vector<size_t> hypotheses; /* of findings; of hypotheses with the paper's method alone */
+    std::vector<size_t> heads; /* of detections; of hypotheses with the paper's method alone */
     std::optional<size_t> selected;
 
     int labelled_count() const;

@@ -35,9 +35,9 @@ class Traces
   public:
     explicit Traces(const Options &options);
 
-    /* Those from options.from on, `most` at most, in the order of their names. */
+    /* Those from options.from on, at most `max`, in the order of their names. */
     std::vector<std::string> chosen(const std::string &from, size_t max) const;
-    /* host_sim could not use all frames; it has told which. */
+    /* host_sim could not use all frames; it has reported which. */
     bool incomplete() const
     {
         return incomplete_;

@@ -226,7 +226,8 @@ static void a_reader_that_is_slow_or_gone_holds_nobody_up(void)
     i = (int)writer.dropped_count;
     TEST_ASSERT_EQUAL_INT(0, strncmp("test: a message", take(ends[0]), 15));
     write_to(ends[1], 3, "last");
-    snprintf(line[0], sizeof line[0], "test: %d messages could not be told\ntest: last\n", i);
+    snprintf(line[0], sizeof line[0],
+             "test: %d messages were lost: the log was not read in time\ntest: last\n", i);
     TEST_ASSERT_EQUAL_STRING(line[0], take(ends[0]));
     TEST_ASSERT_EQUAL_INT64(0, writer.dropped_count);
     close(ends[0]);

@@ -174,8 +174,8 @@ static void press(int writing, int reading, uint64_t seed, size_t longest)
     }
     TEST_ASSERT_GREATER_THAN_UINT64(0, sent_count);
     /* What is kept goes out at the end when the reader has made room; closing again tries again. */
-    while (state.rest_count > 0) {
-        drain_until(reading, sent_count - state.rest_count - doubled);
+    while (state.unsent_count > 0) {
+        drain_until(reading, sent_count - state.unsent_count - doubled);
         state.descriptor = STDOUT_FILENO;
         close_stdout(writing);
     }
@@ -317,7 +317,7 @@ static void a_reader_that_goes_in_mid_record_ends_it(void)
     while (send_to(ends[1], record, sizeof record) == HAL_SENT) {
         TEST_ASSERT_LESS_THAN_INT(100, tries++);
     }
-    TEST_ASSERT_GREATER_THAN_UINT64(0, state.rest_count);
+    TEST_ASSERT_GREATER_THAN_UINT64(0, state.unsent_count);
     close(ends[0]);
     TEST_ASSERT_EQUAL_INT(HAL_SENT_NEVER, send_to(ends[1], "y\n", 2));
     close(ends[1]);
@@ -349,7 +349,7 @@ static void a_full_disk_drops_and_may_work_again(void)
     open_stdout(full);
     TEST_ASSERT_EQUAL_INT(HAL_SENT_NOT, send_to(full, "x\n", 2));
     TEST_ASSERT_EQUAL_STRING(strerror(ENOSPC), error.text);
-    TEST_ASSERT_EQUAL_UINT64(0, state.rest_count);
+    TEST_ASSERT_EQUAL_UINT64(0, state.unsent_count);
     close(full);
 }
 
@@ -559,7 +559,7 @@ static void a_serial_line_that_is_too_slow_drops_records(void)
         }
         round++;
     }
-    drain_until(master, sent_count - state.rest_count);
+    drain_until(master, sent_count - state.unsent_count);
     TEST_ASSERT_EQUAL_MEMORY(sent, got, got_count);
     hal_output_close(&state);
     close(master);

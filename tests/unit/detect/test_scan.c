@@ -316,8 +316,8 @@ static void the_values_of_rays_around(void)
         space.ray[1].slope_y_q20 = (int32_t)lround(cases[i].down * mean.semi_mm_q8[1] * unit);
         set_state(1, cases[i].state, centre_mm + cases[i].behind_mm);
         find();
-        IH_TEST_WITHIN(0.0005, (1 + VECTOR_RING_SHARE * cases[i].value) / 8, from_q12(rating_of(0)),
-                       "value", i);
+        IH_TEST_WITHIN(0.0005, (1 + VECTOR_RING_FRACTION * cases[i].value) / 8,
+                       from_q12(rating_of(0)), "value", i);
     }
 }
 

@@ -1,4 +1,4 @@
-#include "cal_twins.hpp"
+#include "cal_pairs.hpp"
 
 #include <algorithm>
 #include <array>
@@ -9,9 +9,9 @@ namespace cal
 /* Half side of what is compared around a corner, and how far it may have moved. */
 static constexpr int around_corner_px = 8, moved_px = 3;
 static constexpr int common_min = 6;
-static constexpr double still_part = 0.5, same_share = 0.25;
+static constexpr double still_fraction = 0.5, same_fraction = 0.25;
 /* A dot, or an edge that moved, is where the difference of the two pictures, seen through a dot's own width, is so many
- * times its noise; so is what is around. The noise is told by what became darker, which dots do not, for each lightness. */
+ * times its noise; so is what is around. The noise is estimated from what became darker, which dots do not, for each lightness. */
 static constexpr double dot_px = 1.5, noise_times = 3.5;
 static constexpr int around_px = 3;
 static constexpr int level_grey = 16, levels = 256 / level_grey;
@@ -20,7 +20,7 @@ static constexpr size_t level_pixels_min = 300;
 static constexpr double drop_max_grey = 25.0, full_grey = 240.0;
 static constexpr double noise_min = 0.1; /* a sensor's steps alone make so much */
 
-/* How much darker than in `dark` a part of the picture is in `lit` at a place beside it; the laser darkens nothing. */
+/* How much darker than in `dark` a part of the picture is in `lit` at a position beside it; the laser darkens nothing. */
 static double darker(const cv::Mat &dark, const cv::Mat &lit, const cv::Rect &part, cv::Point beside)
 {
     cv::Mat drop = dark(part) - lit(part + beside);
@@ -38,12 +38,12 @@ static bool is_still(const cv::Mat &dark, const cv::Mat &lit, const cv::Rect &pa
             return false;
         sum += there / (side * side);
     }
-    return here < still_part * sum;
+    return here < still_fraction * sum;
 }
 
-/* Whether the board that `dark` shows is in the same place in `lit`. It is not looked for anew: on a near one, dots
+/* Whether the board that `dark` shows has not moved in `lit`. It is not searched again: on a near one, dots
  * cover its markers. They may cover what is around some corners; a board that moves takes all along. */
-static bool same_place(const Picture &dark, const Corners &corners, const Picture &lit)
+static bool is_board_still(const Picture &dark, const Corners &corners, const Picture &lit)
 {
     int looked = 0, same = 0;
     cv::Rect frame({0, 0}, dark.grey.size());
@@ -56,25 +56,25 @@ static bool same_place(const Picture &dark, const Corners &corners, const Pictur
         looked++;
         same += is_still(dark.grey, lit.grey, part);
     }
-    return same >= common_min && same >= same_share * looked;
+    return same >= common_min && same >= same_fraction * looked;
 }
 
-std::vector<int> twins_find(const std::vector<Picture> &pictures, const std::vector<View> &views)
+std::vector<int> pairs_find(const std::vector<Picture> &pictures, const std::vector<View> &views)
 {
-    std::vector<int> twins(pictures.size(), -1);
+    std::vector<int> dark_of(pictures.size(), -1);
     int count = static_cast<int>(pictures.size());
     for (int i = 0; i < count; i++) {
         size_t here = static_cast<size_t>(i);
         for (int other : {i + 1, i - 1}) {
-            if (!pictures[here].laser || twins[here] >= 0 || other < 0 || other >= count)
+            if (!pictures[here].laser || dark_of[here] >= 0 || other < 0 || other >= count)
                 continue;
             size_t there = static_cast<size_t>(other);
             if (!pictures[there].laser && views[there].good() &&
-                same_place(pictures[there], views[there].corners, pictures[here]))
-                twins[here] = other;
+                is_board_still(pictures[there], views[there].corners, pictures[here]))
+                dark_of[here] = other;
         }
     }
-    return twins;
+    return dark_of;
 }
 
 static int level_of(const cv::Mat &grey, int v, int u)
@@ -110,7 +110,7 @@ static std::array<double, levels> limits_of(const cv::Mat &smooth, const cv::Mat
     return limits;
 }
 
-cv::Mat twins_mean(const cv::Mat &dark, const cv::Mat &lit)
+cv::Mat pairs_mean(const cv::Mat &dark, const cv::Mat &lit)
 {
     cv::Mat smooth, same(dark.size(), CV_8U), mean = 0.5 * (dark + lit), result = dark.clone();
     cv::GaussianBlur(lit - dark, smooth, {}, dot_px);
@@ -127,13 +127,13 @@ cv::Mat twins_mean(const cv::Mat &dark, const cv::Mat &lit)
 }
 
 /* By what became darker, which dots do not; for each lightness, then a straight line through all. */
-Noise twins_noise(const std::vector<Picture> &pictures, const std::vector<int> &twins)
+Noise pairs_noise(const std::vector<Picture> &pictures, const std::vector<int> &dark_of)
 {
     std::array<double, levels> counts{}, squares{};
     for (size_t i = 0; i < pictures.size(); i++) {
-        if (twins[i] < 0)
+        if (dark_of[i] < 0)
             continue;
-        const cv::Mat &dark = pictures[static_cast<size_t>(twins[i])].grey;
+        const cv::Mat &dark = pictures[static_cast<size_t>(dark_of[i])].grey;
         for (int v = 0; v < dark.rows; v++) {
             for (int u = 0; u < dark.cols; u++) {
                 double drop = static_cast<double>(dark.at<float>(v, u) - pictures[i].grey.at<float>(v, u));

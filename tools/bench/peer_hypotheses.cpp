@@ -10,7 +10,7 @@ namespace
 constexpr double MEAN_SEMI_MM[3] = {78, 113, 98};
 constexpr double DEEP_MM = 98;
 constexpr double SPACING_MM = 80;
-constexpr size_t PLACES_MAX = 8;
+constexpr size_t POSITIONS_MAX = 8;
 constexpr int BLOCKS = (PEER_GRID + 1) / 2; /* of two by two slots, along a side */
 constexpr double CENTRE_DEPTH_MM = 30;
 constexpr double CENTRE_BEHIND_MM = 108;
@@ -53,7 +53,7 @@ struct scanner {
     std::priority_queue<scored> best; /* of those that have a score */
 };
 
-void score_place(const peer &p, scanner &s, int slot)
+void score_position(const peer &p, scanner &s, int slot)
 {
     place &at = s.places[static_cast<size_t>(slot)];
     if (at.is_there && !at.is_scored) {
@@ -63,7 +63,7 @@ void score_place(const peer &p, scanner &s, int slot)
     }
 }
 
-/* Places behind all points, of which the first of each block of two by two slots gets a score. */
+/* Positions behind all points, of which the first of each block of two by two slots gets a score. */
 void begin_scan(const peer &p, scanner &s)
 {
     std::array<bool, BLOCKS *BLOCKS> is_begun = {};
@@ -83,7 +83,7 @@ void begin_scan(const peer &p, scanner &s)
             is_begun[static_cast<size_t>(slot / PEER_GRID / 2 * BLOCKS + slot % PEER_GRID / 2)];
         if (!block) {
             block = true;
-            score_place(p, s, slot);
+            score_position(p, s, slot);
         }
     }
 }
@@ -93,18 +93,18 @@ void score_around(const peer &p, scanner &s, int slot)
     const int row = slot / PEER_GRID, column = slot % PEER_GRID;
     for (int y = std::max(row - 1, 0); y <= std::min(row + 1, PEER_GRID - 1); y++) {
         for (int x = std::max(column - 1, 0); x <= std::min(column + 1, PEER_GRID - 1); x++) {
-            score_place(p, s, y * PEER_GRID + x);
+            score_position(p, s, y * PEER_GRID + x);
         }
     }
 }
 
-/* The best places: what seems best is taken when those around it have their scores too. */
+/* The best positions: what seems best is taken when those around it have their scores too. */
 void scan(const peer &p, std::vector<peer_head> &out)
 {
     static scanner s;
     const size_t first = out.size();
     begin_scan(p, s);
-    while (out.size() < first + PLACES_MAX && !s.best.empty()) {
+    while (out.size() < first + POSITIONS_MAX && !s.best.empty()) {
         const scored best = s.best.top();
         place &at = s.places[static_cast<size_t>(best.slot)];
         if (at.is_there && !at.is_spread) {
@@ -170,7 +170,7 @@ void try_start(peer &p, const peer_head &start, std::vector<peer_head> &starts)
 
 } // namespace
 
-void peer_find_heads(peer &p)
+void peer_find_hypotheses(peer &p)
 {
     static std::vector<peer_head> places, starts;
     places.clear();
@@ -212,5 +212,5 @@ void peer_frame(peer &p, const cv::Mat &image)
     peer_find_samples(p);
     peer_fit_surface(p);
     peer_find_nests(p);
-    peer_find_heads(p);
+    peer_find_hypotheses(p);
 }

@@ -10,7 +10,7 @@
 #include "cal_beam.hpp"
 #include "cal_refine.hpp"
 #include "cal_spot.hpp"
-#include "cal_twins.hpp"
+#include "cal_pairs.hpp"
 #include "cal_wall.hpp"
 
 static int number, failed;
@@ -42,21 +42,21 @@ struct Stage {
         camera.matrix =
             (cv::Mat_<double>(3, 3) << focal_px, 0, centre_u, 0, focal_px, centre_v, 0, 0, 1);
         camera.distortion = cv::Mat::zeros(1, 5, CV_64F);
-        view.turn = {0.35, -0.3, 0.12};
-        cv::Rodrigues(view.turn, rotation);
+        view.rvec = {0.35, -0.3, 0.12};
+        cv::Rodrigues(view.rvec, rotation);
         view.shift = cv::Vec3d(25.0, -10.0, 620.0) - rotation * cv::Vec3d(135.0, 90.0, 0.0);
     }
 
-    /* White's share of the sheet at a pixel; beyond it there is nothing. */
+    /* White's fraction of the sheet at a pixel; beyond it there is nothing. */
     double white_at(double u, double v) const
     {
         cv::Vec3d sight((u - centre_u) / focal_px, (v - centre_v) / focal_px, 1.0);
         cv::Vec3d normal(rotation(0, 2), rotation(1, 2), rotation(2, 2));
-        cv::Vec3d place =
+        cv::Vec3d position =
             rotation.t() * (sight * (normal.dot(view.shift) / normal.dot(sight)) - view.shift);
         cv::Point2d origin = board.sheet_origin_mm();
-        int x = cvFloor((place[0] - origin.x) * sheet_px_per_mm),
-            y = cvFloor((place[1] - origin.y) * sheet_px_per_mm);
+        int x = cvFloor((position[0] - origin.x) * sheet_px_per_mm),
+            y = cvFloor((position[1] - origin.y) * sheet_px_per_mm);
         bool on = x >= 0 && y >= 0 && x < sheet.cols && y < sheet.rows;
         return on ? sheet.at<uchar>(y, x) / 255.0 : 0.0;
     }
@@ -81,9 +81,10 @@ struct Stage {
         return grey;
     }
 
-    cv::Point2d seen(const cv::Point3d &place_mm) const
+    cv::Point2d seen(const cv::Point3d &position_mm) const
     {
-        cv::Vec3d at = rotation * cv::Vec3d(place_mm.x, place_mm.y, place_mm.z) + view.shift;
+        cv::Vec3d at =
+            rotation * cv::Vec3d(position_mm.x, position_mm.y, position_mm.z) + view.shift;
         return {centre_u + focal_px * at[0] / at[2], centre_v + focal_px * at[1] / at[2]};
     }
 
@@ -115,9 +116,9 @@ struct Stage {
     }
 };
 
-/* The board is found roughly and drawn `told_blur_px` soft. Largest distance of any corner that stands in the picture,
+/* The board is found roughly and drawn `given_blur_px` soft. Largest distance of any corner that stands in the picture,
  * and how many are found. */
-static double corner_error(const Stage &stage, double blur_px, double told_blur_px, size_t &count)
+static double corner_error(const Stage &stage, double blur_px, double given_blur_px, size_t &count)
 {
     cv::Mat print = cal::board_picture(stage.board, cal::draw_px_per_mm);
     cv::Mat tangents =
@@ -130,7 +131,7 @@ static double corner_error(const Stage &stage, double blur_px, double told_blur_
             corners.px.emplace_back(px + cv::Point2d(0.2 * std::sin(id), 0.2 * std::cos(3 * id)));
         }
     }
-    corners.edge_px = 2.5066 * std::hypot(told_blur_px, 0.29);
+    corners.edge_px = 2.5066 * std::hypot(given_blur_px, 0.29);
     cal::corners_refine(stage.board, print, tangents, stage.picture(blur_px), stage.camera.matrix,
                         stage.camera.distortion, corners);
     double max = 0.0;
@@ -154,7 +155,7 @@ static void check_corners()
     result("the outline's corners are among them", count == 70 && expected == 70,
            static_cast<double>(count), 70.0);
     max = corner_error(stage, 0.8, 0.6, count);
-    result("corners of a picture softer than it is told", max < 0.01 && count == 70, max, 0.01);
+    result("corners of a picture softer than it is given as", max < 0.01 && count == 70, max, 0.01);
     /* Edges between the samples of the drawing. */
     for (const char *name : {"charuco-8x6-27.3", "chessboard-9x6-25.1"}) {
         Stage other(name);
@@ -194,7 +195,7 @@ static void check_dots()
             return;
         }
         divided = std::max(divided, cv::norm(found.sightings[0].px - px));
-        cal::spots_place(spots, lit, dark, found);
+        cal::spots_refine(spots, lit, dark, found);
         drawn = std::max(drawn, cv::norm(found.sightings[0].px - px));
     }
     result("dots on edges, as they are found first, are pushed aside", divided > 0.1, divided, 0.1);
@@ -207,7 +208,7 @@ static void check_lens()
     for (int i = 0; i < 200; i++) {
         cal::Sighting sighting{};
         double z_mm = 400.0 + 5.0 * i, near = 1000.0 / z_mm;
-        sighting.place_mm = {0.0, 0.0, z_mm};
+        sighting.position_mm = {0.0, 0.0, z_mm};
         sighting.wide_px = std::sqrt(0.81 + 0.2 * near * near + 0.05 * std::sin(2.4 * i)) +
                            (i % 20 == 7 ? 1.0 : 0.0); /* two dots taken for one */
         lit.sightings.push_back(sighting);
@@ -218,7 +219,7 @@ static void check_lens()
     lit.sightings.clear();
     for (int i = -20; i < 20; i++) {
         cal::Sighting sighting{};
-        sighting.place_mm = {0.0, 0.0, 600.0 + 0.5 * i};
+        sighting.position_mm = {0.0, 0.0, 600.0 + 0.5 * i};
         sighting.wide_px = 1.2 + 0.005 * i;
         lit.sightings.push_back(sighting);
     }
@@ -227,7 +228,7 @@ static void check_lens()
 }
 
 /* Noise of a sensor on white paper, on which the old limit left every pixel but a few out; and dots. */
-static void check_twins()
+static void check_pairs()
 {
     cv::RNG random(7);
     cv::Mat dark(height, width, CV_32F, cv::Scalar(180.0)), lit = dark.clone(),
@@ -247,10 +248,11 @@ static void check_twins()
         *picture += noise;
     }
     lit += spot;
-    cv::Mat mean = cal::twins_mean(dark, lit), used = mean != dark;
-    double share = cv::countNonZero(used & (spot == 0.0f)) /
-                   static_cast<double>(cv::countNonZero(spot == 0.0f));
-    result("twins are averaged where no dot is", share > 0.85, share, 0.85);
+    cv::Mat mean = cal::pairs_mean(dark, lit), used = mean != dark;
+    double fraction = cv::countNonZero(used & (spot == 0.0f)) /
+                      static_cast<double>(cv::countNonZero(spot == 0.0f));
+    result("laser-on and laser-off pictures are averaged where no dot is", fraction > 0.85,
+           fraction, 0.85);
     double leaked = cv::countNonZero(used & (spot > 3.0f));
     result("and nowhere else", leaked == 0.0, leaked, 0.0);
 }
@@ -281,14 +283,14 @@ static void check_fading()
     result("corners in light that fades", max < 0.006 && corners.ids.size() > 60, max, 0.006);
 }
 
-/* Dots whose beams are grainy: the fit that knows of grains errs less than the one to which all pixels are alike, and
+/* Dots whose beams have speckle: the fit that models it errs less than the one to which all pixels are alike, and
  * tells its error. */
-static void check_grains()
+static void check_speckle()
 {
     constexpr double beam_px = 0.9, lens_px = 0.9, noise_grey = 3.0, contrast = 0.45;
     constexpr int count = 200, side = cal::dot_side_px;
     cv::RNG random(11);
-    double plain = 0.0, knowing = 0.0, told = 0.0;
+    double plain = 0.0, knowing = 0.0, reported = 0.0;
     for (int n = 0; n < count; n++) {
         cv::Mat light(cal::beam_side, cal::beam_side, CV_64F), lens(side, cal::beam_side, CV_64F),
             rise;
@@ -296,10 +298,11 @@ static void check_grains()
         for (int i = 0; i < cal::beam_side * cal::beam_side; i++) {
             double x = cal::beam_sample_px(i % cal::beam_side) - px.x,
                    y = cal::beam_sample_px(i / cal::beam_side) - px.y;
-            /* A sample is a ninth of a px^2; grains of 0.1 of the beam's square have 0.9 of its light's variance. */
-            double grain = 1.0 + contrast / 0.45 * beam_px * random.gaussian(std::sqrt(0.1 * 9.0));
+            /* A sample is a ninth of a px^2; speckle of 0.1 of the beam's square have 0.9 of its light's variance. */
+            double speckle_var =
+                1.0 + contrast / 0.45 * beam_px * random.gaussian(std::sqrt(0.1 * 9.0));
             light.at<double>(i / cal::beam_side, i % cal::beam_side) =
-                grain * std::exp(-0.5 * (x * x + y * y) / (beam_px * beam_px));
+                speckle_var * std::exp(-0.5 * (x * x + y * y) / (beam_px * beam_px));
         }
         for (int i = 0; i < side * cal::beam_side; i++) {
             double away =
@@ -323,10 +326,10 @@ static void check_grains()
         }
         plain += (dot.px - px).ddot(dot.px - px) / (2 * count);
         knowing += (beam.px - px).ddot(beam.px - px) / (2 * count);
-        told += beam.sigma_px * beam.sigma_px / count;
+        reported += beam.sigma_px * beam.sigma_px / count;
     }
-    double better = std::sqrt(knowing / plain), honest = std::sqrt(knowing / told);
-    result("grains move a fit that knows of them less", better < 0.95, better, 0.95);
+    double better = std::sqrt(knowing / plain), honest = std::sqrt(knowing / reported);
+    result("speckle moves a fit that models it less", better < 0.95, better, 0.95);
     result("and it tells its error", honest > 0.8 && honest < 1.25, honest, 1.25);
 }
 
@@ -344,8 +347,8 @@ static void check_pair()
         view.corners.px.emplace_back(stage.seen(stage.board.corner_mm(id)));
     cv::Mat aside, move = (cv::Mat_<double>(2, 3) << 1.0, 0.0, 1.0, 0.0, 1.0, 0.4);
     cv::warpAffine(lit, aside, move, lit.size());
-    int same = cal::twins_find({{"a", dark, false}, {"b", lit, true}}, {view, none})[1];
-    int moved = cal::twins_find({{"a", dark, false}, {"b", aside, true}}, {view, none})[1];
+    int same = cal::pairs_find({{"a", dark, false}, {"b", lit, true}}, {view, none})[1];
+    int moved = cal::pairs_find({{"a", dark, false}, {"b", aside, true}}, {view, none})[1];
     result("a board under dots stands still", same == 0, same, 0.0);
     result("and a pixel aside it does not", moved == -1, moved, -1.0);
 }
@@ -382,11 +385,11 @@ static size_t join_wrongly(double aside_px, bool &used)
     double height_mm = normal.dot(lit.view.shift) - normal.dot(projector.origin_mm);
     for (int slot : slots) {
         const cv::Vec3d &ray = projector.rays[static_cast<size_t>(slot)];
-        cv::Vec3d place = projector.origin_mm + ray * (height_mm / normal.dot(ray));
+        cv::Vec3d position = projector.origin_mm + ray * (height_mm / normal.dot(ray));
         cal::Sighting sighting{};
-        cv::Point2d px(centre_u + focal_px * place[0] / place[2] + aside_px,
-                       centre_v + focal_px * place[1] / place[2]);
-        cal::sighting_place(stage.camera, lit.view, px, sighting);
+        cv::Point2d px(centre_u + focal_px * position[0] / position[2] + aside_px,
+                       centre_v + focal_px * position[1] / position[2]);
+        cal::sighting_set(stage.camera, lit.view, px, sighting);
         lit.sightings.push_back(sighting);
     }
     cal::rays_join(stage.camera, projector, pictures);
@@ -401,7 +404,7 @@ static void check_join()
 {
     bool used, used_aside;
     size_t wrong = join_wrongly(0.1, used), wrong_aside = join_wrongly(3.0, used_aside);
-    result("dots without neighbours are told by their rays", used && wrong == 0,
+    result("dots without neighbours are identified by their rays", used && wrong == 0,
            static_cast<double>(wrong), 0.0);
     result("but not those that are elsewhere", !used_aside && wrong_aside == 0,
            static_cast<double>(wrong_aside), 0.0);
@@ -417,17 +420,17 @@ static void check_wall_dots()
     cv::RNG random(11);
     cv::Mat wall(height, width, CV_32F);
     random.fill(wall, cv::RNG::NORMAL, 50.0, 2.0);
-    std::vector<cv::Point2d> places;
+    std::vector<cv::Point2d> positions;
     for (int v = apart_px; v < height - apart_px; v += apart_px) {
         for (int u = apart_px; u < width - apart_px; u += apart_px)
-            places.emplace_back(u + random.uniform(-0.5, 0.5), v + random.uniform(-0.5, 0.5));
+            positions.emplace_back(u + random.uniform(-0.5, 0.5), v + random.uniform(-0.5, 0.5));
     }
     std::vector<cal::Picture> pictures;
-    std::vector<int> twins;
+    std::vector<int> dark_of;
     std::vector<cal::Lit> all;
     for (int pair = 0; pair < pairs; pair++) {
         cv::Mat lit = wall.clone(), dark = wall.clone(), noise(height, width, CV_32F);
-        for (const cv::Point2d &px : places) {
+        for (const cv::Point2d &px : positions) {
             if (random.uniform(0.0, 1.0) < 0.3)
                 continue;
             for (int i = 0; i < cal::dot_side_px * cal::dot_side_px; i++) {
@@ -450,15 +453,15 @@ static void check_wall_dots()
         all.push_back(here);
         pictures.push_back({"lit", lit, true});
         pictures.push_back({"dark", dark, false});
-        twins.push_back(2 * pair + 1);
-        twins.push_back(-1);
+        dark_of.push_back(2 * pair + 1);
+        dark_of.push_back(-1);
     }
-    cal::Lit found = cal::wall_find(stage.board, stage.camera, pictures, twins, all,
+    cal::Lit found = cal::wall_find(stage.board, stage.camera, pictures, dark_of, all,
                                     {noise_grey * noise_grey, 0.0}, lens_px);
     double squares = 0.0, pulls = 0.0;
     for (const cal::Sighting &sighting : found.sightings) {
         double off_px = 1e9;
-        for (const cv::Point2d &px : places)
+        for (const cv::Point2d &px : positions)
             off_px = std::min(off_px, cv::norm(sighting.px - px));
         squares += 0.5 * off_px * off_px;
         pulls += 0.5 * off_px * off_px / (sighting.sigma_px * sighting.sigma_px);
@@ -466,7 +469,7 @@ static void check_wall_dots()
     double count = static_cast<double>(found.sightings.size());
     double rms_px = std::sqrt(squares / count), pull = std::sqrt(pulls / count);
     result("dots on a wall, of which some are missing",
-           count > 0.85 * static_cast<double>(places.size()) && rms_px < 0.033, rms_px, 0.033);
+           count > 0.85 * static_cast<double>(positions.size()) && rms_px < 0.033, rms_px, 0.033);
     result("and how well they are known", pull > 0.65 && pull < 1.25, pull, 1.25);
 }
 
@@ -483,11 +486,11 @@ static void check_wall()
         const cv::Vec3d &ray = projector.rays[slot];
         double along = (height_mm - normal.dot(projector.origin_mm)) / normal.dot(ray);
         bool is_before = slot % 5 == 2;
-        cv::Vec3d place = projector.origin_mm + ray * (is_before ? 0.6 * along : along);
+        cv::Vec3d position = projector.origin_mm + ray * (is_before ? 0.6 * along : along);
         cal::Sighting sighting{};
         sighting.sigma_px = noise_px;
-        sighting.px = {centre_u + focal_px * place[0] / place[2] + random.gaussian(noise_px),
-                       centre_v + focal_px * place[1] / place[2] + random.gaussian(noise_px)};
+        sighting.px = {centre_u + focal_px * position[0] / position[2] + random.gaussian(noise_px),
+                       centre_v + focal_px * position[1] / position[2] + random.gaussian(noise_px)};
         sighting.tangent = stage.camera.tangents({sighting.px}).front();
         wall.sightings.push_back(sighting);
     }
@@ -499,17 +502,17 @@ static void check_wall()
         used += sighting.slot != cal::no_slot;
         wrong += sighting.slot != cal::no_slot &&
                  (sighting.slot != static_cast<int>(slot) || slot % 5 == 2);
-        cv::Vec3d place = wall.view.shift;
-        off_mm = std::max(off_mm, std::abs(normal.dot(place) - height_mm));
+        cv::Vec3d position = wall.view.shift;
+        off_mm = std::max(off_mm, std::abs(normal.dot(position) - height_mm));
     }
     result("a wall behind the board", laid && used > 270 && off_mm < 10.0, off_mm, 10.0);
     result("without the things before it", wrong == 0, static_cast<double>(wrong), 0.0);
     for (cal::Sighting &sighting : wall.sightings) {
         double along = random.uniform(900.0, 4000.0);
         size_t slot = static_cast<size_t>(&sighting - wall.sightings.data());
-        cv::Vec3d place = projector.origin_mm + projector.rays[slot] * along;
-        sighting.px = {centre_u + focal_px * place[0] / place[2],
-                       centre_v + focal_px * place[1] / place[2]};
+        cv::Vec3d position = projector.origin_mm + projector.rays[slot] * along;
+        sighting.px = {centre_u + focal_px * position[0] / position[2],
+                       centre_v + focal_px * position[1] / position[2]};
         sighting.tangent = stage.camera.tangents({sighting.px}).front();
     }
     laid = cal::wall_lay(stage.camera, projector, wall);
@@ -524,9 +527,9 @@ int main()
     check_corners();
     check_dots();
     check_lens();
-    check_twins();
+    check_pairs();
     check_fading();
-    check_grains();
+    check_speckle();
     check_pair();
     check_wall();
     check_wall_dots();

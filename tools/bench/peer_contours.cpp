@@ -46,7 +46,7 @@ void find_corners(const peer_grid &surface_mm, double level_mm, uchar corners[])
 }
 
 /* Is one of the cells of a word neither all nearer nor all farther? */
-bool is_cut(const uchar corners[WORD])
+bool is_crossed(const uchar corners[WORD])
 {
     uint64_t word;
     std::memcpy(&word, corners, sizeof word);
@@ -54,16 +54,17 @@ bool is_cut(const uchar corners[WORD])
 }
 
 /* What is nearer is on the right as one goes from edge to edge. */
-void cut_cell(walker &w, int y, int x, int corners)
+void trace_cell(walker &w, int y, int x, int corners)
 {
     const peer_grid &z = *w.surface_mm;
     const int at = y * PEER_NODES + x;
     const int edge[4] = {at, DOWN + at + 1, at + PEER_NODES, DOWN + at}; /* top right bottom left */
-    static const signed char way[16][2] = {{-1, -1}, {0, 3}, {1, 0}, {1, 3},  {2, 1},   {-1, -1},
-                                           {2, 0},   {2, 3}, {3, 2}, {0, 2},  {-1, -1}, {1, 2},
-                                           {3, 1},   {0, 1}, {3, 0}, {-1, -1}};
-    if (way[corners][0] >= 0) {
-        link(w, edge[static_cast<int>(way[corners][0])], edge[static_cast<int>(way[corners][1])]);
+    static const signed char segments[16][2] = {
+        {-1, -1}, {0, 3}, {1, 0},   {1, 3}, {2, 1}, {-1, -1}, {2, 0}, {2, 3},
+        {3, 2},   {0, 2}, {-1, -1}, {1, 2}, {3, 1}, {0, 1},   {3, 0}, {-1, -1}};
+    if (segments[corners][0] >= 0) {
+        link(w, edge[static_cast<int>(segments[corners][0])],
+             edge[static_cast<int>(segments[corners][1])]);
         return;
     }
     bool joined = z(y, x) + z(y, x + 1) + z(y + 1, x + 1) + z(y + 1, x) < 4 * w.level_mm;
@@ -83,9 +84,9 @@ cv::Point2f crossing(const walker &w, int edge)
     int y = at / PEER_NODES, x = at % PEER_NODES;
     const peer_grid &z = *w.surface_mm;
     double here = z(y, x), there = is_down ? z(y + 1, x) : z(y, x + 1);
-    float part = static_cast<float>((w.level_mm - here) / (there - here));
-    return {static_cast<float>(x) + (is_down ? 0.0F : part),
-            static_cast<float>(y) + (is_down ? part : 0.0F)};
+    float arc = static_cast<float>((w.level_mm - here) / (there - here));
+    return {static_cast<float>(x) + (is_down ? 0.0F : arc),
+            static_cast<float>(y) + (is_down ? arc : 0.0F)};
 }
 
 void follow(walker &w, int start, peer_contour &out)
@@ -110,7 +111,7 @@ walker make_walker()
 
 } // namespace
 
-void peer_cut(const peer_grid &surface_mm, double level_mm, std::vector<peer_contour> &out)
+void peer_contours(const peer_grid &surface_mm, double level_mm, std::vector<peer_contour> &out)
 {
     static walker w = make_walker();
     static uchar corners[(DOWN + WORD - 1) / WORD * WORD]; /* 0 behind the last cell */
@@ -120,13 +121,13 @@ void peer_cut(const peer_grid &surface_mm, double level_mm, std::vector<peer_con
     w.edges.clear();
     find_corners(surface_mm, level_mm, corners);
     for (int first = 0; first < DOWN; first += WORD) {
-        if (!is_cut(corners + first)) {
+        if (!is_crossed(corners + first)) {
             continue;
         }
         for (int at = first; at < first + WORD; at++) {
             const int here = corners[at];
             if (here != 0 && here != 15) {
-                cut_cell(w, at / PEER_NODES, at % PEER_NODES, here);
+                trace_cell(w, at / PEER_NODES, at % PEER_NODES, here);
             }
         }
     }
