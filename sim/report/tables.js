@@ -124,7 +124,7 @@ const Tables = (() => {
    * to be distinguished. */
   function evidenceRow(name, value, part, largest) {
     const [text, unit, decimals] = KINDS[name] || [name, "", 2];
-    const bar = value === null ? null : element("i", { class: part >= 0 ? "for" : "against", style: `width:${(Math.abs(part) / most * 48).toFixed(1)}%` });
+    const bar = value === null ? null : element("i", { class: part >= 0 ? "for" : "against", style: `width:${(Math.abs(part) / largest * 48).toFixed(1)}%` });
     return element("tr", {}, element("th", { scope: "row" }, text),
       element("td", {}, value === null ? "" : `${value.toFixed(decimals)}${unit && unit !== "fraction" ? `\u202f${unit}` : ""}`),
       element("td", {}, `${part >= 0 ? "+" : ""}${part.toFixed(2)}`),
@@ -145,8 +145,8 @@ const Tables = (() => {
     const largest = Math.max(...parts.map(Math.abs), 0.01);
     const h = frame.record.hypotheses[chosen];
     const title = h.predicted ? `Hypothesis ${chosen} is predicted by its track: it was not seen, so there is no evidence of this frame`
-      : `Evidence for (right, green) and against (left) hypothesis ${chosen}: log-odds ${(finding.logit_q10 / 1024).toFixed(2)}` +
-        `${finding.track === 0 ? "" : ", a mean over the frames of its track"}`;
+      : `Evidence for (right, green) and against (left) hypothesis ${chosen}: log-odds ${(detection.logit_q10 / 1024).toFixed(2)}` +
+        `${detection.track === 0 ? "" : ", a mean over the frames of its track"}`;
     const rows = h.predicted ? [] : order.map((i) => evidenceRow(trace.evidence[i], detection.evidence_q8[i] / 256, parts[i], largest));
     if (base !== null && rows.length > 0) rows.unshift(evidenceRow("before any evidence", null, base, largest));
     const head = ["Evidence", "Value", "Log-odds", ""];
@@ -160,7 +160,7 @@ const Tables = (() => {
 
   /* The paper's tests of a nest, in their order (firmware/core/nests/ih_hypotheses.h). */
   function tests(h, l) {
-    const fraction = (part, all, min) => [all === 0 ? "nothing there" : `${part} of ${all}`, `at least ${least} %`, part * 100 >= all * min];
+    const fraction = (part, all, min) => [all === 0 ? "nothing there" : `${part} of ${all}`, `at least ${min} %`, part * 100 >= all * min];
     const o = h.outline;
     return [
       [whole(h.area_mm2), `${whole(l.area_min_mm2)} to ${whole(l.area_max_mm2)}`, h.area_mm2 >= l.area_min_mm2 && h.area_mm2 <= l.area_max_mm2],

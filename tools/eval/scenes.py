@@ -9,7 +9,7 @@ import dataclasses
 import os
 import re
 
-WEIGHTS = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "firmware", "core",
+WEIGHTS = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "firmware", "core", "detect",
                        "ih_score_weights.h")
 CHECK_SEEDS = "6001-6006"
 FIRST_SEED = 7001

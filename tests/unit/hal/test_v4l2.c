@@ -629,14 +629,14 @@ static void exposure_in_rows(void)
     struct fake_control *rows = add_control(V4L2_CID_EXPOSURE, "Exposure", 4, 1000, 100);
 
     want_exposure(HAL_V4L2_VALUE, 5000);
-    check_refused("exposure 5000 us: the device counts exposure in rows and does not tell how long "
+    check_refused("exposure 5000 us: the device counts exposure in rows and does not report how long "
                   "a row takes (controls pixel rate and horizontal blanking)");
     add_control(V4L2_CID_HBLANK, "Horizontal Blanking", 0, 9999, 2000 - WIDTH);
-    check_refused("exposure 5000 us: the device counts exposure in rows and does not tell how long "
+    check_refused("exposure 5000 us: the device counts exposure in rows and does not report how long "
                   "a row takes (controls pixel rate and horizontal blanking)");
     add_control(V4L2_CID_PIXEL_RATE, "Pixel Rate", 0, 0, 100000000);
     fake.control[1].id = V4L2_CID_VBLANK; /* the other one is not there */
-    check_refused("exposure 5000 us: the device counts exposure in rows and does not tell how long "
+    check_refused("exposure 5000 us: the device counts exposure in rows and does not report how long "
                   "a row takes (controls pixel rate and horizontal blanking)");
     fake.control[1].id = V4L2_CID_HBLANK;
     start();
