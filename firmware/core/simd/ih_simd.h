@@ -1,9 +1,10 @@
 /* ih_simd - vectors of integers: one vocabulary for AVX2, SSE2 and NEON.
  *
- * Types: ih_u8, ih_i16, ih_u16, ih_i32, ih_u32, ih_i64, ih_u64, each as wide as a vector register. They are
+ * Types: ih_u8, ih_i8, ih_i16, ih_u16, ih_i32, ih_u32, ih_i64, ih_u64, each as wide as a vector register. They are
  *        C's own vectors, an extension that gcc and clang share.
  * Lanes: IH_I16_LANES of them are 16 bits wide: 16 with AVX2, 8 with SSE2 or NEON. It is 0 where there are
- *        no vectors, while ranges are checked (ISOHEAD_RANGE_CHECKS) and with ISOHEAD_PLAIN. A kernel
+ *        no vectors, while ranges are checked (ISOHEAD_RANGE_CHECKS), and with ISOHEAD_PLAIN or
+ *        ISOHEAD_CORTEXM (ih_simd_cortexm.h), which are for tests. A kernel
  *        stands under #if IH_I16_LANES > 0 and has one plain twin with the same result under #else.
  * Words: load and store take any address. all fills every lane. & | ~ and comparisons work lane by lane as
  *        operators; a comparison gives all bits or none. Arithmetic goes through functions: it wraps, which
@@ -17,7 +18,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#if defined ISOHEAD_PLAIN || defined ISOHEAD_RANGE_CHECKS
+#if defined ISOHEAD_PLAIN || defined ISOHEAD_CORTEXM || defined ISOHEAD_RANGE_CHECKS
 #define IH_I16_LANES 0
 #elif defined __AVX2__
 #define IH_I16_LANES 16
@@ -34,6 +35,7 @@
 #if IH_I16_LANES > 0
 
 typedef uint8_t ih_u8 __attribute__((vector_size(IH_SIMD_BYTES)));
+typedef int8_t ih_i8 __attribute__((vector_size(IH_SIMD_BYTES)));
 typedef int16_t ih_i16 __attribute__((vector_size(IH_SIMD_BYTES)));
 typedef uint16_t ih_u16 __attribute__((vector_size(IH_SIMD_BYTES)));
 typedef int32_t ih_i32 __attribute__((vector_size(IH_SIMD_BYTES)));
@@ -41,7 +43,69 @@ typedef uint32_t ih_u32 __attribute__((vector_size(IH_SIMD_BYTES)));
 typedef int64_t ih_i64 __attribute__((vector_size(IH_SIMD_BYTES)));
 typedef uint64_t ih_u64 __attribute__((vector_size(IH_SIMD_BYTES)));
 
+/* 8 bits */
+
+static inline ih_u8 ih_u8_load(const uint8_t *from)
+{
+    ih_u8 value;
+    __builtin_memcpy(&value, from, sizeof value);
+    return value;
+}
+
+static inline void ih_u8_store(uint8_t *to, ih_u8 value)
+{
+    __builtin_memcpy(to, &value, sizeof value);
+}
+
+static inline ih_u8 ih_u8_all(uint8_t value)
+{
+    return value - (ih_u8){0};
+}
+
 /* 16 bits */
+
+static inline ih_u16 ih_u16_load(const uint16_t *from)
+{
+    ih_u16 value;
+    __builtin_memcpy(&value, from, sizeof value);
+    return value;
+}
+
+static inline void ih_u16_store(uint16_t *to, ih_u16 value)
+{
+    __builtin_memcpy(to, &value, sizeof value);
+}
+
+static inline ih_u16 ih_u16_all(uint16_t value)
+{
+    return value - (ih_u16){0};
+}
+
+/* Two vectors side by side in memory: NEON loads them with one instruction. */
+struct ih_u16_two {
+    ih_u16 low, high;
+};
+
+static inline struct ih_u16_two ih_u16_two_load(const uint16_t *from)
+{
+    return (struct ih_u16_two){ih_u16_load(from), ih_u16_load(&from[IH_I16_LANES])};
+}
+
+static inline void ih_u16_two_store(uint16_t *to, struct ih_u16_two two)
+{
+    ih_u16_store(to, two.low);
+    ih_u16_store(&to[IH_I16_LANES], two.high);
+}
+
+static inline struct ih_u16_two ih_u16_two_add(struct ih_u16_two a, struct ih_u16_two b)
+{
+    return (struct ih_u16_two){a.low + b.low, a.high + b.high};
+}
+
+static inline struct ih_u16_two ih_u16_two_sub(struct ih_u16_two a, struct ih_u16_two b)
+{
+    return (struct ih_u16_two){a.low - b.low, a.high - b.high};
+}
 
 static inline ih_i16 ih_i16_load(const int16_t *from)
 {

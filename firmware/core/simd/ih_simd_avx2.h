@@ -20,6 +20,65 @@ static inline ih_i16 ih_i16_mul_high(ih_i16 a, ih_i16 b)
     return (ih_i16)_mm256_mulhi_epi16((__m256i)a, (__m256i)b);
 }
 
+/* a * b / 2^15, rounded half up; both below 2^15. */
+static inline ih_u16 ih_u16_mul_round(ih_u16 a, ih_u16 b)
+{
+    return (ih_u16)_mm256_mulhrs_epi16((__m256i)a, (__m256i)b);
+}
+
+/* |a|. */
+static inline ih_i16 ih_i16_abs(ih_i16 a)
+{
+    return (ih_i16)_mm256_abs_epi16((__m256i)a);
+}
+
+/* IH_U8_LANES bytes, one for each lane of both. */
+static inline struct ih_u16_two ih_u16_two_load_u8(const uint8_t *from)
+{
+    const __m128i *bytes = (const __m128i *)(const void *)from;
+    return (struct ih_u16_two){(ih_u16)_mm256_cvtepu8_epi16(_mm_loadu_si128(&bytes[0])),
+                               (ih_u16)_mm256_cvtepu8_epi16(_mm_loadu_si128(&bytes[1]))};
+}
+
+/* Lanes of a and of b in turn, to twice as many as a vector has. */
+static inline void ih_i16_store_zip(int16_t *to, ih_i16 a, ih_i16 b)
+{
+    const __m256i low = _mm256_unpacklo_epi16((__m256i)a, (__m256i)b);
+    const __m256i high = _mm256_unpackhi_epi16((__m256i)a, (__m256i)b);
+    __m128i *out = (__m128i *)(void *)to;
+    _mm_storeu_si128(&out[0], _mm256_castsi256_si128(low));
+    _mm_storeu_si128(&out[1], _mm256_castsi256_si128(high));
+    _mm_storeu_si128(&out[2], _mm256_extracti128_si256(low, 1));
+    _mm_storeu_si128(&out[3], _mm256_extracti128_si256(high, 1));
+}
+
+/* Eight lanes from there, and the next eight, where there are more, from so many lanes on. */
+static inline ih_i16 ih_i16_load_eights(const int16_t *from, int32_t apart)
+{
+    const __m128i *first = (const __m128i *)(const void *)from;
+    const __m128i *second = (const __m128i *)(const void *)&from[apart];
+    return (ih_i16)_mm256_inserti128_si256(_mm256_castsi128_si256(_mm_loadu_si128(first)),
+                                           _mm_loadu_si128(second), 1);
+}
+
+/* Eight lanes of a and eight of b in turn, clamped to 8 bits with sign. */
+static inline ih_i8 ih_i16_pack_eights(ih_i16 a, ih_i16 b)
+{
+    return (ih_i8)_mm256_packs_epi16((__m256i)a, (__m256i)b);
+}
+
+/* Sums of eight bytes side by side. */
+static inline ih_u64 ih_u8_sum_eights(ih_u8 a)
+{
+    return (ih_u64)_mm256_sad_epu8((__m256i)a, _mm256_setzero_si256());
+}
+
+/* Each even lane twice. */
+static inline ih_i32 ih_i32_even_twice(ih_i32 a)
+{
+    return (ih_i32)_mm256_shuffle_epi32((__m256i)a, 0xa0);
+}
+
 /* Sums of two products side by side, 32 bits each. */
 static inline ih_i32 ih_i16_madd_pairs(ih_i16 a, ih_i16 b)
 {
@@ -64,6 +123,12 @@ static inline uint32_t ih_i16_bits(ih_i16 a, ih_i16 b)
 {
     const __m256i bytes = _mm256_packs_epi16((__m256i)a, (__m256i)b);
     return (uint32_t)_mm256_movemask_epi8(_mm256_permute4x64_epi64(bytes, 0xd8));
+}
+
+/* The same of a whole 32 lanes. */
+static inline uint32_t ih_i16_bits_32(const ih_i16 mask[32 / IH_I16_LANES])
+{
+    return ih_i16_bits(mask[0], mask[1]);
 }
 
 /* Sum of all lanes. */

@@ -33,6 +33,49 @@ static inline ih_i16 ih_i16_mul_high(ih_i16 a, ih_i16 b)
     return (ih_i16)vshrq_n_s16(vqdmulhq_s16((int16x8_t)a, (int16x8_t)b), 1);
 }
 
+static inline ih_u16 ih_u16_mul_round(ih_u16 a, ih_u16 b)
+{
+    return (ih_u16)vqrdmulhq_s16((int16x8_t)a, (int16x8_t)b);
+}
+
+static inline ih_i16 ih_i16_abs(ih_i16 a)
+{
+    return (ih_i16)vabsq_s16((int16x8_t)a);
+}
+
+static inline struct ih_u16_two ih_u16_two_load_u8(const uint8_t *from)
+{
+    const uint8x16_t bytes = vld1q_u8(from);
+    return (struct ih_u16_two){(ih_u16)vmovl_u8(vget_low_u8(bytes)),
+                               (ih_u16)vmovl_u8(vget_high_u8(bytes))};
+}
+
+static inline void ih_i16_store_zip(int16_t *to, ih_i16 a, ih_i16 b)
+{
+    vst2q_s16(to, (int16x8x2_t){{(int16x8_t)a, (int16x8_t)b}});
+}
+
+static inline ih_i16 ih_i16_load_eights(const int16_t *from, int32_t apart)
+{
+    (void)apart;
+    return ih_i16_load(from);
+}
+
+static inline ih_i8 ih_i16_pack_eights(ih_i16 a, ih_i16 b)
+{
+    return (ih_i8)vcombine_s8(vqmovn_s16((int16x8_t)a), vqmovn_s16((int16x8_t)b));
+}
+
+static inline ih_u64 ih_u8_sum_eights(ih_u8 a)
+{
+    return (ih_u64)vpaddlq_u32(vpaddlq_u16(vpaddlq_u8((uint8x16_t)a)));
+}
+
+static inline ih_i32 ih_i32_even_twice(ih_i32 a)
+{
+    return (ih_i32)vtrnq_s32((int32x4_t)a, (int32x4_t)a).val[0];
+}
+
 static inline ih_i32 ih_i16_madd_pairs(ih_i16 a, ih_i16 b)
 {
     const int32x4_t low = vmull_s16(vget_low_s16((int16x8_t)a), vget_low_s16((int16x8_t)b));
@@ -76,19 +119,30 @@ static inline bool ih_i16_any(ih_i16 a)
     return vget_lane_u64(vreinterpret_u64_u32(half), 0) != 0;
 }
 
-/* There is no instruction for it: each lane leaves its own bit of a byte, and all of a half are added. */
-static inline uint32_t ih_i16_bits(ih_i16 a, ih_i16 b)
+/* Each lane's own bit of a byte: a sum of eight of them is the bits of eight lanes. */
+static inline uint8x16_t ih_neon_bit_bytes(ih_i16 a, ih_i16 b)
 {
     const uint8x8_t bit = vcreate_u8(0x8040201008040201u);
-    const uint8x8_t first = vand_u8(vmovn_u16((uint16x8_t)a), bit);
-    const uint8x8_t second = vand_u8(vmovn_u16((uint16x8_t)b), bit);
-#ifdef __aarch64__
-    return (uint32_t)vaddv_u8(first) | (uint32_t)vaddv_u8(second) << 8;
-#else
-    const uint8x8_t both = vpadd_u8(first, second);
-    const uint8x8_t four = vpadd_u8(both, both);
-    return vget_lane_u16(vreinterpret_u16_u8(vpadd_u8(four, four)), 0);
-#endif
+    const uint8x16_t masks = vcombine_u8(vmovn_u16((uint16x8_t)a), vmovn_u16((uint16x8_t)b));
+    return vandq_u8(masks, vcombine_u8(bit, bit));
+}
+
+static inline uint32_t ih_i16_bits(ih_i16 a, ih_i16 b)
+{
+    const uint8x16_t bytes = ih_neon_bit_bytes(a, b);
+    const uint8x8_t four = vpadd_u8(vget_low_u8(bytes), vget_high_u8(bytes));
+    const uint8x8_t two = vpadd_u8(four, four);
+    return vget_lane_u16(vreinterpret_u16_u8(vpadd_u8(two, two)), 0);
+}
+
+static inline uint32_t ih_i16_bits_32(const ih_i16 mask[32 / IH_I16_LANES])
+{
+    const uint8x16_t first = ih_neon_bit_bytes(mask[0], mask[1]);
+    const uint8x16_t last = ih_neon_bit_bytes(mask[2], mask[3]);
+    const uint8x8_t low = vpadd_u8(vget_low_u8(first), vget_high_u8(first));
+    const uint8x8_t high = vpadd_u8(vget_low_u8(last), vget_high_u8(last));
+    const uint8x8_t two = vpadd_u8(low, high);
+    return vget_lane_u32(vreinterpret_u32_u8(vpadd_u8(two, two)), 0);
 }
 
 static inline int32_t ih_i32_total(ih_i32 a)

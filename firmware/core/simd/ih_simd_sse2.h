@@ -19,6 +19,53 @@ static inline ih_i16 ih_i16_mul_high(ih_i16 a, ih_i16 b)
     return (ih_i16)_mm_mulhi_epi16((__m128i)a, (__m128i)b);
 }
 
+/* The average with 0 rounds half up. */
+static inline ih_u16 ih_u16_mul_round(ih_u16 a, ih_u16 b)
+{
+    const __m128i twice = _mm_mulhi_epu16((__m128i)(a << 1), (__m128i)(b << 1));
+    return (ih_u16)_mm_avg_epu16(twice, _mm_setzero_si128());
+}
+
+static inline ih_i16 ih_i16_abs(ih_i16 a)
+{
+    return ih_i16_max(a, ih_i16_sub((ih_i16){0}, a));
+}
+
+static inline struct ih_u16_two ih_u16_two_load_u8(const uint8_t *from)
+{
+    const __m128i bytes = _mm_loadu_si128((const __m128i *)(const void *)from);
+    const __m128i zero = _mm_setzero_si128();
+    return (struct ih_u16_two){(ih_u16)_mm_unpacklo_epi8(bytes, zero),
+                               (ih_u16)_mm_unpackhi_epi8(bytes, zero)};
+}
+
+static inline void ih_i16_store_zip(int16_t *to, ih_i16 a, ih_i16 b)
+{
+    ih_i16_store(to, (ih_i16)_mm_unpacklo_epi16((__m128i)a, (__m128i)b));
+    ih_i16_store(&to[IH_I16_LANES], (ih_i16)_mm_unpackhi_epi16((__m128i)a, (__m128i)b));
+}
+
+static inline ih_i16 ih_i16_load_eights(const int16_t *from, int32_t apart)
+{
+    (void)apart;
+    return ih_i16_load(from);
+}
+
+static inline ih_i8 ih_i16_pack_eights(ih_i16 a, ih_i16 b)
+{
+    return (ih_i8)_mm_packs_epi16((__m128i)a, (__m128i)b);
+}
+
+static inline ih_u64 ih_u8_sum_eights(ih_u8 a)
+{
+    return (ih_u64)_mm_sad_epu8((__m128i)a, _mm_setzero_si128());
+}
+
+static inline ih_i32 ih_i32_even_twice(ih_i32 a)
+{
+    return (ih_i32)_mm_shuffle_epi32((__m128i)a, 0xa0);
+}
+
 static inline ih_i32 ih_i16_madd_pairs(ih_i16 a, ih_i16 b)
 {
     return (ih_i32)_mm_madd_epi16((__m128i)a, (__m128i)b);
@@ -60,6 +107,11 @@ static inline bool ih_i16_any(ih_i16 a)
 static inline uint32_t ih_i16_bits(ih_i16 a, ih_i16 b)
 {
     return (uint32_t)_mm_movemask_epi8(_mm_packs_epi16((__m128i)a, (__m128i)b));
+}
+
+static inline uint32_t ih_i16_bits_32(const ih_i16 mask[32 / IH_I16_LANES])
+{
+    return ih_i16_bits(mask[0], mask[1]) | ih_i16_bits(mask[2], mask[3]) << 16;
 }
 
 static inline int32_t ih_i32_total(ih_i32 a)
