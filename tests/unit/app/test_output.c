@@ -12,6 +12,7 @@
 #include <termios.h>
 #include <unistd.h>
 
+#include "app_terminal.h"
 #include "ih_test.h"
 
 #define PATIENCE_S 120
@@ -233,11 +234,8 @@ static void a_stream_socket_works_too(void)
 static int open_terminal(int *slave, bool raw)
 {
     struct termios settings;
-    int master = posix_openpt(O_RDWR | O_NOCTTY);
+    int master = terminal_open();
 
-    TEST_ASSERT_GREATER_OR_EQUAL_INT(0, master);
-    TEST_ASSERT_EQUAL_INT(0, grantpt(master));
-    TEST_ASSERT_EQUAL_INT(0, unlockpt(master));
     *slave = open(ptsname(master), O_RDWR | O_NOCTTY);
     TEST_ASSERT_GREATER_OR_EQUAL_INT(0, *slave);
     TEST_ASSERT_EQUAL_INT(0, tcgetattr(*slave, &settings));
@@ -498,11 +496,8 @@ static void a_receiver_that_does_not_read_holds_nobody_up(void)
 /* A terminal in place of a serial line, under a name of ours. */
 static int plug_in(void)
 {
-    int master = posix_openpt(O_RDWR | O_NOCTTY);
+    int master = terminal_open();
 
-    TEST_ASSERT_GREATER_OR_EQUAL_INT(0, master);
-    TEST_ASSERT_EQUAL_INT(0, grantpt(master));
-    TEST_ASSERT_EQUAL_INT(0, unlockpt(master));
     remove(TTY_LINK);
     TEST_ASSERT_EQUAL_INT(0, symlink(ptsname(master), TTY_LINK));
     return master;
