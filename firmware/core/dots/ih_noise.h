@@ -1,23 +1,21 @@
-/* ih_noise - how restless a frame is, place by place; what the last frame without laser takes away.
+/* ih_noise - map of a frame's noise, and of where the ambient frame is subtracted.
  *
- * In:    a frame; if there is one, the ambient frame, taken with the laser off shortly before.
- * Out:   a map of blocks of IH_NOISE_BLOCK pixels a side: the noise of the band-pass's response, and
- *        whether the ambient frame is subtracted there.
- * Way:   median of |R| (ih_bandpass) over every pixel of the rows 4, 20, 36, ... that pass through a
- *        block: a dot covers a fiftieth of it and does not move its median. Then 1-2-1 in both
- *        directions, outermost blocks repeated. Between the blocks' centres ih_noise_at goes
- *        linearly, so there are no seams.
- *        Ambient: it takes texture away but brings its own noise. It is subtracted in the blocks
- *        whose median is by an eighth less with it subtracted (half of the difference is looked at:
- *        nothing is cut off), and which are not darker than it by more than 2 grey levels in the
- *        mean: where something moved or light changed the block tells so itself. The share that
- *        is subtracted goes linearly between the blocks' centres: a ramp has no response. 4 grey
- *        levels are left; what is below 0 then, the dark ghost of something that moved, is 0. The
- *        noise is that of what is left, in these blocks 19/16 of it: it is white, and has more
- *        lonely maxima than texture.
- * Cost:  sums of half of the frame's rows, ih_bandpass's response of a sixteenth; three times that with an
- *        ambient frame.
- * Range: as R; 19/16 of it 22,145. Whole units of R.
+ * In:     a frame, and the ambient frame if there is one, taken with the laser off shortly before.
+ * Out:    for each block of IH_NOISE_BLOCK pixels a side the noise of the band-pass's response, and whether
+ *         the ambient frame is subtracted there.
+ * Method: median of |R| (ih_bandpass) over every pixel of the rows 4, 20, 36, ... in a block. A dot covers a
+ *         fiftieth of a block and does not move its median. Then 1-2-1 in both directions, outermost blocks
+ *         repeated. ih_noise_at interpolates between the blocks' centres, so there are no seams.
+ *         Subtracting the ambient frame removes texture but adds its noise. It is done in blocks whose
+ *         median it lowers by an eighth, measured on half of the difference, which is not clipped, and whose
+ *         mean is not darker than the ambient frame's by more than 2 grey levels: there something moved or
+ *         the light changed. The fraction that is subtracted is interpolated between the blocks' centres: a
+ *         ramp has no response. 4 grey levels stay; below 0, as in the dark ghost of something that moved,
+ *         the result is 0. The noise of these blocks is that of the difference times 19/16: it is white, with
+ *         more isolated local maxima than texture.
+ * Cost:   sums of half of the frame's rows, ih_bandpass's response of a sixteenth; three times that with an
+ *         ambient frame.
+ * Range:  as R; 19/16 of it 22,145. Whole units of R.
  */
 #ifndef IH_NOISE_H
 #define IH_NOISE_H
@@ -29,7 +27,7 @@
 #include "dots/ih_bandpass.h"
 
 #define IH_NOISE_BLOCK 32
-#define IH_NOISE_STEP 16 /* between the rows that are looked at */
+#define IH_NOISE_STEP 16 /* between sampled rows */
 #define IH_NOISE_BLOCKS_X ((IH_FRAME_WIDTH_MAX + IH_NOISE_BLOCK - 1) / IH_NOISE_BLOCK)
 #define IH_NOISE_BLOCKS_Y ((IH_FRAME_HEIGHT_MAX + IH_NOISE_BLOCK - 1) / IH_NOISE_BLOCK)
 
@@ -39,7 +37,7 @@ struct ih_noise {
     uint8_t subtract[IH_NOISE_BLOCKS_Y][IH_NOISE_BLOCKS_X]; /* 1 = the ambient frame */
 };
 
-/* A row of pixels: the rows of blocks between whose centres it lies, and how far on it is, in 64ths. */
+/* The rows of blocks between whose centres a row of pixels lies, and its distance from the first, in 64ths. */
 struct ih_noise_row {
     const uint16_t *above, *below;
     int32_t part;
@@ -58,7 +56,7 @@ IH_BEGIN_DECLS
 void ih_noise_measure(const struct ih_frame *frame, const struct ih_frame *ambient,
                       struct ih_noise_scratch *scratch, struct ih_noise *out);
 
-/* Take a row of the ambient frame from the same row of the lit one, as far as the map says. */
+/* Subtract a row of the ambient frame from the same row of the lit one, as the map says. */
 void ih_noise_subtract(const struct ih_noise *noise, int32_t v, int32_t width,
                        const uint16_t *ambient_q4, uint16_t *grey_q4);
 
@@ -66,8 +64,8 @@ void ih_noise_subtract(const struct ih_noise *noise, int32_t v, int32_t width,
 struct ih_noise_row ih_noise_row(const struct ih_noise *noise, int32_t v);
 int32_t ih_noise_at(const struct ih_noise_row *row, int32_t u);
 
-/* No pixel of a column of blocks has less noise in this row, nor in the others that lie between the centres of the
- * same blocks: those change where v is IH_NOISE_BLOCK / 2 more than a multiple of IH_NOISE_BLOCK. */
+/* Minimum of ih_noise_at over a column of blocks, in this row and all rows between the centres of the same
+ * blocks: those change where v is IH_NOISE_BLOCK / 2 above a multiple of IH_NOISE_BLOCK. */
 int32_t ih_noise_min(const struct ih_noise_row *row, int32_t block);
 
 IH_END_DECLS

@@ -1,6 +1,7 @@
 /* ih_bandpass against scipy.ndimage, on frames that both sides make by the same formula. */
 #include "base/ih_fix.h"
 #include "dots/ih_bandpass.h"
+#include "dots/ih_scanline.h"
 
 #include <stdlib.h>
 
@@ -235,27 +236,26 @@ static void all_ways_give_what_the_header_says(void)
 }
 
 /* For a row of R: what a group's greatest meets, which is not above, or exceeds by one. */
-static void lay_limits(const int16_t *row, int32_t turn, uint32_t *limit)
+static void lay_limits(const int16_t *row, int32_t turn, int16_t *limit)
 {
     int32_t max = 0, u;
 
     for (u = 0; u < frame.width; u++) {
         max = u % IH_BANDPASS_GROUP == 0 || row[u] > max ? row[u] : max;
         limit[u / IH_BANDPASS_GROUP] =
-            (uint32_t)ih_max_s32(0, max - (u / IH_BANDPASS_GROUP + turn) % 2) * 0x10001u;
+            (int16_t)ih_max_s32(0, max - (u / IH_BANDPASS_GROUP + turn) % 2);
     }
 }
 
 /* Groups of a row that have something above their limit; behind the row nothing is. */
-static int32_t expect_groups(const int16_t *row, const uint32_t *limit, int16_t *first)
+static int32_t expect_groups(const int16_t *row, const int16_t *limit, int16_t *first)
 {
     int32_t count = 0, u;
 
     for (u = 0; u < frame.width; u++) {
         const int16_t group = (int16_t)(u / IH_BANDPASS_GROUP * IH_BANDPASS_GROUP);
 
-        if (row[u] > (int32_t)(limit[u / IH_BANDPASS_GROUP] & 0xffff) &&
-            (count == 0 || first[count - 1] != group)) {
+        if (row[u] > limit[u / IH_BANDPASS_GROUP] && (count == 0 || first[count - 1] != group)) {
             first[count++] = group;
         }
     }
@@ -267,7 +267,7 @@ static void groups_above_their_limits_are_listed(void)
 {
     static const int32_t widths[] = {320, 321, 335, 350, 367, 751, 1279, 1280};
     static int16_t row[IH_FRAME_WIDTH_MAX + IH_BANDPASS_GROUP];
-    uint32_t limit[IH_BANDPASS_GROUPS];
+    int16_t limit[IH_BANDPASS_GROUPS];
     int16_t first[IH_BANDPASS_GROUPS];
     int32_t count, i, total, v;
 

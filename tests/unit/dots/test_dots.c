@@ -1,6 +1,7 @@
 /* ih_dots against scipy.ndimage, on frames that both sides make by the same formula. */
 #include "base/ih_fix.h"
 #include "dots/ih_bandpass.h"
+#include "dots/ih_scanline.h"
 #include "dots/ih_dots.h"
 #include "dots/ih_noise.h"
 

@@ -1,0 +1,149 @@
+#include "dots/ih_bandpass_respond.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+
+#include "base/ih_fix.h"
+#include "simd/ih_simd.h"
+#include "simd/ih_simd_cortexm.h"
+
+#define INNER IH_BANDPASS_INNER
+#define OUTER IH_BANDPASS_OUTER
+#define SIDE IH_BANDPASS_SIDE
+#define GROUP IH_BANDPASS_GROUP
+#define RESPONSE_SHIFT 8
+
+#if IH_CORTEXM
+#include "dots/ih_bandpass_cortexm.h"
+#elif IH_I16_LANES > 0
+/* (81 i + 8) / 16 - b; 81 / 16 is 8 * 20736 / 2^15. */
+static inline ih_i16 respond_lanes(ih_u16 sum, ih_u16 box)
+{
+    return (ih_i16)(ih_u16_mul_round(sum << 3, ih_u16_all(INNER << 8)) - box);
+}
+
+/* 2 * IH_I16_LANES pixels; the larger R of each two lanes. */
+static inline ih_i16 respond_two(const struct ih_bandpass_rows *rows, const uint16_t *nine,
+                                 int32_t u, int16_t *restrict response)
+{
+    const struct ih_u16_two middle = ih_u16_two_load(&rows->middle[u]);
+    const struct ih_u16_two sides =
+        ih_u16_two_add(ih_u16_two_load(&rows->above[u]), ih_u16_two_load(&rows->below[u]));
+    const struct ih_u16_two sum = ih_u16_two_add(ih_u16_two_add(sides, middle), middle);
+    const struct ih_u16_two box =
+        ih_u16_two_add(ih_u16_two_add(ih_u16_two_load(&nine[u]), ih_u16_two_load(&nine[u + SIDE])),
+                       ih_u16_two_load(&nine[u + 2 * SIDE]));
+    const ih_i16 low = respond_lanes(sum.low, box.low);
+    const ih_i16 high = respond_lanes(sum.high, box.high);
+    ih_i16_store(&response[u], low);
+    ih_i16_store(&response[u + IH_I16_LANES], high);
+    return ih_i16_max(low, high);
+}
+
+static inline bool is_any_above(const int16_t *response, int16_t limit)
+{
+    ih_i16 max = ih_i16_load(response);
+    for (int32_t i = IH_I16_LANES; i < GROUP; i += IH_I16_LANES) {
+        max = ih_i16_max(max, ih_i16_load(&response[i]));
+    }
+    return ih_i16_any(max > ih_i16_all(limit));
+}
+
+/* The last vector ends with the row; some of its lanes are there already. */
+static void respond_bytes(const struct ih_bandpass_rows *rows, const uint16_t *nine, int32_t first,
+                          int32_t width, int16_t *response)
+{
+    for (int32_t u = first; u < width; u += 2 * IH_I16_LANES) {
+        (void)respond_two(rows, nine, ih_min_s32(u, width - 2 * IH_I16_LANES), response);
+    }
+}
+#else
+static inline bool is_any_above(const int16_t *response, int16_t limit)
+{
+    int16_t max = 0;
+    for (int32_t i = 0; i < GROUP; i++) {
+        max = response[i] > max ? response[i] : max;
+    }
+    return max > limit;
+}
+
+static void respond_bytes(const struct ih_bandpass_rows *rows, const uint16_t *nine, int32_t first,
+                          int32_t width, int16_t *restrict response)
+{
+    const uint16_t *above = rows->above;
+    const uint16_t *middle = rows->middle;
+    const uint16_t *below = rows->below;
+    for (int32_t u = first; u < width; u++) {
+        const uint16_t sum = (uint16_t)(above[u] + 2 * middle[u] + below[u]);
+        const uint16_t half_up = (uint16_t)(sum + OUTER / 2);
+        const uint16_t box = (uint16_t)(nine[u] + nine[u + SIDE] + nine[u + 2 * SIDE]);
+        response[u] = (int16_t)(INNER / OUTER * sum + half_up / OUTER - box);
+    }
+}
+#endif
+
+/* Groups from pixel u on join the listed ones, without a branch: a group that is not above its limit is
+ * overwritten by the next. A misprediction costs more than a group. */
+static void list_groups(struct ih_bandpass_row *out, int32_t u, int32_t width, int32_t listed)
+{
+    int32_t count = listed;
+    if (out->limit == NULL) {
+        return;
+    }
+    for (int32_t first = u; first < width; first += GROUP) {
+        out->first[count] = (int16_t)first;
+        count += is_any_above(&out->response[first], out->limit[first / GROUP]);
+    }
+    out->count = count;
+}
+
+#if !IH_CORTEXM && IH_I16_LANES > 0
+/* Whole groups are listed while their R is in registers. */
+static int32_t respond_and_list(const struct ih_bandpass_rows *rows, const uint16_t *restrict nine,
+                                int32_t groups, const int16_t *restrict limit,
+                                int16_t *restrict response, int16_t *restrict first)
+{
+    const struct ih_bandpass_rows in = *rows;
+    int32_t listed = 0;
+    for (int32_t group = 0; group < groups; group++) {
+        const int32_t u = GROUP * group;
+        ih_i16 max = respond_two(&in, nine, u, response);
+        for (int32_t at = u + 2 * IH_I16_LANES; at < u + GROUP; at += 2 * IH_I16_LANES) {
+            max = ih_i16_max(max, respond_two(&in, nine, at, response));
+        }
+        first[listed] = (int16_t)u;
+        listed += ih_i16_any(max > ih_i16_all(limit[group]));
+    }
+    return listed;
+}
+
+void ih_bandpass_respond_bytes(const struct ih_bandpass_rows *rows, const uint16_t *nine,
+                               int32_t width, struct ih_bandpass_row *out)
+{
+    const int32_t groups = out->limit != NULL ? width / GROUP : 0;
+    const int32_t listed =
+        respond_and_list(rows, nine, groups, out->limit, out->response, out->first);
+    respond_bytes(rows, nine, GROUP * groups, width, out->response);
+    list_groups(out, GROUP * groups, width, listed);
+}
+#else
+void ih_bandpass_respond_bytes(const struct ih_bandpass_rows *rows, const uint16_t *nine,
+                               int32_t width, struct ih_bandpass_row *out)
+{
+    respond_bytes(rows, nine, 0, width, out->response);
+    list_groups(out, 0, width, 0);
+}
+#endif
+
+void ih_bandpass_respond_grey(const struct ih_bandpass_rows *rows_q4, const uint32_t *nine_q4,
+                              int32_t width, struct ih_bandpass_row *out)
+{
+    int16_t *restrict response = out->response;
+    for (int32_t u = 0; u < width; u++) {
+        const int32_t sum = rows_q4->above[u] + 2 * rows_q4->middle[u] + rows_q4->below[u];
+        const int32_t box = (int32_t)(nine_q4[u] + nine_q4[u + SIDE] + nine_q4[u + 2 * SIDE]);
+        response[u] =
+            (int16_t)((INNER * sum - OUTER * box + (1 << (RESPONSE_SHIFT - 1))) >> RESPONSE_SHIFT);
+    }
+    list_groups(out, 0, width, 0);
+}
