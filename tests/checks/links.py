@@ -3,7 +3,7 @@
 
   links     a relative link leads to a file that is tracked, or to a folder of such; #SECTION to a heading of it
   files     a path in `backticks` that begins with a folder of the tree, or a page's name.md, is there
-  names     an ih_NAME in `backticks` stands in the firmware's sources
+  names     an ih_NAME in `backticks` is in the sources of the firmware, or in the headers of its tests
   targets   `make TARGET` is a target of the Makefile
 
 Experiments and the change log name things as they were: only their links are checked.
@@ -25,7 +25,7 @@ TARGET = re.compile(r"\bmake ([a-z][a-z0-9-]*)")
 FENCE = re.compile(r"^( *)```.*?^\1```", re.S | re.M)
 HISTORY = ("docs/experiments/", "CHANGELOG.md")
 # What CONTRIBUTING.md makes up for its example.
-EXAMPLE = re.compile(r"counter|ih_(noun_verb|noun|upper|test)\b")
+EXAMPLE = re.compile(r"counter|ih_(noun_verb|noun|upper)\b")
 
 
 def tracked():
@@ -73,7 +73,7 @@ def check_names(page, text, files, folders, known):
                 yield hit.start(), "no page %s" % word
         for name in IH_NAME.findall(hit[1]):
             if name not in known and not name.endswith("_") and not EXAMPLE.search(name.lower()):
-                yield hit.start(), "nothing in firmware/ is called %s" % name
+                yield hit.start(), "no source has the name %s" % name
     targets = set(re.findall(r"^([a-z][a-z0-9-]*):", read("Makefile"), re.M))
     for hit in TARGET.finditer("\n".join("%s" % code for code in CODE.findall(text))):
         if hit[1] not in targets:
@@ -87,7 +87,7 @@ def main():
                [i for i, c in enumerate(os.path.dirname(path) + "/") if c == "/"]}
     known = set()
     for path in listed:
-        if path.startswith("firmware/") and path.endswith((".c", ".h")):
+        if path.startswith(("firmware/", "tests/unit/ih_")) and path.endswith((".c", ".h")):
             known.add(os.path.splitext(os.path.basename(path))[0])
             known.update(re.findall(r"\b(?:ih|IH)_\w+", read(path)))
     wrong = 0
