@@ -4,9 +4,9 @@
 
 _Static_assert((-3 >> 1) == -2, "right shift of negative values must be arithmetic");
 
-/* 1 / sqrt(m) in Q15 at m = 64/256, 65/256 .. 256/256, lowered by as much as a chord between two of
- * them lies above the curve: what is read between them is never too great, and at most 2^-13.7 too
- * small. Written by tools/oracle/isqrt_table.py. */
+/* 1 / sqrt(m) in Q15 at m = 64/256, 65/256 .. 256/256, lowered by the distance of a chord between two
+ * entries from the curve: an interpolated value is never too large, and at most 2^-13.7 too small.
+ * Written by tools/oracle/isqrt_table.py. */
 const uint16_t ih_root_inverse_q15[193] = {
     65534, 65028, 64533, 64050, 63577, 63115, 62663, 62220, 61786, 61362, 60946, 60538, 60138,
     59747, 59362, 58986, 58616, 58253, 57897, 57547, 57203, 56866, 56534, 56208, 55888, 55573,
@@ -30,18 +30,18 @@ uint32_t ih_isqrt_u64(uint64_t value)
     if (value == 0) {
         return 0;
     }
-    /* Without a division: they are long on small processors. The value is shifted up to 2^62 .. 2^64
-     * by 4^half; its root there is in 2^31 .. 2^32. With r a little below 1 / root, and a root of
-     * which the square is short by d, root + d r / 2 is a better one, again not too great. The first
-     * is short by 2^-13.7 of it, the second by 1.5 times the square of that, 36; the third by 1 and
-     * by what its own rounding takes, less than 1. */
+    /* No division, which is slow on small processors. The value is shifted up to 2^62 .. 2^64 by
+     * 4^half; its root there is in 2^31 .. 2^32. With r slightly below 1 / root, and d the difference
+     * of the value and root^2, root + d r / 2 is a better root, and again not too large. The error of
+     * the first is 2^-13.7 of it, that of the second 1.5 times the square of that, 36; that of the
+     * third 1, and its own rounding below 1. */
     const int half = (64 - ih_bits_u64(value)) / 2;
     const uint64_t square = value << (2 * half);
     const uint64_t r_q15 = ih_inverse_root_q15((uint32_t)(square >> 32));
     uint64_t root = ((square >> 32) * r_q15) >> 15;
     root += ((square - root * root) >> 16) * r_q15 >> 32;
     root += (square - root * root) * r_q15 >> 48;
-    for (uint64_t rest = square - root * root; rest > 2 * root; rest -= 2 * root - 1) {
+    for (uint64_t left = square - root * root; left > 2 * root; left -= 2 * root - 1) {
         root++;
     }
     return (uint32_t)(root >> half);
@@ -52,8 +52,8 @@ uint32_t ih_isqrt_u54(uint64_t value)
     if (value == 0) {
         return 0;
     }
-    /* As above, but with one correction: at 2^31 .. 2^32 the root is short by 36 and what is cut off, and
-     * the value is small enough for 36 / 2^5 and 1 of that to be left. */
+    /* As above, but with one correction: at 2^31 .. 2^32 the root is too small by 36 and the truncation,
+     * and of a value this small by 36 / 2^5 and 1. */
     const int half = (64 - ih_bits_u64(value)) / 2;
     const uint64_t shifted = value << (2 * half);
     const uint64_t r_q15 = ih_inverse_root_q15((uint32_t)(shifted >> 32));
@@ -71,33 +71,32 @@ uint32_t ih_isqrt_u32(uint32_t value)
     if (value == 0) {
         return 0;
     }
-    /* As above, without a correction: at 2^15 .. 2^16 the root is short by 2^-13.7 and 2^-14 of it, 9, and what
-     * is cut off; of small values next to nothing is left of that. */
+    /* As above, without a correction: at 2^15 .. 2^16 the root is too small by 2^-13.7 and 2^-14 of it, 9,
+     * and the truncation; half shifts reduce that. */
     const int half = __builtin_clz(value) / 2;
     const uint32_t shifted = value << (2 * half);
     uint32_t root = ((shifted >> 16) * ih_inverse_root_q15(shifted)) >> (15 + half);
-    for (uint32_t rest = value - root * root; rest > 2 * root; rest -= 2 * root - 1) {
+    for (uint32_t left = value - root * root; left > 2 * root; left -= 2 * root - 1) {
         root++;
     }
     return root;
 }
 
 /* atan(2^-i) in millionths of a degree. */
-static const int32_t atan_udeg[] = {45000000, 26565051, 14036243, 7125016, 3576334, 1789911,
-                                    895174,   447614,   223811,   111906,  55953,   27976,
-                                    13988,    6994,     3497,     1749,    874};
-#define ATAN_STEPS ((int)(sizeof atan_udeg / sizeof atan_udeg[0]))
+const int32_t ih_atan_udeg[IH_ATAN_STEPS] = {
+    45000000, 26565051, 14036243, 7125016, 3576334, 1789911, 895174, 447614, 223811,
+    111906,   55953,    27976,    13988,   6994,    3497,    1749,   874};
 
 int32_t ih_atan2_mdeg(int64_t y, int64_t x)
 {
     if (x == 0 && y == 0) {
         return 0;
     }
-    /* CORDIC in vectoring mode: turn the vector onto the +x axis in ever smaller steps. It needs
-     * x > 0; a vector in the left half is turned by half a circle first. */
-    int64_t turn_udeg = 0;
+    /* CORDIC in vectoring mode: rotate the vector onto the +x axis in ever smaller steps. It needs
+     * x > 0; a vector in the left half is rotated by half a circle first. */
+    int64_t rotated_udeg = 0;
     if (x < 0) {
-        turn_udeg = y >= 0 ? 180000000 : -180000000;
+        rotated_udeg = y >= 0 ? 180000000 : -180000000;
         x = -x;
         y = -y;
     }
@@ -106,15 +105,15 @@ int32_t ih_atan2_mdeg(int64_t y, int64_t x)
     x = shift >= 0 ? x * ((int64_t)1 << shift) : x >> -shift;
     y = shift >= 0 ? y * ((int64_t)1 << shift) : y >> -shift;
     int64_t angle_udeg = 0;
-    for (int i = 0; i < ATAN_STEPS; i++) {
+    for (int i = 0; i < IH_ATAN_STEPS; i++) {
         int64_t x_part = x >> i;
         int64_t y_part = y >> i;
         bool up = y > 0;
         x += up ? y_part : -y_part;
         y += up ? -x_part : x_part;
-        angle_udeg += up ? atan_udeg[i] : -atan_udeg[i];
+        angle_udeg += up ? ih_atan_udeg[i] : -ih_atan_udeg[i];
     }
-    int32_t angle_mdeg = (int32_t)ih_div_round(turn_udeg + angle_udeg, 1000);
+    int32_t angle_mdeg = (int32_t)ih_div_round(rotated_udeg + angle_udeg, 1000);
     IH_IN_RANGE(angle_mdeg, -180001, 180001);
     return angle_mdeg <= -180000 ? angle_mdeg + 360000 : angle_mdeg;
 }

@@ -1,9 +1,8 @@
-/* ih_fix - the only place where numbers change their format.
+/* ih_fix - fixed-point arithmetic: numbers change their format here only.
  *
  * A name ending in _qN carries N fraction bits; the C type gives the width. Right shifts round to
- * nearest, halves upwards (towards plus infinity), on every target alike: a negative value is never
- * shifted right in a way the C standard leaves open except arithmetic shift, which a static
- * assertion in ih_fix.c demands.
+ * nearest, halves upwards (towards plus infinity), on every target alike: C leaves the right shift of
+ * negative values open, and a static assertion in ih_fix.c demands an arithmetic one.
  */
 #ifndef IH_FIX_H
 #define IH_FIX_H
@@ -43,11 +42,11 @@ static inline int64_t ih_mul_wide_shift(int64_t a, uint32_t b, int shift)
     uint64_t lower = low_product & UINT32_MAX;
 
     /* The product is upper * 2^32 + lower; divide by 2^shift with shift >= 32. */
-    int rest = shift - 32;
-    if (rest == 0) {
+    int left = shift - 32;
+    if (left == 0) {
         return upper + (int64_t)(lower >> 31);
     }
-    return ih_shift_round(upper, rest); /* lower is below half a unit of the last place or a tie's
+    return ih_shift_round(upper, left); /* lower is below half a unit of the last place or a tie's
                                          * upper side: rounding half upwards ignores it */
 }
 
@@ -99,7 +98,7 @@ static inline int32_t ih_clamp_s32(int32_t value, int32_t low, int32_t high)
     return ih_min_s32(ih_max_s32(value, low), high);
 }
 
-/* value limited to -most .. most. */
+/* value limited to -max .. max. */
 static inline int64_t ih_clamp_s64(int64_t value, int64_t max)
 {
     return value < -max ? -max : value > max ? max : value;
@@ -115,7 +114,7 @@ static inline int32_t ih_abs_s32(int32_t value)
     return value < 0 ? -value : value;
 }
 
-/* Square of the distance of two places whose coordinates differ by less than 2^30.7. */
+/* Square of the distance of two points whose coordinates differ by less than 2^30.7. */
 static inline int64_t ih_distance2_s32(const int32_t a[3], const int32_t b[3])
 {
     int64_t sum = 0;
@@ -131,23 +130,23 @@ IH_BEGIN_DECLS
 /* floor(sqrt(value)), exact for all 2^64 inputs. */
 uint32_t ih_isqrt_u64(uint64_t value);
 
-/* The same of values below 2^54, in half of the time. */
+/* The same for values below 2^54, in half the time. */
 uint32_t ih_isqrt_u54(uint64_t value);
 
-/* The same, where words have 32 bits, and of values below 2^24 the quickest. */
+/* The same for 32 bits; the fastest below 2^24. */
 uint32_t ih_isqrt_u32(uint32_t value);
 
-/* Of 64/256, 65/256 .. 256/256. */
+/* 1 / sqrt of 64/256, 65/256 .. 256/256. */
 extern const uint16_t ih_root_inverse_q15[193];
 
-/* 1 / sqrt(m), m in Q32 from 1/4 on: never too great, and at most 2^-13.7 of it too small. */
+/* 1 / sqrt(m), m in Q32 from 1/4 on: never too large, and at most 2^-13.7 of it too small. */
 static inline uint32_t ih_inverse_root_q15(uint32_t m_q32)
 {
     const uint32_t at = (m_q32 >> 24) - 64;
-    const uint32_t part_q16 = m_q32 >> 8 & 0xffff;
-    const uint32_t here = ih_root_inverse_q15[at];
-    /* the fall rounded up: never too great */
-    return here - (((here - ih_root_inverse_q15[at + 1]) * part_q16 + 0xffff) >> 16);
+    const uint32_t fraction_q16 = m_q32 >> 8 & 0xffff;
+    const uint32_t first = ih_root_inverse_q15[at];
+    /* The difference is rounded up, so that the result is never too large. */
+    return first - (((first - ih_root_inverse_q15[at + 1]) * fraction_q16 + 0xffff) >> 16);
 }
 
 /* Number of bits needed for value; 0 for 0. */
@@ -155,6 +154,9 @@ static inline int ih_bits_u64(uint64_t value)
 {
     return value == 0 ? 0 : 64 - __builtin_clzll(value);
 }
+
+#define IH_ATAN_STEPS 17
+extern const int32_t ih_atan_udeg[IH_ATAN_STEPS];
 
 /* Angle of (x, y) from +x towards +y in thousandths of a degree, (-180000, 180000]; 0 for (0, 0).
  * |x|, |y| <= 2^40. Within 2 mdeg of atan2. */

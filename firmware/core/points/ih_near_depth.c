@@ -1,7 +1,5 @@
 #include "points/ih_near_depth.h"
 
-#include "base/ih_config.h"
-
 #define PERCENTILE 8
 
 /* A selection digit by digit of seven bits, the highest first: a step of it is 64 mm, and few near depths have the

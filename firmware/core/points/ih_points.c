@@ -4,6 +4,7 @@
 
 #include "base/ih_fix.h"
 #include "base/ih_range.h"
+#include "points/ih_windows_survey.h"
 #include "rig/ih_camera.h"
 
 /* Bounds the search for a measured pixel around a lattice point. */

@@ -91,12 +91,6 @@ enum ih_err ih_windows_find(const struct ih_frame *frame, const struct ih_rig *r
                             struct ih_windows_scratch *scratch, struct ih_windows *out)
     __attribute__((warn_unused_result));
 
-/* The measured pixel (its depth in the working range) nearest to (*u_px, *v_px), at most reach_px
- * away in u and in v; of equals the first in reading order. Its depth in mm, and its place in *u_px
- * and *v_px; 0 when there is none. (*u_px, *v_px) lies in the frame. */
-int32_t ih_windows_pixel(const struct ih_frame *frame, const struct ih_rig *rig, int32_t reach_px,
-                         int32_t *u_px, int32_t *v_px);
-
 IH_END_DECLS
 
 #endif

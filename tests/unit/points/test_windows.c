@@ -1,7 +1,16 @@
 /* ih_windows: scenes against a float64 reference; and images that are no scene at all. */
-#include "points/ih_windows.c" /* for the score of one place */
-
+#include <stdbool.h>
 #include <stdlib.h>
+
+#include "base/ih_config.h"
+#include "base/ih_fix.h"
+#include "base/ih_types.h"
+#include "points/ih_windows.h"
+#include "points/ih_windows_places.h"
+#include "points/ih_windows_score.h"
+#include "points/ih_windows_survey.h"
+#include "rig/ih_camera.h"
+#include "rig/ih_rig.h"
 
 #include "ih_test.h"
 
@@ -36,12 +45,6 @@ struct vector_tilted {
 };
 
 #include "windows.inc"
-#include "base/ih_config.h"
-#include "base/ih_fix.h"
-#include "base/ih_types.h"
-#include "points/ih_windows.h"
-#include "rig/ih_camera.h"
-#include "rig/ih_rig.h"
 
 #define PIXELS_MAX (IH_FRAME_WIDTH_MAX * IH_FRAME_WIDTH_MAX)
 #define HEAD_MM 98 /* from a head's front to its middle */
@@ -230,9 +233,9 @@ static void scores_match_float64(void)
         struct ih_windows_place place;
 
         draw_noise(noise);
-        IH_TEST_EQUAL(0, survey_frame(&frame, &rig, &guarded.scratch), "nothing is rare", i);
+        IH_TEST_EQUAL(0, ih_windows_survey(&frame, &rig, &guarded.scratch), "nothing is rare", i);
         IH_TEST_EQUAL(1, guarded.scratch.cell_px, "cell", i);
-        place = place_at(&guarded.scratch, &rig, &params, 80, 60);
+        place = ih_windows_place_at(&guarded.scratch, &rig, &params, 80, 60);
         /* Each of five parts is rounded down. */
         IH_TEST_WITHIN(5, noise->score, place.score, "score", noise->seed);
     }
@@ -252,11 +255,11 @@ static void connected_cells_are_counted(void)
             guarded.scratch.depth_mm[4 * i + 3] = i < pairs ? 900 : 0;
         }
         guarded.scratch.depth_mm[41] = 900; /* in the first column of the next one */
-        IH_TEST_EQUAL(pairs * 100 / (10 + pairs), connected_percent(&guarded.scratch), "percent",
-                      pairs);
+        IH_TEST_EQUAL(pairs * 100 / (10 + pairs), ih_windows_connected_percent(&guarded.scratch),
+                      "percent", pairs);
     }
     memset(guarded.scratch.depth_mm, 0, sizeof guarded.scratch.depth_mm);
-    IH_TEST_EQUAL(100, connected_percent(&guarded.scratch), "without any", 0);
+    IH_TEST_EQUAL(100, ih_windows_connected_percent(&guarded.scratch), "without any", 0);
 }
 
 /* Depth of the measured pixel nearest to one of 160 x 120 within a square, by trying all; 0: none. The
@@ -313,7 +316,7 @@ static void rare_pixels_are_surveyed_with_half_the_side(void)
             spacing *= 2;
         }
         TEST_ASSERT_GREATER_THAN_INT32(1, spacing);
-        IH_TEST_EQUAL(spacing, survey_frame(&frame, &rig, &guarded.scratch), "spacing", pass);
+        IH_TEST_EQUAL(spacing, ih_windows_survey(&frame, &rig, &guarded.scratch), "spacing", pass);
         cell = spacing / 2;
         IH_TEST_EQUAL(cell, guarded.scratch.cell_px, "cell", pass);
         IH_TEST_EQUAL((160 + cell - 1) / cell, guarded.scratch.column_count, "columns", pass);
@@ -358,10 +361,10 @@ static void planes_match_float64(void)
         struct ih_windows_place place = {80, 60, 0, 0};
 
         draw_tilted(tilted);
-        survey_frame(&frame, &rig, &guarded.scratch);
+        ih_windows_survey(&frame, &rig, &guarded.scratch);
         place.depth_mm = (int16_t)guarded.scratch.depth_mm[60 * 160 + 80];
-        IH_TEST_EQUAL(tilted->stands, stands_on_plane(&guarded.scratch, &rig, &place), "plane",
-                      tilted->seed);
+        IH_TEST_EQUAL(tilted->stands, ih_windows_stands_on_plane(&guarded.scratch, &rig, &place),
+                      "plane", tilted->seed);
         stands += tilted->stands;
     }
     TEST_ASSERT_TRUE(stands > 50 && stands < i - 50);
@@ -418,7 +421,7 @@ static int32_t score_of_regions(int32_t column, int32_t row, int32_t inside_mm, 
         }
     }
     sink(&place, 70, 95, inside_mm);
-    return score_of(&guarded.scratch, &rig, &params, &place);
+    return ih_windows_score(&guarded.scratch, &rig, &params, &place);
 }
 
 /* Of 1000: 350 for the head, 400 for what is around it, 150 for what is below it, 100 for its bulge, of
@@ -477,7 +480,7 @@ static void heads_bulge(void)
         sink(&place, 70, 95, outer_mm);
         sink(&place, 38, 48, 0);
         IH_TEST_EQUAL(350 + 150 + 100 * clamped / 15 - FAR_LOSS,
-                      score_of(&guarded.scratch, &rig, &params, &place), "score", outer_mm);
+                      ih_windows_score(&guarded.scratch, &rig, &params, &place), "score", outer_mm);
     }
 }
 
@@ -507,7 +510,7 @@ static void a_bulge_needs_three_outer_probes(void)
             *cell_at(&place, outer_mm[i][0], outer_mm[i][1]) = 0;
         }
         IH_TEST_EQUAL(350 * (1300 - 70 * holes) / 1300 + 150 + (holes <= 5 ? 100 : 50) - FAR_LOSS,
-                      score_of(&guarded.scratch, &rig, &params, &place), "outer", holes);
+                      ih_windows_score(&guarded.scratch, &rig, &params, &place), "outer", holes);
     }
     for (holes = 0; holes <= 5; holes++) {
         place = flat_cells(80, 60);
@@ -517,7 +520,7 @@ static void a_bulge_needs_three_outer_probes(void)
             *cell_at(&place, inner_mm[i][0], inner_mm[i][1]) = 0;
         }
         IH_TEST_EQUAL(350 * (1300 - 70 * holes) / 1300 + 150 + (holes < 5 ? 100 : 50) - FAR_LOSS,
-                      score_of(&guarded.scratch, &rig, &params, &place), "inner", holes);
+                      ih_windows_score(&guarded.scratch, &rig, &params, &place), "inner", holes);
     }
 }
 
@@ -528,16 +531,16 @@ static void templates_have_a_least_width(void)
 
     rig.calibration.fx_px_q16 = rig.calibration.fy_px_q16 = 60 << 16;
     place.depth_mm = 3596;
-    TEST_ASSERT_GREATER_THAN_INT32(0, score_of(&guarded.scratch, &rig, &params, &place));
+    TEST_ASSERT_GREATER_THAN_INT32(0, ih_windows_score(&guarded.scratch, &rig, &params, &place));
     place.depth_mm = 3601;
-    TEST_ASSERT_EQUAL_INT32(0, score_of(&guarded.scratch, &rig, &params, &place));
+    TEST_ASSERT_EQUAL_INT32(0, ih_windows_score(&guarded.scratch, &rig, &params, &place));
 }
 
 static bool near_within(struct ih_windows_place a, struct ih_windows_place b, int32_t mm)
 {
-    const bool is_near = are_near(&guarded.scratch, &rig, &a, &b, mm);
+    const bool is_near = ih_windows_are_near(&guarded.scratch, &rig, &a, &b, mm);
 
-    TEST_ASSERT_TRUE(is_near == are_near(&guarded.scratch, &rig, &b, &a, mm));
+    TEST_ASSERT_TRUE(is_near == ih_windows_are_near(&guarded.scratch, &rig, &b, &a, mm));
     return is_near;
 }
 
@@ -566,7 +569,7 @@ static void put(int32_t column, int32_t row, int32_t score)
 {
     const struct ih_windows_place place = {(int16_t)column, (int16_t)row, PLACE_MM, (int16_t)score};
 
-    remember(&guarded.scratch, &rig, &place, &windows);
+    ih_windows_remember(&guarded.scratch, &rig, &place, &windows);
 }
 
 static void expect_places(int count, const int32_t score[], const char *what)
@@ -640,7 +643,7 @@ static void a_plane_goes_on_below_where_two_thirds_are_on_it(void)
                 *cell_at(&place, below_mm[i][0], below_mm[i][1]) = (uint16_t)(i < seen ? depth : 0);
             }
             IH_TEST_EQUAL(seen >= 2 && 3 * on >= 2 * seen,
-                          stands_on_plane(&guarded.scratch, &rig, &place), "seen, on it",
+                          ih_windows_stands_on_plane(&guarded.scratch, &rig, &place), "seen, on it",
                           10 * seen + on);
         }
     }
@@ -664,10 +667,10 @@ static void a_window_is_the_mean_of_good_places(void)
         const int32_t columns[] = {80, 3, 157, 80, 80}, rows[] = {60, 60, 60, 2, 118};
 
         draw_noise(&vector_noises[i]);
-        survey_frame(&frame, &rig, &guarded.scratch);
+        ih_windows_survey(&frame, &rig, &guarded.scratch);
         for (k = 0; k < IH_TEST_COUNT(columns); k++) {
             const struct ih_windows_place best =
-                place_at(&guarded.scratch, &rig, &params, columns[k], rows[k]);
+                ih_windows_place_at(&guarded.scratch, &rig, &params, columns[k], rows[k]);
             const double reach_u = mean_reach(vector_noises[i].fx_px, best.depth_mm);
             const double reach_v = mean_reach(vector_noises[i].fy_px, best.depth_mm);
             double weights = 0, u = 0, v = 0, z = 0;
@@ -683,7 +686,8 @@ static void a_window_is_the_mean_of_good_places(void)
                 if (abs(cell % 160 - columns[k]) > reach_u || abs(cell / 160 - rows[k]) > reach_v) {
                     continue;
                 }
-                place = place_at(&guarded.scratch, &rig, &params, cell % 160, cell / 160);
+                place =
+                    ih_windows_place_at(&guarded.scratch, &rig, &params, cell % 160, cell / 160);
                 if (place.score > best.score - 80 && abs(place.depth_mm - best.depth_mm) <= 80) {
                     const double weight = place.score - best.score + 80;
 
@@ -693,7 +697,7 @@ static void a_window_is_the_mean_of_good_places(void)
                     z += weight * place.depth_mm;
                 }
             }
-            place_window(&guarded.scratch, &rig, &params, &best, &window);
+            ih_windows_mean(&guarded.scratch, &rig, &params, &best, &window);
             /* Half a unit of Q12, and of Q28 and Q8. */
             IH_TEST_WITHIN(0.5 / 4096 / vector_noises[i].fx_px + 1e-8,
                            (u / weights - 79.5) / vector_noises[i].fx_px,

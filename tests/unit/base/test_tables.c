@@ -1,8 +1,7 @@
-/* ih_fix's tables against their definitions: most of their last places show in no result. */
-#include "base/ih_fix.c"
+/* ih_fix's tables against their definitions: most of their last digits show in no result. */
+#include "base/ih_fix.h"
 
 #include "ih_test.h"
-#include "base/ih_fix.h"
 
 void setUp(void)
 {
@@ -66,9 +65,10 @@ static void angles_of_the_steps_are_exact(void)
 {
     int i;
 
-    TEST_ASSERT_EQUAL_INT(17, IH_TEST_COUNT(atan_udeg)); /* the last is below the promised 2 mdeg */
-    for (i = 0; i < IH_TEST_COUNT(atan_udeg); i++) {
-        IH_TEST_EQUAL(lround(atan(ldexp(1, -i)) * 180e6 / acos(-1.0)), atan_udeg[i], "step", i);
+    TEST_ASSERT_EQUAL_INT(17,
+                          IH_TEST_COUNT(ih_atan_udeg)); /* the last is below the promised 2 mdeg */
+    for (i = 0; i < IH_TEST_COUNT(ih_atan_udeg); i++) {
+        IH_TEST_EQUAL(lround(atan(ldexp(1, -i)) * 180e6 / acos(-1.0)), ih_atan_udeg[i], "step", i);
     }
 }
 
