@@ -4,91 +4,55 @@
 
 #include "base/ih_fix.h"
 #include "rig/ih_camera.h"
+#include "simd/ih_simd.h"
 
-#if defined __AVX2__
-#include <immintrin.h>
-#define LANES 4
-#endif
-
-static void undo_one(const struct ih_dot *dot, const struct ih_rig *rig, int32_t *u_px_q12,
-                     int32_t *v_px_q12)
+static void undistort_one(const struct ih_dot *dot, const struct ih_rig *rig, int32_t *u_px_q12,
+                          int32_t *v_px_q12)
 {
     int32_t x_q28, y_q28;
     ih_camera_undistort(rig, dot->u_px_q12, dot->v_px_q12, &x_q28, &y_q28);
     ih_camera_pixel(rig, x_q28, y_q28, u_px_q12, v_px_q12);
 }
 
-#ifdef LANES
-
-typedef __m256i lanes; /* four numbers of 64 bits */
+#if IH_I16_LANES > 0
+#define LANES IH_I64_LANES
 
 #define ONE_Q28 ((int64_t)1 << 28)
-#define COEFFICIENT_MAX_Q24 (1 << 24)
-#define ACROSS_MAX_Q24 (1 << 20)
-#define UNDONE_MAX_Q28 375809638 /* 1.4 */
-/* As in ih_rig.c; its upper limit of what is radial is 16. */
-#define RADIAL_MIN_Q28 (ONE_Q28 / 8)
-#define RADIAL_MAX_Q28 (8 * ONE_Q28)
-
-static inline lanes all(int64_t value)
-{
-    return _mm256_set1_epi64x(value);
-}
-
-static inline lanes add(lanes a, lanes b)
-{
-    return _mm256_add_epi64(a, b);
-}
-
-static inline lanes less(lanes a, lanes b)
-{
-    return _mm256_sub_epi64(a, b);
-}
+#define RADIAL_MAX_Q24 (1 << 24)      /* of k1, k2, k3 */
+#define TANGENTIAL_MAX_Q24 (1 << 20)  /* of p1, p2 */
+#define UNDISTORTED_MAX_Q28 375809638 /* 1.4 */
+#define RISE_MAX_Q24 ((1 << 27) - 1)
+/* Limits of the radial factor: the lower one as in ih_camera.c, the upper one half of it. */
+#define FACTOR_MIN_Q28 (ONE_Q28 / 8)
+#define FACTOR_MAX_Q28 (8 * ONE_Q28)
 
 /* Of factors that fit 32 bits. */
-static inline lanes product(lanes a, lanes b)
+static inline ih_i64 product(ih_i64 a, ih_i64 b)
 {
-    return _mm256_mul_epi32(a, b);
+    return ih_i32_mul_even((ih_i32)a, (ih_i32)b);
 }
 
-/* ih_shift_round of what is below 2^62: enlarged by that, it has no sign. */
-static inline lanes shifted(lanes value, int shift)
+static inline ih_i64 product_round(ih_i64 a, ih_i64 b, int shift)
 {
-    const int64_t more = ((int64_t)1 << 62) + ((int64_t)1 << (shift - 1));
-    return less(_mm256_srli_epi64(add(value, all(more)), shift), all((int64_t)1 << (62 - shift)));
+    return ih_i64_shift_round(product(a, b), shift);
 }
 
-static inline lanes product_q28(lanes a_q28, lanes b_q28)
+static inline ih_i64 twice(ih_i64 value)
 {
-    return shifted(product(a_q28, b_q28), 28);
+    return ih_i64_add(value, value);
 }
 
-static inline lanes twice(lanes value)
+/* The sign bit is set where a value is not within -max .. max; 64-bit comparisons are slow with SSE2. */
+static inline ih_i64 is_beyond(ih_i64 value, int64_t max)
 {
-    return add(value, value);
+    return ih_i64_add(value, ih_i64_all(max)) | ih_i64_sub(ih_i64_all(max), value);
 }
 
-/* All bits where it is so. */
-static inline lanes is_above(lanes a, lanes b)
-{
-    return _mm256_cmpgt_epi64(a, b);
-}
-
-static inline lanes is_within(lanes value, int64_t max)
-{
-    return _mm256_andnot_si256(is_above(value, all(max)), is_above(value, all(-max - 1)));
-}
-
-static inline lanes both(lanes a, lanes b)
-{
-    return _mm256_and_si256(a, b);
-}
-
-/* For quotients by a focal length of e bits: the inverse is cut off at 28 + inverse_shift bits, and below 2^31. */
+/* A focal length of e bits; the inverse has 28 + shift bits of fraction, truncated, and is below 2^31. */
 struct focal {
     int64_t principal_px_q16, focal_px_q16;
     int64_t inverse;
-    int inverse_shift;
+    int shift;
 };
 
 static struct focal focal_of(int32_t focal_px_q16, int32_t principal_px_q16)
@@ -98,153 +62,186 @@ static struct focal focal_of(int32_t focal_px_q16, int32_t principal_px_q16)
                           ((int64_t)1 << (28 + shift)) / focal_px_q16, shift};
 }
 
-/* A lens whose numbers need no limit, and where each is in all lanes. */
+/* A lens whose numbers need no limits, each in all lanes. */
 struct lens {
     struct focal x, y;
-    lanes k1, k2, k3, p1, p2;
-    lanes back[3];
+    ih_i64 k1, k2, k3, p1, p2;
+    ih_i64 inverse[3];
     int64_t last_q28;
 };
 
 static bool is_mild(const struct ih_rig *rig)
 {
     const struct ih_calibration *c = &rig->calibration;
-    return rig->newton_steps > 0 && ih_abs_s64(c->k1_q24) < COEFFICIENT_MAX_Q24 &&
-           ih_abs_s64(c->k2_q24) < COEFFICIENT_MAX_Q24 &&
-           ih_abs_s64(c->k3_q24) < COEFFICIENT_MAX_Q24 && ih_abs_s64(c->p1_q24) < ACROSS_MAX_Q24 &&
-           ih_abs_s64(c->p2_q24) < ACROSS_MAX_Q24;
+    return rig->newton_steps > 0 && ih_abs_s64(c->k1_q24) < RADIAL_MAX_Q24 &&
+           ih_abs_s64(c->k2_q24) < RADIAL_MAX_Q24 && ih_abs_s64(c->k3_q24) < RADIAL_MAX_Q24 &&
+           ih_abs_s64(c->p1_q24) < TANGENTIAL_MAX_Q24 && ih_abs_s64(c->p2_q24) < TANGENTIAL_MAX_Q24;
 }
 
 static inline struct lens lens_of(const struct ih_rig *rig)
 {
     const struct ih_calibration *c = &rig->calibration;
+    const int32_t *inverse = rig->inverse_q24;
     return (struct lens){
         .x = focal_of(c->fx_px_q16, c->cx_px_q16),
         .y = focal_of(c->fy_px_q16, c->cy_px_q16),
-        .k1 = all(c->k1_q24),
-        .k2 = all(c->k2_q24),
-        .k3 = all(c->k3_q24),
-        .p1 = all(c->p1_q24),
-        .p2 = all(c->p2_q24),
-        .back = {all(rig->inverse_q24[0]), all(rig->inverse_q24[1]), all(rig->inverse_q24[2])},
+        .k1 = ih_i64_all(c->k1_q24),
+        .k2 = ih_i64_all(c->k2_q24),
+        .k3 = ih_i64_all(c->k3_q24),
+        .p1 = ih_i64_all(c->p1_q24),
+        .p2 = ih_i64_all(c->p2_q24),
+        .inverse = {ih_i64_all(inverse[0]), ih_i64_all(inverse[1]), ih_i64_all(inverse[2])},
         .last_q28 = rig->newton_last_q28,
     };
 }
 
-/* A pixel's place by its focal length, ih_div_round. By the inverse, of which less than 1 is cut off, the quotient of a
- * place within 45 degrees (*is_near) is too small by 2^e / 2^(e + 1) and by what its own bits cut off, less than 1:
- * what is left, with the half that rounds, is below twice the focal length. */
-static inline lanes seen_q28(lanes px_q12, const struct focal *focal, lanes *is_near)
+/* A pixel's offset over the focal length, as ih_div_round. The inverse makes the quotient of an offset within 45
+ * degrees too small by less than 2, so the remainder, with the half that rounds, is below twice the focal
+ * length, and fits 31 bits. *beyond: farther than that. */
+static inline ih_i64 divide_by_focal(ih_i64 px_q16, const struct focal *focal, ih_i64 *beyond)
 {
-    const lanes f = all(focal->focal_px_q16);
-    const lanes off = less(_mm256_slli_epi64(px_q12, 4), all(focal->principal_px_q16));
-    const lanes sign = is_above(_mm256_setzero_si256(), off);
-    const lanes far = less(_mm256_xor_si256(off, sign), sign);
-    *is_near = is_within(off, focal->focal_px_q16);
-    const lanes guess = _mm256_srl_epi64(product(far, all(focal->inverse)),
-                                         _mm_cvtsi32_si128(focal->inverse_shift));
-    const lanes rest =
-        less(add(_mm256_slli_epi64(far, 28), all(focal->focal_px_q16 / 2)), product(guess, f));
-    const lanes quotient = less(guess, is_above(rest, all(focal->focal_px_q16 - 1)));
-    return less(_mm256_xor_si256(quotient, sign), sign);
+    const ih_i64 f = ih_i64_all(focal->focal_px_q16);
+    const ih_i64 offset = ih_i64_sub(px_q16, ih_i64_all(focal->principal_px_q16));
+    const ih_i64 sign = (ih_i64)ih_i32_shift_right((ih_i32)offset, 31); /* offset fits 32 bits */
+    const ih_i64 size = ih_i64_sub(offset ^ sign, sign);
+    *beyond |= is_beyond(offset, focal->focal_px_q16);
+    const ih_i64 guess =
+        (ih_i64)ih_u64_shift_right((ih_u64)product(size, ih_i64_all(focal->inverse)), focal->shift);
+    const ih_i64 half = ih_i64_all(focal->focal_px_q16 / 2);
+    const ih_i64 remainder =
+        ih_i64_sub(ih_i64_add(ih_i64_shift_left(size, 28), half), product(guess, f));
+    const ih_i32 is_low = (ih_i32)remainder >= (ih_i32)f;
+    const ih_i64 quotient = ih_i64_add(guess, (ih_i64)is_low & ih_i64_all(1));
+    return ih_i64_sub(quotient ^ sign, sign);
 }
 
-/* What is not radial; across in ih_rig.c. */
-static inline void across(const struct lens *lens, lanes xx, lanes yy, lanes xy, lanes *dx,
-                          lanes *dy)
+/* The tangential shift, at most 3/4. */
+static inline void tangential_shift(const struct lens *lens, ih_i64 xx, ih_i64 yy, ih_i64 xy,
+                                    ih_i64 *dx, ih_i64 *dy)
 {
-    const lanes half = _mm256_srli_epi64(add(xx, yy), 1);
-    const lanes xy2 = twice(xy);
-    *dx = add(shifted(product(xy2, lens->p1), 24), shifted(product(add(half, xx), lens->p2), 23));
-    *dy = add(shifted(product(add(half, yy), lens->p1), 23), shifted(product(xy2, lens->p2), 24));
+    const ih_i64 half = (ih_i64)ih_u64_shift_right((ih_u64)ih_i64_add(xx, yy), 1);
+    const ih_i64 xy2 = twice(xy);
+    *dx = ih_i64_add(product_round(xy2, lens->p1, 24),
+                     product_round(ih_i64_add(half, xx), lens->p2, 23));
+    *dy = ih_i64_add(product_round(ih_i64_add(half, yy), lens->p1, 23),
+                     product_round(xy2, lens->p2, 24));
 }
 
-static inline lanes radial_at(const struct lens *lens, lanes r2_q28)
+static inline ih_i64 radial_factor(const struct lens *lens, ih_i64 r2_q28)
 {
-    const lanes r4_q25 = shifted(product(r2_q28, r2_q28), 31);
-    const lanes r6_q22 = shifted(product(r4_q25, r2_q28), 31);
-    return add(add(all(ONE_Q28), shifted(product(r2_q28, lens->k1), 24)),
-               add(shifted(product(r4_q25, lens->k2), 21), shifted(product(r6_q22, lens->k3), 18)));
+    const ih_i64 r4_q25 = product_round(r2_q28, r2_q28, 31);
+    const ih_i64 r6_q22 = product_round(r4_q25, r2_q28, 31);
+    const ih_i64 low = ih_i64_add(ih_i64_all(ONE_Q28), product_round(r2_q28, lens->k1, 24));
+    const ih_i64 high =
+        ih_i64_add(product_round(r4_q25, lens->k2, 21), product_round(r6_q22, lens->k3, 18));
+    return ih_i64_add(low, high);
 }
 
-/* Four places of pixels; a bit for each that is right. */
-static inline int undo_four(const struct lens *lens, lanes u_px_q12, lanes v_px_q12, lanes *x_q28,
-                            lanes *y_q28)
+/* The first of Newton's steps of ih_camera_undistort. Returns the sign bit where it needs a limit or another step. */
+static inline ih_i64 undistort_once(const struct lens *lens, ih_i64 u_px_q16, ih_i64 v_px_q16,
+                                    ih_i64 *x_q28, ih_i64 *y_q28)
 {
-    lanes is_near_x, is_near_y, dx, dy;
-    const lanes xd = seen_q28(u_px_q12, &lens->x, &is_near_x);
-    const lanes yd = seen_q28(v_px_q12, &lens->y, &is_near_y);
-    lanes xx = product_q28(xd, xd);
-    lanes yy = product_q28(yd, yd);
-    const lanes r2 = add(xx, yy);
-    const lanes cubic = product_q28(lens->back[2], r2);
-    const lanes square = product_q28(add(lens->back[1], cubic), r2);
-    const lanes rise_q24 = add(add(lens->back[0], twice(square)), product_q28(cubic, r2));
-    const lanes rise = _mm256_slli_epi64(rise_q24, 4);
-    const lanes scale = add(all(ONE_Q28), shifted(product(add(lens->back[0], square), r2), 24));
-    across(lens, xx, yy, product_q28(xd, yd), &dx, &dy);
-    const lanes x = product_q28(less(xd, dx), scale);
-    const lanes y = product_q28(less(yd, dy), scale);
-    lanes is_right = both(both(is_near_x, is_near_y), is_within(rise_q24, (1 << 27) - 1));
-    is_right = both(is_right, is_within(scale, INT32_MAX));
-    is_right = both(is_right, both(is_within(x, UNDONE_MAX_Q28), is_within(y, UNDONE_MAX_Q28)));
+    ih_i64 dx, dy, beyond = {0};
+    const ih_i64 xd = divide_by_focal(u_px_q16, &lens->x, &beyond);
+    const ih_i64 yd = divide_by_focal(v_px_q16, &lens->y, &beyond);
+    ih_i64 xx = product_round(xd, xd, 28);
+    ih_i64 yy = product_round(yd, yd, 28);
+    const ih_i64 r2 = ih_i64_add(xx, yy);
+    const ih_i64 cubic = product_round(lens->inverse[2], r2, 28);
+    const ih_i64 square = product_round(ih_i64_add(lens->inverse[1], cubic), r2, 28);
+    const ih_i64 rise_q24 =
+        ih_i64_add(ih_i64_add(lens->inverse[0], twice(square)), product_round(cubic, r2, 28));
+    const ih_i64 rise = ih_i64_shift_left(rise_q24, 4);
+    const ih_i64 scale = ih_i64_add(ih_i64_all(ONE_Q28),
+                                    product_round(ih_i64_add(lens->inverse[0], square), r2, 24));
+    tangential_shift(lens, xx, yy, product_round(xd, yd, 28), &dx, &dy);
+    const ih_i64 x = product_round(ih_i64_sub(xd, dx), scale, 28);
+    const ih_i64 y = product_round(ih_i64_sub(yd, dy), scale, 28);
+    beyond |= is_beyond(rise_q24, RISE_MAX_Q24) | is_beyond(scale, INT32_MAX) |
+              is_beyond(x, UNDISTORTED_MAX_Q28) | is_beyond(y, UNDISTORTED_MAX_Q28);
 
-    xx = product_q28(x, x);
-    yy = product_q28(y, y);
-    const lanes radial = radial_at(lens, add(xx, yy));
-    across(lens, xx, yy, product_q28(x, y), &dx, &dy);
-    const lanes off_x = less(less(xd, dx), product_q28(x, radial));
-    const lanes off_y = less(less(yd, dy), product_q28(y, radial));
-    const lanes out = twice(add(product_q28(xd, off_x), product_q28(yd, off_y)));
-    const lanes risen = product_q28(out, rise);
-    const lanes step_x = add(product_q28(off_x, scale), product_q28(risen, xd));
-    const lanes step_y = add(product_q28(off_y, scale), product_q28(risen, yd));
-    is_right = both(is_right, both(is_above(radial, all(RADIAL_MIN_Q28 - 1)),
-                                   is_above(all(RADIAL_MAX_Q28), radial)));
-    is_right = both(is_right, both(is_within(off_x, 2 * lens->last_q28 - 1),
-                                   is_within(off_y, 2 * lens->last_q28 - 1)));
-    is_right = both(is_right, both(is_within(step_x, lens->last_q28 - 1),
-                                   is_within(step_y, lens->last_q28 - 1)));
-    *x_q28 = add(x, step_x);
-    *y_q28 = add(y, step_y);
-    return _mm256_movemask_pd(_mm256_castsi256_pd(is_right));
+    xx = product_round(x, x, 28);
+    yy = product_round(y, y, 28);
+    const ih_i64 factor = radial_factor(lens, ih_i64_add(xx, yy));
+    tangential_shift(lens, xx, yy, product_round(x, y, 28), &dx, &dy);
+    const ih_i64 error_x = ih_i64_sub(ih_i64_sub(xd, dx), product_round(x, factor, 28));
+    const ih_i64 error_y = ih_i64_sub(ih_i64_sub(yd, dy), product_round(y, factor, 28));
+    const ih_i64 radial =
+        twice(ih_i64_add(product_round(xd, error_x, 28), product_round(yd, error_y, 28)));
+    const ih_i64 risen = product_round(radial, rise, 28);
+    const ih_i64 step_x =
+        ih_i64_add(product_round(error_x, scale, 28), product_round(risen, xd, 28));
+    const ih_i64 step_y =
+        ih_i64_add(product_round(error_y, scale, 28), product_round(risen, yd, 28));
+    beyond |= ih_i64_sub(factor, ih_i64_all(FACTOR_MIN_Q28)) |
+              ih_i64_sub(ih_i64_all(FACTOR_MAX_Q28 - 1), factor) |
+              is_beyond(error_x, 2 * lens->last_q28 - 1) |
+              is_beyond(error_y, 2 * lens->last_q28 - 1) | is_beyond(step_x, lens->last_q28 - 1) |
+              is_beyond(step_y, lens->last_q28 - 1);
+    *x_q28 = ih_i64_add(x, step_x);
+    *y_q28 = ih_i64_add(y, step_y);
+    return beyond;
 }
 
-/* ih_camera_pixel. */
-static inline void store_pixels(lanes q28, int32_t focal_px_q16, int32_t principal_px_q16,
-                                int32_t px_q12[LANES])
+/* As ih_camera_pixel. */
+static inline void store_pixels(ih_i64 q28, const struct focal *focal, int32_t px_q12[LANES])
 {
-    const lanes px =
-        add(shifted(product(q28, all(focal_px_q16)), 32), all(ih_shift_round(principal_px_q16, 4)));
-    const __m256i words =
-        _mm256_permutevar8x32_epi32(px, _mm256_setr_epi32(0, 2, 4, 6, 0, 0, 0, 0));
-    _mm_storeu_si128((__m128i *)(void *)px_q12, _mm256_castsi256_si128(words));
+    int64_t px[LANES];
+    const ih_i64 principal = ih_i64_all(ih_shift_round(focal->principal_px_q16, 4));
+    ih_i64_store(px,
+                 ih_i64_add(product_round(q28, ih_i64_all(focal->focal_px_q16), 32), principal));
+    for (int i = 0; i < LANES; i++) {
+        px_q12[i] = (int32_t)px[i];
+    }
 }
 
-/* The dots by fours; how many that were. */
-static int32_t undo_fours(const struct ih_dots *dots, const struct ih_rig *rig, int32_t *u_px_q12,
-                          int32_t *v_px_q12)
+static void undistort_vector(const struct ih_dot *dot, const struct ih_rig *rig,
+                             const struct lens *lens, int32_t u_px_q12[LANES],
+                             int32_t v_px_q12[LANES])
 {
-    const struct ih_calibration *c = &rig->calibration;
-    const struct lens lens = lens_of(rig);
-    int32_t first = 0;
-    for (; first + LANES <= dots->dot_count; first += LANES) {
-        const struct ih_dot *dot = &dots->dot[first];
-        lanes x, y;
-        const int right = undo_four(
-            &lens,
-            _mm256_setr_epi64x(dot[0].u_px_q12, dot[1].u_px_q12, dot[2].u_px_q12, dot[3].u_px_q12),
-            _mm256_setr_epi64x(dot[0].v_px_q12, dot[1].v_px_q12, dot[2].v_px_q12, dot[3].v_px_q12),
-            &x, &y);
-        store_pixels(x, c->fx_px_q16, c->cx_px_q16, &u_px_q12[first]);
-        store_pixels(y, c->fy_px_q16, c->cy_px_q16, &v_px_q12[first]);
-        for (int i = 0; right != (1 << LANES) - 1 && i < LANES; i++) {
-            if ((right >> i & 1) == 0) {
-                undo_one(&dot[i], rig, &u_px_q12[first + i], &v_px_q12[first + i]);
-            }
+    int64_t u_px_q16[LANES], v_px_q16[LANES], beyond[LANES];
+    ih_i64 x_q28, y_q28;
+    for (int i = 0; i < LANES; i++) {
+        u_px_q16[i] = (int64_t)dot[i].u_px_q12 * 16;
+        v_px_q16[i] = (int64_t)dot[i].v_px_q12 * 16;
+    }
+    const ih_i64 signs =
+        undistort_once(lens, ih_i64_load(u_px_q16), ih_i64_load(v_px_q16), &x_q28, &y_q28);
+    store_pixels(x_q28, &lens->x, u_px_q12);
+    store_pixels(y_q28, &lens->y, v_px_q12);
+    if (!ih_i16_any((ih_i16)ih_u64_shift_right((ih_u64)signs, 63))) {
+        return;
+    }
+    ih_i64_store(beyond, signs);
+    for (int i = 0; i < LANES; i++) {
+        if (beyond[i] < 0) {
+            undistort_one(&dot[i], rig, &u_px_q12[i], &v_px_q12[i]);
         }
     }
+}
+
+/* Undistorts whole vectors of dots. Returns how many dots those are. */
+static int32_t undistort_vectors(const struct ih_dots *dots, const struct ih_rig *rig,
+                                 int32_t *u_px_q12, int32_t *v_px_q12)
+{
+    int32_t first = 0;
+    if (!is_mild(rig)) {
+        return 0;
+    }
+    const struct lens lens = lens_of(rig);
+    for (; first + LANES <= dots->dot_count; first += LANES) {
+        undistort_vector(&dots->dot[first], rig, &lens, &u_px_q12[first], &v_px_q12[first]);
+    }
     return first;
+}
+
+#else
+
+static int32_t undistort_vectors(const struct ih_dots *dots, const struct ih_rig *rig,
+                                 int32_t *u_px_q12, int32_t *v_px_q12)
+{
+    (void)dots, (void)rig, (void)u_px_q12, (void)v_px_q12;
+    return 0;
 }
 
 #endif
@@ -252,13 +249,7 @@ static int32_t undo_fours(const struct ih_dots *dots, const struct ih_rig *rig, 
 void ih_undistort_dots(const struct ih_dots *dots, const struct ih_rig *rig,
                        int32_t u_px_q12[IH_DOTS_MAX], int32_t v_px_q12[IH_DOTS_MAX])
 {
-    int32_t i = 0;
-#ifdef LANES
-    if (is_mild(rig)) {
-        i = undo_fours(dots, rig, u_px_q12, v_px_q12);
-    }
-#endif
-    for (; i < dots->dot_count; i++) {
-        undo_one(&dots->dot[i], rig, &u_px_q12[i], &v_px_q12[i]);
+    for (int32_t i = undistort_vectors(dots, rig, u_px_q12, v_px_q12); i < dots->dot_count; i++) {
+        undistort_one(&dots->dot[i], rig, &u_px_q12[i], &v_px_q12[i]);
     }
 }

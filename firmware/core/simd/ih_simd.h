@@ -245,6 +245,11 @@ static inline ih_i64 ih_i64_sub(ih_i64 a, ih_i64 b)
     return (ih_i64)((ih_u64)a - (ih_u64)b);
 }
 
+static inline ih_i64 ih_i64_shift_left(ih_i64 a, int bits)
+{
+    return (ih_i64)((ih_u64)a << bits);
+}
+
 static inline ih_u64 ih_u64_shift_right(ih_u64 a, int bits)
 {
     return a >> bits;

@@ -160,7 +160,12 @@ static void lanes_of_64_bits(void)
     CHECK(ih_i64, int64_t, ih_i64_add(a, b), ((uint64_t)x + (uint64_t)y));
     CHECK(ih_i64, int64_t, ih_i64_sub(a, b), ((uint64_t)x - (uint64_t)y));
     for (bits = 0; bits < 64; bits++) {
+        CHECK(ih_i64, int64_t, ih_i64_shift_left(a, bits), ((uint64_t)x << bits));
         CHECK(ih_u64, uint64_t, ih_u64_shift_right(a, bits), (x >> bits));
+        if (bits > 0 && bits < 63) {
+            CHECK(ih_i64, int64_t, ih_i64_shift_round(a >> 1, bits),
+                  (((x >> 1) + ((int64_t)1 << (bits - 1))) >> bits));
+        }
     }
 }
 
