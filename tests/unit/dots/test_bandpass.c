@@ -141,7 +141,7 @@ static void slopes_have_no_response(void)
 }
 
 /* The extremes that the header names: nine bright pixels on black, nine black ones on white. */
-static void the_greatest_responses_fit(void)
+static void the_largest_responses_fit(void)
 {
     fill8(320, 240, 0);
     paint_block(100, 100, 3, 3, 255);
@@ -235,15 +235,15 @@ static void all_ways_give_what_the_header_says(void)
     }
 }
 
-/* For a row of R: what a group's greatest meets, which is not above, or exceeds by one. */
-static void lay_limits(const int16_t *row, int32_t turn, int16_t *limit)
+/* For a row of R: limits that a group's maximum meets, which is not above, or exceeds by one. */
+static void lay_limits(const int16_t *row, int32_t parity, int16_t *limit)
 {
     int32_t max = 0, u;
 
     for (u = 0; u < frame.width; u++) {
         max = u % IH_BANDPASS_GROUP == 0 || row[u] > max ? row[u] : max;
         limit[u / IH_BANDPASS_GROUP] =
-            (int16_t)ih_max_s32(0, max - (u / IH_BANDPASS_GROUP + turn) % 2);
+            (int16_t)ih_max_s32(0, max - (u / IH_BANDPASS_GROUP + parity) % 2);
     }
 }
 
@@ -350,7 +350,7 @@ static void columns_are_sums_of_rows(void)
     }
 }
 
-/* The greatest sum of three columns is found, one of them may be outside. */
+/* The largest sum of three columns is found, one of them may be outside. */
 static void the_brightest_columns_are_known(void)
 {
     static uint16_t sum[IH_FRAME_WIDTH_MAX];
@@ -411,7 +411,7 @@ int main(void)
     RUN_TEST(responses_match_scipy);
     RUN_TEST(constants_have_no_response);
     RUN_TEST(slopes_have_no_response);
-    RUN_TEST(the_greatest_responses_fit);
+    RUN_TEST(the_largest_responses_fit);
     RUN_TEST(all_ways_give_what_the_header_says);
     RUN_TEST(groups_above_their_limits_are_listed);
     RUN_TEST(nine_rows_are_read_to_their_ends);

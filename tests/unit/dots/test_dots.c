@@ -584,7 +584,7 @@ static void fill_hard(int32_t width, int32_t height, uint32_t seed)
     }
 }
 
-/* Least and greatest R, and limits of all kinds, around the frame and where none of its rows came yet. */
+/* Lowest and highest R, and limits of all kinds, around the frame and where none of its rows came yet. */
 static void what_was_in_memory_does_not_matter(void)
 {
     static const int32_t sizes[][2] = {{320, 240}, {333, 247}, {1279, 242}};
@@ -730,16 +730,16 @@ static void a_turned_frame_has_turned_dots(void)
     find();
     TEST_ASSERT_EQUAL_INT32(upright.dot_count, dots.dot_count);
     for (i = 0; i < dots.dot_count; i++) {
-        const struct ih_dot *turned = &dots.dot[dots.dot_count - 1 - i];
+        const struct ih_dot *rotated = &dots.dot[dots.dot_count - 1 - i];
 
         /* A unit each: halves are rounded away from zero on both sides. */
         IH_TEST_RANGE((frame.width - 1) * 4096 - upright.dot[i].u_px_q12 - 1,
-                      (frame.width - 1) * 4096 - upright.dot[i].u_px_q12 + 1, turned->u_px_q12, "u",
-                      i);
+                      (frame.width - 1) * 4096 - upright.dot[i].u_px_q12 + 1, rotated->u_px_q12,
+                      "u", i);
         IH_TEST_RANGE((frame.height - 1) * 4096 - upright.dot[i].v_px_q12 - 1,
-                      (frame.height - 1) * 4096 - upright.dot[i].v_px_q12 + 1, turned->v_px_q12,
+                      (frame.height - 1) * 4096 - upright.dot[i].v_px_q12 + 1, rotated->v_px_q12,
                       "v", i);
-        IH_TEST_EQUAL(upright.dot[i].peak, turned->peak, "peak", i);
+        IH_TEST_EQUAL(upright.dot[i].peak, rotated->peak, "peak", i);
     }
 }
 
@@ -780,7 +780,7 @@ static void nothing_is_bright_outside_the_frame(void)
     TEST_ASSERT_FALSE(ih_dots_is_bright(&dots, INT32_MAX, INT32_MIN));
 }
 
-/* The hardest pictures for sums and tables, at the greatest size; they must end and stay sane. */
+/* The hardest pictures for sums and tables, at the largest size; they must end and stay sane. */
 static void extreme_pictures_are_survived(void)
 {
     int32_t kind, i;

@@ -194,9 +194,9 @@ static int32_t block_at(int32_t row, int32_t column)
                        [column < noise.columns ? column : noise.columns - 1];
 }
 
-/* The least of the blocks around a column, in the two rows of blocks whose centres a row lies between; no pixel
- * of the column has less there. */
-static void no_pixel_of_a_block_has_less_than_its_least(void)
+/* The minimum of the blocks around a column, in the two rows of blocks whose centres a row lies between; no pixel
+ * of the column is below it. */
+static void no_pixel_of_a_block_is_below_its_minimum(void)
 {
     int32_t i, u, v;
 
@@ -311,7 +311,7 @@ int main(void)
     RUN_TEST(the_share_has_no_seams);
     RUN_TEST(flat_frames_have_no_noise);
     RUN_TEST(there_are_no_seams);
-    RUN_TEST(no_pixel_of_a_block_has_less_than_its_least);
+    RUN_TEST(no_pixel_of_a_block_is_below_its_minimum);
     RUN_TEST(medians_are_those_of_sorted_values);
     RUN_TEST(dots_are_no_noise);
     RUN_TEST(the_hardest_frames_fit);

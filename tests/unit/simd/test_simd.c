@@ -106,13 +106,90 @@ static void addresses_need_no_alignment(void)
         memset(to, 0, IH_SIMD_BYTES);
         ih_i64_store(to, ih_i64_load((const void *)&bytes[at]));
         TEST_ASSERT_EQUAL_MEMORY(bytes, copy, sizeof bytes);
+        memset(to, 0, IH_SIMD_BYTES);
+        ih_u8_store(to, ih_u8_load((const void *)&bytes[at]));
+        TEST_ASSERT_EQUAL_MEMORY(bytes, copy, sizeof bytes);
+        memset(to, 0, IH_SIMD_BYTES);
+        ih_u16_store(to, ih_u16_load((const void *)&bytes[at]));
+        TEST_ASSERT_EQUAL_MEMORY(bytes, copy, sizeof bytes);
+        memset(to, 0, 2 * IH_SIMD_BYTES);
+        ih_u16_two_store(to, ih_u16_two_load((const void *)&bytes[at]));
+        TEST_ASSERT_EQUAL_MEMORY(bytes, copy, sizeof bytes);
     }
+}
+
+/* Eights of both in turn, clamped. */
+static int packed(const int16_t *first, const int16_t *second, int k)
+{
+    const int value = (k % 16 < 8 ? first : second)[k / 16 * 8 + k % 8];
+
+    return MAX(MIN(value, INT8_MAX), INT8_MIN);
+}
+
+static unsigned sum_of_eight(const uint8_t *byte)
+{
+    unsigned sum = 0;
+    int k;
+
+    for (k = 0; k < 8; k++) {
+        sum += byte[k];
+    }
+    return sum;
+}
+
+static void lanes_of_8_bits(void)
+{
+    CHECK(ih_u8, uint8_t, ih_u8_all(first[0]), (first[0]));
+    CHECK_TO(ih_i16, int16_t, int8_t, ih_i16_pack_eights(a, b), packed(first, second, k));
+    CHECK_TO(ih_u8, uint8_t, uint64_t, ih_u8_sum_eights(a), sum_of_eight(&first[8 * k]));
+}
+
+static struct ih_u16_two two_of(ih_u16 low, ih_u16 high)
+{
+    return (struct ih_u16_two){low, high};
+}
+
+static void two_vectors_of_16_bits(void)
+{
+    uint8_t bytes[IH_U8_LANES];
+
+    CHECK(ih_u16, uint16_t, ih_u16_two_add(two_of(a, b), two_of(b, b)).low, (x + y));
+    CHECK(ih_u16, uint16_t, ih_u16_two_add(two_of(a, b), two_of(b, b)).high, (2 * y));
+    CHECK(ih_u16, uint16_t, ih_u16_two_sub(two_of(a, b), two_of(b, a)).low, (x - y));
+    CHECK(ih_u16, uint16_t, ih_u16_two_sub(two_of(a, b), two_of(b, a)).high, (y - x));
+    fill(bytes, sizeof bytes);
+    CHECK(ih_u16, uint16_t, ih_u16_two_load_u8(bytes).low, (bytes[k]));
+    CHECK(ih_u16, uint16_t, ih_u16_two_load_u8(bytes).high, (bytes[k + IH_I16_LANES]));
+}
+
+static ih_i16 stored_zip(ih_i16 a, ih_i16 b, int half)
+{
+    int16_t lane[2 * IH_I16_LANES];
+
+    ih_i16_store_zip(lane, a, b);
+    return ih_i16_load(&lane[half * IH_I16_LANES]);
+}
+
+static void lanes_change_their_positions(void)
+{
+    int16_t table[3 * IH_I16_LANES];
+
+    fill(table, sizeof table);
+    CHECK(ih_i16, int16_t, stored_zip(a, b, 0), (k % 2 == 0 ? first[k / 2] : second[k / 2]));
+    CHECK(ih_i16, int16_t, stored_zip(a, b, 1),
+          (k % 2 == 0 ? first[(k + IH_I16_LANES) / 2] : second[(k + IH_I16_LANES) / 2]));
+    CHECK(ih_i16, int16_t, ih_i16_load_eights(&table[1], 20), (table[1 + k / 8 * 20 + k % 8]));
+    CHECK(ih_i32, int32_t, ih_i32_even_twice(a), (first[k / 2 * 2]));
 }
 
 static void lanes_of_16_bits(void)
 {
     int bits;
 
+    CHECK(ih_u16, uint16_t, ih_u16_all(first[0]), (first[0]));
+    CHECK(ih_u16, uint16_t, ih_u16_mul_round(a >> 1, b >> 1),
+          (((x >> 1) * (y >> 1) + 16384) >> 15));
+    CHECK(ih_i16, int16_t, ih_i16_abs(a), (x < 0 ? -x : x));
     CHECK(ih_i16, int16_t, ih_i16_all(first[0]), (first[0]));
     CHECK(ih_i16, int16_t, ih_i16_add(a, b), (x + y));
     CHECK(ih_i16, int16_t, ih_i16_sub(a, b), (x - y));
@@ -242,6 +319,23 @@ static uint32_t bits_where_above(const int16_t *x, const int16_t *y)
     return bits;
 }
 
+/* As often as 32 lanes have room for it. */
+static uint32_t bits_of_32(ih_i16 a, ih_i16 b)
+{
+    ih_i16 mask[32 / IH_I16_LANES];
+    int i;
+
+    for (i = 0; i < IH_TEST_COUNT(mask); i++) {
+        mask[i] = i % 2 == 0 ? a : b;
+    }
+    return ih_i16_bits_32(mask);
+}
+
+static uint32_t repeated(uint32_t bits)
+{
+    return IH_I16_LANES == 8 ? bits | bits << 16 : bits;
+}
+
 static void all_lanes_together(void)
 {
     static const int16_t zero[IH_I16_LANES];
@@ -250,6 +344,7 @@ static void all_lanes_together(void)
     CHECK_ONE(ih_i32, int32_t, ih_i32_total(a), total_of_32(first));
     CHECK_ONE(ih_i64, int64_t, ih_i64_total(a), total_of_64(first));
     CHECK_ONE(ih_i16, int16_t, ih_i16_bits(a > b, b > a), bits_where_above(first, second));
+    CHECK_ONE(ih_i16, int16_t, bits_of_32(a > b, b > a), repeated(bits_where_above(first, second)));
     CHECK_ONE(ih_i16, int16_t, ih_i16_any(a), memcmp(first, zero, sizeof zero) != 0);
     CHECK_ONE(ih_i16, int16_t, ih_i16_any(a > b),
               (bits_where_above(first, second) << 16 >> 16) % (1u << IH_I16_LANES) != 0);
@@ -389,7 +484,10 @@ int main(void)
     UNITY_BEGIN();
 #if IH_I16_LANES > 0
     RUN_TEST(addresses_need_no_alignment);
+    RUN_TEST(lanes_of_8_bits);
     RUN_TEST(lanes_of_16_bits);
+    RUN_TEST(two_vectors_of_16_bits);
+    RUN_TEST(lanes_change_their_positions);
     RUN_TEST(lanes_of_32_bits);
     RUN_TEST(lanes_of_64_bits);
     RUN_TEST(sums_of_pairs);
