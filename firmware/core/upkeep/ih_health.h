@@ -43,11 +43,9 @@
 #include "upkeep/ih_rotation_estimate.h"
 #include "upkeep/ih_rotation_vote.h"
 
-/* Frames of a look, and of a search. */
-#define IH_HEALTH_LOOK 6
-#define IH_HEALTH_SEARCH 3
-/* Most looks until a search that found nothing is repeated. */
-#define IH_HEALTH_PAUSE 50
+#define IH_HEALTH_LOOK 6   /* frames */
+#define IH_HEALTH_SEARCH 3 /* frames */
+#define IH_HEALTH_PAUSE 50 /* max looks until a search that found nothing is repeated */
 /* Frames after which everything known about a rig that stays is as good as new, or as a check needs. */
 #define IH_HEALTH_ENOUGH 60
 
@@ -71,9 +69,8 @@ struct ih_health {
     enum ih_health_state state;
     int32_t across_px_q12;   /* mean distance of the last look's labelled dots; -1: none */
     int32_t turn_rad_q30[3]; /* of the rig against the calibration; camera axes */
-    int32_t sigma_rad_q30
-        [3]; /* its uncertainty, one standard deviation; 0 before the first one. While the
-                               * rig is lost that of the turn before: of no use */
+    /* Its uncertainty, one standard deviation; 0 before the first one, of no use while the rig is lost. */
+    int32_t sigma_rad_q30[3];
     bool is_weak_known;                /* the turn across the baseline; if not, it is 0 */
     int32_t dot_count, labelled_count; /* of the last look, in all its frames */
     /* Its own. */

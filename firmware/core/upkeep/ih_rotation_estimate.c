@@ -5,6 +5,7 @@
 
 #include "base/ih_fix.h"
 #include "base/ih_range.h"
+#include "upkeep/ih_rotation_solve.h"
 
 /* The place is wherever the next dot is. */
 #define ANYWHERE INT32_MIN
@@ -19,10 +20,6 @@
 #define DOUBT_PX_Q12 492  /* 0.12 px */
 #define CHANGE_PX_Q12 246 /* 0.06 px */
 #define SURE 5
-/* The prior is at least as wide as this. */
-#define PRIOR_MIN_RAD_Q30 107374 /* 0.1 mrad */
-/* Least determinant of the correlations: below it an axis is not seen at all. */
-#define DETERMINANT_MIN_Q30 (1 << 20)
 /* Beyond this distance known places are of no use for a turned rig. */
 #define TURN_MAX_PX_Q12 4096
 #define PIN_MAX_PX_Q12 8192
@@ -36,32 +33,14 @@
 #define STEEP_MIN_Q12 1365
 /* Solutions one after the other: the first trusts all slots alike, the others as the one before says. */
 #define PASSES 4
-/* Row and column of a packed entry. */
-static const int8_t packed[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
-
-/* Once in flash, not wherever they are needed: this and limited. */
-__attribute__((noinline)) static int64_t div_round(int64_t numerator, int64_t denominator)
-{
-    return ih_div_round(numerator, denominator);
-}
-
-/* Sums over slots, each with its weight. */
+/* What is summed over slots, and how. */
 struct totals {
-    int64_t normal_q16[6]; /* weight times slope times slope: xx, xy, xz, yy, yz, zz */
-    int64_t right_q24[3];  /* weight times slope times distance */
-    int64_t whole_q8;      /* see whole */
+    struct ih_rotation_sums sums;
+    int64_t whole_q8; /* see whole */
     int32_t slot_count;
     int32_t doubt_px_q12;         /* how far a slot may err, before a turn is sure */
     int64_t half_q24;             /* 3 s^2 */
     const int32_t *about_rad_q30; /* the turn that says how far slots are trusted; NULL: all are */
-};
-
-/* The equations in units in which the diagonal is 1, and their cofactors. */
-struct equations {
-    int64_t root_q8[3]; /* of the diagonal: px per rad and root of the dots' number */
-    int64_t right_px_q16[3];
-    int64_t cofactor_q30[3][3];
-    int64_t determinant_q30;
 };
 
 void ih_rotation_estimate_clear(struct ih_rotation_estimate *places)
@@ -94,8 +73,8 @@ static void weigh(int64_t across_px_q12, int64_t reach_px_q12, int64_t *weight_q
 
 static void scale_sums(struct ih_dot_place_sums *sums, int64_t part, int64_t whole)
 {
-    sums->weight_q8 = (int32_t)div_round(sums->weight_q8 * part, whole);
-    sums->pull_q20 = (int32_t)div_round(sums->pull_q20 * part, whole);
+    sums->weight_q8 = (int32_t)ih_rotation_div_round(sums->weight_q8 * part, whole);
+    sums->pull_q20 = (int32_t)ih_rotation_div_round(sums->pull_q20 * part, whole);
 }
 
 /* Of n frames on a place n / (1 + n / 20); the same share of the rest. */
@@ -201,23 +180,18 @@ static int64_t move_px_q12(const int32_t slope_px_q4[3], const int32_t turn_rad_
     return ih_shift_round(sum_q34, 22);
 }
 
-__attribute__((noinline)) static int64_t limited(int64_t value, int64_t max)
-{
-    return value > max ? max : value < -max ? -max : value;
-}
-
 /* Where all dots move by d, their weighted mean moves by less, as the weights move too: by rise / weight.
  * At least a third, else the weights have lost the dots. */
 static int64_t share_q8(const struct ih_rotation_estimate *places)
 {
     int64_t rise_q8 =
         places->rise_q8 * 3 > places->weight_q8 ? places->rise_q8 : places->weight_q8 / 3;
-    return div_round(rise_q8 * 256, places->weight_q8);
+    return ih_rotation_div_round(rise_q8 * 256, places->weight_q8);
 }
 
 static int64_t whole(int64_t value, int64_t share)
 {
-    return div_round(value * 256, share);
+    return ih_rotation_div_round(value * 256, share);
 }
 
 /* What a turn leaves of a slot's pull, as if the weights stayed. Weights of 2^18, moves of 2^22.7: 2^40.7. */
@@ -232,8 +206,9 @@ static int64_t left_of_q20(const struct ih_dot_place_sums *sum, const struct tot
 static int64_t mean_left_q12(const struct ih_dot_place_sums *sum, const struct totals *totals,
                              const int32_t slope_px_q4[3], const int32_t turn_rad_q30[3])
 {
-    return limited(div_round(left_of_q20(sum, totals, slope_px_q4, turn_rad_q30), sum->weight_q8),
-                   LEFT_MAX_PX_Q12);
+    return ih_rotation_limit(
+        ih_rotation_div_round(left_of_q20(sum, totals, slope_px_q4, turn_rad_q30), sum->weight_q8),
+        LEFT_MAX_PX_Q12);
 }
 
 /* Everything known of a slot, as far as it is trusted: of what the turn leaves of its mean, Cauchy's weight
@@ -246,7 +221,7 @@ static struct ih_dot_place_sums trusted_sum_of(const struct ih_dot_place *place,
     struct ih_dot_place_sums sum = sum_of(place);
     if (sum.weight_q8 > 0 && totals->about_rad_q30 != NULL) {
         int64_t mean_q12 = mean_left_q12(&sum, totals, slope_px_q4, totals->about_rad_q30);
-        int64_t half_q24 = totals->half_q24 + div_round(one_q32, sum.weight_q8);
+        int64_t half_q24 = totals->half_q24 + ih_rotation_div_round(one_q32, sum.weight_q8);
         scale_sums(&sum, half_q24, half_q24 + mean_q12 * mean_q12);
     }
     return sum;
@@ -267,7 +242,7 @@ static int64_t scatter_q24(const struct ih_rotation_estimate *places,
             weight_q8 += sum.weight_q8;
         }
     }
-    return div_round(square_q32, weight_q8);
+    return ih_rotation_div_round(square_q32, weight_q8);
 }
 
 /* Weights of a slot are at most 2^17.9, slopes 2^18, slots 2^8.5: 2^62.4; of the right side, with pulls of 2^28.4,
@@ -275,24 +250,24 @@ static int64_t scatter_q24(const struct ih_rotation_estimate *places,
 static void add_up(const struct ih_rotation_estimate *places,
                    const struct ih_rotation_vote_slopes *slopes, struct totals *out)
 {
-    memset(out->normal_q16, 0, sizeof out->normal_q16);
-    memset(out->right_q24, 0, sizeof out->right_q24);
+    memset(out->sums.normal_q16, 0, sizeof out->sums.normal_q16);
+    memset(out->sums.right_q24, 0, sizeof out->sums.right_q24);
     out->whole_q8 = share_q8(places);
     out->slot_count = 0;
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
         const int32_t *slope = slopes->px_q4[slot];
         struct ih_dot_place_sums sum = trusted_sum_of(&places->slot[slot], slope, out);
         for (int row = 0; row < 3; row++) {
-            out->right_q24[row] += (int64_t)sum.pull_q20 * slope[row];
+            out->sums.right_q24[row] += (int64_t)sum.pull_q20 * slope[row];
             for (int column = row; column < 3; column++) {
-                out->normal_q16[packed[row][column]] +=
+                out->sums.normal_q16[ih_rotation_packed[row][column]] +=
                     (int64_t)sum.weight_q8 * slope[row] * slope[column];
             }
         }
         out->slot_count += sum.weight_q8 > 0;
     }
     for (int row = 0; row < 3; row++) {
-        out->right_q24[row] = whole(out->right_q24[row], out->whole_q8);
+        out->sums.right_q24[row] = whole(out->sums.right_q24[row], out->whole_q8);
     }
 }
 
@@ -303,100 +278,21 @@ static void pin(const struct ih_rotation_estimate *places,
                 const struct ih_rotation_vote_slopes *slopes, const int32_t axis_q30[2],
                 const int32_t offset_rad_q30[3], struct totals *sums)
 {
-    int64_t hold_q36 = (sums->normal_q16[0] / 4 + sums->normal_q16[3] / 4) >> 20;
+    int64_t hold_q36 = (sums->sums.normal_q16[0] / 4 + sums->sums.normal_q16[3] / 4) >> 20;
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
         const int32_t *slope = slopes->px_q4[slot];
-        int64_t move = limited(move_px_q12(slope, offset_rad_q30), PIN_MAX_PX_Q12);
+        int64_t move = ih_rotation_limit(move_px_q12(slope, offset_rad_q30), PIN_MAX_PX_Q12);
         struct ih_dot_place_sums sum = trusted_sum_of(&places->slot[slot], slope, sums);
         for (int row = 0; row < 3; row++) {
-            sums->right_q24[row] -= sum.weight_q8 * move * slope[row];
+            sums->sums.right_q24[row] -= sum.weight_q8 * move * slope[row];
         }
     }
     for (int row = 0; row < 2; row++) {
         for (int column = row; column < 2; column++) {
             int64_t both_q20 = ih_mul_shift(axis_q30[row], axis_q30[column], 40);
-            sums->normal_q16[packed[row][column]] += hold_q36 * both_q20;
+            sums->sums.normal_q16[ih_rotation_packed[row][column]] += hold_q36 * both_q20;
         }
     }
-}
-
-static void fill_cofactors(const int64_t c_q30[3][3], struct equations *out)
-{
-    for (int row = 0; row < 3; row++) {
-        int r1 = (row + 1) % 3;
-        int r2 = (row + 2) % 3;
-        for (int column = 0; column < 3; column++) {
-            int c1 = (column + 1) % 3;
-            int c2 = (column + 2) % 3;
-            out->cofactor_q30[row][column] =
-                ih_shift_round(c_q30[r1][c1] * c_q30[r2][c2] - c_q30[r1][c2] * c_q30[r2][c1], 30);
-        }
-    }
-    out->determinant_q30 = 0;
-    for (int column = 0; column < 3; column++) {
-        out->determinant_q30 += ih_mul_shift(c_q30[0][column], out->cofactor_q30[0][column], 30);
-    }
-}
-
-/* Sums with a prior of that precision about the calibration, from which the rig is turned already. An
- * entry of the matrix is at most the product of its roots, so entries over roots stay below 2^31. */
-static void scale(const struct totals *sums, int64_t precision_q16, const int32_t turned_rad_q30[3],
-                  struct equations *out)
-{
-    int64_t c_q30[3][3];
-    for (int i = 0; i < 3; i++) {
-        int64_t diagonal_q16 = sums->normal_q16[packed[i][i]] + precision_q16;
-        int64_t pull_q24 = ih_mul_shift(precision_q16 >> 8, turned_rad_q30[i], 14);
-        out->root_q8[i] = (int64_t)ih_isqrt_u64((uint64_t)diagonal_q16) + 1;
-        out->right_px_q16[i] = div_round(sums->right_q24[i] - pull_q24, out->root_q8[i]);
-    }
-    for (int row = 0; row < 3; row++) {
-        c_q30[row][row] = (int64_t)1 << 30;
-        for (int column = row + 1; column < 3; column++) {
-            int64_t part_q8 = div_round(sums->normal_q16[packed[row][column]], out->root_q8[row]);
-            c_q30[row][column] = div_round(part_q8 * ((int64_t)1 << 30), out->root_q8[column]);
-            c_q30[column][row] = c_q30[row][column];
-        }
-    }
-    fill_cofactors(c_q30, out);
-}
-
-/* Right sides are below 2^7.5 px times the root of the dots' number, 2^24 in Q16; three products with
- * cofactors of up to 2 in Q30: 2^57. */
-static void solve(const struct equations *e, int32_t turn_rad_q30[3])
-{
-    for (int i = 0; i < 3; i++) {
-        int64_t sum_q46 = 0;
-        for (int k = 0; k < 3; k++) {
-            sum_q46 += e->cofactor_q30[i][k] * e->right_px_q16[k];
-        }
-        int64_t part_px_q16 = div_round(sum_q46, e->determinant_q30);
-        turn_rad_q30[i] =
-            ih_clamp_s32(ih_saturate_s32(div_round(part_px_q16 * (1 << 22), e->root_q8[i])),
-                         -2 * IH_ROTATION_VOTE_MAX_RAD_Q30, 2 * IH_ROTATION_VOTE_MAX_RAD_Q30);
-    }
-}
-
-static int64_t length_rad_q30(const int32_t a_rad_q30[3], const int32_t b_rad_q30[3])
-{
-    int64_t sum = 0;
-    for (int i = 0; i < 3; i++) {
-        int64_t part = (int64_t)a_rad_q30[i] + b_rad_q30[i];
-        sum += part * part;
-    }
-    return (int64_t)ih_isqrt_u64((uint64_t)sum);
-}
-
-/* How much a slot's distance, weighted, turns the solution about an axis, in units of its root. A weight is
- * at least a step, so slopes over roots are at most 16; with cofactors of 2 in Q30: 2^62.6 for three. */
-static int64_t lever_q26(const struct equations *e, const int32_t slope_px_q4[3], int axis)
-{
-    int64_t sum_q56 = 0;
-    for (int k = 0; k < 3; k++) {
-        int64_t part_q26 = div_round(slope_px_q4[k] * ((int64_t)1 << 30), e->root_q8[k]);
-        sum_q56 += e->cofactor_q30[axis][k] * part_q26;
-    }
-    return limited(div_round(sum_q56, e->determinant_q30), (int64_t)1 << 32);
 }
 
 /* Root of the sum of squares, px in Q16 below 2^31. */
@@ -409,15 +305,17 @@ static int64_t with_standing_q16(uint64_t square_q32, uint64_t weight_q32, int64
 /* Of a slot's trusted weight w v, what is left of it when its mean moves: v less as it falls, w v (2 v - 1). */
 static int64_t steepness_q8(int64_t weight_q8, int64_t trusted_q8)
 {
-    return weight_q8 > 0 ? div_round(2 * trusted_q8 * trusted_q8, weight_q8) - trusted_q8 : 0;
+    return weight_q8 > 0
+               ? ih_rotation_div_round(2 * trusted_q8 * trusted_q8, weight_q8) - trusted_q8
+               : 0;
 }
 
 /* What slots leave unexplained is held below 2^28, times a lever of 2^32: 2^60. Squares of 2^26 add up to 2^60.5.
  * Weights of 2^17.9 and slots in Q12: 2^38.4. */
 static void judge(const struct ih_rotation_estimate *places,
-                  const struct ih_rotation_vote_slopes *slopes, const struct equations *e,
-                  const struct totals *sums, const int32_t offset_rad_q30[3],
-                  struct ih_rotation_estimate_turn *out)
+                  const struct ih_rotation_vote_slopes *slopes,
+                  const struct ih_rotation_equations *e, const struct totals *sums,
+                  const int32_t offset_rad_q30[3], struct ih_rotation_estimate_turn *out)
 {
     int32_t turn_rad_q30[3];
     uint64_t square_q32[3] = {0, 0, 0};
@@ -433,62 +331,29 @@ static void judge(const struct ih_rotation_estimate *places,
         steep_q8 += steepness_q8(sum_of(&places->slot[slot]).weight_q8, sum.weight_q8);
         trusted_q8 += sum.weight_q8;
         int64_t left_q20 =
-            limited(left_of_q20(&sum, sums, slope, turn_rad_q30), (int64_t)PULL_MAX_Q20);
+            ih_rotation_limit(left_of_q20(&sum, sums, slope, turn_rad_q30), (int64_t)PULL_MAX_Q20);
         for (int i = 0; sum.weight_q8 > 0 && i < 3; i++) {
-            int64_t lever = lever_q26(e, slope, i);
-            int64_t left_q16 = limited(ih_shift_round(left_q20 * lever, 30), 1 << 26);
-            int64_t own_q16 = limited(ih_shift_round(sum.weight_q8 * lever, 18), 1 << 26);
+            int64_t lever = ih_rotation_lever_q26(e, slope, i);
+            int64_t left_q16 = ih_rotation_limit(ih_shift_round(left_q20 * lever, 30), 1 << 26);
+            int64_t own_q16 = ih_rotation_limit(ih_shift_round(sum.weight_q8 * lever, 18), 1 << 26);
             square_q32[i] += (uint64_t)(left_q16 * left_q16);
             weight_q32[i] += (uint64_t)(own_q16 * own_q16);
         }
     }
     int64_t sure = 0;
-    int64_t steep_q12 = div_round(steep_q8 * 4096, trusted_q8 + 1);
-    int64_t unit_q22 =
-        div_round((int64_t)1 << 34, steep_q12 > STEEP_MIN_Q12 ? steep_q12 : STEEP_MIN_Q12);
+    int64_t steep_q12 = ih_rotation_div_round(steep_q8 * 4096, trusted_q8 + 1);
+    int64_t unit_q22 = ih_rotation_div_round((int64_t)1 << 34,
+                                             steep_q12 > STEEP_MIN_Q12 ? steep_q12 : STEEP_MIN_Q12);
     for (int i = 0; i < 3; i++) {
         int64_t sigma_q16 = with_standing_q16(square_q32[i], weight_q32[i], SLOT_PX_Q12);
         int64_t doubt_q16 = with_standing_q16(square_q32[i], weight_q32[i], sums->doubt_px_q12);
-        int64_t doubt_rad_q30 = div_round(doubt_q16 * unit_q22, e->root_q8[i]);
+        int64_t doubt_rad_q30 = ih_rotation_div_round(doubt_q16 * unit_q22, e->root_q8[i]);
         int64_t part_rad_q30 = ih_abs_s32(out->turn_rad_q30[i]);
-        out->sigma_rad_q30[i] = ih_saturate_s32(div_round(sigma_q16 * unit_q22, e->root_q8[i]));
+        out->sigma_rad_q30[i] =
+            ih_saturate_s32(ih_rotation_div_round(sigma_q16 * unit_q22, e->root_q8[i]));
         sure += part_rad_q30 >= SURE * doubt_rad_q30 ? part_rad_q30 * part_rad_q30 : 0;
     }
     out->sure_rad_q30 = (int32_t)ih_isqrt_u64((uint64_t)sure);
-}
-
-/* The turn with a prior of that width about the calibration. False: an axis is not seen at all. */
-static bool solve_with(const struct totals *sums, int64_t noise_px_q12, int64_t prior_rad_q30,
-                       const int32_t from_rad_q30[3], struct equations *equations,
-                       int32_t turn_rad_q30[3])
-{
-    int64_t root_q8 = div_round(noise_px_q12 * (1 << 26), prior_rad_q30);
-    scale(sums, root_q8 * root_q8, from_rad_q30, equations);
-    if (equations->determinant_q30 < DETERMINANT_MIN_Q30) {
-        return false;
-    }
-    solve(equations, turn_rad_q30);
-    return true;
-}
-
-/* The prior is wide at first, then as wide as the whole turn that was found with it. False: an axis is not seen. */
-static bool solve_twice(const struct totals *sums, int64_t noise_px_q12,
-                        const int32_t from_rad_q30[3], struct equations *wide,
-                        int32_t turn_rad_q30[3])
-{
-    const int32_t none[3] = {0, 0, 0};
-    const int32_t limit[3] = {IH_ROTATION_VOTE_MAX_RAD_Q30, IH_ROTATION_VOTE_MAX_RAD_Q30,
-                              IH_ROTATION_VOTE_MAX_RAD_Q30};
-    struct equations narrow;
-    bool is_solved = solve_with(sums, noise_px_q12, length_rad_q30(limit, none), from_rad_q30, wide,
-                                turn_rad_q30);
-    for (int i = 0; is_solved && i < 2; i++) {
-        int64_t prior_rad_q30 = length_rad_q30(from_rad_q30, turn_rad_q30);
-        prior_rad_q30 = prior_rad_q30 > PRIOR_MIN_RAD_Q30 ? prior_rad_q30 : PRIOR_MIN_RAD_Q30;
-        is_solved =
-            solve_with(sums, noise_px_q12, prior_rad_q30, from_rad_q30, &narrow, turn_rad_q30);
-    }
-    return is_solved;
 }
 
 /* held: the axis about which the turn is what offset says, or NULL. Judged with the wide prior: a narrow one holds
@@ -502,7 +367,7 @@ static bool estimate(const struct ih_rotation_estimate *places,
     int64_t noise_q12 =
         (int64_t)ih_isqrt_u64((uint64_t)(places->square_q32 / places->weight_q8)) + 1;
     int32_t from_rad_q30[3], about_rad_q30[3];
-    struct equations wide;
+    struct ih_rotation_equations wide;
     struct totals sums = {.about_rad_q30 = NULL, .doubt_px_q12 = doubt_px_q12};
     for (int i = 0; i < 3; i++) {
         from_rad_q30[i] = turned_rad_q30[i] + offset_rad_q30[i];
@@ -513,7 +378,7 @@ static bool estimate(const struct ih_rotation_estimate *places,
             pin(places, slopes, held_q30, offset_rad_q30, &sums);
         }
         if (sums.slot_count < SLOTS_MIN ||
-            !solve_twice(&sums, noise_q12, from_rad_q30, &wide, out->turn_rad_q30)) {
+            !ih_rotation_solve(&sums.sums, noise_q12, from_rad_q30, &wide, out->turn_rad_q30)) {
             return false;
         }
         for (int i = 0; i < 3 && pass < PASSES - 1; i++) {
@@ -587,9 +452,9 @@ static void subtract(const struct ih_dot_place *late, const struct ih_dot_place 
         int64_t pull_q28 = (int64_t)of_late.pull_q20 * of_all.weight_q8 -
                            (int64_t)of_all.pull_q20 * of_late.weight_q8;
         out->at[IH_ROTATION_ESTIMATE_KNOWN].weight_q8 =
-            (int32_t)div_round((int64_t)of_late.weight_q8 * of_all.weight_q8, both_q8);
+            (int32_t)ih_rotation_div_round((int64_t)of_late.weight_q8 * of_all.weight_q8, both_q8);
         out->at[IH_ROTATION_ESTIMATE_KNOWN].pull_q20 =
-            (int32_t)limited(div_round(pull_q28, both_q8), PULL_MAX_Q20);
+            (int32_t)ih_rotation_limit(ih_rotation_div_round(pull_q28, both_q8), PULL_MAX_Q20);
     }
 }
 
@@ -631,7 +496,7 @@ void ih_rotation_estimate_turn(struct ih_rotation_estimate *places,
         for (int i = 0; i <= IH_ROTATION_ESTIMATE_KNOWN; i++) {
             struct ih_dot_place_sums *sums = &place->at[i];
             int64_t left_q20 = sums->pull_q20 - ih_shift_round(sums->weight_q8 * move * share, 8);
-            sums->pull_q20 = (int32_t)limited(left_q20, PULL_MAX_Q20);
+            sums->pull_q20 = (int32_t)ih_rotation_limit(left_q20, PULL_MAX_Q20);
         }
     }
 }
