@@ -242,6 +242,10 @@ enum ih_err isohead_label(struct isohead *head, const struct ih_frame *frame,
 
 void isohead_find(struct isohead *head, int64_t time_us)
 {
+    const struct ih_calibration *c = &head->rig.calibration;
+    if (c->kind == IH_RIG_RANGE || c->width == 0) {
+        return; /* isohead_label or isohead_init was refused: the outputs are cleared, and no line is set */
+    }
     begin(head, time_us);
     ih_points_from_labels(&head->labels, &head->rig, &head->points);
     look(head, &head->dots);

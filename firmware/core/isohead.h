@@ -1,11 +1,11 @@
 /* isohead - find a person's head in 3-D from one frame of 361 laser dots.
  *
- * The whole of isohead behind three calls:
+ * A library in three calls:
  *
  *     static struct isohead head;              // the only memory there is
  *     isohead_init(&head, &calibration, &bad); // checks the rig once
  *     isohead_frame(&head, &frame, NULL, time_us); // every frame: dots .. heads
- *     head.result ...                          // the result; every stage's output is beside it
+ *     head.result ...                          // every stage's output is a member, too
  *
  * The frame is a camera frame for a dot rig, a depth image for a range rig. Integer arithmetic
  * only; the same frame gives the same bytes on every processor. Not thread-safe per struct; two
@@ -58,7 +58,7 @@ struct ih_params {
 struct isohead {
     struct ih_rig rig;
     struct ih_params params;
-    /* What is known from the frames before. */
+    /* From the frames before. */
     struct ih_tracks tracks;
     /* The stages' outputs of the last frame, in order. */
     struct ih_dots dots;
@@ -87,7 +87,7 @@ struct isohead {
 IH_BEGIN_DECLS
 
 void ih_params_default(struct ih_params *params);
-/* The paper's method alone: is_paper set, a finer surface, and nests that must be heads by themselves. */
+/* The paper's method alone: is_paper set, a finer surface, and each nest judged by its own shape. */
 void ih_params_paper(struct ih_params *params);
 
 /* Check the calibration, derive the rig, set default parameters. After an error every frame is
@@ -96,19 +96,19 @@ enum ih_err isohead_init(struct isohead *head, const struct ih_calibration *cali
                          int32_t *bad_slot) __attribute__((warn_unused_result));
 
 /* Process one frame that was taken at time_us, which may have any origin. ambient: the last frame
- * that was taken with the laser off, or NULL; it takes what is no dot away and should be as fresh as
- * possible. A range rig ignores it. IH_ERR_SIZE when one of them is not of the rig's size or its view
- * is malformed, IH_ERR_KIND when it does not have 1 or 2 bytes per sample, or a range rig's not 2;
- * then the outputs are those of an empty frame, and tracks stay as they were. */
+ * that was taken with the laser off, or NULL; it is subtracted as ambient light and should be as fresh
+ * as possible. A range rig ignores it. IH_ERR_SIZE when one of them is not of the rig's size or its
+ * view is malformed, IH_ERR_KIND when it does not have 1 or 2 bytes per sample, or a range rig's not
+ * 2; then the outputs are those of an empty frame, and tracks stay as they were. */
 enum ih_err isohead_frame(struct isohead *head, const struct ih_frame *frame,
                           const struct ih_frame *ambient, int64_t time_us)
     __attribute__((warn_unused_result));
 
 /* isohead_frame in two halves, for a dot rig whose caller does not know whether the dots were on
- * when the frame was taken, and decides from head->labels whether it counts. isohead_label fills
+ * when the frame was taken, and decides from head->labels whether it is used. isohead_label fills
  * head->dots and head->labels, leaves all other outputs empty and the tracks as they were; a range
  * rig is IH_ERR_KIND. It may be called again, with an ambient frame this time. isohead_find goes on
- * from there, once per frame that counts. */
+ * from there, once per frame that is used; without a dot rig it does nothing. */
 enum ih_err isohead_label(struct isohead *head, const struct ih_frame *frame,
                           const struct ih_frame *ambient) __attribute__((warn_unused_result));
 void isohead_find(struct isohead *head, int64_t time_us);

@@ -696,6 +696,35 @@ static void a_bad_calibration_is_refused(void)
     TEST_ASSERT_EQUAL_INT32(77, bad_slot);
 }
 
+/* After a refused isohead_init, and after a refused isohead_label with either kind of rig. */
+static void nothing_is_found_after_a_refusal(void)
+{
+    struct ih_calibration c = vector_rigs[0];
+    int32_t bad_slot;
+
+    c.ray_q30[77][2] = 0;
+    TEST_ASSERT_EQUAL_INT(IH_ERR_RAY, isohead_init(&head, &c, &bad_slot));
+    isohead_find(&head, 0);
+    TEST_ASSERT_EQUAL_INT32(0, head.result.entry_count);
+    TEST_ASSERT_EQUAL_INT(IH_ERR_SIZE, isohead_label(&head, &frame, NULL));
+    isohead_find(&head, 0);
+    check_empty("no rig");
+
+    start_range(640, 480);
+    TEST_ASSERT_EQUAL_INT(IH_ERR_KIND, isohead_label(&head, &frame, NULL));
+    isohead_find(&head, 0);
+    check_empty("a range rig");
+
+    start(&head, 0);
+    view8(&head);
+    frame.width--;
+    TEST_ASSERT_EQUAL_INT(IH_ERR_SIZE, isohead_label(&head, &frame, NULL));
+    isohead_find(&head, 0);
+    check_empty("a frame of another size");
+    TEST_ASSERT_EQUAL_INT32(0, head.result.entry_count);
+    TEST_ASSERT_EQUAL_INT32(IH_NONE, head.result.selected);
+}
+
 /* Every parameter has a default: nothing of what was there before is left, and the method is ours. */
 static void defaults_fill_every_parameter(void)
 {
@@ -795,6 +824,7 @@ int main(void)
     RUN_TEST(the_frame_and_the_rig_are_left_alone);
     RUN_TEST(noise_is_survived);
     RUN_TEST(a_bad_calibration_is_refused);
+    RUN_TEST(nothing_is_found_after_a_refusal);
     RUN_TEST(defaults_fill_every_parameter);
     RUN_TEST(defaults_are_those_of_the_references);
     RUN_TEST(the_state_keeps_to_its_budget);

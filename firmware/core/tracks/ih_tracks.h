@@ -7,28 +7,23 @@
  *        frame follows the detections as a predicted one.
  * Method: each track has a Kalman filter (ih_kalman). ih_tracks_expect moves the tracks to the
  *        frame's time and says where heads are expected; ih_tracks_update then
- *        1. assigns detections to tracks, the best pair first: within the gate, and log-odds above
- *           keep_logit even if it would not start a track.
+ *        1. assigns detections to tracks, the best pair first: within the gate and above keep_logit.
  *        2. ends a track without a convincing detection when more than through_percent of the rays
- *           through its head go on and fewer than front_percent are stopped before it: the seat is
- *           empty; or when fewer than 4 rays meet it: it has left the pattern. A frame in which fewer
- *           than seen_min points were seen is lost and shows neither.
- *        3. lets the other tracks coast, slowing down, for at most coast_us. If fewer than
- *           front_percent of the rays are stopped before the head and the frame is not lost, nothing
- *           hides it: that counts as a detection with log-odds keep_logit. A track that is no head yet
- *           ends with the first frame without a detection, and so does the younger of two tracks
- *           within 80 mm.
+ *           through its head go on and fewer than front_percent are stopped before it, as over an empty
+ *           seat, or when fewer than 4 rays meet it: it has left the pattern. A frame with fewer than
+ *           seen_min points is lost and shows neither.
+ *        3. lets the other tracks coast, slowing down, for at most coast_us. Where nothing hides the
+ *           head and the frame is not lost, that counts as a detection with log-odds keep_logit. A
+ *           track that is no head yet ends with the first frame without a detection, and so does the
+ *           younger of two tracks within 80 mm.
  *        4. starts tracks with the remaining detections above start_logit, while there is room.
- *        A track's log-odds are a running mean of its detections'; it is a head above
- *        start_head_logit, from its mature_detections-th detection on above accept_logit, until it
- *        falls below drop_logit.
+ *        A track's log-odds are a running mean of its detections'.
  *        The selected head is the one nearest the middle of the pattern (or the leftmost or
  *        rightmost in the picture, by side) of those not much less probable than the best, a detected
  *        one before a predicted one; another one replaces it after switch_frames frames.
  * Time:  frames may come late, be lost, or jump: a step back, or forward by more than gap_us,
  *        removes all tracks; ids go on, after the largest from 1 again.
- * Overflow: predicted centres are below 2^26 in Q8, detected ones below 2^27: squared distances
- *        below 2^57.6.
+ * Overflow: centres are below 2^27 in Q8, squared distances below 2^57.6.
  * Cost:  tracks x detections distances.
  */
 #ifndef IH_TRACKS_H
