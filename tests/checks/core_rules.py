@@ -120,9 +120,12 @@ def check_limit(rule, what, size, limit):
 
 
 def check_commands(path):
+    # The tests build the same sources once more, with other vectors: those are not the library.
     with open(path, encoding="utf-8") as file:
         commands = {os.path.realpath(os.path.join(c["directory"], c["file"])):
-                    c.get("command") or " ".join(c["arguments"]) for c in json.load(file)}
+                    command for c in json.load(file)
+                    for command in [c.get("command") or " ".join(c["arguments"])]
+                    if not re.search(r"/isohead_core_\w+\.dir/", command)}
     for source in core_sources():
         command = commands.get(os.path.realpath(source))
         if command is None:
