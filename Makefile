@@ -108,7 +108,7 @@ mutation: sim ## would the tests notice? Mistakes made in the core one at a time
 	@tools/setup.sh mutation
 	@$(BUILD)/host/tests/golden/golden_pack $(BUILD)/golden.bin \
 	  $(foreach n,1 2,$(addprefix frames/sequence$n/,rig.json 000024.pgm 000025.pgm 000026.pgm))
-	@/usr/bin/python3 tests/checks/mutation.py --count $(MUTANTS) --least $(CAUGHT_MIN) --unity $(abspath $(UNITY_DIR)) \
+	@/usr/bin/python3 tests/checks/mutation.py --count $(MUTANTS) --min $(CAUGHT_MIN) --unity $(abspath $(UNITY_DIR)) \
 	  --golden $(BUILD)/golden.bin
 
 fuzz: ## fuzz every target with libFuzzer and AFL++, FUZZ_SECONDS each (default 60) or FUZZ_RUNS; a table

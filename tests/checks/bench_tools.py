@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The benchmark's own judgement: results that do not agree are refused, bounds that are passed are told.
+"""The benchmark's own judgement: results that do not agree are refused, bounds that are passed are reported.
 
 Results are made here, as bench_isohead and bench_peer print them, and spoilt one way at a time.
 """

@@ -40,11 +40,11 @@ def under_lanes(lines):
     for line in lines:
         found = CONDITION.match(line.strip())
         if found:
-            kind, rest = found.groups()
+            kind, condition = found.groups()
             if kind in ("if", "ifdef", "ifndef"):
-                stack.append(bool(LANES.search(rest)))
+                stack.append(bool(LANES.search(condition)))
             elif kind == "elif" and stack:
-                stack[-1] = bool(LANES.search(rest))
+                stack[-1] = bool(LANES.search(condition))
             elif kind == "else" and stack:
                 stack[-1] = False
             elif stack:

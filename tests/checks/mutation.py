@@ -8,11 +8,11 @@ A mutant is one of
   no C         does not compile; not counted
   equivalent   gcc -O2 makes the same object code of it as of the original; not counted
   caught       a test fails, crashes, or needs CPU_TIMES as much of the processor as without the
-               mutant, CPU_LEAST_S at least
+               mutant, CPU_MIN_S at least
   golden       no test fails, but the golden set's hashes of every stage's output differ
   alive        nobody noticed
 
-mutation.py [--count N] [--least PERCENT] [--seed N] [--stage NAME]... [--jobs N] [--unity DIR]
+mutation.py [--count N] [--min PERCENT] [--seed N] [--stage NAME]... [--jobs N] [--unity DIR]
             [--golden FILE]
             the mutants that live, the table per stage, and exit status 1 when fewer than PERCENT
             of them are caught by tests alone. The mutants are drawn by the seed, of
@@ -39,7 +39,7 @@ import mutation_sites as sites
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 CPU_TIMES = 6
-CPU_LEAST_S = 2
+CPU_MIN_S = 2
 RESULTS = ("no C", "equivalent", "caught", "golden", "alive")
 
 COMPILE_CORE = ["gcc", "-std=c11", "-O2", "-ffp-contract=off", "-mgeneral-regs-only", "-w", "-I.", "-c"]
@@ -162,7 +162,7 @@ def included_source(test):
 
 def limited(program, seconds):
     """The command for a program that must not run for ever; how busy the machine is is no matter."""
-    return ["prlimit", "--cpu=%d" % math.ceil(max(CPU_LEAST_S, CPU_TIMES * seconds)), program]
+    return ["prlimit", "--cpu=%d" % math.ceil(max(CPU_MIN_S, CPU_TIMES * seconds)), program]
 
 
 def fails(program, seconds):
@@ -231,7 +231,7 @@ class Trial:
             return False
         program = os.path.join(self.folder, "golden")
         self.bench.link(self.bench.golden_objects, program, self.library)
-        done = subprocess.run(limited(program, CPU_LEAST_S) + [self.bench.golden_file], text=True,
+        done = subprocess.run(limited(program, CPU_MIN_S) + [self.bench.golden_file], text=True,
                               stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, check=False)
         return done.stdout != self.bench.golden_hashes
 
@@ -263,7 +263,7 @@ def mutated_sources(core):
             if name.endswith(".c") or "static inline" in read(os.path.join(core, name))]
 
 
-def shares(weights, count):
+def fractions(weights, count):
     """Whole numbers in proportion to the weights, at least 1 each, that add up to count or more."""
     total = sum(weights.values())
     return {name: max(1, round(count * weight / total)) for name, weight in weights.items()}
@@ -323,7 +323,7 @@ def report(bench, quota, seed, jobs):
 def check(arguments):
     tests = [path for path in sorted(glob.glob(ROOT + "/tests/unit/**/test_*.c", recursive=True)) if is_of_core(path)]
     core = os.path.join(ROOT, "firmware", "core")
-    quota = shares({name: len(sites.mutants(read(os.path.join(core, name))))
+    quota = fractions({name: len(sites.mutants(read(os.path.join(core, name))))
                     for name in mutated_sources(core)}, arguments.count)
     if arguments.stage:
         quota = {name: quota[name] for name in quota
@@ -334,9 +334,9 @@ def check(arguments):
         total = report(bench, quota, arguments.seed, arguments.jobs)
     caught = rate(total, "caught")
     counted = sum(total[name] for name in ("caught", "golden", "alive"))
-    bad = caught < arguments.least
+    bad = caught < arguments.min
     print("mutation: %d mutants, tests alone catch %.1f %%, at least %.0f%s; with the golden set %.1f %%; "
-          "%.0f s" % (counted, caught, arguments.least, ": NOT reached" if bad else "",
+          "%.0f s" % (counted, caught, arguments.min, ": NOT reached" if bad else "",
                       rate(total, "caught", "golden"), time.monotonic() - begin))
     return 1 if bad else 0
 
@@ -353,7 +353,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--count", type=int, default=500)
-    parser.add_argument("--least", type=float, default=85.0, metavar="PERCENT")
+    parser.add_argument("--min", type=float, default=85.0, metavar="PERCENT")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--stage", action="append", help="only this one; dots, isohead ...")
     parser.add_argument("--jobs", type=int, default=2)

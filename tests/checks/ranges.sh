@@ -73,7 +73,7 @@ planted() {
     fi
     grep -q "$2" "$work/out" || {
         cat "$work/out" >&2
-        echo "ranges: a planted mistake was told wrongly: $1, expected '$2'" >&2
+        echo "ranges: a planted mistake was reported wrongly: $1, expected '$2'" >&2
         exit 1
     }
     kinds=$((kinds + 1))

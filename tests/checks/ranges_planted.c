@@ -28,10 +28,10 @@ static void make_stage_fail(void)
     const int32_t origin_mm_q8[3] = {0};
     const struct ih_ray ray = {.state = IH_RAY_UNKNOWN};
     const struct ih_ellipsoid thin = {{0, 0, 1000 << 8}, {1 << 8, 100 << 8, 100 << 8}};
-    const struct ih_fractions shares = ih_ellipsoid_fractions(thin.semi_mm_q8);
-    const struct ih_aim aim = ih_ellipsoid_aim(thin.semi_mm_q8, &shares, &ray);
+    const struct ih_fractions fractions = ih_ellipsoid_fractions(thin.semi_mm_q8);
+    const struct ih_aim aim = ih_ellipsoid_aim(thin.semi_mm_q8, &fractions, &ray);
     struct ih_crossing crossing;
-    (void)ih_ellipsoid_cross(&thin, &shares, origin_mm_q8, &ray, &aim, &crossing);
+    (void)ih_ellipsoid_cross(&thin, &fractions, origin_mm_q8, &ray, &aim, &crossing);
 }
 
 static int make(const char *kind)

@@ -92,7 +92,7 @@ class Assembly(unittest.TestCase):
                 ("ldmia.w", "sp!, {r4, pc}", 0), ("stmdb", "r1!, {r4, r5}", 0), ("mov", "r0, sp", 0)):
             self.assertEqual(program.pushed(name, operands), wanted, (name, operands))
 
-    def test_what_cannot_be_told(self):
+    def test_what_cannot_be_determined(self):
         for name, operands in (("mov", "sp, r7"), ("sub.w", "sp, sp, r3"), ("bic", "sp, r3, #7")):
             with self.assertRaises(call_graph.Broken, msg=(name, operands)):
                 program.pushed(name, operands)

@@ -18,7 +18,7 @@
 /* The name is the engines'. Always 0. */
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
-/* What must hold; an engine takes the abort for a finding. */
+/* What must hold; an engine takes the abort for a failure. */
 #define FUZZ_CHECK(condition)                                                         \
     do {                                                                              \
         if (!(condition)) {                                                           \

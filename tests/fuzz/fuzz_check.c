@@ -4,7 +4,7 @@
 
 #include "golden_hash.h"
 
-#define SHARE_ONE_Q16 65536
+#define FRACTION_ONE_Q16 65536
 #define LOGIT_MAX_Q10 (1 << 20)
 /* Axes of a fitted head against the mean one's: e^0.35, and a little for rounding. */
 #define SEMI_MIN_PERCENT 70
@@ -133,27 +133,27 @@ static bool on_border(const struct ih_vertex *vertex)
     return vertex->x_q9 == 0 || vertex->y_q9 == 0 || vertex->x_q9 == end || vertex->y_q9 == end;
 }
 
-void fuzz_check_cuts(const struct ih_contours *cuts)
+void fuzz_check_contours(const struct ih_contours *contours)
 {
     int32_t used = 0;
-    FUZZ_CHECK(cuts->contour_count >= 0 && cuts->contour_count <= IH_CONTOURS_CONTOURS_MAX);
-    FUZZ_CHECK(cuts->vertex_count >= 0 && cuts->vertex_count <= IH_CONTOURS_VERTICES_MAX);
-    FUZZ_CHECK(cuts->contours_dropped >= 0);
-    for (int32_t i = 0; i < cuts->vertex_count; i++) {
-        const struct ih_vertex *vertex = &cuts->vertex[i];
+    FUZZ_CHECK(contours->contour_count >= 0 && contours->contour_count <= IH_CONTOURS_CONTOURS_MAX);
+    FUZZ_CHECK(contours->vertex_count >= 0 && contours->vertex_count <= IH_CONTOURS_VERTICES_MAX);
+    FUZZ_CHECK(contours->contours_dropped >= 0);
+    for (int32_t i = 0; i < contours->vertex_count; i++) {
+        const struct ih_vertex *vertex = &contours->vertex[i];
         FUZZ_CHECK(vertex->x_q9 >= 0 && vertex->x_q9 <= (IH_SURFACE_GRID - 1) * 512);
         FUZZ_CHECK(vertex->y_q9 >= 0 && vertex->y_q9 <= (IH_SURFACE_GRID - 1) * 512);
         FUZZ_CHECK(vertex->x_q9 % 512 == 0 || vertex->y_q9 % 512 == 0);
     }
-    for (int32_t i = 0; i < cuts->contour_count; i++) {
-        const struct ih_contour *contour = &cuts->contour[i];
+    for (int32_t i = 0; i < contours->contour_count; i++) {
+        const struct ih_contour *contour = &contours->contour[i];
         FUZZ_CHECK(contour->first == used && contour->vertex_count >= 2);
         used += contour->vertex_count;
-        FUZZ_CHECK(used <= cuts->vertex_count);
-        FUZZ_CHECK(contour->closed || (on_border(&cuts->vertex[contour->first]) &&
-                                       on_border(&cuts->vertex[used - 1])));
+        FUZZ_CHECK(used <= contours->vertex_count);
+        FUZZ_CHECK(contour->closed || (on_border(&contours->vertex[contour->first]) &&
+                                       on_border(&contours->vertex[used - 1])));
     }
-    FUZZ_CHECK(used == cuts->vertex_count);
+    FUZZ_CHECK(used == contours->vertex_count);
 }
 
 static void check_slice(const struct ih_nest *nest, int32_t index,
@@ -259,7 +259,7 @@ void fuzz_check_detections(const struct ih_detections *detections)
         check_ellipse(f->a_px_q12, f->b_px_q12, f->angle_mdeg, f->distance_mm_q8);
         FUZZ_CHECK(i == 0 || detections->detection[i - 1].logit_q10 >= f->logit_q10);
         FUZZ_CHECK(abs(f->logit_q10) <= LOGIT_MAX_Q10);
-        FUZZ_CHECK(f->probability_q16 >= 0 && f->probability_q16 <= SHARE_ONE_Q16);
+        FUZZ_CHECK(f->probability_q16 >= 0 && f->probability_q16 <= FRACTION_ONE_Q16);
         FUZZ_CHECK(f->source >= IH_SOURCE_SCAN && f->source <= IH_SOURCE_EXPECTED);
         FUZZ_CHECK(e->through_count >= 0 && e->hit_count >= 0 && e->front_count >= 0);
         /* A point on the ellipsoid's far side, seen through it, counts twice. */
@@ -324,7 +324,7 @@ static void check_entry(const struct ih_result_entry *entry)
 {
     check_ellipse(entry->a_px_q12, entry->b_px_q12, entry->angle_mdeg, entry->distance_mm_q8);
     FUZZ_CHECK(entry->rejected >= IH_ACCEPTED && entry->rejected <= IH_REJECT_SCORE);
-    FUZZ_CHECK(entry->probability_q16 >= 0 && entry->probability_q16 <= SHARE_ONE_Q16);
+    FUZZ_CHECK(entry->probability_q16 >= 0 && entry->probability_q16 <= FRACTION_ONE_Q16);
     FUZZ_CHECK(entry->track_id >= 0 && entry->sigma_mm_q8 >= 0);
     FUZZ_CHECK(entry->sigma_mm_q8 <= 500 << 8);
     FUZZ_CHECK(!entry->is_predicted || entry->track_id > 0);

@@ -1,6 +1,6 @@
 /* fuzz_check - what holds of every stage's output, whatever its input was: counts within their
  * tables, indices that point at something, parts that add up to the whole, numbers within what the
- * stage's header says. A violation ends the process as a finding. */
+ * stage's header says. A violation aborts the process, which an engine takes for a failure. */
 #ifndef FUZZ_CHECK_H
 #define FUZZ_CHECK_H
 
@@ -15,7 +15,7 @@ void fuzz_check_windows(const struct ih_windows *windows, const struct ih_rig *r
 void fuzz_check_points(const struct ih_points *points, const struct ih_rig *rig);
 void fuzz_check_samples(const struct ih_samples *samples, const struct ih_points *points);
 void fuzz_check_surface(const struct ih_surface *surface, const struct ih_samples *samples);
-void fuzz_check_cuts(const struct ih_contours *cuts);
+void fuzz_check_contours(const struct ih_contours *contours);
 void fuzz_check_hypotheses(const struct ih_nests *nests, const struct ih_surface *surface,
                            const struct ih_nests_params *params);
 void fuzz_check_heads(const struct ih_hypotheses *hypotheses, const struct ih_nests *nests,

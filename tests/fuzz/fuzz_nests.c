@@ -76,24 +76,24 @@ static void fill_surface(struct fuzz_input *input, struct ih_surface *surface)
 static void cut(struct fuzz_input *input, const struct ih_surface *surface,
                 const struct ih_ellipse_params *params)
 {
-    static struct ih_contours cuts;
+    static struct ih_contours contours;
     static struct ih_arcs parts;
     static struct ih_ellipse_scratch scratch;
     struct ih_ellipse ellipse;
     int64_t level = surface->nearest_mm_q8 + (int64_t)fuzz_within(input, -256, 2000 << 8);
-    ih_contours_level(surface, (int32_t)(level > MAX_Q8 ? MAX_Q8 : level), &cuts);
-    fuzz_check_cuts(&cuts);
+    ih_contours_level(surface, (int32_t)(level > MAX_Q8 ? MAX_Q8 : level), &contours);
+    fuzz_check_contours(&contours);
     struct ih_vertex place = {(int16_t)fuzz_within(input, 0, (IH_SURFACE_GRID - 1) * 512),
                               (int16_t)fuzz_within(input, 0, (IH_SURFACE_GRID - 1) * 512)};
-    for (int32_t i = 0; i < cuts.contour_count; i++) {
-        const struct ih_contour *contour = &cuts.contour[i];
-        int32_t winding = ih_ellipse_winding(&cuts, contour, place);
+    for (int32_t i = 0; i < contours.contour_count; i++) {
+        const struct ih_contour *contour = &contours.contour[i];
+        int32_t winding = ih_ellipse_winding(&contours, contour, place);
         FUZZ_CHECK(!contour->closed || abs(winding) <= 1);
-        if (ih_ellipse_of_contour(&cuts, contour, &ellipse)) {
+        if (ih_ellipse_of_contour(&contours, contour, &ellipse)) {
             FUZZ_CHECK(ellipse.area_q16 != 0 && ellipse.shape_q16 > 0);
             FUZZ_CHECK(ellipse.ratio_q16 >= 65535 && ellipse.ratio_q16 <= 255 << 16);
         }
-        if (ih_arcs_make(&cuts, contour, params, &parts) &&
+        if (ih_arcs_make(&contours, contour, params, &parts) &&
             ih_ellipse_of_part(&parts, place, params, &scratch, &ellipse)) {
             FUZZ_CHECK(ellipse.area_q16 > 0 && ellipse.shape_q16 <= params->shape_max_q16);
             FUZZ_CHECK(ellipse.ratio_q16 <= params->ratio_arc_max_q16);
@@ -112,14 +112,14 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     struct ih_params params;
     const struct ih_rig *rig = fuzz_tables_rig(&input);
     fill_surface(&input, &surface);
-    const struct fuzz_input rest = input;
-    for (int way = 0; way < 2; way++) {
-        if (way == 0) {
+    const struct fuzz_input remaining = input;
+    for (int variant = 0; variant < 2; variant++) {
+        if (variant == 0) {
             ih_params_default(&params);
         } else {
             ih_params_paper(&params);
         }
-        input = rest;
+        input = remaining;
         cut(&input, &surface, &params.nests.ellipse);
         ih_nests_find(&surface, &params.nests, &scratch, &nests);
         fuzz_check_hypotheses(&nests, &surface, &params.nests);

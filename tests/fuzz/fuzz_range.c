@@ -4,7 +4,7 @@
  * A command is a byte and its arguments:
  *   0  look at the image           3  a list of points, drawn
  *   1  one depth, with noise       4  bytes as they are, repeated, from a place on
- *   2  an ellipsoid, and a body    5  nothing measured in a share of the pixels
+ *   2  an ellipsoid, and a body    5  nothing measured in a fraction of the pixels
  */
 #include <string.h>
 
@@ -103,9 +103,9 @@ static void paint_bytes(struct image *image, struct fuzz_input *input)
 static void erase(struct image *image, struct fuzz_input *input)
 {
     uint32_t seed = fuzz_byte(input);
-    int32_t share = fuzz_within(input, 0, 127);
+    int32_t fraction = fuzz_within(input, 0, 127);
     for (int32_t i = 0; i < calibration_of(image)->width * calibration_of(image)->height; i++) {
-        if (fuzz_noise(&seed) % 128 < share) {
+        if (fuzz_noise(&seed) % 128 < fraction) {
             image->depth_mm[i] = 0;
         }
     }

@@ -8,7 +8,7 @@
 struct dots_rig {
     double focal_px, k1, p1;
     double origin_mm[AXES];
-    double pitch, turn, tilt; /* of the pattern: slope from dot to dot, radians, slope */
+    double pitch, rotation, tilt; /* of the pattern: slope from dot to dot, radians, slope */
     int32_t near_mm, far_mm;
 };
 
@@ -28,8 +28,9 @@ static void make_ray(const struct dots_rig *from, int32_t slot, int32_t ray_q30[
 {
     double column = slot % IH_GRID - (IH_GRID - 1) / 2;
     double row = slot / IH_GRID - (IH_GRID - 1) / 2;
-    double x = from->pitch * (cos(from->turn) * column - sin(from->turn) * row) + from->tilt;
-    double y = from->pitch * (sin(from->turn) * column + cos(from->turn) * row);
+    double x =
+        from->pitch * (cos(from->rotation) * column - sin(from->rotation) * row) + from->tilt;
+    double y = from->pitch * (sin(from->rotation) * column + cos(from->rotation) * row);
     double length = sqrt(x * x + y * y + 1);
     ray_q30[0] = fixed(x / length, 30);
     ray_q30[1] = fixed(y / length, 30);

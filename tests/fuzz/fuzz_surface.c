@@ -1,4 +1,4 @@
-/* The surface through any samples, its cuts, hypotheses and heads, as by default and as the paper's method needs it.
+/* The surface through any samples, its contours, nests and hypotheses, as by default and as the paper's method needs it.
  * Input: rig, field, samples. */
 #include <string.h>
 
@@ -19,8 +19,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     const struct ih_rig *rig = fuzz_tables_rig(&input);
     fuzz_tables_field(&input, &field);
     fuzz_tables_samples(&input, &samples);
-    for (int way = 0; way < 2; way++) {
-        if (way == 0) {
+    for (int variant = 0; variant < 2; variant++) {
+        if (variant == 0) {
             ih_params_default(&params);
         } else {
             ih_params_paper(&params);

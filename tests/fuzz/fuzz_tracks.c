@@ -1,5 +1,5 @@
-/* Tracks and the result from any findings, over several frames. Input: parameters, then frames: the
- * step in time, findings, views. */
+/* Tracks and the result from any detections, over several frames. Input: parameters, then frames: the
+ * step in time, detections, views. */
 #include <string.h>
 
 #include "fuzz_check.h"

@@ -8,7 +8,7 @@
 #   FUZZ_ENGINES   default "libfuzzer afl"
 #
 # Starts from tests/fuzz/corpus, unpacked into build/fuzz/TARGET/packed, and from what earlier runs found
-# (build/fuzz/TARGET/corpus). Inputs that break something are left in build/fuzz/TARGET/findings; replay
+# (build/fuzz/TARGET/corpus). Inputs that break something are left in build/fuzz/TARGET/failures; replay
 # one by
 #   build/fuzz-libfuzzer/tests/fuzz/fuzz_TARGET FILE
 # Exit status 1 when there is any.
@@ -17,7 +17,7 @@ cd "$(dirname "$0")/../.."
 
 cjson=$1
 shift
-all="frame range init labels health surface nests findings tracks blob rig_json pgm xyz json render config pixels"
+all="frame range init labels health surface nests detections tracks blob rig_json pgm xyz json render config pixels"
 targets=${*:-$all}
 engines=${FUZZ_ENGINES:-libfuzzer afl}
 seconds=${FUZZ_SECONDS:-60}
@@ -43,16 +43,16 @@ dictionary() {
     esac
 }
 
-# row TARGET ENGINE EXECUTIONS EDGES FINDINGS
+# row TARGET ENGINE EXECUTIONS EDGES FAILURES
 row() { printf '%-10s %-10s %12s %8s %9s\n' "$@"; }
 
-# libFuzzer ends at the first finding.
+# libFuzzer ends at the first failure.
 run_libfuzzer() {
     work=$root/$1
     words=$(dictionary "$1")
     if [ -n "$runs" ]; then limit=-runs=$runs; else limit=-max_total_time=$seconds; fi
     nice "build/fuzz-libfuzzer/tests/fuzz/fuzz_$1" "$limit" ${words:+"-dict=$words"} -timeout=60 \
-        -max_len=4096 -print_final_stats=1 -artifact_prefix="$work/findings/" "$work/corpus" \
+        -max_len=4096 -print_final_stats=1 -artifact_prefix="$work/failures/" "$work/corpus" \
         "$work/packed" >"$work/libfuzzer.log" 2>&1 || true
     executions=$(sed -n 's/^stat::number_of_executed_units: *//p' "$work/libfuzzer.log")
     edges=$(sed -n 's/.* cov: \([0-9]*\) .*/\1/p' "$work/libfuzzer.log" | tail -n 1)
@@ -71,7 +71,7 @@ keep() {
     done
 }
 
-# AFL++ goes on after a finding; what it found new goes to the corpus of later runs.
+# AFL++ goes on after a failure; what it found new goes to the corpus of later runs.
 run_afl() {
     work=$root/$1
     words=$(dictionary "$1")
@@ -89,25 +89,25 @@ run_afl() {
     fi
     executions=$(sed -n 's/^execs_done *: //p' "$stats")
     edges=$(sed -n 's/^edges_found *: //p' "$stats")
-    keep "$work/findings" "$work"/afl/default/crashes/id* "$work"/afl/default/hangs/id*
+    keep "$work/failures" "$work"/afl/default/crashes/id* "$work"/afl/default/hangs/id*
     keep "$work/corpus" "$work"/afl/default/queue/id*+cov
 }
 
 sum=0
 total=0
-row target engine executions edges findings
+row target engine executions edges failures
 for engine in $engines; do
     for target in $targets; do
-        mkdir -p "$root/$target/corpus" "$root/$target/findings"
+        mkdir -p "$root/$target/corpus" "$root/$target/failures"
         rm -rf "$root/$target/packed"
         tests/fuzz/corpus.py unpack "tests/fuzz/corpus/$target.pack" "$root/$target/packed"
-        before=$(find "$root/$target/findings" -type f | wc -l)
+        before=$(find "$root/$target/failures" -type f | wc -l)
         "run_$engine" "$target"
-        count=$(($(find "$root/$target/findings" -type f | wc -l) - before))
+        count=$(($(find "$root/$target/failures" -type f | wc -l) - before))
         row "$target" "$engine" "$executions" "$edges" "$count"
         sum=$((sum + executions))
         total=$((total + count))
     done
 done
 row all "" "$sum" "" "$total"
-[ "$total" = 0 ] || { echo "findings: $root/TARGET/findings" >&2; exit 1; }
+[ "$total" = 0 ] || { echo "failures: $root/TARGET/failures" >&2; exit 1; }

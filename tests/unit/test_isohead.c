@@ -374,7 +374,7 @@ static void wrong_kinds_are_refused(void)
     check_empty("grey frame for a range rig");
 }
 
-/* Rows of two bytes a sample that touch, and the greatest and the least white: as good as any. */
+/* Rows of two bytes a sample that touch, and the largest and the smallest white: as good as any. */
 static void frames_at_their_limits_are_taken(void)
 {
     frame = (struct ih_frame){grey16, frame.width, frame.height, 2 * frame.width, 2, 65535};
@@ -664,7 +664,7 @@ static void the_frame_and_the_rig_are_left_alone(void)
     TEST_ASSERT_EQUAL_MEMORY(&params, &head.params, sizeof params);
 }
 
-/* 16-bit noise at the greatest size: full tables everywhere, and sane counts. */
+/* 16-bit noise at the largest size: full tables everywhere, and sane counts. */
 static void noise_is_survived(void)
 {
     int32_t i, pass;

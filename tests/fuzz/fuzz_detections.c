@@ -1,4 +1,4 @@
-/* Samples, rays, scan, fits, evidence, scores and findings from any points. Input: rig, points, over-exposed
+/* Samples, rays, scan, fits, evidence, scores and detections from any points. Input: rig, points, over-exposed
  * blocks, expected heads, hypotheses. */
 #include <string.h>
 
