@@ -319,7 +319,7 @@ bool sim_page_open(struct sim_page *page, const char *path, struct hal_error *er
 {
     struct stat status;
     if (stat(path, &status) == 0 && !S_ISREG(status.st_mode)) {
-        return hal_fail(error, "the report goes into a regular file, which this is not");
+        return hal_fail(error, "the report needs a regular file, expected no device or pipe");
     }
     size_t size = strlen(path) + PART_SUFFIX_MAX;
     *page = (struct sim_page){.path = path, .part_path = sim_report_grow(NULL, size, 1)};

@@ -44,8 +44,7 @@ static bool read_head(const cJSON *line, struct sim_truth_frame *frame, struct h
         return true;
     }
     if (!cJSON_IsObject(head)) {
-        return hal_fail(error, "%s",
-                        head == NULL ? "no head" : "head is neither an object nor null");
+        return hal_fail(error, "%s", head == NULL ? "no head" : "head: expected an object or null");
     }
     if (!read_numbers(cJSON_GetObjectItemCaseSensitive(head, "centre_mm"), AXES, SIM_TRUTH_MM_MAX,
                       centre_mm)) {
@@ -101,8 +100,8 @@ static bool read_dots(const cJSON *line, struct sim_truth_frame *frame, struct h
                             frame->dot_count, IH_SLOTS);
         }
         if (taken[dot->slot]) {
-            return hal_fail(error, "dots[%zu]: index %ld was there before", frame->dot_count,
-                            (long)dot->slot);
+            return hal_fail(error, "dots[%zu]: index %ld again, expected each index once",
+                            frame->dot_count, (long)dot->slot);
         }
         taken[dot->slot] = true;
         frame->dot_count++;

@@ -21,7 +21,7 @@ static bool read_signals(int fd, unsigned *events, struct hal_error *error)
             return true;
         } else if (count >= 0 || errno != EINTR) {
             return hal_fail(error, "signals: cannot be read: %s",
-                            count < 0 ? strerror(errno) : "half of one");
+                            count < 0 ? strerror(errno) : "an incomplete record");
         }
     }
 }

@@ -157,8 +157,7 @@ bool hal_jail_enter(struct hal_error *error)
 {
     const struct sched_param none = {.sched_priority = 0};
     if (sched_setscheduler(0, SCHED_IDLE, &none) != 0) {
-        return hal_fail(error, "it cannot be made less important than the program: %s",
-                        strerror(errno));
+        return hal_fail(error, "its priority cannot be lowered: %s", strerror(errno));
     }
     if (geteuid() == 0 && (setgroups(0, NULL) != 0 || setresgid(NOBODY, NOBODY, NOBODY) != 0 ||
                            setresuid(NOBODY, NOBODY, NOBODY) != 0)) {
@@ -166,7 +165,7 @@ bool hal_jail_enter(struct hal_error *error)
     }
     /* The second again: the kernel forgets it when the user changes. */
     if (prctl(PR_SET_DUMPABLE, 0) != 0 || prctl(PR_SET_PDEATHSIG, SIGKILL) != 0) {
-        return hal_fail(error, "it would leave a core, or outlive the program: %s",
+        return hal_fail(error, "it cannot be kept from dumping core or outliving the program: %s",
                         strerror(errno));
     }
     return filter_calls(error);

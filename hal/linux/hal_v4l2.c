@@ -25,7 +25,7 @@ static bool check_capabilities(int fd, struct hal_error *error)
     const uint32_t needed = V4L2_CAP_VIDEO_CAPTURE | V4L2_CAP_STREAMING;
     struct v4l2_capability capability = {.driver = ""};
     if (hal_v4l2_ioctl(fd, VIDIOC_QUERYCAP, &capability) != 0) {
-        return hal_fail(error, "asking what it can do: %s", strerror(errno));
+        return hal_fail(error, "querying its capabilities: %s", strerror(errno));
     }
     /* what this node can do, where the driver distinguishes it from what the whole device can */
     const uint32_t has = (capability.capabilities & V4L2_CAP_DEVICE_CAPS) != 0
@@ -71,7 +71,7 @@ static bool map_buffer(struct hal_v4l2 *v4l2, uint32_t index, struct hal_error *
     struct v4l2_buffer buffer = {
         .index = index, .type = V4L2_BUF_TYPE_VIDEO_CAPTURE, .memory = V4L2_MEMORY_MMAP};
     if (hal_v4l2_ioctl(v4l2->fd, VIDIOC_QUERYBUF, &buffer) != 0) {
-        return hal_fail(error, "asking for buffer %u: %s", index, strerror(errno));
+        return hal_fail(error, "querying buffer %u: %s", index, strerror(errno));
     }
     if (buffer.length < v4l2->format.frame_bytes) {
         return hal_fail(error, "buffers of %u bytes, expected at least %zu for %s %dx%d",
@@ -94,7 +94,7 @@ static bool take_buffers(struct hal_v4l2 *v4l2, struct hal_error *error)
                                           .type = V4L2_BUF_TYPE_VIDEO_CAPTURE,
                                           .memory = V4L2_MEMORY_MMAP};
     if (hal_v4l2_ioctl(v4l2->fd, VIDIOC_REQBUFS, &request) != 0) {
-        return hal_fail(error, "asking for %d buffers: %s", HAL_V4L2_BUFFERS_REQUESTED,
+        return hal_fail(error, "requesting %d buffers: %s", HAL_V4L2_BUFFERS_REQUESTED,
                         strerror(errno));
     }
     if (request.count < HAL_V4L2_BUFFERS_MIN) {
@@ -206,7 +206,7 @@ static void return_buffer(struct hal_v4l2 *v4l2, uint32_t index)
 {
     struct hal_error error;
     if (!give_buffer(v4l2, index)) {
-        hal_fail(&error, "giving buffer %u back: %s", index, strerror(errno));
+        hal_fail(&error, "returning buffer %u: %s", index, strerror(errno));
         go(v4l2, &error);
     }
 }
@@ -345,7 +345,7 @@ static enum hal_next next_frame(void *context, struct hal_frame *frame, struct h
         return judge_failure(v4l2, errno, frame, error);
     }
     if (buffer.index >= v4l2->buffer_count) {
-        hal_fail(error, "the device hands on buffer %u of %u", buffer.index, v4l2->buffer_count);
+        hal_fail(error, "the device returned buffer %u of %u", buffer.index, v4l2->buffer_count);
         return go(v4l2, error);
     }
     v4l2->eio_count = 0;

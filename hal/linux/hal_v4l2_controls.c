@@ -30,7 +30,7 @@ static enum found find_control(int fd, uint32_t id, struct v4l2_queryctrl *contr
     if (errno == EINVAL || errno == ENOTTY) {
         return FOUND_NOT;
     }
-    hal_fail(error, "asking for control 0x%08x: %s", id, strerror(errno));
+    hal_fail(error, "querying control 0x%08x: %s", id, strerror(errno));
     return FOUND_ERROR;
 }
 

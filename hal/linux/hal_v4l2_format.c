@@ -118,7 +118,7 @@ static bool read_formats(int fd, struct offer *offer, struct hal_error *error)
         } else if (errno == EINVAL) {
             break;
         } else {
-            return hal_fail(error, "asking for its formats: %s", strerror(errno));
+            return hal_fail(error, "querying its formats: %s", strerror(errno));
         }
     }
     return true;
@@ -178,7 +178,7 @@ static void explain_refusal(int fd, const struct choice *choice, int32_t width, 
     char name[5];
     read_sizes(fd, choice->fourcc, &sizes);
     name_fourcc(given->pixelformat, name);
-    hal_fail(error, "asked for %s %dx%d, the device gives %s %ux%u; its sizes in %s: %s",
+    hal_fail(error, "requested %s %dx%d, the device gives %s %ux%u; its sizes in %s: %s",
              choice->name, width, height, name, given->width, given->height, choice->name,
              list_text(&sizes));
 }
@@ -250,7 +250,7 @@ static void explain_lack(const char *wanted, const struct offer *offer, struct h
         hal_fail(error, "none of " HAL_V4L2_FORMATS "; the device has: %s",
                  list_text(&offer->others));
     } else {
-        hal_fail(error, "no format %s; the device has: %s; and of no use: %s", wanted,
+        hal_fail(error, "no format %s; the device has: %s; and, not usable here: %s", wanted,
                  list_text(&ours), list_text(&offer->others));
     }
 }
@@ -261,7 +261,7 @@ bool hal_v4l2_format_set(int fd, const char *wanted, int32_t width, int32_t heig
     struct offer offer;
     bool refused = false;
     if (width < 1 || width > HAL_V4L2_SIDE_MAX || height < 1 || height > HAL_V4L2_SIDE_MAX) {
-        return hal_fail(error, "asked for frames of %dx%d, expected 1..%d each", width, height,
+        return hal_fail(error, "requested frames of %dx%d, expected 1..%d each", width, height,
                         HAL_V4L2_SIDE_MAX);
     }
     if (!is_name(wanted)) {
@@ -357,7 +357,7 @@ static bool ask_rate(int fd, int32_t rate_mhz, struct v4l2_fract *time, struct h
         struct list rates;
         name_rate(given_mhz, given, sizeof given);
         read_rates(fd, &rates);
-        return hal_fail(error, "asked for %d.%03d frames a second, the device gives %s%s%s",
+        return hal_fail(error, "requested %d.%03d frames a second, the device gives %s%s%s",
                         rate_mhz / 1000, rate_mhz % 1000, given,
                         rates.text[0] == 0 ? "" : "; it has: ", rates.text);
     }
@@ -370,7 +370,7 @@ bool hal_v4l2_rate_set(int fd, int32_t rate_mhz, int32_t *frame_time_us, struct 
     const bool has_rate = hal_v4l2_ioctl(fd, VIDIOC_G_PARM, &parameters) == 0;
     struct v4l2_fract time = {0};
     if (!has_rate && errno != EINVAL && errno != ENOTTY) {
-        return hal_fail(error, "asking for its frame rate: %s", strerror(errno));
+        return hal_fail(error, "querying its frame rate: %s", strerror(errno));
     }
     const bool is_free =
         has_rate && (parameters.parm.capture.capability & V4L2_CAP_TIMEPERFRAME) != 0;
@@ -378,10 +378,10 @@ bool hal_v4l2_rate_set(int fd, int32_t rate_mhz, int32_t *frame_time_us, struct 
         time = parameters.parm.capture.timeperframe;
     }
     if (rate_mhz < 0) {
-        return hal_fail(error, "asked for %d frames in 1000 s, expected 0 or more", rate_mhz);
+        return hal_fail(error, "requested %d frames in 1000 s, expected 0 or more", rate_mhz);
     }
     if (rate_mhz != 0 && !is_free) {
-        return hal_fail(error, "asked for %d.%03d frames a second, the device's rate is fixed",
+        return hal_fail(error, "requested %d.%03d frames a second, the device's rate is fixed",
                         rate_mhz / 1000, rate_mhz % 1000);
     }
     if (rate_mhz != 0 && !ask_rate(fd, rate_mhz, &time, error)) {

@@ -159,7 +159,7 @@ static bool bury(struct hal_viewer_process *process, int options, struct hal_err
         return false;
     }
     process->pid = -1;
-    hal_fail(error, "its process has ended (%s %d); no live view until the program is started anew",
+    hal_fail(error, "its process has ended (%s %d); no live view until the program is restarted",
              WIFSIGNALED(status) ? "signal" : "status",
              WIFSIGNALED(status) ? WTERMSIG(status) : WEXITSTATUS(status));
     return true;
@@ -256,7 +256,7 @@ static bool open_with(struct hal_viewer_process *process, const struct hal_viewe
 {
     char found[PATH_BYTES];
     if (config->program == NULL && !find_program(found)) {
-        return hal_fail(error, "/proc/self/exe: not to be read; is /proc mounted?");
+        return hal_fail(error, "/proc/self/exe: cannot be read; is /proc mounted?");
     }
     return hal_mailbox_create(&process->mailbox, config->content_size, error) &&
            describe(process, listen_fd, error) &&

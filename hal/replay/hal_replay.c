@@ -131,7 +131,7 @@ static bool read_fields(const cJSON *line, struct hal_replay_entry *entry, struc
     const cJSON *laser = cJSON_GetObjectItemCaseSensitive(line, "laser");
     if (laser != NULL) {
         if (!cJSON_IsBool(laser)) {
-            return hal_fail(error, "laser is neither true nor false");
+            return hal_fail(error, "laser: expected true or false");
         }
         entry->laser = cJSON_IsTrue(laser);
     }
@@ -139,7 +139,7 @@ static bool read_fields(const cJSON *line, struct hal_replay_entry *entry, struc
         return hal_fail(error, "no time_us");
     }
     if (!cJSON_IsNumber(time)) {
-        return hal_fail(error, "time_us is not a number");
+        return hal_fail(error, "time_us: expected a number");
     }
     double value = time->valuedouble;
     if (!(value >= -TIME_MAX_US && value <= TIME_MAX_US) || (double)(int64_t)value != value) {

@@ -72,7 +72,7 @@ def case_rate(run):
     accepted(run, "--rate 25")
     expect(any("a frame every 40000 us" in line for line in run.board.log), f"{run.board.log}")
     run.stop()
-    refused(run, "--rate 27", "asked for 27.000 frames a second, the device gives 25.000; it has: "
+    refused(run, "--rate 27", "requested 27.000 frames a second, the device gives 25.000; it has: "
             "1.000, 2.000, 4.000, 5.000, 10.000, 12.500, 15.000, 25.000")
     return "25 is taken, 27 refused: the message lists the camera's rates"
 

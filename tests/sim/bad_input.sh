@@ -502,13 +502,13 @@ list 'a path for a file' 1 3 0 'd/frames\.jsonl: line 4: file is "../d/a\.pgm", 
 list 'not the name of a frame' 1 3 0 'd/frames\.jsonl: line 4: file is "rig\.json", expected' \
     "$a$b$c"'{"file":"rig.json","time_us":5}\n'
 list 'no time' 1 2 1 'd/b\.pgm: frames\.jsonl line 2: no time_us' "$a"'{"file":"b.pgm"}\n'"$c"
-list 'a string for a time' 1 2 1 'd/b\.pgm: frames\.jsonl line 2: time_us is not a number' \
+list 'a string for a time' 1 2 1 'd/b\.pgm: frames\.jsonl line 2: time_us: expected a number' \
     "$a"'{"file":"b.pgm","time_us":"5"}\n'"$c"
 list 'a fraction for a time' 1 2 1 'd/b\.pgm: frames\.jsonl line 2: time_us is 5\.5, expected' \
     "$a"'{"file":"b.pgm","time_us":5.5}\n'"$c"
 list 'an endless time' 1 2 1 'd/b\.pgm: frames\.jsonl line 2: time_us is inf, expected' \
     "$a"'{"file":"b.pgm","time_us":1e999}\n'"$c"
-list 'a word for laser' 1 2 1 'd/b\.pgm: frames\.jsonl line 2: laser is neither true nor false' \
+list 'a word for laser' 1 2 1 'd/b\.pgm: frames\.jsonl line 2: laser: expected true or false' \
     "$a"'{"file":"b.pgm","time_us":5,"laser":"on"}\n'"$c"
 list 'time goes back' 1 2 1 'd/c\.pgm: frames\.jsonl: time_us 39999 is before 40000' \
     "$a$b"'{"file":"c.pgm","time_us":39999}\n'
@@ -573,7 +573,7 @@ truth 'a broken line' 'line 2: not a JSON object' '{"file":"b.pgm","head":'
 truth 'no file' 'line 2: no file' '{"head":null}'
 truth 'a number for a file' 'line 2: no file' '{"file":7,"head":null}'
 truth 'no head' 'line 2: no head' '{"file":"b.pgm"}'
-truth 'a string for a head' 'line 2: head is neither' '{"file":"b.pgm","head":"yes"}'
+truth 'a string for a head' 'line 2: head: expected an object or null' '{"file":"b.pgm","head":"yes"}'
 truth 'a head without centre' 'line 2: head\.centre_mm: expected 3' '{"file":"b.pgm","head":{}}'
 truth 'a centre of 2 numbers' 'line 2: head\.centre_mm: expected 3' \
     '{"file":"b.pgm","head":{"centre_mm":[1,2]}}'
@@ -586,7 +586,7 @@ truth 'a dot of index 361' 'line 2: dots\[1\]: expected \[index below 361' \
     '{"file":"b.pgm","head":null,"dots":[[0,1,2,900],[361,1,2,900]]}'
 truth 'a dot of 3 numbers' 'line 2: dots\[0\]: expected' \
     '{"file":"b.pgm","head":null,"dots":[[0,1,2]]}'
-truth 'a dot twice' 'line 2: dots\[1\]: index 4 was there before' \
+truth 'a dot twice' 'line 2: dots\[1\]: index 4 again, expected each index once' \
     '{"file":"b.pgm","head":null,"dots":[[4,1,2,900],[4,1,2,900]]}'
 mkdir d/truth.jsonl
 run --json d

@@ -9,10 +9,10 @@ static inline bool ih_test_cross(const struct ih_ellipsoid *ellipsoid,
                                  const int32_t origin_mm_q8[3], const struct ih_ray *ray,
                                  struct ih_crossing *out)
 {
-    const struct ih_fractions shares = ih_ellipsoid_fractions(ellipsoid->semi_mm_q8);
-    const struct ih_aim aim = ih_ellipsoid_aim(ellipsoid->semi_mm_q8, &shares, ray);
+    const struct ih_fractions fractions = ih_ellipsoid_fractions(ellipsoid->semi_mm_q8);
+    const struct ih_aim aim = ih_ellipsoid_aim(ellipsoid->semi_mm_q8, &fractions, ray);
 
-    return ih_ellipsoid_cross(ellipsoid, &shares, origin_mm_q8, ray, &aim, out);
+    return ih_ellipsoid_cross(ellipsoid, &fractions, origin_mm_q8, ray, &aim, out);
 }
 
 #endif

@@ -1,7 +1,7 @@
 /* ih_test_v4l2 - a camera of V4L2 made of paper: libv4l2's functions, defined here instead of linked.
  *
  * A test describes the device in `fake` and lists what its frames are; the functions answer as a
- * driver would, note in fake.wrong what no program may do, and fail where they are told to.
+ * driver would, note in fake.wrong what no program may do, and fail on request.
  * A buffer is memory of its own, freed when unmapped: the sanitizer sees every look at it later.
  */
 #ifndef IH_TEST_V4L2_H

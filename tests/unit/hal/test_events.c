@@ -58,7 +58,7 @@ static unsigned wait_us(int64_t timeout_us)
     return events;
 }
 
-static void tell(int fd)
+static void make_readable(int fd)
 {
     TEST_ASSERT_EQUAL_INT(1, write(fd, "x", 1));
 }
@@ -89,10 +89,10 @@ static void each_thing_is_its_event(void)
 {
     const int64_t hour_us = INT64_C(3600) * 1000 * 1000;
 
-    tell(camera[1]);
+    make_readable(camera[1]);
     TEST_ASSERT_EQUAL_UINT(HAL_EVENT_FRAME, wait_us(hour_us));
     take(camera[0]);
-    tell(interlock[1]);
+    make_readable(interlock[1]);
     TEST_ASSERT_EQUAL_UINT(HAL_EVENT_INTERLOCK, wait_us(hour_us));
     TEST_ASSERT_EQUAL_UINT(HAL_EVENT_INTERLOCK, wait_us(hour_us));
     take(interlock[0]);
@@ -105,10 +105,10 @@ static void each_thing_is_its_event(void)
     TEST_ASSERT_EQUAL_UINT(0, wait_us(0));
 }
 
-static void all_at_once_are_told_at_once(void)
+static void all_at_once_are_reported_at_once(void)
 {
-    tell(camera[1]);
-    tell(interlock[1]);
+    make_readable(camera[1]);
+    make_readable(interlock[1]);
     kill(getpid(), SIGTERM);
     kill(getpid(), SIGINT);
     kill(getpid(), SIGHUP);
@@ -120,8 +120,8 @@ static void all_at_once_are_told_at_once(void)
 
 static void what_is_closed_is_not_waited_for(void)
 {
-    tell(camera[1]);
-    tell(interlock[1]);
+    make_readable(camera[1]);
+    make_readable(interlock[1]);
     camera_fd = -1;
     TEST_ASSERT_EQUAL_UINT(HAL_EVENT_INTERLOCK, wait_us(0));
     interlock_fd = -1;
@@ -194,7 +194,7 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(nothing_happens_until_the_time_is_over);
     RUN_TEST(each_thing_is_its_event);
-    RUN_TEST(all_at_once_are_told_at_once);
+    RUN_TEST(all_at_once_are_reported_at_once);
     RUN_TEST(what_is_closed_is_not_waited_for);
     RUN_TEST(errors_are_events);
     RUN_TEST(interrupted_it_waits_for_the_rest);

@@ -239,7 +239,7 @@ static void one_line_is_not_used_twice(void)
     REFUSED(heartbeat_line, "interlock", "heartbeat-line", "interlock-line", "line 7");
 }
 
-static void a_line_in_use_is_told_with_its_user(void)
+static void a_line_in_use_is_reported_with_its_user(void)
 {
     REFUSED(laser_line, "fan", "laser-line", "line 2", "'fan'", "gpiochip0 (pl061)", "busy",
             "used by fan driver");
@@ -326,7 +326,7 @@ static void a_contact_that_chatters_is_never_closed(void)
     TEST_ASSERT_TRUE(is_closed());
 }
 
-static void a_short_opening_is_told_once(void)
+static void a_short_opening_is_reported_once(void)
 {
     int pulses;
 
@@ -345,7 +345,7 @@ static void a_short_opening_is_told_once(void)
     TEST_ASSERT_TRUE(is_closed());
 }
 
-/* The kernel keeps more events than one call takes: they are not lost, only told later. */
+/* The kernel keeps more events than one call takes: they are not lost, only reported later. */
 static void many_events_are_taken_by_several_calls(void)
 {
     int i;
@@ -394,7 +394,7 @@ static void off_is_tried_again(void)
     TEST_ASSERT_EQUAL_INT(0, laser->level);
 }
 
-static void a_line_that_stays_on_is_told_and_given_back(void)
+static void a_line_that_stays_on_is_reported_and_given_back(void)
 {
     TEST_ASSERT_TRUE(open_with(&plain));
     TEST_ASSERT_TRUE(set(true));
@@ -447,7 +447,7 @@ static void any_call_may_fail_once(bool for_good, bool active_low)
         fake.fail_for_good = for_good;
         memset(&error, 0, sizeof error);
         good = use(&config);
-        IH_TEST_EQUAL(good, error.text[0] == 0, "told", call);
+        IH_TEST_EQUAL(good, error.text[0] == 0, "message", call);
         if (call == 0) {
             last = fake.calls;
             TEST_ASSERT_TRUE_MESSAGE(good, error.text);
@@ -513,17 +513,17 @@ int main(void)
     RUN_TEST(chips_and_lines_have_several_names);
     RUN_TEST(unknown_names_are_answered_with_what_there_is);
     RUN_TEST(one_line_is_not_used_twice);
-    RUN_TEST(a_line_in_use_is_told_with_its_user);
+    RUN_TEST(a_line_in_use_is_reported_with_its_user);
     RUN_TEST(long_names_are_cut_visibly);
     RUN_TEST(the_interlock_is_its_level);
     RUN_TEST(without_an_interlock_it_is_closed);
     RUN_TEST(an_active_low_interlock_is_closed_when_low);
     RUN_TEST(a_contact_that_chatters_is_never_closed);
-    RUN_TEST(a_short_opening_is_told_once);
+    RUN_TEST(a_short_opening_is_reported_once);
     RUN_TEST(many_events_are_taken_by_several_calls);
     RUN_TEST(an_interlock_that_cannot_be_read_is_not_closed);
     RUN_TEST(off_is_tried_again);
-    RUN_TEST(a_line_that_stays_on_is_told_and_given_back);
+    RUN_TEST(a_line_that_stays_on_is_reported_and_given_back);
     RUN_TEST(after_any_single_fault_the_laser_is_off_and_nothing_is_left);
     RUN_TEST(when_the_chip_fails_for_good_nothing_is_left);
     RUN_TEST(a_failed_opening_takes_nothing);

@@ -31,9 +31,9 @@ struct shared {
     volatile int off_count;      /* settings to off */
     volatile pid_t guard_pid;
     volatile int open_fails;
-    /* The guard is told to end while set(true) is under way, and held between off and its end. */
+    /* The guard is made to end while set(true) is under way, and held between off and its end. */
     volatile int end_while_on;
-    volatile int tell_off; /* each setting to off by the guard is told through is_off */
+    volatile int note_off; /* each setting to off by the guard sets is_off */
     sem_t is_off, may_end;
 };
 
@@ -88,7 +88,7 @@ static bool line_set(void *context, bool on, struct hal_error *why)
         return hal_fail(why, "line: stuck");
     }
     shared->level = 0;
-    if (shared->tell_off && getpid() != test_pid) {
+    if (shared->note_off && getpid() != test_pid) {
         sem_post(&shared->is_off);
     }
     if (shared->end_while_on && getpid() != test_pid) {
@@ -381,7 +381,7 @@ static void switched_on_behind_the_guards_back_it_goes_off_again(void)
  * process learns of both. */
 static void a_moving_interlock_switches_off(void)
 {
-    struct pollfd event_waits = {.events = POLLIN}, told = {.events = POLLIN};
+    struct pollfd event_waits = {.events = POLLIN}, message = {.events = POLLIN};
     char event = 'e';
     bool closed = true;
     struct timespec end;
@@ -390,18 +390,18 @@ static void a_moving_interlock_switches_off(void)
     TEST_ASSERT_EQUAL_INT(0, pipe(ends));
     interlock_fd = event_waits.fd = ends[0];
     TEST_ASSERT_TRUE(open_it());
-    shared->tell_off = 1;
+    shared->note_off = 1;
     TEST_ASSERT_TRUE(set(true));
     TEST_ASSERT_EQUAL_INT(1, shared->level);
     TEST_ASSERT_EQUAL_INT(1, write(ends[1], &event, 1));
     clock_gettime(CLOCK_REALTIME, &end);
     end.tv_sec += 20;
     TEST_ASSERT_EQUAL_INT(0, sem_timedwait(&shared->is_off, &end));
-    shared->tell_off = 0;
+    shared->note_off = 0;
     TEST_ASSERT_EQUAL_INT(0, shared->level);
     TEST_ASSERT_EQUAL_INT(1, poll(&event_waits, 1, 0));
-    told.fd = guard.socket_fd;
-    TEST_ASSERT_EQUAL_INT(1, poll(&told, 1, 20000));
+    message.fd = guard.socket_fd;
+    TEST_ASSERT_EQUAL_INT(1, poll(&message, 1, 20000));
     TEST_ASSERT_TRUE_MESSAGE(hal_guard_feed(&guard, &error), error.text);
     TEST_ASSERT_TRUE(guard.strobe.interlock(guard.strobe.context, &closed, &error));
     TEST_ASSERT_FALSE_MESSAGE(closed, "the program would believe that the laser is on");

@@ -268,7 +268,8 @@ static void a_named_format_that_is_not_there(void)
     fake.format[4].flags = V4L2_FMT_FLAG_EMULATED;
     add_format(V4L2_PIX_FMT_YUV420);
     fake.format[5].flags = V4L2_FMT_FLAG_EMULATED;
-    check_refused("no format Y10; the device has: GREY, convert; and of no use: MJPG, BA81, Z16");
+    check_refused(
+        "no format Y10; the device has: GREY, convert; and, not usable here: MJPG, BA81, Z16");
 }
 
 static void no_format_that_is_of_use(void)
@@ -281,7 +282,7 @@ static void no_format_that_is_of_use(void)
     check_refused("none of GREY, Y12, Y10, Y16, Y10P, Y12P, YUYV, UYVY, convert; the device has: "
                   "none");
     config.format = "Y16";
-    check_refused("no format Y16; the device has: none; and of no use: none");
+    check_refused("no format Y16; the device has: none; and, not usable here: none");
 }
 
 static void a_format_that_nobody_knows(void)
@@ -298,13 +299,13 @@ static void a_size_that_is_not_there(void)
 {
     fake.format[0] = (struct fake_format){
         .fourcc = GREY, .size = {{640, 480}, {320, 240}, {WIDTH, HEIGHT + 1}}, .size_count = 3};
-    check_refused("asked for GREY 20x6, the device gives GREY 640x480; its sizes in GREY: 640x480, "
+    check_refused("requested GREY 20x6, the device gives GREY 640x480; its sizes in GREY: 640x480, "
                   "320x240, 20x7");
     fake.format[0] = (struct fake_format){.fourcc = GREY,
                                           .size = {{64, 48}, {1280, 800}, {8, 2}},
                                           .size_count = 3,
                                           .is_stepwise = true};
-    check_refused("asked for GREY 20x6, the device gives GREY 64x48; its sizes in GREY: 64x48 to "
+    check_refused("requested GREY 20x6, the device gives GREY 64x48; its sizes in GREY: 64x48 to "
                   "1280x800 in steps of 8x2");
 }
 
@@ -313,7 +314,7 @@ static void long_lists_are_cut(void)
 {
     fake.is_endless = true;
     fake.format[0].size[0].width = WIDTH + 1000;
-    check_refused("asked for GREY 20x6, the device gives GREY 1020x6; its sizes in GREY: 1020x6, "
+    check_refused("requested GREY 20x6, the device gives GREY 1020x6; its sizes in GREY: 1020x6, "
                   "1020x6, 1020x6, 1020x6, 1020x6, 1020x6, 1020x6, 1020x6, 1020x6, 1020x6, 1020x6, "
                   "1020x6, ...");
     only_format(V4L2_PIX_FMT_MJPEG);
@@ -335,25 +336,25 @@ static void auto_goes_on_to_a_format_of_the_right_size(void)
     TEST_ASSERT_EQUAL_STRING("YUYV", v4l2.format.name);
     tearDown();
     fake.format[1].size[0].width = 8;
-    check_refused("asked for GREY 20x6, the device gives GREY 8x6; its sizes in GREY: 8x6");
+    check_refused("requested GREY 20x6, the device gives GREY 8x6; its sizes in GREY: 8x6");
 }
 
 static void a_device_that_does_as_it_likes(void)
 {
     fake.other_fourcc = V4L2_PIX_FMT_YUYV;
-    check_refused("asked for GREY 20x6, the device gives YUYV 20x6; its sizes in GREY: 20x6");
+    check_refused("requested GREY 20x6, the device gives YUYV 20x6; its sizes in GREY: 20x6");
 }
 
 static void sizes_that_make_no_sense(void)
 {
     config.width = 0;
-    check_refused("asked for frames of 0x6, expected 1..16384 each");
+    check_refused("requested frames of 0x6, expected 1..16384 each");
     config.width = WIDTH;
     config.height = 16385;
-    check_refused("asked for frames of 20x16385, expected 1..16384 each");
+    check_refused("requested frames of 20x16385, expected 1..16384 each");
     config.width = 16385;
     config.height = HEIGHT;
-    check_refused("asked for frames of 16385x6, expected 1..16384 each");
+    check_refused("requested frames of 16385x6, expected 1..16384 each");
 }
 
 static void interlaced_frames_are_refused(void)
@@ -423,11 +424,11 @@ static void a_rate_nearby_is_taken_another_is_not(void)
     setUp();
     config.rate_mhz = 30000;
     fake.only_time = (struct v4l2_fract){2, 15};
-    check_refused("asked for 30.000 frames a second, the device gives 7.500");
+    check_refused("requested 30.000 frames a second, the device gives 7.500");
     fake.only_time = (struct v4l2_fract){100, 3030};
-    check_refused("asked for 30.000 frames a second, the device gives 30.300");
+    check_refused("requested 30.000 frames a second, the device gives 30.300");
     fake.only_time = (struct v4l2_fract){0, 1};
-    check_refused("asked for 30.000 frames a second, the device gives 0.000");
+    check_refused("requested 30.000 frames a second, the device gives 0.000");
 }
 
 static void a_refused_rate_names_those_that_there_are(void)
@@ -438,10 +439,10 @@ static void a_refused_rate_names_those_that_there_are(void)
     fake.times[1] = (struct v4l2_fract){1, 25};
     fake.times[2] = (struct v4l2_fract){1001, 30000};
     fake.time_count = 3;
-    check_refused("asked for 27.000 frames a second, the device gives 25.000; it has: 12.500, "
+    check_refused("requested 27.000 frames a second, the device gives 25.000; it has: 12.500, "
                   "25.000, 29.970");
     fake.times_are_stepwise = true;
-    check_refused("asked for 27.000 frames a second, the device gives 25.000; it has: 25.000 to "
+    check_refused("requested 27.000 frames a second, the device gives 25.000; it has: 25.000 to "
                   "12.500");
 }
 
@@ -456,14 +457,14 @@ static void a_device_without_a_rate(void)
     TEST_ASSERT_EQUAL_INT32(0, v4l2.camera.frame_time_us(&v4l2));
     tearDown();
     config.rate_mhz = 12500;
-    check_refused("asked for 12.500 frames a second, the device's rate is fixed");
+    check_refused("requested 12.500 frames a second, the device's rate is fixed");
     fake.no_parameters = EIO;
-    check_refused("asking for its frame rate: Input/output error");
+    check_refused("querying its frame rate: Input/output error");
     fake.no_parameters = 0;
     fake.rate_flags = 0;
-    check_refused("asked for 12.500 frames a second, the device's rate is fixed");
+    check_refused("requested 12.500 frames a second, the device's rate is fixed");
     config.rate_mhz = -1;
-    check_refused("asked for -1 frames in 1000 s, expected 0 or more");
+    check_refused("requested -1 frames in 1000 s, expected 0 or more");
     config.rate_mhz = 0;
     fake.frame_time = (struct v4l2_fract){4000000000u, 0};
     hal_v4l2_init(&v4l2, &config);
@@ -546,7 +547,7 @@ static void exposure_of_a_device_that_changes(void)
                              error.text);
     fake.unplugged = true;
     TEST_ASSERT_FALSE(v4l2.camera.set_exposure(&v4l2, 1000, &error));
-    TEST_ASSERT_EQUAL_STRING("asking for control 0x009a0902: No such device", error.text);
+    TEST_ASSERT_EQUAL_STRING("querying control 0x009a0902: No such device", error.text);
 }
 
 /* Devices have one of two ways to be automatic, and to be manual. */
@@ -629,15 +630,18 @@ static void exposure_in_rows(void)
     struct fake_control *rows = add_control(V4L2_CID_EXPOSURE, "Exposure", 4, 1000, 100);
 
     want_exposure(HAL_V4L2_VALUE, 5000);
-    check_refused("exposure 5000 us: the device counts exposure in rows and does not report how long "
-                  "a row takes (controls pixel rate and horizontal blanking)");
+    check_refused(
+        "exposure 5000 us: the device counts exposure in rows and does not report how long "
+        "a row takes (controls pixel rate and horizontal blanking)");
     add_control(V4L2_CID_HBLANK, "Horizontal Blanking", 0, 9999, 2000 - WIDTH);
-    check_refused("exposure 5000 us: the device counts exposure in rows and does not report how long "
-                  "a row takes (controls pixel rate and horizontal blanking)");
+    check_refused(
+        "exposure 5000 us: the device counts exposure in rows and does not report how long "
+        "a row takes (controls pixel rate and horizontal blanking)");
     add_control(V4L2_CID_PIXEL_RATE, "Pixel Rate", 0, 0, 100000000);
     fake.control[1].id = V4L2_CID_VBLANK; /* the other one is not there */
-    check_refused("exposure 5000 us: the device counts exposure in rows and does not report how long "
-                  "a row takes (controls pixel rate and horizontal blanking)");
+    check_refused(
+        "exposure 5000 us: the device counts exposure in rows and does not report how long "
+        "a row takes (controls pixel rate and horizontal blanking)");
     fake.control[1].id = V4L2_CID_HBLANK;
     start();
     TEST_ASSERT_EQUAL_INT64(250, rows->value);
@@ -1112,7 +1116,7 @@ static void a_buffer_that_does_not_exist(void)
 {
     add_frame(0)->bad_index = true;
     start();
-    check_gone("the device hands on buffer 6 of 6");
+    check_gone("the device returned buffer 6 of 6");
 }
 
 static void unplugged_and_back(void)
@@ -1124,18 +1128,18 @@ static void unplugged_and_back(void)
     expect_frame(0);
     fake.unplugged = true;
     release();
-    check_gone("giving buffer 0 back: No such device");
+    check_gone("returning buffer 0: No such device");
     v4l2.camera.close(&v4l2);
     check_closed();
     TEST_ASSERT_FALSE(open_camera());
-    TEST_ASSERT_EQUAL_STRING("asking what it can do: No such device", error.text);
+    TEST_ASSERT_EQUAL_STRING("querying its capabilities: No such device", error.text);
     check_closed();
     fake.unplugged = false;
     start();
     expect_frame(1);
 }
 
-/* A buffer that cannot be given back is told by the next call, whatever it was that gave it back. */
+/* A buffer that cannot be given back is reported by the next call, whatever it was that gave it back. */
 static void a_buffer_that_cannot_be_given_back(void)
 {
     add_frame(0)->bytesused = 1;
@@ -1144,7 +1148,7 @@ static void a_buffer_that_cannot_be_given_back(void)
     fake.fail_call = fake.call_count + 2;
     fake.fail_reason = ENODEV;
     TEST_ASSERT_EQUAL_INT(HAL_NEXT_BAD, next());
-    check_gone("giving buffer 0 back: No such device");
+    check_gone("returning buffer 0: No such device");
     tearDown();
     setUp();
     only_format(V4L2_PIX_FMT_UYVY);
@@ -1154,7 +1158,7 @@ static void a_buffer_that_cannot_be_given_back(void)
     fake.fail_call = fake.call_count + 2;
     fake.fail_reason = EIO;
     expect_frame(0);
-    check_gone("giving buffer 0 back: Input/output error");
+    check_gone("returning buffer 0: Input/output error");
     release();
 }
 

@@ -204,13 +204,13 @@ static void test_contents_come_whole(void)
     int shown = 0;
     open_as("reader");
     TEST_ASSERT_TRUE_MESSAGE(hal_viewer_open(&viewer, config(), &error), error.text);
-    for (int turn = 0; shown < 200; turn++) {
+    for (int round = 0; shown < 200; round++) {
         void *room = NULL;
         enum hal_look look = viewer.viewer.ask(viewer.viewer.context, &room, &error);
         TEST_ASSERT_NOT_EQUAL_MESSAGE(HAL_LOOK_GONE, look, error.text);
         TEST_ASSERT_EQUAL(look == HAL_LOOK_WANTED, room != NULL);
         if (look == HAL_LOOK_WANTED) {
-            memset(room, turn, CONTENT);
+            memset(room, round, CONTENT);
             viewer.viewer.show(viewer.viewer.context);
             shown++;
         } else {

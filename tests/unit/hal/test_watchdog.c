@@ -159,7 +159,7 @@ static void systemd_behind_an_abstract_name(void)
     systemd_hears_of_the_beginning_life_and_the_end(name);
 }
 
-static void life_is_told_only_where_it_is_asked_for(void)
+static void signs_of_life_are_sent_only_where_expected(void)
 {
     int i;
 
@@ -286,7 +286,7 @@ static void the_device_is_fed_at_times_and_stopped_at_the_end(void)
     TEST_ASSERT_EQUAL_INT('V', last);
 }
 
-static void a_device_that_is_not_there_is_told(void)
+static void a_device_that_is_not_there_is_reported(void)
 {
     be_systemd(socket_path);
     TEST_ASSERT_FALSE(open_with("/nowhere/watchdog", NULL));
@@ -295,8 +295,8 @@ static void a_device_that_is_not_there_is_told(void)
     TEST_ASSERT_EQUAL_INT(-1, feeder.notify_fd);
 }
 
-/* The guard is told all the same, and of two errors its is told. */
-static void one_that_fails_does_not_keep_the_others_from_being_told(void)
+/* The guard is fed all the same, and of two errors its is reported. */
+static void one_that_fails_does_not_keep_the_others_from_being_fed(void)
 {
     char last = 0;
 
@@ -316,7 +316,7 @@ static void one_that_fails_does_not_keep_the_others_from_being_told(void)
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(error.text, "guard:"), error.text);
 }
 
-static void the_guard_is_told_four_times_per_timeout_at_least(void)
+static void the_guard_is_fed_four_times_per_timeout_at_least(void)
 {
     static const int timeouts_ms[] = {2000, 1600, 100, 1};
     int i;
@@ -354,15 +354,15 @@ int main(void)
     RUN_TEST(with_nothing_to_tell_nothing_happens);
     RUN_TEST(systemd_behind_a_path);
     RUN_TEST(systemd_behind_an_abstract_name);
-    RUN_TEST(life_is_told_only_where_it_is_asked_for);
+    RUN_TEST(signs_of_life_are_sent_only_where_expected);
     RUN_TEST(this_process_is_meant_by_its_number);
     RUN_TEST(a_full_socket_is_tried_again);
     RUN_TEST(systemd_gone_is_an_error);
     RUN_TEST(wrong_variables_are_refused);
     RUN_TEST(the_device_is_fed_at_times_and_stopped_at_the_end);
-    RUN_TEST(a_device_that_is_not_there_is_told);
-    RUN_TEST(one_that_fails_does_not_keep_the_others_from_being_told);
-    RUN_TEST(the_guard_is_told_four_times_per_timeout_at_least);
+    RUN_TEST(a_device_that_is_not_there_is_reported);
+    RUN_TEST(one_that_fails_does_not_keep_the_others_from_being_fed);
+    RUN_TEST(the_guard_is_fed_four_times_per_timeout_at_least);
     result = UNITY_END();
     rmdir(folder);
     return result;
