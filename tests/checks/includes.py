@@ -28,7 +28,7 @@ CORE_ORDER = ["base", "simd", "rig", "dots", "labels", "points", "surface", "nes
 CORE_SYSTEM = {"stdalign.h", "stdbool.h", "stddef.h", "stdint.h", "string.h"}
 # The vectors of x86 and the pairs of a Cortex-M, in files that are not yet on one vocabulary.
 VECTOR_HEADERS = {"immintrin.h", "emmintrin.h", "arm_neon.h", "arm_acle.h"}
-VECTOR_FILES = {"ih_normal_equations_cortexm.h", "ih_fit_equations.c",
+VECTOR_FILES = {"ih_normal_equations_cortexm.h",
                 "ih_surface.c"}
 
 INCLUDE = re.compile(r'^\s*#\s*include\s*(["<])([^">]+)[">]')

@@ -84,15 +84,14 @@ static void hash_levels(struct isohead *head, uint64_t hash[GOLDEN_INNERS])
 static void hash_start(struct isohead *head, const int32_t centre_mm_q8[3],
                        uint64_t hash[GOLDEN_INNERS])
 {
-    const struct ih_rays *rays = &head->scratch.detections.space;
+    const struct ih_rays *rays = &head->scratch.detections.rays;
     const struct ih_evidence_nest nest = {.present = false};
     struct ih_ellipsoid start = ih_ellipsoid_mean(centre_mm_q8), fitted;
     struct ih_evidence evidence;
     struct ih_score score;
-    ih_fit_ellipsoid(rays, &head->params.detections.fit, &start, &head->scratch.detections.rows,
+    ih_fit_ellipsoid(rays, &head->params.detections.fit, &start, &head->scratch.detections.fit,
                      &fitted);
-    ih_evidence_collect(rays, &head->scratch.detections.tally, &fitted, centre_mm_q8, &nest,
-                        &evidence);
+    ih_evidence_collect(rays, &fitted, centre_mm_q8, &nest, &evidence);
     ih_score_rate(&evidence, &score);
     hash[GOLDEN_FIT] = golden_add_words(hash[GOLDEN_FIT], &fitted, sizeof fitted);
     hash[GOLDEN_EVIDENCE] = golden_add_words(hash[GOLDEN_EVIDENCE], &evidence, sizeof evidence);
@@ -104,12 +103,11 @@ static void hash_candidates(struct isohead *head, uint64_t hash[GOLDEN_INNERS])
     const struct ih_dots *dots = head->rig.calibration.kind == IH_RIG_DOTS ? &head->dots : NULL;
     struct ih_detections_scratch *scratch = &head->scratch.detections;
     const struct ih_scan *scan = &scratch->scan;
-    ih_rays_make(&head->points, dots, &head->rig, &head->params.detections.space, &scratch->space);
-    ih_scan_find(&scratch->space, &head->params.detections.scan, &scratch->scan_scratch,
+    ih_rays_make(&head->points, dots, &head->rig, &head->params.detections.rays, &scratch->rays);
+    ih_scan_find(&scratch->rays, &head->params.detections.scan, &scratch->scan_scratch,
                  &scratch->scan);
-    ih_fit_equations_prepare(&scratch->space, &scratch->rows.rays);
-    ih_ray_counts_prepare(&scratch->space, &scratch->tally);
-    hash[GOLDEN_RAYS] = golden_add_words(hash[GOLDEN_RAYS], &scratch->space, sizeof scratch->space);
+    hash[GOLDEN_RAYS] =
+        golden_add_words(hash[GOLDEN_RAYS], &scratch->rays, offsetof(struct ih_rays, table));
     hash[GOLDEN_SCAN] = golden_add_word(hash[GOLDEN_SCAN], scan->place_count);
     hash[GOLDEN_SCAN] = golden_add_words(hash[GOLDEN_SCAN], scan->place,
                                          (size_t)scan->place_count * sizeof scan->place[0]);
@@ -151,7 +149,7 @@ static uint64_t hash_paper(struct isohead *head)
 _Static_assert(sizeof(struct ih_exposure_look) == WORDS(4), "ih_exposure_look");
 _Static_assert(sizeof(struct ih_exposure) == WORDS(4), "ih_exposure");
 _Static_assert(sizeof(struct ih_ellipse) == WORDS(9), "ih_ellipse");
-_Static_assert(sizeof(struct ih_rays) == WORDS(3 + 6 * IH_SLOTS), "ih_rays");
+_Static_assert(offsetof(struct ih_rays, table) == WORDS(3 + 6 * IH_SLOTS), "ih_rays");
 _Static_assert(sizeof(struct ih_scan_place) == WORDS(4), "ih_scan_place");
 _Static_assert(sizeof(struct ih_score) == WORDS(2 + IH_EVIDENCE_COUNT), "ih_score");
 

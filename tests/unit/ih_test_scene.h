@@ -25,39 +25,39 @@ struct vector_scene {
 
 #define SCENE_COUNT IH_TEST_COUNT(vector_scenes)
 
-static struct ih_rays space;
+static struct ih_rays rays;
 
 /* The ray of a slot meets something at a depth. */
 static inline void see(int32_t slot, int32_t depth_mm_q8)
 {
-    struct ih_ray *ray = &space.ray[slot];
-    const int64_t along = (int64_t)depth_mm_q8 - space.origin_mm_q8[2];
+    struct ih_ray *ray = &rays.ray[slot];
+    const int64_t along = (int64_t)depth_mm_q8 - rays.origin_mm_q8[2];
 
     ray->state = IH_RAY_SEEN;
     ray->point_mm_q8[0] =
-        (int32_t)(space.origin_mm_q8[0] + ih_mul_shift(along, ray->slope_x_q20, 20));
+        (int32_t)(rays.origin_mm_q8[0] + ih_mul_shift(along, ray->slope_x_q20, 20));
     ray->point_mm_q8[1] =
-        (int32_t)(space.origin_mm_q8[1] + ih_mul_shift(along, ray->slope_y_q20, 20));
+        (int32_t)(rays.origin_mm_q8[1] + ih_mul_shift(along, ray->slope_y_q20, 20));
     ray->point_mm_q8[2] = depth_mm_q8;
 }
 
 /* The ray of a slot meets nothing, or nobody knows. */
 static inline void lose(int32_t slot, enum ih_ray_state state)
 {
-    struct ih_ray *ray = &space.ray[slot];
+    struct ih_ray *ray = &rays.ray[slot];
 
     ray->state = (int32_t)state;
     ray->point_mm_q8[0] = ray->point_mm_q8[1] = ray->point_mm_q8[2] = 0;
 }
 
-static inline void make_rays(const struct vector_rays *rays)
+static inline void make_rays(const struct vector_rays *from)
 {
     int32_t slot;
 
-    memcpy(space.origin_mm_q8, rays->origin_mm_q8, sizeof space.origin_mm_q8);
+    memcpy(rays.origin_mm_q8, from->origin_mm_q8, sizeof rays.origin_mm_q8);
     for (slot = 0; slot < IH_SLOTS; slot++) {
-        space.ray[slot].slope_x_q20 = rays->slope_q20[slot][0];
-        space.ray[slot].slope_y_q20 = rays->slope_q20[slot][1];
+        rays.ray[slot].slope_x_q20 = from->slope_q20[slot][0];
+        rays.ray[slot].slope_y_q20 = from->slope_q20[slot][1];
         lose(slot, IH_RAY_UNKNOWN);
     }
 }
@@ -90,28 +90,28 @@ static inline const struct vector_scene *scene_named(const char *name)
 }
 
 /* The scene in a mirror: left is right. */
-static inline void mirror_space(void)
+static inline void mirror_rays(void)
 {
     int32_t slot;
 
-    space.origin_mm_q8[0] = -space.origin_mm_q8[0];
+    rays.origin_mm_q8[0] = -rays.origin_mm_q8[0];
     for (slot = 0; slot < IH_SLOTS; slot++) {
-        space.ray[slot].slope_x_q20 = -space.ray[slot].slope_x_q20;
-        space.ray[slot].point_mm_q8[0] = -space.ray[slot].point_mm_q8[0];
+        rays.ray[slot].slope_x_q20 = -rays.ray[slot].slope_x_q20;
+        rays.ray[slot].point_mm_q8[0] = -rays.ray[slot].point_mm_q8[0];
     }
 }
 
 /* The whole scene, projector and all, elsewhere. */
-static inline void move_space(const int32_t by_mm_q8[3])
+static inline void move_rays(const int32_t by_mm_q8[3])
 {
     int32_t slot;
     int axis;
 
     for (axis = 0; axis < 3; axis++) {
-        space.origin_mm_q8[axis] += by_mm_q8[axis];
+        rays.origin_mm_q8[axis] += by_mm_q8[axis];
         for (slot = 0; slot < IH_SLOTS; slot++) {
-            if (space.ray[slot].state == IH_RAY_SEEN) {
-                space.ray[slot].point_mm_q8[axis] += by_mm_q8[axis];
+            if (rays.ray[slot].state == IH_RAY_SEEN) {
+                rays.ray[slot].point_mm_q8[axis] += by_mm_q8[axis];
             }
         }
     }

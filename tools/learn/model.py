@@ -98,14 +98,9 @@ def write(path, learnt, kinds, command):
 #include "detect/ih_score.h"
 
 /* clang-format off */
-struct curve {
-    int32_t first_q8, step_q8;     /* evidence at the first knot, and from knot to knot */
-    int16_t at_q10[IH_SCORE_KNOTS]; /* part of the log-odds at each knot */
-};
-
 static const int32_t bias_q10 = %d;
 
-static const struct curve curves[IH_EVIDENCE_COUNT] = {
+static const struct ih_score_curve curves[IH_EVIDENCE_COUNT] = {
 %s
 };
 /* clang-format on */

@@ -46,7 +46,7 @@ def write_vectors(directory):
     logits = curves.logits(evidence / 256)
     inc = emit.Inc("Curves of a score, evidence, and the log-odds that they give.")
     inc.raw("\n#define VECTOR_KINDS %d\n#define VECTOR_BIAS_Q10 %d\n" % (KINDS, curves.bias_q10))
-    inc.struct_array("curve", "vector_curves", [
+    inc.struct_array("ih_score_curve", "vector_curves", [
         "%d, %d, {%s}" % (first, step, ", ".join(emit.numbers(at)))
         for first, step, at in zip(curves.first_q8, curves.step_q8, curves.at_q10)])
     inc.struct_array("vector_case", "vector_cases", [

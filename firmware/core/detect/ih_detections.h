@@ -1,23 +1,23 @@
-/* ih_detections - everything in the frame that may be a head, each with its probability (ours).
+/* ih_detections - every candidate head of a frame, each with its probability (ours).
  *
- * In:    nests and their hypotheses (ih_hypotheses), points, dots, rig, and places from where a head is
- *        expected (tracks).
- * Out:   findings, the most probable first, at least spacing_mm apart.
- * Way:   candidates are the nests' centres, the places of the model scan and the expected ones, in this
- *        order. Nests and places of which a glance says nothing good (ih_prescreen), and starts within apart_mm
- *        of one before, are passed over. Each other one is fitted for a step (ih_fit), looked at
- *        (ih_evidence) and rated (ih_score); then what is not hopeless is fitted to the end, looked at and
- *        rated again. Tracks take no finding below log-odds -3: hopeless is what lies 2.5 below that after
- *        a step. A range frame is looked at window by window: begin once a frame, add once a window.
- *        Of an expected head that is not found it also says what its rays met (views): whether it is
- *        hidden, or gone.
- *        Of two within spacing_mm the more probable stays, of equals the first; it takes the place of
- *        all that are near it.
+ * In:     nests and their hypotheses (ih_hypotheses), points, dots, rig, and where a head is
+ *         expected (tracks).
+ * Out:    detections, the most probable first, at least spacing_mm apart.
+ * Method: candidates are the nests' centres, the candidates of the model scan and the expected heads, in this
+ *         order. Nests and scan candidates that a coarse pre-filter rejects (ih_prescreen), and starts
+ *         within apart_mm of one before, are passed over. Each other one is fitted for a step (ih_fit),
+ *         measured (ih_evidence) and scored (ih_score); those that are not hopeless are fitted to the end,
+ *         measured and scored again. Tracks take no detection below log-odds -3: hopeless is 2.5 below
+ *         that after a step. A range frame has several windows: begin once a frame, add once a window.
+ *         For an expected head that is not found there is what its rays met (views): whether it is
+ *         hidden, or gone.
+ *         Of two within spacing_mm the more probable stays, of equals the first; it replaces all that
+ *         are near it.
  * Full table: the least probable drop and count in dropped_count.
  * Overflow: points are below 2^25 in Q8 (16 m, slopes up to 8), nests' centres below 2^26.01, expected
- *        ones at most 2^26; a fit moves 240 mm: centres below 2^27, squares of differences 2^57.6.
- * Cost:  up to IH_SCAN_MAX + IH_NESTS_MAX + IH_DETECTIONS_EXPECTED_MAX = 32 fits a window. Usually 12
- *        candidates, of which 6 are fitted for a step and 3 to the end.
+ *         ones at most 2^26; a fit moves 240 mm: centres below 2^27, squares of differences 2^57.6.
+ * Cost:   up to IH_SCAN_MAX + IH_NESTS_MAX + IH_DETECTIONS_EXPECTED_MAX = 32 fits a window. Usually 12
+ *         candidates, of which 6 are fitted for a step and 3 to the end.
  */
 #ifndef IH_DETECTIONS_H
 #define IH_DETECTIONS_H
@@ -30,7 +30,6 @@
 #include "detect/ih_evidence.h"
 #include "detect/ih_fit.h"
 #include "detect/ih_fit_equations.h"
-#include "detect/ih_ray_counts.h"
 #include "detect/ih_rays.h"
 #include "detect/ih_scan.h"
 #include "dots/ih_dots.h"
@@ -39,27 +38,26 @@
 #include "points/ih_points.h"
 #include "rig/ih_rig.h"
 
-/* Findings kept; each costs 148 bytes. */
+/* Detections kept; each costs 148 bytes. */
 #define IH_DETECTIONS_MAX 16
-/* Expected places that are tried, and so the tracks; each costs a track and a finding. */
+/* Expected heads that are tried, and so the tracks; each costs a track and a detection. */
 #define IH_DETECTIONS_EXPECTED_MAX 8
 
 enum ih_source { IH_SOURCE_SCAN, IH_SOURCE_NEST, IH_SOURCE_EXPECTED };
 
 struct ih_detections_params {
-    struct ih_rays_params space;
+    struct ih_rays_params rays;
     struct ih_scan_params scan;
     struct ih_fit_params fit;
-    int32_t
-        promise_min_q8; /* a nest or a place of the scan with less (ih_prescreen) is not fitted */
-    int32_t apart_mm;   /* a start nearer than this to one before is not tried */
-    int32_t hopeless_logit_q10; /* less probable after a first step: not fitted any further */
-    int32_t spacing_mm;         /* of two findings */
-    int32_t nest_near_mm;       /* a nest this near is the candidate's own */
+    int32_t promise_min_q8;     /* minimum of ih_prescreen for a nest or a scan candidate */
+    int32_t apart_mm;           /* a start nearer than this to one before is not tried */
+    int32_t hopeless_logit_q10; /* minimum after the first step */
+    int32_t spacing_mm;         /* of two detections */
+    int32_t nest_near_mm;       /* a nest this near belongs to the candidate */
     int32_t nest_max;           /* of them this many are candidates themselves */
     int32_t expected_max;       /* of the expected heads this many are */
     int32_t range_prior_q10;    /* log-odds added with a range rig: most windows show no head */
-    int32_t front_min_mm;       /* nothing nearer than this is a head: the lens is there */
+    int32_t front_min_mm;       /* no head is nearer than this: the lens is there */
 };
 
 struct ih_detection {
@@ -75,8 +73,8 @@ struct ih_detection {
     int32_t distance_mm_q8;
 };
 
-/* What the rays through an expected head met: something behind it or nothing, its surface, something
- * before it. Counts. */
+/* Counts of rays through an expected head, by what they met: something behind it or nothing, its
+ * surface, something before it. */
 struct ih_view {
     int32_t through, hit, front;
 };
@@ -95,7 +93,7 @@ struct ih_expected {
     struct ih_ellipsoid head[IH_DETECTIONS_EXPECTED_MAX];
 };
 
-/* Places from where fits have begun. */
+/* Centres from where fits have begun. */
 struct ih_detections_starts {
     int32_t count;
     int32_t centre_mm_q8[IH_SCAN_MAX + IH_NESTS_MAX + IH_DETECTIONS_EXPECTED_MAX][3];
@@ -103,11 +101,10 @@ struct ih_detections_starts {
 
 struct ih_detections_scratch {
     struct ih_detections_starts starts;
-    struct ih_rays space;
+    struct ih_rays rays;
     struct ih_scan scan;
     struct ih_scan_scratch scan_scratch;
-    struct ih_fit_equations_scratch rows;
-    struct ih_ray_counts_scratch tally;
+    struct ih_fit_scratch fit;
 };
 
 IH_BEGIN_DECLS
@@ -116,18 +113,18 @@ void ih_detections_params_default(struct ih_detections_params *params);
 
 void ih_detections_begin(struct ih_detections *out);
 
-/* Add what one set of points shows. */
+/* Add the detections of one set of points. */
 void ih_detections_add(const struct ih_points *points, const struct ih_dots *dots,
                        const struct ih_hypotheses *hypotheses, const struct ih_expected *expected,
                        const struct ih_rig *rig, const struct ih_detections_params *params,
                        struct ih_detections_scratch *scratch, struct ih_detections *out);
 
-/* The outline of an ellipsoid in the frame; fills the finding from u_px_q12 on. It is the ellipse of
+/* The outline of an ellipsoid in the frame; fills the detection from u_px_q12 on. It is the ellipse of
  * the cross-section at the centre's depth, which the true one exceeds: by 2 % at 500 mm and 0.6 % at
  * 900 mm, and at a slope s from the axis by up to 0.8 s^2 more in that direction, 8 % at 0.3; there
  * its long axis is tilted by up to 10 degrees, and its centre lies s (98 / Z)^2 of a focal length
  * farther out (11 px at 500 mm, 3 px at 900 mm and s = 0.3). The lens bends the centre only. The
- * distance takes the head to be as deep from every side: 2 mm short at s = 0.3; it is 0 where the
+ * distance assumes a head as deep from every side: 2 mm short at s = 0.3; it is 0 where the
  * camera would be inside the head. */
 void ih_detections_outline(const struct ih_rig *rig, struct ih_detection *detection);
 

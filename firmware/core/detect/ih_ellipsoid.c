@@ -2,6 +2,8 @@
 
 #include "base/ih_fix.h"
 #include "base/ih_range.h"
+#include "detect/ih_ellipsoid_distance.h"
+#include "detect/ih_head_model.h"
 
 #define REACH_Q14 (IH_ELLIPSOID_REACH << 14)
 
@@ -9,11 +11,11 @@ struct ih_ellipsoid ih_ellipsoid_mean(const int32_t centre_mm_q8[3])
 {
     return (struct ih_ellipsoid){
         .centre_mm_q8 = {centre_mm_q8[0], centre_mm_q8[1], centre_mm_q8[2]},
-        .semi_mm_q8 = {78 << 8, 113 << 8, 98 << 8},
+        .semi_mm_q8 = {IH_HEAD_SEMI_X_MM << 8, IH_HEAD_SEMI_Y_MM << 8, IH_HEAD_SEMI_Z_MM << 8},
     };
 }
 
-/* What the errors of radius2 and the box's own rounding need: 2^-6, and two steps. */
+/* Room for the errors of radius2 and the box's own rounding: 2^-6, and two steps. */
 #define BOX_RADIUS2_Q14 (1 << 8)
 #define BOX_MM_Q8 2
 
@@ -37,36 +39,26 @@ struct ih_ellipsoid_box ih_ellipsoid_box(const struct ih_ellipsoid *ellipsoid,
     return box;
 }
 
-bool ih_ellipsoid_in_box(const struct ih_ellipsoid *ellipsoid, const struct ih_ellipsoid_box *box,
-                         const int32_t origin_mm_q8[3], const struct ih_ray *ray)
+static bool in_reach(int64_t position_q14)
 {
-    const int32_t *centre_q8 = ellipsoid->centre_mm_q8;
-    int64_t depth_q8 = (int64_t)centre_q8[2] - origin_mm_q8[2];
-    int64_t x_q8 = (depth_q8 * ray->slope_x_q20 >> 20) + origin_mm_q8[0] - centre_q8[0];
-    int64_t y_q8 = (depth_q8 * ray->slope_y_q20 >> 20) + origin_mm_q8[1] - centre_q8[1];
-    return ih_abs_s64(x_q8) <= box->half_mm_q8[0] && ih_abs_s64(y_q8) <= box->half_mm_q8[1];
+    return ih_abs_s64(position_q14) <= REACH_Q14;
 }
 
-static bool in_reach(int64_t place_q14)
-{
-    return ih_abs_s64(place_q14) <= REACH_Q14;
-}
-
-struct ih_aim ih_ellipsoid_aim(const int32_t semi_mm_q8[3], const struct ih_fractions *shares,
+struct ih_aim ih_ellipsoid_aim(const int32_t semi_mm_q8[3], const struct ih_fractions *fractions,
                                const struct ih_ray *ray)
 {
     const int32_t slope_q20[2] = {ray->slope_x_q20, ray->slope_y_q20};
     struct ih_aim aim = {.gg_q28 = (int64_t)1 << 28};
     for (int axis = 0; axis < 2; axis++) {
         /* deep over this semi-axis, at most 5: no division for a ray */
-        const int32_t ratio_q24 = (int32_t)(semi_mm_q8[2] * shares->share_q50[axis] >> 26);
+        const int32_t ratio_q24 = (int32_t)(semi_mm_q8[2] * fractions->inverse_q50[axis] >> 26);
         aim.g_q14[axis] = (int32_t)ih_mul_shift(slope_q20[axis], ratio_q24, 30);
         aim.gg_q28 += (int64_t)aim.g_q14[axis] * aim.g_q14[axis];
     }
     return aim;
 }
 
-bool ih_ellipsoid_cross(const struct ih_ellipsoid *ellipsoid, const struct ih_fractions *shares,
+bool ih_ellipsoid_cross(const struct ih_ellipsoid *ellipsoid, const struct ih_fractions *fractions,
                         const int32_t origin_mm_q8[3], const struct ih_ray *ray,
                         const struct ih_aim *aim, struct ih_crossing *out)
 {
@@ -82,7 +74,7 @@ bool ih_ellipsoid_cross(const struct ih_ellipsoid *ellipsoid, const struct ih_fr
         if (ih_abs_s64(offset_q8) > IH_FRACTION_MAX) {
             return false;
         }
-        e_q14[axis] = ih_fraction(shares->share_q50[axis], (int32_t)offset_q8);
+        e_q14[axis] = ih_fraction(fractions->inverse_q50[axis], (int32_t)offset_q8);
         if (!in_reach(e_q14[axis])) {
             return false;
         }
@@ -113,25 +105,46 @@ bool ih_ellipsoid_cross(const struct ih_ellipsoid *ellipsoid, const struct ih_fr
 
 struct ih_fractions ih_ellipsoid_fractions(const int32_t semi_mm_q8[3])
 {
-    struct ih_fractions shares;
+    struct ih_fractions fractions;
     for (int axis = 0; axis < 3; axis++) {
-        shares.share_q50[axis] = ((int64_t)1 << 50) / semi_mm_q8[axis] + 1;
+        fractions.inverse_q50[axis] = ((int64_t)1 << 50) / semi_mm_q8[axis] + 1;
     }
-    return shares;
+    return fractions;
 }
 
-bool ih_ellipsoid_place(const struct ih_ellipsoid *ellipsoid, const struct ih_fractions *shares,
-                        const int32_t point_mm_q8[3], int32_t place_q14[3])
+bool ih_ellipsoid_position(const struct ih_ellipsoid *ellipsoid,
+                           const struct ih_fractions *fractions, const int32_t point_mm_q8[3],
+                           int32_t position_q14[3])
 {
     for (int axis = 0; axis < 3; axis++) {
         const int64_t offset_q8 = (int64_t)point_mm_q8[axis] - ellipsoid->centre_mm_q8[axis];
         if (ih_abs_s64(offset_q8) > IH_FRACTION_MAX) {
             return false;
         }
-        place_q14[axis] = ih_fraction(shares->share_q50[axis], (int32_t)offset_q8);
-        if (!in_reach(place_q14[axis])) {
+        position_q14[axis] = ih_fraction(fractions->inverse_q50[axis], (int32_t)offset_q8);
+        if (!in_reach(position_q14[axis])) {
             return false;
         }
     }
+    return true;
+}
+
+bool ih_ellipsoid_gradient(const struct ih_inverses *inverses, const int32_t position_q14[3],
+                           int32_t component_q14[3], struct ih_distance *out)
+{
+    const uint32_t length2_q22 = ih_gradient_q22(inverses, position_q14, component_q14);
+    return ih_distance_of(ih_radius2_q22(position_q14), length2_q22, out);
+}
+
+bool ih_ellipsoid_distance(const struct ih_fractions *fractions, const int32_t position_q14[3],
+                           int32_t *distance_mm_q8)
+{
+    const struct ih_inverses inverses = ih_inverses_of(fractions);
+    int32_t component_q14[3];
+    struct ih_distance distance;
+    if (!ih_ellipsoid_gradient(&inverses, position_q14, component_q14, &distance)) {
+        return false;
+    }
+    *distance_mm_q8 = distance.residual_mm_q8;
     return true;
 }

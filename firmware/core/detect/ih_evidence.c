@@ -5,24 +5,20 @@
 
 #include "base/ih_fix.h"
 #include "base/ih_range.h"
-#include "detect/ih_fit_equations.h"
+#include "detect/ih_head_model.h"
+#include "detect/ih_ray_counts.h"
 
 #define ONE_Q14 (1 << 14)
 #define INSIDE_Q14 14746 /* radius2 below 0.9: through the head, not along its edge */
 #define ON_MM_Q8 (20 << 8)
-#define OPEN_MM_Q8 (60 << 8)
 #define THROUGH_MM_Q8 (50 << 8)
 #define FRONT_MM_Q8 (30 << 8)
-#define RING_INNER2_Q28 419430400LL /* 1.25^2 */
-#define RING_OUTER2_Q28 969042657LL /* 1.9^2 */
-#define AROUND2_Q28 1677721600LL    /* 2.5^2 */
-#define HIGH_FROM_Q14 31130         /* 1.9 */
-#define HIGH_WIDE_Q14 26214         /* 1.6 */
-#define BODY_BEFORE_MM_Q8 (-220 * 256)
-#define BODY_BEHIND_MM_Q8 (200 << 8)
+#define RING_INNER2_Q28 IH_HEAD_SQUARE(IH_HEAD_RING_INNER_PERCENT, 28)
+#define RING_OUTER2_Q28 IH_HEAD_SQUARE(IH_HEAD_RING_OUTER_PERCENT, 28)
+#define AROUND2_Q28 IH_HEAD_SQUARE(IH_HEAD_AROUND_PERCENT, 28)
+#define HIGH_FROM_Q14 ((int32_t)IH_HEAD_PART(IH_HEAD_HIGH_FROM_PERCENT, 14))
+#define HIGH_WIDE_Q14 ((int32_t)IH_HEAD_PART(IH_HEAD_HIGH_ASIDE_PERCENT, 14))
 #define BODY_RAYS_MAX 30
-#define LEVEL_MM_Q8 (150 << 8)
-#define BEFORE_MM_Q8 (60 << 8)
 #define PLANE_POINTS_MIN 6
 
 /* The candidate, and what is the same for all rays. */
@@ -30,7 +26,7 @@ struct candidate {
     const struct ih_ellipsoid *ellipsoid;
     const int32_t *origin_mm_q8;
     int32_t depth_mm_q8; /* of its centre, from the origin */
-    struct ih_fractions shares;
+    struct ih_fractions fractions;
     struct ih_ellipsoid_box box; /* rays through it pass here */
 };
 
@@ -40,13 +36,13 @@ struct view {
     bool may_hit;
     int32_t at_q14[2];        /* offset at the centre's depth, in semi-axes */
     int32_t x_mm_q8, y_mm_q8; /* and in mm */
-    int32_t below_chin_mm_q8; /* y less the semi-axis up */
+    int32_t below_chin_mm_q8; /* y minus the semi-axis up */
     int32_t dz_mm_q8;         /* of its point, against the centre */
     int64_t distance2_q28;    /* of the offset, in semi-axes */
     bool is_seen, is_open, is_body;
 };
 
-struct tally {
+struct sums {
     struct ih_ray_counts around;
     int32_t on, through, hit, front;
     int64_t on_square_q16; /* sum of squared distances, mm^2 */
@@ -81,7 +77,7 @@ static bool make_view(const struct candidate *candidate, const struct ih_ray *ra
         if (ih_abs_s64(off_q8) > IH_FRACTION_MAX) {
             return false;
         }
-        const int32_t at_q14 = ih_fraction(candidate->shares.share_q50[axis], (int32_t)off_q8);
+        const int32_t at_q14 = ih_fraction(candidate->fractions.inverse_q50[axis], (int32_t)off_q8);
         if (ih_abs_s32(at_q14) > IH_ELLIPSOID_REACH << 14) {
             return false;
         }
@@ -96,87 +92,88 @@ static bool make_view(const struct candidate *candidate, const struct ih_ray *ra
     view->is_seen = view->ray->state == IH_RAY_SEEN;
     view->dz_mm_q8 =
         view->is_seen ? view->ray->point_mm_q8[2] - ellipsoid->centre_mm_q8[2] : INT32_MAX;
-    view->is_open = view->dz_mm_q8 > OPEN_MM_Q8;
-    view->is_body =
-        view->is_seen && view->dz_mm_q8 > BODY_BEFORE_MM_Q8 && view->dz_mm_q8 < BODY_BEHIND_MM_Q8;
+    view->is_open = view->dz_mm_q8 > (IH_HEAD_OPEN_MM << 8);
+    view->is_body = view->is_seen && view->dz_mm_q8 > -(IH_HEAD_BODY_BEFORE_MM << 8) &&
+                    view->dz_mm_q8 < IH_HEAD_BODY_BEHIND_MM << 8;
     return true;
 }
 
-static void count(struct ih_ray_counts_share *share, bool part)
+static void add_ray(struct ih_ray_count *count, bool is_part)
 {
-    share->all++;
-    share->part += part;
+    count->all++;
+    count->part += is_part;
 }
 
 static void add_on(const struct view *view, const struct ih_ellipsoid *ellipsoid, int32_t off_q8,
-                   struct tally *tally)
+                   struct sums *sums)
 {
     int64_t at_q4[3];
-    tally->on++;
-    tally->on_square_q16 += (int64_t)off_q8 * off_q8;
+    sums->on++;
+    sums->on_square_q16 += (int64_t)off_q8 * off_q8;
     for (int axis = 0; axis < 3; axis++) {
         at_q4[axis] =
             ih_shift_round(view->ray->point_mm_q8[axis] - ellipsoid->centre_mm_q8[axis], 4);
-        tally->sum_q4[axis] += at_q4[axis];
+        sums->sum_q4[axis] += at_q4[axis];
         IH_IN_RANGE(at_q4[axis], -IH_RANGE_ON_MM_Q4, IH_RANGE_ON_MM_Q4);
         for (int other = 0; other <= axis; other++) {
-            tally->product_q8[axis][other] += at_q4[axis] * at_q4[other];
+            sums->product_q8[axis][other] += at_q4[axis] * at_q4[other];
         }
     }
 }
 
 /* Rays through the head. */
-static void look_inside(const struct candidate *candidate, const struct view *view,
-                        struct tally *tally)
+static void add_inside(const struct candidate *candidate, const struct view *view,
+                       struct sums *sums)
 {
     const struct ih_ellipsoid *ellipsoid = candidate->ellipsoid;
     struct ih_crossing crossing;
-    int32_t place_q14[3], off_q8;
+    int32_t position_q14[3], off_q8;
     if (!view->may_hit) {
         return;
     }
     const struct ih_aim aim =
-        ih_ellipsoid_aim(ellipsoid->semi_mm_q8, &candidate->shares, view->ray);
-    if (!ih_ellipsoid_cross(ellipsoid, &candidate->shares, candidate->origin_mm_q8, view->ray, &aim,
-                            &crossing) ||
+        ih_ellipsoid_aim(ellipsoid->semi_mm_q8, &candidate->fractions, view->ray);
+    if (!ih_ellipsoid_cross(ellipsoid, &candidate->fractions, candidate->origin_mm_q8, view->ray,
+                            &aim, &crossing) ||
         crossing.radius2_q14 >= INSIDE_Q14) {
         return;
     }
     if (!view->is_seen) {
-        tally->through += view->ray->state == IH_RAY_EMPTY;
+        sums->through += view->ray->state == IH_RAY_EMPTY;
         return;
     }
     int32_t behind_q8 = view->ray->point_mm_q8[2] - crossing.entry_mm_q8;
-    tally->through += behind_q8 > THROUGH_MM_Q8;
-    tally->front += behind_q8 < -FRONT_MM_Q8;
-    if (ih_ellipsoid_place(ellipsoid, &candidate->shares, view->ray->point_mm_q8, place_q14) &&
-        ih_fit_equations_distance(&candidate->shares, place_q14, &off_q8) &&
+    sums->through += behind_q8 > THROUGH_MM_Q8;
+    sums->front += behind_q8 < -FRONT_MM_Q8;
+    if (ih_ellipsoid_position(ellipsoid, &candidate->fractions, view->ray->point_mm_q8,
+                              position_q14) &&
+        ih_ellipsoid_distance(&candidate->fractions, position_q14, &off_q8) &&
         ih_abs_s32(off_q8) < ON_MM_Q8) {
-        tally->hit++;
-        add_on(view, ellipsoid, off_q8, tally);
+        sums->hit++;
+        add_on(view, ellipsoid, off_q8, sums);
     }
 }
 
 /* Rays around and above the head: is it open there? */
-static void look_around(const struct view *view, struct tally *tally)
+static void add_around(const struct view *view, struct sums *sums)
 {
     int64_t ex = view->at_q14[0];
     int64_t ey = view->at_q14[1];
     if (ey < -HIGH_FROM_Q14 && ih_abs_s64(ex) < HIGH_WIDE_Q14) {
-        count(&tally->around.high, view->is_open);
+        add_ray(&sums->around.high, view->is_open);
     }
     if (view->distance2_q28 <= RING_INNER2_Q28 || view->distance2_q28 >= RING_OUTER2_Q28) {
         return;
     }
-    if (10 * ey > 9 * ih_abs_s64(ex)) {
-        count(&tally->around.below, view->is_open);
+    if (10 * ey > IH_HEAD_RING_BELOW_TENTHS * ih_abs_s64(ex)) {
+        add_ray(&sums->around.below, view->is_open);
         return;
     }
-    count(&tally->around.nothing, view->ray->state == IH_RAY_EMPTY);
-    if (10 * ey < -8 * ih_abs_s64(ex)) {
-        count(&tally->around.above, view->is_open);
+    add_ray(&sums->around.nothing, view->ray->state == IH_RAY_EMPTY);
+    if (10 * ey < -IH_HEAD_RING_ABOVE_TENTHS * ih_abs_s64(ex)) {
+        add_ray(&sums->around.above, view->is_open);
     } else {
-        count(ex < 0 ? &tally->around.left : &tally->around.right, view->is_open);
+        add_ray(ex < 0 ? &sums->around.left : &sums->around.right, view->is_open);
     }
 }
 
@@ -186,48 +183,54 @@ static bool between_mm(int32_t value_mm_q8, int32_t low_mm, int32_t high_mm)
 }
 
 /* What is below and beside: body, shoulders, table. */
-static void look_below(const struct view *view, const struct ih_ellipsoid *ellipsoid,
-                       struct tally *tally)
+static void add_below(const struct view *view, const struct ih_ellipsoid *ellipsoid,
+                      struct sums *sums)
 {
     int32_t aside_q8 = ih_abs_s32(view->x_mm_q8);
     int32_t chin_q8 = view->below_chin_mm_q8;
-    if (between_mm(chin_q8, 40, 260) && aside_q8 < 180 << 8) {
-        count(&tally->around.body, view->is_body);
-        tally->body_dz_q8 += view->is_body ? view->dz_mm_q8 : 0;
+    if (between_mm(chin_q8, IH_HEAD_BODY_TOP_MM, IH_HEAD_BODY_BOTTOM_MM) &&
+        aside_q8 < IH_HEAD_BODY_ASIDE_MM << 8) {
+        add_ray(&sums->around.body, view->is_body);
+        sums->body_dz_q8 += view->is_body ? view->dz_mm_q8 : 0;
     }
-    if (between_mm(chin_q8, 40, 240) && aside_q8 > 300 << 8) {
-        count(&tally->around.wide, view->is_body);
+    if (between_mm(chin_q8, IH_HEAD_BODY_TOP_MM, IH_HEAD_WIDE_BOTTOM_MM) &&
+        aside_q8 > IH_HEAD_WIDE_ASIDE_MM << 8) {
+        add_ray(&sums->around.wide, view->is_body);
     }
-    if (ih_abs_s32(view->y_mm_q8) < ellipsoid->semi_mm_q8[1] && between_mm(aside_q8, 170, 330)) {
-        count(&tally->around.level, view->is_seen && ih_abs_s32(view->dz_mm_q8) < LEVEL_MM_Q8);
+    if (ih_abs_s32(view->y_mm_q8) < ellipsoid->semi_mm_q8[1] &&
+        between_mm(aside_q8, IH_HEAD_LEVEL_NEAR_MM, IH_HEAD_LEVEL_FAR_MM)) {
+        add_ray(&sums->around.level,
+                view->is_seen && ih_abs_s32(view->dz_mm_q8) < IH_HEAD_LEVEL_DEPTH_MM << 8);
     }
-    if (10 * (int64_t)view->y_mm_q8 > 9 * (int64_t)ellipsoid->semi_mm_q8[1] && chin_q8 < 160 << 8 &&
-        between_mm(aside_q8, 100, 260)) {
-        count(&tally->around.shoulder[view->x_mm_q8 > 0], view->is_body);
+    if (100 * (int64_t)view->y_mm_q8 >
+            IH_HEAD_SHOULDER_TOP_PERCENT * (int64_t)ellipsoid->semi_mm_q8[1] &&
+        chin_q8 < IH_HEAD_SHOULDER_BOTTOM_MM << 8 &&
+        between_mm(aside_q8, IH_HEAD_SHOULDER_NEAR_MM, IH_HEAD_SHOULDER_FAR_MM)) {
+        add_ray(&sums->around.shoulder[view->x_mm_q8 > 0], view->is_body);
     }
 }
 
 /* (part + 0.5) / (all + 1) */
-static int32_t careful_q8(struct ih_ray_counts_share share)
+static int32_t careful_fraction_q8(struct ih_ray_count count)
 {
-    return (2 * share.part + 1) * 128 / (share.all + 1);
+    return (2 * count.part + 1) * 128 / (count.all + 1);
 }
 
-static int32_t plain_q8(struct ih_ray_counts_share share, int32_t min)
+static int32_t fraction_q8(struct ih_ray_count count, int32_t min)
 {
-    return share.part * 256 / ih_max_s32(share.all, min);
+    return count.part * 256 / ih_max_s32(count.all, min);
 }
 
 /* Variance of the points' depths that no plane explains, mm^2 in Q8: szz - b^T S^-1 b, S and b the
  * central moments of x, y and with z, each below 2^24. */
-static int64_t plane_rest_q8(const struct tally *tally)
+static int64_t plane_residual_q8(const struct sums *sums)
 {
     int64_t c[3][3];
-    int64_t n = tally->on;
+    int64_t n = sums->on;
     for (int axis = 0; axis < 3; axis++) {
         for (int other = 0; other <= axis; other++) {
-            int64_t mean_q8 = ih_div_round(tally->sum_q4[axis] * tally->sum_q4[other], n);
-            c[axis][other] = ih_div_round(tally->product_q8[axis][other] - mean_q8, n);
+            int64_t mean_q8 = ih_div_round(sums->sum_q4[axis] * sums->sum_q4[other], n);
+            c[axis][other] = ih_div_round(sums->product_q8[axis][other] - mean_q8, n);
             IH_IN_RANGE(c[axis][other], -IH_RANGE_CENTRAL_Q8, IH_RANGE_CENTRAL_Q8);
         }
     }
@@ -239,7 +242,7 @@ static int64_t plane_rest_q8(const struct tally *tally)
     int64_t zy = c[2][1];
     int64_t top_x_q16 = zx * c[1][1] - zy * c[1][0];
     int64_t top_y_q16 = zy * c[0][0] - zx * c[1][0];
-    /* slopes in Q12; a surface steeper than 64 is not looked at by a camera */
+    /* slopes in Q12; a camera sees no surface steeper than 64 */
     const int64_t steep = 64 << 12;
     int drop = ih_max_s32(
         0, ih_bits_u64((uint64_t)ih_abs_s64(top_x_q16) | (uint64_t)ih_abs_s64(top_y_q16)) - 50);
@@ -248,8 +251,8 @@ static int64_t plane_rest_q8(const struct tally *tally)
     int64_t slope_y = ih_div_round((top_y_q16 >> drop) * 4096, det);
     slope_x = slope_x > steep ? steep : slope_x < -steep ? -steep : slope_x;
     slope_y = slope_y > steep ? steep : slope_y < -steep ? -steep : slope_y;
-    int64_t rest = c[2][2] - ih_shift_round(slope_x * zx + slope_y * zy, 12);
-    return rest > 0 ? rest : 0;
+    int64_t residual = c[2][2] - ih_shift_round(slope_x * zx + slope_y * zy, 12);
+    return residual > 0 ? residual : 0;
 }
 
 static int32_t root_mm_q8(int64_t square_q16)
@@ -270,85 +273,95 @@ static int32_t taller_q8(const struct ih_ellipsoid *ellipsoid)
     return (int32_t)ih_div_round((int64_t)(ellipsoid->semi_mm_q8[1] - mean_q8) * 25600, mean_q8);
 }
 
-static void summarise(const struct tally *tally, const struct ih_evidence_nest *nest,
+static void summarise(const struct sums *sums, const struct ih_evidence_nest *nest,
                       int32_t value_q8[])
 {
-    int32_t on = ih_max_s32(tally->on, 1);
-    int32_t rough_q8 = root_mm_q8(tally->on_square_q16 / on);
-    value_q8[IH_EVIDENCE_ON] = tally->on << 8;
+    int32_t on = ih_max_s32(sums->on, 1);
+    int32_t rough_q8 = root_mm_q8(sums->on_square_q16 / on);
+    value_q8[IH_EVIDENCE_ON] = sums->on << 8;
     value_q8[IH_EVIDENCE_ROUGH] = rough_q8;
-    int32_t plane_q8 = tally->on >= PLANE_POINTS_MIN ? root_mm_q8(plane_rest_q8(tally) * 256) : 0;
+    int32_t plane_q8 = sums->on >= PLANE_POINTS_MIN ? root_mm_q8(plane_residual_q8(sums) * 256) : 0;
     value_q8[IH_EVIDENCE_BULGE] = plane_q8 - rough_q8;
-    value_q8[IH_EVIDENCE_ABOVE] = careful_q8(tally->around.above);
+    value_q8[IH_EVIDENCE_ABOVE] = careful_fraction_q8(sums->around.above);
     value_q8[IH_EVIDENCE_BESIDE] =
-        ih_min_s32(careful_q8(tally->around.left), careful_q8(tally->around.right));
-    value_q8[IH_EVIDENCE_BELOW] = careful_q8(tally->around.below);
-    value_q8[IH_EVIDENCE_HIGH] = careful_q8(tally->around.high);
-    value_q8[IH_EVIDENCE_NOTHING] = plain_q8(tally->around.nothing, 1);
-    value_q8[IH_EVIDENCE_BODY] = plain_q8(tally->around.body, 3);
-    value_q8[IH_EVIDENCE_BODY_RAYS] = ih_min_s32(tally->around.body.all, BODY_RAYS_MAX) << 8;
+        ih_min_s32(careful_fraction_q8(sums->around.left), careful_fraction_q8(sums->around.right));
+    value_q8[IH_EVIDENCE_BELOW] = careful_fraction_q8(sums->around.below);
+    value_q8[IH_EVIDENCE_HIGH] = careful_fraction_q8(sums->around.high);
+    value_q8[IH_EVIDENCE_NOTHING] = fraction_q8(sums->around.nothing, 1);
+    value_q8[IH_EVIDENCE_BODY] = fraction_q8(sums->around.body, 3);
+    value_q8[IH_EVIDENCE_BODY_RAYS] = ih_min_s32(sums->around.body.all, BODY_RAYS_MAX) << 8;
     value_q8[IH_EVIDENCE_BODY_DEPTH] =
-        (int32_t)ih_div_round(tally->body_dz_q8, ih_max_s32(tally->around.body.part, 1));
-    value_q8[IH_EVIDENCE_WIDE] = plain_q8(tally->around.wide, 3);
-    value_q8[IH_EVIDENCE_LEVEL] = plain_q8(tally->around.level, 3);
-    value_q8[IH_EVIDENCE_SHOULDER] =
-        ih_min_s32(plain_q8(tally->around.shoulder[0], 2), plain_q8(tally->around.shoulder[1], 2));
-    value_q8[IH_EVIDENCE_BEFORE] = tally->around.before << 8;
+        (int32_t)ih_div_round(sums->body_dz_q8, ih_max_s32(sums->around.body.part, 1));
+    value_q8[IH_EVIDENCE_WIDE] = fraction_q8(sums->around.wide, 3);
+    value_q8[IH_EVIDENCE_LEVEL] = fraction_q8(sums->around.level, 3);
+    value_q8[IH_EVIDENCE_SHOULDER] = ih_min_s32(fraction_q8(sums->around.shoulder[0], 2),
+                                                fraction_q8(sums->around.shoulder[1], 2));
+    value_q8[IH_EVIDENCE_BEFORE] = sums->around.before << 8;
     value_q8[IH_EVIDENCE_EXTENT] = nest->present ? nest->extent_mm_q8 : 0;
     value_q8[IH_EVIDENCE_UPRIGHT] =
         nest->present ? (int32_t)ih_shift_round(nest->upright_q16, 8) : 256;
 }
 
-/* A ray that the tally leaves, or that may hit, or is a part of the body. */
-static void look(const struct candidate *candidate, const struct ih_ray *ray, int32_t flag,
-                 struct tally *tally)
+/* A ray that the counts left, that may hit, or both. */
+static void add_view(const struct candidate *candidate, const struct ih_ray *ray, bool is_unsure,
+                     bool may_hit, struct sums *sums)
 {
     struct view view;
-    if ((flag & IH_RAY_COUNTS_BODY) != 0) {
-        tally->body_dz_q8 += ray->point_mm_q8[2] - candidate->ellipsoid->centre_mm_q8[2];
-    }
-    if ((flag & (IH_RAY_COUNTS_UNSURE | IH_RAY_COUNTS_HIT)) == 0 ||
-        !make_view(candidate, ray, &view)) {
+    if (!make_view(candidate, ray, &view)) {
         return;
     }
-    if ((flag & IH_RAY_COUNTS_HIT) != 0) {
-        look_inside(candidate, &view, tally);
+    if (may_hit) {
+        add_inside(candidate, &view, sums);
     }
-    if ((flag & IH_RAY_COUNTS_UNSURE) != 0) {
-        look_around(&view, tally);
-        look_below(&view, candidate->ellipsoid, tally);
-        tally->around.before += view.is_seen && view.distance2_q28 < AROUND2_Q28 &&
-                                view.dz_mm_q8 < -candidate->ellipsoid->semi_mm_q8[2] - BEFORE_MM_Q8;
+    if (is_unsure) {
+        add_around(&view, sums);
+        add_below(&view, candidate->ellipsoid, sums);
+        sums->around.before +=
+            view.is_seen && view.distance2_q28 < AROUND2_Q28 &&
+            view.dz_mm_q8 < -candidate->ellipsoid->semi_mm_q8[2] - (IH_HEAD_BEFORE_MM << 8);
     }
 }
 
-void ih_evidence_collect(const struct ih_rays *space, struct ih_ray_counts_scratch *scratch,
-                         const struct ih_ellipsoid *ellipsoid, const int32_t start_mm_q8[3],
-                         const struct ih_evidence_nest *nest, struct ih_evidence *out)
+/* The counts have counted these rays, but not how deep their points are. */
+static void add_body_depths(const struct ih_rays *rays, const struct ih_ray_marks *marks,
+                            int32_t centre_mm_q8, struct sums *sums)
 {
-    struct tally tally;
-    const struct candidate candidate = {
-        .ellipsoid = ellipsoid,
-        .origin_mm_q8 = space->origin_mm_q8,
-        .depth_mm_q8 = ellipsoid->centre_mm_q8[2] - space->origin_mm_q8[2],
-        .shares = ih_ellipsoid_fractions(ellipsoid->semi_mm_q8),
-        .box = ih_ellipsoid_box(ellipsoid, scratch->slope_max_q20, INSIDE_Q14),
-    };
-    memset(&tally, 0, sizeof tally);
-    ih_ray_counts_count(space, ellipsoid, &candidate.box, scratch, &tally.around);
-    for (int32_t first = 0; first < IH_RAY_COUNTS_RAYS; first += 4) {
-        uint64_t any; /* of four */
-        memcpy(&any, &scratch->flag[first], sizeof any);
-        for (int32_t slot = first; any != 0 && slot < first + 4; slot++) {
-            if (scratch->flag[slot] != 0) {
-                look(&candidate, &space->ray[slot], scratch->flag[slot], &tally);
-            }
+    for (int32_t word = 0; word < IH_RAYS_WORDS; word++) {
+        for (uint32_t left = marks->body[word]; left != 0; left &= left - 1) {
+            const struct ih_ray *ray = &rays->ray[32 * word + __builtin_ctz(left)];
+            sums->body_dz_q8 += ray->point_mm_q8[2] - centre_mm_q8;
         }
     }
-    summarise(&tally, nest, out->value_q8);
+}
+
+void ih_evidence_collect(const struct ih_rays *rays, const struct ih_ellipsoid *ellipsoid,
+                         const int32_t start_mm_q8[3], const struct ih_evidence_nest *nest,
+                         struct ih_evidence *out)
+{
+    struct ih_ray_marks marks;
+    struct sums sums;
+    const struct candidate candidate = {
+        .ellipsoid = ellipsoid,
+        .origin_mm_q8 = rays->origin_mm_q8,
+        .depth_mm_q8 = ellipsoid->centre_mm_q8[2] - rays->origin_mm_q8[2],
+        .fractions = ih_ellipsoid_fractions(ellipsoid->semi_mm_q8),
+        .box = ih_ellipsoid_box(ellipsoid, rays->table.slope_max_q20, INSIDE_Q14),
+    };
+    memset(&sums, 0, sizeof sums);
+    ih_ray_counts_count(rays, ellipsoid, &candidate.box, &marks, &sums.around);
+    for (int32_t word = 0; word < IH_RAYS_WORDS; word++) {
+        uint32_t left = marks.unsure[word] | marks.may_hit[word];
+        for (; left != 0; left &= left - 1) {
+            const int bit = __builtin_ctz(left);
+            add_view(&candidate, &rays->ray[32 * word + bit], marks.unsure[word] >> bit & 1,
+                     marks.may_hit[word] >> bit & 1, &sums);
+        }
+    }
+    add_body_depths(rays, &marks, ellipsoid->centre_mm_q8[2], &sums);
+    summarise(&sums, nest, out->value_q8);
     out->value_q8[IH_EVIDENCE_TALL] = taller_q8(ellipsoid);
     out->value_q8[IH_EVIDENCE_MOVED] = moved_mm_q8(ellipsoid, start_mm_q8);
-    out->through_count = tally.through;
-    out->hit_count = tally.hit;
-    out->front_count = tally.front;
+    out->through_count = sums.through;
+    out->hit_count = sums.hit;
+    out->front_count = sums.front;
 }

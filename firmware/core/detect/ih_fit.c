@@ -6,15 +6,12 @@
 #include "base/ih_fix.h"
 #include "base/ih_range.h"
 #include "base/ih_types.h"
+#include "detect/ih_fit_axes.h"
 
 /* Robust scale by step, mm. */
 static const int8_t robust_mm[IH_FIT_STEPS] = {24, 16, 8, 8, 8, 8};
-/* (6 mm)^2 over the priors' variances, Q16: 60 mm; 9 hundredths of ln. */
-#define PRIOR_CENTRE_Q16 655
-#define PRIOR_AXES_Q16 29127
 #define STEP_MAX_MM_Q16 (40 << 16)
 #define STEP_MAX_LN_Q16 (15 << 16) /* hundredths */
-#define LN_MAX_Q16 (35 << 16)
 #define SYSTEM_SCALE_BITS 11
 #define RIGHT_BITS 20
 
@@ -23,30 +20,32 @@ void ih_fit_params_default(struct ih_fit_params *params)
     *params = (struct ih_fit_params){.see_through_mm = 60, .step_count = IH_FIT_STEPS};
 }
 
-static void add_priors(struct ih_fit_equations_system *system, const struct ih_fit *fit)
+static void add_priors(struct ih_fit_equations *equations, const struct ih_fit *fit)
 {
     for (int axis = 0; axis < 3; axis++) {
         int64_t moved_q8 = (int64_t)fit->ellipsoid.centre_mm_q8[axis] - fit->start_mm_q8[axis];
-        system->normal_q16[IH_CHOLESKY_PACKED(axis + 1) - 1] += PRIOR_CENTRE_Q16;
-        system->right_q16[axis] -= ih_mul_shift(PRIOR_CENTRE_Q16, moved_q8, 8);
-        system->normal_q16[IH_CHOLESKY_PACKED(axis + 4) - 1] += PRIOR_AXES_Q16;
-        system->right_q16[3 + axis] -= ih_mul_shift(PRIOR_AXES_Q16, fit->ln_q16[axis], 16);
+        equations->normal_q16[IH_CHOLESKY_PACKED(axis + 1) - 1] += IH_FIT_PRIOR_CENTRE_Q16;
+        equations->right_q16[axis] -= ih_mul_shift(IH_FIT_PRIOR_CENTRE_Q16, moved_q8, 8);
+        equations->normal_q16[IH_CHOLESKY_PACKED(axis + 4) - 1] += IH_FIT_PRIOR_AXES_Q16;
+        equations->right_q16[3 + axis] -=
+            ih_mul_shift(IH_FIT_PRIOR_AXES_Q16, fit->ln_q16[axis], 16);
     }
 }
 
 /* Solve for the step, mm and hundredths of ln in Q16. */
-static void solve(const struct ih_fit_equations_system *system, int32_t step_q16[IH_FIT_UNKNOWNS])
+static void solve(const struct ih_fit_equations *equations, int32_t step_q16[IH_FIT_UNKNOWNS])
 {
     int32_t a_q30[IH_CHOLESKY_PACKED(IH_FIT_UNKNOWNS)];
     int32_t right[IH_FIT_UNKNOWNS];
     int32_t bad_pivot, exponent;
     for (int32_t i = 0; i < IH_CHOLESKY_PACKED(IH_FIT_UNKNOWNS); i++) {
-        a_q30[i] = ih_saturate_s32(system->normal_q16[i] * (1 << (14 - SYSTEM_SCALE_BITS)));
+        a_q30[i] = ih_saturate_s32(equations->normal_q16[i] * (1 << (14 - SYSTEM_SCALE_BITS)));
     }
     for (int i = 0; i < IH_FIT_UNKNOWNS; i++) {
         right[i] = ih_saturate_s32(
-            ih_shift_round(system->right_q16[i] * (1 << (RIGHT_BITS - 16)), SYSTEM_SCALE_BITS));
-        IH_IN_RANGE(system->normal_q16[IH_CHOLESKY_PACKED(i + 1) - 1], 1, IH_RANGE_FIT_NORMAL_Q16);
+            ih_shift_round(equations->right_q16[i] * (1 << (RIGHT_BITS - 16)), SYSTEM_SCALE_BITS));
+        IH_IN_RANGE(equations->normal_q16[IH_CHOLESKY_PACKED(i + 1) - 1], 1,
+                    IH_RANGE_FIT_NORMAL_Q16);
     }
     memset(step_q16, 0, IH_FIT_UNKNOWNS * sizeof *step_q16);
     /* The priors keep it positive; if rounding should ever break that, the fit stays where it is. */
@@ -60,17 +59,6 @@ static void solve(const struct ih_fit_equations_system *system, int32_t step_q16
     }
 }
 
-/* exp(x) for |x| <= 0.35, x in hundredths: the series to x^5, its rest is below 3e-6. */
-static int32_t exp_q16(int32_t ln_q16)
-{
-    int64_t x_q24 = ih_div_round((int64_t)ln_q16 * 256, 100);
-    int64_t sum_q24 = 1 << 24;
-    for (int n = 5; n >= 1; n--) {
-        sum_q24 = (1 << 24) + ih_div_round(ih_mul_shift(sum_q24, x_q24, 24), n);
-    }
-    return (int32_t)ih_shift_round(sum_q24, 8);
-}
-
 static void take_step(struct ih_fit *fit, const int32_t step_q16[IH_FIT_UNKNOWNS])
 {
     const struct ih_ellipsoid mean = ih_ellipsoid_mean(fit->ellipsoid.centre_mm_q8);
@@ -78,9 +66,10 @@ static void take_step(struct ih_fit *fit, const int32_t step_q16[IH_FIT_UNKNOWNS
         int32_t move_q16 = ih_clamp_s32(step_q16[axis], -STEP_MAX_MM_Q16, STEP_MAX_MM_Q16);
         fit->ellipsoid.centre_mm_q8[axis] += (int32_t)ih_shift_round(move_q16, 8);
         int32_t grow_q16 = ih_clamp_s32(step_q16[3 + axis], -STEP_MAX_LN_Q16, STEP_MAX_LN_Q16);
-        fit->ln_q16[axis] = ih_clamp_s32(fit->ln_q16[axis] + grow_q16, -LN_MAX_Q16, LN_MAX_Q16);
+        fit->ln_q16[axis] =
+            ih_clamp_s32(fit->ln_q16[axis] + grow_q16, -IH_FIT_LN_MAX_Q16, IH_FIT_LN_MAX_Q16);
         fit->ellipsoid.semi_mm_q8[axis] =
-            (int32_t)ih_mul_shift(mean.semi_mm_q8[axis], exp_q16(fit->ln_q16[axis]), 16);
+            (int32_t)ih_mul_shift(mean.semi_mm_q8[axis], ih_fit_exp_q16(fit->ln_q16[axis]), 16);
         IH_IN_RANGE(fit->ellipsoid.centre_mm_q8[axis], -IH_RANGE_CENTRE_MM_Q8,
                     IH_RANGE_CENTRE_MM_Q8);
         IH_IN_RANGE(fit->ellipsoid.semi_mm_q8[axis], IH_ELLIPSOID_SEMI_MIN_MM << 8,
@@ -88,49 +77,37 @@ static void take_step(struct ih_fit *fit, const int32_t step_q16[IH_FIT_UNKNOWNS
     }
 }
 
-/* 100 ln(a / m) = 200 (x + x^3/3 + x^5/5), x = (a - m) / (a + m); its rest is below 3e-4 at 35 %. */
-static int32_t ln_ratio_q16(int32_t a_mm_q8, int32_t m_mm_q8)
-{
-    int64_t x_q24 = ih_div_round(((int64_t)a_mm_q8 - m_mm_q8) * (1 << 24), a_mm_q8 + m_mm_q8);
-    int64_t xx_q24 = ih_mul_shift(x_q24, x_q24, 24);
-    int64_t series_q24 = ih_div_round(xx_q24, 5) + ih_div_round(1 << 24, 3);
-    series_q24 = (1 << 24) + ih_mul_shift(series_q24, xx_q24, 24);
-    int64_t ln_q16 = ih_mul_shift(200 * x_q24, series_q24, 32);
-    return ih_clamp_s32(ih_saturate_s32(ln_q16), -LN_MAX_Q16, LN_MAX_Q16);
-}
-
 void ih_fit_begin(const struct ih_ellipsoid *start, struct ih_fit *out)
 {
     const struct ih_ellipsoid mean = ih_ellipsoid_mean(start->centre_mm_q8);
     *out = (struct ih_fit){.ellipsoid = *start};
     for (int axis = 0; axis < 3; axis++) {
-        out->ln_q16[axis] = ln_ratio_q16(start->semi_mm_q8[axis], mean.semi_mm_q8[axis]);
+        out->ln_q16[axis] = ih_fit_ln_ratio_q16(start->semi_mm_q8[axis], mean.semi_mm_q8[axis]);
         out->start_mm_q8[axis] = start->centre_mm_q8[axis];
     }
 }
 
-void ih_fit_continue(const struct ih_rays *space, const struct ih_fit_params *params,
-                     int32_t step_count, struct ih_fit_equations_scratch *scratch,
-                     struct ih_fit *fit)
+void ih_fit_continue(const struct ih_rays *rays, const struct ih_fit_params *params,
+                     int32_t step_count, struct ih_fit_scratch *scratch, struct ih_fit *fit)
 {
     const int32_t end = ih_min_s32(step_count, params->step_count);
     for (; fit->step_index < end; fit->step_index++) {
-        struct ih_fit_equations_system system;
+        struct ih_fit_equations equations;
         int32_t step_q16[IH_FIT_UNKNOWNS];
-        ih_fit_equations_collect(space, &fit->ellipsoid, robust_mm[fit->step_index],
-                                 params->see_through_mm, scratch, &system);
-        add_priors(&system, fit);
-        solve(&system, step_q16);
+        ih_fit_equations_collect(rays, &fit->ellipsoid, robust_mm[fit->step_index],
+                                 params->see_through_mm, scratch, &equations);
+        add_priors(&equations, fit);
+        solve(&equations, step_q16);
         take_step(fit, step_q16);
     }
 }
 
-void ih_fit_ellipsoid(const struct ih_rays *space, const struct ih_fit_params *params,
-                      const struct ih_ellipsoid *start, struct ih_fit_equations_scratch *scratch,
+void ih_fit_ellipsoid(const struct ih_rays *rays, const struct ih_fit_params *params,
+                      const struct ih_ellipsoid *start, struct ih_fit_scratch *scratch,
                       struct ih_ellipsoid *out)
 {
     struct ih_fit fit;
     ih_fit_begin(start, &fit);
-    ih_fit_continue(space, params, params->step_count, scratch, &fit);
+    ih_fit_continue(rays, params, params->step_count, scratch, &fit);
     *out = fit.ellipsoid;
 }

@@ -2,6 +2,7 @@
 
 #include <stdbool.h>
 #include <stddef.h>
+#include <string.h>
 
 #include "base/ih_fix.h"
 #include "base/ih_range.h"
@@ -28,6 +29,45 @@ static bool is_empty(const struct ih_rig *rig, const struct ih_dots *dots, int32
     ih_camera_distort(rig, x_q28, y_q28, &u_px_q12, &v_px_q12);
     return ih_camera_sees(rig, u_px_q12, v_px_q12) &&
            (dots == NULL || !ih_dots_is_bright(dots, u_px_q12 >> 12, v_px_q12 >> 12));
+}
+
+static int16_t clamp_s16(int32_t value)
+{
+    return (int16_t)ih_clamp_s32(value, INT16_MIN, INT16_MAX);
+}
+
+static void fill_slot(const struct ih_ray *ray, int32_t slot, struct ih_ray_table *out)
+{
+    const int32_t slope_q20[2] = {ray->slope_x_q20, ray->slope_y_q20};
+    for (int axis = 0; axis < 2; axis++) {
+        out->slope_q12[axis][slot] = (int16_t)(slope_q20[axis] >> 8);
+        out->slope_q14[axis][slot] = clamp_s16(slope_q20[axis] >> 6);
+        out->slope_max_q20[axis] =
+            ih_max_s32(out->slope_max_q20[axis], ih_abs_s32(slope_q20[axis]));
+    }
+    for (int axis = 0; axis < 3; axis++) {
+        out->point_mm_q1[axis][slot] = clamp_s16(ray->point_mm_q8[axis] >> 7);
+    }
+    out->seen[slot] = ray->state == IH_RAY_SEEN ? -1 : 0;
+    out->empty[slot] = ray->state == IH_RAY_EMPTY ? -1 : 0;
+    if (ray->state == IH_RAY_EMPTY) {
+        out->point_mm_q1[2][slot] = IH_RAYS_NOWHERE;
+    }
+    if (ray->state == IH_RAY_UNKNOWN) {
+        out->slope_q12[0][slot] = IH_RAYS_NOWHERE;
+    }
+}
+
+void ih_rays_fill_table(struct ih_rays *rays)
+{
+    struct ih_ray_table *table = &rays->table;
+    memset(table, 0, sizeof *table);
+    for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
+        fill_slot(&rays->ray[slot], slot, table);
+    }
+    for (int32_t slot = IH_SLOTS; slot < IH_RAYS_COLUMN; slot++) {
+        table->slope_q12[0][slot] = IH_RAYS_NOWHERE;
+    }
 }
 
 void ih_rays_make(const struct ih_points *points, const struct ih_dots *dots,
@@ -63,18 +103,5 @@ void ih_rays_make(const struct ih_points *points, const struct ih_dots *dots,
             ray->state = IH_RAY_EMPTY;
         }
     }
-}
-
-void ih_rays_slope_max(const struct ih_rays *space, int32_t slope_max_q20[2])
-{
-    int32_t left = 0, right = 0, up = 0, down = 0;
-    for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
-        const struct ih_ray *ray = &space->ray[slot];
-        left = ih_min_s32(left, ray->slope_x_q20);
-        right = ih_max_s32(right, ray->slope_x_q20);
-        up = ih_min_s32(up, ray->slope_y_q20);
-        down = ih_max_s32(down, ray->slope_y_q20);
-    }
-    slope_max_q20[0] = ih_max_s32(-left, right);
-    slope_max_q20[1] = ih_max_s32(-up, down);
+    ih_rays_fill_table(out);
 }

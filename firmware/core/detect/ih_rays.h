@@ -1,18 +1,18 @@
-/* ih_rays - the dots as rays and points in space, for everything that reasons about bodies.
+/* ih_rays - the dots as rays and points in rays, for every stage that reasons about bodies.
  *
- * In:    points by slot, the dots' over-exposure map (NULL for a range image), rig.
- * Out:   per slot its ray and, where it was seen, its point in mm; where it was not, whether that
- *        says something.
- * Way:   a ray is the line from the projector through the slot's dot (from the camera, for a range
- *        image): at the depth Z it is at origin + (Z - origin_z) (slope_x, slope_y, 1). A seen
- *        point is where the camera saw it: its place times its depth. A dot that is missing is
- *        "empty" when a surface near by would have shown it: its place, probe_mm behind the 8th
- *        percentile of the seen depths (ih_near_depth; 0 when nothing was seen), is inside the
- *        picture and not over-exposed. A missing point of a range image is always "empty":
- *        ih_points says "unknown" where it may only be outside.
- * Overflow: a slope is 2^22, a depth 2^22 in Q8 and a place 2^31 in Q28: points below 2^25.
- * Error: half a step of each format (docs/numerics.md).
- * Cost:  361 places, 4 divisions and the lens for a missing dot, one selection of 361 depths.
+ * In:     points by slot, the dots' over-exposure map (NULL for a range image), rig.
+ * Out:    per slot its ray and, where it was seen, its point in mm; where it was not, whether that
+ *         says something. The same as columns of 16 bits, for vectors.
+ * Method: a ray is the line from the projector through the slot's dot (from the camera, for a range
+ *         image): at the depth Z it is at origin + (Z - origin_z) (slope_x, slope_y, 1). A seen
+ *         point is where the camera saw it: its direction times its depth. A missing dot is
+ *         "empty" when a surface near by would have shown it: its image, probe_mm behind the 8th
+ *         percentile of the seen depths (ih_near_depth; 0 when nothing was seen), is inside the picture and not
+ *         over-exposed. A missing point of a range image is always "empty": ih_points says
+ *         "unknown" where it may only be outside.
+ * Overflow: a slope is 2^22, a depth 2^22 in Q8 and a direction 2^31 in Q28: points below 2^25.
+ * Error:  half a step of each format (docs/numerics.md); columns are rounded down and clamped.
+ * Cost:   361 products, 4 divisions and the lens for a missing dot, one selection of 361 depths.
  */
 #ifndef IH_RAYS_H
 #define IH_RAYS_H
@@ -39,9 +39,25 @@ struct ih_ray {
     int32_t state;                    /* enum ih_ray_state */
 };
 
+/* The slots in whole words of 32 bits, a bit for each, and so in whole vectors. */
+#define IH_RAYS_WORDS ((IH_SLOTS + 31) / 32)
+#define IH_RAYS_COLUMN (32 * IH_RAYS_WORDS)
+/* Slope of a ray of unknown state, and behind the last slot; depth of an empty ray's point. */
+#define IH_RAYS_NOWHERE INT16_MAX
+
+/* The rays as columns by slot, rounded down and clamped to 16 bits. */
+struct ih_ray_table {
+    int16_t slope_q12[2][IH_RAYS_COLUMN];
+    int16_t slope_q14[2][IH_RAYS_COLUMN]; /* of any state; slopes of 2 and more are clamped */
+    int16_t point_mm_q1[3][IH_RAYS_COLUMN];
+    int16_t seen[IH_RAYS_COLUMN], empty[IH_RAYS_COLUMN]; /* all bits or none */
+    int32_t slope_max_q20[2];                            /* maximum |slope| of all rays, x and y */
+};
+
 struct ih_rays {
     int32_t origin_mm_q8[3]; /* where the rays start, camera frame */
     struct ih_ray ray[IH_SLOTS];
+    struct ih_ray_table table;
 };
 
 struct ih_rays_params {
@@ -56,8 +72,8 @@ void ih_rays_make(const struct ih_points *points, const struct ih_dots *dots,
                   const struct ih_rig *rig, const struct ih_rays_params *params,
                   struct ih_rays *out);
 
-/* The greatest |slope| of all rays, x and y. */
-void ih_rays_slope_max(const struct ih_rays *space, int32_t slope_max_q20[2]);
+/* Fill the table from the rays; ih_rays_make has done it. */
+void ih_rays_fill_table(struct ih_rays *rays);
 
 IH_END_DECLS
 

@@ -94,7 +94,7 @@ static void take(struct ih_scan_scratch *scratch, int32_t rank, int32_t spacing_
 }
 
 /* Rate the place behind a slot's point, if there is one and none is kept near it. */
-static void look_at(const struct ih_rays *space, const struct ih_scan_params *params, int32_t slot,
+static void look_at(const struct ih_rays *rays, const struct ih_scan_params *params, int32_t slot,
                     struct ih_scan_scratch *scratch, const struct ih_scan *out)
 {
     if (scratch->state[slot] != IH_SCAN_LEFT) {
@@ -102,24 +102,24 @@ static void look_at(const struct ih_rays *space, const struct ih_scan_params *pa
     }
     int32_t *centre_mm_q8 = scratch->centre_mm_q8[slot];
     scratch->state[slot] = IH_SCAN_RATED;
-    centre_behind(&space->ray[slot], params->deep_mm, centre_mm_q8);
+    centre_behind(&rays->ray[slot], params->deep_mm, centre_mm_q8);
     for (int32_t i = 0; i < out->place_count; i++) {
         if (is_near(out->place[i].centre_mm_q8, centre_mm_q8, params->spacing_mm)) {
             return;
         }
     }
     scratch->rank[scratch->rank_count++] =
-        rank_of(ih_template_score_q12(space, &scratch->table, centre_mm_q8), slot);
+        rank_of(ih_template_score_q12(rays, &scratch->table, centre_mm_q8), slot);
 }
 
 /* The first seen point of each block of two by two slots. */
-static void begin(const struct ih_rays *space, const struct ih_scan_params *params,
+static void begin(const struct ih_rays *rays, const struct ih_scan_params *params,
                   struct ih_scan_scratch *scratch, const struct ih_scan *out)
 {
     scratch->rank_count = 0;
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
         scratch->state[slot] =
-            space->ray[slot].state == IH_RAY_SEEN ? IH_SCAN_LEFT : IH_SCAN_NOTHING;
+            rays->ray[slot].state == IH_RAY_SEEN ? IH_SCAN_LEFT : IH_SCAN_NOTHING;
     }
     for (int32_t y = 0; y < IH_GRID; y += 2) {
         for (int32_t x = 0; x < IH_GRID; x += 2) {
@@ -128,7 +128,7 @@ static void begin(const struct ih_rays *space, const struct ih_scan_params *para
                 const int32_t column = x + i % 2;
                 const int32_t slot = row * IH_GRID + column;
                 if (row < IH_GRID && column < IH_GRID && scratch->state[slot] == IH_SCAN_LEFT) {
-                    look_at(space, params, slot, scratch, out);
+                    look_at(rays, params, slot, scratch, out);
                     break;
                 }
             }
@@ -137,7 +137,7 @@ static void begin(const struct ih_rays *space, const struct ih_scan_params *para
 }
 
 /* The up to 8 places around one are looked at. */
-static void widen(const struct ih_rays *space, const struct ih_scan_params *params, int32_t slot,
+static void widen(const struct ih_rays *rays, const struct ih_scan_params *params, int32_t slot,
                   struct ih_scan_scratch *scratch, const struct ih_scan *out)
 {
     const int32_t row = slot / IH_GRID;
@@ -145,18 +145,18 @@ static void widen(const struct ih_rays *space, const struct ih_scan_params *para
     scratch->state[slot] = IH_SCAN_WIDENED;
     for (int32_t y = ih_max_s32(row - 1, 0); y <= ih_min_s32(row + 1, IH_GRID - 1); y++) {
         for (int32_t x = ih_max_s32(column - 1, 0); x <= ih_min_s32(column + 1, IH_GRID - 1); x++) {
-            look_at(space, params, y * IH_GRID + x, scratch, out);
+            look_at(rays, params, y * IH_GRID + x, scratch, out);
         }
     }
 }
 
 /* What is the best when all around it was looked at is the best of those that were looked at. */
-void ih_scan_find(const struct ih_rays *space, const struct ih_scan_params *params,
+void ih_scan_find(const struct ih_rays *rays, const struct ih_scan_params *params,
                   struct ih_scan_scratch *scratch, struct ih_scan *out)
 {
-    ih_template_prepare(space, &scratch->table);
+    ih_template_prepare(rays, &scratch->table);
     out->place_count = 0;
-    begin(space, params, scratch, out);
+    begin(rays, params, scratch, out);
     while (out->place_count < params->place_max) {
         const int32_t best = best_rank(scratch);
         if (best == RANK_NONE) {
@@ -165,7 +165,7 @@ void ih_scan_find(const struct ih_rays *space, const struct ih_scan_params *para
         if (scratch->state[slot_of(best)] == IH_SCAN_WIDENED) {
             take(scratch, best, params->spacing_mm, out);
         } else {
-            widen(space, params, slot_of(best), scratch, out);
+            widen(rays, params, slot_of(best), scratch, out);
         }
     }
 }

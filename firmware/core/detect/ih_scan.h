@@ -67,7 +67,7 @@ IH_BEGIN_DECLS
 
 void ih_scan_params_default(struct ih_scan_params *params);
 
-void ih_scan_find(const struct ih_rays *space, const struct ih_scan_params *params,
+void ih_scan_find(const struct ih_rays *rays, const struct ih_scan_params *params,
                   struct ih_scan_scratch *scratch, struct ih_scan *out);
 
 IH_END_DECLS

@@ -24,26 +24,32 @@ int32_t ih_score_probability_q16(int32_t logit_q10)
     return (int32_t)(logit_q10 >= 0 ? likely_q16 : 65536 - likely_q16);
 }
 
-static int32_t curve_q10(const struct curve *curve, int32_t value_q8)
+static int32_t value_at_q10(const struct ih_score_curve *curve, int32_t value_q8)
 {
-    int64_t place_q16 = ih_div_round(((int64_t)value_q8 - curve->first_q8) * 65536, curve->step_q8);
+    int64_t knot_q16 = ih_div_round(((int64_t)value_q8 - curve->first_q8) * 65536, curve->step_q8);
     const int64_t last_q16 = (int64_t)(IH_SCORE_KNOTS - 1) << 16;
-    place_q16 = place_q16 < 0 ? 0 : place_q16 > last_q16 ? last_q16 : place_q16;
-    int32_t knot = (int32_t)(place_q16 >> 16);
+    knot_q16 = knot_q16 < 0 ? 0 : knot_q16 > last_q16 ? last_q16 : knot_q16;
+    int32_t knot = (int32_t)(knot_q16 >> 16);
     if (knot == IH_SCORE_KNOTS - 1) {
         return curve->at_q10[knot];
     }
     int64_t rise = (int64_t)curve->at_q10[knot + 1] - curve->at_q10[knot];
-    return curve->at_q10[knot] + (int32_t)ih_mul_shift(rise, place_q16 & 0xffff, 16);
+    return curve->at_q10[knot] + (int32_t)ih_mul_shift(rise, knot_q16 & 0xffff, 16);
 }
 
-void ih_score_rate(const struct ih_evidence *evidence, struct ih_score *out)
+void ih_score_rate_by_curves(const struct ih_score_curve curve[IH_EVIDENCE_COUNT], int32_t bias,
+                             const struct ih_evidence *evidence, struct ih_score *out)
 {
-    out->logit_q10 = bias_q10;
+    out->logit_q10 = bias;
     for (int kind = 0; kind < IH_EVIDENCE_COUNT; kind++) {
-        out->part_q10[kind] = curve_q10(&curves[kind], evidence->value_q8[kind]);
+        out->part_q10[kind] = value_at_q10(&curve[kind], evidence->value_q8[kind]);
         out->logit_q10 += out->part_q10[kind];
     }
     IH_IN_RANGE(out->logit_q10, -IH_RANGE_LOGIT_Q10, IH_RANGE_LOGIT_Q10);
     out->probability_q16 = ih_score_probability_q16(out->logit_q10);
+}
+
+void ih_score_rate(const struct ih_evidence *evidence, struct ih_score *out)
+{
+    ih_score_rate_by_curves(curves, bias_q10, evidence, out);
 }

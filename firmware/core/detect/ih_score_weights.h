@@ -10,14 +10,9 @@
 #include "detect/ih_score.h"
 
 /* clang-format off */
-struct curve {
-    int32_t first_q8, step_q8;     /* evidence at the first knot, and from knot to knot */
-    int16_t at_q10[IH_SCORE_KNOTS]; /* part of the log-odds at each knot */
-};
-
 static const int32_t bias_q10 = -11711;
 
-static const struct curve curves[IH_EVIDENCE_COUNT] = {
+static const struct ih_score_curve curves[IH_EVIDENCE_COUNT] = {
     [IH_EVIDENCE_ON] = {0, 2475, {252, 503, 660, 415, 132, -532, -1430}},
     [IH_EVIDENCE_ROUGH] = {0, 509, {-430, 742, 1160, 599, -250, -816, -1004}},
     [IH_EVIDENCE_BULGE] = {-2782, 1996, {-1848, -1163, 751, 1648, 1133, 203, -725}},

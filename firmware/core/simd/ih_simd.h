@@ -175,6 +175,18 @@ static inline void ih_i32_store(int32_t *to, ih_i32 value)
     __builtin_memcpy(to, &value, sizeof value);
 }
 
+static inline ih_u32 ih_u32_load(const uint32_t *from)
+{
+    ih_u32 value;
+    __builtin_memcpy(&value, from, sizeof value);
+    return value;
+}
+
+static inline void ih_u32_store(uint32_t *to, ih_u32 value)
+{
+    __builtin_memcpy(to, &value, sizeof value);
+}
+
 static inline ih_i32 ih_i32_all(int32_t value)
 {
     return value - (ih_i32){0};
@@ -255,6 +267,13 @@ static inline ih_u64 ih_u64_shift_right(ih_u64 a, int bits)
     return a >> bits;
 }
 
+/* |a|. */
+static inline ih_i32 ih_i32_abs(ih_i32 a)
+{
+    const ih_i32 sign = a >> 31;
+    return ih_i32_sub(a ^ sign, sign);
+}
+
 /* Each lane shifted by its own count, below 32. One instruction where IH_SIMD_LANE_SHIFTS is 1. */
 static inline ih_u32 ih_u32_shift_left_each(ih_u32 a, ih_u32 bits)
 {
@@ -304,6 +323,25 @@ struct ih_u32_neighbours {
 static inline ih_i16 ih_i16_clamp(ih_i16 value, int16_t limit)
 {
     return ih_i16_max(ih_i16_min(value, ih_i16_all(limit)), ih_i16_all((int16_t)-limit));
+}
+
+/* a * b / 2^bits, rounded down; then half up. The lower 32 bits of the quotient. */
+static inline ih_u32 ih_u32_mul_shift(ih_u32 a, ih_u32 b, int bits)
+{
+    return ih_wide_low(ih_wide_shift_right(ih_u32_mul_wide(a, b), bits));
+}
+
+static inline ih_u32 ih_u32_mul_shift_round(ih_u32 a, ih_u32 b, int bits)
+{
+    const struct ih_wide half = ih_wide_all((int64_t)1 << (bits - 1));
+    return ih_wide_low(ih_wide_shift_right(ih_wide_add(ih_u32_mul_wide(a, b), half), bits));
+}
+
+/* bits: at most 32. */
+static inline ih_i32 ih_i32_mul_shift_round(ih_i32 a, ih_i32 b, int bits)
+{
+    const struct ih_wide half = ih_wide_all((int64_t)1 << (bits - 1));
+    return (ih_i32)ih_wide_low(ih_wide_shift_right(ih_wide_add(ih_i32_mul_wide(a, b), half), bits));
 }
 
 /* Add each number to an array. */

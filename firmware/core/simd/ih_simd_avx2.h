@@ -79,6 +79,19 @@ static inline ih_i32 ih_i32_even_twice(ih_i32 a)
     return (ih_i32)_mm256_shuffle_epi32((__m256i)a, 0xa0);
 }
 
+static inline ih_u16 ih_u16_mul_high(ih_u16 a, ih_u16 b)
+{
+    return (ih_u16)_mm256_mulhi_epu16((__m256i)a, (__m256i)b);
+}
+
+/* The lower 16 bits of the lanes of a, then of b. */
+static inline ih_i16 ih_i32_low_halves(ih_i32 a, ih_i32 b)
+{
+    const ih_i32 low = ih_i32_all(UINT16_MAX);
+    const __m256i halves = _mm256_packus_epi32((__m256i)(a & low), (__m256i)(b & low));
+    return (ih_i16)_mm256_permute4x64_epi64(halves, 0xd8);
+}
+
 /* Sums of two products side by side, 32 bits each. */
 static inline ih_i32 ih_i16_madd_pairs(ih_i16 a, ih_i16 b)
 {
@@ -147,6 +160,17 @@ static inline int32_t ih_i32_total(ih_i32 a)
         _mm_add_epi32(_mm256_castsi256_si128((__m256i)a), _mm256_extracti128_si256((__m256i)a, 1));
     const __m128i two = _mm_add_epi32(four, _mm_shuffle_epi32(four, 0x4e));
     return _mm_cvtsi128_si32(_mm_add_epi32(two, _mm_shuffle_epi32(two, 0xb1)));
+}
+
+/* The same in 64 bits, which do not wrap. */
+static inline int64_t ih_i32_total_wide(ih_i32 a)
+{
+    const __m256i low = _mm256_cvtepi32_epi64(_mm256_castsi256_si128((__m256i)a));
+    const __m256i high = _mm256_cvtepi32_epi64(_mm256_extracti128_si256((__m256i)a, 1));
+    const __m256i four = _mm256_add_epi64(low, high);
+    const __m128i two =
+        _mm_add_epi64(_mm256_castsi256_si128(four), _mm256_extracti128_si256(four, 1));
+    return _mm_cvtsi128_si64(_mm_add_epi64(two, _mm_unpackhi_epi64(two, two)));
 }
 
 static inline int32_t ih_i16_total(ih_i16 a)
@@ -244,6 +268,14 @@ static inline struct ih_u32_neighbours ih_u32_look_up(const uint32_t *table, ih_
     return (struct ih_u32_neighbours){
         (ih_u32)_mm256_i32gather_epi32((const int *)table, (__m256i)at, 4),
         (ih_u32)_mm256_i32gather_epi32((const int *)&table[1], (__m256i)at, 4)};
+}
+
+/* The same of a table of 16 bits. */
+static inline struct ih_u32_neighbours ih_u32_look_up_u16(const uint16_t *table, ih_u32 at)
+{
+    const ih_u32 both =
+        (ih_u32)_mm256_i32gather_epi32((const int *)(const void *)table, (__m256i)at, 2);
+    return (struct ih_u32_neighbours){both & UINT16_MAX, both >> 16};
 }
 
 /* Half of the leading zeros, rounded down, of 2^18 .. 2^31 - 1. There is no instruction for it. */

@@ -76,6 +76,19 @@ static inline ih_i32 ih_i32_even_twice(ih_i32 a)
     return (ih_i32)vtrnq_s32((int32x4_t)a, (int32x4_t)a).val[0];
 }
 
+static inline ih_u16 ih_u16_mul_high(ih_u16 a, ih_u16 b)
+{
+    const uint16x8_t x = (uint16x8_t)a, y = (uint16x8_t)b;
+    const uint32x4_t low = vmull_u16(vget_low_u16(x), vget_low_u16(y));
+    const uint32x4_t high = vmull_u16(vget_high_u16(x), vget_high_u16(y));
+    return (ih_u16)vuzpq_u16((uint16x8_t)low, (uint16x8_t)high).val[1];
+}
+
+static inline ih_i16 ih_i32_low_halves(ih_i32 a, ih_i32 b)
+{
+    return (ih_i16)vuzpq_s16((int16x8_t)a, (int16x8_t)b).val[0];
+}
+
 static inline ih_i32 ih_i16_madd_pairs(ih_i16 a, ih_i16 b)
 {
     const int32x4_t low = vmull_s16(vget_low_s16((int16x8_t)a), vget_low_s16((int16x8_t)b));
@@ -154,6 +167,12 @@ static inline int32_t ih_i32_total(ih_i32 a)
 {
     const int64x2_t sums = vpaddlq_s32((int32x4_t)a);
     return (int32_t)(vgetq_lane_s64(sums, 0) + vgetq_lane_s64(sums, 1));
+}
+
+static inline int64_t ih_i32_total_wide(ih_i32 a)
+{
+    const int64x2_t sums = vpaddlq_s32((int32x4_t)a);
+    return vgetq_lane_s64(sums, 0) + vgetq_lane_s64(sums, 1);
 }
 
 static inline int32_t ih_i16_total(ih_i16 a)
@@ -262,6 +281,17 @@ static inline struct ih_u32_neighbours ih_u32_look_up(const uint32_t *table, ih_
         vcombine_u32(ih_neon_pair_at(table, offset[2]), ih_neon_pair_at(table, offset[3]));
     const uint32x4x2_t both = vuzpq_u32(first, last);
     return (struct ih_u32_neighbours){(ih_u32)both.val[0], (ih_u32)both.val[1]};
+}
+
+static inline struct ih_u32_neighbours ih_u32_look_up_u16(const uint16_t *table, ih_u32 at)
+{
+    ih_u32 both;
+    for (int lane = 0; lane < IH_I32_LANES; lane++) {
+        uint32_t pair;
+        __builtin_memcpy(&pair, &table[at[lane]], sizeof pair);
+        both[lane] = pair;
+    }
+    return (struct ih_u32_neighbours){both & UINT16_MAX, both >> 16};
 }
 
 static inline ih_u32 ih_u32_zero_pairs(ih_u32 a)

@@ -66,6 +66,17 @@ static inline ih_i32 ih_i32_even_twice(ih_i32 a)
     return (ih_i32)_mm_shuffle_epi32((__m128i)a, 0xa0);
 }
 
+static inline ih_u16 ih_u16_mul_high(ih_u16 a, ih_u16 b)
+{
+    return (ih_u16)_mm_mulhi_epu16((__m128i)a, (__m128i)b);
+}
+
+static inline ih_i16 ih_i32_low_halves(ih_i32 a, ih_i32 b)
+{
+    const ih_i32 first = ih_i32_shift_left(a, 16) >> 16, second = ih_i32_shift_left(b, 16) >> 16;
+    return (ih_i16)_mm_packs_epi32((__m128i)first, (__m128i)second);
+}
+
 static inline ih_i32 ih_i16_madd_pairs(ih_i16 a, ih_i16 b)
 {
     return (ih_i32)_mm_madd_epi16((__m128i)a, (__m128i)b);
@@ -125,6 +136,16 @@ static inline int32_t ih_i32_total(ih_i32 a)
 {
     const __m128i two = _mm_add_epi32((__m128i)a, _mm_shuffle_epi32((__m128i)a, 0x4e));
     return _mm_cvtsi128_si32(_mm_add_epi32(two, _mm_shuffle_epi32(two, 0xb1)));
+}
+
+static inline int64_t ih_i32_total_wide(ih_i32 a)
+{
+    const __m128i sign = (__m128i)(a >> 31);
+    const __m128i low = _mm_unpacklo_epi32((__m128i)a, sign);
+    const __m128i two = _mm_add_epi64(low, _mm_unpackhi_epi32((__m128i)a, sign));
+    int64_t lane[2];
+    _mm_storeu_si128((__m128i *)(void *)lane, two);
+    return lane[0] + lane[1];
 }
 
 static inline int32_t ih_i16_total(ih_i16 a)

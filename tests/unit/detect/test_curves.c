@@ -1,13 +1,11 @@
-/* The functions of one number in ih_fit, ih_scanline and ih_score over the whole range of their input, against
+/* The functions of one number in ih_fit, ih_fit_weights and ih_score over the whole range of their input, against
  * double: exp, ln, the robust weight, the probability. */
 #include "detect/ih_ellipsoid.h"
+#include "detect/ih_fit_axes.h"
+#include "detect/ih_fit_weights.h"
 #include "detect/ih_score.h"
 
 #include "ih_test.h"
-
-/* In its own words: they are static. */
-#include "detect/ih_fit.c"
-#include "detect/ih_fit_equations.c"
 
 void setUp(void)
 {
@@ -23,8 +21,8 @@ static void exp_follows_libm(void)
     double worst = 0;
     int32_t ln_q16;
 
-    for (ln_q16 = -LN_MAX_Q16; ln_q16 <= LN_MAX_Q16; ln_q16++) {
-        const double off = fabs(exp_q16(ln_q16) / 65536.0 - exp(ln_q16 / 6553600.0));
+    for (ln_q16 = -IH_FIT_LN_MAX_Q16; ln_q16 <= IH_FIT_LN_MAX_Q16; ln_q16++) {
+        const double off = fabs(ih_fit_exp_q16(ln_q16) / 65536.0 - exp(ln_q16 / 6553600.0));
 
         worst = fmax(worst, off);
     }
@@ -46,7 +44,8 @@ static void ln_follows_libm(void)
         int32_t a;
 
         for (a = (int32_t)ceil(m * exp(-0.35)); a <= m * exp(0.35); a++) {
-            worst = fmax(worst, fabs(ln_ratio_q16(a, m) / 65536.0 - 100 * log((double)a / m)));
+            worst =
+                fmax(worst, fabs(ih_fit_ln_ratio_q16(a, m) / 65536.0 - 100 * log((double)a / m)));
         }
     }
     printf("ln: at most %.3g hundredths off\n", worst);
@@ -55,11 +54,12 @@ static void ln_follows_libm(void)
 
 static void robust_weights_follow_double(void)
 {
+    static const int32_t robust_mm[] = {24, 16, 8};
     int step;
 
     for (step = 0; step < 3; step++) {
         const int32_t k = robust_mm[step];
-        const int32_t reach = ROBUST_REACH * k << 8;
+        const int32_t reach = IH_FIT_SCALES_MAX * k << 8;
         int32_t r;
 
         for (r = -reach; r <= reach; r++) {
@@ -68,10 +68,10 @@ static void robust_weights_follow_double(void)
 
             /* half a step of the result, and of its quotient: a half of 2^-16 of (r / k)^2, whose
              * weight falls by at most twice as much */
-            IH_TEST_WITHIN(0.5 + 1.0, exact, (double)robust_weight_q16(r, k), "weight", r);
+            IH_TEST_WITHIN(0.5 + 1.0, exact, (double)ih_fit_robust_weight_q16(r, k), "weight", r);
         }
-        TEST_ASSERT_TRUE(robust_weight_q16(reach + 1, k) == 0);
-        TEST_ASSERT_TRUE(robust_weight_q16(-reach - 1, k) == 0);
+        TEST_ASSERT_TRUE(ih_fit_robust_weight_q16(reach + 1, k) == 0);
+        TEST_ASSERT_TRUE(ih_fit_robust_weight_q16(-reach - 1, k) == 0);
     }
 }
 
@@ -85,8 +85,9 @@ static void low_points_count_half(void)
         const double part = (down_q14 / 16384.0 - 0.5) / 0.3;
         const double exact = 65536 * (1 - 0.5 * fmin(fmax(part, 0), 1));
 
-        if (fabs(exact - (double)lowered_q16(65536, down_q14)) > 3) {
-            IH_TEST_WITHIN(3, exact, (double)lowered_q16(65536, down_q14), "weight", down_q14);
+        if (fabs(exact - (double)ih_fit_lowered_weight_q16(65536, down_q14)) > 3) {
+            IH_TEST_WITHIN(3, exact, (double)ih_fit_lowered_weight_q16(65536, down_q14), "weight",
+                           down_q14);
         }
     }
 }
@@ -95,8 +96,8 @@ static void low_points_count_half(void)
  * which a hundredth is a unit. */
 static void priors_weigh_what_they_should(void)
 {
-    TEST_ASSERT_EQUAL_INT32(floor(65536 * (6.0 / 60) * (6.0 / 60)), PRIOR_CENTRE_Q16);
-    TEST_ASSERT_EQUAL_INT32(floor(65536 * (6.0 / 9) * (6.0 / 9)), PRIOR_AXES_Q16);
+    TEST_ASSERT_EQUAL_INT32(floor(65536 * (6.0 / 60) * (6.0 / 60)), IH_FIT_PRIOR_CENTRE_Q16);
+    TEST_ASSERT_EQUAL_INT32(floor(65536 * (6.0 / 9) * (6.0 / 9)), IH_FIT_PRIOR_AXES_Q16);
 }
 
 /* Monotone, so that what is beyond the ends of the loop lies between them and 0 or 1. */
@@ -114,10 +115,10 @@ static void probabilities_follow_libm(void)
     }
     printf("probability: at most 2^%.2f off\n", log2(worst));
     IH_TEST_WITHIN(1.0 / 8192, 0, worst, "probability", 0);
-    IH_TEST_EQUAL(0, ih_score_probability_q16(-(1 << 20)), "least", 0);
-    IH_TEST_EQUAL(0, ih_score_probability_q16(INT32_MIN), "least", 0);
-    IH_TEST_EQUAL(65536, ih_score_probability_q16(1 << 20), "greatest", 0);
-    IH_TEST_EQUAL(65536, ih_score_probability_q16(INT32_MAX), "greatest", 0);
+    IH_TEST_EQUAL(0, ih_score_probability_q16(-(1 << 20)), "min", 0);
+    IH_TEST_EQUAL(0, ih_score_probability_q16(INT32_MIN), "min", 0);
+    IH_TEST_EQUAL(65536, ih_score_probability_q16(1 << 20), "max", 0);
+    IH_TEST_EQUAL(65536, ih_score_probability_q16(INT32_MAX), "max", 0);
 }
 
 int main(void)

@@ -1,6 +1,6 @@
 /* ih_detections: its list, the nest at a place, the outline against the exact projection of the
  * ellipsoid, and whole scenes. Nothing here depends on the learnt weights. */
-#include "detect/ih_detections.c" /* for insert and nest_at */
+#include "detect/ih_candidates.h"
 
 #include "ih_test.h"
 #include "rigs.inc"
@@ -58,7 +58,7 @@ static void put(double x, int32_t logit_q10)
     struct ih_detection detection = {.logit_q10 = logit_q10};
 
     detection.head.centre_mm_q8[0] = (int32_t)lround(x * 256);
-    insert(&detections, &detection, SPACING_MM);
+    ih_candidates_insert(&detections, &detection, SPACING_MM);
 }
 
 static void expect_list(int count, const int32_t logits[], const char *what)
@@ -170,14 +170,15 @@ static void a_candidate_takes_the_nearest_nest_in_reach(void)
     hypotheses.hypothesis[1].extent_mm_q8 = 22;
     hypotheses.hypothesis[1].upright_q16 = 33;
     hypotheses.hypothesis[2].centre_mm_q8[2] = 900 << 8;
-    nest = nest_at(&hypotheses, place, 90);
+    nest = ih_candidates_nest_at(&hypotheses, place, 90);
     TEST_ASSERT_TRUE(nest.present);
     TEST_ASSERT_EQUAL_INT32(22, nest.extent_mm_q8);
     TEST_ASSERT_EQUAL_INT32(33, nest.upright_q16);
-    TEST_ASSERT_FALSE(nest_at(&hypotheses, place, 30).present); /* 30 mm is not within 30 mm */
-    TEST_ASSERT_TRUE(nest_at(&hypotheses, place, 31).present);
+    TEST_ASSERT_FALSE(
+        ih_candidates_nest_at(&hypotheses, place, 30).present); /* 30 mm is not within 30 mm */
+    TEST_ASSERT_TRUE(ih_candidates_nest_at(&hypotheses, place, 31).present);
     hypotheses.hypothesis_count = 0;
-    TEST_ASSERT_FALSE(nest_at(&hypotheses, place, 90).present);
+    TEST_ASSERT_FALSE(ih_candidates_nest_at(&hypotheses, place, 90).present);
 }
 
 /* --- the outline ---------------------------------------------------------------------------------
@@ -604,8 +605,7 @@ static void what_is_hopeless_is_fitted_for_a_step(void)
         if (pass == 1) { /* six steps are nearer than one */
             struct ih_ellipsoid head;
 
-            ih_fit_equations_prepare(&scratch.space, &scratch.rows.rays);
-            ih_fit_ellipsoid(&scratch.space, &params.fit, &expected.head[0], &scratch.rows, &head);
+            ih_fit_ellipsoid(&scratch.rays, &params.fit, &expected.head[0], &scratch.fit, &head);
             TEST_ASSERT_EQUAL_MEMORY(&head, &once.detection[0].head, sizeof head);
         }
     }

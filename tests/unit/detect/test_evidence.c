@@ -4,7 +4,6 @@
 #include "detect/ih_ellipsoid.h"
 #include "detect/ih_evidence.h"
 #include "detect/ih_rays.h"
-#include "detect/ih_ray_counts.h"
 
 #include "ih_test.h"
 
@@ -29,26 +28,24 @@ struct vector_scene {
 _Static_assert(KINDS <= IH_EVIDENCE_COUNT && IH_EVIDENCE_UPRIGHT == KINDS - 1,
                "new kinds go to the end");
 
-static struct ih_rays space;
-static struct ih_ray_counts_scratch scratch;
+static struct ih_rays rays;
 static struct ih_evidence evidence, one_by_one;
 static const struct ih_evidence_nest no_nest = {.present = false};
 
-/* And the same when each ray is looked at by itself, as those are of which 16 bits cannot tell. */
+/* And the same ray by ray, as in a field too wide for 16 bits. */
 static void collect(const struct ih_ellipsoid *head, const int32_t start_mm_q8[3],
                     const struct ih_evidence_nest *nest)
 {
-    memset(&scratch, IH_TEST_FILL, sizeof scratch);
-    ih_ray_counts_prepare(&space, &scratch);
-    ih_evidence_collect(&space, &scratch, head, start_mm_q8, nest, &evidence);
-    scratch.is_usable = false;
-    ih_evidence_collect(&space, &scratch, head, start_mm_q8, nest, &one_by_one);
+    ih_rays_fill_table(&rays);
+    ih_evidence_collect(&rays, head, start_mm_q8, nest, &evidence);
+    rays.table.slope_max_q20[0] = IH_RAYS_SLOPE_MAX << 20;
+    ih_evidence_collect(&rays, head, start_mm_q8, nest, &one_by_one);
     TEST_ASSERT_EQUAL_MEMORY(&one_by_one, &evidence, sizeof evidence);
 }
 
 void setUp(void)
 {
-    memset(&space, 0, sizeof space);
+    memset(&rays, 0, sizeof rays);
     memset(&evidence, IH_TEST_FILL, sizeof evidence);
 }
 
@@ -60,10 +57,10 @@ static void use_scene(const struct vector_scene *scene)
 {
     int slot, axis;
 
-    memcpy(space.origin_mm_q8, vector_origin_mm_q8, sizeof space.origin_mm_q8);
+    memcpy(rays.origin_mm_q8, vector_origin_mm_q8, sizeof rays.origin_mm_q8);
     for (slot = 0; slot < IH_SLOTS; slot++) {
-        struct ih_ray *ray = &space.ray[slot];
-        const int64_t along = scene->ray[slot].depth_mm_q8 - space.origin_mm_q8[2];
+        struct ih_ray *ray = &rays.ray[slot];
+        const int64_t along = scene->ray[slot].depth_mm_q8 - rays.origin_mm_q8[2];
 
         *ray = (struct ih_ray){.slope_x_q20 = vector_slope_q20[slot][0],
                                .slope_y_q20 = vector_slope_q20[slot][1],
@@ -73,7 +70,7 @@ static void use_scene(const struct vector_scene *scene)
         }
         for (axis = 0; axis < 2; axis++) {
             ray->point_mm_q8[axis] =
-                (int32_t)(space.origin_mm_q8[axis] +
+                (int32_t)(rays.origin_mm_q8[axis] +
                           ((along * vector_slope_q20[slot][axis] + (1 << 19)) >> 20));
         }
         ray->point_mm_q8[2] = scene->ray[slot].depth_mm_q8;
@@ -246,9 +243,9 @@ static void bulges_match_the_best_plane(void)
         for (axis = 0; axis < 3; axis++) {
             head.semi_mm_q8[axis] = (int32_t)ih_test_between(&random, 50 << 8, 152 << 8);
         }
-        memset(&space, 0, sizeof space);
+        memset(&rays, 0, sizeof rays);
         while (count < wanted) {
-            struct ih_ray *ray = &space.ray[count];
+            struct ih_ray *ray = &rays.ray[count];
             double s[3], place[3], f;
 
             s[0] = 1.6 * ih_test_unit(&random) - 0.8;
@@ -293,9 +290,9 @@ static void a_line_has_no_bulge(void)
     int i, pass;
 
     for (pass = 0; pass < 3; pass++) {
-        memset(&space, 0, sizeof space);
+        memset(&rays, 0, sizeof rays);
         for (i = 0; i < 9; i++) {
-            struct ih_ray *ray = &space.ray[i * IH_GRID + i];
+            struct ih_ray *ray = &rays.ray[i * IH_GRID + i];
             const double along = (i - 4) * 0.15;
             const double at[2] = {pass == 1 ? 0 : along, pass == 0 ? 0 : along};
             const double z = 700 - 98 * sqrt(1 - at[0] * at[0] - at[1] * at[1]);
@@ -333,15 +330,15 @@ struct limit {
 
 static void cast_ray(int32_t slot, int32_t x_mm_q8, int32_t y_mm_q8, int32_t dz_mm_q8)
 {
-    space.ray[slot] = (struct ih_ray){
+    rays.ray[slot] = (struct ih_ray){
         .slope_x_q20 = 4 * x_mm_q8, .slope_y_q20 = 4 * y_mm_q8, .state = IH_RAY_EMPTY};
     if (dz_mm_q8 != NO_POINT) {
         const double depth = (double)BALL_Z_MM_Q8 + dz_mm_q8;
 
-        space.ray[slot].state = IH_RAY_SEEN;
-        space.ray[slot].point_mm_q8[0] = (int32_t)lround(x_mm_q8 * depth / BALL_Z_MM_Q8);
-        space.ray[slot].point_mm_q8[1] = (int32_t)lround(y_mm_q8 * depth / BALL_Z_MM_Q8);
-        space.ray[slot].point_mm_q8[2] = BALL_Z_MM_Q8 + dz_mm_q8;
+        rays.ray[slot].state = IH_RAY_SEEN;
+        rays.ray[slot].point_mm_q8[0] = (int32_t)lround(x_mm_q8 * depth / BALL_Z_MM_Q8);
+        rays.ray[slot].point_mm_q8[1] = (int32_t)lround(y_mm_q8 * depth / BALL_Z_MM_Q8);
+        rays.ray[slot].point_mm_q8[2] = BALL_Z_MM_Q8 + dz_mm_q8;
     }
 }
 
@@ -349,9 +346,9 @@ static void forget_rays(void)
 {
     int slot;
 
-    memset(&space, 0, sizeof space);
+    memset(&rays, 0, sizeof rays);
     for (slot = 0; slot < IH_SLOTS; slot++) {
-        space.ray[slot].state = IH_RAY_UNKNOWN;
+        rays.ray[slot].state = IH_RAY_UNKNOWN;
     }
 }
 
@@ -559,10 +556,10 @@ static void extremes_do_not_overflow(void)
                                         ? (axis + pass) % 3 == 0 ? IH_ELLIPSOID_SEMI_MAX_MM << 8
                                                                  : IH_ELLIPSOID_SEMI_MIN_MM << 8
                                         : (int32_t)ih_test_between(&random, 40 << 8, 200 << 8);
-            space.origin_mm_q8[axis] = (int32_t)ih_test_between(&random, -256000, 256000);
+            rays.origin_mm_q8[axis] = (int32_t)ih_test_between(&random, -256000, 256000);
         }
         for (slot = 0; slot < IH_SLOTS; slot++) {
-            struct ih_ray *ray = &space.ray[slot];
+            struct ih_ray *ray = &rays.ray[slot];
 
             ray->slope_x_q20 = (int32_t)ih_test_between(&random, -(4 << 20), 4 << 20);
             ray->slope_y_q20 = (int32_t)ih_test_between(&random, -(4 << 20), 4 << 20);

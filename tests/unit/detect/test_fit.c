@@ -23,7 +23,7 @@ struct vector_fit {
 #include "fit.inc"
 
 static struct ih_fit_params params;
-static struct ih_fit_equations_scratch scratch;
+static struct ih_fit_scratch scratch;
 static struct ih_ellipsoid found;
 
 void setUp(void)
@@ -40,8 +40,8 @@ void tearDown(void)
 
 static void fit(const struct ih_ellipsoid *start)
 {
-    ih_fit_equations_prepare(&space, &scratch.rays);
-    ih_fit_ellipsoid(&space, &params, start, &scratch, &found);
+    ih_rays_fill_table(&rays);
+    ih_fit_ellipsoid(&rays, &params, start, &scratch, &found);
 }
 
 /* A mean head beside the true one. */
@@ -71,7 +71,7 @@ static bool distance_of(const struct ih_ellipsoid *ellipsoid, const int32_t plac
 {
     const struct ih_fractions shares = ih_ellipsoid_fractions(ellipsoid->semi_mm_q8);
 
-    return ih_fit_equations_distance(&shares, place_q14, distance_mm_q8);
+    return ih_ellipsoid_distance(&shares, place_q14, distance_mm_q8);
 }
 
 static void distances_match_float64(void)
@@ -185,9 +185,9 @@ static void points_in_front_change_little(void)
     fit(&start);
     clean = found;
     for (slot = 0; slot < IH_SLOTS; slot++) {
-        if (space.ray[slot].state == IH_RAY_SEEN && space.ray[slot].point_mm_q8[2] < 1000 << 8 &&
+        if (rays.ray[slot].state == IH_RAY_SEEN && rays.ray[slot].point_mm_q8[2] < 1000 << 8 &&
             ih_test_between(&random, 0, 4) == 0) {
-            see(slot, space.ray[slot].point_mm_q8[2] -
+            see(slot, rays.ray[slot].point_mm_q8[2] -
                           (int32_t)ih_test_between(&random, 40 << 8, 300 << 8));
             moved++;
         }
@@ -255,25 +255,25 @@ static void single_and_equal_points(void)
     double reached;
     int32_t slot;
 
-    memset(space.origin_mm_q8, 0, sizeof space.origin_mm_q8);
+    memset(rays.origin_mm_q8, 0, sizeof rays.origin_mm_q8);
     for (slot = 0; slot < IH_SLOTS; slot++) {
-        space.ray[slot] = (struct ih_ray){.state = IH_RAY_UNKNOWN};
+        rays.ray[slot] = (struct ih_ray){.state = IH_RAY_UNKNOWN};
     }
-    space.ray[7].state = IH_RAY_SEEN;
-    memcpy(space.ray[7].point_mm_q8, place, sizeof place);
+    rays.ray[7].state = IH_RAY_SEEN;
+    memcpy(rays.ray[7].point_mm_q8, place, sizeof place);
     fit(&mean);
     reached = (found.centre_mm_q8[2] - found.semi_mm_q8[2]) / 256.0;
     TEST_ASSERT_TRUE(reached < front && reached > front - 20);
     TEST_ASSERT_EQUAL_INT32(0, found.centre_mm_q8[0]);
     TEST_ASSERT_EQUAL_INT32(0, found.centre_mm_q8[1]);
 
-    memcpy(space.ray[7].point_mm_q8, centre, sizeof centre);
+    memcpy(rays.ray[7].point_mm_q8, centre, sizeof centre);
     fit(&mean);
     TEST_ASSERT_EQUAL_MEMORY(&mean, &found, sizeof mean);
 
     for (slot = 0; slot < IH_SLOTS; slot++) {
-        space.ray[slot].state = IH_RAY_SEEN;
-        memcpy(space.ray[slot].point_mm_q8, place, sizeof place);
+        rays.ray[slot].state = IH_RAY_SEEN;
+        memcpy(rays.ray[slot].point_mm_q8, place, sizeof place);
     }
     fit(&mean);
     IH_TEST_WITHIN(0.1, front - 20, (found.centre_mm_q8[2] - found.semi_mm_q8[2]) / 256.0, "front",
@@ -293,7 +293,7 @@ static void a_mirrored_scene_gives_a_mirrored_fit(void)
         fit(&start);
         straight = found;
         straight.centre_mm_q8[0] = -straight.centre_mm_q8[0];
-        mirror_space();
+        mirror_rays();
         start.centre_mm_q8[0] = -start.centre_mm_q8[0];
         fit(&start);
         IH_TEST_WITHIN(0.02 + v->slack_mm, 0, max_difference(&straight, &found), "mirror", i);
@@ -316,14 +316,14 @@ static void place_and_order_do_not_matter(void)
         fit(&start);
         before = found;
         for (slot = 0; slot < IH_SLOTS / 2; slot++) {
-            const struct ih_ray swap = space.ray[slot];
+            const struct ih_ray swap = rays.ray[slot];
 
-            space.ray[slot] = space.ray[IH_SLOTS - 1 - slot];
-            space.ray[IH_SLOTS - 1 - slot] = swap;
+            rays.ray[slot] = rays.ray[IH_SLOTS - 1 - slot];
+            rays.ray[IH_SLOTS - 1 - slot] = swap;
         }
         fit(&start);
         TEST_ASSERT_EQUAL_MEMORY(&before, &found, sizeof found);
-        move_space(by);
+        move_rays(by);
         for (axis = 0; axis < 3; axis++) {
             start.centre_mm_q8[axis] += by[axis];
             before.centre_mm_q8[axis] += by[axis];
@@ -346,7 +346,7 @@ static void random_input_stays_within_the_limits(void)
         struct ih_ellipsoid start;
 
         for (axis = 0; axis < 3; axis++) {
-            space.origin_mm_q8[axis] = (int32_t)ih_test_between(&random, -(1000 << 8), 1000 << 8);
+            rays.origin_mm_q8[axis] = (int32_t)ih_test_between(&random, -(1000 << 8), 1000 << 8);
             start.centre_mm_q8[axis] =
                 (int32_t)ih_test_between(&random, axis < 2 ? -(64000 << 8) : 0, 64000 << 8) >>
                 (pass % 7);
@@ -357,7 +357,7 @@ static void random_input_stays_within_the_limits(void)
                                                      : 2 * ih_test_unit(&random) - 1)));
         }
         for (slot = 0; slot < IH_SLOTS; slot++) {
-            struct ih_ray *ray = &space.ray[slot];
+            struct ih_ray *ray = &rays.ray[slot];
 
             ray->state = (int32_t)ih_test_between(&random, 0, 5) == 0 ? IH_RAY_EMPTY : IH_RAY_SEEN;
             for (axis = 0; axis < 3; axis++) { /* around the start, near or far */
@@ -367,8 +367,8 @@ static void random_input_stays_within_the_limits(void)
             ray->slope_x_q20 = (int32_t)ih_test_any_size(&random, 22);
             ray->slope_y_q20 = (int32_t)ih_test_any_size(&random, 22);
             if (slot % 2 == 0) { /* a ray through the start */
-                const double depth = start.centre_mm_q8[2] - space.origin_mm_q8[2] + 0.5;
-                double x = (start.centre_mm_q8[0] - space.origin_mm_q8[0] +
+                const double depth = start.centre_mm_q8[2] - rays.origin_mm_q8[2] + 0.5;
+                double x = (start.centre_mm_q8[0] - rays.origin_mm_q8[0] +
                             (double)ih_test_any_size(&random, 15)) /
                            depth;
 

@@ -9,11 +9,11 @@
 #include "ih_test_cross.h"
 #include "ih_test_scene.h"
 
-static struct ih_fit_equations_scratch scratch;
+static struct ih_fit_scratch scratch;
 
 void setUp(void)
 {
-    memset(&space, 0, sizeof space);
+    memset(&rays, 0, sizeof rays);
 }
 
 void tearDown(void)
@@ -71,7 +71,7 @@ static bool plain_gradient(const struct ih_ellipsoid *e, const int32_t place[3],
 }
 
 /* Sums with all bits of the products; the right side's are scaled by the caller. */
-static void plain_add(struct ih_fit_equations_system *system, const struct plain *g,
+static void plain_add(struct ih_fit_equations *equations, const struct plain *g,
                       const int32_t place[3], int64_t residual, int64_t weight)
 {
     const int64_t ln_inverse = ih_mul_shift(g->inverse, 41943, 16);
@@ -91,23 +91,23 @@ static void plain_add(struct ih_fit_equations_system *system, const struct plain
         const int64_t weighted = slope[i] < 0 ? -size : size;
 
         for (j = 0; j <= i; j++) {
-            system->normal_q16[at++] += weighted * slope[j];
+            equations->normal_q16[at++] += weighted * slope[j];
         }
-        system->right_q16[i] += ih_mul_shift(weight, residual, 14) * slope[i];
+        equations->right_q16[i] += ih_mul_shift(weight, residual, 14) * slope[i];
     }
 }
 
-static void plain_scale(struct ih_fit_equations_system *system)
+static void plain_scale(struct ih_fit_equations *equations)
 {
     int i, j, at = 0;
 
     for (i = 0; i < 6; i++) {
         for (j = 0; j <= i; j++, at++) {
-            system->normal_q16[at] = ih_shift_round(system->normal_q16[at], i < 3   ? 12
-                                                                            : j < 3 ? 11
-                                                                                    : 10);
+            equations->normal_q16[at] = ih_shift_round(equations->normal_q16[at], i < 3   ? 12
+                                                                                  : j < 3 ? 11
+                                                                                          : 10);
         }
-        system->right_q16[i] = ih_shift_round(system->right_q16[i], i < 3 ? 8 : 7);
+        equations->right_q16[i] = ih_shift_round(equations->right_q16[i], i < 3 ? 8 : 7);
     }
 }
 
@@ -159,13 +159,13 @@ static bool plain_place(const struct ih_ellipsoid *e, const int32_t point_mm_q8[
 
 /* Rows that it added. */
 static int32_t plain_collect(const struct ih_ellipsoid *e, int32_t scale_mm, int32_t see_through_mm,
-                             struct ih_fit_equations_system *out)
+                             struct ih_fit_equations *out)
 {
     int32_t slot, count = 0;
 
     memset(out, 0, sizeof *out);
     for (slot = 0; slot < IH_SLOTS; slot++) {
-        const struct ih_ray *ray = &space.ray[slot];
+        const struct ih_ray *ray = &rays.ray[slot];
         struct ih_crossing crossing;
         struct plain g;
         int32_t place[3];
@@ -182,7 +182,7 @@ static int32_t plain_collect(const struct ih_ellipsoid *e, int32_t scale_mm, int
                 count++;
             }
         }
-        if (ih_test_cross(e, space.origin_mm_q8, ray, &crossing) && crossing.radius2_q14 < 16384 &&
+        if (ih_test_cross(e, rays.origin_mm_q8, ray, &crossing) && crossing.radius2_q14 < 16384 &&
             ray->point_mm_q8[2] - see_through_mm * 256 > crossing.entry_mm_q8 &&
             plain_gradient(e, crossing.nearest_q14, &g)) {
             const int64_t residual = g.residual_mm_q8;
@@ -199,15 +199,15 @@ static int32_t plain_collect(const struct ih_ellipsoid *e, int32_t scale_mm, int
 static int32_t check(const struct ih_ellipsoid *e, int32_t scale_mm, const char *what,
                      int64_t index)
 {
-    struct ih_fit_equations_system expected, found;
+    struct ih_fit_equations expected, found;
     const int32_t see_through_mm = 60;
     const int32_t count = plain_collect(e, scale_mm, see_through_mm, &expected);
     int i;
 
     memset(&scratch, IH_TEST_FILL, sizeof scratch);
     memset(&found, IH_TEST_FILL, sizeof found);
-    ih_fit_equations_prepare(&space, &scratch.rays);
-    ih_fit_equations_collect(&space, e, scale_mm, see_through_mm, &scratch, &found);
+    ih_rays_fill_table(&rays);
+    ih_fit_equations_collect(&rays, e, scale_mm, see_through_mm, &scratch, &found);
     for (i = 0; i < IH_CHOLESKY_PACKED(IH_FIT_UNKNOWNS); i++) {
         IH_TEST_EQUAL(expected.normal_q16[i], found.normal_q16[i], what, index);
     }
@@ -247,7 +247,7 @@ static void scenes_give_the_plain_sums(void)
     for (i = 0; i < SCENE_COUNT; i++) {
         make_scene(&vector_scenes[i]);
         for (pass = 0; pass < 40; pass++) {
-            const struct ih_ray *ray = &space.ray[ih_test_between(&random, 0, IH_SLOTS - 1)];
+            const struct ih_ray *ray = &rays.ray[ih_test_between(&random, 0, IH_SLOTS - 1)];
             struct ih_ellipsoid e;
 
             random_axes(&random, &e);
@@ -276,12 +276,12 @@ static void points_around_give_the_plain_sums(void)
 
         random_axes(&random, &e);
         for (axis = 0; axis < 3; axis++) {
-            space.origin_mm_q8[axis] = (int32_t)ih_test_between(&random, -(99 << 8), 99 << 8);
+            rays.origin_mm_q8[axis] = (int32_t)ih_test_between(&random, -(99 << 8), 99 << 8);
             e.centre_mm_q8[axis] =
                 (int32_t)ih_test_between(&random, axis == 2 ? 100 << 8 : -(500 << 8), 1600 << 8);
         }
         for (slot = 0; slot < IH_SLOTS; slot++) {
-            struct ih_ray *ray = &space.ray[slot];
+            struct ih_ray *ray = &rays.ray[slot];
 
             ray->state = ih_test_between(&random, 0, 9) == 0 ? IH_RAY_EMPTY : IH_RAY_SEEN;
             ray->slope_x_q20 = (int32_t)ih_test_between(&random, -(1 << 20), 1 << 20);
@@ -303,7 +303,7 @@ static void points_around_give_the_plain_sums(void)
         count = check(&e, scale_mm, "around", pass);
         max = count > max ? count : max;
     }
-    TEST_ASSERT_TRUE(max > 2 * IH_FIT_EQUATIONS_MAX);
+    TEST_ASSERT_TRUE(max > 2 * IH_FIT_ROWS_MAX);
 }
 
 /* Rays of all slopes that graze the ellipsoid or go through it, points behind; and origins beside,
@@ -318,19 +318,19 @@ static void pushes_give_the_plain_sums(void)
 
         random_axes(&random, &e);
         for (axis = 0; axis < 3; axis++) {
-            space.origin_mm_q8[axis] = (int32_t)ih_test_between(&random, -(900 << 8), 900 << 8);
+            rays.origin_mm_q8[axis] = (int32_t)ih_test_between(&random, -(900 << 8), 900 << 8);
             e.centre_mm_q8[axis] = (int32_t)ih_test_between(&random, -(900 << 8), 900 << 8);
         }
-        e.centre_mm_q8[2] = space.origin_mm_q8[2] +
+        e.centre_mm_q8[2] = rays.origin_mm_q8[2] +
                             (pass % 5 == 0 ? (int32_t)ih_test_between(&random, -2000, 2000)
                                            : (int32_t)ih_test_between(&random, 0, 15000 << 8));
         for (slot = 0; slot < IH_SLOTS; slot++) {
-            struct ih_ray *ray = &space.ray[slot];
-            const int64_t depth = (int64_t)e.centre_mm_q8[2] - space.origin_mm_q8[2];
+            struct ih_ray *ray = &rays.ray[slot];
+            const int64_t depth = (int64_t)e.centre_mm_q8[2] - rays.origin_mm_q8[2];
             int32_t slope[2];
 
             for (axis = 0; axis < 2; axis++) { /* at the centre's depth, 1.4 semi-axes around it */
-                const int64_t off = (int64_t)e.centre_mm_q8[axis] - space.origin_mm_q8[axis] +
+                const int64_t off = (int64_t)e.centre_mm_q8[axis] - rays.origin_mm_q8[axis] +
                                     ih_test_between(&random, -7, 7) * e.semi_mm_q8[axis] / 5;
 
                 slope[axis] = ih_saturate_s32(ih_div_round(off * 1048576, depth > 0 ? depth : 1));

@@ -1,22 +1,19 @@
 /* ih_prescreen against float64 counts, for rays that are not on a limit. */
 #include "base/ih_config.h"
 #include "detect/ih_prescreen.h"
-#include "detect/ih_fit_equations.h"
 #include "detect/ih_rays.h"
 
 #include <math.h>
 
 #include "ih_test.h"
 
-static struct ih_rays space;
-static struct ih_fit_equations_rays rays;
+static struct ih_rays rays;
 static const int32_t centre_mm_q8[3] = {40 << 8, -25 * 256, 800 << 8};
 
 void setUp(void)
 {
-    memset(&space, 0, sizeof space); /* unknown */
-    memset(&rays, IH_TEST_FILL, sizeof rays);
-    space.origin_mm_q8[0] = 12 << 8;
+    memset(&rays, 0, sizeof rays); /* unknown */
+    rays.origin_mm_q8[0] = 12 << 8;
 }
 
 void tearDown(void)
@@ -27,17 +24,17 @@ void tearDown(void)
 static void look(int32_t slot, double x_mm, double y_mm, double z_mm, enum ih_ray_state state)
 {
     const double off_mm[2] = {x_mm, y_mm};
-    struct ih_ray *ray = &space.ray[slot];
-    const double depth_mm = (centre_mm_q8[2] - space.origin_mm_q8[2]) / 256.0;
+    struct ih_ray *ray = &rays.ray[slot];
+    const double depth_mm = (centre_mm_q8[2] - rays.origin_mm_q8[2]) / 256.0;
     double slope[2];
     int axis;
 
     for (axis = 0; axis < 2; axis++) {
-        const double from_mm = (centre_mm_q8[axis] - space.origin_mm_q8[axis]) / 256.0;
+        const double from_mm = (centre_mm_q8[axis] - rays.origin_mm_q8[axis]) / 256.0;
 
         slope[axis] = (from_mm + off_mm[axis]) / depth_mm;
         ray->point_mm_q8[axis] =
-            (int32_t)(space.origin_mm_q8[axis] + slope[axis] * (depth_mm + z_mm) * 256);
+            (int32_t)(rays.origin_mm_q8[axis] + slope[axis] * (depth_mm + z_mm) * 256);
     }
     ray->slope_x_q20 = (int32_t)lround(slope[0] * 1048576);
     ray->slope_y_q20 = (int32_t)lround(slope[1] * 1048576);
@@ -47,8 +44,8 @@ static void look(int32_t slot, double x_mm, double y_mm, double z_mm, enum ih_ra
 
 static int32_t promise(void)
 {
-    ih_fit_equations_prepare(&space, &rays);
-    return ih_prescreen_score_q8(&rays, space.origin_mm_q8, centre_mm_q8);
+    ih_rays_fill_table(&rays);
+    return ih_prescreen_score_q8(&rays, centre_mm_q8);
 }
 
 static void nothing_known_says_nothing(void)
@@ -138,14 +135,14 @@ static void any_place_is_looked_at(void)
     for (slot = 0; slot < IH_SLOTS; slot++) {
         look(slot, (slot % IH_GRID - 9) * 40, (slot / IH_GRID - 9) * 40, slot - 180, IH_RAY_SEEN);
     }
-    ih_fit_equations_prepare(&space, &rays);
+    ih_rays_fill_table(&rays);
     for (pass = 0; pass < 2000; pass++) {
         int32_t place[3];
 
         for (axis = 0; axis < 3; axis++) {
             place[axis] = (int32_t)ih_test_any_size(&random, 26);
         }
-        const int32_t found = ih_prescreen_score_q8(&rays, space.origin_mm_q8, place);
+        const int32_t found = ih_prescreen_score_q8(&rays, place);
         IH_TEST_RANGE(-4 * 256, 5 * 256, found, "promise", pass);
         if (place[2] < 64 << 8) {
             IH_TEST_EQUAL(256, found, "before the origin", pass);

@@ -5,22 +5,22 @@
 #include "detect/ih_evidence.h"
 #include "detect/ih_rays.h"
 #include "detect/ih_ray_counts.h"
-#include "simd/ih_lane16.h"
+#include "simd/ih_simd.h"
 
 #include "ih_test.h"
 
 /* Rays left, on the average; where there are no vectors all are. */
-#define LEFT_MAX (IH_LANE_COUNT > 1 ? 25 : IH_SLOTS)
+#define LEFT_MAX (IH_I16_LANES > 0 ? 25 : IH_SLOTS)
 
-static struct ih_rays space;
+static struct ih_rays rays;
 static struct ih_ellipsoid head;
-static struct ih_ray_counts_scratch scratch;
-static struct ih_ray_counts tally;
+static struct ih_ray_marks marks;
+static struct ih_ray_counts counts;
 static struct ih_test_random random_state;
 
 void setUp(void)
 {
-    memset(&space, 0, sizeof space);
+    memset(&rays, 0, sizeof rays);
     memset(&head, 0, sizeof head);
     random_state = (struct ih_test_random){617};
 }
@@ -39,27 +39,27 @@ static void place_head(int32_t depth_mm, int32_t semi_min_mm, int32_t semi_max_m
     int axis;
 
     for (axis = 0; axis < 3; axis++) {
-        space.origin_mm_q8[axis] = between(-(200 << 8), 200 << 8);
+        rays.origin_mm_q8[axis] = between(-(200 << 8), 200 << 8);
         head.semi_mm_q8[axis] = between(semi_min_mm << 8, semi_max_mm << 8);
     }
-    head.centre_mm_q8[2] = space.origin_mm_q8[2] + (depth_mm << 8) + between(0, 255);
+    head.centre_mm_q8[2] = rays.origin_mm_q8[2] + (depth_mm << 8) + between(0, 255);
     for (axis = 0; axis < 2; axis++) {
         head.centre_mm_q8[axis] =
-            space.origin_mm_q8[axis] + between(-(depth_mm << 7), depth_mm << 7);
+            rays.origin_mm_q8[axis] + between(-(depth_mm << 7), depth_mm << 7);
     }
 }
 
 /* A ray that passes here at the head's depth, in mm from its centre; its point is so far behind it. */
 static void put(int32_t slot, const double at_mm[2], int32_t state, int32_t dz_mm_q8)
 {
-    struct ih_ray *ray = &space.ray[slot];
-    const double depth_q8 = head.centre_mm_q8[2] - space.origin_mm_q8[2];
+    struct ih_ray *ray = &rays.ray[slot];
+    const double depth_q8 = head.centre_mm_q8[2] - rays.origin_mm_q8[2];
     double slope[2];
     int axis;
 
     for (axis = 0; axis < 2; axis++) {
         slope[axis] =
-            (at_mm[axis] * 256 + head.centre_mm_q8[axis] - space.origin_mm_q8[axis]) / depth_q8;
+            (at_mm[axis] * 256 + head.centre_mm_q8[axis] - rays.origin_mm_q8[axis]) / depth_q8;
         slope[axis] = slope[axis] > 0.9999 ? 0.9999 : slope[axis] < -0.9999 ? -0.9999 : slope[axis];
     }
     *ray = (struct ih_ray){.slope_x_q20 = (int32_t)(slope[0] * (1 << 20)),
@@ -72,21 +72,30 @@ static void put(int32_t slot, const double at_mm[2], int32_t state, int32_t dz_m
     }
 }
 
-/* The same numbers with and without the tally; how many rays it left to ih_evidence. */
+static bool is_marked(const uint32_t *bits, int32_t slot)
+{
+    return (bits[slot / 32] >> slot % 32 & 1) != 0;
+}
+
+/* The same numbers with the counts, and ray by ray, as in a field too wide for 16 bits. How many rays the counts
+ * left to ih_evidence. */
 static int32_t compare(int what)
 {
     static const struct ih_evidence_nest no_nest = {.present = false};
     static struct ih_evidence with, without;
+    struct ih_ellipsoid_box box;
     int32_t slot, left = 0;
 
-    memset(&scratch, IH_TEST_FILL, sizeof scratch);
-    ih_ray_counts_prepare(&space, &scratch);
-    ih_evidence_collect(&space, &scratch, &head, head.centre_mm_q8, &no_nest, &with);
+    ih_rays_fill_table(&rays);
+    ih_evidence_collect(&rays, &head, head.centre_mm_q8, &no_nest, &with);
+    box = ih_ellipsoid_box(&head, rays.table.slope_max_q20, 1 << 14);
+    memset(&marks, IH_TEST_FILL, sizeof marks);
+    ih_ray_counts_count(&rays, &head, &box, &marks, &counts);
     for (slot = 0; slot < IH_SLOTS; slot++) {
-        left += scratch.flag[slot] & IH_RAY_COUNTS_UNSURE;
+        left += is_marked(marks.unsure, slot);
     }
-    scratch.is_usable = false;
-    ih_evidence_collect(&space, &scratch, &head, head.centre_mm_q8, &no_nest, &without);
+    rays.table.slope_max_q20[1] = IH_RAYS_SLOPE_MAX << 20;
+    ih_evidence_collect(&rays, &head, head.centre_mm_q8, &no_nest, &without);
     for (slot = 0; slot < IH_EVIDENCE_COUNT; slot++) {
         IH_TEST_EQUAL(without.value_q8[slot], with.value_q8[slot],
                       ih_evidence_text((enum ih_evidence_kind)slot), what);
@@ -181,20 +190,33 @@ static void few_rays_are_left(void)
     IH_TEST_RANGE(1, LEFT_MAX * 200, left, "rays left", 0);
 }
 
-/* Where 16 bits do not reach every ray that is known is left, and may hit. */
-static void out_of_the_limits_all_are_left(void)
+static void check_all_left(const char *what, int index)
+{
+    int32_t slot;
+
+    for (slot = 0; slot < IH_SLOTS; slot++) {
+        const bool is_known = slot % 3 != IH_RAY_UNKNOWN;
+
+        IH_TEST_EQUAL(is_known, is_marked(marks.unsure, slot), what, index);
+        IH_TEST_EQUAL(is_known, is_marked(marks.may_hit, slot), what, index);
+        IH_TEST_EQUAL(false, is_marked(marks.body, slot), what, index);
+    }
+}
+
+/* Where 16 bits do not suffice every ray of known state is left, and may hit. */
+static void outside_of_the_limits_all_are_left(void)
 {
     static const struct {
         int32_t depth_mm, aside_mm, semi_mm;
-        bool is_usable;
+        bool is_counted;
     } cases[] = {{226, 0, 80, false},   {228, 0, 80, true},      {16301, 0, 80, false},
                  {16299, 0, 80, true},  {1000, 1001, 80, false}, {1000, -1001, 80, false},
                  {1000, 999, 80, true}, {1000, 0, 41, false},    {1000, 0, 43, true},
                  {1000, 0, 201, false}, {1000, 0, 199, true}};
+    const struct ih_ellipsoid_box box = {{20000, 20000}};
     int i, slot;
 
     for (i = 0; i < IH_TEST_COUNT(cases); i++) {
-        const struct ih_ellipsoid_box box = {{20000, 20000}};
         const double at_mm[2] = {40, 40};
 
         head = (struct ih_ellipsoid){
@@ -203,21 +225,20 @@ static void out_of_the_limits_all_are_left(void)
         for (slot = 0; slot < IH_SLOTS; slot++) {
             put(slot, at_mm, slot % 3, 0);
         }
-        ih_ray_counts_prepare(&space, &scratch);
-        ih_ray_counts_count(&space, &head, &box, &scratch, &tally);
-        for (slot = 0; slot < IH_SLOTS; slot++) {
-            const int32_t all = IH_RAY_COUNTS_UNSURE | IH_RAY_COUNTS_HIT;
-
-            if (slot % 3 == IH_RAY_UNKNOWN) {
-                IH_TEST_EQUAL(0, scratch.flag[slot], "unknown", slot);
-            } else if (!cases[i].is_usable || IH_LANE_COUNT == 1) {
-                IH_TEST_EQUAL(all, scratch.flag[slot], "left", i);
-            }
+        ih_rays_fill_table(&rays);
+        memset(&marks, IH_TEST_FILL, sizeof marks);
+        ih_ray_counts_count(&rays, &head, &box, &marks, &counts);
+        if (!cases[i].is_counted || IH_I16_LANES == 0) {
+            check_all_left("left", i);
+        }
+        for (slot = 0; slot < IH_SLOTS; slot += 3) {
+            IH_TEST_EQUAL(false, is_marked(marks.unsure, slot), "unknown", slot);
         }
     }
-    space.ray[0].slope_x_q20 = 1 << 20;
-    ih_ray_counts_prepare(&space, &scratch);
-    TEST_ASSERT_FALSE(scratch.is_usable);
+    rays.ray[1].slope_x_q20 = 1 << 20;
+    ih_rays_fill_table(&rays);
+    ih_ray_counts_count(&rays, &head, &box, &marks, &counts);
+    check_all_left("steep", 0);
 }
 
 int main(void)
@@ -226,6 +247,6 @@ int main(void)
     RUN_TEST(random_heads_are_the_same);
     RUN_TEST(rays_at_limits_are_the_same);
     RUN_TEST(few_rays_are_left);
-    RUN_TEST(out_of_the_limits_all_are_left);
+    RUN_TEST(outside_of_the_limits_all_are_left);
     return UNITY_END();
 }

@@ -32,7 +32,7 @@ static struct ih_rig rig;
 static struct ih_points points;
 static struct ih_dots dots;
 static struct ih_rays_params params;
-static struct ih_rays space;
+static struct ih_rays rays;
 
 static void use_rig(const struct ih_calibration *calibration)
 {
@@ -49,7 +49,7 @@ void setUp(void)
     params.probe_mm = VECTOR_PROBE_MM;
     memset(&points, 0, sizeof points);
     memset(&dots, 0, sizeof dots);
-    memset(&space, IH_TEST_FILL, sizeof space);
+    memset(&rays, IH_TEST_FILL, sizeof rays);
 }
 
 void tearDown(void)
@@ -58,7 +58,7 @@ void tearDown(void)
 
 static void make(bool with_dots)
 {
-    ih_rays_make(&points, with_dots ? &dots : NULL, &rig, &params, &space);
+    ih_rays_make(&points, with_dots ? &dots : NULL, &rig, &params, &rays);
 }
 
 static void mark_bright(int32_t u_below)
@@ -86,7 +86,7 @@ static int32_t count_state(enum ih_ray_state state)
     int32_t slot, count = 0;
 
     for (slot = 0; slot < IH_SLOTS; slot++) {
-        count += space.ray[slot].state == (int32_t)state;
+        count += rays.ray[slot].state == (int32_t)state;
     }
     return count;
 }
@@ -105,15 +105,15 @@ static void rays_and_states_match_float64(void)
         if (v->bright) {
             mark_bright(VECTOR_BRIGHT_U);
         }
-        memset(&space, IH_TEST_FILL, sizeof space);
+        memset(&rays, IH_TEST_FILL, sizeof rays);
         make(v->rig->kind == IH_RIG_DOTS);
         for (axis = 0; axis < 3; axis++) { /* half a step, as all below, and the vectors' digits */
-            IH_TEST_WITHIN(0.002, v->origin_mm[axis], ih_test_from_q(space.origin_mm_q8[axis], 8),
+            IH_TEST_WITHIN(0.002, v->origin_mm[axis], ih_test_from_q(rays.origin_mm_q8[axis], 8),
                            "origin", i);
         }
         for (k = 0; k < v->ray_count; k++) {
             const struct vector_ray *expected = &v->ray[k];
-            const struct ih_ray *ray = &space.ray[expected->slot];
+            const struct ih_ray *ray = &rays.ray[expected->slot];
 
             IH_TEST_WITHIN(5.5e-7, expected->slope_x, ih_test_from_q(ray->slope_x_q20, 20), "x", k);
             IH_TEST_WITHIN(5.5e-7, expected->slope_y, ih_test_from_q(ray->slope_y_q20, 20), "y", k);
@@ -123,7 +123,7 @@ static void rays_and_states_match_float64(void)
             }
         }
         for (k = 0; k < IH_SLOTS; k++) {
-            IH_TEST_EQUAL(v->state[k], space.ray[k].state, "state", i * 1000 + k);
+            IH_TEST_EQUAL(v->state[k], rays.ray[k].state, "state", i * 1000 + k);
         }
     }
 }
@@ -144,14 +144,14 @@ static void a_seen_point_lies_on_its_ray(void)
         make(true);
         TEST_ASSERT_EQUAL_INT32(IH_SLOTS, count_state(IH_RAY_SEEN));
         for (slot = 0; slot < IH_SLOTS; slot++) {
-            const struct ih_ray *ray = &space.ray[slot];
+            const struct ih_ray *ray = &rays.ray[slot];
             const int32_t slope_q20[2] = {ray->slope_x_q20, ray->slope_y_q20};
-            const double depth = ih_test_from_q(ray->point_mm_q8[2] - space.origin_mm_q8[2], 8);
+            const double depth = ih_test_from_q(ray->point_mm_q8[2] - rays.origin_mm_q8[2], 8);
 
             for (axis = 0; axis < 2; axis++) {
                 /* Half steps of origin and point, and the slope's over 16 m: 0.008 mm. */
                 IH_TEST_WITHIN(0.012,
-                               ih_test_from_q(space.origin_mm_q8[axis], 8) +
+                               ih_test_from_q(rays.origin_mm_q8[axis], 8) +
                                    depth * ih_test_from_q(slope_q20[axis], 20),
                                ih_test_from_q(ray->point_mm_q8[axis], 8), "aside", slot);
             }
@@ -164,14 +164,14 @@ static void a_missing_dot_inside_the_picture_is_empty_unless_over_exposed(void)
 {
     see(0, 2000);
     make(true);
-    TEST_ASSERT_EQUAL_INT32(IH_RAY_EMPTY, space.ray[MIDDLE].state);
-    TEST_ASSERT_EQUAL_INT32(IH_RAY_SEEN, space.ray[0].state);
+    TEST_ASSERT_EQUAL_INT32(IH_RAY_EMPTY, rays.ray[MIDDLE].state);
+    TEST_ASSERT_EQUAL_INT32(IH_RAY_SEEN, rays.ray[0].state);
     mark_bright(IH_FRAME_WIDTH_MAX);
     make(true);
-    TEST_ASSERT_EQUAL_INT32(IH_RAY_UNKNOWN, space.ray[MIDDLE].state);
+    TEST_ASSERT_EQUAL_INT32(IH_RAY_UNKNOWN, rays.ray[MIDDLE].state);
     TEST_ASSERT_EQUAL_INT32(IH_SLOTS - 1, count_state(IH_RAY_UNKNOWN));
     make(false); /* without the map nothing is over-exposed */
-    TEST_ASSERT_EQUAL_INT32(IH_RAY_EMPTY, space.ray[MIDDLE].state);
+    TEST_ASSERT_EQUAL_INT32(IH_RAY_EMPTY, rays.ray[MIDDLE].state);
 }
 
 /* With a wide baseline the pattern of a near probe is beside the frame: what is not seen there says
@@ -206,9 +206,9 @@ static void nothing_seen_is_no_division_by_zero(void)
 
     make(true);
     TEST_ASSERT_EQUAL_INT32(0, count_state(IH_RAY_SEEN));
-    TEST_ASSERT_EQUAL_INT32(IH_RAY_EMPTY, space.ray[MIDDLE].state);
+    TEST_ASSERT_EQUAL_INT32(IH_RAY_EMPTY, rays.ray[MIDDLE].state);
     for (slot = 0; slot < IH_SLOTS; slot++) {
-        TEST_ASSERT_EQUAL_INT32(0, space.ray[slot].point_mm_q8[2]);
+        TEST_ASSERT_EQUAL_INT32(0, rays.ray[slot].point_mm_q8[2]);
         points.point[slot].state = IH_POINT_UNKNOWN;
     }
     make(true);
@@ -223,15 +223,14 @@ static void a_range_image_has_its_rays_from_the_camera(void)
     points.point[1] = (struct ih_point){1 << 27, -(1 << 26), 16000 << 8, IH_POINT_SEEN};
     points.point[2] = (struct ih_point){1 << 27, 0, 0, IH_POINT_MISSING};
     make(false);
-    TEST_ASSERT_EQUAL_INT32(0,
-                            space.origin_mm_q8[0] | space.origin_mm_q8[1] | space.origin_mm_q8[2]);
-    TEST_ASSERT_EQUAL_INT32(IH_RAYS_SLOPE_MAX << 20, space.ray[0].slope_x_q20);
-    TEST_ASSERT_EQUAL_INT32(-(IH_RAYS_SLOPE_MAX << 20), space.ray[0].slope_y_q20);
-    TEST_ASSERT_EQUAL_INT32(IH_RAY_UNKNOWN, space.ray[0].state);
-    TEST_ASSERT_EQUAL_INT32(1 << 19, space.ray[1].slope_x_q20);
-    TEST_ASSERT_EQUAL_INT32(8000 << 8, space.ray[1].point_mm_q8[0]);
-    TEST_ASSERT_EQUAL_INT32(-(4000 << 8), space.ray[1].point_mm_q8[1]);
-    TEST_ASSERT_EQUAL_INT32(IH_RAY_EMPTY, space.ray[2].state);
+    TEST_ASSERT_EQUAL_INT32(0, rays.origin_mm_q8[0] | rays.origin_mm_q8[1] | rays.origin_mm_q8[2]);
+    TEST_ASSERT_EQUAL_INT32(IH_RAYS_SLOPE_MAX << 20, rays.ray[0].slope_x_q20);
+    TEST_ASSERT_EQUAL_INT32(-(IH_RAYS_SLOPE_MAX << 20), rays.ray[0].slope_y_q20);
+    TEST_ASSERT_EQUAL_INT32(IH_RAY_UNKNOWN, rays.ray[0].state);
+    TEST_ASSERT_EQUAL_INT32(1 << 19, rays.ray[1].slope_x_q20);
+    TEST_ASSERT_EQUAL_INT32(8000 << 8, rays.ray[1].point_mm_q8[0]);
+    TEST_ASSERT_EQUAL_INT32(-(4000 << 8), rays.ray[1].point_mm_q8[1]);
+    TEST_ASSERT_EQUAL_INT32(IH_RAY_EMPTY, rays.ray[2].state);
 }
 
 /* The steepest rays and the farthest projector that a rig may have, the greatest and least depths
@@ -271,7 +270,7 @@ static void the_extremes_of_a_rig_do_not_overflow(void)
         }
         make(pass % 3 != 0);
         for (slot = 0; slot < IH_SLOTS; slot++) {
-            const struct ih_ray *ray = &space.ray[slot];
+            const struct ih_ray *ray = &rays.ray[slot];
             const int32_t limit = IH_RAYS_SLOPE_MAX << 20;
 
             IH_TEST_RANGE(-limit, limit, ray->slope_x_q20, "x", slot);

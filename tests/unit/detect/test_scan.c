@@ -39,12 +39,12 @@ static void find(void)
 {
     memset(&scratch, IH_TEST_FILL, sizeof scratch);
     memset(&scan, IH_TEST_FILL, sizeof scan);
-    ih_scan_find(&space, &params, &scratch, &scan);
+    ih_scan_find(&rays, &params, &scratch, &scan);
 }
 
 static int32_t rating_of(int32_t slot)
 {
-    return ih_template_score_q12(&space, &scratch.table, scratch.centre_mm_q8[slot]);
+    return ih_template_score_q12(&rays, &scratch.table, scratch.centre_mm_q8[slot]);
 }
 
 static bool is_looked_at(int32_t slot)
@@ -83,7 +83,7 @@ struct second {
 /* The first scan knows it, too, unless it is near one that was taken. */
 static void know(struct second *second, int32_t slot)
 {
-    if (!second->is_known[slot] && space.ray[slot].state == IH_RAY_SEEN) {
+    if (!second->is_known[slot] && rays.ray[slot].state == IH_RAY_SEEN) {
         second->is_known[slot] = true;
         TEST_ASSERT_TRUE(is_looked_at(slot));
         second->rating[slot] = rating_of(slot);
@@ -131,7 +131,7 @@ static void check_choice(void)
 
         for (other = 0; other < slot; other++) {
             is_first =
-                is_first && (space.ray[other].state != IH_RAY_SEEN || !same_block(slot, other));
+                is_first && (rays.ray[other].state != IH_RAY_SEEN || !same_block(slot, other));
         }
         if (is_first) {
             know(&second, slot);
@@ -190,7 +190,7 @@ static void places_and_ratings_match_float64(void)
                                from_q12(rating_of(slot)), vector_scenes[i].name, k);
                 checked++;
             }
-            k += space.ray[slot].state == IH_RAY_SEEN;
+            k += rays.ray[slot].state == IH_RAY_SEEN;
         }
         TEST_ASSERT_EQUAL_INT32(v->tried_count, k);
         check_choice();
@@ -235,9 +235,9 @@ static int32_t stand_before_a_head(void)
     const struct ih_ellipsoid mean = ih_ellipsoid_mean((const int32_t[3]){0, 0, 0});
     int32_t slot;
 
-    memset(&space, 0, sizeof space);
+    memset(&rays, 0, sizeof rays);
     for (slot = 2; slot < IH_SLOTS; slot++) {
-        space.ray[slot].slope_x_q20 = 2 << 20;
+        rays.ray[slot].slope_x_q20 = 2 << 20;
     }
     see(0, 1000 << 8);
     params.deep_mm = mean.semi_mm_q8[2] >> 8;
@@ -312,8 +312,8 @@ static void the_values_of_rays_around(void)
         const int32_t centre_mm = 1000 + stand_before_a_head();
         const double unit = 1048576.0 / 100 / 256 / centre_mm;
 
-        space.ray[1].slope_x_q20 = (int32_t)lround(cases[i].aside * mean.semi_mm_q8[0] * unit);
-        space.ray[1].slope_y_q20 = (int32_t)lround(cases[i].down * mean.semi_mm_q8[1] * unit);
+        rays.ray[1].slope_x_q20 = (int32_t)lround(cases[i].aside * mean.semi_mm_q8[0] * unit);
+        rays.ray[1].slope_y_q20 = (int32_t)lround(cases[i].down * mean.semi_mm_q8[1] * unit);
         set_state(1, cases[i].state, centre_mm + cases[i].behind_mm);
         find();
         IH_TEST_WITHIN(0.0005, (1 + VECTOR_RING_FRACTION * cases[i].value) / 8,
@@ -343,7 +343,7 @@ static void many_rays_show_the_last_unit_of_a_value(void)
     for (i = 0; i < IH_TEST_COUNT(inside); i++) {
         stand_before_a_head();
         for (slot = 1; slot < IH_SLOTS; slot++) {
-            space.ray[slot].slope_x_q20 = 0;
+            rays.ray[slot].slope_x_q20 = 0;
             set_state(slot, inside[i].state, 1000 + inside[i].behind_mm);
         }
         find();
@@ -353,7 +353,7 @@ static void many_rays_show_the_last_unit_of_a_value(void)
         const int32_t centre_mm = 1000 + stand_before_a_head();
 
         for (slot = 1; slot < IH_SLOTS; slot++) {
-            space.ray[slot].slope_x_q20 =
+            rays.ray[slot].slope_x_q20 =
                 (int32_t)lround(1.6 * mean.semi_mm_q8[0] * 4096 / centre_mm);
             set_state(slot, around[i].state, centre_mm + around[i].behind_mm);
         }
@@ -372,16 +372,16 @@ static void few_rays_count_as_eight(void)
         int32_t centre_mm;
 
         stand_before_a_head();
-        space.ray[1].slope_x_q20 = 2 << 20;
+        rays.ray[1].slope_x_q20 = 2 << 20;
         for (slot = 1; slot < count; slot++) {
-            space.ray[slot].slope_x_q20 = 0;
+            rays.ray[slot].slope_x_q20 = 0;
             see(slot, 1000 << 8);
         }
         find();
         IH_TEST_EQUAL(4096 * (count < 8 ? count : 8) / 8, rating_of(0), "inside", count);
         centre_mm = 1000 + stand_before_a_head();
         for (slot = 1; slot <= count; slot++) {
-            space.ray[slot].slope_x_q20 =
+            rays.ray[slot].slope_x_q20 =
                 (int32_t)lround(-1.6 * mean.semi_mm_q8[0] * 4096 / centre_mm);
             see(slot, 5000 << 8);
         }
@@ -397,8 +397,8 @@ static void places_are_farther_apart_than_the_spacing(void)
     int32_t off;
 
     for (off = 0; off <= 1; off++) {
-        memset(&space, 0, sizeof space);
-        space.ray[1].slope_x_q20 = 0;
+        memset(&rays, 0, sizeof rays);
+        rays.ray[1].slope_x_q20 = 0;
         see(0, 1000 << 8);
         see(1, (1080 << 8) + off);
         find();
@@ -415,7 +415,7 @@ static void half_of_the_places_are_rated(void)
         make_scene(&vector_scenes[i]);
         find();
         for (slot = 0; slot < IH_SLOTS; slot++) {
-            seen += space.ray[slot].state == IH_RAY_SEEN;
+            seen += rays.ray[slot].state == IH_RAY_SEEN;
             rated += is_looked_at(slot);
         }
     }
@@ -434,7 +434,7 @@ static void no_point_one_point_and_equal_points(void)
     TEST_ASSERT_EQUAL_INT32(1, scan.place_count);
     check_choice();
     for (slot = 0; slot < IH_SLOTS; slot++) {
-        space.ray[slot] = space.ray[200];
+        rays.ray[slot] = rays.ray[200];
     }
     find();
     TEST_ASSERT_EQUAL_INT32(1, scan.place_count);
@@ -453,14 +453,14 @@ static void the_centre_is_behind_the_point_along_its_ray(void)
         const double step = VECTOR_DEEP_MM / sqrt(1 + x * x + y * y);
         const double expected[3] = {step * x, step * y, step};
 
-        memset(&space, 0, sizeof space);
-        space.ray[3].slope_x_q20 = slope_q20[i % 5];
-        space.ray[3].slope_y_q20 = slope_q20[i / 5];
+        memset(&rays, 0, sizeof rays);
+        rays.ray[3].slope_x_q20 = slope_q20[i % 5];
+        rays.ray[3].slope_y_q20 = slope_q20[i / 5];
         see(3, 700 << 8);
         find();
         TEST_ASSERT_EQUAL_INT32(1, scan.place_count);
         for (axis = 0; axis < 3; axis++) { /* the step's half, times the slope, and half a step */
-            IH_TEST_WITHIN(0.011, space.ray[3].point_mm_q8[axis] / 256.0 + expected[axis],
+            IH_TEST_WITHIN(0.011, rays.ray[3].point_mm_q8[axis] / 256.0 + expected[axis],
                            scan.place[0].centre_mm_q8[axis] / 256.0, "centre", i);
         }
     }
@@ -507,12 +507,12 @@ static void a_mirrored_and_a_moved_scene_give_the_same(void)
         for (slot = 0; slot < IH_SLOTS; slot++) {
             rated[slot] = is_looked_at(slot) ? rating_of(slot) : 0;
         }
-        mirror_space();
+        mirror_rays();
         find();
         for (slot = 0, k = 0; slot < IH_SLOTS; slot++) {
             const struct vector_place *place = &vector_scans[i].tried[k];
 
-            k += space.ray[slot].state == IH_RAY_SEEN;
+            k += rays.ray[slot].state == IH_RAY_SEEN;
             if (before.state[slot] >= IH_SCAN_RATED && is_looked_at(slot)) {
                 const int32_t *centre = before.centre_mm_q8[slot];
 
@@ -521,8 +521,8 @@ static void a_mirrored_and_a_moved_scene_give_the_same(void)
                                from_q12(rating_of(slot)), vector_scenes[i].name, slot);
             }
         }
-        mirror_space();
-        move_space(by);
+        mirror_rays();
+        move_rays(by);
         find();
         for (slot = 0; slot < IH_SLOTS; slot++) {
             IH_TEST_EQUAL(before.state[slot], scratch.state[slot], "state", slot);
@@ -549,11 +549,11 @@ static void random_input_stays_within_the_limits(void)
         const int bits = (int)ih_test_between(&random, 10, 22);
 
         for (axis = 0; axis < 3; axis++) {
-            space.origin_mm_q8[axis] =
+            rays.origin_mm_q8[axis] =
                 (int32_t)ih_test_between(&random, -(1000 << 8), 1000 << 8) >> (pass % 3 * 8);
         }
         for (slot = 0; slot < IH_SLOTS; slot++) {
-            struct ih_ray *ray = &space.ray[slot];
+            struct ih_ray *ray = &rays.ray[slot];
 
             ray->slope_x_q20 = (int32_t)ih_test_any_size(&random, bits);
             ray->slope_y_q20 = pass % 4 == 0 ? 4 << 20 : (int32_t)ih_test_any_size(&random, bits);

@@ -5,16 +5,8 @@
 
 #include "ih_test.h"
 
-/* In place of ih_score_weights.h. */
-#define IH_SCORE_WEIGHTS_H
-struct curve {
-    int32_t first_q8, step_q8;
-    int16_t at_q10[IH_SCORE_KNOTS];
-};
 static int32_t bias_q10;
-static struct curve curves[IH_EVIDENCE_COUNT];
-
-#include "detect/ih_score.c"
+static struct ih_score_curve curves[IH_EVIDENCE_COUNT];
 
 struct vector_case {
     int32_t value_q8[12];
@@ -34,7 +26,7 @@ void setUp(void)
 
     bias_q10 = 0;
     for (kind = 0; kind < IH_EVIDENCE_COUNT; kind++) {
-        curves[kind] = (struct curve){0, 256, {0}};
+        curves[kind] = (struct ih_score_curve){0, 256, {0}};
     }
     memset(&evidence, 0, sizeof evidence);
     memset(&score, IH_TEST_FILL, sizeof score);
@@ -59,7 +51,7 @@ static void log_odds_match_what_was_learnt(void)
         for (kind = 0; kind < VECTOR_KINDS; kind++) {
             evidence.value_q8[kind] = vector_cases[i].value_q8[kind];
         }
-        ih_score_rate(&evidence, &score);
+        ih_score_rate_by_curves(curves, bias_q10, &evidence, &score);
         /* The place between two knots has 16 bits: on a rise of 2^16 another unit. */
         IH_TEST_WITHIN((VECTOR_KINDS + 2) * 0.5 / 1024, vector_cases[i].logit,
                        ih_test_from_q(score.logit_q10, 10), "logit", i);
@@ -75,13 +67,14 @@ static void log_odds_match_what_was_learnt(void)
 static int32_t part_at(int32_t value_q8)
 {
     evidence.value_q8[3] = value_q8;
-    ih_score_rate(&evidence, &score);
+    ih_score_rate_by_curves(curves, bias_q10, &evidence, &score);
     return score.part_q10[3];
 }
 
 static void a_curve_goes_through_its_knots_and_is_constant_beyond(void)
 {
-    static const struct curve curve = {-1000, 300, {-32768, 5, 32767, -7, 900, -900, 1234}};
+    static const struct ih_score_curve curve = {
+        -1000, 300, {-32768, 5, 32767, -7, 900, -900, 1234}};
     int k;
 
     curves[3] = curve;
@@ -113,7 +106,7 @@ static void the_largest_sums_fit(void)
         }
     }
     bias_q10 = -(1 << 19);
-    ih_score_rate(&evidence, &score);
+    ih_score_rate_by_curves(curves, bias_q10, &evidence, &score);
     IH_TEST_EQUAL(-(1 << 19) - IH_EVIDENCE_COUNT * 32768, score.logit_q10, "sum", 0);
     IH_TEST_EQUAL(0, score.probability_q16, "probability", 0);
 }
@@ -153,6 +146,27 @@ static void probabilities_are_monotone_to_the_ends(void)
     TEST_ASSERT_EQUAL_INT32(65536, ih_score_probability_q16(INT32_MAX));
 }
 
+/* Log-odds by the learnt curves are a sum of their parts and a bias that is the same for any evidence. */
+static void the_learnt_curves_are_used(void)
+{
+    static const int32_t value_q8[] = {0, 25600, -25600};
+    int32_t bias[IH_TEST_COUNT(value_q8)];
+    int i, kind;
+
+    for (i = 0; i < IH_TEST_COUNT(value_q8); i++) {
+        for (kind = 0; kind < IH_EVIDENCE_COUNT; kind++) {
+            evidence.value_q8[kind] = value_q8[i];
+        }
+        ih_score_rate(&evidence, &score);
+        bias[i] = score.logit_q10;
+        for (kind = 0; kind < IH_EVIDENCE_COUNT; kind++) {
+            bias[i] -= score.part_q10[kind];
+        }
+        IH_TEST_EQUAL(bias[0], bias[i], "bias", i);
+    }
+    TEST_ASSERT_TRUE(bias[0] != 0);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -161,5 +175,6 @@ int main(void)
     RUN_TEST(the_largest_sums_fit);
     RUN_TEST(probabilities_match_the_closed_form);
     RUN_TEST(probabilities_are_monotone_to_the_ends);
+    RUN_TEST(the_learnt_curves_are_used);
     return UNITY_END();
 }

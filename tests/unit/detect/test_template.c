@@ -15,7 +15,7 @@ static struct ih_template_table table;
 
 void setUp(void)
 {
-    memset(&space, 0, sizeof space);
+    memset(&rays, 0, sizeof rays);
 }
 
 void tearDown(void)
@@ -25,7 +25,7 @@ void tearDown(void)
 static void prepare(void)
 {
     memset(&table, IH_TEST_FILL, sizeof table);
-    ih_template_prepare(&space, &table);
+    ih_template_prepare(&rays, &table);
 }
 
 /* Values of rays: those that surely count, and then those that may, too. */
@@ -79,7 +79,7 @@ struct exact {
 
 static struct exact cross(const struct ih_ray *ray, const int32_t centre_mm_q8[3])
 {
-    const double away = (centre_mm_q8[2] - space.origin_mm_q8[2]) / 256.0;
+    const double away = (centre_mm_q8[2] - rays.origin_mm_q8[2]) / 256.0;
     const double slope[2] = {ray->slope_x_q20 / 1048576.0, ray->slope_y_q20 / 1048576.0};
     double e[2], eg = 0, ee = 0;
     struct exact exact = {.steep = 1, .depth_mm = ray->point_mm_q8[2] / 256.0};
@@ -88,7 +88,7 @@ static struct exact cross(const struct ih_ray *ray, const int32_t centre_mm_q8[3
     for (axis = 0; axis < 2; axis++) {
         const double g = slope[axis] * semi_mm[2] / semi_mm[axis];
 
-        e[axis] = (slope[axis] * away - (centre_mm_q8[axis] - space.origin_mm_q8[axis]) / 256.0) /
+        e[axis] = (slope[axis] * away - (centre_mm_q8[axis] - rays.origin_mm_q8[axis]) / 256.0) /
                   semi_mm[axis];
         exact.steep += g * g;
         eg += e[axis] * g;
@@ -114,7 +114,7 @@ static double behind_mm(const struct exact *exact, double centre_mm, double off)
 static double rating_end(const int32_t centre_mm_q8[3], int sign)
 {
     const double centre_mm = centre_mm_q8[2] / 256.0;
-    const double away = (centre_mm_q8[2] - space.origin_mm_q8[2]) / 256.0;
+    const double away = (centre_mm_q8[2] - rays.origin_mm_q8[2]) / 256.0;
     const double off2 = 4.3e-6 * away + 0.0130, off_mm = (7.9e-7 * away + 0.0009) * (78 + 113);
     static struct values inside, around;
     int32_t slot;
@@ -122,7 +122,7 @@ static double rating_end(const int32_t centre_mm_q8[3], int sign)
     memset(&inside, 0, sizeof inside);
     memset(&around, 0, sizeof around);
     for (slot = 0; slot < IH_SLOTS; slot++) {
-        const struct ih_ray *ray = &space.ray[slot];
+        const struct ih_ray *ray = &rays.ray[slot];
         const struct exact exact = cross(ray, centre_mm_q8);
         const double aside = fabs(exact.ex * 78) - exact.ey * 113;
         const bool seen = ray->state == IH_RAY_SEEN, empty = ray->state == IH_RAY_EMPTY;
@@ -160,7 +160,7 @@ static double rating_end(const int32_t centre_mm_q8[3], int sign)
 static double check(const int32_t centre_mm_q8[3], int32_t index)
 {
     const double low = rating_end(centre_mm_q8, -1), high = rating_end(centre_mm_q8, 1);
-    const double rating = ih_test_from_q(ih_template_score_q12(&space, &table, centre_mm_q8), 12);
+    const double rating = ih_test_from_q(ih_template_score_q12(&rays, &table, centre_mm_q8), 12);
 
     IH_TEST_WITHIN((high - low) / 2 + 0.0005, (high + low) / 2, rating, "rating", index);
     return high - low;
@@ -176,7 +176,7 @@ static void ratings_are_float64s_in_scenes(void)
         make_scene(&vector_scenes[i]);
         prepare();
         for (slot = 0; slot < IH_SLOTS; slot++) {
-            const struct ih_ray *ray = &space.ray[slot];
+            const struct ih_ray *ray = &rays.ray[slot];
             if (ray->state == IH_RAY_SEEN && ray->point_mm_q8[2] > 300 << 8 &&
                 ray->point_mm_q8[2] < 3000 << 8) {
                 const int32_t centre[3] = {ray->point_mm_q8[0], ray->point_mm_q8[1],
@@ -197,12 +197,12 @@ static void ratings_are_float64s_in_scenes(void)
 /* A ray that passes a mean head's centre at (x, y) semi-axes, at the centre's depth. */
 static void aim_at(int32_t slot, const int32_t centre_mm_q8[3], double x, double y)
 {
-    const double depth = (double)centre_mm_q8[2] - space.origin_mm_q8[2];
-    const double off_x = (double)centre_mm_q8[0] - space.origin_mm_q8[0];
-    const double off_y = (double)centre_mm_q8[1] - space.origin_mm_q8[1];
+    const double depth = (double)centre_mm_q8[2] - rays.origin_mm_q8[2];
+    const double off_x = (double)centre_mm_q8[0] - rays.origin_mm_q8[0];
+    const double off_y = (double)centre_mm_q8[1] - rays.origin_mm_q8[1];
 
-    space.ray[slot].slope_x_q20 = (int32_t)lround((off_x + x * 78 * 256) / depth * 1048576);
-    space.ray[slot].slope_y_q20 = (int32_t)lround((off_y + y * 113 * 256) / depth * 1048576);
+    rays.ray[slot].slope_x_q20 = (int32_t)lround((off_x + x * 78 * 256) / depth * 1048576);
+    rays.ray[slot].slope_y_q20 = (int32_t)lround((off_y + y * 113 * 256) / depth * 1048576);
 }
 
 static double random_in(struct ih_test_random *random, double low, double high)
@@ -219,11 +219,11 @@ static void random_centre(struct ih_test_random *random, int32_t centre_mm_q8[3]
     int axis;
 
     for (axis = 0; axis < 3; axis++) {
-        space.origin_mm_q8[axis] = (int32_t)ih_test_between(random, -(200 << 8), 200 << 8);
+        rays.origin_mm_q8[axis] = (int32_t)ih_test_between(random, -(200 << 8), 200 << 8);
     }
-    centre_mm_q8[0] = space.origin_mm_q8[0] + (int32_t)(depth * random_in(random, -0.6, 0.6));
-    centre_mm_q8[1] = space.origin_mm_q8[1] + (int32_t)(depth * random_in(random, -0.6, 0.6));
-    centre_mm_q8[2] = space.origin_mm_q8[2] + depth;
+    centre_mm_q8[0] = rays.origin_mm_q8[0] + (int32_t)(depth * random_in(random, -0.6, 0.6));
+    centre_mm_q8[1] = rays.origin_mm_q8[1] + (int32_t)(depth * random_in(random, -0.6, 0.6));
+    centre_mm_q8[2] = rays.origin_mm_q8[2] + depth;
     if (centre_mm_q8[2] > 16090 << 8) {
         centre_mm_q8[2] = 16090 << 8;
     }
@@ -234,7 +234,7 @@ static void rays_far_off(const int32_t centre_mm_q8[3])
     int32_t slot;
 
     for (slot = 0; slot < IH_SLOTS; slot++) {
-        space.ray[slot].slope_x_q20 = centre_mm_q8[0] > 0 ? -(1 << 19) : 1 << 19;
+        rays.ray[slot].slope_x_q20 = centre_mm_q8[0] > 0 ? -(1 << 19) : 1 << 19;
     }
 }
 
@@ -265,10 +265,10 @@ static void rays_that_pass_beside_a_limit(void)
         double off2, reach2;
         int32_t centre[3];
 
-        memset(&space, 0, sizeof space);
+        memset(&rays, 0, sizeof rays);
         random_centre(&random, centre);
         rays_far_off(centre);
-        off2 = 4.3e-6 * (centre[2] - space.origin_mm_q8[2]) / 256 + 0.0131;
+        off2 = 4.3e-6 * (centre[2] - rays.origin_mm_q8[2]) / 256 + 0.0131;
         reach2 = radius2[kind] + (kind == 4 ? 0 : side * off2 * random_in(&random, 1, 1.5));
         for (slot = 0; slot < 60; slot++) {
             const double turn = kind == 4 ? atan2(78, 113) + side * random_in(&random, 0.01, 0.03)
@@ -280,7 +280,7 @@ static void rays_that_pass_beside_a_limit(void)
 
             for (i = 0; i < 12; i++) { /* as far from the centre as wanted, by its nearest place */
                 aim_at(slot, centre, reach * x, reach * y);
-                reach *= sqrt(reach2 / cross(&space.ray[slot], centre).radius2);
+                reach *= sqrt(reach2 / cross(&rays.ray[slot], centre).radius2);
             }
             random_state(&random, slot, centre[2]);
         }
@@ -305,18 +305,18 @@ static void points_beside_a_limit_of_depth(void)
             pass % 3 == 0 ? random_in(&random, 0.8, 0.9) : random_in(&random, 0, 0.8);
         int32_t centre[3];
 
-        memset(&space, 0, sizeof space);
+        memset(&rays, 0, sizeof rays);
         random_centre(&random, centre);
         rays_far_off(centre);
         for (slot = 0; slot < 60; slot++) {
             const double turn = angle + random_in(&random, -0.004, 0.004);
-            const double off2 = 4.3e-6 * (centre[2] - space.origin_mm_q8[2]) / 256 + 0.0130;
+            const double off2 = 4.3e-6 * (centre[2] - rays.origin_mm_q8[2]) / 256 + 0.0130;
             struct exact exact;
             double behind;
 
             aim_at(slot, centre, reach * cos(turn), reach * sin(turn));
             see(slot, centre[2]);
-            exact = cross(&space.ray[slot], centre);
+            exact = cross(&rays.ray[slot], centre);
             behind = behind_mm(&exact, centre[2] / 256.0, side > 0 ? -off2 : off2);
             see(slot,
                 centre[2] + (int32_t)((limit - behind + side * random_in(&random, 1.7, 3)) * 256));
@@ -335,14 +335,14 @@ static void points_beside_the_limit_of_what_is_open(void)
     for (off = -2; off <= 2; off++) {
         const int32_t centre[3] = {0, 0, 1000 << 8};
 
-        memset(&space, 0, sizeof space);
+        memset(&rays, 0, sizeof rays);
         rays_far_off(centre);
         for (slot = 0; slot < 60; slot++) {
             aim_at(slot, centre, 1.6, 0);
             see(slot, (1060 << 8) + off * 128);
         }
         prepare();
-        IH_TEST_EQUAL(off > 0 ? 2457 : -1459, ih_template_score_q12(&space, &table, centre), "open",
+        IH_TEST_EQUAL(off > 0 ? 2457 : -1459, ih_template_score_q12(&rays, &table, centre), "open",
                       off);
     }
 }
@@ -362,20 +362,20 @@ static void out_of_the_limits_there_is_no_rating(void)
         for (axis = 0; axis < 3; axis++) {
             centre[axis] = centre_mm[i][axis] * 256;
         }
-        IH_TEST_EQUAL(IH_TEMPLATE_NONE_Q12, ih_template_score_q12(&space, &table, centre), "centre",
+        IH_TEST_EQUAL(IH_TEMPLATE_NONE_Q12, ih_template_score_q12(&rays, &table, centre), "centre",
                       i);
     }
-    IH_TEST_EQUAL(-640, ih_template_score_q12(&space, &table, ahead), "unknown", 0);
+    IH_TEST_EQUAL(-640, ih_template_score_q12(&rays, &table, ahead), "unknown", 0);
     for (slot = 0; slot < IH_SLOTS; slot++) {
-        space.ray[slot].slope_y_q20 = 1209000; /* g just below 1 */
+        rays.ray[slot].slope_y_q20 = 1209000; /* g just below 1 */
     }
     prepare();
-    TEST_ASSERT_TRUE(ih_template_score_q12(&space, &table, aside) != 0);
+    TEST_ASSERT_TRUE(ih_template_score_q12(&rays, &table, aside) != 0);
     for (slot = 0; slot < IH_SLOTS; slot++) {
-        space.ray[slot].slope_y_q20 = 1209400;
+        rays.ray[slot].slope_y_q20 = 1209400;
     }
     prepare();
-    IH_TEST_EQUAL(0, ih_template_score_q12(&space, &table, aside), "steep rays", 0);
+    IH_TEST_EQUAL(0, ih_template_score_q12(&rays, &table, aside), "steep rays", 0);
 }
 
 /* Rays, origins and depths of all sizes. */
@@ -388,11 +388,11 @@ static void random_spaces_are_rated(void)
         const int bits = (int)ih_test_between(&random, 14, 22);
 
         for (axis = 0; axis < 3; axis++) {
-            space.origin_mm_q8[axis] =
+            rays.origin_mm_q8[axis] =
                 (int32_t)ih_test_between(&random, -(1000 << 8), 1000 << 8) >> (pass % 3 * 8);
         }
         for (slot = 0; slot < IH_SLOTS; slot++) {
-            struct ih_ray *ray = &space.ray[slot];
+            struct ih_ray *ray = &rays.ray[slot];
 
             ray->slope_x_q20 = (int32_t)ih_test_any_size(&random, bits);
             ray->slope_y_q20 = (int32_t)ih_test_any_size(&random, bits);
@@ -404,10 +404,10 @@ static void random_spaces_are_rated(void)
         }
         prepare();
         for (slot = pass % 7; slot < IH_SLOTS; slot += 7) {
-            const int32_t *point = space.ray[slot].point_mm_q8;
+            const int32_t *point = rays.ray[slot].point_mm_q8;
             const int32_t centre[3] = {point[0], point[1], point[2] + (98 << 8)};
 
-            if (ih_template_score_q12(&space, &table, centre) != IH_TEMPLATE_NONE_Q12) {
+            if (ih_template_score_q12(&rays, &table, centre) != IH_TEMPLATE_NONE_Q12) {
                 check(centre, slot);
             }
         }

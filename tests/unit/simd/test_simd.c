@@ -115,6 +115,9 @@ static void addresses_need_no_alignment(void)
         memset(to, 0, 2 * IH_SIMD_BYTES);
         ih_u16_two_store(to, ih_u16_two_load((const void *)&bytes[at]));
         TEST_ASSERT_EQUAL_MEMORY(bytes, copy, sizeof bytes);
+        memset(to, 0, IH_SIMD_BYTES);
+        ih_u32_store(to, ih_u32_load((const void *)&bytes[at]));
+        TEST_ASSERT_EQUAL_MEMORY(bytes, copy, sizeof bytes);
     }
 }
 
@@ -204,8 +207,20 @@ static void lanes_of_16_bits(void)
     }
     /* The one product that ih_simd.h leaves open is that of twice the lowest number. */
     CHECK(ih_i16, int16_t, ih_i16_mul_high(a | 1, b), ((x | 1) * y >> 16));
+    CHECK(ih_u16, uint16_t, ih_u16_mul_high(a, b), ((uint32_t)x * y >> 16));
     CHECK(ih_i16, int16_t, ih_i16_clamp(a, 1000), (MAX(MIN(x, 1000), -1000)));
     CHECK(ih_i16, int16_t, ih_i16_clamp(a, INT16_MAX), (MAX(x, -INT16_MAX)));
+}
+
+static int64_t sum_of(const int32_t lane[IH_I32_LANES])
+{
+    int64_t sum = 0;
+    int k;
+
+    for (k = 0; k < IH_I32_LANES; k++) {
+        sum += lane[k];
+    }
+    return sum;
 }
 
 static void lanes_of_32_bits(void)
@@ -225,6 +240,10 @@ static void lanes_of_32_bits(void)
         CHECK(ih_i32, int32_t, ih_i32_shift_right(a, bits), (x >> bits));
         CHECK(ih_u32, uint32_t, ih_u32_shift_right(a, bits), (x >> bits));
     }
+    CHECK(ih_i32, int32_t, ih_i32_abs(a), (x < 0 ? 0 - (uint32_t)x : (uint32_t)x));
+    CHECK_TO(ih_i32, int32_t, int16_t, ih_i32_low_halves(a, b),
+             (k < IH_I32_LANES ? first[k] : second[k - IH_I32_LANES]));
+    CHECK_ONE(ih_i32, int32_t, ih_i32_total_wide(a), sum_of(first));
     CHECK(ih_u32, uint32_t, ih_u32_shift_left_each(a, b & (b - b + 31)), (x << (y & 31)));
     CHECK(ih_u32, uint32_t, ih_u32_shift_right_each(a, b & (b - b + 31)), (x >> (y & 31)));
 }
@@ -408,6 +427,26 @@ static void wide_products(void)
     }
 }
 
+/* A product over a power of two, and the half that rounds it. */
+static void shifted_products(void)
+{
+    int bits;
+
+    for (bits = 1; bits < 64; bits++) {
+        const uint64_t half = (uint64_t)1 << (bits - 1);
+
+        CHECK(ih_u32, uint32_t, ih_u32_mul_shift(a, b, bits), ((uint64_t)x * y >> bits));
+        CHECK(ih_u32, uint32_t, ih_u32_mul_shift_round(a, b, bits),
+              (((uint64_t)x * y + half) >> bits));
+    }
+    for (bits = 1; bits <= 32; bits++) {
+        const int64_t half = (int64_t)1 << (bits - 1);
+
+        CHECK(ih_i32, int32_t, ih_i32_mul_shift_round(a, b, bits),
+              (((int64_t)x * y + half) >> bits));
+    }
+}
+
 static void wide_numbers(void)
 {
     int round, k;
@@ -470,6 +509,15 @@ static void look_ups(void)
     CHECK(ih_u32, uint32_t, ih_u32_look_up(table, a >> 24).next, table[(x >> 24) + 1]);
 }
 
+static void look_ups_of_16_bits(void)
+{
+    uint16_t table[300];
+
+    fill(table, sizeof table);
+    CHECK(ih_u32, uint32_t, ih_u32_look_up_u16(table, a >> 24).value, table[x >> 24]);
+    CHECK(ih_u32, uint32_t, ih_u32_look_up_u16(table, a >> 24).next, table[(x >> 24) + 1]);
+}
+
 static void pairs_of_zeros(void)
 {
     CHECK(ih_u32, uint32_t, ih_u32_zero_pairs((a >> 1) | (1u << 18)),
@@ -495,10 +543,12 @@ int main(void)
     RUN_TEST(all_lanes_together);
     RUN_TEST(one_bit_is_any);
     RUN_TEST(wide_products);
+    RUN_TEST(shifted_products);
     RUN_TEST(wide_numbers);
     RUN_TEST(sums_of_wide_products);
 #if IH_SIMD_LANE_SHIFTS
     RUN_TEST(look_ups);
+    RUN_TEST(look_ups_of_16_bits);
     RUN_TEST(pairs_of_zeros);
 #endif
 #endif

@@ -1,0 +1,72 @@
+#include "detect/ih_candidates.h"
+
+#include <string.h>
+
+#include "base/ih_fix.h"
+
+static int64_t square_q16(int32_t distance_mm)
+{
+    return (int64_t)distance_mm * distance_mm * 65536;
+}
+
+struct ih_evidence_nest ih_candidates_nest_at(const struct ih_hypotheses *hypotheses,
+                                              const int32_t centre_mm_q8[3], int32_t near_mm)
+{
+    struct ih_evidence_nest nest = {.present = false};
+    int64_t best = square_q16(near_mm);
+    for (int32_t i = 0; i < hypotheses->hypothesis_count; i++) {
+        const struct ih_hypothesis *h = &hypotheses->hypothesis[i];
+        int64_t distance2 = ih_distance2_s32(h->centre_mm_q8, centre_mm_q8);
+        if (distance2 < best) {
+            best = distance2;
+            nest.present = true;
+            nest.extent_mm_q8 = h->extent_mm_q8;
+            nest.upright_q16 = h->upright_q16;
+        }
+    }
+    return nest;
+}
+
+bool ih_candidates_add_start(struct ih_detections_starts *starts, const int32_t centre_mm_q8[3],
+                             int32_t apart_mm)
+{
+    const int64_t apart2 = square_q16(apart_mm);
+    for (int32_t i = 0; i < starts->count; i++) {
+        if (ih_distance2_s32(starts->centre_mm_q8[i], centre_mm_q8) < apart2) {
+            return false;
+        }
+    }
+    memcpy(starts->centre_mm_q8[starts->count++], centre_mm_q8, 3 * sizeof *centre_mm_q8);
+    return true;
+}
+
+void ih_candidates_insert(struct ih_detections *out, const struct ih_detection *detection,
+                          int32_t spacing_mm)
+{
+    int64_t spacing2 = square_q16(spacing_mm);
+    int32_t kept = 0;
+    for (int32_t i = 0; i < out->detection_count; i++) {
+        const struct ih_detection *other = &out->detection[i];
+        bool same =
+            ih_distance2_s32(other->head.centre_mm_q8, detection->head.centre_mm_q8) < spacing2;
+        if (same && other->logit_q10 >= detection->logit_q10) {
+            return; /* sorted: nothing was dropped before this */
+        }
+        if (!same) {
+            out->detection[kept++] = *other;
+        }
+    }
+    out->detection_count = kept;
+    if (kept == IH_DETECTIONS_MAX) {
+        out->dropped_count++;
+        if (out->detection[kept - 1].logit_q10 >= detection->logit_q10) {
+            return;
+        }
+        out->detection_count--;
+    }
+    int32_t at = out->detection_count++;
+    for (; at > 0 && out->detection[at - 1].logit_q10 < detection->logit_q10; at--) {
+        out->detection[at] = out->detection[at - 1];
+    }
+    out->detection[at] = *detection;
+}
