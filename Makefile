@@ -168,9 +168,9 @@ test-bench: sim ## do isohead and what it is compared with find the same?
 	@tools/setup.sh bench
 	@/usr/bin/python3 tools/bench/agree.py
 
-vectors: ## write tests/vectors anew with the float64 reference
+vectors: ## write tests/vectors anew with the float64 reference; STAGES=dots: of these stages alone
 	@tools/setup.sh vectors
-	@/usr/bin/python3 tools/oracle/make_vectors.py --out tests/vectors
+	@/usr/bin/python3 tools/oracle/make_vectors.py --out tests/vectors $(STAGES)
 
 learn: sim ## learn the score's curves anew from rendered scenes; half an hour
 	@tools/setup.sh vectors
