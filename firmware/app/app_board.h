@@ -41,7 +41,7 @@ struct app_board {
     struct app_state state;
 };
 
-/* Frames in, records out, until asked to end. */
+/* Frames in, records out, until requested to end. */
 enum app_exit app_board_run(struct app_board *board, const struct app_config *config);
 
 /* Only make the laser's line low and give it back. Without chip and line that is wrong usage; but good

@@ -11,7 +11,7 @@
 #define COMMAND_LINE "command line"
 /* What getopt_long returns for a setting is its index above all letters. */
 #define OPTION_FIRST 256
-/* Longest part of something wrong that is told. */
+/* Longest part of a wrong text that is reported. */
 #define QUOTE_MAX 60
 /* "FILE:LINE" */
 #define PLACE_MAX (APP_CONFIG_VALUE_MAX + 16)
@@ -41,12 +41,12 @@ static struct place place_of(const struct reader *reader, int32_t line)
     return place;
 }
 
-static void tell(struct reader *reader, const char *where, const char *format, ...)
+static void report(struct reader *reader, const char *where, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
 
-static void tell(struct reader *reader, const char *where, const char *format, ...)
+static void report(struct reader *reader, const char *where, const char *format, ...)
 {
-    struct hal_error error = {"further errors are not told"};
+    struct hal_error error = {"further errors are not reported"};
     reader->error_count++;
     if (reader->error_count > APP_CONFIG_ERRORS_MAX + 1) {
         return;
@@ -62,16 +62,16 @@ static void tell(struct reader *reader, const char *where, const char *format, .
 }
 
 /* Something that is none of the settings: it may have been meant to be any. */
-static void tell_unknown(struct reader *reader, const char *where, const char *what,
-                         const char *name)
+static void report_unknown(struct reader *reader, const char *where, const char *what,
+                           const char *name)
 {
     int nearest = app_settings_nearest(name);
     reader->line_unsure = true;
     if (nearest >= 0) {
-        tell(reader, where, "unknown %s \"%.*s\", perhaps \"%s\" is meant", what, QUOTE_MAX, name,
-             app_settings[nearest].name);
+        report(reader, where, "unknown %s \"%.*s\", perhaps \"%s\" is meant", what, QUOTE_MAX, name,
+               app_settings[nearest].name);
     } else {
-        tell(reader, where, "unknown %s \"%.*s\", --help lists all", what, QUOTE_MAX, name);
+        report(reader, where, "unknown %s \"%.*s\", --help lists all", what, QUOTE_MAX, name);
     }
 }
 
@@ -95,7 +95,7 @@ static void take(struct reader *reader, const char *where, int index, const char
     struct hal_error error;
     if (!app_settings_take(index, reader->config, value, &error)) {
         reader->line_unsure = reader->line_unsure || concerns_line(index);
-        tell(reader, where, "%s%s: %s", dashes_at(where), app_settings[index].name, error.text);
+        report(reader, where, "%s%s: %s", dashes_at(where), app_settings[index].name, error.text);
     }
 }
 
@@ -119,10 +119,10 @@ static void refuse_option(struct reader *reader, int option, const char *argumen
         const struct app_setting *setting = &app_settings[optopt - OPTION_FIRST];
         reader->line_unsure = true;
         if (option == ':') {
-            tell(reader, COMMAND_LINE, "--%s: no value, expected %s", setting->name,
-                 setting->expected);
+            report(reader, COMMAND_LINE, "--%s: no value, expected %s", setting->name,
+                   setting->expected);
         } else {
-            tell(reader, COMMAND_LINE, "--%s: a value, expected none", setting->name);
+            report(reader, COMMAND_LINE, "--%s: a value, expected none", setting->name);
         }
         return;
     }
@@ -131,7 +131,7 @@ static void refuse_option(struct reader *reader, int option, const char *argumen
         argument += strspn(argument, "-");
         snprintf(name, sizeof name, "%.*s", (int)strcspn(argument, "="), argument);
     }
-    tell_unknown(reader, COMMAND_LINE, "option", name);
+    report_unknown(reader, COMMAND_LINE, "option", name);
 }
 
 /* Values are kept until the file is read; of an option that stands there twice the last one. */
@@ -142,7 +142,7 @@ static void read_arguments(struct reader *reader, int count, char **arguments)
     list_options(options);
     opterr = 0;
     optind = 0; /* from the start, also at a second call */
-    /* The leading ':' tells a missing argument from an unknown option. */
+    /* The leading ':' distinguishes a missing argument from an unknown option. */
     while ((option = getopt_long(count, arguments, ":", options, NULL)) != -1) {
         if (option < OPTION_FIRST) {
             refuse_option(reader, option, arguments[optind - 1]);
@@ -152,9 +152,9 @@ static void read_arguments(struct reader *reader, int count, char **arguments)
     }
     for (int i = optind; i < count; i++) {
         reader->line_unsure = true;
-        tell(reader, COMMAND_LINE, "unexpected argument \"%.*s\", expected options only%s",
-             QUOTE_MAX, arguments[i],
-             strcmp(arguments[i], "off") == 0 ? "; a flag is switched off by --FLAG=off" : "");
+        report(reader, COMMAND_LINE, "unexpected argument \"%.*s\", expected options only%s",
+               QUOTE_MAX, arguments[i],
+               strcmp(arguments[i], "off") == 0 ? "; a flag is switched off by --FLAG=off" : "");
     }
 }
 
@@ -202,13 +202,13 @@ static void read_setting(struct reader *reader, int32_t line, const char *key, c
     struct place place = place_of(reader, line);
     int index = app_settings_find(key);
     if (index < 0) {
-        tell_unknown(reader, place.text, "key", key);
+        report_unknown(reader, place.text, "key", key);
     } else if (app_settings[index].place != APP_SETTINGS_BOTH) {
-        tell(reader, place.text, "%s: in a file, expected on the command line only", key);
+        report(reader, place.text, "%s: in a file, expected on the command line only", key);
     } else if (reader->line[index] != 0) {
         reader->line_unsure = reader->line_unsure || concerns_line(index);
-        tell(reader, place.text, "%s: a second time, after line %d, expected once", key,
-             (int)reader->line[index]);
+        report(reader, place.text, "%s: a second time, after line %d, expected once", key,
+               (int)reader->line[index]);
     } else {
         reader->line[index] = line;
         take(reader, place.text, index, value);
@@ -220,7 +220,7 @@ static void read_line(struct reader *reader, int32_t line, char *text, size_t le
     struct place place = place_of(reader, line);
     if (strlen(text) != length) {
         reader->line_unsure = true;
-        tell(reader, place.text, "zero byte at column %zu, expected text", strlen(text) + 1);
+        report(reader, place.text, "zero byte at column %zu, expected text", strlen(text) + 1);
         return;
     }
     cut_comment(text);
@@ -231,7 +231,7 @@ static void read_line(struct reader *reader, int32_t line, char *text, size_t le
     char *equals = strchr(key, '=');
     if (equals == NULL) {
         reader->line_unsure = true;
-        tell(reader, place.text, "\"%.*s\", expected \"key = value\"", QUOTE_MAX, key);
+        report(reader, place.text, "\"%.*s\", expected \"key = value\"", QUOTE_MAX, key);
         return;
     }
     *equals = 0;
@@ -271,7 +271,7 @@ static void read_file(struct reader *reader)
         read_text(reader, size);
     } else {
         reader->line_unsure = true;
-        tell(reader, config->path, "%s", error.text);
+        report(reader, config->path, "%s", error.text);
     }
 }
 
@@ -292,7 +292,7 @@ static void demand(struct reader *reader, bool good, const char *name, const cha
 {
     if (!good) {
         struct place place = place_of_setting(reader, name);
-        tell(reader, place.text, "%s%s: %s", dashes_at(place.text), name, text);
+        report(reader, place.text, "%s%s: %s", dashes_at(place.text), name, text);
     }
 }
 
@@ -402,6 +402,6 @@ void app_config_help(FILE *file)
     fputs("\n"
           "In a configuration file each is a line `name = value`, flags `name = on` or\n"
           "`off`; '#' starts a comment.\n"
-          "Exit status: 0 ended as asked, 1 could not go on, 2 wrong usage or settings.\n",
+          "Exit status: 0 ended as requested, 1 could not go on, 2 wrong usage or settings.\n",
           file);
 }

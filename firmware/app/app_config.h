@@ -8,7 +8,7 @@
  * File:  '#' starts a comment at the start of a line or after a blank. Blanks around key and value
  *        do not count. At most APP_CONFIG_TEXT_MAX bytes.
  * Flags: `on` or `off` in the file; on the command line --laser, --laser=on or --laser=off.
- * Error: each is told with its place, what was found and what was expected, up to
+ * Error: each is reported with its position, what was found and what was expected, up to
  *        APP_CONFIG_ERRORS_MAX; then what contradicts itself across settings (laser on, but no line).
  * Memory: texts point into `text` or into the arguments, so the struct must not be copied.
  */
@@ -23,7 +23,7 @@
 #define APP_CONFIG_TEXT_MAX (32 * 1024)
 /* Longest value. */
 #define APP_CONFIG_VALUE_MAX 255
-/* Most errors told; then it is said that there are more. */
+/* Errors reported at most; then a line says that there are more. */
 #define APP_CONFIG_ERRORS_MAX 20
 
 enum app_exposure {
@@ -99,7 +99,7 @@ struct app_config {
     char text[APP_CONFIG_TEXT_MAX + 1]; /* of the file */
 };
 
-/* False: something was wrong and told in errors, subject "FILE:LINE", "FILE" or "command line".
+/* False: something was wrong and reported in errors, subject "FILE:LINE", "FILE" or "command line".
  * Whatever was right stands in *config even then: --laser-off with a broken file still knows the
  * laser's line, if that is right. With laser_off, help or version nothing is required, and with the
  * latter two the file is not read. */

@@ -2,7 +2,7 @@
  * debugger or an emulator: RIG is a blob (ih_rig_blob.h), each FRAME a binary PGM (P5), 40 ms after the one
  * before. The names stand on the command line, apart by blanks.
  *
- * Exit status as host_sim's: 0 every frame was processed, 1 something was unreadable or wrong (told on
+ * Exit status as host_sim's: 0 every frame was processed, 1 something was unreadable or wrong (reported on
  * standard error; the other frames are still processed, but none without a rig), 2 wrong usage; 3 a
  * fault of the processor.
  */

@@ -127,7 +127,7 @@ static void show(struct app_state *state, const struct hal_frame *frame)
     }
 }
 
-/* A lit frame whose labels are there: the rest of it. began_us: when it was taken from the camera. */
+/* A lit frame whose labels are there. began_us: when it was taken from the camera. */
 static void use_lit(struct app_state *state, const struct hal_frame *frame, int64_t began_us)
 {
     struct isohead *head = state->head;

@@ -7,8 +7,8 @@
 #include "app_text.h"
 #include "base/ih_fix.h"
 
-/* A turn that differs by more than this from what was told is told again. */
-#define TOLD_RAD_Q30 374802 /* 0.02 degrees */
+/* A rotation is reported again when it differs by more than this from the last report. */
+#define REPORT_RAD_Q30 374802 /* 0.02 degrees */
 #define DEG_PER_RAD_Q10 58671
 #define MM2_PER_M2 1000000
 
@@ -19,8 +19,8 @@ struct depth_text {
 void app_health_begin(struct app_state *state)
 {
     ih_health_init(&state->health, &state->head->rig);
-    state->told_health = IH_HEALTH_UNKNOWN;
-    memset(state->told_turn_rad_q30, 0, sizeof state->told_turn_rad_q30);
+    state->reported_health = IH_HEALTH_UNKNOWN;
+    memset(state->reported_rotation_rad_q30, 0, sizeof state->reported_rotation_rad_q30);
     state->checked_count = 0;
 }
 
@@ -29,50 +29,52 @@ static struct app_decimal degrees(int32_t angle_rad_q30)
     return app_text_fixed((int64_t)angle_rad_q30 * DEG_PER_RAD_Q10 / 1024, 30, 3);
 }
 
-/* What one standard deviation of the turn is in depth at 1 m, in words. */
-static struct depth_text depth_doubt(const struct app_state *state)
+/* One standard deviation of the rotation as depth at 1 m, in words. */
+static struct depth_text depth_uncertainty(const struct app_state *state)
 {
     const struct ih_health *health = &state->health;
     const int32_t *origin_mm_q16 = state->head->rig.calibration.origin_mm_q16;
-    struct depth_text out = {"the turn across the baseline is not known, nor is depth"};
+    struct depth_text out = {"the rotation across the baseline is not known, nor is depth"};
     if (health->is_weak_known) {
         int64_t x = origin_mm_q16[0];
         int64_t y = origin_mm_q16[1];
         int64_t baseline_mm_q16 = (int64_t)ih_isqrt_u64((uint64_t)(x * x + y * y)) + 1;
-        int64_t turn_rad_q30 = ih_max_s32(health->sigma_rad_q30[0], health->sigma_rad_q30[1]);
-        int64_t depth_mm_q4 = ih_div_round(turn_rad_q30 * MM2_PER_M2 / 1024, baseline_mm_q16);
+        int64_t sigma_rad_q30 = ih_max_s32(health->sigma_rad_q30[0], health->sigma_rad_q30[1]);
+        int64_t depth_mm_q4 = ih_div_round(sigma_rad_q30 * MM2_PER_M2 / 1024, baseline_mm_q16);
         snprintf(out.text, sizeof out.text, "that is %s mm of depth at 1 m",
                  app_text_fixed(depth_mm_q4, 4, 1).text);
     }
     return out;
 }
 
-static void tell_turn(struct app_state *state)
+static void report_rotation(struct app_state *state)
 {
     const struct ih_health *health = &state->health;
-    const int32_t *turn = health->turn_rad_q30;
+    const int32_t *rotation = health->turn_rad_q30;
     const int32_t *sigma = health->sigma_rad_q30;
-    app_log_say(state->log, APP_LOG_WARNING,
-                "%s: the projector is turned by (%s, %s, %s) +-(%s, %s, %s) degrees about X, Y, Z, "
-                "%s; corrected for until the end, calibrate again",
-                state->config->rig, degrees(turn[0]).text, degrees(turn[1]).text,
-                degrees(turn[2]).text, degrees(sigma[0]).text, degrees(sigma[1]).text,
-                degrees(sigma[2]).text, depth_doubt(state).text);
-    memcpy(state->told_turn_rad_q30, turn, sizeof state->told_turn_rad_q30);
+    app_log_say(
+        state->log, APP_LOG_WARNING,
+        "%s: the projector is rotated by (%s, %s, %s) +-(%s, %s, %s) degrees about X, Y, Z, "
+        "%s; corrected for until the end, calibrate again",
+        state->config->rig, degrees(rotation[0]).text, degrees(rotation[1]).text,
+        degrees(rotation[2]).text, degrees(sigma[0]).text, degrees(sigma[1]).text,
+        degrees(sigma[2]).text, depth_uncertainty(state).text);
+    memcpy(state->reported_rotation_rad_q30, rotation, sizeof state->reported_rotation_rad_q30);
 }
 
-static void tell_state(struct app_state *state)
+static void report_state(struct app_state *state)
 {
     const struct ih_health *health = &state->health;
     switch (health->state) {
     case IH_HEALTH_TURNED:
-        tell_turn(state);
+        report_rotation(state);
         break;
     case IH_HEALTH_LOST:
-        app_log_say(state->log, APP_LOG_WARNING,
-                    "%s: does not fit: of %" PRId32 " dots %" PRId32
-                    " have a label, and no turn within 0.6 degrees mends it; calibrate again",
-                    state->config->rig, health->dot_count, health->labelled_count);
+        app_log_say(
+            state->log, APP_LOG_WARNING,
+            "%s: does not fit: of %" PRId32 " dots %" PRId32
+            " have a label, and no rotation within 0.6 degrees corrects it; calibrate again",
+            state->config->rig, health->dot_count, health->labelled_count);
         break;
     case IH_HEALTH_FITS:
         app_log_say(state->log, APP_LOG_INFO, "%s: fits", state->config->rig);
@@ -80,19 +82,19 @@ static void tell_state(struct app_state *state)
     case IH_HEALTH_UNKNOWN:
         break;
     }
-    state->told_health = health->state;
+    state->reported_health = health->state;
 }
 
-static bool is_told(const struct app_state *state)
+static bool is_reported(const struct app_state *state)
 {
     const struct ih_health *health = &state->health;
-    bool same_turn = true;
+    bool is_same = true;
     for (int i = 0; i < 3; i++) {
-        int64_t more = (int64_t)health->turn_rad_q30[i] - state->told_turn_rad_q30[i];
-        same_turn = same_turn && more <= TOLD_RAD_Q30 && more >= -TOLD_RAD_Q30;
+        int64_t difference = (int64_t)health->turn_rad_q30[i] - state->reported_rotation_rad_q30[i];
+        is_same = is_same && ih_abs_s64(difference) <= REPORT_RAD_Q30;
     }
-    return state->told_health == health->state &&
-           (same_turn || health->state != IH_HEALTH_TURNED || health->stage != IH_HEALTH_WATCHING);
+    return state->reported_health == health->state &&
+           (is_same || health->state != IH_HEALTH_TURNED || health->stage != IH_HEALTH_WATCHING);
 }
 
 /* Of this frame; 0: no labels. */
@@ -110,14 +112,14 @@ static int32_t mean_across_px_q12(const struct ih_labels *labels)
     return count == 0 ? 0 : (int32_t)((sum + count / 2) / count);
 }
 
-/* A turn that is still on trial is told, too. */
+/* A rotation that is still on trial is reported, too. */
 static const char *word_of(const struct ih_health *health)
 {
-    const int32_t *turn = health->turn_rad_q30;
+    const int32_t *rotation = health->turn_rad_q30;
     if (health->state == IH_HEALTH_LOST) {
         return "lost";
     }
-    return turn[0] != 0 || turn[1] != 0 || turn[2] != 0 ? "turned" : NULL;
+    return rotation[0] != 0 || rotation[1] != 0 || rotation[2] != 0 ? "turned" : NULL;
 }
 
 static void check(struct app_state *state)
@@ -129,23 +131,23 @@ static void check(struct app_state *state)
     }
     if (health->state == IH_HEALTH_UNKNOWN) {
         app_log_say(state->log, APP_LOG_ERROR,
-                    "%s: cannot be told: of %" PRId32 " dots in the last frames %" PRId32
+                    "%s: cannot be determined: of %" PRId32 " dots in the last frames %" PRId32
                     " have a label, expected 200 and more",
                     state->config->rig, health->dot_count, health->labelled_count);
     } else if (health->state == IH_HEALTH_LOST) {
         app_log_say(state->log, APP_LOG_INFO,
                     "%s: checked %" PRId32
-                    " frames, it does not fit; no turn is known that mends it",
+                    " frames, it does not fit; no known rotation corrects it",
                     state->config->rig, state->checked_count);
     } else {
         app_log_say(state->log, APP_LOG_INFO,
                     "%s: checked %" PRId32 " frames, %s; dots lie %s px beside their lines; "
-                    "of a turn (%s, %s, %s) degrees about X, Y, Z may be left, %s",
+                    "a rotation of up to (%s, %s, %s) degrees about X, Y, Z is possible, %s",
                     state->config->rig, state->checked_count,
                     health->state == IH_HEALTH_FITS ? "it fits" : "it does not fit",
                     app_text_fixed(health->across_px_q12, 12, 2).text,
                     degrees(health->sigma_rad_q30[0]).text, degrees(health->sigma_rad_q30[1]).text,
-                    degrees(health->sigma_rad_q30[2]).text, depth_doubt(state).text);
+                    degrees(health->sigma_rad_q30[2]).text, depth_uncertainty(state).text);
     }
     app_state_end(state, health->state == IH_HEALTH_FITS ? APP_EXIT_GOOD : APP_EXIT_FAILED);
 }
@@ -157,8 +159,8 @@ void app_health_frame(struct app_state *state)
     (void)ih_health_frame(&state->health, &head->dots, &head->labels, &head->rig,
                           &state->health_scratch);
     state->live.rig = word_of(&state->health);
-    if (!is_told(state)) {
-        tell_state(state);
+    if (!is_reported(state)) {
+        report_state(state);
     }
     if (state->config->check) {
         check(state);

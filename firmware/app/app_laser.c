@@ -289,7 +289,7 @@ const char *app_laser_block_text(unsigned blocks)
         enum app_laser_block block;
         const char *text;
     } texts[] = {
-        {APP_LASER_BLOCK_DISABLED, "not asked for"},
+        {APP_LASER_BLOCK_DISABLED, "not enabled"},
         {APP_LASER_BLOCK_INTERLOCK, "the interlock is open"},
         {APP_LASER_BLOCK_RIG, "no valid rig"},
         {APP_LASER_BLOCK_CAMERA, "no camera"},

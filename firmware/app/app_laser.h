@@ -3,7 +3,7 @@
  * In:    what the loop wishes, what it sees (frames, the interlock's events, the time), and what
  *        may be wrong (rig, camera).
  * Out:   the strobe line. It is high only while the loop wishes it and nothing speaks against it:
- *        - it was asked for (app_laser_config.enabled);
+ *        - it is enabled (app_laser_config.enabled);
  *        - the rig is valid (app_laser_rig) and the camera streams (app_laser_camera);
  *        - it has not been on for APP_LASER_SILENT_FRAMES frame times since the last frame came;
  *        - the interlock is closed, after a movement for APP_LASER_CLOSED_US: contacts bounce. It is
@@ -18,7 +18,7 @@
  *        longer than what it returns, so that a limit in time is kept to the timer's precision while
  *        the loop waits. While a frame is processed (app_laser_busy) the guard looks at the interlock
  *        and for life (hal/linux/hal_guard.h, docs/safety.md).
- * Errors: app_laser.failed, with the text; told once through the caller.
+ * Errors: app_laser.failed, with the text; reported once through the caller.
  */
 #ifndef APP_LASER_H
 #define APP_LASER_H
@@ -41,7 +41,7 @@
 
 /* What can speak against the laser; a set. */
 enum app_laser_block {
-    APP_LASER_BLOCK_DISABLED = 1,   /* nobody asked for it */
+    APP_LASER_BLOCK_DISABLED = 1,   /* not enabled */
     APP_LASER_BLOCK_RIG = 2,        /* no valid rig */
     APP_LASER_BLOCK_CAMERA = 4,     /* the camera does not stream */
     APP_LASER_BLOCK_SILENCE = 8,    /* frames have stopped coming */
@@ -59,7 +59,7 @@ struct app_laser {
     struct app_laser_config config;
     const struct hal_strobe *strobe;
     bool wished;
-    bool is_on;              /* what the line was told last */
+    bool is_on;              /* the last state that was set */
     unsigned blocks;         /* of enum app_laser_block */
     bool is_open;            /* the lines are taken */
     int64_t silent_us;       /* on without a frame, */

@@ -6,10 +6,10 @@
 #include "rig/ih_camera.h"
 
 #define PIXEL_DECIMALS 2
-/* Of the levels that the core cuts at this part is drawn: 30 mm apart they can be told from each other. */
+/* Every third contour level of the core is drawn: 30 mm apart they can be distinguished. */
 #define LEVEL_STEP 3
-/* Rows of the picture between two rests. */
-#define REST_ROWS 8
+/* Rows of the picture between two pauses. */
+#define PAUSE_ROWS 8
 
 size_t app_live_size(int32_t width, int32_t height)
 {
@@ -69,7 +69,7 @@ static void write_dots(struct app_write *write, const struct isohead *head)
     app_write_close(write, ']');
 }
 
-/* A place on the surface's grid in normalised coordinates. */
+/* A position on the surface's grid in normalised coordinates. */
 static int32_t slope_q28(int32_t centre_q28, int32_t unit_q28, int32_t place_q9)
 {
     int64_t steps_q9 = (int64_t)place_q9 - (IH_SURFACE_GRID - 1) / 2 * 512;
@@ -91,29 +91,29 @@ static void write_vertex(struct app_write *write, const struct isohead *head,
 }
 
 static void write_level(struct app_write *write, const struct isohead *head,
-                        const struct ih_contours *cuts, void (*rest)(void))
+                        const struct ih_contours *contours, void (*pause)(void))
 {
-    for (int32_t i = 0; i < cuts->contour_count; i++) {
-        const struct ih_contour *contour = &cuts->contour[i];
+    for (int32_t i = 0; i < contours->contour_count; i++) {
+        const struct ih_contour *contour = &contours->contour[i];
         app_write_open(write, '{');
         app_write_key(write, "level_mm");
-        app_write_decimal(write, app_text_fixed(cuts->level_mm_q8, 8, 0));
+        app_write_decimal(write, app_text_fixed(contours->level_mm_q8, 8, 0));
         app_write_key(write, "closed");
         app_write_bool(write, contour->closed);
         app_write_key(write, "px");
         app_write_open(write, '[');
         for (int32_t k = 0; k < contour->vertex_count; k++) {
-            write_vertex(write, head, &cuts->vertex[contour->first + k]);
+            write_vertex(write, head, &contours->vertex[contour->first + k]);
         }
         app_write_close(write, ']');
         app_write_close(write, '}');
-        rest();
+        pause();
     }
 }
 
-static void write_contours(struct app_write *write, struct isohead *head, void (*rest)(void))
+static void write_contours(struct app_write *write, struct isohead *head, void (*pause)(void))
 {
-    struct ih_contours *cuts = &head->scratch.nests.contours;
+    struct ih_contours *contours = &head->scratch.nests.contours;
     int32_t level_mm_q8 = 0;
     app_write_key(write, "contours");
     app_write_open(write, '[');
@@ -121,14 +121,14 @@ static void write_contours(struct app_write *write, struct isohead *head, void (
          head->surface.valid &&
          ih_nests_level(&head->surface, &head->params.nests, index, &level_mm_q8);
          index += LEVEL_STEP) {
-        ih_contours_level(&head->surface, level_mm_q8, cuts);
-        rest();
-        write_level(write, head, cuts, rest);
+        ih_contours_level(&head->surface, level_mm_q8, contours);
+        pause();
+        write_level(write, head, contours, pause);
     }
     app_write_close(write, ']');
 }
 
-static void write_text(struct app_live *live, struct app_write *write, void (*rest)(void))
+static void write_text(struct app_live *live, struct app_write *write, void (*pause)(void))
 {
     app_write_open(write, '{');
     app_write_int_field(write, "frame", live->frame_count);
@@ -136,8 +136,8 @@ static void write_text(struct app_live *live, struct app_write *write, void (*re
     app_write_int_field(write, "height", live->height);
     app_write_int_field(write, "scale", scale_of(live));
     write_dots(write, &live->head);
-    rest();
-    write_contours(write, &live->head, rest);
+    pause();
+    write_contours(write, &live->head, pause);
     app_write_close(write, '}');
     app_write_line_end(write);
 }
@@ -163,7 +163,7 @@ static void add_row(const struct app_live *live, int32_t row, uint32_t *sum)
 }
 
 /* Means, to 8 bits: full scale becomes 255. A sum is below 4 * 4 * 2^16, and so is the divisor. */
-static size_t write_picture(const struct app_live *live, unsigned char *to, void (*rest)(void))
+static size_t write_picture(const struct app_live *live, unsigned char *to, void (*pause)(void))
 {
     const int32_t scale = scale_of(live);
     const uint32_t full = (uint32_t)(live->maximum * scale * scale);
@@ -177,8 +177,8 @@ static size_t write_picture(const struct app_live *live, unsigned char *to, void
             uint32_t grey = sum[place] * 255U / full;
             to[count++] = (unsigned char)(grey < 255U ? grey : 255U);
         }
-        if (row % REST_ROWS == 0) {
-            rest();
+        if (row % PAUSE_ROWS == 0) {
+            pause();
         }
     }
     return count;
@@ -194,7 +194,7 @@ static bool is_whole(const struct app_live *live, size_t live_size)
 }
 
 size_t app_live_write(void *content, size_t content_size, unsigned char *to, size_t size,
-                      void (*rest)(void))
+                      void (*pause)(void))
 {
     struct app_live *live = content;
     if (!is_whole(live, content_size)) {
@@ -205,11 +205,11 @@ size_t app_live_write(void *content, size_t content_size, unsigned char *to, siz
         return 0;
     }
     struct app_write write = {.memory = (char *)to, .size = size - more};
-    write_text(live, &write, rest);
+    write_text(live, &write, pause);
     if (write.full) {
         return 0;
     }
     memcpy(to + write.length, live->record, live->record_length);
     size_t length = write.length + live->record_length;
-    return length + write_picture(live, to + length, rest);
+    return length + write_picture(live, to + length, pause);
 }

@@ -2,16 +2,16 @@
  * how it is written for the page (docs/live.md).
  *
  * app_live_put copies: the samples as they are, every stage's outputs, the record. It is all that the
- * loop does for the view, and does it only for a frame that somebody waits for. app_live_write, in the
- * other process, does the rest: cuts the surface again, as the core does not keep the contours, and writes
+ * loop does for the view, and only for a frame that a viewer waits for. app_live_write, in the other
+ * process, computes the contours again, as the core does not keep them, and writes
  *     {"frame":N,"width":W,"height":H,"scale":K,"dots":[[u,v],..],"labelled":[index,..],
  *      "contours":[{"level_mm":Z,"closed":true,"px":[u,v,u,v,..]},..]}
  *     the record, as it was sent
  *     the picture, W / K by H / K samples of 8 bits, row by row without gaps
- * with line ends between the three. Places are frame pixels as in a record; those of contours whole. A
- * sample is the mean of K by K of the camera's, so many that a row is shorter than
- * APP_LIVE_ROW_MAX: what is sent costs the board more than all else here, and dots, contours and
- * ellipses are drawn by numbers anyway.
+ * with line ends between the three. Positions are frame pixels as in a record, those of contours
+ * whole. A sample is the mean of K by K of the camera's; K is such that a row is shorter than
+ * APP_LIVE_ROW_MAX: sending costs the board more than all else here, and dots, contours and ellipses
+ * are drawn from numbers anyway.
  */
 #ifndef APP_LIVE_H
 #define APP_LIVE_H
@@ -40,9 +40,9 @@ size_t app_live_size(int32_t width, int32_t height);
 void app_live_put(struct app_live *live, const struct hal_frame *frame, const struct isohead *head,
                   const struct app_record *record, int64_t frame_count);
 
-/* rest is called after each short piece of work. Length; 0: this is no frame of that size, or there is
+/* pause is called after each short piece of work. Length; 0: this is no frame of that size, or there is
  * no room. For hal_serve: content_size and what is in content may be anything. */
 size_t app_live_write(void *content, size_t content_size, unsigned char *to, size_t size,
-                      void (*rest)(void));
+                      void (*pause)(void));
 
 #endif

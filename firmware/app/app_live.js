@@ -5,7 +5,7 @@
 
 const RATE_S = 3; // rates are means over so many seconds
 const RETRY_MS = 1000;
-const BRIGHT_LEVEL = 170, BRIGHT_MOST = 5; // levels of 255; times
+const BRIGHT_LEVEL = 170, BRIGHT_MAX = 5; // levels of 255; times
 const element = (id) => document.getElementById(id);
 const canvas = element("picture");
 const context = canvas.getContext("2d");
@@ -36,7 +36,7 @@ function brightness(samples) {
   for (const sample of samples) count[sample]++;
   let level = 255;
   for (let above = count[255]; level > 0 && above < samples.length / 100; above += count[level]) level--;
-  return Math.min(Math.max(BRIGHT_LEVEL / (level + 1), 1), BRIGHT_MOST);
+  return Math.min(Math.max(BRIGHT_LEVEL / (level + 1), 1), BRIGHT_MAX);
 }
 
 function drawSamples(view) {
@@ -155,7 +155,7 @@ function rateText(view) {
     `${per(shown.length - 1, now.at_s - before.at_s)} here`;
 }
 
-function tell(view) {
+function report(view) {
   const record = view.record;
   element("head").textContent = headText(record);
   element("rejected").textContent = rejectedText(record);
@@ -182,7 +182,7 @@ async function next() {
   if (!answer.ok) throw new Error(`the board answers ${answer.status}: is this the address it printed last?`);
   last = parse(await answer.arrayBuffer());
   draw();
-  tell(last);
+  report(last);
   say("live");
   await drawn(); // a page that nobody sees asks for nothing
 }

@@ -83,12 +83,12 @@ void app_log_say(struct app_log *log, enum app_log_level level, const char *form
     if (kind->format == NULL) {
         kind->format = format;
         kind->since_us = log->now_us;
-        kind->told_count = 0;
+        kind->reported_count = 0;
         kind->held_count = 0;
         kind->level = level;
     }
-    if (kind->told_count < APP_LOG_BURST) {
-        kind->told_count++;
+    if (kind->reported_count < APP_LOG_BURST) {
+        kind->reported_count++;
         put(log, level, text);
         return;
     }
@@ -99,7 +99,7 @@ void app_log_say(struct app_log *log, enum app_log_level level, const char *form
     }
 }
 
-void app_log_tell(struct app_log *log, enum app_log_level level, const char *text)
+void app_log_report(struct app_log *log, enum app_log_level level, const char *text)
 {
     char own[APP_LOG_TEXT_MAX];
     snprintf(own, sizeof own, "%s", text);

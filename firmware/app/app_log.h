@@ -1,11 +1,11 @@
 /* app_log - messages, with a limit on how often the same one comes.
  *
  * A message's kind is its format and level. In APP_LOG_INTERVAL_US from the first of a kind
- * APP_LOG_BURST are told; further ones are counted, and at the interval's end the last of them is
- * told with their count: "camera: short frame (last of 37 held back in 60 s)". There is room for
+ * APP_LOG_BURST are reported; further ones are counted, and at the interval's end the last of them is
+ * reported with their count: "camera: short frame (last of 37 held back in 60 s)". There is room for
  * APP_LOG_KINDS_MAX kinds at a time; what comes beside them shares one more.
  *
- * Time is what app_log_time was told last. Control characters become '?', a text that is too long
+ * Time is the last argument of app_log_time. Control characters become '?', a text that is too long
  * is cut.
  */
 #ifndef APP_LOG_H
@@ -31,7 +31,7 @@ struct app_log_kind {
     const char *format; /* NULL: free */
     enum app_log_level level;
     int64_t since_us;
-    int32_t told_count;
+    int32_t reported_count;
     int64_t held_count;
     char last[APP_LOG_TEXT_MAX]; /* of those held */
 };
@@ -47,7 +47,7 @@ struct app_log {
 void app_log_init(struct app_log *log, void (*write)(void *context, int level, const char *text),
                   void *context, int64_t now_us);
 
-/* What time it is; tells what is due. To be called whenever the loop wakes. */
+/* What time it is; reports what is due. To be called whenever the loop wakes. */
 void app_log_time(struct app_log *log, int64_t now_us);
 
 /* format: a text that lives as long as the log. */
@@ -55,7 +55,7 @@ void app_log_say(struct app_log *log, enum app_log_level level, const char *form
     __attribute__((format(printf, 3, 4)));
 
 /* Without limit, for what comes seldom of its own. */
-void app_log_tell(struct app_log *log, enum app_log_level level, const char *text);
+void app_log_report(struct app_log *log, enum app_log_level level, const char *text);
 
 /* All that is still held back; before the end. */
 void app_log_end(struct app_log *log);

@@ -7,12 +7,12 @@
 #include "app_rig.h"
 #include "app_rig_explain.h"
 
-/* A strobe that failed ends the program, and is told even at its end: the laser may be on. */
+/* A strobe that failed ends the program, and is reported even at its end: the laser may be on. */
 static void watch_fault(struct app_state *state)
 {
     const struct app_laser *laser = &state->laser;
-    if ((laser->blocks & APP_LASER_BLOCK_FAULT) != 0 && !state->told_fault) {
-        state->told_fault = true;
+    if ((laser->blocks & APP_LASER_BLOCK_FAULT) != 0 && !state->reported_fault) {
+        state->reported_fault = true;
         app_log_say(state->log, APP_LOG_ERROR, "laser: %s", laser->failed.text);
         app_state_end(state, APP_EXIT_FAILED);
     }
@@ -26,7 +26,7 @@ static void watch_laser(struct app_state *state)
     unsigned blocks = laser->blocks & ~quiet;
     state->status.laser_on_us = laser->on_us;
     bool is_fault = (blocks & APP_LASER_BLOCK_FAULT) != 0; /* has a message of its own */
-    if (blocks != state->told_blocks && laser->config.enabled && !is_fault) {
+    if (blocks != state->reported_blocks && laser->config.enabled && !is_fault) {
         const char *why = app_laser_block_text(blocks);
         if (why != NULL) {
             app_log_say(state->log, APP_LOG_WARNING, "laser off: %s", why);
@@ -34,7 +34,7 @@ static void watch_laser(struct app_state *state)
             app_log_say(state->log, APP_LOG_INFO, "laser allowed");
         }
     }
-    state->told_blocks = blocks;
+    state->reported_blocks = blocks;
     watch_fault(state);
 }
 
@@ -197,8 +197,8 @@ static void reset(struct app_state *state)
     app_laser_init(&state->laser, &laser, state->hal.strobe, now_us);
     app_phase_init(&state->phase);
     app_status_init(&state->status, config->status_s, now_us);
-    state->told_blocks = state->laser.blocks;
-    state->told_fault = false;
+    state->reported_blocks = state->laser.blocks;
+    state->reported_fault = false;
     state->light_wanted = false;
     state->on_frames = 0;
     state->is_streaming = false;
@@ -237,7 +237,7 @@ static void run_camera(struct app_state *state, unsigned events)
     }
 }
 
-/* False: time or something that cannot be mended. */
+/* False: the loop ends. */
 static bool wait(struct app_state *state, unsigned *events)
 {
     const struct app_hal *hal = &state->hal;
@@ -263,7 +263,7 @@ static bool wait(struct app_state *state, unsigned *events)
     return true;
 }
 
-static void turn(struct app_state *state)
+static void run_once(struct app_state *state)
 {
     char line[APP_STATUS_TEXT_MAX];
     unsigned events = 0;
@@ -284,7 +284,7 @@ static void turn(struct app_state *state)
     run_camera(state, events);
     watch_laser(state);
     if (app_status_line(&state->status, app_state_now_us(state), line)) {
-        app_log_tell(state->log, APP_LOG_INFO, line);
+        app_log_report(state->log, APP_LOG_INFO, line);
     }
 }
 
@@ -302,7 +302,7 @@ enum app_exit app_loop_run(struct app_state *state)
     app_laser_rig(&state->laser, true, app_state_now_us(state));
     if (app_laser_open(&state->laser)) {
         while (!state->is_over) {
-            turn(state);
+            run_once(state);
         }
     } else {
         watch_laser(state);

@@ -35,11 +35,11 @@
 /* Between two tries to open the camera. */
 #define APP_LOOP_RETRY_MIN_US 250000
 #define APP_LOOP_RETRY_MAX_US 4000000
-/* Most frames that are given back for a newer one at a time; a camera has fewer buffers. */
+/* Max frames that are given back for a newer one at a time; a camera has fewer buffers. */
 #define APP_LOOP_DRAIN_MAX 32
 /* Between frames of a camera that does not say. */
 #define APP_LOOP_FRAME_TIME_US 40000
-/* Until asked to end, or until it cannot go on. All but the given is set here. The camera is closed
+/* Until requested to end, or until it cannot go on. All but the given is set here. The camera is closed
  * and the laser off when it returns. */
 enum app_exit app_loop_run(struct app_state *state);
 

@@ -8,7 +8,7 @@
  * In:    how many dots of a frame are labelled, and since how many frames the laser has been on.
  * Out:   lit: it counts. Dark: it shows the ambient light. Partial: some of it was exposed before the
  *        laser was switched; it is good for nothing.
- * Way:   - Labels, and not much fewer than in the lit frame before it: lit. Much fewer, in a mode
+ * Method: - Labels, and not much fewer than in the lit frame before it: lit. Much fewer, in a mode
  *          that switches: partial; but not twice in a row, then the scene has changed.
  *        - No labels, and the laser has been on for longer than frames stay in flight: lit, and
  *          nothing is within range.
@@ -24,7 +24,7 @@
 
 /* As many labels show that the dots are there. */
 #define APP_PHASE_SEEN_MIN 8
-/* Most frames that are in flight: exposed before the laser was switched on, seen later. Drivers hold
+/* Max frames in flight: exposed before the laser was switched on, seen later. Drivers hold
  * 4 to 8 buffers. */
 #define APP_PHASE_FLIGHT_MAX 8
 /* A lit frame has at least 4/8 of the labels of the lit one before it, else it may be partial. */

@@ -24,11 +24,11 @@
 #define APP_RECORD_NAME_MAX (6 * 255)
 #define APP_RECORD_DIR_MAX (6 * 4095)
 /* Everything else: keys, counts, an error of HAL_ERROR_MAX bytes. */
-#define APP_RECORD_REST_MAX (512 + 6 * HAL_ERROR_MAX)
+#define APP_RECORD_OTHER_MAX (512 + 6 * HAL_ERROR_MAX)
 /* Longest record: 36 KiB; of a board, which has no directory, about a third. */
 #define APP_RECORD_MAX                                                                 \
     (IH_RESULT_MAX * APP_RECORD_ENTRY_MAX + APP_RECORD_NAME_MAX + APP_RECORD_DIR_MAX + \
-     APP_RECORD_REST_MAX)
+     APP_RECORD_OTHER_MAX)
 
 struct app_record {
     const char *dir; /* NULL: the run has one directory only */

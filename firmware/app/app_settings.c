@@ -5,7 +5,7 @@
 
 #define BAUD_DEFAULT 115200
 #define VIEW_LOCAL "127.0.0.1"
-/* Longest part of a wrong value that is told. */
+/* Longest part of a wrong value that is reported. */
 #define QUOTE_MAX 60
 /* A name with more wrong letters than this, or with no right one, is not meant. */
 #define DISTANCE_MAX 2
@@ -271,9 +271,8 @@ const struct app_setting app_settings[] = {
      .offset = AT(interlock_active_low)},
     {"heartbeat-line", "LINE", LINE, "line that is toggled for an external one-shot",
      .take = take_text, .offset = AT(heartbeat_line)},
-    {"duty", "PERCENT", "percent from 1 to 100",
-     "most of the time that the laser may be on; default 100", .take = take_number,
-     .offset = AT(duty_percent), .minimum = 1, .maximum = 100},
+    {"duty", "PERCENT", "percent from 1 to 100", "maximum duty cycle of the laser; default 100",
+     .take = take_number, .offset = AT(duty_percent), .minimum = 1, .maximum = 100},
 
     {"output", "WHERE",
      "-, udp:HOST:PORT or serial:PATH[:BAUD] with 9600, 19200, 38400, 57600, 115200, 230400, "
@@ -284,7 +283,7 @@ const struct app_setting app_settings[] = {
     {"log", "WHERE", "stderr or syslog", "where messages go: stderr, the default, or syslog",
      .take = take_choice, .offset = AT(log), .words = log_words},
     {"status", "SECONDS", "seconds from 0 to 86400",
-     "a message with rates and counts so often; 0: none; default 10", .take = take_number,
+     "interval of a message with rates and counts; 0: none; default 10", .take = take_number,
      .offset = AT(status_s), .maximum = 86400},
     {"watchdog", "PATH", "a device", "watchdog device to feed, such as /dev/watchdog",
      .take = take_text, .offset = AT(watchdog)},

@@ -18,7 +18,7 @@
 #include "upkeep/ih_health.h"
 
 enum app_exit {
-    APP_EXIT_GOOD = 0,   /* ended as asked */
+    APP_EXIT_GOOD = 0,   /* ended as requested */
     APP_EXIT_FAILED = 1, /* could not go on */
     APP_EXIT_USAGE = 2   /* wrong usage, configuration or rig */
 };
@@ -41,7 +41,7 @@ struct app_state {
     struct isohead *head;
     /* Its own. */
     struct app_laser laser;
-    unsigned told_blocks; /* of the laser, in the log */
+    unsigned reported_blocks; /* of the laser, in the log */
     struct app_phase phase;
     struct app_status status;
     bool is_streaming; /* the camera is open */
@@ -60,14 +60,14 @@ struct app_state {
     int64_t result_count;        /* frames with a result */
     struct ih_health health;     /* app_health.h */
     struct ih_health_scratch health_scratch;
-    enum ih_health_state told_health; /* in the log */
-    int32_t told_turn_rad_q30[3];
+    enum ih_health_state reported_health; /* in the log */
+    int32_t reported_rotation_rad_q30[3];
     int32_t checked_count; /* frames, with config->check */
 
     bool rig_is_valid;
     int32_t width, height; /* of the first rig */
     bool is_over;
-    bool told_fault; /* the laser's, in the log */
+    bool reported_fault; /* the laser's, in the log */
     enum app_exit exit;
     struct app_record record;
 };

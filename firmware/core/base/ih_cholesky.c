@@ -37,13 +37,13 @@ static int32_t inverse_of(int32_t pivot_q30)
     return (int32_t)ih_min_s64(value, INT32_MAX); /* 2^31 for a power of 2 */
 }
 
-/* L_ij from A_ij and what the entries before it take away. The rest in Q30: half a step of it is no more than
+/* L_ij from A_ij and the terms that are subtracted before. The residual is in Q30: half a step of it is no more than
  * half a step of A. It is at most 1, with a pivot of the same size or more: Cauchy-Schwarz. */
 static inline int32_t entry_q30(int32_t a_q30, int64_t taken_q60, int32_t pivot_q30,
                                 int32_t inverse, int32_t n)
 {
-    const int64_t rest_q30 = a_q30 - ih_shift_round(taken_q60, 30);
-    const int32_t entry = ih_saturate_s32(ih_mul_shift(rest_q30, inverse, bits_of(pivot_q30)));
+    const int64_t residual_q30 = a_q30 - ih_shift_round(taken_q60, 30);
+    const int32_t entry = ih_saturate_s32(ih_mul_shift(residual_q30, inverse, bits_of(pivot_q30)));
     IH_IN_RANGE(entry, -(1 << 30) - n, (1 << 30) + n);
     return entry;
 }
@@ -84,33 +84,34 @@ static void solve_forward(const int32_t *l_q30, int32_t n, const int32_t *b, int
 {
     for (int32_t i = 0; i < n; i++) {
         const int32_t *row = row_of(l_q30, i);
-        int64_t rest = (int64_t)b[i] * (1 << 30) - dot_q60(row, y, i);
-        y[i] = ih_saturate_s32(ih_div_round(rest, row[i])); /* as the header says, it fits */
+        int64_t residual = (int64_t)b[i] * (1 << 30) - dot_q60(row, y, i);
+        y[i] = ih_saturate_s32(ih_div_round(residual, row[i])); /* as the header says, it fits */
     }
 }
 
 /* Take what an unknown brings from the rests of those before it. Here and below clang's analyzer does not see that
  * the first n rests are set. */
-static void take_unknown(const int32_t *row_q30, int32_t count, int32_t unknown, int64_t *rest_q30)
+static void take_unknown(const int32_t *row_q30, int32_t count, int32_t unknown,
+                         int64_t *residual_q30)
 {
     for (int32_t k = 0; k < count; k++) {
         /* NOLINTNEXTLINE(clang-analyzer-core.uninitialized.Assign) */
-        rest_q30[k] -= (int64_t)row_q30[k] * unknown;
+        residual_q30[k] -= (int64_t)row_q30[k] * unknown;
     }
 }
 
 void ih_cholesky_solve(const int32_t *l_q30, int32_t n, const int32_t *b, int32_t *x_mantissa,
                        int32_t *x_exponent)
 {
-    int64_t rest_q30[IH_CHOLESKY_MAX];
+    int64_t residual_q30[IH_CHOLESKY_MAX];
     solve_forward(l_q30, n, b, x_mantissa);
     for (int32_t k = 0; k < n; k++) {
-        rest_q30[k] = (int64_t)x_mantissa[k] * (1 << 30);
+        residual_q30[k] = (int64_t)x_mantissa[k] * (1 << 30);
     }
     int exponent = 0;
     for (int32_t i = n - 1; i >= 0; i--) { /* L^T x = y, in units of 2^exponent */
         const int32_t *row = row_of(l_q30, i);
-        const int64_t value = ih_div_round(rest_q30[i], row[i]);
+        const int64_t value = ih_div_round(residual_q30[i], row[i]);
         const int grow = ih_max_s32(0, ih_bits_u64((uint64_t)ih_abs_s64(value)) - MANTISSA_BITS);
         if (grow > 0) { /* move the binary point of what is solved so far, and of what is not */
             exponent += grow;
@@ -119,12 +120,12 @@ void ih_cholesky_solve(const int32_t *l_q30, int32_t n, const int32_t *b, int32_
             }
             for (int32_t k = 0; k < i; k++) {
                 /* NOLINTNEXTLINE(clang-analyzer-core.CallAndMessage) */
-                rest_q30[k] = ih_shift_round(rest_q30[k], grow);
+                residual_q30[k] = ih_shift_round(residual_q30[k], grow);
             }
         }
         x_mantissa[i] = (int32_t)ih_shift_round(value, grow);
         IH_IN_RANGE(x_mantissa[i], -IH_RANGE_MANTISSA, IH_RANGE_MANTISSA);
-        take_unknown(row, i, x_mantissa[i], rest_q30);
+        take_unknown(row, i, x_mantissa[i], residual_q30);
     }
     IH_IN_RANGE(exponent, 0, IH_RANGE_EXPONENT);
     *x_exponent = exponent;

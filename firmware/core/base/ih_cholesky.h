@@ -7,7 +7,7 @@
  *        stays below 2^60 + n 2^30 and the 64-bit accumulator needs no guard. A pivot (of A)
  *        that is not at least 2^-60 is zero or negative: IH_ERR_NOT_POSITIVE, *bad_pivot says
  *        which.
- * Way:   entries are divided by a pivot by its inverse of 31 bits.
+ * Method: entries are divided by a pivot by its inverse of 31 bits.
  * Error: a residual of about n 2^-30; docs/numerics.md has the measured figure.
  * Cost:  n^3/6 multiply-adds, n^2/2 products, n square roots and divisions.
  */

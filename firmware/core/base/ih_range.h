@@ -7,7 +7,7 @@
  * That build also checks each cast to an integer type. IH_WRAPS(type, value) is one that may change the
  * value, on purpose. IH_WRAPPING, before a function, says that its unsigned sums pass 2^n on purpose.
  *
- * The constants are the greatest sizes that docs/numerics.md argues for, rounded up, in the unit and
+ * The constants are the largest values that docs/numerics.md derives, rounded up, in the unit and
  * format of their names; tests/checks/ranges_doc.py compares them with it. They hold for rigs that
  * isohead_init accepts and for parameters as ih_params_default sets them. Where a header has a constant
  * for a range, that one is used.
@@ -53,11 +53,11 @@ IH_END_DECLS
 
 /* Labels. */
 #define IH_RANGE_INVERSE_DEPTH_Q36 1031000000
-#define IH_RANGE_RECTANGLE_PX_Q12 (1 << 29) /* second difference of four places */
+#define IH_RANGE_RECTANGLE_PX_Q12 (1 << 29) /* second difference of four positions */
 
-/* Turn, health. */
-#define IH_RANGE_TURN_SLOPE_PX_Q4 (1 << 22)
-#define IH_RANGE_HEALTH_SLOPE_PX_Q4 (1 << 18) /* of a dot whose distance counts */
+/* Rotation, health. */
+#define IH_RANGE_ROTATION_SLOPE_PX_Q4 (1 << 22)
+#define IH_RANGE_HEALTH_SLOPE_PX_Q4 (1 << 18) /* of a dot whose distance is used */
 #define IH_RANGE_ALONG_PX_Q12 (1 << 29)       /* in the image, in a line's direction */
 
 /* Windows. */
@@ -76,22 +76,22 @@ IH_END_DECLS
 #define IH_RANGE_MANTISSA (1 << 25) /* of a solution */
 #define IH_RANGE_EXPONENT 62
 
-/* Cuts, ellipses, hypotheses. */
-#define IH_RANGE_OFFSET_Q8 11776      /* on the grid, from a place on it */
+/* Contours, ellipses, nests. */
+#define IH_RANGE_OFFSET_Q8 11776      /* on the grid, from a point on it */
 #define IH_RANGE_MOMENT_Q16 144769024 /* second, of an ellipse */
 #define IH_RANGE_AREA_Q16 1826600000  /* of an accepted ellipse */
-#define IH_RANGE_LEVEL_MM_Q8 8371200  /* of a cut */
+#define IH_RANGE_LEVEL_MM_Q8 8371200  /* of a contour */
 
-/* Heads, findings. */
+/* Hypotheses, detections. */
 #define IH_RANGE_PX_PER_STEP_Q12 7630000
 #define IH_RANGE_SURFACE_DISTANCE_MM_Q8 47100000
 #define IH_RANGE_CENTRE_MM_Q8 (1 << 27) /* of a head */
 
-/* Space, ellipsoid, scan, fit. */
+/* Rays, ellipsoid, scan, fit. */
 #define IH_RANGE_POINT_MM_Q8 32768000
-#define IH_RANGE_PASS_Q14 185400 /* of a ray's nearest place, from the centre */
-#define IH_RANGE_RATING_MIN_Q12 (-5555)
-#define IH_RANGE_RATING_MAX_Q12 6553
+#define IH_RANGE_PASS_Q14 185400 /* of a ray's nearest point, from the centre */
+#define IH_RANGE_TEMPLATE_SCORE_MIN_Q12 (-5555)
+#define IH_RANGE_TEMPLATE_SCORE_MAX_Q12 6553
 #define IH_RANGE_SLOPE_Q13 29491         /* derivative by ln of what has a weight */
 #define IH_RANGE_FIT_NORMAL_Q16 95000000 /* diagonal of the fit's equations */
 

@@ -472,6 +472,6 @@ int32_t ih_template_score_q12(const struct ih_rays *rays, const struct ih_templa
     /* 0.6 times 64 is 192 / 5 */
     const int32_t score_q12 = totals.inside * 64 / ih_max_s32(totals.inside_count, RAYS_MIN) +
                               totals.around * 192 / (5 * ih_max_s32(totals.around_count, RAYS_MIN));
-    IH_IN_RANGE(score_q12, IH_RANGE_RATING_MIN_Q12, IH_RANGE_RATING_MAX_Q12);
+    IH_IN_RANGE(score_q12, IH_RANGE_TEMPLATE_SCORE_MIN_Q12, IH_RANGE_TEMPLATE_SCORE_MAX_Q12);
     return score_q12;
 }

@@ -41,7 +41,7 @@ void ih_rotation_vote_slopes(const struct ih_rig *rig, struct ih_rotation_vote_s
         slope[1] = slope_px_q4(c, line, one_q20 + ih_mul_shift(x_q20, x_q20, 20), xy_q20);
         slope[2] = slope_px_q4(c, line, -y_q20, x_q20);
         for (int axis = 0; axis < 3; axis++) {
-            IH_IN_RANGE(slope[axis], -IH_RANGE_TURN_SLOPE_PX_Q4, IH_RANGE_TURN_SLOPE_PX_Q4);
+            IH_IN_RANGE(slope[axis], -IH_RANGE_ROTATION_SLOPE_PX_Q4, IH_RANGE_ROTATION_SLOPE_PX_Q4);
         }
     }
 }

@@ -105,7 +105,7 @@ struct world {
     unsigned events;
     /* What it saw. */
     int calls[WORLD_FUNCTIONS];
-    bool told_fault;     /* a message says that the line cannot be set */
+    bool reported_fault; /* a message says that the line cannot be set */
     int64_t excess;      /* on beyond the duty, percent x us, in the worst time until now */
     int64_t on_since_us; /* of the line, without a frame */
     int64_t last_record_us;
@@ -130,7 +130,7 @@ struct world {
 static struct world world;
 static struct isohead world_head; /* its content does not matter */
 static bool world_quiet = true;
-static const char *world_doing; /* what is told where a run of many fails */
+static const char *world_doing; /* what is reported where a run of many fails */
 
 /* Doubles of the rig file and of the core. */
 bool app_rig_load(const char *path, struct ih_calibration *calibration, struct hal_error *error)
@@ -274,7 +274,7 @@ static void world_look(void)
     if (!world.line) {
         return;
     }
-    TEST_ASSERT_TRUE_MESSAGE(world.config.laser, "on though nobody asked for it");
+    TEST_ASSERT_TRUE_MESSAGE(world.config.laser, "on though it is not enabled");
     TEST_ASSERT_TRUE_MESSAGE(world.line_taken, "on though the line was given back");
 }
 
@@ -612,7 +612,7 @@ static enum hal_sent world_send(void *context, const char *bytes, size_t count,
 static void world_write(void *context, int level, const char *text)
 {
     (void)context;
-    world.told_fault |= strstr(text, "laser: cannot be set") != NULL;
+    world.reported_fault |= strstr(text, "laser: cannot be set") != NULL;
     if (!world_quiet) {
         printf("%lld <%d> %s\n", (long long)world.now_us, level, text);
     }

@@ -208,7 +208,7 @@ static void the_command_line_wins_wherever_config_stands(void)
     TEST_ASSERT_TRUE(READ("--laser", "--rate=1", "--config", PATH, "--rate=2", "--laser=off"));
     TEST_ASSERT_EQUAL_INT32(2000, config.rate_mhz);
     TEST_ASSERT_FALSE(config.laser);
-    /* A wrong line is told even where it does not count. */
+    /* A wrong line is reported even where it has no effect. */
     write_file("rig = r\nrate = x\n", 17);
     TEST_ASSERT_FALSE(READ("--config", PATH, "--rate", "20"));
     TEST_ASSERT_EQUAL_INT(1, error_count);
@@ -368,7 +368,7 @@ static void outputs_are_taken_apart(void)
     }
 }
 
-static void all_errors_of_a_file_are_told(void)
+static void all_errors_of_a_file_are_reported(void)
 {
     static const char text[] = "rig = r\n"
                                "rate = fast\n"
@@ -411,10 +411,10 @@ static void very_many_errors_are_cut_short(void)
     TEST_ASSERT_FALSE(read_text(text));
     TEST_ASSERT_EQUAL_INT(APP_CONFIG_ERRORS_MAX + 1, error_count);
     assert_error(19, PATH ":20: \"bad 9\", expected \"key = value\"");
-    assert_error(20, PATH ":21: further errors are not told");
+    assert_error(20, PATH ":21: further errors are not reported");
 }
 
-/* What is told must not steer a terminal, nor be endless. */
+/* What is reported must not steer a terminal, nor be endless. */
 static void wrong_texts_are_tamed_and_cut(void)
 {
     char text[2000];
@@ -451,7 +451,7 @@ static void wrong_texts_are_tamed_and_cut(void)
     }
 }
 
-static void the_view_is_local_unless_told(void)
+static void the_view_is_local_unless_requested(void)
 {
     static const struct {
         const char *option, *host, *port; /* host NULL: refused */
@@ -506,7 +506,7 @@ static void options_are_checked_too(void)
     TEST_ASSERT_FALSE(config.laser);
 }
 
-static void files_that_are_none_are_told(void)
+static void files_that_are_none_are_reported(void)
 {
     static char big[APP_CONFIG_TEXT_MAX + 1];
 
@@ -528,7 +528,7 @@ static void files_that_are_none_are_told(void)
         PATH ": rig: missing, expected the file with the calibration; --help lists all settings");
 }
 
-static void what_does_not_go_together_is_told(void)
+static void what_does_not_go_together_is_reported(void)
 {
     static const struct {
         const char *text, *error;
@@ -797,13 +797,13 @@ int main(void)
     RUN_TEST(numbers_have_bounds);
     RUN_TEST(exposure_and_gain_are_words_or_numbers);
     RUN_TEST(outputs_are_taken_apart);
-    RUN_TEST(all_errors_of_a_file_are_told);
+    RUN_TEST(all_errors_of_a_file_are_reported);
     RUN_TEST(very_many_errors_are_cut_short);
     RUN_TEST(wrong_texts_are_tamed_and_cut);
-    RUN_TEST(the_view_is_local_unless_told);
+    RUN_TEST(the_view_is_local_unless_requested);
     RUN_TEST(options_are_checked_too);
-    RUN_TEST(files_that_are_none_are_told);
-    RUN_TEST(what_does_not_go_together_is_told);
+    RUN_TEST(files_that_are_none_are_reported);
+    RUN_TEST(what_does_not_go_together_is_reported);
     RUN_TEST(laser_off_knows_the_line_or_says_so);
     RUN_TEST(help_tells_every_setting_in_80_columns);
     RUN_TEST(the_nearest_name_is_found);

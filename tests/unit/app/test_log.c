@@ -1,4 +1,4 @@
-/* app_log and hal_log: what is told, what is held back, and where it goes. */
+/* app_log and hal_log: what is reported, what is held back, and where it goes. */
 #include "app_log.h"
 #include "linux/hal_log.h"
 
@@ -50,14 +50,14 @@ static void messages_have_level_and_text(void)
 {
     app_log_say(&log_state, APP_LOG_ERROR, "camera: %s", "gone");
     app_log_say(&log_state, APP_LOG_WARNING, "%d of %d", 3, 4);
-    app_log_tell(&log_state, APP_LOG_INFO, "50 % done");
+    app_log_report(&log_state, APP_LOG_INFO, "50 % done");
     TEST_ASSERT_EQUAL_INT(3, line_count);
     TEST_ASSERT_EQUAL_STRING("3 camera: gone", line[0]);
     TEST_ASSERT_EQUAL_STRING("4 3 of 4", line[1]);
     TEST_ASSERT_EQUAL_STRING("6 50 % done", line[2]);
 }
 
-static void the_same_kind_is_held_back_and_told_later(void)
+static void the_same_kind_is_held_back_and_reported_later(void)
 {
     int i;
 
@@ -115,7 +115,7 @@ static void the_end_tells_what_is_held_back(void)
     TEST_ASSERT_EQUAL_INT(APP_LOG_BURST + 1, line_count);
 }
 
-/* More kinds than there is room for share one entry; of those the worst held back is told. */
+/* More kinds than there is room for share one entry; of those the worst held back is reported. */
 static void more_kinds_than_room_share_one(void)
 {
     static char format[APP_LOG_KINDS_MAX + 20][8];
@@ -140,7 +140,7 @@ static void texts_are_tamed_and_cut(void)
     app_log_say(&log_state, APP_LOG_ERROR, "a\033[2J\nb%s", "\x7f");
     TEST_ASSERT_EQUAL_STRING("3 a?[2J?b?", line[0]);
     memset(text, 'x', sizeof text - 1);
-    app_log_tell(&log_state, APP_LOG_ERROR, text);
+    app_log_report(&log_state, APP_LOG_ERROR, text);
     TEST_ASSERT_EQUAL_UINT64(2 + APP_LOG_TEXT_MAX - 1, strlen(line[1]));
     for (i = 0; i < APP_LOG_BURST + 3; i++) {
         app_log_say(&log_state, APP_LOG_ERROR, "%s", text);
@@ -332,7 +332,7 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(messages_have_level_and_text);
-    RUN_TEST(the_same_kind_is_held_back_and_told_later);
+    RUN_TEST(the_same_kind_is_held_back_and_reported_later);
     RUN_TEST(a_kind_is_known_by_its_letters);
     RUN_TEST(the_end_tells_what_is_held_back);
     RUN_TEST(more_kinds_than_room_share_one);

@@ -61,7 +61,7 @@ static void test_check_says_whether_the_rig_fits(void)
 }
 
 /* Without it the loop goes on, and every record says so. */
-static void test_a_lost_rig_is_told(void)
+static void test_a_lost_rig_is_reported(void)
 {
     static const enum world_act acts[] = {TWENTY};
     world_init(APP_STROBE_ALWAYS, acts, COUNT(acts));
@@ -124,14 +124,14 @@ static void test_always(void)
 static void test_lost_twice_half(void)
 {
     static const enum world_act disturbances[] = {WORLD_LOST, WORLD_TWICE, WORLD_HALF};
-    static const char *const told[] = {"\"lost\":1", "\"skipped\":1", "\"skipped\":1"};
+    static const char *const expected[] = {"\"lost\":1", "\"skipped\":1", "\"skipped\":1"};
     for (int i = 0; i < 3; i++) {
         enum world_act acts[] = {FIVE, disturbances[i], FIVE, FIVE};
         world_init(APP_STROBE_GATED, acts, COUNT(acts));
         TEST_ASSERT_EQUAL_INT(APP_EXIT_GOOD, world_run());
         TEST_ASSERT_EQUAL_INT(0, world.dark_count);
         TEST_ASSERT_GREATER_OR_EQUAL_INT(15, world.lit_count);
-        TEST_ASSERT_EQUAL_INT(1, count_in_records(told[i]));
+        TEST_ASSERT_EQUAL_INT(1, count_in_records(expected[i]));
         world_init(APP_STROBE_ALTERNATING, acts, COUNT(acts));
         TEST_ASSERT_EQUAL_INT(APP_EXIT_GOOD, world_run());
         TEST_ASSERT_EQUAL_INT(0, world.dark_count);
@@ -220,7 +220,7 @@ static void test_reload(void)
     TEST_ASSERT_EQUAL_INT(11, world.lit_count);
 }
 
-/* The paper's method alone, if it is asked for, also after the rig has been read again. */
+/* The paper's method alone, if it is set, also after the rig has been read again. */
 static void test_paper(void)
 {
     static const enum world_act acts[] = {FIVE, WORLD_RELOAD, FIVE};
@@ -299,7 +299,7 @@ static void test_nothing_in_range(void)
     }
 }
 
-/* A camera that refuses is not asked again. */
+/* A camera that refuses is not opened again. */
 static void test_exposure_refused(void)
 {
     static const enum world_act acts[] = {TWENTY};
@@ -395,7 +395,7 @@ static int fail_each_call(enum world_function function, int mode, int flight, bo
     world_run();
     int calls = world.calls[function];
     for (int call = 1; call <= calls; call++) {
-        static char message[128]; /* told after a failure */
+        static char message[128]; /* reported after a failure */
         init_eventful(mode, flight);
         world.faults[0] = (struct world_fault){function, call, .stays = stays};
         snprintf(message, sizeof message, "%s, call %d, mode %d, flight %d, %s",
@@ -403,11 +403,11 @@ static int fail_each_call(enum world_function function, int mode, int flight, bo
         world_doing = message;
         enum app_exit exit = world_run();
         TEST_ASSERT_TRUE_MESSAGE(world.faults[0].done, message);
-        /* Off may have been tried again with success. For good: who looks at it has to be told. */
+        /* Off may have been tried again with success. For good: a message has to say so. */
         if (function != WORLD_STROBE_OFF || stays) {
             bool failed = is_fatal(function) || function == WORLD_STROBE_OFF;
             TEST_ASSERT_EQUAL_INT_MESSAGE(failed ? APP_EXIT_FAILED : APP_EXIT_GOOD, exit, message);
-            TEST_ASSERT_TRUE_MESSAGE(world.told_fault || function != WORLD_STROBE_OFF, message);
+            TEST_ASSERT_TRUE_MESSAGE(world.reported_fault || function != WORLD_STROBE_OFF, message);
         }
     }
     world_doing = NULL;
@@ -457,7 +457,7 @@ static void test_two_calls_fail(void)
     }
     for (int run = 0; run < RUNS; run++) {
         int mode = random_below(&random, 3), flight = random_below(&random, 2);
-        static char message[160]; /* told after a failure */
+        static char message[160]; /* reported after a failure */
         init_eventful(mode, 2 * flight);
         for (int i = 0; i < WORLD_FAULTS; i++) {
             int function = random_below(&random, WORLD_FUNCTIONS);
@@ -489,7 +489,7 @@ static void test_anything_happens(void)
     static enum world_act acts[ACTS + CALM];
     uint32_t random = 4;
     for (int run = 0; run < RUNS; run++) {
-        static char message[80]; /* told after a failure */
+        static char message[80]; /* reported after a failure */
         int wild = 1 + random_below(&random, 8);
         for (int i = 0; i < ACTS; i++) {
             acts[i] = random_below(&random, 8) >= wild
@@ -526,7 +526,7 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(test_gated_takes_every_frame);
     RUN_TEST(test_check_says_whether_the_rig_fits);
-    RUN_TEST(test_a_lost_rig_is_told);
+    RUN_TEST(test_a_lost_rig_is_reported);
     RUN_TEST(test_gated_with_frames_in_flight);
     RUN_TEST(test_alternating);
     RUN_TEST(test_always);

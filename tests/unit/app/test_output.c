@@ -29,13 +29,13 @@ static size_t sent_count, got_count;
 /* A terminal makes two characters of a line's end. */
 static bool doubled;
 
-static int64_t tell_time(void *context)
+static int64_t report_time(void *context)
 {
     (void)context;
     return now_us;
 }
 
-static const struct hal_clock test_clock = {NULL, tell_time};
+static const struct hal_clock test_clock = {NULL, report_time};
 
 void setUp(void)
 {
@@ -118,8 +118,8 @@ static size_t drain(int descriptor, size_t count)
 static void drain_until(int descriptor, size_t count)
 {
     while (got_count < count) {
-        struct pollfd asked = {.fd = descriptor, .events = POLLIN};
-        TEST_ASSERT_EQUAL_INT(1, poll(&asked, 1, -1));
+        struct pollfd readable = {.fd = descriptor, .events = POLLIN};
+        TEST_ASSERT_EQUAL_INT(1, poll(&readable, 1, -1));
         (void)drain(descriptor, SENT_MAX - got_count);
     }
     TEST_ASSERT_EQUAL_UINT64(count, got_count);
@@ -321,7 +321,7 @@ static void a_reader_that_goes_in_mid_record_ends_it(void)
     close(ends[1]);
 }
 
-static void what_cannot_be_opened_is_told(void)
+static void what_cannot_be_opened_is_reported(void)
 {
     int own = dup(STDOUT_FILENO);
     bool good;
@@ -433,7 +433,7 @@ static void a_datagram_is_one_record(void)
     close(receiver);
 }
 
-/* Nobody there: told as far as the network tells; and when somebody comes, it goes on. */
+/* Nobody there: reported as far as the network reports; and when somebody comes, it goes on. */
 static void a_receiver_may_go_and_come_back(void)
 {
     char port[8] = "0";
@@ -588,7 +588,7 @@ static void a_serial_line_that_goes_is_opened_again(void)
     close(master);
 }
 
-static void what_is_no_serial_line_is_told(void)
+static void what_is_no_serial_line_is_reported(void)
 {
     char path[HAL_OUTPUT_PATH_MAX + 1];
     int file = open(PLAIN_FILE, O_RDWR | O_CREAT, 0600);
@@ -621,7 +621,7 @@ int main(void)
     RUN_TEST(a_stopped_terminal_drops_records);
     RUN_TEST(a_reader_that_has_gone_ends_it);
     RUN_TEST(a_reader_that_goes_in_mid_record_ends_it);
-    RUN_TEST(what_cannot_be_opened_is_told);
+    RUN_TEST(what_cannot_be_opened_is_reported);
     RUN_TEST(a_full_disk_drops_and_may_work_again);
     RUN_TEST(a_file_takes_all);
     RUN_TEST(a_datagram_is_one_record);
@@ -631,6 +631,6 @@ int main(void)
     RUN_TEST(a_serial_line_is_raw);
     RUN_TEST(a_serial_line_that_is_too_slow_drops_records);
     RUN_TEST(a_serial_line_that_goes_is_opened_again);
-    RUN_TEST(what_is_no_serial_line_is_told);
+    RUN_TEST(what_is_no_serial_line_is_reported);
     return UNITY_END();
 }

@@ -251,7 +251,7 @@ static void b_and_x_may_be_the_same_array(void)
     TEST_ASSERT_EQUAL_INT32_ARRAY(mantissa, right, v->n);
 }
 
-static void nothing_on_the_right_gives_nothing(void)
+static void a_zero_right_side_gives_zero(void)
 {
     const struct vector_system *v = &vector_systems[2];
 
@@ -262,8 +262,8 @@ static void nothing_on_the_right_gives_nothing(void)
     TEST_ASSERT_EACH_EQUAL_INT32(0, mantissa, v->n);
 }
 
-/* The greatest right side: b = L y with |y| near 2^31 - 1 in the first place alone. */
-static void the_greatest_right_side_is_solved(void)
+/* The largest right side: b = L y with |y| near 2^31 - 1 in the first place alone. */
+static void the_largest_right_side_is_solved(void)
 {
     int32_t sign;
 
@@ -274,15 +274,15 @@ static void the_greatest_right_side_is_solved(void)
         right[1] = 0;
         right[2] = -sign * INT32_MAX;
         ih_cholesky_solve(factor, 3, right, mantissa, &exponent);
-        check_solution(matrix, 3, right, "greatest b");
+        check_solution(matrix, 3, right, "largest b");
         /* A quarter on the diagonal: x = 4 b does not fit 32 bits without an exponent. */
         set_diagonal(3, 1 << 28);
         factorise(matrix, 3, "quarter");
         right[0] = sign * (INT32_MAX / 2);
         right[2] = -sign * (INT32_MAX / 2);
         ih_cholesky_solve(factor, 3, right, mantissa, &exponent);
-        check_exponent_is_min(3, "quarter, greatest b");
-        check_solution(matrix, 3, right, "quarter, greatest b");
+        check_exponent_is_min(3, "quarter, largest b");
+        check_solution(matrix, 3, right, "quarter, largest b");
     }
 }
 
@@ -294,7 +294,7 @@ static void expect_not_positive(int32_t n, int32_t pivot, const char *what)
     IH_TEST_EQUAL(pivot, bad_pivot, what, n);
 }
 
-static void the_bad_pivot_is_told(void)
+static void the_bad_pivot_is_reported(void)
 {
     int32_t k;
 
@@ -342,9 +342,9 @@ int main(void)
     RUN_TEST(a_diagonal_matrix_is_its_roots);
     RUN_TEST(the_unit_diagonal_is_the_upper_limit);
     RUN_TEST(b_and_x_may_be_the_same_array);
-    RUN_TEST(nothing_on_the_right_gives_nothing);
-    RUN_TEST(the_greatest_right_side_is_solved);
-    RUN_TEST(the_bad_pivot_is_told);
+    RUN_TEST(a_zero_right_side_gives_zero);
+    RUN_TEST(the_largest_right_side_is_solved);
+    RUN_TEST(the_bad_pivot_is_reported);
     RUN_TEST(dependent_rows_are_found);
     return UNITY_END();
 }

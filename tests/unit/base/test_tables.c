@@ -16,7 +16,7 @@ static double root_inverse(int of_256)
     return 32768 / sqrt(of_256 / 256.0);
 }
 
-/* How far the chord between two entries lies above the curve at the most: where the curve is as steep
+/* How far the chord between two entries lies above the curve at most: where the curve is as steep
  * as the chord. */
 static double chord_above(int of_256)
 {
@@ -27,7 +27,7 @@ static double chord_above(int of_256)
 }
 
 /* The roots do not show it when an entry is off by one, the time that they take does. An entry is
- * the greatest with which no chord at it is above the curve. */
+ * the largest with which no chord at it is above the curve. */
 static void inverse_roots_are_as_close_as_may_be(void)
 {
     int i;
@@ -42,8 +42,8 @@ static void inverse_roots_are_as_close_as_may_be(void)
     }
 }
 
-/* What the steps of the root take from there: never too great, and at most 2^-13.7 too small. */
-static void inverse_roots_are_never_too_great(void)
+/* What the steps of the root take from there: never too large, and at most 2^-13.7 too small. */
+static void inverse_roots_are_never_too_large(void)
 {
     uint64_t m_q32;
     uint32_t i;
@@ -76,7 +76,7 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(inverse_roots_are_as_close_as_may_be);
-    RUN_TEST(inverse_roots_are_never_too_great);
+    RUN_TEST(inverse_roots_are_never_too_large);
     RUN_TEST(angles_of_the_steps_are_exact);
     return UNITY_END();
 }

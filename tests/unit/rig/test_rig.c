@@ -528,10 +528,10 @@ static void a_range_rig_needs_no_projector(void)
     calibration.cx_px_q16 = calibration.cy_px_q16 = 32 << 16;
     expect(IH_OK, IH_NONE, "least range image");
     calibration.width = IH_RANGE_SIDE_MIN - 1;
-    expect(IH_ERR_SIZE, IH_NONE, "narrower than the least");
+    expect(IH_ERR_SIZE, IH_NONE, "narrower than the minimum");
     calibration.width = IH_RANGE_SIDE_MIN;
     calibration.height = IH_RANGE_SIDE_MIN - 1;
-    expect(IH_ERR_SIZE, IH_NONE, "lower than the least");
+    expect(IH_ERR_SIZE, IH_NONE, "lower than the minimum");
     calibration.height = 320; /* higher than wide */
     expect(IH_OK, IH_NONE, "portrait");
 }
@@ -720,7 +720,7 @@ static void sides_may_be_seen_at_the_widest_angle(void)
 
         use_range_rig(size_px[0], size_px[1], 200);
         *principal_px_q16 = max;
-        expect(IH_OK, IH_NONE, "greatest principal point");
+        expect(IH_OK, IH_NONE, "largest principal point");
         *principal_px_q16 = max + 1;
         expect(IH_ERR_PRINCIPAL, IH_NONE, "a greater one");
         *principal_px_q16 = min;
@@ -805,7 +805,7 @@ static void dots_must_move_by_a_tenth_of_a_pixel(void)
         memset(calibration.origin_mm_q16, 0, sizeof calibration.origin_mm_q16);
         calibration.origin_mm_q16[1] =
             6400 + 16 * off; /* e is rounded to Q8: 16 units are 1/4 px mm */
-        expect(off < 0 ? IH_ERR_BASELINE : IH_OK, off < 0 ? 0 : IH_NONE, "the least baseline");
+        expect(off < 0 ? IH_ERR_BASELINE : IH_OK, off < 0 ? 0 : IH_NONE, "the smallest baseline");
     }
 }
 

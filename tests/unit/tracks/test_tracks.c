@@ -152,7 +152,7 @@ static void check_tracks(void)
 
 /* Detections and predicted heads of the last frame. */
 static int32_t listed_count;
-/* As they were before the frame's findings. */
+/* As they were before the frame's detections. */
 static struct ih_tracks before;
 
 static void frame_at(int64_t at_us)
@@ -214,12 +214,12 @@ static double from_q8(int64_t value)
 /* --- against float64 -----------------------------------------------------------------------------
  */
 
-/* Places are rounded to 1/256 mm a few times a frame; a gain to 2^-17, which on an innovation of at
+/* Positions are rounded to 1/256 mm a few times a frame; a gain to 2^-17, which on an innovation of at
  * most 500 mm is 0.004 mm. The filter forgets within about five frames: 0.02 mm. The gain of the
  * speed is below 13 1/s, its rounding the same: 0.004 mm/s; the time step is rounded to 1 us, 25
- * ppm of 40 ms. What a place is off counts 13 times in the speed. Variances: steps of 25 ppm,
+ * ppm of 40 ms. A position error appears 13 times in the speed. Variances: steps of 25 ppm,
  * collected over some frames: 3e-4 of the value, and a gain's rounding of 2^-17 times the variance
- * before the finding. After a long step that was 250,000 mm^2, and what is left of it, 2 of 144
+ * before the detection. After a long step that was 250,000 mm^2, and what is left of it, 2 of 144
  * mm^2, is felt for ten frames. */
 static int frames_since_long;
 
@@ -228,12 +228,12 @@ static void check_state(const struct vector_sequence *sequence, int frame_index,
 {
     const char *name = sequence->name;
     const double part = frames_since_long < 10 ? 0.02 : 3e-4;
-    double gain_place = 0, gain_cross = 0, speed = expected_state->speed;
+    double gain_position = 0, gain_cross = 0, speed = expected_state->speed;
     int axis;
 
     for (axis = 0; axis < before.track_count; axis++) {
         if (before.track[axis].id == track->id) {
-            gain_place = from_q8(before.track[axis].filter.position_q8) / 65536;
+            gain_position = from_q8(before.track[axis].filter.position_q8) / 65536;
             gain_cross = fabs(from_q8(before.track[axis].filter.cross_q8)) / 65536;
             speed =
                 from_q8(before.track[axis].filter.velocity_q8); /* what is left is a difference */
@@ -252,7 +252,7 @@ static void check_state(const struct vector_sequence *sequence, int frame_index,
         IH_TEST_WITHIN(0.02, expected_state->semi_mm[axis],
                        from_q8(track->filter.head.semi_mm_q8[axis]), name, frame_index);
     }
-    IH_TEST_WITHIN(0.05 + part * expected_state->place + gain_place, expected_state->place,
+    IH_TEST_WITHIN(0.05 + part * expected_state->place + gain_position, expected_state->place,
                    from_q8(track->filter.position_q8), name, frame_index);
     IH_TEST_WITHIN(1 + part * fabs(expected_state->cross) + gain_cross, expected_state->cross,
                    from_q8(track->filter.cross_q8), name, frame_index);
@@ -323,8 +323,8 @@ static void a_moving_head_keeps_its_id(void)
     }
     /* The speed is known: an exact line has no error but the filter's own. */
     IH_TEST_WITHIN(2, 500, from_q8(tracks.track[0].filter.velocity_mm_s_q8[0]), "speed", 0);
-    IH_TEST_WITHIN(1, -500 + 20 * 49, from_q8(tracks.track[0].filter.head.centre_mm_q8[0]), "place",
-                   0);
+    IH_TEST_WITHIN(1, -500 + 20 * 49, from_q8(tracks.track[0].filter.head.centre_mm_q8[0]),
+                   "position", 0);
 }
 
 static void crossing_heads_keep_their_ids(void)
@@ -348,7 +348,7 @@ static void crossing_heads_keep_their_ids(void)
     }
 }
 
-/* Who gets what is a matter of places and log-odds. New ids follow the list, so all heads are there
+/* Assignment depends on positions and log-odds. New ids follow the list, so all heads are there
  * already. */
 static void the_order_of_detections_does_not_matter(void)
 {
@@ -418,7 +418,7 @@ static void a_full_table_takes_no_further_head(void)
         }
     }
     TEST_ASSERT_FALSE(verdict(IH_TRACKS_MAX).is_head);
-    /* One leaves: its place is free in the same frame. */
+    /* One leaves: its room is free in the same frame. */
     view = through;
     for (k = 1; k <= IH_TRACKS_MAX; k++) {
         add(-800 + 200 * k, 0, 900, 5 - 0.4 * k);
@@ -479,8 +479,8 @@ static void an_id_in_use_is_not_given_again(void)
     TEST_ASSERT_EQUAL_INT32(3, tracks.track[2].id);
 }
 
-/* Two tracks that have come to the same place are one head: the older one's, without a gap. */
-static void of_two_tracks_at_one_place_the_older_stays(void)
+/* Two tracks at the same position are one head: the older one's, without a gap. */
+static void of_two_tracks_at_one_position_the_older_stays(void)
 {
     add(-60, 0, 900, 3);
     add(60, 0, 900, 3);
@@ -601,7 +601,7 @@ static void a_seat_that_is_seen_through_ends_at_once(void)
     TEST_ASSERT_EQUAL_INT32(2, tracks.selected_id);
 }
 
-/* Looked through, a convincing finding continues the track and any other does not. */
+/* Looked through, a convincing detection continues the track and any other does not. */
 static void what_is_seen_through_needs_a_convincing_detection(void)
 {
     frames_with(5, 0, 0, 800, 5);
@@ -786,7 +786,7 @@ static void a_coasting_track_slows_down(void)
         x += moved;
     }
     TEST_ASSERT_EQUAL_INT32(0, tracks.track[0].filter.velocity_mm_s_q8[0]);
-    IH_TEST_RANGE(280 + 20, 280 + 100, (int64_t)x, "place", 0);
+    IH_TEST_RANGE(280 + 20, 280 + 100, (int64_t)x, "position", 0);
 }
 
 /* The longer it was not seen, the farther off it may be found. */
@@ -816,7 +816,7 @@ static void sigma_grows_while_coasting_and_shrinks_when_seen(void)
         frames_with(1, 0, 0, 800, 3);
         last = sigma_mm(0);
     }
-    TEST_ASSERT_TRUE(last < 12); /* better than one finding */
+    TEST_ASSERT_TRUE(last < 12); /* better than one detection */
     view = front;
     for (i = 0; i < 25; i++) {
         frames_without(1);
@@ -828,7 +828,7 @@ static void sigma_grows_while_coasting_and_shrinks_when_seen(void)
     TEST_ASSERT_TRUE(sigma_mm(0) < 13);
     frames_with(10, 0, 0, 800, 3);
     last = sigma_mm(0);
-    frames_with(10, 0, 0, 800, 1.5); /* below log-odds of 2 a finding is less certain */
+    frames_with(10, 0, 0, 800, 1.5); /* below log-odds of 2 a detection is less certain */
     TEST_ASSERT_TRUE(sigma_mm(0) > last + 1);
 }
 
@@ -857,7 +857,7 @@ static void a_frame_is_lost_with_fewer_points_than_its_limit(void)
     }
 }
 
-/* At a gate's end a finding still belongs to the track: 30 mm, and 100 mm/s for 40 ms. */
+/* At a gate's end a detection still belongs to the track: 30 mm, and 100 mm/s for 40 ms. */
 static void a_gate_reaches_as_far_as_it_says(void)
 {
     int far_side;
@@ -874,13 +874,13 @@ static void a_gate_reaches_as_far_as_it_says(void)
     }
 }
 
-/* A finding at the gate's end is worth 4 less than one at its middle, in proportion to the square of the
- * distance: half way, 1 less. */
+/* A detection at the gate's end is worth 4 less than one at its middle, in proportion to the square of the
+ * distance: at half of it, 1 less. */
 static void a_near_detection_is_better_than_a_probable_one(void)
 {
     static const struct {
         double more, y_mm;
-        int32_t own; /* the finding that the track takes */
+        int32_t own; /* the detection that the track takes */
     } cases[] = {{3.99, 90, 0}, {4.01, 90, 1}, {0.99, 45, 0}, {1.01, 45, 1}};
     int i;
 
@@ -892,7 +892,7 @@ static void a_near_detection_is_better_than_a_probable_one(void)
         add(0, 0, 800, -2.5);
         add(0, cases[i].y_mm, 800, -2.5 + cases[i].more);
         frame();
-        IH_TEST_EQUAL(cases[i].own, tracks.track[0].index, "finding", i);
+        IH_TEST_EQUAL(cases[i].own, tracks.track[0].index, "detection", i);
     }
 }
 
@@ -923,14 +923,14 @@ static void verdicts_need_more_than_their_limits(void)
     ih_tracks_init(&tracks);
     frames_with(3, 0, 0, 800, 513.0 / 1024);
     TEST_ASSERT_TRUE(tracks.track[0].is_head);
-    params.memory_q16 = 0; /* its mean is its last finding's */
+    params.memory_q16 = 0; /* its mean is its last detection's */
     frames_with(1, 0, 0, 800, -511.0 / 1024);
     TEST_ASSERT_TRUE(tracks.track[0].is_head);
     frames_with(1, 0, 0, 800, -0.5); /* drop */
     TEST_ASSERT_FALSE(tracks.track[0].is_head);
 }
 
-/* A finding of keep_logit itself continues a track, whose mean may be as low; what is seen through takes
+/* A detection of keep_logit itself continues a track, whose mean may be as low; what is seen through takes
  * one of accept_logit. */
 static void a_track_is_continued_down_to_its_limits(void)
 {
@@ -953,33 +953,33 @@ static void a_track_is_continued_down_to_its_limits(void)
     TEST_ASSERT_EQUAL_INT32(2, verdict(0).track_id);
 }
 
-/* A head is no more chosen for its place where it is 3 less probable than the best. */
-static void a_head_is_chosen_for_its_place_within_three(void)
+/* A head is not chosen for its position where it is 3 less probable than the best. */
+static void a_head_is_chosen_for_its_position_within_three(void)
 {
-    int less;
+    int below;
 
     params.side = IH_SIDE_LEFT;
-    for (less = 0; less <= 1; less++) {
+    for (below = 0; below <= 1; below++) {
         ih_tracks_init(&tracks);
         add(0, 0, 800, 5);
-        add(-300, 0, 800, 2 - less / 1024.0);
+        add(-300, 0, 800, 2 - below / 1024.0);
         frame();
-        IH_TEST_EQUAL(less == 0, tracks.selected, "selected", less);
+        IH_TEST_EQUAL(below == 0, tracks.selected, "selected", below);
     }
 }
 
-/* Findings are counted up to 1000. */
+/* Detections are counted up to 1000. */
 static void detections_of_a_track_are_counted(void)
 {
     int i;
 
     for (i = 1; i <= 1002; i++) {
         frames_with(1, 0, 0, 800, 5);
-        IH_TEST_EQUAL(i < 1000 ? i : 1000, tracks.track[0].detection_count, "findings", i);
+        IH_TEST_EQUAL(i < 1000 ? i : 1000, tracks.track[0].detection_count, "detections", i);
     }
 }
 
-/* A place is known to 500 mm at the worst, a speed to 3 m/s, and no head is faster. */
+/* A position is known to 500 mm at worst, a speed to 3 m/s, and no head is faster. */
 static void uncertainty_has_its_limits(void)
 {
     params.acceleration_mm_s2 = 8191;
@@ -1015,15 +1015,15 @@ static void the_middle_of_a_range_camera_is_its_axis(void)
 
 static void the_same_time_again_is_another_look(void)
 {
-    int64_t place_q8;
+    int64_t position_q8;
 
     frames_with(5, 0, 0, 800, 3);
-    place_q8 = tracks.track[0].filter.position_q8;
+    position_q8 = tracks.track[0].filter.position_q8;
     add(4, 0, 800, 3);
     frame_at(time_us);
     TEST_ASSERT_EQUAL_INT32(1, tracks.selected_id);
     TEST_ASSERT_TRUE(tracks.track[0].filter.position_q8 <
-                     place_q8); /* twice seen is better known */
+                     position_q8); /* twice seen is better known */
     IH_TEST_RANGE(0, 4 << 8, tracks.track[0].filter.head.centre_mm_q8[0], "between", 0);
     view = front;
     frame_at(time_us);
@@ -1163,7 +1163,7 @@ static void the_middle_is_on_the_projectors_ray(void)
     }
 }
 
-static void a_doubtful_head_is_not_chosen_for_its_place(void)
+static void a_doubtful_head_is_not_chosen_for_its_position(void)
 {
     frames_with(1, 0, 0, 900, 1.5);
     add(0, 0, 900, 1.5);
@@ -1216,8 +1216,8 @@ static void the_selected_head_changes_slowly(void)
 /* --- numbers -------------------------------------------------------------------------------------
  */
 
-/* As far as a finding can be: 16 m away at a slope of 8. */
-static void extreme_places_do_not_overflow(void)
+/* As far as a detection can be: 16 m away at a slope of 8. */
+static void extreme_positions_do_not_overflow(void)
 {
     static const double far[][3] = {{131000, 131000, 16000},
                                     {-131000, 131000, 16000},
@@ -1240,7 +1240,7 @@ static void extreme_places_do_not_overflow(void)
     frames_without(20);
 }
 
-/* Whatever is found where a fast head is expected, hour after hour: its place stays in its format. */
+/* Whatever is found where a fast head is expected, hour after hour: its position stays in its format. */
 static void a_head_that_runs_away_stays_in_the_format(void)
 {
     int i;
@@ -1262,7 +1262,7 @@ static void a_head_that_runs_away_stays_in_the_format(void)
 }
 
 /* A step of some seconds' tenths limits variances: their cross term must be limited with them, or a
- * finding makes the rest negative. */
+ * detection makes the remainder negative. */
 static void rare_frames_keep_the_variances_positive(void)
 {
     int i;
@@ -1314,13 +1314,13 @@ static void the_covariance_stays_positive(void)
             const double speed = from_q8(track->filter.velocity_q8);
             /* Steps of Q8 collected over frames, the squared time's half step of 2^-21 s^2, and a
              * gain's of 2^-17. */
-            const double place_more = place + 0.2 + speed / 1048576;
+            const double position_more = place + 0.2 + speed / 1048576;
             const double speed_more = speed + 2 + fabs(cross) / 32768;
 
-            IH_TEST_RANGE(0, 250000 << 8, track->filter.position_q8, "place", i);
+            IH_TEST_RANGE(0, 250000 << 8, track->filter.position_q8, "position", i);
             IH_TEST_RANGE(0, (int64_t)9000000 << 8, track->filter.velocity_q8, "speed", i);
-            if (place_more * speed_more < cross * cross) {
-                IH_TEST_WITHIN(0, place_more * speed_more, cross * cross, "determinant", i);
+            if (position_more * speed_more < cross * cross) {
+                IH_TEST_WITHIN(0, position_more * speed_more, cross * cross, "determinant", i);
             }
             min = fmin(min, place);
         }
@@ -1339,7 +1339,7 @@ int main(void)
     RUN_TEST(predicted_heads_have_room_beside_a_full_list);
     RUN_TEST(ids_wrap_to_one);
     RUN_TEST(an_id_in_use_is_not_given_again);
-    RUN_TEST(of_two_tracks_at_one_place_the_older_stays);
+    RUN_TEST(of_two_tracks_at_one_position_the_older_stays);
     RUN_TEST(a_weak_detection_becomes_a_head_after_evidence);
     RUN_TEST(an_improbable_detection_starts_nothing);
     RUN_TEST(a_tentative_track_does_not_coast);
@@ -1362,7 +1362,7 @@ int main(void)
     RUN_TEST(two_tracks_may_be_as_near_as_80_mm);
     RUN_TEST(verdicts_need_more_than_their_limits);
     RUN_TEST(a_track_is_continued_down_to_its_limits);
-    RUN_TEST(a_head_is_chosen_for_its_place_within_three);
+    RUN_TEST(a_head_is_chosen_for_its_position_within_three);
     RUN_TEST(detections_of_a_track_are_counted);
     RUN_TEST(uncertainty_has_its_limits);
     RUN_TEST(the_middle_of_a_range_camera_is_its_axis);
@@ -1377,9 +1377,9 @@ int main(void)
     RUN_TEST(sides_are_those_of_the_picture);
     RUN_TEST(the_middle_is_the_patterns);
     RUN_TEST(the_middle_is_on_the_projectors_ray);
-    RUN_TEST(a_doubtful_head_is_not_chosen_for_its_place);
+    RUN_TEST(a_doubtful_head_is_not_chosen_for_its_position);
     RUN_TEST(the_selected_head_changes_slowly);
-    RUN_TEST(extreme_places_do_not_overflow);
+    RUN_TEST(extreme_positions_do_not_overflow);
     RUN_TEST(a_head_that_runs_away_stays_in_the_format);
     RUN_TEST(rare_frames_keep_the_variances_positive);
     RUN_TEST(the_covariance_stays_positive);
