@@ -33,6 +33,7 @@
 #include "rig/ih_rig.h"
 #include "surface/ih_samples.h"
 #include "surface/ih_surface.h"
+#include "surface/ih_surface_scratch.h"
 #include "tracks/ih_result.h"
 #include "tracks/ih_tracks.h"
 

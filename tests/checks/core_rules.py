@@ -39,6 +39,7 @@ SYMBOLS_ALLOWED = {"memcpy", "memmove", "memset", "memcmp"}
 VECTORS = {"ih_scanline.c", "ih_bandpass.c", "ih_bandpass_respond.c", "ih_bandpass_bytes.c",
            "ih_block_median.c", "ih_noise.c", "ih_dot_maxima.c", "ih_dot_centre.c", "ih_dots.c",
            "ih_normal_equations.c", "ih_normal_solve.c", "ih_multiquadric.c", "ih_surface.c",
+           "ih_surface_rows.c", "ih_surface_grid.c",
            "ih_contours.c", "ih_arcs.c", "ih_arc_fans.c", "ih_ellipse.c",
            "ih_template.c", "ih_scan.c", "ih_fit_weights.c", "ih_fit_equations.c",
            "ih_prescreen.c", "ih_ray_counts.c", "ih_undistort.c"}

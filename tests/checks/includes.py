@@ -26,10 +26,8 @@ ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__)
 
 CORE_ORDER = ["base", "simd", "rig", "dots", "labels", "points", "surface", "nests", "detect", "tracks", "upkeep"]
 CORE_SYSTEM = {"stdalign.h", "stdbool.h", "stddef.h", "stdint.h", "string.h"}
-# The vectors of x86 and the pairs of a Cortex-M, in files that are not yet on one vocabulary.
+# The vectors of x86 and ARM, and the pairs of a Cortex-M: for simd alone.
 VECTOR_HEADERS = {"immintrin.h", "emmintrin.h", "arm_neon.h", "arm_acle.h"}
-VECTOR_FILES = {"ih_normal_equations_cortexm.h",
-                "ih_surface.c"}
 
 INCLUDE = re.compile(r'^\s*#\s*include\s*(["<])([^">]+)[">]')
 
@@ -42,7 +40,7 @@ def judge_core(path, quoted, target):
     if not quoted:
         if target in CORE_SYSTEM:
             return None
-        if target in VECTOR_HEADERS and (folder == "simd" or parts[-1] in VECTOR_FILES):
+        if target in VECTOR_HEADERS and folder == "simd":
             return None
         return "the core does without <%s>" % target
     if "/" not in target:

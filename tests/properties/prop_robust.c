@@ -19,6 +19,7 @@
 #include "points/ih_points.h"
 #include "surface/ih_samples.h"
 #include "surface/ih_surface.h"
+#include "surface/ih_surface_scratch.h"
 #include "prop_scene.h"
 
 #include "rigs.inc"

@@ -156,7 +156,7 @@ def grid(nodes):
             define("surface/ih_surface.h", "IH_SURFACE_GRID", nodes),
             define("surface/ih_surface.h", "IH_SURFACE_STEP_NUMERATOR", numerator),
             define("surface/ih_surface.h", "IH_SURFACE_STEP_DENOMINATOR", denominator),
-            define("surface/ih_surface.c", "TABLE_WIDTH", "(%d * TABLE_LINE)" % -(-(nodes - 1) // 12)),
+            define("surface/ih_surface_grid.c", "TABLE_WIDTH", "(%d * TABLE_LINE)" % -(-(nodes - 1) // 8)),
             define("isohead.h", "IH_RAM_MAX", "(%d * 1024)" % (192 if nodes <= 47 else 1024))]
 
 

@@ -12,6 +12,8 @@
 
 #include <stdint.h>
 
+#include "base/ih_range.h"
+
 #ifdef __ARM_FEATURE_SIMD32
 #include <arm_acle.h>
 #endif
@@ -147,6 +149,25 @@ static inline uint32_t ih_word_sub(uint32_t a, uint32_t b)
            ((a ^ ~b) & IH_WORD_ALL(0x8000));
 #endif
 }
+
+#ifdef __ARM_FEATURE_SIMD32
+/* sum plus the products of both signed lanes; it wraps. */
+static inline uint32_t ih_word_madd(uint32_t sum, uint32_t a, uint32_t b)
+{
+    return (uint32_t)__smlad((int16x2_t)a, (int16x2_t)b, (int32_t)sum);
+}
+#else
+static inline int32_t ih_word_lane(uint32_t half)
+{
+    return (int32_t)(half ^ 0x8000) - 0x8000;
+}
+
+IH_WRAPPING static inline uint32_t ih_word_madd(uint32_t sum, uint32_t a, uint32_t b)
+{
+    return sum + IH_WRAPS(uint32_t, ih_word_lane(a & UINT16_MAX) * ih_word_lane(b & UINT16_MAX)) +
+           IH_WRAPS(uint32_t, ih_word_lane(a >> 16) * ih_word_lane(b >> 16));
+}
+#endif
 
 static inline void ih_word_store(uint32_t word, void *pixel)
 {

@@ -7,14 +7,61 @@
 
 #include <arm_neon.h>
 
-/* Products of the upper halves: only 64-bit ARM has them in one instruction. */
+/* Products of the upper halves of the lanes: 64-bit ARM has one instruction for each. */
 #ifdef __aarch64__
-#define IH_NEON_MUL_UPPER(type, a, b) vmull_high_##type(a, b)
-#define IH_NEON_ADD_UPPER(type, sum, a, b) vmlal_high_##type(sum, a, b)
+
+static inline int32x4_t ih_neon_mul_high_s16(int16x8_t a, int16x8_t b)
+{
+    return vmull_high_s16(a, b);
+}
+
+static inline int32x4_t ih_neon_mul_add_high_s16(int32x4_t sum, int16x8_t a, int16x8_t b)
+{
+    return vmlal_high_s16(sum, a, b);
+}
+
+static inline int64x2_t ih_neon_mul_high_s32(int32x4_t a, int32x4_t b)
+{
+    return vmull_high_s32(a, b);
+}
+
+static inline int64x2_t ih_neon_mul_add_high_s32(int64x2_t sum, int32x4_t a, int32x4_t b)
+{
+    return vmlal_high_s32(sum, a, b);
+}
+
+static inline uint64x2_t ih_neon_mul_high_u32(uint32x4_t a, uint32x4_t b)
+{
+    return vmull_high_u32(a, b);
+}
+
 #else
-#define IH_NEON_MUL_UPPER(type, a, b) vmull_##type(vget_high_##type(a), vget_high_##type(b))
-#define IH_NEON_ADD_UPPER(type, sum, a, b) \
-    vmlal_##type(sum, vget_high_##type(a), vget_high_##type(b))
+
+static inline int32x4_t ih_neon_mul_high_s16(int16x8_t a, int16x8_t b)
+{
+    return vmull_s16(vget_high_s16(a), vget_high_s16(b));
+}
+
+static inline int32x4_t ih_neon_mul_add_high_s16(int32x4_t sum, int16x8_t a, int16x8_t b)
+{
+    return vmlal_s16(sum, vget_high_s16(a), vget_high_s16(b));
+}
+
+static inline int64x2_t ih_neon_mul_high_s32(int32x4_t a, int32x4_t b)
+{
+    return vmull_s32(vget_high_s32(a), vget_high_s32(b));
+}
+
+static inline int64x2_t ih_neon_mul_add_high_s32(int64x2_t sum, int32x4_t a, int32x4_t b)
+{
+    return vmlal_s32(sum, vget_high_s32(a), vget_high_s32(b));
+}
+
+static inline uint64x2_t ih_neon_mul_high_u32(uint32x4_t a, uint32x4_t b)
+{
+    return vmull_u32(vget_high_u32(a), vget_high_u32(b));
+}
+
 #endif
 
 static inline ih_i16 ih_i16_min(ih_i16 a, ih_i16 b)
@@ -191,14 +238,14 @@ static inline struct ih_pair_sums ih_pair_sums_first(ih_i16 a, ih_i16 b)
 {
     const int16x8_t x = (int16x8_t)a, y = (int16x8_t)b;
     return (struct ih_pair_sums){vmull_s16(vget_low_s16(x), vget_low_s16(y)),
-                                 IH_NEON_MUL_UPPER(s16, x, y)};
+                                 ih_neon_mul_high_s16(x, y)};
 }
 
 static inline struct ih_pair_sums ih_pair_sums_add(struct ih_pair_sums sums, ih_i16 a, ih_i16 b)
 {
     const int16x8_t x = (int16x8_t)a, y = (int16x8_t)b;
     return (struct ih_pair_sums){vmlal_s16(sums.first, vget_low_s16(x), vget_low_s16(y)),
-                                 IH_NEON_ADD_UPPER(s16, sums.second, x, y)};
+                                 ih_neon_mul_add_high_s16(sums.second, x, y)};
 }
 
 static inline ih_i32 ih_pair_sums_total(struct ih_pair_sums sums)
@@ -216,14 +263,14 @@ static inline struct ih_wide ih_i32_mul_wide(ih_i32 a, ih_i32 b)
 {
     const int32x4_t x = (int32x4_t)a, y = (int32x4_t)b;
     return (struct ih_wide){(ih_i64)vmull_s32(vget_low_s32(x), vget_low_s32(y)),
-                            (ih_i64)IH_NEON_MUL_UPPER(s32, x, y)};
+                            (ih_i64)ih_neon_mul_high_s32(x, y)};
 }
 
 static inline struct ih_wide ih_u32_mul_wide(ih_u32 a, ih_u32 b)
 {
     const uint32x4_t x = (uint32x4_t)a, y = (uint32x4_t)b;
     return (struct ih_wide){(ih_i64)vmull_u32(vget_low_u32(x), vget_low_u32(y)),
-                            (ih_i64)IH_NEON_MUL_UPPER(u32, x, y)};
+                            (ih_i64)ih_neon_mul_high_u32(x, y)};
 }
 
 static inline ih_u32 ih_wide_low(struct ih_wide x)
@@ -256,7 +303,7 @@ static inline struct ih_wide_sums ih_wide_sums_add(struct ih_wide_sums sums, ih_
     const int32x4_t x = (int32x4_t)a, y = (int32x4_t)b;
     return (struct ih_wide_sums){
         {(ih_i64)vmlal_s32((int64x2_t)sums.sum.a, vget_low_s32(x), vget_low_s32(y)),
-         (ih_i64)IH_NEON_ADD_UPPER(s32, (int64x2_t)sums.sum.b, x, y)}};
+         (ih_i64)ih_neon_mul_add_high_s32((int64x2_t)sums.sum.b, x, y)}};
 }
 
 static inline struct ih_wide ih_wide_sums_total(struct ih_wide_sums sums)

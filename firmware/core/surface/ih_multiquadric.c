@@ -10,6 +10,15 @@
 /* With m = s * 4^e the root of s in Q18 is sqrt(m) / 2^(9 + e), and in Q20 the table's value over 2^(5 + e). */
 #define ROOT_SHIFT 5
 
+#if IH_I16_LANES > 0
+
+static inline ih_u32 load(const uint32_t *from)
+{
+    return (ih_u32)ih_i32_load((const int32_t *)from);
+}
+
+#endif
+
 #if IH_SIMD_LANE_SHIFTS
 
 static inline ih_u32 all_lanes(uint32_t value)
@@ -29,26 +38,18 @@ static inline ih_u32 roots_of(ih_u32 square)
     return ih_u32_shift_right_each(root.value + part, e + all_lanes(ROOT_SHIFT));
 }
 
-/* Roots of the sums, for the lanes from i on. */
-static inline void put_roots(const uint32_t *across_q18, ih_u32 down_q18, int32_t i,
-                             uint32_t *line_q20)
-{
-    const ih_u32 across = (ih_u32)ih_i32_load((const int32_t *)&across_q18[i]);
-    ih_i32_store((int32_t *)&line_q20[i], (ih_i32)roots_of(across + down_q18));
-}
-
 /* The last vector ends with the line: 12 roots are two overlapping vectors of 8. */
 void ih_multiquadric_roots(const uint32_t *across_q18, int32_t across_count,
                            const uint32_t *down_q18, int32_t down_count, uint32_t *root_q20)
 {
-    const int32_t last = across_count - IH_I32_LANES;
-    for (int32_t k = 0; k < down_count; k++) {
-        const ih_u32 here_q18 = all_lanes(down_q18[k]);
-        uint32_t *line_q20 = &root_q20[k * across_count];
-        for (int32_t i = 0; i < last; i += IH_I32_LANES) {
-            put_roots(across_q18, here_q18, i, line_q20);
+    for (int32_t i = 0; i < across_count; i += IH_I32_LANES) {
+        const int32_t last = across_count - IH_I32_LANES;
+        const int32_t at = i < last ? i : last;
+        const ih_u32 across = load(&across_q18[at]);
+        for (int32_t k = 0; k < down_count; k++) {
+            ih_i32_store((int32_t *)&root_q20[k * across_count + at],
+                         (ih_i32)roots_of(across + all_lanes(down_q18[k])));
         }
-        put_roots(across_q18, here_q18, last, line_q20);
     }
 }
 
@@ -83,11 +84,6 @@ void ih_multiquadric_roots(const uint32_t *across_q18, int32_t across_count,
 /* Vectors of half a row of nodes that are summed together, as many as registers hold. */
 #define NODE_VECTORS 3
 
-static inline ih_u32 load(const uint32_t *from)
-{
-    return (ih_u32)ih_i32_load((const int32_t *)from);
-}
-
 /* Sums at `vectors` of nodes side by side, which the compiler knows. */
 __attribute__((always_inline)) static inline void
 sum_nodes(const int32_t *coefficient, const uint32_t *const *line_q20, int32_t line_count,
@@ -97,17 +93,21 @@ sum_nodes(const int32_t *coefficient, const uint32_t *const *line_q20, int32_t l
     for (int32_t v = 0; v < vectors; v++) {
         sums[v] = ih_wide_sums_zero();
     }
-    for (int32_t k = 0; k < line_count; k++) {
-        const uint32_t *basis_q20 = &line_q20[k][x];
-        for (int32_t i = 0; i < count; i++) {
-            const ih_i32 factor = ih_i32_all(coefficient[i]);
+    /* No count is 0: do loops, or compilers move the sums for the case that nothing is added. */
+    const int32_t *const end = &coefficient[line_count * count];
+    do {
+        const uint32_t *basis_q20 = &(*line_q20)[x];
+        const int32_t *const line_end = &coefficient[count];
+        do {
+            const ih_i32 factor = ih_i32_all(*coefficient);
             for (int32_t v = 0; v < vectors; v++) {
                 sums[v] = ih_wide_sums_add(sums[v], load(&basis_q20[IH_I32_LANES * v]), factor);
             }
             basis_q20 = &basis_q20[width];
-        }
-        coefficient = &coefficient[count];
-    }
+            coefficient = &coefficient[1];
+        } while (coefficient != line_end);
+        line_q20 = &line_q20[1];
+    } while (coefficient != end);
     for (int32_t v = 0; v < vectors; v++) {
         ih_wide_store(&sum[x + IH_I32_LANES * v],
                       ih_wide_add(ih_wide_sums_total(sums[v]), ih_wide_all(begin)));

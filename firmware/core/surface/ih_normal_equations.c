@@ -5,6 +5,7 @@
 #include "base/ih_fix.h"
 #include "base/ih_range.h"
 #include "simd/ih_simd.h"
+#include "simd/ih_simd_cortexm.h"
 
 #define PAIRS IH_NORMAL_EQUATIONS_PAIRS
 #define TERMS_MAX IH_NORMAL_EQUATIONS_TERMS_MAX
@@ -78,7 +79,7 @@ static inline uint32_t factor_of(struct update update, uint32_t word)
     return update.is_mixed ? swap_halves(word) : word;
 }
 
-#if IH_I16_LANES > 0
+#if !IH_CORTEXM && IH_I16_LANES > 0
 
 #define HAS_WHOLE_LINES 1
 
@@ -186,25 +187,10 @@ IH_WRAPPING static inline int32_t changed(int32_t entry, uint32_t sum, int shift
     return IH_WRAPS(int32_t, IH_WRAPS(uint32_t, entry) + (sum >> shift) * sign);
 }
 
-#ifdef __ARM_FEATURE_SIMD32
+/* 32-bit ARM has the same products of pairs. */
+#if IH_CORTEXM || defined __ARM_FEATURE_SIMD32
 #include "surface/ih_normal_equations_cortexm.h"
 #else
-
-static inline int32_t lower_of(uint32_t word)
-{
-    return (int32_t)((word & 0xffff) ^ 0x8000) - 0x8000;
-}
-
-static inline int32_t upper_of(uint32_t word)
-{
-    return (int32_t)(word >> 16 ^ 0x8000) - 0x8000;
-}
-
-IH_WRAPPING static inline uint32_t add_products(uint32_t sum, uint32_t a, uint32_t b)
-{
-    return sum + IH_WRAPS(uint32_t, lower_of(a) * lower_of(b)) +
-           IH_WRAPS(uint32_t, upper_of(a) * upper_of(b));
-}
 
 /* Update entries of two lines and four columns. */
 static inline void update_tile(const uint32_t *a, const uint32_t *b, struct update update,
@@ -217,17 +203,17 @@ static inline void update_tile(const uint32_t *a, const uint32_t *b, struct upda
     for (int32_t k = 0; k < PAIRS; k++) {
         const uint32_t a_0 = a[2 * k], a_1 = a[2 * k + 1];
         const uint32_t b_0 = b[k * TERMS_MAX];
-        sum_00 = add_products(sum_00, a_0, b_0);
-        sum_10 = add_products(sum_10, a_1, b_0);
+        sum_00 = ih_word_madd(sum_00, a_0, b_0);
+        sum_10 = ih_word_madd(sum_10, a_1, b_0);
         const uint32_t b_1 = b[k * TERMS_MAX + 1];
-        sum_01 = add_products(sum_01, a_0, b_1);
-        sum_11 = add_products(sum_11, a_1, b_1);
+        sum_01 = ih_word_madd(sum_01, a_0, b_1);
+        sum_11 = ih_word_madd(sum_11, a_1, b_1);
         const uint32_t b_2 = b[k * TERMS_MAX + 2];
-        sum_02 = add_products(sum_02, a_0, b_2);
-        sum_12 = add_products(sum_12, a_1, b_2);
+        sum_02 = ih_word_madd(sum_02, a_0, b_2);
+        sum_12 = ih_word_madd(sum_12, a_1, b_2);
         const uint32_t b_3 = b[k * TERMS_MAX + 3];
-        sum_03 = add_products(sum_03, a_0, b_3);
-        sum_13 = add_products(sum_13, a_1, b_3);
+        sum_03 = ih_word_madd(sum_03, a_0, b_3);
+        sum_13 = ih_word_madd(sum_13, a_1, b_3);
     }
     line[0][0] = changed(line[0][0], sum_00, shift, sign);
     line[0][1] = changed(line[0][1], sum_01, shift, sign);
@@ -266,7 +252,7 @@ static void update_line(uint32_t word[PAIRS][TERMS_MAX], struct update update, i
     for (int32_t j = 0; j <= i; j++) {
         uint32_t sum = update.begin;
         for (int32_t k = 0; k < words; k++) {
-            sum = add_products(sum, factor_of(update, word[k][i]), word[k][j]);
+            sum = ih_word_madd(sum, factor_of(update, word[k][i]), word[k][j]);
         }
         line[j] = changed(line[j], sum, update.shift, sign_of(update));
     }

@@ -5,12 +5,7 @@
 #ifndef IH_NORMAL_EQUATIONS_CORTEXM_H
 #define IH_NORMAL_EQUATIONS_CORTEXM_H
 
-#include <arm_acle.h>
-
-static inline uint32_t add_products(uint32_t sum, uint32_t a, uint32_t b)
-{
-    return IH_WRAPS(uint32_t, __smlad((int16x2_t)a, (int16x2_t)b, IH_WRAPS(int32_t, sum)));
-}
+#include "simd/ih_simd_cortexm.h"
 
 /* No load moves across this; it is no instruction. Compilers load everything early, and then have no registers for the
  * sums. */
@@ -55,17 +50,17 @@ __attribute__((noinline)) static void update_panel(const uint32_t *own, struct p
                 const uint32_t a_0 = own[k * TERMS_MAX], a_1 = own[k * TERMS_MAX + 1];
                 const uint32_t b_0 = column[0], b_1 = column[1];
                 IN_ORDER();
-                sum_00 = add_products(sum_00, a_0, b_0);
-                sum_10 = add_products(sum_10, a_1, b_0);
-                sum_01 = add_products(sum_01, a_0, b_1);
-                sum_11 = add_products(sum_11, a_1, b_1);
+                sum_00 = ih_word_madd(sum_00, a_0, b_0);
+                sum_10 = ih_word_madd(sum_10, a_1, b_0);
+                sum_01 = ih_word_madd(sum_01, a_0, b_1);
+                sum_11 = ih_word_madd(sum_11, a_1, b_1);
                 IN_ORDER();
                 const uint32_t b_2 = column[2], b_3 = column[3];
                 IN_ORDER();
-                sum_02 = add_products(sum_02, a_0, b_2);
-                sum_12 = add_products(sum_12, a_1, b_2);
-                sum_03 = add_products(sum_03, a_0, b_3);
-                sum_13 = add_products(sum_13, a_1, b_3);
+                sum_02 = ih_word_madd(sum_02, a_0, b_2);
+                sum_12 = ih_word_madd(sum_12, a_1, b_2);
+                sum_03 = ih_word_madd(sum_03, a_0, b_3);
+                sum_13 = ih_word_madd(sum_13, a_1, b_3);
             }
             IN_ORDER();
             const int shift = panel->shift;
@@ -132,10 +127,10 @@ static void update_line(uint32_t word[PAIRS][TERMS_MAX], struct update update, i
             IN_ORDER();
             const uint32_t b_0 = other[0], b_1 = other[1], b_2 = other[2], b_3 = other[3];
             IN_ORDER();
-            sum_0 = add_products(sum_0, a, b_0);
-            sum_1 = add_products(sum_1, a, b_1);
-            sum_2 = add_products(sum_2, a, b_2);
-            sum_3 = add_products(sum_3, a, b_3);
+            sum_0 = ih_word_madd(sum_0, a, b_0);
+            sum_1 = ih_word_madd(sum_1, a, b_1);
+            sum_2 = ih_word_madd(sum_2, a, b_2);
+            sum_3 = ih_word_madd(sum_3, a, b_3);
             other = &other[TERMS_MAX];
         }
         change(&line[j], sum_0, sum_1, shift, sign);

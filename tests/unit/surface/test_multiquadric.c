@@ -6,13 +6,15 @@
 #include "surface/ih_normal_equations.h"
 #include "surface/ih_samples.h"
 #include "surface/ih_surface.h"
+#include "surface/ih_surface_grid.h"
+#include "surface/ih_surface_rows.h"
+#include "surface/ih_surface_scratch.h"
 
 #include "ih_test.h"
 
-/* In its own words: its functions are static. */
-#include "surface/ih_surface.c"
-
-#define PLACE_MAX ((IH_SAMPLES_REACH << 16) - 1)
+#define TERMS_MAX IH_SURFACE_TERMS_MAX
+#define CENTRES_MAX IH_SURFACE_CENTRES_MAX
+#define POSITION_MAX ((IH_SAMPLES_REACH << 16) - 1)
 #define SQUARE_MAX (7201 << 18)
 /* Of ih_multiquadric.h. */
 #define RELATIVE ldexp(1, -21) * 0.574 /* 2^-21.8 */
@@ -27,7 +29,7 @@ void setUp(void)
 {
     memset(&scratch, 0, sizeof scratch);
     worst_steps = 0;
-    set_centres(&(struct ih_surface_params){.centres = centres}, &scratch);
+    ih_surface_rows_set_centres(&(struct ih_surface_params){.centres = centres}, &scratch);
 }
 
 void tearDown(void)
@@ -54,7 +56,7 @@ static void check_row(int32_t x_q16, int32_t y_q16)
     uint32_t row_q20[TERMS_MAX];
     int32_t i;
 
-    fill_row(&scratch, &sample, row_q20);
+    ih_surface_rows_fill(&scratch, &sample, row_q20);
     for (i = 0; i < centres * centres; i++) {
         check_basis((int64_t)x_q16 - scratch.centre_q16[i % centres],
                     (int64_t)y_q16 - scratch.centre_q16[i / centres], row_q20[i]);
@@ -248,17 +250,17 @@ static void centres_stand_evenly(void)
 /* x through all that ih_samples lets through, at places of y from end to end. */
 static void every_place_has_its_basis(void)
 {
-    static const int32_t y_q16[] = {-PLACE_MAX, -1310721, 0, 1, 119156, PLACE_MAX};
+    static const int32_t y_q16[] = {-POSITION_MAX, -1310721, 0, 1, 119156, POSITION_MAX};
     const int32_t stride = is_all ? 1 : 1021;
     int i;
 
     for (i = 0; i < IH_TEST_COUNT(y_q16); i++) {
         int32_t x_q16;
 
-        for (x_q16 = -PLACE_MAX; x_q16 <= PLACE_MAX; x_q16 += stride) {
+        for (x_q16 = -POSITION_MAX; x_q16 <= POSITION_MAX; x_q16 += stride) {
             check_row(x_q16, y_q16[i]);
         }
-        check_row(PLACE_MAX, y_q16[i]);
+        check_row(POSITION_MAX, y_q16[i]);
     }
     printf("basis: at most %.7f steps off\n", worst_steps);
 }
@@ -269,8 +271,8 @@ static void any_place_has_its_basis(void)
     int i;
 
     for (i = 0; i < (is_all ? 10000000 : 10000); i++) {
-        check_row((int32_t)ih_test_between(&random, -PLACE_MAX, PLACE_MAX),
-                  (int32_t)ih_test_between(&random, -PLACE_MAX, PLACE_MAX));
+        check_row((int32_t)ih_test_between(&random, -POSITION_MAX, POSITION_MAX),
+                  (int32_t)ih_test_between(&random, -POSITION_MAX, POSITION_MAX));
     }
 }
 
@@ -290,7 +292,7 @@ static void the_table_is_the_basis_at_whole_steps(void)
 {
     int a, b;
 
-    fill_table(&scratch);
+    ih_surface_grid_fill_table(&scratch);
     for (b = 0; b < IH_SURFACE_STEPS; b++) {
         for (a = 1 - IH_SURFACE_STEPS; a < IH_SURFACE_STEPS; a++) {
             const double exact_q20 = ldexp(sqrt((a * a + b * b) * 100.0 / 121 + 1), 20);
@@ -302,45 +304,65 @@ static void the_table_is_the_basis_at_whole_steps(void)
     }
 }
 
-/* Short rows are taken away and added as they are: only what each call rounds is between the sums that were
- * changed and those that are made anew, half a unit. */
-static void changed_sums_are_those_of_the_new_weights(void)
+/* One sample in ten has a third of its root weight. */
+static int32_t changed_weight(const struct ih_samples *samples, int32_t i)
+{
+    const int32_t root_q15 = samples->sample[i].root_weight_q15;
+
+    return i % 10 == 3 ? root_q15 / 3 : root_q15;
+}
+
+/* Rows are subtracted and added as short rows: the exchanged sums differ from new ones by the rounding of each call
+ * only, half a unit. */
+static void exchanged_sums_are_those_of_the_new_weights(void)
 {
     static struct ih_samples samples;
     static struct ih_surface out;
-    static int32_t changed[IH_NORMAL_EQUATIONS_LINE(TERMS_MAX)];
+    static int32_t exchanged[IH_NORMAL_EQUATIONS_LINE(TERMS_MAX)];
     struct ih_surface_params params;
     struct ih_test_random source = {5};
-    int32_t i, calls;
+    int32_t i, calls, count = 0;
 
     ih_surface_params_default(&params);
     params.centres = centres;
     params.is_moving = false;
+    ih_surface_rows_set_centres(&params, &scratch);
     samples.sample_count = 340;
-    out.mean_mm_q8 = 1000 << 8;
     for (i = 0; i < samples.sample_count; i++) {
         samples.sample[i] = (struct ih_sample){
             .x_q16 = (int32_t)ldexp(2.0 * (i % IH_GRID - 9) + 0.3 * ih_test_unit(&source), 16),
             .y_q16 = (int32_t)ldexp(2.0 * (i / IH_GRID - 9) + 0.3 * ih_test_unit(&source), 16),
-            .depth_mm_q8 = (i % 10 == 3 ? 700 : 1000) << 8,
+            .depth_mm_q8 = 1000 << 8,
             .root_weight_q15 = i % 7 == 0 ? 18000 : 1 << 15,
         };
         out.root_weight_q15[i] = samples.sample[i].root_weight_q15;
     }
-    TEST_ASSERT_TRUE(fit_first(&samples, &params, &scratch, &out));
-    calls = (change_far(&samples, &params, &scratch, &out) + IH_NORMAL_EQUATIONS_PAIRS - 1) /
-            IH_NORMAL_EQUATIONS_PAIRS;
-    IH_TEST_RANGE(2, 40, calls, "calls that change", 0);
-    memcpy(changed, scratch.normal,
-           (size_t)IH_NORMAL_EQUATIONS_LINE(scratch.terms) * sizeof changed[0]);
-    sum_all(&samples, &params, &scratch, &out);
+    TEST_ASSERT_TRUE(ih_surface_rows_set_weight_shift(&scratch, out.root_weight_q15, 340));
+    (void)ih_surface_rows_set_norms(&scratch, &samples, out.root_weight_q15);
+    ih_surface_rows_set_scale(&scratch, &samples);
+    ih_surface_rows_sum(&samples, &params, &scratch, &out);
+    for (i = 0; i < samples.sample_count; i++) {
+        const int32_t before_q15 = out.root_weight_q15[i];
+
+        out.root_weight_q15[i] = changed_weight(&samples, i);
+        if (out.root_weight_q15[i] != before_q15) {
+            ih_surface_rows_exchange(&scratch, ih_surface_rows_of(&samples, i, &scratch), count++,
+                                     before_q15, out.root_weight_q15[i]);
+        }
+    }
+    ih_surface_rows_finish_exchange(&scratch, count);
+    calls = (count + IH_NORMAL_EQUATIONS_PAIRS - 1) / IH_NORMAL_EQUATIONS_PAIRS;
+    IH_TEST_RANGE(2, 40, calls, "calls that exchange", 0);
+    memcpy(exchanged, scratch.normal,
+           (size_t)IH_NORMAL_EQUATIONS_LINE(scratch.terms) * sizeof exchanged[0]);
+    ih_surface_rows_sum(&samples, &params, &scratch, &out);
     calls += 2 * ((samples.sample_count + IH_NORMAL_EQUATIONS_ROWS - 1) / IH_NORMAL_EQUATIONS_ROWS);
     for (i = 0; i < scratch.terms; i++) {
-        const int32_t *line = scratch.normal + ih_normal_equations_line(i);
+        const int32_t at = ih_normal_equations_line(i);
         int32_t j;
 
         for (j = 0; j <= i; j++) {
-            IH_TEST_WITHIN(calls / 2.0, line[j], changed[ih_normal_equations_line(i) + j], "sum",
+            IH_TEST_WITHIN(calls / 2.0, scratch.normal[at + j], exchanged[at + j], "sum",
                            i * scratch.terms + j);
         }
     }
@@ -364,7 +386,7 @@ int main(int count, char **arguments)
         RUN_TEST(any_place_has_its_basis);
         RUN_TEST(places_near_centres_have_their_basis);
         RUN_TEST(the_table_is_the_basis_at_whole_steps);
-        RUN_TEST(changed_sums_are_those_of_the_new_weights);
+        RUN_TEST(exchanged_sums_are_those_of_the_new_weights);
     }
     return UNITY_END();
 }

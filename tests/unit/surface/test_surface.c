@@ -3,6 +3,7 @@
 #include "rig/ih_rig.h"
 #include "surface/ih_samples.h"
 #include "surface/ih_surface.h"
+#include "surface/ih_surface_scratch.h"
 
 #include "ih_test.h"
 
