@@ -82,10 +82,12 @@ static bool is_any_eight_above(const uint16_t *nine, const uint16_t *oldest, int
                                int32_t limit)
 {
     ih_i16 max = {0};
-    for (int32_t i = 0; i < count; i += 2 * IH_I16_LANES) {
-        const struct ih_u16_two eight =
-            ih_u16_two_sub(ih_u16_two_load(&nine[i]), ih_u16_two_load(&oldest[i]));
-        max = ih_i16_max(max, ih_i16_max((ih_i16)eight.low, (ih_i16)eight.high));
+    for (int32_t step = 0; step < count; step += IH_BANDPASS_STEP) {
+        for (int32_t i = step; i < step + IH_BANDPASS_STEP; i += 2 * IH_I16_LANES) {
+            const struct ih_u16_two eight =
+                ih_u16_two_sub(ih_u16_two_load(&nine[i]), ih_u16_two_load(&oldest[i]));
+            max = ih_i16_max(max, ih_i16_max((ih_i16)eight.low, (ih_i16)eight.high));
+        }
     }
     return ih_i16_any(max > ih_i16_all((int16_t)ih_clamp_s32(limit, 0, INT16_MAX)));
 }

@@ -202,7 +202,7 @@ void ih_bandpass_bytes(struct ih_bandpass *band, const uint8_t *const row[IH_BAN
     uint16_t *column = band->binomial[0];
     const int32_t count =
         (width + 2 * IH_BANDPASS_SIDE + IH_BANDPASS_STEP - 1) / IH_BANDPASS_STEP * IH_BANDPASS_STEP;
-    struct ih_bandpass_row out;
+    struct ih_bandpass_row out = {.response = response, .limit = NULL};
     band->width = width;
     band->is_bytes = true;
     sum_rows(row[REACH - 1], row[REACH], row[REACH + 1], width, &inner[1], &column[REACH]);
@@ -214,8 +214,6 @@ void ih_bandpass_bytes(struct ih_bandpass *band, const uint8_t *const row[IH_BAN
     sum_threes(column, count, band->nine.of_bytes);
     const struct ih_bandpass_rows rows = {
         .above = &inner[0], .middle = &inner[1], .below = &inner[2]};
-    out.response = response;
-    out.limit = NULL;
     ih_bandpass_respond_bytes(&rows, band->nine.of_bytes, width, &out);
 }
 #endif

@@ -270,8 +270,9 @@ static void find_dots(struct ih_dots_scratch *scratch, struct ih_dots *out, int3
 static void advance(struct ih_dots_scratch *scratch, struct ih_dots *out)
 {
     const int32_t last =
-        scratch->response_rows++ - IH_DOTS_REACH; /* the row whose neighbours are complete */
+        scratch->response_rows - IH_DOTS_REACH; /* all its neighbours are in the ring */
     const int32_t rows = last % IH_DOTS_BATCH + 1;
+    scratch->response_rows++;
     if (last >= 0 && (rows == IH_DOTS_BATCH || last == scratch->height - 1)) {
         find_dots(scratch, out, last + 1 - rows, rows);
     }
