@@ -2,6 +2,10 @@
 
 #include "simd/ih_simd.h"
 
+/* The root's table is looked up at a sum of Q16 shifted by 10 bits at least, which must fit 32. */
+_Static_assert(1 + IH_FIT_SCALES_MAX * IH_FIT_SCALES_MAX < 64,
+               "a sum of a robust weight is below 2^22");
+
 /* With the largest scale, 24 mm, vectors divide a square and its rounding by a product. */
 _Static_assert((IH_FIT_SCALES_MAX * 24 << 8) * (IH_FIT_SCALES_MAX * 24 << 8) + 24 * 24 / 2 <
                    1 << 30,

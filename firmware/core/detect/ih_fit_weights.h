@@ -44,10 +44,6 @@ struct ih_fit_weighting {
     uint32_t reach2_q22; /* positions farther from the centre have no weight: squared */
 };
 
-/* The root's table is looked up at a sum of Q16 shifted by 10 bits at least, which must fit 32. */
-_Static_assert(1 + IH_FIT_SCALES_MAX * IH_FIT_SCALES_MAX < 64,
-               "a sum of a robust weight is below 2^22");
-
 /* (1 + (r / k)^2)^-2, rounded; 0 beyond IH_FIT_SCALES_MAX k. */
 static inline int32_t ih_fit_robust_weight_q16(int32_t residual_mm_q8, int32_t scale_mm)
 {
