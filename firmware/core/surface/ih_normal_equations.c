@@ -50,7 +50,7 @@ static inline struct update mixed_update(void)
     return (struct update){((uint32_t)1 << 31) + LOWER_HALF, LOWER_BITS, true, true};
 }
 
-/* A word has upper parts of two rows. The excess of so many mixed sums is added back. */
+/* A word has upper parts of two rows. The excess of `mixed` mixed sums is added back. */
 IH_WRAPPING static inline struct update upper_update(int32_t mixed)
 {
     return (struct update){0 - (uint32_t)mixed * MIXED_EXCESS, 0, true, false};

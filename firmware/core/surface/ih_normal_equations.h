@@ -25,7 +25,7 @@
 #define IH_NORMAL_EQUATIONS_ROWS (2 * IH_NORMAL_EQUATIONS_PAIRS)
 #define IH_NORMAL_EQUATIONS_MAX 16383 /* 16 of its squares, and 2^15 for rounding, are below 2^32 */
 #define IH_NORMAL_EQUATIONS_SHIFT_MAX 16
-/* Lines of N are padded to whole groups of so many entries, which fill the widest vectors. Padding behind the diagonal
+/* Lines of N are padded to whole groups of this many entries, which fill the widest vectors. Padding behind the diagonal
  * is not used, but loops need no code for a partial group. */
 #define IH_NORMAL_EQUATIONS_GROUP 8
 /* Index at which line i of N begins, i a multiple of IH_NORMAL_EQUATIONS_GROUP; of line term_count: the size of N. */

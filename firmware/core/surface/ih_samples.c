@@ -21,25 +21,26 @@ void ih_samples_params_default(struct ih_samples_params *params)
     };
 }
 
-/* From the least to the most, both included. */
+/* A range of depths, both ends included. */
 struct depths {
     int32_t min_q8, max_q8;
 };
 
 static const struct depths any_depth = {0, INT32_MAX};
 
-/* A neighbour that is seen, at a depth within so much. */
-static inline bool is_there(const struct ih_point *other, int32_t clip_q8, struct depths depths)
+/* Is a neighbour seen, with a depth in that range? */
+static inline bool is_seen_within(const struct ih_point *other, int32_t clip_q8,
+                                  struct depths depths)
 {
     const int32_t depth_q8 = ih_min_s32(other->depth_mm_q8, clip_q8);
     return other->state == IH_POINT_SEEN && depth_q8 >= depths.min_q8 && depth_q8 <= depths.max_q8;
 }
 
-/* The 8 around; those beside, above and below are the likelier ones. */
+/* The 8 neighbours; those in the same row or column first, as they are likelier to decide. */
 static const int8_t step_around[8] = {-1,           1,           -IH_GRID,   IH_GRID, -IH_GRID - 1,
                                       -IH_GRID + 1, IH_GRID - 1, IH_GRID + 1};
 
-/* Beyond an edge a step leads out of the table, or to the other end of a row. */
+/* At an edge a step may leave the table, or reach the other end of a row. */
 static bool is_step_inside(int32_t slot, int32_t step)
 {
     const int32_t at = slot + step;
@@ -53,8 +54,7 @@ static bool is_at_edge(int32_t slot)
     return row == 0 || column == 0 || row == IH_GRID - 1 || column == IH_GRID - 1;
 }
 
-/* How many of the 8 neighbours are seen, and of those stand within so much of a depth; no more than most are
- * counted. */
+/* Count the neighbours that are seen with a depth in that range, up to max. */
 static int32_t count_around(const struct ih_points *points, int32_t slot, int32_t clip_q8,
                             struct depths depths, int32_t max)
 {
@@ -63,15 +63,16 @@ static int32_t count_around(const struct ih_points *points, int32_t slot, int32_
     int32_t count = 0;
     for (int i = 0; i < 8 && count < max; i++) {
         if (!is_edge || is_step_inside(slot, step_around[i])) {
-            count += is_there(&point[step_around[i]], clip_q8, depths);
+            count += is_seen_within(&point[step_around[i]], clip_q8, depths);
         }
     }
     return count;
 }
 
-_Static_assert(ISOLATED_FRIENDS_MAX < 2, "two neighbours tell that a point is not isolated");
+_Static_assert(ISOLATED_FRIENDS_MAX < 2,
+               "two near neighbours suffice for a point that is not isolated");
 
-/* Differs from all but one neighbour. Most points do not, which the two beside them tell. */
+/* Does a point differ from all but one neighbour? Of most points the two beside them decide. */
 static bool is_isolated(const struct ih_points *points, int32_t slot, int32_t clip_q8,
                         int32_t isolated_q8)
 {
@@ -79,8 +80,8 @@ static bool is_isolated(const struct ih_points *points, int32_t slot, int32_t cl
     const int32_t own_q8 = ih_min_s32(point->depth_mm_q8, clip_q8);
     const struct depths near = {own_q8 - isolated_q8, own_q8 + isolated_q8};
     const int32_t column = slot % IH_GRID;
-    if (column > 0 && column < IH_GRID - 1 && is_there(&point[-1], clip_q8, near) &&
-        is_there(&point[1], clip_q8, near)) {
+    if (column > 0 && column < IH_GRID - 1 && is_seen_within(&point[-1], clip_q8, near) &&
+        is_seen_within(&point[1], clip_q8, near)) {
         return false;
     }
     return count_around(points, slot, clip_q8, near, ISOLATED_FRIENDS_MAX + 1) <=
@@ -113,9 +114,9 @@ static void add_sample(struct ih_samples *out, const struct ih_field *field, int
     out->seen_count += !sample.is_filled;
 }
 
-/* Would the dot have been seen at (x, y) if there were something to see? */
-static bool place_is_visible(const struct ih_rig *rig, const struct ih_dots *dots, int32_t x_q28,
-                             int32_t y_q28)
+/* Would a surface at (x, y) show a dot? */
+static bool is_visible_at(const struct ih_rig *rig, const struct ih_dots *dots, int32_t x_q28,
+                          int32_t y_q28)
 {
     int32_t u, v;
     ih_camera_distort(rig, x_q28, y_q28, &u, &v);
@@ -139,7 +140,7 @@ static void fill_missing(const struct ih_points *points, const struct ih_dots *d
     if (rig->calibration.kind == IH_RIG_DOTS) {
         ih_rig_dot_at(rig, slot, depth_q8, &x_q28, &y_q28);
     }
-    if (place_is_visible(rig, dots, x_q28, y_q28)) {
+    if (is_visible_at(rig, dots, x_q28, y_q28)) {
         add_sample(out, &points->field, x_q28, y_q28,
                    (struct ih_sample){.slot = slot,
                                       .depth_mm_q8 = depth_q8,
@@ -148,8 +149,8 @@ static void fill_missing(const struct ih_points *points, const struct ih_dots *d
     }
 }
 
-static void take_seen(const struct ih_points *points, int32_t isolated_q8, int32_t slot,
-                      struct ih_samples *out)
+static void add_seen(const struct ih_points *points, int32_t isolated_q8, int32_t slot,
+                     struct ih_samples *out)
 {
     const struct ih_point *point = &points->point[slot];
     if (is_isolated(points, slot, out->clip_mm_q8, isolated_q8)) {
@@ -179,7 +180,7 @@ void ih_samples_select(const struct ih_points *points, const struct ih_dots *dot
     }
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
         if (points->point[slot].state == IH_POINT_SEEN) {
-            take_seen(points, params->isolated_mm << 8, slot, out);
+            add_seen(points, params->isolated_mm << 8, slot, out);
         } else if (points->point[slot].state == IH_POINT_MISSING) {
             fill_missing(points, dots, rig, params, slot, out);
         }

@@ -1,21 +1,20 @@
-/* ih_samples - what the surface is to be fitted to: points cleaned, missing dots filled in
+/* ih_samples - the samples that the surface is fitted to: points cleaned, missing dots filled in
  * (paper, section 3.1: "outliers have no influence"; the filling is ours).
  *
  * In:    points by slot, the dots' over-exposure map (NULL for a range image), rig.
- * Out:   up to 361 rows (place in field units, depth, weight) for the least-squares fit.
- * Way:   1. Clip: depth := min(depth, p8 + clip_behind), p8 the 8th percentile of the seen depths
- *           (the sorted depths' entry number count * 8 / 100): the surface has no business with the
- *           far wall, and the higher its step beside a head, the more it rings. With a dot rig the
- *           clip is at clip_min or farther: there the dots stand the denser the nearer they are,
- *           and a near hand must not clip the head behind it. A range image's lattice has the same
- *           pitch at any depth.
+ * Out:   up to 361 samples (position in field units, depth, weight) for a least-squares fit.
+ * Method: 1. Clip: depth := min(depth, p8 + clip_behind), p8 the 8th percentile of the seen depths
+ *           (the sorted depths' entry number count * 8 / 100): the far wall is of no interest, and the larger its
+ *           step beside a head, the more the surface rings. With a dot rig the clip depth is at least clip_min: there
+ *           dots are denser the nearer they are, and a near hand must not clip the head behind it. A range image's
+ *           lattice has the same pitch at any depth.
  *        2. Isolated: a point with at least 3 of 8 neighbours whose clipped depth differs by more
  *           than isolated_mm from all but one of them is dropped.
- *        3. Missing dots: a dot that is not seen says that nothing is there: it enters as a far
- *           point at the clip depth, at the place where its ray shows there, with a small weight.
- *           Only where fewer than fill_neighbours of its 8 neighbours are seen (a hole inside a
- *           dark face is no hole), where its place is inside the picture and not over-exposed.
- * Cost:  a depth is counted once, the few near the percentile again; of 8 neighbours two tell most points.
+ *        3. Missing dots: a dot that is not seen means that nothing is near: it becomes a far point at the clip
+ *           depth, where its ray has that depth, with a small weight. Only if fewer than fill_neighbours of its 8
+ *           neighbours are seen (a hole inside a dark face is no hole), and if its pixel is inside the picture and not
+ *           over-exposed.
+ * Cost:  each depth is counted once, those near the percentile again; for most points two of 8 neighbours decide.
  */
 #ifndef IH_SAMPLES_H
 #define IH_SAMPLES_H

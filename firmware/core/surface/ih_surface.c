@@ -40,10 +40,10 @@
 #define CORRECTIONS_FEW 3
 #define SQUARES_LOG2_NONE (-1000)
 #define SQUARES_LOG2_MAX 1000
-/* Samples nearer to the surface than so many eighths of the limit keep their weight; they are not checked again after
+/* Samples nearer to the surface than FAR_EIGHTHS / 8 of the limit keep their weight; they are not checked again after
  * the last correction. */
 #define FAR_EIGHTHS 6
-/* The last rows of the factor, so many, have more bits: of samples on a lattice, the pivots of all others are small. */
+/* Number of last rows of the factor with more bits: of samples on a lattice, the pivots of all others are small. */
 #define FINE_ROWS (2 * IH_NORMAL_EQUATIONS_ROWS)
 
 void ih_surface_params_default(struct ih_surface_params *params)
@@ -161,7 +161,7 @@ static bool try_factor(const struct ih_surface_params *params, int32_t fine_from
                                       scratch->pair);
 }
 
-/* Factor with more bits in all rows. Sums that shared their memory with the factor are made anew. */
+/* Factor with more bits in all rows. Sums that shared their memory with the factor are summed again. */
 static void factor_fine(const struct ih_samples *samples, const struct ih_surface_params *params,
                         const struct ih_surface *out, struct ih_surface_scratch *scratch)
 {
@@ -365,7 +365,7 @@ static void move_sample(const struct ih_sample *sample, const struct ih_surface_
 static int32_t change_far(const struct ih_samples *samples, const struct ih_surface_params *params,
                           struct ih_surface_scratch *scratch, struct ih_surface *out)
 {
-    int32_t lighter = 0;
+    int32_t changed_count = 0;
     set_or_subtract_ridge(params, false, scratch);
     for (int32_t i = 0; i < samples->sample_count; i++) {
         const struct ih_sample *sample = &samples->sample[i];
@@ -388,14 +388,15 @@ static int32_t change_far(const struct ih_samples *samples, const struct ih_surf
             add_right(scratch, row_q20, off,
                       ih_surface_weight_q30(scratch, root_q15) -
                           ih_surface_weight_q30(scratch, sample->root_weight_q15));
-            ih_surface_rows_exchange(scratch, row_q20, lighter, sample->root_weight_q15, root_q15);
+            ih_surface_rows_exchange(scratch, row_q20, changed_count, sample->root_weight_q15,
+                                     root_q15);
         }
-        lighter++;
+        changed_count++;
     }
     if (!params->is_moving) {
-        ih_surface_rows_finish_exchange(scratch, lighter);
+        ih_surface_rows_finish_exchange(scratch, changed_count);
     }
-    return lighter;
+    return changed_count;
 }
 
 static bool fit_first(const struct ih_samples *samples, const struct ih_surface_params *params,

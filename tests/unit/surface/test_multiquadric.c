@@ -98,7 +98,7 @@ static void every_square_has_its_root(void)
     }
 }
 
-/* Places where the number of leading zeros changes, and entries of the table; the least and the greatest. */
+/* Squares where the number of leading zeros changes, and at entries of the table; the smallest and the largest. */
 static void roots_hold_at_the_ends_of_spans(void)
 {
     uint32_t square_q18[IH_MULTIQUADRIC_ACROSS_MAX];

@@ -18,7 +18,7 @@ static int32_t factor[ENTRIES_MAX + 1];
 static _Alignas(IH_NORMAL_EQUATIONS_ALIGNMENT) uint32_t work[IH_NORMAL_EQUATIONS_WORK][TERMS_MAX];
 static double matrix[TERMS_MAX][TERMS_MAX], product[TERMS_MAX][TERMS_MAX];
 static struct ih_test_random random_source;
-/* Every test is made with so many terms as there are at the most, and with fewer. */
+/* Every test runs with the maximum number of terms, and with fewer. */
 static int32_t terms = TERMS_MAX;
 
 static int32_t entries(void)
@@ -72,7 +72,7 @@ static int32_t product_sum(int32_t i, int32_t j, int shift)
     return (int32_t)floor(ldexp((double)sum, -shift) + 0.5);
 }
 
-/* Entries up to the diagonal; what stands behind it is nobody's business. */
+/* Entries up to the diagonal; padding behind it is undefined. */
 static void check(int sign, int shift, const char *what)
 {
     int32_t i, j;
@@ -126,14 +126,14 @@ static void sums_are_rounded_once_a_call(void)
     }
 }
 
-/* 16 times the greatest square, as often as the header allows. */
+/* 16 times the largest square, as often as the header allows. */
 static void max_sums_hold(void)
 {
     int32_t call;
 
     for (call = 0; call < 16; call++) {
         fill_rows(IH_NORMAL_EQUATIONS_MAX, IH_NORMAL_EQUATIONS_MAX);
-        check(1, 5, "greatest");
+        check(1, 5, "largest");
     }
     TEST_ASSERT_TRUE(normal[0] > 2147000000);
 }
@@ -289,8 +289,8 @@ static void systems_have_their_factor(void)
     check_factor(0, 8000, "fewer columns than rows");
 }
 
-/* What 16 bits cannot hold: 16 great pivots more than there are fine rows, all others are the ridge's. */
-static void what_is_too_coarse_is_told(void)
+/* Too much for 16 bits: 16 more large pivots than fine rows, all others are the ridge's. */
+static void a_factor_that_is_too_coarse_is_reported(void)
 {
     make_system(48, 1e-5, 0);
     TEST_ASSERT_FALSE(ih_normal_equations_factor(terms, terms - 32, 8000, factor, work));
@@ -337,8 +337,8 @@ static void systems_are_solved(void)
     }
 }
 
-/* Unknowns that grow by 2^13 from one to the next have no common exponent: that is told before it gets too great. */
-static void what_has_no_solution_is_told(void)
+/* Unknowns that grow by 2^13 from one to the next have no common exponent: reported before it becomes too large. */
+static void a_missing_solution_is_reported(void)
 {
     static int32_t b[TERMS_MAX], x[TERMS_MAX];
     int32_t exponent, i;
@@ -354,8 +354,8 @@ static void what_has_no_solution_is_told(void)
     TEST_ASSERT_FALSE(ih_normal_solve(factor, terms, b, x, &exponent));
 }
 
-/* A diagonal of squares has its roots; what is not positive counts as the least pivot. */
-static void pivots_have_a_least_value(void)
+/* A diagonal of squares has its roots; a number that is not positive becomes the smallest pivot. */
+static void pivots_have_a_min_value(void)
 {
     int32_t i;
 
@@ -397,9 +397,9 @@ static void factors_have_the_same_bits(void)
 {
     static const uint32_t expected_hash[2][3] = {{485617988, 2567137089, 3852012110},
                                                  {78990270, 3451190644, 2704101879}};
-    int way;
+    int kind;
 
-    for (way = 0; way < 3; way++) {
+    for (kind = 0; kind < 3; kind++) {
         uint32_t hash = 2166136261u;
         int32_t i, j;
 
@@ -407,14 +407,14 @@ static void factors_have_the_same_bits(void)
         random_source.state = 7;
         for (i = 0; i < terms; i++) {
             for (j = 0; j < i; j++) {
-                const int32_t max = way == 0 ? 1 << 20 : way == 1 ? 1 << 24 : 1 << 29;
+                const int32_t max = kind == 0 ? 1 << 20 : kind == 1 ? 1 << 24 : 1 << 29;
 
                 factor[ih_normal_equations_line(i) + j] =
                     (int32_t)ih_test_between(&random_source, -max, max);
             }
-            factor[ih_normal_equations_line(i) + i] = way == 2 ? -i : 1000000000 - i;
+            factor[ih_normal_equations_line(i) + i] = kind == 2 ? -i : 1000000000 - i;
         }
-        (void)ih_normal_equations_factor(terms, way == 0 ? 0 : terms - 32, 1, factor, work);
+        (void)ih_normal_equations_factor(terms, kind == 0 ? 0 : terms - 32, 1, factor, work);
         for (i = 0; i < terms; i++) {
             for (j = 0; j <= i; j++) {
                 hash = (uint32_t)((uint64_t)(hash ^
@@ -422,7 +422,7 @@ static void factors_have_the_same_bits(void)
                                   16777619u);
             }
         }
-        IH_TEST_EQUAL(expected_hash[terms == TERMS_MAX ? 0 : 1][way], hash, "hash", way);
+        IH_TEST_EQUAL(expected_hash[terms == TERMS_MAX ? 0 : 1][kind], hash, "hash", kind);
     }
 }
 
@@ -451,10 +451,10 @@ int main(void)
         RUN_TEST(what_was_added_can_be_subtracted);
         RUN_TEST(nothing_behind_the_lines_is_touched);
         RUN_TEST(systems_have_their_factor);
-        RUN_TEST(what_is_too_coarse_is_told);
+        RUN_TEST(a_factor_that_is_too_coarse_is_reported);
         RUN_TEST(systems_are_solved);
-        RUN_TEST(what_has_no_solution_is_told);
-        RUN_TEST(pivots_have_a_least_value);
+        RUN_TEST(a_missing_solution_is_reported);
+        RUN_TEST(pivots_have_a_min_value);
         RUN_TEST(a_pivot_of_one_keeps_signs);
         RUN_TEST(factors_have_the_same_bits);
     }

@@ -19,7 +19,7 @@ static double root(double at)
     return ldexp(sqrt(at), 11 + 16);
 }
 
-/* How far the curve lies above the chord over a span at the most: where it is as steep. */
+/* Maximum height of the curve above the chord over a span: where both are as steep. */
 static double curve_above(int span)
 {
     const double rise = root(span + 1) - root(span);

@@ -335,7 +335,7 @@ static void places_outside_the_picture_are_not_filled(void)
     TEST_ASSERT_TRUE(samples.filled_count > 150 && samples.filled_count < 210);
 }
 
-static void nothing_seen_and_nothing_known_gives_nothing(void)
+static void without_points_there_are_no_samples(void)
 {
     int32_t slot;
 
@@ -395,7 +395,7 @@ int main(void)
     RUN_TEST(over_exposed_and_unknown_places_are_not_filled);
     RUN_TEST(without_weight_nothing_is_filled);
     RUN_TEST(places_outside_the_picture_are_not_filled);
-    RUN_TEST(nothing_seen_and_nothing_known_gives_nothing);
+    RUN_TEST(without_points_there_are_no_samples);
     RUN_TEST(what_is_too_far_from_the_field_is_dropped);
     RUN_TEST(a_range_rig_fills_at_the_lattice_point);
     return UNITY_END();

@@ -153,7 +153,7 @@ static void huber_weights_match_float64(void)
         take_vector(v);
         fit();
         for (k = 0; k < v->sample_count; k++) {
-            /* d sqrt(h / r) = sqrt(h / r) / (2 r) dr is greatest at r = h: 0.2 / 120; and 1 unit
+            /* d sqrt(h / r) = sqrt(h / r) / (2 r) dr is largest at r = h: 0.2 / 120; and 1 unit
              * of Q15. */
             IH_TEST_WITHIN(TOLERANCE_MM / (2 * VECTOR_HUBER_MM) + 1.0 / 32768, v->root_weight[k],
                            ih_test_from_q(surface.root_weight_q15[k], 15), v->name, k);
@@ -365,12 +365,12 @@ static void weigh_two_places(struct two_places *two, bool is_again)
         const double given_mm = ih_test_from_q(samples.sample[k].depth_mm_q8, 8) - mean_mm;
         const double off_mm = fabs(given_mm - two->surface_mm[k % 2]);
         const bool is_far = is_again && off_mm > params.huber_mm;
-        const double share = is_far ? params.huber_mm / off_mm : 1;
+        const double fraction = is_far ? params.huber_mm / off_mm : 1;
         const double depth_mm =
-            is_moving ? two->surface_mm[k % 2] * (1 - share) + given_mm * share : given_mm;
+            is_moving ? two->surface_mm[k % 2] * (1 - fraction) + given_mm * fraction : given_mm;
         double weight = ih_test_from_q(samples.sample[k].root_weight_q15, 15);
 
-        weight *= is_moving ? weight : weight * share;
+        weight *= is_moving ? weight : weight * fraction;
         two->weight[k % 2] += weight;
         two->depth_mm[k % 2] += weight * depth_mm;
     }
@@ -453,7 +453,7 @@ static void samples_without_weight_make_no_surface(void)
     TEST_ASSERT_FALSE(surface.valid);
 }
 
-/* Everything at its limits at once: places, depths and their jumps, the least weight. */
+/* Everything at its limits at once: places, depths and their jumps, the smallest weight. */
 static void the_ends_of_all_ranges_are_survived(void)
 {
     const double reach = IH_SAMPLES_REACH - 1.0 / 65536;
