@@ -5,7 +5,7 @@
 
 static void without_scan(struct ih_params *params)
 {
-    params->detections.scan.place_max = 0;
+    params->detections.scan.candidate_max = 0;
 }
 
 static void without_nests(struct ih_params *params)

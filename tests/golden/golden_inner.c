@@ -108,11 +108,11 @@ static void hash_candidates(struct isohead *head, uint64_t hash[GOLDEN_INNERS])
                  &scratch->scan);
     hash[GOLDEN_RAYS] =
         golden_add_words(hash[GOLDEN_RAYS], &scratch->rays, offsetof(struct ih_rays, table));
-    hash[GOLDEN_SCAN] = golden_add_word(hash[GOLDEN_SCAN], scan->place_count);
-    hash[GOLDEN_SCAN] = golden_add_words(hash[GOLDEN_SCAN], scan->place,
-                                         (size_t)scan->place_count * sizeof scan->place[0]);
-    for (int32_t i = 0; i < scan->place_count; i++) {
-        hash_start(head, scan->place[i].centre_mm_q8, hash);
+    hash[GOLDEN_SCAN] = golden_add_word(hash[GOLDEN_SCAN], scan->candidate_count);
+    hash[GOLDEN_SCAN] = golden_add_words(hash[GOLDEN_SCAN], scan->candidate,
+                                         (size_t)scan->candidate_count * sizeof scan->candidate[0]);
+    for (int32_t i = 0; i < scan->candidate_count; i++) {
+        hash_start(head, scan->candidate[i].centre_mm_q8, hash);
     }
     for (int32_t i = 0; i < head->hypotheses.hypothesis_count; i++) {
         hash_start(head, head->hypotheses.hypothesis[i].centre_mm_q8, hash);
@@ -150,7 +150,7 @@ _Static_assert(sizeof(struct ih_exposure_look) == WORDS(4), "ih_exposure_look");
 _Static_assert(sizeof(struct ih_exposure) == WORDS(4), "ih_exposure");
 _Static_assert(sizeof(struct ih_ellipse) == WORDS(9), "ih_ellipse");
 _Static_assert(offsetof(struct ih_rays, table) == WORDS(3 + 6 * IH_SLOTS), "ih_rays");
-_Static_assert(sizeof(struct ih_scan_place) == WORDS(4), "ih_scan_place");
+_Static_assert(sizeof(struct ih_scan_candidate) == WORDS(4), "ih_scan_candidate");
 _Static_assert(sizeof(struct ih_score) == WORDS(2 + IH_EVIDENCE_COUNT), "ih_score");
 
 const char *const golden_inner_name[GOLDEN_INNERS] = {

@@ -155,8 +155,8 @@ void ih_detections_add(const struct ih_points *points, const struct ih_dots *dot
     for (int32_t i = 0; i < ih_min_s32(hypotheses->hypothesis_count, params->nest_max); i++) {
         try_centre(&context, hypotheses->hypothesis[i].centre_mm_q8, IH_SOURCE_NEST);
     }
-    for (int32_t i = 0; i < scratch->scan.place_count; i++) {
-        try_centre(&context, scratch->scan.place[i].centre_mm_q8, IH_SOURCE_SCAN);
+    for (int32_t i = 0; i < scratch->scan.candidate_count; i++) {
+        try_centre(&context, scratch->scan.candidate[i].centre_mm_q8, IH_SOURCE_SCAN);
     }
     for (int32_t i = 0; i < expected->count; i++) {
         if (i < params->expected_max) {

@@ -13,7 +13,7 @@
  *         hidden, or gone.
  *         Of two within spacing_mm the more probable stays, of equals the first; it replaces all that
  *         are near it.
- * Full table: the least probable drop and count in dropped_count.
+ * Full table: the less probable drop and count in dropped_count.
  * Overflow: points are below 2^25 in Q8 (16 m, slopes up to 8), nests' centres below 2^26.01, expected
  *         ones at most 2^26; a fit moves 240 mm: centres below 2^27, squares of differences 2^57.6.
  * Cost:   up to IH_SCAN_MAX + IH_NESTS_MAX + IH_DETECTIONS_EXPECTED_MAX = 32 fits a window. Usually 12

@@ -61,7 +61,7 @@ struct ih_ellipsoid_box ih_ellipsoid_box(const struct ih_ellipsoid *ellipsoid,
 
 /* Inverses of the semi-axes: many divisions by the same one become products. */
 struct ih_fractions {
-    int64_t inverse_q50[3]; /* 2^50 / semi, made greater by more than 0 and at most 1 */
+    int64_t inverse_q50[3]; /* 2^50 / semi, rounded up, or 1 more where that is exact */
 };
 
 struct ih_fractions ih_ellipsoid_fractions(const int32_t semi_mm_q8[3]);
@@ -70,7 +70,7 @@ struct ih_fractions ih_ellipsoid_fractions(const int32_t semi_mm_q8[3]);
 #define IH_FRACTION_MAX (1 << 19)
 
 /* ih_div_round(offset * 2^14, semi), to the last bit, for |offset| up to IH_FRACTION_MAX. The product is
- * too great by up to |offset|, 2^-17 of the quotient's last place, and a quotient that is not on a half
+ * too great by up to |offset|, 2^-17 of the quotient's last bit, and a quotient that is not on a half
  * is at least 1 / (2 semi), 2^-16.7, away from the next. One that is on a half comes out beyond it, on
  * either side of zero: rounded away from zero, as there. */
 static inline int32_t ih_fraction(int64_t inverse_q50, int32_t offset)

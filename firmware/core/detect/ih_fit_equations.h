@@ -4,7 +4,7 @@
  * In:     rays and points, an ellipsoid, the scale of the robust weights.
  * Out:    normal equations and right side; ih_fit.h says of what.
  * Method: comparisons of 16 bits select the points that may have a weight and the rays that may hit the
- *         ellipsoid, rather too many than too few; the rest of the work is for those alone. Rows are kept until
+ *         ellipsoid, too many rather than too few; all other work is for those alone. Rows are kept until
  *         there are IH_FIT_ROWS_MAX, then their products are summed in vectors; sums are exact until all
  *         rows are in them: the order does not matter.
  * Overflow: as in ih_fit.h. Rows have 16 bits: slopes by the centre are at most 1 (Q14), by ln below 3.6

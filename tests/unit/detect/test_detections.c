@@ -102,7 +102,7 @@ static void of_two_at_one_place_the_more_probable_stays(void)
     TEST_ASSERT_EQUAL_INT32(0, detections.dropped_count);
 }
 
-static void a_full_list_drops_the_least_probable(void)
+static void a_full_list_drops_the_last_one(void)
 {
     int i;
 
@@ -431,7 +431,7 @@ static void only_so_many_expected_heads_are_looked_for(void)
     for (pass = 0; pass < 3; pass++) {
         make_points(true, false);
         ih_detections_begin(&detections);
-        params.scan.place_max = 0;
+        params.scan.candidate_max = 0;
         params.spacing_mm = 1;
         params.expected_max = pass;
         expected.count = 0;
@@ -468,7 +468,7 @@ static void views_tell_an_empty_seat_from_hands(void)
     IH_TEST_RANGE(0, 2, detections.view[0].through, "through", 1);
 }
 
-/* The same window twice: views add up, findings do not. */
+/* The same window twice: views add up, detections do not. */
 static void windows_add_up(void)
 {
     struct ih_view once;
@@ -546,7 +546,7 @@ static void a_front_may_be_as_near_as_its_limit(void)
 {
     make_points(true, false);
     params.fit.step_count = 0;
-    params.scan.place_max = 0;
+    params.scan.candidate_max = 0;
     expect_head();
     params.front_min_mm = 702;
     look();
@@ -586,7 +586,7 @@ static void what_is_hopeless_is_fitted_for_a_step(void)
         expected.count = 0;
         expect_head();
         expected.head[0].centre_mm_q8[0] += 30 << 8;
-        params.scan.place_max = 0;
+        params.scan.candidate_max = 0;
         params.hopeless_logit_q10 = hopeless_q10[pass];
         params.fit.step_count = IH_FIT_STEPS;
         ih_detections_begin(&detections);
@@ -621,7 +621,7 @@ static void near_starts_are_tried_once(void)
     int i;
 
     make_points(true, false);
-    params.scan.place_max = 0;
+    params.scan.candidate_max = 0;
     params.spacing_mm = 0;
     params.fit.step_count = 0;
     for (i = 0; i < IH_TEST_COUNT(cases); i++) {
@@ -677,7 +677,7 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(detections_are_sorted);
     RUN_TEST(of_two_at_one_place_the_more_probable_stays);
-    RUN_TEST(a_full_list_drops_the_least_probable);
+    RUN_TEST(a_full_list_drops_the_last_one);
     RUN_TEST(any_order_gives_a_good_list);
     RUN_TEST(a_candidate_takes_the_nearest_nest_in_reach);
     RUN_TEST(outlines_are_near_the_true_projection);

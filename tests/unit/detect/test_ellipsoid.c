@@ -151,22 +151,22 @@ static void a_mirror_changes_the_sign_alone(void)
 static void places_are_in_semi_axes(void)
 {
     const struct ih_ellipsoid head = ih_ellipsoid_mean((const int32_t[3]){100, -200, 300});
-    const struct ih_fractions shares = ih_ellipsoid_fractions(head.semi_mm_q8);
+    const struct ih_fractions fractions = ih_ellipsoid_fractions(head.semi_mm_q8);
     int32_t point[3], place[3], axis;
 
     for (axis = 0; axis < 3; axis++) {
         memcpy(point, head.centre_mm_q8, sizeof point);
         point[axis] += head.semi_mm_q8[axis];
-        TEST_ASSERT_TRUE(ih_ellipsoid_position(&head, &shares, point, place));
+        TEST_ASSERT_TRUE(ih_ellipsoid_position(&head, &fractions, point, place));
         TEST_ASSERT_EQUAL_INT32(1 << 14, place[axis]);
         TEST_ASSERT_EQUAL_INT32(0, place[(axis + 1) % 3] | place[(axis + 2) % 3]);
         point[axis] += 7 * head.semi_mm_q8[axis];
-        TEST_ASSERT_TRUE(ih_ellipsoid_position(&head, &shares, point, place));
+        TEST_ASSERT_TRUE(ih_ellipsoid_position(&head, &fractions, point, place));
         TEST_ASSERT_EQUAL_INT32(8 << 14, place[axis]);
         point[axis] += 2;
-        TEST_ASSERT_FALSE(ih_ellipsoid_position(&head, &shares, point, place));
+        TEST_ASSERT_FALSE(ih_ellipsoid_position(&head, &fractions, point, place));
         point[axis] = INT32_MIN;
-        TEST_ASSERT_FALSE(ih_ellipsoid_position(&head, &shares, point, place));
+        TEST_ASSERT_FALSE(ih_ellipsoid_position(&head, &fractions, point, place));
     }
 }
 
@@ -290,26 +290,27 @@ static void the_box_misses_nothing(void)
 
 /* Products with an inverse against divisions: every semi-axis, offsets around halves of the last bit, on
  * them where there are such, at the ends and anywhere. */
-static void shares_are_the_quotients(void)
+static void fractions_are_the_quotients(void)
 {
     struct ih_test_random random = {99};
     int32_t semi, i, near;
 
     for (semi = IH_ELLIPSOID_SEMI_MIN_MM << 8; semi <= IH_ELLIPSOID_SEMI_MAX_MM << 8; semi++) {
         const int32_t semis[3] = {semi, semi, semi};
-        const int64_t share = ih_ellipsoid_fractions(semis).inverse_q50[semi % 3];
+        const int64_t inverse_q50 = ih_ellipsoid_fractions(semis).inverse_q50[semi % 3];
         const int32_t step = (semi & (semi - 1)) == 0 ? 1 : 20000;
 
         for (i = -IH_FRACTION_MAX; i <= IH_FRACTION_MAX; i += step) {
             const int64_t half = 2 * ih_test_between(&random, 0, 1 << 17) + 1;
             const int32_t at = (int32_t)(half * semi / 32768);
 
-            TEST_ASSERT_EQUAL_INT64(ih_div_round((int64_t)i * 16384, semi), ih_fraction(share, i));
+            TEST_ASSERT_EQUAL_INT64(ih_div_round((int64_t)i * 16384, semi),
+                                    ih_fraction(inverse_q50, i));
             for (near = at - 1; near <= at + 1 && near <= IH_FRACTION_MAX; near++) {
                 TEST_ASSERT_EQUAL_INT64(ih_div_round((int64_t)near * 16384, semi),
-                                        ih_fraction(share, near));
+                                        ih_fraction(inverse_q50, near));
                 TEST_ASSERT_EQUAL_INT64(ih_div_round(-(int64_t)near * 16384, semi),
-                                        ih_fraction(share, -near));
+                                        ih_fraction(inverse_q50, -near));
             }
         }
     }
@@ -326,6 +327,6 @@ int main(void)
     RUN_TEST(places_are_in_semi_axes);
     RUN_TEST(the_extremes_do_not_overflow);
     RUN_TEST(the_box_misses_nothing);
-    RUN_TEST(shares_are_the_quotients);
+    RUN_TEST(fractions_are_the_quotients);
     return UNITY_END();
 }

@@ -136,7 +136,7 @@ static void every_number_tells_scenes_apart(void)
 {
     static const struct {
         int kind;
-        const char *less, *more;
+        const char *low, *high;
         double by;
     } cases[] = {
         {IH_EVIDENCE_ON, "dark", "head", 4},
@@ -162,12 +162,12 @@ static void every_number_tells_scenes_apart(void)
     int i;
 
     for (i = 0; i < IH_TEST_COUNT(cases); i++) {
-        const double less = value_of(cases[i].less, cases[i].kind);
-        const double more = value_of(cases[i].more, cases[i].kind);
+        const double low = value_of(cases[i].low, cases[i].kind);
+        const double high = value_of(cases[i].high, cases[i].kind);
 
         IH_TEST_EQUAL(i, cases[i].kind, "every kind has its scenes", i);
-        if (more - less < cases[i].by) {
-            IH_TEST_WITHIN(0, cases[i].by, more - less, ih_evidence_text(cases[i].kind), i);
+        if (high - low < cases[i].by) {
+            IH_TEST_WITHIN(0, cases[i].by, high - low, ih_evidence_text(cases[i].kind), i);
         }
     }
 }
@@ -376,7 +376,7 @@ static void tallness_is_in_hundredths_of_the_mean(void)
     }
 }
 
-/* One ray each. A closed one makes a share of openness a quarter, none a half; one of body, of three
+/* One ray each. A closed one makes an open fraction a quarter, none a half; one of body, of three
  * rays at least, makes a third. */
 static void places_and_depths_have_their_limits(void)
 {

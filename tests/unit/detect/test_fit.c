@@ -69,9 +69,9 @@ static double max_difference(const struct ih_ellipsoid *a, const struct ih_ellip
 static bool distance_of(const struct ih_ellipsoid *ellipsoid, const int32_t place_q14[3],
                         int32_t *distance_mm_q8)
 {
-    const struct ih_fractions shares = ih_ellipsoid_fractions(ellipsoid->semi_mm_q8);
+    const struct ih_fractions fractions = ih_ellipsoid_fractions(ellipsoid->semi_mm_q8);
 
-    return ih_ellipsoid_distance(&shares, place_q14, distance_mm_q8);
+    return ih_ellipsoid_distance(&fractions, place_q14, distance_mm_q8);
 }
 
 static void distances_match_float64(void)

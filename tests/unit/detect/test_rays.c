@@ -233,7 +233,7 @@ static void a_range_image_has_its_rays_from_the_camera(void)
     TEST_ASSERT_EQUAL_INT32(IH_RAY_EMPTY, rays.ray[2].state);
 }
 
-/* The steepest rays and the farthest projector that a rig may have, the greatest and least depths
+/* The steepest rays and the farthest projector that a rig may have, the largest and smallest depths
  * and places that points may have: nothing wraps, points stay within 8 times the depth. */
 static void the_extremes_of_a_rig_do_not_overflow(void)
 {
@@ -251,11 +251,11 @@ static void the_extremes_of_a_rig_do_not_overflow(void)
         }
         for (slot = 0; slot < IH_SLOTS; slot++) { /* r_z from 1/4 on: a slope of up to 4 */
             const double z = 0.25 + 0.75 * ih_test_unit(&random) * (pass % 5);
-            const double limited = z > 1 ? 1 : z, turn = 6.2832 * ih_test_unit(&random);
+            const double limited = z > 1 ? 1 : z, angle = 6.2832 * ih_test_unit(&random);
             const double aside = sqrt(1 - limited * limited) * 1.00006;
 
-            c->ray_q30[slot][0] = (int32_t)lround(cos(turn) * aside * (1 << 30));
-            c->ray_q30[slot][1] = (int32_t)lround(sin(turn) * aside * (1 << 30));
+            c->ray_q30[slot][0] = (int32_t)lround(cos(angle) * aside * (1 << 30));
+            c->ray_q30[slot][1] = (int32_t)lround(sin(angle) * aside * (1 << 30));
             c->ray_q30[slot][2] = (int32_t)lround(limited * (1 << 30));
             rig.line[slot].slope_x_q20 =
                 (int32_t)lround(ldexp(c->ray_q30[slot][0], 20) / c->ray_q30[slot][2]);

@@ -9,7 +9,7 @@
 #include "ih_test_scene.h"
 
 struct vector_place {
-    double centre_mm[3], low, high; /* its rating is between */
+    double centre_mm[3], low, high; /* its score is between */
 };
 
 struct vector_scan {
@@ -42,19 +42,19 @@ static void find(void)
     ih_scan_find(&rays, &params, &scratch, &scan);
 }
 
-static int32_t rating_of(int32_t slot)
+static int32_t score_of(int32_t slot)
 {
     return ih_template_score_q12(&rays, &scratch.table, scratch.centre_mm_q8[slot]);
 }
 
 static bool is_looked_at(int32_t slot)
 {
-    return scratch.state[slot] == IH_SCAN_RATED || scratch.state[slot] == IH_SCAN_WIDENED;
+    return scratch.state[slot] == IH_SCAN_SCORED || scratch.state[slot] == IH_SCAN_WIDENED;
 }
 
-static double from_q12(int32_t rating_q12)
+static double from_q12(int32_t score_q12)
 {
-    return ih_test_from_q(rating_q12, 12);
+    return ih_test_from_q(score_q12, 12);
 }
 
 static bool apart(const int32_t a[3], const int32_t b[3])
@@ -74,10 +74,10 @@ static bool same_block(int32_t slot, int32_t other)
     return slot / IH_GRID / 2 == other / IH_GRID / 2 && slot % IH_GRID / 2 == other % IH_GRID / 2;
 }
 
-/* A second scan: what is known of a slot's place is nothing or its rating. */
+/* A second scan: what is known of a slot's place is nothing or its score. */
 struct second {
     bool is_known[IH_SLOTS], is_wide[IH_SLOTS], is_struck[IH_SLOTS];
-    int32_t rating[IH_SLOTS];
+    int32_t score[IH_SLOTS];
 };
 
 /* The first scan knows it, too, unless it is near one that was taken. */
@@ -86,7 +86,7 @@ static void know(struct second *second, int32_t slot)
     if (!second->is_known[slot] && rays.ray[slot].state == IH_RAY_SEEN) {
         second->is_known[slot] = true;
         TEST_ASSERT_TRUE(is_looked_at(slot));
-        second->rating[slot] = rating_of(slot);
+        second->score[slot] = score_of(slot);
     }
 }
 
@@ -97,7 +97,7 @@ static int32_t best_of(const struct second *second)
 
     for (slot = IH_SLOTS - 1; slot >= 0; slot--) {
         if (second->is_known[slot] && !second->is_struck[slot] &&
-            (best == IH_NONE || second->rating[slot] >= second->rating[best])) {
+            (best == IH_NONE || second->score[slot] >= second->score[best])) {
             best = slot;
         }
     }
@@ -139,10 +139,10 @@ static void check_choice(void)
     }
     while (count < IH_SCAN_MAX && (best = best_of(&second)) != IH_NONE) {
         if (second.is_wide[best]) {
-            for (k = 0; k < scan.place_count; k++) {
-                is_found[k] |= scan.place[k].rating_q12 == second.rating[best] &&
-                               memcmp(scratch.centre_mm_q8[best], scan.place[k].centre_mm_q8,
-                                      sizeof scan.place[k].centre_mm_q8) == 0;
+            for (k = 0; k < scan.candidate_count; k++) {
+                is_found[k] |= scan.candidate[k].score_q12 == second.score[best] &&
+                               memcmp(scratch.centre_mm_q8[best], scan.candidate[k].centre_mm_q8,
+                                      sizeof scan.candidate[k].centre_mm_q8) == 0;
             }
             taken[count++] = best;
         } else {
@@ -155,20 +155,21 @@ static void check_choice(void)
         }
         strike_out(&second, taken, count);
     }
-    TEST_ASSERT_EQUAL_INT32(count, scan.place_count);
-    for (k = 0; k < scan.place_count; k++) {
+    TEST_ASSERT_EQUAL_INT32(count, scan.candidate_count);
+    for (k = 0; k < scan.candidate_count; k++) {
         TEST_ASSERT_TRUE(is_found[k]);
-        TEST_ASSERT_TRUE(k == 0 || scan.place[k].rating_q12 <= scan.place[k - 1].rating_q12);
+        TEST_ASSERT_TRUE(k == 0 || scan.candidate[k].score_q12 <= scan.candidate[k - 1].score_q12);
     }
     for (slot = 0; slot < IH_SLOTS; slot++) {
         IH_TEST_EQUAL(second.is_known[slot], is_looked_at(slot), "looked at", slot);
     }
-    IH_TEST_UNTOUCHED(&scan.place[count], (size_t)(IH_SCAN_MAX - count) * sizeof scan.place[0],
+    IH_TEST_UNTOUCHED(&scan.candidate[count],
+                      (size_t)(IH_SCAN_MAX - count) * sizeof scan.candidate[0],
                       "beyond the places");
 }
 
 /* Half a step, and the vectors' digits; two means cut off to Q12. */
-static void places_and_ratings_match_float64(void)
+static void candidates_and_scores_match_float64(void)
 {
     int32_t i, axis, k, slot, checked = 0;
 
@@ -187,7 +188,7 @@ static void places_and_ratings_match_float64(void)
                                    k);
                 }
                 IH_TEST_WITHIN((high - low) / 2 + 0.0006, (high + low) / 2,
-                               from_q12(rating_of(slot)), vector_scenes[i].name, k);
+                               from_q12(score_of(slot)), vector_scenes[i].name, k);
                 checked++;
             }
             k += rays.ray[slot].state == IH_RAY_SEEN;
@@ -216,16 +217,17 @@ static void the_best_place_is_the_head(void)
 
         make_scene(scene);
         find();
-        TEST_ASSERT_TRUE(scan.place_count > 1);
+        TEST_ASSERT_TRUE(scan.candidate_count > 1);
         IH_TEST_WITHIN(cases[i].limit_mm, 0,
-                       distance_mm(scan.place[0].centre_mm_q8, scene->centre_mm), scene->name, 0);
-        TEST_ASSERT_TRUE_MESSAGE(from_q12(scan.place[0].rating_q12 - scan.place[1].rating_q12) >
-                                     cases[i].lead,
-                                 scene->name);
+                       distance_mm(scan.candidate[0].centre_mm_q8, scene->centre_mm), scene->name,
+                       0);
+        TEST_ASSERT_TRUE_MESSAGE(
+            from_q12(scan.candidate[0].score_q12 - scan.candidate[1].score_q12) > cases[i].lead,
+            scene->name);
     }
     make_scene(scene_named("wall")); /* nothing there is nearly as good */
     find();
-    TEST_ASSERT_TRUE(from_q12(scan.place[0].rating_q12) < 0.8);
+    TEST_ASSERT_TRUE(from_q12(scan.candidate[0].score_q12) < 0.8);
 }
 
 /* A head's front at 1000 mm straight ahead, where slot 0 sees it; all others but slot 1 are out of
@@ -277,7 +279,7 @@ static void the_values_of_single_rays(void)
         stand_before_a_head();
         set_state(1, cases[i].state, 1000 + cases[i].behind_mm);
         find();
-        IH_TEST_WITHIN(0.0005, (1 + cases[i].value) / 8, from_q12(rating_of(0)), "value", i);
+        IH_TEST_WITHIN(0.0005, (1 + cases[i].value) / 8, from_q12(score_of(0)), "value", i);
     }
 }
 
@@ -317,7 +319,7 @@ static void the_values_of_rays_around(void)
         set_state(1, cases[i].state, centre_mm + cases[i].behind_mm);
         find();
         IH_TEST_WITHIN(0.0005, (1 + VECTOR_RING_FRACTION * cases[i].value) / 8,
-                       from_q12(rating_of(0)), "value", i);
+                       from_q12(score_of(0)), "value", i);
     }
 }
 
@@ -347,7 +349,7 @@ static void many_rays_show_the_last_unit_of_a_value(void)
             set_state(slot, inside[i].state, 1000 + inside[i].behind_mm);
         }
         find();
-        IH_TEST_EQUAL(trunc(4096 * (1 + 360 * inside[i].value) / 361), rating_of(0), "inside", i);
+        IH_TEST_EQUAL(trunc(4096 * (1 + 360 * inside[i].value) / 361), score_of(0), "inside", i);
     }
     for (i = 0; i < IH_TEST_COUNT(around); i++) {
         const int32_t centre_mm = 1000 + stand_before_a_head();
@@ -358,7 +360,7 @@ static void many_rays_show_the_last_unit_of_a_value(void)
             set_state(slot, around[i].state, centre_mm + around[i].behind_mm);
         }
         find();
-        IH_TEST_EQUAL(4096 / 8 + trunc(0.6 * 4096 * around[i].value), rating_of(0), "around", i);
+        IH_TEST_EQUAL(4096 / 8 + trunc(0.6 * 4096 * around[i].value), score_of(0), "around", i);
     }
 }
 
@@ -378,7 +380,7 @@ static void few_rays_count_as_eight(void)
             see(slot, 1000 << 8);
         }
         find();
-        IH_TEST_EQUAL(4096 * (count < 8 ? count : 8) / 8, rating_of(0), "inside", count);
+        IH_TEST_EQUAL(4096 * (count < 8 ? count : 8) / 8, score_of(0), "inside", count);
         centre_mm = 1000 + stand_before_a_head();
         for (slot = 1; slot <= count; slot++) {
             rays.ray[slot].slope_x_q20 =
@@ -386,7 +388,7 @@ static void few_rays_count_as_eight(void)
             see(slot, 5000 << 8);
         }
         find();
-        IH_TEST_EQUAL(512 + floor(0.6 * 4096 * (count < 8 ? count : 8) / 8), rating_of(0), "around",
+        IH_TEST_EQUAL(512 + floor(0.6 * 4096 * (count < 8 ? count : 8) / 8), score_of(0), "around",
                       count);
     }
 }
@@ -402,12 +404,12 @@ static void places_are_farther_apart_than_the_spacing(void)
         see(0, 1000 << 8);
         see(1, (1080 << 8) + off);
         find();
-        IH_TEST_EQUAL(1 + off, scan.place_count, "places", off);
+        IH_TEST_EQUAL(1 + off, scan.candidate_count, "places", off);
     }
 }
 
 /* As many as a frame can afford. */
-static void half_of_the_places_are_rated(void)
+static void half_of_the_places_are_scored(void)
 {
     int32_t i, slot, seen = 0, rated = 0;
 
@@ -428,17 +430,17 @@ static void no_point_one_point_and_equal_points(void)
     int32_t slot;
 
     find();
-    TEST_ASSERT_EQUAL_INT32(0, scan.place_count);
+    TEST_ASSERT_EQUAL_INT32(0, scan.candidate_count);
     see(200, 900 << 8);
     find();
-    TEST_ASSERT_EQUAL_INT32(1, scan.place_count);
+    TEST_ASSERT_EQUAL_INT32(1, scan.candidate_count);
     check_choice();
     for (slot = 0; slot < IH_SLOTS; slot++) {
         rays.ray[slot] = rays.ray[200];
     }
     find();
-    TEST_ASSERT_EQUAL_INT32(1, scan.place_count);
-    IH_TEST_WITHIN(0.001, 1, from_q12(scan.place[0].rating_q12), "score", 0);
+    TEST_ASSERT_EQUAL_INT32(1, scan.candidate_count);
+    IH_TEST_WITHIN(0.001, 1, from_q12(scan.candidate[0].score_q12), "score", 0);
     check_choice();
 }
 
@@ -458,10 +460,10 @@ static void the_centre_is_behind_the_point_along_its_ray(void)
         rays.ray[3].slope_y_q20 = slope_q20[i / 5];
         see(3, 700 << 8);
         find();
-        TEST_ASSERT_EQUAL_INT32(1, scan.place_count);
+        TEST_ASSERT_EQUAL_INT32(1, scan.candidate_count);
         for (axis = 0; axis < 3; axis++) { /* the step's half, times the slope, and half a step */
             IH_TEST_WITHIN(0.011, rays.ray[3].point_mm_q8[axis] / 256.0 + expected[axis],
-                           scan.place[0].centre_mm_q8[axis] / 256.0, "centre", i);
+                           scan.candidate[0].centre_mm_q8[axis] / 256.0, "centre", i);
         }
     }
 }
@@ -478,12 +480,13 @@ static void places_keep_their_distance_and_come_best_first(void)
             params.spacing_mm = spacing_mm[pass];
             find();
             check_choice();
-            TEST_ASSERT_TRUE(scan.place_count > 0);
-            TEST_ASSERT_TRUE(pass < 4 || scan.place_count == 1);
-            for (k = 1; k < scan.place_count; k++) {
-                TEST_ASSERT_TRUE(scan.place[k].rating_q12 <= scan.place[k - 1].rating_q12);
+            TEST_ASSERT_TRUE(scan.candidate_count > 0);
+            TEST_ASSERT_TRUE(pass < 4 || scan.candidate_count == 1);
+            for (k = 1; k < scan.candidate_count; k++) {
+                TEST_ASSERT_TRUE(scan.candidate[k].score_q12 <= scan.candidate[k - 1].score_q12);
                 for (j = 0; j < k; j++) {
-                    TEST_ASSERT_TRUE(apart(scan.place[k].centre_mm_q8, scan.place[j].centre_mm_q8));
+                    TEST_ASSERT_TRUE(
+                        apart(scan.candidate[k].centre_mm_q8, scan.candidate[j].centre_mm_q8));
                 }
             }
         }
@@ -505,7 +508,7 @@ static void a_mirrored_and_a_moved_scene_give_the_same(void)
         find();
         before = scratch;
         for (slot = 0; slot < IH_SLOTS; slot++) {
-            rated[slot] = is_looked_at(slot) ? rating_of(slot) : 0;
+            rated[slot] = is_looked_at(slot) ? score_of(slot) : 0;
         }
         mirror_rays();
         find();
@@ -513,12 +516,12 @@ static void a_mirrored_and_a_moved_scene_give_the_same(void)
             const struct vector_place *place = &vector_scans[i].tried[k];
 
             k += rays.ray[slot].state == IH_RAY_SEEN;
-            if (before.state[slot] >= IH_SCAN_RATED && is_looked_at(slot)) {
+            if (before.state[slot] >= IH_SCAN_SCORED && is_looked_at(slot)) {
                 const int32_t *centre = before.centre_mm_q8[slot];
 
                 IH_TEST_RANGE(-2, 2, centre[0] + scratch.centre_mm_q8[slot][0], "x", slot);
                 IH_TEST_WITHIN(0.002 + place->high - place->low, from_q12(rated[slot]),
-                               from_q12(rating_of(slot)), vector_scenes[i].name, slot);
+                               from_q12(score_of(slot)), vector_scenes[i].name, slot);
             }
         }
         mirror_rays();
@@ -527,7 +530,7 @@ static void a_mirrored_and_a_moved_scene_give_the_same(void)
         for (slot = 0; slot < IH_SLOTS; slot++) {
             IH_TEST_EQUAL(before.state[slot], scratch.state[slot], "state", slot);
             if (is_looked_at(slot)) {
-                IH_TEST_EQUAL(rated[slot], rating_of(slot), "rating", slot);
+                IH_TEST_EQUAL(rated[slot], score_of(slot), "score", slot);
                 for (axis = 0; axis < 3; axis++) {
                     IH_TEST_EQUAL(before.centre_mm_q8[slot][axis] + by[axis],
                                   scratch.centre_mm_q8[slot][axis], "centre", slot);
@@ -568,9 +571,8 @@ static void random_input_stays_within_the_limits(void)
         find();
         check_choice();
         for (slot = 0; slot < IH_SLOTS; slot++) {
-            if (is_looked_at(slot) && rating_of(slot) != IH_TEMPLATE_NONE_Q12) {
-                IH_TEST_RANGE(-4096 * 136 / 100 - 1, 4096 * 16 / 10, rating_of(slot), "rating",
-                              slot);
+            if (is_looked_at(slot) && score_of(slot) != IH_TEMPLATE_NONE_Q12) {
+                IH_TEST_RANGE(-4096 * 136 / 100 - 1, 4096 * 16 / 10, score_of(slot), "score", slot);
             }
         }
     }
@@ -579,14 +581,14 @@ static void random_input_stays_within_the_limits(void)
 int main(void)
 {
     UNITY_BEGIN();
-    RUN_TEST(places_and_ratings_match_float64);
+    RUN_TEST(candidates_and_scores_match_float64);
     RUN_TEST(the_best_place_is_the_head);
     RUN_TEST(the_values_of_single_rays);
     RUN_TEST(the_values_of_rays_around);
     RUN_TEST(many_rays_show_the_last_unit_of_a_value);
     RUN_TEST(few_rays_count_as_eight);
     RUN_TEST(places_are_farther_apart_than_the_spacing);
-    RUN_TEST(half_of_the_places_are_rated);
+    RUN_TEST(half_of_the_places_are_scored);
     RUN_TEST(no_point_one_point_and_equal_points);
     RUN_TEST(the_centre_is_behind_the_point_along_its_ray);
     RUN_TEST(places_keep_their_distance_and_come_best_first);

@@ -89,7 +89,7 @@ static void a_curve_goes_through_its_knots_and_is_constant_beyond(void)
     IH_TEST_EQUAL(-32768, part_at(INT32_MIN), "before", 1);
     IH_TEST_EQUAL(1234, part_at(curve.first_q8 + 6 * 300 + 1), "behind", 0);
     IH_TEST_EQUAL(1234, part_at(INT32_MAX), "behind", 1);
-    curves[3].step_q8 = 1; /* the least that is learnt */
+    curves[3].step_q8 = 1; /* the minimum that is learnt */
     IH_TEST_EQUAL(5, part_at(curve.first_q8 + 1), "narrow", 0);
     curves[3].first_q8 = INT32_MAX;
     IH_TEST_EQUAL(-32768, part_at(INT32_MIN), "farthest", 0);

@@ -110,8 +110,8 @@ static double behind_mm(const struct exact *exact, double centre_mm, double off)
            semi_mm[2] * sqrt((inside < 0 ? 0 : inside) / exact->steep);
 }
 
-/* The least, or the greatest, that 16 bits may make of a head, see ih_template.h; as tools/oracle/scan.py. */
-static double rating_end(const int32_t centre_mm_q8[3], int sign)
+/* The minimum, or the maximum, that 16 bits may make of a head, see ih_template.h; as tools/oracle/scan.py. */
+static double score_end(const int32_t centre_mm_q8[3], int sign)
 {
     const double centre_mm = centre_mm_q8[2] / 256.0;
     const double away = (centre_mm_q8[2] - rays.origin_mm_q8[2]) / 256.0;
@@ -159,15 +159,15 @@ static double rating_end(const int32_t centre_mm_q8[3], int sign)
 /* Of means cut off to Q12. The width of what is allowed. */
 static double check(const int32_t centre_mm_q8[3], int32_t index)
 {
-    const double low = rating_end(centre_mm_q8, -1), high = rating_end(centre_mm_q8, 1);
-    const double rating = ih_test_from_q(ih_template_score_q12(&rays, &table, centre_mm_q8), 12);
+    const double low = score_end(centre_mm_q8, -1), high = score_end(centre_mm_q8, 1);
+    const double score = ih_test_from_q(ih_template_score_q12(&rays, &table, centre_mm_q8), 12);
 
-    IH_TEST_WITHIN((high - low) / 2 + 0.0005, (high + low) / 2, rating, "rating", index);
+    IH_TEST_WITHIN((high - low) / 2 + 0.0005, (high + low) / 2, score, "score", index);
     return high - low;
 }
 
 /* What is allowed is little, most of the time. */
-static void ratings_are_float64s_in_scenes(void)
+static void scores_are_float64s_in_scenes(void)
 {
     int32_t i, slot, count = 0, wide = 0;
     double sum = 0;
@@ -210,7 +210,7 @@ static double random_in(struct ih_test_random *random, double low, double high)
     return low + (high - low) * (double)ih_test_between(random, 0, 1 << 30) / (1 << 30);
 }
 
-/* Somewhere a rating is given: to 16 m, at slopes to 0.6. */
+/* Somewhere a score is given: to 16 m, at slopes to 0.6. */
 static void random_centre(struct ih_test_random *random, int32_t centre_mm_q8[3])
 {
     static const int32_t max_mm[] = {500, 1200, 4000, 16000};
@@ -271,10 +271,11 @@ static void rays_that_pass_beside_a_limit(void)
         off2 = 4.3e-6 * (centre[2] - rays.origin_mm_q8[2]) / 256 + 0.0131;
         reach2 = radius2[kind] + (kind == 4 ? 0 : side * off2 * random_in(&random, 1, 1.5));
         for (slot = 0; slot < 60; slot++) {
-            const double turn = kind == 4 ? atan2(78, 113) + side * random_in(&random, 0.01, 0.03)
-                                          : random_in(&random, -0.004, 0.004);
-            const double x = kind == 4 ? cos(angle) * cos(turn) : cos(angle + turn);
-            const double y = kind == 4 ? sin(turn) : sin(angle + turn);
+            const double off_angle = kind == 4
+                                         ? atan2(78, 113) + side * random_in(&random, 0.01, 0.03)
+                                         : random_in(&random, -0.004, 0.004);
+            const double x = kind == 4 ? cos(angle) * cos(off_angle) : cos(angle + off_angle);
+            const double y = kind == 4 ? sin(off_angle) : sin(angle + off_angle);
             double reach = sqrt(reach2);
             int32_t i;
 
@@ -309,12 +310,12 @@ static void points_beside_a_limit_of_depth(void)
         random_centre(&random, centre);
         rays_far_off(centre);
         for (slot = 0; slot < 60; slot++) {
-            const double turn = angle + random_in(&random, -0.004, 0.004);
+            const double off_angle = angle + random_in(&random, -0.004, 0.004);
             const double off2 = 4.3e-6 * (centre[2] - rays.origin_mm_q8[2]) / 256 + 0.0130;
             struct exact exact;
             double behind;
 
-            aim_at(slot, centre, reach * cos(turn), reach * sin(turn));
+            aim_at(slot, centre, reach * cos(off_angle), reach * sin(off_angle));
             see(slot, centre[2]);
             exact = cross(&rays.ray[slot], centre);
             behind = behind_mm(&exact, centre[2] / 256.0, side > 0 ? -off2 : off2);
@@ -347,8 +348,8 @@ static void points_beside_the_limit_of_what_is_open(void)
     }
 }
 
-/* Where 16 bits do not reach there is no rating, and rays that are too steep do not count. */
-static void out_of_the_limits_there_is_no_rating(void)
+/* Where 16 bits do not reach there is no score, and rays that are too steep do not count. */
+static void out_of_the_limits_there_is_no_score(void)
 {
     static const int32_t centre_mm[][3] = {{0, 0, 200},     {0, 0, 226},      {0, 0, 16101},
                                            {1001, 0, 1000}, {0, -1001, 1000}, {0, 0, -500}};
@@ -379,7 +380,7 @@ static void out_of_the_limits_there_is_no_rating(void)
 }
 
 /* Rays, origins and depths of all sizes. */
-static void random_spaces_are_rated(void)
+static void random_spaces_are_scored(void)
 {
     struct ih_test_random random = {413};
     int32_t pass, slot, axis;
@@ -417,11 +418,11 @@ static void random_spaces_are_rated(void)
 int main(void)
 {
     UNITY_BEGIN();
-    RUN_TEST(ratings_are_float64s_in_scenes);
+    RUN_TEST(scores_are_float64s_in_scenes);
     RUN_TEST(rays_that_pass_beside_a_limit);
     RUN_TEST(points_beside_a_limit_of_depth);
     RUN_TEST(points_beside_the_limit_of_what_is_open);
-    RUN_TEST(out_of_the_limits_there_is_no_rating);
-    RUN_TEST(random_spaces_are_rated);
+    RUN_TEST(out_of_the_limits_there_is_no_score);
+    RUN_TEST(random_spaces_are_scored);
     return UNITY_END();
 }
