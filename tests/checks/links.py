@@ -44,13 +44,18 @@ def anchors(text):
     return {re.sub(r"[^\w -]", "", head.lower()).replace(" ", "-") for head in heads}
 
 
+def blank(code):
+    """As long as it was, so that offsets stay."""
+    return re.sub(r"[^\n]", " ", code[0])
+
+
 def there(path, files, folders):
     path = os.path.normpath(path)
     return path in files or path in folders
 
 
 def check_links(page, text, files, folders):
-    for hit in LINK.finditer(FENCE.sub(lambda fence: re.sub(r"[^\n]", " ", fence[0]), text)):
+    for hit in LINK.finditer(CODE.sub(blank, FENCE.sub(blank, text))):
         target, _, section = hit[1].partition("#")
         if re.match(r"\w+:", hit[1]):
             continue
