@@ -42,17 +42,14 @@
 enum ih_side { IH_SIDE_MIDDLE, IH_SIDE_LEFT, IH_SIDE_RIGHT };
 
 struct ih_tracks_params {
-    int32_t gate_mm;                        /* radius of a track's gate just after a detection .. */
-    int32_t gate_mm_per_s;                  /* .. and its growth until the next one */
-    int32_t start_logit_q10;                /* detections above this start a track */
-    int32_t start_head_logit_q10;           /* a new track above this is a head at once, */
-    int32_t mature_detections;              /* from this many detections on */
-    int32_t accept_logit_q10;               /* .. above this, */
-    int32_t drop_logit_q10;                 /* until it falls below this */
-    int32_t keep_logit_q10;                 /* detections above this continue a track */
-    int32_t memory_q16;                     /* weight of the old mean in the new one */
-    int32_t through_percent, front_percent; /* of the rays that meet it: gone, hidden */
-    int32_t seen_min;                       /* points; a frame with fewer is lost */
+    int32_t gate_mm, gate_mm_per_s;          /* a gate's radius after a detection, and its growth */
+    int32_t start_logit_q10, keep_logit_q10; /* detections above these start, continue a track */
+    int32_t start_head_logit_q10;            /* a new track above this is a head at once, */
+    int32_t mature_detections, accept_logit_q10; /* after so many detections one above this, */
+    int32_t drop_logit_q10;                      /* until it falls below this */
+    int32_t memory_q16;                          /* weight of the old mean in the new one */
+    int32_t through_percent, front_percent;      /* of the rays that meet it: gone, hidden */
+    int32_t seen_min;                            /* points; a frame with fewer is lost */
     int32_t coast_us;
     int32_t gap_us;             /* up to 2 s; -1: every frame on its own */
     int32_t measured_mm;        /* standard deviation of a detection's centre; 4 .. 500 */
@@ -74,11 +71,9 @@ struct ih_track {
 struct ih_tracks {
     bool has_time;
     int64_t time_us;
-    int32_t last_id;
-    int32_t track_count;
+    int32_t last_id, track_count;
     struct ih_track track[IH_TRACKS_MAX];
-    int32_t selected_id; /* 0: none */
-    int32_t rival_id, rival_frames;
+    int32_t selected_id, rival_id, rival_frames; /* id 0: none */
     /* Of this frame: indices as for ih_tracks_head, most probable first. */
     int32_t head_count;
     int32_t head[IH_TRACKS_MAX];
@@ -93,11 +88,10 @@ struct ih_predicted {
 
 /* The tracks' verdict on a head. */
 struct ih_verdict {
-    int32_t track_id;        /* 0: none */
-    bool is_head;            /* accepted */
-    int32_t logit_q10;       /* the track's; without one the detection's */
-    int32_t probability_q16; /* the same */
-    int32_t sigma_mm_q8;     /* of the centre along each axis; 0: unknown */
+    int32_t track_id;                   /* 0: none */
+    bool is_head;                       /* accepted */
+    int32_t logit_q10, probability_q16; /* the track's; without one the detection's */
+    int32_t sigma_mm_q8;                /* of the centre along each axis; 0: unknown */
 };
 
 IH_BEGIN_DECLS
