@@ -5,6 +5,7 @@
 
 #include "base/ih_fix.h"
 #include "detect/ih_head_model.h"
+#include "detect/ih_ray_limits.h"
 #include "simd/ih_simd.h"
 
 /* Every ray of known state is left to ih_evidence. */
@@ -20,123 +21,12 @@ static void leave_all(const struct ih_rays *rays, struct ih_ray_marks *marks)
 }
 
 #if IH_I16_LANES > 0
-#define DEPTH_MIN_MM 227
-#define DEPTH_MAX_MM 16300
-#define SEMI_MIN_MM 42
-#define SEMI_MAX_MM 200
-#define SLOPE_MAX_Q20 (1 << 20)
-/* Offsets are limited to this: 510 mm in Q4, 3.99 semi-axes in Q11. */
-#define OFFSET_MAX 8171
-#define OFFSET_MAX2_Q10 16000 /* below 3.99^2 */
-#define MM_Q4(mm) ((mm)*16)
+#define OFFSET_MAX2_Q10 16000 /* below the square of IH_RAY_OFFSET_MAX, 3.99 semi-axes */
 #define RING_INNER2_Q10 ((int16_t)IH_HEAD_SQUARE(IH_HEAD_RING_INNER_PERCENT, 10))
 #define RING_OUTER2_Q10 ((int16_t)IH_HEAD_SQUARE(IH_HEAD_RING_OUTER_PERCENT, 10))
 #define AROUND2_Q10 ((int16_t)IH_HEAD_SQUARE(IH_HEAD_AROUND_PERCENT, 10))
 #define BELOW_Q15 ((int16_t)IH_HEAD_PART(IH_HEAD_RING_BELOW_TENTHS * 10, 15))
 #define ABOVE_Q15 ((int16_t)IH_HEAD_PART(IH_HEAD_RING_ABOVE_TENTHS * 10, 15))
-
-/* A slope difference to an offset: clamped, times a power of two, times a factor of 2^-16. */
-struct scale {
-    int16_t limit, power, factor;
-};
-
-/* A candidate, as the loop needs it: limits in mm Q4, depths in mm Q1, else as their names say. */
-struct candidate {
-    int16_t direction_q14[2];
-    int16_t reach_q14[2]; /* rays farther away are in no region */
-    struct scale mm[2], semi[2];
-    int16_t margin;
-    int16_t high_y, high_x, body_top_y, body_bottom_y, wide_bottom_y, semi_y;
-    int16_t shoulder_top_y, shoulder_bottom_y;
-    int16_t hit_q10;
-    int16_t open, body_min, body_max, level_min, level_max, before;
-};
-
-/* Times depth / 2^14, in steps of `length_q8` / 2^bits. */
-static struct scale scale_of(int32_t depth_q8, int32_t length_q8, int bits)
-{
-    const int64_t all = ((int64_t)depth_q8 << (bits + 2)) / length_q8; /* below 2^27 */
-    const int shift = ih_max_s32(ih_bits_u64((uint64_t)all) - 15, 0);
-    const int64_t factor = all > 0 ? all >> shift : 1;
-    return (struct scale){
-        .limit = (int16_t)ih_min_s64(((int64_t)OFFSET_MAX << 16) / (factor << shift), INT16_MAX),
-        .power = (int16_t)(1 << shift),
-        .factor = (int16_t)factor,
-    };
-}
-
-static int16_t clamp_s16(int64_t value)
-{
-    return (int16_t)ih_clamp_s64(value, INT16_MAX);
-}
-
-static int16_t depth_q1(int64_t mm_q8)
-{
-    return clamp_s16(mm_q8 >> 7);
-}
-
-/* An upper bound of a hit's distance from the centre, squared, in semi-axes; above every square if it is limited. */
-static int16_t find_hit_q10(const struct ih_ellipsoid *ellipsoid,
-                            const struct ih_ellipsoid_box *box, int32_t margin)
-{
-    int32_t hit_q10 = 0;
-    for (int axis = 0; axis < 2; axis++) {
-        const int32_t semi_q8 = ellipsoid->semi_mm_q8[axis];
-        const int32_t ratio_q10 = (int32_t)(((int64_t)box->half_mm_q8[axis] << 10) / semi_q8) + 1;
-        hit_q10 = ih_max_s32(hit_q10, ih_min_s32(ratio_q10, 1 << 14));
-    }
-    hit_q10 = ((hit_q10 * hit_q10) >> 10) + 6 * margin + 1;
-    return (int16_t)(hit_q10 < OFFSET_MAX2_Q10 ? hit_q10 : INT16_MAX);
-}
-
-/* False outside of the limits. */
-static bool set_directions(struct candidate *candidate, const struct ih_rays *rays,
-                           const struct ih_ellipsoid *ellipsoid)
-{
-    const int64_t depth_q8 = (int64_t)ellipsoid->centre_mm_q8[2] - rays->origin_mm_q8[2];
-    if (depth_q8 < DEPTH_MIN_MM << 8 || depth_q8 > DEPTH_MAX_MM << 8) {
-        return false;
-    }
-    for (int axis = 0; axis < 2; axis++) {
-        const int32_t semi_q8 = ellipsoid->semi_mm_q8[axis];
-        const int64_t off_q8 = (int64_t)ellipsoid->centre_mm_q8[axis] - rays->origin_mm_q8[axis];
-        if (rays->table.slope_max_q20[axis] >= SLOPE_MAX_Q20 || ih_abs_s64(off_q8) >= depth_q8 ||
-            semi_q8 < SEMI_MIN_MM << 8 || semi_q8 > SEMI_MAX_MM << 8) {
-            return false;
-        }
-        candidate->direction_q14[axis] =
-            (int16_t)((off_q8 * (1 << 14) - (off_q8 < 0 ? depth_q8 - 1 : 0)) / depth_q8);
-        candidate->reach_q14[axis] =
-            clamp_s16((int64_t)semi_q8 * (IH_ELLIPSOID_REACH << 14) / depth_q8);
-        candidate->mm[axis] = scale_of((int32_t)depth_q8, 256, 4);
-        candidate->semi[axis] = scale_of((int32_t)depth_q8, semi_q8, 11);
-    }
-    const int32_t depth_mm = (int32_t)(depth_q8 >> 8);
-    const int32_t shorter_mm = ih_min_s32(ellipsoid->semi_mm_q8[0], ellipsoid->semi_mm_q8[1]) >> 8;
-    candidate->margin = (int16_t)(5 + depth_mm / ih_min_s32(8 * shorter_mm, 900));
-    return true;
-}
-
-static void set_limits(struct candidate *candidate, const struct ih_ellipsoid *ellipsoid)
-{
-    const int32_t *semi_q8 = ellipsoid->semi_mm_q8;
-    const int64_t centre_q8 = ellipsoid->centre_mm_q8[2];
-    const int16_t semi_y = (int16_t)(semi_q8[1] >> 4);
-    candidate->semi_y = semi_y;
-    candidate->high_y = (int16_t)(semi_q8[1] * IH_HEAD_HIGH_FROM_PERCENT / 1600);
-    candidate->high_x = (int16_t)(semi_q8[0] * IH_HEAD_HIGH_ASIDE_PERCENT / 1600);
-    candidate->body_top_y = (int16_t)(semi_y + MM_Q4(IH_HEAD_BODY_TOP_MM));
-    candidate->body_bottom_y = (int16_t)(semi_y + MM_Q4(IH_HEAD_BODY_BOTTOM_MM));
-    candidate->wide_bottom_y = (int16_t)(semi_y + MM_Q4(IH_HEAD_WIDE_BOTTOM_MM));
-    candidate->shoulder_top_y = (int16_t)(semi_q8[1] * IH_HEAD_SHOULDER_TOP_PERCENT / 1600);
-    candidate->shoulder_bottom_y = (int16_t)(semi_y + MM_Q4(IH_HEAD_SHOULDER_BOTTOM_MM));
-    candidate->open = depth_q1(centre_q8 + (IH_HEAD_OPEN_MM << 8));
-    candidate->body_min = depth_q1(centre_q8 - (IH_HEAD_BODY_BEFORE_MM << 8));
-    candidate->body_max = depth_q1(centre_q8 + (IH_HEAD_BODY_BEHIND_MM << 8) - 1);
-    candidate->level_min = depth_q1(centre_q8 - (IH_HEAD_LEVEL_DEPTH_MM << 8));
-    candidate->level_max = depth_q1(centre_q8 + (IH_HEAD_LEVEL_DEPTH_MM << 8) - 1);
-    candidate->before = depth_q1(centre_q8 - semi_q8[2] - (IH_HEAD_BEFORE_MM << 8) - 1);
-}
 
 /* Regions around a head. */
 enum region {
@@ -181,7 +71,7 @@ static inline ih_i16 below(ih_i16 value, int16_t limit)
     return ih_i16_sub(ih_i16_all(limit), value);
 }
 
-static inline ih_i16 scaled(ih_i16 difference, const struct scale *scale)
+static inline ih_i16 scaled(ih_i16 difference, const struct ih_ray_scale *scale)
 {
     const ih_i16 clamped = ih_i16_clamp(difference, scale->limit);
     const ih_i16 product =
@@ -196,7 +86,7 @@ struct offset {
     ih_i16 ring, down; /* slack in the ring; by how much more down than aside */
 };
 
-static inline struct offset offset_of(const struct candidate *candidate,
+static inline struct offset offset_of(const struct ih_ray_limits *candidate,
                                       const struct ih_ray_table *table, int32_t slot)
 {
     struct offset at;
@@ -218,7 +108,7 @@ static inline struct offset offset_of(const struct candidate *candidate,
 }
 
 /* By how much a ray is inside of each region. */
-static inline void find_slack_around(const struct candidate *candidate, const struct offset *at,
+static inline void find_slack_around(const struct ih_ray_limits *candidate, const struct offset *at,
                                      ih_i16 slack[REGION_COUNT])
 {
     const ih_i16 limit = ih_i16_mul_high(at->aside_q12, ih_i16_all(ABOVE_Q15));
@@ -235,23 +125,23 @@ static inline void find_slack_around(const struct candidate *candidate, const st
     slack[BEFORE] = ih_i16_shift_right(below(at->ee_q10, AROUND2_Q10), 2);
 }
 
-static inline void find_slack_below(const struct candidate *candidate, const struct offset *at,
+static inline void find_slack_below(const struct ih_ray_limits *candidate, const struct offset *at,
                                     ih_i16 slack[REGION_COUNT])
 {
     const ih_i16 aside = ih_i16_abs(at->x);
     const ih_i16 under = above(at->y, candidate->body_top_y);
     const ih_i16 shoulder = ih_i16_min(min3(above(at->y, candidate->shoulder_top_y),
                                             below(at->y, candidate->shoulder_bottom_y),
-                                            above(aside, MM_Q4(IH_HEAD_SHOULDER_NEAR_MM))),
-                                       below(aside, MM_Q4(IH_HEAD_SHOULDER_FAR_MM)));
+                                            above(aside, IH_RAY_MM_Q4(IH_HEAD_SHOULDER_NEAR_MM))),
+                                       below(aside, IH_RAY_MM_Q4(IH_HEAD_SHOULDER_FAR_MM)));
     slack[BODY] = min3(under, below(at->y, candidate->body_bottom_y),
-                       below(aside, MM_Q4(IH_HEAD_BODY_ASIDE_MM)));
+                       below(aside, IH_RAY_MM_Q4(IH_HEAD_BODY_ASIDE_MM)));
     slack[WIDE] = ih_i16_min(min3(under, below(at->y, candidate->wide_bottom_y),
-                                  above(aside, MM_Q4(IH_HEAD_WIDE_ASIDE_MM))),
+                                  above(aside, IH_RAY_MM_Q4(IH_HEAD_WIDE_ASIDE_MM))),
                              below(ih_i16_abs(at->dx_q14), candidate->reach_q14[0]));
-    slack[LEVEL] =
-        min3(below(ih_i16_abs(at->y), candidate->semi_y),
-             above(aside, MM_Q4(IH_HEAD_LEVEL_NEAR_MM)), below(aside, MM_Q4(IH_HEAD_LEVEL_FAR_MM)));
+    slack[LEVEL] = min3(below(ih_i16_abs(at->y), candidate->semi_y),
+                        above(aside, IH_RAY_MM_Q4(IH_HEAD_LEVEL_NEAR_MM)),
+                        below(aside, IH_RAY_MM_Q4(IH_HEAD_LEVEL_FAR_MM)));
     slack[SHOULDER_LEFT] = ih_i16_min(shoulder, opposite(at->x));
     slack[SHOULDER_RIGHT] = ih_i16_min(shoulder, at->x);
 }
@@ -261,7 +151,7 @@ struct returns {
     ih_i16 known, empty, is_open, is_body, is_level, is_before, unsure;
 };
 
-static inline struct returns returns_of(const struct candidate *candidate,
+static inline struct returns returns_of(const struct ih_ray_limits *candidate,
                                         const struct ih_ray_table *table, int32_t slot)
 {
     const ih_i16 seen = ih_i16_load(&table->seen[slot]);
@@ -305,7 +195,7 @@ struct masks {
     ih_i16 unsure, may_hit, body;
 };
 
-static inline struct masks count_lanes(const struct candidate *candidate,
+static inline struct masks count_lanes(const struct ih_ray_limits *candidate,
                                        const struct ih_ray_table *table, int32_t slot,
                                        struct sums *sums)
 {
@@ -336,7 +226,7 @@ static inline struct masks count_lanes(const struct candidate *candidate,
                           .body = (slack[BODY] > 0) & body};
 }
 
-static void count_rays(const struct candidate *candidate, const struct ih_ray_table *table,
+static void count_rays(const struct ih_ray_limits *candidate, const struct ih_ray_table *table,
                        struct ih_ray_marks *marks, struct sums *sums)
 {
     memset(marks, 0, sizeof *marks);
@@ -375,18 +265,32 @@ static void sum_lanes(const struct sums *sums, struct ih_ray_counts *out)
     };
 }
 
+/* An upper bound of a hit's distance from the centre, squared, in semi-axes; above every square if it is limited. */
+static int16_t find_hit_q10(const struct ih_ellipsoid *ellipsoid,
+                            const struct ih_ellipsoid_box *box, int32_t margin)
+{
+    int32_t hit_q10 = 0;
+    for (int axis = 0; axis < 2; axis++) {
+        const int32_t semi_q8 = ellipsoid->semi_mm_q8[axis];
+        const int32_t ratio_q10 = (int32_t)(((int64_t)box->half_mm_q8[axis] << 10) / semi_q8) + 1;
+        hit_q10 = ih_max_s32(hit_q10, ih_min_s32(ratio_q10, 1 << 14));
+    }
+    hit_q10 = ((hit_q10 * hit_q10) >> 10) + 6 * margin + 1;
+    return (int16_t)(hit_q10 < OFFSET_MAX2_Q10 ? hit_q10 : INT16_MAX);
+}
+
 /* False outside of the limits. */
 static bool try_count(const struct ih_rays *rays, const struct ih_ellipsoid *ellipsoid,
                       const struct ih_ellipsoid_box *box, struct ih_ray_marks *marks,
                       struct ih_ray_counts *out)
 {
-    struct candidate candidate;
+    struct ih_ray_limits candidate;
     struct sums sums;
-    if (!set_directions(&candidate, rays, ellipsoid)) {
+    if (!ih_ray_limits_set_directions(&candidate, rays, ellipsoid)) {
         return false;
     }
     candidate.hit_q10 = find_hit_q10(ellipsoid, box, candidate.margin);
-    set_limits(&candidate, ellipsoid);
+    ih_ray_limits_set_regions(&candidate, ellipsoid);
     count_rays(&candidate, &rays->table, marks, &sums);
     sum_lanes(&sums, out);
     return true;
