@@ -1,25 +1,23 @@
 /* ih_labels - which detected dot is which of the 361? (paper, section 2.3)
  *
- * In:    dots in any order, rig. Where it matters which of two comes first, it is the one that reads
- *        first in the frame.
- * Out:   the 361-slot table: per slot a dot or IH_NONE; no dot twice.
- * Way:   1. Candidates: a dot is a candidate of every slot whose epipolar line, in undistorted
- *           pixels, passes within perp_max of it, in the working range.
- *        2. Seeds: the four slots of each smallest rectangle of the pattern; a choice of
- *           candidates is an affine image of it when p00 - p01 - p10 + p11 = 0. Error
- *           sqrt(|p00 - p01 - p10 + p11|^2 / 4 + 9 (sum of perp^2) / 4); taken when below
- *           seed_max and no other choice comes within seed_margin.
- *        3. Growing: a slot with labelled neighbours expects its dot where the affine map of the
- *           5x5 around it says (weights 1/d^2), or at the depth of one of its 3x3 neighbours;
- *           error hypot(along, 6 perp) < epsilon; best pairs first. When a pass assigns fewer than
- *           5, epsilon grows by half, up to epsilon_max. What is left then is not labelled: of
- *           what 40 px instead of 8 would add half is wrong, and seeds have bridged the edges.
- * Cost:  361 x the dots in the rows of a line: a few each where lines lie along rows, all where they
- *        stand upright; growing goes through the open slots that have a free candidate a few dozen
- *        times, and asks again what is expected where something has changed. Seeding tries the
- *        candidates of three slots with each other, and of the fourth those that are near where
- *        it should be: 324 x 16^3 at the very worst, which a frame made for it can bring about, a
- *        thousand for a real one.
+ * In:     dots in any order, rig. Ties go to the dot that comes first in reading order.
+ * Out:    the 361-slot table: per slot a dot or IH_NONE; no dot twice.
+ * Method: 1. Candidates: a dot is a candidate of every slot whose epipolar line, in undistorted pixels, passes
+ *            within perp_max of it, in the working range.
+ *         2. Seeds: the four slots of each smallest rectangle of the pattern; a choice of candidates is an
+ *            affine image of it when p00 - p01 - p10 + p11 = 0. Error
+ *            sqrt(|p00 - p01 - p10 + p11|^2 / 4 + 9 (sum of perp^2) / 4); accepted below seed_max, when no
+ *            other choice comes within seed_margin.
+ *         3. Growing: a slot with labelled neighbours expects its dot where the affine map of the 5x5 around
+ *            it predicts it (weights 1/d^2), or at the depth of one of its 3x3 neighbours; error
+ *            hypot(along, 6 perp) < epsilon; best pairs first. When a pass assigns fewer than 5, epsilon
+ *            grows by half, up to epsilon_max; slots still open then get no label. An epsilon_max of 40 px
+ *            instead of 8 would add labels of which half are wrong, and seeds have bridged the edges.
+ * Cost:   361 x the dots in the rows of a line: a few each where lines run along rows, all where they are
+ *         upright. Growing visits the open slots that have a free candidate a few dozen times, and computes
+ *         an expectation again only after a change. Seeding tries the candidates of three slots with each
+ *         other, and of the fourth those near the predicted position: 324 x 16^3 at worst, for a frame made
+ *         to provoke it, a thousand for a real one.
  * Full tables drop and count: candidates_dropped.
  */
 #ifndef IH_LABELS_H
@@ -32,14 +30,14 @@
 #include "dots/ih_dots.h"
 #include "rig/ih_rig.h"
 
-/* Candidates kept per slot; each costs 8 bytes a slot. With a 125 mm baseline a line crosses the
- * places of about ten others. */
+/* Candidates kept per slot; each costs 8 bytes a slot. With a 125 mm baseline a line passes about ten other
+ * dots. */
 #define IH_LABELS_CANDIDATES_MAX 16
 
 struct ih_labels_params {
-    int32_t perp_max_px_q12;    /* a dot farther from the line than this is not its dot */
+    int32_t perp_max_px_q12;    /* of a dot from its line */
     int32_t seed_max_px_q12;    /* affine error of a seed */
-    int32_t seed_margin_px_q12; /* the next best choice must be worse by this */
+    int32_t seed_margin_px_q12; /* the second best choice must be worse by this */
     int32_t epsilon_min_px_q12, epsilon_max_px_q12;
 };
 
@@ -48,7 +46,7 @@ struct ih_labels {
     int32_t seed_count; /* slots labelled by seeds */
     int32_t candidates_dropped;
     int16_t dot_of_slot[IH_SLOTS]; /* index into ih_dots.dot, or IH_NONE */
-    /* Where the dot is on its line, and how far beside it; valid where a dot is. */
+    /* Position of the dot along its line, and distance beside it; valid where there is a dot. */
     int32_t t_px_q12[IH_SLOTS];
     int16_t perp_px_q12[IH_SLOTS];
 };
@@ -59,20 +57,19 @@ struct ih_candidate {
     int16_t dot; /* in the order of rows */
 };
 
-/* Something that may be assigned: a rectangle of four slots while seeding, one slot while growing (choice[0]
- * alone is used). */
+/* A possible assignment: of a rectangle of four slots while seeding, of one slot while growing (choice[0]). */
 struct ih_labels_offer {
-    int32_t error_px_q12; /* INT32_MAX while growing: nothing is expected */
+    int32_t error_px_q12; /* INT32_MAX while growing: no expectation */
     int8_t choice[4];     /* candidates */
 };
 
-/* The pattern with an edge of two slots, beside a row that of the next one. */
+/* The pattern with a border of two slots; rows share the border beside them. */
 #define IH_LABELS_EDGE 2
 #define IH_LABELS_LINE (IH_GRID + IH_LABELS_EDGE)
 #define IH_LABELS_NODES (IH_LABELS_LINE * (IH_GRID + 2 * IH_LABELS_EDGE) + IH_LABELS_EDGE)
 
 struct ih_labels_scratch {
-    /* Dots by row: undistorted places, their numbers in ih_dots. */
+    /* Dots by row: undistorted positions, indices into ih_dots. */
     int32_t u_px_q12[IH_DOTS_MAX], v_px_q12[IH_DOTS_MAX];
     int16_t by_row[IH_DOTS_MAX];
     int16_t slot_of_dot[IH_DOTS_MAX];
@@ -82,7 +79,7 @@ struct ih_labels_scratch {
     struct ih_labels_offer offer[IH_SLOTS]; /* by slot, of a rectangle by its first one */
     uint32_t order[IH_SLOTS];               /* of the offers: error and slot */
     uint32_t sorted[IH_SLOTS];
-    /* Growing: inverse depths of labels, 1/mm, else 0; what an open slot offered is no longer so; open slots. */
+    /* Growing: inverse depths of labels, 1/mm, else 0; must an open slot's offer be computed again? open slots. */
     int32_t inverse_depth_q36[IH_LABELS_NODES];
     bool is_stale[IH_LABELS_NODES];
     int32_t open_count;

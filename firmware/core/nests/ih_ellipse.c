@@ -1,6 +1,5 @@
 #include "nests/ih_ellipse.h"
 
-#include "base/ih_config.h"
 #include "base/ih_fix.h"
 #include "base/ih_range.h"
 #include "surface/ih_surface.h"

@@ -2,15 +2,16 @@
  * seeds, what neighbours expect, the order of offers. */
 #include "base/ih_config.h"
 #include "dots/ih_dots.h"
+#include "labels/ih_label_growth.h"
+#include "labels/ih_label_lines.h"
+#include "labels/ih_label_order.h"
+#include "labels/ih_label_seeds.h"
 #include "labels/ih_labels.h"
 #include "rig/ih_rig.h"
 
 #include <stdlib.h>
 
 #include "ih_test.h"
-
-/* In its own words: they are static. */
-#include "labels/ih_labels.c"
 
 static struct ih_labels_scratch scratch;
 static struct ih_labels_params params;
@@ -57,7 +58,8 @@ static void the_first_sixteen_candidates_stay(void)
             /* few different places, so that rows are equal, but no two dots are at one place */
             dots.dot[i].v_px_q12 = between(0, 5);
             dots.dot[i].u_px_q12 = between(0, 5) * 64 + i;
-            add_candidate(&dots, (struct ih_candidate){.dot = (int16_t)i}, 5, &scratch, &labels);
+            ih_label_lines_add_candidate(&dots, (struct ih_candidate){.dot = (int16_t)i}, 5,
+                                         &scratch, &labels);
         }
         IH_TEST_EQUAL(count < 16 ? count : 16, scratch.candidate_count[5], "kept", pass);
         IH_TEST_EQUAL(count < 16 ? 0 : count - 16, labels.candidates_dropped, "dropped", pass);
@@ -92,28 +94,28 @@ static void candidates_lie_on_their_line(void)
                            .t_far_px_q12 = 40960,
                            .t_near_px_q12 = 57344};
     int32_t first = 0;
-    int i, way;
+    int i, direction;
 
     dots.dot_count = 1;
     for (i = 0; i < IH_TEST_COUNT(cases); i++) {
-        for (way = 0; way < 4; way++) { /* to the right, down, to the left, up */
-            const int32_t along_u = way == 0 ? 1 : way == 2 ? -1 : 0;
-            const int32_t along_v = way == 1 ? 1 : way == 3 ? -1 : 0;
+        for (direction = 0; direction < 4; direction++) { /* to the right, down, to the left, up */
+            const int32_t along_u = direction == 0 ? 1 : direction == 2 ? -1 : 0;
+            const int32_t along_v = direction == 1 ? 1 : direction == 3 ? -1 : 0;
 
             line.dir_u_q30 = along_u * (1 << 30);
             line.dir_v_q30 = along_v * (1 << 30);
             scratch.u_px_q12[0] = 400000 + cases[i].t * along_u - cases[i].perp * along_v;
             scratch.v_px_q12[0] = 300000 + cases[i].t * along_v + cases[i].perp * along_u;
-            find_candidates(&dots, &line, 7, &params, &first, &scratch, &labels);
+            ih_label_lines_find(&dots, &line, 7, &params, &first, &scratch, &labels);
             IH_TEST_EQUAL(cases[i].is_candidate, scratch.candidate_count[7], "candidate", i);
             if (cases[i].is_candidate) {
                 const struct ih_candidate *c = &scratch.candidate[7][0];
 
-                IH_TEST_EQUAL(cases[i].perp, c->perp_px_q12, "perp", way);
-                IH_TEST_EQUAL(cases[i].t, c->t_px_q12, "t", way);
+                IH_TEST_EQUAL(cases[i].perp, c->perp_px_q12, "perp", direction);
+                IH_TEST_EQUAL(cases[i].t, c->t_px_q12, "t", direction);
                 /* t = length / Z */
                 IH_TEST_WITHIN(0.51, ldexp(cases[i].t / 4096.0 / 10000, 36),
-                               inverse_depth_q36(c, &line), "inverse depth", i);
+                               ih_label_growth_inverse_q36(c, &line), "inverse depth", i);
             }
         }
     }
@@ -133,7 +135,7 @@ static void dots_above_a_row_are_counted(void)
         for (i = 0; i < count; i++) {
             v_px_q12[i] = (int32_t)ih_test_between(&random, 0, 8);
             above += v_px_q12[i] < row;
-            place_dot(&scratch, i, 100 + i, v_px_q12[i]);
+            ih_label_lines_add_dot(&scratch, i, 100 + i, v_px_q12[i]);
         }
         for (i = 0; i < count; i++) { /* by row; of one row by number */
             const int32_t dot = scratch.by_row[i];
@@ -145,7 +147,8 @@ static void dots_above_a_row_are_counted(void)
                 (v_px_q12[scratch.by_row[i - 1]] == v_px_q12[dot] && scratch.by_row[i - 1] < dot));
         }
         IH_TEST_EQUAL(above,
-                      dots_above(&scratch, count, row, (int32_t)ih_test_between(&random, 0, count)),
+                      ih_label_lines_count_above(&scratch, count, row,
+                                                 (int32_t)ih_test_between(&random, 0, count)),
                       "above", pass);
     }
 }
@@ -158,7 +161,7 @@ static void put_candidate(int32_t slot, int32_t dot, int32_t perp_px_q12)
         (struct ih_candidate){1 << 24, (int16_t)perp_px_q12, (int16_t)dot};
 }
 
-/* The last corner is looked for along its line: whichever way that leads, no seed may be lost. */
+/* The last corner is looked for along its line: wherever that leads, no seed may be lost. */
 static void turn_line(int32_t slot, double angle_rad)
 {
     rig.line[slot] = (struct ih_line){.infinity_u_px_q12 = 200 * 4096,
@@ -238,7 +241,7 @@ static void the_best_rectangle_is_the_seed(void)
             }
         }
         turn_line(slot[3], pass * 0.1);
-        is_seed = find_seed(&rig, &scratch, slot, &params, &offer);
+        is_seed = ih_label_seeds_find(&rig, &scratch, slot, &params, &offer);
         if (best < 1e9 && (fabs(best - 4096) < 2 || fabs(second - best - 2048) < 2)) {
             close++; /* roots are cut off */
             continue;
@@ -283,8 +286,8 @@ static void seeds_end_at_their_limits(void)
             place[3] = 2 * cases[i].best; /* the error is half of it */
             place[4] = 2 * cases[i].next;
             turn_line(slot[3], (i + axis) % 4 * 0.5 * acos(-1.0));
-            IH_TEST_EQUAL(cases[i].is_seed, find_seed(&rig, &scratch, slot, &params, &offer),
-                          "seed", i);
+            IH_TEST_EQUAL(cases[i].is_seed,
+                          ih_label_seeds_find(&rig, &scratch, slot, &params, &offer), "seed", i);
         }
     }
 }
@@ -310,8 +313,8 @@ static void offers_are_sorted_by_error_then_slot(void)
         for (i = 0; i < count; i++) {
             const int32_t error = between(0, error_max[pass % 5]);
 
-            scratch.order[i] = order_of(error, i);
-            IH_TEST_EQUAL(i, slot_in_order(scratch.order[i]), "slot", pass);
+            scratch.order[i] = ih_label_order(error, i);
+            IH_TEST_EQUAL(i, ih_label_order_slot(scratch.order[i]), "slot", pass);
             IH_TEST_EQUAL(error < 4194303 ? error : 4194303, scratch.order[i] >> 9, "error", pass);
         }
         for (i = count - 1; i > 0; i--) {
@@ -323,7 +326,7 @@ static void offers_are_sorted_by_error_then_slot(void)
         }
         memcpy(sorted, scratch.order, sizeof sorted);
         qsort(sorted, (size_t)count, sizeof sorted[0], compare_orders);
-        sort_order(scratch.order, count, scratch.sorted);
+        ih_label_order_sort(scratch.order, count, scratch.sorted);
         for (i = 0; i < count; i++) {
             TEST_ASSERT_EQUAL_UINT32(sorted[i], scratch.sorted[i]);
         }
@@ -336,7 +339,7 @@ static void label(int32_t row, int32_t column, int32_t inverse_depth_q36)
 {
     const int32_t slot = row * IH_GRID + column;
 
-    scratch.inverse_depth_q36[node_of(slot)] = inverse_depth_q36;
+    scratch.inverse_depth_q36[ih_label_growth_node(slot)] = inverse_depth_q36;
 }
 
 /* Some slots labelled near a plane of inverse depth, with steps. */
@@ -371,13 +374,14 @@ static double plane_at(int32_t row, int32_t column)
             const double term[3] = {1, dx, dy};
 
             if ((dx == 0 && dy == 0) || r < 0 || c < 0 || r >= IH_GRID || c >= IH_GRID ||
-                *inverse_depth_at(&scratch, r * IH_GRID + c) == 0) {
+                scratch.inverse_depth_q36[ih_label_growth_node(r * IH_GRID + c)] == 0) {
                 continue;
             }
             for (i = 0; i < 3; i++) {
                 for (k = 0; k < 4; k++) {
                     const double value =
-                        k < 3 ? term[k] : *inverse_depth_at(&scratch, r * IH_GRID + c);
+                        k < 3 ? term[k]
+                              : scratch.inverse_depth_q36[ih_label_growth_node(r * IH_GRID + c)];
 
                     m[i][k] += term[i] * value / (dx * dx + dy * dy);
                 }
@@ -421,21 +425,22 @@ static void neighbours_and_their_plane_are_expected(void)
         for (slot = 0; slot < IH_SLOTS; slot++) {
             const int32_t row = slot / IH_GRID, column = slot % IH_GRID;
             const double plane = plane_at(row, column);
-            const int32_t own_q36 = *inverse_depth_at(&scratch, slot);
-            struct expectation is;
+            const int32_t own_q36 = scratch.inverse_depth_q36[ih_label_growth_node(slot)];
+            struct ih_label_expectation is;
             int32_t count = 0;
 
-            scratch.inverse_depth_q36[node_of(slot)] = 0; /* open, as those that ask */
-            expect(&scratch, slot, &is);
-            scratch.inverse_depth_q36[node_of(slot)] = own_q36;
+            scratch.inverse_depth_q36[ih_label_growth_node(slot)] = 0; /* open, as those that ask */
+            ih_label_growth_expect(&scratch, slot, &is);
+            scratch.inverse_depth_q36[ih_label_growth_node(slot)] = own_q36;
             for (dy = -1; dy <= 1; dy++) {
                 for (dx = -1; dx <= 1; dx++) {
                     const int32_t r = row + dy, c = column + dx;
 
                     if ((dx != 0 || dy != 0) && r >= 0 && c >= 0 && r < IH_GRID && c < IH_GRID &&
-                        *inverse_depth_at(&scratch, r * IH_GRID + c) != 0) {
-                        IH_TEST_EQUAL(*inverse_depth_at(&scratch, r * IH_GRID + c),
-                                      is.value_q36[count], "neighbour", slot);
+                        scratch.inverse_depth_q36[ih_label_growth_node(r * IH_GRID + c)] != 0) {
+                        IH_TEST_EQUAL(
+                            scratch.inverse_depth_q36[ih_label_growth_node(r * IH_GRID + c)],
+                            is.value_q36[count], "neighbour", slot);
                         count++;
                     }
                 }
@@ -462,8 +467,8 @@ static void errors_are_those_of_the_nearest_expectation(void)
         /* an inverse depth of at most 2^28 */
         const struct ih_candidate candidate = {between(1, ((int64_t)length >> 4) + 1),
                                                (int16_t)between(-2458, 2458), 0};
-        const int32_t own_q36 = inverse_depth_q36(&candidate, &line);
-        struct expectation expected = {.count = between(1, 9)};
+        const int32_t own_q36 = ih_label_growth_inverse_q36(&candidate, &line);
+        struct ih_label_expectation expected = {.count = between(1, 9)};
         double off = 1e12, along;
 
         for (i = 0; i < expected.count; i++) {
@@ -475,7 +480,7 @@ static void errors_are_those_of_the_nearest_expectation(void)
         }
         along = fmin(floor(off * length / 4294967296.0 + 0.5), 1 << 28);
         IH_TEST_EQUAL(floor(hypot(along, 6.0 * candidate.perp_px_q12)),
-                      growth_error(&candidate, &expected, &line), "error", pass);
+                      ih_label_growth_error_px_q12(&candidate, &expected, &line), "error", pass);
     }
 }
 
@@ -495,11 +500,12 @@ static void put_growing_scene(void)
                 50000 + slot % IH_GRID * 100 + between(-20000, 20000) / (1 + i),
                 (int16_t)between(-2458, 2458), (int16_t)((slot + between(0, 6)) % IH_SLOTS)};
         }
-        if (between(0, 9) == 0 && scratch.candidate_count[slot] > 0 && is_free(&scratch, slot, 0)) {
-            assign(&scratch, slot, 0);
+        if (between(0, 9) == 0 && scratch.candidate_count[slot] > 0 &&
+            ih_label_is_free(&scratch, slot, 0)) {
+            ih_label_assign(&scratch, slot, 0);
         }
     }
-    begin_growing(&rig, &scratch);
+    ih_label_growth_begin(&rig, &scratch);
 }
 
 /* An offer that is kept from pass to pass is what would be found again. */
@@ -512,10 +518,10 @@ static void kept_offers_are_those_that_would_be_found(void)
         put_growing_scene();
         again = scratch;
         for (epsilon = 2000; epsilon < 40000; epsilon += between(0, 1) * 2000) {
-            const int32_t grown = grow_once(&rig, &scratch, epsilon);
+            const int32_t grown = ih_label_growth_pass(&rig, &scratch, epsilon);
 
             memset(again.is_stale, true, sizeof again.is_stale);
-            IH_TEST_EQUAL(grow_once(&rig, &again, epsilon), grown, "labelled", pass);
+            IH_TEST_EQUAL(ih_label_growth_pass(&rig, &again, epsilon), grown, "labelled", pass);
             TEST_ASSERT_EQUAL_MEMORY(again.choice, scratch.choice, sizeof scratch.choice);
             labelled += grown;
         }

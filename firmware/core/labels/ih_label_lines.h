@@ -1,0 +1,57 @@
+/* ih_label_lines - which dots lie on a slot's epipolar line: its candidates. Private to labels. */
+#ifndef IH_LABEL_LINES_H
+#define IH_LABEL_LINES_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "base/ih_config.h"
+#include "dots/ih_dots.h"
+#include "labels/ih_labels.h"
+#include "rig/ih_rig.h"
+
+static inline const struct ih_candidate *ih_label_candidate(const struct ih_labels_scratch *scratch,
+                                                            int32_t slot, int32_t choice)
+{
+    return &scratch->candidate[slot][choice];
+}
+
+/* Has a candidate's dot no label yet? */
+static inline bool ih_label_is_free(const struct ih_labels_scratch *scratch, int32_t slot,
+                                    int32_t choice)
+{
+    return scratch->slot_of_dot[ih_label_candidate(scratch, slot, choice)->dot] == IH_NONE;
+}
+
+/* Labels a slot with one of its candidates. */
+static inline void ih_label_assign(struct ih_labels_scratch *scratch, int32_t slot, int8_t choice)
+{
+    scratch->choice[slot] = choice;
+    scratch->slot_of_dot[ih_label_candidate(scratch, slot, choice)->dot] = (int16_t)slot;
+}
+
+/* Inserts a dot's undistorted position in the order of rows, so that a line visits only some rows. Dots come nearly
+ * in that order. Other functions number dots in it. */
+void ih_label_lines_add_dot(struct ih_labels_scratch *scratch, int32_t dot, int32_t u_px_q12,
+                            int32_t v_px_q12);
+
+/* Position of a dot along a line, from infinity. */
+int64_t ih_label_lines_along_px_q12(const struct ih_labels_scratch *scratch, int32_t dot,
+                                    const struct ih_line *line);
+
+/* How many of the dots lie above a row. The search starts at a guess: the count of the slot before is near. */
+int32_t ih_label_lines_count_above(const struct ih_labels_scratch *scratch, int32_t count,
+                                   int32_t v_px_q12, int32_t guess);
+
+/* A slot's candidates are in reading order, and a full table drops the last ones: seeds and growing prefer the first
+ * of equally good ones, and none of that may depend on the order of the dots. */
+void ih_label_lines_add_candidate(const struct ih_dots *dots, struct ih_candidate candidate,
+                                  int32_t slot, struct ih_labels_scratch *scratch,
+                                  struct ih_labels *out);
+
+/* Finds the candidates of a slot. *first: the dot where those of the slot before began; set to this slot's. */
+void ih_label_lines_find(const struct ih_dots *dots, const struct ih_line *line, int32_t slot,
+                         const struct ih_labels_params *params, int32_t *first,
+                         struct ih_labels_scratch *scratch, struct ih_labels *out);
+
+#endif
