@@ -50,7 +50,7 @@ static struct depth_text depth_uncertainty(const struct app_state *state)
 static void report_rotation(struct app_state *state)
 {
     const struct ih_health *health = &state->health;
-    const int32_t *rotation = health->turn_rad_q30;
+    const int32_t *rotation = health->rotation_rad_q30;
     const int32_t *sigma = health->sigma_rad_q30;
     app_log_say(
         state->log, APP_LOG_WARNING,
@@ -66,7 +66,7 @@ static void report_state(struct app_state *state)
 {
     const struct ih_health *health = &state->health;
     switch (health->state) {
-    case IH_HEALTH_TURNED:
+    case IH_HEALTH_ROTATED:
         report_rotation(state);
         break;
     case IH_HEALTH_LOST:
@@ -90,11 +90,12 @@ static bool is_reported(const struct app_state *state)
     const struct ih_health *health = &state->health;
     bool is_same = true;
     for (int i = 0; i < 3; i++) {
-        int64_t difference = (int64_t)health->turn_rad_q30[i] - state->reported_rotation_rad_q30[i];
+        int64_t difference =
+            (int64_t)health->rotation_rad_q30[i] - state->reported_rotation_rad_q30[i];
         is_same = is_same && ih_abs_s64(difference) <= REPORT_RAD_Q30;
     }
     return state->reported_health == health->state &&
-           (is_same || health->state != IH_HEALTH_TURNED || health->stage != IH_HEALTH_WATCHING);
+           (is_same || health->state != IH_HEALTH_ROTATED || health->stage != IH_HEALTH_WATCHING);
 }
 
 /* Of this frame; 0: no labels. */
@@ -115,7 +116,7 @@ static int32_t mean_across_px_q12(const struct ih_labels *labels)
 /* A rotation that is still on trial is reported, too. */
 static const char *word_of(const struct ih_health *health)
 {
-    const int32_t *rotation = health->turn_rad_q30;
+    const int32_t *rotation = health->rotation_rad_q30;
     if (health->state == IH_HEALTH_LOST) {
         return "lost";
     }

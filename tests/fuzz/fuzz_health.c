@@ -66,13 +66,13 @@ static void check(const struct world *world, const struct ih_rig *nominal, bool 
     FUZZ_CHECK(health->state >= IH_HEALTH_UNKNOWN && health->state <= IH_HEALTH_LOST);
     FUZZ_CHECK(health->across_px_q12 >= -1 && health->across_px_q12 <= ACROSS_MAX_PX_Q12);
     for (int i = 0; i < 3; i++) {
-        int32_t rotation = health->turn_rad_q30[i];
+        int32_t rotation = health->rotation_rad_q30[i];
         FUZZ_CHECK(rotation >= -IH_ROTATION_VOTE_MAX_RAD_Q30 &&
                    rotation <= IH_ROTATION_VOTE_MAX_RAD_Q30);
         FUZZ_CHECK(health->sigma_rad_q30[i] >= 0);
         is_rotated = is_rotated || rotation != 0;
     }
-    FUZZ_CHECK(health->state != IH_HEALTH_TURNED || is_rotated || has_changed);
+    FUZZ_CHECK(health->state != IH_HEALTH_ROTATED || is_rotated || has_changed);
     if (!is_rotated) {
         FUZZ_CHECK(memcmp(&world->rig, nominal, sizeof *nominal) == 0);
     }

@@ -40,7 +40,7 @@ static void print_line(const char *name, bool has_changed)
 {
     printf("{\"file\":\"%s\",\"state\":%d,\"changed\":%s", name, (int)health.state,
            has_changed ? "true" : "false");
-    print_vector("turn_rad_q30", health.turn_rad_q30);
+    print_vector("turn_rad_q30", health.rotation_rad_q30);
     print_vector("sigma_rad_q30", health.sigma_rad_q30);
     printf(",\"dots\":%" PRId32 ",\"labelled\":%" PRId32 ",\"across_px_q12\":%" PRId32
            ",\"basis\":%" PRId32 "}\n",

@@ -13,10 +13,10 @@
 #define DEG 0.017453292519943295
 
 /* Unused in one of the two tests. */
-static inline void turn_of(const double turn_deg[3], int32_t turn_rad_q30[3])
+static inline void turn_of(const double turn_deg[3], int32_t rotation_rad_q30[3])
 {
     for (int axis = 0; axis < 3; axis++) {
-        turn_rad_q30[axis] = (int32_t)lround(turn_deg[axis] * DEG * Q30);
+        rotation_rad_q30[axis] = (int32_t)lround(turn_deg[axis] * DEG * Q30);
     }
 }
 

@@ -1,5 +1,9 @@
 #include "labels/ih_label_order.h"
 
+#include "base/ih_config.h"
+
+_Static_assert(IH_SLOTS <= 1 << IH_LABEL_ORDER_SLOT_BITS, "a slot has its bits in the order");
+
 /* A bin for each 64th of a pixel of error, up to a pixel, the limit of seeds. */
 #define ORDER_BINS 64
 #define ORDER_BIN_SHIFT (IH_LABEL_ORDER_SLOT_BITS + 6)

@@ -4,14 +4,11 @@
 
 #include <stdint.h>
 
-#include "base/ih_config.h"
 #include "base/ih_fix.h"
 
 /* An offer's rank is its error, then its slot. Beyond 1024 px only the slot matters. */
 #define IH_LABEL_ORDER_SLOT_BITS 9
 #define IH_LABEL_ORDER_ERROR_MAX ((1 << 22) - 1)
-
-_Static_assert(IH_SLOTS <= 1 << IH_LABEL_ORDER_SLOT_BITS, "a slot has its bits in the order");
 
 static inline uint32_t ih_label_order(int32_t error_px_q12, int32_t slot)
 {

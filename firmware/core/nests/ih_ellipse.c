@@ -57,8 +57,8 @@ static int32_t axis_ratio_q16(int64_t xx_q16, int64_t xy_q16, int64_t yy_q16)
 static int64_t quotient_q16(int64_t sum_q24, int64_t divisor_q16)
 {
     int64_t whole_q8 = sum_q24 / divisor_q16;
-    int64_t rest = sum_q24 % divisor_q16; /* divisor below 2^32: rest * 256 below 2^40 */
-    return whole_q8 * 256 + ih_div_round(rest * 256, divisor_q16);
+    int64_t remainder = sum_q24 % divisor_q16; /* divisor below 2^32: remainder * 256 below 2^40 */
+    return whole_q8 * 256 + ih_div_round(remainder * 256, divisor_q16);
 }
 
 /* Ellipse of closed moments around (x0, y0), Q8 steps, but for its axis ratio. False when the area is

@@ -4,10 +4,10 @@
  * In:    a polygon on the grid; for the part its outline, and a place that it must surround.
  * Out:   area, centre and second moments; shape = 4 pi sqrt(det) / area, det that of the
  *        covariance: 1 for an ellipse and greater for everything else.
- * Way:   moments are sums over the edges. Of all arcs (IH_ARCS_STEPS_MIN of the outline's steps at
+ * Method: moments are sums over the edges. Of all arcs (IH_ARCS_STEPS_MIN of the outline's steps at
  *        least, chord <= chord_max arc) that wind round the place and are elliptical, the one with the
- *        greatest arc - 1.6 chord - 8 (shape - 1) arc is taken, of equal ones the first, the shortest
- *        of those. ih_arcs says which may be some and what they can have at the most: the most
+ *        largest arc - 1.6 chord - 8 (shape - 1) arc is taken, of equal ones the first, the shortest
+ *        of those. ih_arcs says which may be some and what they can have at most: the most
  *        promising one is measured first, then only those that may have as much.
  *        No simple polygon has a shape below 1: a part with less (1/256 is left for rounding)
  *        crosses its own chord and is refused, as is an area below half a grid cell.

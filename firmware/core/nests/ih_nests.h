@@ -2,7 +2,7 @@
  *
  * In:    the surface.
  * Out:   per minimum the sequence of ellipses (slices) that supports it.
- * Way:   every minimum of the grid starts a nest. Levels go from the nearest node back in steps
+ * Method: every minimum of the grid starts a nest. Levels go from the nearest node back in steps
  *        of level_step; at each level the contour that winds round the minimum supports the nest:
  *        whole when it is closed and elliptical, else by its elliptical part. Contours around a
  *        maximum (shrinking) have negative area and support nothing. A head is blunt, the nearest

@@ -4,7 +4,7 @@
  * Out:   a depth image of the rig's size, without padding, that is a frame for isohead_frame: each
  *        point in the pixel where the camera would see it, of several in one pixel the nearest,
  *        everything else 0; and what became of the points.
- * Way:   (x / z, y / z) through lens and camera matrix, rounded to the pixel; z rounded to mm.
+ * Method: (x / z, y / z) through lens and camera matrix, rounded to the pixel; z rounded to mm.
  * Cost:  two divisions and the lens a point. The image has no surfaces where points are rare:
  *        ih_windows looks farther there.
  * Error: 0.5 px, 0.5 mm; a place that close to a pixel's edge may fall into the next one.

@@ -2,7 +2,7 @@
  *
  * In:    the dot table (triangulation); or a depth image and a window of it, where a head may be.
  * Out:   per slot the normalised image position and the Z depth; the field on which they stand.
- * Way:   dots: t px from infinity along the line, Z = |e| / t, one division. The position is
+ * Method: dots: t px from infinity along the line, Z = |e| / t, one division. The position is
  *        the dot's place on its line, (infinity + t dir), so that depth and position agree.
  *        Depths are limited to 1 mm .. far_mm.
  *        range image: a 19x19 lattice is laid over the window, its pitch pitch_mm at the window's

@@ -3,7 +3,7 @@
  * In:    a depth image, the rig.
  * Out:   up to IH_WINDOWS_MAX windows, best first: where the middle of a head would be seen, and
  *        the depth of its front there. The middle of its volume lies about 100 mm behind that.
- * Way:   1. Survey: the image is cut into square cells, at most IH_WINDOWS_CELLS_MAX. A cell has
+ * Method: 1. Survey: the image is cut into square cells, at most IH_WINDOWS_CELLS_MAX. A cell has
  *           the depth of the measured pixel nearest to its middle, within half a cell. While
  *           fewer than 70 % of the cells that have a depth have one at their left too, pixels are
  *           rare, as where a list of points was drawn: then cells are doubled. In the end such an

@@ -10,7 +10,7 @@
 /* What counts for the mean of a place: this near to it, at most this much worse. */
 #define MEAN_REACH_MM 70
 #define MEAN_BEHIND_MM 80
-#define MEAN_SCORE_LESS 80
+#define MEAN_SCORE_DROP 80
 
 bool ih_windows_are_near(const struct ih_windows_scratch *s, const struct ih_rig *rig,
                          const struct ih_windows_place *a, const struct ih_windows_place *b,
@@ -86,7 +86,7 @@ void ih_windows_mean(const struct ih_windows_scratch *s, const struct ih_rig *ri
     for (int32_t row = ih_max_s32(best->row - reach_v, 0); row <= last_v; row++) {
         for (int32_t column = ih_max_s32(best->column - reach_u, 0); column <= last_u; column++) {
             struct ih_windows_place place = ih_windows_place_at(s, rig, params, column, row);
-            int32_t weight = place.score - best->score + MEAN_SCORE_LESS;
+            int32_t weight = place.score - best->score + MEAN_SCORE_DROP;
             if (weight <= 0 || ih_abs_s32(place.depth_mm - best->depth_mm) > MEAN_BEHIND_MM) {
                 continue;
             }

@@ -25,7 +25,7 @@ enum where { OUTSIDE, MISSING, BEFORE, WITHIN, BEHIND, WHERE_COUNT };
 /* Probes that should see the same: places in mm from the middle of a head's front, x right, y down;
  * what is from low_mm to high_mm behind that front is "within". */
 struct group {
-    int32_t share_percent; /* of the score */
+    int32_t fraction_percent; /* of the score */
     int32_t low_mm, high_mm;
     int32_t worth_percent[WHERE_COUNT];
     int32_t probe_count;
@@ -37,11 +37,11 @@ enum { INSIDE, AROUND, BELOW, GROUP_COUNT };
 /* The inner ones of INSIDE come first, for the bulge. */
 #define INNER_COUNT 5
 #define OUTER_MIN 3
-#define BULGE_SHARE_PERCENT 10
+#define BULGE_FRACTION_PERCENT 10
 #define BULGE_MM 15
 
 static const struct group group[GROUP_COUNT] = {
-    [INSIDE] = {.share_percent = 35,
+    [INSIDE] = {.fraction_percent = 35,
                 .low_mm = -40,
                 .high_mm = 110,
                 .worth_percent = {[OUTSIDE] = 50, [MISSING] = 30, [WITHIN] = 100},
@@ -60,7 +60,7 @@ static const struct group group[GROUP_COUNT] = {
                              {0, -80},
                              {0, 80}}},
     /* Something before the head may hide what is beside it. */
-    [AROUND] = {.share_percent = 40,
+    [AROUND] = {.fraction_percent = 40,
                 .low_mm = -100,
                 .high_mm = 89,
                 .worth_percent = {[OUTSIDE] = 50, [MISSING] = 70, [BEFORE] = 40, [BEHIND] = 100},
@@ -78,7 +78,7 @@ static const struct group group[GROUP_COUNT] = {
                              {135, -50},
                              {135, 0},
                              {135, 50}}},
-    [BELOW] = {.share_percent = 15,
+    [BELOW] = {.fraction_percent = 15,
                .low_mm = -149,
                .high_mm = 149,
                .worth_percent = {[OUTSIDE] = 50, [MISSING] = 30, [WITHIN] = 100},
@@ -125,7 +125,7 @@ static int32_t group_score(const struct ih_windows_scratch *s, const struct ih_w
         int32_t depth_mm = probe_mm(s, at, scale, g->probe_mm[i]);
         worth_percent += g->worth_percent[where_is(depth_mm, at->depth_mm, g)];
     }
-    return worth_percent * g->share_percent / (10 * g->probe_count);
+    return worth_percent * g->fraction_percent / (10 * g->probe_count);
 }
 
 /* The same for the bulge: how far the outer part of the head lies behind its inner part. */
@@ -143,10 +143,10 @@ static int32_t bulge_score(const struct ih_windows_scratch *s, const struct ih_w
         }
     }
     if (count[0] == 0 || count[1] < OUTER_MIN) {
-        return BULGE_SHARE_PERCENT * 10 / 2;
+        return BULGE_FRACTION_PERCENT * 10 / 2;
     }
     int32_t bulge_mm = sum_mm[1] / count[1] - sum_mm[0] / count[0];
-    return ih_clamp_s32(bulge_mm, 0, BULGE_MM) * BULGE_SHARE_PERCENT * 10 / BULGE_MM;
+    return ih_clamp_s32(bulge_mm, 0, BULGE_MM) * BULGE_FRACTION_PERCENT * 10 / BULGE_MM;
 }
 
 int32_t ih_windows_score(const struct ih_windows_scratch *s, const struct ih_rig *rig,

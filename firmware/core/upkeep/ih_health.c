@@ -17,7 +17,7 @@
 /* Looks until a search that was in vain is repeated: twice as many each time, up to IH_HEALTH_PAUSE. */
 #define PAUSE_FIRST 1
 /* A turn that is worth a correction. */
-#define TURN_MIN_RAD_Q30 374802 /* 0.02 degrees */
+#define ROTATION_MIN_RAD_Q30 374802 /* 0.02 degrees */
 /* Frames of each step of settling. Dots farther from their line than reach say nothing about a turn. */
 #define SETTLE_STEPS 3
 static const int32_t settle_frames[SETTLE_STEPS] = {4, 4, 24};
@@ -78,39 +78,39 @@ static void add_frame(struct ih_health *health, const struct ih_dots *dots,
 }
 
 /* Turn the rig; false: beyond the limit, and the rig is as it was. */
-static bool turn_to(struct ih_health *health, const int32_t turn_rad_q30[3], struct ih_rig *rig,
-                    struct ih_health_scratch *scratch)
+static bool rotate_to(struct ih_health *health, const int32_t rotation_rad_q30[3],
+                      struct ih_rig *rig, struct ih_health_scratch *scratch)
 {
     int32_t bad_slot;
     for (int i = 0; i < 3; i++) {
-        if (ih_abs_s32(turn_rad_q30[i]) > IH_ROTATION_VOTE_MAX_RAD_Q30) {
+        if (ih_abs_s32(rotation_rad_q30[i]) > IH_ROTATION_VOTE_MAX_RAD_Q30) {
             return false;
         }
     }
-    ih_rotation_vote_calibration(&health->nominal, turn_rad_q30, &scratch->calibration);
+    ih_rotation_vote_calibration(&health->nominal, rotation_rad_q30, &scratch->calibration);
     if (ih_rig_init(&scratch->rig, &scratch->calibration, &bad_slot) != IH_OK) {
         return false; /* a ray turned out of what a rig may have */
     }
     *rig = scratch->rig;
-    memcpy(health->turn_rad_q30, turn_rad_q30, sizeof health->turn_rad_q30);
+    memcpy(health->rotation_rad_q30, rotation_rad_q30, sizeof health->rotation_rad_q30);
     ih_rotation_vote_slopes(rig, &health->slopes);
     return true;
 }
 
-static bool turn_by(struct ih_health *health, const int32_t by_rad_q30[3], struct ih_rig *rig,
-                    struct ih_health_scratch *scratch)
+static bool rotate_by(struct ih_health *health, const int32_t by_rad_q30[3], struct ih_rig *rig,
+                      struct ih_health_scratch *scratch)
 {
-    int32_t turn_rad_q30[3];
+    int32_t rotation_rad_q30[3];
     for (int i = 0; i < 3; i++) {
-        turn_rad_q30[i] = health->turn_rad_q30[i] + by_rad_q30[i];
+        rotation_rad_q30[i] = health->rotation_rad_q30[i] + by_rad_q30[i];
     }
-    return turn_to(health, turn_rad_q30, rig, scratch);
+    return rotate_to(health, rotation_rad_q30, rig, scratch);
 }
 
-static bool is_turned(const struct ih_health *health)
+static bool is_rotated(const struct ih_health *health)
 {
-    return health->turn_rad_q30[0] != 0 || health->turn_rad_q30[1] != 0 ||
-           health->turn_rad_q30[2] != 0;
+    return health->rotation_rad_q30[0] != 0 || health->rotation_rad_q30[1] != 0 ||
+           health->rotation_rad_q30[2] != 0;
 }
 
 static void begin_stage(struct ih_health *health, enum ih_health_stage stage)
@@ -155,7 +155,7 @@ static bool is_search_due(struct ih_health *health)
 static void begin_search(struct ih_health *health)
 {
     health->search_count++;
-    memcpy(health->before_rad_q30, health->turn_rad_q30, sizeof health->before_rad_q30);
+    memcpy(health->before_rad_q30, health->rotation_rad_q30, sizeof health->before_rad_q30);
     health->before_basis_count = health->basis_count;
     health->was_weak_known = health->is_weak_known;
     memset(&health->now.votes, 0, sizeof health->now.votes);
@@ -175,8 +175,8 @@ static void conclude(struct ih_health *health, const struct ih_health_look *look
 {
     if (is_lost(look)) {
         health->state = IH_HEALTH_LOST;
-    } else if (is_turned(health)) {
-        health->state = IH_HEALTH_TURNED;
+    } else if (is_rotated(health)) {
+        health->state = IH_HEALTH_ROTATED;
     } else if (is_known) {
         health->state = IH_HEALTH_FITS;
     }
@@ -202,18 +202,18 @@ static bool elect(struct ih_health *health, struct ih_rig *rig, struct ih_health
 {
     struct ih_rotation_vote_winner winner;
     ih_rotation_vote_elect(&health->now.votes, rig, &winner);
-    bool is_turned_now = is_elected(&winner, &health->look, health->search_count) &&
-                         turn_by(health, winner.turn_rad_q30, rig, scratch);
+    bool is_rotated_now = is_elected(&winner, &health->look, health->search_count) &&
+                          rotate_by(health, winner.rotation_rad_q30, rig, scratch);
     health->before = health->look;
-    health->is_weak_known = health->is_weak_known && !is_turned_now;
-    health->basis_count = is_turned_now ? 0 : health->basis_count;
+    health->is_weak_known = health->is_weak_known && !is_rotated_now;
+    health->basis_count = is_rotated_now ? 0 : health->basis_count;
     ih_rotation_estimate_clear(&health->now.late);
-    if (is_turned_now) {
+    if (is_rotated_now) {
         begin_stage(health, IH_HEALTH_SETTLING);
     } else {
         give_up(health);
     }
-    return is_turned_now;
+    return is_rotated_now;
 }
 
 static bool search(struct ih_health *health, const struct ih_dots *dots,
@@ -221,30 +221,30 @@ static bool search(struct ih_health *health, const struct ih_dots *dots,
                    struct ih_health_scratch *scratch)
 {
     add_look(&health->look, dots, labels);
-    ih_rotation_vote_vote(dots, rig, &health->slopes, &scratch->at.turn, &health->now.votes);
+    ih_rotation_vote_vote(dots, rig, &health->slopes, &scratch->at.rotation, &health->now.votes);
     health->step++;
     return health->step >= IH_HEALTH_SEARCH && elect(health, rig, scratch);
 }
 
 static bool find(const struct ih_health *health, const struct ih_rig *rig,
-                 struct ih_rotation_estimate_turn *out)
+                 struct ih_rotation_estimate_result *out)
 {
-    return ih_rotation_estimate_find(&health->all, rig, &health->slopes, health->turn_rad_q30,
+    return ih_rotation_estimate_find(&health->all, rig, &health->slopes, health->rotation_rad_q30,
                                      health->is_weak_known, out);
 }
 
 /* Uncertainties. Of a turn across the baseline that is not seen: as they were when it was, else the limit. */
 static void keep_sigma(struct ih_health *health, const struct ih_rig *rig,
-                       const struct ih_rotation_estimate_turn *found)
+                       const struct ih_rotation_estimate_result *found)
 {
     int32_t axis_q30[2][2];
     ih_rotation_vote_axes(rig, axis_q30);
     health->is_weak_known = health->is_weak_known || found->is_weak_seen;
     for (int i = 0; i < 3; i++) {
-        int64_t share_q30 = i < 2 ? ih_abs_s32(axis_q30[1][i]) : 0;
+        int64_t component_q30 = i < 2 ? ih_abs_s32(axis_q30[1][i]) : 0;
         int32_t min = health->is_weak_known
                           ? health->sigma_rad_q30[i]
-                          : (int32_t)ih_mul_shift(IH_ROTATION_VOTE_MAX_RAD_Q30, share_q30, 30);
+                          : (int32_t)ih_mul_shift(IH_ROTATION_VOTE_MAX_RAD_Q30, component_q30, 30);
         health->sigma_rad_q30[i] = found->is_weak_seen ? found->sigma_rad_q30[i]
                                                        : ih_max_s32(found->sigma_rad_q30[i], min);
     }
@@ -252,12 +252,12 @@ static void keep_sigma(struct ih_health *health, const struct ih_rig *rig,
 
 /* The turn as it now seems to be, into state and rig; what was seen stays, against the new lines.
  * False: not taken. */
-static bool take(struct ih_health *health, const struct ih_rotation_estimate_turn *found,
+static bool take(struct ih_health *health, const struct ih_rotation_estimate_result *found,
                  struct ih_rig *rig, struct ih_health_scratch *scratch)
 {
-    ih_rotation_estimate_turn(&health->all, &health->slopes, found->turn_rad_q30);
-    ih_rotation_estimate_turn(&health->now.late, &health->slopes, found->turn_rad_q30);
-    if (!turn_by(health, found->turn_rad_q30, rig, scratch)) {
+    ih_rotation_estimate_rotate(&health->all, &health->slopes, found->rotation_rad_q30);
+    ih_rotation_estimate_rotate(&health->now.late, &health->slopes, found->rotation_rad_q30);
+    if (!rotate_by(health, found->rotation_rad_q30, rig, scratch)) {
         start_over(health);
         return false;
     }
@@ -267,9 +267,9 @@ static bool take(struct ih_health *health, const struct ih_rotation_estimate_tur
 }
 
 /* More than chance, and than what does no harm. */
-static bool is_worth_it(const struct ih_rotation_estimate_turn *found)
+static bool is_worth_it(const struct ih_rotation_estimate_result *found)
 {
-    return found->sure_rad_q30 >= TURN_MIN_RAD_Q30;
+    return found->sure_rad_q30 >= ROTATION_MIN_RAD_Q30;
 }
 
 /* Two looks one after the other both differ surely from what was seen before: from now on the second alone
@@ -277,7 +277,7 @@ static bool is_worth_it(const struct ih_rotation_estimate_turn *found)
 static bool is_knocked(struct ih_health *health, const struct ih_rig *rig,
                        struct ih_health_scratch *scratch)
 {
-    struct ih_rotation_estimate_turn change;
+    struct ih_rotation_estimate_result change;
     bool was_doubted = health->is_doubted;
     bool is_doubted = ih_rotation_estimate_change(&health->now.late, &health->all, rig,
                                                   &health->slopes, &scratch->at.change, &change) &&
@@ -295,18 +295,18 @@ static bool is_knocked(struct ih_health *health, const struct ih_rig *rig,
 
 /* Of a rig that is turned: more is known by a quarter, or for the first time. */
 static bool is_refined(const struct ih_health *health,
-                       const struct ih_rotation_estimate_turn *found)
+                       const struct ih_rotation_estimate_result *found)
 {
     int32_t frame_count = health->all.frame_count;
-    return is_turned(health) && (frame_count * 4 >= health->basis_count * 5 ||
-                                 frame_count >= IH_ROTATION_ESTIMATE_FRAMES_MAX ||
-                                 (found->is_weak_seen && !health->is_weak_known));
+    return is_rotated(health) && (frame_count * 4 >= health->basis_count * 5 ||
+                                  frame_count >= IH_ROTATION_ESTIMATE_FRAMES_MAX ||
+                                  (found->is_weak_seen && !health->is_weak_known));
 }
 
 static bool watch(struct ih_health *health, struct ih_rig *rig, struct ih_health_scratch *scratch)
 {
     const struct ih_health_look look = health->look;
-    struct ih_rotation_estimate_turn found;
+    struct ih_rotation_estimate_result found;
     bool has_changed = false;
     bool is_late = is_knocked(health, rig, scratch);
     if (is_search_due(health) && !is_late) {
@@ -361,22 +361,22 @@ static bool drop_weak(struct ih_health *health, struct ih_rig *rig,
                       struct ih_health_scratch *scratch)
 {
     int32_t by_rad_q30[3];
-    ih_rotation_estimate_hold(rig, health->turn_rad_q30, by_rad_q30);
+    ih_rotation_estimate_hold(rig, health->rotation_rad_q30, by_rad_q30);
     start_over(health);
-    return turn_by(health, by_rad_q30, rig, scratch);
+    return rotate_by(health, by_rad_q30, rig, scratch);
 }
 
 /* Refine what was taken; or take it back. */
 static bool settle(struct ih_health *health, struct ih_rig *rig, struct ih_health_scratch *scratch)
 {
     const struct ih_health_look look = health->look;
-    struct ih_rotation_estimate_turn found;
+    struct ih_rotation_estimate_result found;
     bool is_last = health->step == SETTLE_STEPS - 1;
     if (health->step == 0 && !is_proven(&health->before, &look)) {
         give_up(health);
         health->is_weak_known = health->was_weak_known;
         health->basis_count = health->before_basis_count;
-        return turn_to(health, health->before_rad_q30, rig, scratch);
+        return rotate_to(health, health->before_rad_q30, rig, scratch);
     }
     if (health->step == 0) {
         health->all = health->now.late;

@@ -4,7 +4,7 @@
  * In:    dots and labels of every lit frame; the rig that they were labelled with.
  * Out:   the mean distance of labelled dots from their lines, the turn with its uncertainty, a
  *        state; and the rig, turned when there is reason to.
- * Way:   Every IH_HEALTH_LOOK frames:
+ * Method: Every IH_HEALTH_LOOK frames:
  *        1. The look against all frames since the rig last changed, slot by slot (ih_rotation_estimate): when two looks
  *           one after the other differ by more than 0.02 degrees and 5 times its uncertainty, the second
  *           alone counts from then on, and its turn is taken. What a slot errs by in all frames, from
@@ -52,8 +52,8 @@
 enum ih_health_state {
     IH_HEALTH_UNKNOWN = 0, /* too little was seen yet */
     IH_HEALTH_FITS = 1,
-    IH_HEALTH_TURNED = 2, /* the projector is turned, and corrected for */
-    IH_HEALTH_LOST = 3,   /* dots are seen, but hardly one lies on its line, and no turn within the
+    IH_HEALTH_ROTATED = 2, /* the projector is turned, and corrected for */
+    IH_HEALTH_LOST = 3,    /* dots are seen, but hardly one lies on its line, and no turn within the
                            * limit helps */
 };
 
@@ -67,8 +67,8 @@ enum ih_health_stage { IH_HEALTH_WATCHING, IH_HEALTH_SEARCHING, IH_HEALTH_SETTLI
 
 struct ih_health {
     enum ih_health_state state;
-    int32_t across_px_q12;   /* mean distance of the last look's labelled dots; -1: none */
-    int32_t turn_rad_q30[3]; /* of the rig against the calibration; camera axes */
+    int32_t across_px_q12;       /* mean distance of the last look's labelled dots; -1: none */
+    int32_t rotation_rad_q30[3]; /* of the rig against the calibration; camera axes */
     /* Its uncertainty, one standard deviation; 0 before the first one, of no use while the rig is lost. */
     int32_t sigma_rad_q30[3];
     bool is_weak_known;                /* the turn across the baseline; if not, it is 0 */
@@ -97,7 +97,7 @@ struct ih_health {
 
 struct ih_health_scratch {
     union {
-        struct ih_rotation_vote_scratch turn;
+        struct ih_rotation_vote_scratch rotation;
         struct ih_rotation_estimate change;
     } at;
     struct ih_calibration calibration;

@@ -16,12 +16,12 @@
 #define SLOTS_MIN 40
 /* How far a slot errs in every frame alike: what is counted when a turn is told; when it is asked whether
  * there is one at all; and whether it has changed, where what was calibrated badly is in both. */
-#define SLOT_PX_Q12 123   /* 0.03 px */
-#define DOUBT_PX_Q12 492  /* 0.12 px */
-#define CHANGE_PX_Q12 246 /* 0.06 px */
+#define SLOT_PX_Q12 123        /* 0.03 px */
+#define UNCERTAINTY_PX_Q12 492 /* 0.12 px */
+#define CHANGE_PX_Q12 246      /* 0.06 px */
 #define SURE 5
 /* Beyond this distance known places are of no use for a turned rig. */
-#define TURN_MAX_PX_Q12 4096
+#define ROTATION_MAX_PX_Q12 4096
 #define PIN_MAX_PX_Q12 8192
 #define PULL_MAX_Q20 (1 << 28)
 /* A slot whose mean is so far from what the turn says counts half: sqrt(3 s^2 + 0.3^2 / n) px with n frames, where
@@ -38,7 +38,7 @@ struct totals {
     struct ih_rotation_sums sums;
     int64_t whole_q8; /* see whole */
     int32_t slot_count;
-    int32_t doubt_px_q12;         /* how far a slot may err, before a turn is sure */
+    int32_t uncertainty_px_q12;   /* how far a slot may err, before a turn is sure */
     int64_t half_q24;             /* 3 s^2 */
     const int32_t *about_rad_q30; /* the turn that says how far slots are trusted; NULL: all are */
 };
@@ -66,9 +66,9 @@ static bool is_steep(const int32_t slope_px_q4[3])
 static void weigh(int64_t across_px_q12, int64_t reach_px_q12, int64_t *weight_q8, int64_t *rise_q8)
 {
     int64_t ratio_q16 = across_px_q12 * across_px_q12 * 65536 / (reach_px_q12 * reach_px_q12);
-    int64_t rest_q16 = ratio_q16 < 65536 ? 65536 - ratio_q16 : 0;
-    *weight_q8 = ih_mul_shift(rest_q16, rest_q16, 24);
-    *rise_q8 = ih_mul_shift(rest_q16, 65536 - 5 * ratio_q16, 24);
+    int64_t remainder_q16 = ratio_q16 < 65536 ? 65536 - ratio_q16 : 0;
+    *weight_q8 = ih_mul_shift(remainder_q16, remainder_q16, 24);
+    *rise_q8 = ih_mul_shift(remainder_q16, 65536 - 5 * ratio_q16, 24);
 }
 
 static void scale_sums(struct ih_dot_place_sums *sums, int64_t part, int64_t whole)
@@ -77,7 +77,7 @@ static void scale_sums(struct ih_dot_place_sums *sums, int64_t part, int64_t who
     sums->pull_q20 = (int32_t)ih_rotation_div_round(sums->pull_q20 * part, whole);
 }
 
-/* Of n frames on a place n / (1 + n / 20); the same share of the rest. */
+/* Of n frames on a place n / (1 + n / 20); the same fraction of the rest. */
 static void add_place(const struct ih_dot_place_sums *place, struct ih_dot_place_sums *to)
 {
     struct ih_dot_place_sums sums = *place;
@@ -171,43 +171,44 @@ void ih_rotation_estimate_forget(struct ih_rotation_estimate *places)
 }
 
 /* What a turn moves a dot across its line. Slopes of 2^18, turns of 2^24.5: 2^44.1. */
-static int64_t move_px_q12(const int32_t slope_px_q4[3], const int32_t turn_rad_q30[3])
+static int64_t move_px_q12(const int32_t slope_px_q4[3], const int32_t rotation_rad_q30[3])
 {
     int64_t sum_q34 = 0;
     for (int i = 0; i < 3; i++) {
-        sum_q34 += (int64_t)slope_px_q4[i] * turn_rad_q30[i];
+        sum_q34 += (int64_t)slope_px_q4[i] * rotation_rad_q30[i];
     }
     return ih_shift_round(sum_q34, 22);
 }
 
 /* Where all dots move by d, their weighted mean moves by less, as the weights move too: by rise / weight.
  * At least a third, else the weights have lost the dots. */
-static int64_t share_q8(const struct ih_rotation_estimate *places)
+static int64_t fraction_q8(const struct ih_rotation_estimate *places)
 {
     int64_t rise_q8 =
         places->rise_q8 * 3 > places->weight_q8 ? places->rise_q8 : places->weight_q8 / 3;
     return ih_rotation_div_round(rise_q8 * 256, places->weight_q8);
 }
 
-static int64_t whole(int64_t value, int64_t share)
+static int64_t whole(int64_t value, int64_t fraction)
 {
-    return ih_rotation_div_round(value * 256, share);
+    return ih_rotation_div_round(value * 256, fraction);
 }
 
 /* What a turn leaves of a slot's pull, as if the weights stayed. Weights of 2^18, moves of 2^22.7: 2^40.7. */
 static int64_t left_of_q20(const struct ih_dot_place_sums *sum, const struct totals *totals,
-                           const int32_t slope_px_q4[3], const int32_t turn_rad_q30[3])
+                           const int32_t slope_px_q4[3], const int32_t rotation_rad_q30[3])
 {
     return whole(sum->pull_q20, totals->whole_q8) -
-           sum->weight_q8 * move_px_q12(slope_px_q4, turn_rad_q30);
+           sum->weight_q8 * move_px_q12(slope_px_q4, rotation_rad_q30);
 }
 
 /* How far from what the turn says a slot's mean is, up to 1 px. */
 static int64_t mean_left_q12(const struct ih_dot_place_sums *sum, const struct totals *totals,
-                             const int32_t slope_px_q4[3], const int32_t turn_rad_q30[3])
+                             const int32_t slope_px_q4[3], const int32_t rotation_rad_q30[3])
 {
     return ih_rotation_limit(
-        ih_rotation_div_round(left_of_q20(sum, totals, slope_px_q4, turn_rad_q30), sum->weight_q8),
+        ih_rotation_div_round(left_of_q20(sum, totals, slope_px_q4, rotation_rad_q30),
+                              sum->weight_q8),
         LEFT_MAX_PX_Q12);
 }
 
@@ -230,14 +231,14 @@ static struct ih_dot_place_sums trusted_sum_of(const struct ih_dot_place *place,
 /* Mean square of what a turn leaves of slots' means. Weights of 2^17.9, squares of 2^24, slots: 2^50.4. */
 static int64_t scatter_q24(const struct ih_rotation_estimate *places,
                            const struct ih_rotation_vote_slopes *slopes,
-                           const struct totals *totals, const int32_t turn_rad_q30[3])
+                           const struct totals *totals, const int32_t rotation_rad_q30[3])
 {
     int64_t square_q32 = 0;
     int64_t weight_q8 = 1;
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
         struct ih_dot_place_sums sum = sum_of(&places->slot[slot]);
         if (sum.weight_q8 > 0) {
-            int64_t mean_q12 = mean_left_q12(&sum, totals, slopes->px_q4[slot], turn_rad_q30);
+            int64_t mean_q12 = mean_left_q12(&sum, totals, slopes->px_q4[slot], rotation_rad_q30);
             square_q32 += sum.weight_q8 * mean_q12 * mean_q12;
             weight_q8 += sum.weight_q8;
         }
@@ -252,7 +253,7 @@ static void add_up(const struct ih_rotation_estimate *places,
 {
     memset(out->sums.normal_q16, 0, sizeof out->sums.normal_q16);
     memset(out->sums.right_q24, 0, sizeof out->sums.right_q24);
-    out->whole_q8 = share_q8(places);
+    out->whole_q8 = fraction_q8(places);
     out->slot_count = 0;
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
         const int32_t *slope = slopes->px_q4[slot];
@@ -315,23 +316,23 @@ static int64_t steepness_q8(int64_t weight_q8, int64_t trusted_q8)
 static void judge(const struct ih_rotation_estimate *places,
                   const struct ih_rotation_vote_slopes *slopes,
                   const struct ih_rotation_equations *e, const struct totals *sums,
-                  const int32_t offset_rad_q30[3], struct ih_rotation_estimate_turn *out)
+                  const int32_t offset_rad_q30[3], struct ih_rotation_estimate_result *out)
 {
-    int32_t turn_rad_q30[3];
+    int32_t rotation_rad_q30[3];
     uint64_t square_q32[3] = {0, 0, 0};
     uint64_t weight_q32[3] = {0, 0, 0};
     int64_t trusted_q8 = 0;
     int64_t steep_q8 = 0;
     for (int i = 0; i < 3; i++) {
-        turn_rad_q30[i] = out->turn_rad_q30[i] + offset_rad_q30[i];
+        rotation_rad_q30[i] = out->rotation_rad_q30[i] + offset_rad_q30[i];
     }
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
         const int32_t *slope = slopes->px_q4[slot];
         struct ih_dot_place_sums sum = trusted_sum_of(&places->slot[slot], slope, sums);
         steep_q8 += steepness_q8(sum_of(&places->slot[slot]).weight_q8, sum.weight_q8);
         trusted_q8 += sum.weight_q8;
-        int64_t left_q20 =
-            ih_rotation_limit(left_of_q20(&sum, sums, slope, turn_rad_q30), (int64_t)PULL_MAX_Q20);
+        int64_t left_q20 = ih_rotation_limit(left_of_q20(&sum, sums, slope, rotation_rad_q30),
+                                             (int64_t)PULL_MAX_Q20);
         for (int i = 0; sum.weight_q8 > 0 && i < 3; i++) {
             int64_t lever = ih_rotation_lever_q26(e, slope, i);
             int64_t left_q16 = ih_rotation_limit(ih_shift_round(left_q20 * lever, 30), 1 << 26);
@@ -346,12 +347,14 @@ static void judge(const struct ih_rotation_estimate *places,
                                              steep_q12 > STEEP_MIN_Q12 ? steep_q12 : STEEP_MIN_Q12);
     for (int i = 0; i < 3; i++) {
         int64_t sigma_q16 = with_standing_q16(square_q32[i], weight_q32[i], SLOT_PX_Q12);
-        int64_t doubt_q16 = with_standing_q16(square_q32[i], weight_q32[i], sums->doubt_px_q12);
-        int64_t doubt_rad_q30 = ih_rotation_div_round(doubt_q16 * unit_q22, e->root_q8[i]);
-        int64_t part_rad_q30 = ih_abs_s32(out->turn_rad_q30[i]);
+        int64_t uncertainty_q16 =
+            with_standing_q16(square_q32[i], weight_q32[i], sums->uncertainty_px_q12);
+        int64_t uncertainty_rad_q30 =
+            ih_rotation_div_round(uncertainty_q16 * unit_q22, e->root_q8[i]);
+        int64_t part_rad_q30 = ih_abs_s32(out->rotation_rad_q30[i]);
         out->sigma_rad_q30[i] =
             ih_saturate_s32(ih_rotation_div_round(sigma_q16 * unit_q22, e->root_q8[i]));
-        sure += part_rad_q30 >= SURE * doubt_rad_q30 ? part_rad_q30 * part_rad_q30 : 0;
+        sure += part_rad_q30 >= SURE * uncertainty_rad_q30 ? part_rad_q30 * part_rad_q30 : 0;
     }
     out->sure_rad_q30 = (int32_t)ih_isqrt_u64((uint64_t)sure);
 }
@@ -360,17 +363,17 @@ static void judge(const struct ih_rotation_estimate *places,
  * what no dot shows near 0, where it scatters little and may be all wrong. False: an axis is not seen, or less
  * certain than it may be. */
 static bool estimate(const struct ih_rotation_estimate *places,
-                     const struct ih_rotation_vote_slopes *slopes, int32_t doubt_px_q12,
-                     const int32_t turned_rad_q30[3], const int32_t *held_q30,
-                     const int32_t offset_rad_q30[3], struct ih_rotation_estimate_turn *out)
+                     const struct ih_rotation_vote_slopes *slopes, int32_t uncertainty_px_q12,
+                     const int32_t rotated_rad_q30[3], const int32_t *held_q30,
+                     const int32_t offset_rad_q30[3], struct ih_rotation_estimate_result *out)
 {
     int64_t noise_q12 =
         (int64_t)ih_isqrt_u64((uint64_t)(places->square_q32 / places->weight_q8)) + 1;
     int32_t from_rad_q30[3], about_rad_q30[3];
     struct ih_rotation_equations wide;
-    struct totals sums = {.about_rad_q30 = NULL, .doubt_px_q12 = doubt_px_q12};
+    struct totals sums = {.about_rad_q30 = NULL, .uncertainty_px_q12 = uncertainty_px_q12};
     for (int i = 0; i < 3; i++) {
-        from_rad_q30[i] = turned_rad_q30[i] + offset_rad_q30[i];
+        from_rad_q30[i] = rotated_rad_q30[i] + offset_rad_q30[i];
     }
     for (int pass = 0; pass < PASSES; pass++) {
         add_up(places, slopes, &sums);
@@ -378,11 +381,11 @@ static bool estimate(const struct ih_rotation_estimate *places,
             pin(places, slopes, held_q30, offset_rad_q30, &sums);
         }
         if (sums.slot_count < SLOTS_MIN ||
-            !ih_rotation_solve(&sums.sums, noise_q12, from_rad_q30, &wide, out->turn_rad_q30)) {
+            !ih_rotation_solve(&sums.sums, noise_q12, from_rad_q30, &wide, out->rotation_rad_q30)) {
             return false;
         }
         for (int i = 0; i < 3 && pass < PASSES - 1; i++) {
-            about_rad_q30[i] = out->turn_rad_q30[i] + offset_rad_q30[i];
+            about_rad_q30[i] = out->rotation_rad_q30[i] + offset_rad_q30[i];
         }
         if (pass == 0) {
             sums.half_q24 = HALF_SCATTERS * scatter_q24(places, slopes, &sums, about_rad_q30);
@@ -391,20 +394,20 @@ static bool estimate(const struct ih_rotation_estimate *places,
     }
     judge(places, slopes, &wide, &sums, offset_rad_q30, out);
     for (int i = 0; i < 3; i++) {
-        out->turn_rad_q30[i] += offset_rad_q30[i];
+        out->rotation_rad_q30[i] += offset_rad_q30[i];
     }
     return out->sigma_rad_q30[0] <= IH_ROTATION_ESTIMATE_SIGMA_MAX_RAD_Q30 &&
            out->sigma_rad_q30[1] <= IH_ROTATION_ESTIMATE_SIGMA_MAX_RAD_Q30 &&
            out->sigma_rad_q30[2] <= IH_ROTATION_ESTIMATE_SIGMA_MAX_RAD_Q30;
 }
 
-void ih_rotation_estimate_hold(const struct ih_rig *rig, const int32_t turned_rad_q30[3],
+void ih_rotation_estimate_hold(const struct ih_rig *rig, const int32_t rotated_rad_q30[3],
                                int32_t back_rad_q30[3])
 {
     int32_t axis_q30[2][2];
     ih_rotation_vote_axes(rig, axis_q30);
-    int64_t part_rad_q30 = -ih_shift_round((int64_t)axis_q30[1][0] * turned_rad_q30[0] +
-                                               (int64_t)axis_q30[1][1] * turned_rad_q30[1],
+    int64_t part_rad_q30 = -ih_shift_round((int64_t)axis_q30[1][0] * rotated_rad_q30[0] +
+                                               (int64_t)axis_q30[1][1] * rotated_rad_q30[1],
                                            30);
     back_rad_q30[0] = (int32_t)ih_mul_shift(part_rad_q30, axis_q30[1][0], 30);
     back_rad_q30[1] = (int32_t)ih_mul_shift(part_rad_q30, axis_q30[1][1], 30);
@@ -412,8 +415,9 @@ void ih_rotation_estimate_hold(const struct ih_rig *rig, const int32_t turned_ra
 }
 
 static bool find(const struct ih_rotation_estimate *places, const struct ih_rig *rig,
-                 const struct ih_rotation_vote_slopes *slopes, const int32_t turned_rad_q30[3],
-                 bool is_weak_known, int32_t doubt_px_q12, struct ih_rotation_estimate_turn *out)
+                 const struct ih_rotation_vote_slopes *slopes, const int32_t rotated_rad_q30[3],
+                 bool is_weak_known, int32_t uncertainty_px_q12,
+                 struct ih_rotation_estimate_result *out)
 {
     const int32_t none[3] = {0, 0, 0};
     int32_t offset_rad_q30[3] = {0, 0, 0};
@@ -421,23 +425,25 @@ static bool find(const struct ih_rotation_estimate *places, const struct ih_rig 
     if (places->weight_q8 < WEIGHT_MIN_Q8) {
         return false;
     }
-    out->is_weak_seen = estimate(places, slopes, doubt_px_q12, turned_rad_q30, NULL, none, out);
+    out->is_weak_seen =
+        estimate(places, slopes, uncertainty_px_q12, rotated_rad_q30, NULL, none, out);
     if (out->is_weak_seen) {
         return true;
     }
     ih_rotation_vote_axes(rig, axis_q30);
     if (!is_weak_known) {
-        ih_rotation_estimate_hold(rig, turned_rad_q30, offset_rad_q30);
+        ih_rotation_estimate_hold(rig, rotated_rad_q30, offset_rad_q30);
     }
-    return estimate(places, slopes, doubt_px_q12, turned_rad_q30, axis_q30[1], offset_rad_q30, out);
+    return estimate(places, slopes, uncertainty_px_q12, rotated_rad_q30, axis_q30[1],
+                    offset_rad_q30, out);
 }
 
 bool ih_rotation_estimate_find(const struct ih_rotation_estimate *places, const struct ih_rig *rig,
                                const struct ih_rotation_vote_slopes *slopes,
-                               const int32_t turned_rad_q30[3], bool is_weak_known,
-                               struct ih_rotation_estimate_turn *out)
+                               const int32_t rotated_rad_q30[3], bool is_weak_known,
+                               struct ih_rotation_estimate_result *out)
 {
-    return find(places, rig, slopes, turned_rad_q30, is_weak_known, DOUBT_PX_Q12, out);
+    return find(places, rig, slopes, rotated_rad_q30, is_weak_known, UNCERTAINTY_PX_Q12, out);
 }
 
 /* The difference of two means has the weight w v / (w + v). Weights of 2^18, pulls of 2^28.4: 2^47.4. */
@@ -462,7 +468,7 @@ bool ih_rotation_estimate_change(const struct ih_rotation_estimate *late,
                                  const struct ih_rotation_estimate *all, const struct ih_rig *rig,
                                  const struct ih_rotation_vote_slopes *slopes,
                                  struct ih_rotation_estimate *scratch,
-                                 struct ih_rotation_estimate_turn *out)
+                                 struct ih_rotation_estimate_result *out)
 {
     const int32_t none[3] = {0, 0, 0};
     scratch->frame_count = late->frame_count;
@@ -475,27 +481,28 @@ bool ih_rotation_estimate_change(const struct ih_rotation_estimate *late,
     return find(scratch, rig, slopes, none, true, CHANGE_PX_Q12, out);
 }
 
-void ih_rotation_estimate_turn(struct ih_rotation_estimate *places,
-                               const struct ih_rotation_vote_slopes *slopes,
-                               const int32_t by_rad_q30[3])
+void ih_rotation_estimate_rotate(struct ih_rotation_estimate *places,
+                                 const struct ih_rotation_vote_slopes *slopes,
+                                 const int32_t by_rad_q30[3])
 {
     if (places->weight_q8 == 0) {
         return;
     }
-    int64_t share = share_q8(places);
+    int64_t fraction = fraction_q8(places);
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
         struct ih_dot_place *place = &places->slot[slot];
         if (sum_of(place).weight_q8 == 0) {
             continue;
         }
         int64_t move = move_px_q12(slopes->px_q4[slot], by_rad_q30);
-        if (ih_abs_s64(move) > TURN_MAX_PX_Q12) {
+        if (ih_abs_s64(move) > ROTATION_MAX_PX_Q12) {
             ih_rotation_estimate_clear(places);
             return;
         }
         for (int i = 0; i <= IH_ROTATION_ESTIMATE_KNOWN; i++) {
             struct ih_dot_place_sums *sums = &place->at[i];
-            int64_t left_q20 = sums->pull_q20 - ih_shift_round(sums->weight_q8 * move * share, 8);
+            int64_t left_q20 =
+                sums->pull_q20 - ih_shift_round(sums->weight_q8 * move * fraction, 8);
             sums->pull_q20 = (int32_t)ih_rotation_limit(left_q20, PULL_MAX_Q20);
         }
     }

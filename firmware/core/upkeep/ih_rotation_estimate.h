@@ -3,7 +3,7 @@
  * In:    labels, and what a turn does to each slot's dot (ih_rotation_vote_slopes); frame by frame.
  * Out:   a turn against the rig that gave the labels, its uncertainty, and whether it is more than
  *        chance.
- * Way:   Least squares of the dots' distances from their lines, three parameters, Tukey's weights.
+ * Method: Least squares of the dots' distances from their lines, three parameters, Tukey's weights.
  *        A dot's distance has two parts: noise that is another in each frame, and what the surface
  *        below it does to its centre, which is the same as long as the dot stays on its place: 0.2
  *        to 0.6 of the noise. Where walls stand still, and the pattern's corners, which alone show
@@ -64,8 +64,8 @@ struct ih_rotation_estimate {
     struct ih_dot_place slot[IH_SLOTS];
 };
 
-struct ih_rotation_estimate_turn {
-    int32_t turn_rad_q30[3]; /* against the rig of the labels */
+struct ih_rotation_estimate_result {
+    int32_t rotation_rad_q30[3]; /* against the rig of the labels */
     int32_t
         sigma_rad_q30[3]; /* one standard deviation; of no use across the baseline if not seen */
     bool
@@ -90,8 +90,8 @@ void ih_rotation_estimate_add(struct ih_rotation_estimate *places, const struct 
  * baseline, from earlier frames. */
 bool ih_rotation_estimate_find(const struct ih_rotation_estimate *places, const struct ih_rig *rig,
                                const struct ih_rotation_vote_slopes *slopes,
-                               const int32_t turned_rad_q30[3], bool is_weak_known,
-                               struct ih_rotation_estimate_turn *out);
+                               const int32_t rotated_rad_q30[3], bool is_weak_known,
+                               struct ih_rotation_estimate_result *out);
 
 /* How late frames differ from all, among which they are, as a turn; what slots err by in both, from
  * calibration or because they stand still, is not counted. A turn that late dots do not show is 0. False: as
@@ -100,16 +100,16 @@ bool ih_rotation_estimate_change(const struct ih_rotation_estimate *late,
                                  const struct ih_rotation_estimate *all, const struct ih_rig *rig,
                                  const struct ih_rotation_vote_slopes *slopes,
                                  struct ih_rotation_estimate *scratch,
-                                 struct ih_rotation_estimate_turn *out);
+                                 struct ih_rotation_estimate_result *out);
 
 /* What takes the part of a turn across the baseline back. */
-void ih_rotation_estimate_hold(const struct ih_rig *rig, const int32_t turned_rad_q30[3],
+void ih_rotation_estimate_hold(const struct ih_rig *rig, const int32_t rotated_rad_q30[3],
                                int32_t back_rad_q30[3]);
 
 /* The rig was turned by so much: what is known stays, against the new lines. */
-void ih_rotation_estimate_turn(struct ih_rotation_estimate *places,
-                               const struct ih_rotation_vote_slopes *slopes,
-                               const int32_t by_rad_q30[3]);
+void ih_rotation_estimate_rotate(struct ih_rotation_estimate *places,
+                                 const struct ih_rotation_vote_slopes *slopes,
+                                 const int32_t by_rad_q30[3]);
 
 /* What was long ago counts less: the rig may drift. */
 void ih_rotation_estimate_forget(struct ih_rotation_estimate *places);

@@ -41,12 +41,12 @@ static void fill_cofactors(const int64_t c_q30[3][3], struct ih_rotation_equatio
 /* Sums with a prior of that precision about the calibration, from which the rig is turned already. An
  * entry of the matrix is at most the product of its roots, so entries over roots stay below 2^31. */
 static void scale(const struct ih_rotation_sums *sums, int64_t precision_q16,
-                  const int32_t turned_rad_q30[3], struct ih_rotation_equations *out)
+                  const int32_t rotated_rad_q30[3], struct ih_rotation_equations *out)
 {
     int64_t c_q30[3][3];
     for (int i = 0; i < 3; i++) {
         int64_t diagonal_q16 = sums->normal_q16[ih_rotation_packed[i][i]] + precision_q16;
-        int64_t pull_q24 = ih_mul_shift(precision_q16 >> 8, turned_rad_q30[i], 14);
+        int64_t pull_q24 = ih_mul_shift(precision_q16 >> 8, rotated_rad_q30[i], 14);
         out->root_q8[i] = (int64_t)ih_isqrt_u64((uint64_t)diagonal_q16) + 1;
         out->right_px_q16[i] =
             ih_rotation_div_round(sums->right_q24[i] - pull_q24, out->root_q8[i]);
@@ -66,7 +66,7 @@ static void scale(const struct ih_rotation_sums *sums, int64_t precision_q16,
 
 /* Right sides are below 2^7.5 px times the root of the dots' number, 2^24 in Q16; three products with
  * cofactors of up to 2 in Q30: 2^57. */
-static void solve(const struct ih_rotation_equations *e, int32_t turn_rad_q30[3])
+static void solve(const struct ih_rotation_equations *e, int32_t rotation_rad_q30[3])
 {
     for (int i = 0; i < 3; i++) {
         int64_t sum_q46 = 0;
@@ -74,7 +74,7 @@ static void solve(const struct ih_rotation_equations *e, int32_t turn_rad_q30[3]
             sum_q46 += e->cofactor_q30[i][k] * e->right_px_q16[k];
         }
         int64_t part_px_q16 = ih_rotation_div_round(sum_q46, e->determinant_q30);
-        turn_rad_q30[i] = ih_clamp_s32(
+        rotation_rad_q30[i] = ih_clamp_s32(
             ih_saturate_s32(ih_rotation_div_round(part_px_q16 * (1 << 22), e->root_q8[i])),
             -2 * IH_ROTATION_VOTE_MAX_RAD_Q30, 2 * IH_ROTATION_VOTE_MAX_RAD_Q30);
     }
@@ -107,32 +107,32 @@ int64_t ih_rotation_lever_q26(const struct ih_rotation_equations *e, const int32
 /* The turn with a prior of that width about the calibration. False: an axis is not seen at all. */
 static bool solve_with(const struct ih_rotation_sums *sums, int64_t noise_px_q12,
                        int64_t prior_rad_q30, const int32_t from_rad_q30[3],
-                       struct ih_rotation_equations *equations, int32_t turn_rad_q30[3])
+                       struct ih_rotation_equations *equations, int32_t rotation_rad_q30[3])
 {
     int64_t root_q8 = ih_rotation_div_round(noise_px_q12 * (1 << 26), prior_rad_q30);
     scale(sums, root_q8 * root_q8, from_rad_q30, equations);
     if (equations->determinant_q30 < DETERMINANT_MIN_Q30) {
         return false;
     }
-    solve(equations, turn_rad_q30);
+    solve(equations, rotation_rad_q30);
     return true;
 }
 
 bool ih_rotation_solve(const struct ih_rotation_sums *sums, int64_t noise_px_q12,
                        const int32_t from_rad_q30[3], struct ih_rotation_equations *wide,
-                       int32_t turn_rad_q30[3])
+                       int32_t rotation_rad_q30[3])
 {
     const int32_t none[3] = {0, 0, 0};
     const int32_t limit[3] = {IH_ROTATION_VOTE_MAX_RAD_Q30, IH_ROTATION_VOTE_MAX_RAD_Q30,
                               IH_ROTATION_VOTE_MAX_RAD_Q30};
     struct ih_rotation_equations narrow;
     bool is_solved = solve_with(sums, noise_px_q12, length_rad_q30(limit, none), from_rad_q30, wide,
-                                turn_rad_q30);
+                                rotation_rad_q30);
     for (int i = 0; is_solved && i < 2; i++) {
-        int64_t prior_rad_q30 = length_rad_q30(from_rad_q30, turn_rad_q30);
+        int64_t prior_rad_q30 = length_rad_q30(from_rad_q30, rotation_rad_q30);
         prior_rad_q30 = prior_rad_q30 > PRIOR_MIN_RAD_Q30 ? prior_rad_q30 : PRIOR_MIN_RAD_Q30;
         is_solved =
-            solve_with(sums, noise_px_q12, prior_rad_q30, from_rad_q30, &narrow, turn_rad_q30);
+            solve_with(sums, noise_px_q12, prior_rad_q30, from_rad_q30, &narrow, rotation_rad_q30);
     }
     return is_solved;
 }

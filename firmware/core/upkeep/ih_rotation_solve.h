@@ -42,7 +42,7 @@ int64_t ih_rotation_limit(int64_t value, int64_t max);
 /* False: about some axis the rotation cannot be determined. wide: the equations with the wide prior. */
 bool ih_rotation_solve(const struct ih_rotation_sums *sums, int64_t noise_px_q12,
                        const int32_t from_rad_q30[3], struct ih_rotation_equations *wide,
-                       int32_t turn_rad_q30[3]);
+                       int32_t rotation_rad_q30[3]);
 
 /* How much a slot's weighted distance rotates the solution about an axis, in units of its root. */
 int64_t ih_rotation_lever_q26(const struct ih_rotation_equations *e, const int32_t slope_px_q4[3],

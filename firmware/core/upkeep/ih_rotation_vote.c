@@ -58,13 +58,13 @@ static void cross_q30(const int32_t w_q30[3], const int32_t v_q30[3], int32_t ou
 }
 
 void ih_rotation_vote_calibration(const struct ih_calibration *nominal,
-                                  const int32_t turn_rad_q30[3], struct ih_calibration *out)
+                                  const int32_t rotation_rad_q30[3], struct ih_calibration *out)
 {
     *out = *nominal;
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
         int32_t first_q30[3], second_q30[3];
-        cross_q30(turn_rad_q30, nominal->ray_q30[slot], first_q30);
-        cross_q30(turn_rad_q30, first_q30, second_q30);
+        cross_q30(rotation_rad_q30, nominal->ray_q30[slot], first_q30);
+        cross_q30(rotation_rad_q30, first_q30, second_q30);
         for (int axis = 0; axis < 3; axis++) {
             out->ray_q30[slot][axis] +=
                 first_q30[axis] + (int32_t)ih_shift_round(second_q30[axis], 1);
@@ -187,10 +187,10 @@ void ih_rotation_vote_elect(const struct ih_rotation_vote_votes *votes, const st
     int32_t axis_q30[2][2];
     ih_rotation_vote_axes(rig, axis_q30);
     for (int k = 0; k < 2; k++) {
-        out->turn_rad_q30[k] = (int32_t)ih_shift_round(
+        out->rotation_rad_q30[k] = (int32_t)ih_shift_round(
             along_rad_q30 * axis_q30[0][k] + across_rad_q30 * axis_q30[1][k], 30);
     }
-    out->turn_rad_q30[2] = roll * step_rad_q30(IH_ROTATION_VOTE_STEPS_ROLL);
+    out->rotation_rad_q30[2] = roll * step_rad_q30(IH_ROTATION_VOTE_STEPS_ROLL);
     out->vote = votes->vote[best];
     out->vote_of_none = votes->vote[IH_ROTATION_VOTE_VOTES / 2];
     out->vote_mean = sum / IH_ROTATION_VOTE_VOTES;

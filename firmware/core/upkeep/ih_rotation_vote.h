@@ -3,7 +3,7 @@
  * In:    a rig, and dots that need not lie on its lines.
  * Out:   what a turn does to each dot across its line; the rig's calibration turned; by vote of the
  *        dots, about which turn it is.
- * Way:   A turn w (rad, about the axes of the camera frame, through the projector's origin) moves
+ * Method: A turn w (rad, about the axes of the camera frame, through the projector's origin) moves
  *        the dot at infinity (x, y) by
  *            (-x y wx + (1 + x^2) wy - y wz,  -(1 + y^2) wx + x y wy + x wz);
  *        the part of it across the line, in px per rad, is the dot's slope. What goes along
@@ -26,7 +26,7 @@
 #include "dots/ih_dots.h"
 #include "rig/ih_rig.h"
 
-/* Greatest turn about each axis: 0.6 degrees. Beyond it neighbouring columns of dots are mistaken for
+/* Largest rotation about each axis: 0.6 degrees. Beyond it neighbouring columns of dots are mistaken for
  * each other. */
 #define IH_ROTATION_VOTE_MAX_RAD_Q30 11244049
 
@@ -53,7 +53,7 @@ struct ih_rotation_vote_scratch {
 };
 
 struct ih_rotation_vote_winner {
-    int32_t turn_rad_q30[3];
+    int32_t rotation_rad_q30[3];
     int32_t vote, vote_of_none, vote_mean; /* its own, those of no turn at all, all turns' */
 };
 
@@ -67,7 +67,7 @@ void ih_rotation_vote_slopes(const struct ih_rig *rig, struct ih_rotation_vote_s
 
 /* The nominal calibration with its rays turned. */
 void ih_rotation_vote_calibration(const struct ih_calibration *nominal,
-                                  const int32_t turn_rad_q30[3], struct ih_calibration *out);
+                                  const int32_t rotation_rad_q30[3], struct ih_calibration *out);
 
 /* Add a frame's dots to the votes, which are all 0 at first; up to 11 frames: 16 points of each slot. */
 void ih_rotation_vote_vote(const struct ih_dots *dots, const struct ih_rig *rig,

@@ -47,7 +47,7 @@ static void test_check_says_whether_the_rig_fits(void)
     static const enum app_exit exits[] = {
         [IH_HEALTH_UNKNOWN] = APP_EXIT_FAILED,
         [IH_HEALTH_FITS] = APP_EXIT_GOOD,
-        [IH_HEALTH_TURNED] = APP_EXIT_FAILED,
+        [IH_HEALTH_ROTATED] = APP_EXIT_FAILED,
         [IH_HEALTH_LOST] = APP_EXIT_FAILED,
     };
     for (int state = IH_HEALTH_UNKNOWN; state <= IH_HEALTH_LOST; state++) {

@@ -55,10 +55,10 @@ static void look(void)
     changed_count += ih_health_frame(&health, &dots, &labels, &rig, &scratch);
 }
 
-static void run(const struct ih_calibration *seen, const double turn_deg[3], int frames)
+static void run(const struct ih_calibration *seen, const double rotation_deg[3], int frames)
 {
     for (int i = 0; i < frames; i++) {
-        see_dots(seen, turn_deg, WALL_MM, 0.1, &random_source, &dots);
+        see_dots(seen, rotation_deg, WALL_MM, 0.1, &random_source, &dots);
         look();
     }
 }
@@ -70,15 +70,15 @@ static void assert_untouched(void)
 }
 
 /* The weak axis (Y: both baselines are horizontal) within 0.02 degrees: 0.3 px of a dot's depth. */
-static void assert_turn(const double turn_deg[3], int index)
+static void assert_rotation(const double rotation_deg[3], int index)
 {
     static const double limit_deg[3] = {0.002, 0.02, 0.006};
 
     for (int axis = 0; axis < 3; axis++) {
-        IH_TEST_WITHIN(limit_deg[axis], turn_deg[axis], health.turn_rad_q30[axis] / Q30 / DEG,
-                       "turn", 10 * index + axis);
+        IH_TEST_WITHIN(limit_deg[axis], rotation_deg[axis],
+                       health.rotation_rad_q30[axis] / Q30 / DEG, "turn", 10 * index + axis);
     }
-    TEST_ASSERT_EQUAL_INT(IH_HEALTH_TURNED, health.state);
+    TEST_ASSERT_EQUAL_INT(IH_HEALTH_ROTATED, health.state);
 }
 
 static void a_rig_that_fits_is_left_alone(void)
@@ -104,17 +104,17 @@ static void a_knock_is_found_within_fifty_frames(void)
         for (int i = 0; i < IH_TEST_COUNT(turns_deg); i++) {
             use_calibration(&vector_rigs[which]);
             run(&vector_rigs[which], turns_deg[i], FRAMES_TO_FIND);
-            assert_turn(turns_deg[i], 10 * which + i);
+            assert_rotation(turns_deg[i], 10 * which + i);
             TEST_ASSERT_GREATER_THAN_INT32(health.dot_count * 3 / 4, health.labelled_count);
         }
     }
 }
 
 /* Only dots of the middle row and columns. */
-static void run_middle(const double turn_deg[3], int frames)
+static void run_middle(const double rotation_deg[3], int frames)
 {
     for (int frame = 0; frame < frames; frame++) {
-        see_dots(&vector_rigs[0], turn_deg, WALL_MM, 0.1, &random_source, &dots);
+        see_dots(&vector_rigs[0], rotation_deg, WALL_MM, 0.1, &random_source, &dots);
         TEST_ASSERT_EQUAL_INT32(IH_SLOTS, dots.dot_count);
         dots.dot_count = 0;
         for (int slot = 0; slot < IH_SLOTS; slot++) {
@@ -137,11 +137,12 @@ static void what_dots_do_not_show_is_not_taken(void)
     for (int i = 0; i < IH_TEST_COUNT(turns_deg); i++) {
         use_calibration(&vector_rigs[0]);
         run_middle(turns_deg[i], 2 * FRAMES_TO_FIND);
-        TEST_ASSERT_EQUAL_INT(IH_HEALTH_TURNED, health.state);
+        TEST_ASSERT_EQUAL_INT(IH_HEALTH_ROTATED, health.state);
         TEST_ASSERT_FALSE(health.is_weak_known);
-        IH_TEST_WITHIN(0.003, turns_deg[i][0], health.turn_rad_q30[0] / Q30 / DEG, "turn", i);
-        IH_TEST_WITHIN(0.001, 0, health.turn_rad_q30[1] / Q30 / DEG, "across", i);
-        IH_TEST_WITHIN(0.01, turns_deg[i][2], health.turn_rad_q30[2] / Q30 / DEG, "turn", 20 + i);
+        IH_TEST_WITHIN(0.003, turns_deg[i][0], health.rotation_rad_q30[0] / Q30 / DEG, "turn", i);
+        IH_TEST_WITHIN(0.001, 0, health.rotation_rad_q30[1] / Q30 / DEG, "across", i);
+        IH_TEST_WITHIN(0.01, turns_deg[i][2], health.rotation_rad_q30[2] / Q30 / DEG, "turn",
+                       20 + i);
         IH_TEST_WITHIN(0.001, 0.6, health.sigma_rad_q30[1] / Q30 / DEG, "sigma", i);
     }
 }
@@ -166,16 +167,17 @@ static void a_small_turn_makes_nothing_else_known(void)
 /* Frames add up after the turn is found. */
 static void more_frames_make_it_better(void)
 {
-    static const double turn_deg[3] = {-0.2, 0.2, 0.1};
+    static const double rotation_deg[3] = {-0.2, 0.2, 0.1};
 
     for (int which = 0; which < 2; which++) {
         use_calibration(&vector_rigs[which]);
-        run(&vector_rigs[which], turn_deg, FRAMES_TO_FIND);
+        run(&vector_rigs[which], rotation_deg, FRAMES_TO_FIND);
         int32_t basis_count = health.basis_count;
         TEST_ASSERT_GREATER_THAN_INT32(20, basis_count);
-        run(&vector_rigs[which], turn_deg, 200);
+        run(&vector_rigs[which], rotation_deg, 200);
         TEST_ASSERT_GREATER_THAN_INT32(5 * basis_count, health.basis_count);
-        IH_TEST_WITHIN(0.004, turn_deg[1], health.turn_rad_q30[1] / Q30 / DEG, "turn", which);
+        IH_TEST_WITHIN(0.004, rotation_deg[1], health.rotation_rad_q30[1] / Q30 / DEG, "turn",
+                       which);
     }
 }
 
@@ -195,9 +197,9 @@ static void a_knock_after_a_long_peace_is_found_as_soon(void)
         for (int i = 0; i < IH_TEST_COUNT(turns_deg); i++) {
             peaceful = health;
             run(&vector_rigs[which], turns_deg[i], FRAMES_TO_FIND);
-            TEST_ASSERT_EQUAL_INT_MESSAGE(IH_HEALTH_TURNED, health.state, "told");
+            TEST_ASSERT_EQUAL_INT_MESSAGE(IH_HEALTH_ROTATED, health.state, "told");
             run(&vector_rigs[which], turns_deg[i], FRAMES_TO_SETTLE);
-            assert_turn(turns_deg[i], 20 * which + i);
+            assert_rotation(turns_deg[i], 20 * which + i);
             TEST_ASSERT_TRUE(health.is_weak_known);
             health = peaceful;
             rig = before;
@@ -217,9 +219,9 @@ static void a_knock_makes_what_is_not_seen_unknown(void)
         TEST_ASSERT_TRUE(health.is_weak_known);
         run_middle((const double[3]){0, 0.2, 0.1}, 2 * FRAMES_TO_FIND);
         TEST_ASSERT_FALSE(health.is_weak_known);
-        TEST_ASSERT_EQUAL_INT(IH_HEALTH_TURNED, health.state);
-        IH_TEST_WITHIN(0.001, 0, health.turn_rad_q30[1] / Q30 / DEG, "across", seed);
-        IH_TEST_WITHIN(0.02, 0.1, health.turn_rad_q30[2] / Q30 / DEG, "turn", seed);
+        TEST_ASSERT_EQUAL_INT(IH_HEALTH_ROTATED, health.state);
+        IH_TEST_WITHIN(0.001, 0, health.rotation_rad_q30[1] / Q30 / DEG, "across", seed);
+        IH_TEST_WITHIN(0.02, 0.1, health.rotation_rad_q30[2] / Q30 / DEG, "turn", seed);
         IH_TEST_WITHIN(0.001, 0.6, health.sigma_rad_q30[1] / Q30 / DEG, "sigma", seed);
     }
 }
@@ -228,14 +230,14 @@ static void a_knock_makes_what_is_not_seen_unknown(void)
  * before still counts. */
 static void a_search_in_vain_leaves_what_was_known(void)
 {
-    static const double turn_deg[3] = {-0.2, 0.2, 0.1};
+    static const double rotation_deg[3] = {-0.2, 0.2, 0.1};
     static const double other_deg[3] = {0.1, 0.2, 0.1};
     static struct ih_health known;
 
     use_calibration(&vector_rigs[0]);
-    run(&vector_rigs[0], turn_deg, 150);
+    run(&vector_rigs[0], rotation_deg, 150);
     while (health.look.frame_count != 0) {
-        run(&vector_rigs[0], turn_deg, 1);
+        run(&vector_rigs[0], rotation_deg, 1);
     }
     known = health;
     before = rig;
@@ -245,7 +247,7 @@ static void a_search_in_vain_leaves_what_was_known(void)
     TEST_ASSERT_EQUAL_INT(IH_HEALTH_SETTLING, health.stage);
     TEST_ASSERT_FALSE(health.is_weak_known);
     for (int i = 0; i < 30 && health.stage != IH_HEALTH_WATCHING; i++) {
-        run(&vector_rigs[0], turn_deg, 1);
+        run(&vector_rigs[0], rotation_deg, 1);
     }
     TEST_ASSERT_EQUAL_MEMORY(&before, &rig, sizeof rig);
     TEST_ASSERT_EQUAL_INT32(known.basis_count, health.basis_count);
@@ -253,7 +255,7 @@ static void a_search_in_vain_leaves_what_was_known(void)
     TEST_ASSERT_EQUAL_INT32_ARRAY(known.sigma_rad_q30, health.sigma_rad_q30, 3);
     TEST_ASSERT_GREATER_OR_EQUAL_INT32(known.all.frame_count, health.all.frame_count);
     /* No turn of few frames comes instead. */
-    run(&vector_rigs[0], turn_deg, 2 * IH_HEALTH_LOOK);
+    run(&vector_rigs[0], rotation_deg, 2 * IH_HEALTH_LOOK);
     TEST_ASSERT_GREATER_OR_EQUAL_INT32(known.basis_count, health.basis_count);
 }
 
@@ -264,7 +266,7 @@ static void a_second_knock_and_one_back(void)
     use_calibration(&vector_rigs[1]);
     for (int i = 0; i < IH_TEST_COUNT(turns_deg); i++) {
         run(&vector_rigs[1], turns_deg[i], 2 * FRAMES_TO_FIND + IH_HEALTH_PAUSE * IH_HEALTH_LOOK);
-        assert_turn(turns_deg[i], i);
+        assert_rotation(turns_deg[i], i);
     }
 }
 
@@ -276,7 +278,7 @@ static void a_turn_beyond_the_limit_is_told_and_not_taken(void)
         TEST_ASSERT_TRUE(health.state != IH_HEALTH_FITS);
         for (int axis = 0; axis < 3; axis++) {
             TEST_ASSERT_LESS_OR_EQUAL_INT32(IH_ROTATION_VOTE_MAX_RAD_Q30,
-                                            abs(health.turn_rad_q30[axis]));
+                                            abs(health.rotation_rad_q30[axis]));
         }
     }
 }
@@ -296,7 +298,7 @@ static void chance_turns_nothing(void)
             }
             look();
         }
-        TEST_ASSERT_TRUE(health.state != IH_HEALTH_TURNED);
+        TEST_ASSERT_TRUE(health.state != IH_HEALTH_ROTATED);
         TEST_ASSERT_TRUE(health.state != IH_HEALTH_FITS);
         TEST_ASSERT_EQUAL_MEMORY(&before, &rig, sizeof rig);
     }

@@ -17,7 +17,7 @@
 static struct ih_rig rig;
 static struct ih_rotation_vote_slopes slopes;
 static struct ih_rotation_estimate places;
-static struct ih_rotation_estimate_turn found;
+static struct ih_rotation_estimate_result found;
 static struct ih_labels labels;
 static struct ih_test_random random_source;
 
@@ -50,20 +50,20 @@ static double slope_px(int slot, int axis)
     return slopes.px_q4[slot][axis] / 16.0;
 }
 
-static void label(int slot, const double turn_deg[3], double error_px)
+static void label(int slot, const double rotation_deg[3], double error_px)
 {
     double across = standing_px[slot] + error_px;
 
     for (int axis = 0; axis < 3; axis++) {
-        across += slope_px(slot, axis) * turn_deg[axis] * DEG;
+        across += slope_px(slot, axis) * rotation_deg[axis] * DEG;
     }
     labels.perp_px_q12[slot] = (int16_t)lround(4096 * across);
 }
 
-static void add_frame(const double turn_deg[3])
+static void add_frame(const double rotation_deg[3])
 {
     for (int slot = 0; slot < IH_SLOTS; slot++) {
-        label(slot, turn_deg, NOISE_PX * ih_test_normal(&random_source));
+        label(slot, rotation_deg, NOISE_PX * ih_test_normal(&random_source));
     }
     ih_rotation_estimate_add(&places, &labels, &rig, &slopes, REACH_PX_Q12);
 }
@@ -75,10 +75,10 @@ static void move(int slot)
     standing_px[slot] = PLACE_PX * ih_test_normal(&random_source);
 }
 
-static void find(const int32_t turned_rad_q30[3], bool is_weak_known)
+static void find(const int32_t rotated_rad_q30[3], bool is_weak_known)
 {
     TEST_ASSERT_TRUE(
-        ih_rotation_estimate_find(&places, &rig, &slopes, turned_rad_q30, is_weak_known, &found));
+        ih_rotation_estimate_find(&places, &rig, &slopes, rotated_rad_q30, is_weak_known, &found));
 }
 
 static double deg_of(int32_t angle_rad_q30)
@@ -90,7 +90,7 @@ static double deg_of(int32_t angle_rad_q30)
  * in as many frames as the others, but on one place each: 18 frames' worth against 190. */
 static void what_stands_still_counts_once(void)
 {
-    const double turn_deg[3] = {0.003, -0.02, 0.01};
+    const double rotation_deg[3] = {0.003, -0.02, 0.01};
 
     for (int slot = 0; slot < IH_SLOTS; slot += 2) {
         standing_px[slot] = slope_px(slot, 1) * 0.05 * DEG;
@@ -99,12 +99,13 @@ static void what_stands_still_counts_once(void)
         for (int slot = 1; slot < IH_SLOTS; slot += 2) {
             labels.t_px_q12[slot] += 4096;
         }
-        add_frame(turn_deg);
+        add_frame(rotation_deg);
     }
     find(straight, false);
-    IH_TEST_WITHIN(0.001, turn_deg[0], deg_of(found.turn_rad_q30[0]), "turn", 0);
-    IH_TEST_WITHIN(0.05 * 18 / 208 + 0.003, turn_deg[1], deg_of(found.turn_rad_q30[1]), "turn", 1);
-    IH_TEST_WITHIN(0.003, turn_deg[2], deg_of(found.turn_rad_q30[2]), "turn", 2);
+    IH_TEST_WITHIN(0.001, rotation_deg[0], deg_of(found.rotation_rad_q30[0]), "turn", 0);
+    IH_TEST_WITHIN(0.05 * 18 / 208 + 0.003, rotation_deg[1], deg_of(found.rotation_rad_q30[1]),
+                   "turn", 1);
+    IH_TEST_WITHIN(0.003, rotation_deg[2], deg_of(found.rotation_rad_q30[2]), "turn", 2);
     TEST_ASSERT_TRUE(found.is_weak_seen);
 }
 
@@ -112,7 +113,7 @@ static void what_stands_still_counts_once(void)
  * calibration got wrong by 0.1 px each for good, which nothing but the slots' own scatter can tell. */
 static void uncertainties_are_what_errors_come_to(void)
 {
-    const double turn_deg[3] = {0.0002, -0.01, 0.002};
+    const double rotation_deg[3] = {0.0002, -0.01, 0.002};
     const double ray_px[] = {0, 0.1};
 
     for (int which = 0; which < 2; which++) {
@@ -131,11 +132,11 @@ static void uncertainties_are_what_errors_come_to(void)
                     move(slot);
                     standing_px[slot] += own_px[slot];
                 }
-                add_frame(turn_deg);
+                add_frame(rotation_deg);
             }
             find(straight, false);
             for (int axis = 0; axis < 3; axis++) {
-                double error = deg_of(found.turn_rad_q30[axis]) - turn_deg[axis];
+                double error = deg_of(found.rotation_rad_q30[axis]) - rotation_deg[axis];
                 square[axis] += pow(error / deg_of(found.sigma_rad_q30[axis]), 2);
             }
         }
@@ -159,38 +160,39 @@ static void only_middle_dots(void)
 
 static void what_is_not_seen_is_held(void)
 {
-    const double turn_deg[3] = {0.003, 0.01, -0.01};
-    int32_t turned_rad_q30[3];
+    const double rotation_deg[3] = {0.003, 0.01, -0.01};
+    int32_t rotated_rad_q30[3];
 
-    turn_of((const double[3]){0.1, 0.2, 0}, turned_rad_q30);
+    turn_of((const double[3]){0.1, 0.2, 0}, rotated_rad_q30);
     only_middle_dots();
     for (int frame = 0; frame < 12; frame++) {
-        add_frame(turn_deg);
+        add_frame(rotation_deg);
     }
     for (int is_known = 0; is_known < 2; is_known++) {
-        find(turned_rad_q30, is_known != 0);
+        find(rotated_rad_q30, is_known != 0);
         TEST_ASSERT_FALSE(found.is_weak_seen);
-        IH_TEST_WITHIN(0.003, turn_deg[0], deg_of(found.turn_rad_q30[0]), "turn", 0);
-        IH_TEST_WITHIN(0.001, is_known ? 0 : -0.2, deg_of(found.turn_rad_q30[1]), "held", is_known);
-        IH_TEST_WITHIN(0.01, turn_deg[2], deg_of(found.turn_rad_q30[2]), "turn", 2);
+        IH_TEST_WITHIN(0.003, rotation_deg[0], deg_of(found.rotation_rad_q30[0]), "turn", 0);
+        IH_TEST_WITHIN(0.001, is_known ? 0 : -0.2, deg_of(found.rotation_rad_q30[1]), "held",
+                       is_known);
+        IH_TEST_WITHIN(0.01, rotation_deg[2], deg_of(found.rotation_rad_q30[2]), "turn", 2);
     }
 }
 
 /* Turned by what was found nothing is left to find, and as much is known as before. */
 static void a_turn_that_is_taken_leaves_nothing(void)
 {
-    const double turn_deg[3] = {0.003, 0.05, -0.004};
-    struct ih_rotation_estimate_turn first;
+    const double rotation_deg[3] = {0.003, 0.05, -0.004};
+    struct ih_rotation_estimate_result first;
 
     for (int frame = 0; frame < 60; frame++) {
-        add_frame(turn_deg);
+        add_frame(rotation_deg);
     }
     find(straight, false);
     first = found;
-    ih_rotation_estimate_turn(&places, &slopes, found.turn_rad_q30);
-    find(first.turn_rad_q30, true);
+    ih_rotation_estimate_rotate(&places, &slopes, found.rotation_rad_q30);
+    find(first.rotation_rad_q30, true);
     for (int axis = 0; axis < 3; axis++) {
-        IH_TEST_WITHIN(1e-4, 0, deg_of(found.turn_rad_q30[axis]), "left", axis);
+        IH_TEST_WITHIN(1e-4, 0, deg_of(found.rotation_rad_q30[axis]), "left", axis);
         IH_TEST_WITHIN(0.02 * first.sigma_rad_q30[axis], first.sigma_rad_q30[axis],
                        found.sigma_rad_q30[axis], "sigma", axis);
     }
@@ -227,18 +229,18 @@ static void a_turn_moves_no_dot_to_another_place(void)
 {
     static struct ih_calibration turned;
     static struct ih_rig now;
-    int32_t turn_rad_q30[3];
+    int32_t rotation_rad_q30[3];
     int32_t bad_slot;
 
     add_frame(straight_deg);
-    turn_of((const double[3]){0, 0.05, 0}, turn_rad_q30);
-    ih_rotation_vote_calibration(&rig.calibration, turn_rad_q30, &turned);
+    turn_of((const double[3]){0, 0.05, 0}, rotation_rad_q30);
+    ih_rotation_vote_calibration(&rig.calibration, rotation_rad_q30, &turned);
     TEST_ASSERT_EQUAL_INT(IH_OK, ih_rig_init(&now, &turned, &bad_slot));
     for (int slot = 0; slot < IH_SLOTS; slot++) {
         labels.t_px_q12[slot] += 1638;
     }
     add_frame(straight_deg);
-    ih_rotation_estimate_turn(&places, &slopes, turn_rad_q30);
+    ih_rotation_estimate_rotate(&places, &slopes, rotation_rad_q30);
     relabel(&now, 0);
     add_frame(straight_deg);
     TEST_ASSERT_EQUAL_INT32(0, slots_that_left());
@@ -284,41 +286,41 @@ static void slots_that_are_far_off_hardly_count(void)
         add_frame(straight_deg);
     }
     find(straight, false);
-    IH_TEST_WITHIN(0.01, 0, deg_of(found.turn_rad_q30[1]), "turn", 1);
+    IH_TEST_WITHIN(0.01, 0, deg_of(found.rotation_rad_q30[1]), "turn", 1);
 }
 
 /* Beyond a pixel nothing is kept. */
 static void a_great_turn_starts_anew(void)
 {
-    int32_t turn_rad_q30[3];
+    int32_t rotation_rad_q30[3];
 
     add_frame(straight_deg);
-    turn_of((const double[3]){0.3, 0, 0}, turn_rad_q30);
-    ih_rotation_estimate_turn(&places, &slopes, turn_rad_q30);
+    turn_of((const double[3]){0.3, 0, 0}, rotation_rad_q30);
+    ih_rotation_estimate_rotate(&places, &slopes, rotation_rad_q30);
     TEST_ASSERT_EQUAL_INT32(0, places.frame_count);
     TEST_ASSERT_FALSE(
-        ih_rotation_estimate_find(&places, &rig, &slopes, turn_rad_q30, true, &found));
+        ih_rotation_estimate_find(&places, &rig, &slopes, rotation_rad_q30, true, &found));
 }
 
 static void frames_of_long_ago_count_less(void)
 {
-    const double turn_deg[3] = {0.01, 0.02, 0.01};
-    struct ih_rotation_estimate_turn before;
+    const double rotation_deg[3] = {0.01, 0.02, 0.01};
+    struct ih_rotation_estimate_result before;
 
     for (int frame = 0; frame < IH_ROTATION_ESTIMATE_FRAMES_MAX - 1; frame++) {
-        add_frame(turn_deg);
+        add_frame(rotation_deg);
     }
     ih_rotation_estimate_forget(&places);
     TEST_ASSERT_EQUAL_INT32(IH_ROTATION_ESTIMATE_FRAMES_MAX - 1, places.frame_count);
-    add_frame(turn_deg);
+    add_frame(rotation_deg);
     find(straight, false);
     before = found;
     ih_rotation_estimate_forget(&places);
     TEST_ASSERT_EQUAL_INT32(IH_ROTATION_ESTIMATE_FRAMES_MAX * 3 / 4, places.frame_count);
     find(straight, false);
     for (int axis = 0; axis < 3; axis++) {
-        IH_TEST_WITHIN(1e-3, deg_of(before.turn_rad_q30[axis]), deg_of(found.turn_rad_q30[axis]),
-                       "turn", axis);
+        IH_TEST_WITHIN(1e-3, deg_of(before.rotation_rad_q30[axis]),
+                       deg_of(found.rotation_rad_q30[axis]), "turn", axis);
     }
 }
 
@@ -352,7 +354,7 @@ static void a_change_is_found_and_chance_is_none(void)
     double square[3] = {0, 0, 0};
 
     for (int run = 0; run < 80; run++) {
-        const double *turn_deg = turns_deg[run % 4];
+        const double *rotation_deg = turns_deg[run % 4];
         double own_px[IH_SLOTS];
         setUp();
         random_source.state = (uint64_t)run;
@@ -369,7 +371,7 @@ static void a_change_is_found_and_chance_is_none(void)
             standing_px[slot] += own_px[slot];
         }
         for (int frame = 0; frame < 6; frame++) {
-            add_frame(turn_deg);
+            add_frame(rotation_deg);
             ih_rotation_estimate_add(&late, &labels, &rig, &slopes, REACH_PX_Q12);
         }
         memset(&difference, IH_TEST_FILL, sizeof difference);
@@ -378,12 +380,12 @@ static void a_change_is_found_and_chance_is_none(void)
         TEST_ASSERT_TRUE(found.is_weak_seen);
         TEST_ASSERT_TRUE((found.sure_rad_q30 > 0) == (run % 4 > 0));
         for (int axis = 0; axis < 3; axis++) {
-            double part_deg = deg_of(found.turn_rad_q30[axis]);
+            double part_deg = deg_of(found.rotation_rad_q30[axis]);
             if (run % 4 == 0) {
                 square[axis] += pow(part_deg / deg_of(found.sigma_rad_q30[axis]), 2) / 20;
-            } else if (turn_deg[axis] != 0) {
+            } else if (rotation_deg[axis] != 0) {
                 /* Tukey's weights are not linear: half too much, which settling takes back. */
-                IH_TEST_WITHIN(0.45, 1.25, part_deg / turn_deg[axis], "share", run);
+                IH_TEST_WITHIN(0.45, 1.25, part_deg / rotation_deg[axis], "share", run);
             }
         }
     }
@@ -395,14 +397,14 @@ static void a_change_is_found_and_chance_is_none(void)
 /* Only axes that are sure count: one that hardly shows may be anywhere. */
 static void what_is_sure_is_told_apart(void)
 {
-    const double turn_deg[3] = {0.01, 0.03, 0};
+    const double rotation_deg[3] = {0.01, 0.03, 0};
 
     for (int frame = 0; frame < 60; frame++) {
-        add_frame(turn_deg);
+        add_frame(rotation_deg);
     }
     find(straight, false);
-    TEST_ASSERT_GREATER_THAN_INT32(found.turn_rad_q30[0], found.turn_rad_q30[1]);
-    TEST_ASSERT_INT32_WITHIN(1, found.turn_rad_q30[0], found.sure_rad_q30);
+    TEST_ASSERT_GREATER_THAN_INT32(found.rotation_rad_q30[0], found.rotation_rad_q30[1]);
+    TEST_ASSERT_INT32_WITHIN(1, found.rotation_rad_q30[0], found.sure_rad_q30);
 }
 
 static void few_dots_say_nothing(void)

@@ -39,9 +39,9 @@ static void rays_turn_as_rodrigues_says(void)
     int i, slot, axis;
 
     for (i = 0; i < IH_TEST_COUNT(turns_deg); i++) {
-        int32_t turn_rad_q30[3];
-        turn_of(turns_deg[i], turn_rad_q30);
-        ih_rotation_vote_calibration(&vector_rigs[1], turn_rad_q30, &turned);
+        int32_t rotation_rad_q30[3];
+        turn_of(turns_deg[i], rotation_rad_q30);
+        ih_rotation_vote_calibration(&vector_rigs[1], rotation_rad_q30, &turned);
         for (slot = 0; slot < IH_SLOTS; slot++) {
             double ray[3];
             turned_ray(&vector_rigs[1], slot, turns_deg[i], ray);
@@ -62,11 +62,11 @@ static void slopes_are_what_a_turn_moves_across(void)
         use_rig(rigs[i]);
         for (slot = 0; slot < IH_SLOTS; slot += 7) {
             for (axis = 0; axis < 3; axis++) {
-                double turn_deg[3] = {0, 0, 0};
+                double rotation_deg[3] = {0, 0, 0};
                 const struct ih_line *line = &rig.line[slot];
                 double place[2], across;
-                turn_deg[axis] = 0.001;
-                place_at_infinity(&vector_rigs[rigs[i]], slot, turn_deg, place);
+                rotation_deg[axis] = 0.001;
+                place_at_infinity(&vector_rigs[rigs[i]], slot, rotation_deg, place);
                 across = (place[1] - line->infinity_v_px_q12 / 4096.0) * line->dir_u_q30 / Q30 -
                          (place[0] - line->infinity_u_px_q12 / 4096.0) * line->dir_v_q30 / Q30;
                 /* The line itself is rounded: 2 steps of 1/4096 px over 17 microradians. */
@@ -77,7 +77,7 @@ static void slopes_are_what_a_turn_moves_across(void)
     }
 }
 
-static void dots_elect_the_turn(void)
+static void dots_elect_the_rotation(void)
 {
     static const double turns_deg[][3] = {{0.3, 0, 0},        {-0.3, 0, 0},     {0, 0, 0.3},
                                           {0.17, -0.2, 0.15}, {-0.2, 0.2, 0.1}, {0.5, 0.1, -0.3}};
@@ -95,7 +95,7 @@ static void dots_elect_the_turn(void)
             ih_rotation_vote_elect(&votes, &rig, &winner);
             for (axis = 0; axis < 3; axis++) {
                 IH_TEST_WITHIN(limit_deg[axis], turns_deg[i][axis],
-                               winner.turn_rad_q30[axis] / Q30 / DEG, "turn", 10 * i + axis);
+                               winner.rotation_rad_q30[axis] / Q30 / DEG, "turn", 10 * i + axis);
             }
             TEST_ASSERT_GREATER_THAN_INT32(winner.vote_of_none * 5 / 4, winner.vote);
         }
@@ -130,7 +130,7 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(rays_turn_as_rodrigues_says);
     RUN_TEST(slopes_are_what_a_turn_moves_across);
-    RUN_TEST(dots_elect_the_turn);
+    RUN_TEST(dots_elect_the_rotation);
     RUN_TEST(a_rig_that_fits_elects_hardly_another);
     RUN_TEST(no_dots_no_votes);
     return UNITY_END();
