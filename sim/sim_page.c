@@ -205,7 +205,7 @@ static void write_camera(struct app_write *write, const struct ih_calibration *c
     app_write_close(write, '}');
 }
 
-/* What scores are held against; the paper's limits stand in each trace. */
+/* What scores are compared with; the paper's limits are in each trace. */
 static void write_limits(struct app_write *write, const struct ih_tracks_params *params)
 {
     app_write_key(write, "limits");

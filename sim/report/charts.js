@@ -34,13 +34,13 @@ const Charts = (() => {
   function datasets(axis) {
     const at = (frame, mm) => ({ x: frame.time_s, y: mm ? mm[axis] : null });
     const timed = frames.filter((f) => f.time_s !== null);
-    const carried = timed.map((f) => Boolean(f.selected && f.selected.predicted));
+    const predicted = timed.map((f) => Boolean(f.selected && f.selected.predicted));
     const few = timed.length <= 150;
     return [
       { label: "found", data: timed.map((f) => at(f, f.selected && f.selected.centre_mm)), borderColor: colour("accent"),
-        backgroundColor: timed.map((_, i) => carried[i] ? colour("panel") : colour("accent")), borderWidth: 2,
-        pointRadius: timed.map((_, i) => carried[i] ? 4 : few ? 2 : 0), pointBorderColor: colour("accent"),
-        pointBackgroundColor: timed.map((_, i) => carried[i] ? colour("panel") : colour("accent")), pointBorderWidth: 1.5 },
+        backgroundColor: timed.map((_, i) => predicted[i] ? colour("panel") : colour("accent")), borderWidth: 2,
+        pointRadius: timed.map((_, i) => predicted[i] ? 4 : few ? 2 : 0), pointBorderColor: colour("accent"),
+        pointBackgroundColor: timed.map((_, i) => predicted[i] ? colour("panel") : colour("accent")), pointBorderWidth: 1.5 },
       { label: "truth", data: timed.map((f) => at(f, Data.truthMm(f))), borderColor: colour("truth"),
         borderDash: [6, 4], borderWidth: 2, pointRadius: 0 },
     ];

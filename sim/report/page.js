@@ -23,7 +23,7 @@
     if (!frame.verdict) return head;
     const v = frame.verdict;
     if (v.selected_right) return `${head}: right${v.error_mm !== undefined ? `, ${v.error_mm} mm off` : ", the seat is empty"}`;
-    return `${head}: not right, ${!v.head_there ? "nobody is there" : frame.selected ? "it is elsewhere" : "there is one"} (${v.outcome})`;
+    return `${head}: not right, ${!v.head_there ? "nobody is there" : frame.selected ? "it is elsewhere" : "there is one"} (${v.outcome === "not done" ? "no detection" : v.outcome})`;
   }
 
   function report(frame) {

@@ -1,5 +1,5 @@
 "use strict";
-/* tables - values beside the limits that they were held against. Text only ever enters as text. */
+/* tables - values beside the limits that they were compared with. Text only ever enters as text. */
 const Tables = (() => {
   function element(name, attributes = {}, ...children) {
     const e = document.createElement(name);
@@ -180,7 +180,7 @@ const Tables = (() => {
     const nests = trace ? trace.heads.hypothesis : [], dir = Data.dirs[frame.dir];
     into.parentElement.hidden = nests.length === 0;
     text.textContent = nests.length === 0 ? "There are none in this frame."
-      : "Each value stands above its limit. The first test that fails, in this order, is the reason; later ones are shown all the same." +
+      : "Below each value is its limit. The first test that fails, in this order, is the reason; later ones are shown too." +
         (dir.paper ? "" : " With the whole method a nest is only evidence: the scores above decide.");
     const head = ["Nest", "By the paper", "Area mm²", "Curvature mm", "Extent mm", "Height²/width²", "Points on it", "Behind, above", "Behind, beside", "Near, below"];
     fillCards(into, "Nests and the tests of the paper", head, nests.map((h, i) => element("tr", {},

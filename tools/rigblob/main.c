@@ -17,9 +17,9 @@ enum status { STATUS_GOOD = 0, STATUS_INPUT = 1, STATUS_USAGE = 2 };
 static const char help_text[] =
     "rigblob RIG OUT\n"
     "rigblob --show BLOB\n"
-    "Write the rig file RIG (rig.json, docs/contract.md) as a blob for boards without JSON, or say "
-    "what\n"
-    "is in one. A rig that the core refuses is refused here. OUT is there whole or not at all.\n"
+    "Write the rig file RIG (rig.json, docs/contract.md) as a binary blob for boards\n"
+    "without JSON, or print what is in one. A rig that the core refuses is refused\n"
+    "here. OUT is written completely or not at all.\n"
     "\n"
     "  --show     print the blob's numbers, one to a line\n"
     "  --help     this text\n"
