@@ -8,7 +8,7 @@
  *      box 13x13, findContours, weighted centres; the surface's normal equations and their factor in float,
  *      with two solutions for each robust pass of what is left in double (without the second one its worst node is
  *      6 to 14 mm off in frames, as the condition number is beyond 10^6; with it 0.14 mm at most);
- *      whole contours by their moments; parts of as many steps side by side, in vectors of double, and
+ *      whole contours by their moments; arcs of as many steps side by side, in vectors of double, and
  *      only what passes without a root is looked at closely; scan and fits in vectors of float over all
  *      rays that matter (with gcc -O3, v3, 0.4 of what A's cost, ray by ray and in double).
  *
@@ -114,7 +114,7 @@ struct peer_ellipse {
     double area, x, y; /* grid steps */
 };
 
-/* A part of an outline that is an ellipse. */
+/* An arc of an outline that is an ellipse. */
 struct peer_arc {
     int from, to;
     double merit;
@@ -196,11 +196,11 @@ void peer_find_hypotheses(peer &p);
 void peer_contours(const peer_grid &surface_mm, double level_mm, std::vector<peer_contour> &out);
 bool peer_ellipse_whole(peer_kind kind, const peer_contour &contour, peer_ellipse &out);
 bool peer_outline_make(const peer_contour &contour, peer_outline &out);
-/* All parts that are ellipses, wherever the minimum is. */
+/* All arcs that are ellipses, wherever the minimum is. */
 void peer_arcs(peer_kind kind, const peer_outline &outline, std::vector<peer_arc> &out);
 /* The best of them that winds round the position; none: nullptr. */
 const peer_arc *peer_arc_around(const peer_outline &outline, const std::vector<peer_arc> &arcs,
-                                cv::Point2f place);
+                                cv::Point2f position);
 double peer_near_mm(const std::vector<peer_point> &points);
 bool peer_is_visible(const peer &p, cv::Point2d normalised);
 void peer_fill_lanes(peer &p);

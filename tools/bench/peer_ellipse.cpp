@@ -131,7 +131,7 @@ void add_arc(const peer_outline &r, int from, int to, std::vector<peer_arc> &out
     }
 }
 
-/* Peer B: all parts of as many steps side by side; what passes without a root is looked at closely. */
+/* Peer B: all arcs of as many steps side by side; what passes without a root is looked at closely. */
 void add_arcs_of(const peer_outline &r, int steps, std::vector<peer_arc> &out)
 {
     using lanes = Eigen::Array<double, POINTS, 1>;
@@ -238,10 +238,10 @@ void peer_arcs(peer_kind kind, const peer_outline &outline, std::vector<peer_arc
 }
 
 const peer_arc *peer_arc_around(const peer_outline &r, const std::vector<peer_arc> &arcs,
-                                cv::Point2f place)
+                                cv::Point2f position)
 {
     int before[2 * POINTS] = {0}; /* how often the edges before a point wind round the position */
-    const double x = static_cast<double>(place.x), y = static_cast<double>(place.y);
+    const double x = static_cast<double>(position.x), y = static_cast<double>(position.y);
     auto winding = [&r, x, y](int from, int to) {
         double px = r.x[from] - x, py = r.y[from] - y, qx = r.x[to] - x, qy = r.y[to] - y;
         return winding_of(px * qy - qx * py, py, qy);

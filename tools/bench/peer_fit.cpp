@@ -67,12 +67,13 @@ double ring_value(const peer_ray &ray, double centre_mm)
 
 /* Distance to first order at a position in the ellipsoid's units, and its derivatives by centre and
  * logarithms of the semi-axes. */
-bool distance_row(const peer_head &head, const double place[3], double &residual_mm, vector6 &row)
+bool distance_row(const peer_head &head, const double position[3], double &residual_mm,
+                  vector6 &row)
 {
     double f2 = 0, length2 = 0, g[3];
     for (int axis = 0; axis < 3; axis++) {
-        g[axis] = place[axis] / head.semi_mm[axis];
-        f2 += place[axis] * place[axis];
+        g[axis] = position[axis] / head.semi_mm[axis];
+        f2 += position[axis] * position[axis];
         length2 += g[axis] * g[axis];
     }
     double f = std::sqrt(f2), length = std::sqrt(length2);
@@ -82,7 +83,7 @@ bool distance_row(const peer_head &head, const double place[3], double &residual
     residual_mm = (f - 1) * f / length;
     for (int axis = 0; axis < 3; axis++) {
         row[axis] = -g[axis] / length;
-        row[3 + axis] = -place[axis] * place[axis] / length;
+        row[3 + axis] = -position[axis] * position[axis] / length;
     }
     return true;
 }
@@ -100,19 +101,19 @@ struct normal_equations {
 
 void add_point(const peer_head &head, const peer_ray &ray, double scale_mm, normal_equations &out)
 {
-    double place[3], residual;
+    double position[3], residual;
     vector6 row;
     for (int axis = 0; axis < 3; axis++) {
-        place[axis] = (ray.point_mm[axis] - head.centre_mm[axis]) / head.semi_mm[axis];
-        if (std::abs(place[axis]) > REACH) {
+        position[axis] = (ray.point_mm[axis] - head.centre_mm[axis]) / head.semi_mm[axis];
+        if (std::abs(position[axis]) > REACH) {
             return;
         }
     }
-    if (!distance_row(head, place, residual, row) || std::abs(residual) > 8 * scale_mm) {
+    if (!distance_row(head, position, residual, row) || std::abs(residual) > 8 * scale_mm) {
         return;
     }
     double sum = 1 + residual * residual / (scale_mm * scale_mm);
-    double low = 1 - 0.5 * std::min(std::max((place[1] - 0.5) / 0.3, 0.0), 1.0);
+    double low = 1 - 0.5 * std::min(std::max((position[1] - 0.5) / 0.3, 0.0), 1.0);
     out.add(row, residual, low / (sum * sum));
 }
 
@@ -231,20 +232,20 @@ using rows = Eigen::Matrix<float, peer_lanes::SizeAtCompileTime, 6>;
 
 /* Residuals and derivatives of all rays at their positions, in whose units the ellipsoid is a sphere. */
 template <typename T>
-void distance_rows(const peer_head &head, const T place[3], peer_lanes &radius,
+void distance_rows(const peer_head &head, const T position[3], peer_lanes &radius,
                    peer_lanes &residual, rows &row)
 {
     peer_lanes gradient[3];
     for (int axis = 0; axis < 3; axis++) {
-        gradient[axis] = place[axis] * static_cast<float>(1 / head.semi_mm[axis]);
+        gradient[axis] = position[axis] * static_cast<float>(1 / head.semi_mm[axis]);
     }
     const peer_lanes inverse =
         (gradient[0].square() + gradient[1].square() + gradient[2].square()).max(1e-9F).rsqrt();
-    radius = (place[0].square() + place[1].square() + place[2].square()).sqrt();
+    radius = (position[0].square() + position[1].square() + position[2].square()).sqrt();
     residual = (radius - 1) * radius * inverse;
     for (int axis = 0; axis < 3; axis++) {
         row.col(axis) = -gradient[axis] * inverse;
-        row.col(3 + axis) = -place[axis].square() * inverse;
+        row.col(3 + axis) = -position[axis].square() * inverse;
     }
 }
 
@@ -265,20 +266,20 @@ void add_rows(const rows &row, const peer_lanes &residual, const peer_lanes &wei
 void add_rays_lanes(const peer &p, const peer_head &head, double scale_mm, normal_equations &out)
 {
     const peer_ray_lanes &rays = p.lanes;
-    peer_lanes place[3], radius, residual;
+    peer_lanes position[3], radius, residual;
     rows row;
     for (int axis = 0; axis < 3; axis++) {
         const float scale = static_cast<float>(1 / head.semi_mm[axis]);
-        place[axis] = (rays.point_mm[axis] - static_cast<float>(head.centre_mm[axis])) * scale;
+        position[axis] = (rays.point_mm[axis] - static_cast<float>(head.centre_mm[axis])) * scale;
     }
-    distance_rows(head, place, radius, residual, row);
+    distance_rows(head, position, radius, residual, row);
     const float scale = static_cast<float>(scale_mm);
     const peer_lanes reach =
-        static_cast<float>(REACH) - place[0].abs().max(place[1].abs()).max(place[2].abs());
+        static_cast<float>(REACH) - position[0].abs().max(position[1].abs()).max(position[2].abs());
     const peer_lanes valid =
         rays.seen *
         above_0(reach.min(8 * scale - residual.abs()).min(radius - static_cast<float>(RADIUS_MIN)));
-    const peer_lanes low = 1 - ((place[1] - 0.5F) * (0.5F / 0.3F)).max(0.0F).min(0.5F);
+    const peer_lanes low = 1 - ((position[1] - 0.5F) * (0.5F / 0.3F)).max(0.0F).min(0.5F);
     const peer_lanes robust = ((residual * (1 / scale)).square() + 1).inverse();
     add_rows(row, residual, valid * low * robust.square(), out);
 

@@ -34,7 +34,7 @@ double distance_mm(const peer_head &a, const peer_head &b)
 }
 
 /* A mean head behind a slot's point. */
-struct place {
+struct candidate {
     peer_head head;
     bool is_there, is_scored, is_spread;
 };
@@ -49,13 +49,13 @@ struct scored {
 };
 
 struct scanner {
-    std::array<place, PEER_SLOTS> places;
+    std::array<candidate, PEER_SLOTS> candidates;
     std::priority_queue<scored> best; /* of those that have a score */
 };
 
 void score_position(const peer &p, scanner &s, int slot)
 {
-    place &at = s.places[static_cast<size_t>(slot)];
+    candidate &at = s.candidates[static_cast<size_t>(slot)];
     if (at.is_there && !at.is_scored) {
         at.is_scored = true;
         at.head.score = peer_scan_score(p, at.head);
@@ -70,7 +70,7 @@ void begin_scan(const peer &p, scanner &s)
     s.best = {};
     for (int slot = 0; slot < PEER_SLOTS; slot++) {
         const peer_ray &ray = p.rays[static_cast<size_t>(slot)];
-        place &at = s.places[static_cast<size_t>(slot)];
+        candidate &at = s.candidates[static_cast<size_t>(slot)];
         at.is_there = ray.state == peer_ray_state::seen;
         if (!at.is_there) {
             continue;
@@ -106,7 +106,7 @@ void scan(const peer &p, std::vector<peer_head> &out)
     begin_scan(p, s);
     while (out.size() < first + POSITIONS_MAX && !s.best.empty()) {
         const scored best = s.best.top();
-        place &at = s.places[static_cast<size_t>(best.slot)];
+        candidate &at = s.candidates[static_cast<size_t>(best.slot)];
         if (at.is_there && !at.is_spread) {
             at.is_spread = true;
             score_around(p, s, best.slot);
@@ -115,7 +115,7 @@ void scan(const peer &p, std::vector<peer_head> &out)
         s.best.pop();
         if (at.is_there) {
             out.push_back(at.head);
-            for (place &other : s.places) {
+            for (candidate &other : s.candidates) {
                 other.is_there = other.is_there && distance_mm(at.head, other.head) > SPACING_MM;
             }
         }
@@ -194,9 +194,9 @@ void peer_find_hypotheses(peer &p)
     const peer_head last = p.head;
     p.has_head = false;
     p.head.score = SCORE_MIN;
-    for (const peer_head &place : places) {
-        if (peer_promise(p, place) >= PROMISE_MIN) {
-            try_start(p, place, starts);
+    for (const peer_head &head : places) {
+        if (peer_promise(p, head) >= PROMISE_MIN) {
+            try_start(p, head, starts);
         }
     }
     if (had_head) {

@@ -30,8 +30,8 @@ struct offer {
 };
 
 struct table {
-    std::vector<cv::Point2d> place; /* undistorted pixels, sorted by v */
-    std::vector<int> order;         /* dots by v */
+    std::vector<cv::Point2d> position; /* undistorted pixels, sorted by v */
+    std::vector<int> order;            /* dots by v */
     std::vector<candidate> candidates[PEER_SLOTS];
     int choice[PEER_SLOTS];  /* -1: open */
     std::vector<bool> taken; /* by dot */
@@ -51,8 +51,8 @@ void undistort(const peer &p, table &t)
     std::sort(t.order.begin(), t.order.end(), [&raw](int a, int b) {
         return raw[static_cast<size_t>(a)].y < raw[static_cast<size_t>(b)].y;
     });
-    t.place = std::move(raw);
-    t.taken.assign(t.place.size(), false);
+    t.position = std::move(raw);
+    t.taken.assign(t.position.size(), false);
 }
 
 void find_candidates(const peer_line &line, table &t, std::vector<candidate> &out)
@@ -62,11 +62,11 @@ void find_candidates(const peer_line &line, table &t, std::vector<candidate> &ou
     double margin = PERP_MAX_PX + RANGE_MARGIN_PX;
     auto from = std::lower_bound(
         t.order.begin(), t.order.end(), std::min(v_far, v_near) - margin,
-        [&t](int dot, double v) { return t.place[static_cast<size_t>(dot)].y < v; });
+        [&t](int dot, double v) { return t.position[static_cast<size_t>(dot)].y < v; });
     double v_last = std::max(v_far, v_near) + margin;
-    for (; from != t.order.end() && t.place[static_cast<size_t>(*from)].y <= v_last; ++from) {
-        cv::Point2d place = t.place[static_cast<size_t>(*from)];
-        double du = place.x - line.infinity_u, dv = place.y - line.infinity_v;
+    for (; from != t.order.end() && t.position[static_cast<size_t>(*from)].y <= v_last; ++from) {
+        cv::Point2d position = t.position[static_cast<size_t>(*from)];
+        double du = position.x - line.infinity_u, dv = position.y - line.infinity_v;
         double along = du * line.dir_u + dv * line.dir_v;
         double perp = dv * line.dir_u - du * line.dir_v;
         if (std::abs(perp) <= PERP_MAX_PX && along >= line.t_far_px - RANGE_MARGIN_PX &&
@@ -78,10 +78,10 @@ void find_candidates(const peer_line &line, table &t, std::vector<candidate> &ou
 
 double rectangle_error2(const table &t, const candidate *const corner[4])
 {
-    cv::Point2d second = t.place[static_cast<size_t>(corner[0]->dot)] -
-                         t.place[static_cast<size_t>(corner[1]->dot)] -
-                         t.place[static_cast<size_t>(corner[2]->dot)] +
-                         t.place[static_cast<size_t>(corner[3]->dot)];
+    cv::Point2d second = t.position[static_cast<size_t>(corner[0]->dot)] -
+                         t.position[static_cast<size_t>(corner[1]->dot)] -
+                         t.position[static_cast<size_t>(corner[2]->dot)] +
+                         t.position[static_cast<size_t>(corner[3]->dot)];
     double perp2 = 0;
     for (int i = 0; i < 4; i++) {
         perp2 += corner[i]->perp_px * corner[i]->perp_px;

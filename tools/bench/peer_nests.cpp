@@ -114,9 +114,9 @@ void study_contour(peer_kind kind, const peer_contour &contour, double area, dou
         s.ellipse = {area, 0, 0}; /* a tip may be anywhere */
     }
     s.outlined = !s.whole && !s.is_tip && peer_outline_make(contour, s.outline);
-    s.parts.clear();
+    s.arcs.clear();
     if (s.outlined) {
-        peer_arcs(kind, s.outline, s.parts);
+        peer_arcs(kind, s.outline, s.arcs);
     }
 }
 
@@ -145,7 +145,7 @@ void find_supports(const peer &p, const std::vector<peer_contour> &contours, dou
                 to = {true, true, true, &contour, s.ellipse, 0};
                 continue;
             }
-            const peer_arc *arc = s.outlined ? peer_arc_around(s.outline, s.parts, node) : nullptr;
+            const peer_arc *arc = s.outlined ? peer_arc_around(s.outline, s.arcs, node) : nullptr;
             if (arc != nullptr && (!to.found || arc->merit > to.merit)) {
                 to = {true, true, false, &contour, arc->ellipse, arc->merit};
             }

@@ -53,8 +53,8 @@ void add_sample(peer &p, double x, double y, double depth_mm, double weight)
 /* Within the frame, in a block that is not over-exposed. */
 bool peer_is_visible(const peer &p, cv::Point2d normalised)
 {
-    cv::Point2d place = peer_rig_distort(p.rig, normalised);
-    int u = static_cast<int>(std::floor(place.x)), v = static_cast<int>(std::floor(place.y));
+    cv::Point2d position = peer_rig_distort(p.rig, normalised);
+    int u = static_cast<int>(std::floor(position.x)), v = static_cast<int>(std::floor(position.y));
     if (u < 0 || v < 0 || u >= p.rig.width || v >= p.rig.height) {
         return false;
     }
@@ -115,9 +115,9 @@ void peer_find_samples(peer &p)
             add_sample(p, point.x, point.y, depth_mm, 1);
             p.nearest_sample_mm = std::min(p.nearest_sample_mm, depth_mm);
         } else if (!point.seen && near.seen < FILL_NEIGHBOURS) {
-            cv::Point2d place = peer_rig_dot_at(p.rig, slot, clip_mm);
-            if (peer_is_visible(p, place)) {
-                add_sample(p, place.x, place.y, clip_mm, FILL_WEIGHT);
+            cv::Point2d position = peer_rig_dot_at(p.rig, slot, clip_mm);
+            if (peer_is_visible(p, position)) {
+                add_sample(p, position.x, position.y, clip_mm, FILL_WEIGHT);
             }
         }
     }
