@@ -280,7 +280,7 @@ layout: ## files of at most 520 lines, vectors in simd alone, at most 1,000 file
 links: ## links and names of files in the documents lead somewhere
 	@/usr/bin/python3 tests/checks/links.py
 
-lint: sanitize layout links ## clang-tidy, cppcheck, MISRA C, gcc -fanalyzer; what they may find: docs/misra.md
+lint: sanitize words layout links ## clang-tidy, cppcheck, MISRA C, gcc -fanalyzer; what they may find: docs/misra.md
 	@tools/setup.sh lint
 	@/usr/bin/python3 tests/checks/static.py $(BUILD)/sanitize
 	@/usr/bin/python3 tests/checks/lint_commands.py $(BUILD)/sanitize $(BUILD)/lint

@@ -95,7 +95,7 @@ static bool is_lost(const struct ih_dots *dots, const struct ih_labels *labels, 
            ih_dots_is_bright(dots, (int32_t)(sum_u / count >> 12), (int32_t)(sum_v / count >> 12));
 }
 
-/* Over-exposed blocks as a share of the frame, in slots, an eighth of it. */
+/* Over-exposed blocks as a fraction of the frame, in slots, an eighth of it. */
 static int32_t bright_slots(const struct ih_dots *dots, int32_t width, int32_t height)
 {
     int32_t bright = 0;

@@ -2,10 +2,10 @@
  *
  * In:    dots and labels of a frame that was taken with the exposure and duty in the state.
  * Out:   the same two for the next frame, within their limits.
- * Way:   ih_exposure_look sums a frame up: how many dots are labelled, how high the weak and the
+ * Method: ih_exposure_look sums a frame up: how many dots are labelled, how high the weak and the
  *        strong ones among them are (a quarter and nine tenths up the distribution of R), and how
  *        many are lost to over-exposure: missing slots whose place, the mean of at least 3 labelled
- *        ones in the 5x5 around it, is over-exposed. It is at least an eighth of the share of
+ *        ones in the 5x5 around it, is over-exposed. It is at least an eighth of the fraction of
  *        over-exposed blocks: in the middle of a large burnt area no place is known.
  *        ih_exposure_next then takes the first that holds:
  *        1. More lost than lost_max: a shorter exposure, and as much more duty, so that the dots stay
@@ -39,7 +39,7 @@
 
 struct ih_exposure_params {
     int32_t exposure_min_us, exposure_max_us; /* 1 .. 1,000,000 */
-    int32_t duty_min_q8, duty_max_q8; /* share of the exposure with the laser on, 1 .. 256 */
+    int32_t duty_min_q8, duty_max_q8; /* fraction of the exposure with the laser on, 1 .. 256 */
     int32_t weak_grey_q4;             /* R in 8-bit grey levels that weak dots should have */
     int32_t strong_grey_q4;           /* and that strong ones should not exceed */
     int32_t lost_max;                 /* slots lost to over-exposure that are accepted */

@@ -21,7 +21,7 @@
 /* Frames of each step of settling. Dots farther from their line than reach say nothing about a turn. */
 #define SETTLE_STEPS 3
 static const int32_t settle_frames[SETTLE_STEPS] = {4, 4, 24};
-/* What another search takes, which the last step then has less, down to a look: a rig is told of after 41 frames, with
+/* What another search takes, which the last step then has less, down to a look: a rotation is reported after 41 frames, with
  * two more searches 45. */
 #define SEARCH_AGAIN_FRAMES (IH_HEALTH_SEARCH + 4 + 4)
 static const int32_t settle_reach_px_q12[SETTLE_STEPS] = {4915, 2458, 1229};

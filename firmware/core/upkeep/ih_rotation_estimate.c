@@ -14,7 +14,7 @@
 /* What an estimate needs: dots, and slots, whose scatter is the uncertainty. */
 #define WEIGHT_MIN_Q8 (200 << 8)
 #define SLOTS_MIN 40
-/* How far a slot errs in every frame alike: what is counted when a turn is told; when it is asked whether
+/* How far a slot errs in every frame alike: what is used to report a rotation; to decide whether
  * there is one at all; and whether it has changed, where what was calibrated badly is in both. */
 #define SLOT_PX_Q12 123        /* 0.03 px */
 #define UNCERTAINTY_PX_Q12 492 /* 0.12 px */

@@ -162,7 +162,7 @@ static void put_candidate(int32_t slot, int32_t dot, int32_t perp_px_q12)
 }
 
 /* The last corner is looked for along its line: wherever that leads, no seed may be lost. */
-static void turn_line(int32_t slot, double angle_rad)
+static void rotate_line(int32_t slot, double angle_rad)
 {
     rig.line[slot] = (struct ih_line){.infinity_u_px_q12 = 200 * 4096,
                                       .infinity_v_px_q12 = 100 * 4096,
@@ -240,7 +240,7 @@ static void the_best_rectangle_is_the_seed(void)
                 second = fmin(second, error);
             }
         }
-        turn_line(slot[3], pass * 0.1);
+        rotate_line(slot[3], pass * 0.1);
         is_seed = ih_label_seeds_find(&rig, &scratch, slot, &params, &offer);
         if (best < 1e9 && (fabs(best - 4096) < 2 || fabs(second - best - 2048) < 2)) {
             close++; /* roots are cut off */
@@ -285,7 +285,7 @@ static void seeds_end_at_their_limits(void)
             put_candidate(slot[3], 4, 0);
             place[3] = 2 * cases[i].best; /* the error is half of it */
             place[4] = 2 * cases[i].next;
-            turn_line(slot[3], (i + axis) % 4 * 0.5 * acos(-1.0));
+            rotate_line(slot[3], (i + axis) % 4 * 0.5 * acos(-1.0));
             IH_TEST_EQUAL(cases[i].is_seed,
                           ih_label_seeds_find(&rig, &scratch, slot, &params, &offer), "seed", i);
         }
@@ -343,7 +343,7 @@ static void label(int32_t row, int32_t column, int32_t inverse_depth_q36)
 }
 
 /* Some slots labelled near a plane of inverse depth, with steps. */
-static void label_some(double share)
+static void label_some(double fraction)
 {
     const double middle = between(1 << 24, 1 << 26), x = between(-400000, 400000);
     const double y = between(-400000, 400000);
@@ -351,7 +351,7 @@ static void label_some(double share)
 
     memset(scratch.inverse_depth_q36, 0, sizeof scratch.inverse_depth_q36);
     for (slot = 0; slot < IH_SLOTS; slot++) {
-        if (ih_test_unit(&random_source) < share) {
+        if (ih_test_unit(&random_source) < fraction) {
             const double step = between(0, 3) == 0 ? 3000000 : 0;
 
             label(slot / IH_GRID, slot % IH_GRID,

@@ -51,14 +51,14 @@ static bool make(void)
 
 /* Around (x, y): radius 1 + lobes of depth `lobe`, stretched across by a factor. */
 static void take_blob(double x, double y, double radius, double stretch, double lobe, int lobes,
-                      double turn, int32_t count, bool closed)
+                      double phase, int32_t count, bool closed)
 {
     static struct ih_vertex vertex[IH_ARCS_VERTICES_MAX];
     int32_t i;
 
     for (i = 0; i < count; i++) {
         const double angle = (closed ? 2 : 1.7) * acos(-1.0) * i / count;
-        const double r = radius * (1 + lobe * cos(lobes * angle + turn));
+        const double r = radius * (1 + lobe * cos(lobes * angle + phase));
         const double across = x + r * stretch * cos(angle), down = y + r * sin(angle);
 
         vertex[i] = (struct ih_vertex){(int16_t)lround(fmax(0, fmin(46, across)) * UNIT),
@@ -111,12 +111,12 @@ static struct measured measure(int32_t from, int32_t steps)
     return out;
 }
 
-struct tally {
+struct arc_counts {
     int32_t ellipses, kept, dropped;
 };
 
 /* Every part against the sieve. What crosses itself may be kept. */
-static void compare_all(bool simple, struct tally *tally)
+static void compare_all(bool simple, struct arc_counts *counts)
 {
     const double ratio_max = ih_test_from_q(params.ratio_arc_max_q16, 16);
     const double shape_min = ih_test_from_q(IH_ARCS_SHAPE_MIN_Q16, 16);
@@ -134,15 +134,15 @@ static void compare_all(bool simple, struct tally *tally)
 
             if (k >= IH_ARCS_STEPS_MIN && m.chord < chord_max - 0.01 && m.area > 0.51 &&
                 m.shape > shape_min && m.shape < shape_max && m.ratio < ratio_max) {
-                tally->ellipses++;
+                counts->ellipses++;
                 IH_TEST_EQUAL(1, kept, "an ellipse", from * 100 + k);
             }
             if (k < IH_ARCS_STEPS_MIN || m.chord > chord_max + 0.01 || m.area < 0.49 ||
                 (simple && m.area > 4.01 && m.trace > 1.03 * trace_max * m.area)) {
                 IH_TEST_EQUAL(0, kept, "no ellipse", from * 100 + k);
-                tally->dropped++;
+                counts->dropped++;
             }
-            tally->kept += kept;
+            counts->kept += kept;
         }
     }
 }
@@ -169,7 +169,7 @@ static int32_t count_promising(void)
 }
 
 /* Of so many arcs of 56 points: their number grows with the square. */
-static int32_t share_of(int32_t count)
+static int32_t scaled_count(int32_t count)
 {
     return count * points * points / (IH_ARCS_POINTS_MAX * IH_ARCS_POINTS_MAX);
 }
@@ -177,7 +177,7 @@ static int32_t share_of(int32_t count)
 static void the_sieve_drops_no_ellipse_and_keeps_little_else(void)
 {
     struct ih_test_random random = {7};
-    struct tally tally = {0, 0, 0};
+    struct arc_counts counts = {0, 0, 0};
     int32_t promising = 0;
     int i;
 
@@ -189,19 +189,19 @@ static void the_sieve_drops_no_ellipse_and_keeps_little_else(void)
         take_blob((double)ih_test_between(&random, 0, 46), (double)ih_test_between(&random, 0, 46),
                   radius, stretch, lobe, 1 + i % 5, i, 60 + i, i % 2 == 0);
         TEST_ASSERT_TRUE(make());
-        compare_all(true, &tally);
+        compare_all(true, &counts);
         promising += count_promising();
     }
-    TEST_ASSERT_GREATER_THAN(share_of(2000), tally.ellipses);
-    TEST_ASSERT_GREATER_THAN(share_of(100000), tally.dropped);
-    TEST_ASSERT_LESS_THAN(8 * tally.ellipses, tally.kept);
-    TEST_ASSERT_LESS_THAN(2 * tally.kept, promising); /* else fans do not sift */
+    TEST_ASSERT_GREATER_THAN(scaled_count(2000), counts.ellipses);
+    TEST_ASSERT_GREATER_THAN(scaled_count(100000), counts.dropped);
+    TEST_ASSERT_LESS_THAN(8 * counts.ellipses, counts.kept);
+    TEST_ASSERT_LESS_THAN(2 * counts.kept, promising); /* else fans do not sift */
 }
 
 /* With looser limits more is kept; without any, all that has an area. */
 static void limits_are_those_of_the_parameters(void)
 {
-    struct tally tally = {0, 0, 0};
+    struct arc_counts counts = {0, 0, 0};
     int i;
 
     for (i = 0; i < 4; i++) {
@@ -210,7 +210,7 @@ static void limits_are_those_of_the_parameters(void)
         params.chord_max_q16 = (1 + i) << 14;
         take_blob(23, 23, 18, 1.1, 0.15, 3, 1, 200, true);
         TEST_ASSERT_TRUE(make());
-        compare_all(true, &tally);
+        compare_all(true, &counts);
     }
     params.ratio_arc_max_q16 = 200 << 16;
     take_blob(23, 23, 5, 4.5, 0, 1, 0, 200, true);
@@ -226,7 +226,7 @@ static void walks_do_not_overflow(void)
 {
     static struct ih_vertex vertex[IH_ARCS_VERTICES_MAX];
     struct ih_test_random random = {83};
-    struct tally tally = {0, 0, 0};
+    struct arc_counts counts = {0, 0, 0};
     int32_t i, pass;
 
     for (pass = 0; pass < 60; pass++) {
@@ -241,9 +241,9 @@ static void walks_do_not_overflow(void)
         }
         take(vertex, IH_ARCS_VERTICES_MAX, pass % 4 < 2);
         TEST_ASSERT_TRUE(make());
-        compare_all(false, &tally);
+        compare_all(false, &counts);
     }
-    TEST_ASSERT_GREATER_THAN(share_of(10000), tally.dropped);
+    TEST_ASSERT_GREATER_THAN(scaled_count(10000), counts.dropped);
 }
 
 static int16_t on_grid_q9(double steps)
@@ -257,30 +257,30 @@ static void loops_that_cancel_do_not_overflow(void)
 {
     static struct ih_vertex vertex[400];
     struct ih_test_random random = {84};
-    struct tally tally = {0, 0, 0};
+    struct arc_counts counts = {0, 0, 0};
     int32_t pass, i;
 
     for (pass = 0; pass < 400; pass++) {
         const double near = 1 + (double)ih_test_between(&random, 0, 1000) / 100;
         const double far = near * (double)ih_test_between(&random, 800, 1100) / 1000;
-        const double turn = (double)ih_test_between(&random, 0, 628) / 100;
+        const double phase = (double)ih_test_between(&random, 0, 628) / 100;
         const double apart = (double)ih_test_between(&random, 0, 2200) / 100;
 
         for (i = 0; i < 200; i++) {
             const double angle = 2 * acos(-1.0) * i / 200;
 
             vertex[i] =
-                (struct ih_vertex){on_grid_q9(23 - apart * cos(turn) + near * cos(turn + angle)),
-                                   on_grid_q9(23 - apart * sin(turn) + near * sin(turn + angle))};
+                (struct ih_vertex){on_grid_q9(23 - apart * cos(phase) + near * cos(phase + angle)),
+                                   on_grid_q9(23 - apart * sin(phase) + near * sin(phase + angle))};
             vertex[200 + i] =
-                (struct ih_vertex){on_grid_q9(23 + apart * cos(turn) - far * cos(turn - angle)),
-                                   on_grid_q9(23 + apart * sin(turn) - far * sin(turn - angle))};
+                (struct ih_vertex){on_grid_q9(23 + apart * cos(phase) - far * cos(phase - angle)),
+                                   on_grid_q9(23 + apart * sin(phase) - far * sin(phase - angle))};
         }
         take(vertex, 400, true);
         TEST_ASSERT_TRUE(make());
-        compare_all(false, &tally);
+        compare_all(false, &counts);
     }
-    TEST_ASSERT_GREATER_THAN(share_of(10000), tally.dropped);
+    TEST_ASSERT_GREATER_THAN(scaled_count(10000), counts.dropped);
 }
 
 /* On a circle of many vertices the points are equal shares of its length apart; an open one ends at its last
@@ -345,19 +345,20 @@ static void too_few_or_too_many_vertices_are_not_searched(void)
     TEST_ASSERT_FALSE(make());
 }
 
-/* The number of points is a whole number of vectors within its bounds, whatever is asked for. */
+/* The number of points is a whole number of vectors within its bounds, whatever is given. */
 static void the_number_of_points_is_bounded(void)
 {
-    static const int32_t asked[] = {INT32_MIN, 0, 15, 16, 23, 31, 32, 39, 55, 56, 57, INT32_MAX};
+    static const int32_t given_count[] = {INT32_MIN, 0,  15, 16, 23, 31,
+                                          32,        39, 55, 56, 57, INT32_MAX};
     static const int32_t given[] = {16, 16, 16, 16, 16, 24, 32, 32, 48, 56, 56, 56};
     int i;
 
-    for (i = 0; i < IH_TEST_COUNT(asked); i++) {
-        params.point_count = asked[i];
+    for (i = 0; i < IH_TEST_COUNT(given_count); i++) {
+        params.point_count = given_count[i];
         take_blob(23, 23, 20, 1, 0, 1, 0, 200, false);
         TEST_ASSERT_TRUE(ih_arcs_make(&contours, &contour, &params, &arcs));
-        IH_TEST_EQUAL(given[i], arcs.point_count, "points", asked[i]);
-        IH_TEST_EQUAL(given[i], arcs.count, "in use", asked[i]);
+        IH_TEST_EQUAL(given[i], arcs.point_count, "points", given_count[i]);
+        IH_TEST_EQUAL(given[i], arcs.count, "in use", given_count[i]);
     }
 }
 

@@ -98,7 +98,7 @@ static bool on_border(struct ih_vertex v)
 }
 
 /* Two neighbours on a contour lie on the border of one cell. */
-static bool share_a_cell(struct ih_vertex a, struct ih_vertex b)
+static bool are_in_one_cell(struct ih_vertex a, struct ih_vertex b)
 {
     const int32_t cx = (a.x_q9 + b.x_q9) / 2 / UNIT, cy = (a.y_q9 + b.y_q9) / 2 / UNIT;
 
@@ -130,12 +130,12 @@ static void check_contour(const struct ih_contour *contour, int32_t index)
         if (!use_crossing(v[i])) {
             IH_TEST_EQUAL(0, 1, "a vertex on no crossing, or one used twice, in contour", index);
         }
-        if (i > 0 && !share_a_cell(v[i - 1], v[i])) {
+        if (i > 0 && !are_in_one_cell(v[i - 1], v[i])) {
             IH_TEST_EQUAL(0, 1, "a jump in contour", index);
         }
     }
     if (contour->closed) {
-        TEST_ASSERT_TRUE(share_a_cell(v[contour->vertex_count - 1], v[0]));
+        TEST_ASSERT_TRUE(are_in_one_cell(v[contour->vertex_count - 1], v[0]));
     } else {
         TEST_ASSERT_TRUE(on_border(v[0]) && on_border(v[contour->vertex_count - 1]));
     }
@@ -396,12 +396,12 @@ static void a_near_node_at_the_border_is_open(void)
 /* Two near nodes across a cell: one contour when the mean of the four is nearer, else two. */
 static void saddles_follow_the_mean(void)
 {
-    int32_t turn;
+    int32_t pass;
 
-    for (turn = 0; turn < 2; turn++) {
+    for (pass = 0; pass < 2; pass++) {
         flat_at(1000);
-        surface.depth_mm_q8[20][20 + turn] = 0;
-        surface.depth_mm_q8[21][21 - turn] = 0; /* the mean is 500 */
+        surface.depth_mm_q8[20][20 + pass] = 0;
+        surface.depth_mm_q8[21][21 - pass] = 0; /* the mean is 500 */
         cut(501);
         TEST_ASSERT_EQUAL_INT32(1, contours.contour_count);
         TEST_ASSERT_EQUAL_INT32(8, contours.vertex_count);

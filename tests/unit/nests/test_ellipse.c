@@ -440,7 +440,7 @@ static void take_box(int32_t width_q9, int32_t height_q9)
     take(corner, 4, true);
 }
 
-/* Half a grid cell is the least area; 255 the greatest ratio of the axes, here of 46 x 0.1 steps. */
+/* Half a grid cell is the smallest area; 255 the largest ratio of the axes, here of 46 x 0.1 steps. */
 static void areas_and_ratios_have_their_limits(void)
 {
     take_box(UNIT, UNIT / 2);
@@ -462,11 +462,11 @@ static void contours_have_eight_to_768_vertices(void)
     for (i = 0; i < IH_TEST_COUNT(counts); i++) {
         const int32_t n = counts[i];
         const struct ih_vertex place = {23 * UNIT, 22 * UNIT};
-        const double turn = 2 * acos(-1.0) / n;
+        const double step_angle = 2 * acos(-1.0) / n;
 
         for (k = 0; k < n; k++) {
-            vertex[k] = (struct ih_vertex){(int16_t)lround((23 + 20 * cos(k * turn)) * UNIT),
-                                           (int16_t)lround((22 + 20 * sin(k * turn)) * UNIT)};
+            vertex[k] = (struct ih_vertex){(int16_t)lround((23 + 20 * cos(k * step_angle)) * UNIT),
+                                           (int16_t)lround((22 + 20 * sin(k * step_angle)) * UNIT)};
         }
         take(vertex, n, true);
         IH_TEST_EQUAL(i == 1 || i == 2, find_part_around(place), "vertices", n);

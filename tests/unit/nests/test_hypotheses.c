@@ -53,10 +53,10 @@ void tearDown(void)
 {
 }
 
-/* An ellipse on the grid: middle and semi-axes in steps, a towards turn_deg. */
-static struct ih_ellipse make_ellipse(double x, double y, double a, double b, double turn_deg)
+/* An ellipse on the grid: middle and semi-axes in steps, a towards angle_deg. */
+static struct ih_ellipse make_ellipse(double x, double y, double a, double b, double angle_deg)
 {
-    const double c = cos(turn_deg * PI / 180), s = sin(turn_deg * PI / 180);
+    const double c = cos(angle_deg * PI / 180), s = sin(angle_deg * PI / 180);
     struct ih_ellipse out = {0};
 
     out.area_q16 = (int32_t)lround(ldexp(PI * a * b, 16));
@@ -234,19 +234,19 @@ static void proportions_are_those_of_the_deeper_slices(void)
 /* With nothing as deep as 30 mm the last slice is what there is. */
 static void proportions_of_a_shallow_nest_are_its_last_slices(void)
 {
-    int turn;
+    int pass;
 
     params.extent_min_mm = 0;
     params.area_min_mm2 = 0;
-    for (turn = 0; turn < 2; turn++) {
+    for (pass = 0; pass < 2; pass++) {
         struct ih_nest *nest = add_nest(20, 22, 850, 20, 250);
 
-        set_moments(nest, 0, 1 << 16, turn == 0 ? 100 << 16 : 1 << 14);
-        set_moments(nest, 1, 8 << 16, turn == 0 ? 4 << 16 : 16 << 16);
+        set_moments(nest, 0, 1 << 16, pass == 0 ? 100 << 16 : 1 << 14);
+        set_moments(nest, 1, 8 << 16, pass == 0 ? 4 << 16 : 16 << 16);
         select_heads();
-        IH_TEST_EQUAL(turn == 0 ? 32768 : 131072, hypotheses.hypothesis[0].upright_q16, "last",
-                      turn);
-        expect_alone(turn == 0 ? IH_REJECT_SHAPE : IH_ACCEPTED, "shallow");
+        IH_TEST_EQUAL(pass == 0 ? 32768 : 131072, hypotheses.hypothesis[0].upright_q16, "last",
+                      pass);
+        expect_alone(pass == 0 ? IH_REJECT_SHAPE : IH_ACCEPTED, "shallow");
     }
 }
 
@@ -270,30 +270,31 @@ static void proportions_are_sums_over_sums(void)
                    ih_test_from_q(hypotheses.hypothesis[0].upright_q16, 16), "sums", 0);
 }
 
-/* A turned ellipse is as tall as yy is, as wide as xx. */
+/* A rotated ellipse is as tall as yy is, as wide as xx. */
 static void long_heads_stand_upright(void)
 {
     const double limit = ih_test_from_q(params.upright_min_q16, 16);
-    int turn, k;
+    int angle_deg, k;
 
-    for (turn = 0; turn < 180; turn++) {
-        const double c = cos(turn * PI / 180), s = sin(turn * PI / 180);
+    for (angle_deg = 0; angle_deg < 180; angle_deg++) {
+        const double c = cos(angle_deg * PI / 180), s = sin(angle_deg * PI / 180);
         const double upright = (81 * s * s + 36 * c * c) / (81 * c * c + 36 * s * s);
         struct ih_nest *nest = add_head(20, 22, 850);
 
         for (k = 0; k < nest->slice_count; k++) {
-            nest->slice[k].ellipse = make_ellipse(20, 22, 9, 6, turn);
+            nest->slice[k].ellipse = make_ellipse(20, 22, 9, 6, angle_deg);
         }
         select_heads();
         /* Moments of at least 9 rounded to 2^-16, and the quotient of up to 2.25: one unit each. */
         IH_TEST_WITHIN(2.0 / 65536, upright,
-                       ih_test_from_q(hypotheses.hypothesis[0].upright_q16, 16), "upright", turn);
+                       ih_test_from_q(hypotheses.hypothesis[0].upright_q16, 16), "upright",
+                       angle_deg);
         expect_alone(upright >= limit ? IH_ACCEPTED : IH_REJECT_SHAPE, "long");
     }
 }
 
-/* The first test that fails is told: area before curvature before shape before outline. */
-static void the_first_failed_test_is_told(void)
+/* The first test that fails is reported: area before curvature before shape before outline. */
+static void the_first_failed_test_is_reported(void)
 {
     ih_hypotheses_params_default(&params); /* there are no samples: the outline always fails */
     set_moments(add_nest(20, 22, 850, 60, 1000), 0, 2 << 16, 1 << 16);
@@ -412,13 +413,13 @@ static void pixel_ellipses_match_the_closed_form(void)
 {
     const double step =
         ih_test_from_q(UNIT_Q28, 28) * IH_SURFACE_STEP_NUMERATOR / IH_SURFACE_STEP_DENOMINATOR;
-    int turn;
+    int pass;
 
-    for (turn = 0; turn < 360; turn++) {
+    for (pass = 0; pass < 360; pass++) {
         const struct ih_hypothesis *h = &hypotheses.hypothesis[0];
         const double fx = rig.calibration.fx_px_q16 / 65536.0 * step;
         const double fy = rig.calibration.fy_px_q16 / 65536.0 * step;
-        const double c = cos(turn * PI / 360), s = sin(turn * PI / 360);
+        const double c = cos(pass * PI / 360), s = sin(pass * PI / 360);
         const double a = 9.5, b = 6.25;
         const double uu = fx * fx * (a * a * c * c + b * b * s * s);
         const double uv = fx * fy * (a * a - b * b) * c * s;
@@ -430,18 +431,18 @@ static void pixel_ellipses_match_the_closed_form(void)
         nests.nest_count = 0;
         memset(&nests.nest[0], 0, sizeof nests.nest[0]);
         nest = add_head(20, 22, 850);
-        nest->slice[nest->slice_count - 1].ellipse = make_ellipse(20, 22, a, b, turn / 2.0);
+        nest->slice[nest->slice_count - 1].ellipse = make_ellipse(20, 22, a, b, pass / 2.0);
         select_heads();
         /* Covariances are good to 2^-16 step^2 of 10 to 20, times 16 px^2 a step^2, and rounded
          * twice more; a root halves that: 2e-5 of 40 px. The step in Q12 px adds 3e-5. */
         IH_TEST_WITHIN(0.005, sqrt((uu + vv) / 2 + root), ih_test_from_q(h->a_px_q12, 12), "a",
-                       turn);
+                       pass);
         IH_TEST_WITHIN(0.005, sqrt((uu + vv) / 2 - root), ih_test_from_q(h->b_px_q12, 12), "b",
-                       turn);
-        IH_TEST_RANGE(0, 179999, h->angle_mdeg, "angle's range", turn);
+                       pass);
+        IH_TEST_RANGE(0, 179999, h->angle_mdeg, "angle's range", pass);
         angle -= h->angle_mdeg / 1000.0;
         /* 2 mdeg of atan2 halved; the covariance's error over the difference of axes: 5 mdeg. */
-        IH_TEST_WITHIN(0.006, 0, remainder(angle, 180), "angle", turn);
+        IH_TEST_WITHIN(0.006, 0, remainder(angle, 180), "angle", pass);
         TEST_ASSERT_TRUE(h->a_px_q12 >= h->b_px_q12);
     }
 }
@@ -463,7 +464,7 @@ static void an_ellipse_without_width_is_a_line(void)
             const double wide = step * rig.calibration.fx_px_q16 / 65536;
             const double high = step * rig.calibration.fy_px_q16 / 65536;
             const double long_px = 2 * hypot(wide, high) * sqrt(ldexp(variance, -16));
-            const double turn_deg = atan2(high, wide) * 180 / PI;
+            const double angle_deg = atan2(high, wide) * 180 / PI;
 
             last->xx_q16 = last->yy_q16 = variance;
             last->xy_q16 = sign * variance;
@@ -473,7 +474,7 @@ static void an_ellipse_without_width_is_a_line(void)
                            variance);
             IH_TEST_WITHIN(0.001 * long_px + 0.01, long_px, ih_test_from_q(h->a_px_q12, 12), "a",
                            variance);
-            IH_TEST_WITHIN(0.02, sign > 0 ? turn_deg : 180 - turn_deg, h->angle_mdeg / 1000.0,
+            IH_TEST_WITHIN(0.02, sign > 0 ? angle_deg : 180 - angle_deg, h->angle_mdeg / 1000.0,
                            "angle", variance);
             memset(&nests, 0, sizeof nests);
         }
@@ -658,13 +659,13 @@ static void behind_begins_beyond_the_jump(void)
 
 /* The ring follows the ellipse: twice as high as wide, what is one step beside it is in the ring
  * and what is one step above it is not. */
-static void the_ring_follows_a_turned_ellipse(void)
+static void the_ring_follows_a_rotated_ellipse(void)
 {
     const double long_axis = 10, short_axis = 5;
-    int turn;
+    int angle_deg;
 
-    for (turn = 0; turn < 180; turn += 15) {
-        const double c = cos(turn * PI / 180), s = sin(turn * PI / 180);
+    for (angle_deg = 0; angle_deg < 180; angle_deg += 15) {
+        const double c = cos(angle_deg * PI / 180), s = sin(angle_deg * PI / 180);
         struct ih_nest *nest;
         int i;
 
@@ -672,7 +673,7 @@ static void the_ring_follows_a_turned_ellipse(void)
         samples.sample_count = 4;
         nest = add_head(23, 23, 850);
         nest->slice[nest->slice_count - 1].ellipse =
-            make_ellipse(23, 23, long_axis, short_axis, turn);
+            make_ellipse(23, 23, long_axis, short_axis, angle_deg);
         for (i = 0; i < 4; i++) {
             const double along = i < 2 ? (i == 0 ? 1.15 : 1.25) * long_axis : 0;
             const double across = i < 2 ? 0 : (i == 2 ? 1.15 : 1.25) * short_axis;
@@ -689,7 +690,7 @@ static void the_ring_follows_a_turned_ellipse(void)
                       hypotheses.hypothesis[0].outline.above +
                           hypotheses.hypothesis[0].outline.beside +
                           hypotheses.hypothesis[0].outline.below,
-                      "in the ring", turn);
+                      "in the ring", angle_deg);
     }
 }
 
@@ -708,7 +709,7 @@ static void the_best_comes_first(void)
 {
     add_nest(5, 5, 700, 110, 20);   /* rejected: area */
     add_nest(40, 5, 800, 90, 250);  /* accepted */
-    add_nest(5, 40, 900, 110, 250); /* accepted, the greatest extent */
+    add_nest(5, 40, 900, 110, 250); /* accepted, the largest extent */
     add_nest(40, 40, 950, 90, 250); /* accepted, as deep as the second but farther */
     add_nest(23, 23, 990, 40, 250); /* rejected: area */
     select_heads();
@@ -817,7 +818,7 @@ int main(void)
     RUN_TEST(proportions_of_a_shallow_nest_are_its_last_slices);
     RUN_TEST(proportions_are_sums_over_sums);
     RUN_TEST(long_heads_stand_upright);
-    RUN_TEST(the_first_failed_test_is_told);
+    RUN_TEST(the_first_failed_test_is_reported);
     RUN_TEST(places_match_the_closed_form);
     RUN_TEST(the_pixel_is_the_frames_own);
     RUN_TEST(the_distance_is_read_off_the_surface);
@@ -832,7 +833,7 @@ int main(void)
     RUN_TEST(what_was_not_seen_lies_behind);
     RUN_TEST(only_the_ring_is_looked_at);
     RUN_TEST(behind_begins_beyond_the_jump);
-    RUN_TEST(the_ring_follows_a_turned_ellipse);
+    RUN_TEST(the_ring_follows_a_rotated_ellipse);
     RUN_TEST(nothing_gives_nothing);
     RUN_TEST(the_best_comes_first);
     RUN_TEST(centres_closer_than_merge_mm_are_one);

@@ -637,7 +637,7 @@ static void a_plane_goes_on_below_where_two_thirds_are_on_it(void)
             const struct ih_windows_place place = flat_cells(80, 60);
 
             for (i = 0; i < 7; i++) {
-                /* The greatest that is within 40 mm of 600, or the least that is not. */
+                /* The largest depth within 40 mm of 600, or the smallest beyond it. */
                 const int32_t depth = i < on ? PLACE_MM + 40 : PLACE_MM + 41;
 
                 *cell_at(&place, below_mm[i][0], below_mm[i][1]) = (uint16_t)(i < seen ? depth : 0);

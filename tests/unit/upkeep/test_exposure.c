@@ -265,7 +265,7 @@ static void twenty_four_labels_say_something(void)
 static void over_exposure_is_left_by_its_limits(void)
 {
     static const struct {
-        int32_t weak_less, lost_more, duty_q8;
+        int32_t weak_below, lost_more, duty_q8;
         bool is_shorter;
     } cases[] = {{0, 1, 256, true},
                  {1, 1, 256, false},
@@ -277,7 +277,7 @@ static void over_exposure_is_left_by_its_limits(void)
     params.weak_grey_q4 = 16 * 2; /* 2 levels: an even number */
     for (i = 0; i < IH_TEST_COUNT(cases); i++) {
         const struct ih_exposure_look look = {.labelled_count = IH_SLOTS,
-                                              .weak = IH_BANDPASS_UNIT - cases[i].weak_less,
+                                              .weak = IH_BANDPASS_UNIT - cases[i].weak_below,
                                               .strong =
                                                   params.strong_grey_q4 * IH_BANDPASS_UNIT / 16,
                                               .lost_count = params.lost_max + cases[i].lost_more};
@@ -471,7 +471,7 @@ static void all_scenes_come_to_rest_near_the_best(void)
     static const double ambients[] = {0.5, 5.0, 40.0, 150.0};
     static const double heights[] = {2.0, 10.0, 60.0, 400.0};
     struct ih_exposure_look look;
-    int a, h, s, share, index = 0;
+    int a, h, s, percent, index = 0;
 
     for (a = 0; a < IH_TEST_COUNT(ambients); a++) {
         for (h = 0; h < IH_TEST_COUNT(heights); h++) {
@@ -481,11 +481,11 @@ static void all_scenes_come_to_rest_near_the_best(void)
                 (void)run(80, &look);
                 IH_TEST_EQUAL(0, run(100, &look), "changes at rest", index);
                 /* Where dots are much weaker than the sun some are lost either way. */
-                share = heights[h] < 0.02 * ambients[a]  ? 0
-                        : heights[h] < 0.1 * ambients[a] ? 70
-                                                         : 95;
-                IH_TEST_RANGE(best_labels() * share / 100, IH_SLOTS, look.labelled_count, "labels",
-                              index);
+                percent = heights[h] < 0.02 * ambients[a]  ? 0
+                          : heights[h] < 0.1 * ambients[a] ? 70
+                                                           : 95;
+                IH_TEST_RANGE(best_labels() * percent / 100, IH_SLOTS, look.labelled_count,
+                              "labels", index);
             }
         }
     }

@@ -1,4 +1,4 @@
-/* ih_health on dots of turned projectors, labelled by the core as it goes. */
+/* ih_health on dots of rotated projectors, labelled by the core as it goes. */
 #include "labels/ih_labels.h"
 #include "upkeep/ih_health.h"
 #include "upkeep/ih_rotation_vote.h"
@@ -7,7 +7,7 @@
 
 #include "ih_test.h"
 #include "rigs.inc"
-#include "turned_rig.h"
+#include "rotated_rig.h"
 
 #define WALL_MM 1200.0
 #define FRAMES_TO_FIND 50
@@ -96,15 +96,15 @@ static void a_rig_that_fits_is_left_alone(void)
 
 static void a_knock_is_found_within_fifty_frames(void)
 {
-    static const double turns_deg[][3] = {{0.3, 0, 0},      {-0.3, 0, 0},       {0, 0.3, 0},
-                                          {0, 0, -0.3},     {0.17, -0.2, 0.15}, {-0.2, 0.2, 0.1},
-                                          {0.5, 0.1, -0.3}, {0.05, 0, 0}};
+    static const double rotations_deg[][3] = {
+        {0.3, 0, 0},        {-0.3, 0, 0},     {0, 0.3, 0},      {0, 0, -0.3},
+        {0.17, -0.2, 0.15}, {-0.2, 0.2, 0.1}, {0.5, 0.1, -0.3}, {0.05, 0, 0}};
 
     for (int which = 0; which < 2; which++) {
-        for (int i = 0; i < IH_TEST_COUNT(turns_deg); i++) {
+        for (int i = 0; i < IH_TEST_COUNT(rotations_deg); i++) {
             use_calibration(&vector_rigs[which]);
-            run(&vector_rigs[which], turns_deg[i], FRAMES_TO_FIND);
-            assert_rotation(turns_deg[i], 10 * which + i);
+            run(&vector_rigs[which], rotations_deg[i], FRAMES_TO_FIND);
+            assert_rotation(rotations_deg[i], 10 * which + i);
             TEST_ASSERT_GREATER_THAN_INT32(health.dot_count * 3 / 4, health.labelled_count);
         }
     }
@@ -132,16 +132,17 @@ static void run_middle(const double rotation_deg[3], int frames)
  * is said. */
 static void what_dots_do_not_show_is_not_taken(void)
 {
-    static const double turns_deg[][3] = {{0.3, 0, 0}, {-0.2, 0.2, 0}, {0.15, -0.3, 0}};
+    static const double rotations_deg[][3] = {{0.3, 0, 0}, {-0.2, 0.2, 0}, {0.15, -0.3, 0}};
 
-    for (int i = 0; i < IH_TEST_COUNT(turns_deg); i++) {
+    for (int i = 0; i < IH_TEST_COUNT(rotations_deg); i++) {
         use_calibration(&vector_rigs[0]);
-        run_middle(turns_deg[i], 2 * FRAMES_TO_FIND);
+        run_middle(rotations_deg[i], 2 * FRAMES_TO_FIND);
         TEST_ASSERT_EQUAL_INT(IH_HEALTH_ROTATED, health.state);
         TEST_ASSERT_FALSE(health.is_weak_known);
-        IH_TEST_WITHIN(0.003, turns_deg[i][0], health.rotation_rad_q30[0] / Q30 / DEG, "turn", i);
+        IH_TEST_WITHIN(0.003, rotations_deg[i][0], health.rotation_rad_q30[0] / Q30 / DEG, "turn",
+                       i);
         IH_TEST_WITHIN(0.001, 0, health.rotation_rad_q30[1] / Q30 / DEG, "across", i);
-        IH_TEST_WITHIN(0.01, turns_deg[i][2], health.rotation_rad_q30[2] / Q30 / DEG, "turn",
+        IH_TEST_WITHIN(0.01, rotations_deg[i][2], health.rotation_rad_q30[2] / Q30 / DEG, "turn",
                        20 + i);
         IH_TEST_WITHIN(0.001, 0.6, health.sigma_rad_q30[1] / Q30 / DEG, "sigma", i);
     }
@@ -150,14 +151,14 @@ static void what_dots_do_not_show_is_not_taken(void)
 /* However small the turn that they show: what is near the calibration is not known to be there. */
 static void a_small_turn_makes_nothing_else_known(void)
 {
-    static const double turns_deg[][3] = {
+    static const double rotations_deg[][3] = {
         {0, 0, 0}, {0, 0.1, 0}, {0.02, 0.3, 0}, {0.03, -0.3, 0}, {0.045, 0.3, 0}};
 
-    for (int i = 0; i < IH_TEST_COUNT(turns_deg); i++) {
+    for (int i = 0; i < IH_TEST_COUNT(rotations_deg); i++) {
         for (int seed = 0; seed < 6; seed++) {
             random_source.state = (uint64_t)seed;
             use_calibration(&vector_rigs[0]);
-            run_middle(turns_deg[i], 2 * FRAMES_TO_FIND);
+            run_middle(rotations_deg[i], 2 * FRAMES_TO_FIND);
             TEST_ASSERT_FALSE(health.is_weak_known);
             IH_TEST_WITHIN(0.001, 0.6, health.sigma_rad_q30[1] / Q30 / DEG, "sigma", 10 * i + seed);
         }
@@ -182,9 +183,9 @@ static void more_frames_make_it_better(void)
 }
 
 /* However long the peace, and wherever in a look the knock. */
-static void a_knock_after_a_long_peace_is_found_as_soon(void)
+static void a_knock_after_a_long_stable_period_is_found_as_soon(void)
 {
-    static const double turns_deg[][3] = {
+    static const double rotations_deg[][3] = {
         {0, 0.1, 0},     {0, -0.1, 0},          {0, 0, 0.05}, {0, 0, -0.1},       {0, 0, 0.2},
         {0.03, 0, 0},    {-0.1, 0, 0},          {0, 0.3, 0},  {0.05, 0.05, 0.05}, {0.02, 0.02, 0},
         {0, 0.06, 0.06}, {-0.03, -0.09, 0.025}, {-0.03, 0, 0}};
@@ -194,12 +195,12 @@ static void a_knock_after_a_long_peace_is_found_as_soon(void)
         use_calibration(&vector_rigs[which]);
         run(&vector_rigs[which], straight_deg, PEACE_FRAMES);
         assert_untouched();
-        for (int i = 0; i < IH_TEST_COUNT(turns_deg); i++) {
+        for (int i = 0; i < IH_TEST_COUNT(rotations_deg); i++) {
             peaceful = health;
-            run(&vector_rigs[which], turns_deg[i], FRAMES_TO_FIND);
+            run(&vector_rigs[which], rotations_deg[i], FRAMES_TO_FIND);
             TEST_ASSERT_EQUAL_INT_MESSAGE(IH_HEALTH_ROTATED, health.state, "told");
-            run(&vector_rigs[which], turns_deg[i], FRAMES_TO_SETTLE);
-            assert_rotation(turns_deg[i], 20 * which + i);
+            run(&vector_rigs[which], rotations_deg[i], FRAMES_TO_SETTLE);
+            assert_rotation(rotations_deg[i], 20 * which + i);
             TEST_ASSERT_TRUE(health.is_weak_known);
             health = peaceful;
             rig = before;
@@ -261,16 +262,17 @@ static void a_search_in_vain_leaves_what_was_known(void)
 
 static void a_second_knock_and_one_back(void)
 {
-    static const double turns_deg[][3] = {{0.2, 0.05, 0}, {-0.1, 0, 0.2}, {0.01, 0, 0}};
+    static const double rotations_deg[][3] = {{0.2, 0.05, 0}, {-0.1, 0, 0.2}, {0.01, 0, 0}};
 
     use_calibration(&vector_rigs[1]);
-    for (int i = 0; i < IH_TEST_COUNT(turns_deg); i++) {
-        run(&vector_rigs[1], turns_deg[i], 2 * FRAMES_TO_FIND + IH_HEALTH_PAUSE * IH_HEALTH_LOOK);
-        assert_rotation(turns_deg[i], i);
+    for (int i = 0; i < IH_TEST_COUNT(rotations_deg); i++) {
+        run(&vector_rigs[1], rotations_deg[i],
+            2 * FRAMES_TO_FIND + IH_HEALTH_PAUSE * IH_HEALTH_LOOK);
+        assert_rotation(rotations_deg[i], i);
     }
 }
 
-static void a_turn_beyond_the_limit_is_told_and_not_taken(void)
+static void a_rotation_beyond_the_limit_is_reported_and_not_taken(void)
 {
     for (int which = 0; which < 2; which++) {
         use_calibration(&vector_rigs[which]);
@@ -390,11 +392,11 @@ int main(void)
     RUN_TEST(what_dots_do_not_show_is_not_taken);
     RUN_TEST(a_small_turn_makes_nothing_else_known);
     RUN_TEST(more_frames_make_it_better);
-    RUN_TEST(a_knock_after_a_long_peace_is_found_as_soon);
+    RUN_TEST(a_knock_after_a_long_stable_period_is_found_as_soon);
     RUN_TEST(a_knock_makes_what_is_not_seen_unknown);
     RUN_TEST(a_search_in_vain_leaves_what_was_known);
     RUN_TEST(a_second_knock_and_one_back);
-    RUN_TEST(a_turn_beyond_the_limit_is_told_and_not_taken);
+    RUN_TEST(a_rotation_beyond_the_limit_is_reported_and_not_taken);
     RUN_TEST(chance_turns_nothing);
     RUN_TEST(sunlight_turns_nothing);
     RUN_TEST(few_dots_say_nothing);

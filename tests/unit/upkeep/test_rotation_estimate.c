@@ -8,7 +8,7 @@
 
 #include "ih_test.h"
 #include "rigs.inc"
-#include "turned_rig.h"
+#include "rotated_rig.h"
 
 #define REACH_PX_Q12 1229
 #define NOISE_PX 0.1
@@ -86,7 +86,7 @@ static double deg_of(int32_t angle_rad_q30)
     return angle_rad_q30 / Q30 / DEG;
 }
 
-/* Every other dot stands still and errs as if the rig were turned about Y by 0.05 degrees more. They are seen
+/* Every other dot stands still and errs as if the rig were rotated about Y by 0.05 degrees more. They are seen
  * in as many frames as the others, but on one place each: 18 frames' worth against 190. */
 static void what_stands_still_counts_once(void)
 {
@@ -163,7 +163,7 @@ static void what_is_not_seen_is_held(void)
     const double rotation_deg[3] = {0.003, 0.01, -0.01};
     int32_t rotated_rad_q30[3];
 
-    turn_of((const double[3]){0.1, 0.2, 0}, rotated_rad_q30);
+    rotation_of((const double[3]){0.1, 0.2, 0}, rotated_rad_q30);
     only_middle_dots();
     for (int frame = 0; frame < 12; frame++) {
         add_frame(rotation_deg);
@@ -198,7 +198,7 @@ static void a_turn_that_is_taken_leaves_nothing(void)
     }
 }
 
-/* The same dots in the image on the lines of a turned rig, and then further along by that. */
+/* The same dots in the image on the lines of a rotated rig, and then further along by that. */
 static void relabel(const struct ih_rig *now, double further_px)
 {
     for (int slot = 0; slot < IH_SLOTS; slot++) {
@@ -227,15 +227,15 @@ static int32_t slots_that_left(void)
  * 0.4 px before it and go as far after it are, as without it. */
 static void a_turn_moves_no_dot_to_another_place(void)
 {
-    static struct ih_calibration turned;
+    static struct ih_calibration rotated;
     static struct ih_rig now;
     int32_t rotation_rad_q30[3];
     int32_t bad_slot;
 
     add_frame(straight_deg);
-    turn_of((const double[3]){0, 0.05, 0}, rotation_rad_q30);
-    ih_rotation_vote_calibration(&rig.calibration, rotation_rad_q30, &turned);
-    TEST_ASSERT_EQUAL_INT(IH_OK, ih_rig_init(&now, &turned, &bad_slot));
+    rotation_of((const double[3]){0, 0.05, 0}, rotation_rad_q30);
+    ih_rotation_vote_calibration(&rig.calibration, rotation_rad_q30, &rotated);
+    TEST_ASSERT_EQUAL_INT(IH_OK, ih_rig_init(&now, &rotated, &bad_slot));
     for (int slot = 0; slot < IH_SLOTS; slot++) {
         labels.t_px_q12[slot] += 1638;
     }
@@ -275,7 +275,7 @@ static void a_wall_stays_known_while_an_arm_passes(void)
     }
 }
 
-/* Of every twelfth slot the dots lie 0.2 px off for good, as if the rig were turned about Y: by 0.025 degrees,
+/* Of every twelfth slot the dots lie 0.2 px off for good, as if the rig were rotated about Y: by 0.025 degrees,
  * were they trusted as much as the others; 0.007 are left. */
 static void slots_that_are_far_off_hardly_count(void)
 {
@@ -295,7 +295,7 @@ static void a_great_turn_starts_anew(void)
     int32_t rotation_rad_q30[3];
 
     add_frame(straight_deg);
-    turn_of((const double[3]){0.3, 0, 0}, rotation_rad_q30);
+    rotation_of((const double[3]){0.3, 0, 0}, rotation_rad_q30);
     ih_rotation_estimate_rotate(&places, &slopes, rotation_rad_q30);
     TEST_ASSERT_EQUAL_INT32(0, places.frame_count);
     TEST_ASSERT_FALSE(
@@ -324,7 +324,7 @@ static void frames_of_long_ago_count_less(void)
     }
 }
 
-static void a_straight_rig_is_not_surely_turned(void)
+static void a_straight_rig_is_not_surely_rotated(void)
 {
     for (int run = 0; run < 20; run++) {
         setUp();
@@ -350,11 +350,11 @@ static void a_straight_rig_is_not_surely_turned(void)
 static void a_change_is_found_and_chance_is_none(void)
 {
     static struct ih_rotation_estimate late, difference;
-    const double turns_deg[][3] = {{0, 0, 0}, {0, 0.1, 0}, {0, 0, -0.03}, {0.005, 0, 0}};
+    const double rotations_deg[][3] = {{0, 0, 0}, {0, 0.1, 0}, {0, 0, -0.03}, {0.005, 0, 0}};
     double square[3] = {0, 0, 0};
 
     for (int run = 0; run < 80; run++) {
-        const double *rotation_deg = turns_deg[run % 4];
+        const double *rotation_deg = rotations_deg[run % 4];
         double own_px[IH_SLOTS];
         setUp();
         random_source.state = (uint64_t)run;
@@ -395,7 +395,7 @@ static void a_change_is_found_and_chance_is_none(void)
 }
 
 /* Only axes that are sure count: one that hardly shows may be anywhere. */
-static void what_is_sure_is_told_apart(void)
+static void what_is_sure_is_marked(void)
 {
     const double rotation_deg[3] = {0.01, 0.03, 0};
 
@@ -432,9 +432,9 @@ int main(void)
     RUN_TEST(slots_that_are_far_off_hardly_count);
     RUN_TEST(a_great_turn_starts_anew);
     RUN_TEST(frames_of_long_ago_count_less);
-    RUN_TEST(a_straight_rig_is_not_surely_turned);
+    RUN_TEST(a_straight_rig_is_not_surely_rotated);
     RUN_TEST(a_change_is_found_and_chance_is_none);
-    RUN_TEST(what_is_sure_is_told_apart);
+    RUN_TEST(what_is_sure_is_marked);
     RUN_TEST(few_dots_say_nothing);
     return UNITY_END();
 }

@@ -1,15 +1,15 @@
-/* ih_rotation_vote: slopes and turned rays against double, votes of dots that lie beside their lines. */
+/* ih_rotation_vote: slopes and rotated rays against double, votes of dots that lie beside their lines. */
 #include "upkeep/ih_rotation_vote.h"
 
 #include "ih_test.h"
 #include "rigs.inc"
-#include "turned_rig.h"
+#include "rotated_rig.h"
 
 static struct ih_rig rig;
 static struct ih_rotation_vote_slopes slopes;
 static struct ih_rotation_vote_votes votes;
 static struct ih_rotation_vote_scratch scratch;
-static struct ih_calibration turned;
+static struct ih_calibration rotated;
 static struct ih_dots dots;
 static struct ih_test_random random_source;
 
@@ -34,19 +34,19 @@ static void use_rig(int index)
 
 static void rays_turn_as_rodrigues_says(void)
 {
-    static const double turns_deg[][3] = {{0, 0, 0},   {0.6, 0, 0},      {0, -0.6, 0},
-                                          {0, 0, 0.6}, {0.3, -0.2, 0.1}, {0.6, 0.6, 0.6}};
+    static const double rotations_deg[][3] = {{0, 0, 0},   {0.6, 0, 0},      {0, -0.6, 0},
+                                              {0, 0, 0.6}, {0.3, -0.2, 0.1}, {0.6, 0.6, 0.6}};
     int i, slot, axis;
 
-    for (i = 0; i < IH_TEST_COUNT(turns_deg); i++) {
+    for (i = 0; i < IH_TEST_COUNT(rotations_deg); i++) {
         int32_t rotation_rad_q30[3];
-        turn_of(turns_deg[i], rotation_rad_q30);
-        ih_rotation_vote_calibration(&vector_rigs[1], rotation_rad_q30, &turned);
+        rotation_of(rotations_deg[i], rotation_rad_q30);
+        ih_rotation_vote_calibration(&vector_rigs[1], rotation_rad_q30, &rotated);
         for (slot = 0; slot < IH_SLOTS; slot++) {
             double ray[3];
-            turned_ray(&vector_rigs[1], slot, turns_deg[i], ray);
+            rotated_ray(&vector_rigs[1], slot, rotations_deg[i], ray);
             for (axis = 0; axis < 3; axis++) {
-                IH_TEST_WITHIN(1.2e-6, ray[axis], turned.ray_q30[slot][axis] / Q30, "ray", slot);
+                IH_TEST_WITHIN(1.2e-6, ray[axis], rotated.ray_q30[slot][axis] / Q30, "ray", slot);
             }
         }
     }
@@ -79,22 +79,23 @@ static void slopes_are_what_a_turn_moves_across(void)
 
 static void dots_elect_the_rotation(void)
 {
-    static const double turns_deg[][3] = {{0.3, 0, 0},        {-0.3, 0, 0},     {0, 0, 0.3},
-                                          {0.17, -0.2, 0.15}, {-0.2, 0.2, 0.1}, {0.5, 0.1, -0.3}};
+    static const double rotations_deg[][3] = {{0.3, 0, 0},      {-0.3, 0, 0},
+                                              {0, 0, 0.3},      {0.17, -0.2, 0.15},
+                                              {-0.2, 0.2, 0.1}, {0.5, 0.1, -0.3}};
     int which, i, axis;
 
     for (which = 0; which < 2; which++) {
         use_rig(which);
-        for (i = 0; i < IH_TEST_COUNT(turns_deg); i++) {
+        for (i = 0; i < IH_TEST_COUNT(rotations_deg); i++) {
             /* Steps of the lattice, and half as much again: the weak axis is 0.2 degrees coarse. */
             static const double limit_deg[3] = {0.03, 0.4, 0.11};
             struct ih_rotation_vote_winner winner;
             memset(&votes, 0, sizeof votes);
-            see_dots(&vector_rigs[which], turns_deg[i], 1200.0, 0.1, &random_source, &dots);
+            see_dots(&vector_rigs[which], rotations_deg[i], 1200.0, 0.1, &random_source, &dots);
             ih_rotation_vote_vote(&dots, &rig, &slopes, &scratch, &votes);
             ih_rotation_vote_elect(&votes, &rig, &winner);
             for (axis = 0; axis < 3; axis++) {
-                IH_TEST_WITHIN(limit_deg[axis], turns_deg[i][axis],
+                IH_TEST_WITHIN(limit_deg[axis], rotations_deg[i][axis],
                                winner.rotation_rad_q30[axis] / Q30 / DEG, "turn", 10 * i + axis);
             }
             TEST_ASSERT_GREATER_THAN_INT32(winner.vote_of_none * 5 / 4, winner.vote);

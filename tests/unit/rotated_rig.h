@@ -1,7 +1,7 @@
-/* turned_rig - dots that a turned projector casts on a bumpy wall, in double: what ih_rotation_vote and ih_health
+/* rotated_rig - dots that a rotated projector casts on a bumpy wall, in double: what ih_rotation_vote and ih_health
  * are tested with. Shares nothing with the core but its structs and the lens (ih_camera_distort). */
-#ifndef TURNED_RIG_H
-#define TURNED_RIG_H
+#ifndef ROTATED_RIG_H
+#define ROTATED_RIG_H
 
 #include "base/ih_config.h"
 #include "dots/ih_dots.h"
@@ -13,25 +13,25 @@
 #define DEG 0.017453292519943295
 
 /* Unused in one of the two tests. */
-static inline void turn_of(const double turn_deg[3], int32_t rotation_rad_q30[3])
+static inline void rotation_of(const double rotation_deg[3], int32_t rotation_rad_q30[3])
 {
     for (int axis = 0; axis < 3; axis++) {
-        rotation_rad_q30[axis] = (int32_t)lround(turn_deg[axis] * DEG * Q30);
+        rotation_rad_q30[axis] = (int32_t)lround(rotation_deg[axis] * DEG * Q30);
     }
 }
 
 /* By Rodrigues' formula. */
-static inline void turned_ray(const struct ih_calibration *c, int slot, const double turn_deg[3],
-                              double ray[3])
+static inline void rotated_ray(const struct ih_calibration *c, int slot,
+                               const double rotation_deg[3], double ray[3])
 {
     double angle = 0, along = 0, r[3], n[3];
     for (int axis = 0; axis < 3; axis++) {
         r[axis] = c->ray_q30[slot][axis] / Q30;
-        angle += turn_deg[axis] * turn_deg[axis];
+        angle += rotation_deg[axis] * rotation_deg[axis];
     }
     angle = sqrt(angle);
     for (int axis = 0; axis < 3; axis++) {
-        n[axis] = angle > 0 ? turn_deg[axis] / angle : 0;
+        n[axis] = angle > 0 ? rotation_deg[axis] / angle : 0;
         along += n[axis] * r[axis];
     }
     angle *= DEG;
@@ -44,16 +44,16 @@ static inline void turned_ray(const struct ih_calibration *c, int slot, const do
 
 /* Undistorted pixel of a dot far away. */
 static inline void place_at_infinity(const struct ih_calibration *c, int slot,
-                                     const double turn_deg[3], double place_px[2])
+                                     const double rotation_deg[3], double place_px[2])
 {
     double ray[3];
-    turned_ray(c, slot, turn_deg, ray);
+    rotated_ray(c, slot, rotation_deg, ray);
     place_px[0] = (c->fx_px_q16 * ray[0] / ray[2] + c->cx_px_q16) / 65536.0;
     place_px[1] = (c->fy_px_q16 * ray[1] / ray[2] + c->cy_px_q16) / 65536.0;
 }
 
 /* A frame's dots on a wall with waves of 100 mm that are elsewhere in each call; noise on both axes. */
-static inline void see_dots(const struct ih_calibration *c, const double turn_deg[3],
+static inline void see_dots(const struct ih_calibration *c, const double rotation_deg[3],
                             double wall_mm, double noise_px, struct ih_test_random *random,
                             struct ih_dots *out)
 {
@@ -64,7 +64,7 @@ static inline void see_dots(const struct ih_calibration *c, const double turn_de
     for (int slot = 0; slot < IH_SLOTS; slot++) {
         double ray[3], point[3];
         int32_t u, v;
-        turned_ray(c, slot, turn_deg, ray);
+        rotated_ray(c, slot, rotation_deg, ray);
         double depth = wall_mm + 100 * sin(phase + slot % IH_GRID * 0.7 + slot / IH_GRID * 0.4);
         double far = (depth - c->origin_mm_q16[2] / 65536.0) / ray[2];
         for (int axis = 0; axis < 3; axis++) {
