@@ -306,7 +306,8 @@ def bound(folder, host_sim, work, truth, frame_count):
 
 
 def observable(folder):
-    """Rows of (name, rms px across, rms px along, sigma with all six, sigma with rotations alone)."""    rig = Rig(os.path.join(folder, "rig.json"))
+    """Rows of (name, rms px across, rms px along, sigma with all six, sigma with rotations alone)."""
+    rig = Rig(os.path.join(folder, "rig.json"))
     dots = np.concatenate(truths(folder)[:50])
     index = dots[:, 0].astype(int)
     _, direction, across, along = rig.lines()
