@@ -4,7 +4,10 @@
 
 #include "base/ih_fix.h"
 #include "rig/ih_camera.h"
+#include "simd/ih_simd_cortexm.h"
 
+/* The single step takes 2 kB of code, which a microcontroller's flash has no room for. */
+#if !IH_CORTEXM
 #define ONE_Q28 ((int64_t)1 << 28)
 #define RADIAL_MAX_Q24 (1 << 24)      /* of k1, k2, k3 */
 #define TANGENTIAL_MAX_Q24 (1 << 20)  /* of p1, p2 */
@@ -14,9 +17,10 @@
 #define FACTOR_MIN_Q28 (ONE_Q28 / 8)
 #define FACTOR_MAX_Q28 (8 * ONE_Q28)
 
+/* Of factors that fit 32 bits: one multiplication on a Cortex-M. */
 static int64_t product(int64_t a, int64_t b, int shift)
 {
-    return ih_shift_round(a * b, shift);
+    return ih_shift_round((int64_t)(int32_t)a * (int32_t)b, shift);
 }
 
 static bool is_within(int64_t value, int64_t max)
@@ -101,19 +105,39 @@ static bool undistort_once(const struct ih_rig *rig, int64_t xd, int64_t yd, int
     return true;
 }
 
+/* False: left to ih_camera_undistort. */
+static bool undistort_dot(const struct ih_rig *rig, const struct ih_dot *dot, int32_t *x_q28,
+                          int32_t *y_q28)
+{
+    const struct ih_calibration *c = &rig->calibration;
+    const int64_t u = ((int64_t)dot->u_px_q12 * 16 - c->cx_px_q16) * ONE_Q28;
+    const int64_t v = ((int64_t)dot->v_px_q12 * 16 - c->cy_px_q16) * ONE_Q28;
+    return undistort_once(rig, ih_div_round(u, c->fx_px_q16), ih_div_round(v, c->fy_px_q16), x_q28,
+                          y_q28);
+}
+#else
+static bool is_mild(const struct ih_rig *rig)
+{
+    (void)rig;
+    return false;
+}
+
+static bool undistort_dot(const struct ih_rig *rig, const struct ih_dot *dot, int32_t *x_q28,
+                          int32_t *y_q28)
+{
+    (void)rig, (void)dot, (void)x_q28, (void)y_q28;
+    return false;
+}
+#endif
+
 void ih_undistort_dots(const struct ih_dots *dots, const struct ih_rig *rig,
                        int32_t u_px_q12[IH_DOTS_MAX], int32_t v_px_q12[IH_DOTS_MAX])
 {
-    const struct ih_calibration *c = &rig->calibration;
-    const bool may_be_short = is_mild(rig);
+    const bool may_be_single = is_mild(rig);
     for (int32_t i = 0; i < dots->dot_count; i++) {
         const struct ih_dot *dot = &dots->dot[i];
         int32_t x_q28, y_q28;
-        const int64_t xd =
-            ih_div_round(((int64_t)dot->u_px_q12 * 16 - c->cx_px_q16) * ONE_Q28, c->fx_px_q16);
-        const int64_t yd =
-            ih_div_round(((int64_t)dot->v_px_q12 * 16 - c->cy_px_q16) * ONE_Q28, c->fy_px_q16);
-        if (!may_be_short || !undistort_once(rig, xd, yd, &x_q28, &y_q28)) {
+        if (!may_be_single || !undistort_dot(rig, dot, &x_q28, &y_q28)) {
             ih_camera_undistort(rig, dot->u_px_q12, dot->v_px_q12, &x_q28, &y_q28);
         }
         ih_camera_pixel(rig, x_q28, y_q28, &u_px_q12[i], &v_px_q12[i]);
