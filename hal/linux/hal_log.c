@@ -131,7 +131,7 @@ void hal_log_write(void *context, int level, const char *text)
 {
     struct hal_log_writer *writer = context;
     if (writer->dropped_count > 0) {
-        char reported[64];
+        char reported[80];
         snprintf(reported, sizeof reported,
                  "%" PRId64 " messages were lost: the log was not read in time",
                  writer->dropped_count);
