@@ -144,9 +144,9 @@ static inline uint32_t ih_inverse_root_q15(uint32_t m_q32)
 {
     const uint32_t at = (m_q32 >> 24) - 64;
     const uint32_t fraction_q16 = m_q32 >> 8 & 0xffff;
-    const uint32_t first = ih_root_inverse_q15[at];
+    const uint32_t entry = ih_root_inverse_q15[at];
     /* The difference is rounded up, so that the result is never too large. */
-    return first - (((first - ih_root_inverse_q15[at + 1]) * fraction_q16 + 0xffff) >> 16);
+    return entry - (((entry - ih_root_inverse_q15[at + 1]) * fraction_q16 + 0xffff) >> 16);
 }
 
 /* Number of bits needed for value; 0 for 0. */

@@ -156,7 +156,7 @@ void ih_template_prepare(const struct ih_rays *rays, struct ih_template_table *o
 }
 
 /* A centre as the loop needs it: in Q11, e = (slope - direction) power factor / 2^16. */
-struct candidate {
+struct centre {
     int16_t direction_q14[2];
     int16_t offset_max[2]; /* of slopes, Q14 */
     int16_t power[2];      /* of two */
@@ -165,7 +165,7 @@ struct candidate {
 };
 
 /* False outside of the limits. */
-static bool set_axis(struct candidate *candidate, int axis, int64_t off_q8, int32_t depth_q8,
+static bool set_axis(struct centre *candidate, int axis, int64_t off_q8, int32_t depth_q8,
                      int32_t semi_mm)
 {
     const int64_t direction_q14 = (off_q8 * ONE_Q14 - (off_q8 < 0 ? depth_q8 - 1 : 0)) / depth_q8;
@@ -182,7 +182,7 @@ static bool set_axis(struct candidate *candidate, int axis, int64_t off_q8, int3
     return true;
 }
 
-static bool set_candidate(struct candidate *candidate, const struct ih_rays *rays,
+static bool set_candidate(struct centre *candidate, const struct ih_rays *rays,
                           const int32_t centre_mm_q8[3])
 {
     const int64_t depth_q8 = (int64_t)centre_mm_q8[2] - rays->origin_mm_q8[2];
@@ -247,7 +247,7 @@ struct box {
 
 /* Columns of the rays that pass within this fraction of OFFSET_MAX_Q11 aside. */
 static struct span find_columns(const struct ih_template_table *table,
-                                const struct candidate *candidate, int32_t aside_q12)
+                                const struct centre *candidate, int32_t aside_q12)
 {
     /* 3 for the rounding of the factor, of slopes and of the direction */
     const int32_t x_q14 = candidate->direction_q14[0];
@@ -255,7 +255,7 @@ static struct span find_columns(const struct ih_template_table *table,
     return find_span(table, 0, x_q14 - aside_q14, x_q14 + aside_q14);
 }
 
-static struct box find_box(const struct ih_template_table *table, const struct candidate *candidate)
+static struct box find_box(const struct ih_template_table *table, const struct centre *candidate)
 {
     const int32_t y_q14 = candidate->direction_q14[1];
     const int32_t above_q14 = (candidate->offset_max[1] * table->above_q12 >> 12) + 3;
@@ -267,7 +267,7 @@ static struct box find_box(const struct ih_template_table *table, const struct c
 }
 
 /* Sums of values in 64ths, and counts of their rays. */
-struct totals {
+struct ray_totals {
     int32_t inside, inside_count;
     int32_t around, around_count;
 };
@@ -285,7 +285,7 @@ struct crossing {
 };
 
 static inline ih_i16 find_offset(const struct ih_template_table *table,
-                                 const struct candidate *candidate, int axis, int32_t at)
+                                 const struct centre *candidate, int axis, int32_t at)
 {
     const ih_i16 off = ih_i16_sub(ih_i16_load(&table->slope_q14[axis][at]),
                                   ih_i16_all(candidate->direction_q14[axis]));
@@ -295,7 +295,7 @@ static inline ih_i16 find_offset(const struct ih_template_table *table,
 }
 
 static inline struct crossing find_crossing(const struct ih_template_table *table,
-                                            const struct candidate *candidate, int32_t at)
+                                            const struct centre *candidate, int32_t at)
 {
     const ih_i16 ex_q13 = ih_i16_shift_left(find_offset(table, candidate, 0, at), 2);
     const ih_i16 ey_q11 = find_offset(table, candidate, 1, at);
@@ -311,9 +311,8 @@ static inline struct crossing find_crossing(const struct ih_template_table *tabl
 }
 
 /* Rays beside or above the head. */
-static inline void add_around(const struct ih_template_table *table,
-                              const struct candidate *candidate, int32_t at,
-                              const struct crossing *crossing, struct sums *sums)
+static inline void add_around(const struct ih_template_table *table, const struct centre *candidate,
+                              int32_t at, const struct crossing *crossing, struct sums *sums)
 {
     const ih_i16 is_open = ih_i16_load(&table->depth_mm_q1[at]) > candidate->open_mm_q1;
     const ih_i16 value =
@@ -336,9 +335,8 @@ static inline ih_i16 is_before(ih_i16 after_q13, ih_i16 root2_q10, int16_t behin
 }
 
 /* Rays through the head: the value follows from how far a point is behind the entry. */
-static inline void add_inside(const struct ih_template_table *table,
-                              const struct candidate *candidate, int32_t at,
-                              const struct crossing *crossing, struct sums *sums)
+static inline void add_inside(const struct ih_template_table *table, const struct centre *candidate,
+                              int32_t at, const struct crossing *crossing, struct sums *sums)
 {
     const ih_i16 dz_q1 = ih_i16_clamp(
         ih_i16_sub(ih_i16_load(&table->depth_mm_q1[at]), ih_i16_all(candidate->depth_mm_q1)),
@@ -368,8 +366,8 @@ static struct span whole_vectors(struct span rows)
 }
 
 /* Columns beside the head have no ray through it. */
-static void sum_values(const struct ih_template_table *table, const struct candidate *candidate,
-                       const struct box *box, struct totals *out)
+static void sum_values(const struct ih_template_table *table, const struct centre *candidate,
+                       const struct box *box, struct ray_totals *out)
 {
     const struct span through = find_columns(table, candidate, table->through_q12);
     const struct span beside[2] = {{box->columns.begin, through.begin},
@@ -391,8 +389,8 @@ static void sum_values(const struct ih_template_table *table, const struct candi
             add_inside(table, candidate, at, &crossing, &sums);
         }
     }
-    *out = (struct totals){ih_i16_total(sums.inside), ih_i16_total(sums.inside_count),
-                           ih_i16_total(sums.around), ih_i16_total(sums.around_count)};
+    *out = (struct ray_totals){ih_i16_total(sums.inside), ih_i16_total(sums.inside_count),
+                               ih_i16_total(sums.around), ih_i16_total(sums.around_count)};
 }
 
 #else
@@ -403,9 +401,8 @@ static bool is_before(int32_t after_q13, int32_t root2_q10, int32_t behind_q13)
     return root_q13 * root_q13 >> 16 > root2_q10;
 }
 
-static int32_t value_inside(const struct ih_template_table *table,
-                            const struct candidate *candidate, int32_t at, int32_t t_q12,
-                            int32_t radius2_q10)
+static int32_t value_inside(const struct ih_template_table *table, const struct centre *candidate,
+                            int32_t at, int32_t t_q12, int32_t radius2_q10)
 {
     const int32_t dz_q1 = ih_clamp_s32(table->depth_mm_q1[at] - candidate->depth_mm_q1,
                                        -DEPTH_OFF_MAX_Q1, DEPTH_OFF_MAX_Q1);
@@ -417,8 +414,8 @@ static int32_t value_inside(const struct ih_template_table *table,
     return is_before(after_q13, root2_q10, TOUCH_Q13) ? VALUE_ON : VALUE_BEHIND;
 }
 
-static void sum_values(const struct ih_template_table *table, const struct candidate *candidate,
-                       const struct box *box, struct totals *out)
+static void sum_values(const struct ih_template_table *table, const struct centre *candidate,
+                       const struct box *box, struct ray_totals *out)
 {
     const int32_t scale[2] = {candidate->power[0] * candidate->factor[0],
                               candidate->power[1] * candidate->factor[1]};
@@ -426,7 +423,7 @@ static void sum_values(const struct ih_template_table *table, const struct candi
                                 candidate->direction_q14[1] - candidate->offset_max[1]};
     const uint32_t sides_q14[2] = {2 * (uint32_t)candidate->offset_max[0],
                                    2 * (uint32_t)candidate->offset_max[1]};
-    struct totals sums = {0, 0, 0, 0};
+    struct ray_totals sums = {0, 0, 0, 0};
     for (int32_t column = box->columns.begin; column < box->columns.end; column++) {
         for (int32_t row = box->rows.begin; row < box->rows.end; row++) {
             const int32_t at = column * IH_TEMPLATE_COLUMN + row;
@@ -462,8 +459,8 @@ static void sum_values(const struct ih_template_table *table, const struct candi
 int32_t ih_template_score_q12(const struct ih_rays *rays, const struct ih_template_table *table,
                               const int32_t centre_mm_q8[3])
 {
-    struct candidate candidate;
-    struct totals totals;
+    struct centre candidate;
+    struct ray_totals totals;
     if (!set_candidate(&candidate, rays, centre_mm_q8)) {
         return IH_TEMPLATE_NONE_Q12;
     }

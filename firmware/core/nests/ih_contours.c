@@ -166,7 +166,7 @@ _Static_assert(IH_SURFACE_GRID >= HALF_NODES && IH_SURFACE_GRID <= 2 * HALF_NODE
                "two halves cover a row of nodes");
 
 /* Bit x: is node x nearer than the level? Compilers make vectors of a table of bits, not of 1 << x. */
-#define FOUR_BITS(x) 1u << (x), 2u << (x), 4u << (x), 8u << (x)
+#define FOUR_BITS(x) (uint32_t)1 << (x), (uint32_t)2 << (x), (uint32_t)4 << (x), (uint32_t)8 << (x)
 static uint32_t bits_inside(const int32_t *depth_mm_q8, int32_t level_mm_q8)
 {
     static const uint32_t bit[HALF_NODES] = {FOUR_BITS(0),  FOUR_BITS(4),  FOUR_BITS(8),

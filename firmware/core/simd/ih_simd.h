@@ -366,6 +366,8 @@ static inline int64_t ih_wide_total(struct ih_wide x)
     return ih_i64_total(ih_i64_add(x.a, x.b));
 }
 
+#else
+#define IH_SIMD_LANE_SHIFTS 0
 #endif
 
 #endif

@@ -144,7 +144,7 @@ static inline int64_t ih_i32_total_wide(ih_i32 a)
     const __m128i low = _mm_unpacklo_epi32((__m128i)a, sign);
     const __m128i two = _mm_add_epi64(low, _mm_unpackhi_epi32((__m128i)a, sign));
     int64_t lane[2];
-    _mm_storeu_si128((__m128i *)(void *)lane, two);
+    __builtin_memcpy(lane, &two, sizeof lane);
     return lane[0] + lane[1];
 }
 

@@ -85,7 +85,7 @@ static inline uint32_t factor_of(struct update update, uint32_t word)
 
 static inline ih_i16 load_words(const uint32_t *word)
 {
-    return ih_i16_load_aligned((const int16_t *)word);
+    return ih_i16_load_aligned((const void *)word);
 }
 
 /* Update line i by the first words. */

@@ -410,6 +410,7 @@ static void select_head(struct ih_tracks *tracks, const struct ih_tracks_params 
                         int32_t wanted)
 {
     int32_t current = IH_NONE;
+    int32_t next = wanted;
     for (int32_t i = 0; i < tracks->head_count; i++) {
         if (track_of(tracks, tracks->head[i])->id == tracks->selected_id) {
             current = tracks->head[i];
@@ -420,14 +421,14 @@ static void select_head(struct ih_tracks *tracks, const struct ih_tracks_params 
         tracks->rival_frames = rival_id == tracks->rival_id ? tracks->rival_frames + 1 : 1;
         tracks->rival_id = rival_id;
         if (tracks->rival_frames < params->switch_frames) {
-            wanted = current;
+            next = current;
         }
     } else {
         tracks->rival_frames = 0;
         tracks->rival_id = 0;
     }
-    tracks->selected = wanted;
-    tracks->selected_id = wanted == IH_NONE ? 0 : track_of(tracks, wanted)->id;
+    tracks->selected = next;
+    tracks->selected_id = next == IH_NONE ? 0 : track_of(tracks, next)->id;
 }
 
 void ih_tracks_update(struct ih_tracks *tracks, const struct ih_tracks_params *params,
