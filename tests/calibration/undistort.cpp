@@ -66,7 +66,7 @@ static double largest_error_px(const Calibrated &calibrated, const ih_rig &rig, 
     for (int v = 0; v <= last_v + 3; v += 4) {
         for (int u = 0; u <= last_u + 3; u += 4)
             positions.emplace_back(std::min<double>(u + 0.25 * (v % 3), last_u),
-                                std::min<double>(v + 0.25 * (u % 3), last_v));
+                                   std::min<double>(v + 0.25 * (u % 3), last_v));
     }
     cv::undistortPoints(positions, expected, calibrated.camera, calibrated.lens, cv::noArray(),
                         cv::noArray(),
@@ -77,7 +77,8 @@ static double largest_error_px(const Calibrated &calibrated, const ih_rig &rig, 
     undone_px = 0.0;
     for (size_t i = 0; i < positions.size(); i++) {
         int32_t x_q28, y_q28;
-        ih_camera_undistort(&rig, fixed(positions[i].x, 12), fixed(positions[i].y, 12), &x_q28, &y_q28);
+        ih_camera_undistort(&rig, fixed(positions[i].x, 12), fixed(positions[i].y, 12), &x_q28,
+                            &y_q28);
         double du = fx * (std::ldexp(x_q28, -28) - expected[i].x),
                dv = fy * (std::ldexp(y_q28, -28) - expected[i].y);
         largest_px = std::max(largest_px, std::hypot(du, dv));
