@@ -78,12 +78,12 @@ static void fill_ray(const struct ih_ray *ray, struct ih_template_table *out, in
 
 static int16_t max_s16(int16_t a, int16_t b)
 {
-    return a > b ? a : b;
+    return (int16_t)(a > b ? a : b);
 }
 
 static int16_t min_s16(int16_t a, int16_t b)
 {
-    return a < b ? a : b;
+    return (int16_t)(a < b ? a : b);
 }
 
 /* The maximum slope up to a line, and the minimum from it on. */
