@@ -166,11 +166,12 @@ _Static_assert(IH_SURFACE_GRID >= HALF_NODES && IH_SURFACE_GRID <= 2 * HALF_NODE
                "two halves cover a row of nodes");
 
 /* Bit x: is node x nearer than the level? Compilers make vectors of a table of bits, not of 1 << x. */
-#define FOUR_BITS(x) (uint32_t)1 << (x), (uint32_t)2 << (x), (uint32_t)4 << (x), (uint32_t)8 << (x)
+#define FOUR_BITS(lowest) (lowest), 2u * (lowest), 4u * (lowest), 8u * (lowest)
 static uint32_t bits_inside(const int32_t *depth_mm_q8, int32_t level_mm_q8)
 {
-    static const uint32_t bit[HALF_NODES] = {FOUR_BITS(0),  FOUR_BITS(4),  FOUR_BITS(8),
-                                             FOUR_BITS(12), FOUR_BITS(16), FOUR_BITS(20)};
+    static const uint32_t bit[HALF_NODES] = {FOUR_BITS(0x1u),     FOUR_BITS(0x10u),
+                                             FOUR_BITS(0x100u),   FOUR_BITS(0x1000u),
+                                             FOUR_BITS(0x10000u), FOUR_BITS(0x100000u)};
     uint32_t bits = 0;
     for (int32_t x = 0; x < HALF_NODES; x++) {
         bits |= depth_mm_q8[x] < level_mm_q8 ? bit[x] : 0;
