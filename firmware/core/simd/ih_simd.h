@@ -155,12 +155,6 @@ static inline ih_i16 ih_i16_shift_right(ih_i16 a, int bits)
     return a >> bits;
 }
 
-/* Lanes of a where the mask has all bits, of b where it has none. */
-static inline ih_i16 ih_i16_pick(ih_i16 mask, ih_i16 a, ih_i16 b)
-{
-    return (mask & a) | (~mask & b);
-}
-
 /* 32 bits */
 
 static inline ih_i32 ih_i32_load(const int32_t *from)
@@ -223,6 +217,7 @@ static inline ih_u32 ih_u32_shift_right(ih_u32 a, int bits)
     return a >> bits;
 }
 
+/* Lanes of a where the mask has all bits, of b where it has none. */
 static inline ih_i32 ih_i32_pick(ih_i32 mask, ih_i32 a, ih_i32 b)
 {
     return (mask & a) | (~mask & b);
@@ -255,16 +250,6 @@ static inline ih_i64 ih_i64_add(ih_i64 a, ih_i64 b)
 static inline ih_i64 ih_i64_sub(ih_i64 a, ih_i64 b)
 {
     return (ih_i64)((ih_u64)a - (ih_u64)b);
-}
-
-static inline ih_i64 ih_i64_shift_left(ih_i64 a, int bits)
-{
-    return (ih_i64)((ih_u64)a << bits);
-}
-
-static inline ih_u64 ih_u64_shift_right(ih_u64 a, int bits)
-{
-    return a >> bits;
 }
 
 /* |a|. */

@@ -125,15 +125,6 @@ static inline ih_u64 ih_u32_mul_even(ih_u32 a, ih_u32 b)
     return (ih_u64)_mm256_mul_epu32((__m256i)a, (__m256i)b);
 }
 
-/* (a + 2^(bits - 1)) >> bits with sign, 1 <= bits <= 62 and |a| at most 2^62. There is no such shift: with 2^62 added
- * a has no sign. */
-static inline ih_i64 ih_i64_shift_round(ih_i64 a, int bits)
-{
-    const int64_t bias = ((int64_t)1 << 62) + ((int64_t)1 << (bits - 1));
-    const ih_u64 shifted = ih_u64_shift_right((ih_u64)ih_i64_add(a, ih_i64_all(bias)), bits);
-    return ih_i64_sub((ih_i64)shifted, ih_i64_all((int64_t)1 << (62 - bits)));
-}
-
 /* Is any bit of any lane set? */
 static inline bool ih_i16_any(ih_i16 a)
 {

@@ -173,11 +173,6 @@ static inline ih_u64 ih_u32_mul_even(ih_u32 a, ih_u32 b)
     return (ih_u64)vmull_u32(vmovn_u64((uint64x2_t)a), vmovn_u64((uint64x2_t)b));
 }
 
-static inline ih_i64 ih_i64_shift_round(ih_i64 a, int bits)
-{
-    return (ih_i64)vrshlq_s64((int64x2_t)a, vdupq_n_s64(-bits));
-}
-
 static inline bool ih_i16_any(ih_i16 a)
 {
     const uint32x2_t half = vqmovn_u64((uint64x2_t)a);

@@ -110,13 +110,6 @@ static inline ih_i64 ih_i32_mul_even(ih_i32 a, ih_i32 b)
                       (ih_i64)_mm_slli_epi64((__m128i)signs, 32));
 }
 
-static inline ih_i64 ih_i64_shift_round(ih_i64 a, int bits)
-{
-    const int64_t bias = ((int64_t)1 << 62) + ((int64_t)1 << (bits - 1));
-    const ih_u64 shifted = ih_u64_shift_right((ih_u64)ih_i64_add(a, ih_i64_all(bias)), bits);
-    return ih_i64_sub((ih_i64)shifted, ih_i64_all((int64_t)1 << (62 - bits)));
-}
-
 static inline bool ih_i16_any(ih_i16 a)
 {
     return _mm_movemask_epi8(_mm_cmpeq_epi8((__m128i)a, _mm_setzero_si128())) != 0xffff;
