@@ -121,15 +121,20 @@ static void try_candidate(const struct ih_dots *dots, const struct ih_line *line
     ih_label_lines_add_candidate(dots, candidate, slot, scratch, out);
 }
 
-void ih_label_lines_find(const struct ih_dots *dots, const struct ih_line *line, int32_t slot,
-                         const struct ih_labels_params *params, int32_t *first,
-                         struct ih_labels_scratch *scratch, struct ih_labels *out)
+void ih_label_lines_find(const struct ih_dots *dots, const struct ih_rig *rig,
+                         const struct ih_labels_params *params, struct ih_labels_scratch *scratch,
+                         struct ih_labels *out)
 {
-    const struct row_range rows = rows_of_line(line, params);
-    *first = ih_label_lines_count_above(scratch, dots->dot_count, rows.first_px_q12, *first);
-    scratch->candidate_count[slot] = 0;
-    scratch->choice[slot] = IH_NONE;
-    for (int32_t i = *first; i < dots->dot_count && scratch->v_px_q12[i] <= rows.last_px_q12; i++) {
-        try_candidate(dots, line, slot, i, params, scratch, out);
+    int32_t first = 0;
+    for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
+        const struct ih_line *line = &rig->line[slot];
+        const struct row_range rows = rows_of_line(line, params);
+        first = ih_label_lines_count_above(scratch, dots->dot_count, rows.first_px_q12, first);
+        scratch->candidate_count[slot] = 0;
+        scratch->choice[slot] = IH_NONE;
+        for (int32_t i = first; i < dots->dot_count && scratch->v_px_q12[i] <= rows.last_px_q12;
+             i++) {
+            try_candidate(dots, line, slot, i, params, scratch, out);
+        }
     }
 }

@@ -49,9 +49,9 @@ void ih_label_lines_add_candidate(const struct ih_dots *dots, struct ih_candidat
                                   int32_t slot, struct ih_labels_scratch *scratch,
                                   struct ih_labels *out);
 
-/* Finds the candidates of a slot. *first: the dot where those of the slot before began; set to this slot's. */
-void ih_label_lines_find(const struct ih_dots *dots, const struct ih_line *line, int32_t slot,
-                         const struct ih_labels_params *params, int32_t *first,
-                         struct ih_labels_scratch *scratch, struct ih_labels *out);
+/* Finds the candidates of every slot, and labels none. */
+void ih_label_lines_find(const struct ih_dots *dots, const struct ih_rig *rig,
+                         const struct ih_labels_params *params, struct ih_labels_scratch *scratch,
+                         struct ih_labels *out);
 
 #endif

@@ -3,7 +3,7 @@
 #include "labels/ih_label_growth.h"
 #include "labels/ih_label_lines.h"
 #include "labels/ih_label_seeds.h"
-#include "labels/ih_undistort.h"
+#include "rig/ih_camera.h"
 
 void ih_labels_params_default(struct ih_labels_params *params)
 {
@@ -19,9 +19,11 @@ void ih_labels_params_default(struct ih_labels_params *params)
 static void undistort_dots(const struct ih_dots *dots, const struct ih_rig *rig,
                            struct ih_labels_scratch *scratch)
 {
-    ih_undistort_dots(dots, rig, scratch->u_px_q12, scratch->v_px_q12);
     for (int32_t i = 0; i < dots->dot_count; i++) {
-        ih_label_lines_add_dot(scratch, i, scratch->u_px_q12[i], scratch->v_px_q12[i]);
+        int32_t u_px_q12, v_px_q12;
+        ih_camera_undistort_pixel(rig, dots->dot[i].u_px_q12, dots->dot[i].v_px_q12, &u_px_q12,
+                                  &v_px_q12);
+        ih_label_lines_add_dot(scratch, i, u_px_q12, v_px_q12);
         scratch->slot_of_dot[i] = IH_NONE;
     }
 }
@@ -47,12 +49,9 @@ void ih_labels_assign(const struct ih_dots *dots, const struct ih_rig *rig,
                       const struct ih_labels_params *params, struct ih_labels_scratch *scratch,
                       struct ih_labels *out)
 {
-    int32_t first = 0;
     out->candidates_dropped = 0;
     undistort_dots(dots, rig, scratch);
-    for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
-        ih_label_lines_find(dots, &rig->line[slot], slot, params, &first, scratch, out);
-    }
+    ih_label_lines_find(dots, rig, params, scratch, out);
     ih_label_seeds_assign(rig, params, scratch);
     out->seed_count = 0;
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {

@@ -30,8 +30,8 @@ static int64_t limit_brown_q28(int64_t value_q28)
 }
 
 /* Tangential distortion, from x^2, y^2 and x y. */
-static void tangential(const struct ih_calibration *c, int64_t xx, int64_t yy, int64_t xy,
-                       int64_t *dx_q28, int64_t *dy_q28)
+static inline void tangential(const struct ih_calibration *c, int64_t xx, int64_t yy, int64_t xy,
+                              int64_t *dx_q28, int64_t *dy_q28)
 {
     const int64_t r2 = xx + yy;
     /* 2 xy <= 8; (r2 + 2 xx) / 2 <= 8 */
@@ -42,7 +42,7 @@ static void tangential(const struct ih_calibration *c, int64_t xx, int64_t yy, i
 }
 
 /* Radial factor, from the square of the radius. */
-static int64_t radial_at(const struct ih_calibration *c, uint32_t r2_q28)
+static inline int64_t radial_at(const struct ih_calibration *c, uint32_t r2_q28)
 {
     const int64_t r2 = r2_q28;
     const int64_t r4_q25 = ih_mul_shift(r2, r2, 31);
@@ -55,8 +55,8 @@ static int64_t radial_at(const struct ih_calibration *c, uint32_t r2_q28)
 /* OpenCV's Brown model. |x|, |y| <= 2, so r2 <= 8 = 2^31 in Q28, r4 <= 64 = 2^31 in Q25 and
  * r6 <= 512 = 2^31 in Q22: times a coefficient in int32 each stays below 2^62. A lens that exceeds
  * BROWN_MAX anywhere is limited to it, and check_lens refuses it. */
-static void brown(const struct ih_calibration *c, int32_t x_q28, int32_t y_q28, int64_t *radial_q28,
-                  int64_t *dx_q28, int64_t *dy_q28)
+static inline void brown(const struct ih_calibration *c, int32_t x_q28, int32_t y_q28,
+                         int64_t *radial_q28, int64_t *dx_q28, int64_t *dy_q28)
 {
     const int64_t xx = product_q28(x_q28, x_q28);
     const int64_t yy = product_q28(y_q28, y_q28);
@@ -189,14 +189,21 @@ static void fill_inverse(struct ih_rig *rig)
         ih_mul_shift(k1, 8 * k2 - 12 * k1k1, 24) - rig->calibration.k3_q24, max);
 }
 
-void ih_camera_pixel(const struct ih_rig *rig, int32_t x_q28, int32_t y_q28, int32_t *u_px_q12,
-                     int32_t *v_px_q12)
+static inline void pixel_of(const struct ih_calibration *c, int32_t x_q28, int32_t y_q28,
+                            int32_t *u_px_q12, int32_t *v_px_q12)
 {
-    const struct ih_calibration *c = &rig->calibration;
     *u_px_q12 = (int32_t)(ih_mul_shift(x_q28, c->fx_px_q16, 32) + ih_shift_round(c->cx_px_q16, 4));
     *v_px_q12 = (int32_t)(ih_mul_shift(y_q28, c->fy_px_q16, 32) + ih_shift_round(c->cy_px_q16, 4));
     IH_IN_RANGE(*u_px_q12, -IH_RANGE_PLACE_PX_Q12, IH_RANGE_PLACE_PX_Q12);
     IH_IN_RANGE(*v_px_q12, -IH_RANGE_PLACE_PX_Q12, IH_RANGE_PLACE_PX_Q12);
+}
+
+void ih_camera_undistort_pixel(const struct ih_rig *rig, int32_t u_px_q12, int32_t v_px_q12,
+                               int32_t *undistorted_u_px_q12, int32_t *undistorted_v_px_q12)
+{
+    int32_t x_q28, y_q28;
+    ih_camera_undistort(rig, u_px_q12, v_px_q12, &x_q28, &y_q28);
+    pixel_of(&rig->calibration, x_q28, y_q28, undistorted_u_px_q12, undistorted_v_px_q12);
 }
 
 void ih_camera_distort(const struct ih_rig *rig, int32_t x_q28, int32_t y_q28, int32_t *u_px_q12,
@@ -208,8 +215,8 @@ void ih_camera_distort(const struct ih_rig *rig, int32_t x_q28, int32_t y_q28, i
     int64_t radial, dx, dy;
     brown(c, x, y, &radial, &dx, &dy);
     /* Limits, as a strong lens maps coordinates far outside the frame to anything. */
-    ih_camera_pixel(rig, limit_tan_q28(ih_mul_shift(x, radial, 28) + dx),
-                    limit_tan_q28(ih_mul_shift(y, radial, 28) + dy), u_px_q12, v_px_q12);
+    pixel_of(c, limit_tan_q28(ih_mul_shift(x, radial, 28) + dx),
+             limit_tan_q28(ih_mul_shift(y, radial, 28) + dy), u_px_q12, v_px_q12);
 }
 
 bool ih_camera_sees(const struct ih_rig *rig, int32_t u_px_q12, int32_t v_px_q12)

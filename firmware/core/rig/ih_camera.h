@@ -32,9 +32,9 @@ void ih_camera_undistort(const struct ih_rig *rig, int32_t u_px_q12, int32_t v_p
 void ih_camera_distort(const struct ih_rig *rig, int32_t x_q28, int32_t y_q28, int32_t *u_px_q12,
                        int32_t *v_px_q12);
 
-/* Normalised coordinates -> undistorted pixel (fx x + cx, fy y + cy). */
-void ih_camera_pixel(const struct ih_rig *rig, int32_t x_q28, int32_t y_q28, int32_t *u_px_q12,
-                     int32_t *v_px_q12);
+/* Frame pixel -> the pixel that a camera without distortion would show it at (fx x + cx, fy y + cy). */
+void ih_camera_undistort_pixel(const struct ih_rig *rig, int32_t u_px_q12, int32_t v_px_q12,
+                               int32_t *undistorted_u_px_q12, int32_t *undistorted_v_px_q12);
 
 /* Is the pixel's centre inside the frame? */
 bool ih_camera_sees(const struct ih_rig *rig, int32_t u_px_q12, int32_t v_px_q12);

@@ -76,9 +76,8 @@ static void undistort_dots(const struct ih_dots *dots, const struct ih_rig *rig,
                            struct ih_rotation_vote_scratch *scratch)
 {
     for (int32_t i = 0; i < dots->dot_count; i++) {
-        int32_t x_q28, y_q28;
-        ih_camera_undistort(rig, dots->dot[i].u_px_q12, dots->dot[i].v_px_q12, &x_q28, &y_q28);
-        ih_camera_pixel(rig, x_q28, y_q28, &scratch->u_px_q12[i], &scratch->v_px_q12[i]);
+        ih_camera_undistort_pixel(rig, dots->dot[i].u_px_q12, dots->dot[i].v_px_q12,
+                                  &scratch->u_px_q12[i], &scratch->v_px_q12[i]);
     }
 }
 

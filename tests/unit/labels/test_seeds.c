@@ -93,7 +93,6 @@ static void candidates_lie_on_their_line(void)
                            .length_px_mm_q8 = 10000 << 8,
                            .t_far_px_q12 = 40960,
                            .t_near_px_q12 = 57344};
-    int32_t first = 0;
     int i, direction;
 
     dots.dot_count = 1;
@@ -106,7 +105,8 @@ static void candidates_lie_on_their_line(void)
             line.dir_v_q30 = along_v * (1 << 30);
             scratch.u_px_q12[0] = 400000 + cases[i].t * along_u - cases[i].perp * along_v;
             scratch.v_px_q12[0] = 300000 + cases[i].t * along_v + cases[i].perp * along_u;
-            ih_label_lines_find(&dots, &line, 7, &params, &first, &scratch, &labels);
+            rig.line[7] = line;
+            ih_label_lines_find(&dots, &rig, &params, &scratch, &labels);
             IH_TEST_EQUAL(cases[i].is_candidate, scratch.candidate_count[7], "candidate", i);
             if (cases[i].is_candidate) {
                 const struct ih_candidate *c = &scratch.candidate[7][0];

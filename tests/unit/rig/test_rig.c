@@ -222,6 +222,10 @@ static void without_distortion_undistort_is_a_division(void)
         /* Half a unit of Q28. */
         IH_TEST_WITHIN(0.51, ldexp((u * 65536.0 - c->cx_px_q16) / c->fx_px_q16, 28), x, "x", u);
         IH_TEST_WITHIN(0.51, ldexp((50 * 65536.0 - c->cy_px_q16) / c->fy_px_q16, 28), y, "y", u);
+        /* And the pixel stays where it is: one unit of Q12 for roundings. */
+        ih_camera_undistort_pixel(plain, u << 12, 50 << 12, &x, &y);
+        IH_TEST_WITHIN(1, u << 12, x, "u", u);
+        IH_TEST_WITHIN(1, 50 << 12, y, "v", u);
     }
 }
 
