@@ -210,7 +210,7 @@ static void look_around(struct serve *serve)
 /* --- frames --- */
 
 /* If the loop wants to go on it does so now, and not at the next tick. */
-static void refresh_done(void)
+static void yield_to_loop(void)
 {
     sched_yield();
 }
@@ -227,7 +227,7 @@ static void take_frame(struct serve *serve)
     size_t size = 0;
     if (bytes != NULL) {
         size =
-            serve->config->write(content, serve->mailbox.content_size, bytes, room, refresh_done);
+            serve->config->write(content, serve->mailbox.content_size, bytes, room, yield_to_loop);
     }
     hal_mailbox_done(&serve->mailbox);
     bool has_frame = bytes != NULL && hal_serve_answers_frame(&serve->answers, bytes, size);

@@ -44,9 +44,9 @@ struct hal_serve_config {
     const struct hal_serve_asset *asset;
     int asset_count;
     /* The answer from a content of the mailbox, which may be changed. Its length; 0: it has none. It
-     * calls rest() about every 100 us. */
+     * calls yield_to_loop() about every 100 us. */
     size_t (*write)(void *content, size_t content_size, unsigned char *answer, size_t size,
-                    void (*refresh_done)(void));
+                    void (*yield_to_loop)(void));
     size_t answer_more; /* most bytes that an answer has more than a content */
 };
 

@@ -96,7 +96,7 @@ static bool is_due(const struct hal_watchdog_schedule *schedule, int64_t now_us)
     return now_us >= schedule->next_us;
 }
 
-static void reported(struct hal_watchdog_schedule *schedule, int64_t now_us)
+static void schedule_next(struct hal_watchdog_schedule *schedule, int64_t now_us)
 {
     schedule->next_us = now_us + schedule->step_us;
 }
@@ -113,7 +113,7 @@ static bool feed_notify(struct hal_watchdog_feeder *feeder, int64_t now_us, stru
                hal_fail(error, "NOTIFY_SOCKET: cannot send to it: %s", strerror(errno));
     }
     feeder->ready = true;
-    reported(&feeder->notify, now_us);
+    schedule_next(&feeder->notify, now_us);
     return true;
 }
 
@@ -126,7 +126,7 @@ static bool feed_device(struct hal_watchdog_feeder *feeder, int64_t now_us, stru
         return hal_fail(error, "'%.120s' cannot be written: %s", feeder->config.path,
                         strerror(errno));
     }
-    reported(&feeder->device, now_us);
+    schedule_next(&feeder->device, now_us);
     return true;
 }
 
@@ -138,7 +138,7 @@ static bool feed_guard(struct hal_watchdog_feeder *feeder, int64_t now_us, struc
     if (!hal_guard_feed(feeder->config.guard, error)) {
         return false;
     }
-    reported(&feeder->guard, now_us);
+    schedule_next(&feeder->guard, now_us);
     return true;
 }
 

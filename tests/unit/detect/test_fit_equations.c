@@ -1,4 +1,4 @@
-/* ih_scanline against the plain way: every point, one product after the other, without vectors. To the last
+/* ih_fit_equations against the plain way: every point, one product after the other, without vectors. To the last
  * bit. */
 #include "base/ih_cholesky.h"
 #include "detect/ih_fit_equations.h"
