@@ -348,6 +348,36 @@ def bright(folder):
     data = open(folder + "/000002.pgm", "rb").read()[-320 * 240:]
     return sum(sample >= 250 for sample in data) / len(data)
 
+def rotated(ray, rotation_deg):
+    """By Rodrigues' formula."""
+    angle = math.radians(math.hypot(*rotation_deg))
+    n = [math.radians(r) / angle for r in rotation_deg] if angle else [0, 0, 0]
+    along, cross = sum(a * b for a, b in zip(n, ray)), [n[i - 2] * ray[i - 1] - n[i - 1] * ray[i - 2] for i in range(3)]
+    return [r * math.cos(angle) + c * math.sin(angle) + a * along * (1 - math.cos(angle)) for r, c, a in zip(ray, cross, n)]
+
+def off_px(folder, frame=0, rotations_deg=(), shift_mm=(0, 0, 0), camera=(0, 0, 0)):
+    """Largest distance of a frame's dots from where rig.json sends them after this knock, rotations in order."""
+    rig, truths = read(folder)
+    m, ray = rig["camera_matrix"]["data"], rays(rig)
+    origin = [o + s for o, s in zip(rig["projector_origin"]["data"], shift_mm)]
+    focal, worst = 1 + camera[0] / 100, 0
+    for index, u, v, z in truths[frame]["dots"]:
+        way = ray[index]
+        for rotation_deg in rotations_deg:
+            way = rotated(way, rotation_deg)
+        x, y = (origin[i] + way[i] * (z - origin[2]) / way[2] for i in range(2))
+        worst = max(worst, math.hypot(m[0] * focal * x / z + m[2] + camera[1] - u, m[4] * focal * y / z + m[5] + camera[2] - v))
+    return worst
+
+assert off_px("anybody") < 0.005, "a straight rig is off by %g px" % off_px("anybody")
+for axis, what in (((0.5, 0, 0), "x"), ((-0.2, 0.4, -1), "xyz")):
+    assert off_px("knocked_" + what) > 1 and off_px("knocked_" + what, 2, [axis]) < 0.005, "knocked about %s" % what
+assert off_px("shifted") > 0.2 and off_px("shifted", 2, shift_mm=(0.5, -1, 2)) < 0.005, "shifted"
+assert off_px("refocused") > 1 and off_px("refocused", 2, camera=(-1, 2.5, -4)) < 0.005, "camera"
+together = dict(shift_mm=(0.5, 0, 0), camera=(0.5, 0, 3))
+for frame in range(4):
+    drift = (frame / 3 * 0.3, 0, frame / 3 * -0.6)
+    assert off_px("drifted", frame, [(0.2, 0, 0), drift], **together) < 0.005, "drift of frame %d" % frame
 assert max(turns("anybody")) < 0.02, "a straight rig is not straight: %g" % max(turns("anybody"))
 assert 0.1 < max(turns("knocked")) < 0.32, "knocked by %g" % max(turns("knocked"))
 noisy, true = read("noisy")[0], read("anybody")[0]
@@ -360,14 +390,43 @@ PYTHON
 # shellcheck disable=SC2086 # a list of options
 {
     draw "a knocked projector" knocked $few --knock 0.3
+    draw "knocked about X" knocked_x $few --knock 0.5,0,0
+    draw "knocked about an axis" knocked_xyz $few --knock -0.2,0.4,-1
+    draw "knocked by nothing" unknocked $few --knock 0,0,0 --knock-shift 0,0,0 --knock-camera 0,-0,0 --drift 0,0,0
+    draw "a shifted projector" shifted $few --knock-shift 0.5,-1,2
+    draw "another camera" refocused $few --knock-camera -1,2.5,-4
+    draw "drift after a knock" drifted $few --knock 0.2,0,0 --drift 0.3,0,-0.6 --knock-shift 0.5,0,0 --knock-camera 0.5,0,3
+    draw "the end of a drift" drift_end $few --knock 0.2,0,0 --drift 0.3,0,-0.6 --knock-shift 0.5,0,0 \
+        --knock-camera 0.5,0,3 --first-frame 2
+    draw "drift of a single frame" drift_one --frames 1 --size 320x240 --ambient dim --distortion none --seed 5 --drift 1,0,0
     draw "errors of calibration" noisy $few --calibration-noise 2
     draw "sunlight" sunlight --frames 4 --size 320x240 --seed 8 --ambient sunlight
     refuse "too hard a knock" 2 "--knock" --knock 0.51 a
+    for three in 1,2 1,2,3,4 1,,3 ,1,2 1,2, 1,2,x 1,+2,3 "1, 2,3" 1,2,5.1 -5.1,2,1 1e0,0,0 0x1,0,0 nan,0,0 1.2.3,0,0 .,0,0; do
+        refuse "knock of $three" 2 "--knock $three: must be X,Y,Z of -5 to 5 each" --knock "$three" a
+        refuse "drift of $three" 2 "--drift $three: must be X,Y,Z of -5 to 5 each" --drift "$three" a
+    done
+    refuse "drift about no axis" 2 "--drift 0.3: must be X,Y,Z" --drift 0.3 a
+    refuse "knock by nothing at all" 2 "--knock : must be a number" --knock "" a
+    refuse "shift too far" 2 "--knock-shift 0,50.1,0: must be X,Y,Z of -50 to 50 each" --knock-shift 0,50.1,0 a
+    refuse "shift of one number" 2 "--knock-shift 5" --knock-shift 5 a
+    refuse "another camera altogether" 2 "--knock-camera 20.1,0,0: must be F,CX,CY of -20 to 20" --knock-camera 20.1,0,0 a
+    refuse "principal point too far" 2 "--knock-camera 0,0,-101" --knock-camera 0,0,-101 a
     refuse "knock backwards" 2 "--knock" --knock -0.1 a
     refuse "noise that is no number" 2 "--calibration-noise" --calibration-noise 1e a
 }
-cmp -s knocked/rig.json anybody/rig.json && reason= || reason="rig.json differs"
-result "rig.json does not have the rotation" "$reason"
+reason=
+for knock in knocked knocked_x knocked_xyz shifted refocused drifted; do
+    cmp -s $knock/rig.json anybody/rig.json || reason="rig.json of $knock differs"
+done
+result "rig.json does not have the knock" "$reason"
+[ "$(fingerprint unknocked)" = "$(fingerprint anybody)" ] && reason= || reason="bytes differ"
+result "a knock by nothing changes nothing" "$reason"
+cmp -s drift_end/000003.pgm drifted/000003.pgm && [ "$(cat drift_end/truth.jsonl)" = "$(sed -n 3,4p drifted/truth.jsonl)" ] &&
+    reason= || reason="frame or truth differs"
+result "the end of a drift is the same as in the whole" "$reason"
+cmp -s drift_one/000000.pgm anybody/000000.pgm && reason= || reason="frame differs"
+result "a single frame has not drifted" "$reason"
 cmp -s noisy/000002.pgm anybody/000002.pgm && reason= || reason="frame differs"
 result "errors of calibration change no frame" "$reason"
 /usr/bin/python3 wrong.py >out 2>&1 && reason= || reason=$(tail -n 1 out)

@@ -17,7 +17,7 @@
 #include "rd_stage.h"
 
 struct studio {
-    struct rd_rig rig, written_rig; /* as it is, and as rig.json has it */
+    struct rd_rig rig, start_rig, written_rig; /* as it is, as it was in frame 0, and as rig.json has it */
     struct rd_laser laser;
     struct rd_sensor sensor;
     struct rd_stage stage;
@@ -48,6 +48,7 @@ static struct studio *studio_new(const struct rd_options *options)
     rd_rig_make(&studio->rig, options);
     studio->written_rig = studio->rig;
     rd_rig_knock(&studio->rig, options);
+    studio->start_rig = studio->rig;
     rd_rig_misjudge(&studio->written_rig, options);
     rd_laser_make(&studio->laser, options, &studio->rig);
     rd_sensor_make(&studio->sensor, options);
@@ -64,6 +65,8 @@ static struct studio *studio_new(const struct rd_options *options)
 static bool render_frame(struct studio *studio, struct rd_output *output, int frame)
 {
     struct rd_stage *stage = &studio->stage;
+    if (stage->frame_count > 1)
+        rd_rig_drift(&studio->rig, &studio->start_rig, &stage->options, frame / (stage->frame_count - 1.0));
     if (!rd_stage_frame(stage, frame))
         return false;
     if (stage->still_changed || stage->light.shadows) {

@@ -3,6 +3,7 @@
 #include <errno.h>
 #include <getopt.h>
 #include <limits.h>
+#include <math.h>
 #include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -27,6 +28,9 @@ enum option_id {
     OPT_ACT,
     OPT_TILT,
     OPT_KNOCK,
+    OPT_KNOCK_SHIFT,
+    OPT_KNOCK_CAMERA,
+    OPT_DRIFT,
     OPT_LASER,
     OPT_EXPOSURE,
     OPT_FIRST_FRAME,
@@ -84,7 +88,18 @@ static const char help_text[] = /* at most 80 columns */
     "  --tilt DEG         -40 to 40 (default 0): the camera looks up at people by\n"
     "                     this, down where it is negative\n"
     "  --knock DEG        0 (default) to 0.5: the projector is rotated by this\n"
-    "                     against what rig.json says\n"
+    "                     against what rig.json says, about an axis by seed\n"
+    "  --knock X,Y,Z      -5 to 5 degrees each: rotated by this rotation vector\n"
+    "                     (camera's axes; its direction is the axis, its length the\n"
+    "                     angle)\n"
+    "  --knock-shift X,Y,Z  -50 to 50 mm each: the projector's origin is shifted by\n"
+    "                     this against what rig.json says\n"
+    "  --knock-camera F,CX,CY  the camera differs from what rig.json says: F of\n"
+    "                     -20 to 20 % of focal length, CX and CY of -100 to 100 px\n"
+    "                     of principal point\n"
+    "  --drift X,Y,Z      -5 to 5 degrees each: the projector rotates while the\n"
+    "                     sequence runs, from nothing in frame 0 to this in the last\n"
+    "                     frame, linearly; added to --knock\n"
     "  --calibration-noise X  0 (default) to 10: rig.json's errors, in typical ones:\n"
     "                     0.1 % of fx, 1 px of the centre, 0.01 degrees of each ray,\n"
     "                     0.1 mm of the projector's position\n"
@@ -148,6 +163,28 @@ static bool read_decimal(const char *option, const char *text, double low, doubl
     if (strspn(digits, "0123456789.") != strlen(digits) || end == text || *end != '\0' || *value < low || *value > high)
         return complain(option, text, wanted);
     return true;
+}
+
+/* Three decimal numbers, each at most its limit in magnitude. */
+static bool read_three(const char *option, const char *text, const double limits[3], const char *wanted,
+                       double values[3])
+{
+    const char *at = text;
+    for (int i = 0; i < 3; i++) {
+        char *end;
+        const char *digits = at + (*at == '-');
+        size_t length = strspn(digits, "0123456789.");
+        values[i] = strtod(at, &end);
+        if (length == 0 || end != digits + length || *end != (i < 2 ? ',' : '\0') || fabs(values[i]) > limits[i])
+            return complain(option, text, wanted);
+        at = end + 1;
+    }
+    return true;
+}
+
+static bool read_rotation(const char *option, const char *text, const char *wanted, double values[3])
+{
+    return read_three(option, text, (const double[]){5.0, 5.0, 5.0}, wanted, values);
 }
 
 /* Index of a word in a list that ends with NULL. */
@@ -254,7 +291,17 @@ static bool take_option(int id, const char *text, struct rd_options *options)
     case OPT_TILT:
         return read_decimal("tilt", text, -40.0, 40.0, "a number from -40 to 40", &options->tilt_deg);
     case OPT_KNOCK:
-        return read_decimal("knock", text, 0.0, 0.5, "a number from 0 to 0.5", &options->knock_deg);
+        if (strchr(text, ',') != NULL)
+            return read_rotation("knock", text, "X,Y,Z of -5 to 5 each", options->knock_xyz_deg);
+        return read_decimal("knock", text, 0.0, 0.5, "a number from 0 to 0.5 or X,Y,Z", &options->knock_deg);
+    case OPT_KNOCK_SHIFT:
+        return read_three("knock-shift", text, (const double[]){50.0, 50.0, 50.0}, "X,Y,Z of -50 to 50 each",
+                          options->knock_shift_mm);
+    case OPT_KNOCK_CAMERA:
+        return read_three("knock-camera", text, (const double[]){20.0, 100.0, 100.0},
+                          "F,CX,CY of -20 to 20, -100 to 100, -100 to 100", options->knock_camera);
+    case OPT_DRIFT:
+        return read_rotation("drift", text, "X,Y,Z of -5 to 5 each", options->drift_deg);
     case OPT_CALIBRATION_NOISE:
         return read_decimal("calibration-noise", text, 0.0, 10.0, "a number from 0 to 10", &options->calibration_noise);
     case OPT_FOCAL:
@@ -304,6 +351,9 @@ enum rd_options_result rd_options_parse(int argc, char **argv, struct rd_options
         {"act", required_argument, NULL, OPT_ACT},
         {"tilt", required_argument, NULL, OPT_TILT},
         {"knock", required_argument, NULL, OPT_KNOCK},
+        {"knock-shift", required_argument, NULL, OPT_KNOCK_SHIFT},
+        {"knock-camera", required_argument, NULL, OPT_KNOCK_CAMERA},
+        {"drift", required_argument, NULL, OPT_DRIFT},
         {"calibration-noise", required_argument, NULL, OPT_CALIBRATION_NOISE},
         {"laser", required_argument, NULL, OPT_LASER},
         {"exposure", required_argument, NULL, OPT_EXPOSURE},

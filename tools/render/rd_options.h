@@ -53,7 +53,11 @@ struct rd_options {
     bool rig_seed_given;
     int frame_count;          /* for each depth image, where there are any */
     double tilt_deg;          /* the camera looks up at people by this, or down */
-    double knock_deg;         /* the projector's rotation against what rig.json says */
+    double knock_deg;         /* the projector's rotation against what rig.json says, about an axis by seed */
+    double knock_xyz_deg[3];  /* the same as a rotation vector, camera frame */
+    double knock_shift_mm[3]; /* of the projector's origin */
+    double knock_camera[3];   /* focal length in per cent, principal point in px */
+    double drift_deg[3];      /* the projector's further rotation at the last frame, linear in time */
     double calibration_noise; /* rig.json's errors, in typical errors of a calibration */
     double focal;             /* the focal length against the paper's */
     double assembly;          /* the rig's own differences from the plan, in typical ones */

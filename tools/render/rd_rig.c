@@ -119,12 +119,36 @@ void rd_rig_make(struct rd_rig *rig, const struct rd_options *options)
         assemble(rig, options);
 }
 
+/* Rays of `from` about an axis (unit) into the rig. */
+static void rotate_rays(struct rd_rig *rig, const struct rd_rig *from, struct rd_vec axis, double angle_deg)
+{
+    for (int i = 0; angle_deg > 0.0 && i < RD_DOT_COUNT; i++)
+        rig->dot_rays[i] = rd_unit(turned(from->dot_rays[i], axis, angle_deg * RD_RAD_PER_DEG));
+}
+
+static struct rd_vec vec_of(const double xyz[3])
+{
+    return rd_v(xyz[0], xyz[1], xyz[2]);
+}
+
 void rd_rig_knock(struct rd_rig *rig, const struct rd_options *options)
 {
     struct rd_rng rng = rd_rng_start(options->rig_seed, RD_STREAM_RIG + ((uint64_t)1 << 32));
-    struct rd_vec axis = rd_unit(draw_normal_vec(&rng));
-    for (int i = 0; options->knock_deg > 0.0 && i < RD_DOT_COUNT; i++)
-        rig->dot_rays[i] = rd_unit(turned(rig->dot_rays[i], axis, options->knock_deg * RD_RAD_PER_DEG));
+    struct rd_vec rotation_deg = vec_of(options->knock_xyz_deg);
+    double focal = 1.0 + options->knock_camera[0] / 100.0;
+    rotate_rays(rig, rig, rd_unit(draw_normal_vec(&rng)), options->knock_deg);
+    rotate_rays(rig, rig, rd_unit(rotation_deg), rd_length(rotation_deg));
+    rig->projector_mm = rd_add(rig->projector_mm, vec_of(options->knock_shift_mm));
+    rig->fx_px *= focal;
+    rig->fy_px *= focal;
+    rig->cx_px += options->knock_camera[1];
+    rig->cy_px += options->knock_camera[2];
+}
+
+void rd_rig_drift(struct rd_rig *rig, const struct rd_rig *start, const struct rd_options *options, double fraction)
+{
+    struct rd_vec rotation_deg = vec_of(options->drift_deg);
+    rotate_rays(rig, start, rd_unit(rotation_deg), fraction * rd_length(rotation_deg));
 }
 
 void rd_rig_misjudge(struct rd_rig *rig, const struct rd_options *options)

@@ -25,8 +25,10 @@ struct rd_rig {
 
 void rd_rig_make(struct rd_rig *rig, const struct rd_options *options);
 
-/* Turns the projector by the options' angle about an axis by seed: a calibrated rig that was knocked. */
+/* Rotates and shifts the projector and changes the camera as the options say: a calibrated rig that was knocked. */
 void rd_rig_knock(struct rd_rig *rig, const struct rd_options *options);
+/* The projector's rays of `start`, rotated by a fraction of the options' drift. */
+void rd_rig_drift(struct rd_rig *rig, const struct rd_rig *start, const struct rd_options *options, double fraction);
 /* Gives all numbers of a rig the errors of a calibration, as large as the options say. */
 void rd_rig_misjudge(struct rd_rig *rig, const struct rd_options *options);
 
