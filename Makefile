@@ -28,8 +28,8 @@ LONGRUN_FRAMES ?= 100000
 ARCH ?= arm64
 
 .DEFAULT_GOAL := help
-.PHONY: help sim frames sanitize test check unit fuzz coverage ranges exhaustive mutation accept eval bench \
-  bench-instructions bench-peers bench-grow bench-worst test-bench bits cortexm longrun size vectors learn view figures \
+.PHONY: help sim frames sanitize test check unit fuzz coverage ranges exhaustive mutation accept eval misaligned \
+  bench bench-instructions bench-peers bench-grow bench-worst test-bench bits cortexm longrun size vectors learn view figures \
   test-view test-report live-pictures export board board-gpiod2 deb image flash calibrate test-calibration \
   test-calibration-short test-deb test-board test-image format formatted words layout links lint clean
 
@@ -123,6 +123,11 @@ eval: sim ## everything measured: all data sets, fresh scenes, each part left ou
 	@tools/setup.sh eval
 	@/usr/bin/python3 tools/eval/evaluate.py --host-sim $(BUILD)/host/sim/host_sim \
 	  --render $(BUILD)/host/tools/render/render --work $(BUILD)/eval --data $(DATA)
+
+misaligned: sim ## rig files that are wrong: what is found and labelled; seven minutes, with SHORT=1 one; OPTIONS="--rows X"
+	@tools/setup.sh eval
+	@/usr/bin/python3 tools/eval/misaligned.py --host-sim $(BUILD)/host/sim/host_sim \
+	  --render $(BUILD)/host/tools/render/render --work $(BUILD)/misaligned $(if $(SHORT),--short) $(OPTIONS)
 
 bits: sim ## the same bits from gcc and clang, -O0 and -O3, on nine processors, three of them Cortex-M
 	@tools/setup.sh bits

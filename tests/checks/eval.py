@@ -13,6 +13,8 @@ import unittest
 
 TOOLS = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "tools", "eval")
 sys.path.insert(0, TOOLS)
+import misaligned
+import misaligned_rows
 import report
 import runs
 import scenes
@@ -168,7 +170,80 @@ class Scenes(unittest.TestCase):
         self.assertLessEqual({scene.group for scene in rendered}, set(scenes.GROUPS))
 
 
+def frame(right=True, labels=100, labels_right=100, error_mm=8.0, sigma_mm=10.0, there=True):
+    return misaligned.Frame("0.pgm", there, right, error_mm, sigma_mm, labels, labels_right, None, ())
+
+
+class Misaligned(unittest.TestCase):
+    RIG = {"dot_rays": {"data": [0.0, 0.6, 0.8]}, "projector_origin": {"data": [12.5, 0.0, 0.2]},
+           "camera_matrix": {"data": [900.0, 0.0, 375.5, 0.0, 920.0, 290.5, 0.0, 0.0, 1.0]}}
+
+    def test_a_rotation_about_x_takes_y_to_z(self):
+        for got, expected in zip(misaligned_rows.rotated([0.0, 1.0, 0.0], (90.0, 0.0, 0.0)), (0.0, 0.0, 1.0)):
+            self.assertAlmostEqual(got, expected, 12)
+
+    def test_the_file_from_before_a_knock(self):
+        knock = misaligned_rows.Knock((0.0, 0.0, 90.0), (1.0, 2.0, -3.0), (-10.0, 5.0, -4.0))
+        wrong = misaligned_rows.before(self.RIG, knock)
+        for name, expected in (("dot_rays", (0.6, 0.0, 0.8)), ("projector_origin", (11.5, -2.0, 3.2)),
+                               ("camera_matrix", (1000.0, 0.0, 370.5, 0.0, 1022.2222222, 294.5, 0.0, 0.0, 1.0))):
+            for got, value in zip(wrong[name]["data"], expected):
+                self.assertAlmostEqual(got, value, 6)
+        self.assertEqual(misaligned_rows.before(self.RIG, misaligned_rows.Knock()), self.RIG)
+
+    def test_a_drift_is_as_fast_in_a_short_sequence(self):
+        self.assertEqual(misaligned_rows.drift_deg(1, 500), (0.3, 0.0, 0.0))
+        self.assertAlmostEqual(misaligned_rows.drift_deg(2, 100)[1], -0.06 / 3**0.5)
+
+    def test_a_label_is_right_within_1_px_of_its_own_dot(self):
+        trace = {"dots": {"u_px_q12": [40960, 81920, 122880], "v_px_q12": [40960, 40960, 40960]},
+                 "labels": {"slot": [{"dot": 0}, {"dot": 1}, None, {"dot": 2}]}}
+        real = {**truth(CENTRE), "dots": [[0, 10.6, 10.79, 900], [1, 20.0, 8.9, 900], [2, 30.0, 10.0, 900]]}
+        said = record([off(3, 4)], [0], 0)
+        said["hypotheses"][0]["sigma_mm"] = 2.4
+        got = misaligned.judged({**said, "file": "0.pgm", "rig": {"across_px": [0.5, 0, 0], "rotation_deg": [1, 2, 3]}}, real, trace)
+        self.assertEqual((got.labels, got.labels_right, got.error_mm, got.sigma_mm), (3, 1, 5.0, 2.4))
+        self.assertEqual((got.across_px, got.rotation_deg), (0.5, (1, 2, 3)))
+        self.assertIsNone(misaligned.judged({**said, "file": "0.pgm"}, real, trace).across_px)
+
+    def figures(self, frames, right):
+        piece = misaligned.Piece("paper", "d", 1, misaligned_rows.Knock(), "d")
+        return misaligned.figures([(piece, frames)], [right])
+
+    def test_lost_at_the_start(self):
+        right = [frame(there=False), frame(), frame(right=False), frame(), frame()]
+        wrong = [frame(there=False), frame(False, 100, 89), frame(False), frame(False, 100, 91), frame()]
+        got = self.figures(wrong, right)
+        self.assertEqual((got.late_heads, got.late_labels, got.right, got.right_reference), (2, 0, 2, 4))
+        got = self.figures([frame(labels_right=0)] + right[1:], right)
+        self.assertEqual((got.late_heads, got.late_labels), (0, 1))
+
+    def test_limits(self):
+        right = [frame() for _ in range(200)]
+        limits = misaligned_rows.Limits(1.0, 0, {"paper": 99.5}, 10.0, 90.0)
+        self.assertEqual(misaligned.broken(limits, "paper", self.figures(right, right)), [])
+        wrong = [frame(False, 100, 89)] + [frame() for _ in range(197)] + [frame(False), frame(False)]
+        self.assertEqual(misaligned.broken(limits, "paper", self.figures(wrong, right)), ["right", "late"])
+        far = [frame(True, 1000, 994, 18.1, 9.0)] * 200
+        self.assertEqual(misaligned.broken(limits, "paper", self.figures(far, right)), ["labels", "centre", "2 sigma"])
+        nothing = [frame(False, 0, 0, None, None)] * 200
+        self.assertEqual(misaligned.broken(limits, "paper", self.figures(nothing, right)),
+                         ["right", "late", "labels", "centre", "2 sigma"])
+
+    def test_short_rows_exist(self):
+        self.assertLessEqual(set(misaligned_rows.SHORT), {row.name for row in misaligned_rows.all_rows()})
+
+
 class Programs(unittest.TestCase):
+    def test_rows_of_a_wrong_rig_and_of_false_dots(self):
+        with tempfile.TemporaryDirectory() as work:
+            done = subprocess.run(["/usr/bin/python3", os.path.join(TOOLS, "misaligned.py"), "--host-sim", PROGRAMS[0],
+                                   "--render", PROGRAMS[1], "--work", work, "--rows", "^(right rig|cy 4 px|random dots)$", "--rig",
+                                   "paper", "--frames", "4", "--seeds", "1"], stdout=subprocess.PIPE, text=True, check=False)
+        table = done.stdout.splitlines()
+        self.assertEqual([row.split("  ")[0] for row in table[:4]], ["row", "right rig", "cy 4 px", "random dots"])
+        self.assertIn("100.0%", table[1])
+
     def evaluate(self, work):
         subprocess.run(["/usr/bin/python3", os.path.join(TOOLS, "evaluate.py"), "--quick", "--host-sim",
                         PROGRAMS[0], "--render", PROGRAMS[1], "--work", work], check=True,
