@@ -13,6 +13,8 @@ import runs
 import scenes
 
 FULL_GREY = 250
+# The sensor's offset, and what noise adds to a maximum: exposure does not scale them.
+DARK_GREY = 6.0
 EXPOSURE_MAX = 20.0
 RANDOM_DOTS = 1024
 SPOT_SIGMA_PX, SPOT_REACH_PX = 1.2, 7
@@ -49,7 +51,7 @@ def half_exposure(directory):
         for _, u, v, _ in truths[name]["dots"]:
             column, row = math.floor(u + 0.5), math.floor(v + 0.5)
             peaks.append(image[row:row + 3, column:column + 3].max())
-    return min(FULL_GREY / float(np.median(peaks)), EXPOSURE_MAX)
+    return min((FULL_GREY - DARK_GREY) / (float(np.median(peaks)) - DARK_GREY), EXPOSURE_MAX)
 
 
 def rendered(programs, work, kind, rig, sequence, seed, frames):
