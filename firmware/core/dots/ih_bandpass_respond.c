@@ -15,7 +15,17 @@
 
 #if IH_CORTEXM
 #include "dots/ih_bandpass_cortexm.h"
-#elif IH_I16_LANES > 0
+#else
+static inline bool is_any_above(const int16_t *response, int16_t limit)
+{
+    int16_t max = 0;
+    for (int32_t i = 0; i < GROUP; i++) {
+        max = response[i] > max ? response[i] : max;
+    }
+    return max > limit;
+}
+
+#if IH_I16_LANES > 0
 /* (81 i + 8) / 16 - b; 81 / 16 is 8 * 20736 / 2^15. */
 static inline ih_i16 respond_lanes(ih_u16 sum, ih_u16 box)
 {
@@ -40,15 +50,6 @@ static inline ih_i16 respond_two(const struct ih_bandpass_rows *rows, const uint
     return ih_i16_max(low, high);
 }
 
-static inline bool is_any_above(const int16_t *response, int16_t limit)
-{
-    ih_i16 max = ih_i16_load(response);
-    for (int32_t i = IH_I16_LANES; i < GROUP; i += IH_I16_LANES) {
-        max = ih_i16_max(max, ih_i16_load(&response[i]));
-    }
-    return ih_i16_any(max > ih_i16_all(limit));
-}
-
 /* The last vector ends with the row; some of its lanes are there already. */
 static void respond_bytes(const struct ih_bandpass_rows *rows, const uint16_t *nine, int32_t first,
                           int32_t width, int16_t *response)
@@ -58,15 +59,6 @@ static void respond_bytes(const struct ih_bandpass_rows *rows, const uint16_t *n
     }
 }
 #else
-static inline bool is_any_above(const int16_t *response, int16_t limit)
-{
-    int16_t max = 0;
-    for (int32_t i = 0; i < GROUP; i++) {
-        max = response[i] > max ? response[i] : max;
-    }
-    return max > limit;
-}
-
 static void respond_bytes(const struct ih_bandpass_rows *rows, const uint16_t *nine, int32_t first,
                           int32_t width, int16_t *restrict response)
 {
@@ -80,6 +72,7 @@ static void respond_bytes(const struct ih_bandpass_rows *rows, const uint16_t *n
         response[u] = (int16_t)(INNER / OUTER * sum + half_up / OUTER - box);
     }
 }
+#endif
 #endif
 
 /* Groups from pixel u on join the listed ones, without a branch: a group that is not above its limit is
@@ -104,17 +97,17 @@ static int32_t respond_and_list(const struct ih_bandpass_rows *rows, const uint1
                                 int16_t *restrict response, int16_t *restrict first)
 {
     const struct ih_bandpass_rows in = *rows;
-    int32_t listed = 0;
-    for (int32_t group = 0; group < groups; group++) {
-        const int32_t u = GROUP * group;
+    size_t group = 0, listed = 0;
+    for (int32_t u = 0; u < GROUP * groups; u += GROUP) {
         ih_i16 max = respond_two(&in, nine, u, response);
         for (int32_t at = u + 2 * IH_I16_LANES; at < u + GROUP; at += 2 * IH_I16_LANES) {
             max = ih_i16_max(max, respond_two(&in, nine, at, response));
         }
         first[listed] = (int16_t)u;
         listed += ih_i16_any(max > ih_i16_all(limit[group]));
+        group++;
     }
-    return listed;
+    return (int32_t)listed;
 }
 
 void ih_bandpass_respond_bytes(const struct ih_bandpass_rows *rows, const uint16_t *nine,
