@@ -23,7 +23,6 @@
 
 #include <stdalign.h>
 #include <stdbool.h>
-#include <stddef.h>
 #include <stdint.h>
 
 #include "base/ih_config.h"
@@ -91,10 +90,9 @@ void ih_bandpass_columns(const struct ih_bandpass *band, int32_t rows, uint16_t 
  * rows is above the limit. At least IH_BANDPASS_ROWS have been pushed. */
 bool ih_bandpass_is_any_above(const struct ih_bandpass *band, int32_t limit);
 
-/* R of the middle one of nine rows of bytes; nothing is pushed. prefetch: byte offset from each of these
- * rows to the one that is needed next, or 0. */
+/* R of the middle one of nine rows of bytes; nothing is pushed. */
 void ih_bandpass_bytes(struct ih_bandpass *band, const uint8_t *const row[IH_BANDPASS_ROWS],
-                       int32_t width, size_t prefetch, int16_t *response);
+                       int32_t width, int16_t *response);
 
 IH_END_DECLS
 

@@ -109,8 +109,9 @@ static inline bool is_any_above(const int16_t *response, int16_t limit)
 }
 
 /* Sums of three rows, and their 1-2-1. */
-static inline void sum_rows(const uint8_t *above, const uint8_t *middle, const uint8_t *below,
-                            int32_t width, uint16_t *restrict inner, uint16_t *restrict column)
+static inline void sum_three_rows(const uint8_t *above, const uint8_t *middle, const uint8_t *below,
+                                  int32_t width, uint16_t *restrict inner,
+                                  uint16_t *restrict column)
 {
     int32_t u = 0;
     for (; u + 4 <= width; u += 4) {
@@ -148,6 +149,17 @@ static inline void add_rows(const uint8_t *above, const uint8_t *below, int32_t 
     }
     for (; u < width; u++) {
         column[u] = (uint16_t)(column[u] + above[u] + below[u]);
+    }
+}
+
+/* Sums of nine rows, and the 1-2-1 of the three in the middle. */
+static inline void sum_rows(const uint8_t *const row[IH_BANDPASS_ROWS], int32_t width,
+                            uint16_t *restrict inner, uint16_t *restrict column)
+{
+    const int32_t middle = IH_BANDPASS_REACH;
+    sum_three_rows(row[middle - 1], row[middle], row[middle + 1], width, inner, column);
+    for (int32_t i = 2; i <= IH_BANDPASS_REACH; i++) {
+        add_rows(row[middle - i], row[middle + i], width, column);
     }
 }
 

@@ -119,9 +119,7 @@ static void filter_bytes(const struct ih_frame *frame, int32_t v, struct ih_band
         const int32_t at = ih_clamp_s32(v + i - IH_BANDPASS_REACH, 0, frame->height - 1);
         row[i] = &samples[(size_t)at * (size_t)frame->stride_bytes];
     }
-    const bool is_last = v + IH_NOISE_STEP + IH_BANDPASS_REACH >= frame->height;
-    ih_bandpass_bytes(band, row, frame->width,
-                      is_last ? 0 : IH_NOISE_STEP * (size_t)frame->stride_bytes, response);
+    ih_bandpass_bytes(band, row, frame->width, response);
 }
 
 /* R of row v; an ambient frame is subtracted as the map says. */

@@ -45,13 +45,6 @@ typedef uint64_t ih_u64 __attribute__((vector_size(IH_SIMD_BYTES)));
 
 /* 8 bits */
 
-static inline ih_u8 ih_u8_load(const uint8_t *from)
-{
-    ih_u8 value;
-    __builtin_memcpy(&value, from, sizeof value);
-    return value;
-}
-
 static inline void ih_u8_store(uint8_t *to, ih_u8 value)
 {
     __builtin_memcpy(to, &value, sizeof value);

@@ -40,18 +40,6 @@ static inline struct ih_u16_two ih_u16_two_load_u8(const uint8_t *from)
                                (ih_u16)_mm256_cvtepu8_epi16(_mm_loadu_si128(&bytes[1]))};
 }
 
-/* Lanes of a and of b in turn, to twice as many as a vector has. */
-static inline void ih_i16_store_zip(int16_t *to, ih_i16 a, ih_i16 b)
-{
-    const __m256i low = _mm256_unpacklo_epi16((__m256i)a, (__m256i)b);
-    const __m256i high = _mm256_unpackhi_epi16((__m256i)a, (__m256i)b);
-    __m128i *out = (__m128i *)(void *)to;
-    _mm_storeu_si128(&out[0], _mm256_castsi256_si128(low));
-    _mm_storeu_si128(&out[1], _mm256_castsi256_si128(high));
-    _mm_storeu_si128(&out[2], _mm256_extracti128_si256(low, 1));
-    _mm_storeu_si128(&out[3], _mm256_extracti128_si256(high, 1));
-}
-
 /* Eight lanes from there, and the next eight, where there are more, from so many lanes on. */
 static inline ih_i16 ih_i16_load_eights(const int16_t *from, int32_t apart)
 {

@@ -97,11 +97,6 @@ static inline struct ih_u16_two ih_u16_two_load_u8(const uint8_t *from)
                                (ih_u16)vmovl_u8(vget_high_u8(bytes))};
 }
 
-static inline void ih_i16_store_zip(int16_t *to, ih_i16 a, ih_i16 b)
-{
-    vst2q_s16(to, (int16x8x2_t){{(int16x8_t)a, (int16x8_t)b}});
-}
-
 static inline ih_i16 ih_i16_load_eights(const int16_t *from, int32_t apart)
 {
     (void)apart;

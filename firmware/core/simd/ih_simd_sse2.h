@@ -39,12 +39,6 @@ static inline struct ih_u16_two ih_u16_two_load_u8(const uint8_t *from)
                                (ih_u16)_mm_unpackhi_epi8(bytes, zero)};
 }
 
-static inline void ih_i16_store_zip(int16_t *to, ih_i16 a, ih_i16 b)
-{
-    ih_i16_store(to, (ih_i16)_mm_unpacklo_epi16((__m128i)a, (__m128i)b));
-    ih_i16_store(&to[IH_I16_LANES], (ih_i16)_mm_unpackhi_epi16((__m128i)a, (__m128i)b));
-}
-
 static inline ih_i16 ih_i16_load_eights(const int16_t *from, int32_t apart)
 {
     (void)apart;

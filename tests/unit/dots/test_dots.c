@@ -622,7 +622,7 @@ static void filter_whole(void)
             row[i] =
                 ih_frame_scanline(&frame, ih_clamp_s32(v + i - 4, 0, frame.height - 1)).samples;
         }
-        ih_bandpass_bytes(&band, row, frame.width, 0, &plain[v + 1][1]);
+        ih_bandpass_bytes(&band, row, frame.width, &plain[v + 1][1]);
     }
 }
 

@@ -256,7 +256,7 @@ static void medians_are_those_of_sorted_values(void)
             for (k = 0; k < IH_BANDPASS_ROWS; k++) {
                 row[k] = &grey8[(96 + k) * 352];
             }
-            ih_bandpass_bytes(&band, row, 352, 0, out);
+            ih_bandpass_bytes(&band, row, 352, out);
             for (k = 0; k < 64; k++) {
                 value[k] = (uint16_t)abs(out[128 + k % 32]);
             }
