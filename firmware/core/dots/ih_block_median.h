@@ -2,7 +2,8 @@
  *
  * In:     rows of R, at most IH_BLOCK_MEDIAN_ROWS, cut into blocks of IH_NOISE_BLOCK pixels.
  * Out:    of each block the value of rank count / 2, from 0, of its count values.
- * Method: halving the range of values. Nearly all medians are below 255: 8 bits are searched first.
+ * Method: halving the range of values. Nearly all medians are below 255: 8 bits are searched first, and all
+ *         of a block's that has a larger one.
  */
 #ifndef IH_BLOCK_MEDIAN_H
 #define IH_BLOCK_MEDIAN_H

@@ -9,7 +9,7 @@
 #include "simd/ih_simd_cortexm.h"
 
 /* Unrolled by hand: gcc 12 does not unroll at -O2. */
-static inline int32_t count_up_to(const uint16_t *value, uint16_t limit)
+static inline int32_t count_up_to(const int16_t *value, int16_t limit)
 {
     const uint32_t one = ih_word_in_register(IH_WORD_ALL(1));
     const uint32_t raised = IH_WORD_ALL(limit) + IH_WORD_ALL(0x8000);

@@ -1,5 +1,6 @@
 /* ih_noise against NumPy, on frames that both sides make by the same formula. */
 #include "dots/ih_bandpass.h"
+#include "dots/ih_block_median.h"
 #include "dots/ih_noise.h"
 
 #include <stdlib.h>
@@ -266,6 +267,43 @@ static void medians_are_those_of_sorted_values(void)
     }
 }
 
+/* Blocks at the right border lack columns, those at the lower border rows. */
+static void medians_do_not_count_pixels_that_blocks_lack(void)
+{
+    static const int32_t widths[] = {320, 321, 335, 350, 351, 352, 385, 479, 751, 1279, 1280};
+    static const int32_t largest[] = {3, 200, 300, 18360};
+    struct ih_test_random random = {13};
+    uint16_t value[64], median[IH_NOISE_BLOCKS_X];
+    int32_t i, k, u, count, row, rows;
+
+    for (i = 0; i < IH_TEST_COUNT(widths) * IH_TEST_COUNT(largest); i++) {
+        const int32_t width = widths[i / IH_TEST_COUNT(largest)];
+        const int32_t max = largest[i % IH_TEST_COUNT(largest)];
+
+        for (rows = 1; rows <= IH_BLOCK_MEDIAN_ROWS; rows++) {
+            static int16_t response[IH_BLOCK_MEDIAN_ROWS][IH_FRAME_WIDTH_MAX], copy[2][1280];
+
+            for (k = 0; k < rows * width; k++) {
+                copy[k / width][k % width] = (int16_t)ih_test_between(&random, -max, max);
+            }
+            memset(response, IH_TEST_FILL, sizeof response);
+            memcpy(response[0], copy[0], (size_t)width * sizeof copy[0][0]);
+            memcpy(response[rows - 1], copy[rows - 1], (size_t)width * sizeof copy[0][0]);
+            ih_block_medians(response, width, rows, median);
+            for (k = 0; k < (width + 31) / 32; k++) {
+                count = 0;
+                for (row = 0; row < rows; row++) {
+                    for (u = 32 * k; u < width && u < 32 * k + 32; u++) {
+                        value[count++] = (uint16_t)abs(copy[row][u]);
+                    }
+                }
+                qsort(value, (size_t)count, sizeof value[0], compare_values);
+                IH_TEST_EQUAL(value[count / 2], median[k], "median", width * 100 + k);
+            }
+        }
+    }
+}
+
 /* A bright dot in every block, as close as the pattern comes: the noise stays that of the frame. */
 static void dots_are_no_noise(void)
 {
@@ -313,6 +351,7 @@ int main(void)
     RUN_TEST(there_are_no_seams);
     RUN_TEST(no_pixel_of_a_block_is_below_its_minimum);
     RUN_TEST(medians_are_those_of_sorted_values);
+    RUN_TEST(medians_do_not_count_pixels_that_blocks_lack);
     RUN_TEST(dots_are_no_noise);
     RUN_TEST(the_hardest_frames_fit);
     return UNITY_END();
