@@ -158,23 +158,24 @@ static void add_inside(const struct candidate *candidate, const struct view *vie
 /* Rays around and above the head: is it open there? */
 static void add_around(const struct view *view, struct sums *sums)
 {
+    struct ih_ray_count *region = sums->around.region;
     int64_t ex = view->at_q14[0];
     int64_t ey = view->at_q14[1];
     if (ey < -HIGH_FROM_Q14 && ih_abs_s64(ex) < HIGH_WIDE_Q14) {
-        add_ray(&sums->around.high, view->is_open);
+        add_ray(&region[IH_RAY_HIGH], view->is_open);
     }
     if (view->distance2_q28 <= RING_INNER2_Q28 || view->distance2_q28 >= RING_OUTER2_Q28) {
         return;
     }
     if (10 * ey > IH_HEAD_RING_BELOW_TENTHS * ih_abs_s64(ex)) {
-        add_ray(&sums->around.below, view->is_open);
+        add_ray(&region[IH_RAY_BELOW], view->is_open);
         return;
     }
-    add_ray(&sums->around.nothing, view->ray->state == IH_RAY_EMPTY);
+    sums->around.nothing += view->ray->state == IH_RAY_EMPTY;
     if (10 * ey < -IH_HEAD_RING_ABOVE_TENTHS * ih_abs_s64(ex)) {
-        add_ray(&sums->around.above, view->is_open);
+        add_ray(&region[IH_RAY_ABOVE], view->is_open);
     } else {
-        add_ray(ex < 0 ? &sums->around.left : &sums->around.right, view->is_open);
+        add_ray(&region[ex < 0 ? IH_RAY_LEFT : IH_RAY_RIGHT], view->is_open);
     }
 }
 
@@ -187,27 +188,29 @@ static bool between_mm(int32_t value_mm_q8, int32_t low_mm, int32_t high_mm)
 static void add_below(const struct view *view, const struct ih_ellipsoid *ellipsoid,
                       struct sums *sums)
 {
+    struct ih_ray_count *region = sums->around.region;
     int32_t aside_q8 = ih_abs_s32(view->x_mm_q8);
     int32_t chin_q8 = view->below_chin_mm_q8;
     if (between_mm(chin_q8, IH_HEAD_BODY_TOP_MM, IH_HEAD_BODY_BOTTOM_MM) &&
         aside_q8 < IH_HEAD_BODY_ASIDE_MM << 8) {
-        add_ray(&sums->around.body, view->is_body);
+        add_ray(&region[IH_RAY_BODY], view->is_body);
         sums->body_dz_q8 += view->is_body ? view->dz_mm_q8 : 0;
     }
     if (between_mm(chin_q8, IH_HEAD_BODY_TOP_MM, IH_HEAD_WIDE_BOTTOM_MM) &&
         aside_q8 > IH_HEAD_WIDE_ASIDE_MM << 8) {
-        add_ray(&sums->around.wide, view->is_body);
+        add_ray(&region[IH_RAY_WIDE], view->is_body);
     }
     if (ih_abs_s32(view->y_mm_q8) < ellipsoid->semi_mm_q8[1] &&
         between_mm(aside_q8, IH_HEAD_LEVEL_NEAR_MM, IH_HEAD_LEVEL_FAR_MM)) {
-        add_ray(&sums->around.level,
+        add_ray(&region[IH_RAY_LEVEL],
                 view->is_seen && ih_abs_s32(view->dz_mm_q8) < IH_HEAD_LEVEL_DEPTH_MM << 8);
     }
     if (100 * (int64_t)view->y_mm_q8 >
             IH_HEAD_SHOULDER_TOP_PERCENT * (int64_t)ellipsoid->semi_mm_q8[1] &&
         chin_q8 < IH_HEAD_SHOULDER_BOTTOM_MM << 8 &&
         between_mm(aside_q8, IH_HEAD_SHOULDER_NEAR_MM, IH_HEAD_SHOULDER_FAR_MM)) {
-        add_ray(&sums->around.shoulder[view->x_mm_q8 > 0], view->is_body);
+        const bool is_right = view->x_mm_q8 > 0;
+        add_ray(&region[is_right ? IH_RAY_SHOULDER_RIGHT : IH_RAY_SHOULDER_LEFT], view->is_body);
     }
 }
 
@@ -277,26 +280,30 @@ static int32_t taller_q8(const struct ih_ellipsoid *ellipsoid)
 static void summarise(const struct sums *sums, const struct ih_evidence_nest *nest,
                       int32_t value_q8[])
 {
+    const struct ih_ray_count *region = sums->around.region;
+    const int32_t beside =
+        region[IH_RAY_ABOVE].all + region[IH_RAY_LEFT].all + region[IH_RAY_RIGHT].all;
     int32_t on = ih_max_s32(sums->on, 1);
     int32_t rough_q8 = root_mm_q8(sums->on_square_q16 / on);
     value_q8[IH_EVIDENCE_ON] = sums->on << 8;
     value_q8[IH_EVIDENCE_ROUGH] = rough_q8;
     int32_t plane_q8 = sums->on >= PLANE_POINTS_MIN ? root_mm_q8(plane_residual_q8(sums) * 256) : 0;
     value_q8[IH_EVIDENCE_BULGE] = plane_q8 - rough_q8;
-    value_q8[IH_EVIDENCE_ABOVE] = careful_fraction_q8(sums->around.above);
-    value_q8[IH_EVIDENCE_BESIDE] =
-        ih_min_s32(careful_fraction_q8(sums->around.left), careful_fraction_q8(sums->around.right));
-    value_q8[IH_EVIDENCE_BELOW] = careful_fraction_q8(sums->around.below);
-    value_q8[IH_EVIDENCE_HIGH] = careful_fraction_q8(sums->around.high);
-    value_q8[IH_EVIDENCE_NOTHING] = fraction_q8(sums->around.nothing, 1);
-    value_q8[IH_EVIDENCE_BODY] = fraction_q8(sums->around.body, 3);
-    value_q8[IH_EVIDENCE_BODY_RAYS] = ih_min_s32(sums->around.body.all, BODY_RAYS_MAX) << 8;
+    value_q8[IH_EVIDENCE_ABOVE] = careful_fraction_q8(region[IH_RAY_ABOVE]);
+    value_q8[IH_EVIDENCE_BESIDE] = ih_min_s32(careful_fraction_q8(region[IH_RAY_LEFT]),
+                                              careful_fraction_q8(region[IH_RAY_RIGHT]));
+    value_q8[IH_EVIDENCE_BELOW] = careful_fraction_q8(region[IH_RAY_BELOW]);
+    value_q8[IH_EVIDENCE_HIGH] = careful_fraction_q8(region[IH_RAY_HIGH]);
+    value_q8[IH_EVIDENCE_NOTHING] =
+        fraction_q8((struct ih_ray_count){sums->around.nothing, beside}, 1);
+    value_q8[IH_EVIDENCE_BODY] = fraction_q8(region[IH_RAY_BODY], 3);
+    value_q8[IH_EVIDENCE_BODY_RAYS] = ih_min_s32(region[IH_RAY_BODY].all, BODY_RAYS_MAX) << 8;
     value_q8[IH_EVIDENCE_BODY_DEPTH] =
-        (int32_t)ih_div_round(sums->body_dz_q8, ih_max_s32(sums->around.body.part, 1));
-    value_q8[IH_EVIDENCE_WIDE] = fraction_q8(sums->around.wide, 3);
-    value_q8[IH_EVIDENCE_LEVEL] = fraction_q8(sums->around.level, 3);
-    value_q8[IH_EVIDENCE_SHOULDER] = ih_min_s32(fraction_q8(sums->around.shoulder[0], 2),
-                                                fraction_q8(sums->around.shoulder[1], 2));
+        (int32_t)ih_div_round(sums->body_dz_q8, ih_max_s32(region[IH_RAY_BODY].part, 1));
+    value_q8[IH_EVIDENCE_WIDE] = fraction_q8(region[IH_RAY_WIDE], 3);
+    value_q8[IH_EVIDENCE_LEVEL] = fraction_q8(region[IH_RAY_LEVEL], 3);
+    value_q8[IH_EVIDENCE_SHOULDER] = ih_min_s32(fraction_q8(region[IH_RAY_SHOULDER_LEFT], 2),
+                                                fraction_q8(region[IH_RAY_SHOULDER_RIGHT], 2));
     value_q8[IH_EVIDENCE_BEFORE] = sums->around.before << 8;
     value_q8[IH_EVIDENCE_EXTENT] = nest->present ? nest->extent_mm_q8 : 0;
     value_q8[IH_EVIDENCE_UPRIGHT] =

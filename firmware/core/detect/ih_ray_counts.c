@@ -21,39 +21,20 @@ static void leave_all(const struct ih_rays *rays, struct ih_ray_marks *marks)
 }
 
 #if IH_I16_LANES > 0
-#define OFFSET_MAX2_Q10 16000 /* below the square of IH_RAY_OFFSET_MAX, 3.99 semi-axes */
 #define RING_INNER2_Q10 ((int16_t)IH_HEAD_SQUARE(IH_HEAD_RING_INNER_PERCENT, 10))
 #define RING_OUTER2_Q10 ((int16_t)IH_HEAD_SQUARE(IH_HEAD_RING_OUTER_PERCENT, 10))
 #define AROUND2_Q10 ((int16_t)IH_HEAD_SQUARE(IH_HEAD_AROUND_PERCENT, 10))
 #define BELOW_Q15 ((int16_t)IH_HEAD_PART(IH_HEAD_RING_BELOW_TENTHS * 10, 15))
 #define ABOVE_Q15 ((int16_t)IH_HEAD_PART(IH_HEAD_RING_ABOVE_TENTHS * 10, 15))
-
-/* Regions around a head. */
-enum region {
-    HIGH,
-    BELOW,
-    ABOVE,
-    LEFT,
-    RIGHT,
-    BODY,
-    WIDE,
-    LEVEL,
-    SHOULDER_LEFT,
-    SHOULDER_RIGHT,
-    BEFORE,
-    REGION_COUNT
-};
+/* A slack like a region's, but only the points before the front are counted there. */
+#define BEFORE IH_RAY_REGIONS
+#define SLACKS (IH_RAY_REGIONS + 1)
 
 /* Counts of a lane's rays in each region, and of those that met what the region is about. */
 struct sums {
-    ih_i16 all[REGION_COUNT], part[REGION_COUNT];
+    ih_i16 all[IH_RAY_REGIONS], part[IH_RAY_REGIONS];
     ih_i16 nothing, before;
 };
-
-static inline ih_i16 opposite(ih_i16 value)
-{
-    return ih_i16_sub(ih_i16_all(0), value);
-}
 
 static inline ih_i16 min3(ih_i16 a, ih_i16 b, ih_i16 c)
 {
@@ -109,24 +90,24 @@ static inline struct offset offset_of(const struct ih_ray_limits *candidate,
 
 /* By how much a ray is inside of each region. */
 static inline void find_slack_around(const struct ih_ray_limits *candidate, const struct offset *at,
-                                     ih_i16 slack[REGION_COUNT])
+                                     ih_i16 slack[SLACKS])
 {
     const ih_i16 limit = ih_i16_mul_high(at->aside_q12, ih_i16_all(ABOVE_Q15));
-    const ih_i16 up = ih_i16_shift_right(opposite(ih_i16_add(at->ey_q11, limit)), 1);
-    const ih_i16 beside = ih_i16_min(at->ring, opposite(at->down));
-    const ih_i16 side = ih_i16_min(beside, opposite(up));
-    slack[HIGH] = min3(opposite(ih_i16_add(at->y, ih_i16_all(candidate->high_y))),
-                       below(ih_i16_abs(at->x), candidate->high_x),
-                       below(ih_i16_abs(at->dy_q14), candidate->reach_q14[1]));
-    slack[BELOW] = ih_i16_min(at->ring, at->down);
-    slack[ABOVE] = ih_i16_min(beside, up);
-    slack[LEFT] = ih_i16_min(side, opposite(at->ex_q11));
-    slack[RIGHT] = ih_i16_min(side, at->ex_q11);
+    const ih_i16 up = ih_i16_shift_right(ih_i16_negate(ih_i16_add(at->ey_q11, limit)), 1);
+    const ih_i16 beside = ih_i16_min(at->ring, ih_i16_negate(at->down));
+    const ih_i16 side = ih_i16_min(beside, ih_i16_negate(up));
+    slack[IH_RAY_HIGH] = min3(ih_i16_negate(ih_i16_add(at->y, ih_i16_all(candidate->high_y))),
+                              below(ih_i16_abs(at->x), candidate->high_x),
+                              below(ih_i16_abs(at->dy_q14), candidate->reach_q14[1]));
+    slack[IH_RAY_BELOW] = ih_i16_min(at->ring, at->down);
+    slack[IH_RAY_ABOVE] = ih_i16_min(beside, up);
+    slack[IH_RAY_LEFT] = ih_i16_min(side, ih_i16_negate(at->ex_q11));
+    slack[IH_RAY_RIGHT] = ih_i16_min(side, at->ex_q11);
     slack[BEFORE] = ih_i16_shift_right(below(at->ee_q10, AROUND2_Q10), 2);
 }
 
 static inline void find_slack_below(const struct ih_ray_limits *candidate, const struct offset *at,
-                                    ih_i16 slack[REGION_COUNT])
+                                    ih_i16 slack[SLACKS])
 {
     const ih_i16 aside = ih_i16_abs(at->x);
     const ih_i16 under = above(at->y, candidate->body_top_y);
@@ -134,16 +115,16 @@ static inline void find_slack_below(const struct ih_ray_limits *candidate, const
                                             below(at->y, candidate->shoulder_bottom_y),
                                             above(aside, IH_RAY_MM_Q4(IH_HEAD_SHOULDER_NEAR_MM))),
                                        below(aside, IH_RAY_MM_Q4(IH_HEAD_SHOULDER_FAR_MM)));
-    slack[BODY] = min3(under, below(at->y, candidate->body_bottom_y),
-                       below(aside, IH_RAY_MM_Q4(IH_HEAD_BODY_ASIDE_MM)));
-    slack[WIDE] = ih_i16_min(min3(under, below(at->y, candidate->wide_bottom_y),
-                                  above(aside, IH_RAY_MM_Q4(IH_HEAD_WIDE_ASIDE_MM))),
-                             below(ih_i16_abs(at->dx_q14), candidate->reach_q14[0]));
-    slack[LEVEL] = min3(below(ih_i16_abs(at->y), candidate->semi_y),
-                        above(aside, IH_RAY_MM_Q4(IH_HEAD_LEVEL_NEAR_MM)),
-                        below(aside, IH_RAY_MM_Q4(IH_HEAD_LEVEL_FAR_MM)));
-    slack[SHOULDER_LEFT] = ih_i16_min(shoulder, opposite(at->x));
-    slack[SHOULDER_RIGHT] = ih_i16_min(shoulder, at->x);
+    slack[IH_RAY_BODY] = min3(under, below(at->y, candidate->body_bottom_y),
+                              below(aside, IH_RAY_MM_Q4(IH_HEAD_BODY_ASIDE_MM)));
+    slack[IH_RAY_WIDE] = ih_i16_min(min3(under, below(at->y, candidate->wide_bottom_y),
+                                         above(aside, IH_RAY_MM_Q4(IH_HEAD_WIDE_ASIDE_MM))),
+                                    below(ih_i16_abs(at->dx_q14), candidate->reach_q14[0]));
+    slack[IH_RAY_LEVEL] = min3(below(ih_i16_abs(at->y), candidate->semi_y),
+                               above(aside, IH_RAY_MM_Q4(IH_HEAD_LEVEL_NEAR_MM)),
+                               below(aside, IH_RAY_MM_Q4(IH_HEAD_LEVEL_FAR_MM)));
+    slack[IH_RAY_SHOULDER_LEFT] = ih_i16_min(shoulder, ih_i16_negate(at->x));
+    slack[IH_RAY_SHOULDER_RIGHT] = ih_i16_min(shoulder, at->x);
 }
 
 /* What rays returned; unsure: a depth on a limit. */
@@ -172,18 +153,17 @@ static inline struct returns returns_of(const struct ih_ray_limits *candidate,
 }
 
 /* A ray that is unsure in one region is counted in none. */
-static inline ih_i16 find_unsure(const ih_i16 slack[REGION_COUNT], int16_t margin,
+static inline ih_i16 find_unsure(const ih_i16 slack[SLACKS], int16_t margin,
                                  const struct returns *found)
 {
     ih_i16 nearest = ih_i16_abs(slack[0]);
-    for (int region = 1; region < REGION_COUNT; region++) {
+    for (int region = 1; region < SLACKS; region++) {
         nearest = ih_i16_min(nearest, ih_i16_abs(slack[region]));
     }
     return found->known & (found->unsure | ~(nearest > margin));
 }
 
-static inline void add(struct sums *sums, enum region region, ih_i16 slack, ih_i16 counts,
-                       ih_i16 part)
+static inline void add(struct sums *sums, int region, ih_i16 slack, ih_i16 counts, ih_i16 part)
 {
     const ih_i16 is_in = slack > 0;
     sums->all[region] = ih_i16_sub(sums->all[region], is_in & counts);
@@ -199,7 +179,7 @@ static inline struct masks count_lanes(const struct ih_ray_limits *candidate,
                                        const struct ih_ray_table *table, int32_t slot,
                                        struct sums *sums)
 {
-    ih_i16 slack[REGION_COUNT];
+    ih_i16 slack[SLACKS];
     const struct offset at = offset_of(candidate, table, slot);
     const struct returns found = returns_of(candidate, table, slot);
     find_slack_around(candidate, &at, slack);
@@ -208,22 +188,16 @@ static inline struct masks count_lanes(const struct ih_ray_limits *candidate,
     const ih_i16 counts = found.known & ~unsure;
     const ih_i16 open = counts & found.is_open;
     const ih_i16 body = counts & found.is_body;
-    const ih_i16 beside = ih_i16_min(at.ring, opposite(at.down)) > 0;
-    add(sums, HIGH, slack[HIGH], counts, open);
-    add(sums, BELOW, slack[BELOW], counts, open);
-    add(sums, ABOVE, slack[ABOVE], counts, open);
-    add(sums, LEFT, slack[LEFT], counts, open);
-    add(sums, RIGHT, slack[RIGHT], counts, open);
-    add(sums, BODY, slack[BODY], counts, body);
-    add(sums, WIDE, slack[WIDE], counts, body);
-    add(sums, LEVEL, slack[LEVEL], counts, counts & found.is_level);
-    add(sums, SHOULDER_LEFT, slack[SHOULDER_LEFT], counts, body);
-    add(sums, SHOULDER_RIGHT, slack[SHOULDER_RIGHT], counts, body);
+    const ih_i16 beside = ih_i16_min(at.ring, ih_i16_negate(at.down)) > 0;
+    for (int region = 0; region < IH_RAY_LEVEL; region++) {
+        add(sums, region, slack[region], counts, region < IH_RAY_BODY ? open : body);
+    }
+    add(sums, IH_RAY_LEVEL, slack[IH_RAY_LEVEL], counts, counts & found.is_level);
     sums->nothing = ih_i16_sub(sums->nothing, beside & counts & found.empty);
     sums->before = ih_i16_sub(sums->before, (slack[BEFORE] > 0) & counts & found.is_before);
     return (struct masks){.unsure = unsure,
                           .may_hit = found.known & (at.ee_q10 < candidate->hit_q10),
-                          .body = (slack[BODY] > 0) & body};
+                          .body = (slack[IH_RAY_BODY] > 0) & body};
 }
 
 static void count_rays(const struct ih_ray_limits *candidate, const struct ih_ray_table *table,
@@ -242,77 +216,40 @@ static void count_rays(const struct ih_ray_limits *candidate, const struct ih_ra
     }
 }
 
-static void sum_lanes(const struct sums *sums, struct ih_ray_counts *out)
+static bool try_count(const struct ih_rays *rays, const struct ih_ray_limits *candidate,
+                      struct ih_ray_marks *marks, struct ih_ray_counts *out)
 {
-    struct ih_ray_count count[REGION_COUNT];
-    for (int region = 0; region < REGION_COUNT; region++) {
-        count[region].part = ih_i16_total(sums->part[region]);
-        count[region].all = ih_i16_total(sums->all[region]);
-    }
-    *out = (struct ih_ray_counts){
-        .above = count[ABOVE],
-        .left = count[LEFT],
-        .right = count[RIGHT],
-        .below = count[BELOW],
-        .high = count[HIGH],
-        .nothing = {.part = ih_i16_total(sums->nothing),
-                    .all = count[ABOVE].all + count[LEFT].all + count[RIGHT].all},
-        .body = count[BODY],
-        .wide = count[WIDE],
-        .level = count[LEVEL],
-        .shoulder = {count[SHOULDER_LEFT], count[SHOULDER_RIGHT]},
-        .before = ih_i16_total(sums->before),
-    };
-}
-
-/* An upper bound of a hit's distance from the centre, squared, in semi-axes; above every square if it is limited. */
-static int16_t find_hit_q10(const struct ih_ellipsoid *ellipsoid,
-                            const struct ih_ellipsoid_box *box, int32_t margin)
-{
-    int32_t hit_q10 = 0;
-    for (int axis = 0; axis < 2; axis++) {
-        const int32_t semi_q8 = ellipsoid->semi_mm_q8[axis];
-        const int32_t ratio_q10 = (int32_t)(((int64_t)box->half_mm_q8[axis] << 10) / semi_q8) + 1;
-        hit_q10 = ih_max_s32(hit_q10, ih_min_s32(ratio_q10, 1 << 14));
-    }
-    hit_q10 = ((hit_q10 * hit_q10) >> 10) + 6 * margin + 1;
-    return (int16_t)(hit_q10 < OFFSET_MAX2_Q10 ? hit_q10 : INT16_MAX);
-}
-
-/* False outside of the limits. */
-static bool try_count(const struct ih_rays *rays, const struct ih_ellipsoid *ellipsoid,
-                      const struct ih_ellipsoid_box *box, struct ih_ray_marks *marks,
-                      struct ih_ray_counts *out)
-{
-    struct ih_ray_limits candidate;
     struct sums sums;
-    if (!ih_ray_limits_set_directions(&candidate, rays, ellipsoid)) {
-        return false;
+    count_rays(candidate, &rays->table, marks, &sums);
+    for (int region = 0; region < IH_RAY_REGIONS; region++) {
+        out->region[region].part = ih_i16_total(sums.part[region]);
+        out->region[region].all = ih_i16_total(sums.all[region]);
     }
-    candidate.hit_q10 = find_hit_q10(ellipsoid, box, candidate.margin);
-    ih_ray_limits_set_regions(&candidate, ellipsoid);
-    count_rays(&candidate, &rays->table, marks, &sums);
-    sum_lanes(&sums, out);
+    out->nothing = ih_i16_total(sums.nothing);
+    out->before = ih_i16_total(sums.before);
     return true;
 }
+#else
+/* One by one, rays are counted by ih_evidence with fewer instructions. */
+static bool try_count(const struct ih_rays *rays, const struct ih_ray_limits *candidate,
+                      struct ih_ray_marks *marks, struct ih_ray_counts *out)
+{
+    (void)rays;
+    (void)candidate;
+    (void)marks;
+    (void)out;
+    return false;
+}
+#endif
 
 void ih_ray_counts_count(const struct ih_rays *rays, const struct ih_ellipsoid *ellipsoid,
                          const struct ih_ellipsoid_box *box, struct ih_ray_marks *marks,
                          struct ih_ray_counts *out)
 {
-    if (!try_count(rays, ellipsoid, box, marks, out)) {
+    struct ih_ray_limits candidate;
+    if (!ih_ray_limits_set(&candidate, rays, ellipsoid, box) ||
+        !try_count(rays, &candidate, marks, out)) {
         *out = (struct ih_ray_counts){.before = 0};
         leave_all(rays, marks);
     }
 }
-#else
-void ih_ray_counts_count(const struct ih_rays *rays, const struct ih_ellipsoid *ellipsoid,
-                         const struct ih_ellipsoid_box *box, struct ih_ray_marks *marks,
-                         struct ih_ray_counts *out)
-{
-    (void)ellipsoid;
-    (void)box;
-    *out = (struct ih_ray_counts){.before = 0};
-    leave_all(rays, marks);
-}
-#endif

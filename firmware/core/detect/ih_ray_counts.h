@@ -34,12 +34,24 @@ struct ih_ray_count {
     int32_t part, all;
 };
 
-/* The regions are in ih_evidence.h. */
+/* Regions around a head, as ih_evidence.h has them, and what their rays are about. */
+enum ih_ray_region {
+    IH_RAY_HIGH, /* open */
+    IH_RAY_BELOW,
+    IH_RAY_ABOVE,
+    IH_RAY_LEFT,
+    IH_RAY_RIGHT,
+    IH_RAY_BODY, /* body */
+    IH_RAY_WIDE,
+    IH_RAY_SHOULDER_LEFT,
+    IH_RAY_SHOULDER_RIGHT,
+    IH_RAY_LEVEL, /* a thing at the head's depth */
+    IH_RAY_REGIONS
+};
+
 struct ih_ray_counts {
-    struct ih_ray_count above, left, right, below, high; /* part: open */
-    struct ih_ray_count nothing;                         /* empty */
-    struct ih_ray_count body, wide, shoulder[2];         /* body */
-    struct ih_ray_count level;                           /* a thing at the head's depth */
+    struct ih_ray_count region[IH_RAY_REGIONS];
+    int32_t nothing; /* empty, of those above, left and right */
     int32_t before;
 };
 

@@ -22,6 +22,7 @@
 /* Offsets are limited to this: 510 mm in Q4, 3.99 semi-axes in Q11. */
 #define IH_RAY_OFFSET_MAX 8171
 #define IH_RAY_MM_Q4(mm) ((mm)*16)
+#define IH_RAY_OFFSET_MAX2_Q10 16000 /* below the square of 3.99 semi-axes */
 
 /* A slope difference to an offset: clamped, times a power of two, times a factor of 2^-16. */
 struct ih_ray_scale {
@@ -94,6 +95,20 @@ static inline bool ih_ray_limits_set_directions(struct ih_ray_limits *candidate,
     return true;
 }
 
+/* An upper bound of a hit's distance from the centre, squared, in semi-axes; above every square if it is limited. */
+static inline int16_t ih_ray_hit_q10(const struct ih_ellipsoid *ellipsoid,
+                                     const struct ih_ellipsoid_box *box, int32_t margin)
+{
+    int32_t hit_q10 = 0;
+    for (int axis = 0; axis < 2; axis++) {
+        const int32_t semi_q8 = ellipsoid->semi_mm_q8[axis];
+        const int32_t ratio_q10 = (int32_t)(((int64_t)box->half_mm_q8[axis] << 10) / semi_q8) + 1;
+        hit_q10 = ih_max_s32(hit_q10, ih_min_s32(ratio_q10, 1 << 14));
+    }
+    hit_q10 = ((hit_q10 * hit_q10) >> 10) + 6 * margin + 1;
+    return (int16_t)(hit_q10 < IH_RAY_OFFSET_MAX2_Q10 ? hit_q10 : INT16_MAX);
+}
+
 static inline void ih_ray_limits_set_regions(struct ih_ray_limits *candidate,
                                              const struct ih_ellipsoid *ellipsoid)
 {
@@ -114,6 +129,19 @@ static inline void ih_ray_limits_set_regions(struct ih_ray_limits *candidate,
     candidate->level_min = ih_ray_depth_q1(centre_q8 - (IH_HEAD_LEVEL_DEPTH_MM << 8));
     candidate->level_max = ih_ray_depth_q1(centre_q8 + (IH_HEAD_LEVEL_DEPTH_MM << 8) - 1);
     candidate->before = ih_ray_depth_q1(centre_q8 - semi_q8[2] - (IH_HEAD_BEFORE_MM << 8) - 1);
+}
+
+/* box: rays that may hit the ellipsoid pass through it. False outside of the limits. */
+static inline bool ih_ray_limits_set(struct ih_ray_limits *candidate, const struct ih_rays *rays,
+                                     const struct ih_ellipsoid *ellipsoid,
+                                     const struct ih_ellipsoid_box *box)
+{
+    if (!ih_ray_limits_set_directions(candidate, rays, ellipsoid)) {
+        return false;
+    }
+    candidate->hit_q10 = ih_ray_hit_q10(ellipsoid, box, candidate->margin);
+    ih_ray_limits_set_regions(candidate, ellipsoid);
+    return true;
 }
 
 #endif

@@ -317,8 +317,7 @@ static inline void add_around(const struct ih_template_table *table, const struc
     const ih_i16 is_open = ih_i16_load(&table->depth_mm_q1[at]) > candidate->open_mm_q1;
     const ih_i16 value =
         ih_i16_add(ih_i16_load(&table->around[at]), is_open & (AROUND_OPEN - AROUND_NEAR));
-    const ih_i16 size_q13 =
-        ih_i16_max(crossing->ex_q13, ih_i16_sub(ih_i16_all(0), crossing->ex_q13));
+    const ih_i16 size_q13 = ih_i16_abs(crossing->ex_q13);
     const ih_i16 is_below = crossing->ey_q11 > ih_i16_mul_high(size_q13, ih_i16_all(X_OVER_Y_Q14));
     const ih_i16 is_in = (crossing->radius2_q10 > RING_INNER2_Q10) &
                          (crossing->radius2_q10 < RING_OUTER2_Q10) & ~is_below;

@@ -133,6 +133,11 @@ static inline ih_i16 ih_i16_sub(ih_i16 a, ih_i16 b)
     return (ih_i16)((ih_u16)a - (ih_u16)b);
 }
 
+static inline ih_i16 ih_i16_negate(ih_i16 a)
+{
+    return ih_i16_sub(ih_i16_all(0), a);
+}
+
 static inline ih_i16 ih_i16_mul(ih_i16 a, ih_i16 b)
 {
     return (ih_i16)((ih_u16)a * (ih_u16)b);

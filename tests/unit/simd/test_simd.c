@@ -185,6 +185,7 @@ static void lanes_of_16_bits(void)
     CHECK(ih_i16, int16_t, ih_i16_all(first[0]), (first[0]));
     CHECK(ih_i16, int16_t, ih_i16_add(a, b), (x + y));
     CHECK(ih_i16, int16_t, ih_i16_sub(a, b), (x - y));
+    CHECK(ih_i16, int16_t, ih_i16_negate(a), (-x));
     CHECK(ih_i16, int16_t, ih_i16_mul(a, b), (x * y));
     CHECK(ih_i16, int16_t, ih_i16_min(a, b), MIN(x, y));
     CHECK(ih_i16, int16_t, ih_i16_max(a, b), MAX(x, y));
