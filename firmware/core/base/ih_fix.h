@@ -55,7 +55,7 @@ static inline int64_t ih_mul_wide_shift(int64_t a, uint32_t b, int shift)
 static inline int64_t ih_div_round(int64_t numerator, int64_t denominator)
 {
     IH_IN_RANGE(denominator, 1, INT64_MAX);
-    int64_t half = denominator / 2;
+    const int64_t half = denominator >> 1; /* not negative: no division of a number with a sign */
     /* Some denominators are sums over a loop that runs at least once, which the analyzer cannot know;
      * the build of `make ranges` checks each. NOLINTNEXTLINE(clang-analyzer-core.DivideZero) */
     return (numerator >= 0 ? numerator + half : numerator - half) / denominator;
@@ -64,13 +64,11 @@ static inline int64_t ih_div_round(int64_t numerator, int64_t denominator)
 /* value limited to the range of int32_t. */
 static inline int32_t ih_saturate_s32(int64_t value)
 {
-    if (value > INT32_MAX) {
-        return INT32_MAX;
+    const int32_t low = IH_WRAPS(int32_t, value);
+    if (low == value) {
+        return low;
     }
-    if (value < INT32_MIN) {
-        return INT32_MIN;
-    }
-    return (int32_t)value;
+    return value < 0 ? INT32_MIN : INT32_MAX;
 }
 
 static inline int32_t ih_min_s32(int32_t a, int32_t b)

@@ -4,7 +4,8 @@
 #include "base/ih_range.h"
 
 #define ONE_Q28 ((int64_t)1 << 28)
-#define BROWN_MAX 16
+#define BROWN_MAX_Q28 (16 * ONE_Q28)
+#define TAN_MAX_Q28 (IH_RIG_TAN_MAX * ONE_Q28)
 #define RADIAL_MIN_Q28 (ONE_Q28 / 8)
 /* Enough for a lens whose iteration gains only a third a step; usual ones need five. */
 #define ITERATIONS_MAX 64
@@ -24,9 +25,21 @@ static int64_t product_q28(int32_t a_q28, int32_t b_q28)
     return ih_mul_shift(a_q28, b_q28, 28);
 }
 
+/* A seldom limit between constants: compilers make one comparison of both. */
 static int64_t limit_brown_q28(int64_t value_q28)
 {
-    return ih_clamp_s64(value_q28, BROWN_MAX * ONE_Q28);
+    if (value_q28 < -BROWN_MAX_Q28 || value_q28 > BROWN_MAX_Q28) {
+        return value_q28 < 0 ? -BROWN_MAX_Q28 : BROWN_MAX_Q28;
+    }
+    return value_q28;
+}
+
+static int32_t limit_tan_q28(int64_t value_q28)
+{
+    if (value_q28 < -TAN_MAX_Q28 || value_q28 > TAN_MAX_Q28) {
+        return (int32_t)(value_q28 < 0 ? -TAN_MAX_Q28 : TAN_MAX_Q28);
+    }
+    return (int32_t)value_q28;
 }
 
 /* Tangential distortion, from x^2, y^2 and x y. */
@@ -36,8 +49,8 @@ static inline void tangential(const struct ih_calibration *c, int64_t xx, int64_
     const int64_t r2 = xx + yy;
     /* 2 xy <= 8; (r2 + 2 xx) / 2 <= 8 */
     *dx_q28 = limit_brown_q28(ih_mul_shift(2 * xy, c->p1_q24, 24) +
-                              ih_mul_shift(r2 / 2 + xx, c->p2_q24, 23));
-    *dy_q28 = limit_brown_q28(ih_mul_shift(r2 / 2 + yy, c->p1_q24, 23) +
+                              ih_mul_shift((r2 >> 1) + xx, c->p2_q24, 23));
+    *dy_q28 = limit_brown_q28(ih_mul_shift((r2 >> 1) + yy, c->p1_q24, 23) +
                               ih_mul_shift(2 * xy, c->p2_q24, 24));
 }
 
@@ -54,7 +67,7 @@ static inline int64_t radial_at(const struct ih_calibration *c, uint32_t r2_q28)
 
 /* OpenCV's Brown model. |x|, |y| <= 2, so r2 <= 8 = 2^31 in Q28, r4 <= 64 = 2^31 in Q25 and
  * r6 <= 512 = 2^31 in Q22: times a coefficient in int32 each stays below 2^62. A lens that exceeds
- * BROWN_MAX anywhere is limited to it, and check_lens refuses it. */
+ * BROWN_MAX_Q28 anywhere is limited to it, and check_lens refuses it. */
 static inline void brown(const struct ih_calibration *c, int32_t x_q28, int32_t y_q28,
                          int64_t *radial_q28, int64_t *dx_q28, int64_t *dy_q28)
 {
@@ -62,11 +75,6 @@ static inline void brown(const struct ih_calibration *c, int32_t x_q28, int32_t 
     const int64_t yy = product_q28(y_q28, y_q28);
     *radial_q28 = radial_at(c, (uint32_t)(xx + yy));
     tangential(c, xx, yy, product_q28(x_q28, y_q28), dx_q28, dy_q28);
-}
-
-static int32_t limit_tan_q28(int64_t value_q28)
-{
-    return (int32_t)ih_clamp_s64(value_q28, IH_RIG_TAN_MAX * ONE_Q28);
 }
 
 /* Pixel to distorted normalised coordinate. Pixels beyond +-16384 are limited: in Q16 below 2^32,
