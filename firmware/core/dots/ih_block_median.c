@@ -49,8 +49,8 @@ static uint16_t find_median(int16_t response[ROWS][IH_FRAME_WIDTH_MAX], int32_t 
 #if !IH_CORTEXM && IH_I16_LANES > 0
 /* Blocks in a vector, eight bytes of each. Two vectors are searched together: each step of a search waits
  * for the step before. */
-#define SIDE IH_I64_LANES
-#define TOGETHER (2 * SIDE)
+#define TOGETHER (2 * IH_I64_LANES)
+#define SIDE (TOGETHER * BLOCK) /* their width */
 /* Subtracted from 0 .. 255, so that 8 bits with a sign hold it. */
 #define MIDDLE 128
 
@@ -88,21 +88,23 @@ static inline void find_small(int16_t response[ROWS][IH_FRAME_WIDTH_MAX], int32_
     for (int32_t i = 0; i < VALUES / 8; i++) {
         const int16_t *from = &response[8 * i / BLOCK][first + 8 * i % BLOCK];
         group[0].value[i] = load_values(from);
-        group[1].value[i] = load_values(&from[SIDE * BLOCK]);
+        group[1].value[i] = load_values(&from[SIDE / 2]);
     }
-    group[0].low = group[1].low = ih_u8_all(MIDDLE); /* -128 stands for 0 */
+    group[0].low = ih_u8_all(MIDDLE); /* -128 stands for 0 */
+    group[1].low = ih_u8_all(MIDDLE);
     for (int32_t half = 1 << 7; half > 0; half >>= 1) {
         group[0].low = halve(&group[0], ih_u8_all((uint8_t)half));
         group[1].low = halve(&group[1], ih_u8_all((uint8_t)half));
     }
     ih_u8_store(&low[0], group[0].low);
-    ih_u8_store(&low[8 * SIDE], group[1].low);
+    ih_u8_store(&low[4 * TOGETHER], group[1].low);
     for (int32_t i = 0; i < TOGETHER; i++) {
         small[i] = low[8 * i] ^ MIDDLE;
     }
 }
 #else
 #define TOGETHER 1
+#define SIDE BLOCK
 
 static inline void find_small(int16_t response[ROWS][IH_FRAME_WIDTH_MAX], int32_t first,
                               uint8_t small[TOGETHER])
@@ -114,8 +116,7 @@ static inline void find_small(int16_t response[ROWS][IH_FRAME_WIDTH_MAX], int32_
 /* Of the pixels that blocks lack one in two is 0, the others are no smaller than any: the median stays. */
 static void fill_missing(int16_t response[ROWS][IH_FRAME_WIDTH_MAX], int32_t width, int32_t rows)
 {
-    const int32_t side = TOGETHER * BLOCK;
-    const int32_t end = (width + side - 1) / side * side;
+    const int32_t end = (width + SIDE - 1) / SIDE * SIDE;
     for (int32_t row = 0; row < ROWS; row++) {
         const int32_t begin = row < rows ? width : 0;
         for (int32_t u = begin; u < end; u++) {
