@@ -53,7 +53,8 @@ void ih_bandpass_bytes(struct ih_bandpass *band, const uint8_t *const row[IH_BAN
     uint16_t *column = band->binomial[0];
     const int32_t count =
         (width + 2 * IH_BANDPASS_SIDE + IH_BANDPASS_STEP - 1) / IH_BANDPASS_STEP * IH_BANDPASS_STEP;
-    struct ih_bandpass_row out = {.response = response, .limit = NULL};
+    struct ih_bandpass_row out = {.limit = NULL};
+    out.response = response;
     band->width = width;
     band->is_bytes = true;
     sum_rows(row, width, &inner[1], &column[REACH]);

@@ -20,7 +20,7 @@ static inline bool is_any_above(const int16_t *response, int16_t limit)
 {
     int16_t max = 0;
     for (int32_t i = 0; i < GROUP; i++) {
-        max = response[i] > max ? response[i] : max;
+        max = (int16_t)(response[i] > max ? response[i] : max);
     }
     return max > limit;
 }
