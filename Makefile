@@ -261,9 +261,6 @@ test-calibration: calibrate ## calibrate five rendered rigs, compare with the tr
 	  --render $(BUILD)/calibrate/tools/render/render --host-sim $(BUILD)/calibrate/sim/host_sim \
 	  --undistort $(BUILD)/calibrate/tests/calibration/test_undistort \
 	  --fake-camera $(BUILD)/calibrate/tests/calibration/libfake_camera.so --work $(BUILD)/test_calibration
-	@/usr/bin/python3 tests/knock/knock.py --knock $(BUILD)/calibrate/tests/knock/knock \
-	  --render $(BUILD)/calibrate/tools/render/render --host-sim $(BUILD)/calibrate/sim/host_sim \
-	  --work $(BUILD)/test_knock --seeds 4 --frames 250
 
 test-calibration-short: calibrate ## one of these rigs
 	@ctest --test-dir $(BUILD)/calibrate/tests/calibration --output-on-failure

@@ -4,166 +4,185 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "app_rig_text.h"
 #include "app_text.h"
 #include "base/ih_fix.h"
 
-/* A rotation is reported again when it differs by more than this from the last report. */
-#define REPORT_RAD_Q30 374802 /* 0.02 degrees */
-#define DEG_PER_RAD_Q10 58671
-#define MM2_PER_M2 1000000
+/* A rig that moved is reported again when one of its moves differs by more than this from the last report. */
+#define REPORT_RAD_Q30 937007 /* 0.05 degrees */
+/* Farther than this from the mean of the last frames: not by heat. */
+#define KNOCK_RAD_Q30 468504 /* 0.025 degrees */
+/* As much as 0.05 degrees are 0.2 % of focal length, and 0.5 px. */
+#define FOCAL_PERCENT 44
+#define SHIFT_FACTOR 457
+#define MEAN_SHIFT 5 /* about 32 frames */
+/* What no rotation explains. */
+#define ACROSS_MAX_PX_Q12 819 /* 0.2 px */
+#define DEGREE_DECIMALS 3
 
-struct depth_text {
-    char text[80];
+struct health_text {
+    char text[128];
 };
 
 void app_health_begin(struct app_state *state)
 {
-    ih_health_init(&state->health, &state->head->rig);
-    state->reported_health = IH_HEALTH_UNKNOWN;
-    memset(state->reported_rotation_rad_q30, 0, sizeof state->reported_rotation_rad_q30);
-    state->checked_count = 0;
+    memset(&state->health, 0, sizeof state->health);
 }
 
-static struct app_decimal degrees(int32_t angle_rad_q30)
+static struct health_text xyz_text(const int32_t angle_rad_q30[3])
 {
-    return app_text_fixed((int64_t)angle_rad_q30 * DEG_PER_RAD_Q10 / 1024, 30, 3);
+    struct health_text out;
+    snprintf(out.text, sizeof out.text, "(%s, %s, %s)",
+             app_text_degrees(angle_rad_q30[0], DEGREE_DECIMALS).text,
+             app_text_degrees(angle_rad_q30[1], DEGREE_DECIMALS).text,
+             app_text_degrees(angle_rad_q30[2], DEGREE_DECIMALS).text);
+    return out;
 }
 
-/* One standard deviation of the rotation as depth at 1 m, in words. */
-static struct depth_text depth_uncertainty(const struct app_state *state)
+/* One standard deviation of the rotation that is depth, as depth at 1 m. */
+static struct health_text depth_text(const struct isohead *head)
 {
-    const struct ih_health *health = &state->health;
-    const int32_t *origin_mm_q16 = state->head->rig.calibration.origin_mm_q16;
-    struct depth_text out = {"the rotation across the baseline is not known, nor is depth"};
-    if (health->is_weak_known) {
-        int64_t x = origin_mm_q16[0];
-        int64_t y = origin_mm_q16[1];
-        int64_t baseline_mm_q16 = (int64_t)ih_isqrt_u64((uint64_t)(x * x + y * y)) + 1;
-        int64_t sigma_rad_q30 = ih_max_s32(health->sigma_rad_q30[0], health->sigma_rad_q30[1]);
-        int64_t depth_mm_q4 = ih_div_round(sigma_rad_q30 * MM2_PER_M2 / 1024, baseline_mm_q16);
-        snprintf(out.text, sizeof out.text, "that is %s mm of depth at 1 m",
-                 app_text_fixed(depth_mm_q4, 4, 1).text);
+    const struct ih_alignment *now = &head->align.now;
+    struct health_text out = {"depth is not known, as too few dots show it"};
+    if (now->is_depth_known) {
+        snprintf(out.text, sizeof out.text, "depth is known to +-%s mm at 1 m",
+                 app_text_fixed(app_rig_depth_mm_q8(head), 8, 1).text);
     }
     return out;
 }
 
-static void report_rotation(struct app_state *state)
+/* Rotation, change of focal length and shift, as if all of them were angles. */
+static void moves_of(const struct ih_alignment *now, int32_t moves_rad_q30[APP_HEALTH_MOVES])
 {
-    const struct ih_health *health = &state->health;
-    const int32_t *rotation = health->rotation_rad_q30;
-    const int32_t *sigma = health->sigma_rad_q30;
+    memcpy(moves_rad_q30, now->rotation_rad_q30, sizeof now->rotation_rad_q30);
+    moves_rad_q30[3] = (int32_t)((int64_t)now->focal_q30 * FOCAL_PERCENT / 100);
+    for (int i = 0; i < 2; i++) {
+        moves_rad_q30[4 + i] = ih_saturate_s32((int64_t)now->shift_px_q12[i] * SHIFT_FACTOR);
+    }
+}
+
+static bool is_near(const struct ih_alignment *now, const int32_t then_rad_q30[APP_HEALTH_MOVES],
+                    int32_t max_rad_q30)
+{
+    int32_t now_rad_q30[APP_HEALTH_MOVES];
+    bool is_near = true;
+    moves_of(now, now_rad_q30);
+    for (int i = 0; i < APP_HEALTH_MOVES; i++) {
+        is_near = is_near && ih_abs_s64((int64_t)now_rad_q30[i] - then_rad_q30[i]) <= max_rad_q30;
+    }
+    return is_near;
+}
+
+static void report_moved(const struct app_state *state)
+{
+    const struct app_health *health = &state->health;
+    const struct ih_alignment *now = &state->head->align.now;
+    const char *how = "slowly, as heat does it";
+    const char *advice = "calibrate again if it stays so";
+    if (health->frame_count < 2 << MEAN_SHIFT) {
+        how = "since its calibration";
+        advice = "calibrate again when you can";
+    } else if (!is_near(now, health->mean, KNOCK_RAD_Q30)) {
+        how = "at once, as a knock does it";
+        advice = "calibrate again when you can";
+    }
+    if (now->across_px_q12 > ACROSS_MAX_PX_Q12) {
+        advice = "dots still lie beside their lines: calibrate again before you trust a head";
+    }
     app_log_say(
         state->log, APP_LOG_WARNING,
-        "%s: the projector is rotated by (%s, %s, %s) +-(%s, %s, %s) degrees about X, Y, Z, "
-        "%s; corrected for until the end, calibrate again",
-        state->config->rig, degrees(rotation[0]).text, degrees(rotation[1]).text,
-        degrees(rotation[2]).text, degrees(sigma[0]).text, degrees(sigma[1]).text,
-        degrees(sigma[2]).text, depth_uncertainty(state).text);
-    memcpy(state->reported_rotation_rad_q30, rotation, sizeof state->reported_rotation_rad_q30);
+        "%s: the rig has moved %s: its projector by %s +-%s degrees about X, Y, Z, "
+        "its focal length by %s %%, its picture by (%s, %s) px; %s; corrected for in memory, %s",
+        state->config->rig, how, xyz_text(now->rotation_rad_q30).text,
+        xyz_text(now->sigma_rad_q30).text,
+        app_text_fixed((int64_t)now->focal_q30 * 100, 30, 2).text,
+        app_text_fixed(now->shift_px_q12[0], 12, 2).text,
+        app_text_fixed(now->shift_px_q12[1], 12, 2).text, depth_text(state->head).text, advice);
 }
 
-static void report_state(struct app_state *state)
+static void report(struct app_state *state)
 {
-    const struct ih_health *health = &state->health;
-    switch (health->state) {
-    case IH_HEALTH_ROTATED:
-        report_rotation(state);
+    const struct ih_alignment *now = &state->head->align.now;
+    switch (now->state) {
+    case IH_ALIGN_MOVED:
+        report_moved(state);
         break;
-    case IH_HEALTH_LOST:
-        app_log_say(
-            state->log, APP_LOG_WARNING,
-            "%s: does not fit: of %" PRId32 " dots %" PRId32
-            " have a label, and no rotation within 0.6 degrees corrects it; calibrate again",
-            state->config->rig, health->dot_count, health->labelled_count);
+    case IH_ALIGN_LOST:
+        app_log_say(state->log, APP_LOG_WARNING,
+                    "%s: does not fit: of %" PRId32 " dots %" PRId32
+                    " have a label, the others lie on no lines of this rig. Is it the file of "
+                    "this camera and laser? Then they have moved too far: calibrate again",
+                    state->config->rig, state->head->dots.dot_count,
+                    state->head->labels.labelled_count);
         break;
-    case IH_HEALTH_FITS:
+    case IH_ALIGN_FITS:
         app_log_say(state->log, APP_LOG_INFO, "%s: fits", state->config->rig);
         break;
-    case IH_HEALTH_UNKNOWN:
+    case IH_ALIGN_UNKNOWN:
         break;
     }
-    state->reported_health = health->state;
+    state->health.reported_state = now->state;
+    moves_of(now, state->health.reported);
 }
 
-static bool is_reported(const struct app_state *state)
+/* Frames that say the same, one after the other, and the mean of what they say. */
+static void follow(struct app_health *health, const struct ih_alignment *now)
 {
-    const struct ih_health *health = &state->health;
-    bool is_same = true;
-    for (int i = 0; i < 3; i++) {
-        int64_t difference =
-            (int64_t)health->rotation_rad_q30[i] - state->reported_rotation_rad_q30[i];
-        is_same = is_same && ih_abs_s64(difference) <= REPORT_RAD_Q30;
+    int32_t moves_rad_q30[APP_HEALTH_MOVES];
+    health->steady_count = now->state == health->last_state ? health->steady_count + 1 : 1;
+    health->steady_count = ih_min_s32(health->steady_count, APP_HEALTH_STEADY);
+    health->last_state = now->state;
+    health->frame_count = ih_min_s32(health->frame_count + 1, INT32_MAX - 1);
+    moves_of(now, moves_rad_q30);
+    for (int i = 0; i < APP_HEALTH_MOVES; i++) {
+        int64_t difference = (int64_t)moves_rad_q30[i] - health->mean[i];
+        health->mean[i] += (int32_t)(difference / (1 << MEAN_SHIFT));
     }
-    return state->reported_health == health->state &&
-           (is_same || health->state != IH_HEALTH_ROTATED || health->stage != IH_HEALTH_WATCHING);
 }
 
-/* Of this frame; 0: no labels. */
-static int32_t mean_across_px_q12(const struct ih_labels *labels)
+static bool is_reported(const struct app_health *health, const struct ih_alignment *now)
 {
-    int64_t sum = 0;
-    int32_t count = 0;
-    for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
-        if (labels->dot_of_slot[slot] != IH_NONE) {
-            int32_t across = labels->perp_px_q12[slot];
-            sum += across < 0 ? -across : across;
-            count++;
-        }
-    }
-    return count == 0 ? 0 : (int32_t)((sum + count / 2) / count);
+    bool has_moved_on =
+        now->state == IH_ALIGN_MOVED && !is_near(now, health->reported, REPORT_RAD_Q30);
+    return now->state == health->reported_state && !has_moved_on;
 }
 
-/* A rotation that is still on trial is reported, too. */
-static const char *word_of(const struct ih_health *health)
-{
-    const int32_t *rotation = health->rotation_rad_q30;
-    if (health->state == IH_HEALTH_LOST) {
-        return "lost";
-    }
-    return rotation[0] != 0 || rotation[1] != 0 || rotation[2] != 0 ? "turned" : NULL;
-}
-
+/* The answer of --check, after its last frame. */
 static void check(struct app_state *state)
 {
-    const struct ih_health *health = &state->health;
-    state->checked_count++;
-    if (state->checked_count < IH_HEALTH_ENOUGH) {
-        return;
-    }
-    if (health->state == IH_HEALTH_UNKNOWN) {
+    const struct isohead *head = state->head;
+    const struct ih_alignment *now = &head->align.now;
+    if (now->state == IH_ALIGN_UNKNOWN) {
         app_log_say(state->log, APP_LOG_ERROR,
-                    "%s: cannot be determined: of %" PRId32 " dots in the last frames %" PRId32
+                    "%s: cannot be determined: of %" PRId32 " dots in the last frame %" PRId32
                     " have a label, expected 200 and more",
-                    state->config->rig, health->dot_count, health->labelled_count);
-    } else if (health->state == IH_HEALTH_LOST) {
+                    state->config->rig, head->dots.dot_count, head->labels.labelled_count);
+    } else if (now->state == IH_ALIGN_LOST) {
         app_log_say(state->log, APP_LOG_INFO,
-                    "%s: checked %" PRId32
-                    " frames, it does not fit; no known rotation corrects it",
-                    state->config->rig, state->checked_count);
+                    "%s: checked %" PRId32 " frames, it does not fit, and nothing within the "
+                    "limits corrects it; calibrate again",
+                    state->config->rig, state->health.frame_count);
     } else {
         app_log_say(state->log, APP_LOG_INFO,
-                    "%s: checked %" PRId32 " frames, %s; dots lie %s px beside their lines; "
-                    "a rotation of up to (%s, %s, %s) degrees about X, Y, Z is possible, %s",
-                    state->config->rig, state->checked_count,
-                    health->state == IH_HEALTH_FITS ? "it fits" : "it does not fit",
-                    app_text_fixed(health->across_px_q12, 12, 2).text,
-                    degrees(health->sigma_rad_q30[0]).text, degrees(health->sigma_rad_q30[1]).text,
-                    degrees(health->sigma_rad_q30[2]).text, depth_uncertainty(state).text);
+                    "%s: checked %" PRId32 " frames, %s; the projector's rotation is %s +-%s "
+                    "degrees about X, Y, Z; dots lie %s px beside their lines; %s",
+                    state->config->rig, state->health.frame_count,
+                    now->state == IH_ALIGN_FITS ? "it fits" : "it has moved: calibrate again",
+                    xyz_text(now->rotation_rad_q30).text, xyz_text(now->sigma_rad_q30).text,
+                    app_text_fixed(now->across_px_q12, 12, 2).text, depth_text(head).text);
     }
-    app_state_end(state, health->state == IH_HEALTH_FITS ? APP_EXIT_GOOD : APP_EXIT_FAILED);
+    app_state_end(state, now->state == IH_ALIGN_FITS ? APP_EXIT_GOOD : APP_EXIT_FAILED);
 }
 
 void app_health_frame(struct app_state *state)
 {
-    struct isohead *head = state->head;
-    state->live.across_px_q12 = mean_across_px_q12(&head->labels);
-    (void)ih_health_frame(&state->health, &head->dots, &head->labels, &head->rig,
-                          &state->health_scratch);
-    state->live.rig = word_of(&state->health);
-    if (!is_reported(state)) {
-        report_state(state);
+    struct app_health *health = &state->health;
+    const struct ih_alignment *now = &state->head->align.now;
+    follow(health, now);
+    if (health->steady_count == APP_HEALTH_STEADY && !is_reported(health, now)) {
+        report(state);
     }
-    if (state->config->check) {
+    if (state->config->check && health->frame_count == APP_HEALTH_CHECKED) {
         check(state);
     }
 }

@@ -1,18 +1,22 @@
-/* app_health - does the rig still fit? What the board's program does with the core's ih_health.
+/* app_health - does the rig still fit? What the board's program reports of the core's alignment (ih_align.h).
  *
- * After each lit frame: a rotation of the projector by up to 0.6 degrees is corrected for, in memory
- * only, from the next frame on. A warning reports the rotation, its uncertainty and what that is in
- * depth; each record has "rig" (app_record.h) while it lasts. A warning reports a rig that no rotation
- * corrects, too. A reloaded rig starts anew.
+ * The core corrects a rig that moved by itself, in every frame. Here, after each lit frame:
+ *   1. A state that APP_HEALTH_STEADY lit frames agree on is reported when it is another one than before; so is a rig
+ *      that has moved on by more than 0.05 degrees, 0.2 % of focal length or 0.5 px. The message says by how much, what that
+ *      leaves open in depth, and what to do. After a knock, other than with heat, the rotation is far from its mean over
+ *      about 32 frames.
+ *   2. With config->check the loop ends after APP_HEALTH_CHECKED lit frames and no records are written: a message
+ *      says whether the rig fits and how well depth is known. The exit status is 0 if it fits as it is, else 1.
  *
- * With config->check the loop ends after IH_HEALTH_ENOUGH lit frames and no records are written: a
- * message says whether the rig fits and how well that is known, and the exit status is 0 if it does as
- * it is, else 1.
+ * A reloaded rig starts anew. With config->paper nothing is aligned, and nothing is reported.
  */
 #ifndef APP_HEALTH_H
 #define APP_HEALTH_H
 
 #include "app_state.h"
+
+#define APP_HEALTH_STEADY 6   /* frames */
+#define APP_HEALTH_CHECKED 60 /* frames */
 
 /* The rig has just been made from its file. */
 void app_health_begin(struct app_state *state);

@@ -145,6 +145,18 @@ function rejectedText(record) {
   return `${reason}; ${best.distance_mm.toFixed(1)} mm away`;
 }
 
+function rigText(rig) {
+  if (rig === undefined) return "–";
+  const degrees = (values) => values.map((value) => value.toFixed(3)).join(", ");
+  return {
+    unknown: "too few dots to say",
+    fits: "fits",
+    moved: `moved by (${degrees(rig.rotation_deg)}) ± (${degrees(rig.sigma_deg)})°, focal length by ` +
+      `${rig.focal_percent.toFixed(2)} %, picture by (${rig.shift_px.map((px) => px.toFixed(2)).join(", ")}) px; ${rig.depth_known ? "calibrate again" : "depth is not known: calibrate again"}`,
+    lost: "does not fit: dots lie on none of its lines",
+  }[rig.state];
+}
+
 function rateText(view) {
   const now = { frame: view.frame, time_s: view.record.time_us / 1e6, at_s: performance.now() / 1000 };
   shown.push(now);
@@ -160,6 +172,7 @@ function report(view) {
   element("head").textContent = headText(record);
   element("rejected").textContent = rejectedText(record);
   element("dots").textContent = `${record.dots}, ${record.labelled} of 361 labelled`;
+  element("rig").textContent = rigText(record.rig);
   element("rate").textContent = rateText(view);
   element("frame").textContent = record.file;
   canvas.setAttribute("aria-label", `camera image; head: ${headText(record)}`);

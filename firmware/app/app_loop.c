@@ -49,7 +49,7 @@ static bool load_rig(struct app_state *state, struct hal_error *error)
         return hal_fail(error, "kind: range, expected a rig with a laser: dots");
     }
     enum ih_err err = isohead_init(state->head, &calibration, &bad_slot);
-    if (state->config->paper) {
+    if (state->config->paper && !state->config->check) {
         ih_params_paper(&state->head->params);
     }
     if (err != IH_OK) {

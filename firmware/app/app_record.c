@@ -1,10 +1,13 @@
 #include "app_record.h"
 
+#include "app_rig_text.h"
 #include "app_write.h"
 
 #define PIXEL_DECIMALS 2
 #define MM_DECIMALS 1
 #define PROBABILITY_DECIMALS 3
+#define DEGREE_DECIMALS 3 /* of a rig */
+#define PERCENT_DECIMALS 2
 
 static void write_pair_px(struct app_write *write, const char *key, int32_t first_px_q12,
                           int32_t second_px_q12)
@@ -120,8 +123,42 @@ static bool end(struct app_record *record, struct app_write *write)
     return !write->full;
 }
 
-static void write_live(struct app_write *write, const struct app_record_live *live)
+static void write_angles(struct app_write *write, const char *key, const int32_t angle_rad_q30[3])
 {
+    app_write_key(write, key);
+    app_write_open(write, '[');
+    for (int axis = 0; axis < 3; axis++) {
+        app_write_decimal(write, app_text_degrees(angle_rad_q30[axis], DEGREE_DECIMALS));
+    }
+    app_write_close(write, ']');
+}
+
+static void write_rig(struct app_write *write, const struct ih_alignment *now)
+{
+    app_write_key(write, "rig");
+    app_write_open(write, '{');
+    app_write_key(write, "state");
+    app_write_string(write, app_rig_text(now->state));
+    app_write_key(write, "across_px");
+    if (now->across_px_q12 < 0) {
+        app_write_null(write);
+    } else {
+        app_write_decimal(write, app_text_fixed(now->across_px_q12, 12, PIXEL_DECIMALS));
+    }
+    write_angles(write, "rotation_deg", now->rotation_rad_q30);
+    write_angles(write, "sigma_deg", now->sigma_rad_q30);
+    app_write_key(write, "focal_percent");
+    app_write_decimal(write, app_text_fixed((int64_t)now->focal_q30 * 100, 30, PERCENT_DECIMALS));
+    write_pair_px(write, "shift_px", now->shift_px_q12[0], now->shift_px_q12[1]);
+    app_write_key(write, "depth_known");
+    app_write_bool(write, now->is_depth_known);
+    app_write_close(write, '}');
+}
+
+static void write_live(struct app_write *write, const struct app_record_live *live,
+                       const struct isohead *head)
+{
+    const int32_t across_px_q12 = head->align.now.across_px_q12;
     if (live->lost_count != 0) {
         app_write_int_field(write, "lost", live->lost_count);
     }
@@ -132,13 +169,9 @@ static void write_live(struct app_write *write, const struct app_record_live *li
         app_write_key(write, "strobe");
         app_write_string(write, live->strobe);
     }
-    if (live->across_px_q12 != 0) {
+    if (head->labels.labelled_count > 0 && !head->params.is_paper && across_px_q12 >= 0) {
         app_write_key(write, "across_px");
-        app_write_decimal(write, app_text_fixed(live->across_px_q12, 12, PIXEL_DECIMALS));
-    }
-    if (live->rig != NULL) {
-        app_write_key(write, "rig");
-        app_write_string(write, live->rig);
+        app_write_decimal(write, app_text_fixed(across_px_q12, 12, PIXEL_DECIMALS));
     }
 }
 
@@ -152,10 +185,12 @@ bool app_record_frame(struct app_record *record, const struct hal_frame *frame,
     write_result(&write, &head->result);
     if (head->rig.calibration.kind == IH_RIG_RANGE) {
         app_write_int_field(&write, "points", head->points.seen_count);
+    } else if (!head->params.is_paper) {
+        write_rig(&write, &head->align.now);
     }
     write_dropped(&write, head);
     if (live != NULL) {
-        write_live(&write, live);
+        write_live(&write, live, head);
     }
     return end(record, &write);
 }

@@ -7,7 +7,10 @@
  *   "dir"      the frames directory, where a run has several
  *   "points"   measured points; range images only, which have no dots and labels
  *   "dropped"  what did not fit into a full table, by kind; only where something was dropped
- *   "lost", "skipped", "strobe", "across_px", "rig"   live cameras: struct app_record_live
+ *   "rig"      how the rig has moved against its file (ih_align.h): angles with 3 decimals, per cent and pixels with 2; dot
+ *              rigs only, and not with the paper's method alone
+ *   "lost", "skipped", "strobe"   live cameras: struct app_record_live
+ *   "across_px"   live cameras: the one of "rig"; only where a dot is labelled
  * Error: false where a record is longer than APP_RECORD_MAX; then length is 0. No file of Linux has
  *        a name that makes it so.
  */
@@ -42,9 +45,6 @@ struct app_record_live {
     int64_t skipped_count; /* frames not used since then: dark or half lit ones beyond what the
                             * strobe's mode lets expect */
     const char *strobe;    /* a word on how the strobe stands; NULL: as it should */
-    int32_t
-        across_px_q12; /* mean distance of labelled dots from their lines; 0: none is labelled */
-    const char *rig;   /* a word on a rig that does not fit any more; NULL: it does */
 };
 
 /* live: NULL for frames from a file. */

@@ -15,7 +15,6 @@
 #include "hal.h"
 #include "isohead.h"
 #include "upkeep/ih_exposure.h"
-#include "upkeep/ih_health.h"
 
 enum app_exit {
     APP_EXIT_GOOD = 0,   /* ended as requested */
@@ -31,6 +30,18 @@ struct app_hal {
     const struct hal_watchdog *watchdog;
     const struct hal_output *output;
     const struct hal_viewer *viewer; /* NULL: none */
+};
+
+#define APP_HEALTH_MOVES 6
+
+/* What the log knows of the rig; app_health.h. */
+struct app_health {
+    int32_t frame_count;  /* lit ones since the rig was loaded */
+    int32_t steady_count; /* frames of this state, one after the other */
+    enum ih_align_state last_state;
+    int32_t mean[APP_HEALTH_MOVES]; /* over the last frames */
+    enum ih_align_state reported_state;
+    int32_t reported[APP_HEALTH_MOVES];
 };
 
 struct app_state {
@@ -58,11 +69,7 @@ struct app_state {
     bool steers;                 /* the exposure */
     struct app_record_live live; /* since the last record */
     int64_t result_count;        /* frames with a result */
-    struct ih_health health;     /* app_health.h */
-    struct ih_health_scratch health_scratch;
-    enum ih_health_state reported_health; /* in the log */
-    int32_t reported_rotation_rad_q30[3];
-    int32_t checked_count; /* frames, with config->check */
+    struct app_health health;
 
     bool rig_is_valid;
     int32_t width, height; /* of the first rig */

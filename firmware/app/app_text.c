@@ -2,6 +2,8 @@
 
 #include "hal_text.h"
 
+#define DEG_PER_RAD_Q20 60078980
+
 /* A whole number of 10^-decimals as text. */
 static struct app_decimal print_scaled(int64_t scaled, int decimals)
 {
@@ -36,6 +38,11 @@ struct app_decimal app_text_angle(int32_t angle_mdeg)
 {
     int64_t tenths = (angle_mdeg + 50) / 100;
     return print_scaled(tenths % 1800, 1);
+}
+
+struct app_decimal app_text_degrees(int32_t angle_rad_q30, int decimals)
+{
+    return app_text_fixed((int64_t)angle_rad_q30 * DEG_PER_RAD_Q20 / (1 << 20), 30, decimals);
 }
 
 void app_text_tame(char *text)

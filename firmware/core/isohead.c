@@ -3,6 +3,8 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "base/ih_fix.h"
+
 _Static_assert(sizeof(struct isohead) <= IH_RAM_MAX, "the state no longer fits its budget");
 
 const char *ih_err_text(enum ih_err err)
@@ -80,6 +82,8 @@ enum ih_err isohead_init(struct isohead *head, const struct ih_calibration *cali
     enum ih_err err = ih_rig_init(&head->rig, calibration, bad_slot);
     if (err != IH_OK) {
         memset(&head->rig, 0, sizeof head->rig); /* no frame has the size of this rig */
+    } else if (calibration->kind == IH_RIG_DOTS) {
+        ih_align_init(&head->align, &head->rig);
     }
     return err;
 }
@@ -185,6 +189,21 @@ static void begin(struct isohead *head, int64_t time_us)
     }
 }
 
+/* A rig that has moved leaves depth less certain than its tracks say. */
+static void widen_sigma(struct isohead *head)
+{
+    for (int32_t i = 0; i < head->result.entry_count; i++) {
+        struct ih_result_entry *entry = &head->result.entry[i];
+        const int64_t own = entry->sigma_mm_q8;
+        const int64_t depth = ih_align_depth_sigma_mm_q8(&head->align, &head->rig,
+                                                         ih_max_s32(entry->centre_mm_q8[2], 0));
+        if (own > 0 && depth > 0) {
+            entry->sigma_mm_q8 =
+                (int32_t)ih_isqrt_u64((uint64_t)(own * own) + (uint64_t)(depth * depth));
+        }
+    }
+}
+
 /* The result of all stages. */
 static void conclude(struct isohead *head)
 {
@@ -210,6 +229,17 @@ static enum ih_err frame_of_range(struct isohead *head, const struct ih_frame *f
     return err;
 }
 
+/* The paper's method alone takes the rig's file at its word. */
+static void find_rows(struct isohead *head)
+{
+    struct ih_dot_rows *rows = &head->scratch.labels.rows;
+    if (head->params.is_paper) {
+        ih_dot_rows_fill(&head->dots, &head->rig, rows);
+    } else {
+        ih_align_find(&head->align, &head->dots, &head->rig, rows, &head->scratch.labels.at.align);
+    }
+}
+
 /* Dots and labels; the other stages' outputs stay as they were. */
 static enum ih_err label(struct isohead *head, const struct ih_frame *frame,
                          const struct ih_frame *ambient)
@@ -221,8 +251,9 @@ static enum ih_err label(struct isohead *head, const struct ih_frame *frame,
     }
     if (err == IH_OK) {
         ih_dots_find(frame, ambient, &params->dots, &head->scratch.dots, &head->dots);
-        ih_labels_assign(&head->dots, &head->rig, &params->labels, &head->scratch.labels,
-                         &head->labels);
+        find_rows(head);
+        ih_labels_assign(&head->dots, &head->scratch.labels.rows, &head->rig, &params->labels,
+                         &head->scratch.labels.at.labels, &head->labels);
     }
     return err;
 }
@@ -246,10 +277,18 @@ void isohead_find(struct isohead *head, int64_t time_us)
     if (c->kind == IH_RIG_RANGE || c->width == 0) {
         return; /* isohead_label or isohead_init was refused: the outputs are cleared, and no line is set */
     }
+    if (head->align.is_depth_new) { /* tracks have the depths of another rig */
+        ih_tracks_forget(&head->tracks);
+        head->align.is_depth_new = false;
+    }
     begin(head, time_us);
     ih_points_from_labels(&head->labels, &head->rig, &head->points);
     look(head, &head->dots);
     conclude(head);
+    if (!head->params.is_paper) {
+        widen_sigma(head);
+        ih_align_learn(&head->align, &head->labels, &head->rig, &head->scratch.labels.at.align);
+    }
 }
 
 /* A frame of dots needs no clearing: each stage sets its own outputs, and windows has none. */

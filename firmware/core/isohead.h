@@ -21,9 +21,11 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "align/ih_align.h"
 #include "base/ih_config.h"
 #include "base/ih_types.h"
 #include "detect/ih_detections.h"
+#include "dots/ih_dot_rows.h"
 #include "dots/ih_dots.h"
 #include "labels/ih_labels.h"
 #include "nests/ih_hypotheses.h"
@@ -56,11 +58,23 @@ struct ih_params {
     struct ih_tracks_params tracks;
 };
 
+/* Working memory from dots to labels. */
+union ih_rows_work {
+    struct ih_align_scratch align;
+    struct ih_labels_scratch labels;
+};
+
+struct ih_rows_scratch {
+    struct ih_dot_rows rows;
+    union ih_rows_work at;
+};
+
 struct isohead {
     struct ih_rig rig;
     struct ih_params params;
     /* From the frames before. */
     struct ih_tracks tracks;
+    struct ih_align align;
     /* The stages' outputs of the last frame, in order. */
     struct ih_dots dots;
     struct ih_labels labels;
@@ -77,7 +91,7 @@ struct isohead {
     /* Working memory; stages never run at the same time, so they share it. */
     union {
         struct ih_dots_scratch dots;
-        struct ih_labels_scratch labels;
+        struct ih_rows_scratch labels;
         struct ih_windows_scratch windows;
         struct ih_surface_scratch surface;
         struct ih_nests_scratch nests;

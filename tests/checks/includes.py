@@ -24,7 +24,7 @@ import sys
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 
-CORE_ORDER = ["base", "simd", "rig", "dots", "labels", "points", "surface", "nests", "detect", "tracks", "upkeep"]
+CORE_ORDER = ["base", "simd", "rig", "dots", "labels", "align", "points", "surface", "nests", "detect", "tracks", "upkeep"]
 CORE_SYSTEM = {"stdalign.h", "stdbool.h", "stddef.h", "stdint.h", "string.h"}
 # The vectors of x86 and ARM, and the pairs of a Cortex-M: for simd alone.
 VECTOR_HEADERS = {"immintrin.h", "emmintrin.h", "arm_neon.h", "arm_acle.h"}
@@ -81,7 +81,7 @@ def judge_sim(path, quoted, target):
     if not quoted or is_core(target):
         return None
     good = re.fullmatch(r"sim_\w+\.h|hal\.h|hal_file\.h|replay/hal_\w+\.h|"
-                        r"app_(rig|rig_explain|record|text|view|write)\.h", target)
+                        r"app_(rig|rig_explain|rig_text|record|text|view|write)\.h", target)
     return None if good else "sim includes the core, hal, the app's records and its own files"
 
 

@@ -3,7 +3,6 @@
 #include "points/ih_cloud.h"
 #include "rig/ih_rig_blob.h"
 #include "upkeep/ih_exposure.h"
-#include "upkeep/ih_health.h"
 
 #include <cmath>
 #include <cstddef>
@@ -154,9 +153,7 @@ void use_others(const isohead &head, const ih_calibration &calibration)
     check(look.labelled_count == head.labels.labelled_count,
           "labels that the exposure does not see");
 
-    auto health = std::make_unique<ih_health>();
-    ih_health_init(health.get(), &head.rig);
-    check(health->state == IH_HEALTH_UNKNOWN, "a health that is known before the first frame");
+    check(head.align.now.state == IH_ALIGN_FITS, "a rig that has not moved and does not fit");
 
     ih_cloud cloud;
     uint16_t depth_mm = 0;

@@ -87,6 +87,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     static struct ih_dots dots;
     static struct ih_labels labels;
     static struct ih_labels_scratch scratch;
+    static struct ih_dot_rows rows;
     static struct ih_points points;
     static struct ih_samples samples;
     struct ih_labels_params params;
@@ -97,7 +98,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     memset(&scratch, 0xa5, sizeof scratch);
     ih_labels_params_default(&params);
     ih_samples_params_default(&samples_params);
-    ih_labels_assign(&dots, rig, &params, &scratch, &labels);
+    ih_dot_rows_fill(&dots, rig, &rows);
+    ih_labels_assign(&dots, &rows, rig, &params, &scratch, &labels);
     fuzz_check_labels(&labels, &dots, rig, &params);
     ih_points_from_labels(&labels, rig, &points);
     FUZZ_CHECK(points.seen_count == labels.labelled_count);

@@ -257,6 +257,28 @@ static uint64_t hash_result(const struct isohead *head)
     return hash;
 }
 
+/* Where the rig is for the next frame, too. */
+static uint64_t hash_align(const struct isohead *head)
+{
+    const struct ih_align *align = &head->align;
+    const struct ih_alignment *now = &align->now;
+    uint64_t hash = golden_add_word(golden_hash_rig(head), (int32_t)now->state);
+    hash = golden_add_words(hash, now->rotation_rad_q30, sizeof now->rotation_rad_q30);
+    hash = golden_add_word(hash, now->focal_q30);
+    hash = golden_add_words(hash, now->shift_px_q12, sizeof now->shift_px_q12);
+    hash = golden_add_words(hash, now->sigma_rad_q30, sizeof now->sigma_rad_q30);
+    hash = golden_add_word(hash, now->across_px_q12);
+    hash = golden_add_word(hash, now->depth_sigma_rad_q30);
+    hash = golden_add_word(hash, now->is_depth_known);
+    for (int32_t i = 0; i < IH_ALIGN_ENTRIES; i++) {
+        hash = golden_add(hash, align->mean.normal_q24[i], 8);
+    }
+    for (int32_t i = 0; i < IH_ALIGN_AXES; i++) {
+        hash = golden_add(hash, align->mean.right_px_q24[i], 8);
+    }
+    return hash;
+}
+
 const struct golden_stage golden_stage[GOLDEN_STAGES] = {
     {"dots", hash_dots},
     {"labels", hash_labels},
@@ -270,4 +292,5 @@ const struct golden_stage golden_stage[GOLDEN_STAGES] = {
     {"findings", hash_detections},
     {"tracks", hash_tracks},
     {"result", hash_result},
+    {"align", hash_align},
 };

@@ -9,7 +9,8 @@
  * from the most negative to the last ones that 64 bits hold, and after the third round tracks have the
  * numbers before and after the largest. So every round's records, times and numbers of tracks counted
  * from its start, are compared with the first round's, and so are the hashes of the stages. At the end
- * each state is started anew and gives the first round's records as they are, to the byte.
+ * each state is started anew and gives the first round's records as they are, to the byte. Where the rig is
+ * is a mean over the frames before, so each round starts that one anew; the rigs are right and do not move.
  *
  * Exit status: 0 the same, 1 a difference or what cannot be read, 2 wrong usage.
  */
@@ -50,7 +51,8 @@ struct sequence {
     const char *dir; /* NULL: the depth camera's scenes */
     struct ih_calibration calibration;
     struct isohead head;
-    int32_t frame_count; /* of the first round */
+    struct ih_align align; /* as it was at first */
+    int32_t frame_count;   /* of the first round */
     struct expected expected[FRAMES_PER_SEQUENCE_MAX];
     int64_t track_count; /* begun so far */
 };
@@ -249,6 +251,7 @@ static void play(struct sequence *sequence)
     if (run.round == WRAP_ROUND) {
         tracks->last_id = INT32_MAX - WRAP_IDS_LEFT;
     }
+    sequence->head.align = sequence->align;
     struct visit visit = {.run = &run,
                           .sequence = sequence,
                           .start_us = start_of_round_us(run.round),
@@ -272,6 +275,7 @@ static void start(struct sequence *sequence)
     if (err != IH_OK) {
         fail(sequence->dir != NULL ? sequence->dir : "depth camera", ih_err_text(err));
     }
+    sequence->align = sequence->head.align;
 }
 
 static void add_sequence(const char *dir)

@@ -15,6 +15,7 @@
 static struct ih_rig rig;
 static struct ih_labels_params params;
 static struct ih_labels_scratch scratch;
+static struct ih_dot_rows rows;
 static struct ih_labels labels;
 static struct ih_dots all, dots;
 static int16_t slot_of_all[IH_DOTS_MAX], slot_of_dot[IH_DOTS_MAX];
@@ -49,7 +50,8 @@ static struct label_counts count(void)
 {
     struct label_counts counts = {dots.dot_count, 0, 0, 0};
 
-    ih_labels_assign(&dots, &rig, &params, &scratch, &labels);
+    ih_dot_rows_fill(&dots, &rig, &rows);
+    ih_labels_assign(&dots, &rows, &rig, &params, &scratch, &labels);
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
         const int32_t dot = labels.dot_of_slot[slot];
 

@@ -88,8 +88,9 @@ static void find_all(struct isohead *head, const struct ih_calibration *c)
 
     TEST_ASSERT_EQUAL_INT(IH_OK, isohead_init(head, c, &bad_slot));
     head->dots = dots;
-    ih_labels_assign(&head->dots, &head->rig, &head->params.labels, &head->scratch.labels,
-                     &head->labels);
+    ih_dot_rows_fill(&head->dots, &head->rig, &head->scratch.labels.rows);
+    ih_labels_assign(&head->dots, &head->scratch.labels.rows, &head->rig, &head->params.labels,
+                     &head->scratch.labels.at.labels, &head->labels);
     isohead_find(head, 0);
 }
 

@@ -34,6 +34,7 @@ static struct ih_dots dots;
 static int16_t slot_of_dot[IH_DOTS_MAX];
 static struct ih_labels labels, changed;
 static struct ih_labels_scratch labels_scratch;
+static struct ih_dot_rows rows;
 static struct ih_points points;
 static struct ih_samples samples;
 static struct ih_surface_scratch surface_scratch;
@@ -158,7 +159,8 @@ static void check(int which, uint64_t seed, int32_t taken, int32_t moved,
         const double before_head_mm = scene.body[0].centre_mm[2] - 150 - rig.calibration.near_mm;
 
         prop_dots(&scene, &vector_rigs[which], &random, CENTRE_SIGMA_PX, &dots, slot_of_dot);
-        ih_labels_assign(&dots, &rig, &params, &labels_scratch, &labels);
+        ih_dot_rows_fill(&dots, &rig, &rows);
+        ih_labels_assign(&dots, &rows, &rig, &params, &labels_scratch, &labels);
         fit(&labels, &before);
         change(&random, taken, moved, i % 2 == 0 ? whole_mm : before_head_mm);
         fit(&changed, &after);

@@ -43,6 +43,7 @@ static struct ih_rig one_rig, two_rig;
 static struct ih_dots dots;
 static int16_t slot_of_dot[IH_DOTS_MAX];
 static struct ih_labels_scratch labels_scratch;
+static struct ih_dot_rows rows;
 static struct ih_labels one_labels, two_labels;
 static struct ih_points one_points, two_points;
 
@@ -70,9 +71,11 @@ static void check_twice(const struct ih_calibration *c, int32_t seed)
     TEST_ASSERT_EQUAL_INT(IH_OK, ih_rig_init(&one_rig, c, &bad_slot));
     TEST_ASSERT_EQUAL_INT(IH_OK, ih_rig_init(&two_rig, &twice, &bad_slot));
     prop_dots(&scene, c, &random_source, 0, &dots, slot_of_dot);
-    ih_labels_assign(&dots, &one_rig, &params, &labels_scratch, &one_labels);
+    ih_dot_rows_fill(&dots, &one_rig, &rows);
+    ih_labels_assign(&dots, &rows, &one_rig, &params, &labels_scratch, &one_labels);
     prop_dots(&large, &twice, &random_source, 0, &dots, slot_of_dot);
-    ih_labels_assign(&dots, &two_rig, &params, &labels_scratch, &two_labels);
+    ih_dot_rows_fill(&dots, &two_rig, &rows);
+    ih_labels_assign(&dots, &rows, &two_rig, &params, &labels_scratch, &two_labels);
     TEST_ASSERT_GREATER_THAN_INT32(150, one_labels.labelled_count);
     ih_points_from_labels(&one_labels, &one_rig, &one_points);
     ih_points_from_labels(&two_labels, &two_rig, &two_points);

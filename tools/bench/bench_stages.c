@@ -8,9 +8,9 @@ struct bench_times bench_times;
 const char *bench_stage_name(int stage)
 {
     static const char *const names[BENCH_STAGES] = {
-        [BENCH_DOTS] = "dots",           [BENCH_LABELS] = "labels", [BENCH_POINTS] = "points",
-        [BENCH_SURFACE] = "surface",     [BENCH_NESTS] = "nests",   [BENCH_HYPOTHESES] = "heads",
-        [BENCH_DETECTIONS] = "findings", [BENCH_TRACKS] = "tracks",
+        [BENCH_DOTS] = "dots",        [BENCH_ALIGN] = "align",         [BENCH_LABELS] = "labels",
+        [BENCH_POINTS] = "points",    [BENCH_SURFACE] = "surface",     [BENCH_NESTS] = "nests",
+        [BENCH_HYPOTHESES] = "heads", [BENCH_DETECTIONS] = "findings", [BENCH_TRACKS] = "tracks",
     };
     return names[stage];
 }
@@ -43,10 +43,19 @@ WRAP(BENCH_DOTS, ih_dots_find,
      (const struct ih_frame *frame, const struct ih_frame *ambient,
       const struct ih_dots_params *params, struct ih_dots_scratch *scratch, struct ih_dots *out),
      (frame, ambient, params, scratch, out))
+WRAP(BENCH_ALIGN, ih_align_find,
+     (struct ih_align * align, const struct ih_dots *dots, struct ih_rig *rig,
+      struct ih_dot_rows *rows, struct ih_align_scratch *scratch),
+     (align, dots, rig, rows, scratch))
+WRAP(BENCH_ALIGN, ih_align_learn,
+     (struct ih_align * align, const struct ih_labels *labels, struct ih_rig *rig,
+      struct ih_align_scratch *scratch),
+     (align, labels, rig, scratch))
 WRAP(BENCH_LABELS, ih_labels_assign,
-     (const struct ih_dots *dots, const struct ih_rig *rig, const struct ih_labels_params *params,
-      struct ih_labels_scratch *scratch, struct ih_labels *out),
-     (dots, rig, params, scratch, out))
+     (const struct ih_dots *dots, const struct ih_dot_rows *rows, const struct ih_rig *rig,
+      const struct ih_labels_params *params, struct ih_labels_scratch *scratch,
+      struct ih_labels *out),
+     (dots, rows, rig, params, scratch, out))
 WRAP(BENCH_POINTS, ih_points_from_labels,
      (const struct ih_labels *labels, const struct ih_rig *rig, struct ih_points *out),
      (labels, rig, out))

@@ -10,6 +10,7 @@
 
 enum bench_stage {
     BENCH_DOTS,
+    BENCH_ALIGN,
     BENCH_LABELS,
     BENCH_POINTS,
     BENCH_SURFACE,

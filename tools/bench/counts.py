@@ -31,6 +31,7 @@ BOUND = "bench_%s_instructions"
 FUNCTIONS = {
     "frame": ("isohead_frame",),
     "dots": ("ih_dots_find",),
+    "align": ("ih_align_find", "ih_align_learn"),
     "labels": ("ih_labels_assign",),
     "points, samples": ("ih_points_from_labels", "ih_samples_select"),
     "surface": ("ih_surface_fit",),
@@ -48,7 +49,7 @@ FUNCTIONS = {
 # Rows beside the peers: isohead's and theirs. What the peers' last stage does isohead does in four.
 BESIDE = {
     "dots": (("dots",), "peer_find_dots"),
-    "labels": (("labels",), "peer_find_labels"),
+    "labels": (("align", "labels"), "peer_find_labels"),
     "points, samples": (("points, samples",), "peer_find_samples"),
     "surface": (("surface",), "peer_fit_surface"),
     "cuts, nests": (("nests",), "peer_find_nests"),

@@ -22,7 +22,7 @@ import agree
 import builds
 
 # Rows of the table: name, what isohead's stages and the peers' are called.
-ROWS = [("dots", ("dots",)), ("labels", ("labels",)), ("points, samples", ("points",)), ("surface", ("surface",)),
+ROWS = [("dots", ("dots",)), ("labels", ("align", "labels")), ("points, samples", ("points",)), ("surface", ("surface",)),
         ("cuts, nests", ("nests",)), ("heads to tracks", ("heads", "findings", "tracks", "rest"))]
 SUM_TOLERANCE = 0.05  # of the stages against the whole that was timed without timers inside
 

@@ -8,6 +8,7 @@ output. Seeds are fixed: the same files come out every time.
 import argparse
 import os
 
+import align
 import bandpass
 import cholesky
 import cloud
@@ -31,7 +32,7 @@ import tracks
 import windows
 
 STAGES = {"rig": rig, "bandpass": bandpass, "noise": noise, "dots": dots, "labels": labels,
-          "exposure": exposure, "cloud": cloud, "windows": windows, "points": points,
+          "align": align,           "exposure": exposure, "cloud": cloud, "windows": windows, "points": points,
           "samples": samples, "cholesky": cholesky, "surface": surface, "ellipse": ellipse,
           "rays": rays, "ellipsoid": ellipsoid, "scan": scan, "fit": fit, "evidence": evidence,
           "score": score, "tracks": tracks, "isohead": isohead}

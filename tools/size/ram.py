@@ -18,7 +18,8 @@ def members():
     member = re.compile(r"struct \w+ (\w+);")
     names = member.findall(outer)
     if union:
-        names += ["scratch"] + ["scratch." + name for name in member.findall(union[1])]
+        flat = re.sub(r"\n        struct \{.*?\n        \} (\w+);", r"\n        struct nested \1;", union[1], flags=re.S)
+        names += ["scratch"] + ["scratch." + name for name in member.findall(flat)]
     return names
 
 

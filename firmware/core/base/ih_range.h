@@ -55,11 +55,6 @@ IH_END_DECLS
 #define IH_RANGE_INVERSE_DEPTH_Q36 1031000000
 #define IH_RANGE_RECTANGLE_PX_Q12 (1 << 29) /* second difference of four positions */
 
-/* Rotation, health. */
-#define IH_RANGE_ROTATION_SLOPE_PX_Q4 (1 << 22)
-#define IH_RANGE_HEALTH_SLOPE_PX_Q4 (1 << 18) /* of a dot whose distance is used */
-#define IH_RANGE_ALONG_PX_Q12 (1 << 29)       /* in the image, in a line's direction */
-
 /* Windows. */
 #define IH_RANGE_SCALE_Q16 5368710 /* cells per mm */
 #define IH_RANGE_WINDOW_SCORE 1000

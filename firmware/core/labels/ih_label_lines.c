@@ -6,39 +6,6 @@
 /* A dot's centre may be off by this along the line and still belong to the working range. */
 #define RANGE_MARGIN_PX_Q12 2048
 
-void ih_label_lines_add_dot(struct ih_labels_scratch *scratch, int32_t dot, int32_t u_px_q12,
-                            int32_t v_px_q12)
-{
-    int32_t at = dot;
-    for (; at > 0 && scratch->v_px_q12[at - 1] > v_px_q12; at--) {
-        scratch->u_px_q12[at] = scratch->u_px_q12[at - 1];
-        scratch->v_px_q12[at] = scratch->v_px_q12[at - 1];
-        scratch->by_row[at] = scratch->by_row[at - 1];
-    }
-    scratch->u_px_q12[at] = u_px_q12;
-    scratch->v_px_q12[at] = v_px_q12;
-    scratch->by_row[at] = (int16_t)dot;
-}
-
-/* Positions are within 2^27 in Q12, those at infinity within 2^27.6: a difference of 2^28.4 times a Q30 unit
- * vector, two products, below 2^59.4. */
-int64_t ih_label_lines_along_px_q12(const struct ih_labels_scratch *scratch, int32_t dot,
-                                    const struct ih_line *line)
-{
-    int64_t du = scratch->u_px_q12[dot] - line->infinity_u_px_q12;
-    int64_t dv = scratch->v_px_q12[dot] - line->infinity_v_px_q12;
-    return ih_shift_round(du * line->dir_u_q30 + dv * line->dir_v_q30, 30);
-}
-
-/* Distance beside the line. */
-static int64_t beside_px_q12(const struct ih_labels_scratch *scratch, int32_t dot,
-                             const struct ih_line *line)
-{
-    int64_t du = scratch->u_px_q12[dot] - line->infinity_u_px_q12;
-    int64_t dv = scratch->v_px_q12[dot] - line->infinity_v_px_q12;
-    return ih_shift_round(dv * line->dir_u_q30 - du * line->dir_v_q30, 30);
-}
-
 /* Reading order: by row, then column. */
 static bool reads_before(const struct ih_dot *a, const struct ih_dot *b)
 {
@@ -50,7 +17,7 @@ void ih_label_lines_add_candidate(const struct ih_dots *dots, struct ih_candidat
                                   struct ih_labels *out)
 {
     struct ih_candidate *list = scratch->candidate[slot];
-    const int16_t *by_row = scratch->by_row;
+    const int16_t *by_row = scratch->rows->dot;
     const struct ih_dot *dot = &dots->dot[by_row[candidate.dot]];
     int8_t at = scratch->candidate_count[slot];
     if (at == IH_LABELS_CANDIDATES_MAX) {
@@ -66,19 +33,6 @@ void ih_label_lines_add_candidate(const struct ih_dots *dots, struct ih_candidat
         list[at] = list[at - 1];
     }
     list[at] = candidate;
-}
-
-int32_t ih_label_lines_count_above(const struct ih_labels_scratch *scratch, int32_t count,
-                                   int32_t v_px_q12, int32_t guess)
-{
-    int32_t at = guess;
-    while (at > 0 && scratch->v_px_q12[at - 1] >= v_px_q12) {
-        at--;
-    }
-    while (at < count && scratch->v_px_q12[at] < v_px_q12) {
-        at++;
-    }
-    return at;
 }
 
 /* The rows of a line's candidates: those of its ends, which the margins move by at most their sum; 4 units
@@ -103,11 +57,11 @@ static void try_candidate(const struct ih_dots *dots, const struct ih_line *line
                           int32_t dot, const struct ih_labels_params *params,
                           struct ih_labels_scratch *scratch, struct ih_labels *out)
 {
-    int64_t perp = beside_px_q12(scratch, dot, line);
+    int64_t perp = ih_dot_rows_across_px_q12(scratch->rows, dot, line);
     if (ih_abs_s64(perp) > params->perp_max_px_q12) {
         return;
     }
-    int64_t t = ih_label_lines_along_px_q12(scratch, dot, line);
+    int64_t t = ih_dot_rows_along_px_q12(scratch->rows, dot, line);
     if (t < line->t_far_px_q12 - RANGE_MARGIN_PX_Q12 ||
         t > line->t_near_px_q12 + RANGE_MARGIN_PX_Q12 || t <= 0) {
         return;
@@ -128,12 +82,12 @@ void ih_label_lines_find(const struct ih_dots *dots, const struct ih_rig *rig,
     int32_t first = 0;
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
         const struct ih_line *line = &rig->line[slot];
-        const struct row_range rows = rows_of_line(line, params);
-        first = ih_label_lines_count_above(scratch, dots->dot_count, rows.first_px_q12, first);
+        const struct row_range range = rows_of_line(line, params);
+        first = ih_dot_rows_count_above(scratch->rows, range.first_px_q12, first);
         scratch->candidate_count[slot] = 0;
         scratch->choice[slot] = IH_NONE;
-        for (int32_t i = first; i < dots->dot_count && scratch->v_px_q12[i] <= rows.last_px_q12;
-             i++) {
+        for (int32_t i = first;
+             i < dots->dot_count && scratch->rows->v_px_q12[i] <= range.last_px_q12; i++) {
             try_candidate(dots, line, slot, i, params, scratch, out);
         }
     }

@@ -30,19 +30,6 @@ static inline void ih_label_assign(struct ih_labels_scratch *scratch, int32_t sl
     scratch->slot_of_dot[ih_label_candidate(scratch, slot, choice)->dot] = (int16_t)slot;
 }
 
-/* Inserts a dot's undistorted position in the order of rows, so that a line visits only some rows. Dots come nearly
- * in that order. Other functions number dots in it. */
-void ih_label_lines_add_dot(struct ih_labels_scratch *scratch, int32_t dot, int32_t u_px_q12,
-                            int32_t v_px_q12);
-
-/* Position of a dot along a line, from infinity. */
-int64_t ih_label_lines_along_px_q12(const struct ih_labels_scratch *scratch, int32_t dot,
-                                    const struct ih_line *line);
-
-/* How many of the dots lie above a row. The search starts at a guess: the count of the slot before is near. */
-int32_t ih_label_lines_count_above(const struct ih_labels_scratch *scratch, int32_t count,
-                                   int32_t v_px_q12, int32_t guess);
-
 /* A slot's candidates are in reading order, and a full table drops the last ones: seeds and growing prefer the first
  * of equally good ones, and none of that may depend on the order of the dots. */
 void ih_label_lines_add_candidate(const struct ih_dots *dots, struct ih_candidate candidate,

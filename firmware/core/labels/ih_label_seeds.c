@@ -19,7 +19,8 @@ struct corners {
 static inline struct corners corner_of(const struct ih_labels_scratch *scratch,
                                        const struct ih_candidate *candidate)
 {
-    return (struct corners){scratch->u_px_q12[candidate->dot], scratch->v_px_q12[candidate->dot],
+    return (struct corners){scratch->rows->u_px_q12[candidate->dot],
+                            scratch->rows->v_px_q12[candidate->dot],
                             (uint32_t)(candidate->perp_px_q12 * candidate->perp_px_q12)};
 }
 
@@ -63,8 +64,8 @@ static void begin_search(const struct ih_labels_scratch *scratch, const struct i
     out->reach_px_q12 =
         2 * ((int64_t)params->seed_max_px_q12 + ih_max_s32(params->seed_margin_px_q12, 0)) + 4;
     for (int8_t i = 0; i < scratch->candidate_count[slot]; i++) {
-        const int64_t t =
-            ih_label_lines_along_px_q12(scratch, ih_label_candidate(scratch, slot, i)->dot, line);
+        const int64_t t = ih_dot_rows_along_px_q12(scratch->rows,
+                                                   ih_label_candidate(scratch, slot, i)->dot, line);
         int32_t at = out->last_count++;
         for (; at > 0 && out->last_t_px_q12[at - 1] > t; at--) {
             out->last_t_px_q12[at] = out->last_t_px_q12[at - 1];

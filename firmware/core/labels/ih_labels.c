@@ -1,9 +1,10 @@
 #include "labels/ih_labels.h"
 
+#include <string.h>
+
 #include "labels/ih_label_growth.h"
 #include "labels/ih_label_lines.h"
 #include "labels/ih_label_seeds.h"
-#include "rig/ih_camera.h"
 
 void ih_labels_params_default(struct ih_labels_params *params)
 {
@@ -16,18 +17,6 @@ void ih_labels_params_default(struct ih_labels_params *params)
     };
 }
 
-static void undistort_dots(const struct ih_dots *dots, const struct ih_rig *rig,
-                           struct ih_labels_scratch *scratch)
-{
-    for (int32_t i = 0; i < dots->dot_count; i++) {
-        int32_t u_px_q12, v_px_q12;
-        ih_camera_undistort_pixel(rig, dots->dot[i].u_px_q12, dots->dot[i].v_px_q12, &u_px_q12,
-                                  &v_px_q12);
-        ih_label_lines_add_dot(scratch, i, u_px_q12, v_px_q12);
-        scratch->slot_of_dot[i] = IH_NONE;
-    }
-}
-
 static void write_table(const struct ih_labels_scratch *scratch, struct ih_labels *out)
 {
     out->labelled_count = 0;
@@ -37,7 +26,7 @@ static void write_table(const struct ih_labels_scratch *scratch, struct ih_label
         out->perp_px_q12[slot] = 0;
         if (scratch->choice[slot] != IH_NONE) {
             const struct ih_candidate *c = ih_label_candidate(scratch, slot, scratch->choice[slot]);
-            out->dot_of_slot[slot] = scratch->by_row[c->dot];
+            out->dot_of_slot[slot] = scratch->rows->dot[c->dot];
             out->t_px_q12[slot] = c->t_px_q12;
             out->perp_px_q12[slot] = c->perp_px_q12;
             out->labelled_count++;
@@ -45,12 +34,13 @@ static void write_table(const struct ih_labels_scratch *scratch, struct ih_label
     }
 }
 
-void ih_labels_assign(const struct ih_dots *dots, const struct ih_rig *rig,
-                      const struct ih_labels_params *params, struct ih_labels_scratch *scratch,
-                      struct ih_labels *out)
+void ih_labels_assign(const struct ih_dots *dots, const struct ih_dot_rows *rows,
+                      const struct ih_rig *rig, const struct ih_labels_params *params,
+                      struct ih_labels_scratch *scratch, struct ih_labels *out)
 {
     out->candidates_dropped = 0;
-    undistort_dots(dots, rig, scratch);
+    scratch->rows = rows;
+    memset(scratch->slot_of_dot, 0xff, sizeof scratch->slot_of_dot); /* IH_NONE */
     ih_label_lines_find(dots, rig, params, scratch, out);
     ih_label_seeds_assign(rig, params, scratch);
     out->seed_count = 0;

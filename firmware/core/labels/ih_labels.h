@@ -27,6 +27,7 @@
 #include <stdint.h>
 
 #include "base/ih_config.h"
+#include "dots/ih_dot_rows.h"
 #include "dots/ih_dots.h"
 #include "rig/ih_rig.h"
 
@@ -69,9 +70,7 @@ struct ih_labels_offer {
 #define IH_LABELS_NODES (IH_LABELS_LINE * (IH_GRID + 2 * IH_LABELS_EDGE) + IH_LABELS_EDGE)
 
 struct ih_labels_scratch {
-    /* Dots by row: undistorted positions, indices into ih_dots. */
-    int32_t u_px_q12[IH_DOTS_MAX], v_px_q12[IH_DOTS_MAX];
-    int16_t by_row[IH_DOTS_MAX];
+    const struct ih_dot_rows *rows; /* of this frame */
     int16_t slot_of_dot[IH_DOTS_MAX];
     int8_t candidate_count[IH_SLOTS];
     int8_t choice[IH_SLOTS]; /* candidate taken, or IH_NONE */
@@ -90,9 +89,10 @@ IH_BEGIN_DECLS
 
 void ih_labels_params_default(struct ih_labels_params *params);
 
-void ih_labels_assign(const struct ih_dots *dots, const struct ih_rig *rig,
-                      const struct ih_labels_params *params, struct ih_labels_scratch *scratch,
-                      struct ih_labels *out);
+/* rows: of those dots. */
+void ih_labels_assign(const struct ih_dots *dots, const struct ih_dot_rows *rows,
+                      const struct ih_rig *rig, const struct ih_labels_params *params,
+                      struct ih_labels_scratch *scratch, struct ih_labels *out);
 
 IH_END_DECLS
 

@@ -1,6 +1,7 @@
 #include "rig/ih_rig.h"
 
 #include <stdbool.h>
+#include <string.h>
 
 #include "base/ih_fix.h"
 #include "base/ih_range.h"
@@ -115,6 +116,17 @@ static bool fill_line(struct ih_rig *rig, int32_t slot)
     return true;
 }
 
+/* w x v; both below 2^30.1. */
+static void cross_q30(const int32_t w_q30[3], const int32_t v_q30[3], int32_t out_q30[3])
+{
+    for (int axis = 0; axis < 3; axis++) {
+        const int next = (axis + 1) % 3;
+        const int last = (axis + 2) % 3;
+        out_q30[axis] = (int32_t)ih_shift_round(
+            (int64_t)w_q30[next] * v_q30[last] - (int64_t)w_q30[last] * v_q30[next], 30);
+    }
+}
+
 /* Mean distance of the pattern's columns and rows in normalised coordinates, halved: the unit. */
 static void fill_field(struct ih_rig *rig)
 {
@@ -163,4 +175,29 @@ enum ih_err ih_rig_init(struct ih_rig *rig, const struct ih_calibration *calibra
         return IH_ERR_RAY;
     }
     return IH_OK;
+}
+
+/* To second order; the third is below 2e-5 of a ray's length. */
+void ih_rig_move(struct ih_rig *rig, const int32_t ray_q30[IH_SLOTS][3],
+                 const struct ih_rig_motion *motion)
+{
+    rig->focal_q30 = motion->focal_q30;
+    memcpy(rig->shift_px_q12, motion->shift_px_q12, sizeof rig->shift_px_q12);
+    for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
+        const struct ih_line before = rig->line[slot];
+        int32_t *ray = rig->calibration.ray_q30[slot];
+        const int32_t ray_before[3] = {ray[0], ray[1], ray[2]};
+        int32_t first_q30[3], second_q30[3];
+        cross_q30(motion->rotation_rad_q30, ray_q30[slot], first_q30);
+        cross_q30(motion->rotation_rad_q30, first_q30, second_q30);
+        for (int axis = 0; axis < 3; axis++) {
+            ray[axis] = ray_q30[slot][axis] + first_q30[axis] +
+                        (int32_t)ih_shift_round(second_q30[axis], 1);
+        }
+        if (ray[2] < RAY_FORWARD_MIN_Q30 || !fill_line(rig, slot)) {
+            rig->line[slot] = before;
+            memcpy(ray, ray_before, sizeof ray_before);
+        }
+    }
+    fill_field(rig);
 }

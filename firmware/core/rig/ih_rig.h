@@ -66,6 +66,9 @@ struct ih_rig {
     int32_t inverse_q24[3];  /* series of the inverse radial distortion */
     int32_t newton_steps;    /* at most; 0: the iteration alone is accurate enough */
     int32_t newton_last_q28; /* a step below this is the last one */
+    /* By ih_rig_move: relative change of the focal length, and shift of the picture. */
+    int32_t focal_q30;
+    int32_t shift_px_q12[2];
     struct ih_line line[IH_SLOTS];
 };
 
@@ -74,6 +77,18 @@ IH_BEGIN_DECLS
 /* Check the calibration and fill the rig. *bad_slot is the dot that failed, or IH_NONE. */
 enum ih_err ih_rig_init(struct ih_rig *rig, const struct ih_calibration *calibration,
                         int32_t *bad_slot) __attribute__((warn_unused_result));
+
+/* How a rig has moved: the projector by up to 0.05 rad about each axis, the camera's focal length, its picture. */
+struct ih_rig_motion {
+    int32_t rotation_rad_q30[3];
+    int32_t focal_q30; /* relative */
+    int32_t shift_px_q12[2];
+};
+
+/* The lines where they are now; ray_q30: of the rig's file. A line that would leave the bounds of a rig stays. Dots are to
+ * be put where the file's camera would see them (ih_dot_rows). */
+void ih_rig_move(struct ih_rig *rig, const int32_t ray_q30[IH_SLOTS][3],
+                 const struct ih_rig_motion *motion);
 
 /* Normalised coordinates of a dot at a depth; depth_mm_q8 > 0. */
 void ih_rig_dot_at(const struct ih_rig *rig, int32_t slot, int32_t depth_mm_q8, int32_t *x_q28,

@@ -52,6 +52,13 @@ void ih_tracks_init(struct ih_tracks *tracks)
     tracks->selected = IH_NONE;
 }
 
+void ih_tracks_forget(struct ih_tracks *tracks)
+{
+    const int32_t last_id = tracks->last_id;
+    ih_tracks_init(tracks);
+    tracks->last_id = last_id;
+}
+
 /* Is later 0 to gap_us after earlier? Their difference may not fit 64 bits. */
 static bool is_next(int64_t earlier_us, int64_t later_us, int32_t gap_us)
 {

@@ -101,6 +101,9 @@ void ih_tracks_params_default(struct ih_tracks_params *params);
 /* No track; ids begin at 1. */
 void ih_tracks_init(struct ih_tracks *tracks);
 
+/* All tracks end; the next one gets a number that none had. */
+void ih_tracks_forget(struct ih_tracks *tracks);
+
 void ih_tracks_expect(struct ih_tracks *tracks, const struct ih_tracks_params *params,
                       int64_t time_us, struct ih_expected *expected);
 

@@ -20,6 +20,7 @@
 #define WORLD_FRAME_US 40000
 #define WORLD_LIT_LABELS 200
 #define WORLD_UNPLUGGED_US 300000
+#define WORLD_KNOCK_RAD_Q30 3748032 /* 0.2 degrees */
 #define WORLD_BUFFERS 16
 #define WORLD_FAULTS 2
 /* However quick, no wait takes no time. */
@@ -67,6 +68,7 @@ enum world_act {
     WORLD_INTERLOCK_BLINKS, /* opens and closes */
     WORLD_RELOAD,
     WORLD_RELOAD_ALONE, /* and no frame; the rig and next_rig change places */
+    WORLD_KNOCK,        /* the rig moves by 0.2 degrees */
     WORLD_UNPLUGGED,    /* the camera is gone, and cannot be opened for a while */
     WORLD_STOP
 };
@@ -111,9 +113,12 @@ struct world {
     int64_t last_record_us;
     int record_count, lit_count, dark_count, error_count, ambient_count;
     int rise_count, beat_count;
-    enum ih_health_state health;
+    int32_t drift_rad_q30[3];      /* from one lit frame to the next */
+    struct ih_alignment alignment; /* what the core says of every lit frame */
+    int moved_count, lost_count;   /* warnings of the rig */
+    char moved[APP_LOG_TEXT_MAX];  /* the last one */
     size_t records_length;
-    char records[65536];
+    char records[131072];
     int waits;
     /* The board program. */
     struct app_config config;
@@ -138,6 +143,7 @@ bool app_rig_load(const char *path, struct ih_calibration *calibration, struct h
     *calibration = (struct ih_calibration){.kind = IH_RIG_DOTS, .width = 752, .height = 582};
     calibration->kind = strcmp(path, "range") == 0 ? IH_RIG_RANGE : IH_RIG_DOTS;
     calibration->width = strcmp(path, "narrow") == 0 ? 640 : 752;
+    calibration->origin_mm_q16[0] = 25 << 15; /* 12.5 mm */
     bool is_bad = strcmp(path, "bad") == 0;
     TEST_ASSERT_FALSE_MESSAGE(world.line, "on while the rig is read");
     if (strcmp(path, "now and then") == 0 && world.act_index <= world.rig_is_good_from_act) {
@@ -201,6 +207,10 @@ void isohead_find(struct isohead *head, int64_t time_us)
     head->result.entry_count = 0;
     head->result.head_count = 0;
     head->result.selected = IH_NONE;
+    head->align.now = world.alignment;
+    for (int i = 0; i < 3; i++) {
+        world.alignment.rotation_rad_q30[i] += world.drift_rad_q30[i];
+    }
     if (head->labels.labelled_count > 0) {
         world.lit_count++;
     } else {
@@ -236,25 +246,6 @@ void ih_exposure_next(const struct ih_exposure_params *params, const struct ih_e
     TEST_ASSERT_EQUAL_INT32(256, params->duty_min_q8);
     TEST_ASSERT_EQUAL_INT(world_head.labels.labelled_count, look->labelled_count);
     state->exposure_us += world.lit_count % 2 * 100;
-}
-
-/* A rig that always fits. */
-void ih_health_init(struct ih_health *health, const struct ih_rig *rig)
-{
-    (void)rig;
-    health->state = IH_HEALTH_UNKNOWN;
-}
-
-bool ih_health_frame(struct ih_health *health, const struct ih_dots *dots,
-                     const struct ih_labels *labels, struct ih_rig *rig,
-                     struct ih_health_scratch *scratch)
-{
-    (void)dots;
-    (void)labels;
-    (void)rig;
-    (void)scratch;
-    health->state = world.health;
-    return false;
 }
 
 const char *ih_err_text(enum ih_err err)
@@ -516,6 +507,10 @@ static void world_step(void)
         world.events |= HAL_EVENT_RELOAD;
         return;
     }
+    case WORLD_KNOCK:
+        world.alignment.state = IH_ALIGN_MOVED;
+        world.alignment.rotation_rad_q30[0] += WORLD_KNOCK_RAD_Q30;
+        break;
     case WORLD_INTERLOCK_OPENS:
         world_move_interlock(false);
         break;
@@ -613,6 +608,11 @@ static void world_write(void *context, int level, const char *text)
 {
     (void)context;
     world.reported_fault |= strstr(text, "laser: cannot be set") != NULL;
+    world.lost_count += strstr(text, "good: does not fit") != NULL;
+    if (strstr(text, "the rig has moved") != NULL) {
+        world.moved_count++;
+        snprintf(world.moved, sizeof world.moved, "%s", text);
+    }
     if (!world_quiet) {
         printf("%lld <%d> %s\n", (long long)world.now_us, level, text);
     }

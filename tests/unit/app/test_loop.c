@@ -1,5 +1,6 @@
 /* app_loop and app_frame in a made-up world (app_world.h), every call of the HAL failing in turn. */
 #include "app_frame.h"
+#include "app_health.h"
 #include "app_world.h"
 
 #define COUNT(acts) ((int)(sizeof(acts) / sizeof(acts)[0]))
@@ -45,29 +46,104 @@ static void test_check_says_whether_the_rig_fits(void)
 {
     static const enum world_act acts[] = {TWENTY, TWENTY, TWENTY, TWENTY};
     static const enum app_exit exits[] = {
-        [IH_HEALTH_UNKNOWN] = APP_EXIT_FAILED,
-        [IH_HEALTH_FITS] = APP_EXIT_GOOD,
-        [IH_HEALTH_ROTATED] = APP_EXIT_FAILED,
-        [IH_HEALTH_LOST] = APP_EXIT_FAILED,
+        [IH_ALIGN_UNKNOWN] = APP_EXIT_FAILED,
+        [IH_ALIGN_FITS] = APP_EXIT_GOOD,
+        [IH_ALIGN_MOVED] = APP_EXIT_FAILED,
+        [IH_ALIGN_LOST] = APP_EXIT_FAILED,
     };
-    for (int state = IH_HEALTH_UNKNOWN; state <= IH_HEALTH_LOST; state++) {
+    for (int state = IH_ALIGN_UNKNOWN; state <= IH_ALIGN_LOST; state++) {
         world_init(APP_STROBE_ALWAYS, acts, COUNT(acts));
         world.config.check = true;
-        world.health = (enum ih_health_state)state;
+        world.config.paper = true; /* of no matter here */
+        world.alignment.state = (enum ih_align_state)state;
         TEST_ASSERT_EQUAL_INT(exits[state], world_run());
-        TEST_ASSERT_EQUAL_INT(IH_HEALTH_ENOUGH, world.lit_count);
+        TEST_ASSERT_FALSE(world_head.params.is_paper);
+        TEST_ASSERT_EQUAL_INT(APP_HEALTH_CHECKED, world.lit_count);
         TEST_ASSERT_EQUAL_INT(0, world.record_count);
     }
 }
 
-/* Without it the loop goes on, and every record says so. */
+/* Without it the loop goes on, every record says so, and the log once, also after a reload. */
 static void test_a_lost_rig_is_reported(void)
 {
-    static const enum world_act acts[] = {TWENTY};
-    world_init(APP_STROBE_ALWAYS, acts, COUNT(acts));
-    world.health = IH_HEALTH_LOST;
+    static const enum world_act acts[] = {TWENTY, WORLD_RELOAD, TWENTY};
+    world_init(APP_STROBE_ALWAYS, acts, 20);
+    world.alignment.state = IH_ALIGN_LOST;
     TEST_ASSERT_EQUAL_INT(APP_EXIT_GOOD, world_run());
-    TEST_ASSERT_EQUAL_INT(world.record_count, count_in_records("\"rig\":\"lost\""));
+    TEST_ASSERT_EQUAL_INT(world.record_count, count_in_records("\"rig\":{\"state\":\"lost\""));
+    TEST_ASSERT_EQUAL_INT(1, world.lost_count);
+    world_init(APP_STROBE_ALWAYS, acts, COUNT(acts));
+    world.alignment.state = IH_ALIGN_LOST;
+    TEST_ASSERT_EQUAL_INT(APP_EXIT_GOOD, world_run());
+    TEST_ASSERT_EQUAL_INT(2, world.lost_count);
+}
+
+/* A few frames that say something else are no message. */
+static void test_a_rig_that_is_lost_for_moments_is_not_reported(void)
+{
+    struct app_state *state = &world.state;
+    world_init(APP_STROBE_ALWAYS, NULL, 0);
+    app_health_begin(state);
+    for (int i = 0; i < 100; i++) {
+        world_head.align.now = (struct ih_alignment){
+            .state = i % (2 * APP_HEALTH_STEADY) < APP_HEALTH_STEADY - 1 ? IH_ALIGN_LOST
+                                                                         : IH_ALIGN_FITS};
+        app_health_frame(state);
+    }
+    TEST_ASSERT_EQUAL_INT(0, world.lost_count);
+}
+
+static void assert_moved(int count, const char *how, const char *rotation)
+{
+    TEST_ASSERT_EQUAL_INT(count, world.moved_count);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(world.moved, how), world.moved);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(world.moved, rotation), world.moved);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(world.moved, "calibrate again"), world.moved);
+}
+
+/* What is no rotation is reported, too: focal length and picture, one after the other. */
+static void assert_lens_is_seen(void)
+{
+    struct ih_alignment *now = &world_head.align.now;
+    int32_t *const moves[] = {&now->focal_q30, &now->shift_px_q12[0], &now->shift_px_q12[1]};
+    static const int32_t enough[] = {2254858, 2150, 2150};     /* 0.21 %, 0.525 px */
+    static const int32_t too_little[] = {1932735, 1843, 1843}; /* 0.18 %, 0.45 px */
+    for (int i = 0; i < 3; i++) {
+        world.moved_count = 0;
+        *moves[i] += too_little[i];
+        app_health_frame(&world.state);
+        TEST_ASSERT_EQUAL_INT(0, world.moved_count);
+        *moves[i] += enough[i] - too_little[i];
+        app_health_frame(&world.state);
+        assert_moved(1, "at once", "(0.200, 0.000, 0.000)");
+    }
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(world.moved, "0.21 %, its picture by (0.52, 0.52) px"),
+                                 world.moved);
+}
+
+/* Moved before the start, by a knock, by heat: each has its own message. */
+static void test_a_rig_that_moved_is_reported(void)
+{
+    static const enum world_act calm[] = {TWENTY, TWENTY, TWENTY, TWENTY, TWENTY, TWENTY, TWENTY};
+    static const enum world_act knock[] = {TWENTY, TWENTY, TWENTY, TWENTY, WORLD_KNOCK, TWENTY};
+    static const enum world_act knocked[] = {WORLD_KNOCK, TWENTY, TWENTY, TWENTY, TWENTY};
+    world_init(APP_STROBE_ALWAYS, knocked, COUNT(knocked));
+    TEST_ASSERT_EQUAL_INT(APP_EXIT_GOOD, world_run());
+    assert_moved(1, "since its calibration", "(0.200, 0.000, 0.000)");
+    world_init(APP_STROBE_ALWAYS, knock, COUNT(knock));
+    world.alignment.state = IH_ALIGN_FITS;
+    TEST_ASSERT_EQUAL_INT(APP_EXIT_GOOD, world_run());
+    assert_moved(1, "at once", "(0.200, 0.000, 0.000)");
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(world.moved, "depth is not known"), world.moved);
+    assert_lens_is_seen();
+    /* 0.07 degrees in 140 frames: one report at the beginning, one at 0.05 more. */
+    world_init(APP_STROBE_ALWAYS, calm, COUNT(calm));
+    world.alignment.state = IH_ALIGN_MOVED;
+    world.drift_rad_q30[2] = WORLD_KNOCK_RAD_Q30 / 400;
+    world.alignment.is_depth_known = true;
+    world.alignment.depth_sigma_rad_q30 = 187402; /* 0.01 degrees: 175 um of 12.5 mm */
+    TEST_ASSERT_EQUAL_INT(APP_EXIT_GOOD, world_run());
+    assert_moved(2, "slowly", "depth is known to +-14.0 mm at 1 m");
 }
 
 /* Frames in flight were exposed before the laser was on: none of them counts. */
@@ -527,6 +603,8 @@ int main(void)
     RUN_TEST(test_gated_takes_every_frame);
     RUN_TEST(test_check_says_whether_the_rig_fits);
     RUN_TEST(test_a_lost_rig_is_reported);
+    RUN_TEST(test_a_rig_that_is_lost_for_moments_is_not_reported);
+    RUN_TEST(test_a_rig_that_moved_is_reported);
     RUN_TEST(test_gated_with_frames_in_flight);
     RUN_TEST(test_alternating);
     RUN_TEST(test_always);

@@ -2,6 +2,7 @@
  * are compared whole in the simulator's tests. */
 #include "app_record.h"
 
+#include "app_rig_text.h"
 #include "app_write.h"
 #include "ih_test.h"
 
@@ -16,6 +17,7 @@ void setUp(void)
     record.dir = NULL;
     frame = (struct hal_frame){.name = "000007.pgm", .time_us = 280000};
     head.result.selected = IH_NONE;
+    head.align.now.across_px_q12 = -1;
 }
 
 void tearDown(void)
@@ -32,28 +34,84 @@ static void assert_record(const char *wanted)
 
 #define START "{\"file\":\"000007.pgm\",\"time_us\":280000,\"dots\":0,\"labelled\":0,"
 #define NOTHING "\"hypotheses\":[],\"heads\":[],\"head\":null"
+#define NO_RIG                                                                                   \
+    ",\"rig\":{\"state\":\"unknown\",\"across_px\":null,\"rotation_deg\":[0.000,0.000,0.000],"   \
+    "\"sigma_deg\":[0.000,0.000,0.000],\"focal_percent\":0.00,\"shift_px\":[0.00,0.00],\"depth_" \
+    "known\":false}"
 
 static void live_cameras_add_what_is_not_as_usual(void)
 {
     struct app_record_live live = {.lost_count = 0};
 
     TEST_ASSERT_TRUE(app_record_frame(&record, &frame, &head, NULL));
-    assert_record(START NOTHING "}\n");
+    assert_record(START NOTHING NO_RIG "}\n");
     setUp();
     TEST_ASSERT_TRUE(app_record_frame(&record, &frame, &head, &live));
-    assert_record(START NOTHING "}\n");
+    assert_record(START NOTHING NO_RIG "}\n");
     setUp();
     live.lost_count = 3;
     record.dir = "a\"b";
     TEST_ASSERT_TRUE(app_record_frame(&record, &frame, &head, &live));
-    assert_record(START NOTHING ",\"lost\":3,\"dir\":\"a\\\"b\"}\n");
+    assert_record(START NOTHING NO_RIG ",\"lost\":3,\"dir\":\"a\\\"b\"}\n");
     setUp();
-    live = (struct app_record_live){INT64_MAX, 1, "late", 410, "turned"};
+    live = (struct app_record_live){INT64_MAX, 1, "late"};
     head.dots.dots_dropped = 2;
     TEST_ASSERT_TRUE(app_record_frame(&record, &frame, &head, &live));
-    assert_record(START NOTHING
-                  ",\"dropped\":{\"dots\":2},\"lost\":9223372036854775807,"
-                  "\"skipped\":1,\"strobe\":\"late\",\"across_px\":0.10,\"rig\":\"turned\"}\n");
+    assert_record(START NOTHING NO_RIG ",\"dropped\":{\"dots\":2},\"lost\":9223372036854775807,"
+                                       "\"skipped\":1,\"strobe\":\"late\"}\n");
+}
+
+/* How the rig has moved: with dots, and not with the paper's method alone. */
+static void dot_rigs_have_their_alignment(void)
+{
+    static const struct ih_alignment moved = {
+        .state = IH_ALIGN_MOVED,
+        .rotation_rad_q30 = {3748066, -18740330, 9371}, /* 0.2, -1, 0.0005 degrees */
+        .sigma_rad_q30 = {187403, 1874033, 374807},     /* 0.01, 0.1, 0.02 degrees */
+        .focal_q30 = -5368709,                          /* -0.5 % */
+        .shift_px_q12 = {0, -16384},                    /* -4 px */
+        .across_px_q12 = 410,
+        .is_depth_known = true,
+    };
+    static const char wanted[] =
+        ",\"rig\":{\"state\":\"moved\",\"across_px\":0.10,\"rotation_deg\":[0.200,-1.000,0.001],"
+        "\"sigma_deg\":[0.010,0.100,0.020],\"focal_percent\":-0.50,\"shift_px\":[0.00,-4.00],"
+        "\"depth_known\":true}";
+    static const char start[] =
+        "{\"file\":\"000007.pgm\",\"time_us\":280000,\"dots\":0,\"labelled\":1,";
+    static const char *const states[] = {
+        [IH_ALIGN_UNKNOWN] = "unknown",
+        [IH_ALIGN_FITS] = "fits",
+        [IH_ALIGN_MOVED] = "moved",
+        [IH_ALIGN_LOST] = "lost",
+    };
+    const struct app_record_live live = {.lost_count = 0};
+    char text[512];
+
+    head.align.now = moved;
+    head.labels.labelled_count = 1;
+    snprintf(text, sizeof text, "%s%s%s}\n", start, NOTHING, wanted);
+    TEST_ASSERT_TRUE(app_record_frame(&record, &frame, &head, NULL));
+    assert_record(text);
+    /* A live camera has the distance twice, as readers know it. */
+    snprintf(text, sizeof text, "%s%s%s,\"across_px\":0.10}\n", start, NOTHING, wanted);
+    memset(&record.text, IH_TEST_FILL, sizeof record.text);
+    TEST_ASSERT_TRUE(app_record_frame(&record, &frame, &head, &live));
+    assert_record(text);
+    head.params.is_paper = true;
+    snprintf(text, sizeof text, "%s%s}\n", start, NOTHING);
+    memset(&record.text, IH_TEST_FILL, sizeof record.text);
+    TEST_ASSERT_TRUE(app_record_frame(&record, &frame, &head, &live));
+    assert_record(text);
+    head.params.is_paper = false;
+    head.rig.calibration.kind = IH_RIG_RANGE;
+    snprintf(text, sizeof text, "%s%s,\"points\":0}\n", start, NOTHING);
+    memset(&record.text, IH_TEST_FILL, sizeof record.text);
+    TEST_ASSERT_TRUE(app_record_frame(&record, &frame, &head, NULL));
+    assert_record(text);
+    for (int state = IH_ALIGN_UNKNOWN; state <= IH_ALIGN_LOST; state++) {
+        TEST_ASSERT_EQUAL_STRING(states[state], app_rig_text((enum ih_align_state)state));
+    }
 }
 
 static void errors_are_records_too(void)
@@ -66,7 +124,7 @@ static void errors_are_records_too(void)
 static void the_longest_record_has_room(void)
 {
     static char name[256], dir[4096], error[HAL_ERROR_MAX], word[33];
-    const struct app_record_live live = {INT64_MIN, INT64_MIN, word, INT32_MIN, word};
+    const struct app_record_live live = {INT64_MIN, INT64_MIN, word};
     int i;
 
     memset(name, 0x1b, sizeof name - 1);
@@ -76,8 +134,16 @@ static void the_longest_record_has_room(void)
     frame.name = name;
     frame.time_us = INT64_MIN;
     record.dir = dir;
-    head.rig.calibration.kind = IH_RIG_RANGE;
-    head.dots.dot_count = head.labels.labelled_count = head.points.seen_count = INT32_MIN;
+    head.align.now = (struct ih_alignment){
+        .state = IH_ALIGN_UNKNOWN,
+        .rotation_rad_q30 = {INT32_MIN, INT32_MIN, INT32_MIN},
+        .sigma_rad_q30 = {INT32_MIN, INT32_MIN, INT32_MIN},
+        .focal_q30 = INT32_MIN,
+        .shift_px_q12 = {INT32_MIN, INT32_MIN},
+        .across_px_q12 = INT32_MAX,
+    };
+    head.dots.dot_count = head.points.seen_count = INT32_MIN;
+    head.labels.labelled_count = INT32_MAX;
     head.dots.dots_dropped = head.labels.candidates_dropped = INT32_MIN;
     head.nests.minima_dropped = head.nests.contours_dropped = INT32_MIN;
     head.windows.places_dropped = head.detections.dropped_count = INT32_MIN;
@@ -152,6 +218,7 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(live_cameras_add_what_is_not_as_usual);
+    RUN_TEST(dot_rigs_have_their_alignment);
     RUN_TEST(errors_are_records_too);
     RUN_TEST(the_longest_record_has_room);
     RUN_TEST(memory_of_every_size_is_kept);

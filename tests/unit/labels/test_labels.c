@@ -1,6 +1,7 @@
 /* ih_labels on dots of made-up scenes whose labels are known. */
 #include "base/ih_config.h"
 #include "base/ih_types.h"
+#include "dots/ih_dot_rows.h"
 #include "dots/ih_dots.h"
 #include "labels/ih_labels.h"
 #include "rig/ih_camera.h"
@@ -29,6 +30,7 @@ struct vector_scene {
 static struct ih_rig rig;
 static struct ih_labels_params params;
 static struct ih_labels_scratch scratch;
+static struct ih_dot_rows rows;
 static struct ih_dots dots;
 static struct ih_labels labels;
 static int16_t truth[IH_DOTS_MAX]; /* slot of each dot */
@@ -102,7 +104,8 @@ static void sort_dots(void)
 
 static void assign(void)
 {
-    ih_labels_assign(&dots, &rig, &params, &scratch, &labels);
+    ih_dot_rows_fill(&dots, &rig, &rows);
+    ih_labels_assign(&dots, &rows, &rig, &params, &scratch, &labels);
 }
 
 /* What holds for any input: no dot twice, counts that agree, dots that lie on their lines. */

@@ -14,6 +14,7 @@
 #include "ih_test.h"
 
 static struct ih_labels_scratch scratch;
+static struct ih_dot_rows rows;
 static struct ih_labels_params params;
 static struct ih_labels labels;
 static struct ih_dots dots;
@@ -25,11 +26,13 @@ void setUp(void)
     random_source.state = 4711;
     ih_labels_params_default(&params);
     memset(&scratch, 0, sizeof scratch);
+    memset(&rows, 0, sizeof rows);
+    scratch.rows = &rows;
     memset(&labels, 0, sizeof labels);
     memset(scratch.choice, 0xff, sizeof scratch.choice);
     memset(scratch.slot_of_dot, 0xff, sizeof scratch.slot_of_dot);
     for (int16_t i = 0; i < IH_DOTS_MAX; i++) {
-        scratch.by_row[i] = i;
+        rows.dot[i] = i;
     }
 }
 
@@ -103,8 +106,8 @@ static void candidates_lie_on_their_line(void)
 
             line.dir_u_q30 = along_u * (1 << 30);
             line.dir_v_q30 = along_v * (1 << 30);
-            scratch.u_px_q12[0] = 400000 + cases[i].t * along_u - cases[i].perp * along_v;
-            scratch.v_px_q12[0] = 300000 + cases[i].t * along_v + cases[i].perp * along_u;
+            rows.u_px_q12[0] = 400000 + cases[i].t * along_u - cases[i].perp * along_v;
+            rows.v_px_q12[0] = 300000 + cases[i].t * along_v + cases[i].perp * along_u;
             rig.line[7] = line;
             ih_label_lines_find(&dots, &rig, &params, &scratch, &labels);
             IH_TEST_EQUAL(cases[i].is_candidate, scratch.candidate_count[7], "candidate", i);
@@ -118,38 +121,6 @@ static void candidates_lie_on_their_line(void)
                                ih_label_growth_inverse_q36(c, &line), "inverse depth", i);
             }
         }
-    }
-}
-
-/* How many dots lie above a row, whatever the guess. */
-static void dots_above_a_row_are_counted(void)
-{
-    struct ih_test_random random = {29};
-    int pass, i;
-
-    for (pass = 0; pass < 2000; pass++) {
-        const int32_t count = (int32_t)ih_test_between(&random, 0, 12);
-        const int32_t row = (int32_t)ih_test_between(&random, -1, 9);
-        int32_t v_px_q12[12], above = 0;
-
-        for (i = 0; i < count; i++) {
-            v_px_q12[i] = (int32_t)ih_test_between(&random, 0, 8);
-            above += v_px_q12[i] < row;
-            ih_label_lines_add_dot(&scratch, i, 100 + i, v_px_q12[i]);
-        }
-        for (i = 0; i < count; i++) { /* by row; of one row by number */
-            const int32_t dot = scratch.by_row[i];
-
-            IH_TEST_EQUAL(v_px_q12[dot], scratch.v_px_q12[i], "v", pass);
-            IH_TEST_EQUAL(100 + dot, scratch.u_px_q12[i], "u", pass);
-            TEST_ASSERT_TRUE(
-                i == 0 || v_px_q12[scratch.by_row[i - 1]] < v_px_q12[dot] ||
-                (v_px_q12[scratch.by_row[i - 1]] == v_px_q12[dot] && scratch.by_row[i - 1] < dot));
-        }
-        IH_TEST_EQUAL(above,
-                      ih_label_lines_count_above(&scratch, count, row,
-                                                 (int32_t)ih_test_between(&random, 0, count)),
-                      "above", pass);
     }
 }
 
@@ -178,8 +149,8 @@ static double rectangle_error(const int32_t dot[4], const int32_t perp[4])
     int i;
 
     for (i = 0; i < 4; i++) {
-        u += sign[i] * scratch.u_px_q12[dot[i]];
-        v += sign[i] * scratch.v_px_q12[dot[i]];
+        u += sign[i] * rows.u_px_q12[dot[i]];
+        v += sign[i] * rows.v_px_q12[dot[i]];
         perp2 += (double)perp[i] * perp[i];
     }
     return sqrt((u * u + v * v) / 4 + 9 * perp2 / 4);
@@ -209,8 +180,8 @@ static void the_best_rectangle_is_the_seed(void)
                     dot[i][k] = dot[between(0, i - 1)][0];
                 }
                 perp[i][k] = between(-1200, 1200);
-                scratch.u_px_q12[3 * i + k] = (i % 2 * 30 + 300) * 4096 + between(-4096, 4096);
-                scratch.v_px_q12[3 * i + k] = (i / 2 * 25 + 200) * 4096 + between(-4096, 4096);
+                rows.u_px_q12[3 * i + k] = (i % 2 * 30 + 300) * 4096 + between(-4096, 4096);
+                rows.v_px_q12[3 * i + k] = (i / 2 * 25 + 200) * 4096 + between(-4096, 4096);
                 put_candidate(slot[i], dot[i][k], perp[i][k]);
             }
         }
@@ -273,11 +244,11 @@ static void seeds_end_at_their_limits(void)
 
     for (i = 0; i < IH_TEST_COUNT(cases); i++) {
         for (axis = 0; axis < 2; axis++) {
-            int32_t *place = axis == 0 ? scratch.u_px_q12 : scratch.v_px_q12;
+            int32_t *place = axis == 0 ? rows.u_px_q12 : rows.v_px_q12;
             struct ih_labels_offer offer;
 
-            memset(scratch.u_px_q12, 0, sizeof scratch.u_px_q12);
-            memset(scratch.v_px_q12, 0, sizeof scratch.v_px_q12);
+            memset(rows.u_px_q12, 0, sizeof rows.u_px_q12);
+            memset(rows.v_px_q12, 0, sizeof rows.v_px_q12);
             for (corner = 0; corner < 4; corner++) {
                 scratch.candidate_count[slot[corner]] = 0;
                 put_candidate(slot[corner], corner, 0);
@@ -534,7 +505,6 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(the_first_sixteen_candidates_stay);
     RUN_TEST(candidates_lie_on_their_line);
-    RUN_TEST(dots_above_a_row_are_counted);
     RUN_TEST(the_best_rectangle_is_the_seed);
     RUN_TEST(seeds_end_at_their_limits);
     RUN_TEST(offers_are_sorted_by_error_then_slot);

@@ -1,0 +1,66 @@
+#include "align/ih_align_pairs.h"
+
+#include "base/ih_fix.h"
+
+#define ONE_Q14 (1 << 14)
+#define ASPECT_MAX_Q14 (8 << 14)
+
+void ih_align_axes(const struct ih_rig *rig, struct ih_align_axes *out)
+{
+    const struct ih_calibration *c = &rig->calibration;
+    out->along_q14[0] = (int32_t)ih_shift_round(rig->line[IH_SLOTS / 2].dir_u_q30, 16);
+    out->along_q14[1] = (int32_t)ih_shift_round(rig->line[IH_SLOTS / 2].dir_v_q30, 16);
+    out->aspect_q14 = (int32_t)ih_clamp_s64(
+        ih_div_round((int64_t)c->fy_px_q16 * (1 << 14), c->fx_px_q16), ASPECT_MAX_Q14);
+}
+
+static int16_t slope_of(int64_t slope_q28)
+{
+    return (int16_t)ih_clamp_s64(slope_q28 >> 16, INT16_MAX);
+}
+
+/* A rotation (a, b, c) moves a dot at (x, y), per rad and focal length, by (-x y a + (1 + x x) b - y c,
+ * -(1 + y y) a + x y b + x c); a focal length, by (x, y). |x|, |y| < 4 and an aspect of 8: all is below 2^40 in Q28. */
+void ih_align_slopes(const struct ih_rig *rig, const struct ih_align_axes *axes, int32_t slot,
+                     int16_t slope_q12[IH_ALIGN_AXES])
+{
+    const struct ih_line *line = &rig->line[slot];
+    const int64_t x = line->slope_x_q20 >> 6, y = line->slope_y_q20 >> 6;
+    const int64_t along_u = axes->along_q14[0], along_v = axes->along_q14[1];
+    /* The line's direction; what moves along v is longer by the aspect. */
+    const int64_t u = line->dir_u_q30 >> 16, v = line->dir_v_q30 >> 16;
+    const int64_t u_aspect = u * axes->aspect_q14 >> 14;
+    const int64_t xy = x * y >> 14, xx = ONE_Q14 + (x * x >> 14), yy = ONE_Q14 + (y * y >> 14);
+    const int64_t by_a = (v * xy - u_aspect * yy) >> 14, by_b = (u_aspect * xy - v * xx) >> 14;
+    slope_q12[IH_ALIGN_BASELINE] = slope_of(along_u * by_a + along_v * by_b);
+    slope_q12[IH_ALIGN_DEPTH] = slope_of(along_u * by_b - along_v * by_a);
+    slope_q12[IH_ALIGN_ROLL] = slope_of(u_aspect * x + v * y);
+    slope_q12[IH_ALIGN_FOCAL] = slope_of(u_aspect * y - v * x);
+    slope_q12[IH_ALIGN_SHIFT] = slope_of(u * along_u + v * along_v);
+}
+
+/* Of the rows of a line's two ends, widened by the margin, the first and the last one; the line's shift and half a band
+ * move them by at most as much. */
+int32_t ih_align_near(const struct ih_dot_rows *rows, const struct ih_line *line,
+                      int32_t shift_px_q12, struct ih_align_band band, int32_t *first,
+                      int32_t across_px_q12[IH_ALIGN_NEAR_MAX])
+{
+    const int32_t near = line->t_near_px_q12 + band.margin_px_q12;
+    const int32_t far = line->t_far_px_q12 - band.margin_px_q12;
+    const int32_t middle =
+        line->infinity_v_px_q12 + (int32_t)ih_mul_shift(shift_px_q12, line->dir_u_q30, 30);
+    const int32_t near_v = middle + (int32_t)ih_mul_shift(near, line->dir_v_q30, 30);
+    const int32_t far_v = middle + (int32_t)ih_mul_shift(far, line->dir_v_q30, 30);
+    const int32_t last_v = ih_max_s32(near_v, far_v) + band.half_px_q12;
+    *first = ih_dot_rows_count_above(rows, ih_min_s32(near_v, far_v) - band.half_px_q12, *first);
+    int32_t count = 0;
+    for (int32_t i = *first; i < rows->dot_count && rows->v_px_q12[i] <= last_v; i++) {
+        const int64_t along = ih_dot_rows_along_px_q12(rows, i, line);
+        const int64_t across = ih_dot_rows_across_px_q12(rows, i, line) - shift_px_q12;
+        if (along >= far && along <= near && ih_abs_s64(across) < band.half_px_q12 &&
+            count < IH_ALIGN_NEAR_MAX) {
+            across_px_q12[count++] = (int32_t)across;
+        }
+    }
+    return count;
+}

@@ -1,0 +1,601 @@
+/* ih_align on dots of rigs that were moved, labelled by the core as it goes. */
+#include "align/ih_align.h"
+#include "labels/ih_labels.h"
+
+#include <stdlib.h>
+
+#include "ih_test.h"
+#include "moved_rig.h"
+#include "rigs.inc"
+
+#define WALL_MM 1200.0
+#define NOISE_PX 0.1
+
+static const struct moved_rig file = {{0, 0, 0}, 0};
+static const struct moved_scene room = {WALL_MM, NOISE_PX, 1, 0};
+
+static struct ih_rig rig, before;
+static struct ih_labels_params params;
+static struct ih_labels_scratch labels_scratch;
+static struct ih_labels labels;
+static struct ih_dots dots;
+static struct ih_dot_rows rows;
+static struct ih_align align;
+static struct ih_align_scratch scratch;
+static int16_t slot_of_dot[IH_DOTS_MAX];
+static struct ih_test_random random_source;
+
+void setUp(void)
+{
+    random_source.state = 81;
+    ih_labels_params_default(&params);
+    memset(&align, IH_TEST_FILL, sizeof align);
+    memset(&scratch, IH_TEST_FILL, sizeof scratch);
+}
+
+void tearDown(void)
+{
+}
+
+static void use_rig(int which)
+{
+    int32_t bad_slot;
+
+    TEST_ASSERT_EQUAL_INT(IH_OK, ih_rig_init(&rig, &vector_rigs[which], &bad_slot));
+    before = rig;
+    ih_align_init(&align, &rig);
+    TEST_ASSERT_EQUAL_INT(IH_ALIGN_UNKNOWN, align.now.state);
+}
+
+static void see(int which, const struct moved_rig *moved, const struct moved_scene *scene)
+{
+    see_dots(&vector_rigs[which], moved, scene, &random_source, slot_of_dot, &dots);
+}
+
+static void find(void)
+{
+    ih_align_find(&align, &dots, &rig, &rows, &scratch);
+}
+
+static void learn(void)
+{
+    ih_labels_assign(&dots, &rows, &rig, &params, &labels_scratch, &labels);
+    ih_align_learn(&align, &labels, &rig, &scratch);
+}
+
+static void run(int which, const struct moved_rig *moved, const struct moved_scene *scene,
+                int frames)
+{
+    for (int i = 0; i < frames; i++) {
+        see(which, moved, scene);
+        find();
+        learn();
+    }
+}
+
+/* Dots anywhere. */
+static void scatter(int which, int32_t count)
+{
+    const struct moved_scene chance = {WALL_MM, 0, 0, count};
+
+    see(which, &file, &chance);
+}
+
+static void assert_untouched(const char *what, int index)
+{
+    IH_TEST_EQUAL(0, memcmp(&before, &rig, sizeof rig), what, index);
+}
+
+/* How far from its line a slot's own dot lies at worst, without noise. */
+static double worst_px(int which, const struct moved_rig *moved)
+{
+    static const struct moved_scene exact = {WALL_MM, 0, 1, 0};
+    static struct ih_dots own;
+    static struct ih_dot_rows own_rows;
+    static int16_t slot[IH_DOTS_MAX];
+    struct ih_test_random random = {3};
+    double worst = 0;
+
+    see_dots(&vector_rigs[which], moved, &exact, &random, slot, &own);
+    ih_dot_rows_fill(&own, &rig, &own_rows);
+    for (int32_t i = 0; i < own_rows.dot_count; i++) {
+        const struct ih_line *line = &rig.line[slot[own_rows.dot[i]]];
+
+        worst = fmax(worst, fabs((double)ih_dot_rows_across_px_q12(&own_rows, i, line) / 4096));
+    }
+    return worst;
+}
+
+static double rotation_deg(int axis)
+{
+    return align.now.rotation_rad_q30[axis] / Q30 / DEG;
+}
+
+static double sigma_deg(int axis)
+{
+    return align.now.sigma_rad_q30[axis] / Q30 / DEG;
+}
+
+static double right_label_ratio(void)
+{
+    int right = 0, dot_count = 0;
+
+    for (int32_t i = 0; i < dots.dot_count; i++) {
+        dot_count += slot_of_dot[i] != IH_NONE;
+    }
+    for (int slot = 0; slot < IH_SLOTS; slot++) {
+        right +=
+            labels.dot_of_slot[slot] != IH_NONE && slot_of_dot[labels.dot_of_slot[slot]] == slot;
+    }
+    return (double)right / dot_count;
+}
+
+/* --- where the rig is right --- */
+
+static void a_right_rig_stays_to_the_last_bit(void)
+{
+    static const struct moved_scene scenes[] = {
+        {1200, 0.1, 1, 0},   {600, 0.1, 1, 0},     {2300, 0.15, 1, 0},   {1200, 0.1, 0.5, 0},
+        {900, 0.1, 0.3, 30}, {1500, 0.1, 0.7, 90}, {1200, 0.1, 0.9, 300}};
+
+    for (int which = 0; which < 2; which++) {
+        for (int i = 0; i < IH_TEST_COUNT(scenes); i++) {
+            use_rig(which);
+            for (int frame = 0; frame < 60; frame++) {
+                run(which, &file, &scenes[i], 1);
+                IH_TEST_EQUAL(IH_ALIGN_FITS, align.now.state, "state", 10 * i + which);
+                assert_untouched("right", 1000 * which + 100 * i + frame);
+            }
+            for (int axis = 0; axis < 3; axis++) {
+                IH_TEST_EQUAL(0, align.now.rotation_rad_q30[axis], "rotation", axis);
+            }
+            IH_TEST_EQUAL(0, align.now.focal_q30, "focal", i);
+        }
+    }
+}
+
+/* Mean size of what is normal with sigma 0.1: 0.08. */
+static void distance_from_lines_is_reported(void)
+{
+    for (int which = 0; which < 2; which++) {
+        use_rig(which);
+        IH_TEST_EQUAL(-1, align.now.across_px_q12, "before", which);
+        run(which, &file, &room, 1);
+        IH_TEST_WITHIN(0.012, 0.08, align.now.across_px_q12 / 4096.0, "across", which);
+        scatter(which, 0);
+        find();
+        learn();
+        IH_TEST_EQUAL(-1, align.now.across_px_q12, "none", which);
+    }
+}
+
+/* --- found in the first frame --- */
+
+static const struct moved_rig moves[] = {{{0.05, 0, 0}, 0},         {{-0.1, 0, 0}, 0},
+                                         {{0.2, 0, 0}, 0},          {{0.5, 0, 0}, 0},
+                                         {{-0.5, 0, 0}, 0},         {{0, 0, 0.2}, 0},
+                                         {{0, 0, -0.5}, 0},         {{0, 0, 1}, 0},
+                                         {{0, 0, -1}, 0},           {{0, 0, 0}, 0.005},
+                                         {{0, 0, 0}, -0.005},       {{0, 0, 0}, 0.01},
+                                         {{0, 0, 0}, -0.01},        {{0.3, 0.05, -0.3}, 0},
+                                         {{-0.5, 0, 0.3}, 0},       {{0.1, -0.3, 0.6}, 0},
+                                         {{0.3, 0.1, -0.3}, 0.005}, {{-0.2, 0.2, 0.1}, -0.008},
+                                         {{0.2, 0.5, 0}, 0}};
+
+/* Labels of the right rig: what a moved one is compared with. */
+static double straight_ratio(int which, const struct moved_scene *scene)
+{
+    double sum = 0;
+
+    use_rig(which);
+    for (int i = 0; i < IH_TEST_COUNT(moves); i++) {
+        run(which, &file, scene, 1);
+        sum += right_label_ratio();
+    }
+    return sum / IH_TEST_COUNT(moves);
+}
+
+/* Within 0.2 px on any slot, and 3 % of how far the rig was moved: lines are
+ * fitted as if the dots lay at infinity, and the wide rig's projector stands 19
+ * mm before the camera. */
+static void a_moved_rig_is_found_in_one_frame(void)
+{
+    static const struct moved_scene scenes[] = {
+        {1200, 0.1, 1, 0}, {700, 0.1, 1, 0}, {2000, 0.1, 1, 0}, {1200, 0.1, 0.7, 40}};
+
+    for (int which = 0; which < 2; which++) {
+        for (int k = 0; k < IH_TEST_COUNT(scenes); k++) {
+            const double ratio = straight_ratio(which, &scenes[k]);
+            double sum = 0;
+
+            for (int i = 0; i < IH_TEST_COUNT(moves); i++) {
+                const int index = 1000 * which + 100 * k + i;
+
+                use_rig(which);
+                const double moved_px = worst_px(which, &moves[i]);
+                see(which, &moves[i], &scenes[k]);
+                find();
+                IH_TEST_WITHIN(fmin(0.2 + 0.03 * moved_px, moved_px), 0, worst_px(which, &moves[i]),
+                               "worst slot, px", index);
+                learn();
+                sum += right_label_ratio();
+            }
+            IH_TEST_WITHIN(0.015, ratio, fmin(sum / IH_TEST_COUNT(moves), ratio), "right labels",
+                           10 * which + k);
+        }
+    }
+}
+
+/* With half of the dots missing depth is known to 0.1 degrees, which are 0.2 px in the corners. */
+static void half_of_the_dots_are_enough(void)
+{
+    static const struct moved_scene scene = {1200, 0.12, 0.5, 20};
+
+    for (int which = 0; which < 2; which++) {
+        for (int i = 0; i < IH_TEST_COUNT(moves); i++) {
+            use_rig(which);
+            const double moved_px = worst_px(which, &moves[i]);
+            if (moved_px > 0.8) {
+                see(which, &moves[i], &scene);
+                find();
+                IH_TEST_EQUAL(IH_ALIGN_MOVED, align.now.state, "state", 100 * which + i);
+                IH_TEST_WITHIN(0.4 + 0.03 * moved_px, 0, worst_px(which, &moves[i]),
+                               "worst slot, px", 100 * which + i);
+            }
+        }
+    }
+}
+
+/* Other rigs: no distortion, baselines along Y and aslant. */
+static void rigs_of_any_kind_are_found(void)
+{
+    static const double far_mm[] = {1200, 1200, 1500, 1200, 1000, 1200, 1200};
+
+    for (int which = 2; which < IH_TEST_COUNT(vector_rigs); which++) {
+        for (int i = 0; i < 2; i++) {
+            /* About the baseline; 0.1 degrees where slots are so close that 0.3 are
+       * half of their distance. */
+            const int axis = which == 4 ? 1 : 0;
+            const struct moved_scene scene = {far_mm[which], 0.1, 1, 0};
+            struct moved_rig moved = file;
+
+            moved.rotation_deg[axis] = which == 5 ? 0.1 : i == 0 ? 0.3 : -0.2;
+            use_rig(which);
+            see(which, &moved, &scene);
+            if (dots.dot_count < 100 || worst_px(which, &moved) < 1) {
+                continue;
+            }
+            find();
+            IH_TEST_EQUAL(IH_ALIGN_MOVED, align.now.state, "state", 10 * which + i);
+            IH_TEST_WITHIN(0.25, 0, worst_px(which, &moved), "worst slot, px", 10 * which + i);
+        }
+    }
+}
+
+static void a_second_knock_and_one_back(void)
+{
+    static const struct moved_rig knocks[] = {
+        {{0.2, 0.05, 0}, 0}, {{-0.1, 0, 0.2}, 0.004}, {{0, 0, 0}, 0}};
+
+    for (int which = 0; which < 2; which++) {
+        use_rig(which);
+        for (int i = 0; i < IH_TEST_COUNT(knocks); i++) {
+            see(which, &knocks[i], &room);
+            find();
+            IH_TEST_WITHIN(0.25, 0, worst_px(which, &knocks[i]), "worst slot, px", i);
+            run(which, &knocks[i], &room, 20);
+            IH_TEST_WITHIN(0.2, 0, worst_px(which, &knocks[i]), "worst slot, px, later", i);
+        }
+    }
+}
+
+/* --- where there is nothing to find --- */
+
+static void few_dots_say_nothing(void)
+{
+    for (int which = 0; which < 2; which++) {
+        use_rig(which);
+        for (int32_t count = 0; count < 30; count++) {
+            scatter(which, count);
+            find();
+            IH_TEST_EQUAL(count, rows.dot_count, "rows", count);
+            IH_TEST_EQUAL(IH_ALIGN_UNKNOWN, align.now.state, "state", count);
+            learn();
+            assert_untouched("few dots", count);
+        }
+        run(which, &file, &room, 1);
+        scatter(which, 29);
+        find();
+        IH_TEST_EQUAL(IH_ALIGN_FITS, align.now.state, "state stays", which);
+    }
+}
+
+/* Dots anywhere, as sunlight or an ambient frame makes them: they lie on no
+ * lines, and move none. */
+static void chance_moves_nothing(void)
+{
+    for (int which = 0; which < 2; which++) {
+        use_rig(which);
+        for (int i = 0; i < 400; i++) {
+            scatter(which, (int32_t)ih_test_between(&random_source, 30, i % 4 == 0 ? 1024 : 300));
+            find();
+            IH_TEST_EQUAL(IH_ALIGN_LOST, align.now.state, "state", dots.dot_count);
+            learn();
+            assert_untouched("by chance", i);
+        }
+    }
+}
+
+/* A lattice of other pitch, turned: none of a projector's. */
+static void a_false_lattice_moves_nothing_far(void)
+{
+    for (int which = 0; which < 2; which++) {
+        for (int i = 0; i < 60; i++) {
+            const double pitch_px = 15 + 25 * ih_test_unit(&random_source);
+            const double angle = 1.57 * ih_test_unit(&random_source);
+
+            use_rig(which);
+            dots.dot_count = 0;
+            for (int k = 0; k < 1600; k++) {
+                const double a = pitch_px * (k % 40 - 20), b = pitch_px * (k / 40 - 20);
+                const double u = 370 + a * cos(angle) - b * sin(angle);
+                const double v = 290 + a * sin(angle) + b * cos(angle);
+
+                if (u > 0 && v > 0 && u < 751 && v < 581) {
+                    add_dot(u * 4096, v * 4096, IH_NONE, slot_of_dot, &dots);
+                }
+            }
+            find();
+            learn();
+            IH_TEST_WITHIN(0.1, 0, worst_px(which, &file), "worst slot, px", 100 * which + i);
+        }
+    }
+}
+
+static void what_is_lost_keeps_the_last_good_alignment(void)
+{
+    static const struct moved_rig moved = {{0.3, 0.05, -0.3}, 0.004};
+    static struct ih_alignment good;
+
+    for (int which = 0; which < 2; which++) {
+        use_rig(which);
+        run(which, &moved, &room, 5);
+        before = rig;
+        good = align.now;
+        for (int i = 0; i < 20; i++) {
+            scatter(which, 200);
+            find();
+            IH_TEST_EQUAL(IH_ALIGN_LOST, align.now.state, "state", i);
+            learn();
+            assert_untouched("lost", i);
+            TEST_ASSERT_EQUAL_INT32_ARRAY(good.rotation_rad_q30, align.now.rotation_rad_q30, 3);
+            TEST_ASSERT_EQUAL_INT32(good.focal_q30, align.now.focal_q30);
+        }
+        run(which, &moved, &room, 1);
+        IH_TEST_EQUAL(IH_ALIGN_MOVED, align.now.state, "state", which);
+        IH_TEST_WITHIN(0.2, 0, worst_px(which, &moved), "worst slot, px", which);
+    }
+}
+
+/* A rig that was turned by degrees is another one: it may be found wrongly, but never beyond the limits. */
+static void what_is_beyond_the_limits_is_not_taken(void)
+{
+    static const struct moved_rig far[] = {
+        {{3, 0, 0}, 0}, {{-4, 0, 0}, 0}, {{0, 0, 6}, 0}, {{0, 0, 0}, 0.08}, {{2, 0, 4}, -0.05}};
+
+    for (int which = 0; which < 2; which++) {
+        for (int i = 0; i < IH_TEST_COUNT(far); i++) {
+            use_rig(which);
+            for (int frame = 0; frame < 10; frame++) {
+                run(which, &far[i], &room, 1);
+                for (int axis = 0; axis < 3; axis++) {
+                    IH_TEST_WITHIN(2.2, 0, rotation_deg(axis), "rotation", 10 * i + which);
+                }
+            }
+        }
+    }
+}
+
+/* --- learning --- */
+
+/* What the dots show of the axis that is depth: within its uncertainty,
+ * whatever is missing. */
+static void depth_is_found_within_its_uncertainty(void)
+{
+    static const double about_y_deg[] = {0.1, -0.1, 0.2, -0.2, 0.5, -0.5};
+    static const double seen[] = {1, 0.6};
+    int count = 0, within = 0;
+
+    for (int which = 0; which < 2; which++) {
+        for (int i = 0; i < IH_TEST_COUNT(about_y_deg); i++) {
+            for (int k = 0; k < 2; k++) {
+                for (int seed = 0; seed < 4; seed++) {
+                    const struct moved_rig moved = {{0, about_y_deg[i], 0}, 0};
+                    const struct moved_scene scene = {1000 + 100 * seed, NOISE_PX, seen[k], 0};
+
+                    use_rig(which);
+                    run(which, &moved, &scene, 10);
+                    TEST_ASSERT_TRUE(align.now.is_depth_known);
+                    IH_TEST_WITHIN(0.05, about_y_deg[i], rotation_deg(1), "about Y",
+                                   100 * which + 10 * i + seed);
+                    within += fabs(rotation_deg(1) - about_y_deg[i]) < 2 * sigma_deg(1);
+                    count++;
+                }
+            }
+        }
+    }
+    /* 95 of 100 with errors that are normal. */
+    IH_TEST_RANGE(count * 9 / 10, count, within, "within two sigmas", count);
+}
+
+/* All numbers against their uncertainty, with all moved at once. */
+static void all_axes_are_within_their_uncertainty(void)
+{
+    int count = 0, within[3] = {0};
+
+    for (int which = 0; which < 2; which++) {
+        for (int seed = 0; seed < 30; seed++) {
+            struct moved_rig moved;
+
+            use_rig(which);
+            for (int axis = 0; axis < 3; axis++) {
+                moved.rotation_deg[axis] = 0.6 * ih_test_unit(&random_source) - 0.3;
+            }
+            moved.focal = 0.012 * ih_test_unit(&random_source) - 0.006;
+            run(which, &moved, &room, 10);
+            for (int axis = 0; axis < 3; axis++) {
+                within[axis] +=
+                    fabs(rotation_deg(axis) - moved.rotation_deg[axis]) < 2 * sigma_deg(axis);
+            }
+            count++;
+            IH_TEST_WITHIN(0.2, 0, worst_px(which, &moved), "worst slot, px", seed);
+        }
+    }
+    for (int axis = 0; axis < 3; axis++) {
+        IH_TEST_RANGE(count * 9 / 10, count, within[axis], "within two sigmas", axis);
+    }
+}
+
+/* Dots of one row and three columns hardly show the pattern's keystone. */
+static void depth_that_dots_do_not_show_is_not_known(void)
+{
+    for (int which = 0; which < 2; which++) {
+        int32_t kept = 0;
+
+        use_rig(which);
+        see(which, &file, &room);
+        for (int32_t i = 0; i < dots.dot_count; i++) {
+            const int row = slot_of_dot[i] / IH_GRID - IH_GRID / 2;
+            const int column = slot_of_dot[i] % IH_GRID - IH_GRID / 2;
+
+            if (row == 0 || abs(column) <= 1) {
+                slot_of_dot[kept] = slot_of_dot[i];
+                dots.dot[kept++] = dots.dot[i];
+            }
+        }
+        dots.dot_count = kept;
+        find();
+        learn();
+        IH_TEST_EQUAL(IH_ALIGN_FITS, align.now.state, "state", which);
+        TEST_ASSERT_FALSE(align.now.is_depth_known);
+        assert_untouched("few rows", which);
+        IH_TEST_WITHIN(0.06, 0.16, align.now.depth_sigma_rad_q30 / Q30 / DEG, "sigma", which);
+        run(which, &file, &room, 1);
+        TEST_ASSERT_TRUE(align.now.is_depth_known);
+    }
+}
+
+/* Frames add up. Lines do not follow the mean by less than 0.02 degrees. */
+static void more_frames_make_it_better(void)
+{
+    static const struct moved_rig moved = {{-0.2, 0.2, 0.1}, 0};
+    static const struct moved_scene scene = {1200, 0.15, 0.5, 0};
+
+    for (int which = 0; which < 2; which++) {
+        for (int seed = 0; seed < 12; seed++) {
+            use_rig(which);
+            run(which, &moved, &scene, 1);
+            const int32_t first_rad_q30 = align.now.depth_sigma_rad_q30;
+            run(which, &moved, &scene, 30);
+            TEST_ASSERT_LESS_THAN_INT32(first_rad_q30 * 7 / 10, align.now.depth_sigma_rad_q30);
+            IH_TEST_WITHIN(0.02 + 3 * sigma_deg(1), 0.2, rotation_deg(1), "about Y", seed);
+        }
+    }
+}
+
+/* What many frames said counts no more after a knock, of one that moves labels
+ * as of one that moves depth alone. */
+static void a_knock_starts_the_mean_anew(void)
+{
+    static const struct moved_rig first = {{0, 0.1, 0}, 0};
+    static const struct moved_rig knocks[] = {
+        {{0, -0.3, 0}, 0}, {{0.3, -0.2, 0}, 0}, {{0, 0.4, 0.2}, 0.005}};
+
+    for (int which = 0; which < 2; which++) {
+        for (int i = 0; i < IH_TEST_COUNT(knocks); i++) {
+            int32_t settled;
+
+            use_rig(which);
+            run(which, &first, &room, 60);
+            IH_TEST_WITHIN(0.03, 0.1, rotation_deg(1), "before", i);
+            settled = align.now.depth_sigma_rad_q30;
+            run(which, &knocks[i], &room, 1);
+            TEST_ASSERT_GREATER_THAN_INT32(settled, align.now.depth_sigma_rad_q30);
+            run(which, &knocks[i], &room, 2);
+            IH_TEST_WITHIN(0.05, knocks[i].rotation_deg[1], rotation_deg(1), "after", 10 * i);
+            run(which, &knocks[i], &room, 30);
+            IH_TEST_WITHIN(0.03, knocks[i].rotation_deg[1], rotation_deg(1), "later", 10 * i + 1);
+        }
+    }
+}
+
+/* As slow as heat, 0.3 degrees in 500 frames: no label is lost on the way. */
+static void a_slow_drift_is_followed(void)
+{
+    for (int which = 0; which < 2; which++) {
+        double sum[2] = {0};
+
+        for (int is_drift = 0; is_drift < 2; is_drift++) {
+            use_rig(which);
+            for (int frame = 0; frame < 300; frame++) {
+                const double by = is_drift * 0.0006 * frame;
+                const struct moved_rig moved = {{by, by / 2, -by / 2}, 0};
+
+                run(which, &moved, &room, 1);
+                sum[is_drift] += right_label_ratio() / 300;
+                if (frame % 20 == 0) {
+                    IH_TEST_WITHIN(0.4, 0, worst_px(which, &moved), "worst slot, px", frame);
+                }
+            }
+        }
+        IH_TEST_WITHIN(0.002, sum[0], fmin(sum[0], sum[1]), "right labels", which);
+    }
+}
+
+/* All fields at their ends: nothing overflows (sanitizers), all numbers stay
+ * within their limits. */
+static void anything_labelled_is_survived(void)
+{
+    for (int which = 0; which < IH_TEST_COUNT(vector_rigs); which++) {
+        use_rig(which);
+        for (int i = 0; i < 200; i++) {
+            for (int slot = 0; slot < IH_SLOTS; slot++) {
+                const int32_t perp = i < 60 ? 0 : i % 3 == 0 ? 2458 : i % 3 == 1 ? -2458 : 300;
+
+                labels.dot_of_slot[slot] = (int16_t)slot;
+                labels.perp_px_q12[slot] =
+                    (int16_t)(i < 150 ? perp : ih_test_between(&random_source, -2458, 2458));
+            }
+            ih_align_learn(&align, &labels, &rig, &scratch);
+            for (int axis = 0; axis < 3; axis++) {
+                IH_TEST_WITHIN(2.2, 0, rotation_deg(axis), "rotation", axis);
+                TEST_ASSERT_GREATER_THAN_INT32(0, align.now.sigma_rad_q30[axis]);
+            }
+            IH_TEST_WITHIN(0.0151, 0, align.now.focal_q30 / Q30, "focal", i);
+        }
+    }
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(a_right_rig_stays_to_the_last_bit);
+    RUN_TEST(distance_from_lines_is_reported);
+    RUN_TEST(a_moved_rig_is_found_in_one_frame);
+    RUN_TEST(half_of_the_dots_are_enough);
+    RUN_TEST(rigs_of_any_kind_are_found);
+    RUN_TEST(a_second_knock_and_one_back);
+    RUN_TEST(few_dots_say_nothing);
+    RUN_TEST(chance_moves_nothing);
+    RUN_TEST(a_false_lattice_moves_nothing_far);
+    RUN_TEST(what_is_lost_keeps_the_last_good_alignment);
+    RUN_TEST(what_is_beyond_the_limits_is_not_taken);
+    RUN_TEST(depth_is_found_within_its_uncertainty);
+    RUN_TEST(all_axes_are_within_their_uncertainty);
+    RUN_TEST(depth_that_dots_do_not_show_is_not_known);
+    RUN_TEST(more_frames_make_it_better);
+    RUN_TEST(a_knock_starts_the_mean_anew);
+    RUN_TEST(a_slow_drift_is_followed);
+    RUN_TEST(anything_labelled_is_survived);
+    return UNITY_END();
+}
