@@ -24,6 +24,13 @@ void sim_report_init(struct sim_report *report)
     *report = (struct sim_report){.terminal = isatty(STDERR_FILENO) && !isatty(STDOUT_FILENO)};
 }
 
+static void put(struct sim_report *report, char *message)
+{
+    app_text_tame(message);
+    sim_report_progress_end(report);
+    fprintf(stderr, "host_sim: %s\n", message);
+}
+
 void sim_report_error(struct sim_report *report, const char *subject, const char *format, ...)
 {
     char message[MESSAGE_MAX];
@@ -34,10 +41,15 @@ void sim_report_error(struct sim_report *report, const char *subject, const char
         vsnprintf(message + length, sizeof message - (size_t)length, format, arguments);
         va_end(arguments);
     }
-    app_text_tame(message);
-    sim_report_progress_end(report);
-    fprintf(stderr, "host_sim: %s\n", message);
+    put(report, message);
     report->error_count++;
+}
+
+void sim_report_hint(struct sim_report *report, const char *subject, const char *text)
+{
+    char message[MESSAGE_MAX];
+    snprintf(message, sizeof message, "%s: %s", subject, text);
+    put(report, message);
 }
 
 static int64_t now_us(void)

@@ -1,4 +1,4 @@
-/* sim_report - what goes to standard error: errors, and on a terminal the progress. */
+/* sim_report - what goes to standard error: errors, hints, and on a terminal the progress. */
 #ifndef SIM_REPORT_H
 #define SIM_REPORT_H
 
@@ -21,6 +21,9 @@ void sim_report_init(struct sim_report *report);
 /* "host_sim: SUBJECT: TEXT" on a line; subject is the file, device or directory. */
 void sim_report_error(struct sim_report *report, const char *subject, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
+
+/* The same, and no error: the exit status stays. */
+void sim_report_hint(struct sim_report *report, const char *subject, const char *text);
 
 /* "NAME DONE/COUNT, RATE frames/s, TIME left" on the same line again and again, where it is shown: ten
  * times a second. The time that is left is shown from the third second on. */

@@ -10,6 +10,7 @@
 #include "replay/hal_replay.h"
 #include "sim_cloud.h"
 #include "sim_dirs.h"
+#include "sim_hint.h"
 #include "app_record.h"
 #include "sim_report.h"
 #include "app_rig.h"
@@ -46,9 +47,11 @@ struct visit {
     struct app_record record;
     struct sim_cloud cloud;
     struct sim_score *score;
+    struct sim_hint hint;
     /* The last frame without laser, for the lit ones after it; samples NULL: none yet. */
     struct hal_frame ambient;
     struct ih_frame ambient_view;
+    enum ih_align_state shown_state; /* on standard output */
 };
 
 /* Rig file to a core that is ready; wrong ones go to the report. */
@@ -155,6 +158,10 @@ static void put_frame(struct visit *visit, const struct hal_frame *frame,
     put_record(visit, frame->name, app_record_frame(&visit->record, frame, head, NULL));
     if (!options->json) {
         sim_table_frame(stdout, frame, head, &verdict);
+        if (head->align.now.state != visit->shown_state) {
+            sim_table_rig(stdout, head);
+            visit->shown_state = head->align.now.state;
+        }
     }
     const struct sim_page_frame page_frame = {frame, view, head, &visit->record, truth, &verdict};
     put_files(visit, &page_frame);
@@ -206,6 +213,7 @@ static void process_lit(struct visit *visit, const struct hal_frame *frame)
         lose_frame(visit, frame, error.text);
         return;
     }
+    sim_hint_frame(&visit->hint, head, &view);
     put_frame(visit, frame, &view);
 }
 
@@ -267,6 +275,12 @@ static void process_dir(struct run *run, size_t index)
         sim_page_dir(&run->page, dir, run->head);
     }
     process_frames(&visit);
+    if (!run->options->json && visit.shown_state == IH_ALIGN_MOVED) {
+        sim_table_rig(stdout, run->head);
+    }
+    sim_hint_report(&visit.hint, run->head, dir->path,
+                    run->options->rig != NULL ? run->options->rig : "its rig.json", &run->report);
+    sim_hint_free(&visit.hint);
     release(&visit, &visit.ambient);
     sim_truth_free(&visit.truth);
     sim_cloud_free(&visit.cloud);

@@ -3,6 +3,7 @@
 #include <inttypes.h>
 #include <string.h>
 
+#include "app_rig_text.h"
 #include "app_text.h"
 
 #define LABEL_WIDTH 20
@@ -76,6 +77,33 @@ void sim_table_frame(FILE *file, const struct hal_frame *frame, const struct iso
     print_verdict(file, verdict);
     fputc('\n', file);
     fflush(file);
+}
+
+void sim_table_rig(FILE *file, const struct isohead *head)
+{
+    const struct ih_alignment *now = &head->align.now;
+    if (head->rig.calibration.kind == IH_RIG_RANGE || head->params.is_paper) {
+        return;
+    }
+    fprintf(file, "  rig %s", app_rig_text(now->state));
+    if (now->state == IH_ALIGN_MOVED) {
+        fputs(":", file);
+        for (int axis = 0; axis < 3; axis++) {
+            fprintf(file, " %s", app_text_degrees(now->rotation_rad_q30[axis], 3).text);
+        }
+        fprintf(file, " degrees, focal %s %%, shift",
+                app_text_fixed((int64_t)now->focal_q30 * 100, 30, 2).text);
+        for (int axis = 0; axis < 2; axis++) {
+            fprintf(file, " %s", app_text_fixed(now->shift_px_q12[axis], 12, 2).text);
+        }
+        fputs(" px\n  rig depth ", file);
+        if (now->is_depth_known) {
+            fprintf(file, "+-%s mm at 1 m", app_text_fixed(app_rig_depth_mm_q8(head), 8, 0).text);
+        } else {
+            fputs("not known", file);
+        }
+    }
+    fputc('\n', file);
 }
 
 void sim_table_error(FILE *file, const char *name, const char *error)

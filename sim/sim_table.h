@@ -20,6 +20,8 @@ void sim_table_title(FILE *file, const char *path);
 
 void sim_table_frame(FILE *file, const struct hal_frame *frame, const struct isohead *head,
                      const struct sim_verdict *verdict);
+/* How the rig has moved; nothing for a range rig and with the paper's method alone. */
+void sim_table_rig(FILE *file, const struct isohead *head);
 void sim_table_error(FILE *file, const char *name, const char *error);
 
 /* Heading, then a row per directory and last the sum, each for Table 1 and for the dots. Rows

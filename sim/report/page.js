@@ -26,7 +26,26 @@
     return `${head}: not right, ${!v.head_there ? "nobody is there" : frame.selected ? "it is elsewhere" : "there is one"} (${v.outcome === "not done" ? "no detection" : v.outcome})`;
   }
 
+  /* How the rig has moved against its file. */
+  function rigText(rig) {
+    const degrees = (values) => values.map((v) => v.toFixed(3)).join(", ");
+    const across = rig.across_px === null ? "" : `; dots lie ${rig.across_px.toFixed(2)} px beside their lines`;
+    return {
+      unknown: "Rig: too few dots to say whether it fits",
+      fits: `Rig: fits${across}`,
+      moved: `Rig: has moved, the projector by (${degrees(rig.rotation_deg)}) ± (${degrees(rig.sigma_deg)})° about X, Y, Z, ` +
+        `the focal length by ${rig.focal_percent.toFixed(2)} %, the picture by (${rig.shift_px.map((v) => v.toFixed(2)).join(", ")}) px${across}; depth is ${rig.depth_known ? "" : "not "}known`,
+      lost: "Rig: does not fit, dots lie on none of its lines",
+    }[rig.state];
+  }
+
+  function reportRig(rig) {
+    by("rig").textContent = rig ? rigText(rig) : "";
+    by("rig").className = rig && (rig.state === "moved" || rig.state === "lost") ? "quiet moved" : "quiet";
+  }
+
   function report(frame) {
+    reportRig(frame.record.rig);
     const state = Data.state(frame);
     const tag = Tables.element("span", { class: `tag ${state === "right" ? "good" : state === "wrong" || state === "lost" ? "bad" : "plain"}` }, stateText[state]);
     now.replaceChildren(tag, " ", Tables.element("span", {}, `Frame ${frame.index + 1} of ${frames.length}`), " ",

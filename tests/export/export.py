@@ -517,7 +517,16 @@ class Table(unittest.TestCase):
         row, = self.rows("odd")
         self.assertEqual((row["dir"], row["file"], row["dropped"]), (odd, "ä.pgm", "minima=3 dots=1"))
         self.assertEqual((row["lost"], row["skipped"], row["strobe"]), ("2", "1", "late"))
-        self.assertEqual((row["across_px"], row["rig"]), ("0.25", "turned"))
+        self.assertEqual((row["across_px"], row["rig"], row["rig_depth_known"]), ("0.25", "turned", ""))
+        record["rig"] = {"state": "moved", "across_px": 0.08, "rotation_deg": [0.2, -1, 0], "sigma_deg": [0, 0, 0],
+                         "focal_percent": -0.5, "shift_px": [0, 2.25], "depth_known": True}
+        with open(at("odd.jsonl"), "w", encoding="utf-8") as file:
+            file.write("%s\n" % json.dumps(record))
+        row, = self.rows("odd")
+        self.assertEqual([row[key] for key in ("across_px", "rig", "rig_rotation_x_deg", "rig_rotation_y_deg",
+                                               "rig_rotation_z_deg", "rig_focal_percent", "rig_shift_u_px",
+                                               "rig_shift_v_px", "rig_depth_known")],
+                         ["0.08", "moved", "0.2", "-1", "0", "-0.5", "0", "2.25", "true"])
         self.rows("both")
         lines = read(at("both.csv")).split(b"\r\n")
         self.assertEqual(lines.pop(), b"")

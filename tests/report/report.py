@@ -149,8 +149,21 @@ def test_evidence(browser, record, trace):
     return "" if close else "%r, expected %r" % (found, wanted)
 
 
+def expected_rig(record):
+    rig = record.get("rig")
+    if rig is None:
+        return ""
+    across = "; dots lie %.2f px beside their lines" % rig["across_px"]
+    if rig["state"] == "fits":
+        return "Rig: fits" + across
+    def degrees(key):
+        return ", ".join("%.3f" % angle for angle in rig[key])
+    return ("Rig: has moved, the projector by (%s) ± (%s)° about X, Y, Z, the focal length by %.2f %%, the picture by (%.2f, %.2f) px%s; depth is known" %
+            (degrees("rotation_deg"), degrees("sigma_deg"), rig["focal_percent"], *rig["shift_px"], across))
+
+
 def test_frames(test, browser, records, traces):
-    wrong = {"record": [], "status": [], "hypotheses": [], "nests": [], "evidence": []}
+    wrong = {"record": [], "status": [], "rig": [], "hypotheses": [], "nests": [], "evidence": []}
     for index, (record, trace) in enumerate(zip(records, traces)):
         go(browser, index)
         if json.loads(browser.value("document.getElementById('record').textContent")) != record:
@@ -161,6 +174,9 @@ def test_frames(test, browser, records, traces):
             parts.append("x %.1f, y %.1f, z %.1f mm" % tuple(record["hypotheses"][record["head"]]["centre_mm"]))
         if any(part not in status for part in parts):
             wrong["status"].append((index, status))
+        rig = browser.value("document.getElementById('rig').textContent")
+        if rig != expected_rig(record):
+            wrong["rig"].append((index, rig))
         for name, why in (("hypotheses", test_hypotheses(browser, record)),
                           ("nests", test_nests(browser, trace) if trace else ""),
                           ("evidence", test_evidence(browser, record, trace) if trace else "")):
@@ -369,7 +385,25 @@ def test_paper(test, browser, program, frames, work):
             wrong.append((index, why))
     test.ok(len(records) == len(TAKEN) and not wrong, "--paper: every frame's hypotheses and nests", wrong[:2])
     test.same(browser.value("document.getElementById('evidence').textContent"), "", "--paper: no evidence that was not used")
+    test.same(browser.value("document.getElementById('rig').textContent"), "", "--paper: no rig that was not checked")
     test.same(browser.errors, [], "--paper: no error on the console")
+
+
+def test_moved(test, browser, program, frames, work):
+    """A rig whose principal point is 2 px off."""
+    page, wrong = os.path.join(work, "moved.html"), os.path.join(work, "moved.json")
+    with open(os.path.join(frames, "sequence1", "rig.json"), encoding="utf-8") as file:
+        rig = json.load(file)
+    rig["camera_matrix"]["data"][5] += 2
+    with open(wrong, "w", encoding="utf-8") as file:
+        json.dump(rig, file)
+    result = run(program, "--json", "--rig", wrong, "--report", page, os.path.join(frames, "sequence1"))
+    records = [json.loads(line) for line in result.stdout.splitlines()]
+    open_anew(browser, page)
+    go(browser, 6)
+    shown = browser.value("document.getElementById('rig').textContent")
+    test.ok(shown == expected_rig(records[6]) and "has moved" in shown, "a rig that moved: by how much", shown)
+    test.same(browser.value("document.getElementById('rig').className"), "quiet moved", "a rig that moved: in another colour")
 
 
 def test_range(test, browser, program, work):
@@ -524,6 +558,7 @@ def main():
             test.same(browser.errors, [], "no error on the console")
             test.same(browser.requests, ["file://" + page], "nothing is requested from the network")
             test_paper(test, browser, program, frames, work)
+            test_moved(test, browser, program, frames, work)
             test_range(test, browser, program, work)
             test_hostile(test, browser, program, frames, work)
         test_files(test, program, frames, work)

@@ -5,7 +5,7 @@
 #     bad_input.sh HOST_SIM FRAMES_DIR
 #
 # FRAMES_DIR: any frames directory with at least three good frames; its first three are used, with
-# a rig that is made here. Prints TAP; exit status 1 when a case fails.
+# its rig, written anew here. Prints TAP; exit status 1 when a case fails.
 set -u
 LC_ALL=C
 export LC_ALL
@@ -85,14 +85,16 @@ matrix() {
     printf '{"type_id":"opencv-matrix","rows":%s,"cols":%s,"dt":"d","data":[%s]}' "$1" "$2" "$3"
 }
 
+# data FIELD: the numbers of a matrix of the good directory's rig.
+data() {
+    tr -d ' \n' <"$good/rig.json" | sed "s/.*\"$1\":{[^}]*\"data\":\[\([^]]*\)\].*/\1/"
+}
+
 # rays [SLOT X Y Z]: the pattern's unit vectors; one of them replaced.
 rays() {
-    awk -v slot="${1:--1}" -v new="${2:-0},${3:-0},${4:-0}" 'BEGIN {
+    data dot_rays | awk -F , -v slot="${1:--1}" -v new="${2:-0},${3:-0},${4:-0}" '{
         for (i = 0; i < 361; i++) {
-            x = (i % 19 - 9) * 0.0305 + (int(i / 19) - 9) * 0.0016
-            y = (int(i / 19) - 9) * 0.0305 - (i % 19 - 9) * 0.0016
-            n = sqrt(x * x + y * y + 1)
-            ray = i == slot ? new : sprintf("%.12f,%.12f,%.12f", x / n, y / n, 1 / n)
+            ray = i == slot ? new : $(3 * i + 1) "," $(3 * i + 2) "," $(3 * i + 3)
             printf "%s%s", i ? "," : "", ray
         }
     }'
@@ -134,13 +136,13 @@ chmod u+w base/*.pgm
 set -- $(frame_header base/a.pgm)
 width=$1
 height=$2
-camera="$((width + 100)),0,$((width / 2)),0,$((width + 120)),$((height / 2)),0,0,1"
+camera=$(data camera_matrix)
 echo - >fields/kind
 echo "$width" >fields/image_width
 echo "$height" >fields/image_height
 matrix 3 3 "$camera" >fields/camera_matrix
-matrix 1 5 -0.17,0.06,0.0005,-0.0003,0 >fields/distortion_coefficients
-matrix 3 1 12.5,0,0.2 >fields/projector_origin
+matrix 1 5 "$(data distortion_coefficients)" >fields/distortion_coefficients
+matrix 3 1 "$(data projector_origin)" >fields/projector_origin
 matrix 361 3 "$(rays)" >fields/dot_rays
 echo 400 >fields/near_mm
 echo 2600.0 >fields/far_mm
@@ -470,6 +472,84 @@ fresh
 { printf 'P5\n64 80\n255\n' && head -c 5120 /dev/zero; } >range/b.pgm
 run --json range
 check 'range: an 8-bit frame' 1 2 1 'range/b\.pgm: maxval 255, expected above 255'
+
+# --- frames and rig that do not fit --------------------------------------------------------------
+
+# hint NAME PATTERN: of the last run of one directory: all is well, but one line says what is wrong.
+hint() {
+    count=$(wc -l <out)
+    check "hint: $1" 0 "$count" 0 "$2"
+    lines=$(wc -l <err)
+    [ "$lines" -eq 1 ] && reason= || reason="$lines lines on standard error, expected 1"
+    result "hint: $1: one line" "$reason"
+}
+
+# The camera's matrix with its principal point elsewhere, by px.
+moved() { echo "$camera" | awk -F , -v OFS=, -v x="$1" -v y="$2" '{ $3 += x; $6 += y; print }'; }
+rig camera_matrix "$(matrix 3 3 "$(moved 0 40)")" >d/rig.json
+run --json d
+hint 'moved beyond mending' 'd: hardly a dot has a good label in 3 of 3 frames: its rig\.json does not fit .*calibrate again'
+run --json --paper d
+hint 'moved, with --paper' 'd: hardly a dot .* try without --paper'
+mv d/rig.json other.json
+cp base/rig.json d
+run --json --rig other.json d
+hint 'the file of --rig' 'd: hardly a dot .* in 3 of 3 frames: other\.json does not fit'
+run --json d
+check 'hint: none where the rig fits' 0 3 0 -
+rig projector_origin "$(matrix 3 1 0,125,0)" >d/rig.json
+run --json d
+hint 'another rig: the laser above the camera' 'd: hardly a dot has a good label'
+rig projector_origin "$(matrix 3 1 125,0,0.2)" >d/rig.json
+run --json d
+hint 'another rig: the laser farther away, labels by chance' 'd: hardly a dot has a good label'
+rig near_mm 2500 >d/rig.json
+run --json d # all that is there is nearer
+hint 'nothing in the working range' 'd: hardly a dot .* nearer than 2500 or farther than 2600 mm'
+{ printf 'P5\n%d %d\n255\n' "$width" "$height" && head -c $((width * height)) /dev/zero; } >d/black.pgm
+cp d/black.pgm d/a.pgm && cp d/black.pgm d/b.pgm && mv d/black.pgm d/c.pgm
+run --json d
+check 'hint: none without dots' 0 3 0 -
+fresh
+
+# A wall in a depth image, at 1 to 2 m; every eighth pixel is not measured.
+# depths NAME MULTIPLIER DIVISOR SWAPPED: range/NAME.pgm
+depths() {
+    { printf 'P5\n64 80\n65535\n' && awk -v times="$2" -v over="$3" -v swapped="$4" 'BEGIN {
+        for (i = 0; i < 5120; i++) {
+            mm = i % 8 == 0 ? 0 : 1000 + i % 64 * 10 + int(i / 64) * 5
+            value = int(mm * times / over)
+            high = int(value / 256)
+            low = value % 256
+            if (swapped) printf "\\%03o\\%03o", low, high
+            else printf "\\%03o\\%03o", high, low
+        }
+    }' | xargs -0 printf; } >"range/$1.pgm"
+}
+rm range/*.pgm
+depths a 1 1 0
+run --json range
+check 'hint: none for depth in mm' 0 1 0 -
+depths a 1 1 1
+run --json range
+hint 'bytes swapped' 'range: [0-9]+ % of its depths lie within 400 \.\. 4000 mm, but 100 % would if .*bytes swapped'
+depths a 1 10 0
+run --json range
+hint 'cm' 'range: 0 % of its depths .* but 100 % would if they were cm: convert'
+depths a 10 1 0
+run --json range
+hint 'a tenth of a mm' 'range: 0 % of its depths .* but 100 % would if they were 0\.1 mm: convert'
+depths a 1 1000 0
+run --json range
+hint 'metres' 'range: 0 % of its depths .* but 100 % would if they were metres: convert'
+sed 's/"near_mm":400,"far_mm":4000/"near_mm":3000,"far_mm":4000/' range/rig.json >other.json
+depths a 1 1 0
+run --json --rig other.json range
+hint 'nothing in the working range of depth' \
+    'range: 0 % of its depths lie within 3000 \.\. 4000 mm, the median is 1[0-9]* mm: .* far_mm in other\.json'
+{ printf 'P5\n64 80\n65535\n' && head -c 10240 /dev/zero; } >range/a.pgm
+run --json --rig other.json range
+check 'hint: none where nothing is measured' 0 1 0 -
 
 # --- frames.jsonl --------------------------------------------------------------------------------
 

@@ -38,6 +38,8 @@ class Part:
 
 PARTS = (
     Part("dots", ("ih_dots_find",), ("ih_bandpass", "ih_noise", "ih_dots"), ("dots",), "dots"),
+    Part("align", ("ih_align_find", "ih_align_learn"),
+         ("ih_dot_rows", "ih_align", "ih_align_fit", "ih_align_pairs", "ih_align_vote"), ("align",), "labels"),
     Part("labels", ("ih_labels_assign",), ("ih_labels",), ("labels",), "labels"),
     Part("windows", ("ih_windows_find",), ("ih_windows",), ("windows",), "windows"),
     Part("points", ("ih_points_from_labels", "ih_points_from_range"), ("ih_points",), ("points",)),

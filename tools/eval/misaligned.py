@@ -75,8 +75,10 @@ def judged(record, truth, trace):
     near = sum(math.dist((dots["u_px_q12"][dot] / 4096, dots["v_px_q12"][dot] / 4096), true[slot]) <= NEAR_PX
                for slot, dot in labels if slot in true)
     rig = record.get("rig") or {}
+    # What lies on no lines moves no rig; its labels are chance.
+    across_px = None if rig.get("state") == "lost" else first_number(rig.get("across_px"))
     return Frame(record["file"], there, verdict.right, error_mm, selected.get("sigma_mm") if selected else None,
-                 len(labels), near, first_number(rig.get("across_px")), tuple(rig.get("rotation_deg") or ()))
+                 len(labels), near, across_px, tuple(rig.get("rotation_deg") or ()))
 
 
 def measure(program, work, directory, knock):

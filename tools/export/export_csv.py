@@ -13,7 +13,8 @@ COLUMNS = (
     "dir", "file", "time_us", "dots", "labelled", "points", "error", "hypothesis", "pixel_u_px", "pixel_v_px",
     "axis_a_px", "axis_b_px", "angle_deg", "distance_mm", "centre_x_mm", "centre_y_mm", "centre_z_mm",
     "rejected", "score", "track", "sigma_mm", "predicted", "head_rank", "selected", "dropped", "lost",
-    "skipped", "strobe", "across_px", "rig",
+    "skipped", "strobe", "across_px", "rig", "rig_rotation_x_deg", "rig_rotation_y_deg", "rig_rotation_z_deg",
+    "rig_focal_percent", "rig_shift_u_px", "rig_shift_v_px", "rig_depth_known",
 )
 
 # What a formula begins with, and the white space that spreadsheets skip before one.
@@ -30,10 +31,24 @@ def text(value):
     return str(value)
 
 
+def rig_fields(rig):
+    """How the rig has moved. Boards once wrote a word."""
+    if not isinstance(rig, dict):
+        return {"rig": rig}
+    fields = {"rig": rig.get("state"), "across_px": rig.get("across_px"), "rig_focal_percent": rig.get("focal_percent"),
+              "rig_depth_known": rig.get("depth_known")}
+    for axis, angle in zip("xyz", rig.get("rotation_deg", ())):
+        fields["rig_rotation_%s_deg" % axis] = angle
+    for axis, shift in zip("uv", rig.get("shift_px", ())):
+        fields["rig_shift_%s_px" % axis] = shift
+    return fields
+
+
 def frame_fields(record):
     fields = {key: record.data.get(key) for key in
               ("dir", "file", "time_us", "dots", "labelled", "points", "error", "lost", "skipped", "strobe",
-               "across_px", "rig")}
+               "across_px")}
+    fields.update(rig_fields(record.data.get("rig")))
     dropped = record.data.get("dropped", {})
     fields["dropped"] = " ".join("%s=%s" % (kind, count) for kind, count in dropped.items())
     return fields

@@ -80,6 +80,10 @@ def is_object(value):
     return isinstance(value, dict)
 
 
+def is_rig(value):
+    return is_text(value) or is_object(value)
+
+
 def list_of(good, length=None):
     return lambda value: (isinstance(value, list) and (length is None or len(value) == length)
                           and all(good(item) for item in value))
@@ -125,7 +129,7 @@ RECORD_ADDED = (
     ("skipped", is_index, "a whole number"),
     ("strobe", is_text, "a text"),
     ("across_px", is_number, "a number"),
-    ("rig", is_text, "a text"),
+    ("rig", is_rig, "an object, or a word of older boards"),
     ("dropped", is_object, "an object"),
 )
 
