@@ -1,9 +1,10 @@
 """Cases of the laser's line: each returns what was seen; its first line says what is done."""
 
 import json
+import math
 import re
 
-from frames import host_records
+from frames import MOVED_DEG, host_records, picked
 from run import (FRAME_S, HEARTBEAT, HEIGHT, INTERLOCK, LASER, LIVE_FIELDS, RATE, SILENT_S, SOON_S,
                  WIDTH, expect, same_but)
 
@@ -11,6 +12,8 @@ from run import (FRAME_S, HEARTBEAT, HEIGHT, INTERLOCK, LASER, LIVE_FIELDS, RATE
 GUARD = "$(pidof isohead-guard)"
 # It acts when the program has shown no sign of life for so long (hal_guard.h).
 GUARD_S = 2
+# Longer than a frame is looked at, so that each counts.
+CHECK_FRAME_S = 0.05
 
 
 def case_interlock(run):
@@ -65,6 +68,66 @@ def case_reload(run):
     expect(record.get("strobe") != "reopened", f"the camera was opened anew: {record}")
     run.stop()
     return f"low {low_ms:.1f} ms later, no records with the broken one; goes on with the good one"
+
+
+def case_moved(run):
+    """the rig file is replaced by one that is 0.2 degrees off, and reloaded: heads go on in the next frame"""
+    gated, board = run.gated, run.board
+    rig = f"/rig/{gated.rig}.json"
+
+    def part(name, *indices):
+        return picked(run, name, gated, [(i, gated.time_us(i)) for i in indices])
+    before = part("before", *range(60, 64))
+    after, right = (part(name, *range(64, 72)) for name in ("after", "right"))
+    host_records(run, after, "--rig", run.moved_rig)
+    run.start(gated, "gated")
+    for number, line in enumerate(host_records(run, before)):
+        same_but(run.lit_frame(before, number), line)
+    board.command(f"cp {rig} /rig/good.json; cp /rig/moved.json {rig}")
+    board.signal("HUP")
+    board.wait(lambda: any("reloaded" in line for line in board.log), SOON_S, "reloaded rig")
+    errors_mm = []
+    for number, (line, wanted) in enumerate(zip(after.records, host_records(run, right))):
+        record = run.lit_frame(after, number, sequence=len(before) + number)
+        same_but(record, line)
+        errors_mm.append(math.dist(*(head_mm(each) for each in (record, wanted))))
+    moved = json.loads(record)["rig"]
+    expect(moved["state"] == "moved" and abs(moved["rotation_deg"][0] + MOVED_DEG) < MOVED_DEG / 2,
+           f"how the rig has moved: {moved}")
+    expect(max(errors_mm) < 50, f"heads are off by {errors_mm} mm")
+    board.wait(lambda: any("the rig has moved" in line for line in board.log), SOON_S, "warning of a rig that moved")
+    run.stop()
+    board.command(f"cp /rig/good.json {rig}")
+    return f"{len(errors_mm)} heads in as many frames, at most {max(errors_mm):.0f} mm from those with the right file"
+
+
+def head_mm(record):
+    found = json.loads(record)
+    expect(found["head"] is not None, f"no head: {record}")
+    return found["hypotheses"][found["head"]]["centre_mm"]
+
+
+def case_check(run):
+    """--check with the right rig file, and with the one that is 0.2 degrees off"""
+    gated, board = run.gated, run.board
+    found = []
+    for rig, status, words in ((gated.rig, 0, "it fits"), ("moved", 1, "it has moved")):
+        board.command(f"feed {WIDTH} {HEIGHT} GREY")
+        board.set_input(INTERLOCK, 1)
+        board.log.clear()
+        run.start_at("/dev/video0", rig, "always", "--format GREY --check")
+        run.laser(1)
+        for index in range(len(gated)):
+            run.give(gated, index)
+            board.settle(CHECK_FRAME_S)
+            if any("checked" in line for line in board.log):
+                break
+        is_status = board.exit_status(SOON_S)
+        line = next((line for line in board.log if "checked 60 frames" in line), "")
+        expect(is_status == status and words in line, f"exit status {is_status}, {board.log[-3:]}")
+        expect(not board.records and not run.is_on(), f"records, or the laser is on: {list(board.records)[:1]}")
+        found.append(f"{rig}: status {status}")
+    return ", ".join(found)
 
 
 def case_unasked(run):
@@ -198,5 +261,5 @@ def case_status(run):
     return f"reported {percent} %, the line was high for {fraction:.1f} %"
 
 
-CASES = [case_interlock, case_reload, case_unasked, case_signals, case_killed, case_all_killed,
+CASES = [case_interlock, case_reload, case_moved, case_check, case_unasked, case_signals, case_killed, case_all_killed,
          case_stopped, case_guard_killed, case_duty, case_status]

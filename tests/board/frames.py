@@ -1,6 +1,7 @@
 """Frames directories, as the board's camera gives them and as host_sim reads them."""
 
 import json
+import math
 import os
 import re
 import shutil
@@ -10,6 +11,8 @@ import subprocess
 TIME_0_US = 1000000
 # Labelled dots of a rig that fits lie nearer to their lines than this; 0.6 px is ih_labels' limit.
 ACROSS_MAX_PX = 0.3
+# Of the rig file that is wrong.
+MOVED_DEG = 0.2
 
 
 class Frames:
@@ -91,24 +94,40 @@ def clipped(run, name, frames, white):
 
 
 def as_of_host(record):
-    """A board's record without what it alone says of its rig, which fits the frames here."""
+    """A board's record without what it alone has: across_px once more."""
     try:
         found = json.loads(record)
     except json.JSONDecodeError:
         return record
-    across_px = found.get("across_px")
-    if "rig" in found or (across_px is not None) != (found.get("labelled", 0) > 0):
-        return "expected across_px where there are labels, and no rig: " + record
+    if "error" in found:
+        return record
+    across_px, rig = found.get("across_px"), found.get("rig")
+    if not rig or (across_px is not None) != (found["labelled"] > 0):
+        return "expected a rig, and across_px where there are labels: " + record
     if across_px is None:
         return record
-    if not 0 < across_px < ACROSS_MAX_PX:
-        return f"across_px is not within 0 .. {ACROSS_MAX_PX}: {record}"
-    return re.sub(r',"across_px":[0-9.]+', "", record)
+    if not 0 < across_px < ACROSS_MAX_PX or rig["across_px"] != across_px:
+        return f"across_px is not within 0 .. {ACROSS_MAX_PX}, or another one in rig: {record}"
+    return re.sub(r'(.*),"across_px":[0-9.]+', r"\1", record)
 
 
-def host_records(run, frames):
+def moved_rig(frames, path):
+    """The rig file of these frames with its projector rotated about X."""
+    with open(os.path.join(frames.directory, "rig.json"), encoding="ascii") as file:
+        rig = json.load(file)
+    sine, cosine = math.sin(math.radians(MOVED_DEG)), math.cos(math.radians(MOVED_DEG))
+    rays = rig["dot_rays"]["data"]
+    for i in range(0, len(rays), 3):
+        y, z = rays[i + 1], rays[i + 2]
+        rays[i + 1], rays[i + 2] = cosine * y - sine * z, sine * y + cosine * z
+    with open(path, "w", encoding="ascii") as file:
+        json.dump(rig, file)
+    return path
+
+
+def host_records(run, frames, *options):
     """What host_sim says, a line per lit frame."""
     if frames.records is None:
-        frames.records = subprocess.run([run.host_sim, "--json", frames.directory], check=True,
+        frames.records = subprocess.run([run.host_sim, "--json", *options, frames.directory], check=True,
                                         stdout=subprocess.PIPE, text=True).stdout.splitlines()
     return frames.records

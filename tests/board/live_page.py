@@ -49,6 +49,8 @@ def check_screen(browser, name, width):
     head, dots, rate, state = (browser.value(TEXT % id) for id in ("head", "dots", "rate", "state"))
     check(head.count("mm") >= 2 and "score" in head, f"{name}: head: {head}")
     check("of 361 labelled" in dots and int(dots.split(",")[0]) > 200, f"{name}: dots: {dots}")
+    rig = browser.value(TEXT % "rig")
+    check(rig == "fits", f"{name}: rig: {rig}")
     check("frames/s on the board" in rate and state == "live", f"{name}: rate: {rate}; state: {state}")
     needs = browser.value("document.documentElement.scrollWidth")
     check(needs <= width, f"{name}: {needs} pixels wide, the screen {width}")

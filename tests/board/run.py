@@ -7,7 +7,7 @@ import subprocess
 
 import initramfs
 from board import Board
-from frames import host_records, render
+from frames import host_records, moved_rig, render
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 # Pins of the board's only GPIO chip. 3 is its power button.
@@ -63,13 +63,15 @@ class Run:
         # Now, as the board does not wait for what host_sim says.
         for frames in [self.gated, self.alternating]:
             host_records(self, frames)
+        self.moved_rig = moved_rig(self.gated, os.path.join(self.work, "moved.json"))
         self.image = os.path.join(self.work, "initramfs")
         initramfs.build(self.image, os.path.join(self.work, "root"),
                         {NAMES[1][1:]: arguments.program, NAMES[2][1:]: arguments.program2,
                          LIVE[1:]: os.path.join(os.path.dirname(arguments.program), LIVE_BUILT)},
                         arguments.sysroot, [self._tool("feeder"), self._tool("control")],
                         {f"rig/{frames.rig}.json": os.path.join(frames.directory, "rig.json")
-                         for frames in [self.gated, self.alternating, self.small]})
+                         for frames in [self.gated, self.alternating, self.small]} |
+                        {"rig/moved.json": self.moved_rig})
 
     def _tool(self, name):
         path = os.path.join(self.work, name)
