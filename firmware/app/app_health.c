@@ -82,7 +82,7 @@ static void report_moved(const struct app_state *state)
     if (health->frame_count < 2 << MEAN_SHIFT) {
         how = "since its calibration";
         advice = "calibrate again when you can";
-    } else if (!is_near(now, health->mean, KNOCK_RAD_Q30)) {
+    } else if (!is_near(now, health->mean_rad_q30, KNOCK_RAD_Q30)) {
         how = "at once, as a knock does it";
         advice = "calibrate again when you can";
     }
@@ -122,7 +122,7 @@ static void report(struct app_state *state)
         break;
     }
     state->health.reported_state = now->state;
-    moves_of(now, state->health.reported);
+    moves_of(now, state->health.reported_rad_q30);
 }
 
 /* Frames that say the same, one after the other, and the mean of what they say. */
@@ -135,15 +135,15 @@ static void follow(struct app_health *health, const struct ih_alignment *now)
     health->frame_count = ih_min_s32(health->frame_count + 1, INT32_MAX - 1);
     moves_of(now, moves_rad_q30);
     for (int i = 0; i < APP_HEALTH_MOVES; i++) {
-        int64_t difference = (int64_t)moves_rad_q30[i] - health->mean[i];
-        health->mean[i] += (int32_t)(difference / (1 << MEAN_SHIFT));
+        int64_t difference = (int64_t)moves_rad_q30[i] - health->mean_rad_q30[i];
+        health->mean_rad_q30[i] += (int32_t)(difference / (1 << MEAN_SHIFT));
     }
 }
 
 static bool is_reported(const struct app_health *health, const struct ih_alignment *now)
 {
     bool has_moved_on =
-        now->state == IH_ALIGN_MOVED && !is_near(now, health->reported, REPORT_RAD_Q30);
+        now->state == IH_ALIGN_MOVED && !is_near(now, health->reported_rad_q30, REPORT_RAD_Q30);
     return now->state == health->reported_state && !has_moved_on;
 }
 

@@ -9,6 +9,6 @@
 const char *app_rig_text(enum ih_align_state state);
 
 /* One standard deviation of depth at 1 m. A dot rig only. */
-int64_t app_rig_depth_mm_q8(const struct isohead *head);
+int32_t app_rig_depth_mm_q8(const struct isohead *head);
 
 #endif

@@ -39,9 +39,9 @@ struct app_health {
     int32_t frame_count;  /* lit ones since the rig was loaded */
     int32_t steady_count; /* frames of this state, one after the other */
     enum ih_align_state last_state;
-    int32_t mean[APP_HEALTH_MOVES]; /* over the last frames */
+    int32_t mean_rad_q30[APP_HEALTH_MOVES]; /* over the last frames */
     enum ih_align_state reported_state;
-    int32_t reported[APP_HEALTH_MOVES];
+    int32_t reported_rad_q30[APP_HEALTH_MOVES];
 };
 
 struct app_state {

@@ -192,7 +192,8 @@ static void begin(struct isohead *head, int64_t time_us)
 /* A rig that has moved leaves depth less certain than its tracks say. */
 static void widen_sigma(struct isohead *head)
 {
-    for (int32_t i = 0; i < head->result.entry_count; i++) {
+    const bool is_moved = head->align.now.state == IH_ALIGN_MOVED;
+    for (int32_t i = 0; i < head->result.entry_count && is_moved; i++) {
         struct ih_result_entry *entry = &head->result.entry[i];
         const int64_t own = entry->sigma_mm_q8;
         const int64_t depth = ih_align_depth_sigma_mm_q8(&head->align, &head->rig,

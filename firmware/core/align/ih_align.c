@@ -39,7 +39,8 @@ static const int32_t floor_rad_q30[3] = {281102, 224882, 37480};
 /* At first so many of the dots must lie on the lines that nobody searches; later three quarters of what was the
  * best since a search. */
 #define TRUSTED_FIRST_Q8 160
-/* Or so many on the lines that those beside them, by chance as many on them, are at most a fifth. */
+/* Or so many lie on the lines, and two fifths as many beside them at most: the ring is twice as wide, so a fifth of those
+ * on the lines are there by chance. */
 #define CLEAR_MIN 64
 /* After so many searches in vain a pause grows by a frame. */
 #define VAIN_FRAMES 4
@@ -207,8 +208,10 @@ static int32_t search(struct ih_align *align, const struct ih_dots *dots, int32_
         forget(align);
         return excess;
     }
-    move_rig(align, before_px_q12, rig);
-    ih_dot_rows_fill(dots, rig, rows);
+    if (!is_none(before_px_q12)) { /* else the lines are back already */
+        move_rig(align, before_px_q12, rig);
+        ih_dot_rows_fill(dots, rig, rows);
+    }
     return excess_before;
 }
 
@@ -350,16 +353,16 @@ static bool is_knock(const struct ih_align *align, const struct ih_align_sums *f
             depth_px_q12 > KNOCK_SIGMAS * (int64_t)ih_isqrt_u64((uint64_t)(a * a + b * b)));
 }
 
-/* Is the mean so far from the rig's lines that they move? Depth stays where dots do not show it. */
+/* Is the mean so far from the rig's lines that they move? Depth stays where dots do not show it; then the others are what
+ * they are with that. */
 static bool is_to_move(const struct ih_align *align, const struct ih_align_sums *frame,
-                       const struct ih_rig *rig, int32_t mean_px_q12[IH_ALIGN_AXES],
-                       int32_t sigma_px_q12[IH_ALIGN_AXES])
+                       const struct ih_rig *rig, int32_t depth_sigma_px_q12,
+                       int32_t mean_px_q12[IH_ALIGN_AXES])
 {
     int32_t difference_px_q12[IH_ALIGN_AXES];
     struct ih_align_sums held;
-    solve_mean(align, &align->mean, mean_px_q12, sigma_px_q12);
     if (is_depth_seen(align, mean_px_q12[IH_ALIGN_DEPTH] - align->moved_px_q12[IH_ALIGN_DEPTH],
-                      sigma_px_q12[IH_ALIGN_DEPTH], rig)) {
+                      depth_sigma_px_q12, rig)) {
         return true;
     }
     held = align->mean;
@@ -383,12 +386,11 @@ static int64_t sigma_of(const struct ih_align *align, int axis, int32_t mean_px_
 }
 
 /* Uncertainty about the camera's axes. */
-static void set_sigma(struct ih_align *align, const struct ih_rig *rig)
+static void set_sigma(struct ih_align *align, const int32_t mean_px_q12[IH_ALIGN_AXES],
+                      const int32_t sigma_px_q12[IH_ALIGN_AXES], const struct ih_rig *rig)
 {
-    int32_t mean_px_q12[IH_ALIGN_AXES], sigma_px_q12[IH_ALIGN_AXES];
     int64_t sigma_rad_q30[3];
     struct ih_alignment *now = &align->now;
-    solve_mean(align, &align->mean, mean_px_q12, sigma_px_q12);
     for (int k = 0; k < 3; k++) {
         sigma_rad_q30[k] = sigma_of(align, k, mean_px_q12[k], sigma_px_q12[k], rig);
     }
@@ -410,9 +412,6 @@ int32_t ih_align_depth_sigma_mm_q8(const struct ih_align *align, const struct ih
 {
     const int64_t x = rig->calibration.origin_mm_q16[0], y = rig->calibration.origin_mm_q16[1];
     const int64_t baseline_mm_q16 = (int64_t)ih_isqrt_u64((uint64_t)(x * x + y * y)) + 1;
-    if (align->now.state != IH_ALIGN_MOVED) {
-        return 0;
-    }
     const int64_t depth2_mm2_q8 = ih_mul_shift(depth_mm_q8, depth_mm_q8, 8);
     const int64_t aside_mm2_q16 =
         ih_mul_shift(depth2_mm2_q8, align->now.depth_sigma_rad_q30, 30 - 8);
@@ -449,7 +448,7 @@ void ih_align_learn(struct ih_align *align, const struct ih_labels *labels, stru
     struct ih_align_pairs *pairs = &scratch->at.pairs;
     struct ih_align_sums frame;
     int32_t frame_px_q12[IH_ALIGN_AXES], mean_px_q12[IH_ALIGN_AXES];
-    int32_t sigma_px_q12[IH_ALIGN_AXES];
+    int32_t sigma_px_q12[IH_ALIGN_AXES], next_px_q12[IH_ALIGN_AXES];
     align->is_short = 2 * labels->labelled_count < align->excess;
     if (align->is_short) {
         align->now.is_depth_known = false;
@@ -468,17 +467,20 @@ void ih_align_learn(struct ih_align *align, const struct ih_labels *labels, stru
     }
     add_moved(&frame, align->moved_px_q12);
     add_frame(align, &frame);
-    bool is_moving = is_to_move(align, &frame, rig, mean_px_q12, sigma_px_q12);
-    if (is_within_limits(mean_px_q12, rig)) {
+    solve_mean(align, &align->mean, mean_px_q12, sigma_px_q12);
+    memcpy(next_px_q12, mean_px_q12, sizeof next_px_q12);
+    const bool is_moving =
+        is_to_move(align, &frame, rig, sigma_px_q12[IH_ALIGN_DEPTH], next_px_q12);
+    if (is_within_limits(next_px_q12, rig)) {
         const int32_t before_px_q12 = align->moved_px_q12[IH_ALIGN_DEPTH];
-        round_to_file(align, &frame, rig, mean_px_q12);
-        if (is_moving || is_none(mean_px_q12)) {
-            move_rig(align, mean_px_q12, rig);
+        round_to_file(align, &frame, rig, next_px_q12);
+        if (is_moving || is_none(next_px_q12)) {
+            move_rig(align, next_px_q12, rig);
         }
         note_change(align, before_px_q12, rig);
         align->now.state = state_of(align);
     }
-    set_sigma(align, rig);
+    set_sigma(align, mean_px_q12, sigma_px_q12, rig);
     if (align->is_depth_new && !was_depth_new) {
         forget(align); /* labels were of another depth, and fewer */
     }

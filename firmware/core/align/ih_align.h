@@ -2,23 +2,23 @@
  * their epipolar lines together.
  *
  * In:     dots, rig; after the labels, which dot is whose.
- * Out:    the rig's lines where the dots are, the dots by row, and how the rig has moved: a rotation of the projector and
- *         a change of focal length, with uncertainty.
- * Method: 1. Look: of the dots near the lines, are more within 0.3 px than 0.6 to 1.2 px beside them, and
- *            nearly as many of all as were since the last search, or
- *            hardly one beside? Then the rig is where it was in the frame before.
- *         2. If not, search: a vote over planes (ih_align_vote) on both sides of the file's lines, in bins of 0.5 px, then of
- *            0.2 px around each of the best; a fit of all five numbers (ih_align_fit). It is taken when it would pass the
- *            look, by more dots than before.
+ * Out:    the rig's lines where the dots are, the dots by row, and how the rig has moved: a rotation of the projector, a
+ *         change of focal length and a shift of the picture, with uncertainty.
+ * Method: 1. Look: dots within 0.3 px of the lines, against those 0.6 to 1.2 px beside them. If nearly as many of all dots
+ *            lie on the lines as did since the last search, or hardly one beside them, the rig is where it was.
+ *         2. If not, search (ih_align_search): back at the file's lines, or around them. The result is taken when more dots
+ *            lie on its lines than before. After searches in vain there are pauses of up to 8 frames. If dots lie on
+ *            the lines, but beyond the working range, so that labels are short, depth alone is searched for.
  *         3. Learn, after the labels: a fit to how far labelled dots lie across their lines, averaged with those of up to 16
- *            frames before. A frame that says something else starts the mean anew.
- *            The rig is moved when the mean says so by more than MOVE_PX, or by 4 times its uncertainty in depth.
+ *            frames before. A frame that differs starts the mean anew. The lines move when the mean is 0.1 px off them
+ *            (0.05 px once they have moved), or when depth is: 0.04 degrees and 3 times its uncertainty (then 0.01 degrees
+ *            and once).
  *         Where the rig is right nothing changes, to the last bit.
  *         The rotation about the axis across the baseline is depth. Dots show it by the pattern's keystone alone: to
  *         0.02 degrees in a frame of a room, 0.2 where half of the dots are missing.
  * Limits: 12 px across a line, 1 degree about the camera's axis, 1 % of focal length. Not seen: a shift along the
  *         baseline, and of the principal point along it.
- * Cost:   looking and learning 0.1 M instructions; docs/performance.md.
+ * Cost:   looking and learning 0.2 M instructions, a search 2 M (x86-64): docs/performance.md.
  * Error:  against float64 on the same dots: docs/numerics.md.
  */
 #ifndef IH_ALIGN_H
@@ -30,8 +30,8 @@
 #include "align/ih_align_fit.h"
 #include "align/ih_align_pairs.h"
 #include "align/ih_align_search.h"
-#include "dots/ih_dot_rows.h"
 #include "base/ih_config.h"
+#include "dots/ih_dot_rows.h"
 #include "dots/ih_dots.h"
 #include "labels/ih_labels.h"
 #include "rig/ih_rig.h"
@@ -50,8 +50,8 @@ struct ih_alignment {
     int32_t focal_q30;           /* relative change of the focal length */
     int32_t shift_px_q12[2];     /* of the picture */
     int32_t sigma_rad_q30[3];    /* one standard deviation */
-    int32_t
-        across_px_q12; /* mean distance of this frame's labelled dots from their lines; -1: none */
+    /* Mean distance of this frame's labelled dots from their lines; -1: none. */
+    int32_t across_px_q12;
     int32_t depth_sigma_rad_q30; /* of the rotation that is depth */
     bool is_depth_known;
 };
@@ -86,7 +86,7 @@ void ih_align_find(struct ih_align *align, const struct ih_dots *dots, struct ih
 void ih_align_learn(struct ih_align *align, const struct ih_labels *labels, struct ih_rig *rig,
                     struct ih_align_scratch *scratch);
 
-/* What the uncertainty of a rig that has moved is in depth, one standard deviation; 0 while it fits. */
+/* What the uncertainty of the rotation is at a depth, one standard deviation. */
 int32_t ih_align_depth_sigma_mm_q8(const struct ih_align *align, const struct ih_rig *rig,
                                    int32_t depth_mm_q8);
 

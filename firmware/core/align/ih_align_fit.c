@@ -36,7 +36,7 @@ void ih_align_prior(const struct ih_rig *rig, int32_t sigma_px_q12[IH_ALIGN_AXES
     }
 }
 
-/* (1 + (r / s)^2)^-2, 0 beyond 4 s. Squares are taken in Q16, below 2^22 for s up to 2 px. */
+/* (1 + (r / s)^2)^-2, 0 beyond 4 s. Squares are taken in Q16; scales and distances of up to 64 px: below 2^29. */
 static int32_t weight_q14(int64_t residual_px_q12, int32_t scale_px_q12)
 {
     if (ih_abs_s64(residual_px_q12) > 4 * (int64_t)scale_px_q12) {
@@ -48,13 +48,13 @@ static int32_t weight_q14(int64_t residual_px_q12, int32_t scale_px_q12)
     return (int32_t)(root_q14 * root_q14 >> 14);
 }
 
-/* A weight times a slope is below 2^29 in Q26; with another slope or a distance of up to 2^18, over 1024 pairs: 2^57. */
+/* Sums are exact: rounded products would make the matrix indefinite, as the shift is hardly another number than the
+ * rotation about the baseline. A weight times a slope is below 2^29 in Q26; with another slope, or a distance of up to
+ * 64 px, over 1,024 pairs below 2^57. */
 void ih_align_sums_add(const struct ih_align_pairs *pairs,
                        const int32_t guess_px_q12[IH_ALIGN_AXES], int32_t scale_px_q12,
                        struct ih_align_sums *sums)
 {
-    /* Exact: rounded products would make the matrix indefinite, as the shift is hardly another number than the rotation
-     * about the baseline. 1,024 pairs of 2^14 2^15 2^15: 2^54. */
     int64_t normal_q38[IH_ALIGN_ENTRIES] = {0}, right_px_q38[IH_ALIGN_AXES] = {0};
     for (int32_t i = 0; i < pairs->count; i++) {
         const struct ih_align_pair *pair = &pairs->pair[i];

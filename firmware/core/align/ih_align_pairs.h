@@ -11,8 +11,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "dots/ih_dot_rows.h"
 #include "base/ih_config.h"
+#include "dots/ih_dot_rows.h"
 #include "rig/ih_rig.h"
 
 enum ih_align_axis {

@@ -2,9 +2,10 @@
  *
  * In:     dots by row, the rig with the lines of its file.
  * Out:    the five numbers of ih_align_pairs.h.
- * Method: all pairs of a slot and a dot within 16 px of its line (less where dots are less than 28 px apart) and near its working range; votes over planes in bins of
- *         0.5 px (the same), then of 0.2 px around each of the best and for rotations of depth; a fit to the pairs within 1 px of the
- *         best one. Depth is 0 unless it is 3 times its uncertainty.
+ * Method: all pairs of a slot and a dot within 16 px of its line and near its working range; votes over planes in bins
+ *         of 0.5 px, then of 0.2 px around each of the best and for rotations of depth; a fit to the pairs within 1 px of
+ *         the best one. Where dots are less than 28 px apart the 16 and 0.5 px are as much less. Depth is 0 unless it is 3
+ *         times its uncertainty.
  */
 #ifndef IH_ALIGN_SEARCH_H
 #define IH_ALIGN_SEARCH_H

@@ -3,7 +3,7 @@
  * In:    distances of dots across their lines, of every slot; most belong to other slots.
  * Method: a histogram for each block of slots. A plane shift + column + row (px at the pattern's edges) moves each
  *        block's histogram against the others; their sum has a peak where the plane is right. Columns are summed
- *        first, then rows. A peak counts by how much it rises above what lies 1.5 bins beside it: planes that are wrong
+ *        first, then rows. A peak counts by how much it rises above what lies three bins beside it: planes that are wrong
  *        give hills, right ones a peak. The fine vote tries rotations of depth, too.
  * Cost:  docs/performance.md; only when dots do not lie on their lines.
  */
