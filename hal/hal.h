@@ -84,8 +84,11 @@ struct hal_strobe {
     bool (*set)(void *context, bool on, struct hal_error *error);
     /* Toggle the line that feeds an external one-shot; without such a line nothing happens. */
     bool (*beat)(void *context, struct hal_error *error);
-    /* Is the interlock closed, so that the laser may be on? True where none is configured. */
+    /* Is the interlock closed, so that the laser may be on? True where none is configured. False
+     * too when somebody else has switched off: then the laser is not on any more. */
     bool (*interlock)(void *context, bool *closed, struct hal_error *error);
+    /* A frame was taken and judged: whoever limits the time without one starts anew. */
+    bool (*judged)(void *context, struct hal_error *error);
 };
 
 /* What can be waited for; a set. */

@@ -76,6 +76,7 @@ struct app_config {
     bool laser_active_low;
     bool interlock_active_low;
     int32_t duty_percent; /* 1 .. 100, default 100 */
+    int32_t laser_cap_ms; /* 10 .. 1000, default 200 */
 
     enum app_output output;
     char output_host[APP_CONFIG_VALUE_MAX + 1]; /* without the brackets of an IPv6 address */

@@ -170,11 +170,13 @@ static void use_dark(struct app_state *state, const struct hal_frame *frame)
 
 static enum app_phase_verdict judge(struct app_state *state)
 {
-    if (!state->config->laser) {
-        return APP_PHASE_LIT;
+    enum app_phase_verdict verdict = APP_PHASE_LIT;
+    if (state->config->laser) {
+        verdict = app_phase_judge(&state->phase, state->head->labels.labelled_count,
+                                  state->config->strobe != APP_STROBE_ALWAYS, state->on_frames);
     }
-    return app_phase_judge(&state->phase, state->head->labels.labelled_count,
-                           state->config->strobe != APP_STROBE_ALWAYS, state->on_frames);
+    app_laser_frame(&state->laser, app_state_now_us(state));
+    return verdict;
 }
 
 /* Lit, dark, or neither: and what the laser does next. */

@@ -2,6 +2,11 @@
 
 #define PERCENT 100
 
+static int64_t min(int64_t a, int64_t b)
+{
+    return a < b ? a : b;
+}
+
 static int64_t credit_max(const struct app_laser *laser)
 {
     return (int64_t)laser->config.duty_percent * APP_LASER_BURST_US;
@@ -22,6 +27,7 @@ static void account(struct app_laser *laser, int64_t now_us)
     int64_t passed_us = now_us - laser->tick_us;
     int32_t duty = laser->config.duty_percent;
     laser->tick_us = now_us;
+    laser->off_us = laser->is_on ? 0 : laser->off_us + passed_us;
     if (laser->is_on) {
         laser->on_us += passed_us;
         laser->silent_us += passed_us;
@@ -116,13 +122,28 @@ static void switch_on(struct app_laser *laser)
     }
 }
 
+/* Even if the guard has to end it. */
+static bool duty_lasts(const struct app_laser *laser)
+{
+    int64_t longest_us = laser->config.cap_us + HAL_LIMITS_SLACK_US;
+    return laser->credit >= longest_us * (PERCENT - laser->config.duty_percent);
+}
+
+/* Until this stage ends, as far as it is known. */
+static bool cap_lasts(const struct app_laser *laser)
+{
+    int64_t end_us = laser->stage_us + laser->stage_max_us[laser->stage];
+    return end_us - laser->tick_us <= laser->config.cap_us - laser->silent_us;
+}
+
 /* The line as wish and blocks say. */
 static void apply(struct app_laser *laser)
 {
     if (!laser->is_open) {
         return;
     }
-    bool on = laser->wished && laser->blocks == 0;
+    bool lasts = laser->stage == APP_LASER_IDLE || (duty_lasts(laser) && cap_lasts(laser));
+    bool on = laser->wished && laser->blocks == 0 && lasts;
     if (on && !laser->is_on) {
         switch_on(laser);
     } else if (!on && laser->is_on) {
@@ -200,12 +221,25 @@ void app_laser_camera(struct app_laser *laser, bool streams, int64_t frame_time_
 {
     account(laser, now_us);
     if (streams) {
-        laser->silent_us = 0;
-        laser->silent_max_us = APP_LASER_SILENT_FRAMES * frame_time_us;
-        block(laser, APP_LASER_BLOCK_SILENCE, false);
+        int64_t silent_us = APP_LASER_SILENT_FRAMES * frame_time_us;
+        laser->silent_max_us = min(silent_us, laser->config.cap_us);
+        if (laser->off_us >= HAL_LIMITS_PAUSE_US) {
+            laser->silent_us = 0;
+        }
+        block(laser, APP_LASER_BLOCK_SILENCE, laser->silent_us >= laser->silent_max_us);
     }
     block(laser, APP_LASER_BLOCK_CAMERA, !streams);
     apply(laser);
+}
+
+static void begin_stage(struct app_laser *laser, enum app_laser_stage stage)
+{
+    int64_t took_us = laser->tick_us - laser->stage_us;
+    if (took_us > laser->stage_max_us[laser->stage]) {
+        laser->stage_max_us[laser->stage] = took_us;
+    }
+    laser->stage = stage;
+    laser->stage_us = laser->tick_us;
 }
 
 /* Nothing is switched on here: the loop says first what this frame means for the next one. */
@@ -214,24 +248,27 @@ void app_laser_frame(struct app_laser *laser, int64_t now_us)
     account(laser, now_us);
     laser->silent_us = 0;
     block(laser, APP_LASER_BLOCK_SILENCE, false);
+    if (laser->is_open && !laser->strobe->judged(laser->strobe->context, &laser->failed)) {
+        fail(laser);
+        return;
+    }
+    if (laser->stage != APP_LASER_IDLE) {
+        begin_stage(laser, APP_LASER_FINDS);
+    }
+    if (laser->is_on) {
+        apply(laser);
+    }
 }
 
 void app_laser_busy(struct app_laser *laser, bool busy, int64_t now_us)
 {
     account(laser, now_us);
+    begin_stage(laser, busy ? APP_LASER_JUDGES : APP_LASER_IDLE);
     if (busy) {
-        laser->busy_us = now_us;
-        if (laser->config.duty_percent < PERCENT && laser->is_on &&
-            duty_wait_us(laser) <= 2 * laser->busy_max_us) {
+        if (laser->is_on && !duty_lasts(laser)) {
             block(laser, APP_LASER_BLOCK_DUTY, true);
         }
         apply(laser);
-        return;
-    }
-    laser->silent_us = 0;
-    block(laser, APP_LASER_BLOCK_SILENCE, false);
-    if (now_us - laser->busy_us > laser->busy_max_us) {
-        laser->busy_max_us = now_us - laser->busy_us;
     }
 }
 
@@ -257,11 +294,6 @@ static int64_t silence_wait_us(const struct app_laser *laser)
 static int64_t beat_wait_us(const struct app_laser *laser, int64_t now_us)
 {
     return laser->is_on ? laser->beat_us + APP_LASER_BEAT_US - now_us : APP_LASER_NEVER_US;
-}
-
-static int64_t min(int64_t a, int64_t b)
-{
-    return a < b ? a : b;
 }
 
 int64_t app_laser_tick(struct app_laser *laser, int64_t now_us)

@@ -5,13 +5,16 @@
  * Out:   the strobe line. It is high only while the loop wishes it and nothing speaks against it:
  *        - it is enabled (app_laser_config.enabled);
  *        - the rig is valid (app_laser_rig) and the camera streams (app_laser_camera);
- *        - it has not been on for APP_LASER_SILENT_FRAMES frame times since the last frame came;
+ *        - since the last frame that was judged it has been on for less than APP_LASER_SILENT_FRAMES
+ *          frame times, and for less than the cap, whatever the camera says of its rate;
  *        - the interlock is closed, after a movement for APP_LASER_CLOSED_US: contacts bounce. It is
  *          read before switching on and once more afterwards, so that one that opens in between is
  *          seen here or comes as an event later; and at every tick, which is also how the guard tells
  *          that it has switched off;
  *        - the duty is kept: over any time T the laser is on for at most duty_percent of
- *          (T + APP_LASER_BURST_US);
+ *          (T + APP_LASER_BURST_US). While a frame is processed nobody looks: the laser stays on
+ *          only where duty and cap last. For the duty that means for as long as the guard lets it
+ *          be on (HAL_LIMITS_SLACK_US beyond the cap), for the cap as long as any frame took;
  *        - no call of the strobe has failed. After a failure it is switched off by every means there
  *          is (again, then by giving the lines back) and stays off: the caller ends.
  * Time:  app_laser_tick looks at the clock. The loop calls it before it waits and does not wait for
@@ -23,15 +26,17 @@
 #ifndef APP_LASER_H
 #define APP_LASER_H
 
-#include "hal.h"
+#include "hal_limits.h"
 
 /* The time whose duty may be used at once, after a rest. */
-#define APP_LASER_BURST_US 100000
+#define APP_LASER_BURST_US HAL_LIMITS_BURST_US
 /* Between two edges for an external one-shot while the laser is on; there is a rising one just before
  * it is switched on. The one-shot has to bridge the processing of a frame too. */
 #define APP_LASER_BEAT_US 10000
 /* Without a frame for so many frame times it goes off. */
 #define APP_LASER_SILENT_FRAMES 3
+/* The cap is at least so many frame times, or frames would come too late for it. */
+#define APP_LASER_CAP_FRAMES 2
 /* A wait that nothing limits; the watchdogs want a sign of life several times in 2 s. */
 #define APP_LASER_NEVER_US 400000
 /* So long the interlock has been closed and has not moved before the laser is on again. */
@@ -53,26 +58,37 @@ enum app_laser_block {
 struct app_laser_config {
     bool enabled;         /* false: the strobe is never touched */
     int32_t duty_percent; /* 1 .. 100 */
+    int64_t cap_us;       /* max time on without a frame that was judged */
+};
+
+/* What the loop does with a frame; nobody looks at the clock meanwhile. */
+enum app_laser_stage {
+    APP_LASER_IDLE,   /* nothing: it waits */
+    APP_LASER_JUDGES, /* finds out whether it is lit */
+    APP_LASER_FINDS,  /* finds the heads */
+    APP_LASER_STAGES
 };
 
 struct app_laser {
     struct app_laser_config config;
     const struct hal_strobe *strobe;
     bool wished;
-    bool is_on;              /* the last state that was set */
-    unsigned blocks;         /* of enum app_laser_block */
-    bool is_open;            /* the lines are taken */
-    int64_t silent_us;       /* on without a frame, */
-    int64_t silent_max_us;   /* and its limit */
-    int64_t tick_us;         /* when time was last accounted for */
-    int64_t credit;          /* left of the duty, percent x us */
-    int64_t busy_us;         /* since when the loop is busy, */
-    int64_t busy_max_us;     /* and for how long at most it has been */
-    int64_t open_us;         /* when the interlock was last seen open */
-    int64_t beat_us;         /* last edge for the one-shot */
-    int64_t on_us;           /* sum of all times with the laser on */
-    int64_t on_count;        /* how often it was switched on */
-    struct hal_error failed; /* why APP_LASER_BLOCK_FAULT */
+    bool is_on;            /* the last state that was set */
+    unsigned blocks;       /* of enum app_laser_block */
+    bool is_open;          /* the lines are taken */
+    int64_t silent_us;     /* on without a frame, */
+    int64_t silent_max_us; /* and its limit */
+    int64_t off_us;        /* off since so long */
+    int64_t tick_us;       /* when time was last accounted for */
+    int64_t credit;        /* left of the duty, percent x us */
+    enum app_laser_stage stage;
+    int64_t stage_us;                       /* since when */
+    int64_t stage_max_us[APP_LASER_STAGES]; /* longest so far */
+    int64_t open_us;                        /* when the interlock was last seen open */
+    int64_t beat_us;                        /* last edge for the one-shot */
+    int64_t on_us;                          /* sum of all times with the laser on */
+    int64_t on_count;                       /* how often it was switched on */
+    struct hal_error failed;                /* why APP_LASER_BLOCK_FAULT */
 };
 
 /* Off, with everything against it that can be; strobe and config's values are kept. */
@@ -94,11 +110,11 @@ void app_laser_rig(struct app_laser *laser, bool is_valid, int64_t now_us);
 /* The camera streams, a frame every frame_time_us, or it does not: then the time does not matter. */
 void app_laser_camera(struct app_laser *laser, bool streams, int64_t frame_time_us, int64_t now_us);
 
-/* A frame came that can be looked at. */
+/* A frame was judged: lit, dark or neither. */
 void app_laser_frame(struct app_laser *laser, int64_t now_us);
 
-/* The loop is busy with a frame from now on, or has been until now: no time to tick, and no silence.
- * Where the duty might not last for twice as long as the longest such time it goes off before. */
+/* The loop is busy with a frame from now on, or has been until now: no time to tick. Where duty or
+ * cap might not last it goes off before. */
 void app_laser_busy(struct app_laser *laser, bool busy, int64_t now_us);
 
 /* The interlock has moved, or might have. */

@@ -113,6 +113,26 @@ static void lose_camera(struct app_state *state, const char *why)
     }
 }
 
+/* Can frames of this rate be believed in, and come in time for the laser's cap? */
+static bool check_rate(const struct app_state *state, struct hal_error *error)
+{
+    int64_t cap_us = state->laser.config.cap_us;
+    int64_t frame_us = state->frame_time_us;
+    if (frame_us < APP_LOOP_FRAME_TIME_MIN_US || frame_us > APP_LOOP_FRAME_TIME_MAX_US) {
+        return hal_fail(error, "a frame every %" PRId64 " us, expected 1 to 1000 frames a second",
+                        frame_us);
+    }
+    if (state->laser.config.enabled && APP_LASER_CAP_FRAMES * frame_us > cap_us) {
+        return hal_fail(error,
+                        "a frame every %" PRId64 " us, too slow for laser-cap = %" PRId64
+                        ": expected at most %" PRId64 " us, or laser-cap = %" PRId64
+                        " (at most 1000)",
+                        frame_us, cap_us / 1000, cap_us / APP_LASER_CAP_FRAMES,
+                        (APP_LASER_CAP_FRAMES * frame_us + 999) / 1000);
+    }
+    return true;
+}
+
 static void open_camera(struct app_state *state)
 {
     const struct hal_camera *camera = state->hal.camera;
@@ -121,11 +141,15 @@ static void open_camera(struct app_state *state)
         lose_camera(state, error.text);
         return;
     }
-    state->is_streaming = true;
     state->frame_time_us = camera->frame_time_us(camera->context);
-    if (state->frame_time_us <= 0) { /* it does not say, and then it took no rate either */
+    if (state->frame_time_us == 0) { /* it does not say, and then it took no rate either */
         state->frame_time_us = APP_LOOP_FRAME_TIME_US;
     }
+    if (!check_rate(state, &error)) {
+        lose_camera(state, error.text);
+        return;
+    }
+    state->is_streaming = true;
     state->frame_us = app_state_now_us(state);
     app_frame_begin(state);
     app_log_say(state->log, APP_LOG_INFO, "%s: open, a frame every %" PRId64 " us",
@@ -165,11 +189,9 @@ static void take_frames(struct app_state *state)
         }
         note_frame(state);
         if (next == HAL_NEXT_BAD) {
-            /* The camera lives, but nobody has seen anything: no frame to the laser. */
             app_frame_lose(state, &frame, error.text);
             continue;
         }
-        app_laser_frame(&state->laser, app_state_now_us(state));
         if (has_newest) {
             app_frame_skip(state, &newest);
         }
@@ -192,7 +214,11 @@ static void take_frames(struct app_state *state)
 static void reset(struct app_state *state)
 {
     const struct app_config *config = state->config;
-    const struct app_laser_config laser = {config->laser, config->duty_percent};
+    const struct app_laser_config laser = {
+        .enabled = config->laser,
+        .duty_percent = config->duty_percent,
+        .cap_us = (int64_t)config->laser_cap_ms * 1000,
+    };
     int64_t now_us = app_state_now_us(state);
     app_laser_init(&state->laser, &laser, state->hal.strobe, now_us);
     app_phase_init(&state->phase);

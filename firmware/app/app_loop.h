@@ -18,8 +18,9 @@
  * Frames that wait behind a newer one are given back unseen: the newest counts. What was lost or
  * skipped on the way to a frame stands in its record.
  *
- * Errors: a frame that cannot be used has an error record. A camera that is gone, or silent for
- * APP_LOOP_SILENT_FRAMES frame times, is closed and opened again, at first soon, then every few
+ * Errors: a frame that cannot be used has an error record. A camera that is gone, silent for
+ * APP_LOOP_SILENT_FRAMES frame times, or of a rate that cannot be believed in or is too slow for the
+ * laser's cap (APP_LASER_CAP_FRAMES) is closed and opened again, at first soon, then every few
  * seconds; the laser is off meanwhile. A rig that cannot be read at SIGHUP: laser off and no records
  * until the next SIGHUP with a good one. What fails of strobe, guard, events or output for good ends
  * the program, laser off.
@@ -39,6 +40,10 @@
 #define APP_LOOP_DRAIN_MAX 32
 /* Between frames of a camera that does not say. */
 #define APP_LOOP_FRAME_TIME_US 40000
+/* Between frames of one that does: nothing else is believed. */
+#define APP_LOOP_FRAME_TIME_MIN_US 1000
+#define APP_LOOP_FRAME_TIME_MAX_US 1000000
+
 /* Until requested to end, or until it cannot go on. All but the given is set here. The camera is closed
  * and the laser off when it returns. */
 enum app_exit app_loop_run(struct app_state *state);

@@ -273,6 +273,10 @@ const struct app_setting app_settings[] = {
      .take = take_text, .offset = AT(heartbeat_line)},
     {"duty", "PERCENT", "percent from 1 to 100", "maximum duty cycle of the laser; default 100",
      .take = take_number, .offset = AT(duty_percent), .minimum = 1, .maximum = 100},
+    {"laser-cap", "MS", "milliseconds from 10 to 1000",
+     "the laser goes off when it has been on for so many milliseconds without a frame that was "
+     "judged; at least two frames must fit; default 200",
+     .take = take_number, .offset = AT(laser_cap_ms), .minimum = 10, .maximum = 1000},
 
     {"output", "WHERE",
      "-, udp:HOST:PORT or serial:PATH[:BAUD] with 9600, 19200, 38400, 57600, 115200, 230400, "
@@ -395,6 +399,7 @@ void app_settings_default(struct app_config *config)
     config->format = format_words[0];
     config->rate_mhz = 0;
     config->duty_percent = 100;
+    config->laser_cap_ms = 200;
     config->output_baud = BAUD_DEFAULT;
     config->status_s = 10;
 }

@@ -185,10 +185,18 @@ static bool gpio_interlock(void *context, bool *closed, struct hal_error *error)
     return true;
 }
 
+/* A line has no limits. */
+static bool gpio_judged(void *context, struct hal_error *error)
+{
+    (void)context;
+    (void)error;
+    return true;
+}
+
 void hal_gpio_init(struct hal_gpio *gpio, const struct hal_gpio_config *config)
 {
     *gpio = (struct hal_gpio){
-        .strobe = {gpio, gpio_open, gpio_close, gpio_set, gpio_beat, gpio_interlock},
+        .strobe = {gpio, gpio_open, gpio_close, gpio_set, gpio_beat, gpio_interlock, gpio_judged},
         .interlock_fd = -1,
         .laser_fd = -1,
         .config = *config,

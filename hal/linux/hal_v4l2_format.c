@@ -387,8 +387,10 @@ bool hal_v4l2_rate_set(int fd, int32_t rate_mhz, int32_t *frame_time_us, struct 
     if (rate_mhz != 0 && !ask_rate(fd, rate_mhz, &time, error)) {
         return false;
     }
-    const int64_t time_us =
-        time.denominator == 0 ? 0 : (int64_t)time.numerator * 1000000 / time.denominator;
-    *frame_time_us = time_us > INT32_MAX ? 0 : (int32_t)time_us;
+    *frame_time_us = 0;
+    if (time.denominator != 0 && time.numerator != 0) {
+        const int64_t time_us = (int64_t)time.numerator * 1000000 / time.denominator;
+        *frame_time_us = time_us < 1 ? 1 : time_us > INT32_MAX ? INT32_MAX : (int32_t)time_us;
+    }
     return true;
 }

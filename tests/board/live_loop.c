@@ -174,8 +174,8 @@ static int64_t cpu_us(void)
 
 static void run(bool has_viewer)
 {
-    static const struct hal_strobe strobe = {NULL,       strobe_good, camera_close,
-                                             strobe_set, strobe_good, strobe_interlock};
+    static const struct hal_strobe strobe = {
+        NULL, strobe_good, camera_close, strobe_set, strobe_good, strobe_interlock, strobe_good};
     static const struct hal_events events = {NULL, wait_for};
     static const struct hal_watchdog watchdog = {NULL, feed};
     static const struct hal_output output = {NULL, send_record};
@@ -216,6 +216,7 @@ int main(int argument_count, char **arguments)
     config.rig = rig;
     config.device = arguments[1];
     config.duty_percent = 100;
+    config.laser_cap_ms = 200;
     frame_count = strtol(arguments[2], NULL, 10);
     long rate = strtol(arguments[3], NULL, 10);
     period_us = rate > 0 ? 1000000 / rate : 0;

@@ -61,15 +61,15 @@ def judge_hal(path, quoted, target):
     if is_core(target):
         return "hal knows no firmware"
     own = os.path.basename(os.path.dirname(path))
-    if quoted and not re.fullmatch(r"hal\.h|hal_(file|text)\.h|(%s/)hal_\w+\.h" % own, target):
-        return "a back end includes hal.h, hal_file.h, hal_text.h and its own files by their folder"
+    if quoted and not re.fullmatch(r"hal\.h|hal_(file|limits|text)\.h|(%s/)hal_\w+\.h" % own, target):
+        return "a back end includes hal.h, hal_file.h, hal_limits.h, hal_text.h and its own files by their folder"
     return None
 
 
 def judge_app(path, quoted, target):
     if not quoted or is_core(target):
         return None
-    good = re.fullmatch(r"app_\w+\.h|hal\.h|hal_(file|text)\.h", target)
+    good = re.fullmatch(r"app_\w+\.h|hal\.h|hal_(file|limits|text)\.h", target)
     if os.path.basename(path).startswith(("app_board.", "app_live_main.")):
         good = good or re.fullmatch(r"linux/hal_\w+\.h", target)
     if os.path.basename(path) == "app_cortexm.c":

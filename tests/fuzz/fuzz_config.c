@@ -34,6 +34,7 @@ static void check_values(const struct app_config *c)
                                          : c->gain_value == 0);
     FUZZ_CHECK((int)c->strobe >= 0 && c->strobe <= APP_STROBE_ALTERNATING);
     FUZZ_CHECK(c->duty_percent >= 1 && c->duty_percent <= 100);
+    FUZZ_CHECK(c->laser_cap_ms >= 10 && c->laser_cap_ms <= 1000);
     FUZZ_CHECK((int)c->output >= 0 && c->output <= APP_OUTPUT_SERIAL);
     FUZZ_CHECK((int)c->log >= 0 && c->log <= APP_MESSAGES_SYSLOG);
     FUZZ_CHECK(c->status_s >= 0 && c->status_s <= 86400);

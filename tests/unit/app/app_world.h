@@ -18,6 +18,7 @@
 #include "unity.h"
 
 #define WORLD_FRAME_US 40000
+#define WORLD_CAP_MS 200
 #define WORLD_LIT_LABELS 200
 #define WORLD_UNPLUGGED_US 300000
 #define WORLD_KNOCK_RAD_Q30 3748032 /* 0.2 degrees */
@@ -39,6 +40,7 @@ enum world_function {
     WORLD_STROBE_OFF,
     WORLD_STROBE_BEAT,
     WORLD_STROBE_INTERLOCK,
+    WORLD_STROBE_JUDGED,
     WORLD_EVENTS_WAIT,
     WORLD_EVENTS_NOTHING, /* an event goes by unseen */
     WORLD_WATCHDOG_FEED,
@@ -48,12 +50,12 @@ enum world_function {
 };
 
 static const char *const world_function_text[WORLD_FUNCTIONS] = {
-    "camera.open",      "camera.next: gone",   "camera.next: bad frame",
-    "camera.next: end", "camera.next: none",   "camera.set_exposure",
-    "strobe.open",      "strobe.set on",       "strobe.set on, but high",
-    "strobe.set off",   "strobe.beat",         "strobe.interlock",
-    "events.wait",      "events.wait: unseen", "watchdog.feed",
-    "output.send: not", "output.send: never",
+    "camera.open",      "camera.next: gone", "camera.next: bad frame",
+    "camera.next: end", "camera.next: none", "camera.set_exposure",
+    "strobe.open",      "strobe.set on",     "strobe.set on, but high",
+    "strobe.set off",   "strobe.beat",       "strobe.interlock",
+    "strobe.judged",    "events.wait",       "events.wait: unseen",
+    "watchdog.feed",    "output.send: not",  "output.send: never",
 };
 
 /* What happens at a frame's time, in place of the frame or with it. */
@@ -85,8 +87,9 @@ struct world {
     const enum world_act *act; /* of each frame's time, from 0; then WORLD_STOP */
     int act_count;
     int flight;
-    bool is_empty;   /* nothing is within the laser's range */
-    int64_t busy_us; /* so long a lit frame is looked at */
+    bool is_empty;         /* nothing is within the laser's range */
+    int64_t busy_us;       /* so long a lit frame is looked at */
+    int32_t frame_time_us; /* what the camera says of it */
     struct world_fault faults[WORLD_FAULTS];
     uint32_t rig_random; /* the rig "now and then" is bad by chance, until this act */
     int rig_is_good_from_act;
@@ -107,12 +110,14 @@ struct world {
     unsigned events;
     /* What it saw. */
     int calls[WORLD_FUNCTIONS];
-    bool reported_fault; /* a message says that the line cannot be set */
+    bool reported_fault;                /* a message says that the line cannot be set */
+    char camera_text[APP_LOG_TEXT_MAX]; /* the last message about the camera */
     int64_t excess;      /* on beyond the duty, percent x us, in the worst time until now */
     int64_t on_since_us; /* of the line, without a frame */
     int64_t last_record_us;
     int record_count, lit_count, dark_count, error_count, ambient_count;
     int rise_count, beat_count;
+    int busy_on_count;             /* heads were looked for with the laser on */
     int32_t drift_rad_q30[3];      /* from one lit frame to the next */
     struct ih_alignment alignment; /* what the core says of every lit frame */
     int moved_count, lost_count;   /* warnings of the rig */
@@ -185,6 +190,7 @@ enum ih_err isohead_label(struct isohead *head, const struct ih_frame *frame,
     if (frame->width != head->rig.calibration.width) {
         return IH_ERR_SIZE;
     }
+    world.on_since_us = world.now_us;
     head->labels.labelled_count = *(const uint8_t *)frame->samples;
     head->dots.dot_count = head->labels.labelled_count;
     if (ambient != NULL) {
@@ -197,13 +203,8 @@ enum ih_err isohead_label(struct isohead *head, const struct ih_frame *frame,
 void isohead_find(struct isohead *head, int64_t time_us)
 {
     (void)time_us;
-    if (world.lit_count + world.dark_count == 0) {
-        world.now_us += world.busy_us; /* nobody knows yet how long it takes */
-        world.excess = 0;
-    } else {
-        world_pass(world.busy_us);
-    }
-    world.on_since_us = world.now_us;
+    world.busy_on_count += world.line;
+    world_pass(world.busy_us);
     head->result.entry_count = 0;
     head->result.head_count = 0;
     head->result.selected = IH_NONE;
@@ -279,7 +280,7 @@ static void world_look_waiting(void)
     TEST_ASSERT_TRUE_MESSAGE(world.camera_open, "on without a camera");
     TEST_ASSERT_TRUE_MESSAGE(world.interlock_closed, "on with the interlock open");
     TEST_ASSERT_TRUE_MESSAGE(world.now_us - world.on_since_us <= 3 * WORLD_FRAME_US,
-                             "on for more than 3 frame times without a frame");
+                             "on for more than 3 frame times without a frame that was judged");
 }
 
 /* True: this call is to fail. */
@@ -356,7 +357,6 @@ static enum hal_next world_camera_next(void *context, struct hal_frame *frame,
         held += world.held[i];
     }
     TEST_ASSERT_LESS_OR_EQUAL_INT(HAL_CAMERA_HOLD_MAX + 1, held);
-    world.on_since_us = world.now_us;
     return HAL_NEXT_FRAME;
 }
 
@@ -377,7 +377,7 @@ static bool world_camera_exposure(void *context, int32_t exposure_us, struct hal
 static int32_t world_camera_frame_time(void *context)
 {
     (void)context;
-    return WORLD_FRAME_US;
+    return world.frame_time_us;
 }
 
 static bool world_strobe_open(void *context, struct hal_error *error)
@@ -437,6 +437,12 @@ static bool world_strobe_interlock(void *context, bool *closed, struct hal_error
     *closed = world.interlock_closed && !world.interlock_moved;
     world.interlock_moved = false;
     return true;
+}
+
+static bool world_strobe_judged(void *context, struct hal_error *error)
+{
+    (void)context;
+    return world_call(WORLD_STROBE_JUDGED) ? hal_fail(error, "cannot be passed on") : true;
 }
 
 static void world_push(bool is_half)
@@ -609,6 +615,9 @@ static void world_write(void *context, int level, const char *text)
     (void)context;
     world.reported_fault |= strstr(text, "laser: cannot be set") != NULL;
     world.lost_count += strstr(text, "good: does not fit") != NULL;
+    if (strncmp(text, "made up: ", 9) == 0) {
+        snprintf(world.camera_text, sizeof world.camera_text, "%s", text);
+    }
     if (strstr(text, "the rig has moved") != NULL) {
         world.moved_count++;
         snprintf(world.moved, sizeof world.moved, "%s", text);
@@ -633,6 +642,8 @@ static void world_init(enum app_strobe strobe, const enum world_act *act, int ac
     world.config.laser = true;
     world.config.strobe = strobe;
     world.config.duty_percent = 100;
+    world.config.laser_cap_ms = WORLD_CAP_MS;
+    world.frame_time_us = WORLD_FRAME_US;
     world.config.exposure = APP_EXPOSURE_KEEP;
     app_log_init(&world.log, world_write, NULL, world.now_us);
     world.camera = (struct hal_camera){
@@ -649,6 +660,7 @@ static void world_init(enum app_strobe strobe, const enum world_act *act, int ac
         .set = world_strobe_set,
         .beat = world_strobe_beat,
         .interlock = world_strobe_interlock,
+        .judged = world_strobe_judged,
     };
     world.event_table = (struct hal_events){.wait = world_wait};
     world.clock = (struct hal_clock){.now_us = world_now};

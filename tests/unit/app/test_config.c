@@ -107,6 +107,7 @@ static void what_is_not_given_has_its_default(void)
     TEST_ASSERT_FALSE(config.laser_active_low);
     TEST_ASSERT_FALSE(config.interlock_active_low);
     TEST_ASSERT_EQUAL_INT32(100, config.duty_percent);
+    TEST_ASSERT_EQUAL_INT32(200, config.laser_cap_ms);
     TEST_ASSERT_EQUAL_INT(APP_OUTPUT_STDOUT, config.output);
     TEST_ASSERT_EQUAL_INT(APP_MESSAGES_STDERR, config.log);
     TEST_ASSERT_EQUAL_INT32(10, config.status_s);
@@ -252,6 +253,10 @@ static void numbers_have_bounds(void)
         {"--duty=101", false, 0},  {"--duty=50%", false, 0},  {"--duty=50.0", false, 0},
         {"--duty= 50", false, 0},  {"--duty=", false, 0},     {"--duty=4294967346", false, 0},
         {"--duty=fifty", false, 0}};
+    static const struct trial caps[] = {{"--laser-cap=10", true, 10},
+                                        {"--laser-cap=1000", true, 1000},
+                                        {"--laser-cap=9", false, 0},
+                                        {"--laser-cap=1001", false, 0}};
     static const struct trial intervals[] = {{"--status=0", true, 0},
                                              {"--status=86400", true, 86400},
                                              {"--status=86401", false, 0},
@@ -268,6 +273,11 @@ static void numbers_have_bounds(void)
                                   duties[i].option);
         TEST_ASSERT_EQUAL_INT32_MESSAGE(duties[i].good ? duties[i].value : 100, config.duty_percent,
                                         duties[i].option);
+    }
+    for (i = 0; i < IH_TEST_COUNT(caps); i++) {
+        TEST_ASSERT_EQUAL_MESSAGE(caps[i].good, READ("--rig=r", caps[i].option), caps[i].option);
+        TEST_ASSERT_EQUAL_INT32_MESSAGE(caps[i].good ? caps[i].value : 200, config.laser_cap_ms,
+                                        caps[i].option);
     }
     for (i = 0; i < IH_TEST_COUNT(intervals); i++) {
         TEST_ASSERT_EQUAL_MESSAGE(intervals[i].good, READ("--rig=r", intervals[i].option),

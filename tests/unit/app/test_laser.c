@@ -3,12 +3,14 @@
 #include "unity.h"
 
 #define FRAME_US 40000
+#define CAP_US 200000
 
 static struct {
     bool line, taken, closed;
     bool opens_after_read; /* the interlock opens right after it was read */
     int off_failures;      /* so many calls of set(false) fail */
-    bool on_fails;
+    bool on_fails, judged_fails;
+    int judged_count;
     int close_count, beat_count, call_count;
     bool beat_high;      /* the heartbeat's line, whatever it began with */
     bool rise_before_on; /* it has risen while the laser was off */
@@ -63,12 +65,19 @@ static bool fake_interlock(void *context, bool *closed, struct hal_error *error)
     return true;
 }
 
-static const struct hal_strobe strobe = {NULL,     fake_open, fake_close,
-                                         fake_set, fake_beat, fake_interlock};
+static bool fake_judged(void *context, struct hal_error *error)
+{
+    (void)context;
+    fake.judged_count++;
+    return fake.judged_fails ? hal_fail(error, "judged fails") : true;
+}
+
+static const struct hal_strobe strobe = {NULL,      fake_open,      fake_close, fake_set,
+                                         fake_beat, fake_interlock, fake_judged};
 
 static void start(bool enabled, int32_t duty_percent)
 {
-    const struct app_laser_config config = {enabled, duty_percent};
+    const struct app_laser_config config = {enabled, duty_percent, CAP_US};
     app_laser_init(&laser, &config, &strobe, 0);
     TEST_ASSERT_TRUE(app_laser_open(&laser));
     app_laser_rig(&laser, true, 0);
@@ -77,8 +86,9 @@ static void start(bool enabled, int32_t duty_percent)
 
 void setUp(void)
 {
-    fake.line = fake.taken = fake.opens_after_read = fake.on_fails = false;
+    fake.line = fake.taken = fake.opens_after_read = fake.on_fails = fake.judged_fails = false;
     fake.closed = true;
+    fake.judged_count = 0;
     fake.off_failures = fake.close_count = fake.beat_count = fake.call_count = 0;
 }
 
@@ -316,8 +326,8 @@ static void test_time_is_accounted_for(void)
     }
 }
 
-/* Nobody looks at the clock while a frame is processed. From the second one on it is known how long
- * that takes, and the duty is kept there, too. */
+/* Nobody looks at the clock while a frame is processed, and nobody knows how long the first one
+ * takes: the duty is kept there, too. */
 static void test_duty_while_busy(void)
 {
     static const int32_t duties[] = {1, 10, 50, 90, 99};
@@ -334,16 +344,16 @@ static void test_duty_while_busy(void)
                 int64_t left_us = FRAME_US - BUSY_US - passed_us;
                 wait_us = wait_us < left_us ? wait_us : left_us;
                 excess += wait_us * ((fake.line ? 100 : 0) - duties[d]);
-                excess = excess < 0 || frame == 0 ? 0 : excess;
+                excess = excess < 0 ? 0 : excess;
                 TEST_ASSERT_LESS_OR_EQUAL_INT64(max + 100, excess);
                 now_us += wait_us;
                 passed_us += wait_us;
             }
-            app_laser_frame(&laser, now_us);
             app_laser_busy(&laser, true, now_us);
+            app_laser_frame(&laser, now_us);
             busy_on_count += fake.line;
             excess += BUSY_US * ((fake.line ? 100 : 0) - duties[d]);
-            excess = excess < 0 || frame == 0 ? 0 : excess;
+            excess = excess < 0 ? 0 : excess;
             TEST_ASSERT_LESS_OR_EQUAL_INT64(max + 100, excess);
             now_us += BUSY_US;
             app_laser_busy(&laser, false, now_us);
@@ -354,20 +364,214 @@ static void test_duty_while_busy(void)
     }
 }
 
-/* The time that a frame takes is no silence, however long. */
-static void test_busy_is_no_silence(void)
+/* Half an hour of a random schedule: frames, wishes, stalls, an interlock, cameras that come and go. The
+ * guard's limits look every LOOK_US, also while the program stalls. Each rise and fall is noted, and
+ * judged afterwards without the sums of either. */
+enum { EDGES_MAX = 200000, LOOK_US = 20000 };
+
+static struct schedule {
+    uint32_t random;
+    int64_t now_us, next_look_us, on_us, judged_on_us;
+    int64_t silent_us, silent_max_us; /* on without a frame, and the longest such time */
+    bool was_on;
+    int cut_count, edge_count;
+    int64_t edge_us[EDGES_MAX]; /* rise, fall, rise, ... */
+    struct hal_limits limits;
+} schedule;
+
+/* 0 .. below - 1, the same in every run of the test. */
+static int64_t random_below(int64_t below)
+{
+    schedule.random = schedule.random * 1664525u + 1013904223u;
+    return (int64_t)((uint64_t)schedule.random * (uint64_t)below >> 32);
+}
+
+static void note_edge(void)
+{
+    if (fake.line != schedule.was_on) {
+        TEST_ASSERT_LESS_THAN_INT(EDGES_MAX, schedule.edge_count);
+        schedule.edge_us[schedule.edge_count++] = schedule.now_us;
+        schedule.was_on = fake.line;
+    }
+}
+
+static void note_judged(void)
+{
+    schedule.silent_us = 0;
+    schedule.judged_on_us = schedule.on_us;
+}
+
+/* Time passes, with the guard's looks in it. */
+static void pass(int64_t time_us)
+{
+    int64_t end_us = schedule.now_us + time_us;
+    note_edge();
+    while (schedule.now_us < end_us) {
+        int64_t to_us = schedule.next_look_us < end_us ? schedule.next_look_us : end_us;
+        int64_t step_us = to_us - schedule.now_us;
+        schedule.on_us += fake.line ? step_us : 0;
+        schedule.silent_us += fake.line ? step_us : 0;
+        if (schedule.silent_us > schedule.silent_max_us) {
+            schedule.silent_max_us = schedule.silent_us;
+        }
+        schedule.now_us = to_us;
+        if (to_us == schedule.next_look_us) {
+            schedule.next_look_us += LOOK_US;
+            bool allowed =
+                hal_limits_allow(&schedule.limits, to_us, schedule.on_us, schedule.judged_on_us);
+            schedule.cut_count += !allowed && fake.line;
+            fake.line = fake.line && allowed;
+            fake.closed = allowed; /* as hal_guard reports it */
+            note_edge();
+        }
+    }
+}
+
+/* One frame: waits with ticks, then the frame, with a stall at any place. */
+static void run_frame(bool stalls)
+{
+    int64_t wait_us = 1000 + random_below(random_below(8) == 0 ? 300000 : 60000);
+    int64_t end_us = schedule.now_us + wait_us;
+    while (schedule.now_us < end_us) {
+        int64_t tick_us = app_laser_tick(&laser, schedule.now_us);
+        TEST_ASSERT_GREATER_THAN_INT64(0, tick_us);
+        pass(tick_us < end_us - schedule.now_us ? tick_us : end_us - schedule.now_us);
+        if (stalls && random_below(2000) == 0) {
+            pass(random_below(3000000));
+        }
+    }
+    app_laser_tick(&laser, schedule.now_us);
+    app_laser_busy(&laser, true, schedule.now_us);
+    pass(random_below(10000));
+    if (random_below(8) != 0) {
+        note_judged();
+        app_laser_frame(&laser, schedule.now_us);
+    }
+    app_laser_wish(&laser, random_below(3) != 0, schedule.now_us);
+    pass(random_below(stalls && random_below(50) == 0 ? 2000000 : 60000));
+    app_laser_wish(&laser, random_below(4) != 0, schedule.now_us);
+    app_laser_busy(&laser, false, schedule.now_us);
+    if (random_below(100) == 0) {
+        app_laser_camera(&laser, false, 0, schedule.now_us);
+        pass(HAL_LIMITS_PAUSE_US + random_below(1000000));
+        schedule.silent_us = 0; /* after a rest it may be on once more */
+        app_laser_camera(&laser, true, 1 + random_below(INT32_MAX), schedule.now_us);
+    }
+}
+
+/* In any time from a rise to a fall, and so in any time: on for at most the duty and the burst, and
+ * extra_us more. */
+static void assert_duty(int32_t duty_percent, int64_t extra_us)
+{
+    int64_t worst_us = 0, min_before = 0, on_us = 0;
+    for (int i = 0; i + 1 < schedule.edge_count; i += 2) {
+        int64_t rise_us = schedule.edge_us[i], fall_us = schedule.edge_us[i + 1];
+        int64_t before = 100 * on_us - duty_percent * rise_us;
+        min_before = i == 0 || before < min_before ? before : min_before;
+        on_us += fall_us - rise_us;
+        int64_t excess = 100 * on_us - duty_percent * fall_us - min_before;
+        int64_t excess_us = (excess - duty_percent * (int64_t)APP_LASER_BURST_US) / 100;
+        worst_us = excess_us > worst_us ? excess_us : worst_us;
+    }
+    TEST_ASSERT_LESS_OR_EQUAL_INT64(extra_us, worst_us);
+}
+
+static void test_any_schedule(void)
+{
+    static const int32_t duties[] = {1, 5, 10, 30, 50, 80, 90, 99, 100};
+    for (int run = 0; run < 36; run++) {
+        int32_t duty = duties[run % 9];
+        bool stalls = run >= 9;
+        const struct hal_limits_config limits = {CAP_US, duty};
+        setUp();
+        schedule = (struct schedule){.random = (uint32_t)run, .next_look_us = LOOK_US};
+        hal_limits_init(&schedule.limits, &limits, 0);
+        start(true, duty);
+        app_laser_wish(&laser, true, 0);
+        while (schedule.now_us < 1800 * INT64_C(1000000)) {
+            run_frame(stalls);
+        }
+        app_laser_close(&laser, schedule.now_us);
+        note_edge();
+        /* Without stalls the program keeps them by itself; else the guard does, at its next look. */
+        int64_t late_us = HAL_LIMITS_SLACK_US + LOOK_US;
+        assert_duty(duty, stalls ? late_us : 100);
+        TEST_ASSERT_LESS_OR_EQUAL_INT64(CAP_US + (stalls ? late_us : 0), schedule.silent_max_us);
+        TEST_ASSERT_GREATER_THAN_INT64(0, laser.on_us);
+        TEST_ASSERT_TRUE(stalls ? schedule.cut_count > 0 : schedule.cut_count == 0);
+    }
+}
+
+/* What a camera says of its rate, 1000 s here, changes nothing: off at the cap. */
+static void test_the_cap_needs_no_frame_time(void)
+{
+    int64_t now_us = 0;
+    start(true, 100);
+    app_laser_camera(&laser, true, 1000000000, 0);
+    app_laser_wish(&laser, true, 0);
+    while (fake.line && now_us < 10 * CAP_US) {
+        int64_t wait_us = app_laser_tick(&laser, now_us);
+        now_us += fake.line ? wait_us : 0;
+    }
+    TEST_ASSERT_EQUAL_INT64(CAP_US, now_us);
+    /* A camera that is opened again at once has no more light; after a rest it has. */
+    app_laser_camera(&laser, false, 0, now_us);
+    app_laser_camera(&laser, true, 1000000000, now_us + HAL_LIMITS_PAUSE_US - 1);
+    TEST_ASSERT_FALSE(fake.line);
+    app_laser_camera(&laser, true, 1000000000, now_us + HAL_LIMITS_PAUSE_US);
+    TEST_ASSERT_TRUE(fake.line);
+}
+
+/* Only frames that were judged count, and each is passed on. */
+static void test_a_frame_that_is_not_judged_is_none(void)
 {
     start(true, 100);
     app_laser_wish(&laser, true, 0);
-    app_laser_busy(&laser, true, 1000);
-    TEST_ASSERT_TRUE(fake.line);
-    app_laser_busy(&laser, false, 10 * FRAME_US);
-    app_laser_tick(&laser, 10 * FRAME_US);
-    app_laser_busy(&laser, true, 10 * FRAME_US);
-    TEST_ASSERT_TRUE_MESSAGE(fake.line, "off though there is no limit");
-    app_laser_busy(&laser, false, 10 * FRAME_US);
-    app_laser_tick(&laser, 13 * FRAME_US);
+    for (int64_t now_us = 0; now_us < 3 * FRAME_US; now_us += 1000) {
+        app_laser_busy(&laser, true, now_us);
+        app_laser_busy(&laser, false, now_us + 500);
+        app_laser_tick(&laser, now_us + 500);
+    }
+    app_laser_tick(&laser, 3 * FRAME_US);
     TEST_ASSERT_FALSE(fake.line);
+    TEST_ASSERT_EQUAL_INT(0, fake.judged_count);
+    app_laser_frame(&laser, 3 * FRAME_US);
+    TEST_ASSERT_EQUAL_INT(1, fake.judged_count);
+    app_laser_tick(&laser, 3 * FRAME_US);
+    TEST_ASSERT_TRUE(fake.line);
+    fake.judged_fails = true;
+    app_laser_frame(&laser, 3 * FRAME_US);
+    TEST_ASSERT_FALSE(fake.line || fake.taken);
+    TEST_ASSERT_EQUAL_STRING("judged fails", laser.failed.text);
+}
+
+/* What a frame took so long it may take again: the laser goes off before where the cap would not last,
+ * and comes back for the wait. Before it is judged, and after. */
+static void test_the_cap_while_busy(void)
+{
+    static const int64_t takes_us[][2] = {{CAP_US + 1, 0}, {0, CAP_US + 1}, {CAP_US - 2000, 0}};
+    for (int i = 0; i < 3; i++) {
+        int64_t now_us = 0;
+        setUp();
+        start(true, 100);
+        app_laser_wish(&laser, true, 0);
+        for (int frame = 0; frame < 5; frame++) {
+            bool lasts = frame == 0 || i == 2;
+            bool is_used_up = i == 1 && frame == 1;
+            app_laser_tick(&laser, now_us);
+            TEST_ASSERT_EQUAL(!is_used_up, fake.line);
+            now_us += 1000;
+            app_laser_busy(&laser, true, now_us);
+            TEST_ASSERT_EQUAL(lasts || (i == 1 && !is_used_up), fake.line);
+            now_us += takes_us[i][0];
+            app_laser_frame(&laser, now_us);
+            TEST_ASSERT_EQUAL(lasts, fake.line);
+            app_laser_wish(&laser, true, now_us);
+            TEST_ASSERT_EQUAL(lasts || i == 0, fake.line);
+            now_us += takes_us[i][1];
+            app_laser_busy(&laser, false, now_us);
+        }
+    }
 }
 
 /* Whatever level the heartbeat's line has: a one-shot that has run out lets light through from now on. */
@@ -446,7 +650,10 @@ int main(void)
     RUN_TEST(test_duty_is_made_up_for_in_time);
     RUN_TEST(test_time_is_accounted_for);
     RUN_TEST(test_duty_while_busy);
-    RUN_TEST(test_busy_is_no_silence);
+    RUN_TEST(test_any_schedule);
+    RUN_TEST(test_the_cap_needs_no_frame_time);
+    RUN_TEST(test_a_frame_that_is_not_judged_is_none);
+    RUN_TEST(test_the_cap_while_busy);
     RUN_TEST(test_a_rising_edge_comes_before_the_light);
     RUN_TEST(test_beats_while_on);
     RUN_TEST(test_off_fails);

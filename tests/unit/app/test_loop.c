@@ -230,6 +230,44 @@ static void test_late(void)
     }
 }
 
+/* Another program has set a frame time of 1000 s, or the camera is too slow for the cap: a message,
+ * and no light. Without a laser a slow camera is none of its business. */
+static void test_a_rate_that_does_not_fit_is_refused(void)
+{
+    static const enum world_act acts[] = {TWENTY};
+    static const int32_t frame_times_us[] = {1000000000, INT32_MAX, 1000001, 999, 1, -1, 100001};
+    for (int i = 0; i < COUNT(frame_times_us); i++) {
+        world_init(APP_STROBE_ALWAYS, acts, COUNT(acts));
+        world.frame_time_us = frame_times_us[i];
+        TEST_ASSERT_EQUAL_INT(APP_EXIT_GOOD, world_run());
+        TEST_ASSERT_EQUAL_INT(0, world.rise_count);
+        TEST_ASSERT_EQUAL_INT(0, world.record_count);
+        TEST_ASSERT_GREATER_THAN_INT_MESSAGE(1, world.calls[WORLD_CAMERA_OPEN], "not tried again");
+        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(world.camera_text, "a frame every"), world.camera_text);
+    }
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(world.camera_text, "expected at most 100000 us, or "
+                                                           "laser-cap = 201"),
+                                 world.camera_text);
+    world_init(APP_STROBE_ALWAYS, acts, COUNT(acts));
+    world.frame_time_us = 1000000;
+    world.config.laser = false;
+    TEST_ASSERT_EQUAL_INT(APP_EXIT_GOOD, world_run());
+    TEST_ASSERT_EQUAL_INT(20, world.record_count);
+}
+
+/* Frames of a slow processor: each is judged, and the light goes off where it would not be in time. */
+static void test_frames_that_take_long(void)
+{
+    static const enum world_act acts[] = {TWENTY, TWENTY, TWENTY};
+    for (int mode = 0; mode < 3; mode++) {
+        world_init((enum app_strobe)mode, acts, COUNT(acts));
+        world.busy_us = 1500 * WORLD_CAP_MS;
+        TEST_ASSERT_EQUAL_INT(APP_EXIT_GOOD, world_run());
+        TEST_ASSERT_LESS_OR_EQUAL_INT_MESSAGE(1, world.busy_on_count, "the first one says it");
+        TEST_ASSERT_GREATER_THAN_INT(5, world.lit_count);
+    }
+}
+
 /* Frames stay away: the camera is opened anew. */
 static void test_silent(void)
 {
@@ -455,6 +493,7 @@ static bool is_fatal(enum world_function function)
     case WORLD_STROBE_ON_HIGH:
     case WORLD_STROBE_BEAT:
     case WORLD_STROBE_INTERLOCK:
+    case WORLD_STROBE_JUDGED:
     case WORLD_EVENTS_WAIT:
     case WORLD_WATCHDOG_FEED:
     case WORLD_OUTPUT_NEVER:
@@ -610,6 +649,8 @@ int main(void)
     RUN_TEST(test_always);
     RUN_TEST(test_lost_twice_half);
     RUN_TEST(test_late);
+    RUN_TEST(test_a_rate_that_does_not_fit_is_refused);
+    RUN_TEST(test_frames_that_take_long);
     RUN_TEST(test_silent);
     RUN_TEST(test_interlock);
     RUN_TEST(test_interlock_blinks);

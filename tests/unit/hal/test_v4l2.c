@@ -471,9 +471,14 @@ static void a_device_without_a_rate(void)
     start();
     TEST_ASSERT_EQUAL_INT32(0, v4l2.camera.frame_time_us(&v4l2));
     tearDown();
+    /* Not "does not say": the program has to refuse it. */
     fake.frame_time = (struct v4l2_fract){4000000000u, 1};
     start();
-    TEST_ASSERT_EQUAL_INT32(0, v4l2.camera.frame_time_us(&v4l2));
+    TEST_ASSERT_EQUAL_INT32(INT32_MAX, v4l2.camera.frame_time_us(&v4l2));
+    tearDown();
+    fake.frame_time = (struct v4l2_fract){1, 4000000000u};
+    start();
+    TEST_ASSERT_EQUAL_INT32(1, v4l2.camera.frame_time_us(&v4l2));
 }
 
 /* Exposure and gain. */
