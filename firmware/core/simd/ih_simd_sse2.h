@@ -193,9 +193,10 @@ static inline struct ih_wide ih_wide_in_order(struct ih_wide x)
 
 static inline int64_t ih_i64_total(ih_i64 a)
 {
+    const __m128i high = _mm_unpackhi_epi64((__m128i)a, (__m128i)a);
     int64_t lane[2];
-    ih_i64_store(lane, a);
-    return (int64_t)((uint64_t)lane[0] + (uint64_t)lane[1]);
+    ih_i64_store(lane, ih_i64_add(a, (ih_i64)high));
+    return lane[0];
 }
 
 /* Products without sign, and what they are too large by where b is negative: a times 2^32. */
