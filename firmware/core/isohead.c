@@ -72,43 +72,6 @@ void ih_params_paper(struct ih_params *params)
     ih_nests_params_paper(&params->nests);
 }
 
-enum ih_err isohead_init(struct isohead *head, const struct ih_calibration *calibration,
-                         int32_t *bad_slot)
-{
-    memset(head, 0, sizeof *head);
-    ih_params_default(&head->params);
-    ih_tracks_init(&head->tracks);
-    ih_result_clear(&head->result);
-    enum ih_err err = ih_rig_init(&head->rig, calibration, bad_slot);
-    if (err != IH_OK) {
-        memset(&head->rig, 0, sizeof head->rig); /* no frame has the size of this rig */
-    } else if (calibration->kind == IH_RIG_DOTS) {
-        ih_align_init(&head->align, &head->rig);
-    }
-    return err;
-}
-
-static enum ih_err check_frame(const struct ih_frame *frame, const struct ih_calibration *c)
-{
-    int32_t bytes = frame->bytes_per_sample;
-    if (bytes != 1 && bytes != 2) {
-        return IH_ERR_KIND;
-    }
-    if (c->kind == IH_RIG_RANGE && bytes != 2) {
-        return IH_ERR_KIND;
-    }
-    bool maximum_ok = c->kind == IH_RIG_RANGE ||
-                      (frame->maximum >= 1 && frame->maximum <= (bytes == 1 ? 255 : 65535));
-    bool aligned =
-        (uintptr_t)frame->samples % (uintptr_t)bytes == 0 && frame->stride_bytes % bytes == 0;
-    if (frame->samples == NULL || frame->width < 1 || frame->width != c->width ||
-        frame->height != c->height || frame->stride_bytes < frame->width * bytes || !aligned ||
-        !maximum_ok) {
-        return IH_ERR_SIZE;
-    }
-    return IH_OK;
-}
-
 /* The outputs of the stages after labels are those of an empty frame. */
 static void clear_found(struct isohead *head)
 {
@@ -133,6 +96,46 @@ static void clear_outputs(struct isohead *head)
         head->labels.dot_of_slot[slot] = IH_NONE;
     }
     clear_found(head);
+}
+
+enum ih_err isohead_init(struct isohead *head, const struct ih_calibration *calibration,
+                         int32_t *bad_slot)
+{
+    memset(head, 0, sizeof *head);
+    ih_params_default(&head->params);
+    ih_tracks_init(&head->tracks);
+    clear_outputs(head);
+    enum ih_err err = ih_rig_init(&head->rig, calibration, bad_slot);
+    if (err != IH_OK) {
+        memset(&head->rig, 0, sizeof head->rig); /* no frame has the size of this rig */
+    } else if (calibration->kind == IH_RIG_DOTS) {
+        ih_align_init(&head->align, &head->rig);
+    }
+    return err;
+}
+
+static enum ih_err check_frame(const struct ih_frame *frame, const struct ih_calibration *c)
+{
+    if (frame == NULL) {
+        return IH_ERR_SIZE;
+    }
+    int32_t bytes = frame->bytes_per_sample;
+    if (bytes != 1 && bytes != 2) {
+        return IH_ERR_KIND;
+    }
+    if (c->kind == IH_RIG_RANGE && bytes != 2) {
+        return IH_ERR_KIND;
+    }
+    bool maximum_ok = c->kind == IH_RIG_RANGE ||
+                      (frame->maximum >= 1 && frame->maximum <= (bytes == 1 ? 255 : 65535));
+    bool aligned =
+        (uintptr_t)frame->samples % (uintptr_t)bytes == 0 && frame->stride_bytes % bytes == 0;
+    if (frame->samples == NULL || frame->width < 1 || frame->width != c->width ||
+        frame->height != c->height || frame->stride_bytes < frame->width * bytes || !aligned ||
+        !maximum_ok) {
+        return IH_ERR_SIZE;
+    }
+    return IH_OK;
 }
 
 /* From points to hypotheses: the paper's method. */

@@ -12,6 +12,9 @@
  * structs are independent. It is aligned for vectors, to 32 bytes: allocate it on a heap with
  * aligned_alloc, as malloc aligns to less. C++ can include this header.
  *
+ * The calls may come in any order: memory of zeros and a refused rig take no frame. A frame that is
+ * NULL is malformed, no other pointer may be NULL; params stay within their headers' bounds.
+ *
  * Method: M. Clabian, H. Roetzer, H. Bischof, W. G. Kropatsch, "Head detection and localization
  * from sparse 3D data", DAGM 2002. Each stage's header names its section.
  */
@@ -123,7 +126,8 @@ enum ih_err isohead_frame(struct isohead *head, const struct ih_frame *frame,
  * when the frame was taken, and decides from head->labels whether it is used. isohead_label fills
  * head->dots and head->labels, leaves all other outputs empty and the tracks as they were; a range
  * rig is IH_ERR_KIND. It may be called again, with an ambient frame this time. isohead_find goes on
- * from there, once per frame that is used; without a dot rig it does nothing. */
+ * from there, once per frame that is used; without a dot rig it does nothing, and after isohead_init
+ * or a refused frame it finds what is in an empty one. */
 enum ih_err isohead_label(struct isohead *head, const struct ih_frame *frame,
                           const struct ih_frame *ambient) __attribute__((warn_unused_result));
 void isohead_find(struct isohead *head, int64_t time_us);

@@ -725,6 +725,23 @@ static void nothing_is_found_after_a_refusal(void)
     TEST_ASSERT_EQUAL_INT32(IH_NONE, head.result.selected);
 }
 
+/* Nor before the first frame, nor in memory of zeros. */
+static void nothing_is_found_before_a_frame(void)
+{
+    start(&head, 0);
+    isohead_find(&head, 0);
+    TEST_ASSERT_EQUAL_INT32(0, head.points.seen_count);
+    TEST_ASSERT_EQUAL_INT32(0, head.result.entry_count);
+    TEST_ASSERT_EQUAL_INT(IH_ERR_SIZE, isohead_frame(&head, NULL, NULL, 0));
+    isohead_find(&head, 40000);
+    check_empty("no frame");
+
+    memset(&head, 0, sizeof head);
+    isohead_find(&head, 0);
+    TEST_ASSERT_EQUAL_INT32(0, head.result.entry_count);
+    TEST_ASSERT_EQUAL_INT(IH_ERR_SIZE, isohead_label(&head, &frame, NULL));
+}
+
 /* Every parameter has a default: nothing of what was there before is left, and the method is ours. */
 static void defaults_fill_every_parameter(void)
 {
@@ -825,6 +842,7 @@ int main(void)
     RUN_TEST(noise_is_survived);
     RUN_TEST(a_bad_calibration_is_refused);
     RUN_TEST(nothing_is_found_after_a_refusal);
+    RUN_TEST(nothing_is_found_before_a_frame);
     RUN_TEST(defaults_fill_every_parameter);
     RUN_TEST(defaults_are_those_of_the_references);
     RUN_TEST(the_state_keeps_to_its_budget);
