@@ -27,6 +27,7 @@ struct health_text {
 void app_health_begin(struct app_state *state)
 {
     memset(&state->health, 0, sizeof state->health);
+    state->health.lit_us = app_state_now_us(state);
 }
 
 static struct health_text xyz_text(const int32_t angle_rad_q30[3])
@@ -179,10 +180,26 @@ void app_health_frame(struct app_state *state)
     struct app_health *health = &state->health;
     const struct ih_alignment *now = &state->head->align.now;
     follow(health, now);
+    health->lit_us = app_state_now_us(state);
     if (health->steady_count == APP_HEALTH_STEADY && !is_reported(health, now)) {
         report(state);
     }
     if (state->config->check && health->frame_count == APP_HEALTH_CHECKED) {
         check(state);
     }
+}
+
+void app_health_tick(struct app_state *state)
+{
+    const struct app_health *health = &state->health;
+    if (!state->config->check || state->is_over ||
+        app_state_now_us(state) - health->lit_us < APP_HEALTH_WAIT_US) {
+        return;
+    }
+    app_log_say(state->log, APP_LOG_ERROR,
+                "%s: cannot be determined: no lit frame for %d s, after %" PRId32 " of %d; is the "
+                "camera there, and the laser allowed?",
+                state->config->rig, APP_HEALTH_WAIT_US / 1000000, health->frame_count,
+                APP_HEALTH_CHECKED);
+    app_state_end(state, APP_EXIT_FAILED);
 }

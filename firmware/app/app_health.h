@@ -6,7 +6,8 @@
  *      leaves open in depth, and what to do. After a knock, other than with heat, the rotation is far from its mean over
  *      about 32 frames.
  *   2. With config->check the loop ends after APP_HEALTH_CHECKED lit frames and no records are written: a message
- *      says whether the rig fits and how well depth is known. The exit status is 0 if it fits as it is, else 1.
+ *      says whether the rig fits and how well depth is known. The exit status is 0 if it fits as it is, else 1: also
+ *      when no lit frame has come for APP_HEALTH_WAIT_US, as without a camera, and when it is ended before.
  *
  * A reloaded rig starts anew. With config->paper nothing is aligned, and nothing is reported.
  */
@@ -15,13 +16,17 @@
 
 #include "app_state.h"
 
-#define APP_HEALTH_STEADY 6   /* frames */
-#define APP_HEALTH_CHECKED 60 /* frames */
+#define APP_HEALTH_STEADY 6 /* frames */
+/* Longer than any camera takes to start, and to frames at 1 Hz of which every second is lit. */
+#define APP_HEALTH_WAIT_US 15000000
 
 /* The rig has just been made from its file. */
 void app_health_begin(struct app_state *state);
 
 /* A lit frame whose result is there and not yet in a record. */
 void app_health_frame(struct app_state *state);
+
+/* Whenever the loop wakes: --check does not wait for ever. */
+void app_health_tick(struct app_state *state);
 
 #endif

@@ -308,6 +308,7 @@ static void run_once(struct app_state *state)
         reload_rig(state);
     }
     run_camera(state, events);
+    app_health_tick(state);
     watch_laser(state);
     if (app_status_line(&state->status, app_state_now_us(state), line)) {
         app_log_report(state->log, APP_LOG_INFO, line);

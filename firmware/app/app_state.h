@@ -33,9 +33,11 @@ struct app_hal {
 };
 
 #define APP_HEALTH_MOVES 6
+#define APP_HEALTH_CHECKED 60 /* lit frames of --check */
 
 /* What the log knows of the rig; app_health.h. */
 struct app_health {
+    int64_t lit_us;       /* when the last lit frame came, or the rig was loaded */
     int32_t frame_count;  /* lit ones since the rig was loaded */
     int32_t steady_count; /* frames of this state, one after the other */
     enum ih_align_state last_state;
@@ -82,7 +84,8 @@ struct app_state {
 /* The clock of the board. */
 int64_t app_state_now_us(const struct app_state *state);
 
-/* Laser off, and the loop ends with this turn. */
+/* Laser off, and the loop ends with this turn. A --check that has no answer yet has failed, even if its end was
+ * requested. */
 void app_state_end(struct app_state *state, enum app_exit exit);
 
 #endif

@@ -117,11 +117,12 @@ struct world {
     int64_t last_record_us;
     int record_count, lit_count, dark_count, error_count, ambient_count;
     int rise_count, beat_count;
-    int busy_on_count;             /* heads were looked for with the laser on */
-    int32_t drift_rad_q30[3];      /* from one lit frame to the next */
-    struct ih_alignment alignment; /* what the core says of every lit frame */
-    int moved_count, lost_count;   /* warnings of the rig */
-    char moved[APP_LOG_TEXT_MAX];  /* the last one */
+    int busy_on_count;              /* heads were looked for with the laser on */
+    int32_t drift_rad_q30[3];       /* from one lit frame to the next */
+    struct ih_alignment alignment;  /* what the core says of every lit frame */
+    int moved_count, lost_count;    /* warnings of the rig */
+    char moved[APP_LOG_TEXT_MAX];   /* the last one */
+    char unknown[APP_LOG_TEXT_MAX]; /* why --check has no answer */
     size_t records_length;
     char records[131072];
     int waits;
@@ -621,6 +622,9 @@ static void world_write(void *context, int level, const char *text)
     if (strstr(text, "the rig has moved") != NULL) {
         world.moved_count++;
         snprintf(world.moved, sizeof world.moved, "%s", text);
+    }
+    if (strstr(text, "cannot be determined") != NULL) {
+        snprintf(world.unknown, sizeof world.unknown, "%s", text);
     }
     if (!world_quiet) {
         printf("%lld <%d> %s\n", (long long)world.now_us, level, text);

@@ -63,6 +63,35 @@ static void test_check_says_whether_the_rig_fits(void)
     }
 }
 
+/* Without a camera, or without light, there is no answer: status 1 in time, and not by being stopped. */
+static void test_check_does_not_wait_for_ever(void)
+{
+    static const enum world_act dark[1000] = {WORLD_INTERLOCK_OPENS};
+    const int64_t end_us = 1000000 + APP_HEALTH_WAIT_US;
+    for (int has_camera = 0; has_camera < 2; has_camera++) {
+        world_init(APP_STROBE_ALWAYS, dark, COUNT(dark));
+        world.config.check = true;
+        world.unplugged_until_us = has_camera != 0 ? 0 : INT64_MAX;
+        TEST_ASSERT_EQUAL_INT(APP_EXIT_FAILED, world_run());
+        TEST_ASSERT_EQUAL_INT(0, world.record_count);
+        TEST_ASSERT_GREATER_OR_EQUAL_INT64(end_us, world.now_us);
+        TEST_ASSERT_LESS_OR_EQUAL_INT64(end_us + APP_LOOP_RETRY_MAX_US, world.now_us);
+        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(world.unknown, "no lit frame"), world.unknown);
+    }
+}
+
+/* It has not found that the rig fits, though its end was requested. */
+static void test_check_that_is_stopped_has_failed(void)
+{
+    static const enum world_act acts[] = {TWENTY};
+    world_init(APP_STROBE_ALWAYS, acts, COUNT(acts));
+    world.config.check = true;
+    world.alignment.state = IH_ALIGN_FITS;
+    TEST_ASSERT_EQUAL_INT(APP_EXIT_FAILED, world_run());
+    TEST_ASSERT_EQUAL_INT(20, world.lit_count);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(world.unknown, "20 of 60"), world.unknown);
+}
+
 /* Without it the loop goes on, every record says so, and the log once, also after a reload. */
 static void test_a_lost_rig_is_reported(void)
 {
@@ -641,6 +670,8 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(test_gated_takes_every_frame);
     RUN_TEST(test_check_says_whether_the_rig_fits);
+    RUN_TEST(test_check_does_not_wait_for_ever);
+    RUN_TEST(test_check_that_is_stopped_has_failed);
     RUN_TEST(test_a_lost_rig_is_reported);
     RUN_TEST(test_a_rig_that_is_lost_for_moments_is_not_reported);
     RUN_TEST(test_a_rig_that_moved_is_reported);
