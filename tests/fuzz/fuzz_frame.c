@@ -267,7 +267,7 @@ static void start(struct canvas *canvas, struct fuzz_input *input)
         ih_params_paper(&core.params);
     }
     core.params.tracks.side =
-        (flags & 8) != 0 ? fuzz_within(input, IH_SIDE_MIDDLE, IH_SIDE_RIGHT) : IH_SIDE_MIDDLE;
+        (flags & 8) != 0 ? fuzz_within(input, IH_SIDE_NEAREST, IH_SIDE_RIGHT) : IH_SIDE_NEAREST;
     canvas->core = &core;
     canvas->twin = &twin;
     canvas->has_twin = (flags & 16) != 0;

@@ -142,7 +142,7 @@ static void start(struct image *image, struct fuzz_input *input)
         ih_params_paper(&core.params);
     }
     core.params.tracks.side =
-        (flags & 8) != 0 ? fuzz_within(input, IH_SIDE_MIDDLE, IH_SIDE_RIGHT) : IH_SIDE_MIDDLE;
+        (flags & 8) != 0 ? fuzz_within(input, IH_SIDE_NEAREST, IH_SIDE_RIGHT) : IH_SIDE_NEAREST;
     image->core = &core;
     image->twin = &twin;
     image->has_twin = (flags & 16) != 0;

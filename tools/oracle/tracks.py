@@ -18,10 +18,12 @@ START_SPEED = 300.0
 POSITION_MAX, SPEED_MAX = 500.0, 3000.0
 LOGIT_MAX, GATE_LOGIT, SURE_LOGIT, CHOICE_LOGIT = 6.0, 4.0, 2.0, 3.0
 UNSURE_FACTOR2 = 4.0
+FAST_LOGIT = 1024.0
 AXES_FRACTION = 0.25
 SLOW_S = 0.3
 SAME_MM = 80.0
 VIEW_RAYS_MIN = 4
+OWN_MM = np.array([150.0, 150, 450])
 
 
 class Params:
@@ -119,10 +121,16 @@ class Tracks:
     def merit(self, track, detection, gone):
         gate = Params.gate_mm + Params.gate_mm_per_s * (self.time_s - track.seen_s)
         away = np.linalg.norm(track.state[0] - detection.position)
-        if clear(away - gate, 0.5) or not clear(detection.logit - Params.keep, 0.002):
+        if not clear(detection.logit - Params.keep, 0.002):
             return None
         if gone and not clear(detection.logit - Params.accept, 0.002):
             return None
+        if clear(away - gate, 0.5):
+            if (not track.is_head or not clear(detection.logit - Params.accept, 0.002)
+                    or not self.is_own(track, detection.position)):
+                return None
+            apart = np.linalg.norm((track.state[0] - detection.position) / OWN_MM)
+            return detection.logit - FAST_LOGIT - GATE_LOGIT * apart**2
         return detection.logit - GATE_LOGIT * (away / gate)**2
 
     def associate(self, detections, gone):
@@ -136,10 +144,18 @@ class Tracks:
             if len(pairs) > 1:
                 clear(pairs[0][0] - pairs[1][0], 0.02)
             _, track, detection = pairs[0]
-            track.detection, detection.track, track.seen_s = detection, track.id, self.time_s
-            track.detections += 1
-            track.correct(detection)
-            track.remember(detection.logit)
+            self.give(track, detection)
+
+    @staticmethod
+    def is_own(track, position):
+        away = np.linalg.norm((track.state[0] - position) / OWN_MM)
+        return clear(1 - away, 0.02)
+
+    def give(self, track, detection):
+        track.detection, detection.track, track.seen_s = detection, track.id, self.time_s
+        track.detections += 1
+        track.correct(detection)
+        track.remember(detection.logit)
 
     def prune(self, gone, hidden):
         kept = []
@@ -150,7 +166,9 @@ class Tracks:
             if track.detection is not None:
                 ended = not clear(track.logit - Params.keep, 0.004)
             else:
-                ended = not track.is_head or clear(unseen - Params.carry_s, 1e-9) or is_gone
+                ended = (not track.is_head or clear(unseen - Params.carry_s, 1e-9) or is_gone
+                         or any([self.is_own(track, t.state[0]) for t in self.tracks
+                                 if t.detection is not None and t.is_head]))
             near = [clear(SAME_MM - np.linalg.norm(t.state[0] - track.state[0]), 0.5)
                     for t in kept]
             if ended or any(near):
@@ -180,15 +198,14 @@ class Tracks:
             track.judge()
             self.tracks.append(track)
 
-    def select(self, middle):
-        """The head nearest the middle of those not much less probable than the best."""
+    def select(self):
+        """The nearest head of those not much less probable than the best."""
         heads = sorted([t for t in self.tracks if t.is_head], key=lambda t: -t.logit)
         good = [t for t in heads if not clear(heads[0].logit - CHOICE_LOGIT - t.logit, 0.004)]
-        aside = sorted([(t.detection is None, abs(self.shown(t)[0] / self.shown(t)[2] - middle), t.id)
-                        for t in good])
-        if len(aside) > 1 and aside[0][0] == aside[1][0]:
-            clear(aside[0][1] - aside[1][1], 1e-4)
-        wanted = aside[0][2] if aside else 0
+        near = sorted([(t.detection is None, np.linalg.norm(self.shown(t)), t.id) for t in good])
+        if len(near) > 1 and near[0][0] == near[1][0]:
+            clear(near[0][1] - near[1][1], 0.1)
+        wanted = near[0][2] if near else 0
         if self.selected in [t.id for t in heads] and wanted != self.selected:
             self.rival_frames = self.rival_frames + 1 if wanted == self.rival else 1
             self.rival = wanted
@@ -202,7 +219,7 @@ class Tracks:
     def shown(track):
         return track.state[0] if track.detection is None else track.detection.position
 
-    def update(self, detections, views, middle):
+    def update(self, detections, views):
         gone, hidden = [], []
         for through, hit, front in views:
             rays = through + hit + front
@@ -212,7 +229,7 @@ class Tracks:
         self.associate(detections, gone)
         self.prune(gone, hidden)
         self.start(detections)
-        self.select(middle)
+        self.select()
 
 
 def detection(random, position, logit, noise=6.0):
@@ -251,6 +268,16 @@ def hands(random):
         yield 40000, [detection(random, position, random.normal(3, 0.5))] if seen else [], view
 
 
+def rush(random):
+    """Somebody comes at 2.6 m/s, stops, and goes aside; another head stays where it is."""
+    for k in range(40):
+        z = 1800 - (0 if k < 8 else min(100 * (k - 7), 1000))
+        position = (60 * max(k - 28, 0), -40, z)
+        both = [detection(random, position, random.normal(4, 0.5)),
+                detection(random, (-420, 0, 1200), random.normal(3, 0.5))]
+        yield 40000, both, FRONT
+
+
 def weak(random):
     """A detection that is never convincing, then one that is; then rejected ones inside the gate."""
     for k in range(40):
@@ -284,7 +311,7 @@ def slow(random):
         yield int(random.uniform(0.7e6, 1.9e6)), [detection(random, (20 * (k % 5), 0, 800), 3)], HIT
 
 
-SCENES = {"walk": walk, "crossing": crossing, "hands": hands, "weak": weak, "crowd": crowd,
+SCENES = {"walk": walk, "crossing": crossing, "hands": hands, "rush": rush, "weak": weak, "crowd": crowd,
           "slow": slow}
 
 
@@ -296,7 +323,7 @@ def play(scene, seed):
         time_us += step_us
         tracks.expect(time_us / 1e6)
         views = [view] * len(tracks.tracks)
-        tracks.update(detections, views, 0.0)
+        tracks.update(detections, views)
         after = [(t.id, t.is_head, t.detection is not None, *t.state[0], *t.state[1],
                   *t.semi, t.covariance[0, 0], t.covariance[0, 1], t.covariance[1, 1], t.logit)
                  for t in tracks.tracks]

@@ -11,11 +11,16 @@
 #define LOGIT_MAX_Q10 (6 << 10)
 /* A detection at the edge of the gate needs this much more than one at its centre. */
 #define GATE_LOGIT_Q10 (4 << 10)
+/* A detection beyond the gate is worse than all within one. */
+#define FAST_LOGIT_Q10 (1 << 20)
 /* The variance of a detection below SURE_LOGIT is UNSURE_FACTOR2 times as large. */
 #define SURE_LOGIT_Q10 (2 << 10)
 #define UNSURE_FACTOR2 4
 /* Two tracks nearer than this follow the same head. */
 #define SAME_MM 80
+/* Two heads within this ellipsoid are one person's: another one has no room there. */
+#define OWN_ASIDE_MM 150
+#define OWN_DEPTH_MM 450
 /* A head that fewer rays meet has left the pattern. */
 #define VIEW_RAYS_MIN 4
 #define DETECTION_COUNT_MAX 1000
@@ -42,7 +47,7 @@ void ih_tracks_params_default(struct ih_tracks_params *params)
         .measured_mm = 12,
         .acceleration_mm_s2 = 2500,
         .switch_frames = 3,
-        .side = IH_SIDE_MIDDLE,
+        .side = IH_SIDE_NEAREST,
     };
 }
 
@@ -127,6 +132,36 @@ struct ih_verdict ih_tracks_verdict(const struct ih_tracks *tracks,
     };
 }
 
+/* How far apart the heads of one person would be, as a part of the limits, squared; false: of two people. */
+static bool is_own(const int32_t *centre_mm_q8, const int32_t *other_mm_q8, int64_t *apart2_q16)
+{
+    static const int32_t limit_mm[3] = {OWN_ASIDE_MM, OWN_ASIDE_MM, OWN_DEPTH_MM};
+    *apart2_q16 = 0;
+    for (int axis = 0; axis < 3; axis++) {
+        const int64_t off_q8 = (int64_t)centre_mm_q8[axis] - other_mm_q8[axis];
+        if (ih_abs_s64(off_q8) >= limit_mm[axis] << 8) {
+            return false;
+        }
+        const int64_t part_q8 = ih_div_round(off_q8, limit_mm[axis]);
+        *apart2_q16 += part_q8 * part_q8;
+    }
+    return *apart2_q16 < 65536;
+}
+
+/* Beyond the gate: a head whose person moves fast, and a detection that is surely a head. */
+static bool fits_fast(const struct ih_tracks_params *params, const struct ih_track *track,
+                      const struct ih_detection *detection, int32_t *merit_q10)
+{
+    int64_t apart2_q16;
+    if (!track->is_head || detection->logit_q10 <= params->accept_logit_q10 ||
+        !is_own(track->filter.head.centre_mm_q8, detection->head.centre_mm_q8, &apart2_q16)) {
+        return false;
+    }
+    *merit_q10 = detection->logit_q10 - FAST_LOGIT_Q10 -
+                 (int32_t)ih_shift_round(apart2_q16 * GATE_LOGIT_Q10, 16);
+    return true;
+}
+
 /* How well a detection continues a track, as log-odds; false: not at all. */
 static bool fits(const struct ih_tracks *tracks, const struct ih_tracks_params *params,
                  const struct ih_track *track, const struct ih_detection *detection,
@@ -137,8 +172,11 @@ static bool fits(const struct ih_tracks *tracks, const struct ih_tracks_params *
     int64_t gate2_q16 = gate_mm * gate_mm * 65536;
     int64_t distance2 =
         ih_distance2_s32(track->filter.head.centre_mm_q8, detection->head.centre_mm_q8);
-    if (detection->logit_q10 < params->keep_logit_q10 || distance2 > gate2_q16) {
+    if (detection->logit_q10 < params->keep_logit_q10) {
         return false;
+    }
+    if (distance2 > gate2_q16) {
+        return fits_fast(params, track, detection, merit_q10);
     }
     /* Within the gate the quotient is at most GATE_LOGIT. */
     int64_t loss_q10 = ih_div_round((distance2 >> 10) * GATE_LOGIT_Q10, (gate2_q16 >> 10) + 1);
@@ -227,6 +265,20 @@ static bool best_pair(const struct ih_tracks *tracks, const struct ih_tracks_par
     return best != INT32_MIN;
 }
 
+/* Is the person whose head was expected here measured elsewhere? */
+static bool is_elsewhere(const struct ih_tracks *tracks, const struct ih_track *track)
+{
+    int64_t apart2_q16;
+    for (int32_t t = 0; t < tracks->track_count; t++) {
+        const struct ih_track *other = &tracks->track[t];
+        if (other->index != IH_NONE && other->is_head &&
+            is_own(track->filter.head.centre_mm_q8, other->filter.head.centre_mm_q8, &apart2_q16)) {
+            return true;
+        }
+    }
+    return false;
+}
+
 /* Could something in front of the head hide it, or was the frame lost? */
 static bool may_be_hidden(const struct ih_detections *detections, int32_t track,
                           const struct ih_tracks_params *params)
@@ -266,7 +318,7 @@ static void prune(struct ih_tracks *tracks, const struct ih_tracks_params *param
         }
         bool ended = seen ? track->mean_logit_q10 < params->keep_logit_q10
                           : !track->is_head || unseen_us > params->coast_us ||
-                                is_gone(detections, t, params);
+                                is_gone(detections, t, params) || is_elsewhere(tracks, track);
         if (ended || is_double(tracks, kept, track)) {
             continue;
         }
@@ -360,39 +412,25 @@ static void list_heads(struct ih_tracks *tracks)
     }
 }
 
-/* X of the middle dot's ray at a depth; for a range rig the optical axis. */
-static int64_t middle_x_mm_q8(const struct ih_rig *rig, int32_t depth_mm_q8)
+/* Of two heads the one with the smaller number is selected: squared distance from the camera, or slope in X. */
+static int64_t order_of(const struct ih_ellipsoid *head, int32_t side)
 {
-    const struct ih_calibration *c = &rig->calibration;
-    const int32_t *ray_q30 = c->ray_q30[IH_SLOTS / 2];
-    if (c->kind == IH_RIG_RANGE) {
-        return 0;
+    static const int32_t camera_mm_q8[3] = {0, 0, 0};
+    if (side == IH_SIDE_NEAREST) {
+        return ih_distance2_s32(head->centre_mm_q8, camera_mm_q8);
     }
-    int64_t along_q8 = depth_mm_q8 - ih_shift_round(c->origin_mm_q16[2], 8);
-    return ih_shift_round(c->origin_mm_q16[0], 8) + ih_div_round(along_q8 * ray_q30[0], ray_q30[2]);
+    const int32_t depth_q8 = ih_max_s32(head->centre_mm_q8[2], 1 << 8);
+    const int64_t slope_q28 = ih_div_round((int64_t)head->centre_mm_q8[0] * (1 << 28), depth_q8);
+    return side == IH_SIDE_RIGHT ? -slope_q28 : slope_q28;
 }
 
-/* Distance from the wanted side, as a slope; the smaller is the better. */
-static int64_t aside_q28(const struct ih_ellipsoid *head, const struct ih_rig *rig, int32_t side)
-{
-    int32_t depth_q8 = ih_max_s32(head->centre_mm_q8[2], 1 << 8);
-    int64_t x_q8 = head->centre_mm_q8[0];
-    if (side == IH_SIDE_MIDDLE) {
-        x_q8 = ih_abs_s64(x_q8 - middle_x_mm_q8(rig, depth_q8));
-    } else if (side == IH_SIDE_RIGHT) {
-        x_q8 = -x_q8;
-    }
-    return ih_div_round(x_q8 * (1 << 28), depth_q8);
-}
-
-/* A detected head is better than a predicted one; then the wanted side decides. */
+/* A detected head is better than a predicted one; then the nearer one, or the wanted side. */
 static int32_t choose(const struct ih_tracks *tracks, const struct ih_tracks_params *params,
-                      const struct ih_rig *rig, const struct ih_detections *detections,
-                      const struct ih_predicted *predicted)
+                      const struct ih_detections *detections, const struct ih_predicted *predicted)
 {
     int32_t chosen = IH_NONE;
     bool is_chosen_predicted = false;
-    int64_t chosen_q28 = 0;
+    int64_t chosen_order = 0;
     for (int32_t i = 0; i < tracks->head_count; i++) {
         const int32_t index = tracks->head[i];
         const int32_t best_q10 = track_of(tracks, tracks->head[0])->mean_logit_q10;
@@ -401,12 +439,12 @@ static int32_t choose(const struct ih_tracks *tracks, const struct ih_tracks_par
         }
         const bool is_predicted = index >= detections->detection_count;
         const struct ih_detection *head = ih_tracks_head(detections, predicted, index);
-        const int64_t own_q28 = aside_q28(&head->head, rig, params->side);
+        const int64_t order = order_of(&head->head, params->side);
         if (chosen == IH_NONE || (is_chosen_predicted && !is_predicted) ||
-            (is_chosen_predicted == is_predicted && own_q28 < chosen_q28)) {
+            (is_chosen_predicted == is_predicted && order < chosen_order)) {
             chosen = index;
             is_chosen_predicted = is_predicted;
-            chosen_q28 = own_q28;
+            chosen_order = order;
         }
     }
     return chosen;
@@ -455,5 +493,5 @@ void ih_tracks_update(struct ih_tracks *tracks, const struct ih_tracks_params *p
         }
     }
     list_heads(tracks);
-    select_head(tracks, params, choose(tracks, params, rig, detections, predicted));
+    select_head(tracks, params, choose(tracks, params, detections, predicted));
 }

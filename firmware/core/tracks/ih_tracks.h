@@ -8,19 +8,22 @@
  * Method: each track has a Kalman filter (ih_kalman). ih_tracks_expect moves the tracks to the
  *        frame's time and says where heads are expected; ih_tracks_update then
  *        1. assigns detections to tracks, the best pair first: within the gate and above keep_logit.
+ *           What is left goes to heads beyond their gate: detections above accept_logit within an
+ *           ellipsoid of 150 mm aside and 450 mm in depth, which has no room for a second person.
  *        2. ends a track without a convincing detection when more than through_percent of the rays
  *           through its head go on and fewer than front_percent are stopped before it, as over an empty
  *           seat, or when fewer than 4 rays meet it: it has left the pattern. A frame with fewer than
- *           seen_min points is lost and shows neither.
+ *           seen_min points is lost and shows neither. It ends, too, when a measured head is in that
+ *           ellipsoid around it: nobody has two.
  *        3. lets the other tracks coast, slowing down, for at most coast_us. Where nothing hides the
  *           head and the frame is not lost, that counts as a detection with log-odds keep_logit. A
  *           track that is no head yet ends with the first frame without a detection, and so does the
  *           younger of two tracks within 80 mm.
  *        4. starts tracks with the remaining detections above start_logit, while there is room.
  *        A track's log-odds are a running mean of its detections'.
- *        The selected head is the one nearest the middle of the pattern (or the leftmost or
- *        rightmost in the picture, by side) of those not much less probable than the best, a detected
- *        one before a predicted one; another one replaces it after switch_frames frames.
+ *        The selected head is the one nearest to the camera (or the leftmost or rightmost in the
+ *        picture, by side) of those not much less probable than the best, a detected one before a
+ *        predicted one; another one replaces it after switch_frames frames.
  * Time:  frames may come late, be lost, or jump: a step back, or forward by more than gap_us,
  *        removes all tracks; ids go on, after the largest from 1 again.
  * Overflow: centres are below 2^27 in Q8, squared distances below 2^57.6.
@@ -39,7 +42,7 @@
 
 #define IH_TRACKS_MAX IH_DETECTIONS_EXPECTED_MAX
 
-enum ih_side { IH_SIDE_MIDDLE, IH_SIDE_LEFT, IH_SIDE_RIGHT };
+enum ih_side { IH_SIDE_NEAREST, IH_SIDE_LEFT, IH_SIDE_RIGHT };
 
 struct ih_tracks_params {
     int32_t gate_mm, gate_mm_per_s;          /* a gate's radius after a detection, and its growth */

@@ -85,7 +85,7 @@ void setUp(void)
     params.measured_mm = 12;
     params.acceleration_mm_s2 = 2500;
     params.switch_frames = 3;
-    params.side = IH_SIDE_MIDDLE;
+    params.side = IH_SIDE_NEAREST;
     view = hit;
     time_us = 1000000;
 }
@@ -301,7 +301,6 @@ static void sequences_match_float64(void)
 
     for (i = 0; i < IH_TEST_COUNT(vector_sequences); i++) {
         setUp();
-        rig.calibration.kind = IH_RIG_RANGE; /* the middle is 0 */
         play(&vector_sequences[i]);
     }
 }
@@ -994,22 +993,6 @@ static void uncertainty_has_its_limits(void)
     IH_TEST_EQUAL(500 << 8, verdict(tracks.track[0].index).sigma_mm_q8, "sigma", 0);
 }
 
-/* For a range camera the middle of two heads is the optical axis itself, to the last unit. */
-static void the_middle_of_a_range_camera_is_its_axis(void)
-{
-    int off;
-
-    rig.calibration.kind = IH_RIG_RANGE;
-    for (off = -1; off <= 1; off++) {
-        ih_tracks_init(&tracks);
-        add(-200 + off / 256.0, 0, 800, 5);
-        add(200, 0, 800, 5);
-        frame();
-        /* the first of equals */
-        IH_TEST_EQUAL(off < 0, tracks.selected, "selected", off);
-    }
-}
-
 /* --- time ----------------------------------------------------------------------------------------
  */
 
@@ -1110,7 +1093,7 @@ static int32_t selected_of_three(int32_t side)
 
 static void the_head_is_chosen_by_side(void)
 {
-    TEST_ASSERT_EQUAL_INT32(2, selected_of_three(IH_SIDE_MIDDLE));
+    TEST_ASSERT_EQUAL_INT32(1, selected_of_three(IH_SIDE_NEAREST));
     TEST_ASSERT_EQUAL_INT32(1, selected_of_three(IH_SIDE_LEFT));
     TEST_ASSERT_EQUAL_INT32(3, selected_of_three(IH_SIDE_RIGHT));
 }
@@ -1125,42 +1108,70 @@ static void sides_are_those_of_the_picture(void)
     TEST_ASSERT_EQUAL_INT32(2, tracks.selected_id);
 }
 
-static void the_middle_is_the_patterns(void)
+/* From the camera, not along its axis; of equals the first. */
+static void the_nearest_head_is_selected(void)
 {
-    const double middle = rig.field.centre_x_q28 / 268435456.0 * 900;
-
-    add(middle + 90, 0, 900, 3);
-    add(middle - 60, 0, 900, 3);
+    add(300, 0, 700, 3);
+    add(0, -60, 730, 3);
     frame();
     TEST_ASSERT_EQUAL_INT32(2, tracks.selected_id);
     setUp();
-    rig.calibration.kind = IH_RIG_RANGE; /* has no pattern: the picture's */
-    add(40, 0, 900, 3);
-    add(-60, 0, 900, 3);
+    add(200, 0, 800, 3);
+    add(-200, 0, 800, 3);
     frame();
     TEST_ASSERT_EQUAL_INT32(1, tracks.selected_id);
 }
 
-/* The middle dot's ray from a projector that is not beside the camera: at 900 mm it has gone
- * 900 + 200 mm ahead from (50, 20, -200), at 3 in 4 aside. */
-static void the_middle_is_on_the_projectors_ray(void)
-{
-    const double middle = 50 + 1100 * 0.75;
-    int side;
+/* --- somebody fast -------------------------------------------------------------------------------
+ */
 
-    for (side = -1; side <= 1; side += 2) {
-        setUp();
-        rig.calibration.origin_mm_q16[0] = 50 << 16;
-        rig.calibration.origin_mm_q16[1] = 20 << 16;
-        rig.calibration.origin_mm_q16[2] = -(200 << 16);
-        rig.calibration.ray_q30[IH_SLOTS / 2][0] = (1 << 30) / 10 * 6;
-        rig.calibration.ray_q30[IH_SLOTS / 2][1] = 0;
-        rig.calibration.ray_q30[IH_SLOTS / 2][2] = (1 << 30) / 10 * 8;
-        add(middle + side * 101, 0, 900, 3);
-        add(middle - side * 99, 0, 900, 3);
-        frame();
-        IH_TEST_EQUAL(2, tracks.selected_id, "nearer", side);
+/* The second of two frames, with a head that has jumped. */
+static void jump_by(double x, double y, double z, double logit)
+{
+    setUp();
+    view = front;
+    frames_with(3, 0, 0, 1000, 3);
+    add(x, y, 1000 + z, logit);
+    frame();
+}
+
+static void a_head_that_jumps_stays_the_same_within_its_limits(void)
+{
+    static const struct {
+        double x, y, z, logit;
+        int32_t id;
+    } jumps[] = {
+        {0, 0, -449, 3, 1},   {0, 0, -451, 3, 2},  {0, 0, 449, 3, 1},   {149, 0, 0, 3, 1},
+        {151, 0, 0, 3, 2},    {0, -149, 0, 3, 1},  {0, -151, 0, 3, 2},  {105, 105, 0, 3, 1},
+        {107, 107, 0, 3, 2},  {0, 105, 316, 3, 1}, {0, 107, 320, 3, 2}, {0, 0, -400, 0.51, 1},
+        {0, 0, -400, 0.5, 2},
+    };
+    for (int i = 0; i < IH_TEST_COUNT(jumps); i++) {
+        jump_by(jumps[i].x, jumps[i].y, jumps[i].z, jumps[i].logit);
+        IH_TEST_EQUAL(jumps[i].id, verdict(0).track_id, "track", i);
     }
+}
+
+/* What hides a predicted head is the person's own one, measured. */
+static void a_prediction_ends_beside_a_measured_head_of_its_person(void)
+{
+    view = front;
+    frames_with(3, 0, 0, 1400, 3);
+    for (int i = 0; i < 3; i++) {
+        add(0, 0, 940, 3); /* too far for the same track, then it stays before it */
+        frame();
+    }
+    IH_TEST_EQUAL(2, tracks.track_count, "tracks, the first one hidden", 0);
+    add(0, 0, 1010, 3);
+    frame();
+    IH_TEST_EQUAL(1, tracks.track_count, "tracks, the first one ended", 0);
+    IH_TEST_EQUAL(2, tracks.selected_id, "selected", 0);
+    setUp();
+    view = front;
+    frames_with(3, 0, 0, 1400, 3);
+    add(200, 0, 1300, 3); /* somebody beside */
+    frame();
+    IH_TEST_EQUAL(2, tracks.track_count, "tracks of two people", 0);
 }
 
 static void a_doubtful_head_is_not_chosen_for_its_position(void)
@@ -1365,7 +1376,6 @@ int main(void)
     RUN_TEST(a_head_is_chosen_for_its_position_within_three);
     RUN_TEST(detections_of_a_track_are_counted);
     RUN_TEST(uncertainty_has_its_limits);
-    RUN_TEST(the_middle_of_a_range_camera_is_its_axis);
     RUN_TEST(the_gate_grows_while_coasting);
     RUN_TEST(sigma_grows_while_coasting_and_shrinks_when_seen);
     RUN_TEST(the_same_time_again_is_another_look);
@@ -1375,8 +1385,9 @@ int main(void)
     RUN_TEST(frames_may_come_at_the_end_of_time);
     RUN_TEST(the_head_is_chosen_by_side);
     RUN_TEST(sides_are_those_of_the_picture);
-    RUN_TEST(the_middle_is_the_patterns);
-    RUN_TEST(the_middle_is_on_the_projectors_ray);
+    RUN_TEST(the_nearest_head_is_selected);
+    RUN_TEST(a_head_that_jumps_stays_the_same_within_its_limits);
+    RUN_TEST(a_prediction_ends_beside_a_measured_head_of_its_person);
     RUN_TEST(a_doubtful_head_is_not_chosen_for_its_position);
     RUN_TEST(the_selected_head_changes_slowly);
     RUN_TEST(extreme_positions_do_not_overflow);
