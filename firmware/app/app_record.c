@@ -41,6 +41,11 @@ static void write_hypothesis(struct app_write *write, const struct ih_result_ent
         app_write_decimal(write,
                           app_text_fixed(hypothesis->probability_q16, 16, PROBABILITY_DECIMALS));
     }
+    if (hypothesis->has_probability && !hypothesis->is_predicted) {
+        app_write_key(write, "frame_score");
+        app_write_decimal(
+            write, app_text_fixed(hypothesis->frame_probability_q16, 16, PROBABILITY_DECIMALS));
+    }
     if (hypothesis->track_id != 0) {
         app_write_int_field(write, "track", hypothesis->track_id);
         app_write_key(write, "sigma_mm");

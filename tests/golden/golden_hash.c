@@ -250,6 +250,7 @@ static uint64_t hash_result(const struct isohead *head)
         hash = golden_add_word(hash, entry->rejected);
         hash = golden_add_word(hash, entry->has_probability);
         hash = golden_add_word(hash, entry->probability_q16);
+        hash = golden_add_word(hash, entry->frame_probability_q16);
         hash = golden_add_word(hash, entry->track_id);
         hash = golden_add_word(hash, entry->sigma_mm_q8);
         hash = golden_add_word(hash, entry->is_predicted);

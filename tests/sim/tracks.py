@@ -14,7 +14,7 @@ import subprocess
 import sys
 import tempfile
 
-ADDED = {"score", "track", "sigma_mm", "predicted"}
+ADDED = {"score", "frame_score", "track", "sigma_mm", "predicted"}
 PERSON_FRAMES = 26
 LOST = range(12, 15)
 NEAR_MM = 100
@@ -105,6 +105,10 @@ def check_fields(test, records):
     for record in records:
         for index, h in enumerate(record["hypotheses"]):
             tracked = "track" in h
+            if ("frame_score" in h) == ("predicted" in h) or not 0 <= h.get("frame_score", 0) <= 1:
+                bad.append((record["file"], index, h))
+            if not tracked and h.get("frame_score") != h["score"]:
+                bad.append((record["file"], index, h))
             if not (0 <= h["score"] <= 1 and tracked == ("sigma_mm" in h)
                     and h.get("predicted", True) is True and (tracked or "predicted" not in h)
                     and (h["rejected"] is None) == (index in record["heads"])

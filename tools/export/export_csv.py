@@ -12,7 +12,7 @@ import csv
 COLUMNS = (
     "dir", "file", "time_us", "dots", "labelled", "points", "error", "hypothesis", "pixel_u_px", "pixel_v_px",
     "axis_a_px", "axis_b_px", "angle_deg", "distance_mm", "centre_x_mm", "centre_y_mm", "centre_z_mm",
-    "rejected", "score", "track", "sigma_mm", "predicted", "head_rank", "selected", "dropped", "lost",
+    "rejected", "score", "frame_score", "track", "sigma_mm", "predicted", "head_rank", "selected", "dropped", "lost",
     "skipped", "strobe", "across_px", "rig", "rig_rotation_x_deg", "rig_rotation_y_deg", "rig_rotation_z_deg",
     "rig_focal_percent", "rig_shift_u_px", "rig_shift_v_px", "rig_depth_known",
 )
@@ -56,7 +56,8 @@ def frame_fields(record):
 
 def hypothesis_fields(record, index):
     h = record.hypotheses[index]
-    fields = {key: h.get(key) for key in ("angle_deg", "distance_mm", "rejected", "score", "track", "sigma_mm")}
+    plain = ("angle_deg", "distance_mm", "rejected", "score", "frame_score", "track", "sigma_mm")
+    fields = {key: h.get(key) for key in plain}
     fields["hypothesis"] = index
     fields["pixel_u_px"], fields["pixel_v_px"] = h["pixel"]
     fields["axis_a_px"], fields["axis_b_px"] = h["axes_px"]

@@ -118,6 +118,7 @@ HYPOTHESIS = (
 )
 HYPOTHESIS_ADDED = (
     ("score", is_number, "a number"),
+    ("frame_score", is_number, "a number"),
     ("track", is_index, "a whole number"),
     ("sigma_mm", is_number, "a number"),
     ("predicted", is_bool, "true or false"),

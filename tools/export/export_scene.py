@@ -223,8 +223,8 @@ def surface(trace, rig, time):
 
 def facts(record, index):
     h = record.hypotheses[index]
-    pairs = [(key, h[key]) for key in ("distance_mm", "score", "track", "sigma_mm", "predicted", "rejected")
-             if h.get(key) is not None]
+    keys = ("distance_mm", "score", "frame_score", "track", "sigma_mm", "predicted", "rejected")
+    pairs = [(key, h[key]) for key in keys if h.get(key) is not None]
     if index == record.head:
         pairs.append(("selected", True))
     return [KeyValuePair(key=key, value=str(value).lower()) for key, value in pairs]

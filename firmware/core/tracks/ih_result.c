@@ -54,6 +54,7 @@ void ih_result_from_tracks(const struct ih_detections *detections, const struct 
             .rejected = verdict.is_head ? IH_ACCEPTED : IH_REJECT_SCORE,
             .has_probability = true,
             .probability_q16 = verdict.probability_q16,
+            .frame_probability_q16 = d->probability_q16,
             .track_id = verdict.track_id,
             .sigma_mm_q8 = verdict.sigma_mm_q8,
             .is_predicted = i >= detections->detection_count,

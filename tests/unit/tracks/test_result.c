@@ -162,6 +162,7 @@ static void full_tables_come_through(void)
             IH_TEST_EQUAL(700 + i, entry->centre_mm_q8[1], "y", i);
             IH_TEST_EQUAL(1, entry->has_probability, "has probability", i);
             IH_TEST_EQUAL(is_predicted, entry->is_predicted, "predicted", i);
+            IH_TEST_EQUAL(1000 + i, entry->frame_probability_q16, "by its frame", i);
             expect_verdict(entry, i, is_predicted ? i - IH_DETECTIONS_MAX : of_detection);
         }
         TEST_ASSERT_EQUAL_INT32(2, result.head_count);
