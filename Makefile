@@ -22,13 +22,15 @@ VIEW := $(BUILD)/view/tools/view/view
 
 # The frames directory that make export takes.
 FRAMES ?= frames/sequence2
+# Runs of make kills; make test takes 60.
+KILLS ?= 5000
 # Frames of make longrun; make test takes a few hundred.
 LONGRUN_FRAMES ?= 100000
 # What the board's program is built for: arm64, armhf or host.
 ARCH ?= arm64
 
 .DEFAULT_GOAL := help
-.PHONY: help sim frames sanitize test check unit fuzz coverage ranges exhaustive mutation accept eval misaligned \
+.PHONY: help sim frames sanitize test check unit kills fuzz coverage ranges exhaustive mutation accept eval misaligned \
   bench bench-instructions bench-peers bench-grow bench-worst test-bench bits cortexm longrun size vectors learn view figures \
   test-view test-report live-pictures export board board-gpiod2 deb image flash calibrate test-calibration \
   test-calibration-short test-deb test-board test-image format formatted words layout links lint clean
@@ -86,6 +88,10 @@ live-pictures: sanitize ## the live view's page in a browser: docs/live.png and 
 	@cmake --build --preset sanitize --parallel 2 --target live_loop isohead_live
 	@/usr/bin/python3 -B tests/board/live_page.py $(BUILD)/sanitize/tests/live_loop \
 	  $(BUILD)/sanitize/firmware/lib/isohead/isohead_live frames/sequence2 docs
+
+kills: sanitize ## program and guards killed and stopped at random, KILLS times (5000): how long the laser stays on
+	@cmake --build --preset sanitize --parallel 2 --target kills
+	@$(BUILD)/sanitize/tests/kills $(KILLS)
 
 coverage: sim ## the core's lines and branches that its own tests run, against the limits
 	@tools/setup.sh coverage

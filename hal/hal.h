@@ -89,6 +89,8 @@ struct hal_strobe {
     bool (*interlock)(void *context, bool *closed, struct hal_error *error);
     /* A frame was taken and judged: whoever limits the time without one starts anew. */
     bool (*judged)(void *context, struct hal_error *error);
+    /* What the laser's line reads, whatever it was set to. False: *error, it cannot be read. */
+    bool (*level)(void *context, bool *on, struct hal_error *error);
 };
 
 /* What can be waited for; a set. */

@@ -66,6 +66,9 @@ static void init_gpio(struct app_board *board, const struct app_config *config, 
         .line_fd = &board->gpio.laser_fd,
         .timeout_ms = HAL_GUARD_TIMEOUT_MS,
         .interlock_fd = &board->gpio.interlock_fd,
+        .limits = {.cap_us = (int64_t)config->laser_cap_ms * 1000,
+                   .duty_percent = config->duty_percent},
+        .line_name = board->gpio.line_name,
     };
     hal_guard_init(&board->guard, &guard);
 }
@@ -200,9 +203,32 @@ enum app_exit app_board_run(struct app_board *board, const struct app_config *co
     return exit;
 }
 
-enum app_exit app_board_laser_off(struct app_board *board, const struct app_config *config)
+/* Take the line, which makes it low, from whoever of ours has it. */
+static bool take_line(struct app_board *board, struct hal_error *error)
 {
     const struct timespec pause = {.tv_nsec = APP_BOARD_OFF_PAUSE_MS * 1000000L};
+    const struct hal_strobe *strobe = &board->gpio.strobe;
+    for (int i = 0; i < APP_BOARD_OFF_TRIES; i++) {
+        if (strobe->open(strobe->context, error)) {
+            return true;
+        }
+        if (i >= APP_BOARD_OFF_PATIENCE && board->gpio.line_name[0] != 0) {
+            int ended_count = hal_guard_end(board->gpio.line_name, error);
+            if (ended_count < 0) {
+                return false;
+            }
+            if (ended_count > 0) {
+                app_log_say(&board->log, APP_LOG_WARNING,
+                            "laser: %d processes that held its line were ended", ended_count);
+            }
+        }
+        nanosleep(&pause, NULL);
+    }
+    return false;
+}
+
+enum app_exit app_board_laser_off(struct app_board *board, const struct app_config *config)
+{
     const struct hal_strobe *strobe = &board->gpio.strobe;
     struct hal_error error = {
         "gpio-chip and laser-line: missing or in doubt, so that nothing was switched off"};
@@ -214,14 +240,7 @@ enum app_exit app_board_laser_off(struct app_board *board, const struct app_conf
     open_log(board, config);
     if (config->gpio_chip != NULL && config->laser_line != NULL) {
         init_gpio(board, config, true);
-        exit = APP_EXIT_FAILED;
-        for (int i = 0; i < APP_BOARD_OFF_TRIES && exit != APP_EXIT_GOOD; i++) {
-            if (strobe->open(strobe->context, &error)) {
-                exit = APP_EXIT_GOOD;
-            } else {
-                nanosleep(&pause, NULL);
-            }
-        }
+        exit = take_line(board, &error) ? APP_EXIT_GOOD : APP_EXIT_FAILED;
         strobe->close(strobe->context);
     }
     if (exit != APP_EXIT_GOOD) {

@@ -15,6 +15,7 @@
 #include "linux/hal_events.h"
 #include "linux/hal_gpio.h"
 #include "linux/hal_guard.h"
+#include "linux/hal_guard_end.h"
 #include "linux/hal_log.h"
 #include "linux/hal_output.h"
 #include "linux/hal_signals.h"
@@ -22,9 +23,11 @@
 #include "linux/hal_viewer.h"
 #include "linux/hal_watchdog.h"
 
-/* How long --laser-off waits for a line that a dying program's guard still holds. */
+/* How long --laser-off tries to take a line that others of ours still hold, ... */
 #define APP_BOARD_OFF_TRIES 100
 #define APP_BOARD_OFF_PAUSE_MS 20
+/* ... and when it begins to end them: a dying program's guards need no more. */
+#define APP_BOARD_OFF_PATIENCE 5
 
 struct app_board {
     struct hal_log_writer writer;
@@ -44,7 +47,8 @@ struct app_board {
 /* Frames in, records out, until requested to end. */
 enum app_exit app_board_run(struct app_board *board, const struct app_config *config);
 
-/* Only make the laser's line low and give it back. Without chip and line that is wrong usage; but good
+/* Only make the laser's line low and give it back. Whoever of ours holds the line is ended for it, the
+ * program that uses it and guards that stand still; others are not. Without chip and line that is wrong usage; but good
  * where a configuration file was read that has none and no laser. */
 enum app_exit app_board_laser_off(struct app_board *board, const struct app_config *config);
 

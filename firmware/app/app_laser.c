@@ -322,7 +322,7 @@ const char *app_laser_block_text(unsigned blocks)
         const char *text;
     } texts[] = {
         {APP_LASER_BLOCK_DISABLED, "not enabled"},
-        {APP_LASER_BLOCK_INTERLOCK, "the interlock is open"},
+        {APP_LASER_BLOCK_INTERLOCK, "the interlock is open, or a guard keeps the laser off"},
         {APP_LASER_BLOCK_RIG, "no valid rig"},
         {APP_LASER_BLOCK_CAMERA, "no camera"},
         {APP_LASER_BLOCK_SILENCE, "no frames come"},

@@ -50,7 +50,7 @@ enum app_laser_block {
     APP_LASER_BLOCK_RIG = 2,        /* no valid rig */
     APP_LASER_BLOCK_CAMERA = 4,     /* the camera does not stream */
     APP_LASER_BLOCK_SILENCE = 8,    /* frames have stopped coming */
-    APP_LASER_BLOCK_INTERLOCK = 16, /* the interlock is open */
+    APP_LASER_BLOCK_INTERLOCK = 16, /* the interlock is open, or a guard keeps it off */
     APP_LASER_BLOCK_DUTY = 32,      /* on for too long, will be over soon */
     APP_LASER_BLOCK_FAULT = 64      /* the strobe failed; never taken back */
 };

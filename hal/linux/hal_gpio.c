@@ -47,6 +47,7 @@ static bool take_all(struct hal_gpio *gpio, const struct hal_gpio_chip_info *inf
             }
         }
     }
+    snprintf(gpio->line_name, sizeof gpio->line_name, "%s.%u", info->name, offsets[0]);
     for (int i = 0; i < wish_count; i++) {
         const struct hal_gpio_request request = {.offset = offsets[i],
                                                  .active_low = wishes[i].active_low,
@@ -193,15 +194,23 @@ static bool gpio_judged(void *context, struct hal_error *error)
     return true;
 }
 
+static bool gpio_level(void *context, bool *on, struct hal_error *error)
+{
+    struct hal_gpio *gpio = context;
+    int level = gpio->laser.handle == NULL ? -1 : hal_gpio_line_get(&gpio->laser);
+    *on = level == 1;
+    return level >= 0 || hal_fail(error, "%s: cannot be read: %s", gpio->what, strerror(errno));
+}
+
 void hal_gpio_init(struct hal_gpio *gpio, const struct hal_gpio_config *config)
 {
-    *gpio = (struct hal_gpio){
-        .strobe = {gpio, gpio_open, gpio_close, gpio_set, gpio_beat, gpio_interlock, gpio_judged},
-        .interlock_fd = -1,
-        .laser_fd = -1,
-        .config = *config,
-        .laser = {.fd = -1},
-        .interlock = {.fd = -1},
-        .heartbeat = {.fd = -1},
-        .what = "laser-line: not taken"};
+    *gpio = (struct hal_gpio){.strobe = {gpio, gpio_open, gpio_close, gpio_set, gpio_beat,
+                                         gpio_interlock, gpio_judged, gpio_level},
+                              .interlock_fd = -1,
+                              .laser_fd = -1,
+                              .config = *config,
+                              .laser = {.fd = -1},
+                              .interlock = {.fd = -1},
+                              .heartbeat = {.fd = -1},
+                              .what = "laser-line: not taken"};
 }

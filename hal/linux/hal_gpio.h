@@ -31,6 +31,8 @@
 #include "hal.h"
 
 #define HAL_GPIO_OFF_TRIES 3
+/* "CHIP.OFFSET" */
+#define HAL_GPIO_LINE_NAME_MAX 48
 
 /* The texts belong to the caller and live as long as the strobe. */
 struct hal_gpio_config {
@@ -57,6 +59,8 @@ struct hal_gpio {
     int interlock_fd;
     /* As long as a process holds this open, the kernel keeps the line for it. -1: not taken. */
     int laser_fd;
+    /* The laser's line, such as gpiochip0.17, by whatever name it was found; "" before. */
+    char line_name[HAL_GPIO_LINE_NAME_MAX];
     /* Private from here on. */
     struct hal_gpio_config config;
     struct gpiod_chip *chip;

@@ -24,15 +24,16 @@ static bool wait_readable(int fd)
     return ready > 0;
 }
 
-/* What became of the guard; it is not waited for. */
-static bool fail_gone(const struct hal_guard *guard, struct hal_error *error)
+/* What became of a guard; it is not waited for. */
+static bool fail_gone(const struct hal_guard *guard, const struct hal_guard_process *process,
+                      struct hal_error *error)
 {
     int status = 0;
     siginfo_t info = {.si_pid = 0};
-    if (waitid(P_PID, (id_t)guard->pid, &info, WEXITED | WSTOPPED | WNOHANG | WNOWAIT) != 0 ||
+    if (waitid(P_PID, (id_t)process->pid, &info, WEXITED | WSTOPPED | WNOHANG | WNOWAIT) != 0 ||
         info.si_pid == 0) {
         return hal_fail(error, "guard: process %d has let go of the laser, expected it to watch",
-                        (int)guard->pid);
+                        (int)process->pid);
     }
     status = info.si_status;
     if (info.si_code == CLD_EXITED && status == GUARD_EXIT_LATE) {
@@ -41,62 +42,111 @@ static bool fail_gone(const struct hal_guard *guard, struct hal_error *error)
                         "several times in that time",
                         (int)guard->config.timeout_ms);
     }
-    return hal_fail(error, "guard: process %d has %s %d, expected it to watch", (int)guard->pid,
+    return hal_fail(error, "guard: process %d has %s %d, expected it to watch", (int)process->pid,
                     info.si_code == CLD_EXITED    ? "ended with status"
                     : info.si_code == CLD_STOPPED ? "been stopped by signal"
                                                   : "died of signal",
                     status);
 }
 
-/* Takes what the guard has said. Not the end of the file: then it is watching. */
-static bool is_watching(struct hal_guard *guard)
+/* No end of the file, then it is watching. */
+static bool is_watching(const struct hal_guard_process *process)
 {
-    char bytes[64];
+    char byte = 0;
     ssize_t count = 0;
     do {
-        count = recv(guard->socket_fd, bytes, sizeof bytes, MSG_DONTWAIT);
-        guard->moved = guard->moved || count > 0;
-    } while (count > 0 || (count < 0 && errno == EINTR));
+        count = recv(process->socket_fd, &byte, 1, MSG_DONTWAIT);
+    } while (count < 0 && errno == EINTR);
     return count < 0 && errno == EAGAIN;
 }
 
-static bool send_byte(const struct hal_guard *guard, char byte)
+/* The first guard that is not; NULL: all are. */
+static const struct hal_guard_process *find_gone(const struct hal_guard *guard)
 {
-    return send(guard->socket_fd, &byte, 1, MSG_NOSIGNAL | MSG_DONTWAIT) == 1;
+    for (int i = 0; i < HAL_GUARD_COUNT; i++) {
+        if (!is_watching(&guard->process[i])) {
+            return &guard->process[i];
+        }
+    }
+    return NULL;
 }
 
-static void stop(struct hal_guard *guard)
+static bool send_byte(const struct hal_guard_process *process, char byte)
 {
-    if (guard->socket_fd < 0) {
+    return send(process->socket_fd, &byte, 1, MSG_NOSIGNAL | MSG_DONTWAIT) == 1;
+}
+
+/* The last guard that it did not reach, or NULL. */
+static const struct hal_guard_process *send_all(const struct hal_guard *guard, char byte)
+{
+    const struct hal_guard_process *deaf = NULL;
+    for (int i = 0; i < HAL_GUARD_COUNT; i++) {
+        if (!send_byte(&guard->process[i], byte)) {
+            deaf = &guard->process[i];
+        }
+    }
+    return deaf;
+}
+
+/* Does a guard keep the laser off, or has it, unknown to the caller? */
+static bool is_refused(const struct hal_guard *guard)
+{
+    const struct hal_guard_page *page = guard->page;
+    int64_t now_us = hal_guard_now_us();
+    for (int i = 0; i < HAL_GUARD_COUNT; i++) {
+        if (page->guard[i].refuses || page->guard[i].cut_count != guard->process[i].cut_count ||
+            !hal_guard_page_lives(page, i, now_us)) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* It closes its end in ending; one that was stopped does not. */
+static void stop_one(struct hal_guard_process *process)
+{
+    struct pollfd waiting = {.fd = process->socket_fd};
+    int ready = 0;
+    if (process->socket_fd < 0) {
         return;
     }
-    send_byte(guard, GUARD_DONE);
-    shutdown(guard->socket_fd, SHUT_WR);
-    /* It closes its end in ending; one that was stopped does not. */
-    struct pollfd waiting = {.fd = guard->socket_fd};
-    int ready = 0;
     do {
         ready = poll(&waiting, 1, GUARD_WAIT_MS);
     } while (ready < 0 && errno == EINTR);
     if (ready <= 0) {
-        kill(guard->pid, SIGKILL);
+        kill(process->pid, SIGKILL);
     }
-    close(guard->socket_fd);
-    guard->socket_fd = -1;
+    close(process->socket_fd);
+    process->socket_fd = -1;
     /* Where SIGCHLD is ignored there is nothing to be collected, and this says so after its end. */
-    while (waitpid(guard->pid, NULL, 0) < 0 && errno == EINTR) {
+    while (waitpid(process->pid, NULL, 0) < 0 && errno == EINTR) {
     }
 }
 
+static void stop(struct hal_guard *guard)
+{
+    for (int i = 0; i < HAL_GUARD_COUNT; i++) {
+        if (guard->process[i].socket_fd >= 0) {
+            send_byte(&guard->process[i], GUARD_DONE);
+            shutdown(guard->process[i].socket_fd, SHUT_WR);
+        }
+    }
+    for (int i = 0; i < HAL_GUARD_COUNT; i++) {
+        stop_one(&guard->process[i]);
+    }
+    hal_guard_page_free(guard->page);
+    guard->page = NULL;
+}
+
 /* Fork, with no signal between the fork and what the child does about signals. */
-static pid_t fork_child(const struct hal_guard_config *config, int child_fd)
+static pid_t fork_child(const struct hal_guard *guard, int index, int child_fd)
 {
     sigset_t all, before;
     sigfillset(&all);
     sigprocmask(SIG_SETMASK, &all, &before);
     pid_t pid = fork();
     if (pid == 0) {
-        hal_guard_child(config, child_fd);
+        hal_guard_child(&guard->config, guard->page, index, child_fd);
     }
     int error = errno;
     sigprocmask(SIG_SETMASK, &before, NULL);
@@ -104,44 +154,63 @@ static pid_t fork_child(const struct hal_guard_config *config, int child_fd)
     return pid;
 }
 
-static bool start(struct hal_guard *guard, struct hal_error *error)
+static bool start_one(struct hal_guard *guard, int index, struct hal_error *error)
 {
+    struct hal_guard_process *process = &guard->process[index];
     int ends[2];
-    char byte = 0;
     if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0) {
         return hal_fail(error, "guard: no socket: %s", strerror(errno));
     }
-    guard->pid = fork_child(&guard->config, ends[1]);
+    guard->page->guard[index].life_us = hal_guard_now_us();
+    process->pid = fork_child(guard, index, ends[1]);
     int reason = errno;
     close(ends[1]);
-    if (guard->pid < 0) {
+    if (process->pid < 0) {
         close(ends[0]);
         return hal_fail(error, "guard: no process: %s", strerror(reason));
     }
-    guard->socket_fd = ends[0];
-    guard->moved = false;
-    if (!wait_readable(guard->socket_fd) || recv(guard->socket_fd, &byte, 1, MSG_DONTWAIT) != 1 ||
-        byte != GUARD_READY) {
-        stop(guard);
-        return hal_fail(error,
-                        "guard: the process did not begin, expected it within %d ms; is "
-                        "/proc mounted?",
-                        GUARD_WAIT_MS);
+    process->socket_fd = ends[0];
+    process->cut_count = 0;
+    return true;
+}
+
+static bool start(struct hal_guard *guard, struct hal_error *error)
+{
+    guard->page = hal_guard_page_new(guard->config.line_name);
+    if (guard->page == NULL) {
+        return hal_fail(error, "guard: no memory to share: %s", strerror(errno));
+    }
+    for (int i = 0; i < HAL_GUARD_COUNT; i++) {
+        if (!start_one(guard, i, error)) {
+            return false;
+        }
+    }
+    for (int i = 0; i < HAL_GUARD_COUNT; i++) {
+        char byte = 0;
+        int fd = guard->process[i].socket_fd;
+        if (!wait_readable(fd) || recv(fd, &byte, 1, MSG_DONTWAIT) != 1 || byte != GUARD_READY) {
+            return hal_fail(error,
+                            "guard: the process did not begin, expected it within %d ms; is "
+                            "/proc mounted?",
+                            GUARD_WAIT_MS);
+        }
     }
     return true;
 }
 
 bool hal_guard_feed(struct hal_guard *guard, struct hal_error *error)
 {
-    siginfo_t info = {.si_pid = 0};
-    if (guard->socket_fd < 0) {
-        return true;
-    }
-    /* One that was stopped still has its socket open. */
-    bool stands = waitid(P_PID, (id_t)guard->pid, &info, WSTOPPED | WNOHANG | WNOWAIT) == 0 &&
-                  info.si_pid != 0;
-    if (stands || !is_watching(guard) || !send_byte(guard, GUARD_ALIVE)) {
-        return fail_gone(guard, error);
+    for (int i = 0; i < HAL_GUARD_COUNT; i++) {
+        const struct hal_guard_process *process = &guard->process[i];
+        siginfo_t info = {.si_pid = 0};
+        if (process->socket_fd < 0) {
+            continue;
+        }
+        bool stands = waitid(P_PID, (id_t)process->pid, &info, WSTOPPED | WNOHANG | WNOWAIT) == 0 &&
+                      info.si_pid != 0;
+        if (stands || !is_watching(process) || !send_byte(process, GUARD_ALIVE)) {
+            return fail_gone(guard, process, error);
+        }
     }
     return true;
 }
@@ -156,8 +225,22 @@ static bool guard_open(void *context, struct hal_error *error)
         return false;
     }
     if (!start(guard, error)) {
+        stop(guard);
         strobe->close(strobe->context);
         return false;
+    }
+    return true;
+}
+
+static bool set_off(const struct hal_guard *guard, struct hal_error *error)
+{
+    const struct hal_strobe *strobe = guard->config.strobe;
+    if (!strobe->set(strobe->context, false, error)) {
+        return false;
+    }
+    if (guard->page != NULL) {
+        hal_guard_page_announce(guard->page, false);
+        send_all(guard, GUARD_OFF); /* else they go on to expect signs of life */
     }
     return true;
 }
@@ -167,7 +250,7 @@ static void guard_close(void *context)
     struct hal_guard *guard = context;
     const struct hal_strobe *strobe = guard->config.strobe;
     struct hal_error ignored;
-    strobe->set(strobe->context, false, &ignored);
+    set_off(guard, &ignored);
     stop(guard);
     strobe->close(strobe->context);
 }
@@ -176,29 +259,32 @@ static bool guard_set(void *context, bool on, struct hal_error *error)
 {
     struct hal_guard *guard = context;
     const struct hal_strobe *strobe = guard->config.strobe;
+    struct hal_error ignored;
     if (!on) {
-        if (!strobe->set(strobe->context, false, error)) {
-            return false;
-        }
-        if (guard->socket_fd >= 0) {
-            send_byte(guard, GUARD_OFF); /* else it goes on to expect signs of life */
-        }
-        return true;
+        return set_off(guard, error);
     }
-    if (guard->socket_fd < 0) {
+    if (guard->page == NULL) {
         return hal_fail(error, "guard: none, expected an open strobe");
     }
-    if (is_watching(guard) && send_byte(guard, GUARD_ON)) {
-        if (!strobe->set(strobe->context, true, error)) {
-            return false;
-        }
-        /* It may have let go, and switched off, before the line went on: then it is on unguarded. */
-        if (is_watching(guard)) {
-            return true;
-        }
+    const struct hal_guard_process *gone = find_gone(guard);
+    gone = gone == NULL ? send_all(guard, GUARD_ON) : gone;
+    if (gone != NULL) {
+        set_off(guard, &ignored);
+        return fail_gone(guard, gone, error);
     }
-    strobe->set(strobe->context, false, error);
-    return fail_gone(guard, error);
+    if (is_refused(guard)) {
+        return set_off(guard, error); /* interlock() says so */
+    }
+    hal_guard_page_announce(guard->page, true);
+    bool is_on = strobe->set(strobe->context, true, error);
+    /* One may have let go, and switched off, before the line went on: then it is on unguarded. */
+    gone = find_gone(guard);
+    if (gone != NULL) {
+        set_off(guard, &ignored);
+        return fail_gone(guard, gone, error);
+    }
+    /* A guard that was quicker may be why the line does not read as it was set. */
+    return is_refused(guard) ? set_off(guard, error) : is_on;
 }
 
 static bool guard_beat(void *context, struct hal_error *error)
@@ -215,20 +301,47 @@ static bool guard_interlock(void *context, bool *closed, struct hal_error *error
     if (!strobe->interlock(strobe->context, closed, error)) {
         return false;
     }
-    if (guard->socket_fd >= 0 && !is_watching(guard)) {
-        *closed = false;
-        return fail_gone(guard, error);
+    if (guard->page == NULL) {
+        return true;
     }
-    *closed = *closed && !guard->moved;
-    guard->moved = false;
+    const struct hal_guard_process *gone = find_gone(guard);
+    if (gone != NULL) {
+        *closed = false;
+        return fail_gone(guard, gone, error);
+    }
+    unsigned counts[HAL_GUARD_COUNT];
+    for (int i = 0; i < HAL_GUARD_COUNT; i++) {
+        counts[i] = guard->page->guard[i].cut_count; /* those that come later are reported later */
+    }
+    *closed = *closed && !is_refused(guard);
+    for (int i = 0; i < HAL_GUARD_COUNT; i++) {
+        guard->process[i].cut_count = counts[i];
+    }
     return true;
+}
+
+static bool guard_judged(void *context, struct hal_error *error)
+{
+    const struct hal_guard *guard = context;
+    (void)error;
+    if (guard->page != NULL) {
+        hal_guard_page_judged(guard->page);
+    }
+    return true;
+}
+
+static bool guard_level(void *context, bool *on, struct hal_error *error)
+{
+    const struct hal_strobe *strobe = ((struct hal_guard *)context)->config.strobe;
+    return strobe->level(strobe->context, on, error);
 }
 
 void hal_guard_init(struct hal_guard *guard, const struct hal_guard_config *config)
 {
-    *guard = (struct hal_guard){
-        .strobe = {guard, guard_open, guard_close, guard_set, guard_beat, guard_interlock},
-        .config = *config,
-        .socket_fd = -1,
-        .pid = -1};
+    *guard = (struct hal_guard){.strobe = {guard, guard_open, guard_close, guard_set, guard_beat,
+                                           guard_interlock, guard_judged, guard_level},
+                                .config = *config};
+    for (int i = 0; i < HAL_GUARD_COUNT; i++) {
+        guard->process[i] = (struct hal_guard_process){.socket_fd = -1, .pid = -1};
+    }
 }

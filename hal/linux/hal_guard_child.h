@@ -1,8 +1,8 @@
-/* hal_guard_child - what the guard does on its side of the fork; see hal_guard.h. */
+/* hal_guard_child - what a guard does on its side of the fork; see hal_guard.h. */
 #ifndef HAL_GUARD_CHILD_H
 #define HAL_GUARD_CHILD_H
 
-#include "linux/hal_guard.h"
+#include "linux/hal_guard_page.h"
 
 /* The bytes on the socket. */
 #define GUARD_ALIVE 'a' /* to the guard */
@@ -10,7 +10,6 @@
 #define GUARD_OFF 'o'   /* to the guard, after it was switched off: they need not */
 #define GUARD_DONE 'd'  /* to the guard: off, and end */
 #define GUARD_READY 'r' /* from the guard, once */
-#define GUARD_MOVED 'm' /* from the guard: off, since the interlock has moved */
 
 /* The guard's exit status. */
 enum guard_exit {
@@ -22,10 +21,14 @@ enum guard_exit {
 };
 
 #define GUARD_OFF_TRIES 100
+/* Between two looks at the page and the line. */
+#define GUARD_LOOK_MS 20
 /* Between two looks whether the interlock's event has been taken. */
-#define GUARD_LOOK_MS 2
+#define GUARD_EVENT_MS 2
 
-/* The child's life, right after the fork with all signals blocked. Does not return. */
-_Noreturn void hal_guard_child(const struct hal_guard_config *config, int socket_fd);
+/* The child's life, right after the fork with all signals blocked. index: which of the guards it is.
+ * Does not return. */
+_Noreturn void hal_guard_child(const struct hal_guard_config *config, struct hal_guard_page *page,
+                               int index, int socket_fd);
 
 #endif

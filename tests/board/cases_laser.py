@@ -5,12 +5,13 @@ import math
 import re
 
 from frames import MOVED_DEG, host_records, picked
-from run import (FRAME_S, HEARTBEAT, HEIGHT, INTERLOCK, LASER, LIVE_FIELDS, RATE, SILENT_S, SOON_S,
+from run import (CAP_MS, FRAME_S, HEARTBEAT, HEIGHT, INTERLOCK, LASER, LIVE_FIELDS, RATE, SILENT_S, SOON_S,
                  WIDTH, expect, same_but)
 
-# Its process number, for the board's shell.
+# Their process numbers, for the board's shell, and that of one of them.
 GUARD = "$(pidof isohead-guard)"
-# It acts when the program has shown no sign of life for so long (hal_guard.h).
+ONE_GUARD = "$(pidof isohead-guard | cut -d ' ' -f 1)"
+# They end when the program has shown no sign of life for so long (hal_guard.h).
 GUARD_S = 2
 # Longer than a frame is looked at, so that each counts.
 CHECK_FRAME_S = 0.05
@@ -205,12 +206,13 @@ def case_all_killed(run):
 
 
 def case_stopped(run):
-    """SIGSTOP while the laser is on: the guard process acts"""
+    """SIGSTOP while the laser is on: the guards act after the cap"""
     board = run.board
     run.start(run.gated, "gated")
     run.lit_frame(run.gated, 0)
-    low_ms = run.low_after("kill -STOP $program", GUARD_S + FRAME_S)
+    low_ms = run.low_after("kill -STOP $program", CAP_MS / 1000 + FRAME_S)
     rises = board.rises[LASER]
+    board.settle(2 * GUARD_S)
     board.signal("CONT")
     status = board.exit_status(SOON_S)
     expect(status == 1, f"exit status {status} after SIGCONT, not 1: {board.log[-3:]}")
@@ -228,6 +230,35 @@ def case_guard_killed(run):
     expect(status == 1, f"exit status {status}, not 1: {board.log[-3:]}")
     expect(board.levels[LASER] == 0, "the laser's line is high after the end")
     return f"low {low_ms:.0f} ms later, exit status 1"
+
+
+def case_guard_stopped(run):
+    """one guard stopped, then the program killed: the other guard acts"""
+    board = run.board
+    run.start(run.gated, "gated")
+    run.lit_frame(run.gated, 0)
+    low_ms = run.low_after(f"kill -STOP {ONE_GUARD}; kill -KILL $program")
+    status = board.exit_status(SOON_S)
+    expect(status == -9, f"exit status {status} after SIGKILL")
+    run.laser_off()
+    left = board.command("pidof isohead-guard || echo none").strip()
+    expect(left == "none", f"guards are left after --laser-off: {left}")
+    return f"low {low_ms:.1f} ms later; --laser-off ends the one that stands still"
+
+
+def case_guards_stopped(run):
+    """both guards stopped and the program killed at once: --laser-off takes the line from them"""
+    board = run.board
+    run.start(run.gated, "gated")
+    run.lit_frame(run.gated, 0)
+    run.laser(1)
+    board.signal("STOP", GUARD)
+    board.signal("KILL")
+    status = board.exit_status(SOON_S)
+    expect(status == -9, f"exit status {status} after SIGKILL")
+    stuck = "high" if board.levels[LASER] else "low"
+    run.laser_off()
+    return f"the line stays {stuck}; low after --laser-off, with status 0"
 
 
 def case_duty(run):
@@ -262,4 +293,4 @@ def case_status(run):
 
 
 CASES = [case_interlock, case_reload, case_moved, case_check, case_unasked, case_signals, case_killed, case_all_killed,
-         case_stopped, case_guard_killed, case_duty, case_status]
+         case_stopped, case_guard_killed, case_guard_stopped, case_guards_stopped, case_duty, case_status]

@@ -174,8 +174,12 @@ static int64_t cpu_us(void)
 
 static void run(bool has_viewer)
 {
-    static const struct hal_strobe strobe = {
-        NULL, strobe_good, camera_close, strobe_set, strobe_good, strobe_interlock, strobe_good};
+    static const struct hal_strobe strobe = {.open = strobe_good,
+                                             .close = camera_close,
+                                             .set = strobe_set,
+                                             .beat = strobe_good,
+                                             .interlock = strobe_interlock,
+                                             .judged = strobe_good};
     static const struct hal_events events = {NULL, wait_for};
     static const struct hal_watchdog watchdog = {NULL, feed};
     static const struct hal_output output = {NULL, send_record};

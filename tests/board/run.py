@@ -16,6 +16,8 @@ WIDTH, HEIGHT = 752, 582
 # A slow camera: an emulated processor under load must not count as a camera that fell silent.
 RATE = 2
 FRAME_S = 1 / RATE
+# The longest cap that there is, and the shortest for so few frames.
+CAP_MS = 1000
 SILENT_S = 3 * FRAME_S
 # Longest time for what follows from a pin or a frame at once; a hundred times what it takes.
 SOON_S = 20
@@ -125,7 +127,7 @@ class Run:
         expect(not self.is_on(), "the laser is on before the program starts")
         self.board.start(
             f"{self.name} --rig /rig/{rig}.json --device {device} --rate {RATE} "
-            f"--exposure keep --gain keep --laser --strobe {strobe} {self.gpio_options()} "
+            f"--exposure keep --gain keep --laser --laser-cap {CAP_MS} --strobe {strobe} {self.gpio_options()} "
             f"--heartbeat-line {HEARTBEAT} --interlock-line {INTERLOCK} --output - {more}")
 
     def stop(self):

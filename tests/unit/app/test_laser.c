@@ -72,8 +72,12 @@ static bool fake_judged(void *context, struct hal_error *error)
     return fake.judged_fails ? hal_fail(error, "judged fails") : true;
 }
 
-static const struct hal_strobe strobe = {NULL,      fake_open,      fake_close, fake_set,
-                                         fake_beat, fake_interlock, fake_judged};
+static const struct hal_strobe strobe = {.open = fake_open,
+                                         .close = fake_close,
+                                         .set = fake_set,
+                                         .beat = fake_beat,
+                                         .interlock = fake_interlock,
+                                         .judged = fake_judged};
 
 static void start(bool enabled, int32_t duty_percent)
 {

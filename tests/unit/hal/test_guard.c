@@ -19,9 +19,12 @@
 #include "ih_test.h"
 #include "linux/hal_guard.h"
 #include "linux/hal_guard_child.h"
+#include "linux/hal_guard_end.h"
 #include "linux/hal_signals.h"
 
 #define LONG_MS (1000 * 1000)
+/* A limit of time that the machine's load is not to decide: many times what anything takes. */
+#define WIDE_MS 20000
 
 /* Seen by every process. */
 struct shared {
@@ -29,7 +32,8 @@ struct shared {
     volatile int taken;          /* opened and not closed */
     volatile int off_fail_count; /* as many settings to off fail */
     volatile int off_count;      /* settings to off */
-    volatile pid_t guard_pid;
+    volatile pid_t guard_pid[HAL_GUARD_COUNT];
+    volatile int unreadable; /* the level */
     volatile int open_fails;
     /* The guard is made to end while set(true) is under way, and held between off and its end. */
     volatile int end_while_on;
@@ -76,7 +80,7 @@ static bool line_set(void *context, bool on, struct hal_error *why)
         if (shared->end_while_on) {
             const char done = GUARD_DONE;
 
-            TEST_ASSERT_EQUAL_INT(1, send(guard.socket_fd, &done, 1, 0));
+            TEST_ASSERT_EQUAL_INT(1, send(guard.process[0].socket_fd, &done, 1, 0));
             sem_wait(&shared->is_off);
         }
         shared->level = 1;
@@ -112,19 +116,40 @@ static bool line_interlock(void *context, bool *closed, struct hal_error *why)
     return true;
 }
 
-static const struct hal_strobe line = {NULL,     line_open, line_close,
-                                       line_set, line_beat, line_interlock};
+static bool line_level(void *context, bool *on, struct hal_error *why)
+{
+    (void)context;
+    *on = shared->level == 1;
+    return shared->unreadable ? hal_fail(why, "line: unreadable") : true;
+}
 
-static void init(int timeout_ms)
+static const struct hal_strobe line = {.open = line_open,
+                                       .close = line_close,
+                                       .set = line_set,
+                                       .beat = line_beat,
+                                       .interlock = line_interlock,
+                                       .level = line_level};
+
+static char line_name[32]; /* of this test process alone */
+
+static void init_with_cap(int timeout_ms, int cap_ms)
 {
     const struct hal_guard_config config = {
         .strobe = &line,
         .line_fd = &line_fd,
         .timeout_ms = timeout_ms,
         .interlock_fd = &interlock_fd,
+        .limits = {.cap_us = (int64_t)cap_ms * 1000, .duty_percent = 100},
+        .line_name = line_name,
     };
 
     hal_guard_init(&guard, &config);
+}
+
+/* No cap that matters. */
+static void init(int timeout_ms)
+{
+    init_with_cap(timeout_ms, LONG_MS);
 }
 
 static bool set(bool on)
@@ -178,16 +203,50 @@ static void expect_exit(pid_t pid, int code)
     TEST_ASSERT_EQUAL_INT(code, WEXITSTATUS(status));
 }
 
-/* For good, since nothing here collects it: the guard of this very process has ended. */
-static void wait_for_end_of_own_guard(void)
+static void expect_guards_exit(int code)
+{
+    for (int i = 0; i < HAL_GUARD_COUNT; i++) {
+        expect_exit(shared->guard_pid[i], code);
+    }
+}
+
+/* For good, since nothing here collects it: a guard of this very process has ended. */
+static void wait_for_end_of_own_guard(int index)
 {
     siginfo_t info;
 
-    TEST_ASSERT_EQUAL_INT(0, waitid(P_PID, (id_t)guard.pid, &info, WEXITED | WNOWAIT));
+    TEST_ASSERT_EQUAL_INT(0,
+                          waitid(P_PID, (id_t)guard.process[index].pid, &info, WEXITED | WNOWAIT));
+}
+
+static void wait_for_end_of_own_guards(void)
+{
+    for (int i = 0; i < HAL_GUARD_COUNT; i++) {
+        wait_for_end_of_own_guard(i);
+    }
+}
+
+/* The laser's state as the program sees it: false, and off, while a guard refuses. */
+static bool is_closed(void)
+{
+    bool closed = false;
+
+    return guard.strobe.interlock(guard.strobe.context, &closed, &error) && closed;
+}
+
+/* On for certain: on a slow machine a guard may be late, or have let go before. */
+static void switch_on(void)
+{
+    do {
+        if (is_closed() ? !set(true) : guard.process[0].socket_fd < 0 || error.text[0] != 0) {
+            memset(&error, 0, sizeof error);
+            open_it();
+        }
+    } while (shared->level == 0);
 }
 
 /* A program with its laser on, that then does one thing. It tells when it is about to. */
-static pid_t program(int timeout_ms, void (*act)(void))
+static pid_t program_with_cap(int timeout_ms, int cap_ms, void (*act)(void))
 {
     int ready[2];
     char byte = 0;
@@ -196,11 +255,12 @@ static pid_t program(int timeout_ms, void (*act)(void))
     TEST_ASSERT_EQUAL_INT(0, pipe(ready));
     pid = fork();
     if (pid == 0) {
-        init(timeout_ms);
-        /* On a slow machine a guard with a short time may have let go before. */
-        while (!open_it() || !set(true)) {
+        init_with_cap(timeout_ms, cap_ms);
+        open_it();
+        switch_on();
+        for (int i = 0; i < HAL_GUARD_COUNT; i++) {
+            shared->guard_pid[i] = guard.process[i].pid;
         }
-        shared->guard_pid = guard.pid;
         byte = write(ready[1], "r", 1) == 1;
         act();
         for (;;) {
@@ -211,6 +271,11 @@ static pid_t program(int timeout_ms, void (*act)(void))
     TEST_ASSERT_EQUAL_INT(1, read(ready[0], &byte, 1));
     close(ready[0]);
     return pid;
+}
+
+static pid_t program(int timeout_ms, void (*act)(void))
+{
+    return program_with_cap(timeout_ms, LONG_MS, act);
 }
 
 static void go_on(void)
@@ -239,11 +304,10 @@ static void killed_the_laser_goes_off(void)
         const pid_t pid = program(LONG_MS, go_on);
         int64_t before_us, took_us;
 
-        TEST_ASSERT_EQUAL_INT(1, shared->level);
         before_us = now_us();
         TEST_ASSERT_EQUAL_INT(0, kill(pid, SIGKILL));
         TEST_ASSERT_EQUAL_INT(SIGKILL, WTERMSIG(end_of(pid)));
-        expect_exit(shared->guard_pid, GUARD_EXIT_GONE);
+        expect_guards_exit(GUARD_EXIT_GONE);
         took_us = now_us() - before_us;
         longest_us = took_us > longest_us ? took_us : longest_us;
         TEST_ASSERT_EQUAL_INT(0, shared->level);
@@ -256,25 +320,29 @@ static void left_without_a_word_the_laser_goes_off(void)
     const pid_t pid = program(LONG_MS, leave);
 
     expect_exit(pid, 7);
-    expect_exit(shared->guard_pid, GUARD_EXIT_GONE);
+    expect_guards_exit(GUARD_EXIT_GONE);
     TEST_ASSERT_EQUAL_INT(0, shared->level);
 }
 
 static void stopped_the_laser_goes_off(void)
 {
     const pid_t pid = program(50, go_on);
+    struct pollfd ended[HAL_GUARD_COUNT];
 
-    struct pollfd ended = {.fd = (int)syscall(SYS_pidfd_open, shared->guard_pid, 0),
-                           .events = POLLIN};
-
-    TEST_ASSERT_TRUE(ended.fd >= 0);
+    for (int i = 0; i < HAL_GUARD_COUNT; i++) {
+        ended[i].fd = (int)syscall(SYS_pidfd_open, shared->guard_pid[i], 0);
+        ended[i].events = POLLIN;
+        TEST_ASSERT_TRUE(ended[i].fd >= 0);
+    }
     TEST_ASSERT_EQUAL_INT(0, kill(pid, SIGSTOP));
-    TEST_ASSERT_EQUAL_INT(1, poll(&ended, 1, -1));
-    close(ended.fd);
+    for (int i = 0; i < HAL_GUARD_COUNT; i++) {
+        TEST_ASSERT_EQUAL_INT(1, poll(&ended[i], 1, -1));
+        close(ended[i].fd);
+    }
     TEST_ASSERT_EQUAL_INT(0, shared->level);
     TEST_ASSERT_EQUAL_INT(0, kill(pid, SIGKILL));
     end_of(pid);
-    expect_exit(shared->guard_pid, GUARD_EXIT_LATE);
+    expect_guards_exit(GUARD_EXIT_LATE);
 }
 
 static void a_line_that_fails_is_tried_again(void)
@@ -285,21 +353,21 @@ static void a_line_that_fails_is_tried_again(void)
     shared->off_count = 0;
     kill(pid, SIGKILL);
     end_of(pid);
-    expect_exit(shared->guard_pid, GUARD_EXIT_GONE);
+    expect_guards_exit(GUARD_EXIT_GONE);
     TEST_ASSERT_EQUAL_INT(0, shared->level);
-    TEST_ASSERT_EQUAL_INT(6, shared->off_count);
+    TEST_ASSERT_GREATER_OR_EQUAL_INT(6, shared->off_count);
 }
 
 static void a_line_that_fails_for_good_is_given_up(void)
 {
     const pid_t pid = program(LONG_MS, go_on);
 
-    shared->off_fail_count = 1000;
+    shared->off_fail_count = 1000 * 1000;
     shared->off_count = 0;
     kill(pid, SIGKILL);
     end_of(pid);
-    expect_exit(shared->guard_pid, GUARD_EXIT_LINE);
-    TEST_ASSERT_EQUAL_INT(GUARD_OFF_TRIES, shared->off_count);
+    expect_guards_exit(GUARD_EXIT_LINE);
+    TEST_ASSERT_GREATER_OR_EQUAL_INT(GUARD_OFF_TRIES, shared->off_count);
     shared->level = 0;
 }
 
@@ -315,15 +383,15 @@ static void signals_do_not_end_the_guard(void)
     TEST_ASSERT_TRUE_MESSAGE(open_it(), error.text);
     TEST_ASSERT_TRUE(set(true));
     for (i = 0; i < IH_TEST_COUNT(sent); i++) {
-        TEST_ASSERT_EQUAL_INT(0, kill(guard.pid, sent[i]));
+        TEST_ASSERT_EQUAL_INT(0, kill(guard.process[0].pid, sent[i]));
     }
     TEST_ASSERT_TRUE(hal_guard_feed(&guard, &error));
-    TEST_ASSERT_EQUAL_INT(1, shared->level);
-    TEST_ASSERT_TRUE(getsid(guard.pid) == guard.pid);
-    TEST_ASSERT_TRUE(getsid(0) != guard.pid);
+    switch_on();
+    TEST_ASSERT_TRUE(getsid(guard.process[0].pid) == guard.process[0].pid);
+    TEST_ASSERT_TRUE(getsid(0) != guard.process[0].pid);
     /* A signal that got through would come before this byte is read. */
-    TEST_ASSERT_EQUAL_INT(1, send(guard.socket_fd, &done, 1, 0));
-    TEST_ASSERT_EQUAL_INT(0, waitid(P_PID, (id_t)guard.pid, &info, WEXITED | WNOWAIT));
+    TEST_ASSERT_EQUAL_INT(1, send(guard.process[0].socket_fd, &done, 1, 0));
+    TEST_ASSERT_EQUAL_INT(0, waitid(P_PID, (id_t)guard.process[0].pid, &info, WEXITED | WNOWAIT));
     TEST_ASSERT_EQUAL_INT(CLD_EXITED, info.si_code);
     TEST_ASSERT_EQUAL_INT(GUARD_EXIT_DONE, info.si_status);
 }
@@ -348,8 +416,8 @@ static void dying_of_a_fault_the_guard_switches_off(void)
         if (!open_it() || !set(true)) {
             _exit(1);
         }
-        kill(guard.pid, SIGABRT);
-        if (waitid(P_PID, (id_t)guard.pid, &info, WEXITED | WNOWAIT) != 0) {
+        kill(guard.process[0].pid, SIGABRT);
+        if (waitid(P_PID, (id_t)guard.process[0].pid, &info, WEXITED | WNOWAIT) != 0) {
             _exit(2);
         }
         _exit((info.si_code != CLD_KILLED && info.si_code != CLD_DUMPED) ||
@@ -360,9 +428,13 @@ static void dying_of_a_fault_the_guard_switches_off(void)
     }
     TEST_ASSERT_EQUAL_INT(pid, waitpid(pid, &status, 0));
     TEST_ASSERT_EQUAL_INT(0, status);
-    /* The program has left its zombie to the test. */
-    TEST_ASSERT_TRUE(waitpid(-1, &status, 0) > 0);
-    TEST_ASSERT_EQUAL_INT(SIGABRT, WTERMSIG(status));
+    /* The program has left its zombies to the test: the one, and the other that saw it die. */
+    int aborted_count = 0;
+    for (int i = 0; i < HAL_GUARD_COUNT; i++) {
+        TEST_ASSERT_TRUE(waitpid(-1, &status, 0) > 0);
+        aborted_count += WIFSIGNALED(status) && WTERMSIG(status) == SIGABRT;
+    }
+    TEST_ASSERT_EQUAL_INT(1, aborted_count);
 }
 
 /* The guard's off comes before the program's on: the program has to see that it is alone. */
@@ -381,7 +453,7 @@ static void switched_on_behind_the_guards_back_it_goes_off_again(void)
  * process learns of both. */
 static void a_moving_interlock_switches_off(void)
 {
-    struct pollfd event_waits = {.events = POLLIN}, message = {.events = POLLIN};
+    struct pollfd event_waits = {.events = POLLIN};
     char event = 'e';
     bool closed = true;
     struct timespec end;
@@ -390,9 +462,8 @@ static void a_moving_interlock_switches_off(void)
     TEST_ASSERT_EQUAL_INT(0, pipe(ends));
     interlock_fd = event_waits.fd = ends[0];
     TEST_ASSERT_TRUE(open_it());
+    switch_on();
     shared->note_off = 1;
-    TEST_ASSERT_TRUE(set(true));
-    TEST_ASSERT_EQUAL_INT(1, shared->level);
     TEST_ASSERT_EQUAL_INT(1, write(ends[1], &event, 1));
     clock_gettime(CLOCK_REALTIME, &end);
     end.tv_sec += 20;
@@ -400,8 +471,6 @@ static void a_moving_interlock_switches_off(void)
     shared->note_off = 0;
     TEST_ASSERT_EQUAL_INT(0, shared->level);
     TEST_ASSERT_EQUAL_INT(1, poll(&event_waits, 1, 0));
-    message.fd = guard.socket_fd;
-    TEST_ASSERT_EQUAL_INT(1, poll(&message, 1, 20000));
     TEST_ASSERT_TRUE_MESSAGE(hal_guard_feed(&guard, &error), error.text);
     TEST_ASSERT_TRUE(guard.strobe.interlock(guard.strobe.context, &closed, &error));
     TEST_ASSERT_FALSE_MESSAGE(closed, "the program would believe that the laser is on");
@@ -423,14 +492,14 @@ static void it_is_named_and_holds_two_descriptors(void)
 
     TEST_ASSERT_EQUAL_INT(0, pipe(other));
     TEST_ASSERT_TRUE(open_it());
-    snprintf(path, sizeof path, "/proc/%d/comm", (int)guard.pid);
+    snprintf(path, sizeof path, "/proc/%d/comm", (int)guard.process[0].pid);
     i = open(path, O_RDONLY);
     length = read(i, text, sizeof text - 1);
     close(i);
     TEST_ASSERT_TRUE(length > 0);
     TEST_ASSERT_EQUAL_STRING("isohead-guard\n", text);
     for (i = 0; i < 256; i++) {
-        snprintf(path, sizeof path, "/proc/%d/fd/%d", (int)guard.pid, i);
+        snprintf(path, sizeof path, "/proc/%d/fd/%d", (int)guard.process[0].pid, i);
         open_count += readlink(path, text, sizeof text) >= 0;
         if (i == line_fd) {
             TEST_ASSERT_TRUE(readlink(path, text, sizeof text) >= 0);
@@ -450,7 +519,7 @@ static void closed_the_guard_ends_and_gives_the_line_back(void)
 
     TEST_ASSERT_TRUE(open_it());
     TEST_ASSERT_TRUE(set(true));
-    pid = guard.pid;
+    pid = guard.process[0].pid;
     close_it();
     TEST_ASSERT_EQUAL_INT(0, shared->level);
     TEST_ASSERT_EQUAL_INT(0, shared->taken);
@@ -469,10 +538,10 @@ static void opened_again_the_old_guard_has_ended_first(void)
 
     TEST_ASSERT_TRUE(open_it());
     TEST_ASSERT_TRUE(set(true));
-    first = guard.pid;
+    first = guard.process[0].pid;
     TEST_ASSERT_TRUE(open_it());
     TEST_ASSERT_EQUAL_INT(0, shared->level);
-    TEST_ASSERT_TRUE(guard.pid != first);
+    TEST_ASSERT_TRUE(guard.process[0].pid != first);
     TEST_ASSERT_EQUAL_INT(-1, kill(first, 0));
     TEST_ASSERT_TRUE(set(true));
     TEST_ASSERT_TRUE(hal_guard_feed(&guard, &error));
@@ -493,23 +562,34 @@ static void an_opening_that_fails_has_no_guard(void)
     TEST_ASSERT_EQUAL_INT(0, shared->level);
 }
 
-static void without_a_socket_or_process_the_line_is_given_back(void)
+/* Descriptors are used up but for a few: two are the line's, the page and the sockets need the rest. */
+static void without_descriptors_the_line_is_given_back(void)
 {
-    int fds[1024], count = 0;
+    int spare = 1;
+    bool good = false;
 
-    /* All descriptors are used up but those of the line. */
-    while (count < IH_TEST_COUNT(fds) && (fds[count] = dup(0)) >= 0) {
-        count++;
+    while (!good) {
+        int fds[1024], count = 0;
+
+        while (count < IH_TEST_COUNT(fds) && (fds[count] = dup(0)) >= 0) {
+            count++;
+        }
+        TEST_ASSERT_TRUE_MESSAGE(count < IH_TEST_COUNT(fds), "no limit of descriptors was set");
+        spare++;
+        for (int i = 0; i < spare; i++) {
+            close(fds[--count]);
+        }
+        good = open_it();
+        while (count > 0) {
+            close(fds[--count]);
+        }
+        if (!good) {
+            TEST_ASSERT_NOT_NULL_MESSAGE(strstr(error.text, "guard: "), error.text);
+            TEST_ASSERT_EQUAL_INT(0, shared->taken);
+            TEST_ASSERT_EQUAL_INT(-1, waitpid(-1, NULL, WNOHANG));
+        }
     }
-    TEST_ASSERT_TRUE_MESSAGE(count < IH_TEST_COUNT(fds), "no limit of descriptors was set");
-    close(fds[--count]);
-    close(fds[--count]);
-    TEST_ASSERT_FALSE(open_it());
-    while (count > 0) {
-        close(fds[--count]);
-    }
-    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(error.text, "guard: no socket"), error.text);
-    TEST_ASSERT_EQUAL_INT(0, shared->taken);
+    TEST_ASSERT_GREATER_THAN_INT(4, spare);
 }
 
 static void a_dead_guard_is_noticed(void)
@@ -517,8 +597,8 @@ static void a_dead_guard_is_noticed(void)
     TEST_ASSERT_TRUE(open_it());
     TEST_ASSERT_TRUE(hal_guard_feed(&guard, &error));
     TEST_ASSERT_TRUE(set(true));
-    kill(guard.pid, SIGKILL);
-    wait_for_end_of_own_guard();
+    kill(guard.process[0].pid, SIGKILL);
+    wait_for_end_of_own_guard(0);
     TEST_ASSERT_FALSE(hal_guard_feed(&guard, &error));
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(error.text, "died of signal 9"), error.text);
     TEST_ASSERT_FALSE(hal_guard_feed(&guard, &error));
@@ -534,12 +614,12 @@ static void a_guard_that_was_stopped_is_noticed(void)
     siginfo_t info;
 
     TEST_ASSERT_TRUE(open_it());
-    kill(guard.pid, SIGSTOP);
-    TEST_ASSERT_EQUAL_INT(0, waitid(P_PID, (id_t)guard.pid, &info, WSTOPPED | WNOWAIT));
+    kill(guard.process[0].pid, SIGSTOP);
+    TEST_ASSERT_EQUAL_INT(0, waitid(P_PID, (id_t)guard.process[0].pid, &info, WSTOPPED | WNOWAIT));
     TEST_ASSERT_FALSE(hal_guard_feed(&guard, &error));
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(error.text, "stopped by signal"), error.text);
-    kill(guard.pid, SIGCONT);
-    TEST_ASSERT_EQUAL_INT(0, waitid(P_PID, (id_t)guard.pid, &info, WCONTINUED));
+    kill(guard.process[0].pid, SIGCONT);
+    TEST_ASSERT_EQUAL_INT(0, waitid(P_PID, (id_t)guard.process[0].pid, &info, WCONTINUED));
     TEST_ASSERT_TRUE_MESSAGE(hal_guard_feed(&guard, &error), error.text);
 }
 
@@ -548,7 +628,7 @@ static void a_guard_that_was_stopped_can_be_replaced(void)
 {
     TEST_ASSERT_TRUE(open_it());
     TEST_ASSERT_TRUE(set(true));
-    kill(guard.pid, SIGSTOP);
+    kill(guard.process[0].pid, SIGSTOP);
     TEST_ASSERT_TRUE(open_it());
     TEST_ASSERT_EQUAL_INT(0, shared->level);
     TEST_ASSERT_TRUE(set(true));
@@ -559,7 +639,7 @@ static void without_signs_of_life_it_lets_go(void)
     init(1);
     TEST_ASSERT_TRUE(open_it());
     set(true); /* undone where the guard has let go so soon */
-    wait_for_end_of_own_guard();
+    wait_for_end_of_own_guards();
     TEST_ASSERT_EQUAL_INT(0, shared->level);
     TEST_ASSERT_GREATER_OR_EQUAL_INT(2, shared->off_count); /* in opening, and by the guard */
     TEST_ASSERT_FALSE(hal_guard_feed(&guard, &error));
@@ -607,7 +687,7 @@ static void a_sign_of_life_starts_the_time_anew(void)
         poll(NULL, 0, timeout_ms / 2);
         fed_us = now_us();
         if (hal_guard_feed(&guard, &error)) {
-            wait_for_end_of_own_guard();
+            wait_for_end_of_own_guards();
             TEST_ASSERT_TRUE(now_us() - fed_us >= timeout_ms * 1000);
             return;
         }
@@ -627,12 +707,162 @@ static void the_rest_is_the_strobe_below(void)
     TEST_ASSERT_EQUAL_STRING("line: beat", error.text);
 }
 
+/* Until it is so; the test's own time is over after WIDE_MS. */
+static void wait_until(bool (*is_so)(void))
+{
+    const int64_t end_us = now_us() + WIDE_MS * INT64_C(1000);
+
+    while (!is_so() && now_us() < end_us) {
+        poll(NULL, 0, 1);
+    }
+    TEST_ASSERT_TRUE(is_so());
+}
+
+static bool is_dark(void)
+{
+    return shared->level == 0;
+}
+
+static bool is_refused(void)
+{
+    return !is_closed();
+}
+
+/* One guard stands still, the program is killed: the other guard acts. Either of the two. */
+static void with_one_guard_stopped_the_other_acts(void)
+{
+    for (int i = 0; i < HAL_GUARD_COUNT; i++) {
+        const pid_t pid = program(LONG_MS, go_on);
+
+        kill(shared->guard_pid[i], SIGSTOP);
+        kill(pid, SIGKILL);
+        end_of(pid);
+        expect_exit(shared->guard_pid[1 - i], GUARD_EXIT_GONE);
+        TEST_ASSERT_EQUAL_INT(0, shared->level);
+        kill(shared->guard_pid[i], SIGKILL);
+        end_of(shared->guard_pid[i]);
+    }
+}
+
+/* The program stands still, one guard is killed. */
+static void with_one_guard_killed_the_other_acts(void)
+{
+    for (int i = 0; i < HAL_GUARD_COUNT; i++) {
+        const pid_t pid = program(LONG_MS, go_on);
+
+        kill(pid, SIGSTOP);
+        kill(shared->guard_pid[i], SIGKILL);
+        wait_until(is_dark);
+        kill(pid, SIGKILL);
+        end_of(pid);
+        expect_exit(shared->guard_pid[1 - i], GUARD_EXIT_GONE);
+        TEST_ASSERT_EQUAL_INT(SIGKILL, WTERMSIG(end_of(shared->guard_pid[i])));
+    }
+}
+
+/* Both guards stand still: the program sees it before any feed. */
+static void with_both_guards_stopped_the_program_sees_it(void)
+{
+    TEST_ASSERT_TRUE(open_it());
+    switch_on();
+    for (int i = 0; i < HAL_GUARD_COUNT; i++) {
+        kill(guard.process[i].pid, SIGSTOP);
+    }
+    wait_until(is_refused);
+    TEST_ASSERT_TRUE(set(true));
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, shared->level, "on without a guard that lives");
+    for (int i = 0; i < HAL_GUARD_COUNT; i++) {
+        kill(guard.process[i].pid, SIGCONT);
+    }
+    switch_on();
+    TEST_ASSERT_TRUE_MESSAGE(hal_guard_feed(&guard, &error), error.text);
+}
+
+/* A loop that lives, feeds and never judges a frame. */
+static void without_a_frame_the_guards_switch_off(void)
+{
+    init_with_cap(LONG_MS, 100);
+    TEST_ASSERT_TRUE(open_it());
+    switch_on();
+    const int64_t before_us = now_us();
+    wait_until(is_dark);
+    printf("a cap of 100 ms: dark after %lld us\n", (long long)(now_us() - before_us));
+    TEST_ASSERT_TRUE(set(true));
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, shared->level, "on again without a frame");
+    TEST_ASSERT_TRUE(set(false));
+    TEST_ASSERT_TRUE(guard.strobe.judged(guard.strobe.context, &error));
+    switch_on();
+    TEST_ASSERT_TRUE_MESSAGE(hal_guard_feed(&guard, &error), "a guard has ended");
+}
+
+/* With frames it stays on, for many times the cap. */
+static void with_frames_it_stays_on(void)
+{
+    int rise_count = 1;
+
+    init_with_cap(LONG_MS, 500);
+    TEST_ASSERT_TRUE(open_it());
+    switch_on();
+    for (int i = 0; i < 60; i++) {
+        poll(NULL, 0, 30);
+        TEST_ASSERT_TRUE(guard.strobe.judged(guard.strobe.context, &error));
+        rise_count += shared->level == 0;
+        switch_on();
+    }
+    /* A machine that stands still for half a second makes the guards right to switch off. */
+    TEST_ASSERT_LESS_THAN_INT(20, rise_count);
+}
+
+/* Somebody else drives the line, or a bit of the program has changed. */
+static void a_line_that_was_not_announced_goes_off(void)
+{
+    TEST_ASSERT_TRUE(open_it());
+    shared->level = 1;
+    wait_until(is_dark);
+    TEST_ASSERT_FALSE(is_closed());
+    switch_on();
+}
+
+/* A chip that cannot read its outputs: the guards go by what is announced. */
+static void a_line_that_cannot_be_read_is_guarded_too(void)
+{
+    shared->unreadable = 1;
+    init_with_cap(LONG_MS, 100);
+    TEST_ASSERT_TRUE(open_it());
+    switch_on();
+    wait_until(is_dark);
+}
+
+/* Program killed, guards stopped: nobody acts. What --laser-off does ends them, and no one else. */
+static void who_holds_the_line_can_be_ended(void)
+{
+    const pid_t pid = program(LONG_MS, go_on);
+    char other_name[sizeof line_name + 1];
+
+    TEST_ASSERT_TRUE(open_it());
+    snprintf(other_name, sizeof other_name, "%s0", line_name);
+    TEST_ASSERT_EQUAL_INT(0, hal_guard_end(other_name, &error));
+    close_it();
+    for (int i = 0; i < HAL_GUARD_COUNT; i++) {
+        kill(shared->guard_pid[i], SIGSTOP);
+    }
+    TEST_ASSERT_EQUAL_INT(0, waitpid(pid, NULL, WNOHANG));
+    TEST_ASSERT_EQUAL_INT(1 + HAL_GUARD_COUNT, hal_guard_end(line_name, &error));
+    TEST_ASSERT_EQUAL_INT(SIGKILL, WTERMSIG(end_of(pid)));
+    for (int i = 0; i < HAL_GUARD_COUNT; i++) {
+        TEST_ASSERT_EQUAL_INT(SIGKILL, WTERMSIG(end_of(shared->guard_pid[i])));
+    }
+    TEST_ASSERT_EQUAL_INT(0, hal_guard_end(line_name, &error));
+    shared->level = 0;
+}
+
 int main(void)
 {
     const struct rlimit files = {.rlim_cur = 200, .rlim_max = 200}, no_core = {0, 0};
 
     UNITY_BEGIN();
     test_pid = getpid();
+    snprintf(line_name, sizeof line_name, "test.%d", (int)test_pid);
     setrlimit(RLIMIT_NOFILE, &files);
     setrlimit(RLIMIT_CORE, &no_core);
     prctl(PR_SET_CHILD_SUBREAPER, 1);
@@ -653,7 +883,7 @@ int main(void)
     RUN_TEST(closed_the_guard_ends_and_gives_the_line_back);
     RUN_TEST(opened_again_the_old_guard_has_ended_first);
     RUN_TEST(an_opening_that_fails_has_no_guard);
-    RUN_TEST(without_a_socket_or_process_the_line_is_given_back);
+    RUN_TEST(without_descriptors_the_line_is_given_back);
     RUN_TEST(a_dead_guard_is_noticed);
     RUN_TEST(a_guard_that_was_stopped_is_noticed);
     RUN_TEST(a_guard_that_was_stopped_can_be_replaced);
@@ -661,5 +891,13 @@ int main(void)
     RUN_TEST(while_off_it_needs_no_sign_of_life);
     RUN_TEST(a_sign_of_life_starts_the_time_anew);
     RUN_TEST(the_rest_is_the_strobe_below);
+    RUN_TEST(with_one_guard_stopped_the_other_acts);
+    RUN_TEST(with_one_guard_killed_the_other_acts);
+    RUN_TEST(with_both_guards_stopped_the_program_sees_it);
+    RUN_TEST(without_a_frame_the_guards_switch_off);
+    RUN_TEST(with_frames_it_stays_on);
+    RUN_TEST(a_line_that_was_not_announced_goes_off);
+    RUN_TEST(a_line_that_cannot_be_read_is_guarded_too);
+    RUN_TEST(who_holds_the_line_can_be_ended);
     return UNITY_END();
 }

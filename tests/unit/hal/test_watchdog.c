@@ -94,7 +94,7 @@ void setUp(void)
     device_fd = open(device_path, O_RDONLY | O_NONBLOCK);
     TEST_ASSERT_EQUAL_INT(0, socketpair(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK, 0, guard_ends));
     hal_guard_init(&guard, &config);
-    guard.socket_fd = guard_ends[0];
+    guard.process[0].socket_fd = guard_ends[0]; /* one of them is enough here */
     feeder.notify_fd = feeder.device_fd = -1;
 }
 

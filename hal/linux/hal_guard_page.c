@@ -1,0 +1,75 @@
+#include "linux/hal_guard_page.h"
+
+#include <stdio.h>
+#include <sys/mman.h>
+#include <time.h>
+#include <unistd.h>
+
+struct hal_guard_page *hal_guard_page_new(const char *line_name)
+{
+    char name[sizeof GUARD_PAGE_NAME + 64];
+    snprintf(name, sizeof name, GUARD_PAGE_NAME "%.64s", line_name);
+    int fd = memfd_create(name, MFD_CLOEXEC);
+    if (fd < 0) {
+        return NULL;
+    }
+    void *page = MAP_FAILED;
+    if (ftruncate(fd, sizeof(struct hal_guard_page)) == 0) {
+        page = mmap(NULL, sizeof(struct hal_guard_page), PROT_READ | PROT_WRITE, MAP_SHARED, fd, 0);
+    }
+    close(fd);
+    return page == MAP_FAILED ? NULL : page;
+}
+
+void hal_guard_page_free(struct hal_guard_page *page)
+{
+    if (page != NULL) {
+        munmap(page, sizeof *page);
+    }
+}
+
+int64_t hal_guard_now_us(void)
+{
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000;
+}
+
+void hal_guard_page_announce(struct hal_guard_page *page, bool on)
+{
+    int64_t now_us = hal_guard_now_us();
+    if (page->is_on == on) {
+        return;
+    }
+    page->writes++;
+    if (!on) {
+        page->sum_us += now_us - page->edge_us;
+    }
+    page->is_on = on;
+    page->edge_us = now_us;
+    page->writes++;
+}
+
+void hal_guard_page_judged(struct hal_guard_page *page)
+{
+    page->judged_on_us =
+        page->sum_us + (page->is_on ? hal_guard_now_us() - page->edge_us : INT64_C(0));
+}
+
+bool hal_guard_page_read(const struct hal_guard_page *page, int64_t now_us,
+                         struct hal_guard_view *view)
+{
+    view->writes = page->writes;
+    view->is_on = page->is_on;
+    view->judged_on_us = page->judged_on_us;
+    int64_t edge_us = page->edge_us, sum_us = page->sum_us;
+    /* Switched on after the caller has looked at the clock: not yet. */
+    view->on_us = sum_us + (view->is_on && now_us > edge_us ? now_us - edge_us : 0);
+    return view->writes % 2 == 0 && view->writes == page->writes;
+}
+
+bool hal_guard_page_lives(const struct hal_guard_page *page, int guard, int64_t now_us)
+{
+    int64_t age_us = now_us - page->guard[guard].life_us;
+    return age_us < GUARD_STALE_MS * 1000 && age_us > -GUARD_STALE_MS * 1000;
+}
