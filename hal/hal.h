@@ -24,6 +24,9 @@ struct hal_error {
     char text[HAL_ERROR_MAX];
 };
 
+/* More to the end of a text, after "; " where there is some. */
+void hal_add(struct hal_error *error, const char *text);
+
 /* Set the text; always false, so that a failing function can return it. */
 bool hal_fail(struct hal_error *error, const char *format, ...)
     __attribute__((format(printf, 2, 3)));
@@ -91,6 +94,9 @@ struct hal_strobe {
     bool (*judged)(void *context, struct hal_error *error);
     /* What the laser's line reads, whatever it was set to. False: *error, it cannot be read. */
     bool (*level)(void *context, bool *on, struct hal_error *error);
+    /* Right after opening, with the laser off: try what can be tried of the lines. *unproven: what
+     * could not be shown to work, ""  where all could. False: *error, something does not work. */
+    bool (*prove)(void *context, struct hal_error *unproven, struct hal_error *error);
 };
 
 /* What can be waited for; a set. */

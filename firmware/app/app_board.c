@@ -154,7 +154,7 @@ static enum app_exit run_loop(struct app_board *board, const struct app_config *
 
 static enum app_exit run_with_output(struct app_board *board, const struct app_config *config)
 {
-    struct hal_error error;
+    struct hal_error error, unproven;
     const struct hal_watchdog_config watchdog = {
         .path = config->watchdog,
         .guard = config->laser ? &board->guard : NULL,
@@ -163,11 +163,14 @@ static enum app_exit run_with_output(struct app_board *board, const struct app_c
     if (!hal_signals_open(&board->signals, config->laser ? &board->guard.strobe : NULL, &error)) {
         return fail(board, "signals", &error, APP_EXIT_FAILED);
     }
-    if (!hal_watchdog_open(&board->watchdog, &watchdog, &error)) {
+    if (!hal_watchdog_open(&board->watchdog, &watchdog, &unproven, &error)) {
         return fail(board, "watchdog", &error, APP_EXIT_FAILED);
     }
+    if (unproven.text[0] != 0) {
+        app_log_say(&board->log, APP_LOG_WARNING, "%s", unproven.text);
+    }
     enum app_exit exit = run_loop(board, config);
-    hal_watchdog_close(&board->watchdog);
+    hal_watchdog_close(&board->watchdog, board->state.laser.may_be_on);
     return exit;
 }
 

@@ -53,6 +53,7 @@ static bool force_off(struct app_laser *laser, struct hal_error *error)
     laser->strobe->close(laser->strobe->context);
     laser->is_open = false;
     laser->is_on = false;
+    laser->may_be_on = laser->may_be_on || !off;
     return off;
 }
 
@@ -181,8 +182,9 @@ void app_laser_init(struct app_laser *laser, const struct app_laser_config *conf
     laser->credit = credit_max(laser);
 }
 
-bool app_laser_open(struct app_laser *laser)
+bool app_laser_open(struct app_laser *laser, struct hal_error *unproven)
 {
+    unproven->text[0] = 0;
     if (!laser->config.enabled) {
         return true;
     }
@@ -191,6 +193,10 @@ bool app_laser_open(struct app_laser *laser)
         return false;
     }
     laser->is_open = true;
+    if (!laser->strobe->prove(laser->strobe->context, unproven, &laser->failed)) {
+        fail(laser);
+        return false;
+    }
     return true;
 }
 

@@ -89,14 +89,16 @@ struct app_laser {
     int64_t on_us;                          /* sum of all times with the laser on */
     int64_t on_count;                       /* how often it was switched on */
     struct hal_error failed;                /* why APP_LASER_BLOCK_FAULT */
+    bool may_be_on; /* it could not be switched off, only its lines given back */
 };
 
 /* Off, with everything against it that can be; strobe and config's values are kept. */
 void app_laser_init(struct app_laser *laser, const struct app_laser_config *config,
                     const struct hal_strobe *strobe, int64_t now_us);
 
-/* Take the lines; false: failed. Not enabled: nothing happens. */
-bool app_laser_open(struct app_laser *laser);
+/* Take the lines and try them; *unproven: what could not be shown to work, or "". False: failed, and
+ * the lines are given back. Not enabled: nothing happens. */
+bool app_laser_open(struct app_laser *laser, struct hal_error *unproven);
 
 /* Off by every means, lines given back. May be called at any time, several times. If it could not be
  * switched off before: failed. */

@@ -327,7 +327,11 @@ enum app_exit app_loop_run(struct app_state *state)
     state->width = state->head->rig.calibration.width;
     state->height = state->head->rig.calibration.height;
     app_laser_rig(&state->laser, true, app_state_now_us(state));
-    if (app_laser_open(&state->laser)) {
+    if (app_laser_open(&state->laser, &error)) {
+        if (error.text[0] != 0) {
+            app_log_say(state->log, APP_LOG_WARNING, "laser: not proven at the start: %s",
+                        error.text);
+        }
         while (!state->is_over) {
             run_once(state);
         }

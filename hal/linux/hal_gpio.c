@@ -61,20 +61,21 @@ static bool take_all(struct hal_gpio *gpio, const struct hal_gpio_chip_info *inf
     return true;
 }
 
-/* Not switched off: without stdio and strerror, since a signal handler may be here. */
+/* Not switched off: without stdio and strerror, since a signal handler may be here. reason 0: it was
+ * set, and reads as on. */
 static bool fail_off(const struct hal_gpio *gpio, int reason, struct hal_error *error)
 {
-    static const char before[] = ": cannot be switched off: error ";
+    static const char refused[] = ": cannot be switched off: error ";
+    static const char reads_on[] = ": switched off, and reads as on";
+    const char *text = reason == 0 ? reads_on : refused;
     char digits[12];
     size_t digit_count = 0, length = strnlen(gpio->what, sizeof gpio->what - 1);
-    unsigned remaining = reason < 0 ? 0 : (unsigned)reason;
-    do {
+    for (int remaining = reason; remaining > 0; remaining /= 10) {
         digits[digit_count++] = (char)('0' + remaining % 10);
-        remaining /= 10;
-    } while (remaining > 0);
+    }
     memcpy(error->text, gpio->what, length);
-    memcpy(error->text + length, before, sizeof before - 1);
-    length += sizeof before - 1;
+    memcpy(error->text + length, text, strlen(text));
+    length += strlen(text);
     while (digit_count > 0) {
         error->text[length++] = digits[--digit_count];
     }
@@ -82,15 +83,33 @@ static bool fail_off(const struct hal_gpio *gpio, int reason, struct hal_error *
     return false;
 }
 
+/* Set, and read back. False: errno, 0 where the line reads otherwise. */
+static bool set_line(struct hal_gpio *gpio, bool on)
+{
+    if (!hal_gpio_line_set(&gpio->laser, on)) {
+        return false;
+    }
+    if (!gpio->can_read || gpio->laser.handle == NULL) {
+        return true;
+    }
+    int level = hal_gpio_line_get(&gpio->laser);
+    if (level < 0) {
+        return false;
+    }
+    errno = 0;
+    gpio->was_on = gpio->was_on || (on && level == 1);
+    return level == on || (on && !gpio->was_on);
+}
+
 static bool gpio_set(void *context, bool on, struct hal_error *error)
 {
     struct hal_gpio *gpio = context;
     if (on) {
-        return hal_gpio_line_set(&gpio->laser, true) ||
-               hal_fail(error, "%s: cannot be switched on: %s", gpio->what, strerror(errno));
+        return set_line(gpio, true) || hal_fail(error, "%s: cannot be switched on: %s", gpio->what,
+                                                errno == 0 ? "it reads as off" : strerror(errno));
     }
     for (int i = 0; i < HAL_GPIO_OFF_TRIES; i++) {
-        if (hal_gpio_line_set(&gpio->laser, false)) {
+        if (set_line(gpio, false)) {
             return true;
         }
     }
@@ -142,6 +161,13 @@ static bool gpio_open(void *context, struct hal_error *error)
     }
     snprintf(gpio->what, sizeof gpio->what, "laser-line: '%.20s' of %.30s", config->laser_line,
              info.name);
+    int level = hal_gpio_line_get(&gpio->laser);
+    if (level == 1) {
+        gpio_close(gpio);
+        return hal_fail(error, "%s: taken as off, and reads as on", gpio->what);
+    }
+    gpio->can_read = level == 0;
+    gpio->was_on = false;
     gpio->laser_fd = gpio->laser.fd;
     gpio->interlock_fd = gpio->interlock.fd;
     gpio->beat = false;
@@ -202,10 +228,55 @@ static bool gpio_level(void *context, bool *on, struct hal_error *error)
     return level >= 0 || hal_fail(error, "%s: cannot be read: %s", gpio->what, strerror(errno));
 }
 
+/* Both levels, read back. What hangs on the line cannot be seen from here. */
+static bool prove_heartbeat(struct hal_gpio *gpio, struct hal_error *unproven,
+                            struct hal_error *error)
+{
+    bool is_read = true;
+    for (int edge = 0; edge < 2; edge++) {
+        if (!gpio_beat(gpio, error)) {
+            return false;
+        }
+        int level = hal_gpio_line_get(&gpio->heartbeat);
+        if (level >= 0 && level != gpio->beat) {
+            return hal_fail(error, "heartbeat-line: '%.31s' of %.80s was set to %d and reads %d",
+                            gpio->config.heartbeat_line, gpio->config.chip, gpio->beat, level);
+        }
+        is_read = is_read && level >= 0;
+    }
+    hal_add(unproven, is_read ? "heartbeat-line: moves, but not that its one-shot acts"
+                              : "heartbeat-line: cannot be read back");
+    return true;
+}
+
+static bool prove_interlock(struct hal_gpio *gpio, struct hal_error *unproven,
+                            struct hal_error *error)
+{
+    bool closed = false;
+    if (!gpio_interlock(gpio, &closed, error)) {
+        return false;
+    }
+    if (closed) {
+        hal_add(unproven, "interlock-line: closed since the start, not that it opens");
+    }
+    return true;
+}
+
+static bool gpio_prove(void *context, struct hal_error *unproven, struct hal_error *error)
+{
+    struct hal_gpio *gpio = context;
+    unproven->text[0] = 0;
+    if (!gpio->can_read) {
+        hal_add(unproven, "laser-line: cannot be read back");
+    }
+    return (gpio->config.heartbeat_line == NULL || prove_heartbeat(gpio, unproven, error)) &&
+           (gpio->config.interlock_line == NULL || prove_interlock(gpio, unproven, error));
+}
+
 void hal_gpio_init(struct hal_gpio *gpio, const struct hal_gpio_config *config)
 {
     *gpio = (struct hal_gpio){.strobe = {gpio, gpio_open, gpio_close, gpio_set, gpio_beat,
-                                         gpio_interlock, gpio_judged, gpio_level},
+                                         gpio_interlock, gpio_judged, gpio_level, gpio_prove},
                               .interlock_fd = -1,
                               .laser_fd = -1,
                               .config = *config,

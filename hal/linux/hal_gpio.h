@@ -16,6 +16,10 @@
  *        that hold here.) On this side: one atomic pointer, which is NULL whenever the line is not
  *        taken, and an error text that is built without stdio. errno is changed.
  * Not taken: set(false) is true, as nothing here drives the line; all other calls fail.
+ * Read-back: after each set() the line is read, where the chip can read its outputs; open() finds that
+ *        out. On after it was switched off is an error, always. Off after it was switched on is one
+ *        once it has been read as on: some controllers read 0 whatever an output drives, and a line
+ *        that stays dark hurts nobody.
  * Off:   is tried HAL_GPIO_OFF_TRIES times before it is reported as failed; close() tries as often, and
  *        gives the line back whatever comes of it.
  * After: the kernel does not touch the level of a line that is given back. Most controllers go on
@@ -66,6 +70,8 @@ struct hal_gpio {
     struct gpiod_chip *chip;
     struct hal_gpio_line laser, interlock, heartbeat;
     bool beat;     /* the heartbeat's level */
+    bool can_read; /* the laser's line */
+    bool was_on;   /* it has been read as on */
     char what[96]; /* the laser's line in errors */
 };
 

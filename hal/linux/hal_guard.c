@@ -336,10 +336,16 @@ static bool guard_level(void *context, bool *on, struct hal_error *error)
     return strobe->level(strobe->context, on, error);
 }
 
+static bool guard_prove(void *context, struct hal_error *unproven, struct hal_error *error)
+{
+    const struct hal_strobe *strobe = ((struct hal_guard *)context)->config.strobe;
+    return strobe->prove(strobe->context, unproven, error);
+}
+
 void hal_guard_init(struct hal_guard *guard, const struct hal_guard_config *config)
 {
     *guard = (struct hal_guard){.strobe = {guard, guard_open, guard_close, guard_set, guard_beat,
-                                           guard_interlock, guard_judged, guard_level},
+                                           guard_interlock, guard_judged, guard_level, guard_prove},
                                 .config = *config};
     for (int i = 0; i < HAL_GUARD_COUNT; i++) {
         guard->process[i] = (struct hal_guard_process){.socket_fd = -1, .pid = -1};

@@ -3,9 +3,11 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <limits.h>
+#include <linux/watchdog.h>
 #include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/ioctl.h>
 #include <sys/socket.h>
 #include <sys/un.h>
 #include <unistd.h>
@@ -76,7 +78,25 @@ static bool open_notify(struct hal_watchdog_feeder *feeder, struct hal_error *er
     return true;
 }
 
-static bool open_device(struct hal_watchdog_feeder *feeder, struct hal_error *error)
+/* Its time is set, and what it says of it afterwards counts. */
+static bool set_time(int fd, const char *path, struct hal_error *unproven, struct hal_error *error)
+{
+    int wanted_s = HAL_WATCHDOG_TIMEOUT_S, time_s = 0;
+    bool is_set = ioctl(fd, WDIOC_SETTIMEOUT, &wanted_s) == 0;
+    if (ioctl(fd, WDIOC_GETTIMEOUT, &time_s) != 0) {
+        hal_fail(unproven, "watchdog: '%.80s' does not say when it resets", path);
+    } else if ((int64_t)time_s * 1000000 < 2 * HAL_WATCHDOG_STEP_US) {
+        return hal_fail(error, "'%.120s' resets after %d s, expected %d", path, time_s,
+                        HAL_WATCHDOG_TIMEOUT_S);
+    } else if (!is_set || time_s != HAL_WATCHDOG_TIMEOUT_S) {
+        hal_fail(unproven, "watchdog: '%.80s' resets after %d s, requested %d", path, time_s,
+                 HAL_WATCHDOG_TIMEOUT_S);
+    }
+    return true;
+}
+
+static bool open_device(struct hal_watchdog_feeder *feeder, struct hal_error *unproven,
+                        struct hal_error *error)
 {
     const char *path = feeder->config.path;
     if (path == NULL) {
@@ -87,7 +107,7 @@ static bool open_device(struct hal_watchdog_feeder *feeder, struct hal_error *er
         return hal_fail(error, "'%.120s': %s; expected a device like /dev/watchdog", path,
                         strerror(errno));
     }
-    return true;
+    return set_time(feeder->device_fd, path, unproven, error);
 }
 
 /* Is the next feed due? */
@@ -147,17 +167,12 @@ static bool watchdog_feed(void *context, struct hal_error *error)
     struct hal_watchdog_feeder *feeder = context;
     const struct hal_clock *clock = feeder->config.clock;
     int64_t now_us = clock->now_us(clock->context);
-    struct hal_error errors[3];
-    const bool fed[3] = {feed_guard(feeder, now_us, &errors[0]),
-                         feed_device(feeder, now_us, &errors[1]),
-                         feed_notify(feeder, now_us, &errors[2])};
-    for (int i = 0; i < 3; i++) {
-        if (!fed[i]) {
-            *error = errors[i];
-            return false;
-        }
+    struct hal_error ignored;
+    if (!feed_guard(feeder, now_us, error)) {
+        return false;
     }
-    return true;
+    bool device_fed = feed_device(feeder, now_us, error);
+    return feed_notify(feeder, now_us, device_fed ? error : &ignored) && device_fed;
 }
 
 /* A guard with a short timeout needs a feed more often than the others. */
@@ -179,8 +194,9 @@ static void close_all(struct hal_watchdog_feeder *feeder)
 }
 
 bool hal_watchdog_open(struct hal_watchdog_feeder *feeder, const struct hal_watchdog_config *config,
-                       struct hal_error *error)
+                       struct hal_error *unproven, struct hal_error *error)
 {
+    unproven->text[0] = 0;
     *feeder = (struct hal_watchdog_feeder){.watchdog = {feeder, watchdog_feed},
                                            .config = *config,
                                            .device_fd = -1,
@@ -189,21 +205,21 @@ bool hal_watchdog_open(struct hal_watchdog_feeder *feeder, const struct hal_watc
                                            .notify = {0, INT64_MIN},
                                            .guard = {guard_step_us(config->guard), INT64_MIN}};
     /* The device last: it runs from its opening on. */
-    if (!open_notify(feeder, error) || !open_device(feeder, error)) {
+    if (!open_notify(feeder, error) || !open_device(feeder, unproven, error)) {
         close_all(feeder);
         return false;
     }
     return true;
 }
 
-void hal_watchdog_close(struct hal_watchdog_feeder *feeder)
+void hal_watchdog_close(struct hal_watchdog_feeder *feeder, bool may_be_on)
 {
     static const char stopping[] = "STOPPING=1";
     if (feeder->notify_fd >= 0) {
         /* Nobody to hear it: nothing is lost, the end is seen anyway. */
         (void)send(feeder->notify_fd, stopping, sizeof stopping - 1, MSG_NOSIGNAL);
     }
-    if (feeder->device_fd >= 0 && write(feeder->device_fd, "V", 1) != 1) {
+    if (feeder->device_fd >= 0 && !may_be_on && write(feeder->device_fd, "V", 1) != 1) {
         /* The device then resets the machine, as it is there to do. */
     }
     close_all(feeder);

@@ -9,13 +9,16 @@
  *           for this process. The protocol is one datagram of text to a socket, promised to stay
  *           (sd_notify(3), "Notes"); the fifty lines for it here replace a library and its
  *           dependencies in packages and cross builds.
- * machine:  a device like /dev/watchdog: a byte each HAL_WATCHDOG_STEP_US, and 'V' at the orderly end,
- *           which stops it (a driver set to nowayout goes on and resets the machine). A period below
- *           two steps is too short for it.
+ * machine:  a device like /dev/watchdog, set to reset the machine after HAL_WATCHDOG_TIMEOUT_S: a byte
+ *           each HAL_WATCHDOG_STEP_US, and 'V' at the orderly end with the laser off, which stops it
+ *           (a driver set to nowayout goes on and resets the machine). The driver may round the time,
+ *           or have one that cannot be set: what it says then is reported. Below two steps is an
+ *           error.
  * guard:    hal_guard_feed each HAL_WATCHDOG_STEP_US, or four times per its timeout.
  *
- * Error:    all are fed before one that failed is reported; the guard first. A full socket of systemd
- *           is no error: it is tried again with the next feed.
+ * Error:    the guard comes first: without it nobody else is fed, and they act. The others are both
+ *           fed before one that failed is reported. A full socket of systemd is no error: it is tried
+ *           again with the next feed.
  */
 #ifndef HAL_WATCHDOG_H
 #define HAL_WATCHDOG_H
@@ -23,6 +26,8 @@
 #include "linux/hal_guard.h"
 
 #define HAL_WATCHDOG_STEP_US 400000
+/* Longer than a USB camera takes to open or to fail; the unit's WatchdogSec, too. */
+#define HAL_WATCHDOG_TIMEOUT_S 10
 
 struct hal_watchdog_config {
     const char *path;        /* a watchdog device; NULL: none */
@@ -47,10 +52,11 @@ struct hal_watchdog_feeder {
 };
 
 /* False: *error names the variable or device, what was found and expected; nothing is open. Opening
- * the device starts it. */
+ * the device starts it. *unproven: what is not known of its time, or "". */
 bool hal_watchdog_open(struct hal_watchdog_feeder *feeder, const struct hal_watchdog_config *config,
-                       struct hal_error *error);
-/* The orderly end. Without it the watchers act, as they should. */
-void hal_watchdog_close(struct hal_watchdog_feeder *feeder);
+                       struct hal_error *unproven, struct hal_error *error);
+/* The orderly end. Without it the watchers act, as they should: so does the machine's where the laser
+ * may be on. */
+void hal_watchdog_close(struct hal_watchdog_feeder *feeder, bool may_be_on);
 
 #endif

@@ -41,6 +41,7 @@ enum world_function {
     WORLD_STROBE_BEAT,
     WORLD_STROBE_INTERLOCK,
     WORLD_STROBE_JUDGED,
+    WORLD_STROBE_PROVE,
     WORLD_EVENTS_WAIT,
     WORLD_EVENTS_NOTHING, /* an event goes by unseen */
     WORLD_WATCHDOG_FEED,
@@ -50,12 +51,13 @@ enum world_function {
 };
 
 static const char *const world_function_text[WORLD_FUNCTIONS] = {
-    "camera.open",      "camera.next: gone", "camera.next: bad frame",
-    "camera.next: end", "camera.next: none", "camera.set_exposure",
-    "strobe.open",      "strobe.set on",     "strobe.set on, but high",
-    "strobe.set off",   "strobe.beat",       "strobe.interlock",
-    "strobe.judged",    "events.wait",       "events.wait: unseen",
-    "watchdog.feed",    "output.send: not",  "output.send: never",
+    "camera.open",         "camera.next: gone", "camera.next: bad frame",
+    "camera.next: end",    "camera.next: none", "camera.set_exposure",
+    "strobe.open",         "strobe.set on",     "strobe.set on, but high",
+    "strobe.set off",      "strobe.beat",       "strobe.interlock",
+    "strobe.judged",       "strobe.prove",      "events.wait",
+    "events.wait: unseen", "watchdog.feed",     "output.send: not",
+    "output.send: never",
 };
 
 /* What happens at a frame's time, in place of the frame or with it. */
@@ -120,6 +122,7 @@ struct world {
     int busy_on_count;              /* heads were looked for with the laser on */
     int32_t drift_rad_q30[3];       /* from one lit frame to the next */
     struct ih_alignment alignment;  /* what the core says of every lit frame */
+    int unproven_count;             /* messages of it */
     int moved_count, lost_count;    /* warnings of the rig */
     char moved[APP_LOG_TEXT_MAX];   /* the last one */
     char unknown[APP_LOG_TEXT_MAX]; /* why --check has no answer */
@@ -446,6 +449,14 @@ static bool world_strobe_judged(void *context, struct hal_error *error)
     return world_call(WORLD_STROBE_JUDGED) ? hal_fail(error, "cannot be passed on") : true;
 }
 
+static bool world_strobe_prove(void *context, struct hal_error *unproven, struct hal_error *error)
+{
+    (void)context;
+    TEST_ASSERT_TRUE(world.line_taken && !world.line);
+    hal_fail(unproven, "interlock-line: closed since the start");
+    return world_call(WORLD_STROBE_PROVE) ? hal_fail(error, "does not move") : true;
+}
+
 static void world_push(bool is_half)
 {
     struct hal_frame *frame = &world.queue[world.queue_count];
@@ -615,6 +626,7 @@ static void world_write(void *context, int level, const char *text)
 {
     (void)context;
     world.reported_fault |= strstr(text, "laser: cannot be set") != NULL;
+    world.unproven_count += strstr(text, "not proven at the start: interlock-line") != NULL;
     world.lost_count += strstr(text, "good: does not fit") != NULL;
     if (strncmp(text, "made up: ", 9) == 0) {
         snprintf(world.camera_text, sizeof world.camera_text, "%s", text);
@@ -665,6 +677,7 @@ static void world_init(enum app_strobe strobe, const enum world_act *act, int ac
         .beat = world_strobe_beat,
         .interlock = world_strobe_interlock,
         .judged = world_strobe_judged,
+        .prove = world_strobe_prove,
     };
     world.event_table = (struct hal_events){.wait = world_wait};
     world.clock = (struct hal_clock){.now_us = world_now};

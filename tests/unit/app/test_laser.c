@@ -9,7 +9,7 @@ static struct {
     bool line, taken, closed;
     bool opens_after_read; /* the interlock opens right after it was read */
     int off_failures;      /* so many calls of set(false) fail */
-    bool on_fails, judged_fails;
+    bool on_fails, judged_fails, prove_fails;
     int judged_count;
     int close_count, beat_count, call_count;
     bool beat_high;      /* the heartbeat's line, whatever it began with */
@@ -23,6 +23,7 @@ static bool fake_open(void *context, struct hal_error *error)
     (void)context;
     (void)error;
     fake.taken = true;
+    fake.line = false;
     return true;
 }
 
@@ -72,18 +73,29 @@ static bool fake_judged(void *context, struct hal_error *error)
     return fake.judged_fails ? hal_fail(error, "judged fails") : true;
 }
 
+static bool fake_prove(void *context, struct hal_error *unproven, struct hal_error *error)
+{
+    (void)context;
+    TEST_ASSERT_FALSE(fake.line);
+    hal_fail(unproven, "made up");
+    return fake.prove_fails ? hal_fail(error, "prove fails") : true;
+}
+
 static const struct hal_strobe strobe = {.open = fake_open,
                                          .close = fake_close,
                                          .set = fake_set,
                                          .beat = fake_beat,
                                          .interlock = fake_interlock,
-                                         .judged = fake_judged};
+                                         .judged = fake_judged,
+                                         .prove = fake_prove};
 
 static void start(bool enabled, int32_t duty_percent)
 {
     const struct app_laser_config config = {enabled, duty_percent, CAP_US};
     app_laser_init(&laser, &config, &strobe, 0);
-    TEST_ASSERT_TRUE(app_laser_open(&laser));
+    struct hal_error unproven;
+    TEST_ASSERT_TRUE(app_laser_open(&laser, &unproven));
+    TEST_ASSERT_EQUAL_STRING(enabled ? "made up" : "", unproven.text);
     app_laser_rig(&laser, true, 0);
     app_laser_camera(&laser, true, FRAME_US, 0);
 }
@@ -91,6 +103,7 @@ static void start(bool enabled, int32_t duty_percent)
 void setUp(void)
 {
     fake.line = fake.taken = fake.opens_after_read = fake.on_fails = fake.judged_fails = false;
+    fake.prove_fails = false;
     fake.closed = true;
     fake.judged_count = 0;
     fake.off_failures = fake.close_count = fake.beat_count = fake.call_count = 0;
@@ -620,6 +633,7 @@ static void test_off_fails(void)
         TEST_ASSERT_FALSE(fake.taken);
         TEST_ASSERT_BITS_HIGH(APP_LASER_BLOCK_FAULT, laser.blocks);
         TEST_ASSERT_EQUAL_STRING("off fails", laser.failed.text);
+        TEST_ASSERT_EQUAL(failures > 1 + APP_LASER_OFF_TRIES, laser.may_be_on);
         app_laser_wish(&laser, true, 0);
         app_laser_interlock(&laser, 0);
         app_laser_frame(&laser, 0);
@@ -627,6 +641,23 @@ static void test_off_fails(void)
         app_laser_close(&laser, 0);
         TEST_ASSERT_FALSE(fake.line);
     }
+}
+
+/* What does not work at the start is never switched on. */
+static void test_prove_fails(void)
+{
+    const struct app_laser_config config = {true, 100, CAP_US};
+    struct hal_error unproven;
+    fake.prove_fails = true;
+    app_laser_init(&laser, &config, &strobe, 0);
+    TEST_ASSERT_FALSE(app_laser_open(&laser, &unproven));
+    TEST_ASSERT_FALSE(fake.taken);
+    TEST_ASSERT_EQUAL_STRING("prove fails", laser.failed.text);
+    app_laser_rig(&laser, true, 0);
+    app_laser_camera(&laser, true, FRAME_US, 0);
+    app_laser_wish(&laser, true, 0);
+    TEST_ASSERT_FALSE(fake.line);
+    TEST_ASSERT_FALSE(laser.may_be_on);
 }
 
 static void test_on_fails(void)
@@ -661,6 +692,7 @@ int main(void)
     RUN_TEST(test_a_rising_edge_comes_before_the_light);
     RUN_TEST(test_beats_while_on);
     RUN_TEST(test_off_fails);
+    RUN_TEST(test_prove_fails);
     RUN_TEST(test_on_fails);
     return UNITY_END();
 }

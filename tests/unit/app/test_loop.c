@@ -39,6 +39,7 @@ static void test_gated_takes_every_frame(void)
     TEST_ASSERT_EQUAL_INT(0, world.dark_count);
     TEST_ASSERT_EQUAL_INT(21, world.rise_count); /* one for the frame that did not come any more */
     TEST_ASSERT_EQUAL_INT(0, count_in_records("lost") + count_in_records("skipped"));
+    TEST_ASSERT_EQUAL_INT(1, world.unproven_count);
 }
 
 /* --check: as many frames as it takes, no record, and a status. */
@@ -523,6 +524,7 @@ static bool is_fatal(enum world_function function)
     case WORLD_STROBE_BEAT:
     case WORLD_STROBE_INTERLOCK:
     case WORLD_STROBE_JUDGED:
+    case WORLD_STROBE_PROVE:
     case WORLD_EVENTS_WAIT:
     case WORLD_WATCHDOG_FEED:
     case WORLD_OUTPUT_NEVER:

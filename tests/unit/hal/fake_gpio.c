@@ -107,7 +107,7 @@ static void trace(struct fake_line *line, int level)
 {
     size_t length = strlen(line->trace);
 
-    line->level = level;
+    line->level = line->is_stuck ? line->level : level;
     if (length + 1 < sizeof line->trace) {
         line->trace[length] = (char)('0' + level);
     }
@@ -157,6 +157,10 @@ bool fake_set(struct fake_line *line, int value)
 int fake_get(struct fake_line *line)
 {
     fake.misuse_count += !line->taken;
+    if (fake.unreadable && line->output) {
+        errno = EIO;
+        return -1;
+    }
     return fake_fails() ? -1 : line->level ^ line->active_low;
 }
 

@@ -19,7 +19,8 @@ struct fake_line {
     bool used;        /* by somebody else */
     bool taken, output, active_low;
     int fd;
-    int level; /* of the wire: 0 or 1 */
+    int level;     /* of the wire: 0 or 1 */
+    bool is_stuck; /* the wire stays, whatever it is driven to */
     int event_count;
     char consumer[32];
     char trace[FAKE_TRACE]; /* levels that it was driven to as an output, '0' and '1' */
@@ -41,6 +42,7 @@ struct fake_gpio {
     int fail_errno;
     int object_count; /* of libgpiod's, not freed yet */
     int misuse_count; /* calls that libgpiod does not allow */
+    bool unreadable;  /* outputs cannot be read */
     bool opens_more;  /* a request opens something else before the line, and keeps it */
     int more_fd;      /* that; -1: none */
 };

@@ -410,14 +410,95 @@ static void a_line_that_stays_on_is_reported_and_given_back(void)
     TEST_ASSERT_FALSE(laser->taken);
 }
 
+/* Something else drives the wire, or the transistor of the output has failed. */
+static void a_line_that_reads_on_after_off_is_reported(void)
+{
+    bool on = false;
+
+    TEST_ASSERT_TRUE(open_with(&plain));
+    TEST_ASSERT_TRUE(set(true));
+    TEST_ASSERT_TRUE(gpio.strobe.level(gpio.strobe.context, &on, &error));
+    TEST_ASSERT_TRUE(on);
+    laser->is_stuck = true;
+    TEST_ASSERT_FALSE(set(false));
+    TEST_ASSERT_EQUAL_STRING("laser-line: 'laser' of gpiochip0: switched off, and reads as on",
+                             error.text);
+    TEST_ASSERT_EQUAL_STRING("01000", laser->trace); /* HAL_GPIO_OFF_TRIES times */
+    laser->is_stuck = false;
+    TEST_ASSERT_TRUE(set(false));
+    TEST_ASSERT_TRUE(gpio.strobe.level(gpio.strobe.context, &on, &error));
+    TEST_ASSERT_FALSE(on);
+    close_it();
+    laser->level = 1;
+    laser->is_stuck = true;
+    TEST_ASSERT_FALSE(open_with(&plain));
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(error.text, "taken as off, and reads as on"), error.text);
+    TEST_ASSERT_FALSE(laser->taken);
+}
+
+/* Never on: a chip that reads 0 whatever it drives. Off after it was on: something is broken. */
+static void a_line_that_reads_off_after_on_is_reported_once_it_was_on(void)
+{
+    TEST_ASSERT_TRUE(open_with(&plain));
+    laser->is_stuck = true;
+    TEST_ASSERT_TRUE(set(true));
+    TEST_ASSERT_TRUE(set(false));
+    laser->is_stuck = false;
+    TEST_ASSERT_TRUE(set(true));
+    TEST_ASSERT_TRUE(set(false));
+    laser->is_stuck = true;
+    TEST_ASSERT_FALSE(set(true));
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(error.text, "cannot be switched on: it reads as off"),
+                                 error.text);
+}
+
+static bool prove(struct hal_error *unproven)
+{
+    return gpio.strobe.prove(gpio.strobe.context, unproven, &error);
+}
+
+/* What the start can show, and what it says of the rest. */
+static void what_can_be_tried_at_the_start_is_tried(void)
+{
+    struct hal_error unproven;
+
+    TEST_ASSERT_TRUE(open_with(&plain));
+    TEST_ASSERT_TRUE(prove(&unproven));
+    TEST_ASSERT_EQUAL_STRING("", unproven.text);
+    close_it();
+    interlock->level = 1;
+    TEST_ASSERT_TRUE(open_with(&full));
+    TEST_ASSERT_TRUE_MESSAGE(prove(&unproven), error.text);
+    TEST_ASSERT_EQUAL_STRING("heartbeat-line: moves, but not that its one-shot acts; "
+                             "interlock-line: closed since the start, not that it opens",
+                             unproven.text);
+    TEST_ASSERT_EQUAL_STRING("010", beat->trace);
+    TEST_ASSERT_EQUAL_STRING("000", laser->trace); /* taken, given back, taken */
+    beat->is_stuck = true;
+    TEST_ASSERT_FALSE(prove(&unproven));
+    TEST_ASSERT_EQUAL_STRING("heartbeat-line: 'beat' of gpiochip0 was set to 1 and reads 0",
+                             error.text);
+    close_it();
+    fake_reset();
+    fake.unreadable = true; /* open now, too */
+    TEST_ASSERT_TRUE(open_with(&full));
+    TEST_ASSERT_TRUE(prove(&unproven));
+    TEST_ASSERT_EQUAL_STRING("laser-line: cannot be read back; heartbeat-line: cannot be read back",
+                             unproven.text);
+    TEST_ASSERT_TRUE(set(true));
+    TEST_ASSERT_TRUE(set(false));
+}
+
 /* As a program does: on the first failure it closes, at the end too. */
 static bool use(const struct hal_gpio_config *config)
 {
     const struct hal_strobe *strobe = &gpio.strobe;
     void *context = strobe->context;
     bool closed = false;
-    bool good = open_with(config) && strobe->interlock(context, &closed, &error) &&
-                strobe->set(context, true, &error) && strobe->beat(context, &error);
+    struct hal_error unproven;
+    bool good = open_with(config) && strobe->prove(context, &unproven, &error) &&
+                strobe->interlock(context, &closed, &error) && strobe->set(context, true, &error) &&
+                strobe->beat(context, &error);
 
     if (good) {
         fake_drive(interlock, 0);
@@ -524,6 +605,9 @@ int main(void)
     RUN_TEST(an_interlock_that_cannot_be_read_is_not_closed);
     RUN_TEST(off_is_tried_again);
     RUN_TEST(a_line_that_stays_on_is_reported_and_given_back);
+    RUN_TEST(a_line_that_reads_on_after_off_is_reported);
+    RUN_TEST(a_line_that_reads_off_after_on_is_reported_once_it_was_on);
+    RUN_TEST(what_can_be_tried_at_the_start_is_tried);
     RUN_TEST(after_any_single_fault_the_laser_is_off_and_nothing_is_left);
     RUN_TEST(when_the_chip_fails_for_good_nothing_is_left);
     RUN_TEST(a_failed_opening_takes_nothing);

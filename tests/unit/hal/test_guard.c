@@ -238,10 +238,17 @@ static bool is_closed(void)
 static void switch_on(void)
 {
     do {
-        if (is_closed() ? !set(true) : guard.process[0].socket_fd < 0 || error.text[0] != 0) {
-            memset(&error, 0, sizeof error);
+        bool has_failed = false;
+        if (is_closed()) {
+            has_failed = !set(true);
+        } else {
+            has_failed = error.text[0] != 0;
+            set(false);
+        }
+        if (has_failed) {
             open_it();
         }
+        memset(&error, 0, sizeof error);
     } while (shared->level == 0);
 }
 

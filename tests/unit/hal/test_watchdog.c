@@ -1,8 +1,11 @@
 /* Feeding: a real datagram socket in systemd's place, a pipe as the device, a socket as the guard, and
  * a clock that the test moves. */
 #include <errno.h>
+#include <linux/watchdog.h>
+#include <stdarg.h>
 #include <stddef.h>
 #include <stdlib.h>
+#include <sys/ioctl.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/un.h>
@@ -18,8 +21,13 @@ static int systemd_fd = -1, device_fd = -1;
 static int guard_ends[2];
 static struct hal_guard guard;
 static struct hal_watchdog_feeder feeder;
-static struct hal_error error;
+static struct hal_error error, unproven;
 static int64_t time_us;
+/* The device's answers. */
+static struct {
+    bool has_time, can_be_set;
+    int time_s, min_s, max_s;
+} dog;
 
 static int64_t now_us(void *context)
 {
@@ -28,6 +36,27 @@ static int64_t now_us(void *context)
 }
 
 static const struct hal_clock test_clock = {.now_us = now_us};
+
+/* The kernel's own call. */
+int ioctl(int fd, unsigned long request, ...)
+{
+    va_list arguments;
+    va_start(arguments, request);
+    int *value = va_arg(arguments, int *);
+    va_end(arguments);
+    TEST_ASSERT_EQUAL_INT(feeder.device_fd, fd);
+    if (request == WDIOC_SETTIMEOUT && dog.can_be_set) {
+        dog.time_s = *value < dog.min_s ? dog.min_s : *value > dog.max_s ? dog.max_s : *value;
+        *value = dog.time_s;
+        return 0;
+    }
+    if (request == WDIOC_GETTIMEOUT && dog.has_time) {
+        *value = dog.time_s;
+        return 0;
+    }
+    errno = ENOTTY;
+    return -1;
+}
 
 /* name: with '@' for a socket without a file. */
 static void be_systemd(const char *name)
@@ -73,7 +102,7 @@ static bool open_with(const char *path, struct hal_guard *guarded)
     const struct hal_watchdog_config config = {
         .path = path, .guard = guarded, .clock = &test_clock};
 
-    return hal_watchdog_open(&feeder, &config, &error);
+    return hal_watchdog_open(&feeder, &config, &unproven, &error);
 }
 
 static bool feed(void)
@@ -86,6 +115,10 @@ void setUp(void)
     const struct hal_guard_config config = {.timeout_ms = 2000};
 
     time_us = 1000000;
+    dog.has_time = dog.can_be_set = true;
+    dog.time_s = 60;
+    dog.min_s = 1;
+    dog.max_s = 60;
     memset(&error, 0, sizeof error);
     unsetenv("NOTIFY_SOCKET");
     unsetenv("WATCHDOG_USEC");
@@ -100,7 +133,7 @@ void setUp(void)
 
 void tearDown(void)
 {
-    hal_watchdog_close(&feeder);
+    hal_watchdog_close(&feeder, false);
     close(device_fd);
     unlink(device_path);
     close(guard_ends[0]);
@@ -140,9 +173,9 @@ static void systemd_hears_of_the_beginning_life_and_the_end(const char *name)
     time_us += 1500000;
     TEST_ASSERT_TRUE(feed());
     TEST_ASSERT_EQUAL_STRING("WATCHDOG=1", heard());
-    hal_watchdog_close(&feeder);
+    hal_watchdog_close(&feeder, false);
     TEST_ASSERT_EQUAL_STRING("STOPPING=1", heard());
-    hal_watchdog_close(&feeder);
+    hal_watchdog_close(&feeder, false);
     TEST_ASSERT_EQUAL_STRING("", heard());
 }
 
@@ -175,7 +208,7 @@ static void signs_of_life_are_sent_only_where_expected(void)
         time_us += 1000000;
         TEST_ASSERT_TRUE(feed());
         TEST_ASSERT_EQUAL_STRING("", heard());
-        hal_watchdog_close(&feeder);
+        hal_watchdog_close(&feeder, false);
         close(systemd_fd);
         unlink(socket_path);
     }
@@ -281,9 +314,55 @@ static void the_device_is_fed_at_times_and_stopped_at_the_end(void)
     TEST_ASSERT_TRUE(feed());
     TEST_ASSERT_EQUAL_INT(1, bytes_from(device_fd, &last));
     TEST_ASSERT_TRUE(last != 'V');
-    hal_watchdog_close(&feeder);
+    hal_watchdog_close(&feeder, false);
     TEST_ASSERT_EQUAL_INT(1, bytes_from(device_fd, &last));
     TEST_ASSERT_EQUAL_INT('V', last);
+}
+
+/* A kernel that hangs keeps the light on for as long: not for the driver's default. */
+static void the_devices_time_is_set_and_read_back(void)
+{
+    TEST_ASSERT_TRUE_MESSAGE(open_with(device_path, NULL), error.text);
+    TEST_ASSERT_EQUAL_INT(HAL_WATCHDOG_TIMEOUT_S, dog.time_s);
+    TEST_ASSERT_EQUAL_STRING("", unproven.text);
+}
+
+/* Rounded by the driver, fixed, or unknown: the program says so. Too short for the feeds: an error. */
+static void a_time_that_is_not_as_requested_is_reported(void)
+{
+    dog.min_s = 16;
+    TEST_ASSERT_TRUE(open_with(device_path, NULL));
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(unproven.text, "resets after 16 s, requested 10"),
+                                 unproven.text);
+    hal_watchdog_close(&feeder, false);
+    dog.can_be_set = false;
+    dog.time_s = 30;
+    TEST_ASSERT_TRUE(open_with(device_path, NULL));
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(unproven.text, "resets after 30 s, requested 10"),
+                                 unproven.text);
+    hal_watchdog_close(&feeder, false);
+    dog.has_time = false;
+    TEST_ASSERT_TRUE(open_with(device_path, NULL));
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(unproven.text, "does not say when it resets"),
+                                 unproven.text);
+    hal_watchdog_close(&feeder, false);
+    dog.has_time = true;
+    dog.time_s = 0;
+    TEST_ASSERT_FALSE(open_with(device_path, NULL));
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(error.text, "resets after 0 s"), error.text);
+    TEST_ASSERT_EQUAL_INT(-1, feeder.device_fd);
+}
+
+/* The laser may be on: what resets the machine goes on counting. */
+static void with_the_laser_on_the_device_is_not_stopped(void)
+{
+    char last = 0;
+
+    TEST_ASSERT_TRUE(open_with(device_path, NULL));
+    TEST_ASSERT_TRUE(feed());
+    TEST_ASSERT_EQUAL_INT(1, bytes_from(device_fd, &last));
+    hal_watchdog_close(&feeder, true);
+    TEST_ASSERT_EQUAL_INT(0, bytes_from(device_fd, &last));
 }
 
 static void a_device_that_is_not_there_is_reported(void)
@@ -295,8 +374,8 @@ static void a_device_that_is_not_there_is_reported(void)
     TEST_ASSERT_EQUAL_INT(-1, feeder.notify_fd);
 }
 
-/* The guard is fed all the same, and of two errors its is reported. */
-static void one_that_fails_does_not_keep_the_others_from_being_fed(void)
+/* The guard is fed all the same; without it nobody is. */
+static void without_the_guard_nobody_is_fed(void)
 {
     char last = 0;
 
@@ -307,13 +386,18 @@ static void one_that_fails_does_not_keep_the_others_from_being_fed(void)
                                  error.text);
     TEST_ASSERT_EQUAL_STRING("READY=1", heard());
     TEST_ASSERT_EQUAL_INT(1, bytes_from(guard_ends[1], &last));
+    hal_watchdog_close(&feeder, false);
+    setenv("NOTIFY_SOCKET", socket_path, 1);
+    TEST_ASSERT_TRUE(open_with(device_path, &guard));
     close(guard_ends[1]);
     guard_ends[1] = -1;
-    time_us += HAL_WATCHDOG_STEP_US;
-    TEST_ASSERT_FALSE(feed());
-    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(error.text, "guard:"), error.text);
-    TEST_ASSERT_FALSE(feed());
-    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(error.text, "guard:"), error.text);
+    for (int i = 0; i < 2; i++) {
+        TEST_ASSERT_FALSE(feed());
+        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(error.text, "guard:"), error.text);
+        TEST_ASSERT_EQUAL_INT(0, bytes_from(device_fd, &last));
+    }
+    TEST_ASSERT_EQUAL_STRING("STOPPING=1", heard()); /* of the first */
+    TEST_ASSERT_EQUAL_STRING("", heard());
 }
 
 static void the_guard_is_fed_four_times_per_timeout_at_least(void)
@@ -337,7 +421,7 @@ static void the_guard_is_fed_four_times_per_timeout_at_least(void)
         time_us += 1;
         TEST_ASSERT_TRUE(feed());
         TEST_ASSERT_EQUAL_INT(1, bytes_from(guard_ends[1], &last));
-        hal_watchdog_close(&feeder);
+        hal_watchdog_close(&feeder, false);
     }
 }
 
@@ -361,7 +445,10 @@ int main(void)
     RUN_TEST(wrong_variables_are_refused);
     RUN_TEST(the_device_is_fed_at_times_and_stopped_at_the_end);
     RUN_TEST(a_device_that_is_not_there_is_reported);
-    RUN_TEST(one_that_fails_does_not_keep_the_others_from_being_fed);
+    RUN_TEST(the_devices_time_is_set_and_read_back);
+    RUN_TEST(a_time_that_is_not_as_requested_is_reported);
+    RUN_TEST(with_the_laser_on_the_device_is_not_stopped);
+    RUN_TEST(without_the_guard_nobody_is_fed);
     RUN_TEST(the_guard_is_fed_four_times_per_timeout_at_least);
     result = UNITY_END();
     rmdir(folder);
