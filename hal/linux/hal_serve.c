@@ -15,18 +15,21 @@
 
 /* Between two looks at who has had his time. */
 #define LOOK_MS 250
+#define SLOTS (HAL_SERVE_CONNECTIONS + HAL_SERVE_STRANGERS)
 #define FRAME_NAME "frame"
 
 enum visit {
-    VISIT_FREE, /* nobody */
-    VISIT_OPEN, /* asks, or is being answered: until end_ms */
-    VISIT_WAIT, /* for a frame: until end_ms */
-    VISIT_FRAME /* there is one, or he has waited too long for it: has_frame */
+    VISIT_FREE,  /* nobody */
+    VISIT_OPEN,  /* asks, or is being answered: until end_ms */
+    VISIT_WAIT,  /* for a frame: until end_ms */
+    VISIT_FRAME, /* there is one, or he has waited too long for it: has_frame */
+    VISIT_CUT    /* the library has not found it closed yet */
 };
 
 struct visitor {
     enum visit visit;
     bool has_frame;
+    bool is_known; /* has shown the token */
     int64_t end_ms;
     int fd;
     struct MHD_Connection *connection;
@@ -37,7 +40,8 @@ struct serve {
     struct hal_mailbox mailbox;
     struct hal_serve_answers answers;
     struct MHD_Daemon *daemon;
-    struct visitor visitor[HAL_SERVE_CONNECTIONS];
+    struct visitor visitor[SLOTS];
+    int known_count;
 };
 
 static int64_t now_ms(void)
@@ -101,13 +105,18 @@ static enum MHD_Result wait_for_frame(const struct serve *serve, struct visitor 
     return MHD_YES;
 }
 
-static enum MHD_Result answer_name(const struct serve *serve, struct visitor *visitor,
-                                   const char *url)
+static enum MHD_Result answer_name(struct serve *serve, struct visitor *visitor, const char *url)
 {
     const char *name = behind_token(serve, url);
     if (name == NULL) {
         return hal_serve_plain(&serve->answers, visitor->connection, HAL_SERVE_FORBIDDEN);
     }
+    if (!visitor->is_known && serve->known_count == HAL_SERVE_CONNECTIONS) {
+        return hal_serve_plain(&serve->answers, visitor->connection, HAL_SERVE_BUSY);
+    }
+    serve->known_count += !visitor->is_known;
+    visitor->is_known = true;
+    visitor->end_ms = now_ms() + HAL_SERVE_REQUEST_MS;
     return strcmp(name, FRAME_NAME) == 0 ? wait_for_frame(serve, visitor)
                                          : answer_asset(serve, visitor->connection, name);
 }
@@ -120,7 +129,7 @@ answer(void *context, struct MHD_Connection *connection, const char *url, const 
        /* NOLINTNEXTLINE(readability-non-const-parameter): the library's type */
        size_t *upload_size, void **request)
 {
-    const struct serve *serve = context;
+    struct serve *serve = context;
     const union MHD_ConnectionInfo *info =
         MHD_get_connection_info(connection, MHD_CONNECTION_INFO_SOCKET_CONTEXT);
     struct visitor *visitor = info == NULL ? NULL : info->socket_context;
@@ -144,6 +153,47 @@ answer(void *context, struct MHD_Connection *connection, const char *url, const 
 
 /* --- connections --- */
 
+/* The library finds it closed. */
+static void cut(struct visitor *visitor)
+{
+    visitor->visit = VISIT_CUT;
+    shutdown(visitor->fd, SHUT_RDWR);
+}
+
+/* Room for one more stranger besides the newest one. */
+static void cut_oldest_stranger(struct serve *serve, const struct visitor *newest)
+{
+    struct visitor *oldest = NULL;
+    int count = 0;
+    for (int i = 0; i < SLOTS; i++) {
+        struct visitor *visitor = &serve->visitor[i];
+        if (visitor->visit == VISIT_OPEN && !visitor->is_known) {
+            count++;
+            bool is_older = oldest == NULL || visitor->end_ms < oldest->end_ms;
+            oldest = visitor != newest && is_older ? visitor : oldest;
+        }
+    }
+    if (count == HAL_SERVE_STRANGERS && oldest != NULL) {
+        cut(oldest);
+    }
+}
+
+static void begin_visit(struct serve *serve, struct visitor *visitor, int fd,
+                        struct MHD_Connection *connection)
+{
+    *visitor = (struct visitor){.visit = VISIT_OPEN,
+                                .end_ms = now_ms() + HAL_SERVE_TOKEN_MS,
+                                .fd = fd,
+                                .connection = connection};
+    cut_oldest_stranger(serve, visitor);
+}
+
+static void end_visit(struct serve *serve, struct visitor *visitor)
+{
+    serve->known_count -= visitor->is_known;
+    *visitor = (struct visitor){.visit = VISIT_FREE};
+}
+
 static void note_connection(void *context, struct MHD_Connection *connection, void **socket_context,
                             enum MHD_ConnectionNotificationCode code)
 {
@@ -151,19 +201,16 @@ static void note_connection(void *context, struct MHD_Connection *connection, vo
     if (code == MHD_CONNECTION_NOTIFY_CLOSED) {
         struct visitor *gone = *socket_context;
         if (gone != NULL) {
-            gone->visit = VISIT_FREE;
+            end_visit(serve, gone);
         }
         return;
     }
     const union MHD_ConnectionInfo *info =
         MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CONNECTION_FD);
     *socket_context = NULL;
-    for (int i = 0; i < HAL_SERVE_CONNECTIONS && info != NULL; i++) {
+    for (int i = 0; i < SLOTS && info != NULL; i++) {
         if (serve->visitor[i].visit == VISIT_FREE) {
-            serve->visitor[i] = (struct visitor){.visit = VISIT_OPEN,
-                                                 .end_ms = now_ms() + HAL_SERVE_REQUEST_MS,
-                                                 .fd = info->connect_fd,
-                                                 .connection = connection};
+            begin_visit(serve, &serve->visitor[i], info->connect_fd, connection);
             *socket_context = &serve->visitor[i];
             return;
         }
@@ -176,8 +223,8 @@ static void note_answered(void *context, struct MHD_Connection *connection, void
     const union MHD_ConnectionInfo *info =
         MHD_get_connection_info(connection, MHD_CONNECTION_INFO_SOCKET_CONTEXT);
     (void)context, (void)request, (void)code;
-    if (info != NULL && info->socket_context != NULL) {
-        struct visitor *visitor = info->socket_context;
+    struct visitor *visitor = info == NULL ? NULL : info->socket_context;
+    if (visitor != NULL && visitor->is_known && visitor->visit != VISIT_CUT) {
         visitor->visit = VISIT_OPEN;
         visitor->end_ms = now_ms() + HAL_SERVE_REQUEST_MS;
     }
@@ -194,7 +241,7 @@ static void go_on(struct visitor *visitor, bool has_frame)
 static void look_around(struct serve *serve)
 {
     int64_t time_ms = now_ms();
-    for (int i = 0; i < HAL_SERVE_CONNECTIONS; i++) {
+    for (int i = 0; i < SLOTS; i++) {
         struct visitor *visitor = &serve->visitor[i];
         if (time_ms < visitor->end_ms) {
             continue;
@@ -202,7 +249,7 @@ static void look_around(struct serve *serve)
         if (visitor->visit == VISIT_WAIT) {
             go_on(visitor, false);
         } else if (visitor->visit == VISIT_OPEN) {
-            shutdown(visitor->fd, SHUT_RDWR); /* and the library finds it closed */
+            cut(visitor);
         }
     }
 }
@@ -231,7 +278,7 @@ static void take_frame(struct serve *serve)
     }
     hal_mailbox_done(&serve->mailbox);
     bool has_frame = bytes != NULL && hal_serve_answers_frame(&serve->answers, bytes, size);
-    for (int i = 0; i < HAL_SERVE_CONNECTIONS; i++) {
+    for (int i = 0; i < SLOTS; i++) {
         if (serve->visitor[i].visit == VISIT_WAIT) {
             go_on(&serve->visitor[i], has_frame && size > 0);
         }
@@ -290,14 +337,13 @@ static bool begin(struct serve *serve, struct hal_error *error)
     if (!hal_serve_answers_make(&serve->answers, serve->config)) {
         return hal_fail(error, "no memory for the answers");
     }
-    serve->daemon = MHD_start_daemon(
-        MHD_USE_EPOLL | MHD_ALLOW_SUSPEND_RESUME, 0, NULL, NULL, answer, serve,
-        MHD_OPTION_LISTEN_SOCKET, HAL_VIEWER_LISTEN_FD,                           /* */
-        MHD_OPTION_CONNECTION_LIMIT, (unsigned)HAL_SERVE_CONNECTIONS,             /* */
-        MHD_OPTION_PER_IP_CONNECTION_LIMIT, (unsigned)HAL_SERVE_CONNECTIONS_EACH, /* */
-        MHD_OPTION_CONNECTION_MEMORY_LIMIT, (size_t)HAL_SERVE_REQUEST_MAX,        /* */
-        MHD_OPTION_NOTIFY_CONNECTION, note_connection, serve,                     /* */
-        MHD_OPTION_NOTIFY_COMPLETED, note_answered, serve, MHD_OPTION_END);
+    serve->daemon =
+        MHD_start_daemon(MHD_USE_EPOLL | MHD_ALLOW_SUSPEND_RESUME, 0, NULL, NULL, answer, serve,
+                         MHD_OPTION_LISTEN_SOCKET, HAL_VIEWER_LISTEN_FD,                    /* */
+                         MHD_OPTION_CONNECTION_LIMIT, (unsigned)SLOTS,                      /* */
+                         MHD_OPTION_CONNECTION_MEMORY_LIMIT, (size_t)HAL_SERVE_REQUEST_MAX, /* */
+                         MHD_OPTION_NOTIFY_CONNECTION, note_connection, serve,              /* */
+                         MHD_OPTION_NOTIFY_COMPLETED, note_answered, serve, MHD_OPTION_END);
     if (serve->daemon == NULL) {
         return hal_fail(error, "libmicrohttpd does not start");
     }

@@ -6,12 +6,15 @@
  * link gets fewer frames and not older ones, and a frame that nobody waits for is never copied.
  * Answers: 200; 204 where no frame came for HAL_SERVE_PATIENCE_MS; 403 whatever is asked without the
  *        right token, which is compared in a time that does not depend on it; 404 any other name; 405
- *        any other method; 413 a request with a body. libmicrohttpd itself refuses what is no HTTP,
- *        and a request line and header longer than HAL_SERVE_REQUEST_MAX.
- * Limits: HAL_SERVE_CONNECTIONS at a time, further ones wait in the system's short queue;
- *        HAL_SERVE_CONNECTIONS_EACH from one address. From the last answer, or the beginning, a request
- *        has HAL_SERVE_REQUEST_MS to be asked whole and answered whole, its waiting for a frame not
- *        counted: then the connection is cut, at whatever pace its bytes drip.
+ *        any other method; 413 a request with a body; 503 when HAL_SERVE_CONNECTIONS have shown the
+ *        token. libmicrohttpd itself refuses what is no HTTP, and a request line and header longer than
+ *        HAL_SERVE_REQUEST_MAX.
+ * Limits: a connection that has shown the token keeps its slot, HAL_SERVE_CONNECTIONS of them at a time.
+ *        From the last answer its request has HAL_SERVE_REQUEST_MS to be asked whole and answered
+ *        whole, its waiting for a frame not counted: then the connection is cut, at whatever pace its
+ *        bytes drip. Connections that have not shown it have slots of their own, HAL_SERVE_STRANGERS,
+ *        HAL_SERVE_TOKEN_MS to show it. When all of these are taken the oldest is cut, so
+ *        that a newcomer always gets in: who holds connections without the token keeps nobody out.
  * Memory: an answer per frame, shared by all that get it, so at most one more than connections.
  * The processor: whoever is let go on by the kernel's clock keeps the processor until its next tick, up
  *        to 10 ms later, as unimportant as he may be. So the work on a frame is done in short pieces, each
@@ -26,11 +29,11 @@
 #include "hal.h"
 
 #define HAL_SERVE_CONNECTIONS 8
-/* What a browser opens at most. */
-#define HAL_SERVE_CONNECTIONS_EACH 6
+#define HAL_SERVE_STRANGERS 16
 /* Of a connection's memory: the request, and the header of its answer. */
 #define HAL_SERVE_REQUEST_MAX 4096
 #define HAL_SERVE_REQUEST_MS 10000
+#define HAL_SERVE_TOKEN_MS 3000
 #define HAL_SERVE_PATIENCE_MS 3000
 
 struct hal_serve_asset {

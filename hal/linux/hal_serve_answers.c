@@ -7,7 +7,7 @@
 static const unsigned status_of[HAL_SERVE_PLAIN_COUNT] = {
     [HAL_SERVE_NOTHING] = MHD_HTTP_NO_CONTENT,     [HAL_SERVE_FORBIDDEN] = MHD_HTTP_FORBIDDEN,
     [HAL_SERVE_UNKNOWN] = MHD_HTTP_NOT_FOUND,      [HAL_SERVE_METHOD] = MHD_HTTP_METHOD_NOT_ALLOWED,
-    [HAL_SERVE_BODY] = MHD_HTTP_CONTENT_TOO_LARGE,
+    [HAL_SERVE_BODY] = MHD_HTTP_CONTENT_TOO_LARGE, [HAL_SERVE_BUSY] = MHD_HTTP_SERVICE_UNAVAILABLE,
 };
 
 /* The page may load what is served here and nothing else, may not be framed, leaves no copy and tells

@@ -15,6 +15,7 @@ enum hal_serve_plain {
     HAL_SERVE_UNKNOWN,   /* 404 */
     HAL_SERVE_METHOD,    /* 405 */
     HAL_SERVE_BODY,      /* 413 */
+    HAL_SERVE_BUSY,      /* 503 */
     HAL_SERVE_PLAIN_COUNT
 };
 

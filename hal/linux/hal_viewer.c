@@ -17,7 +17,7 @@
 /* Beyond what the process is given. */
 #define FREE_FD 16
 /* Connections that wait to be accepted. */
-#define BACKLOG 8
+#define BACKLOG 32
 #define PATH_BYTES 4096
 
 /* --- the listening socket --- */
