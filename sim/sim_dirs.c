@@ -34,20 +34,35 @@ static bool is_directory(const char *path)
     return stat(path, &status) == 0 && S_ISDIR(status.st_mode);
 }
 
+static bool is_frame_name(const char *name)
+{
+    const char *suffix = strrchr(name, '.');
+    return suffix != NULL && suffix != name &&
+           (strcmp(suffix, ".pgm") == 0 || strcmp(suffix, ".xyz") == 0);
+}
+
+/* The next name; NULL at the end and, with errno, at an error. */
+static const char *next_name(DIR *stream)
+{
+    errno = 0;
+    const struct dirent *item = readdir(stream);
+    return item == NULL ? NULL : item->d_name;
+}
+
+/* At least one where that cannot be found out: opening the directory for its frames says why. */
 static size_t count_frames(const char *dir)
 {
     DIR *stream = opendir(dir);
     size_t count = 0;
-    struct dirent *item = NULL;
-    while (stream != NULL && (item = readdir(stream)) != NULL) {
-        const char *suffix = strrchr(item->d_name, '.');
-        count += suffix != NULL && suffix != item->d_name &&
-                 (strcmp(suffix, ".pgm") == 0 || strcmp(suffix, ".xyz") == 0);
+    const char *name = NULL;
+    while (stream != NULL && (name = next_name(stream)) != NULL) {
+        count += is_frame_name(name);
     }
+    bool is_whole = stream != NULL && errno == 0;
     if (stream != NULL) {
         closedir(stream);
     }
-    return count;
+    return count > 0 || is_whole ? count : 1;
 }
 
 /* Can the directory be processed itself? */
@@ -110,18 +125,19 @@ static int compare_names(const void *left, const void *right)
     return strcmp(*(char *const *)left, *(char *const *)right);
 }
 
-/* Paths of the subdirectories that are frames directories, sorted. */
-static char **find_children(const char *path, DIR *stream, bool with_rig, size_t *count)
+/* Paths of the subdirectories that are frames directories, sorted; *reason: why there may be more, or 0. */
+static char **find_children(const char *path, DIR *stream, bool with_rig, size_t *count,
+                            int *reason)
 {
     char **child = NULL;
     size_t capacity = 0;
     *count = 0;
-    struct dirent *item = NULL;
-    while ((item = readdir(stream)) != NULL) {
-        if (item->d_name[0] == '.') {
+    const char *name = NULL;
+    while ((name = next_name(stream)) != NULL) {
+        if (name[0] == '.') {
             continue;
         }
-        char *candidate = join(path, item->d_name);
+        char *candidate = join(path, name);
         if (!is_frames_dir(candidate, with_rig)) {
             free(candidate);
             continue;
@@ -132,6 +148,7 @@ static char **find_children(const char *path, DIR *stream, bool with_rig, size_t
         }
         child[(*count)++] = candidate;
     }
+    *reason = errno;
     if (*count > 0) {
         qsort(child, *count, sizeof *child, compare_names);
     }
@@ -152,17 +169,61 @@ void sim_dirs_add(struct sim_dirs *dirs, const char *path, bool with_rig, struct
         return;
     }
     size_t count = 0;
-    char **child = find_children(path, stream, with_rig, &count);
+    int reason = 0;
+    char **child = find_children(path, stream, with_rig, &count, &reason);
     closedir(stream);
     for (size_t i = 0; i < count; i++) {
         add(dirs, child[i]);
     }
     free(child);
-    if (count == 0) {
+    if (reason != 0) {
+        sim_report_error(report, path, "the list of its files ends with an error: %s",
+                         strerror(reason));
+    } else if (count == 0) {
         sim_report_error(report, path, "no %s here and in no subdirectory%s",
                          with_rig ? "frames (*.pgm, *.xyz)" : RIG_NAME,
                          with_rig ? "" : "; name one with --rig, or make one: docs/calibration.md");
     }
+}
+
+/* The same file, whatever its path. */
+static bool is_same(const char *dir, const char *name, const struct stat *as)
+{
+    char *path = join(dir, name);
+    struct stat status;
+    bool same =
+        stat(path, &status) == 0 && status.st_dev == as->st_dev && status.st_ino == as->st_ino;
+    free(path);
+    return same;
+}
+
+/* One of those that a run reads in this directory. */
+static bool is_input_of(const char *dir, const struct stat *as)
+{
+    static const char *const other[] = {RIG_NAME, "frames.jsonl", "truth.jsonl"};
+    bool found = false;
+    for (size_t i = 0; i < sizeof other / sizeof *other; i++) {
+        found = found || is_same(dir, other[i], as);
+    }
+    DIR *stream = opendir(dir);
+    const char *name = NULL;
+    while (stream != NULL && !found && (name = next_name(stream)) != NULL) {
+        found = is_frame_name(name) && is_same(dir, name, as);
+    }
+    if (stream != NULL) {
+        closedir(stream);
+    }
+    return found;
+}
+
+bool sim_dirs_has_input(const struct sim_dirs *dirs, const char *path)
+{
+    struct stat status;
+    bool found = false;
+    for (size_t i = 0; i < dirs->dir_count && stat(path, &status) == 0; i++) {
+        found = found || is_input_of(dirs->dir[i].path, &status);
+    }
+    return found;
 }
 
 void sim_dirs_free(struct sim_dirs *dirs)

@@ -2,7 +2,8 @@
  *
  * A DIR with a rig.json is one itself; any other stands for those of its subdirectories that have
  * one, in byte order of their names, hidden ones left out. With --rig frames do in place of a
- * rig.json. A DIR that is neither is an error in the report.
+ * rig.json. A DIR that is neither, or cannot be read to its end, is an error in
+ * the report.
  */
 #ifndef SIM_DIRS_H
 #define SIM_DIRS_H
@@ -27,6 +28,10 @@ struct sim_dirs {
 /* with_rig: a rig comes from elsewhere. Adds to dirs. */
 void sim_dirs_add(struct sim_dirs *dirs, const char *path, bool with_rig,
                   struct sim_report *report);
+/* Is there a file at the path that a run reads, under whatever name: a frame, a list, a rig of these directories? */
+bool sim_dirs_has_input(const struct sim_dirs *dirs, const char *path);
+
+
 void sim_dirs_free(struct sim_dirs *dirs);
 
 #endif

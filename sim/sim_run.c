@@ -5,6 +5,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
 #include "hal_file.h"
 #include "replay/hal_replay.h"
@@ -343,12 +344,27 @@ static void finish_page(struct run *run)
     }
 }
 
+/* The page would replace it. */
+static bool is_input(const struct run *run, const char *path)
+{
+    struct stat page, rig;
+    const char *own = run->options->rig;
+    bool is_rig = own != NULL && stat(own, &rig) == 0 && stat(path, &page) == 0 &&
+                  rig.st_dev == page.st_dev && rig.st_ino == page.st_ino;
+    return is_rig || sim_dirs_has_input(&run->dirs, path);
+}
+
 /* False: the page cannot be written, which is reported before any frame is processed. */
 static bool start_page(struct run *run)
 {
     struct hal_error error;
     const char *path = run->options->report;
-    if (path == NULL || sim_page_open(&run->page, path, &error)) {
+    if (path == NULL) {
+        return true;
+    }
+    if (is_input(run, path)) {
+        hal_fail(&error, "a file that this run reads, expected another one for the report");
+    } else if (sim_page_open(&run->page, path, &error)) {
         return true;
     }
     sim_report_error(&run->report, path, "%s", error.text);

@@ -105,6 +105,7 @@ static bool read_names(struct hal_replay *replay, struct hal_error *error)
     }
     bool good = true;
     struct dirent *item = NULL;
+    errno = 0; /* the end and an error differ in it alone */
     while (good && (item = readdir(dir)) != NULL) {
         if (is_frame_name(replay, item->d_name)) {
             struct hal_replay_entry *entry = add_entry(replay, item->d_name);
@@ -113,10 +114,15 @@ static bool read_names(struct hal_replay *replay, struct hal_error *error)
                 entry->on_disk = true;
             }
         }
+        errno = 0;
     }
+    int reason = errno;
     closedir(dir);
     if (!good) {
         return hal_fail(error, "no memory for the list of frames");
+    }
+    if (reason != 0) {
+        return hal_fail(error, "the list of its files ends with an error: %s", strerror(reason));
     }
     if (replay->entry_count == 0) {
         return hal_fail(error, "no frames (%s) in this directory", frame_names(replay));

@@ -4,7 +4,7 @@
  *        too, lists of points (hal_xyz.h), for a program that asks for them.
  * Out:   the frames in the lexicographic (byte) order of their names. Without frames.jsonl the
  *        laser is on and frames are HAL_REPLAY_STEP_US apart.
- * Error: on opening: no directory, no frames, no memory. To the log: what is wrong in frames.jsonl
+ * Error: on opening: no directory, one that cannot be read to its end, no frames, no memory. To the log: what is wrong in frames.jsonl
  *        and cannot be tied to a frame. As HAL_NEXT_BAD, in the frame's place: a frame that cannot
  *        be read; a frame that frames.jsonl does not list; a listed one that is not there; one
  *        whose line has a bad time_us or laser, or a time before that of the frame before it.

@@ -799,6 +799,23 @@ reason='they are not kept apart'
 [ ! -s trace/deep/er/two/a.json ] || [ ! -s trace/deep/er/two-2/a.json ] || reason=
 result 'trace: two directories of one name are kept apart' "$reason"
 
+fresh
+for name in a.pgm rig.json; do
+    cp "d/$name" before
+    run --json --report "d/../d/$name" d
+    check "report: over $name" 1 0 0 "$name: a file that this run reads"
+    reason='it was overwritten'
+    ! cmp -s before "d/$name" || reason=
+    result "report: $name is as before" "$reason"
+done
+ln -s ../base/a.pgm d/link.pgm
+run --json --report base/a.pgm d
+check 'report: over what a frame is a link to' 1 0 0 'base/a\.pgm: a file that this run reads'
+rm d/link.pgm
+run --json --rig base/rig.json --report base/rig.json d
+check 'report: over --rig' 1 0 0 'base/rig\.json: a file that this run reads'
+fresh
+
 echo "1..$number"
 echo "# $((number - failed)) passed, $failed failed"
 [ "$failed" -eq 0 ]

@@ -1,0 +1,125 @@
+/* A frames directory whose list of files ends with an error: nothing of it is left out in silence. readdir is wrapped by
+ * the linker. */
+#include "replay/hal_replay.h"
+#include "sim_dirs.h"
+
+#include <dirent.h>
+#include <errno.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "unity.h"
+
+#define FRAMES 3
+/* Their names, "." and "..", rig.json, and the end. */
+#define CALLS (FRAMES + 4)
+
+static char root[] = "/tmp/isohead_replay_XXXXXX";
+static char dir[64];
+static int calls, failing; /* which call fails, from 1; 0: none */
+static int told;
+
+struct dirent *__real_readdir(DIR *stream);
+struct dirent *__wrap_readdir(DIR *stream);
+
+struct dirent *__wrap_readdir(DIR *stream)
+{
+    if (++calls == failing) {
+        errno = EIO;
+        return NULL;
+    }
+    return __real_readdir(stream);
+}
+
+static void make_file(const char *name)
+{
+    char path[128];
+    snprintf(path, sizeof path, "%s/%s", dir, name);
+    FILE *file = fopen(path, "w");
+    TEST_ASSERT_NOT_NULL(file);
+    fputs("P5 1 1 255 x", file);
+    TEST_ASSERT_EQUAL_INT(0, fclose(file));
+}
+
+static void remove_file(const char *name)
+{
+    char path[128];
+    snprintf(path, sizeof path, "%s/%s", dir, name);
+    TEST_ASSERT_EQUAL_INT(0, unlink(path));
+}
+
+void setUp(void)
+{
+    calls = failing = told = 0;
+}
+
+void tearDown(void)
+{
+}
+
+static void count_message(void *context, const char *subject, const char *text)
+{
+    (void)context, (void)subject, (void)text;
+    told++;
+}
+
+static void test_a_list_that_ends_with_an_error_opens_nothing(void)
+{
+    const struct hal_log log = {.error = count_message};
+    struct hal_replay replay;
+    struct hal_error error = {""};
+    for (failing = 1; failing <= CALLS; failing++) {
+        calls = 0;
+        TEST_ASSERT_FALSE(hal_replay_open(&replay, dir, false, &log, &error));
+        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(error.text, strerror(EIO)), error.text);
+    }
+    calls = 0; /* beyond the end */
+    TEST_ASSERT_TRUE(hal_replay_open(&replay, dir, false, &log, &error));
+    TEST_ASSERT_EQUAL_INT(CALLS, calls);
+    TEST_ASSERT_EQUAL_INT(FRAMES, replay.entry_count);
+    TEST_ASSERT_EQUAL_INT(0, told);
+    hal_replay_close(&replay);
+}
+
+/* Whatever call fails for the directory above: an error, or all of its frames directories. */
+static void test_no_directory_is_left_out(void)
+{
+    const int all = 40;
+    int errors = 0;
+    for (failing = 1; failing <= all; failing++) {
+        for (int with_rig = 0; with_rig < 2; with_rig++) {
+            struct sim_dirs dirs = {.dir_count = 0};
+            struct sim_report report;
+            calls = 0;
+            sim_report_init(&report);
+            sim_dirs_add(&dirs, root, with_rig != 0, &report);
+            TEST_ASSERT_TRUE(report.error_count > 0 || dirs.dir_count == 1);
+            errors += report.error_count > 0;
+            sim_dirs_free(&dirs);
+        }
+    }
+    TEST_ASSERT_GREATER_OR_EQUAL_INT(6, errors); /* ".", "..", the directory, the end, of both */
+}
+
+int main(void)
+{
+    TEST_ASSERT_NOT_NULL(mkdtemp(root));
+    snprintf(dir, sizeof dir, "%s/frames", root);
+    TEST_ASSERT_EQUAL_INT(0, mkdir(dir, 0700));
+    static const char *const names[] = {"a.pgm", "b.pgm", "c.pgm", "rig.json"};
+    for (int i = 0; i < FRAMES + 1; i++) {
+        make_file(names[i]);
+    }
+    UNITY_BEGIN();
+    RUN_TEST(test_a_list_that_ends_with_an_error_opens_nothing);
+    RUN_TEST(test_no_directory_is_left_out);
+    int failures = UNITY_END();
+    for (int i = 0; i < FRAMES + 1; i++) {
+        remove_file(names[i]);
+    }
+    rmdir(dir);
+    rmdir(root);
+    return failures;
+}
