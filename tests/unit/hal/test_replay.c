@@ -19,7 +19,7 @@
 static char root[] = "/tmp/isohead_replay_XXXXXX";
 static char dir[64];
 static int calls, failing; /* which call fails, from 1; 0: none */
-static int told;
+static int reported;
 
 struct dirent *__real_readdir(DIR *stream);
 struct dirent *__wrap_readdir(DIR *stream);
@@ -52,7 +52,7 @@ static void remove_file(const char *name)
 
 void setUp(void)
 {
-    calls = failing = told = 0;
+    calls = failing = reported = 0;
 }
 
 void tearDown(void)
@@ -62,7 +62,7 @@ void tearDown(void)
 static void count_message(void *context, const char *subject, const char *text)
 {
     (void)context, (void)subject, (void)text;
-    told++;
+    reported++;
 }
 
 static void test_a_list_that_ends_with_an_error_opens_nothing(void)
@@ -79,7 +79,7 @@ static void test_a_list_that_ends_with_an_error_opens_nothing(void)
     TEST_ASSERT_TRUE(hal_replay_open(&replay, dir, false, &log, &error));
     TEST_ASSERT_EQUAL_INT(CALLS, calls);
     TEST_ASSERT_EQUAL_INT(FRAMES, replay.entry_count);
-    TEST_ASSERT_EQUAL_INT(0, told);
+    TEST_ASSERT_EQUAL_INT(0, reported);
     hal_replay_close(&replay);
 }
 
