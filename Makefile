@@ -24,6 +24,11 @@ VIEW := $(BUILD)/view/tools/view/view
 FRAMES ?= frames/sequence2
 # Runs of make kills; make test takes 60.
 KILLS ?= 5000
+# What make people makes, and where: a kind of scene, a rig and a seed of tools/people/make.py.
+KIND ?= hands
+RIG ?= paper
+SEED ?= 1
+OUT ?= $(BUILD)/people/$(RIG)_$(KIND)_$(SEED)
 # Frames of make longrun; make test takes a few hundred.
 LONGRUN_FRAMES ?= 100000
 # What the board's program is built for: arm64, armhf or host.
@@ -32,7 +37,7 @@ ARCH ?= arm64
 .DEFAULT_GOAL := help
 .PHONY: help sim frames sanitize test check unit kills fuzz coverage ranges exhaustive mutation accept eval misaligned \
   bench bench-instructions bench-peers bench-grow bench-worst test-bench bits cortexm longrun size vectors learn view figures \
-  test-view test-report live-pictures export board board-gpiod2 deb image flash calibrate test-calibration \
+  test-view test-report live-pictures export people board board-gpiod2 deb image flash calibrate test-calibration \
   test-calibration-short test-deb test-board test-image format formatted words layout links lint clean
 
 help: ## this list
@@ -208,6 +213,10 @@ export: sim ## what is found in FRAMES=DIR for Foxglove and Rerun (MCAP) and spr
 	@./host_sim --json --trace $(BUILD)/export/trace $(FRAMES) > $(BUILD)/export/records.jsonl
 	@tools/export/isohead-export $(BUILD)/export/records.jsonl --csv $(BUILD)/export/records.csv \
 	  --mcap $(BUILD)/export/frames.mcap --frames $(FRAMES) --trace $(BUILD)/export/trace/$(notdir $(FRAMES:/=))
+
+people: ## frames of people of true anatomy: KIND=hands RIG=paper SEED=1 OUT=DIR (docs/people.md)
+	@tools/setup.sh people
+	@/usr/bin/python3 tools/people/make.py --rig $(RIG) --kind $(KIND) --seed $(SEED) $(OUT)
 
 board: ## build isohead_board for ARCH=arm64 (default), armhf or host: build/board-ARCH/firmware/app
 	@tools/setup.sh board $(ARCH)

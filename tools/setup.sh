@@ -7,7 +7,7 @@
 #   tools/setup.sh test-deb
 #   tools/setup.sh test-board
 #   tools/setup.sh image|flash|test-image
-#   tools/setup.sh calibrate|view|test-view|test-report|export
+#   tools/setup.sh calibrate|view|test-view|test-report|export|people
 #
 # On Debian and its kin missing packages are installed when that is allowed (root, or sudo without a
 # password); otherwise the exact command is printed and the exit status is 1. Nothing is installed
@@ -119,7 +119,7 @@ need_view() {
     [ -e /usr/include/nlohmann/json.hpp ] || lacks nlohmann-json3-dev
 }
 
-# mcap's own needs, and pip for tools/export/packages.sh, which fetches mcap.
+# mcap's own needs, and pip for tools/python_packages.sh, which fetches mcap.
 need_export() {
     need_python lz4 python3-lz4
     need_python zstandard python3-zstandard
@@ -301,6 +301,12 @@ export)
     need_sim
     need_export
     ;;
+people)
+    need_python numpy python3-numpy
+    need_python pip python3-pip
+    # its rays are cast by a package that is there for x86-64 alone
+    [ "$(uname -m)" = x86_64 ] || { echo "make people needs an x86-64 machine" >&2; exit 1; }
+    ;;
 accept | vectors)
     need_python numpy python3-numpy
     need_python scipy python3-scipy
@@ -360,5 +366,8 @@ size)
 test | test-board) tools/board/gpiod2.sh build/third_party/gpiod2 ;;
 esac
 case "$1" in
-test | export) tools/export/packages.sh build/export/python ;;
+test | export) tools/python_packages.sh tools/export/requirements.txt build/export/python ;;
+esac
+case "$1-$(uname -m)" in
+test-x86_64 | people-x86_64) tools/python_packages.sh tools/people/requirements.txt build/people/python ;;
 esac

@@ -1,14 +1,14 @@
 #!/bin/sh
-# Bring the Python packages of requirements.txt into a folder of their own, without touching the system's.
+# Bring the Python packages of a list into a folder of their own, without touching the system's.
 #
-#   tools/export/packages.sh DIR      ->  DIR/mcap, DIR/mcap_protobuf, DIR/foxglove_schemas_protobuf, DIR/google
+#   tools/python_packages.sh tools/export/requirements.txt DIR      ->  DIR/mcap, DIR/google and so on
 #
 # pip fetches them from the package index this machine is set up for. Versions and SHA-256 are fixed in
-# requirements.txt; pip refuses anything else. A folder that was made from the same list stays as it is.
+# the list; pip refuses anything else. A folder that was made from the same list stays as it is.
 set -eu
-[ $# = 1 ] || { echo "usage: $0 DIR" >&2; exit 2; }
-wanted=$(dirname "$0")/requirements.txt
-dir=$1
+[ $# = 2 ] || { echo "usage: $0 LIST DIR" >&2; exit 2; }
+wanted=$1
+dir=$2
 cmp -s "$wanted" "$dir/requirements.txt" && exit 0
 if [ -e "$dir" ] && [ ! -e "$dir/requirements.txt" ]; then
     echo "$dir is there and not of this script: name another folder" >&2

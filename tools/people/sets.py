@@ -1,0 +1,52 @@
+"""Makes sets of sequences: python3 sets.py SET OUT [--rigs ...]. The seeds of `learn` and `judge` share nobody."""
+
+import argparse
+import os
+
+import make
+import rig as rigs
+from body import Model
+from scene import KINDS
+
+# set: first seed, rounds of all kinds, frames a sequence, further empty rooms
+SETS = {
+    "learn": (
+        20000, 4, 24, 20), "judge": (
+            70000, 2, 24, 8), "rigs": (
+                80000, 1, 20, 0), "sample": (
+                    90000, 1, 5, 0)}
+EMPTY_FRAMES = 30
+ALL_RIGS = [*rigs.KINDS, "range"]
+
+
+def sequences(name, rig_kind):
+    """(directory, kind, seed, frames) of every sequence, kinds mixed so that a part is balanced."""
+    first, rounds, frames, empty = SETS[name]
+    first += 1000 * ALL_RIGS.index(rig_kind)
+    listed = [(kind, frames) for _ in range(rounds) for kind in KINDS]
+    every = max(1, len(listed) // max(1, empty))
+    mixed = []
+    for i, item in enumerate(listed):
+        mixed.append(item)
+        if empty and i % every == every - 1 and i // every < empty:
+            mixed.append(("empty", EMPTY_FRAMES))
+    return [("%03d_%s" % (i, kind), kind, first + i, count) for i, (kind, count) in enumerate(mixed)]
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("set", choices=SETS)
+    parser.add_argument("out")
+    parser.add_argument("--rigs", nargs="+", default=["paper", "wide", "range"], choices=ALL_RIGS)
+    options = parser.parse_args()
+    model = Model()
+    by_rig = [[(rig_kind, *item) for item in sequences(options.set, rig_kind)] for rig_kind in options.rigs]
+    for row in zip(*by_rig):
+        for rig_kind, directory, kind, seed, frames in row:
+            out = os.path.join(options.out, rig_kind, directory)
+            if not os.path.exists(os.path.join(out, "rig.json")):
+                make.make(model, out, rig_kind, kind, seed, frames)
+
+
+if __name__ == "__main__":
+    main()
