@@ -144,8 +144,8 @@ def describe(studio, scene, heads, extra, samples, dots, hits):
     fields = {}
     if there or not unclear:
         fields["head"] = head_entry(there[0]) if there else None
-    if len(heads) > 1:
-        fields["heads"] = [head_entry(head) for head in there]
+    if len(heads) > 1 or not fields:
+        fields["heads"] = [head_entry(head) for head in there or unclear]
     if unclear:
         fields["unclear"] = [head_entry(head) for head in unclear]
     return fields, {"kind": scene.kind, "people": notes, **extra, "wear": [actor.note() for actor in scene.actors]}

@@ -161,12 +161,13 @@ class Scene:
         return [first + lift, second + lift]
 
     def _tilt(self, rng):
+        """The camera looks up by so many degrees, or down."""
         degrees = 0.0
         if self.kind == "tilted":
-            degrees = rng.uniform(8.0, 30.0) * (1.0 if rng.random() < 0.8 else -0.5)
+            degrees = rng.choice([-1.0, 1.0]) * rng.uniform(8.0, 30.0)
         elif rng.random() < 0.25:
             degrees = rng.uniform(-8.0, 15.0)
-        self.tilt = rotation(X, numpy.radians(degrees))
+        self.tilt = rotation(X, numpy.radians(-degrees))
         middle = self.head_mm if self.kind != "empty" else numpy.array([0.0, 0.0, 1000.0])
         self.tilt_shift = middle - self.tilt @ middle
         self.tilt_deg = degrees
