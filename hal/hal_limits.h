@@ -7,8 +7,8 @@
  *          cap_us + HAL_LIMITS_SLACK_US;
  *        - in any time T it is high for at most duty_percent of (T + HAL_LIMITS_BURST_US), and
  *          HAL_LIMITS_SLACK_US more.
- *        Both hold to the time between two looks. In 10 s that is duty x 10.1 s + 0.05 s, in an hour
- *        duty x 3600.1 s + 0.05 s. Once exceeded, the cap needs a frame or a pause, and the duty half
+ *        Both hold to the time between two looks. In 10 s that is duty x 10.1 s + 0.03 s, in an hour
+ *        duty x 3600.1 s + 0.03 s. Once exceeded, the cap needs a frame or a pause, and the duty half
  *        of what it may use at once.
  * Trust: none. Sums that cannot be count as high for the whole time since the last look, and a frame
  *        judged in the future as none.
@@ -21,7 +21,7 @@
 /* The time whose duty may be used at once, after a rest. */
 #define HAL_LIMITS_BURST_US 100000
 /* Who switches the laser keeps the same limits, and gets so much time to do it. */
-#define HAL_LIMITS_SLACK_US 50000
+#define HAL_LIMITS_SLACK_US 30000
 /* Low for so long: it may be on once more without a frame. */
 #define HAL_LIMITS_PAUSE_US 500000
 

@@ -261,6 +261,24 @@ def case_guards_stopped(run):
     return f"the line stays {stuck}; low after --laser-off, with status 0"
 
 
+def case_frame_time(run):
+    """another program sets the camera's frame time to 1000 s, and no frame comes"""
+    board = run.board
+    run.start(run.gated, "gated")
+    run.lit_frame(run.gated, 0)
+    low_ms = run.low_after("control /dev/video0 frame-time 1000", CAP_MS / 1000 + FRAME_S)
+    run.stop()
+    rises = board.rises[LASER]
+    board.log.clear()
+    board.start(f"{run.name} --rig /rig/gated.json --device /dev/video0 --format GREY --exposure keep "
+                f"--gain keep --laser {run.gpio_options()}")
+    board.wait(lambda: any("a frame every 1000000000 us, expected" in line for line in board.log), SOON_S,
+               "message about the frame time")
+    run.stop()
+    expect(board.rises[LASER] == rises, "the laser went on for a camera of a frame in 1000 s")
+    return f"low {low_ms:.0f} ms later; refused with a message when started anew, laser never on"
+
+
 def case_duty(run):
     """duty limit of 30 %, laser always on"""
     run.board.watch_pins()
@@ -293,4 +311,4 @@ def case_status(run):
 
 
 CASES = [case_interlock, case_reload, case_moved, case_check, case_unasked, case_signals, case_killed, case_all_killed,
-         case_stopped, case_guard_killed, case_guard_stopped, case_guards_stopped, case_duty, case_status]
+         case_stopped, case_guard_killed, case_guard_stopped, case_guards_stopped, case_frame_time, case_duty, case_status]

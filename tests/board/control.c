@@ -1,6 +1,7 @@
-/* control - a camera's control by its name: print it, or set it first.
+/* control - a camera's control by its name: print it, or set it first; or its frame time.
  *
  *   control DEVICE NAME [VALUE]
+ *   control DEVICE frame-time SECONDS
  *
  * The button "Disconnect" of the kernel's virtual camera (vivid) pulls its plug: every call of every
  * program that has it open fails from then on as with a camera that was pulled out. It comes back
@@ -8,6 +9,7 @@
  */
 #include <fcntl.h>
 #include <linux/videodev2.h>
+#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -29,6 +31,12 @@ int main(int argc, char **argv)
     int device = open(argv[1], O_RDWR);
     if (device < 0)
         return fail(argv[1]);
+    if (argc == 4 && strcmp(argv[2], "frame-time") == 0) {
+        struct v4l2_streamparm parameters = {.type = V4L2_BUF_TYPE_VIDEO_CAPTURE};
+        parameters.parm.capture.timeperframe.numerator = (uint32_t)atoi(argv[3]);
+        parameters.parm.capture.timeperframe.denominator = 1;
+        return ioctl(device, VIDIOC_S_PARM, &parameters) == 0 ? 0 : fail(argv[2]);
+    }
     struct v4l2_queryctrl query = {.id = V4L2_CTRL_FLAG_NEXT_CTRL};
     while (ioctl(device, VIDIOC_QUERYCTRL, &query) == 0) {
         struct v4l2_control control = {.id = query.id};
