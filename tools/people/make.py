@@ -116,6 +116,17 @@ class Studio:
                            numpy.clip(u // STEP, 0, self.rays.shape[1] - 1).astype(int)]
         return pixels * z[:, None], tag
 
+    def rays_at(self, head):
+        """How many dots, or looks at a depth image, the head would get if nothing hid it."""
+        if self.is_range:
+            origin, rays = numpy.zeros(3), self.rays[::LOOK, ::LOOK].reshape(-1, 3)
+        else:
+            origin, rays = self.rig.projector_mm, self.rig.dot_rays
+        # In units of the semi-axes the head is a ball of radius 1.
+        path, rays = (head.centre_mm - origin) / head.axes_mm, rays / head.axes_mm
+        along = rays @ path
+        return int(numpy.count_nonzero((along > 0.0) & (path @ path - along ** 2 / (rays ** 2).sum(axis=1) < 1.0)))
+
     def in_field(self, point_mm):
         """Within the picture and, with dots, the pattern."""
         if point_mm[2] <= 0.0:
@@ -139,6 +150,7 @@ def describe(studio, scene, heads, extra, samples, dots, hits):
         elif count > NO_HEAD_DOTS or field:
             unclear.append(head)
         notes.append({"centre_mm": round_list(head.centre_mm), "points": count, "in_field": field,
+                      "visible": round(min(1.0, count / max(1, studio.rays_at(head))), 2),
                       "angles_deg": round_list(head.angles_deg), "number": head.number})
     there.sort(key=lambda head: numpy.linalg.norm(head.centre_mm))
     fields = {}
