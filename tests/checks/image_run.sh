@@ -1,0 +1,43 @@
+#!/bin/sh
+# What the image's run does when the firmware has ended: its laser_off, with a program and a reboot that
+# only say what they were called for.
+set -eu
+cd "$(dirname "$0")/../.."
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+dog=$work/watchdog
+sed -n '/^laser_off() {/,/^}/p' tools/image/root/usr/lib/isohead/run |
+    sed "s|/data/isohead.conf|$work/conf|g" >"$work/laser_off"
+[ -s "$work/laser_off" ] || { echo "image_run: run has no laser_off" >&2; exit 1; }
+say() { :; }
+isohead_board() { echo off >>"$work/calls"; return "$off_status"; }
+reboot() { echo reset >>"$work/calls"; }
+sleep() { :; }
+# shellcheck source=/dev/null
+. "$work/laser_off"
+
+failed=0
+# expect CALLS FED STATUS OFF_STATUS: after the firmware's STATUS, where --laser-off ends with OFF_STATUS
+expect() {
+    : >"$work/calls"
+    : >"$dog"
+    off_status=$4
+    laser_off "$3" || true
+    calls=$(tr '\n' ' ' <"$work/calls")
+    fed=$(wc -c <"$dog")
+    if [ "$calls" != "$1" ] || [ "$fed" != "$2" ]; then
+        echo "image_run: firmware $3, --laser-off $4: calls '$calls', $fed bytes for the watchdog, expected '$1', $2" >&2
+        failed=1
+    fi
+}
+
+expect "" 0 1 1 # no settings, no laser
+: >"$work/conf"
+expect "off " 0 0 0
+expect "off " 0 137 0
+expect "off reset " 1 137 1 # started, and fed no more
+expect "off reset " 1 0 1
+expect "off reset " 1 1 2
+expect "off " 0 2 2 # settings that are wrong switched nothing on
+echo "image_run: 7 ends of the firmware, $failed wrong"
+exit $failed
