@@ -18,6 +18,22 @@ static struct {
 
 static struct app_laser laser;
 
+/* A random schedule: frames, wishes, stalls, an interlock, cameras that come and go. The guard's limits
+ * look every LOOK_US, also while the program stalls. Each rise and fall is noted, and judged afterwards
+ * without the sums of either. */
+enum { EDGES_MAX = 200000, LOOK_US = 20000 };
+
+static struct schedule {
+    uint32_t random;
+    int64_t now_us, next_look_us, on_us, judged_on_us;
+    int64_t silent_us, silent_max_us; /* on without a frame, and the longest such time */
+    int64_t low_us;
+    bool was_on;
+    int cut_count, edge_count;
+    int64_t edge_us[EDGES_MAX]; /* rise, fall, rise, ... */
+    struct hal_limits limits;
+} schedule;
+
 static bool fake_open(void *context, struct hal_error *error)
 {
     (void)context;
@@ -70,6 +86,8 @@ static bool fake_judged(void *context, struct hal_error *error)
 {
     (void)context;
     fake.judged_count++;
+    schedule.silent_us = 0;
+    schedule.judged_on_us = schedule.on_us;
     return fake.judged_fails ? hal_fail(error, "judged fails") : true;
 }
 
@@ -381,21 +399,6 @@ static void test_duty_while_busy(void)
     }
 }
 
-/* Half an hour of a random schedule: frames, wishes, stalls, an interlock, cameras that come and go. The
- * guard's limits look every LOOK_US, also while the program stalls. Each rise and fall is noted, and
- * judged afterwards without the sums of either. */
-enum { EDGES_MAX = 200000, LOOK_US = 20000 };
-
-static struct schedule {
-    uint32_t random;
-    int64_t now_us, next_look_us, on_us, judged_on_us;
-    int64_t silent_us, silent_max_us; /* on without a frame, and the longest such time */
-    bool was_on;
-    int cut_count, edge_count;
-    int64_t edge_us[EDGES_MAX]; /* rise, fall, rise, ... */
-    struct hal_limits limits;
-} schedule;
-
 /* 0 .. below - 1, the same in every run of the test. */
 static int64_t random_below(int64_t below)
 {
@@ -412,12 +415,6 @@ static void note_edge(void)
     }
 }
 
-static void note_judged(void)
-{
-    schedule.silent_us = 0;
-    schedule.judged_on_us = schedule.on_us;
-}
-
 /* Time passes, with the guard's looks in it. */
 static void pass(int64_t time_us)
 {
@@ -428,6 +425,10 @@ static void pass(int64_t time_us)
         int64_t step_us = to_us - schedule.now_us;
         schedule.on_us += fake.line ? step_us : 0;
         schedule.silent_us += fake.line ? step_us : 0;
+        schedule.low_us = fake.line ? 0 : schedule.low_us + step_us;
+        if (schedule.low_us >= HAL_LIMITS_PAUSE_US) {
+            schedule.silent_us = 0; /* it may be on once more */
+        }
         if (schedule.silent_us > schedule.silent_max_us) {
             schedule.silent_max_us = schedule.silent_us;
         }
@@ -461,7 +462,6 @@ static void run_frame(bool stalls)
     app_laser_busy(&laser, true, schedule.now_us);
     pass(random_below(10000));
     if (random_below(8) != 0) {
-        note_judged();
         app_laser_frame(&laser, schedule.now_us);
     }
     app_laser_wish(&laser, random_below(3) != 0, schedule.now_us);
@@ -471,7 +471,6 @@ static void run_frame(bool stalls)
     if (random_below(100) == 0) {
         app_laser_camera(&laser, false, 0, schedule.now_us);
         pass(HAL_LIMITS_PAUSE_US + random_below(1000000));
-        schedule.silent_us = 0; /* after a rest it may be on once more */
         app_laser_camera(&laser, true, 1 + random_below(INT32_MAX), schedule.now_us);
     }
 }
@@ -493,6 +492,7 @@ static void assert_duty(int32_t duty_percent, int64_t extra_us)
     TEST_ASSERT_LESS_OR_EQUAL_INT64(extra_us, worst_us);
 }
 
+/* Half an hour of each. */
 static void test_any_schedule(void)
 {
     static const int32_t duties[] = {1, 5, 10, 30, 50, 80, 90, 99, 100};
@@ -517,6 +517,99 @@ static void test_any_schedule(void)
         TEST_ASSERT_GREATER_THAN_INT64(0, laser.on_us);
         TEST_ASSERT_TRUE(stalls ? schedule.cut_count > 0 : schedule.cut_count == 0);
     }
+}
+
+/* Which bits of a member can flip: all of a flag's one, and not those whose sums would overflow. */
+struct member {
+    const char *name;
+    size_t offset;
+    int bit_count;
+};
+#define MEMBER(name, bits)                            \
+    {                                                 \
+#name, offsetof(struct app_laser, name), bits \
+    }
+
+static const struct member members[] = {
+    MEMBER(config.enabled, 1),
+    MEMBER(config.duty_percent, 7),
+    MEMBER(config.cap_us, 55),
+    MEMBER(wished, 1),
+    MEMBER(is_on, 1),
+    MEMBER(blocks, 32),
+    MEMBER(is_open, 1),
+    MEMBER(silent_us, 55),
+    MEMBER(silent_max_us, 55),
+    MEMBER(off_us, 55),
+    MEMBER(tick_us, 48),
+    MEMBER(credit, 55),
+    MEMBER(stage_us, 55),
+    MEMBER(stage_max_us[0], 55),
+    MEMBER(stage_max_us[1], 55),
+    MEMBER(stage_max_us[2], 55),
+    MEMBER(open_us, 55),
+    MEMBER(beat_us, 55),
+    MEMBER(on_us, 55),
+    MEMBER(on_count, 55),
+    MEMBER(may_be_on, 1),
+};
+
+static void flip(const struct member *member, int bit)
+{
+    ((uint8_t *)&laser)[member->offset + (size_t)bit / 8] ^= (uint8_t)(1u << bit % 8);
+}
+
+/* A processor that was hit goes on with whatever is in its memory. */
+static void run_flipped(int64_t end_us)
+{
+    while (schedule.now_us < end_us) {
+        int64_t frame_us = schedule.now_us + FRAME_US;
+        while (schedule.now_us < frame_us) {
+            app_laser_tick(&laser, schedule.now_us);
+            pass(APP_LASER_BEAT_US);
+        }
+        app_laser_busy(&laser, true, schedule.now_us);
+        if (random_below(8) != 0 && end_us - schedule.now_us > 1000000) {
+            app_laser_frame(&laser, schedule.now_us); /* the last second has no frame */
+        }
+        pass(10000);
+        app_laser_wish(&laser, random_below(8) != 0, schedule.now_us);
+        app_laser_busy(&laser, false, schedule.now_us);
+    }
+}
+
+/* Any bit of the policy's state: cap and duty hold all the same, as the guards keep sums of their own. */
+static void test_any_bit_flips(void)
+{
+    static const int32_t duties[] = {30, 100};
+    const int64_t late_us = HAL_LIMITS_SLACK_US + LOOK_US;
+    int flip_count = 0, cut_count = 0;
+    for (size_t m = 0; m < sizeof members / sizeof members[0]; m++) {
+        for (int bit = 0; bit < members[m].bit_count; bit++) {
+            int32_t duty = duties[bit % 2];
+            const struct hal_limits_config limits = {CAP_US, duty};
+            setUp();
+            schedule = (struct schedule){.random = (uint32_t)bit, .next_look_us = LOOK_US};
+            hal_limits_init(&schedule.limits, &limits, 0);
+            start(true, duty);
+            app_laser_wish(&laser, true, 0);
+            run_flipped(2000000 + random_below(100000));
+            flip(&members[m], bit);
+            run_flipped(6000000);
+            note_edge();
+            schedule.edge_us[schedule.edge_count] = schedule.now_us; /* it may be on still */
+            schedule.edge_count += schedule.edge_count % 2;
+            if (schedule.silent_max_us > CAP_US + late_us) {
+                TEST_FAIL_MESSAGE(members[m].name);
+            }
+            assert_duty(duty, late_us);
+            flip_count++;
+            cut_count += schedule.cut_count > 0;
+        }
+    }
+    printf("%d bits of the policy flipped: cap and duty hold, %d times by the guards\n", flip_count,
+           cut_count);
+    TEST_ASSERT_GREATER_THAN_INT(20, cut_count);
 }
 
 /* What a camera says of its rate, 1000 s here, changes nothing: off at the cap. */
@@ -686,6 +779,7 @@ int main(void)
     RUN_TEST(test_time_is_accounted_for);
     RUN_TEST(test_duty_while_busy);
     RUN_TEST(test_any_schedule);
+    RUN_TEST(test_any_bit_flips);
     RUN_TEST(test_the_cap_needs_no_frame_time);
     RUN_TEST(test_a_frame_that_is_not_judged_is_none);
     RUN_TEST(test_the_cap_while_busy);
