@@ -35,7 +35,8 @@ int hal_v4l2_ioctl(int fd, unsigned long request, void *argument);
 bool hal_v4l2_format_set(int fd, const char *wanted, int32_t width, int32_t height,
                          struct hal_v4l2_format *format, struct hal_error *error);
 
-/* rate_mhz 0: the rate is left as it is. *frame_time_us is 0 where the device does not say. */
+/* rate_mhz 0: the rate is left as it is. *frame_time_us is 0 where the device does not say, else what it
+ * says, believable or not, cut to 1 .. INT32_MAX. */
 bool hal_v4l2_rate_set(int fd, int32_t rate_mhz, int32_t *frame_time_us, struct hal_error *error);
 
 #endif
