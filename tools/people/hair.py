@@ -95,7 +95,8 @@ def shell(head, kind, rng):
     waves = smooth(points, 45.0, seed) + 0.7 * smooth(points, 20.0, seed + 1) + 0.4 * smooth(points, 9.0, seed + 2)
     thick = thick * taper * (1.0 + 0.55 * kind["rough"] * waves)
     if kind["top"][0] < 0:
-        thick = numpy.where(on_top > 0.3, -6.0, thick)
+        # Below the skin, on top and before.
+        thick = numpy.where((on_top > 0.3) | (beside[:, None] < 0.5), -6.0, thick)
     points = points + outward * (thick + 0.5)[..., None]
     return make(points.reshape(-1, 3), grid_faces(AROUND + 1, ALONG), 1.0, HAIR)
 

@@ -69,6 +69,10 @@ class Visit:
         self.ahead = not self.past and rng.random() < 0.2
         self.phase = rng.uniform(0.0, 6.28)
 
+    def deepest_mm(self):
+        """How far behind its place a body comes from, with room to walk."""
+        return 2.0 * self.outside_mm + 400.0 if self.ahead else max(0.0, self.deep_mm) + 300.0
+
     def at(self, frame):
         """Shift, yaw and how far away from the place (-1 .. 1 with the side); None: out of sight."""
         bob = numpy.array([0.0, 12.0 * numpy.sin(1.2 * frame + self.phase), 0.0])

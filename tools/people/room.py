@@ -34,11 +34,12 @@ def backdrop(z_mm, rng):
     return meshes
 
 
-def around(heads_mm, seated, turning, rng):
-    """A room for people whose heads are there."""
+def around(heads_mm, seated, turning, deep_mm, rng):
+    """A room for people whose heads are there; somebody comes from `deep_mm` behind them."""
     middle = numpy.mean(heads_mm, axis=0)
     depth = max(head[2] for head in heads_mm)
     behind = rng.choice([rng.uniform(280.0, 600.0), rng.uniform(600.0, 2500.0)])
+    behind = max(behind, deep_mm)
     meshes = backdrop(depth + behind, rng)
     floor_y = middle[1] + (SEATED_MM if seated else STANDING_MM)
     if rng.random() < 0.5:

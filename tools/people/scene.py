@@ -146,7 +146,9 @@ class Scene:
         self._tilt(rng)
         self.still = None
         if kind != "empty":
-            self.still = room.around(places, self.actors[0].seated, kind in ("turning", "visit", "past"), rng)
+            visit = self.actors[0].visit
+            self.still = room.around(places, self.actors[0].seated, kind in ("turning", "visit", "past"),
+                                     visit.deepest_mm() if visit else 0.0, rng)
 
     def _pair(self, rng):
         apart = rng.uniform(400.0, 900.0)
