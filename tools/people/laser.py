@@ -5,7 +5,7 @@ import dataclasses
 import numpy
 
 from noise import hash_unit
-from rig import DOTS, ROWS
+from rig import DOTS, ROWS, WIDTH
 
 # The bundle of rays of a dot, as in tools/render/rd_dots.c.
 INNER, OUTER = 6, 8
@@ -21,9 +21,9 @@ NOMINAL_MM = 850.0
 
 
 class Laser:
-    def __init__(self, rng):
+    def __init__(self, rng, rig):
         self.power_grey = rng.uniform(105.0, 180.0)
-        self.optics_px = max(0.8, rng.uniform(0.80, 0.98))
+        self.optics_px = rng.uniform(0.80, 0.98) * max(0.9, numpy.sqrt(rig.width / WIDTH))
         self.field_blur = rng.uniform(0.05, 0.35)
         self.beam_mm = rng.uniform(0.45, 0.75)
         self.divergence = rng.uniform(1e-4, 3e-4)

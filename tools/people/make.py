@@ -45,13 +45,13 @@ def on_head(points, head, reach=1.35):
 class Studio:
     """What a sequence has in common."""
 
-    def __init__(self, rig_kind, seed, distance_mm):
+    def __init__(self, rig_kind, seed, distance_mm, width=rigs.WIDTH):
         rng = numpy.random.default_rng([seed, 3])
         self.kind = rig_kind
         self.is_range = rig_kind == "range"
-        self.rig = rigs.range_rig(rng) if self.is_range else rigs.dots_rig(rig_kind, rng)
+        self.rig = rigs.range_rig(rng) if self.is_range else rigs.dots_rig(rig_kind, rng, width)
         self.rays = self.rig.pixel_rays(STEP).astype(numpy.float32)
-        self.laser = laser.Laser(rng)
+        self.laser = laser.Laser(rng, self.rig)
         self.light = laser.Light(rng, distance_mm)
         self.sensor = depth.Sensor(rng, self.rig, STEP) if self.is_range else laser.Sensor(rng, self.rig)
         self.set_still(None)
@@ -94,7 +94,7 @@ class Studio:
         shape = self.rays.shape[:2]
         if self.is_range:
             return spread(depth.measure(self.sensor, hits, shape, rng)), 65535, None, hits
-        grey = laser.soften(spread(grey.reshape(shape)))
+        grey = laser.soften(spread(grey.reshape(shape))[:self.rig.height, :self.rig.width])
 
         def cast(origins, directions):
             found = [one.cast(origins, directions) for one in (self.still, caster) if one is not None]
@@ -163,10 +163,10 @@ def describe(studio, scene, heads, extra, samples, dots, hits):
     return fields, {"kind": scene.kind, "people": notes, **extra, "wear": [actor.note() for actor in scene.actors]}
 
 
-def make(model, out, rig_kind, scene_kind, seed, frames):
+def make(model, out, rig_kind, scene_kind, seed, frames, width=rigs.WIDTH):
     os.makedirs(out, exist_ok=True)
     scene = Scene(model, scene_kind, seed, frames, rig_kind)
-    studio = Studio(rig_kind, seed, scene.head_mm[2])
+    studio = Studio(rig_kind, seed, scene.head_mm[2], width)
     key_before = None
     with open(os.path.join(out, "frames.jsonl"), "w", encoding="utf-8") as frames_file, \
             open(os.path.join(out, "truth.jsonl"), "w", encoding="utf-8") as truth_file, \
@@ -198,9 +198,10 @@ def main():
     parser.add_argument("--kind", default="calm", choices=KINDS)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--frames", type=int, default=30)
+    parser.add_argument("--width", type=int, default=rigs.WIDTH, help="of dot rigs' pictures, pixels")
     parser.add_argument("out")
     options = parser.parse_args()
-    make(Model(), options.out, options.rig, options.kind, options.seed, options.frames)
+    make(Model(), options.out, options.rig, options.kind, options.seed, options.frames, options.width)
 
 
 if __name__ == "__main__":

@@ -9,6 +9,8 @@ import numpy
 ROWS = 19
 DOTS = ROWS * ROWS
 MEET_MM = 800.0
+# The pictures of the paper's camera, in pixels.
+WIDTH, HEIGHT = 752, 582
 UNDISTORT_STEPS = 12
 # name: baseline, projector's direction from the camera (degrees: 0 right, 90 above), pitch of the dots in degrees
 KINDS = {
@@ -69,7 +71,7 @@ class Rig:
         return direction @ down / (down @ down), direction @ across / (across @ across)
 
 
-def dots_rig(kind, rng):
+def dots_rig(kind, rng, width):
     baseline_mm, direction_deg, pitch_deg = KINDS[kind]
     lens = (rng.uniform(-0.18, -0.14), rng.uniform(0.045, 0.08), rng.uniform(-5.5e-4, 5.5e-4),
             rng.uniform(-5.5e-4, 5.5e-4), 0.0)
@@ -89,7 +91,9 @@ def dots_rig(kind, rng):
     towards = (numpy.outer(cosine * beside + sine * forward, beside) + numpy.outer(other, other) +
                numpy.outer(cosine * forward - sine * beside, forward))
     projector = baseline_mm * (cosine * beside + sine * forward)
-    return Rig(752, 582, (920.8, 943.8), (375.5, 290.5), lens, 400.0, 2600.0, projector, rays @ towards.T)
+    zoom, height = width / WIDTH, round(width * HEIGHT / WIDTH)
+    return Rig(width, height, (920.8 * zoom, 943.8 * zoom), (0.5 * (width - 1), 0.5 * (height - 1)), lens, 400.0, 2600.0,
+               projector, rays @ towards.T)
 
 
 def range_rig(rng):
