@@ -48,8 +48,9 @@ void file_write(const std::string &path, const std::string &bytes)
     int descriptor = open(part.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
     if (descriptor < 0)
         throw Error(path + ": could not be written: " + std::strerror(errno));
-    bool good =
-        (!exists || fchmod(descriptor, there.st_mode & 0777) == 0) && put(descriptor, bytes);
+    /* On the disk before it has the name: a power cut leaves the old file or this one. */
+    bool good = (!exists || fchmod(descriptor, there.st_mode & 0777) == 0) &&
+                put(descriptor, bytes) && fsync(descriptor) == 0;
     int reason = errno;
     if (close(descriptor) != 0 && good) {
         good = false;
