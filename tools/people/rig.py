@@ -92,8 +92,8 @@ def dots_rig(kind, rng, width):
                numpy.outer(cosine * forward - sine * beside, forward))
     projector = baseline_mm * (cosine * beside + sine * forward)
     zoom, height = width / WIDTH, round(width * HEIGHT / WIDTH)
-    return Rig(width, height, (920.8 * zoom, 943.8 * zoom), (0.5 * (width - 1), 0.5 * (height - 1)), lens, 400.0, 2600.0,
-               projector, rays @ towards.T)
+    return Rig(width, height, (920.8 * zoom, 943.8 * zoom), (0.5 * (width - 1), 0.5 * (height - 1)), lens,
+               400.0, 2600.0, projector, rays @ towards.T)
 
 
 def range_rig(rng):
