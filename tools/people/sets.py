@@ -16,13 +16,16 @@ SETS = {
                 80000, 1, 20, 0), "sample": (
                     90000, 1, 5, 0)}
 EMPTY_FRAMES = 30
+# All rigs of this set see the same people.
+SAME_PEOPLE = "rigs"
 ALL_RIGS = [*rigs.KINDS, "range"]
 
 
 def sequences(name, rig_kind):
     """(directory, kind, seed, frames) of every sequence, kinds mixed so that a part is balanced."""
     first, rounds, frames, empty = SETS[name]
-    first += 1000 * ALL_RIGS.index(rig_kind)
+    if name != SAME_PEOPLE:
+        first += 1000 * ALL_RIGS.index(rig_kind)
     listed = [(kind, frames) for _ in range(rounds) for kind in KINDS]
     every = max(1, len(listed) // max(1, empty))
     mixed = []
