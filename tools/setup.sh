@@ -137,6 +137,7 @@ need_deb() {
         ;;
     esac
     need_program dpkg-shlibdeps dpkg-dev
+    need_python json python3
 }
 
 # clang's run-time libraries are a package of their own, with its version in the name.
@@ -193,6 +194,7 @@ need_image() {
     need_program xz xz-utils
     need_program git git
     need_program readelf binutils
+    need_python json python3
     PATH=$PATH:/sbin:/usr/sbin need_program mkfs.vfat dosfstools
     PATH=$PATH:/sbin:/usr/sbin need_program sfdisk fdisk
     PATH=$PATH:/sbin:/usr/sbin need_program depmod kmod

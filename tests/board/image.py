@@ -300,7 +300,8 @@ class Case:
         program = os.path.join(root, "usr/bin/isohead_board")
         os.remove(program)
         with open(program, "w", encoding="ascii") as file:
-            file.write("#!/bin/sh\necho this firmware is broken >&2\nexit 1\n")
+            # Making the line low works: else the board is reset at once.
+            file.write("#!/bin/sh\ncase $* in *--laser-off*) exit 0 ;; esac\necho this firmware is broken >&2\nexit 1\n")
         os.chmod(program, 0o755)
         path = os.path.join(self.work, "broken.squashfs")
         run("mksquashfs", root, path, "-quiet", "-no-progress", "-all-root", "-comp", "zstd",
@@ -333,6 +334,10 @@ def case_update(shared):
         board.wait("slot a is good", ANSWER_S)
         board.command("grep -q ' /data vfat ro,' /proc/mounts")
         board.command("! touch /usr/x")
+        firmware = "/proc/$(pidof isohead_board | cut -d ' ' -f 1)"
+        board.command(f"[ $(stat -c %U {firmware}) = isohead ]")
+        board.command(f"grep -q 'CapPrm:.0*$' {firmware}/status && grep -q 'NoNewPrivs:.1' {firmware}/status")
+        board.command("[ $(stat -c %a%U $(readlink -f /dev/console)) != 660isohead ]")
         board.command("ls -l /proc/$(pidof isohead_board)/fd | grep -q /dev/watchdog")
         case.update(board, broken)
         board.command("reboot")

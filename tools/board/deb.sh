@@ -2,6 +2,7 @@
 # The Debian package of isohead_board.
 #
 #   tools/board/deb.sh arm64|armhf     ->  build/isohead_VERSION_ARCH.deb; its name is printed
+#                                          build/isohead_VERSION_ARCH.cdx.json, its bill of materials
 #
 # Of what `make board ARCH=...` built. Dependencies are computed from the program's symbols and what
 # the sysroot's packages say of theirs. The same commit gives the same bytes.
@@ -15,7 +16,7 @@ case "${1:-}" in
 arm64) arch=$1 strip=aarch64-linux-gnu-strip ;;
 armhf) arch=$1 strip=arm-linux-gnueabihf-strip ;;
 *)
-    sed -n '2,4s/^# \{0,1\}//p' "$0" >&2
+    sed -n '2,5s/^# \{0,1\}//p' "$0" >&2
     exit 2
     ;;
 esac
@@ -94,4 +95,5 @@ sed -e "s/@VERSION@/$version/" -e "s/@ARCH@/$arch/" -e "s/@SIZE@/$size/" -e "s/@
 find "$package" -exec touch -h -d "@$SOURCE_DATE_EPOCH" {} +
 deb=build/isohead_${version}_$arch.deb
 dpkg-deb --root-owner-group -Zxz --build "$package" "$deb" >"$stage/build.log"
+/usr/bin/python3 tools/board/bill.py deb "$deb" build/apt/debs >"${deb%.deb}.cdx.json"
 echo "$deb"

@@ -4,8 +4,8 @@
 #   tools/image/image.sh [BOARD [OUT]]
 #
 # BOARD is isohead_board for arm64 (default: that of `make board ARCH=arm64`). Writes below OUT
-# (default build/image): isohead.img; slot.squashfs, what isohead-update takes; SHA256SUMS. With
-# XZ=1 isohead.img.xz too. Needs no root and mounts nothing.
+# (default build/image): isohead.img; slot.squashfs, what isohead-update takes; isohead.cdx.json, the
+# bill of materials; SHA256SUMS. With XZ=1 isohead.img.xz too. Needs no root and mounts nothing.
 # The same commit and packages give the same bytes: identifiers and times are fixed.
 set -eu
 cd "$(dirname "$0")/../.."
@@ -87,7 +87,12 @@ put "$slot" $((1 + ESP_MIB))
 put "$slot" $((1 + ESP_MIB + SLOT_MIB))
 put "$data" $((1 + ESP_MIB + 2 * SLOT_MIB))
 
-(cd "$out" && sha256sum isohead.img slot.squashfs >SHA256SUMS)
+read -r packages <"$out/packages.list"
+# shellcheck disable=SC2086 # a list of packages
+/usr/bin/python3 tools/board/bill.py image "$out/root" "$out/initramfs" "$out/boot" build/apt/debs $packages \
+    >"$out/isohead.cdx.json"
+
+(cd "$out" && sha256sum isohead.img slot.squashfs isohead.cdx.json >SHA256SUMS)
 show() { echo "$1: $(($(stat -c %s "$1") * 10 / 1048576))" | sed 's/\(.\)$/.\1 MiB/'; }
 show "$image"
 show "$slot"

@@ -25,11 +25,13 @@ rm -rf "$packages" "$root" "$initramfs" "${work:?}/boot"
 mkdir -p "$root" "$initramfs" "$work/boot"
 
 kernel_package=$("$apt" newest 'linux-image-6\.1\.0-[0-9]*-arm64')
-"$apt" unpack "$packages" "$kernel_package:arm64" busybox-static:arm64 systemd-boot-efi:arm64 \
+set -- "$kernel_package:arm64" busybox-static:arm64 systemd-boot-efi:arm64 \
     libc6:arm64 libgcc-s1:arm64 libv4l-0:arm64 libv4lconvert0:arm64 libjpeg62-turbo:arm64 \
     libgpiod2:arm64 libcjson1:arm64 libmicrohttpd12:arm64 libgnutls30:arm64 libnettle8:arm64 \
     libhogweed6:arm64 libgmp10:arm64 libidn2-0:arm64 libunistring2:arm64 libtasn1-6:arm64 \
     libp11-kit0:arm64 libffi8:arm64
+"$apt" unpack "$packages" "$@"
+echo "$*" >"$work/packages.list" # for the bill of materials
 version=$(basename "$packages"/lib/modules/*)
 
 # modules TREE KIND...: the kernel's modules of these kinds in modules.list, and what they need
