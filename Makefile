@@ -98,14 +98,17 @@ kills: sanitize ## program and guards killed and stopped at random, KILLS times 
 	@cmake --build --preset sanitize --parallel 2 --target kills
 	@$(BUILD)/sanitize/tests/kills $(KILLS)
 
-coverage: sim ## the core's lines and branches that its own tests run, against the limits
+coverage: sim ## the lines and branches of the core and of the board's program that their tests run, against limits
 	@tools/setup.sh coverage
-	@cmake --preset coverage -DISOHEAD_UNITY_DIR=$(abspath $(UNITY_DIR)) \
+	@cmake --preset coverage -DISOHEAD_UNITY_DIR=$(abspath $(UNITY_DIR)) -DISOHEAD_GPIOD2_DIR=$(abspath $(GPIOD2_DIR)) \
 	  > $(BUILD)/coverage.log 2>&1 || { cat $(BUILD)/coverage.log; exit 1; }
 	@find $(BUILD)/coverage -name '*.gcda' -delete
 	@cmake --build --preset coverage --parallel 2
 	@ctest --test-dir $(BUILD)/coverage --label-regex '^core$$' --output-on-failure --parallel 2
-	@/usr/bin/python3 tests/checks/coverage.py $(BUILD)/coverage
+	@/usr/bin/python3 tests/checks/coverage.py core $(BUILD)/coverage
+	@find $(BUILD)/coverage -name '*.gcda' -delete
+	@ctest --test-dir $(BUILD)/coverage --label-regex '^board$$' --output-on-failure --parallel 2
+	@/usr/bin/python3 tests/checks/coverage.py board $(BUILD)/coverage
 
 ranges: sim ## the core with every operation and range checked, over all frames, its tests, the fuzzers' corpus
 	@tools/setup.sh ranges

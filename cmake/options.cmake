@@ -23,6 +23,13 @@ if(ISOHEAD_SANITIZE)
   add_link_options(-fsanitize=address,undefined)
 endif()
 
+# Counts of processes that end in haste, too.
+if(ISOHEAD_COVERAGE)
+  add_library(coverage_ends OBJECT "${CMAKE_SOURCE_DIR}/tests/checks/coverage_ends.c")
+  link_libraries("$<TARGET_OBJECTS:coverage_ends>")
+  add_link_options(-Wl,--wrap=_exit,--wrap=raise,--wrap=execv,--wrap=syscall)
+endif()
+
 # The board's program runs for months on devices that are not ours: what the compiler can harden is
 # hardened. No path of the machine that built it stays in it.
 if(ISOHEAD_BOARD)

@@ -190,7 +190,8 @@ static bool is_whole(const struct app_live *live, size_t live_size)
            live->height <= IH_FRAME_HEIGHT_MAX &&
            app_live_size(live->width, live->height) <= live_size && live->maximum > 0 &&
            live->maximum <= UINT16_MAX && live->record_length > 0 &&
-           live->record_length <= sizeof live->record;
+           live->record_length <= sizeof live->record && live->head.dots.dot_count >= 0 &&
+           live->head.dots.dot_count <= IH_DOTS_MAX;
 }
 
 size_t app_live_write(void *content, size_t content_size, unsigned char *to, size_t size,

@@ -41,7 +41,7 @@ void app_live_put(struct app_live *live, const struct hal_frame *frame, const st
                   const struct app_record *record, int64_t frame_count);
 
 /* pause is called after each short piece of work. Length; 0: this is no frame of that size, or there is
- * no room. For hal_serve: content_size and what is in content may be anything. */
+ * no room. For hal_serve: content_size and the numbers in content may be anything; results are the core's. */
 size_t app_live_write(void *content, size_t content_size, unsigned char *to, size_t size,
                       void (*pause)(void));
 

@@ -1,0 +1,158 @@
+#!/usr/bin/env python3
+"""isohead_board on a machine without a board: its options, what is wrong with its files and devices, its ends and their
+exit statuses.
+
+program.py ISOHEAD_BOARD RIG_JSON      exit status 1 if something is wrong
+"""
+
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+
+# hal_serve.h, app_health.h; on a machine under load everything may take longer.
+CHECK_S, SOON_S = 15, 60
+
+failures = []
+
+
+def check(condition, text):
+    if not condition:
+        failures.append(text)
+        print("FAIL", text, flush=True)
+
+
+def run(*options, limit_s=SOON_S, **more):
+    done = subprocess.run([program, *options], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+                          timeout=limit_s, check=False, **more)
+    check("Sanitizer" not in done.stderr and "runtime error" not in done.stderr, f"{options}: {done.stderr}")
+    return done
+
+
+def expect(status, pattern, *options, **more):
+    """This exit status and message, and no records."""
+    done = run(*options, **more)
+    check(done.returncode == status and re.search(pattern, done.stderr) and not done.stdout,
+          f"{options}: status {done.returncode}, expected {status}; no '{pattern}' in: {done.stderr}")
+
+
+def write(name, text):
+    path = os.path.join(work, name)
+    with open(path, "w", encoding="utf-8") as file:
+        file.write(text)
+    return path
+
+
+def check_usage():
+    done = run("--help")
+    check(done.returncode == 0 and "--laser-off" in done.stdout and not done.stderr, f"--help: {done}")
+    done = run("--version")
+    check(done.returncode == 0 and re.fullmatch(r"isohead_board \d+\.\d+\.\d+\n", done.stdout), f"--version: {done}")
+    with open("/dev/full", "w", encoding="ascii") as full:
+        done = subprocess.run([program, "--help"], stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+        check(done.returncode == 1 and "standard output" in done.stderr, f"--help, full: {done}")
+    expect(2, "rig", "--device", "/dev/null")
+    expect(2, "perhaps .device. is meant", "--devise", "x", "--rig", rig)
+    expect(2, "duty", "--rig", rig, "--duty", "101")
+    expect(2, "No such file", "--config", "/nowhere/isohead.conf")
+    expect(2, "No such file", "--rig", "/nowhere/rig.json")
+    expect(2, "a directory", "--rig", work)
+    expect(2, "not JSON", "--rig", write("bad.json", "{"))
+    with open(rig, encoding="ascii") as file:
+        text = file.read()
+    expect(2, "near", "--rig", write("near.json", re.sub(r'"near_mm" *: *\d+', '"near_mm":-5', text)))
+    range_rig = '{"kind":"range",' + text.split("{", 1)[1]
+    expect(2, "range", "--rig", write("range.json", range_rig), "--device", "/dev/null")
+
+
+def check_outputs():
+    expect(1, "output: .*No such file", "--rig", rig, "--output", "serial:/nowhere/ttyS0")
+    expect(1, "output: ", "--rig", rig, "--output", "serial:" + write("file", ""))
+    expect(1, "output: ", "--rig", rig, "--output", "udp:no.such.host.invalid:9")
+    expect(1, "watchdog: ", "--rig", rig, "--watchdog", "/nowhere/watchdog")
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        expect(1, "view: .*Address already in use", "--rig", rig, "--view", str(taken.getsockname()[1]))
+
+
+def check_laser():
+    conf = write("none.conf", "laser = off\n")
+    check(run("--config", conf, "--laser-off").returncode == 0, "--laser-off of a board without a laser")
+    expect(2, "gpio-chip and laser-line", "--laser-off")
+    expect(1, "/nowhere/gpiochip0", "--laser-off", "--gpio-chip", "/nowhere/gpiochip0", "--laser-line", "3")
+    expect(2, "status", "--laser-off", "--config", write("wrong.conf", "laser = on\nstatus = soon\n"))
+    expect(1, "/nowhere/gpiochip0", "--rig", rig, "--laser", "--gpio-chip", "/nowhere/gpiochip0", "--laser-line", "3", "--device",
+           "/nowhere/video0")
+
+
+def end(number, *options, until="trying again", **more):
+    """Started, ended by the signal once it says so; exit status, standard error."""
+    with subprocess.Popen([program, "--rig", rig, "--device", "/nowhere/video0", *options], stdin=subprocess.DEVNULL,
+                          stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **more) as process:
+        text = ""
+        while until not in text:
+            line = process.stderr.readline()
+            if not line:
+                break
+            text += line
+        if number == signal.SIGHUP:
+            process.send_signal(number)
+            while "reloaded" not in text:
+                text += process.stderr.readline() or "reloaded? it has ended"
+            number = signal.SIGTERM
+        process.send_signal(number)
+        text += process.communicate(timeout=SOON_S)[1]
+    check("Sanitizer" not in text and "runtime error" not in text, text)
+    return process.returncode, text
+
+
+def check_ends():
+    for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
+        status, text = end(number)
+        check(status == 0 and "No such file" in text, f"{number!r} without a camera: status {status}: {text}")
+    for number in (signal.SIGABRT, signal.SIGKILL):
+        status, _ = end(number)
+        check(status != 0, f"{number!r}: status {status}")
+    status, text = end(signal.SIGTERM, "--view", "127.0.0.1:0", until="trying again")
+    check(status == 2 and "view" in text, f"port 0: status {status}: {text}")
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        port = free.getsockname()[1]
+    status, text = end(signal.SIGTERM, "--view", str(port))
+    check(status == 0 and f"live view: http://127.0.0.1:{port}/" in text, f"with a view: status {status}: {text}")
+    for output in ("udp:127.0.0.1:9", "udp:[::1]:9"):
+        status, text = end(signal.SIGTERM, "--output", output)
+        check(status == 0, f"{output}: status {status}: {text}")
+
+
+def check_check():
+    """--check: ended before its answer, and without a camera, it has not found that the rig fits."""
+    status, text = end(signal.SIGTERM, "--check")
+    check(status == 1 and "ended after 0 of 60" in text, f"--check, ended: status {status}: {text}")
+    begin = time.monotonic()
+    expect(1, "cannot be determined: no lit frame for 15 s", "--check", "--rig", rig, "--device", "/nowhere/video0",
+           limit_s=CHECK_S + SOON_S)
+    check(time.monotonic() - begin >= CHECK_S, "--check did not wait for the camera")
+
+
+def check_modes():
+    """Settings that only the camera would see: they are taken."""
+    for options in (["--exposure", "auto", "--gain", "auto"], ["--exposure", "500", "--gain", "7"], ["--exposure", "keep", "--gain", "keep"],
+                    ["--exposure", "steer"]):
+        status, text = end(signal.SIGTERM, *options)
+        check(status == 0, f"{options}: status {status}: {text}")
+
+
+def main():
+    for part in (check_usage, check_outputs, check_laser, check_ends, check_check, check_modes):
+        part()
+    print(f"isohead_board without a board: {len(failures)} failures")
+    return 1 if failures else 0
+
+
+if __name__ == "__main__":
+    program, rig = [os.path.abspath(path) for path in sys.argv[1:]]
+    with tempfile.TemporaryDirectory() as work:
+        sys.exit(main())
