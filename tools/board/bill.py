@@ -84,7 +84,7 @@ def bill(name, kind, components):
                 "dependencies": [{"ref": "isohead", "dependsOn": [component["bom-ref"] for component in components
                                                                   if "bom-ref" in component]}]}
     content = json.dumps(document, sort_keys=True)
-    document["serialNumber"] = "urn:uuid:" + str(uuid.UUID(digest_of(content.encode())[:32]))
+    document["serialNumber"] = "urn:uuid:" + str(uuid.uuid5(uuid.NAMESPACE_OID, content))
     json.dump(document, sys.stdout, indent=1, sort_keys=True)
     print()
 
