@@ -26,6 +26,7 @@ format = GREY
 rate = 2
 exposure = keep
 gain = keep
+laser-cap = 1000
 gpio-chip = /dev/gpiochip0
 laser-line = 0
 status = 0
