@@ -253,6 +253,11 @@ coverage | mutation)
     need_sim
     need_header microhttpd.h libmicrohttpd-dev
     need_program gcc gcc
+    if [ "$1" = coverage ]; then
+        need_python numpy python3-numpy
+        need_header libv4l2.h libv4l-dev
+        need_gpio
+    fi
     ;;
 fuzz) need_fuzz ;;
 eval)
@@ -365,7 +370,7 @@ size)
         mv build/third_party/qemu/qemu-*/"$header" build/third_party/qemu/
     fi
     ;;
-test | test-board) tools/board/gpiod2.sh build/third_party/gpiod2 ;;
+test | coverage | test-board) tools/board/gpiod2.sh build/third_party/gpiod2 ;;
 esac
 case "$1" in
 test | export) tools/python_packages.sh tools/export/requirements.txt build/export/python ;;

@@ -16,6 +16,11 @@
 /* Between two looks at who has had his time. */
 #define LOOK_MS 250
 #define SLOTS (HAL_SERVE_CONNECTIONS + HAL_SERVE_STRANGERS)
+/* Strangers who make room at a time, and turns of the library in which each could have been read before. */
+#define ROOM 8
+#define LOOKS_MIN 2
+/* Between two turns when all slots are taken, as somebody may wait. */
+#define FULL_MS 10
 #define FRAME_NAME "frame"
 
 enum visit {
@@ -29,7 +34,8 @@ enum visit {
 struct visitor {
     enum visit visit;
     bool has_frame;
-    bool is_known; /* has shown the token */
+    bool is_known;  /* has shown the token */
+    int look_count; /* turns of the library since he came, up to LOOKS_MIN */
     int64_t end_ms;
     int fd;
     struct MHD_Connection *connection;
@@ -42,6 +48,7 @@ struct serve {
     struct MHD_Daemon *daemon;
     struct visitor visitor[SLOTS];
     int known_count;
+    bool is_full;
 };
 
 static int64_t now_ms(void)
@@ -160,32 +167,45 @@ static void cut(struct visitor *visitor)
     shutdown(visitor->fd, SHUT_RDWR);
 }
 
-/* Room for one more stranger besides the newest one. */
-static void cut_oldest_stranger(struct serve *serve, const struct visitor *newest)
+/* The one who has not shown the token for longest, though the library had its chance to read what he sent: NULL for none. */
+static struct visitor *oldest_stranger(struct serve *serve)
 {
     struct visitor *oldest = NULL;
-    int count = 0;
     for (int i = 0; i < SLOTS; i++) {
         struct visitor *visitor = &serve->visitor[i];
-        if (visitor->visit == VISIT_OPEN && !visitor->is_known) {
-            count++;
-            bool is_older = oldest == NULL || visitor->end_ms < oldest->end_ms;
-            oldest = visitor != newest && is_older ? visitor : oldest;
+        const bool may_go =
+            visitor->visit == VISIT_OPEN && !visitor->is_known && visitor->look_count >= LOOKS_MIN;
+        if (may_go && (oldest == NULL || visitor->end_ms < oldest->end_ms)) {
+            oldest = visitor;
         }
     }
-    if (count == HAL_SERVE_STRANGERS && oldest != NULL) {
-        cut(oldest);
+    return oldest;
+}
+
+/* When all slots are taken the library accepts nobody: then strangers make room for who waits. */
+static void make_room(struct serve *serve)
+{
+    int taken_count = 0;
+    for (int i = 0; i < SLOTS; i++) {
+        struct visitor *visitor = &serve->visitor[i];
+        taken_count += visitor->visit != VISIT_FREE;
+        visitor->look_count += visitor->look_count < LOOKS_MIN;
+    }
+    serve->is_full = taken_count == SLOTS;
+    for (int i = 0; i < ROOM && serve->is_full; i++) {
+        struct visitor *oldest = oldest_stranger(serve);
+        if (oldest != NULL) {
+            cut(oldest);
+        }
     }
 }
 
-static void begin_visit(struct serve *serve, struct visitor *visitor, int fd,
-                        struct MHD_Connection *connection)
+static void begin_visit(struct visitor *visitor, int fd, struct MHD_Connection *connection)
 {
     *visitor = (struct visitor){.visit = VISIT_OPEN,
                                 .end_ms = now_ms() + HAL_SERVE_TOKEN_MS,
                                 .fd = fd,
                                 .connection = connection};
-    cut_oldest_stranger(serve, visitor);
 }
 
 static void end_visit(struct serve *serve, struct visitor *visitor)
@@ -210,7 +230,7 @@ static void note_connection(void *context, struct MHD_Connection *connection, vo
     *socket_context = NULL;
     for (int i = 0; i < SLOTS && info != NULL; i++) {
         if (serve->visitor[i].visit == VISIT_FREE) {
-            begin_visit(serve, &serve->visitor[i], info->connect_fd, connection);
+            begin_visit(&serve->visitor[i], info->connect_fd, connection);
             *socket_context = &serve->visitor[i];
             return;
         }
@@ -296,11 +316,12 @@ static bool listen_to_loop(struct serve *serve)
     return count > 0 || (count < 0 && (errno == EAGAIN || errno == EINTR));
 }
 
-static int wait_ms(struct MHD_Daemon *daemon)
+static int wait_ms(const struct serve *serve)
 {
     MHD_UNSIGNED_LONG_LONG library_ms = 0;
-    bool has_limit = MHD_get_timeout(daemon, &library_ms) == MHD_YES;
-    return has_limit && library_ms < LOOK_MS ? (int)library_ms : LOOK_MS;
+    const int own_ms = serve->is_full ? FULL_MS : LOOK_MS;
+    bool has_limit = MHD_get_timeout(serve->daemon, &library_ms) == MHD_YES;
+    return has_limit && (int64_t)library_ms < own_ms ? (int)library_ms : own_ms;
 }
 
 static int serve_until_end(struct serve *serve)
@@ -309,12 +330,13 @@ static int serve_until_end(struct serve *serve)
     struct pollfd waiting[] = {{.fd = HAL_VIEWER_SOCKET_FD, .events = POLLIN},
                                {.fd = info->epoll_fd, .events = POLLIN}};
     for (;;) {
-        poll(waiting, 2, wait_ms(serve->daemon));
+        poll(waiting, 2, wait_ms(serve));
         if (!listen_to_loop(serve)) {
             return 0;
         }
         MHD_run(serve->daemon);
         look_around(serve);
+        make_room(serve);
     }
 }
 

@@ -12,9 +12,10 @@
  * Limits: a connection that has shown the token keeps its slot, HAL_SERVE_CONNECTIONS of them at a time.
  *        From the last answer its request has HAL_SERVE_REQUEST_MS to be asked whole and answered
  *        whole, its waiting for a frame not counted: then the connection is cut, at whatever pace its
- *        bytes drip. Connections that have not shown it have slots of their own, HAL_SERVE_STRANGERS,
- *        HAL_SERVE_TOKEN_MS to show it. When all of these are taken the oldest is cut, so
- *        that a newcomer always gets in: who holds connections without the token keeps nobody out.
+ *        bytes drip. Others have HAL_SERVE_TOKEN_MS to show it, and HAL_SERVE_STRANGERS slots at least.
+ *        When all slots are taken those of them that came first are cut, as soon as what they sent could
+ *        be read, so that newcomers get in: who holds connections without the token keeps nobody out.
+ *        Those who wait to be accepted stand in the system's queue, HAL_VIEWER_BACKLOG long.
  * Memory: an answer per frame, shared by all that get it, so at most one more than connections.
  * The processor: whoever is let go on by the kernel's clock keeps the processor until its next tick, up
  *        to 10 ms later, as unimportant as he may be. So the work on a frame is done in short pieces, each

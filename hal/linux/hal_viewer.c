@@ -16,8 +16,6 @@
 
 /* Beyond what the process is given. */
 #define FREE_FD 16
-/* Connections that wait to be accepted. */
-#define BACKLOG 32
 #define PATH_BYTES 4096
 
 /* --- the listening socket --- */
@@ -37,7 +35,7 @@ static int bind_to(const struct addrinfo *at)
     }
     /* Else a program that is started anew would find its own closed connections in the way. */
     if (setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on) != 0 ||
-        bind(fd, at->ai_addr, at->ai_addrlen) != 0 || listen(fd, BACKLOG) != 0) {
+        bind(fd, at->ai_addr, at->ai_addrlen) != 0 || listen(fd, HAL_VIEWER_BACKLOG) != 0) {
         int reason = errno;
         close(fd);
         errno = reason;

@@ -38,6 +38,8 @@
 
 /* Longest wait for it to begin. */
 #define HAL_VIEWER_START_MS 5000
+/* Connections that wait to be accepted; what the system allows may be less. */
+#define HAL_VIEWER_BACKLOG 1024
 
 #define HAL_VIEWER_URL_MAX 160
 
