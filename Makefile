@@ -191,10 +191,12 @@ vectors: ## write tests/vectors anew with the float64 reference; STAGES=dots: of
 	@tools/setup.sh vectors
 	@/usr/bin/python3 tools/oracle/make_vectors.py --out tests/vectors $(STAGES)
 
-learn: sim ## learn the score's curves anew from rendered scenes; half an hour
+learn: sim ## learn the score anew from rendered scenes and people; an hour
 	@tools/setup.sh vectors
+	@tools/setup.sh people
+	@/usr/bin/python3 tools/people/sets.py learn $(BUILD)/learn/people
 	@/usr/bin/python3 tools/learn/learn.py --render $(BUILD)/host/tools/render/render \
-	  --host-sim $(BUILD)/host/sim/host_sim --work $(BUILD)/learn
+	  --host-sim $(BUILD)/host/sim/host_sim --work $(BUILD)/learn --people $(BUILD)/learn/people
 
 view: sim ## build tools/view, pictures of frames and what was found in them: build/view/tools/view/view
 	@tools/setup.sh view

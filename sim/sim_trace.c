@@ -9,6 +9,7 @@
 #include "hal_file.h"
 #include "sim_trace_contours.h"
 #include "detect/ih_score.h"
+#include "detect/ih_surroundings.h"
 
 /* An int32_t member of an array of structs as a list of its own. */
 static void write_column(struct app_write *write, const char *key, const void *first, int32_t count,
@@ -259,8 +260,27 @@ static void write_heads(struct app_write *write, const struct ih_hypotheses *hyp
     app_write_close(write, '}');
 }
 
-static void write_detection(struct app_write *write, const struct ih_detection *detection,
-                            const struct ih_verdict *verdict, bool is_predicted)
+/* What the rays ask of the learnt map. Of several windows of a depth image only the last one's rays are there. */
+static void write_surroundings(struct app_write *write, const struct isohead *head,
+                               const struct ih_ellipsoid *ellipsoid)
+{
+    struct ih_surroundings surroundings;
+    ih_surroundings_find(&head->scratch.detections.rays, ellipsoid, &surroundings);
+    app_write_key(write, "surroundings");
+    app_write_open(write, '{');
+    app_write_int_field(write, "weight_q12", surroundings.weight_q12);
+    app_write_key(write, "place");
+    app_write_open(write, '[');
+    for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
+        app_write_int(write, surroundings.place[slot]);
+    }
+    app_write_close(write, ']');
+    app_write_close(write, '}');
+}
+
+static void write_detection(struct app_write *write, const struct isohead *head,
+                            const struct ih_detection *detection, const struct ih_verdict *verdict,
+                            bool is_predicted)
 {
     struct ih_score score;
     ih_score_rate(&detection->evidence, &score);
@@ -288,6 +308,9 @@ static void write_detection(struct app_write *write, const struct ih_detection *
     app_write_int_field(write, "b_px_q12", detection->b_px_q12);
     app_write_int_field(write, "angle_mdeg", detection->angle_mdeg);
     app_write_int_field(write, "distance_mm_q8", detection->distance_mm_q8);
+    if (!is_predicted && head->windows.window_count <= 1) {
+        write_surroundings(write, head, &detection->head);
+    }
     app_write_close(write, '}');
 }
 
@@ -304,8 +327,8 @@ static void write_detections(struct app_write *write, const struct isohead *head
     app_write_open(write, '[');
     for (int32_t i = 0; i < count + head->predicted.count; i++) {
         const struct ih_verdict verdict = ih_tracks_verdict(&head->tracks, &head->detections, i);
-        write_detection(write, ih_tracks_head(&head->detections, &head->predicted, i), &verdict,
-                        i >= count);
+        write_detection(write, head, ih_tracks_head(&head->detections, &head->predicted, i),
+                        &verdict, i >= count);
     }
     app_write_close(write, ']');
 }

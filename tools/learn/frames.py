@@ -9,6 +9,8 @@ import subprocess
 
 import numpy
 
+SLOTS = 361
+
 
 def render(program, directory, seed, options):
     """Render unless it is there: rig.json is written last."""
@@ -19,43 +21,51 @@ def render(program, directory, seed, options):
     subprocess.run([program, *options, "--seed", str(seed), directory], check=True)
 
 
+def centres(heads):
+    return numpy.array([head["centre_mm"] for head in heads]).reshape(-1, 3)
+
+
 def read_truth(directory):
-    """Per file the heads' centres in mm, an empty array where nobody is."""
+    """Per file the heads' centres in mm, an empty array where nobody is; and those of which too little is seen."""
     truth = {}
     with open(os.path.join(directory, "truth.jsonl"), encoding="utf-8") as lines:
         for line in lines:
             entry = json.loads(line)
-            heads = entry.get("heads") or ([entry["head"]] if entry.get("head") else [])
-            truth[entry["file"]] = numpy.array([h["centre_mm"] for h in heads]).reshape(-1, 3)
+            if "head" in entry:
+                heads = entry.get("heads") or ([entry["head"]] if entry["head"] else [])
+                truth[entry["file"]] = centres(heads), centres(entry.get("unclear", []))
     return truth
 
 
 def read_trace(path):
     with open(path, encoding="utf-8") as file:
         trace = json.load(file)
-    found = [detection for detection in trace["findings"] if not detection["predicted"]]
+    found = [f for f in trace["findings"] if "surroundings" in f]
     return {
         "file": trace["file"],
         "kinds": trace["evidence"],
         "centre_mm": numpy.array([f["centre_mm_q8"] for f in found]).reshape(-1, 3) / 256,
         "evidence_q8": numpy.array([f["evidence_q8"] for f in found],
                                    dtype=numpy.int64).reshape(len(found), len(trace["evidence"])),
+        "weight_q12": numpy.array([f["surroundings"]["weight_q12"] for f in found], dtype=int),
+        "place": numpy.array([f["surroundings"]["place"] for f in found], dtype=numpy.int16).reshape(len(found), SLOTS),
     }
 
 
 def look(program, directory, scratch):
     """Every frame of a directory through the firmware."""
     name = os.path.relpath(directory, "/").replace(os.sep, "_")
-    out = os.path.join(scratch, name)
+    out = os.path.join(scratch, name[-200:])
     shutil.rmtree(out, ignore_errors=True)
     subprocess.run([program, "--trace", out, directory], check=True, stdout=subprocess.DEVNULL)
     truth = read_truth(directory)
     frames = []
     for path in sorted(glob.glob(os.path.join(out, "**", "*.json"), recursive=True)):
         frame = read_trace(path)
-        frame["heads"] = truth[frame["file"]]
-        frame["directory"] = directory
-        frames.append(frame)
+        if frame["file"] in truth:
+            frame["heads"], frame["unclear"] = truth[frame["file"]]
+            frame["directory"] = directory
+            frames.append(frame)
     shutil.rmtree(out)
     return frames
 

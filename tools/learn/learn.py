@@ -1,16 +1,20 @@
 #!/usr/bin/env python3
-"""Learn the score's curves (firmware/core/detect/ih_score_weights.h) from rendered scenes.
+"""Learn the score (ih_score_weights.h and ih_surroundings_map.h of firmware/core/detect) from rendered scenes.
 
-learn.py --render PROGRAM --host-sim PROGRAM --work DIR [--seeds A-B] [--out FILE] [--also DIR...]
+learn.py --render PROGRAM --host-sim PROGRAM --work DIR [--seeds A-B] [--people DIR...] [--out DIR] [--also DIR...]
 
-Renders every scene of scenes.py for every seed into DIR (those already there are kept), runs the
-firmware over them, and fits a logistic model: log-odds = bias + one piecewise linear curve per kind
-of evidence, with a penalty on curves that bend. A detection within 55 mm of a head is one, beyond
-100 mm it is none, between it is not used. Run it twice: which detections remain depends a little on
-the curves that rated them.
+Renders every scene of scenes.py for every seed into DIR (those already there are kept), runs the firmware over them and
+over the frames of people that tools/people has made, and fits a logistic model: log-odds = bias + one piecewise linear
+curve per kind of evidence + the map of the surroundings, with a penalty on curves that bend and on neighbours in the map
+that differ. A detection within 55 mm of a head is one, beyond 100 mm it is none, between it is not used, and neither is
+one within 150 mm of a head that is hardly seen. A person of tools/people counts as ten frames of tools/render, and a
+false head 2.2 times as much as a missed one. Run it twice: which detections remain depends a little on the score
+that rated them.
 """
 
 import argparse
+import collections
+import glob
 import os
 import sys
 
@@ -18,29 +22,65 @@ import numpy
 
 import frames
 import model
+import ray_map
 import scenes
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 ROOT = os.path.dirname(os.path.dirname(HERE))
 HEAD_MM = 55
 NO_HEAD_MM = 100
+UNCLEAR_MM = 150
+PERSON_FRAMES = 10
+FALSE_COST = 2.2
+MAP_KIND = "surroundings"
 
 
 def label(frame):
     """Of every detection: 1 a head, 0 none, nan not to be used."""
-    count = len(frame["centre_mm"])
-    if len(frame["heads"]) == 0:
-        return numpy.zeros(count)
-    distance = numpy.linalg.norm(frame["centre_mm"][:, None] - frame["heads"][None], axis=2)
-    nearest = distance.min(axis=1)
-    return numpy.where(nearest < HEAD_MM, 1.0, numpy.where(nearest > NO_HEAD_MM, 0.0, numpy.nan))
+    def nearest(heads):
+        if len(heads) == 0:
+            return numpy.full(len(frame["centre_mm"]), numpy.inf)
+        return numpy.linalg.norm(frame["centre_mm"][:, None] - heads[None], axis=2).min(axis=1)
+
+    distance = nearest(frame["heads"])
+    none = (distance > NO_HEAD_MM) & (nearest(frame["unclear"]) > UNCLEAR_MM)
+    return numpy.where(distance < HEAD_MM, 1.0, numpy.where(none, 0.0, numpy.nan))
 
 
-def gather(seen):
-    evidence = numpy.concatenate([f["evidence_q8"] for f in seen if len(f["evidence_q8"])]) / 256
-    labels = numpy.concatenate([label(f) for f in seen if len(f["evidence_q8"])])
-    usable = ~numpy.isnan(labels)
-    return evidence[usable], labels[usable]
+def importance(seen, people):
+    """Of every frame: each person counts as much as the others, in however many frames."""
+    count = collections.Counter(frame["directory"] for frame in seen)
+    return [PERSON_FRAMES / count[f["directory"]] if f["directory"] in people else 1.0 for f in seen]
+
+
+def gather(seen, people):
+    """Evidence without the map's, places, their weights, labels, importance."""
+    weights = importance(seen, people)
+    parts = [(f["evidence_q8"] / 256, f["place"], f["weight_q12"], label(f), numpy.full(len(f["place"]), w))
+             for f, w in zip(seen, weights) if len(f["place"])]
+    columns = [numpy.concatenate(column) for column in zip(*parts)]
+    usable = ~numpy.isnan(columns[3])
+    rows = [column[usable] for column in columns]
+    rows[4] = rows[4] * numpy.where(rows[3] == 0, FALSE_COST, 1.0)
+    return rows
+
+
+class Score:
+    """The map, then the curves, of which the last is the map's."""
+
+    def __init__(self, evidence, place, weight_q12, labels, weights, kinds):
+        self.own = kinds.index(MAP_KIND)
+        others = numpy.delete(evidence, self.own, axis=1)
+        self.map_q9 = ray_map.fit(others, place, weight_q12, labels, weights)
+        self.curves = model.fit(self.with_map(evidence, place, weight_q12), labels, weights)
+
+    def with_map(self, evidence, place, weight_q12):
+        evidence = evidence.copy()
+        evidence[:, self.own] = ray_map.logits(self.map_q9, place, weight_q12)
+        return evidence
+
+    def logits(self, frame):
+        return self.curves.logits(self.with_map(frame["evidence_q8"] / 256, frame["place"], frame["weight_q12"]))
 
 
 def report(learnt, seen, limit):
@@ -48,7 +88,7 @@ def report(learnt, seen, limit):
     table = {}
     for frame in seen:
         row = table.setdefault(os.path.basename(frame["directory"]).rsplit("-", 1)[0], [0] * 5)
-        logits = learnt.logits(frame["evidence_q8"] / 256) if len(frame["centre_mm"]) else []
+        logits = learnt.logits(frame) if len(frame["centre_mm"]) else []
         best = int(numpy.argmax(logits)) if len(logits) else -1
         accepted = best >= 0 and logits[best] > limit
         if len(frame["heads"]) > 0:
@@ -74,10 +114,11 @@ def parse():
     parser.add_argument("--seeds", default="5001-5060", help="learnt from (default 5001-5060)")
     parser.add_argument("--check-seeds", default="6001-6006",
                         help="reported on, not learnt from (default 6001-6006)")
+    parser.add_argument("--people", nargs="*", default=[], help="folders of frames directories of tools/people to learn from")
     parser.add_argument("--also", nargs="*", default=[], help="frames directories to report on")
     parser.add_argument("--limit", type=float, default=0.5, help="log-odds for the report")
     parser.add_argument("--jobs", type=int, default=2)
-    parser.add_argument("--out", default=os.path.join(ROOT, "firmware/core/detect/ih_score_weights.h"))
+    parser.add_argument("--out", default=os.path.join(ROOT, "firmware/core/detect"))
     return parser.parse_args()
 
 
@@ -99,13 +140,17 @@ def main():
     def see(directories):
         return frames.look_at_all(arguments.host_sim, directories, scratch, arguments.jobs)
 
-    seen = see(directories_of(arguments, arguments.seeds))
+    people = sorted(os.path.dirname(path) for folder in arguments.people
+                    for path in glob.glob(os.path.join(folder, "**", "rig.json"), recursive=True))
+    seen = see(directories_of(arguments, arguments.seeds) + people)
     kinds = seen[0]["kinds"]
-    evidence, labels = gather(seen)
-    print("%d frames, %d detections, %d heads" % (len(seen), len(labels), labels.sum()))
-    learnt = model.fit(evidence, labels)
-    model.write(arguments.out, learnt, kinds,
-                "tools/learn/learn.py --seeds %s" % arguments.seeds)
+    rows = gather(seen, set(people))
+    print("%d frames, %d detections, %d heads" % (len(seen), len(rows[3]), rows[3].sum()))
+    learnt = Score(*rows, kinds)
+    command = "tools/learn/learn.py --seeds %s --people %s" % (
+        arguments.seeds, " ".join(os.path.basename(os.path.normpath(folder)) for folder in arguments.people))
+    model.write(os.path.join(arguments.out, "ih_score_weights.h"), learnt.curves, kinds, command)
+    ray_map.write(os.path.join(arguments.out, "ih_surroundings_map.h"), learnt.map_q9, command)
     report(learnt, seen, arguments.limit)
     report(learnt, see(directories_of(arguments, arguments.check_seeds)), arguments.limit)
     if arguments.also:

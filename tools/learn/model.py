@@ -58,16 +58,16 @@ def penalty(kinds):
     return whole
 
 
-def fit(evidence, labels):
-    """Newton's method on the penalised likelihood."""
+def fit(evidence, labels, importance):
+    """Newton's method on the penalised likelihood; importance: how often each row counts."""
     first_q8, step_q8 = make_knots(evidence)
     design = hats(evidence, first_q8, step_q8)
     smooth = penalty(evidence.shape[1])
     weights = numpy.zeros(design.shape[1])
     for _ in range(40):
         probability = 1 / (1 + numpy.exp(-design @ weights))
-        slope = design.T @ (probability - labels) + smooth @ weights
-        spread = probability * (1 - probability) + 1e-6
+        slope = design.T @ (importance * (probability - labels)) + smooth @ weights
+        spread = importance * probability * (1 - probability) + 1e-6
         change = numpy.linalg.solve((design * spread[:, None]).T @ design + smooth, slope)
         weights -= change * min(1, 5 / numpy.abs(design @ change).max())
         if numpy.abs(change).max() < 1e-5:

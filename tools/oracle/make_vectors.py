@@ -28,6 +28,7 @@ import scan
 import score
 import rays
 import surface
+import surroundings
 import tracks
 import windows
 
@@ -35,7 +36,7 @@ STAGES = {"rig": rig, "bandpass": bandpass, "noise": noise, "dots": dots, "label
           "align": align,           "exposure": exposure, "cloud": cloud, "windows": windows, "points": points,
           "samples": samples, "cholesky": cholesky, "surface": surface, "ellipse": ellipse,
           "rays": rays, "ellipsoid": ellipsoid, "scan": scan, "fit": fit, "evidence": evidence,
-          "score": score, "tracks": tracks, "isohead": isohead}
+          "surroundings": surroundings, "score": score, "tracks": tracks, "isohead": isohead}
 
 
 def main():

@@ -1,6 +1,6 @@
 """Float64 reference of the score: the log-odds as tools/learn computes them, for curves drawn here.
 
-    score.py --check HEADER      is ih_score_weights.h what tools/learn/model.py writes?
+    score.py --check FOLDER      are ih_score_weights.h and ih_surroundings_map.h what tools/learn writes?
 """
 
 import argparse
@@ -16,6 +16,7 @@ import emit
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 sys.path.insert(0, os.path.join(ROOT, "tools", "learn"))
 import model  # pylint: disable=wrong-import-position
+import ray_map  # pylint: disable=wrong-import-position
 
 KINDS = 12  # no more than the firmware has; its test leaves the others flat
 CASES = 40
@@ -73,15 +74,35 @@ def kinds_of_firmware():
     return [k.lower() for k in re.findall(r"IH_EVIDENCE_(\w+),", body)]
 
 
-def check(path):
-    kinds, curves, command = read_header(path)
+def read_map(path):
+    """The map and the command that made it."""
+    with open(path, encoding="utf-8") as file:
+        text = file.read()
+    body = re.sub(r"/\*.*?\*/", "", text.split("= {")[1].split("};")[0])
+    numbers = np.array([int(value) for value in re.findall(r"-?\d+", body)])
+    return numbers, re.search(r"written by\n \* +(.*)", text)[1]
+
+
+def is_written_by(write, path):
     with tempfile.TemporaryDirectory() as work:
         again = os.path.join(work, "again.h")
-        model.write(again, curves, kinds, command)
+        write(again)
         with open(path, encoding="utf-8") as one, open(again, encoding="utf-8") as other:
             same = one.read() == other.read()
     if not same:
-        print("%s: not as tools/learn/model.py writes it" % path)
+        print("%s: not as tools/learn writes it" % path)
+    return same
+
+
+def check(folder):
+    path, map_path = (os.path.join(folder, name) for name in ("ih_score_weights.h", "ih_surroundings_map.h"))
+    kinds, curves, command = read_header(path)
+    numbers, map_command = read_map(map_path)
+    same = (is_written_by(lambda again: model.write(again, curves, kinds, command), path)
+            and is_written_by(lambda again: ray_map.write(again, numbers, map_command), map_path))
+    if command != map_command:
+        print("%s: learnt at another time than %s" % (path, map_path))
+        same = False
     if kinds != kinds_of_firmware():
         print("%s: not the evidence of ih_evidence.h" % path)
         same = False
@@ -91,5 +112,5 @@ def check(path):
 if __name__ == "__main__":
     PARSER = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
-    PARSER.add_argument("--check", required=True, metavar="HEADER")
+    PARSER.add_argument("--check", required=True, metavar="FOLDER")
     sys.exit(check(PARSER.parse_args().check))

@@ -21,7 +21,7 @@ void ih_detections_params_default(struct ih_detections_params *params)
     params->hopeless_logit_q10 = -5632;
     params->spacing_mm = 80;
     params->nest_near_mm = 90;
-    params->range_prior_q10 = -1280;
+    params->range_prior_q10 = -1536;
     params->nest_max = IH_NESTS_MAX;
     params->expected_max = IH_DETECTIONS_EXPECTED_MAX;
     params->front_min_mm = 150;

@@ -7,6 +7,7 @@
 #include "base/ih_range.h"
 #include "detect/ih_head_model.h"
 #include "detect/ih_ray_counts.h"
+#include "detect/ih_surroundings.h"
 
 #define ONE_Q14 (1 << 14)
 #define INSIDE_Q14 14746 /* radius2 below 0.9: through the head, not along its edge */
@@ -56,9 +57,9 @@ struct sums {
 const char *ih_evidence_text(enum ih_evidence_kind kind)
 {
     static const char *const text[IH_EVIDENCE_COUNT] = {
-        "on",    "rough",    "bulge",   "tall",   "moved",     "above",      "beside",
-        "below", "high",     "nothing", "body",   "body_rays", "body_depth", "wide",
-        "level", "shoulder", "before",  "extent", "upright",
+        "on",    "rough",    "bulge",   "tall",   "moved",     "above",        "beside",
+        "below", "high",     "nothing", "body",   "body_rays", "body_depth",   "wide",
+        "level", "shoulder", "before",  "extent", "upright",   "surroundings",
     };
     return (uint32_t)kind < IH_EVIDENCE_COUNT ? text[kind] : NULL;
 }
@@ -368,6 +369,7 @@ void ih_evidence_collect(const struct ih_rays *rays, const struct ih_ellipsoid *
     add_body_depths(rays, &marks, ellipsoid->centre_mm_q8[2], &sums);
     summarise(&sums, nest, out->value_q8);
     out->value_q8[IH_EVIDENCE_TALL] = taller_q8(ellipsoid);
+    out->value_q8[IH_EVIDENCE_SURROUNDINGS] = ih_surroundings_logit_q8(rays, ellipsoid);
     out->value_q8[IH_EVIDENCE_MOVED] = moved_mm_q8(ellipsoid, start_mm_q8);
     out->through_count = sums.through;
     out->hit_count = sums.hit;

@@ -49,6 +49,7 @@ enum ih_evidence_kind {
     IH_EVIDENCE_BEFORE,     /* points around, 60 mm and more before the front, as hands: count */
     IH_EVIDENCE_EXTENT,     /* of the nest at this position: mm, 0 without one */
     IH_EVIDENCE_UPRIGHT,    /* of that nest: height^2 / width^2, 1 without one */
+    IH_EVIDENCE_SURROUNDINGS, /* what all rays there say by the learnt map (ih_surroundings): log-odds */
     IH_EVIDENCE_COUNT
 };
 

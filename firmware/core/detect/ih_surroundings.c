@@ -1,0 +1,131 @@
+#include "detect/ih_surroundings.h"
+
+#include "base/ih_fix.h"
+#include "base/ih_range.h"
+#include "base/ih_types.h"
+#include "detect/ih_surroundings_map.h"
+
+#define CELL_BITS 14 /* 64 mm in Q8 */
+#define CELL_MM_Q8 (1 << CELL_BITS)
+#define TOP_MM_Q8 (6 * CELL_MM_Q8) /* above the centre */
+/* Depths against the centre's, by steps of 8 mm; the map's limits are -256, -176, -96, -40, 40, 128, 200 and 304 mm. */
+#define NEAREST_MM (-256)
+#define STEP_BITS 3
+#define STEPS 71
+#define EMPTY (IH_SURROUNDINGS_DEPTHS - 1)
+/* Slots whose rays span a part of the pattern that is nearly even, so many steps wide and high. */
+#define FIRST_LINE 4
+#define LAST_LINE 14
+#define SPAN (LAST_LINE - FIRST_LINE)
+
+static const uint8_t depth_of_step[STEPS] = {
+    1, 1, 1, 1, 1, 1, 1, 1, 1, 1,          /* -256 */
+    2, 2, 2, 2, 2, 2, 2, 2, 2, 2,          /* -176 */
+    3, 3, 3, 3, 3, 3, 3,                   /* -96 */
+    4, 4, 4, 4, 4, 4, 4, 4, 4, 4,          /* -40 */
+    5, 5, 5, 5, 5, 5, 5, 5, 5, 5, 5,       /* 40 */
+    6, 6, 6, 6, 6, 6, 6, 6, 6,             /* 128 */
+    7, 7, 7, 7, 7, 7, 7, 7, 7, 7, 7, 7, 7, /* 200 */
+    8,                                     /* 304 and more */
+};
+
+/* The candidate, as every ray needs it. */
+struct candidate {
+    int64_t depth_mm_q8; /* of its centre, from where rays start */
+    int64_t away_mm_q8[2];
+    int32_t centre_mm_q8; /* its depth in the camera frame */
+};
+
+static struct candidate candidate_of(const struct ih_rays *rays,
+                                     const struct ih_ellipsoid *ellipsoid)
+{
+    return (struct candidate){
+        .depth_mm_q8 = (int64_t)ellipsoid->centre_mm_q8[2] - rays->origin_mm_q8[2],
+        .away_mm_q8 = {(int64_t)rays->origin_mm_q8[0] - ellipsoid->centre_mm_q8[0],
+                       (int64_t)rays->origin_mm_q8[1] - ellipsoid->centre_mm_q8[1]},
+        .centre_mm_q8 = ellipsoid->centre_mm_q8[2],
+    };
+}
+
+static int32_t depth_of(const struct candidate *candidate, const struct ih_ray *ray)
+{
+    if (ray->state == IH_RAY_EMPTY) {
+        return EMPTY;
+    }
+    const int64_t behind_mm =
+        ih_shift_round((int64_t)ray->point_mm_q8[2] - candidate->centre_mm_q8, 8) - NEAREST_MM;
+    if (behind_mm < 0) {
+        return 0;
+    }
+    return depth_of_step[ih_min_s64(behind_mm >> STEP_BITS, STEPS - 1)];
+}
+
+/* Or IH_NONE. */
+static int32_t place_of(const struct candidate *candidate, const struct ih_ray *ray)
+{
+    if (ray->state == IH_RAY_UNKNOWN) {
+        return IH_NONE;
+    }
+    const int64_t aside_mm_q8 = ih_abs_s64(
+        candidate->away_mm_q8[0] + ih_mul_shift(candidate->depth_mm_q8, ray->slope_x_q20, 20));
+    const int64_t down_mm_q8 =
+        candidate->away_mm_q8[1] + ih_mul_shift(candidate->depth_mm_q8, ray->slope_y_q20, 20);
+    const int64_t from_top_mm_q8 = down_mm_q8 + TOP_MM_Q8;
+    if (aside_mm_q8 >= IH_SURROUNDINGS_COLUMNS * CELL_MM_Q8 || from_top_mm_q8 < 0 ||
+        from_top_mm_q8 >= IH_SURROUNDINGS_ROWS * CELL_MM_Q8) {
+        return IH_NONE;
+    }
+    const int32_t column = (int32_t)(aside_mm_q8 >> CELL_BITS);
+    const int32_t row = (int32_t)(from_top_mm_q8 >> CELL_BITS);
+    return (row * IH_SURROUNDINGS_COLUMNS + column) * IH_SURROUNDINGS_DEPTHS +
+           depth_of(candidate, ray);
+}
+
+/* Spacing^2 / cell^2. The rays of four slots span a quadrilateral: half the cross product of its diagonals. */
+static int32_t weight_q12(const struct ih_rays *rays, int64_t depth_mm_q8)
+{
+    const struct ih_ray *a = &rays->ray[FIRST_LINE * IH_GRID + FIRST_LINE];
+    const struct ih_ray *b = &rays->ray[FIRST_LINE * IH_GRID + LAST_LINE];
+    const struct ih_ray *c = &rays->ray[LAST_LINE * IH_GRID + LAST_LINE];
+    const struct ih_ray *d = &rays->ray[LAST_LINE * IH_GRID + FIRST_LINE];
+    const int64_t across_q20[2] = {(int64_t)c->slope_x_q20 - a->slope_x_q20,
+                                   (int64_t)d->slope_x_q20 - b->slope_x_q20};
+    const int64_t down_q20[2] = {(int64_t)c->slope_y_q20 - a->slope_y_q20,
+                                 (int64_t)d->slope_y_q20 - b->slope_y_q20};
+    const int64_t twice_q40 = ih_abs_s64(across_q20[0] * down_q20[1] - across_q20[1] * down_q20[0]);
+    const int64_t pitch_q20 = ih_isqrt_u64((uint64_t)twice_q40 / (2 * SPAN * SPAN));
+    const int64_t spacing_mm_q8 =
+        ih_min_s64(ih_mul_shift(ih_max_s64(depth_mm_q8, 0), pitch_q20, 20), CELL_MM_Q8);
+    return (int32_t)ih_shift_round(spacing_mm_q8 * spacing_mm_q8, 2 * CELL_BITS - 12);
+}
+
+int32_t ih_surroundings_logit_by_map_q8(const int8_t map_q9[IH_SURROUNDINGS_PLACES],
+                                        const struct ih_rays *rays,
+                                        const struct ih_ellipsoid *ellipsoid)
+{
+    const struct candidate candidate = candidate_of(rays, ellipsoid);
+    int32_t sum_q9 = 0;
+    for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
+        const int32_t place = place_of(&candidate, &rays->ray[slot]);
+        if (place != IH_NONE) {
+            sum_q9 += map_q9[place];
+        }
+    }
+    IH_IN_RANGE(sum_q9, -IH_RANGE_MAP_SUM_Q9, IH_RANGE_MAP_SUM_Q9);
+    return (int32_t)ih_mul_shift(sum_q9, weight_q12(rays, candidate.depth_mm_q8), 12 + 1);
+}
+
+int32_t ih_surroundings_logit_q8(const struct ih_rays *rays, const struct ih_ellipsoid *ellipsoid)
+{
+    return ih_surroundings_logit_by_map_q8(surroundings_map_q9, rays, ellipsoid);
+}
+
+void ih_surroundings_find(const struct ih_rays *rays, const struct ih_ellipsoid *ellipsoid,
+                          struct ih_surroundings *out)
+{
+    const struct candidate candidate = candidate_of(rays, ellipsoid);
+    out->weight_q12 = weight_q12(rays, candidate.depth_mm_q8);
+    for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
+        out->place[slot] = (int16_t)place_of(&candidate, &rays->ray[slot]);
+    }
+}

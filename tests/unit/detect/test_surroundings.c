@@ -1,0 +1,240 @@
+/* ih_surroundings against a float64 reference, with a map of the test's own: the learnt one may change. And cells,
+ * ranges and weights at their limits. */
+#include "base/ih_config.h"
+#include "detect/ih_ellipsoid.h"
+#include "detect/ih_rays.h"
+#include "detect/ih_surroundings.h"
+
+#include "ih_test.h"
+
+struct vector_ray {
+    int32_t slope_x_q20, slope_y_q20, depth_mm_q8, state, place;
+};
+
+struct vector_scene {
+    const char *name;
+    const struct vector_ray *ray;
+    int32_t centre_mm_q8[3];
+    double weight, logit;
+};
+
+#include "surroundings.inc"
+
+_Static_assert(IH_TEST_COUNT(vector_map_q9) == IH_SURROUNDINGS_PLACES, "another map");
+
+/* A ray every 64 mm at 1024 mm: slopes of 1/16, and each ray stands for one cell. */
+#define PITCH_Q20 (1 << 16)
+#define DEPTH_MM 1024
+#define SEMI_MM_Q8 (80 << 8)
+
+static struct ih_rays rays;
+static struct ih_ellipsoid head;
+static struct ih_surroundings found;
+static int8_t map_q9[IH_SURROUNDINGS_PLACES];
+
+void setUp(void)
+{
+    int slot;
+
+    memset(&rays, 0, sizeof rays);
+    memset(map_q9, 0, sizeof map_q9);
+    memset(&found, IH_TEST_FILL, sizeof found);
+    head = (struct ih_ellipsoid){.centre_mm_q8 = {0, 0, DEPTH_MM << 8},
+                                 .semi_mm_q8 = {SEMI_MM_Q8, SEMI_MM_Q8, SEMI_MM_Q8}};
+    for (slot = 0; slot < IH_SLOTS; slot++) {
+        rays.ray[slot] = (struct ih_ray){.slope_x_q20 = (slot % IH_GRID - 9) * PITCH_Q20,
+                                         .slope_y_q20 = (slot / IH_GRID - 9) * PITCH_Q20,
+                                         .state = IH_RAY_UNKNOWN};
+    }
+}
+
+void tearDown(void)
+{
+}
+
+static void use_scene(const struct vector_scene *scene)
+{
+    int slot;
+
+    memcpy(rays.origin_mm_q8, vector_origin_mm_q8, sizeof rays.origin_mm_q8);
+    memcpy(head.centre_mm_q8, scene->centre_mm_q8, sizeof head.centre_mm_q8);
+    for (slot = 0; slot < IH_SLOTS; slot++) {
+        const struct vector_ray *ray = &scene->ray[slot];
+
+        rays.ray[slot] = (struct ih_ray){.slope_x_q20 = ray->slope_x_q20,
+                                         .slope_y_q20 = ray->slope_y_q20,
+                                         .point_mm_q8 = {0, 0, ray->depth_mm_q8},
+                                         .state = ray->state};
+    }
+}
+
+/* The weight is a square of a spacing in steps of 1/256 mm, known to 2: an isqrt's and its own. */
+static void scenes_match_float64(void)
+{
+    int i, slot;
+
+    for (i = 0; i < IH_TEST_COUNT(vector_scenes); i++) {
+        const struct vector_scene *scene = &vector_scenes[i];
+        const double error = 4.0 * sqrt(scene->weight) / (64 * 256) + 1.0 / 4096;
+
+        use_scene(scene);
+        ih_surroundings_find(&rays, &head, &found);
+        for (slot = 0; slot < IH_SLOTS; slot++) {
+            IH_TEST_EQUAL(scene->ray[slot].place, found.place[slot], scene->name, slot);
+        }
+        IH_TEST_WITHIN(error, scene->weight, ih_test_from_q(found.weight_q12, 12), scene->name, i);
+        IH_TEST_WITHIN(
+            fabs(scene->logit) * error / scene->weight + 1.0 / 256, scene->logit,
+            ih_test_from_q(ih_surroundings_logit_by_map_q8(vector_map_q9, &rays, &head), 8),
+            scene->name, 100 + i);
+    }
+}
+
+/* One ray, so many 1/256 mm from the centre at its depth, and its point so far behind the centre. */
+static int32_t place_of(int32_t x_mm_q8, int32_t y_mm_q8, int32_t state, int32_t dz_mm_q8)
+{
+    rays.ray[0] = (struct ih_ray){.slope_x_q20 = 4 * x_mm_q8, /* 2^20 / (1024 * 256) */
+                                  .slope_y_q20 = 4 * y_mm_q8,
+                                  .point_mm_q8 = {0, 0, head.centre_mm_q8[2] + dz_mm_q8},
+                                  .state = state};
+    ih_surroundings_find(&rays, &head, &found);
+    return found.place[0];
+}
+
+static int32_t place_at(int32_t row, int32_t column, int32_t depth)
+{
+    return (row * IH_SURROUNDINGS_COLUMNS + column) * IH_SURROUNDINGS_DEPTHS + depth;
+}
+
+static void cells_begin_and_end_at_their_limits(void)
+{
+    enum { MM = 256 };
+    static const struct {
+        int32_t x_mm_q8, y_mm_q8, row, column;
+    } cases[] = {{0, 0, 6, 0},
+                 {64 * MM - 1, 0, 6, 0},
+                 {64 * MM, 0, 6, 1},
+                 {-64 * MM + 1, 0, 6, 0},
+                 {-64 * MM, 0, 6, 1},
+                 {384 * MM - 1, 0, 6, 5},
+                 {384 * MM, 0, -1, 0},
+                 {-384 * MM, 0, -1, 0},
+                 {0, -1, 5, 0},
+                 {0, 64 * MM - 1, 6, 0},
+                 {0, 64 * MM, 7, 0},
+                 {0, -384 * MM, 0, 0},
+                 {0, -384 * MM - 1, -1, 0},
+                 {0, 448 * MM - 1, 12, 0},
+                 {0, 448 * MM, -1, 0}};
+    int i;
+
+    for (i = 0; i < IH_TEST_COUNT(cases); i++) {
+        const int32_t expected =
+            cases[i].row < 0 ? IH_NONE : place_at(cases[i].row, cases[i].column, 4);
+
+        IH_TEST_EQUAL(expected, place_of(cases[i].x_mm_q8, cases[i].y_mm_q8, IH_RAY_SEEN, 0),
+                      "place", i);
+    }
+}
+
+/* Rounded to whole mm, halves upwards. */
+static void ranges_begin_at_their_limits(void)
+{
+    static const int32_t limit_mm[] = {-256, -176, -96, -40, 40, 128, 200, 304};
+    int i;
+
+    for (i = 0; i < IH_TEST_COUNT(limit_mm); i++) {
+        const int32_t limit_q8 = limit_mm[i] * 256 - 128;
+
+        IH_TEST_EQUAL(place_at(6, 0, i), place_of(0, 0, IH_RAY_SEEN, limit_q8 - 1), "before", i);
+        IH_TEST_EQUAL(place_at(6, 0, i + 1), place_of(0, 0, IH_RAY_SEEN, limit_q8), "at", i);
+    }
+    IH_TEST_EQUAL(place_at(6, 0, 0), place_of(0, 0, IH_RAY_SEEN, -head.centre_mm_q8[2]), "near", 0);
+    IH_TEST_EQUAL(place_at(6, 0, 8), place_of(0, 0, IH_RAY_SEEN, 1 << 25), "far", 0);
+    IH_TEST_EQUAL(place_at(6, 0, 9), place_of(0, 0, IH_RAY_EMPTY, 0), "empty", 0);
+    IH_TEST_EQUAL(IH_NONE, place_of(0, 0, IH_RAY_UNKNOWN, 0), "unknown", 0);
+}
+
+/* So dense a pattern, so far, of a weight: the square of the spacing in cells, at most 1. */
+static void dense_rays_have_small_weights(void)
+{
+    static const struct {
+        int32_t pitch_q20, depth_mm, weight_q12;
+    } cases[] = {{PITCH_Q20, 1024, 4096},   {PITCH_Q20 / 2, 1024, 1024}, {PITCH_Q20 / 4, 1024, 256},
+                 {PITCH_Q20 / 2, 512, 256}, {PITCH_Q20, 2048, 4096},     {PITCH_Q20, 512, 1024},
+                 {PITCH_Q20, -100, 0}};
+    int i, slot;
+
+    for (i = 0; i < IH_TEST_COUNT(cases); i++) {
+        for (slot = 0; slot < IH_SLOTS; slot++) {
+            rays.ray[slot].slope_x_q20 = (slot % IH_GRID - 9) * cases[i].pitch_q20;
+            rays.ray[slot].slope_y_q20 = (slot / IH_GRID - 9) * cases[i].pitch_q20;
+        }
+        head.centre_mm_q8[2] = cases[i].depth_mm * 256;
+        ih_surroundings_find(&rays, &head, &found);
+        IH_TEST_EQUAL(cases[i].weight_q12, found.weight_q12, "weight", i);
+    }
+}
+
+/* 1/16 in log-odds for each of three rays of four that ask the same place. */
+static void rays_of_known_state_add_up(void)
+{
+    int i;
+
+    map_q9[place_at(6, 0, 4)] = 32;
+    for (i = 0; i < 4; i++) {
+        struct ih_ray *ray = &rays.ray[180 + i];
+
+        *ray = (struct ih_ray){.point_mm_q8 = {0, 0, head.centre_mm_q8[2]},
+                               .state = i == 2 ? IH_RAY_UNKNOWN : IH_RAY_SEEN};
+    }
+    IH_TEST_EQUAL(3 * 16, ih_surroundings_logit_by_map_q8(map_q9, &rays, &head), "log-odds", 0);
+}
+
+/* As far as rays, points and fits can be; the largest sum. The sanitizers watch. */
+static void extremes_do_not_overflow(void)
+{
+    struct ih_test_random random = {31};
+    int pass, slot, axis, i;
+
+    for (i = 0; i < IH_SURROUNDINGS_PLACES; i++) {
+        map_q9[i] = INT8_MIN;
+    }
+    for (pass = 0; pass < 400; pass++) {
+        int32_t logit_q8, known = 0;
+
+        for (axis = 0; axis < 3; axis++) {
+            const int32_t far = pass % 4 == 0 ? 300 << 8 : 1 << 27;
+
+            head.centre_mm_q8[axis] = (int32_t)ih_test_between(&random, -far, far);
+            rays.origin_mm_q8[axis] = (int32_t)ih_test_between(&random, -256000, 256000);
+        }
+        for (slot = 0; slot < IH_SLOTS; slot++) {
+            rays.ray[slot] = (struct ih_ray){
+                .slope_x_q20 = (int32_t)ih_test_between(&random, -(4 << 20), 4 << 20),
+                .slope_y_q20 = (int32_t)ih_test_between(&random, -(4 << 20), 4 << 20),
+                .point_mm_q8 = {0, 0, (int32_t)ih_test_between(&random, -(1 << 25), 1 << 25)},
+                .state = (int32_t)ih_test_between(&random, 0, 2)};
+        }
+        logit_q8 = ih_surroundings_logit_by_map_q8(map_q9, &rays, &head);
+        ih_surroundings_find(&rays, &head, &found);
+        IH_TEST_RANGE(0, 4096, found.weight_q12, "weight", pass);
+        for (slot = 0; slot < IH_SLOTS; slot++) {
+            IH_TEST_RANGE(IH_NONE, IH_SURROUNDINGS_PLACES - 1, found.place[slot], "place", slot);
+            known += found.place[slot] != IH_NONE;
+        }
+        IH_TEST_RANGE(-known * (128 / 2), 0, logit_q8, "log-odds", pass);
+    }
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(scenes_match_float64);
+    RUN_TEST(cells_begin_and_end_at_their_limits);
+    RUN_TEST(ranges_begin_at_their_limits);
+    RUN_TEST(dense_rays_have_small_weights);
+    RUN_TEST(rays_of_known_state_add_up);
+    RUN_TEST(extremes_do_not_overflow);
+    return UNITY_END();
+}

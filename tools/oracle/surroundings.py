@@ -1,0 +1,69 @@
+"""Float64 reference of the map of the surroundings, over the scenes of evidence.py and patterns of other pitch.
+
+Rays whose place is a matter of rounding are made unknown ones.
+"""
+
+import numpy as np
+
+import emit
+import evidence
+from rig import GRID, from_q, to_q
+
+COLUMNS, ROWS, DEPTHS = 6, 13, 10
+CELL_MM, TOP_MM = 64.0, 384.0
+LIMITS_MM = np.array([-256, -176, -96, -40, 40, 128, 200, 304])
+EMPTY_PLACE, NONE = DEPTHS - 1, -1
+# Slopes that the pattern's own are multiplied by, and the centre moved by: dense, as it is, so far that a ray has a cell of its own.
+CASES = (("head", 1.0, 0), ("hand", 0.4, 0), ("table", 1.7, 0), ("before_nothing", 3.0, 0), ("unknown", 1.0, 0),
+         ("rough", 1.0, -260), ("neighbours", 1.0, 700))
+
+
+def spacing_mm(slope, depth_mm):
+    """Of rays at this depth: the mean of the cells that four of them span."""
+    at = slope.reshape(GRID, GRID, 2)
+    a, b, c, d = at[4, 4], at[4, 14], at[14, 14], at[14, 4]
+    across, down = c - a, d - b
+    return np.sqrt(abs(across[0] * down[1] - across[1] * down[0]) / 2 / 100) * depth_mm
+
+
+def places(slope_q20, depth_q8, state, centre):
+    """By slot; and how far, in mm, each ray is from being elsewhere."""
+    slope = from_q(slope_q20, 20)
+    x, y = (evidence.ORIGIN[:2] + (centre[2] - evidence.ORIGIN[2]) * slope - centre[:2]).T
+    dz = from_q(depth_q8, 8) - centre[2]
+    column, row = np.abs(x) // CELL_MM, (y + TOP_MM) // CELL_MM
+    depth = np.where(state == evidence.EMPTY, EMPTY_PLACE, (dz[:, None] >= LIMITS_MM - 0.5).sum(1))
+    inside = (column < COLUMNS) & (row >= 0) & (row < ROWS) & (state != evidence.UNKNOWN)
+    place = np.where(inside, (row * COLUMNS + column) * DEPTHS + depth, NONE).astype(int)
+
+    def edge(value):
+        return np.abs(value - CELL_MM * np.round(value / CELL_MM))
+
+    beside = np.abs(dz[:, None] - LIMITS_MM + 0.5).min(1)
+    return place, np.minimum(np.minimum(edge(x), edge(y)), np.where(state == evidence.SEEN, beside, np.inf))
+
+
+def write_vectors(directory):
+    random = np.random.default_rng(83)
+    learnt = random.integers(-128, 128, COLUMNS * ROWS * DEPTHS)
+    inc = emit.Inc("Scenes of simple bodies, where their rays are on a map, and what a map of random numbers says.")
+    inc.raw("\nstatic const int32_t vector_origin_mm_q8[] = {%d, %d, %d};\n" % tuple(to_q(evidence.ORIGIN, 8)))
+    inc.array("int8_t", "vector_map_q9", learnt)
+    rows = []
+    for name, widen, move in CASES:
+        slope_q20 = np.rint(evidence.lattice() * widen).astype(np.int64)
+        centre_q8 = to_q(evidence.CENTRE + [0, 0, move], 8)
+        depth_q8, state = evidence.make_scene(name, slope_q20, random)
+        _, margin = places(slope_q20, depth_q8, state, from_q(centre_q8, 8))
+        state = np.where(margin < 0.02, evidence.UNKNOWN, state)
+        depth_q8 = np.where(state == evidence.SEEN, depth_q8, 0)
+        place, _ = places(slope_q20, depth_q8, state, from_q(centre_q8, 8))
+        spacing = spacing_mm(from_q(slope_q20, 20), from_q(centre_q8[2], 8) - evidence.ORIGIN[2])
+        weight = min(1.0, spacing / CELL_MM)**2
+        logit = weight * learnt[place[place != NONE]].sum() / 512
+        inc.raw("\nstatic const struct vector_ray vector_%s_rays[] = {\n%s};\n" % (
+            name, emit.wrap(["{%d, %d, %d, %d, %d}" % r for r in zip(*slope_q20.T, depth_q8, state, place)])))
+        rows.append('"%s", vector_%s_rays, {%d, %d, %d}, %s, %s' % (
+            name, name, *centre_q8, emit.number(weight, 7), emit.number(logit, 5)))
+    inc.struct_array("vector_scene", "vector_scenes", rows)
+    return inc.write(directory, "surroundings.inc")
