@@ -202,7 +202,7 @@ for truth, depth in zip(truths, (ball, slope)):
         hit_count += z < 1000
     assert hit_count > 15, "few dots: %d" % hit_count
 assert not [d for d in truths[0]["dots"] if 21 < (d[1] - m[2]) / m[0] * F + 79.5 < 38], "a dot in the hole"
-assert truths[0]["head"]["centre_mm"] == [0, 0, 900], "head: the one nearest the middle"
+assert truths[0]["head"]["centre_mm"] == [0, 0, 900], "head: the nearest one"
 assert len(truths[0]["heads"]) == 2 and truths[1]["head"] is None, "heads"
 moved = [json.loads(line) for line in open("moved/truth.jsonl")]
 assert len(moved) == 6, "three poses for each depth image"

@@ -169,11 +169,12 @@ void rd_company_choose(struct rd_truth *truth, const struct rd_rig *rig, double 
     double min = 1e9;
     truth->head = RD_NOBODY;
     for (int i = 0; i < truth->head_count; i++) {
-        double row, column;
-        bool ahead = rd_rig_pattern_place(rig, truth->heads[i].centre_mm, &row, &column);
-        if (!ahead || fmax(fabs(row), fabs(column)) > dots || hypot(row, column) >= min)
+        struct rd_vec centre_mm = truth->heads[i].centre_mm;
+        double row, column, away_mm = rd_length(centre_mm);
+        bool ahead = rd_rig_pattern_place(rig, centre_mm, &row, &column);
+        if (!ahead || fmax(fabs(row), fabs(column)) > dots || away_mm >= min)
             continue;
-        min = hypot(row, column);
+        min = away_mm;
         truth->head = i;
     }
 }

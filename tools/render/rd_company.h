@@ -4,7 +4,7 @@
  * again (rd_visit.h); the truth has the head when somebody is there and the head's centre lies within the pattern by
  * at least one dot's distance, as seen from the projector: rows and columns -8 .. 8 of -9 .. 9.
  * two: two people side by side, 450 to 650 mm apart, the second up to 200 mm behind; the head to find is the one
- * nearest the pattern's middle. They come and go as in the scene person.
+ * nearest the camera. They come and go as in the scene person.
  */
 #ifndef RD_COMPANY_H
 #define RD_COMPANY_H
@@ -40,7 +40,7 @@ void rd_company_make(struct rd_company *company, const struct rd_options *option
 /* Adds what moves. */
 void rd_company_frame(struct rd_company *company, int frame, struct rd_scene *scene, struct rd_truth *truth);
 
-/* Sets truth->head to the head nearest the pattern's middle, if its centre is within `dots` of it in row and column. */
+/* Sets truth->head to the nearest head of those whose centre is within `dots` of the pattern's middle in row and column. */
 void rd_company_choose(struct rd_truth *truth, const struct rd_rig *rig, double dots);
 
 #endif

@@ -3,7 +3,7 @@
  * frames, ten seconds later.
  * board: see rd_board.h; nobody.
  * A range directory: each of its depth images in turn, every frame ten seconds later; the heads are those of its truth
- * file, and the one to find is the one nearest the pattern's middle, if its centre lies within the pattern.
+ * file, and the one to find is the one nearest to the camera of those whose centre lies within the pattern.
  */
 #ifndef RD_STAGE_H
 #define RD_STAGE_H
