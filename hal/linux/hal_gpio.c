@@ -33,7 +33,7 @@ static bool fail_taking(struct gpiod_chip *chip, const struct hal_gpio_chip_info
 static bool take_all(struct hal_gpio *gpio, const struct hal_gpio_chip_info *info,
                      const struct wish *wishes, int wish_count, struct hal_error *error)
 {
-    unsigned offsets[3];
+    unsigned offsets[3] = {0};
     for (int i = 0; i < wish_count; i++) {
         if (!hal_gpio_find_line(gpio->chip, info, wishes[i].setting, wishes[i].called, &offsets[i],
                                 error)) {

@@ -128,9 +128,9 @@ static void check_taken(const struct caller *caller, enum ih_err err, const stru
 
 static void label(struct caller *caller, struct fuzz_input *input)
 {
-    struct ih_frame frame, ambient;
+    struct ih_frame lit, ambient;
     const bool has_ambient = (fuzz_byte(input) & 1) != 0;
-    const struct ih_frame *const first = choose(caller, input, &frame);
+    const struct ih_frame *const first = choose(caller, input, &lit);
     const struct ih_frame *const second = choose(caller, input, &ambient);
     const enum ih_err err = isohead_label(&caller->core, first, has_ambient ? second : NULL);
     caller->looks += err == IH_OK;

@@ -30,16 +30,16 @@ static const uint8_t depth_of_step[STEPS] = {
 };
 
 /* The candidate, as every ray needs it. */
-struct candidate {
+struct head_from_rays {
     int64_t depth_mm_q8; /* of its centre, from where rays start */
     int64_t away_mm_q8[2];
     int32_t centre_mm_q8; /* its depth in the camera frame */
 };
 
-static struct candidate candidate_of(const struct ih_rays *rays,
-                                     const struct ih_ellipsoid *ellipsoid)
+static struct head_from_rays candidate_of(const struct ih_rays *rays,
+                                          const struct ih_ellipsoid *ellipsoid)
 {
-    return (struct candidate){
+    return (struct head_from_rays){
         .depth_mm_q8 = (int64_t)ellipsoid->centre_mm_q8[2] - rays->origin_mm_q8[2],
         .away_mm_q8 = {(int64_t)rays->origin_mm_q8[0] - ellipsoid->centre_mm_q8[0],
                        (int64_t)rays->origin_mm_q8[1] - ellipsoid->centre_mm_q8[1]},
@@ -47,7 +47,7 @@ static struct candidate candidate_of(const struct ih_rays *rays,
     };
 }
 
-static int32_t depth_of(const struct candidate *candidate, const struct ih_ray *ray)
+static int32_t depth_of(const struct head_from_rays *candidate, const struct ih_ray *ray)
 {
     if (ray->state == IH_RAY_EMPTY) {
         return EMPTY;
@@ -61,7 +61,7 @@ static int32_t depth_of(const struct candidate *candidate, const struct ih_ray *
 }
 
 /* Or IH_NONE. */
-static int32_t place_of(const struct candidate *candidate, const struct ih_ray *ray)
+static int32_t place_of(const struct head_from_rays *candidate, const struct ih_ray *ray)
 {
     if (ray->state == IH_RAY_UNKNOWN) {
         return IH_NONE;
@@ -103,7 +103,7 @@ int32_t ih_surroundings_logit_by_map_q8(const int8_t map_q9[IH_SURROUNDINGS_PLAC
                                         const struct ih_rays *rays,
                                         const struct ih_ellipsoid *ellipsoid)
 {
-    const struct candidate candidate = candidate_of(rays, ellipsoid);
+    const struct head_from_rays candidate = candidate_of(rays, ellipsoid);
     int32_t sum_q9 = 0;
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
         const int32_t place = place_of(&candidate, &rays->ray[slot]);
@@ -123,7 +123,7 @@ int32_t ih_surroundings_logit_q8(const struct ih_rays *rays, const struct ih_ell
 void ih_surroundings_find(const struct ih_rays *rays, const struct ih_ellipsoid *ellipsoid,
                           struct ih_surroundings *out)
 {
-    const struct candidate candidate = candidate_of(rays, ellipsoid);
+    const struct head_from_rays candidate = candidate_of(rays, ellipsoid);
     out->weight_q12 = weight_q12(rays, candidate.depth_mm_q8);
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
         out->place[slot] = (int16_t)place_of(&candidate, &rays->ray[slot]);
