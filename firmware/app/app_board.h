@@ -29,19 +29,20 @@
 /* ... and when it begins to end them: a dying program's guards need no more. */
 #define APP_BOARD_OFF_PATIENCE 5
 
+/* The largest first, so that little is lost between them. */
 struct app_board {
+    struct isohead head;
     struct hal_log_writer writer;
-    struct app_log log;
-    struct hal_v4l2 v4l2;
-    struct hal_gpio gpio;
-    struct hal_guard guard;
-    struct hal_signals signals;
     struct hal_event_source events;
     struct hal_watchdog_feeder watchdog;
-    struct hal_output_state output;
+    struct hal_guard guard;
     struct hal_viewer_process viewer;
-    struct isohead head;
+    struct hal_gpio gpio;
+    struct hal_v4l2 v4l2;
+    struct app_log log;
     struct app_state state;
+    struct hal_output_state output;
+    struct hal_signals signals;
 };
 
 /* Frames in, records out, until requested to end. */
