@@ -260,12 +260,12 @@ static void write_heads(struct app_write *write, const struct ih_hypotheses *hyp
     app_write_close(write, '}');
 }
 
-/* What the rays ask of the learnt map. Of several windows of a depth image only the last one's rays are there. */
-static void write_surroundings(struct app_write *write, const struct isohead *head,
+/* What the rays ask of the learnt map. */
+static void write_surroundings(struct app_write *write, const struct ih_rays *rays,
                                const struct ih_ellipsoid *ellipsoid)
 {
     struct ih_surroundings surroundings;
-    ih_surroundings_find(&head->scratch.detections.rays, ellipsoid, &surroundings);
+    ih_surroundings_find(rays, ellipsoid, &surroundings);
     app_write_key(write, "surroundings");
     app_write_open(write, '{');
     app_write_int_field(write, "weight_q12", surroundings.weight_q12);
@@ -278,7 +278,15 @@ static void write_surroundings(struct app_write *write, const struct isohead *he
     app_write_close(write, '}');
 }
 
-static void write_detection(struct app_write *write, const struct isohead *head,
+/* The rays are those that it was measured by: not those of another window of a depth image, or of lines that
+ * have moved since. */
+static bool is_of(const struct ih_rays *rays, const struct ih_detection *detection)
+{
+    return ih_surroundings_logit_q8(rays, &detection->head) ==
+           detection->evidence.value_q8[IH_EVIDENCE_SURROUNDINGS];
+}
+
+static void write_detection(struct app_write *write, const struct ih_rays *rays,
                             const struct ih_detection *detection, const struct ih_verdict *verdict,
                             bool is_predicted)
 {
@@ -308,8 +316,8 @@ static void write_detection(struct app_write *write, const struct isohead *head,
     app_write_int_field(write, "b_px_q12", detection->b_px_q12);
     app_write_int_field(write, "angle_mdeg", detection->angle_mdeg);
     app_write_int_field(write, "distance_mm_q8", detection->distance_mm_q8);
-    if (!is_predicted && head->windows.window_count <= 1) {
-        write_surroundings(write, head, &detection->head);
+    if (!is_predicted && is_of(rays, detection)) {
+        write_surroundings(write, rays, &detection->head);
     }
     app_write_close(write, '}');
 }
@@ -317,6 +325,9 @@ static void write_detection(struct app_write *write, const struct isohead *head,
 static void write_detections(struct app_write *write, const struct isohead *head)
 {
     const int32_t count = head->detections.detection_count;
+    struct ih_rays rays; /* anew: later stages have used the memory of those of the frame */
+    ih_rays_make(&head->points, head->rig.calibration.kind == IH_RIG_RANGE ? NULL : &head->dots,
+                 &head->rig, &head->params.detections.rays, &rays);
     app_write_key(write, "evidence");
     app_write_open(write, '[');
     for (int kind = 0; kind < IH_EVIDENCE_COUNT; kind++) {
@@ -327,7 +338,7 @@ static void write_detections(struct app_write *write, const struct isohead *head
     app_write_open(write, '[');
     for (int32_t i = 0; i < count + head->predicted.count; i++) {
         const struct ih_verdict verdict = ih_tracks_verdict(&head->tracks, &head->detections, i);
-        write_detection(write, head, ih_tracks_head(&head->detections, &head->predicted, i),
+        write_detection(write, &rays, ih_tracks_head(&head->detections, &head->predicted, i),
                         &verdict, i >= count);
     }
     app_write_close(write, ']');
