@@ -152,6 +152,22 @@ static enum app_exit run_loop(struct app_board *board, const struct app_config *
     return app_loop_run(&board->state);
 }
 
+/* A line that is stuck on is left to the watchdog that runs from before: opening it would be a sign of
+ * life, and ending without a laser that could be on would stop it. */
+static bool is_laser_off(const struct app_board *board, const struct app_config *config,
+                         struct hal_error *error)
+{
+    const struct hal_strobe *strobe = &board->gpio.strobe;
+    if (!config->laser) {
+        return true;
+    }
+    if (!strobe->open(strobe->context, error)) {
+        return false;
+    }
+    strobe->close(strobe->context);
+    return true;
+}
+
 static enum app_exit run_with_output(struct app_board *board, const struct app_config *config)
 {
     struct hal_error error, unproven;
@@ -162,6 +178,9 @@ static enum app_exit run_with_output(struct app_board *board, const struct app_c
     };
     if (!hal_signals_open(&board->signals, config->laser ? &board->guard.strobe : NULL, &error)) {
         return fail(board, "signals", &error, APP_EXIT_FAILED);
+    }
+    if (!is_laser_off(board, config, &error)) {
+        return fail(board, "laser", &error, APP_EXIT_FAILED);
     }
     if (!hal_watchdog_open(&board->watchdog, &watchdog, &unproven, &error)) {
         return fail(board, "watchdog", &error, APP_EXIT_FAILED);

@@ -6,7 +6,8 @@
  *        - it is enabled (app_laser_config.enabled);
  *        - the rig is valid (app_laser_rig) and the camera streams (app_laser_camera);
  *        - since the last frame that was judged it has been on for less than APP_LASER_SILENT_FRAMES
- *          frame times, and for less than the cap, whatever the camera says of its rate;
+ *          frame times, and for less than the cap, whatever the camera says of its rate. A camera that
+ *          is opened after the laser has been off for HAL_LIMITS_PAUSE_US begins anew;
  *        - the interlock is closed, after a movement for APP_LASER_CLOSED_US: contacts bounce. It is
  *          read before switching on and once more afterwards, so that one that opens in between is
  *          seen here or comes as an event later; and at every tick, which is also how the guard tells

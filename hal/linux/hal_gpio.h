@@ -11,11 +11,11 @@
  *        reported as open once more, on purpose. The kernel keeps the events, so nothing is missed
  *        between.
  * Signals: set(false) is safe in a signal handler in fact, not by promise. gpiod_line_set_value of
- *        1.6.3 and gpiod_line_request_set_value of 2.2 and 2.3 compare fields of their own, fill a
- *        structure on the stack and call ioctl: no lock, no allocation, no stdio. (2.x has asserts
+ *        1.6.3 and gpiod_line_request_set_value of 2.2 and 2.3, and those that read it back, compare
+ *        fields of their own, fill a structure on the stack and call ioctl: no lock, no allocation, no stdio. (2.x has asserts
  *        that hold here.) On this side: one atomic pointer, which is NULL whenever the line is not
  *        taken, and an error text that is built without stdio. errno is changed.
- * Not taken: set(false) is true, as nothing here drives the line; all other calls fail.
+ * Not taken: set(false) is true, as nothing here drives the line; set(true), beat(), interlock() and level() fail.
  * Read-back: after each set() the line is read, where the chip can read its outputs; open() finds that
  *        out. On after it was switched off is an error, always. Off after it was switched on is one
  *        once it has been read as on: some controllers read 0 whatever an output drives, and a line

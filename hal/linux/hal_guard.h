@@ -22,7 +22,8 @@
  *        - the socket to this process reads end of file, or this process reports that all is done;
  *        - no sign of life (hal_guard_feed) came for timeout_ms, with the laser on;
  *          while it is off a camera may take seconds to open.
- *        It has tried GUARD_OFF_TRIES times, 10 ms apart, before it gives up on a line that fails.
+ *        It has tried GUARD_OFF_TRIES times, 10 ms apart, before it gives up on a line that fails, and
+ *        as often once more in ending.
  * While both live, and only then, set(true) switches on; it is undone as soon as a guard has let go.
  *        set(false) never asks the guards, only informs them, and is as safe in a signal handler as
  *        that of the strobe below.

@@ -84,8 +84,12 @@ def check_laser():
     expect(2, "gpio-chip and laser-line", "--laser-off")
     expect(1, "/nowhere/gpiochip0", "--laser-off", "--gpio-chip", "/nowhere/gpiochip0", "--laser-line", "3")
     expect(2, "status", "--laser-off", "--config", write("wrong.conf", "laser = on\nstatus = soon\n"))
+    # A watchdog that runs from before, for a line that is stuck, gets no sign of life and is not stopped.
+    dog = write("dog", "")
     expect(1, "/nowhere/gpiochip0", "--rig", rig, "--laser", "--gpio-chip", "/nowhere/gpiochip0", "--laser-line", "3", "--device",
-           "/nowhere/video0")
+           "/nowhere/video0", "--watchdog", dog)
+    with open(dog, "rb") as file:
+        check(file.read() == b"", "the watchdog was written to although the laser's line could not be taken")
 
 
 def end(number, *options, until="trying again", **more):

@@ -35,10 +35,11 @@ def good():
     return result, truth
 
 
-def complaints(found):
+def complaints(found, frame="sequence1/000000.pgm"):
     reference, truth = good()
-    frames = agree.measure([found], [reference], [(truth, OneNode)])
-    return agree.check("it", ["rig.json", "a/b.pgm"], frames)
+    arguments = ["rig.json", frame]
+    frames = agree.measure([found], [reference], [(truth, OneNode)], arguments)
+    return agree.check("it", arguments, frames)
 
 
 class Agreement(unittest.TestCase):
@@ -69,6 +70,9 @@ class Agreement(unittest.TestCase):
     def test_head(self):
         self.refused("head_mm", lambda r: r.update(head=[30.0, 0.0, 900.0]))
         self.refused("head_mm", lambda r: r.update(head=None))
+        behind_hands = copy.deepcopy(good()[0])
+        behind_hands.update(head=None)
+        self.assertEqual(complaints(behind_hands, "sequence2/000000.pgm"), [])
 
     def test_other_work_ends_it(self):
         for key, other in (("surface", []), ("centres", 12), ("points", 56)):

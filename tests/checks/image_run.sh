@@ -7,10 +7,11 @@ work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 dog=$work/watchdog
 sed -n '/^laser_off() {/,/^}/p' tools/image/root/usr/lib/isohead/run |
-    sed "s|/data/isohead.conf|$work/conf|g" >"$work/laser_off"
+    sed "s|/run/isohead.conf|$work/conf|g" >"$work/laser_off"
 [ -s "$work/laser_off" ] || { echo "image_run: run has no laser_off" >&2; exit 1; }
 say() { :; }
-isohead_board() { echo off >>"$work/calls"; return "$off_status"; }
+# By another file than that of the settings that the firmware was started with it says "wrong".
+isohead_board() { [ "$2" = "$work/conf" ] && echo off >>"$work/calls" || echo wrong >>"$work/calls"; return "$off_status"; }
 reboot() { echo reset >>"$work/calls"; }
 sleep() { :; }
 # shellcheck source=/dev/null
