@@ -350,9 +350,18 @@ if [ -n "$packages" ]; then
         exit 1
     fi
     echo "setup: installing$packages"
-    $as_root apt-get update -qq
+    # A new machine often installs its own updates meanwhile: that is waited for, ten minutes at most.
+    tries=120
+    until $as_root apt-get update -qq 2>build/setup.log; do
+        tries=$((tries - 1))
+        if ! grep -q 'Could not get lock' build/setup.log || [ "$tries" = 0 ]; then
+            cat build/setup.log >&2
+            exit 1
+        fi
+        sleep 5
+    done
     # shellcheck disable=SC2086 # both are lists of words
-    DEBIAN_FRONTEND=noninteractive $as_root apt-get install -qq --yes --no-install-recommends \
+    DEBIAN_FRONTEND=noninteractive $as_root apt-get -o DPkg::Lock::Timeout=600 install -qq --yes --no-install-recommends \
         $packages >build/setup.log 2>&1 || { tail -n 20 build/setup.log >&2; exit 1; }
 fi
 
