@@ -3,19 +3,37 @@
 #include <inttypes.h>
 #include <stdlib.h>
 
+#include "app_rig.h"
 #include "app_view.h"
 #include "sim_report.h"
 #include "points/ih_cloud.h"
+
+static void reserve(struct sim_cloud *cloud, const struct ih_rig *rig)
+{
+    size_t pixels = (size_t)rig->calibration.width * (size_t)rig->calibration.height;
+    if (cloud->depth_mm == NULL) {
+        cloud->depth_mm = sim_report_grow(NULL, pixels, sizeof *cloud->depth_mm);
+    }
+}
+
+/* Depths in units to mm, rounded; what is beyond 16 bits stays as far as they go. */
+static void scale(struct sim_cloud *cloud, struct ih_frame *view)
+{
+    const uint16_t *depth = view->samples;
+    for (int32_t i = 0; i < view->width * view->height; i++) {
+        int64_t depth_mm = ((int64_t)depth[i] * cloud->scale_q20 + APP_RIG_SCALE_ONE / 2) >> 20;
+        cloud->depth_mm[i] = (uint16_t)(depth_mm < UINT16_MAX ? depth_mm : UINT16_MAX);
+    }
+    view->samples = cloud->depth_mm;
+    view->maximum = UINT16_MAX;
+}
 
 static bool draw(struct sim_cloud *cloud, const struct hal_frame *frame, const struct ih_rig *rig,
                  struct hal_error *error)
 {
     const struct ih_calibration *c = &rig->calibration;
     struct ih_cloud count;
-    size_t pixels = (size_t)c->width * (size_t)c->height;
-    if (cloud->depth_mm == NULL) {
-        cloud->depth_mm = sim_report_grow(NULL, pixels, sizeof *cloud->depth_mm);
-    }
+    reserve(cloud, rig);
     enum ih_err err =
         ih_cloud_draw(frame->point_mm_q8, frame->point_count, rig, cloud->depth_mm, &count);
     if (err != IH_OK) {
@@ -36,6 +54,13 @@ bool sim_cloud_view(struct sim_cloud *cloud, const struct hal_frame *frame,
 {
     *view = app_view_of(frame);
     if (frame->samples != NULL) {
+        /* What the core refuses is left as it is. */
+        bool is_depth = frame->bytes_per_sample == 2 && frame->width == rig->calibration.width &&
+                        frame->height == rig->calibration.height;
+        if (is_depth && cloud->scale_q20 != APP_RIG_SCALE_ONE) {
+            reserve(cloud, rig);
+            scale(cloud, view);
+        }
         return true;
     }
     if (!draw(cloud, frame, rig, error)) {

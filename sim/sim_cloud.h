@@ -1,4 +1,4 @@
-/* sim_cloud - the frame that the core is given: the camera's own, or a list of points drawn. */
+/* sim_cloud - the frame that the core is given: the camera's own, a depth image in mm, or a list of points drawn. */
 #ifndef SIM_CLOUD_H
 #define SIM_CLOUD_H
 
@@ -7,7 +7,8 @@
 #include "rig/ih_rig.h"
 
 struct sim_cloud {
-    uint16_t *depth_mm; /* NULL while no list came */
+    uint16_t *depth_mm; /* NULL while nothing was converted */
+    int32_t scale_q20;  /* mm per unit of a depth image (app_rig.h); lists of points are in mm */
 };
 
 /* False when not one of a list's points can be seen: *error says where they are. */

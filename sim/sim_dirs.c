@@ -9,6 +9,7 @@
 #include <sys/stat.h>
 
 #include "hal_file.h"
+#include "replay/hal_replay.h"
 
 #define RIG_NAME "rig.json"
 /* Room for a number after a label. */
@@ -34,13 +35,6 @@ static bool is_directory(const char *path)
     return stat(path, &status) == 0 && S_ISDIR(status.st_mode);
 }
 
-static bool is_frame_name(const char *name)
-{
-    const char *suffix = strrchr(name, '.');
-    return suffix != NULL && suffix != name &&
-           (strcmp(suffix, ".pgm") == 0 || strcmp(suffix, ".xyz") == 0);
-}
-
 /* The next name; NULL at the end and, with errno, at an error. */
 static const char *next_name(DIR *stream)
 {
@@ -56,7 +50,7 @@ static size_t count_frames(const char *dir)
     size_t count = 0;
     const char *name = NULL;
     while (stream != NULL && (name = next_name(stream)) != NULL) {
-        count += is_frame_name(name);
+        count += hal_replay_is_frame(name, true);
     }
     bool is_whole = stream != NULL && errno == 0;
     if (stream != NULL) {
@@ -181,7 +175,7 @@ void sim_dirs_add(struct sim_dirs *dirs, const char *path, bool with_rig, struct
                          strerror(reason));
     } else if (count == 0) {
         sim_report_error(report, path, "no %s here and in no subdirectory%s",
-                         with_rig ? "frames (*.pgm, *.xyz)" : RIG_NAME,
+                         with_rig ? "frames (*.pgm, *.png, *.xyz)" : RIG_NAME,
                          with_rig ? "" : "; name one with --rig, or make one: docs/calibration.md");
     }
 }
@@ -208,7 +202,7 @@ static bool is_input_of(const char *dir, const struct stat *as)
     DIR *stream = opendir(dir);
     const char *name = NULL;
     while (stream != NULL && !found && (name = next_name(stream)) != NULL) {
-        found = is_frame_name(name) && is_same(dir, name, as);
+        found = hal_replay_is_frame(name, true) && is_same(dir, name, as);
     }
     if (stream != NULL) {
         closedir(stream);

@@ -1,9 +1,15 @@
 #include "sim_hint.h"
 
+#include <dirent.h>
 #include <inttypes.h>
+#include <limits.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
+
+#include "app_rig.h"
+#include "replay/hal_replay.h"
 
 #define DOTS_MIN 60
 /* Labels by chance: few, or not half of the dots and beside lines that do not fit. */
@@ -19,6 +25,28 @@
 #define IN_RANGE_MIN_SWAPPED 33
 #define EXPLAINED_MIN 80
 
+/* What may hold frames and is not read: suffix, and how it becomes frames. */
+#define IMAGE "ffmpeg -i %s -pix_fmt gray 000000.png (gray16be where it has more than 8 bits)"
+#define VIDEO "ffmpeg -i %s -pix_fmt gray %%06d.png (docs/depth_camera.md has the times)"
+#define DUMP "ffmpeg -f rawvideo -pixel_format gray -video_size WIDTHxHEIGHT -i %s %%06d.png"
+#define NUMBERS "%s: docs/depth_camera.md writes depth images with a few lines of Python"
+static const struct {
+    const char *suffix, *recipe;
+} unread[] = {
+    {".tif", IMAGE},   {".tiff", IMAGE},
+    {".jpg", IMAGE},   {".jpeg", IMAGE},
+    {".bmp", IMAGE},   {".ppm", IMAGE},
+    {".pnm", IMAGE},   {".webp", IMAGE},
+    {".avi", VIDEO},   {".mp4", VIDEO},
+    {".mkv", VIDEO},   {".mov", VIDEO},
+    {".webm", VIDEO},  {".raw", DUMP},
+    {".bin", DUMP},    {".yuv", DUMP},
+    {".npy", NUMBERS}, {".npz", NUMBERS},
+    {".exr", NUMBERS}, {".ply", NUMBERS},
+    {".pcd", NUMBERS}, {".xyz", "%s: lists of points need a rig of \"kind\": \"range\""},
+};
+#define UNREAD (int)(sizeof unread / sizeof unread[0])
+
 /* What depths may be by mistake: mm are value * multiplier / divisor. Not micrometres: 16 bits are 65 mm. */
 struct unit {
     const char *text;
@@ -28,12 +56,56 @@ struct unit {
 
 static const struct unit units[] = {
     {"mm", 1, 1, false},
-    {"mm with their bytes swapped (a PGM has the most significant one first)", 1, 1, true},
+    {"mm with their bytes swapped (PGM and PNG have the most significant one first)", 1, 1, true},
     {"cm", 10, 1, false},
-    {"0.1 mm", 1, 10, false},
+    {"0.1 mm (or 0.2 mm, as in the sets of TUM)", 1, 10, false},
     {"metres", 1000, 1, false},
 };
 #define UNITS (int)(sizeof units / sizeof units[0])
+
+/* NULL: it is read, or is no frame. */
+static const char *recipe_of(const char *name, bool with_lists)
+{
+    const char *suffix = strrchr(name, '.');
+    if (suffix == NULL || name[0] == '.' || hal_replay_is_frame(name, with_lists)) {
+        return NULL;
+    }
+    for (int i = 0; i < UNREAD; i++) {
+        if (strcasecmp(suffix, unread[i].suffix) == 0) {
+            return unread[i].recipe;
+        }
+    }
+    return NULL;
+}
+
+void sim_hint_unread(const char *dir, bool with_lists, struct sim_report *report)
+{
+    char first[NAME_MAX + 1] = "";
+    int count = 0;
+    DIR *stream = opendir(dir);
+    const struct dirent *item = NULL;
+    while (stream != NULL && (item = readdir(stream)) != NULL) {
+        if (recipe_of(item->d_name, with_lists) == NULL) {
+            continue;
+        }
+        if (count == 0 || strcmp(item->d_name, first) < 0) {
+            snprintf(first, sizeof first, "%s", item->d_name);
+        }
+        count++;
+    }
+    if (stream != NULL) {
+        closedir(stream);
+    }
+    if (count == 0) {
+        return;
+    }
+    char text[TEXT_MAX];
+    int length =
+        snprintf(text, sizeof text, "%d file%s not read, as frames are *.pgm and *.png%s: ", count,
+                 count == 1 ? " is" : "s are", with_lists ? " and *.xyz" : "");
+    snprintf(text + length, sizeof text - (size_t)length, recipe_of(first, with_lists), first);
+    sim_report_hint(report, dir, text);
+}
 
 static void count_depths(struct sim_hint *hint, const struct ih_frame *view)
 {
@@ -133,7 +205,9 @@ static int find_unit(const struct sim_hint *hint, const struct ih_calibration *r
     for (int i = 1; i < UNITS; i++) {
         int min = units[i].is_swapped ? IN_RANGE_MIN_SWAPPED : IN_RANGE_MIN;
         int64_t count = in_range_count(hint, rig, &units[i]);
-        if (percent(good_count, measured_count) < min &&
+        bool is_raw =
+            hint->scale_q20 == APP_RIG_SCALE_ONE; /* else its bytes are not those of the file */
+        if ((is_raw || !units[i].is_swapped) && percent(good_count, measured_count) < min &&
             percent(count, measured_count) >= EXPLAINED_MIN && count > best_count) {
             best = i;
             best_count = count;
@@ -154,12 +228,18 @@ static void report_depths(const struct sim_hint *hint, const struct ih_calibrati
     const int good_percent = percent(good_count, measured_count);
     char text[TEXT_MAX];
     if (unit != 0) {
+        char scale[32];
+        snprintf(scale, sizeof scale, "%.4g",
+                 (double)hint->scale_q20 / APP_RIG_SCALE_ONE * units[unit].multiplier /
+                     units[unit].divisor);
+        bool is_swapped = units[unit].is_swapped;
         snprintf(text, sizeof text,
                  "%d %% of its depths lie within %" PRId32 " .. %" PRId32
-                 " mm, but %d %% would if they were %s: convert the frames to mm",
+                 " mm, but %d %% would if they were %s: %s%s%s%s",
                  good_percent, rig->near_mm, rig->far_mm,
-                 percent(in_range_count(hint, rig, &units[unit]), measured_count),
-                 units[unit].text);
+                 percent(in_range_count(hint, rig, &units[unit]), measured_count), units[unit].text,
+                 is_swapped ? "write the frames again" : "enter \"depth_scale\": ",
+                 is_swapped ? "" : scale, is_swapped ? "" : " in ", is_swapped ? "" : rig_path);
     } else if (good_percent < IN_RANGE_MIN) {
         snprintf(
             text, sizeof text,

@@ -22,7 +22,7 @@ static const struct option table[] = {
     {"trace", required_argument, NULL, OPTION_TRACE},
     {"report", required_argument, NULL, OPTION_REPORT},
     {"without", required_argument, NULL, OPTION_WITHOUT},
-    {"help", no_argument, NULL, OPTION_HELP},
+    {"help", no_argument, NULL, OPTION_HELP}, /* and -h */
     {"version", no_argument, NULL, OPTION_VERSION},
     {NULL, 0, NULL, 0},
 };
@@ -65,6 +65,7 @@ static bool take(struct sim_options *options, int option)
     case OPTION_WITHOUT:
         return take_without(options, optarg);
     case OPTION_HELP:
+    case 'h':
         options->help = true;
         break;
     default:
@@ -80,7 +81,7 @@ bool sim_options_parse(struct sim_options *options, int argument_count, char **a
     int option = 0;
     opterr = 0;
     /* The leading ':' tells a missing argument from an unknown option. */
-    while ((option = getopt_long(argument_count, arguments, ":", table, NULL)) != -1) {
+    while ((option = getopt_long(argument_count, arguments, ":h", table, NULL)) != -1) {
         if (option == ':') {
             return refuse("missing argument of ", arguments[optind - 1]);
         }
@@ -108,7 +109,7 @@ bool sim_options_parse(struct sim_options *options, int argument_count, char **a
 void sim_options_help(void)
 {
     fputs("host_sim [options] DIR...\n"
-          "Find a person's head in 3-D in the frames of each DIR (*.pgm, rig.json).\n"
+          "Find a person's head in 3-D in the frames of each DIR (*.pgm, *.png, rig.json).\n"
           "With a range rig *.xyz are frames too: a line `x y z` in mm per point.\n"
           "A DIR without rig.json stands for those of its subdirectories that have one.\n"
           "\n"
@@ -126,7 +127,7 @@ void sim_options_help(void)
           "                 tracks    every frame on its own\n"
           "                 windows   of a depth image only the best window\n"
           "                 missing   dots that are not seen are not entered as far points\n"
-          "  --help         this text\n"
+          "  -h, --help     this text\n"
           "  --version      the version\n"
           "\n"
           "Without --json: a line per frame, then, where there is truth, the paper's\n"

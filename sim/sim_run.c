@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include "hal_file.h"
 #include "replay/hal_replay.h"
@@ -56,14 +57,14 @@ struct visit {
 };
 
 /* Rig file to a core that is ready; wrong ones go to the report. */
-static bool start_core(struct run *run, const char *dir)
+static bool start_core(struct run *run, const char *dir, int32_t *scale_q20)
 {
     struct ih_calibration calibration;
     struct hal_error error = {"no memory"};
     int32_t bad_slot = IH_NONE;
     char *own = hal_file_join(dir, "rig.json");
     const char *path = run->options->rig != NULL ? run->options->rig : own;
-    bool good = path != NULL && app_rig_load(path, &calibration, &error);
+    bool good = path != NULL && app_rig_load_scaled(path, &calibration, scale_q20, &error);
     if (good) {
         enum ih_err err = isohead_init(run->head, &calibration, &bad_slot);
         if (run->options->paper) {
@@ -149,7 +150,7 @@ static void put_frame(struct visit *visit, const struct hal_frame *frame,
     struct isohead *head = visit->run->head;
     const struct sim_truth_frame *truth = sim_truth_find(&visit->truth, frame->name);
     if (visit->truth.present && truth == NULL) {
-        sim_report_error(&visit->run->report, visit->truth.path, "no line for %s", frame->name);
+        sim_truth_note_unknown(&visit->truth, frame->name);
     }
     struct sim_verdict verdict = sim_score_judge(&head->result, truth);
     sim_score_add(visit->score, &verdict);
@@ -259,11 +260,13 @@ static void process_dir(struct run *run, size_t index)
         .record = {.dir = run->dirs.dir_count > 1 ? dir->path : NULL},
         .score = &run->score[index],
     };
-    if (!start_core(run, dir->path)) {
+    if (!start_core(run, dir->path, &visit.cloud.scale_q20)) {
         return;
     }
+    visit.hint.scale_q20 = visit.cloud.scale_q20;
     struct hal_log log = sim_report_log(&run->report);
     bool with_lists = run->head->rig.calibration.kind == IH_RIG_RANGE;
+    sim_hint_unread(dir->path, with_lists, &run->report);
     if (!hal_replay_open(&visit.replay, dir->path, with_lists, &log, &error)) {
         sim_report_error(&run->report, dir->path, "%s", error.text);
         return;
@@ -283,6 +286,7 @@ static void process_dir(struct run *run, size_t index)
                     run->options->rig != NULL ? run->options->rig : "its rig.json", &run->report);
     sim_hint_free(&visit.hint);
     release(&visit, &visit.ambient);
+    sim_truth_report(&visit.truth, &run->report);
     sim_truth_free(&visit.truth);
     sim_cloud_free(&visit.cloud);
     hal_replay_close(&visit.replay);
@@ -371,6 +375,21 @@ static bool start_page(struct run *run)
     return false;
 }
 
+/* False: nothing can be written where traces are wanted, which is reported before any frame is processed. */
+static bool prepare_traces(struct run *run)
+{
+    struct hal_error error;
+    bool good = true;
+    for (size_t i = 0; run->options->trace != NULL && i < run->dirs.dir_count; i++) {
+        const struct sim_trace trace = {run->options->trace, run->dirs.dir[i].label};
+        if (good && !sim_trace_prepare(&trace, &error)) {
+            sim_report_error(&run->report, run->dirs.dir[i].path, "%s", error.text);
+            good = false;
+        }
+    }
+    return good;
+}
+
 static void process_all(struct run *run)
 {
     size_t count = run->dirs.dir_count;
@@ -385,6 +404,9 @@ static void process_all(struct run *run)
     }
     if (run->page.file != NULL) {
         finish_page(run);
+    } else if (!run->options->json && isatty(STDOUT_FILENO)) {
+        printf("\nWhy each frame came out so, in a browser: host_sim --report report.html %s\n",
+               run->options->dirs[0]);
     }
     for (size_t i = 0; i < count; i++) {
         sim_score_free(&run->score[i]);
@@ -399,7 +421,7 @@ enum sim_status sim_run(const struct sim_options *options, struct isohead *head)
     for (int i = 0; i < options->dir_count; i++) {
         sim_dirs_add(&run.dirs, options->dirs[i], options->rig != NULL, &run.report);
     }
-    if (start_page(&run)) {
+    if (prepare_traces(&run) && start_page(&run)) {
         process_all(&run);
     }
     if (fflush(stdout) != 0 || ferror(stdout)) {

@@ -1,10 +1,12 @@
 #include "sim_trace.h"
 
+#include <dirent.h>
 #include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include "hal_file.h"
 #include "sim_trace_contours.h"
@@ -415,6 +417,26 @@ static char *make_path(const struct sim_trace *trace, const char *name)
         snprintf(path, size, "%s/%s/%.*s.json", trace->out, trace->label, stem_length, name);
     }
     return path;
+}
+
+bool sim_trace_prepare(const struct sim_trace *trace, struct hal_error *error)
+{
+    char *path = make_path(trace, "");
+    if (path == NULL) {
+        return fail(error, trace->label);
+    }
+    make_parents(path);
+    *strrchr(path, '/') = 0;
+    DIR *folder = opendir(path);
+    bool good = folder != NULL && access(path, W_OK | X_OK) == 0;
+    if (!good) {
+        fail(error, path);
+    }
+    if (folder != NULL) {
+        closedir(folder);
+    }
+    free(path);
+    return good;
 }
 
 bool sim_trace_frame(const struct sim_trace *trace, const struct hal_frame *frame,

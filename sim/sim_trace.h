@@ -1,7 +1,7 @@
 /* sim_trace - every stage's results of one frame as a JSON file, raw integers.
  *
  * File:  OUT/LABEL/FRAME.json, LABEL the last part of the frames directory's path, FRAME the
- *        frame's name without .pgm. Folders are made as needed; files are overwritten.
+ *        frame's name without its suffix. Folders are made as needed; files are overwritten.
  * Keys:  the names of the core's struct members with unit and format; a key per stage.
  * Error: what could not be made or written, and why.
  */
@@ -16,6 +16,9 @@ struct sim_trace {
     const char *out;
     const char *label;
 };
+
+/* Makes OUT/LABEL before the first frame. False: *error says why nothing can be written there. */
+bool sim_trace_prepare(const struct sim_trace *trace, struct hal_error *error);
 
 /* Uses head->scratch to trace the contours again. False: *error says why. */
 bool sim_trace_frame(const struct sim_trace *trace, const struct hal_frame *frame,

@@ -115,7 +115,8 @@ static void free_frame(struct sim_truth_frame *frame)
     free(frame->dot);
 }
 
-/* One line as a frame. On failure it has no name, or is one that is not scored. */
+/* One line as a frame; without a name when there is no such frame. On failure it has no name, or is one that is not
+ * scored. */
 static bool read_frame(const cJSON *line, const struct hal_replay *replay,
                        struct sim_truth_frame *frame, struct hal_error *error)
 {
@@ -124,7 +125,7 @@ static bool read_frame(const cJSON *line, const struct hal_replay *replay,
         return hal_fail(error, "no file, expected the name of a frame");
     }
     if (!hal_replay_has(replay, name)) {
-        return hal_fail(error, "%.100s: no such frame in this directory", name);
+        return true; /* truth of frames that were left out does no harm */
     }
     size_t size = strlen(name) + 1;
     frame->name = sim_report_grow(NULL, size, 1);
@@ -218,6 +219,22 @@ void sim_truth_load(struct sim_truth *truth, const char *dir, const struct hal_r
         qsort(truth->frame, truth->frame_count, sizeof *truth->frame, compare_frames);
     }
     drop_doubles(truth, report);
+}
+
+void sim_truth_note_unknown(struct sim_truth *truth, const char *name)
+{
+    truth->unknown_name = truth->unknown_count == 0 ? name : truth->unknown_name;
+    truth->unknown_count++;
+}
+
+void sim_truth_report(const struct sim_truth *truth, struct sim_report *report)
+{
+    if (truth->unknown_count == 1) {
+        sim_report_error(report, truth->path, "no line for %s", truth->unknown_name);
+    } else if (truth->unknown_count > 1) {
+        sim_report_error(report, truth->path, "no line for %zu frames, the first is %s",
+                         truth->unknown_count, truth->unknown_name);
+    }
 }
 
 void sim_truth_free(struct sim_truth *truth)

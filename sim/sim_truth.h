@@ -3,8 +3,8 @@
  * In:    a JSON object per line (docs/contract.md): file, head, dots.
  * Out:   the frames sorted by name, in the core's units and formats.
  * Error: reported with file and line, and the other lines stay. A line is lost that is no
- *        JSON object, or names no frame of the directory or one that had a line before; one with a
- *        malformed head or dots leaves its frame unscored. A file that cannot be read is no truth.
+ *        JSON object, or names a frame that had a line before; one with a malformed head or dots leaves its frame
+ *        unscored. A file that cannot be read is no truth. A line for a frame that is not in the directory is ignored.
  * Note:  a line with a "heads" list (several people) in place of a head says nothing about one
  *        head: its frame is not scored.
  */
@@ -45,11 +45,18 @@ struct sim_truth {
     char *path;
     struct sim_truth_frame *frame; /* sorted by name */
     size_t frame_count, frame_capacity;
+    /* frames without a line: how many, and the first one's name */
+    size_t unknown_count;
+    const char *unknown_name;
 };
 
 /* The truth of a directory, empty when it has none. */
 void sim_truth_load(struct sim_truth *truth, const char *dir, const struct hal_replay *replay,
                     struct sim_report *report);
+/* A frame that has no line; name: good until the report. */
+void sim_truth_note_unknown(struct sim_truth *truth, const char *name);
+/* In one line how many there were. */
+void sim_truth_report(const struct sim_truth *truth, struct sim_report *report);
 void sim_truth_free(struct sim_truth *truth);
 
 /* The frame of this name, or NULL. */

@@ -31,9 +31,10 @@ need_sim() {
     need_program cmake cmake
     need_header stdlib.h libc6-dev
     need_header cjson/cJSON.h libcjson-dev
-    # What is folded into the report page, and writes it. Elsewhere these lie in other places: host_sim is
+    # PNG frames; and what is folded into the report page, and writes it. Elsewhere these lie in other places: host_sim is
     # built without the page, and CMake says how to name them.
     if command -v apt-get >/dev/null 2>&1; then
+        need_header png.h libpng-dev
         need_header zlib.h zlib1g-dev
         need_header turbojpeg.h libturbojpeg0-dev
         [ -e /usr/share/javascript/three/three.min.js ] || lacks libjs-three

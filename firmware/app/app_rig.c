@@ -85,62 +85,105 @@ static bool check_count(const struct field *field, const cJSON *matrix, const ch
     return true;
 }
 
-/* The matrix of a field, with its shape and type as they must be; NULL when not. */
-static const cJSON *find_matrix(const struct field *field, int rows, int columns)
+/* Does OpenCV's form of a matrix say the shape and type that it must have? */
+static bool check_form(const struct field *field, const cJSON *matrix, int rows, int columns)
 {
-    const cJSON *matrix = find(field);
-    if (matrix == NULL) {
-        return NULL;
-    }
     const char *type = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(matrix, "type_id"));
     if (type == NULL || strcmp(type, "opencv-matrix") != 0) {
-        hal_fail(field->error, "%s: type_id is %s, expected \"opencv-matrix\"", field->name,
-                 type == NULL ? "missing" : type);
-        return NULL;
+        return hal_fail(field->error, "%s: type_id is %s, expected \"opencv-matrix\"", field->name,
+                        type == NULL ? "missing" : type);
     }
     const char *format = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(matrix, "dt"));
     if (format == NULL || (strcmp(format, "d") != 0 && strcmp(format, "f") != 0)) {
-        hal_fail(field->error, "%s: dt is %s, expected \"d\" or \"f\"", field->name,
-                 format == NULL ? "missing" : format);
-        return NULL;
+        return hal_fail(field->error, "%s: dt is %s, expected \"d\" or \"f\"", field->name,
+                        format == NULL ? "missing" : format);
     }
-    if (!check_count(field, matrix, "rows", rows) || !check_count(field, matrix, "cols", columns)) {
-        return NULL;
-    }
-    return matrix;
+    return check_count(field, matrix, "rows", rows) && check_count(field, matrix, "cols", columns);
 }
 
-/* The numbers of a matrix, row by row. */
+/* Where numbers are read from, and how many were. */
+struct numbers {
+    const struct field *field;
+    int rows, columns;
+    int count;
+    double *value;
+};
+
+static bool read_one(struct numbers *numbers, const cJSON *item)
+{
+    const struct field *field = numbers->field;
+    const int row = numbers->count / numbers->columns;
+    const int column = numbers->count % numbers->columns;
+    if (!cJSON_IsNumber(item)) {
+        return hal_fail(field->error, "%s[%d][%d]: %s, expected a number", field->name, row, column,
+                        type_text(item));
+    }
+    if (!isfinite(item->valuedouble)) {
+        return hal_fail(field->error, "%s[%d][%d]: %g, expected a finite number", field->name, row,
+                        column, item->valuedouble);
+    }
+    numbers->value[numbers->count++] = item->valuedouble;
+    return true;
+}
+
+/* All numbers of a flat array. where: what of the field it is. */
+static bool read_flat(struct numbers *numbers, const cJSON *array, const char *where)
+{
+    const int expected = numbers->rows * numbers->columns;
+    if (cJSON_GetArraySize(array) != expected) {
+        return hal_fail(numbers->field->error, "%s: %d numbers%s, expected %d",
+                        numbers->field->name, cJSON_GetArraySize(array), where, expected);
+    }
+    bool good = true;
+    for (const cJSON *item = array->child; good && item != NULL; item = item->next) {
+        good = read_one(numbers, item);
+    }
+    return good;
+}
+
+/* An array of rows, as NumPy's tolist() writes it. */
+static bool read_rows(struct numbers *numbers, const cJSON *array)
+{
+    const struct field *field = numbers->field;
+    if (cJSON_GetArraySize(array) != numbers->rows) {
+        return hal_fail(field->error, "%s: %d rows, expected %d", field->name,
+                        cJSON_GetArraySize(array), numbers->rows);
+    }
+    for (const cJSON *row = array->child; row != NULL; row = row->next) {
+        const int index = numbers->count / numbers->columns;
+        if (!cJSON_IsArray(row) || cJSON_GetArraySize(row) != numbers->columns) {
+            return hal_fail(field->error, "%s[%d]: expected an array of %d numbers", field->name,
+                            index, numbers->columns);
+        }
+        for (const cJSON *item = row->child; item != NULL; item = item->next) {
+            if (!read_one(numbers, item)) {
+                return false;
+            }
+        }
+    }
+    return true;
+}
+
+/* The numbers of a matrix, row by row: OpenCV's form, an array of rows, or a flat array. */
 static bool read_matrix(const struct field *field, int rows, int columns, double *value)
 {
-    const cJSON *matrix = find_matrix(field, rows, columns);
+    struct numbers numbers = {field, rows, columns, 0, value};
+    const cJSON *matrix = find(field);
     if (matrix == NULL) {
+        return false;
+    }
+    if (cJSON_IsArray(matrix)) {
+        return cJSON_IsArray(matrix->child) ? read_rows(&numbers, matrix)
+                                            : read_flat(&numbers, matrix, "");
+    }
+    if (!check_form(field, matrix, rows, columns)) {
         return false;
     }
     const cJSON *data = cJSON_GetObjectItemCaseSensitive(matrix, "data");
     if (!cJSON_IsArray(data)) {
         return hal_fail(field->error, "%s: data is no array", field->name);
     }
-    if (cJSON_GetArraySize(data) != rows * columns) {
-        return hal_fail(field->error, "%s: %d numbers in data, expected %d", field->name,
-                        cJSON_GetArraySize(data), rows * columns);
-    }
-    int index = 0;
-    const cJSON *item = NULL;
-    cJSON_ArrayForEach(item, data)
-    {
-        if (!cJSON_IsNumber(item)) {
-            return hal_fail(field->error, "%s[%d][%d]: %s, expected a number", field->name,
-                            index / columns, index % columns, type_text(item));
-        }
-        value[index] = item->valuedouble;
-        if (!isfinite(value[index])) {
-            return hal_fail(field->error, "%s[%d][%d]: %g, expected a finite number", field->name,
-                            index / columns, index % columns, value[index]);
-        }
-        index++;
-    }
-    return true;
+    return read_flat(&numbers, data, " in data");
 }
 
 /* value * 2^fraction_bits as int32_t. part: what of the field it is. */
@@ -244,6 +287,29 @@ static bool read_projector(struct field *field, struct ih_calibration *calibrati
     return true;
 }
 
+/* mm per unit; 1 where the file says nothing. */
+static bool read_depth_scale(struct field *field, const struct ih_calibration *calibration,
+                             int32_t *scale_q20)
+{
+    double scale = 1;
+    field->name = "depth_scale";
+    *scale_q20 = APP_RIG_SCALE_ONE;
+    if (cJSON_GetObjectItemCaseSensitive(field->rig, field->name) == NULL) {
+        return true;
+    }
+    if (!read_number(field, &scale)) {
+        return false;
+    }
+    if (calibration->kind != IH_RIG_RANGE) {
+        return hal_fail(field->error, "depth_scale: only a rig of kind \"range\" has depths");
+    }
+    if (!(scale >= APP_RIG_SCALE_MIN && scale <= APP_RIG_SCALE_MAX)) {
+        return hal_fail(field->error, "depth_scale: %g, expected %g to %g mm per unit", scale,
+                        APP_RIG_SCALE_MIN, APP_RIG_SCALE_MAX);
+    }
+    return round_fixed(field, "", scale, 20, scale_q20);
+}
+
 static bool read_kind(struct field *field, struct ih_calibration *calibration)
 {
     const cJSON *kind = cJSON_GetObjectItemCaseSensitive(field->rig, "kind");
@@ -263,14 +329,16 @@ static bool read_kind(struct field *field, struct ih_calibration *calibration)
     return true;
 }
 
-static bool read_rig(const cJSON *rig, struct ih_calibration *calibration, struct hal_error *error)
+static bool read_rig(const cJSON *rig, struct ih_calibration *calibration, int32_t *scale_q20,
+                     struct hal_error *error)
 {
     struct field field = {.rig = rig, .error = error};
     *calibration = (struct ih_calibration){.kind = IH_RIG_DOTS};
     return read_kind(&field, calibration) && read_size(&field, calibration) &&
            read_camera(&field, calibration) && read_distortion(&field, calibration) &&
            read_range(&field, calibration) &&
-           (calibration->kind == IH_RIG_RANGE || read_projector(&field, calibration));
+           (calibration->kind == IH_RIG_RANGE || read_projector(&field, calibration)) &&
+           read_depth_scale(&field, calibration, scale_q20);
 }
 
 /* Where in the text parsing stopped. */
@@ -292,7 +360,8 @@ static void locate(const char *text, const char *stop, struct hal_error *error)
     }
 }
 
-bool app_rig_load(const char *path, struct ih_calibration *calibration, struct hal_error *error)
+bool app_rig_load_scaled(const char *path, struct ih_calibration *calibration, int32_t *scale_q20,
+                         struct hal_error *error)
 {
     uint8_t *data = NULL;
     size_t size = 0;
@@ -310,9 +379,21 @@ bool app_rig_load(const char *path, struct ih_calibration *calibration, struct h
     } else if (!cJSON_IsObject(rig)) {
         hal_fail(error, "%s, expected an object", type_text(rig));
     } else {
-        good = read_rig(rig, calibration, error);
+        good = read_rig(rig, calibration, scale_q20, error);
     }
     cJSON_Delete(rig);
     free(data);
     return good;
+}
+
+bool app_rig_load(const char *path, struct ih_calibration *calibration, struct hal_error *error)
+{
+    int32_t scale_q20 = APP_RIG_SCALE_ONE;
+    if (!app_rig_load_scaled(path, calibration, &scale_q20, error)) {
+        return false;
+    }
+    if (scale_q20 != APP_RIG_SCALE_ONE) {
+        return hal_fail(error, "depth_scale: expected 1, as this program takes depths in mm");
+    }
+    return true;
 }

@@ -1,6 +1,7 @@
 /* app_rig - rig.json to the core's calibration.
  *
- * In:    JSON as OpenCV's FileStorage writes it (docs/contract.md). Unknown fields are ignored.
+ * In:    JSON as OpenCV's FileStorage writes it (docs/contract.md); a matrix may also be an array of its rows, or of
+ *        all its numbers row by row. Unknown fields are ignored.
  * Out:   the numbers rounded to the formats of struct ih_calibration, nothing else: near_mm is
  *        rounded down and far_mm up, so that the range never shrinks.
  * Error: one line that names field, value and expectation. What can be seen in one number (missing,
@@ -16,7 +17,16 @@
 /* Largest rig.json; 361 rays in full precision need 30 kB. */
 #define APP_RIG_FILE_MAX ((size_t)4 << 20)
 
-/* False: *error says why. */
+/* mm per unit of a range frame. */
+#define APP_RIG_SCALE_ONE (1 << 20)
+#define APP_RIG_SCALE_MIN 0.01
+#define APP_RIG_SCALE_MAX 1000.0
+
+/* scale_q20: depth_scale. False: *error says why. */
+bool app_rig_load_scaled(const char *path, struct ih_calibration *calibration, int32_t *scale_q20,
+                         struct hal_error *error);
+
+/* For frames in mm: another depth_scale is refused. */
 bool app_rig_load(const char *path, struct ih_calibration *calibration, struct hal_error *error);
 
 #endif

@@ -5,14 +5,17 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 
 #include "hal_file.h"
 #include "replay/hal_lines.h"
 #include "replay/hal_pgm.h"
+#include "replay/hal_png.h"
 #include "replay/hal_xyz.h"
 
 #define LIST_NAME "frames.jsonl"
-#define FRAME_SUFFIX ".pgm"
+#define PGM_SUFFIX ".pgm"
+#define PNG_SUFFIX ".png"
 #define POINTS_SUFFIX ".xyz"
 /* Times beyond this are not exact in JSON's numbers. */
 #define TIME_MAX_US ((double)((int64_t)1 << 53))
@@ -27,25 +30,25 @@ static char *copy_text(const char *text)
     return copy;
 }
 
+/* In any case: cameras and other systems write .PGM. */
 static bool has_suffix(const char *name, const char *suffix)
 {
     size_t length = strlen(name);
     size_t suffix_length = strlen(suffix);
-    return length > suffix_length && strcmp(name + length - suffix_length, suffix) == 0;
+    return length > suffix_length && strcasecmp(name + length - suffix_length, suffix) == 0;
 }
 
-/* Frames are what the shell's *.pgm matches, and *.xyz where lists are asked for. */
-static bool is_frame_name(const struct hal_replay *replay, const char *name)
+bool hal_replay_is_frame(const char *name, bool with_lists)
 {
     return name[0] != '.' && strchr(name, '/') == NULL &&
-           (has_suffix(name, FRAME_SUFFIX) ||
-            (replay->with_lists && has_suffix(name, POINTS_SUFFIX)));
+           (has_suffix(name, PGM_SUFFIX) || has_suffix(name, PNG_SUFFIX) ||
+            (with_lists && has_suffix(name, POINTS_SUFFIX)));
 }
 
 /* What a frame is called, for messages. */
 static const char *frame_names(const struct hal_replay *replay)
 {
-    return replay->with_lists ? "*" FRAME_SUFFIX ", *" POINTS_SUFFIX : "*" FRAME_SUFFIX;
+    return replay->with_lists ? "*.pgm, *.png, *.xyz" : "*.pgm, *.png";
 }
 
 /* Index of the first entry whose name is not less. */
@@ -73,28 +76,28 @@ static struct hal_replay_entry *find_entry(const struct hal_replay *replay, cons
     return NULL;
 }
 
-/* A new entry in its place; NULL when there is no memory. */
-static struct hal_replay_entry *add_entry(struct hal_replay *replay, const char *name)
+/* A new entry in its place. False: there is no memory. */
+static bool add_entry(struct hal_replay *replay, const char *name)
 {
     if (replay->entry_count == replay->entry_capacity) {
         size_t capacity = replay->entry_capacity == 0 ? 64 : replay->entry_capacity * 2;
         struct hal_replay_entry *grown = realloc(replay->entry, capacity * sizeof *grown);
         if (grown == NULL) {
-            return NULL;
+            return false;
         }
         replay->entry = grown;
         replay->entry_capacity = capacity;
     }
     char *copy = copy_text(name);
     if (copy == NULL) {
-        return NULL;
+        return false;
     }
     size_t place = find_position(replay, name);
     struct hal_replay_entry *entry = &replay->entry[place];
     memmove(entry + 1, entry, (replay->entry_count - place) * sizeof *entry);
     *entry = (struct hal_replay_entry){.name = copy, .laser = true};
     replay->entry_count++;
-    return entry;
+    return true;
 }
 
 static bool read_names(struct hal_replay *replay, struct hal_error *error)
@@ -107,12 +110,8 @@ static bool read_names(struct hal_replay *replay, struct hal_error *error)
     struct dirent *item = NULL;
     errno = 0; /* the end and an error differ in it alone */
     while (good && (item = readdir(dir)) != NULL) {
-        if (is_frame_name(replay, item->d_name)) {
-            struct hal_replay_entry *entry = add_entry(replay, item->d_name);
-            good = entry != NULL;
-            if (good) {
-                entry->on_disk = true;
-            }
+        if (hal_replay_is_frame(item->d_name, replay->with_lists)) {
+            good = add_entry(replay, item->d_name);
         }
         errno = 0;
     }
@@ -155,34 +154,21 @@ static bool read_fields(const cJSON *line, struct hal_replay_entry *entry, struc
     return true;
 }
 
-/* The entry that a line names, from now on listed; NULL with *error when there is none to take. */
-static struct hal_replay_entry *claim_entry(struct hal_replay *replay, const cJSON *line,
-                                            struct hal_error *error)
+/* The frame that a line names; NULL with *error when there is no such name. */
+static const char *read_name(const struct hal_replay *replay, const cJSON *line,
+                             struct hal_error *error)
 {
-    const cJSON *file = cJSON_GetObjectItemCaseSensitive(line, "file");
-    if (!cJSON_IsString(file)) {
+    const char *name = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(line, "file"));
+    if (name == NULL) {
         hal_fail(error, "no file, expected the name of a frame");
         return NULL;
     }
-    const char *name = file->valuestring;
-    if (!is_frame_name(replay, name)) {
-        hal_fail(error, "file is \"%.100s\", expected the name of a %s", name, frame_names(replay));
+    if (!hal_replay_is_frame(name, replay->with_lists)) {
+        hal_fail(error, "file is \"%.100s\", expected the name of a frame (%s)", name,
+                 frame_names(replay));
         return NULL;
     }
-    struct hal_replay_entry *entry = find_entry(replay, name);
-    if (entry == NULL) {
-        entry = add_entry(replay, name);
-        if (entry == NULL) {
-            hal_fail(error, "no memory for the list of frames");
-        }
-    } else if (entry->listed) {
-        hal_fail(error, "%.100s was listed before; this line is ignored", name);
-        return NULL;
-    }
-    if (entry != NULL) {
-        entry->listed = true;
-    }
-    return entry;
+    return name;
 }
 
 /* The text may be lost for want of memory; that the entry is bad is not. */
@@ -196,16 +182,23 @@ static void spoil(struct hal_replay_entry *entry, const char *text)
 static bool read_line(struct hal_replay *replay, const cJSON *line, long number,
                       struct hal_error *error)
 {
-    struct hal_replay_entry *entry = claim_entry(replay, line, error);
-    if (entry == NULL) {
+    const char *name = read_name(replay, line, error);
+    if (name == NULL) {
         return false;
     }
-    char message[HAL_ERROR_MAX + 64];
+    struct hal_replay_entry *entry = find_entry(replay, name);
+    if (entry == NULL) {
+        replay->absent_line = replay->absent_count == 0 ? number : replay->absent_line;
+        replay->absent_count++;
+        return true;
+    }
+    if (entry->listed) {
+        return hal_fail(error, "%.100s was listed before; this line is ignored", name);
+    }
+    entry->listed = true;
     if (!read_fields(line, entry, error)) {
+        char message[HAL_ERROR_MAX + 64];
         snprintf(message, sizeof message, LIST_NAME " line %ld: %s", number, error->text);
-        spoil(entry, message);
-    } else if (!entry->on_disk) {
-        snprintf(message, sizeof message, "no such file; listed in " LIST_NAME " line %ld", number);
         spoil(entry, message);
     }
     return true;
@@ -228,6 +221,13 @@ static void read_lines(struct hal_replay *replay, struct hal_lines *lines, const
             log->error(log->context, path, message);
         }
         cJSON_Delete(line);
+    }
+    if (replay->absent_count > 0) {
+        char message[HAL_ERROR_MAX];
+        snprintf(message, sizeof message,
+                 "%zu of its frames are not in this directory, the first in line %ld",
+                 replay->absent_count, replay->absent_line);
+        log->error(log->context, path, message);
     }
 }
 
@@ -272,7 +272,7 @@ static void read_list(struct hal_replay *replay, const struct hal_log *log)
     free(path);
 }
 
-static bool load_image(const char *path, struct hal_frame *frame, struct hal_error *error)
+static bool load_pgm(const char *path, struct hal_frame *frame, struct hal_error *error)
 {
     size_t size = 0;
     struct hal_pgm pgm = {0};
@@ -291,6 +291,25 @@ static bool load_image(const char *path, struct hal_frame *frame, struct hal_err
     frame->bytes_per_sample = pgm.bytes_per_sample;
     frame->maximum = pgm.maximum;
     return true;
+}
+
+static bool load_png(const char *path, struct hal_frame *frame, struct hal_error *error)
+{
+    size_t size = 0;
+    struct hal_png png = {.samples = NULL};
+    uint8_t *bytes = NULL;
+    if (!hal_file_read(path, HAL_PNG_FILE_MAX, &bytes, &size, error)) {
+        return false;
+    }
+    bool good = hal_png_decode(bytes, size, &png, error);
+    free(bytes);
+    frame->samples = png.samples;
+    frame->width = png.width;
+    frame->height = png.height;
+    frame->stride_bytes = png.width * png.bytes_per_sample;
+    frame->bytes_per_sample = png.bytes_per_sample;
+    frame->maximum = png.maximum;
+    return good;
 }
 
 static bool load_points(const char *path, struct hal_frame *frame, struct hal_error *error)
@@ -317,7 +336,8 @@ static bool load_frame(struct hal_replay *replay, const char *name, struct hal_f
         return hal_fail(error, "no memory for this file");
     }
     bool good = has_suffix(name, POINTS_SUFFIX) ? load_points(path, frame, error)
-                                                : load_image(path, frame, error);
+                : has_suffix(name, PNG_SUFFIX)  ? load_png(path, frame, error)
+                                                : load_pgm(path, frame, error);
     free(path);
     return good;
 }
@@ -389,6 +409,5 @@ void hal_replay_close(struct hal_replay *replay)
 
 bool hal_replay_has(const struct hal_replay *replay, const char *name)
 {
-    const struct hal_replay_entry *entry = find_entry(replay, name);
-    return entry != NULL && entry->on_disk;
+    return find_entry(replay, name) != NULL;
 }

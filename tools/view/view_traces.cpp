@@ -148,7 +148,7 @@ std::vector<std::string> Traces::chosen(const std::string &from, size_t max) con
     auto first = paths_.begin();
     if (!from.empty()) {
         fs::path name = from;
-        if (name.extension() == ".pgm" || name.extension() == ".xyz")
+        if (name.extension() == ".pgm" || name.extension() == ".png" || name.extension() == ".xyz")
             name.replace_extension();
         first = std::find_if(paths_.begin(), paths_.end(),
                              [&](const std::string &path) { return fs::path(path).stem() == name; });
