@@ -237,6 +237,8 @@ test)
     need_python numpy python3-numpy
     need_python scipy python3-scipy
     need_program nm binutils
+    need_program c++ g++
+    need_program pkg-config pkg-config
     need_program valgrind valgrind
     need_header libv4l2.h libv4l-dev
     need_header microhttpd.h libmicrohttpd-dev
