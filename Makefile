@@ -99,9 +99,8 @@ test-report: sim ## the report page in a browser; pictures of it in build/test_r
 
 live-pictures: sanitize ## the live view's page in a browser: docs/live.png and docs/live_phone.png anew
 	@tools/setup.sh test-report
-	@cmake --build --preset sanitize --parallel 2 --target live_loop isohead_live
-	@/usr/bin/python3 -B tests/board/live_page.py $(BUILD)/sanitize/tests/live_loop \
-	  $(BUILD)/sanitize/firmware/lib/isohead/isohead_live frames/sequence2 docs
+	@cmake --build --preset sanitize --parallel 2 --target isohead_board
+	@/usr/bin/python3 -B tests/board/live_page.py $(BUILD)/sanitize/firmware/app/isohead_board frames/sequence2 docs
 
 kills: sanitize ## program and guards killed and stopped at random, KILLS times (5000): how long the laser stays on
 	@cmake --build --preset sanitize --parallel 2 --target kills

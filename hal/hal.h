@@ -73,6 +73,8 @@ struct hal_camera {
     bool (*set_exposure)(void *context, int32_t exposure_us, struct hal_error *error);
     /* What the camera says of itself once it is open: 0 when it does not. */
     int32_t (*frame_time_us)(void *context);
+    bool
+        waits; /* no live camera: a frame waits until it is taken, so that none is late or to be skipped */
 };
 
 /* The laser's line, and what speaks against switching it on. */

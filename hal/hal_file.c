@@ -17,6 +17,18 @@ bool hal_file_exists(const char *path)
     return lstat(path, &status) == 0;
 }
 
+enum hal_file_kind hal_file_kind(const char *path)
+{
+    struct stat status;
+    if (stat(path, &status) != 0) {
+        return HAL_FILE_NONE;
+    }
+    if (S_ISDIR(status.st_mode)) {
+        return HAL_FILE_DIRECTORY;
+    }
+    return S_ISCHR(status.st_mode) ? HAL_FILE_CHARACTERS : HAL_FILE_OTHER;
+}
+
 FILE *hal_file_open(const char *path, size_t limit, struct hal_error *error)
 {
     struct stat status;

@@ -14,6 +14,11 @@
 /* Is there anything of this name, be it a link that leads nowhere? */
 bool hal_file_exists(const char *path);
 
+enum hal_file_kind { HAL_FILE_NONE, HAL_FILE_DIRECTORY, HAL_FILE_CHARACTERS, HAL_FILE_OTHER };
+
+/* What a path leads to; none also where nobody can say. */
+enum hal_file_kind hal_file_kind(const char *path);
+
 /* For reading; NULL with *error when that is not possible or it has more bytes than the limit. */
 FILE *hal_file_open(const char *path, size_t limit, struct hal_error *error);
 

@@ -73,12 +73,33 @@ static void init_gpio(struct app_board *board, const struct app_config *config, 
     hal_guard_init(&board->guard, &guard);
 }
 
-/* The camera has to have the rig's size. */
-static bool init_camera(struct app_board *board, const struct app_config *config,
-                        struct hal_error *error)
+static void log_error(void *context, const char *subject, const char *text)
+{
+    struct app_board *board = context;
+    app_log_say(&board->log, APP_LOG_WARNING, "%s: %s", subject, text);
+}
+
+static bool init_directory(struct app_board *board, const struct app_config *config,
+                           struct hal_error *error)
+{
+    const bool goes_on = config->view_port[0] != 0 || config->check;
+    const struct hal_directory_config directory = {
+        .path = config->device,
+        .rate_mhz = config->rate_mhz,
+        .repeats =
+            config->repeat == APP_REPEAT_ON || (config->repeat == APP_REPEAT_AUTO && goes_on),
+    };
+    const struct hal_log log = {board, log_error};
+    return hal_directory_init(&board->directory, &directory, &log, error);
+}
+
+/* The camera has to have the rig's size. False: what is wrong is in the log. */
+static bool init_camera(struct app_board *board, const struct app_config *config)
 {
     struct ih_calibration calibration;
-    if (!app_rig_load(config->rig, &calibration, error)) {
+    struct hal_error error;
+    if (!app_rig_load(config->rig, &calibration, &error)) {
+        fail(board, config->rig, &error, APP_EXIT_USAGE);
         return false;
     }
     const struct hal_v4l2_config v4l2 = {
@@ -91,7 +112,18 @@ static bool init_camera(struct app_board *board, const struct app_config *config
         .gain = gain_of(config),
     };
     hal_v4l2_init(&board->v4l2, &v4l2);
+    if (config->is_directory && !init_directory(board, config, &error)) {
+        fail(board, config->device, &error, APP_EXIT_USAGE);
+        return false;
+    }
     return true;
+}
+
+static void free_camera(struct app_board *board, const struct app_config *config)
+{
+    if (config->is_directory) {
+        hal_directory_free(&board->directory);
+    }
 }
 
 static bool open_output(struct app_board *board, const struct app_config *config,
@@ -132,7 +164,7 @@ static bool open_viewer(struct app_board *board, const struct app_config *config
 static enum app_exit run_loop(struct app_board *board, const struct app_config *config)
 {
     const struct hal_events_config events = {
-        .camera_fd = &board->v4l2.fd,
+        .camera_fd = config->is_directory ? &board->directory.fd : &board->v4l2.fd,
         .interlock_fd = &board->gpio.interlock_fd,
         .signal_fd = &board->signals.fd,
     };
@@ -141,7 +173,7 @@ static enum app_exit run_loop(struct app_board *board, const struct app_config *
     board->state.log = &board->log;
     board->state.head = &board->head;
     board->state.hal = (struct app_hal){
-        .camera = &board->v4l2.camera,
+        .camera = config->is_directory ? &board->directory.camera : &board->v4l2.camera,
         .strobe = &board->guard.strobe,
         .events = &board->events.events,
         .clock = &hal_clock,
@@ -207,19 +239,25 @@ static enum app_exit run_with_view(struct app_board *board, const struct app_con
     return exit;
 }
 
-enum app_exit app_board_run(struct app_board *board, const struct app_config *config)
+static enum app_exit run_with_camera(struct app_board *board, const struct app_config *config)
 {
     struct hal_error error;
-    enum app_exit exit = APP_EXIT_FAILED;
+    if (!open_output(board, config, &error)) {
+        return fail(board, "output", &error, APP_EXIT_FAILED);
+    }
+    enum app_exit exit = run_with_view(board, config);
+    hal_output_close(&board->output);
+    return exit;
+}
+
+enum app_exit app_board_run(struct app_board *board, const struct app_config *config)
+{
+    enum app_exit exit = APP_EXIT_USAGE;
     open_log(board, config);
     init_gpio(board, config, false);
-    if (!init_camera(board, config, &error)) {
-        exit = fail(board, config->rig, &error, APP_EXIT_USAGE);
-    } else if (!open_output(board, config, &error)) {
-        exit = fail(board, "output", &error, APP_EXIT_FAILED);
-    } else {
-        exit = run_with_view(board, config);
-        hal_output_close(&board->output);
+    if (init_camera(board, config)) {
+        exit = run_with_camera(board, config);
+        free_camera(board, config);
     }
     hal_log_close(&board->writer);
     return exit;

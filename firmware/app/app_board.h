@@ -12,6 +12,7 @@
 #include "app_log.h"
 #include "app_loop.h"
 #include "linux/hal_clock.h"
+#include "linux/hal_directory.h"
 #include "linux/hal_events.h"
 #include "linux/hal_gpio.h"
 #include "linux/hal_guard.h"
@@ -39,6 +40,7 @@ struct app_board {
     struct hal_viewer_process viewer;
     struct hal_gpio gpio;
     struct hal_v4l2 v4l2;
+    struct hal_directory directory; /* in place of v4l2, where the device is one */
     struct app_log log;
     struct app_state state;
     struct hal_output_state output;

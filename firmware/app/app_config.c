@@ -321,9 +321,28 @@ static void check_lines(struct reader *reader)
            "the interlock-line too, expected another line");
 }
 
+/* A device that is not there may be plugged in later. */
+static void check_device(struct reader *reader)
+{
+    struct app_config *config = reader->config;
+    enum hal_file_kind kind = hal_file_kind(config->device);
+    config->is_directory = kind == HAL_FILE_DIRECTORY;
+    demand(reader, kind != HAL_FILE_OTHER, "device",
+           "neither a camera nor a directory, expected /dev/videoN or a directory with frames");
+    demand(reader, !config->is_directory || !config->laser, "laser",
+           "on, but the device is a directory, expected laser off: old frames show nothing of what "
+           "the laser does");
+    if (config->is_directory && config->rig == NULL) {
+        snprintf(config->directory_rig, sizeof config->directory_rig, "%s/rig.json",
+                 config->device);
+        config->rig = config->directory_rig;
+    }
+}
+
 static void check(struct reader *reader)
 {
     const struct app_config *config = reader->config;
+    check_device(reader);
     demand(reader, config->rig != NULL, "rig",
            "missing, expected the file with the calibration; --help lists all settings");
     demand(reader, !config->laser || config->laser_line != NULL, "laser",

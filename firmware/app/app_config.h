@@ -39,6 +39,12 @@ enum app_gain {
     APP_GAIN_FIXED, /* gain_value, in the camera's own unit */
 };
 
+enum app_repeat {
+    APP_REPEAT_AUTO, /* with a live view, and for --check */
+    APP_REPEAT_ON,
+    APP_REPEAT_OFF,
+};
+
 enum app_strobe {
     APP_STROBE_ALWAYS,      /* on while frames come */
     APP_STROBE_GATED,       /* on for the exposure of each frame */
@@ -58,10 +64,12 @@ enum app_messages {
 
 /* Texts are NULL where a setting is not given and no default is named here. */
 struct app_config {
-    const char *rig;    /* file; never NULL after success without laser_off, help or version */
-    const char *device; /* default /dev/video0 */
-    const char *format; /* auto (default), GREY, Y10, ..., convert */
-    int32_t rate_mhz;   /* frames per 1000 s, 1000 .. 1000000; default 0: as the camera is set */
+    const char *rig;        /* file; never NULL after success without laser_off, help or version */
+    const char *device;     /* default /dev/video0 */
+    bool is_directory;      /* the device is one, with frames; the laser is not enabled then */
+    enum app_repeat repeat; /* a directory's frames */
+    const char *format;     /* auto (default), GREY, Y10, ..., convert */
+    int32_t rate_mhz; /* frames per 1000 s, 1000 .. 1000000; default 0: as the camera is set */
     enum app_exposure exposure;
     int32_t exposure_us; /* 1 .. 1000000 with APP_EXPOSURE_FIXED, else 0 */
     enum app_gain gain;
@@ -97,7 +105,8 @@ struct app_config {
     bool check;       /* say whether the rig still fits and end */
     bool help, version;
 
-    char text[APP_CONFIG_TEXT_MAX + 1]; /* of the file */
+    char directory_rig[APP_CONFIG_VALUE_MAX + sizeof "/rig.json"]; /* where rig is not given */
+    char text[APP_CONFIG_TEXT_MAX + 1];                            /* of the file */
 };
 
 /* False: something was wrong and reported in errors, subject "FILE:LINE", "FILE" or "command line".

@@ -127,6 +127,19 @@ static void show(struct app_state *state, const struct hal_frame *frame)
     }
 }
 
+/* Labels may move the rig's lines. Frames without a record must not, so that a recording of the others gives the same. */
+static void remember_rig(struct app_state *state)
+{
+    state->align_before = state->head->align;
+    state->rig_before = state->head->rig;
+}
+
+static void recall_rig(const struct app_state *state)
+{
+    state->head->align = state->align_before;
+    state->head->rig = state->rig_before;
+}
+
 /* A lit frame whose labels are there. began_us: when it was taken from the camera. */
 static void use_lit(struct app_state *state, const struct hal_frame *frame, int64_t began_us)
 {
@@ -136,6 +149,7 @@ static void use_lit(struct app_state *state, const struct hal_frame *frame, int6
     if (is_fresh) {
         struct ih_frame view = app_view_of(frame);
         struct ih_frame ambient = app_view_of(&state->ambient);
+        recall_rig(state);
         enum ih_err err = isohead_label(head, &view, &ambient);
         if (err != IH_OK) {
             lose_frame(state, frame->name, ih_err_text(err));
@@ -155,7 +169,8 @@ static void use_lit(struct app_state *state, const struct hal_frame *frame, int6
 /* Give the frame back, or hold it as the ambient one. */
 static void use_dark(struct app_state *state, const struct hal_frame *frame)
 {
-    bool wanted = state->config->strobe == APP_STROBE_ALTERNATING && !state->light_wanted;
+    bool wanted = !state->config->laser ||
+                  (state->config->strobe == APP_STROBE_ALTERNATING && !state->light_wanted);
     if (!wanted) {
         skip_frame(state, frame);
         return;
@@ -168,9 +183,10 @@ static void use_dark(struct app_state *state, const struct hal_frame *frame)
     wish_light(state, true);
 }
 
-static enum app_phase_verdict judge(struct app_state *state)
+/* Without a laser of ours the camera knows, or all are lit by something else. */
+static enum app_phase_verdict judge(struct app_state *state, const struct hal_frame *frame)
 {
-    enum app_phase_verdict verdict = APP_PHASE_LIT;
+    enum app_phase_verdict verdict = frame->laser ? APP_PHASE_LIT : APP_PHASE_DARK;
     if (state->config->laser) {
         verdict = app_phase_judge(&state->phase, state->head->labels.labelled_count,
                                   state->config->strobe != APP_STROBE_ALWAYS, state->on_frames);
@@ -184,11 +200,13 @@ static void use_frame(struct app_state *state, const struct hal_frame *frame)
 {
     const enum app_strobe strobe = state->config->strobe;
     int64_t began_us = app_state_now_us(state);
-    switch (judge(state)) {
+    switch (judge(state, frame)) {
     case APP_PHASE_DARK:
+        recall_rig(state);
         use_dark(state, frame);
         break;
     case APP_PHASE_PARTIAL:
+        recall_rig(state);
         skip_frame(state, frame);
         break;
     case APP_PHASE_LIT:
@@ -240,6 +258,7 @@ void app_frame_use(struct app_state *state, const struct hal_frame *frame)
         skip_frame(state, frame);
         return;
     }
+    remember_rig(state);
     enum ih_err err = isohead_label(state->head, &view, NULL);
     if (err != IH_OK) {
         app_view_explain(frame, &state->head->rig.calibration, err, &error);

@@ -163,11 +163,22 @@ static void note_frame(struct app_state *state)
 {
     int64_t now_us = app_state_now_us(state);
     bool is_late = now_us - state->frame_us > APP_LASER_SILENT_FRAMES * state->frame_time_us;
-    if (state->sequence >= 0 && is_late) {
+    if (state->sequence >= 0 && is_late && !state->hal.camera->waits) {
         state->live.strobe = "late";
     }
     state->frame_us = now_us;
     state->retry_wait_us = APP_LOOP_RETRY_MIN_US;
+}
+
+/* A camera that is gone may come back; the end of a directory is that of the program. */
+static void end_frames(struct app_state *state, enum hal_next next, const char *why)
+{
+    if (next == HAL_NEXT_GONE) {
+        lose_camera(state, why);
+    } else {
+        app_log_say(state->log, APP_LOG_INFO, "%s: no more frames", state->config->device);
+        app_state_end(state, APP_EXIT_GOOD);
+    }
 }
 
 /* The newest frame that waits, or what is wrong. */
@@ -178,7 +189,8 @@ static void take_frames(struct app_state *state)
     struct hal_frame newest = {.samples = NULL};
     bool has_newest = false;
     enum hal_next next = HAL_NEXT_FRAME;
-    for (int i = 0; i < APP_LOOP_DRAIN_MAX && next != HAL_NEXT_NONE && state->is_streaming; i++) {
+    const int drain_max = camera->waits ? 1 : APP_LOOP_DRAIN_MAX;
+    for (int i = 0; i < drain_max && next != HAL_NEXT_NONE && state->is_streaming; i++) {
         struct hal_frame frame;
         next = camera->next(camera->context, &frame, &error);
         if (next == HAL_NEXT_GONE || next == HAL_NEXT_END) {
@@ -202,7 +214,7 @@ static void take_frames(struct app_state *state)
         if (has_newest) {
             camera->release(camera->context, &newest);
         }
-        lose_camera(state, next == HAL_NEXT_GONE ? error.text : "no more frames");
+        end_frames(state, next, error.text);
     } else if (has_newest) {
         app_laser_busy(&state->laser, true, app_state_now_us(state));
         app_frame_use(state, &newest);

@@ -48,7 +48,7 @@ int main(int argument_count, char **arguments)
         } else {
             puts("isohead_board " ISOHEAD_VERSION);
         }
-        if (fflush(stdout) != 0) {
+        if (fflush(stdout) != 0 || ferror(stdout)) {
             perror("isohead_board: standard output");
             return APP_EXIT_FAILED;
         }

@@ -76,6 +76,7 @@ static void put_choice(const struct app_setting *setting, struct app_config *con
     _Static_assert(sizeof(enum app_gain) == sizeof choice, "");
     _Static_assert(sizeof(enum app_strobe) == sizeof choice, "");
     _Static_assert(sizeof(enum app_messages) == sizeof choice, "");
+    _Static_assert(sizeof(enum app_repeat) == sizeof choice, "");
     memcpy(place_of(config, setting->offset), &choice, sizeof choice);
 }
 
@@ -223,6 +224,7 @@ static bool take_output(const struct app_setting *setting, struct app_config *co
 static const char *const format_words[] = {"auto", "GREY", "Y10",  "Y10P",    "Y12", "Y12P",
                                            "Y16",  "YUYV", "UYVY", "convert", NULL};
 static const char *const exposure_words[] = {"auto", "keep", "steer", NULL};
+static const char *const repeat_words[] = {"auto", "on", "off", NULL};
 static const char *const gain_words[] = {"auto", "keep", NULL};
 static const char *const strobe_words[] = {"always", "gated", "alternating", NULL};
 static const char *const log_words[] = {"stderr", "syslog", NULL};
@@ -232,10 +234,18 @@ static const char *const log_words[] = {"stderr", "syslog", NULL};
 #define LINE "the name of a line or its offset"
 
 const struct app_setting app_settings[] = {
-    {"rig", "FILE", "a file", "the calibrated rig, rig.json; must be given", .take = take_text,
-     .offset = AT(rig), .heading = "Camera"},
-    {"device", "PATH", "a device", "the camera; default /dev/video0", .take = take_text,
-     .offset = AT(device)},
+    {"rig", "FILE", "a file",
+     "the calibrated rig, rig.json; must be given, but for a directory that has one",
+     .take = take_text, .offset = AT(rig), .heading = "Camera"},
+    {"device", "PATH", "a device or a directory",
+     "the camera, default /dev/video0; or a directory with frames, which come at their own times, "
+     "or at the rate; "
+     "no laser then",
+     .take = take_text, .offset = AT(device)},
+    {"loop", NULL, "auto, on or off",
+     "a directory's frames again and again: on; off, once; auto, the default, on with --view and "
+     "--check",
+     .take = take_choice, .offset = AT(repeat), .words = repeat_words},
     {"format", "NAME", "auto, GREY, Y10, Y10P, Y12, Y12P, Y16, YUYV, UYVY or convert",
      "how the camera sends its samples: GREY, Y10, Y10P, Y12, Y12P, Y16, YUYV, UYVY, or convert, "
      "grey from what else it has; default auto, the best of them that it has",

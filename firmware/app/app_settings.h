@@ -28,7 +28,7 @@ struct app_setting {
     enum app_settings_place place;
 };
 
-#define APP_SETTINGS_COUNT 27
+#define APP_SETTINGS_COUNT 28
 extern const struct app_setting app_settings[];
 
 /* Index of a setting, or -1. */

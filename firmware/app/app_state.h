@@ -67,6 +67,9 @@ struct app_state {
     int64_t sequence; /* of the last frame; -1: none */
     bool has_ambient;
     struct hal_frame ambient; /* held */
+    /* Before a frame was judged: what that changed is undone where the frame is not used as it was judged. */
+    struct ih_align align_before;
+    struct ih_rig rig_before;
     struct ih_exposure exposure;
     bool steers;                 /* the exposure */
     struct app_record_live live; /* since the last record */

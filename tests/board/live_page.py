@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
 """The live view's page in a browser, on a desk and on a phone: does it show what the board sees?
 
-live_page.py LIVE_LOOP ISOHEAD_LIVE FRAMES [PICTURES]      exit status 1 if something is wrong
+live_page.py ISOHEAD_BOARD FRAMES [PICTURES]      exit status 1 if something is wrong
 
 PICTURES: a folder for live.png and live_phone.png, of one frame that has something of everything.
 """
 
 import os
+import socket
 import subprocess
 import sys
 import tempfile
@@ -93,21 +94,24 @@ def watch(browser, url, pictures):
 
 
 def main():
-    live_loop, isohead_live, source = sys.argv[1:4]
-    pictures = sys.argv[4] if len(sys.argv) > 4 else None
+    program, source = sys.argv[1:3]
+    pictures = sys.argv[3] if len(sys.argv) > 3 else None
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        port = free.getsockname()[1]
     with tempfile.TemporaryDirectory() as work:
         folder = os.path.join(work, "frames")
         os.makedirs(folder)
         frames_of(source, folder)
-        loop = subprocess.Popen([live_loop, folder, "0", str(RATE), isohead_live, "0"], stdin=subprocess.PIPE,
+        loop = subprocess.Popen([program, "--device", folder, "--rate", str(RATE), "--view", str(port)],
                                 stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
         try:
-            url = loop.stderr.readline().strip()
+            url = loop.stderr.readline().split("live view: ")[1].strip()
             with Browser(work) as browser:
                 watch(browser, url, pictures)
             strange = [request for request in browser.requests if not request.startswith((url, "data:", "about:"))]
             check(not strange, f"requests elsewhere: {strange}")
             check(not browser.errors, f"errors: {browser.errors}")
+            loop.terminate()
             messages = loop.communicate()[1]
             check(loop.returncode == 0, f"the loop's end: {messages}")
         finally:

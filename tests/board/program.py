@@ -2,17 +2,21 @@
 """isohead_board on a machine without a board: its options, what is wrong with its files and devices, its ends and their
 exit statuses.
 
-program.py ISOHEAD_BOARD RIG_JSON      exit status 1 if something is wrong
+program.py ISOHEAD_BOARD HOST_SIM RENDER FRAMES      exit status 1 if something is wrong
 """
 
+import json
 import os
 import re
+import shutil
 import signal
 import socket
 import subprocess
 import sys
 import tempfile
 import time
+
+from frames import Frames, as_of_host, moved_rig
 
 # hal_serve.h, app_health.h; on a machine under load everything may take longer.
 CHECK_S, SOON_S = 15, 60
@@ -94,8 +98,9 @@ def check_laser():
 
 def end(number, *options, until="trying again", **more):
     """Started, ended by the signal once it says so; exit status, standard error."""
+    more = {"stdout": subprocess.PIPE} | more
     with subprocess.Popen([program, "--rig", rig, "--device", "/nowhere/video0", *options], stdin=subprocess.DEVNULL,
-                          stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **more) as process:
+                          stderr=subprocess.PIPE, text=True, **more) as process:
         text = ""
         while until not in text:
             line = process.stderr.readline()
@@ -141,6 +146,79 @@ def check_check():
     check(time.monotonic() - begin >= CHECK_S, "--check did not wait for the camera")
 
 
+def records_of_host(directory, *options):
+    return subprocess.run([host_sim, "--json", *options, directory], stdout=subprocess.PIPE, text=True, check=False).stdout.splitlines()
+
+
+def same_as_host(directory, *options):
+    """With this directory as its camera, every record is host_sim's, and the end is good."""
+    done = run("--device", directory, "--rate", "1000", *options)
+    check(done.returncode == 0, f"{directory}: status {done.returncode}: {done.stderr}")
+    found = [as_of_host(line) for line in done.stdout.splitlines()]
+    check(found and found == records_of_host(directory, *options), f"{directory} {options}: other records than host_sim's")
+
+
+def rendered(name, *options):
+    path = os.path.join(work, name)
+    subprocess.run([render, *options, path], check=True, stdout=subprocess.DEVNULL)
+    return path
+
+
+def small_directory(name, *contents):
+    """Frames that are no pictures of anything, with the rig."""
+    path = os.path.join(work, name)
+    os.makedirs(path)
+    shutil.copy(rig, path)
+    for number, content in enumerate(contents):
+        with open(os.path.join(path, f"take{number}.pgm"), "wb") as file:
+            file.write(content)
+    return path
+
+
+BLACK = b"P5 752 582 255\n" + bytes(752 * 582)
+
+
+def check_directory():
+    """Frames from a directory: records as host_sim's, again and again, never with a laser; what is no camera at all."""
+    same_as_host(frames)
+    alternating = rendered("alternating", "--sequence", "2", "--seed", "3", "--laser", "alternate", "--frames", "40")
+    same_as_host(alternating)
+    moved = moved_rig(Frames(alternating, "moved"), os.path.join(work, "moved.json"))
+    same_as_host(alternating, "--rig", moved)
+    taken = small_directory("taken", BLACK, BLACK[:1000], b"P5 2 2 255\nxxxx")
+    done = run("--device", taken)
+    lines = [json.loads(line) for line in done.stdout.splitlines()]
+    check([line["file"] for line in lines] == ["000000.pgm", "000001.pgm", "000002.pgm"], f"names: {done.stdout}")
+    check("error" not in lines[0] and "take1.pgm: " in lines[1]["error"] and "2x2 px" in lines[2]["error"], f"errors: {done.stdout}")
+    check(done.returncode == 0 and "no more frames" in done.stderr, f"its end: {done.returncode}: {done.stderr}")
+    out = os.path.join(work, "out")
+    with open(out, "wb") as file:
+        status, text = end(signal.SIGTERM, "--device", taken, "--loop", "--rate", "1000", "--status", "1", until="bad", stdout=file)
+    with open(out, "rb") as file:
+        lines = [json.loads(line) for line in file]
+    times = [line["time_us"] for line in lines if "time_us" in line]
+    check(status == 0 and len(lines) > 6 and [line["file"] for line in lines] == [f"{i:06}.pgm" for i in range(len(lines))],
+          f"again and again: status {status}, {len(lines)} records: {text}")
+    check(times == [120000 * i for i in range(len(times))], f"times of the passes: {times[:9]}")
+    laser = ["--laser", "--gpio-chip", "/nowhere/gpiochip0", "--laser-line", "3"]
+    expect(2, "--laser: on, but the device is a directory", "--device", frames, *laser)
+    expect(2, "no frames", "--device", small_directory("none"))
+    expect(2, "rig.json: No such file", "--device", work)
+    fifo = os.path.join(work, "fifo")
+    os.mkfifo(fifo)
+    for path in (rig, fifo):
+        expect(2, "--device: neither a camera nor a directory", "--device", path, "--rig", rig)
+
+
+def check_answers():
+    """--check's answers, each with its status, on frames from a directory."""
+    expect(0, "checked 60 frames, it fits", "--check", "--device", frames, "--rate", "1000")
+    moved = moved_rig(Frames(frames, "moved"), os.path.join(work, "moved.json"))
+    expect(1, "checked 60 frames, it has moved", "--check", "--device", frames, "--rate", "1000", "--rig", moved)
+    expect(1, "ended after 50 of 60", "--check", "--device", frames, "--rate", "1000", "--loop=off")
+    expect(1, "cannot be determined: of 0 dots", "--check", "--device", small_directory("black", BLACK), "--rate", "1000")
+
+
 def check_modes():
     """Settings that only the camera would see: they are taken."""
     for options in (["--exposure", "auto", "--gain", "auto"], ["--exposure", "500", "--gain", "7"], ["--exposure", "keep", "--gain", "keep"],
@@ -150,13 +228,14 @@ def check_modes():
 
 
 def main():
-    for part in (check_usage, check_outputs, check_laser, check_ends, check_check, check_modes):
+    for part in (check_usage, check_outputs, check_laser, check_ends, check_check, check_directory, check_answers, check_modes):
         part()
     print(f"isohead_board without a board: {len(failures)} failures")
     return 1 if failures else 0
 
 
 if __name__ == "__main__":
-    program, rig = [os.path.abspath(path) for path in sys.argv[1:]]
+    program, host_sim, render, frames = [os.path.abspath(path) for path in sys.argv[1:]]
+    rig = os.path.join(frames, "rig.json")
     with tempfile.TemporaryDirectory() as work:
         sys.exit(main())

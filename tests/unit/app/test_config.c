@@ -400,7 +400,7 @@ static void all_errors_of_a_file_are_reported(void)
     assert_error(1, PATH ":3: unknown key \"rte\", perhaps \"rate\" is meant");
     assert_error(2, PATH ":5: laser: a second time, after line 4, expected once");
     assert_error(3, PATH ":6: \"foo\", expected \"key = value\"");
-    assert_error(4, PATH ":7: device: empty, expected a device");
+    assert_error(4, PATH ":7: device: empty, expected a device or a directory");
     assert_error(5, PATH ":8: help: in a file, expected on the command line only");
     assert_error(6, PATH ":9: unknown key \"something-else\", --help lists all");
     assert_error(7, PATH ":10: unknown key \"\", --help lists all");
@@ -576,6 +576,33 @@ static void what_does_not_go_together_is_reported(void)
     TEST_ASSERT_FALSE(READ("--device=x"));
     assert_one_error("command line: --rig: missing, expected the file with the calibration; --help "
                      "lists all settings");
+}
+
+/* Frames from a directory: with its rig, never with the laser; a device that is not there may come later. */
+static void a_device_may_be_a_directory(void)
+{
+    TEST_ASSERT_TRUE(READ("--device=/tmp"));
+    TEST_ASSERT_TRUE(config.is_directory);
+    TEST_ASSERT_EQUAL_STRING("/tmp/rig.json", config.rig);
+    TEST_ASSERT_EQUAL_INT(APP_REPEAT_AUTO, config.repeat);
+    TEST_ASSERT_TRUE(READ("--device=/tmp", "--rig=r", "--loop"));
+    TEST_ASSERT_EQUAL_STRING("r", config.rig);
+    TEST_ASSERT_EQUAL_INT(APP_REPEAT_ON, config.repeat);
+    TEST_ASSERT_TRUE(READ("--device=/tmp", "--loop=off"));
+    TEST_ASSERT_EQUAL_INT(APP_REPEAT_OFF, config.repeat);
+    TEST_ASSERT_FALSE(READ("--device=/tmp", "--laser", "--gpio-chip=c", "--laser-line=3"));
+    assert_one_error(
+        "command line: --laser: on, but the device is a directory, expected laser off: old frames "
+        "show nothing of what the laser does");
+    write_file("rig = r\n", 8);
+    TEST_ASSERT_FALSE(READ("--rig=r", "--device=" PATH));
+    assert_one_error("command line: --device: neither a camera nor a directory, expected "
+                     "/dev/videoN or a directory "
+                     "with frames");
+    TEST_ASSERT_TRUE(READ("--rig=r", "--device=/dev/null"));
+    TEST_ASSERT_FALSE(config.is_directory);
+    TEST_ASSERT_TRUE(READ("--rig=r", "--device=/nowhere/video0"));
+    TEST_ASSERT_FALSE(config.is_directory);
 }
 
 #define LINE "gpio-chip = c\nlaser-line = 3\nlaser-active-low = on\n"
@@ -814,6 +841,7 @@ int main(void)
     RUN_TEST(options_are_checked_too);
     RUN_TEST(files_that_are_none_are_reported);
     RUN_TEST(what_does_not_go_together_is_reported);
+    RUN_TEST(a_device_may_be_a_directory);
     RUN_TEST(laser_off_knows_the_line_or_says_so);
     RUN_TEST(help_tells_every_setting_in_80_columns);
     RUN_TEST(the_nearest_name_is_found);
