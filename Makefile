@@ -32,10 +32,10 @@ OUT ?= $(BUILD)/people/$(RIG)_$(KIND)_$(SEED)
 # Frames of make longrun; make test takes a few hundred.
 LONGRUN_FRAMES ?= 100000
 # What the board's program is built for: arm64, armhf or host.
+ARCH ?= arm64
 # Where make install puts things; DESTDIR stands before it.
 PREFIX ?= /usr/local
 DESTDIR ?=
-ARCH ?= arm64
 
 .DEFAULT_GOAL := help
 .PHONY: help sim install frames sanitize test check unit kills fuzz coverage ranges exhaustive mutation accept eval misaligned \
@@ -60,13 +60,13 @@ sim: ## build host_sim, and render frames/ if they are not there
 
 frames: frames/sequence1/rig.json frames/sequence2/rig.json
 
-# rig.json is written last: it stands for the whole directory.
 install: ## install libraries, headers, CMake and pkg-config files, host_sim: PREFIX=/usr/local DESTDIR=
 	@tools/setup.sh sim
 	@cmake --preset install -DCMAKE_INSTALL_PREFIX=$(PREFIX) > $(BUILD)/install.log 2>&1 || { cat $(BUILD)/install.log; exit 1; }
 	@cmake --build --preset install --parallel 2
 	@DESTDIR=$(DESTDIR) cmake --install $(BUILD)/install
 
+# rig.json is written last: it stands for the whole directory.
 frames/sequence%/rig.json:
 	@mkdir -p frames
 	@$(BUILD)/host/tools/render/render --sequence $* --seed $* frames/sequence$*
