@@ -114,6 +114,7 @@ function draw() {
   if (canvas.width !== last.width || canvas.height !== last.height) {
     canvas.width = last.width;
     canvas.height = last.height;
+    canvas.style.setProperty("--ratio", `${last.width / last.height}`);
   }
   // A pixel of the screen in pixels of the frame, so that lines are as thick on a phone.
   const unit = Math.max(1, canvas.width / (canvas.clientWidth || canvas.width));

@@ -22,7 +22,7 @@ from browser import Browser
 devtools.TIMEOUT_S = 180
 # Frames of sequence 2: a hand comes before the face. Slow enough for a picture to be taken of one.
 SHOWN, WANTED, RATE = range(16, 25), "000022.pgm", 2
-SCREENS = {"live": (640, 800, 1, False), "live_phone": (360, 780, 1, True)}  # width, height, scale, phone
+SCREENS = {"live": (1280, 800, 1, False), "live_phone": (360, 780, 1, True)}  # width, height, scale, phone
 COLOURS = {"heads": 0xffb000, "dots": 0xff3d9a, "contours": 0x35c2ff, "others": 0xff8a5c}  # app_live.css
 # Pixels of the canvas that are nearly of a colour.
 COUNT = """(() => { const c = document.getElementById("picture"); let count = 0;
@@ -46,7 +46,7 @@ def frames_of(source, folder):
         os.symlink(os.path.join(os.path.abspath(source), name), os.path.join(folder, name))
 
 
-def check_screen(browser, name, width):
+def check_screen(browser, name, width, height):
     head, dots, rate, state = (browser.value(TEXT % id) for id in ("head", "dots", "rate", "state"))
     check(head.count("mm") >= 2 and "score" in head, f"{name}: head: {head}")
     check("of 361 labelled" in dots and int(dots.split(",")[0]) > 200, f"{name}: dots: {dots}")
@@ -55,6 +55,8 @@ def check_screen(browser, name, width):
     check("frames/s on the board" in rate and state == "live", f"{name}: rate: {rate}; state: {state}")
     needs = browser.value("document.documentElement.scrollWidth")
     check(needs <= width, f"{name}: {needs} pixels wide, the screen {width}")
+    bottoms = browser.value('["head", "picture"].map((id) => document.getElementById(id).getBoundingClientRect().bottom)')
+    check(max(bottoms) <= height, f"{name}: the answer ends at {bottoms[0]}, the picture at {bottoms[1]}, the screen at {height}")
     label = browser.value('document.getElementById("picture").getAttribute("aria-label")')
     check(label.startswith("camera image; head: "), f"{name}: a screen reader reads: {label}")
 
@@ -89,7 +91,7 @@ def watch(browser, url, pictures):
         stand(browser, there)
         if pictures:
             browser.screenshot(os.path.join(pictures, name + ".png"), "main")
-        check_screen(browser, name, width)
+        check_screen(browser, name, width, height)
         check_boxes(browser, name)
 
 
