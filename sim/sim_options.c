@@ -10,6 +10,7 @@ enum {
     OPTION_RIG,
     OPTION_TRACE,
     OPTION_REPORT,
+    OPTION_AGAINST,
     OPTION_WITHOUT,
     OPTION_HELP,
     OPTION_VERSION
@@ -21,6 +22,7 @@ static const struct option table[] = {
     {"rig", required_argument, NULL, OPTION_RIG},
     {"trace", required_argument, NULL, OPTION_TRACE},
     {"report", required_argument, NULL, OPTION_REPORT},
+    {"against", required_argument, NULL, OPTION_AGAINST},
     {"without", required_argument, NULL, OPTION_WITHOUT},
     {"help", no_argument, NULL, OPTION_HELP}, /* and -h */
     {"version", no_argument, NULL, OPTION_VERSION},
@@ -62,6 +64,9 @@ static bool take(struct sim_options *options, int option)
     case OPTION_REPORT:
         options->report = optarg;
         break;
+    case OPTION_AGAINST:
+        options->against = optarg;
+        break;
     case OPTION_WITHOUT:
         return take_without(options, optarg);
     case OPTION_HELP:
@@ -98,6 +103,11 @@ bool sim_options_parse(struct sim_options *options, int argument_count, char **a
             return false;
         }
     }
+    if (options->against != NULL && options->report == NULL) {
+        return refuse("--against needs the page that it is for: --report FILE", "");
+    }
+    options->words = arguments;
+    options->word_count = argument_count;
     options->dirs = arguments + optind;
     options->dir_count = argument_count - optind;
     if (options->dir_count == 0 && !options->help && !options->version) {
@@ -118,6 +128,7 @@ void sim_options_help(void)
           "  --rig FILE     this rig file instead of DIR/rig.json\n"
           "  --trace OUT    also write every stage's results of each frame under OUT\n"
           "  --report FILE  also write a page for a browser that explains each frame\n"
+          "  --against FILE and in it what another run said, its --json in FILE\n"
           "  --without PART[,PART...]  leave out parts of the method:\n"
           "                 ambient   frames without laser help nothing\n"
           "                 scan      no candidates from the model scan\n"

@@ -17,9 +17,12 @@ struct sim_options {
     bool paper;       /* the paper's method alone */
     uint32_t without; /* parts that are left out, sim_without.h */
     bool help, version;
-    const char *rig;    /* NULL: DIR/rig.json */
-    const char *trace;  /* NULL: none */
-    const char *report; /* NULL: none */
+    const char *rig;     /* NULL: DIR/rig.json */
+    const char *trace;   /* NULL: none */
+    const char *report;  /* NULL: none */
+    const char *against; /* records of another run, for the report; NULL: none */
+    char **words;        /* the command line, options first */
+    int word_count;
     char **dirs;
     int dir_count; /* at least 1, unless help or version is asked for */
 };

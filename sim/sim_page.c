@@ -10,6 +10,7 @@
 #include <zlib.h>
 
 #include "app_write.h"
+#include "replay/hal_lines.h"
 #include "sim_page_parts.h"
 #include "sim_report.h"
 #include "sim_table.h"
@@ -217,7 +218,80 @@ static void write_limits(struct app_write *write, const struct ih_tracks_params 
     app_write_close(write, '}');
 }
 
-void sim_page_dir(struct sim_page *page, const struct sim_dir *dir, const struct isohead *head)
+/* A record of the other run as it is compared; what makes none goes to the report. */
+static void put_other(struct sim_page *page, const cJSON *record)
+{
+    char *text = cJSON_PrintUnformatted(record);
+    if (text == NULL) {
+        sim_report_grow(NULL, SIZE_MAX, 1); /* there is no memory */
+    }
+    begin(page, "class=\"other\"");
+    take_json(page->file, text, strlen(text));
+    end(page);
+    cJSON_free(text);
+}
+
+static bool is_record(const cJSON *line)
+{
+    return cJSON_IsString(cJSON_GetObjectItemCaseSensitive(line, "file")) &&
+           (cJSON_IsArray(cJSON_GetObjectItemCaseSensitive(line, "hypotheses")) ||
+            cJSON_IsString(cJSON_GetObjectItemCaseSensitive(line, "error")));
+}
+
+static void put_others(struct sim_page *page, const char *path, struct sim_report *report)
+{
+    struct hal_lines lines;
+    struct hal_error error;
+    cJSON *line = NULL;
+    enum hal_lines_next next = HAL_LINES_END;
+    if (!hal_lines_open(&lines, path, &error)) {
+        sim_report_error(report, path, "%s", error.text);
+        return;
+    }
+    while ((next = hal_lines_next(&lines, &line, &error)) != HAL_LINES_END) {
+        if (next == HAL_LINES_BAD) {
+            sim_report_error(report, path, "%s", error.text);
+            continue;
+        }
+        if (is_record(line)) {
+            put_other(page, line);
+        } else {
+            sim_report_error(report, path,
+                             "line %ld: no record, expected a line of host_sim --json",
+                             lines.number);
+        }
+        cJSON_Delete(line);
+    }
+    hal_lines_close(&lines);
+}
+
+void sim_page_run(struct sim_page *page, const struct sim_options *options,
+                  struct sim_report *report)
+{
+    struct app_write write = json_writer(page);
+    begin(page, "class=\"run\"");
+    app_write_open(&write, '{');
+    app_write_key(&write, "version");
+    app_write_string(&write, ISOHEAD_VERSION);
+    app_write_key(&write, "command");
+    app_write_open(&write, '[');
+    for (int i = 1; i < options->word_count; i++) {
+        app_write_string(&write, options->words[i]);
+    }
+    app_write_close(&write, ']');
+    if (options->against != NULL) {
+        app_write_key(&write, "against");
+        app_write_string(&write, options->against);
+    }
+    app_write_close(&write, '}');
+    end(page);
+    if (options->against != NULL) {
+        put_others(page, options->against, report);
+    }
+}
+
+void sim_page_dir(struct sim_page *page, const struct sim_dir *dir, const char *rig_path,
+                  const struct isohead *head)
 {
     const struct ih_calibration *rig = &head->rig.calibration;
     struct app_write write = json_writer(page);
@@ -227,6 +301,10 @@ void sim_page_dir(struct sim_page *page, const struct sim_dir *dir, const struct
     app_write_string(&write, dir->label);
     app_write_key(&write, "path");
     app_write_string(&write, dir->path);
+    app_write_key(&write, "rig");
+    app_write_string(&write, rig_path);
+    app_write_int_field(&write, "near_mm", rig->near_mm);
+    app_write_int_field(&write, "far_mm", rig->far_mm);
     app_write_key(&write, "range");
     app_write_bool(&write, rig->kind == IH_RIG_RANGE);
     app_write_key(&write, "paper");

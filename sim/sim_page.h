@@ -2,6 +2,8 @@
  *
  * Out:   sim/report/page.html with its style, its program and the libraries, which the build folds into
  *        this one, and in their midst the data, as elements that the browser does not run:
+ *          class run     JSON: version, command line
+ *          class other   JSON: a record of the run that this one is compared with
  *          class dir     JSON: a directory's rig and the limits that scores are held against
  *          class frame   JSON: the record as host_sim --json writes it, the truth, the verdict
  *          class trace   base64 of zlib of what host_sim --trace writes of the frame
@@ -20,6 +22,7 @@
 #include "app_record.h"
 #include "sim_dirs.h"
 #include "sim_image.h"
+#include "sim_options.h"
 #include "sim_score.h"
 
 struct sim_page {
@@ -46,8 +49,13 @@ struct sim_page_frame {
 /* False: *error says why, and there is nothing to close. */
 bool sim_page_open(struct sim_page *page, const char *path, struct hal_error *error);
 
-/* The directory that the frames after it are of. */
-void sim_page_dir(struct sim_page *page, const struct sim_dir *dir, const struct isohead *head);
+/* How the run was started, and the records of --against. What is wrong in them goes to the report. */
+void sim_page_run(struct sim_page *page, const struct sim_options *options,
+                  struct sim_report *report);
+
+/* The directory that the frames after it are of; rig_path: its file. */
+void sim_page_dir(struct sim_page *page, const struct sim_dir *dir, const char *rig_path,
+                  const struct isohead *head);
 
 /* False: *error, and the frame has no image; what cannot be written shows on closing. */
 bool sim_page_frame(struct sim_page *page, const struct sim_page_frame *frame,

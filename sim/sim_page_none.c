@@ -13,10 +13,20 @@ bool sim_page_open(struct sim_page *page, const char *path, struct hal_error *er
     return hal_fail(error, "this host_sim has no report page: " SIM_PAGE_REASON);
 }
 
-void sim_page_dir(struct sim_page *page, const struct sim_dir *dir, const struct isohead *head)
+void sim_page_run(struct sim_page *page, const struct sim_options *options,
+                  struct sim_report *report)
+{
+    (void)page;
+    (void)options;
+    (void)report;
+}
+
+void sim_page_dir(struct sim_page *page, const struct sim_dir *dir, const char *rig,
+                  const struct isohead *head)
 {
     (void)page;
     (void)dir;
+    (void)rig;
     (void)head;
 }
 

@@ -276,7 +276,8 @@ static void process_dir(struct run *run, size_t index)
         sim_table_title(stdout, dir->path);
     }
     if (run->page.file != NULL) {
-        sim_page_dir(&run->page, dir, run->head);
+        sim_page_dir(&run->page, dir, run->options->rig != NULL ? run->options->rig : "rig.json",
+                     run->head);
     }
     process_frames(&visit);
     if (!run->options->json && visit.shown_state == IH_ALIGN_MOVED) {
@@ -351,11 +352,14 @@ static void finish_page(struct run *run)
 /* The page would replace it. */
 static bool is_input(const struct run *run, const char *path)
 {
-    struct stat page, rig;
-    const char *own = run->options->rig;
-    bool is_rig = own != NULL && stat(own, &rig) == 0 && stat(path, &page) == 0 &&
-                  rig.st_dev == page.st_dev && rig.st_ino == page.st_ino;
-    return is_rig || sim_dirs_has_input(&run->dirs, path);
+    const char *const own[] = {run->options->rig, run->options->against};
+    struct stat page, file;
+    bool is_own = false;
+    for (size_t i = 0; i < sizeof own / sizeof *own && stat(path, &page) == 0; i++) {
+        is_own = is_own || (own[i] != NULL && stat(own[i], &file) == 0 &&
+                            file.st_dev == page.st_dev && file.st_ino == page.st_ino);
+    }
+    return is_own || sim_dirs_has_input(&run->dirs, path);
 }
 
 /* False: the page cannot be written, which is reported before any frame is processed. */
@@ -369,6 +373,7 @@ static bool start_page(struct run *run)
     if (is_input(run, path)) {
         hal_fail(&error, "a file that this run reads, expected another one for the report");
     } else if (sim_page_open(&run->page, path, &error)) {
+        sim_page_run(&run->page, run->options, &run->report);
         return true;
     }
     sim_report_error(&run->report, path, "%s", error.text);

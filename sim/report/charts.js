@@ -22,6 +22,25 @@ const Charts = (() => {
     },
   };
 
+  /* Behind frames that are not right, as far as half of the way to those beside them. */
+  const shade = {
+    id: "shade",
+    beforeDatasetsDraw(chart) {
+      const timed = frames.filter((f) => f.time_s !== null), area = chart.chartArea, context = chart.ctx;
+      const x = timed.map((f) => chart.scales.x.getPixelForValue(f.time_s));
+      const half = x.length > 1 ? (x[x.length - 1] - x[0]) / (x.length - 1) / 2 : 4;
+      context.save();
+      context.fillStyle = colour("bad-ground");
+      timed.forEach((f, i) => {
+        if (Data.state(f) !== "wrong" && Data.state(f) !== "lost") return;
+        const from = Math.max(i > 0 ? (x[i - 1] + x[i]) / 2 : x[i] - half, area.left);
+        const to = Math.min(i + 1 < x.length ? (x[i] + x[i + 1]) / 2 : x[i] + half, area.right);
+        context.fillRect(from, area.top, Math.max(to - from, 2), area.height);
+      });
+      context.restore();
+    },
+  };
+
   /* At least this much is shown of an axis, so that noise of a few mm does not look like a movement. */
   const SPAN_MM = 100;
   function span(axis) {
@@ -43,6 +62,8 @@ const Charts = (() => {
         pointBackgroundColor: timed.map((_, i) => predicted[i] ? colour("panel") : colour("accent")), pointBorderWidth: 1.5 },
       { label: "truth", data: timed.map((f) => at(f, Data.truthMm(f))), borderColor: colour("truth"),
         borderDash: [6, 4], borderWidth: 2, pointRadius: 0 },
+      ...(Data.others.size === 0 ? [] : [{ label: "the other run", data: timed.map((f) => at(f, f.otherSelected && f.otherSelected.centre_mm)),
+        borderColor: colour("other"), borderDash: [2, 3], borderWidth: 2, pointRadius: 0 }]),
     ];
   }
 
@@ -104,7 +125,7 @@ const Charts = (() => {
     charts = AXES.map((_, axis) => {
       const canvas = document.getElementById(`chart-${axis}`);
       canvas.setAttribute("aria-label", describe(axis));
-      return new Chart(canvas, { type: "line", data: { datasets: datasets(axis) }, options: options(axis), plugins: [marker] });
+      return new Chart(canvas, { type: "line", data: { datasets: datasets(axis) }, options: options(axis), plugins: [shade, marker] });
     });
     if (details.open) fillTable();
   }

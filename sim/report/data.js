@@ -4,7 +4,16 @@ const Data = (() => {
   const NODES = 47, STEP = 10 / 11; /* of the surface's grid: nodes, and field units from one to the next */
   const KEPT = 12; /* frames whose trace and image stay decoded */
   const json = (name) => [...document.querySelectorAll(`script.${name}`)].map((e) => JSON.parse(e.textContent));
-  const dirs = json("dir"), rows = json("row");
+  const dirs = json("dir"), rows = json("row"), [run] = json("run");
+  const MATCH_MM = 100; /* as far as a head may be from another to be the same (docs/contract.md, "Score") */
+  const stem = (name) => name.replace(/\.[^.]*$/, "");
+
+  /* Records of the run that this one is compared with, by the last part of their directory and their frame's name. */
+  const last = (path) => path.replace(/\/+$/, "").split("/").pop();
+  const others = new Map(json("other").map((o) => [`${last(o.dir ?? "")}/${stem(o.file)}`, o]));
+  const otherOf = (frame) => others.get(`${last(dirs[frame.dir].path)}/${stem(frame.record.file)}`) ?? others.get(`/${stem(frame.record.file)}`) ?? null;
+  const selectedOf = (record) => record.hypotheses && record.head !== null ? record.hypotheses[record.head] : null;
+  const apartMm = (a, b) => Math.hypot(...a.map((v, k) => v - b[k]));
 
   /* A frame's trace and image follow its own element, unless it was lost. */
   const frames = [...document.querySelectorAll("script.frame")].map((element, index) => {
@@ -16,7 +25,10 @@ const Data = (() => {
     }
     const record = frame.record;
     frame.index = index;
-    frame.selected = record.hypotheses && record.head !== null ? record.hypotheses[record.head] : null;
+    frame.selected = selectedOf(record);
+    frame.other = otherOf(frame);
+    frame.otherSelected = frame.other ? selectedOf(frame.other) : null;
+    frame.link = `#${encodeURIComponent(dirs[frame.dir].label)}/${encodeURIComponent(stem(record.file))}`;
     return frame;
   });
   let first = {};
@@ -109,5 +121,18 @@ const Data = (() => {
 
   const truthMm = (frame) => frame.truth && frame.truth.head ? frame.truth.centre_mm_q8.map((v) => v / 256) : null;
 
-  return { dirs, rows, frames, load, toPixel, fromGrid, depthRange, depthColour, cssColour, state, truthMm, NODES, STOPS };
+  /* Was the other run right in a frame? null where nobody knows. */
+  function otherRight(frame) {
+    if (!frame.other || !frame.truth) return null;
+    const mm = truthMm(frame), head = frame.otherSelected;
+    return frame.other.error === undefined && (mm ? head !== null && apartMm(mm, head.centre_mm) <= MATCH_MM : head === null);
+  }
+  /* Another head, or none, in the other run. */
+  function differs(frame) {
+    if (!frame.other) return false;
+    const [a, b] = [frame.selected, frame.otherSelected];
+    return a && b ? apartMm(a.centre_mm, b.centre_mm) > MATCH_MM : Boolean(a) !== Boolean(b);
+  }
+
+  return { run, others, apartMm, otherRight, differs, dirs, rows, frames, load, toPixel, fromGrid, depthRange, depthColour, cssColour, state, truthMm, NODES, STOPS };
 })();

@@ -13,17 +13,34 @@
     return values.map((v, i) => `${"xyz"[i]}\u00a0${v.toFixed(1)}`).join(", ");
   }
 
+  const capital = (text) => text[0].toUpperCase() + text.slice(1);
+
+  function headText(record, selected) {
+    const score = selected && selected.score !== undefined ? `, score\u00a0${selected.score.toFixed(3)}` : "";
+    return selected ? `head at ${mm(selected.centre_mm)}\u00a0mm${selected.predicted ? " (predicted)" : ""}${score}`
+      : record.heads.length > 1 ? `${record.heads.length} heads, none selected` : "no head";
+  }
+
   /* What came of the frame, as a sentence: the live region. */
   function sentence(frame) {
     const record = frame.record;
-    if (record.error !== undefined) return `lost: ${record.error}`;
-    const score = frame.selected && frame.selected.score !== undefined ? `, score ${frame.selected.score.toFixed(3)}` : "";
-    const head = frame.selected ? `head at ${mm(frame.selected.centre_mm)} mm${score}`
-      : record.heads.length > 1 ? `${record.heads.length} heads, none selected` : "no head";
-    if (!frame.verdict) return head;
-    const v = frame.verdict;
-    if (v.selected_right) return `${head}: right${v.error_mm !== undefined ? `, ${v.error_mm} mm off` : ", the seat is empty"}`;
-    return `${head}: not right, ${!v.head_there ? "nobody is there" : frame.selected ? "it is elsewhere" : "there is one"} (${v.outcome === "not done" ? "no detection" : v.outcome})`;
+    if (record.error !== undefined) return `Lost: ${record.error}`;
+    const head = headText(record, frame.selected), v = frame.verdict;
+    if (!v) return `${capital(head)}.`;
+    if (v.selected_right) return `Right: ${head}${v.error_mm !== undefined ? `, ${v.error_mm}\u00a0mm from the true centre` : ", and nobody is there"}.`;
+    const off = frame.selected && v.head_there ? Data.apartMm(frame.selected.centre_mm, Data.truthMm(frame)).toFixed(0) : 0;
+    return `Not right: ${head}, but ${!v.head_there ? "nobody is there" : frame.selected ? `the true one is ${off}\u00a0mm away` : "there is one"}.`;
+  }
+
+  /* The same of the run that this one is compared with. */
+  function otherText(frame) {
+    const record = frame.other;
+    if (Data.others.size === 0) return "";
+    if (!record) return "The other run has no such frame.";
+    if (record.error !== undefined) return `The other run lost it: ${record.error}`;
+    const right = Data.otherRight(frame), there = frame.otherSelected;
+    const apart = frame.selected && there ? `, ${Data.apartMm(frame.selected.centre_mm, there.centre_mm).toFixed(0)}\u00a0mm from this one` : "";
+    return `The other run: ${headText(record, there)}${apart}${right === null ? "" : right ? ": right" : ": not right"}.`;
   }
 
   /* How the rig has moved against its file. */
@@ -47,9 +64,11 @@
   function report(frame) {
     reportRig(frame.record.rig);
     const state = Data.state(frame);
-    const tag = Tables.element("span", { class: `tag ${state === "right" ? "good" : state === "wrong" || state === "lost" ? "bad" : "plain"}` }, stateText[state]);
-    now.replaceChildren(tag, " ", Tables.element("span", {}, `Frame ${frame.index + 1} of ${frames.length}`), " ",
-      Tables.element("span", { class: "quiet" }, `${dirs.length > 1 ? `${dirs[frame.dir].label}/` : ""}${frame.record.file}: ${sentence(frame)}`));
+    const tag = Tables.element("strong", { class: `verdict ${state === "right" ? "good" : state === "wrong" || state === "lost" ? "bad" : ""}` }, sentence(frame));
+    const other = otherText(frame);
+    now.replaceChildren(tag, " ", Tables.element("span", { class: "quiet" }, `Frame ${frame.index + 1} of ${frames.length}, `,
+      Tables.element("a", { href: frame.link, title: "The link to this frame" }, `${dirs.length > 1 ? `${dirs[frame.dir].label}/` : ""}${frame.record.file}`),
+      other ? `. ${other}` : ""));
     slider.setAttribute("aria-valuetext", `${frame.index + 1} of ${frames.length}, ${stateText[state]}`);
   }
 
@@ -70,6 +89,7 @@
     const own = dirs[dir];
     by("path-dir").textContent = dirs.length > 1 ? `in ${own.label}` : "";
     by("dir").value = `${dir}`;
+    document.documentElement.style.setProperty("--ratio", `${own.camera.width / own.camera.height}`);
     Charts.show(frames.slice(own.first, own.first + own.count), go);
   }
 
@@ -78,6 +98,7 @@
     const frame = frames[Math.min(Math.max(index, 0), frames.length - 1)];
     current = frame.index;
     slider.value = `${current}`;
+    if (location.hash !== frame.link) history.replaceState(null, "", frame.link);
     report(frame);
     showDir(frame);
     Charts.mark(frame.inDir);
@@ -106,6 +127,18 @@
     now.append(Tables.element("span", { class: "quiet" }, ` (no ${step > 0 ? "later" : "earlier"} frame is ${sought})`));
   }
 
+  function goDifferent(step) {
+    for (let i = current + step; i >= 0 && i < frames.length; i += step) {
+      if (Data.differs(frames[i])) { go(i); return; }
+    }
+    now.append(Tables.element("span", { class: "quiet" }, " (no later frame is different)"));
+  }
+
+  /* The frame that the address names, or -1. */
+  function linked() {
+    return frames.findIndex((f) => f.link === location.hash || decodeURIComponent(f.link) === location.hash);
+  }
+
   async function play() {
     playing = !playing;
     by("play").setAttribute("aria-pressed", `${playing}`);
@@ -120,7 +153,7 @@
 
   const keys = {
     ArrowLeft: () => go(current - 1), ArrowRight: () => go(current + 1),
-    n: () => goWrong(1), p: () => goWrong(-1), h: () => choose(chosen + 1),
+    n: () => goWrong(1), d: () => goDifferent(1), p: () => goWrong(-1), h: () => choose(chosen + 1),
   };
   /* Elsewhere these scroll the page. */
   const sliderKeys = {
@@ -151,17 +184,34 @@
     by("strip-text").textContent = Object.keys(stateText).filter(count).map((s) => `${count(s)} frames ${stateText[s]}`).join(", ");
   }
 
+  /* The one sentence about all frames. */
   function fillSummary() {
     const count = (n, one, many) => `${n} ${n === 1 ? one : many}`;
     const scored = frames.filter((f) => f.verdict), right = scored.filter((f) => f.verdict.selected_right).length;
-    by("summary").textContent = `${count(frames.length, "frame", "frames")} of ${dirs.map((d) => d.path).join(", ")}` +
-      `${dirs.some((d) => d.paper) ? ", the paper’s method alone" : ""}` +
-      `${scored.length > 0 ? `: ${right} of ${scored.length} right.` : "."}`;
+    const found = frames.filter((f) => f.selected).length;
+    const both = scored.filter((f) => f.other), better = both.filter((f) => Data.otherRight(f) === false && f.verdict.selected_right).length;
+    const worse = both.filter((f) => Data.otherRight(f) && !f.verdict.selected_right).length;
+    by("summary").textContent = (scored.length > 0 ? `${right} of ${count(scored.length, "frame is", "frames are")} right`
+      : `a head in ${found} of ${count(frames.length, "frame", "frames")}`) + (dirs.some((d) => d.paper) ? ", the paper’s method alone" : "") +
+      (Data.others.size === 0 ? "" : `; against ${Data.run.against}: ${both.length > 0 ? `${better} better, ${worse} worse, ` : ""}` +
+        `${count(frames.filter(Data.differs).length, "head differs", "heads differ")}`) + ".";
     for (const e of document.querySelectorAll(".with-truth")) e.hidden = scored.length === 0;
+    for (const e of document.querySelectorAll(".with-other")) e.hidden = Data.others.size === 0;
     if (scored.length === 0) {
       for (const e of document.querySelectorAll(".not-right")) e.textContent = "without a head";
       by("next-wrong").title = "Next frame without a head (N)";
     }
+  }
+
+  /* Which run this is. */
+  function fillRun() {
+    const quote = (word) => /^[\w@%+=:,./-]+$/.test(word) ? word : `'${word.replaceAll("'", "'\\''")}'`;
+    by("command").textContent = ["host_sim", ...Data.run.command.map(quote)].join(" ");
+    const cameraText = (d) => `${d.camera.width} × ${d.camera.height} px, focal length ${(d.camera.fx_px_q16 / 65536).toFixed(1)} px, ` +
+      `${d.range ? "depth image" : "laser dots"}, working range ${d.near_mm} to ${d.far_mm} mm`;
+    const rows = [["Version", `isohead ${Data.run.version}`],
+      ...dirs.map((d) => [`${d.path}`, `${d.count ?? 0} frames; ${d.rig}; ${cameraText(d)}`])];
+    by("run-values").replaceChildren(...rows.flatMap(([name, value]) => [Tables.element("dt", {}, name), Tables.element("dd", {}, value)]));
   }
 
   function fillDirs() {
@@ -182,6 +232,7 @@
   }
   Tables.fillTable1();
   fillSummary();
+  fillRun();
   by("main").hidden = frames.length === 0;
   if (frames.length === 0) return;
   slider.max = `${frames.length - 1}`;
@@ -189,12 +240,14 @@
   by("previous").addEventListener("click", () => go(current - 1));
   by("next").addEventListener("click", () => go(current + 1));
   by("next-wrong").addEventListener("click", () => goWrong(1));
+  by("next-other").addEventListener("click", () => goDifferent(1));
   by("play").addEventListener("click", play);
+  addEventListener("hashchange", () => { if (linked() >= 0) go(linked()); });
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", theme);
   matchMedia("print").addEventListener("change", theme);
   fillStrip();
   fillDirs();
   Space.theme();
-  const first = frames.findIndex((f) => f.selected);
+  const first = linked() >= 0 ? linked() : frames.findIndex((f) => f.selected);
   go(first < 0 ? 0 : first);
 })();

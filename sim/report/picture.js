@@ -122,6 +122,18 @@ const Picture = (() => {
     });
   }
 
+  function drawOther(context, frame, px) {
+    const h = frame.otherSelected;
+    if (!h) return;
+    context.setLineDash([2 * px, 5 * px]);
+    for (const [style, width] of [["#000c", 5.5], [colour("other"), 3]]) {
+      context.strokeStyle = style;
+      context.lineWidth = width * px;
+      ellipse(context, h.pixel, h.axes_px, h.angle_deg);
+    }
+    context.setLineDash([]);
+  }
+
   function drawTruth(context, frame, camera, px) {
     const mm = Data.truthMm(frame);
     if (!mm) return;
@@ -157,6 +169,7 @@ const Picture = (() => {
       if (layers.nests) drawNests(context, trace, camera, px);
     }
     if (layers.hypotheses && frame.record.hypotheses) drawHypotheses(context, frame.record, px);
+    if (layers.other) drawOther(context, frame, px);
     if (layers.truth) drawTruth(context, frame, camera, px);
   }
 

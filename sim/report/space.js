@@ -3,7 +3,7 @@
  * camera frame's x, -y, -z. */
 const Space = (() => {
   const canvas = document.getElementById("space");
-  const DISTANCE = 1250, AIM_BEHIND_MM = 400, ROTATION = Math.PI / 24; /* mm; radians per key */
+  const DISTANCE = 1250, WHOLE = 2200, AIM_BEHIND_MM = 400, ROTATION = Math.PI / 24; /* mm; radians per key */
   let renderer = null;
   try {
     renderer = new THREE.WebGLRenderer({ canvas, antialias: true, preserveDrawingBuffer: true });
@@ -24,12 +24,17 @@ const Space = (() => {
   light.position.set(0.6, 1, 1.2);
   scene.add(light);
 
+  const focus = new THREE.Vector3(); /* what is looked at, of a directory */
   const parts = {};
   const visible = {};
   function renew(name, object) {
     if (parts[name]) {
       scene.remove(parts[name]);
-      parts[name].traverse((o) => { if (o.geometry) o.geometry.dispose(); if (o.material) o.material.dispose(); });
+      parts[name].traverse((o) => {
+        if (o.geometry && !o.isSprite) o.geometry.dispose(); /* sprites share theirs */
+        if (o.material && o.material.map && o.material.map !== disc) o.material.map.dispose();
+        if (o.material) o.material.dispose();
+      });
     }
     parts[name] = object;
     object.visible = visible[name];
@@ -128,6 +133,45 @@ const Space = (() => {
     return group;
   }
 
+  /* A word that always faces the viewer. */
+  function makeWord(text, at, colour) {
+    const drawing = document.createElement("canvas");
+    drawing.width = 256;
+    drawing.height = 64;
+    const context = drawing.getContext("2d");
+    context.font = "600 40px system-ui, sans-serif";
+    context.textAlign = "center";
+    context.textBaseline = "middle";
+    context.fillStyle = colour;
+    context.fillText(text, 128, 32);
+    const sprite = new THREE.Sprite(new THREE.SpriteMaterial({ map: new THREE.CanvasTexture(drawing), transparent: true, depthTest: false }));
+    sprite.scale.set(180, 45, 1);
+    sprite.position.set(...at);
+    return sprite;
+  }
+
+  /* Left below what is looked at: 200 mm along each axis with a tick at 100; and what the camera sees, from its centre on. */
+  const AXIS_MM = 200, TICK_MM = 12, CORNER_MM = [-390, 60, -60];
+  const AXES = [["x", 0xff8a80, "#ff8a80"], ["y", 0x8be28b, "#8be28b"], ["z", 0x8ab8ff, "#8ab8ff"]];
+  function makeAxes(frame) {
+    const group = new THREE.Group(), target = focus, c = Data.dirs[frame.dir].camera;
+    const corner = [target.x, -target.y, -target.z].map((v, k) => v + CORNER_MM[k]);
+    AXES.forEach(([name, hex, css], axis) => {
+      const along = (mm, aside = 0) => place(...corner.map((v, k) => v + (k === axis ? mm : k === (axis + 1) % 3 ? aside : 0)));
+      const positions = [...along(0), ...along(AXIS_MM)];
+      for (const tick of [AXIS_MM / 2, AXIS_MM]) positions.push(...along(tick, -TICK_MM), ...along(tick, TICK_MM));
+      group.add(new THREE.LineSegments(geometryOf(positions), new THREE.LineBasicMaterial({ color: hex, depthTest: false, transparent: true })));
+      group.add(makeWord(axis === 0 ? `x ${AXIS_MM} mm` : name, along(AXIS_MM + (axis === 0 ? 100 : 35)), css));
+    });
+    const far = -target.z, edge = [[0, 0], [c.width, 0], [c.width, c.height], [0, c.height]].map(([u, v]) =>
+      place((u - c.cx_px_q16 / 65536) / (c.fx_px_q16 / 65536) * far, (v - c.cy_px_q16 / 65536) / (c.fy_px_q16 / 65536) * far, far));
+    const positions = edge.flatMap((at, i) => [0, 0, 0, ...at, ...at, ...edge[(i + 1) % 4]]);
+    group.add(new THREE.LineSegments(geometryOf(positions), new THREE.LineBasicMaterial({ color: 0xb9bec8, transparent: true, opacity: 0.5 })));
+    group.add(makeWord("camera", [0, 45, 0], "#dfe3ea"));
+    group.traverse((o) => { o.renderOrder = 1; }); /* over the surface, which is transparent too */
+    return group;
+  }
+
   const paper = matchMedia("print");
   function draw() {
     if (paper.matches) return; /* what is on the screen is printed */
@@ -150,10 +194,11 @@ const Space = (() => {
       if (-at.getZ(i) < far) [at.getX(i), at.getY(i)].forEach((v, axis) => q[axis].push(v));
     }
     const median = (values) => values.sort((a, b) => a - b)[Math.floor(values.length / 2)] ?? 0;
-    controls.target.set(median(q[0]), median(q[1]), -(near + AIM_BEHIND_MM));
+    focus.set(median(q[0]), median(q[1]), -(near + AIM_BEHIND_MM));
   }
 
-  function rotateTo(azimuth, elevation, distance = DISTANCE) {
+  function rotateTo(azimuth, elevation, distance = DISTANCE, at = focus) {
+    controls.target.copy(at);
     const offset = new THREE.Vector3().setFromSpherical(new THREE.Spherical(distance, Math.PI / 2 - elevation, azimuth));
     camera.position.copy(controls.target).add(offset);
     controls.update();
@@ -164,7 +209,7 @@ const Space = (() => {
   function rotateBy(azimuth, elevation, zoom) {
     const s = new THREE.Spherical().setFromVector3(camera.position.clone().sub(controls.target));
     const limit = Math.PI / 2 - 0.02;
-    rotateTo(s.theta + azimuth, Math.min(Math.max(Math.PI / 2 - s.phi + elevation, -limit), limit), s.radius * zoom);
+    rotateTo(s.theta + azimuth, Math.min(Math.max(Math.PI / 2 - s.phi + elevation, -limit), limit), s.radius * zoom, controls.target.clone());
   }
 
   const moves = {
@@ -207,6 +252,7 @@ const Space = (() => {
     if (trace && dir !== frame.dir) {
       dir = frame.dir;
       aim(trace);
+      renew("axes", makeAxes(frame));
       home();
     }
     draw();
@@ -242,6 +288,7 @@ const Space = (() => {
   document.getElementById("space-front").addEventListener("click", () => rotateTo(0, 0));
   document.getElementById("space-side").addEventListener("click", () => rotateTo(Math.PI / 2, 0));
   document.getElementById("space-top").addEventListener("click", () => rotateTo(0, Math.PI / 2 - 0.02));
+  document.getElementById("space-camera").addEventListener("click", () => rotateTo(1.1, 0.3, WHOLE, focus.clone().multiplyScalar(0.55)));
   new ResizeObserver(draw).observe(canvas);
   theme();
   return { show, choose, theme, draw };

@@ -288,7 +288,7 @@ def test_space(test, browser):
     browser.key("+")
     test.ok(browser.value(PIXELS % "space") not in (first, left), "3-D: + zooms")
     browser.key("0")
-    for part in ("points", "surface", "head", "truth"):
+    for part in ("points", "surface", "head", "truth", "axes"):
         browser.value("document.querySelector('[data-part=%s]').click()" % part)
         test.ok(browser.value(PIXELS % "space") != first, "3-D: %s can be taken away" % part)
         browser.value("document.querySelector('[data-part=%s]').click()" % part)
@@ -351,6 +351,12 @@ def test_looks(test, browser, keep):
         if keep:
             go(browser, 5)
             browser.screenshot(os.path.join(keep, "phone%d.png" % width), whole=True)
+    for name, width, height, phone in (("1280x800", 1280, 800, False), ("a phone", 390, 844, True)):
+        browser.size(width, height, 1, phone)
+        browser.value("scrollTo(0, 0)")
+        go(browser, 5)
+        bottom = browser.value("['now', 'picture', 'space'].map((id) => document.getElementById(id).getBoundingClientRect().bottom)")
+        test.ok(bottom[0] < min(bottom[1:]) and max(bottom[1:]) <= height, "%s: verdict, picture and 3-D are in the first screen" % name, bottom)
     bar = "getComputedStyle(document.getElementById('bar')).position"
     browser.size(844, 390, 2, True)
     test.same(browser.value(bar), "static", "a phone on its side: the slider scrolls away with the page")
@@ -360,6 +366,111 @@ def test_looks(test, browser, keep):
     hidden = browser.value("['.buttons', '.slide', '.layers'].map((s) => getComputedStyle(document.querySelector(s)).display)")
     test.same(hidden, ["none"] * 3, "on paper there is nothing to press")
     browser.media(prefers_color_scheme="light")
+
+
+def test_link(test, browser, page, records):
+    """An address names a frame, and each frame shows its own."""
+    browser.open(page + "?anew#sequence2/000006")  # another document, which loads
+    browser.until(SHOWN + " !== undefined")
+    index = len(TAKEN) + TAKEN.index(6)
+    test.same(browser.value(SHOWN), "%d" % index, "an address with a frame opens it")
+    link = "document.querySelector('#now a')"
+    test.same(browser.value(link + ".hash"), "#sequence2/000006", "a frame shows its link")
+    go(browser, 3)
+    test.same(browser.value("location.hash"), "#sequence1/%06d" % TAKEN[3], "the address follows the frame")
+    browser.value("location.hash = '#sequence2/%06d'" % TAKEN[1])
+    browser.until("%s === '%d'" % (SHOWN, len(TAKEN) + 1))
+    browser.value("location.hash = '#no/such%'")
+    test.same(browser.value(SHOWN), "%d" % (len(TAKEN) + 1), "an address without a frame changes nothing")
+    before = browser.value("history.length")
+    go(browser, 5)
+    go(browser, 6)
+    test.same(browser.value("history.length"), before, "frames do not fill the history")
+    header = browser.value("document.getElementById('run').textContent")
+    camera = [json.loads(line)["camera"] for line in browser.value("[...document.querySelectorAll('script.dir')].map((e) => e.textContent)")]
+    test.ok("host_sim --json --report " in header and "isohead " in header and "%d × %d px" % (camera[0]["width"], camera[0]["height"]) in header
+            and "rig.json" in header and header.count("%d frames" % len(TAKEN)) == 2, "the header: command, version, rig, camera", header)
+    test.same(len(records), 2 * len(TAKEN), "records of all frames")
+
+
+def shaded(browser, index, axis=0):
+    """Is the ground of a curve at a frame that of frames that are not right?"""
+    return browser.value("""(() => { const chart = Chart.getChart('chart-%d'), f = Data.frames[%d];
+        const x = chart.scales.x.getPixelForValue(f.time_s), y = chart.chartArea.top + 3, r = chart.currentDevicePixelRatio;
+        return [-3, 3].some((dx) => { const p = chart.ctx.getImageData(Math.round((x + dx) * r), Math.round(y * r), 1, 1).data;
+          return p[3] > 0 && p[0] - p[2] > 15; }); })()""" % (axis, index))
+
+
+def test_shades(test, browser, right):
+    for first in (0, len(TAKEN)):
+        for start in (first + 1, first + 4):
+            go(browser, start)  # the line at the frame that is shown is elsewhere
+            others = [i for i in range(first, first + len(TAKEN) - 1) if abs(i - start) > 1]
+            wrong = [i for i in others if shaded(browser, i) == right[i]]
+            test.same(wrong, [], "curves: frames that are not right are shaded, no others")
+
+
+def test_against(test, browser, program, frames, work):
+    """Two runs of the same frames; the other one knows less."""
+    page, other = os.path.join(work, "against.html"), os.path.join(work, "other.json")
+    result = run(program, "--json", "--without", "fit,scan,tracks", frames)
+    theirs = [json.loads(line) for line in result.stdout.splitlines()]
+    with open(other, "w", encoding="utf-8") as file:
+        file.write(result.stdout)
+    result = run(program, "--json", "--report", page, "--against", other, frames)
+    ours = [json.loads(line) for line in result.stdout.splitlines()]
+    truth = []
+    for sequence in ("sequence1", "sequence2"):
+        with open(os.path.join(frames, sequence, "truth.jsonl"), encoding="utf-8") as file:
+            truth += [json.loads(line)["head"] for line in file]
+
+    def centre(record):
+        return record["hypotheses"][record["head"]]["centre_mm"] if record.get("head") is not None else None
+
+    def near(a, b):
+        return a is not None and b is not None and sum((p - q) ** 2 for p, q in zip(a, b)) <= 100 ** 2
+
+    def right(record, head):
+        return "error" not in record and (near(centre(record), head["centre_mm"]) if head else centre(record) is None)
+
+    scored = [i for i, record in enumerate(ours) if "error" not in record]
+    better = [i for i in scored if right(ours[i], truth[i]) and not right(theirs[i], truth[i])]
+    worse = [i for i in scored if right(theirs[i], truth[i]) and not right(ours[i], truth[i])]
+    different = [i for i in range(len(ours)) if centre(ours[i]) != centre(theirs[i]) and not near(centre(ours[i]), centre(theirs[i]))]
+    open_anew(browser, page)
+    shown = browser.value("document.getElementById('summary').textContent")
+    test.ok("%d better, %d worse, %d heads differ." % (len(better), len(worse), len(different)) in shown and len(different) > 2,
+            "--against: how many are better and worse", (shown, better, worse, different))
+    go(browser, 0)
+    browser.value("document.activeElement.blur()")
+    seen = []
+    for _ in different:
+        browser.key("d")
+        browser.until(SHOWN + " !== '%d'" % (seen[-1] if seen else 0))
+        seen.append(int(browser.value(SHOWN)))
+    test.same(seen, [i for i in different if i > 0][:len(seen)], "--against: key d, the frames that differ")
+    lone = next(i for i in different if centre(theirs[i]) is None)
+    go(browser, lone)
+    test.ok("The other run: no head: not right." in browser.value("document.getElementById('now').textContent"), "--against: what the other run said")
+    both = next(i for i in scored if centre(theirs[i]) is not None and centre(ours[i]) is not None)
+    go(browser, both)
+    before = browser.value(PIXELS % "picture")
+    browser.value("document.querySelector('[data-layer=other]').click()")
+    test.ok(browser.value(PIXELS % "picture") != before, "--against: the other run's head in the picture")
+    test.same(browser.value("Chart.getChart('chart-0').data.datasets.length"), 3, "--against: a third curve")
+    test.same(browser.errors, [], "--against: no error on the console")
+    with open(other, "w", encoding="utf-8") as file:
+        file.write('{"file":"x.pgm"}\nno\n{"file":"</script><b>.pgm","error":"</script>"}\n')
+    result = run(program, "--json", "--report", page, "--against", other, os.path.join(frames, "sequence1"))
+    test.ok(result.returncode == 1 and "other.json: line 1: no record, expected a line of host_sim --json" in result.stderr
+            and "other.json: line 2: not a JSON object" in result.stderr and result.stdout.count("\n") == len(TAKEN),
+            "--against: what is no record is reported, and the run goes on", result.stderr)
+    open_anew(browser, page)
+    test.same(browser.errors, [], "--against: frames that this run does not have do no harm")
+    result = run(program, "--against", other, frames)
+    test.ok(result.returncode == 2 and "--report FILE" in result.stderr, "--against without --report: usage", result.stderr)
+    result = run(program, "--report", other, "--against", other, frames)
+    test.ok(result.returncode == 1 and "a file that this run reads" in result.stderr and result.stdout == "", "--against: its file is not overwritten", result.stderr)
 
 
 # --- other runs -------------------------------------------------------------------------------------
@@ -554,9 +665,12 @@ def main():
             test_space(test, browser)
             test_picture(test, browser)
             test_names(test, browser)
+            test_shades(test, browser, right)
             test_looks(test, browser, options.keep)
             test.same(browser.errors, [], "no error on the console")
             test.same(browser.requests, ["file://" + page], "nothing is requested from the network")
+            test_link(test, browser, page, records)
+            test_against(test, browser, program, frames, work)
             test_paper(test, browser, program, frames, work)
             test_moved(test, browser, program, frames, work)
             test_range(test, browser, program, work)
