@@ -40,7 +40,7 @@ DESTDIR ?=
 .DEFAULT_GOAL := help
 .PHONY: help sim install frames sanitize test check unit kills fuzz coverage ranges exhaustive mutation accept eval misaligned \
   bench bench-instructions bench-peers bench-grow bench-worst test-bench bits cortexm longrun size vectors learn view figures \
-  test-view test-report live-pictures export python people board board-gpiod2 deb image flash calibrate test-calibration \
+  test-view test-report site live-pictures export python people board board-gpiod2 deb image flash calibrate test-calibration \
   test-calibration-short test-deb test-board test-image format formatted words layout links lint clean
 
 help: ## this list
@@ -96,6 +96,11 @@ test-report: sim ## the report page in a browser; pictures of it in build/test_r
 	@tools/setup.sh test-report
 	@/usr/bin/python3 -B tests/report/report.py --host-sim $(BUILD)/host/sim/host_sim --frames frames \
 	  --keep $(BUILD)/test_report
+
+site: sim ## all pages as a static site in build/site, with a report page of the rendered frames in it
+	@tools/setup.sh site
+	@$(BUILD)/host/sim/host_sim --report $(BUILD)/site_report.html frames > /dev/null
+	@/usr/bin/python3 -B tools/site.py $(BUILD)/site $(BUILD)/site_report.html
 
 live-pictures: sanitize ## the live view's page in a browser: docs/live.png and docs/live_phone.png anew
 	@tools/setup.sh test-report

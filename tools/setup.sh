@@ -7,7 +7,7 @@
 #   tools/setup.sh test-deb
 #   tools/setup.sh test-board
 #   tools/setup.sh image|flash|test-image
-#   tools/setup.sh calibrate|view|test-view|test-report|export|people
+#   tools/setup.sh calibrate|view|test-view|test-report|site|export|people
 #
 # On Debian and its kin missing packages are installed when that is allowed (root, or sudo without a
 # password); otherwise the exact command is printed and the exit status is 1. Nothing is installed
@@ -42,10 +42,15 @@ need_sim() {
     fi
 }
 
-# A browser for the report page.
+# A browser for the report page and the site.
 need_report() {
     need_program chromium chromium
-    need_python json python3
+    need_site
+}
+
+need_site() {
+    need_python markdown_it python3-markdown-it
+    need_program git git
 }
 
 # Compilers and the emulator for tests/checks/same_bits.sh and tests/golden/golden.sh in make test.
@@ -228,6 +233,10 @@ test-image)
 test-report)
     need_sim
     need_report
+    ;;
+site)
+    need_sim
+    need_site
     ;;
 test)
     need_sim

@@ -549,6 +549,49 @@ def test_range(test, browser, program, work):
     test.same(browser.errors, [], "a list of points: no error on the console")
 
 
+# --- the site ---------------------------------------------------------------------------------------
+
+ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..")
+
+
+def make_site(*arguments):
+    return run("/usr/bin/python3", "-B", os.path.join(ROOT, "tools", "site.py"), *arguments)
+
+
+def test_site(test, browser, page, work, keep):
+    """All pages of the repository; the report page is this run's."""
+    site = os.path.join(work, "site")
+    result = make_site(site, page)
+    test.ok(result.returncode == 0 and result.stderr == "", "site: every link leads somewhere", result.stderr)
+    browser.errors.clear()
+    browser.requests.clear()
+    for name in ("index.html", "docs/design.html", "docs/report.html", "docs/experiments/README.html", "CONTRIBUTING.html"):
+        for width, phone in ((1280, False), (390, True)):
+            browser.size(width, 800, 1, phone)
+            browser.open(os.path.join(site, name))
+            wide = browser.value("document.documentElement.scrollWidth - %d" % width)
+            test.ok(wide <= 0, "site: %s fits %d px" % (name, width), "%d px too wide" % wide)
+            if keep:
+                browser.screenshot(os.path.join(keep, "site_%s_%d.png" % (name.replace("/", "_"), width)))
+        pictures = browser.value("[...document.images].every((i) => i.complete && i.naturalWidth > 0)")
+        test.ok(pictures, "site: %s: its pictures are there" % name)
+    outside = [url for url in browser.requests if not url.startswith(("file://" + site, "data:"))]
+    test.same((outside, browser.errors), ([], []), "site: nothing is loaded from elsewhere, no error")
+    browser.open(os.path.join(site, "index.html"))
+    browser.click("a.open")
+    browser.until(SHOWN + " !== undefined")
+    test.ok(browser.value("location.hash").startswith("#sequence2/"), "site: leads to the report page", browser.value("location.href"))
+    browser.size(*DESK)
+    result = make_site(work, page)
+    test.ok(result.returncode == 2 and "name another folder" in result.stderr and os.path.exists(page), "site: another's folder is left alone", result.stderr)
+    os.remove(os.path.join(site, "docs", "design.html"))
+    found = run("/usr/bin/python3", "-B", "-c", "import runpy, sys; print(*runpy.run_path(sys.argv[1])['check'](sys.argv[2]), sep='\\n')",
+                os.path.join(ROOT, "tools", "site.py"), site).stdout
+    test.ok("index.html: docs/design.html: there is no docs/design.html" in found, "site: a link that leads nowhere is found", found)
+    result = make_site(site, page)
+    test.ok(result.returncode == 0 and os.path.exists(os.path.join(site, "docs", "design.html")), "site: its own folder is made anew")
+
+
 # --- the file --------------------------------------------------------------------------------------
 
 def test_hostile(test, browser, program, frames, work):
@@ -675,6 +718,7 @@ def main():
             test_moved(test, browser, program, frames, work)
             test_range(test, browser, program, work)
             test_hostile(test, browser, program, frames, work)
+            test_site(test, browser, page, work, options.keep)
         test_files(test, program, frames, work)
         test_stopped(test, program, frames, work)
     print("report: %d tests, %d failed" % (test.count, test.failed))
