@@ -20,6 +20,9 @@ CAUGHT_MIN ?= 85
 # What make view builds.
 VIEW := $(BUILD)/view/tools/view/view
 
+# pip of the venv that make python makes; packages of its list and no others.
+PYTHON_PIP := $(BUILD)/python/venv/bin/pip --quiet --disable-pip-version-check --no-input
+
 # The frames directory that make export takes.
 FRAMES ?= frames/sequence2
 # Runs of make kills; make test takes 60.
@@ -231,6 +234,16 @@ export: sim ## what is found in FRAMES=DIR for Foxglove and Rerun (MCAP) and spr
 	@./host_sim --json --trace $(BUILD)/export/trace $(FRAMES) > $(BUILD)/export/records.jsonl
 	@tools/export/isohead-export $(BUILD)/export/records.jsonl --csv $(BUILD)/export/records.csv \
 	  --mcap $(BUILD)/export/frames.mcap --frames $(FRAMES) --trace $(BUILD)/export/trace/$(notdir $(FRAMES:/=))
+
+python: sim ## build the Python package's wheel (build/python/dist), install it in a venv, test it against host_sim
+	@tools/setup.sh python
+	@/usr/bin/python3 -m venv --system-site-packages --clear $(BUILD)/python/venv
+	@$(PYTHON_PIP) install --no-deps --require-hashes --only-binary :all: --requirement python/requirements.txt
+	@rm -rf $(BUILD)/python/dist
+	@$(PYTHON_PIP) wheel --no-deps --no-build-isolation --wheel-dir $(BUILD)/python/dist .
+	@$(PYTHON_PIP) install --no-deps --force-reinstall $(BUILD)/python/dist/isohead-*.whl
+	@HOST_SIM=$(abspath $(BUILD))/host/sim/host_sim FRAMES=$(abspath frames) \
+	  $(BUILD)/python/venv/bin/python -B -m pytest --quiet -p no:cacheprovider python/tests
 
 people: ## frames of people of true anatomy: KIND=hands RIG=paper SEED=1 OUT=DIR (docs/people.md)
 	@tools/setup.sh people

@@ -1,6 +1,7 @@
 #include "sim_cloud.h"
 
 #include <inttypes.h>
+#include <stddef.h>
 #include <stdlib.h>
 
 #include "app_rig.h"
@@ -19,11 +20,16 @@ static void reserve(struct sim_cloud *cloud, const struct ih_rig *rig)
 /* Depths in units to mm, rounded; what is beyond 16 bits stays as far as they go. */
 static void scale(struct sim_cloud *cloud, struct ih_frame *view)
 {
-    const uint16_t *depth = view->samples;
-    for (int32_t i = 0; i < view->width * view->height; i++) {
-        int64_t depth_mm = ((int64_t)depth[i] * cloud->scale_q20 + APP_RIG_SCALE_ONE / 2) >> 20;
-        cloud->depth_mm[i] = (uint16_t)(depth_mm < UINT16_MAX ? depth_mm : UINT16_MAX);
+    uint16_t *depth_mm = cloud->depth_mm;
+    for (int32_t v = 0; v < view->height; v++) {
+        const uint16_t *depth =
+            (const void *)((const uint8_t *)view->samples + (ptrdiff_t)v * view->stride_bytes);
+        for (int32_t u = 0; u < view->width; u++) {
+            int64_t mm = ((int64_t)depth[u] * cloud->scale_q20 + APP_RIG_SCALE_ONE / 2) >> 20;
+            *depth_mm++ = (uint16_t)(mm < UINT16_MAX ? mm : UINT16_MAX);
+        }
     }
+    view->stride_bytes = view->width * (int32_t)sizeof *depth_mm;
     view->samples = cloud->depth_mm;
     view->maximum = UINT16_MAX;
 }

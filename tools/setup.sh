@@ -7,7 +7,7 @@
 #   tools/setup.sh test-deb
 #   tools/setup.sh test-board
 #   tools/setup.sh image|flash|test-image
-#   tools/setup.sh calibrate|view|test-view|test-report|site|export|people
+#   tools/setup.sh calibrate|view|test-view|test-report|site|export|people|python
 #
 # On Debian and its kin missing packages are installed when that is allowed (root, or sudo without a
 # password); otherwise the exact command is printed and the exit status is 1. Nothing is installed
@@ -321,6 +321,14 @@ export)
     need_export
     ;;
 people)
+python)
+    need_sim
+    [ -e "/usr/include/$(/usr/bin/python3 -c 'import sys; print("python%d.%d" % sys.version_info[:2])')/Python.h" ] ||
+        lacks python3-dev
+    need_python ensurepip python3-venv
+    need_python numpy python3-numpy
+    need_python cv2 python3-opencv
+    ;;
     need_python numpy python3-numpy
     need_python pip python3-pip
     # its rays are cast by a package that is there for x86-64 alone

@@ -360,15 +360,9 @@ static void locate(const char *text, const char *stop, struct hal_error *error)
     }
 }
 
-bool app_rig_load_scaled(const char *path, struct ih_calibration *calibration, int32_t *scale_q20,
-                         struct hal_error *error)
+bool app_rig_parse(const char *text, size_t size, struct ih_calibration *calibration,
+                   int32_t *scale_q20, struct hal_error *error)
 {
-    uint8_t *data = NULL;
-    size_t size = 0;
-    if (!hal_file_read(path, APP_RIG_FILE_MAX, &data, &size, error)) {
-        return false;
-    }
-    const char *text = (const char *)data;
     const char *stop = text;
     cJSON *rig = NULL;
     bool good = false;
@@ -382,6 +376,18 @@ bool app_rig_load_scaled(const char *path, struct ih_calibration *calibration, i
         good = read_rig(rig, calibration, scale_q20, error);
     }
     cJSON_Delete(rig);
+    return good;
+}
+
+bool app_rig_load_scaled(const char *path, struct ih_calibration *calibration, int32_t *scale_q20,
+                         struct hal_error *error)
+{
+    uint8_t *data = NULL;
+    size_t size = 0;
+    if (!hal_file_read(path, APP_RIG_FILE_MAX, &data, &size, error)) {
+        return false;
+    }
+    bool good = app_rig_parse((const char *)data, size, calibration, scale_q20, error);
     free(data);
     return good;
 }

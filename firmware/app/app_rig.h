@@ -22,7 +22,10 @@
 #define APP_RIG_SCALE_MIN 0.01
 #define APP_RIG_SCALE_MAX 1000.0
 
-/* scale_q20: depth_scale. False: *error says why. */
+/* scale_q20: depth_scale. text has a zero byte at its end, which size does not count. False: *error says why. */
+bool app_rig_parse(const char *text, size_t size, struct ih_calibration *calibration,
+                   int32_t *scale_q20, struct hal_error *error);
+/* The same with a file. */
 bool app_rig_load_scaled(const char *path, struct ih_calibration *calibration, int32_t *scale_q20,
                          struct hal_error *error);
 
