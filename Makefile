@@ -43,7 +43,7 @@ DESTDIR ?=
 .DEFAULT_GOAL := help
 .PHONY: help sim install frames sanitize test check unit kills fuzz coverage ranges exhaustive mutation accept eval misaligned \
   bench bench-instructions bench-peers bench-grow bench-worst test-bench bits cortexm longrun size vectors learn view figures \
-  test-view test-report site live-pictures export python people board board-gpiod2 deb image flash calibrate test-calibration \
+  test-view test-report site live-pictures export python people board board-gpiod2 deb deb-tools image flash calibrate test-calibration \
   test-calibration-short test-deb test-board test-image format formatted words layout links lint clean
 
 help: ## this list
@@ -264,8 +264,13 @@ deb: board ## the Debian package of isohead_board for ARCH=arm64 (default) or ar
 	@tools/setup.sh deb $(ARCH)
 	@tools/board/deb.sh $(ARCH)
 
-test-deb: sim ## build both Debian packages; install, run, update, purge one; its unit under systemd
+deb-tools: calibrate ## the Debian package isohead-tools for this machine: calibrate, host_sim, render, rigblob
+	@tools/setup.sh deb tools
+	@tools/board/deb.sh tools
+
+test-deb: sim ## build all Debian packages; install, run, update, purge one; its unit under systemd
 	@tools/setup.sh test-deb
+	@$(MAKE) calibrate
 	@$(MAKE) board ARCH=arm64
 	@$(MAKE) board ARCH=armhf
 	@tests/board/get.sh

@@ -3,7 +3,7 @@
 #
 #   tools/setup.sh sim|test|fuzz|coverage|ranges|mutation|accept|eval|bench|bits|cortexm|size|vectors|format|lint
 #   tools/setup.sh board arm64|armhf|host
-#   tools/setup.sh deb arm64|armhf
+#   tools/setup.sh deb arm64|armhf|tools
 #   tools/setup.sh test-deb
 #   tools/setup.sh test-board
 #   tools/setup.sh image|flash|test-image
@@ -132,13 +132,14 @@ need_export() {
     need_python pip python3-pip
 }
 
-# need_deb arm64|armhf
+# need_deb arm64|armhf|tools
 need_deb() {
     case "${1:-}" in
     arm64) need_program aarch64-linux-gnu-strip binutils-aarch64-linux-gnu ;;
     armhf) need_program arm-linux-gnueabihf-strip binutils-arm-linux-gnueabihf ;;
+    tools) need_program strip binutils ;;
     *)
-        echo "there is no package for '${1:-}': name arm64 or armhf" >&2
+        echo "there is no package for '${1:-}': name arm64, armhf or tools" >&2
         exit 2
         ;;
     esac
@@ -320,7 +321,6 @@ export)
     need_sim
     need_export
     ;;
-people)
 python)
     need_sim
     [ -e "/usr/include/$(/usr/bin/python3 -c 'import sys; print("python%d.%d" % sys.version_info[:2])')/Python.h" ] ||
@@ -329,6 +329,7 @@ python)
     need_python numpy python3-numpy
     need_python cv2 python3-opencv
     ;;
+people)
     need_python numpy python3-numpy
     need_python pip python3-pip
     # its rays are cast by a package that is there for x86-64 alone

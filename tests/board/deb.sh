@@ -4,7 +4,7 @@
 #
 #     tests/board/deb.sh RIG_JSON
 #
-# Needs the programs of `make board` for arm64 and armhf, the kernel of get.sh, and root. The arm64 root
+# Needs the programs of `make board` for arm64 and armhf and of `make calibrate`, the kernel of get.sh, and root. The arm64 root
 # is a small Debian of the archives that this machine is set up for; on a processor other than ARM its
 # programs run by qemu-user through binfmt_misc, which is set up here if it is not. A root of the last
 # day is used again: build/deb-root.tar. Exit status 1 when something is wrong.
@@ -67,6 +67,7 @@ check_package() {
     dpkg-deb --raw-extract "$deb" "$work/tree"
     check_program "$1" "$work/tree/usr/bin/isohead_board"
     check_program "$1" "$work/tree/usr/lib/isohead/isohead_live"
+    check_pages
     # Whoever holds the laser loads nothing of the network.
     ! readelf --dynamic "$work/tree/usr/bin/isohead_board" | grep -q microhttpd || fail "$1: loads libmicrohttpd"
     for library in libc6 libv4l-0 libgpiod libcjson libmicrohttpd; do
@@ -78,6 +79,42 @@ check_package() {
         fail "$deb: not root's"
     fi
     step "$deb: $(stat -c %s "$deb") bytes, the program $(stat -c %s "$work/tree/usr/bin/isohead_board")"
+}
+
+# check_pages: the documents in the tree lead to each other and nowhere else
+check_pages() {
+    for page in "$work"/tree/usr/share/doc/*/*.md; do
+        for link in $(grep -oE '\]\([^)]*\)' "$page" | sed -e 's/^](//' -e 's/[)#].*//'); do
+            [ -e "$(dirname "$page")/$link" ] || fail "$page: $link is not in the package"
+        done
+    done
+}
+
+# isohead-tools, for this machine: unpacked, not installed
+check_tools() {
+    build_twice tools
+    rm -rf "$work/tree"
+    dpkg-deb --raw-extract "$deb" "$work/tree"
+    for library in libopencv-calib3d libcairo2 libcjson1; do
+        dpkg-deb --field "$deb" Depends | grep -q "$library" || fail "$deb does not depend on $library"
+    done
+    lintian --allow-root --fail-on error,warning "$deb" || fail "lintian of $deb"
+    check_pages
+    ! grep -rn 'build/' "$work/tree/usr/share/doc" || fail "$deb: a page names files of the sources"
+    for program in isohead-calibrate isohead-render rigblob host_sim; do
+        page=$work/tree/usr/share/man/man1/$program.1
+        gunzip "$page.gz"
+        mandoc -Tlint -Wwarning "$page" >"$work/lint" || fail "$program.1: $(cat "$work/lint")"
+        "$work/tree/usr/bin/$program" --help >"$work/help"
+        ! grep -qF "$PWD" "$work/tree/usr/bin/$program" || fail "$program knows where it was built: $PWD"
+        # every line of --help, as it stands there
+        mandoc -Tascii "$page" | col -b | sed 's/^     //' | grep -vxFf - "$work/help" && fail "$program.1 lacks lines of --help"
+    done
+    # The page's own example, as far as seconds go.
+    (cd "$work" && PATH=$work/tree/usr/bin:$PATH && isohead-calibrate board board.pgm &&
+        isohead-render --frames 3 person && rigblob person/rig.json rig.bin && host_sim person) >"$work/words" 2>&1 ||
+        fail "the tools: $(cat "$work/words")"
+    step "$deb: $(stat -c %s "$deb") bytes"
 }
 
 check_unit() {
@@ -251,6 +288,7 @@ check_remove() {
 for arch in armhf arm64; do
     check_package $arch
 done
+check_tools
 check_unit
 need_binfmt
 make_root
