@@ -5,6 +5,7 @@
   files     a path in `backticks` that begins with a folder of the tree, or a page's name.md, is there
   names     an ih_NAME in `backticks` is in the sources of the firmware, or in the headers of its tests
   targets   `make TARGET` is a target of the Makefile
+  tests     a `name` in the column "shown by" of docs/safety.md is a test, a case of the emulated board, or a test's file
 
 Experiments and the change log name things as they were: only their links are checked.
 
@@ -23,6 +24,7 @@ PATH = re.compile(r"[\w.-]+(?:/[\w.-]+)+/?$")
 IH_NAME = re.compile(r"\bih_[a-z0-9_]+\b|\bIH_[A-Z0-9_]+\b")
 TARGET = re.compile(r"\bmake ([a-z][a-z0-9-]*)")
 FENCE = re.compile(r"^( *)```.*?^\1```", re.S | re.M)
+TEST = re.compile(r"^(?:static )?(?:void|def) (?:case_)?(\w+)\(", re.M)
 HISTORY = ("docs/experiments/", "CHANGELOG.md")
 # What CONTRIBUTING.md makes up for its example.
 EXAMPLE = re.compile(r"counter|ih_(noun_verb|noun|upper)\b")
@@ -85,6 +87,21 @@ def check_names(page, text, files, folders, known):
             yield text.find("make " + hit[1]), "no target %s" % hit[1]
 
 
+def check_tests(text, files):
+    """Of the tables that end with the column, and have a heading of bold letters in between."""
+    tests = {os.path.basename(path).split(".")[0] for path in files if path.startswith("tests/")}
+    for path in files:
+        if path.startswith("tests/") and path.endswith((".c", ".py")):
+            tests.update(TEST.findall(read(path)))
+    in_table = False
+    for hit in re.finditer(r".*\n", text):
+        line = hit[0].rstrip()
+        in_table = line.startswith("|") and (in_table or line.endswith("| shown by |"))
+        for name in CODE.findall(line.strip("|").rpartition("|")[2] if in_table else ""):
+            if not name.startswith("make ") and name not in tests:
+                yield hit.start(), "no test %s" % name
+
+
 def main():
     listed = tracked()
     files = set(listed)
@@ -103,6 +120,8 @@ def main():
         found = list(check_links(page, text, files, folders))
         if not page.startswith(HISTORY):
             found += check_names(page, text, files, folders, known)
+        if page == "docs/safety.md":
+            found += check_tests(text, files)
         for offset, what in found:
             print("%s:%d: %s" % (page, text.count("\n", 0, offset) + 1, what))
         wrong += len(found)
