@@ -40,6 +40,8 @@ static void test_gated_takes_every_frame(void)
     TEST_ASSERT_EQUAL_INT(21, world.rise_count); /* one for the frame that did not come any more */
     TEST_ASSERT_EQUAL_INT(0, count_in_records("lost") + count_in_records("skipped"));
     TEST_ASSERT_EQUAL_INT(1, world.unproven_count);
+    TEST_ASSERT_EQUAL_INT64(20, world.state.result_count);
+    TEST_ASSERT_EQUAL_INT64(20, world.state.status.frame_count);
 }
 
 /* --check: as many frames as it takes, no record, and a status. */
@@ -443,6 +445,25 @@ static void test_nothing_in_range(void)
     }
 }
 
+/* An exposure ends within its frame, and the camera is told of one that differs: every second one. */
+static void test_exposure(void)
+{
+    static const enum world_act acts[] = {FIVE};
+    static const int32_t frame_times_us[] = {WORLD_FRAME_US, 20001, 19999, 10000};
+    static const int32_t max_us[] = {20000, 20000, 19999, 10000};
+    for (int i = 0; i < COUNT(frame_times_us); i++) {
+        world_init(APP_STROBE_ALWAYS, acts, COUNT(acts));
+        world.config.exposure = APP_EXPOSURE_STEER;
+        world.frame_time_us = frame_times_us[i];
+        TEST_ASSERT_EQUAL_INT(APP_EXIT_GOOD, world_run());
+        TEST_ASSERT_EQUAL_INT32(max_us[i], world.exposure_max_us);
+        if (i == 0) {
+            TEST_ASSERT_EQUAL_INT(5, world.lit_count);
+            TEST_ASSERT_EQUAL_INT(1 + 3, world.calls[WORLD_CAMERA_EXPOSURE]);
+        }
+    }
+}
+
 /* A camera that refuses is not opened again. */
 static void test_exposure_refused(void)
 {
@@ -462,7 +483,7 @@ static void test_on_for_long(void)
 {
     static const enum world_act acts[] = {WORLD_FRAME};
     static const uint8_t nothing = 0;
-    const struct hal_frame frame = {.samples = &nothing, .width = 752, .height = 582, .name = ""};
+    struct hal_frame frame = {.samples = &nothing, .width = 752, .height = 582, .name = ""};
     world_init(APP_STROBE_ALWAYS, acts, COUNT(acts));
     TEST_ASSERT_EQUAL_INT(APP_EXIT_GOOD, world_run());
     world.state.laser.is_on = world.state.light_wanted = true;
@@ -471,6 +492,12 @@ static void test_on_for_long(void)
     app_frame_use(&world.state, &frame);
     TEST_ASSERT_GREATER_THAN_INT32(APP_PHASE_FLIGHT_MAX, world.state.on_frames);
     TEST_ASSERT_EQUAL_INT(1, world.dark_count);
+    /* One of another size is lost, with a record that says so, and is given back. */
+    frame.width = 640;
+    world.held[0] = true;
+    app_frame_use(&world.state, &frame);
+    TEST_ASSERT_EQUAL_INT(1, world.error_count);
+    TEST_ASSERT_FALSE(world.held[0]);
 }
 
 /* Nobody sees anything in frames that cannot be read: they do not keep the laser on. A good one does
@@ -554,6 +581,8 @@ static int fail_each_call(enum world_function function, int mode, int flight, bo
             bool failed = is_fatal(function) || function == WORLD_STROBE_OFF;
             TEST_ASSERT_EQUAL_INT_MESSAGE(failed ? APP_EXIT_FAILED : APP_EXIT_GOOD, exit, message);
             TEST_ASSERT_TRUE_MESSAGE(world.reported_fault || function != WORLD_STROBE_OFF, message);
+            TEST_ASSERT_EQUAL_MESSAGE(function == WORLD_OUTPUT_NEVER, world.reported_output,
+                                      message);
         }
     }
     world_doing = NULL;
@@ -696,6 +725,7 @@ int main(void)
     RUN_TEST(test_no_rig);
     RUN_TEST(test_without_laser);
     RUN_TEST(test_nothing_in_range);
+    RUN_TEST(test_exposure);
     RUN_TEST(test_exposure_refused);
     RUN_TEST(test_on_for_long);
     RUN_TEST(test_bad_frames_only);

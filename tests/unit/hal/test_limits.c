@@ -130,6 +130,25 @@ static void the_duty_holds(void)
     }
 }
 
+/* Used up, it needs half of what may be used at once: 50 % of the burst and the slack are 8,000,000. */
+static void a_used_up_duty_needs_half(void)
+{
+    int64_t now_us = 0;
+    int steps;
+
+    start(50);
+    while (hal_limits_allow(&limits, now_us, now_us, now_us)) {
+        now_us += STEP_US;
+    }
+    TEST_ASSERT_EQUAL_INT64(17 * STEP_US, now_us);
+    const int64_t on_us = now_us;
+    for (steps = 1; steps < 9; steps++) {
+        IH_TEST_EQUAL(false, hal_limits_allow(&limits, now_us + steps * STEP_US, on_us, on_us),
+                      "allowed", steps);
+    }
+    TEST_ASSERT_TRUE(hal_limits_allow(&limits, now_us + steps * STEP_US, on_us, on_us));
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -140,5 +159,6 @@ int main(void)
     RUN_TEST(what_cannot_be_counts_as_high);
     RUN_TEST(a_clock_that_goes_back_is_no_rest);
     RUN_TEST(the_duty_holds);
+    RUN_TEST(a_used_up_duty_needs_half);
     return UNITY_END();
 }
