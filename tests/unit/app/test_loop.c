@@ -445,7 +445,7 @@ static void test_nothing_in_range(void)
     }
 }
 
-/* An exposure ends within its frame, and the camera is told of one that differs: every second one. */
+/* An exposure ends within its frame, and one that differs is sent to the camera: every second one. */
 static void test_exposure(void)
 {
     static const enum world_act acts[] = {FIVE};
