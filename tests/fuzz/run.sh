@@ -17,7 +17,7 @@ cd "$(dirname "$0")/../.."
 
 cjson=$1
 shift
-all="frame range calls init labels align surface nests detections tracks blob rig_json pgm png xyz json render config pixels"
+all="frame range calls init labels align surface nests detections tracks blob rig_json images xyz json render config pixels"
 targets=${*:-$all}
 engines=${FUZZ_ENGINES:-libfuzzer afl}
 seconds=${FUZZ_SECONDS:-60}

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """Frames as people have them: PNG, any case of a suffix, other units of depth, matrices as arrays, files in other formats.
+And what host_sim says beside its records: progress, lines of 80 columns, how the rig has moved, what to do next.
 
 frames.py HOST_SIM FRAMES_DIR
 """
@@ -302,11 +303,13 @@ def test_page(program, work):
     ok(times[0]["hypotheses"][0]["centre_mm"] == expected, "the page's rig.json: depth in 0.2 mm", times[0])
 
 
-# --- help and the last line ------------------------------------------------------------------------
+# --- what it says ------------------------------------------------------------------------
 
-def on_terminal(program, *arguments):
+def shown_on(stream, program, *arguments):
+    """What a program writes to a terminal in place of its standard output or error."""
     ours, theirs = pty.openpty()
-    with subprocess.Popen([program, *arguments], stdout=theirs, stderr=subprocess.DEVNULL) as process:
+    streams = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, stream: theirs}
+    with subprocess.Popen([program, *arguments], **streams) as process:
         os.close(theirs)
         shown = b""
         while True:
@@ -319,22 +322,77 @@ def on_terminal(program, *arguments):
             shown += data
         process.wait(60)
     os.close(ours)
-    return shown.decode().replace("\r\n", "\n")
+    return shown.decode()
 
 
-def test_lines(program, work):
+def test_next(program, work):
     short, long = run(program, "-h"), run(program, "--help")
     ok(short.returncode == 0 and short.stdout == long.stdout != "" and short.stderr == "", "-h is --help")
     folder = os.path.join(work, "pgm")
     try:
-        last = on_terminal(program, folder).rstrip("\n").split("\n")[-1]
+        last = shown_on("stdout", program, folder).split()
     except OSError as reason:
         ok(True, "the last line on a terminal # SKIP no terminal can be opened here: %s" % reason.strerror)
         return
-    ok(last.endswith("host_sim --report report.html " + folder), "the last line on a terminal says what to do next", last)
+    ok(last[-4:] == ["host_sim", "--report", "report.html", folder], "the last line on a terminal says what to do next", last)
     ok("--report" not in run(program, folder).stdout, "and is not there in a pipe")
     page = os.path.join(work, "report.html")
-    ok("host_sim --report" not in on_terminal(program, "--report", page, folder), "nor where there is a report")
+    ok("host_sim --report" not in shown_on("stdout", program, "--report", page, folder), "nor where there is a report")
+
+
+def test_lines(program, folder):
+    text = run(program, folder).stdout
+    long = [line for line in text.splitlines()[1:] if len(line) > 80 and "error:" not in line]
+    ok(text and not long, "lines of at most 80 columns, with long names too", long)
+    help_lines = run(program, "--help").stdout.splitlines()
+    ok(max(map(len, help_lines)) <= 80, "help fits a terminal", max(help_lines, key=len))
+
+
+def rig_lines(program, *arguments):
+    return [line for line in run(program, *arguments).stdout.splitlines() if line.startswith("  rig ")]
+
+
+def test_rig(program, folder, work):
+    """A line where the state of the rig changes, and how it has moved at the end."""
+    wrong = os.path.join(work, "wrong.json")
+    rig = read_json(os.path.join(folder, "rig.json"))
+    rig["camera_matrix"]["data"][5] += 2  # cy in px
+    write_json(wrong, rig)
+    lines = rig_lines(program, folder)
+    ok(lines == ["  rig fits"], "a rig that fits: said once", lines)
+    lines = rig_lines(program, "--rig", wrong, folder)
+    record = json.loads(run(program, "--json", "--rig", wrong, folder).stdout.splitlines()[2])
+    moved = "  rig moved: %.3f %.3f %.3f degrees, focal %.2f %%, shift %.2f %.2f px" % (
+        *record["rig"]["rotation_deg"], record["rig"]["focal_percent"], *record["rig"]["shift_px"])
+    good = len(lines) == 4 and lines[2] == moved and lines[0].startswith("  rig moved: ")
+    good = good and all(line.startswith("  rig depth ") for line in lines[1::2]) and max(map(len, lines)) <= 80
+    ok(good, "a rig that moved: how, after the first frame and the last", (lines, moved))
+    lines = rig_lines(program, "--paper", folder)
+    ok(lines == [], "with --paper nothing is said of the rig", lines)
+
+
+def test_progress(program, folder):
+    ok(run(program, "--json", folder).stderr.count("\r") == 0, "no progress in a pipe")
+    try:
+        shown = shown_on("stderr", program, "--json", folder)
+    except OSError as reason:
+        ok(True, "progress on a terminal # SKIP no terminal can be opened here, /dev/pts: %s" % reason.strerror)
+        return
+    ok("%s 1/" % os.path.basename(folder) in shown, "progress on a terminal", shown[:200])
+    ok(shown.endswith("\r\x1b[K"), "and nothing is left of it", shown[-80:])
+
+
+def test_said(program, source, work):
+    folder = os.path.join(work, 'frames, "all"')
+    os.makedirs(folder)
+    shutil.copy(os.path.join(source, "rig.json"), folder)
+    for i in (0, 10, 20):
+        shutil.copy(os.path.join(source, "%06d.pgm" % i), folder)
+    os.rename(os.path.join(folder, "000020.pgm"), os.path.join(folder, "a_camera_s_own_long_name,000020.pgm"))
+    write(os.path.join(folder, "b\nbroken.pgm"), b"P5 no frame")
+    test_rig(program, folder, work)
+    test_lines(program, folder)
+    test_progress(program, folder)
 
 
 def test_trace(program, work):
@@ -352,8 +410,9 @@ def main():
         test_unread(program, source, work)
         test_absent(program, source, work)
         test_page(program, work)
-        test_lines(program, work)
+        test_next(program, work)
         test_trace(program, work)
+        test_said(program, source, work)
     return 1 if failed else 0
 
 
