@@ -105,7 +105,7 @@ site: sim ## all pages as a static site in build/site, with a report page of the
 	@$(BUILD)/host/sim/host_sim --report $(BUILD)/site_report.html frames > /dev/null
 	@/usr/bin/python3 -B tools/site.py $(BUILD)/site $(BUILD)/site_report.html
 
-live-pictures: sanitize ## the live view's page in a browser: docs/live.png and docs/live_phone.png anew
+live-pictures: sanitize ## the live view's page in a browser: docs/live.png anew
 	@tools/setup.sh test-report
 	@cmake --build --preset sanitize --parallel 2 --target isohead_board
 	@/usr/bin/python3 -B tests/board/live_page.py $(BUILD)/sanitize/firmware/app/isohead_board frames/sequence2 docs
