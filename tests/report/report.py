@@ -579,7 +579,7 @@ def test_site(test, browser, page, work, keep):
     test.same((outside, browser.errors), ([], []), "site: nothing is loaded from elsewhere, no error")
     browser.open(os.path.join(site, "index.html"))
     browser.click("a.open")
-    browser.until(SHOWN + " !== undefined")
+    browser.until("document.documentElement !== null && %s !== undefined" % SHOWN)  # null between two pages
     test.ok(browser.value("location.hash").startswith("#sequence2/"), "site: leads to the report page", browser.value("location.href"))
     browser.size(*DESK)
     result = make_site(work, page)
