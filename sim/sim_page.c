@@ -224,6 +224,7 @@ static void put_other(struct sim_page *page, const cJSON *record)
     char *text = cJSON_PrintUnformatted(record);
     if (text == NULL) {
         sim_report_grow(NULL, SIZE_MAX, 1); /* there is no memory */
+        return;
     }
     begin(page, "class=\"other\"");
     take_json(page->file, text, strlen(text));

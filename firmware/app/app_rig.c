@@ -106,10 +106,9 @@ struct numbers {
     const struct field *field;
     int rows, columns;
     int count;
-    double *value;
 };
 
-static bool read_one(struct numbers *numbers, const cJSON *item)
+static bool read_one(struct numbers *numbers, const cJSON *item, double *value)
 {
     const struct field *field = numbers->field;
     const int row = numbers->count / numbers->columns;
@@ -122,12 +121,12 @@ static bool read_one(struct numbers *numbers, const cJSON *item)
         return hal_fail(field->error, "%s[%d][%d]: %g, expected a finite number", field->name, row,
                         column, item->valuedouble);
     }
-    numbers->value[numbers->count++] = item->valuedouble;
+    value[numbers->count++] = item->valuedouble;
     return true;
 }
 
 /* All numbers of a flat array. where: what of the field it is. */
-static bool read_flat(struct numbers *numbers, const cJSON *array, const char *where)
+static bool read_flat(struct numbers *numbers, const cJSON *array, const char *where, double *value)
 {
     const int expected = numbers->rows * numbers->columns;
     if (cJSON_GetArraySize(array) != expected) {
@@ -136,13 +135,13 @@ static bool read_flat(struct numbers *numbers, const cJSON *array, const char *w
     }
     bool good = true;
     for (const cJSON *item = array->child; good && item != NULL; item = item->next) {
-        good = read_one(numbers, item);
+        good = read_one(numbers, item, value);
     }
     return good;
 }
 
 /* An array of rows, as NumPy's tolist() writes it. */
-static bool read_rows(struct numbers *numbers, const cJSON *array)
+static bool read_rows(struct numbers *numbers, const cJSON *array, double *value)
 {
     const struct field *field = numbers->field;
     if (cJSON_GetArraySize(array) != numbers->rows) {
@@ -156,7 +155,7 @@ static bool read_rows(struct numbers *numbers, const cJSON *array)
                             index, numbers->columns);
         }
         for (const cJSON *item = row->child; item != NULL; item = item->next) {
-            if (!read_one(numbers, item)) {
+            if (!read_one(numbers, item, value)) {
                 return false;
             }
         }
@@ -167,14 +166,14 @@ static bool read_rows(struct numbers *numbers, const cJSON *array)
 /* The numbers of a matrix, row by row: OpenCV's form, an array of rows, or a flat array. */
 static bool read_matrix(const struct field *field, int rows, int columns, double *value)
 {
-    struct numbers numbers = {field, rows, columns, 0, value};
+    struct numbers numbers = {field, rows, columns, 0};
     const cJSON *matrix = find(field);
     if (matrix == NULL) {
         return false;
     }
     if (cJSON_IsArray(matrix)) {
-        return cJSON_IsArray(matrix->child) ? read_rows(&numbers, matrix)
-                                            : read_flat(&numbers, matrix, "");
+        return cJSON_IsArray(matrix->child) ? read_rows(&numbers, matrix, value)
+                                            : read_flat(&numbers, matrix, "", value);
     }
     if (!check_form(field, matrix, rows, columns)) {
         return false;
@@ -183,7 +182,7 @@ static bool read_matrix(const struct field *field, int rows, int columns, double
     if (!cJSON_IsArray(data)) {
         return hal_fail(field->error, "%s: data is no array", field->name);
     }
-    return read_flat(&numbers, data, " in data");
+    return read_flat(&numbers, data, " in data", value);
 }
 
 /* value * 2^fraction_bits as int32_t. part: what of the field it is. */
@@ -262,7 +261,7 @@ static bool read_projector(struct field *field, struct ih_calibration *calibrati
 {
     static const char *const axis[RAY_AXES] = {" x", " y", " z"};
     double origin_mm[RAY_AXES] = {0};
-    double ray[IH_SLOTS * RAY_AXES];
+    double ray[IH_SLOTS * RAY_AXES] = {0};
     field->name = "projector_origin";
     if (!read_matrix(field, RAY_AXES, 1, origin_mm)) {
         return false;
