@@ -100,7 +100,9 @@ check_tools() {
     done
     lintian --allow-root --fail-on error,warning "$deb" || fail "lintian of $deb"
     check_pages
-    ! grep -rn 'build/' "$work/tree/usr/share/doc" || fail "$deb: a page names files of the sources"
+    ! grep -n 'build/\|\./host_sim' "$work/tree/usr/share/doc/isohead-tools/calibration.md" ||
+        fail "$deb: the page of the calibration names programs of the sources"
+    grep -q 'three.js authors' "$work/tree/usr/share/doc/isohead-tools/copyright" || fail "$deb: no word of three.js"
     for program in isohead-calibrate isohead-render rigblob host_sim; do
         page=$work/tree/usr/share/man/man1/$program.1
         gunzip "$page.gz"
@@ -108,7 +110,7 @@ check_tools() {
         "$work/tree/usr/bin/$program" --help >"$work/help"
         ! grep -qF "$PWD" "$work/tree/usr/bin/$program" || fail "$program knows where it was built: $PWD"
         # every line of --help, as it stands there
-        mandoc -Tascii "$page" | col -b | sed 's/^     //' | grep -vxFf - "$work/help" && fail "$program.1 lacks lines of --help"
+        mandoc -Tascii "$page" | col -bx | sed 's/^     //' | grep -vxFf - "$work/help" && fail "$program.1 lacks lines of --help"
     done
     # The page's own example, as far as seconds go.
     (cd "$work" && PATH=$work/tree/usr/bin:$PATH && isohead-calibrate board board.pgm &&

@@ -95,7 +95,7 @@ tools_package() {
     manual isohead-render $built/tools/render/render "render frames of laser dots, and boards to try the calibration with"
     manual rigblob $built/tools/rigblob/rigblob "a calibrated rig as bytes for boards without JSON"
     manual host_sim $built/sim/host_sim "find heads in 3-D in directories of frames"
-    pages calibration contract safety hardware health report
+    pages calibration contract safety health report
     # The page's commands as they are where the package is installed.
     sed -i -E -e '/^## What it needs$/,/^calibrate=/c\## What it needs\nThis package. The rendered pictures take 50 MB and all steps with them some minutes. For short:\n```\ncalibrate=isohead-calibrate' \
         -e 's,^render=.*,render=isohead-render,' -e 's,build/[a-z/]*/rigblob,rigblob,' -e 's,\./host_sim,host_sim,' \
@@ -111,8 +111,14 @@ fi
 # The licence's text as an indented paragraph, empty lines as dots.
 sed '1,/^$/d' LICENSE | sed '1,/^$/d' | sed -e 's/^$/./' -e 's/^/ /' | cat packaging/copyright - \
     >"$stage/copyright"
+if [ "$name" = isohead-tools ]; then
+    # What is folded into the page that host_sim writes; the licence is the same.
+    printf '\nFiles: usr/bin/host_sim\nCopyright:' >>"$stage/copyright"
+    sed -n 's/^ .*Copyright (c)//p' sim/report/notices.txt >>"$stage/copyright"
+    printf 'License: Expat\n' >>"$stage/copyright"
+fi
 put 644 "$stage/copyright" "/usr/share/doc/$name/copyright"
-maintainer=$(sed -n 's/^Maintainer: //p' packaging/control.in)
+maintainer=$(sed -n '/^Maintainer: /{s///p;q}' packaging/control.in)
 {
     printf '%s (%s) stable; urgency=medium\n\n' "$name" "$version"
     printf '  * What is new stands in CHANGELOG.md of the sources.\n\n'
