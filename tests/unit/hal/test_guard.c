@@ -812,26 +812,24 @@ static void a_sign_of_life_starts_the_time_anew(void)
     TEST_FAIL_MESSAGE("in 50 tries no sign of life came in time");
 }
 
-static void the_rest_is_the_strobe_below(void)
-{
-    bool closed = false;
-
-    TEST_ASSERT_TRUE(open_it());
-    TEST_ASSERT_TRUE(guard.strobe.interlock(guard.strobe.context, &closed, &error));
-    TEST_ASSERT_TRUE(closed);
-    TEST_ASSERT_FALSE(guard.strobe.beat(guard.strobe.context, &error));
-    TEST_ASSERT_EQUAL_STRING("line: beat", error.text);
-}
-
 /* Until it is so; the test's own time is over after WIDE_MS. */
 static void wait_until(bool (*is_so)(void))
 {
     const int64_t end_us = now_us() + WIDE_MS * INT64_C(1000);
+    bool good = false;
 
-    while (!is_so() && now_us() < end_us) {
+    while (!(good = is_so()) && now_us() < end_us) {
         poll(NULL, 0, 1);
     }
-    TEST_ASSERT_TRUE(is_so());
+    TEST_ASSERT_TRUE(good);
+}
+
+static void the_rest_is_the_strobe_below(void)
+{
+    TEST_ASSERT_TRUE(open_it());
+    wait_until(is_closed);
+    TEST_ASSERT_FALSE(guard.strobe.beat(guard.strobe.context, &error));
+    TEST_ASSERT_EQUAL_STRING("line: beat", error.text);
 }
 
 static bool is_dark(void)
