@@ -14,9 +14,12 @@ QEMU_PLUGIN_DIR ?= $(BUILD)/third_party/qemu
 # The builds whose outputs of every stage are compared; make test takes those of -O3 for this machine and arm64.
 GOLDEN_ALL := gcc-O0 gcc-O3 clang-O0 clang-O3 arm64-O0 arm64-O3 armhf-O2 riscv64-O2 s390x-O2 ppc64-O2 \
   mps2-an386-O2 mps2-an500-O2 mps3-an547-O2
-# How many mistakes make mutation makes, and how many per cent of them tests must catch.
+# How many mistakes make mutation makes in the core and in what switches the laser, and how many per cent of them
+# tests must catch, those that change nothing among them.
 MUTANTS ?= 500
 CAUGHT_MIN ?= 85
+LASER_MUTANTS ?= 150
+LASER_CAUGHT_MIN ?= 80
 # What make view builds.
 VIEW := $(BUILD)/view/tools/view/view
 
@@ -134,12 +137,14 @@ exhaustive: sim ## square root, division, angle and the surface's basis for all 
 	@tools/setup.sh ranges
 	@tests/checks/exhaustive.sh $(UNITY_DIR)
 
-mutation: sim ## would the tests notice? Mistakes made in the core one at a time; half an hour
+mutation: sim ## would the tests notice? Mistakes made in the core and in the laser's code one at a time; half an hour
 	@tools/setup.sh mutation
 	@$(BUILD)/host/tests/golden/golden_pack $(BUILD)/golden.bin \
 	  $(foreach n,1 2,$(addprefix frames/sequence$n/,rig.json 000024.pgm 000025.pgm 000026.pgm))
 	@/usr/bin/python3 tests/checks/mutation.py --count $(MUTANTS) --min $(CAUGHT_MIN) --unity $(abspath $(UNITY_DIR)) \
 	  --golden $(BUILD)/golden.bin
+	@/usr/bin/python3 tests/checks/mutation.py laser --count $(LASER_MUTANTS) --min $(LASER_CAUGHT_MIN) \
+	  --unity $(abspath $(UNITY_DIR))
 
 fuzz: ## fuzz every target with libFuzzer and AFL++, FUZZ_SECONDS each (default 60) or FUZZ_RUNS; a table
 	@tools/setup.sh fuzz

@@ -1,18 +1,24 @@
 #!/usr/bin/env python3
-"""Would the tests notice a mistake? Mistakes are made in firmware/core one at a time: another
+"""Would the tests notice a mistake? Mistakes are made in a part of the firmware one at a time: another
 operator, a constant one more or less, a condition the other way round, a statement left out. The
 tests that are linked with the mutated source run, its own first, until one fails; at last its own
-once more with the sanitizers that make test has.
+once more with the sanitizers that make test has. The parts are
+  core         firmware/core
+  laser        what switches the laser on and off: policy, frames, the guards and their limits, signals.
+               A guard with a mistake may kill whoever it finds: each test runs in a PID namespace of
+               its own, with its own /proc. One that waits for ever needs no processor: a test ends after
+               WALL_TIMES its time without the mutant, and where that is too short for the test without
+               the mutant, too, as the machine has become busy, it is tried again with twice as much
 
 A mutant is one of
   no C         does not compile; not counted
   equivalent   gcc -O2 makes the same object code of it as of the original; not counted
-  caught       a test fails, crashes, or needs CPU_TIMES as much of the processor as without the
-               mutant, CPU_MIN_S at least
+  caught       a test fails, crashes, does not end, or needs CPU_TIMES as much of the processor as
+               without the mutant, CPU_MIN_S at least
   golden       no test fails, but the golden set's hashes of every stage's output differ
   alive        nobody noticed
 
-mutation.py [--count N] [--min PERCENT] [--seed N] [--stage NAME]... [--jobs N] [--unity DIR]
+mutation.py [PART] [--count N] [--min PERCENT] [--seed N] [--stage NAME]... [--jobs N] [--unity DIR]
             [--golden FILE]
             the mutants that live, the table per stage, and exit status 1 when fewer than PERCENT
             of them are caught by tests alone. The mutants are drawn by the seed, of
@@ -40,13 +46,37 @@ import mutation_sites as sites
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 CPU_TIMES = 6
 CPU_MIN_S = 2
+WALL_TIMES = 4
+WALL_MIN_S = 30
+KILLED = 128 + 9  # the status of timeout and of unshare
 RESULTS = ("no C", "equivalent", "caught", "golden", "alive")
 
-COMPILE_CORE = ["gcc", "-std=c11", "-O2", "-ffp-contract=off", "-mgeneral-regs-only", "-w", "-I.", "-c"]
+COMPILE = ["gcc", "-std=c11", "-O2", "-ffp-contract=off", "-w", "-c"]
 # Tests see no vectors either: their headers say what the core can do.
 COMPILE_TEST = ["gcc", "-std=c11", "-O1", "-ffp-contract=off", "-U__SSE2__", "-w", "-c"]
 SANITIZERS = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
 SANITIZERS_SLOWER = 10
+
+
+# root: where names begin. folders: copied with all that is in them. library: what tests are linked with.
+# mutated: sources of it by name; None: all, and the headers that hold code. tests: by name; None: those
+# of the sources.
+Part = collections.namedtuple("Part", "root folders library mutated tests options may_kill")
+PARTS = {
+    "core": Part("firmware/core", ["."], ["**/*.c"], None, None, ["-mgeneral-regs-only", "-I."], False),
+    "laser": Part(".", ["firmware/core", "firmware/app", "hal"],
+                  ["firmware/core/%s/*.c" % name for name in "align base nests rig".split()] +
+                  ["firmware/core/dots/ih_dot_rows.c", "hal/hal*.c", "hal/replay/hal_pgm.c", "hal/linux/hal_guard*.c",
+                   "hal/linux/hal_descriptors.c", "hal/linux/hal_signals.c"] +
+                  ["firmware/app/app_%s.c" % name for name in
+                   "config frame health laser live log loop phase record rig_explain rig_text state status text view write".split()],
+                  "app_laser app_frame app_phase hal_limits hal_guard hal_guard_child hal_guard_end hal_guard_page "
+                  "hal_signals hal_descriptors".split(),
+                  "laser loop phase limits guard signals".split(),
+                  ["-D_GNU_SOURCE", "-Ifirmware/core", "-Ifirmware/app", "-Ihal"], True),
+}
+# A process ID of one there is no process here; nothing is left of it when it ends.
+NAMESPACE = ["unshare", "--pid", "--fork", "--mount-proc", "--kill-child"]
 
 
 def run(command, directory=None):
@@ -63,23 +93,27 @@ def read(path, mode="r"):
 
 
 class Bench:
-    """The core and its tests, built once, in a folder; a mutant is built and run in its own one."""
+    """A part and its tests, built once, in a folder; a mutant is built and run in its own one."""
 
-    def __init__(self, core, tests, unity, work, golden=None):
-        self.core, self.tests, self.unity, self.work = core, tests, unity, work
+    def __init__(self, part, unity, work, golden=None):
+        self.part, self.unity, self.work = part, unity, work
+        self.tree = os.path.join(work, "tree")
+        self.tests = tests_of(part)
         self.golden_file, self.golden_hashes = golden, None
-        self.seconds = {}
-        self.linked = {}  # objects of the core, by test
+        self.seconds, self.wall, self.patience = {}, {}, 1
+        self.linked = {}  # objects of the library, by test
         self.lock = threading.Lock()
-        shutil.copytree(core, os.path.join(work, "core"))
-        self.sources = core_files(core, "*.c")
+        for folder in part.folders:
+            shutil.copytree(os.path.join(ROOT, part.root, folder), os.path.join(self.tree, folder), dirs_exist_ok=True)
+        self.sources = files_of(part)
+        self.compile = COMPILE + part.options
         for source in self.sources:
-            run(COMPILE_CORE + [source, "-o", source[:-2] + ".o"], os.path.join(work, "core"))
-        self.library = os.path.join(work, "libcore.a")
-        run(["ar", "rcs", self.library] + [os.path.join(work, "core", source[:-2] + ".o") for source in self.sources])
+            run(self.compile + [source, "-o", source[:-2] + ".o"], self.tree)
+        self.library = os.path.join(work, "libpart.a")
+        run(["ar", "rcs", self.library] + [os.path.join(self.tree, source[:-2] + ".o") for source in self.sources])
         if unity:
             run(COMPILE_TEST + [unity + "/unity.c", "-o", work + "/unity.o"])
-        for test in tests:
+        for test in self.tests:
             self.build_test(test)
         if golden:
             self.build_golden()
@@ -92,17 +126,18 @@ class Bench:
         output = self.program(test) + ".sanitized.o"
         with self.lock:
             if not os.path.exists(output):
-                run(self.compile_test(test, os.path.join(self.work, "core"), output) + SANITIZERS)
+                run(self.compile_test(test, self.tree, output) + SANITIZERS)
                 program = output[:-2]
                 self.link([output], program, options=SANITIZERS)
-                if fails(program, SANITIZERS_SLOWER * self.seconds[test]):
+                if self.fails(program, test, SANITIZERS_SLOWER):
                     sys.exit("mutation: %s fails with sanitizers without any mutant" % os.path.basename(test))
         return output
 
-    def compile_test(self, test, core, output):
-        own = os.path.dirname(test)
-        folders = [core, own, os.path.join(ROOT, "tests/unit"), os.path.join(ROOT, "tests/vectors")] + ([self.unity] if self.unity else [])
-        return COMPILE_TEST + ["-I" + folder for folder in folders] + [test, "-o", output]
+    def compile_test(self, test, tree, output):
+        options = [re.sub("^-I", "-I%s/" % tree, option) for option in self.part.options if option[1] in "ID"]
+        folders = [os.path.dirname(test), os.path.join(ROOT, "tests/unit"), os.path.join(ROOT, "tests/vectors")] + \
+            ([self.unity] if self.unity else [])
+        return COMPILE_TEST + options + ["-I" + folder for folder in folders] + [test, "-o", output]
 
     def link(self, objects, output, library=None, options=()):
         unity = [self.work + "/unity.o"] if self.unity else []
@@ -111,16 +146,17 @@ class Bench:
 
     def build_test(self, test):
         program = self.program(test)
-        run(self.compile_test(test, os.path.join(self.work, "core"), program + ".o"))
+        run(self.compile_test(test, self.tree, program + ".o"))
         trace = self.link([program + ".o"], program)
-        self.linked[test] = set(re.findall(r"libcore\.a\W+(\w+)\.o", trace))
+        self.linked[test] = set(re.findall(r"libpart\.a\W+(\w+)\.o", trace))
         included = included_source(test)
         if included:
             self.linked[test].add(os.path.basename(included)[:-2])
-        begin = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
+        begin, wall = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime, time.monotonic()
         if subprocess.run([program], stdout=subprocess.DEVNULL, check=False).returncode:
             sys.exit("mutation: %s fails without any mutant" % os.path.basename(test))
         self.seconds[test] = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - begin
+        self.wall[test] = time.monotonic() - wall
 
     def build_golden(self):
         folder, hal = os.path.join(ROOT, "tests", "golden"), os.path.join(ROOT, "hal")
@@ -128,11 +164,22 @@ class Bench:
         objects = []
         for source in [os.path.join(folder, name + ".c") for name in names] + [os.path.join(hal, "hal_text.c")]:
             objects.append(os.path.join(self.work, os.path.basename(source)[:-2] + ".o"))
-            run(COMPILE_TEST + ["-I", self.core, "-I", hal, source, "-o", objects[-1]])
+            run(COMPILE_TEST + ["-I", self.tree, "-I", hal, source, "-o", objects[-1]])
         self.golden_objects = objects
         program = os.path.join(self.work, "golden")
         self.link(objects, program)
         self.golden_hashes = run([program, self.golden_file])
+
+    def fails(self, program, test, slower=1):
+        command = limited(program, slower * self.seconds[test])
+        if not self.part.may_kill:
+            return run_to_failure(command) != 0
+        while True:
+            limit = self.patience * slower * max(WALL_MIN_S, WALL_TIMES * self.wall[test])
+            status = run_to_failure(in_namespace(command, limit))
+            if status != KILLED or run_to_failure(in_namespace([self.program(test)], limit)) == 0:
+                return status != 0
+            self.patience *= 2
 
     def tests_of(self, source):
         """Those that the source is linked with: its own, then the others, the quick ones first."""
@@ -142,8 +189,10 @@ class Bench:
         return own + sorted(others, key=lambda test: self.seconds[test])
 
 
-def core_files(core, pattern):
-    return sorted(glob.glob("**/" + pattern, root_dir=core, recursive=True))
+def files_of(part, patterns=None):
+    root = os.path.join(ROOT, part.root)
+    return sorted(set(sum((glob.glob(pattern, root_dir=root, recursive=True)
+                           for pattern in patterns or part.library), [])))
 
 
 def stem_of(source):
@@ -151,11 +200,11 @@ def stem_of(source):
 
 
 def is_own(test, source):
-    return os.path.basename(test)[5:-2] == re.sub(r"^ih_", "", stem_of(source))
+    return os.path.basename(test)[5:-2] == re.sub(r"^(ih|app|hal)_", "", stem_of(source))
 
 
 def included_source(test):
-    """The source of the core that a test includes, to reach its static functions."""
+    """The source of the part that a test includes, to reach its static functions."""
     found = re.search(r'^#include "([\w/]+\.c)"', read(test), re.MULTILINE)
     return found[1] if found else None
 
@@ -165,15 +214,21 @@ def limited(program, seconds):
     return ["prlimit", "--cpu=%d" % math.ceil(max(CPU_MIN_S, CPU_TIMES * seconds)), program]
 
 
-def fails(program, seconds):
-    """Runs a test until its first failure; needing more than its time is one too."""
+def in_namespace(command, seconds):
+    """The command where it can end nobody else, and is ended with all that it has begun."""
+    user = [] if os.getuid() == 0 else ["--user", "--map-root-user"]
+    return NAMESPACE + user + ["timeout", "--signal=KILL", str(math.ceil(seconds))] + command
+
+
+def run_to_failure(command):
+    """Runs a test until its first failure; its status, 0 where there was none."""
     # stdbuf: each line as it is written, not all of them at the end
-    with subprocess.Popen(["stdbuf", "-oL"] + limited(program, seconds), text=True, errors="replace",
+    with subprocess.Popen(["stdbuf", "-oL"] + command, text=True, errors="replace",
                           stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
                           env=dict(os.environ, ASAN_OPTIONS="verify_asan_link_order=0")) as process:
         if any(":FAIL" in text for text in process.stdout):
             process.kill()
-    return process.returncode != 0
+    return process.returncode
 
 
 class Trial:
@@ -181,21 +236,21 @@ class Trial:
 
     def __init__(self, bench, source, mutant, folder):
         self.bench, self.source, self.mutant, self.folder = bench, source, mutant, folder
-        self.core = os.path.join(folder, "core")
-        shutil.copytree(os.path.join(bench.work, "core"), self.core)
-        text = read(os.path.join(self.core, source))
-        with open(os.path.join(self.core, source), "w", encoding="utf-8") as file:
+        self.tree = os.path.join(folder, "tree")
+        shutil.copytree(bench.tree, self.tree)
+        text = read(os.path.join(self.tree, source))
+        with open(os.path.join(self.tree, source), "w", encoding="utf-8") as file:
             file.write(sites.apply(text, mutant))
         # A header's mutant is in every source; which of them include it is not looked up.
         self.sources = bench.sources if source.endswith(".h") else [source]
-        self.objects = [os.path.join(self.core, name[:-2] + ".o") for name in self.sources]
+        self.objects = [os.path.join(self.tree, name[:-2] + ".o") for name in self.sources]
 
     def compile(self):
-        return all(subprocess.run(COMPILE_CORE + [name, "-o", name[:-2] + ".o"], cwd=self.core, stderr=subprocess.DEVNULL,
-                                  check=False).returncode == 0 for name in self.sources)
+        return all(subprocess.run(self.bench.compile + [name, "-o", name[:-2] + ".o"], cwd=self.tree,
+                                  stderr=subprocess.DEVNULL, check=False).returncode == 0 for name in self.sources)
 
     def is_equivalent(self):
-        return all(read(path, "rb") == read(os.path.join(self.bench.work, "core", os.path.relpath(path, self.core)), "rb")
+        return all(read(path, "rb") == read(os.path.join(self.bench.tree, os.path.relpath(path, self.tree)), "rb")
                    for path in self.objects)
 
     def put_into_library(self):
@@ -207,24 +262,24 @@ class Trial:
         if included_source(test) == self.source or \
                 self.source.endswith(".h") and is_own(test, self.source):
             built = os.path.join(self.folder, "test.o")
-            if subprocess.run(self.bench.compile_test(test, self.core, built), check=False,
+            if subprocess.run(self.bench.compile_test(test, self.tree, built), check=False,
                               stderr=subprocess.DEVNULL).returncode:
                 return True  # a static assertion of the test
         program = os.path.join(self.folder, "test")
         self.bench.link([built], program, self.library)
-        return fails(program, self.bench.seconds[test])
+        return self.bench.fails(program, test)
 
     def is_caught_by_sanitizers(self, test):
         """A source's own test, with both of them compiled as make test does."""
         objects = [os.path.join(self.folder, "sanitized.o")]
         if included_source(test) == self.source:
-            run(self.bench.compile_test(test, self.core, objects[0]) + SANITIZERS)
+            run(self.bench.compile_test(test, self.tree, objects[0]) + SANITIZERS)
         else:
-            run(COMPILE_CORE + ["-O1", self.source, "-o", objects[0]] + SANITIZERS, self.core)
+            run(self.bench.compile + ["-O1", self.source, "-o", objects[0]] + SANITIZERS, self.tree)
             objects.append(self.bench.sanitized(test))
         program = os.path.join(self.folder, "test")
         self.bench.link(objects, program, self.library, SANITIZERS)
-        return fails(program, SANITIZERS_SLOWER * self.bench.seconds[test])
+        return self.bench.fails(program, test, SANITIZERS_SLOWER)
 
     def differs_in_golden(self):
         if not self.bench.golden_file:
@@ -257,10 +312,12 @@ def try_one(bench, source, mutant):
         return mutant, Trial(bench, source, mutant, folder).result()
 
 
-def mutated_sources(core):
-    """Every source, and the headers that hold code."""
-    return [name for name in core_files(core, "*.[ch]")
-            if name.endswith(".c") or "static inline" in read(os.path.join(core, name))]
+def mutated_sources(part):
+    """Those named; else every source, and the headers that hold code."""
+    if part.mutated:
+        return [name for name in files_of(part) if stem_of(name) in part.mutated]
+    return [name for name in files_of(part, ["**/*.[ch]"])
+            if name.endswith(".c") or "static inline" in read(os.path.join(ROOT, part.root, name))]
 
 
 def fractions(weights, count):
@@ -271,7 +328,7 @@ def fractions(weights, count):
 
 def draw(bench, source, count, seed, pool):
     """Tries mutants of one source until so many count, or there are no more."""
-    every = sites.mutants(read(os.path.join(bench.work, "core", source)))
+    every = sites.mutants(read(os.path.join(bench.tree, source)))
     random.Random("%d %s" % (seed, source)).shuffle(every)
     tried, counted = [], 0
     while every and counted < count:
@@ -303,7 +360,7 @@ def report(bench, quota, seed, jobs):
     print("not caught by a test (golden: the golden set's hashes differ):", flush=True)
     with concurrent.futures.ThreadPoolExecutor(jobs) as pool:
         for source, count in quota.items():
-            text = read(os.path.join(bench.work, "core", source))
+            text = read(os.path.join(bench.tree, source))
             results = stages[source] = collections.Counter()
             for mutant, (result, _) in draw(bench, source, count, seed, pool):
                 results[result] += 1
@@ -321,37 +378,44 @@ def report(bench, quota, seed, jobs):
 
 
 def check(arguments):
-    tests = [path for path in sorted(glob.glob(ROOT + "/tests/unit/**/test_*.c", recursive=True)) if is_of_core(path)]
-    core = os.path.join(ROOT, "firmware", "core")
-    quota = fractions({name: len(sites.mutants(read(os.path.join(core, name))))
-                    for name in mutated_sources(core)}, arguments.count)
+    part = PARTS[arguments.part]
+    if part.may_kill:
+        run(in_namespace(["true"], 10))
+    quota = fractions({name: len(sites.mutants(read(os.path.join(ROOT, part.root, name))))
+                       for name in mutated_sources(part)}, arguments.count)
     if arguments.stage:
         quota = {name: quota[name] for name in quota
-                 if re.sub(r"^ih_", "", stem_of(name)) in arguments.stage}
+                 if re.sub(r"^(ih|app|hal)_", "", stem_of(name)) in arguments.stage}
     begin = time.monotonic()
     with tempfile.TemporaryDirectory() as work:
-        bench = Bench(core, tests, arguments.unity, work, arguments.golden)
+        bench = Bench(part, arguments.unity, work, arguments.golden)
         total = report(bench, quota, arguments.seed, arguments.jobs)
     caught = rate(total, "caught")
     counted = sum(total[name] for name in ("caught", "golden", "alive"))
     bad = caught < arguments.min
-    print("mutation: %d mutants, tests alone catch %.1f %%, at least %.0f%s; with the golden set %.1f %%; "
-          "%.0f s" % (counted, caught, arguments.min, ": NOT reached" if bad else "",
+    print("mutation of %s: %d mutants, tests alone catch %.1f %%, at least %.0f%s; with the golden set %.1f %%; "
+          "%.0f s" % (arguments.part, counted, caught, arguments.min, ": NOT reached" if bad else "",
                       rate(total, "caught", "golden"), time.monotonic() - begin))
     return 1 if bad else 0
 
 
-def is_of_core(test):
-    """A test of a source of the core by its name, or one that includes it."""
-    stem = os.path.basename(test)[5:-2]
-    names = {os.path.basename(name) for name in core_files(os.path.join(ROOT, "firmware", "core"), "*.c")}
-    included = included_source(test)
-    return bool({stem + ".c", "ih_" + stem + ".c", included and os.path.basename(included)} & names)
+def tests_of(part):
+    """Those named; else the tests of a source of the part by its name, and those that include one."""
+    every = sorted(glob.glob(ROOT + "/tests/unit/**/test_*.c", recursive=True))
+    if part.tests:
+        return [test for test in every if os.path.basename(test)[5:-2] in part.tests]
+    names = {os.path.basename(name) for name in files_of(part)}
+
+    def is_of_part(test):
+        stem, included = os.path.basename(test)[5:-2], included_source(test)
+        return bool({stem + ".c", "ih_" + stem + ".c", included and os.path.basename(included)} & names)
+    return [test for test in every if is_of_part(test)]
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("part", nargs="?", default="core", choices=sorted(PARTS))
     parser.add_argument("--count", type=int, default=500)
     parser.add_argument("--min", type=float, default=85.0, metavar="PERCENT")
     parser.add_argument("--seed", type=int, default=1)
