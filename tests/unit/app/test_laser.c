@@ -1,4 +1,6 @@
 /* app_laser: the policy against a line that can fail and an interlock that can open at any moment. */
+#include <string.h>
+
 #include "app_laser.h"
 #include "unity.h"
 
@@ -30,8 +32,8 @@ static struct schedule {
     int64_t low_us;
     bool was_on;
     int cut_count, edge_count;
-    int64_t edge_us[EDGES_MAX]; /* rise, fall, rise, ... */
     struct hal_limits limits;
+    int64_t edge_us[EDGES_MAX]; /* rise, fall, rise, ...; the last member */
 } schedule;
 
 static bool fake_open(void *context, struct hal_error *error)
@@ -86,7 +88,6 @@ static bool fake_judged(void *context, struct hal_error *error)
 {
     (void)context;
     fake.judged_count++;
-    schedule.silent_us = 0;
     schedule.judged_on_us = schedule.on_us;
     return fake.judged_fails ? hal_fail(error, "judged fails") : true;
 }
@@ -415,6 +416,13 @@ static void note_edge(void)
     }
 }
 
+/* A frame comes, and is judged: the only thing that ends a silence. */
+static void judge_frame(void)
+{
+    app_laser_frame(&laser, schedule.now_us);
+    schedule.silent_us = 0;
+}
+
 /* Time passes, with the guard's looks in it. */
 static void pass(int64_t time_us)
 {
@@ -462,7 +470,7 @@ static void run_frame(bool stalls)
     app_laser_busy(&laser, true, schedule.now_us);
     pass(random_below(10000));
     if (random_below(8) != 0) {
-        app_laser_frame(&laser, schedule.now_us);
+        judge_frame();
     }
     app_laser_wish(&laser, random_below(3) != 0, schedule.now_us);
     pass(random_below(stalls && random_below(50) == 0 ? 2000000 : 60000));
@@ -490,6 +498,50 @@ static void assert_duty(int32_t duty_percent, int64_t extra_us)
         worst_us = excess_us > worst_us ? excess_us : worst_us;
     }
     TEST_ASSERT_LESS_OR_EQUAL_INT64(extra_us, worst_us);
+}
+
+/* While a frame is processed the duty lasts for as long as the guards may let it be on: at 90 % a burst
+ * of 100 ms lasts for 900 ms, and the cap with its slack takes 230 ms of them. */
+static void test_the_duty_before_a_frame(void)
+{
+    for (int64_t late_us = 0; late_us < 2; late_us++) {
+        const int64_t end_us = 10 * INT64_C(90000) - CAP_US - HAL_LIMITS_SLACK_US + late_us;
+        setUp();
+        start(true, 90);
+        app_laser_wish(&laser, true, 0);
+        for (int64_t now_us = 0; now_us < end_us; now_us += FRAME_US) {
+            app_laser_frame(&laser, now_us);
+        }
+        app_laser_frame(&laser, end_us);
+        TEST_ASSERT_TRUE(fake.line);
+        app_laser_busy(&laser, true, end_us);
+        TEST_ASSERT_EQUAL(late_us == 0, fake.line);
+        /* Off it stays off until the duty is made up for. */
+        app_laser_busy(&laser, false, end_us + 1);
+        app_laser_tick(&laser, end_us + 1);
+        TEST_ASSERT_EQUAL(late_us == 0, fake.line);
+    }
+}
+
+/* Of several reasons the weightiest; none for what has a message of its own. */
+static void test_reasons_have_texts(void)
+{
+    static const struct {
+        unsigned block;
+        const char *part;
+    } reasons[] = {
+        {APP_LASER_BLOCK_DUTY, "duty"},           {APP_LASER_BLOCK_SILENCE, "no frames"},
+        {APP_LASER_BLOCK_CAMERA, "camera"},       {APP_LASER_BLOCK_RIG, "rig"},
+        {APP_LASER_BLOCK_INTERLOCK, "interlock"}, {APP_LASER_BLOCK_DISABLED, "not enabled"},
+    };
+    unsigned blocks = 0;
+    TEST_ASSERT_NULL(app_laser_block_text(0));
+    TEST_ASSERT_NULL(app_laser_block_text(APP_LASER_BLOCK_FAULT));
+    for (size_t i = 0; i < sizeof reasons / sizeof reasons[0]; i++) {
+        blocks |= reasons[i].block;
+        TEST_ASSERT_NOT_NULL(strstr(app_laser_block_text(reasons[i].block), reasons[i].part));
+        TEST_ASSERT_NOT_NULL(strstr(app_laser_block_text(blocks), reasons[i].part));
+    }
 }
 
 /* Half an hour of each. */
@@ -559,23 +611,64 @@ static void flip(const struct member *member, int bit)
     ((uint8_t *)&laser)[member->offset + (size_t)bit / 8] ^= (uint8_t)(1u << bit % 8);
 }
 
+/* The calls of a frame, one at a time. */
+enum { FRAME_CALLS = 8 };
+
+static void call_policy(int call, bool has_frame)
+{
+    switch (call % FRAME_CALLS) {
+    case 4:
+        app_laser_busy(&laser, true, schedule.now_us);
+        break;
+    case 5:
+        if (has_frame) {
+            judge_frame();
+        }
+        break;
+    case 6:
+        app_laser_wish(&laser, random_below(8) != 0, schedule.now_us);
+        break;
+    case 7:
+        app_laser_busy(&laser, false, schedule.now_us);
+        break;
+    default:
+        app_laser_tick(&laser, schedule.now_us);
+        break;
+    }
+}
+
+static void pass_after(int call)
+{
+    pass(call % FRAME_CALLS < 4 || call % FRAME_CALLS == 5 ? APP_LASER_BEAT_US : 0);
+}
+
 /* A processor that was hit goes on with whatever is in its memory. */
 static void run_flipped(int64_t end_us)
 {
-    while (schedule.now_us < end_us) {
-        int64_t frame_us = schedule.now_us + FRAME_US;
-        while (schedule.now_us < frame_us) {
-            app_laser_tick(&laser, schedule.now_us);
-            pass(APP_LASER_BEAT_US);
-        }
-        app_laser_busy(&laser, true, schedule.now_us);
-        if (random_below(8) != 0 && end_us - schedule.now_us > 1000000) {
-            app_laser_frame(&laser, schedule.now_us); /* the last second has no frame */
-        }
-        pass(10000);
-        app_laser_wish(&laser, random_below(8) != 0, schedule.now_us);
-        app_laser_busy(&laser, false, schedule.now_us);
+    for (int call = 0; schedule.now_us < end_us || call % FRAME_CALLS != 0; call++) {
+        /* the last second has no frame */
+        call_policy(call, random_below(8) != 0 && end_us - schedule.now_us > 1000000);
+        pass_after(call);
     }
+}
+
+static void start_flipped(int32_t duty, uint32_t random)
+{
+    const struct hal_limits_config limits = {CAP_US, duty};
+    setUp();
+    schedule = (struct schedule){.random = random, .next_look_us = LOOK_US};
+    hal_limits_init(&schedule.limits, &limits, 0);
+    start(true, duty);
+    app_laser_wish(&laser, true, 0);
+    run_flipped(2000000 + random_below(100000));
+}
+
+/* It may be on still. */
+static void end_flipped(void)
+{
+    note_edge();
+    schedule.edge_us[schedule.edge_count] = schedule.now_us;
+    schedule.edge_count += schedule.edge_count % 2;
 }
 
 /* Any bit of the policy's state: cap and duty hold all the same, as the guards keep sums of their own. */
@@ -587,18 +680,10 @@ static void test_any_bit_flips(void)
     for (size_t m = 0; m < sizeof members / sizeof members[0]; m++) {
         for (int bit = 0; bit < members[m].bit_count; bit++) {
             int32_t duty = duties[bit % 2];
-            const struct hal_limits_config limits = {CAP_US, duty};
-            setUp();
-            schedule = (struct schedule){.random = (uint32_t)bit, .next_look_us = LOOK_US};
-            hal_limits_init(&schedule.limits, &limits, 0);
-            start(true, duty);
-            app_laser_wish(&laser, true, 0);
-            run_flipped(2000000 + random_below(100000));
+            start_flipped(duty, (uint32_t)bit);
             flip(&members[m], bit);
             run_flipped(6000000);
-            note_edge();
-            schedule.edge_us[schedule.edge_count] = schedule.now_us; /* it may be on still */
-            schedule.edge_count += schedule.edge_count % 2;
+            end_flipped();
             if (schedule.silent_max_us > CAP_US + late_us) {
                 TEST_FAIL_MESSAGE(members[m].name);
             }
@@ -778,6 +863,8 @@ int main(void)
     RUN_TEST(test_duty_is_made_up_for_in_time);
     RUN_TEST(test_time_is_accounted_for);
     RUN_TEST(test_duty_while_busy);
+    RUN_TEST(test_the_duty_before_a_frame);
+    RUN_TEST(test_reasons_have_texts);
     RUN_TEST(test_any_schedule);
     RUN_TEST(test_any_bit_flips);
     RUN_TEST(test_the_cap_needs_no_frame_time);
