@@ -376,7 +376,7 @@ def check_confined(pid):
         status = dict(line.rstrip("\n").split(":\t", 1) for line in file if ":\t" in line)
     check(status["Seccomp"] == "2" and status["NoNewPrivs"] == "1", f"not in jail: {status['Seccomp']}")
     check(os.sched_getscheduler(pid) == os.SCHED_IDLE, "as important as the loop")
-    # Seen. From here on it has its share of a machine that has other work, or limits of time decide by chance.
+    # Seen. From here on it is scheduled like everybody else: limits of time are not to depend on other work.
     os.sched_setscheduler(pid, os.SCHED_OTHER, os.sched_param(0))
     if os.geteuid() == 0:
         check(status["Uid"].split() == ["65534"] * 4 and not status["Groups"].strip(), f"user {status['Uid']}")
