@@ -24,6 +24,7 @@ SLOW_S = 0.3
 SAME_MM = 80.0
 VIEW_RAYS_MIN = 4
 OWN_MM = np.array([150.0, 150, 450])
+BODY_MM = ((-150, 150), (200, 400), (-250, 150))
 
 
 class Params:
@@ -103,6 +104,16 @@ class Track:
         self.judge()
 
 
+def is_body(detection, detections):
+    """Is there something above that may be the head to this body?"""
+    for other in detections:
+        off = detection.position - other.position
+        if clear(other.logit - Params.start, 0.002) and all(
+                [clear(min(off[i] - low, high - off[i]), 0.01) for i, (low, high) in enumerate(BODY_MM)]):
+            return True
+    return False
+
+
 class Tracks:
     def __init__(self):
         self.time_s, self.last_id, self.tracks = None, 0, []
@@ -137,7 +148,8 @@ class Tracks:
         """The best pair first."""
         while True:
             pairs = [(self.merit(t, f, g), t, f) for t, g in zip(self.tracks, gone)
-                     if t.detection is None for f in detections if f.track == 0]
+                     if t.detection is None for f in detections
+                     if f.track == 0 and not is_body(f, detections)]
             pairs = sorted([p for p in pairs if p[0] is not None], key=lambda p: -p[0])
             if not pairs:
                 return
@@ -184,7 +196,8 @@ class Tracks:
         for detection in detections:
             if len(self.tracks) == TRACKS_MAX:
                 return
-            if detection.track != 0 or not clear(detection.logit - Params.start, 0.002):
+            if (detection.track != 0 or not clear(detection.logit - Params.start, 0.002)
+                    or is_body(detection, detections)):
                 continue
             away = [np.linalg.norm(t.state[0] - detection.position) for t in self.tracks]
             if any(clear(SAME_MM - a, 0.5) for a in away):
@@ -199,9 +212,10 @@ class Tracks:
             self.tracks.append(track)
 
     def select(self):
-        """The nearest head of those not much less probable than the best."""
+        """The nearest head, but for doubtful ones."""
         heads = sorted([t for t in self.tracks if t.is_head], key=lambda t: -t.logit)
-        good = [t for t in heads if not clear(heads[0].logit - CHOICE_LOGIT - t.logit, 0.004)]
+        good = [t for t in heads
+                if not clear(min(heads[0].logit - CHOICE_LOGIT, Params.accept) - t.logit, 0.004)]
         near = sorted([(t.detection is None, np.linalg.norm(self.shown(t)), t.id) for t in good])
         if len(near) > 1 and near[0][0] == near[1][0]:
             clear(near[0][1] - near[1][1], 0.1)
@@ -305,6 +319,14 @@ def crowd(random):
         yield step, there, [HIT, FRONT, NOTHING, HIT][random.integers(4)]
 
 
+def chest(random):
+    """A chest below a head, more probable than it and nearer; then the head is not seen."""
+    for k in range(30):
+        both = [detection(random, (3 * k, 260, 760), random.normal(3, 0.5)),
+                detection(random, (3 * k, -20, 850), random.normal(1.5, 0.5))]
+        yield 40000, both if k < 20 else both[:1], FRONT
+
+
 def slow(random):
     """A frame each 0.7 to 1.9 s: limited variances."""
     for k in range(30):
@@ -312,7 +334,7 @@ def slow(random):
 
 
 SCENES = {"walk": walk, "crossing": crossing, "hands": hands, "rush": rush, "weak": weak, "crowd": crowd,
-          "slow": slow}
+          "chest": chest, "slow": slow}
 
 
 def play(scene, seed):

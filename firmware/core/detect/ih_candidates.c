@@ -4,6 +4,13 @@
 
 #include "base/ih_fix.h"
 
+/* The middle of a body lies in this box below its head, mm. */
+#define BODY_ASIDE_MM 150
+#define BODY_TOP_MM 200
+#define BODY_BOTTOM_MM 400
+#define BODY_BEFORE_MM 250
+#define BODY_BEHIND_MM 150
+
 static int64_t square_q16(int32_t distance_mm)
 {
     return (int64_t)distance_mm * distance_mm * 65536;
@@ -69,4 +76,26 @@ void ih_candidates_insert(struct ih_detections *out, const struct ih_detection *
         out->detection[at] = out->detection[at - 1];
     }
     out->detection[at] = *detection;
+}
+
+static bool is_between_mm(int64_t value_mm_q8, int32_t low_mm, int32_t high_mm)
+{
+    return value_mm_q8 > (int64_t)low_mm * 256 && value_mm_q8 < (int64_t)high_mm * 256;
+}
+
+bool ih_candidates_is_body(const struct ih_detections *detections, int32_t index,
+                           int32_t logit_min_q10)
+{
+    const int32_t *own_mm_q8 = detections->detection[index].head.centre_mm_q8;
+    for (int32_t i = 0; i < detections->detection_count; i++) {
+        const int32_t *head_mm_q8 = detections->detection[i].head.centre_mm_q8;
+        if (detections->detection[i].logit_q10 > logit_min_q10 &&
+            is_between_mm((int64_t)own_mm_q8[0] - head_mm_q8[0], -BODY_ASIDE_MM, BODY_ASIDE_MM) &&
+            is_between_mm((int64_t)own_mm_q8[1] - head_mm_q8[1], BODY_TOP_MM, BODY_BOTTOM_MM) &&
+            is_between_mm((int64_t)own_mm_q8[2] - head_mm_q8[2], -BODY_BEFORE_MM,
+                          BODY_BEHIND_MM)) {
+            return true;
+        }
+    }
+    return false;
 }

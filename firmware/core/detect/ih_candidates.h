@@ -1,7 +1,9 @@
 /* ih_candidates - distances among the candidates of ih_detections: of starts, nests and detections (ours).
  *
  * In:     centres in the camera frame.
- * Out:    starts that are new, the nest of a candidate, detections in their order.
+ * Out:    starts that are new, the nest of a candidate, detections in their order, and which of them is the
+ *         body to another one's head.
+ * Overflow: centres are below 2^27 in Q8; their differences have 64 bits.
  */
 #ifndef IH_CANDIDATES_H
 #define IH_CANDIDATES_H
@@ -27,6 +29,11 @@ struct ih_evidence_nest ih_candidates_nest_at(const struct ih_hypotheses *hypoth
 /* Insert, the more probable first; one nearer than spacing_mm to a more probable one is the same thing. */
 void ih_candidates_insert(struct ih_detections *out, const struct ih_detection *detection,
                           int32_t spacing_mm);
+
+/* Chest and belly are round, too, and nearer than the head. Is a detection's middle within 150 mm aside of
+ * another one's above logit_min, 200 to 400 mm below it, and from 250 mm before to 150 mm behind it? */
+bool ih_candidates_is_body(const struct ih_detections *detections, int32_t index,
+                           int32_t logit_min_q10);
 
 IH_END_DECLS
 

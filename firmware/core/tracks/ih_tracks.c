@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "base/ih_fix.h"
+#include "detect/ih_candidates.h"
 #include "detect/ih_ellipsoid.h"
 #include "detect/ih_score.h"
 
@@ -24,7 +25,7 @@
 /* A head that fewer rays meet has left the pattern. */
 #define VIEW_RAYS_MIN 4
 #define DETECTION_COUNT_MAX 1000
-/* A head is chosen by its position among those at most this much less probable than the best. */
+/* A doubtful head is not chosen for its position when it is this much less probable than the best. */
 #define CHOICE_LOGIT_Q10 (3 << 10)
 
 void ih_tracks_params_default(struct ih_tracks_params *params)
@@ -36,7 +37,7 @@ void ih_tracks_params_default(struct ih_tracks_params *params)
         .start_head_logit_q10 = 1024,
         .mature_detections = 3,
         .accept_logit_q10 = 512,
-        .drop_logit_q10 = -512,
+        .drop_logit_q10 = -1536,
         .keep_logit_q10 = -3072,
         .memory_q16 = 49152,
         .through_percent = 50,
@@ -251,6 +252,7 @@ static bool best_pair(const struct ih_tracks *tracks, const struct ih_tracks_par
             const struct ih_detection *detection = &detections->detection[i];
             int32_t merit;
             if (track->index != IH_NONE || track_of(tracks, i) != NULL ||
+                ih_candidates_is_body(detections, i, params->start_logit_q10) ||
                 !fits(tracks, params, track, detection, &merit) ||
                 (gone && detection->logit_q10 < params->accept_logit_q10)) {
                 continue;
@@ -376,7 +378,8 @@ static void start_tracks(struct ih_tracks *tracks, const struct ih_tracks_params
     for (int32_t i = 0; i < detections->detection_count && tracks->track_count < IH_TRACKS_MAX;
          i++) {
         const struct ih_detection *detection = &detections->detection[i];
-        if (track_of(tracks, i) == NULL && detection->logit_q10 > params->start_logit_q10) {
+        if (track_of(tracks, i) == NULL && detection->logit_q10 > params->start_logit_q10 &&
+            !ih_candidates_is_body(detections, i, params->start_logit_q10)) {
             start_track(tracks, params, detection, i);
         }
     }
@@ -434,7 +437,8 @@ static int32_t choose(const struct ih_tracks *tracks, const struct ih_tracks_par
     for (int32_t i = 0; i < tracks->head_count; i++) {
         const int32_t index = tracks->head[i];
         const int32_t best_q10 = track_of(tracks, tracks->head[0])->mean_logit_q10;
-        if (track_of(tracks, index)->mean_logit_q10 < best_q10 - CHOICE_LOGIT_Q10) {
+        if (track_of(tracks, index)->mean_logit_q10 <
+            ih_min_s32(best_q10 - CHOICE_LOGIT_Q10, params->accept_logit_q10)) {
             break;
         }
         const bool is_predicted = index >= detections->detection_count;

@@ -7,7 +7,8 @@
  *        frame follows the detections as a predicted one.
  * Method: each track has a Kalman filter (ih_kalman). ih_tracks_expect moves the tracks to the
  *        frame's time and says where heads are expected; ih_tracks_update then
- *        1. assigns detections to tracks, the best pair first: within the gate and above keep_logit.
+ *        1. assigns detections to tracks, the best pair first: within the gate and above keep_logit. One with a
+ *           possible head above it, above start_logit, is a body (ih_candidates) and gets and starts no track.
  *           What is left goes to heads beyond their gate: detections above accept_logit within an
  *           ellipsoid of 150 mm aside and 450 mm in depth, which has no room for a second person.
  *        2. ends a track without a convincing detection when more than through_percent of the rays
@@ -20,10 +21,12 @@
  *           track that is no head yet ends with the first frame without a detection, and so does the
  *           younger of two tracks within 80 mm.
  *        4. starts tracks with the remaining detections above start_logit, while there is room.
- *        A track's log-odds are a running mean of its detections'.
+ *        A track's log-odds are a running mean of its detections'. A head ends as one only when the mean says
+ *        so clearly, below drop_logit: what moves on smoothly from a head is more probably one than a new thing
+ *        that looks the same.
  *        The selected head is the one nearest to the camera (or the leftmost or rightmost in the
- *        picture, by side) of those not much less probable than the best, a detected one before a
- *        predicted one; another one replaces it after switch_frames frames.
+ *        picture, by side), a detected one before a predicted one; not one below accept_logit that is much
+ *        less probable than the best. Another one replaces it after switch_frames frames.
  * Time:  frames may come late, be lost, or jump: a step back, or forward by more than gap_us,
  *        removes all tracks; ids go on, after the largest from 1 again.
  * Overflow: centres are below 2^27 in Q8, squared distances below 2^57.6.

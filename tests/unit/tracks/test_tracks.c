@@ -952,19 +952,63 @@ static void a_track_is_continued_down_to_its_limits(void)
     TEST_ASSERT_EQUAL_INT32(2, verdict(0).track_id);
 }
 
-/* A head is not chosen for its position where it is 3 less probable than the best. */
+/* A head is not chosen for its position where it is 3 less probable than the best, and below accept_logit. */
 static void a_head_is_chosen_for_its_position_within_three(void)
 {
-    int below;
+    static const struct {
+        double best, other; /* log-odds */
+        bool chosen;
+    } cases[] = {{5, 0.5, true}, {5, 0.5 - 1 / 1024.0, false}, {3, 0, true}, {3, -1 / 1024.0, false}};
+    int i;
 
     params.side = IH_SIDE_LEFT;
-    for (below = 0; below <= 1; below++) {
+    params.start_head_logit_q10 = -1024;
+    for (i = 0; i < IH_TEST_COUNT(cases); i++) {
         ih_tracks_init(&tracks);
-        add(0, 0, 800, 5);
-        add(-300, 0, 800, 2 - below / 1024.0);
+        add(0, 0, 800, cases[i].best);
+        add(-300, 0, 800, cases[i].other);
         frame();
-        IH_TEST_EQUAL(below == 0, tracks.selected, "selected", below);
+        IH_TEST_EQUAL(2, tracks.head_count, "heads", i);
+        IH_TEST_EQUAL(cases[i].chosen, tracks.selected, "selected", i);
     }
+}
+
+/* Both detections of each pair are above start_logit but the last one's, and the second is more probable. */
+static void a_body_gets_no_track(void)
+{
+    static const struct {
+        double x, y, z, head_logit; /* from head to body */
+        bool is_body;
+    } cases[] = {
+        {0, 300, -100, 1.5, true},    {149, 300, -100, 1.5, true},  {150, 300, -100, 1.5, false},
+        {-149, 300, -100, 1.5, true}, {-150, 300, 0, 1.5, false},   {0, 201, -100, 1.5, true},
+        {0, 200, -100, 1.5, false},   {0, 399, -100, 1.5, true},    {0, 400, -100, 1.5, false},
+        {0, 300, -249, 1.5, true},    {0, 300, -250, 1.5, false},   {0, 300, 149, 1.5, true},
+        {0, 300, 150, 1.5, false},    {0, -300, -100, 1.5, false},  {0, 300, -100, -0.999, true},
+        {0, 300, -100, -1, false},
+    };
+    int i;
+
+    for (i = 0; i < IH_TEST_COUNT(cases); i++) {
+        setUp();
+        add(cases[i].x, cases[i].y, 900 + cases[i].z, 3);
+        add(0, 0, 900, cases[i].head_logit);
+        frame();
+        IH_TEST_EQUAL(!cases[i].is_body, ih_tracks_verdict(&tracks, &detections, 0).track_id != 0,
+                      "track of the body", i);
+    }
+}
+
+/* Nor does it continue the track of its head. */
+static void a_body_continues_no_track(void)
+{
+    frames_with(3, 0, 0, 900, 3);
+    add(0, 210, 900, 5);
+    add(0, 0, 900, 1);
+    frame();
+    IH_TEST_EQUAL(1, tracks.track_count, "tracks", 0);
+    IH_TEST_EQUAL(0, ih_tracks_verdict(&tracks, &detections, 0).track_id, "track of the body", 0);
+    IH_TEST_EQUAL(1, ih_tracks_verdict(&tracks, &detections, 1).track_id, "track of the head", 0);
 }
 
 /* Detections are counted up to 1000. */
@@ -1177,21 +1221,23 @@ static void a_prediction_ends_beside_a_measured_head_of_its_person(void)
 static void a_doubtful_head_is_not_chosen_for_its_position(void)
 {
     frames_with(1, 0, 0, 900, 1.5);
-    add(0, 0, 900, 1.5);
+    add(0, 0, 900, -3);
     add(300, 0, 900, 6);
     frame();
-    /* 1.5 < 6 - 3, but the first one is selected already. */
+    /* 0.75 1.5 - 0.25 3 < 0.5, but the first one is selected already. */
     TEST_ASSERT_EQUAL_INT32(1, tracks.selected_id);
-    setUp();
-    add(0, 0, 900, 2.9);
+    add(0, 0, 900, 0);
     add(300, 0, 900, 6);
     frame();
-    TEST_ASSERT_EQUAL_INT32(2, tracks.selected_id);
-    setUp();
-    add(0, 0, 900, 3.1);
+    add(0, 0, 900, 0);
     add(300, 0, 900, 6);
     frame();
-    TEST_ASSERT_EQUAL_INT32(1, tracks.selected_id);
+    TEST_ASSERT_EQUAL_INT32(2, tracks.selected_id); /* the third frame in a row */
+    setUp();
+    add(0, 0, 900, 1.1);
+    add(300, 0, 900, 6);
+    frame();
+    TEST_ASSERT_EQUAL_INT32(1, tracks.selected_id); /* by itself it is no doubtful one */
 }
 
 /* Another head takes over in the switch_frames-th frame in a row in which it is the better one. */
@@ -1374,6 +1420,8 @@ int main(void)
     RUN_TEST(verdicts_need_more_than_their_limits);
     RUN_TEST(a_track_is_continued_down_to_its_limits);
     RUN_TEST(a_head_is_chosen_for_its_position_within_three);
+    RUN_TEST(a_body_gets_no_track);
+    RUN_TEST(a_body_continues_no_track);
     RUN_TEST(detections_of_a_track_are_counted);
     RUN_TEST(uncertainty_has_its_limits);
     RUN_TEST(the_gate_grows_while_coasting);
