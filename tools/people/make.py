@@ -111,7 +111,8 @@ class Studio:
             tags = hits.tag.reshape(self.rays.shape[:2])[::LOOK, ::LOOK]
             z = samples[::STEP * LOOK, ::STEP * LOOK].astype(float)
             return (self.rays[::LOOK, ::LOOK] * z[..., None])[z > 0], tags[z > 0]
-        index, u, v, z, tag = dots
+        measured = (dots[3] >= self.rig.near_mm) & (dots[3] <= self.rig.far_mm)
+        _, u, v, z, tag = (column[measured] for column in dots)
         pixels = self.rays[numpy.clip(v // STEP, 0, self.rays.shape[0] - 1).astype(int),
                            numpy.clip(u // STEP, 0, self.rays.shape[1] - 1).astype(int)]
         return pixels * z[:, None], tag

@@ -12,6 +12,8 @@ MEET_MM = 800.0
 # The pictures of the paper's camera, in pixels.
 WIDTH, HEIGHT = 752, 582
 UNDISTORT_STEPS = 12
+# The nearest surface that is measured: the nose of a head whose middle is at 450 mm.
+NEAR_MM = 320.0
 # name: baseline, projector's direction from the camera (degrees: 0 right, 90 above), pitch of the dots in degrees
 KINDS = {
     "paper": (12.5, 0.0, 1.7),
@@ -93,7 +95,7 @@ def dots_rig(kind, rng, width):
     projector = baseline_mm * (cosine * beside + sine * forward)
     zoom, height = width / WIDTH, round(width * HEIGHT / WIDTH)
     return Rig(width, height, (920.8 * zoom, 943.8 * zoom), (0.5 * (width - 1), 0.5 * (height - 1)), lens,
-               400.0, 2600.0, projector, rays @ towards.T)
+               NEAR_MM, 2600.0, projector, rays @ towards.T)
 
 
 def range_rig(rng):

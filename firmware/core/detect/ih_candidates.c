@@ -83,19 +83,26 @@ static bool is_between_mm(int64_t value_mm_q8, int32_t low_mm, int32_t high_mm)
     return value_mm_q8 > (int64_t)low_mm * 256 && value_mm_q8 < (int64_t)high_mm * 256;
 }
 
-bool ih_candidates_is_body(const struct ih_detections *detections, int32_t index,
-                           int32_t logit_min_q10)
+/* Is the second one a body to the first one's head? */
+static bool is_body_of(const struct ih_detection *head, const struct ih_detection *body)
 {
-    const int32_t *own_mm_q8 = detections->detection[index].head.centre_mm_q8;
+    const int32_t *head_mm_q8 = head->head.centre_mm_q8;
+    const int32_t *body_mm_q8 = body->head.centre_mm_q8;
+    return is_between_mm((int64_t)body_mm_q8[0] - head_mm_q8[0], -BODY_ASIDE_MM, BODY_ASIDE_MM) &&
+           is_between_mm((int64_t)body_mm_q8[1] - head_mm_q8[1], BODY_TOP_MM, BODY_BOTTOM_MM) &&
+           is_between_mm((int64_t)body_mm_q8[2] - head_mm_q8[2], -BODY_BEFORE_MM, BODY_BEHIND_MM);
+}
+
+uint32_t ih_candidates_bodies(const struct ih_detections *detections, int32_t logit_min_q10)
+{
+    uint32_t bodies = 0;
     for (int32_t i = 0; i < detections->detection_count; i++) {
-        const int32_t *head_mm_q8 = detections->detection[i].head.centre_mm_q8;
-        if (detections->detection[i].logit_q10 > logit_min_q10 &&
-            is_between_mm((int64_t)own_mm_q8[0] - head_mm_q8[0], -BODY_ASIDE_MM, BODY_ASIDE_MM) &&
-            is_between_mm((int64_t)own_mm_q8[1] - head_mm_q8[1], BODY_TOP_MM, BODY_BOTTOM_MM) &&
-            is_between_mm((int64_t)own_mm_q8[2] - head_mm_q8[2], -BODY_BEFORE_MM,
-                          BODY_BEHIND_MM)) {
-            return true;
+        for (int32_t j = 0; j < detections->detection_count; j++) {
+            if (detections->detection[j].logit_q10 > logit_min_q10 &&
+                is_body_of(&detections->detection[j], &detections->detection[i])) {
+                bodies |= 1u << i;
+            }
         }
     }
-    return false;
+    return bodies;
 }

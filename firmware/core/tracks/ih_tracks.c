@@ -239,9 +239,9 @@ static bool is_gone(const struct ih_detections *detections, int32_t track,
            view->front * 100 < rays * params->front_percent;
 }
 
-/* The best pair of a track without detection and a detection without track. */
+/* The best pair of a track without detection and a detection without track that is no body. */
 static bool best_pair(const struct ih_tracks *tracks, const struct ih_tracks_params *params,
-                      const struct ih_detections *detections, int32_t *best_track,
+                      const struct ih_detections *detections, uint32_t bodies, int32_t *best_track,
                       int32_t *best_index)
 {
     int32_t best = INT32_MIN;
@@ -251,8 +251,7 @@ static bool best_pair(const struct ih_tracks *tracks, const struct ih_tracks_par
         for (int32_t i = 0; i < detections->detection_count; i++) {
             const struct ih_detection *detection = &detections->detection[i];
             int32_t merit;
-            if (track->index != IH_NONE || track_of(tracks, i) != NULL ||
-                ih_candidates_is_body(detections, i, params->start_logit_q10) ||
+            if (track->index != IH_NONE || track_of(tracks, i) != NULL || (bodies >> i & 1) != 0 ||
                 !fits(tracks, params, track, detection, &merit) ||
                 (gone && detection->logit_q10 < params->accept_logit_q10)) {
                 continue;
@@ -373,13 +372,13 @@ static void start_track(struct ih_tracks *tracks, const struct ih_tracks_params 
 }
 
 static void start_tracks(struct ih_tracks *tracks, const struct ih_tracks_params *params,
-                         const struct ih_detections *detections)
+                         const struct ih_detections *detections, uint32_t bodies)
 {
     for (int32_t i = 0; i < detections->detection_count && tracks->track_count < IH_TRACKS_MAX;
          i++) {
         const struct ih_detection *detection = &detections->detection[i];
         if (track_of(tracks, i) == NULL && detection->logit_q10 > params->start_logit_q10 &&
-            !ih_candidates_is_body(detections, i, params->start_logit_q10)) {
+            (bodies >> i & 1) == 0) {
             start_track(tracks, params, detection, i);
         }
     }
@@ -484,12 +483,13 @@ void ih_tracks_update(struct ih_tracks *tracks, const struct ih_tracks_params *p
                       const struct ih_rig *rig, const struct ih_detections *detections,
                       struct ih_predicted *predicted)
 {
+    const uint32_t bodies = ih_candidates_bodies(detections, params->start_logit_q10);
     int32_t t, index;
-    while (best_pair(tracks, params, detections, &t, &index)) {
+    while (best_pair(tracks, params, detections, bodies, &t, &index)) {
         assign(tracks, params, &tracks->track[t], &detections->detection[index], index);
     }
     prune(tracks, params, detections);
-    start_tracks(tracks, params, detections);
+    start_tracks(tracks, params, detections, bodies);
     predicted->count = 0;
     for (t = 0; t < tracks->track_count; t++) {
         if (tracks->track[t].index == IH_NONE) {

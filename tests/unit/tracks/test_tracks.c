@@ -958,7 +958,8 @@ static void a_head_is_chosen_for_its_position_within_three(void)
     static const struct {
         double best, other; /* log-odds */
         bool chosen;
-    } cases[] = {{5, 0.5, true}, {5, 0.5 - 1 / 1024.0, false}, {3, 0, true}, {3, -1 / 1024.0, false}};
+    } cases[] = {
+        {5, 0.5, true}, {5, 0.5 - 1 / 1024.0, false}, {3, 0, true}, {3, -1 / 1024.0, false}};
     int i;
 
     params.side = IH_SIDE_LEFT;
@@ -980,11 +981,11 @@ static void a_body_gets_no_track(void)
         double x, y, z, head_logit; /* from head to body */
         bool is_body;
     } cases[] = {
-        {0, 300, -100, 1.5, true},    {149, 300, -100, 1.5, true},  {150, 300, -100, 1.5, false},
-        {-149, 300, -100, 1.5, true}, {-150, 300, 0, 1.5, false},   {0, 201, -100, 1.5, true},
-        {0, 200, -100, 1.5, false},   {0, 399, -100, 1.5, true},    {0, 400, -100, 1.5, false},
-        {0, 300, -249, 1.5, true},    {0, 300, -250, 1.5, false},   {0, 300, 149, 1.5, true},
-        {0, 300, 150, 1.5, false},    {0, -300, -100, 1.5, false},  {0, 300, -100, -0.999, true},
+        {0, 300, -100, 1.5, true},    {149, 300, -100, 1.5, true}, {150, 300, -100, 1.5, false},
+        {-149, 300, -100, 1.5, true}, {-150, 300, 0, 1.5, false},  {0, 201, -100, 1.5, true},
+        {0, 200, -100, 1.5, false},   {0, 399, -100, 1.5, true},   {0, 400, -100, 1.5, false},
+        {0, 300, -249, 1.5, true},    {0, 300, -250, 1.5, false},  {0, 300, 149, 1.5, true},
+        {0, 300, 150, 1.5, false},    {0, -300, -100, 1.5, false}, {0, 300, -100, -0.999, true},
         {0, 300, -100, -1, false},
     };
     int i;
