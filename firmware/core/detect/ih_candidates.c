@@ -4,12 +4,8 @@
 
 #include "base/ih_fix.h"
 
-/* The middle of a body lies in this box below its head, mm. */
-#define BODY_ASIDE_MM 150
-#define BODY_TOP_MM 200
-#define BODY_BOTTOM_MM 400
-#define BODY_BEFORE_MM 250
-#define BODY_BEHIND_MM 150
+/* The middle of a body lies in this box about the middle of its head, mm. */
+static const int16_t body_low_mm[3] = {-150, 200, -250}, body_high_mm[3] = {150, 400, 150};
 
 static int64_t square_q16(int32_t distance_mm)
 {
@@ -78,19 +74,16 @@ void ih_candidates_insert(struct ih_detections *out, const struct ih_detection *
     out->detection[at] = *detection;
 }
 
-static bool is_between_mm(int64_t value_mm_q8, int32_t low_mm, int32_t high_mm)
-{
-    return value_mm_q8 > (int64_t)low_mm * 256 && value_mm_q8 < (int64_t)high_mm * 256;
-}
-
 /* Is the second one a body to the first one's head? */
 static bool is_body_of(const struct ih_detection *head, const struct ih_detection *body)
 {
-    const int32_t *head_mm_q8 = head->head.centre_mm_q8;
-    const int32_t *body_mm_q8 = body->head.centre_mm_q8;
-    return is_between_mm((int64_t)body_mm_q8[0] - head_mm_q8[0], -BODY_ASIDE_MM, BODY_ASIDE_MM) &&
-           is_between_mm((int64_t)body_mm_q8[1] - head_mm_q8[1], BODY_TOP_MM, BODY_BOTTOM_MM) &&
-           is_between_mm((int64_t)body_mm_q8[2] - head_mm_q8[2], -BODY_BEFORE_MM, BODY_BEHIND_MM);
+    bool is_inside = true;
+    for (int axis = 0; axis < 3; axis++) {
+        const int32_t off_mm_q8 = body->head.centre_mm_q8[axis] - head->head.centre_mm_q8[axis];
+        is_inside = is_inside && off_mm_q8 > body_low_mm[axis] * 256 &&
+                    off_mm_q8 < body_high_mm[axis] * 256;
+    }
+    return is_inside;
 }
 
 uint32_t ih_candidates_bodies(const struct ih_detections *detections, int32_t logit_min_q10)

@@ -3,7 +3,7 @@
  * In:     centres in the camera frame.
  * Out:    starts that are new, the nest of a candidate, detections in their order, and which of them is the
  *         body to another one's head.
- * Overflow: centres are below 2^27 in Q8; their differences have 64 bits.
+ * Overflow: centres are below 2^27 in Q8, their differences below 2^28.
  */
 #ifndef IH_CANDIDATES_H
 #define IH_CANDIDATES_H
