@@ -237,7 +237,7 @@ WRONG_IMAGES = [
     (lambda i: i.astype(">u2" if sys.byteorder == "little" else "<u2"), isohead.Error, "byte order"),
     (lambda i: i[:, ::-1], isohead.Error, "numpy.ascontiguousarray"),
     (lambda i: i[::-1], isohead.Error, "numpy.ascontiguousarray"),
-    (lambda i: np.asfortranarray(i), isohead.Error, "numpy.ascontiguousarray"),
+    (np.asfortranarray, isohead.Error, "numpy.ascontiguousarray"),
     (lambda i: np.frombuffer(b"\0" + i.astype(np.uint16).tobytes(), np.uint8)[1:].view(np.uint16).reshape(i.shape),
      isohead.Error, "numpy.ascontiguousarray"),
     (lambda i: i[:-1], isohead.Error, "752x581 px, expected 752x582 as in the rig"),
@@ -346,7 +346,7 @@ def test_one_thread_at_a_time(rig, image):
     assert not wrong and all("another thread" in text for text in refused)
 
 
-def test_examples(ranges, tmp_path, monkeypatch):
+def test_examples(tmp_path, monkeypatch):
     """draw.py writes a picture with the head in it; depth_camera.py prints a head for each depth image."""
     cv2 = pytest.importorskip("cv2")
 

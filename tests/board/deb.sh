@@ -84,6 +84,7 @@ check_package() {
 # check_pages: the documents in the tree lead to each other and nowhere else
 check_pages() {
     for page in "$work"/tree/usr/share/doc/*/*.md; do
+        # shellcheck disable=SC2013 # links have no spaces
         for link in $(grep -oE '\]\([^)]*\)' "$page" | sed -e 's/^](//' -e 's/[)#].*//'); do
             [ -e "$(dirname "$page")/$link" ] || fail "$page: $link is not in the package"
         done

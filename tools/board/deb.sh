@@ -63,7 +63,7 @@ pages() {
 manual() {
     {
         printf '.Dd %s\n.Dt %s 1\n.Os\n.Sh NAME\n.Nm %s\n.Nd %s\n.Sh DESCRIPTION\n.Bd -literal\n' \
-            "$(date -u -d "@$SOURCE_DATE_EPOCH" '+%B %-d, %Y')" "$(echo "$1" | tr 'a-z' 'A-Z')" "$1" "$3"
+            "$(date -u -d "@$SOURCE_DATE_EPOCH" '+%B %-d, %Y')" "$(echo "$1" | tr '[:lower:]' '[:upper:]')" "$1" "$3"
         "$2" --help | sed -e 's/\\/\\e/g' -e 's/-/\\-/g' -e "s/^[.']/\\\\\&&/"
         printf '.Ed\n'
     } >"$stage/$1.1"
@@ -113,9 +113,11 @@ sed '1,/^$/d' LICENSE | sed '1,/^$/d' | sed -e 's/^$/./' -e 's/^/ /' | cat packa
     >"$stage/copyright"
 if [ "$name" = isohead-tools ]; then
     # What is folded into the page that host_sim writes; the licence is the same.
-    printf '\nFiles: usr/bin/host_sim\nCopyright:' >>"$stage/copyright"
-    sed -n 's/^ .*Copyright (c)//p' sim/report/notices.txt >>"$stage/copyright"
-    printf 'License: Expat\n' >>"$stage/copyright"
+    {
+        printf '\nFiles: usr/bin/host_sim\nCopyright:'
+        sed -n 's/^ .*Copyright (c)//p' sim/report/notices.txt
+        printf 'License: Expat\n'
+    } >>"$stage/copyright"
 fi
 put 644 "$stage/copyright" "/usr/share/doc/$name/copyright"
 maintainer=$(sed -n '/^Maintainer: /{s///p;q}' packaging/control.in)
