@@ -290,17 +290,26 @@ test-board: sim ## isohead_board on an emulated ARM board: frames, faults, signa
 	  --program2 $(BUILD)/board-arm64-gpiod2/firmware/app/isohead_board --sysroot $(BUILD)/sysroot/arm64 --host-sim $(BUILD)/host/sim/host_sim \
 	  --render $(BUILD)/host/tools/render/render --board $(BUILD)/board
 
-image: ## the image to flash for arm64: build/image/isohead.img; XZ=1 packs it too
-	@tools/setup.sh image
+# What an image is for: boards with UEFI, or a Raspberry Pi.
+IMAGE_OUT = $(BUILD)/image$(if $(filter rpi,$(BOARD)),-rpi)
+image test-image: BOARD ?= uefi
+image: ## the image to flash for arm64, BOARD=uefi or rpi: build/image/ or build/image-rpi/isohead.img; XZ=1 packs it too
+	@tools/setup.sh image $(BOARD)
 	@$(MAKE) board ARCH=arm64
-	@tools/image/image.sh
+	@tools/image/image.sh $(BOARD) $(BUILD)/board-arm64/firmware/app/isohead_board $(IMAGE_OUT)
 
-flash: ## write IMAGE (default build/image/isohead.img) to the disk DEVICE=/dev/..., and read it back
+flash: ## write IMAGE (default isohead.img of BOARD, as for image) to the disk DEVICE=/dev/..., and read it back
 	@tools/setup.sh flash
-	@tools/image/flash.sh "$(DEVICE)" $(IMAGE)
+	@tools/image/flash.sh "$(DEVICE)" $(or $(IMAGE),$(IMAGE_OUT)/isohead.img)
 
-test-image: sim image ## boot the image on an emulated board; failed updates and slots; what flash refuses
-	@tools/setup.sh test-image
+test-image: sim image test-image-$(if $(filter rpi,$(BOARD)),rpi,uefi) ## boot the image of BOARD on an emulated board; failed updates and slots; what flash refuses
+
+test-image-rpi: sim image
+	@tools/setup.sh test-image rpi
+	@/usr/bin/python3 tests/board/image_rpi.py --image $(IMAGE_OUT) --frames frames/sequence2 --work $(BUILD)/test_image_rpi
+
+test-image-uefi: sim image
+	@tools/setup.sh test-image uefi
 	@tests/board/get.sh
 	@tests/board/flash.sh $(BUILD)/test_flash
 	@/usr/bin/python3 tests/board/image.py --image $(BUILD)/image --board $(BUILD)/board \

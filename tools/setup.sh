@@ -6,7 +6,8 @@
 #   tools/setup.sh deb arm64|armhf|tools
 #   tools/setup.sh test-deb
 #   tools/setup.sh test-board
-#   tools/setup.sh image|flash|test-image
+#   tools/setup.sh image|test-image [uefi|rpi]
+#   tools/setup.sh flash
 #   tools/setup.sh calibrate|view|test-view|test-report|site|export|people|python
 #
 # On Debian and its kin missing packages are installed when that is allowed (root, or sudo without a
@@ -191,7 +192,16 @@ need_test_deb() {
         lacks qemu-user-static
 }
 
+# need_image uefi|rpi
 need_image() {
+    case "${1:-}" in
+    uefi) ;;
+    rpi) need_program mkenvimage u-boot-tools ;;
+    *)
+        echo "there is no image for '${1:-}': name uefi or rpi" >&2
+        exit 2
+        ;;
+    esac
     need_board arm64
     need_program qemu-aarch64 qemu-user
     need_program mksquashfs squashfs-tools
@@ -220,10 +230,10 @@ board) need_board "${2:-}" ;;
 deb) need_deb "${2:-}" ;;
 test-deb) need_test_deb ;;
 test-board) need_test_board ;;
-image) need_image ;;
+image) need_image "${2:-}" ;;
 flash) need_flash ;;
 test-image)
-    need_image
+    need_image "${2:-}"
     need_flash
     need_program qemu-system-aarch64 qemu-system-arm
     [ -e /usr/share/AAVMF/AAVMF_CODE.fd ] || lacks qemu-efi-aarch64
@@ -351,7 +361,7 @@ lint)
     need_view
     ;;
 *)
-    sed -n '4,11s/^# \{0,1\}//p' "$0" >&2
+    sed -n '4,12s/^# \{0,1\}//p' "$0" >&2
     exit 2
     ;;
 esac

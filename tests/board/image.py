@@ -111,22 +111,26 @@ class Disk:
         run("cp", "--sparse=always", image, path)
         self.path = path
         table = json.loads(run("/sbin/sfdisk", "--json", path))["partitiontable"]
-        self.places = {part["name"]: (part["start"] * 512, part["size"] * 512)
-                       for part in table["partitions"]}
+        self.places = self.places_of(table)
 
-    def _fat(self, name):
+    @staticmethod
+    def places_of(table):
+        """Name to begin and size, in bytes."""
+        return {part["name"]: (part["start"] * 512, part["size"] * 512) for part in table["partitions"]}
+
+    def fat(self, name):
         return f"{self.path}@@{self.places[name][0]}"
 
     def put(self, sources, folder):
         """Files into a folder of the data partition."""
-        run("mcopy", "-o", "-i", self._fat("isohead-data"), *sources, "::" + folder)
+        run("mcopy", "-o", "-i", self.fat("isohead-data"), *sources, "::" + folder)
 
     def make_folder(self, folder):
-        run("mmd", "-i", self._fat("isohead-data"), "::" + folder)
+        run("mmd", "-i", self.fat("isohead-data"), "::" + folder)
 
     def entries(self):
         """Names of the boot loader's entries."""
-        names = run("mdir", "-b", "-i", self._fat("isohead-esp"), "::/loader/entries").split()
+        names = run("mdir", "-b", "-i", self.fat("isohead-esp"), "::/loader/entries").split()
         return sorted(os.path.basename(name) for name in names)
 
     def content(self, name, size=None):
@@ -158,12 +162,14 @@ class Disk:
 class Board:
     """QEMU's virt board with UEFI, its console, a line for records and a port for frames."""
 
-    def __init__(self, disk, work):
-        self.work = work
+    LINES = ("console", "records", "frames")
+
+    @staticmethod
+    def machine(disk, work):
+        """QEMU's arguments; a character device is there for each of LINES."""
         variables = shutil.copy(os.path.join(FIRMWARE, "AAVMF_VARS.fd"), work)
-        arguments = [
-            "qemu-system-aarch64", "-M", "virt,acpi=off", "-cpu", "cortex-a53", "-m", "512",
-            "-nodefaults", "-display", "none",
+        return [
+            "-M", "virt,acpi=off", "-cpu", "cortex-a53", "-m", "512",
             "-drive", f"if=pflash,format=raw,readonly=on,file={FIRMWARE}/AAVMF_CODE.fd",
             "-drive", f"if=pflash,format=raw,file={variables}",
             "-drive", f"if=none,id=disk,format=raw,file={disk.path}",
@@ -171,13 +177,17 @@ class Board:
             "-device", "virtio-serial-device", "-device", "virtconsole,chardev=records",
             "-device", "virtserialport,chardev=frames,name=frames",
             "-serial", "chardev:console"]
+
+    def __init__(self, disk, work):
+        self.work = work
+        arguments = ["qemu-system-aarch64", "-nodefaults", "-display", "none", *self.machine(disk, work)]
         self.sockets, theirs = {}, []
-        for name in ["console", "records", "frames"]:
+        for name in self.LINES:
             self.sockets[name], other = socket.socketpair()
             theirs.append(other)
             arguments += ["-chardev", f"socket,id={name},fd={other.fileno()}"]
-        self.text = {"console": "", "records": ""}
-        self.seen = {"console": 0, "records": 0}  # how far it has been looked at
+        self.text = {name: "" for name in self.LINES if name != "frames"}
+        self.seen = dict.fromkeys(self.text, 0)  # how far it has been looked at
         self.selector = selectors.DefaultSelector()
         for name in self.text:
             self.selector.register(self.sockets[name], selectors.EVENT_READ, name)
@@ -388,7 +398,7 @@ def case_zeroed(shared):
 def case_same_bytes(shared):
     """built a second time, elsewhere: the same bytes"""
     again = os.path.join(shared.work, "again")
-    run(os.path.join(HERE, "..", "..", "tools", "image", "image.sh"), shared.program, again)
+    run(os.path.join(HERE, "..", "..", "tools", "image", "image.sh"), "uefi", shared.program, again)
     sums = []
     for folder in [shared.image, again]:
         with open(os.path.join(folder, "SHA256SUMS"), encoding="ascii") as file:

@@ -4,14 +4,14 @@ the data partition is the old one or the new one.
 
 power_loss.py [--trials COUNT] [--work DIR]      exit status 1 if something is wrong
 
-The scripts themselves run (isohead-update, isohead-put, the rename of a slot that proved good), in a tree of files in
-place of the disk; their paths are rewritten, and mount does nothing. torn.c notes each operation on the way to the disk,
+The scripts themselves run (isohead-update, isohead-put, the note that a slot proved good), those of each kind of board,
+in a tree of files in place of the disk; their paths are rewritten, and mount does nothing. torn.c notes each operation on the way to the disk,
 and lets the one that was chosen fail.
 
 What a disk holds after a power cut is a model, stricter than a FAT driver: of the operations since the last sync each
 may have reached the disk or not, whatever the order; of a write each sector of 512 bytes by itself; a rename leaves the
 old name, the new one, both or, between two folders, neither. Boot loader and initramfs are modelled as
-tools/image/initramfs/init and systemd-boot do it.
+tools/image/initramfs/init, systemd-boot and tools/image/rpi/uboot.env do it.
 """
 
 import argparse
@@ -24,13 +24,19 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import zlib
 
 HERE = os.path.dirname(os.path.abspath(__file__))
-IMAGE = os.path.join(HERE, "..", "..", "tools", "image", "root", "usr")
+IMAGE = os.path.join(HERE, "..", "..", "tools", "image")
+SCRIPTS = {"sbin/isohead-update": "root/usr/sbin/isohead-update", "sbin/isohead-put": "root/usr/sbin/isohead-put",
+           "lib/isohead/slots": "root/usr/lib/isohead/slots"}
 # Folders of the tree that are the disk.
 DISK = ("dev/", "run/esp/", "data/")
 SECTOR = 512
+PIECE = 64
 ROOM_SECTORS = 64
+SLOT_DEVICES = {"a": "dev/sd2", "b": "dev/sd3"}
+PARTITIONS = {"sd1": "esp", "sd2": "a", "sd3": "b"}
 SLOT_BYTES = {1: 9000, 2: 11111, 3: 10240}
 FILE = {"old": b"duty = 20\n" * 90 + b"interlock-line = 5\n", "new": b"duty = 10\n" * 300 + b"interlock-line = 6\n"}
 
@@ -38,7 +44,8 @@ FILE = {"old": b"duty = 20\n" * 90 + b"interlock-line = 5\n", "new": b"duty = 10
 MOUNT = """#!/bin/sh
 [ "$2" = squashfs ] || exit 0
 shift 4
-mkdir -p "$2/boot"
+mkdir -p "$2/boot" "$2/usr/lib/isohead"
+cp "$2/../../usr/lib/isohead/boot" "$2/usr/lib/isohead/"
 bytes=$(sed -n 's/^hsqs \\([0-9]*\\) .*/\\1/p' "$1" | head -n 1)
 digest=$(head -c "$bytes" "$1" | sha256sum | cut -d ' ' -f 1)
 for part in linux initrd; do
@@ -64,22 +71,142 @@ def boot_file(part, slot):
     return "".join(f"{part} {i} of {digest_of(slot)}\n" for i in range(1, 13)).encode()
 
 
-def entry(name, version, slot):
-    return (f"title isohead, slot {name}\nsort-key isohead\nversion {version}\nlinux /{name}/linux\n"
-            f"initrd /{name}/initrd\noptions isohead.slot={name} isohead.bytes={len(slot)} "
-            f"isohead.sha256={digest_of(slot)} panic=5 loglevel=4\n").encode()
-
-
-def fresh_disk(b_entry="slot-b.conf"):
-    """Slot a runs and is good, version 2; slot b has version 1."""
-    a, b = slot_file(2), slot_file(1)
-    disk = {"dev/a-slot": a.ljust(ROOM_SECTORS * SECTOR, b"\xff"), "dev/b-slot": b.ljust(ROOM_SECTORS * SECTOR, b"\xff"),
-            "run/esp/loader/entries/slot-a.conf": entry("a", 2, a), "run/esp/loader/entries/" + b_entry: entry("b", 1, b),
-            "data/isohead.conf": FILE["old"]}
-    for name, slot in (("a", a), ("b", b)):
+def common_disk():
+    """What both kinds of board have: slot a runs, slot b has another version."""
+    disk = {"data/isohead.conf": FILE["old"]}
+    for name, version in (("a", 2), ("b", 1)):
+        slot = slot_file(version)
+        disk[SLOT_DEVICES[name]] = slot.ljust(ROOM_SECTORS * SECTOR, b"\xff")
         for part in ("linux", "initrd"):
             disk[f"run/esp/{name}/{part}"] = boot_file(part, slot)
     return disk
+
+
+def has_kernel(disk, name):
+    return any(all(disk.get(f"run/esp/{name}/{part}") == boot_file(part, slot_file(version)) for part in ("linux", "initrd"))
+               for version in SLOT_BYTES)
+
+
+class Uefi:
+    """systemd-boot and its entries."""
+
+    name = "uefi"
+    b_states = ("slot-b.conf", "slot-b+0-3.conf", "slot-b+2-1.conf")
+    trial = "slot-b+2-1.conf"
+    # what is wrong: an entry without a count that may be there before its kernel is
+    wrong_update = [("sync\n", ":\n"), ("sync && mv", "mv"), ("+$TRIES.conf", ".conf")]
+
+    @staticmethod
+    def entry(name, version, slot):
+        return (f"title isohead, slot {name}\nsort-key isohead\nversion {version}\nlinux /{name}/linux\n"
+                f"initrd /{name}/initrd\noptions isohead.slot={name} isohead.bytes={len(slot)} "
+                f"isohead.sha256={digest_of(slot)} panic=5 loglevel=4\n").encode()
+
+    def fresh_disk(self, b_state="slot-b.conf"):
+        """Slot a is good, version 2; slot b has version 1."""
+        return {**common_disk(), "run/esp/loader/entries/slot-a.conf": self.entry("a", 2, slot_file(2)),
+                "run/esp/loader/entries/" + b_state: self.entry("b", 1, slot_file(1))}
+
+    def is_updated(self, disk):
+        return disk.get("run/esp/loader/entries/slot-b+3.conf") == self.entry("b", 3, slot_file(3))
+
+    @staticmethod
+    def is_good(disk):
+        return "run/esp/loader/entries/slot-b.conf" in disk
+
+    @staticmethod
+    def boot(disk):
+        """Which slot starts, after how many starts; (None, why) for none."""
+        disk = dict(disk)
+        for start in range(1, 12):
+            entries = []
+            for path in disk:
+                match = re.fullmatch(r"run/esp/loader/entries/slot-(.)(\+(\d+)(-(\d+))?)?\.conf", path)
+                if match:
+                    text = disk[path].decode("ascii", "replace")
+                    version = int((re.findall(r"(?m)^version (\d+)$", text) or ["0"])[0])
+                    left = None if match[2] is None else int(match[3])
+                    entries.append(((left != 0, version, path), path, match, left, text))
+            if not entries:
+                return None, "no entry"
+            _, path, match, left, text = max(entries)
+            options = dict(re.findall(r"isohead\.(\w+)=(\w+)", text))
+            name = options.get("slot", "?")
+            if left:
+                tried = int(match[5] or 0) + 1
+                disk[f"run/esp/loader/entries/slot-{match[1]}+{left - 1}-{tried}.conf"] = disk.pop(path)
+            if not has_kernel(disk, name):
+                if left:
+                    continue
+                return None, f"{path} has no whole kernel, and no starts are counted"
+            content = disk[SLOT_DEVICES[name]][:int(options.get("bytes", "0"))]
+            if digest_of(content) == options.get("sha256"):
+                return name, start
+            for other in [other for other in disk if other.startswith(f"run/esp/loader/entries/slot-{name}")][:1]:
+                disk[f"run/esp/loader/entries/slot-{name}+0-1.conf"] = disk.pop(other)
+        return None, "it starts again and again"
+
+
+class Rpi:
+    """U-Boot and its two sectors."""
+
+    name = "rpi"
+    b_states = ("good", "0", "2")
+    trial = "2"
+    # what is wrong: one sector may be half written when the other one is
+    wrong_update = [("        sync\n", "        :\n")]
+
+    @staticmethod
+    def sector(settings):
+        body = "".join(f"{key}={value}\0" for key, value in sorted(settings.items())).encode().ljust(SECTOR - 4, b"\0")
+        return zlib.crc32(body).to_bytes(4, "little") + body
+
+    @staticmethod
+    def state(disk):
+        """Of the first sector that is whole; nothing when none is."""
+        for number in (1, 9):
+            sector = disk["dev/sd"][number * SECTOR:(number + 1) * SECTOR]
+            if zlib.crc32(sector[4:]) == int.from_bytes(sector[:4], "little"):
+                return dict(word.split("=", 1) for word in sector[4:].decode().split("\0") if word)
+        return {}
+
+    def settings(self, first, b_left, b_version):
+        a, b = slot_file(2), slot_file(b_version)
+        return {"first": first, "a_left": "good", "a_bytes": len(a), "a_sha256": digest_of(a),
+                "b_left": b_left, "b_bytes": len(b), "b_sha256": digest_of(b)}
+
+    def fresh_disk(self, b_state="good"):
+        sector = self.sector(self.settings("a", b_state, 1))
+        head = bytearray(10 * SECTOR)
+        for number in (1, 9):
+            head[number * SECTOR:(number + 1) * SECTOR] = sector
+        return {**common_disk(), "dev/sd": bytes(head)}
+
+    def is_updated(self, disk):
+        wanted = self.sector(self.settings("b", "3", 3))
+        return all(disk["dev/sd"][number * SECTOR:(number + 1) * SECTOR] == wanted for number in (1, 9))
+
+    def is_good(self, disk):
+        return self.state(disk).get("b_left") == "good"
+
+    def boot(self, disk):
+        """Which slot starts, after how many starts; (None, why) for none."""
+        state = self.state(disk)
+        if not state:
+            return None, "no state is whole"
+        for start in range(1, 12):
+            order = [state["first"], "ba"["ab".index(state["first"])]]
+            for name in [name for name in order if state[name + "_left"] != "0"] + order[::-1]:
+                if state[name + "_left"] not in ("good", "0"):
+                    state[name + "_left"] = str(int(state[name + "_left"]) - 1)
+                if has_kernel(disk, name):
+                    break
+            else:
+                return None, "no slot has a whole kernel"
+            if digest_of(disk[SLOT_DEVICES[name]][:int(state[name + "_bytes"])]) == state[name + "_sha256"]:
+                return name, start
+            state[name + "_left"] = "0"
+        return None, "it starts again and again"
 
 
 # --- running a script ---
@@ -87,7 +214,8 @@ def fresh_disk(b_entry="slot-b.conf"):
 class Tree:
     """A folder that stands for the board's file system."""
 
-    def __init__(self, work, shim):
+    def __init__(self, work, shim, board):
+        self.board = board
         self.root = os.path.join(work, "board")
         self.work, self.shim = work, shim
         self.journal = os.path.join(work, "journal")
@@ -112,13 +240,17 @@ class Tree:
             self._put(name, content)
         for folder in ("run/esp/loader/entries", "run/esp/a", "run/esp/b", "data", "proc/sys/vm", "run/new"):
             os.makedirs(os.path.join(self.root, folder), exist_ok=True)
-        for name in ("a", "b", "esp"):
-            device = f"sys/class/block/{name}-slot/"
+        for number, (device, name) in enumerate(PARTITIONS.items(), 1):
+            device = f"sys/class/block/{device}/"
             self._put(device + "uevent", b"PARTNAME=isohead-%s\n" % name.encode())
             self._put(device + "size", b"%d\n" % ROOM_SECTORS)
+            self._put(device + "partition", b"%d\n" % number)
         self._put("run/slot", b"a\n")
-        for name in ("sbin/isohead-update", "sbin/isohead-put", "lib/isohead/slots"):
-            with open(os.path.join(IMAGE, name), encoding="ascii") as file:
+        if self.board.name == "rpi":
+            self._put("sys/class/block/sd/size", b"10\n")
+            self._put("run/disk", b"sd\n")
+        for name, source in {**SCRIPTS, "lib/isohead/boot": self.board.name + "/boot"}.items():
+            with open(os.path.join(IMAGE, source), encoding="ascii") as file:
                 text = file.read()
             for before, after in changes:
                 text = text.replace(before, after)
@@ -170,11 +302,13 @@ def is_disk(name):
 # --- a power cut ---
 
 def write_sectors(disk, name, offset, content, keeps):
-    """The sectors that reach the disk; the file is as long as the last of them says."""
+    """The sectors that reach the disk, of those outside of all file systems pieces; the file is as long as the last of
+    them says."""
     old = disk[name]
-    for start in range(0, len(content), SECTOR):
+    unit = PIECE if name == "dev/sd" else SECTOR
+    for start in range(0, len(content), unit):
         if keeps():
-            piece = content[start:start + SECTOR]
+            piece = content[start:start + unit]
             place = offset + start
             old = old.ljust(place, b"\0")
             old = old[:place] + piece + old[place + len(piece):]
@@ -213,48 +347,11 @@ def after_cut(disk, operations, at, generator):
     return disk
 
 
-# --- a start ---
-
-def boot(disk):
-    """Which slot starts, after how many starts; (None, why) for none."""
-    disk = dict(disk)
-    for start in range(1, 12):
-        entries = []
-        for path in disk:
-            match = re.fullmatch(r"run/esp/loader/entries/slot-(.)(\+(\d+)(-(\d+))?)?\.conf", path)
-            if match:
-                text = disk[path].decode("ascii", "replace")
-                version = int((re.findall(r"(?m)^version (\d+)$", text) or ["0"])[0])
-                left = None if match[2] is None else int(match[3])
-                entries.append(((left != 0, version, path), path, match, left, text))
-        if not entries:
-            return None, "no entry"
-        _, path, match, left, text = max(entries)
-        options = dict(re.findall(r"isohead\.(\w+)=(\w+)", text))
-        name = options.get("slot", "?")
-        if left:
-            tried = int(match[5] or 0) + 1
-            disk[f"run/esp/loader/entries/slot-{match[1]}+{left - 1}-{tried}.conf"] = disk.pop(path)
-        known = [slot_file(version) for version in SLOT_BYTES]
-        has_kernel = any(all(disk.get(f"run/esp/{name}/{part}") == boot_file(part, slot) for part in ("linux", "initrd"))
-                         for slot in known)
-        if not has_kernel:
-            if left:
-                continue
-            return None, f"{path} has no whole kernel, and no starts are counted"
-        content = disk[f"dev/{name}-slot"][:int(options.get("bytes", "0"))]
-        if digest_of(content) == options.get("sha256"):
-            return name, start
-        for other in [other for other in disk if other.startswith(f"run/esp/loader/entries/slot-{name}")][:1]:
-            disk[f"run/esp/loader/entries/slot-{name}+0-1.conf"] = disk.pop(other)
-    return None, "it starts again and again"
-
-
 # --- what is tried ---
 
 UPDATE = "sh ROOT/usr/sbin/isohead-update ROOT/stick/3"
 PUT = "sh ROOT/usr/sbin/isohead-put ROOT/stick/isohead.conf"
-GOOD = ". ROOT/usr/lib/isohead/slots; rename_entry b ''"
+GOOD = ". ROOT/usr/lib/isohead/slots; slot_judge b good"
 
 failures = []
 
@@ -265,8 +362,8 @@ def check(condition, text):
         print("FAIL", text, flush=True)
 
 
-def check_disk(disk, what):
-    slot, why = boot(disk)
+def check_disk(board, disk, what):
+    slot, why = board.boot(disk)
     check(slot is not None, f"{what}: no slot starts: {why}")
     check(disk.get("data/isohead.conf") in FILE.values(), f"{what}: isohead.conf is neither the old one nor the new one")
     return slot
@@ -284,11 +381,11 @@ def try_script(tree, name, script, disk, done, count, seed, with_faults=True):
     status, operations, text = tree.run(script)
     check(status == 0 and done(tree.content()), f"{name}: status {status}: {text}")
     check(len(operations) > 1, f"{name}: {len(operations)} operations")
-    check_disk(tree.content(), name)
+    check_disk(tree.board, tree.content(), name)
     generator = random.Random(seed)
     for index in range(count):
         at = index % (len(operations) + 1)
-        slot = check_disk(after_cut(disk, operations, at, generator), f"{name}, cut {index} behind operation {at}")
+        slot = check_disk(tree.board, after_cut(disk, operations, at, generator), f"{name}, cut {index} behind operation {at}")
         Sums.trials += 1
         Sums.slots[slot] = Sums.slots.get(slot, 0) + 1
     for how in ("EIO", "ENOSPC", "CUT") if with_faults else ():
@@ -297,7 +394,7 @@ def try_script(tree, name, script, disk, done, count, seed, with_faults=True):
             status, _, text = tree.run(script, at, how)
             after = tree.content()
             what = f"{name}, {how} at operation {at}"
-            check_disk(after, what)
+            check_disk(tree.board, after, what)
             check(status != 0 or done(after), f"{what}: status 0, and not done: {text}")
             Sums.faults += 1
             status, _, text = tree.run(script)
@@ -306,10 +403,9 @@ def try_script(tree, name, script, disk, done, count, seed, with_faults=True):
 
 
 def notices(tree):
-    """Scripts that are wrong are noticed: an entry without a count that may be there before its kernel is, and a file
-    that is written in place."""
-    disk = fresh_disk()
-    for script, changes in ((UPDATE, [("sync\n", ":\n"), ("+$TRIES.conf", ".conf")]),
+    """Scripts that are wrong are noticed: an update as the board says, and a file that is written in place."""
+    disk = tree.board.fresh_disk()
+    for script, changes in ((UPDATE, tree.board.wrong_update),
                             (PUT, [("new=/data/$name.new", "new=/data/$name"), ('mv -f "$new"', 'true "$new"')])):
         tree.fill(disk, changes)
         _, operations, _ = tree.run(script)
@@ -317,8 +413,28 @@ def notices(tree):
         bad = 0
         for index in range(3000):
             after = after_cut(disk, operations, index % (len(operations) + 1), generator)
-            bad += boot(after)[0] is None or after.get("data/isohead.conf") not in FILE.values()
+            bad += tree.board.boot(after)[0] is None or after.get("data/isohead.conf") not in FILE.values()
         check(bad > 0, f"{changes}: not noticed")
+
+
+def try_board(tree, trials):
+    """What each script of it does in its states."""
+    board = tree.board
+    notices(tree)
+
+    def updated(disk):
+        return (board.is_updated(disk) and disk[SLOT_DEVICES["b"]].startswith(slot_file(3)) and
+                board.boot(disk) == ("b", 1))
+
+    for seed, state in enumerate(board.b_states, 1):
+        count = try_script(tree, f"{board.name}, update beside {state}", UPDATE, board.fresh_disk(state), updated, trials, seed,
+                           seed == 1)
+        print(f"{board.name}, update beside {state}: {count} operations")
+    count = try_script(tree, f"{board.name}, proved good", GOOD, board.fresh_disk(board.trial), board.is_good, trials, 4)
+    print(f"{board.name}, proved good: {count} operations")
+    count = try_script(tree, f"{board.name}, settings", PUT, board.fresh_disk(),
+                       lambda disk: disk["data/isohead.conf"] == FILE["new"], trials, 5)
+    print(f"{board.name}, settings: {count} operations")
 
 
 def main():
@@ -330,24 +446,8 @@ def main():
         shim = os.path.join(work, "torn.so")
         subprocess.run(["cc", "-std=c11", "-shared", "-fPIC", "-O1", "-Wall", "-Wextra", "-Werror", "-o", shim,
                         os.path.join(HERE, "torn.c")], check=True)
-        tree = Tree(work, shim)
-        notices(tree)
-        new = slot_file(3)
-
-        def updated(disk):
-            return (disk.get("run/esp/loader/entries/slot-b+3.conf") == entry("b", 3, new) and
-                    disk["dev/b-slot"].startswith(new) and boot(disk) == ("b", 1))
-
-        for seed, name in enumerate(("slot-b.conf", "slot-b+0-3.conf", "slot-b+2-1.conf"), 1):
-            count = try_script(tree, f"update beside {name}", UPDATE, fresh_disk(name), updated, arguments.trials, seed, seed == 1)
-            print(f"update beside {name}: {count} operations")
-        trial = fresh_disk("slot-b+2-1.conf")
-        count = try_script(tree, "proved good", GOOD, trial,
-                           lambda disk: "run/esp/loader/entries/slot-b.conf" in disk, arguments.trials, 4)
-        print(f"proved good: {count} operations")
-        count = try_script(tree, "settings", PUT, fresh_disk(), lambda disk: disk["data/isohead.conf"] == FILE["new"],
-                           arguments.trials, 5)
-        print(f"settings: {count} operations")
+        for board in (Uefi(), Rpi()):
+            try_board(Tree(os.path.join(work, board.name), shim, board), arguments.trials)
     slots = ", ".join(f"{slot}: {count}" for slot, count in sorted(Sums.slots.items(), key=str))
     print(f"power cuts: {Sums.trials}, then started {slots}; operations that failed or were the last: {Sums.faults}; "
           f"{len(failures)} failures")

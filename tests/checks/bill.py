@@ -5,6 +5,7 @@ packages made here.
 bill.py      exit status 1 if not
 """
 
+import gzip
 import hashlib
 import json
 import os
@@ -88,9 +89,11 @@ def main():
         write(os.path.join(root, "etc/passwd"), b"p")
         write(os.path.join(initramfs, "init"), b"i")
         write(os.path.join(boot, "initrd"), b"r")
+        write(os.path.join(boot, "linux"), gzip.compress(b"kernel"))
+        make_deb(work, "linux3", "3", {"/boot/vmlinuz": b"kernel"})
         os.symlink("init", os.path.join(initramfs, "link"))
-        found = bill("image", root, initramfs, boot, debs, "libone1:arm64", "libtwo2:arm64")
-        check(set(found) == {"libone1", "slot/etc/passwd", "initramfs/init", "boot/initrd"}, f"of an image: {sorted(found)}")
+        found = bill("image", root, initramfs, boot, debs, "libone1:arm64", "libtwo2:arm64", "linux3:arm64")
+        check(set(found) == {"libone1", "linux3", "slot/etc/passwd", "initramfs/init", "boot/initrd"}, f"of an image: {sorted(found)}")
         check(hash_of(found["slot/etc/passwd"]) == digest(b"p"), "hash of a file of ours")
     print(f"bill: {len(failures)} failures")
     return 1 if failures else 0

@@ -8,11 +8,13 @@
 #   tools/board/apt.sh newest REGEX                  the newest package name that REGEX matches wholly
 #
 # Uses the archives that this machine is set up for, with lists and cache of its own below
-# build/apt; signatures are checked as always. Downloads are kept there.
+# build/apt; signatures are checked as always. Downloads are kept there. With SUITE=NAME in the
+# environment it is that suite of the same archive instead, its firmware and its backports.
 set -eu
 cd "$(dirname "$0")/../.."
-apt_dir=$PWD/build/apt
-usage() { sed -n '2,11s/^# \{0,1\}//p' "$0" >&2; exit 2; }
+debs=$PWD/build/apt/debs
+apt_dir=$PWD/build/apt${SUITE:+-$SUITE}
+usage() { sed -n '2,12s/^# \{0,1\}//p' "$0" >&2; exit 2; }
 [ $# -ge 2 ] || usage
 command -v apt-get >/dev/null 2>&1 || { echo "no apt-get here: this needs Debian or its kin" >&2; exit 1; }
 mkdir -p "$apt_dir/lists/partial" "$apt_dir/archives/partial" "$apt_dir/parts"
@@ -22,8 +24,27 @@ exec 9>"$apt_dir/lock"
 flock 9
 
 id=$(. /etc/os-release && echo "$ID")
+# suite: the sources of $SUITE, from where this machine gets its own
+suite() {
+    codename=$(. /etc/os-release && echo "$VERSION_CODENAME")
+    # shellcheck disable=SC2016 # apt-get's own variables
+    uri=$(apt-get indextargets --format '$(REPO_URI) $(RELEASE)' 'Created-By: Packages' |
+        awk -v release="$codename" '$2 == release { print $1; exit }')
+    [ -n "$uri" ] || { echo "no package archive of $codename in /etc/apt" >&2; exit 1; }
+    cat <<END
+Types: deb
+URIs: $uri
+Suites: $SUITE $SUITE-backports
+Components: main non-free-firmware
+Architectures: arm64
+Targets: Packages
+Signed-By: /usr/share/keyrings/debian-archive-keyring.gpg
+END
+}
+
+[ -z "${SUITE:-}" ] || suite >"$apt_dir/parts/suite.sources"
 for file in /etc/apt/sources.list /etc/apt/sources.list.d/*.list /etc/apt/sources.list.d/*.sources; do
-    if [ -e "$file" ] && grep -qi "$id" "$file"; then
+    if [ -z "${SUITE:-}" ] && [ -e "$file" ] && grep -qi "$id" "$file"; then
         sed -e 's/^deb \(.*\)/deb \1\ndeb-src \1/' -e 's/^Types:.*/Types: deb deb-src/' "$file" \
             >"$apt_dir/parts/$(basename "$file")"
     fi
@@ -60,16 +81,16 @@ update() {
 download() {
     where=$1
     shift
-    mkdir -p "$apt_dir/debs" "$where"
+    mkdir -p "$debs" "$where"
     for package in "$@"; do
-        if [ ! -e "$apt_dir/debs/$package.deb" ]; then
+        if [ ! -e "$debs/$package.deb" ]; then
             rm -rf "$apt_dir/new"
             mkdir "$apt_dir/new"
             (cd "$apt_dir/new" && apt-get download -qq "$package") >"$apt_dir/log" 2>&1 ||
                 { cat "$apt_dir/log" >&2; echo "cannot download $package" >&2; exit 1; }
-            mv "$apt_dir"/new/*.deb "$apt_dir/debs/$package.deb"
+            mv "$apt_dir"/new/*.deb "$debs/$package.deb"
         fi
-        [ "$where" = "$apt_dir/debs" ] || cp -f "$apt_dir/debs/$package.deb" "$where/"
+        [ "$where" = "$debs" ] || cp -f "$debs/$package.deb" "$where/"
     done
 }
 
@@ -80,10 +101,10 @@ case "$verb" in
 unpack)
     root=$1
     shift
-    download "$apt_dir/debs" "$@"
+    download "$debs" "$@"
     mkdir -p "$root"
     for package in "$@"; do
-        dpkg-deb --extract "$apt_dir/debs/$package.deb" "$root"
+        dpkg-deb --extract "$debs/$package.deb" "$root"
     done
     ;;
 download) download "$@" ;;

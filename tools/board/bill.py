@@ -7,11 +7,12 @@ bill.py image SLOT_ROOT INITRAMFS BOOT DEBS PACKAGE...
                                              that the build made
 
 DEBS has the packages that were downloaded (tools/board/apt.sh), as NAME:ARCH.deb. A Debian package stands in the bill
-of an image when a file of it is in there, the same byte for byte; with its version, the SHA-256 of the .deb, and how many
+of an image when a file of it is in there, the same byte for byte or packed by gzip; with its version, the SHA-256 of the .deb, and how many
 of its files are packed. The same input gives the same bytes; the time is SOURCE_DATE_EPOCH.
 """
 
 import datetime
+import gzip
 import hashlib
 import io
 import json
@@ -36,6 +37,15 @@ def digest_of(content):
 def digest_of_file(path):
     with open(path, "rb") as file:
         return digest_of(file.read())
+
+
+def digest_unpacked(path):
+    """Of what a file has that gzip packed; nothing of another one."""
+    try:
+        with gzip.open(path) as file:
+            return digest_of(file.read())
+    except gzip.BadGzipFile:
+        return None
 
 
 def hashes(digest):
@@ -117,8 +127,9 @@ def of_image(root, initramfs, boot, debs, packages):
                 if os.path.islink(path) or not os.path.isfile(path):
                     continue
                 digest = digest_of_file(path)
-                if digest in owners:
-                    counts[owners[digest]] += 1
+                owner = owners.get(digest) or owners.get(digest_unpacked(path))
+                if owner:
+                    counts[owner] += 1
                 else:
                     components.append(file_component(prefix + "/" + os.path.relpath(path, tree), digest, "isohead or its build"))
     components += [debian_component(path, packed="yes", files=count) for path, count in counts.items() if count > 0]

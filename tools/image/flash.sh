@@ -1,19 +1,19 @@
 #!/bin/sh
 # Write an image to a whole disk, and read it back.
 #
-#   tools/image/flash.sh DEVICE [IMAGE]      IMAGE: default build/image/isohead.img
+#   tools/image/flash.sh DEVICE IMAGE
 #
 # Refused: what is no whole disk, read-only, too small, the disk of the running system, or in use:
 # mounted, swap, part of a volume group or array, open for itself by anyone. The device's name has
 # to be typed once more; YES=1 in the environment stands for that.
 set -eu
 PATH=$PATH:/sbin:/usr/sbin
-if [ -z "${1:-}" ] || [ $# -gt 2 ]; then
+if [ -z "${1:-}" ] || [ $# != 2 ]; then
     sed -n '2,4s/^# \{0,1\}//p' "$0" >&2
     exit 2
 fi
 device=$1
-image=${2:-$(dirname "$0")/../../build/image/isohead.img}
+image=$2
 refuse() { echo "flash: $device: $*; nothing was written" >&2; exit 1; }
 
 [ -f "$image" ] || { echo "flash: no image $image: type  make image" >&2; exit 1; }
@@ -73,10 +73,12 @@ dd if="$device" bs=4M iflag=direct,count_bytes count="$bytes" status=none | cmp 
     echo "flash: $device does not hold what was written: do not use it" >&2
     exit 1
 }
-# The table's second copy belongs to the end of the medium, which the image does not know.
-message=$(sfdisk --quiet --relocate gpt-bak-std "$device" 2>&1) || {
-    echo "flash: the second partition table of $device: $message" >&2
-    exit 1
-}
+# A GPT's second copy belongs to the end of the medium, which the image does not know.
+if sfdisk --dump "$image" | grep -q '^label: gpt'; then
+    message=$(sfdisk --quiet --relocate gpt-bak-std "$device" 2>&1) || {
+        echo "flash: the second partition table of $device: $message" >&2
+        exit 1
+    }
+fi
 sync "$device"
 echo "$device holds $(basename "$image"), read back and compared"

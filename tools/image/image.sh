@@ -1,17 +1,22 @@
 #!/bin/sh
-# The image to flash: a GPT with the ESP, slots A and B, and the data partition.
+# The image to flash: a boot partition, slots A and B, and the data partition.
 #
-#   tools/image/image.sh [BOARD [OUT]]
+#   tools/image/image.sh uefi|rpi PROGRAM OUT
 #
-# BOARD is isohead_board for arm64 (default: that of `make board ARCH=arm64`). Writes below OUT
-# (default build/image): isohead.img; slot.squashfs, what isohead-update takes; isohead.cdx.json, the
+# PROGRAM is isohead_board for arm64, as `make board ARCH=arm64` gives it. What a kind of board has of its
+# own is in a folder beside this script. Writes below OUT: isohead.img; slot.squashfs, what isohead-update takes; isohead.cdx.json, the
 # bill of materials; SHA256SUMS. With XZ=1 isohead.img.xz too. Needs no root and mounts nothing.
 # The same commit and packages give the same bytes: identifiers and times are fixed.
 set -eu
 cd "$(dirname "$0")/../.."
-board=${1:-build/board-arm64/firmware/app/isohead_board}
-out=${2:-build/image}
-[ -f "$board" ] || { echo "no $board: type  make board ARCH=arm64" >&2; exit 1; }
+if [ $# != 3 ] || [ ! -f "tools/image/$1/board.sh" ]; then
+    sed -n '4s/^# \{0,1\}//p' "$0" >&2
+    exit 2
+fi
+board=$1
+program=$2
+out=$3
+[ -f "$program" ] || { echo "no $program: type  make board ARCH=arm64" >&2; exit 1; }
 
 ESP_MIB=128
 SLOT_MIB=64 # twice of what is needed: room for years of updates
@@ -22,7 +27,9 @@ PATH=$PATH:/sbin:/usr/sbin
 
 mkdir -p "$out"
 out=$(cd "$out" && pwd)
-tools/image/slot.sh "$out" "$board"
+# shellcheck source=tools/image/rpi/board.sh
+. "tools/image/$board/board.sh"
+tools/image/slot.sh "$out" "$board" "$program"
 slot=$out/slot.squashfs
 bytes=$(stat -c %s "$slot")
 sha256=$(sha256sum "$slot" | cut -d ' ' -f 1)
@@ -40,28 +47,13 @@ fat() {
     mkfs.vfat --invariant -F 32 -n "$3" -i "$4" "$1" >/dev/null
 }
 
-# entry SLOT VERSION: its boot loader entry; 3 tries
-entry() {
-    cat <<ENTRY
-title isohead, slot $1
-sort-key isohead
-version $2
-linux /$1/linux
-initrd /$1/initrd
-options isohead.slot=$1 isohead.bytes=$bytes isohead.sha256=$sha256 panic=5 loglevel=4
-ENTRY
-}
-
 esp=$out/esp.fat
 fat "$esp" $ESP_MIB ISOHEAD-ESP 15048ead
-mmd -i "$esp" ::/EFI ::/EFI/BOOT ::/loader ::/loader/entries ::/a ::/b
-mcopy -i "$esp" "$out/boot/systemd-bootaa64.efi" ::/EFI/BOOT/BOOTAA64.EFI
-mcopy -i "$esp" "$out/boot/linux" "$out/boot/initrd" ::/a/
-mcopy -i "$esp" "$out/boot/linux" "$out/boot/initrd" ::/b/
-# The menu takes no key: the command line of an entry says what is checked.
-printf 'timeout 0\neditor no\nauto-entries no\nauto-firmware no\n' | mcopy -i "$esp" - ::/loader/loader.conf
-entry a 2 | mcopy -i "$esp" - ::/loader/entries/slot-a+3.conf
-entry b 1 | mcopy -i "$esp" - ::/loader/entries/slot-b+3.conf
+board_esp "$esp"
+for name in a b; do
+    mmd -i "$esp" "::/$name"
+    mcopy -i "$esp" "$out/boot/linux" "$out/boot/initrd" "::/$name/"
+done
 
 data=$out/data.fat
 fat "$data" $DATA_MIB ISOHEAD 15048eda
@@ -71,15 +63,8 @@ sed 's|^rig = .*|rig = /data/rig.json|' firmware/app/isohead.conf | mcopy -i "$d
 image=$out/isohead.img
 rm -f "$image"
 truncate -s $((ESP_MIB + 2 * SLOT_MIB + DATA_MIB + 2))M "$image"
-sfdisk --quiet "$image" <<TABLE
-label: gpt
-label-id: $(identifier disk)
-first-lba: 2048
-start=2048, size=${ESP_MIB}MiB, type=uefi, name=isohead-esp, uuid=$(identifier esp)
-size=${SLOT_MIB}MiB, type=linux, name=isohead-a, uuid=$(identifier a)
-size=${SLOT_MIB}MiB, type=linux, name=isohead-b, uuid=$(identifier b)
-size=${DATA_MIB}MiB, type=EBD0A0A2-B9E5-4433-87C0-68B6B72699C7, name=isohead-data, uuid=$(identifier data)
-TABLE
+board_table | sfdisk --quiet "$image"
+board_state "$image"
 # put FILE MIB: at that offset of the image
 put() { dd if="$1" of="$image" bs=1M seek="$2" conv=notrunc,sparse status=none; }
 put "$esp" 1

@@ -1,19 +1,20 @@
 #!/bin/sh
 # The root of one slot of the image: everything that an update replaces.
 #
-#   tools/image/slot.sh WORK BOARD
+#   tools/image/slot.sh WORK uefi|rpi PROGRAM
 #
-# BOARD is isohead_board for arm64. Writes WORK/slot.squashfs, and WORK/boot/ with the kernel, the
+# PROGRAM is isohead_board for arm64. Writes WORK/slot.squashfs, and WORK/boot/ with the kernel, the
 # initramfs and the boot loader; kernel and initramfs are in the slot too, so that its one file is
 # all of an update. WORK/root, what the slot was made of, is left there.
 # Same input, same bytes: SOURCE_DATE_EPOCH is the time of every file, names are sorted.
 set -eu
-[ $# = 2 ] || { sed -n '2,4s/^# \{0,1\}//p' "$0" >&2; exit 2; }
+[ $# = 3 ] || { sed -n '2,4s/^# \{0,1\}//p' "$0" >&2; exit 2; }
 here=$(cd "$(dirname "$0")" && pwd)
 apt=$here/../board/apt.sh
 mkdir -p "$1"
 work=$(cd "$1" && pwd)
 board=$2
+program=$3
 : "${SOURCE_DATE_EPOCH:?is the time that all files get}"
 export LC_ALL=C
 umask 022
@@ -24,15 +25,21 @@ initramfs=$work/initramfs
 rm -rf "$packages" "$root" "$initramfs" "${work:?}/boot"
 mkdir -p "$root" "$initramfs" "$work/boot"
 
-kernel_package=$("$apt" newest 'linux-image-6\.1\.0-[0-9]*-arm64')
-set -- "$kernel_package:arm64" busybox-static:arm64 systemd-boot-efi:arm64 \
-    libc6:arm64 libgcc-s1:arm64 libv4l-0:arm64 libv4lconvert0:arm64 libjpeg62-turbo:arm64 \
+# shellcheck source=tools/image/rpi/board.sh
+. "$here/$board/board.sh"
+of_board=$(board_packages)
+# shellcheck disable=SC2086 # a list of packages
+"$apt" unpack "$packages" $of_board
+set -- busybox-static:arm64 libc6:arm64 libgcc-s1:arm64 libv4l-0:arm64 libv4lconvert0:arm64 libjpeg62-turbo:arm64 \
     libgpiod2:arm64 libcjson1:arm64 libmicrohttpd12:arm64 libgnutls30:arm64 libnettle8:arm64 \
     libhogweed6:arm64 libgmp10:arm64 libidn2-0:arm64 libunistring2:arm64 libtasn1-6:arm64 \
     libp11-kit0:arm64 libffi8:arm64
-"$apt" unpack "$packages" "$@"
-echo "$*" >"$work/packages.list" # for the bill of materials
+SUITE='' "$apt" unpack "$packages" "$@"
+# shellcheck disable=SC2086 # a list of packages
+echo $of_board "$*" >"$work/packages.list" # for the bill of materials
+[ ! -e "$packages/usr/lib/modules" ] || mv "$packages/usr/lib/modules" "$packages/lib/"
 version=$(basename "$packages"/lib/modules/*)
+kernel=$(find "$packages" -name "vmlinuz*")
 
 # modules TREE KIND...: the kernel's modules of these kinds in modules.list, and what they need
 modules() {
@@ -45,8 +52,10 @@ modules() {
         sed -n "s/^$kind //p" "$here/modules.list"
     done | sort >"$work/wanted"
     while read -r path; do
+        ! grep -qx "kernel/$path" "$from/modules.builtin" || continue
+        [ -e "$from/kernel/$path" ] || path=$path.xz
         [ -e "$from/kernel/$path" ] || { echo "modules.list: kernel $version has no $path" >&2; exit 1; }
-        (cd "$from" && find "kernel/$path" -name '*.ko')
+        (cd "$from" && find "kernel/$path" -name '*.ko' -o -name '*.ko.xz')
     done <"$work/wanted" >"$work/modules"
     # modules.dep names all that a module needs, not only the next.
     awk 'NR == FNR { wanted[$1 ":"]; next } $1 in wanted { for (i = 2; i <= NF; i++) print $i }' \
@@ -93,18 +102,18 @@ level() {
 [ -e "$packages/lib/modules/$version/modules.dep" ] || depmod -b "$packages" "$version"
 
 mkdir -p "$initramfs/dev" "$initramfs/proc" "$initramfs/sys" "$initramfs/run" "$initramfs/root" \
-    "$initramfs/lib/isohead"
+    "$initramfs/usr/lib/isohead"
 busybox "$initramfs" bin
 cp "$here/initramfs/init" "$initramfs/init"
-cp "$here/root/usr/lib/isohead/slots" "$initramfs/lib/isohead/"
-modules "$initramfs" boot
+cp "$here/root/usr/lib/isohead/slots" "$here/$board/boot" "$initramfs/usr/lib/isohead/"
+modules "$initramfs" "$BOOT_KIND"
 level "$initramfs"
 (cd "$initramfs" && find . | sort | cpio --quiet --reproducible -R 0:0 -o -H newc) |
     zstd --quiet -19 >"$work/boot/initrd"
-cp "$packages/boot/vmlinuz-$version" "$work/boot/linux"
-cp "$packages/usr/lib/systemd/boot/efi/systemd-bootaa64.efi" "$work/boot/"
+board_boot
 
 cp -R "$here/root/." "$root/"
+cp "$here/$board/boot" "$root/usr/lib/isohead/"
 for folder in boot data dev etc proc run sys tmp usr/bin usr/lib/aarch64-linux-gnu; do
     mkdir -p "$root/$folder"
 done
@@ -114,11 +123,11 @@ ln -s usr/lib "$root/lib"
 ln -s ../run/resolv.conf "$root/etc/resolv.conf"
 busybox "$root" bin
 ln -s ../bin/busybox "$root/usr/sbin/init"
-modules "$root" boot root
-aarch64-linux-gnu-strip -o "$root/usr/bin/isohead_board" "$board"
-live=$(dirname "$board")/../lib/isohead/isohead_live
+modules "$root" boot root "$board"
+aarch64-linux-gnu-strip -o "$root/usr/bin/isohead_board" "$program"
+live=$(dirname "$program")/../lib/isohead/isohead_live
 aarch64-linux-gnu-strip -o "$root/usr/lib/isohead/isohead_live" "$live"
-libraries "$board"
+libraries "$program"
 libraries "$live"
 ln -s aarch64-linux-gnu/ld-linux-aarch64.so.1 "$root/usr/lib/ld-linux-aarch64.so.1"
 cp "$work/boot/linux" "$work/boot/initrd" "$root/boot/"
