@@ -306,7 +306,8 @@ test-image: sim image test-image-$(if $(filter rpi,$(BOARD)),rpi,uefi) ## boot t
 
 test-image-rpi: sim image
 	@tools/setup.sh test-image rpi
-	@/usr/bin/python3 tests/board/image_rpi.py --image $(IMAGE_OUT) --frames frames/sequence2 --work $(BUILD)/test_image_rpi
+	@/usr/bin/python3 tests/board/image_rpi.py --image $(IMAGE_OUT) --frames frames/sequence2 \
+	  --host-sim $(BUILD)/host/sim/host_sim --work $(BUILD)/test_image_rpi
 
 test-image-uefi: sim image
 	@tools/setup.sh test-image uefi

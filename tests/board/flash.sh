@@ -130,3 +130,12 @@ if YES=1 PATH=$work/bin:$PATH "$flash" "$loop" "$image" >"$work/log" 2>&1; then
 fi
 grep -q "does not hold what was written" "$work/log" || fail "a forgetful disk: $(cat "$work/log")"
 echo "ok   sees that a disk does not hold what was written"
+
+# The older kind of partition table has no second copy: nothing is added to the image.
+truncate -s 12M "$image"
+printf 'label: dos\nsize=4MiB, type=c\ntype=83\n' | sfdisk --quiet --wipe always "$image"
+attach older 16
+YES=1 "$flash" "$loop" "$image" >"$work/log" 2>&1 || fail "a table of the older kind: $(cat "$work/log")"
+cmp -s -n 12582912 "$image" "$work/older" || fail "the disk does not hold the image with a table of the older kind"
+cmp -s -i 12582912:0 -n 4194304 "$work/older" /dev/zero || fail "something was written behind the image"
+echo "ok   a table of the older kind"

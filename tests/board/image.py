@@ -122,8 +122,8 @@ class Disk:
         return f"{self.path}@@{self.places[name][0]}"
 
     def put(self, sources, folder):
-        """Files into a folder of the data partition."""
-        run("mcopy", "-o", "-i", self.fat("isohead-data"), *sources, "::" + folder)
+        """Files and folders into a folder of the data partition."""
+        run("mcopy", "-o", "-s", "-i", self.fat("isohead-data"), *sources, "::" + folder)
 
     def make_folder(self, folder):
         run("mmd", "-i", self.fat("isohead-data"), "::" + folder)
@@ -163,6 +163,7 @@ class Board:
     """QEMU's virt board with UEFI, its console, a line for records and a port for frames."""
 
     LINES = ("console", "records", "frames")
+    START_S = START_S
 
     @staticmethod
     def machine(disk, work):
@@ -273,7 +274,7 @@ class Board:
 
     def wait_slot(self, name):
         """For the slot that is started next; True when it is whole."""
-        match = self.wait(r"isohead: slot (.) on \S+ is (whole|damaged)", START_S)
+        match = self.wait(r"isohead: slot (.) on \S+ is (whole|damaged)", self.START_S)
         expect(match.group(1) == name, f"slot {match.group(1)} was started, not {name}")
         return match.group(2) == "whole"
 

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 """The image for a Raspberry Pi, on QEMU's Raspberry Pi 3: U-Boot from the image starts a slot and counts, the kernel and
-the slot are the image's own, a camera of vivid gives frames, the laser's line is the processor's.
+the slot are the image's own, frames come from a directory and from the kernel's virtual camera, the laser's line is the processor's.
 
-image_rpi.py --image DIR --frames DIR --work DIR [CASE...]
+image_rpi.py --image DIR --frames DIR --host-sim FILE --work DIR [CASE...]
 
---image: what tools/image/image.sh has made; --frames: a rendered frames directory, for its rig.json. QEMU has none of
+--image: what tools/image/image.sh has made; --frames: a rendered frames directory. QEMU has none of
 Raspberry Pi's own firmware: firmware_choice() reads config.txt as that firmware is documented to do, and QEMU gets the
 files that it names. Exit status 1 if a case fails.
 """
@@ -18,7 +18,8 @@ import sys
 import time
 import zlib
 
-from image import ANSWER_S, Board, Disk, Wrong, expect, run
+from frames import as_of_host
+from image import ANSWER_S, Board, Disk, Frames, Wrong, expect, run
 
 # What a model's firmware puts true in the filters of config.txt, and the names of its device tree, upstream's first.
 MODELS = {
@@ -34,10 +35,16 @@ FIRMWARE_BEFORE_4 = ["bootcode.bin", "start.elf", "fixup.dat"]
 
 SECTOR = 512
 STATE_SECTORS = (1, 9)
-START_S = 400
+START_S = 600
 LASER = 17
 GPLEV0 = 0x3F200034
-CONFIG = f"""device = /dev/video0
+# First the frames of a directory, then a camera of vivid, for which alone the laser may be on.
+DIRECTORY = """device = /data/frames
+rate = 2
+loop = on
+status = 0
+"""
+CAMERA = f"""device = /dev/video0
 rate = 5
 exposure = keep
 gain = keep
@@ -141,6 +148,7 @@ class PiBoard(Board):
     """QEMU's Raspberry Pi 3 with its SD card, its console and QEMU's own monitor."""
 
     LINES = ("console", "monitor")
+    START_S = START_S
 
     @staticmethod
     def machine(disk, work):
@@ -261,37 +269,60 @@ def vivid(image, folder):
     return commands
 
 
-def case_start(shared):
-    """a zeroed slot is left by itself; camera, records and laser; the power fails in an update"""
-    disk, work = card(shared, "start")
+def fill(shared, disk, work):
+    """The data partition: frames, a rig for them and one for vivid, settings for both, an update."""
+    frames = Frames(shared.frames, os.path.join(work, "frames"), shared.host_sim)
     folder = os.path.join(work, "test")
     os.makedirs(folder)
-    files = {"isohead.conf": CONFIG, "start.sh": vivid(shared.image, folder),
-             "rig.json": re.sub(r'("image_width":)\d+', r"\g<1>640",
-                                re.sub(r'("image_height":)\d+', r"\g<1>360", read(os.path.join(shared.frames, "rig.json"))))}
-    for name, text in files.items():
+    rig = read(frames.rig)
+    small = re.sub(r'("image_height":)\d+', r"\g<1>360", re.sub(r'("image_width":)\d+', r"\g<1>640", rig))
+    for name, text in (("isohead.conf", DIRECTORY), ("start.sh", vivid(shared.image, folder)), ("rig.json", rig),
+                       ("test/camera.conf", CAMERA), ("test/camera.json", small)):
         with open(os.path.join(work, name), "w", encoding="ascii") as file:
             file.write(text)
-    disk.put([os.path.join(work, name) for name in files], "/")
-    disk.make_folder("/test")
-    disk.put([os.path.join(folder, name) for name in os.listdir(folder)], "/test")
+    disk.put([os.path.join(work, name) for name in ("isohead.conf", "start.sh", "rig.json")], "/")
+    disk.put([os.path.join(shared.image, "slot.squashfs"), folder, os.path.join(work, "frames")], "/")
+    return frames
+
+
+def case_start(shared):
+    """a zeroed slot is left by itself; records and laser; the power fails in an update"""
+    disk, work = card(shared, "start")
+    frames = fill(shared, disk, work)
     disk.zero("isohead-a")
     with PiBoard(disk, work) as board:
         expect(not board.wait_slot("a"), "a zeroed slot counts as whole")
         expect(board.wait_slot("b"), "slot B is damaged")
         back_s = board.now_s()
-        board.wait(r'(?m)^\{"time_us":\d+,.*"heads":\[\]', START_S)
-        record_s = board.now_s()
-        board.wait("slot b is good", ANSWER_S)
+        for index, wanted in enumerate(frames.records):
+            match = board.wait(r'(?m)^\{"file":"%06d\.pgm".*\}$' % index, START_S)
+            if index == 0:
+                record_s = board.now_s()
+            expect(as_of_host(match[0]) == wanted, f"frame {index}:\nboard    {match[0]}\nhost_sim {wanted}")
+        board.wait("slot b is good", START_S)
         expect(disk.state() == {"first": "a", "a_left": "0", "b_left": "good"}, f"state {disk.state()}")
         board.command("grep -q ' /data vfat ro,' /proc/mounts")
         board.command("! touch /usr/x")
-        board.wait_level(LASER, 1, ANSWER_S)
-        board.command("kill -9 $(pidof isohead_board)")
+        board.command("isohead-put /data/test/camera.json rig.json", START_S)
+        board.command("isohead-put /data/test/camera.conf isohead.conf", START_S)
+        expect(board.line_level(LASER) == 0, "the laser's line is high before anything may use it")
+        board.command("killall isohead_board")
+        board.wait_level(LASER, 1, START_S)
+        board.wait(r'(?m)^\{"file":"\d+\.pgm".*"dots":\d+.*\}$', START_S)
+        board.command("killall -9 isohead_board")
         board.wait("the firmware ended with status 137", ANSWER_S)
         board.wait_level(LASER, 0, ANSWER_S)
-        board.wait_level(LASER, 1, ANSWER_S)
-    return f"power-on to slot B after A was found damaged {back_s:.0f} s, to the first record {record_s:.0f} s"
+        board.wait_level(LASER, 1, START_S)
+        board.sockets["console"].sendall(b"\nisohead-update /data/slot.squashfs\n")
+        board.wait("writing slot a on /dev/", START_S)
+        board.read(1)
+    cut = disk.state()
+    expect(cut == {"first": "b", "a_left": "0", "b_left": "good"}, f"state after the power failed in an update: {cut}")
+    with PiBoard(disk, work) as board:
+        expect(board.wait_slot("b"), "slot B is damaged after the power failed in an update of A")
+        board.wait_level(LASER, 1, START_S)
+    return (f"power-on to slot B, after A was found damaged, {back_s:.0f} s, to the first record {record_s:.0f} s; "
+            f"{len(frames.records)} records identical to host_sim's")
 
 
 CASES = [case_choice, case_loader, case_start]
@@ -299,7 +330,7 @@ CASES = [case_choice, case_loader, case_start]
 
 def main():
     parser = argparse.ArgumentParser()
-    for name in ["image", "frames", "work"]:
+    for name in ["image", "frames", "host-sim", "work"]:
         parser.add_argument("--" + name, required=True, type=os.path.abspath)
     parser.add_argument("case", nargs="*")
     shared = parser.parse_args()
