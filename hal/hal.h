@@ -107,6 +107,7 @@ enum hal_event {
     HAL_EVENT_INTERLOCK = 2, /* the interlock opened or closed, perhaps several times */
     HAL_EVENT_STOP = 4,      /* end the program */
     HAL_EVENT_RELOAD = 8,    /* read the rig again */
+    HAL_EVENT_RECORD = 16,   /* write what the recorder has */
 };
 
 struct hal_events {
@@ -149,6 +150,20 @@ struct hal_viewer {
     void *context;
     enum hal_look (*ask)(void *context, void **room, struct hal_error *error);
     void (*show)(void *context);
+};
+
+/* Keeps frames in memory, and writes them where that is wanted; never waits. */
+struct hal_recorder {
+    void *context;
+    /* Into the memory: a frame that is used, lit or not. The oldest give way while nothing is written. False: there is no room,
+     * and it is lost. */
+    bool (*keep)(void *context, const struct hal_frame *frame, bool lit);
+    /* true: what is in the memory is written, and what comes, as one recording; false: only what is there already. */
+    void (*write)(void *context, bool on);
+    /* The rig was read anew: what is kept is forgotten, and another recording begins. */
+    void (*rig)(void *context);
+    /* True: *error is something to report. */
+    bool (*news)(void *context, struct hal_error *error);
 };
 
 /* Takes what went wrong beside the frames themselves. subject: a file or device. */

@@ -4,8 +4,12 @@
 
 #include "app_live.h"
 #include "app_rig.h"
+#include "app_settings.h"
+#include "app_write.h"
 
 #define PROGRAM "isohead_board"
+#define MEGABYTE INT64_C(1000000)
+#define SECOND_US INT64_C(1000000)
 
 static struct hal_v4l2_setting exposure_of(const struct app_config *config)
 {
@@ -161,6 +165,39 @@ static bool open_viewer(struct app_board *board, const struct app_config *config
     return true;
 }
 
+static bool write_settings(struct app_board *board, const struct app_config *config,
+                           struct hal_error *error)
+{
+    struct app_write write = {.memory = board->settings, .size = sizeof board->settings - 1};
+    app_write_open(&write, '{');
+    app_write_key(&write, "version");
+    app_write_string(&write, ISOHEAD_VERSION);
+    app_write_key(&write, "settings");
+    app_settings_write(config, &write);
+    app_write_close(&write, '}');
+    app_write_line_end(&write);
+    board->settings[write.length] = 0;
+    return !write.full || hal_fail(error, "the settings are too long");
+}
+
+/* Before camera and laser, too. */
+static bool open_recorder(struct app_board *board, const struct app_config *config,
+                          struct hal_error *error)
+{
+    const struct hal_v4l2_config *camera = &board->v4l2.config;
+    const struct hal_recorder_config recorder = {
+        .recording = {.dir = config->record,
+                      .rig = config->rig,
+                      .settings = board->settings,
+                      .bytes_max = config->record_max_mb * MEGABYTE},
+        .memory_bytes = config->record_memory_mb * MEGABYTE,
+        .frame_bytes = (int64_t)camera->width * camera->height * 2,
+        .keep_us = config->record_s * SECOND_US,
+    };
+    return write_settings(board, config, error) &&
+           hal_recorder_open(&board->recorder, &recorder, error);
+}
+
 static enum app_exit run_loop(struct app_board *board, const struct app_config *config)
 {
     const struct hal_events_config events = {
@@ -180,6 +217,7 @@ static enum app_exit run_loop(struct app_board *board, const struct app_config *
         .watchdog = &board->watchdog.watchdog,
         .output = &board->output.output,
         .viewer = config->view_port[0] != 0 ? &board->viewer.viewer : NULL,
+        .recorder = config->record != NULL ? &board->recorder.recorder : NULL,
     };
     return app_loop_run(&board->state);
 }
@@ -208,7 +246,8 @@ static enum app_exit run_with_output(struct app_board *board, const struct app_c
         .guard = config->laser ? &board->guard : NULL,
         .clock = &hal_clock,
     };
-    if (!hal_signals_open(&board->signals, config->laser ? &board->guard.strobe : NULL, &error)) {
+    if (!hal_signals_open(&board->signals, config->laser ? &board->guard.strobe : NULL,
+                          config->record != NULL, &error)) {
         return fail(board, "signals", &error, APP_EXIT_FAILED);
     }
     if (!is_laser_off(board, config, &error)) {
@@ -225,16 +264,30 @@ static enum app_exit run_with_output(struct app_board *board, const struct app_c
     return exit;
 }
 
+static enum app_exit run_with_recorder(struct app_board *board, const struct app_config *config)
+{
+    struct hal_error error;
+    if (config->record == NULL) {
+        return run_with_output(board, config);
+    }
+    if (!open_recorder(board, config, &error)) {
+        return fail(board, "record", &error, APP_EXIT_FAILED);
+    }
+    enum app_exit exit = run_with_output(board, config);
+    hal_recorder_close(&board->recorder);
+    return exit;
+}
+
 static enum app_exit run_with_view(struct app_board *board, const struct app_config *config)
 {
     struct hal_error error;
     if (config->view_port[0] == 0) {
-        return run_with_output(board, config);
+        return run_with_recorder(board, config);
     }
     if (!open_viewer(board, config, &error)) {
         return fail(board, "view", &error, APP_EXIT_FAILED);
     }
-    enum app_exit exit = run_with_output(board, config);
+    enum app_exit exit = run_with_recorder(board, config);
     hal_viewer_close(&board->viewer);
     return exit;
 }

@@ -19,6 +19,7 @@
 #include "linux/hal_guard_end.h"
 #include "linux/hal_log.h"
 #include "linux/hal_output.h"
+#include "linux/hal_recorder.h"
 #include "linux/hal_signals.h"
 #include "linux/hal_v4l2.h"
 #include "linux/hal_viewer.h"
@@ -30,6 +31,9 @@
 /* ... and when it begins to end them: a dying program's guards need no more. */
 #define APP_BOARD_OFF_PATIENCE 5
 
+/* All settings as JSON: their values, and twice as much for names. */
+#define APP_BOARD_SETTINGS_MAX (3 * APP_CONFIG_TEXT_MAX)
+
 /* The largest first, so that little is lost between them. */
 struct app_board {
     struct isohead head;
@@ -38,6 +42,7 @@ struct app_board {
     struct hal_watchdog_feeder watchdog;
     struct hal_guard guard;
     struct hal_viewer_process viewer;
+    struct hal_recorder_process recorder;
     struct hal_gpio gpio;
     struct hal_v4l2 v4l2;
     struct hal_directory directory; /* in place of v4l2, where the device is one */
@@ -45,6 +50,7 @@ struct app_board {
     struct app_state state;
     struct hal_output_state output;
     struct hal_signals signals;
+    char settings[APP_BOARD_SETTINGS_MAX]; /* as a recording has them */
 };
 
 /* Frames in, records out, until requested to end. */

@@ -349,6 +349,8 @@ static void check(struct reader *reader)
            "on, but no laser-line, expected the line that switches it");
     demand(reader, config->laser || config->strobe != APP_STROBE_ALTERNATING, "strobe",
            "alternating without laser, expected always, gated or laser on");
+    demand(reader, config->record != NULL || config->record_when == APP_RECORD_ALWAYS,
+           "record-when", "given, but no record, expected the directory too");
     check_lines(reader);
 }
 

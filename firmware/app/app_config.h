@@ -57,6 +57,13 @@ enum app_output {
     APP_OUTPUT_SERIAL, /* output_path, output_baud */
 };
 
+enum app_record_when {
+    APP_RECORD_ALWAYS,
+    APP_RECORD_SIGNAL,
+    APP_RECORD_MOVED,
+    APP_RECORD_NO_HEAD, /* for record_no_head_s */
+};
+
 enum app_messages {
     APP_MESSAGES_STDERR,
     APP_MESSAGES_SYSLOG,
@@ -98,6 +105,13 @@ struct app_config {
     bool paper;
     char view_host[APP_CONFIG_VALUE_MAX + 1]; /* a numeric address; default 127.0.0.1 */
     char view_port[sizeof "65535"]; /* decimal, 1 .. 65535; empty (default): no live view */
+
+    const char *record; /* directory; NULL: nothing is recorded */
+    enum app_record_when record_when;
+    int32_t record_no_head_s; /* 1 .. 86400 with APP_RECORD_NO_HEAD, else 0 */
+    int32_t record_s;         /* before and after what it is for; 1 .. 3600, default 10 */
+    int32_t record_memory_mb; /* 1 .. 4096, default 32 */
+    int32_t record_max_mb;    /* on the disk, 1 .. 1000000, default 1000 */
 
     /* Of the command line only. */
     const char *path; /* of the file; NULL: none */

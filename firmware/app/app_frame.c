@@ -2,6 +2,7 @@
 
 #include "app_health.h"
 #include "app_live.h"
+#include "app_recorder.h"
 #include "app_view.h"
 
 static void wish_light(struct app_state *state, bool on)
@@ -158,6 +159,7 @@ static void use_lit(struct app_state *state, const struct hal_frame *frame, int6
     }
     isohead_find(head, frame->time_us);
     app_health_frame(state);
+    app_recorder_frame(state, frame, true);
     app_status_frame(&state->status, head->dots.dot_count, head->result.head_count,
                      app_state_now_us(state) - began_us);
     put_record(state, app_record_frame(&state->record, frame, head, &state->live), frame->name);
@@ -180,6 +182,7 @@ static void use_dark(struct app_state *state, const struct hal_frame *frame)
     }
     state->ambient = *frame;
     state->has_ambient = true;
+    app_recorder_frame(state, frame, false);
     wish_light(state, true);
 }
 

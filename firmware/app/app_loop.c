@@ -4,6 +4,7 @@
 
 #include "app_frame.h"
 #include "app_health.h"
+#include "app_recorder.h"
 #include "app_rig.h"
 #include "app_rig_explain.h"
 
@@ -75,6 +76,7 @@ static void reload_rig(struct app_state *state)
     }
     if (state->rig_is_valid) {
         app_log_say(state->log, APP_LOG_INFO, "%s: reloaded", state->config->rig);
+        app_recorder_rig(state);
         app_laser_rig(&state->laser, true, app_state_now_us(state));
         app_frame_light(state);
     } else {
@@ -319,7 +321,11 @@ static void run_once(struct app_state *state)
     if ((events & HAL_EVENT_RELOAD) != 0) {
         reload_rig(state);
     }
+    if ((events & HAL_EVENT_RECORD) != 0) {
+        app_recorder_request(state);
+    }
     run_camera(state, events);
+    app_recorder_tick(state);
     app_health_tick(state);
     watch_laser(state);
     if (app_status_line(&state->status, app_state_now_us(state), line)) {
@@ -338,6 +344,7 @@ enum app_exit app_loop_run(struct app_state *state)
     }
     state->width = state->head->rig.calibration.width;
     state->height = state->head->rig.calibration.height;
+    app_recorder_begin(state);
     app_laser_rig(&state->laser, true, app_state_now_us(state));
     if (app_laser_open(&state->laser, &error)) {
         if (error.text[0] != 0) {

@@ -77,6 +77,7 @@ static void put_choice(const struct app_setting *setting, struct app_config *con
     _Static_assert(sizeof(enum app_strobe) == sizeof choice, "");
     _Static_assert(sizeof(enum app_messages) == sizeof choice, "");
     _Static_assert(sizeof(enum app_repeat) == sizeof choice, "");
+    _Static_assert(sizeof(enum app_record_when) == sizeof choice, "");
     memcpy(place_of(config, setting->offset), &choice, sizeof choice);
 }
 
@@ -227,6 +228,7 @@ static const char *const exposure_words[] = {"auto", "keep", "steer", NULL};
 static const char *const repeat_words[] = {"auto", "on", "off", NULL};
 static const char *const gain_words[] = {"auto", "keep", NULL};
 static const char *const strobe_words[] = {"always", "gated", "alternating", NULL};
+static const char *const record_words[] = {"always", "signal", "moved", NULL};
 static const char *const log_words[] = {"stderr", "syslog", NULL};
 
 #define AT(member) offsetof(struct app_config, member)
@@ -308,6 +310,25 @@ const struct app_setting app_settings[] = {
      "URL "
      "is in the messages; default: none",
      .take = take_view},
+
+    {"record", "DIR", "a directory",
+     "record frames here, as directories that host_sim reads; default: none", .take = take_text,
+     .offset = AT(record), .heading = "Recording"},
+    {"record-when", "WHEN", "always, signal, moved or seconds from 1 to 86400",
+     "always, all frames, the default; or some seconds before and after: signal, SIGUSR1 alone; "
+     "moved, "
+     "that the rig has moved; seconds without a head",
+     .take = take_choice_or_number, .offset = AT(record_when), .words = record_words, .minimum = 1,
+     .maximum = 86400, .number_offset = AT(record_no_head_s)},
+    {"record-seconds", "SECONDS", "seconds from 1 to 3600",
+     "so many seconds before and after; default 10", .take = take_number, .offset = AT(record_s),
+     .minimum = 1, .maximum = 3600},
+    {"record-memory", "MB", "megabytes from 1 to 4096",
+     "memory for frames that wait to be written, or for what they are written for; default 32",
+     .take = take_number, .offset = AT(record_memory_mb), .minimum = 1, .maximum = 4096},
+    {"record-max", "MB", "megabytes from 1 to 1000000",
+     "all files in the directory, at most; default 1000", .take = take_number,
+     .offset = AT(record_max_mb), .minimum = 1, .maximum = 1000000},
 
     {"config", "FILE", "a file", "read settings from here too; these options win",
      .take = take_text, .offset = AT(path), .place = APP_SETTINGS_OPTION,
@@ -402,6 +423,86 @@ bool app_settings_take(int index, struct app_config *config, const char *value,
     return true;
 }
 
+static void write_number(const struct app_setting *setting, int32_t value, struct app_write *write)
+{
+    struct app_decimal decimal;
+    int32_t unit = 1;
+    for (int32_t i = 0; i < setting->decimals; i++) {
+        unit *= 10;
+    }
+    if (setting->decimals == 0) {
+        app_write_int(write, value);
+        return;
+    }
+    snprintf(decimal.text, sizeof decimal.text, "%d.%0*d", (int)(value / unit),
+             (int)setting->decimals, (int)(value % unit));
+    app_write_decimal(write, decimal);
+}
+
+static void write_output(const struct app_config *config, struct app_write *write)
+{
+    char text[APP_CONFIG_VALUE_MAX + 32] = "-";
+    if (config->output == APP_OUTPUT_UDP) {
+        snprintf(text, sizeof text, "udp:[%s]:%s", config->output_host, config->output_port);
+    } else if (config->output == APP_OUTPUT_SERIAL) {
+        snprintf(text, sizeof text, "serial:%s:%d", config->output_path, (int)config->output_baud);
+    }
+    app_write_string(write, text);
+}
+
+static void write_view(const struct app_config *config, struct app_write *write)
+{
+    char text[APP_CONFIG_VALUE_MAX + 32];
+    snprintf(text, sizeof text, "[%s]:%s", config->view_host, config->view_port);
+    app_write_string_or_null(write, config->view_port[0] != 0 ? text : NULL);
+}
+
+static int32_t number_at(const struct app_config *config, size_t offset)
+{
+    int32_t number = 0;
+    memcpy(&number, (const char *)config + offset, sizeof number);
+    return number;
+}
+
+static const char *text_at(const struct app_config *config, size_t offset)
+{
+    const char *text = NULL;
+    memcpy(&text, (const char *)config + offset, sizeof text);
+    return text;
+}
+
+static void write_value(const struct app_setting *setting, const struct app_config *config,
+                        struct app_write *write)
+{
+    if (setting->take == take_output) {
+        write_output(config, write);
+    } else if (setting->take == take_view) {
+        write_view(config, write);
+    } else if (setting->take == take_flag) {
+        app_write_bool(write, *((const char *)config + setting->offset) != 0);
+    } else if (setting->take == take_number) {
+        write_number(setting, number_at(config, setting->offset), write);
+    } else if (setting->take == take_text || setting->take == take_word) {
+        app_write_string_or_null(write, text_at(config, setting->offset));
+    } else if (setting->words[number_at(config, setting->offset)] != NULL) {
+        app_write_string(write, setting->words[number_at(config, setting->offset)]);
+    } else {
+        app_write_int(write, number_at(config, setting->number_offset));
+    }
+}
+
+void app_settings_write(const struct app_config *config, struct app_write *write)
+{
+    app_write_open(write, '{');
+    for (int i = 0; i < APP_SETTINGS_COUNT; i++) {
+        if (app_settings[i].place == APP_SETTINGS_BOTH) {
+            app_write_key(write, app_settings[i].name);
+            write_value(&app_settings[i], config, write);
+        }
+    }
+    app_write_close(write, '}');
+}
+
 void app_settings_default(struct app_config *config)
 {
     memset(config, 0, sizeof *config);
@@ -412,4 +513,7 @@ void app_settings_default(struct app_config *config)
     config->laser_cap_ms = 200;
     config->output_baud = BAUD_DEFAULT;
     config->status_s = 10;
+    config->record_s = 10;
+    config->record_memory_mb = 32;
+    config->record_max_mb = 1000;
 }

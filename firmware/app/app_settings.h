@@ -5,6 +5,7 @@
 #define APP_SETTINGS_H
 
 #include "app_config.h"
+#include "app_write.h"
 
 enum app_settings_place {
     APP_SETTINGS_BOTH,    /* option and key */
@@ -28,7 +29,7 @@ struct app_setting {
     enum app_settings_place place;
 };
 
-#define APP_SETTINGS_COUNT 28
+#define APP_SETTINGS_COUNT 33
 extern const struct app_setting app_settings[];
 
 /* Index of a setting, or -1. */
@@ -40,6 +41,9 @@ int app_settings_nearest(const char *name);
 /* Put the value into the config; texts are not copied. False: *error, without the setting's name. */
 bool app_settings_take(int index, struct app_config *config, const char *value,
                        struct hal_error *error);
+
+/* An object with every setting that may stand in a file: what was given, or its default; null where there is none. */
+void app_settings_write(const struct app_config *config, struct app_write *write);
 
 /* All that is not given. */
 void app_settings_default(struct app_config *config);

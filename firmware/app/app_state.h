@@ -29,7 +29,8 @@ struct app_hal {
     const struct hal_clock *clock;
     const struct hal_watchdog *watchdog;
     const struct hal_output *output;
-    const struct hal_viewer *viewer; /* NULL: none */
+    const struct hal_viewer *viewer;     /* NULL: none */
+    const struct hal_recorder *recorder; /* NULL: none */
 };
 
 #define APP_HEALTH_MOVES 6
@@ -44,6 +45,15 @@ struct app_health {
     int32_t mean_rad_q30[APP_HEALTH_MOVES]; /* over the last frames */
     enum ih_align_state reported_state;
     int32_t reported_rad_q30[APP_HEALTH_MOVES];
+};
+
+/* app_recorder.h. */
+struct app_recording {
+    bool writes;
+    int64_t until_us;    /* it writes; not with APP_RECORD_ALWAYS */
+    int64_t head_us;     /* when the last head was found */
+    bool waits_for_head; /* written for its want; not again before there is one */
+    enum ih_align_state reported_state;
 };
 
 struct app_state {
@@ -75,6 +85,7 @@ struct app_state {
     struct app_record_live live; /* since the last record */
     int64_t result_count;        /* frames with a result */
     struct app_health health;
+    struct app_recording recording;
 
     bool rig_is_valid;
     int32_t width, height; /* of the first rig */

@@ -60,6 +60,10 @@ static void print_line(const struct app_status *status, int64_t passed_us, char 
                                ", unsent %" PRId64 ", laser on %" PRId64 " %%",
                                status->lost_count, status->skipped_count, status->bad_count,
                                status->unsent_count, (laser_us * 100 + passed_us / 2) / passed_us);
+    if (status->unrecorded_count > 0) {
+        length += (size_t)snprintf(text + length, room - length, ", unrecorded %" PRId64,
+                                   status->unrecorded_count);
+    }
     if (count > 0) {
         snprintf(text + length, room - length, ", frame %" PRId64 " ms",
                  (status->process_max_us + 999) / 1000);

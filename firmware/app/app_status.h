@@ -2,7 +2,7 @@
  *
  * "25.0 frames/s, 312 dots, 0.9 heads, lost 0, skipped 0, bad 0, unsent 0, laser on 38 %, frame 41 ms"
  * Frames are those with a result, dots and heads their means, frame the longest time that one took;
- * without frames these three are left out. All of it is since the line before.
+ * without frames these three are left out; ", unrecorded N" is there only where frames were. All of it is since the line before.
  */
 #ifndef APP_STATUS_H
 #define APP_STATUS_H
@@ -20,11 +20,12 @@ struct app_status {
     int64_t process_max_us;
     int64_t laser_before_us; /* laser_on_us at the last line */
     /* The caller adds to these. */
-    int64_t laser_on_us;   /* time with the laser on, since ever */
-    int64_t lost_count;    /* missing in the camera's sequence */
-    int64_t skipped_count; /* not used: dark or half lit */
-    int64_t bad_count;     /* could not be read or processed */
-    int64_t unsent_count;  /* records that the output did not take */
+    int64_t laser_on_us;      /* time with the laser on, since ever */
+    int64_t lost_count;       /* missing in the camera's sequence */
+    int64_t skipped_count;    /* not used: dark or half lit */
+    int64_t bad_count;        /* could not be read or processed */
+    int64_t unsent_count;     /* records that the output did not take */
+    int64_t unrecorded_count; /* frames that the recorder had no room for */
 };
 
 /* interval_s: 0, no lines, or 1 .. 86400. */

@@ -9,6 +9,18 @@
 
 #include "linux/hal_clock.h"
 
+static unsigned event_of(uint32_t signal)
+{
+    switch (signal) {
+    case SIGHUP:
+        return HAL_EVENT_RELOAD;
+    case SIGUSR1:
+        return HAL_EVENT_RECORD;
+    default:
+        return HAL_EVENT_STOP;
+    }
+}
+
 /* All signals that are there become events. */
 static bool read_signals(int fd, unsigned *events, struct hal_error *error)
 {
@@ -16,7 +28,7 @@ static bool read_signals(int fd, unsigned *events, struct hal_error *error)
         struct signalfd_siginfo info;
         ssize_t count = read(fd, &info, sizeof info);
         if (count == (ssize_t)sizeof info) {
-            *events |= info.ssi_signo == SIGHUP ? HAL_EVENT_RELOAD : HAL_EVENT_STOP;
+            *events |= event_of(info.ssi_signo);
         } else if (count < 0 && errno == EAGAIN) {
             return true;
         } else if (count >= 0 || errno != EINTR) {

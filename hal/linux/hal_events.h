@@ -8,7 +8,7 @@
  *            makes the descriptor -1. A next() that said NONE there would make the program spin.
  * Interlock: readable or in an error state: HAL_EVENT_INTERLOCK, until interlock() was asked. It fails
  *            on a line in an error state; the program closes the strobe, and the descriptor is -1.
- * Signals:   read here: SIGTERM and SIGINT are HAL_EVENT_STOP, SIGHUP is HAL_EVENT_RELOAD, once for
+ * Signals:   read here: SIGTERM and SIGINT are HAL_EVENT_STOP, SIGHUP is HAL_EVENT_RELOAD, SIGUSR1 HAL_EVENT_RECORD, once for
  *            any number of them.
  * Error:     what the system says of waiting or of the signals' descriptor. Not to be gone on with.
  */

@@ -86,7 +86,7 @@ static void ignore_some(void)
     set_default(SIGCHLD);
 }
 
-bool hal_signals_open(struct hal_signals *signals, const struct hal_strobe *strobe,
+bool hal_signals_open(struct hal_signals *signals, const struct hal_strobe *strobe, bool records,
                       struct hal_error *error)
 {
     sigset_t read_ones;
@@ -94,6 +94,9 @@ bool hal_signals_open(struct hal_signals *signals, const struct hal_strobe *stro
     sigaddset(&read_ones, SIGTERM);
     sigaddset(&read_ones, SIGINT);
     sigaddset(&read_ones, SIGHUP);
+    if (records) {
+        sigaddset(&read_ones, SIGUSR1);
+    }
     signals->fd = -1;
     laser = strobe;
     ignore_some();

@@ -1,6 +1,6 @@
 /* hal_signals - signals as something to wait for, and none that kills with the laser on.
  *
- * SIGTERM, SIGINT, SIGHUP: blocked, to be read from fd (hal_events does).
+ * SIGTERM, SIGINT, SIGHUP, and SIGUSR1 where there is something to record: blocked, to be read from fd (hal_events does).
  * SIGPIPE:  ignored, as writing says EPIPE. SIGTSTP, SIGTTIN, SIGTTOU: ignored, as a program that is
  *           stopped with its laser on is blind. (SIGSTOP cannot be: the guard is there for it.)
  * SIGCHLD:  default, so that the guard's end can be asked for even if it was ignored by the parent.
@@ -21,8 +21,8 @@ struct hal_signals {
 };
 
 /* strobe: its set(false) is called by the handlers, whether it is open or not; it lives as long as
- * the process. NULL: there is no laser. Once in a process. False: *error. */
-bool hal_signals_open(struct hal_signals *signals, const struct hal_strobe *strobe,
+ * the process. NULL: there is no laser. records: SIGUSR1 is read. Once in a process. False: *error. */
+bool hal_signals_open(struct hal_signals *signals, const struct hal_strobe *strobe, bool records,
                       struct hal_error *error);
 
 #endif

@@ -112,6 +112,11 @@ def end(number, *options, until="trying again", **more):
             while "reloaded" not in text:
                 text += process.stderr.readline() or "reloaded? it has ended"
             number = signal.SIGTERM
+        if number == signal.SIGUSR1:
+            process.send_signal(number)
+            while "requested" not in text:
+                text += process.stderr.readline() or "requested? it has ended"
+            number = signal.SIGTERM
         process.send_signal(number)
         text += process.communicate(timeout=SOON_S)[1]
     check("Sanitizer" not in text and "runtime error" not in text, text)
@@ -219,6 +224,45 @@ def check_answers():
     expect(1, "cannot be determined: of 0 dots", "--check", "--device", small_directory("black", BLACK), "--rate", "1000")
 
 
+def recorded(directory, *options):
+    """A recording of it, replayed by host_sim, gives the records of the program."""
+    target = os.path.join(work, "recorded")
+    shutil.rmtree(target, ignore_errors=True)
+    done = run("--device", directory, "--rate", "20", "--record", target, *options)
+    check(done.returncode == 0 and "record:" not in done.stderr, f"recording {directory}: status {done.returncode}: {done.stderr}")
+    found = [as_of_host(line) for line in done.stdout.splitlines()]
+    part = os.path.join(target, "000001")
+    check(os.listdir(target) == ["000001"] and found and records_of_host(part) == found, f"{directory}: the recording gives other records")
+    with open(os.path.join(part, "settings.json"), encoding="ascii") as file:
+        settings = json.load(file)
+    check(settings["settings"]["record"] == target and settings["settings"]["laser"] is False, f"settings: {settings}")
+    return part
+
+
+def check_record():
+    """--record: replayed to the same bytes, with ambient frames and a rig that has moved; bounded, and of what cannot be written."""
+    alternating = os.path.join(work, "alternating")
+    part = recorded(alternating)
+    moved = os.path.join(work, "moved.json")
+    moved_rig(Frames(alternating, "moved"), moved)
+    part = recorded(alternating, "--rig", moved)
+    with open(os.path.join(part, "rig.json"), "rb") as copy, open(moved, "rb") as file:
+        check(copy.read() == file.read(), "another rig than the one that was used")
+    small = os.path.join(work, "small")
+    done = run("--device", alternating, "--rate", "20", "--record", small, "--record-max", "2")
+    size = sum(os.path.getsize(os.path.join(folder, name)) for folder, _, names in os.walk(small) for name in names)
+    check(done.returncode == 0 and done.stderr.count("record-max") == 1 and 1000000 < size <= 2000000,
+          f"--record-max 2: {size} bytes: {done.stderr}")
+    status, text = end(signal.SIGUSR1, "--device", alternating, "--record", os.path.join(work, "event"), "--record-when", "signal",
+                       "--loop", "--status", "1", until="frames/s")
+    check(status == 0 and "record: requested: the last 10 s" in text and os.path.exists(os.path.join(work, "event", "000001", "rig.json")),
+          f"SIGUSR1: status {status}: {text}")
+    expect(1, "record: making /proc/none", "--device", alternating, "--record", "/proc/none")
+    expect(1, "record: record-memory: 1000000 bytes, expected at least 4 frames", "--device", alternating, "--record", small,
+           "--record-memory", "1")
+    expect(2, "record-when: given, but no record", "--device", alternating, "--record-when", "moved")
+
+
 def check_modes():
     """Settings that only the camera would see: they are taken."""
     for options in (["--exposure", "auto", "--gain", "auto"], ["--exposure", "500", "--gain", "7"], ["--exposure", "keep", "--gain", "keep"],
@@ -228,7 +272,7 @@ def check_modes():
 
 
 def main():
-    for part in (check_usage, check_outputs, check_laser, check_ends, check_check, check_directory, check_answers, check_modes):
+    for part in (check_usage, check_outputs, check_laser, check_ends, check_check, check_directory, check_answers, check_record, check_modes):
         part()
     print(f"isohead_board without a board: {len(failures)} failures")
     return 1 if failures else 0

@@ -23,11 +23,12 @@ import cases_frames
 import cases_gpio
 import cases_laser
 import cases_output
+import cases_record
 import cases_view
 from board import BoardError
 from run import Run, Wrong
 
-MODULES = [cases_frames, cases_camera, cases_laser, cases_gpio, cases_end, cases_output, cases_view]
+MODULES = [cases_frames, cases_camera, cases_laser, cases_gpio, cases_end, cases_output, cases_record, cases_view]
 
 
 def run_case(run, case):

@@ -47,6 +47,8 @@ enum world_function {
     WORLD_WATCHDOG_FEED,
     WORLD_OUTPUT_NOT,
     WORLD_OUTPUT_NEVER,
+    WORLD_RECORDER_KEEP,
+    WORLD_RECORDER_NEWS,
     WORLD_FUNCTIONS
 };
 
@@ -57,7 +59,7 @@ static const char *const world_function_text[WORLD_FUNCTIONS] = {
     "strobe.set off",      "strobe.beat",       "strobe.interlock",
     "strobe.judged",       "strobe.prove",      "events.wait",
     "events.wait: unseen", "watchdog.feed",     "output.send: not",
-    "output.send: never",
+    "output.send: never",  "recorder.keep",     "recorder.news",
 };
 
 /* What happens at a frame's time, in place of the frame or with it. */
@@ -71,6 +73,7 @@ enum world_act {
     WORLD_INTERLOCK_CLOSES,
     WORLD_INTERLOCK_BLINKS, /* opens and closes */
     WORLD_RELOAD,
+    WORLD_RECORD,       /* somebody requests a recording */
     WORLD_RELOAD_ALONE, /* and no frame; the rig and next_rig change places */
     WORLD_KNOCK,        /* the rig moves by 0.2 degrees */
     WORLD_UNPLUGGED,    /* the camera is gone, and cannot be opened for a while */
@@ -131,6 +134,11 @@ struct world {
     size_t records_length;
     char records[131072];
     int waits;
+    /* What the recorder has; frames since it began to write. */
+    int kept_count, kept_dark_count, write_count, rig_count, news_count;
+    int64_t write_us, end_us; /* when it last began and ended to write */
+    bool writes;
+    int head_count; /* heads in every lit frame */
     /* The board program. */
     struct app_config config;
     struct app_log log;
@@ -141,6 +149,7 @@ struct world {
     struct hal_clock clock;
     struct hal_watchdog watchdog;
     struct hal_output output;
+    struct hal_recorder recorder;
 };
 
 static struct world world;
@@ -212,7 +221,7 @@ void isohead_find(struct isohead *head, int64_t time_us)
     world.busy_on_count += world.line;
     world_pass(world.busy_us);
     head->result.entry_count = 0;
-    head->result.head_count = 0;
+    head->result.head_count = world.head_count;
     head->result.selected = IH_NONE;
     head->align.now = world.alignment;
     for (int i = 0; i < 3; i++) {
@@ -527,6 +536,9 @@ static void world_step(void)
         world.events |= HAL_EVENT_RELOAD;
         return;
     }
+    case WORLD_RECORD:
+        world.events |= HAL_EVENT_RECORD;
+        break;
     case WORLD_KNOCK:
         world.alignment.state = IH_ALIGN_MOVED;
         world.alignment.rotation_rad_q30[0] += WORLD_KNOCK_RAD_Q30;
@@ -624,6 +636,40 @@ static enum hal_sent world_send(void *context, const char *bytes, size_t count,
     return HAL_SENT;
 }
 
+/* Whoever keeps a frame looks at all of it, and at nothing afterwards. */
+static bool world_keep(void *context, const struct hal_frame *frame, bool lit)
+{
+    (void)context;
+    TEST_ASSERT_TRUE_MESSAGE(world.held[frame->buffer_index], "recorded after it was released");
+    TEST_ASSERT_TRUE(lit || *(const uint8_t *)frame->samples == 0);
+    if (world_call(WORLD_RECORDER_KEEP)) {
+        return false;
+    }
+    world.kept_count += lit;
+    world.kept_dark_count += !lit;
+    return true;
+}
+
+static void world_record(void *context, bool on)
+{
+    (void)context;
+    world.write_count += on;
+    *(on ? &world.write_us : &world.end_us) = world.now_us;
+    world.writes = on;
+}
+
+static void world_new_rig(void *context)
+{
+    (void)context;
+    world.rig_count++;
+}
+
+static bool world_news(void *context, struct hal_error *error)
+{
+    (void)context;
+    return world_call(WORLD_RECORDER_NEWS) ? !hal_fail(error, "the disk is full") : false;
+}
+
 static void world_write(void *context, int level, const char *text)
 {
     (void)context;
@@ -631,6 +677,7 @@ static void world_write(void *context, int level, const char *text)
     world.reported_output |= strstr(text, "output: closed") != NULL;
     world.unproven_count += strstr(text, "not proven at the start: interlock-line") != NULL;
     world.lost_count += strstr(text, "good: does not fit") != NULL;
+    world.news_count += strstr(text, "record: the disk is full") != NULL;
     if (strncmp(text, "made up: ", 9) == 0) {
         snprintf(world.camera_text, sizeof world.camera_text, "%s", text);
     }
@@ -686,6 +733,13 @@ static void world_init(enum app_strobe strobe, const enum world_act *act, int ac
     world.clock = (struct hal_clock){.now_us = world_now};
     world.watchdog = (struct hal_watchdog){.feed = world_feed};
     world.output = (struct hal_output){.send = world_send};
+    world.recorder = (struct hal_recorder){
+        .keep = world_keep,
+        .write = world_record,
+        .rig = world_new_rig,
+        .news = world_news,
+    };
+    world.config.record_s = 2;
     world.state.config = &world.config;
     world.state.log = &world.log;
     world.state.head = &world_head;
@@ -696,6 +750,7 @@ static void world_init(enum app_strobe strobe, const enum world_act *act, int ac
         .clock = &world.clock,
         .watchdog = &world.watchdog,
         .output = &world.output,
+        .recorder = &world.recorder,
     };
 }
 

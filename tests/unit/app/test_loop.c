@@ -517,20 +517,137 @@ static void test_bad_frames_only(void)
     }
 }
 
+/* What has a record, and what was its ambient light: nothing else, or a replay would give other records. */
+static void test_what_is_used_is_recorded(void)
+{
+    static const enum world_act acts[] = {TWENTY, WORLD_TWICE,  WORLD_HALF,
+                                          TWENTY, WORLD_RELOAD, TWENTY};
+    for (int mode = 0; mode < 3; mode++) {
+        for (int flight = 0; flight <= 2; flight += 2) {
+            world_init((enum app_strobe)mode, acts, COUNT(acts));
+            world.flight = flight;
+            TEST_ASSERT_EQUAL_INT(APP_EXIT_GOOD, world_run());
+            TEST_ASSERT_EQUAL_INT(world.record_count, world.kept_count);
+            TEST_ASSERT_EQUAL_INT(mode == APP_STROBE_ALTERNATING, world.kept_dark_count > 0);
+            TEST_ASSERT_EQUAL_INT(1, world.write_count);
+            TEST_ASSERT_TRUE(world.writes);
+            TEST_ASSERT_EQUAL_INT(1, world.rig_count);
+        }
+    }
+}
+
+static void test_without_a_recorder(void)
+{
+    static const enum world_act acts[] = {TWENTY, WORLD_RECORD, WORLD_RELOAD, TWENTY};
+    world_init(APP_STROBE_ALWAYS, acts, COUNT(acts));
+    world.state.hal.recorder = NULL;
+    TEST_ASSERT_EQUAL_INT(APP_EXIT_GOOD, world_run());
+    TEST_ASSERT_EQUAL_INT(0, world.kept_count + world.write_count);
+}
+
+/* Two seconds from its request on, and from a second one during it. */
+static void test_a_recording_is_requested(void)
+{
+    static const enum world_act acts[] = {TWENTY, WORLD_RECORD, TWENTY, WORLD_RECORD,
+                                          TWENTY, TWENTY,       TWENTY, TWENTY};
+    const int64_t second_us = 42 * WORLD_FRAME_US;
+    world_init(APP_STROBE_ALWAYS, acts, COUNT(acts));
+    world.config.record_when = APP_RECORD_SIGNAL;
+    TEST_ASSERT_EQUAL_INT(APP_EXIT_GOOD, world_run());
+    TEST_ASSERT_EQUAL_INT(2, world.write_count);
+    TEST_ASSERT_FALSE(world.writes);
+    TEST_ASSERT_EQUAL_INT(world.record_count, world.kept_count); /* in memory, all of them */
+    TEST_ASSERT_INT64_WITHIN(WORLD_FRAME_US, 1000000 + second_us + 2000000, world.end_us);
+}
+
+/* Once for the rig that moved, and not again while it stays so. */
+static void test_a_rig_that_moves_is_recorded(void)
+{
+    static const enum world_act acts[] = {TWENTY, WORLD_RECORD, TWENTY, TWENTY, TWENTY, WORLD_KNOCK,
+                                          TWENTY, TWENTY,       TWENTY, TWENTY, TWENTY};
+    for (int is_lost = 0; is_lost < 2; is_lost++) {
+        world_init(APP_STROBE_ALWAYS, acts, COUNT(acts));
+        world.config.record_when = APP_RECORD_MOVED;
+        world.alignment.state = is_lost ? IH_ALIGN_LOST : IH_ALIGN_FITS;
+        TEST_ASSERT_EQUAL_INT(APP_EXIT_GOOD, world_run());
+        TEST_ASSERT_EQUAL_INT(is_lost ? 3 : 2, world.write_count); /* lost, requested, moved */
+        TEST_ASSERT_FALSE(world.writes);
+    }
+}
+
+/* Once a second has passed without a head; again only after one was there. */
+static void test_a_head_that_is_missed_is_recorded(void)
+{
+    static const enum world_act acts[] = {TWENTY, TWENTY, TWENTY, TWENTY,
+                                          TWENTY, TWENTY, TWENTY, TWENTY};
+    world_init(APP_STROBE_ALWAYS, acts, COUNT(acts));
+    world.config.record_when = APP_RECORD_NO_HEAD;
+    world.config.record_no_head_s = 1;
+    TEST_ASSERT_EQUAL_INT(APP_EXIT_GOOD, world_run());
+    TEST_ASSERT_EQUAL_INT(1, world.write_count);
+    TEST_ASSERT_INT64_WITHIN(2 * WORLD_FRAME_US, 1000000 + 1000000, world.write_us);
+    TEST_ASSERT_INT64_WITHIN(2 * WORLD_FRAME_US, world.write_us + 2000000, world.end_us);
+    world_init(APP_STROBE_ALWAYS, acts, COUNT(acts));
+    world.config.record_when = APP_RECORD_NO_HEAD;
+    world.config.record_no_head_s = 1;
+    world.head_count = 1;
+    world_head.result.head[0] = 0;
+    TEST_ASSERT_EQUAL_INT(APP_EXIT_GOOD, world_run());
+    TEST_ASSERT_EQUAL_INT(0, world.write_count);
+}
+
+/* A disk that does not keep up, or is full: the log has it, and nothing else changes. */
+static void test_a_recorder_that_fails_changes_no_record(void)
+{
+    static const enum world_act acts[] = {TWENTY, TWENTY};
+    static char records[sizeof world.records];
+    world_init(APP_STROBE_ALTERNATING, acts, COUNT(acts));
+    world_run();
+    memcpy(records, world.records, sizeof records);
+    int rise_count = world.rise_count;
+    world_init(APP_STROBE_ALTERNATING, acts, COUNT(acts));
+    world.faults[0] = (struct world_fault){WORLD_RECORDER_KEEP, 2, .stays = true};
+    world.faults[1] = (struct world_fault){WORLD_RECORDER_NEWS, 3, .stays = false};
+    TEST_ASSERT_EQUAL_INT(APP_EXIT_GOOD, world_run());
+    TEST_ASSERT_EQUAL_STRING(records, world.records);
+    TEST_ASSERT_EQUAL_INT(rise_count, world.rise_count);
+    TEST_ASSERT_EQUAL_INT(1, world.kept_count + world.kept_dark_count);
+    TEST_ASSERT_GREATER_THAN_INT64(10, world.state.status.unrecorded_count);
+    TEST_ASSERT_EQUAL_INT(1, world.news_count);
+}
+
+/* A directory's frames wait: one at a time, none late, and their end is a good one. */
+static void test_a_camera_that_waits(void)
+{
+    static const enum world_act acts[] = {TWENTY,      WORLD_TWICE, WORLD_PAUSE, WORLD_PAUSE,
+                                          WORLD_PAUSE, WORLD_PAUSE, WORLD_PAUSE, TWENTY};
+    world_init(APP_STROBE_ALWAYS, acts, COUNT(acts));
+    world.config.laser = false;
+    world.camera.waits = true;
+    TEST_ASSERT_EQUAL_INT(APP_EXIT_GOOD, world_run());
+    TEST_ASSERT_EQUAL_INT(42, world.record_count);
+    TEST_ASSERT_EQUAL_INT(0, count_in_records("skipped") + count_in_records("late"));
+    world_init(APP_STROBE_ALWAYS, acts, COUNT(acts));
+    world.faults[0] = (struct world_fault){WORLD_CAMERA_NEXT_END, 5, .stays = true};
+    TEST_ASSERT_EQUAL_INT(APP_EXIT_GOOD, world_run());
+    TEST_ASSERT_EQUAL_INT(1, world.calls[WORLD_CAMERA_OPEN]);
+    TEST_ASSERT_LESS_THAN_INT(10, world.act_index);
+}
+
 /* Every kind of thing that can happen, for the faults. */
 static const enum world_act eventful[] = {
-    FIVE,        WORLD_LOST,
-    WORLD_FRAME, WORLD_TWICE,
-    WORLD_FRAME, WORLD_HALF,
-    WORLD_FRAME, WORLD_INTERLOCK_OPENS,
-    WORLD_FRAME, WORLD_INTERLOCK_CLOSES,
-    FIVE,        WORLD_PAUSE,
-    WORLD_PAUSE, WORLD_PAUSE,
-    WORLD_PAUSE, WORLD_PAUSE,
-    WORLD_FRAME, WORLD_RELOAD,
-    FIVE,        WORLD_INTERLOCK_BLINKS,
-    FIVE,        WORLD_UNPLUGGED,
-    FIVE,        FIVE,
+    FIVE,         WORLD_LOST,
+    WORLD_FRAME,  WORLD_TWICE,
+    WORLD_FRAME,  WORLD_HALF,
+    WORLD_FRAME,  WORLD_INTERLOCK_OPENS,
+    WORLD_FRAME,  WORLD_INTERLOCK_CLOSES,
+    FIVE,         WORLD_PAUSE,
+    WORLD_PAUSE,  WORLD_PAUSE,
+    WORLD_PAUSE,  WORLD_PAUSE,
+    WORLD_FRAME,  WORLD_RELOAD,
+    WORLD_RECORD, WORLD_INTERLOCK_BLINKS,
+    FIVE,         WORLD_UNPLUGGED,
+    FIVE,         FIVE,
 };
 
 static void init_eventful(int mode, int flight)
@@ -729,6 +846,13 @@ int main(void)
     RUN_TEST(test_exposure_refused);
     RUN_TEST(test_on_for_long);
     RUN_TEST(test_bad_frames_only);
+    RUN_TEST(test_what_is_used_is_recorded);
+    RUN_TEST(test_without_a_recorder);
+    RUN_TEST(test_a_recording_is_requested);
+    RUN_TEST(test_a_rig_that_moves_is_recorded);
+    RUN_TEST(test_a_head_that_is_missed_is_recorded);
+    RUN_TEST(test_a_recorder_that_fails_changes_no_record);
+    RUN_TEST(test_a_camera_that_waits);
     RUN_TEST(test_every_call_fails);
     RUN_TEST(test_two_calls_fail);
     RUN_TEST(test_anything_happens);

@@ -47,7 +47,7 @@ int __wrap_timerfd_settime(int fd, int flags, const struct itimerspec *new, stru
     TEST_ASSERT_EQUAL_INT(directory.fd, fd);
     TEST_ASSERT_EQUAL_INT(TFD_TIMER_ABSTIME, flags);
     TEST_ASSERT_NULL(old);
-    timer_us = (int64_t)new->it_value.tv_sec * 1000000 + new->it_value.tv_nsec / 1000;
+    timer_us = (int64_t) new->it_value.tv_sec * 1000000 + new->it_value.tv_nsec / 1000;
     TEST_ASSERT_GREATER_THAN_INT64_MESSAGE(0, timer_us, "this stops the timer");
     errno = ECANCELED;
     return set_fails ? -1 : 0;
@@ -96,7 +96,8 @@ static void make_files(void)
 static void open_with(int32_t rate_mhz, bool repeats)
 {
     const struct hal_directory_config config = {dir, rate_mhz, repeats};
-    TEST_ASSERT_TRUE_MESSAGE(hal_directory_init(&directory, &config, &messages, &error), error.text);
+    TEST_ASSERT_TRUE_MESSAGE(hal_directory_init(&directory, &config, &messages, &error),
+                             error.text);
     TEST_ASSERT_EQUAL_INT(-1, directory.fd);
     TEST_ASSERT_TRUE(camera->open(camera->context, &error));
     TEST_ASSERT_TRUE(camera->waits);
@@ -168,7 +169,8 @@ static void test_again_and_again_at_a_rate(void)
     open_with(50000, true);
     TEST_ASSERT_EQUAL_INT32(20000, camera->frame_time_us(camera->context));
     for (int64_t i = 0; i < 5 * COUNT; i++) {
-        assert_due(5000000 + 20000 * i, (int)(i % COUNT), i, times_us[i % COUNT] + i / COUNT * pass_us);
+        assert_due(5000000 + 20000 * i, (int)(i % COUNT), i,
+                   times_us[i % COUNT] + i / COUNT * pass_us);
     }
 }
 

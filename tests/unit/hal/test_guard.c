@@ -480,7 +480,7 @@ static void catch_signals(void)
 {
     static struct hal_signals signals;
 
-    hal_signals_open(&signals, &guard.strobe, &error);
+    hal_signals_open(&signals, &guard.strobe, false, &error);
 }
 
 /* A fault in the guard itself, or what a service manager sends to all on its watchdog's behalf: the

@@ -43,7 +43,7 @@ static int run(const struct hal_strobe *laser, void (*act)(void))
     const pid_t pid = fork();
 
     if (pid == 0) {
-        if (!hal_signals_open(&signals, laser, &error)) {
+        if (!hal_signals_open(&signals, laser, false, &error)) {
             _exit(99);
         }
         *level = 1;
@@ -172,7 +172,7 @@ static void the_signal_keeps_its_data(void)
     const pid_t pid = fork();
 
     if (pid == 0) {
-        hal_signals_open(&signals, &strobe, &error);
+        hal_signals_open(&signals, &strobe, false, &error);
         *level = 1;
         be_traced_and_touch();
         _exit(0);
@@ -225,7 +225,7 @@ static void orderly_signals_are_read_and_harmless_ones_do_nothing(void)
 
     if (pid == 0) {
         signal(SIGCHLD, SIG_IGN); /* as inherited; in the test itself a quick child would be lost */
-        OR_EXIT(hal_signals_open(&signals, &strobe, &error));
+        OR_EXIT(hal_signals_open(&signals, &strobe, false, &error));
         *level = 1;
         receive_orderly_signals();
         _exit(0);
