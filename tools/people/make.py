@@ -39,7 +39,7 @@ def head_entry(head):
 
 def on_head(points, head, reach=1.35):
     """Points near enough to the ellipsoid to belong to skull, face or hair."""
-    return numpy.linalg.norm((points - head.centre_mm) / (head.axes_mm + 15.0), axis=1) < reach
+    return numpy.linalg.norm((points - head.centre_mm) @ head.level / (head.axes_mm + 15.0), axis=1) < reach
 
 
 class Studio:
@@ -124,7 +124,7 @@ class Studio:
         else:
             origin, rays = self.rig.projector_mm, self.rig.dot_rays
         # In units of the semi-axes the head is a ball of radius 1.
-        path, rays = (head.centre_mm - origin) / head.axes_mm, rays / head.axes_mm
+        path, rays = (head.centre_mm - origin) @ head.level / head.axes_mm, rays @ head.level / head.axes_mm
         along = rays @ path
         return int(numpy.count_nonzero((along > 0.0) & (path @ path - along ** 2 / (rays ** 2).sum(axis=1) < 1.0)))
 
@@ -164,9 +164,9 @@ def describe(studio, scene, heads, extra, samples, dots, hits):
     return fields, {"kind": scene.kind, "people": notes, **extra, "wear": [actor.note() for actor in scene.actors]}
 
 
-def make(model, out, rig_kind, scene_kind, seed, frames, width=rigs.WIDTH):
+def make(model, out, rig_kind, scene_kind, seed, frames, width=rigs.WIDTH, mount=None):
     os.makedirs(out, exist_ok=True)
-    scene = Scene(model, scene_kind, seed, frames, rig_kind)
+    scene = Scene(model, scene_kind, seed, frames, rig_kind, mount)
     studio = Studio(rig_kind, seed, scene.head_mm[2], width)
     key_before = None
     with open(os.path.join(out, "frames.jsonl"), "w", encoding="utf-8") as frames_file, \
@@ -190,6 +190,8 @@ def make(model, out, rig_kind, scene_kind, seed, frames, width=rigs.WIDTH):
             frames_file.write(json.dumps({"file": name, "time_us": scene.time_us(index), "laser": True}) + "\n")
             truth_file.write(json.dumps(truth) + "\n")
             scene_file.write(json.dumps({"file": name, **note}) + "\n")
+    if mount is not None:
+        studio.rig.up = scene.level @ (0.0, -1.0, 0.0)
     rigs.write(studio.rig, out)
 
 
@@ -200,9 +202,12 @@ def main():
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--frames", type=int, default=30)
     parser.add_argument("--width", type=int, default=rigs.WIDTH, help="of dot rigs' pictures, pixels")
+    parser.add_argument("--tilt", type=float, help="degrees by which the camera looks down: rig.json says where up is")
+    parser.add_argument("--roll", type=float, help="degrees by which heads' tops tip to the right, 180: upside down")
     parser.add_argument("out")
     options = parser.parse_args()
-    make(Model(), options.out, options.rig, options.kind, options.seed, options.frames, options.width)
+    make(Model(), options.out, options.rig, options.kind, options.seed, options.frames, options.width,
+         None if options.tilt is None and options.roll is None else (options.tilt or 0.0, options.roll or 0.0))
 
 
 if __name__ == "__main__":

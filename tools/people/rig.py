@@ -38,6 +38,7 @@ class Rig:
     far_mm: float
     projector_mm: numpy.ndarray = None
     dot_rays: numpy.ndarray = None
+    up: numpy.ndarray = None
 
     def distort(self, x, y):
         k1, k2, p1, p2, k3 = self.lens
@@ -123,6 +124,8 @@ def write(rig, directory):
         fields["projector_origin"] = matrix(3, 1, rig.projector_mm)
         fields["dot_rays"] = matrix(DOTS, 3, rig.dot_rays)
     fields.update(near_mm=rig.near_mm, far_mm=rig.far_mm)
+    if rig.up is not None:
+        fields["up"] = [float(value) for value in rig.up]
     with open(os.path.join(directory, "rig.json"), "w", encoding="utf-8") as file:
         json.dump(fields, file)
         file.write("\n")

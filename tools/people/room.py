@@ -34,7 +34,7 @@ def backdrop(z_mm, rng):
     return meshes
 
 
-def around(heads_mm, seated, turning, deep_mm, rng):
+def around(heads_mm, seated, turning, deep_mm, rng, has_floor=False):
     """A room for people whose heads are there; somebody comes from `deep_mm` behind them."""
     middle = numpy.mean(heads_mm, axis=0)
     depth = max(head[2] for head in heads_mm)
@@ -42,7 +42,7 @@ def around(heads_mm, seated, turning, deep_mm, rng):
     behind = max(behind, deep_mm)
     meshes = backdrop(depth + behind, rng)
     floor_y = middle[1] + (SEATED_MM if seated else STANDING_MM)
-    if rng.random() < 0.5:
+    if rng.random() < 0.5 or has_floor:
         meshes.append(floor(floor_y, rng))
     for head in heads_mm:
         if seated and rng.random() < (0.25 if turning else 0.75):
@@ -73,7 +73,7 @@ def beside(middle, depth, behind, floor_y, rng):
     return meshes
 
 
-def empty(rng):
+def empty(rng, has_floor=False):
     """Nobody, but much that is as large and as round as a head, at a head's distance."""
     depth = rng.uniform(550.0, 1900.0)
     level = rng.uniform(-150.0, 350.0)
@@ -95,6 +95,6 @@ def empty(rng):
         meshes.append(mesh)
     if kind == 2:
         meshes.append(things.seat(middle + [0.0, -rng.uniform(0.0, 200.0), 0.0], rng))
-    if rng.random() < 0.4:
+    if rng.random() < 0.4 or has_floor:
         meshes.append(floor(level + rng.uniform(350.0, 1400.0), rng))
     return join(meshes) if meshes else None

@@ -15,6 +15,8 @@ from person import TO_CAMERA, Person
 KINDS = ("calm", "near", "hands", "turning", "leaning", "objects", "visit", "past", "two", "profile", "edge", "tilted",
          "helmet", "face", "body", "empty")
 EMPTY_FRAMES, EMPTY_US = 3, 10000000
+# A camera that looks down by more than this sees a floor.
+STEEP_DEG = 35.0
 # The second of two has a seed of its own.
 SECOND_SEED = 500000
 X, Y, Z = numpy.eye(3)
@@ -26,6 +28,7 @@ class HeadTruth:
     axes_mm: numpy.ndarray
     angles_deg: tuple
     number: int
+    level: numpy.ndarray  # from the frame in which it stands upright to the camera's
 
 
 def angles_of(rot):
@@ -34,6 +37,11 @@ def angles_of(rot):
     return (float(numpy.degrees(numpy.arctan2(theirs[0, 2], theirs[2, 2]))),
             float(numpy.degrees(numpy.arcsin(numpy.clip(-theirs[1, 2], -1.0, 1.0)))),
             float(numpy.degrees(numpy.arctan2(theirs[1, 0], theirs[1, 1]))))
+
+
+def mounted(tilt_deg, roll_deg):
+    """From the level frame to that of a camera that looks down by the tilt; heads' tops tip to the right by the roll."""
+    return rotation(Z, numpy.radians(roll_deg)) @ rotation(X, numpy.radians(tilt_deg))
 
 
 def draw_distance(kind, rng):
@@ -132,9 +140,12 @@ class Actor:
 
 
 class Scene:
-    """A level frame with the camera at its origin; tilted at the end."""
+    """A level frame with the camera at its origin; tilted at the end.
 
-    def __init__(self, model, kind, seed, frames, rig_kind):
+    With `mount`, tilt and roll, the camera is turned about the head in this way, and in no other.
+    """
+
+    def __init__(self, model, kind, seed, frames, rig_kind, mount=None):
         rng = numpy.random.default_rng([seed, 2])
         self.kind, self.seed = kind, seed
         self.head_mm = draw_place(kind, rig_kind, rng)
@@ -143,12 +154,12 @@ class Scene:
             places = self._pair(rng)
         self.actors = [Actor(model, kind, seed + SECOND_SEED * i, i, place, frames, rng)
                        for i, place in enumerate(places)]
-        self._tilt(rng)
+        self._tilt(rng, mount)
         self.still = None
         if kind != "empty":
             visit = self.actors[0].visit
             self.still = room.around(places, self.actors[0].seated, kind in ("turning", "visit", "past"),
-                                     visit.deepest_mm() if visit else 0.0, rng)
+                                     visit.deepest_mm() if visit else 0.0, rng, self.is_steep)
 
     def _pair(self, rng):
         apart = rng.uniform(400.0, 900.0)
@@ -162,24 +173,28 @@ class Scene:
         self.head_mm = first + lift
         return [first + lift, second + lift]
 
-    def _tilt(self, rng):
+    def _tilt(self, rng, mount):
         """The camera looks up by so many degrees, or down."""
         degrees = 0.0
         if self.kind == "tilted":
             degrees = rng.choice([-1.0, 1.0]) * rng.uniform(8.0, 30.0)
         elif rng.random() < 0.25:
             degrees = rng.uniform(-8.0, 15.0)
-        self.tilt = rotation(X, numpy.radians(-degrees))
+        self.tilt, self.tilt_deg, self.level = rotation(X, numpy.radians(-degrees)), degrees, numpy.eye(3)
         middle = self.head_mm if self.kind != "empty" else numpy.array([0.0, 0.0, 1000.0])
-        self.tilt_shift = middle - self.tilt @ middle
-        self.tilt_deg = degrees
+        if mount is not None:
+            self.tilt = self.level = mounted(*mount)
+            self.tilt_deg = -mount[0]
+        about = middle if mount is None else mounted(0.0, mount[1]) @ middle
+        self.tilt_shift = about - self.tilt @ middle
+        self.is_steep = mount is not None and mount[0] > STEEP_DEG
 
     def still_at(self, index):
         """A key that changes with what stands still, and its mesh."""
         if self.kind != "empty":
             return 0, self._tilted(self.still)
         key = index // EMPTY_FRAMES
-        return key, self._tilted(room.empty(numpy.random.default_rng([self.seed, 5, key])))
+        return key, self._tilted(room.empty(numpy.random.default_rng([self.seed, 5, key]), self.is_steep))
 
     def _tilted(self, mesh):
         return mesh.moved(self.tilt, self.tilt_shift) if mesh is not None else None
@@ -198,6 +213,6 @@ class Scene:
             meshes.append(mesh)
             held += names
             heads.append(HeadTruth(self.tilt @ centre + self.tilt_shift, actor.person.head.axes_mm,
-                                   angles_of(self.tilt @ rot), actor.person.number))
+                                   angles_of(self.tilt @ rot), actor.person.number, self.level))
         moving = self._tilted(join(meshes)) if meshes else None
         return moving, heads, {"held": held, "tilt_deg": round(self.tilt_deg, 1)}
