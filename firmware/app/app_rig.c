@@ -10,6 +10,8 @@
 
 #define RAY_AXES 3
 
+static const char *const axis_text[RAY_AXES] = {" x", " y", " z"};
+
 /* One field: where it stands, so that every message can name it. */
 struct field {
     const cJSON *rig;
@@ -259,7 +261,6 @@ static bool read_range(struct field *field, struct ih_calibration *calibration)
 
 static bool read_projector(struct field *field, struct ih_calibration *calibration)
 {
-    static const char *const axis[RAY_AXES] = {" x", " y", " z"};
     double origin_mm[RAY_AXES] = {0};
     double ray[IH_SLOTS * RAY_AXES] = {0};
     field->name = "projector_origin";
@@ -267,7 +268,7 @@ static bool read_projector(struct field *field, struct ih_calibration *calibrati
         return false;
     }
     for (int i = 0; i < RAY_AXES; i++) {
-        if (!round_fixed(field, axis[i], origin_mm[i], 16, &calibration->origin_mm_q16[i])) {
+        if (!round_fixed(field, axis_text[i], origin_mm[i], 16, &calibration->origin_mm_q16[i])) {
             return false;
         }
     }
@@ -277,7 +278,7 @@ static bool read_projector(struct field *field, struct ih_calibration *calibrati
     }
     for (int i = 0; i < IH_SLOTS * RAY_AXES; i++) {
         char part[32];
-        snprintf(part, sizeof part, "[%d]%s", i / RAY_AXES, axis[i % RAY_AXES]);
+        snprintf(part, sizeof part, "[%d]%s", i / RAY_AXES, axis_text[i % RAY_AXES]);
         if (!round_fixed(field, part, ray[i], 30,
                          &calibration->ray_q30[i / RAY_AXES][i % RAY_AXES])) {
             return false;
@@ -328,6 +329,22 @@ static bool read_kind(struct field *field, struct ih_calibration *calibration)
     return true;
 }
 
+/* Absent: a level camera. */
+static bool read_up(struct field *field, struct ih_calibration *calibration)
+{
+    double up[RAY_AXES] = {0.0, -1.0, 0.0};
+    field->name = "up";
+    if (cJSON_HasObjectItem(field->rig, field->name) && !read_matrix(field, 1, RAY_AXES, up)) {
+        return false;
+    }
+    for (int i = 0; i < RAY_AXES; i++) {
+        if (!round_fixed(field, axis_text[i], up[i], 30, &calibration->up_q30[i])) {
+            return false;
+        }
+    }
+    return true;
+}
+
 static bool read_rig(const cJSON *rig, struct ih_calibration *calibration, int32_t *scale_q20,
                      struct hal_error *error)
 {
@@ -337,7 +354,7 @@ static bool read_rig(const cJSON *rig, struct ih_calibration *calibration, int32
            read_camera(&field, calibration) && read_distortion(&field, calibration) &&
            read_range(&field, calibration) &&
            (calibration->kind == IH_RIG_RANGE || read_projector(&field, calibration)) &&
-           read_depth_scale(&field, calibration, scale_q20);
+           read_depth_scale(&field, calibration, scale_q20) && read_up(&field, calibration);
 }
 
 /* Where in the text parsing stopped. */

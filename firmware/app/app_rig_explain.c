@@ -33,6 +33,19 @@ static void explain_baseline(const struct ih_calibration *calibration, struct ha
         origin_mm[0], origin_mm[1], origin_mm[2], IH_RIG_BASELINE_MAX_MM);
 }
 
+static void explain_up(const struct ih_calibration *calibration, struct hal_error *error)
+{
+    double up[RAY_AXES];
+    for (int i = 0; i < RAY_AXES; i++) {
+        up[i] = from_fixed(calibration->up_q30[i], 30);
+    }
+    (void)hal_fail(error,
+                   "up: (%.6g, %.6g, %.6g), length %.6g, expected a unit vector that is at least "
+                   "10 degrees off "
+                   "the optical axis",
+                   up[0], up[1], up[2], sqrt(up[0] * up[0] + up[1] * up[1] + up[2] * up[2]));
+}
+
 static void explain_size(const struct ih_calibration *calibration, struct hal_error *error)
 {
     bool range = calibration->kind == IH_RIG_RANGE;
@@ -82,6 +95,9 @@ void app_rig_explain(const struct ih_calibration *calibration, enum ih_err err, 
             break;
         }
         (void)hal_fail(error, "dot_rays: %s", ih_err_text(err));
+        break;
+    case IH_ERR_UP:
+        explain_up(c, error);
         break;
     default:
         (void)hal_fail(error, "%s", ih_err_text(err));

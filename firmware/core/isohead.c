@@ -44,6 +44,8 @@ const char *ih_err_text(enum ih_err err)
         return "rig blob whose bytes have changed: its CRC-32 does not fit";
     case IH_ERR_BLOB_FIELD:
         return "rig blob of an unknown kind, or of a range rig with a projector";
+    case IH_ERR_UP:
+        return "up that is no unit vector, or along the optical axis";
     }
     return "unknown error";
 }
@@ -212,11 +214,12 @@ static void widen_sigma(struct isohead *head)
 static void conclude(struct isohead *head)
 {
     if (head->params.is_paper) {
-        ih_result_from_hypotheses(&head->hypotheses, &head->result);
+        ih_result_from_hypotheses(&head->hypotheses, &head->rig, &head->result);
     } else {
         ih_tracks_update(&head->tracks, &head->params.tracks, &head->rig, &head->detections,
                          &head->predicted);
-        ih_result_from_tracks(&head->detections, &head->tracks, &head->predicted, &head->result);
+        ih_result_from_tracks(&head->detections, &head->tracks, &head->predicted, &head->rig,
+                              &head->result);
     }
 }
 

@@ -64,12 +64,13 @@ blob = open(sys.argv[2], "rb").read()
 def fixed(value, bits):
     return math.floor(abs(value) * 2**bits + 0.5) * (1 if value >= 0 else -1)
 fx, _, cx, _, fy, cy = rig["camera_matrix"]["data"][:6]
-words = [1, 4416, 0, rig["image_width"], rig["image_height"]]
+words = [2, 4428, 0, rig["image_width"], rig["image_height"]]
 words += [fixed(value, 16) for value in (fx, fy, cx, cy)]
 words += [fixed(value, 24) for value in rig["distortion_coefficients"]["data"]]
 words += [math.floor(rig["near_mm"]), math.ceil(rig["far_mm"])]
 words += [fixed(value, 16) for value in rig["projector_origin"]["data"]]
 words += [fixed(value, 30) for value in rig["dot_rays"]["data"]]
+words += [fixed(value, 30) for value in rig.get("up", [0, -1, 0])]
 wanted = b"IHRB" + struct.pack("<%di" % len(words), *words)
 wanted += struct.pack("<I", zlib.crc32(wanted))
 if blob != wanted:
@@ -78,6 +79,12 @@ if blob != wanted:
              % (len(blob), len(wanted), at))
 PYTHON
 
+sed 's/"near_mm"/"up":[0.36,0.48,-0.8],"near_mm"/' "$rig" >tilted.json
+check 'tilted' 0 '' tilted.json tilted.bin
+check 'show up' 0 '^up 0\.36 0\.4[78][0-9]* -0\.8' --show tilted.bin
+sed 's/"near_mm"/"up":[0.6,0.8,0.8],"near_mm"/' "$rig" >tilted.json
+check 'no unit vector' 1 'tilted\.json: up: .0\.6, 0\.8, 0\.8., length 1\.28062, expected a unit vector' tilted.json a.bin
+rm tilted.json tilted.bin
 check 'show' 0 '^kind dots$' --show rig.bin
 check 'show a ray' 0 '^dot_rays\[360\] ' --show rig.bin
 check 'no argument' 2 'expected RIG OUT'
@@ -108,16 +115,16 @@ check 'an old one is replaced' 0 '' "$rig" rig.bin
 cmp rig.bin before.bin || bad=$((bad + 1))
 there before.bin d rig.bin
 
-head -c 4415 before.bin >rig.bin
+head -c 4427 before.bin >rig.bin
 check 'one byte short' 1 'rig\.bin: rig blob that is too short' --show rig.bin
 { cat before.bin && printf x; } >rig.bin
 check 'one byte more' 1 'rig\.bin: rig blob with bytes after its end' --show rig.bin
 cat before.bin before.bin before.bin >rig.bin
-check 'far too long' 1 'rig\.bin: 13248 bytes, expected at most' --show rig.bin
+check 'far too long' 1 'rig\.bin: 13284 bytes, expected at most' --show rig.bin
 printf 'P5 4 4 255 0123456789' >frame.pgm
 check 'something else' 1 'no rig blob: it does not begin with IHRB' --show frame.pgm
 cp before.bin rig.bin
-printf '\002' | dd of=rig.bin bs=1 seek=4 conv=notrunc status=none
+printf '\003' | dd of=rig.bin bs=1 seek=4 conv=notrunc status=none
 check 'another version' 1 'another version' --show rig.bin
 cp before.bin rig.bin
 printf 'changed' | dd of=rig.bin bs=1 seek=2000 conv=notrunc status=none

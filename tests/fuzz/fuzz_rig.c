@@ -10,13 +10,14 @@ struct dots_rig {
     double origin_mm[AXES];
     double pitch, rotation, tilt; /* of the pattern: slope from dot to dot, radians, slope */
     int32_t near_mm, far_mm;
+    double up[AXES]; /* all 0: level */
 };
 
 static const struct dots_rig dots_rig[FUZZ_RIGS_DOTS] = {
     {330, 0, 0, {-12.5, 0, 0}, 0.030, 0, 0, 400, 2500},
     {300, -0.15, 0.001, {-125, 3, 5}, 0.032, 0.05, 0.1, 500, 3000},
     {250, 0.05, 0, {2, -60, -10}, 0.055, -0.1, 0, 100, 16000},
-    {420, 0, 0, {-20, 15, 60}, 0.025, 0.3, -0.1, 300, 4000},
+    {420, 0, 0, {-20, 15, 60}, 0.025, 0.3, -0.1, 300, 4000, {0.36, 0.48, -0.8}},
 };
 
 static int32_t fixed(double value, int fraction_bits)
@@ -55,6 +56,7 @@ static void make_dots(int index, struct ih_calibration *c)
     };
     for (int axis = 0; axis < AXES; axis++) {
         c->origin_mm_q16[axis] = fixed(from->origin_mm[axis], 16);
+        c->up_q30[axis] = fixed(from->up[axis], 30);
     }
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
         make_ray(from, slot, c->ray_q30[slot]);
@@ -74,6 +76,7 @@ static void make_range(int index, struct ih_calibration *c)
         .k1_q24 = fixed(index == 0 ? 0 : -0.1, 24),
         .near_mm = index == 0 ? 100 : 400,
         .far_mm = index == 0 ? 16000 : 4000,
+        .up_q30 = {fixed(index == 0 ? 0 : 0.8, 30), 0, fixed(index == 0 ? 0 : 0.6, 30)},
     };
 }
 

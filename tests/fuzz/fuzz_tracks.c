@@ -87,7 +87,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         fill_detections(&input, &detections);
         ih_tracks_update(&tracks, &params, rig, &detections, &predicted);
         fuzz_check_tracks(&tracks, &detections, &predicted);
-        ih_result_from_tracks(&detections, &tracks, &predicted, &result);
+        ih_result_from_tracks(&detections, &tracks, &predicted, rig, &result);
         fuzz_check_result(&result);
         FUZZ_CHECK(result.selected == tracks.selected);
     }

@@ -20,7 +20,7 @@
 enum golden_record { GOLDEN_END = 0, GOLDEN_RIG = 1, GOLDEN_FRAME = 2 };
 
 /* Words of a calibration after its kind: all its other members. */
-#define GOLDEN_RIG_WORDS (16 + 3 * IH_SLOTS)
+#define GOLDEN_RIG_WORDS (19 + 3 * IH_SLOTS)
 _Static_assert(sizeof(struct ih_calibration) - offsetof(struct ih_calibration, width) ==
                    GOLDEN_RIG_WORDS * sizeof(int32_t),
                "a calibration has other members than were counted here");

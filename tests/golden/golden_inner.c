@@ -129,7 +129,7 @@ static uint64_t hash_paper(struct isohead *head)
     ih_nests_find(&head->surface, &params.nests, &head->scratch.nests, &head->nests);
     ih_hypotheses_select(&head->nests, &head->surface, &head->samples, &head->rig,
                          &params.hypotheses, &head->hypotheses);
-    ih_result_from_hypotheses(&head->hypotheses, &result);
+    ih_result_from_hypotheses(&head->hypotheses, &head->rig, &result);
     uint64_t hash = golden_add_words(GOLDEN_FNV_START, head->surface.depth_mm_q8,
                                      sizeof head->surface.depth_mm_q8);
     hash = golden_add_word(hash, result.entry_count);

@@ -6,6 +6,7 @@ difference is the firmware's arithmetic and not the rounding of the calibration.
 
 import numpy as np
 from scipy.optimize import fsolve
+from scipy.spatial.transform import Rotation
 
 import emit
 
@@ -165,6 +166,85 @@ def probe_positions(rig, random):
     return to_q(np.concatenate([lattice, free]), 12)
 
 
+# (rig, tilt, roll): the camera looks down by the tilt; heads' tops tip to the right by the roll, degrees.
+MOUNTS = [(0, 0, 90), (0, 0, 180), (1, 30, 0), (1, -20, -90), (2, 45, 15), (3, 44.9, 200), (4, 60, -120), (5, -70, 45),
+          (6, 45.1, -1)]
+TILT_MAX_DEG = 45
+TAN_MAX = 2.0
+
+
+class Level:
+    """The level frame of a camera, by Euler angles; up is rounded as the firmware gets it."""
+
+    def __init__(self, rig, tilt_deg, roll_deg):
+        exact = Rotation.from_euler("xz", [tilt_deg, roll_deg], degrees=True).apply([0.0, -1.0, 0.0])
+        self.rig, self.up_q30 = rig, to_q(exact, 30)
+        taken = min(max(tilt_deg, -TILT_MAX_DEG), TILT_MAX_DEG)
+        self.to_camera = Rotation.from_euler("xz", [taken, roll_deg], degrees=True)
+
+    def point(self, x, y):
+        """The direction in the level frame, and a depth of 1 there; None out of view."""
+        right, down, forward = self.to_camera.inv().apply([x, y, 1.0])
+        is_seen = forward > 0.125 and max(abs(right), abs(down)) <= TAN_MAX * forward
+        return (right / forward, down / forward, forward) if is_seen else None
+
+    def project(self, point):
+        """Undistorted pixels of a point of the level frame."""
+        x, y, z = self.to_camera.apply(point)
+        return self.rig.focal * np.array([x, y]) / z + self.rig.principal
+
+    def ellipse(self, centre, covariance):
+        """Semi-axes and angle of a point's spread in the picture, to first order."""
+        step = 1e-3
+        slopes = np.array([(self.project(centre + step * e) - self.project(centre - step * e)) / (2 * step)
+                           for e in np.eye(3)])
+        values, vectors = np.linalg.eigh(slopes.T @ covariance @ slopes)
+        angle = np.degrees(np.arctan2(vectors[1, 1], vectors[0, 1])) % 180
+        return 2 * np.sqrt(values[1]), 2 * np.sqrt(values[0]), angle
+
+
+def write_level(directory):
+    random = np.random.default_rng(22)
+    inc = emit.Inc("Cameras that do not hang level, in float64.")
+    mounts, rotated, dots, ellipses = [], [], [], []
+    for index, (number, tilt, roll) in enumerate(MOUNTS):
+        rig = dot_rigs()[number]
+        level = Level(rig, tilt, roll)
+        rows = level.to_camera.inv().as_matrix()
+        origin = level.to_camera.inv().apply(from_q(rig.origin_q16, 16))
+        mounts.append("%d, {%s}, {%s}, {%s}" % (
+            number, ", ".join(emit.numbers(level.up_q30)), ", ".join(emit.numbers(rows.ravel(), 10)),
+            ", ".join(emit.numbers(origin, 6))))
+        for x, y in to_q(random.uniform(-1.2, 1.2, (12, 2)), 28):
+            found = level.point(from_q(x, 28), from_q(y, 28))
+            rotated.append("%d, %d, %d, %d, %s" % (index, x, y, found is not None,
+                                                  ", ".join(emit.numbers(found or (0, 0, 0), 10))))
+        for slot in PROBE_SLOTS:
+            depth_mm = random.uniform(rig.near_mm, rig.far_mm)
+            ray, centre = from_q(rig.rays_q30[slot], 30), from_q(rig.origin_q16, 16)
+            ray, centre = level.to_camera.inv().apply(ray), level.to_camera.inv().apply(centre)
+            place = (centre + ray * (depth_mm - centre[2]) / ray[2])[:2] / depth_mm if ray[2] > 0.3 else [9, 9]
+            if max(abs(place)) < TAN_MAX and max(abs(ray[:2])) < TAN_MAX * ray[2]:
+                pixel = level.to_camera.apply([place[0], place[1], 1.0])
+                pixel = rig.distort(*(pixel[:2] / pixel[2]))
+                dots.append("%d, %d, %d, %s" % (index, slot, to_q(depth_mm, 8), ", ".join(
+                    emit.numbers(ray[:2] / ray[2], 8) + emit.numbers(place, 8) + emit.numbers(pixel, 4))))
+        for _ in range(4):
+            depth_mm, axes_mm = random.uniform(500, 2000), random.uniform(70, 130, 3)
+            x, y = random.uniform(-0.2, 0.2, 2)
+            right, down, _ = level.to_camera.inv().apply([x, y, 1.0]) / level.to_camera.inv().apply([x, y, 1.0])[2]
+            centre = np.array([right, down, 1.0]) * depth_mm
+            found = level.ellipse(centre, np.diag(axes_mm ** 2) / 4)
+            ellipses.append("%d, {%s}, {%s}, %s" % (
+                index, ", ".join(emit.numbers(centre, 4)), ", ".join(emit.numbers(axes_mm, 4)),
+                ", ".join(emit.numbers(found, 5))))
+    inc.struct_array("vector_mount", "vector_mounts", mounts)
+    inc.struct_array("vector_rotated", "vector_rotated", rotated)
+    inc.struct_array("vector_level_dot", "vector_level_dots", dots)
+    inc.struct_array("vector_level_ellipse", "vector_level_ellipses", ellipses)
+    return inc.write(directory, "level.inc")
+
+
 def write_vectors(directory):
     random = np.random.default_rng(21)
     inc = emit.Inc("Calibrations, and their lines and lens in float64.")
@@ -187,4 +267,4 @@ def write_vectors(directory):
             lens.append("%d, %d, %d, %s" % (index, u, v, ", ".join(emit.numbers((x, y), 11))))
     inc.struct_array("vector_line", "vector_lines", lines)
     inc.struct_array("vector_lens", "vector_lens", lens)
-    return size + inc.write(directory, "rig.inc")
+    return size + inc.write(directory, "rig.inc") + write_level(directory)

@@ -123,6 +123,8 @@ static void print_calibration(const struct ih_calibration *c)
         snprintf(name, sizeof name, "projector_origin %c", axis[i]);
         print(name, c->origin_mm_q16[i], 16);
     }
+    printf("up %.9g %.9g %.9g\n", c->up_q30[0] / 0x1p30, c->up_q30[1] / 0x1p30,
+           c->up_q30[2] / 0x1p30);
     for (int slot = 0; slot < IH_SLOTS && c->kind == IH_RIG_DOTS; slot++) {
         const int32_t *ray = c->ray_q30[slot];
         printf("dot_rays[%d] %.9f %.9f %.9f\n", slot, ray[0] / 0x1p30, ray[1] / 0x1p30,

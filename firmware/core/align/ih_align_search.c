@@ -20,11 +20,10 @@
 /* Against this scale a plane's pairs weigh all the same. */
 #define EQUAL_SCALE_PX_Q12 (64 * 4096)
 
-/* Dots stand twice the field's unit apart. */
 static int32_t bin_of(const struct ih_rig *rig)
 {
     const int64_t pitch_px_q12 =
-        ih_mul_shift(2 * (int64_t)rig->field.unit_q28, rig->calibration.fx_px_q16, 28 + 4);
+        ih_mul_shift(2 * (int64_t)rig->half_pitch_q28, rig->calibration.fx_px_q16, 28 + 4);
     return (int32_t)ih_min_s64(ih_max_s64(pitch_px_q12 / PITCH_BINS, BIN_MIN_PX_Q12),
                                BIN_MAX_PX_Q12);
 }

@@ -28,6 +28,7 @@ enum ih_err {
     IH_ERR_BLOB_LENGTH = -14,  /* a length that the version does not have */
     IH_ERR_BLOB_CRC = -15,     /* changed bytes */
     IH_ERR_BLOB_FIELD = -16,   /* a kind that does not exist, or a range rig with a projector */
+    IH_ERR_UP = -17, /* up that is no unit vector, or within 10 degrees of the optical axis */
 };
 
 IH_BEGIN_DECLS

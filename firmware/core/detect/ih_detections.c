@@ -6,7 +6,7 @@
 #include "detect/ih_candidates.h"
 #include "detect/ih_prescreen.h"
 #include "detect/ih_score.h"
-#include "rig/ih_camera.h"
+#include "rig/ih_level.h"
 
 /* A hopeless candidate is not fitted beyond these. */
 #define FIRST_LOOK_STEPS 1
@@ -35,15 +35,12 @@ void ih_detections_begin(struct ih_detections *out)
     memset(out->view, 0, sizeof out->view);
 }
 
-void ih_detections_outline(const struct ih_rig *rig, struct ih_detection *detection)
+/* A level camera sees no axis of a head turned. */
+static void outline_level(const struct ih_rig *rig, int32_t depth_q8,
+                          struct ih_detection *detection)
 {
     const struct ih_calibration *c = &rig->calibration;
     const struct ih_ellipsoid *head = &detection->head;
-    int64_t depth_q8 = ih_max_s32(head->centre_mm_q8[2], 1 << 8);
-    int64_t x_q28 = ih_div_round((int64_t)head->centre_mm_q8[0] * (1 << 28), depth_q8);
-    int64_t y_q28 = ih_div_round((int64_t)head->centre_mm_q8[1] * (1 << 28), depth_q8);
-    ih_camera_distort(rig, ih_saturate_s32(x_q28), ih_saturate_s32(y_q28), &detection->u_px_q12,
-                      &detection->v_px_q12);
     int32_t across_q12 =
         ih_saturate_s32(ih_div_round(ih_mul_shift(head->semi_mm_q8[0], c->fx_px_q16, 4), depth_q8));
     int32_t up_q12 =
@@ -51,6 +48,40 @@ void ih_detections_outline(const struct ih_rig *rig, struct ih_detection *detect
     detection->a_px_q12 = ih_max_s32(across_q12, up_q12);
     detection->b_px_q12 = ih_min_s32(across_q12, up_q12);
     detection->angle_mdeg = up_q12 > across_q12 ? 90000 : 0;
+}
+
+/* In units of half its semi-axes an ellipsoid has the second moments 1. */
+static void outline_rotated(const struct ih_rig *rig, int32_t depth_q8, int32_t x_q28,
+                            int32_t y_q28, struct ih_detection *detection)
+{
+    static const int32_t moment_q16[3][3] = {{65536, 0, 0}, {0, 65536, 0}, {0, 0, 65536}};
+    const int32_t *semi = detection->head.semi_mm_q8;
+    const struct ih_level_place place = {
+        .x_q28 = x_q28,
+        .y_q28 = y_q28,
+        .step_q28 = {semi[0] * (1 << 12), semi[1] * (1 << 12), semi[2] * (1 << 12)},
+        .multiple = 1 << 15, /* 2^28 over 2, and over 2^12 */
+        .divisor = depth_q8};
+    const struct ih_level_ellipse axes = ih_level_ellipse(rig, &place, moment_q16);
+    detection->a_px_q12 = axes.a_px_q12;
+    detection->b_px_q12 = axes.b_px_q12;
+    detection->angle_mdeg = axes.angle_mdeg;
+}
+
+void ih_detections_outline(const struct ih_rig *rig, struct ih_detection *detection)
+{
+    const struct ih_ellipsoid *head = &detection->head;
+    const int32_t depth_q8 = ih_max_s32(head->centre_mm_q8[2], 1 << 8);
+    const int32_t x_q28 =
+        ih_saturate_s32(ih_div_round((int64_t)head->centre_mm_q8[0] * (1 << 28), depth_q8));
+    const int32_t y_q28 =
+        ih_saturate_s32(ih_div_round((int64_t)head->centre_mm_q8[1] * (1 << 28), depth_q8));
+    (void)ih_level_sees(rig, x_q28, y_q28, &detection->u_px_q12, &detection->v_px_q12);
+    if (rig->is_level) {
+        outline_level(rig, depth_q8, detection);
+    } else {
+        outline_rotated(rig, depth_q8, x_q28, y_q28, detection);
+    }
     int64_t length2_q16 = 0;
     for (int axis = 0; axis < 3; axis++) {
         length2_q16 += (int64_t)head->centre_mm_q8[axis] * head->centre_mm_q8[axis];

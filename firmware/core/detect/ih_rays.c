@@ -7,7 +7,7 @@
 #include "base/ih_fix.h"
 #include "base/ih_range.h"
 #include "points/ih_near_depth.h"
-#include "rig/ih_camera.h"
+#include "rig/ih_level.h"
 
 void ih_rays_params_default(struct ih_rays_params *params)
 {
@@ -25,9 +25,8 @@ static bool is_empty(const struct ih_rig *rig, const struct ih_dots *dots, int32
                      int32_t probe_mm_q8)
 {
     int32_t x_q28, y_q28, u_px_q12, v_px_q12;
-    ih_rig_dot_at(rig, slot, probe_mm_q8, &x_q28, &y_q28);
-    ih_camera_distort(rig, x_q28, y_q28, &u_px_q12, &v_px_q12);
-    return ih_camera_sees(rig, u_px_q12, v_px_q12) &&
+    ih_level_dot_at(rig, slot, probe_mm_q8, &x_q28, &y_q28);
+    return ih_level_sees(rig, x_q28, y_q28, &u_px_q12, &v_px_q12) &&
            (dots == NULL || !ih_dots_is_bright(dots, u_px_q12 >> 12, v_px_q12 >> 12));
 }
 
@@ -78,18 +77,18 @@ void ih_rays_make(const struct ih_points *points, const struct ih_dots *dots,
     int32_t probe_mm_q8 = ih_near_depth_mm_q8(points) + (params->probe_mm << 8);
     for (int axis = 0; axis < 3; axis++) {
         out->origin_mm_q8[axis] =
-            is_range ? 0 : (int32_t)ih_shift_round(rig->calibration.origin_mm_q16[axis], 8);
+            is_range ? 0 : (int32_t)ih_shift_round(rig->level_origin_mm_q16[axis], 8);
     }
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
         const struct ih_point *point = &points->point[slot];
         struct ih_ray *ray = &out->ray[slot];
         *ray = (struct ih_ray){.state = IH_RAY_UNKNOWN};
-        if (is_range) {
-            ray->slope_x_q20 = limited_slope_q20(ih_shift_round(point->x_q28, 8));
-            ray->slope_y_q20 = limited_slope_q20(ih_shift_round(point->y_q28, 8));
-        } else {
-            ray->slope_x_q20 = rig->line[slot].slope_x_q20;
-            ray->slope_y_q20 = rig->line[slot].slope_y_q20;
+        int32_t x_q28 = point->x_q28, y_q28 = point->y_q28;
+        const bool is_in_view = is_range || ih_level_ray(rig, slot, &x_q28, &y_q28);
+        ray->slope_x_q20 = limited_slope_q20(ih_shift_round(x_q28, 8));
+        ray->slope_y_q20 = limited_slope_q20(ih_shift_round(y_q28, 8));
+        if (!is_in_view) {
+            continue;
         }
         if (point->state == IH_POINT_SEEN) {
             ray->state = IH_RAY_SEEN;

@@ -6,7 +6,7 @@
 #include "base/ih_fix.h"
 #include "base/ih_range.h"
 #include "nests/ih_ellipse.h"
-#include "rig/ih_camera.h"
+#include "rig/ih_level.h"
 
 /* Slices up to this depth behind the front make the curvature. */
 #define CURVATURE_DEPTH_MM 70
@@ -144,44 +144,24 @@ static int32_t surface_depth_mm_q8(const struct ih_surface *surface, int32_t x_q
         ih_shift_round(top, 16) * (65536 - fy) + ih_shift_round(bottom, 16) * fy, 16);
 }
 
-/* Semi-axis = 2 sqrt(variance); the variance in Q16 px^2 less drop bits, below 2^32. */
-static int32_t semi_axis_px_q12(int64_t variance, int drop)
-{
-    uint64_t variance_q24 = variance > 0 ? (uint64_t)variance << (8 + drop) : 0;
-    return ih_saturate_s32(2 * (int64_t)ih_isqrt_u64(variance_q24));
-}
-
-/* Covariance on the grid to an ellipse in pixels. */
+/* Covariance on the grid, at that place, to an ellipse in pixels. A unit below 2^25.5 (a pitch of a third of a radian) at
+ * 8192 px is below 2^11. */
 static void fill_axes(const struct ih_ellipse *ellipse, const struct ih_surface *surface,
-                      const struct ih_rig *rig, struct ih_hypothesis *out)
+                      const struct ih_rig *rig, int32_t x_q28, int32_t y_q28,
+                      struct ih_hypothesis *out)
 {
-    const struct ih_calibration *c = &rig->calibration;
-    /* px per grid step in Q12: a unit below 2^25.5 (a pitch of a third of a radian) at 8192 px is
-     * below 2^11; a variance of 2^28 in Q16 times its square stays below 2^62 as it is scaled back
-     * in between. */
-    int64_t step_u = ih_div_round(ih_mul_shift(surface->field.unit_q28, c->fx_px_q16, 32) *
-                                      IH_SURFACE_STEP_NUMERATOR,
-                                  IH_SURFACE_STEP_DENOMINATOR);
-    int64_t step_v = ih_div_round(ih_mul_shift(surface->field.unit_q28, c->fy_px_q16, 32) *
-                                      IH_SURFACE_STEP_NUMERATOR,
-                                  IH_SURFACE_STEP_DENOMINATOR);
-    IH_IN_RANGE(step_u, 0, IH_RANGE_PX_PER_STEP_Q12);
-    IH_IN_RANGE(step_v, 0, IH_RANGE_PX_PER_STEP_Q12);
-    int64_t uu = ih_mul_shift(ih_mul_shift(ellipse->xx_q16, step_u, 12), step_u, 12);
-    int64_t uv = ih_mul_shift(ih_mul_shift(ellipse->xy_q16, step_u, 12), step_v, 12);
-    int64_t vv = ih_mul_shift(ih_mul_shift(ellipse->yy_q16, step_v, 12), step_v, 12);
-    /* Squares of the variances must fit: drop bits that a large ellipse does not need. */
-    uint64_t all = (uint64_t)ih_abs_s64(uu) | (uint64_t)ih_abs_s64(uv) | (uint64_t)ih_abs_s64(vv);
-    int drop = ih_max_s32(0, ih_bits_u64(all) - 30);
-    uu = ih_shift_round(uu, drop);
-    uv = ih_shift_round(uv, drop);
-    vv = ih_shift_round(vv, drop);
-    int64_t half = (uu - vv) / 2;
-    int64_t root = ih_isqrt_u64((uint64_t)(half * half + uv * uv));
-    out->a_px_q12 = semi_axis_px_q12((uu + vv) / 2 + root, drop);
-    out->b_px_q12 = semi_axis_px_q12((uu + vv) / 2 - root, drop);
-    int32_t angle = (int32_t)ih_div_round(ih_atan2_mdeg(2 * uv, uu - vv), 2);
-    out->angle_mdeg = angle < 0 ? angle + 180000 : angle;
+    const int32_t unit_q28 = surface->field.unit_q28;
+    const struct ih_level_place place = {.x_q28 = x_q28,
+                                         .y_q28 = y_q28,
+                                         .step_q28 = {unit_q28, unit_q28, 0},
+                                         .multiple = IH_SURFACE_STEP_NUMERATOR,
+                                         .divisor = IH_SURFACE_STEP_DENOMINATOR};
+    const int32_t moment_q16[3][3] = {
+        {ellipse->xx_q16, ellipse->xy_q16, 0}, {ellipse->xy_q16, ellipse->yy_q16, 0}, {0, 0, 0}};
+    const struct ih_level_ellipse axes = ih_level_ellipse(rig, &place, moment_q16);
+    out->a_px_q12 = axes.a_px_q12;
+    out->b_px_q12 = axes.b_px_q12;
+    out->angle_mdeg = axes.angle_mdeg;
 }
 
 /* Where a sample lies relative to an ellipse: the ellipse's normalised radius squared, Q4, and the
@@ -264,11 +244,13 @@ static void fill_place(const struct ih_nest *nest, const struct ih_surface *surf
                        const struct ih_rig *rig, const struct ih_hypotheses_params *params,
                        struct ih_hypothesis *out)
 {
+    const struct ih_slice *last = &nest->slice[nest->slice_count - 1];
     int32_t x_q16, y_q16;
     nest_centre_q16(nest, &x_q16, &y_q16);
     int32_t x_q28 = to_normalised_q28(x_q16, surface->field.centre_x_q28, surface->field.unit_q28);
     int32_t y_q28 = to_normalised_q28(y_q16, surface->field.centre_y_q28, surface->field.unit_q28);
-    ih_camera_distort(rig, x_q28, y_q28, &out->u_px_q12, &out->v_px_q12);
+    (void)ih_level_sees(rig, x_q28, y_q28, &out->u_px_q12, &out->v_px_q12);
+    fill_axes(&last->ellipse, surface, rig, x_q28, y_q28, out);
     out->distance_mm_q8 = ih_saturate_s32(
         ih_mul_shift(surface_depth_mm_q8(surface, x_q16, y_q16), ray_length_q28(x_q28, y_q28), 28));
     int64_t depth_q8 = nest->front_mm_q8 + (int64_t)(params->centre_behind_mm << 8);
@@ -307,7 +289,6 @@ static struct ih_hypothesis judge(const struct ih_nest *nest, const struct ih_su
     h.curvature_mm_q8 = curvature_mm_q8(nest);
     h.extent_mm_q8 = last->behind_mm_q8;
     fill_place(nest, surface, rig, params, &h);
-    fill_axes(&last->ellipse, surface, rig, &h);
     fill_outline(nest, samples, params, &h.outline);
     h.upright_q16 = upright_q16(nest);
     h.rejected = (int32_t)test(&h, params);

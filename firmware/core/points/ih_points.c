@@ -6,6 +6,7 @@
 #include "base/ih_range.h"
 #include "points/ih_windows_survey.h"
 #include "rig/ih_camera.h"
+#include "rig/ih_level.h"
 
 /* Bounds the search for a measured pixel around a lattice point. */
 #define REACH_MAX_PX 32
@@ -25,6 +26,19 @@ static int32_t normalised_q28(int64_t px_q12, int32_t principal_px_q16, int32_t 
         ih_div_round((px_q12 * 16 - principal_px_q16) * ((int64_t)1 << 28), focal_px_q16));
 }
 
+/* A point of the camera frame, whose depth is known, to the level frame. Out of view there it says nothing. */
+static void set_seen(const struct ih_rig *rig, struct ih_point *point)
+{
+    const int32_t depth_q28 = ih_level_rotate(rig, &point->x_q28, &point->y_q28);
+    const int64_t depth_mm_q8 = ih_mul_shift(point->depth_mm_q8, depth_q28, 28);
+    point->depth_mm_q8 = (int32_t)ih_min_s64(depth_mm_q8, IH_DEPTH_MAX_MM << 8);
+    point->state = IH_POINT_SEEN;
+    if (depth_mm_q8 < 1 << 8) {
+        point->depth_mm_q8 = 0;
+        point->state = IH_POINT_UNKNOWN;
+    }
+}
+
 static void point_of_dot(const struct ih_labels *labels, const struct ih_rig *rig, int32_t slot,
                          struct ih_point *out)
 {
@@ -39,7 +53,7 @@ static void point_of_dot(const struct ih_labels *labels, const struct ih_rig *ri
                                 c->cx_px_q16, c->fx_px_q16);
     out->y_q28 = normalised_q28(line->infinity_v_px_q12 + ih_mul_shift(t, line->dir_v_q30, 30),
                                 c->cy_px_q16, c->fy_px_q16);
-    out->state = IH_POINT_SEEN;
+    set_seen(rig, out);
 }
 
 void ih_points_from_labels(const struct ih_labels *labels, const struct ih_rig *rig,
@@ -51,12 +65,12 @@ void ih_points_from_labels(const struct ih_labels *labels, const struct ih_rig *
         struct ih_point *point = &out->point[slot];
         if (labels->dot_of_slot[slot] != IH_NONE) {
             point_of_dot(labels, rig, slot, point);
-            out->seen_count++;
         } else {
-            ih_rig_dot_at(rig, slot, rig->calibration.far_mm << 8, &point->x_q28, &point->y_q28);
+            ih_level_dot_at(rig, slot, rig->calibration.far_mm << 8, &point->x_q28, &point->y_q28);
             point->depth_mm_q8 = 0;
             point->state = IH_POINT_MISSING;
         }
+        out->seen_count += point->state == IH_POINT_SEEN;
     }
 }
 
@@ -100,11 +114,11 @@ static void measure(const struct ih_frame *frame, const struct ih_rig *rig,
     if (depth_mm == 0) {
         out->state = IH_POINT_MISSING;
     } else if (du * du + dv * dv <= reach->seen_px * reach->seen_px) {
-        out->state = IH_POINT_SEEN;
         out->depth_mm_q8 = depth_mm << 8;
-        if (du != 0 || dv != 0) {
+        if (du != 0 || dv != 0 || !rig->is_level) {
             ih_camera_undistort(rig, found_u * 4096, found_v * 4096, &out->x_q28, &out->y_q28);
         }
+        set_seen(rig, out);
     }
 }
 
@@ -119,10 +133,9 @@ static void point_of_range(const struct ih_frame *frame, const struct ih_rig *ri
     out->depth_mm_q8 = 0;
     out->state = IH_POINT_UNKNOWN;
     int32_t u, v;
-    ih_camera_distort(rig, out->x_q28, out->y_q28, &u, &v);
     bool in_view = ih_abs_s64(out->x_q28) < (int64_t)IH_RIG_TAN_MAX << 28 &&
                    ih_abs_s64(out->y_q28) < (int64_t)IH_RIG_TAN_MAX << 28;
-    if (in_view && ih_camera_sees(rig, u, v)) {
+    if (in_view && ih_level_sees(rig, out->x_q28, out->y_q28, &u, &v)) {
         measure(frame, rig, reach, (int32_t)ih_shift_round(u, 12), (int32_t)ih_shift_round(v, 12),
                 out);
     }

@@ -3,8 +3,8 @@
  * In:    a depth image, the rig.
  * Out:   up to IH_WINDOWS_MAX windows, best first: where the middle of a head would be seen, and
  *        the depth of its front there. The middle of its volume lies about 100 mm behind that.
- * Method: 1. Survey: the image is cut into square cells, at most IH_WINDOWS_CELLS_MAX. A cell has
- *           the depth of the measured pixel nearest to its middle, within half a cell. While
+ * Method: 1. Survey: the image, as a level camera would see it, is cut into square cells, at most IH_WINDOWS_CELLS_MAX. A
+ *           cell has the depth of the measured pixel nearest to its middle, within half a cell. While
  *           fewer than 70 % of the cells that have a depth have one at their left too, pixels are
  *           rare, as where a list of points was drawn: then cells are doubled. In the end such an
  *           image is surveyed once more with cells of half that side that look a whole side far, so
@@ -76,9 +76,13 @@ struct ih_windows_place {
 
 struct ih_windows_scratch {
     int32_t column_count, row_count, cell_px;
+    /* The picture that is cut: a level rig's is the frame, another's what a level camera would see of it, without
+     * distortion; then left and top are from its principal point. */
+    int32_t left_px, top_px, width_px, height_px;
     int32_t place_count;
     struct ih_windows_place place[IH_WINDOWS_PLACES_MAX]; /* best first */
-    uint16_t depth_mm[IH_WINDOWS_CELLS_MAX];              /* row by row; 0 = nothing measured */
+    int16_t depth_mm
+        [IH_WINDOWS_CELLS_MAX]; /* row by row; 0: nothing measured, IH_NONE: outside of the frame */
 };
 
 IH_BEGIN_DECLS

@@ -3,7 +3,7 @@
 #include "base/ih_fix.h"
 #include "base/ih_range.h"
 #include "points/ih_windows_score.h"
-#include "rig/ih_camera.h"
+#include "points/ih_windows_survey.h"
 
 /* Places nearer than this to a better one are not remembered. */
 #define MERGE_MM 70
@@ -57,7 +57,7 @@ struct ih_windows_place ih_windows_place_at(const struct ih_windows_scratch *s,
                                             int32_t row)
 {
     struct ih_windows_place place = {(int16_t)column, (int16_t)row,
-                                     (int16_t)s->depth_mm[row * s->column_count + column], 0};
+                                     s->depth_mm[row * s->column_count + column], 0};
     if (place.depth_mm > 0) {
         place.score = (int16_t)ih_windows_score(s, rig, params, &place);
         IH_IN_RANGE(place.score, 0, IH_RANGE_WINDOW_SCORE);
@@ -96,8 +96,8 @@ void ih_windows_mean(const struct ih_windows_scratch *s, const struct ih_rig *ri
             depth_mm += (int64_t)weight * place.depth_mm;
         }
     }
-    ih_camera_undistort(rig, mean_px_q12(u, weights, s), mean_px_q12(v, weights, s), &out->x_q28,
-                        &out->y_q28);
+    ih_windows_direction(s, rig, mean_px_q12(u, weights, s), mean_px_q12(v, weights, s),
+                         &out->x_q28, &out->y_q28);
     out->depth_mm_q8 = (int32_t)ih_div_round(depth_mm * 256, weights);
     IH_IN_RANGE(out->depth_mm_q8, IH_DEPTH_MIN_MM << 8, IH_DEPTH_MAX_MM << 8);
     out->score = best->score;

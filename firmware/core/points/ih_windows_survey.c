@@ -4,6 +4,8 @@
 #include <stddef.h>
 
 #include "base/ih_fix.h"
+#include "rig/ih_camera.h"
+#include "rig/ih_level.h"
 
 #define CONNECTED_MIN_PERCENT 70
 #define DOUBLINGS_MAX 5
@@ -81,16 +83,73 @@ int32_t ih_windows_connected_percent(const struct ih_windows_scratch *s)
     return count == 0 ? 100 : connected * 100 / count;
 }
 
+static int32_t direction_q28(int32_t px_q12, int32_t begin_px, int32_t focal_px_q16)
+{
+    const int64_t px_q16 = (px_q12 + (int64_t)begin_px * 4096) * 16;
+    return ih_saturate_s32(ih_div_round(px_q16 * (1 << 28), focal_px_q16));
+}
+
+void ih_windows_direction(const struct ih_windows_scratch *s, const struct ih_rig *rig,
+                          int32_t u_px_q12, int32_t v_px_q12, int32_t *x_q28, int32_t *y_q28)
+{
+    if (rig->is_level) {
+        ih_camera_undistort(rig, u_px_q12, v_px_q12, x_q28, y_q28);
+    } else {
+        *x_q28 = direction_q28(u_px_q12, s->left_px, rig->calibration.fx_px_q16);
+        *y_q28 = direction_q28(v_px_q12, s->top_px, rig->calibration.fy_px_q16);
+    }
+}
+
+/* Depth in the level frame at a place in the picture; IH_NONE outside of the frame. */
+static int32_t level_depth_mm(const struct ih_windows_scratch *s, const struct ih_frame *frame,
+                              const struct ih_rig *rig, int32_t reach_px, int32_t u, int32_t v)
+{
+    int32_t x_q28, y_q28, u_px_q12, v_px_q12;
+    ih_windows_direction(s, rig, u * 4096, v * 4096, &x_q28, &y_q28);
+    const int32_t depth_q28 = ih_level_rotate_back(rig, &x_q28, &y_q28);
+    ih_camera_distort(rig, x_q28, y_q28, &u_px_q12, &v_px_q12);
+    if (depth_q28 == 0 || !ih_camera_sees(rig, u_px_q12, v_px_q12)) {
+        return IH_NONE;
+    }
+    u = (u_px_q12 + 2048) >> 12;
+    v = (v_px_q12 + 2048) >> 12;
+    const int64_t depth_mm = ih_windows_pixel(frame, rig, reach_px, &u, &v);
+    return (int32_t)ih_min_s64(ih_div_round(depth_mm * (1 << 28), depth_q28), IH_DEPTH_MAX_MM);
+}
+
+/* Begin and length of what a level camera would see of the frame: of its corners and the middles of its sides. */
+static void frame_picture(const struct ih_rig *rig, struct ih_windows_scratch *s)
+{
+    const struct ih_calibration *c = &rig->calibration;
+    int32_t min_q28[2] = {INT32_MAX, INT32_MAX}, max_q28[2] = {INT32_MIN, INT32_MIN};
+    for (int i = 0; i < 9; i++) {
+        int32_t at_q28[2];
+        ih_camera_undistort(rig, (c->width - 1) * 2048 * (i % 3), (c->height - 1) * 2048 * (i / 3),
+                            &at_q28[0], &at_q28[1]);
+        (void)ih_level_rotate(rig, &at_q28[0], &at_q28[1]);
+        for (int axis = 0; axis < 2; axis++) {
+            min_q28[axis] = ih_min_s32(min_q28[axis], at_q28[axis]);
+            max_q28[axis] = ih_max_s32(max_q28[axis], at_q28[axis]);
+        }
+    }
+    s->left_px = (int32_t)ih_mul_shift(min_q28[0], c->fx_px_q16, 44);
+    s->top_px = (int32_t)ih_mul_shift(min_q28[1], c->fy_px_q16, 44);
+    s->width_px = (int32_t)ih_mul_shift(max_q28[0], c->fx_px_q16, 44) - s->left_px + 1;
+    s->height_px = (int32_t)ih_mul_shift(max_q28[1], c->fy_px_q16, 44) - s->top_px + 1;
+}
+
 static void survey(const struct ih_frame *frame, const struct ih_rig *rig, int32_t cell_px,
                    int32_t reach_px, struct ih_windows_scratch *s)
 {
     s->cell_px = cell_px;
-    s->column_count = (frame->width + cell_px - 1) / cell_px;
-    s->row_count = (frame->height + cell_px - 1) / cell_px;
+    s->column_count = (s->width_px + cell_px - 1) / cell_px;
+    s->row_count = (s->height_px + cell_px - 1) / cell_px;
     for (int32_t cell = 0; cell < s->column_count * s->row_count; cell++) {
-        int32_t u = middle_px(cell % s->column_count, cell_px, frame->width);
-        int32_t v = middle_px(cell / s->column_count, cell_px, frame->height);
-        s->depth_mm[cell] = (uint16_t)ih_windows_pixel(frame, rig, reach_px, &u, &v);
+        int32_t u = middle_px(cell % s->column_count, cell_px, s->width_px);
+        int32_t v = middle_px(cell / s->column_count, cell_px, s->height_px);
+        s->depth_mm[cell] =
+            (int16_t)(rig->is_level ? ih_windows_pixel(frame, rig, reach_px, &u, &v)
+                                    : level_depth_mm(s, frame, rig, reach_px, u, v));
     }
 }
 
@@ -98,7 +157,13 @@ int32_t ih_windows_survey(const struct ih_frame *frame, const struct ih_rig *rig
                           struct ih_windows_scratch *s)
 {
     int32_t min_px = 1;
-    while (((frame->width + min_px - 1) / min_px) * ((frame->height + min_px - 1) / min_px) >
+    s->left_px = s->top_px = 0;
+    s->width_px = frame->width;
+    s->height_px = frame->height;
+    if (!rig->is_level) {
+        frame_picture(rig, s);
+    }
+    while (((s->width_px + min_px - 1) / min_px) * ((s->height_px + min_px - 1) / min_px) >
            IH_WINDOWS_CELLS_MAX) {
         min_px++;
     }

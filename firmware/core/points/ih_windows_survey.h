@@ -18,6 +18,10 @@ IH_BEGIN_DECLS
 int32_t ih_windows_survey(const struct ih_frame *frame, const struct ih_rig *rig,
                           struct ih_windows_scratch *s);
 
+/* The direction, in the level frame, of a place in the picture that is cut. */
+void ih_windows_direction(const struct ih_windows_scratch *s, const struct ih_rig *rig,
+                          int32_t u_px_q12, int32_t v_px_q12, int32_t *x_q28, int32_t *y_q28);
+
 /* Percentage of the cells with a depth, without the first column, whose left neighbour has one too;
  * 100 where there are none. */
 int32_t ih_windows_connected_percent(const struct ih_windows_scratch *s);

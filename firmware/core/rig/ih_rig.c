@@ -6,37 +6,57 @@
 #include "base/ih_fix.h"
 #include "base/ih_range.h"
 #include "rig/ih_camera.h"
+#include "rig/ih_level.h"
 
 /* At this depth the middle dot is the centre of the surface: a person sits there. */
 #define FIELD_DEPTH_MM 900
 #define ONE_Q28 ((int64_t)1 << 28)
 /* No camera sees rays that are steeper than this against its optical axis. */
 #define RAY_FORWARD_MIN_Q30 (1 << 28)
-#define RAY_LENGTH_TOLERANCE_Q30 (1 << 16) /* 6e-5 */
+#define UNIT_TOLERANCE_Q30 (1 << 16) /* 6e-5 */
 
-/* tan of the ray and its offset O - Oz r/rz: X/Z = tan + offset / Z. */
-static void ray_line(const struct ih_calibration *c, int32_t slot, int axis, int64_t *tan_q30,
-                     int64_t *offset_mm_q16)
+/* tan of the ray. */
+static int64_t ray_tan_q30(const struct ih_calibration *c, int32_t slot, int axis)
 {
     const int32_t *ray = c->ray_q30[slot];
-    *tan_q30 = ih_div_round((int64_t)ray[axis] * ((int64_t)1 << 30), ray[2]);
-    *offset_mm_q16 = c->origin_mm_q16[axis] - ih_mul_shift(c->origin_mm_q16[2], *tan_q30, 30);
-    IH_IN_RANGE(*offset_mm_q16, -IH_RANGE_OFFSET_MM_Q16, IH_RANGE_OFFSET_MM_Q16);
+    return ih_div_round((int64_t)ray[axis] * ((int64_t)1 << 30), ray[2]);
+}
+
+/* O - Oz r/rz: X/Z = tan + offset / Z. */
+static int64_t offset_mm_q16(const int32_t origin_mm_q16[3], int axis, int64_t tan_q30)
+{
+    const int64_t offset = origin_mm_q16[axis] - ih_mul_shift(origin_mm_q16[2], tan_q30, 30);
+    IH_IN_RANGE(offset, -IH_RANGE_OFFSET_MM_Q16, IH_RANGE_OFFSET_MM_Q16);
+    return offset;
+}
+
+int32_t ih_rig_slope_at_q28(const int32_t origin_mm_q16[3], int axis, int64_t tan_q30,
+                            int32_t depth_mm_q8)
+{
+    /* |offset| <= |O| + |Oz| |tan|: below 5000 mm = 2^28.3 in Q16, times 2^20; a quotient in
+     * Q28. */
+    const int64_t shift_q28 =
+        ih_div_round(offset_mm_q16(origin_mm_q16, axis, tan_q30) * (1 << 20), depth_mm_q8);
+    return (int32_t)ih_clamp_s64(ih_shift_round(tan_q30, 2) + shift_q28, IH_RIG_TAN_MAX * ONE_Q28);
 }
 
 void ih_rig_dot_at(const struct ih_rig *rig, int32_t slot, int32_t depth_mm_q8, int32_t *x_q28,
                    int32_t *y_q28)
 {
-    int32_t *out[2] = {x_q28, y_q28};
-    for (int axis = 0; axis < 2; axis++) {
-        int64_t tan_q30, offset_mm_q16;
-        ray_line(&rig->calibration, slot, axis, &tan_q30, &offset_mm_q16);
-        /* |offset| <= |O| + |Oz| |tan|: below 5000 mm = 2^28.3 in Q16, times 2^20; a quotient in
-         * Q28. */
-        int64_t shift_q28 = ih_div_round(offset_mm_q16 * (1 << 20), depth_mm_q8);
-        *out[axis] =
-            (int32_t)ih_clamp_s64(ih_shift_round(tan_q30, 2) + shift_q28, IH_RIG_TAN_MAX * ONE_Q28);
+    const struct ih_calibration *c = &rig->calibration;
+    *x_q28 = ih_rig_slope_at_q28(c->origin_mm_q16, 0, ray_tan_q30(c, slot, 0), depth_mm_q8);
+    *y_q28 = ih_rig_slope_at_q28(c->origin_mm_q16, 1, ray_tan_q30(c, slot, 1), depth_mm_q8);
+}
+
+bool ih_rig_is_unit(const int32_t vector_q30[3])
+{
+    int64_t length2_q58 = 0;
+    for (int axis = 0; axis < 3; axis++) {
+        int64_t part = ih_abs_s64(vector_q30[axis]) >> 1;
+        length2_q58 += part * part; /* each below 2^60 */
     }
+    int64_t length_q30 = 2 * (int64_t)ih_isqrt_u64((uint64_t)length2_q58);
+    return ih_abs_s64(length_q30 - ((int64_t)1 << 30)) <= UNIT_TOLERANCE_Q30;
 }
 
 static enum ih_err check_projector(const struct ih_calibration *c, int32_t *bad_slot)
@@ -47,15 +67,7 @@ static enum ih_err check_projector(const struct ih_calibration *c, int32_t *bad_
         }
     }
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
-        const int32_t *ray = c->ray_q30[slot];
-        int64_t length2_q58 = 0;
-        for (int axis = 0; axis < 3; axis++) {
-            int64_t part = ih_abs_s64(ray[axis]) >> 1;
-            length2_q58 += part * part; /* each below 2^60 */
-        }
-        int64_t length_q30 = 2 * (int64_t)ih_isqrt_u64((uint64_t)length2_q58);
-        if (ray[2] < RAY_FORWARD_MIN_Q30 ||
-            ih_abs_s64(length_q30 - ((int64_t)1 << 30)) > RAY_LENGTH_TOLERANCE_Q30) {
+        if (c->ray_q30[slot][2] < RAY_FORWARD_MIN_Q30 || !ih_rig_is_unit(c->ray_q30[slot])) {
             *bad_slot = slot;
             return IH_ERR_RAY;
         }
@@ -79,9 +91,7 @@ static bool fill_line(struct ih_rig *rig, int32_t slot)
 {
     const struct ih_calibration *c = &rig->calibration;
     struct ih_line *line = &rig->line[slot];
-    int64_t tan_q30[2], offset_mm_q16[2];
-    ray_line(c, slot, 0, &tan_q30[0], &offset_mm_q16[0]);
-    ray_line(c, slot, 1, &tan_q30[1], &offset_mm_q16[1]);
+    const int64_t tan_q30[2] = {ray_tan_q30(c, slot, 0), ray_tan_q30(c, slot, 1)};
 
     line->slope_x_q20 = slope_q20(c->ray_q30[slot], 0);
     line->slope_y_q20 = slope_q20(c->ray_q30[slot], 1);
@@ -94,8 +104,8 @@ static bool fill_line(struct ih_rig *rig, int32_t slot)
 
     /* e = focal * offset is below 2^13 px * 5000 mm = 2^26, and limited to 2^22 in Q8, so that its
      * square is below 2^60. */
-    int64_t e_u_q8 = ih_mul_shift(c->fx_px_q16, offset_mm_q16[0], 24);
-    int64_t e_v_q8 = ih_mul_shift(c->fy_px_q16, offset_mm_q16[1], 24);
+    int64_t e_u_q8 = ih_mul_shift(c->fx_px_q16, offset_mm_q16(c->origin_mm_q16, 0, tan_q30[0]), 24);
+    int64_t e_v_q8 = ih_mul_shift(c->fy_px_q16, offset_mm_q16(c->origin_mm_q16, 1, tan_q30[1]), 24);
     if (ih_abs_s64(e_u_q8) >= (int64_t)1 << 30 || ih_abs_s64(e_v_q8) >= (int64_t)1 << 30) {
         return false;
     }
@@ -128,25 +138,37 @@ static void cross_q30(const int32_t w_q30[3], const int32_t v_q30[3], int32_t ou
 }
 
 /* Mean distance of the pattern's columns and rows in normalised coordinates, halved: the unit. */
-static void fill_field(struct ih_rig *rig)
+static int32_t half_pitch_q28(const struct ih_rig *rig, bool is_level_frame, int32_t depth_mm_q8)
 {
-    const struct ih_calibration *c = &rig->calibration;
     const int32_t ends[4][2] = {{0, IH_GRID - 1},
                                 {IH_SLOTS - IH_GRID, IH_SLOTS - 1},
                                 {0, IH_SLOTS - IH_GRID},
                                 {IH_GRID - 1, IH_SLOTS - 1}};
-    int32_t depth_q8 = ih_clamp_s32(FIELD_DEPTH_MM, c->near_mm, c->far_mm) << 8;
     int64_t sum_q28 = 0;
     for (int i = 0; i < 4; i++) {
-        int32_t x0, y0, x1, y1;
-        ih_rig_dot_at(rig, ends[i][0], depth_q8, &x0, &y0);
-        ih_rig_dot_at(rig, ends[i][1], depth_q8, &x1, &y1);
-        int64_t dx = x1 - (int64_t)x0;
-        int64_t dy = y1 - (int64_t)y0;
+        int32_t x[2], y[2];
+        for (int k = 0; k < 2; k++) {
+            if (is_level_frame) {
+                ih_level_dot_at(rig, ends[i][k], depth_mm_q8, &x[k], &y[k]);
+            } else {
+                ih_rig_dot_at(rig, ends[i][k], depth_mm_q8, &x[k], &y[k]);
+            }
+        }
+        int64_t dx = x[1] - (int64_t)x[0];
+        int64_t dy = y[1] - (int64_t)y[0];
         sum_q28 += ih_isqrt_u64((uint64_t)(dx * dx) + (uint64_t)(dy * dy));
     }
-    ih_rig_dot_at(rig, IH_SLOTS / 2, depth_q8, &rig->field.centre_x_q28, &rig->field.centre_y_q28);
-    rig->field.unit_q28 = (int32_t)ih_div_round(sum_q28, 4 * (IH_GRID - 1) * 2);
+    return (int32_t)ih_div_round(sum_q28, 4 * (IH_GRID - 1) * 2);
+}
+
+static void fill_field(struct ih_rig *rig)
+{
+    const struct ih_calibration *c = &rig->calibration;
+    int32_t depth_q8 = ih_clamp_s32(FIELD_DEPTH_MM, c->near_mm, c->far_mm) << 8;
+    rig->half_pitch_q28 = half_pitch_q28(rig, false, depth_q8);
+    ih_level_dot_at(rig, IH_SLOTS / 2, depth_q8, &rig->field.centre_x_q28,
+                    &rig->field.centre_y_q28);
+    rig->field.unit_q28 = half_pitch_q28(rig, true, depth_q8);
     IH_IN_RANGE(rig->field.unit_q28, 0, IH_RANGE_UNIT_Q28);
 }
 
@@ -157,6 +179,9 @@ enum ih_err ih_rig_init(struct ih_rig *rig, const struct ih_calibration *calibra
     *rig = (struct ih_rig){0};
     rig->calibration = *calibration;
     enum ih_err err = ih_camera_init(rig);
+    if (err == IH_OK) {
+        err = ih_level_init(rig);
+    }
     if (err != IH_OK || calibration->kind == IH_RIG_RANGE) {
         return err;
     }
@@ -171,7 +196,7 @@ enum ih_err ih_rig_init(struct ih_rig *rig, const struct ih_calibration *calibra
         }
     }
     fill_field(rig);
-    if (rig->field.unit_q28 < (1 << 28) / 1000) { /* dots closer than 2 mrad: not a 19x19 pattern */
+    if (rig->half_pitch_q28 < (1 << 28) / 1000) { /* dots closer than 2 mrad: not a 19x19 pattern */
         return IH_ERR_RAY;
     }
     return IH_OK;

@@ -7,7 +7,8 @@
  *        by zero or overflows.
  * Cost:  once per rig: 361 lines, and the lens.
  *
- * The camera frame is OpenCV's: X right, Y down, Z forward, mm. Normalised coordinates are
+ * The camera frame is OpenCV's: X right, Y down, Z forward, mm. The level frame is the same for a camera that hangs
+ * level; else it is turned (ih_level). Normalised coordinates are
  * x = X / Z and y = Y / Z after removal of the lens distortion; "undistorted pixels" are
  * (fx x + cx, fy y + cy).
  *
@@ -18,6 +19,7 @@
 #ifndef IH_RIG_H
 #define IH_RIG_H
 
+#include <stdbool.h>
 #include <stdint.h>
 
 #include "base/ih_config.h"
@@ -40,6 +42,8 @@ struct ih_calibration {
     /* Not used for a range rig. */
     int32_t origin_mm_q16[3];
     int32_t ray_q30[IH_SLOTS][3];
+    /* Of any rig: unit vector that points up; all 0 is that of a level camera, (0, -1, 0). */
+    int32_t up_q30[3];
 };
 
 /* One dot's epipolar line. A position t on it is the distance along dir from the dot at infinity, px. */
@@ -58,10 +62,16 @@ struct ih_field {
 };
 
 /* field, of a dot rig: centred on the middle dot at 900 mm (or the nearest depth in range), the unit from
- * the four sides of the pattern at that depth. A range rig has a field per frame. */
+ * the four sides of the pattern at that depth; in the level frame. A range rig has a field per frame. */
 struct ih_rig {
     struct ih_calibration calibration;
     struct ih_field field;
+    int32_t half_pitch_q28; /* the same unit in the camera frame */
+    /* By ih_level_init. */
+    bool is_level; /* both frames are the same */
+    int32_t level_q30[3][3],
+        level_back_q30[3][3]; /* the level frame's axes in the camera's, and the other way round */
+    int32_t level_origin_mm_q16[3]; /* of the dots' rays, in the level frame */
     /* By ih_camera_init, for ih_camera_undistort. */
     int32_t inverse_q24[3];  /* series of the inverse radial distortion */
     int32_t newton_steps;    /* at most; 0: the iteration alone is accurate enough */
@@ -89,6 +99,13 @@ struct ih_rig_motion {
  * be put where the file's camera would see them (ih_dot_rows). */
 void ih_rig_move(struct ih_rig *rig, const int32_t ray_q30[IH_SLOTS][3],
                  const struct ih_rig_motion *motion);
+
+/* Is it a unit vector? */
+bool ih_rig_is_unit(const int32_t vector_q30[3]);
+
+/* Along one axis the normalised coordinate, at a depth, of a ray with this slope. */
+int32_t ih_rig_slope_at_q28(const int32_t origin_mm_q16[3], int axis, int64_t tan_q30,
+                            int32_t depth_mm_q8);
 
 /* Normalised coordinates of a dot at a depth; depth_mm_q8 > 0. */
 void ih_rig_dot_at(const struct ih_rig *rig, int32_t slot, int32_t depth_mm_q8, int32_t *x_q28,

@@ -1,5 +1,6 @@
 #include "rig/ih_rig_blob.h"
 
+#include <stdbool.h>
 #include <string.h>
 
 #include "base/ih_range.h"
@@ -13,12 +14,14 @@
 #define AT_CAMERA 16
 #define AT_PROJECTOR 68
 #define AT_RAYS 80
+#define AT_UP 4412
 #define AT_CRC (IH_RIG_BLOB_BYTES - WORD_BYTES)
 #define HEADER_BYTES AT_KIND
 #define CAMERA_WORDS ((AT_PROJECTOR - AT_CAMERA) / WORD_BYTES)
 #define AXES 3
 #define POLYNOMIAL 0xedb88320u /* x^32 + x^26 + .. + 1, lowest power first */
 
+static const int32_t level_q30[AXES] = {0, -(1 << 30), 0};
 static const uint8_t magic[WORD_BYTES] = {'I', 'H', 'R', 'B'};
 
 /* The camera's fields in the order of the blob. */
@@ -76,16 +79,19 @@ static enum ih_err check_frame(const uint8_t *blob, size_t size)
     if (memcmp(&blob[AT_MAGIC], magic, sizeof magic) != 0) {
         return IH_ERR_BLOB_MAGIC;
     }
-    if (get_u32(&blob[AT_VERSION]) != IH_RIG_BLOB_VERSION) {
+    const uint32_t version = get_u32(&blob[AT_VERSION]);
+    if (version < 1 || version > IH_RIG_BLOB_VERSION) {
         return IH_ERR_BLOB_VERSION;
     }
-    if (get_u32(&blob[AT_LENGTH]) != IH_RIG_BLOB_BYTES) {
+    const size_t bytes = version == 1 ? IH_RIG_BLOB_1_BYTES : IH_RIG_BLOB_BYTES;
+    if (get_u32(&blob[AT_LENGTH]) != bytes) {
         return IH_ERR_BLOB_LENGTH;
     }
-    if (size != IH_RIG_BLOB_BYTES) {
-        return size < IH_RIG_BLOB_BYTES ? IH_ERR_BLOB_SHORT : IH_ERR_BLOB_LONG;
+    if (size != bytes) {
+        return size < bytes ? IH_ERR_BLOB_SHORT : IH_ERR_BLOB_LONG;
     }
-    return ih_rig_blob_crc32(blob, AT_CRC) == get_u32(&blob[AT_CRC]) ? IH_OK : IH_ERR_BLOB_CRC;
+    const size_t at_crc = bytes - WORD_BYTES;
+    return ih_rig_blob_crc32(blob, at_crc) == get_u32(&blob[at_crc]) ? IH_OK : IH_ERR_BLOB_CRC;
 }
 
 /* Of a blob in which nothing else is wrong. */
@@ -95,7 +101,7 @@ static enum ih_err check_fields(const uint8_t *blob)
     if (kind != IH_RIG_DOTS && kind != IH_RIG_RANGE) {
         return IH_ERR_BLOB_FIELD;
     }
-    for (int at = AT_PROJECTOR; at < AT_CRC && kind == IH_RIG_RANGE; at++) {
+    for (int at = AT_PROJECTOR; at < AT_UP && kind == IH_RIG_RANGE; at++) {
         if (blob[at] != 0) {
             return IH_ERR_BLOB_FIELD;
         }
@@ -125,6 +131,10 @@ enum ih_err ih_rig_blob_decode(const uint8_t *blob, size_t size, struct ih_calib
     for (int i = 0; i < AXES * IH_SLOTS; i++) {
         c->ray_q30[i / AXES][i % AXES] = get_s32(&blob[AT_RAYS + WORD_BYTES * i]);
     }
+    const bool has_up = size == IH_RIG_BLOB_BYTES;
+    for (int axis = 0; axis < AXES; axis++) {
+        c->up_q30[axis] = has_up ? get_s32(&blob[AT_UP + WORD_BYTES * axis]) : level_q30[axis];
+    }
     return IH_OK;
 }
 
@@ -147,6 +157,9 @@ enum ih_err ih_rig_blob_encode(const struct ih_calibration *calibration,
     }
     for (int i = 0; i < AXES * IH_SLOTS; i++) {
         put_s32(&blob[AT_RAYS + WORD_BYTES * i], c->ray_q30[i / AXES][i % AXES]);
+    }
+    for (int axis = 0; axis < AXES; axis++) {
+        put_s32(&blob[AT_UP + WORD_BYTES * axis], c->up_q30[axis]);
     }
     put_u32(&blob[AT_CRC], ih_rig_blob_crc32(blob, AT_CRC));
     return check_fields(blob);

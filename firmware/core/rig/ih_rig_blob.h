@@ -16,9 +16,11 @@
  *                    of struct ih_calibration
  *       68      12   origin x y z
  *       80    4332   ray x y z of slot 0, 1, .. 360
- *     4412       4   CRC-32 (IEEE 802.3, as of zlib and PNG) of all bytes before it
+ *     4412      12   up x y z
+ *     4424       4   CRC-32 (IEEE 802.3, as of zlib and PNG) of all bytes before it
  *
- * A range rig has no projector: its origin and rays are 0, so that a rig has one blob and no other.
+ * A range rig has no projector: its origin and rays are 0. A blob of version 1, which is read too, has no up, as its camera
+ * was level: its CRC is at 4412.
  *
  * Error: what is found first, in this order; then the calibration stays as it was.
  *   IH_ERR_BLOB_SHORT    fewer than 12 bytes
@@ -42,8 +44,9 @@
 #include "base/ih_types.h"
 #include "rig/ih_rig.h"
 
-#define IH_RIG_BLOB_VERSION 1
-#define IH_RIG_BLOB_BYTES (4 * (4 + 16 + 3 * IH_SLOTS + 1))
+#define IH_RIG_BLOB_VERSION 2
+#define IH_RIG_BLOB_BYTES (4 * (4 + 16 + 3 * IH_SLOTS + 3 + 1))
+#define IH_RIG_BLOB_1_BYTES (IH_RIG_BLOB_BYTES - 12) /* of version 1 */
 
 IH_BEGIN_DECLS
 

@@ -5,7 +5,7 @@
 #include "base/ih_fix.h"
 #include "base/ih_range.h"
 #include "points/ih_near_depth.h"
-#include "rig/ih_camera.h"
+#include "rig/ih_level.h"
 
 #define ISOLATED_NEIGHBOURS_MIN 3
 #define ISOLATED_FRIENDS_MAX 1
@@ -119,8 +119,7 @@ static bool is_visible_at(const struct ih_rig *rig, const struct ih_dots *dots, 
                           int32_t y_q28)
 {
     int32_t u, v;
-    ih_camera_distort(rig, x_q28, y_q28, &u, &v);
-    return ih_camera_sees(rig, u, v) &&
+    return ih_level_sees(rig, x_q28, y_q28, &u, &v) &&
            (dots == NULL || !ih_dots_is_bright(dots, u >> 12, v >> 12));
 }
 
@@ -138,7 +137,7 @@ static void fill_missing(const struct ih_points *points, const struct ih_dots *d
     int32_t x_q28 = point->x_q28;
     int32_t y_q28 = point->y_q28;
     if (rig->calibration.kind == IH_RIG_DOTS) {
-        ih_rig_dot_at(rig, slot, depth_q8, &x_q28, &y_q28);
+        ih_level_dot_at(rig, slot, depth_q8, &x_q28, &y_q28);
     }
     if (is_visible_at(rig, dots, x_q28, y_q28)) {
         add_sample(out, &points->field, x_q28, y_q28,

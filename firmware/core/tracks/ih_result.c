@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "nests/ih_nests.h"
+#include "rig/ih_level.h"
 
 _Static_assert(IH_RESULT_MAX >= IH_NESTS_MAX, "every nest must find room");
 
@@ -12,7 +13,8 @@ void ih_result_clear(struct ih_result *out)
     out->selected = IH_NONE;
 }
 
-void ih_result_from_hypotheses(const struct ih_hypotheses *hypotheses, struct ih_result *out)
+void ih_result_from_hypotheses(const struct ih_hypotheses *hypotheses, const struct ih_rig *rig,
+                               struct ih_result *out)
 {
     ih_result_clear(out);
     for (int32_t i = 0; i < hypotheses->hypothesis_count; i++) {
@@ -27,6 +29,7 @@ void ih_result_from_hypotheses(const struct ih_hypotheses *hypotheses, struct ih
             .centre_mm_q8 = {h->centre_mm_q8[0], h->centre_mm_q8[1], h->centre_mm_q8[2]},
             .rejected = h->rejected,
         };
+        ih_level_point_back(rig, out->entry[i].centre_mm_q8);
     }
     for (int32_t i = 0; i < hypotheses->head_count; i++) {
         out->head[out->head_count++] = hypotheses->head[i];
@@ -35,7 +38,8 @@ void ih_result_from_hypotheses(const struct ih_hypotheses *hypotheses, struct ih
 }
 
 void ih_result_from_tracks(const struct ih_detections *detections, const struct ih_tracks *tracks,
-                           const struct ih_predicted *predicted, struct ih_result *out)
+                           const struct ih_predicted *predicted, const struct ih_rig *rig,
+                           struct ih_result *out)
 {
     ih_result_clear(out);
     out->entry_count = detections->detection_count + predicted->count;
@@ -59,6 +63,7 @@ void ih_result_from_tracks(const struct ih_detections *detections, const struct 
             .sigma_mm_q8 = verdict.sigma_mm_q8,
             .is_predicted = i >= detections->detection_count,
         };
+        ih_level_point_back(rig, out->entry[i].centre_mm_q8);
     }
     for (int32_t i = 0; i < tracks->head_count; i++) {
         out->head[out->head_count++] = tracks->head[i];

@@ -2,7 +2,7 @@
  * selected.
  *
  * In:    either the nests' hypotheses (the paper's method alone), or detections and the tracks'
- *        verdicts.
+ *        verdicts; the rig, as they are in the level frame.
  * Out:   one list in one form. Rejected hypotheses stay in it with the reason.
  * With the paper's method alone no head is selected where several are accepted.
  */
@@ -15,6 +15,7 @@
 #include "base/ih_config.h"
 #include "detect/ih_detections.h"
 #include "nests/ih_hypotheses.h"
+#include "rig/ih_rig.h"
 #include "tracks/ih_tracks.h"
 
 #define IH_RESULT_MAX (IH_DETECTIONS_MAX + IH_TRACKS_MAX)
@@ -48,10 +49,12 @@ IH_BEGIN_DECLS
 /* Nothing. */
 void ih_result_clear(struct ih_result *out);
 
-void ih_result_from_hypotheses(const struct ih_hypotheses *hypotheses, struct ih_result *out);
+void ih_result_from_hypotheses(const struct ih_hypotheses *hypotheses, const struct ih_rig *rig,
+                               struct ih_result *out);
 
 void ih_result_from_tracks(const struct ih_detections *detections, const struct ih_tracks *tracks,
-                           const struct ih_predicted *predicted, struct ih_result *out);
+                           const struct ih_predicted *predicted, const struct ih_rig *rig,
+                           struct ih_result *out);
 
 IH_END_DECLS
 

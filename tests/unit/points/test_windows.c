@@ -402,7 +402,7 @@ static void sink(const struct ih_windows_place *place, double x_mm, double y_mm,
         const double x = (i % 160 - place->column) * 5, y = (i / 160 - place->row) * 5;
 
         if (hypot(x / x_mm, y / y_mm) < 1) {
-            guarded.scratch.depth_mm[i] = (uint16_t)(behind_mm == HOLE ? 0 : PLACE_MM + behind_mm);
+            guarded.scratch.depth_mm[i] = (int16_t)(behind_mm == HOLE ? 0 : PLACE_MM + behind_mm);
         }
     }
 }
@@ -417,7 +417,7 @@ static int32_t score_of_regions(int32_t column, int32_t row, int32_t inside_mm, 
     sink(&place, 1e6, 1e6, around_mm);
     for (i = 0; i < 160 * 120; i++) {
         if ((i / 160 - row) * 5 > 100) {
-            guarded.scratch.depth_mm[i] = (uint16_t)(below_mm == HOLE ? 0 : PLACE_MM + below_mm);
+            guarded.scratch.depth_mm[i] = (int16_t)(below_mm == HOLE ? 0 : PLACE_MM + below_mm);
         }
     }
     sink(&place, 70, 95, inside_mm);
@@ -485,7 +485,7 @@ static void heads_bulge(void)
 }
 
 /* Depth of the cell that is nearest to so many mm from the place. */
-static uint16_t *cell_at(const struct ih_windows_place *place, int32_t x_mm, int32_t y_mm)
+static int16_t *cell_at(const struct ih_windows_place *place, int32_t x_mm, int32_t y_mm)
 {
     const int32_t column = place->column + (int32_t)floor(x_mm / 5.0 + 0.5);
     const int32_t row = place->row + (int32_t)floor(y_mm / 5.0 + 0.5);
@@ -640,7 +640,7 @@ static void a_plane_goes_on_below_where_two_thirds_are_on_it(void)
                 /* The largest depth within 40 mm of 600, or the smallest beyond it. */
                 const int32_t depth = i < on ? PLACE_MM + 40 : PLACE_MM + 41;
 
-                *cell_at(&place, below_mm[i][0], below_mm[i][1]) = (uint16_t)(i < seen ? depth : 0);
+                *cell_at(&place, below_mm[i][0], below_mm[i][1]) = (int16_t)(i < seen ? depth : 0);
             }
             IH_TEST_EQUAL(seen >= 2 && 3 * on >= 2 * seen,
                           ih_windows_stands_on_plane(&guarded.scratch, &rig, &place), "seen, on it",

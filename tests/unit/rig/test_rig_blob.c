@@ -105,8 +105,8 @@ static void fields_stand_where_the_header_says(void)
         int field;
 
         IH_TEST_EQUAL(IH_OK, ih_rig_blob_encode(c, blob), "encode", i);
-        TEST_ASSERT_EQUAL_MEMORY("IHRB\x01\0\0\0", blob, 8);
-        IH_TEST_EQUAL(4416, word_at(blob, 8), "length", i);
+        TEST_ASSERT_EQUAL_MEMORY("IHRB\x02\0\0\0", blob, 8);
+        IH_TEST_EQUAL(4428, word_at(blob, 8), "length", i);
         IH_TEST_EQUAL(c->kind == IH_RIG_RANGE, word_at(blob, 12), "kind", i);
         for (field = 0; field < IH_TEST_COUNT(camera); field++) {
             IH_TEST_EQUAL(camera[field], signed_at(blob, 16 + 4 * field), "camera", field);
@@ -120,7 +120,10 @@ static void fields_stand_where_the_header_says(void)
                               "ray", slot);
             }
         }
-        IH_TEST_EQUAL(ih_rig_blob_crc32(blob, 4412), word_at(blob, 4412), "CRC", i);
+        for (axis = 0; axis < 3; axis++) {
+            IH_TEST_EQUAL(c->up_q30[axis], signed_at(blob, 4412 + 4 * axis), "up", axis);
+        }
+        IH_TEST_EQUAL(ih_rig_blob_crc32(blob, 4424), word_at(blob, 4424), "CRC", i);
     }
 }
 
@@ -143,8 +146,10 @@ static void random_numbers_come_back(void)
         for (i = 0; i < IH_TEST_COUNT(head); i++) {
             *head[i] = (int32_t)ih_test_between(&random, INT32_MIN, INT32_MAX);
         }
-        for (i = 0; i < 3 + 3 * IH_SLOTS; i++) {
-            int32_t *const at = i < 3 ? &made.origin_mm_q16[i] : &made.ray_q30[i / 3 - 1][i % 3];
+        for (i = 0; i < 6 + 3 * IH_SLOTS; i++) {
+            int32_t *const at = i < 3   ? &made.origin_mm_q16[i]
+                                : i < 6 ? &made.up_q30[i - 3]
+                                        : &made.ray_q30[i / 3 - 2][i % 3];
 
             *at = (int32_t)ih_test_between(&random, INT32_MIN, INT32_MAX);
         }
@@ -236,7 +241,8 @@ static void other_headers_are_refused(void)
     } other[] = {{0, 0x31474849, IH_ERR_BLOB_MAGIC},
                  {0, 0x42524849 ^ 0x20, IH_ERR_BLOB_MAGIC},
                  {4, 0, IH_ERR_BLOB_VERSION},
-                 {4, 2, IH_ERR_BLOB_VERSION},
+                 {4, 1, IH_ERR_BLOB_LENGTH},
+                 {4, 3, IH_ERR_BLOB_VERSION},
                  {4, 0x01000000, IH_ERR_BLOB_VERSION},
                  {8, IH_RIG_BLOB_BYTES - 4, IH_ERR_BLOB_LENGTH},
                  {8, IH_RIG_BLOB_BYTES + 4, IH_ERR_BLOB_LENGTH},
@@ -272,12 +278,39 @@ static void a_range_rig_has_no_projector(void)
     IH_TEST_EQUAL(IH_OK, decode(blob, sizeof blob), "without one", 0);
     TEST_ASSERT_EQUAL_MEMORY(&range, &calibration, sizeof range);
     memset(&calibration, IH_TEST_FILL, sizeof calibration);
-    for (at = 68; at < AT_CRC; at++) {
+    for (at = 68; at < 4412; at++) {
         blob[at] = 1;
         seal(blob);
         IH_TEST_EQUAL(IH_ERR_BLOB_FIELD, decode(blob, sizeof blob), "offset", at);
         blob[at] = 0;
     }
+}
+
+/* Of boards that knew nothing of up. */
+static void version_1_is_a_level_camera(void)
+{
+    static struct ih_calibration level;
+    size_t size;
+
+    level = vector_rigs[1];
+    IH_TEST_EQUAL(IH_OK, ih_rig_blob_encode(&level, blob), "encode", 1);
+    set_word(blob, 4, 1);
+    set_word(blob, 8, IH_RIG_BLOB_1_BYTES);
+    set_word(blob, 4412, ih_rig_blob_crc32(blob, 4412));
+    for (size = 0; size < IH_RIG_BLOB_1_BYTES; size++) {
+        refused(IH_ERR_BLOB_SHORT, blob, size, "size", (int64_t)size);
+    }
+    refused(IH_ERR_BLOB_LONG, blob, IH_RIG_BLOB_1_BYTES + 1, "size", IH_RIG_BLOB_1_BYTES + 1);
+    refused(IH_ERR_BLOB_LONG, blob, IH_RIG_BLOB_BYTES, "size", IH_RIG_BLOB_BYTES);
+    IH_TEST_EQUAL(IH_OK, decode(blob, IH_RIG_BLOB_1_BYTES), "decode", 1);
+    level.up_q30[1] = -(1 << 30);
+    TEST_ASSERT_EQUAL_MEMORY(&level, &calibration, sizeof level);
+    memset(&calibration, IH_TEST_FILL, sizeof calibration);
+    blob[4411] ^= 1;
+    refused(IH_ERR_BLOB_CRC, blob, IH_RIG_BLOB_1_BYTES, "changed", 4411);
+    blob[4411] ^= 1;
+    set_word(blob, 8, IH_RIG_BLOB_BYTES);
+    refused(IH_ERR_BLOB_LENGTH, blob, IH_RIG_BLOB_1_BYTES, "length of version 2", 1);
 }
 
 static void kinds_that_do_not_exist_have_no_blob(void)
@@ -304,7 +337,8 @@ static void wrong_numbers_are_the_rigs_business(void)
                  {60, 0, IH_ERR_RANGE},
                  {64, 0x7fffffff, IH_ERR_RANGE},
                  {68, 0x80000000, IH_ERR_BASELINE},
-                 {88, 0, IH_ERR_RAY}};
+                 {88, 0, IH_ERR_RAY},
+                 {4416, 5, IH_ERR_UP}};
     int32_t bad_slot = 0;
     int i;
 
@@ -329,6 +363,7 @@ int main(void)
     RUN_TEST(bytes_after_the_end_are_refused);
     RUN_TEST(other_headers_are_refused);
     RUN_TEST(a_range_rig_has_no_projector);
+    RUN_TEST(version_1_is_a_level_camera);
     RUN_TEST(kinds_that_do_not_exist_have_no_blob);
     RUN_TEST(wrong_numbers_are_the_rigs_business);
     return UNITY_END();

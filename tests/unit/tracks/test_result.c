@@ -3,6 +3,7 @@
 #include "detect/ih_detections.h"
 #include "nests/ih_hypotheses.h"
 #include "nests/ih_nests.h"
+#include "rig/ih_rig.h"
 #include "tracks/ih_result.h"
 #include "tracks/ih_tracks.h"
 
@@ -13,12 +14,15 @@ static struct ih_detections detections;
 static struct ih_tracks tracks;
 static struct ih_predicted predicted;
 static struct ih_result result;
+static struct ih_rig rig;
 
 void setUp(void)
 {
     memset(&hypotheses, 0, sizeof hypotheses);
     memset(&detections, 0, sizeof detections);
     memset(&predicted, 0, sizeof predicted);
+    memset(&rig, 0, sizeof rig);
+    rig.is_level = true;
     ih_tracks_init(&tracks);
     memset(&result, IH_TEST_FILL, sizeof result);
 }
@@ -34,11 +38,11 @@ static void empty_lists_give_an_empty_result(void)
     TEST_ASSERT_EQUAL_INT32(0, result.head_count);
     TEST_ASSERT_EQUAL_INT32(IH_NONE, result.selected);
     memset(&result, IH_TEST_FILL, sizeof result);
-    ih_result_from_hypotheses(&hypotheses, &result);
+    ih_result_from_hypotheses(&hypotheses, &rig, &result);
     TEST_ASSERT_EQUAL_INT32(0, result.entry_count);
     TEST_ASSERT_EQUAL_INT32(IH_NONE, result.selected);
     memset(&result, IH_TEST_FILL, sizeof result);
-    ih_result_from_tracks(&detections, &tracks, &predicted, &result);
+    ih_result_from_tracks(&detections, &tracks, &predicted, &rig, &result);
     TEST_ASSERT_EQUAL_INT32(0, result.entry_count);
     TEST_ASSERT_EQUAL_INT32(IH_NONE, result.selected);
 }
@@ -63,7 +67,7 @@ static void nests_come_through_without_what_tracks_add(void)
     hypotheses.hypothesis[3].rejected = IH_ACCEPTED;
     hypotheses.head_count = 1;
     hypotheses.head[0] = 3;
-    ih_result_from_hypotheses(&hypotheses, &result);
+    ih_result_from_hypotheses(&hypotheses, &rig, &result);
     TEST_ASSERT_EQUAL_INT32(IH_NESTS_MAX, result.entry_count);
     for (i = 0; i < IH_NESTS_MAX; i++) {
         const struct ih_result_entry *entry = &result.entry[i];
@@ -83,7 +87,7 @@ static void nests_come_through_without_what_tracks_add(void)
     TEST_ASSERT_EQUAL_INT32(3, result.selected);
     hypotheses.head_count = 2;
     hypotheses.head[1] = 5;
-    ih_result_from_hypotheses(&hypotheses, &result);
+    ih_result_from_hypotheses(&hypotheses, &rig, &result);
     TEST_ASSERT_EQUAL_INT32(2, result.head_count);
     TEST_ASSERT_EQUAL_INT32(5, result.head[1]);
     TEST_ASSERT_EQUAL_INT32(IH_NONE, result.selected);
@@ -146,7 +150,7 @@ static void full_tables_come_through(void)
     for (pass = 0; pass < 2; pass++) {
         setUp();
         fill(pass == 1);
-        ih_result_from_tracks(&detections, &tracks, &predicted, &result);
+        ih_result_from_tracks(&detections, &tracks, &predicted, &rig, &result);
         TEST_ASSERT_EQUAL_INT32(pass == 1 ? IH_RESULT_MAX : IH_DETECTIONS_MAX, result.entry_count);
         for (i = 0; i < result.entry_count; i++) {
             const struct ih_result_entry *entry = &result.entry[i];
@@ -172,11 +176,36 @@ static void full_tables_come_through(void)
     }
 }
 
+/* Lists are in the level frame, the result in the camera's, here one that hangs upside down. */
+static void centres_are_rotated_back(void)
+{
+    int i;
+
+    rig.is_level = false;
+    rig.level_back_q30[0][0] = rig.level_back_q30[1][1] = -(1 << 30);
+    rig.level_back_q30[2][2] = 1 << 30;
+    fill(true);
+    ih_result_from_tracks(&detections, &tracks, &predicted, &rig, &result);
+    for (i = 0; i < result.entry_count; i++) {
+        const int32_t *level = ih_tracks_head(&detections, &predicted, i)->head.centre_mm_q8;
+
+        IH_TEST_EQUAL(-level[0], result.entry[i].centre_mm_q8[0], "x", i);
+        IH_TEST_EQUAL(-level[1], result.entry[i].centre_mm_q8[1], "y", i);
+        IH_TEST_EQUAL(level[2], result.entry[i].centre_mm_q8[2], "z", i);
+        IH_TEST_EQUAL(100 + i, result.entry[i].u_px_q12, "u", i);
+    }
+    hypotheses.hypothesis_count = 1;
+    hypotheses.hypothesis[0].centre_mm_q8[0] = 77;
+    ih_result_from_hypotheses(&hypotheses, &rig, &result);
+    TEST_ASSERT_EQUAL_INT32(-77, result.entry[0].centre_mm_q8[0]);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(empty_lists_give_an_empty_result);
     RUN_TEST(nests_come_through_without_what_tracks_add);
     RUN_TEST(full_tables_come_through);
+    RUN_TEST(centres_are_rotated_back);
     return UNITY_END();
 }
