@@ -188,8 +188,9 @@ void sim_page_lost(struct sim_page *page, const struct app_record *record)
     page->frame_count++;
 }
 
-static void write_camera(struct app_write *write, const struct ih_calibration *c)
+static void write_camera(struct app_write *write, const struct ih_rig *rig)
 {
+    const struct ih_calibration *c = &rig->calibration;
     app_write_key(write, "camera");
     app_write_open(write, '{');
     app_write_int_field(write, "width", c->width);
@@ -203,6 +204,14 @@ static void write_camera(struct app_write *write, const struct ih_calibration *c
     app_write_int_field(write, "p1_q24", c->p1_q24);
     app_write_int_field(write, "p2_q24", c->p2_q24);
     app_write_int_field(write, "k3_q24", c->k3_q24);
+    if (!rig->is_level) {
+        app_write_key(write, "level_q30");
+        app_write_open(write, '[');
+        for (int i = 0; i < 9; i++) {
+            app_write_int(write, rig->level_q30[i / 3][i % 3]);
+        }
+        app_write_close(write, ']');
+    }
     app_write_close(write, '}');
 }
 
@@ -310,7 +319,7 @@ void sim_page_dir(struct sim_page *page, const struct sim_dir *dir, const char *
     app_write_bool(&write, rig->kind == IH_RIG_RANGE);
     app_write_key(&write, "paper");
     app_write_bool(&write, head->params.is_paper);
-    write_camera(&write, rig);
+    write_camera(&write, &head->rig);
     write_limits(&write, &head->params.tracks);
     app_write_close(&write, '}');
     end(page);

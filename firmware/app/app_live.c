@@ -3,7 +3,7 @@
 #include <string.h>
 
 #include "app_write.h"
-#include "rig/ih_camera.h"
+#include "rig/ih_level.h"
 
 #define PIXEL_DECIMALS 2
 /* Every third contour level of the core is drawn: 30 mm apart they can be distinguished. */
@@ -83,9 +83,9 @@ static void write_vertex(struct app_write *write, const struct isohead *head,
 {
     const struct ih_field *field = &head->surface.field;
     int32_t u_px_q12 = 0, v_px_q12 = 0;
-    ih_camera_distort(&head->rig, slope_q28(field->centre_x_q28, field->unit_q28, vertex->x_q9),
-                      slope_q28(field->centre_y_q28, field->unit_q28, vertex->y_q9), &u_px_q12,
-                      &v_px_q12);
+    (void)ih_level_sees(&head->rig, slope_q28(field->centre_x_q28, field->unit_q28, vertex->x_q9),
+                        slope_q28(field->centre_y_q28, field->unit_q28, vertex->y_q9), &u_px_q12,
+                        &v_px_q12);
     app_write_decimal(write, app_text_fixed(u_px_q12, 12, 0));
     app_write_decimal(write, app_text_fixed(v_px_q12, 12, 0));
 }

@@ -88,6 +88,23 @@ const Data = (() => {
     return [(camera.fx_px_q16 * xd + camera.cx_px_q16) / q16, (camera.fy_px_q16 * yd + camera.cy_px_q16) / q16];
   }
 
+  /* Where the camera does not hang level, what looks for heads works in a frame that does (ih_level.h): a vector to it, and
+   * back. */
+  function toLevel(camera, v) {
+    const m = camera.level_q30;
+    return m ? [0, 3, 6].map((i) => (m[i] * v[0] + m[i + 1] * v[1] + m[i + 2] * v[2]) / (1 << 30)) : v;
+  }
+  function fromLevel(camera, v) {
+    const m = camera.level_q30;
+    return m ? [0, 1, 2].map((i) => (m[i] * v[0] + m[i + 3] * v[1] + m[i + 6] * v[2]) / (1 << 30)) : v;
+  }
+
+  /* A position on the grid to pixels. */
+  function gridPixel(camera, field, x, y) {
+    const [u, v, depth] = fromLevel(camera, [...fromGrid(field, x, y), 1]);
+    return toPixel(camera, u / depth, v / depth);
+  }
+
   /* A position on the grid, in steps, to normalised coordinates. */
   function fromGrid(field, x, y) {
     const q28 = 1 << 28, unit = field.unit_q28 * STEP, middle = (NODES - 1) / 2;
@@ -134,5 +151,5 @@ const Data = (() => {
     return a && b ? apartMm(a.centre_mm, b.centre_mm) > MATCH_MM : Boolean(a) !== Boolean(b);
   }
 
-  return { run, others, apartMm, otherRight, differs, dirs, rows, frames, load, toPixel, fromGrid, depthRange, depthColour, cssColour, state, truthMm, NODES, STOPS };
+  return { run, others, apartMm, otherRight, differs, dirs, rows, frames, load, toPixel, toLevel, fromGrid, gridPixel, depthRange, depthColour, cssColour, state, truthMm, NODES, STOPS };
 })();

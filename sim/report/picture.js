@@ -57,7 +57,7 @@ const Picture = (() => {
       for (const contour of cut.contour) {
         context.beginPath();
         for (const [x, y] of contour.x_y_q9) {
-          context.lineTo(...Data.toPixel(camera, ...Data.fromGrid(trace.surface.field, x / 512, y / 512)));
+          context.lineTo(...Data.gridPixel(camera, trace.surface.field, x / 512, y / 512));
         }
         if (contour.closed) context.closePath();
         context.stroke();
@@ -76,7 +76,7 @@ const Picture = (() => {
       const t = i / 48 * 2 * Math.PI, c = a * Math.cos(t), s = b * Math.sin(t);
       const x = slice.x_q16 / 65536 + c * Math.cos(angle) - s * Math.sin(angle);
       const y = slice.y_q16 / 65536 + c * Math.sin(angle) + s * Math.cos(angle);
-      context.lineTo(...Data.toPixel(camera, ...Data.fromGrid(field, x, y)));
+      context.lineTo(...Data.gridPixel(camera, field, x, y));
     }
     context.closePath();
     context.stroke();
@@ -145,6 +145,25 @@ const Picture = (() => {
     }
   }
 
+  /* In a corner an arrow to where up is; shorter, the more the camera looks down or up. */
+  function drawUp(context, camera, px) {
+    const m = camera.level_q30, up = [-m[3] / (1 << 30) * 30 * px, -m[4] / (1 << 30) * 30 * px];
+    const at = [45 * px, 45 * px], side = [-up[1] * 0.2, up[0] * 0.2];
+    context.strokeStyle = "#fff";
+    context.lineWidth = 2 * px;
+    context.beginPath();
+    context.moveTo(at[0] - up[0], at[1] - up[1]);
+    context.lineTo(at[0] + up[0], at[1] + up[1]);
+    for (const sign of [-1, 1]) {
+      context.moveTo(at[0] + up[0], at[1] + up[1]);
+      context.lineTo(at[0] + up[0] * 0.6 + sign * side[0], at[1] + up[1] * 0.6 + sign * side[1]);
+    }
+    context.stroke();
+    context.fillStyle = "#fff";
+    context.font = `${12 * px}px sans-serif`;
+    context.fillText("up", at[0] + side[0] * 3, at[1] + side[1] * 3);
+  }
+
   function draw() {
     if (!shown) return;
     const { frame, trace, image } = shown;
@@ -171,6 +190,7 @@ const Picture = (() => {
     if (layers.hypotheses && frame.record.hypotheses) drawHypotheses(context, frame.record, px);
     if (layers.other) drawOther(context, frame, px);
     if (layers.truth) drawTruth(context, frame, camera, px);
+    if (camera.level_q30) drawUp(context, camera, px);
   }
 
   function describe(frame) {

@@ -116,7 +116,7 @@ const Space = (() => {
       if (h.rejected !== null && i !== chosen) return;
       const detection = Data.dirs[frame.dir].paper ? null : trace.findings[i];
       const semi = detection ? detection.semi_mm_q8.map((v) => v / 256) : MEAN_SEMI;
-      group.add(makeEllipsoid(h.centre_mm, semi, h.rejected === null ? 0x00c98d : 0xff9d2e));
+      group.add(makeEllipsoid(Data.toLevel(Data.dirs[frame.dir].camera, h.centre_mm), semi, h.rejected === null ? 0x00c98d : 0xff9d2e));
     });
     return group;
   }
@@ -124,7 +124,7 @@ const Space = (() => {
   function makeTruth(frame) {
     const group = new THREE.Group(), mm = Data.truthMm(frame);
     if (!mm) return group;
-    const at = place(...mm), positions = [];
+    const at = place(...Data.toLevel(Data.dirs[frame.dir].camera, mm)), positions = [];
     for (let axis = 0; axis < 3; axis++) {
       for (const sign of [-1, 1]) positions.push(...at.map((v, k) => (k === axis ? v + sign * 130 : v)));
     }
@@ -157,14 +157,17 @@ const Space = (() => {
     const group = new THREE.Group(), target = focus, c = Data.dirs[frame.dir].camera;
     const corner = [target.x, -target.y, -target.z].map((v, k) => v + CORNER_MM[k]);
     AXES.forEach(([name, hex, css], axis) => {
-      const along = (mm, aside = 0) => place(...corner.map((v, k) => v + (k === axis ? mm : k === (axis + 1) % 3 ? aside : 0)));
+      const along = (mm, aside = 0) => {
+        const step = Data.toLevel(c, [0, 1, 2].map((k) => k === axis ? mm : k === (axis + 1) % 3 ? aside : 0));
+        return place(...corner.map((v, k) => v + step[k]));
+      };
       const positions = [...along(0), ...along(AXIS_MM)];
       for (const tick of [AXIS_MM / 2, AXIS_MM]) positions.push(...along(tick, -TICK_MM), ...along(tick, TICK_MM));
       group.add(new THREE.LineSegments(geometryOf(positions), new THREE.LineBasicMaterial({ color: hex, depthTest: false, transparent: true })));
       group.add(makeWord(axis === 0 ? `x ${AXIS_MM} mm` : name, along(AXIS_MM + (axis === 0 ? 100 : 35)), css));
     });
     const far = -target.z, edge = [[0, 0], [c.width, 0], [c.width, c.height], [0, c.height]].map(([u, v]) =>
-      place((u - c.cx_px_q16 / 65536) / (c.fx_px_q16 / 65536) * far, (v - c.cy_px_q16 / 65536) / (c.fy_px_q16 / 65536) * far, far));
+      place(...Data.toLevel(c, [(u - c.cx_px_q16 / 65536) / (c.fx_px_q16 / 65536) * far, (v - c.cy_px_q16 / 65536) / (c.fy_px_q16 / 65536) * far, far])));
     const positions = edge.flatMap((at, i) => [0, 0, 0, ...at, ...at, ...edge[(i + 1) % 4]]);
     group.add(new THREE.LineSegments(geometryOf(positions), new THREE.LineBasicMaterial({ color: 0xb9bec8, transparent: true, opacity: 0.5 })));
     group.add(makeWord("camera", [0, 45, 0], "#dfe3ea"));

@@ -3,7 +3,7 @@
  * In:    up of the calibration, a unit vector of the camera frame; all 0 is level, as (0, -1, 0).
  * Out:   a rotation from the camera frame to the level frame. What looks for heads works in that frame, from points to
  *        tracks; dots, alignment and labels know nothing of it. Results are turned back.
- * Method: the roll is taken out wholly, the tilt up to IH_LEVEL_TILT_DEG: slopes are tangents, and grow without bound
+ * Method: the roll is taken out wholly, the tilt up to 45 degrees: slopes are tangents, and grow without bound
  *        with it. What is seen at a slope of IH_RIG_TAN_MAX or more in the level frame is out of view there. A level
  *        camera's rotation is none: every coordinate stays as it is.
  * Cost:  nothing for a level camera; else nine products and two divisions a point.
