@@ -23,8 +23,9 @@ MARK = ".isohead-site"  # in a folder that may be replaced
 # What stands at the left, in this order; experiments are below their own page.
 MENU = (
     ("", (("README.md", "Overview"), ("report.html", "A run, frame by frame"))),
-    ("Use", (("docs/report.md", "Report page"), ("docs/depth_camera.md", "Your depth camera, films"), ("docs/calibration.md", "Calibration"),
-             ("docs/contract.md", "Files and output"), ("docs/view.md", "Pictures and films"), ("docs/export.md", "Foxglove, CSV"))),
+    ("Use", (("docs/report.md", "Report page"), ("docs/depth_camera.md", "Your depth camera, films"), ("python/README.md", "From Python"),
+             ("docs/calibration.md", "Calibration"),
+             ("docs/contract.md", "Files and output"), ("docs/view.md", "Pictures and films"), ("docs/export.md", "Foxglove, CSV"), ("docs/ros2.md", "UDP, ROS 2"))),
     ("On a board", (("docs/hardware.md", "Hardware"), ("docs/live.md", "Live view"), ("docs/health.md", "Does the rig fit?"), ("docs/safety.md", "The laser"))),
     ("Inside", (("docs/design.md", "Design"), ("docs/experiments/README.md", "Experiments"), ("docs/performance.md", "Performance"),
                 ("docs/porting.md", "Porting"), ("docs/numerics.md", "Number formats"), ("docs/simd.md", "Vectors"), ("docs/trust.md", "What is promised"),
