@@ -62,61 +62,65 @@ static const char *kind_text(int kind)
     }
 }
 
-/* The header; leaves at what is not taken. */
-static void read_shape(struct reader *reader)
+/* The header. False, also after a jump: *error says why. */
+static bool read_shape(struct reader *reader)
 {
     struct hal_png *image = reader->image;
-    png_read_info(reader->png, reader->info);
-    const int kind = png_get_color_type(reader->png, reader->info);
-    const int bits = png_get_bit_depth(reader->png, reader->info);
-    if (kind != PNG_COLOR_TYPE_GRAY || (bits != BYTE_BITS && bits != WORD_BITS)) {
-        hal_fail(
-            reader->error,
-            "%s of %d bits, expected grey of 8 or 16: ffmpeg -i this.png -pix_fmt gray new.png "
-            "(gray16be for 16)",
-            kind_text(kind), bits);
-        reader->is_explained = true;
-        png_error(reader->png, "kind");
-    }
-    image->width = (int32_t)png_get_image_width(reader->png, reader->info);
-    image->height = (int32_t)png_get_image_height(reader->png, reader->info);
-    image->bytes_per_sample = bits / BYTE_BITS;
-    image->maximum = bits == BYTE_BITS ? UINT8_MAX : UINT16_MAX;
-}
-
-static void read_samples(struct reader *reader)
-{
-    static const uint16_t one = 1;
-    struct hal_png *image = reader->image;
-    const size_t row_bytes = (size_t)image->width * (size_t)image->bytes_per_sample;
-    if (image->bytes_per_sample == 2 && *(const uint8_t *)(const void *)&one == 1) {
-        png_set_swap(reader->png);
-    }
-    (void)png_set_interlace_handling(reader->png);
-    png_read_update_info(reader->png, reader->info);
-    image->samples = malloc(row_bytes * (size_t)image->height);
-    reader->row = malloc((size_t)image->height * sizeof *reader->row);
-    if (image->samples == NULL || reader->row == NULL ||
-        png_get_rowbytes(reader->png, reader->info) != row_bytes) {
-        png_error(reader->png, "no memory for the samples");
-    }
-    for (int32_t v = 0; v < image->height; v++) {
-        reader->row[v] = image->samples + (size_t)v * row_bytes;
-    }
-    png_read_image(reader->png, reader->row);
-    png_read_end(reader->png, NULL);
-}
-
-/* False after a jump. */
-static bool read_file(struct reader *reader)
-{
     if (setjmp(png_jmpbuf(reader->png)) != 0) {
         return false;
     }
     png_set_read_fn(reader->png, reader, take_bytes);
     png_set_user_limits(reader->png, HAL_PNG_SIDE_MAX, HAL_PNG_SIDE_MAX);
-    read_shape(reader);
-    read_samples(reader);
+    png_read_info(reader->png, reader->info);
+    const int kind = png_get_color_type(reader->png, reader->info);
+    const int bits = png_get_bit_depth(reader->png, reader->info);
+    if (kind != PNG_COLOR_TYPE_GRAY || (bits != BYTE_BITS && bits != WORD_BITS)) {
+        return hal_fail(reader->error,
+                        "%s of %d bits, expected grey of 8 or 16: ffmpeg -i this.png -pix_fmt gray "
+                        "new.png (gray16be for 16)",
+                        kind_text(kind), bits);
+    }
+    image->width = (int32_t)png_get_image_width(reader->png, reader->info);
+    image->height = (int32_t)png_get_image_height(reader->png, reader->info);
+    image->bytes_per_sample = bits / BYTE_BITS;
+    image->maximum = bits == BYTE_BITS ? UINT8_MAX : UINT16_MAX;
+    return true;
+}
+
+static bool reserve(struct reader *reader)
+{
+    struct hal_png *image = reader->image;
+    const size_t row_bytes = (size_t)image->width * (size_t)image->bytes_per_sample;
+    uint8_t *samples = malloc(row_bytes * (size_t)image->height);
+    png_bytep *row = malloc((size_t)image->height * sizeof *row);
+    if (samples == NULL || row == NULL) {
+        free(samples);
+        free(row);
+        return hal_fail(reader->error, "no memory for %dx%d samples", (int)image->width,
+                        (int)image->height);
+    }
+    for (int32_t v = 0; v < image->height; v++) {
+        row[v] = samples + (size_t)v * row_bytes;
+    }
+    image->samples = samples;
+    reader->row = row;
+    return true;
+}
+
+/* False after a jump. */
+static bool read_samples(struct reader *reader)
+{
+    static const uint16_t one = 1;
+    if (setjmp(png_jmpbuf(reader->png)) != 0) {
+        return false;
+    }
+    if (*(const uint8_t *)(const void *)&one == 1) {
+        png_set_swap(reader->png); /* of two-byte samples; others stay */
+    }
+    (void)png_set_interlace_handling(reader->png);
+    png_read_update_info(reader->png, reader->info);
+    png_read_image(reader->png, reader->row);
+    png_read_end(reader->png, NULL);
     return true;
 }
 
@@ -133,12 +137,9 @@ bool hal_png_decode(const uint8_t *data, size_t size, struct hal_png *image,
     }
     reader.png = png_create_read_struct(PNG_LIBPNG_VER_STRING, &reader, jump_out, ignore);
     reader.info = reader.png == NULL ? NULL : png_create_info_struct(reader.png);
-    bool good = false;
-    if (reader.info != NULL) {
-        good = read_file(&reader);
-    } else {
-        hal_fail(error, "no memory for libpng");
-    }
+    bool good = reader.info != NULL
+                    ? read_shape(&reader) && reserve(&reader) && read_samples(&reader)
+                    : hal_fail(error, "no memory for libpng");
     png_destroy_read_struct(&reader.png, &reader.info, NULL);
     free(reader.row);
     if (!good) {
