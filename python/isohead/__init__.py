@@ -27,7 +27,9 @@ Pixel = tuple[float, float]
 
 _DROPPED = ("dots", "candidates", "minima", "contours", "places", "findings")
 _SCALE_ONE = 1 << 20
-_RIG_NUMBERS = struct.Struct("<14i")  # of a blob, from its kind on
+# Of a blob (ih_rig_blob.h): from its kind on, and what stands before its CRC.
+_RIG_NUMBERS = struct.Struct("<14i")
+_RIG_UP, _RIG_UP_AT = struct.Struct("<3i"), 4412
 
 
 class Rig(NamedTuple):
@@ -66,6 +68,12 @@ class Rig(NamedTuple):
     def range_mm(self) -> tuple[int, int]:
         """Nearest and farthest Z."""
         return self._numbers()[12:14]  # type: ignore[return-value]
+
+    @property
+    def up(self) -> Vector:
+        """Unit vector of the camera frame that points up; (0, -1, 0) of a level camera."""
+        x, y, z = (number / (1 << 30) for number in _RIG_UP.unpack_from(self.blob, _RIG_UP_AT))
+        return x, y, z
 
     def __repr__(self) -> str:
         return "<isohead.Rig %s %dx%d, %d to %d mm>" % (self.kind, *self.size, *self.range_mm)
@@ -145,15 +153,15 @@ def parse_rig(rig: str | Mapping[str, Any]) -> Rig:
 
 def depth_rig(width: int, height: int, fx: float, fy: float, cx: float, cy: float, *,
               distortion: Sequence[float] = (0, 0, 0, 0, 0), near_mm: float = 400, far_mm: float = 4000,
-              depth_scale: float = 1) -> Rig:
+              depth_scale: float = 1, up: Sequence[float] = (0, -1, 0)) -> Rig:
     """The rig of a depth camera by what its maker's software says of it: focal lengths and principal point in pixels.
 
-    depth_scale: mm per unit of its images.
+    depth_scale: mm per unit of its images. up: the unit vector of the camera frame that points up, where it is not level.
     """
     return parse_rig({
         "kind": "range", "image_width": width, "image_height": height, "near_mm": near_mm, "far_mm": far_mm,
         "depth_scale": depth_scale, "camera_matrix": [[fx, 0, cx], [0, fy, cy], [0, 0, 1]],
-        "distortion_coefficients": list(distortion)})
+        "distortion_coefficients": list(distortion), "up": list(up)})
 
 
 def _rig(raw: tuple[bytes, int]) -> Rig:

@@ -286,6 +286,9 @@ def test_rigs(rig, tmp_path):
     assert isohead.parse_rig(file) == isohead.parse_rig(json.dumps(file)) == rig
     depth_rig = isohead.depth_rig(WIDTH, HEIGHT, FOCAL, FOCAL, (WIDTH - 1) / 2, (HEIGHT - 1) / 2)
     assert depth_rig == isohead.parse_rig(RANGE_RIG) and "range 320x240, 400 to 4000 mm" in repr(depth_rig)
+    up = (0, -np.cos(0.5), -np.sin(0.5))
+    leaning = isohead.depth_rig(WIDTH, HEIGHT, FOCAL, FOCAL, 160, 120, up=up)
+    assert rig.up == depth_rig.up == (0, -1, 0) and np.allclose(leaning.up, up, atol=1e-8)
     # A file is refused with host_sim's words.
     for name, change in (("no_size", {"image_width": None}), ("focal", {"near_mm": 5000, "far_mm": 100}),
                          ("text", {"near_mm": "400"})):
