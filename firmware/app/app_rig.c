@@ -334,7 +334,8 @@ static bool read_up(struct field *field, struct ih_calibration *calibration)
 {
     double up[RAY_AXES] = {0.0, -1.0, 0.0};
     field->name = "up";
-    if (cJSON_GetObjectItemCaseSensitive(field->rig, field->name) != NULL && !read_matrix(field, 1, RAY_AXES, up)) {
+    if (cJSON_GetObjectItemCaseSensitive(field->rig, field->name) != NULL &&
+        !read_matrix(field, 1, RAY_AXES, up)) {
         return false;
     }
     for (int i = 0; i < RAY_AXES; i++) {
