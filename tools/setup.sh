@@ -236,6 +236,7 @@ test-image)
     need_image "${2:-}"
     need_flash
     need_program qemu-system-aarch64 qemu-system-arm
+    [ "${2:-}" != rpi ] || need_program fdtput device-tree-compiler
     [ -e /usr/share/AAVMF/AAVMF_CODE.fd ] || lacks qemu-efi-aarch64
     [ -e /usr/aarch64-linux-gnu/lib/libc.a ] || lacks libc6-dev-arm64-cross
     need_program bzip2 bzip2
