@@ -302,12 +302,12 @@ flash: ## write IMAGE (default isohead.img of BOARD, as for image) to the disk D
 	@tools/setup.sh flash
 	@tools/image/flash.sh "$(DEVICE)" $(or $(IMAGE),$(IMAGE_OUT)/isohead.img)
 
-test-image: sim image test-image-$(if $(filter rpi,$(BOARD)),rpi,uefi) ## boot the image of BOARD on an emulated board; failed updates and slots; what flash refuses
+test-image: sim image test-image-$(if $(filter rpi,$(BOARD)),rpi,uefi) ## boot the image of BOARD on an emulated board; failed updates and slots; what flash refuses; BOARD=rpi QUICK=1: U-Boot alone
 
 test-image-rpi: sim image
 	@tools/setup.sh test-image rpi
 	@/usr/bin/python3 tests/board/image_rpi.py --image $(IMAGE_OUT) --frames frames/sequence2 \
-	  --host-sim $(BUILD)/host/sim/host_sim --work $(BUILD)/test_image_rpi
+	  --host-sim $(BUILD)/host/sim/host_sim --work $(BUILD)/test_image_rpi $(if $(QUICK),choice loader)
 
 test-image-uefi: sim image
 	@tools/setup.sh test-image uefi
