@@ -35,7 +35,7 @@ static bool fail(struct hal_error *error, const char *doing, const char *path)
     return hal_fail(error, "%s %.160s: %s", doing, path, strerror(errno));
 }
 
-/* Bytes of all files, and the greatest number of a part. */
+/* Bytes of all files, and the largest number of a part. */
 static void add_up(int dir_fd, int depth, int64_t *bytes, long *number_max)
 {
     DIR *dir = fdopendir(dir_fd);

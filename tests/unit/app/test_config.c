@@ -751,6 +751,11 @@ static void the_installed_file_has_every_key(void)
     TEST_ASSERT_NOT_NULL(config.watchdog);
     config.gpio_chip = config.laser_line = config.interlock_line = config.heartbeat_line = NULL;
     config.watchdog = NULL;
+    TEST_ASSERT_NOT_NULL(config.record);
+    TEST_ASSERT_EQUAL_INT(APP_RECORD_NO_HEAD, config.record_when);
+    config.record = NULL;
+    config.record_when = APP_RECORD_ALWAYS;
+    config.record_no_head_s = 0;
     TEST_ASSERT_EQUAL_STRING("8080", config.view_port);
     memset(config.view_host, 0, sizeof config.view_host);
     memset(config.view_port, 0, sizeof config.view_port);

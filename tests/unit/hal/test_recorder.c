@@ -33,7 +33,7 @@ static char dir[64], rig[64];
 static int counts[CALLS];
 static enum call failing;
 static int failing_from, failing_to; /* which calls of it, from 1 */
-static bool is_counting, cuts_short, allocation_fails;
+static bool is_counting, is_partial, allocation_fails;
 static struct hal_error error;
 static struct hal_recorder_process process;
 static struct hal_recorder *const recorder = &process.recorder;
@@ -76,7 +76,7 @@ int __wrap_open(const char *path, int flags, ...)
 ssize_t __wrap_pwrite(int fd, const void *bytes, size_t count, off_t offset)
 {
     if (fails(PWRITE)) {
-        if (cuts_short && count > 1) {
+        if (is_partial && count > 1) {
             __real_pwrite(fd, bytes, count / 2, offset);
         }
         errno = ENOSPC;
@@ -131,7 +131,7 @@ static void write_rig(const char *text)
 void setUp(void)
 {
     memset(counts, 0, sizeof counts);
-    is_counting = cuts_short = false;
+    is_counting = is_partial = false;
     failing_from = failing_to = 0;
     process = (struct hal_recorder_process){.socket_fd = -1, .pid = -1};
     write_rig(RIG);
@@ -247,7 +247,7 @@ static void test_every_call_fails(void)
                 failing = (enum call)call;
                 failing_from = from;
                 failing_to = variant % 2 == 0 ? from + 1 : INT32_MAX;
-                cuts_short = variant >= 2;
+                is_partial = variant >= 2;
                 snprintf(message, sizeof message, "%s, call %d, variant %d", call_text[call], from,
                          variant);
                 bool opened = record(&lost);
@@ -488,7 +488,7 @@ static void test_memory_is_bounded(void)
     TEST_ASSERT_EQUAL_INT(10, read_part(1, &bad));
 }
 
-/* The loop goes on, and is told; what fits is written later. */
+/* The loop goes on, and keep() says so; what fits is written later. */
 static void test_a_disk_that_stands_still(void)
 {
     int kept = 0, bad = 0;
