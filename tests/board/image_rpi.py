@@ -148,7 +148,7 @@ class PiBoard(Board):
     """QEMU's Raspberry Pi 3 with its SD card, its console and QEMU's own monitor.
 
     QEMU's watchdog of this processor fires when it is started. So it is taken out of the device tree; and as it
-    is what resets the processor, too, the test does that when the kernel has stopped."""
+    is what resets the processor, too, the test does that when the kernel has tried to."""
 
     LINES = ("console", "monitor")
     START_S = START_S
@@ -167,9 +167,9 @@ class PiBoard(Board):
 
     def read(self, limit_s):
         got = super().read(limit_s)
-        halts = self.text["console"].count("System halted")
-        if halts > self.resets:
-            self.resets = halts
+        resets = self.text["console"].count("reboot: Restarting system")
+        if resets > self.resets:
+            self.resets = resets
             self.sockets["monitor"].sendall(b"system_reset\n")
         return got
 
