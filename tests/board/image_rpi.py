@@ -309,10 +309,10 @@ def case_start(shared):
         expect(board.wait_slot("b"), "slot B is damaged")
         back_s = board.now_s()
         for index, wanted in enumerate(frames.records):
-            match = board.wait(r'(?m)^\{"file":"%06d\.pgm".*\}$' % index, START_S)
+            match = board.wait(r'(?m)^(\{"file":"%06d\.pgm".*\})\n' % index, START_S)
             if index == 0:
                 record_s = board.now_s()
-            expect(as_of_host(match[0]) == wanted, f"frame {index}:\nboard    {match[0]}\nhost_sim {wanted}")
+            expect(as_of_host(match[1]) == wanted, f"frame {index}:\nboard    {match[1]}\nhost_sim {wanted}")
         board.wait("slot b is good", START_S)
         expect(disk.state() == {"first": "a", "a_left": "0", "b_left": "good"}, f"state {disk.state()}")
         board.command("grep -q ' /data vfat ro,' /proc/mounts")
@@ -322,7 +322,7 @@ def case_start(shared):
         expect(board.line_level(LASER) == 0, "the laser's line is high before anything may use it")
         board.command("killall isohead_board")
         board.wait_level(LASER, 1, START_S)
-        board.wait(r'(?m)^\{"file":"\d+\.pgm".*"dots":\d+.*\}$', START_S)
+        board.wait(r'(?m)^\{"file":"\d+\.pgm".*"dots":\d+.*\}\n', START_S)
         board.command("killall -9 isohead_board")
         board.wait("the firmware ended with status 137", ANSWER_S)
         board.wait_level(LASER, 0, ANSWER_S)
