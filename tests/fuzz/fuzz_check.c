@@ -64,16 +64,26 @@ void fuzz_check_labels(const struct ih_labels *labels, const struct ih_dots *dot
     }
 }
 
+/* The level frame's depths are others. */
+static int32_t near_mm_q8(const struct ih_rig *rig)
+{
+    return (rig->is_level ? rig->calibration.near_mm : IH_DEPTH_MIN_MM) << 8;
+}
+
+static int32_t far_mm_q8(const struct ih_rig *rig)
+{
+    return (rig->is_level ? rig->calibration.far_mm : IH_DEPTH_MAX_MM) << 8;
+}
+
 void fuzz_check_windows(const struct ih_windows *windows, const struct ih_rig *rig)
 {
-    const struct ih_calibration *c = &rig->calibration;
     FUZZ_CHECK(windows->window_count >= 0 && windows->window_count <= IH_WINDOWS_MAX);
     FUZZ_CHECK(windows->places_dropped >= 0);
     for (int32_t i = 0; i < windows->window_count; i++) {
         const struct ih_window *window = &windows->window[i];
         FUZZ_CHECK(window->score <= 1000 && window->spacing_px >= 0);
         FUZZ_CHECK(i == 0 || windows->window[i - 1].score >= window->score);
-        FUZZ_CHECK(window->depth_mm_q8 >= c->near_mm << 8 && window->depth_mm_q8 <= c->far_mm << 8);
+        FUZZ_CHECK(window->depth_mm_q8 >= near_mm_q8(rig) && window->depth_mm_q8 <= far_mm_q8(rig));
     }
 }
 
@@ -85,7 +95,7 @@ void fuzz_check_points(const struct ih_points *points, const struct ih_rig *rig)
         FUZZ_CHECK(point->state >= IH_POINT_MISSING && point->state <= IH_POINT_UNKNOWN);
         if (point->state == IH_POINT_SEEN) {
             FUZZ_CHECK(point->depth_mm_q8 >= 1 << 8);
-            FUZZ_CHECK(point->depth_mm_q8 <= rig->calibration.far_mm << 8);
+            FUZZ_CHECK(point->depth_mm_q8 <= far_mm_q8(rig));
             seen++;
         } else {
             FUZZ_CHECK(point->depth_mm_q8 == 0);

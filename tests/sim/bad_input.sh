@@ -372,6 +372,26 @@ field far_mm -1e999 'far_mm: -inf, out of range'
 rig extra '{"kind":["anything"]}' >d/rig.json
 run --json d
 check 'rig: an unknown field is ignored' 0 3 0 -
+up() {
+    rig extra '0' | sed "s/\"extra\":0/\"up\":$1/" >d/rig.json
+}
+up '[0,0,1]'
+rig_case 'up along the axis' 'd/rig\.json: up: \(0, 0, 1\), length 1, expected a unit vector'
+up '[0,-1.1,0]'
+rig_case 'up that is no unit vector' 'd/rig\.json: up: \(0, -1\.1, 0\), length 1\.1, expected a unit vector'
+up '[0,-1]'
+rig_case 'up of two numbers' 'd/rig\.json: up: 2 numbers, expected 3'
+up '[0,"-1",0]'
+rig_case 'up with a string' 'd/rig\.json: up\[0\]\[1\]: a string, expected a number'
+up '[0,-1e999,0]'
+rig_case 'up without end' 'd/rig\.json: up\[0\]\[1\]: -inf'
+up '[0,-7,0]'
+rig_case 'up beyond its format' 'd/rig\.json: up y: -7, expected less than 2'
+up '"above"'
+rig_case 'up in words' 'd/rig\.json: up: '
+up '[0.6,-0.8,0]'
+run --json d
+check 'rig: rolled' 0 3 0 -
 rig near_mm 400.7 >d/rig.json
 run --json d
 check 'rig: a fraction in near_mm is fine' 0 3 0 -

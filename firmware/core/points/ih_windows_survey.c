@@ -113,8 +113,10 @@ static int32_t level_depth_mm(const struct ih_windows_scratch *s, const struct i
     }
     u = (u_px_q12 + 2048) >> 12;
     v = (v_px_q12 + 2048) >> 12;
-    const int64_t depth_mm = ih_windows_pixel(frame, rig, reach_px, &u, &v);
-    return (int32_t)ih_min_s64(ih_div_round(depth_mm * (1 << 28), depth_q28), IH_DEPTH_MAX_MM);
+    const int64_t camera_mm = ih_windows_pixel(frame, rig, reach_px, &u, &v);
+    const int64_t depth_mm =
+        ih_min_s64(ih_div_round(camera_mm * (1 << 28), depth_q28), IH_DEPTH_MAX_MM);
+    return depth_mm < IH_DEPTH_MIN_MM ? 0 : (int32_t)depth_mm;
 }
 
 /* Begin and length of what a level camera would see of the frame: of its corners and the middles of its sides. */
@@ -134,8 +136,8 @@ static void frame_picture(const struct ih_rig *rig, struct ih_windows_scratch *s
     }
     s->left_px = (int32_t)ih_mul_shift(min_q28[0], c->fx_px_q16, 44);
     s->top_px = (int32_t)ih_mul_shift(min_q28[1], c->fy_px_q16, 44);
-    s->width_px = (int32_t)ih_mul_shift(max_q28[0], c->fx_px_q16, 44) - s->left_px + 1;
-    s->height_px = (int32_t)ih_mul_shift(max_q28[1], c->fy_px_q16, 44) - s->top_px + 1;
+    s->width_px = (int32_t)ih_mul_shift((int64_t)max_q28[0] - min_q28[0], c->fx_px_q16, 44) + 1;
+    s->height_px = (int32_t)ih_mul_shift((int64_t)max_q28[1] - min_q28[1], c->fy_px_q16, 44) + 1;
 }
 
 static void survey(const struct ih_frame *frame, const struct ih_rig *rig, int32_t cell_px,

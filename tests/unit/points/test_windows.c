@@ -194,6 +194,67 @@ static void windows_match_float64(void)
     }
 }
 
+/* The picture of a camera that is rolled by so many quarter turns, heads' tops to the right first. */
+static void roll(const struct vector_scene *scene, int quarters)
+{
+    static uint16_t level_mm[PIXELS_MAX];
+    static const int32_t up_q30[4][2] = {
+        {0, -(1 << 30)}, {1 << 30, 0}, {0, 1 << 30}, {-(1 << 30), 0}};
+    const int32_t width = quarters % 2 == 0 ? scene->width : scene->height;
+    const int32_t height = quarters % 2 == 0 ? scene->height : scene->width;
+    int32_t bad_slot, u, v;
+
+    memcpy(level_mm, depth_mm, sizeof level_mm);
+    use_rig(width, height, scene->focal_px);
+    calibration.up_q30[0] = up_q30[quarters][0];
+    calibration.up_q30[1] = up_q30[quarters][1];
+    TEST_ASSERT_EQUAL_INT(IH_OK, ih_rig_init(&rig, &calibration, &bad_slot));
+    for (v = 0; v < height; v++) {
+        for (u = 0; u < width; u++) {
+            const int32_t level_u = quarters == 1   ? v
+                                    : quarters == 2 ? width - 1 - u
+                                                    : height - 1 - v;
+            const int32_t level_v = quarters == 1   ? width - 1 - u
+                                    : quarters == 2 ? height - 1 - v
+                                                    : u;
+
+            depth_mm[v * width + u] = level_mm[level_v * scene->width + level_u];
+        }
+    }
+}
+
+/* The same windows, in the level frame, whichever way the camera hangs. */
+static void rolled_cameras_find_the_same(void)
+{
+    int s, i, quarters, count = 0;
+
+    for (s = 0; s < IH_TEST_COUNT(vector_scenes); s++) {
+        const struct vector_scene *scene = &vector_scenes[s];
+
+        for (quarters = 1; quarters < 4 && scene->every == 1; quarters++) {
+            draw(scene);
+            roll(scene, quarters);
+            find(scene->name);
+            IH_TEST_EQUAL(scene->cell_px, guarded.scratch.cell_px, scene->name, quarters);
+            IH_TEST_EQUAL(scene->window_count, windows.window_count, scene->name, quarters);
+            for (i = 0; i < scene->window_count; i++) {
+                const struct ih_window *w = &windows.window[i];
+                const double cell = (double)guarded.scratch.cell_px / scene->focal_px;
+
+                /* As above, and a cell may begin half a pixel off. */
+                IH_TEST_WITHIN(1.5 * cell, scene->window[i].x, ih_test_from_q(w->x_q28, 28), "x",
+                               s);
+                IH_TEST_WITHIN(1.5 * cell, scene->window[i].y, ih_test_from_q(w->y_q28, 28), "y",
+                               s);
+                IH_TEST_WITHIN(5, scene->window[i].depth_mm, w->depth_mm_q8 / 256.0, "depth", s);
+                IH_TEST_WITHIN(2 * 400.0 / 13 + 2, scene->window[i].score, w->score, "score", s);
+                count++;
+            }
+        }
+    }
+    TEST_ASSERT_TRUE(count > 10);
+}
+
 /* Class Noise of tools/oracle/windows.py: wherever a probe is a cell off, or a limit a millimetre,
  * some score is another. */
 static uint32_t noise_hash(uint32_t number, uint32_t seed)
@@ -1059,6 +1120,7 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(windows_match_float64);
+    RUN_TEST(rolled_cameras_find_the_same);
     RUN_TEST(scores_match_float64);
     RUN_TEST(every_head_has_its_window);
     RUN_TEST(connected_cells_are_counted);
