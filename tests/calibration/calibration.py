@@ -558,6 +558,8 @@ def check_values(bench):
             ("--board", "charuco-20x20-9", "more than 100 white squares"),
             ("--near", "99", ranges), ("--near", "nan", ranges), ("--near", "400mm", ranges), ("--near", "-400", ranges),
             ("--far", "16001", ranges), ("--far", "inf", ranges), ("--far", "1e999", ranges), ("--far", "400", "--near must be less"),
+            ("--tilt", "81", "must be a number of degrees from -80 to 80"), ("--tilt", "nan", "from -80 to 80"),
+            ("--roll", "-180.5", "must be a number of degrees from -180 to 180"), ("--roll", "left", "from -180 to 180"),
             ("--middle", "000000.pgm", "must be FILE:U,V, U and V in pixels"), ("--middle", ":1,2", "must be FILE:U,V"),
             ("--middle", "000000.pgm:1", "must be FILE:U,V"), ("--middle", "000000.pgm:1,2,3", "must be FILE:U,V"),
             ("--middle", "000000.pgm:nan,2", "U must be from 0 to 1279 px"), ("--middle", "000000.pgm:2,inf", "V from 0 to 799"),
@@ -608,6 +610,7 @@ def check_usage(bench):
                           (("board", "pdf"), "must end in .pdf or .pgm"),
                           (("guide", "--size", "640x480", "a"), "--size belongs to guide --camera"),
                           (("guide", "--far", "900", "a"), "--far belongs to solve"),
+                          (("guide", "--tilt", "9", "a"), "--tilt belongs to solve"),
                           (("guide", "--middle", "a:1,2", "a"), "--middle belongs to solve")]:
         status, out, err = run(bench.calibrate, *words)
         fine = status == 2 and not out and err.startswith("calibrate: ") and wanted in err and len(err.splitlines()) == 1

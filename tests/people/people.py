@@ -27,9 +27,9 @@ HOST_SIM = None
 SEED = 8
 
 
-def make(out, rig, kind, seed=SEED, frames=2):
+def make(out, rig, kind, seed=SEED, frames=2, *options):
     subprocess.run([sys.executable, "-B", os.path.join(TOOL, "make.py"), "--rig", rig, "--kind", kind,
-                    "--seed", str(seed), "--frames", str(frames), out], check=True)
+                    "--seed", str(seed), "--frames", str(frames), *options, out], check=True)
     return out
 
 
@@ -109,6 +109,17 @@ class People(unittest.TestCase):
             self.assertGreater(len(entry["dots"]), 150)
             self.assertGreater(record["labelled"], 0.8 * len(entry["dots"]))
 
+    def test_a_mounted_camera_sees_the_same_person(self):
+        """Truth in the level frame is that of a level camera, moved about the head; up is the camera's."""
+        level = make(os.path.join(self.work, "level"), "range", "calm", SEED, 1, "--tilt", "0")
+        down = make(os.path.join(self.work, "down"), "range", "calm", SEED, 1, "--tilt", "30", "--roll", "90")
+        with open(os.path.join(down, "rig.json"), encoding="utf-8") as file:
+            np.testing.assert_allclose(json.load(file)["up"], [np.cos(np.pi / 6), 0.0, -0.5], atol=1e-9)
+        mine, theirs = (lines_of(path, "truth.jsonl")[0]["head"] for path in (level, down))
+        self.assertEqual(mine["semi_axes_mm"], theirs["semi_axes_mm"])
+        # The middle of the sequence's head is where the camera is turned about: it stays as far off.
+        self.assertAlmostEqual(np.linalg.norm(mine["centre_mm"]), np.linalg.norm(theirs["centre_mm"]), delta=40.0)
+
     def test_nobody_has_no_head(self):
         for kind in ("empty", "body"):
             out = make(os.path.join(self.work, kind), "paper", kind, SEED)
@@ -119,10 +130,12 @@ class People(unittest.TestCase):
         import scene
         import sets
         seeds = {}
-        for name in ("learn", "judge"):
+        for name in ("learn", "judge", "mounted", "mounted_judge"):
             seeds[name] = {seed for rig in sets.ALL_RIGS for _, _, seed, _ in sets.sequences(name, rig)}
             seeds[name] |= {seed + scene.SECOND_SEED for seed in seeds[name]}
-        self.assertFalse(seeds["learn"] & seeds["judge"])
+        for learn in ("learn", "mounted"):
+            for judge in ("judge", "mounted_judge"):
+                self.assertFalse(seeds[learn] & seeds[judge])
 
 
 if __name__ == "__main__":

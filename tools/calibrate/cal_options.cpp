@@ -15,7 +15,8 @@ const char *const options_help = /* at most 80 columns */
     "Usage: calibrate board [--board NAME] FILE\n"
     "       calibrate guide [--board NAME] [--camera DEVICE [--size WxH]] DIR\n"
     "       calibrate solve [--board NAME] [--near MM] [--far MM]\n"
-    "                       [--middle FILE:U,V] --out OUT DIR\n"
+    "                       [--tilt DEG] [--roll DEG] [--middle FILE:U,V]\n"
+    "                       --out OUT DIR\n"
     "From pictures of a printed board to rig.json: docs/calibration.md has the steps.\n"
     "\n"
     "  board            the board to print, A4 in true size: FILE.pdf; FILE.pgm for\n"
@@ -33,6 +34,9 @@ const char *const options_help = /* at most 80 columns */
     "                   DIR's pictures, else as the camera gives them)\n"
     "  --near MM, --far MM   the working range in Z, for rig.json (default 400,\n"
     "                   2600; from 100 to 16000)\n"
+    "  --tilt DEG, --roll DEG   how the camera will hang, for rig.json: it looks down\n"
+    "                   by the tilt (-80 to 80, below 0: up), and heads' tops tip to\n"
+    "                   the right in its picture by the roll (-180 to 180)\n"
     "  --middle FILE:U,V     the pattern's middle dot is at pixel U,V of a picture\n"
     "                   with the laser on; needed only where the pattern's edges are\n"
     "                   not seen on the board\n"
@@ -44,7 +48,17 @@ const char *const options_help = /* at most 80 columns */
     "calibration, a camera that cannot be used or gives no more frames, a file that\n"
     "cannot be written; 2 wrong usage.\n";
 
-enum OptionId { opt_board = tool::opt_help + 1, opt_camera, opt_size, opt_near, opt_far, opt_middle, opt_out };
+enum OptionId {
+    opt_board = tool::opt_help + 1,
+    opt_camera,
+    opt_size,
+    opt_near,
+    opt_far,
+    opt_middle,
+    opt_out,
+    opt_tilt,
+    opt_roll
+};
 
 static bool complain(const std::string &what)
 {
@@ -71,6 +85,15 @@ static bool read_mm(const char *name, const char *value, double &mm)
     if (end == value || *end != '\0' || !(mm >= depth_min_mm && mm <= depth_max_mm))
         return complain(
             text("--%s %s: must be a number of mm from %.0f to %.0f", name, value, depth_min_mm, depth_max_mm));
+    return true;
+}
+
+static bool read_degrees(const char *name, const char *value, double max_deg, double &degrees)
+{
+    char *end;
+    degrees = std::strtod(value, &end);
+    if (end == value || *end != '\0' || !(std::abs(degrees) <= max_deg))
+        return complain(text("--%s %s: must be a number of degrees from %.0f to %.0f", name, value, -max_deg, max_deg));
     return true;
 }
 
@@ -119,6 +142,10 @@ static bool take(int id, const char *value, Options &options)
         return belongs_to_solve("near", options) && read_mm("near", value, options.range.near_mm);
     case opt_far:
         return belongs_to_solve("far", options) && read_mm("far", value, options.range.far_mm);
+    case opt_tilt:
+        return belongs_to_solve("tilt", options) && read_degrees("tilt", value, 80.0, options.mount.tilt_deg);
+    case opt_roll:
+        return belongs_to_solve("roll", options) && read_degrees("roll", value, 180.0, options.mount.roll_deg);
     case opt_middle:
         return belongs_to_solve("middle", options) && read_middle(value, options.middle);
     case opt_out:
@@ -164,6 +191,8 @@ bool options_parse(int argc, char **argv, Options &options)
         {"camera", required_argument, nullptr, opt_camera},
         {"near", required_argument, nullptr, opt_near},
         {"far", required_argument, nullptr, opt_far},
+        {"tilt", required_argument, nullptr, opt_tilt},
+        {"roll", required_argument, nullptr, opt_roll},
         {"middle", required_argument, nullptr, opt_middle},
         {"out", required_argument, nullptr, opt_out},
         {"size", required_argument, nullptr, opt_size},

@@ -18,6 +18,7 @@ struct Options {
     std::string camera; /* guide: what cv::VideoCapture opens; empty: look at the directory only */
     cv::Size size;      /* guide: of the camera's frames; empty: as it gives them */
     Range range{400.0, 2600.0};
+    Mount mount;
     MiddleDot middle;
 };
 

@@ -1,5 +1,6 @@
 #include "cal_rig.hpp"
 
+#include <cmath>
 #include <sstream>
 
 #include "cal_error.hpp"
@@ -28,7 +29,15 @@ static std::vector<double> values_of(const cv::Mat &matrix)
     return {matrix.begin<double>(), matrix.end<double>()};
 }
 
-void rig_write(const std::string &path, const Camera &camera, const Projector &projector, const Range &range)
+/* The unit vector of the camera frame that points up. */
+static cv::Vec3d up_of(const Mount &mount)
+{
+    double tilt = mount.tilt_deg * CV_PI / 180.0, roll = mount.roll_deg * CV_PI / 180.0;
+    return {std::cos(tilt) * std::sin(roll), -std::cos(tilt) * std::cos(roll), -std::sin(tilt)};
+}
+
+void rig_write(const std::string &path, const Camera &camera, const Projector &projector, const Range &range,
+               const Mount &mount)
 {
     std::vector<double> rays;
     for (const cv::Vec3d &ray : projector.rays)
@@ -44,7 +53,12 @@ void rig_write(const std::string &path, const Camera &camera, const Projector &p
     file << "  \"dot_sightings\":[";
     for (size_t slot = 0; slot < slot_count; slot++)
         file << (slot > 0 ? "," : "") << projector.seen[slot];
-    file << "],\n  \"near_mm\":" << number(range.near_mm) << ",\n  \"far_mm\":" << number(range.far_mm) << "\n}\n";
+    file << "],\n";
+    if (mount.tilt_deg != 0.0 || mount.roll_deg != 0.0) {
+        cv::Vec3d up = up_of(mount);
+        file << "  \"up\":[" << number(up[0]) << "," << number(up[1]) << "," << number(up[2]) << "],\n";
+    }
+    file << "  \"near_mm\":" << number(range.near_mm) << ",\n  \"far_mm\":" << number(range.far_mm) << "\n}\n";
     tool::file_write(path, file.str());
 }
 } // namespace cal

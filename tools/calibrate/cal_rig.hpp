@@ -12,8 +12,14 @@ struct Range {
     double near_mm, far_mm;
 };
 
+/* How the camera will hang: it looks down by the tilt, and heads' tops tip to the right by the roll. */
+struct Mount {
+    double tilt_deg = 0.0, roll_deg = 0.0;
+};
+
 /* Throws cal::Error. */
-void rig_write(const std::string &path, const Camera &camera, const Projector &projector, const Range &range);
+void rig_write(const std::string &path, const Camera &camera, const Projector &projector, const Range &range,
+               const Mount &mount);
 } // namespace cal
 
 #endif

@@ -280,7 +280,7 @@ static void write_out(const std::string &out, const Result &result)
 {
     report_write(out + "/report.html", result);
     try {
-        rig_write(out + "/rig.json", result.camera, result.projector, result.range);
+        rig_write(out + "/rig.json", result.camera, result.projector, result.range, result.mount);
     } catch (const Error &) {
         remove_out(out);
         throw;
@@ -295,6 +295,7 @@ void solve_run(const Options &options)
     make_out(options.out);
     result.board = options.board;
     result.range = options.range;
+    result.mount = options.mount;
     std::vector<Picture> pictures = pictures_read(options.target);
     check_middle(options.middle, pictures);
     auto lit_count = std::count_if(pictures.begin(), pictures.end(), [](const Picture &p) { return p.laser; });

@@ -15,6 +15,7 @@ struct Result {
     Camera camera;
     Projector projector;
     Range range{};
+    Mount mount;
 };
 
 /* Prints what it finds on standard output. Throws cal::Error. */

@@ -14,7 +14,11 @@ SETS = {
         20000, 4, 24, 20), "judge": (
             70000, 2, 24, 8), "rigs": (
                 80000, 1, 20, 0), "sample": (
-                    90000, 1, 5, 0)}
+                    90000, 1, 5, 0), "mounted": (
+                310000, 2, 24, 8), "mounted_judge": (
+                    330000, 1, 12, 4)}
+# Sequences of these sets are seen by cameras that hang otherwise than level: tilt (down) and roll, in turn.
+MOUNTS = ((45.0, 0.0), (30.0, 90.0), (60.0, 0.0), (-20.0, 180.0), (0.0, -90.0), (50.0, 30.0), (20.0, -15.0))
 EMPTY_FRAMES = 30
 # All rigs of this set see the same people.
 SAME_PEOPLE = "rigs"
@@ -48,7 +52,8 @@ def main():
         for rig_kind, directory, kind, seed, frames in row:
             out = os.path.join(options.out, rig_kind, directory)
             if not os.path.exists(os.path.join(out, "rig.json")):
-                make.make(model, out, rig_kind, kind, seed, frames)
+                make.make(model, out, rig_kind, kind, seed, frames,
+                          mount=MOUNTS[seed % len(MOUNTS)] if options.set.startswith("mounted") else None)
 
 
 if __name__ == "__main__":
