@@ -95,7 +95,7 @@ tools_package() {
     manual isohead-render $built/tools/render/render "render frames of laser dots, and boards to try the calibration with"
     manual rigblob $built/tools/rigblob/rigblob "a calibrated rig as bytes for boards without JSON"
     manual host_sim $built/sim/host_sim "find heads in 3-D in directories of frames"
-    pages calibration contract safety health report
+    pages calibration contract depth_camera safety health report
     # The page's commands as they are where the package is installed.
     sed -i -E -e '/^## What it needs$/,/^calibrate=/c\## What it needs\nThis package. The rendered pictures take 50 MB and all steps with them some minutes. For short:\n```\ncalibrate=isohead-calibrate' \
         -e 's,^render=.*,render=isohead-render,' -e 's,build/[a-z/]*/rigblob,rigblob,' -e 's,\./host_sim,host_sim,' \
