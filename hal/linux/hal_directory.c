@@ -171,12 +171,12 @@ static bool set_exposure(void *context, int32_t exposure_us, struct hal_error *e
 static int32_t frame_time_us(void *context)
 {
     const struct hal_directory *directory = context;
-    int64_t count = (int64_t)directory->replay.entry_count;
+    int64_t count = (int64_t)directory->replay.entry_count; /* none before it was read */
     int64_t sum_us = 0;
     for (int64_t i = 1; i <= count; i++) {
         sum_us += step_us(directory, (size_t)i);
     }
-    int64_t mean_us = (sum_us + count / 2) / count;
+    int64_t mean_us = count > 0 ? (sum_us + count / 2) / count : 0;
     return mean_us < HAL_DIRECTORY_STEP_MIN_US ? HAL_DIRECTORY_STEP_MIN_US : (int32_t)mean_us;
 }
 

@@ -437,13 +437,13 @@ void hal_recorder_close(struct hal_recorder_process *process)
         close(process->socket_fd);
         process->socket_fd = -1;
     }
-    for (int i = 0; process->pid > 0 && i < HAL_RECORDER_END_MS / PAUSE_MS; i++) {
+    bool is_over = process->pid <= 0;
+    for (int i = 0; !is_over && i < HAL_RECORDER_END_MS / PAUSE_MS; i++) {
         pid_t dead = waitpid(process->pid, NULL, WNOHANG);
-        if (dead == process->pid || (dead < 0 && errno != EINTR)) {
-            process->pid = -1;
-            break;
+        is_over = dead == process->pid || (dead < 0 && errno != EINTR);
+        if (!is_over) {
+            nanosleep(&pause, NULL);
         }
-        nanosleep(&pause, NULL);
     }
     process->pid = -1;
     if (process->ring != NULL) {

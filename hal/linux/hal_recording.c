@@ -16,8 +16,6 @@
 #define LIST "frames.jsonl"
 #define LINE_MAX_BYTES 160
 #define HEAD_MAX_BYTES 64
-/* DIR, a part, a file in it. */
-#define DEPTH_MAX 2
 
 struct path {
     char text[HAL_RECORDING_PATH_MAX + 2 * HAL_RECORDING_NAME_MAX];
@@ -35,34 +33,35 @@ static bool fail(struct hal_error *error, const char *doing, const char *path)
     return hal_fail(error, "%s %.160s: %s", doing, path, strerror(errno));
 }
 
-/* Bytes of all files, and the largest number of a part. */
-static void add_up(int dir_fd, int depth, int64_t *bytes, long *number_max)
+/* The next file or folder; NULL at the end. */
+static const struct dirent *next_item(DIR *dir, struct stat *about)
 {
-    DIR *dir = fdopendir(dir_fd);
     const struct dirent *item = NULL;
-    if (dir == NULL) {
-        close(dir_fd);
-        return;
-    }
     while ((item = readdir(dir)) != NULL) {
-        struct stat about;
-        if (strcmp(item->d_name, ".") == 0 || strcmp(item->d_name, "..") == 0 ||
-            fstatat(dirfd(dir), item->d_name, &about, AT_SYMLINK_NOFOLLOW) != 0) {
-            continue;
-        }
-        *bytes += S_ISREG(about.st_mode) ? about.st_size : 0;
-        if (S_ISDIR(about.st_mode) && depth < DEPTH_MAX) {
-            long number = strtol(item->d_name, NULL, 10);
-            int fd =
-                openat(dirfd(dir), item->d_name, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
-            long ignored = 0;
-            *number_max = number > *number_max ? number : *number_max;
-            if (fd >= 0) {
-                add_up(fd, depth + 1, bytes, &ignored);
-            }
+        if (strcmp(item->d_name, ".") != 0 && strcmp(item->d_name, "..") != 0 &&
+            fstatat(dirfd(dir), item->d_name, about, AT_SYMLINK_NOFOLLOW) == 0) {
+            return item;
         }
     }
-    closedir(dir);
+    return NULL;
+}
+
+/* Of all files of a part. */
+static int64_t bytes_of_part(int parent_fd, const char *name)
+{
+    struct stat about;
+    int64_t bytes = 0;
+    int fd = openat(parent_fd, name, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
+    DIR *dir = fd >= 0 ? fdopendir(fd) : NULL;
+    while (dir != NULL && next_item(dir, &about) != NULL) {
+        bytes += S_ISREG(about.st_mode) ? about.st_size : 0;
+    }
+    if (dir != NULL) {
+        closedir(dir);
+    } else if (fd >= 0) {
+        close(fd);
+    }
+    return bytes;
 }
 
 static bool write_all(int fd, const void *content, size_t size, int64_t offset)
@@ -117,13 +116,24 @@ static void close_part(struct hal_recording *recording)
 /* Counts what is there; *number_max: the last part. */
 static bool look_into(struct hal_recording *recording, long *number_max, struct hal_error *error)
 {
-    int fd = open(recording->config.dir, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-    if (fd < 0) {
+    const struct dirent *item = NULL;
+    struct stat about;
+    DIR *dir = opendir(recording->config.dir);
+    if (dir == NULL) {
         return fail(error, "opening", recording->config.dir);
     }
     *number_max = 0;
     recording->bytes = 0;
-    add_up(fd, 1, &recording->bytes, number_max);
+    while ((item = next_item(dir, &about)) != NULL) {
+        if (S_ISDIR(about.st_mode)) {
+            long number = strtol(item->d_name, NULL, 10);
+            *number_max = number > *number_max ? number : *number_max;
+            recording->bytes += bytes_of_part(dirfd(dir), item->d_name);
+        } else if (S_ISREG(about.st_mode)) {
+            recording->bytes += about.st_size;
+        }
+    }
+    closedir(dir);
     return true;
 }
 

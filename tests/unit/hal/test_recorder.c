@@ -164,11 +164,13 @@ static bool put(struct hal_recording *recording, int index, const char *name)
     return hal_recording_put(recording, &frame, samples, &error);
 }
 
-static void ignore(void *context, const char *subject, const char *text)
+static int message_count;
+
+/* A line without its frame. */
+static void count_message(void *context, const char *subject, const char *text)
 {
-    (void)context;
-    TEST_FAIL_MESSAGE(subject);
-    TEST_FAIL_MESSAGE(text);
+    (void)context, (void)subject, (void)text;
+    message_count++;
 }
 
 /* Frames of a part that can be read: each as it was put, with its line; those that cannot be are counted. */
@@ -176,11 +178,12 @@ static int read_part(int number, int *bad_count)
 {
     struct hal_replay replay;
     struct hal_frame frame;
-    const struct hal_log log = {.error = ignore};
+    const struct hal_log log = {.error = count_message};
     char path[96];
     int count = 0;
     enum hal_next next = HAL_NEXT_END;
     snprintf(path, sizeof path, "%s/%06d", dir, number);
+    message_count = 0;
     if (!hal_replay_open(&replay, path, false, &log, &error)) {
         return 0;
     }
@@ -196,6 +199,7 @@ static int read_part(int number, int *bad_count)
         count++;
     }
     hal_replay_close(&replay);
+    *bad_count += message_count;
     return count;
 }
 
@@ -325,7 +329,7 @@ static void test_two_bytes(void)
     uint16_t samples[2] = {1000, 3};
     struct hal_replay replay;
     struct hal_frame found;
-    const struct hal_log log = {.error = ignore};
+    const struct hal_log log = {.error = count_message};
     char path[96];
     TEST_ASSERT_TRUE(hal_recording_open(&recording, &config, &error));
     TEST_ASSERT_TRUE(hal_recording_put(&recording, &frame, (uint8_t *)samples, &error));
