@@ -16,8 +16,8 @@ typedef void *TaskHandle_t;
 #define pdMS_TO_TICKS(ms) ((TickType_t)(ms))
 #define portYIELD_FROM_ISR(woken) ((void)(woken))
 
-BaseType_t xTaskCreate(void (*code)(void *), const char *name, uint16_t stack_words, void *parameter, UBaseType_t priority,
-                       TaskHandle_t *handle);
+BaseType_t xTaskCreate(void (*code)(void *), const char *name, uint16_t stack_words,
+                       void *parameter, UBaseType_t priority, TaskHandle_t *handle);
 void vTaskDelete(TaskHandle_t handle);
 uint32_t ulTaskNotifyTake(BaseType_t clear, TickType_t ticks);
 void vTaskNotifyGiveFromISR(TaskHandle_t handle, BaseType_t *woken);

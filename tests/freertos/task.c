@@ -10,15 +10,19 @@
 /* Words: 2.4 kB of the core, and what the calls above it and the interrupts need. */
 #define STACK_WORDS 1024
 
-extern const uint8_t rig_blob[IH_RIG_BLOB_BYTES];                    /* in flash, written by rigblob */
-void camera_start(uint8_t *frame);                                   /* DMA of the next frame */
-int64_t camera_time_us(void);                                        /* of the frame that was filled last */
+extern const uint8_t rig_blob[IH_RIG_BLOB_BYTES]; /* in flash, written by rigblob */
+void camera_start(uint8_t *frame);                /* DMA of the next frame */
+int64_t camera_time_us(void);                     /* of the frame that was filled last */
 void head_found(const struct ih_result_entry *head, int64_t time_us); /* NULL: nobody */
 void laser_off(void);
 
-static struct isohead head;                   /* the largest piece: SRAM with a cache */
-static uint8_t frames[2][WIDTH * HEIGHT];     /* where the camera's DMA can write */
-static struct ih_calibration calibration;     /* 4.5 kB that are free after the start */
+/* What a board calls: from the interrupt's vector, and from main. */
+void camera_interrupt(void);
+BaseType_t isohead_task_create(void);
+
+static struct isohead head;               /* the largest piece: SRAM with a cache */
+static uint8_t frames[2][WIDTH * HEIGHT]; /* where the camera's DMA can write */
+static struct ih_calibration calibration; /* 4.5 kB that are free after the start */
 static TaskHandle_t task;
 
 /* The camera's interrupt: the frame is whole. */

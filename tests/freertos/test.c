@@ -26,8 +26,8 @@ static uint8_t *waiting;
 static void (*task)(void *);
 static int frame_count, given, called_count, found_count, off_count, deleted_count;
 
-BaseType_t xTaskCreate(void (*code)(void *), const char *name, uint16_t stack_words, void *parameter, UBaseType_t priority,
-                       TaskHandle_t *handle)
+BaseType_t xTaskCreate(void (*code)(void *), const char *name, uint16_t stack_words,
+                       void *parameter, UBaseType_t priority, TaskHandle_t *handle)
 {
     (void)name, (void)parameter, (void)priority;
     task = code;
@@ -88,7 +88,8 @@ void laser_off(void)
 static void load(const char *path, void *to, size_t count, long from_end)
 {
     FILE *file = fopen(path, "rb");
-    if (file == NULL || fseek(file, -from_end, SEEK_END) != 0 || fread(to, 1, count, file) != count) {
+    if (file == NULL || fseek(file, -from_end, SEEK_END) != 0 ||
+        fread(to, 1, count, file) != count) {
         perror(path);
         exit(1);
     }
@@ -110,8 +111,10 @@ int main(int argument_count, char **arguments)
     }
     rig_blob[100] ^= 1;
     task(NULL);
-    if (off_count != 2 || deleted_count != 2 || called_count != FRAMES || found_count < FRAMES / 2) {
-        printf("FAIL: off %d times, %d of %d frames, %d with a head\n", off_count, called_count, FRAMES, found_count);
+    if (off_count != 2 || deleted_count != 2 || called_count != FRAMES ||
+        found_count < FRAMES / 2) {
+        printf("FAIL: off %d times, %d of %d frames, %d with a head\n", off_count, called_count,
+               FRAMES, found_count);
         return 1;
     }
     printf("%d frames, %d with a head; laser off when they ended\n", called_count, found_count);
