@@ -7,7 +7,7 @@
 typedef long BaseType_t;
 typedef unsigned long UBaseType_t;
 typedef uint32_t TickType_t;
-typedef void *TaskHandle_t;
+typedef const void *TaskHandle_t;
 
 #define pdFALSE 0
 #define pdTRUE 1

@@ -159,7 +159,8 @@ int32_t ih_windows_survey(const struct ih_frame *frame, const struct ih_rig *rig
                           struct ih_windows_scratch *s)
 {
     int32_t min_px = 1;
-    s->left_px = s->top_px = 0;
+    s->left_px = 0;
+    s->top_px = 0;
     s->width_px = frame->width;
     s->height_px = frame->height;
     if (!rig->is_level) {
