@@ -45,7 +45,7 @@ DESTDIR ?=
 
 .DEFAULT_GOAL := help
 .PHONY: help sim install frames sanitize test check unit kills fuzz coverage ranges exhaustive mutation accept eval misaligned \
-  bench bench-instructions bench-peers bench-grow bench-worst test-bench bits cortexm longrun size vectors learn view figures \
+  bench bench-instructions bench-peers bench-grow bench-worst test-bench bits cortexm longrun size vectors learn learn-pose view figures \
   test-view test-report site live-pictures export python people board board-gpiod2 deb deb-tools image flash calibrate test-calibration \
   test-calibration-short test-deb test-board test-image format formatted words layout links lint clean
 
@@ -218,6 +218,15 @@ learn: sim ## learn the score anew from rendered scenes and people; an hour
 	@/usr/bin/python3 tools/people/sets.py learn $(BUILD)/learn/people
 	@/usr/bin/python3 tools/learn/learn.py --render $(BUILD)/host/tools/render/render \
 	  --host-sim $(BUILD)/host/sim/host_sim --work $(BUILD)/learn --people $(BUILD)/learn/people
+
+learn-pose: ## learn anew where heads look, from people that dots are cast on; half an hour
+	@tools/setup.sh vectors
+	@tools/setup.sh people
+	@mkdir -p $(BUILD)/learn
+	@$(CC) -O2 -shared -fPIC -Ifirmware/core tools/people/cast_points.c $(wildcard firmware/core/*.c firmware/core/*/*.c) \
+	  -o $(BUILD)/learn/libcast.so
+	@/usr/bin/python3 tools/people/cast.py $(BUILD)/learn/libcast.so $(BUILD)/learn/heads.npz
+	@/usr/bin/python3 tools/learn/learn_pose.py $(BUILD)/learn/heads.npz
 
 view: sim ## build tools/view, pictures of frames and what was found in them: build/view/tools/view/view
 	@tools/setup.sh view

@@ -63,6 +63,7 @@ void ih_params_default(struct ih_params *params)
     ih_hypotheses_params_default(&params->hypotheses);
     ih_detections_params_default(&params->detections);
     ih_tracks_params_default(&params->tracks);
+    ih_pose_params_default(&params->pose);
 }
 
 void ih_params_paper(struct ih_params *params)
@@ -220,6 +221,9 @@ static void conclude(struct isohead *head)
                          &head->predicted);
         ih_result_from_tracks(&head->detections, &head->tracks, &head->predicted, &head->rig,
                               &head->result);
+        ih_pose_update(&head->pose, &head->params.pose, &head->points, &head->rig,
+                       &head->detections, &head->predicted, &head->tracks, &head->scratch.pose,
+                       &head->result);
     }
 }
 

@@ -35,6 +35,7 @@
 #include "nests/ih_nests.h"
 #include "points/ih_points.h"
 #include "points/ih_windows.h"
+#include "pose/ih_pose.h"
 #include "rig/ih_rig.h"
 #include "surface/ih_samples.h"
 #include "surface/ih_surface.h"
@@ -59,6 +60,7 @@ struct ih_params {
     struct ih_hypotheses_params hypotheses;
     struct ih_detections_params detections;
     struct ih_tracks_params tracks;
+    struct ih_pose_params pose;
 };
 
 /* Working memory from dots to labels. */
@@ -78,6 +80,7 @@ struct isohead {
     /* From the frames before. */
     struct ih_tracks tracks;
     struct ih_align align;
+    struct ih_pose pose;
     /* The stages' outputs of the last frame, in order. */
     struct ih_dots dots;
     struct ih_labels labels;
@@ -99,6 +102,7 @@ struct isohead {
         struct ih_surface_scratch surface;
         struct ih_nests_scratch nests;
         struct ih_detections_scratch detections;
+        struct ih_pose_scratch pose;
     } scratch;
 };
 

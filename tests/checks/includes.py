@@ -11,6 +11,7 @@
            hal/linux, and app_cortexm one, hal/cortexm, with the decoder of PGM.
   sim      core, the app's records and rig, hal, its own files.
   render   its own files and the system: what draws the frames shares no line with what reads them.
+  people   core.
   rigblob  core, the app's rig, hal_file.h.
   size     the system: a plugin of QEMU.
   bench    core, the app's rig, hal's files, its own files.
@@ -25,7 +26,7 @@ import sys
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 
-CORE_ORDER = ["base", "simd", "rig", "dots", "labels", "align", "points", "surface", "nests", "detect", "tracks", "upkeep"]
+CORE_ORDER = ["base", "simd", "rig", "dots", "labels", "align", "points", "surface", "nests", "detect", "tracks", "pose", "upkeep"]
 CORE_SYSTEM = {"stdalign.h", "stdbool.h", "stddef.h", "stdint.h", "string.h"}
 # The vectors of x86 and ARM, and the pairs of a Cortex-M: for simd alone.
 VECTOR_HEADERS = {"immintrin.h", "emmintrin.h", "arm_neon.h", "arm_acle.h"}
@@ -100,6 +101,10 @@ def judge_size(_path, quoted, _target):
     return "a plugin of QEMU knows nothing of ours" if quoted else None
 
 
+def judge_people(_path, quoted, target):
+    return None if is_core(target) or not quoted else "only the core"
+
+
 def judge_rigblob(path, quoted, target):
     if not quoted or is_core(target) or re.fullmatch(r"app_rig(_explain)?\.h|hal\.h|hal_file\.h", target):
         return None
@@ -115,7 +120,7 @@ def judge_bench(path, quoted, target):
 
 FOLDERS = {"firmware/core": judge_core, "firmware/app": judge_app, "hal": judge_hal, "sim": judge_sim,
            "tools/render": judge_render, "tools/rigblob": judge_rigblob, "tools/size": judge_size,
-           "tools/bench": judge_bench}
+           "tools/bench": judge_bench, "tools/people": judge_people}
 
 
 def judge(path, line):

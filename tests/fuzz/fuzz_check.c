@@ -348,6 +348,10 @@ static void check_entry(const struct ih_result_entry *entry)
     FUZZ_CHECK(entry->track_id >= 0 && entry->sigma_mm_q8 >= 0);
     FUZZ_CHECK(entry->sigma_mm_q8 <= 500 << 8);
     FUZZ_CHECK(!entry->is_predicted || entry->track_id > 0);
+    FUZZ_CHECK(!entry->pose.is_known || (entry->track_id > 0 && entry->rejected == IH_ACCEPTED));
+    FUZZ_CHECK(entry->pose.yaw_mdeg > -180000 && entry->pose.yaw_mdeg <= 180000);
+    FUZZ_CHECK(entry->pose.pitch_mdeg >= -90000 && entry->pose.pitch_mdeg <= 90000);
+    FUZZ_CHECK(entry->pose.yaw_sigma_mdeg >= 0 && entry->pose.pitch_sigma_mdeg >= 0);
 }
 
 void fuzz_check_result(const struct ih_result *result)

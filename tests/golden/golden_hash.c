@@ -280,6 +280,29 @@ static uint64_t hash_align(const struct isohead *head)
     return hash;
 }
 
+/* What is believed, and what the result says of it. */
+static uint64_t hash_pose(const struct isohead *head)
+{
+    const struct ih_pose *pose = &head->pose;
+    uint64_t hash = golden_add_word(GOLDEN_FNV_START, pose->belief_count);
+    for (int32_t i = 0; i < pose->belief_count; i++) {
+        const struct ih_pose_belief *belief = &pose->belief[i];
+        hash = golden_add_word(hash, belief->track_id);
+        hash = golden_add(hash, belief->time_us, 8);
+        hash = golden_add_words(hash, belief->yaw_q16, sizeof belief->yaw_q16);
+        hash = golden_add_words(hash, belief->pitch_q16, sizeof belief->pitch_q16);
+    }
+    for (int32_t i = 0; i < head->result.entry_count; i++) {
+        const struct ih_head_pose *said = &head->result.entry[i].pose;
+        hash = golden_add_word(hash, said->is_known);
+        hash = golden_add_word(hash, said->yaw_mdeg);
+        hash = golden_add_word(hash, said->pitch_mdeg);
+        hash = golden_add_word(hash, said->yaw_sigma_mdeg);
+        hash = golden_add_word(hash, said->pitch_sigma_mdeg);
+    }
+    return hash;
+}
+
 const struct golden_stage golden_stage[GOLDEN_STAGES] = {
     {"dots", hash_dots},
     {"labels", hash_labels},
@@ -294,4 +317,5 @@ const struct golden_stage golden_stage[GOLDEN_STAGES] = {
     {"tracks", hash_tracks},
     {"result", hash_result},
     {"align", hash_align},
+    {"pose", hash_pose},
 };

@@ -13,7 +13,7 @@ struct golden_stage {
     uint64_t (*hash)(const struct isohead *head);
 };
 
-#define GOLDEN_STAGES 13
+#define GOLDEN_STAGES 14
 
 /* In the order of processing. */
 extern const struct golden_stage golden_stage[GOLDEN_STAGES];

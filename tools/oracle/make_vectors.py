@@ -22,6 +22,7 @@ import isohead
 import labels
 import noise
 import points
+import pose
 import rig
 import samples
 import scan
@@ -36,7 +37,7 @@ STAGES = {"rig": rig, "bandpass": bandpass, "noise": noise, "dots": dots, "label
           "align": align,           "exposure": exposure, "cloud": cloud, "windows": windows, "points": points,
           "samples": samples, "cholesky": cholesky, "surface": surface, "ellipse": ellipse,
           "rays": rays, "ellipsoid": ellipsoid, "scan": scan, "fit": fit, "evidence": evidence,
-          "surroundings": surroundings, "score": score, "tracks": tracks, "isohead": isohead}
+          "surroundings": surroundings, "score": score, "tracks": tracks, "pose": pose, "isohead": isohead}
 
 
 def main():

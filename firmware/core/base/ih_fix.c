@@ -117,3 +117,12 @@ int32_t ih_atan2_mdeg(int64_t y, int64_t x)
     IH_IN_RANGE(angle_mdeg, -180001, 180001);
     return angle_mdeg <= -180000 ? angle_mdeg + 360000 : angle_mdeg;
 }
+
+int32_t ih_power_q16(int64_t x_q16)
+{
+    const int64_t fraction = x_q16 & 0xffff;
+    const int64_t whole = x_q16 >> 16;
+    int64_t sum = -ih_mul_shift(fraction, 2560, 16) + 15145; /* of exp(-x ln 2): x^3, x^2 */
+    sum = ih_mul_shift(sum, fraction, 16) - 45353;
+    return whole > 30 ? 0 : (int32_t)(65536 + ih_mul_shift(sum, fraction, 16)) >> whole;
+}

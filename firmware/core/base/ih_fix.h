@@ -147,6 +147,9 @@ static inline uint32_t ih_inverse_root_q15(uint32_t m_q32)
     return entry - (((entry - ih_root_inverse_q15[at + 1]) * fraction_q16 + 0xffff) >> 16);
 }
 
+/* 2^-x, x >= 0 in Q16: within 2^-13. */
+int32_t ih_power_q16(int64_t x_q16);
+
 /* Number of bits needed for value; 0 for 0. */
 static inline int ih_bits_u64(uint64_t value)
 {

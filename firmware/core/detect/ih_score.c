@@ -4,21 +4,10 @@
 #include "base/ih_range.h"
 #include "detect/ih_score_weights.h"
 
-/* 2^-x for x in [0, 1), Q16: a cubic through the ends, within 2^-13. */
-static int32_t power_q16(int32_t fraction_q16)
-{
-    int64_t x = fraction_q16;
-    int64_t sum = -ih_mul_shift(x, 2560, 16) + 15145; /* of exp(-x ln 2): x^3, x^2 */
-    sum = ih_mul_shift(sum, x, 16) - 45353;
-    return (int32_t)(65536 + ih_mul_shift(sum, x, 16));
-}
-
 int32_t ih_score_probability_q16(int32_t logit_q10)
 {
     /* exp(-|logit|) = 2^-(|logit| / ln 2) */
-    int64_t power2_q16 = ih_mul_shift(ih_abs_s64(logit_q10), 94548, 10);
-    int64_t whole = power2_q16 >> 16;
-    int64_t small_q16 = whole > 30 ? 0 : power_q16((int32_t)(power2_q16 & 0xffff)) >> whole;
+    int64_t small_q16 = ih_power_q16(ih_mul_shift(ih_abs_s64(logit_q10), 94548, 10));
     int64_t likely_q16 = ih_div_round((int64_t)1 << 32, 65536 + small_q16);
     IH_IN_RANGE(likely_q16, 32768, 65536);
     return (int32_t)(logit_q10 >= 0 ? likely_q16 : 65536 - likely_q16);

@@ -20,6 +20,14 @@
 
 #define IH_RESULT_MAX (IH_DETECTIONS_MAX + IH_TRACKS_MAX)
 
+/* Where a head looks, by ih_pose: 0, 0 is straight back along the camera's Z axis. Yaw is positive when the face
+ * turns towards +X, pitch when it looks up. */
+struct ih_head_pose {
+    bool is_known;
+    int32_t yaw_mdeg, pitch_mdeg; /* yaw: -179999 .. 180000 */
+    int32_t yaw_sigma_mdeg, pitch_sigma_mdeg;
+};
+
 struct ih_result_entry {
     int32_t u_px_q12, v_px_q12; /* centre of the ellipse in the frame (distorted pixels) */
     int32_t a_px_q12, b_px_q12; /* semi-axes, a >= b */
@@ -34,6 +42,7 @@ struct ih_result_entry {
     int32_t track_id;              /* 0: none */
     int32_t sigma_mm_q8;           /* of the centre along each axis; with a track */
     bool is_predicted;             /* not detected in this frame, but predicted by its track */
+    struct ih_head_pose pose;      /* of a head with a track; else 0 and not known */
 };
 
 struct ih_result {

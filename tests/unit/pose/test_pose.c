@@ -1,0 +1,530 @@
+/* ih_pose and ih_pose_look: features and mean heads against a float64 reference with weights of the test's own, as the
+ * learnt ones may change; beliefs against their arithmetic; and what a head, its track and time do to them. */
+#include <math.h>
+
+#include "base/ih_config.h"
+#include "pose/ih_pose.h"
+#include "pose/ih_pose_look.h"
+#include "rig/ih_level.h"
+
+#include "ih_test.h"
+
+#define RADIANS 0.017453292519943295 /* of a degree */
+
+struct vector_look {
+    int32_t kind, length_px_mm_q8, unit_q28;
+    struct ih_ellipsoid head;
+    const struct ih_point *point;
+    const double *feature, *log2; /* of all features and outputs */
+};
+
+#include "pose.inc"
+
+static struct ih_points points;
+static struct ih_rig rig;
+static struct ih_pose_look_scratch look;
+static struct ih_pose_means means;
+static struct ih_pose_likelihood likelihood;
+static struct ih_pose_params params;
+static struct ih_pose pose;
+static struct ih_pose_scratch scratch;
+static struct ih_detections detections;
+static struct ih_predicted predicted;
+static struct ih_tracks tracks;
+static struct ih_result result;
+
+void setUp(void)
+{
+    memset(&points, 0, sizeof points);
+    memset(&rig, 0, sizeof rig);
+    rig.is_level = true;
+    memset(&look, IH_TEST_FILL, sizeof look);
+    memset(&likelihood, IH_TEST_FILL, sizeof likelihood);
+    memset(&pose, 0, sizeof pose);
+    memset(&detections, 0, sizeof detections);
+    memset(&predicted, 0, sizeof predicted);
+    ih_tracks_init(&tracks);
+    ih_result_clear(&result);
+    ih_pose_params_default(&params);
+}
+
+void tearDown(void)
+{
+}
+
+/* As tools/oracle/pose.py has it. */
+static void fill_means(void)
+{
+    for (int32_t i = 0; i < IH_POSE_MEANS; i++) {
+        means.bias_q10[i] = (i * 1237) % 8191 - 4095;
+        for (int32_t k = 0; k < IH_POSE_FEATURES; k++) {
+            /* Those of pitch are their own mirror images. */
+            const bool is_pitch = i >= IH_POSE_YAWS / 2 && k < IH_POSE_FEATURES - 5;
+            const int32_t column = k % IH_POSE_COLUMNS;
+            const int32_t twin = k - column + ih_min_s32(column, IH_POSE_COLUMNS - 1 - column);
+            const int32_t at = is_pitch ? twin : k;
+            means.line_q5[i][k] = (int8_t)((i * 37 + at * 101 + i * at) % 61 - 30);
+            means.square_q5[i][k] = (int8_t)((i * 53 + at * 29 + i * at) % 41 - 20);
+        }
+    }
+}
+
+static void use_look(const struct vector_look *vector)
+{
+    rig.calibration.kind = (enum ih_rig_kind)vector->kind;
+    rig.line[IH_SLOTS / 2].length_px_mm_q8 = vector->length_px_mm_q8;
+    points.field.unit_q28 = vector->unit_q28;
+    memcpy(points.point, vector->point, sizeof points.point);
+}
+
+/* A step of a feature is 1/32; a point at the border of its range may fall on either side of it, so that the points of
+ * the vectors keep away from it. */
+static void features_are_those_of_the_reference(void)
+{
+    for (size_t i = 0; i < IH_TEST_COUNT(vector_looks); i++) {
+        const struct vector_look *vector = &vector_looks[i];
+        use_look(vector);
+        TEST_ASSERT_TRUE(ih_pose_look_features(&points, &rig, &vector->head, 10, &look));
+        for (int32_t k = 0; k < IH_POSE_FEATURES; k++) {
+            TEST_ASSERT_DOUBLE_WITHIN(0.06, vector->feature[k], look.feature_q5[0][k] / 32.0);
+        }
+    }
+}
+
+static void outputs_are_those_of_the_reference(void)
+{
+    fill_means();
+    for (size_t i = 0; i < IH_TEST_COUNT(vector_looks); i++) {
+        const struct vector_look *vector = &vector_looks[i];
+        use_look(vector);
+        TEST_ASSERT_TRUE(ih_pose_look_features(&points, &rig, &vector->head, 10, &look));
+        ih_pose_look_weigh(&means, &look, &likelihood);
+        for (int32_t k = 0; k < IH_POSE_OUTPUTS; k++) {
+            TEST_ASSERT_DOUBLE_WITHIN(0.25, vector->log2[k], likelihood.log2_q10[k] / 1024.0);
+        }
+    }
+}
+
+/* A head and its mirror image: yaws change sides, pitches stay. */
+static void left_and_right_are_equal(void)
+{
+    struct ih_pose_likelihood mirrored;
+    struct ih_ellipsoid head = vector_looks[0].head;
+
+    use_look(&vector_looks[0]);
+    TEST_ASSERT_TRUE(ih_pose_look_features(&points, &rig, &head, 10, &look));
+    ih_pose_look_weigh(&ih_pose_means, &look, &likelihood);
+    head.centre_mm_q8[0] = -head.centre_mm_q8[0];
+    for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
+        points.point[slot].x_q28 = -points.point[slot].x_q28;
+    }
+    TEST_ASSERT_TRUE(ih_pose_look_features(&points, &rig, &head, 10, &look));
+    ih_pose_look_weigh(&ih_pose_means, &look, &mirrored);
+    for (int32_t i = 0; i < IH_POSE_YAWS; i++) {
+        TEST_ASSERT_INT32_WITHIN(256, likelihood.log2_q10[i],
+                                 mirrored.log2_q10[IH_POSE_YAWS - 1 - i]);
+    }
+    for (int32_t i = IH_POSE_YAWS; i < IH_POSE_OUTPUTS; i++) {
+        TEST_ASSERT_INT32_WITHIN(256, likelihood.log2_q10[i], mirrored.log2_q10[i]);
+    }
+}
+
+static void few_points_say_nothing(void)
+{
+    struct ih_ellipsoid head = {.centre_mm_q8 = {0, 0, 900 << 8},
+                                .semi_mm_q8 = {20000, 29000, 25000}};
+
+    rig.line[IH_SLOTS / 2].length_px_mm_q8 = 11500 << 8;
+    points.field.unit_q28 = 1 << 22;
+    TEST_ASSERT_FALSE(ih_pose_look_features(&points, &rig, &head, 10, &look));
+    for (int32_t i = 0; i < 10; i++) {
+        TEST_ASSERT_FALSE(ih_pose_look_features(&points, &rig, &head, 10, &look));
+        points.point[i] = (struct ih_point){.depth_mm_q8 = 820 << 8, .state = IH_POINT_SEEN};
+    }
+    TEST_ASSERT_TRUE(ih_pose_look_features(&points, &rig, &head, 10, &look));
+    points.point[3].depth_mm_q8 = 3000 << 8; /* the wall */
+    TEST_ASSERT_FALSE(ih_pose_look_features(&points, &rig, &head, 10, &look));
+    points.point[3].depth_mm_q8 = 820 << 8;
+    head.centre_mm_q8[2] = 0; /* in the camera */
+    TEST_ASSERT_FALSE(ih_pose_look_features(&points, &rig, &head, 10, &look));
+}
+
+/* All points in one cell, at every end of what a point can be: nothing overflows (make ranges), every feature is in
+ * its range. */
+static void the_ends_of_all_ranges_are_taken(void)
+{
+    static const int32_t centres_mm_q8[][3] = {
+        {0, 0, 256}, {1 << 26, 1 << 26, 1 << 26}, {-(1 << 26), -(1 << 26), 1 << 20}, {5, -7, 300}};
+    fill_means();
+    memset(means.line_q5, 127, sizeof means.line_q5);
+    memset(means.square_q5, 127, sizeof means.square_q5);
+    for (size_t i = 0; i < IH_TEST_COUNT(centres_mm_q8); i++) {
+        struct ih_ellipsoid head = {.semi_mm_q8 = {220 << 8, 220 << 8, 220 << 8}};
+        memcpy(head.centre_mm_q8, centres_mm_q8[i], sizeof head.centre_mm_q8);
+        for (int32_t kind = 0; kind < 2; kind++) {
+            rig.calibration.kind = (enum ih_rig_kind)kind;
+            rig.line[IH_SLOTS / 2].length_px_mm_q8 = 25600;
+            points.field.unit_q28 = 67108864;
+            for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
+                points.point[slot] = (struct ih_point){
+                    .x_q28 = (slot & 1) != 0 ? INT32_MAX : INT32_MIN,
+                    .y_q28 = (slot & 2) != 0 ? INT32_MAX : INT32_MIN,
+                    .depth_mm_q8 = slot < 200 ? head.centre_mm_q8[2] : 1 << 22,
+                    .state = IH_POINT_SEEN,
+                };
+                if (slot < 200) {
+                    points.point[slot].x_q28 =
+                        (int32_t)((int64_t)head.centre_mm_q8[0] * (1 << 28) /
+                                  ih_max_s32(head.centre_mm_q8[2], 1) % INT32_MAX);
+                    points.point[slot].y_q28 =
+                        (int32_t)((int64_t)head.centre_mm_q8[1] * (1 << 28) /
+                                  ih_max_s32(head.centre_mm_q8[2], 1) % INT32_MAX);
+                }
+            }
+            if (ih_pose_look_features(&points, &rig, &head, 0, &look)) {
+                for (int32_t k = 0; k < IH_POSE_FEATURES; k++) {
+                    TEST_ASSERT_TRUE(look.feature_q5[0][k] > -128);
+                }
+                ih_pose_look_weigh(&means, &look, &likelihood);
+            }
+        }
+    }
+}
+
+static int64_t sum_of(const int32_t *cell, int32_t count)
+{
+    int64_t sum = 0;
+    for (int32_t i = 0; i < count; i++) {
+        TEST_ASSERT_TRUE(cell[i] >= 0);
+        sum += cell[i];
+    }
+    return sum;
+}
+
+static void check_sums(const struct ih_pose_belief *belief)
+{
+    TEST_ASSERT_INT64_WITHIN(64, 65536, sum_of(belief->yaw_q16, IH_POSE_YAWS));
+    TEST_ASSERT_INT64_WITHIN(64, 65536, sum_of(belief->pitch_q16, IH_POSE_PITCHES));
+}
+
+/* Certain of one yaw and one pitch. */
+static void be_certain(struct ih_pose_belief *belief, int32_t yaw, int32_t pitch)
+{
+    memset(belief, 0, sizeof *belief);
+    belief->yaw_q16[yaw] = belief->pitch_q16[pitch] = 65536;
+}
+
+static void beliefs_begin_as_what_was_learnt_and_are_not_known(void)
+{
+    static const int32_t ahead_mm_q8[3] = {0, 0, 1 << 18};
+    struct ih_pose_belief belief;
+    struct ih_head_pose said;
+
+    ih_pose_begin(7, 1234, &belief);
+    TEST_ASSERT_EQUAL_INT32(7, belief.track_id);
+    TEST_ASSERT_EQUAL_INT64(1234, belief.time_us);
+    check_sums(&belief);
+    for (int32_t i = 0; i < IH_POSE_YAWS; i++) {
+        TEST_ASSERT_EQUAL_INT32(belief.yaw_q16[i], belief.yaw_q16[IH_POSE_YAWS - 1 - i]);
+    }
+    ih_pose_conclude(&belief, &params, ahead_mm_q8, &said);
+    TEST_ASSERT_FALSE(said.is_known);
+}
+
+/* Angles are against the camera's axis: a head at 45 degrees to the right that looks at the camera has turned to -X. */
+static void directions_are_against_the_cameras_axis(void)
+{
+    static const struct {
+        int32_t yaw, pitch, x_mm, z_mm, yaw_mdeg, pitch_mdeg;
+    } cases[] = {
+        {12, 4, 0, 1000, 7500, 0},       {11, 4, 0, 1000, -7500, 0},
+        {12, 4, 1000, 1000, -37500, 0},  {12, 4, -1000, 1000, 52500, 0},
+        {23, 8, 0, 1000, 172500, 40000}, {0, 0, 0, 1000, -172500, -40000},
+        {0, 4, 1000, 1000, 142500, 0},   {23, 4, -1000, 1000, -142500, 0},
+    };
+    for (size_t i = 0; i < IH_TEST_COUNT(cases); i++) {
+        const int32_t centre_mm_q8[3] = {cases[i].x_mm * 256, 0, cases[i].z_mm * 256};
+        struct ih_pose_belief belief;
+        struct ih_head_pose said;
+        be_certain(&belief, cases[i].yaw, cases[i].pitch);
+        ih_pose_conclude(&belief, &params, centre_mm_q8, &said);
+        TEST_ASSERT_TRUE(said.is_known);
+        TEST_ASSERT_INT32_WITHIN(3, cases[i].yaw_mdeg, said.yaw_mdeg);
+        TEST_ASSERT_EQUAL_INT32(cases[i].pitch_mdeg, said.pitch_mdeg);
+        TEST_ASSERT_EQUAL_INT32(params.yaw_sigma_mdeg, said.yaw_sigma_mdeg);
+        TEST_ASSERT_EQUAL_INT32(params.pitch_sigma_mdeg, said.pitch_sigma_mdeg);
+    }
+}
+
+/* Half on each of two neighbours: the mean between them, across the seam of the ring as well. */
+static void a_mean_goes_across_the_back(void)
+{
+    static const int32_t ahead_mm_q8[3] = {0, 0, 1 << 18};
+    for (int32_t first = 0; first < IH_POSE_YAWS; first++) {
+        struct ih_pose_belief belief;
+        struct ih_head_pose said;
+        const int32_t between_mdeg = (first + 1) * 15000 - 180000;
+        be_certain(&belief, first, 4);
+        belief.yaw_q16[first] = belief.yaw_q16[(first + 1) % IH_POSE_YAWS] = 32768;
+        ih_pose_conclude(&belief, &params, ahead_mm_q8, &said);
+        TEST_ASSERT_INT32_WITHIN(1, between_mdeg == 180000 ? 180000 : between_mdeg, said.yaw_mdeg);
+        /* 7.5 degrees on both sides, and the 4 of its own */
+        TEST_ASSERT_INT32_WITHIN(
+            2,
+            (int32_t)lround(
+                sqrt(7500.0 * 7500 + (double)params.yaw_sigma_mdeg * params.yaw_sigma_mdeg)),
+            said.yaw_sigma_mdeg);
+    }
+}
+
+static void two_peaks_are_not_known(void)
+{
+    static const int32_t ahead_mm_q8[3] = {0, 0, 1 << 18};
+    struct ih_pose_belief belief;
+    struct ih_head_pose said;
+
+    be_certain(&belief, 12, 4);
+    belief.yaw_q16[12] = params.known_min_q16;
+    belief.yaw_q16[0] = 65536 - params.known_min_q16;
+    ih_pose_conclude(&belief, &params, ahead_mm_q8, &said);
+    TEST_ASSERT_TRUE(said.is_known);
+    belief.yaw_q16[12]--;
+    belief.yaw_q16[0]++;
+    ih_pose_conclude(&belief, &params, ahead_mm_q8, &said);
+    TEST_ASSERT_FALSE(said.is_known);
+}
+
+/* A step of 1-2-1 adds half of a cell squared to the variance, whatever the frames' times. */
+static void time_spreads_in_proportion(void)
+{
+    params.yaw.leak_q16 = params.pitch.leak_q16 = 0;
+    for (int64_t parts = 1; parts <= 8; parts *= 2) {
+        struct ih_pose_belief belief;
+        double variance = 0;
+        be_certain(&belief, 12, 4);
+        for (int64_t i = 1; i <= parts; i++) {
+            ih_pose_wait(&belief, &params, i * 8 * params.step_us / parts);
+            check_sums(&belief);
+        }
+        for (int32_t i = 0; i < IH_POSE_YAWS; i++) {
+            variance += (i - 12) * (i - 12) * belief.yaw_q16[i] / 65536.0;
+        }
+        TEST_ASSERT_DOUBLE_WITHIN(0.05, 8 * 0.5, variance);
+    }
+}
+
+/* The seam is no wall; a pitch has ends. */
+static void yaws_are_a_ring_and_pitches_are_not(void)
+{
+    struct ih_pose_belief belief;
+
+    params.yaw.leak_q16 = params.pitch.leak_q16 = 0;
+    be_certain(&belief, 0, 0);
+    ih_pose_wait(&belief, &params, params.step_us);
+    TEST_ASSERT_EQUAL_INT32(32768, belief.yaw_q16[0]);
+    TEST_ASSERT_EQUAL_INT32(16384, belief.yaw_q16[1]);
+    TEST_ASSERT_EQUAL_INT32(16384, belief.yaw_q16[IH_POSE_YAWS - 1]);
+    TEST_ASSERT_EQUAL_INT32(0, belief.pitch_q16[IH_POSE_PITCHES - 1]);
+    check_sums(&belief);
+}
+
+static void long_times_end_in_what_it_began_with(void)
+{
+    struct ih_pose_belief belief, start;
+
+    ih_pose_begin(1, 0, &start);
+    be_certain(&belief, 0, 0);
+    for (int64_t i = 1; i <= 400; i++) {
+        ih_pose_wait(&belief, &params, i * 1000 * (int64_t)params.step_us);
+        check_sums(&belief);
+    }
+    for (int32_t i = 0; i < IH_POSE_YAWS; i++) {
+        /* spreading evens it out, the leak brings it back */
+        TEST_ASSERT_INT32_WITHIN(3000, start.yaw_q16[i], belief.yaw_q16[i]);
+    }
+    ih_pose_wait(&belief, &params, INT64_MAX);
+    check_sums(&belief);
+}
+
+/* Bayes' rule, and its power. */
+static void a_frame_multiplies(void)
+{
+    struct ih_pose_belief belief;
+
+    memset(&likelihood, 0, sizeof likelihood);
+    for (int32_t i = 0; i < IH_POSE_OUTPUTS; i++) {
+        likelihood.log2_q10[i] = -20 * 1024;
+    }
+    be_certain(&belief, 3, 2);
+    belief.yaw_q16[3] = belief.yaw_q16[9] = 32768;
+    likelihood.log2_q10[3] = 5 * 1024;
+    likelihood.log2_q10[9] = 3 * 1024;
+    likelihood.log2_q10[IH_POSE_YAWS + 2] = 0;
+    ih_pose_learn(&belief, &likelihood, 256, 256); /* 4 to 1 */
+    TEST_ASSERT_INT32_WITHIN(16, 65536 * 4 / 5, belief.yaw_q16[3]);
+    TEST_ASSERT_INT32_WITHIN(16, 65536 / 5, belief.yaw_q16[9]);
+    TEST_ASSERT_EQUAL_INT32(65536, belief.pitch_q16[2]);
+    belief.yaw_q16[3] = belief.yaw_q16[9] = 32768;
+    ih_pose_learn(&belief, &likelihood, 128, 128); /* 2 to 1 */
+    TEST_ASSERT_INT32_WITHIN(16, 65536 * 2 / 3, belief.yaw_q16[3]);
+    check_sums(&belief);
+}
+
+/* However sure one was, a few frames that say otherwise suffice: some of the beginning stays for each. */
+static void frames_may_overrule(void)
+{
+    struct ih_pose_belief belief;
+    int32_t frames = 0;
+
+    for (int32_t i = 0; i < IH_POSE_OUTPUTS; i++) {
+        likelihood.log2_q10[i] = -30 * 1024;
+    }
+    likelihood.log2_q10[0] = likelihood.log2_q10[IH_POSE_YAWS] = 0;
+    be_certain(&belief, 12, 8);
+    for (; belief.yaw_q16[0] < params.known_min_q16 && frames < 10; frames++) {
+        ih_pose_wait(&belief, &params, belief.time_us + 1);
+        ih_pose_learn(&belief, &likelihood, params.yaw.follow_q8, params.pitch.follow_q8);
+        check_sums(&belief);
+    }
+    TEST_ASSERT_LESS_THAN_INT32(3, frames);
+}
+
+/* A head of a track before the camera, as far as ih_pose looks at it. */
+static void add_head(int32_t track_id, bool is_predicted)
+{
+    const struct ih_ellipsoid head = vector_looks[0].head;
+    struct ih_result_entry *entry = &result.entry[result.entry_count];
+    if (is_predicted) {
+        predicted.head[predicted.count++].head = head;
+    } else {
+        detections.detection[detections.detection_count++].head = head;
+    }
+    tracks.track[tracks.track_count++].id = track_id;
+    *entry = (struct ih_result_entry){.track_id = track_id, .is_predicted = is_predicted};
+    memcpy(entry->centre_mm_q8, head.centre_mm_q8, sizeof entry->centre_mm_q8);
+    result.entry_count++;
+}
+
+static void update(int64_t time_us)
+{
+    tracks.time_us = time_us;
+    ih_pose_update(&pose, &params, &points, &rig, &detections, &predicted, &tracks, &scratch,
+                   &result);
+}
+
+static void beliefs_come_and_go_with_their_tracks(void)
+{
+    use_look(&vector_looks[0]);
+    for (int32_t i = 0; i < IH_TRACKS_MAX; i++) {
+        add_head(i + 5, false);
+    }
+    update(1000);
+    TEST_ASSERT_EQUAL_INT32(IH_TRACKS_MAX, pose.belief_count);
+    update(2000);
+    TEST_ASSERT_EQUAL_INT32(IH_TRACKS_MAX, pose.belief_count);
+    TEST_ASSERT_EQUAL_INT64(2000, pose.belief[3].time_us);
+    tracks.track[0].id = 99; /* the first ended, another began */
+    result.entry[0].track_id = 99;
+    update(3000);
+    TEST_ASSERT_EQUAL_INT32(IH_TRACKS_MAX, pose.belief_count);
+    TEST_ASSERT_EQUAL_INT32(6, pose.belief[0].track_id);
+    TEST_ASSERT_EQUAL_INT32(99, pose.belief[IH_TRACKS_MAX - 1].track_id);
+    tracks.track_count = 0;
+    result.entry_count = 0;
+    update(4000);
+    TEST_ASSERT_EQUAL_INT32(0, pose.belief_count);
+}
+
+static void what_is_no_head_has_no_pose(void)
+{
+    use_look(&vector_looks[0]);
+    add_head(1, false);
+    result.entry[0].rejected = IH_REJECT_SCORE;
+    update(1000);
+    TEST_ASSERT_EQUAL_INT32(0, pose.belief_count);
+    TEST_ASSERT_FALSE(result.entry[0].pose.is_known);
+    result.entry[0].rejected = IH_ACCEPTED;
+    result.entry[0].track_id = 0;
+    update(2000);
+    TEST_ASSERT_EQUAL_INT32(0, pose.belief_count);
+}
+
+/* A predicted head is not looked at: it only becomes less certain. */
+static void predicted_heads_are_not_looked_at(void)
+{
+    use_look(&vector_looks[0]);
+    params.yaw.leak_q16 = 0;
+    add_head(1, true);
+    pose.belief_count = 1;
+    be_certain(&pose.belief[0], 12, 4);
+    pose.belief[0].track_id = 1;
+    update(params.step_us);
+    TEST_ASSERT_INT32_WITHIN(2500, 32768, pose.belief[0].yaw_q16[12]);
+    TEST_ASSERT_INT32_WITHIN(2500, 16384, pose.belief[0].yaw_q16[11]);
+    update((int64_t)60 * params.step_us);
+    update((int64_t)120 * params.step_us);
+    TEST_ASSERT_FALSE(result.entry[0].pose.is_known);
+}
+
+/* A camera that is tilted by 30 degrees down, or rolled, sees the same face at other angles: those of its direction in its
+ * own frame, by double arithmetic. */
+static void directions_are_those_of_the_camera(void)
+{
+    static const double ups[][3] = {
+        {0, -0.8, -0.6}, {0, -0.8, 0.6}, {0.28, -0.96, 0}, {-0.48, -0.6, 0.64}};
+    for (size_t i = 0; i < IH_TEST_COUNT(ups); i++) {
+        for (int32_t yaw = 0; yaw < IH_POSE_YAWS; yaw++) {
+            const int32_t pitch = (yaw * 5) % IH_POSE_PITCHES;
+            const double a = (yaw * 15.0 - 172.5) * RADIANS, b = (pitch * 10.0 - 40.0) * RADIANS;
+            const double level[3] = {sin(a) * cos(b), -sin(b), -cos(a) * cos(b)};
+            double face[3] = {0, 0, 0};
+            struct ih_head_pose *said = &result.entry[0].pose;
+            setUp();
+            for (int axis = 0; axis < 3; axis++) {
+                rig.calibration.up_q30[axis] = (int32_t)lround(ups[i][axis] * (1 << 30));
+            }
+            TEST_ASSERT_EQUAL_INT(IH_OK, ih_level_init(&rig));
+            for (int axis = 0; axis < 3; axis++) {
+                for (int k = 0; k < 3; k++) {
+                    face[axis] += rig.level_q30[k][axis] / (double)(1 << 30) * level[k];
+                }
+            }
+            params.yaw.leak_q16 = params.pitch.leak_q16 = 0;
+            add_head(1, true);
+            predicted.head[0].head.centre_mm_q8[0] = 0;
+            pose.belief_count = 1;
+            be_certain(&pose.belief[0], yaw, pitch);
+            pose.belief[0].track_id = 1;
+            update(0);
+            TEST_ASSERT_TRUE(said->is_known);
+            TEST_ASSERT_DOUBLE_WITHIN(
+                0.02, 0,
+                remainder(atan2(face[0], -face[2]) / RADIANS - said->yaw_mdeg / 1000.0, 360));
+            TEST_ASSERT_DOUBLE_WITHIN(0.02, asin(-face[1]) / RADIANS, said->pitch_mdeg / 1000.0);
+        }
+    }
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(features_are_those_of_the_reference);
+    RUN_TEST(outputs_are_those_of_the_reference);
+    RUN_TEST(left_and_right_are_equal);
+    RUN_TEST(few_points_say_nothing);
+    RUN_TEST(the_ends_of_all_ranges_are_taken);
+    RUN_TEST(beliefs_begin_as_what_was_learnt_and_are_not_known);
+    RUN_TEST(directions_are_against_the_cameras_axis);
+    RUN_TEST(a_mean_goes_across_the_back);
+    RUN_TEST(two_peaks_are_not_known);
+    RUN_TEST(time_spreads_in_proportion);
+    RUN_TEST(yaws_are_a_ring_and_pitches_are_not);
+    RUN_TEST(long_times_end_in_what_it_began_with);
+    RUN_TEST(a_frame_multiplies);
+    RUN_TEST(frames_may_overrule);
+    RUN_TEST(beliefs_come_and_go_with_their_tracks);
+    RUN_TEST(what_is_no_head_has_no_pose);
+    RUN_TEST(directions_are_those_of_the_camera);
+    RUN_TEST(predicted_heads_are_not_looked_at);
+    return UNITY_END();
+}
