@@ -19,6 +19,29 @@ static void write_pair_px(struct app_write *write, const char *key, int32_t firs
     app_write_close(write, ']');
 }
 
+static void write_directions(struct app_write *write, const char *key, int32_t yaw_mdeg,
+                             int32_t pitch_mdeg)
+{
+    app_write_key(write, key);
+    app_write_open(write, '[');
+    app_write_decimal(write, app_text_direction(yaw_mdeg));
+    app_write_decimal(write, app_text_direction(pitch_mdeg));
+    app_write_close(write, ']');
+}
+
+static void write_pose(struct app_write *write, const struct ih_head_pose *pose)
+{
+    if (pose->is_known) {
+        write_directions(write, "pose_deg", pose->yaw_mdeg, pose->pitch_mdeg);
+        write_directions(write, "pose_sigma_deg", pose->yaw_sigma_mdeg, pose->pitch_sigma_mdeg);
+        return;
+    }
+    app_write_key(write, "pose_deg");
+    app_write_null(write);
+    app_write_key(write, "pose_sigma_deg");
+    app_write_null(write);
+}
+
 static void write_hypothesis(struct app_write *write, const struct ih_result_entry *hypothesis)
 {
     app_write_open(write, '{');
@@ -50,6 +73,7 @@ static void write_hypothesis(struct app_write *write, const struct ih_result_ent
         app_write_int_field(write, "track", hypothesis->track_id);
         app_write_key(write, "sigma_mm");
         app_write_decimal(write, app_text_fixed(hypothesis->sigma_mm_q8, 8, MM_DECIMALS));
+        write_pose(write, &hypothesis->pose);
     }
     if (hypothesis->is_predicted) {
         app_write_key(write, "predicted");

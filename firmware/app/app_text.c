@@ -40,6 +40,13 @@ struct app_decimal app_text_angle(int32_t angle_mdeg)
     return print_scaled(tenths % 1800, 1);
 }
 
+struct app_decimal app_text_direction(int32_t angle_mdeg)
+{
+    const int64_t magnitude = angle_mdeg < 0 ? -(int64_t)angle_mdeg : angle_mdeg;
+    const int64_t tenths = (magnitude + 50) / 100;
+    return print_scaled(angle_mdeg < 0 ? -tenths : tenths, 1);
+}
+
 struct app_decimal app_text_degrees(int32_t angle_rad_q30, int decimals)
 {
     return app_text_fixed((int64_t)angle_rad_q30 * DEG_PER_RAD_Q20 / (1 << 20), 30, decimals);

@@ -23,6 +23,9 @@ struct app_decimal app_text_fixed(int64_t value, int fraction_bits, int decimals
 /* Angle of a line: thousandths of a degree, 0 .. 179999, to one decimal, below 180.0. */
 struct app_decimal app_text_angle(int32_t angle_mdeg);
 
+/* Thousandths of a degree as degrees, to one decimal. */
+struct app_decimal app_text_direction(int32_t angle_mdeg);
+
 /* Radians as degrees; decimals as above. */
 struct app_decimal app_text_degrees(int32_t angle_rad_q30, int decimals);
 

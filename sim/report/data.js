@@ -136,6 +136,13 @@ const Data = (() => {
     return frame.verdict.selected_right ? "right" : "wrong";
   }
 
+  /* Where the face looks, a unit vector of the camera frame; null where it is not known. */
+  function directionOf(hypothesis) {
+    if (!hypothesis.pose_deg) return null;
+    const [yaw, pitch] = hypothesis.pose_deg.map((degrees) => degrees * Math.PI / 180);
+    return [Math.sin(yaw) * Math.cos(pitch), -Math.sin(pitch), -Math.cos(yaw) * Math.cos(pitch)];
+  }
+
   const truthMm = (frame) => frame.truth && frame.truth.head ? frame.truth.centre_mm_q8.map((v) => v / 256) : null;
 
   /* Was the other run right in a frame? null where nobody knows. */
@@ -151,5 +158,5 @@ const Data = (() => {
     return a && b ? apartMm(a.centre_mm, b.centre_mm) > MATCH_MM : Boolean(a) !== Boolean(b);
   }
 
-  return { run, others, apartMm, otherRight, differs, dirs, rows, frames, load, toPixel, toLevel, fromGrid, gridPixel, depthRange, depthColour, cssColour, state, truthMm, NODES, STOPS };
+  return { run, others, apartMm, otherRight, differs, dirs, rows, frames, load, toPixel, toLevel, fromGrid, gridPixel, depthRange, depthColour, cssColour, state, directionOf, truthMm, NODES, STOPS };
 })();

@@ -17,7 +17,9 @@
 
   function headText(record, selected) {
     const score = selected && selected.score !== undefined ? `, score\u00a0${selected.score.toFixed(3)}` : "";
-    return selected ? `head at ${mm(selected.centre_mm)}\u00a0mm${selected.predicted ? " (predicted)" : ""}${score}`
+    const pose = selected && selected.pose_deg
+      ? `, looks ${selected.pose_deg.map((v, i) => `${v.toFixed(0)} ± ${selected.pose_sigma_deg[i].toFixed(0)}°`).join(" aside, ")} up` : "";
+    return selected ? `head at ${mm(selected.centre_mm)}\u00a0mm${selected.predicted ? " (predicted)" : ""}${score}${pose}`
       : record.heads.length > 1 ? `${record.heads.length} heads, none selected` : "no head";
   }
 

@@ -134,6 +134,31 @@ const Picture = (() => {
     context.setLineDash([]);
   }
 
+  /* From a head's middle to where it looks; its end is 250 mm before it. */
+  function drawDirections(context, record, camera, px) {
+    for (const h of record.hypotheses) {
+      const direction = Data.directionOf(h);
+      if (!direction) continue;
+      const ends = [0, 250].map((length) => h.centre_mm.map((mm, axis) => mm + length * direction[axis]));
+      if (ends.some((end) => end[2] < 50)) continue;
+      const [from, to] = ends.map(([x, y, z]) => Data.toPixel(camera, x / z, y / z));
+      const angle = Math.atan2(to[1] - from[1], to[0] - from[0]);
+      const barb = Math.min(12 * px, Math.hypot(to[0] - from[0], to[1] - from[1]) / 2);
+      for (const [style, width] of [["#0009", 5.5], [colour("selected"), 3]]) {
+        context.strokeStyle = style;
+        context.lineWidth = width * px;
+        context.beginPath();
+        context.moveTo(...from);
+        context.lineTo(...to);
+        for (const side of [-0.5, 0.5]) {
+          context.moveTo(...to);
+          context.lineTo(to[0] - barb * Math.cos(angle + side), to[1] - barb * Math.sin(angle + side));
+        }
+        context.stroke();
+      }
+    }
+  }
+
   function drawTruth(context, frame, camera, px) {
     const mm = Data.truthMm(frame);
     if (!mm) return;
@@ -188,6 +213,7 @@ const Picture = (() => {
       if (layers.nests) drawNests(context, trace, camera, px);
     }
     if (layers.hypotheses && frame.record.hypotheses) drawHypotheses(context, frame.record, px);
+    if (layers.hypotheses && frame.record.hypotheses) drawDirections(context, frame.record, camera, px);
     if (layers.other) drawOther(context, frame, px);
     if (layers.truth) drawTruth(context, frame, camera, px);
     if (camera.level_q30) drawUp(context, camera, px);

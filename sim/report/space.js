@@ -117,6 +117,12 @@ const Space = (() => {
       const detection = Data.dirs[frame.dir].paper ? null : trace.findings[i];
       const semi = detection ? detection.semi_mm_q8.map((v) => v / 256) : MEAN_SEMI;
       group.add(makeEllipsoid(Data.toLevel(Data.dirs[frame.dir].camera, h.centre_mm), semi, h.rejected === null ? 0x00c98d : 0xff9d2e));
+      const direction = Data.directionOf(h);
+      if (direction) {
+        const [from, to] = [0, 1].map((length) => Data.toLevel(Data.dirs[frame.dir].camera, h.centre_mm.map((mm, axis) => mm + length * direction[axis])));
+        group.add(new THREE.ArrowHelper(new THREE.Vector3(...place(...to.map((mm, axis) => mm - from[axis]))),
+          new THREE.Vector3(...place(...from)), 250, 0x00c98d, 50, 30));
+      }
     });
     return group;
   }

@@ -77,7 +77,8 @@ const Tables = (() => {
       h.score === undefined ? null
         : held(h.score.toFixed(3), `over ${once} at once, ${later} from frame ${limits.mature_findings} on`, h.rejected === null),
       element("td", {}, h.centre_mm.map((v) => v.toFixed(1)).join(", "),
-        h.sigma_mm === undefined ? null : element("small", {}, `± ${h.sigma_mm.toFixed(1)}, track ${h.track}`)),
+        h.sigma_mm === undefined ? null : element("small", {}, `± ${h.sigma_mm.toFixed(1)}, track ${h.track}`),
+        !h.pose_deg ? null : element("small", {}, `looks ${h.pose_deg.map((v) => v.toFixed(1)).join("°, ")}°`)),
       element("td", {}, h.distance_mm.toFixed(1)),
       element("td", {}, h.pixel.map((v) => v.toFixed(2)).join(", "),
         element("small", {}, `${h.axes_px.map((v) => v.toFixed(2)).join(" × ")}, ${h.angle_deg.toFixed(1)}°`)));

@@ -12,7 +12,7 @@ import csv
 COLUMNS = (
     "dir", "file", "time_us", "dots", "labelled", "points", "error", "hypothesis", "pixel_u_px", "pixel_v_px",
     "axis_a_px", "axis_b_px", "angle_deg", "distance_mm", "centre_x_mm", "centre_y_mm", "centre_z_mm",
-    "rejected", "score", "frame_score", "track", "sigma_mm", "predicted", "head_rank", "selected", "dropped", "lost",
+    "rejected", "score", "frame_score", "track", "sigma_mm", "yaw_deg", "pitch_deg", "yaw_sigma_deg", "pitch_sigma_deg", "predicted", "head_rank", "selected", "dropped", "lost",
     "skipped", "strobe", "across_px", "rig", "rig_rotation_x_deg", "rig_rotation_y_deg", "rig_rotation_z_deg",
     "rig_focal_percent", "rig_shift_u_px", "rig_shift_v_px", "rig_depth_known",
 )
@@ -62,6 +62,8 @@ def hypothesis_fields(record, index):
     fields["pixel_u_px"], fields["pixel_v_px"] = h["pixel"]
     fields["axis_a_px"], fields["axis_b_px"] = h["axes_px"]
     fields["centre_x_mm"], fields["centre_y_mm"], fields["centre_z_mm"] = h["centre_mm"]
+    fields["yaw_deg"], fields["pitch_deg"] = h.get("pose_deg") or (None, None)
+    fields["yaw_sigma_deg"], fields["pitch_sigma_deg"] = h.get("pose_sigma_deg") or (None, None)
     fields["predicted"] = h.get("predicted", False)
     fields["head_rank"] = record.heads.index(index) if index in record.heads else None
     fields["selected"] = index == record.head

@@ -121,6 +121,8 @@ HYPOTHESIS_ADDED = (
     ("frame_score", is_number, "a number"),
     ("track", is_index, "a whole number"),
     ("sigma_mm", is_number, "a number"),
+    ("pose_deg", or_null(list_of(is_number, 2)), "[yaw, pitch] or null"),
+    ("pose_sigma_deg", or_null(list_of(is_number, 2)), "[yaw, pitch] or null"),
     ("predicted", is_bool, "true or false"),
 )
 RECORD_ADDED = (

@@ -80,9 +80,20 @@ def metres(position_mm):
     return [float(value) / 1000 for value in position_mm]
 
 
-def pose(position_mm):
+def pose(position_mm, orientation=NO_ROTATION):
     x, y, z = metres(position_mm)
-    return Pose(position=Vector3(x=x, y=y, z=z), orientation=NO_ROTATION)
+    return Pose(position=Vector3(x=x, y=y, z=z), orientation=orientation)
+
+
+def looking(pose_deg):
+    """What turns the x axis, along which players draw a pose's arrow, to where the face looks; without roll."""
+    if pose_deg is None:
+        return NO_ROTATION
+    yaw, pitch = (math.radians(float(angle)) for angle in pose_deg)
+    # About Y (down) by the angle from +X to the face, then up about what is then the y axis's neighbour, Z.
+    about_y, about_z = 0.5 * (0.5 * math.pi - yaw), -0.5 * pitch
+    return Quaternion(x=math.sin(about_y) * math.sin(about_z), y=math.sin(about_y) * math.cos(about_z),
+                      z=math.cos(about_y) * math.sin(about_z), w=math.cos(about_y) * math.cos(about_z))
 
 
 def pixel(u_px, v_px):
@@ -223,11 +234,12 @@ def surface(trace, rig, time):
 
 def facts(record, index):
     h = record.hypotheses[index]
-    keys = ("distance_mm", "score", "frame_score", "track", "sigma_mm", "predicted", "rejected")
+    keys = ("distance_mm", "score", "frame_score", "track", "sigma_mm", "pose_deg", "pose_sigma_deg", "predicted", "rejected")
     pairs = [(key, h[key]) for key in keys if h.get(key) is not None]
     if index == record.head:
         pairs.append(("selected", True))
-    return [KeyValuePair(key=key, value=str(value).lower()) for key, value in pairs]
+    return [KeyValuePair(key=key, value=", ".join(map(str, value)) if isinstance(value, list) else str(value).lower())
+            for key, value in pairs]
 
 
 def head(record, index, semi_axes_mm, time):
@@ -257,7 +269,8 @@ def head_pose(record, time):
     """Where the head is; None where there is none."""
     if record.head is None:
         return None
-    return PoseInFrame(timestamp=time, frame_id=CAMERA, pose=pose(record.hypotheses[record.head]["centre_mm"]))
+    h = record.hypotheses[record.head]
+    return PoseInFrame(timestamp=time, frame_id=CAMERA, pose=pose(h["centre_mm"], looking(h.get("pose_deg"))))
 
 
 def lost(record, time):

@@ -165,6 +165,7 @@ static void the_longest_record_has_room(void)
             .track_id = INT32_MIN,
             .sigma_mm_q8 = INT32_MIN,
             .is_predicted = true,
+            .pose = {true, INT32_MIN, INT32_MIN, INT32_MIN, INT32_MIN},
         };
     }
     TEST_ASSERT_TRUE(app_record_frame(&record, &frame, &head, &live));
