@@ -86,7 +86,8 @@ def expected_row(record, index):
     if "score" in h:
         row.append("%.3f%s" % (h["score"], " ✗" if h["rejected"] else ""))
     row.append(", ".join("%.1f" % v for v in h["centre_mm"]) +
-               ("|± %.1f, track %d" % (h["sigma_mm"], h["track"]) if "track" in h else ""))
+               ("|± %.1f, track %d" % (h["sigma_mm"], h["track"]) if "track" in h else "") +
+               ("|looks %.1f°, %.1f°" % tuple(v + 0.0 for v in h["pose_deg"]) if h.get("pose_deg") else ""))
     row.append("%.1f" % h["distance_mm"])
     row.append(", ".join("%.2f" % v for v in h["pixel"]) + "|%.2f × %.2f, %.1f°" % (*h["axes_px"], h["angle_deg"]))
     return row
