@@ -31,7 +31,7 @@ class Limits(unittest.TestCase):
         bounds = limits.read()
         self.assertEqual(set(bounds), limits.NAMES)
         self.assertEqual(bounds["ram_bytes"], 192 * 1024)
-        self.assertEqual(bounds["flash_bytes"], 96 * 1024)
+        self.assertEqual(bounds["flash_bytes"], 112 * 1024)
         self.assertEqual(bounds["stack_bytes"], 4 * 1024)
 
     def test_comments_and_blanks(self):
