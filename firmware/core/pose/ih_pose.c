@@ -87,7 +87,7 @@ void ih_pose_wait(struct ih_pose_belief *belief, const struct ih_pose_params *pa
         spread(belief->pitch_q16, IH_POSE_PITCHES, (int32_t)pitch_q16, false);
     }
     mix(belief->yaw_q16, ih_pose_prior_q16, IH_POSE_YAWS, params->yaw.leak_q16);
-    mix(belief->pitch_q16, ih_pose_prior_q16 + IH_POSE_YAWS, IH_POSE_PITCHES,
+    mix(belief->pitch_q16, &ih_pose_prior_q16[IH_POSE_YAWS], IH_POSE_PITCHES,
         params->pitch.leak_q16);
     belief->time_us = time_us;
 }
@@ -110,7 +110,7 @@ void ih_pose_learn(struct ih_pose_belief *belief, const struct ih_pose_likelihoo
                    int32_t yaw_power_q8, int32_t pitch_power_q8)
 {
     multiply(belief->yaw_q16, likelihood->log2_q10, IH_POSE_YAWS, yaw_power_q8);
-    multiply(belief->pitch_q16, likelihood->log2_q10 + IH_POSE_YAWS, IH_POSE_PITCHES,
+    multiply(belief->pitch_q16, &likelihood->log2_q10[IH_POSE_YAWS], IH_POSE_PITCHES,
              pitch_power_q8);
 }
 

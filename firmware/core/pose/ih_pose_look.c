@@ -31,7 +31,7 @@ static const struct grid head_grid = {IH_POSE_HEAD_ROWS, 5, -128, -176, 112, 32,
 static const struct grid body_grid = {IH_POSE_BODY_ROWS, 6, 160, -256, 256, 0, 7};
 
 /* The camera's vertical plane through the head's centre. */
-struct plane {
+struct head_plane {
     const int32_t *centre_mm_q8;
     int64_t cos_q14, sin_q14;
     int32_t distance_mm_q8; /* on the level */
@@ -39,7 +39,7 @@ struct plane {
 };
 
 static bool plane_of(const int32_t centre_mm_q8[3], const struct ih_points *points,
-                     struct plane *out)
+                     struct head_plane *out)
 {
     const int64_t x = centre_mm_q8[0];
     const int64_t z = centre_mm_q8[2];
@@ -47,7 +47,7 @@ static bool plane_of(const int32_t centre_mm_q8[3], const struct ih_points *poin
         return false;
     }
     const int64_t distance = ih_isqrt_u64((uint64_t)(x * x + z * z));
-    *out = (struct plane){
+    *out = (struct head_plane){
         .centre_mm_q8 = centre_mm_q8,
         .cos_q14 = ih_div_round(z * 16384, distance),
         .sin_q14 = ih_div_round(x * 16384, distance),
@@ -59,7 +59,8 @@ static bool plane_of(const int32_t centre_mm_q8[3], const struct ih_points *poin
 }
 
 /* A point in the plane's frame, against the centre. */
-static void place(const struct ih_point *point, const struct plane *plane, int32_t out_mm_q8[3])
+static void place(const struct ih_point *point, const struct head_plane *plane,
+                  int32_t out_mm_q8[3])
 {
     const int64_t x = ih_mul_shift(point->depth_mm_q8, point->x_q28, 28) - plane->centre_mm_q8[0];
     const int64_t y = ih_mul_shift(point->depth_mm_q8, point->y_q28, 28) - plane->centre_mm_q8[1];
@@ -92,7 +93,7 @@ static void spread(const int32_t place_mm_q8[3], const struct grid *grid,
 }
 
 /* The points on a grid are spread over its cells; returns how many lie on its middle cells. */
-static int32_t fill(const struct ih_points *points, const struct plane *plane,
+static int32_t fill(const struct ih_points *points, const struct head_plane *plane,
                     const struct grid *grid, struct ih_pose_cells *cells)
 {
     const int32_t aside_mm_q8 = (IH_POSE_COLUMNS + 1) / 2 << (grid->shift + 8);
@@ -130,10 +131,10 @@ static void blur_line(int32_t *cell, int32_t count, int32_t step)
 static void blur(int32_t *cell, int32_t rows)
 {
     for (int32_t column = 0; column < IH_POSE_COLUMNS; column++) {
-        blur_line(cell + column, rows, IH_POSE_COLUMNS);
+        blur_line(&cell[column], rows, IH_POSE_COLUMNS);
     }
     for (int32_t row = 0; row < rows; row++) {
-        blur_line(cell + row * IH_POSE_COLUMNS, IH_POSE_COLUMNS, 1);
+        blur_line(&cell[row * IH_POSE_COLUMNS], IH_POSE_COLUMNS, 1);
     }
 }
 
@@ -143,7 +144,7 @@ static int8_t feature(int64_t value_q5)
 }
 
 /* A grid's features, depths first, as seen and mirrored; returns where the next ones go. */
-static int32_t add_grid(const struct grid *grid, const struct plane *plane,
+static int32_t add_grid(const struct grid *grid, const struct head_plane *plane,
                         struct ih_pose_look_scratch *scratch, int32_t first)
 {
     const int32_t *weight_q12 = scratch->cells.weight_q8; /* Q12 once they are blurred */
@@ -170,7 +171,7 @@ static int32_t add_grid(const struct grid *grid, const struct plane *plane,
 }
 
 /* Standard deviation of a depth there. */
-static int64_t sigma_mm_q8(const struct ih_rig *rig, const struct plane *plane)
+static int64_t sigma_mm_q8(const struct ih_rig *rig, const struct head_plane *plane)
 {
     if (rig->calibration.kind == IH_RIG_RANGE) {
         return RANGE_SIGMA_MM_Q8;
@@ -182,7 +183,7 @@ static int64_t sigma_mm_q8(const struct ih_rig *rig, const struct plane *plane)
 }
 
 static void add_others(const struct ih_rig *rig, const struct ih_ellipsoid *head,
-                       const struct plane *plane, struct ih_pose_look_scratch *scratch,
+                       const struct head_plane *plane, struct ih_pose_look_scratch *scratch,
                        int32_t first)
 {
     const int64_t sigma = sigma_mm_q8(rig, plane);
@@ -201,13 +202,13 @@ bool ih_pose_look_features(const struct ih_points *points, const struct ih_rig *
                            const struct ih_ellipsoid *head, int32_t points_min,
                            struct ih_pose_look_scratch *scratch)
 {
-    struct plane plane;
+    struct head_plane plane;
     if (!plane_of(head->centre_mm_q8, points, &plane) ||
         fill(points, &plane, &head_grid, &scratch->cells) < points_min) {
         return false;
     }
     int32_t next = add_grid(&head_grid, &plane, scratch, 0);
-    fill(points, &plane, &body_grid, &scratch->cells);
+    (void)fill(points, &plane, &body_grid, &scratch->cells);
     next = add_grid(&body_grid, &plane, scratch, next);
     add_others(rig, head, &plane, scratch, next);
     return true;
