@@ -143,9 +143,9 @@ head -c 4000 s1/rig.bin >short.bin
 board=mps2-an500-O2
 refused "$board" 1 'flipped.bin: rig blob whose bytes have changed' flipped.bin s1/000000.pgm
 refused "$board" 1 'short.bin: rig blob that is too short' short.bin s1/000000.pgm
-refused "$board" 1 'long.bin: 4417 bytes, expected at most 4416' long.bin s1/000000.pgm
-refused "$board" 1 'rig.json: .* bytes, expected at most 4416' s1/rig.json s1/000000.pgm
-refused "$board" 1 '000000.pgm: .* bytes, expected at most 4416' s1/000000.pgm s1/000000.pgm
+refused "$board" 1 'long.bin: 4429 bytes, expected at most 4428' long.bin s1/000000.pgm
+refused "$board" 1 'rig.json: .* bytes, expected at most 4428' s1/rig.json s1/000000.pgm
+refused "$board" 1 '000000.pgm: .* bytes, expected at most 4428' s1/000000.pgm s1/000000.pgm
 refused "$board" 1 'none.bin: cannot be opened' none.bin s1/000000.pgm
 refused "$board" 2 'expected RIG FRAME' s1/rig.bin
 on_board "$board" s1/rig.bin s1/none.pgm
