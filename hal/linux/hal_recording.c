@@ -64,11 +64,12 @@ static int64_t bytes_of_part(int parent_fd, const char *name)
     return bytes;
 }
 
+/* On a board of 32 bits a file ends at 2 GB. */
 static bool write_all(int fd, const void *content, size_t size, int64_t offset)
 {
     const char *at = content;
     while (size > 0) {
-        ssize_t count = pwrite(fd, at, size, offset);
+        ssize_t count = pwrite(fd, at, size, (off_t)offset);
         if (count < 0 && errno == EINTR) {
             continue;
         }
@@ -211,7 +212,7 @@ static bool add_line(struct hal_recording *recording, const char *line, size_t s
         return true;
     }
     fail(error, "writing", LIST);
-    if (ftruncate(recording->list_fd, recording->list_bytes) != 0) {
+    if (ftruncate(recording->list_fd, (off_t)recording->list_bytes) != 0) {
         close_part(recording); /* the next frame begins another */
     }
     return false;
