@@ -245,8 +245,8 @@ const struct app_setting app_settings[] = {
      "no laser then",
      .take = take_text, .offset = AT(device)},
     {"loop", NULL, "auto, on or off",
-     "a directory's frames again and again: on; off, once; auto, the default, on with --view and "
-     "--check",
+     "a directory's frames again and again: on; once: off; auto, the default, is on with a live "
+     "view and for a check",
      .take = take_choice, .offset = AT(repeat), .words = repeat_words},
     {"format", "NAME", "auto, GREY, Y10, Y10P, Y12, Y12P, Y16, YUYV, UYVY or convert",
      "how the camera sends its samples: GREY, Y10, Y10P, Y12, Y12P, Y16, YUYV, UYVY, or convert, "
