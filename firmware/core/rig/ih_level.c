@@ -143,8 +143,11 @@ bool ih_level_sees(const struct ih_rig *rig, int32_t x_q28, int32_t y_q28, int32
 void ih_level_point_back(const struct ih_rig *rig, int32_t point_mm_q8[3])
 {
     int64_t out[3];
+    if (rig->is_level) {
+        return;
+    }
     rotate_vector(rig->level_back_q30, point_mm_q8, out);
-    for (int axis = 0; axis < 3 && !rig->is_level; axis++) {
+    for (int axis = 0; axis < 3; axis++) {
         point_mm_q8[axis] = (int32_t)out[axis];
     }
 }

@@ -314,7 +314,7 @@ static bool switch_on_once(void)
 }
 
 /* Switched on once, and no sign of life after it: both guards let go. One that let go, or refused, before the laser was
- * on has had the other told that it is off, which would then wait for nothing. */
+ * on has made the program send off to the other, which would then wait for nothing. */
 static void switch_on_and_stay_silent(void)
 {
     const char on = GUARD_ON;
