@@ -26,7 +26,9 @@
 
 #define LONG_MS (1000 * 1000)
 /* A limit of time that the machine's load is not to decide: many times what anything takes. */
-#define WIDE_MS 20000
+#define WIDE_MS 60000
+/* What is to wait for so long in a call waits for a guard: tests and guards wait for less at a time. */
+#define GUARD_WAIT_MIN_MS 1000
 
 /* Seen by every process. */
 struct shared {
@@ -47,13 +49,16 @@ struct shared {
 static struct shared *shared;
 static pid_t test_pid;
 static int line_fd = -1;
-static int line_ends[2]; /* the reading end sees its end of file when no process holds the line */
+static int line_ends[2] = {
+    -1, -1}; /* the reading end sees its end of file when no process holds the line */
 static int interlock_fd = -1;
 static struct hal_guard guard;
 static struct hal_error error;
 
 static int interrupt_count; /* so many calls of poll are interrupted */
-static bool poll_timed_out;
+/* How long a guard is waited for counts for the one behind this descriptor, once. A guard that gets no processor is
+ * waited for, however long it takes, and neither killed nor said not to have begun. */
+static int limited_fd = -1;
 static int pidfd_errno; /* why there is no descriptor of a process */
 
 /* In place of the C library's. */
@@ -64,10 +69,15 @@ int poll(struct pollfd *fds, nfds_t count, int timeout_ms)
         errno = EINTR;
         return -1;
     }
-    int ready =
-        ((int (*)(struct pollfd *, nfds_t, int))dlsym(RTLD_NEXT, "poll"))(fds, count, timeout_ms);
-    poll_timed_out = poll_timed_out || ready == 0;
-    return ready;
+    if (count > 0 && timeout_ms >= GUARD_WAIT_MIN_MS) {
+        /* The header declares that poll does not read what it is given. */
+        const struct pollfd *volatile asked = fds;
+        const bool is_limited = asked->fd == limited_fd;
+        timeout_ms = is_limited ? timeout_ms : -1;
+        limited_fd = is_limited ? -1 : limited_fd;
+    }
+    return ((int (*)(struct pollfd *, nfds_t, int))dlsym(RTLD_NEXT, "poll"))(fds, count,
+                                                                             timeout_ms);
 }
 
 long syscall(long number, ...)
@@ -88,12 +98,25 @@ long syscall(long number, ...)
                                                               values[2], values[3]);
 }
 
+/* What is left of an earlier opening. */
+static void close_ends(void)
+{
+    for (int i = 0; i < 2; i++) {
+        const int fd = i == 0 ? line_ends[0] : line_fd;
+        if (fd >= 0) {
+            close(fd);
+        }
+    }
+    line_ends[0] = line_fd = -1;
+}
+
 static bool line_open(void *context, struct hal_error *why)
 {
     (void)context;
     if (shared->open_fails) {
         return hal_fail(why, "line: refused");
     }
+    close_ends();
     TEST_ASSERT_EQUAL_INT(0, pipe(line_ends));
     line_fd = line_ends[1];
     shared->level = 0;
@@ -197,15 +220,9 @@ static bool set(bool on)
     return guard.strobe.set(guard.strobe.context, on, &error);
 }
 
-/* Again where a guard got no processor for as long as it is waited for. */
 static bool open_it(void)
 {
-    bool good = false;
-
-    do {
-        good = guard.strobe.open(guard.strobe.context, &error);
-    } while (!good && strstr(error.text, "did not begin") != NULL);
-    return good;
+    return guard.strobe.open(guard.strobe.context, &error);
 }
 
 static void close_it(void)
@@ -375,6 +392,18 @@ static int64_t now_us(void)
     return (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000;
 }
 
+/* Until it is so; the test's own time is over after WIDE_MS. */
+static void wait_until(bool (*is_so)(void))
+{
+    const int64_t end_us = now_us() + WIDE_MS * INT64_C(1000);
+    bool good = false;
+
+    while (!(good = is_so()) && now_us() < end_us) {
+        poll(NULL, 0, 1);
+    }
+    TEST_ASSERT_TRUE(good);
+}
+
 static void killed_the_laser_goes_off(void)
 {
     int64_t longest_us = 0;
@@ -442,8 +471,8 @@ static void a_line_that_fails_for_good_is_given_up(void)
 {
     const pid_t pid = program(LONG_MS, go_on);
 
-    shared->off_fail_count = 1000 * 1000;
     shared->off_count = 0;
+    shared->off_fail_count = 1000 * 1000;
     kill(pid, SIGKILL);
     end_of(pid);
     expect_guards_exit(GUARD_EXIT_LINE);
@@ -539,6 +568,11 @@ static void switched_on_behind_the_guards_back_it_goes_off_again(void)
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(error.text, "has let go"), error.text);
 }
 
+static bool is_noted(void)
+{
+    return sem_trywait(&shared->is_off) == 0;
+}
+
 /* It moves while this process is busy, and is closed again already: the guard switches off, and this
  * process learns of both. */
 static void a_moving_interlock_switches_off(void)
@@ -546,7 +580,6 @@ static void a_moving_interlock_switches_off(void)
     struct pollfd event_waits = {.events = POLLIN};
     char event = 'e';
     bool closed = true;
-    struct timespec end;
     int ends[2];
 
     TEST_ASSERT_EQUAL_INT(0, pipe(ends));
@@ -555,9 +588,7 @@ static void a_moving_interlock_switches_off(void)
     switch_on();
     shared->note_off = 1;
     TEST_ASSERT_EQUAL_INT(1, write(ends[1], &event, 1));
-    clock_gettime(CLOCK_REALTIME, &end);
-    end.tv_sec += 20;
-    TEST_ASSERT_EQUAL_INT(0, sem_timedwait(&shared->is_off, &end));
+    wait_until(is_noted);
     shared->note_off = 0;
     TEST_ASSERT_EQUAL_INT(0, shared->level);
     TEST_ASSERT_EQUAL_INT(1, poll(&event_waits, 1, 0));
@@ -636,11 +667,8 @@ static void closed_the_guard_ends_and_gives_the_line_back(void)
 static void interrupted_it_goes_on_waiting(void)
 {
     interrupt_count = 3;
-    poll_timed_out = false;
-    const bool good = guard.strobe.open(guard.strobe.context, &error);
-    TEST_ASSERT_TRUE_MESSAGE(good || poll_timed_out, error.text);
-    TEST_ASSERT_EQUAL_INT(0, interrupt_count);
     TEST_ASSERT_TRUE_MESSAGE(open_it(), error.text);
+    TEST_ASSERT_EQUAL_INT(0, interrupt_count);
     shared->off_count = 0;
     interrupt_count = 3;
     close_it();
@@ -687,7 +715,8 @@ static void without_descriptors_the_line_is_given_back(void)
     while (!good) {
         int fds[1024], count = 0;
 
-        while (count < IH_TEST_COUNT(fds) && (fds[count] = dup(0)) >= 0) {
+        close_ends();
+        while (count < IH_TEST_COUNT(fds) && (fds[count] = dup(STDOUT_FILENO)) >= 0) {
             count++;
         }
         TEST_ASSERT_TRUE_MESSAGE(count < IH_TEST_COUNT(fds), "no limit of descriptors was set");
@@ -745,7 +774,9 @@ static void a_guard_that_was_stopped_can_be_replaced(void)
     TEST_ASSERT_TRUE(open_it());
     TEST_ASSERT_TRUE(set(true));
     kill(guard.process[0].pid, SIGSTOP);
+    limited_fd = guard.process[0].socket_fd;
     TEST_ASSERT_TRUE(open_it());
+    TEST_ASSERT_EQUAL_INT_MESSAGE(-1, limited_fd, "it was not waited for");
     TEST_ASSERT_EQUAL_INT(0, shared->level);
     TEST_ASSERT_TRUE(set(true));
 }
@@ -787,22 +818,23 @@ static void while_off_it_needs_no_sign_of_life(void)
     TEST_ASSERT_TRUE_MESSAGE(good, error.text);
 }
 
-/* The time starts anew with every sign of life. A machine that is so slow that the guard was right
+/* The time starts anew with every sign of life. A machine that is so slow that a guard may have been right
  * to end before the sign says nothing, and is asked again. */
 static void a_sign_of_life_starts_the_time_anew(void)
 {
-    const int timeout_ms = 100;
+    const int timeout_ms = 500;
     int tries;
 
     for (tries = 0; tries < 50; tries++) {
-        int64_t fed_us;
+        int64_t begun_us, fed_us;
 
         init(timeout_ms);
         TEST_ASSERT_TRUE(open_it());
+        begun_us = now_us();
         switch_on_and_stay_silent();
         poll(NULL, 0, timeout_ms / 2);
         fed_us = now_us();
-        if (hal_guard_feed(&guard, &error)) {
+        if (hal_guard_feed(&guard, &error) && now_us() - begun_us < timeout_ms * 1000) {
             wait_for_end_of_own_guards();
             TEST_ASSERT_TRUE(now_us() - fed_us >= timeout_ms * 1000);
             return;
@@ -810,18 +842,6 @@ static void a_sign_of_life_starts_the_time_anew(void)
         close_it();
     }
     TEST_FAIL_MESSAGE("in 50 tries no sign of life came in time");
-}
-
-/* Until it is so; the test's own time is over after WIDE_MS. */
-static void wait_until(bool (*is_so)(void))
-{
-    const int64_t end_us = now_us() + WIDE_MS * INT64_C(1000);
-    bool good = false;
-
-    while (!(good = is_so()) && now_us() < end_us) {
-        poll(NULL, 0, 1);
-    }
-    TEST_ASSERT_TRUE(good);
 }
 
 static void the_rest_is_the_strobe_below(void)
@@ -880,8 +900,12 @@ static void with_both_guards_stopped_the_program_sees_it(void)
     TEST_ASSERT_TRUE(open_it());
     switch_on();
     for (int i = 0; i < HAL_GUARD_COUNT; i++) {
+        siginfo_t info;
         kill(guard.process[i].pid, SIGSTOP);
+        TEST_ASSERT_EQUAL_INT(0,
+                              waitid(P_PID, (id_t)guard.process[i].pid, &info, WSTOPPED | WNOWAIT));
     }
+    is_closed(); /* reports what a guard has switched off before it was stopped */
     wait_until(is_refused);
     TEST_ASSERT_TRUE(set(true));
     TEST_ASSERT_EQUAL_INT_MESSAGE(0, shared->level, "on without a guard that lives");
