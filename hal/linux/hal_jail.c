@@ -156,9 +156,6 @@ static bool filter_calls(struct hal_error *error)
 bool hal_jail_enter(struct hal_error *error)
 {
     const struct sched_param none = {.sched_priority = 0};
-    if (sched_setscheduler(0, SCHED_IDLE, &none) != 0) {
-        return hal_fail(error, "its priority cannot be lowered: %s", strerror(errno));
-    }
     if (geteuid() == 0 && (setgroups(0, NULL) != 0 || setresgid(NOBODY, NOBODY, NOBODY) != 0 ||
                            setresuid(NOBODY, NOBODY, NOBODY) != 0)) {
         return hal_fail(error, "root's rights cannot be given up: %s", strerror(errno));
@@ -167,6 +164,10 @@ bool hal_jail_enter(struct hal_error *error)
     if (prctl(PR_SET_DUMPABLE, 0) != 0 || prctl(PR_SET_PDEATHSIG, SIGKILL) != 0) {
         return hal_fail(error, "it cannot be kept from dumping core or outliving the program: %s",
                         strerror(errno));
+    }
+    /* Late: its beginning is waited for, and from here on it takes as long as others want the processor. */
+    if (sched_setscheduler(0, SCHED_IDLE, &none) != 0) {
+        return hal_fail(error, "its priority cannot be lowered: %s", strerror(errno));
     }
     return filter_calls(error);
 }

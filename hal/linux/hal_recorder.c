@@ -153,11 +153,15 @@ static bool prepare(struct writer *writer, struct hal_error *error)
     if (writer->samples == NULL) {
         return hal_fail(error, "no memory for a frame");
     }
-    if (!hal_descriptors_keep(keep_fds, sizeof keep_fds / sizeof keep_fds[0]) ||
-        sched_setscheduler(0, SCHED_IDLE, &none) != 0) {
+    if (!hal_descriptors_keep(keep_fds, sizeof keep_fds / sizeof keep_fds[0])) {
         return hal_fail(error, "its process cannot be set up: %s", strerror(errno));
     }
-    return hal_recording_open(&writer->recording, &config->recording, error);
+    if (!hal_recording_open(&writer->recording, &config->recording, error)) {
+        return false;
+    }
+    /* Last: its beginning is waited for, and from here on it takes as long as others want the processor. */
+    return sched_setscheduler(0, SCHED_IDLE, &none) == 0 ||
+           hal_fail(error, "its priority cannot be lowered: %s", strerror(errno));
 }
 
 static _Noreturn void run_writer(const struct hal_recorder_process *process)
