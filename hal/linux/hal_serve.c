@@ -16,9 +16,11 @@
 /* Between two looks at who has had his time. */
 #define LOOK_MS 250
 #define SLOTS (HAL_SERVE_CONNECTIONS + HAL_SERVE_STRANGERS)
-/* Strangers who make room at a time, and turns of the library in which each could have been read before. */
+/* Strangers who make room at a time, and turns of the library in which each could have been read before; what he sends is
+ * on its way for some time, too. */
 #define ROOM 8
 #define LOOKS_MIN 2
+#define ROOM_MS 250
 /* Between two turns when all slots are taken, as somebody may wait. */
 #define FULL_MS 10
 #define FRAME_NAME "frame"
@@ -171,10 +173,11 @@ static void cut(struct visitor *visitor)
 static struct visitor *oldest_stranger(struct serve *serve)
 {
     struct visitor *oldest = NULL;
+    const int64_t limit_ms = now_ms() + HAL_SERVE_TOKEN_MS - ROOM_MS;
     for (int i = 0; i < SLOTS; i++) {
         struct visitor *visitor = &serve->visitor[i];
-        const bool may_go =
-            visitor->visit == VISIT_OPEN && !visitor->is_known && visitor->look_count >= LOOKS_MIN;
+        const bool may_go = visitor->visit == VISIT_OPEN && !visitor->is_known &&
+                            visitor->look_count >= LOOKS_MIN && visitor->end_ms <= limit_ms;
         if (may_go && (oldest == NULL || visitor->end_ms < oldest->end_ms)) {
             oldest = visitor;
         }

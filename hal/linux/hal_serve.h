@@ -13,8 +13,9 @@
  *        From the last answer its request has HAL_SERVE_REQUEST_MS to be asked whole and answered
  *        whole, its waiting for a frame not counted: then the connection is cut, at whatever pace its
  *        bytes drip. Others have HAL_SERVE_TOKEN_MS to show it, and HAL_SERVE_STRANGERS slots at least.
- *        When all slots are taken those of them that came first are cut, as soon as what they sent could
- *        be read, so that newcomers get in: who holds connections without the token keeps nobody out.
+ *        When all slots are taken those of them that came first are cut, after a quarter of a second in which
+ *        what they sent could come and be read, so that newcomers get in: who holds connections without the
+ *        token keeps nobody out.
  *        Those who wait to be accepted stand in the system's queue, HAL_VIEWER_BACKLOG long.
  * Memory: an answer per frame, shared by all that get it, so at most one more than connections.
  * The processor: whoever is let go on by the kernel's clock keeps the processor until its next tick, up

@@ -1,9 +1,34 @@
 """Somebody who looks at the live view, as its page does."""
 
+import contextlib
 import http.client
 import json
+import os
+import socket
 import threading
 import time
+
+
+def held_port():
+    """A port that nobody else is given, and the socket that holds it: bound, not listened at. Who asks for it by number gets
+    it, as long as he sets SO_REUSEADDR like this one."""
+    held = socket.socket()
+    held.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    held.bind(("127.0.0.1", 0))
+    return held.getsockname()[1], held
+
+
+def view_pid(program_pid):
+    """The view's process, a child of the program's; None: there is none."""
+    with open(f"/proc/{program_pid}/task/{program_pid}/children", encoding="ascii") as file:
+        pids = file.read().split()
+    return int(pids[0]) if pids else None
+
+
+def schedule_as_others(pid):
+    """Like everybody else, where that is allowed: what it shows is not to depend on other work of this machine."""
+    with contextlib.suppress(PermissionError):
+        os.sched_setscheduler(pid, os.SCHED_OTHER, os.sched_param(0))
 
 
 class Watcher(threading.Thread):
