@@ -26,13 +26,14 @@ import subprocess
 import time
 
 from frames import as_of_host
+from watch import held_port
 
 PORTS = ["frames", "records", "log", "control"]
-# Longest time from power-on to the first process's "ready": ten times what it takes when idle.
-BOOT_S = 60
+# Longest time from power-on to the first process's "ready": thirty times what it takes when idle.
+BOOT_S = 180
 MEMORY_MB = 256
 # Longest time that QEMU or the board's shell may take for an answer.
-ANSWER_S = 30
+ANSWER_S = 60
 GPIO_TYPE = "child<pl061>"
 # What QEMU calls this machine and the board on their network, and the board's port that this machine
 # reaches, at board.view_port.
@@ -59,8 +60,7 @@ class Board:
         self.selector = selectors.DefaultSelector()
         self.sockets = {}
         self.qemu = None
-        with socket.create_server(("127.0.0.1", 0)) as free:
-            self.view_port = free.getsockname()[1]
+        self.view_port, self.held = held_port()
         try:
             self._start(kernel, initramfs, memory_mb)
             self._find_gpio()
@@ -83,6 +83,7 @@ class Board:
             self.qemu = None
         for sock in self.sockets.values():
             sock.close()
+        self.held.close()
         self.selector.close()
 
     # --- QEMU ---

@@ -12,6 +12,11 @@ FRAMES, MEMORY_MB, MAX_MB = 12, 4, 60
 DIR = "/tmp/record"
 
 
+def wait_for_writer(run):
+    """The process that writes goes on alone where the program has waited long enough for it."""
+    run.board.command("while pidof isohead-record; do sleep 0.05; done >/dev/null", SOON_S)
+
+
 def fetch(run, name):
     """A part of the recording, byte for byte, as a directory of this machine."""
     target = os.path.join(run.work, "recorded")
@@ -49,6 +54,7 @@ def record_loop(run, what, rig):
     records = loop(run, run.alternating, FRAMES)
     resident, _ = board.memory_kb()
     run.stop()
+    wait_for_writer(run)
     frames = fetch(run, "000001")
     expect(len(frames) == FRAMES, f"{what}: {len(frames)} frames of {FRAMES} are recorded: {board.log[-3:]}")
     expect([entry["laser"] for entry in frames.entries] == [run.alternating.lit(index) for index in range(FRAMES)], f"{what}: laser")
@@ -67,6 +73,7 @@ def busy_ms(run, more):
     times = run.high_times()
     resident, _ = run.board.memory_kb()
     run.stop()
+    wait_for_writer(run)
     spans = [1000 * (rise_s - fall_s) for (_, fall_s), (rise_s, _) in zip(times, times[1:])]
     return sum(spans) / len(spans), resident
 
@@ -100,6 +107,7 @@ def case_record_full(run):
         expect(0 < len(frames) < FRAMES and replayed(run, frames) == run.gated.records[:len(frames)], "what was written before is not whole")
     finally:
         run.stop()
+        wait_for_writer(run)
         board.command(f"umount {DIR}")
     return f"{len(frames)} frames fit and give host_sim's records; {FRAMES} records, one message"
 

@@ -19,8 +19,8 @@ FRAME_S = 1 / RATE
 # The longest cap that there is, and the shortest for so few frames.
 CAP_MS = 1000
 SILENT_S = 3 * FRAME_S
-# Longest time for what follows from a pin or a frame at once; a hundred times what it takes.
-SOON_S = 20
+# Longest time for what follows from a pin or a frame at once; hundreds of times what it takes.
+SOON_S = 60
 GATED_COUNT, ALTERNATING_COUNT, SMALL_COUNT = 200, 40, 12
 # The program on the board, by the version of libgpiod that is in it.
 NAMES = {1: "/bin/isohead_board", 2: "/bin/isohead_board_gpiod2"}
