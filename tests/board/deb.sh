@@ -178,7 +178,7 @@ as_user() {
     expected=$1
     shift
     status=0
-    inside setpriv --reuid=isohead --regid=isohead --init-groups timeout 30 "$@" \
+    inside setpriv --reuid=isohead --regid=isohead --init-groups timeout 300 "$@" \
         >"$work/words" 2>&1 </dev/null || status=$?
     [ $status = "$expected" ] || fail "$*: status $status, expected $expected: $(cat "$work/words")"
 }
@@ -241,7 +241,7 @@ check_stop() {
     until grep -q /dev/video0 "$work/words"; do
         kill -0 $program || fail "ended without a camera: $(cat "$work/words")"
         tries=$((tries + 1))
-        [ $tries -le 300 ] || fail "says nothing of the camera in 30 s: $(cat "$work/words")"
+        [ $tries -le 3000 ] || fail "says nothing of the camera in 300 s: $(cat "$work/words")"
         sleep 0.1
     done
     kill -TERM $program

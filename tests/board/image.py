@@ -33,7 +33,7 @@ FRAME_COUNT = 10
 # Time stamps start here: v4l2loopback takes 0 for none.
 TIME_0_US = 1000000
 # Longest times: a start takes 20 s when idle, and several may run at once.
-START_S, ANSWER_S = 120, 60
+START_S, ANSWER_S = 300, 180
 
 CONFIG = """device = /dev/video0
 format = GREY

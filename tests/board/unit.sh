@@ -45,7 +45,7 @@ for unit in getty.target apt-daily.timer apt-daily-upgrade.timer dpkg-db-backup.
 done
 # The unit's own times are ten seconds each, and the board's clock is slower than this machine's.
 mkdir "$units/isohead.service.d"
-printf '[Service]\nWatchdogSec=4\nRestartSec=1\n' >"$units/isohead.service.d/times.conf"
+printf '[Service]\nWatchdogSec=4\nRestartSec=5\n' >"$units/isohead.service.d/times.conf"
 # Of a size that vivid has; there are no dots in its pictures anyway.
 sed -e 's/"image_width": *[0-9]*/"image_width":640/' -e 's/"image_height": *[0-9]*/"image_height":480/' \
     "$rig" >"$root/etc/isohead/rig.json"

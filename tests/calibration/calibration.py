@@ -520,7 +520,7 @@ def check_device(bench):
         header = file.read(15)
     result("guide: a device: its own size is kept", None if header == b"P5\n640 480\n255\n" else str(header))
     take("a size that it has not", 1, "640x480 pixels, not 800x600 as --size", size=("--size", "800x600"), names=0)
-    take("that gives no more frames", 1, "no more frames from 7", end="still", seconds=60)
+    take("that gives no more frames", 1, "no more frames from 7", end="still", seconds=300)
     take("that another program has", 1, "/dev/video7: is no camera, or another program has it", busy="1", names=0)
     film_of(bench, [])
     take("that never gives a frame", 1, "no more frames from 7", names=0)

@@ -30,7 +30,7 @@ FRAMES = 12  # of the rendered sequence
 NESTED = 10  # the last frame that is taken of sequence1, whose first ones have whole contours in their nests
 VERMILION, BLACK, WHITE, BLUE = (213, 94, 0), (0, 0, 0), (255, 255, 255), (0, 114, 178)
 YELLOW, SKY = (240, 228, 66), (86, 180, 233)
-LIMIT_S = 60
+LIMIT_S = 300  # what ends a program that hangs
 
 number = failed = 0
 options = None
