@@ -270,7 +270,7 @@ class Tree:
                        "TORN_JOURNAL": self.journal, "TORN_AT": str(at), "TORN_HOW": how, 
                        "TORN_BELOW": ":".join(os.path.join(self.root, folder) for folder in DISK)}
         done = subprocess.run(["sh", "-c", script.replace("ROOT", self.root)], env=environment, capture_output=True, text=True,
-                              timeout=60, check=False)
+                              timeout=600, check=False)
         return done.returncode, self.operations(), done.stdout + done.stderr
 
     def operations(self):

@@ -670,7 +670,7 @@ def test_stopped(test, program, frames, work):
             process.stdout.close()
         else:
             process.send_signal(number)
-        test.same((begun, process.wait(60)), (1, -number), "%s in the midst ends it" % number.name)
+        test.same((begun, process.wait(600)), (1, -number), "%s in the midst ends it" % number.name)
         test.same(os.listdir(folder), [], "%s: no half page is left" % number.name)
 
 

@@ -46,7 +46,7 @@ result() {
 
 # run ARGUMENT...: host_sim with its output in the files out, err and status.
 run() {
-    timeout 120 "$host_sim" "$@" >out 2>err
+    timeout 600 "$host_sim" "$@" >out 2>err
     echo $? >status
 }
 
@@ -773,7 +773,7 @@ unwritable() {
     name=$1
     shift
     : >out
-    timeout 120 "$host_sim" "$@" >/dev/full 2>err
+    timeout 600 "$host_sim" "$@" >/dev/full 2>err
     echo $? >status
     check "output: full, $name" 1 0 0 'standard output'
 }
@@ -782,15 +782,15 @@ unwritable 'table' d
 unwritable 'help' --help
 
 : >out
-timeout 120 "$host_sim" --json --trace trace d >&- 2>err
+timeout 600 "$host_sim" --json --trace trace d >&- 2>err
 echo $? >status
 check 'output: closed' 1 0 0 'standard output'
-timeout 120 "$host_sim" --json d >out 2>&-
+timeout 600 "$host_sim" --json d >out 2>&-
 echo $? >status
 : >err
 check 'output: standard error is closed' 0 3 0 -
 : >d/b.pgm
-timeout 120 "$host_sim" --json --trace trace d >out 2>&-
+timeout 600 "$host_sim" --json --trace trace d >out 2>&-
 echo $? >status
 check 'output: standard error is closed and something to tell' 1 2 1 -
 rm -rf trace

@@ -320,7 +320,7 @@ def shown_on(stream, program, *arguments):
             if not data:
                 break
             shown += data
-        process.wait(60)
+        process.wait(600)
     os.close(ours)
     return shown.decode()
 

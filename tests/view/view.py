@@ -572,10 +572,13 @@ def stopped(number, ready, *words, ignored=False):
 
 def case_stopped():
     """By a signal to itself alone, as a service manager sends it: while host_sim runs, and while it draws."""
-    long = at("long")
+    # So long that a signal comes while there is still a lot to do, however late this test is with it.
+    long, traces = at("long"), at("traces/long")
     os.makedirs(long)
+    os.makedirs(traces)
     for index in range(300):
         os.symlink(at("short/%06d.pgm" % (index % FRAMES)), os.path.join(long, "%06d.pgm" % index))
+        os.symlink(at("traces/short/%06d.json" % (index % FRAMES)), os.path.join(traces, "%06d.json" % index))
     shutil.copy(at("short/rig.json"), long)
 
     def with_traces(seen):
@@ -588,8 +591,8 @@ def case_stopped():
             ("host_sim runs", signal.SIGTERM, with_traces, ("control", long, at("stopped.pdf"))),
             ("host_sim runs", signal.SIGINT, with_traces, ("sheet", long, at("stopped.png"))),
             ("host_sim runs", signal.SIGHUP, with_traces, ("control", long, at("stopped.pdf"))),
-            ("it draws", signal.SIGINT, drawing, ("pair", at("short"), at("stopped.mp4"))),
-            ("it draws a trace", signal.SIGTERM, drawing, ("pair", "--trace", at("traces"), at("short"), at("stopped.mp4")))]:
+            ("it draws", signal.SIGINT, drawing, ("pair", long, at("stopped.mp4"))),
+            ("it draws a trace", signal.SIGTERM, drawing, ("pair", "--trace", at("traces"), long, at("stopped.mp4")))]:
         said, status, alive = stopped(number, ready, *words)
         left = os.listdir(at("tmp")) + [other for other in os.listdir(options.work) if other.startswith("stopped")]
         good = status == -number and not said and not alive and not left

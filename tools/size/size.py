@@ -96,7 +96,7 @@ def count(program, plugin, rig, frames):
              "-semihosting-config", "enable=on,target=native," + ",".join("arg=" + word for word in words),
              "-plugin", "%s,out=%s,stack=%x,%s" % (plugin, out, program.symbol["hal_bss_end"],
                                                    ",".join("mark=%x" % mark for mark in marks)),
-             "-kernel", program.path], stdout=subprocess.PIPE, text=True, timeout=600, check=False)
+             "-kernel", program.path], stdout=subprocess.PIPE, text=True, timeout=3600, check=False)
         if done.returncode or done.stdout.count('"head":') != len(frames):
             raise Broken("run: status %d, %d records of %d frames"
                          % (done.returncode, done.stdout.count('"head":'), len(frames)))
