@@ -125,8 +125,8 @@ def case_check(run):
         span_us = gated.time_us(len(gated) - 1) + FRAME_S * 1e6
         sequence, end = 0, time.monotonic() + CHECK_S
         while not any("checked" in line or "cannot be determined" in line for line in board.log) and time.monotonic() < end:
-            turn, index = divmod(sequence, len(gated))
-            run.give(gated, index, sequence, int(gated.time_us(index) + turn * span_us))
+            lap, index = divmod(sequence, len(gated))
+            run.give(gated, index, sequence, int(gated.time_us(index) + lap * span_us))
             board.settle(CHECK_FRAME_S)
             sequence += 1
         is_status = board.exit_status(SOON_S)

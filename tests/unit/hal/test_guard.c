@@ -71,8 +71,8 @@ int poll(struct pollfd *fds, nfds_t count, int timeout_ms)
     }
     if (count > 0 && timeout_ms >= GUARD_WAIT_MIN_MS) {
         /* The header declares that poll does not read what it is given. */
-        const struct pollfd *volatile asked = fds;
-        const bool is_limited = asked->fd == limited_fd;
+        const struct pollfd *volatile request = fds;
+        const bool is_limited = request->fd == limited_fd;
         timeout_ms = is_limited ? timeout_ms : -1;
         limited_fd = is_limited ? -1 : limited_fd;
     }
