@@ -270,6 +270,7 @@ board: ## build isohead_board for ARCH=arm64 (default), armhf or host: build/boa
 
 # The same for arm64 with libgpiod 2, which Debian 12 does not have.
 board-gpiod2:
+	@tools/setup.sh board arm64
 	@cmake --preset board-arm64-gpiod2 -DISOHEAD_GPIOD2_DIR=$(abspath $(GPIOD2_DIR)) \
 	  > $(BUILD)/board-arm64-gpiod2.log 2>&1 || { cat $(BUILD)/board-arm64-gpiod2.log; exit 1; }
 	@cmake --build --preset board-arm64-gpiod2 --parallel 2 --target isohead_board
@@ -301,11 +302,13 @@ test-board: sim ## isohead_board on an emulated ARM board: frames, faults, signa
 
 # What an image is for: boards with UEFI, or a Raspberry Pi.
 IMAGE_OUT = $(BUILD)/image$(if $(filter rpi,$(BOARD)),-rpi)
+# The newer kernel of a Raspberry Pi's image does not know the interface of libgpiod 1 any more.
+IMAGE_PROGRAM = $(BUILD)/board-arm64$(if $(filter rpi,$(BOARD)),-gpiod2)/firmware/app/isohead_board
 image test-image: BOARD ?= uefi
 image: ## the image to flash for arm64, BOARD=uefi or rpi: build/image/ or build/image-rpi/isohead.img; XZ=1 packs it too
 	@tools/setup.sh image $(BOARD)
-	@$(MAKE) board ARCH=arm64
-	@tools/image/image.sh $(BOARD) $(BUILD)/board-arm64/firmware/app/isohead_board $(IMAGE_OUT)
+	@$(MAKE) $(if $(filter rpi,$(BOARD)),board-gpiod2,board ARCH=arm64)
+	@tools/image/image.sh $(BOARD) $(IMAGE_PROGRAM) $(IMAGE_OUT)
 
 flash: ## write IMAGE (default isohead.img of BOARD, as for image) to the disk DEVICE=/dev/..., and read it back
 	@tools/setup.sh flash

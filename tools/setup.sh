@@ -196,7 +196,10 @@ need_test_deb() {
 need_image() {
     case "${1:-}" in
     uefi) ;;
-    rpi) need_program mkenvimage u-boot-tools ;;
+    rpi)
+        need_program mkenvimage u-boot-tools
+        need_python pip python3-pip # for tools/board/gpiod2.sh
+        ;;
     *)
         echo "there is no image for '${1:-}': name uefi or rpi" >&2
         exit 2
@@ -412,6 +415,7 @@ size)
     fi
     ;;
 test | coverage | test-board) tools/board/gpiod2.sh build/third_party/gpiod2 ;;
+image | test-image) [ "$2" != rpi ] || tools/board/gpiod2.sh build/third_party/gpiod2 ;;
 esac
 case "$1" in
 test | export) tools/python_packages.sh tools/export/requirements.txt build/export/python ;;

@@ -92,8 +92,9 @@ def main():
         write(os.path.join(boot, "linux"), gzip.compress(b"kernel"))
         make_deb(work, "linux3", "3", {"/boot/vmlinuz": b"kernel"})
         os.symlink("init", os.path.join(initramfs, "link"))
-        found = bill("image", root, initramfs, boot, debs, "libone1:arm64", "libtwo2:arm64", "linux3:arm64")
-        check(set(found) == {"libone1", "linux3", "slot/etc/passwd", "initramfs/init", "boot/initrd"}, f"of an image: {sorted(found)}")
+        found = bill("image", root, initramfs, boot, debs, "libone1:arm64", "libtwo2:arm64", "linux3:arm64", "pkg:pypi/four@4.1")
+        check(set(found) == {"libone1", "linux3", "four", "slot/etc/passwd", "initramfs/init", "boot/initrd"}, f"of an image: {sorted(found)}")
+        check(found["four"]["version"] == "4.1" and found["four"]["purl"] == "pkg:pypi/four@4.1", "a library in the program")
         check(hash_of(found["slot/etc/passwd"]) == digest(b"p"), "hash of a file of ours")
     print(f"bill: {len(failures)} failures")
     return 1 if failures else 0

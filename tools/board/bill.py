@@ -8,7 +8,7 @@ bill.py image SLOT_ROOT INITRAMFS BOOT DEBS PACKAGE...
 
 DEBS has the packages that were downloaded (tools/board/apt.sh), as NAME:ARCH.deb. A Debian package stands in the bill
 of an image when a file of it is in there, the same byte for byte or packed by gzip; with its version, the SHA-256 of the .deb, and how many
-of its files are packed. The same input gives the same bytes; the time is SOURCE_DATE_EPOCH.
+of its files are packed. A PACKAGE may also be the package URL of a library that the program is linked with. The same input gives the same bytes; the time is SOURCE_DATE_EPOCH.
 """
 
 import datetime
@@ -78,6 +78,12 @@ def debian_component(path, **more):
             "properties": [{"name": "isohead:" + key, "value": str(value)} for key, value in sorted(properties.items())]}
 
 
+def linked_component(purl):
+    name, its_version = purl.rsplit("/", 1)[1].split("@")
+    return {"type": "library", "bom-ref": purl, "name": name, "version": its_version, "purl": purl,
+            "properties": [{"name": "isohead:packed", "value": "in the program"}]}
+
+
 def file_component(name, digest, origin):
     return {"type": "file", "name": name, "hashes": hashes(digest),
             "properties": [{"name": "isohead:origin", "value": origin}]}
@@ -114,7 +120,8 @@ def of_deb(path, debs):
 
 
 def of_image(root, initramfs, boot, debs, packages):
-    paths = [os.path.join(debs, package + ".deb") for package in sorted(packages)]
+    linked = [package for package in packages if package.startswith("pkg:")]
+    paths = [os.path.join(debs, package + ".deb") for package in sorted(set(packages) - set(linked))]
     owners = {}
     for path in paths:
         for digest in files_of_deb(path).values():
@@ -133,6 +140,7 @@ def of_image(root, initramfs, boot, debs, packages):
                 else:
                     components.append(file_component(prefix + "/" + os.path.relpath(path, tree), digest, "isohead or its build"))
     components += [debian_component(path, packed="yes", files=count) for path, count in counts.items() if count > 0]
+    components += [linked_component(purl) for purl in linked]
     bill("isohead image (arm64)", "firmware", components)
 
 

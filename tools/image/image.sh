@@ -73,8 +73,8 @@ put "$slot" $((1 + ESP_MIB + SLOT_MIB))
 put "$data" $((1 + ESP_MIB + 2 * SLOT_MIB))
 
 read -r packages <"$out/packages.list"
-# shellcheck disable=SC2086 # a list of packages
-/usr/bin/python3 tools/board/bill.py image "$out/root" "$out/initramfs" "$out/boot" build/apt/debs $packages \
+# shellcheck disable=SC2046,SC2086 # lists of packages
+/usr/bin/python3 tools/board/bill.py image "$out/root" "$out/initramfs" "$out/boot" build/apt/debs $packages $(board_linked) \
     >"$out/isohead.cdx.json"
 
 (cd "$out" && sha256sum isohead.img slot.squashfs isohead.cdx.json >SHA256SUMS)

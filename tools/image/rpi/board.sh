@@ -16,6 +16,8 @@ board_packages() {
 }
 BOOT_KIND=rpi
 
+board_linked() { sed 's|\(.*\)-|pkg:pypi/\1@|' build/third_party/gpiod2/package; }
+
 board_boot() {
     # U-Boot unpacks it; reading takes longer.
     gzip -9 -n <"$kernel" >"$work/boot/linux"

@@ -4,6 +4,9 @@
 board_packages() { echo "$("$apt" newest 'linux-image-6\.1\.0-[0-9]*-arm64'):arm64 systemd-boot-efi:arm64"; }
 BOOT_KIND=boot
 
+# board_linked: package URLs of what the program is linked with that no package brings
+board_linked() { :; }
+
 # board_boot: the boot loader's files, and the kernel as it takes it, into $work/boot
 board_boot() {
     cp "$kernel" "$work/boot/linux"
