@@ -139,11 +139,16 @@ class Disk:
             file.seek(start)
             return file.read(whole if size is None else size)
 
-    def zero(self, name):
-        start, size = self.places[name]
+    def write(self, name, content):
+        self.write_at(self.places[name][0], content)
+
+    def write_at(self, start, content):
         with open(self.path, "r+b") as file:
             file.seek(start)
-            file.write(bytes(size))
+            file.write(content)
+
+    def zero(self, name):
+        self.write(name, bytes(self.places[name][1]))
 
     def check_esp(self, work):
         """Is the ESP whole, and unmounted cleanly?"""
@@ -180,7 +185,6 @@ class Board:
             "-serial", "chardev:console"]
 
     def __init__(self, disk, work):
-        self.work = work
         arguments = ["qemu-system-aarch64", "-nodefaults", "-display", "none", *self.machine(disk, work)]
         self.sockets, theirs = {}, []
         for name in self.LINES:
@@ -188,6 +192,8 @@ class Board:
             theirs.append(other)
             arguments += ["-chardev", f"socket,id={name},fd={other.fileno()}"]
         self.text = {name: "" for name in self.LINES if name != "frames"}
+        # Written as it comes, for whoever looks on; of all boards of a case.
+        self.logs = {name: open(os.path.join(work, name + ".log"), "a", encoding="utf-8") for name in self.text}
         self.seen = dict.fromkeys(self.text, 0)  # how far it has been looked at
         self.selector = selectors.DefaultSelector()
         for name in self.text:
@@ -206,9 +212,8 @@ class Board:
         self.qemu.wait()
         for sock in self.sockets.values():
             sock.close()
-        for name, text in self.text.items():
-            with open(os.path.join(self.work, name + ".log"), "w", encoding="utf-8") as file:
-                file.write(text)
+        for log in self.logs.values():
+            log.close()
 
     def now_s(self):
         """Since power-on."""
@@ -236,7 +241,10 @@ class Board:
             content = key.fileobj.recv(65536)
             if not content:  # QEMU has ended
                 self.selector.unregister(key.fileobj)
-            self.text[key.data] += content.decode("utf-8", errors="replace").replace("\r", "")
+            text = content.decode("utf-8", errors="replace").replace("\r", "")
+            self.text[key.data] += text
+            self.logs[key.data].write(text)
+            self.logs[key.data].flush()
         return bool(ready)
 
     def ends(self):
@@ -282,6 +290,23 @@ class Board:
 # --- cases: each returns what was seen ---
 
 
+def broken_slot(image, work):
+    """A slot whose firmware ends at once; its file below work."""
+    root = os.path.join(work, "root")
+    run("cp", "--archive", "--link", os.path.join(image, "root"), root)
+    program = os.path.join(root, "usr/bin/isohead_board")
+    os.remove(program)
+    with open(program, "w", encoding="ascii") as file:
+        # Making the line low works: else the board is reset at once.
+        file.write("#!/bin/sh\ncase $* in *--laser-off*) exit 0 ;; esac\necho this firmware is broken >&2\nexit 1\n")
+    os.chmod(program, 0o755)
+    path = os.path.join(work, "broken.squashfs")
+    run("mksquashfs", root, path, "-quiet", "-no-progress", "-all-root", "-comp", "zstd",
+        "-Xcompression-level", "3")
+    shutil.rmtree(root)
+    return path
+
+
 class Case:
     """What a case needs: a disk of its own whose data partition is set up."""
 
@@ -304,22 +329,6 @@ class Case:
         with open(os.path.join(self.work, name), "w", encoding="ascii") as file:
             file.write(text)
 
-    def broken_slot(self):
-        """A slot whose firmware ends at once."""
-        root = os.path.join(self.work, "root")
-        run("cp", "--archive", "--link", os.path.join(self.image, "root"), root)
-        program = os.path.join(root, "usr/bin/isohead_board")
-        os.remove(program)
-        with open(program, "w", encoding="ascii") as file:
-            # Making the line low works: else the board is reset at once.
-            file.write("#!/bin/sh\ncase $* in *--laser-off*) exit 0 ;; esac\necho this firmware is broken >&2\nexit 1\n")
-        os.chmod(program, 0o755)
-        path = os.path.join(self.work, "broken.squashfs")
-        run("mksquashfs", root, path, "-quiet", "-no-progress", "-all-root", "-comp", "zstd",
-            "-Xcompression-level", "3")
-        shutil.rmtree(root)
-        return path
-
     def data_digest(self):
         return hashlib.sha256(self.disk.content("isohead-data")).hexdigest()
 
@@ -332,7 +341,7 @@ class Case:
 def case_update(shared):
     """boots, finds heads; an update whose firmware fails is tried 3 times, then taken back"""
     case = Case(shared, "update")
-    broken = case.broken_slot()
+    broken = broken_slot(case.image, case.work)
     case.disk.put([broken], "/")
     data = case.data_digest()
     with Board(case.disk, case.work) as board:

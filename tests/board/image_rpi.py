@@ -10,6 +10,7 @@ files that it names. Exit status 1 if a case fails.
 """
 
 import argparse
+import hashlib
 import os
 import re
 import shutil
@@ -19,7 +20,7 @@ import time
 import zlib
 
 from frames import as_of_host
-from image import ANSWER_S, Board, Disk, Frames, Wrong, expect, run
+from image import Board, Disk, FRAME_COUNT, Frames, Wrong, broken_slot, expect, run
 
 # What a model's firmware puts true in the filters of config.txt, and the names of its device tree, upstream's first.
 MODELS = {
@@ -35,14 +36,15 @@ FIRMWARE_BEFORE_4 = ["bootcode.bin", "start.elf", "fixup.dat"]
 
 SECTOR = 512
 STATE_SECTORS = (1, 9)
-START_S = 600
-RECORDS = 3
+START_S = 900
 LASER = 17
 GPLEV0 = 0x3F200034
-# First the frames of a directory, then a camera of vivid, for which alone the laser may be on.
+TIMER_US = 0x3F003004  # two words: microseconds since power-on
+# The frames of a directory, or a camera of vivid, for which alone the laser may be on.
 DIRECTORY = """device = /data/frames
-rate = 2
+rate = 1
 loop = on
+output = serial:/dev/ttyAMA0
 status = 0
 """
 CAMERA = f"""device = /dev/video0
@@ -53,6 +55,7 @@ laser = on
 laser-cap = 1000
 gpio-chip = pinctrl-bcm2835
 laser-line = {LASER}
+output = serial:/dev/ttyAMA0
 status = 0
 """
 
@@ -137,21 +140,21 @@ class PiDisk(Disk):
         sector = zlib.crc32(body).to_bytes(4, "little") + body
         if changes is None:
             sector = sector[:SECTOR // 2] + b"\xa5" * (SECTOR // 2)
-        with open(self.path, "r+b") as file:
-            file.seek(number * SECTOR)
-            file.write(sector)
+        self.write_at(number * SECTOR, sector)
 
 
 # --- the board ---
 
 
 class PiBoard(Board):
-    """QEMU's Raspberry Pi 3 with its SD card, its console and QEMU's own monitor.
+    """QEMU's Raspberry Pi 3 with its SD card, its console, a line for records and QEMU's own monitor.
 
-    QEMU's watchdog of this processor fires when it is started. So it is taken out of the device tree; and as it
-    is what resets the processor, too, the test does that when the kernel has tried to."""
+    Its time is a nanosecond per instruction, and none passes while it waits: no limit of the board's programs, such as
+    the laser's, depends on how busy this machine is.
+    Bluetooth is taken out of the device tree, as dtoverlay=disable-bt does: its serial line is the one for records. So is the
+    watchdog, which fires in QEMU when it is started; it is what resets the processor, too, so the test does that when the kernel has tried to."""
 
-    LINES = ("console", "monitor")
+    LINES = ("console", "records", "monitor")
     START_S = START_S
     resets = 0
 
@@ -160,11 +163,11 @@ class PiBoard(Board):
         names = disk.boot_files()
         kernel, tree = firmware_choice(read(disk.boot_file("config.txt", work)), "3", names.__contains__)
         tree = disk.boot_file(tree, work)
-        run("fdtput", "-r", tree, "/soc/watchdog@7e100000")
-        return ["-M", "raspi3b", "-drive", f"if=sd,format=raw,file={disk.path}",
+        run("fdtput", "-r", tree, "/soc/watchdog@7e100000", "/soc/serial@7e201000/bluetooth")
+        return ["-M", "raspi3b", "-icount", "shift=0,sleep=off", "-drive", f"if=sd,format=raw,file={disk.path}",
                 "-kernel", disk.boot_file(kernel, work), "-dtb", tree,
                 # The console is the second line: the first is Bluetooth's.
-                "-serial", "null", "-serial", "chardev:console", "-monitor", "chardev:monitor"]
+                "-serial", "chardev:records", "-serial", "chardev:console", "-monitor", "chardev:monitor"]
 
     def read(self, limit_s):
         got = super().read(limit_s)
@@ -174,17 +177,36 @@ class PiBoard(Board):
             self.sockets["monitor"].sendall(b"system_reset\n")
         return got
 
-    def line_level(self, number):
-        """Of a GPIO line, as QEMU's processor has it."""
-        self.sockets["monitor"].sendall(f"xp /1wx {GPLEV0:#x}\n".encode())
-        match = self.wait(r"[0-9a-f]{8,16}: 0x([0-9a-f]{8})", ANSWER_S, "monitor")
-        return int(match[1], 16) >> number & 1
+    def words(self, address, count):
+        """Of the processor's memory, or of what is there instead of it."""
+        self.sockets["monitor"].sendall(f"xp /{count}wx {address:#x}\n".encode())
+        match = self.wait(r"(?m)^0*%x:((?: 0x[0-9a-f]{8}){%d})\n" % (address, count), START_S, "monitor")
+        return [int(word, 16) for word in match[1].split()]
 
-    def wait_level(self, number, level, limit_s):
-        end = time.monotonic() + limit_s
-        while self.line_level(number) != level:
-            expect(time.monotonic() < end, f"line {number} is not {level} within {limit_s} s{self.ends()}")
+    def board_s(self):
+        """Of the board's own time, since power-on."""
+        low, high = self.words(TIMER_US, 2)
+        return (high << 32 | low) / 1e6
+
+    def wait_level(self, level):
+        """Until the laser's GPIO line is at that level, as QEMU's processor has it."""
+        end = time.monotonic() + START_S
+        while self.words(GPLEV0, 1)[0] >> LASER & 1 != level:
+            expect(time.monotonic() < end, f"the laser's line is not {level} within {START_S} s{self.ends()}")
             self.read(0.2)
+
+    def record(self):
+        """The next whole one."""
+        return self.wait(r"(?m)^(\{.*\})\n", START_S, "records")[1]
+
+    def records_of_host(self, frames):
+        """All of a directory's frames, from the first; returns when the first came."""
+        for index, wanted in enumerate(frames.records):
+            found = as_of_host(self.record())
+            if index == 0:
+                first_s = self.board_s()
+            expect(found == wanted, f"frame {index}:\nboard    {found}\nhost_sim {wanted}")
+        return first_s
 
 
 def read(path):
@@ -284,65 +306,120 @@ def vivid(image, folder):
     return commands
 
 
-def fill(shared, disk, work):
-    """The data partition: frames, a rig for them and one for vivid, settings for both, an update."""
-    frames = Frames(shared.frames, os.path.join(work, "frames"), shared.host_sim)
-    folder = os.path.join(work, "test")
-    os.makedirs(folder)
-    rig = read(frames.rig)
-    small = re.sub(r'("image_height":)\d+', r"\g<1>360", re.sub(r'("image_width":)\d+', r"\g<1>640", rig))
-    for name, text in (("isohead.conf", DIRECTORY), ("start.sh", vivid(shared.image, folder)), ("rig.json", rig),
-                       ("test/camera.conf", CAMERA), ("test/camera.json", small)):
-        with open(os.path.join(work, name), "w", encoding="ascii") as file:
-            file.write(text)
-    disk.put([os.path.join(work, name) for name in ("isohead.conf", "start.sh", "rig.json")], "/")
-    disk.put([os.path.join(shared.image, "slot.squashfs"), folder, os.path.join(work, "frames")], "/")
-    return frames
+class Card:
+    """A disk whose data partition has frames, a rig for them, settings, and what makes a camera of vivid."""
+
+    def __init__(self, shared, name, camera=False):
+        self.disk, self.work = card(shared, name)
+        self.frames = Frames(shared.frames, os.path.join(self.work, "frames"), shared.host_sim)
+        self.slot = os.path.join(shared.image, "slot.squashfs")
+        folder = os.path.join(self.work, "test")
+        os.makedirs(folder)
+        rig = read(self.frames.rig)
+        small = re.sub(r'("image_height":)\d+', r"\g<1>360", re.sub(r'("image_width":)\d+', r"\g<1>640", rig))
+        for name, text in (("isohead.conf", CAMERA if camera else DIRECTORY), ("rig.json", small if camera else rig),
+                           ("start.sh", "dmesg -n 1\n" + (vivid(shared.image, folder) if camera else "")), ("test/directory.conf", DIRECTORY)):
+            with open(os.path.join(self.work, name), "w", encoding="ascii") as file:
+                file.write(text)
+        self.disk.put([os.path.join(self.work, name) for name in ("isohead.conf", "start.sh", "rig.json")], "/")
+        self.disk.put([folder, os.path.join(self.work, "frames")], "/")
+
+    def state_is(self, first, a_left, b_left):
+        state = self.disk.state()
+        expect(state == {"first": first, "a_left": a_left, "b_left": b_left}, f"state {state}")
 
 
-def case_start(shared):
-    """a zeroed slot is left by itself; records and laser; the power fails in an update"""
-    disk, work = card(shared, "start")
-    frames = fill(shared, disk, work)
-    disk.zero("isohead-a")
-    with PiBoard(disk, work) as board:
+def case_slots(shared):
+    """a zeroed slot is left by itself, records; the power fails in an update; the update run again"""
+    card_ = Card(shared, "slots")
+    card_.disk.put([card_.slot], "/")
+    card_.disk.zero("isohead-a")
+    with open(card_.slot, "rb") as file:
+        slot = file.read()
+    # The processor is reset, with nothing else written, when half of the slot is on the card.
+    cut = (f"isohead-update /data/slot.squashfs & "
+           f"s() {{ set -- $(cat /sys/class/block/$(cat /run/disk)/stat); echo $7; }}; "
+           f"n=$(($(s) + {len(slot) // SECTOR // 2})); until [ $(s) -ge $n ]; do :; done; echo b >/proc/sysrq-trigger")
+    with PiBoard(card_.disk, card_.work) as board:
         expect(not board.wait_slot("a"), "a zeroed slot counts as whole")
+        damaged_s = board.board_s()
         expect(board.wait_slot("b"), "slot B is damaged")
-        back_s = board.now_s()
-        # Not all: the slot is judged after some, and what is said of it then stands between a record's pieces.
-        records = frames.records[:RECORDS]
-        for index, wanted in enumerate(records):
-            match = board.wait(r'(?m)^(\{"file":"%06d\.pgm".*\})\n' % index, START_S)
-            if index == 0:
-                record_s = board.now_s()
-            expect(as_of_host(match[1]) == wanted, f"frame {index}:\nboard    {match[1]}\nhost_sim {wanted}")
+        back_s = board.board_s()
+        first_s = board.records_of_host(card_.frames)
         board.wait("slot b is good", START_S)
-        expect(disk.state() == {"first": "a", "a_left": "0", "b_left": "good"}, f"state {disk.state()}")
-        board.command("grep -q ' /data vfat ro,' /proc/mounts")
-        board.command("! touch /usr/x")
-        board.command("isohead-put /data/test/camera.json rig.json", START_S)
-        board.command("isohead-put /data/test/camera.conf isohead.conf", START_S)
-        expect(board.line_level(LASER) == 0, "the laser's line is high before anything may use it")
-        board.command("killall isohead_board")
-        board.wait_level(LASER, 1, START_S)
-        board.wait(r'(?m)^\{"file":"\d+\.pgm".*"dots":\d+.*\}\n', START_S)
-        board.command("killall -9 isohead_board")
-        board.wait("the firmware ended with status 137", ANSWER_S)
-        board.wait_level(LASER, 0, ANSWER_S)
-        board.wait_level(LASER, 1, START_S)
-        board.sockets["console"].sendall(b"\nisohead-update /data/slot.squashfs\n")
+        card_.state_is("a", "0", "good")
+        board.command("grep -q ' /data vfat ro,' /proc/mounts", START_S)
+        board.command("! touch /usr/x", START_S)
+        board.sockets["console"].sendall(f"\n{cut}\n".encode())
         board.wait("writing slot a on /dev/", START_S)
-        board.read(1)
-    cut = disk.state()
-    expect(cut == {"first": "b", "a_left": "0", "b_left": "good"}, f"state after the power failed in an update: {cut}")
-    with PiBoard(disk, work) as board:
+        board.wait("sysrq: Resetting", START_S)
+    card_.state_is("b", "0", "good")
+    written = card_.disk.content("isohead-a", len(slot))
+    expect(written != slot and written.strip(b"\0"), "the power failed when slot A was whole or empty")
+    with PiBoard(card_.disk, card_.work) as board:
         expect(board.wait_slot("b"), "slot B is damaged after the power failed in an update of A")
-        board.wait_level(LASER, 1, START_S)
-    return (f"power-on to slot B, after A was found damaged, {back_s:.0f} s, to the first record {record_s:.0f} s; "
-            f"{len(records)} records identical to host_sim's")
+        board.records_of_host(card_.frames)
+        board.command(f"isohead-update /data/slot.squashfs {hashlib.sha256(slot).hexdigest()}", START_S)
+        board.command("reboot", START_S)
+        expect(board.wait_slot("a"), "slot A is damaged after the update")
+        board.wait("slot a is good", START_S)
+        card_.state_is("a", "good", "good")
+    expect(card_.disk.content("isohead-a", len(slot)) == slot, "slot A is not what the update held")
+    return (f"of the board's time: A found damaged {damaged_s:.1f} s after power-on, B whole {back_s:.1f} s, first record {first_s:.1f} s; "
+            f"{FRAME_COUNT} records identical to host_sim's")
 
 
-CASES = [case_choice, case_loader, case_start]
+def case_broken(shared):
+    """the last start of a slot on trial whose firmware fails: the slot before is back"""
+    card_ = Card(shared, "broken")
+    path = broken_slot(shared.image, card_.work)
+    with open(path, "rb") as file:
+        broken = file.read()
+    card_.disk.write("isohead-b", broken)
+    state = {"first": "b", "a_left": "good", "b_left": "1", "b_bytes": len(broken), "b_sha256": hashlib.sha256(broken).hexdigest()}
+    for number in STATE_SECTORS:
+        card_.disk.set_state(number, state)
+    with PiBoard(card_.disk, card_.work) as board:
+        expect(board.wait_slot("b"), "slot B is damaged")
+        board.wait("slot b on trial: the firmware ended 3 times; starting again", START_S)
+        card_.state_is("b", "good", "0")
+        bad_s = board.board_s()
+        expect(board.wait_slot("a"), "slot A is damaged")
+        first_s = board.records_of_host(card_.frames) - bad_s
+        card_.state_is("b", "good", "0")
+    return f"of the board's time: B given up {bad_s:.1f} s after power-on, first record of A {first_s:.1f} s later"
+
+
+def case_laser(shared):
+    """records of the kernel's camera with the laser on; the program is killed, and all that hold the line"""
+    card_ = Card(shared, "laser", camera=True)
+    with PiBoard(card_.disk, card_.work) as board:
+        board.wait("isohead: starting slot a", START_S)
+        expect(board.words(GPLEV0, 1)[0] >> LASER & 1 == 0, "the laser's line is high before anything may use it")
+        expect(board.wait_slot("a"), "slot A is damaged")
+        for _ in range(FRAME_COUNT):
+            record = board.record()
+            expect('"dots":' in record, record)
+        board.wait_level(1)
+        board.wait("slot a is good", START_S)
+        # The program alone: its guards make the line low. What would do it after them, and starts it again, stands still.
+        board.command("for p in /proc/[0-9]*; do case $(cat $p/comm) in isohead_board) program=${p#/proc/} ;; esac; done; "
+                      "keeper=$(awk '/^PPid/ {print $2}' /proc/$program/status); kill -STOP $keeper; kill -9 $program", START_S)
+        board.wait_level(0)
+        board.command("kill -CONT $keeper", START_S)
+        board.wait("the firmware ended with status 137", START_S)
+        board.wait_level(1)
+        # The guards, too. The settings that it is started with next know of no laser.
+        board.command("isohead-put /data/test/directory.conf isohead.conf", START_S)
+        board.command("kill -STOP $keeper; killall -9 isohead_board", START_S)
+        left = board.words(GPLEV0, 1)[0] >> LASER & 1
+        board.command("kill -CONT $keeper", START_S)
+        board.wait("the firmware ended with status 137", START_S)
+        board.wait_level(0)
+    return f"{FRAME_COUNT} records; line {LASER} high, low by the guards, high again; without guards, {left} and then low by --laser-off"
+
+
+CASES = [case_choice, case_loader, case_slots, case_broken, case_laser]
 
 
 def main():
