@@ -306,7 +306,7 @@ def vivid(image, folder):
     return commands
 
 
-class Card:
+class Case:
     """A disk whose data partition has frames, a rig for them, settings, and what makes a camera of vivid."""
 
     def __init__(self, shared, name, camera=False):
@@ -331,75 +331,77 @@ class Card:
 
 def case_slots(shared):
     """a zeroed slot is left by itself, records; the power fails in an update; the update run again"""
-    card_ = Card(shared, "slots")
-    card_.disk.put([card_.slot], "/")
-    card_.disk.zero("isohead-a")
-    with open(card_.slot, "rb") as file:
+    case = Case(shared, "slots")
+    case.disk.put([case.slot], "/")
+    case.disk.zero("isohead-a")
+    with open(case.slot, "rb") as file:
         slot = file.read()
     # The processor is reset, with nothing else written, when half of the slot is on the card.
     cut = (f"isohead-update /data/slot.squashfs & "
            f"s() {{ set -- $(cat /sys/class/block/$(cat /run/disk)/stat); echo $7; }}; "
            f"n=$(($(s) + {len(slot) // SECTOR // 2})); until [ $(s) -ge $n ]; do :; done; echo b >/proc/sysrq-trigger")
-    with PiBoard(card_.disk, card_.work) as board:
+    with PiBoard(case.disk, case.work) as board:
         expect(not board.wait_slot("a"), "a zeroed slot counts as whole")
         damaged_s = board.board_s()
         expect(board.wait_slot("b"), "slot B is damaged")
         back_s = board.board_s()
-        first_s = board.records_of_host(card_.frames)
+        first_s = board.records_of_host(case.frames)
         board.wait("slot b is good", START_S)
-        card_.state_is("a", "0", "good")
+        case.state_is("a", "0", "good")
         board.command("grep -q ' /data vfat ro,' /proc/mounts", START_S)
         board.command("! touch /usr/x", START_S)
         board.sockets["console"].sendall(f"\n{cut}\n".encode())
         board.wait("writing slot a on /dev/", START_S)
         board.wait("sysrq: Resetting", START_S)
-    card_.state_is("b", "0", "good")
-    written = card_.disk.content("isohead-a", len(slot))
+    case.state_is("b", "0", "good")
+    written = case.disk.content("isohead-a", len(slot))
     expect(written != slot and written.strip(b"\0"), "the power failed when slot A was whole or empty")
-    with PiBoard(card_.disk, card_.work) as board:
+    with PiBoard(case.disk, case.work) as board:
         expect(board.wait_slot("b"), "slot B is damaged after the power failed in an update of A")
-        board.records_of_host(card_.frames)
+        board.records_of_host(case.frames)
         board.command(f"isohead-update /data/slot.squashfs {hashlib.sha256(slot).hexdigest()}", START_S)
         board.command("reboot", START_S)
         expect(board.wait_slot("a"), "slot A is damaged after the update")
         board.wait("slot a is good", START_S)
-        card_.state_is("a", "good", "good")
-    expect(card_.disk.content("isohead-a", len(slot)) == slot, "slot A is not what the update held")
+        case.state_is("a", "good", "good")
+    expect(case.disk.content("isohead-a", len(slot)) == slot, "slot A is not what the update held")
     return (f"of the board's time: A found damaged {damaged_s:.1f} s after power-on, B whole {back_s:.1f} s, first record {first_s:.1f} s; "
             f"{FRAME_COUNT} records identical to host_sim's")
 
 
 def case_broken(shared):
     """the last start of a slot on trial whose firmware fails: the slot before is back"""
-    card_ = Card(shared, "broken")
-    path = broken_slot(shared.image, card_.work)
+    case = Case(shared, "broken")
+    path = broken_slot(shared.image, case.work)
     with open(path, "rb") as file:
         broken = file.read()
-    card_.disk.write("isohead-b", broken)
+    case.disk.write("isohead-b", broken)
     state = {"first": "b", "a_left": "good", "b_left": "1", "b_bytes": len(broken), "b_sha256": hashlib.sha256(broken).hexdigest()}
     for number in STATE_SECTORS:
-        card_.disk.set_state(number, state)
-    with PiBoard(card_.disk, card_.work) as board:
+        case.disk.set_state(number, state)
+    with PiBoard(case.disk, case.work) as board:
         expect(board.wait_slot("b"), "slot B is damaged")
         board.wait("slot b on trial: the firmware ended 3 times; starting again", START_S)
-        card_.state_is("b", "good", "0")
+        case.state_is("b", "good", "0")
         bad_s = board.board_s()
         expect(board.wait_slot("a"), "slot A is damaged")
-        first_s = board.records_of_host(card_.frames) - bad_s
-        card_.state_is("b", "good", "0")
+        first_s = board.records_of_host(case.frames) - bad_s
+        case.state_is("b", "good", "0")
     return f"of the board's time: B given up {bad_s:.1f} s after power-on, first record of A {first_s:.1f} s later"
 
 
 def case_laser(shared):
     """records of the kernel's camera with the laser on; the program is killed, and all that hold the line"""
-    card_ = Card(shared, "laser", camera=True)
-    with PiBoard(card_.disk, card_.work) as board:
+    case = Case(shared, "laser", camera=True)
+    with PiBoard(case.disk, case.work) as board:
         board.wait("isohead: starting slot a", START_S)
         expect(board.words(GPLEV0, 1)[0] >> LASER & 1 == 0, "the laser's line is high before anything may use it")
         expect(board.wait_slot("a"), "slot A is damaged")
-        for _ in range(FRAME_COUNT):
+        for index in range(FRAME_COUNT):
             record = board.record()
             expect('"dots":' in record, record)
+            if index == 0:
+                first_s = board.board_s()
         board.wait_level(1)
         board.wait("slot a is good", START_S)
         # The program alone: its guards make the line low. What would do it after them, and starts it again, stands still.
@@ -416,7 +418,8 @@ def case_laser(shared):
         board.command("kill -CONT $keeper", START_S)
         board.wait("the firmware ended with status 137", START_S)
         board.wait_level(0)
-    return f"{FRAME_COUNT} records; line {LASER} high, low by the guards, high again; without guards, {left} and then low by --laser-off"
+    return (f"of the board's time: first record {first_s:.1f} s after power-on; {FRAME_COUNT} records; "
+            f"line {LASER} high, low by the guards, high again; without guards, {left} and then low by --laser-off")
 
 
 CASES = [case_choice, case_loader, case_slots, case_broken, case_laser]
