@@ -23,6 +23,7 @@
 #include "sim_table.h"
 #include "sim_trace.h"
 #include "sim_truth.h"
+#include "sim_up.h"
 
 #define STDOUT_NAME "standard output"
 /* An ambient frame older than this says too little about the scene: at 1 m/s somebody has moved by
@@ -50,6 +51,7 @@ struct visit {
     struct sim_cloud cloud;
     struct sim_score *score;
     struct sim_hint hint;
+    struct sim_up up;
     /* The last frame without laser, for the lit ones after it; samples NULL: none yet. */
     struct hal_frame ambient;
     struct ih_frame ambient_view;
@@ -216,6 +218,7 @@ static void process_lit(struct visit *visit, const struct hal_frame *frame)
         return;
     }
     sim_hint_frame(&visit->hint, head, &view);
+    sim_up_frame(&visit->up, head, visit->replay.next_index - 1);
     put_frame(visit, frame, &view);
 }
 
@@ -248,6 +251,21 @@ static void process_frames(struct visit *visit)
                             visit->run->dirs.file_count);
     }
     sim_report_progress_end(report);
+}
+
+/* What is left out, and the paper's method alone, are meant to find less. */
+static void report_hints(struct visit *visit)
+{
+    struct run *run = visit->run;
+    const struct sim_options *options = run->options;
+    const char *rig = options->rig != NULL ? options->rig : "its rig.json";
+    const struct sim_up_source source = {&visit->replay, &visit->cloud, run->head, visit->dir->path,
+                                         rig};
+    sim_hint_report(&visit->hint, run->head, visit->dir->path, rig, &run->report);
+    sim_hint_free(&visit->hint);
+    if (!options->paper && options->without == 0) {
+        sim_up_report(&visit->up, &source, &run->report);
+    }
 }
 
 static void process_dir(struct run *run, size_t index)
@@ -283,9 +301,7 @@ static void process_dir(struct run *run, size_t index)
     if (!run->options->json && visit.shown_state == IH_ALIGN_MOVED) {
         sim_table_rig(stdout, run->head);
     }
-    sim_hint_report(&visit.hint, run->head, dir->path,
-                    run->options->rig != NULL ? run->options->rig : "its rig.json", &run->report);
-    sim_hint_free(&visit.hint);
+    report_hints(&visit);
     release(&visit, &visit.ambient);
     sim_truth_report(&visit.truth, &run->report);
     sim_truth_free(&visit.truth);

@@ -6,6 +6,7 @@ frames.py HOST_SIM FRAMES_DIR
 """
 
 import json
+import math
 import os
 import pty
 import re
@@ -17,6 +18,8 @@ import tempfile
 import zlib
 
 PICKED = (5, 17, 30)
+# What sequence 1 has of its room alone.
+EMPTY = ["%06d.pgm" % i for i in range(4)]
 failed = 0
 
 
@@ -395,6 +398,108 @@ def test_said(program, source, work):
     test_progress(program, folder)
 
 
+# --- which way is up -------------------------------------------------------------------------------
+
+def quarter(path):
+    """A picture, rotated clockwise."""
+    width, height, maximum, samples = read_pgm(path)
+    rows = [samples[v * width:(v + 1) * width] for v in range(height)]
+    return b"P5\n%d %d\n%d\n" % (height, width, maximum) + b"".join(bytes(row) for row in zip(*rows[::-1]))
+
+
+def quarter_rig(rig):
+    """The rig whose pictures are so: what was above is on the right."""
+    k, lens = rig["camera_matrix"]["data"], rig["distortion_coefficients"]["data"]
+
+    def rotated(values):
+        return [part for i in range(0, len(values), 3) for part in (-values[i + 1], values[i], values[i + 2])]
+
+    def as_matrix(old, data):
+        return {**old, "data": data}
+    return {**rig, "image_width": rig["image_height"], "image_height": rig["image_width"],
+            "camera_matrix": as_matrix(rig["camera_matrix"], [k[4], 0, rig["image_height"] - 1 - k[5], 0, k[0], k[2], 0, 0, 1]),
+            "distortion_coefficients": as_matrix(rig["distortion_coefficients"], [lens[0], lens[1], lens[3], -lens[2], lens[4]]),
+            "projector_origin": as_matrix(rig["projector_origin"], rotated(rig["projector_origin"]["data"])),
+            "dot_rays": as_matrix(rig["dot_rays"], rotated(rig["dot_rays"]["data"])),
+            "up": rotated(rig.get("up", [0, -1, 0]))}
+
+
+def points_of(rig, dots, sine, cosine):
+    """Points of truth's dots, before a camera that looks down, by an angle of this sine, at what the level one has on its axis."""
+    k, middle = rig["camera_matrix"]["data"], 900.0
+    k1, k2, p1, p2, k3 = rig["distortion_coefficients"]["data"]
+    for _, u, v, depth in dots:
+        bent = x, y = (u - k[2]) / k[0], (v - k[5]) / k[4]
+        for _ in range(10):
+            r2 = x * x + y * y
+            radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
+            x, y = ((bent[0] - 2 * p1 * x * y - p2 * (r2 + 2 * x * x)) / radial,
+                    (bent[1] - p1 * (r2 + 2 * y * y) - 2 * p2 * x * y) / radial)
+        above, behind = y * depth, depth - middle
+        yield x * depth, cosine * above - sine * behind, sine * above + cosine * behind + middle
+
+
+def heads(result):
+    return sum(json.loads(line)["head"] is not None for line in result.stdout.splitlines())
+
+
+def test_up(program, source, work):
+    """Advice where heads are found with another up, and only there."""
+    names = ["%06d.pgm" % i for i in range(8, 40, 4)]
+    folder, rig = source, read_json(os.path.join(source, "rig.json"))
+    for step, (side, up) in enumerate((("right side", "[1, 0, 0]"), ("bottom", "[0, 1, 0]"), ("left side", "[-1, 0, 0]")), 1):
+        before, rig = folder, quarter_rig(rig)
+        folder = make(os.path.join(work, "rotated %d" % step), rig)
+        for name in names:
+            write(os.path.join(folder, name), quarter(os.path.join(before, name)))
+        result = run(program, "--json", folder)
+        ok((result.returncode, result.stderr) == (0, "") and heads(result) >= 6, "%s up, and the rig says so: heads, no advice" % side, result)
+        write_json(os.path.join(folder, "rig.json"), {key: value for key, value in rig.items() if key != "up"})
+        result = run(program, "--json", folder)
+        advice = 'host_sim: %s: 0 of 8 frames have a head, but ' % folder, ' of 8 would with "up": %s (the picture\'s %s is up): ' % (up, side)
+        ok(result.returncode == 0 and result.stderr.startswith(advice[0]) and advice[1] in result.stderr and result.stderr.count("\n") == 1
+           and result.stdout.count("\n") == 8 and heads(result) == 0, "%s up, and the rig does not say so: advice in one line" % side, result.stderr)
+    for options in (["--paper"], ["--without", "fit"]):
+        ok(run(program, "--json", *options, folder).stderr == "", "no advice with %s" % options[0])
+    result = run(program, "--json", "--rig", os.path.join(folder, "rig.json"), folder)
+    ok("enter that in %s (" % os.path.join(folder, "rig.json") in result.stderr, "--rig: the advice names that file", result.stderr)
+    for name in names[1:]:
+        shutil.copy(os.path.join(folder, names[0]), os.path.join(folder, name))
+    result = run(program, "--json", folder)
+    ok((result.returncode, result.stderr) == (0, ""), "no advice where what looks like a head from another side never moves", result.stderr)
+    for up in ([0, -1, 0], [1, 0, 0], [0, 1, 0], [0, -0.8, 0.6]):
+        empty = make(os.path.join(work, "empty %s" % up), {**read_json(os.path.join(source, "rig.json")), "up": up})
+        for name in EMPTY:
+            shutil.copy(os.path.join(source, name), empty)
+        result = run(program, "--json", empty)
+        ok((result.returncode, result.stderr, heads(result)) == (0, "", 0), "no advice for an empty room, up %s" % up, result.stderr)
+    test_tilted(program, source, work)
+
+
+def test_tilted(program, source, work):
+    """Lists of points as seen from above."""
+    rig = read_json(os.path.join(source, "rig.json"))
+    with open(os.path.join(source, "truth.jsonl"), encoding="utf-8") as lines:
+        truths = [json.loads(line) for line in lines]
+    for tilt, side in ((30, "top"), (45, "top"), (45, "bottom")):
+        sine, cosine, sign = math.sin(math.radians(tilt)), math.cos(math.radians(tilt)), 1 if side == "top" else -1
+        folder = make(os.path.join(work, "tilted %d %s" % (tilt, side)), range_rig())
+        for truth in truths[8:40:4]:
+            with open(os.path.join(folder, truth["file"].replace(".pgm", ".xyz")), "w", encoding="ascii") as file:
+                file.writelines("%.1f %.1f %.1f\n" % (sign * x, sign * y, z) for x, y, z in points_of(rig, truth["dots"], sine, cosine))
+        result = run(program, "--json", folder)
+        where = "(the picture's %s is up, the camera looks down by about " % side
+        ok(result.returncode == 0 and where in result.stderr and result.stderr.count("\n") == 1,
+           "lists of points, tilted by %d degrees, the %s up: advice" % (tilt, side), result.stderr)
+        write_json(os.path.join(folder, "rig.json"), range_rig(up=[0, -sign * cosine, -sine]))
+        result = run(program, "--json", folder)
+        ok((result.returncode, result.stderr) == (0, "") and heads(result) >= 6, "and none where the rig says so", (heads(result), result.stderr))
+    for name in sorted(os.listdir(folder))[4:8]:
+        os.remove(os.path.join(folder, name))
+    write_json(os.path.join(folder, "rig.json"), range_rig())
+    ok(run(program, "--json", folder).stderr == "", "nor with fewer than 5 frames")
+
+
 def test_trace(program, work):
     """Nothing can be written: said once, before any frame."""
     for out in ("/dev/null", "/proc/no/trace"):
@@ -413,6 +518,7 @@ def main():
         test_next(program, work)
         test_trace(program, work)
         test_said(program, source, work)
+        test_up(program, source, work)
     return 1 if failed else 0
 
 
