@@ -33,7 +33,7 @@ struct sim_up {
 struct sim_up_source {
     struct hal_replay *replay; /* its next frame changes */
     struct sim_cloud *cloud;
-    struct isohead *head; /* changes */
+    struct isohead *head;  /* changes */
     const char *dir, *rig; /* as they are called in the advice */
 };
 

@@ -1,9 +1,12 @@
 #include "app_board.h"
 
+#include <math.h>
+#include <string.h>
 #include <time.h>
 
 #include "app_live.h"
 #include "app_rig.h"
+#include "app_rig_text.h"
 #include "app_settings.h"
 #include "app_write.h"
 
@@ -123,6 +126,62 @@ static bool init_camera(struct app_board *board, const struct app_config *config
     return true;
 }
 
+/* By the core's own rule; what else may be wrong with a rig is for the loop to say. */
+static bool has_sides(struct app_board *board, const struct app_config *config)
+{
+    struct ih_calibration calibration;
+    struct hal_error ignored;
+    int32_t bad_slot = IH_NONE;
+    if (!app_rig_load(config->rig, &calibration, &ignored)) {
+        return true;
+    }
+    memcpy(calibration.up_q30, board->up_q30, sizeof board->up_q30);
+    return isohead_init(&board->head, &calibration, &bad_slot) != IH_ERR_UP;
+}
+
+static bool read_up(struct app_board *board, const struct app_config *config,
+                    struct hal_iio_up *measured, struct hal_error *error)
+{
+    const struct hal_iio_config iio = {
+        .called = config->up + strlen(APP_CONFIG_IIO),
+        .dir = HAL_IIO_DIR,
+        .pause_us = HAL_IIO_PAUSE_US,
+    };
+    if (!hal_iio_read(&iio, measured, error)) {
+        return false;
+    }
+    for (int axis = 0; axis < 3; axis++) {
+        board->up_q30[axis] = (int32_t)lround(ldexp(measured->up[axis], 30));
+    }
+    return has_sides(board, config) ||
+           hal_fail(error,
+                    "%s: the camera looks straight up or down, so that no side of its "
+                    "picture is up",
+                    measured->device);
+}
+
+/* Once, before the camera is opened. Without it the program goes on. */
+static void measure_up(struct app_board *board, const struct app_config *config)
+{
+    struct hal_iio_up measured;
+    struct hal_error error;
+    board->up_text[0] = 0;
+    if (config->up == NULL) {
+        return;
+    }
+    if (!read_up(board, config, &measured, &error)) {
+        app_log_say(&board->log, APP_LOG_WARNING,
+                    "up: %s: %s; the rig's is used, or that of a level camera where it has none",
+                    config->up, error.text);
+        return;
+    }
+    snprintf(board->up_text, sizeof board->up_text, "[%.10f,%.10f,%.10f]",
+             ldexp(board->up_q30[0], -30), ldexp(board->up_q30[1], -30),
+             ldexp(board->up_q30[2], -30));
+    app_log_say(&board->log, APP_LOG_INFO, "up: %s reads %.2f m/s2: up is %s", measured.device,
+                measured.gravity_m_s2, app_rig_up_text(board->up_q30).text);
+}
+
 static void free_camera(struct app_board *board, const struct app_config *config)
 {
     if (config->is_directory) {
@@ -188,6 +247,7 @@ static bool open_recorder(struct app_board *board, const struct app_config *conf
     const struct hal_recorder_config recorder = {
         .recording = {.dir = config->record,
                       .rig = config->rig,
+                      .up = board->up_text[0] != 0 ? board->up_text : NULL,
                       .settings = board->settings,
                       .bytes_max = config->record_max_mb * MEGABYTE},
         .memory_bytes = config->record_memory_mb * MEGABYTE,
@@ -209,6 +269,7 @@ static enum app_exit run_loop(struct app_board *board, const struct app_config *
     board->state.config = config;
     board->state.log = &board->log;
     board->state.head = &board->head;
+    board->state.measured_up_q30 = board->up_text[0] != 0 ? board->up_q30 : NULL;
     board->state.hal = (struct app_hal){
         .camera = config->is_directory ? &board->directory.camera : &board->v4l2.camera,
         .strobe = &board->guard.strobe,
@@ -309,6 +370,7 @@ enum app_exit app_board_run(struct app_board *board, const struct app_config *co
     open_log(board, config);
     init_gpio(board, config, false);
     if (init_camera(board, config)) {
+        measure_up(board, config);
         exit = run_with_camera(board, config);
         free_camera(board, config);
     }

@@ -17,6 +17,7 @@
 #include "linux/hal_gpio.h"
 #include "linux/hal_guard.h"
 #include "linux/hal_guard_end.h"
+#include "linux/hal_iio.h"
 #include "linux/hal_log.h"
 #include "linux/hal_output.h"
 #include "linux/hal_recorder.h"
@@ -50,6 +51,9 @@ struct app_board {
     struct app_state state;
     struct hal_output_state output;
     struct hal_signals signals;
+    /* Which way is up, by an accelerometer: measured_up_q30 of the state, and as a recording has it; "": not known. */
+    int32_t up_q30[3];
+    char up_text[64];
     char settings[APP_BOARD_SETTINGS_MAX]; /* as a recording has them */
 };
 

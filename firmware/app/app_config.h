@@ -23,6 +23,8 @@
 #define APP_CONFIG_TEXT_MAX (32 * 1024)
 /* Longest value. */
 #define APP_CONFIG_VALUE_MAX 255
+/* What stands before an accelerometer's name. */
+#define APP_CONFIG_IIO "iio:"
 /* Errors reported at most; then a line says that there are more. */
 #define APP_CONFIG_ERRORS_MAX 20
 
@@ -73,6 +75,7 @@ enum app_messages {
 struct app_config {
     const char *rig;        /* file; never NULL after success without laser_off, help or version */
     const char *device;     /* default /dev/video0 */
+    const char *up;         /* APP_CONFIG_IIO and an accelerometer (hal_iio.h); NULL: none */
     bool is_directory;      /* the device is one, with frames; the laser is not enabled then */
     enum app_repeat repeat; /* a directory's frames */
     const char *format;     /* auto (default), GREY, Y10, ..., convert */

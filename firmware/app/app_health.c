@@ -24,6 +24,42 @@ struct health_text {
     char text[128];
 };
 
+/* Between two unit vectors. */
+static int32_t angle_mdeg(const int32_t a_q30[3], const int32_t b_q30[3])
+{
+    int64_t along_q30 = 0;
+    uint64_t across2_q60 = 0;
+    for (int i = 0; i < 3; i++) {
+        const int k = (i + 1) % 3;
+        const int64_t across_q30 =
+            ih_shift_round((int64_t)a_q30[i] * b_q30[k] - (int64_t)a_q30[k] * b_q30[i], 30);
+        along_q30 += ih_shift_round((int64_t)a_q30[i] * b_q30[i], 30);
+        across2_q60 += (uint64_t)(across_q30 * across_q30);
+    }
+    return ih_atan2_mdeg(ih_isqrt_u64(across2_q60), along_q30);
+}
+
+void app_health_up(const struct app_state *state, struct ih_calibration *calibration)
+{
+    const int32_t *measured = state->measured_up_q30;
+    const int32_t *own = calibration->up_q30;
+    if (measured == NULL) {
+        return;
+    }
+    if (own[0] == 0 && own[1] == 0 && own[2] == 0) {
+        memcpy(calibration->up_q30, measured, sizeof calibration->up_q30);
+        app_log_say(state->log, APP_LOG_INFO, "%s: has no up, the accelerometer's is used",
+                    state->config->rig);
+    } else if (angle_mdeg(own, measured) > APP_HEALTH_UP_MDEG) {
+        app_log_say(state->log, APP_LOG_WARNING,
+                    "%s: its up is %s; by the accelerometer it is %s: %s degrees from it, at most "
+                    "%s are good. Does the camera hang otherwise now? The rig's is used",
+                    state->config->rig, app_rig_up_text(own).text, app_rig_up_text(measured).text,
+                    app_text_direction(angle_mdeg(own, measured)).text,
+                    app_text_direction(APP_HEALTH_UP_MDEG).text);
+    }
+}
+
 void app_health_begin(struct app_state *state)
 {
     memset(&state->health, 0, sizeof state->health);

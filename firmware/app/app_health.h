@@ -9,6 +9,9 @@
  *      says whether the rig fits and how well depth is known. The exit status is 0 if it fits as it is, else 1: also
  *      when no lit frame has come for APP_HEALTH_WAIT_US, as without a camera, and when it is ended before.
  *
+ * Before a rig goes to the core its up is held against that of the accelerometer, where there is one: a rig that says
+ * none gets the measured one, one that is off by more than APP_HEALTH_UP_MDEG is reported and used.
+ *
  * A reloaded rig starts anew. With config->paper nothing is aligned, and nothing is reported.
  */
 #ifndef APP_HEALTH_H
@@ -17,8 +20,13 @@
 #include "app_state.h"
 
 #define APP_HEALTH_STEADY 6 /* frames */
+/* Twice what is lost hardly a head for. */
+#define APP_HEALTH_UP_MDEG 10000
 /* Longer than any camera takes to start, and to frames at 1 Hz of which every second is lit. */
 #define APP_HEALTH_WAIT_US 15000000
+
+/* The file's calibration, before the core gets it. */
+void app_health_up(const struct app_state *state, struct ih_calibration *calibration);
 
 /* The rig has just been made from its file. */
 void app_health_begin(struct app_state *state);

@@ -49,6 +49,7 @@ static bool load_rig(struct app_state *state, struct hal_error *error)
     if (calibration.kind == IH_RIG_RANGE) {
         return hal_fail(error, "kind: range, expected a rig with a laser: dots");
     }
+    app_health_up(state, &calibration);
     enum ih_err err = isohead_init(state->head, &calibration, &bad_slot);
     if (state->config->paper && !state->config->check) {
         ih_params_paper(&state->head->params);

@@ -329,10 +329,10 @@ static bool read_kind(struct field *field, struct ih_calibration *calibration)
     return true;
 }
 
-/* Absent: a level camera. */
+/* Absent: all 0, as of a level camera. */
 static bool read_up(struct field *field, struct ih_calibration *calibration)
 {
-    double up[RAY_AXES] = {0.0, -1.0, 0.0};
+    double up[RAY_AXES] = {0};
     field->name = "up";
     if (cJSON_GetObjectItemCaseSensitive(field->rig, field->name) != NULL &&
         !read_matrix(field, 1, RAY_AXES, up)) {

@@ -3,13 +3,14 @@
 #include <limits.h>
 #include <string.h>
 
+#include "app_text.h"
+
 #define BAUD_DEFAULT 115200
 #define VIEW_LOCAL "127.0.0.1"
 /* Longest part of a wrong value that is reported. */
 #define QUOTE_MAX 60
 /* A name with more wrong letters than this, or with no right one, is not meant. */
 #define DISTANCE_MAX 2
-#define NAME_MAX_BYTES 24
 
 static void *place_of(struct app_config *config, size_t offset)
 {
@@ -112,6 +113,14 @@ static bool take_text(const struct app_setting *setting, struct app_config *conf
 {
     *(const char **)place_of(config, setting->offset) = value;
     return true;
+}
+
+/* An accelerometer is all there is. */
+static bool take_up(const struct app_setting *setting, struct app_config *config, const char *value)
+{
+    const size_t prefix = strlen(APP_CONFIG_IIO);
+    return strncmp(value, APP_CONFIG_IIO, prefix) == 0 && value[prefix] != 0 &&
+           take_text(setting, config, value);
 }
 
 static bool take_word(const struct app_setting *setting, struct app_config *config,
@@ -244,6 +253,11 @@ const struct app_setting app_settings[] = {
      "or at the rate; "
      "no laser then",
      .take = take_text, .offset = AT(device)},
+    {"up", "iio:DEVICE", "iio: and the name of an accelerometer, its iio:deviceN or its directory",
+     "which way is up, by this accelerometer, for a rig that does not say it, and to check one "
+     "that "
+     "does; default: none",
+     .take = take_up, .offset = AT(up)},
     {"loop", NULL, "auto, on or off",
      "a directory's frames again and again: on; once: off; auto, the default, is on with a live "
      "view and for a check",
@@ -357,41 +371,15 @@ int app_settings_find(const char *name)
     return -1;
 }
 
-static int smaller(int a, int b)
-{
-    return a < b ? a : b;
-}
-
-/* Letters to change, insert or leave out to make one name of the other; both of up to
- * NAME_MAX_BYTES. */
-static int distance(const char *from, const char *to)
-{
-    int row[NAME_MAX_BYTES + 1];
-    int length = (int)strlen(to);
-    for (int k = 0; k <= length; k++) {
-        row[k] = k;
-    }
-    for (int i = 0; from[i] != 0; i++) {
-        int diagonal = row[0];
-        row[0] = i + 1;
-        for (int k = 1; k <= length; k++) {
-            int changed = diagonal + (from[i] == to[k - 1] ? 0 : 1);
-            diagonal = row[k];
-            row[k] = smaller(changed, 1 + smaller(row[k], row[k - 1]));
-        }
-    }
-    return row[length];
-}
-
 int app_settings_nearest(const char *name)
 {
     int nearest = -1;
     int min = DISTANCE_MAX + 1;
-    if (strlen(name) > NAME_MAX_BYTES) {
+    if (strlen(name) > APP_TEXT_NAME_MAX) {
         return -1;
     }
     for (int i = 0; i < APP_SETTINGS_COUNT; i++) {
-        int letters = distance(name, app_settings[i].name);
+        int letters = app_text_distance(name, app_settings[i].name);
         if (letters < min && letters < (int)strlen(name)) {
             min = letters;
             nearest = i;
@@ -482,7 +470,8 @@ static void write_value(const struct app_setting *setting, const struct app_conf
         app_write_bool(write, *((const char *)config + setting->offset) != 0);
     } else if (setting->take == take_number) {
         write_number(setting, number_at(config, setting->offset), write);
-    } else if (setting->take == take_text || setting->take == take_word) {
+    } else if (setting->take == take_text || setting->take == take_word ||
+               setting->take == take_up) {
         app_write_string_or_null(write, text_at(config, setting->offset));
     } else if (setting->words[number_at(config, setting->offset)] != NULL) {
         app_write_string(write, setting->words[number_at(config, setting->offset)]);

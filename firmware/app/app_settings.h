@@ -29,7 +29,7 @@ struct app_setting {
     enum app_settings_place place;
 };
 
-#define APP_SETTINGS_COUNT 33
+#define APP_SETTINGS_COUNT 34
 extern const struct app_setting app_settings[];
 
 /* Index of a setting, or -1. */

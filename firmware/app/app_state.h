@@ -62,6 +62,7 @@ struct app_state {
     struct app_hal hal;
     struct app_log *log;
     struct isohead *head;
+    const int32_t *measured_up_q30; /* by an accelerometer; NULL: none */
     /* Its own. */
     struct app_laser laser;
     unsigned reported_blocks; /* of the laser, in the log */

@@ -61,3 +61,27 @@ void app_text_tame(char *text)
         }
     }
 }
+
+static int smaller(int a, int b)
+{
+    return a < b ? a : b;
+}
+
+int app_text_distance(const char *from, const char *to)
+{
+    int row[APP_TEXT_NAME_MAX + 1];
+    const int length = (int)hal_text_length(to);
+    for (int k = 0; k <= length; k++) {
+        row[k] = k;
+    }
+    for (int i = 0; from[i] != 0; i++) {
+        int diagonal = row[0];
+        row[0] = i + 1;
+        for (int k = 1; k <= length; k++) {
+            int changed = diagonal + (from[i] == to[k - 1] ? 0 : 1);
+            diagonal = row[k];
+            row[k] = smaller(changed, 1 + smaller(row[k], row[k - 1]));
+        }
+    }
+    return row[length];
+}

@@ -29,6 +29,13 @@ struct app_decimal app_text_direction(int32_t angle_mdeg);
 /* Radians as degrees; decimals as above. */
 struct app_decimal app_text_degrees(int32_t angle_rad_q30, int decimals);
 
+/* A name of a setting, at most. */
+#define APP_TEXT_NAME_MAX 24
+
+/* Letters to change, insert or leave out to make one name of the other; both of up to
+ * APP_TEXT_NAME_MAX bytes. */
+int app_text_distance(const char *from, const char *to);
+
 /* Control characters become '?', in place: names from a disk must not steer a terminal. */
 void app_text_tame(char *text);
 

@@ -9,6 +9,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <cjson/cJSON.h>
+
 #include "hal_file.h"
 
 #define DIR_MODE 0777
@@ -256,6 +258,27 @@ bool hal_recording_put(struct hal_recording *recording, const struct hal_recordi
     return rename(hidden.text, path.text) == 0 || fail(error, "naming", path.text);
 }
 
+/* A text that begins with its first field, an object of JSON without "up". To be freed by the caller; NULL: no memory. */
+static char *insert_up(const char *text, const char *up)
+{
+    const size_t before = strcspn(text, "{") + 1;
+    const size_t size = strlen(text) + strlen(up) + sizeof "\"up\":,";
+    char *out = malloc(size);
+    if (out != NULL) {
+        snprintf(out, size, "%.*s\"up\":%s,%s", (int)before, text, up, text + before);
+    }
+    return out;
+}
+
+/* Does it say which way is up? So does what is no object, in which nothing can be written. */
+static bool has_up(const char *text)
+{
+    cJSON *rig = cJSON_Parse(text);
+    bool has = !cJSON_IsObject(rig) || cJSON_GetObjectItemCaseSensitive(rig, "up") != NULL;
+    cJSON_Delete(rig);
+    return has;
+}
+
 bool hal_recording_rig(struct hal_recording *recording, struct hal_error *error)
 {
     uint8_t *text = NULL;
@@ -264,9 +287,17 @@ bool hal_recording_rig(struct hal_recording *recording, struct hal_error *error)
     if (!hal_file_read(recording->config.rig, HAL_RECORDING_RIG_MAX, &text, &size, &reason)) {
         return hal_fail(error, "%.100s: %.120s", recording->config.rig, reason.text);
     }
+    char *with_up = NULL;
+    if (recording->config.up != NULL && !has_up((const char *)text)) {
+        with_up = insert_up((const char *)text, recording->config.up);
+        free(text);
+        if (with_up == NULL) {
+            return hal_fail(error, "no memory");
+        }
+    }
     free(recording->rig_text);
-    recording->rig_text = (char *)text;
-    recording->rig_size = size;
+    recording->rig_text = with_up != NULL ? with_up : (char *)text;
+    recording->rig_size = with_up != NULL ? strlen(with_up) : size;
     return true;
 }
 

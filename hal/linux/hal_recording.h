@@ -21,8 +21,9 @@
 #define HAL_RECORDING_RIG_MAX (1024 * 1024)
 
 struct hal_recording_config {
-    const char *dir;      /* is made where only it itself is missing */
-    const char *rig;      /* file */
+    const char *dir; /* is made where only it itself is missing */
+    const char *rig; /* file */
+    const char *up;  /* as JSON, for a rig file that does not say it; NULL: it stays as it is */
     const char *settings; /* what settings.json has */
     int64_t bytes_max;
 };

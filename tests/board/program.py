@@ -289,6 +289,57 @@ def check_record():
     expect(2, "record-when: given, but no record", "--device", alternating, "--record-when", "moved")
 
 
+def accelerometer(x, y, z):
+    """A directory as sysfs has one for it, which reads this, in m/s2."""
+    path = os.path.join(work, "iio:device0")
+    os.makedirs(path, exist_ok=True)
+    for name, text in (("name", "bmi160"), ("in_accel_scale", "0.001"), ("in_mount_matrix", "0, 1, 0; 1, 0, 0; 0, 0, -1"),
+                       ("in_accel_x_raw", y * 1000), ("in_accel_y_raw", x * 1000), ("in_accel_z_raw", -z * 1000)):
+        with open(os.path.join(path, name), "w", encoding="ascii") as file:
+            file.write(f"{text}\n")
+    return "iio:" + path
+
+
+def check_up():
+    """--up: for a rig that has none, in a recording too; off from one that has; not to be had; with --check."""
+    level = accelerometer(0, -9.81, 0)
+    with open(rig, encoding="ascii") as file:
+        fields = json.load(file)
+    fields.pop("up", None)
+    plain = write("plain.json", json.dumps(fields))
+    tilted = write("tilted.json", json.dumps({**fields, "up": [0, -0.8, -0.6]}))
+    quick = ["--device", frames, "--rate", "1000", "--rig", plain]
+    done = run(*quick, "--up", level)
+    check("up: bmi160 (iio:device0) reads 9.81 m/s2: up is [0.000, -1.000, 0.000], tilt 0.0 and roll 0.0 degrees" in done.stderr
+          and "plain.json: has no up, the accelerometer's is used" in done.stderr, f"--up: {done.stderr}")
+    check([as_of_host(line) for line in done.stdout.splitlines()] == records_of_host(frames), "--up of a level camera: other records")
+    down = accelerometer(0, -8, -6)
+    done = run(*quick, "--up", down)
+    check([as_of_host(line) for line in done.stdout.splitlines()] == records_of_host(frames, "--rig", tilted) != records_of_host(frames),
+          f"--up: other records than with up in the rig: {done.stderr}")
+    part = recorded(frames, "--up", down, "--rig", plain)
+    with open(os.path.join(part, "rig.json"), encoding="ascii") as file:
+        text = json.load(file)
+    up = text.pop("up")
+    check(text == fields and [round(part, 6) for part in up] == [0, -0.8, -0.6], f"the recording's rig: {up}")
+    with open(os.path.join(part, "settings.json"), encoding="ascii") as file:
+        check(json.load(file)["settings"]["up"] == down, "settings.json: up")
+    done = run(*quick, "--up", accelerometer(9.81, 0, 0), "--rig", tilted)
+    check("tilted.json: its up is [0.000, -0.800, -0.600], tilt 36.9 and roll 0.0 degrees; by the accelerometer it is "
+          "[1.000, 0.000, 0.000], tilt 0.0 and roll 90.0 degrees: 90.0 degrees from it" in done.stderr, f"--up, off: {done.stderr}")
+    check([as_of_host(line) for line in done.stdout.splitlines()] == records_of_host(frames, "--rig", tilted), "--up, off: not the rig's is used")
+    for z, why in ((9.81, "the camera looks straight up or down"), (None, "No such file"), (0, "it reads 0.00 m/s2")):
+        up = "iio:/nowhere/iio:device0" if z is None else accelerometer(0, 0, z)
+        done = run(*quick, "--up", up)
+        check(done.returncode == 0 and f"up: {up}: " in done.stderr and why in done.stderr and "level camera where it has none" in done.stderr
+              and "accelerometer's is used" not in done.stderr, f"--up {up}: {done.stderr}")
+        check([as_of_host(line) for line in done.stdout.splitlines()] == records_of_host(frames), f"--up {up}: other records")
+    expect(0, r"(?s)its up is .*checked 60 frames, it fits", "--check", "--device", frames, "--rate", "1000", "--rig", tilted, "--up",
+           accelerometer(0, 9.81, 0))
+    for wrong in ("iio:", "bmi160", "on"):
+        expect(2, f'--up: "{wrong}", expected iio: and the name of an accelerometer', *quick, "--up", wrong)
+
+
 def check_modes():
     """Settings that only the camera would see: they are taken."""
     for options in (["--exposure", "auto", "--gain", "auto"], ["--exposure", "500", "--gain", "7"], ["--exposure", "keep", "--gain", "keep"],
@@ -298,7 +349,7 @@ def check_modes():
 
 
 def main():
-    for part in (check_usage, check_outputs, check_laser, check_ends, check_check, check_directory, check_answers, check_record, check_modes):
+    for part in (check_usage, check_outputs, check_laser, check_ends, check_check, check_directory, check_answers, check_record, check_up, check_modes):
         part()
     print(f"isohead_board without a board: {len(failures)} failures")
     return 1 if failures else 0

@@ -123,11 +123,14 @@ struct world {
     int64_t last_record_us;
     int record_count, lit_count, dark_count, error_count, ambient_count;
     int rise_count, beat_count;
-    int32_t exposure_max_us;        /* as the core was given it */
-    int busy_on_count;              /* heads were looked for with the laser on */
-    int32_t drift_rad_q30[3];       /* from one lit frame to the next */
-    struct ih_alignment alignment;  /* what the core says of every lit frame */
-    int unproven_count;             /* messages of it */
+    int32_t exposure_max_us;       /* as the core was given it */
+    int busy_on_count;             /* heads were looked for with the laser on */
+    int32_t drift_rad_q30[3];      /* from one lit frame to the next */
+    struct ih_alignment alignment; /* what the core says of every lit frame */
+    int unproven_count;            /* messages of it */
+    int up_count;                  /* messages of up; the last one */
+    char up[APP_LOG_TEXT_MAX];
+    int32_t rig_up_q30[3];          /* in the rig file */
     int moved_count, lost_count;    /* warnings of the rig */
     char moved[APP_LOG_TEXT_MAX];   /* the last one */
     char unknown[APP_LOG_TEXT_MAX]; /* why --check has no answer */
@@ -164,6 +167,7 @@ bool app_rig_load(const char *path, struct ih_calibration *calibration, struct h
     calibration->kind = strcmp(path, "range") == 0 ? IH_RIG_RANGE : IH_RIG_DOTS;
     calibration->width = strcmp(path, "narrow") == 0 ? 640 : 752;
     calibration->origin_mm_q16[0] = 25 << 15; /* 12.5 mm */
+    memcpy(calibration->up_q30, world.rig_up_q30, sizeof calibration->up_q30);
     bool is_bad = strcmp(path, "bad") == 0;
     TEST_ASSERT_FALSE_MESSAGE(world.line, "on while the rig is read");
     if (strcmp(path, "now and then") == 0 && world.act_index <= world.rig_is_good_from_act) {
@@ -680,6 +684,10 @@ static void world_write(void *context, int level, const char *text)
     world.news_count += strstr(text, "record: the disk is full") != NULL;
     if (strncmp(text, "made up: ", 9) == 0) {
         snprintf(world.camera_text, sizeof world.camera_text, "%s", text);
+    }
+    if (strstr(text, "accelerometer") != NULL) {
+        world.up_count++;
+        snprintf(world.up, sizeof world.up, "%s", text);
     }
     if (strstr(text, "the rig has moved") != NULL) {
         world.moved_count++;

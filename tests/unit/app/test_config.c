@@ -124,6 +124,7 @@ static void assert_all_is_read(void)
     TEST_ASSERT_EQUAL_STRING("r.json", config.rig);
     TEST_ASSERT_EQUAL_STRING("/dev/video7", config.device);
     TEST_ASSERT_EQUAL_STRING("Y10P", config.format);
+    TEST_ASSERT_EQUAL_STRING("iio:bmi160", config.up);
     TEST_ASSERT_EQUAL_INT32(29970, config.rate_mhz);
     TEST_ASSERT_EQUAL_INT(APP_EXPOSURE_FIXED, config.exposure);
     TEST_ASSERT_EQUAL_INT32(1500, config.exposure_us);
@@ -152,7 +153,7 @@ static void assert_all_is_read(void)
 static void every_setting_is_an_option_and_a_key(void)
 {
     TEST_ASSERT_TRUE(READ("--rig", "r.json", "--device", "/dev/video7", "--format", "Y10P",
-                          "--rate", "29.97", "--exposure", "1500", "--gain", "64", "--laser",
+                          "--rate", "29.97", "--up", "iio:bmi160", "--exposure", "1500", "--gain", "64", "--laser",
                           "--strobe", "alternating", "--gpio-chip", "pinctrl#1", "--laser-line",
                           "LASER EN", "--laser-active-low=on", "--interlock-line=6",
                           "--interlock-active-low", "--heartbeat-line", "7", "--duty", "40",
@@ -170,6 +171,7 @@ static void every_setting_is_an_option_and_a_key(void)
                                "rate = 29.970\r\n"
                                "exposure = 1500\n"
                                "gain = 64\n"
+                               "up = iio:bmi160\n"
                                "laser = on\n"
                                "strobe = alternating\n"
                                "gpio-chip = pinctrl#1\n"
@@ -756,6 +758,8 @@ static void the_installed_file_has_every_key(void)
     config.record = NULL;
     config.record_when = APP_RECORD_ALWAYS;
     config.record_no_head_s = 0;
+    TEST_ASSERT_EQUAL_STRING("iio:bmi160", config.up);
+    config.up = NULL;
     TEST_ASSERT_EQUAL_STRING("8080", config.view_port);
     memset(config.view_host, 0, sizeof config.view_host);
     memset(config.view_port, 0, sizeof config.view_port);

@@ -366,6 +366,69 @@ static void test_reload(void)
     TEST_ASSERT_EQUAL_INT(11, world.lit_count);
 }
 
+/* The accelerometer's up for a rig that has none, and a message where one that has is off; also after a reload. */
+static void test_up_by_an_accelerometer(void)
+{
+    static const enum world_act acts[] = {FIVE, WORLD_RELOAD, FIVE};
+    static const int32_t down_30_q30[3] = {0, -929887697, -536870912};
+    static const int32_t level_q30[3] = {0, -(1 << 30), 0};
+    world_init(APP_STROBE_GATED, acts, COUNT(acts));
+    world.state.measured_up_q30 = down_30_q30;
+    TEST_ASSERT_EQUAL_INT(APP_EXIT_GOOD, world_run());
+    TEST_ASSERT_EQUAL_INT32_ARRAY(down_30_q30, world_head.rig.calibration.up_q30, 3);
+    TEST_ASSERT_EQUAL_INT(2, world.up_count);
+    TEST_ASSERT_EQUAL_STRING("good: has no up, the accelerometer's is used", world.up);
+    for (int is_off = 0; is_off < 2; is_off++) {
+        world_init(APP_STROBE_GATED, acts, COUNT(acts));
+        memcpy(world.rig_up_q30, level_q30, sizeof level_q30);
+        world.state.measured_up_q30 = is_off ? down_30_q30 : level_q30;
+        TEST_ASSERT_EQUAL_INT(APP_EXIT_GOOD, world_run());
+        TEST_ASSERT_EQUAL_INT32_ARRAY(level_q30, world_head.rig.calibration.up_q30, 3);
+        TEST_ASSERT_EQUAL_INT(2 * is_off, world.up_count);
+    }
+    TEST_ASSERT_EQUAL_STRING(
+        "good: its up is [0.000, -1.000, 0.000], tilt 0.0 and roll 0.0 degrees; by the "
+        "accelerometer it is [0.000, -0.866, -0.500], tilt 30.0 and roll 0.0 degrees: 30.0 degrees "
+        "from it, at most 10.0 are good. Does the camera hang otherwise now? The rig's is used",
+        world.up);
+    world_init(APP_STROBE_GATED, acts, COUNT(acts));
+    TEST_ASSERT_EQUAL_INT(APP_EXIT_GOOD, world_run());
+    TEST_ASSERT_EQUAL_INT(0, world_head.rig.calibration.up_q30[1]);
+    TEST_ASSERT_EQUAL_INT(0, world.up_count);
+}
+
+/* All around, and on both sides of the limit. */
+static void test_ups_apart(void)
+{
+    static const struct {
+        double own[3], measured[3];
+        int message_count;
+        const char *text;
+    } cases[] = {
+        {{0, -1, 0}, {0.172, -0.98510, 0}, 0, ""}, /* 9.90 degrees */
+        {{0, -1, 0}, {0.176, -0.98439, 0}, 1, ": 10.1 degrees"},
+        {{0, -1, 0}, {0, 1, 0}, 1, ": 180.0 degrees"},
+        {{1, 0, 0}, {0, 1, 0}, 1, ": 90.0 degrees"},
+        {{-0.6, 0, -0.8}, {-0.6, 0, -0.8}, 0, ""},
+        {{-0.6, 0, -0.8}, {-0.8, 0, -0.6}, 1, "tilt 36.9 and roll -90.0 degrees: 16.3 degrees"},
+        {{0, 0.6, 0.8}, {0, 0.6, -0.8}, 1, "tilt 53.1 and roll 180.0 degrees: 106.3 degrees"},
+    };
+    for (int i = 0; i < COUNT(cases); i++) {
+        struct ih_calibration calibration = {.width = 752};
+        int32_t measured_q30[3];
+        world_init(APP_STROBE_GATED, NULL, 0);
+        for (int axis = 0; axis < 3; axis++) {
+            calibration.up_q30[axis] = (int32_t)(cases[i].own[axis] * (1 << 30));
+            measured_q30[axis] = (int32_t)(cases[i].measured[axis] * (1 << 30));
+        }
+        world.state.measured_up_q30 = measured_q30;
+        app_health_up(&world.state, &calibration);
+        TEST_ASSERT_EQUAL_INT_MESSAGE(cases[i].message_count, world.up_count, world.up);
+        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(world.up, cases[i].text), world.up);
+        TEST_ASSERT_EQUAL_INT32((int32_t)(cases[i].own[1] * (1 << 30)), calibration.up_q30[1]);
+    }
+}
+
 /* The paper's method alone, if it is set, also after the rig has been read again. */
 static void test_paper(void)
 {
@@ -836,6 +899,8 @@ int main(void)
     RUN_TEST(test_unplugged);
     RUN_TEST(test_plugged_in_late);
     RUN_TEST(test_reload);
+    RUN_TEST(test_up_by_an_accelerometer);
+    RUN_TEST(test_ups_apart);
     RUN_TEST(test_paper);
     RUN_TEST(test_reload_bad);
     RUN_TEST(test_reload_good_again);

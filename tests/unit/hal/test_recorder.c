@@ -170,7 +170,8 @@ void tearDown(void)
 
 static struct hal_recording_config recording_config(int64_t bytes_max)
 {
-    return (struct hal_recording_config){dir, rig, "{}\n", bytes_max};
+    return (struct hal_recording_config){
+        .dir = dir, .rig = rig, .settings = "{}\n", .bytes_max = bytes_max};
 }
 
 static bool put(struct hal_recording *recording, int index, const char *name)
@@ -620,6 +621,33 @@ static void test_a_rig_that_is_read_anew(void)
     TEST_ASSERT_TRUE(has_text(2, "settings.json", "{}\n"));
 }
 
+/* Which way is up goes into a rig file that does not say it, and into no other. */
+static void test_up(void)
+{
+    static const struct {
+        const char *rig, *up, *copy;
+    } cases[] = {
+        {RIG, "[0,1,0]", "{\"up\":[0,1,0],\"rig\":1}\n"},
+        {" \n{ \"a\": {\"up\": 1}}", "[0,1,0]", " \n{\"up\":[0,1,0], \"a\": {\"up\": 1}}"},
+        {"{\"rig\":1,\"up\":[1,0,0]}", "[0,1,0]", "{\"rig\":1,\"up\":[1,0,0]}"},
+        {RIG, NULL, RIG},
+        {"[1]", "[0,1,0]", "[1]"},
+        {"no JSON {", "[0,1,0]", "no JSON {"},
+        {"", "[0,1,0]", ""},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        struct hal_recording recording;
+        struct hal_recording_config config = recording_config(1000000);
+        config.up = cases[i].up;
+        write_rig(cases[i].rig);
+        TEST_ASSERT_TRUE_MESSAGE(hal_recording_open(&recording, &config, &error), error.text);
+        TEST_ASSERT_TRUE_MESSAGE(put(&recording, 0, "000000.pgm"), error.text);
+        hal_recording_close(&recording);
+        TEST_ASSERT_TRUE_MESSAGE(has_text(1, "rig.json", cases[i].copy), cases[i].copy);
+        run("rm -rf", dir);
+    }
+}
+
 static void refuse(const struct hal_recorder_config *config, const char *text)
 {
     TEST_ASSERT_FALSE(hal_recorder_open(&process, config, &error));
@@ -679,6 +707,7 @@ int main(void)
     RUN_TEST(test_a_process_that_is_killed);
     RUN_TEST(test_failures_are_reported_once);
     RUN_TEST(test_a_rig_that_is_read_anew);
+    RUN_TEST(test_up);
     RUN_TEST(test_what_cannot_be_opened);
     int failures = UNITY_END();
     run("rm -rf", root);
