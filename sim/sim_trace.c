@@ -38,6 +38,14 @@ static void write_field(struct app_write *write, const struct ih_field *field)
     app_write_close(write, '}');
 }
 
+/* What comes after the labels is in the level frame, where that is another one than the camera's (ih_level.h). */
+static void write_level(struct app_write *write, const struct ih_rig *rig)
+{
+    if (!rig->is_level) {
+        write_column(write, "level_q30", rig->level_q30, 9, sizeof rig->level_q30[0][0]);
+    }
+}
+
 static void write_dots(struct app_write *write, const struct ih_dots *dots)
 {
     const struct ih_dot *dot = dots->dot;
@@ -375,6 +383,7 @@ void sim_trace_write(struct app_write *write, const struct hal_frame *frame, str
     app_write_key(write, "file");
     app_write_string(write, frame->name);
     app_write_int_field(write, "time_us", frame->time_us);
+    write_level(write, &head->rig);
     write_dots(write, &head->dots);
     write_labels(write, &head->labels);
     write_points(write, &head->points);

@@ -47,6 +47,8 @@ def setUpModule():
     damage(UNREADABLE)
     make_dots("bits10", "10", "5+3")
     make_range("range")
+    tilt("bits10", "tilted")
+    run_sim("tilted", [], ["tilted"])
     run_sim("both", [], ["dots", "range"])
     run_sim("bits10", [], ["bits10"])
     run_sim("paper", ["--paper"], ["bits10"])
@@ -69,6 +71,18 @@ def make_dots(name, bits, frames):
     """An empty seat, from the fifth frame on a person."""
     subprocess.run([RENDER, "--sequence", "1", "--seed", "1", "--bits", bits, "--first-frame", frames, at(name)],
                    check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
+
+# Not the one of these frames: what is found is of no matter, but where it is.
+UP = np.array([0.25, -0.85, -np.sqrt(1 - 0.25**2 - 0.85**2)])
+
+
+def tilt(source, name):
+    shutil.copytree(at(source), at(name))
+    with open(at(name, "rig.json"), encoding="utf-8") as file:
+        rig = json.load(file)
+    with open(at(name, "rig.json"), "w", encoding="utf-8") as file:
+        json.dump({**rig, "up": list(UP)}, file)
 
 
 def damage(frame):
@@ -191,6 +205,12 @@ def project(calibration, places):
                      k[1, 1] * (y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y) + k[1, 2]], axis=1)
 
 
+def matrix_of(q):
+    return np.array([[1 - 2 * (q.y**2 + q.z**2), 2 * (q.x * q.y - q.z * q.w), 2 * (q.x * q.z + q.y * q.w)],
+                     [2 * (q.x * q.y + q.z * q.w), 1 - 2 * (q.x**2 + q.z**2), 2 * (q.y * q.z - q.x * q.w)],
+                     [2 * (q.x * q.z - q.y * q.w), 2 * (q.y * q.z + q.x * q.w), 1 - 2 * (q.x**2 + q.y**2)]])
+
+
 def cloud(message):
     kind = np.dtype([("place", "<f4", 3), ("slot", "<u4")])
     assert message.point_stride == kind.itemsize
@@ -294,10 +314,7 @@ class DotsFile(unittest.TestCase):
         np.testing.assert_allclose([place.x, place.y, place.z], np.array(rig["projector_origin"]["data"]) / 1000)
         self.assertEqual(parents["projector"].parent_frame_id, "camera")
         # forward is the rig's X, down its -Z
-        q = parents["camera"].rotation
-        rotation = np.array([[1 - 2 * (q.y**2 + q.z**2), 2 * (q.x * q.y - q.z * q.w), 2 * (q.x * q.z + q.y * q.w)],
-                         [2 * (q.x * q.y + q.z * q.w), 1 - 2 * (q.x**2 + q.z**2), 2 * (q.y * q.z - q.x * q.w)],
-                         [2 * (q.x * q.z - q.y * q.w), 2 * (q.y * q.z + q.x * q.w), 1 - 2 * (q.x**2 + q.y**2)]])
+        rotation = matrix_of(parents["camera"].rotation)
         np.testing.assert_allclose(rotation @ [0, 0, 1], [1, 0, 0], atol=1e-12)
         np.testing.assert_allclose(rotation @ [0, 1, 0], [0, 0, -1], atol=1e-12)
 
@@ -432,6 +449,47 @@ class OtherFiles(unittest.TestCase):
             self.assertAlmostEqual(middle, 0.8, delta=0.08)
             self.assertAlmostEqual(left, right, delta=0.02)
             self.assertGreater(min(left, right, above), middle + 0.05)
+
+    def test_a_camera_that_does_not_hang_level(self):
+        """Everything is in its own frame, heads stand upright in space, and the rig's Z is up."""
+        done = export(*mcap_arguments("tilted", "tilted", "tilted.mcap"))
+        self.assertEqual(done.returncode, 0, done.stderr)
+        mcap = Mcap(at("tilted.mcap"))
+        rotation = matrix_of(next(m for _, m in mcap.messages["/tf"] if m.child_frame_id == "camera").rotation)
+        np.testing.assert_allclose(rotation @ UP, [0, 0, 1], atol=1e-12)
+        np.testing.assert_allclose(rotation @ rotation.T, np.eye(3), atol=1e-12)
+        forward = rotation @ [0, 0, 1]
+        self.assertGreater(forward[0], 0.8)
+        self.assertAlmostEqual(forward[1], 0, delta=1e-12)
+        balls = 0
+        for record in records_of("tilted"):
+            trace = trace_of("tilted", "tilted", record)
+            level = np.reshape(trace["level_q30"], (3, 3)) / 2**30
+            np.testing.assert_allclose(level @ UP, [0, -1, 0], atol=1e-8)
+            topics = ("/camera/dots", "/points", "/surface", "/camera/calibration", "/heads", "/rejected")
+            dots, points, scene, calibration, *ellipsoids = (mcap.at(topic, record["time_us"]) for topic in topics)
+            places = cloud(points)["place"].astype(float)
+            of_dots = np.array([[p.x - 0.5, p.y - 0.5] for p in dots.points[0].points])
+            mine = of_dots[[trace["labels"]["slot"][slot]["dot"] for slot in cloud(points)["slot"]]]
+            off_px = np.hypot(*(project(calibration, places) - mine).T)
+            self.assertLess(np.median(off_px), 0.3, record["file"])
+            self.assertLess(off_px.max(), 6, record["file"])
+            nodes = np.array([[p.x, p.y, p.z] for p in scene.entities[0].triangles[0].points]) @ level.T
+            np.testing.assert_allclose(nodes[:, 2] * 256000, np.ravel(trace["surface"]["depth_mm_q8"]), rtol=1e-6)
+            used = set(np.array(trace["samples"]["slot"])[np.array(trace["samples"]["final_root_weight_q15"]) > 32000])
+            places = np.array([p["place"] for p in cloud(points) if p["slot"] in used], dtype=float) @ level.T
+            slopes, lattice = places[:, :2] / places[:, 2:], nodes[:, :2] / nodes[:, 2:]
+            on_it = ((slopes > lattice.min(axis=0)) & (slopes < lattice.max(axis=0))).all(axis=1)
+            near = on_it & (places[:, 2] * 256000 < trace["samples"]["clip_mm_q8"])
+            self.assertGreater(near.sum(), 40)
+            self.assertLess(np.abs(depth_at(nodes, slopes[near]) - places[near, 2]).mean(), 0.03, record["file"])
+            for entity in (entity for one in ellipsoids for entity in one.entities):
+                np.testing.assert_allclose(matrix_of(entity.spheres[0].pose.orientation), level.T, atol=1e-8)
+                above = np.subtract(*([getattr(p, axis) for axis in "xyz"] for p in
+                                      (entity.texts[0].pose.position, entity.spheres[0].pose.position)))
+                np.testing.assert_allclose(above / np.linalg.norm(above), UP, atol=1e-6)
+                balls += 1
+        self.assertGreater(balls, 2)
 
     def test_ten_bits(self):
         done = export(*mcap_arguments("bits10", "bits10", "bits10.mcap"))

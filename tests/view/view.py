@@ -152,6 +152,46 @@ def case_bands(picture):
     result("bands: white where there is no surface", None if outside > 252 else "%.0f" % outside)
 
 
+def case_level():
+    """Cameras on their side, looking down, and both: the surface is in the level frame, the picture the camera's."""
+    trace, rig = read_json(at("trace/000003.json")), read_json(at("made/rig.json"))
+    trace["points"]["state"][7], trace["points"]["x_q28"][7], trace["points"]["y_q28"][7] = 1, round(0.1 * 2**28), round(-0.15 * 2**28)
+    for folder in ("hung", "hung_trace"):
+        os.makedirs(at(folder))
+    shutil.copy(at("made/" + scene.FRAME), at("hung"))
+    write_json(at("hung/rig.json"), {**rig, "kind": "range"})
+    for name, roll_deg, tilt_deg, corner in (("on its side", 90, 0, (29, 0)), ("looking down", 0, 25, (0, -29)), ("both", -90, 25, (-29, 0))):
+        roll, tilt = np.radians(roll_deg), np.radians(tilt_deg)
+        level = (np.array([[1, 0, 0], [0, np.cos(tilt), -np.sin(tilt)], [0, np.sin(tilt), np.cos(tilt)]])
+                 @ np.array([[np.cos(roll), np.sin(roll), 0], [-np.sin(roll), np.cos(roll), 0], [0, 0, 1]]))
+        write_json(at("hung_trace/000003.json"), {**trace, "level_q30": [round(value * 2**30) for value in level.ravel()]})
+
+        def seen(x, y, of=level):
+            """A direction of the level frame, by its slopes, in the camera's picture."""
+            direction = of.T @ [x, y, 1]
+            return tuple(scene.CENTRE + scene.FOCAL * direction[:2] / direction[2])
+
+        def node(x, y, at_px=seen):
+            return at_px((x - 23) * scene.STEP_PX / scene.FOCAL, (y - 23) * scene.STEP_PX / scene.FOCAL)
+        must("contours", "--trace", at("hung_trace"), at("hung"), at("hung.png"))
+        picture = Picture(at("hung.png"), (20, 60), 820 / scene.WIDTH)
+        part = [node(x, y) for x in np.arange(30.5, 39, 0.25) for y in (5, 12)]
+        part = [px for px in part if 4 < px[0] < scene.WIDTH - 4 and 4 < px[1] < scene.HEIGHT - 4]
+        result("level: enough of the part is in the picture, " + name, None if len(part) > 30 else len(part))
+        check_fraction("level: a contour's part is where the camera sees it, " + name, fraction(picture, part, WHITE, radius=1), 0.95)
+        greys = [picture.brightness(node(x, 16)) for x in np.arange(19.5, 31, 2)]
+        result("level: so are the bands, " + name, None if all(a < b for a, b in zip(greys, greys[1:])) else str(greys))
+        solid = fraction(picture, around(scene.ACCEPTED), BLACK, radius=1)
+        check_fraction("level: an ellipse is the picture's own, " + name, solid, 0.9)
+        tip = 20 + 48 + corner[0] * 24 / 29, 60 + 820 * scene.HEIGHT / scene.WIDTH - 48 + corner[1] * 24 / 29
+        result("level: an arrow says which way is up, " + name, None if picture.near(tip, SKY, radius=3) else "nothing at %s" % (tip,))
+        must("control", "--trace", at("hung_trace"), at("hung"), at("hung.png"))
+        picture = Picture(at("hung.png"), (20, 64), 1880 / scene.WIDTH)
+        u, v = picture.page(seen(0.1, -0.15))
+        ring = [picture.near((u + 6.5 * np.cos(t), v + 6.5 * np.sin(t)), YELLOW, radius=3) for t in np.linspace(0, 6.28, 8, endpoint=False)]
+        result("level: a point of a depth image, " + name, None if all(ring) else str(ring))
+
+
 def case_control():
     must("control", "--trace", at("trace/000003.json"), at("made"), at("control.png"))
     picture = Picture(at("control.png"), (20, 64), 1880 / scene.WIDTH)
@@ -640,6 +680,7 @@ def main():
     options = parser.parse_args()
     records, nested = prepare()
     case_bands(case_contours())
+    case_level()
     case_control()
     case_real_residuals()
     case_trace([("short", record) for record in records] + [("sequence1", record) for record in nested])

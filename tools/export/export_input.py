@@ -222,6 +222,7 @@ class Rig:
                            "more mm than near_mm", path)
         self.matrix = self.numbers(data, "camera_matrix", 9, path)
         self.lens = self.numbers(data, "distortion_coefficients", 5, path)
+        self.up = take(data, "up", list_of(is_number, 3), "[x, y, z]", path) if "up" in data else [0, -1, 0]
         self.projector_mm = None if self.is_range else self.numbers(data, "projector_origin", 3, path)
 
     @staticmethod
@@ -285,6 +286,8 @@ class Trace:
         self.data = parse(read_bytes(path), path)
         self.check_frame(record)
         self.read_dots()
+        # rows: from the camera frame to the one that points, surface and ellipsoids are in
+        self.level = self.read_level()
         self.points_mm = self.read_points()
         self.depths_mm = self.read_depths()
         self.surface_mm = self.read_surface()
@@ -319,10 +322,26 @@ class Trace:
                        self.path, "labels.slot[%d]." % slot)
             for slot, entry in enumerate(slots) if entry is not None}
 
+    def read_level(self):
+        if "level_q30" not in self.data:
+            return [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
+        raw = take(self.data, "level_q30", list_of(is_raw, 9), "9 integers", self.path)
+        return [[value / 2**30 for value in raw[3 * i:3 * i + 3]] for i in range(3)]
+
+    def of_camera(self, position):
+        """A position of the level frame."""
+        if "level_q30" not in self.data:
+            return position
+        return tuple(sum(row[axis] * value for row, value in zip(self.level, position)) for axis in range(3))
+
+    def depth(self, position):
+        """Of a position of the camera frame, as the surface has it."""
+        return position[2] if "level_q30" not in self.data else sum(a * b for a, b in zip(self.level[2], position))
+
     def read_points(self):
         """(slot, x, y, z) of every slot that was seen."""
         columns = [self.column("points", key, SLOTS) for key in ("x_q28", "y_q28", "depth_mm_q8", "state")]
-        return [(slot, x / 2**28 * depth / 256, y / 2**28 * depth / 256, depth / 256)
+        return [(slot, *self.of_camera((x / 2**28 * depth / 256, y / 2**28 * depth / 256, depth / 256)))
                 for slot, (x, y, depth, state) in enumerate(zip(*columns)) if state == 1]
 
     def read_depths(self):
@@ -343,7 +362,7 @@ class Trace:
         rows = take(surface, "depth_mm_q8", list_of(list_of(is_raw, GRID), GRID),
                     "%d rows of %d integers" % (GRID, GRID), self.path, "surface.")
         slopes = [(k - (GRID - 1) / 2) * unit * 10 / 11 for k in range(GRID)]  # 10/11 field units a step
-        return [[((middle_x + across) * depth / 256, (middle_y + down) * depth / 256, depth / 256)
+        return [[self.of_camera(((middle_x + across) * depth / 256, (middle_y + down) * depth / 256, depth / 256))
                  for across, depth in zip(slopes, row)] for down, row in zip(slopes, rows)]
 
     def read_semi_axes(self, count):

@@ -51,8 +51,8 @@ def frame_messages(record, rig, picture, trace):
     yield "/camera/rejected", scene.outlines(record, time, False)
     yield "/points", scene.points(trace, time)
     yield "/surface", scene.surface(trace, rig, time)
-    yield "/heads", scene.heads(record, trace.semi_axes_mm, time, True)
-    yield "/rejected", scene.heads(record, trace.semi_axes_mm, time, False)
+    yield "/heads", scene.heads(record, trace, time, True)
+    yield "/rejected", scene.heads(record, trace, time, False)
     found = scene.head_pose(record, time)
     if found is not None:
         yield "/head", found

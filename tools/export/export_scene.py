@@ -1,7 +1,7 @@
 """One frame as messages of Foxglove's schemas: picture, dots, points, surface, heads.
 
 Lengths are metres, as Foxglove takes them to be; the frame "camera" is that of docs/contract.md (X right, Y
-down, Z forward), "rig" the same origin with X forward and Z up. Foxglove counts pixels from the corner of the
+down, Z forward), "rig" the same origin with Z up, by the rig's "up", and X level and forward. Foxglove counts pixels from the corner of the
 first one, the records from its centre: half a pixel is added.
 
 Colours can be distinguished in grey and by the colour-blind: depth from dark (near) over green to yellow (far);
@@ -43,8 +43,6 @@ MEAN_SEMI_AXES_MM = (78, 113, 98)
 OUTLINE_POINTS = 48
 FOREVER = Duration()  # until the next scene deletes it
 NO_ROTATION = Quaternion(x=0, y=0, z=0, w=1)
-# X right, Y down, Z forward, seen from X forward, Y left, Z up.
-CAMERA_ROTATION = Quaternion(x=-0.5, y=0.5, z=-0.5, w=0.5)
 
 HEAD = (0.84, 0.37, 0.00)
 OTHER_HEAD = (0.94, 0.89, 0.26)
@@ -85,6 +83,30 @@ def pose(position_mm, orientation=NO_ROTATION):
     return Pose(position=Vector3(x=x, y=y, z=z), orientation=orientation)
 
 
+def cross(a, b):
+    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+
+
+def rotation(rows):
+    """The matrix as a quaternion, by whichever of its parts is large."""
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = rows
+    x, y, z, w = max(((1 + xx - yy - zz, xy + yx, xz + zx, zy - yz), (xy + yx, 1 - xx + yy - zz, yz + zy, xz - zx),
+                      (xz + zx, yz + zy, 1 - xx - yy + zz, yx - xy), (zy - yz, xz - zx, yx - xy, 1 + xx + yy + zz)),
+                     key=lambda q: sum(part * part for part in q))
+    length = math.sqrt(x * x + y * y + z * z + w * w)
+    return Quaternion(x=x / length, y=y / length, z=z / length, w=w / length)
+
+
+def upright(rig):
+    """Turns the camera's axes to those that have Z up, X level and as far forward as that allows."""
+    length = math.sqrt(sum(float(value) ** 2 for value in rig.up)) or 1.0
+    up = [float(value) / length for value in rig.up]
+    forward = [-up[2] * up[0], -up[2] * up[1], 1 - up[2] * up[2]]
+    length = math.sqrt(sum(value * value for value in forward)) or 1.0
+    forward = [value / length for value in forward]
+    return rotation([forward, cross(up, forward), up])
+
+
 def looking(pose_deg):
     """What turns the x axis, along which players draw a pose's arrow, to where the face looks; without roll."""
     if pose_deg is None:
@@ -104,7 +126,7 @@ def pixel(u_px, v_px):
 
 def transforms(rig, time):
     found = [FrameTransform(timestamp=time, parent_frame_id="rig", child_frame_id=CAMERA,
-                            translation=Vector3(), rotation=CAMERA_ROTATION)]
+                            translation=Vector3(), rotation=upright(rig))]
     if rig.projector_mm is not None:
         x, y, z = metres(rig.projector_mm)
         found.append(FrameTransform(timestamp=time, parent_frame_id=CAMERA, child_frame_id="projector",
@@ -130,7 +152,7 @@ def image(picture, rig, time):
 
 def dots(trace, rig, time):
     """Every dot: a labelled one by its depth, another one grey."""
-    depth_of_slot = {slot: z for slot, _, _, z in trace.points_mm}
+    depth_of_slot = {slot: trace.depth(position) for slot, *position in trace.points_mm}
     slot_of_dot = {dot: slot for slot, dot in trace.dot_of_slot.items()}
     depths = [depth_of_slot.get(slot_of_dot.get(dot)) for dot in range(len(trace.dots_px))]
     colours = [colour(REJECTED) if depth is None else depth_colour(depth, trace, rig) for depth in depths]
@@ -225,7 +247,7 @@ def surface(trace, rig, time):
     nodes = [position for row in trace.surface_mm for position in row]
     shape = TriangleListPrimitive(
         pose=pose((0, 0, 0)), points=[Point3(x=x, y=y, z=z) for x, y, z in map(metres, nodes)],
-        color=colour(REJECTED), colors=[depth_colour(position[2], trace, rig, 0.7) for position in nodes],
+        color=colour(REJECTED), colors=[depth_colour(trace.depth(position), trace, rig, 0.7) for position in nodes],
         indices=triangles(len(trace.surface_mm)))
     scene.entities.append(SceneEntity(timestamp=time, frame_id=CAMERA, id="surface", lifetime=FOREVER,
                                       triangles=[shape]))
@@ -242,26 +264,26 @@ def facts(record, index):
             for key, value in pairs]
 
 
-def head(record, index, semi_axes_mm, time):
+def head(record, index, semi_axes_mm, level, time):
     h = record.hypotheses[index]
     rgb, is_head = look(record, index)
     x, y, z = metres(semi_axes_mm)
-    above = [h["centre_mm"][0], float(h["centre_mm"][1]) - float(semi_axes_mm[1]) - 30, h["centre_mm"][2]]
+    above = [float(value) - down * (float(semi_axes_mm[1]) + 30) for value, down in zip(h["centre_mm"], level[1])]
     return SceneEntity(
         timestamp=time, frame_id=CAMERA, id=str(index), lifetime=FOREVER, metadata=facts(record, index),
-        spheres=[SpherePrimitive(pose=pose(h["centre_mm"]), size=Vector3(x=2 * x, y=2 * y, z=2 * z),
+        spheres=[SpherePrimitive(pose=pose(h["centre_mm"], rotation(list(zip(*level)))), size=Vector3(x=2 * x, y=2 * y, z=2 * z),
                                  color=colour(rgb, 0.6 if is_head else 0.15))],
         texts=[TextPrimitive(pose=pose(above), billboard=True, font_size=0.03, color=colour(rgb),
                              text=words(record, index))])
 
 
-def heads(record, semi_axes_mm, time, wanted_heads):
-    """The heads, or the rejected hypotheses, as ellipsoids. semi_axes_mm: a triple per hypothesis, or None."""
+def heads(record, trace, time, wanted_heads):
+    """The heads, or the rejected hypotheses, as ellipsoids, which stand upright."""
     scene = fresh_scene(time)
     for index in range(len(record.hypotheses)):
         if look(record, index)[1] == wanted_heads:
-            axes = MEAN_SEMI_AXES_MM if semi_axes_mm is None else semi_axes_mm[index]
-            scene.entities.append(head(record, index, axes, time))
+            axes = MEAN_SEMI_AXES_MM if trace.semi_axes_mm is None else trace.semi_axes_mm[index]
+            scene.entities.append(head(record, index, axes, trace.level, time))
     return scene
 
 

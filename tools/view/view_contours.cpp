@@ -58,7 +58,8 @@ cv::Mat1b Shader::shade(const Trace &trace) const
     cv::Mat1b grey(size_, 255);
     for (size_t i = 0; trace.surface.valid && i < positions_.size(); i++) {
         double depth_mm;
-        if (depth_at(trace.surface, positions_[i], depth_mm))
+        std::optional<cv::Point2d> position = rotate(trace.level, positions_[i]);
+        if (position && depth_at(trace.surface, *position, depth_mm))
             grey.data[i] = band_grey(trace, depth_mm);
     }
     return grey;
@@ -66,14 +67,15 @@ cv::Mat1b Shader::shade(const Trace &trace) const
 
 /* From positions on the depth grid to the page, in pieces: what the lens's polynomials do not cover is left out. */
 static std::vector<std::vector<cv::Point2d>> on_page(const std::vector<cv::Point2d> &steps, const Plot &plot,
-                                                     const Surface &surface, const Rig &rig)
+                                                     const Trace &trace, const Rig &rig)
 {
     std::vector<std::vector<cv::Point2d>> pieces(1);
     for (cv::Point2d step : steps) {
         cv::Point2d from_middle = step - cv::Point2d(1, 1) * (0.5 * (grid_nodes - 1));
-        cv::Point2d position = surface.centre + from_middle * surface.step;
-        if (cv::norm(position) <= rig.reach)
-            pieces.back().push_back(plot.page(rig.pixel(position)));
+        std::optional<cv::Point2d> position =
+            rotate(trace.level.t(), trace.surface.centre + from_middle * trace.surface.step);
+        if (position && cv::norm(*position) <= rig.reach)
+            pieces.back().push_back(plot.page(rig.pixel(*position)));
         else if (!pieces.back().empty())
             pieces.emplace_back();
     }
@@ -85,7 +87,7 @@ static void draw_steps(Canvas &canvas, std::vector<cv::Point2d> steps, bool clos
 {
     if (closed && !steps.empty())
         steps.push_back(steps.front());
-    for (const auto &piece : on_page(steps, plot, trace.surface, rig))
+    for (const auto &piece : on_page(steps, plot, trace, rig))
         canvas.line(piece, stroke);
 }
 
@@ -176,6 +178,7 @@ void contours_draw_plot(Canvas &canvas, const Plot &plot, const Shader &shader, 
         canvas.text(plot.where.tl() + cv::Point2d(plot.where.width, plot.where.height) / 2,
                     "no surface: too few points", words_size, Anchor::middle);
     draw_hypotheses(canvas, plot, trace, rig, much);
+    up_draw(canvas, plot, trace, much);
     canvas.unclip();
     canvas.line(
         {plot.where.tl(), {plot.where.br().x, plot.where.y}, plot.where.br(), {plot.where.x, plot.where.br().y}},

@@ -219,6 +219,7 @@ void control_draw(Canvas &canvas, const cv::Mat1b &image, const Trace &trace, co
     if (rig.range)
         draw_points(canvas, plot, trace, rig, ring_radius);
     heads_draw(canvas, plot, trace, 1);
+    up_draw(canvas, plot, trace, 1.5);
     int without = draw_numbers(canvas, plot, trace, room);
     canvas.unclip();
     cv::Point2d foot(margin, plot.where.br().y + 26);

@@ -58,6 +58,20 @@ void heads_draw(Canvas &canvas, const Plot &plot, const Trace &trace, double muc
                      {vermilion, 4 * much, {}, false, 1.5 * much}, true);
 }
 
+void up_draw(Canvas &canvas, const Plot &plot, const Trace &trace, double much)
+{
+    if (trace.level == cv::Matx33d::eye())
+        return;
+    /* the level frame's -Y in the picture; of its tilt 45 degrees are taken out at most, so it is no point there */
+    cv::Point2d up(-trace.level(1, 0), -trace.level(1, 1));
+    up *= 24 * much / cv::norm(up);
+    cv::Point2d middle(plot.where.x + 48 * much, plot.where.br().y - 48 * much), aside(-up.y, up.x), tip = middle + up;
+    Stroke stroke{sky, 3 * much, {}, false, 1.6 * much, black};
+    canvas.line({middle - up, tip}, stroke);
+    canvas.line({tip - up / 2 + aside / 3, tip, tip - up / 2 - aside / 3}, stroke);
+    canvas.text_with_halo(tip + up / 2, "up", 15 * much, Anchor::middle, black, white);
+}
+
 void key_draw(Canvas &canvas, cv::Point2d at, int columns, cv::Size2d cell, double much, bool paper)
 {
     struct Entry {

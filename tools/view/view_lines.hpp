@@ -23,6 +23,9 @@ void hypothesis_draw(Canvas &canvas, const Plot &plot, const Ellipse &ellipse, c
 /* The heads of the whole method: their outlines, the selected one with a cross. None with the paper's method alone. */
 void heads_draw(Canvas &canvas, const Plot &plot, const Trace &trace, double much);
 
+/* An arrow in the lower left corner to where is up, where the camera does not hang level. */
+void up_draw(Canvas &canvas, const Plot &plot, const Trace &trace, double much);
+
 /* What the lines mean, row by row in columns of this width, rows of this height, from `at` on. With the paper's method
  * alone without what only the whole method has. */
 void key_draw(Canvas &canvas, cv::Point2d at, int columns, cv::Size2d cell, double much, bool paper);

@@ -24,6 +24,10 @@ class Node
     {
         return value_->is_null();
     }
+    bool has(const char *key) const
+    {
+        return value_->is_object() && value_->contains(key);
+    }
     bool boolean() const;
     std::string string() const;
     /* An integer within bounds. */

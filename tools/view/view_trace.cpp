@@ -43,13 +43,34 @@ static void read_labels(const Node &slots, Trace &trace)
     }
 }
 
+std::optional<cv::Point2d> rotate(const cv::Matx33d &rotation, cv::Point2d position)
+{
+    static constexpr double depth_min = 0.05;
+    cv::Vec3d direction = rotation * cv::Vec3d(position.x, position.y, 1);
+    if (direction[2] < depth_min)
+        return std::nullopt;
+    return cv::Point2d(direction[0] / direction[2], direction[1] / direction[2]);
+}
+
+static void read_level(const Node &whole, Trace &trace)
+{
+    trace.level = cv::Matx33d::eye();
+    if (!whole.has("level_q30"))
+        return;
+    whole["level_q30"].must_count(9);
+    for (int i = 0; i < 9; i++)
+        trace.level(i / 3, i % 3) = whole["level_q30"][static_cast<size_t>(i)].fixed(30);
+}
+
 static void read_points(const Node &points, Trace &trace)
 {
     for (const char *key : {"x_q28", "y_q28", "state"})
         points[key].must_count(slot_count);
     for (size_t i = 0; i < slot_count; i++) {
-        trace.points[i] = {{points["x_q28"][i].fixed(28), points["y_q28"][i].fixed(28)},
-                           points["state"][i].integer(0, 2) == 1};
+        cv::Point2d position(points["x_q28"][i].fixed(28), points["y_q28"][i].fixed(28));
+        std::optional<cv::Point2d> of_camera = rotate(trace.level.t(), position);
+        trace.points[i] = {of_camera.value_or(cv::Point2d()),
+                           points["state"][i].integer(0, 2) == 1 && of_camera.has_value()};
     }
 }
 
@@ -190,6 +211,7 @@ Trace trace_read(const std::string &path)
     if (trace.file.empty() || trace.file.find('/') != std::string::npos)
         whole["file"].complain("the name of a frame");
     trace.time_us = whole["time_us"].integer(INT64_MIN, INT64_MAX);
+    read_level(whole, trace);
     read_dots(whole["dots"], trace);
     read_labels(whole["labels"]["slot"], trace);
     read_points(whole["points"], trace);

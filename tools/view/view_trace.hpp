@@ -21,7 +21,7 @@ struct Label {
     double perp_px = 0;
 };
 
-/* A position on the depth grid in steps (0 .. 46) stands at centre + (place - 23) * step, normalised. */
+/* A position on the depth grid in steps (0 .. 46) stands at centre + (place - 23) * step, normalised, in the level frame. */
 struct Surface {
     bool valid = false;
     cv::Point2d centre;
@@ -80,7 +80,7 @@ struct Detection {
 };
 
 struct Point {
-    cv::Point2d position; /* normalised */
+    cv::Point2d position; /* normalised, camera frame */
     bool seen;
 };
 
@@ -88,6 +88,7 @@ struct Trace {
     std::string path; /* of the trace */
     std::string file; /* of the frame, in the frames directory */
     int64_t time_us;
+    cv::Matx33d level; /* from the camera frame to that of the surface */
     std::vector<cv::Point2d> dots_px;
     std::array<Label, slot_count> labels;
     std::array<Point, slot_count> points;
@@ -106,6 +107,9 @@ struct Trace {
 };
 
 Trace trace_read(const std::string &path);
+
+/* Normalised coordinates in the frame that the rotation leads to; nothing where they lie behind the camera. */
+std::optional<cv::Point2d> rotate(const cv::Matx33d &rotation, cv::Point2d position);
 } // namespace view
 
 #endif

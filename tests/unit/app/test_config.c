@@ -153,9 +153,9 @@ static void assert_all_is_read(void)
 static void every_setting_is_an_option_and_a_key(void)
 {
     TEST_ASSERT_TRUE(READ("--rig", "r.json", "--device", "/dev/video7", "--format", "Y10P",
-                          "--rate", "29.97", "--up", "iio:bmi160", "--exposure", "1500", "--gain", "64", "--laser",
-                          "--strobe", "alternating", "--gpio-chip", "pinctrl#1", "--laser-line",
-                          "LASER EN", "--laser-active-low=on", "--interlock-line=6",
+                          "--rate", "29.97", "--up", "iio:bmi160", "--exposure", "1500", "--gain",
+                          "64", "--laser", "--strobe", "alternating", "--gpio-chip", "pinctrl#1",
+                          "--laser-line", "LASER EN", "--laser-active-low=on", "--interlock-line=6",
                           "--interlock-active-low", "--heartbeat-line", "7", "--duty", "40",
                           "--output", "udp:[fe80::1]:5005", "--log=syslog", "--status", "0",
                           "--watchdog", "/dev/watchdog1", "--paper", "--view", "10.0.0.1:8080"));

@@ -140,7 +140,8 @@ static void test_mount_matrix(void)
     expect_up(0.0, -1.0, 0.0);
     put_raw("iio:device0", "-490.5", "0", "849.571");
     expect_up(0.0, -0.8660254, 0.5);
-    put("iio:device0", "in_accel_mount_matrix", "1,0,0;0,1,0;0,0,1"); /* goes before the common one */
+    put("iio:device0", "in_accel_mount_matrix",
+        "1,0,0;0,1,0;0,0,1"); /* goes before the common one */
     expect_up(-0.5, 0.0, 0.8660254);
     put("iio:device0", "in_accel_mount_matrix", NULL);
     put("iio:device0", "in_mount_matrix", NULL);
@@ -235,7 +236,8 @@ static void test_moving(void)
     put_raw("iio:device0", "60", "-981", "0");
     shake_raw[0] = -60;
     shake_raw[1] = 60;
-    expect_error("bmi160", "it moves: readings are up to 0.60 m/s2 from their mean, expected at most 0.5");
+    expect_error("bmi160",
+                 "it moves: readings are up to 0.60 m/s2 from their mean, expected at most 0.5");
 }
 
 int main(void)
