@@ -238,6 +238,28 @@ def board_depths(directory):
     return depths
 
 
+def check_plumb(bench):
+    """The board of a picture says which way is up, of either picture of a pair."""
+    good, out = bench.path("rig0", "good"), bench.path("plumb")
+    with open(good + "/truth.jsonl", encoding="utf-8") as file:
+        down = {entry["file"]: np.array(entry["board"]["down"]) for entry in map(json.loads, file)}
+    for name in ("000007.pgm", "000030.pgm"):
+        status, text, err = bench.solve(good, out, "--plumb", name)
+        if status != 0:
+            result("--plumb " + name, "status %s: %s" % (status, err))
+            continue
+        with open(out + "/rig.json", encoding="utf-8") as file:
+            up = np.array(json.load(file)["up"])
+        lit = "%06d.pgm" % (int(name[:6]) // 2 * 2)  # truth has these alone
+        off_deg = math.degrees(math.acos(min(1.0, -up @ down[lit])))
+        said = re.search(r"^up: tilt (\S+), roll (\S+) degrees, by the board in %s$" % name, text, re.M)
+        tilt, roll = (math.radians(float(value)) for value in said.groups()) if said else (math.nan, math.nan)
+        again = [math.cos(tilt) * math.sin(roll), -math.cos(tilt) * math.cos(roll), -math.sin(tilt)]
+        fine = off_deg < 0.2 and abs(np.linalg.norm(up) - 1) < 1e-9 and np.abs(again - up).max() < 2e-4
+        result("--plumb " + name, None if fine else "%.2f degrees off; %s, said %s" % (off_deg, up, again))
+    refuse(bench, "--plumb with a picture that is not there", good, 1, r"--plumb: there is no 000099\.pgm in ", "--plumb", "000099.pgm", kept=True)
+
+
 def check_refusals(bench):
     good = bench.path("rig0", "good")
     made = bench.path("made")
@@ -611,6 +633,9 @@ def check_usage(bench):
                           (("guide", "--size", "640x480", "a"), "--size belongs to guide --camera"),
                           (("guide", "--far", "900", "a"), "--far belongs to solve"),
                           (("guide", "--tilt", "9", "a"), "--tilt belongs to solve"),
+                          (("guide", "--plumb", "a", "a"), "--plumb belongs to solve"),
+                          (("solve", "--plumb", "a", "--board", "chessboard-9x6-30", "--out", "o", "a"), "a board with markers"),
+                          (("solve", "--plumb", "a", "--roll", "90", "--out", "o", "a"), "without --tilt and --roll"),
                           (("guide", "--middle", "a:1,2", "a"), "--middle belongs to solve")]:
         status, out, err = run(bench.calibrate, *words)
         fine = status == 2 and not out and err.startswith("calibrate: ") and wanted in err and len(err.splitlines()) == 1
@@ -759,6 +784,7 @@ def main():
             outputs = drawn[index].result()
             for kind in ("good", "mixed"):
                 judge(bench, index, kind, outputs[kind], table)
+    check_plumb(bench)
     if not options.short:
         check_refusals(bench)
         check_corrupt(bench)

@@ -15,7 +15,8 @@ const char *const options_help = /* at most 80 columns */
     "Usage: calibrate board [--board NAME] FILE\n"
     "       calibrate guide [--board NAME] [--camera DEVICE [--size WxH]] DIR\n"
     "       calibrate solve [--board NAME] [--near MM] [--far MM]\n"
-    "                       [--tilt DEG] [--roll DEG] [--middle FILE:U,V]\n"
+    "                       [--tilt DEG] [--roll DEG] [--plumb FILE]\n"
+    "                       [--middle FILE:U,V]\n"
     "                       --out OUT DIR\n"
     "From pictures of a printed board to rig.json: docs/calibration.md has the steps.\n"
     "\n"
@@ -37,6 +38,8 @@ const char *const options_help = /* at most 80 columns */
     "  --tilt DEG, --roll DEG   how the camera will hang, for rig.json: it looks down\n"
     "                   by the tilt (-80 to 80, below 0: up), and heads' tops tip to\n"
     "                   the right in its picture by the roll (-180 to 180)\n"
+    "  --plumb FILE     it will hang as it did for this picture, in which the board\n"
+    "                   hung plumb, with its upper edge level\n"
     "  --middle FILE:U,V     the pattern's middle dot is at pixel U,V of a picture\n"
     "                   with the laser on; needed only where the pattern's edges are\n"
     "                   not seen on the board\n"
@@ -57,7 +60,8 @@ enum OptionId {
     opt_middle,
     opt_out,
     opt_tilt,
-    opt_roll
+    opt_roll,
+    opt_plumb
 };
 
 static bool complain(const std::string &what)
@@ -146,6 +150,9 @@ static bool take(int id, const char *value, Options &options)
         return belongs_to_solve("tilt", options) && read_degrees("tilt", value, 80.0, options.mount.tilt_deg);
     case opt_roll:
         return belongs_to_solve("roll", options) && read_degrees("roll", value, 180.0, options.mount.roll_deg);
+    case opt_plumb:
+        options.mount.plumb_file = value;
+        return belongs_to_solve("plumb", options);
     case opt_middle:
         return belongs_to_solve("middle", options) && read_middle(value, options.middle);
     case opt_out:
@@ -179,6 +186,10 @@ static bool check(const Options &options)
         return complain("--out must be another directory than the pictures': a rig.json there would be lost");
     if (solve && has_pictures(options.out))
         return complain("--out " + options.out + ": has pictures in it: a rig.json there would be lost; is it DIR?");
+    if (!options.mount.plumb_file.empty() && !options.board.charuco)
+        return complain("--plumb needs a board with markers: a chessboard looks the same upside down");
+    if (!options.mount.plumb_file.empty() && (options.mount.tilt_deg != 0.0 || options.mount.roll_deg != 0.0))
+        return complain("--plumb says it all: without --tilt and --roll");
     if (!options.size.empty() && options.camera.empty())
         return complain("--size belongs to guide --camera");
     return options.range.near_mm < options.range.far_mm || complain("--near must be less than --far");
@@ -187,17 +198,12 @@ static bool check(const Options &options)
 bool options_parse(int argc, char **argv, Options &options)
 {
     static const struct option long_options[] = {
-        {"board", required_argument, nullptr, opt_board},
-        {"camera", required_argument, nullptr, opt_camera},
-        {"near", required_argument, nullptr, opt_near},
-        {"far", required_argument, nullptr, opt_far},
-        {"tilt", required_argument, nullptr, opt_tilt},
-        {"roll", required_argument, nullptr, opt_roll},
-        {"middle", required_argument, nullptr, opt_middle},
-        {"out", required_argument, nullptr, opt_out},
-        {"size", required_argument, nullptr, opt_size},
-        {"help", no_argument, nullptr, tool::opt_help},
-        {nullptr, 0, nullptr, 0},
+        {"board", required_argument, nullptr, opt_board}, {"camera", required_argument, nullptr, opt_camera},
+        {"near", required_argument, nullptr, opt_near},   {"far", required_argument, nullptr, opt_far},
+        {"tilt", required_argument, nullptr, opt_tilt},   {"roll", required_argument, nullptr, opt_roll},
+        {"plumb", required_argument, nullptr, opt_plumb}, {"middle", required_argument, nullptr, opt_middle},
+        {"out", required_argument, nullptr, opt_out},     {"size", required_argument, nullptr, opt_size},
+        {"help", no_argument, nullptr, tool::opt_help},   {nullptr, 0, nullptr, 0},
     };
     std::string verb = tool::options_verb(argc, argv);
     if (verb == "--help")

@@ -1,6 +1,7 @@
 #include "cal_rig.hpp"
 
 #include <cmath>
+#include <opencv2/calib3d.hpp>
 #include <sstream>
 
 #include "cal_error.hpp"
@@ -8,6 +9,9 @@
 
 namespace cal
 {
+/* Nearer to the optical axis the core takes no up: the sine of 10 degrees. */
+static constexpr double aside_min = 0.17365;
+
 static std::string number(double value)
 {
     std::string digits = text("%.17g", value);
@@ -29,15 +33,26 @@ static std::vector<double> values_of(const cv::Mat &matrix)
     return {matrix.begin<double>(), matrix.end<double>()};
 }
 
-/* The unit vector of the camera frame that points up. */
-static cv::Vec3d up_of(const Mount &mount)
+cv::Vec3d up_of(const Mount &mount)
 {
     double tilt = mount.tilt_deg * CV_PI / 180.0, roll = mount.roll_deg * CV_PI / 180.0;
     return {std::cos(tilt) * std::sin(roll), -std::cos(tilt) * std::cos(roll), -std::sin(tilt)};
 }
 
+cv::Vec3d up_of(const View &plumb)
+{
+    cv::Matx33d rotation;
+    cv::Rodrigues(plumb.rvec, rotation);
+    cv::Vec3d up = rotation * cv::Vec3d(0, -1, 0); /* the board's Y runs down */
+    if (std::hypot(up[0], up[1]) < aside_min)
+        throw Error(plumb.file +
+                    ": by this board the camera looks straight up or down, so that no side of its picture is "
+                    "up: name a picture in which it hung plumb");
+    return up;
+}
+
 void rig_write(const std::string &path, const Camera &camera, const Projector &projector, const Range &range,
-               const Mount &mount)
+               const cv::Vec3d &up)
 {
     std::vector<double> rays;
     for (const cv::Vec3d &ray : projector.rays)
@@ -54,10 +69,8 @@ void rig_write(const std::string &path, const Camera &camera, const Projector &p
     for (size_t slot = 0; slot < slot_count; slot++)
         file << (slot > 0 ? "," : "") << projector.seen[slot];
     file << "],\n";
-    if (mount.tilt_deg != 0.0 || mount.roll_deg != 0.0) {
-        cv::Vec3d up = up_of(mount);
+    if (up != cv::Vec3d(0, -1, 0))
         file << "  \"up\":[" << number(up[0]) << "," << number(up[1]) << "," << number(up[2]) << "],\n";
-    }
     file << "  \"near_mm\":" << number(range.near_mm) << ",\n  \"far_mm\":" << number(range.far_mm) << "\n}\n";
     tool::file_write(path, file.str());
 }

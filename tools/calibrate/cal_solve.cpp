@@ -225,12 +225,31 @@ static void report_projector(const Projector &projector)
     std::printf("\n");
 }
 
-/* Names that may be mistyped: looked at before an earlier calibration is given up. */
-static void check_names(const std::string &dir, const MiddleDot &middle)
+/* The picture in which the board hung plumb; of a pair either. */
+static void hang_plumb(const std::string &file, Result &result)
 {
-    std::vector<std::string> names = pictures_required(dir);
-    if (!middle.file.empty() && !std::binary_search(names.begin(), names.end(), middle.file))
-        throw Error("--middle: there is no " + middle.file + " in " + dir);
+    if (file.empty())
+        return;
+    auto pair = std::find_if(result.lit.begin(), result.lit.end(), [&](const Lit &lit) { return lit.file == file; });
+    const View *view = view_of(result.views, file);
+    if (view == nullptr && pair != result.lit.end())
+        view = view_of(result.views, pair->dark_file);
+    if (view == nullptr || !view->good())
+        throw Error("--plumb: the board in " + file + " was not found; name another picture in which it hung plumb");
+    result.up = up_of(*view);
+    std::printf("up: tilt %.2f, roll %.2f degrees, by the board in %s\n", std::asin(-result.up[2]) * 180.0 / CV_PI,
+                std::atan2(result.up[0], -result.up[1]) * 180.0 / CV_PI, file.c_str());
+}
+
+/* Names that may be mistyped: looked at before an earlier calibration is given up. */
+static void check_names(const Options &options)
+{
+    std::vector<std::string> names = pictures_required(options.target);
+    for (const auto &[option, file] :
+         {std::pair("--middle", options.middle.file), std::pair("--plumb", options.mount.plumb_file)}) {
+        if (!file.empty() && !std::binary_search(names.begin(), names.end(), file))
+            throw Error(option + (": there is no " + file) + " in " + options.target);
+    }
 }
 
 static void check_middle(const MiddleDot &middle, const std::vector<Picture> &pictures)
@@ -280,7 +299,7 @@ static void write_out(const std::string &out, const Result &result)
 {
     report_write(out + "/report.html", result);
     try {
-        rig_write(out + "/rig.json", result.camera, result.projector, result.range, result.mount);
+        rig_write(out + "/rig.json", result.camera, result.projector, result.range, result.up);
     } catch (const Error &) {
         remove_out(out);
         throw;
@@ -291,11 +310,11 @@ void solve_run(const Options &options)
 {
     Result result;
     tool::Progress progress;
-    check_names(options.target, options.middle);
+    check_names(options);
     make_out(options.out);
     result.board = options.board;
     result.range = options.range;
-    result.mount = options.mount;
+    result.up = up_of(options.mount);
     std::vector<Picture> pictures = pictures_read(options.target);
     check_middle(options.middle, pictures);
     auto lit_count = std::count_if(pictures.begin(), pictures.end(), [](const Picture &p) { return p.laser; });
@@ -333,6 +352,7 @@ void solve_run(const Options &options)
     report_camera(result.camera);
     report_uncovered(result.camera);
     report_projector(result.projector);
+    hang_plumb(options.mount.plumb_file, result);
     write_out(options.out, result);
     std::printf("%s/rig.json and %s/report.html are written\n", options.out.c_str(), options.out.c_str());
     if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0)

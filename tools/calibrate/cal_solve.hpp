@@ -15,7 +15,7 @@ struct Result {
     Camera camera;
     Projector projector;
     Range range{};
-    Mount mount;
+    cv::Vec3d up;
 };
 
 /* Prints what it finds on standard output. Throws cal::Error. */
