@@ -120,7 +120,7 @@ static struct sight look(const struct ih_dot_rows *rows, const struct ih_rig *ri
     int32_t first = 0;
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
         int32_t across[IH_ALIGN_NEAR_MAX];
-        const int32_t count = ih_align_near(rows, &rig->line[slot], 0, band, &first, across);
+        const int32_t count = ih_align_near(rows, &rig->line[slot], band, &first, across);
         for (int32_t i = 0; i < count; i++) {
             judge(across[i], &sight);
         }

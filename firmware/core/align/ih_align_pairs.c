@@ -4,6 +4,8 @@
 
 #define ONE_Q14 (1 << 14)
 #define ASPECT_MAX_Q14 (8 << 14)
+/* Columns are looked at by so much more than is needed: positions are rounded. */
+#define COLUMN_PX_Q12 4096
 
 void ih_align_axes(const struct ih_rig *rig, struct ih_align_axes *out)
 {
@@ -39,24 +41,40 @@ void ih_align_slopes(const struct ih_rig *rig, const struct ih_align_axes *axes,
     slope_q12[IH_ALIGN_SHIFT] = slope_of(u * along_u + v * along_v);
 }
 
-/* Of the rows of a line's two ends, widened by the margin, the first and the last one; the line's shift and half a band
- * move them by at most as much. */
+/* Of rows or columns. */
+struct span {
+    int32_t low_px_q12, high_px_q12;
+};
+
+static struct span span_of(int32_t infinity_px_q12, int32_t dir_q30, int32_t near_px_q12,
+                           int32_t far_px_q12, int32_t wider_px_q12)
+{
+    const int32_t near = infinity_px_q12 + (int32_t)ih_mul_shift(near_px_q12, dir_q30, 30);
+    const int32_t far = infinity_px_q12 + (int32_t)ih_mul_shift(far_px_q12, dir_q30, 30);
+    return (struct span){ih_min_s32(near, far) - wider_px_q12,
+                         ih_max_s32(near, far) + wider_px_q12};
+}
+
+/* A line's two ends, widened by the margin; half a band moves them by at most as much. Of the dots in these rows most lie
+ * in other columns. */
 int32_t ih_align_near(const struct ih_dot_rows *rows, const struct ih_line *line,
-                      int32_t shift_px_q12, struct ih_align_band band, int32_t *first,
+                      struct ih_align_band band, int32_t *first,
                       int32_t across_px_q12[IH_ALIGN_NEAR_MAX])
 {
     const int32_t near = line->t_near_px_q12 + band.margin_px_q12;
     const int32_t far = line->t_far_px_q12 - band.margin_px_q12;
-    const int32_t middle =
-        line->infinity_v_px_q12 + (int32_t)ih_mul_shift(shift_px_q12, line->dir_u_q30, 30);
-    const int32_t near_v = middle + (int32_t)ih_mul_shift(near, line->dir_v_q30, 30);
-    const int32_t far_v = middle + (int32_t)ih_mul_shift(far, line->dir_v_q30, 30);
-    const int32_t last_v = ih_max_s32(near_v, far_v) + band.half_px_q12;
-    *first = ih_dot_rows_count_above(rows, ih_min_s32(near_v, far_v) - band.half_px_q12, *first);
+    const struct span u = span_of(line->infinity_u_px_q12, line->dir_u_q30, near, far,
+                                  band.half_px_q12 + COLUMN_PX_Q12);
+    const struct span v =
+        span_of(line->infinity_v_px_q12, line->dir_v_q30, near, far, band.half_px_q12);
     int32_t count = 0;
-    for (int32_t i = *first; i < rows->dot_count && rows->v_px_q12[i] <= last_v; i++) {
+    *first = ih_dot_rows_count_above(rows, v.low_px_q12, *first);
+    for (int32_t i = *first; rows->v_px_q12[i] <= v.high_px_q12; i++) {
+        if (rows->u_px_q12[i] < u.low_px_q12 || rows->u_px_q12[i] > u.high_px_q12) {
+            continue;
+        }
         const int64_t along = ih_dot_rows_along_px_q12(rows, i, line);
-        const int64_t across = ih_dot_rows_across_px_q12(rows, i, line) - shift_px_q12;
+        const int64_t across = ih_dot_rows_across_px_q12(rows, i, line);
         if (along >= far && along <= near && ih_abs_s64(across) < band.half_px_q12 &&
             count < IH_ALIGN_NEAR_MAX) {
             across_px_q12[count++] = (int32_t)across;

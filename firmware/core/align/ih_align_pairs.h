@@ -46,7 +46,7 @@ struct ih_align_axes {
     int32_t aspect_q14; /* fy over fx */
 };
 
-/* Dots within half a band of a line that is shifted across, and within the working range widened by a margin. */
+/* Dots within half a band of a line, and within the working range widened by a margin. */
 struct ih_align_band {
     int32_t half_px_q12, margin_px_q12;
 };
@@ -66,10 +66,9 @@ static inline int64_t ih_align_field_px_q12(const int16_t slope_q12[IH_ALIGN_AXE
     return (sum_q24 + 2048) >> 12;
 }
 
-/* Distances of dots across a line that is shifted across by shift_px_q12, against that one. *first: of the rows, kept
- * from slot to slot. Returns how many. */
+/* Distances of dots across a line. *first: of the rows, kept from slot to slot. Returns how many. */
 int32_t ih_align_near(const struct ih_dot_rows *rows, const struct ih_line *line,
-                      int32_t shift_px_q12, struct ih_align_band band, int32_t *first,
+                      struct ih_align_band band, int32_t *first,
                       int32_t across_px_q12[IH_ALIGN_NEAR_MAX]);
 
 #endif

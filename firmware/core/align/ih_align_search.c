@@ -33,15 +33,14 @@ static void find_all(const struct ih_align_axes *axes, const struct ih_rig *rig,
                      const struct ih_dot_rows *rows, struct ih_align_scratch *out)
 {
     const struct ih_align_band band = {BAND_BINS * bin_of(rig), SEARCH_MARGIN_PX_Q12};
-    int32_t first = 0;
-    out->found_count = 0;
+    int32_t first = 0, total = 0;
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
         int32_t across[IH_ALIGN_NEAR_MAX];
-        const int32_t count = ih_align_near(rows, &rig->line[slot], 0, band, &first, across);
+        const int32_t count = ih_align_near(rows, &rig->line[slot], band, &first, across);
         ih_align_slopes(rig, axes, slot, out->slope_q12[slot]);
-        for (int32_t i = 0; i < count && out->found_count < IH_ALIGN_FOUND_MAX; i++) {
-            out->found[out->found_count++] =
-                (struct ih_align_found){(int16_t)slot, (int16_t)(across[i] >> 2)};
+        out->found_count[slot] = (uint8_t)ih_min_s32(count, IH_ALIGN_FOUND_MAX - total);
+        for (int32_t i = 0; i < out->found_count[slot]; i++) {
+            out->found_px_q10[total++] = (int16_t)(across[i] >> 2);
         }
     }
 }
@@ -58,18 +57,18 @@ static int32_t shift_of(const int16_t slope_q12[IH_ALIGN_AXES], int32_t slot,
 static void collect(const struct ih_align_plane *plane, const struct ih_align_scratch *scratch,
                     struct ih_align_pairs *out)
 {
-    int32_t slot = IH_NONE, shift_px_q12 = 0;
+    const int16_t *found_px_q10 = scratch->found_px_q10;
     out->count = 0;
-    for (int32_t i = 0; i < scratch->found_count && out->count < IH_ALIGN_PAIRS_MAX; i++) {
-        const int32_t across = scratch->found[i].across_px_q10 * 4;
-        if (slot != scratch->found[i].slot) {
-            slot = scratch->found[i].slot;
-            shift_px_q12 = shift_of(scratch->slope_q12[slot], slot, plane);
-        }
-        if (ih_abs_s32(across - shift_px_q12) < FIT_PX_Q12) {
-            struct ih_align_pair *pair = &out->pair[out->count++];
-            memcpy(pair->slope_q12, scratch->slope_q12[slot], sizeof pair->slope_q12);
-            pair->across_px_q12 = across;
+    for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
+        const int16_t *end = &found_px_q10[scratch->found_count[slot]];
+        const int32_t shift_px_q12 = shift_of(scratch->slope_q12[slot], slot, plane);
+        for (; found_px_q10 < end; found_px_q10++) {
+            const int32_t across = *found_px_q10 * 4;
+            if (ih_abs_s32(across - shift_px_q12) < FIT_PX_Q12 && out->count < IH_ALIGN_PAIRS_MAX) {
+                struct ih_align_pair *pair = &out->pair[out->count++];
+                memcpy(pair->slope_q12, scratch->slope_q12[slot], sizeof pair->slope_q12);
+                pair->across_px_q12 = across;
+            }
         }
     }
 }
@@ -78,15 +77,15 @@ static void collect(const struct ih_align_plane *plane, const struct ih_align_sc
 static void vote(const struct ih_align_grid *grid, const struct ih_align_plane *around,
                  struct ih_align_scratch *scratch, struct ih_align_plane peak[IH_ALIGN_PEAKS])
 {
-    int32_t slot = IH_NONE, shift_px_q12 = 0;
-    ih_align_votes_clear(&scratch->at.votes);
-    for (int32_t i = 0; i < scratch->found_count; i++) {
-        if (slot != scratch->found[i].slot) {
-            slot = scratch->found[i].slot;
-            shift_px_q12 = ih_align_plane_px_q12(around, slot);
+    const int16_t *found_px_q10 = scratch->found_px_q10;
+    ih_align_votes_clear(&scratch->at.votes, grid);
+    for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
+        const int16_t *end = &found_px_q10[scratch->found_count[slot]];
+        const int32_t shift_px_q12 = ih_align_plane_px_q12(around, slot);
+        uint16_t *histogram = ih_align_votes_of(&scratch->at.votes, grid, slot);
+        for (; found_px_q10 < end; found_px_q10++) {
+            ih_align_votes_add(histogram, grid, *found_px_q10 * 4 - shift_px_q12);
         }
-        ih_align_votes_add(&scratch->at.votes, grid, slot,
-                           scratch->found[i].across_px_q10 * 4 - shift_px_q12);
     }
     ih_align_votes_count(&scratch->at.votes, grid, scratch->slope_q12, peak);
 }

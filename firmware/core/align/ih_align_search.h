@@ -25,12 +25,6 @@
 /* So much moves dots of a far wall out of the working range. */
 #define IH_ALIGN_DEPTH_FAR_RAD_Q30 1874016 /* 0.1 degrees */
 
-/* A dot on one side of a slot's line or the other. */
-struct ih_align_found {
-    int16_t slot;
-    int16_t across_px_q10;
-};
-
 /* Votes come first, the fit later. */
 union ih_align_work {
     struct ih_align_votes votes;
@@ -39,8 +33,9 @@ union ih_align_work {
 
 struct ih_align_scratch {
     int16_t slope_q12[IH_SLOTS][IH_ALIGN_AXES];
-    int32_t found_count;
-    struct ih_align_found found[IH_ALIGN_FOUND_MAX];
+    /* Distances of dots across their lines, one slot's after the other's. */
+    uint8_t found_count[IH_SLOTS];
+    int16_t found_px_q10[IH_ALIGN_FOUND_MAX];
     union ih_align_work at;
 };
 

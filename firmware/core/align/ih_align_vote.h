@@ -1,6 +1,6 @@
 /* ih_align_vote - where most dots lie across their lines, as a plane over the pattern. Private to align.
  *
- * In:    distances of dots across their lines, of every slot; most belong to other slots.
+ * In:     distances of dots across their lines, of every slot; most belong to other slots.
  * Method: a histogram for each block of slots. A plane shift + column + row (px at the pattern's edges) moves each
  *        block's histogram against the others; their sum has a peak where the plane is right. Columns are summed
  *        first, then rows. A peak counts by how much it rises above what lies three bins beside it: planes that are wrong
@@ -19,6 +19,7 @@
 #define IH_ALIGN_BINS_MAX 64
 /* Empty bins on both sides, so that a histogram that is moved needs no bounds; no plane moves one by more. */
 #define IH_ALIGN_PAD 32
+#define IH_ALIGN_PADDED (IH_ALIGN_BINS_MAX + 2 * IH_ALIGN_PAD)
 /* Planes that a vote gives. */
 #define IH_ALIGN_PEAKS 3
 /* Steps of columns and rows on one side of 0. */
@@ -31,36 +32,41 @@ struct ih_align_plane {
 };
 
 struct ih_align_votes {
-    uint16_t block[IH_ALIGN_SIDE_MAX][IH_ALIGN_SIDE_MAX]
-                  [IH_ALIGN_BINS_MAX + 2 * IH_ALIGN_PAD]; /* by row */
-    uint16_t row[IH_ALIGN_SIDE_MAX][IH_ALIGN_BINS_MAX + 2 * IH_ALIGN_PAD];
-    uint16_t sum[IH_ALIGN_BINS_MAX];
-    /* Bins by which blocks are moved: by steps of columns or rows, by the rotation of depth that is tried. */
-    int8_t plane_bins[2 * IH_ALIGN_STEPS_MAX + 1][IH_ALIGN_SIDE_MAX];
+    uint16_t block[IH_ALIGN_SIDE_MAX][IH_ALIGN_SIDE_MAX][IH_ALIGN_PADDED]; /* by row */
+    uint16_t row[IH_ALIGN_SIDE_MAX][IH_ALIGN_PADDED];
+    uint16_t sum[IH_ALIGN_PADDED]; /* whole vectors are read */
+    /* Where blocks begin that steps of columns or rows move, with the padding; bins by which the rotation of depth that is
+     * tried moves them. */
+    int32_t plane_first[2 * IH_ALIGN_STEPS_MAX + 1][IH_ALIGN_SIDE_MAX];
     int8_t depth_bins[IH_ALIGN_SIDE_MAX][IH_ALIGN_SIDE_MAX];
 };
 
 /* What is tried. */
 struct ih_align_grid {
     int32_t side, slots;           /* blocks of slots by slots */
-    int32_t bin_count, bin_px_q12; /* count: a multiple of 32 */
+    int32_t bin_count, bin_px_q12; /* count: 32 or 64 */
     int32_t peak_bins;             /* width of a peak */
     int32_t step_px_q12;
     int32_t column_steps, row_steps;        /* on both sides of 0 */
     int32_t depth_steps, depth_step_px_q12; /* the same */
 };
 
-void ih_align_votes_clear(struct ih_align_votes *votes);
+/* The blocks that a grid uses. */
+void ih_align_votes_clear(struct ih_align_votes *votes, const struct ih_align_grid *grid);
 
-static inline void ih_align_votes_add(struct ih_align_votes *votes,
-                                      const struct ih_align_grid *grid, int32_t slot,
+/* The histogram of a slot's block. */
+static inline uint16_t *ih_align_votes_of(struct ih_align_votes *votes,
+                                          const struct ih_align_grid *grid, int32_t slot)
+{
+    return &votes->block[slot / IH_GRID / grid->slots][slot % IH_GRID / grid->slots][IH_ALIGN_PAD];
+}
+
+static inline void ih_align_votes_add(uint16_t *histogram, const struct ih_align_grid *grid,
                                       int32_t across_px_q12)
 {
     const int32_t half_px_q12 = grid->bin_count / 2 * grid->bin_px_q12;
     if (across_px_q12 >= -half_px_q12 && across_px_q12 < half_px_q12) {
-        const int32_t bin = (across_px_q12 + half_px_q12) / grid->bin_px_q12;
-        votes->block[slot / IH_GRID / grid->slots][slot % IH_GRID / grid->slots]
-                    [IH_ALIGN_PAD + bin]++;
+        histogram[(across_px_q12 + half_px_q12) / grid->bin_px_q12]++;
     }
 }
 

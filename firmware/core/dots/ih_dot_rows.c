@@ -44,6 +44,7 @@ void ih_dot_rows_fill(const struct ih_dots *dots, const struct ih_rig *rig, stru
         ih_camera_undistort_pixel(rig, u_px_q12, v_px_q12, &u_px_q12, &v_px_q12);
         insert(out, i, u_px_q12, v_px_q12);
     }
+    out->v_px_q12[dots->dot_count] = INT32_MAX;
 }
 
 int32_t ih_dot_rows_count_above(const struct ih_dot_rows *rows, int32_t v_px_q12, int32_t guess)
@@ -52,7 +53,7 @@ int32_t ih_dot_rows_count_above(const struct ih_dot_rows *rows, int32_t v_px_q12
     while (at > 0 && rows->v_px_q12[at - 1] >= v_px_q12) {
         at--;
     }
-    while (at < rows->dot_count && rows->v_px_q12[at] < v_px_q12) {
+    while (rows->v_px_q12[at] < v_px_q12) {
         at++;
     }
     return at;

@@ -17,7 +17,8 @@
 
 struct ih_dot_rows {
     int32_t dot_count;
-    int32_t u_px_q12[IH_DOTS_MAX], v_px_q12[IH_DOTS_MAX];
+    int32_t u_px_q12[IH_DOTS_MAX];
+    int32_t v_px_q12[IH_DOTS_MAX + 1]; /* INT32_MAX behind the last one: there every search ends */
     int16_t dot[IH_DOTS_MAX];
 };
 

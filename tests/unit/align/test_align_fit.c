@@ -125,7 +125,6 @@ static void dots_near_a_line_are_all_found(void)
         }
         ih_dot_rows_fill(&dots, &rig, &rows);
         for (int pass = 0; pass < 4; pass++) {
-            const int32_t shift_px_q12 = (int32_t)ih_test_between(&random_source, -40000, 40000);
             const struct ih_align_band band = {(int32_t)ih_test_between(&random_source, 1, 60000),
                                                (int32_t)ih_test_between(&random_source, 0, 40960)};
             int32_t first = 0;
@@ -133,12 +132,11 @@ static void dots_near_a_line_are_all_found(void)
             for (int slot = 0; slot < IH_SLOTS; slot++) {
                 const struct ih_line *line = &rig.line[slot];
                 int32_t across_px_q12[IH_ALIGN_NEAR_MAX], count = 0;
-                const int32_t found =
-                    ih_align_near(&rows, line, shift_px_q12, band, &first, across_px_q12);
+                const int32_t found = ih_align_near(&rows, line, band, &first, across_px_q12);
 
                 for (int32_t i = 0; i < rows.dot_count && count < IH_ALIGN_NEAR_MAX; i++) {
                     const int64_t along = ih_dot_rows_along_px_q12(&rows, i, line);
-                    const int64_t across = ih_dot_rows_across_px_q12(&rows, i, line) - shift_px_q12;
+                    const int64_t across = ih_dot_rows_across_px_q12(&rows, i, line);
 
                     if (along >= line->t_far_px_q12 - band.margin_px_q12 &&
                         along <= line->t_near_px_q12 + band.margin_px_q12 &&

@@ -48,7 +48,7 @@ static void add(const struct ih_align_grid *grid, int32_t slot, int32_t across_p
     if (vote_count < VOTES_MAX) {
         vote[vote_count].slot = slot;
         vote[vote_count++].across_px_q12 = across_px_q12;
-        ih_align_votes_add(&votes, grid, slot, across_px_q12);
+        ih_align_votes_add(ih_align_votes_of(&votes, grid, slot), grid, across_px_q12);
     }
 }
 
@@ -161,7 +161,7 @@ static void cast_votes(const struct ih_align_grid *grid, const struct ih_align_p
     const int32_t half_px_q12 = grid->bin_count / 2 * grid->bin_px_q12;
 
     vote_count = 0;
-    ih_align_votes_clear(&votes);
+    ih_align_votes_clear(&votes, grid);
     for (int i = 0; i < chance_count; i++) {
         add(grid, (int32_t)ih_test_between(&random_source, 0, IH_SLOTS - 1),
             (int32_t)ih_test_between(&random_source, -half_px_q12 - 2000, half_px_q12 + 2000));
@@ -235,7 +235,7 @@ static void no_votes_give_no_plane(void)
 {
     for (int i = 0; i < IH_TEST_COUNT(grids); i++) {
         vote_count = 0;
-        ih_align_votes_clear(&votes);
+        ih_align_votes_clear(&votes, &grids[i]);
         ih_align_votes_count(&votes, &grids[i], slope_q12, peak);
         for (int k = 0; k < IH_ALIGN_PEAKS; k++) {
             IH_TEST_EQUAL(0, peak[k].score, "score", k);

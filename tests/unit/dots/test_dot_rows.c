@@ -48,6 +48,7 @@ static void assert_order(void)
 
     memset(uses, 0, sizeof uses);
     IH_TEST_EQUAL(dots.dot_count, rows.dot_count, "dots", 0);
+    IH_TEST_EQUAL(INT32_MAX, rows.v_px_q12[rows.dot_count], "behind the last one", 0);
     for (int32_t i = 0; i < rows.dot_count; i++) {
         IH_TEST_RANGE(0, dots.dot_count - 1, rows.dot[i], "dot", i);
         IH_TEST_EQUAL(0, uses[rows.dot[i]]++, "uses", i);
