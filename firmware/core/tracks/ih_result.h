@@ -40,9 +40,9 @@ struct ih_result_entry {
     int32_t probability_q16;       /* that it is a head, by its track; without one by this frame */
     int32_t frame_probability_q16; /* by this frame alone; of a predicted one 0 */
     int32_t track_id;              /* 0: none */
-    int32_t sigma_mm_q8;           /* of the centre along each axis; with a track */
-    bool is_predicted;             /* not detected in this frame, but predicted by its track */
-    struct ih_head_pose pose;      /* of a head with a track; else 0 and not known */
+    int32_t sigma_mm_q8;      /* of the centre up and down, its least known axis; with a track */
+    bool is_predicted;        /* not detected in this frame, but predicted by its track */
+    struct ih_head_pose pose; /* of a head with a track; else 0 and not known */
 };
 
 struct ih_result {

@@ -9,6 +9,10 @@
 
 #include "ih_test.h"
 
+/* What the model of a head does not know, in quadrature; at most MAX_MM in all. */
+#define MODEL_MM 20
+#define MAX_MM 500
+
 static struct ih_hypotheses hypotheses;
 static struct ih_detections detections;
 static struct ih_tracks tracks;
@@ -137,10 +141,23 @@ static void expect_verdict(const struct ih_result_entry *entry, int index, int t
     const bool is_tracked = track != IH_NONE;
 
     IH_TEST_EQUAL(is_tracked ? 10 + track : 0, entry->track_id, "track", index);
-    IH_TEST_EQUAL(is_tracked ? (4 + track) << 8 : 0, entry->sigma_mm_q8, "sigma", index);
+    IH_TEST_WITHIN(1, is_tracked ? 256 * hypot(4 + track, MODEL_MM) : 0, entry->sigma_mm_q8,
+                   "sigma", index);
     IH_TEST_EQUAL(is_tracked ? 32768 : 1000 + index, entry->probability_q16, "probability", index);
     IH_TEST_EQUAL(is_tracked && track % 2 == 1 ? IH_ACCEPTED : IH_REJECT_SCORE, entry->rejected,
                   "rejected", index);
+}
+
+/* From the smallest that a filter can have to its limit. */
+static void sigma_has_what_the_model_does_not_know(void)
+{
+    for (int mm = 1; mm <= MAX_MM; mm++) {
+        fill(false);
+        tracks.track[0].filter.position_q8 = (int64_t)mm * mm * 256;
+        ih_result_from_tracks(&detections, &tracks, &predicted, &rig, &result);
+        IH_TEST_WITHIN(1, 256 * fmin(hypot(mm, MODEL_MM), MAX_MM), result.entry[0].sigma_mm_q8,
+                       "sigma", mm);
+    }
 }
 
 static void full_tables_come_through(void)
@@ -205,6 +222,7 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(empty_lists_give_an_empty_result);
     RUN_TEST(nests_come_through_without_what_tracks_add);
+    RUN_TEST(sigma_has_what_the_model_does_not_know);
     RUN_TEST(full_tables_come_through);
     RUN_TEST(centres_are_rotated_back);
     return UNITY_END();
