@@ -37,7 +37,10 @@ struct device {
 static struct path join(const char *dir, const char *name)
 {
     struct path path;
-    snprintf(path.text, sizeof path.text, "%s/%s", dir, name);
+    const int length = snprintf(path.text, sizeof path.text, "%s/%s", dir, name);
+    if (length < 0 || (size_t)length >= sizeof path.text) {
+        path.text[0] = 0; /* too long: there is no such file */
+    }
     return path;
 }
 
