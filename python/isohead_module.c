@@ -81,7 +81,7 @@ static PyObject *to_blob(const struct ih_calibration *calibration, int32_t scale
         return PyErr_Format(error_type, path != NULL ? "%s: %s" : "%s%s", path != NULL ? path : "",
                             error.text);
     }
-    err = ih_rig_blob_encode(calibration, blob);
+    err = app_rig_to_blob(calibration, blob);
     return err == IH_OK
                ? Py_BuildValue("y#i", (const char *)blob, (Py_ssize_t)sizeof blob, (int)scale_q20)
                : fail(ih_err_text(err));

@@ -420,3 +420,14 @@ bool app_rig_load(const char *path, struct ih_calibration *calibration, struct h
     }
     return true;
 }
+
+enum ih_err app_rig_to_blob(const struct ih_calibration *calibration,
+                            uint8_t blob[IH_RIG_BLOB_BYTES])
+{
+    struct ih_calibration level = *calibration;
+    const int32_t *up = level.up_q30;
+    if (up[0] == 0 && up[1] == 0 && up[2] == 0) {
+        level.up_q30[1] = -(1 << 30);
+    }
+    return ih_rig_blob_encode(&level, blob);
+}

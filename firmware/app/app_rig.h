@@ -13,6 +13,7 @@
 
 #include "hal.h"
 #include "rig/ih_rig.h"
+#include "rig/ih_rig_blob.h"
 
 /* Largest rig.json; 361 rays in full precision need 30 kB. */
 #define APP_RIG_FILE_MAX ((size_t)4 << 20)
@@ -31,5 +32,9 @@ bool app_rig_load_scaled(const char *path, struct ih_calibration *calibration, i
 
 /* For frames in mm: another depth_scale is refused. */
 bool app_rig_load(const char *path, struct ih_calibration *calibration, struct hal_error *error);
+
+/* As ih_rig_blob_encode; a rig that does not say which way is up hangs level, and its blob says so. */
+enum ih_err app_rig_to_blob(const struct ih_calibration *calibration,
+                            uint8_t blob[IH_RIG_BLOB_BYTES]);
 
 #endif

@@ -22,7 +22,7 @@ int32_t app_rig_depth_mm_q8(const struct isohead *head)
 
 struct app_rig_up_text app_rig_up_text(const int32_t up_q30[3])
 {
-    struct app_rig_up_text out;
+    struct app_rig_up_text out = {""};
     struct hal_text text = hal_text_begin(out.text, sizeof out.text);
     const int64_t x = up_q30[0], y = up_q30[1];
     const int32_t tilt_mdeg =

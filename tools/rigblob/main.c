@@ -81,11 +81,7 @@ static enum status write_blob(const char *rig_path, const char *path)
     if (!app_rig_load(rig_path, &calibration, &error) || !check(&calibration, &error)) {
         return fail(rig_path, error.text);
     }
-    const int32_t *up = calibration.up_q30;
-    if (up[0] == 0 && up[1] == 0 && up[2] == 0) {
-        calibration.up_q30[1] = -(1 << 30); /* a blob says it */
-    }
-    enum ih_err err = ih_rig_blob_encode(&calibration, blob);
+    enum ih_err err = app_rig_to_blob(&calibration, blob);
     if (err != IH_OK) {
         return fail(rig_path, ih_err_text(err));
     }

@@ -68,10 +68,10 @@ void ih_align_sums_add(const struct ih_align_pairs *pairs,
         int32_t at = 0;
         sums->weight_q14 += weight;
         for (int k = 0; k < IH_ALIGN_AXES; k++) {
-            const int64_t pull_q26 = weight * pair->slope_q12[k];
-            right_px_q38[k] += pull_q26 * pair->across_px_q12;
+            const int32_t pull_q26 = weight * pair->slope_q12[k];
+            right_px_q38[k] += (int64_t)pull_q26 * pair->across_px_q12;
             for (int l = 0; l <= k; l++) {
-                normal_q38[at++] += pull_q26 * pair->slope_q12[l];
+                normal_q38[at++] += (int64_t)pull_q26 * pair->slope_q12[l];
             }
         }
     }

@@ -89,8 +89,8 @@ static int32_t peak_of(const uint16_t *sum, int32_t width)
 /* Of the peak that begins at a bin. */
 static int32_t score_of(const uint16_t *bin, int32_t width)
 {
-    return 2 * peak_of(bin, width) - peak_of(bin - BESIDE_BINS, width) -
-           peak_of(bin + BESIDE_BINS, width);
+    return 2 * peak_of(bin, width) - peak_of(&bin[-BESIDE_BINS], width) -
+           peak_of(&bin[BESIDE_BINS], width);
 }
 
 /* The first bin from one on, or the end, where the score is above that. Scores are below 2^14. */
@@ -104,7 +104,7 @@ static ih_u16 peaks_of(const uint16_t *sum, int32_t width)
 static ih_i16 are_above(const uint16_t *bin, int32_t width, int32_t limit)
 {
     const ih_u16 peaks = peaks_of(bin, width);
-    const ih_u16 beside = peaks_of(bin - BESIDE_BINS, width) + peaks_of(bin + BESIDE_BINS, width);
+    const ih_u16 beside = peaks_of(&bin[-BESIDE_BINS], width) + peaks_of(&bin[BESIDE_BINS], width);
     return (ih_i16)(peaks + peaks - beside) > ih_i16_all((int16_t)limit);
 }
 
