@@ -42,17 +42,17 @@ void ih_align_slopes(const struct ih_rig *rig, const struct ih_align_axes *axes,
 }
 
 /* Of rows or columns. */
-struct reach {
+struct stretch {
     int32_t low_px_q12, high_px_q12;
 };
 
-static struct reach reach_of(int32_t infinity_px_q12, int32_t dir_q30, int32_t near_px_q12,
-                             int32_t far_px_q12, int32_t wider_px_q12)
+static struct stretch stretch_of(int32_t infinity_px_q12, int32_t dir_q30, int32_t near_px_q12,
+                                 int32_t far_px_q12, int32_t wider_px_q12)
 {
     const int32_t near = infinity_px_q12 + (int32_t)ih_mul_shift(near_px_q12, dir_q30, 30);
     const int32_t far = infinity_px_q12 + (int32_t)ih_mul_shift(far_px_q12, dir_q30, 30);
-    return (struct reach){ih_min_s32(near, far) - wider_px_q12,
-                          ih_max_s32(near, far) + wider_px_q12};
+    return (struct stretch){ih_min_s32(near, far) - wider_px_q12,
+                            ih_max_s32(near, far) + wider_px_q12};
 }
 
 /* A line's two ends, widened by the margin; half a band moves them by at most as much. Of the dots in these rows most lie
@@ -63,10 +63,10 @@ int32_t ih_align_near(const struct ih_dot_rows *rows, const struct ih_line *line
 {
     const int32_t near = line->t_near_px_q12 + band.margin_px_q12;
     const int32_t far = line->t_far_px_q12 - band.margin_px_q12;
-    const struct reach u = reach_of(line->infinity_u_px_q12, line->dir_u_q30, near, far,
-                                    band.half_px_q12 + COLUMN_PX_Q12);
-    const struct reach v =
-        reach_of(line->infinity_v_px_q12, line->dir_v_q30, near, far, band.half_px_q12);
+    const struct stretch u = stretch_of(line->infinity_u_px_q12, line->dir_u_q30, near, far,
+                                        band.half_px_q12 + COLUMN_PX_Q12);
+    const struct stretch v =
+        stretch_of(line->infinity_v_px_q12, line->dir_v_q30, near, far, band.half_px_q12);
     int32_t count = 0;
     *first = ih_dot_rows_count_above(rows, v.low_px_q12, *first);
     for (int32_t i = *first; rows->v_px_q12[i] <= v.high_px_q12; i++) {
