@@ -49,9 +49,8 @@ static int32_t weight_q14(int64_t residual_px_q12, int32_t scale_px_q12)
 }
 
 /* Sums are exact: rounded products would make the matrix indefinite, as the shift is hardly another number than the
- * rotation about the baseline. A weight times a slope is below 2^29 in Q26, so that every product is one of
- * 32 bits by 32; with another slope, or a distance of up to
- * 64 px, over 1,024 pairs below 2^57. */
+ * rotation about the baseline. A weight times a slope is below 2^29 in Q26, so that every product is one of 32 bits
+ * by 32; with another slope, or a distance of up to 64 px, over 1,024 pairs below 2^57. */
 void ih_align_sums_add(const struct ih_align_pairs *pairs,
                        const int32_t guess_px_q12[IH_ALIGN_AXES], int32_t scale_px_q12,
                        struct ih_align_sums *sums)

@@ -1,6 +1,6 @@
 /* ih_align_vote - where most dots lie across their lines, as a plane over the pattern. Private to align.
  *
- * In:     distances of dots across their lines, of every slot; most belong to other slots.
+ * In:    distances of dots across their lines, of every slot; most belong to other slots.
  * Method: a histogram for each block of slots. A plane shift + column + row (px at the pattern's edges) moves each
  *        block's histogram against the others; their sum has a peak where the plane is right. Columns are summed
  *        first, then rows. A peak counts by how much it rises above what lies three bins beside it: planes that are wrong
