@@ -13,7 +13,7 @@ import mesh
 import rig as rigs
 from body import Model
 from picture import write_pgm
-from scene import KINDS, Scene
+from scene import KINDS, MORE_KINDS, ROOMS, Scene
 
 # A head that shows so many dots is there; below the lower number it is not; between, nothing is said.
 HEAD_DOTS, NO_HEAD_DOTS = 6, 2
@@ -164,7 +164,8 @@ def describe(studio, scene, heads, extra, samples, dots, hits):
     return fields, {"kind": scene.kind, "people": notes, **extra, "wear": [actor.note() for actor in scene.actors]}
 
 
-def make(model, out, rig_kind, scene_kind, seed, frames, width=rigs.WIDTH, mount=None):
+def make(model, out, rig_kind, scene_kind, seed, frames, width=rigs.WIDTH, mount=None, step=1):
+    """Of the frames every step-th, each at its own time."""
     os.makedirs(out, exist_ok=True)
     scene = Scene(model, scene_kind, seed, frames, rig_kind, mount)
     studio = Studio(rig_kind, seed, scene.head_mm[2], width)
@@ -172,7 +173,7 @@ def make(model, out, rig_kind, scene_kind, seed, frames, width=rigs.WIDTH, mount
     with open(os.path.join(out, "frames.jsonl"), "w", encoding="utf-8") as frames_file, \
             open(os.path.join(out, "truth.jsonl"), "w", encoding="utf-8") as truth_file, \
             open(os.path.join(out, "scene.jsonl"), "w", encoding="utf-8") as scene_file:
-        for index in range(frames):
+        for index in range(seed % step, frames, step):
             name = "%06d.pgm" % index
             rng = numpy.random.default_rng([seed, 4, index])
             key, still = scene.still_at(index)
@@ -198,7 +199,7 @@ def make(model, out, rig_kind, scene_kind, seed, frames, width=rigs.WIDTH, mount
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--rig", default="paper", choices=[*rigs.KINDS, "range"])
-    parser.add_argument("--kind", default="calm", choices=KINDS)
+    parser.add_argument("--kind", default="calm", choices=[*KINDS, *MORE_KINDS, *ROOMS[1:]])
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--frames", type=int, default=30)
     parser.add_argument("--width", type=int, default=rigs.WIDTH, help="of dot rigs' pictures, pixels")

@@ -98,3 +98,45 @@ def empty(rng, has_floor=False):
     if rng.random() < 0.4 or has_floor:
         meshes.append(floor(level + rng.uniform(350.0, 1400.0), rng))
     return join(meshes) if meshes else None
+
+
+def empty_seat(rng, has_floor=False):
+    """A seat with a headrest."""
+    depth = rng.uniform(550.0, 1800.0)
+    head = numpy.array([rng.normal(0.0, 0.1), rng.uniform(-0.2, 0.15), 1.0]) * depth
+    behind = rng.choice([rng.uniform(280.0, 600.0), rng.uniform(600.0, 2500.0)])
+    meshes = backdrop(depth + behind, rng)
+    if rng.random() < 0.4 or has_floor:
+        meshes.append(floor(head[1] + SEATED_MM, rng))
+    meshes.append(things.seat_with_headrest(head, rng))
+    if rng.random() < 0.3:
+        meshes.append(things.table(head, rng))
+    if behind > 450.0:
+        meshes += beside(head, depth, behind, head[1] + SEATED_MM, rng)
+    return join(meshes)
+
+
+def ground(rng, has_floor=False):
+    """Things that stand on a floor or a table, to be looked at from above: jugs, vessels, balls, bags."""
+    level = rng.uniform(-150.0, 500.0)
+    # Where the camera's axis meets the ground depends on its tilt.
+    middle_z = 1000.0 + level * rng.uniform(0.4, 2.0)
+    if rng.random() < 0.7 or has_floor:
+        meshes = [floor(level, rng)]
+        if rng.random() < 0.4:
+            meshes.append(things.wall(middle_z + rng.uniform(500.0, 2000.0), rng.normal(0.0, 0.3), rng))
+    else:
+        meshes = [things.box(numpy.array([0.0, level + 20.0, middle_z]),
+                             numpy.array([rng.uniform(400.0, 900.0), 20.0, rng.uniform(250.0, 450.0)]), rng)]
+        if rng.random() < 0.5:
+            meshes.append(floor(level + rng.uniform(400.0, 800.0), rng))
+    for _ in range(int(rng.integers(1, 5))):
+        place = numpy.array([rng.normal(0.0, 180.0), level, middle_z + rng.normal(0.0, 170.0)])
+        meshes.append(things.GROUND[rng.integers(len(things.GROUND))](place, rng))
+    if rng.random() < 0.2:
+        place = numpy.array([rng.normal(0.0, 500.0), level - 430.0, middle_z + rng.uniform(400.0, 1000.0)])
+        meshes.append(things.chair(place, rng))
+    return join(meshes)
+
+
+ROOMS = {"empty": empty, "above": empty, "ground": ground, "seat": empty_seat}

@@ -14,6 +14,11 @@ from person import TO_CAMERA, Person
 
 KINDS = ("calm", "near", "hands", "turning", "leaning", "objects", "visit", "past", "two", "profile", "edge", "tilted",
          "helmet", "face", "body", "empty")
+# Kinds that only some sets have. far: beyond 1.5 m.
+MORE_KINDS = ("far",)
+# Nobody is there; of these rooms the camera looks down on some, by up to so many degrees.
+ROOMS = tuple(room.ROOMS)
+LOOKS_DOWN_DEG = {"above": (5.0, 45.0), "ground": (15.0, 65.0)}
 EMPTY_FRAMES, EMPTY_US = 3, 10000000
 # A camera that looks down by more than this sees a floor.
 STEEP_DEG = 35.0
@@ -44,9 +49,11 @@ def mounted(tilt_deg, roll_deg):
     return rotation(Z, numpy.radians(roll_deg)) @ rotation(X, numpy.radians(tilt_deg))
 
 
-def draw_distance(kind, rng):
+def draw_distance(kind, rig_kind, rng):
     if kind == "near":
         return rng.uniform(450.0, 720.0)
+    if kind == "far":
+        return rng.uniform(1500.0, 3000.0 if rig_kind == "range" else 2200.0)
     if kind in ("two", "visit", "past"):
         return rng.uniform(750.0, 1700.0)
     return rng.choice([rng.uniform(500.0, 750.0), rng.uniform(750.0, 1150.0), rng.uniform(1150.0, 1800.0)],
@@ -62,7 +69,7 @@ def draw_place(kind, rig_kind, rng):
         at[axis] = rng.choice([-1.0, 1.0]) * rng.uniform(0.72, 1.05) * half[axis]
     if kind == "body":
         at[1] = -rng.uniform(1.6, 3.0) * half[1]
-    return numpy.array([at[0], at[1], 1.0]) * draw_distance(kind, rng)
+    return numpy.array([at[0], at[1], 1.0]) * draw_distance(kind, rig_kind, rng)
 
 
 def dress(kind):
@@ -149,14 +156,14 @@ class Scene:
         rng = numpy.random.default_rng([seed, 2])
         self.kind, self.seed = kind, seed
         self.head_mm = draw_place(kind, rig_kind, rng)
-        places = [self.head_mm] if kind != "empty" else []
+        places = [self.head_mm] if kind not in ROOMS else []
         if kind == "two":
             places = self._pair(rng)
         self.actors = [Actor(model, kind, seed + SECOND_SEED * i, i, place, frames, rng)
                        for i, place in enumerate(places)]
         self._tilt(rng, mount)
         self.still = None
-        if kind != "empty":
+        if kind not in ROOMS:
             visit = self.actors[0].visit
             self.still = room.around(places, self.actors[0].seated, kind in ("turning", "visit", "past"),
                                      visit.deepest_mm() if visit else 0.0, rng, self.is_steep)
@@ -181,7 +188,10 @@ class Scene:
         elif rng.random() < 0.25:
             degrees = rng.uniform(-8.0, 15.0)
         self.tilt, self.tilt_deg, self.level = rotation(X, numpy.radians(-degrees)), degrees, numpy.eye(3)
-        middle = self.head_mm if self.kind != "empty" else numpy.array([0.0, 0.0, 1000.0])
+        if self.kind in LOOKS_DOWN_DEG:
+            degrees = -numpy.random.default_rng([self.seed, 9]).uniform(*LOOKS_DOWN_DEG[self.kind])
+            self.tilt, self.tilt_deg = rotation(X, numpy.radians(-degrees)), degrees
+        middle = self.head_mm if self.kind not in ROOMS else numpy.array([0.0, 0.0, 1000.0])
         if mount is not None:
             self.tilt = self.level = mounted(*mount)
             self.tilt_deg = -mount[0]
@@ -191,16 +201,16 @@ class Scene:
 
     def still_at(self, index):
         """A key that changes with what stands still, and its mesh."""
-        if self.kind != "empty":
+        if self.kind not in ROOMS:
             return 0, self._tilted(self.still)
         key = index // EMPTY_FRAMES
-        return key, self._tilted(room.empty(numpy.random.default_rng([self.seed, 5, key]), self.is_steep))
+        return key, self._tilted(room.ROOMS[self.kind](numpy.random.default_rng([self.seed, 5, key]), self.is_steep))
 
     def _tilted(self, mesh):
         return mesh.moved(self.tilt, self.tilt_shift) if mesh is not None else None
 
     def time_us(self, index):
-        return index * motion.FRAME_US + (index // EMPTY_FRAMES * EMPTY_US if self.kind == "empty" else 0)
+        return index * motion.FRAME_US + (index // EMPTY_FRAMES * EMPTY_US if self.kind in ROOMS else 0)
 
     def frame(self, index):
         """The mesh of what moves, heads, and what else the frame shows."""

@@ -11,7 +11,7 @@ from scene import KINDS
 # set: first seed, rounds of all kinds, frames a sequence, further empty rooms
 SETS = {
     "learn": (
-        20000, 4, 24, 20), "judge": (
+        410000, 40, 24, 120), "judge": (
             70000, 2, 24, 8), "rigs": (
                 80000, 1, 20, 0), "sample": (
                     90000, 1, 5, 0), "mounted": (
@@ -20,6 +20,10 @@ SETS = {
 # Sequences of these sets are seen by cameras that hang otherwise than level: tilt (down) and roll, in turn.
 MOUNTS = ((45.0, 0.0), (30.0, 90.0), (60.0, 0.0), (-20.0, 180.0), (0.0, -90.0), (50.0, 30.0), (20.0, -15.0))
 EMPTY_FRAMES = 30
+# More people teach more than more frames of the same: of each sequence to learn from every fourth frame is made. What
+# follows the people: kind, first seed after the people's, sequences.
+LEARN_STEP = 4
+LEARN_MORE = (("above", 60000, 60), ("seat", 70000, 60), ("ground", 80000, 200), ("far", 90000, 120), ("hands", 100000, 60))
 # All rigs of this set see the same people.
 SAME_PEOPLE = "rigs"
 ALL_RIGS = [*rigs.KINDS, "range"]
@@ -30,6 +34,11 @@ def sequences(name, rig_kind):
     first, rounds, frames, empty = SETS[name]
     if name != SAME_PEOPLE:
         first += 1000 * ALL_RIGS.index(rig_kind)
+    if name == "learn":
+        one_round = [*KINDS] + ["empty"] * (empty // rounds)
+        people = [(kind, first + i) for i, kind in enumerate(one_round * rounds)]
+        more = [(kind, first + seed + i) for kind, seed, count in LEARN_MORE for i in range(count)]
+        return [("%03d_%s" % (i, kind), kind, seed, frames) for i, (kind, seed) in enumerate(people + more)]
     listed = [(kind, frames) for _ in range(rounds) for kind in KINDS]
     every = max(1, len(listed) // max(1, empty))
     mixed = []
@@ -52,7 +61,7 @@ def main():
         for rig_kind, directory, kind, seed, frames in row:
             out = os.path.join(options.out, rig_kind, directory)
             if not os.path.exists(os.path.join(out, "rig.json")):
-                make.make(model, out, rig_kind, kind, seed, frames,
+                make.make(model, out, rig_kind, kind, seed, frames, step=LEARN_STEP if options.set == "learn" else 1,
                           mount=MOUNTS[seed % len(MOUNTS)] if options.set.startswith("mounted") else None)
 
 

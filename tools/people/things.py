@@ -72,6 +72,25 @@ def table(head_mm, rng):
                numpy.array([rng.uniform(400.0, 800.0), 20.0, rng.uniform(200.0, 350.0)]), rng, rng.normal(0.0, 0.1))
 
 
+def seat_with_headrest(head_mm, rng):
+    """Of a car, of an office: nobody sits before it."""
+    back_z = head_mm[2] + rng.uniform(130.0, 220.0)
+    top_y = head_mm[1] + rng.uniform(90.0, 300.0)
+    half = numpy.array([rng.uniform(170.0, 300.0), 330.0, rng.uniform(15.0, 70.0)])
+    yaw = rng.normal(0.0, 0.3)
+    centre = numpy.array([head_mm[0] + rng.normal(0.0, 40.0), top_y + half[1], back_z + half[2]])
+    meshes = [cushion(centre, half, rng, rng.uniform(3.0, 9.0), yaw)]
+    headrest = numpy.array([rng.uniform(90.0, 150.0), rng.uniform(60.0, 120.0), rng.uniform(30.0, 70.0)])
+    gap = rng.choice([0.0, rng.uniform(20.0, 60.0)])
+    middle = numpy.array([centre[0], top_y - gap - 0.8 * headrest[1], back_z + headrest[2] + rng.normal(0.0, 25.0)])
+    meshes.append(cushion(middle, headrest, rng, rng.uniform(2.2, 6.0), yaw))
+    if gap > 0.0:
+        for side in (-1, 1):
+            meshes.append(box(middle + [side * headrest[0] * 0.4, headrest[1] + 0.5 * gap, 0.0],
+                              numpy.array([8.0, gap, 8.0]), rng))
+    return join(meshes)
+
+
 def chair(place, rng):
     """Stands there with its back upright; sometimes a jacket hangs over it. `place` is the seat's middle."""
     yaw = rng.uniform(-numpy.pi, numpy.pi)
@@ -186,6 +205,26 @@ def vessel(place, rng):
     return lathe(place, fine, rng)
 
 
+def jug(place, rng):
+    """Milk, oil, detergent, petrol: a block with shoulders, a neck and a handle."""
+    half = numpy.array([rng.uniform(55.0, 110.0), rng.uniform(80.0, 170.0), rng.uniform(55.0, 110.0)])
+    yaw = rng.uniform(-numpy.pi, numpy.pi)
+    middle = place - [0.0, half[1], 0.0]
+    block = cushion(middle, half, rng, rng.uniform(2.3, 6.0), yaw)
+    # Towards the top it narrows to the neck.
+    above = numpy.clip((middle[1] - block.vertices[:, 1]) / half[1], 0.0, 1.0)
+    narrow = 1.0 - rng.uniform(0.2, 0.75) * above ** rng.uniform(1.0, 3.0)
+    block.vertices[:, [0, 2]] = (block.vertices[:, [0, 2]] - place[[0, 2]]) * narrow[:, None] + place[[0, 2]]
+    top = place - [0.0, 2.0 * half[1] - 10.0, 0.0]
+    neck = rng.uniform(12.0, 45.0)
+    meshes = [block, lathe(top, [(neck, 0), (neck, rng.uniform(20.0, 70.0)), (0, rng.uniform(20.0, 70.0))], rng)]
+    if rng.random() < 0.7:
+        side = rotation(Y, yaw) @ X * (half[0] + 10.0)
+        path = [top + 0.3 * side, top + side + [0.0, 0.3 * half[1], 0.0], middle + side, middle + 0.8 * side + 0.4 * half[1] * Y]
+        meshes.append(make(*tube(path, numpy.full(4, rng.uniform(8.0, 20.0))), draw_albedo(rng)))
+    return join(meshes)
+
+
 def bag(place, rng):
     half = numpy.array([rng.uniform(120.0, 220.0), rng.uniform(140.0, 260.0), rng.uniform(60.0, 120.0)])
     shape = cushion(place - [0.0, half[1], 0.0], half, rng, 2.8, rng.uniform(-1.0, 1.0))
@@ -235,6 +274,10 @@ SMALL = (vessel, vessel, crate, round_thing, globe, plant, lamp, screen, bag)
 # Too low to hide who sits behind.
 LOW = (vessel, round_thing)
 LARGE = (chair, chair, armchair, plant, lamp, bag, coat, crate, balloons)
+
+
+# Stands on floors and tables that a camera looks down on.
+GROUND = (jug, jug, jug, vessel, vessel, round_thing, crate, bag, plant)
 
 
 def shelf(place, rng):
