@@ -212,8 +212,8 @@ vectors: ## write tests/vectors anew with the float64 reference; STAGES=dots: of
 	@tools/setup.sh vectors
 	@/usr/bin/python3 tools/oracle/make_vectors.py --out tests/vectors $(STAGES)
 
-learn: sim ## learn the score anew from rendered scenes and people; an hour
-	@tools/setup.sh vectors
+learn: sim ## learn the score anew from rendered scenes and people; three hours
+	@tools/setup.sh learn
 	@tools/setup.sh people
 	@/usr/bin/python3 tools/people/sets.py learn $(BUILD)/learn/people
 	@/usr/bin/python3 tools/learn/learn.py --render $(BUILD)/host/tools/render/render \

@@ -78,7 +78,7 @@ static void put_trace(struct sim_page *page, const struct sim_page_frame *frame)
 {
     struct app_write write = {.take = take_memory, .context = page};
     page->length = 0;
-    sim_trace_write(&write, frame->frame, frame->head);
+    sim_trace_write(&write, frame->frame, frame->view, frame->head);
     uLongf packed_size = compressBound((uLong)page->length);
     uint8_t *packed = sim_report_grow(NULL, packed_size, 1);
     int status =

@@ -134,7 +134,7 @@ static void put_files(struct visit *visit, const struct sim_page_frame *frame)
     struct hal_error error = {""};
     if (run->options->trace != NULL) {
         const struct sim_trace trace = {run->options->trace, visit->dir->label};
-        if (!sim_trace_frame(&trace, frame->frame, frame->head, &error)) {
+        if (!sim_trace_frame(&trace, frame->frame, frame->view, frame->head, &error)) {
             report_frame(visit, name, error.text);
         }
     }

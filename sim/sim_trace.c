@@ -296,7 +296,28 @@ static bool is_of(const struct ih_rays *rays, const struct ih_detection *detecti
            detection->evidence.value_q8[IH_EVIDENCE_SURROUNDINGS];
 }
 
-static void write_detection(struct app_write *write, const struct ih_rays *rays,
+/* The rays of each view of the frame: of the dots, or of each window of a depth image. They are made anew, for later
+ * stages have used the memory of those of the frame. Returns how many there are. */
+static int32_t make_rays(const struct isohead *head, const struct ih_frame *view,
+                         struct ih_rays rays[IH_WINDOWS_MAX])
+{
+    const struct ih_rays_params *params = &head->params.detections.rays;
+    if (head->rig.calibration.kind == IH_RIG_DOTS) {
+        ih_rays_make(&head->points, &head->dots, &head->rig, params, &rays[0]);
+        return 1;
+    }
+    struct ih_points points;
+    int32_t count = 0;
+    for (int32_t i = 0; i < head->windows.window_count; i++) {
+        if (ih_points_from_range(view, &head->rig, &head->params.points, &head->windows.window[i],
+                                 &points) == IH_OK) {
+            ih_rays_make(&points, NULL, &head->rig, params, &rays[count++]);
+        }
+    }
+    return count;
+}
+
+static void write_detection(struct app_write *write, const struct ih_rays *rays, int32_t rays_count,
                             const struct ih_detection *detection, const struct ih_verdict *verdict,
                             bool is_predicted)
 {
@@ -316,6 +337,7 @@ static void write_detection(struct app_write *write, const struct ih_rays *rays,
     write_column(write, "evidence_q8", detection->evidence.value_q8, IH_EVIDENCE_COUNT,
                  sizeof(int32_t));
     write_column(write, "part_q10", score.part_q10, IH_EVIDENCE_COUNT, sizeof(int32_t));
+    app_write_int_field(write, "together_q10", score.together_q10);
     app_write_int_field(write, "through_count", detection->evidence.through_count);
     app_write_int_field(write, "hit_count", detection->evidence.hit_count);
     app_write_int_field(write, "front_count", detection->evidence.front_count);
@@ -326,18 +348,22 @@ static void write_detection(struct app_write *write, const struct ih_rays *rays,
     app_write_int_field(write, "b_px_q12", detection->b_px_q12);
     app_write_int_field(write, "angle_mdeg", detection->angle_mdeg);
     app_write_int_field(write, "distance_mm_q8", detection->distance_mm_q8);
-    if (!is_predicted && is_of(rays, detection)) {
-        write_surroundings(write, rays, &detection->head);
+    int32_t of = 0;
+    while (of < rays_count && !is_of(&rays[of], detection)) {
+        of++;
+    }
+    if (!is_predicted && of < rays_count) {
+        write_surroundings(write, &rays[of], &detection->head);
     }
     app_write_close(write, '}');
 }
 
-static void write_detections(struct app_write *write, const struct isohead *head)
+static void write_detections(struct app_write *write, const struct isohead *head,
+                             const struct ih_frame *view)
 {
     const int32_t count = head->detections.detection_count;
-    struct ih_rays rays; /* anew: later stages have used the memory of those of the frame */
-    ih_rays_make(&head->points, head->rig.calibration.kind == IH_RIG_RANGE ? NULL : &head->dots,
-                 &head->rig, &head->params.detections.rays, &rays);
+    struct ih_rays rays[IH_WINDOWS_MAX];
+    const int32_t rays_count = make_rays(head, view, rays);
     app_write_key(write, "evidence");
     app_write_open(write, '[');
     for (int kind = 0; kind < IH_EVIDENCE_COUNT; kind++) {
@@ -348,8 +374,9 @@ static void write_detections(struct app_write *write, const struct isohead *head
     app_write_open(write, '[');
     for (int32_t i = 0; i < count + head->predicted.count; i++) {
         const struct ih_verdict verdict = ih_tracks_verdict(&head->tracks, &head->detections, i);
-        write_detection(write, &rays, ih_tracks_head(&head->detections, &head->predicted, i),
-                        &verdict, i >= count);
+        write_detection(write, rays, rays_count,
+                        ih_tracks_head(&head->detections, &head->predicted, i), &verdict,
+                        i >= count);
     }
     app_write_close(write, ']');
 }
@@ -377,7 +404,8 @@ static void take_text(void *file, const char *text, size_t length)
     fwrite(text, 1, length, file); /* an error stays in the file */
 }
 
-void sim_trace_write(struct app_write *write, const struct hal_frame *frame, struct isohead *head)
+void sim_trace_write(struct app_write *write, const struct hal_frame *frame,
+                     const struct ih_frame *view, struct isohead *head)
 {
     app_write_open(write, '{');
     app_write_key(write, "file");
@@ -392,7 +420,7 @@ void sim_trace_write(struct app_write *write, const struct hal_frame *frame, str
     sim_trace_contours(write, head);
     write_hypotheses(write, &head->nests);
     write_heads(write, &head->hypotheses, &head->params.hypotheses);
-    write_detections(write, head);
+    write_detections(write, head, view);
     write_result(write, head);
     app_write_close(write, '}');
     app_write_line_end(write);
@@ -449,7 +477,7 @@ bool sim_trace_prepare(const struct sim_trace *trace, struct hal_error *error)
 }
 
 bool sim_trace_frame(const struct sim_trace *trace, const struct hal_frame *frame,
-                     struct isohead *head, struct hal_error *error)
+                     const struct ih_frame *view, struct isohead *head, struct hal_error *error)
 {
     char *path = make_path(trace, frame->name);
     if (path == NULL) {
@@ -460,7 +488,7 @@ bool sim_trace_frame(const struct sim_trace *trace, const struct hal_frame *fram
     bool good = file != NULL;
     if (good) {
         struct app_write write = {.take = take_text, .context = file};
-        sim_trace_write(&write, frame, head);
+        sim_trace_write(&write, frame, view, head);
         good = !ferror(file);
         /* Closing writes what is buffered, so it can fail too; it must be done in any case. */
         good = fclose(file) == 0 && good;

@@ -20,11 +20,12 @@ struct sim_trace {
 /* Makes OUT/LABEL before the first frame. False: *error says why nothing can be written there. */
 bool sim_trace_prepare(const struct sim_trace *trace, struct hal_error *error);
 
-/* Uses head->scratch to trace the contours again. False: *error says why. */
+/* `view` is what the core was given. Uses head->scratch to trace the contours again. False: *error says why. */
 bool sim_trace_frame(const struct sim_trace *trace, const struct hal_frame *frame,
-                     struct isohead *head, struct hal_error *error);
+                     const struct ih_frame *view, struct isohead *head, struct hal_error *error);
 
 /* What goes into the file, to wherever the caller wants it. */
-void sim_trace_write(struct app_write *write, const struct hal_frame *frame, struct isohead *head);
+void sim_trace_write(struct app_write *write, const struct hal_frame *frame,
+                     const struct ih_frame *view, struct isohead *head);
 
 #endif

@@ -349,6 +349,11 @@ people)
     # its rays are cast by a package that is there for x86-64 alone
     [ "$(uname -m)" = x86_64 ] || { echo "make people needs an x86-64 machine" >&2; exit 1; }
     ;;
+learn)
+    need_python numpy python3-numpy
+    need_python scipy python3-scipy
+    need_python xgboost python3-xgboost
+    ;;
 accept | vectors)
     need_python numpy python3-numpy
     need_python scipy python3-scipy

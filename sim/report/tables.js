@@ -113,20 +113,20 @@ const Tables = (() => {
     level: ["things beside at its height", "fraction", 2], shoulder: ["a shoulder on the weaker side", "fraction", 2],
     before: ["points before it, as hands", "", 0], extent: ["extent of the nest there", "mm", 0], upright: ["height² / width² of that nest", "", 2],
     surroundings: ["what all dots there say by the learnt map", "", 2],
+    distance: ["how far away it is", "mm", 0],
   };
 
   /* The log-odds before any evidence, the same for all of a frame: read from one without a track, whose
    * log-odds are no mean over frames. null where there is none. */
   function baseOf(trace) {
     const free = trace.findings.find((f) => f.track === 0 && !f.predicted);
-    return free ? (free.logit_q10 - free.part_q10.reduce((sum, p) => sum + p, 0)) / 1024 : null;
+    return free ? (free.logit_q10 - free.together_q10 - free.part_q10.reduce((sum, p) => sum + p, 0)) / 1024 : null;
   }
 
-  /* What was there before, without a value, has no bar: it is larger than all others, which would be too short
-   * to be distinguished. */
+  /* What was there before has no bar: it is larger than all others, which would be too short to be distinguished. */
   function evidenceRow(name, value, part, largest) {
     const [text, unit, decimals] = KINDS[name] || [name, "", 2];
-    const bar = value === null ? null : element("i", { class: part >= 0 ? "for" : "against", style: `width:${(Math.abs(part) / largest * 48).toFixed(1)}%` });
+    const bar = largest === null ? null : element("i", { class: part >= 0 ? "for" : "against", style: `width:${(Math.abs(part) / largest * 48).toFixed(1)}%` });
     return element("tr", {}, element("th", { scope: "row" }, text),
       element("td", {}, value === null ? "" : `${value.toFixed(decimals)}${unit && unit !== "fraction" ? `\u202f${unit}` : ""}`),
       element("td", {}, `${part >= 0 ? "+" : ""}${part.toFixed(2)}`),
@@ -144,13 +144,15 @@ const Tables = (() => {
     const parts = detection.part_q10.map((p) => p / 1024);
     const order = parts.map((_, i) => i).sort((a, b) => Math.abs(parts[b]) - Math.abs(parts[a]));
     const base = baseOf(trace);
-    const largest = Math.max(...parts.map(Math.abs), 0.01);
+    const together = detection.together_q10 / 1024;
+    const largest = Math.max(...parts.map(Math.abs), Math.abs(together), 0.01);
     const h = frame.record.hypotheses[chosen];
     const title = h.predicted ? `Hypothesis ${chosen} is predicted by its track: it was not seen, so there is no evidence of this frame`
       : `Evidence for (right, green) and against (left) hypothesis ${chosen}: log-odds ${(detection.logit_q10 / 1024).toFixed(2)}` +
         `${detection.track === 0 ? "" : ", a mean over the frames of its track"}`;
     const rows = h.predicted ? [] : order.map((i) => evidenceRow(trace.evidence[i], detection.evidence_q8[i] / 256, parts[i], largest));
-    if (base !== null && rows.length > 0) rows.unshift(evidenceRow("before any evidence", null, base, largest));
+    if (rows.length > 0) rows.push(evidenceRow("what they say together", null, together, largest));
+    if (base !== null && rows.length > 0) rows.unshift(evidenceRow("before any evidence", null, base, null));
     const head = ["Evidence", "Value", "Log-odds", ""];
     const open = into.querySelector("details") ? into.querySelector("details").open : true;
     into.replaceChildren(element("details", { open }, element("summary", {}, title),

@@ -151,7 +151,7 @@ _Static_assert(sizeof(struct ih_exposure) == WORDS(4), "ih_exposure");
 _Static_assert(sizeof(struct ih_ellipse) == WORDS(9), "ih_ellipse");
 _Static_assert(offsetof(struct ih_rays, table) == WORDS(3 + 6 * IH_SLOTS), "ih_rays");
 _Static_assert(sizeof(struct ih_scan_candidate) == WORDS(4), "ih_scan_candidate");
-_Static_assert(sizeof(struct ih_score) == WORDS(2 + IH_EVIDENCE_COUNT), "ih_score");
+_Static_assert(sizeof(struct ih_score) == WORDS(3 + IH_EVIDENCE_COUNT), "ih_score");
 
 const char *const golden_inner_name[GOLDEN_INNERS] = {
     "noise", "exposure", "cuts", "ellipses", "space", "scan", "fit", "evidence", "score", "paper"};

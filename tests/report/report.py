@@ -141,7 +141,7 @@ def test_evidence(browser, record, trace):
             return "%r sum to %.2f, expected %.2f" % (found, sum(found), detection["logit_q10"] / 1024)
         found = found[1:]
     found.sort()
-    wanted = sorted(round(p / 1024, 2) for p in detection["part_q10"])
+    wanted = sorted(round(p / 1024, 2) for p in [*detection["part_q10"], detection["together_q10"]])
     length = browser.value("[...document.querySelectorAll('#evidence .bar i')].map((e) => parseFloat(e.style.width))")
     value = [abs(float(row[2])) for row in rows if row[0] != "before any evidence"]
     if len(length) != len(value) or any(abs(l - 48 * v / max(value)) > 0.3 for l, v in zip(length, value)):

@@ -1,10 +1,12 @@
-"""Logistic regression on piecewise linear curves, and its rounding to the firmware's numbers."""
+"""Logistic regression on piecewise linear curves, trees beside them, and the rounding to the firmware's numbers."""
 
 import dataclasses
 
 import numpy
 
 KNOTS = 7
+# As in ih_score.h.
+TREES, QUESTIONS, PLACES = 64, 7, 32
 SIZE_PENALTY = 1.0
 STEP_PENALTY = 3.0
 BEND_PENALTY = 10.0
@@ -12,21 +14,43 @@ BEND_PENALTY = 10.0
 
 @dataclasses.dataclass
 class Curves:
-    """first_q8, step_q8 (kinds), at_q10 (kinds x KNOTS), bias_q10: exactly what the firmware has."""
+    """first_q8, step_q8 (kinds), at_q10 (kinds x KNOTS), bias_q10; trees' kind, limit (TREES x QUESTIONS), leaf_q8
+    (TREES x QUESTIONS + 1), or none of them: exactly what the firmware has."""
 
     first_q8: numpy.ndarray
     step_q8: numpy.ndarray
     at_q10: numpy.ndarray
     bias_q10: int
+    kind: numpy.ndarray = None
+    limit: numpy.ndarray = None
+    leaf_q8: numpy.ndarray = None
+
+    def position(self, evidence):
+        return numpy.clip((evidence * 256 - self.first_q8) / self.step_q8, 0, KNOTS - 1)
+
+    def places(self, evidence):
+        """In parts of a knot's step; the firmware rounds a position to 16 bits first."""
+        return numpy.floor(numpy.round(self.position(evidence) * 65536) * PLACES / 65536).astype(int)
+
+    def leaves(self, evidence):
+        """What the trees add."""
+        place, row = self.places(evidence), numpy.arange(len(evidence))
+        total = numpy.zeros(len(evidence))
+        for kind, limit, leaf in zip(self.kind, self.limit, self.leaf_q8):
+            at = numpy.zeros(len(evidence), dtype=int)
+            for _ in range(3):
+                at = 2 * at + 1 + (place[row, kind[at]] >= limit[at])
+            total += leaf[at - QUESTIONS] / 256
+        return total
 
     def logits(self, evidence):
-        position = (evidence * 256 - self.first_q8) / self.step_q8
-        position = numpy.clip(position, 0, KNOTS - 1)
+        position = self.position(evidence)
         knot = numpy.minimum(position.astype(int), KNOTS - 2)
         part = position - knot
         kind = numpy.arange(evidence.shape[1])
         low, high = self.at_q10[kind, knot], self.at_q10[kind, knot + 1]
-        return ((low * (1 - part) + high * part).sum(axis=1) + self.bias_q10) / 1024
+        sums = ((low * (1 - part) + high * part).sum(axis=1) + self.bias_q10) / 1024
+        return sums if self.kind is None else sums + self.leaves(evidence)
 
 
 def make_knots(evidence):
@@ -79,14 +103,20 @@ def fit(evidence, labels, importance):
     return Curves(first_q8, step_q8, at_q10, int(round(bias * 1024)))
 
 
+def listed(values):
+    return ", ".join(str(value) for value in values)
+
+
 def write(path, learnt, kinds, command):
     """The header that ih_score.c includes."""
     rows = []
     for kind, first, step, at in zip(kinds, learnt.first_q8, learnt.step_q8, learnt.at_q10):
-        rows.append("    [IH_EVIDENCE_%s] = {%d, %d, {%s}}," %
-                    (kind.upper(), first, step, ", ".join(str(value) for value in at)))
+        rows.append("        [IH_EVIDENCE_%s] = {%d, %d, {%s}}," %
+                    (kind.upper(), first, step, listed(at)))
+    trees = ["        {{%s}, {%s}, {%s}}," % (listed(kind), listed(limit), listed(leaf))
+             for kind, limit, leaf in zip(learnt.kind, learnt.limit, learnt.leaf_q8)]
     with open(path, "w", encoding="utf-8") as file:
-        file.write("""/* ih_score_weights - the curves of ih_score, written by
+        file.write("""/* ih_score_weights - the curves and trees of ih_score, written by
  *     %s
  * Do not edit. */
 #ifndef IH_SCORE_WEIGHTS_H
@@ -98,12 +128,17 @@ def write(path, learnt, kinds, command):
 #include "detect/ih_score.h"
 
 /* clang-format off */
-static const int32_t bias_q10 = %d;
-
-static const struct ih_score_curve curves[IH_EVIDENCE_COUNT] = {
+static const struct ih_score_tables learnt = {
+    .bias_q10 = %d,
+    .curve = {
 %s
+    },
+    /* kinds of evidence in the order of ih_evidence.h */
+    .tree = {
+%s
+    },
 };
 /* clang-format on */
 
 #endif
-""" % (command, learnt.bias_q10, "\n".join(rows)))
+""" % (command, learnt.bias_q10, "\n".join(rows), "\n".join(trees)))

@@ -9,8 +9,8 @@ import model
 COLUMNS, ROWS, DEPTHS = 6, 13, 10  # as in ih_surroundings.h
 PLACES = COLUMNS * ROWS * DEPTHS
 RANGES = DEPTHS - 1  # of depth; the last place is a ray that met nothing, which has no neighbour in depth
-SIZE_PENALTY = 100.0
-CELL_PENALTY, DEPTH_PENALTY = 1000.0, 500.0
+SIZE_PENALTY = 30.0
+CELL_PENALTY, DEPTH_PENALTY = 300.0, 150.0
 STEPS = 200
 
 

@@ -1,4 +1,4 @@
-"""Float64 reference of the score: the log-odds as tools/learn computes them, for curves drawn here.
+"""Float64 reference of the score: the log-odds as tools/learn computes them, for curves and trees drawn here.
 
     score.py --check FOLDER      are ih_score_weights.h and ih_surroundings_map.h what tools/learn writes?
 """
@@ -27,7 +27,11 @@ def drawn_curves(random):
     step = np.append(random.integers(1, 8000, KINDS - 2), [1, 30000])
     at = random.integers(-4000, 4001, (KINDS, model.KNOTS))
     at[0] = np.array([-32768, 32767] * model.KNOTS)[:model.KNOTS]
-    return model.Curves(first, step, at, int(random.integers(-9000, 9000)))
+    bias = int(random.integers(-9000, 9000))
+    kind = random.integers(0, KINDS, (model.TREES, model.QUESTIONS))
+    limit = random.integers(0, (model.KNOTS - 1) * model.PLACES + 2, kind.shape)
+    leaf = random.integers(-128, 128, (model.TREES, model.QUESTIONS + 1))
+    return model.Curves(first, step, at, bias, kind, limit, leaf)
 
 
 def drawn_evidence(random, curves):
@@ -45,14 +49,18 @@ def write_vectors(directory):
     curves = drawn_curves(random)
     evidence = drawn_evidence(random, curves)
     logits = curves.logits(evidence / 256)
-    inc = emit.Inc("Curves of a score, evidence, and the log-odds that they give.")
+    together = curves.leaves(evidence / 256)
+    inc = emit.Inc("Curves and trees of a score, evidence, and the log-odds that they give, those of the trees alone behind.")
     inc.raw("\n#define VECTOR_KINDS %d\n#define VECTOR_BIAS_Q10 %d\n" % (KINDS, curves.bias_q10))
     inc.struct_array("ih_score_curve", "vector_curves", [
         "%d, %d, {%s}" % (first, step, ", ".join(emit.numbers(at)))
         for first, step, at in zip(curves.first_q8, curves.step_q8, curves.at_q10)])
+    inc.struct_array("ih_score_tree", "vector_trees", [
+        "{%s}, {%s}, {%s}" % tuple(", ".join(emit.numbers(part)) for part in tree)
+        for tree in zip(curves.kind, curves.limit, curves.leaf_q8)])
     inc.struct_array("vector_case", "vector_cases", [
-        "{%s}, %s" % (", ".join(emit.numbers(row)), emit.number(logit, 6))
-        for row, logit in zip(evidence, logits)])
+        "{%s}, %s, %s" % (", ".join(emit.numbers(row)), emit.number(logit, 6), emit.number(leaves, 10))
+        for row, logit, leaves in zip(evidence, logits, together)])
     return inc.write(directory, "score.inc")
 
 
@@ -60,11 +68,13 @@ def read_header(path):
     """Kinds, curves and the command that made them."""
     with open(path, encoding="utf-8") as file:
         text = file.read()
+    trees = re.findall(r"^ +\{\{([\d, ]+)\}, \{([\d, ]+)\}, \{([-\d, ]+)\}\},$", text, re.M)
+    kind, limit, leaf = ([[int(value) for value in part.split(",")] for part in column] for column in zip(*trees))
     rows = re.findall(r"\[IH_EVIDENCE_(\w+)\] = \{(-?\d+), (\d+), \{([-\d, ]+)\}\},", text)
     at = np.array([[int(value) for value in row[3].split(",")] for row in rows])
     curves = model.Curves(np.array([int(row[1]) for row in rows]),
                           np.array([int(row[2]) for row in rows]), at,
-                          int(re.search(r"bias_q10 = (-?\d+);", text)[1]))
+                          int(re.search(r"bias_q10 = (-?\d+),", text)[1]), kind, limit, leaf)
     return [row[0].lower() for row in rows], curves, re.search(r"written by\n \* +(.*)", text)[1]
 
 

@@ -21,7 +21,6 @@ void ih_detections_params_default(struct ih_detections_params *params)
     params->hopeless_logit_q10 = -5632;
     params->spacing_mm = 80;
     params->nest_near_mm = 90;
-    params->range_prior_q10 = -1536;
     params->nest_max = IH_NESTS_MAX;
     params->expected_max = IH_DETECTIONS_EXPECTED_MAX;
     params->front_min_mm = 150;
@@ -112,9 +111,6 @@ static void score_fit(const struct context *context, const struct ih_fit *fit,
                         &detection->evidence);
     ih_score_rate(&detection->evidence, &score);
     detection->logit_q10 = score.logit_q10;
-    if (context->rig->calibration.kind == IH_RIG_RANGE) {
-        detection->logit_q10 += context->params->range_prior_q10;
-    }
 }
 
 static bool is_too_near(const struct context *context, const struct ih_ellipsoid *head)

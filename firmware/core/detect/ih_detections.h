@@ -56,7 +56,6 @@ struct ih_detections_params {
     int32_t nest_near_mm;       /* a nest this near belongs to the candidate */
     int32_t nest_max;           /* of them this many are candidates themselves */
     int32_t expected_max;       /* of the expected heads this many are */
-    int32_t range_prior_q10;    /* log-odds added with a range rig: most windows show no head */
     int32_t front_min_mm;       /* no head is nearer than this: the lens is there */
 };
 

@@ -59,7 +59,7 @@ const char *ih_evidence_text(enum ih_evidence_kind kind)
     static const char *const text[IH_EVIDENCE_COUNT] = {
         "on",    "rough",    "bulge",   "tall",   "moved",     "above",        "beside",
         "below", "high",     "nothing", "body",   "body_rays", "body_depth",   "wide",
-        "level", "shoulder", "before",  "extent", "upright",   "surroundings",
+        "level", "shoulder", "before",  "extent", "upright",   "surroundings", "distance",
     };
     return (uint32_t)kind < IH_EVIDENCE_COUNT ? text[kind] : NULL;
 }
@@ -370,6 +370,7 @@ void ih_evidence_collect(const struct ih_rays *rays, const struct ih_ellipsoid *
     summarise(&sums, nest, out->value_q8);
     out->value_q8[IH_EVIDENCE_TALL] = taller_q8(ellipsoid);
     out->value_q8[IH_EVIDENCE_SURROUNDINGS] = ih_surroundings_logit_q8(rays, ellipsoid);
+    out->value_q8[IH_EVIDENCE_DISTANCE] = ellipsoid->centre_mm_q8[2];
     out->value_q8[IH_EVIDENCE_MOVED] = moved_mm_q8(ellipsoid, start_mm_q8);
     out->through_count = sums.through;
     out->hit_count = sums.hit;

@@ -50,6 +50,7 @@ enum ih_evidence_kind {
     IH_EVIDENCE_EXTENT,     /* of the nest at this position: mm, 0 without one */
     IH_EVIDENCE_UPRIGHT,    /* of that nest: height^2 / width^2, 1 without one */
     IH_EVIDENCE_SURROUNDINGS, /* what all rays there say by the learnt map (ih_surroundings): log-odds */
+    IH_EVIDENCE_DISTANCE, /* depth of the centre: mm; near and far heads show themselves otherwise */
     IH_EVIDENCE_COUNT
 };
 

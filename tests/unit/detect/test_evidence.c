@@ -373,6 +373,7 @@ static void tallness_is_in_hundredths_of_the_mean(void)
         forget_rays();
         collect(&head, head.centre_mm_q8, &no_nest);
         IH_TEST_EQUAL(100 * (times[i] - 1) << 8, evidence.value_q8[IH_EVIDENCE_TALL], "tall", i);
+        IH_TEST_EQUAL(head.centre_mm_q8[2], evidence.value_q8[IH_EVIDENCE_DISTANCE], "distance", i);
     }
 }
 
