@@ -198,13 +198,15 @@ class Misaligned(unittest.TestCase):
     def test_a_label_is_right_within_1_px_of_its_own_dot(self):
         trace = {"dots": {"u_px_q12": [40960, 81920, 122880], "v_px_q12": [40960, 40960, 40960]},
                  "labels": {"slot": [{"dot": 0}, {"dot": 1}, None, {"dot": 2}]}}
-        real = {**truth(CENTRE), "dots": [[0, 10.6, 10.79, 900], [1, 20.0, 8.9, 900], [2, 30.0, 10.0, 900]]}
+        real = {**truth(CENTRE), "dots": [[0, 10.6, 10.79, 900], [1, 20.0, 8.9, 900]], "dim_dots": [[2, 30.0, 10.0, 900]]}
         said = record([off(3, 4)], [0], 0)
         said["hypotheses"][0]["sigma_mm"] = 2.4
         got = misaligned.judged({**said, "file": "0.pgm", "rig": {"across_px": [0.5, 0, 0], "rotation_deg": [1, 2, 3]}}, real, trace)
         self.assertEqual((got.labels, got.labels_right, got.error_mm, got.sigma_mm), (3, 1, 5.0, 2.4))
         self.assertEqual((got.across_px, got.rotation_deg), (0.5, (1, 2, 3)))
         self.assertIsNone(misaligned.judged({**said, "file": "0.pgm"}, real, trace).across_px)
+        trace["labels"]["slot"][2] = {"dot": 2}
+        self.assertEqual(misaligned.judged({**said, "file": "0.pgm"}, real, trace).labels_right, 2)
 
     def figures(self, frames, right):
         piece = misaligned.Piece("paper", "d", 1, misaligned_rows.Knock(), "d")

@@ -112,8 +112,9 @@ for truth in truths:
     start = data.index(fields[3], data.index(fields[2], 2 + 1 + len(fields[1]))) + len(fields[3]) + 1
     assert len(data) - start == width * height * (1 if maximum < 256 else 2), "length of the samples"
     assert truth["dots"] or head_wanted != "yes", "no dots"
-    assert len({d[0] for d in truth["dots"]}) == len(truth["dots"]), "a dot twice"
-    for index, u, v, z_mm in truth["dots"]:
+    both = truth["dots"] + truth["dim_dots"]
+    assert len({d[0] for d in both}) == len(both), "a dot twice"
+    for index, u, v, z_mm in both:
         assert 0 <= index < 361, "index %d" % index
         assert -0.5 <= u <= width - 0.5 and -0.5 <= v <= height - 0.5, "dot outside: %g %g" % (u, v)
         assert 0 < z_mm < 16000, "depth %g" % z_mm
@@ -457,7 +458,10 @@ assert peaks("alternate", "000002.pgm", on[2]["dots"], fx) > 10, "dots do not st
 assert peaks("alternate", "000001.pgm", on[1]["dots"], fx) < 5, "dots without a laser"
 half, once = (peaks(f, "000002.pgm", on[2]["dots"], fx) for f in ("half", "anybody"))
 assert 0.4 < half / once < 0.65, "half the exposure: %g of %g" % (half, once)
-assert len(read("half")[1][2]["dots"]) <= len(on[2]["dots"]), "more dots with less light"
+for less, more in zip(read("half")[1], on):
+    assert less["dots"] == [d for d in more["dots"] if d in less["dots"]], "other dots with less light"
+    assert len(less["dim_dots"]) > len(more["dim_dots"]), "no dot is dimmer with less light"
+    assert sorted(less["dots"] + less["dim_dots"]) == sorted(more["dots"] + more["dim_dots"]), "a dot gone with less light"
 PYTHON
 # shellcheck disable=SC2086 # a list of options
 {

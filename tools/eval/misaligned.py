@@ -9,7 +9,7 @@ the right rig file and with wrong ones; only a drift has frames of its own. Prin
   right      frames selected right (docs/contract.md, "Score"), and their fraction of those with the right rig
   late       the worst directory: its first frames that are lost, of those with a head that the right rig gets
              right, and of those whose labels it gets (fewer than 90 % of them are right)
-  labels     fraction right: the dot lies within 1 px of that index's true dot; their count against the right rig's
+  labels     fraction right: the dot lies within 1 px of that index's true dot, dim ones too; their count against the right rig's
   centre     the centre error's median from frame 10 on, mm, and with the right rig
   2 sigma    fraction of the selected heads that lie within two reported sigma_mm
   across     the reported alignment across the lines, px: median, and the largest magnitude
@@ -70,7 +70,8 @@ def judged(record, truth, trace):
     selected = None if record["head"] is None else record["hypotheses"][record["head"]]
     there = truth["head"] is not None
     error_mm = score.distance_mm(selected, truth["head"]["centre_mm"]) if there and selected else None
-    dots, true = trace["dots"], {dot[0]: dot[1:3] for dot in truth["dots"]}
+    # A dim dot that is found has its label as well.
+    dots, true = trace["dots"], {dot[0]: dot[1:3] for dot in truth["dots"] + truth["dim_dots"]}
     labels = [(slot, label["dot"]) for slot, label in enumerate(trace["labels"]["slot"]) if label is not None]
     near = sum(math.dist((dots["u_px_q12"][dot] / 4096, dots["v_px_q12"][dot] / 4096), true[slot]) <= NEAR_PX
                for slot, dot in labels if slot in true)

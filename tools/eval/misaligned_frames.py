@@ -111,6 +111,6 @@ def false_dots(work, kind, rig_directory, name, seed, frames):
             pitch_px = PITCH_PX * LATTICE_PITCHES[frame % len(LATTICE_PITCHES)]
             dots = random_dots(rng, *size) if kind == "random" else lattice_dots(rng, *size, pitch_px)
             write_image(os.path.join(directory, file_name), draw_dots(rng, *size, dots))
-            print(json.dumps({"file": file_name, "head": None, "dots": []}), file=truth)
+            print(json.dumps({"file": file_name, "head": None, "dots": [], "dim_dots": []}), file=truth)
     shutil.copy(os.path.join(rig_directory, "rig.json"), directory)
     return directory

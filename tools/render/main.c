@@ -21,7 +21,7 @@ struct studio {
     struct rd_laser laser;
     struct rd_sensor sensor;
     struct rd_stage stage;
-    struct rd_dot_list visible;
+    struct rd_dot_list dots;
     struct rd_ambient *ambient;
     float *grey;
     uint16_t *samples;
@@ -77,8 +77,8 @@ static bool render_frame(struct studio *studio, struct rd_output *output, int fr
     rd_ambient_frame(studio->ambient, &stage->scene, &stage->light, studio->grey);
     struct rd_frame_note note = {stage->time_us, !stage->options.alternate || frame % 2 == 0, stage->source};
     if (note.laser) {
-        rd_dots_cast(&studio->laser, &studio->rig, &stage->scene, frame, studio->grey, &studio->visible);
-        rd_output_truth(output, frame, &stage->truth, &studio->visible);
+        rd_dots_cast(&studio->laser, &studio->rig, &stage->scene, frame, studio->grey, &studio->dots);
+        rd_output_truth(output, frame, &stage->truth, &studio->dots);
     }
     if (stage->options.blur_px > 0.0)
         rd_ambient_blur(studio->ambient, stage->options.blur_px, studio->grey);

@@ -141,7 +141,7 @@ static double beam_sigma(const struct rd_laser *laser, const struct rd_scene *sc
     return laser->beam_mm / reach_mm + laser->divergence;
 }
 
-/* Draws one dot. True: it is visible, at *dot. */
+/* Draws one dot. True: the camera sees the point of its middle ray, at *dot. */
 static bool cast_dot(const struct rd_laser *laser, const struct rd_rig *rig, const struct rd_scene *scene, int index,
                      float *grey, struct rd_dot *dot)
 {
@@ -162,20 +162,21 @@ static bool cast_dot(const struct rd_laser *laser, const struct rd_rig *rig, con
         if (sub == 0) {
             middle_seen = in_frame(rig, spot.u_px, spot.v_px);
             before_grey = peak_near(rig, grey, spot.u_px, spot.v_px);
-            *dot = (struct rd_dot){index, spot.u_px, spot.v_px, hit.point_mm.z};
+            *dot = (struct rd_dot){index, false, spot.u_px, spot.v_px, hit.point_mm.z};
         }
         draw_spot(rig, &spot, grey);
     }
-    return middle_seen && peak_near(rig, grey, dot->u_px, dot->v_px) - before_grey >= RD_VISIBLE_GREY;
+    dot->is_dim = middle_seen && peak_near(rig, grey, dot->u_px, dot->v_px) - before_grey < RD_VISIBLE_GREY;
+    return middle_seen;
 }
 
 void rd_dots_cast(const struct rd_laser *laser, const struct rd_rig *rig, const struct rd_scene *scene, int frame,
-                  float *grey, struct rd_dot_list *visible)
+                  float *grey, struct rd_dot_list *seen)
 {
-    visible->dot_count = 0;
+    seen->dot_count = 0;
     for (int i = 0; i < RD_DOT_COUNT; i++) {
         bool missing = rd_hash_unit(laser->seed, (uint64_t)i, (uint64_t)frame) < laser->missing;
-        if (!missing && cast_dot(laser, rig, scene, i, grey, &visible->dots[visible->dot_count]))
-            visible->dot_count++;
+        if (!missing && cast_dot(laser, rig, scene, i, grey, &seen->dots[seen->dot_count]))
+            seen->dot_count++;
     }
 }

@@ -7,11 +7,13 @@
 #ifndef RD_DOTS_H
 #define RD_DOTS_H
 
+#include <stdbool.h>
+
 #include "rd_options.h"
 #include "rd_rig.h"
 #include "rd_scene.h"
 
-/* A dot counts as visible from this peak above the picture around it, grey levels of 255. */
+/* A dot counts as visible from this peak above the picture around it, grey levels of 255; below it, as dim. */
 #define RD_VISIBLE_GREY 6.0
 /* Grey levels beyond this are lost. */
 #define RD_FULL_GREY 255.0
@@ -31,6 +33,7 @@ struct rd_laser {
 
 struct rd_dot {
     int index;
+    bool is_dim;
     double u_px, v_px, z_mm;
 };
 
@@ -41,8 +44,8 @@ struct rd_dot_list {
 
 void rd_laser_make(struct rd_laser *laser, const struct rd_options *options, const struct rd_rig *rig);
 
-/* Adds all dots to `grey` and lists the visible ones with the true positions of their middle rays. */
+/* Adds all dots to `grey` and lists those whose middle rays' points the camera sees, with these true positions. */
 void rd_dots_cast(const struct rd_laser *laser, const struct rd_rig *rig, const struct rd_scene *scene, int frame,
-                  float *grey, struct rd_dot_list *visible);
+                  float *grey, struct rd_dot_list *seen);
 
 #endif

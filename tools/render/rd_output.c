@@ -143,8 +143,21 @@ static void write_vec(FILE *file, const char *before, struct rd_vec v)
     fprintf(file, "%s[%.9g,%.9g,%.9g]", before, v.x, v.y, v.z);
 }
 
-void rd_output_truth(struct rd_output *output, int frame, const struct rd_truth *truth,
-                     const struct rd_dot_list *visible)
+static void write_dots(FILE *file, const char *name, const struct rd_dot_list *list, bool is_dim)
+{
+    const char *before = "";
+    fprintf(file, ",\"%s\":[", name);
+    for (int i = 0; i < list->dot_count; i++) {
+        const struct rd_dot *dot = &list->dots[i];
+        if (dot->is_dim != is_dim)
+            continue;
+        fprintf(file, "%s[%d,%.3f,%.3f,%.2f]", before, dot->index, dot->u_px, dot->v_px, dot->z_mm);
+        before = ",";
+    }
+    putc(']', file);
+}
+
+void rd_output_truth(struct rd_output *output, int frame, const struct rd_truth *truth, const struct rd_dot_list *dots)
 {
     FILE *file = output->truth;
     char name[32];
@@ -165,12 +178,9 @@ void rd_output_truth(struct rd_output *output, int frame, const struct rd_truth 
         write_vec(file, ",\"down\":", truth->board.rot.y);
         putc('}', file);
     }
-    fputs(",\"dots\":[", file);
-    for (int i = 0; i < visible->dot_count; i++) {
-        const struct rd_dot *dot = &visible->dots[i];
-        fprintf(file, "%s[%d,%.3f,%.3f,%.2f]", i > 0 ? "," : "", dot->index, dot->u_px, dot->v_px, dot->z_mm);
-    }
-    fputs("]}\n", file);
+    write_dots(file, "dots", dots, false);
+    write_dots(file, "dim_dots", dots, true);
+    fputs("}\n", file);
 }
 
 static void write_matrix(FILE *file, const char *name, int rows, int columns, const double *data)
