@@ -113,19 +113,31 @@ static void judge(int32_t across_px_q12, struct sight *sight)
     sight->beside += off > BESIDE_FROM_PX_Q12 && off < BESIDE_TO_PX_Q12;
 }
 
-static struct sight look(const struct ih_dot_rows *rows, const struct ih_rig *rig)
+/* At every step-th slot, and as if the others were like these. */
+static struct sight look(const struct ih_dot_rows *rows, const struct ih_rig *rig, int32_t step)
 {
     const struct ih_align_band band = {BESIDE_TO_PX_Q12, MARGIN_PX_Q12};
     struct sight sight = {0, 0};
     int32_t first = 0;
-    for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
+    for (int32_t slot = 0; slot < IH_SLOTS; slot += step) {
         int32_t across[IH_ALIGN_NEAR_MAX];
         const int32_t count = ih_align_near(rows, &rig->line[slot], band, &first, across);
         for (int32_t i = 0; i < count; i++) {
             judge(across[i], &sight);
         }
     }
+    sight.on *= step;
+    sight.beside *= step;
     return sight;
+}
+
+/* Are dots on the lines as they were, or so many that they can be on no others? */
+static bool is_where_it_was(const struct ih_align *align, struct sight sight, int32_t dot_count)
+{
+    const int32_t excess = excess_of(sight);
+    const bool is_clear = sight.on >= CLEAR_MIN && sight.beside * 5 <= sight.on * 2;
+    const bool is_as_before = excess * 256 / dot_count >= align->trusted_q8 * 3 / 4;
+    return (is_clear || is_as_before) && excess >= excess_min(dot_count);
 }
 
 /* What is less than its uncertainty says nothing of depth. A rig that has moved needs less than one that fits. */
@@ -172,7 +184,7 @@ static int32_t try_motion(struct ih_align *align, const struct ih_dots *dots,
     memcpy(before_px_q12, align->moved_px_q12, sizeof before_px_q12);
     move_rig(align, moved_px_q12, rig);
     ih_dot_rows_fill(dots, rig, rows);
-    const int32_t excess = excess_of(look(rows, rig));
+    const int32_t excess = excess_of(look(rows, rig, 1));
     if (excess >= excess_wanted) {
         return excess;
     }
@@ -251,23 +263,22 @@ void ih_align_find(struct ih_align *align, const struct ih_dots *dots, struct ih
     if (rows->dot_count < DOTS_MIN) {
         return;
     }
-    const struct sight sight = look(rows, rig);
+    struct sight sight = look(rows, rig, 2);
+    if (!is_where_it_was(align, sight, rows->dot_count)) {
+        sight = look(rows, rig, 1);
+    }
     align->excess = excess_of(sight);
-    int32_t fraction_q8 = align->excess * 256 / rows->dot_count;
-    const bool is_clear = sight.on >= CLEAR_MIN && sight.beside * 5 <= sight.on * 2;
-    const bool is_as_before = fraction_q8 >= align->trusted_q8 * 3 / 4;
-    if ((!is_clear && !is_as_before) || align->excess < excess_min(rows->dot_count)) {
+    if (!is_where_it_was(align, sight, rows->dot_count)) {
         align->pause--;
         if (align->pause < 0) {
             align->excess = search(align, dots, align->excess, rig, rows, scratch);
             align->trusted_q8 = 0;
-            fraction_q8 = align->excess * 256 / rows->dot_count;
         }
     } else if (align->is_short) {
         search_depth(align, dots, rig, rows, scratch);
     }
     align->is_short = false;
-    align->trusted_q8 = ih_max_s32(align->trusted_q8, fraction_q8);
+    align->trusted_q8 = ih_max_s32(align->trusted_q8, align->excess * 256 / rows->dot_count);
     if (align->excess >= excess_min(rows->dot_count)) {
         align->now.state = state_of(align);
         align->vain_count = 0;
@@ -424,11 +435,12 @@ static void fit_frame(const struct ih_align *align, const struct ih_align_pairs 
                       int32_t sigma_px_q12[IH_ALIGN_AXES])
 {
     memset(frame_px_q12, 0, IH_ALIGN_AXES * sizeof *frame_px_q12);
-    ih_align_step(pairs, align->prior_px_q12, IH_ALIGN_FIRST_SCALE_PX_Q12, frame, frame_px_q12);
+    ih_align_step(pairs, align->prior_px_q12, IH_ALIGN_FIRST_SCALE_PX_Q12, frame, frame_px_q12,
+                  sigma_px_q12);
     if (ih_align_rms_px_q12(frame, frame_px_q12) > NEAR_PX_Q12) {
-        ih_align_step(pairs, align->prior_px_q12, IH_ALIGN_SCALE_PX_Q12, frame, frame_px_q12);
+        ih_align_step(pairs, align->prior_px_q12, IH_ALIGN_SCALE_PX_Q12, frame, frame_px_q12,
+                      sigma_px_q12);
     }
-    ih_align_solve(frame, align->prior_px_q12, IH_ALIGN_NOISE_PX_Q12, frame_px_q12, sigma_px_q12);
 }
 
 /* A mean that is hardly anything is nothing: the rig fits again. */

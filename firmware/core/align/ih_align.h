@@ -5,7 +5,8 @@
  * Out:    the rig's lines where the dots are, the dots by row, and how the rig has moved: a rotation of the projector, a
  *         change of focal length and a shift of the picture, with uncertainty.
  * Method: 1. Look: dots within 0.3 px of the lines, against those 0.6 to 1.2 px beside them. If nearly as many of all dots
- *            lie on the lines as did since the last search, or hardly one beside them, the rig is where it was.
+ *            lie on the lines as did since the last search, or hardly one beside them, the rig is where it was. Every
+ *            second slot is looked at, and all of them where these do not show it.
  *         2. If not, search (ih_align_search): back at the file's lines, or around them. The result is taken when more dots
  *            lie on its lines than before. After searches in vain there are pauses of up to 8 frames. If dots lie on
  *            the lines, but beyond the working range, so that labels are short, depth alone is searched for.
@@ -18,7 +19,7 @@
  *         0.02 degrees in a frame of a room, 0.2 where half of the dots are missing.
  * Limits: 12 px across a line, 1 degree about the camera's axis, 1 % of focal length. Not seen: a shift along the
  *         baseline, and of the principal point along it.
- * Cost:   looking and learning 0.2 M instructions, a search 0.6 to 0.8 M (x86-64-v3): docs/performance.md.
+ * Cost:   looking and learning 0.12 to 0.15 M instructions, a search 0.6 to 0.8 M (x86-64-v3): docs/performance.md.
  * Error:  against float64 on the same dots: docs/numerics.md.
  */
 #ifndef IH_ALIGN_H

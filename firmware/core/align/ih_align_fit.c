@@ -167,11 +167,11 @@ void ih_align_solve(const struct ih_align_sums *sums, const int32_t prior_px_q12
 
 void ih_align_step(const struct ih_align_pairs *pairs, const int32_t prior_px_q12[IH_ALIGN_AXES],
                    int32_t scale_px_q12, struct ih_align_sums *sums,
-                   int32_t moved_px_q12[IH_ALIGN_AXES])
+                   int32_t moved_px_q12[IH_ALIGN_AXES], int32_t sigma_px_q12[IH_ALIGN_AXES])
 {
     memset(sums, 0, sizeof *sums);
     ih_align_sums_add(pairs, moved_px_q12, scale_px_q12, sums);
-    ih_align_solve(sums, prior_px_q12, IH_ALIGN_NOISE_PX_Q12, moved_px_q12, NULL);
+    ih_align_solve(sums, prior_px_q12, IH_ALIGN_NOISE_PX_Q12, moved_px_q12, sigma_px_q12);
 }
 
 int32_t ih_align_rms_px_q12(const struct ih_align_sums *sums,

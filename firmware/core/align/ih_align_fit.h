@@ -52,10 +52,10 @@ void ih_align_solve(const struct ih_align_sums *sums, const int32_t prior_px_q12
                     int32_t noise_px_q12, int32_t moved_px_q12[IH_ALIGN_AXES],
                     int32_t sigma_px_q12[IH_ALIGN_AXES]);
 
-/* One step: weights against what the last one left, then solved. */
+/* One step: weights against what the last one left, then solved. sigma_px_q12 may be NULL. */
 void ih_align_step(const struct ih_align_pairs *pairs, const int32_t prior_px_q12[IH_ALIGN_AXES],
                    int32_t scale_px_q12, struct ih_align_sums *sums,
-                   int32_t moved_px_q12[IH_ALIGN_AXES]);
+                   int32_t moved_px_q12[IH_ALIGN_AXES], int32_t sigma_px_q12[IH_ALIGN_AXES]);
 
 /* Root mean square, over those pairs, of what the five move dots by. */
 int32_t ih_align_rms_px_q12(const struct ih_align_sums *sums,

@@ -9,8 +9,6 @@
 
 /* Beside a peak of so many bins is what it must rise above. */
 #define BESIDE_BINS 3
-/* Half columns from the pattern's middle to its edge. */
-#define EDGE 18
 
 void ih_align_votes_clear(struct ih_align_votes *votes, const struct ih_align_grid *grid)
 {
@@ -27,7 +25,7 @@ void ih_align_votes_clear(struct ih_align_votes *votes, const struct ih_align_gr
 static int32_t middle_of(int32_t block, const struct ih_align_grid *grid)
 {
     const int32_t first = block * grid->slots;
-    return first + ih_min_s32(first + grid->slots, IH_GRID) - 1 - EDGE;
+    return first + ih_min_s32(first + grid->slots, IH_GRID) - 1 - IH_ALIGN_EDGE;
 }
 
 static int32_t bins_of(int64_t px_q12, const struct ih_align_grid *grid)
@@ -197,7 +195,7 @@ static void set_plane_first(struct ih_align_votes *votes, const struct ih_align_
         for (int32_t block = 0; block < grid->side; block++) {
             votes->plane_first[IH_ALIGN_STEPS_MAX + steps][block] =
                 IH_ALIGN_PAD +
-                bins_of(steps * grid->step_px_q12 * middle_of(block, grid) / EDGE, grid);
+                bins_of(steps * grid->step_px_q12 * middle_of(block, grid) / IH_ALIGN_EDGE, grid);
         }
     }
 }
@@ -208,8 +206,8 @@ static void set_depth_bins(struct ih_align_votes *votes, const struct ih_align_g
 {
     for (int32_t row = 0; row < grid->side; row++) {
         for (int32_t column = 0; column < grid->side; column++) {
-            const int32_t slot =
-                (middle_of(row, grid) + EDGE) / 2 * IH_GRID + (middle_of(column, grid) + EDGE) / 2;
+            const int32_t slot = (middle_of(row, grid) + IH_ALIGN_EDGE) / 2 * IH_GRID +
+                                 (middle_of(column, grid) + IH_ALIGN_EDGE) / 2;
             const int64_t px_q12 = ih_mul_shift(depth_px_q12, slope_q12[slot][IH_ALIGN_DEPTH], 12);
             votes->depth_bins[row][column] = (int8_t)bins_of(px_q12, grid);
         }
@@ -264,11 +262,4 @@ void ih_align_votes_count(struct ih_align_votes *votes, const struct ih_align_gr
             }
         }
     }
-}
-
-int32_t ih_align_plane_px_q12(const struct ih_align_plane *plane, int32_t slot)
-{
-    return plane->shift_px_q12 + (plane->column_px_q12 * (2 * (slot % IH_GRID) - EDGE) +
-                                  plane->row_px_q12 * (2 * (slot / IH_GRID) - EDGE)) /
-                                     EDGE;
 }

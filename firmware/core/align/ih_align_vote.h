@@ -22,6 +22,8 @@
 #define IH_ALIGN_PADDED (IH_ALIGN_BINS_MAX + 2 * IH_ALIGN_PAD)
 /* Planes that a vote gives. */
 #define IH_ALIGN_PEAKS 3
+/* Half columns from the pattern's middle to its edge. */
+#define IH_ALIGN_EDGE (IH_GRID - 1)
 /* Steps of columns and rows on one side of 0. */
 #define IH_ALIGN_STEPS_MAX 12
 
@@ -77,6 +79,11 @@ void ih_align_votes_count(struct ih_align_votes *votes, const struct ih_align_gr
                           struct ih_align_plane peak[IH_ALIGN_PEAKS]);
 
 /* Of a plane, without the rotation of depth. */
-int32_t ih_align_plane_px_q12(const struct ih_align_plane *plane, int32_t slot);
+static inline int32_t ih_align_plane_px_q12(const struct ih_align_plane *plane, int32_t slot)
+{
+    return plane->shift_px_q12 + (plane->column_px_q12 * (2 * (slot % IH_GRID) - IH_ALIGN_EDGE) +
+                                  plane->row_px_q12 * (2 * (slot / IH_GRID) - IH_ALIGN_EDGE)) /
+                                     IH_ALIGN_EDGE;
+}
 
 #endif
