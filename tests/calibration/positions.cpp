@@ -7,10 +7,9 @@
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "cal_beam.hpp"
+#include "cal_pairs.hpp"
 #include "cal_refine.hpp"
 #include "cal_spot.hpp"
-#include "cal_pairs.hpp"
 #include "cal_wall.hpp"
 
 static int number, failed;

@@ -4,6 +4,10 @@
  * The board's frame: origin where the chessboard's top left square begins, X right, Y down, Z away from who looks at
  * it. Inner corner k is at ((k % (columns - 1) + 1) square, (k / (columns - 1) + 1) square, 0).
  * The dark squares are grey, not black: the laser's dots must show on them too.
+ *
+ * On paper, by the file's name: .pdf is a sheet of A4 in true size, drawn as areas, with a ruler of 100 mm to check the
+ * printer by; .pgm is the same sheet without the ruler, 4 samples to the mm, 255 for an albedo of 1: what tools/render
+ * shows.
  */
 #ifndef CAL_BOARD_HPP
 #define CAL_BOARD_HPP
@@ -51,6 +55,12 @@ cv::Mat board_bitmap(const Board &board, int px_per_mm);
 
 /* The same with greys where an edge lies within a sample: edges are where they are printed, to 0.025 mm at 4 px/mm. */
 cv::Mat board_picture(const Board &board, int px_per_mm);
+
+/* Whether the file's name ends in one of these. */
+bool board_prints(const std::string &path);
+
+/* For such a name. Throws cal::Error. */
+void board_print(const Board &board, const std::string &path);
 } // namespace cal
 
 #endif

@@ -4,9 +4,9 @@
 #include <cstdlib>
 #include <filesystem>
 
+#include "cal_board.hpp"
 #include "cal_error.hpp"
 #include "cal_pictures.hpp"
-#include "cal_print.hpp"
 #include "tool_options.hpp"
 
 namespace cal

@@ -1,5 +1,9 @@
 /* cal_sightings - dots on the board, as points in space: each picture with the laser on gives the points where rays of
- * the projector cross a plane that is known.
+ * the projector cross a plane that is known. And which dots of one picture are neighbours: whole numbers of steps from a
+ * dot somewhere in the middle.
+ * In tangents X/Z, Y/Z a pattern that is projected on a plane is nearly regular at any distance: its steps are found as
+ * the differences that most neighbours share, and it is grown from dot to dot, each predicted from those around it.
+ * Columns run to the right and rows downwards: the pattern may be rotated by up to 40 degrees.
  */
 #ifndef CAL_SIGHTINGS_HPP
 #define CAL_SIGHTINGS_HPP
@@ -40,6 +44,9 @@ void sighting_set(const Camera &camera, const View &view, cv::Point2d px, Sighti
 
 /* The board's pose in `lit.view` must be known. */
 void sightings_find(const Board &board, const Camera &camera, const cv::Mat &grey, const cv::Mat &dark, Lit &lit);
+
+/* Sets step and in_lattice; returns how many dots are in the lattice. Those that are not are left for nothing. */
+int lattice_grow(std::vector<Sighting> &sightings);
 } // namespace cal
 
 #endif

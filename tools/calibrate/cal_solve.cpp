@@ -4,13 +4,13 @@
 #include <filesystem>
 
 #include "cal_coverage.hpp"
-#include "cal_draw.hpp"
 #include "cal_error.hpp"
-#include "cal_lattice.hpp"
 #include "cal_nominal.hpp"
-#include "cal_report.hpp"
-#include "cal_spot.hpp"
 #include "cal_pairs.hpp"
+#include "cal_refine.hpp"
+#include "cal_report.hpp"
+#include "cal_sightings.hpp"
+#include "cal_spot.hpp"
 #include "cal_wall.hpp"
 #include "tool_progress.hpp"
 

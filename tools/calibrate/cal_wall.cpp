@@ -4,8 +4,8 @@
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "cal_beam.hpp"
-#include "cal_epipolar.hpp"
+#include "cal_rig.hpp"
+#include "cal_spot.hpp"
 
 namespace cal
 {

@@ -6,10 +6,10 @@
 #include <exception>
 #include <new>
 
+#include "cal_board.hpp"
 #include "cal_error.hpp"
 #include "cal_guide.hpp"
 #include "cal_options.hpp"
-#include "cal_print.hpp"
 #include "cal_solve.hpp"
 
 /* Output that was not written is an error. */

@@ -7,8 +7,8 @@
 #ifndef RD_BOARD_H
 #define RD_BOARD_H
 
-#include "rd_bitmap.h"
 #include "rd_light.h"
+#include "rd_material.h"
 #include "rd_rig.h"
 
 struct rd_board {

@@ -17,4 +17,9 @@ void rd_furniture_table(struct rd_scene *scene, struct rd_rng *rng);
 /* A room with chairs, shelves, plants, lamps, boxes. */
 void rd_furniture_room(struct rd_scene *scene, struct rd_rng *rng);
 
+/* Two to eight things that may be taken for a head, 0.5 to 1.5 m before the camera and anywhere in the pattern: on
+ * posts, tables, stools and boards, or standing on the floor; with or without walls behind. Half of the cameras look
+ * straight ahead, the others down by up to 40 degrees. */
+void rd_clutter_build(struct rd_scene *scene, struct rd_rng *rng);
+
 #endif

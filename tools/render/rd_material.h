@@ -2,6 +2,7 @@
  * the ambient picture), by pattern and place.
  * In:    a point in the pattern's own frame, mm.
  * Out:   albedo 0.01 .. 0.95.
+ * A printed sheet's albedo comes from a binary PGM of 8 bits: a sample of 255 is an albedo of 1.
  */
 #ifndef RD_MATERIAL_H
 #define RD_MATERIAL_H
@@ -9,8 +10,22 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "rd_bitmap.h"
 #include "rd_vec.h"
+
+/* Longer sides are refused. */
+#define RD_BITMAP_SIDE_MAX 8192
+
+struct rd_bitmap {
+    int width, height;
+    uint8_t *samples; /* row by row */
+};
+
+/* NULL: reported on standard error. */
+struct rd_bitmap *rd_bitmap_load(const char *path);
+void rd_bitmap_free(struct rd_bitmap *bitmap);
+
+/* Albedo at a position in samples, their centres at integers; between them it is linear, outside it is the border's. */
+double rd_bitmap_albedo(const struct rd_bitmap *bitmap, double column, double row);
 
 enum rd_pattern {
     RD_PLAIN,

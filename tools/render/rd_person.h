@@ -69,6 +69,9 @@ void rd_gear_dress(struct rd_person *person, struct rd_scene *scene, struct rd_r
 struct rd_pose rd_person_head_pose(const struct rd_person *person, const struct rd_pose *torso, double yaw,
                                    double pitch, double roll);
 
+/* Skull, face, hair, ears, hat and what else the person wears at the posture's head pose. */
+void rd_head_build(const struct rd_person *person, const struct rd_pose *head, struct rd_scene *scene);
+
 /* Adds all shapes of the posture. */
 void rd_person_build(const struct rd_person *person, const struct rd_posture *posture, struct rd_scene *scene);
 
