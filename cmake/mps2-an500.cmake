@@ -1,4 +1,4 @@
 # Cortex-M7 on Arm's MPS2 with AN500, which qemu-system-arm emulates.
 set(ISOHEAD_CPU cortex-m7)
-set(ISOHEAD_LINKER_SCRIPT mps2-an500.ld)
+set(ISOHEAD_LINKER_SCRIPT mps2.ld)
 include("${CMAKE_CURRENT_LIST_DIR}/cortexm.cmake")

@@ -16,7 +16,6 @@
 
 #include "app_record.h"
 #include "app_rig.h"
-#include "app_rig_explain.h"
 #include "app_rig_text.h"
 #include "app_view.h"
 #include "isohead.h"

@@ -1,10 +1,15 @@
-/* sim_options - the command line of host_sim. */
+/* sim_options - the command line of host_sim, and what --without leaves out.
+ *
+ * Each part of the method that can be left out, to measure what it brings, is a parameter of the core
+ * that is set so that the part does nothing; but for ambient frames, which the core is not given.
+ */
 #ifndef SIM_OPTIONS_H
 #define SIM_OPTIONS_H
 
 #include <stdbool.h>
+#include <stdint.h>
 
-#include "sim_without.h"
+#include "isohead.h"
 
 enum sim_status {
     SIM_STATUS_GOOD = 0,  /* every frame was processed */
@@ -15,7 +20,7 @@ enum sim_status {
 struct sim_options {
     bool json;
     bool paper;       /* the paper's method alone */
-    uint32_t without; /* parts that are left out, sim_without.h */
+    uint32_t without; /* parts that are left out */
     bool help, version;
     const char *rig;     /* NULL: DIR/rig.json */
     const char *trace;   /* NULL: none */
@@ -32,5 +37,14 @@ bool sim_options_parse(struct sim_options *options, int argument_count, char **a
 
 /* The text of --help, on standard output. */
 void sim_options_help(void);
+
+/* Add the parts of a list, "scan,fit", to a set. NULL, or where in the list the first stands that does
+ * not exist. */
+const char *sim_without_add(uint32_t *parts, const char *list);
+
+void sim_without_apply(uint32_t parts, struct ih_params *params);
+
+/* Are frames without laser left out? */
+bool sim_without_ambient(uint32_t parts);
 
 #endif

@@ -11,7 +11,6 @@
 
 #include "app_write.h"
 #include "replay/hal_lines.h"
-#include "sim_page_parts.h"
 #include "sim_report.h"
 #include "sim_table.h"
 #include "sim_trace.h"

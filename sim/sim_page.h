@@ -17,6 +17,7 @@
 #ifndef SIM_PAGE_H
 #define SIM_PAGE_H
 
+#include <stddef.h>
 #include <stdio.h>
 
 #include "app_record.h"
@@ -35,6 +36,12 @@ struct sim_page {
     size_t dir_count, frame_count; /* so far */
     int error_number;              /* of the first write that failed */
 };
+
+/* The page without its data, as the build folded it (sim/report/fold.cmake): before them and after them. */
+extern const unsigned char sim_page_head[];
+extern const size_t sim_page_head_size;
+extern const unsigned char sim_page_tail[];
+extern const size_t sim_page_tail_size;
 
 /* What there is to say of a frame. */
 struct sim_page_frame {

@@ -8,17 +8,16 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "app_record.h"
+#include "app_rig.h"
+#include "app_view.h"
 #include "hal_file.h"
 #include "replay/hal_replay.h"
 #include "sim_cloud.h"
 #include "sim_dirs.h"
 #include "sim_hint.h"
-#include "app_record.h"
-#include "sim_report.h"
-#include "app_rig.h"
-#include "app_rig_explain.h"
-#include "app_view.h"
 #include "sim_page.h"
+#include "sim_report.h"
 #include "sim_score.h"
 #include "sim_table.h"
 #include "sim_trace.h"

@@ -16,7 +16,6 @@
 #include "linux/hal_events.h"
 #include "linux/hal_gpio.h"
 #include "linux/hal_guard.h"
-#include "linux/hal_guard_end.h"
 #include "linux/hal_iio.h"
 #include "linux/hal_log.h"
 #include "linux/hal_output.h"

@@ -6,7 +6,6 @@
 #include "app_health.h"
 #include "app_recorder.h"
 #include "app_rig.h"
-#include "app_rig_explain.h"
 
 /* A strobe that failed ends the program, and is reported even at its end: the laser may be on. */
 static void watch_fault(struct app_state *state)

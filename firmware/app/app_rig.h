@@ -11,6 +11,7 @@
 #ifndef APP_RIG_H
 #define APP_RIG_H
 
+#include "base/ih_types.h"
 #include "hal.h"
 #include "rig/ih_rig.h"
 #include "rig/ih_rig_blob.h"
@@ -36,5 +37,10 @@ bool app_rig_load(const char *path, struct ih_calibration *calibration, struct h
 /* As ih_rig_blob_encode; a rig that does not say which way is up hangs level, and its blob says so. */
 enum ih_err app_rig_to_blob(const struct ih_calibration *calibration,
                             uint8_t blob[IH_RIG_BLOB_BYTES]);
+
+/* app_rig_explain.c: why the core refuses a calibration, in terms of rig.json. err and bad_slot as from
+ * ih_rig_init. *error names field, value and expectation. */
+void app_rig_explain(const struct ih_calibration *calibration, enum ih_err err, int32_t bad_slot,
+                     struct hal_error *error);
 
 #endif

@@ -1,4 +1,4 @@
-#include "app_rig_explain.h"
+#include "app_rig.h"
 
 #include <math.h>
 

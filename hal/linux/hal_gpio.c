@@ -4,7 +4,6 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "linux/hal_gpio_find.h"
 #include "linux/hal_gpio_lines.h"
 
 /* A line as the configuration has it; lines that are not wanted have no name. */

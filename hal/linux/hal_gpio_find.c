@@ -1,4 +1,4 @@
-#include "linux/hal_gpio_find.h"
+#include "linux/hal_gpio_lines.h"
 
 #include <dirent.h>
 #include <errno.h>

@@ -44,7 +44,7 @@ string(SUBSTRING "${page}" 0 ${split} head)
 math(EXPR split "${split} + ${length}")
 string(SUBSTRING "${page}" ${split} -1 tail)
 
-file(WRITE "${OUT}.new" "/* Made by sim/report/fold.cmake. */\n#include \"sim_page_parts.h\"\n\n")
+file(WRITE "${OUT}.new" "/* Made by sim/report/fold.cmake. */\n#include \"sim_page.h\"\n\n")
 foreach(part head tail)
   string(REGEX REPLACE "(..)" "0x\\1," bytes "${${part}}")
   file(APPEND "${OUT}.new"

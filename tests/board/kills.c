@@ -24,7 +24,6 @@
 #include "app_laser.h"
 #include "linux/hal_clock.h"
 #include "linux/hal_guard.h"
-#include "linux/hal_guard_end.h"
 
 #define PROCESSES (1 + HAL_GUARD_COUNT)
 #define CAP_US 200000

@@ -70,7 +70,7 @@ PARTS = {
                    "hal/linux/hal_descriptors.c", "hal/linux/hal_signals.c"] +
                   ["firmware/app/app_%s.c" % name for name in
                    "config frame health laser live log loop phase record rig_explain rig_text state status text view write".split()],
-                  "app_laser app_frame app_phase hal_limits hal_guard hal_guard_child hal_guard_end hal_guard_page "
+                  "app_laser app_frame app_phase hal_limits hal_guard hal_guard_child hal_guard_page "
                   "hal_signals hal_descriptors".split(),
                   "laser loop phase limits guard signals".split(),
                   ["-D_GNU_SOURCE", "-Ifirmware/core", "-Ifirmware/app", "-Ihal"], True),

@@ -5,7 +5,7 @@
 #include "app_config.h"
 #include "app_settings.h"
 
-#include "fuzz_file.h"
+#include "fuzz.h"
 
 #define ARGUMENTS_MAX 16
 

@@ -3,7 +3,7 @@
 #include <string.h>
 
 #include "fuzz_check.h"
-#include "fuzz_tables.h"
+#include "fuzz_rig.h"
 
 #define NORMALISED_MAX_Q28 INT32_MAX
 #define CHANGES_MAX 64

@@ -1,4 +1,4 @@
-#include "fuzz_file.h"
+#include "fuzz.h"
 
 #include <string.h>
 #include <sys/mman.h>

@@ -3,7 +3,7 @@
  * every check is reached. */
 #include <string.h>
 
-#include "app_rig_explain.h"
+#include "app_rig.h"
 
 #include "fuzz_rig.h"
 #include "rig/ih_camera.h"

@@ -8,7 +8,7 @@
 #include "replay/hal_replay.h"
 #include "sim_truth.h"
 
-#include "fuzz_file.h"
+#include "fuzz.h"
 
 #define PIXELS 4
 

@@ -3,7 +3,7 @@
 #include <string.h>
 
 #include "fuzz_check.h"
-#include "fuzz_tables.h"
+#include "fuzz_rig.h"
 
 #define MIN_Q8 (1 << 8)
 #define MAX_Q8 (IH_SURFACE_DEPTH_MAX_MM << 8)

@@ -5,7 +5,7 @@
 
 #include "rd_range.h"
 
-#include "fuzz_file.h"
+#include "fuzz.h"
 
 #define SIDE 64
 #define HEADER "P5 64 64 65535\n"

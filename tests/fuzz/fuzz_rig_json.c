@@ -5,9 +5,8 @@
 #include <string.h>
 
 #include "app_rig.h"
-#include "app_rig_explain.h"
 
-#include "fuzz_file.h"
+#include "fuzz.h"
 #include "fuzz_rig.h"
 
 #define TEXT_MAX ((size_t)256 * 1024)

@@ -3,7 +3,7 @@
 #include <string.h>
 
 #include "fuzz_check.h"
-#include "fuzz_tables.h"
+#include "fuzz_rig.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {

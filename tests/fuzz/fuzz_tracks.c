@@ -2,9 +2,9 @@
  * step in time, detections, views. */
 #include <string.h>
 
-#include "fuzz_check.h"
-#include "fuzz_tables.h"
 #include "detect/ih_score.h"
+#include "fuzz_check.h"
+#include "fuzz_rig.h"
 
 #define FRAMES_MAX 32
 #define FRONT_MIN_MM 150

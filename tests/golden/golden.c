@@ -2,9 +2,7 @@
 
 #include <string.h>
 
-#include "golden_file.h"
 #include "golden_hash.h"
-#include "golden_inner.h"
 #include "golden_scene.h"
 #include "hal_text.h"
 

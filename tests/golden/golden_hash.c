@@ -1,7 +1,5 @@
 #include "golden_hash.h"
 
-#include "golden_fnv.h"
-
 /* Structs that golden_add_words takes: a member of another type would change these sizes. */
 #define WORDS(n) ((n) * sizeof(int32_t))
 _Static_assert(sizeof(struct ih_line) == WORDS(9), "ih_line");

@@ -1,8 +1,7 @@
-#include "golden_inner.h"
+#include "golden_hash.h"
 
 #include <stddef.h>
 
-#include "golden_fnv.h"
 #include "detect/ih_score.h"
 
 void golden_inner_start(struct ih_exposure *exposure)

@@ -5,7 +5,7 @@
 #include <string.h>
 
 #include "app_rig.h"
-#include "golden_file.h"
+#include "golden.h"
 #include "hal_file.h"
 #include "replay/hal_pgm.h"
 

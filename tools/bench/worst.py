@@ -3,7 +3,7 @@
 
     worst.py [--frames N] --plugin-header DIR
 
-Frames that are drawn to cost much (worst_frames.h) with the paper's rig and with a wide one, rendered sequences
+Frames that are drawn to cost much (bench_worst.c) with the paper's rig and with a wide one, rendered sequences
 of all kinds, and rendered ones seen through the other rig. Instructions are those of a 64-bit ARM build
 (gcc -O2: a Cortex-A53's), counted in QEMU by worst_count.c, so they are the same each time. The worst frame
 is written to build/bench/worst.pgm, and what its stages take on x86-64 is counted by callgrind.

@@ -82,7 +82,8 @@ board_package() {
     for script in postinst prerm postrm; do
         install -m 755 "packaging/$script" "$package/DEBIAN/$script"
     done
-    install -m 644 packaging/conffiles "$package/DEBIAN/conffiles"
+    echo /etc/isohead/isohead.conf >"$package/DEBIAN/conffiles"
+    chmod 644 "$package/DEBIAN/conffiles"
 }
 
 tools_package() {

@@ -9,6 +9,7 @@ Exit status 1 if any is above the limit, 2 if there was nothing to compare.
 """
 
 import argparse
+import json
 import os
 import sys
 
@@ -17,7 +18,23 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # for 144 unknowns threads o
 import numpy as np
 
 import surface
-import traces
+
+
+def sequences(root):
+    """(name, directory) of every directory under root, or root itself, that holds frames."""
+    for directory, below, files in os.walk(root):
+        below.sort()
+        if any(f.endswith(".json") for f in files):
+            name = os.path.relpath(directory, root)
+            yield os.path.basename(os.path.abspath(root)) if name == "." else name, directory
+
+
+def frames(directory):
+    """(stem, trace) of every frame in the order of their names."""
+    for name in sorted(os.listdir(directory)):
+        if name.endswith(".json"):
+            with open(os.path.join(directory, name), encoding="utf-8") as file:
+                yield name[:-len(".json")], json.load(file)
 
 
 def column(table, key, fraction_bits):
@@ -46,7 +63,7 @@ def differences(frame, ridge, huber_mm):
 def check_sequence(name, directory, arguments):
     """The differences of all frames with a surface, one row each."""
     rows, without = [], 0
-    for stem, frame in traces.frames(directory):
+    for stem, frame in frames(directory):
         if not frame.get("surface", {}).get("valid"):
             without += 1
             continue
@@ -73,7 +90,7 @@ def main():
     arguments = parser.parse_args()
     rows = []
     for root in arguments.trace_dir:
-        for name, directory in traces.sequences(root):
+        for name, directory in sequences(root):
             rows += check_sequence(name, directory, arguments)
     if not rows:
         print("no frame with a surface found", file=sys.stderr)

@@ -1,7 +1,7 @@
 /* rd_company - people on their seats, from frame to frame.
  * person, turning: somebody is there except in four of fifty frames (at the start, in the middle or at the end, by
  * seed). empty: the seat alone. visit: a seat, an office chair or an open room that somebody comes to and leaves
- * again (rd_visit.h); the truth has the head when somebody is there and the head's centre lies within the pattern by
+ * again (rd_motion.h); the truth has the head when somebody is there and the head's centre lies within the pattern by
  * at least one dot's distance, as seen from the projector: rows and columns -8 .. 8 of -9 .. 9.
  * two: two people side by side, 450 to 650 mm apart, the second up to 200 mm behind; the head to find is the one
  * nearest the camera. They come and go as in the scene person.
@@ -15,7 +15,6 @@
 #include "rd_rig.h"
 #include "rd_room.h"
 #include "rd_scene.h"
-#include "rd_visit.h"
 
 #define RD_SITTERS_MAX 2
 

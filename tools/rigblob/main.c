@@ -8,7 +8,6 @@
 #include <unistd.h>
 
 #include "app_rig.h"
-#include "app_rig_explain.h"
 #include "hal_file.h"
 #include "rig/ih_rig_blob.h"
 

@@ -6,7 +6,7 @@ _Static_assert((-3 >> 1) == -2, "right shift of negative values must be arithmet
 
 /* 1 / sqrt(m) in Q15 at m = 64/256, 65/256 .. 256/256, lowered by the distance of a chord between two
  * entries from the curve: an interpolated value is never too large, and at most 2^-13.7 too small.
- * Written by tools/oracle/isqrt_table.py. */
+ * Written by tools/oracle/root_tables.py. */
 const uint16_t ih_root_inverse_q15[193] = {
     65534, 65028, 64533, 64050, 63577, 63115, 62663, 62220, 61786, 61362, 60946, 60538, 60138,
     59747, 59362, 58986, 58616, 58253, 57897, 57547, 57203, 56866, 56534, 56208, 55888, 55573,

@@ -6,7 +6,7 @@
 
 /* sqrt(m) * 2^16 for m in 2^30 .. 2^32, at the beginning of each span of 2^22 and at the end of the last one. With g the
  * position in a span, 0 .. 65535, and rise the difference to the next value >> 6, value + (rise * g >> 10) has a relative
- * error below 2^-21.8. Written by tools/oracle/multiquadric_table.py. */
+ * error below 2^-21.8. Written by tools/oracle/root_tables.py. */
 static const uint32_t ih_multiquadric_roots_q16[] = {
     2147484207, 2151674420, 2155856488, 2160030460, 2164196382, 2168354300, 2172504260, 2176646308,
     2180780489, 2184906848, 2189025428, 2193136274, 2197239429, 2201334935, 2205422837, 2209503175,

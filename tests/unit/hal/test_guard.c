@@ -21,7 +21,6 @@
 #include "ih_test.h"
 #include "linux/hal_guard.h"
 #include "linux/hal_guard_child.h"
-#include "linux/hal_guard_end.h"
 #include "linux/hal_signals.h"
 
 #define LONG_MS (1000 * 1000)
