@@ -287,8 +287,12 @@ static uint64_t hash_pose(const struct isohead *head)
         const struct ih_pose_belief *belief = &pose->belief[i];
         hash = golden_add_word(hash, belief->track_id);
         hash = golden_add(hash, belief->time_us, 8);
-        hash = golden_add_words(hash, belief->yaw_q16, sizeof belief->yaw_q16);
-        hash = golden_add_words(hash, belief->pitch_q16, sizeof belief->pitch_q16);
+        for (int32_t k = 0; k < IH_POSE_RATES * IH_POSE_YAWS; k++) {
+            hash = golden_add(hash, belief->yaw_q16[k], 2);
+        }
+        for (int32_t k = 0; k < IH_POSE_PITCHES; k++) {
+            hash = golden_add(hash, belief->pitch_q16[k], 2);
+        }
     }
     for (int32_t i = 0; i < head->result.entry_count; i++) {
         const struct ih_head_pose *said = &head->result.entry[i].pose;

@@ -9,67 +9,123 @@
 /* A belief that has spread so far says nothing any more. */
 #define STEPS_MAX 12
 
+/* How often a head turns to -X, hardly, and to +X before anything is known of it. */
+static const uint16_t rate_prior_q16[IH_POSE_RATES] = {15664, 34208, 15664};
+
 void ih_pose_params_default(struct ih_pose_params *params)
 {
     *params = (struct ih_pose_params){
         .points_min = 16,
-        .yaw = {.follow_q8 = 115, .leak_q16 = 13107, .side_q16 = 16384},
+        .yaw = {.follow_q8 = 154, .leak_q16 = 6554, .side_q16 = 6554},
         .pitch = {.follow_q8 = 90, .leak_q16 = 16384, .side_q16 = 13107},
         .step_us = 25000,
+        .rate_q16 = 16384, /* 150 degrees a second */
+        .rate_side_q16 = 3277,
         .span = 2,
-        .known_min_q16 = 49152, /* 0.75 */
+        .known_min_q16 = 51118, /* 0.78 */
         .sigma_max_mdeg = 22000,
         .yaw_sigma_mdeg = 4000,
         .pitch_sigma_mdeg = 2000,
     };
 }
 
+static int32_t yaw_prior_q16(int32_t rate, int32_t yaw)
+{
+    return (int32_t)ih_mul_shift(ih_pose_prior_q16[yaw], rate_prior_q16[rate], 16);
+}
+
 void ih_pose_begin(int32_t track_id, int64_t time_us, struct ih_pose_belief *out)
 {
     out->track_id = track_id;
     out->time_us = time_us;
-    for (int32_t i = 0; i < IH_POSE_YAWS; i++) {
-        out->yaw_q16[i] = ih_pose_prior_q16[i];
+    for (int32_t rate = 0; rate < IH_POSE_RATES; rate++) {
+        for (int32_t i = 0; i < IH_POSE_YAWS; i++) {
+            out->yaw_q16[rate * IH_POSE_YAWS + i] = (uint16_t)yaw_prior_q16(rate, i);
+        }
     }
     for (int32_t i = 0; i < IH_POSE_PITCHES; i++) {
         out->pitch_q16[i] = ih_pose_prior_q16[IH_POSE_YAWS + i];
     }
 }
 
-/* One step of spreading: part_q16 of each cell goes to each neighbour; yaws are a ring, pitches have ends. */
-static void spread(int32_t *cell_q16, int32_t count, int32_t part_q16, bool is_ring)
+/* A line of cells, `stride` apart. */
+struct cells {
+    uint16_t *cell_q16;
+    int32_t count, stride;
+    bool is_ring; /* else it has ends */
+};
+
+/* One step of spreading: so much of each cell goes to the one after it, and to the one before. */
+static void spread(const struct cells *cells, int64_t forth_q16, int64_t back_q16)
 {
+    uint16_t *cell_q16 = cells->cell_q16;
     const int32_t first = cell_q16[0];
-    int32_t before = is_ring ? cell_q16[count - 1] : first;
-    for (int32_t i = 0; i < count; i++) {
-        const int32_t here = cell_q16[i];
-        const int32_t end = is_ring ? first : here;
-        const int32_t after = i + 1 < count ? cell_q16[i + 1] : end;
-        const int64_t gained = (int64_t)before + after - 2 * (int64_t)here;
-        cell_q16[i] = here + (int32_t)ih_mul_shift(gained, part_q16, 16);
+    int32_t before = cells->is_ring ? cell_q16[(cells->count - 1) * cells->stride] : first;
+    for (int32_t i = 0; i < cells->count; i++) {
+        const int32_t here = cell_q16[0];
+        const int32_t end = cells->is_ring ? first : here;
+        const int32_t after = i + 1 < cells->count ? cell_q16[cells->stride] : end;
+        const int64_t gained_q32 =
+            ((int64_t)before - here) * forth_q16 + ((int64_t)after - here) * back_q16;
+        *cell_q16 = (uint16_t)(here + ih_shift_round(gained_q32, 16));
         before = here;
+        cell_q16 += cells->stride;
     }
 }
 
 /* The sum is 1 again: roundings add up. */
-static void normalise(int32_t *cell_q16, int32_t count)
+static void normalise(uint16_t *cell_q16, int32_t count)
 {
     int64_t sum = 0;
     for (int32_t i = 0; i < count; i++) {
         sum += cell_q16[i];
     }
     for (int32_t i = 0; i < count && sum > 0; i++) {
-        cell_q16[i] = (int32_t)ih_div_round((int64_t)cell_q16[i] * 65536, sum);
+        const int64_t part_q16 = ih_div_round((int64_t)cell_q16[i] * 65536, sum);
+        cell_q16[i] = (uint16_t)ih_min_s64(part_q16, UINT16_MAX);
     }
 }
 
-static void mix(int32_t *cell_q16, const uint16_t *with_q16, int32_t count, int32_t part_q16)
+/* Both in Q16. */
+static void mix(uint16_t *cell, int64_t with, int32_t part)
 {
-    for (int32_t i = 0; i < count; i++) {
-        const int64_t difference = with_q16[i] - (int64_t)cell_q16[i];
-        cell_q16[i] += (int32_t)ih_mul_shift(difference, part_q16, 16);
+    *cell = (uint16_t)(*cell + ih_mul_shift(with - *cell, part, 16));
+}
+
+static void leak(struct ih_pose_belief *belief, const struct ih_pose_params *params)
+{
+    for (int32_t rate = 0; rate < IH_POSE_RATES; rate++) {
+        for (int32_t i = 0; i < IH_POSE_YAWS; i++) {
+            mix(&belief->yaw_q16[rate * IH_POSE_YAWS + i], yaw_prior_q16(rate, i),
+                params->yaw.leak_q16);
+        }
     }
-    normalise(cell_q16, count);
+    for (int32_t i = 0; i < IH_POSE_PITCHES; i++) {
+        mix(&belief->pitch_q16[i], ih_pose_prior_q16[IH_POSE_YAWS + i], params->pitch.leak_q16);
+    }
+    normalise(belief->yaw_q16, IH_POSE_RATES * IH_POSE_YAWS);
+    normalise(belief->pitch_q16, IH_POSE_PITCHES);
+}
+
+/* So much of a step's spreading, and of how far a turn goes in a step. */
+static void spread_all(struct ih_pose_belief *belief, const struct ih_pose_params *params,
+                       int64_t step_q16)
+{
+    const int64_t yaw_q16 = ih_mul_shift(params->yaw.side_q16, step_q16, 16);
+    const int64_t pitch_q16 = ih_mul_shift(params->pitch.side_q16, step_q16, 16);
+    const int64_t rate_q16 = ih_mul_shift(params->rate_side_q16, step_q16, 16);
+    const int64_t rotated_q16 = ih_mul_shift(params->rate_q16, step_q16, 16);
+    for (int32_t rate = 0; rate < IH_POSE_RATES; rate++) {
+        const struct cells yaws = {&belief->yaw_q16[rate * IH_POSE_YAWS], IH_POSE_YAWS, 1, true};
+        spread(&yaws, yaw_q16 + (rate == IH_POSE_RATES - 1 ? rotated_q16 : 0),
+               yaw_q16 + (rate == 0 ? rotated_q16 : 0));
+    }
+    for (int32_t i = 0; i < IH_POSE_YAWS; i++) {
+        const struct cells rates = {&belief->yaw_q16[i], IH_POSE_RATES, IH_POSE_YAWS, false};
+        spread(&rates, rate_q16, rate_q16);
+    }
+    const struct cells pitches = {belief->pitch_q16, IH_POSE_PITCHES, 1, false};
+    spread(&pitches, pitch_q16, pitch_q16);
 }
 
 void ih_pose_wait(struct ih_pose_belief *belief, const struct ih_pose_params *params,
@@ -80,37 +136,42 @@ void ih_pose_wait(struct ih_pose_belief *belief, const struct ih_pose_params *pa
     const int64_t steps = (passed_us + params->step_us - 1) / params->step_us;
     for (int64_t i = 0; i < steps; i++) {
         /* All steps are alike, and together of the time that has passed. */
-        const int64_t whole_us = steps * params->step_us;
-        const int64_t yaw_q16 = ih_div_round(passed_us * params->yaw.side_q16, whole_us);
-        const int64_t pitch_q16 = ih_div_round(passed_us * params->pitch.side_q16, whole_us);
-        spread(belief->yaw_q16, IH_POSE_YAWS, (int32_t)yaw_q16, true);
-        spread(belief->pitch_q16, IH_POSE_PITCHES, (int32_t)pitch_q16, false);
+        spread_all(belief, params, ih_div_round(passed_us * 65536, steps * params->step_us));
     }
-    mix(belief->yaw_q16, ih_pose_prior_q16, IH_POSE_YAWS, params->yaw.leak_q16);
-    mix(belief->pitch_q16, &ih_pose_prior_q16[IH_POSE_YAWS], IH_POSE_PITCHES,
-        params->pitch.leak_q16);
+    leak(belief, params);
     belief->time_us = time_us;
 }
 
-/* Multiply by the likelihoods to a power, relative to the largest; the sum is 1 again. */
-static void multiply(int32_t *cell_q16, const int32_t *log2_q10, int32_t count, int32_t power_q8)
+static int32_t max_of(const int32_t *value, int32_t count)
 {
-    int32_t max = log2_q10[0];
+    int32_t max = value[0];
     for (int32_t i = 1; i < count; i++) {
-        max = ih_max_s32(max, log2_q10[i]);
+        max = ih_max_s32(max, value[i]);
     }
+    return max;
+}
+
+/* Multiply by the likelihoods to a power, relative to the largest; the sum is 1 again. Cells are `rows` times as many. */
+static void multiply(uint16_t *cell_q16, int32_t rows, const int32_t *log2_q10, int32_t count,
+                     int32_t power_q8)
+{
+    const int32_t max = max_of(log2_q10, count);
     for (int32_t i = 0; i < count; i++) {
         const int64_t below_q16 = ((int64_t)max - log2_q10[i]) * power_q8 >> 2;
-        cell_q16[i] = (int32_t)ih_mul_shift(cell_q16[i], ih_power_q16(below_q16), 16);
+        const int64_t times_q16 = ih_power_q16(below_q16);
+        for (int32_t row = 0; row < rows; row++) {
+            uint16_t *cell = &cell_q16[row * count + i];
+            *cell = (uint16_t)ih_mul_shift(*cell, times_q16, 16);
+        }
     }
-    normalise(cell_q16, count);
+    normalise(cell_q16, rows * count);
 }
 
 void ih_pose_learn(struct ih_pose_belief *belief, const struct ih_pose_likelihood *likelihood,
                    int32_t yaw_power_q8, int32_t pitch_power_q8)
 {
-    multiply(belief->yaw_q16, likelihood->log2_q10, IH_POSE_YAWS, yaw_power_q8);
-    multiply(belief->pitch_q16, &likelihood->log2_q10[IH_POSE_YAWS], IH_POSE_PITCHES,
+    multiply(belief->yaw_q16, IH_POSE_RATES, likelihood->log2_q10, IH_POSE_YAWS, yaw_power_q8);
+    multiply(belief->pitch_q16, 1, &likelihood->log2_q10[IH_POSE_YAWS], IH_POSE_PITCHES,
              pitch_power_q8);
 }
 
@@ -194,15 +255,24 @@ static int32_t sigma_mdeg(int64_t variance_mdeg2, int64_t own_mdeg)
 void ih_pose_conclude(const struct ih_pose_belief *belief, const struct ih_pose_params *params,
                       const int32_t centre_mm_q8[3], struct ih_head_pose *out)
 {
+    int32_t yaw_q16[IH_POSE_YAWS]; /* at any rate */
+    int32_t pitch_q16[IH_POSE_PITCHES];
     int32_t best = 0;
-    for (int32_t i = 1; i < IH_POSE_YAWS; i++) {
-        best = belief->yaw_q16[i] > belief->yaw_q16[best] ? i : best;
+    for (int32_t i = 0; i < IH_POSE_YAWS; i++) {
+        yaw_q16[i] = 0;
+        for (int32_t rate = 0; rate < IH_POSE_RATES; rate++) {
+            yaw_q16[i] += belief->yaw_q16[rate * IH_POSE_YAWS + i];
+        }
+        best = yaw_q16[i] > yaw_q16[best] ? i : best;
+    }
+    for (int32_t i = 0; i < IH_POSE_PITCHES; i++) {
+        pitch_q16[i] = belief->pitch_q16[i];
     }
     const int32_t first = (best - params->span + IH_POSE_YAWS) % IH_POSE_YAWS;
-    const struct moments yaw = moments_of(belief->yaw_q16, first, 2 * params->span + 1,
-                                          IH_POSE_YAWS, IH_POSE_YAW_STEP_MDEG);
+    const struct moments yaw =
+        moments_of(yaw_q16, first, 2 * params->span + 1, IH_POSE_YAWS, IH_POSE_YAW_STEP_MDEG);
     const struct moments pitch =
-        moments_of(belief->pitch_q16, 0, IH_POSE_PITCHES, IH_POSE_PITCHES, IH_POSE_PITCH_STEP_MDEG);
+        moments_of(pitch_q16, 0, IH_POSE_PITCHES, IH_POSE_PITCHES, IH_POSE_PITCH_STEP_MDEG);
     /* Cells are from -180 degrees on; the camera's direction is that from the head. */
     const int64_t towards_mdeg = ih_atan2_mdeg(centre_mm_q8[0], centre_mm_q8[2]);
     const int64_t first_mdeg =
@@ -273,7 +343,9 @@ void ih_pose_update(struct ih_pose *pose, const struct ih_pose_params *params,
         if (!entry->is_predicted && ih_pose_look_features(points, rig, &detection->head,
                                                           params->points_min, &scratch->look)) {
             ih_pose_look_weigh(&ih_pose_means, &scratch->look, &scratch->likelihood);
-            ih_pose_learn(belief, &scratch->likelihood, is_new ? 256 : params->yaw.follow_q8,
+            const int32_t yaw_q8 = is_new ? 256 : params->yaw.follow_q8;
+            ih_pose_learn(belief, &scratch->likelihood,
+                          (int32_t)ih_mul_shift(yaw_q8, entry->frame_probability_q16, 16),
                           is_new ? 256 : params->pitch.follow_q8);
         }
         ih_pose_conclude(belief, params, detection->head.centre_mm_q8, &entry->pose);

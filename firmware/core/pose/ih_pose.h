@@ -3,19 +3,21 @@
  * In:     points, rig, detections, tracks, the time of the frame; what was believed before.
  * Out:    in each entry of the result that is a head: yaw, pitch, a standard deviation each, and whether they are
  *         known.
- * Method: a belief for each track, probabilities of IH_POSE_YAWS yaws and IH_POSE_PITCHES pitches. It begins as the
- *         distribution that was learnt from. Time spreads it, in steps in proportion to the time, and mixes
- *         in leak of the beginning, so that a frame may overrule what was before. A detected head multiplies it
- *         by the frame's likelihood (ih_pose_look), to the power follow once there was a frame before: errors of
- *         successive frames are alike. A predicted head only spreads. The yaw is the mean over span cells on both
+ * Method: a belief for each track, probabilities of IH_POSE_YAWS yaws at IH_POSE_RATES rates of turning, and of
+ *         IH_POSE_PITCHES pitches. It begins as the distribution that was learnt from. Time turns it by the rates
+ *         and spreads it, in steps in proportion to the time, and mixes in leak of the beginning, so that a
+ *         frame may overrule what was before. A detected head multiplies it by the frame's likelihood
+ *         (ih_pose_look), to the power follow once there was a frame before: errors of successive frames are
+ *         alike. Of yaw, the power is also that of the head's probability by this frame: a head that may be none, or is cut off,
+ *         is where looks err most. A predicted head only spreads. The yaw is the mean over span cells on both
  *         sides of the most probable one, known when these hold known_min of the belief and the standard deviation
  *         is at most sigma_max; front and back under long hair make two peaks, and it is not known. The pitch is
  *         the mean. Beliefs are of the level frame (ih_level), what is said of the camera's; pitches are within
  *         40 degrees of the level.
- * Overflow: probabilities are at most 2^16 in Q16; a power of 2 is 2^16 in Q16: products 2^32, sums of 24 2^36.6.
+ * Overflow: probabilities are at most 2^16 in Q16; a power of 2 is 2^16 in Q16: products 2^32, sums of 72 2^38.2.
  *         A cell's distance from the mean is at most 60000 mdeg, its square times 2^16 2^47.8.
  * Error:  probabilities within 2^-10, angles within 0.2 degrees of the float64 reference.
- * Cost:   ih_pose_look for each head that is detected; 12 steps of 33 cells at most.
+ * Cost:   ih_pose_look for each head that is detected; 12 steps of 153 cells at most.
  */
 #ifndef IH_POSE_H
 #define IH_POSE_H
@@ -30,6 +32,9 @@
 #include "tracks/ih_result.h"
 #include "tracks/ih_tracks.h"
 
+/* Towards -X, none, towards +X. */
+#define IH_POSE_RATES 3
+
 struct ih_pose_axis {
     int32_t follow_q8; /* power of a frame's likelihood after another */
     int32_t leak_q16;  /* of the beginning in what was believed before; above 0 */
@@ -39,8 +44,10 @@ struct ih_pose_axis {
 struct ih_pose_params {
     int32_t points_min; /* on the head, for a look */
     struct ih_pose_axis yaw, pitch;
-    int32_t step_us; /* of time that one step of spreading stands for */
-    int32_t span;    /* cells on each side of the most probable yaw; 0 .. IH_POSE_YAWS / 2 - 1 */
+    int32_t step_us;       /* of time that one step of spreading stands for */
+    int32_t rate_q16;      /* of a cell that a turning head's yaw goes on in a step; up to a half */
+    int32_t rate_side_q16; /* of a rate goes to each neighbour in a step; up to a quarter */
+    int32_t span; /* cells on each side of the most probable yaw; 0 .. IH_POSE_YAWS / 2 - 1 */
     int32_t known_min_q16;
     int32_t sigma_max_mdeg;
     int32_t yaw_sigma_mdeg, pitch_sigma_mdeg; /* of what a belief does not know of; below 2^17 */
@@ -48,7 +55,8 @@ struct ih_pose_params {
 
 struct ih_pose_belief {
     int32_t track_id;
-    int32_t yaw_q16[IH_POSE_YAWS], pitch_q16[IH_POSE_PITCHES]; /* probabilities */
+    /* Probabilities, the yaws of one rate after those of another; a certain one is the largest number. */
+    uint16_t yaw_q16[IH_POSE_RATES * IH_POSE_YAWS], pitch_q16[IH_POSE_PITCHES];
     int64_t time_us;
 };
 
