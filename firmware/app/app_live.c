@@ -1,5 +1,6 @@
 #include "app_live.h"
 
+#include <stdlib.h>
 #include <string.h>
 
 #include "app_write.h"
@@ -128,6 +129,17 @@ static void write_contours(struct app_write *write, struct isohead *head, void (
     app_write_close(write, ']');
 }
 
+/* Clockwise: the side of the picture that is nearest to where up is comes to the top. */
+static int32_t rotation_deg(const int32_t up_q30[3])
+{
+    const int64_t right = up_q30[0];
+    const int64_t down = up_q30[1];
+    if (llabs(right) > llabs(down)) {
+        return right > 0 ? 270 : 90;
+    }
+    return down > 0 ? 180 : 0;
+}
+
 static void write_text(struct app_live *live, struct app_write *write, void (*pause)(void))
 {
     app_write_open(write, '{');
@@ -135,6 +147,7 @@ static void write_text(struct app_live *live, struct app_write *write, void (*pa
     app_write_int_field(write, "width", live->width);
     app_write_int_field(write, "height", live->height);
     app_write_int_field(write, "scale", scale_of(live));
+    app_write_int_field(write, "rotate_deg", rotation_deg(live->head.rig.calibration.up_q30));
     write_dots(write, &live->head);
     pause();
     write_contours(write, &live->head, pause);

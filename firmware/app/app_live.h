@@ -4,12 +4,13 @@
  * app_live_put copies: the samples as they are, every stage's outputs, the record. It is all that the
  * loop does for the view, and only for a frame that a viewer waits for. app_live_write, in the other
  * process, computes the contours again, as the core does not keep them, and writes
- *     {"frame":N,"width":W,"height":H,"scale":K,"dots":[[u,v],..],"labelled":[index,..],
+ *     {"frame":N,"width":W,"height":H,"scale":K,"rotate_deg":R,"dots":[[u,v],..],"labelled":[index,..],
  *      "contours":[{"level_mm":Z,"closed":true,"px":[u,v,u,v,..]},..]}
  *     the record, as it was sent
  *     the picture, W / K by H / K samples of 8 bits, row by row without gaps
- * with line ends between the three. Positions are frame pixels as in a record, those of contours
- * whole. A sample is the mean of K by K of the camera's; K is such that a row is shorter than
+ * with line ends between the three. The picture is upright when it is rotated clockwise by R, which is 0, 90, 180
+ * or 270. Positions are frame pixels as in a record, those of contours whole. A sample is the mean of K by K of
+ * the camera's; K is such that a row is shorter than
  * APP_LIVE_ROW_MAX: sending costs the board more than all else here, and dots, contours and ellipses
  * are drawn from numbers anyway.
  */

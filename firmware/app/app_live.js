@@ -86,6 +86,43 @@ function drawEllipse(hypothesis) {
   context.stroke();
 }
 
+// Where a face looks, as far as it is across the picture, from the head's centre on.
+function drawArrow(hypothesis, unit) {
+  const [yaw, pitch] = hypothesis.pose_deg.map((degrees) => degrees * Math.PI / 180);
+  const [u, v] = hypothesis.pixel, reach = 1.6 * hypothesis.axes_px[0];
+  const aside = reach * Math.sin(yaw) * Math.cos(pitch), down = -reach * Math.sin(pitch);
+  const length = Math.hypot(aside, down), barb = Math.min(12 * unit, length / 2);
+  const along = Math.atan2(down, aside);
+  context.beginPath();
+  context.arc(u, v, 3 * unit, 0, 2 * Math.PI);
+  context.moveTo(u, v);
+  context.lineTo(u + aside, v + down);
+  for (const angle of [along + 2.6, along - 2.6]) {
+    context.moveTo(u + aside, v + down);
+    context.lineTo(u + aside + barb * Math.cos(angle), v + down + barb * Math.sin(angle));
+  }
+  for (const [width, style] of [[6, "#000"], [3, "#ffb000"]]) {
+    context.lineWidth = width * unit;
+    context.strokeStyle = style;
+    context.stroke();
+  }
+}
+
+// Below the place, where no arrow begins; upright, however the picture is rotated.
+function drawText(text, [u, v], view, unit) {
+  context.save();
+  context.translate(u, v);
+  context.rotate(-view.rotate_deg * Math.PI / 180);
+  context.font = `bold ${16 * unit}px system-ui, sans-serif`;
+  context.textAlign = "center";
+  context.lineWidth = 4 * unit;
+  context.strokeStyle = "#000";
+  context.strokeText(text, 0, 24 * unit);
+  context.fillStyle = "#ffb000";
+  context.fillText(text, 0, 24 * unit);
+  context.restore();
+}
+
 function drawHypotheses(view, unit) {
   const heads = new Set(view.record.heads);
   view.record.hypotheses.forEach((hypothesis, index) => {
@@ -97,30 +134,34 @@ function drawHypotheses(view, unit) {
     drawEllipse(hypothesis);
     context.setLineDash([]);
     if (isHead) {
-      context.font = `bold ${16 * unit}px system-ui, sans-serif`;
-      context.textAlign = "center";
-      const text = `${Math.round(hypothesis.distance_mm)} mm`;
-      context.lineWidth = 4 * unit;
-      context.strokeStyle = "#000";
-      context.strokeText(text, hypothesis.pixel[0], hypothesis.pixel[1]);
-      context.fillStyle = "#ffb000";
-      context.fillText(text, hypothesis.pixel[0], hypothesis.pixel[1]);
+      if (hypothesis.pose_deg) drawArrow(hypothesis, unit);
+      drawText(`${Math.round(hypothesis.distance_mm)} mm`, hypothesis.pixel, view, unit);
     }
   });
 }
 
+// From the frame's pixels to the canvas, by how far the picture is rotated.
+const upright = ({ width, height, rotate_deg }) => ({
+  0: [1, 0, 0, 1, 0, 0],
+  90: [0, 1, -1, 0, height, 0],
+  180: [-1, 0, 0, -1, width, height],
+  270: [0, -1, 1, 0, 0, width],
+}[rotate_deg]);
+
 function draw() {
   if (last === null) return;
-  if (canvas.width !== last.width || canvas.height !== last.height) {
-    canvas.width = last.width;
-    canvas.height = last.height;
-    canvas.style.setProperty("--ratio", `${last.width / last.height}`);
+  const isAside = last.rotate_deg % 180 !== 0;
+  const width = isAside ? last.height : last.width, height = isAside ? last.width : last.height;
+  if (canvas.width !== width || canvas.height !== height) {
+    canvas.width = width;
+    canvas.height = height;
+    canvas.style.setProperty("--ratio", `${width / height}`);
   }
   // A pixel of the screen in pixels of the frame, so that lines are as thick on a phone.
   const unit = Math.max(1, canvas.width / (canvas.clientWidth || canvas.width));
-  context.setTransform(1, 0, 0, 1, 0, 0);
+  context.setTransform(...upright(last));
   drawSamples(last);
-  context.setTransform(1, 0, 0, 1, 0.5, 0.5); // a pixel's centre is at whole numbers
+  context.translate(0.5, 0.5); // a pixel's centre is at whole numbers
   context.lineWidth = unit;
   if (element("show-contours").checked && last.contours.length > 0) drawContours(last);
   if (element("show-dots").checked) drawDots(last, unit);
@@ -133,7 +174,8 @@ function headText(record) {
   }
   const head = record.hypotheses[record.head];
   const score = head.score === undefined ? "" : `, score ${head.score.toFixed(3)}`;
-  return `${head.distance_mm.toFixed(1)} mm away, centre ${head.centre_mm.map((mm) => mm.toFixed(1)).join(", ")} mm${score}` +
+  const pose = head.pose_deg ? `, looks ${head.pose_deg.map((degrees) => degrees.toFixed(0)).join("° aside, ")}° up` : "";
+  return `${head.distance_mm.toFixed(1)} mm away, centre ${head.centre_mm.map((mm) => mm.toFixed(1)).join(", ")} mm${score}${pose}` +
     (head.predicted ? ", predicted" : "");
 }
 

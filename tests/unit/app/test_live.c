@@ -107,7 +107,7 @@ static void check_picture(size_t length)
 static void a_frame_is_text_record_and_picture(void)
 {
     static const char start[] =
-        "{\"frame\":7,\"width\":752,\"height\":582,\"scale\":2,"
+        "{\"frame\":7,\"width\":752,\"height\":582,\"scale\":2,\"rotate_deg\":0,"
         "\"dots\":[[1.00,2.00],[3.50,0.25]],\"labelled\":[1],\"contours\":[";
     const size_t length = write_frame();
 
@@ -121,6 +121,27 @@ static void a_frame_is_text_record_and_picture(void)
     TEST_ASSERT_TRUE(contour != NULL && contour < line_end);
     TEST_ASSERT_TRUE(strstr(contour, "\"closed\":true,\"px\":[") < line_end);
     TEST_ASSERT_GREATER_THAN_INT(frame.height / SCALE / 8, pause_count);
+}
+
+/* What is up in the picture comes to the top: on its left after a quarter clockwise. */
+static void the_side_that_is_up_comes_to_the_top(void)
+{
+    static const struct {
+        double up[3];
+        int rotate_deg;
+    } cases[] = {{{0, 0, 0}, 0},         {{0, -1, 0}, 0},         {{0, -0.6, -0.8}, 0},
+                 {{0.28, -0.96, 0}, 0},  {{0.6, -0.64, 0.48}, 0}, {{1, 0, 0}, 270},
+                 {{0.8, 0, 0.6}, 270},   {{-1, 0, 0}, 90},        {{-0.64, 0.6, 0.48}, 90},
+                 {{-0.64, -0.6, 0}, 90}, {{0, 1, 0}, 180},        {{0.28, 0.96, 0}, 180}};
+    for (size_t i = 0; i < IH_TEST_COUNT(cases); i++) {
+        char said[32];
+        for (int axis = 0; axis < 3; axis++) {
+            head.rig.calibration.up_q30[axis] = (int32_t)(cases[i].up[axis] * (1 << 30));
+        }
+        check_picture(write_frame());
+        (void)snprintf(said, sizeof said, "\"rotate_deg\":%d,\"dots\"", cases[i].rotate_deg);
+        TEST_ASSERT_NOT_NULL(strstr((const char *)answer, said));
+    }
 }
 
 static void samples_of_two_bytes_give_the_same_picture(void)
@@ -185,6 +206,7 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(a_frame_is_text_record_and_picture);
+    RUN_TEST(the_side_that_is_up_comes_to_the_top);
     RUN_TEST(samples_of_two_bytes_give_the_same_picture);
     RUN_TEST(a_frame_without_a_surface_has_no_contours);
     RUN_TEST(an_answer_that_has_no_room_is_none);
