@@ -62,14 +62,14 @@ static void spread(const struct cells *cells, int64_t forth_q16, int64_t back_q1
     const int32_t first = cell_q16[0];
     int32_t before = cells->is_ring ? cell_q16[(cells->count - 1) * cells->stride] : first;
     for (int32_t i = 0; i < cells->count; i++) {
-        const int32_t here = cell_q16[0];
+        const int32_t at = i * cells->stride;
+        const int32_t here = cell_q16[at];
         const int32_t end = cells->is_ring ? first : here;
-        const int32_t after = i + 1 < cells->count ? cell_q16[cells->stride] : end;
+        const int32_t after = i + 1 < cells->count ? cell_q16[at + cells->stride] : end;
         const int64_t gained_q32 =
             ((int64_t)before - here) * forth_q16 + ((int64_t)after - here) * back_q16;
-        *cell_q16 = (uint16_t)(here + ih_shift_round(gained_q32, 16));
+        cell_q16[at] = (uint16_t)(here + ih_shift_round(gained_q32, 16));
         before = here;
-        cell_q16 += cells->stride;
     }
 }
 
