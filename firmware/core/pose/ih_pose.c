@@ -22,7 +22,7 @@ void ih_pose_params_default(struct ih_pose_params *params)
         .rate_q16 = 16384, /* 150 degrees a second */
         .rate_side_q16 = 3277,
         .span = 2,
-        .known_min_q16 = 51118, /* 0.78 */
+        .known_min_q16 = 53740, /* 0.82 */
         .sigma_max_mdeg = 22000,
         .yaw_sigma_mdeg = 4000,
         .pitch_sigma_mdeg = 2000,
