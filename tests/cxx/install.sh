@@ -55,7 +55,10 @@ awk '/^```c$/ { on = 1; next } /^```$/ { if (on) exit } on' "$root/docs/porting.
 } >rig_blob.h
 cp program.c program.cpp
 for frame in "$frames"/*.pgm; do tail -c 437664 "$frame"; done >samples
-"$work/moved/bin/host_sim" --json "$frames" >records.jsonl
+# Without frames.jsonl frames are 40 ms apart, as those of the program.
+mkdir plain
+cp "$frames"/*.pgm "$frames/rig.json" plain
+"$work/moved/bin/host_sim" --json plain >records.jsonl
 /usr/bin/python3 - >heads <<'END'
 import json
 for line in open("records.jsonl", encoding="utf-8"):
