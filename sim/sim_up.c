@@ -143,13 +143,15 @@ static void try_up(struct trial *trial, struct isohead *head, struct ih_calibrat
     }
 }
 
-/* The best one, or NULL. */
-static const struct trial *find_best(const struct trial trials[TRIALS])
+/* The best one of a side or of all sides, or NULL. */
+static const struct trial *find_best(const struct trial trials[TRIALS], int first_side,
+                                     int end_side)
 {
     const struct trial *best = NULL;
     for (int i = 0; i < TRIALS; i++) {
         const struct trial *trial = &trials[i];
-        const bool is_good = !trial->is_over && trial->hit_count >= FRAMES_MIN;
+        const bool is_one = i % SIDES >= first_side && i % SIDES < end_side;
+        const bool is_good = is_one && !trial->is_over && trial->hit_count >= FRAMES_MIN;
         if (is_good && (best == NULL || trial->hit_count > best->hit_count ||
                         (trial->hit_count == best->hit_count &&
                          trial->probability_sum_q16 > best->probability_sum_q16))) {
@@ -157,6 +159,16 @@ static const struct trial *find_best(const struct trial trials[TRIALS])
         }
     }
     return best;
+}
+
+/* Most cameras have the picture's top up: a head that lies on its side looks much like one. */
+static const struct trial *find_likely(const struct trial trials[TRIALS])
+{
+    const struct trial *best = find_best(trials, 0, SIDES);
+    const struct trial *top = find_best(trials, 0, 1);
+    const bool is_top_near =
+        top != NULL && 4 * top->probability_sum_q16 >= 3 * best->probability_sum_q16;
+    return is_top_near ? top : best;
 }
 
 /* A frame of the sample with every up that may still be right. */
@@ -194,7 +206,7 @@ void sim_up_report(const struct sim_up *up, const struct sim_up_source *source,
     for (int32_t i = 0; i < up->sample_count; i++) {
         try_frame(trials, up, up->sample[i], source, &rig);
     }
-    const struct trial *best = find_best(trials);
+    const struct trial *best = find_likely(trials);
     if (best == NULL || !has_moved(best)) {
         return;
     }
