@@ -166,9 +166,10 @@ static const struct trial *find_likely(const struct trial trials[TRIALS])
 {
     const struct trial *best = find_best(trials, 0, SIDES);
     const struct trial *top = find_best(trials, 0, 1);
-    const bool is_top_near =
-        top != NULL && 4 * top->probability_sum_q16 >= 3 * best->probability_sum_q16;
-    return is_top_near ? top : best;
+    if (best == NULL || top == NULL) {
+        return best;
+    }
+    return 4 * top->probability_sum_q16 >= 3 * best->probability_sum_q16 ? top : best;
 }
 
 /* A frame of the sample with every up that may still be right. */
