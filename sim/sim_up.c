@@ -143,15 +143,14 @@ static void try_up(struct trial *trial, struct isohead *head, struct ih_calibrat
     }
 }
 
-/* The best one of a side or of all sides, or NULL. */
-static const struct trial *find_best(const struct trial trials[TRIALS], int first_side,
-                                     int end_side)
+/* The best one of so many sides, the top first, or NULL. */
+static const struct trial *find_best(const struct trial trials[TRIALS], int side_count)
 {
     const struct trial *best = NULL;
     for (int i = 0; i < TRIALS; i++) {
         const struct trial *trial = &trials[i];
-        const bool is_one = i % SIDES >= first_side && i % SIDES < end_side;
-        const bool is_good = is_one && !trial->is_over && trial->hit_count >= FRAMES_MIN;
+        const bool is_good =
+            i % SIDES < side_count && !trial->is_over && trial->hit_count >= FRAMES_MIN;
         if (is_good && (best == NULL || trial->hit_count > best->hit_count ||
                         (trial->hit_count == best->hit_count &&
                          trial->probability_sum_q16 > best->probability_sum_q16))) {
@@ -164,8 +163,8 @@ static const struct trial *find_best(const struct trial trials[TRIALS], int firs
 /* Most cameras have the picture's top up: a head that lies on its side looks much like one. */
 static const struct trial *find_likely(const struct trial trials[TRIALS])
 {
-    const struct trial *best = find_best(trials, 0, SIDES);
-    const struct trial *top = find_best(trials, 0, 1);
+    const struct trial *best = find_best(trials, SIDES);
+    const struct trial *top = find_best(trials, 1);
     if (best == NULL || top == NULL) {
         return best;
     }

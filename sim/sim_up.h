@@ -4,9 +4,9 @@
  * Out:    one line of advice on standard error with the "up" to enter in the rig file; the exit status stays.
  * Method: only when fewer than a tenth of at least 5 such frames have a head: up to SIM_UP_SAMPLES of them, evenly spread,
  *         are read again and looked at one by one, without tracks, as if the camera hung otherwise: each side of the picture
- *         up, and level or looking up or down by 30 or 45 degrees. The up with the most heads, then the most probable ones
- *         (or one with the picture's top up that has three quarters of its probability),
- *         is named when at least half of the sample, and at least 5 frames, have one, and these heads move: a thing in an
+ *         up, and level or looking up or down by 30 or 45 degrees. The up with the most heads, then the most probable ones,
+ *         is named; or the best one that has the picture's top up, where its heads are three quarters as probable in sum.
+ *         At least half of the sample, and at least 5 frames, must have a head, and these heads must move: a thing in an
  *         empty room may look like a head from another side.
  * Cost:   nothing for a run with heads; else at most half of 20 times the sample and a bit, in frames.
  */

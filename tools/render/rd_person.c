@@ -41,7 +41,6 @@ void rd_person_make(struct rd_person *person, struct rd_rng *rng)
     draw_looks(person, rng);
 }
 
-/* Mostly dark, some brown, some grey or fair. */
 static void make_child(struct rd_person *p, struct rd_rng *rng)
 {
     p->head_axes_mm = rd_scale(p->head_axes_mm, rd_rng_uniform(rng, 0.90, 0.94));
@@ -112,6 +111,7 @@ void rd_gear_dress(struct rd_person *p, struct rd_scene *scene, struct rd_rng *r
     p->gear.dark = rd_scene_paint(scene, &dark);
 }
 
+/* Mostly dark, some brown, some grey or fair. */
 static double hair_albedo(struct rd_rng *rng)
 {
     double kind = rd_rng_uniform(rng, 0.0, 1.0);

@@ -8,8 +8,8 @@
  *         and spreads it, in steps in proportion to the time, and mixes in leak of the beginning, so that a
  *         frame may overrule what was before. A detected head multiplies it by the frame's likelihood
  *         (ih_pose_look), to the power follow once there was a frame before: errors of successive frames are
- *         alike. Of yaw, the power is also that of the head's probability by this frame: a head that may be none, or is cut off,
- *         is where looks err most. A predicted head only spreads. The yaw is the mean over span cells on both
+ *         alike. The power of yaw is multiplied by how probable the head is by this frame: where it may be none, or
+ *         is cut off, looks err most. A predicted head only spreads. The yaw is the mean over span cells on both
  *         sides of the most probable one, known when these hold known_min of the belief and the standard deviation
  *         is at most sigma_max; front and back under long hair make two peaks, and it is not known. The pitch is
  *         the mean. Beliefs are of the level frame (ih_level), what is said of the camera's; pitches are within
