@@ -16,8 +16,9 @@ NONE = -1
 SEMI_MM = np.array([78.0, 113, 98])
 START_SPEED = 300.0
 POSITION_MAX, SPEED_MAX = 500.0, 3000.0
-LOGIT_MAX, GATE_LOGIT, SURE_LOGIT, CHOICE_LOGIT = 6.0, 4.0, 2.0, 3.0
-UNSURE_FACTOR2 = 4.0
+LOGIT_MAX, GATE_LOGIT, CHOICE_LOGIT = 6.0, 4.0, 3.0
+# Below these log-odds a detection's variance is so many times as large.
+UNSURE_FACTORS = ((2.0, 4.0), (1.0, 25.0), (0.0, 49.0))
 FAST_LOGIT = 1024.0
 AXES_FRACTION = 0.25
 SLOW_S = 0.3
@@ -84,9 +85,8 @@ class Track:
             self.covariance[1, 0] *= fraction
 
     def correct(self, detection):
-        noise = Params.measured_mm**2
-        if not clear(detection.logit - SURE_LOGIT, 0.002):
-            noise *= UNSURE_FACTOR2
+        noise = Params.measured_mm**2 * max([1.0] + [factor for limit, factor in UNSURE_FACTORS
+                                                     if not clear(detection.logit - limit, 0.002)])
         see = np.array([[1.0, 0.0]])
         gain = self.covariance @ see.T / (see @ self.covariance @ see.T + noise)
         self.state = self.state + gain @ (detection.position[None] - see @ self.state)

@@ -14,9 +14,14 @@
 #define GATE_LOGIT_Q10 (4 << 10)
 /* A detection beyond the gate is worse than all within one. */
 #define FAST_LOGIT_Q10 (1 << 20)
-/* The variance of a detection below SURE_LOGIT is UNSURE_FACTOR2 times as large. */
+/* The less a detection looks like a head, the more of it is a hand or a chest, which would take the track along: below
+ * each of these log-odds its variance is so many times that of a sure one. */
 #define SURE_LOGIT_Q10 (2 << 10)
-#define UNSURE_FACTOR2 4
+#define UNSURE_FACTOR 4
+#define DOUBTFUL_LOGIT_Q10 (1 << 10)
+#define DOUBTFUL_FACTOR 25
+#define HARDLY_LOGIT_Q10 0
+#define HARDLY_FACTOR 49
 /* Two tracks nearer than this follow the same head. */
 #define SAME_MM 80
 /* Two heads within this ellipsoid are one person's: another one has no room there. */
@@ -187,8 +192,15 @@ static bool fits(const struct ih_tracks *tracks, const struct ih_tracks_params *
 
 static int64_t variance_q8(const struct ih_detection *detection, int32_t measured_mm)
 {
-    int64_t sure_q8 = (int64_t)measured_mm * measured_mm * 256;
-    return detection->logit_q10 < SURE_LOGIT_Q10 ? sure_q8 * UNSURE_FACTOR2 : sure_q8;
+    int64_t factor = 1;
+    if (detection->logit_q10 < HARDLY_LOGIT_Q10) {
+        factor = HARDLY_FACTOR;
+    } else if (detection->logit_q10 < DOUBTFUL_LOGIT_Q10) {
+        factor = DOUBTFUL_FACTOR;
+    } else if (detection->logit_q10 < SURE_LOGIT_Q10) {
+        factor = UNSURE_FACTOR;
+    }
+    return (int64_t)measured_mm * measured_mm * 256 * factor;
 }
 
 static void average_logit(struct ih_track *track, int32_t logit_q10, int32_t memory_q16)

@@ -21,6 +21,7 @@
  *           track that is no head yet ends with the first frame without a detection, and so does the
  *           younger of two tracks within 80 mm.
  *        4. starts tracks with the remaining detections above start_logit, while there is room.
+ *        A detection moves its track by the less, the less it looks like a head: it may be a hand before it.
  *        A track's log-odds are a running mean of its detections'. A head ends as one only when the mean says
  *        so clearly, below drop_logit: what moves on smoothly from a head is more probably one than a new thing
  *        that looks the same.
