@@ -39,14 +39,13 @@ static inline ih_i16 respond_two(const struct ih_bandpass_rows *rows, const uint
     const struct ih_u16_two middle = ih_u16_two_load(&rows->middle[u]);
     const struct ih_u16_two sides =
         ih_u16_two_add(ih_u16_two_load(&rows->above[u]), ih_u16_two_load(&rows->below[u]));
-    const struct ih_u16_two sum = ih_u16_two_add(ih_u16_two_add(sides, middle), middle);
+    const struct ih_u16_two sum = ih_u16_two_add_twice(sides, middle);
     const struct ih_u16_two box =
         ih_u16_two_add(ih_u16_two_add(ih_u16_two_load(&nine[u]), ih_u16_two_load(&nine[u + SIDE])),
                        ih_u16_two_load(&nine[u + 2 * SIDE]));
     const ih_i16 low = respond_lanes(sum.low, box.low);
     const ih_i16 high = respond_lanes(sum.high, box.high);
-    ih_i16_store(&response[u], low);
-    ih_i16_store(&response[u + IH_I16_LANES], high);
+    ih_u16_two_store((uint16_t *)&response[u], (struct ih_u16_two){(ih_u16)low, (ih_u16)high});
     return ih_i16_max(low, high);
 }
 

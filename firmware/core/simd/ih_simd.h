@@ -84,12 +84,6 @@ static inline struct ih_u16_two ih_u16_two_load(const uint16_t *from)
     return (struct ih_u16_two){ih_u16_load(from), ih_u16_load(&from[IH_I16_LANES])};
 }
 
-static inline void ih_u16_two_store(uint16_t *to, struct ih_u16_two two)
-{
-    ih_u16_store(to, two.low);
-    ih_u16_store(&to[IH_I16_LANES], two.high);
-}
-
 static inline struct ih_u16_two ih_u16_two_add(struct ih_u16_two a, struct ih_u16_two b)
 {
     return (struct ih_u16_two){a.low + b.low, a.high + b.high};
@@ -99,6 +93,20 @@ static inline struct ih_u16_two ih_u16_two_sub(struct ih_u16_two a, struct ih_u1
 {
     return (struct ih_u16_two){a.low - b.low, a.high - b.high};
 }
+
+#ifndef __aarch64__
+static inline void ih_u16_two_store(uint16_t *to, struct ih_u16_two two)
+{
+    ih_u16_store(to, two.low);
+    ih_u16_store(&to[IH_I16_LANES], two.high);
+}
+
+/* a + 2 b */
+static inline struct ih_u16_two ih_u16_two_add_twice(struct ih_u16_two a, struct ih_u16_two b)
+{
+    return ih_u16_two_add(ih_u16_two_add(a, b), b);
+}
+#endif
 
 static inline ih_i16 ih_i16_load(const int16_t *from)
 {

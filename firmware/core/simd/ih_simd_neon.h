@@ -90,6 +90,28 @@ static inline ih_i16 ih_i16_abs(ih_i16 a)
     return (ih_i16)vabsq_s16((int16x8_t)a);
 }
 
+#ifdef __aarch64__
+
+/* By name: gcc 12 joins two loads of vectors, but never two stores. */
+static inline void ih_u16_two_store(uint16_t *to, struct ih_u16_two two)
+{
+#ifdef __clang__
+    ih_u16_store(to, two.low);
+    ih_u16_store(&to[IH_I16_LANES], two.high);
+#else
+    typedef uint16_t both __attribute__((vector_size(32), aligned(2), may_alias));
+    __asm__("stp %q1, %q2, %0" : "=Ump"(*(both *)to) : "w"(two.low), "w"(two.high));
+#endif
+}
+
+static inline struct ih_u16_two ih_u16_two_add_twice(struct ih_u16_two a, struct ih_u16_two b)
+{
+    return (struct ih_u16_two){(ih_u16)vmlaq_n_u16((uint16x8_t)a.low, (uint16x8_t)b.low, 2),
+                               (ih_u16)vmlaq_n_u16((uint16x8_t)a.high, (uint16x8_t)b.high, 2)};
+}
+
+#endif
+
 static inline struct ih_u16_two ih_u16_two_load_u8(const uint8_t *from)
 {
     const uint8x16_t bytes = vld1q_u8(from);

@@ -160,6 +160,8 @@ static void two_vectors_of_16_bits(void)
     CHECK(ih_u16, uint16_t, ih_u16_two_add(two_of(a, b), two_of(b, b)).high, (2 * y));
     CHECK(ih_u16, uint16_t, ih_u16_two_sub(two_of(a, b), two_of(b, a)).low, (x - y));
     CHECK(ih_u16, uint16_t, ih_u16_two_sub(two_of(a, b), two_of(b, a)).high, (y - x));
+    CHECK(ih_u16, uint16_t, ih_u16_two_add_twice(two_of(a, b), two_of(b, a)).low, (x + 2 * y));
+    CHECK(ih_u16, uint16_t, ih_u16_two_add_twice(two_of(a, b), two_of(b, a)).high, (y + 2 * x));
     fill(bytes, sizeof bytes);
     CHECK(ih_u16, uint16_t, ih_u16_two_load_u8(bytes).low, (bytes[k]));
     CHECK(ih_u16, uint16_t, ih_u16_two_load_u8(bytes).high, (bytes[k + IH_I16_LANES]));
