@@ -89,21 +89,24 @@ def check_symbols(objects):
 def check_data(objects):
     """Bytes of the read-only sections, by kind."""
     total = {"code": 0, "constants": 0}
-    for path in objects:
-        for line in run(["size", "-A", path]).splitlines():
-            part = line.split()
-            if len(part) != 3 or not part[1].isdigit():
-                continue
-            name, size = part[0], int(part[1])
-            if WRITABLE.match(name) and size > 0:
-                raise Broken("data: %s has %d bytes of %s" % (os.path.basename(path), size, name))
-            if name.startswith(".text"):
-                total["code"] += size
-            elif name.startswith(".rodata"):
-                total["constants"] += size
-        for line in run(["nm", "--format=posix", path]).splitlines():
-            if len(line.split()) >= 2 and line.split()[1] in "CcDdBb":
-                raise Broken("data: %s: %s is writable" % (os.path.basename(path), line.split()[0]))
+    path = None
+    for line in run(["size", "-A"] + objects).splitlines():
+        part = line.split()
+        if line.endswith(":") and len(part) == 2:
+            path = part[0]
+        if len(part) != 3 or not part[1].isdigit():
+            continue
+        name, size = part[0], int(part[1])
+        if WRITABLE.match(name) and size > 0:
+            raise Broken("data: %s has %d bytes of %s" % (os.path.basename(path), size, name))
+        if name.startswith(".text"):
+            total["code"] += size
+        elif name.startswith(".rodata"):
+            total["constants"] += size
+    for line in run(["nm", "-A", "--format=posix"] + objects).splitlines():
+        path, *part = line.split()
+        if len(part) >= 2 and part[1] in "CcDdBb":
+            raise Broken("data: %s: %s is writable" % (os.path.basename(path.rstrip(":")), part[0]))
     return total
 
 

@@ -67,46 +67,49 @@ static void take_blob(double x, double y, double radius, double stretch, double 
     take(vertex, count, closed);
 }
 
-/* Of points from..from + steps closed by their chord, from triangles about their mean. */
+/* Of points from..from + steps closed by their chord. */
 struct measured {
     double chord, area, trace, shape, ratio;
 };
 
-static struct measured measure(int32_t from, int32_t steps)
+/* Of triangles from the first point to each edge: the chord's own is empty, so that one more point adds one triangle. */
+struct sums {
+    double area, x, y, xx, xy, yy;
+};
+
+static void add_triangle(struct sums *sums, double ax, double ay, double bx, double by)
 {
-    double x[IH_ARCS_POINTS_MAX] = {0}, y[IH_ARCS_POINTS_MAX] = {0};
-    double mx = 0, my = 0, area = 0, cx = 0, cy = 0, xx = 0, xy = 0, yy = 0, root;
+    const double t = (ax * by - bx * ay) / 2;
+
+    sums->area += t;
+    sums->x += t * (ax + bx) / 3;
+    sums->y += t * (ay + by) / 3;
+    sums->xx += t * (ax * ax + ax * bx + bx * bx) / 6;
+    sums->yy += t * (ay * ay + ay * by + by * by) / 6;
+    sums->xy += t * (2 * ax * ay + ax * by + bx * ay + 2 * bx * by) / 12;
+}
+
+/* Where sums are those of one step less. */
+static struct measured measure(struct sums *sums, int32_t from, int32_t steps)
+{
+    const int32_t last = from + steps;
+    const double x = ih_test_from_q(arcs.x_q8[last] - arcs.x_q8[from], 8);
+    const double y = ih_test_from_q(arcs.y_q8[last] - arcs.y_q8[from], 8);
+    double cx, cy, xx, xy, yy, root;
     struct measured out;
-    int32_t k;
 
-    for (k = 0; k <= steps; k++) {
-        x[k] = ih_test_from_q(arcs.x_q8[from + k], 8);
-        y[k] = ih_test_from_q(arcs.y_q8[from + k], 8);
-        mx += x[k] / (steps + 1);
-        my += y[k] / (steps + 1);
-    }
-    for (k = 0; k <= steps; k++) {
-        const int32_t next = k < steps ? k + 1 : 0;
-        const double ax = x[k] - mx, ay = y[k] - my, bx = x[next] - mx, by = y[next] - my;
-        const double t = (ax * by - bx * ay) / 2; /* triangle a, b, origin */
-
-        area += t;
-        cx += t * (ax + bx) / 3;
-        cy += t * (ay + by) / 3;
-        xx += t * (ax * ax + ax * bx + bx * bx) / 6;
-        yy += t * (ay * ay + ay * by + by * by) / 6;
-        xy += t * (2 * ax * ay + ax * by + bx * ay + 2 * bx * by) / 12;
-    }
-    cx /= area;
-    cy /= area;
-    xx = xx / area - cx * cx;
-    xy = xy / area - cx * cy;
-    yy = yy / area - cy * cy;
+    add_triangle(sums, ih_test_from_q(arcs.x_q8[last - 1] - arcs.x_q8[from], 8),
+                 ih_test_from_q(arcs.y_q8[last - 1] - arcs.y_q8[from], 8), x, y);
+    cx = sums->x / sums->area;
+    cy = sums->y / sums->area;
+    xx = sums->xx / sums->area - cx * cx;
+    xy = sums->xy / sums->area - cx * cy;
+    yy = sums->yy / sums->area - cy * cy;
     root = sqrt((xx - yy) * (xx - yy) / 4 + xy * xy);
-    out.chord = hypot(x[steps] - x[0], y[steps] - y[0]);
-    out.area = area;
+    out.chord = hypot(x, y);
+    out.area = sums->area;
     out.trace = xx + yy;
-    out.shape = 4 * acos(-1.0) * sqrt(fmax(0, xx * yy - xy * xy)) / area;
+    out.shape = 4 * acos(-1.0) * sqrt(fmax(0, xx * yy - xy * xy)) / sums->area;
     out.ratio = sqrt((out.trace / 2 + root) / fmax(out.trace / 2 - root, 1e-9));
     return out;
 }
@@ -125,9 +128,11 @@ static void compare_all(bool simple, struct arc_counts *counts)
     int32_t from, k;
 
     for (from = 0; from < points; from++) {
+        struct sums sums = {0};
+
         TEST_ASSERT_TRUE(may_be[from] >> points == 0);
         for (k = 1; k < points && from + k < arcs.count; k++) {
-            const struct measured m = measure(from, k);
+            const struct measured m = measure(&sums, from, k);
             const double chord_max =
                 ih_test_from_q(params.chord_max_q16, 16) * ih_test_from_q(arcs.length_q8[k], 8);
             const bool kept = (may_be[from] >> k & 1) != 0;

@@ -7,20 +7,10 @@
 #include "rig/ih_level.h"
 
 #include "ih_test.h"
+#include "ih_test_look.h"
 
 #define RADIANS 0.017453292519943295 /* of a degree */
 
-struct vector_look {
-    int32_t kind, length_px_mm_q8, unit_q28;
-    struct ih_ellipsoid head;
-    const struct ih_point *point;
-    const double *feature, *log2; /* of all features and outputs */
-};
-
-#include "pose.inc"
-
-static struct ih_points points;
-static struct ih_rig rig;
 static struct ih_pose_likelihood likelihood;
 static struct ih_pose_params params;
 static struct ih_pose pose;
@@ -46,14 +36,6 @@ void setUp(void)
 
 void tearDown(void)
 {
-}
-
-static void use_look(const struct vector_look *vector)
-{
-    rig.calibration.kind = (enum ih_rig_kind)vector->kind;
-    rig.line[IH_SLOTS / 2].length_px_mm_q8 = vector->length_px_mm_q8;
-    points.field.unit_q28 = vector->unit_q28;
-    memcpy(points.point, vector->point, sizeof points.point);
 }
 
 static int64_t sum_of(const uint16_t *cell, int32_t count)

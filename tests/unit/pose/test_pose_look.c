@@ -4,18 +4,8 @@
 #include "pose/ih_pose_look.h"
 
 #include "ih_test.h"
+#include "ih_test_look.h"
 
-struct vector_look {
-    int32_t kind, length_px_mm_q8, unit_q28;
-    struct ih_ellipsoid head;
-    const struct ih_point *point;
-    const double *feature, *log2; /* of all features and outputs */
-};
-
-#include "pose.inc"
-
-static struct ih_points points;
-static struct ih_rig rig;
 static struct ih_pose_look_scratch look;
 static struct ih_pose_means means;
 static struct ih_pose_likelihood likelihood;
@@ -47,14 +37,6 @@ static void fill_means(void)
             means.square_q5[i][k] = (int8_t)((i * 53 + at * 29 + i * at) % 41 - 20);
         }
     }
-}
-
-static void use_look(const struct vector_look *vector)
-{
-    rig.calibration.kind = (enum ih_rig_kind)vector->kind;
-    rig.line[IH_SLOTS / 2].length_px_mm_q8 = vector->length_px_mm_q8;
-    points.field.unit_q28 = vector->unit_q28;
-    memcpy(points.point, vector->point, sizeof points.point);
 }
 
 /* A step of a feature is 1/32; a point at the border of its range may fall on either side of it, so that the points of
