@@ -32,7 +32,9 @@
 #define DEPTH_NEW_RAD_Q30 937007 /* 0.05 degrees */
 /* Beyond this a rig has not moved but is another one. */
 #define ROTATION_MAX_RAD_Q30 28110244 /* 1.5 degrees */
-#define FOCAL_MAX_Q30 16106127        /* 1.5 % */
+/* Four times the prior's 0.2 degrees: wrong motions take much of it, and more from their own labels. */
+#define DEPTH_MAX_RAD_Q30 14992130
+#define FOCAL_MAX_Q30 16106127 /* 1.5 % */
 #define MARGIN_PX_Q12 (4 * 4096)
 /* At first so many of the dots must lie on the lines that nobody searches; later three quarters of what was the
  * best since a search. */
@@ -44,7 +46,7 @@
 #define VAIN_FRAMES 4
 #define PAUSE_MAX 8
 /* So long what a search found is questioned. */
-#define DOUBT_FRAMES_MAX 16
+#define UNSETTLED_FRAMES_MAX 16
 
 static bool is_none(const int32_t moved_px_q12[IH_ALIGN_AXES])
 {
@@ -159,7 +161,9 @@ static bool is_within_limits(const int32_t moved_px_q12[IH_ALIGN_AXES], const st
 {
     bool is_within = true;
     for (int k = 0; k < IH_ALIGN_AXES; k++) {
-        const int32_t max_q30 = k == IH_ALIGN_FOCAL ? FOCAL_MAX_Q30 : ROTATION_MAX_RAD_Q30;
+        const int32_t max_q30 = k == IH_ALIGN_FOCAL   ? FOCAL_MAX_Q30
+                                : k == IH_ALIGN_DEPTH ? DEPTH_MAX_RAD_Q30
+                                                      : ROTATION_MAX_RAD_Q30;
         is_within = is_within && ih_abs_s32(ih_align_rad_q30(moved_px_q12[k], rig)) <= max_q30;
     }
     return is_within;
@@ -220,10 +224,10 @@ static int32_t search(struct ih_align *align, const struct ih_dots *dots, int32_
         excess = try_motion(align, dots, moved_px_q12, enough, rig, rows);
     }
     if (excess >= enough) {
-        if (align->doubt_frames == 0) {
+        if (align->unsettled_frames == 0) {
             memcpy(align->settled_px_q12, before_px_q12, sizeof before_px_q12);
         }
-        align->doubt_frames = 1;
+        align->unsettled_frames = 1;
         align->trusted_q8 = 0;
         note_change(align, before_px_q12[IH_ALIGN_DEPTH], rig);
         forget(align);
@@ -246,7 +250,7 @@ static void question(struct ih_align *align, const struct ih_dots *dots, struct 
     align->excess = try_motion(align, dots, align->settled_px_q12,
                                ih_max_s32(excess_min(rows->dot_count), excess), rig, rows);
     if (align->excess > 0) {
-        align->doubt_frames = 0;
+        align->unsettled_frames = 0;
         align->trusted_q8 = 0;
         note_change(align, before_px_q12, rig);
         forget(align);
@@ -260,17 +264,17 @@ static void question_sometimes(struct ih_align *align, const struct ih_dots *dot
                                struct sight sight, struct ih_rig *rig, struct ih_dot_rows *rows,
                                struct ih_align_scratch *scratch)
 {
-    const int32_t frames = align->doubt_frames;
+    const int32_t frames = align->unsettled_frames;
     if (is_clear(sight)) {
-        align->doubt_frames = 0;
+        align->unsettled_frames = 0;
         return;
     }
-    align->doubt_frames++;
+    align->unsettled_frames++;
     if ((frames & (frames - 1)) == 0) {
         question(align, dots, rig, rows, scratch);
     }
-    if (align->doubt_frames > DOUBT_FRAMES_MAX) {
-        align->doubt_frames = 0;
+    if (align->unsettled_frames > UNSETTLED_FRAMES_MAX) {
+        align->unsettled_frames = 0;
     }
 }
 
@@ -323,7 +327,7 @@ void ih_align_find(struct ih_align *align, const struct ih_dots *dots, struct ih
         }
     } else if (align->is_short) {
         search_depth(align, dots, rig, rows, scratch);
-    } else if (align->doubt_frames > 0) {
+    } else if (align->unsettled_frames > 0) {
         question_sometimes(align, dots, sight, rig, rows, scratch);
     }
     align->is_short = false;

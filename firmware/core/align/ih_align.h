@@ -19,7 +19,7 @@
  *         Where the rig is right nothing changes, to the last bit.
  *         The rotation about the axis across the baseline is depth. Dots show it by the pattern's keystone alone: to
  *         0.02 degrees in a frame of a room, 0.2 where half of the dots are missing.
- * Limits: 12 px across a line, 1 degree about the camera's axis, 1 % of focal length. Not seen: a shift along the
+ * Limits: 12 px across a line, 1 degree about the camera's axis, 0.8 of depth, 1 % of focal length. Not seen: a shift along the
  *         baseline, and of the principal point along it.
  * Cost:   looking and learning 0.12 to 0.15 M instructions, a search 0.6 to 0.8 M (x86-64-v3): docs/performance.md.
  * Error:  against float64 on the same dots: docs/numerics.md.
@@ -75,7 +75,7 @@ struct ih_align {
     int32_t pause;      /* frames until the next one */
     int32_t trusted_q8; /* fraction of the dots on the lines that is good enough */
     /* Frames since a search moved the lines, and where they were before; 0: what it found is not questioned any more. */
-    int32_t doubt_frames, settled_px_q12[IH_ALIGN_AXES];
+    int32_t unsettled_frames, settled_px_q12[IH_ALIGN_AXES];
 };
 
 IH_BEGIN_DECLS
