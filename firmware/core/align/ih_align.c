@@ -241,9 +241,9 @@ static int32_t search(struct ih_align *align, const struct ih_dots *dots, int32_
 }
 
 /* A wrong motion may have had the most dots in the one frame that was searched, and fits the labels that it makes; in other
- * frames the right one has more. */
-static void question(struct ih_align *align, const struct ih_dots *dots, struct ih_rig *rig,
-                     struct ih_dot_rows *rows, struct ih_align_scratch *scratch)
+ * frames the right one has more. Back to the motion before? If not, another search is due. */
+static bool question(struct ih_align *align, const struct ih_dots *dots, struct ih_rig *rig,
+                     struct ih_dot_rows *rows)
 {
     const int32_t excess = excess_of(look(rows, rig, 1));
     const int32_t before_px_q12 = align->moved_px_q12[IH_ALIGN_DEPTH];
@@ -254,28 +254,23 @@ static void question(struct ih_align *align, const struct ih_dots *dots, struct 
         align->trusted_q8 = 0;
         note_change(align, before_px_q12, rig);
         forget(align);
-    } else {
-        align->excess = search(align, dots, excess, rig, rows, scratch);
+        return false;
     }
+    align->excess = excess;
+    return true;
 }
 
 /* After 1, 2, 4, 8 and 16 frames, unless dots can be on no other lines. */
-static void question_sometimes(struct ih_align *align, const struct ih_dots *dots,
-                               struct sight sight, struct ih_rig *rig, struct ih_dot_rows *rows,
-                               struct ih_align_scratch *scratch)
+static bool question_sometimes(struct ih_align *align, const struct ih_dots *dots,
+                               struct sight sight, struct ih_rig *rig, struct ih_dot_rows *rows)
 {
     const int32_t frames = align->unsettled_frames;
-    if (is_clear(sight)) {
+    if (frames == 0 || is_clear(sight)) {
         align->unsettled_frames = 0;
-        return;
+        return false;
     }
-    align->unsettled_frames++;
-    if ((frames & (frames - 1)) == 0) {
-        question(align, dots, rig, rows, scratch);
-    }
-    if (align->unsettled_frames > UNSETTLED_FRAMES_MAX) {
-        align->unsettled_frames = 0;
-    }
+    align->unsettled_frames = (frames + 1) % (UNSETTLED_FRAMES_MAX + 1);
+    return (frames & (frames - 1)) == 0 && question(align, dots, rig, rows);
 }
 
 /* Labels are short where dots lie on their lines, but out of range: a rotation of depth that no plane shows. */
@@ -319,16 +314,18 @@ void ih_align_find(struct ih_align *align, const struct ih_dots *dots, struct ih
         sight = look(rows, rig, 1);
     }
     align->excess = excess_of(sight);
+    bool is_due = false;
     if (!is_where_it_was(align, sight, rows->dot_count)) {
         align->pause--;
-        if (align->pause < 0) {
-            align->excess = search(align, dots, align->excess, rig, rows, scratch);
-            align->trusted_q8 = 0;
-        }
+        is_due = align->pause < 0;
     } else if (align->is_short) {
         search_depth(align, dots, rig, rows, scratch);
-    } else if (align->unsettled_frames > 0) {
-        question_sometimes(align, dots, sight, rig, rows, scratch);
+    } else {
+        is_due = question_sometimes(align, dots, sight, rig, rows);
+    }
+    if (is_due) {
+        align->excess = search(align, dots, align->excess, rig, rows, scratch);
+        align->trusted_q8 = 0;
     }
     align->is_short = false;
     align->trusted_q8 = ih_max_s32(align->trusted_q8, align->excess * 256 / rows->dot_count);
