@@ -265,11 +265,11 @@ static bool question_sometimes(struct ih_align *align, const struct ih_dots *dot
                                struct sight sight, struct ih_rig *rig, struct ih_dot_rows *rows)
 {
     const int32_t frames = align->unsettled_frames;
-    if (frames == 0 || is_clear(sight)) {
+    if (frames == 0 || frames > UNSETTLED_FRAMES_MAX || is_clear(sight)) {
         align->unsettled_frames = 0;
         return false;
     }
-    align->unsettled_frames = (frames + 1) % (UNSETTLED_FRAMES_MAX + 1);
+    align->unsettled_frames = frames + 1; /* not 0 yet: what this frame's search finds is compared with the same motion */
     return (frames & (frames - 1)) == 0 && question(align, dots, rig, rows);
 }
 
