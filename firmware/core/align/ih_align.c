@@ -269,7 +269,8 @@ static bool question_sometimes(struct ih_align *align, const struct ih_dots *dot
         align->unsettled_frames = 0;
         return false;
     }
-    align->unsettled_frames = frames + 1; /* not 0 yet: what this frame's search finds is compared with the same motion */
+    /* Not 0 yet: what this frame's search finds is compared with the same motion. */
+    align->unsettled_frames = frames + 1;
     return (frames & (frames - 1)) == 0 && question(align, dots, rig, rows);
 }
 
