@@ -3,6 +3,7 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "align/ih_align_sigma.h"
 #include "base/ih_fix.h"
 
 /* Fewer dots, or labels, say nothing. */
@@ -29,12 +30,11 @@
 #define KNOCK_SIGMAS 5
 /* Depths from before such a change are of no use. */
 #define DEPTH_NEW_RAD_Q30 937007 /* 0.05 degrees */
-/* What no number of frames shows, about the baseline, of depth, about the camera's axis: 0.015, 0.012, 0.002 degrees. */
-static const int32_t floor_rad_q30[3] = {281102, 224882, 37480};
-#define DEPTH_KNOWN_RAD_Q30 1874016 /* 0.1 degrees */
 /* Beyond this a rig has not moved but is another one. */
 #define ROTATION_MAX_RAD_Q30 28110244 /* 1.5 degrees */
-#define FOCAL_MAX_Q30 16106127        /* 1.5 % */
+/* Four times the prior's 0.2 degrees: wrong motions take much of it, and more from their own labels. */
+#define DEPTH_MAX_RAD_Q30 14992130
+#define FOCAL_MAX_Q30 16106127 /* 1.5 % */
 #define MARGIN_PX_Q12 (4 * 4096)
 /* At first so many of the dots must lie on the lines that nobody searches; later three quarters of what was the
  * best since a search. */
@@ -45,6 +45,8 @@ static const int32_t floor_rad_q30[3] = {281102, 224882, 37480};
 /* After so many searches in vain a pause grows by a frame. */
 #define VAIN_FRAMES 4
 #define PAUSE_MAX 8
+/* So long what a search found is questioned. */
+#define UNSETTLED_FRAMES_MAX 16
 
 static bool is_none(const int32_t moved_px_q12[IH_ALIGN_AXES])
 {
@@ -131,13 +133,17 @@ static struct sight look(const struct ih_dot_rows *rows, const struct ih_rig *ri
     return sight;
 }
 
+static bool is_clear(struct sight sight)
+{
+    return sight.on >= CLEAR_MIN && sight.beside * 5 <= sight.on * 2;
+}
+
 /* Are dots on the lines as they were, or so many that they can be on no others? */
 static bool is_where_it_was(const struct ih_align *align, struct sight sight, int32_t dot_count)
 {
     const int32_t excess = excess_of(sight);
-    const bool is_clear = sight.on >= CLEAR_MIN && sight.beside * 5 <= sight.on * 2;
     const bool is_as_before = excess * 256 / dot_count >= align->trusted_q8 * 3 / 4;
-    return (is_clear || is_as_before) && excess >= excess_min(dot_count);
+    return (is_clear(sight) || is_as_before) && excess >= excess_min(dot_count);
 }
 
 /* What is less than its uncertainty says nothing of depth. A rig that has moved needs less than one that fits. */
@@ -155,7 +161,9 @@ static bool is_within_limits(const int32_t moved_px_q12[IH_ALIGN_AXES], const st
 {
     bool is_within = true;
     for (int k = 0; k < IH_ALIGN_AXES; k++) {
-        const int32_t max_q30 = k == IH_ALIGN_FOCAL ? FOCAL_MAX_Q30 : ROTATION_MAX_RAD_Q30;
+        const int32_t max_q30 = k == IH_ALIGN_FOCAL   ? FOCAL_MAX_Q30
+                                : k == IH_ALIGN_DEPTH ? DEPTH_MAX_RAD_Q30
+                                                      : ROTATION_MAX_RAD_Q30;
         is_within = is_within && ih_abs_s32(ih_align_rad_q30(moved_px_q12[k], rig)) <= max_q30;
     }
     return is_within;
@@ -216,6 +224,11 @@ static int32_t search(struct ih_align *align, const struct ih_dots *dots, int32_
         excess = try_motion(align, dots, moved_px_q12, enough, rig, rows);
     }
     if (excess >= enough) {
+        if (align->unsettled_frames == 0) {
+            memcpy(align->settled_px_q12, before_px_q12, sizeof before_px_q12);
+        }
+        align->unsettled_frames = 1;
+        align->trusted_q8 = 0;
         note_change(align, before_px_q12[IH_ALIGN_DEPTH], rig);
         forget(align);
         return excess;
@@ -225,6 +238,40 @@ static int32_t search(struct ih_align *align, const struct ih_dots *dots, int32_
         ih_dot_rows_fill(dots, rig, rows);
     }
     return excess_before;
+}
+
+/* A wrong motion may have had the most dots in the one frame that was searched, and fits the labels that it makes; in other
+ * frames the right one has more. Back to the motion before? If not, another search is due. */
+static bool question(struct ih_align *align, const struct ih_dots *dots, struct ih_rig *rig,
+                     struct ih_dot_rows *rows)
+{
+    const int32_t excess = excess_of(look(rows, rig, 1));
+    const int32_t before_px_q12 = align->moved_px_q12[IH_ALIGN_DEPTH];
+    align->excess = try_motion(align, dots, align->settled_px_q12,
+                               ih_max_s32(excess_min(rows->dot_count), excess), rig, rows);
+    if (align->excess > 0) {
+        align->unsettled_frames = 0;
+        align->trusted_q8 = 0;
+        note_change(align, before_px_q12, rig);
+        forget(align);
+        return false;
+    }
+    align->excess = excess;
+    return true;
+}
+
+/* After 1, 2, 4, 8 and 16 frames, unless dots can be on no other lines. */
+static bool question_sometimes(struct ih_align *align, const struct ih_dots *dots,
+                               struct sight sight, struct ih_rig *rig, struct ih_dot_rows *rows)
+{
+    const int32_t frames = align->unsettled_frames;
+    if (frames == 0 || frames > UNSETTLED_FRAMES_MAX || is_clear(sight)) {
+        align->unsettled_frames = 0;
+        return false;
+    }
+    /* Not 0 yet: what this frame's search finds is compared with the same motion. */
+    align->unsettled_frames = frames + 1;
+    return (frames & (frames - 1)) == 0 && question(align, dots, rig, rows);
 }
 
 /* Labels are short where dots lie on their lines, but out of range: a rotation of depth that no plane shows. */
@@ -268,14 +315,18 @@ void ih_align_find(struct ih_align *align, const struct ih_dots *dots, struct ih
         sight = look(rows, rig, 1);
     }
     align->excess = excess_of(sight);
+    bool is_due = false;
     if (!is_where_it_was(align, sight, rows->dot_count)) {
         align->pause--;
-        if (align->pause < 0) {
-            align->excess = search(align, dots, align->excess, rig, rows, scratch);
-            align->trusted_q8 = 0;
-        }
+        is_due = align->pause < 0;
     } else if (align->is_short) {
         search_depth(align, dots, rig, rows, scratch);
+    } else {
+        is_due = question_sometimes(align, dots, sight, rig, rows);
+    }
+    if (is_due) {
+        align->excess = search(align, dots, align->excess, rig, rows, scratch);
+        align->trusted_q8 = 0;
     }
     align->is_short = false;
     align->trusted_q8 = ih_max_s32(align->trusted_q8, align->excess * 256 / rows->dot_count);
@@ -386,49 +437,6 @@ static bool is_to_move(const struct ih_align *align, const struct ih_align_sums 
            (state_of(align) == IH_ALIGN_FITS ? MOVE_FIRST_PX_Q12 : MOVE_PX_Q12);
 }
 
-/* One of the five, against where the rig's lines are. */
-static int64_t sigma_of(const struct ih_align *align, int axis, int32_t mean_px_q12,
-                        int32_t sigma_px_q12, const struct ih_rig *rig)
-{
-    const int64_t own = ih_align_rad_q30(sigma_px_q12, rig);
-    const int64_t lag = ih_align_rad_q30(mean_px_q12 - align->moved_px_q12[axis], rig);
-    const int64_t floor = floor_rad_q30[axis];
-    return ih_isqrt_u64((uint64_t)(own * own) + (uint64_t)(lag * lag) + (uint64_t)(floor * floor));
-}
-
-/* Uncertainty about the camera's axes. */
-static void set_sigma(struct ih_align *align, const int32_t mean_px_q12[IH_ALIGN_AXES],
-                      const int32_t sigma_px_q12[IH_ALIGN_AXES], const struct ih_rig *rig)
-{
-    int64_t sigma_rad_q30[3];
-    struct ih_alignment *now = &align->now;
-    for (int k = 0; k < 3; k++) {
-        sigma_rad_q30[k] = sigma_of(align, k, mean_px_q12[k], sigma_px_q12[k], rig);
-    }
-    now->depth_sigma_rad_q30 = ih_saturate_s32(sigma_rad_q30[IH_ALIGN_DEPTH]);
-    now->is_depth_known = now->depth_sigma_rad_q30 <= DEPTH_KNOWN_RAD_Q30;
-    for (int axis = 0; axis < 2; axis++) {
-        const int64_t a =
-            ih_mul_shift(sigma_rad_q30[IH_ALIGN_BASELINE], align->axes.along_q14[axis], 14);
-        const int64_t b =
-            ih_mul_shift(sigma_rad_q30[IH_ALIGN_DEPTH], align->axes.along_q14[1 - axis], 14);
-        now->sigma_rad_q30[axis] =
-            ih_saturate_s32(ih_isqrt_u64((uint64_t)(a * a) + (uint64_t)(b * b)));
-    }
-    now->sigma_rad_q30[2] = ih_saturate_s32(sigma_rad_q30[IH_ALIGN_ROLL]);
-}
-
-int32_t ih_align_depth_sigma_mm_q8(const struct ih_align *align, const struct ih_rig *rig,
-                                   int32_t depth_mm_q8)
-{
-    const int64_t x = rig->calibration.origin_mm_q16[0], y = rig->calibration.origin_mm_q16[1];
-    const int64_t baseline_mm_q16 = (int64_t)ih_isqrt_u64((uint64_t)(x * x + y * y)) + 1;
-    const int64_t depth2_mm2_q8 = ih_mul_shift(depth_mm_q8, depth_mm_q8, 8);
-    const int64_t aside_mm2_q16 =
-        ih_mul_shift(depth2_mm2_q8, align->now.depth_sigma_rad_q30, 30 - 8);
-    return ih_saturate_s32(ih_div_round(aside_mm2_q16 * (1 << 8), baseline_mm_q16));
-}
-
 /* What the labels of a frame say. Where they lie near their lines, one step is enough. */
 static void fit_frame(const struct ih_align *align, const struct ih_align_pairs *pairs,
                       struct ih_align_sums *frame, int32_t frame_px_q12[IH_ALIGN_AXES],
@@ -492,7 +500,7 @@ void ih_align_learn(struct ih_align *align, const struct ih_labels *labels, stru
         note_change(align, before_px_q12, rig);
         align->now.state = state_of(align);
     }
-    set_sigma(align, mean_px_q12, sigma_px_q12, rig);
+    ih_align_set_sigma(align, mean_px_q12, sigma_px_q12, rig);
     if (align->is_depth_new && !was_depth_new) {
         forget(align); /* labels were of another depth, and fewer */
     }

@@ -9,7 +9,9 @@
  *            second slot is looked at, and all of them where these do not show it.
  *         2. If not, search (ih_align_search): back at the file's lines, or around them. The result is taken when more dots
  *            lie on its lines than before. After searches in vain there are pauses of up to 8 frames. If dots lie on
- *            the lines, but beyond the working range, so that labels are short, depth alone is searched for.
+ *            the lines, but beyond the working range, so that labels are short, depth alone is searched for. In one frame
+ *            a wrong motion may have the most dots, and its own labels keep it: 1, 2, 4, 8 and 16 frames after a search
+ *            lines go back to where they were if no fewer dots lie there, or are searched for again.
  *         3. Learn, after the labels: a fit to how far labelled dots lie across their lines, averaged with those of up to 16
  *            frames before. A frame that differs starts the mean anew. The lines move when the mean is 0.1 px off them
  *            (0.05 px once they have moved), or when depth is: 0.04 degrees and 3 times its uncertainty (then 0.01 degrees
@@ -17,7 +19,7 @@
  *         Where the rig is right nothing changes, to the last bit.
  *         The rotation about the axis across the baseline is depth. Dots show it by the pattern's keystone alone: to
  *         0.02 degrees in a frame of a room, 0.2 where half of the dots are missing.
- * Limits: 12 px across a line, 1 degree about the camera's axis, 1 % of focal length. Not seen: a shift along the
+ * Limits: 12 px across a line, 1 degree about the camera's axis, 0.8 of depth, 1 % of focal length. Not seen: a shift along the
  *         baseline, and of the principal point along it.
  * Cost:   looking and learning 0.12 to 0.15 M instructions, a search 0.6 to 0.8 M (x86-64-v3): docs/performance.md.
  * Error:  against float64 on the same dots: docs/numerics.md.
@@ -72,6 +74,8 @@ struct ih_align {
     int32_t vain_count; /* searches that found nothing, one after the other */
     int32_t pause;      /* frames until the next one */
     int32_t trusted_q8; /* fraction of the dots on the lines that is good enough */
+    /* Frames since a search moved the lines, and where they were before; 0: what it found is not questioned any more. */
+    int32_t unsettled_frames, settled_px_q12[IH_ALIGN_AXES];
 };
 
 IH_BEGIN_DECLS

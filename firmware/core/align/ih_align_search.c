@@ -78,7 +78,7 @@ static void collect(const struct ih_align_plane *plane, const struct ih_align_sc
 
 /* Votes of all that was found, against a plane; the best planes. */
 static void vote(const struct ih_align_grid *grid, const struct ih_align_plane *around,
-                 struct ih_align_scratch *scratch, struct ih_align_plane peak[IH_ALIGN_PEAKS])
+                 struct ih_align_scratch *scratch, struct ih_align_plane *peak)
 {
     const int16_t *found_px_q10 = scratch->found_px_q10;
     ih_align_votes_clear(&scratch->at.votes, grid);
@@ -117,6 +117,7 @@ static void search_plane(const int32_t prior_px_q12[IH_ALIGN_AXES], const struct
                                    .bin_count = 2 * BAND_BINS,
                                    .bin_px_q12 = bin_of(rig),
                                    .peak_bins = 2,
+                                   .peak_count = IH_ALIGN_PEAKS,
                                    .step_px_q12 = 3072};
     coarse.column_steps = steps_of(prior_px_q12, slope_q12[middle * IH_GRID],
                                    slope_q12[middle * IH_GRID + IH_GRID - 1], coarse.step_px_q12);
@@ -127,21 +128,22 @@ static void search_plane(const int32_t prior_px_q12[IH_ALIGN_AXES], const struct
                                        .bin_count = 32,
                                        .bin_px_q12 = 819,
                                        .peak_bins = 3,
+                                       .peak_count = 1,
                                        .step_px_q12 = 1638,
                                        .column_steps = 2,
                                        .row_steps = 2,
                                        .depth_steps = 2,
                                        .depth_step_px_q12 =
                                            ih_align_px_q12(DEPTH_STEP_RAD_Q30, rig)};
-    const struct ih_align_plane none = {0};
-    struct ih_align_plane peak[IH_ALIGN_PEAKS], fine_peak[IH_ALIGN_PEAKS];
+    static const struct ih_align_plane none;
+    struct ih_align_plane peak[IH_ALIGN_PEAKS], fine_peak;
     vote(&coarse, &none, scratch, peak);
     best->score = 0;
     /* A plane with less than half of the best one's score is not tried. */
     for (int32_t i = 0; i < IH_ALIGN_PEAKS && 2 * peak[i].score > peak[0].score; i++) {
-        vote(&fine, &peak[i], scratch, fine_peak);
-        if (fine_peak[0].score > best->score) {
-            *best = fine_peak[0];
+        vote(&fine, &peak[i], scratch, &fine_peak);
+        if (fine_peak.score > best->score) {
+            *best = fine_peak;
             best->shift_px_q12 += peak[i].shift_px_q12;
             best->column_px_q12 += peak[i].column_px_q12;
             best->row_px_q12 += peak[i].row_px_q12;
@@ -183,7 +185,7 @@ bool ih_align_search_depth(const struct ih_align_axes *axes,
                            const struct ih_dot_rows *rows, struct ih_align_scratch *scratch,
                            int32_t moved_px_q12[IH_ALIGN_AXES])
 {
-    const struct ih_align_plane none = {0};
+    static const struct ih_align_plane none;
     find_all(axes, rig, rows, scratch);
     fit_plane(prior_px_q12, rig, &none, scratch, moved_px_q12);
     return ih_abs_s32(moved_px_q12[IH_ALIGN_DEPTH]) >

@@ -162,29 +162,31 @@ static bool is_alike(const struct ih_align_plane *a, const struct ih_align_plane
 }
 
 /* Of planes that are alike the best alone stays. */
-static void keep(const struct ih_align_plane *plane, struct ih_align_plane peak[IH_ALIGN_PEAKS])
+static void keep(const struct ih_align_plane *plane, int32_t peak_count,
+                 struct ih_align_plane *peak)
 {
-    struct ih_align_plane before[IH_ALIGN_PEAKS];
     int32_t at = 0;
-    while (at < IH_ALIGN_PEAKS && peak[at].score >= plane->score) {
+    while (at < peak_count && peak[at].score >= plane->score) {
         if (is_alike(&peak[at], plane)) {
             return;
         }
         at++;
     }
-    if (at == IH_ALIGN_PEAKS) {
+    if (at == peak_count) {
         return;
     }
-    memcpy(before, peak, sizeof before);
-    peak[at] = *plane;
-    int32_t kept = at + 1;
-    for (int32_t i = at; i < IH_ALIGN_PEAKS && kept < IH_ALIGN_PEAKS; i++) {
-        if (!is_alike(&before[i], plane)) {
-            peak[kept++] = before[i];
+    int32_t kept = at;
+    for (int32_t i = at; i < peak_count; i++) {
+        if (!is_alike(&peak[i], plane)) {
+            peak[kept++] = peak[i];
         }
     }
-    for (; kept < IH_ALIGN_PEAKS; kept++) {
-        peak[kept].score = 0;
+    for (int32_t i = ih_min_s32(kept, peak_count - 1); i > at; i--) {
+        peak[i] = peak[i - 1];
+    }
+    peak[at] = *plane;
+    for (int32_t i = kept + 1; i < peak_count; i++) {
+        peak[i].score = 0;
     }
 }
 
@@ -239,11 +241,11 @@ static void sum_columns(struct ih_align_votes *votes, const struct ih_align_grid
 
 void ih_align_votes_count(struct ih_align_votes *votes, const struct ih_align_grid *grid,
                           const int16_t slope_q12[IH_SLOTS][IH_ALIGN_AXES],
-                          struct ih_align_plane peak[IH_ALIGN_PEAKS])
+                          struct ih_align_plane *peak)
 {
     struct ih_align_plane plane = {0};
     int32_t best = BESIDE_BINS;
-    memset(peak, 0, IH_ALIGN_PEAKS * sizeof *peak);
+    memset(peak, 0, (size_t)grid->peak_count * sizeof *peak);
     set_plane_first(votes, grid);
     for (int32_t depth = -grid->depth_steps; depth <= grid->depth_steps; depth++) {
         plane.depth_px_q12 = depth * grid->depth_step_px_q12;
@@ -255,9 +257,9 @@ void ih_align_votes_count(struct ih_align_votes *votes, const struct ih_align_gr
                 plane.row_px_q12 = row * grid->step_px_q12;
                 sum_moved(votes->row, votes->plane_first[IH_ALIGN_STEPS_MAX + row], grid,
                           votes->sum);
-                plane.score = peak[IH_ALIGN_PEAKS - 1].score;
+                plane.score = peak[grid->peak_count - 1].score;
                 if (find_shift(votes->sum, grid, &best, &plane)) {
-                    keep(&plane, peak);
+                    keep(&plane, grid->peak_count, peak);
                 }
             }
         }

@@ -20,8 +20,8 @@
 /* Empty bins on both sides, so that a histogram that is moved needs no bounds; no plane moves one by more. */
 #define IH_ALIGN_PAD 32
 #define IH_ALIGN_PADDED (IH_ALIGN_BINS_MAX + 2 * IH_ALIGN_PAD)
-/* Planes that a vote gives. */
-#define IH_ALIGN_PEAKS 3
+/* Planes that a vote gives, at most. With three, the right one was not among them in a few frames of the wide rig. */
+#define IH_ALIGN_PEAKS 5
 /* Half columns from the pattern's middle to its edge. */
 #define IH_ALIGN_EDGE (IH_GRID - 1)
 /* Steps of columns and rows on one side of 0. */
@@ -48,6 +48,7 @@ struct ih_align_grid {
     int32_t side, slots;           /* blocks of slots by slots */
     int32_t bin_count, bin_px_q12; /* count: 32 or 64 */
     int32_t peak_bins;             /* width of a peak */
+    int32_t peak_count;            /* planes that the vote gives, at most IH_ALIGN_PEAKS */
     int32_t step_px_q12;
     int32_t column_steps, row_steps;        /* on both sides of 0 */
     int32_t depth_steps, depth_step_px_q12; /* the same */
@@ -72,11 +73,11 @@ static inline void ih_align_votes_add(uint16_t *histogram, const struct ih_align
     }
 }
 
-/* The planes with the highest scores, best first, no two alike; fewer than IH_ALIGN_PEAKS: score 0. slope_q12: of all
- * slots. */
+/* The grid's peak_count planes with the highest scores, best first, no two alike; if there are fewer: score 0. slope_q12:
+ * of all slots. */
 void ih_align_votes_count(struct ih_align_votes *votes, const struct ih_align_grid *grid,
                           const int16_t slope_q12[IH_SLOTS][IH_ALIGN_AXES],
-                          struct ih_align_plane peak[IH_ALIGN_PEAKS]);
+                          struct ih_align_plane *peak);
 
 /* Of a plane, without the rotation of depth. */
 static inline int32_t ih_align_plane_px_q12(const struct ih_align_plane *plane, int32_t slot)

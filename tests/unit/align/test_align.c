@@ -427,6 +427,66 @@ static void what_is_beyond_the_limits_is_not_taken(void)
     }
 }
 
+/* --- where a frame is misleading --- */
+
+/* Dots of two rigs together: one of them is the wrong motion that a search may take for the right one. */
+static void see_both(const struct moved_rig *moved, double seen, const struct moved_rig *false_one,
+                     double false_seen)
+{
+    static struct ih_dots false_dots;
+    static int16_t false_slot[IH_DOTS_MAX];
+    const struct moved_scene scene = {WALL_MM, NOISE_PX, seen, 0};
+    const struct moved_scene false_scene = {WALL_MM, NOISE_PX, false_seen, 0};
+
+    see_dots(&vector_rigs[1], false_one, &false_scene, &random_source, false_slot, &false_dots);
+    see(1, moved, &scene);
+    for (int32_t i = 0; i < false_dots.dot_count; i++) {
+        add_dot(false_dots.dot[i].u_px_q12, false_dots.dot[i].v_px_q12, IH_NONE, slot_of_dot,
+                &dots);
+    }
+}
+
+static const struct moved_rig right_motion = {{0.2, 0, -0.1}, 0};
+static const struct moved_rig false_motion = {{-0.15, 0, 0.3}, 0};
+
+/* In the first frame none of the right dots is there, but as many anywhere: the false ones win. They are there later on,
+ * too, but fewer. With the wide rig's dense lines neither motion is clear. */
+static void a_false_motion_of_the_first_frame_does_not_stay(void)
+{
+    for (int i = 0; i < 6; i++) {
+        const struct moved_scene misleading = {WALL_MM, NOISE_PX, 0.5, 280};
+
+        use_rig(1);
+        run(1, &false_motion, &misleading, 1);
+        IH_TEST_WITHIN(0.5, 0, worst_px(1, &false_motion), "misled, px", i);
+        for (int frame = 0; frame < 18; frame++) {
+            see_both(&right_motion, 0.8, &false_motion, 0.5);
+            find();
+            learn();
+        }
+        IH_TEST_WITHIN(0.3, 0, worst_px(1, &right_motion), "worst slot, px", i);
+    }
+}
+
+/* A few dots more than on the false lines are enough to come back to a motion that had held: fewer than a search asks for. */
+static void a_motion_that_had_held_comes_back(void)
+{
+    for (int i = 0; i < 6; i++) {
+        use_rig(1);
+        run(1, &right_motion, &room, 20);
+        see_both(&right_motion, 0.2, &false_motion, 0.9);
+        find();
+        learn();
+        IH_TEST_WITHIN(0.5, 0, worst_px(1, &false_motion), "misled, px", i);
+        for (int frame = 0; frame < 18; frame++) {
+            see_both(&right_motion, 0.8, &false_motion, 0.7);
+            find();
+            learn();
+        }
+        IH_TEST_WITHIN(0.3, 0, worst_px(1, &right_motion), "worst slot, px", i);
+    }
+}
+
 /* --- learning --- */
 
 /* What the dots show of the axis that is depth: within its uncertainty,
@@ -622,6 +682,8 @@ int main(void)
     RUN_TEST(a_false_lattice_moves_nothing_far);
     RUN_TEST(what_is_lost_keeps_the_last_good_alignment);
     RUN_TEST(what_is_beyond_the_limits_is_not_taken);
+    RUN_TEST(a_false_motion_of_the_first_frame_does_not_stay);
+    RUN_TEST(a_motion_that_had_held_comes_back);
     RUN_TEST(depth_is_found_within_its_uncertainty);
     RUN_TEST(all_axes_are_within_their_uncertainty);
     RUN_TEST(depth_that_dots_do_not_show_is_not_known);
