@@ -44,6 +44,8 @@ def read_trace(path):
     return {
         "file": trace["file"],
         "kinds": trace["evidence"],
+        # To the level frame, in which detections are; a camera that hangs level has none.
+        "level": numpy.array(trace.get("level_q30", (1 << 30) * numpy.eye(3))).reshape(3, 3) / (1 << 30),
         "centre_mm": numpy.array([f["centre_mm_q8"] for f in found]).reshape(-1, 3) / 256,
         "evidence_q8": numpy.array([f["evidence_q8"] for f in found],
                                    dtype=numpy.int64).reshape(len(found), len(trace["evidence"])),
@@ -63,7 +65,7 @@ def look(program, directory, scratch):
     for path in sorted(glob.glob(os.path.join(out, "**", "*.json"), recursive=True)):
         frame = read_trace(path)
         if frame["file"] in truth:
-            frame["heads"], frame["unclear"] = truth[frame["file"]]
+            frame["heads"], frame["unclear"] = (heads @ frame["level"].T for heads in truth[frame["file"]])
             frame["directory"] = directory
             frames.append(frame)
     shutil.rmtree(out)
