@@ -215,10 +215,9 @@ vectors: ## write tests/vectors anew with the float64 reference; STAGES=dots: of
 learn: sim ## learn the score anew from rendered scenes and people; three hours
 	@tools/setup.sh learn
 	@tools/setup.sh people
-	@/usr/bin/python3 tools/people/sets.py learn $(BUILD)/learn/people/learn
-	@/usr/bin/python3 tools/people/sets.py mounted_learn $(BUILD)/learn/people/mounted_learn
+	@/usr/bin/python3 tools/people/sets.py learn $(BUILD)/learn/people
 	@/usr/bin/python3 tools/learn/learn.py --render $(BUILD)/host/tools/render/render \
-	  --host-sim $(BUILD)/host/sim/host_sim --work $(BUILD)/learn --people $(BUILD)/learn/people/learn $(BUILD)/learn/people/mounted_learn
+	  --host-sim $(BUILD)/host/sim/host_sim --work $(BUILD)/learn --people $(BUILD)/learn/people
 
 learn-pose: ## learn anew where heads look, from people that dots are cast on; half an hour
 	@tools/setup.sh vectors

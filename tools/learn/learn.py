@@ -32,8 +32,7 @@ NO_HEAD_MM = 100
 UNCLEAR_MM = 150
 # Hardly a head is farther away in the scenes: what is would teach that far things are no heads.
 FAR_MM = 2900
-# Against the penalties of model.py and ray_map.py: a sequence of people, a rendered frame.
-SEQUENCE_WEIGHT, RENDERED_WEIGHT = 12.0, 2.0
+SEQUENCE_WEIGHT = 6.0
 MAP_KIND = "surroundings"
 
 
@@ -53,7 +52,7 @@ def label(frame):
 def importance(seen, people):
     """Of every frame: each sequence of people counts as much as the others, in however many frames."""
     count = collections.Counter(frame["directory"] for frame in seen)
-    return [SEQUENCE_WEIGHT / count[f["directory"]] if f["directory"] in people else RENDERED_WEIGHT for f in seen]
+    return [SEQUENCE_WEIGHT / count[f["directory"]] if f["directory"] in people else 1.0 for f in seen]
 
 
 def gather(seen, people):
