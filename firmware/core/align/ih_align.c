@@ -32,7 +32,7 @@
 #define DEPTH_NEW_RAD_Q30 937007 /* 0.05 degrees */
 /* Beyond this a rig has not moved but is another one. */
 #define ROTATION_MAX_RAD_Q30 28110244 /* 1.5 degrees */
-/* Four times the prior's 0.2 degrees: wrong motions take much of it, and more from their own labels. */
+/* 0.8 degrees. Wrong motions ask for much depth, and learn more of it from their own labels. */
 #define DEPTH_MAX_RAD_Q30 14992130
 #define FOCAL_MAX_Q30 16106127 /* 1.5 % */
 #define MARGIN_PX_Q12 (4 * 4096)
@@ -228,7 +228,6 @@ static int32_t search(struct ih_align *align, const struct ih_dots *dots, int32_
             memcpy(align->settled_px_q12, before_px_q12, sizeof before_px_q12);
         }
         align->unsettled_frames = 1;
-        align->trusted_q8 = 0;
         note_change(align, before_px_q12[IH_ALIGN_DEPTH], rig);
         forget(align);
         return excess;

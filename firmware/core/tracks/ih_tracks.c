@@ -15,7 +15,7 @@
 /* A detection beyond the gate is worse than all within one. */
 #define FAST_LOGIT_Q10 (1 << 20)
 /* The less a detection looks like a head, the more of it is a hand or a chest, which would take the track along: below
- * each of these log-odds its variance is so many times that of a sure one. */
+ * each of these log-odds its variance is so many times that of a sure one. Chosen on hands before faces (E025). */
 #define SURE_LOGIT_Q10 (2 << 10)
 #define UNSURE_FACTOR 4
 #define DOUBTFUL_LOGIT_Q10 (1 << 10)
