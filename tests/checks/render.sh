@@ -230,6 +230,57 @@ cp range/slope/000000.pgm short && : >short/truth.jsonl
 refuse "depth image without a truth" 1 "short/truth.jsonl" --range short a
 rm -rf a
 
+# --- a depth camera ------------------------------------------------------------------------------
+cat >camera.py <<'PYTHON'
+"""What is measured is where the truth says that a head is; farther away by what was asked for; beside the head, where
+the sensor's projector does not get, nothing is known."""
+import json
+import struct
+
+def read(folder):
+    rig = json.load(open(folder + "/rig.json"))
+    assert rig["kind"] == "range" and "dot_rays" not in rig and "projector_origin" not in rig, "rig"
+    assert (rig["image_width"], rig["image_height"]) == (640, 480), "size"
+    frames = []
+    for line in open(folder + "/truth.jsonl"):
+        truth = json.loads(line)
+        data = open(folder + "/" + truth["file"], "rb").read()
+        assert data.startswith(b"P5\n640 480\n65535\n") and len(data) == 17 + 2 * 640 * 480, "image"
+        assert "dots" not in truth, "dots"
+        frames.append((truth["head"], struct.unpack(">%dH" % (640 * 480), data[17:])))
+    return rig, frames
+
+def behind_front(folder):
+    """Of the surface at the head's centre, behind the centre less the depth's semi-axis."""
+    rig, frames = read(folder)
+    m, offsets = rig["camera_matrix"]["data"], []
+    for head, depth in frames:
+        if head:
+            (x, y, z), axes = head["centre_mm"], head["semi_axes_mm"]
+            offsets.append(depth[640 * round(m[4] * y / z + m[5]) + round(m[0] * x / z + m[2])] - z + axes[2])
+    return offsets, [head["centre_mm"][2] for head, _ in frames if head], frames
+
+near, near_z, frames = behind_front("camera")
+far, far_z, _ = behind_front("camera_far")
+assert near and max(map(abs, near + far)) < 45, "surface off the head by %s %s" % (near, far)
+assert all(abs(b - a - 700) < 0.02 for a, b in zip(near_z, far_z)), "not 700 mm farther: %s %s" % (near_z, far_z)
+unknown = [sum(z == 0 for z in depth) / len(depth) for _, depth in frames]
+assert all(0.002 < share < 0.5 for share in unknown), "not known: %s" % unknown
+PYTHON
+draw "a depth camera" camera --rig range --frames 4 --seed 3 --background near --act none
+draw "a depth camera farther away" camera_far --rig range --frames 4 --seed 3 --background near --act none --away 700
+draw "the same depth images" camera_again --rig range --frames 4 --seed 3 --background near --act none
+/usr/bin/python3 camera.py >out 2>&1 && reason= || reason=$(tail -n 1 out)
+result "a depth camera measures the head where the truth has it" "$reason"
+[ "$(fingerprint camera)" = "$(fingerprint camera_again)" ] && reason= || reason="bytes differ"
+result "the same options give the same depth images" "$reason"
+for option in "--laser alternate" "--knock 0.1" "--bits 8" "--range range" "--missing 0.5" "--ambient dim"; do
+    # shellcheck disable=SC2086 # an option and its value
+    refuse "a depth camera with $option" 2 "${option%% *}: a depth camera" --rig range $option a
+done
+refuse "too far away" 2 "--away" --away 2001 a
+refuse "real depth images farther away" 2 "--away" --range range --away 100 a
+
 # --- somebody comes and goes -------------------------------------------------------------------------
 cat >pattern.py <<'PYTHON'
 import json

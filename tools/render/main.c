@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include "rd_ambient.h"
+#include "rd_depth.h"
 #include "rd_dots.h"
 #include "rd_options.h"
 #include "rd_output.h"
@@ -20,6 +21,7 @@ struct studio {
     struct rd_rig rig, start_rig, written_rig; /* as it is, as it was in frame 0, and as rig.json has it */
     struct rd_laser laser;
     struct rd_sensor sensor;
+    struct rd_depth depth; /* instead of laser and sensor, where the rig is a depth camera */
     struct rd_stage stage;
     struct rd_dot_list dots;
     struct rd_ambient *ambient;
@@ -33,6 +35,7 @@ static void studio_free(struct studio *studio)
         return;
     rd_stage_end(&studio->stage);
     rd_ambient_free(studio->ambient);
+    rd_depth_free(&studio->depth);
     free(studio->grey);
     free(studio->samples);
     free(studio);
@@ -55,11 +58,21 @@ static struct studio *studio_new(const struct rd_options *options)
     studio->ambient = rd_ambient_new(&studio->rig);
     studio->grey = malloc(pixel_count * sizeof *studio->grey);
     studio->samples = malloc(pixel_count * sizeof *studio->samples);
-    if (studio->ambient == NULL || studio->grey == NULL || studio->samples == NULL) {
+    bool depth_made = !studio->rig.is_range || rd_depth_make(&studio->depth, options, &studio->rig);
+    if (studio->ambient == NULL || studio->grey == NULL || studio->samples == NULL || !depth_made) {
         studio_free(studio);
         return NULL;
     }
     return studio;
+}
+
+static bool render_depth(struct studio *studio, struct rd_output *output, int frame)
+{
+    struct rd_stage *stage = &studio->stage;
+    struct rd_frame_note note = {stage->time_us, true, stage->source};
+    rd_depth_expose(&studio->depth, &studio->rig, &stage->scene, frame, studio->samples);
+    rd_output_truth(output, frame, &stage->truth, NULL);
+    return rd_output_frame(output, frame, &note, &studio->rig, RD_DEPTH_MAX, studio->samples);
 }
 
 static bool render_frame(struct studio *studio, struct rd_output *output, int frame)
@@ -69,6 +82,8 @@ static bool render_frame(struct studio *studio, struct rd_output *output, int fr
         rd_rig_drift(&studio->rig, &studio->start_rig, &stage->options, frame / (stage->frame_count - 1.0));
     if (!rd_stage_frame(stage, frame))
         return false;
+    if (studio->rig.is_range)
+        return render_depth(studio, output, frame);
     if (stage->still_changed || stage->light.shadows) {
         rd_ambient_still(studio->ambient, &stage->scene, &stage->light);
         if (stage->truth.board_known)

@@ -111,11 +111,12 @@ static struct rd_vec draw_neighbour(uint64_t seed, struct rd_vec *first_mm)
 }
 
 /* A camera that looks up sees what is below the head nearer than the head. */
-static void plan_tilt(struct rd_company *company, double tilt_deg, struct rd_vec head_mm)
+static void plan_shift(struct rd_company *company, const struct rd_options *options, struct rd_vec head_mm)
 {
-    company->tilted = tilt_deg != 0.0;
-    company->tilt.rot = rd_rot_euler(0.0, -tilt_deg * RD_RAD_PER_DEG, 0.0);
-    company->tilt.origin_mm = rd_sub(head_mm, rd_turn(&company->tilt.rot, head_mm));
+    company->shifted = options->tilt_deg != 0.0 || options->away_mm != 0.0;
+    company->shift.rot = rd_rot_euler(0.0, -options->tilt_deg * RD_RAD_PER_DEG, 0.0);
+    company->shift.origin_mm = rd_sub(head_mm, rd_turn(&company->shift.rot, head_mm));
+    company->shift.origin_mm.z += options->away_mm;
 }
 
 void rd_company_make(struct rd_company *company, const struct rd_options *options, const struct rd_rig *rig,
@@ -145,9 +146,9 @@ void rd_company_make(struct rd_company *company, const struct rd_options *option
         rd_seat_build(scene, &seat_rng, head_mm);
     if (two)
         make_neighbour(company, options, &seat_rng, rd_add(head_mm, beside_mm), scene);
-    plan_tilt(company, options->tilt_deg, head_mm);
-    if (company->tilted)
-        rd_scene_move(scene, 0, &company->tilt);
+    plan_shift(company, options, head_mm);
+    if (company->shifted)
+        rd_scene_move(scene, 0, &company->shift);
 }
 
 static void add_truth(struct rd_truth *truth, const struct rd_person *person, const struct rd_pose *head)
@@ -208,10 +209,10 @@ void rd_company_frame(struct rd_company *company, int frame, struct rd_scene *sc
         struct rd_posture posture;
         rd_motion_posture(&sitter->motion, &sitter->person, frame, &posture);
         rd_person_build(&sitter->person, &posture, scene);
-        struct rd_pose head = company->tilted ? rd_pose_mul(&company->tilt, &posture.head) : posture.head;
+        struct rd_pose head = company->shifted ? rd_pose_mul(&company->shift, &posture.head) : posture.head;
         add_truth(truth, &sitter->person, &head);
     }
-    if (company->tilted)
-        rd_scene_move(scene, first, &company->tilt);
+    if (company->shifted)
+        rd_scene_move(scene, first, &company->shift);
     rd_company_choose(truth, company->rig, company->kind == RD_SCENE_VISIT ? VISIT_DOTS : ANYWHERE_DOTS);
 }

@@ -20,8 +20,9 @@
 
 struct rd_company {
     enum rd_scene_kind kind;
-    bool tilted;
-    struct rd_pose tilt; /* everything turned about the first head's position at rest, for the option --tilt */
+    bool shifted;
+    /* Everything turned about the first head's position at rest and moved, for the options --tilt and --away. */
+    struct rd_pose shift;
     const struct rd_rig *rig;
     struct rd_sitter {
         struct rd_person person;

@@ -27,6 +27,7 @@ enum option_id {
     OPT_PERSON,
     OPT_ACT,
     OPT_TILT,
+    OPT_AWAY,
     OPT_KNOCK,
     OPT_KNOCK_SHIFT,
     OPT_KNOCK_CAMERA,
@@ -72,21 +73,22 @@ static const char help_text[] = /* at most 80 columns */
     "                     face (hands on it), back (turns to the back seat again and\n"
     "                     again), none (hands down)\n"
     "  --rig KIND         paper (default): 12.5 mm between camera and projector;\n"
-    "                     wide: 125 mm\n"
+    "                     wide: 125 mm; range: a depth camera instead of dots\n"
     "  --seed N           which person, room, light, motion (default 1); with\n"
     "                     --range: from where, 0 for the depth camera's own position\n"
     "  --rig-seed N       lens, assembly, laser, sensor (default: as --seed):\n"
     "                     other people before the same rig\n"
     "  --frames N         1 to 5000 (default 50, four of them without the person; for\n"
     "                     a visit 100); with --range for each depth image (default 1)\n"
-    "  --size WxH         320x240 to 1280x800 (default 752x582); the focal length\n"
-    "                     follows the width\n"
+    "  --size WxH         320x240 to 1280x800 (default 752x582, a depth camera\n"
+    "                     640x480); the focal length follows the width\n"
     "  --background KIND  varied (default, by seed), near, far, none\n"
     "  --ambient KIND     varied (default, by seed), dim, normal, bright, sunlight\n"
     "                     (hard shadows)\n"
     "  --distortion KIND  normal (default), none, strong\n"
     "  --tilt DEG         -40 to 40 (default 0): the camera looks up at people by\n"
     "                     this, down where it is negative\n"
+    "  --away MM          0 (default) to 2000: everything is farther away by this\n"
     "  --knock DEG        0 (default) to 0.5: the projector is rotated by this\n"
     "                     against what rig.json says, about an axis by seed\n"
     "  --knock X,Y,Z      -5 to 5 degrees each: rotated by this rotation vector\n"
@@ -234,7 +236,7 @@ static bool take_word(int id, const char *text, struct rd_options *options)
                                           "long-hair", "bald",  "glasses", "headphones", NULL};
     static const char *const acts[] = {"varied", "phone", "face", "back", "none", NULL};
     static const char *const lasers[] = {"on", "alternate", NULL};
-    static const char *const rigs[] = {"paper", "wide", NULL};
+    static const char *const rigs[] = {"paper", "wide", "range", NULL};
     static const char *const backgrounds[] = {"varied", "near", "far", "none", NULL};
     static const char *const lenses[] = {"normal", "none", "strong", NULL};
     static const char *const ambients[] = {"varied", "dim", "normal", "bright", "sunlight", NULL};
@@ -290,6 +292,8 @@ static bool take_option(int id, const char *text, struct rd_options *options)
                 complain("bits", text, "8, 10, 12 or 16"));
     case OPT_TILT:
         return read_decimal("tilt", text, -40.0, 40.0, "a number from -40 to 40", &options->tilt_deg);
+    case OPT_AWAY:
+        return read_decimal("away", text, 0.0, 2000.0, "a number from 0 to 2000", &options->away_mm);
     case OPT_KNOCK:
         if (strchr(text, ',') != NULL)
             return read_rotation("knock", text, "X,Y,Z of -5 to 5 each", options->knock_xyz_deg);
@@ -332,6 +336,19 @@ static bool take_option(int id, const char *text, struct rd_options *options)
     }
 }
 
+/* What a depth camera does not have. */
+static bool is_of_dots(int id)
+{
+    static const int ids[] = {OPT_BOARD,    OPT_RANGE,        OPT_BITS,  OPT_AMBIENT, OPT_DISTORTION,
+                              OPT_KNOCK,    OPT_KNOCK_SHIFT,  OPT_DRIFT, OPT_LASER,   OPT_CALIBRATION_NOISE,
+                              OPT_ASSEMBLY, OPT_KNOCK_CAMERA, OPT_BLUR,  OPT_MISSING, OPT_EXPOSURE};
+    for (size_t i = 0; i < sizeof ids / sizeof ids[0]; i++) {
+        if (ids[i] == id)
+            return true;
+    }
+    return false;
+}
+
 enum rd_options_result rd_options_parse(int argc, char **argv, struct rd_options *options)
 {
     static const struct option long_options[] = {
@@ -350,6 +367,7 @@ enum rd_options_result rd_options_parse(int argc, char **argv, struct rd_options
         {"person", required_argument, NULL, OPT_PERSON},
         {"act", required_argument, NULL, OPT_ACT},
         {"tilt", required_argument, NULL, OPT_TILT},
+        {"away", required_argument, NULL, OPT_AWAY},
         {"knock", required_argument, NULL, OPT_KNOCK},
         {"knock-shift", required_argument, NULL, OPT_KNOCK_SHIFT},
         {"knock-camera", required_argument, NULL, OPT_KNOCK_CAMERA},
@@ -368,11 +386,11 @@ enum rd_options_result rd_options_parse(int argc, char **argv, struct rd_options
         {"help", no_argument, NULL, OPT_HELP},
         {NULL, 0, NULL, 0},
     };
-    int id;
+    int id, index = 0;
     bool scene_given = false;
-    *options = (struct rd_options){
-        .sequence = 1, .exposure = 1.0, .focal = 1.0, .seed = 1, .width = 752, .height = 582, .bits = 8};
-    while ((id = getopt_long(argc, argv, "", long_options, NULL)) != -1) {
+    const char *of_dots = NULL;
+    *options = (struct rd_options){.sequence = 1, .exposure = 1.0, .focal = 1.0, .seed = 1, .bits = 8};
+    while ((id = getopt_long(argc, argv, "", long_options, &index)) != -1) {
         if (id == OPT_HELP) {
             fputs(help_text, stdout);
             return RD_OPTIONS_HELP;
@@ -381,6 +399,7 @@ enum rd_options_result rd_options_parse(int argc, char **argv, struct rd_options
         if (id == '?' || !take_option(id, optarg, options))
             return RD_OPTIONS_WRONG;
         scene_given = scene_given || id == OPT_SCENE;
+        of_dots = is_of_dots(id) ? long_options[index].name : of_dots;
     }
     if (optind != argc - 1 || argv[optind][0] == '\0') {
         fputs("render: one OUT_DIR is needed; see render --help\n", stderr);
@@ -393,6 +412,18 @@ enum rd_options_result rd_options_parse(int argc, char **argv, struct rd_options
     if ((options->scene == RD_SCENE_BOARD) != (options->board_file != NULL && options->board_mm > 0.0)) {
         fputs("render: --scene board, --board and --board-mm go together\n", stderr);
         return RD_OPTIONS_WRONG;
+    }
+    if (options->rig == RD_RIG_RANGE && of_dots != NULL) {
+        fprintf(stderr, "render: --%s: a depth camera (--rig range) has none of that\n", of_dots);
+        return RD_OPTIONS_WRONG;
+    }
+    if (options->away_mm > 0.0 && (options->range_dir != NULL || options->scene == RD_SCENE_BOARD)) {
+        fputs("render: --away is of people and rooms, not of boards and real depth images\n", stderr);
+        return RD_OPTIONS_WRONG;
+    }
+    if (options->width == 0) {
+        options->width = options->rig == RD_RIG_RANGE ? 640 : 752;
+        options->height = options->rig == RD_RIG_RANGE ? 480 : 582;
     }
     if (!options->rig_seed_given)
         options->rig_seed = options->seed;

@@ -28,7 +28,7 @@ enum rd_person_kind {
     RD_PERSON_HEADPHONES
 };
 enum rd_act { RD_ACT_VARIED, RD_ACT_PHONE, RD_ACT_FACE, RD_ACT_BACK, RD_ACT_NONE };
-enum rd_rig_kind { RD_RIG_PAPER, RD_RIG_WIDE };
+enum rd_rig_kind { RD_RIG_PAPER, RD_RIG_WIDE, RD_RIG_RANGE };
 enum rd_background { RD_BACK_VARIED, RD_BACK_NEAR, RD_BACK_FAR, RD_BACK_NONE };
 enum rd_distortion { RD_LENS_NORMAL, RD_LENS_NONE, RD_LENS_STRONG };
 enum rd_ambient_kind { RD_AMBIENT_VARIED, RD_AMBIENT_DIM, RD_AMBIENT_NORMAL, RD_AMBIENT_BRIGHT, RD_AMBIENT_SUNLIGHT };
@@ -53,6 +53,7 @@ struct rd_options {
     bool rig_seed_given;
     int frame_count;          /* for each depth image, where there are any */
     double tilt_deg;          /* the camera looks up at people by this, or down */
+    double away_mm;           /* everything is farther away by this */
     double knock_deg;         /* the projector's rotation against what rig.json says, about an axis by seed */
     double knock_xyz_deg[3];  /* the same as a rotation vector, camera frame */
     double knock_shift_mm[3]; /* of the projector's origin */

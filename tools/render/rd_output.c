@@ -178,8 +178,10 @@ void rd_output_truth(struct rd_output *output, int frame, const struct rd_truth 
         write_vec(file, ",\"down\":", truth->board.rot.y);
         putc('}', file);
     }
-    write_dots(file, "dots", dots, false);
-    write_dots(file, "dim_dots", dots, true);
+    if (dots != NULL) {
+        write_dots(file, "dots", dots, false);
+        write_dots(file, "dim_dots", dots, true);
+    }
     fputs("}\n", file);
 }
 
@@ -210,11 +212,14 @@ static bool write_rig(const struct rd_output *output, const struct rd_rig *rig)
         rays[3 * i + 1] = rig->dot_rays[i].y;
         rays[3 * i + 2] = rig->dot_rays[i].z;
     }
-    fprintf(file, "{\n  \"kind\":\"dots\",\n  \"image_width\":%d,\n  \"image_height\":%d,\n", rig->width, rig->height);
+    fprintf(file, "{\n  \"kind\":\"%s\",\n  \"image_width\":%d,\n  \"image_height\":%d,\n",
+            rig->is_range ? "range" : "dots", rig->width, rig->height);
     write_matrix(file, "camera_matrix", 3, 3, camera);
     write_matrix(file, "distortion_coefficients", 1, 5, lens);
-    write_matrix(file, "projector_origin", 3, 1, projector);
-    write_matrix(file, "dot_rays", RD_DOT_COUNT, 3, rays);
+    if (!rig->is_range) {
+        write_matrix(file, "projector_origin", 3, 1, projector);
+        write_matrix(file, "dot_rays", RD_DOT_COUNT, 3, rays);
+    }
     fprintf(file, "  \"near_mm\":%.1f,\n  \"far_mm\":%.1f\n}\n", rig->near_mm, rig->far_mm);
     return close_in(output, "rig.json", file);
 }

@@ -49,6 +49,7 @@ struct rd_frame_note {
 
 bool rd_output_frame(struct rd_output *output, int frame, const struct rd_frame_note *note, const struct rd_rig *rig,
                      int max_value, const uint16_t *samples);
+/* `dots`: NULL with a depth camera. */
 void rd_output_truth(struct rd_output *output, int frame, const struct rd_truth *truth, const struct rd_dot_list *dots);
 /* Removes an earlier run's frames other than first .. end - 1, closes the lists and writes rig.json. */
 bool rd_output_finish(struct rd_output *output, const struct rd_rig *rig, int first, int end);

@@ -8,6 +8,9 @@
 #define PAPER_WIDTH_PX 752
 #define PAPER_FX_PX 920.8
 #define PAPER_FY_PX 943.8
+/* A common depth camera, at 640 pixels. */
+#define RANGE_WIDTH_PX 640
+#define RANGE_FOCAL_PX 525.0
 #define PAPER_BASELINE_MM 12.5
 #define WIDE_BASELINE_MM 125.0
 /* Where the pattern's middle crosses the camera's axis, nearly. */
@@ -113,6 +116,12 @@ void rd_rig_make(struct rd_rig *rig, const struct rd_options *options)
     rig->cy_px = 0.5 * (options->height - 1);
     rig->near_mm = NEAR_MM;
     rig->far_mm = open_room ? ROOM_FAR_MM : SEAT_FAR_MM;
+    rig->is_range = options->rig == RD_RIG_RANGE;
+    if (rig->is_range) {
+        rig->fx_px = rig->fy_px = RANGE_FOCAL_PX * options->focal * options->width / RANGE_WIDTH_PX;
+        rig->far_mm = ROOM_FAR_MM;
+        return;
+    }
     make_lens(rig, options);
     make_dots(rig, options->rig == RD_RIG_WIDE ? WIDE_BASELINE_MM : PAPER_BASELINE_MM);
     if (options->assembly > 0.0)
@@ -192,6 +201,12 @@ bool rd_rig_project(const struct rd_rig *rig, struct rd_vec point_mm, double *u_
 /* The middle dot's neighbours on both sides give the grating's two axes, as long as one step of direction cosine. */
 bool rd_rig_pattern_place(const struct rd_rig *rig, struct rd_vec point_mm, double *row, double *column)
 {
+    if (rig->is_range) {
+        double half = 0.5 * RD_DOT_ROWS;
+        *row = rig->fy_px * point_mm.y / point_mm.z / (0.5 * rig->height) * half;
+        *column = rig->fx_px * point_mm.x / point_mm.z / (0.5 * rig->width) * half;
+        return point_mm.z > 0.0;
+    }
     const struct rd_vec *middle = &rig->dot_rays[RD_DOT_COUNT / 2];
     struct rd_vec across = rd_scale(rd_sub(middle[1], middle[-1]), 0.5);
     struct rd_vec down = rd_scale(rd_sub(middle[RD_DOT_ROWS], middle[-RD_DOT_ROWS]), 0.5);

@@ -15,6 +15,7 @@
 #define RD_DOT_COUNT (RD_DOT_ROWS * RD_DOT_ROWS)
 
 struct rd_rig {
+    bool is_range; /* a depth camera: no projector, no rays */
     int width, height;
     double fx_px, fy_px, cx_px, cy_px;
     double k1, k2, p1, p2, k3; /* OpenCV's distortion */
@@ -36,7 +37,7 @@ void rd_rig_misjudge(struct rd_rig *rig, const struct rd_options *options);
 bool rd_rig_project(const struct rd_rig *rig, struct rd_vec point_mm, double *u_px, double *v_px);
 
 /* Where a point lies in the pattern, as seen from the projector: row and column of dots from the middle one, -9 .. 9
- * within the pattern. False: behind the projector. */
+ * within the pattern. False: behind the projector. A depth camera has a pattern that fills its picture. */
 bool rd_rig_pattern_place(const struct rd_rig *rig, struct rd_vec point_mm, double *row, double *column);
 
 /* Unit direction of what a pixel sees. */

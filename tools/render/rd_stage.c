@@ -159,6 +159,10 @@ static void arrange(struct rd_stage *stage, int arrangement)
         rd_clutter_build(&stage->scene, &rng);
     else
         rd_furniture_room(&stage->scene, &rng);
+    if (stage->options.away_mm != 0.0) {
+        struct rd_pose away = rd_pose_at(rd_v(0.0, 0.0, stage->options.away_mm));
+        rd_scene_move(&stage->scene, 0, &away);
+    }
     stage->scene.still_count = stage->scene.shape_count;
     stage->arrangement = arrangement;
     stage->still_changed = true;
