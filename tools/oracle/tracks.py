@@ -34,6 +34,7 @@ class Params:
     gate_mm, gate_mm_per_s = 90, 300
     start, start_head, accept, drop, keep = -1.0, 1.0, 0.5, -0.5, -3.0
     mature_detections = 3
+    moved_mm, moved = 25, 1.0
     memory = 0.75
     through_percent, front_percent = 50, 30
     carry_s, gap_s = 1.0, 2.0
@@ -71,6 +72,8 @@ class Track:
     is_head: bool
     detection: object = None
     detections: int = 1
+    start_mm: np.ndarray = None
+    has_moved: bool = False
 
     def predict(self, dt):
         move = np.array([[1, dt], [0, 1]])
@@ -96,7 +99,8 @@ class Track:
 
     def judge(self):
         limit = Params.start_head if self.detections < Params.mature_detections else Params.accept
-        self.is_head = clear(self.logit - (Params.drop if self.is_head else limit), 0.004)
+        limit = (Params.drop if self.is_head else limit) - (Params.moved if self.has_moved else 0)
+        self.is_head = clear(self.logit - limit, 0.004)
 
     def remember(self, logit):
         limited = np.clip(logit, -LOGIT_MAX, LOGIT_MAX)
@@ -167,6 +171,9 @@ class Tracks:
         track.detection, detection.track, track.seen_s = detection, track.id, self.time_s
         track.detections += 1
         track.correct(detection)
+        if not track.has_moved:
+            away = np.linalg.norm(track.state[0] - track.start_mm)
+            track.has_moved = clear(away - Params.moved_mm, 0.05)
         track.remember(detection.logit)
 
     def prune(self, gone, hidden):
@@ -207,7 +214,7 @@ class Tracks:
             track = Track(self.last_id, np.array([detection.position, np.zeros(3)]),
                           np.diag([Params.measured_mm**2, START_SPEED**2]).astype(float),
                           detection.semi.copy(), np.clip(detection.logit, -LOGIT_MAX, LOGIT_MAX),
-                          self.time_s, False, detection)
+                          self.time_s, False, detection, start_mm=detection.position)
             track.judge()
             self.tracks.append(track)
 
@@ -299,6 +306,13 @@ def weak(random):
         yield 40000, [detection(random, (30, 0, 900 + 3 * k), random.normal(logit, 0.15))], HIT
 
 
+def stroll(random):
+    """A doubtful detection that stands, goes 200 mm aside, becomes ever less of a head, and stands again."""
+    for k in range(90):
+        x = 4 * min(max(k - 15, 0), 50)
+        yield 40000, [detection(random, (x, -40, 900), random.normal(0.1 if k < 60 else -1 if k < 75 else -2.2, 0.05))], HIT
+
+
 def crowd(random):
     """Six that come and go, frames late, lost and far apart."""
     positions = [np.array([x, y, z], float) for x, y, z in
@@ -333,8 +347,8 @@ def slow(random):
         yield int(random.uniform(0.7e6, 1.9e6)), [detection(random, (20 * (k % 5), 0, 800), 3)], HIT
 
 
-SCENES = {"walk": walk, "crossing": crossing, "hands": hands, "rush": rush, "weak": weak, "crowd": crowd,
-          "chest": chest, "slow": slow}
+SCENES = {"walk": walk, "crossing": crossing, "hands": hands, "rush": rush, "weak": weak, "stroll": stroll,
+          "crowd": crowd, "chest": chest, "slow": slow}
 
 
 def play(scene, seed):

@@ -14,14 +14,6 @@
 #define GATE_LOGIT_Q10 (4 << 10)
 /* A detection beyond the gate is worse than all within one. */
 #define FAST_LOGIT_Q10 (1 << 20)
-/* The less a detection looks like a head, the more of it is a hand or a chest, which would take the track along: below
- * each of these log-odds its variance is so many times that of a sure one. Chosen on hands before faces (E025). */
-#define SURE_LOGIT_Q10 (2 << 10)
-#define UNSURE_FACTOR 4
-#define DOUBTFUL_LOGIT_Q10 (1 << 10)
-#define DOUBTFUL_FACTOR 25
-#define HARDLY_LOGIT_Q10 0
-#define HARDLY_FACTOR 49
 /* Two tracks nearer than this follow the same head. */
 #define SAME_MM 80
 /* Two heads within this ellipsoid are one person's: another one has no room there. */
@@ -43,6 +35,8 @@ void ih_tracks_params_default(struct ih_tracks_params *params)
         .mature_detections = 3,
         .accept_logit_q10 = 512,
         .drop_logit_q10 = -1536,
+        .moved_mm = 25,
+        .moved_logit_q10 = 1024,
         .keep_logit_q10 = -3072,
         .memory_q16 = 49152,
         .through_percent = 50,
@@ -190,17 +184,18 @@ static bool fits(const struct ih_tracks *tracks, const struct ih_tracks_params *
     return true;
 }
 
-static int64_t variance_q8(const struct ih_detection *detection, int32_t measured_mm)
+/* The less a detection looks like a head, the more of it is a hand or a chest, which would take the track along: its
+ * variance is so many times that of a sure one. Chosen on hands before faces (E025). */
+static int64_t variance_q8(int32_t logit_q10, int32_t measured_mm)
 {
-    int64_t factor = 1;
-    if (detection->logit_q10 < HARDLY_LOGIT_Q10) {
-        factor = HARDLY_FACTOR;
-    } else if (detection->logit_q10 < DOUBTFUL_LOGIT_Q10) {
-        factor = DOUBTFUL_FACTOR;
-    } else if (detection->logit_q10 < SURE_LOGIT_Q10) {
-        factor = UNSURE_FACTOR;
+    static const struct {
+        int32_t below_q10, factor;
+    } doubt[] = {{0, 49}, {1 << 10, 25}, {2 << 10, 4}, {INT32_MAX, 1}};
+    int32_t i = 0;
+    while (logit_q10 >= doubt[i].below_q10) {
+        i++;
     }
-    return (int64_t)measured_mm * measured_mm * 256 * factor;
+    return (int64_t)measured_mm * measured_mm * 256 * doubt[i].factor;
 }
 
 static void average_logit(struct ih_track *track, int32_t logit_q10, int32_t memory_q16)
@@ -219,6 +214,9 @@ static void judge(struct ih_track *track, const struct ih_tracks_params *params)
     } else if (track->detection_count >= params->mature_detections) {
         limit_q10 = params->accept_logit_q10;
     }
+    if (track->has_moved) {
+        limit_q10 -= params->moved_logit_q10;
+    }
     track->is_head = track->mean_logit_q10 > limit_q10;
 }
 
@@ -230,7 +228,10 @@ static void assign(struct ih_tracks *tracks, const struct ih_tracks_params *para
     track->seen_us = tracks->time_us;
     track->detection_count = ih_min_s32(track->detection_count + 1, DETECTION_COUNT_MAX);
     ih_kalman_correct(&track->filter, &detection->head,
-                      variance_q8(detection, params->measured_mm));
+                      variance_q8(detection->logit_q10, params->measured_mm));
+    track->has_moved =
+        track->has_moved || ih_distance2_s32(track->filter.head.centre_mm_q8, track->start_mm_q8) >
+                                (int64_t)params->moved_mm * params->moved_mm * 65536;
     average_logit(track, detection->logit_q10, params->memory_q16);
     judge(track, params);
 }
@@ -374,6 +375,7 @@ static void start_track(struct ih_tracks *tracks, const struct ih_tracks_params 
         .detection_count = 1,
         .index = index,
     };
+    memcpy(track->start_mm_q8, detection->head.centre_mm_q8, sizeof track->start_mm_q8);
     ih_kalman_start(&detection->head, params->measured_mm, &track->filter);
     if (is_double(tracks, tracks->track_count, track)) {
         return;

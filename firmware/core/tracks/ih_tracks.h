@@ -24,7 +24,8 @@
  *        A detection moves its track by the less, the less it looks like a head: it may be a hand before it.
  *        A track's log-odds are a running mean of its detections'. A head ends as one only when the mean says
  *        so clearly, below drop_logit: what moves on smoothly from a head is more probably one than a new thing
- *        that looks the same.
+ *        that looks the same. Rooms stand still: what was moved_mm away from where its track began needs
+ *        moved_logit less, to become a head and to stay one.
  *        The selected head is the one nearest to the camera (or the leftmost or rightmost in the
  *        picture, by side), a detected one before a predicted one; not one below accept_logit that is much
  *        less probable than the best. Another one replaces it after switch_frames frames.
@@ -54,6 +55,7 @@ struct ih_tracks_params {
     int32_t start_head_logit_q10;            /* a new track above this is a head at once, */
     int32_t mature_detections, accept_logit_q10; /* after so many detections one above this, */
     int32_t drop_logit_q10;                      /* until it falls below this */
+    int32_t moved_mm, moved_logit_q10;           /* what has moved so far needs so much less */
     int32_t memory_q16;                          /* weight of the old mean in the new one */
     int32_t through_percent, front_percent;      /* of the rays that meet it: gone, hidden */
     int32_t seen_min;                            /* points; a frame with fewer is lost */
@@ -70,6 +72,8 @@ struct ih_track {
     bool is_head;
     int32_t mean_logit_q10;
     struct ih_kalman filter;
+    int32_t start_mm_q8[3]; /* of the first detection */
+    bool has_moved;
     int64_t seen_us;
     int32_t detection_count; /* so far, at most 1000 */
     int32_t index; /* of its head in this frame, as for ih_tracks_head; IH_NONE: not yet known */

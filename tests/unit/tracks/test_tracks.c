@@ -220,14 +220,16 @@ static double from_q8(int64_t value)
  * ppm of 40 ms. A position error appears 13 times in the speed. Variances: steps of 25 ppm,
  * collected over some frames: 3e-4 of the value, and a gain's rounding of 2^-17 times the variance
  * before the detection. After a long step that was 250,000 mm^2, and what is left of it, 2 of 144
- * mm^2, is felt for ten frames. */
-static int frames_since_long;
+ * mm^2, is felt until ten sure detections have come. */
+#define SURE_Q10 (2 << 10)
+#define IDS_MAX 64
+static int sure_since_long[IDS_MAX]; /* by the track's id */
 
 static void check_state(const struct vector_sequence *sequence, int frame_index,
                         const struct vector_state *expected_state, const struct ih_track *track)
 {
     const char *name = sequence->name;
-    const double part = frames_since_long < 10 ? 0.02 : 3e-4;
+    const double part = sure_since_long[track->id % IDS_MAX] < 10 ? 0.02 : 3e-4;
     double gain_position = 0, gain_cross = 0, speed = expected_state->speed;
     int axis;
 
@@ -280,10 +282,13 @@ static void play(const struct vector_sequence *sequence)
             detection->logit_q10 = found[k].logit_q10;
         }
         view = now->view;
-        frames_since_long = now->time_us - time_us > 300000 ? 0 : frames_since_long + 1;
+        if (now->time_us - time_us > 300000) {
+            memset(sure_since_long, 0, sizeof sure_since_long);
+        }
         frame_at(now->time_us);
         for (k = 0; k < now->found_count; k++) {
             IH_TEST_EQUAL(found[k].track_id, verdict(k).track_id, sequence->name, i);
+            sure_since_long[verdict(k).track_id % IDS_MAX] += found[k].logit_q10 >= SURE_Q10;
         }
         IH_TEST_EQUAL(now->state_count, tracks.track_count, sequence->name, i);
         for (k = 0; k < now->state_count; k++) {
@@ -302,6 +307,38 @@ static void sequences_match_float64(void)
     for (i = 0; i < IH_TEST_COUNT(vector_sequences); i++) {
         setUp();
         play(&vector_sequences[i]);
+    }
+}
+
+/* --- movement ------------------------------------------------------------------------------------
+ */
+
+/* Neither is surely a head: the one that stands, however it jitters, stays none; the other is one as soon as its
+ * track is 25 mm from where it began, and stays one when it goes back. */
+static void what_has_moved_needs_less(void)
+{
+    static const struct {
+        double log_odds; /* accept_logit, 0.5, less moved_logit, 1, is -0.5 */
+        bool becomes;
+    } cases[] = {{0.49, true}, {-0.49, true}, {-0.51, false}};
+    int i, k;
+
+    params.moved_mm = 25;
+    params.moved_logit_q10 = 1024;
+    for (i = 0; i < IH_TEST_COUNT(cases); i++) {
+        bool moved = false;
+
+        ih_tracks_init(&tracks);
+        for (k = 0; k < 60; k++) {
+            frames_with(1, k % 2 == 0 ? 8 : -8, 0, 800, cases[i].log_odds);
+            IH_TEST_EQUAL(0, tracks.head_count, "heads of what stands", k);
+        }
+        for (k = 0; k < 60; k++) {
+            frames_with(1, 8 + 2 * (k < 30 ? k : 60 - k), 0, 800, cases[i].log_odds);
+            moved = moved || from_q8(tracks.track[0].filter.head.centre_mm_q8[0]) > 8 + 25;
+            IH_TEST_EQUAL(moved && cases[i].becomes, tracks.head_count, "heads of what moves", k);
+        }
+        TEST_ASSERT_TRUE(moved);
     }
 }
 
@@ -1409,6 +1446,7 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(sequences_match_float64);
+    RUN_TEST(what_has_moved_needs_less);
     RUN_TEST(a_moving_head_keeps_its_id);
     RUN_TEST(crossing_heads_keep_their_ids);
     RUN_TEST(the_order_of_detections_does_not_matter);
