@@ -212,10 +212,11 @@ vectors: ## write tests/vectors anew with the float64 reference; STAGES=dots: of
 	@tools/setup.sh vectors
 	@/usr/bin/python3 tools/oracle/make_vectors.py --out tests/vectors $(STAGES)
 
-learn: sim ## learn the score anew from rendered scenes and people; three hours
+learn: sim ## learn the score anew from rendered scenes and people; two hours
 	@tools/setup.sh learn
 	@tools/setup.sh people
-	@/usr/bin/python3 tools/people/sets.py learn $(BUILD)/learn/people
+	@/usr/bin/python3 tools/people/sets.py learn $(BUILD)/learn/people/level
+	@/usr/bin/python3 tools/people/sets.py mounted_learn $(BUILD)/learn/people/mounted
 	@/usr/bin/python3 tools/learn/learn.py --render $(BUILD)/host/tools/render/render \
 	  --host-sim $(BUILD)/host/sim/host_sim --work $(BUILD)/learn --people $(BUILD)/learn/people
 

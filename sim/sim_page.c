@@ -223,6 +223,8 @@ static void write_limits(struct app_write *write, const struct ih_tracks_params 
     app_write_int_field(write, "mature_findings", params->mature_detections);
     app_write_int_field(write, "accept_logit_q10", params->accept_logit_q10);
     app_write_int_field(write, "drop_logit_q10", params->drop_logit_q10);
+    app_write_int_field(write, "moved_mm", params->moved_mm);
+    app_write_int_field(write, "moved_logit_q10", params->moved_logit_q10);
     app_write_close(write, '}');
 }
 

@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
 """Learn the score (ih_score_weights.h and ih_surroundings_map.h of firmware/core/detect) from rendered scenes.
 
-learn.py --render PROGRAM --host-sim PROGRAM --work DIR [--seeds A-B] [--people DIR...] [--out DIR] [--also DIR...]
+learn.py --render PROGRAM --host-sim PROGRAM --work DIR [--seeds A-B] [--depth-seeds A-B] [--people DIR...] [--out DIR] [--also DIR...]
 
 Renders every scene of scenes.py for every seed into DIR (those already there are kept), runs the firmware over them and
 over the frames of people that tools/people has made, and fits a logistic model: log-odds = bias + one piecewise linear
 curve per kind of evidence + the map of the surroundings, with a penalty on curves that bend and on neighbours in the map
 that differ; then trees for what the curves leave. A detection within 55 mm of a head is one, beyond 100 mm it is none,
 between it is not used, and neither is one within 150 mm of a head that is hardly seen. A sequence of tools/people counts
-as six frames of tools/render. Run it twice: which detections remain depends a little on the score that rated them.
+as three frames of tools/render. Run it twice: which detections remain depends a little on the score that rated them.
 """
 
 import argparse
@@ -32,7 +32,8 @@ NO_HEAD_MM = 100
 UNCLEAR_MM = 150
 # Hardly a head is farther away in the scenes: what is would teach that far things are no heads.
 FAR_MM = 2900
-SEQUENCE_WEIGHT = 6.0
+# Of a rendered frame, and of a whole sequence of people.
+FRAME_WEIGHT, SEQUENCE_WEIGHT = 2.0, 6.0
 MAP_KIND = "surroundings"
 
 
@@ -52,7 +53,7 @@ def label(frame):
 def importance(seen, people):
     """Of every frame: each sequence of people counts as much as the others, in however many frames."""
     count = collections.Counter(frame["directory"] for frame in seen)
-    return [SEQUENCE_WEIGHT / count[f["directory"]] if f["directory"] in people else 1.0 for f in seen]
+    return [SEQUENCE_WEIGHT / count[f["directory"]] if f["directory"] in people else FRAME_WEIGHT for f in seen]
 
 
 def gather(seen, people):
@@ -113,6 +114,7 @@ def parse():
     parser.add_argument("--host-sim", required=True)
     parser.add_argument("--work", required=True)
     parser.add_argument("--seeds", default="5001-5020", help="learnt from (default 5001-5020)")
+    parser.add_argument("--depth-seeds", default="5001-5060", help="the same of depth images (default 5001-5060)")
     parser.add_argument("--check-seeds", default="6001-6006",
                         help="reported on, not learnt from (default 6001-6006)")
     parser.add_argument("--people", nargs="*", default=[], help="folders of frames directories of tools/people to learn from")
@@ -123,15 +125,20 @@ def parse():
     return parser.parse_args()
 
 
-def directories_of(arguments, seeds):
+def rendered(arguments, seeds, scenes_of_seed):
     first, last = (int(part) for part in seeds.split("-"))
     made = []
     for seed in range(first, last + 1):
-        for name, options in scenes.scenes_of_seed(seed):
+        for name, options in scenes_of_seed(seed):
             directory = os.path.join(arguments.work, "%s-%d" % (name, seed))
             frames.render(arguments.render, directory, seed, options)
             made.append(directory)
     return made
+
+
+def directories_of(arguments, seeds, depth_seeds):
+    return (rendered(arguments, seeds, scenes.scenes_of_seed)
+            + rendered(arguments, depth_seeds, scenes.depth_scenes_of_seed))
 
 
 def main():
@@ -143,17 +150,17 @@ def main():
 
     people = sorted(os.path.dirname(path) for folder in arguments.people
                     for path in glob.glob(os.path.join(folder, "**", "rig.json"), recursive=True))
-    seen = see(directories_of(arguments, arguments.seeds) + people)
+    seen = see(directories_of(arguments, arguments.seeds, arguments.depth_seeds) + people)
     kinds = seen[0]["kinds"]
     rows = gather(seen, set(people))
     print("%d frames, %d detections, %d heads" % (len(seen), len(rows[3]), rows[3].sum()))
     learnt = Score(*rows, kinds)
-    command = "tools/learn/learn.py --seeds %s --people %s" % (
-        arguments.seeds, " ".join(os.path.basename(os.path.normpath(folder)) for folder in arguments.people))
+    command = "tools/learn/learn.py --seeds %s --depth-seeds %s --people %s" % (
+        arguments.seeds, arguments.depth_seeds, " ".join(os.path.basename(os.path.normpath(folder)) for folder in arguments.people))
     model.write(os.path.join(arguments.out, "ih_score_weights.h"), learnt.curves, kinds, command)
     ray_map.write(os.path.join(arguments.out, "ih_surroundings_map.h"), learnt.map_q9, command)
     report(learnt, seen, arguments.limit)
-    report(learnt, see(directories_of(arguments, arguments.check_seeds)), arguments.limit)
+    report(learnt, see(directories_of(arguments, arguments.check_seeds, arguments.check_seeds)), arguments.limit)
     if arguments.also:
         report(learnt, see(arguments.also), arguments.limit)
 

@@ -1,7 +1,7 @@
 """The rendered scenes that the score is learnt from: as many kinds as tools/render has.
 
 Variety decides, not number: a score learnt in one kind of room fails in every other. So each scene has half of the frames
-that it could have, 6 at least, and there are the more seeds.
+that it could have, 6 at least, and there are the more seeds. Depth images are seen from up to 2 m farther away than dots.
 """
 
 RIGS = ("paper", "wide")
@@ -9,6 +9,7 @@ BACKGROUNDS = ("varied", "none", "far", "near")
 AMBIENTS = ("varied", "normal", "bright", "dim", "varied", "sunlight")
 PERSONS = ("varied", "child", "hat", "mask", "beard", "long-hair", "bald", "glasses", "headphones")
 ACTS = ("phone", "face", "back", "none")
+AWAY_MM = (0, 300, 700, 1200, 2000)
 
 
 def scenes_of_seed(seed):
@@ -44,3 +45,27 @@ def scenes_of_seed(seed):
         scene("clutter", "clutter", 40, rig, "--background", background),
         scene("clutter-other", "clutter", 30, other),
     ]
+
+
+def depth_scenes_of_seed(seed):
+    """The same for a depth camera; neighbouring scenes of a seed, and a scene of neighbouring seeds, differ in distance."""
+    background = ["--background", BACKGROUNDS[seed // 2 % len(BACKGROUNDS)]]
+    tilt = str((seed * 7 % 11 - 5) * 6)
+    scenes = [
+        ("still", "person", 6, *background),
+        ("hands", "person", 10, "--sequence", "2"),
+        ("people", "person", 8, "--person", PERSONS[seed % len(PERSONS)], *background),
+        ("acts", "person", 6, "--act", ACTS[seed % len(ACTS)]),
+        ("turning", "turning", 8, *background),
+        ("two", "two", 6),
+        ("visit", "visit", 16, *background),
+        ("tilted", "person", 6, "--tilt", tilt),
+        ("empty", "empty", 6),
+        ("empty-other", "empty", 6, *background),
+        ("table", "table", 10),
+        ("room", "room", 10),
+        ("clutter", "clutter", 20, *background),
+    ]
+    return [("depth-" + name, ["--rig", "range", "--scene", kind, "--frames", str(frames),
+                               "--away", str(AWAY_MM[(3 * seed + number) % len(AWAY_MM)]), *more])
+            for number, (name, kind, frames, *more) in enumerate(scenes)]

@@ -8,37 +8,53 @@ import rig as rigs
 from body import Model
 from scene import KINDS
 
-# set: first seed, rounds of all kinds, frames a sequence, further empty rooms
+# set: first seed, rounds of all kinds, frames a sequence, empty rooms beside them (of sets to learn from, in each round)
 SETS = {
-    "learn": (
-        410000, 40, 24, 120), "judge": (
-            70000, 2, 24, 8), "rigs": (
-                80000, 1, 20, 0), "sample": (
-                    90000, 1, 5, 0), "mounted": (
-                310000, 2, 24, 8), "mounted_judge": (
-                    330000, 1, 12, 4)}
+    "learn": (410000, 80, 24, 3),
+    "mounted_learn": (340000, 60, 24, 2),
+    "judge": (70000, 2, 24, 8),
+    "rigs": (80000, 1, 20, 0),
+    "sample": (90000, 1, 5, 0),
+    "mounted": (310000, 2, 24, 8),
+    "mounted_judge": (330000, 1, 12, 4),
+}
 # Sequences of these sets are seen by cameras that hang otherwise than level: tilt (down) and roll, in turn.
 MOUNTS = ((45.0, 0.0), (30.0, 90.0), (60.0, 0.0), (-20.0, 180.0), (0.0, -90.0), (50.0, 30.0), (20.0, -15.0))
+LEARN_TILTS = (45.0, 30.0, 60.0, -20.0, 50.0, 20.0, 40.0)
+LEARN_ROLLS = (0.0, 90.0, 0.0, 180.0, -30.0, 15.0)
 EMPTY_FRAMES = 30
 # More people teach more than more frames of the same: of each sequence to learn from every fourth frame is made. What
-# follows the people: kind, first seed after the people's, sequences.
+# follows the people of the level set: kind, first seed after the people's, sequences.
 LEARN_STEP = 4
-LEARN_MORE = (("above", 60000, 60), ("seat", 70000, 60), ("ground", 80000, 200), ("far", 90000, 120), ("hands", 100000, 60))
+LEARN_MORE = (("above", 60000, 80), ("seat", 70000, 180), ("ground", 80000, 250), ("far", 90000, 200), ("hands", 100000, 120))
 # All rigs of this set see the same people.
 SAME_PEOPLE = "rigs"
 ALL_RIGS = [*rigs.KINDS, "range"]
+
+
+def is_learnt(name):
+    return name.endswith("learn")
+
+
+def mount_of(name, seed):
+    """How the camera hangs, tilt and roll; None: level."""
+    if not name.startswith("mounted"):
+        return None
+    if is_learnt(name):
+        return LEARN_TILTS[seed % len(LEARN_TILTS)], LEARN_ROLLS[seed // len(LEARN_TILTS) % len(LEARN_ROLLS)]
+    return MOUNTS[seed % len(MOUNTS)]
 
 
 def sequences(name, rig_kind):
     """(directory, kind, seed, frames) of every sequence, kinds mixed so that a part is balanced."""
     first, rounds, frames, empty = SETS[name]
     if name != SAME_PEOPLE:
-        first += 1000 * ALL_RIGS.index(rig_kind)
-    if name == "learn":
-        one_round = [*KINDS] + ["empty"] * (empty // rounds)
-        people = [(kind, first + i) for i, kind in enumerate(one_round * rounds)]
+        first += (2000 if is_learnt(name) else 1000) * ALL_RIGS.index(rig_kind)
+    if is_learnt(name):
+        people = [(kind, first + i) for i, kind in enumerate(([*KINDS] + ["empty"] * empty) * rounds)]
         more = [(kind, first + seed + i) for kind, seed, count in LEARN_MORE for i in range(count)]
-        return [("%03d_%s" % (i, kind), kind, seed, frames) for i, (kind, seed) in enumerate(people + more)]
+        listed = people if name.startswith("mounted") else people + more
+        return [("%04d_%s" % (i, kind), kind, seed, frames) for i, (kind, seed) in enumerate(listed)]
     listed = [(kind, frames) for _ in range(rounds) for kind in KINDS]
     every = max(1, len(listed) // max(1, empty))
     mixed = []
@@ -61,8 +77,8 @@ def main():
         for rig_kind, directory, kind, seed, frames in row:
             out = os.path.join(options.out, rig_kind, directory)
             if not os.path.exists(os.path.join(out, "rig.json")):
-                make.make(model, out, rig_kind, kind, seed, frames, step=LEARN_STEP if options.set == "learn" else 1,
-                          mount=MOUNTS[seed % len(MOUNTS)] if options.set.startswith("mounted") else None)
+                make.make(model, out, rig_kind, kind, seed, frames, step=LEARN_STEP if is_learnt(options.set) else 1,
+                          mount=mount_of(options.set, seed))
 
 
 if __name__ == "__main__":
