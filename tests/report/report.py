@@ -22,6 +22,8 @@ from browser import Browser
 
 # Frames of each sequence: an empty seat at either end, hands, lost heads. The last one of sequence2 is broken here.
 TAKEN = [0, 1, 3, 4, 5, 6, 7, 8, 20, 21, 45, 49]
+# In this one the truth is moved, so that there are frames that are not right, however good the program is.
+ELSEWHERE = 20
 PAGE_BYTES_MAX = 30e6  # of 200 frames
 DESK = (1000, 700)  # px; two pictures beside each other, and no more to draw than that takes
 SHOWN = "document.documentElement.dataset.shown"
@@ -41,7 +43,7 @@ class Test:
 
 
 def make_input(source, folder):
-    """Two directories; a broken frame at the end of the second."""
+    """Two directories; the truth of a frame in each has the head elsewhere; a broken frame at the end of the second."""
     for sequence in ("sequence1", "sequence2"):
         to = os.path.join(folder, sequence)
         os.makedirs(to)
@@ -50,9 +52,12 @@ def make_input(source, folder):
             shutil.copy(os.path.join(source, sequence, name), to)
         for lines in ("truth.jsonl", "frames.jsonl"):
             with open(os.path.join(source, sequence, lines), encoding="utf-8") as file:
-                kept = [line for line in file if json.loads(line)["file"] in names]
+                kept = [entry for entry in map(json.loads, file) if entry["file"] in names]
+            for entry in kept:
+                if entry["file"] == "%06d.pgm" % ELSEWHERE and entry.get("head"):
+                    entry["head"]["centre_mm"][0] += 300
             with open(os.path.join(to, lines), "w", encoding="utf-8") as file:
-                file.writelines(kept)
+                file.writelines(json.dumps(entry) + "\n" for entry in kept)
     broken = os.path.join(folder, "sequence2", "000049.pgm")
     with open(broken, "r+b") as file:
         file.truncate(1000)
