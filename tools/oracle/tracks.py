@@ -19,7 +19,7 @@ POSITION_MAX, SPEED_MAX = 500.0, 3000.0
 LOGIT_MAX, GATE_LOGIT, CHOICE_LOGIT = 6.0, 4.0, 3.0
 # Below these log-odds a detection's variance is so many times as large.
 UNSURE_FACTORS = ((2.0, 4.0), (1.0, 25.0), (0.0, 49.0))
-FAST_LOGIT = 1024.0
+FAST_LOGIT = 2.0
 AXES_FRACTION = 0.25
 SLOW_S = 0.3
 SAME_MM = 80.0

@@ -12,8 +12,9 @@
 #define LOGIT_MAX_Q10 (6 << 10)
 /* A detection at the edge of the gate needs this much more than one at its centre. */
 #define GATE_LOGIT_Q10 (4 << 10)
-/* A detection beyond the gate is worse than all within one. */
-#define FAST_LOGIT_Q10 (1 << 20)
+/* A detection beyond the gate needs this much more than one within: where a head was that came nearer by 2 m/s there is
+ * something all the same, the person's chest, but it is hardly a head. */
+#define FAST_LOGIT_Q10 (2 << 10)
 /* Two tracks nearer than this follow the same head. */
 #define SAME_MM 80
 /* Two heads within this ellipsoid are one person's: another one has no room there. */

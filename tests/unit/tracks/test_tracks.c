@@ -1234,6 +1234,25 @@ static void a_head_that_jumps_stays_the_same_within_its_limits(void)
     }
 }
 
+/* Somebody comes 250 mm nearer in a frame. Where the head was is a chest now: the track goes on with the one that is more
+ * of a head by 2 log-odds and the 4 parts of its squared distance over the limit's, 250 / 450. */
+static void what_is_where_a_fast_head_was_does_not_keep_its_track(void)
+{
+    static const struct {
+        double chest;
+        bool goes;
+    } cases[] = {{-2.5, true}, {-0.25, true}, {-0.22, false}, {2.5, false}};
+    for (int i = 0; i < IH_TEST_COUNT(cases); i++) {
+        setUp();
+        frames_with(1, 0, 0, 1400, 3);
+        add(0, 0, 1400, cases[i].chest);
+        add(0, 0, 1150, 3);
+        frame();
+        IH_TEST_EQUAL(cases[i].goes ? 1 : 2, verdict(1).track_id, "the near head's track", i);
+        IH_TEST_EQUAL(cases[i].goes ? 0 : 1, verdict(0).track_id == 1, "the chest keeps it", i);
+    }
+}
+
 /* What hides a predicted head is the person's own one, measured. */
 static void a_prediction_ends_beside_a_measured_head_of_its_person(void)
 {
@@ -1493,6 +1512,7 @@ int main(void)
     RUN_TEST(sides_are_those_of_the_picture);
     RUN_TEST(the_nearest_head_is_selected);
     RUN_TEST(a_head_that_jumps_stays_the_same_within_its_limits);
+    RUN_TEST(what_is_where_a_fast_head_was_does_not_keep_its_track);
     RUN_TEST(a_prediction_ends_beside_a_measured_head_of_its_person);
     RUN_TEST(a_doubtful_detection_hardly_moves_its_track);
     RUN_TEST(a_doubtful_head_is_not_chosen_for_its_position);
