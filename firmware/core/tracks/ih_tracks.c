@@ -23,6 +23,8 @@
 /* A head that fewer rays meet has left the pattern. */
 #define VIEW_RAYS_MIN 4
 #define DETECTION_COUNT_MAX 1000
+/* As much open as closed above, or nothing to be seen. */
+#define OPEN_ABOVE_Q8 128
 /* A doubtful head is not chosen for its position when it is this much less probable than the best. */
 #define CHOICE_LOGIT_Q10 (3 << 10)
 
@@ -221,6 +223,15 @@ static void judge(struct ih_track *track, const struct ih_tracks_params *params)
     track->is_head = track->mean_logit_q10 > limit_q10;
 }
 
+/* Is it away from where the track began, and no chest? */
+static bool has_moved(const struct ih_track *track, const struct ih_tracks_params *params,
+                      const struct ih_detection *detection)
+{
+    return detection->evidence.value_q8[IH_EVIDENCE_HIGH] > OPEN_ABOVE_Q8 &&
+           ih_distance2_s32(track->filter.head.centre_mm_q8, track->start_mm_q8) >
+               (int64_t)params->moved_mm * params->moved_mm * 65536;
+}
+
 /* A track continues with a detection. */
 static void assign(struct ih_tracks *tracks, const struct ih_tracks_params *params,
                    struct ih_track *track, const struct ih_detection *detection, int32_t index)
@@ -230,9 +241,7 @@ static void assign(struct ih_tracks *tracks, const struct ih_tracks_params *para
     track->detection_count = ih_min_s32(track->detection_count + 1, DETECTION_COUNT_MAX);
     ih_kalman_correct(&track->filter, &detection->head,
                       variance_q8(detection->logit_q10, params->measured_mm));
-    track->has_moved =
-        track->has_moved || ih_distance2_s32(track->filter.head.centre_mm_q8, track->start_mm_q8) >
-                                (int64_t)params->moved_mm * params->moved_mm * 65536;
+    track->has_moved = track->has_moved || has_moved(track, params, detection);
     average_logit(track, detection->logit_q10, params->memory_q16);
     judge(track, params);
 }
@@ -345,23 +354,18 @@ static void prune(struct ih_tracks *tracks, const struct ih_tracks_params *param
     tracks->track_count = kept;
 }
 
-static bool has_id(const struct ih_tracks *tracks, int32_t id)
-{
-    for (int32_t t = 0; t < tracks->track_count; t++) {
-        if (tracks->track[t].id == id) {
-            return true;
-        }
-    }
-    return false;
-}
-
 /* The next id that no track has; after the largest comes 1 again. */
 static int32_t next_id(const struct ih_tracks *tracks)
 {
     int32_t id = tracks->last_id;
+    bool is_taken;
     do {
         id = id == INT32_MAX ? 1 : id + 1;
-    } while (has_id(tracks, id));
+        is_taken = false;
+        for (int32_t t = 0; t < tracks->track_count; t++) {
+            is_taken = is_taken || tracks->track[t].id == id;
+        }
+    } while (is_taken);
     return id;
 }
 

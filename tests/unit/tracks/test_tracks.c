@@ -56,6 +56,9 @@ static struct ih_view view; /* of every expected head in the next frames */
 static int64_t time_us;
 
 /* The tests' own parameters, so that tuning the defaults does not touch them. */
+/* How much is open above what is added. */
+static int32_t high_q8;
+
 void setUp(void)
 {
     int32_t bad_slot;
@@ -87,6 +90,7 @@ void setUp(void)
     params.switch_frames = 3;
     params.side = IH_SIDE_NEAREST;
     view = hit;
+    high_q8 = 240;
     time_us = 1000000;
 }
 
@@ -106,6 +110,7 @@ static struct ih_detection *add(double x, double y, double z, double logit)
     memset(detection, 0, sizeof *detection);
     detection->head = ih_ellipsoid_mean(centre);
     detection->logit_q10 = (int32_t)lround(logit * 1024);
+    detection->evidence.value_q8[IH_EVIDENCE_HIGH] = high_q8;
     return detection;
 }
 
@@ -314,13 +319,16 @@ static void sequences_match_float64(void)
  */
 
 /* Neither is surely a head: the one that stands, however it jitters, stays none; the other is one as soon as its
- * track is 25 mm from where it began, and stays one when it goes back. */
+ * track is 25 mm from where it began, and stays one when it goes back. What has a neck above it, or nothing that is
+ * seen, is none however it moves. */
 static void what_has_moved_needs_less(void)
 {
     static const struct {
         double log_odds; /* accept_logit, 0.5, less moved_logit, 1, is -0.5 */
+        int32_t high_q8;
         bool becomes;
-    } cases[] = {{0.49, true}, {-0.49, true}, {-0.51, false}};
+    } cases[] = {{0.49, 240, true}, {-0.49, 240, true}, {-0.51, 240, false},
+                 {0.49, 129, true}, {0.49, 128, false}, {0.49, 20, false}};
     int i, k;
 
     params.moved_mm = 25;
@@ -329,6 +337,7 @@ static void what_has_moved_needs_less(void)
         bool moved = false;
 
         ih_tracks_init(&tracks);
+        high_q8 = cases[i].high_q8;
         for (k = 0; k < 60; k++) {
             frames_with(1, k % 2 == 0 ? 8 : -8, 0, 800, cases[i].log_odds);
             IH_TEST_EQUAL(0, tracks.head_count, "heads of what stands", k);
