@@ -47,14 +47,14 @@ void rd_depth_free(struct rd_depth *depth)
 static void look(struct rd_depth *depth, const struct rd_rig *rig, const struct rd_scene *scene, int row, int column)
 {
     double middle = 0.5 * (RD_DEPTH_SQUARE - 1);
-    struct rd_vec way = rd_rig_pixel_ray(rig, column * RD_DEPTH_SQUARE + middle, row * RD_DEPTH_SQUARE + middle);
-    struct rd_ray ray = {rd_v(0.0, 0.0, 0.0), way};
+    struct rd_vec dir = rd_rig_pixel_ray(rig, column * RD_DEPTH_SQUARE + middle, row * RD_DEPTH_SQUARE + middle);
+    struct rd_ray ray = {rd_v(0.0, 0.0, 0.0), dir};
     struct rd_hit hit;
     int at = row * depth->columns + column;
     depth->disparity[at] = 0.0f;
     depth->light[at] = 0.0f;
     if (rd_scene_hit(scene, &ray, RD_FAR_AWAY_MM, &hit)) {
-        double bright = fmin(1.0, hit.albedo / ALBEDO_ENOUGH) * fabs(rd_dot(hit.normal, way));
+        double bright = fmin(1.0, hit.albedo / ALBEDO_ENOUGH) * fabs(rd_dot(hit.normal, dir));
         depth->disparity[at] = (float)(depth->product / hit.point_mm.z);
         depth->light[at] = (float)(bright * LIGHT_MM / fmax(hit.point_mm.z, 0.4 * LIGHT_MM));
     }
@@ -66,15 +66,15 @@ static double smooth(const struct rd_depth *depth, int row, int column, double s
     return 2.0 * rd_noise3(column / squares, row / squares, frame * 7.37, depth->seed + (what << 32)) - 1.0;
 }
 
-/* The greatest disparity within the spread of an edge. */
+/* The largest disparity within the spread of an edge. */
 static double spread_at(const struct rd_depth *depth, int row, int column)
 {
-    double most = 0.0;
+    double max = 0.0;
     for (int c = column - depth->edge; c <= column + depth->edge; c++) {
         if (c >= 0 && c < depth->columns)
-            most = fmax(most, (double)depth->disparity[row * depth->columns + c]);
+            max = fmax(max, (double)depth->disparity[row * depth->columns + c]);
     }
-    return most;
+    return max;
 }
 
 /* Z in mm, 0: not known. `shadow`: the projector's light does not get there. */

@@ -193,12 +193,12 @@ static int64_t variance_q8(int32_t logit_q10, int32_t measured_mm)
 {
     static const struct {
         int32_t below_q10, factor;
-    } doubt[] = {{0, 49}, {1 << 10, 25}, {2 << 10, 4}, {INT32_MAX, 1}};
+    } unsure[] = {{0, 49}, {1 << 10, 25}, {2 << 10, 4}, {INT32_MAX, 1}};
     int32_t i = 0;
-    while (logit_q10 >= doubt[i].below_q10) {
+    while (logit_q10 >= unsure[i].below_q10) {
         i++;
     }
-    return (int64_t)measured_mm * measured_mm * 256 * doubt[i].factor;
+    return (int64_t)measured_mm * measured_mm * 256 * unsure[i].factor;
 }
 
 static void average_logit(struct ih_track *track, int32_t logit_q10, int32_t memory_q16)
