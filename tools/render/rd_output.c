@@ -205,7 +205,6 @@ static bool write_rig(const struct rd_output *output, const struct rd_rig *rig)
         return false;
     double camera[9] = {rig->fx_px, 0.0, rig->cx_px, 0.0, rig->fy_px, rig->cy_px, 0.0, 0.0, 1.0};
     double lens[5] = {rig->k1, rig->k2, rig->p1, rig->p2, rig->k3};
-    double projector[3] = {rig->projector_mm.x, rig->projector_mm.y, rig->projector_mm.z};
     double rays[3 * RD_DOT_COUNT];
     for (int i = 0; i < RD_DOT_COUNT; i++) {
         rays[3 * i] = rig->dot_rays[i].x;
@@ -217,6 +216,7 @@ static bool write_rig(const struct rd_output *output, const struct rd_rig *rig)
     write_matrix(file, "camera_matrix", 3, 3, camera);
     write_matrix(file, "distortion_coefficients", 1, 5, lens);
     if (!rig->is_range) {
+        double projector[3] = {rig->projector_mm.x, rig->projector_mm.y, rig->projector_mm.z};
         write_matrix(file, "projector_origin", 3, 1, projector);
         write_matrix(file, "dot_rays", RD_DOT_COUNT, 3, rays);
     }

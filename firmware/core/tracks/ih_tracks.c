@@ -191,14 +191,13 @@ static bool fits(const struct ih_tracks *tracks, const struct ih_tracks_params *
  * variance is so many times that of a sure one. Chosen on hands before faces (E025). */
 static int64_t variance_q8(int32_t logit_q10, int32_t measured_mm)
 {
-    static const struct {
-        int32_t below_q10, factor;
-    } unsure[] = {{0, 49}, {1 << 10, 25}, {2 << 10, 4}, {INT32_MAX, 1}};
+    static const int32_t below_q10[] = {0, 1 << 10, 2 << 10, INT32_MAX};
+    static const int32_t factor[] = {49, 25, 4, 1};
     int32_t i = 0;
-    while (logit_q10 >= unsure[i].below_q10) {
+    while (logit_q10 >= below_q10[i]) {
         i++;
     }
-    return (int64_t)measured_mm * measured_mm * 256 * unsure[i].factor;
+    return (int64_t)measured_mm * measured_mm * 256 * factor[i];
 }
 
 static void average_logit(struct ih_track *track, int32_t logit_q10, int32_t memory_q16)
