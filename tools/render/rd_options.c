@@ -349,6 +349,41 @@ static bool is_of_dots(int id)
     return false;
 }
 
+/* `of_dots`: an option that was given of what a depth camera does not have, or NULL. */
+static bool fit_together(const struct rd_options *options, bool scene_given, const char *of_dots)
+{
+    if (options->range_dir != NULL && scene_given) {
+        fputs("render: --range takes the place of --scene\n", stderr);
+        return false;
+    }
+    if ((options->scene == RD_SCENE_BOARD) != (options->board_file != NULL && options->board_mm > 0.0)) {
+        fputs("render: --scene board, --board and --board-mm go together\n", stderr);
+        return false;
+    }
+    if (options->rig == RD_RIG_RANGE && of_dots != NULL) {
+        fprintf(stderr, "render: --%s: a depth camera (--rig range) has none of that\n", of_dots);
+        return false;
+    }
+    if (options->away_mm > 0.0 && (options->range_dir != NULL || options->scene == RD_SCENE_BOARD)) {
+        fputs("render: --away is of people and rooms, not of boards and real depth images\n", stderr);
+        return false;
+    }
+    return true;
+}
+
+/* What follows from other options where it was not given. */
+static void fill_in(struct rd_options *options)
+{
+    if (options->width == 0) {
+        options->width = options->rig == RD_RIG_RANGE ? 640 : 752;
+        options->height = options->rig == RD_RIG_RANGE ? 480 : 582;
+    }
+    if (!options->rig_seed_given)
+        options->rig_seed = options->seed;
+    if (options->frame_count == 0)
+        options->frame_count = options->range_dir != NULL ? 1 : options->scene == RD_SCENE_VISIT ? 100 : 50;
+}
+
 enum rd_options_result rd_options_parse(int argc, char **argv, struct rd_options *options)
 {
     static const struct option long_options[] = {
@@ -405,30 +440,9 @@ enum rd_options_result rd_options_parse(int argc, char **argv, struct rd_options
         fputs("render: one OUT_DIR is needed; see render --help\n", stderr);
         return RD_OPTIONS_WRONG;
     }
-    if (options->range_dir != NULL && scene_given) {
-        fputs("render: --range takes the place of --scene\n", stderr);
+    if (!fit_together(options, scene_given, of_dots))
         return RD_OPTIONS_WRONG;
-    }
-    if ((options->scene == RD_SCENE_BOARD) != (options->board_file != NULL && options->board_mm > 0.0)) {
-        fputs("render: --scene board, --board and --board-mm go together\n", stderr);
-        return RD_OPTIONS_WRONG;
-    }
-    if (options->rig == RD_RIG_RANGE && of_dots != NULL) {
-        fprintf(stderr, "render: --%s: a depth camera (--rig range) has none of that\n", of_dots);
-        return RD_OPTIONS_WRONG;
-    }
-    if (options->away_mm > 0.0 && (options->range_dir != NULL || options->scene == RD_SCENE_BOARD)) {
-        fputs("render: --away is of people and rooms, not of boards and real depth images\n", stderr);
-        return RD_OPTIONS_WRONG;
-    }
-    if (options->width == 0) {
-        options->width = options->rig == RD_RIG_RANGE ? 640 : 752;
-        options->height = options->rig == RD_RIG_RANGE ? 480 : 582;
-    }
-    if (!options->rig_seed_given)
-        options->rig_seed = options->seed;
-    if (options->frame_count == 0)
-        options->frame_count = options->range_dir != NULL ? 1 : options->scene == RD_SCENE_VISIT ? 100 : 50;
+    fill_in(options);
     options->out_dir = argv[optind];
     return RD_OPTIONS_RUN;
 }
