@@ -12,8 +12,8 @@
 #define LOGIT_MAX_Q10 (6 << 10)
 /* A detection at the edge of the gate needs this much more than one at its centre. */
 #define GATE_LOGIT_Q10 (4 << 10)
-/* A detection beyond the gate needs this much more than one within: where a head was that came nearer by 2 m/s there is
- * something all the same, the person's chest, but it is hardly a head. */
+/* A detection beyond the gate needs this much more than one within: where somebody's head was who comes nearer at 2 m/s
+ * there is still something, the chest, but hardly a head. */
 #define FAST_LOGIT_Q10 (2 << 10)
 /* Two tracks nearer than this follow the same head. */
 #define SAME_MM 80
@@ -191,10 +191,11 @@ static bool fits(const struct ih_tracks *tracks, const struct ih_tracks_params *
  * variance is so many times that of a sure one. Chosen on hands before faces (E025). */
 static int64_t variance_q8(int32_t logit_q10, int32_t measured_mm)
 {
-    static const int32_t below_q10[] = {0, 1 << 10, 2 << 10, INT32_MAX};
+    static const int32_t below_q10[] = {0, 1 << 10, 2 << 10};
     static const int32_t factor[] = {49, 25, 4, 1};
+    const int32_t count = (int32_t)(sizeof below_q10 / sizeof below_q10[0]);
     int32_t i = 0;
-    while (logit_q10 >= below_q10[i]) {
+    while (i < count && logit_q10 >= below_q10[i]) {
         i++;
     }
     return (int64_t)measured_mm * measured_mm * 256 * factor[i];

@@ -1290,8 +1290,8 @@ static void a_doubtful_detection_hardly_moves_its_track(void)
 {
     static const struct {
         double logit, factor;
-    } rows[] = {{2.5, 1}, {1.5, 4}, {0.5, 25}, {-1, 49}};
-    for (int i = 0; i < 4; i++) {
+    } rows[] = {{INT32_MAX / 1024.0, 1}, {2.5, 1}, {1.5, 4}, {0.5, 25}, {-1, 49}};
+    for (int i = 0; i < IH_TEST_COUNT(rows); i++) {
         const double gain = 292 / (292 + 144 * rows[i].factor);
         setUp();
         frames_with(1, 0, 0, 900, 3);
