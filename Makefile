@@ -218,7 +218,7 @@ learn: sim ## learn the score anew from rendered scenes and people; two hours
 	@/usr/bin/python3 tools/people/sets.py learn $(BUILD)/learn/people/level
 	@/usr/bin/python3 tools/people/sets.py mounted_learn $(BUILD)/learn/people/mounted
 	@/usr/bin/python3 tools/learn/learn.py --render $(BUILD)/host/tools/render/render \
-	  --host-sim $(BUILD)/host/sim/host_sim --work $(BUILD)/learn --people $(BUILD)/learn/people
+	  --host-sim $(BUILD)/host/sim/host_sim --work $(BUILD)/learn --people $(BUILD)/learn/people/level $(BUILD)/learn/people/mounted
 
 learn-pose: ## learn anew where heads look, from people that dots are cast on; half an hour
 	@tools/setup.sh vectors

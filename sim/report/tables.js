@@ -99,7 +99,7 @@ const Tables = (() => {
       : `The score is the probability of a head by all evidence together, of a track its mean over frames. A head starts ` +
         `above log-odds of ${odds(l.start_head_logit_q10)}, or ${odds(l.accept_logit_q10)} once it was found in ${l.mature_findings} frames, ` +
         `and stays one until they fall below ${odds(l.drop_logit_q10)} (a score of ${probability(l.drop_logit_q10 / 1024).toFixed(3)}). ` +
-        `What has moved by ${l.moved_mm} mm since it was first found needs ${odds(l.moved_logit_q10)} less.`;
+        `What has moved by ${l.moved_mm} mm since it was first found needs ${odds(l.moved_logit_q10)} less, if more is open than closed above it.`;
     const head = ["No.", "Decision", ...(dir.paper ? [] : ["Score"]), "Centre x, y, z in mm", "Distance in mm", "Ellipse in pixels"];
     fillCards(into, "Hypotheses of this frame", head, hypotheses.map((_, i) => hypothesisRow(frame, i, chosen, choose)));
   }

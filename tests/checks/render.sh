@@ -651,7 +651,7 @@ refuse "too steep" 2 "--tilt" --tilt 41 a
 refuse "tilt that is no number" 2 "--tilt" --tilt -up a
 refuse "9 bits" 2 "--bits" --bits 9 a
 refuse "unknown scene" 2 "--scene" --scene cat a
-refuse "unknown rig" 2 "--rig" --rig narrow a
+refuse "unknown rig" 2 "--rig narrow: must be paper, wide or range" --rig narrow a
 refuse "sequence 3" 2 "--sequence" --sequence 3 a
 [ ! -e a ] && reason= || reason="a directory was made"
 result "wrong options leave nothing behind" "$reason"

@@ -34,7 +34,7 @@ class Params:
     gate_mm, gate_mm_per_s = 90, 300
     start, start_head, accept, drop, keep = -1.0, 1.0, 0.5, -0.5, -3.0
     mature_detections = 3
-    moved_mm, moved = 25, 1.0
+    moved_mm, moved = 25, 1.0  # all detections have more open than closed above them
     memory = 0.75
     through_percent, front_percent = 50, 30
     carry_s, gap_s = 1.0, 2.0

@@ -110,7 +110,7 @@ static struct rd_vec draw_neighbour(uint64_t seed, struct rd_vec *first_mm)
     return rd_v(side * sqrt(apart_mm * apart_mm - behind_mm * behind_mm), up_mm, behind_mm);
 }
 
-/* A camera that looks up sees what is below the head nearer than the head. */
+/* A camera that looks up sees what is below the head nearer than the head; then everything moves away. */
 static void plan_shift(struct rd_company *company, const struct rd_options *options, struct rd_vec head_mm)
 {
     company->shifted = options->tilt_deg != 0.0 || options->away_mm != 0.0;

@@ -257,7 +257,7 @@ static bool take_word(int id, const char *text, struct rd_options *options)
         known = read_word("laser", text, lasers, "on or alternate", &index);
         options->alternate = index == 1;
     } else if (id == OPT_RIG) {
-        known = read_word("rig", text, rigs, "paper or wide", &index);
+        known = read_word("rig", text, rigs, "paper, wide or range", &index);
         options->rig = (enum rd_rig_kind)index;
     } else if (id == OPT_BACKGROUND) {
         known = read_word("background", text, backgrounds, "varied, near, far or none", &index);
@@ -341,7 +341,8 @@ static bool is_of_dots(int id)
 {
     static const int ids[] = {OPT_BOARD,    OPT_RANGE,        OPT_BITS,  OPT_AMBIENT, OPT_DISTORTION,
                               OPT_KNOCK,    OPT_KNOCK_SHIFT,  OPT_DRIFT, OPT_LASER,   OPT_CALIBRATION_NOISE,
-                              OPT_ASSEMBLY, OPT_KNOCK_CAMERA, OPT_BLUR,  OPT_MISSING, OPT_EXPOSURE};
+                              OPT_ASSEMBLY, OPT_KNOCK_CAMERA, OPT_BLUR,  OPT_MISSING, OPT_EXPOSURE,
+                              OPT_GLARE};
     for (size_t i = 0; i < sizeof ids / sizeof ids[0]; i++) {
         if (ids[i] == id)
             return true;

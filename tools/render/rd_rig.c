@@ -115,7 +115,7 @@ void rd_rig_make(struct rd_rig *rig, const struct rd_options *options)
     rig->cx_px = 0.5 * (options->width - 1);
     rig->cy_px = 0.5 * (options->height - 1);
     rig->near_mm = NEAR_MM;
-    rig->far_mm = open_room ? ROOM_FAR_MM : SEAT_FAR_MM;
+    rig->far_mm = (open_room ? ROOM_FAR_MM : SEAT_FAR_MM) + options->away_mm;
     rig->is_range = options->rig == RD_RIG_RANGE;
     if (rig->is_range) {
         rig->fx_px = rig->fy_px = RANGE_FOCAL_PX * options->focal * options->width / RANGE_WIDTH_PX;

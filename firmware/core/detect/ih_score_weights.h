@@ -1,5 +1,5 @@
 /* ih_score_weights - the curves and trees of ih_score, written by
- *     tools/learn/learn.py --seeds 5001-5020 --depth-seeds 5001-5060 --people people
+ *     tools/learn/learn.py --seeds 5001-5020 --depth-seeds 5001-5060 --people level mounted
  * Do not edit. */
 #ifndef IH_SCORE_WEIGHTS_H
 #define IH_SCORE_WEIGHTS_H

@@ -1,5 +1,5 @@
 /* ih_surroundings_map - the map of ih_surroundings, written by
- *     tools/learn/learn.py --seeds 5001-5020 --depth-seeds 5001-5060 --people people
+ *     tools/learn/learn.py --seeds 5001-5020 --depth-seeds 5001-5060 --people level mounted
  * Do not edit. A line is a cell: its nine ranges of depth, the nearest first, then an empty ray. */
 #ifndef IH_SURROUNDINGS_MAP_H
 #define IH_SURROUNDINGS_MAP_H

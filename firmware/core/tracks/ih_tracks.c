@@ -151,7 +151,7 @@ static bool is_own(const int32_t *centre_mm_q8, const int32_t *other_mm_q8, int6
     return *apart2_q16 < 65536;
 }
 
-/* Beyond the gate: a head whose person moves fast, and a detection that is surely a head. */
+/* Beyond the gate: a head whose person moves fast, and a detection that is one rather than not. */
 static bool fits_fast(const struct ih_tracks_params *params, const struct ih_track *track,
                       const struct ih_detection *detection, int32_t *merit_q10)
 {

@@ -55,10 +55,10 @@ static struct ih_predicted predicted;
 static struct ih_view view; /* of every expected head in the next frames */
 static int64_t time_us;
 
-/* The tests' own parameters, so that tuning the defaults does not touch them. */
 /* How much is open above what is added. */
 static int32_t high_q8;
 
+/* The tests' own parameters, so that tuning the defaults does not touch them. */
 void setUp(void)
 {
     int32_t bad_slot;
@@ -78,6 +78,8 @@ void setUp(void)
     params.accept_logit_q10 = 512;
     params.drop_logit_q10 = -512;
     params.keep_logit_q10 = -3072;
+    params.moved_mm = 25;
+    params.moved_logit_q10 = 1024;
     params.memory_q16 = 49152;
     params.through_percent = 50;
     params.front_percent = 30;
@@ -331,8 +333,6 @@ static void what_has_moved_needs_less(void)
                  {0.49, 129, true}, {0.49, 128, false}, {0.49, 20, false}};
     int i, k;
 
-    params.moved_mm = 25;
-    params.moved_logit_q10 = 1024;
     for (i = 0; i < IH_TEST_COUNT(cases); i++) {
         bool moved = false;
 
