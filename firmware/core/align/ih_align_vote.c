@@ -39,14 +39,13 @@ static void sum_moved(const uint16_t from[IH_ALIGN_SIDE_MAX][IH_ALIGN_PADDED],
                       const int32_t first[IH_ALIGN_SIDE_MAX], const struct ih_align_grid *grid,
                       uint16_t *sum)
 {
-    for (int32_t i = 0; i < grid->bin_count; i += 2 * IH_I16_LANES) {
-        const uint16_t *bin = &from[0][i];
-        struct ih_u16_two total = {ih_u16_all(0), ih_u16_all(0)};
+    for (int32_t i = 0; i < grid->bin_count; i += 32) {
+        struct ih_u16_32 total = {0};
         for (int32_t k = 0; k < grid->side; k++) {
-            total = ih_u16_two_add(total, ih_u16_two_load(&bin[first[k]]));
-            bin += IH_ALIGN_PADDED;
+            const uint16_t *bin = &from[k][i + first[k]];
+            total = ih_u16_32_add(total, ih_u16_32_next(&bin, 0));
         }
-        ih_u16_two_store(&sum[i], total);
+        ih_u16_32_put(&sum, i, &total);
     }
 }
 #else

@@ -54,26 +54,23 @@ static uint16_t *binomial_of(struct ih_bandpass *band, int32_t ago)
 #if IH_CORTEXM
 #include "dots/ih_bandpass_cortexm.h"
 #elif IH_I16_LANES > 0
-static inline void take_two(const uint8_t *pixel, uint16_t *restrict three,
-                            uint16_t *restrict binomial, uint16_t *restrict nine)
-{
-    const struct ih_u16_two without = ih_u16_two_sub(ih_u16_two_load(nine), ih_u16_two_load(three));
-    const struct ih_u16_two middle = ih_u16_two_load_u8(&pixel[1]);
-    const struct ih_u16_two pair = ih_u16_two_add(ih_u16_two_load_u8(pixel), middle);
-    const struct ih_u16_two sum = ih_u16_two_add(pair, ih_u16_two_load_u8(&pixel[2]));
-    ih_u16_two_store(nine, ih_u16_two_add(without, sum));
-    ih_u16_two_store(three, sum);
-    ih_u16_two_store(binomial, ih_u16_two_add(sum, middle));
-}
-
-/* Whole steps: gcc 12 unrolls the inner loop alone. */
 static void take_bytes(const uint8_t *restrict pixel, int32_t count, uint16_t *restrict three,
                        uint16_t *restrict binomial, uint16_t *restrict nine)
 {
-    for (int32_t step = 0; step < count; step += IH_BANDPASS_STEP) {
-        for (int32_t i = step; i < step + IH_BANDPASS_STEP; i += 2 * IH_I16_LANES) {
-            take_two(&pixel[i], &three[i], &binomial[i], &nine[i]);
-        }
+    const uint8_t *left = pixel, *middle = &pixel[1], *right = &pixel[2];
+    const uint16_t *oldest = three, *before = nine;
+    uint16_t *to_three = three, *to_binomial = binomial, *to_nine = nine;
+    for (int32_t i = 0; i < count; i += IH_BANDPASS_STEP) {
+        const struct ih_u16_32 here = ih_u16_32_next_u8(&middle, i);
+        struct ih_u16_32 sum = ih_u16_32_add(ih_u16_32_next_u8(&left, i), here);
+        sum = ih_u16_32_add(sum, ih_u16_32_next_u8(&right, i));
+        struct ih_u16_32 all =
+            ih_u16_32_sub(ih_u16_32_next(&before, i), ih_u16_32_next(&oldest, i));
+        ih_u16_32_put(&to_three, i, &sum);
+        all = ih_u16_32_add(all, sum);
+        ih_u16_32_put(&to_nine, i, &all);
+        struct ih_u16_32 twice = ih_u16_32_add(sum, here);
+        ih_u16_32_put(&to_binomial, i, &twice);
     }
 }
 
@@ -82,14 +79,11 @@ static bool is_any_eight_above(const uint16_t *nine, const uint16_t *oldest, int
                                int32_t limit)
 {
     ih_i16 max = {0};
-    for (int32_t step = 0; step < count; step += IH_BANDPASS_STEP) {
-        for (int32_t i = step; i < step + IH_BANDPASS_STEP; i += 2 * IH_I16_LANES) {
-            const struct ih_u16_two eight =
-                ih_u16_two_sub(ih_u16_two_load(&nine[i]), ih_u16_two_load(&oldest[i]));
-            max = ih_i16_max(max, ih_i16_max((ih_i16)eight.low, (ih_i16)eight.high));
-        }
+    for (int32_t i = 0; i < count; i += IH_BANDPASS_STEP) {
+        const struct ih_u16_32 all = ih_u16_32_next(&nine, i);
+        max = ih_i16_max(max, ih_u16_32_max(ih_u16_32_sub(all, ih_u16_32_next(&oldest, i))));
     }
-    return ih_i16_any(max > ih_i16_all((int16_t)ih_clamp_s32(limit, 0, INT16_MAX)));
+    return ih_i16_any_above(max, (int16_t)ih_clamp_s32(limit, 0, INT16_MAX));
 }
 #else
 static void take_bytes(const uint8_t *pixel, int32_t count, uint16_t *restrict three,

@@ -26,35 +26,45 @@ static inline bool is_any_above(const int16_t *response, int16_t limit)
 }
 
 #if IH_I16_LANES > 0
-/* (81 i + 8) / 16 - b; 81 / 16 is 8 * 20736 / 2^15. */
-static inline ih_i16 respond_lanes(ih_u16 sum, ih_u16 box)
+/* Where sums and R of the next group are. */
+struct place {
+    const uint16_t *above, *middle, *below;
+    const uint16_t *left, *centre, *right; /* sums of nine */
+    uint16_t *response;
+};
+
+static inline struct place place_of(const struct ih_bandpass_rows *rows, const uint16_t *nine,
+                                    int32_t u, int16_t *response)
 {
-    return (ih_i16)(ih_u16_mul_round(sum << 3, ih_u16_all(INNER << 8)) - box);
+    return (struct place){&rows->above[u], &rows->middle[u],    &rows->below[u],         &nine[u],
+                          &nine[u + SIDE], &nine[u + 2 * SIDE], (uint16_t *)&response[u]};
 }
 
-/* 2 * IH_I16_LANES pixels; the larger R of each two lanes. */
-static inline ih_i16 respond_two(const struct ih_bandpass_rows *rows, const uint16_t *nine,
-                                 int32_t u, int16_t *restrict response)
+/* (81 i + 8) / 16 - b of a group; 81 / 16 is 8 * 20736 / 2^15. The larger R of each few lanes. */
+__attribute__((always_inline)) static inline ih_i16 respond_group(struct place *at, int32_t u)
 {
-    const struct ih_u16_two middle = ih_u16_two_load(&rows->middle[u]);
-    const struct ih_u16_two sides =
-        ih_u16_two_add(ih_u16_two_load(&rows->above[u]), ih_u16_two_load(&rows->below[u]));
-    const struct ih_u16_two sum = ih_u16_two_add_twice(sides, middle);
-    const struct ih_u16_two box =
-        ih_u16_two_add(ih_u16_two_add(ih_u16_two_load(&nine[u]), ih_u16_two_load(&nine[u + SIDE])),
-                       ih_u16_two_load(&nine[u + 2 * SIDE]));
-    const ih_i16 low = respond_lanes(sum.low, box.low);
-    const ih_i16 high = respond_lanes(sum.high, box.high);
-    ih_u16_two_store((uint16_t *)&response[u], (struct ih_u16_two){(ih_u16)low, (ih_u16)high});
-    return ih_i16_max(low, high);
+    const struct ih_u16_32 sides =
+        ih_u16_32_add(ih_u16_32_next(&at->above, u), ih_u16_32_next(&at->below, u));
+    struct ih_u16_32 sum = ih_u16_32_add_twice(sides, ih_u16_32_next(&at->middle, u));
+    for (int32_t k = 0; k < IH_U16_PARTS; k++) {
+        sum.part[k] = ih_u16_mul_round(sum.part[k] << 3, ih_u16_all(INNER << 8));
+    }
+    const struct ih_u16_32 box =
+        ih_u16_32_add(ih_u16_32_next(&at->left, u), ih_u16_32_next(&at->centre, u));
+    struct ih_u16_32 response =
+        ih_u16_32_sub(ih_u16_32_sub(sum, box), ih_u16_32_next(&at->right, u));
+    ih_u16_32_put(&at->response, u, &response);
+    return ih_u16_32_max(response);
 }
 
-/* The last vector ends with the row; some of its lanes are there already. */
+/* The last group ends with the row; some of its lanes are there already. */
 static void respond_bytes(const struct ih_bandpass_rows *rows, const uint16_t *nine, int32_t first,
                           int32_t width, int16_t *response)
 {
-    for (int32_t u = first; u < width; u += 2 * IH_I16_LANES) {
-        (void)respond_two(rows, nine, ih_min_s32(u, width - 2 * IH_I16_LANES), response);
+    const struct ih_bandpass_rows in = *rows;
+    for (int32_t u = first; u < width; u += GROUP) {
+        struct place at = place_of(&in, nine, ih_min_s32(u, width - GROUP), response);
+        (void)respond_group(&at, 0);
     }
 }
 #else
@@ -91,19 +101,16 @@ static void list_groups(struct ih_bandpass_row *out, int32_t u, int32_t width, i
 
 #if !IH_CORTEXM && IH_I16_LANES > 0
 /* Whole groups are listed while their R is in registers. */
-static int32_t respond_and_list(const struct ih_bandpass_rows *rows, const uint16_t *restrict nine,
-                                int32_t groups, const int16_t *restrict limit,
-                                int16_t *restrict response, int16_t *restrict first)
+__attribute__((always_inline)) static inline int32_t
+respond_and_list(const struct ih_bandpass_rows *rows, const uint16_t *restrict nine, int32_t groups,
+                 const int16_t *restrict limit, int16_t *restrict response, int16_t *restrict first)
 {
-    const struct ih_bandpass_rows in = *rows;
+    struct place at = place_of(rows, nine, 0, response);
     size_t group = 0, listed = 0;
     for (int32_t u = 0; u < GROUP * groups; u += GROUP) {
-        ih_i16 max = respond_two(&in, nine, u, response);
-        for (int32_t at = u + 2 * IH_I16_LANES; at < u + GROUP; at += 2 * IH_I16_LANES) {
-            max = ih_i16_max(max, respond_two(&in, nine, at, response));
-        }
+        const ih_i16 max = respond_group(&at, u);
         first[listed] = (int16_t)u;
-        listed += ih_i16_any(max > ih_i16_all(limit[group]));
+        listed += ih_i16_any_above(max, limit[group]);
         group++;
     }
     return (int32_t)listed;

@@ -8,25 +8,30 @@
 #define GROUP IH_BANDPASS_GROUP
 
 #if !IH_CORTEXM && IH_I16_LANES > 0
-/* Maxima above the limit: greater than all neighbours before, not below any after. */
-static inline ih_i16 find_lanes(const int16_t *above, const int16_t *middle, const int16_t *below,
-                                int16_t limit)
+static inline struct ih_u16_32 load(const int16_t *response)
 {
-    const ih_i16 peak = ih_i16_load(middle);
-    const ih_i16 before = ih_i16_max(ih_i16_max(ih_i16_load(&above[-1]), ih_i16_load(above)),
-                                     ih_i16_max(ih_i16_load(&above[1]), ih_i16_load(&middle[-1])));
-    const ih_i16 after = ih_i16_max(ih_i16_max(ih_i16_load(&below[-1]), ih_i16_load(below)),
-                                    ih_i16_max(ih_i16_load(&below[1]), ih_i16_load(&middle[1])));
-    return (peak > ih_i16_max(before, ih_i16_all(limit))) & (peak >= after);
+    const uint16_t *from = (const uint16_t *)response;
+    return ih_u16_32_next(&from, 0);
 }
 
-static inline uint32_t find_maxima(const int16_t *above, const int16_t *middle,
-                                   const int16_t *below, int16_t limit)
+static inline struct ih_u16_32 largest_of(const int16_t *row, const int16_t *beside)
 {
-    ih_i16 is_maximum[GROUP / IH_I16_LANES];
-    for (int32_t i = 0; i < GROUP / IH_I16_LANES; i++) {
-        const int32_t u = i * IH_I16_LANES;
-        is_maximum[i] = find_lanes(&above[u], &middle[u], &below[u], limit);
+    const struct ih_u16_32 two = ih_u16_32_larger(load(&row[-1]), load(row));
+    return ih_u16_32_larger(ih_u16_32_larger(two, load(&row[1])), load(beside));
+}
+
+/* Maxima above the limit: greater than all neighbours before, not below any after. */
+__attribute__((always_inline)) static inline uint32_t
+find_maxima(const int16_t *above, const int16_t *middle, const int16_t *below, int16_t limit)
+{
+    const struct ih_u16_32 before = largest_of(above, &middle[-1]);
+    const struct ih_u16_32 after = largest_of(below, &middle[1]);
+    const struct ih_u16_32 all = load(middle);
+    ih_i16 is_maximum[IH_U16_PARTS];
+    for (int32_t k = 0; k < IH_U16_PARTS; k++) {
+        const ih_i16 peak = (ih_i16)all.part[k];
+        is_maximum[k] = (peak > ih_i16_max((ih_i16)before.part[k], ih_i16_all(limit))) &
+                        (peak >= (ih_i16)after.part[k]);
     }
     return ih_i16_bits_32(is_maximum);
 }

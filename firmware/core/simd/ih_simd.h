@@ -74,39 +74,28 @@ static inline ih_u16 ih_u16_all(uint16_t value)
     return value - (ih_u16){0};
 }
 
-/* Two vectors side by side in memory: NEON loads them with one instruction. */
-struct ih_u16_two {
-    ih_u16 low, high;
+/* 32 lanes: as many vectors as hold them. */
+#define IH_U16_PARTS (32 / IH_I16_LANES)
+
+struct ih_u16_32 {
+    ih_u16 part[IH_U16_PARTS];
 };
 
-static inline struct ih_u16_two ih_u16_two_load(const uint16_t *from)
+static inline struct ih_u16_32 ih_u16_32_add(struct ih_u16_32 a, struct ih_u16_32 b)
 {
-    return (struct ih_u16_two){ih_u16_load(from), ih_u16_load(&from[IH_I16_LANES])};
+    for (int k = 0; k < IH_U16_PARTS; k++) {
+        a.part[k] += b.part[k];
+    }
+    return a;
 }
 
-static inline struct ih_u16_two ih_u16_two_add(struct ih_u16_two a, struct ih_u16_two b)
+static inline struct ih_u16_32 ih_u16_32_sub(struct ih_u16_32 a, struct ih_u16_32 b)
 {
-    return (struct ih_u16_two){a.low + b.low, a.high + b.high};
+    for (int k = 0; k < IH_U16_PARTS; k++) {
+        a.part[k] -= b.part[k];
+    }
+    return a;
 }
-
-static inline struct ih_u16_two ih_u16_two_sub(struct ih_u16_two a, struct ih_u16_two b)
-{
-    return (struct ih_u16_two){a.low - b.low, a.high - b.high};
-}
-
-#ifndef __aarch64__
-static inline void ih_u16_two_store(uint16_t *to, struct ih_u16_two two)
-{
-    ih_u16_store(to, two.low);
-    ih_u16_store(&to[IH_I16_LANES], two.high);
-}
-
-/* a + 2 b */
-static inline struct ih_u16_two ih_u16_two_add_twice(struct ih_u16_two a, struct ih_u16_two b)
-{
-    return ih_u16_two_add(ih_u16_two_add(a, b), b);
-}
-#endif
 
 static inline ih_i16 ih_i16_load(const int16_t *from)
 {
@@ -309,6 +298,46 @@ struct ih_u32_neighbours {
 #else
 #include "simd/ih_simd_neon.h"
 #endif
+
+#if !IH_SIMD_LISTS
+/* Lanes i to i + 31 of an array that a loop goes through, i = 0, 32, 64 and so on: with lists NEON moves the address on
+ * instead of using i. */
+static inline struct ih_u16_32 ih_u16_32_next(const uint16_t **from, int32_t i)
+{
+    struct ih_u16_32 value;
+    for (int k = 0; k < IH_U16_PARTS; k++) {
+        value.part[k] = ih_u16_load(&(*from)[i + IH_I16_LANES * k]);
+    }
+    return value;
+}
+
+/* Store them there; the value stays. */
+static inline void ih_u16_32_put(uint16_t **to, int32_t i, struct ih_u16_32 *value)
+{
+    for (int k = 0; k < IH_U16_PARTS; k++) {
+        ih_u16_store(&(*to)[i + IH_I16_LANES * k], value->part[k]);
+    }
+}
+#endif
+
+/* The larger of each two lanes, with sign. */
+static inline struct ih_u16_32 ih_u16_32_larger(struct ih_u16_32 a, struct ih_u16_32 b)
+{
+    for (int k = 0; k < IH_U16_PARTS; k++) {
+        a.part[k] = (ih_u16)ih_i16_max((ih_i16)a.part[k], (ih_i16)b.part[k]);
+    }
+    return a;
+}
+
+/* Each lane's largest of all parts, with sign. */
+static inline ih_i16 ih_u16_32_max(struct ih_u16_32 a)
+{
+    ih_i16 max = (ih_i16)a.part[0];
+    for (int k = 1; k < IH_U16_PARTS; k++) {
+        max = ih_i16_max(max, (ih_i16)a.part[k]);
+    }
+    return max;
+}
 
 /* value, or the limit nearer to it: -limit .. limit. */
 static inline ih_i16 ih_i16_clamp(ih_i16 value, int16_t limit)

@@ -32,12 +32,18 @@ static inline ih_i16 ih_i16_abs(ih_i16 a)
     return (ih_i16)_mm256_abs_epi16((__m256i)a);
 }
 
-/* IH_U8_LANES bytes, one for each lane of both. */
-static inline struct ih_u16_two ih_u16_two_load_u8(const uint8_t *from)
+/* a + 2 b */
+static inline struct ih_u16_32 ih_u16_32_add_twice(struct ih_u16_32 a, struct ih_u16_32 b)
 {
-    const __m128i *bytes = (const __m128i *)(const void *)from;
-    return (struct ih_u16_two){(ih_u16)_mm256_cvtepu8_epi16(_mm_loadu_si128(&bytes[0])),
-                               (ih_u16)_mm256_cvtepu8_epi16(_mm_loadu_si128(&bytes[1]))};
+    return ih_u16_32_add(ih_u16_32_add(a, b), b);
+}
+
+/* Bytes i to i + 31 in the same way, one for each lane. */
+static inline struct ih_u16_32 ih_u16_32_next_u8(const uint8_t **from, int32_t i)
+{
+    const __m128i *bytes = (const __m128i *)(const void *)&(*from)[i];
+    return (struct ih_u16_32){{(ih_u16)_mm256_cvtepu8_epi16(_mm_loadu_si128(&bytes[0])),
+                               (ih_u16)_mm256_cvtepu8_epi16(_mm_loadu_si128(&bytes[1]))}};
 }
 
 /* Eight lanes from there, and the next eight, where there are more, from so many lanes on. */
@@ -117,6 +123,15 @@ static inline ih_u64 ih_u32_mul_even(ih_u32 a, ih_u32 b)
 static inline bool ih_i16_any(ih_i16 a)
 {
     return _mm256_testz_si256((__m256i)a, (__m256i)a) == 0;
+}
+
+/* Whether one instruction loads or stores a list of vectors, and moves the address on. */
+#define IH_SIMD_LISTS 0
+
+/* Is any lane above the limit? */
+static inline bool ih_i16_any_above(ih_i16 a, int16_t limit)
+{
+    return ih_i16_any(a > ih_i16_all(limit));
 }
 
 /* A bit for each lane of two masks, the first lane lowest: 2 * IH_I16_LANES bits. */

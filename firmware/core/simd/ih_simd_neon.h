@@ -90,34 +90,80 @@ static inline ih_i16 ih_i16_abs(ih_i16 a)
     return (ih_i16)vabsq_s16((int16x8_t)a);
 }
 
-#ifdef __aarch64__
-
-/* By name: gcc 12 joins two loads of vectors, but never two stores. */
-static inline void ih_u16_two_store(uint16_t *to, struct ih_u16_two two)
+static inline struct ih_u16_32 ih_u16_32_add_twice(struct ih_u16_32 a, struct ih_u16_32 b)
 {
-#ifdef __clang__
-    ih_u16_store(to, two.low);
-    ih_u16_store(&to[IH_I16_LANES], two.high);
+    for (int k = 0; k < IH_U16_PARTS; k++) {
+        a.part[k] = (ih_u16)vmlaq_n_u16((uint16x8_t)a.part[k], (uint16x8_t)b.part[k], 2);
+    }
+    return a;
+}
+
+static inline struct ih_u16_32 ih_neon_widen(uint8x16_t low, uint8x16_t high)
+{
+    return (struct ih_u16_32){
+        {(ih_u16)vmovl_u8(vget_low_u8(low)), (ih_u16)vmovl_u8(vget_high_u8(low)),
+         (ih_u16)vmovl_u8(vget_low_u8(high)), (ih_u16)vmovl_u8(vget_high_u8(high))}};
+}
+
+#if defined __aarch64__ && !defined __clang__
+#define IH_SIMD_LISTS 1
+
+/* By name: of the intrinsics for them gcc 12 makes an addition for each address, and copies lists. */
+struct ih_neon_memory {
+    uint16_t lane[32];
+};
+
+struct ih_neon_bytes {
+    uint8_t lane[32];
+};
+
+static inline struct ih_u16_32 ih_u16_32_next(const uint16_t **from, int32_t i)
+{
+    (void)i;
+    const struct ih_neon_memory *memory = (const void *)*from;
+    uint16x8x4_t list;
+    __asm__("ld1 {%S0.8h - %V0.8h}, [%1], #64"
+            : "=w"(list), "=r"(*from)
+            : "1"(memory), "m"(*memory));
+    return (struct ih_u16_32){
+        {(ih_u16)list.val[0], (ih_u16)list.val[1], (ih_u16)list.val[2], (ih_u16)list.val[3]}};
+}
+
+/* The value is read from the list's registers from here on. */
+static inline void ih_u16_32_put(uint16_t **to, int32_t i, struct ih_u16_32 *value)
+{
+    (void)i;
+    struct ih_neon_memory *memory = (void *)*to;
+    uint16x8x4_t list = {{(uint16x8_t)value->part[0], (uint16x8_t)value->part[1],
+                          (uint16x8_t)value->part[2], (uint16x8_t)value->part[3]}};
+    __asm__("st1 {%S0.8h - %V0.8h}, [%1], #64"
+            : "+w"(list), "=r"(*to), "=m"(*memory)
+            : "1"(memory));
+    *value = (struct ih_u16_32){
+        {(ih_u16)list.val[0], (ih_u16)list.val[1], (ih_u16)list.val[2], (ih_u16)list.val[3]}};
+}
+
+static inline struct ih_u16_32 ih_u16_32_next_u8(const uint8_t **from, int32_t i)
+{
+    (void)i;
+    const struct ih_neon_bytes *memory = (const void *)*from;
+    uint8x16x2_t list;
+    __asm__("ld1 {%S0.16b - %T0.16b}, [%1], #32"
+            : "=w"(list), "=r"(*from)
+            : "1"(memory), "m"(*memory));
+    return ih_neon_widen(list.val[0], list.val[1]);
+}
+
 #else
-    typedef uint16_t both __attribute__((vector_size(32), aligned(2), may_alias));
-    __asm__("stp %q1, %q2, %0" : "=Ump"(*(both *)to) : "w"(two.low), "w"(two.high));
-#endif
-}
+#define IH_SIMD_LISTS 0
 
-static inline struct ih_u16_two ih_u16_two_add_twice(struct ih_u16_two a, struct ih_u16_two b)
+static inline struct ih_u16_32 ih_u16_32_next_u8(const uint8_t **from, int32_t i)
 {
-    return (struct ih_u16_two){(ih_u16)vmlaq_n_u16((uint16x8_t)a.low, (uint16x8_t)b.low, 2),
-                               (ih_u16)vmlaq_n_u16((uint16x8_t)a.high, (uint16x8_t)b.high, 2)};
+    const uint8x16_t low = vld1q_u8(&(*from)[i]), high = vld1q_u8(&(*from)[i + 16]);
+    return ih_neon_widen(low, high);
 }
 
 #endif
-
-static inline struct ih_u16_two ih_u16_two_load_u8(const uint8_t *from)
-{
-    const uint8x16_t bytes = vld1q_u8(from);
-    return (struct ih_u16_two){(ih_u16)vmovl_u8(vget_low_u8(bytes)),
-                               (ih_u16)vmovl_u8(vget_high_u8(bytes))};
-}
 
 static inline ih_i16 ih_i16_load_eights(const int16_t *from, int32_t apart)
 {
@@ -196,6 +242,15 @@ static inline bool ih_i16_any(ih_i16 a)
     return vget_lane_u64(vreinterpret_u64_u32(half), 0) != 0;
 }
 
+static inline bool ih_i16_any_above(ih_i16 a, int16_t limit)
+{
+#ifdef __aarch64__
+    return vmaxvq_s16((int16x8_t)a) > limit;
+#else
+    return ih_i16_any(a > ih_i16_all(limit));
+#endif
+}
+
 /* Each lane's own bit of a byte: a sum of eight of them is the bits of eight lanes. */
 static inline uint8x16_t ih_neon_bit_bytes(ih_i16 a, ih_i16 b)
 {
@@ -216,10 +271,16 @@ static inline uint32_t ih_i16_bits_32(const ih_i16 mask[32 / IH_I16_LANES])
 {
     const uint8x16_t first = ih_neon_bit_bytes(mask[0], mask[1]);
     const uint8x16_t last = ih_neon_bit_bytes(mask[2], mask[3]);
+#ifdef __aarch64__
+    const uint8x16_t four = vpaddq_u8(first, last);
+    const uint8x16_t pairs = vpaddq_u8(four, four);
+    return vgetq_lane_u32(vreinterpretq_u32_u8(vpaddq_u8(pairs, pairs)), 0);
+#else
     const uint8x8_t low = vpadd_u8(vget_low_u8(first), vget_high_u8(first));
     const uint8x8_t high = vpadd_u8(vget_low_u8(last), vget_high_u8(last));
     const uint8x8_t two = vpadd_u8(low, high);
     return vget_lane_u32(vreinterpret_u32_u8(vpadd_u8(two, two)), 0);
+#endif
 }
 
 static inline int32_t ih_i32_total(ih_i32 a)

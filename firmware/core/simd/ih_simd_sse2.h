@@ -31,12 +31,19 @@ static inline ih_i16 ih_i16_abs(ih_i16 a)
     return ih_i16_max(a, ih_i16_sub((ih_i16){0}, a));
 }
 
-static inline struct ih_u16_two ih_u16_two_load_u8(const uint8_t *from)
+static inline struct ih_u16_32 ih_u16_32_add_twice(struct ih_u16_32 a, struct ih_u16_32 b)
 {
-    const __m128i bytes = _mm_loadu_si128((const __m128i *)(const void *)from);
+    return ih_u16_32_add(ih_u16_32_add(a, b), b);
+}
+
+static inline struct ih_u16_32 ih_u16_32_next_u8(const uint8_t **from, int32_t i)
+{
+    const __m128i *bytes = (const __m128i *)(const void *)&(*from)[i];
+    const __m128i low = _mm_loadu_si128(&bytes[0]), high = _mm_loadu_si128(&bytes[1]);
     const __m128i zero = _mm_setzero_si128();
-    return (struct ih_u16_two){(ih_u16)_mm_unpacklo_epi8(bytes, zero),
-                               (ih_u16)_mm_unpackhi_epi8(bytes, zero)};
+    return (struct ih_u16_32){
+        {(ih_u16)_mm_unpacklo_epi8(low, zero), (ih_u16)_mm_unpackhi_epi8(low, zero),
+         (ih_u16)_mm_unpacklo_epi8(high, zero), (ih_u16)_mm_unpackhi_epi8(high, zero)}};
 }
 
 static inline ih_i16 ih_i16_load_eights(const int16_t *from, int32_t apart)
@@ -107,6 +114,13 @@ static inline ih_i64 ih_i32_mul_even(ih_i32 a, ih_i32 b)
 static inline bool ih_i16_any(ih_i16 a)
 {
     return _mm_movemask_epi8(_mm_cmpeq_epi8((__m128i)a, _mm_setzero_si128())) != 0xffff;
+}
+
+#define IH_SIMD_LISTS 0
+
+static inline bool ih_i16_any_above(ih_i16 a, int16_t limit)
+{
+    return ih_i16_any(a > ih_i16_all(limit));
 }
 
 static inline uint32_t ih_i16_bits(ih_i16 a, ih_i16 b)

@@ -112,9 +112,6 @@ static void addresses_need_no_alignment(void)
         memset(to, 0, IH_SIMD_BYTES);
         ih_u16_store(to, ih_u16_load((const void *)&bytes[at]));
         TEST_ASSERT_EQUAL_MEMORY(bytes, copy, sizeof bytes);
-        memset(to, 0, 2 * IH_SIMD_BYTES);
-        ih_u16_two_store(to, ih_u16_two_load((const void *)&bytes[at]));
-        TEST_ASSERT_EQUAL_MEMORY(bytes, copy, sizeof bytes);
         memset(to, 0, IH_SIMD_BYTES);
         ih_u32_store(to, ih_u32_load((const void *)&bytes[at]));
         TEST_ASSERT_EQUAL_MEMORY(bytes, copy, sizeof bytes);
@@ -147,24 +144,85 @@ static void lanes_of_8_bits(void)
     CHECK_TO(ih_u8, uint8_t, uint64_t, ih_u8_sum_eights(a), sum_of_eight(&first[8 * k]));
 }
 
-static struct ih_u16_two two_of(ih_u16 low, ih_u16 high)
+#define LANES 32 /* of struct ih_u16_32 */
+
+/* Three times 32 lanes, as a loop takes and puts them; the lanes around stay as they are. */
+static void lanes_of_a_row(void)
 {
-    return (struct ih_u16_two){low, high};
+    enum { COUNT = 3 * LANES };
+    uint16_t row[COUNT + 8], copy[COUNT + 8];
+    uint8_t byte[COUNT + 8];
+    const uint16_t *from = &row[1];
+    const uint8_t *from_byte = &byte[1];
+    uint16_t *to = &copy[1], *widened = &copy[1];
+    int32_t i;
+
+    fill(row, sizeof row);
+    fill(byte, sizeof byte);
+    memcpy(copy, row, sizeof copy);
+    memset(&copy[1], 0, COUNT * sizeof copy[0]);
+    for (i = 0; i < COUNT; i += LANES) {
+        struct ih_u16_32 value = ih_u16_32_next(&from, i);
+
+        ih_u16_32_put(&to, i, &value);
+        IH_TEST_EQUAL(row[1 + i], value.part[0][0], "still there", i);
+    }
+    TEST_ASSERT_EQUAL_MEMORY(row, copy, sizeof row);
+    for (i = 0; i < COUNT; i += LANES) {
+        struct ih_u16_32 value = ih_u16_32_next_u8(&from_byte, i);
+
+        ih_u16_32_put(&widened, i, &value);
+    }
+    for (i = 0; i < COUNT; i++) {
+        IH_TEST_EQUAL(byte[1 + i], copy[1 + i], "widened", i);
+    }
 }
 
-static void two_vectors_of_16_bits(void)
+static struct ih_u16_32 lanes_from(const uint16_t *lane)
 {
-    uint8_t bytes[IH_U8_LANES];
+    return ih_u16_32_next(&lane, 0);
+}
 
-    CHECK(ih_u16, uint16_t, ih_u16_two_add(two_of(a, b), two_of(b, b)).low, (x + y));
-    CHECK(ih_u16, uint16_t, ih_u16_two_add(two_of(a, b), two_of(b, b)).high, (2 * y));
-    CHECK(ih_u16, uint16_t, ih_u16_two_sub(two_of(a, b), two_of(b, a)).low, (x - y));
-    CHECK(ih_u16, uint16_t, ih_u16_two_sub(two_of(a, b), two_of(b, a)).high, (y - x));
-    CHECK(ih_u16, uint16_t, ih_u16_two_add_twice(two_of(a, b), two_of(b, a)).low, (x + 2 * y));
-    CHECK(ih_u16, uint16_t, ih_u16_two_add_twice(two_of(a, b), two_of(b, a)).high, (y + 2 * x));
-    fill(bytes, sizeof bytes);
-    CHECK(ih_u16, uint16_t, ih_u16_two_load_u8(bytes).low, (bytes[k]));
-    CHECK(ih_u16, uint16_t, ih_u16_two_load_u8(bytes).high, (bytes[k + IH_I16_LANES]));
+static uint16_t lane_of(struct ih_u16_32 value, int k)
+{
+    return value.part[k / IH_I16_LANES][k % IH_I16_LANES];
+}
+
+static void lanes_of_16_bits_in_32(void)
+{
+    uint16_t first[LANES], second[LANES];
+    int16_t max;
+    int round, k;
+
+    for (round = 0; round < ROUNDS; round++) {
+        struct ih_u16_32 a, b;
+        ih_i16 each;
+
+        fill(first, sizeof first);
+        fill(second, sizeof second);
+        a = lanes_from(first);
+        b = lanes_from(second);
+        each = ih_u16_32_max(a);
+        for (k = 0; k < LANES; k++) {
+            const uint16_t x = first[k], y = second[k];
+
+            IH_TEST_EQUAL((uint16_t)(x + y), lane_of(ih_u16_32_add(a, b), k), "add", k);
+            IH_TEST_EQUAL((uint16_t)(x - y), lane_of(ih_u16_32_sub(a, b), k), "sub", k);
+            IH_TEST_EQUAL((uint16_t)(x + 2 * y), lane_of(ih_u16_32_add_twice(a, b), k), "add_twice",
+                          k);
+            IH_TEST_EQUAL(MAX((int16_t)x, (int16_t)y), (int16_t)lane_of(ih_u16_32_larger(a, b), k),
+                          "larger", k);
+        }
+        for (k = 0; k < IH_I16_LANES; k++) {
+            int i;
+
+            max = (int16_t)first[k];
+            for (i = k; i < LANES; i += IH_I16_LANES) {
+                max = MAX(max, (int16_t)first[i]);
+            }
+            IH_TEST_EQUAL(max, each[k], "max", k);
+        }
+    }
 }
 
 static void lanes_change_their_positions(void)
@@ -335,6 +393,17 @@ static uint32_t repeated(uint32_t bits)
     return IH_I16_LANES == 8 ? bits | bits << 16 : bits;
 }
 
+static bool is_any_above(const int16_t *lane, int16_t limit)
+{
+    bool above = false;
+    int k;
+
+    for (k = 0; k < IH_I16_LANES; k++) {
+        above |= lane[k] > limit;
+    }
+    return above;
+}
+
 static void all_lanes_together(void)
 {
     static const int16_t zero[IH_I16_LANES];
@@ -347,6 +416,7 @@ static void all_lanes_together(void)
     CHECK_ONE(ih_i16, int16_t, ih_i16_any(a), memcmp(first, zero, sizeof zero) != 0);
     CHECK_ONE(ih_i16, int16_t, ih_i16_any(a > b),
               (bits_where_above(first, second) << 16 >> 16) % (1u << IH_I16_LANES) != 0);
+    CHECK_ONE(ih_i16, int16_t, ih_i16_any_above(a, second[0]), is_any_above(first, second[0]));
 }
 
 static void one_bit_is_any(void)
@@ -514,7 +584,8 @@ int main(void)
     RUN_TEST(addresses_need_no_alignment);
     RUN_TEST(lanes_of_8_bits);
     RUN_TEST(lanes_of_16_bits);
-    RUN_TEST(two_vectors_of_16_bits);
+    RUN_TEST(lanes_of_a_row);
+    RUN_TEST(lanes_of_16_bits_in_32);
     RUN_TEST(lanes_change_their_positions);
     RUN_TEST(lanes_of_32_bits);
     RUN_TEST(lanes_of_64_bits);
