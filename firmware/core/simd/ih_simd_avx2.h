@@ -127,6 +127,8 @@ static inline bool ih_i16_any(ih_i16 a)
 
 /* Whether one instruction loads or stores a list of vectors, and moves the address on. */
 #define IH_SIMD_LISTS 0
+/* Registers for vectors. */
+#define IH_SIMD_REGISTERS 16
 
 /* Is any lane above the limit? */
 static inline bool ih_i16_any_above(ih_i16 a, int16_t limit)

@@ -7,8 +7,10 @@
 
 #include <arm_neon.h>
 
-/* Products of the upper halves of the lanes: 64-bit ARM has one instruction for each. */
+/* Products of the upper halves of the lanes: 64-bit ARM has one instruction for each. Those of the lower halves by name:
+ * gcc 12 copies the lower half of a factor to a register of its own. */
 #ifdef __aarch64__
+#define IH_SIMD_REGISTERS 32
 
 static inline int32x4_t ih_neon_mul_high_s16(int16x8_t a, int16x8_t b)
 {
@@ -18,6 +20,19 @@ static inline int32x4_t ih_neon_mul_high_s16(int16x8_t a, int16x8_t b)
 static inline int32x4_t ih_neon_mul_add_high_s16(int32x4_t sum, int16x8_t a, int16x8_t b)
 {
     return vmlal_high_s16(sum, a, b);
+}
+
+static inline int32x4_t ih_neon_mul_low_s16(int16x8_t a, int16x8_t b)
+{
+    int32x4_t product;
+    __asm__("smull %0.4s, %1.4h, %2.4h" : "=w"(product) : "w"(a), "w"(b));
+    return product;
+}
+
+static inline int32x4_t ih_neon_mul_add_low_s16(int32x4_t sum, int16x8_t a, int16x8_t b)
+{
+    __asm__("smlal %0.4s, %1.4h, %2.4h" : "+w"(sum) : "w"(a), "w"(b));
+    return sum;
 }
 
 static inline int64x2_t ih_neon_mul_high_s32(int32x4_t a, int32x4_t b)
@@ -36,6 +51,7 @@ static inline uint64x2_t ih_neon_mul_high_u32(uint32x4_t a, uint32x4_t b)
 }
 
 #else
+#define IH_SIMD_REGISTERS 16
 
 static inline int32x4_t ih_neon_mul_high_s16(int16x8_t a, int16x8_t b)
 {
@@ -45,6 +61,16 @@ static inline int32x4_t ih_neon_mul_high_s16(int16x8_t a, int16x8_t b)
 static inline int32x4_t ih_neon_mul_add_high_s16(int32x4_t sum, int16x8_t a, int16x8_t b)
 {
     return vmlal_s16(sum, vget_high_s16(a), vget_high_s16(b));
+}
+
+static inline int32x4_t ih_neon_mul_low_s16(int16x8_t a, int16x8_t b)
+{
+    return vmull_s16(vget_low_s16(a), vget_low_s16(b));
+}
+
+static inline int32x4_t ih_neon_mul_add_low_s16(int32x4_t sum, int16x8_t a, int16x8_t b)
+{
+    return vmlal_s16(sum, vget_low_s16(a), vget_low_s16(b));
 }
 
 static inline int64x2_t ih_neon_mul_high_s32(int32x4_t a, int32x4_t b)
@@ -310,14 +336,13 @@ struct ih_pair_sums {
 static inline struct ih_pair_sums ih_pair_sums_first(ih_i16 a, ih_i16 b)
 {
     const int16x8_t x = (int16x8_t)a, y = (int16x8_t)b;
-    return (struct ih_pair_sums){vmull_s16(vget_low_s16(x), vget_low_s16(y)),
-                                 ih_neon_mul_high_s16(x, y)};
+    return (struct ih_pair_sums){ih_neon_mul_low_s16(x, y), ih_neon_mul_high_s16(x, y)};
 }
 
 static inline struct ih_pair_sums ih_pair_sums_add(struct ih_pair_sums sums, ih_i16 a, ih_i16 b)
 {
     const int16x8_t x = (int16x8_t)a, y = (int16x8_t)b;
-    return (struct ih_pair_sums){vmlal_s16(sums.first, vget_low_s16(x), vget_low_s16(y)),
+    return (struct ih_pair_sums){ih_neon_mul_add_low_s16(sums.first, x, y),
                                  ih_neon_mul_add_high_s16(sums.second, x, y)};
 }
 

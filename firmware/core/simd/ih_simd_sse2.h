@@ -117,6 +117,7 @@ static inline bool ih_i16_any(ih_i16 a)
 }
 
 #define IH_SIMD_LISTS 0
+#define IH_SIMD_REGISTERS 16
 
 static inline bool ih_i16_any_above(ih_i16 a, int16_t limit)
 {

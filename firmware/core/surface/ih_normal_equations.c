@@ -88,28 +88,48 @@ static inline ih_i16 load_words(const uint32_t *word)
     return ih_i16_load_aligned((const void *)word);
 }
 
-/* Update line i by the first words. */
-__attribute__((always_inline)) static inline void update_line(uint32_t word[PAIRS][TERMS_MAX],
-                                                              struct update update, int32_t words,
-                                                              int32_t i, int32_t *line)
+/* Lines that are updated together, so that each word is loaded once for them: as many as registers hold factors of. */
+#define TOGETHER (IH_SIMD_REGISTERS / 16)
+
+/* Update lines i to i + lines - 1, of one length, by the first words. */
+__attribute__((always_inline)) static inline void update_together(uint32_t word[PAIRS][TERMS_MAX],
+                                                                  struct update update,
+                                                                  int32_t words, int32_t i,
+                                                                  int32_t lines, int32_t *line)
 {
     const ih_i32 begin = ih_i32_all((int32_t)update.begin);
     const int32_t length = length_of(i);
-    ih_i16 factor[PAIRS];
+    ih_i16 factor[TOGETHER][PAIRS];
     for (int32_t k = 0; k < words; k++) {
-        factor[k] = (ih_i16)ih_i32_all((int32_t)factor_of(update, word[k][i]));
+        for (int32_t n = 0; n < lines; n++) {
+            factor[n][k] = (ih_i16)ih_i32_all((int32_t)factor_of(update, word[k][i + n]));
+        }
     }
     for (int32_t j = 0; j < length; j += IH_I32_LANES) {
-        struct ih_pair_sums sums = ih_pair_sums_first(factor[0], load_words(&word[0][j]));
-        for (int32_t k = 1; k < words; k++) {
-            sums = ih_pair_sums_add(sums, factor[k], load_words(&word[k][j]));
+        struct ih_pair_sums sums[TOGETHER];
+        for (int32_t n = 0; n < lines; n++) {
+            sums[n] = ih_pair_sums_first(factor[n][0], load_words(&word[0][j]));
         }
-        const ih_u32 total = (ih_u32)ih_i32_add(ih_pair_sums_total(sums), begin);
-        const ih_i32 change = (ih_i32)ih_u32_shift_right(total, update.shift);
-        const ih_i32 before = ih_i32_load(&line[j]);
-        ih_i32_store(&line[j], update.is_subtracted ? ih_i32_sub(before, change)
-                                                    : ih_i32_add(before, change));
+        for (int32_t k = 1; k < words; k++) {
+            for (int32_t n = 0; n < lines; n++) {
+                sums[n] = ih_pair_sums_add(sums[n], factor[n][k], load_words(&word[k][j]));
+            }
+        }
+        for (int32_t n = 0; n < lines; n++) {
+            int32_t *to = &line[n * length + j];
+            const ih_u32 total = (ih_u32)ih_i32_add(ih_pair_sums_total(sums[n]), begin);
+            const ih_i32 change = (ih_i32)ih_u32_shift_right(total, update.shift);
+            const ih_i32 before = ih_i32_load(to);
+            ih_i32_store(to, update.is_subtracted ? ih_i32_sub(before, change)
+                                                  : ih_i32_add(before, change));
+        }
     }
+}
+
+static inline void update_line(uint32_t word[PAIRS][TERMS_MAX], struct update update, int32_t words,
+                               int32_t i, int32_t *line)
+{
+    update_together(word, update, words, i, 1, line);
 }
 
 /* Update the first `count` lines. Inlined: each update has code of its own. */
@@ -117,9 +137,9 @@ __attribute__((always_inline)) static inline void
 update_lines(uint32_t word[PAIRS][TERMS_MAX], struct update update, int32_t count, int32_t *normal)
 {
     int32_t *line = normal;
-    for (int32_t i = 0; i < count; i++) {
-        update_line(word, update, PAIRS, i, line);
-        line = &line[length_of(i)];
+    for (int32_t i = 0; i < count; i += TOGETHER) {
+        update_together(word, update, PAIRS, i, TOGETHER, line);
+        line = &line[TOGETHER * length_of(i)];
     }
 }
 
