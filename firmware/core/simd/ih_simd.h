@@ -247,13 +247,6 @@ static inline ih_i64 ih_i64_sub(ih_i64 a, ih_i64 b)
     return (ih_i64)((ih_u64)a - (ih_u64)b);
 }
 
-/* |a|. */
-static inline ih_i32 ih_i32_abs(ih_i32 a)
-{
-    const ih_i32 sign = a >> 31;
-    return ih_i32_sub(a ^ sign, sign);
-}
-
 /* Each lane shifted by its own count, below 32. One instruction where IH_SIMD_LANE_SHIFTS is 1. */
 static inline ih_u32 ih_u32_shift_left_each(ih_u32 a, ih_u32 bits)
 {

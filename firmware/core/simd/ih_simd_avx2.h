@@ -32,6 +32,11 @@ static inline ih_i16 ih_i16_abs(ih_i16 a)
     return (ih_i16)_mm256_abs_epi16((__m256i)a);
 }
 
+static inline ih_i32 ih_i32_abs(ih_i32 a)
+{
+    return (ih_i32)_mm256_abs_epi32((__m256i)a);
+}
+
 /* a + 2 b */
 static inline struct ih_u16_32 ih_u16_32_add_twice(struct ih_u16_32 a, struct ih_u16_32 b)
 {

@@ -116,6 +116,11 @@ static inline ih_i16 ih_i16_abs(ih_i16 a)
     return (ih_i16)vabsq_s16((int16x8_t)a);
 }
 
+static inline ih_i32 ih_i32_abs(ih_i32 a)
+{
+    return (ih_i32)vabsq_s32((int32x4_t)a);
+}
+
 static inline struct ih_u16_32 ih_u16_32_add_twice(struct ih_u16_32 a, struct ih_u16_32 b)
 {
     for (int k = 0; k < IH_U16_PARTS; k++) {
@@ -216,7 +221,11 @@ static inline ih_u16 ih_u16_mul_high(ih_u16 a, ih_u16 b)
 {
     const uint16x8_t x = (uint16x8_t)a, y = (uint16x8_t)b;
     const uint32x4_t low = vmull_u16(vget_low_u16(x), vget_low_u16(y));
+#ifdef __aarch64__
+    const uint32x4_t high = vmull_high_u16(x, y);
+#else
     const uint32x4_t high = vmull_u16(vget_high_u16(x), vget_high_u16(y));
+#endif
     return (ih_u16)vuzpq_u16((uint16x8_t)low, (uint16x8_t)high).val[1];
 }
 
@@ -373,8 +382,12 @@ static inline struct ih_wide ih_u32_mul_wide(ih_u32 a, ih_u32 b)
 
 static inline ih_u32 ih_wide_low(struct ih_wide x)
 {
-    return (ih_u32)vcombine_s64((int64x1_t)vmovn_s64((int64x2_t)x.a),
-                                (int64x1_t)vmovn_s64((int64x2_t)x.b));
+    const int32x2_t first = vmovn_s64((int64x2_t)x.a);
+#ifdef __aarch64__
+    return (ih_u32)vmovn_high_s64(first, (int64x2_t)x.b);
+#else
+    return (ih_u32)vcombine_s32(first, vmovn_s64((int64x2_t)x.b));
+#endif
 }
 
 static inline struct ih_wide ih_wide_in_order(struct ih_wide x)

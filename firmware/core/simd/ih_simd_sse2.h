@@ -31,6 +31,12 @@ static inline ih_i16 ih_i16_abs(ih_i16 a)
     return ih_i16_max(a, ih_i16_sub((ih_i16){0}, a));
 }
 
+static inline ih_i32 ih_i32_abs(ih_i32 a)
+{
+    const ih_i32 sign = a >> 31;
+    return ih_i32_sub(a ^ sign, sign);
+}
+
 static inline struct ih_u16_32 ih_u16_32_add_twice(struct ih_u16_32 a, struct ih_u16_32 b)
 {
     return ih_u16_32_add(ih_u16_32_add(a, b), b);
