@@ -436,6 +436,7 @@ void ih_dots_find(const struct ih_frame *frame, const struct ih_frame *ambient,
             const struct ih_scanline ahead = ih_frame_scanline(frame, v + ROWS_AHEAD);
             const uint8_t *samples = ahead.samples;
             const int32_t bytes = frame->width * frame->bytes_per_sample;
+#pragma GCC unroll 4
             for (int32_t i = 0; i < bytes; i += IH_LINE_BYTES) {
                 __builtin_prefetch(&samples[i]); /* no function: gcc 12 leaves out calls of it */
             }

@@ -293,12 +293,14 @@ int32_t ih_noise_at(const struct ih_noise_row *row, int32_t u)
     return between(left, right, cell.part);
 }
 
+static inline int32_t min_of_rows(const struct ih_noise_row *row, int32_t block)
+{
+    return ih_min_s32(row->above[block], row->below[block]);
+}
+
 int32_t ih_noise_min(const struct ih_noise_row *row, int32_t block)
 {
-    const int32_t last = ih_min_s32(block + 1, row->columns - 1);
-    int32_t min = ih_min_s32(row->above[block], row->below[block]);
-    for (int32_t i = ih_max_s32(block - 1, 0); i <= last; i++) {
-        min = ih_min_s32(min, ih_min_s32(row->above[i], row->below[i]));
-    }
-    return min;
+    const int32_t before = min_of_rows(row, ih_max_s32(block - 1, 0));
+    const int32_t after = min_of_rows(row, ih_min_s32(block + 1, row->columns - 1));
+    return ih_min_s32(min_of_rows(row, block), ih_min_s32(before, after));
 }
