@@ -64,10 +64,10 @@ static void take_bytes(const uint8_t *restrict pixel, int32_t count, uint16_t *r
         const struct ih_u16_32 here = ih_u16_32_next_u8(&middle, i);
         struct ih_u16_32 sum = ih_u16_32_add(ih_u16_32_next_u8(&left, i), here);
         sum = ih_u16_32_add(sum, ih_u16_32_next_u8(&right, i));
-        struct ih_u16_32 all =
-            ih_u16_32_sub(ih_u16_32_next(&before, i), ih_u16_32_next(&oldest, i));
+        const struct ih_u16_32 leaving = ih_u16_32_next(&oldest, i);
         ih_u16_32_put(&to_three, i, &sum);
-        all = ih_u16_32_add(all, sum);
+        struct ih_u16_32 all =
+            ih_u16_32_add(ih_u16_32_sub(leaving, sum), ih_u16_32_next(&before, i));
         ih_u16_32_put(&to_nine, i, &all);
         struct ih_u16_32 twice = ih_u16_32_add(sum, here);
         ih_u16_32_put(&to_binomial, i, &twice);
@@ -78,12 +78,15 @@ static void take_bytes(const uint8_t *restrict pixel, int32_t count, uint16_t *r
 static bool is_any_eight_above(const uint16_t *nine, const uint16_t *oldest, int32_t count,
                                int32_t limit)
 {
-    ih_i16 max = {0};
+    ih_i16 min = {0};
     for (int32_t i = 0; i < count; i += IH_BANDPASS_STEP) {
         const struct ih_u16_32 all = ih_u16_32_next(&nine, i);
-        max = ih_i16_max(max, ih_u16_32_max(ih_u16_32_sub(all, ih_u16_32_next(&oldest, i))));
+        const struct ih_u16_32 eight = ih_u16_32_add(all, ih_u16_32_next(&oldest, i));
+        for (int32_t k = 0; k < IH_U16_PARTS; k++) {
+            min = ih_i16_min(min, (ih_i16)eight.part[k]);
+        }
     }
-    return ih_i16_any_above(max, (int16_t)ih_clamp_s32(limit, 0, INT16_MAX));
+    return ih_i16_any_above(ih_i16_negate(min), (int16_t)ih_clamp_s32(limit, 0, INT16_MAX));
 }
 #else
 static void take_bytes(const uint8_t *pixel, int32_t count, uint16_t *restrict three,
@@ -166,7 +169,8 @@ static void take_again(struct ih_bandpass *band)
     const int32_t end = end_of(band);
     for (int32_t i = FIRST; i < end; i++) {
         if (band->is_bytes) {
-            band->nine.of_bytes[i] = (uint16_t)(band->nine.of_bytes[i] + newest[i] - three[i]);
+            band->nine.of_bytes[i] =
+                (uint16_t)(band->nine.of_bytes[i] + IH_BANDPASS_NINE_SIGN * (newest[i] - three[i]));
         } else {
             band->nine.of_grey_q4[i] = band->nine.of_grey_q4[i] + newest[i] - three[i];
         }

@@ -47,7 +47,8 @@ struct ih_bandpass {
     int32_t rows_in; /* pushed so far, repeated ones included */
     bool is_bytes;   /* sums of bytes, else of 12 bits */
     /* Rings of sums of three pixels and of 1-2-1 sums, and the sums of three over the newest nine rows.
-     * Index IH_BANDPASS_LEAD is pixel 0; edge pixels are repeated outside. */
+     * Index IH_BANDPASS_LEAD is pixel 0; edge pixels are repeated outside. The last have a sign
+     * (IH_BANDPASS_NINE_SIGN). */
     alignas(IH_ALIGNMENT) uint16_t three[IH_BANDPASS_ROWS][IH_BANDPASS_SUMS];
     alignas(IH_ALIGNMENT) uint16_t binomial[IH_BANDPASS_KEPT][IH_BANDPASS_SUMS];
     alignas(IH_ALIGNMENT) union {

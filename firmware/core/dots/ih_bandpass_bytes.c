@@ -30,7 +30,7 @@ static void sum_rows(const uint8_t *const row[IH_BANDPASS_ROWS], int32_t width,
 static void sum_threes(const uint16_t *column, int32_t count, uint16_t *restrict nine)
 {
     for (int32_t i = 0; i < count; i++) {
-        nine[i] = (uint16_t)(column[i] + column[i + 1] + column[i + 2]);
+        nine[i] = (uint16_t)(IH_BANDPASS_NINE_SIGN * (column[i] + column[i + 1] + column[i + 2]));
     }
 }
 #endif

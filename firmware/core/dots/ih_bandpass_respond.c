@@ -40,19 +40,16 @@ static inline struct place place_of(const struct ih_bandpass_rows *rows, const u
                           &nine[u + SIDE], &nine[u + 2 * SIDE], (uint16_t *)&response[u]};
 }
 
-/* (81 i + 8) / 16 - b of a group; 81 / 16 is 8 * 20736 / 2^15. The larger R of each few lanes. */
+/* (81 i + 8) / 16 - b of a group. The larger R of each few lanes. */
 __attribute__((always_inline)) static inline ih_i16 respond_group(struct place *at, int32_t u)
 {
     const struct ih_u16_32 sides =
         ih_u16_32_add(ih_u16_32_next(&at->above, u), ih_u16_32_next(&at->below, u));
-    struct ih_u16_32 sum = ih_u16_32_add_twice(sides, ih_u16_32_next(&at->middle, u));
-    for (int32_t k = 0; k < IH_U16_PARTS; k++) {
-        sum.part[k] = ih_u16_mul_round(sum.part[k] << 3, ih_u16_all(INNER << 8));
-    }
+    const struct ih_u16_32 sum = ih_u16_32_add_twice(sides, ih_u16_32_next(&at->middle, u));
     const struct ih_u16_32 box =
         ih_u16_32_add(ih_u16_32_next(&at->left, u), ih_u16_32_next(&at->centre, u));
     struct ih_u16_32 response =
-        ih_u16_32_sub(ih_u16_32_sub(sum, box), ih_u16_32_next(&at->right, u));
+        ih_u16_32_add(ih_u16_32_add_81_16ths(box, sum), ih_u16_32_next(&at->right, u));
     ih_u16_32_put(&at->response, u, &response);
     return ih_u16_32_max(response);
 }

@@ -20,12 +20,6 @@ static inline ih_i16 ih_i16_mul_high(ih_i16 a, ih_i16 b)
     return (ih_i16)_mm256_mulhi_epi16((__m256i)a, (__m256i)b);
 }
 
-/* a * b / 2^15, rounded half up; both below 2^15. */
-static inline ih_u16 ih_u16_mul_round(ih_u16 a, ih_u16 b)
-{
-    return (ih_u16)_mm256_mulhrs_epi16((__m256i)a, (__m256i)b);
-}
-
 /* |a|. */
 static inline ih_i16 ih_i16_abs(ih_i16 a)
 {
@@ -41,6 +35,16 @@ static inline ih_i32 ih_i32_abs(ih_i32 a)
 static inline struct ih_u16_32 ih_u16_32_add_twice(struct ih_u16_32 a, struct ih_u16_32 b)
 {
     return ih_u16_32_add(ih_u16_32_add(a, b), b);
+}
+
+/* a + 81 b / 16, rounded half up; b below 2^12. 81 / 16 is 8 * 20736 / 2^15. */
+static inline struct ih_u16_32 ih_u16_32_add_81_16ths(struct ih_u16_32 a, struct ih_u16_32 b)
+{
+    const __m256i factor = _mm256_set1_epi16(81 << 8);
+    for (int k = 0; k < IH_U16_PARTS; k++) {
+        a.part[k] += (ih_u16)_mm256_mulhrs_epi16((__m256i)(b.part[k] << 3), factor);
+    }
+    return a;
 }
 
 /* Bytes i to i + 31 in the same way, one for each lane. */

@@ -106,11 +106,6 @@ static inline ih_i16 ih_i16_mul_high(ih_i16 a, ih_i16 b)
     return (ih_i16)vshrq_n_s16(vqdmulhq_s16((int16x8_t)a, (int16x8_t)b), 1);
 }
 
-static inline ih_u16 ih_u16_mul_round(ih_u16 a, ih_u16 b)
-{
-    return (ih_u16)vqrdmulhq_s16((int16x8_t)a, (int16x8_t)b);
-}
-
 static inline ih_i16 ih_i16_abs(ih_i16 a)
 {
     return (ih_i16)vabsq_s16((int16x8_t)a);
@@ -125,6 +120,15 @@ static inline struct ih_u16_32 ih_u16_32_add_twice(struct ih_u16_32 a, struct ih
 {
     for (int k = 0; k < IH_U16_PARTS; k++) {
         a.part[k] = (ih_u16)vmlaq_n_u16((uint16x8_t)a.part[k], (uint16x8_t)b.part[k], 2);
+    }
+    return a;
+}
+
+static inline struct ih_u16_32 ih_u16_32_add_81_16ths(struct ih_u16_32 a, struct ih_u16_32 b)
+{
+    for (int k = 0; k < IH_U16_PARTS; k++) {
+        const uint16x8_t whole = vmlaq_n_u16((uint16x8_t)a.part[k], (uint16x8_t)b.part[k], 5);
+        a.part[k] = (ih_u16)vrsraq_n_u16(whole, (uint16x8_t)b.part[k], 4);
     }
     return a;
 }

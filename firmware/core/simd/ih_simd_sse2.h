@@ -19,13 +19,6 @@ static inline ih_i16 ih_i16_mul_high(ih_i16 a, ih_i16 b)
     return (ih_i16)_mm_mulhi_epi16((__m128i)a, (__m128i)b);
 }
 
-/* The average with 0 rounds half up. */
-static inline ih_u16 ih_u16_mul_round(ih_u16 a, ih_u16 b)
-{
-    const __m128i twice = _mm_mulhi_epu16((__m128i)(a << 1), (__m128i)(b << 1));
-    return (ih_u16)_mm_avg_epu16(twice, _mm_setzero_si128());
-}
-
 static inline ih_i16 ih_i16_abs(ih_i16 a)
 {
     return ih_i16_max(a, ih_i16_sub((ih_i16){0}, a));
@@ -40,6 +33,17 @@ static inline ih_i32 ih_i32_abs(ih_i32 a)
 static inline struct ih_u16_32 ih_u16_32_add_twice(struct ih_u16_32 a, struct ih_u16_32 b)
 {
     return ih_u16_32_add(ih_u16_32_add(a, b), b);
+}
+
+/* The average with 0 rounds half up. */
+static inline struct ih_u16_32 ih_u16_32_add_81_16ths(struct ih_u16_32 a, struct ih_u16_32 b)
+{
+    const __m128i factor = (__m128i)ih_u16_all(81 << 9);
+    for (int k = 0; k < IH_U16_PARTS; k++) {
+        const __m128i twice = _mm_mulhi_epu16((__m128i)(b.part[k] << 4), factor);
+        a.part[k] += (ih_u16)_mm_avg_epu16(twice, _mm_setzero_si128());
+    }
+    return a;
 }
 
 static inline struct ih_u16_32 ih_u16_32_next_u8(const uint8_t **from, int32_t i)
