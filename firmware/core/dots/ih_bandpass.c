@@ -54,6 +54,7 @@ static uint16_t *binomial_of(struct ih_bandpass *band, int32_t ago)
 #if IH_CORTEXM
 #include "dots/ih_bandpass_cortexm.h"
 #elif IH_I16_LANES > 0
+/* A sum of three is stored before it is used: NEON need not copy it then. */
 static void take_bytes(const uint8_t *restrict pixel, int32_t count, uint16_t *restrict three,
                        uint16_t *restrict binomial, uint16_t *restrict nine)
 {

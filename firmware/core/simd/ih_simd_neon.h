@@ -164,7 +164,7 @@ static inline struct ih_u16_32 ih_u16_32_next(const uint16_t **from, int32_t i)
         {(ih_u16)list.val[0], (ih_u16)list.val[1], (ih_u16)list.val[2], (ih_u16)list.val[3]}};
 }
 
-/* The value is read from the list's registers from here on. */
+/* The value is read from the registers that it was stored from, or gcc 12 keeps a copy for each of its parts. */
 static inline void ih_u16_32_put(uint16_t **to, int32_t i, struct ih_u16_32 *value)
 {
     (void)i;
