@@ -45,7 +45,7 @@
 /* After so many searches in vain a pause grows by a frame. */
 #define VAIN_FRAMES 4
 #define PAUSE_MAX 8
-/* So long what a search found is questioned. */
+/* So long what a search found is questioned, in every frame; then an eighth more dots are enough, not a quarter. */
 #define UNSETTLED_FRAMES_MAX 16
 
 static bool is_none(const int32_t moved_px_q12[IH_ALIGN_AXES])
@@ -208,7 +208,8 @@ static int32_t search(struct ih_align *align, const struct ih_dots *dots, int32_
 {
     static const int32_t none[IH_ALIGN_AXES];
     int32_t before_px_q12[IH_ALIGN_AXES], moved_px_q12[IH_ALIGN_AXES];
-    const int32_t enough = ih_max_s32(excess_min(rows->dot_count), excess_before * 5 / 4 + 1);
+    const int32_t more = excess_before / (align->unsettled_frames > 0 ? 8 : 4) + 1;
+    const int32_t enough = ih_max_s32(excess_min(rows->dot_count), excess_before + more);
     const int32_t trusted = rows->dot_count * align->trusted_q8 * 3 / 4 / 256;
     int32_t excess = 0;
     memcpy(before_px_q12, align->moved_px_q12, sizeof before_px_q12);
@@ -240,11 +241,19 @@ static int32_t search(struct ih_align *align, const struct ih_dots *dots, int32_
 }
 
 /* A wrong motion may have had the most dots in the one frame that was searched, and fits the labels that it makes; in other
- * frames the right one has more. Back to the motion before? If not, another search is due. */
+ * frames the right one has more. Unless dots can be on no other lines: back to the motion before? If not, another search
+ * is due. */
 static bool question(struct ih_align *align, const struct ih_dots *dots, struct ih_rig *rig,
                      struct ih_dot_rows *rows)
 {
-    const int32_t excess = excess_of(look(rows, rig, 1));
+    const struct sight sight = look(rows, rig, 1);
+    const int32_t excess = excess_of(sight);
+    if (align->unsettled_frames > UNSETTLED_FRAMES_MAX || is_clear(sight)) {
+        align->unsettled_frames = 0;
+        return false;
+    }
+    /* Not 0 yet: what this frame's search finds is compared with the same motion. */
+    align->unsettled_frames++;
     const int32_t before_px_q12 = align->moved_px_q12[IH_ALIGN_DEPTH];
     align->excess = try_motion(align, dots, align->settled_px_q12,
                                ih_max_s32(excess_min(rows->dot_count), excess), rig, rows);
@@ -257,20 +266,6 @@ static bool question(struct ih_align *align, const struct ih_dots *dots, struct 
     }
     align->excess = excess;
     return true;
-}
-
-/* After 1, 2, 4, 8 and 16 frames, unless dots can be on no other lines. */
-static bool question_sometimes(struct ih_align *align, const struct ih_dots *dots,
-                               struct sight sight, struct ih_rig *rig, struct ih_dot_rows *rows)
-{
-    const int32_t frames = align->unsettled_frames;
-    if (frames == 0 || frames > UNSETTLED_FRAMES_MAX || is_clear(sight)) {
-        align->unsettled_frames = 0;
-        return false;
-    }
-    /* Not 0 yet: what this frame's search finds is compared with the same motion. */
-    align->unsettled_frames = frames + 1;
-    return (frames & (frames - 1)) == 0 && question(align, dots, rig, rows);
 }
 
 /* Labels are short where dots lie on their lines, but out of range: a rotation of depth that no plane shows. */
@@ -320,8 +315,8 @@ void ih_align_find(struct ih_align *align, const struct ih_dots *dots, struct ih
         is_due = align->pause < 0;
     } else if (align->is_short) {
         search_depth(align, dots, rig, rows, scratch);
-    } else {
-        is_due = question_sometimes(align, dots, sight, rig, rows);
+    } else if (align->unsettled_frames > 0) {
+        is_due = question(align, dots, rig, rows);
     }
     if (is_due) {
         align->excess = search(align, dots, align->excess, rig, rows, scratch);

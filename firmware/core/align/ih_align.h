@@ -10,8 +10,9 @@
  *         2. If not, search (ih_align_search): back at the file's lines, or around them. The result is taken when more dots
  *            lie on its lines than before. After searches in vain there are pauses of up to 8 frames. If dots lie on
  *            the lines, but beyond the working range, so that labels are short, depth alone is searched for. In one frame
- *            a wrong motion may have the most dots, and its own labels keep it: 1, 2, 4, 8 and 16 frames after a search
- *            lines go back to where they were if no fewer dots lie there, or are searched for again.
+ *            a wrong motion may have the most dots, and its own labels keep it: in each of the 16 frames after a
+ *            search lines go back to where they were if no fewer dots lie there, or are searched for again, unless
+ *            hardly a dot lies beside them.
  *         3. Learn, after the labels: a fit to how far labelled dots lie across their lines, averaged with those of up to 16
  *            frames before. A frame that differs starts the mean anew. The lines move when the mean is 0.1 px off them
  *            (0.05 px once they have moved), or when depth is: 0.04 degrees and 3 times its uncertainty (then 0.01 degrees

@@ -487,6 +487,21 @@ static void a_motion_that_had_held_comes_back(void)
     }
 }
 
+/* Right dots come back in any of the 16 frames after the search: lines do in the same frame. */
+static void a_false_motion_is_questioned_in_each_frame(void)
+{
+    for (int wait = 1; wait < 16; wait++) {
+        const struct moved_scene misleading = {WALL_MM, NOISE_PX, 0.5, 280};
+
+        use_rig(1);
+        run(1, &false_motion, &misleading, wait);
+        IH_TEST_WITHIN(0.5, 0, worst_px(1, &false_motion), "misled, px", wait);
+        see_both(&right_motion, 0.9, &false_motion, 0.4);
+        find();
+        IH_TEST_WITHIN(0.5, 0, worst_px(1, &right_motion), "worst slot, px", wait);
+    }
+}
+
 /* --- learning --- */
 
 /* What the dots show of the axis that is depth: within its uncertainty,
@@ -684,6 +699,7 @@ int main(void)
     RUN_TEST(what_is_beyond_the_limits_is_not_taken);
     RUN_TEST(a_false_motion_of_the_first_frame_does_not_stay);
     RUN_TEST(a_motion_that_had_held_comes_back);
+    RUN_TEST(a_false_motion_is_questioned_in_each_frame);
     RUN_TEST(depth_is_found_within_its_uncertainty);
     RUN_TEST(all_axes_are_within_their_uncertainty);
     RUN_TEST(depth_that_dots_do_not_show_is_not_known);
