@@ -9,6 +9,8 @@
 /* Fewer dots, or labels, say nothing. */
 #define DOTS_MIN 30
 #define LABELS_MIN 16
+/* Of dots on the lines. Before a wall beyond the working range one of ten gets a label, of another slot. */
+#define LABELS_DIVISOR 4
 /* A dot on its line, and those beside it that are not: the ring is twice as wide as the line. */
 #define ON_PX_Q12 1229          /* 0.3 px */
 #define BESIDE_FROM_PX_Q12 2458 /* 0.6 px */
@@ -471,7 +473,8 @@ void ih_align_learn(struct ih_align *align, const struct ih_labels *labels, stru
                        ih_align_rad_q30(align->prior_px_q12[IH_ALIGN_DEPTH], rig));
     }
     take_labels(align, labels, rig, pairs);
-    if (pairs->count < LABELS_MIN || align->now.state == IH_ALIGN_LOST) {
+    if (pairs->count < LABELS_MIN || align->now.state == IH_ALIGN_LOST ||
+        LABELS_DIVISOR * labels->labelled_count < align->excess) {
         return;
     }
     const bool was_depth_new = align->is_depth_new;
