@@ -6,7 +6,7 @@
 #include "align/ih_align_fit.h"
 #include "base/ih_fix.h"
 
-/* Where a search looks: on both sides of a line, and beyond the working range, as a rotation moves dots along, too. */
+/* A search looks so much nearer than the working range, and beyond infinity: a rotation moves dots along their lines, too. */
 #define SEARCH_MARGIN_PX_Q12 (10 * 4096)
 /* Bins of the first vote on one side of a line, and how many of them are from dot to dot: with 28 px between dots they are
  * half a pixel wide, and a line's neighbours are beyond the last one. */
@@ -38,12 +38,12 @@ static void find_all(const struct ih_align_axes *axes, const struct ih_rig *rig,
     const struct ih_align_band band = {BAND_BINS * bin_of(rig), SEARCH_MARGIN_PX_Q12};
     int32_t first = 0, total = 0;
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
-        int32_t across[IH_ALIGN_NEAR_MAX];
-        const int32_t count = ih_align_near(rows, &rig->line[slot], band, &first, across);
+        struct ih_align_dot dot[IH_ALIGN_NEAR_MAX];
+        const int32_t count = ih_align_near(rows, &rig->line[slot], band, &first, dot);
         ih_align_slopes(rig, axes, slot, out->slope_q12[slot]);
         out->found_count[slot] = (uint8_t)ih_min_s32(count, IH_ALIGN_FOUND_MAX - total);
         for (int32_t i = 0; i < out->found_count[slot]; i++) {
-            out->found_px_q10[total++] = (int16_t)(across[i] >> 2);
+            out->found_px_q10[total++] = (int16_t)(dot[i].across_px_q12 >> 2);
         }
     }
 }
