@@ -12,7 +12,7 @@
  *         2. If not, search (ih_align_search): back at the file's lines, or around them. The result is taken when more dots
  *            lie on its lines than before. After searches in vain there are pauses of up to 8 frames. If dots lie on
  *            the lines and in the working range, widened by 4 px, but less than half as many get labels, depth alone is
- *            searched for. In one frame a wrong motion may have the most dots, and
+ *            searched for, and must be 5 times its uncertainty. In one frame a wrong motion may have the most dots, and
  *            its own labels keep it: in each of the 16 frames after a search lines go back to where they were if no
  *            fewer dots lie there, or are searched for again, unless hardly a dot lies beside them.
  *         3. Learn, after the labels, if they are at least a quarter as many as the dots on the lines: a fit to how far

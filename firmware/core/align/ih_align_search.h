@@ -5,7 +5,7 @@
  * Method: all pairs of a slot and a dot within 16 px of its line, from the nearest depth to infinity and 10 px more at
  *         both ends; votes over planes in bins of 0.5 px, then of 0.2 px around each of the best and for rotations of
  *         depth; a fit to the pairs within 1 px of the best one. Where dots are less than 28 px apart the 16 and 0.5 px
- *         are as much less. Depth is 0 unless it is 3 times its uncertainty.
+ *         are as much less. Depth is 0 unless it is 3 times its uncertainty, or 5 times where it is searched for alone.
  */
 #ifndef IH_ALIGN_SEARCH_H
 #define IH_ALIGN_SEARCH_H

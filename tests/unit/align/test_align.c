@@ -276,6 +276,24 @@ static void a_person_before_a_wall_beyond_the_range_moves_no_right_rig(void)
     }
 }
 
+/* Every frame asks for depth where labels are short: no pattern of chance must answer. */
+static void labels_that_are_short_move_no_right_rig(void)
+{
+    static const struct moved_scene scene[] = {{3000, 0.12, 0.25, 60}, {2900, 0.12, 0.25, 60}};
+
+    for (int which = 0; which < 2; which++) {
+        int short_count = 0;
+
+        use_rig(which);
+        for (int frame = 0; frame < 1500; frame++) {
+            run(which, &file, &scene[which], 1);
+            short_count += align.is_short;
+            IH_TEST_WITHIN(0.1, 0, rotation_deg(1), "about Y", 10000 * which + frame);
+        }
+        TEST_ASSERT_GREATER_THAN_INT(1200, short_count);
+    }
+}
+
 /* --- found in the first frame --- */
 
 static const struct moved_rig moves[] = {{{0.05, 0, 0}, 0},         {{-0.1, 0, 0}, 0},
@@ -804,6 +822,7 @@ int main(void)
     RUN_TEST(distance_from_lines_is_reported);
     RUN_TEST(a_wall_beyond_the_range_moves_no_right_rig);
     RUN_TEST(a_person_before_a_wall_beyond_the_range_moves_no_right_rig);
+    RUN_TEST(labels_that_are_short_move_no_right_rig);
     RUN_TEST(a_moved_rig_is_found_in_one_frame);
     RUN_TEST(a_moved_rig_is_found_before_a_wall_beyond_the_range);
     RUN_TEST(half_of_the_dots_are_enough);
