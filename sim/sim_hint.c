@@ -139,6 +139,7 @@ void sim_hint_frame(struct sim_hint *hint, const struct isohead *head, const str
     } else if (head->dots.dot_count >= DOTS_MIN) {
         hint->dotted_count++;
         hint->bare_count += is_bare(head);
+        hint->on_lines_count += is_bare(head) && head->align.now.state == IH_ALIGN_FITS;
     }
 }
 
@@ -149,6 +150,16 @@ static void report_dots(const struct sim_hint *hint, const struct isohead *head,
         return;
     }
     char text[TEXT_MAX];
+    if (2 * hint->on_lines_count > hint->bare_count) {
+        snprintf(text, sizeof text,
+                 "hardly a dot has a good label in %" PRId32 " of %" PRId32
+                 " frames, but dots lie on the lines of %s: what is seen is nearer than %" PRId32
+                 " or farther than %" PRId32 " mm",
+                 hint->bare_count, hint->dotted_count, rig, head->rig.calibration.near_mm,
+                 head->rig.calibration.far_mm);
+        sim_report_hint(report, dir, text);
+        return;
+    }
     snprintf(text, sizeof text,
              "hardly a dot has a good label in %" PRId32 " of %" PRId32
              " frames: %s does not fit these frames. Use the rig file of this camera and "

@@ -9,6 +9,8 @@
 /* Fewer dots, or labels, say nothing. */
 #define DOTS_MIN 30
 #define LABELS_MIN 16
+/* Of dots on the lines. Before a wall beyond the working range one of ten gets a label, of another slot. */
+#define LABELS_DIVISOR 4
 /* A dot on its line, and those beside it that are not: the ring is twice as wide as the line. */
 #define ON_PX_Q12 1229          /* 0.3 px */
 #define BESIDE_FROM_PX_Q12 2458 /* 0.6 px */
@@ -45,7 +47,7 @@
 /* After so many searches in vain a pause grows by a frame. */
 #define VAIN_FRAMES 4
 #define PAUSE_MAX 8
-/* So long what a search found is questioned. */
+/* So long what a search found is questioned, in every frame; then an eighth more dots are enough, not a quarter. */
 #define UNSETTLED_FRAMES_MAX 16
 
 static bool is_none(const int32_t moved_px_q12[IH_ALIGN_AXES])
@@ -97,39 +99,48 @@ static int32_t excess_min(int32_t dot_count)
     return 12 + dot_count / 8;
 }
 
-/* How many dots lie on the rig's lines, and beside them. */
+/* How many dots lie on the rig's lines, and beside them; of these, how many no farther than the working range. */
 struct sight {
     int32_t on, beside;
+    int32_t near_on, near_beside;
 };
 
 /* More than chance puts there. */
-static int32_t excess_of(struct sight sight)
+static int32_t excess_of(int32_t on, int32_t beside)
 {
-    return sight.on - sight.beside / 2;
+    return on - beside / 2;
 }
 
-static void judge(int32_t across_px_q12, struct sight *sight)
+static void judge(struct ih_align_dot dot, int32_t far_px_q12, struct sight *sight)
 {
-    const int32_t off = ih_abs_s32(across_px_q12);
-    sight->on += off < ON_PX_Q12;
-    sight->beside += off > BESIDE_FROM_PX_Q12 && off < BESIDE_TO_PX_Q12;
+    const int32_t off = ih_abs_s32(dot.across_px_q12);
+    const bool is_on = off < ON_PX_Q12;
+    const bool is_beside = off > BESIDE_FROM_PX_Q12 && off < BESIDE_TO_PX_Q12;
+    const bool is_near = dot.along_px_q12 >= far_px_q12;
+    sight->on += is_on;
+    sight->beside += is_beside;
+    sight->near_on += is_on && is_near;
+    sight->near_beside += is_beside && is_near;
 }
 
 /* At every step-th slot, and as if the others were like these. */
 static struct sight look(const struct ih_dot_rows *rows, const struct ih_rig *rig, int32_t step)
 {
     const struct ih_align_band band = {BESIDE_TO_PX_Q12, MARGIN_PX_Q12};
-    struct sight sight = {0, 0};
+    struct sight sight = {0, 0, 0, 0};
     int32_t first = 0;
     for (int32_t slot = 0; slot < IH_SLOTS; slot += step) {
-        int32_t across[IH_ALIGN_NEAR_MAX];
-        const int32_t count = ih_align_near(rows, &rig->line[slot], band, &first, across);
+        struct ih_align_dot dot[IH_ALIGN_NEAR_MAX];
+        const int32_t count = ih_align_near(rows, &rig->line[slot], band, &first, dot);
+        const int32_t far_px_q12 = rig->line[slot].t_far_px_q12 - MARGIN_PX_Q12;
         for (int32_t i = 0; i < count; i++) {
-            judge(across[i], &sight);
+            judge(dot[i], far_px_q12, &sight);
         }
     }
     sight.on *= step;
     sight.beside *= step;
+    sight.near_on *= step;
+    sight.near_beside *= step;
     return sight;
 }
 
@@ -141,7 +152,7 @@ static bool is_clear(struct sight sight)
 /* Are dots on the lines as they were, or so many that they can be on no others? */
 static bool is_where_it_was(const struct ih_align *align, struct sight sight, int32_t dot_count)
 {
-    const int32_t excess = excess_of(sight);
+    const int32_t excess = excess_of(sight.on, sight.beside);
     const bool is_as_before = excess * 256 / dot_count >= align->trusted_q8 * 3 / 4;
     return (is_clear(sight) || is_as_before) && excess >= excess_min(dot_count);
 }
@@ -192,8 +203,10 @@ static int32_t try_motion(struct ih_align *align, const struct ih_dots *dots,
     memcpy(before_px_q12, align->moved_px_q12, sizeof before_px_q12);
     move_rig(align, moved_px_q12, rig);
     ih_dot_rows_fill(dots, rig, rows);
-    const int32_t excess = excess_of(look(rows, rig, 1));
+    const struct sight sight = look(rows, rig, 1);
+    const int32_t excess = excess_of(sight.on, sight.beside);
     if (excess >= excess_wanted) {
+        align->near_excess = excess_of(sight.near_on, sight.near_beside);
         return excess;
     }
     move_rig(align, before_px_q12, rig);
@@ -208,8 +221,10 @@ static int32_t search(struct ih_align *align, const struct ih_dots *dots, int32_
 {
     static const int32_t none[IH_ALIGN_AXES];
     int32_t before_px_q12[IH_ALIGN_AXES], moved_px_q12[IH_ALIGN_AXES];
-    const int32_t enough = ih_max_s32(excess_min(rows->dot_count), excess_before * 5 / 4 + 1);
+    const int32_t more = excess_before / (align->unsettled_frames > 0 ? 8 : 4) + 1;
+    const int32_t enough = ih_max_s32(excess_min(rows->dot_count), excess_before + more);
     const int32_t trusted = rows->dot_count * align->trusted_q8 * 3 / 4 / 256;
+    const int32_t near_excess_before = align->near_excess;
     int32_t excess = 0;
     memcpy(before_px_q12, align->moved_px_q12, sizeof before_px_q12);
     if (!is_none(before_px_q12)) {
@@ -236,15 +251,24 @@ static int32_t search(struct ih_align *align, const struct ih_dots *dots, int32_
         move_rig(align, before_px_q12, rig);
         ih_dot_rows_fill(dots, rig, rows);
     }
+    align->near_excess = near_excess_before;
     return excess_before;
 }
 
 /* A wrong motion may have had the most dots in the one frame that was searched, and fits the labels that it makes; in other
- * frames the right one has more. Back to the motion before? If not, another search is due. */
+ * frames the right one has more. Unless dots can be on no other lines: back to the motion before? If not, another search
+ * is due. */
 static bool question(struct ih_align *align, const struct ih_dots *dots, struct ih_rig *rig,
                      struct ih_dot_rows *rows)
 {
-    const int32_t excess = excess_of(look(rows, rig, 1));
+    const struct sight sight = look(rows, rig, 1);
+    const int32_t excess = excess_of(sight.on, sight.beside);
+    if (align->unsettled_frames > UNSETTLED_FRAMES_MAX || is_clear(sight)) {
+        align->unsettled_frames = 0;
+        return false;
+    }
+    /* Not 0 yet: what this frame's search finds is compared with the same motion. */
+    align->unsettled_frames++;
     const int32_t before_px_q12 = align->moved_px_q12[IH_ALIGN_DEPTH];
     align->excess = try_motion(align, dots, align->settled_px_q12,
                                ih_max_s32(excess_min(rows->dot_count), excess), rig, rows);
@@ -259,21 +283,8 @@ static bool question(struct ih_align *align, const struct ih_dots *dots, struct 
     return true;
 }
 
-/* After 1, 2, 4, 8 and 16 frames, unless dots can be on no other lines. */
-static bool question_sometimes(struct ih_align *align, const struct ih_dots *dots,
-                               struct sight sight, struct ih_rig *rig, struct ih_dot_rows *rows)
-{
-    const int32_t frames = align->unsettled_frames;
-    if (frames == 0 || frames > UNSETTLED_FRAMES_MAX || is_clear(sight)) {
-        align->unsettled_frames = 0;
-        return false;
-    }
-    /* Not 0 yet: what this frame's search finds is compared with the same motion. */
-    align->unsettled_frames = frames + 1;
-    return (frames & (frames - 1)) == 0 && question(align, dots, rig, rows);
-}
-
-/* Labels are short where dots lie on their lines, but out of range: a rotation of depth that no plane shows. */
+/* Labels are short where dots lie on their lines and in the working range, or hardly beyond it: a rotation of depth that no
+ * plane shows. */
 static void search_depth(struct ih_align *align, const struct ih_dots *dots, struct ih_rig *rig,
                          struct ih_dot_rows *rows, struct ih_align_scratch *scratch)
 {
@@ -313,15 +324,16 @@ void ih_align_find(struct ih_align *align, const struct ih_dots *dots, struct ih
     if (!is_where_it_was(align, sight, rows->dot_count)) {
         sight = look(rows, rig, 1);
     }
-    align->excess = excess_of(sight);
+    align->excess = excess_of(sight.on, sight.beside);
+    align->near_excess = excess_of(sight.near_on, sight.near_beside);
     bool is_due = false;
     if (!is_where_it_was(align, sight, rows->dot_count)) {
         align->pause--;
         is_due = align->pause < 0;
     } else if (align->is_short) {
         search_depth(align, dots, rig, rows, scratch);
-    } else {
-        is_due = question_sometimes(align, dots, sight, rig, rows);
+    } else if (align->unsettled_frames > 0) {
+        is_due = question(align, dots, rig, rows);
     }
     if (is_due) {
         align->excess = search(align, dots, align->excess, rig, rows, scratch);
@@ -468,7 +480,7 @@ void ih_align_learn(struct ih_align *align, const struct ih_labels *labels, stru
     struct ih_align_sums frame;
     int32_t frame_px_q12[IH_ALIGN_AXES], mean_px_q12[IH_ALIGN_AXES];
     int32_t sigma_px_q12[IH_ALIGN_AXES], next_px_q12[IH_ALIGN_AXES];
-    align->is_short = 2 * labels->labelled_count < align->excess;
+    align->is_short = 2 * labels->labelled_count < align->near_excess;
     if (align->is_short) {
         align->now.is_depth_known = false;
         align->now.depth_sigma_rad_q30 =
@@ -476,7 +488,8 @@ void ih_align_learn(struct ih_align *align, const struct ih_labels *labels, stru
                        ih_align_rad_q30(align->prior_px_q12[IH_ALIGN_DEPTH], rig));
     }
     take_labels(align, labels, rig, pairs);
-    if (pairs->count < LABELS_MIN || align->now.state == IH_ALIGN_LOST) {
+    if (pairs->count < LABELS_MIN || align->now.state == IH_ALIGN_LOST ||
+        LABELS_DIVISOR * labels->labelled_count < align->excess) {
         return;
     }
     const bool was_depth_new = align->is_depth_new;

@@ -5,17 +5,20 @@
  * Out:    the rig's lines where the dots are, the dots by row, and how the rig has moved: a rotation of the projector, a
  *         change of focal length and a shift of the picture, with uncertainty.
  * Method: 1. Look: dots within 0.3 px of the lines, against those 0.6 to 1.2 px beside them. If nearly as many of all dots
- *            lie on the lines as did since the last search, or hardly one beside them, the rig is where it was. Every
- *            second slot is looked at, and all of them where these do not show it.
+ *            lie on the lines as did since the last search, or hardly one beside them, the rig is where it was. Lines are
+ *            looked at from the near end of the working range to infinity: of a room beyond the range no dot gets a
+ *            label, but all show where the lines are. Every second slot is looked at, and all of them where these do
+ *            not show it.
  *         2. If not, search (ih_align_search): back at the file's lines, or around them. The result is taken when more dots
  *            lie on its lines than before. After searches in vain there are pauses of up to 8 frames. If dots lie on
- *            the lines, but beyond the working range, so that labels are short, depth alone is searched for. In one frame
- *            a wrong motion may have the most dots, and its own labels keep it: 1, 2, 4, 8 and 16 frames after a search
- *            lines go back to where they were if no fewer dots lie there, or are searched for again.
- *         3. Learn, after the labels: a fit to how far labelled dots lie across their lines, averaged with those of up to 16
- *            frames before. A frame that differs starts the mean anew. The lines move when the mean is 0.1 px off them
- *            (0.05 px once they have moved), or when depth is: 0.04 degrees and 3 times its uncertainty (then 0.01 degrees
- *            and once).
+ *            the lines and in the working range, widened by 4 px, but less than half as many get labels, depth alone is
+ *            searched for, and must be 5 times its uncertainty. In one frame a wrong motion may have the most dots, and
+ *            its own labels keep it: in each of the 16 frames after a search lines go back to where they were if no
+ *            fewer dots lie there, or are searched for again, unless hardly a dot lies beside them.
+ *         3. Learn, after the labels, if they are at least a quarter as many as the dots on the lines: a fit to how far
+ *            labelled dots lie across their lines, averaged with those of up to 16 frames before. A frame that differs
+ *            starts the mean anew. The lines move when the mean is 0.1 px off them (0.05 px once they have moved), or
+ *            when depth is: 0.04 degrees and 3 times its uncertainty (then 0.01 degrees and once).
  *         Where the rig is right nothing changes, to the last bit.
  *         The rotation about the axis across the baseline is depth. Dots show it by the pattern's keystone alone: to
  *         0.02 degrees in a frame of a room, 0.2 where half of the dots are missing.
@@ -67,13 +70,14 @@ struct ih_align {
     int32_t moved_px_q12[IH_ALIGN_AXES]; /* the rig's lines, against its file */
     struct ih_align_sums mean;           /* over frame_count frames */
     int32_t frame_count;
-    int32_t odd;        /* slots of the last frame, after the first frames */
-    int32_t excess;     /* of this frame: dots on the lines, less those that chance puts there */
-    bool is_short;      /* the frame before had labels for less than half of them */
-    bool is_depth_new;  /* depths have changed by more than tracks follow; the caller clears it */
-    int32_t vain_count; /* searches that found nothing, one after the other */
-    int32_t pause;      /* frames until the next one */
-    int32_t trusted_q8; /* fraction of the dots on the lines that is good enough */
+    int32_t odd;         /* slots of the last frame, after the first frames */
+    int32_t excess;      /* of this frame: dots on the lines, less those that chance puts there */
+    int32_t near_excess; /* the same of dots that are no farther than the working range */
+    bool is_short;       /* the frame before had labels for less than half of the latter */
+    bool is_depth_new;   /* depths have changed by more than tracks follow; the caller clears it */
+    int32_t vain_count;  /* searches that found nothing, one after the other */
+    int32_t pause;       /* frames until the next one */
+    int32_t trusted_q8;  /* fraction of the dots on the lines that is good enough */
     /* Frames since a search moved the lines, and where they were before; 0: what it found is not questioned any more. */
     int32_t unsettled_frames, settled_px_q12[IH_ALIGN_AXES];
 };

@@ -55,14 +55,14 @@ static struct stretch stretch_of(int32_t infinity_px_q12, int32_t dir_q30, int32
                             ih_max_s32(near, far) + wider_px_q12};
 }
 
-/* A line's two ends, widened by the margin; half a band moves them by at most as much. Of the dots in these rows most lie
- * in other columns. */
+/* A line from the nearest depth to infinity, both widened by the margin; half a band moves its ends by at most as much. Of
+ * the dots in these rows most lie in other columns. Where a dot is kept, along is between two 32-bit numbers. */
 int32_t ih_align_near(const struct ih_dot_rows *rows, const struct ih_line *line,
                       struct ih_align_band band, int32_t *first,
-                      int32_t across_px_q12[IH_ALIGN_NEAR_MAX])
+                      struct ih_align_dot dot[IH_ALIGN_NEAR_MAX])
 {
     const int32_t near = line->t_near_px_q12 + band.margin_px_q12;
-    const int32_t far = line->t_far_px_q12 - band.margin_px_q12;
+    const int32_t far = -band.margin_px_q12;
     const struct stretch u = stretch_of(line->infinity_u_px_q12, line->dir_u_q30, near, far,
                                         band.half_px_q12 + COLUMN_PX_Q12);
     const struct stretch v =
@@ -77,7 +77,7 @@ int32_t ih_align_near(const struct ih_dot_rows *rows, const struct ih_line *line
         const int64_t across = ih_dot_rows_across_px_q12(rows, i, line);
         if (along >= far && along <= near && ih_abs_s64(across) < band.half_px_q12 &&
             count < IH_ALIGN_NEAR_MAX) {
-            across_px_q12[count++] = (int32_t)across;
+            dot[count++] = (struct ih_align_dot){(int32_t)along, (int32_t)across};
         }
     }
     return count;

@@ -6,7 +6,7 @@
 #include "align/ih_align_fit.h"
 #include "base/ih_fix.h"
 
-/* Where a search looks: on both sides of a line, and beyond the working range, as a rotation moves dots along, too. */
+/* A search looks so much nearer than the working range, and beyond infinity: a rotation moves dots along their lines, too. */
 #define SEARCH_MARGIN_PX_Q12 (10 * 4096)
 /* Bins of the first vote on one side of a line, and how many of them are from dot to dot: with 28 px between dots they are
  * half a pixel wide, and a line's neighbours are beyond the last one. */
@@ -17,6 +17,9 @@
 #define FIT_PX_Q12 4096            /* 1 px */
 #define DEPTH_STEP_RAD_Q30 4685041 /* 0.25 degrees, from where the fit finds its way */
 #define PLANE_SLOTS 5              /* of so many slots one shows a plane */
+/* Before a wall just beyond the range every frame asks for depth. Of 328 such fits before right rigs 9 were beyond 3 times
+ * their uncertainty, and one beyond 5 times. */
+#define DEPTH_FAR_SIGMAS 5
 /* Against this scale a plane's pairs weigh all the same. */
 #define EQUAL_SCALE_PX_Q12 (64 * 4096)
 /* So far a plane may be from the dots. If the fit began with the next scale, 840 of 7,344 single frames would be searched
@@ -38,12 +41,12 @@ static void find_all(const struct ih_align_axes *axes, const struct ih_rig *rig,
     const struct ih_align_band band = {BAND_BINS * bin_of(rig), SEARCH_MARGIN_PX_Q12};
     int32_t first = 0, total = 0;
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
-        int32_t across[IH_ALIGN_NEAR_MAX];
-        const int32_t count = ih_align_near(rows, &rig->line[slot], band, &first, across);
+        struct ih_align_dot dot[IH_ALIGN_NEAR_MAX];
+        const int32_t count = ih_align_near(rows, &rig->line[slot], band, &first, dot);
         ih_align_slopes(rig, axes, slot, out->slope_q12[slot]);
         out->found_count[slot] = (uint8_t)ih_min_s32(count, IH_ALIGN_FOUND_MAX - total);
         for (int32_t i = 0; i < out->found_count[slot]; i++) {
-            out->found_px_q10[total++] = (int16_t)(across[i] >> 2);
+            out->found_px_q10[total++] = (int16_t)(dot[i].across_px_q12 >> 2);
         }
     }
 }
@@ -151,10 +154,11 @@ static void search_plane(const int32_t prior_px_q12[IH_ALIGN_AXES], const struct
     }
 }
 
-/* The five numbers that come nearest to a plane, and from there those of the pairs around it. */
+/* The five numbers that come nearest to a plane, and from there those of the pairs around it. Depth is 0 unless it is so
+ * many times its uncertainty. */
 static void fit_plane(const int32_t prior_px_q12[IH_ALIGN_AXES], const struct ih_rig *rig,
-                      const struct ih_align_plane *plane, struct ih_align_scratch *scratch,
-                      int32_t moved_px_q12[IH_ALIGN_AXES])
+                      const struct ih_align_plane *plane, int32_t depth_sigmas,
+                      struct ih_align_scratch *scratch, int32_t moved_px_q12[IH_ALIGN_AXES])
 {
     struct ih_align_pairs *pairs = &scratch->at.pairs;
     struct ih_align_sums sums;
@@ -171,9 +175,8 @@ static void fit_plane(const int32_t prior_px_q12[IH_ALIGN_AXES], const struct ih
     ih_align_step(pairs, prior_px_q12, PLANE_SCALE_PX_Q12, &sums, moved_px_q12, NULL);
     ih_align_step(pairs, prior_px_q12, IH_ALIGN_FIRST_SCALE_PX_Q12, &sums, moved_px_q12, NULL);
     ih_align_step(pairs, prior_px_q12, IH_ALIGN_SCALE_PX_Q12, &sums, moved_px_q12, sigma_px_q12);
-    const int32_t depth_min_px_q12 =
-        ih_max_s32(IH_ALIGN_DEPTH_SIGMAS * sigma_px_q12[IH_ALIGN_DEPTH],
-                   ih_align_px_q12(IH_ALIGN_DEPTH_MIN_RAD_Q30, rig));
+    const int32_t depth_min_px_q12 = ih_max_s32(depth_sigmas * sigma_px_q12[IH_ALIGN_DEPTH],
+                                                ih_align_px_q12(IH_ALIGN_DEPTH_MIN_RAD_Q30, rig));
     if (ih_abs_s32(moved_px_q12[IH_ALIGN_DEPTH]) <= depth_min_px_q12) {
         ih_align_sums_hold(&sums, IH_ALIGN_DEPTH, 0);
         ih_align_solve(&sums, prior_px_q12, IH_ALIGN_NOISE_PX_Q12, moved_px_q12, NULL);
@@ -187,7 +190,7 @@ bool ih_align_search_depth(const struct ih_align_axes *axes,
 {
     static const struct ih_align_plane none;
     find_all(axes, rig, rows, scratch);
-    fit_plane(prior_px_q12, rig, &none, scratch, moved_px_q12);
+    fit_plane(prior_px_q12, rig, &none, DEPTH_FAR_SIGMAS, scratch, moved_px_q12);
     return ih_abs_s32(moved_px_q12[IH_ALIGN_DEPTH]) >
            ih_align_px_q12(IH_ALIGN_DEPTH_FAR_RAD_Q30, rig);
 }
@@ -202,6 +205,6 @@ bool ih_align_search(const struct ih_align_axes *axes, const int32_t prior_px_q1
     if (plane.score <= 0) {
         return false;
     }
-    fit_plane(prior_px_q12, rig, &plane, scratch, moved_px_q12);
+    fit_plane(prior_px_q12, rig, &plane, IH_ALIGN_DEPTH_SIGMAS, scratch, moved_px_q12);
     return true;
 }

@@ -2,10 +2,10 @@
  *
  * In:     dots by row, the rig with the lines of its file.
  * Out:    the five numbers of ih_align_pairs.h.
- * Method: all pairs of a slot and a dot within 16 px of its line and near its working range; votes over planes in bins
- *         of 0.5 px, then of 0.2 px around each of the best and for rotations of depth; a fit to the pairs within 1 px of
- *         the best one. Where dots are less than 28 px apart the 16 and 0.5 px are as much less. Depth is 0 unless it is 3
- *         times its uncertainty.
+ * Method: all pairs of a slot and a dot within 16 px of its line, from the nearest depth to infinity and 10 px more at
+ *         both ends; votes over planes in bins of 0.5 px, then of 0.2 px around each of the best and for rotations of
+ *         depth; a fit to the pairs within 1 px of the best one. Where dots are less than 28 px apart the 16 and 0.5 px
+ *         are as much less. Depth is 0 unless it is 3 times its uncertainty, or 5 times where it is searched for alone.
  */
 #ifndef IH_ALIGN_SEARCH_H
 #define IH_ALIGN_SEARCH_H
@@ -44,7 +44,7 @@ bool ih_align_search(const struct ih_align_axes *axes, const int32_t prior_px_q1
                      const struct ih_rig *rig, const struct ih_dot_rows *rows,
                      struct ih_align_scratch *scratch, int32_t moved_px_q12[IH_ALIGN_AXES]);
 
-/* Where dots lie on the rig's lines as they are, but beyond its working range: what is left, of it a rotation of depth. False:
+/* Where dots lie on the rig's lines as they are, but labels are short: what is left, of it a rotation of depth. False:
  * there is none that could be the reason. */
 bool ih_align_search_depth(const struct ih_align_axes *axes,
                            const int32_t prior_px_q12[IH_ALIGN_AXES], const struct ih_rig *rig,

@@ -106,7 +106,7 @@ static void the_prior_is_in_pixels(void)
     }
 }
 
-/* Which dots are near a line, one by one. */
+/* Which dots are near a line, one by one: to infinity, however near the working range ends. */
 static void dots_near_a_line_are_all_found(void)
 {
     static struct ih_dot_rows rows;
@@ -131,26 +131,28 @@ static void dots_near_a_line_are_all_found(void)
 
             for (int slot = 0; slot < IH_SLOTS; slot++) {
                 const struct ih_line *line = &rig.line[slot];
-                int32_t across_px_q12[IH_ALIGN_NEAR_MAX], count = 0;
-                const int32_t found = ih_align_near(&rows, line, band, &first, across_px_q12);
+                struct ih_align_dot dot[IH_ALIGN_NEAR_MAX];
+                const int32_t found = ih_align_near(&rows, line, band, &first, dot);
+                int32_t count = 0;
 
                 for (int32_t i = 0; i < rows.dot_count && count < IH_ALIGN_NEAR_MAX; i++) {
                     const int64_t along = ih_dot_rows_along_px_q12(&rows, i, line);
                     const int64_t across = ih_dot_rows_across_px_q12(&rows, i, line);
 
-                    if (along >= line->t_far_px_q12 - band.margin_px_q12 &&
+                    if (along >= -band.margin_px_q12 &&
                         along <= line->t_near_px_q12 + band.margin_px_q12 &&
                         across < band.half_px_q12 - 4 && -across < band.half_px_q12 - 4) {
                         /* Those within 4 units of the band's edge may be there or not. */
-                        while (count < found && across_px_q12[count] != across) {
+                        while (count < found && dot[count].across_px_q12 != across) {
                             count++;
                         }
                         TEST_ASSERT_LESS_THAN_INT32(found, count);
+                        IH_TEST_EQUAL(along, dot[count].along_px_q12, "along", slot);
                         count++;
                     }
                 }
                 for (int32_t i = 0; i < found; i++) {
-                    IH_TEST_RANGE(1 - band.half_px_q12, band.half_px_q12 - 1, across_px_q12[i],
+                    IH_TEST_RANGE(1 - band.half_px_q12, band.half_px_q12 - 1, dot[i].across_px_q12,
                                   "within the band", slot);
                 }
             }
