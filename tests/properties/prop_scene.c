@@ -226,6 +226,13 @@ void prop_range_rig(struct ih_calibration *c, int32_t width, int32_t height, dou
     c->far_mm = 6000;
 }
 
+/* How far a head's surface lies before its ellipsoid: brow, nose, lips and hair, made of waves that are as wide wherever the
+ * head is. A surface without any is a ball's. */
+static double relief_mm(const struct prop_body *head, double x_mm, double y_mm)
+{
+    return 8 * sin((y_mm - head->centre_mm[1]) / 9) * cos((x_mm - head->centre_mm[0]) / 14);
+}
+
 void prop_paint_range(const struct prop_scene *scene, const struct ih_calibration *c,
                       uint16_t *depth_mm, struct ih_frame *frame)
 {
@@ -238,7 +245,13 @@ void prop_paint_range(const struct prop_scene *scene, const struct ih_calibratio
             (i % c->width - ih_test_from_q(c->cx_px_q16, 16)) / focal,
             ((double)(i / c->width) - ih_test_from_q(c->cy_px_q16, 16)) / focal, 1};
 
-        depth_mm[i] = (uint16_t)lround(prop_depth_mm(scene, camera, towards, NULL));
+        int body;
+        double z_mm = prop_depth_mm(scene, camera, towards, &body);
+
+        if (body == 0) {
+            z_mm -= relief_mm(&scene->body[0], z_mm * towards[0], z_mm * towards[1]);
+        }
+        depth_mm[i] = (uint16_t)lround(z_mm);
     }
 }
 
