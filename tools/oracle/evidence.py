@@ -14,7 +14,7 @@ CENTRE = np.array([10.0, -100, 800])
 ORIGIN = np.array([60.0, -20, 15])
 PITCH = 0.05
 KINDS = ("on rough bulge tall moved above beside below high nothing body body_rays body_depth wide "
-         "level shoulder before extent upright").split()
+         "level shoulder before extent upright bend_down bend_across").split()
 
 
 def lattice():
@@ -131,6 +131,7 @@ class Scene:
         self.dz = np.where(self.seen, self.point[:, 2] - centre[2], np.inf)
         position = (self.point - centre) / semi
         f = np.linalg.norm(position, axis=1)
+        self.radius = f
         self.distance = (f - 1) / (np.linalg.norm(position / semi, axis=1) / f)
         self.margin = np.full(SLOTS, np.inf)
 
@@ -142,6 +143,13 @@ class Scene:
 
     def between(self, value, low, high):
         return self.above(value, low, 0.05) & ~self.above(value, high, 0.05)
+
+
+def bend(height, face, axis):
+    """How uneven a surface is along an axis of the pattern, with one more bend of 12 mm."""
+    height, face = (np.moveaxis(a.reshape(GRID, GRID), axis, 0) for a in (height, face))
+    bends = np.minimum(np.abs(np.diff(height, 2, axis=0)), 20)[face[:-2] & face[1:-1] & face[2:]]
+    return (bends.sum() + 12) / (len(bends) + 1)
 
 
 def look(s, start, nest):
@@ -200,6 +208,9 @@ def look(s, start, nest):
                      & ~s.above(s.dz, -s.semi[2] - 60, 0.02)).sum()
     out["extent"] = nest[0] if nest else 0
     out["upright"] = nest[1] if nest else 1
+    face = seen & ~s.above(s.dz, 0, 0.02) & ~s.above(s.radius**2, 1.4**2, 2e-3)
+    height = (s.radius**2 - 1) / 2 * s.semi[2]
+    out["bend_down"], out["bend_across"] = (bend(height, face, axis) for axis in (0, 1))
     return out, (through.sum(), on.sum(), front.sum())
 
 

@@ -9,7 +9,7 @@
 #include "detect/ih_ray_counts.h"
 #include "detect/ih_surroundings.h"
 
-#define ONE_Q14 (1 << 14)
+#define ONE_Q28 ((int64_t)1 << 28)
 #define INSIDE_Q14 14746 /* radius2 below 0.9: through the head, not along its edge */
 #define ON_MM_Q8 (20 << 8)
 #define THROUGH_MM_Q8 (50 << 8)
@@ -22,6 +22,9 @@
 #define HIGH_WIDE_Q14 ((int32_t)IH_HEAD_PART(IH_HEAD_HIGH_ASIDE_PERCENT, 14))
 #define BODY_RAYS_MAX 30
 #define PLANE_POINTS_MIN 6
+#define FACE2_Q28 IH_HEAD_SQUARE(140, 28)
+#define BEND_MAX_MM_Q8 (20 << 8)
+#define BEND_MIDDLE_MM_Q8 (12 << 8)
 
 /* The candidate, and what is the same for all rays. */
 struct candidate {
@@ -59,7 +62,8 @@ const char *ih_evidence_text(enum ih_evidence_kind kind)
     static const char *const text[IH_EVIDENCE_COUNT] = {
         "on",    "rough",    "bulge",   "tall",   "moved",     "above",        "beside",
         "below", "high",     "nothing", "body",   "body_rays", "body_depth",   "wide",
-        "level", "shoulder", "before",  "extent", "upright",   "surroundings", "distance",
+        "level", "shoulder", "before",  "extent", "upright",   "bend_down",    "bend_across",
+        "surroundings", "distance",
     };
     return (uint32_t)kind < IH_EVIDENCE_COUNT ? text[kind] : NULL;
 }
@@ -343,6 +347,85 @@ static void add_body_depths(const struct ih_rays *rays, const struct ih_ray_mark
     }
 }
 
+/* The points before the centre and near the ellipsoid, where a face is. */
+struct face {
+    uint32_t mark[IH_RAYS_WORDS];    /* a bit for each slot */
+    int16_t height_mm_q8[IH_SLOTS]; /* where there is one; within half a semi-axis */
+};
+
+static bool is_marked(const struct face *face, int32_t slot)
+{
+    return face->mark[slot / 32] >> slot % 32 & 1;
+}
+
+/* Most points end here: within one and a half semi-axes, and before the centre. */
+static bool is_before(const struct ih_ellipsoid *ellipsoid, const int32_t point_mm_q8[3])
+{
+    const int32_t *centre_mm_q8 = ellipsoid->centre_mm_q8, *semi_mm_q8 = ellipsoid->semi_mm_q8;
+    return point_mm_q8[2] < centre_mm_q8[2] &&
+           2 * (centre_mm_q8[2] - point_mm_q8[2]) < 3 * semi_mm_q8[2] &&
+           2 * ih_abs_s32(point_mm_q8[1] - centre_mm_q8[1]) < 3 * semi_mm_q8[1] &&
+           2 * ih_abs_s32(point_mm_q8[0] - centre_mm_q8[0]) < 3 * semi_mm_q8[0];
+}
+
+static void find_face(const struct ih_rays *rays, const struct candidate *candidate,
+                      struct face *face)
+{
+    const struct ih_ellipsoid *ellipsoid = candidate->ellipsoid;
+    int32_t position_q14[3];
+    memset(face->mark, 0, sizeof face->mark);
+    for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
+        const struct ih_ray *ray = &rays->ray[slot];
+        if (ray->state != IH_RAY_SEEN || !is_before(ellipsoid, ray->point_mm_q8) ||
+            !ih_ellipsoid_position(ellipsoid, &candidate->fractions, ray->point_mm_q8,
+                                   position_q14)) {
+            continue;
+        }
+        const int64_t radius2_q28 = (int64_t)position_q14[0] * position_q14[0] +
+                                    (int64_t)position_q14[1] * position_q14[1] +
+                                    (int64_t)position_q14[2] * position_q14[2];
+        if (radius2_q28 < FACE2_Q28) {
+            face->mark[slot / 32] |= (uint32_t)1 << slot % 32;
+            face->height_mm_q8[slot] = (int16_t)ih_mul_shift(radius2_q28 - ONE_Q28,
+                                                             ellipsoid->semi_mm_q8[2], 29);
+        }
+    }
+}
+
+/* Of three slots that are step apart; column_max: of the first one. */
+static int32_t bend_mm_q8(const struct face *face, int32_t step, int32_t column_max)
+{
+    int32_t sum_q8 = BEND_MIDDLE_MM_Q8, count = 1;
+    for (int32_t word = 0; word < IH_RAYS_WORDS; word++) {
+        for (uint32_t left = face->mark[word]; left != 0; left &= left - 1) {
+            const int32_t slot = 32 * word + __builtin_ctz(left);
+            if (slot + 2 * step < IH_SLOTS && slot % IH_GRID <= column_max &&
+                is_marked(face, slot + step) && is_marked(face, slot + 2 * step)) {
+                const int32_t bend_q8 = face->height_mm_q8[slot] -
+                                        2 * face->height_mm_q8[slot + step] +
+                                        face->height_mm_q8[slot + 2 * step];
+                sum_q8 += ih_min_s32(ih_abs_s32(bend_q8), BEND_MAX_MM_Q8);
+                count++;
+            }
+        }
+    }
+    return (sum_q8 + count / 2) / count;
+}
+
+/* A camera on its side has the pattern's rows downwards. */
+static void bends(const struct ih_rays *rays, const struct candidate *candidate, int32_t value_q8[])
+{
+    const struct ih_ray *middle = &rays->ray[IH_SLOTS / 2];
+    const bool is_turned = ih_abs_s32(middle[1].slope_y_q20 - middle->slope_y_q20) >
+                           ih_abs_s32(middle[1].slope_x_q20 - middle->slope_x_q20);
+    struct face face;
+    find_face(rays, candidate, &face);
+    const int32_t by_rows_q8 = bend_mm_q8(&face, IH_GRID, IH_GRID - 1);
+    const int32_t by_columns_q8 = bend_mm_q8(&face, 1, IH_GRID - 3);
+    value_q8[IH_EVIDENCE_BEND_DOWN] = is_turned ? by_columns_q8 : by_rows_q8;
+    value_q8[IH_EVIDENCE_BEND_ACROSS] = is_turned ? by_rows_q8 : by_columns_q8;
+}
+
 void ih_evidence_collect(const struct ih_rays *rays, const struct ih_ellipsoid *ellipsoid,
                          const int32_t start_mm_q8[3], const struct ih_evidence_nest *nest,
                          struct ih_evidence *out)
@@ -368,6 +451,7 @@ void ih_evidence_collect(const struct ih_rays *rays, const struct ih_ellipsoid *
     }
     add_body_depths(rays, &marks, ellipsoid->centre_mm_q8[2], &sums);
     summarise(&sums, nest, out->value_q8);
+    bends(rays, &candidate, out->value_q8);
     out->value_q8[IH_EVIDENCE_TALL] = taller_q8(ellipsoid);
     out->value_q8[IH_EVIDENCE_SURROUNDINGS] = ih_surroundings_logit_q8(rays, ellipsoid);
     out->value_q8[IH_EVIDENCE_DISTANCE] = ellipsoid->centre_mm_q8[2];

@@ -10,6 +10,10 @@
  *         rays change little; other fractions are of 1 to 3 rays at least. "Body" is dz -220 .. 200 mm.
  *         Rays of unknown state count nowhere. "On" are points of rays through the ellipsoid
  *         (radius2 below 0.9): without its edge, where depths are uncertain. Regions: ih_head_model.h.
+ *         A point's height is how far it lies outside of the ellipsoid, (radius^2 - 1) / 2 times the semi-axis of depth. A
+ *         bend is |h1 - 2 h2 + h3|, 20 mm at most, of three neighbours in the pattern that all lie before the centre and
+ *         within 1.4 semi-axes of it; their mean is with one more of 12 mm, so that few change little. A face and hair
+ *         bend more than a limb, a bag or a ball, above all from brow to chin.
  * Overflow: points and centres below 2^26 in Q8. Moments are of points on the ellipsoid, 220 mm at
  *         most from its centre: products 2^23.6 in Q8, 361 of them 2^32.1, squared sums 2^40.6;
  *         central ones 2^23.6, their determinants 2^48.2, times 2^12 2^60.2.
@@ -49,6 +53,8 @@ enum ih_evidence_kind {
     IH_EVIDENCE_BEFORE,     /* points around, 60 mm and more before the front, as hands: count */
     IH_EVIDENCE_EXTENT,     /* of the nest at this position: mm, 0 without one */
     IH_EVIDENCE_UPRIGHT,    /* of that nest: height^2 / width^2, 1 without one */
+    IH_EVIDENCE_BEND_DOWN,   /* how uneven the surface is from dot to dot, downwards: mm */
+    IH_EVIDENCE_BEND_ACROSS, /* and across */
     IH_EVIDENCE_SURROUNDINGS, /* what all rays there say by the learnt map (ih_surroundings): log-odds */
     IH_EVIDENCE_DISTANCE, /* depth of the centre: mm; near and far heads show themselves otherwise */
     IH_EVIDENCE_COUNT

@@ -7,7 +7,7 @@
 
 #include "ih_test.h"
 
-#define KINDS 19 /* that the vectors have; later ones are not tested here */
+#define KINDS 21 /* that the vectors have; later ones are not tested here */
 
 struct vector_ray {
     int32_t depth_mm_q8, state;
@@ -25,7 +25,7 @@ struct vector_scene {
 
 #include "evidence.inc"
 
-_Static_assert(KINDS <= IH_EVIDENCE_COUNT && IH_EVIDENCE_UPRIGHT == KINDS - 1,
+_Static_assert(KINDS <= IH_EVIDENCE_COUNT && IH_EVIDENCE_BEND_ACROSS == KINDS - 1,
                "new kinds go to the end");
 
 static struct ih_rays rays;
@@ -91,6 +91,8 @@ static double tolerance(int kind)
     case IH_EVIDENCE_ROUGH:
         return 0.03;
     case IH_EVIDENCE_BULGE:
+    case IH_EVIDENCE_BEND_DOWN: /* of three heights, each within 0.01 mm */
+    case IH_EVIDENCE_BEND_ACROSS:
         return 0.06;
     default:
         return 1.01 / 256;
@@ -158,6 +160,8 @@ static void every_number_tells_scenes_apart(void)
         {IH_EVIDENCE_BEFORE, "head", "hand", 3},
         {IH_EVIDENCE_EXTENT, "head", "moved", 120},
         {IH_EVIDENCE_UPRIGHT, "head", "moved", 0.6},
+        {IH_EVIDENCE_BEND_DOWN, "head", "rough", 5},
+        {IH_EVIDENCE_BEND_ACROSS, "head", "rough", 5},
     };
     int i;
 
@@ -196,6 +200,8 @@ static void without_rays_nothing_is_known(void)
     IH_TEST_EQUAL(0, evidence.value_q8[IH_EVIDENCE_BODY], "body", 0);
     IH_TEST_EQUAL(0, evidence.value_q8[IH_EVIDENCE_BULGE], "bulge", 0);
     IH_TEST_EQUAL(256, evidence.value_q8[IH_EVIDENCE_UPRIGHT], "upright", 0);
+    IH_TEST_EQUAL(12 << 8, evidence.value_q8[IH_EVIDENCE_BEND_DOWN], "bend down", 0);
+    IH_TEST_EQUAL(12 << 8, evidence.value_q8[IH_EVIDENCE_BEND_ACROSS], "bend across", 0);
 }
 
 /* --- the plane -----------------------------------------------------------------------------------
@@ -358,6 +364,117 @@ static void collect_ball(void)
                                              .semi_mm_q8 = {BALL_MM_Q8, BALL_MM_Q8, BALL_MM_Q8}};
 
     collect(&ball, ball.centre_mm_q8, &no_nest);
+}
+
+/* A lattice of rays 20 mm apart at the ball, its rows down the camera's y, or its x where it is turned. Points lie height
+ * mm outside of the ball's front, measured as the evidence does, or are not seen (HOLE). */
+#define HOLE 1000
+static void ball_lattice(bool is_turned, const int (*height_mm)[IH_GRID])
+{
+    int slot;
+
+    forget_rays();
+    for (slot = 0; slot < IH_SLOTS; slot++) {
+        struct ih_ray *ray = &rays.ray[slot];
+        const int row = slot / IH_GRID - IH_GRID / 2, column = slot % IH_GRID - IH_GRID / 2;
+        const double x = 20.0 * 256 * (is_turned ? row : column);
+        const double y = 20.0 * 256 * (is_turned ? column : row);
+        const int height = height_mm[slot / IH_GRID][slot % IH_GRID];
+        const double radius2 = 1 + 2.0 * height * 256 / BALL_MM_Q8;
+        const double z2 = radius2 - (x * x + y * y) / BALL_MM_Q8 / BALL_MM_Q8;
+
+        ray->slope_x_q20 = (int32_t)lround(x * (1 << 20) / BALL_Z_MM_Q8);
+        ray->slope_y_q20 = (int32_t)lround(y * (1 << 20) / BALL_Z_MM_Q8);
+        if (height == HOLE || z2 < 0) {
+            continue;
+        }
+        ray->state = IH_RAY_SEEN;
+        ray->point_mm_q8[0] = (int32_t)lround(x);
+        ray->point_mm_q8[1] = (int32_t)lround(y);
+        ray->point_mm_q8[2] = (int32_t)lround(BALL_Z_MM_Q8 - BALL_MM_Q8 * sqrt(z2));
+    }
+}
+
+static void bends_are(int down_q8, int across_q8, const char *what, int i)
+{
+    collect_ball();
+    IH_TEST_WITHIN(4, down_q8, evidence.value_q8[IH_EVIDENCE_BEND_DOWN], what, i);
+    IH_TEST_WITHIN(4, across_q8, evidence.value_q8[IH_EVIDENCE_BEND_ACROSS], what, i);
+}
+
+/* Around the middle of the pattern, of which each case sets some points. */
+static void bends_are_of_three_neighbours(void)
+{
+    static int height[IH_GRID][IH_GRID];
+    const int mid = IH_GRID / 2;
+    int turned, row, column;
+
+    for (turned = 0; turned < 2; turned++) {
+        const bool is_turned = turned == 1;
+        for (row = 0; row < IH_GRID; row++) {
+            for (column = 0; column < IH_GRID; column++) {
+                height[row][column] = HOLE;
+            }
+        }
+        height[mid][mid] = height[mid + 1][mid] = 0;
+        ball_lattice(is_turned, height);
+        bends_are(12 << 8, 12 << 8, "two points", turned);
+        /* |3 - 2 * 0 + 5| = 8, with the 12 of nobody: 10. */
+        height[mid][mid] = 3;
+        height[mid + 2][mid] = 5;
+        ball_lattice(is_turned, height);
+        bends_are(is_turned ? 12 << 8 : 10 << 8, is_turned ? 10 << 8 : 12 << 8, "three in a column",
+                  turned);
+        /* 20 at most: 16. */
+        height[mid][mid] = 15;
+        height[mid + 2][mid] = 15;
+        ball_lattice(is_turned, height);
+        bends_are(is_turned ? 12 << 8 : 16 << 8, is_turned ? 16 << 8 : 12 << 8, "a large bend",
+                  turned);
+        /* A ramp has no bend. */
+        height[mid][mid] = -6;
+        height[mid + 2][mid] = 6;
+        ball_lattice(is_turned, height);
+        bends_are(is_turned ? 12 << 8 : 6 << 8, is_turned ? 6 << 8 : 12 << 8, "a ramp", turned);
+    }
+}
+
+/* The last two columns and the next row's first are no neighbours, nor is a point that is too far out. */
+static void bends_end_with_the_pattern_and_the_head(void)
+{
+    static int height[IH_GRID][IH_GRID];
+    int row, column, slot;
+
+    for (row = 0; row < IH_GRID; row++) {
+        for (column = 0; column < IH_GRID; column++) {
+            height[row][column] = HOLE;
+        }
+    }
+    ball_lattice(false, height);
+    for (slot = IH_GRID - 2; slot <= IH_GRID; slot++) { /* on the ball, wherever their rays go */
+        rays.ray[slot].state = IH_RAY_SEEN;
+        rays.ray[slot].point_mm_q8[0] = 0;
+        rays.ray[slot].point_mm_q8[1] = 0;
+        rays.ray[slot].point_mm_q8[2] = BALL_Z_MM_Q8 - BALL_MM_Q8;
+    }
+    bends_are(12 << 8, 12 << 8, "around a row's end", 0);
+    for (row = 0; row < 2; row++) {
+        /* Straight before the ball's centre, just within 1.4 semi-axes and just beyond. */
+        const int32_t front_q8 = (int32_t)(BALL_MM_Q8 * (row == 0 ? 1.399 : 1.401));
+        ball_lattice(false, height);
+        for (slot = 0; slot < 3; slot++) {
+            rays.ray[slot].state = IH_RAY_SEEN;
+            rays.ray[slot].point_mm_q8[0] = rays.ray[slot].point_mm_q8[1] = 0;
+            rays.ray[slot].point_mm_q8[2] = BALL_Z_MM_Q8 - (slot == 1 ? front_q8 : BALL_MM_Q8);
+        }
+        bends_are(12 << 8, row == 0 ? 16 << 8 : 12 << 8, "1.4 semi-axes", row);
+    }
+    ball_lattice(false, height);
+    for (slot = 0; slot < 3; slot++) {
+        rays.ray[slot].state = IH_RAY_SEEN;
+        rays.ray[slot].point_mm_q8[2] = BALL_Z_MM_Q8 + (slot == 1 ? 256 : -256);
+    }
+    bends_are(12 << 8, 12 << 8, "behind the centre", 0);
 }
 
 /* A head twice as high as the mean one is 100 per cent taller, to the last unit; one as high as that is not. */
@@ -608,6 +725,8 @@ int main(void)
     RUN_TEST(without_rays_nothing_is_known);
     RUN_TEST(bulges_match_the_best_plane);
     RUN_TEST(a_line_has_no_bulge);
+    RUN_TEST(bends_are_of_three_neighbours);
+    RUN_TEST(bends_end_with_the_pattern_and_the_head);
     RUN_TEST(tallness_is_in_hundredths_of_the_mean);
     RUN_TEST(places_and_depths_have_their_limits);
     RUN_TEST(shoulders_have_their_limits);
