@@ -88,13 +88,21 @@ double depth_on(const ellipsoid &body, const double ray[3])
     return root < 0 ? wall_mm : (-b - std::sqrt(root)) / a;
 }
 
+// Brow, nose and hair before the ellipsoid: a surface without any is a ball's.
+double head_depth(const double ray[3])
+{
+    const double depth = depth_on(head_shape, ray);
+    const double y = depth * ray[1] - head_shape.centre_mm[1];
+    return depth == wall_mm ? wall_mm : depth - 8 * std::sin(y / 9);
+}
+
 std::vector<uint8_t> make_samples()
 {
     std::vector<double> light(width * height, 40);
     for (int slot = 0; slot < IH_SLOTS; slot++) {
         double ray[3];
         ray_of(slot, ray);
-        const double depth = std::fmin(depth_on(head_shape, ray), depth_on(shoulders, ray));
+        const double depth = std::fmin(head_depth(ray), depth_on(shoulders, ray));
         const double u = middle_u + focal_px * (ray[0] + baseline_mm / depth);
         const double v = middle_v + focal_px * ray[1];
         for (int y = static_cast<int>(v) - 6; y <= static_cast<int>(v) + 7; y++) {

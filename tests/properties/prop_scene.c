@@ -79,6 +79,16 @@ static double enter(const struct prop_body *body, const double from[3], const do
     return s > 0 ? s : HUGE_VAL;
 }
 
+/* How far a head's surface lies before its ellipsoid: brow, nose, lips and hair, made of waves: a twelfth of its depth high. A
+ * surface without any is a ball's. */
+static double relief_mm(const struct prop_body *head, double x_mm, double y_mm)
+{
+    const double x = (x_mm - head->centre_mm[0]) / head->semi_mm[0];
+    const double y = (y_mm - head->centre_mm[1]) / head->semi_mm[1];
+
+    return head->semi_mm[2] / 12 * sin(12.5 * y) * cos(5.5 * x);
+}
+
 double prop_depth_mm(const struct prop_scene *scene, const double from_mm[3],
                      const double towards[3], int *body)
 {
@@ -95,6 +105,11 @@ double prop_depth_mm(const struct prop_scene *scene, const double from_mm[3],
     }
     if (body != NULL) {
         *body = which;
+    }
+    if (which == 0) {
+        nearest -= relief_mm(&scene->body[0], from_mm[0] + nearest * towards[0],
+                             from_mm[1] + nearest * towards[1]) /
+                   towards[2];
     }
     return from_mm[2] + nearest * towards[2];
 }
@@ -115,12 +130,12 @@ void prop_project(const struct ih_calibration *c, const double point_mm[3], doub
     *v_px = ih_test_from_q(c->fy_px_q16, 16) * bent_y + ih_test_from_q(c->cy_px_q16, 16);
 }
 
-/* Does the camera see this point, or something before it? */
+/* Does the camera see this point, or something before it? It may see the same relief a little nearer. */
 static bool is_hidden(const struct prop_scene *scene, const double point_mm[3])
 {
     static const double camera[3] = {0, 0, 0};
 
-    return prop_depth_mm(scene, camera, point_mm, NULL) < point_mm[2] * 0.9995;
+    return prop_depth_mm(scene, camera, point_mm, NULL) < point_mm[2] * 0.995;
 }
 
 struct prop_dot prop_dot_of(const struct prop_scene *scene, const struct ih_calibration *c,
@@ -226,13 +241,6 @@ void prop_range_rig(struct ih_calibration *c, int32_t width, int32_t height, dou
     c->far_mm = 6000;
 }
 
-/* How far a head's surface lies before its ellipsoid: brow, nose, lips and hair, made of waves that are as wide wherever the
- * head is. A surface without any is a ball's. */
-static double relief_mm(const struct prop_body *head, double x_mm, double y_mm)
-{
-    return 8 * sin((y_mm - head->centre_mm[1]) / 9) * cos((x_mm - head->centre_mm[0]) / 14);
-}
-
 void prop_paint_range(const struct prop_scene *scene, const struct ih_calibration *c,
                       uint16_t *depth_mm, struct ih_frame *frame)
 {
@@ -245,13 +253,7 @@ void prop_paint_range(const struct prop_scene *scene, const struct ih_calibratio
             (i % c->width - ih_test_from_q(c->cx_px_q16, 16)) / focal,
             ((double)(i / c->width) - ih_test_from_q(c->cy_px_q16, 16)) / focal, 1};
 
-        int body;
-        double z_mm = prop_depth_mm(scene, camera, towards, &body);
-
-        if (body == 0) {
-            z_mm -= relief_mm(&scene->body[0], z_mm * towards[0], z_mm * towards[1]);
-        }
-        depth_mm[i] = (uint16_t)lround(z_mm);
+        depth_mm[i] = (uint16_t)lround(prop_depth_mm(scene, camera, towards, NULL));
     }
 }
 

@@ -60,10 +60,10 @@ struct sums {
 const char *ih_evidence_text(enum ih_evidence_kind kind)
 {
     static const char *const text[IH_EVIDENCE_COUNT] = {
-        "on",    "rough",    "bulge",   "tall",   "moved",     "above",        "beside",
-        "below", "high",     "nothing", "body",   "body_rays", "body_depth",   "wide",
-        "level", "shoulder", "before",  "extent", "upright",   "bend_down",    "bend_across",
-        "surroundings", "distance",
+        "on",         "rough",     "bulge",       "tall",         "moved",    "above",
+        "beside",     "below",     "high",        "nothing",      "body",     "body_rays",
+        "body_depth", "wide",      "level",       "shoulder",     "before",   "extent",
+        "upright",    "bend_down", "bend_across", "surroundings", "distance",
     };
     return (uint32_t)kind < IH_EVIDENCE_COUNT ? text[kind] : NULL;
 }
@@ -349,7 +349,7 @@ static void add_body_depths(const struct ih_rays *rays, const struct ih_ray_mark
 
 /* The points before the centre and near the ellipsoid, where a face is. */
 struct face {
-    uint32_t mark[IH_RAYS_WORDS];    /* a bit for each slot */
+    uint32_t mark[IH_RAYS_WORDS];   /* a bit for each slot */
     int16_t height_mm_q8[IH_SLOTS]; /* where there is one; within half a semi-axis */
 };
 
@@ -386,8 +386,8 @@ static void find_face(const struct ih_rays *rays, const struct candidate *candid
                                     (int64_t)position_q14[2] * position_q14[2];
         if (radius2_q28 < FACE2_Q28) {
             face->mark[slot / 32] |= (uint32_t)1 << slot % 32;
-            face->height_mm_q8[slot] = (int16_t)ih_mul_shift(radius2_q28 - ONE_Q28,
-                                                             ellipsoid->semi_mm_q8[2], 29);
+            face->height_mm_q8[slot] =
+                (int16_t)ih_mul_shift(radius2_q28 - ONE_Q28, ellipsoid->semi_mm_q8[2], 29);
         }
     }
 }

@@ -34,25 +34,25 @@
 #include "detect/ih_rays.h"
 
 enum ih_evidence_kind {
-    IH_EVIDENCE_ON,         /* points within 20 mm of the ellipsoid: count */
-    IH_EVIDENCE_ROUGH,      /* their root mean square distance: mm */
-    IH_EVIDENCE_BULGE,      /* that of their best plane, minus ROUGH: mm; a board has none */
-    IH_EVIDENCE_TALL,       /* semi-axis up, above the mean head's: % */
-    IH_EVIDENCE_MOVED,      /* from the start of the fit: mm */
-    IH_EVIDENCE_ABOVE,      /* open above: fraction */
-    IH_EVIDENCE_BESIDE,     /* open on the side that is less open: fraction */
-    IH_EVIDENCE_BELOW,      /* open below, where the neck is: fraction */
-    IH_EVIDENCE_HIGH,       /* open farther above (beyond 1.9 semi-axes): fraction */
-    IH_EVIDENCE_NOTHING,    /* empty rays around and above: fraction of all there */
-    IH_EVIDENCE_BODY,       /* body 40 to 260 mm below the chin: fraction of the rays there */
-    IH_EVIDENCE_BODY_RAYS,  /* those rays: count, at most 30 */
-    IH_EVIDENCE_BODY_DEPTH, /* mean dz of the body below: mm */
-    IH_EVIDENCE_WIDE,       /* body there, but 300 mm aside or more, as a table has: fraction */
-    IH_EVIDENCE_LEVEL,      /* things 170 to 330 mm aside at the head's height: fraction */
-    IH_EVIDENCE_SHOULDER,   /* body at the shoulder with less of it: fraction */
-    IH_EVIDENCE_BEFORE,     /* points around, 60 mm and more before the front, as hands: count */
-    IH_EVIDENCE_EXTENT,     /* of the nest at this position: mm, 0 without one */
-    IH_EVIDENCE_UPRIGHT,    /* of that nest: height^2 / width^2, 1 without one */
+    IH_EVIDENCE_ON,          /* points within 20 mm of the ellipsoid: count */
+    IH_EVIDENCE_ROUGH,       /* their root mean square distance: mm */
+    IH_EVIDENCE_BULGE,       /* that of their best plane, minus ROUGH: mm; a board has none */
+    IH_EVIDENCE_TALL,        /* semi-axis up, above the mean head's: % */
+    IH_EVIDENCE_MOVED,       /* from the start of the fit: mm */
+    IH_EVIDENCE_ABOVE,       /* open above: fraction */
+    IH_EVIDENCE_BESIDE,      /* open on the side that is less open: fraction */
+    IH_EVIDENCE_BELOW,       /* open below, where the neck is: fraction */
+    IH_EVIDENCE_HIGH,        /* open farther above (beyond 1.9 semi-axes): fraction */
+    IH_EVIDENCE_NOTHING,     /* empty rays around and above: fraction of all there */
+    IH_EVIDENCE_BODY,        /* body 40 to 260 mm below the chin: fraction of the rays there */
+    IH_EVIDENCE_BODY_RAYS,   /* those rays: count, at most 30 */
+    IH_EVIDENCE_BODY_DEPTH,  /* mean dz of the body below: mm */
+    IH_EVIDENCE_WIDE,        /* body there, but 300 mm aside or more, as a table has: fraction */
+    IH_EVIDENCE_LEVEL,       /* things 170 to 330 mm aside at the head's height: fraction */
+    IH_EVIDENCE_SHOULDER,    /* body at the shoulder with less of it: fraction */
+    IH_EVIDENCE_BEFORE,      /* points around, 60 mm and more before the front, as hands: count */
+    IH_EVIDENCE_EXTENT,      /* of the nest at this position: mm, 0 without one */
+    IH_EVIDENCE_UPRIGHT,     /* of that nest: height^2 / width^2, 1 without one */
     IH_EVIDENCE_BEND_DOWN,   /* how uneven the surface is from dot to dot, downwards: mm */
     IH_EVIDENCE_BEND_ACROSS, /* and across */
     IH_EVIDENCE_SURROUNDINGS, /* what all rays there say by the learnt map (ih_surroundings): log-odds */
