@@ -416,14 +416,14 @@ static int32_t bend_mm_q8(const struct face *face, int32_t step, int32_t column_
 static void bends(const struct ih_rays *rays, const struct candidate *candidate, int32_t value_q8[])
 {
     const struct ih_ray *middle = &rays->ray[IH_SLOTS / 2];
-    const bool is_turned = ih_abs_s32(middle[1].slope_y_q20 - middle->slope_y_q20) >
-                           ih_abs_s32(middle[1].slope_x_q20 - middle->slope_x_q20);
+    const bool is_rotated = ih_abs_s32(middle[1].slope_y_q20 - middle->slope_y_q20) >
+                            ih_abs_s32(middle[1].slope_x_q20 - middle->slope_x_q20);
     struct face face;
     find_face(rays, candidate, &face);
     const int32_t by_rows_q8 = bend_mm_q8(&face, IH_GRID, IH_GRID - 1);
     const int32_t by_columns_q8 = bend_mm_q8(&face, 1, IH_GRID - 3);
-    value_q8[IH_EVIDENCE_BEND_DOWN] = is_turned ? by_columns_q8 : by_rows_q8;
-    value_q8[IH_EVIDENCE_BEND_ACROSS] = is_turned ? by_rows_q8 : by_columns_q8;
+    value_q8[IH_EVIDENCE_BEND_DOWN] = is_rotated ? by_columns_q8 : by_rows_q8;
+    value_q8[IH_EVIDENCE_BEND_ACROSS] = is_rotated ? by_rows_q8 : by_columns_q8;
 }
 
 void ih_evidence_collect(const struct ih_rays *rays, const struct ih_ellipsoid *ellipsoid,

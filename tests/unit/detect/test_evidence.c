@@ -366,10 +366,10 @@ static void collect_ball(void)
     collect(&ball, ball.centre_mm_q8, &no_nest);
 }
 
-/* A lattice of rays 20 mm apart at the ball, its rows down the camera's y, or its x where it is turned. Points lie height
+/* A lattice of rays 20 mm apart at the ball, its rows down the camera's y, or its x where it is rotated. Points lie height
  * mm outside of the ball's front, measured as the evidence does, or are not seen (HOLE). */
 #define HOLE 1000
-static void ball_lattice(bool is_turned, const int (*height_mm)[IH_GRID])
+static void ball_lattice(bool is_rotated, const int (*height_mm)[IH_GRID])
 {
     int slot;
 
@@ -377,8 +377,8 @@ static void ball_lattice(bool is_turned, const int (*height_mm)[IH_GRID])
     for (slot = 0; slot < IH_SLOTS; slot++) {
         struct ih_ray *ray = &rays.ray[slot];
         const int row = slot / IH_GRID - IH_GRID / 2, column = slot % IH_GRID - IH_GRID / 2;
-        const double x = 20.0 * 256 * (is_turned ? row : column);
-        const double y = 20.0 * 256 * (is_turned ? column : row);
+        const double x = 20.0 * 256 * (is_rotated ? row : column);
+        const double y = 20.0 * 256 * (is_rotated ? column : row);
         const int height = height_mm[slot / IH_GRID][slot % IH_GRID];
         const double radius2 = 1 + 2.0 * height * 256 / BALL_MM_Q8;
         const double z2 = radius2 - (x * x + y * y) / BALL_MM_Q8 / BALL_MM_Q8;
@@ -407,35 +407,35 @@ static void bends_are_of_three_neighbours(void)
 {
     static int height[IH_GRID][IH_GRID];
     const int mid = IH_GRID / 2;
-    int turned, row, column;
+    int rotated, row, column;
 
-    for (turned = 0; turned < 2; turned++) {
-        const bool is_turned = turned == 1;
+    for (rotated = 0; rotated < 2; rotated++) {
+        const bool is_rotated = rotated == 1;
         for (row = 0; row < IH_GRID; row++) {
             for (column = 0; column < IH_GRID; column++) {
                 height[row][column] = HOLE;
             }
         }
         height[mid][mid] = height[mid + 1][mid] = 0;
-        ball_lattice(is_turned, height);
-        bends_are(12 << 8, 12 << 8, "two points", turned);
+        ball_lattice(is_rotated, height);
+        bends_are(12 << 8, 12 << 8, "two points", rotated);
         /* |3 - 2 * 0 + 5| = 8, with the 12 of nobody: 10. */
         height[mid][mid] = 3;
         height[mid + 2][mid] = 5;
-        ball_lattice(is_turned, height);
-        bends_are(is_turned ? 12 << 8 : 10 << 8, is_turned ? 10 << 8 : 12 << 8, "three in a column",
-                  turned);
+        ball_lattice(is_rotated, height);
+        bends_are(is_rotated ? 12 << 8 : 10 << 8, is_rotated ? 10 << 8 : 12 << 8,
+                  "three in a column", rotated);
         /* 20 at most: 16. */
         height[mid][mid] = 15;
         height[mid + 2][mid] = 15;
-        ball_lattice(is_turned, height);
-        bends_are(is_turned ? 12 << 8 : 16 << 8, is_turned ? 16 << 8 : 12 << 8, "a large bend",
-                  turned);
+        ball_lattice(is_rotated, height);
+        bends_are(is_rotated ? 12 << 8 : 16 << 8, is_rotated ? 16 << 8 : 12 << 8, "a large bend",
+                  rotated);
         /* A ramp has no bend. */
         height[mid][mid] = -6;
         height[mid + 2][mid] = 6;
-        ball_lattice(is_turned, height);
-        bends_are(is_turned ? 12 << 8 : 6 << 8, is_turned ? 6 << 8 : 12 << 8, "a ramp", turned);
+        ball_lattice(is_rotated, height);
+        bends_are(is_rotated ? 12 << 8 : 6 << 8, is_rotated ? 6 << 8 : 12 << 8, "a ramp", rotated);
     }
 }
 
