@@ -24,7 +24,7 @@
  *         0.02 degrees in a frame of a room, 0.2 where half of the dots are missing.
  * Limits: 12 px across a line, 1 degree about the camera's axis, 0.8 of depth, 1 % of focal length. Not seen: a shift along the
  *         baseline, and of the principal point along it.
- * Cost:   looking and learning 0.12 to 0.15 M instructions, a search 0.6 to 0.8 M (x86-64-v3): docs/performance.md.
+ * Cost:   looking and learning 0.12 to 0.16 M instructions, a search 0.6 to 0.85 M (x86-64-v3): docs/performance.md.
  * Error:  against float64 on the same dots: docs/numerics.md.
  */
 #ifndef IH_ALIGN_H

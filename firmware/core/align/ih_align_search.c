@@ -18,7 +18,7 @@
 #define DEPTH_STEP_RAD_Q30 4685041 /* 0.25 degrees, from where the fit finds its way */
 #define PLANE_SLOTS 5              /* of so many slots one shows a plane */
 /* Before a wall just beyond the range every frame asks for depth. Of 328 such fits before right rigs 9 were beyond 3 times
- * their uncertainty, and one beyond 5 times. */
+ * their uncertainty, and one beyond 5 times and 0.1 degrees. */
 #define DEPTH_FAR_SIGMAS 5
 /* Against this scale a plane's pairs weigh all the same. */
 #define EQUAL_SCALE_PX_Q12 (64 * 4096)

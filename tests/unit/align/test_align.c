@@ -622,7 +622,7 @@ static void a_motion_that_had_held_comes_back(void)
 /* Right dots come back in any of the 16 frames after the search: lines do in the same frame. */
 static void a_false_motion_is_questioned_in_each_frame(void)
 {
-    for (int wait = 1; wait < 16; wait++) {
+    for (int wait = 1; wait <= 16; wait++) {
         const struct moved_scene misleading = {WALL_MM, NOISE_PX, 0.5, 280};
 
         use_rig(1);

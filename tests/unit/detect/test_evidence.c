@@ -698,6 +698,8 @@ static void extremes_do_not_overflow(void)
         IH_TEST_RANGE(0, 256, evidence.value_q8[IH_EVIDENCE_ABOVE], "share", pass);
         IH_TEST_RANGE(0, IH_SLOTS << 8, evidence.value_q8[IH_EVIDENCE_ON], "count", pass);
         IH_TEST_RANGE(0, 30 << 8, evidence.value_q8[IH_EVIDENCE_BODY_RAYS], "count", pass);
+        IH_TEST_RANGE(0, 20 << 8, evidence.value_q8[IH_EVIDENCE_BEND_DOWN], "bend", pass);
+        IH_TEST_RANGE(0, 20 << 8, evidence.value_q8[IH_EVIDENCE_BEND_ACROSS], "bend", pass);
     }
 }
 

@@ -165,7 +165,7 @@ static void lanes_of_a_row(void)
         struct ih_u16_32 value = ih_u16_32_next(&from, i);
 
         ih_u16_32_put(&to, i, &value);
-        IH_TEST_EQUAL(row[1 + i], value.part[0][0], "still there", i);
+        TEST_ASSERT_EQUAL_MEMORY(&row[1 + i], &value, LANES * sizeof row[0]);
     }
     TEST_ASSERT_EQUAL_MEMORY(row, copy, sizeof row);
     for (i = 0; i < COUNT; i += LANES) {
