@@ -99,7 +99,7 @@ def check_directory(directory, suffix=".pgm", *, paper=False):
 
 
 def depth_of(frame):
-    """Depth in mm of a head on shoulders before a wall, which move to the right."""
+    """Depth in mm of a head with a brow and hair on shoulders before a wall, which move to the right."""
     v, u = np.mgrid[:HEIGHT, :WIDTH]
     x, y = (u - (WIDTH - 1) / 2) / FOCAL, (v - (HEIGHT - 1) / 2) / FOCAL
     depth = np.full((HEIGHT, WIDTH), 2000.0)
@@ -108,7 +108,10 @@ def depth_of(frame):
         a = (x / ax) ** 2 + (y / ay) ** 2 + 1 / az ** 2
         b = x * cx / ax ** 2 + y * cy / ay ** 2 + cz / az ** 2
         root = b * b - a * ((cx / ax) ** 2 + (cy / ay) ** 2 + (cz / az) ** 2 - 1)
-        depth = np.minimum(depth, np.where(root > 0, (b - np.sqrt(np.maximum(root, 0))) / a, 2000))
+        body = np.where(root > 0, (b - np.sqrt(np.maximum(root, 0))) / a, 2000)
+        if cz == 1000:  # an even surface is a ball's
+            body -= np.where(root > 0, 8 * np.sin((y * body - cy) / 9), 0)
+        depth = np.minimum(depth, body)
     return np.rint(depth).astype(np.uint16)
 
 
