@@ -130,12 +130,15 @@ void prop_project(const struct ih_calibration *c, const double point_mm[3], doub
     *v_px = ih_test_from_q(c->fy_px_q16, 16) * bent_y + ih_test_from_q(c->cy_px_q16, 16);
 }
 
-/* Does the camera see this point, or something before it? It may see the same relief a little nearer. */
+/* Does the camera see this point, or something before it? Of a head it may see the same relief a little nearer. */
 static bool is_hidden(const struct prop_scene *scene, const double point_mm[3])
 {
     static const double camera[3] = {0, 0, 0};
+    int body;
+    const double z_mm = prop_depth_mm(scene, camera, point_mm, &body);
+    const double nearer_mm = body == 0 ? scene->body[0].semi_mm[2] / 12 : point_mm[2] * 0.0005;
 
-    return prop_depth_mm(scene, camera, point_mm, NULL) < point_mm[2] * 0.995;
+    return z_mm < point_mm[2] - nearer_mm;
 }
 
 struct prop_dot prop_dot_of(const struct prop_scene *scene, const struct ih_calibration *c,

@@ -22,8 +22,11 @@
 #define HIGH_WIDE_Q14 ((int32_t)IH_HEAD_PART(IH_HEAD_HIGH_ASIDE_PERCENT, 14))
 #define BODY_RAYS_MAX 30
 #define PLANE_POINTS_MIN 6
+/* Hair, nose and chin lie outside of the ellipsoid. */
 #define FACE2_Q28 IH_HEAD_SQUARE(140, 28)
+/* So that one step, as from a nose to the cheek behind it, is not the whole mean. */
 #define BEND_MAX_MM_Q8 (20 << 8)
+/* Says neither way: about between the medians of heads and of what is taken for one (E025). */
 #define BEND_MIDDLE_MM_Q8 (12 << 8)
 
 /* The candidate, and what is the same for all rays. */
@@ -346,6 +349,8 @@ static void add_body_depths(const struct ih_rays *rays, const struct ih_ray_mark
         }
     }
 }
+
+_Static_assert(IH_ELLIPSOID_SEMI_MAX_MM < 256, "a height of half a semi-axis has 16 bits");
 
 /* The points before the centre and near the ellipsoid, where a face is. */
 struct face {

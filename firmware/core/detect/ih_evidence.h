@@ -16,13 +16,13 @@
  *         bend more than a limb, a bag or a ball, above all from brow to chin.
  * Overflow: points and centres below 2^26 in Q8. Moments are of points on the ellipsoid, 220 mm at
  *         most from its centre: products 2^23.6 in Q8, 361 of them 2^32.1, squared sums 2^40.6;
- *         central ones 2^23.6, their determinants 2^48.2, times 2^12 2^60.2.
+ *         central ones 2^23.6, their determinants 2^48.2, times 2^12 2^60.2. Heights are within half of the longest
+ *         semi-axis, 16 bits.
  * Error:  counts are exact but where a ray passes within 2^-10 of a limit; rough within 0.03 mm, bulge
  *         within 0.06 mm.
  * Cost:   vectors count the rays (ih_ray_counts) but for some 15 of 361; a crossing for some 33
- *         that may hit the ellipsoid: 33,000 instructions (x86-64-v3). The bends pass over all points: 13,000
- *         (x86-64, -O2). Without vectors two products for
- *         each ray.
+ *         that may hit the ellipsoid: 33,000 instructions (x86-64-v3). The bends pass over all points:
+ *         13,000 (x86-64, -O2). Without vectors two products for each ray.
  */
 #ifndef IH_EVIDENCE_H
 #define IH_EVIDENCE_H
