@@ -113,7 +113,7 @@ const Tables = (() => {
     body_depth: ["depth of the body behind the centre", "mm", 0], wide: ["as wide as a table below", "fraction", 2],
     level: ["things beside at its height", "fraction", 2], shoulder: ["a shoulder on the weaker side", "fraction", 2],
     before: ["points before it, as hands", "", 0], extent: ["extent of the nest there", "mm", 0], upright: ["height² / width² of that nest", "", 2],
-    bend_down: ["how uneven from dot to dot, downwards", "mm", 1], bend_across: ["and across", "mm", 1],
+    bend_down: ["how uneven from dot to dot, downwards", "mm", 1], bend_across: ["how uneven from dot to dot, across", "mm", 1],
     surroundings: ["what all dots there say by the learnt map", "", 2],
     distance: ["how far away it is", "mm", 0],
   };
