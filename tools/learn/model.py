@@ -6,7 +6,7 @@ import numpy
 
 KNOTS = 7
 # As in ih_score.h.
-TREES, QUESTIONS, PLACES = 64, 7, 32
+QUESTIONS, TREES, BRANCHES, PLACES = 256, 192, 7, 32
 SIZE_PENALTY = 1.0
 STEP_PENALTY = 3.0
 BEND_PENALTY = 10.0
@@ -14,8 +14,8 @@ BEND_PENALTY = 10.0
 
 @dataclasses.dataclass
 class Curves:
-    """first_q8, step_q8 (kinds), at_q10 (kinds x KNOTS), bias_q10; trees' kind, limit (TREES x QUESTIONS), leaf_q8
-    (TREES x QUESTIONS + 1), or none of them: exactly what the firmware has."""
+    """first_q8, step_q8 (kinds), at_q10 (kinds x KNOTS), bias_q10; questions' kind, limit (QUESTIONS), trees' question
+    (TREES x BRANCHES), leaf_q8 (TREES x BRANCHES + 1), or none of them: exactly what the firmware has."""
 
     first_q8: numpy.ndarray
     step_q8: numpy.ndarray
@@ -23,6 +23,7 @@ class Curves:
     bias_q10: int
     kind: numpy.ndarray = None
     limit: numpy.ndarray = None
+    question: numpy.ndarray = None
     leaf_q8: numpy.ndarray = None
 
     def position(self, evidence):
@@ -34,13 +35,13 @@ class Curves:
 
     def leaves(self, evidence):
         """What the trees add."""
-        place, row = self.places(evidence), numpy.arange(len(evidence))
+        yes, row = self.places(evidence)[:, self.kind] >= self.limit, numpy.arange(len(evidence))
         total = numpy.zeros(len(evidence))
-        for kind, limit, leaf in zip(self.kind, self.limit, self.leaf_q8):
+        for question, leaf in zip(self.question, self.leaf_q8):
             at = numpy.zeros(len(evidence), dtype=int)
             for _ in range(3):
-                at = 2 * at + 1 + (place[row, kind[at]] >= limit[at])
-            total += leaf[at - QUESTIONS] / 256
+                at = 2 * at + 1 + yes[row, question[at]]
+            total += leaf[at - BRANCHES] / 256
         return total
 
     def logits(self, evidence):
@@ -113,8 +114,9 @@ def write(path, learnt, kinds, command):
     for kind, first, step, at in zip(kinds, learnt.first_q8, learnt.step_q8, learnt.at_q10):
         rows.append("        [IH_EVIDENCE_%s] = {%d, %d, {%s}}," %
                     (kind.upper(), first, step, listed(at)))
-    trees = ["        {{%s}, {%s}, {%s}}," % (listed(kind), listed(limit), listed(leaf))
-             for kind, limit, leaf in zip(learnt.kind, learnt.limit, learnt.leaf_q8)]
+    questions = ["{%d, %d}" % pair for pair in zip(learnt.kind, learnt.limit)]
+    lines = ["        %s," % ", ".join(questions[i:i + 12]) for i in range(0, QUESTIONS, 12)]
+    trees = ["        {{%s}, {%s}}," % (listed(question), listed(leaf)) for question, leaf in zip(learnt.question, learnt.leaf_q8)]
     with open(path, "w", encoding="utf-8") as file:
         file.write("""/* ih_score_weights - the curves and trees of ih_score, written by
  *     %s
@@ -134,6 +136,9 @@ static const struct ih_score_tables learnt = {
 %s
     },
     /* kinds of evidence in the order of ih_evidence.h */
+    .question = {
+%s
+    },
     .tree = {
 %s
     },
@@ -141,4 +146,4 @@ static const struct ih_score_tables learnt = {
 /* clang-format on */
 
 #endif
-""" % (command, learnt.bias_q10, "\n".join(rows), "\n".join(trees)))
+""" % (command, learnt.bias_q10, "\n".join(rows), "\n".join(lines), "\n".join(trees)))

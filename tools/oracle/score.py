@@ -28,10 +28,11 @@ def drawn_curves(random):
     at = random.integers(-4000, 4001, (KINDS, model.KNOTS))
     at[0] = np.array([-32768, 32767] * model.KNOTS)[:model.KNOTS]
     bias = int(random.integers(-9000, 9000))
-    kind = random.integers(0, KINDS, (model.TREES, model.QUESTIONS))
+    kind = random.integers(0, KINDS, model.QUESTIONS)
     limit = random.integers(0, (model.KNOTS - 1) * model.PLACES + 2, kind.shape)
-    leaf = random.integers(-128, 128, (model.TREES, model.QUESTIONS + 1))
-    return model.Curves(first, step, at, bias, kind, limit, leaf)
+    question = random.integers(0, model.QUESTIONS, (model.TREES, model.BRANCHES))
+    leaf = random.integers(-128, 128, (model.TREES, model.BRANCHES + 1))
+    return model.Curves(first, step, at, bias, kind, limit, question, leaf)
 
 
 def drawn_evidence(random, curves):
@@ -55,9 +56,9 @@ def write_vectors(directory):
     inc.struct_array("ih_score_curve", "vector_curves", [
         "%d, %d, {%s}" % (first, step, ", ".join(emit.numbers(at)))
         for first, step, at in zip(curves.first_q8, curves.step_q8, curves.at_q10)])
+    inc.struct_array("ih_score_question", "vector_questions", ["%d, %d" % pair for pair in zip(curves.kind, curves.limit)])
     inc.struct_array("ih_score_tree", "vector_trees", [
-        "{%s}, {%s}, {%s}" % tuple(", ".join(emit.numbers(part)) for part in tree)
-        for tree in zip(curves.kind, curves.limit, curves.leaf_q8)])
+        "{%s}, {%s}" % tuple(", ".join(emit.numbers(part)) for part in tree) for tree in zip(curves.question, curves.leaf_q8)])
     inc.struct_array("vector_case", "vector_cases", [
         "{%s}, %s, %s" % (", ".join(emit.numbers(row)), emit.number(logit, 6), emit.number(leaves, 10))
         for row, logit, leaves in zip(evidence, logits, together)])
@@ -68,13 +69,15 @@ def read_header(path):
     """Kinds, curves and the command that made them."""
     with open(path, encoding="utf-8") as file:
         text = file.read()
-    trees = re.findall(r"^ +\{\{([\d, ]+)\}, \{([\d, ]+)\}, \{([-\d, ]+)\}\},$", text, re.M)
-    kind, limit, leaf = ([[int(value) for value in part.split(",")] for part in column] for column in zip(*trees))
+    trees = re.findall(r"^ +\{\{([\d, ]+)\}, \{([-\d, ]+)\}\},$", text, re.M)
+    question, leaf = ([[int(value) for value in part.split(",")] for part in column] for column in zip(*trees))
+    asked = re.search(r"\.question = \{(.*?)\n    \}", text, re.S)[1]
+    kind, limit = zip(*((int(kind), int(limit)) for kind, limit in re.findall(r"\{(\d+), (\d+)\}", asked)))
     rows = re.findall(r"\[IH_EVIDENCE_(\w+)\] = \{(-?\d+), (\d+), \{([-\d, ]+)\}\},", text)
     at = np.array([[int(value) for value in row[3].split(",")] for row in rows])
     curves = model.Curves(np.array([int(row[1]) for row in rows]),
                           np.array([int(row[2]) for row in rows]), at,
-                          int(re.search(r"bias_q10 = (-?\d+),", text)[1]), kind, limit, leaf)
+                          int(re.search(r"bias_q10 = (-?\d+),", text)[1]), kind, limit, question, leaf)
     return [row[0].lower() for row in rows], curves, re.search(r"written by\n \* +(.*)", text)[1]
 
 

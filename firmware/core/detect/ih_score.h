@@ -5,13 +5,14 @@
  * Out:    log-odds, their parts by kind of evidence and of what kinds say together, and the probability.
  * Method: log-odds = bias + sum of one curve per kind of evidence + sum of one leaf per tree. A curve is piecewise
  *         linear over IH_SCORE_KNOTS equally spaced knots and constant beyond them, so no single number can
- *         decide alone, and the parts show what counted for or against a candidate. A tree asks three
- *         questions, each whether one kind lies beyond a limit on its curve: what a kind means may depend on
- *         others, as few points on a head mean something else near than far. Curves first, then trees for what
- *         they leave, are learnt by tools/learn from rendered scenes and people of true anatomy;
- *         ih_score_weights.h has them with the command that made them.
+ *         decide alone, and the parts show what counted for or against a candidate. A question asks whether
+ *         one kind lies beyond a limit on its curve; a tree asks three out of one list that all trees share, so
+ *         that a tree is 15 bytes: what a kind means may depend on others, as few points on a head mean
+ *         something else near than far. Curves first, then trees for what they leave, are learnt by tools/learn
+ *         from rendered scenes and people of true anatomy; ih_score_weights.h has them with the command that
+ *         made them.
  * Overflow: COUNT curves within 2^15 and TREES leaves within 2^9 in Q10: below 2^20.
- * Cost:   three comparisons a tree and a quotient a curve: some 1,700 instructions.
+ * Cost:   a comparison for each question, three steps a tree and a quotient a curve: some 6,000 instructions.
  * Error:  the probability within 2^-13.
  */
 #ifndef IH_SCORE_H
@@ -23,11 +24,12 @@
 #include "detect/ih_evidence.h"
 
 #define IH_SCORE_KNOTS 7
-#define IH_SCORE_TREES 64
-/* Questions of a tree: the first one, and from question i on 2i + 1 is asked where its answer is no, 2i + 2 where it is
- * yes. Its leaves, from no to yes. */
-#define IH_SCORE_QUESTIONS 7
-#define IH_SCORE_LEAVES (IH_SCORE_QUESTIONS + 1)
+#define IH_SCORE_QUESTIONS 256
+#define IH_SCORE_TREES 192
+/* Branches of a tree: the first one, and from branch i on 2i + 1 follows where the answer is no, 2i + 2 where it is yes.
+ * Its leaves, from no to yes. */
+#define IH_SCORE_BRANCHES 7
+#define IH_SCORE_LEAVES (IH_SCORE_BRANCHES + 1)
 /* Parts of a knot's step in which limits are given. */
 #define IH_SCORE_PLACES_LOG2 5
 
@@ -36,10 +38,13 @@ struct ih_score_curve {
     int16_t at_q10[IH_SCORE_KNOTS]; /* part of the log-odds at each knot */
 };
 
+struct ih_score_question {
+    uint8_t kind;
+    uint8_t limit; /* yes: the kind's place on its curve, 0 to 6 * 32, is this one or beyond */
+};
+
 struct ih_score_tree {
-    uint8_t kind[IH_SCORE_QUESTIONS];
-    uint8_t limit
-        [IH_SCORE_QUESTIONS]; /* yes: the kind's place on its curve, 0 to 6 * 32, is this one or beyond */
+    uint8_t question[IH_SCORE_BRANCHES];
     int8_t leaf_q8[IH_SCORE_LEAVES];
 };
 
@@ -47,6 +52,7 @@ struct ih_score_tree {
 struct ih_score_tables {
     int32_t bias_q10;
     struct ih_score_curve curve[IH_EVIDENCE_COUNT];
+    struct ih_score_question question[IH_SCORE_QUESTIONS];
     struct ih_score_tree tree[IH_SCORE_TREES];
 };
 

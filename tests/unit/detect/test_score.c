@@ -44,6 +44,7 @@ static void log_odds_match_what_was_learnt(void)
     for (kind = 0; kind < VECTOR_KINDS; kind++) {
         tables.curve[kind] = vector_curves[kind];
     }
+    memcpy(tables.question, vector_questions, sizeof tables.question);
     memcpy(tables.tree, vector_trees, sizeof tables.tree);
     for (i = 0; i < IH_TEST_COUNT(vector_cases); i++) {
         int32_t sum = tables.bias_q10;
@@ -101,10 +102,15 @@ static void a_curve_goes_through_its_knots_and_is_constant_beyond(void)
 /* Every way through a tree ends at its own leaf, and what lies on a limit is beyond it. */
 static void a_tree_asks_three_questions(void)
 {
-    static const struct ih_score_tree tree = {
-        {1, 2, 3, 4, 5, 6, 7}, {1, 192, 40, 7, 8, 9, 10}, {1, 2, -3, 4, 5, -128, 127, 8}};
-    int leaf, beside;
+    static const struct ih_score_question asked[IH_SCORE_BRANCHES] = {
+        {1, 1}, {2, 192}, {3, 40}, {4, 7}, {5, 8}, {6, 9}, {7, 10}};
+    static const struct ih_score_tree tree = {{255, 0, 77, 254, 13, 128, 9},
+                                              {1, 2, -3, 4, 5, -128, 127, 8}};
+    int leaf, beside, branch;
 
+    for (branch = 0; branch < IH_SCORE_BRANCHES; branch++) {
+        tables.question[tree.question[branch]] = asked[branch];
+    }
     tables.tree[9] = tree;
     for (leaf = 0; leaf < IH_SCORE_LEAVES; leaf++) {
         for (beside = 0; beside < 2; beside++) {
@@ -114,8 +120,8 @@ static void a_tree_asks_three_questions(void)
             for (level = 2; level >= 0; level--) {
                 const int yes = leaf >> level & 1;
                 /* 8 in Q8 a place; one less is not beyond the limit. */
-                evidence.value_q8[tree.kind[at]] =
-                    yes ? 8 * tree.limit[at] + 7 * beside : 8 * tree.limit[at] - 1 - 7 * beside;
+                evidence.value_q8[asked[at].kind] =
+                    yes ? 8 * asked[at].limit + 7 * beside : 8 * asked[at].limit - 1 - 7 * beside;
                 at = 2 * at + 1 + yes;
             }
             ih_score_rate_by_tables(&tables, &evidence, &score);
