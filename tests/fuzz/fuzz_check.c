@@ -302,9 +302,10 @@ static void check_track(const struct ih_tracks *tracks, int32_t index, int32_t c
     FUZZ_CHECK(track->id > 0 && track->detection_count >= 1);
     for (int32_t i = 0; i < index; i++) {
         FUZZ_CHECK(tracks->track[i].id != track->id);
-        FUZZ_CHECK(tracks->track[i].index != track->index);
+        FUZZ_CHECK(tracks->track[i].index != track->index || track->index == IH_NONE);
     }
-    FUZZ_CHECK(track->index >= 0 && track->index < count);
+    FUZZ_CHECK(track->index < count &&
+               (track->index >= 0 || (track->index == IH_NONE && track->is_head)));
     FUZZ_CHECK(filter->position_q8 >= 0 && filter->velocity_q8 >= 0);
     FUZZ_CHECK(filter->position_q8 <= (int64_t)500 * 500 * 256);
     FUZZ_CHECK(filter->velocity_q8 <= (int64_t)3000 * 3000 * 256);
@@ -323,7 +324,7 @@ void fuzz_check_tracks(const struct ih_tracks *tracks, const struct ih_detection
     FUZZ_CHECK(predicted->count >= 0 && predicted->count <= IH_TRACKS_MAX);
     for (int32_t i = 0; i < tracks->track_count; i++) {
         check_track(tracks, i, count);
-        hypotheses += tracks->track[i].is_head;
+        hypotheses += tracks->track[i].is_head && tracks->track[i].index != IH_NONE;
     }
     FUZZ_CHECK(tracks->head_count == hypotheses);
     bool is_listed = tracks->selected == IH_NONE;

@@ -18,6 +18,7 @@ static void fill_params(struct fuzz_input *input, struct ih_tracks_params *param
     if ((flags & 1) != 0) {
         params->gap_us = fuzz_within(input, -1, 2000000);
         params->coast_us = fuzz_within(input, 0, 2000000);
+        params->blind_us = fuzz_within(input, 0, 2000000);
     }
     if ((flags & 2) != 0) {
         params->measured_mm = fuzz_within(input, 4, 500);

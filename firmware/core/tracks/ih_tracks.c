@@ -46,6 +46,7 @@ void ih_tracks_params_default(struct ih_tracks_params *params)
         .front_percent = 30,
         .seen_min = 30,
         .coast_us = 1000000,
+        .blind_us = 300000,
         .gap_us = 2000000,
         .measured_mm = 12,
         .acceleration_mm_s2 = 2500,
@@ -252,14 +253,9 @@ static bool is_gone(const struct ih_detections *detections, int32_t track,
 {
     const struct ih_view *view = &detections->view[track];
     int32_t rays = view->through + view->hit + view->front;
-    if (detections->seen_count < params->seen_min) {
-        return false;
-    }
-    if (rays < VIEW_RAYS_MIN) {
-        return true;
-    }
-    return view->through * 100 > rays * params->through_percent &&
-           view->front * 100 < rays * params->front_percent;
+    return detections->seen_count >= params->seen_min &&
+           (rays < VIEW_RAYS_MIN || (view->through * 100 > rays * params->through_percent &&
+                                     view->front * 100 < rays * params->front_percent));
 }
 
 /* The best pair of a track without detection and a detection without track that is no body. */
@@ -420,7 +416,7 @@ static void list_heads(struct ih_tracks *tracks)
     tracks->head_count = 0;
     for (int32_t t = 0; t < tracks->track_count; t++) {
         const struct ih_track *track = &tracks->track[t];
-        if (!track->is_head) {
+        if (!track->is_head || track->index == IH_NONE) {
             continue;
         }
         int32_t at = tracks->head_count++;
@@ -510,8 +506,10 @@ void ih_tracks_update(struct ih_tracks *tracks, const struct ih_tracks_params *p
     prune(tracks, params, detections);
     start_tracks(tracks, params, detections, bodies);
     predicted->count = 0;
+    const bool is_lost = detections->seen_count < params->seen_min;
     for (t = 0; t < tracks->track_count; t++) {
-        if (tracks->track[t].index == IH_NONE) {
+        const int64_t unseen_us = tracks->time_us - tracks->track[t].seen_us;
+        if (tracks->track[t].index == IH_NONE && !(is_lost && unseen_us > params->blind_us)) {
             append_predicted(rig, &tracks->track[t], detections, predicted);
         }
     }

@@ -16,10 +16,11 @@
  *           seat, or when fewer than 4 rays meet it: it has left the pattern. A frame with fewer than
  *           seen_min points is lost and shows neither. It ends, too, when a measured head is in that
  *           ellipsoid around it: nobody has two.
- *        3. lets the other tracks coast, slowing down, for at most coast_us. Where nothing hides the
- *           head and the frame is not lost, that counts as a detection with log-odds keep_logit. A
- *           track that is no head yet ends with the first frame without a detection, and so does the
- *           younger of two tracks within 80 mm.
+ *        3. lets the other tracks coast, slowing down, for at most coast_us. In a lost frame a head is reported
+ *           for at most blind_us: the laser may have failed, or somebody has left a room whose walls are beyond the
+ *           range. Where nothing hides the head and the frame is not lost, that counts as a detection with
+ *           log-odds keep_logit. A track that is no head yet ends with the first frame without a detection, and so
+ *           does the younger of two tracks within 80 mm.
  *        4. starts tracks with the remaining detections above start_logit, while there is room.
  *        A detection moves its track by the less, the less it looks like a head: it may be a hand before it.
  *        A track's log-odds are a running mean of its detections'. A head ends as one only when the mean says
@@ -60,7 +61,7 @@ struct ih_tracks_params {
     int32_t memory_q16;                          /* weight of the old mean in the new one */
     int32_t through_percent, front_percent;      /* of the rays that meet it: gone, hidden */
     int32_t seen_min;                            /* points; a frame with fewer is lost */
-    int32_t coast_us;
+    int32_t coast_us, blind_us;
     int32_t gap_us;             /* up to 2 s; -1: every frame on its own */
     int32_t measured_mm;        /* standard deviation of a detection's centre; 4 .. 500 */
     int32_t acceleration_mm_s2; /* of heads, standard deviation; 0 .. 8191 */
@@ -77,7 +78,7 @@ struct ih_track {
     bool has_moved;
     int64_t seen_us;
     int32_t detection_count; /* so far, at most 1000 */
-    int32_t index; /* of its head in this frame, as for ih_tracks_head; IH_NONE: not yet known */
+    int32_t index; /* of its head in this frame, as for ih_tracks_head; IH_NONE: none is reported */
 };
 
 struct ih_tracks {

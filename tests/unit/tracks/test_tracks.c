@@ -86,6 +86,7 @@ void setUp(void)
     params.seen_min = 30;
     detections.seen_count = 300;
     params.coast_us = 1000000;
+    params.blind_us = 300000;
     params.gap_us = 2000000;
     params.measured_mm = 12;
     params.acceleration_mm_s2 = 2500;
@@ -133,15 +134,20 @@ static void check_tracks(void)
         const struct ih_verdict own = verdict(track->index);
 
         IH_TEST_RANGE(1, INT32_MAX, track->id, "id", t);
+        for (k = 0; k < t; k++) {
+            TEST_ASSERT_TRUE(tracks.track[k].id != track->id);
+        }
+        if (track->index == IH_NONE) { /* not reported */
+            TEST_ASSERT_TRUE(track->is_head && detections.seen_count < params.seen_min &&
+                             tracks.time_us - track->seen_us > params.blind_us);
+            continue;
+        }
         IH_TEST_RANGE(0, detections.detection_count + predicted.count - 1, track->index,
                       "its index", t);
         IH_TEST_EQUAL(track->id, own.track_id, "the verdict's track", t);
         IH_TEST_EQUAL(track->is_head, own.is_head, "the verdict", t);
         IH_TEST_RANGE(0, 500 << 8, own.sigma_mm_q8, "sigma", t);
         TEST_ASSERT_TRUE(track->is_head || track->index < detections.detection_count);
-        for (k = 0; k < t; k++) {
-            TEST_ASSERT_TRUE(tracks.track[k].id != track->id);
-        }
     }
     for (k = 0; k < tracks.head_count; k++) {
         TEST_ASSERT_TRUE(verdict(tracks.head[k]).is_head);
@@ -809,6 +815,33 @@ static void a_track_coasts_for_coast_us_at_most(void)
     }
 }
 
+/* Of a room beyond the range nothing is seen when its visitor has left: no head is reported for long. It is the same
+ * person's when it comes back. */
+static void a_head_is_reported_for_blind_us_where_nothing_is_seen(void)
+{
+    int is_hidden;
+
+    for (is_hidden = 0; is_hidden < 2; is_hidden++) {
+        setUp();
+        frames_with(10, 0, 0, 800, 5);
+        view = front;
+        detections.seen_count = is_hidden ? 30 : 29;
+        frames_without(7); /* 280 ms */
+        frame_at(time_us + 20000);
+        IH_TEST_EQUAL(1, tracks.head_count, "heads after blind_us", is_hidden);
+        IH_TEST_EQUAL(0, tracks.selected, "selected", is_hidden);
+        frame_at(time_us + 1);
+        IH_TEST_EQUAL(is_hidden, tracks.head_count, "heads, longer", is_hidden);
+        IH_TEST_EQUAL(is_hidden, predicted.count, "predicted, longer", is_hidden);
+        IH_TEST_EQUAL(is_hidden ? 0 : IH_NONE, tracks.selected, "selected, longer", is_hidden);
+        IH_TEST_EQUAL(1, tracks.track_count, "tracks, longer", is_hidden);
+        view = hit;
+        detections.seen_count = 300;
+        frames_with(1, 0, 0, 800, 5);
+        IH_TEST_EQUAL(1, tracks.selected_id, "the same person's", is_hidden);
+    }
+}
+
 /* It moves on, and slows down within 0.3 s. */
 static void a_coasting_track_slows_down(void)
 {
@@ -1074,6 +1107,7 @@ static void uncertainty_has_its_limits(void)
 {
     params.acceleration_mm_s2 = 8191;
     params.coast_us = INT32_MAX;
+    params.blind_us = INT32_MAX;
     detections.seen_count = 0; /* lost frames: it coasts */
     frames_with(1, 0, 0, 800, 5);
     frame_at(time_us + 2000000);
@@ -1498,6 +1532,7 @@ int main(void)
     RUN_TEST(hands_before_a_head_do_not_end_it);
     RUN_TEST(a_predicted_head_has_no_evidence);
     RUN_TEST(a_track_coasts_for_coast_us_at_most);
+    RUN_TEST(a_head_is_reported_for_blind_us_where_nothing_is_seen);
     RUN_TEST(a_coasting_track_slows_down);
     RUN_TEST(a_frame_is_lost_with_fewer_points_than_its_limit);
     RUN_TEST(a_gate_reaches_as_far_as_it_says);
