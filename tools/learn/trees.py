@@ -25,14 +25,14 @@ def grow(values, labels, weights, margin, options, count):
     return [json.loads(text) for text in grown]
 
 
-def asked(node):
+def question_of(node):
     """Feature and limit of a node's question."""
     return int(node["split"][1:]), int(numpy.ceil(node["split_condition"]))
 
 
 def add_gains(node, gains):
     if "children" in node:
-        gains[asked(node)] += node["gain"]
+        gains[question_of(node)] += node["gain"]
         for child in node["children"]:
             add_gains(child, gains)
 
@@ -42,7 +42,7 @@ def choose_questions(places, labels, weights, margin):
     gains = collections.Counter()
     for tree in grow(places, labels, weights, margin, OPTIONS | CHOOSING, CHOOSING_TREES):
         add_gains(tree, gains)
-    return sorted(question for question, _ in gains.most_common(model.QUESTIONS))
+    return sorted(sorted(gains, key=gains.get, reverse=True)[:model.QUESTIONS])
 
 
 def fill_tree(node, at, index, question, leaf):
@@ -52,7 +52,7 @@ def fill_tree(node, at, index, question, leaf):
         return
     below = {child["nodeid"]: child for child in node.get("children", [])}
     if below:
-        question[at] = index[asked(node)]
+        question[at] = index[question_of(node)]
     fill_tree(below[node["yes"]] if below else node, 2 * at + 1, index, question, leaf)
     fill_tree(below[node["no"]] if below else node, 2 * at + 2, index, question, leaf)
 

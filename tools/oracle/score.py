@@ -71,8 +71,8 @@ def read_header(path):
         text = file.read()
     trees = re.findall(r"^ +\{\{([\d, ]+)\}, \{([-\d, ]+)\}\},$", text, re.M)
     question, leaf = ([[int(value) for value in part.split(",")] for part in column] for column in zip(*trees))
-    asked = re.search(r"\.question = \{(.*?)\n    \}", text, re.S)[1]
-    kind, limit = zip(*((int(kind), int(limit)) for kind, limit in re.findall(r"\{(\d+), (\d+)\}", asked)))
+    listed = re.search(r"\.question = \{(.*?)\n    \}", text, re.S)[1]
+    kind, limit = zip(*((int(kind), int(limit)) for kind, limit in re.findall(r"\{(\d+), (\d+)\}", listed)))
     rows = re.findall(r"\[IH_EVIDENCE_(\w+)\] = \{(-?\d+), (\d+), \{([-\d, ]+)\}\},", text)
     at = np.array([[int(value) for value in row[3].split(",")] for row in rows])
     curves = model.Curves(np.array([int(row[1]) for row in rows]),

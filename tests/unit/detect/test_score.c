@@ -102,14 +102,14 @@ static void a_curve_goes_through_its_knots_and_is_constant_beyond(void)
 /* Every way through a tree ends at its own leaf, and what lies on a limit is beyond it. */
 static void a_tree_asks_three_questions(void)
 {
-    static const struct ih_score_question asked[IH_SCORE_BRANCHES] = {
+    static const struct ih_score_question of_branch[IH_SCORE_BRANCHES] = {
         {1, 1}, {2, 192}, {3, 40}, {4, 7}, {5, 8}, {6, 9}, {7, 10}};
     static const struct ih_score_tree tree = {{255, 0, 77, 254, 13, 128, 9},
                                               {1, 2, -3, 4, 5, -128, 127, 8}};
     int leaf, beside, branch;
 
     for (branch = 0; branch < IH_SCORE_BRANCHES; branch++) {
-        tables.question[tree.question[branch]] = asked[branch];
+        tables.question[tree.question[branch]] = of_branch[branch];
     }
     tables.tree[9] = tree;
     for (leaf = 0; leaf < IH_SCORE_LEAVES; leaf++) {
@@ -120,8 +120,9 @@ static void a_tree_asks_three_questions(void)
             for (level = 2; level >= 0; level--) {
                 const int yes = leaf >> level & 1;
                 /* 8 in Q8 a place; one less is not beyond the limit. */
-                evidence.value_q8[asked[at].kind] =
-                    yes ? 8 * asked[at].limit + 7 * beside : 8 * asked[at].limit - 1 - 7 * beside;
+                evidence.value_q8[of_branch[at].kind] =
+                    yes ? 8 * of_branch[at].limit + 7 * beside
+                        : 8 * of_branch[at].limit - 1 - 7 * beside;
                 at = 2 * at + 1 + yes;
             }
             ih_score_rate_by_tables(&tables, &evidence, &score);
