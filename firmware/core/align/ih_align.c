@@ -206,6 +206,7 @@ static int32_t try_motion(struct ih_align *align, const struct ih_dots *dots,
     const struct sight sight = look(rows, rig, 1);
     const int32_t excess = excess_of(sight.on, sight.beside);
     if (excess >= excess_wanted) {
+        align->excess = excess;
         align->near_excess = excess_of(sight.near_on, sight.near_beside);
         return excess;
     }
@@ -232,11 +233,10 @@ static int32_t search(struct ih_align *align, const struct ih_dots *dots, int32_
     }
     if (excess < ih_max_s32(enough, trusted)) {
         excess = 0;
-    }
-    if (excess == 0 &&
-        ih_align_search(&align->axes, align->prior_px_q12, rig, rows, scratch, moved_px_q12) &&
-        is_within_limits(moved_px_q12, rig)) {
-        excess = try_motion(align, dots, moved_px_q12, enough, rig, rows);
+        if (ih_align_search(&align->axes, align->prior_px_q12, rig, rows, scratch, moved_px_q12) &&
+            is_within_limits(moved_px_q12, rig)) {
+            excess = try_motion(align, dots, moved_px_q12, enough, rig, rows);
+        }
     }
     if (excess >= enough) {
         if (align->unsettled_frames == 0) {
@@ -262,7 +262,8 @@ static bool question(struct ih_align *align, const struct ih_dots *dots, struct 
                      struct ih_dot_rows *rows)
 {
     const struct sight sight = look(rows, rig, 1);
-    const int32_t excess = excess_of(sight.on, sight.beside);
+    align->excess = excess_of(sight.on, sight.beside);
+    align->near_excess = excess_of(sight.near_on, sight.near_beside);
     if (align->unsettled_frames > UNSETTLED_FRAMES_MAX || is_clear(sight)) {
         align->unsettled_frames = 0;
         return false;
@@ -270,16 +271,14 @@ static bool question(struct ih_align *align, const struct ih_dots *dots, struct 
     /* Not 0 yet: what this frame's search finds is compared with the same motion. */
     align->unsettled_frames++;
     const int32_t before_px_q12 = align->moved_px_q12[IH_ALIGN_DEPTH];
-    align->excess = try_motion(align, dots, align->settled_px_q12,
-                               ih_max_s32(excess_min(rows->dot_count), excess), rig, rows);
-    if (align->excess > 0) {
+    const int32_t enough = ih_max_s32(excess_min(rows->dot_count), align->excess);
+    if (try_motion(align, dots, align->settled_px_q12, enough, rig, rows) > 0) {
         align->unsettled_frames = 0;
         align->trusted_q8 = 0;
         note_change(align, before_px_q12, rig);
         forget(align);
         return false;
     }
-    align->excess = excess;
     return true;
 }
 
@@ -318,6 +317,8 @@ void ih_align_find(struct ih_align *align, const struct ih_dots *dots, struct ih
 {
     ih_dot_rows_fill(dots, rig, rows);
     if (rows->dot_count < DOTS_MIN) {
+        align->excess = 0;
+        align->near_excess = 0;
         return;
     }
     struct sight sight = look(rows, rig, 2);

@@ -462,6 +462,9 @@ static void few_dots_say_nothing(void)
         scatter(which, 29);
         find();
         IH_TEST_EQUAL(IH_ALIGN_FITS, align.now.state, "state stays", which);
+        learn(); /* nor that labels are short */
+        TEST_ASSERT_FALSE(align.is_short);
+        TEST_ASSERT_TRUE(align.now.is_depth_known);
     }
 }
 
