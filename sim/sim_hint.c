@@ -154,7 +154,8 @@ static void report_dots(const struct sim_hint *hint, const struct isohead *head,
         snprintf(text, sizeof text,
                  "hardly a dot has a good label in %" PRId32 " of %" PRId32
                  " frames, but dots lie on the lines of %s: what is seen is nearer than %" PRId32
-                 " or farther than %" PRId32 " mm",
+                 " or farther than %" PRId32 " mm, or the projector is nearer to the camera or "
+                 "farther from it than that file says",
                  hint->bare_count, hint->dotted_count, rig, head->rig.calibration.near_mm,
                  head->rig.calibration.far_mm);
         sim_report_hint(report, dir, text);
