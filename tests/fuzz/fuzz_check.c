@@ -304,8 +304,10 @@ static void check_track(const struct ih_tracks *tracks, int32_t index, int32_t c
         FUZZ_CHECK(tracks->track[i].id != track->id);
         FUZZ_CHECK(tracks->track[i].index != track->index || track->index == IH_NONE);
     }
-    FUZZ_CHECK(track->index < count &&
-               (track->index >= 0 || (track->index == IH_NONE && track->is_head)));
+    FUZZ_CHECK(track->index < count);
+    FUZZ_CHECK(track->index >= 0 ||
+               (track->index == IH_NONE && track->is_head && track->seen_us <= tracks->lit_us &&
+                tracks->lit_us < tracks->time_us));
     FUZZ_CHECK(filter->position_q8 >= 0 && filter->velocity_q8 >= 0);
     FUZZ_CHECK(filter->position_q8 <= (int64_t)500 * 500 * 256);
     FUZZ_CHECK(filter->velocity_q8 <= (int64_t)3000 * 3000 * 256);

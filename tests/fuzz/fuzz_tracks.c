@@ -18,7 +18,6 @@ static void fill_params(struct fuzz_input *input, struct ih_tracks_params *param
     if ((flags & 1) != 0) {
         params->gap_us = fuzz_within(input, -1, 2000000);
         params->coast_us = fuzz_within(input, 0, 2000000);
-        params->blind_us = fuzz_within(input, 0, 2000000);
     }
     if ((flags & 2) != 0) {
         params->measured_mm = fuzz_within(input, 4, 500);
@@ -28,6 +27,9 @@ static void fill_params(struct fuzz_input *input, struct ih_tracks_params *param
         params->gate_mm = fuzz_within(input, 0, 1000);
         params->gate_mm_per_s = fuzz_within(input, 0, 3000);
         params->switch_frames = fuzz_within(input, 0, 8);
+    }
+    if ((flags & 8) != 0) {
+        params->blind_us = fuzz_within(input, 0, 2000000);
     }
 }
 

@@ -221,17 +221,16 @@ static int32_t search(struct ih_align *align, const struct ih_dots *dots, int32_
                       struct ih_align_scratch *scratch)
 {
     static const int32_t none[IH_ALIGN_AXES];
-    int32_t before_px_q12[IH_ALIGN_AXES], moved_px_q12[IH_ALIGN_AXES];
+    int32_t before_px_q12[IH_ALIGN_AXES];
     const int32_t more = excess_before / (align->unsettled_frames > 0 ? 8 : 4) + 1;
     const int32_t enough = ih_max_s32(excess_min(rows->dot_count), excess_before + more);
     const int32_t trusted = rows->dot_count * align->trusted_q8 * 3 / 4 / 256;
     const int32_t near_excess_before = align->near_excess;
-    int32_t excess = 0;
     memcpy(before_px_q12, align->moved_px_q12, sizeof before_px_q12);
-    if (!is_none(before_px_q12)) {
-        excess = try_motion(align, dots, none, INT32_MIN, rig, rows);
-    }
+    int32_t excess =
+        is_none(before_px_q12) ? 0 : try_motion(align, dots, none, INT32_MIN, rig, rows);
     if (excess < ih_max_s32(enough, trusted)) {
+        int32_t moved_px_q12[IH_ALIGN_AXES];
         excess = 0;
         if (ih_align_search(&align->axes, align->prior_px_q12, rig, rows, scratch, moved_px_q12) &&
             is_within_limits(moved_px_q12, rig)) {
@@ -296,8 +295,9 @@ static void search_depth(struct ih_align *align, const struct ih_dots *dots, str
     for (int k = 0; k < IH_ALIGN_AXES; k++) {
         moved_px_q12[k] += align->moved_px_q12[k];
     }
+    const int32_t enough = ih_max_s32(excess_min(rows->dot_count), align->excess / 2);
     if (is_within_limits(moved_px_q12, rig) &&
-        try_motion(align, dots, moved_px_q12, align->excess / 2, rig, rows) > 0) {
+        try_motion(align, dots, moved_px_q12, enough, rig, rows) > 0) {
         note_change(align, before_px_q12, rig);
         forget(align);
     }
@@ -489,7 +489,7 @@ void ih_align_learn(struct ih_align *align, const struct ih_labels *labels, stru
                        ih_align_rad_q30(align->prior_px_q12[IH_ALIGN_DEPTH], rig));
     }
     take_labels(align, labels, rig, pairs);
-    if (pairs->count < LABELS_MIN || align->now.state == IH_ALIGN_LOST ||
+    if (pairs->count < LABELS_MIN || align->now.state == IH_ALIGN_LOST || align->excess == 0 ||
         LABELS_DIVISOR * labels->labelled_count < align->excess) {
         return;
     }

@@ -87,6 +87,7 @@ void ih_tracks_expect(struct ih_tracks *tracks, const struct ih_tracks_params *p
         tracks->track_count = 0;
         tracks->selected_id = 0;
         tracks->rival_frames = 0;
+        tracks->lit_us = time_us;
     }
     tracks->has_time = true;
     tracks->time_us = time_us;
@@ -507,9 +508,10 @@ void ih_tracks_update(struct ih_tracks *tracks, const struct ih_tracks_params *p
     start_tracks(tracks, params, detections, bodies);
     predicted->count = 0;
     const bool is_lost = detections->seen_count < params->seen_min;
+    tracks->lit_us = is_lost ? tracks->lit_us : tracks->time_us;
     for (t = 0; t < tracks->track_count; t++) {
-        const int64_t unseen_us = tracks->time_us - tracks->track[t].seen_us;
-        if (tracks->track[t].index == IH_NONE && !(is_lost && unseen_us > params->blind_us)) {
+        if (tracks->track[t].index == IH_NONE &&
+            tracks->time_us - tracks->lit_us <= params->blind_us) {
             append_predicted(rig, &tracks->track[t], detections, predicted);
         }
     }

@@ -16,9 +16,9 @@
  *           seat, or when fewer than 4 rays meet it: it has left the pattern. A frame with fewer than
  *           seen_min points is lost and shows neither. It ends, too, when a measured head is in that
  *           ellipsoid around it: nobody has two.
- *        3. lets the other tracks coast, slowing down, for at most coast_us. In a lost frame a head is reported
- *           for at most blind_us: the laser may have failed, or somebody has left a room whose walls are beyond the
- *           range. Where nothing hides the head and the frame is not lost, that counts as a detection with
+ *        3. lets the other tracks coast, slowing down, for at most coast_us. Their heads are reported, but not
+ *           when all frames of the last blind_us were lost: the laser may have failed, or somebody has left a room
+ *           whose walls are beyond the range. Where nothing hides the head and the frame is not lost, that counts as a detection with
  *           log-odds keep_logit. A track that is no head yet ends with the first frame without a detection, and so
  *           does the younger of two tracks within 80 mm.
  *        4. starts tracks with the remaining detections above start_logit, while there is room.
@@ -83,7 +83,7 @@ struct ih_track {
 
 struct ih_tracks {
     bool has_time;
-    int64_t time_us;
+    int64_t time_us, lit_us; /* of this frame, and of the last one that was not lost */
     int32_t last_id, track_count;
     struct ih_track track[IH_TRACKS_MAX];
     int32_t selected_id, rival_id, rival_frames; /* id 0: none */
