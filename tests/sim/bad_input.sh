@@ -528,7 +528,7 @@ run --json d # all that is there is nearer
 hint 'nothing in the working range' 'd: hardly a dot .* nearer than 2500 or farther than 2600 mm'
 sed 's/"near_mm":[^,]*/"near_mm":300/; s/"far_mm":[^,}]*/"far_mm":500/' d/rig.json >far.json
 run --json --rig far.json d # all that is there is farther
-hint 'a room beyond the working range' 'd: hardly a dot .* of 3 frames, but dots lie on the lines of far\.json: .* farther than 500 mm'
+hint 'a room beyond the working range' 'd: hardly a dot .* of 3 frames, but dots lie on the lines of far\.json: .* farther than 500 mm, or the projector is nearer to the camera or farther from it'
 rm far.json
 { printf 'P5\n%d %d\n255\n' "$width" "$height" && head -c $((width * height)) /dev/zero; } >d/black.pgm
 cp d/black.pgm d/a.pgm && cp d/black.pgm d/b.pgm && mv d/black.pgm d/c.pgm

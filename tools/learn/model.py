@@ -115,7 +115,7 @@ def write(path, learnt, kinds, command):
         rows.append("        [IH_EVIDENCE_%s] = {%d, %d, {%s}}," %
                     (kind.upper(), first, step, listed(at)))
     questions = ["{%d, %d}" % pair for pair in zip(learnt.kind, learnt.limit)]
-    lines = ["        %s," % ", ".join(questions[i:i + 12]) for i in range(0, QUESTIONS, 12)]
+    lines = ["        %s," % ", ".join(questions[i:i + 12]) for i in range(0, len(questions), 12)]
     trees = ["        {{%s}, {%s}}," % (listed(question), listed(leaf)) for question, leaf in zip(learnt.question, learnt.leaf_q8)]
     with open(path, "w", encoding="utf-8") as file:
         file.write("""/* ih_score_weights - the curves and trees of ih_score, written by
