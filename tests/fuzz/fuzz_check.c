@@ -306,7 +306,7 @@ static void check_track(const struct ih_tracks *tracks, int32_t index, int32_t c
     }
     FUZZ_CHECK(track->index < count);
     FUZZ_CHECK(track->index >= 0 ||
-               (track->index == IH_NONE && track->is_head && track->seen_us <= tracks->lit_us &&
+               (track->index == IH_NONE && track->is_head && track->seen_us < tracks->time_us &&
                 tracks->lit_us < tracks->time_us));
     FUZZ_CHECK(filter->position_q8 >= 0 && filter->velocity_q8 >= 0);
     FUZZ_CHECK(filter->position_q8 <= (int64_t)500 * 500 * 256);

@@ -510,8 +510,8 @@ void ih_tracks_update(struct ih_tracks *tracks, const struct ih_tracks_params *p
     const bool is_lost = detections->seen_count < params->seen_min;
     tracks->lit_us = is_lost ? tracks->lit_us : tracks->time_us;
     for (t = 0; t < tracks->track_count; t++) {
-        if (tracks->track[t].index == IH_NONE &&
-            tracks->time_us - tracks->lit_us <= params->blind_us) {
+        const int64_t shown_us = ih_max_s64(tracks->lit_us, tracks->track[t].seen_us);
+        if (tracks->track[t].index == IH_NONE && tracks->time_us - shown_us <= params->blind_us) {
             append_predicted(rig, &tracks->track[t], detections, predicted);
         }
     }

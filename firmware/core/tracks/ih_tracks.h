@@ -17,10 +17,10 @@
  *           seen_min points is lost and shows neither. It ends, too, when a measured head is in that
  *           ellipsoid around it: nobody has two.
  *        3. lets the other tracks coast, slowing down, for at most coast_us. Their heads are reported, but not
- *           when all frames of the last blind_us were lost: the laser may have failed, or somebody has left a room
- *           whose walls are beyond the range. Where nothing hides the head and the frame is not lost, that counts as a detection with
- *           log-odds keep_logit. A track that is no head yet ends with the first frame without a detection, and so
- *           does the younger of two tracks within 80 mm.
+ *           when all frames of the last blind_us were lost and did not show them: the laser may have failed, or
+ *           somebody has left a room whose walls are beyond the range. Where nothing hides the head and the frame
+ *           is not lost, that counts as a detection with log-odds keep_logit. A track that is no head yet ends
+ *           with the first frame without a detection, and so does the younger of two tracks within 80 mm.
  *        4. starts tracks with the remaining detections above start_logit, while there is room.
  *        A detection moves its track by the less, the less it looks like a head: it may be a hand before it.
  *        A track's log-odds are a running mean of its detections'. A head ends as one only when the mean says

@@ -846,6 +846,9 @@ static void a_head_is_reported_for_blind_us_where_nothing_is_seen(void)
     detections.seen_count = 29;
     frame();
     IH_TEST_EQUAL(0, tracks.selected, "selected in one lost frame", 0);
+    frames_with(12, 0, 0, 800, 5); /* found in lost frames, and then not once */
+    frame();
+    IH_TEST_EQUAL(0, tracks.selected, "selected after lost frames", 0);
 }
 
 /* It moves on, and slows down within 0.3 s. */
