@@ -4,7 +4,8 @@
  *   dots    of the frames with 60 dots and more, more than half have labels for fewer than a fifth of them, or by chance
  *           alone (fewer than half, beside the lines of a rig that has moved): the file of another rig, or one that moved
  *           beyond what ih_align corrects. If dots of most of these frames lie on the lines of the rig's file, what is seen
- *           is nearer or farther than the working range; not with --paper, which does not look.
+ *           is nearer or farther than the working range, or the projector stands elsewhere along the baseline; not with
+ *           --paper, which does not look.
  *   depth   of the measured pixels of all frames fewer than 2 % lie within near_mm .. far_mm: another working range, or
  *           another unit. When 80 % would lie there with another unit, that unit is named. Samples with their bytes
  *           swapped are spread over all values, so there fewer than a third within the range are enough.

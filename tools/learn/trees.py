@@ -1,6 +1,6 @@
 """Trees of three questions for what the curves of model.py leave, by xgboost, in the firmware's numbers.
 
-All trees ask out of one list of questions, so that a tree is a few bytes: those that larger trees gain most by."""
+All trees ask out of one list, so that a tree is a few bytes: the questions by which larger trees gained most."""
 
 import collections
 import dataclasses

@@ -17,8 +17,9 @@
  *            fewer dots lie there, or are searched for again, unless hardly a dot lies beside them.
  *         3. Learn, after the labels, if they are at least a quarter as many as the dots on the lines: a fit to how far
  *            labelled dots lie across their lines, averaged with those of up to 16 frames before. A frame that differs
- *            starts the mean anew. The lines move when the mean is 0.1 px off them (0.05 px once they have moved), or
- *            when depth is: 0.04 degrees and 3 times its uncertainty (then 0.01 degrees and once).
+ *            starts the mean anew. Frames of fewer than 30 dots teach nothing. The lines move when the mean is 0.1 px
+ *            off them (0.05 px once they have moved), or when depth is: 0.04 degrees and 3 times its uncertainty (then
+ *            0.01 degrees and once).
  *         Where the rig is right nothing changes, to the last bit.
  *         The rotation about the axis across the baseline is depth. Dots show it by the pattern's keystone alone: to
  *         0.02 degrees in a frame of a room, 0.2 where half of the dots are missing.

@@ -31,11 +31,13 @@ static int32_t value_at_q10(const struct ih_score_curve *curve, int32_t knot_q16
     return curve->at_q10[knot] + (int32_t)ih_mul_shift(rise, knot_q16 & 0xffff, 16);
 }
 
-static int32_t leaf_q8(const struct ih_score_tree *tree, const uint8_t yes[IH_SCORE_QUESTIONS])
+static int32_t leaf_q8(const struct ih_score_tables *tables, const struct ih_score_tree *tree,
+                       const uint8_t place[IH_EVIDENCE_COUNT])
 {
     int32_t at = 0;
     while (at < IH_SCORE_BRANCHES) {
-        at = 2 * at + 1 + yes[tree->question[at]];
+        const struct ih_score_question *question = &tables->question[tree->question[at]];
+        at = 2 * at + 1 + (place[question->kind] >= question->limit);
     }
     return tree->leaf_q8[at - IH_SCORE_BRANCHES];
 }
@@ -52,13 +54,9 @@ void ih_score_rate_by_tables(const struct ih_score_tables *tables,
         out->part_q10[kind] = value_at_q10(curve, knot_q16);
         out->logit_q10 += out->part_q10[kind];
     }
-    uint8_t yes[IH_SCORE_QUESTIONS];
-    for (int i = 0; i < IH_SCORE_QUESTIONS; i++) {
-        yes[i] = place[tables->question[i].kind] >= tables->question[i].limit;
-    }
     int32_t together_q8 = 0;
     for (int i = 0; i < IH_SCORE_TREES; i++) {
-        together_q8 += leaf_q8(&tables->tree[i], yes);
+        together_q8 += leaf_q8(tables, &tables->tree[i], place);
     }
     out->together_q10 = together_q8 * 4;
     out->logit_q10 += out->together_q10;
