@@ -851,7 +851,7 @@ static void a_head_is_reported_for_blind_us_where_nothing_is_seen(void)
     IH_TEST_EQUAL(0, tracks.selected, "selected after lost frames", 0);
 }
 
-/* It moves on, and slows down within 0.3 s. */
+/* It moves on, and slows down within 0.1 s. */
 static void a_coasting_track_slows_down(void)
 {
     double x, last = 0;
@@ -873,7 +873,7 @@ static void a_coasting_track_slows_down(void)
         x += moved;
     }
     TEST_ASSERT_EQUAL_INT32(0, tracks.track[0].filter.velocity_mm_s_q8[0]);
-    IH_TEST_RANGE(280 + 20, 280 + 100, (int64_t)x, "position", 0);
+    IH_TEST_RANGE(280 + 20, 280 + 50, (int64_t)x, "position", 0);
 }
 
 /* The longer it was not seen, the farther off it may be found. */
