@@ -234,10 +234,11 @@ view: sim ## build tools/view, pictures of frames and what was found in them: bu
 	@cmake --preset view > $(BUILD)/view.log 2>&1 || { cat $(BUILD)/view.log; exit 1; }
 	@cmake --build --preset view --parallel 2 --target view
 
-figures: view ## draw docs/figure1.png, docs/figure2.png (the paper's) and docs/figure_control.png anew
+figures: view ## draw docs/figure1.png, docs/figure2.png (the paper's), docs/figure_control.png and the learnt maps anew
 	@$(VIEW) contours --from 000022 frames/sequence2 docs/figure1.png
 	@$(VIEW) sheet --from 000020 frames/sequence2 docs/figure2.png
 	@$(VIEW) control --from 000010 frames/sequence1 docs/figure_control.png
+	@/usr/bin/python3 tools/learn/draw_maps.py docs/pictures/maps.svg
 
 test-view: view ## what tools/view draws, pixel by pixel and word by word; what it refuses
 	@tools/setup.sh test-view

@@ -270,7 +270,7 @@ static void write_heads(struct app_write *write, const struct ih_hypotheses *hyp
     app_write_close(write, '}');
 }
 
-/* What the rays ask of the learnt map. */
+/* What the rays ask of the learnt maps. */
 static void write_surroundings(struct app_write *write, const struct ih_rays *rays,
                                const struct ih_ellipsoid *ellipsoid)
 {
@@ -292,8 +292,10 @@ static void write_surroundings(struct app_write *write, const struct ih_rays *ra
  * have moved since. */
 static bool is_of(const struct ih_rays *rays, const struct ih_detection *detection)
 {
-    return ih_surroundings_logit_q8(rays, &detection->head) ==
-           detection->evidence.value_q8[IH_EVIDENCE_SURROUNDINGS];
+    int32_t answer_q8[IH_SURROUNDINGS_MAPS];
+    ih_surroundings_ask(rays, &detection->head, answer_q8);
+    return memcmp(answer_q8, &detection->evidence.value_q8[IH_EVIDENCE_MAPS], sizeof answer_q8) ==
+           0;
 }
 
 /* The rays of each view of the frame: of the dots, or of each window of a depth image. They are made anew, for later

@@ -99,7 +99,7 @@ const Tables = (() => {
       : `The score is the probability of a head by all evidence together, of a track its mean over frames. A head starts ` +
         `above log-odds of ${odds(l.start_head_logit_q10)}, or ${odds(l.accept_logit_q10)} once it was found in ${l.mature_findings} frames, ` +
         `and stays one until they fall below ${odds(l.drop_logit_q10)} (a score of ${probability(l.drop_logit_q10 / 1024).toFixed(3)}). ` +
-        `What has moved by ${l.moved_mm} mm since it was first found needs ${odds(l.moved_logit_q10)} less, if more is open than closed above it.`;
+        `What has moved by ${l.moved_mm} mm since it was first found needs ${odds(l.moved_logit_q10)} less.`;
     const head = ["No.", "Decision", ...(dir.paper ? [] : ["Score"]), "Centre x, y, z in mm", "Distance in mm", "Ellipse in pixels"];
     fillCards(into, "Hypotheses of this frame", head, hypotheses.map((_, i) => hypothesisRow(frame, i, chosen, choose)));
   }
@@ -107,14 +107,8 @@ const Tables = (() => {
   /* Kinds of evidence (firmware/core/detect/ih_evidence.h): what they are, unit, decimals. */
   const KINDS = {
     on: ["points on the ellipsoid", "", 0], rough: ["their distance from it", "mm", 1], bulge: ["rounder than a plane by", "mm", 1],
-    tall: ["taller than the mean head by", "%", 0], moved: ["moved by the fit", "mm", 0], above: ["open above", "fraction", 2],
-    beside: ["open beside", "fraction", 2], below: ["open below, at the neck", "fraction", 2], high: ["open farther above", "fraction", 2],
-    nothing: ["rays that meet nothing", "fraction", 2], body: ["body below", "fraction", 2], body_rays: ["rays below the chin", "", 0],
-    body_depth: ["depth of the body behind the centre", "mm", 0], wide: ["as wide as a table below", "fraction", 2],
-    level: ["things beside at its height", "fraction", 2], shoulder: ["a shoulder on the weaker side", "fraction", 2],
-    before: ["points before it, as hands", "", 0], extent: ["extent of the nest there", "mm", 0], upright: ["height² / width² of that nest", "", 2],
+    tall: ["taller than the mean head by", "%", 0], moved: ["moved by the fit", "mm", 0],
     bend_down: ["how uneven from dot to dot, downwards", "mm", 1], bend_across: ["how uneven from dot to dot, across", "mm", 1],
-    surroundings: ["what all dots there say by the learnt map", "", 2],
     distance: ["how far away it is", "mm", 0],
   };
 
@@ -127,7 +121,8 @@ const Tables = (() => {
 
   /* What was there before has no bar: it is larger than all others, which would be too short to be distinguished. */
   function evidenceRow(name, value, part, largest) {
-    const [text, unit, decimals] = KINDS[name] || [name, "", 2];
+    const map = /^map_(\d)$/.exec(name);
+    const [text, unit, decimals] = map ? [`what all dots there say by learnt map ${map[1]}`, "", 2] : KINDS[name] || [name, "", 2];
     const bar = largest === null ? null : element("i", { class: part >= 0 ? "for" : "against", style: `width:${(Math.abs(part) / largest * 48).toFixed(1)}%` });
     return element("tr", {}, element("th", { scope: "row" }, text),
       element("td", {}, value === null ? "" : `${value.toFixed(decimals)}${unit && unit !== "fraction" ? `\u202f${unit}` : ""}`),

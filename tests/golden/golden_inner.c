@@ -84,13 +84,12 @@ static void hash_start(struct isohead *head, const int32_t centre_mm_q8[3],
                        uint64_t hash[GOLDEN_INNERS])
 {
     const struct ih_rays *rays = &head->scratch.detections.rays;
-    const struct ih_evidence_nest nest = {.present = false};
     struct ih_ellipsoid start = ih_ellipsoid_mean(centre_mm_q8), fitted;
     struct ih_evidence evidence;
     struct ih_score score;
     ih_fit_ellipsoid(rays, &head->params.detections.fit, &start, &head->scratch.detections.fit,
                      &fitted);
-    ih_evidence_collect(rays, &fitted, centre_mm_q8, &nest, &evidence);
+    ih_evidence_collect(rays, &fitted, centre_mm_q8, &evidence);
     ih_score_rate(&evidence, &score);
     hash[GOLDEN_FIT] = golden_add_words(hash[GOLDEN_FIT], &fitted, sizeof fitted);
     hash[GOLDEN_EVIDENCE] = golden_add_words(hash[GOLDEN_EVIDENCE], &evidence, sizeof evidence);

@@ -24,8 +24,8 @@ import score  # pylint: disable=wrong-import-position
 BALLS_MM = ((-400.0, 1000.0), (0.0, 1500.0), (600.0, 1900.0))
 
 
-def complaints(trace, map_q9):
-    kind = trace["evidence"].index("surroundings")
+def complaints(trace, maps):
+    first = trace["evidence"].index("map_0")
     for detection in trace["findings"]:
         rays = detection.get("surroundings")
         if detection["predicted"]:
@@ -33,9 +33,10 @@ def complaints(trace, map_q9):
         if rays is None:
             yield "%s: a detection without its rays" % trace["file"]
             continue
-        logit = ray_map.logits(map_q9, numpy.array([rays["place"]]), numpy.array([rays["weight_q12"]]))[0]
-        if round(256 * logit) != detection["evidence_q8"][kind]:
-            yield "%s: rays say %.3f, the evidence %.3f" % (trace["file"], logit, detection["evidence_q8"][kind] / 256)
+        answers = ray_map.answers(maps, numpy.array([rays["place"]]), numpy.array([rays["weight_q12"]]))[0]
+        given_q8 = detection["evidence_q8"][first:first + ray_map.MAPS]
+        if [round(256 * answer) for answer in answers] != given_q8:
+            yield "%s: rays say %s, the evidence %s in Q8" % (trace["file"], answers, given_q8)
 
 
 def write_depth_image(folder):
@@ -59,7 +60,7 @@ def write_depth_image(folder):
 
 
 def main():
-    map_q9, _ = score.read_map(os.path.join(ROOT, "firmware/core/detect/ih_surroundings_map.h"))
+    maps, _ = score.read_map(os.path.join(ROOT, "firmware/core/detect/ih_surroundings_map.h"))
     with tempfile.TemporaryDirectory() as work:
         depth = os.path.join(work, "depth")
         os.mkdir(depth)
@@ -70,7 +71,7 @@ def main():
         for path in sorted(glob.glob(os.path.join(out, "*", "*.json"))):
             with open(path, encoding="utf-8") as file:
                 traces.append(json.load(file))
-    bad = [text for trace in traces for text in complaints(trace, map_q9)]
+    bad = [text for trace in traces for text in complaints(trace, maps)]
     depths = [detection["centre_mm_q8"][2] / 256 for detection in traces[0]["findings"]]
     bad += ["depth image: no detection at %g mm" % ball for _, ball in BALLS_MM
             if not any(abs(depth - ball) < 100.0 for depth in depths)]

@@ -34,7 +34,6 @@ UNCLEAR_MM = 150
 FAR_MM = 2900
 # Of a rendered frame, and of a whole sequence of people.
 FRAME_WEIGHT, SEQUENCE_WEIGHT = 2.0, 6.0
-MAP_KIND = "surroundings"
 
 
 def label(frame):
@@ -57,7 +56,7 @@ def importance(seen, people):
 
 
 def gather(seen, people):
-    """Evidence without the map's, places, their weights, labels, importance."""
+    """Evidence, places, their weights, labels, importance."""
     weights = importance(seen, people)
     parts = [(f["evidence_q8"] / 256, f["place"], f["weight_q12"], label(f), numpy.full(len(f["place"]), w))
              for f, w in zip(seen, weights) if len(f["place"])]
@@ -67,22 +66,18 @@ def gather(seen, people):
 
 
 class Score:
-    """The map, then the curves, of which the last is the map's."""
+    """The maps, then curves and trees, of which the last kinds are the maps'."""
 
-    def __init__(self, evidence, place, weight_q12, labels, weights, kinds):
-        self.own = kinds.index(MAP_KIND)
-        others = numpy.delete(evidence, self.own, axis=1)
-        self.map_q9 = ray_map.fit(others, place, weight_q12, labels, weights)
-        known = self.with_map(evidence, place, weight_q12)
+    def __init__(self, evidence, place, weight_q12, labels, weights):
+        self.maps = ray_map.fit(evidence[:, :-ray_map.MAPS], place, weight_q12, labels, weights)
+        known = self.with_maps(evidence, place, weight_q12)
         self.curves = trees.add_trees(model.fit(known, labels, weights), known, labels, weights)
 
-    def with_map(self, evidence, place, weight_q12):
-        evidence = evidence.copy()
-        evidence[:, self.own] = ray_map.logits(self.map_q9, place, weight_q12)
-        return evidence
+    def with_maps(self, evidence, place, weight_q12):
+        return numpy.concatenate([evidence[:, :-ray_map.MAPS], ray_map.answers(self.maps, place, weight_q12)], axis=1)
 
     def logits(self, frame):
-        return self.curves.logits(self.with_map(frame["evidence_q8"] / 256, frame["place"], frame["weight_q12"]))
+        return self.curves.logits(self.with_maps(frame["evidence_q8"] / 256, frame["place"], frame["weight_q12"]))
 
 
 def report(learnt, seen, limit):
@@ -154,11 +149,11 @@ def main():
     kinds = seen[0]["kinds"]
     rows = gather(seen, set(people))
     print("%d frames, %d detections, %d heads" % (len(seen), len(rows[3]), rows[3].sum()))
-    learnt = Score(*rows, kinds)
+    learnt = Score(*rows)
     command = "tools/learn/learn.py --seeds %s --depth-seeds %s --people %s" % (
         arguments.seeds, arguments.depth_seeds, " ".join(os.path.basename(os.path.normpath(folder)) for folder in arguments.people))
     model.write(os.path.join(arguments.out, "ih_score_weights.h"), learnt.curves, kinds, command)
-    ray_map.write(os.path.join(arguments.out, "ih_surroundings_map.h"), learnt.map_q9, command)
+    ray_map.write(os.path.join(arguments.out, "ih_surroundings_map.h"), learnt.maps, command)
     report(learnt, seen, arguments.limit)
     report(learnt, see(directories_of(arguments, arguments.check_seeds, arguments.check_seeds)), arguments.limit)
     if arguments.also:

@@ -6,7 +6,7 @@ import numpy
 
 KNOTS = 7
 # As in ih_score.h.
-QUESTIONS, TREES, BRANCHES, PLACES = 256, 192, 7, 32
+QUESTIONS, TREES, BRANCHES, PLACES = 256, 160, 7, 32
 SIZE_PENALTY = 1.0
 STEP_PENALTY = 3.0
 BEND_PENALTY = 10.0
@@ -112,8 +112,8 @@ def write(path, learnt, kinds, command):
     """The header that ih_score.c includes."""
     rows = []
     for kind, first, step, at in zip(kinds, learnt.first_q8, learnt.step_q8, learnt.at_q10):
-        rows.append("        [IH_EVIDENCE_%s] = {%d, %d, {%s}}," %
-                    (kind.upper(), first, step, listed(at)))
+        place = kind.upper().replace("MAP_", "MAPS + ")
+        rows.append("        [IH_EVIDENCE_%s] = {%d, %d, {%s}}," % (place, first, step, listed(at)))
     questions = ["{%d, %d}" % pair for pair in zip(learnt.kind, learnt.limit)]
     lines = ["        %s," % ", ".join(questions[i:i + 12]) for i in range(0, len(questions), 12)]
     trees = ["        {{%s}, {%s}}," % (listed(question), listed(leaf)) for question, leaf in zip(learnt.question, learnt.leaf_q8)]

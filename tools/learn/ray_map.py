@@ -1,72 +1,127 @@
-"""The map of ih_surroundings: what a ray says at its place around a head, learnt together with the curves."""
+"""The maps of ih_surroundings: what a ray says at its place around a head.
+
+All maps are learnt at once, as a part of the first layer of a small network, which has their answers and the other
+evidence before it. The rest of the network is thrown away: curves and trees are learnt behind the maps."""
 
 import numpy
-import scipy.optimize
 import scipy.sparse
 
-import model
-
-COLUMNS, ROWS, DEPTHS = 6, 13, 10  # as in ih_surroundings.h
+COLUMNS, ROWS, DEPTHS, MAPS = 6, 13, 10, 8  # as in ih_surroundings.h
 PLACES = COLUMNS * ROWS * DEPTHS
-RANGES = DEPTHS - 1  # of depth; the last place is a ray that met nothing, which has no neighbour in depth
-SIZE_PENALTY = 30.0
-CELL_PENALTY, DEPTH_PENALTY = 300.0, 150.0
-STEPS = 200
+BITS, ZERO = 4, 8
+CLIPPED = 0.98  # this fraction of a map's numbers is within its range
+HIDDEN = 32
+EPOCHS, BATCH, RATE = 20, 2048, 3e-3
+DECAY = 0.3  # of weights, by rate and step
+DROPPED = 0.2  # fraction of what is asked that a step does not see, so that no place decides alone
+MEAN, SQUARE = 0.9, 0.999  # memories of the steps (Adam)
+QUANTILES = 65  # evidence is given to the network by its rank
+SEED = 10
+
+
+def counts_of(place):
+    """A row for each detection: how many of its rays ask at each place of a map."""
+    row, slot = numpy.nonzero(place >= 0)
+    ones = numpy.ones(len(row), dtype=numpy.int32)
+    return scipy.sparse.coo_matrix((ones, (row, place[row, slot])), shape=(len(place), PLACES)).tocsr()
 
 
 def needed_of(place, weight_q12):
-    """A row for each detection: how much its rays ask at each place of the map."""
-    row, slot = numpy.nonzero(place >= 0)
-    return scipy.sparse.coo_matrix((weight_q12[row] / 4096, (row, place[row, slot])),
-                                   shape=(len(place), PLACES)).tocsr()
+    """The same times the weight of each."""
+    return (scipy.sparse.diags(weight_q12 / 4096) @ counts_of(place)).astype(numpy.float32)
 
 
-def penalty():
-    index = numpy.arange(PLACES).reshape(ROWS, COLUMNS, DEPTHS)
-    whole = SIZE_PENALTY * scipy.sparse.identity(PLACES, format="csr")
-    for low, high, weight in ((index[1:], index[:-1], CELL_PENALTY), (index[:, 1:], index[:, :-1], CELL_PENALTY),
-                              (index[:, :, 1:RANGES], index[:, :, :RANGES - 1], DEPTH_PENALTY)):
-        rows = numpy.arange(low.size)
-        step = scipy.sparse.coo_matrix(
-            (numpy.repeat([1.0, -1.0], low.size), (numpy.tile(rows, 2), numpy.append(low.ravel(), high.ravel()))),
-            shape=(low.size, PLACES)).tocsr()
-        whole = whole + weight * (step.T @ step)
-    return whole
+def ranks(evidence):
+    """Of each kind, from -1.5 to 1.5."""
+    columns = []
+    for values in evidence.T:
+        limits = numpy.unique(numpy.quantile(values, numpy.linspace(0, 1, QUANTILES)))
+        columns.append(numpy.interp(values, limits, numpy.linspace(-1.5, 1.5, len(limits))))
+    return numpy.stack(columns, axis=1).astype(numpy.float32)
+
+
+class Network:
+    """Maps, two layers behind them, and the steps of Adam."""
+
+    def __init__(self, kinds, random):
+        def drawn(size, *shape):
+            return (size * random.standard_normal(shape)).astype(numpy.float32)
+
+        self.kinds = kinds
+        self.weights = {"maps": drawn(0.05, PLACES, MAPS), "first": drawn(0.2, kinds + MAPS, HIDDEN),
+                        "second": drawn(0.2, HIDDEN, HIDDEN), "last": drawn(0.1, HIDDEN),
+                        "first_bias": drawn(0, HIDDEN), "second_bias": drawn(0, HIDDEN), "last_bias": drawn(0, 1)}
+        self.mean = {name: numpy.zeros_like(value) for name, value in self.weights.items()}
+        self.square = {name: numpy.zeros_like(value) for name, value in self.weights.items()}
+        self.steps = 0
+
+    def slopes(self, needed, ranked, labels, importance):
+        """Of the weighted cross entropy."""
+        own = self.weights
+        seen = numpy.concatenate([ranked, needed @ own["maps"]], axis=1)
+        first = numpy.maximum(seen @ own["first"] + own["first_bias"], 0)
+        second = numpy.maximum(first @ own["second"] + own["second_bias"], 0)
+        logits = numpy.clip(second @ own["last"] + own["last_bias"], -60, 60)
+        by_logit = (importance * (1 / (1 + numpy.exp(-logits)) - labels) / len(labels)).astype(numpy.float32)
+        by_second = numpy.outer(by_logit, own["last"]) * (second > 0)
+        by_first = (by_second @ own["second"].T) * (first > 0)
+        return {"maps": needed.T @ (by_first @ own["first"][self.kinds:].T),
+                "first": seen.T @ by_first, "first_bias": by_first.sum(axis=0),
+                "second": first.T @ by_second, "second_bias": by_second.sum(axis=0),
+                "last": second.T @ by_logit, "last_bias": by_logit.sum(keepdims=True)}
+
+    def step(self, slopes, rate):
+        self.steps += 1
+        for name, slope in slopes.items():
+            self.mean[name] += (1 - MEAN) * (slope - self.mean[name])
+            self.square[name] += (1 - SQUARE) * (slope * slope - self.square[name])
+            size = numpy.sqrt(self.square[name] / (1 - SQUARE ** self.steps)) + 1e-8
+            decay = DECAY * self.weights[name] if self.weights[name].ndim == 2 else 0
+            self.weights[name] -= rate * (self.mean[name] / (1 - MEAN ** self.steps) / size + decay)
 
 
 def fit(evidence, place, weight_q12, labels, importance):
-    """The map, PLACES numbers of 8 bits in Q9: with curves beside it, so that neither says what the other has said."""
-    first_q8, step_q8 = model.make_knots(evidence)
-    design, curves = model.hats(evidence, first_q8, step_q8), model.penalty(evidence.shape[1])
-    rays, smooth = needed_of(place, weight_q12), penalty()
-
-    def loss(weights):
-        own, others = weights[:PLACES], weights[PLACES:]
-        logits = rays @ own + design @ others
-        stiff, bent = smooth @ own, curves @ others
-        slope = importance * (1 / (1 + numpy.exp(-logits)) - labels)
-        value = (importance * (numpy.logaddexp(0, logits) - labels * logits)).sum() + (own @ stiff + others @ bent) / 2
-        return value, numpy.append(rays.T @ slope + stiff, design.T @ slope + bent)
-
-    start = numpy.zeros(PLACES + design.shape[1])
-    found = scipy.optimize.minimize(loss, start, jac=True, method="L-BFGS-B", options={"maxiter": STEPS})
-    return numpy.clip(numpy.round(512 * found.x[:PLACES]), -128, 127).astype(int)
-
-
-def logits(map_q9, place, weight_q12):
-    """What ih_surroundings_logit_q8 gives, in log-odds."""
-    sums_q9 = numpy.where(place >= 0, map_q9[place], 0).sum(axis=1)
-    return ((sums_q9 * weight_q12 + (1 << 12)) >> 13) / 256
+    """The maps, PLACES times MAPS numbers of BITS bits; evidence: all that is beside them."""
+    random = numpy.random.default_rng(SEED)
+    needed, ranked, importance = needed_of(place, weight_q12), ranks(evidence), importance / importance.mean()
+    network = Network(evidence.shape[1], random)
+    batches = len(labels) // BATCH
+    for epoch in range(EPOCHS):
+        order = random.permutation(len(labels))
+        for i in range(batches):
+            rows = order[i * BATCH:(i + 1) * BATCH]
+            part = needed[rows]
+            part.data = part.data * (random.random(len(part.data)) >= DROPPED).astype(numpy.float32) / (1 - DROPPED)
+            done = (epoch + i / batches) / EPOCHS
+            network.step(network.slopes(part, ranked[rows], labels[rows], importance[rows]),
+                         RATE * (1 + numpy.cos(numpy.pi * done)) / 2)
+    maps = network.weights["maps"]
+    step = numpy.quantile(numpy.abs(maps), CLIPPED, axis=0) / (ZERO - 1)
+    return numpy.clip(numpy.round(maps / step), -ZERO, ZERO - 1).astype(int)
 
 
-def write(path, map_q9, command):
+def answers(maps, place, weight_q12):
+    """What ih_surroundings_ask_maps gives: a column for each map."""
+    return ((counts_of(place) @ maps * weight_q12[:, None] + (1 << 3)) >> 4) / 256
+
+
+def packed(maps):
+    """A word for each place, the first map's number lowest."""
+    return ((maps + ZERO) << BITS * numpy.arange(MAPS)).sum(axis=1)
+
+
+def unpacked(words):
+    return (numpy.array(words)[:, None] >> BITS * numpy.arange(MAPS) & (1 << BITS) - 1) - ZERO
+
+
+def write(path, maps, command):
     """The header that ih_surroundings.c includes: a line for a cell, its ranges of depth from near to far, then nothing."""
     lines = []
-    for row, cells in enumerate(map_q9.reshape(ROWS, COLUMNS, DEPTHS)):
+    for row, cells in enumerate(packed(maps).reshape(ROWS, COLUMNS, DEPTHS)):
         lines.append("    /* row %d */" % row)
-        lines += ["    %s," % ", ".join(str(value) for value in cell) for cell in cells]
+        lines += ["    %s," % ", ".join("0x%08x" % word for word in cell) for cell in cells]
     with open(path, "w", encoding="utf-8") as file:
-        file.write("""/* ih_surroundings_map - the map of ih_surroundings, written by
+        file.write("""/* ih_surroundings_map - the maps of ih_surroundings, written by
  *     %s
  * Do not edit. A line is a cell: its nine ranges of depth, the nearest first, then an empty ray. */
 #ifndef IH_SURROUNDINGS_MAP_H
@@ -77,7 +132,7 @@ def write(path, map_q9, command):
 #include "detect/ih_surroundings.h"
 
 /* clang-format off */
-static const int8_t surroundings_map_q9[IH_SURROUNDINGS_PLACES] = {
+static const uint32_t surroundings_maps[IH_SURROUNDINGS_PLACES] = {
 %s
 };
 /* clang-format on */

@@ -13,8 +13,7 @@ MEAN_SEMI = np.array([78.0, 113, 98])
 CENTRE = np.array([10.0, -100, 800])
 ORIGIN = np.array([60.0, -20, 15])
 PITCH = 0.05
-KINDS = ("on rough bulge tall moved above beside below high nothing body body_rays body_depth wide "
-         "level shoulder before extent upright bend_down bend_across").split()
+KINDS = "on rough bulge tall moved bend_down bend_across".split()
 
 
 def lattice():
@@ -104,14 +103,6 @@ def points_of(depth_q8, slope_q20):
     return np.column_stack([origin_q8[:2] + aside, depth_q8])
 
 
-def fraction(part, everything):
-    return (part.sum() + 0.5) / (everything.sum() + 1)
-
-
-def plain(part, everything, smallest):
-    return part.sum() / max(everything.sum(), smallest)
-
-
 class Scene:
     """What a ray is, against one ellipsoid."""
 
@@ -120,7 +111,6 @@ class Scene:
         slope = from_q(slope_q20, 20)
         self.point = from_q(points_of(depth_q8, slope_q20), 8)
         self.seen, self.empty = state == SEEN, state == EMPTY
-        self.telling = self.seen | self.empty
         self.aside = ORIGIN[:2] + (centre[2] - ORIGIN[2]) * slope - centre[:2]
         self.e = self.aside / semi[:2]
         g = slope * semi[2] / semi[:2]
@@ -141,9 +131,6 @@ class Scene:
             self.margin = np.minimum(self.margin, np.abs(value - limit) / step)
         return value > limit
 
-    def between(self, value, low, high):
-        return self.above(value, low, 0.05) & ~self.above(value, high, 0.05)
-
 
 def bend(height, face, axis):
     """How uneven a surface is along an axis of the pattern, with one more bend of 12 mm."""
@@ -152,12 +139,12 @@ def bend(height, face, axis):
     return (bends.sum() + 12) / (len(bends) + 1)
 
 
-def look(s, start, nest):
+def look(s, start):
     """All numbers by name, and the three counts for the tracks."""
     ex, ey = s.e.T
     out = {}
     reach = ~s.above(np.abs(ex), 8, 1e-3) & ~s.above(np.abs(ey), 8, 1e-3)
-    telling, seen = s.telling & reach, s.seen & reach
+    seen = s.seen & reach
     inside = reach & ~s.above(s.radius2, 0.9, 2e-3)
     behind = s.point[:, 2] - s.entry
     on = inside & seen & ~s.above(np.abs(s.distance), 20, 0.05)
@@ -174,40 +161,6 @@ def look(s, start, nest):
     out["bulge"] = bulge - out["rough"]
     out["tall"] = 100 * (s.semi[1] - MEAN_SEMI[1]) / MEAN_SEMI[1]
     out["moved"] = np.linalg.norm(s.centre - start)
-    is_open = telling & s.above(s.dz, 60, 0.02)
-    body = seen & s.above(s.dz, -220, 0.02) & ~s.above(s.dz, 200, 0.02)
-    high = telling & ~s.above(ey, -1.9, 1e-3) & ~s.above(np.abs(ex), 1.6, 1e-3)
-    out["high"] = fraction(is_open & high, high)
-    d2 = ex**2 + ey**2
-    ring = telling & s.above(d2, 1.25**2, 4e-3) & ~s.above(d2, 1.9**2, 4e-3)
-    low = ring & s.above(ey - 0.9 * np.abs(ex), 0, 1e-3)
-    ring &= ~low
-    top = ring & ~s.above(ey + 0.8 * np.abs(ex), 0, 1e-3)
-    left = ring & ~top & ~s.above(ex, 0, 1e-3)
-    right = ring & ~top & ~left
-    out["below"] = fraction(is_open & low, low)
-    out["nothing"] = plain(s.empty & ring, ring, 1)
-    out["above"] = fraction(is_open & top, top)
-    out["beside"] = min(fraction(is_open & left, left), fraction(is_open & right, right))
-    x, y = s.aside.T
-    chin = y - s.semi[1]
-    here = telling & s.between(chin, 40, 260) & ~s.above(np.abs(x), 180, 0.05)
-    out["body"] = plain(body & here, here, 3)
-    out["body_rays"] = min(here.sum(), 30)
-    out["body_depth"] = s.dz[body & here].mean() if (body & here).any() else 0
-    here = telling & s.between(chin, 40, 240) & s.above(np.abs(x), 300, 0.05)
-    out["wide"] = plain(body & here, here, 3)
-    here = telling & ~s.above(np.abs(y), s.semi[1], 0.05) & s.between(np.abs(x), 170, 330)
-    out["level"] = plain(here & seen & ~s.above(np.abs(s.dz), 150, 0.02), here, 3)
-    here = (telling & s.above(y, 0.9 * s.semi[1], 0.05) & ~s.above(chin, 160, 0.05)
-            & s.between(np.abs(x), 100, 260))
-    side = s.above(x, 0, 0.05)
-    out["shoulder"] = min(plain(body & here & side, here & side, 2),
-                          plain(body & here & ~side, here & ~side, 2))
-    out["before"] = (seen & ~s.above(d2, 2.5**2, 8e-3)
-                     & ~s.above(s.dz, -s.semi[2] - 60, 0.02)).sum()
-    out["extent"] = nest[0] if nest else 0
-    out["upright"] = nest[1] if nest else 1
     face = seen & ~s.above(s.dz, 0, 0.02) & ~s.above(s.radius**2, 1.4**2, 2e-3)
     height = (s.radius**2 - 1) / 2 * s.semi[2]
     out["bend_down"], out["bend_across"] = (bend(height, face, axis) for axis in (0, 1))
@@ -228,21 +181,18 @@ def write_vectors(directory):
         semi = MEAN_SEMI * ([1, 0.8, 1] if name == "small" else 1)
         centre_q8, semi_q8 = to_q(CENTRE, 8), to_q(semi, 8)
         start_q8 = centre_q8 + (to_q([30, -40, 0], 8) if name == "moved" else 0)
-        nest_q = (123 << 8, int(1.7 * 65536)) if name == "moved" else None
-        nest = (123, nest_q[1] / 65536) if nest_q else None
         first = Scene(slope_q20, depth_q8, state, from_q(centre_q8, 8), from_q(semi_q8, 8))
-        look(first, CENTRE, None)
+        look(first, CENTRE)
         state = np.where(first.margin < 1, UNKNOWN, state)
         depth_q8 = np.where(state == SEEN, depth_q8, 0)
         found, counts = look(Scene(slope_q20, depth_q8, state, from_q(centre_q8, 8),
-                                   from_q(semi_q8, 8)), from_q(start_q8, 8), nest)
+                                   from_q(semi_q8, 8)), from_q(start_q8, 8))
         assert list(sorted(found)) == sorted(KINDS)
         inc.raw("\nstatic const struct vector_ray vector_%s_rays[] = {\n%s};\n" % (
             name, emit.wrap(["{%d, %d}" % r for r in zip(depth_q8, state)])))
         rows.append('"%s", vector_%s_rays, {{%d, %d, %d}, {%d, %d, %d}}, {%d, %d, %d}, '
-                    '{%s, %d, %d}, {%s}, %d, %d, %d' % (
+                    '{%s}, %d, %d, %d' % (
                         name, name, *centre_q8, *semi_q8, *start_q8,
-                        "true" if nest else "false", *(nest_q or (0, 0)),
                         ", ".join(emit.numbers([found[k] for k in KINDS], 5)), *counts))
     inc.struct_array("vector_scene", "vector_scenes", rows)
     return inc.write(directory, "evidence.inc")

@@ -65,6 +65,11 @@ def write_vectors(directory):
     return inc.write(directory, "score.inc")
 
 
+def kind_of(name):
+    """Of a name in the header: MAPS + 3 is map_3."""
+    return name.lower().replace("maps + ", "map_")
+
+
 def read_header(path):
     """Kinds, curves and the command that made them."""
     with open(path, encoding="utf-8") as file:
@@ -73,27 +78,28 @@ def read_header(path):
     question, leaf = ([[int(value) for value in part.split(",")] for part in column] for column in zip(*trees))
     listed = re.search(r"\.question = \{(.*?)\n    \}", text, re.S)[1]
     kind, limit = zip(*((int(kind), int(limit)) for kind, limit in re.findall(r"\{(\d+), (\d+)\}", listed)))
-    rows = re.findall(r"\[IH_EVIDENCE_(\w+)\] = \{(-?\d+), (\d+), \{([-\d, ]+)\}\},", text)
+    rows = re.findall(r"\[IH_EVIDENCE_(\w+(?: \+ \d+)?)\] = \{(-?\d+), (\d+), \{([-\d, ]+)\}\},", text)
     at = np.array([[int(value) for value in row[3].split(",")] for row in rows])
     curves = model.Curves(np.array([int(row[1]) for row in rows]),
                           np.array([int(row[2]) for row in rows]), at,
                           int(re.search(r"bias_q10 = (-?\d+),", text)[1]), kind, limit, question, leaf)
-    return [row[0].lower() for row in rows], curves, re.search(r"written by\n \* +(.*)", text)[1]
+    return [kind_of(row[0]) for row in rows], curves, re.search(r"written by\n \* +(.*)", text)[1]
 
 
 def kinds_of_firmware():
     with open(os.path.join(ROOT, "firmware/core/detect/ih_evidence.h"), encoding="utf-8") as file:
         body = re.search(r"enum ih_evidence_kind \{(.*?)\}", file.read(), re.S)[1]
-    return [k.lower() for k in re.findall(r"IH_EVIDENCE_(\w+),", body)]
+    own = [k.lower() for k in re.findall(r"IH_EVIDENCE_(\w+),", body) if k != "MAPS"]
+    return own + ["map_%d" % i for i in range(ray_map.MAPS)]
 
 
 def read_map(path):
-    """The map and the command that made it."""
+    """The maps and the command that made them."""
     with open(path, encoding="utf-8") as file:
         text = file.read()
     body = re.sub(r"/\*.*?\*/", "", text.split("= {")[1].split("};")[0])
-    numbers = np.array([int(value) for value in re.findall(r"-?\d+", body)])
-    return numbers, re.search(r"written by\n \* +(.*)", text)[1]
+    words = [int(word, 16) for word in re.findall(r"0x[0-9a-f]+", body)]
+    return ray_map.unpacked(words), re.search(r"written by\n \* +(.*)", text)[1]
 
 
 def is_written_by(write, path):
@@ -110,9 +116,9 @@ def is_written_by(write, path):
 def check(folder):
     path, map_path = (os.path.join(folder, name) for name in ("ih_score_weights.h", "ih_surroundings_map.h"))
     kinds, curves, command = read_header(path)
-    numbers, map_command = read_map(map_path)
+    maps, map_command = read_map(map_path)
     same = (is_written_by(lambda again: model.write(again, curves, kinds, command), path)
-            and is_written_by(lambda again: ray_map.write(again, numbers, map_command), map_path))
+            and is_written_by(lambda again: ray_map.write(again, maps, map_command), map_path))
     if command != map_command:
         print("%s: learnt at another time than %s" % (path, map_path))
         same = False

@@ -1,4 +1,4 @@
-"""Float64 reference of the map of the surroundings, over the scenes of evidence.py and patterns of other pitch.
+"""Float64 reference of the maps of the surroundings, over the scenes of evidence.py and patterns of other pitch.
 
 Rays whose place is a matter of rounding are made unknown ones.
 """
@@ -9,7 +9,7 @@ import emit
 import evidence
 from rig import GRID, from_q, to_q
 
-COLUMNS, ROWS, DEPTHS = 6, 13, 10
+COLUMNS, ROWS, DEPTHS, MAPS = 6, 13, 10, 8
 CELL_MM, TOP_MM = 64.0, 384.0
 LIMITS_MM = np.array([-256, -176, -96, -40, 40, 128, 200, 304])
 EMPTY_PLACE, NONE = DEPTHS - 1, -1
@@ -45,10 +45,11 @@ def places(slope_q20, depth_q8, state, centre):
 
 def write_vectors(directory):
     random = np.random.default_rng(83)
-    learnt = random.integers(-128, 128, COLUMNS * ROWS * DEPTHS)
-    inc = emit.Inc("Scenes of simple bodies, where their rays are on a map, and what a map of random numbers says.")
+    maps = random.integers(-8, 8, (COLUMNS * ROWS * DEPTHS, MAPS))
+    inc = emit.Inc("Scenes of simple bodies, where their rays are on the maps, and what maps of random numbers say.")
     inc.raw("\nstatic const int32_t vector_origin_mm_q8[] = {%d, %d, %d};\n" % tuple(to_q(evidence.ORIGIN, 8)))
-    inc.array("int8_t", "vector_map_q9", learnt)
+    words = [sum((int(value) + 8) << 4 * map for map, value in enumerate(row)) for row in maps]
+    inc.raw("\nstatic const uint32_t vector_maps[] = {\n%s};\n" % emit.wrap(["0x%08x" % word for word in words]))
     rows = []
     for name, widen, move in CASES:
         slope_q20 = np.rint(evidence.lattice() * widen).astype(np.int64)
@@ -60,10 +61,10 @@ def write_vectors(directory):
         place, _ = places(slope_q20, depth_q8, state, from_q(centre_q8, 8))
         spacing = spacing_mm(from_q(slope_q20, 20), from_q(centre_q8[2], 8) - evidence.ORIGIN[2])
         weight = min(1.0, spacing / CELL_MM)**2
-        logit = weight * learnt[place[place != NONE]].sum() / 512
+        answer = weight * maps[place[place != NONE]].sum(axis=0)
         inc.raw("\nstatic const struct vector_ray vector_%s_rays[] = {\n%s};\n" % (
             name, emit.wrap(["{%d, %d, %d, %d, %d}" % r for r in zip(*slope_q20.T, depth_q8, state, place)])))
-        rows.append('"%s", vector_%s_rays, {%d, %d, %d}, %s, %s' % (
-            name, name, *centre_q8, emit.number(weight, 7), emit.number(logit, 5)))
+        rows.append('"%s", vector_%s_rays, {%d, %d, %d}, %s, {%s}' % (
+            name, name, *centre_q8, emit.number(weight, 7), ", ".join(emit.numbers(answer, 5))))
     inc.struct_array("vector_scene", "vector_scenes", rows)
     return inc.write(directory, "surroundings.inc")

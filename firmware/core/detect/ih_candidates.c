@@ -12,24 +12,6 @@ static int64_t square_q16(int32_t distance_mm)
     return (int64_t)distance_mm * distance_mm * 65536;
 }
 
-struct ih_evidence_nest ih_candidates_nest_at(const struct ih_hypotheses *hypotheses,
-                                              const int32_t centre_mm_q8[3], int32_t near_mm)
-{
-    struct ih_evidence_nest nest = {.present = false};
-    int64_t best = square_q16(near_mm);
-    for (int32_t i = 0; i < hypotheses->hypothesis_count; i++) {
-        const struct ih_hypothesis *h = &hypotheses->hypothesis[i];
-        int64_t distance2 = ih_distance2_s32(h->centre_mm_q8, centre_mm_q8);
-        if (distance2 < best) {
-            best = distance2;
-            nest.present = true;
-            nest.extent_mm_q8 = h->extent_mm_q8;
-            nest.upright_q16 = h->upright_q16;
-        }
-    }
-    return nest;
-}
-
 bool ih_candidates_add_start(struct ih_detections_starts *starts, const int32_t centre_mm_q8[3],
                              int32_t apart_mm)
 {

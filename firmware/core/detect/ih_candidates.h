@@ -1,7 +1,7 @@
-/* ih_candidates - distances among the candidates of ih_detections: of starts, nests and detections (ours).
+/* ih_candidates - distances among the candidates of ih_detections: of starts and detections (ours).
  *
  * In:     centres in the camera frame.
- * Out:    starts that are new, the nest of a candidate, detections in their order, and which of them is the
+ * Out:    starts that are new, detections in their order, and which of them is the
  *         body to another one's head.
  * Overflow: centres are below 2^27 in Q8, their differences below 2^28.
  */
@@ -13,18 +13,12 @@
 
 #include "base/ih_config.h"
 #include "detect/ih_detections.h"
-#include "detect/ih_evidence.h"
-#include "nests/ih_hypotheses.h"
 
 IH_BEGIN_DECLS
 
 /* Remember a start and give true, if none before it is as near as apart_mm. */
 bool ih_candidates_add_start(struct ih_detections_starts *starts, const int32_t centre_mm_q8[3],
                              int32_t apart_mm);
-
-/* The nest whose centre is nearest, if it is within near_mm. */
-struct ih_evidence_nest ih_candidates_nest_at(const struct ih_hypotheses *hypotheses,
-                                              const int32_t centre_mm_q8[3], int32_t near_mm);
 
 /* Insert, the more probable first; one nearer than spacing_mm to a more probable one is the same thing. */
 void ih_candidates_insert(struct ih_detections *out, const struct ih_detection *detection,

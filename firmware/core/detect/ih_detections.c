@@ -20,7 +20,6 @@ void ih_detections_params_default(struct ih_detections_params *params)
     params->apart_mm = 20;
     params->hopeless_logit_q10 = -5632;
     params->spacing_mm = 80;
-    params->nest_near_mm = 90;
     params->nest_max = IH_NESTS_MAX;
     params->expected_max = IH_DETECTIONS_EXPECTED_MAX;
     params->front_min_mm = 150;
@@ -92,7 +91,6 @@ void ih_detections_outline(const struct ih_rig *rig, struct ih_detection *detect
 
 struct context {
     const struct ih_rays *rays;
-    const struct ih_hypotheses *hypotheses;
     const struct ih_rig *rig;
     const struct ih_detections_params *params;
     struct ih_detections_scratch *scratch;
@@ -105,10 +103,7 @@ static void score_fit(const struct context *context, const struct ih_fit *fit,
 {
     struct ih_score score;
     detection->head = fit->ellipsoid;
-    struct ih_evidence_nest nest = ih_candidates_nest_at(
-        context->hypotheses, detection->head.centre_mm_q8, context->params->nest_near_mm);
-    ih_evidence_collect(context->rays, &detection->head, fit->start_mm_q8, &nest,
-                        &detection->evidence);
+    ih_evidence_collect(context->rays, &detection->head, fit->start_mm_q8, &detection->evidence);
     ih_score_rate(&detection->evidence, &score);
     detection->logit_q10 = score.logit_q10;
 }
@@ -158,9 +153,8 @@ static void try_centre(const struct context *context, const int32_t centre_mm_q8
 static void view_expected(const struct context *context, const struct ih_ellipsoid *head,
                           struct ih_view *view)
 {
-    const struct ih_evidence_nest no_nest = {.present = false};
     struct ih_evidence evidence;
-    ih_evidence_collect(context->rays, head, head->centre_mm_q8, &no_nest, &evidence);
+    ih_evidence_collect(context->rays, head, head->centre_mm_q8, &evidence);
     view->through += evidence.through_count;
     view->hit += evidence.hit_count;
     view->front += evidence.front_count;
@@ -171,7 +165,7 @@ void ih_detections_add(const struct ih_points *points, const struct ih_dots *dot
                        const struct ih_rig *rig, const struct ih_detections_params *params,
                        struct ih_detections_scratch *scratch, struct ih_detections *out)
 {
-    const struct context context = {&scratch->rays, hypotheses, rig, params, scratch, out};
+    const struct context context = {&scratch->rays, rig, params, scratch, out};
     if (points->seen_count == 0) {
         return;
     }

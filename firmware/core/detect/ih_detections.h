@@ -53,7 +53,6 @@ struct ih_detections_params {
     int32_t apart_mm;           /* a start nearer than this to one before is not tried */
     int32_t hopeless_logit_q10; /* minimum after the first step */
     int32_t spacing_mm;         /* of two detections */
-    int32_t nest_near_mm;       /* a nest this near belongs to the candidate */
     int32_t nest_max;           /* of them this many are candidates themselves */
     int32_t expected_max;       /* of the expected heads this many are */
     int32_t front_min_mm;       /* no head is nearer than this: the lens is there */

@@ -6,7 +6,6 @@
 #include "base/ih_fix.h"
 #include "base/ih_range.h"
 #include "detect/ih_head_model.h"
-#include "detect/ih_ray_counts.h"
 #include "detect/ih_surroundings.h"
 
 #define ONE_Q28 ((int64_t)1 << 28)
@@ -14,13 +13,6 @@
 #define ON_MM_Q8 (20 << 8)
 #define THROUGH_MM_Q8 (50 << 8)
 #define FRONT_MM_Q8 (30 << 8)
-#define RING_INNER2_Q28 IH_HEAD_SQUARE(IH_HEAD_RING_INNER_PERCENT, 28)
-/* 1.9 squared is 969051996; the results so far, and their tests, have this limit, 1e-5 of it lower. */
-#define RING_OUTER2_Q28 969042657LL
-#define AROUND2_Q28 IH_HEAD_SQUARE(IH_HEAD_AROUND_PERCENT, 28)
-#define HIGH_FROM_Q14 ((int32_t)IH_HEAD_PART(IH_HEAD_HIGH_FROM_PERCENT, 14))
-#define HIGH_WIDE_Q14 ((int32_t)IH_HEAD_PART(IH_HEAD_HIGH_ASIDE_PERCENT, 14))
-#define BODY_RAYS_MAX 30
 #define PLANE_POINTS_MIN 6
 /* Hair, nose and chin lie outside of the ellipsoid. */
 #define FACE2_Q28 IH_HEAD_SQUARE(140, 28)
@@ -38,23 +30,9 @@ struct candidate {
     struct ih_ellipsoid_box box; /* rays through it pass here */
 };
 
-/* One ray against the candidate; its state is known. */
-struct view {
-    const struct ih_ray *ray;
-    bool may_hit;
-    int32_t at_q14[2];        /* offset at the centre's depth, in semi-axes */
-    int32_t x_mm_q8, y_mm_q8; /* and in mm */
-    int32_t below_chin_mm_q8; /* y minus the semi-axis up */
-    int32_t dz_mm_q8;         /* of its point, against the centre */
-    int64_t distance2_q28;    /* of the offset, in semi-axes */
-    bool is_seen, is_open, is_body;
-};
-
 struct sums {
-    struct ih_ray_counts around;
     int32_t on, through, hit, front;
     int64_t on_square_q16; /* sum of squared distances, mm^2 */
-    int64_t body_dz_q8;
     /* For the plane through the points on the ellipsoid: sums of x, y, z and of their products,
      * mm in Q4 from the centre. */
     int64_t sum_q4[3], product_q8[3][3];
@@ -63,65 +41,35 @@ struct sums {
 const char *ih_evidence_text(enum ih_evidence_kind kind)
 {
     static const char *const text[IH_EVIDENCE_COUNT] = {
-        "on",         "rough",     "bulge",       "tall",         "moved",    "above",
-        "beside",     "below",     "high",        "nothing",      "body",     "body_rays",
-        "body_depth", "wide",      "level",       "shoulder",     "before",   "extent",
-        "upright",    "bend_down", "bend_across", "surroundings", "distance",
+        "on",    "rough", "bulge", "tall",  "moved", "bend_down", "bend_across", "distance",
+        "map_0", "map_1", "map_2", "map_3", "map_4", "map_5",     "map_6",       "map_7",
     };
     return (uint32_t)kind < IH_EVIDENCE_COUNT ? text[kind] : NULL;
 }
 
-/* False: farther away than IH_ELLIPSOID_REACH semi-axes. */
-static bool make_view(const struct candidate *candidate, const struct ih_ray *ray,
-                      struct view *view)
+/* Does a ray pass near enough to go through the head? */
+static bool may_hit(const struct candidate *candidate, const struct ih_ray *ray)
 {
-    const struct ih_ellipsoid *ellipsoid = candidate->ellipsoid;
     const int32_t slope_q20[2] = {ray->slope_x_q20, ray->slope_y_q20};
-    view->ray = ray;
-    view->may_hit = true;
     for (int axis = 0; axis < 2; axis++) {
         const int64_t off_q8 = candidate->origin_mm_q8[axis] +
                                ih_mul_shift(candidate->depth_mm_q8, slope_q20[axis], 20) -
-                               ellipsoid->centre_mm_q8[axis];
-        if (ih_abs_s64(off_q8) > IH_FRACTION_MAX) {
+                               candidate->ellipsoid->centre_mm_q8[axis];
+        if (ih_abs_s64(off_q8) > candidate->box.half_mm_q8[axis]) {
             return false;
         }
-        const int32_t at_q14 = ih_fraction(candidate->fractions.inverse_q50[axis], (int32_t)off_q8);
-        if (ih_abs_s32(at_q14) > IH_ELLIPSOID_REACH << 14) {
-            return false;
-        }
-        view->at_q14[axis] = at_q14;
-        view->may_hit = view->may_hit && ih_abs_s64(off_q8) <= candidate->box.half_mm_q8[axis];
     }
-    const int32_t *at_q14 = view->at_q14;
-    view->x_mm_q8 = (int32_t)ih_mul_shift(at_q14[0], ellipsoid->semi_mm_q8[0], 14);
-    view->y_mm_q8 = (int32_t)ih_mul_shift(at_q14[1], ellipsoid->semi_mm_q8[1], 14);
-    view->below_chin_mm_q8 = view->y_mm_q8 - ellipsoid->semi_mm_q8[1];
-    view->distance2_q28 = (int64_t)at_q14[0] * at_q14[0] + (int64_t)at_q14[1] * at_q14[1];
-    view->is_seen = view->ray->state == IH_RAY_SEEN;
-    view->dz_mm_q8 =
-        view->is_seen ? view->ray->point_mm_q8[2] - ellipsoid->centre_mm_q8[2] : INT32_MAX;
-    view->is_open = view->dz_mm_q8 > (IH_HEAD_OPEN_MM << 8);
-    view->is_body = view->is_seen && view->dz_mm_q8 > -(IH_HEAD_BODY_BEFORE_MM << 8) &&
-                    view->dz_mm_q8 < IH_HEAD_BODY_BEHIND_MM << 8;
     return true;
 }
 
-static void add_ray(struct ih_ray_count *count, bool is_part)
-{
-    count->all++;
-    count->part += is_part;
-}
-
-static void add_on(const struct view *view, const struct ih_ellipsoid *ellipsoid, int32_t off_q8,
+static void add_on(const struct ih_ray *ray, const struct ih_ellipsoid *ellipsoid, int32_t off_q8,
                    struct sums *sums)
 {
     int64_t at_q4[3];
     sums->on++;
     sums->on_square_q16 += (int64_t)off_q8 * off_q8;
     for (int axis = 0; axis < 3; axis++) {
-        at_q4[axis] =
-            ih_shift_round(view->ray->point_mm_q8[axis] - ellipsoid->centre_mm_q8[axis], 4);
+        at_q4[axis] = ih_shift_round(ray->point_mm_q8[axis] - ellipsoid->centre_mm_q8[axis], 4);
         sums->sum_q4[axis] += at_q4[axis];
         IH_IN_RANGE(at_q4[axis], -IH_RANGE_ON_MM_Q4, IH_RANGE_ON_MM_Q4);
         for (int other = 0; other <= axis; other++) {
@@ -130,107 +78,31 @@ static void add_on(const struct view *view, const struct ih_ellipsoid *ellipsoid
     }
 }
 
-/* Rays through the head. */
-static void add_inside(const struct candidate *candidate, const struct view *view,
-                       struct sums *sums)
+/* A ray of known state that may go through the head. */
+static void add_ray(const struct candidate *candidate, const struct ih_ray *ray, struct sums *sums)
 {
     const struct ih_ellipsoid *ellipsoid = candidate->ellipsoid;
     struct ih_crossing crossing;
     int32_t position_q14[3], off_q8;
-    if (!view->may_hit) {
-        return;
-    }
-    const struct ih_aim aim =
-        ih_ellipsoid_aim(ellipsoid->semi_mm_q8, &candidate->fractions, view->ray);
-    if (!ih_ellipsoid_cross(ellipsoid, &candidate->fractions, candidate->origin_mm_q8, view->ray,
-                            &aim, &crossing) ||
+    const struct ih_aim aim = ih_ellipsoid_aim(ellipsoid->semi_mm_q8, &candidate->fractions, ray);
+    if (!ih_ellipsoid_cross(ellipsoid, &candidate->fractions, candidate->origin_mm_q8, ray, &aim,
+                            &crossing) ||
         crossing.radius2_q14 >= INSIDE_Q14) {
         return;
     }
-    if (!view->is_seen) {
-        sums->through += view->ray->state == IH_RAY_EMPTY;
+    if (ray->state == IH_RAY_EMPTY) {
+        sums->through++;
         return;
     }
-    int32_t behind_q8 = view->ray->point_mm_q8[2] - crossing.entry_mm_q8;
+    int32_t behind_q8 = ray->point_mm_q8[2] - crossing.entry_mm_q8;
     sums->through += behind_q8 > THROUGH_MM_Q8;
     sums->front += behind_q8 < -FRONT_MM_Q8;
-    if (ih_ellipsoid_position(ellipsoid, &candidate->fractions, view->ray->point_mm_q8,
-                              position_q14) &&
+    if (ih_ellipsoid_position(ellipsoid, &candidate->fractions, ray->point_mm_q8, position_q14) &&
         ih_ellipsoid_distance(&candidate->fractions, position_q14, &off_q8) &&
         ih_abs_s32(off_q8) < ON_MM_Q8) {
         sums->hit++;
-        add_on(view, ellipsoid, off_q8, sums);
+        add_on(ray, ellipsoid, off_q8, sums);
     }
-}
-
-/* Rays around and above the head: is it open there? */
-static void add_around(const struct view *view, struct sums *sums)
-{
-    struct ih_ray_count *region = sums->around.region;
-    int64_t ex = view->at_q14[0];
-    int64_t ey = view->at_q14[1];
-    if (ey < -HIGH_FROM_Q14 && ih_abs_s64(ex) < HIGH_WIDE_Q14) {
-        add_ray(&region[IH_RAY_HIGH], view->is_open);
-    }
-    if (view->distance2_q28 <= RING_INNER2_Q28 || view->distance2_q28 >= RING_OUTER2_Q28) {
-        return;
-    }
-    if (10 * ey > IH_HEAD_RING_BELOW_TENTHS * ih_abs_s64(ex)) {
-        add_ray(&region[IH_RAY_BELOW], view->is_open);
-        return;
-    }
-    sums->around.nothing += view->ray->state == IH_RAY_EMPTY;
-    if (10 * ey < -IH_HEAD_RING_ABOVE_TENTHS * ih_abs_s64(ex)) {
-        add_ray(&region[IH_RAY_ABOVE], view->is_open);
-    } else {
-        add_ray(&region[ex < 0 ? IH_RAY_LEFT : IH_RAY_RIGHT], view->is_open);
-    }
-}
-
-static bool between_mm(int32_t value_mm_q8, int32_t low_mm, int32_t high_mm)
-{
-    return value_mm_q8 > low_mm << 8 && value_mm_q8 < high_mm << 8;
-}
-
-/* What is below and beside: body, shoulders, table. */
-static void add_below(const struct view *view, const struct ih_ellipsoid *ellipsoid,
-                      struct sums *sums)
-{
-    struct ih_ray_count *region = sums->around.region;
-    int32_t aside_q8 = ih_abs_s32(view->x_mm_q8);
-    int32_t chin_q8 = view->below_chin_mm_q8;
-    if (between_mm(chin_q8, IH_HEAD_BODY_TOP_MM, IH_HEAD_BODY_BOTTOM_MM) &&
-        aside_q8 < IH_HEAD_BODY_ASIDE_MM << 8) {
-        add_ray(&region[IH_RAY_BODY], view->is_body);
-        sums->body_dz_q8 += view->is_body ? view->dz_mm_q8 : 0;
-    }
-    if (between_mm(chin_q8, IH_HEAD_BODY_TOP_MM, IH_HEAD_WIDE_BOTTOM_MM) &&
-        aside_q8 > IH_HEAD_WIDE_ASIDE_MM << 8) {
-        add_ray(&region[IH_RAY_WIDE], view->is_body);
-    }
-    if (ih_abs_s32(view->y_mm_q8) < ellipsoid->semi_mm_q8[1] &&
-        between_mm(aside_q8, IH_HEAD_LEVEL_NEAR_MM, IH_HEAD_LEVEL_FAR_MM)) {
-        add_ray(&region[IH_RAY_LEVEL],
-                view->is_seen && ih_abs_s32(view->dz_mm_q8) < IH_HEAD_LEVEL_DEPTH_MM << 8);
-    }
-    if (100 * (int64_t)view->y_mm_q8 >
-            IH_HEAD_SHOULDER_TOP_PERCENT * (int64_t)ellipsoid->semi_mm_q8[1] &&
-        chin_q8 < IH_HEAD_SHOULDER_BOTTOM_MM << 8 &&
-        between_mm(aside_q8, IH_HEAD_SHOULDER_NEAR_MM, IH_HEAD_SHOULDER_FAR_MM)) {
-        const bool is_right = view->x_mm_q8 > 0;
-        add_ray(&region[is_right ? IH_RAY_SHOULDER_RIGHT : IH_RAY_SHOULDER_LEFT], view->is_body);
-    }
-}
-
-/* (part + 0.5) / (all + 1) */
-static int32_t careful_fraction_q8(struct ih_ray_count count)
-{
-    return (2 * count.part + 1) * 128 / (count.all + 1);
-}
-
-static int32_t fraction_q8(struct ih_ray_count count, int32_t min)
-{
-    return count.part * 256 / ih_max_s32(count.all, min);
 }
 
 /* Variance of the points' depths that no plane explains, mm^2 in Q8: szz - b^T S^-1 b, S and b the
@@ -285,69 +157,14 @@ static int32_t taller_q8(const struct ih_ellipsoid *ellipsoid)
     return (int32_t)ih_div_round((int64_t)(ellipsoid->semi_mm_q8[1] - mean_q8) * 25600, mean_q8);
 }
 
-static void summarise(const struct sums *sums, const struct ih_evidence_nest *nest,
-                      int32_t value_q8[])
+static void summarise(const struct sums *sums, int32_t value_q8[])
 {
-    const struct ih_ray_count *region = sums->around.region;
-    const int32_t beside =
-        region[IH_RAY_ABOVE].all + region[IH_RAY_LEFT].all + region[IH_RAY_RIGHT].all;
     int32_t on = ih_max_s32(sums->on, 1);
     int32_t rough_q8 = root_mm_q8(sums->on_square_q16 / on);
+    int32_t plane_q8 = sums->on >= PLANE_POINTS_MIN ? root_mm_q8(plane_residual_q8(sums) * 256) : 0;
     value_q8[IH_EVIDENCE_ON] = sums->on << 8;
     value_q8[IH_EVIDENCE_ROUGH] = rough_q8;
-    int32_t plane_q8 = sums->on >= PLANE_POINTS_MIN ? root_mm_q8(plane_residual_q8(sums) * 256) : 0;
     value_q8[IH_EVIDENCE_BULGE] = plane_q8 - rough_q8;
-    value_q8[IH_EVIDENCE_ABOVE] = careful_fraction_q8(region[IH_RAY_ABOVE]);
-    value_q8[IH_EVIDENCE_BESIDE] = ih_min_s32(careful_fraction_q8(region[IH_RAY_LEFT]),
-                                              careful_fraction_q8(region[IH_RAY_RIGHT]));
-    value_q8[IH_EVIDENCE_BELOW] = careful_fraction_q8(region[IH_RAY_BELOW]);
-    value_q8[IH_EVIDENCE_HIGH] = careful_fraction_q8(region[IH_RAY_HIGH]);
-    value_q8[IH_EVIDENCE_NOTHING] =
-        fraction_q8((struct ih_ray_count){sums->around.nothing, beside}, 1);
-    value_q8[IH_EVIDENCE_BODY] = fraction_q8(region[IH_RAY_BODY], 3);
-    value_q8[IH_EVIDENCE_BODY_RAYS] = ih_min_s32(region[IH_RAY_BODY].all, BODY_RAYS_MAX) << 8;
-    value_q8[IH_EVIDENCE_BODY_DEPTH] =
-        (int32_t)ih_div_round(sums->body_dz_q8, ih_max_s32(region[IH_RAY_BODY].part, 1));
-    value_q8[IH_EVIDENCE_WIDE] = fraction_q8(region[IH_RAY_WIDE], 3);
-    value_q8[IH_EVIDENCE_LEVEL] = fraction_q8(region[IH_RAY_LEVEL], 3);
-    value_q8[IH_EVIDENCE_SHOULDER] = ih_min_s32(fraction_q8(region[IH_RAY_SHOULDER_LEFT], 2),
-                                                fraction_q8(region[IH_RAY_SHOULDER_RIGHT], 2));
-    value_q8[IH_EVIDENCE_BEFORE] = sums->around.before << 8;
-    value_q8[IH_EVIDENCE_EXTENT] = nest->present ? nest->extent_mm_q8 : 0;
-    value_q8[IH_EVIDENCE_UPRIGHT] =
-        nest->present ? (int32_t)ih_shift_round(nest->upright_q16, 8) : 256;
-}
-
-/* A ray that the counts left, that may hit, or both. */
-static void add_view(const struct candidate *candidate, const struct ih_ray *ray, bool is_unsure,
-                     bool may_hit, struct sums *sums)
-{
-    struct view view;
-    if (!make_view(candidate, ray, &view)) {
-        return;
-    }
-    if (may_hit) {
-        add_inside(candidate, &view, sums);
-    }
-    if (is_unsure) {
-        add_around(&view, sums);
-        add_below(&view, candidate->ellipsoid, sums);
-        sums->around.before +=
-            view.is_seen && view.distance2_q28 < AROUND2_Q28 &&
-            view.dz_mm_q8 < -candidate->ellipsoid->semi_mm_q8[2] - (IH_HEAD_BEFORE_MM << 8);
-    }
-}
-
-/* The counts have counted these rays, but not how deep their points are. */
-static void add_body_depths(const struct ih_rays *rays, const struct ih_ray_marks *marks,
-                            int32_t centre_mm_q8, struct sums *sums)
-{
-    for (int32_t word = 0; word < IH_RAYS_WORDS; word++) {
-        for (uint32_t left = marks->body[word]; left != 0; left &= left - 1) {
-            const struct ih_ray *ray = &rays->ray[32 * word + __builtin_ctz(left)];
-            sums->body_dz_q8 += ray->point_mm_q8[2] - centre_mm_q8;
-        }
-    }
 }
 
 _Static_assert(IH_ELLIPSOID_SEMI_MAX_MM < 256, "a height of half a semi-axis has 16 bits");
@@ -432,10 +249,8 @@ static void bends(const struct ih_rays *rays, const struct candidate *candidate,
 }
 
 void ih_evidence_collect(const struct ih_rays *rays, const struct ih_ellipsoid *ellipsoid,
-                         const int32_t start_mm_q8[3], const struct ih_evidence_nest *nest,
-                         struct ih_evidence *out)
+                         const int32_t start_mm_q8[3], struct ih_evidence *out)
 {
-    struct ih_ray_marks marks;
     struct sums sums;
     const struct candidate candidate = {
         .ellipsoid = ellipsoid,
@@ -445,22 +260,18 @@ void ih_evidence_collect(const struct ih_rays *rays, const struct ih_ellipsoid *
         .box = ih_ellipsoid_box(ellipsoid, rays->table.slope_max_q20, INSIDE_Q14),
     };
     memset(&sums, 0, sizeof sums);
-    ih_ray_counts_count(rays, ellipsoid, &candidate.box, &marks, &sums.around);
-    for (int32_t word = 0; word < IH_RAYS_WORDS; word++) {
-        uint32_t left = marks.unsure[word] | marks.may_hit[word];
-        for (; left != 0; left &= left - 1) {
-            const int bit = __builtin_ctz(left);
-            add_view(&candidate, &rays->ray[32 * word + bit], marks.unsure[word] >> bit & 1,
-                     marks.may_hit[word] >> bit & 1, &sums);
+    for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
+        const struct ih_ray *ray = &rays->ray[slot];
+        if (ray->state != IH_RAY_UNKNOWN && may_hit(&candidate, ray)) {
+            add_ray(&candidate, ray, &sums);
         }
     }
-    add_body_depths(rays, &marks, ellipsoid->centre_mm_q8[2], &sums);
-    summarise(&sums, nest, out->value_q8);
+    summarise(&sums, out->value_q8);
     bends(rays, &candidate, out->value_q8);
     out->value_q8[IH_EVIDENCE_TALL] = taller_q8(ellipsoid);
-    out->value_q8[IH_EVIDENCE_SURROUNDINGS] = ih_surroundings_logit_q8(rays, ellipsoid);
-    out->value_q8[IH_EVIDENCE_DISTANCE] = ellipsoid->centre_mm_q8[2];
     out->value_q8[IH_EVIDENCE_MOVED] = moved_mm_q8(ellipsoid, start_mm_q8);
+    out->value_q8[IH_EVIDENCE_DISTANCE] = ellipsoid->centre_mm_q8[2];
+    ih_surroundings_ask(rays, ellipsoid, &out->value_q8[IH_EVIDENCE_MAPS]);
     out->through_count = sums.through;
     out->hit_count = sums.hit;
     out->front_count = sums.front;

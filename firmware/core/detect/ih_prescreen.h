@@ -2,9 +2,8 @@
  *
  * In:     the table of rays, the candidate centre of a mean head.
  * Out:    how much the surroundings are a head's: 2 high + 3 body - 4 level, Q8; -4 .. 5.
- * Method: three of ih_evidence's fractions, those with the most information before a fit, with about the
- *         weights of ih_score's curves. Of the rays whose state is known, by where they pass the centre's
- *         depth (ih_head_model.h):
+ * Method: three fractions, with the most information before a fit. Of the rays whose state is known, by where they
+ *         pass the centre's depth (ih_head_model.h):
  *             high   open, farther above than 1.9 semi-axes, as (open + 0.5) / (all + 1)
  *             body   a body, 40 to 260 mm below the chin and at most 180 mm aside
  *             level  something within 150 mm of the centre's depth, 170 to 330 mm aside

@@ -40,7 +40,6 @@ static void fill_slot(const struct ih_ray *ray, int32_t slot, struct ih_ray_tabl
     const int32_t slope_q20[2] = {ray->slope_x_q20, ray->slope_y_q20};
     for (int axis = 0; axis < 2; axis++) {
         out->slope_q12[axis][slot] = (int16_t)(slope_q20[axis] >> 8);
-        out->slope_q14[axis][slot] = clamp_s16(slope_q20[axis] >> 6);
         out->slope_max_q20[axis] =
             ih_max_s32(out->slope_max_q20[axis], ih_abs_s32(slope_q20[axis]));
     }

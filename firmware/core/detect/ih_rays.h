@@ -48,7 +48,6 @@ struct ih_ray {
 /* The rays as columns by slot, rounded down and clamped to 16 bits. */
 struct ih_ray_table {
     int16_t slope_q12[2][IH_RAYS_COLUMN];
-    int16_t slope_q14[2][IH_RAYS_COLUMN]; /* of any state; slopes of 2 and more are clamped */
     int16_t point_mm_q1[3][IH_RAYS_COLUMN];
     int16_t seen[IH_RAYS_COLUMN], empty[IH_RAYS_COLUMN]; /* all bits or none */
     int32_t slope_max_q20[2];                            /* maximum |slope| of all rays, x and y */

@@ -18,6 +18,11 @@
 #define LAST_LINE 14
 #define SPAN (LAST_LINE - FIRST_LINE)
 
+/* Two maps, half a word apart, are summed at once: 361 numbers below 16 do not overflow 16 bits. */
+#define PAIRS (IH_SURROUNDINGS_MAPS / 2)
+#define PAIR_MASK 0x000f000fu
+_Static_assert(IH_SURROUNDINGS_MAPS *IH_SURROUNDINGS_BITS == 32, "a word has a number by each map");
+
 static const uint8_t depth_of_step[STEPS] = {
     1, 1, 1, 1, 1, 1, 1, 1, 1, 1,          /* -256 */
     2, 2, 2, 2, 2, 2, 2, 2, 2, 2,          /* -176 */
@@ -99,25 +104,36 @@ static int32_t weight_q12(const struct ih_rays *rays, int64_t depth_mm_q8)
     return (int32_t)ih_shift_round(spacing_mm_q8 * spacing_mm_q8, 2 * CELL_BITS - 12);
 }
 
-int32_t ih_surroundings_logit_by_map_q8(const int8_t map_q9[IH_SURROUNDINGS_PLACES],
-                                        const struct ih_rays *rays,
-                                        const struct ih_ellipsoid *ellipsoid)
+void ih_surroundings_ask_maps(const uint32_t maps[IH_SURROUNDINGS_PLACES],
+                              const struct ih_rays *rays, const struct ih_ellipsoid *ellipsoid,
+                              int32_t answer_q8[IH_SURROUNDINGS_MAPS])
 {
     const struct head_from_rays candidate = candidate_of(rays, ellipsoid);
-    int32_t sum_q9 = 0;
+    const int32_t weight = weight_q12(rays, candidate.depth_mm_q8);
+    uint32_t pair[PAIRS] = {0}; /* sums of two maps each, in 16 bits */
+    int32_t count = 0;
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
         const int32_t place = place_of(&candidate, &rays->ray[slot]);
-        if (place != IH_NONE) {
-            sum_q9 += map_q9[place];
+        if (place == IH_NONE) {
+            continue;
         }
+        for (int i = 0; i < PAIRS; i++) {
+            pair[i] += maps[place] >> IH_SURROUNDINGS_BITS * i & PAIR_MASK;
+        }
+        count++;
     }
-    IH_IN_RANGE(sum_q9, -IH_RANGE_MAP_SUM_Q9, IH_RANGE_MAP_SUM_Q9);
-    return (int32_t)ih_mul_shift(sum_q9, weight_q12(rays, candidate.depth_mm_q8), 12 + 1);
+    for (int map = 0; map < IH_SURROUNDINGS_MAPS; map++) {
+        const int32_t sum = (int32_t)(pair[map % PAIRS] >> (map < PAIRS ? 0 : 16) & UINT16_MAX) -
+                            count * IH_SURROUNDINGS_ZERO;
+        IH_IN_RANGE(sum, -IH_RANGE_MAP_SUM, IH_RANGE_MAP_SUM);
+        answer_q8[map] = (int32_t)ih_mul_shift(sum, weight, 12 - 8);
+    }
 }
 
-int32_t ih_surroundings_logit_q8(const struct ih_rays *rays, const struct ih_ellipsoid *ellipsoid)
+void ih_surroundings_ask(const struct ih_rays *rays, const struct ih_ellipsoid *ellipsoid,
+                         int32_t answer_q8[IH_SURROUNDINGS_MAPS])
 {
-    return ih_surroundings_logit_by_map_q8(surroundings_map_q9, rays, ellipsoid);
+    ih_surroundings_ask_maps(surroundings_maps, rays, ellipsoid, answer_q8);
 }
 
 void ih_surroundings_find(const struct ih_rays *rays, const struct ih_ellipsoid *ellipsoid,

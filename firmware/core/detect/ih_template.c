@@ -19,7 +19,7 @@
 #define RAYS_MIN 8
 
 #define ONE_Q10 1024
-#define RING_INNER2_Q10 ((int16_t)IH_HEAD_SQUARE(IH_HEAD_RING_INNER_TEMPLATE_PERCENT, 10))
+#define RING_INNER2_Q10 ((int16_t)IH_HEAD_SQUARE(IH_HEAD_RING_INNER_PERCENT, 10))
 #define RING_OUTER2_Q10 ((int16_t)IH_HEAD_SQUARE(IH_HEAD_RING_OUTER_PERCENT, 10))
 /* Ratio of two semi-axes, rounded. */
 #define RATIO_Q14(a, b) ((((a) << 14) + (b) / 2) / (b))

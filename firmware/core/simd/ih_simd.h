@@ -145,11 +145,6 @@ static inline ih_i16 ih_i16_shift_left(ih_i16 a, int bits)
     return (ih_i16)((ih_u16)a << bits);
 }
 
-static inline ih_i16 ih_i16_shift_right(ih_i16 a, int bits)
-{
-    return a >> bits;
-}
-
 /* 32 bits */
 
 static inline ih_i32 ih_i32_load(const int32_t *from)

@@ -23,8 +23,6 @@
 /* A head that fewer rays meet has left the pattern. */
 #define VIEW_RAYS_MIN 4
 #define DETECTION_COUNT_MAX 1000
-/* As much open as closed above, or nothing to be seen. */
-#define OPEN_ABOVE_Q8 128
 /* A doubtful head is not chosen for its position when it is this much less probable than the best. */
 #define CHOICE_LOGIT_Q10 (3 << 10)
 
@@ -225,13 +223,11 @@ static void judge(struct ih_track *track, const struct ih_tracks_params *params)
     track->is_head = track->mean_logit_q10 > limit_q10;
 }
 
-/* Is it away from where the track began, and no chest? */
-static bool has_moved(const struct ih_track *track, const struct ih_tracks_params *params,
-                      const struct ih_detection *detection)
+/* Is it away from where the track began? */
+static bool has_moved(const struct ih_track *track, const struct ih_tracks_params *params)
 {
-    return detection->evidence.value_q8[IH_EVIDENCE_HIGH] > OPEN_ABOVE_Q8 &&
-           ih_distance2_s32(track->filter.head.centre_mm_q8, track->start_mm_q8) >
-               (int64_t)params->moved_mm * params->moved_mm * 65536;
+    return ih_distance2_s32(track->filter.head.centre_mm_q8, track->start_mm_q8) >
+           (int64_t)params->moved_mm * params->moved_mm * 65536;
 }
 
 /* A track continues with a detection. */
@@ -243,7 +239,7 @@ static void assign(struct ih_tracks *tracks, const struct ih_tracks_params *para
     track->detection_count = ih_min_s32(track->detection_count + 1, DETECTION_COUNT_MAX);
     ih_kalman_correct(&track->filter, &detection->head,
                       variance_q8(detection->logit_q10, params->measured_mm));
-    track->has_moved = track->has_moved || has_moved(track, params, detection);
+    track->has_moved = track->has_moved || has_moved(track, params);
     average_logit(track, detection->logit_q10, params->memory_q16);
     judge(track, params);
 }

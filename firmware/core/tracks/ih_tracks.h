@@ -25,9 +25,8 @@
  *        A detection moves its track by the less, the less it looks like a head: it may be a hand before it.
  *        A track's log-odds are a running mean of its detections'. A head ends as one only when the mean says
  *        so clearly, below drop_logit: what moves on smoothly from a head is more probably one than a new thing
- *        that looks the same. Rooms stand still: what was moved_mm away from where its track began, with more open
- *        than not above it, needs moved_logit less, to become a head and to stay one. A chest moves, too, and what is
- *        above one is a neck, or out of the picture.
+ *        that looks the same. Rooms stand still: what was moved_mm away from where its track began needs
+ *        moved_logit less, to become a head and to stay one.
  *        The selected head is the one nearest to the camera (or the leftmost or rightmost in the
  *        picture, by side), a detected one before a predicted one; not one below accept_logit that is much
  *        less probable than the best. Another one replaces it after switch_frames frames.

@@ -1,4 +1,4 @@
-/* ih_detections: its list, the nest at a place, the outline against the exact projection of the
+/* ih_detections: its list, the outline against the exact projection of the
  * ellipsoid, and whole scenes. Nothing here depends on the learnt weights. */
 #include "detect/ih_candidates.h"
 
@@ -41,7 +41,6 @@ void setUp(void)
     memset(&expected, 0, sizeof expected);
     ih_detections_params_default(&params);
     params.spacing_mm = SPACING_MM;
-    params.nest_near_mm = 90;
     params.front_min_mm = 150;
     ih_detections_begin(&detections);
 }
@@ -156,29 +155,6 @@ static void any_order_gives_a_good_list(void)
             }
         }
     }
-}
-
-static void a_candidate_takes_the_nearest_nest_in_reach(void)
-{
-    static const int32_t place[3] = {0, 0, 800 << 8};
-    struct ih_evidence_nest nest;
-
-    hypotheses.hypothesis_count = 3;
-    hypotheses.hypothesis[0].centre_mm_q8[2] = 850 << 8;
-    hypotheses.hypothesis[0].extent_mm_q8 = 11;
-    hypotheses.hypothesis[1].centre_mm_q8[2] = 770 << 8;
-    hypotheses.hypothesis[1].extent_mm_q8 = 22;
-    hypotheses.hypothesis[1].upright_q16 = 33;
-    hypotheses.hypothesis[2].centre_mm_q8[2] = 900 << 8;
-    nest = ih_candidates_nest_at(&hypotheses, place, 90);
-    TEST_ASSERT_TRUE(nest.present);
-    TEST_ASSERT_EQUAL_INT32(22, nest.extent_mm_q8);
-    TEST_ASSERT_EQUAL_INT32(33, nest.upright_q16);
-    TEST_ASSERT_FALSE(
-        ih_candidates_nest_at(&hypotheses, place, 30).present); /* 30 mm is not within 30 mm */
-    TEST_ASSERT_TRUE(ih_candidates_nest_at(&hypotheses, place, 31).present);
-    hypotheses.hypothesis_count = 0;
-    TEST_ASSERT_FALSE(ih_candidates_nest_at(&hypotheses, place, 90).present);
 }
 
 /* --- the outline ---------------------------------------------------------------------------------
@@ -675,7 +651,6 @@ int main(void)
     RUN_TEST(of_two_at_one_place_the_more_probable_stays);
     RUN_TEST(a_full_list_drops_the_last_one);
     RUN_TEST(any_order_gives_a_good_list);
-    RUN_TEST(a_candidate_takes_the_nearest_nest_in_reach);
     RUN_TEST(outlines_are_near_the_true_projection);
     RUN_TEST(a_wide_head_has_its_long_axis_across);
     RUN_TEST(distances_are_those_of_the_front);

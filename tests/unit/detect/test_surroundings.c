@@ -1,4 +1,4 @@
-/* ih_surroundings against a float64 reference, with a map of the test's own: the learnt one may change. And cells,
+/* ih_surroundings against a float64 reference, with maps of the test's own: the learnt ones may change. And cells,
  * ranges and weights at their limits. */
 #include "base/ih_config.h"
 #include "detect/ih_ellipsoid.h"
@@ -15,12 +15,12 @@ struct vector_scene {
     const char *name;
     const struct vector_ray *ray;
     int32_t centre_mm_q8[3];
-    double weight, logit;
+    double weight, answer[IH_SURROUNDINGS_MAPS];
 };
 
 #include "surroundings.inc"
 
-_Static_assert(IH_TEST_COUNT(vector_map_q9) == IH_SURROUNDINGS_PLACES, "another map");
+_Static_assert(IH_TEST_COUNT(vector_maps) == IH_SURROUNDINGS_PLACES, "other maps");
 
 /* A ray every 64 mm at 1024 mm: slopes of 1/16, and each ray stands for one cell. */
 #define PITCH_Q20 (1 << 16)
@@ -30,14 +30,16 @@ _Static_assert(IH_TEST_COUNT(vector_map_q9) == IH_SURROUNDINGS_PLACES, "another 
 static struct ih_rays rays;
 static struct ih_ellipsoid head;
 static struct ih_surroundings found;
-static int8_t map_q9[IH_SURROUNDINGS_PLACES];
+static uint32_t maps[IH_SURROUNDINGS_PLACES];
+static int32_t answer_q8[IH_SURROUNDINGS_MAPS];
 
 void setUp(void)
 {
     int slot;
 
     memset(&rays, 0, sizeof rays);
-    memset(map_q9, 0, sizeof map_q9);
+    memset(maps, 0x88, sizeof maps);
+    memset(answer_q8, IH_TEST_FILL, sizeof answer_q8);
     memset(&found, IH_TEST_FILL, sizeof found);
     head = (struct ih_ellipsoid){.centre_mm_q8 = {0, 0, DEPTH_MM << 8},
                                  .semi_mm_q8 = {SEMI_MM_Q8, SEMI_MM_Q8, SEMI_MM_Q8}};
@@ -71,7 +73,7 @@ static void use_scene(const struct vector_scene *scene)
 /* The weight is a square of a spacing in steps of 1/256 mm, known to 2: an isqrt's and its own. */
 static void scenes_match_float64(void)
 {
-    int i, slot;
+    int i, slot, map;
 
     for (i = 0; i < IH_TEST_COUNT(vector_scenes); i++) {
         const struct vector_scene *scene = &vector_scenes[i];
@@ -83,10 +85,12 @@ static void scenes_match_float64(void)
             IH_TEST_EQUAL(scene->ray[slot].place, found.place[slot], scene->name, slot);
         }
         IH_TEST_WITHIN(error, scene->weight, ih_test_from_q(found.weight_q12, 12), scene->name, i);
-        IH_TEST_WITHIN(
-            fabs(scene->logit) * error / scene->weight + 1.0 / 256, scene->logit,
-            ih_test_from_q(ih_surroundings_logit_by_map_q8(vector_map_q9, &rays, &head), 8),
-            scene->name, 100 + i);
+        ih_surroundings_ask_maps(vector_maps, &rays, &head, answer_q8);
+        for (map = 0; map < IH_SURROUNDINGS_MAPS; map++) {
+            IH_TEST_WITHIN(fabs(scene->answer[map]) * error / scene->weight + 1.0 / 256,
+                           scene->answer[map], ih_test_from_q(answer_q8[map], 8), scene->name,
+                           100 + map);
+        }
     }
 }
 
@@ -176,32 +180,35 @@ static void dense_rays_have_small_weights(void)
     }
 }
 
-/* 1/16 in log-odds for each of three rays of four that ask the same place. */
+/* Three rays of four ask the same place, and by each map get its number there. */
 static void rays_of_known_state_add_up(void)
 {
-    int i;
+    int i, map;
 
-    map_q9[place_at(6, 0, 4)] = 32;
+    for (map = 0; map < IH_SURROUNDINGS_MAPS; map++) {
+        maps[place_at(6, 0, 4)] += (uint32_t)(map - 3) << 4 * map;
+    }
     for (i = 0; i < 4; i++) {
         struct ih_ray *ray = &rays.ray[180 + i];
 
         *ray = (struct ih_ray){.point_mm_q8 = {0, 0, head.centre_mm_q8[2]},
                                .state = i == 2 ? IH_RAY_UNKNOWN : IH_RAY_SEEN};
     }
-    IH_TEST_EQUAL(3 * 16, ih_surroundings_logit_by_map_q8(map_q9, &rays, &head), "log-odds", 0);
+    ih_surroundings_ask_maps(maps, &rays, &head, answer_q8);
+    for (map = 0; map < IH_SURROUNDINGS_MAPS; map++) {
+        IH_TEST_EQUAL(3 * (map - 3) * 256, answer_q8[map], "answer", map);
+    }
 }
 
 /* As far as rays, points and fits can be; the largest sum. The sanitizers watch. */
 static void extremes_do_not_overflow(void)
 {
     struct ih_test_random random = {31};
-    int pass, slot, axis, i;
+    int pass, slot, axis, map;
 
-    for (i = 0; i < IH_SURROUNDINGS_PLACES; i++) {
-        map_q9[i] = INT8_MIN;
-    }
+    memset(maps, 0, sizeof maps);
     for (pass = 0; pass < 400; pass++) {
-        int32_t logit_q8, known = 0;
+        int32_t known = 0;
 
         for (axis = 0; axis < 3; axis++) {
             const int32_t far = pass % 4 == 0 ? 300 << 8 : 1 << 27;
@@ -216,14 +223,16 @@ static void extremes_do_not_overflow(void)
                 .point_mm_q8 = {0, 0, (int32_t)ih_test_between(&random, -(1 << 25), 1 << 25)},
                 .state = (int32_t)ih_test_between(&random, 0, 2)};
         }
-        logit_q8 = ih_surroundings_logit_by_map_q8(map_q9, &rays, &head);
+        ih_surroundings_ask_maps(maps, &rays, &head, answer_q8);
         ih_surroundings_find(&rays, &head, &found);
         IH_TEST_RANGE(0, 4096, found.weight_q12, "weight", pass);
         for (slot = 0; slot < IH_SLOTS; slot++) {
             IH_TEST_RANGE(IH_NONE, IH_SURROUNDINGS_PLACES - 1, found.place[slot], "place", slot);
             known += found.place[slot] != IH_NONE;
         }
-        IH_TEST_RANGE(-known * (128 / 2), 0, logit_q8, "log-odds", pass);
+        for (map = 0; map < IH_SURROUNDINGS_MAPS; map++) {
+            IH_TEST_RANGE(-known * 8 * 256, 0, answer_q8[map], "answer", pass);
+        }
     }
 }
 

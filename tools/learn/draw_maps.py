@@ -1,0 +1,67 @@
+"""draw_maps.py OUT: the learnt maps of ih_surroundings as a picture, the mean of several ranges of depth in each row."""
+
+import os
+import re
+import sys
+
+import numpy
+
+import ray_map
+
+ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+HEADER = os.path.join(ROOT, "firmware/core/detect/ih_surroundings_map.h")
+SHOWN = (("96 mm and more before", (0, 1, 2)), ("at the head's depth", (3, 4)), ("behind, 40 to 304 mm", (5, 6, 7)), ("far behind, or nothing", (8, 9)))
+CELL, GAP, LEFT, TOP = 7, 14, 150, 34
+LEVELS = 6
+HEAD_MM, CELL_MM = (78, 113), 64
+
+
+def read():
+    """Rows, columns, depths, maps."""
+    with open(HEADER, encoding="utf-8") as file:
+        words = [int(word, 16) for word in re.findall(r"0x[0-9a-f]{8}", file.read())]
+    return ray_map.unpacked(words).reshape(ray_map.ROWS, ray_map.COLUMNS, ray_map.DEPTHS, ray_map.MAPS)
+
+
+def colour(level):
+    """Blue above zero, orange below."""
+    dark = (0, 114, 178) if level > 0 else (213, 94, 0)
+    part = abs(level) / LEVELS
+    return "#%02x%02x%02x" % tuple(round(255 + (value - 255) * part) for value in dark)
+
+
+def cells_of(values, at):
+    """One path for all cells of a colour; left and right alike."""
+    levels = numpy.rint(values * LEVELS / ray_map.ZERO).astype(int)
+    for level in sorted(set(levels.ravel()) - {0}):
+        path = ""
+        for row, column in zip(*numpy.nonzero(levels == level)):
+            for side in (column, -1 - column):
+                path += "M%d %dh%dv%dh-%dz" % (at[0] + (ray_map.COLUMNS + side) * CELL, at[1] + row * CELL, CELL, CELL, CELL)
+        yield '<path fill="%s" d="%s"/>' % (colour(level), path)
+
+
+def draw():
+    maps = read()
+    wide, high = 2 * ray_map.COLUMNS * CELL, ray_map.ROWS * CELL
+    size = LEFT + ray_map.MAPS * (wide + GAP), TOP + len(SHOWN) * (high + GAP)
+    yield '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 %d %d" width="%d" height="%d" font-family="sans-serif" font-size="12">' % (*size, *size)
+    yield "<title>What each learnt map says of a ray, by where it passes the head and how deep its point lies</title>"
+    yield '<rect width="%d" height="%d" fill="#fff"/>' % size
+    for map_index in range(ray_map.MAPS):
+        left = LEFT + map_index * (wide + GAP)
+        yield '<text x="%d" y="20" text-anchor="middle">map %d</text>' % (left + wide // 2, map_index)
+        for row, (text, depths) in enumerate(SHOWN):
+            top = TOP + row * (high + GAP)
+            if map_index == 0:
+                yield '<text x="8" y="%d">%s</text>' % (top + high // 2, text)
+            yield from cells_of(maps[:, :, depths, map_index].mean(axis=2), (left, top))
+            yield '<rect x="%d" y="%d" width="%d" height="%d" fill="none" stroke="#bbb"/>' % (left, top, wide, high)
+            radii = tuple(CELL * length / CELL_MM for length in HEAD_MM)
+            yield '<ellipse cx="%d" cy="%d" rx="%.1f" ry="%.1f" fill="none" stroke="#000"/>' % (left + wide // 2, top + 6 * CELL, *radii)
+    yield "</svg>"
+
+
+if __name__ == "__main__":
+    with open(sys.argv[1], "w", encoding="utf-8") as OUT:
+        OUT.write("\n".join(draw()) + "\n")
