@@ -294,7 +294,7 @@ static bool is_of(const struct ih_rays *rays, const struct ih_detection *detecti
 {
     int32_t answer_q8[IH_SURROUNDINGS_MAPS];
     ih_surroundings_ask(rays, &detection->head, answer_q8);
-    return memcmp(answer_q8, &detection->evidence.value_q8[IH_EVIDENCE_MAPS], sizeof answer_q8) ==
+    return memcmp(answer_q8, &detection->evidence.value_q8[IH_EVIDENCE_MAP_0], sizeof answer_q8) ==
            0;
 }
 

@@ -112,8 +112,8 @@ def write(path, learnt, kinds, command):
     """The header that ih_score.c includes."""
     rows = []
     for kind, first, step, at in zip(kinds, learnt.first_q8, learnt.step_q8, learnt.at_q10):
-        place = kind.upper().replace("MAP_", "MAPS + ")
-        rows.append("        [IH_EVIDENCE_%s] = {%d, %d, {%s}}," % (place, first, step, listed(at)))
+        rows.append("        [IH_EVIDENCE_%s] = {%d, %d, {%s}}," %
+                    (kind.upper(), first, step, listed(at)))
     questions = ["{%d, %d}" % pair for pair in zip(learnt.kind, learnt.limit)]
     lines = ["        %s," % ", ".join(questions[i:i + 12]) for i in range(0, len(questions), 12)]
     trees = ["        {{%s}, {%s}}," % (listed(question), listed(leaf)) for question, leaf in zip(learnt.question, learnt.leaf_q8)]

@@ -65,11 +65,6 @@ def write_vectors(directory):
     return inc.write(directory, "score.inc")
 
 
-def kind_of(name):
-    """Of a name in the header: MAPS + 3 is map_3."""
-    return name.lower().replace("maps + ", "map_")
-
-
 def read_header(path):
     """Kinds, curves and the command that made them."""
     with open(path, encoding="utf-8") as file:
@@ -78,19 +73,18 @@ def read_header(path):
     question, leaf = ([[int(value) for value in part.split(",")] for part in column] for column in zip(*trees))
     listed = re.search(r"\.question = \{(.*?)\n    \}", text, re.S)[1]
     kind, limit = zip(*((int(kind), int(limit)) for kind, limit in re.findall(r"\{(\d+), (\d+)\}", listed)))
-    rows = re.findall(r"\[IH_EVIDENCE_(\w+(?: \+ \d+)?)\] = \{(-?\d+), (\d+), \{([-\d, ]+)\}\},", text)
+    rows = re.findall(r"\[IH_EVIDENCE_(\w+)\] = \{(-?\d+), (\d+), \{([-\d, ]+)\}\},", text)
     at = np.array([[int(value) for value in row[3].split(",")] for row in rows])
     curves = model.Curves(np.array([int(row[1]) for row in rows]),
                           np.array([int(row[2]) for row in rows]), at,
                           int(re.search(r"bias_q10 = (-?\d+),", text)[1]), kind, limit, question, leaf)
-    return [kind_of(row[0]) for row in rows], curves, re.search(r"written by\n \* +(.*)", text)[1]
+    return [row[0].lower() for row in rows], curves, re.search(r"written by\n \* +(.*)", text)[1]
 
 
 def kinds_of_firmware():
     with open(os.path.join(ROOT, "firmware/core/detect/ih_evidence.h"), encoding="utf-8") as file:
         body = re.search(r"enum ih_evidence_kind \{(.*?)\}", file.read(), re.S)[1]
-    own = [k.lower() for k in re.findall(r"IH_EVIDENCE_(\w+),", body) if k != "MAPS"]
-    return own + ["map_%d" % i for i in range(ray_map.MAPS)]
+    return [k.lower() for k in re.findall(r"IH_EVIDENCE_(\w+),", body)]
 
 
 def read_map(path):

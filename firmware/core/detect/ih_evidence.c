@@ -21,6 +21,9 @@
 /* Says neither way: about between the medians of heads and of what is taken for one (E025). */
 #define BEND_MIDDLE_MM_Q8 (12 << 8)
 
+_Static_assert(IH_EVIDENCE_COUNT - IH_EVIDENCE_MAP_0 == IH_SURROUNDINGS_MAPS,
+               "the maps are the last kinds");
+
 /* The candidate, and what is the same for all rays. */
 struct candidate {
     const struct ih_ellipsoid *ellipsoid;
@@ -271,7 +274,7 @@ void ih_evidence_collect(const struct ih_rays *rays, const struct ih_ellipsoid *
     out->value_q8[IH_EVIDENCE_TALL] = taller_q8(ellipsoid);
     out->value_q8[IH_EVIDENCE_MOVED] = moved_mm_q8(ellipsoid, start_mm_q8);
     out->value_q8[IH_EVIDENCE_DISTANCE] = ellipsoid->centre_mm_q8[2];
-    ih_surroundings_ask(rays, ellipsoid, &out->value_q8[IH_EVIDENCE_MAPS]);
+    ih_surroundings_ask(rays, ellipsoid, &out->value_q8[IH_EVIDENCE_MAP_0]);
     out->through_count = sums.through;
     out->hit_count = sums.hit;
     out->front_count = sums.front;

@@ -39,8 +39,15 @@ enum ih_evidence_kind {
     IH_EVIDENCE_BEND_DOWN,   /* how uneven the surface is from dot to dot, downwards: mm */
     IH_EVIDENCE_BEND_ACROSS, /* and across */
     IH_EVIDENCE_DISTANCE, /* depth of the centre: mm; near and far heads show themselves otherwise */
-    IH_EVIDENCE_MAPS,     /* and on: what the rays there say by each learnt map (ih_surroundings) */
-    IH_EVIDENCE_COUNT = IH_EVIDENCE_MAPS + IH_SURROUNDINGS_MAPS
+    IH_EVIDENCE_MAP_0,    /* what the rays there say by each learnt map (ih_surroundings) */
+    IH_EVIDENCE_MAP_1,
+    IH_EVIDENCE_MAP_2,
+    IH_EVIDENCE_MAP_3,
+    IH_EVIDENCE_MAP_4,
+    IH_EVIDENCE_MAP_5,
+    IH_EVIDENCE_MAP_6,
+    IH_EVIDENCE_MAP_7,
+    IH_EVIDENCE_COUNT
 };
 
 struct ih_evidence {

@@ -535,7 +535,7 @@ static void answers_of_the_maps_are_passed_on(void)
 
     value_of("head", 0);
     ih_surroundings_ask(&rays, &vector_scenes[0].head, answer_q8);
-    TEST_ASSERT_EQUAL_INT32_ARRAY(answer_q8, &evidence.value_q8[IH_EVIDENCE_MAPS],
+    TEST_ASSERT_EQUAL_INT32_ARRAY(answer_q8, &evidence.value_q8[IH_EVIDENCE_MAP_0],
                                   IH_SURROUNDINGS_MAPS);
 }
 
