@@ -238,6 +238,7 @@ figures: view ## draw docs/figure1.png, docs/figure2.png (the paper's), docs/fig
 	@$(VIEW) contours --from 000022 frames/sequence2 docs/figure1.png
 	@$(VIEW) sheet --from 000020 frames/sequence2 docs/figure2.png
 	@$(VIEW) control --from 000010 frames/sequence1 docs/figure_control.png
+	@tools/setup.sh vectors
 	@/usr/bin/python3 tools/learn/draw_maps.py docs/pictures/maps.svg
 
 test-view: view ## what tools/view draws, pixel by pixel and word by word; what it refuses

@@ -125,7 +125,7 @@ const Tables = (() => {
     const [text, unit, decimals] = map ? [`what all dots there say by learnt map ${map[1]}`, "", 2] : KINDS[name] || [name, "", 2];
     const bar = largest === null ? null : element("i", { class: part >= 0 ? "for" : "against", style: `width:${(Math.abs(part) / largest * 48).toFixed(1)}%` });
     return element("tr", {}, element("th", { scope: "row" }, text),
-      element("td", {}, value === null ? "" : `${value.toFixed(decimals)}${unit && unit !== "fraction" ? `\u202f${unit}` : ""}`),
+      element("td", {}, value === null ? "" : `${value.toFixed(decimals)}${unit ? `\u202f${unit}` : ""}`),
       element("td", {}, `${part >= 0 ? "+" : ""}${part.toFixed(2)}`),
       element("td", { "aria-hidden": "true" }, bar && element("div", { class: "bar" }, bar)));
   }
@@ -182,7 +182,7 @@ const Tables = (() => {
     into.parentElement.hidden = nests.length === 0;
     text.textContent = nests.length === 0 ? "There are none in this frame."
       : "Below each value is its limit. The first test that fails, in this order, is the reason; later ones are shown too." +
-        (dir.paper ? "" : " With the whole method a nest is only evidence: the scores above decide.");
+        (dir.paper ? "" : " With the whole method a nest is only a candidate: the scores above decide.");
     const head = ["Nest", "By the paper", "Area mm²", "Curvature mm", "Extent mm", "Height²/width²", "Points on it", "Behind, above", "Behind, beside", "Near, below"];
     fillCards(into, "Nests and the tests of the paper", head, nests.map((h, i) => element("tr", {},
       element("th", { scope: "row" }, `${i}`),

@@ -11,7 +11,7 @@ import ray_map
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 HEADER = os.path.join(ROOT, "firmware/core/detect/ih_surroundings_map.h")
 SHOWN = (("96 mm and more before", (0, 1, 2)), ("at the head's depth", (3, 4)), ("behind, 40 to 304 mm", (5, 6, 7)), ("far behind, or nothing", (8, 9)))
-CELL, GAP, LEFT, TOP = 7, 14, 150, 34
+CELL, GAP, LEFT, TOP = 7, 14, 160, 34
 LEVELS = 6
 HEAD_MM, CELL_MM = (78, 113), 64
 
@@ -51,10 +51,10 @@ def draw():
     for map_index in range(ray_map.MAPS):
         left = LEFT + map_index * (wide + GAP)
         yield '<text x="%d" y="20" text-anchor="middle">map %d</text>' % (left + wide // 2, map_index)
-        for row, (text, depths) in enumerate(SHOWN):
+        for row, (label, depths) in enumerate(SHOWN):
             top = TOP + row * (high + GAP)
             if map_index == 0:
-                yield '<text x="8" y="%d">%s</text>' % (top + high // 2, text)
+                yield '<text x="8" y="%d">%s</text>' % (top + high // 2, label)
             yield from cells_of(maps[:, :, depths, map_index].mean(axis=2), (left, top))
             yield '<rect x="%d" y="%d" width="%d" height="%d" fill="none" stroke="#bbb"/>' % (left, top, wide, high)
             radii = tuple(CELL * length / CELL_MM for length in HEAD_MM)
@@ -62,6 +62,10 @@ def draw():
     yield "</svg>"
 
 
+def text():
+    return "\n".join(draw()) + "\n"
+
+
 if __name__ == "__main__":
     with open(sys.argv[1], "w", encoding="utf-8") as OUT:
-        OUT.write("\n".join(draw()) + "\n")
+        OUT.write(text())

@@ -4,9 +4,9 @@
 learn.py --render PROGRAM --host-sim PROGRAM --work DIR [--seeds A-B] [--depth-seeds A-B] [--people DIR...] [--out DIR] [--also DIR...]
 
 Renders every scene of scenes.py for every seed into DIR (those already there are kept), runs the firmware over them and
-over the frames of people that tools/people has made, and fits a logistic model: log-odds = bias + one piecewise linear
-curve per kind of evidence + the map of the surroundings, with a penalty on curves that bend and on neighbours in the map
-that differ; then trees for what the curves leave. A detection within 55 mm of a head is one, beyond 100 mm it is none,
+over the frames of people that tools/people has made, and learns the maps of the surroundings (ray_map.py); then a
+logistic model: log-odds = bias + one piecewise linear curve per kind of evidence, the maps' among them, with a penalty on
+curves that bend; then trees for what the curves leave. A detection within 55 mm of a head is one, beyond 100 mm it is none,
 between it is not used, and neither is one within 150 mm of a head that is hardly seen. A sequence of tools/people counts
 as three frames of tools/render. Run it twice: which detections remain depends a little on the score that rated them.
 """

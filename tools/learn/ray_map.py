@@ -55,7 +55,7 @@ class Network:
         self.square = {name: numpy.zeros_like(value) for name, value in self.weights.items()}
         self.steps = 0
 
-    def slopes(self, needed, ranked, labels, importance):
+    def gradients(self, needed, ranked, labels, importance):
         """Of the weighted cross entropy."""
         own = self.weights
         seen = numpy.concatenate([ranked, needed @ own["maps"]], axis=1)
@@ -70,11 +70,11 @@ class Network:
                 "second": first.T @ by_second, "second_bias": by_second.sum(axis=0),
                 "last": second.T @ by_logit, "last_bias": by_logit.sum(keepdims=True)}
 
-    def step(self, slopes, rate):
+    def step(self, gradients, rate):
         self.steps += 1
-        for name, slope in slopes.items():
-            self.mean[name] += (1 - MEAN) * (slope - self.mean[name])
-            self.square[name] += (1 - SQUARE) * (slope * slope - self.square[name])
+        for name, gradient in gradients.items():
+            self.mean[name] += (1 - MEAN) * (gradient - self.mean[name])
+            self.square[name] += (1 - SQUARE) * (gradient * gradient - self.square[name])
             size = numpy.sqrt(self.square[name] / (1 - SQUARE ** self.steps)) + 1e-8
             decay = DECAY * self.weights[name] if self.weights[name].ndim == 2 else 0
             self.weights[name] -= rate * (self.mean[name] / (1 - MEAN ** self.steps) / size + decay)
@@ -85,7 +85,7 @@ def fit(evidence, place, weight_q12, labels, importance):
     random = numpy.random.default_rng(SEED)
     needed, ranked, importance = needed_of(place, weight_q12), ranks(evidence), importance / importance.mean()
     network = Network(evidence.shape[1], random)
-    batches = len(labels) // BATCH
+    batches = max(1, len(labels) // BATCH)
     for epoch in range(EPOCHS):
         order = random.permutation(len(labels))
         for i in range(batches):
@@ -93,7 +93,7 @@ def fit(evidence, place, weight_q12, labels, importance):
             part = needed[rows]
             part.data = part.data * (random.random(len(part.data)) >= DROPPED).astype(numpy.float32) / (1 - DROPPED)
             done = (epoch + i / batches) / EPOCHS
-            network.step(network.slopes(part, ranked[rows], labels[rows], importance[rows]),
+            network.step(network.gradients(part, ranked[rows], labels[rows], importance[rows]),
                          RATE * (1 + numpy.cos(numpy.pi * done)) / 2)
     maps = network.weights["maps"]
     step = numpy.quantile(numpy.abs(maps), CLIPPED, axis=0) / (ZERO - 1)
@@ -119,7 +119,7 @@ def write(path, maps, command):
     lines = []
     for row, cells in enumerate(packed(maps).reshape(ROWS, COLUMNS, DEPTHS)):
         lines.append("    /* row %d */" % row)
-        lines += ["    %s," % ", ".join("0x%08x" % word for word in cell) for cell in cells]
+        lines += ["    %s," % ", ".join("0x%08xu" % word for word in cell) for cell in cells]
     with open(path, "w", encoding="utf-8") as file:
         file.write("""/* ih_surroundings_map - the maps of ih_surroundings, written by
  *     %s

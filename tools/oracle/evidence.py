@@ -51,16 +51,11 @@ def bodies(name):
         "head": [head, neck, torso, wall],
         "board": [("disc", 715), neck, torso, wall],
         "table": [head, ("box", 850, (-5000, 5000), (60, 5000)), wall],
-        "headrest": [head, ("box", 780, (-130, 150), (-60, 300)), wall],
         "hand": [head, neck, torso, wall,
                  ("ellipsoid", CENTRE + [-70, 40, -220], np.full(3, 70.0))],
-        "alone": [head, wall],
-        "before_a_wall": [head, neck, torso, ("box", 840, (-5000, 5000), (-5000, 5000))],
         "before_nothing": [head, neck, torso],
         "rough": [head, neck, torso, wall],
         "dark": [head, neck, torso, wall],
-        "leaning": [head, neck, ("ellipsoid", CENTRE + [0, 300, -90], np.array([240.0, 190, 120])),
-                    wall],
         "small": [("ellipsoid", CENTRE, MEAN_SEMI * [1, 0.8, 1]), neck, torso, wall],
         "moved": [head, neck, torso, wall],
         "neighbours": [head, neck, torso, wall, ("ellipsoid", CENTRE + [-250, 0, 0], MEAN_SEMI),
@@ -70,8 +65,7 @@ def bodies(name):
     }[name]
 
 
-SCENES = ("head board table headrest hand alone before_a_wall before_nothing rough dark leaning "
-          "small moved neighbours gone unknown").split()
+SCENES = "head board hand before_nothing rough dark small moved gone unknown".split()
 
 
 def depth_of(body, slope):

@@ -1,6 +1,6 @@
 """Float64 reference of the score: the log-odds as tools/learn computes them, for curves and trees drawn here.
 
-    score.py --check FOLDER      are ih_score_weights.h and ih_surroundings_map.h what tools/learn writes?
+    score.py --check FOLDER      are ih_score_weights.h and ih_surroundings_map.h what tools/learn writes, and drawn?
 """
 
 import argparse
@@ -15,6 +15,7 @@ import emit
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 sys.path.insert(0, os.path.join(ROOT, "tools", "learn"))
+import draw_maps  # pylint: disable=wrong-import-position
 import model  # pylint: disable=wrong-import-position
 import ray_map  # pylint: disable=wrong-import-position
 
@@ -116,6 +117,10 @@ def check(folder):
     if command != map_command:
         print("%s: learnt at another time than %s" % (path, map_path))
         same = False
+    with open(os.path.join(ROOT, "docs/pictures/maps.svg"), encoding="utf-8") as picture:
+        if picture.read() != draw_maps.text():
+            print("docs/pictures/maps.svg: of other maps; tools/learn/draw_maps.py draws it")
+            same = False
     if kinds != kinds_of_firmware():
         print("%s: not the evidence of ih_evidence.h" % path)
         same = False

@@ -38,7 +38,7 @@
 #include "points/ih_points.h"
 #include "rig/ih_rig.h"
 
-/* Detections kept; each costs 148 bytes. */
+/* Detections kept; each costs 136 bytes. */
 #define IH_DETECTIONS_MAX 16
 /* Expected heads that are tried, and so the tracks; each costs a track and a detection. */
 #define IH_DETECTIONS_EXPECTED_MAX 8

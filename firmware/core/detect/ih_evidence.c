@@ -1,5 +1,6 @@
 #include "detect/ih_evidence.h"
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <string.h>
 

@@ -22,7 +22,6 @@
 #ifndef IH_EVIDENCE_H
 #define IH_EVIDENCE_H
 
-#include <stdbool.h>
 #include <stdint.h>
 
 #include "base/ih_config.h"

@@ -1,4 +1,4 @@
-/* ih_head_model - the mean head and the regions around it: numbers that several stages share.
+/* ih_head_model - the mean head and the regions around it, by which stages look for heads before they are fitted.
  *
  * Units: mm, or hundredths of a semi-axis (PERCENT). Directions as in the camera frame: down is positive.
  */

@@ -51,7 +51,7 @@
 
 struct ih_ellipse_params {
     /* On a contour, rounded down to a multiple of 8 between IH_ARCS_POINTS_MIN and _MAX. A head found by
-     * nests alone needs 56; 32 find as many where other evidence is weighed with them. */
+     * nests alone needs 56; 32 find as many where other candidates stand beside them. */
     int32_t point_count;
     int32_t shape_max_q16;        /* an ellipse's, at least 1 */
     int32_t ratio_closed_max_q16; /* axis ratio of a closed contour, of an arc */

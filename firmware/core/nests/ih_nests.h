@@ -11,8 +11,8 @@
  *        where the area grows past blunt_mm2. A nest ends depth_max behind its front, when its area
  *        falls below 0.6 of the slice before, when it jumps by more than 3.2 times and 2500 mm^2
  *        beyond end_depth, or after gap_max levels without support.
- * Fewer: ours; with everything on a nest is one candidate and one piece of evidence of many, so less will
- *        do (not with ih_nests_params_paper). A head stands out: to the left, to the right and above a
+ * Fewer: ours; with everything on a nest is one candidate of many, so less will do
+ *        (not with ih_nests_params_paper). A head stands out: to the left, to the right and above a
  *        minimum the surface falls off, or ends, within free_mm, else it is a fold of clothes or the
  *        background's, and starts no nest. A closed contour smaller than blunt_mm2 is the tip's whatever
  *        its shape, and no part of it is searched for. Nests that have come to the same ellipse are the

@@ -28,12 +28,16 @@ _Static_assert(KINDS <= IH_EVIDENCE_COUNT && IH_EVIDENCE_BEND_ACROSS == KINDS - 
                "new kinds go to the end");
 
 static struct ih_rays rays;
-static struct ih_evidence evidence;
+static struct ih_evidence evidence, of_all;
 
+/* And the same with the steepest rays, for which every ray near by may go through the head. */
 static void collect(const struct ih_ellipsoid *head, const int32_t start_mm_q8[3])
 {
     ih_rays_fill_table(&rays);
     ih_evidence_collect(&rays, head, start_mm_q8, &evidence);
+    rays.table.slope_max_q20[0] = rays.table.slope_max_q20[1] = IH_RAYS_SLOPE_MAX << 20;
+    ih_evidence_collect(&rays, head, start_mm_q8, &of_all);
+    TEST_ASSERT_EQUAL_MEMORY(&of_all, &evidence, sizeof evidence);
 }
 
 void setUp(void)
@@ -166,10 +170,17 @@ static void rays_through_a_head_tell_seen_hidden_and_gone(void)
 /* Nothing seen: every number says that it knows nothing. */
 static void without_rays_nothing_is_known(void)
 {
+    int map;
+
     value_of("unknown", 0);
+    IH_TEST_EQUAL(0, evidence.value_q8[IH_EVIDENCE_ON], "on", 0);
+    IH_TEST_EQUAL(0, evidence.value_q8[IH_EVIDENCE_ROUGH], "rough", 0);
     IH_TEST_EQUAL(0, evidence.value_q8[IH_EVIDENCE_BULGE], "bulge", 0);
     IH_TEST_EQUAL(12 << 8, evidence.value_q8[IH_EVIDENCE_BEND_DOWN], "bend down", 0);
     IH_TEST_EQUAL(12 << 8, evidence.value_q8[IH_EVIDENCE_BEND_ACROSS], "bend across", 0);
+    for (map = 0; map < IH_SURROUNDINGS_MAPS; map++) {
+        IH_TEST_EQUAL(0, evidence.value_q8[IH_EVIDENCE_MAP_0 + map], "map", map);
+    }
 }
 
 /* --- the plane -----------------------------------------------------------------------------------

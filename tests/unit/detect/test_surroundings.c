@@ -200,15 +200,43 @@ static void rays_of_known_state_add_up(void)
     }
 }
 
+/* All rays ask one place, where of each two maps that are summed together one says the most and the other the least. */
+static void sums_of_two_maps_stay_apart(void)
+{
+    static const uint32_t words[] = {0x0000ffff, 0xffff0000, 0x0f0f0f0f, 0xf0f0f0f0};
+    int i, map, slot;
+
+    head.centre_mm_q8[2] =
+        400 << 8; /* 25 mm apart: all within 225 mm aside, and so within five cells */
+    for (slot = 0; slot < IH_SLOTS; slot++) {
+        rays.ray[slot].state = IH_RAY_EMPTY;
+    }
+    for (i = 0; i < IH_TEST_COUNT(words); i++) {
+        for (slot = 0; slot < IH_SURROUNDINGS_PLACES; slot++) {
+            maps[slot] = words[i];
+        }
+        ih_surroundings_ask_maps(maps, &rays, &head, answer_q8);
+        for (map = 0; map < IH_SURROUNDINGS_MAPS; map++) {
+            const int32_t each = (words[i] >> 4 * map & 15) == 15 ? 7 : -8;
+
+            /* (25 / 64)^2 of a cell each, in Q12 625. */
+            IH_TEST_EQUAL((int32_t)floor(ldexp(IH_SLOTS * each * 625, -4) + 0.5), answer_q8[map],
+                          "answer", map);
+        }
+    }
+}
+
 /* As far as rays, points and fits can be; the largest sum. The sanitizers watch. */
 static void extremes_do_not_overflow(void)
 {
     struct ih_test_random random = {31};
     int pass, slot, axis, map;
 
-    memset(maps, 0, sizeof maps);
     for (pass = 0; pass < 400; pass++) {
+        const int32_t each = pass % 2 == 0 ? -8 : 7; /* by all maps at all places */
         int32_t known = 0;
+
+        memset(maps, pass % 2 == 0 ? 0 : UINT8_MAX, sizeof maps);
 
         for (axis = 0; axis < 3; axis++) {
             const int32_t far = pass % 4 == 0 ? 300 << 8 : 1 << 27;
@@ -231,7 +259,8 @@ static void extremes_do_not_overflow(void)
             known += found.place[slot] != IH_NONE;
         }
         for (map = 0; map < IH_SURROUNDINGS_MAPS; map++) {
-            IH_TEST_RANGE(-known * 8 * 256, 0, answer_q8[map], "answer", pass);
+            IH_TEST_EQUAL((int32_t)floor(ldexp(known * each * found.weight_q12, -4) + 0.5),
+                          answer_q8[map], "answer", pass);
         }
     }
 }
@@ -244,6 +273,7 @@ int main(void)
     RUN_TEST(ranges_begin_at_their_limits);
     RUN_TEST(dense_rays_have_small_weights);
     RUN_TEST(rays_of_known_state_add_up);
+    RUN_TEST(sums_of_two_maps_stay_apart);
     RUN_TEST(extremes_do_not_overflow);
     return UNITY_END();
 }

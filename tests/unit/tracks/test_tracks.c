@@ -55,8 +55,6 @@ static struct ih_predicted predicted;
 static struct ih_view view; /* of every expected head in the next frames */
 static int64_t time_us;
 
-/* How much is open above what is added. */
-
 /* The tests' own parameters, so that tuning the defaults does not touch them. */
 void setUp(void)
 {
