@@ -200,7 +200,7 @@ static void rays_of_known_state_add_up(void)
     }
 }
 
-/* All rays ask one place, where of each two maps that are summed together one says the most and the other the least. */
+/* All rays ask one place, where of each two maps that are summed together one says the most and the other the smallest. */
 static void sums_of_two_maps_stay_apart(void)
 {
     static const uint32_t words[] = {0x0000ffff, 0xffff0000, 0x0f0f0f0f, 0xf0f0f0f0};
