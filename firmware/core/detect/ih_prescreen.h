@@ -11,7 +11,7 @@
  * Overflow: 16 bits, saturated.
  * Error:  a ray near a limit may be counted either way, by 2^-12 of the depth and half a millimetre.
  * Cost:   8 comparisons of 16 bits thrice for each of 361 rays (without vectors most need one or two): a
- *         fiftieth of a step and its evidence. Of 12,000 centres in 970 frames it rejects half, of those
+ *         fortieth of a step and its evidence. Of 12,000 centres in 970 frames it rejects half, of those
  *         that would end above log-odds -3 about one in five hundred.
  */
 #ifndef IH_PRESCREEN_H

@@ -12,7 +12,7 @@
  *         from rendered scenes and people of true anatomy; ih_score_weights.h has them with the command that
  *         made them.
  * Overflow: COUNT curves within 2^15 and TREES leaves within 2^9 in Q10: below 2^20.
- * Cost:   three comparisons a tree and a quotient a curve: 9,600 instructions (x86-64, -O2).
+ * Cost:   three comparisons a tree and a quotient a curve: 7,900 instructions (x86-64, -O3).
  * Error:  the probability within 2^-13.
  */
 #ifndef IH_SCORE_H

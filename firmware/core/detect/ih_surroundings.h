@@ -17,8 +17,7 @@
  *         numbers, -8 to 7 each, is below 2^11.5, times a weight of 2^12 2^23.5.
  * Error:  a ray that passes within 1/128 mm of a cell's edge, or a depth within half a mm of a range's, may
  *         be counted on either side. The weight 2 %, at 25 mm of spacing 0.2 %: a square of Q8.
- * Cost:   two products for each ray of known state, and four sums of two maps each: some 12,000 instructions
- *         for 340 of them.
+ * Cost:   two products for each ray of known state, and four sums of two maps each: 22,000 instructions (x86-64, -O3).
  */
 #ifndef IH_SURROUNDINGS_H
 #define IH_SURROUNDINGS_H
