@@ -18,6 +18,13 @@ import time
 
 TIMEOUT_S = 60  # of one call; on a busy machine the first frame of software 3-D takes seconds
 
+# What chromium answers to a question about a page that a link is just leading away from.
+LEFT_PAGE = ("Inspected target navigated or closed", "Execution context was destroyed.", "Cannot find default execution context")
+
+
+class LeftPage(RuntimeError):
+    pass
+
 
 class Browser:
     def __init__(self, work):
@@ -110,7 +117,8 @@ class Browser:
             self.receive(deadline)
         answer = self.answers.pop(self.number)
         if "error" in answer:
-            raise RuntimeError("%s: %s" % (method, answer["error"]["message"]))
+            message = answer["error"]["message"]
+            raise (LeftPage if message in LEFT_PAGE else RuntimeError)("%s: %s" % (method, message))
         return answer["result"]
 
     # --- what a user does ------------------------------------------------------------------------
@@ -129,10 +137,17 @@ class Browser:
             raise RuntimeError("%s: %s" % (expression, result["exceptionDetails"]["exception"]["description"]))
         return result["result"].get("value")
 
+    def is_true(self, expression):
+        """Not of a page that is just being left."""
+        try:
+            return self.value(expression)
+        except LeftPage:
+            return False
+
     def until(self, expression):
-        """Wait until an expression is true."""
+        """Wait until an expression is true, of this page or of the one that it leads to."""
         deadline = time.monotonic() + TIMEOUT_S
-        while not self.value(expression):
+        while not self.is_true(expression):
             if time.monotonic() > deadline:
                 raise TimeoutError("never true: " + expression)
             time.sleep(0.02)
