@@ -340,9 +340,9 @@ static void write_detection(struct app_write *write, const struct ih_rays *rays,
                  sizeof(int32_t));
     write_column(write, "part_q10", score.part_q10, IH_EVIDENCE_COUNT, sizeof(int32_t));
     app_write_int_field(write, "together_q10", score.together_q10);
-    app_write_int_field(write, "through_count", detection->evidence.through_count);
-    app_write_int_field(write, "hit_count", detection->evidence.hit_count);
-    app_write_int_field(write, "front_count", detection->evidence.front_count);
+    app_write_int_field(write, "through_count", detection->evidence.view.through);
+    app_write_int_field(write, "hit_count", detection->evidence.view.hit);
+    app_write_int_field(write, "front_count", detection->evidence.view.front);
     app_write_int_field(write, "sigma_mm_q8", verdict->sigma_mm_q8);
     app_write_int_field(write, "u_px_q12", detection->u_px_q12);
     app_write_int_field(write, "v_px_q12", detection->v_px_q12);

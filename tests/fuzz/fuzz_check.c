@@ -281,10 +281,10 @@ void fuzz_check_detections(const struct ih_detections *detections)
         FUZZ_CHECK(abs(f->logit_q10) <= LOGIT_MAX_Q10);
         FUZZ_CHECK(f->probability_q16 >= 0 && f->probability_q16 <= FRACTION_ONE_Q16);
         FUZZ_CHECK(f->source >= IH_SOURCE_SCAN && f->source <= IH_SOURCE_EXPECTED);
-        FUZZ_CHECK(e->through_count >= 0 && e->hit_count >= 0 && e->front_count >= 0);
+        FUZZ_CHECK(e->view.through >= 0 && e->view.hit >= 0 && e->view.front >= 0);
         /* A point on the ellipsoid's far side, seen through it, counts twice. */
-        FUZZ_CHECK(e->through_count <= IH_SLOTS && e->hit_count <= IH_SLOTS);
-        FUZZ_CHECK(e->through_count + e->front_count <= IH_SLOTS);
+        FUZZ_CHECK(e->view.through <= IH_SLOTS && e->view.hit <= IH_SLOTS);
+        FUZZ_CHECK(e->view.through + e->view.front <= IH_SLOTS);
         FUZZ_CHECK(e->value_q8[IH_EVIDENCE_ON] >= 0);
         FUZZ_CHECK(e->value_q8[IH_EVIDENCE_ON] <= IH_SLOTS << 8);
         FUZZ_CHECK(e->value_q8[IH_EVIDENCE_ROUGH] >= 0 && e->value_q8[IH_EVIDENCE_MOVED] >= 0);

@@ -153,11 +153,10 @@ static void try_centre(const struct context *context, const int32_t centre_mm_q8
 static void view_expected(const struct context *context, const struct ih_ellipsoid *head,
                           struct ih_view *view)
 {
-    struct ih_evidence evidence;
-    ih_evidence_collect(context->rays, head, head->centre_mm_q8, &evidence);
-    view->through += evidence.through_count;
-    view->hit += evidence.hit_count;
-    view->front += evidence.front_count;
+    const struct ih_view met = ih_evidence_view(context->rays, head);
+    view->through += met.through;
+    view->hit += met.hit;
+    view->front += met.front;
 }
 
 void ih_detections_add(const struct ih_points *points, const struct ih_dots *dots,

@@ -71,12 +71,6 @@ struct ih_detection {
     int32_t distance_mm_q8;
 };
 
-/* Counts of rays through an expected head, by what they met: something behind it or nothing, its
- * surface, something before it. */
-struct ih_view {
-    int32_t through, hit, front;
-};
-
 struct ih_detections {
     int32_t detection_count;
     int32_t dropped_count;

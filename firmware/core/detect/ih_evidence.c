@@ -35,7 +35,7 @@ struct candidate {
 };
 
 struct sums {
-    int32_t on, through, hit, front;
+    int32_t on, through, front;
     int64_t on_square_q16; /* sum of squared distances, mm^2 */
     /* For the plane through the points on the ellipsoid: sums of x, y, z and of their products,
      * mm in Q4 from the centre. */
@@ -104,7 +104,6 @@ static void add_ray(const struct candidate *candidate, const struct ih_ray *ray,
     if (ih_ellipsoid_position(ellipsoid, &candidate->fractions, ray->point_mm_q8, position_q14) &&
         ih_ellipsoid_distance(&candidate->fractions, position_q14, &off_q8) &&
         ih_abs_s32(off_q8) < ON_MM_Q8) {
-        sums->hit++;
         add_on(ray, ellipsoid, off_q8, sums);
     }
 }
@@ -252,31 +251,44 @@ static void bends(const struct ih_rays *rays, const struct candidate *candidate,
     value_q8[IH_EVIDENCE_BEND_ACROSS] = is_rotated ? by_rows_q8 : by_columns_q8;
 }
 
-void ih_evidence_collect(const struct ih_rays *rays, const struct ih_ellipsoid *ellipsoid,
-                         const int32_t start_mm_q8[3], struct ih_evidence *out)
+/* Begins: the candidate, and the sums over the rays through it. */
+static struct ih_view look(const struct ih_rays *rays, const struct ih_ellipsoid *ellipsoid,
+                           struct candidate *candidate, struct sums *sums)
 {
-    struct sums sums;
-    const struct candidate candidate = {
+    *candidate = (struct candidate){
         .ellipsoid = ellipsoid,
         .origin_mm_q8 = rays->origin_mm_q8,
         .depth_mm_q8 = ellipsoid->centre_mm_q8[2] - rays->origin_mm_q8[2],
         .fractions = ih_ellipsoid_fractions(ellipsoid->semi_mm_q8),
         .box = ih_ellipsoid_box(ellipsoid, rays->table.slope_max_q20, INSIDE_Q14),
     };
-    memset(&sums, 0, sizeof sums);
+    memset(sums, 0, sizeof *sums);
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
         const struct ih_ray *ray = &rays->ray[slot];
-        if (ray->state != IH_RAY_UNKNOWN && may_hit(&candidate, ray)) {
-            add_ray(&candidate, ray, &sums);
+        if (ray->state != IH_RAY_UNKNOWN && may_hit(candidate, ray)) {
+            add_ray(candidate, ray, sums);
         }
     }
+    return (struct ih_view){sums->through, sums->on, sums->front};
+}
+
+struct ih_view ih_evidence_view(const struct ih_rays *rays, const struct ih_ellipsoid *ellipsoid)
+{
+    struct candidate candidate;
+    struct sums sums;
+    return look(rays, ellipsoid, &candidate, &sums);
+}
+
+void ih_evidence_collect(const struct ih_rays *rays, const struct ih_ellipsoid *ellipsoid,
+                         const int32_t start_mm_q8[3], struct ih_evidence *out)
+{
+    struct candidate candidate;
+    struct sums sums;
+    out->view = look(rays, ellipsoid, &candidate, &sums);
     summarise(&sums, out->value_q8);
     bends(rays, &candidate, out->value_q8);
     out->value_q8[IH_EVIDENCE_TALL] = taller_q8(ellipsoid);
     out->value_q8[IH_EVIDENCE_MOVED] = moved_mm_q8(ellipsoid, start_mm_q8);
     out->value_q8[IH_EVIDENCE_DISTANCE] = ellipsoid->centre_mm_q8[2];
     ih_surroundings_ask(rays, ellipsoid, &out->value_q8[IH_EVIDENCE_MAP_0]);
-    out->through_count = sums.through;
-    out->hit_count = sums.hit;
-    out->front_count = sums.front;
 }

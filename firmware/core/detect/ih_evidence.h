@@ -49,17 +49,24 @@ enum ih_evidence_kind {
     IH_EVIDENCE_COUNT
 };
 
+/* For following a head over time: counts of the rays through it, by what they met: something behind it or nothing,
+ * its surface, something before it. */
+struct ih_view {
+    int32_t through, hit, front;
+};
+
 struct ih_evidence {
     int32_t value_q8[IH_EVIDENCE_COUNT];
-    /* For following a head over time: of the rays through it, those that went through it, that saw
-     * its surface, that were stopped before it. */
-    int32_t through_count, hit_count, front_count;
+    struct ih_view view;
 };
 
 IH_BEGIN_DECLS
 
 void ih_evidence_collect(const struct ih_rays *rays, const struct ih_ellipsoid *ellipsoid,
                          const int32_t start_mm_q8[3], struct ih_evidence *out);
+
+/* The view alone, for half of the cost. */
+struct ih_view ih_evidence_view(const struct ih_rays *rays, const struct ih_ellipsoid *ellipsoid);
 
 /* Name of a kind, for tables and traces. */
 const char *ih_evidence_text(enum ih_evidence_kind kind);

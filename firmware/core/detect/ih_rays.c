@@ -47,7 +47,6 @@ static void fill_slot(const struct ih_ray *ray, int32_t slot, struct ih_ray_tabl
         out->point_mm_q1[axis][slot] = clamp_s16(ray->point_mm_q8[axis] >> 7);
     }
     out->seen[slot] = ray->state == IH_RAY_SEEN ? -1 : 0;
-    out->empty[slot] = ray->state == IH_RAY_EMPTY ? -1 : 0;
     if (ray->state == IH_RAY_EMPTY) {
         out->point_mm_q1[2][slot] = IH_RAYS_NOWHERE;
     }

@@ -49,8 +49,8 @@ struct ih_ray {
 struct ih_ray_table {
     int16_t slope_q12[2][IH_RAYS_COLUMN];
     int16_t point_mm_q1[3][IH_RAYS_COLUMN];
-    int16_t seen[IH_RAYS_COLUMN], empty[IH_RAYS_COLUMN]; /* all bits or none */
-    int32_t slope_max_q20[2];                            /* maximum |slope| of all rays, x and y */
+    int16_t seen[IH_RAYS_COLUMN]; /* all bits or none */
+    int32_t slope_max_q20[2];     /* maximum |slope| of all rays, x and y */
 };
 
 struct ih_rays {

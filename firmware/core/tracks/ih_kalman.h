@@ -40,8 +40,8 @@ void ih_kalman_predict(struct ih_kalman *filter, int64_t step_us, int32_t accele
 void ih_kalman_correct(struct ih_kalman *filter, const struct ih_ellipsoid *measured,
                        int64_t variance_q8);
 
-/* Reduce the velocity of a head that is not measured; it is 0 after IH_KALMAN_SLOW_US. A new track's may come from a hand
- * that came between: it must not lead away from the head behind. */
+/* Reduce the velocity of a head that is not measured; it is 0 after IH_KALMAN_SLOW_US. A new track's may be that of a
+ * hand before the head: it must not lead away from the head behind. */
 #define IH_KALMAN_SLOW_US 100000
 void ih_kalman_slow_down(struct ih_kalman *filter, int64_t unseen_us);
 

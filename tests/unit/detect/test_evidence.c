@@ -30,11 +30,15 @@ _Static_assert(KINDS <= IH_EVIDENCE_COUNT && IH_EVIDENCE_BEND_ACROSS == KINDS - 
 static struct ih_rays rays;
 static struct ih_evidence evidence, of_all;
 
-/* And the same with the steepest rays, for which every ray near by may go through the head. */
+/* And the view alone; and the same with the steepest rays, for which every ray near by may go through the head. */
 static void collect(const struct ih_ellipsoid *head, const int32_t start_mm_q8[3])
 {
+    struct ih_view view;
+
     ih_rays_fill_table(&rays);
     ih_evidence_collect(&rays, head, start_mm_q8, &evidence);
+    view = ih_evidence_view(&rays, head);
+    TEST_ASSERT_EQUAL_MEMORY(&view, &evidence.view, sizeof view);
     rays.table.slope_max_q20[0] = rays.table.slope_max_q20[1] = IH_RAYS_SLOPE_MAX << 20;
     ih_evidence_collect(&rays, head, start_mm_q8, &of_all);
     TEST_ASSERT_EQUAL_MEMORY(&of_all, &evidence, sizeof evidence);
@@ -108,9 +112,9 @@ static void scenes_match_float64(void)
             IH_TEST_WITHIN(tolerance(kind), scene->value[kind],
                            ih_test_from_q(evidence.value_q8[kind], 8), what, kind);
         }
-        IH_TEST_EQUAL(scene->through, evidence.through_count, scene->name, 100);
-        IH_TEST_EQUAL(scene->hit, evidence.hit_count, scene->name, 101);
-        IH_TEST_EQUAL(scene->front, evidence.front_count, scene->name, 102);
+        IH_TEST_EQUAL(scene->through, evidence.view.through, scene->name, 100);
+        IH_TEST_EQUAL(scene->hit, evidence.view.hit, scene->name, 101);
+        IH_TEST_EQUAL(scene->front, evidence.view.front, scene->name, 102);
     }
 }
 
@@ -157,14 +161,14 @@ static void every_number_tells_scenes_apart(void)
 static void rays_through_a_head_tell_seen_hidden_and_gone(void)
 {
     TEST_ASSERT_TRUE(value_of("head", 0) > 10);
-    TEST_ASSERT_TRUE(evidence.hit_count > 10 && evidence.through_count <= 1 &&
-                     evidence.front_count == 0);
+    TEST_ASSERT_TRUE(evidence.view.hit > 10 && evidence.view.through <= 1 &&
+                     evidence.view.front == 0);
     value_of("hand", 0);
-    TEST_ASSERT_TRUE(evidence.front_count >= 3 && evidence.through_count <= 1);
+    TEST_ASSERT_TRUE(evidence.view.front >= 3 && evidence.view.through <= 1);
     value_of("gone", 0);
-    TEST_ASSERT_TRUE(evidence.hit_count == 0 && evidence.through_count > 10);
+    TEST_ASSERT_TRUE(evidence.view.hit == 0 && evidence.view.through > 10);
     value_of("unknown", 0);
-    TEST_ASSERT_TRUE(evidence.hit_count + evidence.through_count + evidence.front_count == 0);
+    TEST_ASSERT_TRUE(evidence.view.hit + evidence.view.through + evidence.view.front == 0);
 }
 
 /* Nothing seen: every number says that it knows nothing. */
@@ -254,7 +258,7 @@ static void bulges_match_the_best_plane(void)
             count++;
         }
         collect(&head, centre);
-        if (evidence.hit_count != count) {
+        if (evidence.view.hit != count) {
             continue; /* a ray along the edge */
         }
         rms = plane_rms(count, point);
@@ -290,7 +294,7 @@ static void a_line_has_no_bulge(void)
             ray->state = IH_RAY_SEEN;
         }
         collect(&head, centre);
-        IH_TEST_EQUAL(9, evidence.hit_count, "on", pass);
+        IH_TEST_EQUAL(9, evidence.view.hit, "on", pass);
         IH_TEST_RANGE(0, 35 << 8,
                       evidence.value_q8[IH_EVIDENCE_BULGE] + evidence.value_q8[IH_EVIDENCE_ROUGH],
                       "plane", pass);
@@ -483,9 +487,9 @@ static void rays_through_the_middle_have_their_limits(void)
         forget_rays();
         cast_ray(180, 0, 0, cases[i].dz_mm_q8);
         collect_ball();
-        IH_TEST_EQUAL(cases[i].through, evidence.through_count, "through", i);
-        IH_TEST_EQUAL(cases[i].front, evidence.front_count, "front", i);
-        IH_TEST_EQUAL(cases[i].hit, evidence.hit_count, "hit", i);
+        IH_TEST_EQUAL(cases[i].through, evidence.view.through, "through", i);
+        IH_TEST_EQUAL(cases[i].front, evidence.view.front, "front", i);
+        IH_TEST_EQUAL(cases[i].hit, evidence.view.hit, "hit", i);
         IH_TEST_EQUAL(cases[i].hit << 8, evidence.value_q8[IH_EVIDENCE_ON], "on", i);
     }
 }

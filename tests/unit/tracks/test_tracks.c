@@ -787,7 +787,7 @@ static void a_predicted_head_has_no_evidence(void)
     for (kind = 0; kind < IH_EVIDENCE_COUNT; kind++) {
         IH_TEST_EQUAL(0, predicted.head[0].evidence.value_q8[kind], "evidence", kind);
     }
-    IH_TEST_EQUAL(0, predicted.head[0].evidence.hit_count, "hits", 0);
+    IH_TEST_EQUAL(0, predicted.head[0].evidence.view.hit, "hits", 0);
     IH_TEST_EQUAL(IH_SOURCE_EXPECTED, predicted.head[0].source, "source", 0);
 }
 
