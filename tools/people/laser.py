@@ -33,6 +33,11 @@ class Laser:
         row, column = index // ROWS - ROWS // 2, index % ROWS - ROWS // 2
         self.gain = rng.uniform(0.85, 1.15, DOTS) * (1.0 - 0.2 * (row ** 2 + column ** 2) / 162.0)
         self.gain[DOTS // 2] *= 1.4
+        self.lit = numpy.ones(DOTS)
+
+    def lose(self, fraction, rng):
+        """So many dots are not there."""
+        self.lit = rng.random(DOTS) >= fraction
 
 
 class Sensor:
@@ -177,7 +182,7 @@ def cast_dots(rig, laser, exposure, cast, grey, rng):
     u_px, v_px = rig.project(numpy.where(found[:, None], points, [0.0, 0.0, 1000.0]))
     flat = hash_unit(laser.seed, numpy.floor(points[:, 2] / SPECKLE_MM), dot, sub)
     gain = 1.0 - laser.speckle - laser.speckle * numpy.log(1.0 - flat)
-    power = exposure * laser.power_grey * laser.gain[dot] * 2.0 * numpy.pi * NOMINAL_SIGMA_PX ** 2 * part[sub] * gain
+    power = exposure * laser.power_grey * laser.gain[dot] * laser.lit[dot] * 2.0 * numpy.pi * NOMINAL_SIGMA_PX ** 2 * part[sub] * gain
     sum_grey = power * numpy.maximum(ALBEDO_MIN, hits.albedo) * cosine / (1e-3 * length) ** 2
     x, y = (u_px - rig.centre_px[0]) / rig.centre_px[0], (v_px - rig.centre_px[1]) / rig.centre_px[0]
     sigma_px = laser.optics_px * (1.0 + laser.field_blur * (x * x + y * y))

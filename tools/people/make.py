@@ -164,8 +164,8 @@ def describe(studio, scene, heads, extra, samples, dots, hits):
     return fields, {"kind": scene.kind, "people": notes, **extra, "wear": [actor.note() for actor in scene.actors]}
 
 
-def make(model, out, rig_kind, scene_kind, seed, frames, width=rigs.WIDTH, mount=None, step=1):
-    """Of the frames every step-th, each at its own time."""
+def make(model, out, rig_kind, scene_kind, seed, frames, width=rigs.WIDTH, mount=None, step=1, missing=0.0):
+    """Of the frames every step-th, each at its own time; so many dots are missing, others in each frame."""
     os.makedirs(out, exist_ok=True)
     scene = Scene(model, scene_kind, seed, frames, rig_kind, mount)
     studio = Studio(rig_kind, seed, scene.head_mm[2], width)
@@ -181,6 +181,7 @@ def make(model, out, rig_kind, scene_kind, seed, frames, width=rigs.WIDTH, mount
                 studio.set_still(still)
                 key_before = key
             moving, heads, extra = scene.frame(index)
+            studio.laser.lose(missing, numpy.random.default_rng([seed, 6, index]))
             samples, max_value, dots, hits = studio.shoot(moving, rng)
             write_pgm(os.path.join(out, name), samples, max_value)
             fields, note = describe(studio, scene, heads, extra, samples, dots, hits)
@@ -205,10 +206,12 @@ def main():
     parser.add_argument("--width", type=int, default=rigs.WIDTH, help="of dot rigs' pictures, pixels")
     parser.add_argument("--tilt", type=float, help="degrees by which the camera looks down: rig.json says where up is")
     parser.add_argument("--roll", type=float, help="degrees by which heads' tops tip to the right, 180: upside down")
+    parser.add_argument("--missing", type=float, default=0.0, help="so many dots are not there, others in each frame: 0 to 0.9")
     parser.add_argument("out")
     options = parser.parse_args()
     make(Model(), options.out, options.rig, options.kind, options.seed, options.frames, options.width,
-         None if options.tilt is None and options.roll is None else (options.tilt or 0.0, options.roll or 0.0))
+         None if options.tilt is None and options.roll is None else (options.tilt or 0.0, options.roll or 0.0),
+         missing=options.missing)
 
 
 if __name__ == "__main__":

@@ -3,6 +3,8 @@
 import argparse
 import os
 
+import numpy
+
 import make
 import rig as rigs
 from body import Model
@@ -17,6 +19,7 @@ SETS = {
     "sample": (90000, 1, 5, 0),
     "mounted": (310000, 2, 24, 8),
     "mounted_judge": (330000, 1, 12, 4),
+    "missing": (350000, 1, 12, 4),
 }
 # Sequences of these sets are seen by cameras that hang otherwise than level: tilt (down) and roll, in turn.
 MOUNTS = ((45.0, 0.0), (30.0, 90.0), (60.0, 0.0), (-20.0, 180.0), (0.0, -90.0), (50.0, 30.0), (20.0, -15.0))
@@ -27,6 +30,11 @@ EMPTY_FRAMES = 30
 # follows the people of the level set: kind, first seed after the people's, sequences.
 LEARN_STEP = 4
 LEARN_MORE = (("above", 60000, 80), ("seat", 70000, 180), ("ground", 80000, 250), ("far", 90000, 200), ("hands", 100000, 120))
+# Dots are missing, where they are weak or the sun is strong: these fractions of them. To learn from there are the people of
+# another set again, of every fifth sequence.
+MISSING = (0.15, 0.6)
+AGAIN = {"missing_learn": "learn", "mounted_missing_learn": "mounted_learn"}
+AGAIN_STEP, AGAIN_FIRST = 5, 2
 # All rigs of this set see the same people.
 SAME_PEOPLE = "rigs"
 ALL_RIGS = [*rigs.KINDS, "range"]
@@ -45,8 +53,17 @@ def mount_of(name, seed):
     return MOUNTS[seed % len(MOUNTS)]
 
 
+def missing_of(name, seed):
+    """The fraction of dots that are not there."""
+    if "missing" not in name:
+        return 0.0
+    return numpy.random.default_rng([seed, 7]).uniform(*MISSING)
+
+
 def sequences(name, rig_kind):
     """(directory, kind, seed, frames) of every sequence, kinds mixed so that a part is balanced."""
+    if name in AGAIN:
+        return sequences(AGAIN[name], rig_kind)[AGAIN_FIRST::AGAIN_STEP]
     first, rounds, frames, empty = SETS[name]
     if name != SAME_PEOPLE:
         first += (2000 if is_learnt(name) else 1000) * ALL_RIGS.index(rig_kind)
@@ -67,7 +84,7 @@ def sequences(name, rig_kind):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("set", choices=SETS)
+    parser.add_argument("set", choices=[*SETS, *AGAIN])
     parser.add_argument("out")
     parser.add_argument("--rigs", nargs="+", default=["paper", "wide", "range"], choices=ALL_RIGS)
     options = parser.parse_args()
@@ -78,7 +95,7 @@ def main():
             out = os.path.join(options.out, rig_kind, directory)
             if not os.path.exists(os.path.join(out, "rig.json")):
                 make.make(model, out, rig_kind, kind, seed, frames, step=LEARN_STEP if is_learnt(options.set) else 1,
-                          mount=mount_of(options.set, seed))
+                          mount=mount_of(options.set, seed), missing=missing_of(options.set, seed))
 
 
 if __name__ == "__main__":
