@@ -22,10 +22,10 @@ UNSURE_FACTORS = ((2.0, 4.0), (1.0, 25.0), (0.0, 49.0))
 FAST_LOGIT = 2.0
 AXES_FRACTION = 0.25
 SLOW_S = 0.1
-SAME_MM = 80.0
 VIEW_RAYS_MIN = 4
-OWN_MM = np.array([150.0, 150, 450])
-BODY_MM = ((-150, 150), (200, 400), (-250, 150))
+# Heads of one person: nobody has two, and behind a head there is no other one in view.
+OWN_MM, HIDDEN_MM = np.array([150.0, 150, 250]), np.array([150.0, 150, 450])
+BODY_MM = ((-150, 150), (200, 400), (-350, 150))
 
 
 class Params:
@@ -142,9 +142,9 @@ class Tracks:
             return None
         if clear(away - gate, 0.5):
             if (not track.is_head or not clear(detection.logit - Params.accept, 0.002)
-                    or not self.is_own(track, detection.position)):
+                    or not self.is_own(track, detection.position, HIDDEN_MM)):
                 return None
-            apart = np.linalg.norm((track.state[0] - detection.position) / OWN_MM)
+            apart = np.linalg.norm((track.state[0] - detection.position) / HIDDEN_MM)
             return detection.logit - FAST_LOGIT - GATE_LOGIT * apart**2
         return detection.logit - GATE_LOGIT * (away / gate)**2
 
@@ -163,8 +163,8 @@ class Tracks:
             self.give(track, detection)
 
     @staticmethod
-    def is_own(track, position):
-        away = np.linalg.norm((track.state[0] - position) / OWN_MM)
+    def is_own(track, position, limit_mm=OWN_MM):
+        away = np.linalg.norm((track.state[0] - position) / limit_mm)
         return clear(1 - away, 0.02)
 
     def give(self, track, detection):
@@ -186,10 +186,9 @@ class Tracks:
                 ended = not clear(track.logit - Params.keep, 0.004)
             else:
                 ended = (not track.is_head or clear(unseen - Params.carry_s, 1e-9) or is_gone
-                         or any([self.is_own(track, t.state[0]) for t in self.tracks
+                         or any([self.is_own(track, t.state[0], HIDDEN_MM) for t in self.tracks
                                  if t.detection is not None and t.is_head]))
-            near = [clear(SAME_MM - np.linalg.norm(t.state[0] - track.state[0]), 0.5)
-                    for t in kept]
+            near = [self.is_own(track, t.state[0]) for t in kept]
             if ended or any(near):
                 if track.detection is not None:
                     track.detection.track = 0
@@ -206,8 +205,7 @@ class Tracks:
             if (detection.track != 0 or not clear(detection.logit - Params.start, 0.002)
                     or is_body(detection, detections)):
                 continue
-            away = [np.linalg.norm(t.state[0] - detection.position) for t in self.tracks]
-            if any(clear(SAME_MM - a, 0.5) for a in away):
+            if any([self.is_own(t, detection.position) for t in self.tracks]):
                 continue
             self.last_id += 1
             detection.track = self.last_id

@@ -5,7 +5,7 @@
 #include "base/ih_fix.h"
 
 /* The middle of a body lies in this box about the middle of its head, mm. */
-static const int16_t body_low_mm[3] = {-150, 200, -250}, body_high_mm[3] = {150, 400, 150};
+static const int16_t body_low_mm[3] = {-150, 200, -350}, body_high_mm[3] = {150, 400, 150};
 
 static int64_t square_q16(int32_t distance_mm)
 {

@@ -24,7 +24,7 @@ void ih_candidates_insert(struct ih_detections *out, const struct ih_detection *
                           int32_t spacing_mm);
 
 /* Chest and belly are round, too, and nearer than the head. Bit i: the middle of detection i is within 150 mm aside of
- * another one's above logit_min, 200 to 400 mm below it, and from 250 mm before to 150 mm behind it. */
+ * another one's above logit_min, 200 to 400 mm below it, and from 350 mm before to 150 mm behind it. */
 uint32_t ih_candidates_bodies(const struct ih_detections *detections, int32_t logit_min_q10);
 
 IH_END_DECLS

@@ -3,8 +3,8 @@
  * In:     nests and their hypotheses (ih_hypotheses), points, dots, rig, and where a head is
  *         expected (tracks).
  * Out:    detections, the most probable first, at least spacing_mm apart.
- * Method: candidates are the nests' centres, the candidates of the model scan and the expected heads, in this
- *         order. Nests and scan candidates that a coarse pre-filter rejects (ih_prescreen), and starts
+ * Method: candidates are the nests' centres, the candidates of the model scan, the expected heads and where those were last
+ *         seen that may be hidden, in this order. Nests and scan candidates that a coarse pre-filter rejects (ih_prescreen), and starts
  *         within apart_mm of one before, are passed over. Each other one is fitted for a step (ih_fit),
  *         measured (ih_evidence) and scored (ih_score); those that are not hopeless are fitted to the end,
  *         measured and scored again. Tracks take no detection below log-odds -3: hopeless is 2.5 below
@@ -16,7 +16,7 @@
  * Full table: the less probable drop and count in dropped_count.
  * Overflow: points are below 2^25 in Q8 (16 m, slopes up to 8), nests' centres below 2^26.01, expected
  *         ones at most 2^26; a fit moves 240 mm: centres below 2^27, squares of differences 2^57.6.
- * Cost:   up to IH_SCAN_MAX + IH_NESTS_MAX + IH_DETECTIONS_EXPECTED_MAX = 32 fits a window. Usually 12
+ * Cost:   up to IH_DETECTIONS_STARTS_MAX = 40 fits a window. Usually 12
  *         candidates, of which 6 are fitted for a step and 3 to the end.
  */
 #ifndef IH_DETECTIONS_H
@@ -42,6 +42,8 @@
 #define IH_DETECTIONS_MAX 16
 /* Expected heads that are tried, and so the tracks; each costs a track and a detection. */
 #define IH_DETECTIONS_EXPECTED_MAX 8
+/* Starts of a window: each expected head may have two. */
+#define IH_DETECTIONS_STARTS_MAX (IH_SCAN_MAX + IH_NESTS_MAX + 2 * IH_DETECTIONS_EXPECTED_MAX)
 
 enum ih_source { IH_SOURCE_SCAN, IH_SOURCE_NEST, IH_SOURCE_EXPECTED };
 
@@ -79,16 +81,18 @@ struct ih_detections {
     struct ih_view view[IH_DETECTIONS_EXPECTED_MAX]; /* by expected head, summed over windows */
 };
 
-/* Heads that are expected. */
+/* Heads that are expected, and where those that no detection shows for sure were seen last. */
 struct ih_expected {
     int32_t count;
     struct ih_ellipsoid head[IH_DETECTIONS_EXPECTED_MAX];
+    int32_t again_count;
+    struct ih_ellipsoid again[IH_DETECTIONS_EXPECTED_MAX];
 };
 
 /* Centres from where fits have begun. */
 struct ih_detections_starts {
     int32_t count;
-    int32_t centre_mm_q8[IH_SCAN_MAX + IH_NESTS_MAX + IH_DETECTIONS_EXPECTED_MAX][3];
+    int32_t centre_mm_q8[IH_DETECTIONS_STARTS_MAX][3];
 };
 
 struct ih_detections_scratch {

@@ -12,14 +12,13 @@
 #define LOGIT_MAX_Q10 (6 << 10)
 /* A detection at the edge of the gate needs this much more than one at its centre. */
 #define GATE_LOGIT_Q10 (4 << 10)
-/* A detection beyond the gate needs this much more than one within: where somebody's head was who comes nearer at 2 m/s
- * there is still something, the chest, but hardly a head. */
+/* A detection beyond the gate needs this much more: where a fast person's head was there is still a chest. */
 #define FAST_LOGIT_Q10 (2 << 10)
-/* Two tracks nearer than this follow the same head. */
-#define SAME_MM 80
-/* Two heads within this ellipsoid are one person's: another one has no room there. */
+/* Two heads within this ellipsoid are one person's: another one has no room, or behind it would be hidden. */
 #define OWN_ASIDE_MM 150
-#define OWN_DEPTH_MM 450
+#define OWN_DEPTH_MM 250
+#define HIDDEN_DEPTH_MM 450
+#define ONE_Q16 65536
 /* A head that fewer rays meet has left the pattern. */
 #define VIEW_RAYS_MIN 4
 #define DETECTION_COUNT_MAX 1000
@@ -90,11 +89,16 @@ void ih_tracks_expect(struct ih_tracks *tracks, const struct ih_tracks_params *p
     tracks->has_time = true;
     tracks->time_us = time_us;
     expected->count = tracks->track_count;
+    expected->again_count = 0;
     for (int32_t i = 0; i < tracks->track_count; i++) {
         struct ih_track *track = &tracks->track[i];
         ih_kalman_predict(&track->filter, step_us, params->acceleration_mm_s2);
         track->index = IH_NONE;
         expected->head[i] = track->filter.head;
+        if (!track->is_sure) {
+            expected->again[expected->again_count++] = track->sure;
+        }
+        track->is_sure = false;
     }
 }
 
@@ -135,33 +139,31 @@ struct ih_verdict ih_tracks_verdict(const struct ih_tracks *tracks,
     };
 }
 
-/* How far apart the heads of one person would be, as a part of the limits, squared; false: of two people. */
-static bool is_own(const int32_t *centre_mm_q8, const int32_t *other_mm_q8, int64_t *apart2_q16)
+/* How far apart two heads are, as a part of that ellipsoid, squared; 1 and more: of two people. */
+static int64_t apart2_q16(const struct ih_ellipsoid *head, const struct ih_ellipsoid *other,
+                          int32_t depth_mm)
 {
-    static const int32_t limit_mm[3] = {OWN_ASIDE_MM, OWN_ASIDE_MM, OWN_DEPTH_MM};
-    *apart2_q16 = 0;
+    const int32_t limit_mm[3] = {OWN_ASIDE_MM, OWN_ASIDE_MM, depth_mm};
+    int64_t sum_q16 = 0;
     for (int axis = 0; axis < 3; axis++) {
-        const int64_t off_q8 = (int64_t)centre_mm_q8[axis] - other_mm_q8[axis];
-        if (ih_abs_s64(off_q8) >= limit_mm[axis] << 8) {
-            return false;
-        }
+        const int64_t off_q8 = (int64_t)head->centre_mm_q8[axis] - other->centre_mm_q8[axis];
         const int64_t part_q8 = ih_div_round(off_q8, limit_mm[axis]);
-        *apart2_q16 += part_q8 * part_q8;
+        sum_q16 += part_q8 * part_q8;
     }
-    return *apart2_q16 < 65536;
+    return sum_q16;
 }
 
 /* Beyond the gate: a head whose person moves fast, and a detection that is one rather than not. */
 static bool fits_fast(const struct ih_tracks_params *params, const struct ih_track *track,
                       const struct ih_detection *detection, int32_t *merit_q10)
 {
-    int64_t apart2_q16;
+    const int64_t own2_q16 = apart2_q16(&track->filter.head, &detection->head, HIDDEN_DEPTH_MM);
     if (!track->is_head || detection->logit_q10 <= params->accept_logit_q10 ||
-        !is_own(track->filter.head.centre_mm_q8, detection->head.centre_mm_q8, &apart2_q16)) {
+        own2_q16 >= ONE_Q16) {
         return false;
     }
     *merit_q10 = detection->logit_q10 - FAST_LOGIT_Q10 -
-                 (int32_t)ih_shift_round(apart2_q16 * GATE_LOGIT_Q10, 16);
+                 (int32_t)ih_shift_round(own2_q16 * GATE_LOGIT_Q10, 16);
     return true;
 }
 
@@ -234,6 +236,10 @@ static bool has_moved(const struct ih_track *track, const struct ih_tracks_param
 static void assign(struct ih_tracks *tracks, const struct ih_tracks_params *params,
                    struct ih_track *track, const struct ih_detection *detection, int32_t index)
 {
+    track->is_sure = detection->logit_q10 > params->accept_logit_q10;
+    if (track->is_sure) {
+        track->sure = detection->head;
+    }
     track->index = index;
     track->seen_us = tracks->time_us;
     track->detection_count = ih_min_s32(track->detection_count + 1, DETECTION_COUNT_MAX);
@@ -285,11 +291,10 @@ static bool best_pair(const struct ih_tracks *tracks, const struct ih_tracks_par
 /* Is the person whose head was expected here measured elsewhere? */
 static bool is_elsewhere(const struct ih_tracks *tracks, const struct ih_track *track)
 {
-    int64_t apart2_q16;
     for (int32_t t = 0; t < tracks->track_count; t++) {
         const struct ih_track *other = &tracks->track[t];
         if (other->index != IH_NONE && other->is_head &&
-            is_own(track->filter.head.centre_mm_q8, other->filter.head.centre_mm_q8, &apart2_q16)) {
+            apart2_q16(&track->filter.head, &other->filter.head, HIDDEN_DEPTH_MM) < ONE_Q16) {
             return true;
         }
     }
@@ -310,17 +315,15 @@ static bool may_be_hidden(const struct ih_detections *detections, int32_t track,
 static bool is_double(const struct ih_tracks *tracks, int32_t kept, const struct ih_track *track)
 {
     for (int32_t i = 0; i < kept; i++) {
-        int64_t distance2 = ih_distance2_s32(tracks->track[i].filter.head.centre_mm_q8,
-                                             track->filter.head.centre_mm_q8);
-        if (distance2 < (int64_t)SAME_MM * SAME_MM * 65536) {
+        if (apart2_q16(&tracks->track[i].filter.head, &track->filter.head, OWN_DEPTH_MM) <
+            ONE_Q16) {
             return true;
         }
     }
     return false;
 }
 
-/* Drop tracks whose head is gone, was not seen for too long, or is another track's. A track that is
- * no head ends with the first frame that does not show it. */
+/* Drop tracks whose head is gone, was not seen for too long, or is another track's (method 1 to 3). */
 static void prune(struct ih_tracks *tracks, const struct ih_tracks_params *params,
                   const struct ih_detections *detections)
 {
@@ -372,6 +375,7 @@ static void start_track(struct ih_tracks *tracks, const struct ih_tracks_params 
         .seen_us = tracks->time_us,
         .detection_count = 1,
         .index = index,
+        .sure = detection->head,
     };
     memcpy(track->start_mm_q8, detection->head.centre_mm_q8, sizeof track->start_mm_q8);
     ih_kalman_start(&detection->head, params->measured_mm, &track->filter);

@@ -398,6 +398,31 @@ static void an_expected_head_is_looked_for(void)
     IH_TEST_EQUAL(0, detections.view[0].front, "front", 0);
 }
 
+/* It is looked for where it was seen last, too, if that promises something; where nothing is expected that is not asked. */
+static void a_head_is_looked_for_where_it_was_seen(void)
+{
+    int pass, axis, i;
+
+    for (pass = 0; pass < 4; pass++) {
+        int32_t count = 0;
+
+        make_points(true, false);
+        ih_detections_begin(&detections);
+        params.scan.candidate_max = 0;
+        params.promise_min_q8 = pass == 2 ? 5 * 256 + 1 : 0;
+        params.expected_max = pass == 3 ? 0 : 1;
+        expected.again_count = pass != 0;
+        for (axis = 0; axis < 3; axis++) {
+            expected.again[0].centre_mm_q8[axis] = (int32_t)(head_mm[axis] * 256);
+        }
+        look();
+        for (i = 0; i < detections.detection_count; i++) {
+            count += detections.detection[i].source == IH_SOURCE_EXPECTED;
+        }
+        IH_TEST_EQUAL(pass == 1, count, "found", pass);
+    }
+}
+
 /* More heads may be expected than are looked for again: their rays are looked at all the same. */
 static void only_so_many_expected_heads_are_looked_for(void)
 {
@@ -657,6 +682,7 @@ int main(void)
     RUN_TEST(outlines_exist_for_any_place);
     RUN_TEST(a_head_is_among_the_detections);
     RUN_TEST(an_expected_head_is_looked_for);
+    RUN_TEST(a_head_is_looked_for_where_it_was_seen);
     RUN_TEST(only_so_many_expected_heads_are_looked_for);
     RUN_TEST(views_tell_an_empty_seat_from_hands);
     RUN_TEST(windows_add_up);

@@ -974,16 +974,61 @@ static void a_near_detection_is_better_than_a_probable_one(void)
     }
 }
 
-/* Two heads may be 80 mm apart, and no nearer. */
-static void two_tracks_may_be_as_near_as_80_mm(void)
+/* Nobody has two heads: within an ellipsoid of 150 mm aside and 250 mm in depth there is one track. */
+static void two_tracks_are_as_far_apart_as_two_people(void)
 {
-    add(0, 0, 800, 5);
-    add(80, 0, 800, 4);
-    add(0, 79.996, 800, 4);
-    add(0, 0, 880, 4);
+    static const struct {
+        double x, y, z;
+        bool is_own;
+    } cases[] = {
+        {149, 0, 0, true},   {151, 0, 0, false},   {-151, 0, 0, false},  {0, 149, 0, true},
+        {0, 151, 0, false},  {0, 0, 249, true},    {0, 0, 251, false},   {0, 0, -249, true},
+        {105, 0, 175, true}, {107, 0, 178, false}, {86, -86, 143, true}, {88, 88, -146, false},
+    };
+    int i;
+
+    for (i = 0; i < IH_TEST_COUNT(cases); i++) {
+        setUp();
+        add(0, 0, 1000, 5);
+        add(cases[i].x, cases[i].y, 1000 + cases[i].z, 4);
+        frame();
+        IH_TEST_EQUAL(1, verdict(0).track_id, "first", i);
+        IH_TEST_EQUAL(cases[i].is_own ? 0 : 2, verdict(1).track_id, "second", i);
+    }
+}
+
+/* Where is the track looked for besides its prediction? */
+static void check_again(const double *x_mm, int pass)
+{
+    IH_TEST_EQUAL(x_mm != NULL, expected.again_count, "again", pass);
+    if (x_mm != NULL) {
+        IH_TEST_EQUAL((int32_t)(*x_mm * 256), expected.again[0].centre_mm_q8[0], "where", pass);
+    }
+}
+
+/* A doubtful detection may be a hand's: the head is looked for where it was seen for sure until it is again. */
+static void an_unsure_track_is_looked_for_where_it_was_sure(void)
+{
+    static const double first = 0, sure = 9, later = 12;
+
+    add(first, 0, 900, 1);
     frame();
-    TEST_ASSERT_EQUAL_INT32(3, tracks.track_count);
-    TEST_ASSERT_EQUAL_INT32(0, verdict(2).track_id);
+    check_again(NULL, 0);
+    add(sure, 0, 900, 3);
+    frame();
+    check_again(&first, 1);
+    add(20, 0, 900, 0.2);
+    frame();
+    check_again(NULL, 2);
+    frame();
+    check_again(&sure, 3);
+    add(later, 0, 900, 3);
+    frame();
+    check_again(&sure, 4);
+    frame();
+    check_again(NULL, 5);
+    frame();
+    check_again(&later, 6);
 }
 
 /* Each verdict needs more than its limit. */
@@ -1063,7 +1108,7 @@ static void a_body_gets_no_track(void)
         {0, 300, -100, 1.5, true},    {149, 300, -100, 1.5, true}, {150, 300, -100, 1.5, false},
         {-149, 300, -100, 1.5, true}, {-150, 300, 0, 1.5, false},  {0, 201, -100, 1.5, true},
         {0, 200, -100, 1.5, false},   {0, 399, -100, 1.5, true},   {0, 400, -100, 1.5, false},
-        {0, 300, -249, 1.5, true},    {0, 300, -250, 1.5, false},  {0, 300, 149, 1.5, true},
+        {0, 300, -349, 1.5, true},    {0, 300, -350, 1.5, false},  {0, 300, 149, 1.5, true},
         {0, 300, 150, 1.5, false},    {0, -300, -100, 1.5, false}, {0, 300, -100, -0.999, true},
         {0, 300, -100, -1, false},
     };
@@ -1537,7 +1582,8 @@ int main(void)
     RUN_TEST(a_frame_is_lost_with_fewer_points_than_its_limit);
     RUN_TEST(a_gate_reaches_as_far_as_it_says);
     RUN_TEST(a_near_detection_is_better_than_a_probable_one);
-    RUN_TEST(two_tracks_may_be_as_near_as_80_mm);
+    RUN_TEST(two_tracks_are_as_far_apart_as_two_people);
+    RUN_TEST(an_unsure_track_is_looked_for_where_it_was_sure);
     RUN_TEST(verdicts_need_more_than_their_limits);
     RUN_TEST(a_track_is_continued_down_to_its_limits);
     RUN_TEST(a_head_is_chosen_for_its_position_within_three);
