@@ -21,6 +21,7 @@ def scenes_of_seed(seed):
     act = ACTS[seed % len(ACTS)]
     tilt = str((seed * 7 % 11 - 5) * 6)  # -30 .. 30 degrees
     knock = ("0", "0", "0.01", "0.02")[seed % 4]
+    missing = ("0.2", "0.35", "0.5")[seed % 3]
 
     def scene(name, kind, frames, rig, *more):
         return name, ["--scene", kind, "--frames", str(max(6, frames // 2)), "--rig", rig, "--ambient", ambient,
@@ -44,6 +45,9 @@ def scenes_of_seed(seed):
         scene("room", "room", 20, other, "--background", background),
         scene("clutter", "clutter", 40, rig, "--background", background),
         scene("clutter-other", "clutter", 30, other),
+        scene("missing", "person", 20, rig, "--sequence", "2", "--missing", missing),
+        scene("missing-other", "person", 20, other, "--background", background, "--missing", missing),
+        scene("missing-clutter", "clutter", 20, rig, "--missing", missing),
     ]
 
 

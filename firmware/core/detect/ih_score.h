@@ -25,7 +25,7 @@
 
 #define IH_SCORE_KNOTS 7
 #define IH_SCORE_QUESTIONS 256
-#define IH_SCORE_TREES 160
+#define IH_SCORE_TREES 150
 /* Branches of a tree: the first one, and from branch i on 2i + 1 follows where the answer is no, 2i + 2 where it is yes.
  * Its leaves, from no to yes. */
 #define IH_SCORE_BRANCHES 7
