@@ -63,6 +63,17 @@ class People(unittest.TestCase):
                 pair = (os.path.join(path, name) for path in (directory, again))
                 self.assertTrue(filecmp.cmp(*pair, shallow=False), name)
 
+    def test_missing_dots_are_others_in_each_frame(self):
+        """All else stays: the dots that are there are where they were."""
+        sparse = make(os.path.join(self.work, "missing"), "wide", "calm", SEED, 2, "--missing", "0.5")
+        kept = []
+        for mine, theirs in zip(lines_of(self.dots, "truth.jsonl"), lines_of(sparse, "truth.jsonl")):
+            whole, part = ({dot[0]: dot[1:] for dot in entry["dots"]} for entry in (mine, theirs))
+            self.assertLess(abs(len(part) / len(whole) - 0.5), 0.15)
+            self.assertEqual(part, {index: whole[index] for index in part})
+            kept.append(set(part) & set(whole))
+        self.assertLess(len(kept[0] & kept[1]), 0.4 * len(whole))
+
     def test_another_seed_gives_another_person(self):
         other = make(os.path.join(self.work, "other"), "wide", "calm", SEED + 1, 1)
         mine, theirs = (lines_of(path, "truth.jsonl")[0]["head"]["semi_axes_mm"] for path in (self.dots, other))
@@ -130,11 +141,11 @@ class People(unittest.TestCase):
         import scene
         import sets
         seeds = {}
-        for name in ("learn", "mounted_learn", "judge", "mounted", "mounted_judge"):
+        for name in ("learn", "mounted_learn", "judge", "mounted", "mounted_judge", "missing"):
             seeds[name] = {seed for rig in sets.ALL_RIGS for _, _, seed, _ in sets.sequences(name, rig)}
             seeds[name] |= {seed + scene.SECOND_SEED for seed in seeds[name]}
         for learn in ("learn", "mounted_learn", "mounted"):
-            for judge in ("judge", "mounted_judge"):
+            for judge in ("judge", "mounted_judge", "missing"):
                 self.assertFalse(seeds[learn] & seeds[judge])
 
 

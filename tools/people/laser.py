@@ -33,10 +33,11 @@ class Laser:
         row, column = index // ROWS - ROWS // 2, index % ROWS - ROWS // 2
         self.gain = rng.uniform(0.85, 1.15, DOTS) * (1.0 - 0.2 * (row ** 2 + column ** 2) / 162.0)
         self.gain[DOTS // 2] *= 1.4
-        self.lit = numpy.ones(DOTS)
+        self.missing, self.lit = 0.0, numpy.ones(DOTS, dtype=bool)
 
     def lose(self, fraction, rng):
         """So many dots are not there."""
+        self.missing = fraction
         self.lit = rng.random(DOTS) >= fraction
 
 

@@ -161,7 +161,7 @@ def describe(studio, scene, heads, extra, samples, dots, hits):
         fields["heads"] = [head_entry(head) for head in there or unclear]
     if unclear:
         fields["unclear"] = [head_entry(head) for head in unclear]
-    return fields, {"kind": scene.kind, "people": notes, **extra, "wear": [actor.note() for actor in scene.actors]}
+    return fields, {"kind": scene.kind, "people": notes, **extra, "missing": round(studio.laser.missing, 2), "wear": [actor.note() for actor in scene.actors]}
 
 
 def make(model, out, rig_kind, scene_kind, seed, frames, width=rigs.WIDTH, mount=None, step=1, missing=0.0):
@@ -209,6 +209,10 @@ def main():
     parser.add_argument("--missing", type=float, default=0.0, help="so many dots are not there, others in each frame: 0 to 0.9")
     parser.add_argument("out")
     options = parser.parse_args()
+    if not 0.0 <= options.missing <= 0.9:
+        parser.error("--missing %g: from 0 to 0.9" % options.missing)
+    if options.missing and options.rig == "range":
+        parser.error("--missing: depth images have no dots")
     make(Model(), options.out, options.rig, options.kind, options.seed, options.frames, options.width,
          None if options.tilt is None and options.roll is None else (options.tilt or 0.0, options.roll or 0.0),
          missing=options.missing)

@@ -1,4 +1,4 @@
-"""Makes sets of sequences: python3 sets.py SET OUT [--rigs ...]. The seeds of `learn` and `judge` share nobody."""
+"""Makes sets of sequences: python3 sets.py SET OUT [--rigs ...]. Those to learn from and those to judge by share nobody."""
 
 import argparse
 import os
@@ -19,7 +19,7 @@ SETS = {
     "sample": (90000, 1, 5, 0),
     "mounted": (310000, 2, 24, 8),
     "mounted_judge": (330000, 1, 12, 4),
-    "missing": (350000, 1, 12, 4),
+    "missing": (370000, 1, 12, 4),
 }
 # Sequences of these sets are seen by cameras that hang otherwise than level: tilt (down) and roll, in turn.
 MOUNTS = ((45.0, 0.0), (30.0, 90.0), (60.0, 0.0), (-20.0, 180.0), (0.0, -90.0), (50.0, 30.0), (20.0, -15.0))
@@ -30,8 +30,8 @@ EMPTY_FRAMES = 30
 # follows the people of the level set: kind, first seed after the people's, sequences.
 LEARN_STEP = 4
 LEARN_MORE = (("above", 60000, 80), ("seat", 70000, 180), ("ground", 80000, 250), ("far", 90000, 200), ("hands", 100000, 120))
-# Dots are missing, where they are weak or the sun is strong: these fractions of them. To learn from there are the people of
-# another set again, of every fifth sequence.
+# Of these fractions of the dots, drawn anew in each frame, none is seen; where weak dots are missed they are the same in
+# each. To learn from there are the people of another set again, of every fifth sequence.
 MISSING = (0.15, 0.6)
 AGAIN = {"missing_learn": "learn", "mounted_missing_learn": "mounted_learn"}
 AGAIN_STEP, AGAIN_FIRST = 5, 2
@@ -88,6 +88,8 @@ def main():
     parser.add_argument("out")
     parser.add_argument("--rigs", nargs="+", default=["paper", "wide", "range"], choices=ALL_RIGS)
     options = parser.parse_args()
+    if missing_of(options.set, 0) and "range" in options.rigs:
+        parser.error("depth images have no dots that may be missing: --rigs paper wide")
     model = Model()
     by_rig = [[(rig_kind, *item) for item in sequences(options.set, rig_kind)] for rig_kind in options.rigs]
     for row in zip(*by_rig):
