@@ -188,7 +188,7 @@ static enum ih_err look_at_windows(struct isohead *head, const struct ih_frame *
 static void begin(struct isohead *head, int64_t time_us)
 {
     head->expected.count = 0;
-    head->expected.again_count = 0;
+    head->expected.last_sure_count = 0;
     ih_detections_begin(&head->detections);
     head->predicted.count = 0;
     if (!head->params.is_paper) {

@@ -88,6 +88,10 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     for (int32_t i = 0; i < expected.count; i++) {
         fuzz_tables_head(&input, &expected.head[i]);
     }
+    expected.last_sure_count = fuzz_byte(&input) % (IH_DETECTIONS_EXPECTED_MAX + 1);
+    for (int32_t i = 0; i < expected.last_sure_count; i++) {
+        fuzz_tables_head(&input, &expected.last_sure[i]);
+    }
     memset(&detections, 0xa5, sizeof detections);
     memset(&scratch, 0xa5, sizeof scratch);
     memset(&dots, fuzz_byte(&input) % 8 == 7 ? 0xff : 0, sizeof dots);

@@ -67,6 +67,13 @@ static void check_expected(const struct ih_expected *expected, const struct ih_t
         FUZZ_CHECK(memcmp(&expected->head[i], &tracks->track[i].filter.head,
                           sizeof expected->head[i]) == 0);
     }
+    FUZZ_CHECK(expected->last_sure_count >= 0 && expected->last_sure_count <= expected->count);
+    for (int32_t i = 0; i < expected->last_sure_count; i++) {
+        for (int axis = 0; axis < 3; axis++) {
+            const int32_t centre_mm_q8 = expected->last_sure[i].centre_mm_q8[axis];
+            FUZZ_CHECK(centre_mm_q8 > -(1 << 27) && centre_mm_q8 < 1 << 27);
+        }
+    }
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)

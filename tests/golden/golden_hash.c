@@ -159,8 +159,11 @@ static uint64_t hash_expected(const struct isohead *head)
 {
     const struct ih_expected *expected = &head->expected;
     uint64_t hash = golden_add_word(GOLDEN_FNV_START, expected->count);
-    return golden_add_words(hash, expected->head,
-                            (size_t)expected->count * sizeof expected->head[0]);
+    hash =
+        golden_add_words(hash, expected->head, (size_t)expected->count * sizeof expected->head[0]);
+    hash = golden_add_word(hash, expected->last_sure_count);
+    return golden_add_words(hash, expected->last_sure,
+                            (size_t)expected->last_sure_count * sizeof expected->last_sure[0]);
 }
 
 static uint64_t hash_detections(const struct isohead *head)

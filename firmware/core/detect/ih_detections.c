@@ -184,7 +184,7 @@ void ih_detections_add(const struct ih_points *points, const struct ih_dots *dot
         }
         view_expected(&context, &expected->head[i], &out->view[i]);
     }
-    for (int32_t i = 0; i < ih_min_s32(expected->again_count, params->expected_max); i++) {
-        try_centre(&context, expected->again[i].centre_mm_q8, IH_SOURCE_EXPECTED);
+    for (int32_t i = 0; i < ih_min_s32(expected->last_sure_count, params->expected_max); i++) {
+        try_start(&context, &expected->last_sure[i], IH_SOURCE_EXPECTED);
     }
 }

@@ -3,8 +3,9 @@
  * In:     nests and their hypotheses (ih_hypotheses), points, dots, rig, and where a head is
  *         expected (tracks).
  * Out:    detections, the most probable first, at least spacing_mm apart.
- * Method: candidates are the nests' centres, the candidates of the model scan, the expected heads and where those were last
- *         seen that may be hidden, in this order. Nests and scan candidates that a coarse pre-filter rejects (ih_prescreen), and starts
+ * Method: candidates are the nests' centres, those of the model scan, the expected heads, and where those were
+ *         last seen for sure that were not in the frame before, in this order. Nests and scan candidates that
+ *         a coarse pre-filter rejects (ih_prescreen), and starts
  *         within apart_mm of one before, are passed over. Each other one is fitted for a step (ih_fit),
  *         measured (ih_evidence) and scored (ih_score); those that are not hopeless are fitted to the end,
  *         measured and scored again. Tracks take no detection below log-odds -3: hopeless is 2.5 below
@@ -15,9 +16,9 @@
  *         are near it.
  * Full table: the less probable drop and count in dropped_count.
  * Overflow: points are below 2^25 in Q8 (16 m, slopes up to 8), nests' centres below 2^26.01, expected
- *         ones at most 2^26; a fit moves 240 mm: centres below 2^27, squares of differences 2^57.6.
+ *         ones at most 2^26, last sure ones 2^26.01; a fit moves 240 mm: centres below 2^27, squares of differences 2^57.6.
  * Cost:   up to IH_DETECTIONS_STARTS_MAX = 40 fits a window. Usually 12
- *         candidates, of which 6 are fitted for a step and 3 to the end.
+ *         candidates, of which 6 are fitted for a step and 3 to the end; one more for a head that is hidden.
  */
 #ifndef IH_DETECTIONS_H
 #define IH_DETECTIONS_H
@@ -56,8 +57,8 @@ struct ih_detections_params {
     int32_t hopeless_logit_q10; /* minimum after the first step */
     int32_t spacing_mm;         /* of two detections */
     int32_t nest_max;           /* of them this many are candidates themselves */
-    int32_t expected_max;       /* of the expected heads this many are */
-    int32_t front_min_mm;       /* no head is nearer than this: the lens is there */
+    int32_t expected_max; /* of the expected heads, and of the last sure places, this many are */
+    int32_t front_min_mm; /* no head is nearer than this: the lens is there */
 };
 
 struct ih_detection {
@@ -81,12 +82,12 @@ struct ih_detections {
     struct ih_view view[IH_DETECTIONS_EXPECTED_MAX]; /* by expected head, summed over windows */
 };
 
-/* Heads that are expected, and where those that no detection shows for sure were seen last. */
+/* Heads that are expected, and where those were last seen for sure that the frame before did not show so. */
 struct ih_expected {
     int32_t count;
     struct ih_ellipsoid head[IH_DETECTIONS_EXPECTED_MAX];
-    int32_t again_count;
-    struct ih_ellipsoid again[IH_DETECTIONS_EXPECTED_MAX];
+    int32_t last_sure_count;
+    struct ih_ellipsoid last_sure[IH_DETECTIONS_EXPECTED_MAX];
 };
 
 /* Centres from where fits have begun. */

@@ -14,9 +14,10 @@
 #define GATE_LOGIT_Q10 (4 << 10)
 /* A detection beyond the gate needs this much more: where a fast person's head was there is still a chest. */
 #define FAST_LOGIT_Q10 (2 << 10)
-/* Two heads within this ellipsoid are one person's: another one has no room, or behind it would be hidden. */
+/* Two heads within this are one person's: another one has no room there. */
 #define OWN_ASIDE_MM 150
 #define OWN_DEPTH_MM 250
+/* A head that is not measured, so far behind one that is: it would be hidden. */
 #define HIDDEN_DEPTH_MM 450
 #define ONE_Q16 65536
 /* A head that fewer rays meet has left the pattern. */
@@ -74,6 +75,20 @@ static bool is_next(int64_t earlier_us, int64_t later_us, int32_t gap_us)
     return later_us - earlier_us <= gap_us;
 }
 
+/* How far apart two heads are, as a part of the limits aside and in depth, squared, at most 1: of two people. */
+static int32_t apart2_q16(const struct ih_ellipsoid *head, const struct ih_ellipsoid *other,
+                          int32_t depth_mm)
+{
+    const int32_t limit_mm[3] = {OWN_ASIDE_MM, OWN_ASIDE_MM, depth_mm};
+    int64_t sum_q16 = 0;
+    for (int axis = 0; axis < 3; axis++) {
+        const int64_t off_q8 = (int64_t)head->centre_mm_q8[axis] - other->centre_mm_q8[axis];
+        const int64_t part_q8 = ih_div_round(off_q8, limit_mm[axis]);
+        sum_q16 += part_q8 * part_q8;
+    }
+    return (int32_t)ih_min_s64(sum_q16, ONE_Q16);
+}
+
 void ih_tracks_expect(struct ih_tracks *tracks, const struct ih_tracks_params *params,
                       int64_t time_us, struct ih_expected *expected)
 {
@@ -89,14 +104,15 @@ void ih_tracks_expect(struct ih_tracks *tracks, const struct ih_tracks_params *p
     tracks->has_time = true;
     tracks->time_us = time_us;
     expected->count = tracks->track_count;
-    expected->again_count = 0;
+    expected->last_sure_count = 0;
     for (int32_t i = 0; i < tracks->track_count; i++) {
         struct ih_track *track = &tracks->track[i];
         ih_kalman_predict(&track->filter, step_us, params->acceleration_mm_s2);
         track->index = IH_NONE;
         expected->head[i] = track->filter.head;
-        if (!track->is_sure) {
-            expected->again[expected->again_count++] = track->sure;
+        if (!track->is_sure &&
+            apart2_q16(&track->filter.head, &track->last_sure, HIDDEN_DEPTH_MM) < ONE_Q16) {
+            expected->last_sure[expected->last_sure_count++] = track->last_sure;
         }
         track->is_sure = false;
     }
@@ -139,32 +155,14 @@ struct ih_verdict ih_tracks_verdict(const struct ih_tracks *tracks,
     };
 }
 
-/* How far apart two heads are, as a part of that ellipsoid, squared; 1 and more: of two people. */
-static int64_t apart2_q16(const struct ih_ellipsoid *head, const struct ih_ellipsoid *other,
-                          int32_t depth_mm)
-{
-    const int32_t limit_mm[3] = {OWN_ASIDE_MM, OWN_ASIDE_MM, depth_mm};
-    int64_t sum_q16 = 0;
-    for (int axis = 0; axis < 3; axis++) {
-        const int64_t off_q8 = (int64_t)head->centre_mm_q8[axis] - other->centre_mm_q8[axis];
-        const int64_t part_q8 = ih_div_round(off_q8, limit_mm[axis]);
-        sum_q16 += part_q8 * part_q8;
-    }
-    return sum_q16;
-}
-
 /* Beyond the gate: a head whose person moves fast, and a detection that is one rather than not. */
 static bool fits_fast(const struct ih_tracks_params *params, const struct ih_track *track,
                       const struct ih_detection *detection, int32_t *merit_q10)
 {
-    const int64_t own2_q16 = apart2_q16(&track->filter.head, &detection->head, HIDDEN_DEPTH_MM);
-    if (!track->is_head || detection->logit_q10 <= params->accept_logit_q10 ||
-        own2_q16 >= ONE_Q16) {
-        return false;
-    }
+    const int32_t own2_q16 = apart2_q16(&track->filter.head, &detection->head, HIDDEN_DEPTH_MM);
     *merit_q10 = detection->logit_q10 - FAST_LOGIT_Q10 -
-                 (int32_t)ih_shift_round(own2_q16 * GATE_LOGIT_Q10, 16);
-    return true;
+                 (int32_t)ih_shift_round((int64_t)own2_q16 * GATE_LOGIT_Q10, 16);
+    return track->is_head && detection->logit_q10 > params->accept_logit_q10 && own2_q16 < ONE_Q16;
 }
 
 /* How well a detection continues a track, as log-odds; false: not at all. */
@@ -238,7 +236,7 @@ static void assign(struct ih_tracks *tracks, const struct ih_tracks_params *para
 {
     track->is_sure = detection->logit_q10 > params->accept_logit_q10;
     if (track->is_sure) {
-        track->sure = detection->head;
+        track->last_sure = detection->head;
     }
     track->index = index;
     track->seen_us = tracks->time_us;
@@ -323,7 +321,7 @@ static bool is_double(const struct ih_tracks *tracks, int32_t kept, const struct
     return false;
 }
 
-/* Drop tracks whose head is gone, was not seen for too long, or is another track's (method 1 to 3). */
+/* Drop tracks whose head is gone, was not seen for too long, or is another track's (method 2 and 3). */
 static void prune(struct ih_tracks *tracks, const struct ih_tracks_params *params,
                   const struct ih_detections *detections)
 {
@@ -375,7 +373,8 @@ static void start_track(struct ih_tracks *tracks, const struct ih_tracks_params 
         .seen_us = tracks->time_us,
         .detection_count = 1,
         .index = index,
-        .sure = detection->head,
+        .is_sure = detection->logit_q10 > params->accept_logit_q10,
+        .last_sure = detection->head,
     };
     memcpy(track->start_mm_q8, detection->head.centre_mm_q8, sizeof track->start_mm_q8);
     ih_kalman_start(&detection->head, params->measured_mm, &track->filter);

@@ -10,7 +10,7 @@
  *        1. assigns detections to tracks, the best pair first: within the gate and above keep_logit. One with a
  *           possible head above it, above start_logit, is a body (ih_candidates) and gets and starts no track.
  *           A head may be beyond its gate, too: a detection above accept_logit within an ellipsoid of
- *           150 mm aside and 450 mm in depth, which has no room for a second person (those in it are one person's), for 2 log-odds more.
+ *           150 mm aside and 450 mm in depth, which has no room for a second person, for 2 log-odds more.
  *        2. ends a track without a convincing detection when more than through_percent of the rays
  *           through its head go on and fewer than front_percent are stopped before it, as over an empty
  *           seat, or when fewer than 4 rays meet it: it has left the pattern. A frame with fewer than
@@ -20,10 +20,12 @@
  *           when all frames of the last blind_us were lost and did not show them: the laser may have failed, or
  *           somebody has left a room whose walls are beyond the range. Where nothing hides the head and the frame
  *           is not lost, that counts as a detection with log-odds keep_logit. A track that is no head yet ends
- *           with the first frame without a detection, and so does the younger of two that are one person's.
- *        4. starts tracks with the remaining detections above start_logit, while there is room.
- *        What a hand before the head shows may have sent its track astray: fits begin where the head was
- *        seen for sure, too, until it is again.
+ *           with the first frame without a detection. Nobody has two heads: of two tracks within 150 mm aside and
+ *           250 mm in depth, where another head has no room, the younger ends.
+ *        4. starts tracks with the remaining detections above start_logit that are not so near another track,
+ *           while there is room.
+ *        A hand before a head may draw its track away. So a head without a detection above accept_logit in the
+ *        frame before is looked for where it had the last one, too, if that is within the ellipsoid of 1.
  *        A detection moves its track by the less, the less it looks like a head: it may be a hand before it.
  *        A track's log-odds are a running mean of its detections'. A head ends as one only when the mean says
  *        so clearly, below drop_logit: what moves on smoothly from a head is more probably one than a new thing
@@ -77,8 +79,8 @@ struct ih_track {
     struct ih_kalman filter;
     int32_t start_mm_q8[3]; /* of the first detection */
     bool has_moved;
-    bool is_sure;             /* its last frame had a detection above accept_logit; */
-    struct ih_ellipsoid sure; /* the last one of those, or the first of all */
+    bool is_sure;                  /* its last frame had a detection above accept_logit; */
+    struct ih_ellipsoid last_sure; /* the last one of those, or the first of all */
     int64_t seen_us;
     int32_t detection_count; /* so far, at most 1000 */
     int32_t index; /* of its head in this frame, as for ih_tracks_head; IH_NONE: none is reported */

@@ -405,15 +405,16 @@ static void the_order_of_detections_does_not_matter(void)
 
         setUp();
         for (i = 0; i < 4; i++) {
-            add((double)ih_test_between(&random, -60, 60) + 130 * i,
+            add((double)ih_test_between(&random, -60, 60) + 330 * i,
                 (double)ih_test_between(&random, -90, 90),
                 800 + (double)ih_test_between(&random, -90, 90), 2);
         }
         frame();
+        TEST_ASSERT_EQUAL_INT32(4, tracks.track_count);
         start = tracks;
         for (i = 0; i < 12; i++) {
             order[i] = i;
-            drawn[i] = *add((double)ih_test_between(&random, -100, 500) + i / 16.0,
+            drawn[i] = *add((double)ih_test_between(&random, -100, 1100) + i / 16.0,
                             (double)ih_test_between(&random, -120, 120),
                             800 + (double)ih_test_between(&random, -120, 120),
                             ih_test_unit(&random) * 10 - 5);
@@ -525,12 +526,14 @@ static void an_id_in_use_is_not_given_again(void)
 /* Two tracks at the same position are one head: the older one's, without a gap. */
 static void of_two_tracks_at_one_position_the_older_stays(void)
 {
-    add(-60, 0, 900, 3);
-    add(60, 0, 900, 3);
+    add(-80, 0, 900, 3);
+    add(80, 0, 900, 3);
     frame();
-    add(-5, 0, 900, 3);
-    add(20, 0, 900, 3);
+    TEST_ASSERT_EQUAL_INT32(2, tracks.track_count);
+    add(-30, 0, 900, 3);
+    add(30, 0, 900, 3);
     frame();
+    TEST_ASSERT_EQUAL_INT32(1, tracks.track_count);
     frames_with(3, 10, 0, 900, 3);
     TEST_ASSERT_EQUAL_INT32(1, tracks.track_count);
     TEST_ASSERT_EQUAL_INT32(1, tracks.track[0].id);
@@ -978,7 +981,7 @@ static void a_near_detection_is_better_than_a_probable_one(void)
 static void two_tracks_are_as_far_apart_as_two_people(void)
 {
     static const struct {
-        double x, y, z;
+        double x_mm, y_mm, z_mm;
         bool is_own;
     } cases[] = {
         {149, 0, 0, true},   {151, 0, 0, false},   {-151, 0, 0, false},  {0, 149, 0, true},
@@ -990,45 +993,84 @@ static void two_tracks_are_as_far_apart_as_two_people(void)
     for (i = 0; i < IH_TEST_COUNT(cases); i++) {
         setUp();
         add(0, 0, 1000, 5);
-        add(cases[i].x, cases[i].y, 1000 + cases[i].z, 4);
+        add(cases[i].x_mm, cases[i].y_mm, 1000 + cases[i].z_mm, 4);
         frame();
         IH_TEST_EQUAL(1, verdict(0).track_id, "first", i);
         IH_TEST_EQUAL(cases[i].is_own ? 0 : 2, verdict(1).track_id, "second", i);
     }
 }
 
-/* Where is the track looked for besides its prediction? */
-static void check_again(const double *x_mm, int pass)
+/* Where are heads looked for besides their predictions? */
+static void check_last_sure(int count, double first_mm, int pass)
 {
-    IH_TEST_EQUAL(x_mm != NULL, expected.again_count, "again", pass);
-    if (x_mm != NULL) {
-        IH_TEST_EQUAL((int32_t)(*x_mm * 256), expected.again[0].centre_mm_q8[0], "where", pass);
+    IH_TEST_EQUAL(count, expected.last_sure_count, "last sure places", pass);
+    if (count > 0) {
+        IH_TEST_EQUAL((int32_t)(first_mm * 256), expected.last_sure[0].centre_mm_q8[0], "where",
+                      pass);
     }
 }
 
 /* A doubtful detection may be a hand's: the head is looked for where it was seen for sure until it is again. */
 static void an_unsure_track_is_looked_for_where_it_was_sure(void)
 {
-    static const double first = 0, sure = 9, later = 12;
+    static const struct {
+        double x_mm, logit; /* of this frame's detection; none with log-odds 0 */
+        int count;          /* of last sure places, */
+        double last_mm;     /* where */
+    } frames[] = {
+        {3, 0.5, 0, 0}, {9, 3, 1, 3},   {20, 0.5, 0, 0}, {20, 0.501, 1, 9}, {25, 0, 0, 0},
+        {25, 0, 1, 20}, {12, 2, 1, 20}, {12, 2, 0, 0},   {12, 0, 0, 0},     {12, 2, 1, 12},
+    };
+    int i;
 
-    add(first, 0, 900, 1);
+    view = front;
+    for (i = 0; i < IH_TEST_COUNT(frames); i++) {
+        if (frames[i].logit > 0) {
+            add(frames[i].x_mm, 0, 900, frames[i].logit);
+        }
+        frame();
+        check_last_sure(frames[i].count, frames[i].last_mm, i);
+    }
+    ih_tracks_forget(&tracks);
     frame();
-    check_again(NULL, 0);
-    add(sure, 0, 900, 3);
-    frame();
-    check_again(&first, 1);
-    add(20, 0, 900, 0.2);
-    frame();
-    check_again(NULL, 2);
-    frame();
-    check_again(&sure, 3);
-    add(later, 0, 900, 3);
-    frame();
-    check_again(&sure, 4);
-    frame();
-    check_again(NULL, 5);
-    frame();
-    check_again(&later, 6);
+    check_last_sure(0, 0, i);
+}
+
+/* Each track has a place of its own; one that is sure from its first frame on has none. */
+static void last_sure_places_are_those_of_unsure_tracks(void)
+{
+    int pass;
+
+    for (pass = 0; pass < 2; pass++) {
+        setUp();
+        add(-300, 0, 900, 3);
+        add(300, 0, 900, 3);
+        frame();
+        add(-300, 0, 900, pass == 0 ? 3 : 0);
+        add(300, 0, 900, pass == 0 ? 0 : 3);
+        frame();
+        check_last_sure(0, 0, pass);
+        frame();
+        check_last_sure(1, pass == 0 ? 300 : -300, pass);
+    }
+    frame_at(time_us + params.gap_us + 1);
+    check_last_sure(0, 0, pass);
+}
+
+/* Who has walked on is not where the last sure detection was. */
+static void a_last_sure_place_is_near(void)
+{
+    int i;
+
+    view = front;
+    frames_with(2, 0, 0, 900, 3);
+    for (i = 1; i <= 12; i++) {
+        add(30 * i, 0, 900, 0.3);
+        frame();
+        check_last_sure(i > 1 && expected.head[0].centre_mm_q8[0] < 150 * 256, 0, i);
+    }
+    TEST_ASSERT_TRUE(expected.head[0].centre_mm_q8[0] > 150 * 256);
+    TEST_ASSERT_EQUAL_INT32(1, tracks.track_count);
 }
 
 /* Each verdict needs more than its limit. */
@@ -1584,6 +1626,8 @@ int main(void)
     RUN_TEST(a_near_detection_is_better_than_a_probable_one);
     RUN_TEST(two_tracks_are_as_far_apart_as_two_people);
     RUN_TEST(an_unsure_track_is_looked_for_where_it_was_sure);
+    RUN_TEST(last_sure_places_are_those_of_unsure_tracks);
+    RUN_TEST(a_last_sure_place_is_near);
     RUN_TEST(verdicts_need_more_than_their_limits);
     RUN_TEST(a_track_is_continued_down_to_its_limits);
     RUN_TEST(a_head_is_chosen_for_its_position_within_three);
