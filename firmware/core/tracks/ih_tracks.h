@@ -10,7 +10,7 @@
  *        1. assigns detections to tracks, the best pair first: within the gate and above keep_logit. One with a
  *           possible head above it, above start_logit, is a body (ih_candidates) and gets and starts no track.
  *           A head may be beyond its gate, too: a detection above accept_logit within an ellipsoid of
- *           150 mm aside and 450 mm in depth, which has no room for a second person, for 2 log-odds more.
+ *           150 mm aside and 450 mm in depth, in which a second person would be hidden, for 2 log-odds more.
  *        2. ends a track without a convincing detection when more than through_percent of the rays
  *           through its head go on and fewer than front_percent are stopped before it, as over an empty
  *           seat, or when fewer than 4 rays meet it: it has left the pattern. A frame with fewer than
