@@ -23,7 +23,7 @@ FAST_LOGIT = 2.0
 AXES_FRACTION = 0.25
 SLOW_S = 0.1
 VIEW_RAYS_MIN = 4
-# Heads of one person: nobody has two, and behind a head there is no other one in view.
+# Heads of one person: measured ones, which another one has no room between; and one that is expected behind another.
 OWN_MM, HIDDEN_MM = np.array([150.0, 150, 250]), np.array([150.0, 150, 450])
 BODY_MM = ((-150, 150), (200, 400), (-350, 150))
 

@@ -161,7 +161,8 @@ def describe(studio, scene, heads, extra, samples, dots, hits):
         fields["heads"] = [head_entry(head) for head in there or unclear]
     if unclear:
         fields["unclear"] = [head_entry(head) for head in unclear]
-    return fields, {"kind": scene.kind, "people": notes, **extra, "missing": round(studio.laser.missing, 2), "wear": [actor.note() for actor in scene.actors]}
+    return fields, {"kind": scene.kind, "people": notes, **extra, "missing": round(studio.laser.missing, 2),
+                    "wear": [actor.note() for actor in scene.actors]}
 
 
 def make(model, out, rig_kind, scene_kind, seed, frames, width=rigs.WIDTH, mount=None, step=1, missing=0.0):

@@ -3,10 +3,10 @@
  * In:     nests and their hypotheses (ih_hypotheses), points, dots, rig, and where a head is
  *         expected (tracks).
  * Out:    detections, the most probable first, at least spacing_mm apart.
- * Method: candidates are the nests' centres, those of the model scan, the expected heads, and where those were
- *         last seen for sure that were not in the frame before, in this order. Nests and scan candidates that
- *         a coarse pre-filter rejects (ih_prescreen), and starts
- *         within apart_mm of one before, are passed over. Each other one is fitted for a step (ih_fit),
+ * Method: candidates are the nests' centres, those of the model scan, the expected heads, and the last sure places
+ *         of heads that the frame before left in doubt, in this order. Nests and scan candidates that a coarse
+ *         pre-filter rejects (ih_prescreen), and starts within apart_mm of one before, are passed over. Each
+ *         other one is fitted for a step (ih_fit),
  *         measured (ih_evidence) and scored (ih_score); those that are not hopeless are fitted to the end,
  *         measured and scored again. Tracks take no detection below log-odds -3: hopeless is 2.5 below
  *         that after a step. A range frame has several windows: begin once a frame, add once a window.
@@ -16,9 +16,10 @@
  *         are near it.
  * Full table: the less probable drop and count in dropped_count.
  * Overflow: points are below 2^25 in Q8 (16 m, slopes up to 8), nests' centres below 2^26.01, expected
- *         ones at most 2^26, last sure ones 2^26.01; a fit moves 240 mm: centres below 2^27, squares of differences 2^57.6.
- * Cost:   up to IH_DETECTIONS_STARTS_MAX = 40 fits a window. Usually 12
- *         candidates, of which 6 are fitted for a step and 3 to the end; one more for a head that is hidden.
+ *         ones at most 2^26, last sure ones 2^26.01; a fit moves 240 mm: centres below 2^27, squares of
+ *         differences 2^57.6.
+ * Cost:   up to IH_DETECTIONS_STARTS_MAX = 40 fits a window. Usually 12 candidates, of which 6 are fitted for a step
+ *         and 3 to the end; one more for a head that is hidden.
  */
 #ifndef IH_DETECTIONS_H
 #define IH_DETECTIONS_H
@@ -82,7 +83,7 @@ struct ih_detections {
     struct ih_view view[IH_DETECTIONS_EXPECTED_MAX]; /* by expected head, summed over windows */
 };
 
-/* Heads that are expected, and where those were last seen for sure that the frame before did not show so. */
+/* Heads that are expected, and the last sure places of those that the frame before left in doubt. */
 struct ih_expected {
     int32_t count;
     struct ih_ellipsoid head[IH_DETECTIONS_EXPECTED_MAX];

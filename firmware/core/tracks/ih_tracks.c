@@ -17,7 +17,7 @@
 /* Two heads within this are one person's: another one has no room there. */
 #define OWN_ASIDE_MM 150
 #define OWN_DEPTH_MM 250
-/* A head that is not measured, so far behind one that is: it would be hidden. */
+/* The same of one that is expected, not measured: so far behind another one it would be hidden. */
 #define HIDDEN_DEPTH_MM 450
 #define ONE_Q16 65536
 /* A head that fewer rays meet has left the pattern. */
