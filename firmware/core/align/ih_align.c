@@ -15,12 +15,9 @@
 #define ON_PX_Q12 1229          /* 0.3 px */
 #define BESIDE_FROM_PX_Q12 2458 /* 0.6 px */
 #define BESIDE_TO_PX_Q12 4915   /* 1.2 px */
-/* Frames of the mean; from then on older ones fade. */
-#define FRAMES_MAX 16
-/* So many frames are taken whole; of later ones every second slot is enough. */
-#define FRAMES_WHOLE 4
-/* A fit that moves dots by less needs no second step. */
-#define NEAR_PX_Q12 205 /* 0.05 px */
+#define FRAMES_MAX 16           /* of the mean; from then on older ones fade */
+#define FRAMES_WHOLE 4          /* are taken whole; of later ones every second slot is enough */
+#define NEAR_PX_Q12 205         /* 0.05 px: a fit that moves dots by less needs no second step */
 /* The rig is moved when the mean says so by more than this (root mean square over the dots). */
 #define MOVE_FIRST_PX_Q12 410 /* 0.1 px: labels hold up to there */
 #define MOVE_PX_Q12 205       /* 0.05 px, once it has moved */
@@ -38,6 +35,8 @@
 #define DEPTH_MAX_RAD_Q30 14992130
 #define FOCAL_MAX_Q30 16106127 /* 1.5 % */
 #define MARGIN_PX_Q12 (4 * 4096)
+/* So much farther than the working range a rotation of depth puts the dots of a wall: 8 px for 0.5 degrees. */
+#define FAR_MARGIN_PX_Q12 (7 * 4096)
 /* At first so many of the dots must lie on the lines that nobody searches; later three quarters of what was the
  * best since a search. */
 #define TRUSTED_FIRST_Q8 160
@@ -132,7 +131,7 @@ static struct sight look(const struct ih_dot_rows *rows, const struct ih_rig *ri
     for (int32_t slot = 0; slot < IH_SLOTS; slot += step) {
         struct ih_align_dot dot[IH_ALIGN_NEAR_MAX];
         const int32_t count = ih_align_near(rows, &rig->line[slot], band, &first, dot);
-        const int32_t far_px_q12 = rig->line[slot].t_far_px_q12 - MARGIN_PX_Q12;
+        const int32_t far_px_q12 = rig->line[slot].t_far_px_q12 - FAR_MARGIN_PX_Q12;
         for (int32_t i = 0; i < count; i++) {
             judge(dot[i], far_px_q12, &sight);
         }
@@ -281,26 +280,28 @@ static bool question(struct ih_align *align, const struct ih_dots *dots, struct 
     return true;
 }
 
-/* Labels are short where dots lie on their lines and in the working range, or hardly beyond it: a rotation of depth that no
- * plane shows. */
-static void search_depth(struct ih_align *align, const struct ih_dots *dots, struct ih_rig *rig,
+/* Labels are short where dots lie on their lines and not far beyond the working range: a rotation of depth that no plane
+ * shows. False: it is not that. */
+static bool search_depth(struct ih_align *align, const struct ih_dots *dots, struct ih_rig *rig,
                          struct ih_dot_rows *rows, struct ih_align_scratch *scratch)
 {
     int32_t moved_px_q12[IH_ALIGN_AXES];
     const int32_t before_px_q12 = align->moved_px_q12[IH_ALIGN_DEPTH];
     if (!ih_align_search_depth(&align->axes, align->prior_px_q12, rig, rows, scratch,
                                moved_px_q12)) {
-        return;
+        return false;
     }
     for (int k = 0; k < IH_ALIGN_AXES; k++) {
         moved_px_q12[k] += align->moved_px_q12[k];
     }
     const int32_t enough = ih_max_s32(excess_min(rows->dot_count), align->excess / 2);
-    if (is_within_limits(moved_px_q12, rig) &&
-        try_motion(align, dots, moved_px_q12, enough, rig, rows) > 0) {
+    const bool is_depth = is_within_limits(moved_px_q12, rig) &&
+                          try_motion(align, dots, moved_px_q12, enough, rig, rows) > 0;
+    if (is_depth) {
         note_change(align, before_px_q12, rig);
         forget(align);
     }
+    return is_depth;
 }
 
 /* The first searches that find nothing follow each other; later there are up to PAUSE_MAX frames between them. */
@@ -327,13 +328,12 @@ void ih_align_find(struct ih_align *align, const struct ih_dots *dots, struct ih
     }
     align->excess = excess_of(sight.on, sight.beside);
     align->near_excess = excess_of(sight.near_on, sight.near_beside);
+    const bool is_depth = align->is_short && search_depth(align, dots, rig, rows, scratch);
     bool is_due = false;
-    if (!is_where_it_was(align, sight, rows->dot_count)) {
+    if (!is_depth && !is_where_it_was(align, sight, rows->dot_count)) {
         align->pause--;
         is_due = align->pause < 0;
-    } else if (align->is_short) {
-        search_depth(align, dots, rig, rows, scratch);
-    } else if (align->unsettled_frames > 0) {
+    } else if (!is_depth && align->unsettled_frames > 0) {
         is_due = question(align, dots, rig, rows);
     }
     if (is_due) {
@@ -481,7 +481,7 @@ void ih_align_learn(struct ih_align *align, const struct ih_labels *labels, stru
     struct ih_align_sums frame;
     int32_t frame_px_q12[IH_ALIGN_AXES], mean_px_q12[IH_ALIGN_AXES];
     int32_t sigma_px_q12[IH_ALIGN_AXES], next_px_q12[IH_ALIGN_AXES];
-    align->is_short = 2 * labels->labelled_count < align->near_excess;
+    align->is_short = 4 * labels->labelled_count < 3 * align->near_excess;
     if (align->is_short) {
         align->now.is_depth_known = false;
         align->now.depth_sigma_rad_q30 =

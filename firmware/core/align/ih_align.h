@@ -11,10 +11,10 @@
  *            not show it.
  *         2. If not, search (ih_align_search): back at the file's lines, or around them. The result is taken when more dots
  *            lie on its lines than before. After searches in vain there are pauses of up to 8 frames. If dots lie on
- *            the lines and in the working range, widened by 4 px, but less than half as many get labels, depth alone is
- *            searched for, and must be 5 times its uncertainty. In one frame a wrong motion may have the most dots, and
- *            its own labels keep it: in each of the 16 frames after a search lines go back to where they were if no
- *            fewer dots lie there, or are searched for again, unless hardly a dot lies beside them.
+ *            the lines and in the working range, widened by 7 px, but less than three quarters as many get labels, depth
+ *            alone is searched for first, and must be 5 times its uncertainty. In one frame a wrong motion may have the
+ *            most dots, and its own labels keep it: in each of the 16 frames after a search lines go back to where they
+ *            were if no fewer dots lie there, or are searched for again, unless hardly a dot lies beside them.
  *         3. Learn, after the labels, if they are at least a quarter as many as the dots on the lines: a fit to how far
  *            labelled dots lie across their lines, averaged with those of up to 16 frames before. A frame that differs
  *            starts the mean anew. Frames of fewer than 30 dots teach nothing. The lines move when the mean is 0.1 px
@@ -74,11 +74,11 @@ struct ih_align {
     int32_t odd;         /* slots of the last frame, after the first frames */
     int32_t excess;      /* of this frame: dots on the lines, less those that chance puts there */
     int32_t near_excess; /* the same of dots that are no farther than the working range */
-    bool is_short;       /* the frame before had labels for less than half of the latter */
-    bool is_depth_new;   /* depths have changed by more than tracks follow; the caller clears it */
-    int32_t vain_count;  /* searches that found nothing, one after the other */
-    int32_t pause;       /* frames until the next one */
-    int32_t trusted_q8;  /* fraction of the dots on the lines that is good enough */
+    bool is_short;      /* the frame before had labels for less than three quarters of the latter */
+    bool is_depth_new;  /* depths have changed by more than tracks follow; the caller clears it */
+    int32_t vain_count; /* searches that found nothing, one after the other */
+    int32_t pause;      /* frames until the next one */
+    int32_t trusted_q8; /* fraction of the dots on the lines that is good enough */
     /* Frames since a search moved the lines, and where they were before; 0: what it found is not questioned any more. */
     int32_t unsettled_frames, settled_px_q12[IH_ALIGN_AXES];
 };
