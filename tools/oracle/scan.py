@@ -17,7 +17,7 @@ RING_INNER, RING_OUTER = 1.3, 1.9
 RING_EMPTY, RING_NEAR, RING_FRACTION = 45 / 64, -38 / 64, 0.6
 RAYS_MIN = 8
 # What 16 bits may be off by, with the depth in mm: see ih_template.h.
-ERROR_E, ERROR_RADIUS2, ERROR_DEPTH_MM = (7.9e-7, 0.0009), (4.3e-6, 0.0130), 1.6
+ERROR_E, ERROR_RADIUS2, ERROR_DEPTH = (1.58e-6, 0.0009), (8.6e-6, 0.0180), (1.12e-6, 0.0095)
 
 
 def centres_behind(ray_table):
@@ -46,14 +46,14 @@ def template_score(ray_table, centre):
     semi = np.array(MEAN_SEMI_MM, float)
     at, nearest, radius2, _, near = ellipsoid.cross(centre, semi, ray_table.origin, ray_table.slope)
     away = centre[2] - ray_table.origin[2]
-    error_e, error2 = [per_mm * away + fixed for per_mm, fixed in (ERROR_E, ERROR_RADIUS2)]
+    error_e, error2, error_depth = [per_mm * away + fixed for per_mm, fixed in (ERROR_E, ERROR_RADIUS2, ERROR_DEPTH)]
     seen, empty = ray_table.state == scenes.SEEN, ray_table.state == scenes.EMPTY
     depth = ray_table.point[:, 2]
     steep = 1 + ((ray_table.slope * semi[2] / semi[:2])**2).sum(axis=1)
-    near = near & (steep < 2)
+    near = near & (steep < 3)
     behind = [(depth - centre[2]) / semi[2] - nearest[:, 2]
               + np.sqrt(np.maximum(0, 1 - radius2 + off) / steep) for off in (-error2, error2)]
-    behind = [semi[2] * behind[0] - ERROR_DEPTH_MM, semi[2] * behind[1] + ERROR_DEPTH_MM]
+    behind = [semi[2] * (behind[0] - error_depth), semi[2] * (behind[1] + error_depth)]
     aside = np.abs(at[:, 0] * semi[0]) - at[:, 1] * semi[1]  # more down when negative
     off_mm = error_e * (semi[0] + semi[1])
     ends = []

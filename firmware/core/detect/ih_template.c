@@ -26,20 +26,21 @@
 #define X_OVER_Y_Q14 RATIO_Q14(IH_HEAD_SEMI_X_MM, IH_HEAD_SEMI_Y_MM)
 #define Z_OVER_X_Q14 RATIO_Q14(IH_HEAD_SEMI_Z_MM, IH_HEAD_SEMI_X_MM)
 #define Z_OVER_Y_Q14 RATIO_Q14(IH_HEAD_SEMI_Z_MM, IH_HEAD_SEMI_Y_MM)
-/* Offsets are limited to 2.75 semi-axes. */
-#define OFFSET_MAX_Q11 5632
+/* Offsets are limited to 3.4 semi-axes. */
+#define OFFSET_MAX_Q11 6963
 /* Fractions of OFFSET_MAX_Q11, rounded up: the ring's outer rim; a head's rim; and how far down a ray
  * of the ring can pass that is not more down than aside, in mm. */
-#define RING_Q12 2875    /* 1.93 */
-#define THROUGH_Q12 1520 /* 1.02 */
-#define BELOW_Q12 1639   /* 1.1; it is 1.08 */
-/* Depths against the centre's are limited to 2 semi-axes: Q1 mm. */
-#define DEPTH_OFF_MAX_Q1 (2 * 2 * IH_HEAD_SEMI_Z_MM)
+#define RING_Q12 2326    /* 1.93 */
+#define THROUGH_Q12 1229 /* 1.02 */
+#define BELOW_Q12 1326   /* 1.1; it is 1.08 */
+/* Depths against the centre's are limited to 1.55 semi-axes, so that with t they fit 16 bits: Q1 mm. A head ends at 1. */
+#define DEPTH_OFF_MAX_Q1 (2 * 155 * IH_HEAD_SEMI_Z_MM / 100)
 /* 64ths of a Q1 mm as a fraction of the semi-axis, Q12, of 2^16. */
 #define DEPTH_Q16 (((1 << 21) + IH_HEAD_SEMI_Z_MM / 2) / IH_HEAD_SEMI_Z_MM)
 #define ON_SURFACE_MM 32
 /* The same as a fraction of the semi-axis. */
 #define TOUCH_Q13 ((ON_SURFACE_MM * 8192 + IH_HEAD_SEMI_Z_MM / 2) / IH_HEAD_SEMI_Z_MM)
+#define ONE_Q13 (1 << 13)
 #define ONE_Q14 (1 << 14)
 #define DEPTH_MIN_MM 227
 #define DEPTH_MAX_MM 16100
@@ -55,22 +56,22 @@ static void fill_ray(const struct ih_ray *ray, struct ih_template_table *out, in
 {
     const bool is_seen = ray->state == IH_RAY_SEEN;
     const bool is_empty = ray->state == IH_RAY_EMPTY;
-    const int32_t x_q14 = ray->slope_x_q20 >> 6;
-    const int32_t y_q14 = ray->slope_y_q20 >> 6;
+    const int32_t x_q13 = ray->slope_x_q20 >> 7;
+    const int32_t y_q13 = ray->slope_y_q20 >> 7;
     /* slopes below 2^16.1 times 2^14.4; cut, so that squares fit */
-    const int32_t gx_q15 = ih_clamp_s32(x_q14 * Z_OVER_X_Q14 >> 13, -(1 << 15), 1 << 15);
-    const int32_t gy_q15 = ih_clamp_s32(y_q14 * Z_OVER_Y_Q14 >> 13, -(1 << 15), 1 << 15);
-    const uint32_t gg_q30 = (uint32_t)(gx_q15 * gx_q15) + (uint32_t)(gy_q15 * gy_q15);
-    if (gg_q30 >= 1U << 30) { /* too steep for 16 bits: it passes no head */
-        out->slope_q14[0][at] = x_q14 < 0 ? INT16_MIN : INT16_MAX;
-        out->slope_q14[1][at] = y_q14 < 0 ? INT16_MIN : INT16_MAX;
+    const int32_t gx_q14 = ih_clamp_s32(x_q13 * Z_OVER_X_Q14 >> 13, -(1 << 15), 1 << 15);
+    const int32_t gy_q14 = ih_clamp_s32(y_q13 * Z_OVER_Y_Q14 >> 13, -(1 << 15), 1 << 15);
+    const uint32_t gg_q28 = (uint32_t)(gx_q14 * gx_q14) + (uint32_t)(gy_q14 * gy_q14);
+    if (gg_q28 >= 1U << 29) { /* too steep for 16 bits: it passes no head */
+        out->slope_q13[0][at] = x_q13 < 0 ? INT16_MIN : INT16_MAX;
+        out->slope_q13[1][at] = y_q13 < 0 ? INT16_MIN : INT16_MAX;
         return;
     }
-    out->slope_q14[0][at] = (int16_t)x_q14;
-    out->slope_q14[1][at] = (int16_t)y_q14;
-    out->g_q15[0][at] = (int16_t)gx_q15;
-    out->g_q15[1][at] = (int16_t)gy_q15;
-    out->inverse_q15[at] = saturate_s16((int32_t)((1U << 30) / ((1U << 15) + (gg_q30 >> 15))));
+    out->slope_q13[0][at] = (int16_t)x_q13;
+    out->slope_q13[1][at] = (int16_t)y_q13;
+    out->g_q14[0][at] = (int16_t)gx_q14;
+    out->g_q14[1][at] = (int16_t)gy_q14;
+    out->inverse_q15[at] = saturate_s16((int32_t)((1U << 30) / ((1U << 15) + (gg_q28 >> 13))));
     out->depth_mm_q1[at] = saturate_s16(is_seen ? ray->point_mm_q8[2] >> 7 : NOWHERE_Q1);
     out->inside[at] = (int16_t)(is_empty ? VALUE_EMPTY : VALUE_NEARER);
     out->around[at] = (int16_t)(is_seen ? AROUND_NEAR : is_empty ? AROUND_EMPTY : 0);
@@ -91,30 +92,30 @@ static void set_lines(struct ih_template_table *out)
 {
     for (int32_t line = 0; line < IH_TEMPLATE_COLUMN; line++) {
         for (int axis = 0; axis < 2; axis++) {
-            out->max_q14[axis][line] = line < IH_GRID ? INT16_MIN : INT16_MAX;
-            out->min_q14[axis][line] = line < IH_GRID ? INT16_MAX : INT16_MIN;
+            out->max_q13[axis][line] = line < IH_GRID ? INT16_MIN : INT16_MAX;
+            out->min_q13[axis][line] = line < IH_GRID ? INT16_MAX : INT16_MIN;
         }
     }
     for (int32_t column = 0; column < IH_GRID; column++) {
-        const int16_t *x_q14 = &out->slope_q14[0][column * IH_TEMPLATE_COLUMN];
-        const int16_t *y_q14 = &out->slope_q14[1][column * IH_TEMPLATE_COLUMN];
-        int16_t max_q14 = INT16_MIN, min_q14 = INT16_MAX;
+        const int16_t *x_q13 = &out->slope_q13[0][column * IH_TEMPLATE_COLUMN];
+        const int16_t *y_q13 = &out->slope_q13[1][column * IH_TEMPLATE_COLUMN];
+        int16_t max_q13 = INT16_MIN, min_q13 = INT16_MAX;
         for (int32_t row = 0; row < IH_GRID; row++) {
-            max_q14 = max_s16(max_q14, x_q14[row]);
-            min_q14 = min_s16(min_q14, x_q14[row]);
-            out->max_q14[1][row] = max_s16(out->max_q14[1][row], y_q14[row]);
-            out->min_q14[1][row] = min_s16(out->min_q14[1][row], y_q14[row]);
+            max_q13 = max_s16(max_q13, x_q13[row]);
+            min_q13 = min_s16(min_q13, x_q13[row]);
+            out->max_q13[1][row] = max_s16(out->max_q13[1][row], y_q13[row]);
+            out->min_q13[1][row] = min_s16(out->min_q13[1][row], y_q13[row]);
         }
-        out->max_q14[0][column] = max_q14;
-        out->min_q14[0][column] = min_q14;
+        out->max_q13[0][column] = max_q13;
+        out->min_q13[0][column] = min_q13;
     }
     for (int axis = 0; axis < 2; axis++) {
-        int16_t *max_q14 = out->max_q14[axis];
-        int16_t *min_q14 = out->min_q14[axis];
+        int16_t *max_q13 = out->max_q13[axis];
+        int16_t *min_q13 = out->min_q13[axis];
         for (int32_t line = 1; line < IH_GRID; line++) {
             const int32_t back = IH_GRID - 1 - line;
-            max_q14[line] = max_s16(max_q14[line], max_q14[line - 1]);
-            min_q14[back] = min_s16(min_q14[back], min_q14[back + 1]);
+            max_q13[line] = max_s16(max_q13[line], max_q13[line - 1]);
+            min_q13[back] = min_s16(min_q13[back], min_q13[back + 1]);
         }
     }
 }
@@ -122,15 +123,15 @@ static void set_lines(struct ih_template_table *out)
 /* Half sides of the box that holds every ray that contributes, see ih_template.h. */
 static void set_reach(struct ih_template_table *out)
 {
-    int32_t g_max_q15[2] = {0, 0};
+    int32_t g_max_q14[2] = {0, 0};
     for (int axis = 0; axis < 2; axis++) {
         for (int32_t at = 0; at < IH_TEMPLATE_CELLS; at++) {
-            g_max_q15[axis] = ih_max_s32(g_max_q15[axis], ih_abs_s32(out->g_q15[axis][at]));
+            g_max_q14[axis] = ih_max_s32(g_max_q14[axis], ih_abs_s32(out->g_q14[axis][at]));
         }
     }
     /* sqrt(1 + g2) is below 1 + g2 / 2 */
-    const int32_t wide_q14 = ONE_Q14 + (g_max_q15[0] * g_max_q15[0] >> 17) + 1;
-    const int32_t high_q14 = ONE_Q14 + (g_max_q15[1] * g_max_q15[1] >> 17) + 1;
+    const int32_t wide_q14 = ONE_Q14 + (g_max_q14[0] * g_max_q14[0] >> 15) + 1;
+    const int32_t high_q14 = ONE_Q14 + (g_max_q14[1] * g_max_q14[1] >> 15) + 1;
     out->aside_q12 = RING_Q12 * wide_q14 >> 14;
     out->above_q12 = RING_Q12 * high_q14 >> 14;
     out->below_q12 = BELOW_Q12 * (wide_q14 + high_q14 - ONE_Q14) >> 14;
@@ -146,8 +147,8 @@ void ih_template_prepare(const struct ih_rays *rays, struct ih_template_table *o
             if (row < IH_GRID) {
                 fill_ray(&rays->ray[row * IH_GRID + column], out, at);
             } else { /* behind a column: it passes no head */
-                out->slope_q14[0][at] = INT16_MAX;
-                out->slope_q14[1][at] = INT16_MAX;
+                out->slope_q13[0][at] = INT16_MAX;
+                out->slope_q13[1][at] = INT16_MAX;
             }
         }
     }
@@ -157,7 +158,7 @@ void ih_template_prepare(const struct ih_rays *rays, struct ih_template_table *o
 
 /* A centre as the loop needs it: in Q11, e = (slope - direction) power factor / 2^16. */
 struct centre {
-    int16_t direction_q14[2];
+    int16_t direction_q13[2];
     int16_t offset_max[2]; /* of slopes, Q14 */
     int16_t power[2];      /* of two */
     int16_t factor[2];     /* 2^14 .. 2^15 */
@@ -168,17 +169,17 @@ struct centre {
 static bool set_axis(struct centre *candidate, int axis, int64_t off_q8, int32_t depth_q8,
                      int32_t semi_mm)
 {
-    const int64_t direction_q14 = (off_q8 * ONE_Q14 - (off_q8 < 0 ? depth_q8 - 1 : 0)) / depth_q8;
-    const int32_t ratio_q13 = depth_q8 * 32 / semi_mm;
-    const int shift = ih_max_s32(17 - __builtin_clz((uint32_t)ratio_q13), 0);
+    const int64_t direction_q13 = (off_q8 * ONE_Q13 - (off_q8 < 0 ? depth_q8 - 1 : 0)) / depth_q8;
+    const int32_t ratio_q14 = depth_q8 * 64 / semi_mm;
+    const int shift = ih_max_s32(17 - __builtin_clz((uint32_t)ratio_q14), 0);
     candidate->power[axis] = (int16_t)(1 << shift);
-    candidate->factor[axis] = (int16_t)(ratio_q13 >> shift);
+    candidate->factor[axis] = (int16_t)(ratio_q14 >> shift);
     candidate->offset_max[axis] =
         (int16_t)((OFFSET_MAX_Q11 << 16) / (candidate->factor[axis] << shift));
-    if (direction_q14 <= -ONE_Q14 || direction_q14 >= ONE_Q14) {
+    if (direction_q13 <= -2 * ONE_Q13 || direction_q13 >= 2 * ONE_Q13) {
         return false;
     }
-    candidate->direction_q14[axis] = (int16_t)direction_q14;
+    candidate->direction_q13[axis] = (int16_t)direction_q13;
     return true;
 }
 
@@ -205,12 +206,12 @@ struct span {
 
 #if IH_I16_LANES > 0
 /* A bit for each line below a limit. */
-static inline uint32_t lines_below(const int16_t *slope_q14, int16_t limit_q14)
+static inline uint32_t lines_below(const int16_t *slope_q13, int16_t limit_q13)
 {
     uint32_t bits = 0;
     for (int32_t line = 0; line < IH_TEMPLATE_COLUMN; line += 2 * IH_I16_LANES) {
-        const ih_i16 first = ih_i16_load(&slope_q14[line]) < limit_q14;
-        const ih_i16 second = ih_i16_load(&slope_q14[line + IH_I16_LANES]) < limit_q14;
+        const ih_i16 first = ih_i16_load(&slope_q13[line]) < limit_q13;
+        const ih_i16 second = ih_i16_load(&slope_q13[line + IH_I16_LANES]) < limit_q13;
         bits |= ih_i16_bits(first, second) << line;
     }
     return bits;
@@ -218,22 +219,22 @@ static inline uint32_t lines_below(const int16_t *slope_q14, int16_t limit_q14)
 
 /* The lines that may have a ray between two slopes, and those between them. */
 static inline struct span find_span(const struct ih_template_table *table, int axis,
-                                    int32_t low_q14, int32_t high_q14)
+                                    int32_t low_q13, int32_t high_q13)
 {
-    const int32_t before = __builtin_ctz(~lines_below(table->max_q14[axis], saturate_s16(low_q14)));
-    const uint32_t inside = lines_below(table->min_q14[axis], saturate_s16(high_q14 + 1));
+    const int32_t before = __builtin_ctz(~lines_below(table->max_q13[axis], saturate_s16(low_q13)));
+    const uint32_t inside = lines_below(table->min_q13[axis], saturate_s16(high_q13 + 1));
     const int32_t end = __builtin_ctz(~inside | 1U << IH_GRID);
     return (struct span){before, ih_max_s32(end, before)};
 }
 #else
-static struct span find_span(const struct ih_template_table *table, int axis, int32_t low_q14,
-                             int32_t high_q14)
+static struct span find_span(const struct ih_template_table *table, int axis, int32_t low_q13,
+                             int32_t high_q13)
 {
     struct span span = {0, IH_GRID};
-    while (span.begin < IH_GRID && table->max_q14[axis][span.begin] < low_q14) {
+    while (span.begin < IH_GRID && table->max_q13[axis][span.begin] < low_q13) {
         span.begin++;
     }
-    while (span.end > span.begin && table->min_q14[axis][span.end - 1] > high_q14) {
+    while (span.end > span.begin && table->min_q13[axis][span.end - 1] > high_q13) {
         span.end--;
     }
     return span;
@@ -250,19 +251,19 @@ static struct span find_columns(const struct ih_template_table *table,
                                 const struct centre *candidate, int32_t aside_q12)
 {
     /* 3 for the rounding of the factor, of slopes and of the direction */
-    const int32_t x_q14 = candidate->direction_q14[0];
-    const int32_t aside_q14 = (candidate->offset_max[0] * aside_q12 >> 12) + 3;
-    return find_span(table, 0, x_q14 - aside_q14, x_q14 + aside_q14);
+    const int32_t x_q13 = candidate->direction_q13[0];
+    const int32_t aside_q13 = (candidate->offset_max[0] * aside_q12 >> 12) + 3;
+    return find_span(table, 0, x_q13 - aside_q13, x_q13 + aside_q13);
 }
 
 static struct box find_box(const struct ih_template_table *table, const struct centre *candidate)
 {
-    const int32_t y_q14 = candidate->direction_q14[1];
-    const int32_t above_q14 = (candidate->offset_max[1] * table->above_q12 >> 12) + 3;
-    const int32_t below_q14 = (candidate->offset_max[1] * table->below_q12 >> 12) + 3;
+    const int32_t y_q13 = candidate->direction_q13[1];
+    const int32_t above_q13 = (candidate->offset_max[1] * table->above_q12 >> 12) + 3;
+    const int32_t below_q13 = (candidate->offset_max[1] * table->below_q12 >> 12) + 3;
     return (struct box){
         .columns = find_columns(table, candidate, table->aside_q12),
-        .rows = find_span(table, 1, y_q14 - above_q14, y_q14 + below_q14),
+        .rows = find_span(table, 1, y_q13 - above_q13, y_q13 + below_q13),
     };
 }
 
@@ -287,8 +288,8 @@ struct crossing {
 static inline ih_i16 find_offset(const struct ih_template_table *table,
                                  const struct centre *candidate, int axis, int32_t at)
 {
-    const ih_i16 off = ih_i16_sub(ih_i16_load(&table->slope_q14[axis][at]),
-                                  ih_i16_all(candidate->direction_q14[axis]));
+    const ih_i16 off = ih_i16_sub(ih_i16_load(&table->slope_q13[axis][at]),
+                                  ih_i16_all(candidate->direction_q13[axis]));
     return ih_i16_mul_high(ih_i16_mul(ih_i16_clamp(off, candidate->offset_max[axis]),
                                       ih_i16_all(candidate->power[axis])),
                            ih_i16_all(candidate->factor[axis]));
@@ -302,11 +303,13 @@ static inline struct crossing find_crossing(const struct ih_template_table *tabl
     const ih_i16 ey_q13 = ih_i16_shift_left(ey_q11, 2);
     const ih_i16 ee_q10 =
         ih_i16_add(ih_i16_mul_high(ex_q13, ex_q13), ih_i16_mul_high(ey_q13, ey_q13));
-    const ih_i16 eg_q12 = ih_i16_add(ih_i16_mul_high(ex_q13, ih_i16_load(&table->g_q15[0][at])),
-                                     ih_i16_mul_high(ey_q13, ih_i16_load(&table->g_q15[1][at])));
-    const ih_i16 eg_q13 = ih_i16_shift_left(eg_q12, 1);
-    const ih_i16 t_q12 = ih_i16_mul_high(eg_q13, ih_i16_load(&table->inverse_q15[at]));
-    const ih_i16 product_q10 = ih_i16_mul_high(eg_q13, ih_i16_shift_left(t_q12, 1));
+    const ih_i16 eg_q11 = ih_i16_add(ih_i16_mul_high(ex_q13, ih_i16_load(&table->g_q14[0][at])),
+                                     ih_i16_mul_high(ey_q13, ih_i16_load(&table->g_q14[1][at])));
+    const ih_i16 eg_q12 = ih_i16_shift_left(eg_q11, 1);
+    const ih_i16 t_q11 = ih_i16_mul_high(eg_q12, ih_i16_load(&table->inverse_q15[at]));
+    const ih_i16 t_q12 = ih_i16_shift_left(t_q11, 1);
+    const ih_i16 product_q9 = ih_i16_mul_high(eg_q12, ih_i16_shift_left(t_q11, 2));
+    const ih_i16 product_q10 = ih_i16_shift_left(product_q9, 1);
     return (struct crossing){ex_q13, ey_q11, t_q12, ih_i16_sub(ee_q10, product_q10)};
 }
 
@@ -418,27 +421,28 @@ static void sum_values(const struct ih_template_table *table, const struct centr
 {
     const int32_t scale[2] = {candidate->power[0] * candidate->factor[0],
                               candidate->power[1] * candidate->factor[1]};
-    const int32_t min_q14[2] = {candidate->direction_q14[0] - candidate->offset_max[0],
-                                candidate->direction_q14[1] - candidate->offset_max[1]};
-    const uint32_t sides_q14[2] = {2 * (uint32_t)candidate->offset_max[0],
+    const int32_t min_q13[2] = {candidate->direction_q13[0] - candidate->offset_max[0],
+                                candidate->direction_q13[1] - candidate->offset_max[1]};
+    const uint32_t sides_q13[2] = {2 * (uint32_t)candidate->offset_max[0],
                                    2 * (uint32_t)candidate->offset_max[1]};
     struct ray_totals sums = {0, 0, 0, 0};
     for (int32_t column = box->columns.begin; column < box->columns.end; column++) {
         for (int32_t row = box->rows.begin; row < box->rows.end; row++) {
             const int32_t at = column * IH_TEMPLATE_COLUMN + row;
-            const int32_t x_q14 = table->slope_q14[0][at] - min_q14[0];
-            const int32_t y_q14 = table->slope_q14[1][at] - min_q14[1];
-            if (IH_WRAPS(uint32_t, x_q14) > sides_q14[0] ||
-                IH_WRAPS(uint32_t, y_q14) > sides_q14[1]) {
+            const int32_t x_q13 = table->slope_q13[0][at] - min_q13[0];
+            const int32_t y_q13 = table->slope_q13[1][at] - min_q13[1];
+            if (IH_WRAPS(uint32_t, x_q13) > sides_q13[0] ||
+                IH_WRAPS(uint32_t, y_q13) > sides_q13[1]) {
                 continue;
             }
-            const int32_t ex_q11 = (x_q14 - candidate->offset_max[0]) * scale[0] >> 16;
-            const int32_t ey_q11 = (y_q14 - candidate->offset_max[1]) * scale[1] >> 16;
-            const int32_t eg_q12 =
-                (ex_q11 * table->g_q15[0][at] >> 14) + (ey_q11 * table->g_q15[1][at] >> 14);
-            const int32_t t_q12 = eg_q12 * table->inverse_q15[at] >> 15;
+            const int32_t ex_q11 = (x_q13 - candidate->offset_max[0]) * scale[0] >> 16;
+            const int32_t ey_q11 = (y_q13 - candidate->offset_max[1]) * scale[1] >> 16;
+            const int32_t eg_q11 =
+                (ex_q11 * table->g_q14[0][at] >> 14) + (ey_q11 * table->g_q14[1][at] >> 14);
+            const int32_t t_q11 = eg_q11 * table->inverse_q15[at] >> 15;
+            const int32_t t_q12 = 2 * t_q11;
             const int32_t radius2_q10 =
-                (ex_q11 * ex_q11 >> 12) + (ey_q11 * ey_q11 >> 12) - (eg_q12 * t_q12 >> 14);
+                (ex_q11 * ex_q11 >> 12) + (ey_q11 * ey_q11 >> 12) - 2 * (eg_q11 * t_q11 >> 13);
             if (radius2_q10 < ONE_Q10) {
                 sums.inside += value_inside(table, candidate, at, t_q12, radius2_q10);
                 sums.inside_count++;

@@ -101,6 +101,12 @@ static struct exact cross(const struct ih_ray *ray, const int32_t centre_mm_q8[3
     return exact;
 }
 
+/* How far a point may be off against the entry. */
+static double depth_off_mm(double away_mm)
+{
+    return (0.0095 + 1.12e-6 * away_mm) * semi_mm[2];
+}
+
 /* How far a point is behind where its ray enters, if radius2 is off by so much. */
 static double behind_mm(const struct exact *exact, double centre_mm, double off)
 {
@@ -115,7 +121,8 @@ static double score_end(const int32_t centre_mm_q8[3], int sign)
 {
     const double centre_mm = centre_mm_q8[2] / 256.0;
     const double away = (centre_mm_q8[2] - rays.origin_mm_q8[2]) / 256.0;
-    const double off2 = 4.3e-6 * away + 0.0130, off_mm = (7.9e-7 * away + 0.0009) * (78 + 113);
+    const double off2 = 8.6e-6 * away + 0.0180, off_mm = (1.58e-6 * away + 0.0009) * (78 + 113);
+    const double off_depth_mm = depth_off_mm(away);
     static struct values inside, around;
     int32_t slot;
 
@@ -127,12 +134,12 @@ static double score_end(const int32_t centre_mm_q8[3], int sign)
         const double aside = fabs(exact.ex * 78) - exact.ey * 113;
         const bool seen = ray->state == IH_RAY_SEEN, empty = ray->state == IH_RAY_EMPTY;
 
-        if (exact.steep >= 2) {
+        if (exact.steep >= 3) {
             continue;
         }
         if (exact.radius2 < 1 + off2) {
-            const double low = behind_mm(&exact, centre_mm, -off2) - 1.6;
-            const double high = behind_mm(&exact, centre_mm, off2) + 1.6;
+            const double low = behind_mm(&exact, centre_mm, -off2) - off_depth_mm;
+            const double high = behind_mm(&exact, centre_mm, off2) + off_depth_mm;
             const bool is_on = sign > 0 ? high > -32 && low < 32 : low > -32 && high < 32;
             const bool is_far = sign > 0 ? low >= 32 : high >= 32;
 
@@ -210,7 +217,7 @@ static double random_in(struct ih_test_random *random, double low, double high)
     return low + (high - low) * (double)ih_test_between(random, 0, 1 << 30) / (1 << 30);
 }
 
-/* Somewhere a score is given: to 16 m, at slopes to 0.6. */
+/* Somewhere a score is given: to 16 m, at slopes to 0.6, and down to 1.5 as before a camera that looks down. */
 static void random_centre(struct ih_test_random *random, int32_t centre_mm_q8[3])
 {
     static const int32_t max_mm[] = {500, 1200, 4000, 16000};
@@ -222,7 +229,7 @@ static void random_centre(struct ih_test_random *random, int32_t centre_mm_q8[3]
         rays.origin_mm_q8[axis] = (int32_t)ih_test_between(random, -(200 << 8), 200 << 8);
     }
     centre_mm_q8[0] = rays.origin_mm_q8[0] + (int32_t)(depth * random_in(random, -0.6, 0.6));
-    centre_mm_q8[1] = rays.origin_mm_q8[1] + (int32_t)(depth * random_in(random, -0.6, 0.6));
+    centre_mm_q8[1] = rays.origin_mm_q8[1] + (int32_t)(depth * random_in(random, -0.6, 1.5));
     centre_mm_q8[2] = rays.origin_mm_q8[2] + depth;
     if (centre_mm_q8[2] > 16090 << 8) {
         centre_mm_q8[2] = 16090 << 8;
@@ -268,7 +275,7 @@ static void rays_that_pass_beside_a_limit(void)
         memset(&rays, 0, sizeof rays);
         random_centre(&random, centre);
         rays_far_off(centre);
-        off2 = 4.3e-6 * (centre[2] - rays.origin_mm_q8[2]) / 256 + 0.0131;
+        off2 = 8.6e-6 * (centre[2] - rays.origin_mm_q8[2]) / 256 + 0.0181;
         reach2 = radius2[kind] + (kind == 4 ? 0 : side * off2 * random_in(&random, 1, 1.5));
         for (slot = 0; slot < 60; slot++) {
             const double off_angle = kind == 4
@@ -311,7 +318,8 @@ static void points_beside_a_limit_of_depth(void)
         rays_far_off(centre);
         for (slot = 0; slot < 60; slot++) {
             const double off_angle = angle + random_in(&random, -0.004, 0.004);
-            const double off2 = 4.3e-6 * (centre[2] - rays.origin_mm_q8[2]) / 256 + 0.0130;
+            const double away = (centre[2] - rays.origin_mm_q8[2]) / 256.0;
+            const double off2 = 8.6e-6 * away + 0.0180, off_mm = depth_off_mm(away) + 0.1;
             struct exact exact;
             double behind;
 
@@ -319,8 +327,9 @@ static void points_beside_a_limit_of_depth(void)
             see(slot, centre[2]);
             exact = cross(&rays.ray[slot], centre);
             behind = behind_mm(&exact, centre[2] / 256.0, side > 0 ? -off2 : off2);
-            see(slot,
-                centre[2] + (int32_t)((limit - behind + side * random_in(&random, 1.7, 3)) * 256));
+            see(slot, centre[2] + (int32_t)((limit - behind +
+                                             side * random_in(&random, off_mm, off_mm + 1.3)) *
+                                            256));
         }
         prepare();
         tight += check(centre, pass) < 0.3;
@@ -352,8 +361,8 @@ static void points_beside_the_limit_of_what_is_open(void)
 static void out_of_the_limits_there_is_no_score(void)
 {
     static const int32_t centre_mm[][3] = {{0, 0, 200},     {0, 0, 226},      {0, 0, 16101},
-                                           {1001, 0, 1000}, {0, -1001, 1000}, {0, 0, -500}};
-    static const int32_t ahead[3] = {0, 0, 1000 << 8}, aside[3] = {0, 995 << 8, 1000 << 8};
+                                           {2001, 0, 1000}, {0, -2001, 1000}, {0, 0, -500}};
+    static const int32_t ahead[3] = {0, 0, 1000 << 8}, aside[3] = {0, 1625 << 8, 1000 << 8};
     int32_t i, axis, slot;
 
     prepare();
@@ -368,12 +377,12 @@ static void out_of_the_limits_there_is_no_score(void)
     }
     IH_TEST_EQUAL(-640, ih_template_score_q12(&rays, &table, ahead), "unknown", 0);
     for (slot = 0; slot < IH_SLOTS; slot++) {
-        rays.ray[slot].slope_y_q20 = 1209000; /* g just below 1 */
+        rays.ray[slot].slope_y_q20 = 1709600; /* g just below the root of 2 */
     }
     prepare();
     TEST_ASSERT_TRUE(ih_template_score_q12(&rays, &table, aside) != 0);
     for (slot = 0; slot < IH_SLOTS; slot++) {
-        rays.ray[slot].slope_y_q20 = 1209400;
+        rays.ray[slot].slope_y_q20 = 1710100;
     }
     prepare();
     IH_TEST_EQUAL(0, ih_template_score_q12(&rays, &table, aside), "steep rays", 0);
