@@ -59,8 +59,8 @@ static void fill_ray(const struct ih_ray *ray, struct ih_template_table *out, in
     const int32_t x_q13 = ray->slope_x_q20 >> 7;
     const int32_t y_q13 = ray->slope_y_q20 >> 7;
     /* slopes below 2^16.1 times 2^14.4; cut, so that squares fit */
-    const int32_t gx_q14 = ih_clamp_s32(x_q13 * Z_OVER_X_Q14 >> 13, -(1 << 15), 1 << 15);
-    const int32_t gy_q14 = ih_clamp_s32(y_q13 * Z_OVER_Y_Q14 >> 13, -(1 << 15), 1 << 15);
+    const int16_t gx_q14 = saturate_s16(x_q13 * Z_OVER_X_Q14 >> 13);
+    const int16_t gy_q14 = saturate_s16(y_q13 * Z_OVER_Y_Q14 >> 13);
     const uint32_t gg_q28 = (uint32_t)(gx_q14 * gx_q14) + (uint32_t)(gy_q14 * gy_q14);
     if (gg_q28 >= 1U << 29) { /* too steep for 16 bits: it passes no head */
         out->slope_q13[0][at] = x_q13 < 0 ? INT16_MIN : INT16_MAX;
@@ -69,8 +69,8 @@ static void fill_ray(const struct ih_ray *ray, struct ih_template_table *out, in
     }
     out->slope_q13[0][at] = (int16_t)x_q13;
     out->slope_q13[1][at] = (int16_t)y_q13;
-    out->g_q14[0][at] = (int16_t)gx_q14;
-    out->g_q14[1][at] = (int16_t)gy_q14;
+    out->g_q14[0][at] = gx_q14;
+    out->g_q14[1][at] = gy_q14;
     out->inverse_q15[at] = saturate_s16((int32_t)((1U << 30) / ((1U << 15) + (gg_q28 >> 13))));
     out->depth_mm_q1[at] = saturate_s16(is_seen ? ray->point_mm_q8[2] >> 7 : NOWHERE_Q1);
     out->inside[at] = (int16_t)(is_empty ? VALUE_EMPTY : VALUE_NEARER);
@@ -148,7 +148,6 @@ void ih_template_prepare(const struct ih_rays *rays, struct ih_template_table *o
                 fill_ray(&rays->ray[row * IH_GRID + column], out, at);
             } else { /* behind a column: it passes no head */
                 out->slope_q13[0][at] = INT16_MAX;
-                out->slope_q13[1][at] = INT16_MAX;
             }
         }
     }
@@ -421,10 +420,11 @@ static void sum_values(const struct ih_template_table *table, const struct centr
 {
     const int32_t scale[2] = {candidate->power[0] * candidate->factor[0],
                               candidate->power[1] * candidate->factor[1]};
-    const int32_t min_q13[2] = {candidate->direction_q13[0] - candidate->offset_max[0],
-                                candidate->direction_q13[1] - candidate->offset_max[1]};
-    const uint32_t sides_q13[2] = {2 * (uint32_t)candidate->offset_max[0],
-                                   2 * (uint32_t)candidate->offset_max[1]};
+    const int32_t reach_q13[2] = {(candidate->offset_max[0] * table->aside_q12 >> 12) + 3,
+                                  (candidate->offset_max[1] * table->above_q12 >> 12) + 3};
+    const int32_t min_q13[2] = {candidate->direction_q13[0] - reach_q13[0],
+                                candidate->direction_q13[1] - reach_q13[1]};
+    const uint32_t sides_q13[2] = {2 * (uint32_t)reach_q13[0], 2 * (uint32_t)reach_q13[1]};
     struct ray_totals sums = {0, 0, 0, 0};
     for (int32_t column = box->columns.begin; column < box->columns.end; column++) {
         for (int32_t row = box->rows.begin; row < box->rows.end; row++) {
@@ -435,8 +435,8 @@ static void sum_values(const struct ih_template_table *table, const struct centr
                 IH_WRAPS(uint32_t, y_q13) > sides_q13[1]) {
                 continue;
             }
-            const int32_t ex_q11 = (x_q13 - candidate->offset_max[0]) * scale[0] >> 16;
-            const int32_t ey_q11 = (y_q13 - candidate->offset_max[1]) * scale[1] >> 16;
+            const int32_t ex_q11 = (x_q13 - reach_q13[0]) * scale[0] >> 16;
+            const int32_t ey_q11 = (y_q13 - reach_q13[1]) * scale[1] >> 16;
             const int32_t eg_q11 =
                 (ex_q11 * table->g_q14[0][at] >> 14) + (ey_q11 * table->g_q14[1][at] >> 14);
             const int32_t t_q11 = eg_q11 * table->inverse_q15[at] >> 15;
