@@ -6,7 +6,8 @@ misaligned.py --host-sim PROGRAM --render PROGRAM --work DIR [--rows REGEX] [--s
 Renders both rigs and sequences once into DIR/frames (what is there stays) and runs host_sim over them with
 the right rig file and with wrong ones; only a drift has frames of its own. Prints by row and rig:
 
-  right      frames selected right (docs/contract.md, "Score"), and their fraction of those with the right rig
+  right      frames selected right (docs/contract.md, "Score"), and their fraction of those with the right rig; a rotation
+             about Y is depth, which the frame before must show: there from the second frame on
   late       the worst directory: its first frames that are lost, of those with a head that the right rig gets
              right, and of those whose labels it gets (fewer than 90 % of them are right)
   labels     fraction right: the dot lies within 1 px of that index's true dot, dim ones too; their count against the right rig's
@@ -173,6 +174,7 @@ class Figures:
     """Of a row with one rig."""
 
     frames: int
+    counted: int
     right: int
     right_reference: int
     late_heads: int
@@ -200,9 +202,11 @@ def alignment(pairs):
             tuple(median(list(axis)) for axis in zip(*left)) if left else None)
 
 
-def figures(pairs, references):
+def figures(pairs, references, first_frame):
     everything = [frame for _, frames in pairs for frame in frames]
     reference = [frame for frames in references for frame in frames]
+    counted = [frame for _, frames in pairs for frame in frames[first_frame:]]
+    counted_reference = [frame for frames in references for frame in frames[first_frame:]]
     settled = [frame for _, frames in pairs for frame in frames[SETTLED_FRAME:]]
     settled_reference = [frame for frames in references for frame in frames[SETTLED_FRAME:]]
     both = [(frames, right) for (_, frames), right in zip(pairs, references)]
@@ -214,7 +218,8 @@ def figures(pairs, references):
     label_count = sum(frame.labels for frame in everything)
     label_right = sum(frame.labels_right for frame in everything)
     across, rotation = alignment(pairs)
-    return Figures(len(everything), sum(frame.right for frame in everything), sum(frame.right for frame in reference),
+    return Figures(len(everything), len(counted), sum(frame.right for frame in counted),
+                   sum(frame.right for frame in counted_reference),
                    max(heads), max(labels), percent(label_right, label_count),
                    percent(label_right, sum(frame.labels_right for frame in reference)),
                    median(errors_of(settled)), median(errors_of(settled_reference)), percent(within, len(sure)),
@@ -226,6 +231,8 @@ def broken(limits, rig, got):
     out = []
     if got.right < got.right_reference * (1 - limits.fewer_percent / 100):
         out.append("right")
+    if limits.right_percent and got.right < got.counted * limits.right_percent[rig] / 100:
+        out.append("right at all")
     if limits.late_frames is not None and max(got.late_heads, got.late_labels) > limits.late_frames:
         out.append("late")
     if limits.labels_percent and not got.labels_percent >= limits.labels_percent[rig]:
@@ -320,7 +327,7 @@ def report(options, program, reference_program, pool, found):
     print(HEADER, flush=True)
     for row, rig, futures in started:
         pairs = [(piece, future.result()) for piece, future, _ in futures]
-        got = figures(pairs, [reference.result() for _, _, reference in futures])
+        got = figures(pairs, [reference.result() for _, _, reference in futures], row.limits.first_frame)
         wrong = broken(row.limits, rig, got)
         failed += bool(wrong)
         print(line(row, rig, got, wrong), flush=True)
