@@ -208,9 +208,9 @@ class Misaligned(unittest.TestCase):
         trace["labels"]["slot"][2] = {"dot": 2}
         self.assertEqual(misaligned.judged({**said, "file": "0.pgm"}, real, trace).labels_right, 2)
 
-    def figures(self, frames, right):
+    def figures(self, frames, right, first_frame=0):
         piece = misaligned.Piece("paper", "d", 1, misaligned_rows.Knock(), "d")
-        return misaligned.figures([(piece, frames)], [right])
+        return misaligned.figures([(piece, frames)], [right], first_frame)
 
     def test_lost_at_the_start(self):
         right = [frame(there=False), frame(), frame(right=False), frame(), frame()]
@@ -220,9 +220,25 @@ class Misaligned(unittest.TestCase):
         got = self.figures([frame(labels_right=0)] + right[1:], right)
         self.assertEqual((got.late_heads, got.late_labels), (0, 1))
 
+    def test_counted_from_a_later_frame_on(self):
+        right = [frame(), frame(), frame(right=False), frame()]
+        got = self.figures([frame(False), frame(), frame(), frame(False)], right, first_frame=1)
+        self.assertEqual((got.frames, got.counted, got.right, got.right_reference), (4, 3, 2, 2))
+        self.assertEqual(got.late_heads, 1, "what is late is, from the first frame on")
+
+    def test_what_the_right_rig_finds_has_a_limit(self):
+        limits = misaligned_rows.Limits(right_percent={"paper": 90.0, "wide": 50.0})
+        some = [frame()] * 8 + [frame(False)] * 2
+        got = self.figures(some, some)
+        self.assertEqual(misaligned.broken(limits, "paper", got), ["right at all"])
+        self.assertEqual(misaligned.broken(limits, "wide", got), [])
+        limited = {row.name for row in misaligned_rows.all_rows() if row.limits.right_percent}
+        self.assertEqual(limited, {"right rig", "missing: right rig", "over-exposed: right rig"})
+
     def test_limits(self):
         right = [frame() for _ in range(200)]
-        limits = misaligned_rows.Limits(1.0, 0, {"paper": 99.5}, 10.0, 90.0)
+        limits = misaligned_rows.Limits(fewer_percent=1.0, late_frames=0, labels_percent={"paper": 99.5}, centre_more_mm=10.0,
+                                        within_percent=90.0)
         self.assertEqual(misaligned.broken(limits, "paper", self.figures(right, right)), [])
         wrong = [frame(False, 100, 89)] + [frame() for _ in range(197)] + [frame(False), frame(False)]
         self.assertEqual(misaligned.broken(limits, "paper", self.figures(wrong, right)), ["right", "late"])
