@@ -17,7 +17,7 @@ RING_INNER, RING_OUTER = 1.3, 1.9
 RING_EMPTY, RING_NEAR, RING_FRACTION = 45 / 64, -38 / 64, 0.6
 RAYS_MIN = 8
 # What 16 bits may be off by, with the depth in mm: see ih_template.h.
-ERROR_E, ERROR_RADIUS2, ERROR_DEPTH = (1.58e-6, 0.0009), (8.6e-6, 0.0180), (1.12e-6, 0.0095)
+ERROR_E, ERROR_RADIUS2, ERROR_DEPTH = (1.58e-6, 0.0009), (8.6e-6, 0.0135), (1.12e-6, 0.0095)
 
 
 def centres_behind(ray_table):

@@ -6,9 +6,8 @@
 #include "align/ih_align_sigma.h"
 #include "base/ih_fix.h"
 
-/* Fewer dots, or labels, say nothing. */
-#define DOTS_MIN 30
-#define LABELS_MIN 16
+#define DOTS_MIN 30   /* fewer say nothing */
+#define LABELS_MIN 16 /* as few labels */
 /* Of dots on the lines. Before a wall beyond the working range one of ten gets a label, of another slot. */
 #define LABELS_DIVISOR 4
 /* A dot on its line, and those beside it that are not: the ring is twice as wide as the line. */
@@ -35,7 +34,7 @@
 #define DEPTH_MAX_RAD_Q30 14992130
 #define FOCAL_MAX_Q30 16106127 /* 1.5 % */
 #define MARGIN_PX_Q12 (4 * 4096)
-/* So much farther than the working range a rotation of depth puts the dots of a wall: 8 px for 0.5 degrees. */
+/* So far beyond the range a rotation of depth may put dots. With 4 px it is found frames later, with 10 px right rigs move. */
 #define FAR_MARGIN_PX_Q12 (7 * 4096)
 /* At first so many of the dots must lie on the lines that nobody searches; later three quarters of what was the
  * best since a search. */
@@ -98,7 +97,7 @@ static int32_t excess_min(int32_t dot_count)
     return 12 + dot_count / 8;
 }
 
-/* How many dots lie on the rig's lines, and beside them; of these, how many no farther than the working range. */
+/* How many dots lie on the rig's lines, and beside them; of these, how many near the working range. */
 struct sight {
     int32_t on, beside;
     int32_t near_on, near_beside;
@@ -294,7 +293,7 @@ static bool search_depth(struct ih_align *align, const struct ih_dots *dots, str
     for (int k = 0; k < IH_ALIGN_AXES; k++) {
         moved_px_q12[k] += align->moved_px_q12[k];
     }
-    const int32_t enough = ih_max_s32(excess_min(rows->dot_count), align->excess / 2);
+    const int32_t enough = ih_max_s32(excess_min(rows->dot_count), align->excess);
     const bool is_depth = is_within_limits(moved_px_q12, rig) &&
                           try_motion(align, dots, moved_px_q12, enough, rig, rows) > 0;
     if (is_depth) {
@@ -328,7 +327,8 @@ void ih_align_find(struct ih_align *align, const struct ih_dots *dots, struct ih
     }
     align->excess = excess_of(sight.on, sight.beside);
     align->near_excess = excess_of(sight.near_on, sight.near_beside);
-    const bool is_depth = align->is_short && search_depth(align, dots, rig, rows, scratch);
+    const bool is_asked = align->is_short && align->now.state != IH_ALIGN_LOST;
+    const bool is_depth = is_asked && search_depth(align, dots, rig, rows, scratch);
     bool is_due = false;
     if (!is_depth && !is_where_it_was(align, sight, rows->dot_count)) {
         align->pause--;

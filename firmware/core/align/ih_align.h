@@ -12,7 +12,7 @@
  *         2. If not, search (ih_align_search): back at the file's lines, or around them. The result is taken when more dots
  *            lie on its lines than before. After searches in vain there are pauses of up to 8 frames. If dots lie on
  *            the lines and in the working range, widened by 7 px, but less than three quarters as many get labels, depth
- *            alone is searched for first, and must be 5 times its uncertainty. In one frame a wrong motion may have the
+ *            alone is searched for before all else, and must be 5 times its uncertainty. In one frame a wrong motion may have the
  *            most dots, and its own labels keep it: in each of the 16 frames after a search lines go back to where they
  *            were if no fewer dots lie there, or are searched for again, unless hardly a dot lies beside them.
  *         3. Learn, after the labels, if they are at least a quarter as many as the dots on the lines: a fit to how far
@@ -73,7 +73,7 @@ struct ih_align {
     int32_t frame_count;
     int32_t odd;         /* slots of the last frame, after the first frames */
     int32_t excess;      /* of this frame: dots on the lines, less those that chance puts there */
-    int32_t near_excess; /* the same of dots that are no farther than the working range */
+    int32_t near_excess; /* the same of dots that are no more than 7 px beyond the range */
     bool is_short;      /* the frame before had labels for less than three quarters of the latter */
     bool is_depth_new;  /* depths have changed by more than tracks follow; the caller clears it */
     int32_t vain_count; /* searches that found nothing, one after the other */

@@ -44,7 +44,7 @@ bool ih_align_search(const struct ih_align_axes *axes, const int32_t prior_px_q1
                      const struct ih_rig *rig, const struct ih_dot_rows *rows,
                      struct ih_align_scratch *scratch, int32_t moved_px_q12[IH_ALIGN_AXES]);
 
-/* Where dots lie on the rig's lines as they are, but labels are short: what is left, of it a rotation of depth. False:
+/* Around the rig's lines as they are now, where labels are short: what is left, of it a rotation of depth. False:
  * there is none that could be the reason. */
 bool ih_align_search_depth(const struct ih_align_axes *axes,
                            const int32_t prior_px_q12[IH_ALIGN_AXES], const struct ih_rig *rig,

@@ -33,7 +33,8 @@
 #define RING_Q12 2326    /* 1.93 */
 #define THROUGH_Q12 1229 /* 1.02 */
 #define BELOW_Q12 1326   /* 1.1; it is 1.08 */
-/* Depths against the centre's are limited to 1.55 semi-axes, so that with t they fit 16 bits: Q1 mm. A head ends at 1. */
+/* Depths against the centre's are limited to 1.55 semi-axes, Q1 mm, so that with t they fit 16 bits. What is 32 mm behind, or before,
+ * a head's surface is within 1.33: no answer changes. */
 #define DEPTH_OFF_MAX_Q1 (2 * 155 * IH_HEAD_SEMI_Z_MM / 100)
 /* 64ths of a Q1 mm as a fraction of the semi-axis, Q12, of 2^16. */
 #define DEPTH_Q16 (((1 << 21) + IH_HEAD_SEMI_Z_MM / 2) / IH_HEAD_SEMI_Z_MM)
@@ -58,7 +59,7 @@ static void fill_ray(const struct ih_ray *ray, struct ih_template_table *out, in
     const bool is_empty = ray->state == IH_RAY_EMPTY;
     const int32_t x_q13 = ray->slope_x_q20 >> 7;
     const int32_t y_q13 = ray->slope_y_q20 >> 7;
-    /* slopes below 2^16.1 times 2^14.4; cut, so that squares fit */
+    /* slopes of 2^15 at most times 2^14.4; cut, so that squares fit */
     const int16_t gx_q14 = saturate_s16(x_q13 * Z_OVER_X_Q14 >> 13);
     const int16_t gy_q14 = saturate_s16(y_q13 * Z_OVER_Y_Q14 >> 13);
     const uint32_t gg_q28 = (uint32_t)(gx_q14 * gx_q14) + (uint32_t)(gy_q14 * gy_q14);
@@ -158,7 +159,7 @@ void ih_template_prepare(const struct ih_rays *rays, struct ih_template_table *o
 /* A centre as the loop needs it: in Q11, e = (slope - direction) power factor / 2^16. */
 struct centre {
     int16_t direction_q13[2];
-    int16_t offset_max[2]; /* of slopes, Q14 */
+    int16_t offset_max[2]; /* of slopes, Q13 */
     int16_t power[2];      /* of two */
     int16_t factor[2];     /* 2^14 .. 2^15 */
     int16_t depth_mm_q1, open_mm_q1;

@@ -16,12 +16,13 @@
  *         as e.e is below 3.61 (1 + g.g), ey is below 1.08 sqrt(1 + g.g). g: the maximum of all rays.
  * Limits: only rays with g.g below 2: up to 58 degrees above or below the horizon, 48 to the side. Depths 227 mm to
  *         16.1 m, and a centre seen at a slope below 2; elsewhere the score is IH_TEMPLATE_NONE_Q12.
- * Error:  with D the depth in mm: e within 1.58e-6 D + 0.0009, radius2 within 8.6e-6 D + 0.0180, where
+ * Error:  with D the depth in mm: e within 1.58e-6 D + 0.0009, radius2 within 8.6e-6 D + 0.0135, where
  *         the ray's nearest point is within 1.95 radii; a point's depth against the entry within
  *         0.0095 + 1.12e-6 D of the semi-axis, 2.7 mm. What is nearer to a limit may be on either side.
  * Overflow: lanes have 16 bits. e is limited to 3.4 in Q11: then e.g is below 6.8, t below 2.41, and
- *         radius2 of what was limited is above 3.8. Sums of 361 values of at most 64: 23104.
- * Cost:   56 instructions for 16 rays of a box of 150, 22 more for those in columns of the head, and 400
+ *         radius2 of what was limited is above 3.75, beyond the ring. What follows from a radius2 above 1 may wrap in the
+ *         lanes of rays that pass beside the head; these do not count. Sums of 361 values of at most 64: 23104.
+ * Cost:   58 instructions for 16 rays of a box of 150, 22 more for those in columns of the head, and 400
  *         for the box, the candidate and the sums: 1100 (x86-64-v3). Without vectors a ray ends at its
  *         first failed comparison.
  */

@@ -294,6 +294,25 @@ static void labels_that_are_short_move_no_right_rig(void)
     }
 }
 
+/* Half a degree puts walls beyond the range, or beyond infinity: few labels are left, of other slots, and the lines that they
+ * teach are wrong ones. Of 120 rigs 71 were late when depth was searched for last, and only where less than half of the
+ * dots up to 4 px beyond the range had labels. */
+static void a_rotation_of_depth_that_hides_the_room_is_found_in_the_second_frame(void)
+{
+    static const double wall_mm[] = {1100, 1300, 1500, 1700, 1900, 2100};
+    int late = 0;
+
+    for (int i = 0; i < 120; i++) {
+        const struct moved_rig knock = {{0, i % 2 == 0 ? -0.5 : -0.4, 0}, 0};
+        const struct moved_scene scene = {wall_mm[i / 2 % 6], 0.2, 0.9, 20};
+
+        use_rig(0);
+        run(0, &knock, &scene, 2);
+        late += fabs(rotation_deg(1) - knock.rotation_deg[1]) > 0.1;
+    }
+    TEST_ASSERT_LESS_THAN_INT(20, late);
+}
+
 /* --- found in the first frame --- */
 
 static const struct moved_rig moves[] = {{{0.05, 0, 0}, 0},         {{-0.1, 0, 0}, 0},
@@ -832,6 +851,7 @@ int main(void)
     RUN_TEST(a_wall_beyond_the_range_moves_no_right_rig);
     RUN_TEST(a_person_before_a_wall_beyond_the_range_moves_no_right_rig);
     RUN_TEST(labels_that_are_short_move_no_right_rig);
+    RUN_TEST(a_rotation_of_depth_that_hides_the_room_is_found_in_the_second_frame);
     RUN_TEST(a_moved_rig_is_found_in_one_frame);
     RUN_TEST(a_moved_rig_is_found_before_a_wall_beyond_the_range);
     RUN_TEST(half_of_the_dots_are_enough);
