@@ -327,8 +327,8 @@ void ih_align_find(struct ih_align *align, const struct ih_dots *dots, struct ih
     }
     align->excess = excess_of(sight.on, sight.beside);
     align->near_excess = excess_of(sight.near_on, sight.near_beside);
-    const bool is_asked = align->is_short && align->now.state != IH_ALIGN_LOST;
-    const bool is_depth = is_asked && search_depth(align, dots, rig, rows, scratch);
+    const bool is_doubtful = align->is_short && align->now.state != IH_ALIGN_LOST;
+    const bool is_depth = is_doubtful && search_depth(align, dots, rig, rows, scratch);
     bool is_due = false;
     if (!is_depth && !is_where_it_was(align, sight, rows->dot_count)) {
         align->pause--;
@@ -340,7 +340,6 @@ void ih_align_find(struct ih_align *align, const struct ih_dots *dots, struct ih
         align->excess = search(align, dots, align->excess, rig, rows, scratch);
         align->trusted_q8 = 0;
     }
-    align->is_short = false;
     align->trusted_q8 = ih_max_s32(align->trusted_q8, align->excess * 256 / rows->dot_count);
     if (align->excess >= excess_min(rows->dot_count)) {
         align->now.state = state_of(align);

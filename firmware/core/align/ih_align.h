@@ -74,11 +74,11 @@ struct ih_align {
     int32_t odd;         /* slots of the last frame, after the first frames */
     int32_t excess;      /* of this frame: dots on the lines, less those that chance puts there */
     int32_t near_excess; /* the same of dots that are no more than 7 px beyond the range */
-    bool is_short;      /* the frame before had labels for less than three quarters of the latter */
-    bool is_depth_new;  /* depths have changed by more than tracks follow; the caller clears it */
-    int32_t vain_count; /* searches that found nothing, one after the other */
-    int32_t pause;      /* frames until the next one */
-    int32_t trusted_q8; /* fraction of the dots on the lines that is good enough */
+    bool is_short;       /* the last frame had labels for less than three quarters of the latter */
+    bool is_depth_new;   /* depths have changed by more than tracks follow; the caller clears it */
+    int32_t vain_count;  /* searches that found nothing, one after the other */
+    int32_t pause;       /* frames until the next one */
+    int32_t trusted_q8;  /* fraction of the dots on the lines that is good enough */
     /* Frames since a search moved the lines, and where they were before; 0: what it found is not questioned any more. */
     int32_t unsettled_frames, settled_px_q12[IH_ALIGN_AXES];
 };

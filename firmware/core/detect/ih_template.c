@@ -171,7 +171,7 @@ static bool set_axis(struct centre *candidate, int axis, int64_t off_q8, int32_t
 {
     const int64_t direction_q13 = (off_q8 * ONE_Q13 - (off_q8 < 0 ? depth_q8 - 1 : 0)) / depth_q8;
     const int32_t ratio_q14 = depth_q8 * 64 / semi_mm;
-    const int shift = ih_max_s32(17 - __builtin_clz((uint32_t)ratio_q14), 0);
+    const int shift = 17 - __builtin_clz((uint32_t)ratio_q14); /* 1 at DEPTH_MIN_MM */
     candidate->power[axis] = (int16_t)(1 << shift);
     candidate->factor[axis] = (int16_t)(ratio_q14 >> shift);
     candidate->offset_max[axis] =
