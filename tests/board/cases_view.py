@@ -104,6 +104,10 @@ def flood(run, path, held):
             sock.sendall([b"GET ", f"GET {path}frame HTTP/1.1\r\n\r\n".encode(), b"\0" * 9000][index % 3])
 
 
+def deaths(run):
+    return [line for line in run.board.log if "view: its process" in line]
+
+
 def case_view_attacked(run):
     """live view: wrong tokens, a flood, slow and silent connections, while the laser is on"""
     network(run)
@@ -119,12 +123,15 @@ def case_view_attacked(run):
     gated_loop(run, FRAMES)
     # The process dies while the laser is on; frames go on, as a camera without them is opened anew.
     run.laser(1)
-    run.board.command("kill -KILL $(pidof isohead_live)")
+    run.board.command("pid=$(pidof isohead_live); kill -KILL $pid; "
+                      "while [ -e /proc/$pid ] && ! grep -q '^State:.Z' /proc/$pid/status; do sleep 0.01; done")
     expected = host_records(run, run.gated)
     for index in range(FRAMES, FRAMES + AFTER):
         record = run.lit_frame(run.gated, index)
         expect(record == expected[index], f"frame {index}:\nboard    {record}\nhost_sim {expected[index]}")
-    reported = [line for line in run.board.log if "view: its process" in line]
+    # It is reported with the next frame; the line may come after that one's record.
+    run.board.wait(lambda: deaths(run), SOON_S, "message of its death")
+    reported = deaths(run)
     expect(len(reported) == 1 and "signal 9" in reported[0], f"messages of its death: {reported}")
     run.stop()
     attack.join(SOON_S)
