@@ -174,7 +174,6 @@ class Figures:
     """Of a row with one rig."""
 
     frames: int
-    counted: int
     right: int
     right_reference: int
     late_heads: int
@@ -218,7 +217,7 @@ def figures(pairs, references, first_frame):
     label_count = sum(frame.labels for frame in everything)
     label_right = sum(frame.labels_right for frame in everything)
     across, rotation = alignment(pairs)
-    return Figures(len(everything), len(counted), sum(frame.right for frame in counted),
+    return Figures(len(counted), sum(frame.right for frame in counted),
                    sum(frame.right for frame in counted_reference),
                    max(heads), max(labels), percent(label_right, label_count),
                    percent(label_right, sum(frame.labels_right for frame in reference)),
@@ -231,7 +230,7 @@ def broken(limits, rig, got):
     out = []
     if got.right < got.right_reference * (1 - limits.fewer_percent / 100):
         out.append("right")
-    if limits.right_percent and got.right < got.counted * limits.right_percent[rig] / 100:
+    if limits.right_percent and got.right < got.frames * limits.right_percent[rig] / 100:
         out.append("right at all")
     if limits.late_frames is not None and max(got.late_heads, got.late_labels) > limits.late_frames:
         out.append("late")

@@ -18,7 +18,7 @@
  * Overflow: scores are below 2^13, times 512. A centre is a point plus at most deep_mm on an axis;
  *         squares of distances 2^53.6.
  * Error:  a score is float64's but for rays nearer to a limit than 16 bits resolve (ih_template.h),
- *         which may be counted either way: 0.1 on the average if all of them were. Centres within 0.003 mm
+ *         which may be counted either way: 0.11 on the average if all of them were. Centres within 0.003 mm
  *         for slopes up to 1/2.
  * Cost:   a score for half of the points. 0.24 million instructions for 320 points (x86-64-v3, gcc -O3,
  *         frames of both sequences).

@@ -48,6 +48,10 @@
 /* Depth of rays without a point: before all heads, by more than the limit of depths. */
 #define NOWHERE_Q1 (-400)
 
+/* set_axis shifts a depth over the longer semi-axis by 0 or more. */
+_Static_assert((DEPTH_MIN_MM << 14) / IH_HEAD_SEMI_Y_MM >= 1 << 14,
+               "a factor has 15 bits at DEPTH_MIN_MM");
+
 static int16_t saturate_s16(int32_t value)
 {
     return (int16_t)ih_clamp_s32(value, INT16_MIN, INT16_MAX);
@@ -171,7 +175,7 @@ static bool set_axis(struct centre *candidate, int axis, int64_t off_q8, int32_t
 {
     const int64_t direction_q13 = (off_q8 * ONE_Q13 - (off_q8 < 0 ? depth_q8 - 1 : 0)) / depth_q8;
     const int32_t ratio_q14 = depth_q8 * 64 / semi_mm;
-    const int shift = 17 - __builtin_clz((uint32_t)ratio_q14); /* 1 at DEPTH_MIN_MM */
+    const int shift = 17 - __builtin_clz((uint32_t)ratio_q14);
     candidate->power[axis] = (int16_t)(1 << shift);
     candidate->factor[axis] = (int16_t)(ratio_q14 >> shift);
     candidate->offset_max[axis] =
