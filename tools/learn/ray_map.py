@@ -15,8 +15,29 @@ EPOCHS, BATCH, RATE = 20, 2048, 3e-3
 DECAY = 0.3  # of weights, by rate and step
 DROPPED = 0.2  # fraction of what is asked that a step does not see, so that no place decides alone
 MEAN, SQUARE = 0.9, 0.999  # memories of the steps (Adam)
+# A view that ends: chances that it does so at a border, and the cells of the map, or ranges of depth, that are left.
+ENDS_BELOW, ENDS_ASIDE, ENDS_ABOVE, ENDS_BEHIND = 0.75, 0.5, 0.4, 0.4
+ROWS_KEPT, COLUMNS_KEPT, ROWS_LOST, DEPTHS_KEPT = (8, ROWS), (2, COLUMNS), (0, 5), (7, 8)
+ENDS_SEED = 5
 QUANTILES = 65  # evidence is given to the network by its rank
 SEED = 18
+
+
+def ending_views(place):
+    """The same detections in views that end nearer: under the chin or on the chest, close beside the head, above it or
+    within it, and with nothing measured far behind. What is beyond is not known and asks nothing."""
+    random = numpy.random.default_rng(ENDS_SEED)
+    count = len(place)
+
+    def border(chance, limits, without):
+        low, high = limits
+        return numpy.where(random.random(count) < chance, random.integers(low, high + 1, count), without)[:, None]
+
+    row, column, range_of_depth = place // (COLUMNS * DEPTHS), place // DEPTHS % COLUMNS, place % DEPTHS
+    beyond = (row >= border(ENDS_BELOW, ROWS_KEPT, ROWS)) | (column >= border(ENDS_ASIDE, COLUMNS_KEPT, COLUMNS))
+    beyond |= row < border(ENDS_ABOVE, ROWS_LOST, 0)
+    beyond |= (range_of_depth >= border(ENDS_BEHIND, DEPTHS_KEPT, DEPTHS)) & (range_of_depth < DEPTHS - 1)
+    return numpy.where(beyond, -1, place).astype(place.dtype)
 
 
 def counts_of(place):
