@@ -24,7 +24,10 @@ void fuzz_check_heads(const struct ih_hypotheses *hypotheses, const struct ih_ne
 void fuzz_check_detections(const struct ih_detections *detections);
 void fuzz_check_tracks(const struct ih_tracks *tracks, const struct ih_detections *detections,
                        const struct ih_predicted *predicted);
-void fuzz_check_result(const struct ih_result *result);
+/* What a track's position is known to at worst (ih_kalman.h). */
+#define FUZZ_SIGMA_MAX_MM 500
+
+void fuzz_check_result(const struct ih_result *result, int32_t sigma_max_mm);
 
 /* All of a core after isohead_frame. */
 void fuzz_check_core(const struct isohead *core);

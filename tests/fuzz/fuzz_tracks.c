@@ -98,7 +98,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         ih_tracks_update(&tracks, &params, rig, &detections, &predicted);
         fuzz_check_tracks(&tracks, &detections, &predicted);
         ih_result_from_tracks(&detections, &tracks, &predicted, rig, &result);
-        fuzz_check_result(&result);
+        fuzz_check_result(&result, FUZZ_SIGMA_MAX_MM);
         FUZZ_CHECK(result.selected == tracks.selected);
     }
     return 0;

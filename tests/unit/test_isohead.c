@@ -320,7 +320,7 @@ static void flat_frames_have_no_head(void)
 /* Most busts are too smooth for a head's score; this one is taken for one. */
 static void paint_head(void)
 {
-    paint_bust(&vector_busts[4]);
+    paint_bust(&vector_busts[5]);
 }
 
 /* After a good frame, so that what is left of it would show. */

@@ -96,7 +96,8 @@ void ih_align_find(struct ih_align *align, const struct ih_dots *dots, struct ih
 void ih_align_learn(struct ih_align *align, const struct ih_labels *labels, struct ih_rig *rig,
                     struct ih_align_scratch *scratch);
 
-/* What the uncertainty of the rotation is at a depth, one standard deviation. */
+/* What the uncertainty of the rotation, of which more than 0.9 degrees count as 0.9, is at a depth, one standard
+ * deviation; at most IH_DEPTH_MAX_MM. */
 int32_t ih_align_depth_sigma_mm_q8(const struct ih_align *align, const struct ih_rig *rig,
                                    int32_t depth_mm_q8);
 

@@ -5,6 +5,8 @@
 /* What no number of frames shows, about the baseline, of depth, about the camera's axis: 0.015, 0.012, 0.002 degrees. */
 static const int32_t floor_rad_q30[3] = {281102, 224882, 37480};
 #define DEPTH_KNOWN_RAD_Q30 1874016 /* 0.1 degrees */
+/* 0.9 degrees: times the square of 16 m in Q8 it is 2^60. */
+#define DEPTH_UNKNOWN_RAD_Q30 (1 << 24)
 
 /* One of the five, against where the rig's lines are. */
 static int64_t sigma_of(const struct ih_align *align, int axis, int32_t mean_px_q12,
@@ -43,7 +45,8 @@ int32_t ih_align_depth_sigma_mm_q8(const struct ih_align *align, const struct ih
     const int64_t x = rig->calibration.origin_mm_q16[0], y = rig->calibration.origin_mm_q16[1];
     const int64_t baseline_mm_q16 = (int64_t)ih_isqrt_u64((uint64_t)(x * x + y * y)) + 1;
     const int64_t depth2_mm2_q8 = ih_mul_shift(depth_mm_q8, depth_mm_q8, 8);
-    const int64_t aside_mm2_q16 =
-        ih_mul_shift(depth2_mm2_q8, align->now.depth_sigma_rad_q30, 30 - 8);
-    return ih_saturate_s32(ih_div_round(aside_mm2_q16 * (1 << 8), baseline_mm_q16));
+    const int64_t aside_mm2_q16 = ih_mul_shift(
+        depth2_mm2_q8, ih_min_s32(align->now.depth_sigma_rad_q30, DEPTH_UNKNOWN_RAD_Q30), 30 - 8);
+    return (int32_t)ih_min_s64(ih_div_round(aside_mm2_q16 * (1 << 8), baseline_mm_q16),
+                               IH_DEPTH_MAX_MM << 8);
 }

@@ -842,6 +842,21 @@ static void anything_labelled_is_survived(void)
     }
 }
 
+/* By hand, 12.5 mm beside the camera: 0.1 degrees at 1 m are 1000 * 1000 / 12.5 * 0.1 degrees = 139.6 mm. */
+static void no_depth_is_less_certain_than_the_range(void)
+{
+    struct ih_rig wide_open = rig;
+    wide_open.calibration.origin_mm_q16[0] = 25 << 15;
+    wide_open.calibration.origin_mm_q16[1] = 0;
+    align.now.depth_sigma_rad_q30 = (int32_t)(0.1 * DEG * Q30);
+    IH_TEST_WITHIN(139.5, 139.8, ih_align_depth_sigma_mm_q8(&align, &wide_open, 1000 << 8) / 256.0,
+                   "mm", 0);
+    align.now.depth_sigma_rad_q30 = INT32_MAX;
+    const int32_t farthest_q8 = IH_DEPTH_MAX_MM << 8;
+    TEST_ASSERT_EQUAL_INT32(farthest_q8,
+                            ih_align_depth_sigma_mm_q8(&align, &wide_open, farthest_q8));
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -872,5 +887,6 @@ int main(void)
     RUN_TEST(a_knock_starts_the_mean_anew);
     RUN_TEST(a_slow_drift_is_followed);
     RUN_TEST(anything_labelled_is_survived);
+    RUN_TEST(no_depth_is_less_certain_than_the_range);
     return UNITY_END();
 }
