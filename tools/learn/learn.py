@@ -8,7 +8,8 @@ over the frames of people that tools/people has made, and learns the maps of the
 logistic model: log-odds = bias + one piecewise linear curve per kind of evidence, the maps' among them, with a penalty on
 curves that bend; then trees for what the curves leave. A detection within 55 mm of a head is one, beyond 100 mm it is none,
 between it is not used, and neither is one within 150 mm of a head that is hardly seen. A sequence of tools/people counts
-as three frames of tools/render. Every detection is learnt from once more, for half as much, as if the view ended nearer. Run it twice: which detections remain depends a little on the score that rated them.
+as three frames of tools/render. Every detection is learnt from once more, for half as much, as if the view ended nearer.
+Run it twice: which detections remain depends a little on the score that rated them.
 """
 
 import argparse
@@ -58,13 +59,17 @@ def importance(seen, people):
 
 
 def gather(seen, people):
-    """Evidence, places, their weights, labels, importance: all in the whole view, then all in views that end."""
+    """Evidence, places, their weights, labels, importance."""
     weights = importance(seen, people)
     parts = [(f["evidence_q8"] / 256, f["place"], f["weight_q12"], label(f), numpy.full(len(f["place"]), w))
              for f, w in zip(seen, weights) if len(f["place"])]
     columns = [numpy.concatenate(column) for column in zip(*parts)]
     usable = ~numpy.isnan(columns[3])
-    evidence, place, weight_q12, labels, importances = (column[usable] for column in columns)
+    return [column[usable] for column in columns]
+
+
+def and_in_ending_views(evidence, place, weight_q12, labels, importances):
+    """The same, then all once more in views that end nearer."""
     return [numpy.concatenate(pair) for pair in (
         (evidence, evidence), (place, ray_map.ending_views(place)), (weight_q12, weight_q12), (labels, labels),
         (importances, ENDING_WEIGHT * importances))]
@@ -153,8 +158,8 @@ def main():
     seen = see(directories_of(arguments, arguments.seeds, arguments.depth_seeds) + people)
     kinds = seen[0]["kinds"]
     rows = gather(seen, set(people))
-    print("%d frames, %d detections, %d heads" % (len(seen), len(rows[3]) // 2, rows[3].sum() / 2))
-    learnt = Score(*rows)
+    print("%d frames, %d detections, %d heads" % (len(seen), len(rows[3]), rows[3].sum()))
+    learnt = Score(*and_in_ending_views(*rows))
     command = "tools/learn/learn.py --seeds %s --depth-seeds %s --people %s" % (
         arguments.seeds, arguments.depth_seeds, " ".join(os.path.basename(os.path.normpath(folder)) for folder in arguments.people))
     model.write(os.path.join(arguments.out, "ih_score_weights.h"), learnt.curves, kinds, command)

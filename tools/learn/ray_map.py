@@ -15,7 +15,8 @@ EPOCHS, BATCH, RATE = 20, 2048, 3e-3
 DECAY = 0.3  # of weights, by rate and step
 DROPPED = 0.2  # fraction of what is asked that a step does not see, so that no place decides alone
 MEAN, SQUARE = 0.9, 0.999  # memories of the steps (Adam)
-# A view that ends: chances that it does so at a border, and the cells of the map, or ranges of depth, that are left.
+# A view that ends: chances that it does so at a border, and between which cells or ranges of depth: from the chin (128 mm
+# below the centre) down, from the temples (128 mm) outwards, to the forehead (64 mm above the centre), from 200 mm behind.
 ENDS_BELOW, ENDS_ASIDE, ENDS_ABOVE, ENDS_BEHIND = 0.75, 0.5, 0.4, 0.4
 ROWS_KEPT, COLUMNS_KEPT, ROWS_LOST, DEPTHS_KEPT = (8, ROWS), (2, COLUMNS), (0, 5), (7, 8)
 ENDS_SEED = 5

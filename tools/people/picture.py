@@ -12,6 +12,14 @@ def write_pgm(path, samples, max_value):
         file.write(samples.astype(">u2" if max_value > 255 else "u1").tobytes())
 
 
+def read_pgm(path):
+    """Of 16 bits, as write_pgm writes it."""
+    with open(path, "rb") as file:
+        _, size, _, samples = file.read().split(b"\n", 3)
+    width, height = (int(number) for number in size.split())
+    return numpy.frombuffer(samples, ">u2").reshape(height, width)
+
+
 def write_png(path, pixels):
     """Grey (h, w) or RGB (h, w, 3), 8 bits."""
     pixels = numpy.ascontiguousarray(pixels, numpy.uint8)

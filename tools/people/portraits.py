@@ -15,7 +15,7 @@ import os
 
 import numpy
 
-from picture import write_pgm
+from picture import read_pgm, write_pgm
 
 EVERY = 6
 BEHIND_MM = 450.0
@@ -23,13 +23,6 @@ SMALLEST_PX = 64
 THINGS = 3  # of each frame
 THING_MM = 125.0
 MARGIN_PX = 60
-
-
-def read_pgm(path):
-    with open(path, "rb") as file:
-        _, size, _, samples = file.read().split(b"\n", 3)
-    width, height = (int(number) for number in size.split())
-    return numpy.frombuffer(samples, ">u2").reshape(height, width)
 
 
 def write(out, rig, z, box, truth):

@@ -5,7 +5,7 @@
 /* What no number of frames shows, about the baseline, of depth, about the camera's axis: 0.015, 0.012, 0.002 degrees. */
 static const int32_t floor_rad_q30[3] = {281102, 224882, 37480};
 #define DEPTH_KNOWN_RAD_Q30 1874016 /* 0.1 degrees */
-/* 0.9 degrees: times the square of 16 m in Q8 it is 2^60. */
+/* 0.9 degrees: times the square of 32 m in Q8 it is below 2^62, and no track gets there: 16 m, and 3 m/s for 2 s. */
 #define DEPTH_UNKNOWN_RAD_Q30 (1 << 24)
 
 /* One of the five, against where the rig's lines are. */
