@@ -25,7 +25,7 @@ static bool is_empty(const struct ih_rig *rig, const struct ih_dots *dots, int32
                      int32_t probe_mm_q8)
 {
     int32_t x_q28, y_q28, u_px_q12, v_px_q12;
-    ih_level_dot_at(rig, slot, probe_mm_q8, &x_q28, &y_q28);
+    (void)ih_level_dot_at(rig, slot, probe_mm_q8, &x_q28, &y_q28);
     return ih_level_sees(rig, x_q28, y_q28, &u_px_q12, &v_px_q12) &&
            (dots == NULL || !ih_dots_is_bright(dots, u_px_q12 >> 12, v_px_q12 >> 12));
 }

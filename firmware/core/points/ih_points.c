@@ -66,9 +66,10 @@ void ih_points_from_labels(const struct ih_labels *labels, const struct ih_rig *
         if (labels->dot_of_slot[slot] != IH_NONE) {
             point_of_dot(labels, rig, slot, point);
         } else {
-            ih_level_dot_at(rig, slot, rig->calibration.far_mm << 8, &point->x_q28, &point->y_q28);
+            const bool is_in_view = ih_level_dot_at(rig, slot, rig->calibration.far_mm << 8,
+                                                    &point->x_q28, &point->y_q28);
             point->depth_mm_q8 = 0;
-            point->state = IH_POINT_MISSING;
+            point->state = is_in_view ? IH_POINT_MISSING : IH_POINT_UNKNOWN;
         }
         out->seen_count += point->state == IH_POINT_SEEN;
     }

@@ -35,7 +35,8 @@ struct ih_points_params {
 enum ih_point_state {
     IH_POINT_MISSING = 0, /* nothing was measured; a surface there would have been seen */
     IH_POINT_SEEN = 1,
-    IH_POINT_UNKNOWN = 2, /* missing, but that says nothing: outside a range image, or too rare */
+    /* missing, but that says nothing: outside a range image, too rare, or a ray out of the level frame's view */
+    IH_POINT_UNKNOWN = 2,
 };
 
 struct ih_point {

@@ -119,17 +119,18 @@ bool ih_level_ray(const struct ih_rig *rig, int32_t slot, int32_t *slope_x_q28,
     return ih_level_rotate(rig, slope_x_q28, slope_y_q28) > 0;
 }
 
-void ih_level_dot_at(const struct ih_rig *rig, int32_t slot, int32_t depth_mm_q8, int32_t *x_q28,
+bool ih_level_dot_at(const struct ih_rig *rig, int32_t slot, int32_t depth_mm_q8, int32_t *x_q28,
                      int32_t *y_q28)
 {
     if (rig->is_level) {
         ih_rig_dot_at(rig, slot, depth_mm_q8, x_q28, y_q28);
-        return;
+        return true;
     }
     int32_t tan_q28[2];
-    (void)ih_level_ray(rig, slot, &tan_q28[0], &tan_q28[1]);
+    const bool is_in_view = ih_level_ray(rig, slot, &tan_q28[0], &tan_q28[1]);
     *x_q28 = ih_rig_slope_at_q28(rig->level_origin_mm_q16, 0, tan_q28[0] * (int64_t)4, depth_mm_q8);
     *y_q28 = ih_rig_slope_at_q28(rig->level_origin_mm_q16, 1, tan_q28[1] * (int64_t)4, depth_mm_q8);
+    return is_in_view;
 }
 
 bool ih_level_sees(const struct ih_rig *rig, int32_t x_q28, int32_t y_q28, int32_t *u_px_q12,

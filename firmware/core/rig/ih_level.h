@@ -36,8 +36,9 @@ int32_t ih_level_rotate_back(const struct ih_rig *rig, int32_t *x_q28, int32_t *
 bool ih_level_ray(const struct ih_rig *rig, int32_t slot, int32_t *slope_x_q28,
                   int32_t *slope_y_q28);
 
-/* Normalised coordinates of a dot at a depth, both in the level frame; depth_mm_q8 > 0. */
-void ih_level_dot_at(const struct ih_rig *rig, int32_t slot, int32_t depth_mm_q8, int32_t *x_q28,
+/* Normalised coordinates of a dot at a depth, both in the level frame; depth_mm_q8 > 0. False when its ray is out of view
+ * there: a camera that looks down has rays that pass its feet. */
+bool ih_level_dot_at(const struct ih_rig *rig, int32_t slot, int32_t depth_mm_q8, int32_t *x_q28,
                      int32_t *y_q28);
 
 /* The frame's pixel where a direction of the level frame is seen; false outside of the frame. */

@@ -14,6 +14,7 @@
 /* No camera sees rays that are steeper than this against its optical axis. */
 #define RAY_FORWARD_MIN_Q30 (1 << 28)
 #define UNIT_TOLERANCE_Q30 (1 << 16) /* 6e-5 */
+#define HALF_PITCH_MIN_Q28 ((1 << 28) / 1000)
 
 /* tan of the ray. */
 static int64_t ray_tan_q30(const struct ih_calibration *c, int32_t slot, int axis)
@@ -149,7 +150,7 @@ static int32_t half_pitch_q28(const struct ih_rig *rig, bool is_level_frame, int
         int32_t x[2], y[2];
         for (int k = 0; k < 2; k++) {
             if (is_level_frame) {
-                ih_level_dot_at(rig, ends[i][k], depth_mm_q8, &x[k], &y[k]);
+                (void)ih_level_dot_at(rig, ends[i][k], depth_mm_q8, &x[k], &y[k]);
             } else {
                 ih_rig_dot_at(rig, ends[i][k], depth_mm_q8, &x[k], &y[k]);
             }
@@ -161,15 +162,23 @@ static int32_t half_pitch_q28(const struct ih_rig *rig, bool is_level_frame, int
     return (int32_t)ih_div_round(sum_q28, 4 * (IH_GRID - 1) * 2);
 }
 
-static void fill_field(struct ih_rig *rig)
+/* False, and all as it was, when dots are closer than 2 mrad: not a 19x19 pattern. The level frame's are when a tilted
+ * camera's pattern leaves its view. */
+static bool fill_field(struct ih_rig *rig)
 {
     const struct ih_calibration *c = &rig->calibration;
-    int32_t depth_q8 = ih_clamp_s32(FIELD_DEPTH_MM, c->near_mm, c->far_mm) << 8;
-    rig->half_pitch_q28 = half_pitch_q28(rig, false, depth_q8);
-    ih_level_dot_at(rig, IH_SLOTS / 2, depth_q8, &rig->field.centre_x_q28,
-                    &rig->field.centre_y_q28);
-    rig->field.unit_q28 = half_pitch_q28(rig, true, depth_q8);
-    IH_IN_RANGE(rig->field.unit_q28, 0, IH_RANGE_UNIT_Q28);
+    const int32_t depth_q8 = ih_clamp_s32(FIELD_DEPTH_MM, c->near_mm, c->far_mm) << 8;
+    const int32_t half_q28 = half_pitch_q28(rig, false, depth_q8);
+    const int32_t unit_q28 = half_pitch_q28(rig, true, depth_q8);
+    if (ih_min_s32(half_q28, unit_q28) < HALF_PITCH_MIN_Q28) {
+        return false;
+    }
+    rig->half_pitch_q28 = half_q28;
+    rig->field.unit_q28 = unit_q28;
+    (void)ih_level_dot_at(rig, IH_SLOTS / 2, depth_q8, &rig->field.centre_x_q28,
+                          &rig->field.centre_y_q28);
+    IH_IN_RANGE(rig->field.unit_q28, HALF_PITCH_MIN_Q28, IH_RANGE_UNIT_Q28);
+    return true;
 }
 
 enum ih_err ih_rig_init(struct ih_rig *rig, const struct ih_calibration *calibration,
@@ -195,11 +204,7 @@ enum ih_err ih_rig_init(struct ih_rig *rig, const struct ih_calibration *calibra
             return IH_ERR_BASELINE;
         }
     }
-    fill_field(rig);
-    if (rig->half_pitch_q28 < (1 << 28) / 1000) { /* dots closer than 2 mrad: not a 19x19 pattern */
-        return IH_ERR_RAY;
-    }
-    return IH_OK;
+    return fill_field(rig) ? IH_OK : IH_ERR_RAY;
 }
 
 /* To second order; the third is below 2e-5 of a ray's length. */
@@ -224,5 +229,5 @@ void ih_rig_move(struct ih_rig *rig, const int32_t ray_q30[IH_SLOTS][3],
             memcpy(ray, ray_before, sizeof ray_before);
         }
     }
-    fill_field(rig);
+    (void)fill_field(rig);
 }

@@ -138,6 +138,38 @@ static void missing_dots_stand_at_the_far_end(void)
     }
 }
 
+/* The camera looks down by 45 degrees: a ray below its own axis by a slope of 1/3 and more passes its feet, where nothing is
+ * looked for and nothing is missed. */
+static void rays_out_of_view_are_not_missed(void)
+{
+    const int32_t half_q30 = 759250125; /* sin and cos of 45 degrees */
+    int32_t bad_slot, slot, unknown = 0;
+
+    calibration = vector_rigs[0];
+    calibration.up_q30[0] = 0;
+    calibration.up_q30[1] = calibration.up_q30[2] = -half_q30;
+    for (slot = 0; slot < IH_SLOTS; slot++) {
+        const double slope = 0.4 * (slot / IH_GRID - 9) / 9.0;
+
+        calibration.ray_q30[slot][0] = 0;
+        calibration.ray_q30[slot][1] = (int32_t)lround(slope / sqrt(1 + slope * slope) * (1 << 30));
+        calibration.ray_q30[slot][2] = (int32_t)lround(1 / sqrt(1 + slope * slope) * (1 << 30));
+    }
+    TEST_ASSERT_EQUAL_INT(IH_OK, ih_rig_init(&rig, &calibration, &bad_slot));
+    for (slot = 0; slot < IH_SLOTS; slot++) {
+        labels.dot_of_slot[slot] = IH_NONE;
+    }
+    ih_points_from_labels(&labels, &rig, &points);
+    for (slot = 0; slot < IH_SLOTS; slot++) {
+        const bool is_in_view = slot / IH_GRID - 9 < 9 / 0.4 / 3;
+
+        IH_TEST_EQUAL(is_in_view ? IH_POINT_MISSING : IH_POINT_UNKNOWN, points.point[slot].state,
+                      "state", slot);
+        unknown += !is_in_view;
+    }
+    TEST_ASSERT_EQUAL_INT32(2 * IH_GRID, unknown);
+}
+
 /* A range camera without distortion; the image's diagonal is seen at about 75 degrees. */
 static void use_range_rig(int32_t width, int32_t height)
 {
@@ -548,6 +580,7 @@ int main(void)
     RUN_TEST(depth_comes_back_through_the_rig);
     RUN_TEST(depth_beyond_the_range_is_limited);
     RUN_TEST(missing_dots_stand_at_the_far_end);
+    RUN_TEST(rays_out_of_view_are_not_missed);
     RUN_TEST(an_empty_range_image_has_no_points);
     RUN_TEST(a_wall_is_seen_wherever_it_is_in_view);
     RUN_TEST(a_point_has_the_depth_of_its_pixel);

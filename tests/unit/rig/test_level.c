@@ -203,6 +203,51 @@ static void level_cameras_are_not_rotated(void)
     }
 }
 
+/* All rays within half of slopes x and y. */
+static void aim(double x, double y, double half)
+{
+    int slot, axis;
+
+    for (slot = 0; slot < IH_SLOTS; slot++) {
+        const double ray[3] = {x + half * (slot % IH_GRID - 9) / 9.0,
+                               y + half * (slot / IH_GRID - 9) / 9.0, 1};
+        const double length = sqrt(ray[0] * ray[0] + ray[1] * ray[1] + 1);
+        for (axis = 0; axis < 3; axis++) {
+            calibration.ray_q30[slot][axis] = (int32_t)lround(ray[axis] / length * (1 << 30));
+        }
+    }
+}
+
+/* A camera that looks down by 45 degrees has what is below a slope of 1/3 at a tangent of 2 and more in the level frame:
+ * (1 + y) / (1 - y). */
+static void rays_at_the_cameras_feet_are_out_of_view(void)
+{
+    const int32_t half_q30 = 759250125; /* sin and cos of 45 degrees */
+    int32_t x, y;
+    int slot;
+
+    aim(0, 0, 0.4);
+    IH_TEST_EQUAL(IH_OK, init(0, -half_q30, -half_q30), "to the floor", 0);
+    for (slot = 0; slot < IH_SLOTS; slot++) {
+        const double slope = 0.4 * (slot / IH_GRID - 9) / 9.0;
+        const bool is_in_view = (1 + slope) / (1 - slope) < 2;
+
+        IH_TEST_EQUAL(is_in_view, ih_level_ray(&rig, slot, &x, &y), "ray", slot);
+        IH_TEST_EQUAL(is_in_view, ih_level_dot_at(&rig, slot, 900 << 8, &x, &y), "dot", slot);
+    }
+}
+
+static void a_pattern_at_the_cameras_feet_is_refused(void)
+{
+    const int32_t half_q30 = 759250125;
+
+    calibration.origin_mm_q16[0] = calibration.origin_mm_q16[1] = -(900 << 16);
+    calibration.origin_mm_q16[2] = 0;
+    aim(0.9, 0.9, 0.15);
+    IH_TEST_EQUAL(IH_OK, init(0, -(1 << 30), 0), "level", 0);
+    IH_TEST_EQUAL(IH_ERR_RAY, init(0, -half_q30, -half_q30), "to the floor", 0);
+}
+
 static void up_is_a_unit_vector_aside_of_the_axis(void)
 {
     const double limit = 10.0 / 180 * acos(-1);
@@ -327,6 +372,8 @@ int main(void)
     RUN_TEST(dots_match_float64);
     RUN_TEST(ellipses_match_float64);
     RUN_TEST(level_cameras_are_not_rotated);
+    RUN_TEST(rays_at_the_cameras_feet_are_out_of_view);
+    RUN_TEST(a_pattern_at_the_cameras_feet_is_refused);
     RUN_TEST(up_is_a_unit_vector_aside_of_the_axis);
     RUN_TEST(any_up_gives_a_rotation);
     RUN_TEST(points_come_back);
