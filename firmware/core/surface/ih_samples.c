@@ -112,6 +112,7 @@ static void add_sample(struct ih_samples *out, const struct ih_field *field, int
     out->sample[out->sample_count++] = sample;
     out->filled_count += sample.is_filled;
     out->seen_count += !sample.is_filled;
+    out->nearest_mm_q8 = ih_min_s32(out->nearest_mm_q8, sample.depth_mm_q8);
 }
 
 /* Would a surface at (x, y) show a dot? */
@@ -137,7 +138,7 @@ static void fill_missing(const struct ih_points *points, const struct ih_dots *d
     int32_t x_q28 = point->x_q28;
     int32_t y_q28 = point->y_q28;
     if (rig->calibration.kind == IH_RIG_DOTS) {
-        ih_level_dot_at(rig, slot, depth_q8, &x_q28, &y_q28);
+        (void)ih_level_dot_at(rig, slot, depth_q8, &x_q28, &y_q28);
     }
     if (is_visible_at(rig, dots, x_q28, y_q28)) {
         add_sample(out, &points->field, x_q28, y_q28,
@@ -160,7 +161,6 @@ static void add_seen(const struct ih_points *points, int32_t isolated_q8, int32_
     add_sample(
         out, &points->field, point->x_q28, point->y_q28,
         (struct ih_sample){.slot = slot, .depth_mm_q8 = depth_q8, .root_weight_q15 = 1 << 15});
-    out->nearest_mm_q8 = ih_min_s32(out->nearest_mm_q8, depth_q8);
 }
 
 void ih_samples_select(const struct ih_points *points, const struct ih_dots *dots,

@@ -47,7 +47,8 @@ struct ih_samples {
     int32_t seen_count, filled_count;
     int32_t isolated_count; /* dropped as isolated */
     int32_t outside_count;  /* dropped: farther than IH_SAMPLES_REACH from the field's centre */
-    int32_t nearest_mm_q8, clip_mm_q8;
+    int32_t nearest_mm_q8;  /* of all samples; INT32_MAX without any */
+    int32_t clip_mm_q8;
     struct ih_sample sample[IH_SLOTS];
 };
 

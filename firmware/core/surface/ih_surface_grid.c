@@ -40,16 +40,6 @@ void ih_surface_grid_fill_table(struct ih_surface_scratch *scratch)
     }
 }
 
-/* Lower limit of the nodes: see IH_SURFACE_OVERSHOOT_MM. */
-static int32_t min_depth_mm_q8(const struct ih_samples *samples)
-{
-    int32_t nearest_q8 = INT32_MAX;
-    for (int32_t i = 0; i < samples->sample_count; i++) {
-        nearest_q8 = ih_min_s32(nearest_q8, samples->sample[i].depth_mm_q8);
-    }
-    return ih_max_s32(nearest_q8 - (IH_SURFACE_OVERSHOOT_MM << 8), 1 << 8);
-}
-
 /* Grid steps from the grid's first node to a centre. */
 static int32_t centre_node(const struct ih_surface_scratch *scratch, int32_t centre)
 {
@@ -155,7 +145,7 @@ void ih_surface_grid_evaluate(const struct ih_samples *samples, struct ih_surfac
     const struct depth_scale scale = {
         .shift = ih_min_s32(20 + scratch->coefficient_shift - 7, 62), /* sums are twice as great */
         .mean_mm_q8 = out->mean_mm_q8,
-        .min_mm_q8 = min_depth_mm_q8(samples),
+        .min_mm_q8 = ih_max_s32(samples->nearest_mm_q8 - (IH_SURFACE_OVERSHOOT_MM << 8), 1 << 8),
         .max_mm_q8 = IH_SURFACE_DEPTH_MAX_MM << 8,
     };
     int32_t *between;

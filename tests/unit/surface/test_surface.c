@@ -62,6 +62,14 @@ void tearDown(void)
 
 static void fit(void)
 {
+    int32_t i;
+
+    samples.nearest_mm_q8 = INT32_MAX;
+    for (i = 0; i < samples.sample_count; i++) {
+        if (samples.sample[i].depth_mm_q8 < samples.nearest_mm_q8) {
+            samples.nearest_mm_q8 = samples.sample[i].depth_mm_q8;
+        }
+    }
     ih_surface_fit(&samples, &field, &params, &scratch, &surface);
 }
 
