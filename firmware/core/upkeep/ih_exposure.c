@@ -138,15 +138,16 @@ static int32_t damped_q8(int32_t wanted, int32_t is)
 static void raise_light(const struct ih_exposure_params *params, int32_t factor_q8,
                         bool exposure_too, struct ih_exposure *state)
 {
+    /* One more at least: a small number would be rounded back. */
     if (state->duty_q8 < params->duty_max_q8) {
-        /* One more at least: a small duty would be rounded back. */
         state->duty_q8 =
             ih_max_s32(ih_min_s32(state->duty_q8 + 1, params->duty_max_q8),
                        scaled(state->duty_q8, factor_q8, params->duty_min_q8, params->duty_max_q8));
-    } else if (exposure_too) {
+    } else if (exposure_too && state->exposure_us < params->exposure_max_us) {
         int32_t high = ih_min_s32(params->exposure_max_us, state->ceiling_us);
-        int32_t more =
-            scaled(state->exposure_us, factor_q8, params->exposure_min_us, params->exposure_max_us);
+        int32_t more = ih_max_s32(state->exposure_us + 1,
+                                  scaled(state->exposure_us, factor_q8, params->exposure_min_us,
+                                         params->exposure_max_us));
         state->exposure_us = ih_max_s32(state->exposure_us, ih_min_s32(more, high));
     }
 }

@@ -231,6 +231,23 @@ static void a_small_duty_grows_by_one(void)
 }
 
 /* Fewer than 24 labels say nothing about how high dots are. */
+/* Once the duty is at its limit: 1 us times 1.25 would be 1 us again. */
+static void a_small_exposure_grows_by_one(void)
+{
+    const int32_t weak_aim = params.weak_grey_q4 * IH_BANDPASS_UNIT / 16;
+    const struct ih_exposure_look look = {
+        .labelled_count = IH_SLOTS, .weak = weak_aim * 8 / 10, .strong = 1};
+    int32_t us;
+
+    params.exposure_min_us = 1;
+    params.exposure_max_us = 4;
+    ih_exposure_start(&params, 1, params.duty_max_q8, &state);
+    for (us = 2; us <= 5; us++) {
+        ih_exposure_next(&params, &look, &state);
+        TEST_ASSERT_EQUAL_INT32(us < 4 ? us : 4, state.exposure_us);
+    }
+}
+
 static void twenty_four_labels_say_something(void)
 {
     const int32_t weak_aim = params.weak_grey_q4 * IH_BANDPASS_UNIT / 16;
@@ -587,6 +604,7 @@ int main(void)
     RUN_TEST(without_labels_the_frame_itself_is_looked_at);
     RUN_TEST(steps_begin_beyond_the_gaps);
     RUN_TEST(a_small_duty_grows_by_one);
+    RUN_TEST(a_small_exposure_grows_by_one);
     RUN_TEST(twenty_four_labels_say_something);
     RUN_TEST(over_exposure_is_left_by_its_limits);
     RUN_TEST(exposure_grows_while_hardly_any_is_lost);
