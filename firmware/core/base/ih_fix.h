@@ -96,6 +96,11 @@ static inline int32_t ih_clamp_s32(int32_t value, int32_t low, int32_t high)
     return ih_min_s32(ih_max_s32(value, low), high);
 }
 
+static inline int16_t ih_saturate_s16(int32_t value)
+{
+    return (int16_t)ih_clamp_s32(value, INT16_MIN, INT16_MAX);
+}
+
 /* value limited to -max .. max. */
 static inline int64_t ih_clamp_s64(int64_t value, int64_t max)
 {

@@ -131,13 +131,8 @@ static int64_t plane_residual_q8(const struct sums *sums)
     int64_t top_y_q16 = zy * c[0][0] - zx * c[1][0];
     /* slopes in Q12; a camera sees no surface steeper than 64 */
     const int64_t steep = 64 << 12;
-    int drop = ih_max_s32(
-        0, ih_bits_u64((uint64_t)ih_abs_s64(top_x_q16) | (uint64_t)ih_abs_s64(top_y_q16)) - 50);
-    int64_t det = (det_q16 >> drop) + 1;
-    int64_t slope_x = ih_div_round((top_x_q16 >> drop) * 4096, det);
-    int64_t slope_y = ih_div_round((top_y_q16 >> drop) * 4096, det);
-    slope_x = slope_x > steep ? steep : slope_x < -steep ? -steep : slope_x;
-    slope_y = slope_y > steep ? steep : slope_y < -steep ? -steep : slope_y;
+    const int64_t slope_x = ih_clamp_s64(ih_div_round(top_x_q16 * 4096, det_q16 + 1), steep);
+    const int64_t slope_y = ih_clamp_s64(ih_div_round(top_y_q16 * 4096, det_q16 + 1), steep);
     int64_t residual = c[2][2] - ih_shift_round(slope_x * zx + slope_y * zy, 12);
     return residual > 0 ? residual : 0;
 }

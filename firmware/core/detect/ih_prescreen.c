@@ -44,8 +44,8 @@ struct count {
 
 static void set_range(int32_t middle, int32_t before, int32_t behind, int16_t range[2])
 {
-    range[0] = (int16_t)ih_clamp_s32(middle - before, INT16_MIN, INT16_MAX);
-    range[1] = (int16_t)ih_clamp_s32(middle + behind, INT16_MIN, INT16_MAX);
+    range[0] = ih_saturate_s16(middle - before);
+    range[1] = ih_saturate_s16(middle + behind);
 }
 
 /* mm_q20: a mm at the centre's depth, as a slope. */

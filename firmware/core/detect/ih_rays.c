@@ -16,8 +16,7 @@ void ih_rays_params_default(struct ih_rays_params *params)
 
 static int32_t limited_slope_q20(int64_t slope_q20)
 {
-    const int64_t limit = (int64_t)IH_RAYS_SLOPE_MAX << 20;
-    return (int32_t)(slope_q20 > limit ? limit : slope_q20 < -limit ? -limit : slope_q20);
+    return (int32_t)ih_clamp_s64(slope_q20, (int64_t)IH_RAYS_SLOPE_MAX << 20);
 }
 
 /* Would this dot be seen on a surface at the probe's depth? */
@@ -30,11 +29,6 @@ static bool is_empty(const struct ih_rig *rig, const struct ih_dots *dots, int32
            (dots == NULL || !ih_dots_is_bright(dots, u_px_q12 >> 12, v_px_q12 >> 12));
 }
 
-static int16_t clamp_s16(int32_t value)
-{
-    return (int16_t)ih_clamp_s32(value, INT16_MIN, INT16_MAX);
-}
-
 static void fill_slot(const struct ih_ray *ray, int32_t slot, struct ih_ray_table *out)
 {
     const int32_t slope_q20[2] = {ray->slope_x_q20, ray->slope_y_q20};
@@ -44,7 +38,7 @@ static void fill_slot(const struct ih_ray *ray, int32_t slot, struct ih_ray_tabl
             ih_max_s32(out->slope_max_q20[axis], ih_abs_s32(slope_q20[axis]));
     }
     for (int axis = 0; axis < 3; axis++) {
-        out->point_mm_q1[axis][slot] = clamp_s16(ray->point_mm_q8[axis] >> 7);
+        out->point_mm_q1[axis][slot] = ih_saturate_s16(ray->point_mm_q8[axis] >> 7);
     }
     out->seen[slot] = ray->state == IH_RAY_SEEN ? -1 : 0;
     if (ray->state == IH_RAY_EMPTY) {

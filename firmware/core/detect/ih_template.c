@@ -52,11 +52,6 @@
 _Static_assert((DEPTH_MIN_MM << 14) / IH_HEAD_SEMI_Y_MM >= 1 << 14,
                "a factor has 15 bits at DEPTH_MIN_MM");
 
-static int16_t saturate_s16(int32_t value)
-{
-    return (int16_t)ih_clamp_s32(value, INT16_MIN, INT16_MAX);
-}
-
 static void fill_ray(const struct ih_ray *ray, struct ih_template_table *out, int32_t at)
 {
     const bool is_seen = ray->state == IH_RAY_SEEN;
@@ -64,8 +59,8 @@ static void fill_ray(const struct ih_ray *ray, struct ih_template_table *out, in
     const int32_t x_q13 = ray->slope_x_q20 >> 7;
     const int32_t y_q13 = ray->slope_y_q20 >> 7;
     /* slopes of 2^15 at most times 2^14.4; cut, so that squares fit */
-    const int16_t gx_q14 = saturate_s16(x_q13 * Z_OVER_X_Q14 >> 13);
-    const int16_t gy_q14 = saturate_s16(y_q13 * Z_OVER_Y_Q14 >> 13);
+    const int16_t gx_q14 = ih_saturate_s16(x_q13 * Z_OVER_X_Q14 >> 13);
+    const int16_t gy_q14 = ih_saturate_s16(y_q13 * Z_OVER_Y_Q14 >> 13);
     const uint32_t gg_q28 = (uint32_t)(gx_q14 * gx_q14) + (uint32_t)(gy_q14 * gy_q14);
     if (gg_q28 >= 1U << 29) { /* too steep for 16 bits: it passes no head */
         out->slope_q13[0][at] = x_q13 < 0 ? INT16_MIN : INT16_MAX;
@@ -76,8 +71,8 @@ static void fill_ray(const struct ih_ray *ray, struct ih_template_table *out, in
     out->slope_q13[1][at] = (int16_t)y_q13;
     out->g_q14[0][at] = gx_q14;
     out->g_q14[1][at] = gy_q14;
-    out->inverse_q15[at] = saturate_s16((int32_t)((1U << 30) / ((1U << 15) + (gg_q28 >> 13))));
-    out->depth_mm_q1[at] = saturate_s16(is_seen ? ray->point_mm_q8[2] >> 7 : NOWHERE_Q1);
+    out->inverse_q15[at] = ih_saturate_s16((int32_t)((1U << 30) / ((1U << 15) + (gg_q28 >> 13))));
+    out->depth_mm_q1[at] = ih_saturate_s16(is_seen ? ray->point_mm_q8[2] >> 7 : NOWHERE_Q1);
     out->inside[at] = (int16_t)(is_empty ? VALUE_EMPTY : VALUE_NEARER);
     out->around[at] = (int16_t)(is_seen ? AROUND_NEAR : is_empty ? AROUND_EMPTY : 0);
 }
@@ -225,8 +220,8 @@ static inline uint32_t lines_below(const int16_t *slope_q13, int16_t limit_q13)
 static inline struct span find_span(const struct ih_template_table *table, int axis,
                                     int32_t low_q13, int32_t high_q13)
 {
-    const int32_t before = __builtin_ctz(~lines_below(table->max_q13[axis], saturate_s16(low_q13)));
-    const uint32_t inside = lines_below(table->min_q13[axis], saturate_s16(high_q13 + 1));
+    const int32_t before = __builtin_ctz(~lines_below(table->max_q13[axis], ih_saturate_s16(low_q13)));
+    const uint32_t inside = lines_below(table->min_q13[axis], ih_saturate_s16(high_q13 + 1));
     const int32_t end = __builtin_ctz(~inside | 1U << IH_GRID);
     return (struct span){before, ih_max_s32(end, before)};
 }
