@@ -49,7 +49,7 @@
 #define IH_RAM_MAX (192 * 1024)
 
 struct ih_params {
-    bool is_paper; /* the paper's method alone: every frame on its own, nests judged by limits */
+    bool is_paper; /* the paper's method alone, from the first frame on; nests judged by limits */
     struct ih_dots_params dots;
     struct ih_labels_params labels;
     struct ih_windows_params windows;
@@ -129,7 +129,9 @@ enum ih_err isohead_frame(struct isohead *head, const struct ih_frame *frame,
 /* isohead_frame in two halves, for a dot rig whose caller does not know whether the dots were on
  * when the frame was taken, and decides from head->labels whether it is used. isohead_label fills
  * head->dots and head->labels, leaves all other outputs empty and the tracks as they were; a range
- * rig is IH_ERR_KIND. It may be called again, with an ambient frame this time. isohead_find goes on
+ * rig is IH_ERR_KIND. It may be called again, with an ambient frame this time. Labels move the rig's
+ * lines: before a second call, and after a frame that is not used, put back what head->rig and
+ * head->align were before. isohead_find goes on
  * from there, once per frame that is used; without a dot rig it does nothing, and after isohead_init
  * or a refused frame it finds what is in an empty one. */
 enum ih_err isohead_label(struct isohead *head, const struct ih_frame *frame,

@@ -89,8 +89,8 @@ static void solve_forward(const int32_t *l_q30, int32_t n, const int32_t *b, int
     }
 }
 
-/* Take what an unknown brings from the rests of those before it. Here and below clang's analyzer does not see that
- * the first n rests are set. */
+/* Take what an unknown brings from the residuals of those before it. Here and below clang's analyzer does not see that
+ * the first n residuals are set. */
 static void take_unknown(const int32_t *row_q30, int32_t count, int32_t unknown,
                          int64_t *residual_q30)
 {

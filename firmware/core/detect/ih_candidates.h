@@ -1,6 +1,6 @@
 /* ih_candidates - distances among the candidates of ih_detections: of starts and detections (ours).
  *
- * In:     centres in the camera frame.
+ * In:     centres in the level frame.
  * Out:    starts that are new, detections in their order, and which of them is the body to another one's head.
  * Overflow: centres are below 2^27 in Q8, their differences below 2^28.
  */

@@ -1,6 +1,6 @@
 /* ih_head_model - the mean head and the regions around it, by which stages look for heads before they are fitted.
  *
- * Units: mm, or hundredths of a semi-axis (PERCENT). Directions as in the camera frame: down is positive.
+ * Units: mm, or hundredths of a semi-axis (PERCENT). Directions as in the level frame: down is positive.
  */
 #ifndef IH_HEAD_MODEL_H
 #define IH_HEAD_MODEL_H

@@ -35,7 +35,7 @@ enum ih_ray_state {
 
 struct ih_ray {
     int32_t slope_x_q20, slope_y_q20; /* mm aside per mm of depth */
-    int32_t point_mm_q8[3];           /* camera frame; 0 when not seen */
+    int32_t point_mm_q8[3];           /* level frame; 0 when not seen */
     int32_t state;                    /* enum ih_ray_state */
 };
 
@@ -54,7 +54,7 @@ struct ih_ray_table {
 };
 
 struct ih_rays {
-    int32_t origin_mm_q8[3]; /* where the rays start, camera frame */
+    int32_t origin_mm_q8[3]; /* where the rays start, level frame */
     struct ih_ray ray[IH_SLOTS];
     struct ih_ray_table table;
 };

@@ -39,7 +39,7 @@ static const uint8_t depth_of_step[STEPS] = {
 struct head_from_rays {
     int64_t depth_mm_q8; /* of its centre, from where rays start */
     int64_t away_mm_q8[2];
-    int32_t centre_mm_q8; /* its depth in the camera frame */
+    int32_t centre_mm_q8; /* its depth in the level frame */
 };
 
 static struct head_from_rays candidate_of(const struct ih_rays *rays,

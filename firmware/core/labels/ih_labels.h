@@ -16,8 +16,8 @@
  * Cost:   361 x the dots in the rows of a line: a few each where lines run along rows, all where they are
  *         upright. Growing visits the open slots that have a free candidate a few dozen times, and computes
  *         an expectation again only after a change. Seeding tries the candidates of three slots with each
- *         other, and of the fourth those near the predicted position: 324 x 16^3 at worst, for a frame made
- *         to provoke it, a thousand for a real one.
+ *         other, and walks those of the fourth for one near the predicted position: 324 x 16^4 comparisons at
+ *         worst, for a frame made to provoke it, a thousand trials for a real one.
  * Full tables drop and count: candidates_dropped.
  */
 #ifndef IH_LABELS_H

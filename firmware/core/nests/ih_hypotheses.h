@@ -65,7 +65,7 @@ struct ih_hypothesis {
     int32_t a_px_q12, b_px_q12; /* semi-axes, a >= b */
     int32_t angle_mdeg;         /* of a, from +u towards +v, 0 .. 179999 */
     int32_t distance_mm_q8;     /* camera's centre to the surface at the ellipse's centre */
-    int32_t centre_mm_q8[3];    /* of the head's volume, camera frame */
+    int32_t centre_mm_q8[3];    /* of the head's volume, level frame */
     int32_t area_mm2;           /* of the widest slice */
     int32_t curvature_mm_q8;
     int32_t extent_mm_q8;

@@ -10,14 +10,15 @@
  *        the tip and are passed over, until it is longer than tip_max_mm; the front of the nest is
  *        where the area grows past blunt_mm2. A nest ends depth_max behind its front, when its area
  *        falls below 0.6 of the slice before, when it jumps by more than 3.2 times and 2500 mm^2
- *        beyond end_depth, or after gap_max levels without support.
+ *        beyond end_depth, or after more than gap_max levels without support.
  * Fewer: ours; with everything on a nest is one candidate of many, so less will do
  *        (not with ih_nests_params_paper). A head stands out: to the left, to the right and above a
  *        minimum the surface falls off, or ends, within free_mm, else it is a fold of clothes or the
  *        background's, and starts no nest. A closed contour smaller than blunt_mm2 is the tip's whatever
  *        its shape, and no part of it is searched for. Nests that have come to the same ellipse are the
- *        same thing from there on: the nearest goes on, the others end without slices. And gap_max is 3
- *        instead of 8, depth_max 80 mm instead of 110: what is wider there is the neck's and the body's.
+ *        same thing from there on: the nearest goes on, the others end without slices. And gap_max is 2
+ *        instead of 8, level_step 20 mm instead of 10, depth_max 80 mm instead of 110: what is wider there is the
+ *        neck's and the body's.
  * Cost:  levels x (cells + minima x contours); the chord search only where no whole ellipse is.
  * Full tables drop and count: minima_dropped (the farthest), contours_dropped (at levels
  * that a nest waits for: others are not cut).

@@ -4,14 +4,14 @@
  * Out:   per slot the normalised image position and the Z depth; the field on which they stand.
  * Method: dots: t px from infinity along the line, Z = |e| / t, one division. The position is
  *        the dot's place on its line, (infinity + t dir), so that depth and position agree.
- *        Depths are limited to 1 mm .. far_mm.
+ *        Depths are limited to 1 mm .. far_mm; turned to the level frame, to IH_DEPTH_MAX_MM.
  *        range image: a 19x19 lattice is laid over the window, its pitch pitch_mm at the window's
  *        depth, its middle lower_q8 pitches below the window's. A slot takes the measured pixel
  *        nearest to it within a quarter pitch (at least a pixel), and that pixel's place; without
  *        one it is missing. Where measured pixels are rare (ih_windows) it takes one within half a
  *        pitch, and is missing only where none lies within 1.25 times their spacing, else unknown.
- * Cost:  361 divisions; of a range image at most 65 x 65 pixels a slot are read, and few where most
- *        are measured.
+ * Cost:  361 divisions; of a range image at most 65 x 65 pixels a slot are read, and few where most are
+ *        measured; where they are rare, the square of 2.5 times their spacing.
  * Bounds: a window's depth is at least 100 mm, so a pitch below 2^28 in Q28, saturated with its
  *        place; half of it times a focal length of 2^29 in Q16: 2^56.
  */

@@ -23,8 +23,8 @@
  *           near it.
  *        Windows are few: one that scores score_behind_max less than the best, or less than
  *        score_min, is none.
- * Cost:  33 probes a cell with a depth, two divisions; every pixel is read about once, about six
- *        times where measured ones are rare. One core of a server takes 4 ms for 640 x 480 pixels
+ * Cost:  46 probes a cell with a depth, eight divisions at most; every pixel is read about once, seven or
+ *        eight times where measured ones are rare. One core of a server takes 4 ms for 640 x 480 pixels
  *        and 16 ms for 1280 x 800.
  * Error: within a step of the float64 reference, apart from probes that hit another cell.
  * Bounds: focal length 2^29 in Q16 over a depth of at least 100 mm: 2^22.4 cells per mm; times

@@ -284,7 +284,6 @@ static bool correct_or_refactor(const struct ih_samples *samples,
     return true;
 }
 
-/* The right side for the present coefficients, which at first are all 0, and which samples are far from the surface. */
 /* Set the right side for the present coefficients, which at first are all 0, and mark the samples far from the surface. */
 static void set_right(const struct ih_samples *samples, const struct ih_surface_params *params,
                       const struct ih_surface *out, bool is_first,
