@@ -220,7 +220,8 @@ static inline uint32_t lines_below(const int16_t *slope_q13, int16_t limit_q13)
 static inline struct span find_span(const struct ih_template_table *table, int axis,
                                     int32_t low_q13, int32_t high_q13)
 {
-    const int32_t before = __builtin_ctz(~lines_below(table->max_q13[axis], ih_saturate_s16(low_q13)));
+    const int32_t before =
+        __builtin_ctz(~lines_below(table->max_q13[axis], ih_saturate_s16(low_q13)));
     const uint32_t inside = lines_below(table->min_q13[axis], ih_saturate_s16(high_q13 + 1));
     const int32_t end = __builtin_ctz(~inside | 1U << IH_GRID);
     return (struct span){before, ih_max_s32(end, before)};
