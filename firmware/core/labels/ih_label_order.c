@@ -14,7 +14,8 @@ static uint32_t bin_of(uint32_t order)
     return bin < ORDER_BINS ? bin : ORDER_BINS - 1;
 }
 
-/* First into bins, then by insertion, which moves each but a little. */
+/* First into bins, then by insertion, which moves each but a little; errors beyond a pixel, which growth has, share the
+ * last bin. */
 void ih_label_order_sort(const uint32_t *order, int32_t count, uint32_t *sorted)
 {
     int16_t begin[ORDER_BINS] = {0};

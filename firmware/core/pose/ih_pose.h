@@ -14,6 +14,8 @@
  *         is at most sigma_max; front and back under long hair make two peaks, and it is not known. The pitch is
  *         the mean. Beliefs are of the level frame (ih_level), what is said of the camera's; pitches are within
  *         40 degrees of the level.
+ *         Of a depth image with several windows the points are those of the best one: a head that only another
+ *         window has may look anywhere.
  * Overflow: probabilities are at most 2^16 in Q16; a power of 2 is 2^16 in Q16: products 2^32, sums of 72 2^38.2.
  *         A cell's distance from the mean is at most 60000 mdeg, its square times 2^16 2^47.8.
  * Error:  probabilities within 2^-10, angles within 0.2 degrees of the float64 reference.

@@ -17,7 +17,7 @@
  * Overflow: a cell has at most 361 weights of 2^8, times 2^10 of depth 2^26.5, after 1-2-1 twice 2^30.5.
  *         A sum is at most 187 times 127 * (127 * 32 + 127 * 127) = 2^28.9, and a bias of 2^15.
  * Error:  logarithms within 0.25 of the float64 reference with the same weights.
- * Cost:   361 points, 33 of them spread; 182 divisions, 33 x 374 products: at most 0.2 M instructions.
+ * Cost:   361 points, 33 of them spread; 91 divisions, 33 x 374 products: at most 0.2 M instructions.
  */
 #ifndef IH_POSE_LOOK_H
 #define IH_POSE_LOOK_H

@@ -87,7 +87,7 @@ static int32_t slope_q20(const int32_t ray_q30[3], int axis)
     return (int32_t)ih_div_round((int64_t)ray_q30[axis] * (1 << 20), ray_q30[2]);
 }
 
-/* False when the projector sits on the camera's centre: the dot does not move with depth. */
+/* False when the projector sits on the camera's centre, where the dot does not move with depth, or too far from it. */
 static bool fill_line(struct ih_rig *rig, int32_t slot)
 {
     const struct ih_calibration *c = &rig->calibration;
@@ -103,7 +103,7 @@ static bool fill_line(struct ih_rig *rig, int32_t slot)
     line->infinity_v_px_q12 =
         (int32_t)(ih_mul_shift(tan_q30[1], c->fy_px_q16, 34) + ih_shift_round(c->cy_px_q16, 4));
 
-    /* e = focal * offset is below 2^13 px * 5000 mm = 2^26, and limited to 2^22 in Q8, so that its
+    /* e = focal * offset is below 2^13 px * 5000 mm = 2^26, and limited to 2^22, in Q8 2^30, so that its
      * square is below 2^60. */
     int64_t e_u_q8 = ih_mul_shift(c->fx_px_q16, offset_mm_q16(c->origin_mm_q16, 0, tan_q30[0]), 24);
     int64_t e_v_q8 = ih_mul_shift(c->fy_px_q16, offset_mm_q16(c->origin_mm_q16, 1, tan_q30[1]), 24);

@@ -74,7 +74,7 @@ struct ih_rig {
     int32_t level_origin_mm_q16[3]; /* of the dots' rays, in the level frame */
     /* By ih_camera_init, for ih_camera_undistort. */
     int32_t inverse_q24[3];  /* series of the inverse radial distortion */
-    int32_t newton_steps;    /* at most; 0: the iteration alone is accurate enough */
+    int32_t newton_steps;    /* at most; 0: Newton is no better than the iteration alone */
     int32_t newton_last_q28; /* a step below this is the last one */
     /* By ih_rig_move: relative change of the focal length, and shift of the picture. */
     int32_t focal_q30;

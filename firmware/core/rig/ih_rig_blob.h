@@ -57,7 +57,7 @@ enum ih_err ih_rig_blob_decode(const uint8_t *blob, size_t size, struct ih_calib
 enum ih_err ih_rig_blob_encode(const struct ih_calibration *calibration,
                                uint8_t blob[IH_RIG_BLOB_BYTES]) __attribute__((warn_unused_result));
 
-/* The CRC alone, of all bytes but the last four. */
+/* The CRC alone, of all bytes that are given: a blob has that of those before it at its end. */
 uint32_t ih_rig_blob_crc32(const uint8_t *bytes, size_t count);
 
 IH_END_DECLS
