@@ -180,13 +180,17 @@ void sim_dirs_add(struct sim_dirs *dirs, const char *path, bool with_rig, struct
     }
 }
 
-/* The same file, whatever its path. */
-static bool is_same(const char *dir, const char *name, const struct stat *as)
+/* The same file or directory, whatever its path. */
+static bool is_same(const char *path, const struct stat *as)
+{
+    struct stat status;
+    return stat(path, &status) == 0 && status.st_dev == as->st_dev && status.st_ino == as->st_ino;
+}
+
+static bool is_same_in(const char *dir, const char *name, const struct stat *as)
 {
     char *path = join(dir, name);
-    struct stat status;
-    bool same =
-        stat(path, &status) == 0 && status.st_dev == as->st_dev && status.st_ino == as->st_ino;
+    bool same = is_same(path, as);
     free(path);
     return same;
 }
@@ -197,12 +201,12 @@ static bool is_input_of(const char *dir, const struct stat *as)
     static const char *const other[] = {RIG_NAME, "frames.jsonl", "truth.jsonl"};
     bool found = false;
     for (size_t i = 0; i < sizeof other / sizeof *other; i++) {
-        found = found || is_same(dir, other[i], as);
+        found = found || is_same_in(dir, other[i], as);
     }
     DIR *stream = opendir(dir);
     const char *name = NULL;
     while (stream != NULL && !found && (name = next_name(stream)) != NULL) {
-        found = hal_replay_is_frame(name, true) && is_same(dir, name, as);
+        found = hal_replay_is_frame(name, true) && is_same_in(dir, name, as);
     }
     if (stream != NULL) {
         closedir(stream);
@@ -216,6 +220,16 @@ bool sim_dirs_has_input(const struct sim_dirs *dirs, const char *path)
     bool found = false;
     for (size_t i = 0; i < dirs->dir_count && stat(path, &status) == 0; i++) {
         found = found || is_input_of(dirs->dir[i].path, &status);
+    }
+    return found;
+}
+
+bool sim_dirs_has(const struct sim_dirs *dirs, const char *path)
+{
+    struct stat status;
+    bool found = false;
+    for (size_t i = 0; i < dirs->dir_count && stat(path, &status) == 0; i++) {
+        found = found || is_same(dirs->dir[i].path, &status);
     }
     return found;
 }

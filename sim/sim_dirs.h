@@ -31,6 +31,9 @@ void sim_dirs_add(struct sim_dirs *dirs, const char *path, bool with_rig,
 /* Is there a file at the path that a run reads, under whatever name: a frame, a list, a rig of these directories? */
 bool sim_dirs_has_input(const struct sim_dirs *dirs, const char *path);
 
+/* Is the directory at the path one of these, under whatever name? */
+bool sim_dirs_has(const struct sim_dirs *dirs, const char *path);
+
 void sim_dirs_free(struct sim_dirs *dirs);
 
 #endif

@@ -395,6 +395,23 @@ static bool start_page(struct run *run)
     return false;
 }
 
+/* Traces must not lie among frames, where that of rig.pgm would replace rig.json. True: one would, which is reported. */
+static bool has_trace_in_frames(struct run *run)
+{
+    bool found = false;
+    for (size_t i = 0; run->options->trace != NULL && i < run->dirs.dir_count; i++) {
+        const struct sim_trace trace = {run->options->trace, run->dirs.dir[i].label};
+        char *folder = sim_trace_folder(&trace);
+        if (folder != NULL && sim_dirs_has(&run->dirs, folder)) {
+            sim_report_error(&run->report, folder,
+                             "a frames directory of this run, expected another OUT of --trace");
+            found = true;
+        }
+        free(folder);
+    }
+    return found;
+}
+
 /* False: nothing can be written where traces are wanted, which is reported before any frame is processed. */
 static bool prepare_traces(struct run *run)
 {
@@ -441,12 +458,16 @@ enum sim_status sim_run(const struct sim_options *options, struct isohead *head)
     for (int i = 0; i < options->dir_count; i++) {
         sim_dirs_add(&run.dirs, options->dirs[i], options->rig != NULL, &run.report);
     }
-    if (prepare_traces(&run) && start_page(&run)) {
+    const bool is_usage = has_trace_in_frames(&run);
+    if (!is_usage && prepare_traces(&run) && start_page(&run)) {
         process_all(&run);
     }
     if (fflush(stdout) != 0 || ferror(stdout)) {
         sim_report_error(&run.report, STDOUT_NAME, "cannot be written: %s", strerror(errno));
     }
     sim_dirs_free(&run.dirs);
+    if (is_usage) {
+        return SIM_STATUS_USAGE;
+    }
     return run.report.error_count == 0 ? SIM_STATUS_GOOD : SIM_STATUS_INPUT;
 }

@@ -445,6 +445,11 @@ static void make_parents(char *path)
     }
 }
 
+char *sim_trace_folder(const struct sim_trace *trace)
+{
+    return hal_file_join(trace->out, trace->label);
+}
+
 /* OUT/LABEL/FRAME.json in new memory. */
 static char *make_path(const struct sim_trace *trace, const char *name)
 {

@@ -1,7 +1,8 @@
 /* sim_trace - every stage's results of one frame as a JSON file, raw integers.
  *
  * File:  OUT/LABEL/FRAME.json, LABEL the last part of the frames directory's path, FRAME the
- *        frame's name without its suffix. Folders are made as needed; files are overwritten.
+ *        frame's name without its suffix. Folders are made as needed; files are overwritten, so that
+ *        OUT/LABEL must not be a frames directory.
  * Keys:  the names of the core's struct members with unit and format; a key per stage.
  * Error: what could not be made or written, and why.
  */
@@ -16,6 +17,9 @@ struct sim_trace {
     const char *out;
     const char *label;
 };
+
+/* OUT/LABEL in new memory; NULL: there is none. */
+char *sim_trace_folder(const struct sim_trace *trace);
 
 /* Makes OUT/LABEL before the first frame. False: *error says why nothing can be written there. */
 bool sim_trace_prepare(const struct sim_trace *trace, struct hal_error *error);

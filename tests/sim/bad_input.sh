@@ -824,6 +824,24 @@ reason='they are not kept apart'
 result 'trace: two directories of one name are kept apart' "$reason"
 
 fresh
+cp d/a.pgm d/rig.pgm
+cp d/rig.json before
+mkdir links && ln -s ../d links/d
+for out in . ./ d/.. links; do
+    run --json --trace "$out" d
+    check "trace: $out, so that they would lie among the frames" 2 0 0 \
+        'd: a frames directory of this run, expected another OUT of --trace'
+    reason='it was overwritten'
+    ! cmp -s before d/rig.json || reason=
+    result "trace: $out: rig.json is as before" "$reason"
+done
+fresh
+mkdir p && cp -R base p/d
+run --json --trace . p/d d
+check 'trace: among the frames of another directory' 2 0 0 '\./d: a frames directory of this run'
+rm -rf p links
+
+fresh
 for name in a.pgm rig.json; do
     cp "d/$name" before
     run --json --report "d/../d/$name" d
