@@ -100,7 +100,19 @@ check 'a field is missing' 1 'rig\.json: image_width: missing' rig.json a.bin
 sed 's/"near_mm": *[0-9.e+]*/"near_mm":9000/' "$rig" >rig.json
 check 'the core refuses it' 1 'rig\.json: near_mm, far_mm: 9000 and ' rig.json a.bin
 check 'no JSON' 1 'rig\.bin: ' rig.bin a.bin
-rm rig.json
+cp "$rig" rig.json
+cp "$rig" rig.part
+ln rig.json linked.json
+ln -s rig.json link.json
+for out in rig.json ./rig.json linked.json link.json; do
+    check "over its own rig: $out" 2 "$out: OUT would replace RIG, expected another file" rig.json "$out"
+done
+check 'over its own rig while it is written' 2 'rig: OUT would replace RIG' rig.part rig
+for file in rig.json rig.part; do
+    count=$((count + 1))
+    cmp -s "$rig" "$file" || { bad=$((bad + 1)); echo "not ok - $file is no longer as it was"; }
+done
+rm rig.json rig.part linked.json link.json
 there rig.bin
 
 mkdir d

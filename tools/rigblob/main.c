@@ -18,7 +18,7 @@ static const char help_text[] =
     "rigblob --show BLOB\n"
     "Write the rig file RIG (rig.json, docs/contract.md) as a binary blob for boards\n"
     "without JSON, or print what is in one. A rig that the core refuses is refused\n"
-    "here. OUT is written completely or not at all.\n"
+    "here. OUT is another file than RIG, written completely or not at all.\n"
     "\n"
     "  --show     print the blob's numbers, one to a line\n"
     "  --help     this text\n"
@@ -72,11 +72,24 @@ static bool put(const char *part, const char *path, const uint8_t *blob, struct 
     return true;
 }
 
-static enum status write_blob(const char *rig_path, const char *path)
+/* The same file, whatever its path. */
+static bool is_same(const char *path, const char *other_path)
+{
+    struct stat one, other;
+    return stat(path, &one) == 0 && stat(other_path, &other) == 0 && one.st_dev == other.st_dev &&
+           one.st_ino == other.st_ino;
+}
+
+/* part: a file beside OUT, which gets its name once it is whole. */
+static enum status write_blob(const char *rig_path, const char *part, const char *path)
 {
     static struct ih_calibration calibration;
     static uint8_t blob[IH_RIG_BLOB_BYTES];
     struct hal_error error;
+    if (is_same(rig_path, path) || is_same(rig_path, part)) {
+        fprintf(stderr, "rigblob: %s: OUT would replace RIG, expected another file\n", path);
+        return STATUS_USAGE;
+    }
     if (!app_rig_load(rig_path, &calibration, &error) || !check(&calibration, &error)) {
         return fail(rig_path, error.text);
     }
@@ -84,15 +97,20 @@ static enum status write_blob(const char *rig_path, const char *path)
     if (err != IH_OK) {
         return fail(rig_path, ih_err_text(err));
     }
+    return put(part, path, blob, &error) ? STATUS_GOOD : fail(path, error.text);
+}
+
+static enum status convert(const char *rig_path, const char *path)
+{
     size_t size = strlen(path) + sizeof ".part";
     char *part = malloc(size);
     if (part == NULL) {
         return fail(path, "no memory");
     }
     snprintf(part, size, "%s.part", path);
-    bool good = put(part, path, blob, &error);
+    enum status status = write_blob(rig_path, part, path);
     free(part);
-    return good ? STATUS_GOOD : fail(path, error.text);
+    return status;
 }
 
 static void print(const char *name, int32_t value, int fraction_bits)
@@ -173,7 +191,7 @@ int main(int argument_count, char **arguments)
         fputs("rigblob: expected RIG OUT, or --show BLOB; see rigblob --help\n", stderr);
         return STATUS_USAGE;
     } else {
-        status = show ? show_blob(path[0]) : write_blob(path[0], path[1]);
+        status = show ? show_blob(path[0]) : convert(path[0], path[1]);
     }
     if (fflush(stdout) != 0) {
         return (int)fail("standard output", strerror(errno));
