@@ -102,12 +102,14 @@ static enum status write_blob(const char *rig_path, const char *part, const char
 
 static enum status convert(const char *rig_path, const char *path)
 {
-    size_t size = strlen(path) + sizeof ".part";
-    char *part = malloc(size);
+    static const char suffix[] = ".part";
+    const size_t length = strlen(path);
+    char *part = malloc(length + sizeof suffix);
     if (part == NULL) {
         return fail(path, "no memory");
     }
-    snprintf(part, size, "%s.part", path);
+    memcpy(part, path, length);
+    memcpy(part + length, suffix, sizeof suffix);
     enum status status = write_blob(rig_path, part, path);
     free(part);
     return status;
