@@ -14,7 +14,7 @@ static void fail(struct hal_error *error, const char *text)
 bool hal_file_exists(const char *path)
 {
     struct stat status;
-    return lstat(path, &status) == 0;
+    return lstat(path, &status) == 0 || (errno != ENOENT && errno != ENOTDIR);
 }
 
 enum hal_file_kind hal_file_kind(const char *path)

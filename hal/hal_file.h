@@ -11,7 +11,8 @@
 
 #include "hal.h"
 
-/* Is there anything of this name, be it a link that leads nowhere? */
+/* Is there anything of this name, be it a link that leads nowhere? True also where that cannot be found out: opening
+ * it says why. */
 bool hal_file_exists(const char *path);
 
 enum hal_file_kind { HAL_FILE_NONE, HAL_FILE_DIRECTORY, HAL_FILE_CHARACTERS, HAL_FILE_OTHER };

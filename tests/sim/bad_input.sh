@@ -725,6 +725,14 @@ check 'directory: a broken rig beside a good one' 1 2 1 'many/one/rig\.json: .*n
 rm -rf many/one/rig.json
 run --json many
 check 'directory: one without a rig is passed over' 1 2 1 'many/two/a\.pgm: '
+if [ "$(id -u)" -ne 0 ]; then # root may read everything
+    cp -R base many/shut && chmod 000 many/shut
+    run --json many
+    check 'directory: one that may not be read' 1 2 1 'many/shut/rig\.json: Permission denied'
+    run --json many/shut
+    check 'directory: it may not be read' 1 0 0 'many/shut/rig\.json: Permission denied'
+    chmod 700 many/shut && rm -r many/shut
+fi
 
 # --- command line --------------------------------------------------------------------------------
 

@@ -1,5 +1,5 @@
-/* A frames directory whose list of files ends with an error: nothing of it is left out in silence. readdir is wrapped by
- * the linker. */
+/* A frames directory whose list of files ends with an error, or that cannot be looked into: nothing of it is left out in
+ * silence. readdir and lstat are wrapped by the linker. */
 #include "replay/hal_replay.h"
 #include "sim_dirs.h"
 
@@ -20,6 +20,7 @@ static char root[] = "/tmp/isohead_replay_XXXXXX";
 static char dir[64];
 static int calls, failing; /* which call fails, from 1; 0: none */
 static int reported;
+static int lstat_error; /* what lstat fails with in the frames directory; 0: it does not */
 
 struct dirent *__real_readdir(DIR *stream);
 struct dirent *__wrap_readdir(DIR *stream);
@@ -31,6 +32,18 @@ struct dirent *__wrap_readdir(DIR *stream)
         return NULL;
     }
     return __real_readdir(stream);
+}
+
+int __real_lstat(const char *path, struct stat *status);
+int __wrap_lstat(const char *path, struct stat *status);
+
+int __wrap_lstat(const char *path, struct stat *status)
+{
+    if (lstat_error != 0 && strncmp(path, dir, strlen(dir)) == 0) {
+        errno = lstat_error;
+        return -1;
+    }
+    return __real_lstat(path, status);
 }
 
 static void make_file(const char *name)
@@ -52,7 +65,7 @@ static void remove_file(const char *name)
 
 void setUp(void)
 {
-    calls = failing = reported = 0;
+    calls = failing = reported = lstat_error = 0;
 }
 
 void tearDown(void)
@@ -103,6 +116,25 @@ static void test_no_directory_is_left_out(void)
     TEST_ASSERT_GREATER_OR_EQUAL_INT(6, errors); /* ".", "..", the directory, the end, of both */
 }
 
+/* Only one without a rig is passed over, not one that does not let its rig be seen: opening that says why. */
+static void test_a_directory_that_cannot_be_looked_into_is_not_passed_over(void)
+{
+    static const struct {
+        int error;
+        int dir_count;
+    } of[] = {{ENOENT, 0}, {ENOTDIR, 0}, {EACCES, 1}, {EIO, 1}, {ELOOP, 1}, {ENAMETOOLONG, 1}};
+    for (size_t i = 0; i < sizeof of / sizeof *of; i++) {
+        struct sim_dirs dirs = {.dir_count = 0};
+        struct sim_report report;
+        sim_report_init(&report);
+        lstat_error = of[i].error;
+        sim_dirs_add(&dirs, root, false, &report);
+        TEST_ASSERT_EQUAL_INT(of[i].dir_count, dirs.dir_count);
+        TEST_ASSERT_EQUAL_INT(of[i].dir_count == 0, report.error_count > 0);
+        sim_dirs_free(&dirs);
+    }
+}
+
 int main(void)
 {
     TEST_ASSERT_NOT_NULL(mkdtemp(root));
@@ -115,6 +147,7 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(test_a_list_that_ends_with_an_error_opens_nothing);
     RUN_TEST(test_no_directory_is_left_out);
+    RUN_TEST(test_a_directory_that_cannot_be_looked_into_is_not_passed_over);
     int failures = UNITY_END();
     for (int i = 0; i < FRAMES + 1; i++) {
         remove_file(names[i]);
