@@ -1,5 +1,6 @@
 #include "hal_file.h"
 
+#include <cjson/cJSON.h>
 #include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -98,4 +99,46 @@ char *hal_file_join(const char *dir, const char *name)
         snprintf(path, size, "%s%s%s", dir, has_slash ? "" : "/", name);
     }
     return path;
+}
+
+static int compare_names(const void *left, const void *right)
+{
+    return strcmp(*(const char *const *)left, *(const char *const *)right);
+}
+
+/* The fields of one object alone; they are sorted, as there may be very many. of: the object's name and a point, or "". */
+static bool is_unique(const cJSON *object, const char *of, const char *point,
+                      struct hal_error *error)
+{
+    size_t count = 0;
+    for (const cJSON *item = object->child; item != NULL; item = item->next) {
+        count++;
+    }
+    const char **name = malloc((count + 1) * sizeof *name);
+    if (name == NULL) {
+        fail(error, "no memory for this file");
+        return false;
+    }
+    count = 0;
+    for (const cJSON *item = object->child; item != NULL; item = item->next) {
+        name[count++] = item->string;
+    }
+    qsort(name, count, sizeof *name, compare_names);
+    bool good = true;
+    for (size_t i = 1; good && i < count; i++) {
+        good = strcmp(name[i - 1], name[i]) != 0 ||
+               hal_fail(error, "%.60s%s%.60s: a second time", of, point, name[i]);
+    }
+    free(name);
+    return good;
+}
+
+bool hal_file_is_unique(const struct cJSON *object, struct hal_error *error)
+{
+    bool good = is_unique(object, "", "", error);
+    for (const cJSON *item = object->child; good && item != NULL; item = item->next) {
+        good =
+            (item->type & UINT8_MAX) != cJSON_Object || is_unique(item, item->string, ".", error);
+    }
+    return good;
 }

@@ -1,4 +1,4 @@
-/* hal_file - regular files, opened or read whole.
+/* hal_file - regular files, opened or read whole, and what no JSON in them may have.
  *
  * Error: as text without the file's name: what the system says, a directory or device in place of
  *        a file (opening a pipe would wait for ever), more bytes than the limit, no memory.
@@ -29,5 +29,11 @@ bool hal_file_read(const char *path, size_t limit, uint8_t **data, size_t *size,
 
 /* dir/name in new memory; NULL when there is none. */
 char *hal_file_join(const char *dir, const char *name);
+
+struct cJSON;
+
+/* Is each field of a JSON object, and of the objects among its fields, there once? Of two each reader may take another.
+ * False: *error names one that is not. */
+bool hal_file_is_unique(const struct cJSON *object, struct hal_error *error);
 
 #endif

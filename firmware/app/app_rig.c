@@ -390,7 +390,7 @@ bool app_rig_parse(const char *text, size_t size, struct ih_calibration *calibra
     } else if (!cJSON_IsObject(rig)) {
         hal_fail(error, "%s, expected an object", type_text(rig));
     } else {
-        good = read_rig(rig, calibration, scale_q20, error);
+        good = hal_file_is_unique(rig, error) && read_rig(rig, calibration, scale_q20, error);
     }
     cJSON_Delete(rig);
     return good;

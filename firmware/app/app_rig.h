@@ -4,7 +4,7 @@
  *        all its numbers row by row. Unknown fields are ignored.
  * Out:   the numbers rounded to the formats of struct ih_calibration, nothing else: near_mm is
  *        rounded down and far_mm up, so that the range never shrinks.
- * Error: one line that names field, value and expectation. What can be seen in one number (missing,
+ * Error: one line that names field, value and expectation. What can be seen in one number (missing, there twice,
  *        wrong type or shape, not finite, beyond its format) is found here; what makes a rig is
  *        judged by the core (ih_rig_init), and app_rig_explain words its verdict.
  */

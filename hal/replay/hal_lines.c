@@ -46,13 +46,17 @@ enum hal_lines_next hal_lines_next(struct hal_lines *lines, cJSON **object, stru
     /* A zero byte inside the line would hide what follows it. */
     bool whole = memchr(lines->text, 0, (size_t)length) == NULL;
     *object = whole ? cJSON_ParseWithOpts(lines->text, NULL, 1) : NULL;
-    if (cJSON_IsObject(*object)) {
+    struct hal_error reason;
+    if (!cJSON_IsObject(*object)) {
+        hal_fail(error, "line %ld: %s: %.60s", lines->number,
+                 whole ? "not a JSON object" : "a zero byte in the line", lines->text);
+    } else if (!hal_file_is_unique(*object, &reason)) {
+        hal_fail(error, "line %ld: %.200s", lines->number, reason.text);
+    } else {
         return HAL_LINES_OBJECT;
     }
     cJSON_Delete(*object);
     *object = NULL;
-    snprintf(error->text, sizeof error->text, "line %ld: %s: %.60s", lines->number,
-             whole ? "not a JSON object" : "a zero byte in the line", lines->text);
     return HAL_LINES_BAD;
 }
 

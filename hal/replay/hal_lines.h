@@ -1,7 +1,7 @@
 /* hal_lines - a file of JSON objects, one per line (JSON Lines), read line by line.
  *
- * Empty lines are skipped. Error: on opening as hal_file; a line that is no JSON object is reported
- * with its number and beginning, and reading goes on behind it.
+ * Empty lines are skipped. Error: on opening as hal_file; a line that is no JSON object, or one with a field twice,
+ * is reported with its number, and reading goes on behind it.
  */
 #ifndef HAL_LINES_H
 #define HAL_LINES_H

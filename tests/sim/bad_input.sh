@@ -298,6 +298,18 @@ for name in image_width image_height camera_matrix distortion_coefficients proje
     field $name '[1,2]' "$name: .*expected"
 done
 
+# twice NAME FIELD PATTERN: a good rig with this field at its end once more.
+twice() {
+    sed "s/}\$/,$2}/" base/rig.json >d/rig.json
+    rig_case "$1 a second time" "d/rig\\.json: $3: a second time"
+}
+twice 'a number' '"near_mm":400' near_mm
+twice 'one that need not be there' '"up":[0,-1,0],"up":[0,0.8,-0.6]' up
+twice 'one that is not known' '"extra":1,"extra":1' extra
+rig camera_matrix "$(matrix 3 3 "$camera" | sed 's/"rows"/"data":[1],"rows"/')" >d/rig.json
+rig_case 'data of a matrix a second time' 'd/rig\.json: camera_matrix\.data: a second time'
+twice 'a long name' "\"$(printf '%0200d' 0)\":1,\"$(printf '%0200d' 0)\":2" '0{60}'
+
 field kind '"stereo"' 'kind: "stereo", expected "dots" or "range"'
 field kind 1 'kind: .*expected "dots" or "range"'
 for name in image_width image_height; do
@@ -615,6 +627,8 @@ list 'an endless time' 1 2 1 'd/b\.pgm: frames\.jsonl line 2: time_us is inf, ex
     "$a"'{"file":"b.pgm","time_us":1e999}\n'"$c"
 list 'a word for laser' 1 2 1 'd/b\.pgm: frames\.jsonl line 2: laser: expected true or false' \
     "$a"'{"file":"b.pgm","time_us":5,"laser":"on"}\n'"$c"
+list 'a field twice' 1 2 1 'd/frames\.jsonl: line 2: time_us: a second time' \
+    "$a"'{"file":"b.pgm","time_us":40000,"time_us":50000}\n'"$c"
 list 'time goes back' 1 2 1 'd/c\.pgm: frames\.jsonl: time_us 39999 is before 40000' \
     "$a$b"'{"file":"c.pgm","time_us":39999}\n'
 list 'empty' 1 0 3 'd/b\.pgm: not listed in frames\.jsonl' ''
@@ -674,6 +688,9 @@ truth 'a frame without truth' 'no line for b\.pgm' ''
 truth 'two lines for a frame' 'line 2: a\.pgm has truth in line 1 already' \
     '{"file":"a.pgm","head":null}'
 truth 'a broken line' 'line 2: not a JSON object' '{"file":"b.pgm","head":'
+truth 'a field twice' 'line 2: head: a second time' '{"file":"b.pgm","head":null,"head":null}'
+truth 'a field of the head twice' 'line 2: head\.centre_mm: a second time' \
+    '{"file":"b.pgm","head":{"centre_mm":[1,2,800],"centre_mm":[1,2,900]}}'
 truth 'no file' 'line 2: no file' '{"head":null}'
 truth 'a number for a file' 'line 2: no file' '{"file":7,"head":null}'
 truth 'no head' 'line 2: no head' '{"file":"b.pgm"}'
