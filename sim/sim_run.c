@@ -132,7 +132,8 @@ static void put_files(struct visit *visit, const struct sim_page_frame *frame)
     const char *name = frame->frame->name;
     struct hal_error error = {""};
     if (run->options->trace != NULL) {
-        const struct sim_trace trace = {run->options->trace, visit->dir->label};
+        const struct sim_trace trace = {run->options->trace, visit->dir->label,
+                                        hal_replay_stem(&visit->replay, name)};
         if (!sim_trace_frame(&trace, frame->frame, frame->view, frame->head, &error)) {
             report_frame(visit, name, error.text);
         }
@@ -400,7 +401,8 @@ static bool has_trace_in_frames(struct run *run)
 {
     bool found = false;
     for (size_t i = 0; run->options->trace != NULL && i < run->dirs.dir_count; i++) {
-        const struct sim_trace trace = {run->options->trace, run->dirs.dir[i].label};
+        const struct sim_trace trace = {.out = run->options->trace,
+                                        .label = run->dirs.dir[i].label};
         char *folder = sim_trace_folder(&trace);
         if (folder != NULL && sim_dirs_has(&run->dirs, folder)) {
             sim_report_error(&run->report, folder,
@@ -418,7 +420,8 @@ static bool prepare_traces(struct run *run)
     struct hal_error error;
     bool good = true;
     for (size_t i = 0; run->options->trace != NULL && i < run->dirs.dir_count; i++) {
-        const struct sim_trace trace = {run->options->trace, run->dirs.dir[i].label};
+        const struct sim_trace trace = {.out = run->options->trace,
+                                        .label = run->dirs.dir[i].label};
         if (good && !sim_trace_prepare(&trace, &error)) {
             sim_report_error(&run->report, run->dirs.dir[i].path, "%s", error.text);
             good = false;

@@ -453,12 +453,11 @@ char *sim_trace_folder(const struct sim_trace *trace)
 /* OUT/LABEL/FRAME.json in new memory. */
 static char *make_path(const struct sim_trace *trace, const char *name)
 {
-    size_t size = strlen(trace->out) + strlen(trace->label) + strlen(name) + sizeof "//.json";
-    const char *dot = strrchr(name, '.');
-    int stem_length = (int)(dot == NULL ? strlen(name) : (size_t)(dot - name));
+    size_t size = strlen(trace->out) + strlen(trace->label) + trace->stem_length + sizeof "//.json";
     char *path = malloc(size);
     if (path != NULL) {
-        snprintf(path, size, "%s/%s/%.*s.json", trace->out, trace->label, stem_length, name);
+        snprintf(path, size, "%s/%s/%.*s.json", trace->out, trace->label, (int)trace->stem_length,
+                 name);
     }
     return path;
 }

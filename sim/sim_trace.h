@@ -1,7 +1,7 @@
 /* sim_trace - every stage's results of one frame as a JSON file, raw integers.
  *
  * File:  OUT/LABEL/FRAME.json, LABEL the last part of the frames directory's path, FRAME the
- *        frame's name without its suffix. Folders are made as needed; files are overwritten, so that
+ *        frame's name without its suffix, if no other frame shares that. Folders are made as needed; files are overwritten, so that
  *        OUT/LABEL must not be a frames directory.
  * Keys:  the names of the core's struct members with unit and format; a key per stage.
  * Error: what could not be made or written, and why.
@@ -16,6 +16,7 @@
 struct sim_trace {
     const char *out;
     const char *label;
+    size_t stem_length; /* of the frame's name: as much of it as names its file (hal_replay_stem) */
 };
 
 /* OUT/LABEL in new memory; NULL: there is none. */

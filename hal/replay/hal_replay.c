@@ -411,3 +411,22 @@ bool hal_replay_has(const struct hal_replay *replay, const char *name)
 {
     return find_entry(replay, name) != NULL;
 }
+
+/* Length without the suffix, which each frame has. */
+static size_t stem_length(const char *name)
+{
+    return (size_t)(strrchr(name, '.') - name);
+}
+
+size_t hal_replay_stem(const struct hal_replay *replay, const char *name)
+{
+    const size_t length = stem_length(name);
+    bool is_shared = false;
+    for (size_t i = 0; !is_shared && i < replay->entry_count; i++) {
+        const char *other = replay->entry[i].name;
+        is_shared =
+            strncmp(other, name, length) == 0 &&
+            (other[length] == 0 || (stem_length(other) == length && strcmp(other, name) != 0));
+    }
+    return is_shared ? strlen(name) : length;
+}

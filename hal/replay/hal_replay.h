@@ -57,4 +57,8 @@ bool hal_replay_is_frame(const char *name, bool with_lists);
 /* Is a frame of this name on the disk? */
 bool hal_replay_has(const struct hal_replay *replay, const char *name);
 
+/* Length of the part of a frame's name that other files of the frame are named by: without its suffix, but with it where
+ * another frame would have the same name (a.pgm, a.png), or has it (a.pgm and a.pgm.png). No two frames share one. */
+size_t hal_replay_stem(const struct hal_replay *replay, const char *name);
+
 #endif

@@ -694,6 +694,13 @@ class Refusals(unittest.TestCase):
         self.refused(mcap_arguments("both", "dots", "kept.mcap", at("trace-both")),
                      "name one of the folders in it: dots")
 
+    def test_traces_with_suffix(self):
+        """As host_sim names them where frames differ in it alone."""
+        shutil.copytree(at("trace-both", "dots"), at("suffixed"))
+        os.rename(at("suffixed", "000001.json"), at("suffixed", "000001.pgm.json"))
+        done = export(*mcap_arguments("both", "dots", "suffixed.mcap", at("suffixed")))
+        self.assertEqual(done.returncode, 0, done.stderr)
+
     def test_records(self):
         lines = read(at("both.jsonl")).splitlines()
         for spoil, said in ((lambda line: line[:100], "no JSON"),

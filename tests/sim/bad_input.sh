@@ -849,6 +849,20 @@ reason='they are not kept apart'
 result 'trace: two directories of one name are kept apart' "$reason"
 
 fresh
+cp d/b.pgm d/a.PGM && cp d/c.pgm d/a.pgm.pgm
+rm -rf trace
+run --json --trace trace d
+check 'trace: frames that differ in their suffix' 0 5 0 -
+reason=
+[ "$(cd trace/d && echo *)" = 'a.PGM.json a.pgm.json a.pgm.pgm.json b.json c.json' ] ||
+    reason="$(cd trace/d && echo *)"
+for name in a.PGM a.pgm a.pgm.pgm; do
+    grep -q "^{\"file\":\"$name\"," "trace/d/$name.json" || reason="$reason: $name is not in its file"
+done
+result 'trace: frames that differ in their suffix have a file each' "$reason"
+rm -r trace
+
+fresh
 cp d/a.pgm d/rig.pgm
 cp d/rig.json before
 mkdir links && ln -s ../d links/d

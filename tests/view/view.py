@@ -410,6 +410,12 @@ def case_straight():
     must("contours", "--from", "000004", "--trace", at("traces"), at("short"), at("traced.png"))
     with open(at("straight.png"), "rb") as one, open(at("traced.png"), "rb") as other:
         result("straight from frames: the same bytes", None if one.read() == other.read() else "they differ")
+    # host_sim keeps the suffix in a trace's name where frames differ in it alone.
+    shutil.copytree(at("traces"), at("suffixed"))
+    os.rename(at("suffixed/short/000004.json"), at("suffixed/short/000004.pgm.json"))
+    must("contours", "--from", "000004.pgm", "--trace", at("suffixed"), at("short"), at("suffixed.png"))
+    with open(at("straight.png"), "rb") as one, open(at("suffixed.png"), "rb") as other:
+        result("a trace that has its frame's suffix", None if one.read() == other.read() else "another picture")
     done = subprocess.run([options.view, "control", "--from", "000004", ".", at("here.png")], cwd=at("short"),
                           capture_output=True, text=True, check=False)
     result("straight from frames: of the working directory", None if done.returncode == 0 else done.stderr)

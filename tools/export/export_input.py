@@ -380,7 +380,10 @@ class Trace:
 
 
 def trace_of(folder, record):
-    path = os.path.join(folder, os.path.splitext(record.file)[0] + ".json")
+    # Frames that differ in their suffix alone keep it.
+    path = os.path.join(folder, record.file + ".json")
+    if not os.path.exists(path):
+        path = os.path.join(folder, os.path.splitext(record.file)[0] + ".json")
     if not os.path.exists(path):
         inner = sorted(entry for entry in os.listdir(folder)
                        if os.path.isfile(os.path.join(folder, entry, os.path.basename(path)))) \

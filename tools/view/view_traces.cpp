@@ -150,8 +150,10 @@ std::vector<std::string> Traces::chosen(const std::string &from, size_t max) con
         fs::path name = from;
         if (name.extension() == ".pgm" || name.extension() == ".png" || name.extension() == ".xyz")
             name.replace_extension();
-        first = std::find_if(paths_.begin(), paths_.end(),
-                             [&](const std::string &path) { return fs::path(path).stem() == name; });
+        first = std::find_if(paths_.begin(), paths_.end(), [&](const std::string &path) {
+            fs::path stem = fs::path(path).stem();
+            return stem == name || stem == from; // frames that differ in their suffix alone keep it
+        });
         if (first == paths_.end())
             throw Error(from_where_ + ": has no trace of a frame " + name.string());
     }
