@@ -178,9 +178,10 @@ bool sim_options_parse(struct sim_options *options, int argument_count, char **a
 {
     *options = (struct sim_options){.json = false};
     int option = 0;
+    int index = 0; /* in the table */
     opterr = 0;
     /* The leading ':' tells a missing argument from an unknown option. */
-    while ((option = getopt_long(argument_count, arguments, ":h", table, NULL)) != -1) {
+    while ((option = getopt_long(argument_count, arguments, ":h", table, &index)) != -1) {
         if (option == ':') {
             return refuse("missing argument of ", arguments[optind - 1]);
         }
@@ -191,7 +192,7 @@ bool sim_options_parse(struct sim_options *options, int argument_count, char **a
                           optopt >= ' ' ? letter : arguments[optind - 1]);
         }
         if (optarg != NULL && optarg[0] == 0) {
-            return refuse("empty argument of ", arguments[optind - 2]);
+            return refuse("empty argument of --", table[index].name);
         }
         if (!take(options, option)) {
             return false;

@@ -767,6 +767,8 @@ run --rig
 check 'usage: --rig without a file' 2 0 0 'host_sim: missing argument of --rig'
 run --trace '' d
 check 'usage: empty --trace' 2 0 0 'host_sim: empty argument of --trace'
+run --json --rig= d
+check 'usage: empty --rig=' 2 0 0 'host_sim: empty argument of --rig;'
 run --json --without
 check 'usage: --without without a part' 2 0 0 'host_sim: missing argument of --without'
 run --json --without '' d
