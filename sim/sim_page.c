@@ -18,6 +18,8 @@
 #define ZLIB_LEVEL 6
 /* Room for a point, a process number and a zero. */
 #define PART_SUFFIX_MAX 24
+/* Of another run's file that is none, each line is wrong. */
+#define OTHER_BAD_MAX 3
 
 static void begin(struct sim_page *page, const char *attributes)
 {
@@ -254,14 +256,17 @@ static void put_others(struct sim_page *page, const char *path, struct sim_repor
     struct hal_lines lines;
     struct hal_error error;
     cJSON *line = NULL;
+    int bad_count = 0;
     enum hal_lines_next next = HAL_LINES_END;
     if (!hal_lines_open(&lines, path, &error)) {
         sim_report_error(report, path, "%s", error.text);
         return;
     }
-    while ((next = hal_lines_next(&lines, &line, &error)) != HAL_LINES_END) {
+    while (bad_count < OTHER_BAD_MAX &&
+           (next = hal_lines_next(&lines, &line, &error)) != HAL_LINES_END) {
         if (next == HAL_LINES_BAD) {
             sim_report_error(report, path, "%s", error.text);
+            bad_count++;
             continue;
         }
         if (is_record(line)) {
@@ -270,8 +275,13 @@ static void put_others(struct sim_page *page, const char *path, struct sim_repor
             sim_report_error(report, path,
                              "line %ld: no record, expected a line of host_sim --json",
                              lines.number);
+            bad_count++;
         }
         cJSON_Delete(line);
+    }
+    if (bad_count == OTHER_BAD_MAX) {
+        sim_report_error(report, path, "%d lines that are no records: it is read no further",
+                         bad_count);
     }
     hal_lines_close(&lines);
 }

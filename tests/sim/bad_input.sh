@@ -899,6 +899,16 @@ run --json --rig base/rig.json --report base/rig.json d
 check 'report: over --rig' 1 0 0 'base/rig\.json: a file that this run reads'
 fresh
 
+# A file that is none of another run: a few of its lines say so, whatever its length.
+yes '{"file":"x.pgm"}' | head -n 1000 >other.jsonl
+run --json --report page.html --against other.jsonl d
+if ! grep -q 'has no report page' err; then
+    check 'report: against no records' 1 3 0 'other\.jsonl: 3 lines that are no records: it is read no further'
+    lines=$(wc -l <err)
+    [ "$lines" -eq 4 ] && reason= || reason="$lines lines on standard error, expected 4"
+    result 'report: against no records: few lines' "$reason"
+fi
+
 echo "1..$number"
 echo "# $((number - failed)) passed, $failed failed"
 [ "$failed" -eq 0 ]
