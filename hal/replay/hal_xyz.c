@@ -6,6 +6,7 @@
 
 #define AXES 3
 #define BLANKS " \t\r\v\f"
+#define BYTE_ORDER_MARK "\xEF\xBB\xBF"
 
 /* One coordinate; *at moves behind it. */
 static bool read_number(const char **at, long line, int32_t *value_mm_q8, struct hal_error *error)
@@ -18,7 +19,8 @@ static bool read_number(const char **at, long line, int32_t *value_mm_q8, struct
     int length = (int)strcspn(*at, BLANKS "\n");
     char *end = NULL;
     double value_mm = strtod(*at, &end);
-    if (end != *at + length) {
+    /* strtod takes hexadecimal numbers, which no writer of points means. */
+    if (end != *at + length || strcspn(*at, "xX") < (size_t)length) {
         return hal_fail(error, "line %ld: %.*s, expected a number", line, length < 40 ? length : 40,
                         *at);
     }
@@ -49,7 +51,8 @@ static bool read_point(const char **at, long line, int32_t point_mm_q8[AXES],
 
 static bool read_points(const char *text, struct hal_xyz *xyz, struct hal_error *error)
 {
-    const char *at = text;
+    const bool is_marked = strncmp(text, BYTE_ORDER_MARK, strlen(BYTE_ORDER_MARK)) == 0;
+    const char *at = is_marked ? text + strlen(BYTE_ORDER_MARK) : text;
     for (long line = 1; *at != 0; line++) {
         at += strspn(at, BLANKS);
         if (*at == '#') {

@@ -2,10 +2,11 @@
  *
  * In:    a whole file in memory: a line per point, `x y z` in mm in the camera frame (X right, Y
  *        down, Z forward), apart by white space. Empty lines, and lines whose first character that
- *        is no white space is #, are skipped. A list without points is a frame that shows nothing.
+ *        is no white space is #, are skipped, and so is a byte-order mark before all. A list without
+ *        points is a frame that shows nothing.
  * Out:   the points in the order of the file, in 1/256 mm.
  * Error: anything else, with the number of the line: more or fewer than three numbers, one that is
- *        not finite or beyond HAL_XYZ_MAX_MM, a zero byte; no memory.
+ *        not decimal, not finite or beyond HAL_XYZ_MAX_MM, a zero byte; no memory.
  */
 #ifndef HAL_XYZ_H
 #define HAL_XYZ_H

@@ -467,6 +467,8 @@ good_points 'one point' '0 0 1000'
 good_points 'no points' ''
 good_points 'comments, empty lines, blanks and carriage returns' \
     '# made by hand\n\n \t# more\r\n  1.5\t-2e1 +1000.25 \r\n\r\n0 0 900 '
+good_points 'a byte-order mark before a point' '\357\273\2770 0 900\n'
+good_points 'a byte-order mark before a comment' '\357\273\277# by a spreadsheet\n0 0 900\n'
 reason='the order is not that of the names'
 order=$(sed 's/^{"file":"\([^"]*\)".*/\1/' out | tr '\n' ' ')
 [ "$order" != 'a.pgm aa.xyz b.pgm b.xyz c.pgm ' ] || reason=
@@ -478,9 +480,12 @@ points 'a word' 'lists/b\.xyz: line 3: high, expected a number' '#\n\n1 2 high\n
 points 'commas' 'lists/b\.xyz: line 1: 1,2,900, expected a number' '1,2,900\n'
 points 'digits and more' 'lists/b\.xyz: line 1: 900mm, expected a number' '1 2 900mm\n'
 points 'a comment behind a point' 'lists/b\.xyz: line 1: more than three numbers' '1 2 900 # head\n'
+points 'a hexadecimal number' 'lists/b\.xyz: line 1: 0x384, expected a number' '1 2 0x384\n'
+points 'a hexadecimal number with a sign' 'lists/b\.xyz: line 2: -0X1p3, expected a number' '0 0 900\n1 -0X1p3 900\n'
 points 'not a number' 'lists/b\.xyz: line 1: -?nan mm, expected within' 'nan nan nan\n'
 points 'infinite' 'lists/b\.xyz: line 1: inf mm, expected within' '1 2 inf\n'
 points 'beyond all bounds' 'lists/b\.xyz: line 1: 8\.00001e\+06 mm, expected within' '1 2 8000010\n'
+points 'a byte-order mark in the middle' 'lists/b\.xyz: line 2: .*, expected a number' '0 0 900\n\357\273\2770 0 900\n'
 points 'a zero byte' 'lists/b\.xyz: offset 8: a zero byte' '1 2 900\n\000'
 points 'metres' 'lists/b\.xyz: none of 2 points can be seen: 2 are nearer than 400 mm' \
     '0 0 0.9\n0 0.1 1.1\n'
