@@ -329,21 +329,26 @@ static bool read_kind(struct field *field, struct ih_calibration *calibration)
     return true;
 }
 
-/* Absent: all 0, as of a level camera. */
+/* Absent: all 0, as of a level camera. There, it must not be that. */
 static bool read_up(struct field *field, struct ih_calibration *calibration)
 {
     double up[RAY_AXES] = {0};
+    bool is_zero = true;
     field->name = "up";
-    if (cJSON_GetObjectItemCaseSensitive(field->rig, field->name) != NULL &&
-        !read_matrix(field, 1, RAY_AXES, up)) {
+    if (cJSON_GetObjectItemCaseSensitive(field->rig, field->name) == NULL) {
+        return true;
+    }
+    if (!read_matrix(field, 1, RAY_AXES, up)) {
         return false;
     }
     for (int i = 0; i < RAY_AXES; i++) {
         if (!round_fixed(field, axis_text[i], up[i], 30, &calibration->up_q30[i])) {
             return false;
         }
+        is_zero = is_zero && calibration->up_q30[i] == 0;
     }
-    return true;
+    return !is_zero ||
+           hal_fail(field->error, "up: (%g, %g, %g), expected a unit vector", up[0], up[1], up[2]);
 }
 
 static bool read_rig(const cJSON *rig, struct ih_calibration *calibration, int32_t *scale_q20,
