@@ -187,6 +187,11 @@ static bool open_image(PyObject *image, const char *what, int maximum, Py_buffer
         return false;
     }
     const int32_t full_scale = buffer->itemsize == 1 ? UINT8_MAX : UINT16_MAX;
+    if (maximum < 0 || maximum > full_scale) {
+        PyBuffer_Release(buffer);
+        return refuse("maximum: %d, expected at %s %d", maximum, maximum < 0 ? "least" : "most",
+                      maximum < 0 ? 0 : (int)full_scale);
+    }
     *frame = (struct hal_frame){
         .samples = buffer->buf,
         .width = (int32_t)buffer->shape[1],
@@ -195,6 +200,22 @@ static bool open_image(PyObject *image, const char *what, int maximum, Py_buffer
         .bytes_per_sample = (int32_t)buffer->itemsize,
         .maximum = maximum > 0 ? maximum : full_scale,
     };
+    return true;
+}
+
+/* The same of the picture without laser, which is of the image's type. */
+static bool open_ambient(PyObject *ambient, const struct hal_frame *image, Py_buffer *buffer,
+                         struct hal_frame *frame)
+{
+    if (!open_image(ambient, "ambient", 0, buffer, frame)) {
+        return false;
+    }
+    if (frame->bytes_per_sample != image->bytes_per_sample) {
+        PyBuffer_Release(buffer);
+        return refuse("ambient: samples of %d bits, expected %d as in the image",
+                      (int)frame->bytes_per_sample * 8, (int)image->bytes_per_sample * 8);
+    }
+    frame->maximum = image->maximum;
     return true;
 }
 
@@ -337,12 +358,19 @@ static PyObject *detector_new(PyTypeObject *type, PyObject *arguments, PyObject 
     struct hal_error error;
     const char *bytes = NULL;
     Py_ssize_t size = 0;
-    int is_paper = 0, scale_q20 = APP_RIG_SCALE_ONE;
+    double depth_scale = 1;
+    int is_paper = 0;
     int32_t bad_slot = IH_NONE;
     (void)keywords;
-    if (!PyArg_ParseTuple(arguments, "y#ip", &bytes, &size, &scale_q20, &is_paper) ||
+    if (!PyArg_ParseTuple(arguments, "y#dp", &bytes, &size, &depth_scale, &is_paper) ||
         !decode(bytes, size, &calibration)) {
         return NULL;
+    }
+    /* A rig made by hand has passed no check of app_rig. */
+    if (!(depth_scale >= APP_RIG_SCALE_MIN && depth_scale <= APP_RIG_SCALE_MAX)) {
+        hal_fail(&error, "depth_scale: %g, expected %g to %g mm per unit", depth_scale,
+                 APP_RIG_SCALE_MIN, APP_RIG_SCALE_MAX);
+        return fail(error.text);
     }
     allocfunc allocate = (allocfunc)PyType_GetSlot(type, Py_tp_alloc);
     struct detector *detector = (struct detector *)allocate(type, 0);
@@ -356,7 +384,7 @@ static PyObject *detector_new(PyTypeObject *type, PyObject *arguments, PyObject 
         Py_DECREF(detector);
         return PyErr_NoMemory();
     }
-    detector->cloud.scale_q20 = scale_q20;
+    detector->cloud.scale_q20 = (int32_t)lround(depth_scale * APP_RIG_SCALE_ONE);
     memset(detector->head, 0, sizeof *detector->head);
     enum ih_err err = isohead_init(detector->head, &calibration, &bad_slot);
     if (err != IH_OK) {
@@ -438,7 +466,7 @@ static PyObject *detector_frame(PyObject *self, PyObject *arguments)
         return NULL;
     }
     const bool has_ambient = ambient != Py_None;
-    if (!has_ambient || open_image(ambient, "ambient", maximum, &ambient_buffer, &ambient_frame)) {
+    if (!has_ambient || open_ambient(ambient, &frame, &ambient_buffer, &ambient_frame)) {
         frame.time_us = time_us;
         if (enter(detector)) {
             result = process(detector, &frame, has_ambient ? &ambient_frame : NULL);
@@ -478,8 +506,15 @@ static PyObject *detector_cloud(PyObject *self, PyObject *arguments)
 static PyObject *detector_record(PyObject *self, PyObject *name)
 {
     struct detector *detector = (struct detector *)self;
-    const char *file = PyUnicode_AsUTF8AndSize(name, NULL);
-    if (file == NULL || !enter(detector)) {
+    Py_ssize_t size = 0;
+    const char *file = PyUnicode_AsUTF8AndSize(name, &size);
+    if (file == NULL) {
+        return NULL;
+    }
+    if (strlen(file) != (size_t)size) {
+        return fail("file: a zero character in it, expected the name of a frame");
+    }
+    if (!enter(detector)) {
         return NULL;
     }
     PyObject *text = NULL;

@@ -11,6 +11,7 @@ rounded; docs/contract.md says what each means.
 """
 
 import json
+import math
 import os
 import struct
 from collections.abc import Mapping, Sequence
@@ -38,7 +39,7 @@ class Rig(NamedTuple):
     blob: bytes
     """The whole rig as bytes, which boards read too."""
     depth_scale: float = 1.0
-    """mm per unit of a depth image."""
+    """mm per unit of a depth image, 0.01 to 1000."""
 
     def _numbers(self) -> tuple[int, ...]:
         return _RIG_NUMBERS.unpack_from(self.blob, 12)
@@ -158,10 +159,25 @@ def depth_rig(width: int, height: int, fx: float, fy: float, cx: float, cy: floa
 
     depth_scale: mm per unit of its images. up: the unit vector of the camera frame that points up, where it is not level.
     """
+    width, height, fx, fy, cx, cy, near_mm, far_mm, depth_scale = map(_finite, (
+        "width", "height", "fx", "fy", "cx", "cy", "near_mm", "far_mm", "depth_scale"), (
+        width, height, fx, fy, cx, cy, near_mm, far_mm, depth_scale))
     return parse_rig({
         "kind": "range", "image_width": width, "image_height": height, "near_mm": near_mm, "far_mm": far_mm,
         "depth_scale": depth_scale, "camera_matrix": [[fx, 0, cx], [0, fy, cy], [0, 0, 1]],
-        "distortion_coefficients": list(distortion), "up": list(up)})
+        "distortion_coefficients": [_finite("distortion", number) for number in distortion],
+        "up": [_finite("up", number) for number in up]})
+
+
+def _finite(name: str, value: Any) -> float:
+    """Of Python's or NumPy's kinds of numbers."""
+    try:
+        number = math.nan if isinstance(value, (str, bytes)) else float(value)
+    except (TypeError, ValueError, OverflowError):
+        number = math.nan
+    if not math.isfinite(number):
+        raise Error("%s: %.60r, expected a finite number" % (name, value))
+    return number
 
 
 def _rig(raw: tuple[bytes, int]) -> Rig:
@@ -176,7 +192,7 @@ class Detector:
 
     def __init__(self, rig: Rig, *, paper: bool = False) -> None:
         self.rig = rig
-        self._core = _core.Detector(rig.blob, round(rig.depth_scale * _SCALE_ONE), paper)
+        self._core = _core.Detector(rig.blob, rig.depth_scale, paper)
 
     def process(self, image: Any, *, time_us: int, ambient: Any = None, maximum: int = 0) -> Result:
         """Find the heads in a frame.
@@ -185,8 +201,8 @@ class Detector:
             and not copied. For a range rig uint16: Z depth, 0 where nothing was measured, in mm or in the rig's unit; depths
             in another unit are converted by each call.
         time_us: when it was taken, from any origin. It tells how far somebody may have moved since the frame before.
-        ambient: the last picture with the laser off, not older than 0.2 s.
-        maximum: the grey value of full scale: 1023 for a 10-bit sensor. 0: what the type of image can hold.
+        ambient: the last picture with the laser off, not older than 0.2 s, of the same size and type.
+        maximum: the grey value of full scale: 1023 for a 10-bit sensor. 0: what the type of image can hold, which is the most.
         """
         return _result(self._core.frame(image, ambient, time_us, maximum), time_us)
 

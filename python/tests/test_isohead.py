@@ -205,6 +205,65 @@ def test_ambient_is_used(rig, image):
         process(rig, image, ambient=flat[:100, :100])
 
 
+def test_an_ambient_of_another_type_is_refused(rig, image):
+    wide = image.astype(np.uint16) * 257
+    for one, other, bits in ((image, wide, "16 bits, expected 8"), (wide, image, "8 bits, expected 16")):
+        with pytest.raises(isohead.Error, match="ambient: samples of " + bits):
+            process(rig, one, ambient=other)
+    assert process(rig, wide, ambient=wide).dots == 0
+
+
+def test_a_maximum_that_the_type_cannot_hold_is_refused(rig, image):
+    wide = image.astype(np.uint16) * 4
+    for picture, maximum, text in ((image, 300, "at most 255"), (image, -1, "at least 0"), (wide, 65536, "at most 65535")):
+        with pytest.raises(isohead.Error, match="maximum: %d, expected %s" % (maximum, text)):
+            process(rig, picture, maximum=maximum)
+    assert process(rig, image, maximum=255) == process(rig, image)
+
+
+def test_a_unit_that_no_rig_may_have_is_refused(rig):
+    depth_rig = isohead.parse_rig(RANGE_RIG)
+    for scale in (0, -1, 1e-9, 1001, 1e300, float("nan"), float("inf")):
+        for blob in (rig.blob, depth_rig.blob):
+            with pytest.raises(isohead.Error, match="depth_scale: .*, expected 0.01 to 1000 mm per unit"):
+                isohead.Detector(isohead.Rig(blob, scale))
+    isohead.Detector(isohead.Rig(depth_rig.blob, np.float32(0.2)))
+
+
+def test_numbers_of_numpy_make_a_depth_rig():
+    numbers = (WIDTH, HEIGHT, FOCAL, FOCAL, (WIDTH - 1) / 2, (HEIGHT - 1) / 2)
+    expected = isohead.depth_rig(*numbers, depth_scale=0.25)
+    for kind in (np.float32, np.float64, np.array):
+        assert expected == isohead.depth_rig(np.int64(WIDTH), np.uint16(HEIGHT), *map(kind, numbers[2:]),
+                                             distortion=np.zeros(5, np.float32), near_mm=np.int32(400),
+                                             far_mm=kind(4000), depth_scale=kind(0.25), up=np.array([0, -1, 0]))
+
+
+@pytest.mark.parametrize("wrong", [float("nan"), np.float32("inf"), "400", None, pytest.param(10**400, id="huge"),
+                                   np.zeros(2)])
+def test_what_is_no_finite_number_makes_no_depth_rig(wrong):
+    names = ("width", "height", "fx", "fy", "cx", "cy")
+    numbers = dict(zip(names, (WIDTH, HEIGHT, FOCAL, FOCAL, 160, 120)))
+    for name in (*names, "near_mm", "far_mm", "depth_scale"):
+        with pytest.raises(isohead.Error, match=r"^%s: [^:]*, expected a finite number" % name):
+            isohead.depth_rig(**{**numbers, name: wrong})
+    for name, values in (("up", [0, wrong, 0]), ("distortion", [wrong, 0, 0, 0, 0])):
+        with pytest.raises(isohead.Error, match="^%s: .*, expected a finite number" % name):
+            isohead.depth_rig(**numbers, **{name: values})
+    with pytest.raises(isohead.Error, match="image_width: 320.5, expected a whole number"):
+        isohead.depth_rig(**{**numbers, "width": 320.5})
+    with pytest.raises(isohead.Error, match="up: .0, 0, 0., expected a unit vector"):
+        isohead.depth_rig(**numbers, up=(0, 0, 0))
+
+
+def test_a_record_of_a_name_with_a_zero_is_refused(rig, image):
+    detector = isohead.Detector(rig)
+    detector.process(image, time_us=0)
+    with pytest.raises(isohead.Error, match="file: a zero character"):
+        detector.record("a\0b")
+    assert json.loads(detector.record("a"))["file"] == "a"
+
+
 def test_nothing_is_copied(rig, image):
     """NumPy's and Python's own memory of a call stays far below an image's, whatever its strides."""
     detector = isohead.Detector(rig)
