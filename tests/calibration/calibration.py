@@ -341,6 +341,8 @@ def check_corrupt(bench):
          "a.pgm, which is not there"),
         ("a file twice in the list", "frames.jsonl", lambda data: data + b'{"file":"000000.pgm","laser":false}\n',
          "frames.jsonl:51: names a file that an earlier line names"),
+        ("a field twice in a line", "frames.jsonl", lambda data: data + b'{"file":"a.pgm","laser":true,"laser":false}\n',
+         "frames.jsonl:51: laser: a second time"),
         ("a file that is not in the list", "frames.jsonl", lambda data: data[data.index(b"\n") + 1:],
          "000000.pgm: is not listed in frames.jsonl"),
     ]

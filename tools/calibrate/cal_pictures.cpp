@@ -7,6 +7,7 @@
 #include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "cal_error.hpp"
 #include "tool_file.hpp"
@@ -99,6 +100,18 @@ static bool ends_with(const std::string &name, const std::string &end)
     return name.size() > end.size() && name.compare(name.size() - end.size(), end.size(), end) == 0;
 }
 
+/* A line's object. The parser takes the last of two fields of one name, host_sim takes none. */
+static nlohmann::json parse_line(const std::string &line, const std::string &where)
+{
+    using Event = nlohmann::json::parse_event_t;
+    std::set<std::string> names;
+    return nlohmann::json::parse(line, [&](int depth, Event event, const nlohmann::json &value) {
+        if (event == Event::key && depth == 1 && !names.insert(value.get<std::string>()).second)
+            throw Error(where + ": " + value.get<std::string>() + ": a second time");
+        return true;
+    });
+}
+
 /* Which files had the laser on, by frames.jsonl. */
 static std::map<std::string, bool> read_list(const std::string &path)
 {
@@ -111,7 +124,7 @@ static std::map<std::string, bool> read_list(const std::string &path)
         if (line.find_first_not_of(" \t\r") == std::string::npos)
             continue;
         try {
-            nlohmann::json entry = nlohmann::json::parse(line);
+            nlohmann::json entry = parse_line(line, path + text(":%d", number));
             bool laser = entry.at("laser").get<bool>();
             if (!lasers.emplace(entry.at("file").get<std::string>(), laser).second)
                 throw Error(path + text(":%d: names a file that an earlier line names", number));
