@@ -73,10 +73,10 @@ static bool put(const char *part, const char *path, const uint8_t *blob, struct 
 }
 
 /* The same file, whatever its path. */
-static bool is_same(const char *path, const char *other_path)
+static bool is_same(const char *first, const char *second)
 {
     struct stat one, other;
-    return stat(path, &one) == 0 && stat(other_path, &other) == 0 && one.st_dev == other.st_dev &&
+    return stat(first, &one) == 0 && stat(second, &other) == 0 && one.st_dev == other.st_dev &&
            one.st_ino == other.st_ino;
 }
 
@@ -102,15 +102,13 @@ static enum status write_blob(const char *rig_path, const char *part, const char
 
 static enum status convert(const char *rig_path, const char *path)
 {
-    static const char suffix[] = ".part";
-    const size_t length = strlen(path);
-    char *part = malloc(length + sizeof suffix);
+    size_t size = strlen(path) + sizeof ".part";
+    char *part = malloc(size);
     if (part == NULL) {
         return fail(path, "no memory");
     }
-    memcpy(part, path, length);
-    memcpy(part + length, suffix, sizeof suffix);
-    enum status status = write_blob(rig_path, part, path);
+    int length = snprintf(part, size, "%s.part", path);
+    enum status status = length > 0 ? write_blob(rig_path, part, path) : fail(path, "too long");
     free(part);
     return status;
 }
