@@ -13,6 +13,8 @@
 #define OPTION_FIRST 256
 /* Longest part of a wrong text that is reported. */
 #define QUOTE_MAX 60
+/* Some editors begin a file with it. */
+#define BYTE_ORDER_MARK "\xEF\xBB\xBF"
 /* "FILE:LINE" */
 #define PLACE_MAX (APP_CONFIG_VALUE_MAX + 16)
 
@@ -238,15 +240,25 @@ static void read_line(struct reader *reader, int32_t line, char *text, size_t le
     read_setting(reader, line, trim(key), trim(equals + 1));
 }
 
+/* Its number may lack digits, and the lines behind it their limits. */
+static void refuse_cut_line(struct reader *reader, int32_t line)
+{
+    struct place place = place_of(reader, line);
+    reader->line_unsure = true;
+    report(reader, place.text, "the last line has no line end: the file may be cut");
+}
+
 static void read_text(struct reader *reader, size_t size)
 {
     char *at = reader->config->text;
     char *end = at + size;
     *end = 0;
+    at += strncmp(at, BYTE_ORDER_MARK, strlen(BYTE_ORDER_MARK)) == 0 ? strlen(BYTE_ORDER_MARK) : 0;
     for (int32_t line = 1; at < end; line++) {
         char *line_end = memchr(at, '\n', (size_t)(end - at));
         if (line_end == NULL) {
-            line_end = end;
+            refuse_cut_line(reader, line);
+            return;
         }
         *line_end = 0;
         read_line(reader, line, at, (size_t)(line_end - at));
@@ -293,6 +305,24 @@ static void demand(struct reader *reader, bool good, const char *name, const cha
     if (!good) {
         struct place place = place_of_setting(reader, name);
         report(reader, place.text, "%s%s: %s", dashes_at(place.text), name, text);
+    }
+}
+
+/* The command line cannot be cut. */
+static bool may_lack(const struct reader *reader, const char *name)
+{
+    int index = app_settings_find(name);
+    return reader->config->path != NULL && reader->given[index] == NULL && reader->line[index] == 0;
+}
+
+/* Also for --laser-off: of the wrong polarity, "off" is on. */
+static void check_polarity(struct reader *reader)
+{
+    if (reader->config->laser_line != NULL && may_lack(reader, "laser-active-low")) {
+        reader->line_unsure = true;
+        demand(reader, false, "laser-line",
+               "given, but no laser-active-low, expected it too, on or off: a file that was cut "
+               "lacks it");
     }
 }
 
@@ -347,6 +377,11 @@ static void check(struct reader *reader)
            "missing, expected the file with the calibration; --help lists all settings");
     demand(reader, !config->laser || config->laser_line != NULL, "laser",
            "on, but no laser-line, expected the line that switches it");
+    demand(reader,
+           !config->laser || config->laser_line == NULL || !may_lack(reader, "interlock-line"),
+           "laser",
+           "on, but no interlock-line, expected it too, a line or none: a file that was cut lacks "
+           "it");
     demand(reader, config->laser || config->strobe != APP_STROBE_ALTERNATING, "strobe",
            "alternating without laser, expected always, gated or laser on");
     demand(reader, config->record != NULL || config->record_when == APP_RECORD_ALWAYS,
@@ -368,6 +403,9 @@ bool app_config_read(struct app_config *config, int argument_count, char **argum
         read_file(&reader);
     }
     take_arguments(&reader, true);
+    if (!reader.line_unsure) {
+        check_polarity(&reader);
+    }
     if (!config->laser_off && reader.error_count == 0) {
         check(&reader);
     }

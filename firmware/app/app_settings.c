@@ -115,6 +115,13 @@ static bool take_text(const struct app_setting *setting, struct app_config *conf
     return true;
 }
 
+/* "none" is written out where a file is to say that there is none. */
+static bool take_line_or_none(const struct app_setting *setting, struct app_config *config,
+                              const char *value)
+{
+    return take_text(setting, config, strcmp(value, "none") == 0 ? NULL : value);
+}
+
 /* An accelerometer is all there is. */
 static bool take_up(const struct app_setting *setting, struct app_config *config, const char *value)
 {
@@ -291,8 +298,9 @@ const struct app_setting app_settings[] = {
      .offset = AT(laser_line)},
     {"laser-active-low", NULL, ON_OR_OFF, "low is on", .take = take_flag,
      .offset = AT(laser_active_low)},
-    {"interlock-line", "LINE", LINE, "input that must be active for the laser to be on",
-     .take = take_text, .offset = AT(interlock_line)},
+    {"interlock-line", "LINE", LINE ", or none",
+     "input that must be active for the laser to be on; or none", .take = take_line_or_none,
+     .offset = AT(interlock_line)},
     {"interlock-active-low", NULL, ON_OR_OFF, "low is closed", .take = take_flag,
      .offset = AT(interlock_active_low)},
     {"heartbeat-line", "LINE", LINE, "line that is toggled for an external one-shot",
@@ -471,7 +479,7 @@ static void write_value(const struct app_setting *setting, const struct app_conf
     } else if (setting->take == take_number) {
         write_number(setting, number_at(config, setting->offset), write);
     } else if (setting->take == take_text || setting->take == take_word ||
-               setting->take == take_up) {
+               setting->take == take_line_or_none || setting->take == take_up) {
         app_write_string_or_null(write, text_at(config, setting->offset));
     } else if (setting->words[number_at(config, setting->offset)] != NULL) {
         app_write_string(write, setting->words[number_at(config, setting->offset)]);

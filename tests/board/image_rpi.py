@@ -51,12 +51,14 @@ CAMERA = f"""device = /dev/video0
 rate = 5
 exposure = keep
 gain = keep
-laser = on
 laser-cap = 1000
 gpio-chip = pinctrl-bcm2835
 laser-line = {LASER}
+laser-active-low = off
+interlock-line = none
 output = serial:/dev/ttyAMA0
 status = 0
+laser = on
 """
 
 

@@ -29,6 +29,8 @@ gain = keep
 laser-cap = 1000
 gpio-chip = /dev/gpiochip0
 laser-line = 0
+laser-active-low = off
+interlock-line = none
 status = 0
 """
 
@@ -176,7 +178,7 @@ def refuses(unit):
     unit.command("! systemctl restart isohead")
     expect(unit.show("ActiveState") == "failed", "not failed, but " + unit.show("SubState"))
     expect(unit.show("ExecMainStatus") == "2", "status " + unit.show("ExecMainStatus"))
-    expect("isohead.conf:10" in unit.journal(), "the journal does not name the line:\n" + unit.journal())
+    expect("isohead.conf:12" in unit.journal(), "the journal does not name the line:\n" + unit.journal())
     expect(unit.board.levels[LASER] == 0, "the laser is on")
     return "status 2, not tried again, the journal names the line"
 

@@ -161,8 +161,8 @@ static void every_setting_is_an_option_and_a_key(void)
                           "--watchdog", "/dev/watchdog1", "--paper", "--view", "10.0.0.1:8080"));
     assert_all_is_read();
     setUp();
-    /* No line end at the end, line ends of other systems, blanks and comments everywhere. */
-    TEST_ASSERT_TRUE(read_text("# comment = here\n"
+    /* A byte order mark, line ends of other systems, blanks and comments everywhere. */
+    TEST_ASSERT_TRUE(read_text("\xEF\xBB\xBF# comment = here\n"
                                "rig=r.json\n"
                                "  device =   /dev/video7   \n"
                                "\tformat\t=\tY10P\t# comment\n"
@@ -186,14 +186,18 @@ static void every_setting_is_an_option_and_a_key(void)
                                "status = 0\n"
                                "watchdog = /dev/watchdog1 #=\n"
                                "view = 10.0.0.1:8080\n"
-                               "paper = on"));
+                               "paper = on\n"));
     assert_all_is_read();
+    TEST_ASSERT_TRUE(read_text("\xEF\xBB\xBFrig = r\n"));
+    TEST_ASSERT_TRUE(READ("--rig=r", "--interlock-line=none"));
+    TEST_ASSERT_NULL(config.interlock_line);
 }
 
 static void the_command_line_wins_wherever_config_stands(void)
 {
     static const char text[] = "rig = file.json\nrate = 10\npaper = on\nlaser = off\n"
-                               "gpio-chip = c\nlaser-line = 1\noutput = serial:/dev/x:9600\n";
+                               "gpio-chip = c\nlaser-line = 1\nlaser-active-low = off\n"
+                               "interlock-line = none\noutput = serial:/dev/x:9600\n";
 
     write_file(text, strlen(text));
     TEST_ASSERT_TRUE(READ("--config", PATH, "--rate", "20", "--paper=off", "--output", "-"));
@@ -533,6 +537,7 @@ static void files_that_are_none_are_reported(void)
     TEST_ASSERT_FALSE(READ("--config", PATH));
     TEST_ASSERT_EQUAL_INT(1, error_count);
     memcpy(big, "rig = r\n", 8);
+    big[sizeof big - 2] = '\n';
     write_file(big, sizeof big - 1);
     TEST_ASSERT_TRUE(READ("--config", PATH));
     TEST_ASSERT_FALSE(read_text(""));
@@ -546,7 +551,8 @@ static void what_does_not_go_together_is_reported(void)
         const char *text, *error;
     } trials[] = {
         {"laser = on\n", ":2: laser: on, but no laser-line, expected the line that switches it"},
-        {"laser-line = 3\n", ":2: laser-line: given, but no gpio-chip, expected both"},
+        {"laser-line = 3\nlaser-active-low = off\n",
+         ":2: laser-line: given, but no gpio-chip, expected both"},
         {"interlock-line = 3\n", ":2: interlock-line: given, but no gpio-chip, expected both"},
         {"heartbeat-line = 3\n", ":2: heartbeat-line: given, but no gpio-chip, expected both"},
         {"laser-active-low = on\n", ":2: laser-active-low: on, but no laser-line, expected both"},
@@ -554,12 +560,20 @@ static void what_does_not_go_together_is_reported(void)
          ":2: interlock-active-low: on, but no interlock-line, expected both"},
         {"strobe = alternating\n",
          ":2: strobe: alternating without laser, expected always, gated or laser on"},
-        {"gpio-chip=c\nlaser-line=3\ninterlock-line=3\n",
-         ":4: interlock-line: the laser-line too, expected another line"},
-        {"gpio-chip=c\nlaser-line=3\nheartbeat-line=3\n",
-         ":4: heartbeat-line: the laser-line too, expected another line"},
+        {"gpio-chip=c\nlaser-line=3\nlaser-active-low=off\ninterlock-line=3\n",
+         ":5: interlock-line: the laser-line too, expected another line"},
+        {"gpio-chip=c\nlaser-line=3\nlaser-active-low=off\nheartbeat-line=3\n",
+         ":5: heartbeat-line: the laser-line too, expected another line"},
         {"gpio-chip=c\nheartbeat-line=x\ninterlock-line=x\n",
          ":3: heartbeat-line: the interlock-line too, expected another line"},
+        {"gpio-chip=c\nlaser-line=3\n", ":3: laser-line: given, but no laser-active-low, expected "
+                                        "it too, on or off: a file that was "
+                                        "cut lacks it"},
+        {"gpio-chip=c\nlaser-line=3\nlaser-active-low=off\nlaser=on\n",
+         ":5: laser: on, but no interlock-line, expected it too, a line or none: a file that was "
+         "cut "
+         "lacks it"},
+        {"duty = 50", ":2: the last line has no line end: the file may be cut"},
     };
     char text[200], wanted[200];
     int i;
@@ -621,6 +635,8 @@ static void laser_off_knows_the_line_or_says_so(void)
         LINE "laser-active-low = off\n",
         LINE "laser-line = 4\n",
         LINE "gpio-chip = d\n",
+        "gpio-chip = c\nlaser-line = 3\n",
+        "gpio-chip = c\nlaser-active-low = off\nlaser-line = 1",
     };
     int i;
 
@@ -774,6 +790,73 @@ static void the_installed_file_has_every_key(void)
     TEST_ASSERT_EQUAL_MEMORY(&wanted, &config, offsetof(struct app_config, text));
 }
 
+/* The installed file with all that is commented out; it switches a laser on that is active-low. */
+static size_t load_filled(char *text, size_t size)
+{
+    static const char *const changes[][2] = {
+        {"\nlaser-active-low = off", "\nlaser-active-low = on "},
+        {"\nlaser = off", "\nlaser = on "}};
+    size_t length = load_example(text, size);
+    size_t i;
+    int c;
+
+    for (i = 0; i + 1 < length; i++) {
+        if (text[i] == '#' && text[i + 1] >= 'a' && text[i + 1] <= 'z') {
+            memmove(text + i, text + i + 1, length - i);
+            length--;
+        }
+    }
+    for (c = 0; c < IH_TEST_COUNT(changes); c++) {
+        char *at = strstr(text, changes[c][0]);
+        TEST_ASSERT_NOT_NULL_MESSAGE(at, changes[c][0]);
+        memcpy(at, changes[c][1], strlen(changes[c][1]));
+    }
+    return length;
+}
+
+/* However much of it is left, it is refused or has no laser on, and --laser-off knows the line or says
+ * that it does not. */
+static void a_cut_file_does_not_switch_the_laser_on(void)
+{
+    static char text[APP_CONFIG_TEXT_MAX];
+    size_t length = load_filled(text, sizeof text);
+    size_t left;
+
+    TEST_ASSERT_TRUE_MESSAGE(read_text(text), errors[0]);
+    TEST_ASSERT_TRUE(config.laser && config.laser_active_low);
+    for (left = 0; left < length; left++) {
+        bool good;
+        write_file(text, left);
+        good = READ("--config", PATH);
+        TEST_ASSERT_FALSE_MESSAGE(good && config.laser, text + left);
+        (void)READ("--config", PATH, "--laser-off");
+        TEST_ASSERT_TRUE_MESSAGE(
+            config.laser_line == NULL ||
+                (strcmp(config.laser_line, "17") == 0 && config.laser_active_low),
+            text + left);
+    }
+}
+
+/* Where the laser stands first: polarity and interlock are as in the whole file. */
+static void a_cut_file_with_the_laser_first_keeps_its_lines(void)
+{
+    static const char text[] = "laser = on\nrig = r\ngpio-chip = c\nlaser-line = 17\n"
+                               "laser-active-low = on\ninterlock-line = 27\nduty = 50\n";
+    int good_count = 0;
+    size_t left;
+
+    for (left = 0; left < sizeof text; left++) {
+        write_file(text, left);
+        if (READ("--config", PATH) && config.laser) {
+            good_count++;
+            TEST_ASSERT_EQUAL_STRING("17", config.laser_line);
+            TEST_ASSERT_TRUE(config.laser_active_low);
+            TEST_ASSERT_EQUAL_STRING("27", config.interlock_line);
+        }
+    }
+    TEST_ASSERT_EQUAL_INT(2, good_count);
+}
+
 /* Whatever a file says, it is read to its end; what is accepted keeps its promises. */
 static void files_of_rubbish_do_no_harm(void)
 {
@@ -855,6 +938,8 @@ int main(void)
     RUN_TEST(help_tells_every_setting_in_80_columns);
     RUN_TEST(the_nearest_name_is_found);
     RUN_TEST(the_installed_file_has_every_key);
+    RUN_TEST(a_cut_file_does_not_switch_the_laser_on);
+    RUN_TEST(a_cut_file_with_the_laser_first_keeps_its_lines);
     RUN_TEST(files_of_rubbish_do_no_harm);
     return UNITY_END();
 }
