@@ -140,14 +140,35 @@ static bool wait_for_more(const struct writer *writer)
     return count > 0;
 }
 
+/* A handler gets no context. */
+static volatile pid_t program_pid;
+
+/* systemd makes the laser's line low when every process is gone, so nobody waits for a disk when the program
+ * has died. One that is about to end in order has switched off, and its frames are still written. */
+static void end_with_program(int number)
+{
+    (void)number;
+    if (getppid() != program_pid) {
+        _exit(0);
+    }
+}
+
+static void block_signals(void)
+{
+    const struct sigaction action = {.sa_handler = end_with_program, .sa_flags = SA_RESTART};
+    sigset_t set;
+    sigaction(SIGTERM, &action, NULL);
+    sigfillset(&set);
+    sigdelset(&set, SIGTERM);
+    sigprocmask(SIG_SETMASK, &set, NULL);
+}
+
 static bool prepare(struct writer *writer, struct hal_error *error)
 {
     const struct hal_recorder_config *config = &writer->process->config;
     const struct sched_param none = {.sched_priority = 0};
     const int keep_fds[] = {0, 1, 2, writer->process->socket_fd};
-    sigset_t all;
-    sigfillset(&all);
-    sigprocmask(SIG_SETMASK, &all, NULL);
+    block_signals();
     prctl(PR_SET_NAME, "isohead-record");
     writer->samples = malloc((size_t)config->frame_bytes);
     if (writer->samples == NULL) {
@@ -385,6 +406,7 @@ static bool start(struct hal_recorder_process *process, struct hal_error *error)
     if (socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends) != 0) {
         return hal_fail(error, "no socket: %s", strerror(errno));
     }
+    program_pid = getpid();
     process->pid = fork();
     if (process->pid == 0) {
         process->socket_fd = ends[1];

@@ -7,7 +7,8 @@
  * Why a process: a disk may make who writes wait, for seconds. The loop only copies, and never waits: where the process does not
  *        keep up and the ring is full, a frame is lost, and keep() says so. The process is forked before camera and laser are
  *        opened, has no descriptor of theirs, and gets the processor when nobody else wants it (SCHED_IDLE). When the program
- *        ends, or is killed, it writes what was wanted and ends.
+ *        ends, or is killed, it writes what was wanted and ends; without the rest where SIGTERM comes after the program is
+ *        gone, as systemd sends it, whose --laser-off waits for the end of every process.
  * The ring: bytes [tail, limit) are the process's, [limit, head) are kept. Only the process moves tail while tail < limit, only
  *        the loop while tail = limit; the loop alone moves limit.
  * Memory: memory_bytes, all of it from the beginning, so that keep() never finds it full.

@@ -9,6 +9,7 @@
 #include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/prctl.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <time.h>
@@ -551,6 +552,68 @@ static void test_a_process_that_is_killed(void)
     recorder->rig(recorder->context);
 }
 
+#define WAITING 10
+
+static void keep_waiting_frames(void)
+{
+    open_with(WAITING, 1000 * PERIOD_US);
+    kill(process.pid, SIGSTOP);
+    waitid(P_PID, (id_t)process.pid, &(siginfo_t){.si_pid = 0}, WSTOPPED | WNOWAIT);
+    recorder->write(recorder->context, true);
+    for (int i = 0; i < WAITING; i++) {
+        keep_frame(i);
+    }
+}
+
+/* Its process, which has stopped and has frames to write; this process collects it. */
+static pid_t die_with_frames_waiting(void)
+{
+    pid_t writer = -1;
+    int ends[2];
+    TEST_ASSERT_EQUAL_INT(0, prctl(PR_SET_CHILD_SUBREAPER, 1));
+    TEST_ASSERT_EQUAL_INT(0, pipe(ends));
+    pid_t program = fork();
+    if (program == 0) {
+        keep_waiting_frames();
+        (void)!write(ends[1], &process.pid, sizeof process.pid);
+        raise(SIGKILL);
+    }
+    TEST_ASSERT_EQUAL_INT64(sizeof writer, read(ends[0], &writer, sizeof writer));
+    TEST_ASSERT_EQUAL_INT(program, waitpid(program, NULL, 0));
+    close(ends[0]);
+    close(ends[1]);
+    return writer;
+}
+
+/* What was wanted is written, but not where whoever ends the program's processes waits for it. */
+static void test_a_program_that_is_killed(void)
+{
+    int bad = 0;
+    pid_t writer = die_with_frames_waiting();
+    TEST_ASSERT_EQUAL_INT(0, kill(writer, SIGCONT));
+    TEST_ASSERT_EQUAL_INT(writer, waitpid(writer, NULL, 0));
+    TEST_ASSERT_EQUAL_INT(WAITING, read_part(1, &bad));
+    run("rm -rf", dir);
+    writer = die_with_frames_waiting();
+    TEST_ASSERT_EQUAL_INT(0, kill(writer, SIGTERM));
+    TEST_ASSERT_EQUAL_INT(0, kill(writer, SIGCONT));
+    TEST_ASSERT_EQUAL_INT(writer, waitpid(writer, NULL, 0));
+    TEST_ASSERT_EQUAL_INT(0, read_part(1, &bad));
+    TEST_ASSERT_EQUAL_INT(0, bad);
+}
+
+/* The program lives, and is about to end: everything is written. */
+static void test_sigterm_while_the_program_lives(void)
+{
+    int bad = 0;
+    keep_waiting_frames();
+    TEST_ASSERT_EQUAL_INT(0, kill(process.pid, SIGTERM));
+    TEST_ASSERT_EQUAL_INT(0, kill(process.pid, SIGCONT));
+    close_and_wait();
+    TEST_ASSERT_EQUAL_INT(WAITING, read_part(1, &bad));
+    TEST_ASSERT_EQUAL_INT(0, bad);
+}
+
 /* A row of frames that cannot be written is two messages, and no more. */
 static void test_failures_are_reported_once(void)
 {
@@ -705,6 +768,8 @@ int main(void)
     RUN_TEST(test_memory_is_bounded);
     RUN_TEST(test_a_disk_that_stands_still);
     RUN_TEST(test_a_process_that_is_killed);
+    RUN_TEST(test_a_program_that_is_killed);
+    RUN_TEST(test_sigterm_while_the_program_lives);
     RUN_TEST(test_failures_are_reported_once);
     RUN_TEST(test_a_rig_that_is_read_anew);
     RUN_TEST(test_up);
