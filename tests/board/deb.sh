@@ -127,6 +127,9 @@ check_unit() {
     systemd-analyze verify --man=no "$work/isohead.service" >"$work/verify" 2>&1 ||
         fail "systemd-analyze verify: $(cat "$work/verify")"
     [ ! -s "$work/verify" ] || fail "systemd-analyze verify: $(cat "$work/verify")"
+    for name in Conflicts Before; do
+        grep -qx "$name=sleep.target" $unit || fail "the unit has no $name=sleep.target: the laser would stay on in a suspend"
+    done
     # 0 is a locked box, 10 no sandbox at all; the threshold is in tenths.
     systemd-analyze security --offline=true --threshold=20 $unit >"$work/security" ||
         fail "the unit's sandbox has holes: $(cat "$work/security")"

@@ -163,6 +163,20 @@ def hangs(unit):
     return "line low; ended by the watchdog, started again"
 
 
+def sleeps(unit):
+    """What suspends the machine needs sleep.target before: the unit is stopped first, and stays so."""
+    unit.wait_laser(1, SOON_S)
+    unit.command("printf '[Unit]\\nRequires=sleep.target\\nAfter=sleep.target\\n[Service]\\nType=oneshot\\n"
+                 "ExecStart=/bin/sh -c \"systemctl is-active isohead >/run/nap; true\"\\n' >/run/systemd/system/nap.service")
+    unit.command("systemctl daemon-reload; systemctl start nap")
+    expect(unit.board.levels[LASER] == 0, "the laser is on in the machine's sleep")
+    state = unit.command("cat /run/nap")
+    expect(state == "inactive", f"it is {state} when the machine goes to sleep")
+    expect(unit.show("Result") == "success", "it did not end by itself:\n" + unit.journal())
+    unit.start()
+    return "line low and stopped before the machine sleeps"
+
+
 def stops(unit):
     unit.wait_laser(1, SOON_S)
     unit.command("systemctl stop isohead")
@@ -183,7 +197,7 @@ def refuses(unit):
     return "status 2, not tried again, the journal names the line"
 
 
-CASES = [boots_without_it, sandboxed, lights, killed, edited, hangs, stops, refuses]
+CASES = [boots_without_it, sandboxed, lights, killed, edited, hangs, sleeps, stops, refuses]
 
 
 def main():
