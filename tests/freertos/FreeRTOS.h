@@ -18,6 +18,7 @@ typedef const void *TaskHandle_t;
 
 BaseType_t xTaskCreate(void (*code)(void *), const char *name, uint16_t stack_words,
                        void *parameter, UBaseType_t priority, TaskHandle_t *handle);
+TickType_t xTaskGetTickCount(void);
 void vTaskDelete(TaskHandle_t handle);
 uint32_t ulTaskNotifyTake(BaseType_t clear, TickType_t ticks);
 void vTaskNotifyGiveFromISR(TaskHandle_t handle, BaseType_t *woken);
