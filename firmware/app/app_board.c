@@ -415,7 +415,9 @@ enum app_exit app_board_laser_off(struct app_board *board, const struct app_conf
     open_log(board, config);
     if (config->gpio_chip != NULL && config->laser_line != NULL) {
         init_gpio(board, config, true);
-        exit = take_line(board, &error) ? APP_EXIT_GOOD : APP_EXIT_FAILED;
+        exit = take_line(board, &error)  ? APP_EXIT_GOOD
+               : board->gpio.has_no_line ? APP_EXIT_NO_LINE
+                                         : APP_EXIT_FAILED;
         strobe->close(strobe->context);
     }
     if (exit != APP_EXIT_GOOD) {

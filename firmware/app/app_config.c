@@ -461,6 +461,7 @@ void app_config_help(FILE *file)
     fputs("\n"
           "In a configuration file each is a line `name = value`, flags `name = on` or\n"
           "`off`; '#' starts a comment.\n"
-          "Exit status: 0 ended as requested, 1 could not go on, 2 wrong usage or settings.\n",
+          "Exit status: 0 ended as requested, 1 could not go on, 2 wrong usage or settings;\n"
+          "3 of --laser-off: there is no such chip or line, or somebody else has it.\n",
           file);
 }

@@ -19,7 +19,8 @@
 enum app_exit {
     APP_EXIT_GOOD = 0,   /* ended as requested */
     APP_EXIT_FAILED = 1, /* could not go on */
-    APP_EXIT_USAGE = 2   /* wrong usage, configuration or rig */
+    APP_EXIT_USAGE = 2,  /* wrong usage, configuration or rig */
+    APP_EXIT_NO_LINE = 3 /* --laser-off alone: the line was not found, or somebody else has it */
 };
 
 struct app_hal {

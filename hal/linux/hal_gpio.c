@@ -15,12 +15,14 @@ struct wish {
 };
 
 /* What cannot be taken is most often taken already: by whom? */
-static bool fail_taking(struct gpiod_chip *chip, const struct hal_gpio_chip_info *info,
+static bool fail_taking(struct hal_gpio *gpio, const struct hal_gpio_chip_info *info,
                         const struct wish *wish, unsigned offset, struct hal_error *error)
 {
     int reason = errno;
     struct hal_gpio_line_info line = {.used = false};
-    bool busy = reason == EBUSY && hal_gpio_line_about(chip, offset, &line) && line.used;
+    bool busy = reason == EBUSY && hal_gpio_line_about(gpio->chip, offset, &line) && line.used;
+    gpio->has_no_line =
+        busy && strncmp(line.user, gpio->config.consumer, HAL_GPIO_NAME_MAX - 1) != 0;
     return hal_fail(error, "%s: cannot take line %u ('%.31s') of %s (%s): %s%s%s", wish->setting,
                     offset, wish->called, info->name, info->label, strerror(reason),
                     busy ? ", used by " : "",
@@ -36,6 +38,7 @@ static bool take_all(struct hal_gpio *gpio, const struct hal_gpio_chip_info *inf
     for (int i = 0; i < wish_count; i++) {
         if (!hal_gpio_find_line(gpio->chip, info, wishes[i].setting, wishes[i].called, &offsets[i],
                                 error)) {
+            gpio->has_no_line = true;
             return false;
         }
         for (int k = 0; k < i; k++) {
@@ -54,7 +57,7 @@ static bool take_all(struct hal_gpio *gpio, const struct hal_gpio_chip_info *inf
         bool input = wishes[i].line == &gpio->interlock;
         if (!(input ? hal_gpio_line_input : hal_gpio_line_output)(wishes[i].line, gpio->chip,
                                                                   &request)) {
-            return fail_taking(gpio->chip, info, &wishes[i], offsets[i], error);
+            return fail_taking(gpio, info, &wishes[i], offsets[i], error);
         }
     }
     return true;
@@ -151,7 +154,8 @@ static bool gpio_open(void *context, struct hal_error *error)
     }
     gpio_close(gpio);
     gpio->chip = hal_gpio_find_chip(config->chip, &info, error);
-    if (gpio->chip == NULL) {
+    gpio->has_no_line = gpio->chip == NULL;
+    if (gpio->has_no_line) {
         return false;
     }
     if (!take_all(gpio, &info, wishes, count, error)) {

@@ -65,6 +65,8 @@ struct hal_gpio {
     int laser_fd;
     /* The laser's line, such as gpiochip0.17, by whatever name it was found; "" before. */
     char line_name[HAL_GPIO_LINE_NAME_MAX];
+    /* Why open() has failed: the chip or a line was not found, or somebody has it who is not the consumer. */
+    bool has_no_line;
     /* Private from here on. */
     struct hal_gpio_config config;
     struct gpiod_chip *chip;

@@ -95,7 +95,7 @@ def check_laser():
     conf = write("none.conf", "laser = off\n")
     check(run("--config", conf, "--laser-off").returncode == 0, "--laser-off of a board without a laser")
     expect(2, "gpio-chip and laser-line", "--laser-off")
-    expect(1, "/nowhere/gpiochip0", "--laser-off", "--gpio-chip", "/nowhere/gpiochip0", "--laser-line", "3")
+    expect(3, "/nowhere/gpiochip0", "--laser-off", "--gpio-chip", "/nowhere/gpiochip0", "--laser-line", "3")
     expect(2, "status", "--laser-off", "--config", write("wrong.conf", "laser = on\nstatus = soon\n"))
     # A watchdog that runs from before, for a line that is stuck, gets no sign of life and is not stopped.
     dog = write("dog", "")

@@ -6,9 +6,9 @@ cd "$(dirname "$0")/../.."
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 dog=$work/watchdog
-sed -n '/^laser_off() {/,/^}/p' tools/image/root/usr/lib/isohead/run |
+sed -n -e '/^line_before() {/,/^}/p' -e '/^laser_off() {/,/^}/p' tools/image/root/usr/lib/isohead/run |
     sed "s|/run/isohead.conf|$work/conf|g" >"$work/laser_off"
-[ -s "$work/laser_off" ] || { echo "image_run: run has no laser_off" >&2; exit 1; }
+grep -q laser_off "$work/laser_off" || { echo "image_run: run has no laser_off" >&2; exit 1; }
 say() { :; }
 # By another file than that of the settings that the firmware was started with it says "wrong".
 isohead_board() { [ "$2" = "$work/conf" ] && echo off >>"$work/calls" || echo wrong >>"$work/calls"; return "$off_status"; }
@@ -18,10 +18,13 @@ sleep() { :; }
 . "$work/laser_off"
 
 failed=0
-# expect CALLS FED STATUS OFF_STATUS: after the firmware's STATUS, where --laser-off ends with OFF_STATUS
+# expect CALLS FED STATUS OFF_STATUS [BEFORE]: after the firmware's STATUS, where --laser-off ends with OFF_STATUS, and before its
+# start with BEFORE, 0 if not given
 expect() {
-    : >"$work/calls"
     : >"$dog"
+    off_status=${5:-0}
+    line_before
+    : >"$work/calls"
     off_status=$4
     laser_off "$3" || true
     calls=$(tr '\n' ' ' <"$work/calls")
@@ -40,5 +43,9 @@ expect "off reset " 1 137 1 # started, and fed no more
 expect "off reset " 1 0 1
 expect "off reset " 1 1 2
 expect "off " 0 2 2 # settings that are wrong switched nothing on
-echo "image_run: 7 ends of the firmware, $failed wrong"
+expect "off " 0 1 3 3 # the wrong line in the settings
+expect "off " 0 0 3 3
+expect "off reset " 1 1 3 0 # the line was there, and is no more
+expect "off reset " 1 1 1 3
+echo "image_run: 11 ends of the firmware, $failed wrong"
 exit $failed

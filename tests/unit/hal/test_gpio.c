@@ -246,6 +246,34 @@ static void a_line_in_use_is_reported_with_its_user(void)
     REFUSED(laser_line, "3", "laser-line", "line 3", "busy", "used by the kernel");
 }
 
+static bool open_without_line(const char *chip, const char *line)
+{
+    struct hal_gpio_config config = plain;
+
+    config.chip = chip;
+    config.laser_line = line;
+    TEST_ASSERT_FALSE(open_with(&config));
+    return gpio.has_no_line;
+}
+
+/* A line that ours hold is there. */
+static void a_line_that_is_not_there_or_is_others_is_known(void)
+{
+    TEST_ASSERT_TRUE(open_without_line("none", "laser"));
+    TEST_ASSERT_TRUE(open_without_line("/dev/gpiochip9", "laser"));
+    TEST_ASSERT_TRUE(open_without_line("pl061", "lasr"));
+    TEST_ASSERT_TRUE(open_without_line("pl061", "8"));
+    TEST_ASSERT_TRUE(open_without_line("pl061", "fan"));
+    lines[2].user = "isohead";
+    TEST_ASSERT_FALSE(open_without_line("pl061", "fan"));
+    TEST_ASSERT_TRUE(open_with(&plain));
+    TEST_ASSERT_FALSE(gpio.has_no_line);
+    close_it();
+    laser->is_stuck = true;
+    laser->level = 1;
+    TEST_ASSERT_FALSE(open_without_line("pl061", "laser"));
+}
+
 static void long_names_are_cut_visibly(void)
 {
     char name[400];
@@ -595,6 +623,7 @@ int main(void)
     RUN_TEST(unknown_names_are_answered_with_what_there_is);
     RUN_TEST(one_line_is_not_used_twice);
     RUN_TEST(a_line_in_use_is_reported_with_its_user);
+    RUN_TEST(a_line_that_is_not_there_or_is_others_is_known);
     RUN_TEST(long_names_are_cut_visibly);
     RUN_TEST(the_interlock_is_its_level);
     RUN_TEST(without_an_interlock_it_is_closed);
