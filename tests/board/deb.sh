@@ -127,6 +127,8 @@ check_unit() {
     systemd-analyze verify --man=no "$work/isohead.service" >"$work/verify" 2>&1 ||
         fail "systemd-analyze verify: $(cat "$work/verify")"
     [ ! -s "$work/verify" ] || fail "systemd-analyze verify: $(cat "$work/verify")"
+    [ "$(grep -c '^Exec.*isohead_board --config /run/isohead/isohead.conf' $unit)" = 2 ] ||
+        fail "the program and the command after its end go by different settings"
     for name in Conflicts Before; do
         grep -qx "$name=sleep.target" $unit || fail "the unit has no $name=sleep.target: the laser would stay on in a suspend"
     done

@@ -9,6 +9,11 @@ dog=$work/watchdog
 sed -n -e '/^line_before() {/,/^}/p' -e '/^laser_off() {/,/^}/p' tools/image/root/usr/lib/isohead/run |
     sed "s|/run/isohead.conf|$work/conf|g" >"$work/laser_off"
 grep -q laser_off "$work/laser_off" || { echo "image_run: run has no laser_off" >&2; exit 1; }
+# The firmware goes by the same copy.
+if ! grep -q 'set -- --config /run/isohead.conf;' tools/image/root/usr/lib/isohead/run; then
+    echo "image_run: the firmware is not started with the settings that --laser-off goes by" >&2
+    exit 1
+fi
 say() { :; }
 # By another file than that of the settings that the firmware was started with it says "wrong".
 isohead_board() { [ "$2" = "$work/conf" ] && echo off >>"$work/calls" || echo wrong >>"$work/calls"; return "$off_status"; }
