@@ -9,11 +9,11 @@
 
 #include "linux/hal_clock.h"
 
-static unsigned event_of(uint32_t signal)
+static unsigned event_of(const struct hal_events_config *config, uint32_t signal)
 {
     switch (signal) {
     case SIGHUP:
-        return HAL_EVENT_RELOAD;
+        return config->has_terminal ? HAL_EVENT_STOP : HAL_EVENT_RELOAD;
     case SIGUSR1:
         return HAL_EVENT_RECORD;
     default:
@@ -22,13 +22,14 @@ static unsigned event_of(uint32_t signal)
 }
 
 /* All signals that are there become events. */
-static bool read_signals(int fd, unsigned *events, struct hal_error *error)
+static bool read_signals(const struct hal_events_config *config, unsigned *events,
+                         struct hal_error *error)
 {
     for (;;) {
         struct signalfd_siginfo info;
-        ssize_t count = read(fd, &info, sizeof info);
+        ssize_t count = read(*config->signal_fd, &info, sizeof info);
         if (count == (ssize_t)sizeof info) {
-            *events |= event_of(info.ssi_signo);
+            *events |= event_of(config, info.ssi_signo);
         } else if (count < 0 && errno == EAGAIN) {
             return true;
         } else if (count >= 0 || errno != EINTR) {
@@ -70,7 +71,7 @@ static bool events_wait(void *context, int64_t timeout_us, unsigned *events,
     if (waiting[1].revents != 0) {
         *events |= HAL_EVENT_INTERLOCK;
     }
-    return waiting[2].revents == 0 || read_signals(waiting[2].fd, events, error);
+    return waiting[2].revents == 0 || read_signals(config, events, error);
 }
 
 void hal_events_init(struct hal_event_source *source, const struct hal_events_config *config)

@@ -5,6 +5,7 @@ exit statuses.
 program.py ISOHEAD_BOARD HOST_SIM RENDER FRAMES      exit status 1 if something is wrong
 """
 
+import fcntl
 import json
 import os
 import re
@@ -14,6 +15,7 @@ import socket
 import subprocess
 import sys
 import tempfile
+import termios
 import time
 from concurrent.futures import ThreadPoolExecutor
 
@@ -161,6 +163,20 @@ def check_ends():
     for output in ("udp:127.0.0.1:9", *(["udp:[::1]:9"] if has_v6() else [])):
         status, text = end(signal.SIGTERM, "--output", output)
         check(status == 0, f"{output}: status {status}: {text}")
+
+
+def check_terminal():
+    """A terminal that is gone takes the program with it."""
+    master, slave = os.openpty()
+    with subprocess.Popen([program, "--rig", rig, "--device", "/nowhere/video0"], stdin=slave, stdout=slave, stderr=subprocess.PIPE,
+                          text=True, start_new_session=True,
+                          preexec_fn=lambda: fcntl.ioctl(0, termios.TIOCSCTTY, 0)) as process:
+        os.close(slave)
+        while "trying again" not in process.stderr.readline():
+            pass
+        os.close(master)
+        process.communicate(timeout=SOON_S)
+    check(process.returncode == 0, f"lost terminal: status {process.returncode}")
 
 
 def check_check():
@@ -356,7 +372,7 @@ def check_modes():
 def main():
     with ThreadPoolExecutor(1) as beside:
         dark = beside.submit(check_dark)  # it waits for most of its time
-        for part in (check_usage, check_outputs, check_laser, check_ends, check_check, check_directory, check_answers, check_record, check_up,
+        for part in (check_usage, check_outputs, check_laser, check_ends, check_terminal, check_check, check_directory, check_answers, check_record, check_up,
                      check_modes):
             part()
         dark.result()

@@ -105,6 +105,13 @@ static void each_thing_is_its_event(void)
     TEST_ASSERT_EQUAL_UINT(0, wait_us(0));
 }
 
+static void a_lost_terminal_stops(void)
+{
+    source.config.has_terminal = true;
+    kill(getpid(), SIGHUP);
+    TEST_ASSERT_EQUAL_UINT(HAL_EVENT_STOP, wait_us(0));
+}
+
 static void all_at_once_are_reported_at_once(void)
 {
     make_readable(camera[1]);
@@ -194,6 +201,7 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(nothing_happens_until_the_time_is_over);
     RUN_TEST(each_thing_is_its_event);
+    RUN_TEST(a_lost_terminal_stops);
     RUN_TEST(all_at_once_are_reported_at_once);
     RUN_TEST(what_is_closed_is_not_waited_for);
     RUN_TEST(errors_are_events);
