@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
+#include <sys/prctl.h>
 #include <sys/syscall.h>
 #include <time.h>
 #include <unistd.h>
@@ -24,6 +25,7 @@ struct hal_guard_page *hal_guard_page_new(const char *line_name)
         page = mmap(NULL, sizeof(struct hal_guard_page), PROT_READ | PROT_WRITE, MAP_SHARED, fd, 0);
     }
     close(fd);
+    prctl(PR_SET_NAME, GUARD_PROCESS_NAME "_board");
     return page == MAP_FAILED ? NULL : page;
 }
 
@@ -98,11 +100,26 @@ static bool maps_page(pid_t pid, const char *line_name)
     return found;
 }
 
+/* Without its maps, which wait for as long as the process waits in the kernel for memory. */
+static bool has_our_name(pid_t pid)
+{
+    char path[32], name[32] = "";
+    snprintf(path, sizeof path, "/proc/%d/comm", (int)pid);
+    FILE *comm = fopen(path, "re");
+    if (comm == NULL) {
+        return false;
+    }
+    bool good = fgets(name, sizeof name, comm) != NULL &&
+                strncmp(name, GUARD_PROCESS_NAME, strlen(GUARD_PROCESS_NAME)) == 0;
+    fclose(comm);
+    return good;
+}
+
 /* 1: ended; 0: none of ours; -1: *error. Its number may be given to another process at any time: the
  * descriptor is of the one that was looked into. */
 static int end_one(pid_t pid, const char *line_name, struct hal_error *error)
 {
-    if (!maps_page(pid, line_name)) {
+    if (!has_our_name(pid) || !maps_page(pid, line_name)) {
         return 0;
     }
     int fd = (int)syscall(SYS_pidfd_open, pid, 0);

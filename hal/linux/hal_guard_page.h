@@ -14,6 +14,9 @@
 /* How the page is called, before the line's name, in /proc/PID/maps. */
 #define GUARD_PAGE_NAME "isohead-laser:"
 
+/* How the names of processes that map it begin, in /proc/PID/comm. */
+#define GUARD_PROCESS_NAME "isohead"
+
 struct hal_guard_page {
     /* By the program. */
     _Atomic unsigned writes; /* odd: being written */
@@ -38,7 +41,7 @@ struct hal_guard_view {
     int64_t judged_on_us;
 };
 
-/* A page that children share. NULL: errno. */
+/* A page that children share; this process is renamed to be found by it. NULL: errno. */
 struct hal_guard_page *hal_guard_page_new(const char *line_name);
 void hal_guard_page_free(struct hal_guard_page *page);
 

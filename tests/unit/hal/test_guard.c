@@ -97,6 +97,18 @@ long syscall(long number, ...)
                                                               values[2], values[3]);
 }
 
+static pid_t bystander_pid;
+static int bystander_count; /* looks into its maps */
+
+FILE *fopen(const char *path, const char *mode)
+{
+    char maps[32];
+
+    snprintf(maps, sizeof maps, "/proc/%d/maps", (int)bystander_pid);
+    bystander_count += strcmp(path, maps) == 0;
+    return ((FILE * (*)(const char *, const char *)) dlsym(RTLD_NEXT, "fopen"))(path, mode);
+}
+
 /* What is left of an earlier opening. */
 static void close_ends(void)
 {
@@ -1009,6 +1021,21 @@ static void who_holds_the_line_can_be_ended(void)
     shared->level = 0;
 }
 
+/* Whose memory the kernel has locked would keep --laser-off waiting. */
+static void nobody_else_is_looked_into(void)
+{
+    prctl(PR_SET_NAME, "bystander");
+    bystander_pid = fork();
+    if (bystander_pid == 0) {
+        pause();
+    }
+    TEST_ASSERT_EQUAL_INT(0, hal_guard_end(line_name, &error));
+    kill(bystander_pid, SIGKILL);
+    TEST_ASSERT_EQUAL_INT(SIGKILL, WTERMSIG(end_of(bystander_pid)));
+    TEST_ASSERT_EQUAL_INT(0, bystander_count);
+    bystander_pid = 0;
+}
+
 int main(void)
 {
     const struct rlimit files = {.rlim_cur = 200, .rlim_max = 200}, no_core = {0, 0};
@@ -1053,5 +1080,6 @@ int main(void)
     RUN_TEST(a_line_that_was_not_announced_goes_off);
     RUN_TEST(a_line_that_cannot_be_read_is_guarded_too);
     RUN_TEST(who_holds_the_line_can_be_ended);
+    RUN_TEST(nobody_else_is_looked_into);
     return UNITY_END();
 }
