@@ -3,6 +3,7 @@
 #include <errno.h>
 #include <poll.h>
 #include <signal.h>
+#include <sys/mman.h>
 #include <sys/prctl.h>
 #include <sys/socket.h>
 #include <time.h>
@@ -150,6 +151,8 @@ _Noreturn void hal_guard_child(const struct hal_guard_config *config, struct hal
     hal_limits_init(&watch.limits, &config->limits, hal_guard_now_us());
     const int *interlock_fd = config->interlock_fd;
     const int keep_fds[] = {socket_fd, *config->line_fd, interlock_fd == NULL ? -1 : *interlock_fd};
+    /* Where memory is short its code would have to be read from the disk first. Without leave it goes on. */
+    mlockall(MCL_CURRENT);
     if (setsid() < 0 || !hal_descriptors_keep(keep_fds, 3) ||
         send(socket_fd, &ready, 1, MSG_NOSIGNAL) != 1) {
         _exit(GUARD_EXIT_SETUP);

@@ -37,7 +37,8 @@ struct shared {
     _Atomic int off_count;       /* settings to off */
     volatile int on_count;       /* settings to on */
     volatile pid_t guard_pid[HAL_GUARD_COUNT];
-    volatile int unreadable; /* the level */
+    volatile int unreadable;  /* the level */
+    _Atomic int locked_count; /* guards that asked for their memory to stay */
     volatile int open_fails;
     /* The guard is made to end while set(true) is under way, and held between off and its end. */
     volatile int end_while_on;
@@ -95,6 +96,14 @@ long syscall(long number, ...)
     }
     return ((long (*)(long, ...))dlsym(RTLD_NEXT, "syscall"))(number, values[0], values[1],
                                                               values[2], values[3]);
+}
+
+/* Refused, as to who has no leave. */
+int mlockall(int flags)
+{
+    shared->locked_count += flags == MCL_CURRENT;
+    errno = ENOMEM;
+    return -1;
 }
 
 static pid_t bystander_pid;
@@ -648,6 +657,13 @@ static void holds_its_descriptors(bool has_interlock)
     close(other[0]);
 }
 
+static void its_memory_stays_where_it_may(void)
+{
+    shared->locked_count = 0;
+    TEST_ASSERT_TRUE(open_it());
+    TEST_ASSERT_EQUAL_INT(HAL_GUARD_COUNT, shared->locked_count);
+}
+
 static void it_is_named_and_holds_what_it_needs(void)
 {
     holds_its_descriptors(false);
@@ -1060,6 +1076,7 @@ int main(void)
     RUN_TEST(switched_on_behind_the_guards_back_it_goes_off_again);
     RUN_TEST(a_moving_interlock_switches_off);
     RUN_TEST(it_is_named_and_holds_what_it_needs);
+    RUN_TEST(its_memory_stays_where_it_may);
     RUN_TEST(closed_the_guard_ends_and_gives_the_line_back);
     RUN_TEST(interrupted_it_goes_on_waiting);
     RUN_TEST(opened_again_the_old_guard_has_ended_first);
