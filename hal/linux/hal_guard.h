@@ -30,14 +30,15 @@
  * The children: a session of their own, so that a terminal's keys do not reach them; every signal
  *        blocked but SIGKILL, SIGSTOP and those of their own faults, for which they have inherited the
  *        handlers of hal_signals.h; no descriptor open but their end of the socket, the line and the
- *        interlock; named isohead-guard; they never write a word.
+ *        interlock; named isohead-guard; memory that is locked where that is allowed; they never write a word.
  *        They are copies of this process: memory-mapped buffers of a camera that is open while the
  *        strobe is opened stay mapped in them, and keep the device in use. Open the strobe first, or
  *        give the buffers MADV_DONTFORK.
  * The line: the kernel keeps it requested, and so driven low, until the guards have closed it as well;
  *        for what comes then see hal_gpio.h: low on most controllers, an input held by the board's
  *        pull-down on others. A program that is started anew within these milliseconds can get EBUSY.
- *        All three map a page of memory that is named after the line: hal_guard_end finds them by it.
+ *        All three map a page of memory that is named after the line: hal_guard_end finds them by it, among
+ *        processes whose names begin as ours do.
  * What it does not do: all three stopped or killed at once (a control group being killed, the machine
  *        out of memory), a kernel that stands still: for these there are the service manager's own
  *        switching off, the watchdog and the one-shot of docs/safety.md.
