@@ -141,26 +141,6 @@ def killed(unit):
     return "line low; started again by itself"
 
 
-def killed_while_it_records(unit):
-    """Program and guards by SIGKILL, with frames waiting to be written: the unit's last command does not wait for these."""
-    unit.configure(SETTINGS + "record = /var/lib/isohead\nlaser = on\n")
-    unit.start()
-    unit.wait_laser(1, SOON_S)
-    unit.command("program=; for pid in $(cat /sys/fs/cgroup/system.slice/isohead.service/cgroup.procs); do "
-                 "case $(cat /proc/$pid/comm) in isohead-record) writer=$pid ;; *) program=\"$program $pid\" ;; esac; done")
-    unit.command("kill -STOP $writer")
-    unit.board.settle(3)
-    written = unit.command("find /var/lib/isohead -name '*.pgm' | wc -l")
-    unit.command("kill -KILL $program")
-    unit.wait_laser(0, SOON_S)
-    unit.wait_for("SubState", "auto-restart", SOON_S)
-    expect("status=0" in unit.stop_post(), "the command after the end: " + unit.stop_post())
-    after = unit.command("find /var/lib/isohead -name '*.pgm' | wc -l")
-    expect(written == after and int(written) > 0, f"{written} frames were written, and {after} after the end")
-    lights(unit)
-    return f"line low; {written} frames, those that waited are lost"
-
-
 def edited(unit):
     """Rubbish where its settings were, while it runs: it still knows which line to make low."""
     unit.configure("laser-line = 7\nrubbish\n")
@@ -217,7 +197,7 @@ def refuses(unit):
     return "status 2, not tried again, the journal names the line"
 
 
-CASES = [boots_without_it, sandboxed, lights, killed, killed_while_it_records, edited, hangs, sleeps, stops, refuses]
+CASES = [boots_without_it, sandboxed, lights, killed, edited, hangs, sleeps, stops, refuses]
 
 
 def main():
