@@ -60,8 +60,9 @@ struct app_board {
 enum app_exit app_board_run(struct app_board *board, const struct app_config *config);
 
 /* Only make the laser's line low and give it back. Whoever of ours holds the line is ended for it, the
- * program that uses it and guards that stand still; others are not, which is APP_EXIT_NO_LINE, as is a line that is not there. Without chip and line that is wrong usage; but good
- * where a configuration file was read that has none and no laser. */
+ * program that uses it and guards that stand still; others are not, which is APP_EXIT_NO_LINE, as is a line that is
+ * not there. Without chip and line that is wrong usage; but good where a configuration file was read that has none and
+ * no laser. */
 enum app_exit app_board_laser_off(struct app_board *board, const struct app_config *config);
 
 #endif

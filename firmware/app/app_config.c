@@ -308,24 +308,6 @@ static void demand(struct reader *reader, bool good, const char *name, const cha
     }
 }
 
-/* The command line cannot be cut. */
-static bool may_lack(const struct reader *reader, const char *name)
-{
-    int index = app_settings_find(name);
-    return reader->config->path != NULL && reader->given[index] == NULL && reader->line[index] == 0;
-}
-
-/* Also for --laser-off: of the wrong polarity, "off" is on. */
-static void check_polarity(struct reader *reader)
-{
-    if (reader->config->laser_line != NULL && may_lack(reader, "laser-active-low")) {
-        reader->line_unsure = true;
-        demand(reader, false, "laser-line",
-               "given, but no laser-active-low, expected it too, on or off: a file that was cut "
-               "lacks it");
-    }
-}
-
 static bool same_line(const char *one, const char *other)
 {
     return one != NULL && other != NULL && strcmp(one, other) == 0;
@@ -377,11 +359,6 @@ static void check(struct reader *reader)
            "missing, expected the file with the calibration; --help lists all settings");
     demand(reader, !config->laser || config->laser_line != NULL, "laser",
            "on, but no laser-line, expected the line that switches it");
-    demand(reader,
-           !config->laser || config->laser_line == NULL || !may_lack(reader, "interlock-line"),
-           "laser",
-           "on, but no interlock-line, expected it too, a line or none: a file that was cut lacks "
-           "it");
     demand(reader, config->laser || config->strobe != APP_STROBE_ALTERNATING, "strobe",
            "alternating without laser, expected always, gated or laser on");
     demand(reader, config->record != NULL || config->record_when == APP_RECORD_ALWAYS,
@@ -403,9 +380,6 @@ bool app_config_read(struct app_config *config, int argument_count, char **argum
         read_file(&reader);
     }
     take_arguments(&reader, true);
-    if (!reader.line_unsure) {
-        check_polarity(&reader);
-    }
     if (!config->laser_off && reader.error_count == 0) {
         check(&reader);
     }

@@ -7,8 +7,7 @@
  *        the file is an error.
  * File:  '#' starts a comment at the start of a line or after a blank. Blanks around key and value
  *        do not count. At most APP_CONFIG_TEXT_MAX bytes. A file may be cut, so the last line needs its
- *        line end; laser-active-low has to be written out where there is a laser-line, and
- *        interlock-line where the laser is on.
+ *        line end.
  * Flags: `on` or `off` in the file; on the command line --laser, --laser=on or --laser=off.
  * Error: each is reported with its position, what was found and what was expected, up to
  *        APP_CONFIG_ERRORS_MAX; then what contradicts itself across settings (laser on, but no line).

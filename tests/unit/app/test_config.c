@@ -566,13 +566,6 @@ static void what_does_not_go_together_is_reported(void)
          ":5: heartbeat-line: the laser-line too, expected another line"},
         {"gpio-chip=c\nheartbeat-line=x\ninterlock-line=x\n",
          ":3: heartbeat-line: the interlock-line too, expected another line"},
-        {"gpio-chip=c\nlaser-line=3\n", ":3: laser-line: given, but no laser-active-low, expected "
-                                        "it too, on or off: a file that was "
-                                        "cut lacks it"},
-        {"gpio-chip=c\nlaser-line=3\nlaser-active-low=off\nlaser=on\n",
-         ":5: laser: on, but no interlock-line, expected it too, a line or none: a file that was "
-         "cut "
-         "lacks it"},
         {"duty = 50", ":2: the last line has no line end: the file may be cut"},
     };
     char text[200], wanted[200];
@@ -635,7 +628,6 @@ static void laser_off_knows_the_line_or_says_so(void)
         LINE "laser-active-low = off\n",
         LINE "laser-line = 4\n",
         LINE "gpio-chip = d\n",
-        "gpio-chip = c\nlaser-line = 3\n",
         "gpio-chip = c\nlaser-active-low = off\nlaser-line = 1",
     };
     int i;
@@ -837,26 +829,6 @@ static void a_cut_file_does_not_switch_the_laser_on(void)
     }
 }
 
-/* Where the laser stands first: polarity and interlock are as in the whole file. */
-static void a_cut_file_with_the_laser_first_keeps_its_lines(void)
-{
-    static const char text[] = "laser = on\nrig = r\ngpio-chip = c\nlaser-line = 17\n"
-                               "laser-active-low = on\ninterlock-line = 27\nduty = 50\n";
-    int good_count = 0;
-    size_t left;
-
-    for (left = 0; left < sizeof text; left++) {
-        write_file(text, left);
-        if (READ("--config", PATH) && config.laser) {
-            good_count++;
-            TEST_ASSERT_EQUAL_STRING("17", config.laser_line);
-            TEST_ASSERT_TRUE(config.laser_active_low);
-            TEST_ASSERT_EQUAL_STRING("27", config.interlock_line);
-        }
-    }
-    TEST_ASSERT_EQUAL_INT(2, good_count);
-}
-
 /* Whatever a file says, it is read to its end; what is accepted keeps its promises. */
 static void files_of_rubbish_do_no_harm(void)
 {
@@ -939,7 +911,6 @@ int main(void)
     RUN_TEST(the_nearest_name_is_found);
     RUN_TEST(the_installed_file_has_every_key);
     RUN_TEST(a_cut_file_does_not_switch_the_laser_on);
-    RUN_TEST(a_cut_file_with_the_laser_first_keeps_its_lines);
     RUN_TEST(files_of_rubbish_do_no_harm);
     return UNITY_END();
 }
