@@ -1,6 +1,8 @@
 """Makes sets of sequences: python3 sets.py SET OUT [--rigs ...]. Those to learn from and those to judge by share nobody."""
 
 import argparse
+import concurrent.futures
+import functools
 import os
 
 import numpy
@@ -82,22 +84,35 @@ def sequences(name, rig_kind):
     return [("%03d_%s" % (i, kind), kind, first + i, count) for i, (kind, count) in enumerate(mixed)]
 
 
+@functools.cache
+def bodies():
+    """Read once in each process, which takes seconds."""
+    return Model()
+
+
+def make_one(name, out, rig_kind, kind, seed, frames):
+    make.make(bodies(), out, rig_kind, kind, seed, frames, step=LEARN_STEP if is_learnt(name) else 1,
+              mount=mount_of(name, seed), missing=missing_of(name, seed))
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("set", choices=[*SETS, *AGAIN])
     parser.add_argument("out")
     parser.add_argument("--rigs", nargs="+", default=["paper", "wide", "range"], choices=ALL_RIGS)
+    parser.add_argument("--jobs", type=int, default=os.cpu_count())
     options = parser.parse_args()
     if missing_of(options.set, 0) and "range" in options.rigs:
         parser.error("depth images have no dots that may be missing: --rigs paper wide")
-    model = Model()
     by_rig = [[(rig_kind, *item) for item in sequences(options.set, rig_kind)] for rig_kind in options.rigs]
-    for row in zip(*by_rig):
-        for rig_kind, directory, kind, seed, frames in row:
+    with concurrent.futures.ProcessPoolExecutor(options.jobs) as pool:
+        work = []
+        for rig_kind, directory, kind, seed, frames in (item for row in zip(*by_rig) for item in row):
             out = os.path.join(options.out, rig_kind, directory)
             if not os.path.exists(os.path.join(out, "rig.json")):
-                make.make(model, out, rig_kind, kind, seed, frames, step=LEARN_STEP if is_learnt(options.set) else 1,
-                          mount=mount_of(options.set, seed), missing=missing_of(options.set, seed))
+                work.append(pool.submit(make_one, options.set, out, rig_kind, kind, seed, frames))
+        for one in work:
+            one.result()
 
 
 if __name__ == "__main__":
