@@ -61,8 +61,8 @@ def write_vectors(directory):
         if np.abs(np.abs(at).max() - REACH) < NOT_CLOSE:
             continue
         texts = ["{%s}" % ", ".join(emit.numbers(v)) for v in ints]
-        rows.append("%d, %s, %d, {%s}, {%s}, %s, %s" % (
-            wild, ", ".join(texts), near, ", ".join(emit.numbers(at, 7)),
+        rows.append("%d, %s, %d, {%s}, %s, %s" % (
+            wild, ", ".join(texts), near,
             ", ".join(emit.numbers(nearest, 7)), emit.number(radius2, 7), emit.number(entry, 4)))
     inc.struct_array("vector_crossing", "vector_crossings", rows)
     return inc.write(directory, "ellipsoid.inc")

@@ -85,7 +85,6 @@ bool ih_ellipsoid_cross(const struct ih_ellipsoid *ellipsoid, const struct ih_fr
     int64_t radius2_q28 = ee_q28 + ih_mul_shift(eg_q28, tau_q14, 14);
     radius2_q28 = radius2_q28 < 0 ? 0 : radius2_q28;
     for (int axis = 0; axis < 2; axis++) {
-        out->at_q14[axis] = (int32_t)e_q14[axis];
         out->nearest_q14[axis] = (int32_t)(e_q14[axis] + ih_mul_shift(g_q14[axis], tau_q14, 14));
         IH_IN_RANGE(ellipsoid->semi_mm_q8[axis], IH_ELLIPSOID_SEMI_MIN_MM << 8,
                     IH_ELLIPSOID_SEMI_MAX_MM << 8);

@@ -2,9 +2,9 @@
  * a head model as its next step).
  *
  * In:     centre and semi-axes (across, up, deep: along the camera's X, Y, Z), a ray.
- * Out:    everything in the ellipsoid's own units, in which it is the unit sphere: where the ray
- *         passes the centre's depth (at), its nearest point to the centre (nearest) with the square
- *         of its distance (radius2: below 1 the ray hits), and the depth where it enters.
+ * Out:    everything in the ellipsoid's own units, in which it is the unit sphere: the ray's
+ *         nearest point to the centre (nearest) with the square of its distance (radius2: below 1 the
+ *         ray hits), and the depth where it enters.
  * Method: with e = offset at the centre's depth and g = (slope_x az / ax, slope_y az / ay), the ray is
  *         (e + g tau, tau); tau = -(e.g) / (1 + g.g) is nearest, radius2 = e.e + (e.g) tau, and it
  *         enters at tau - sqrt((1 - radius2) / (1 + g.g)).
@@ -38,7 +38,6 @@ struct ih_ellipsoid {
 };
 
 struct ih_crossing {
-    int32_t at_q14[2];
     int32_t nearest_q14[3];
     int32_t radius2_q14;
     int32_t entry_mm_q8; /* Z; of a ray that passes: the depth of its nearest point */

@@ -5,6 +5,7 @@
 
 #include "base/ih_fix.h"
 #include "base/ih_range.h"
+#include "detect/ih_head_model.h"
 
 #define RANK_BITS 9
 #define RANK_SLOTS (1 << RANK_BITS) /* more than there are slots */
@@ -13,7 +14,7 @@
 void ih_scan_params_default(struct ih_scan_params *params)
 {
     *params = (struct ih_scan_params){
-        .deep_mm = 98,
+        .deep_mm = IH_HEAD_SEMI_Z_MM,
         .spacing_mm = 80,
         .candidate_max = IH_SCAN_MAX,
     };

@@ -30,6 +30,23 @@ static int32_t between(int32_t low, int32_t high, int32_t part)
     return low + (((high - low) * part + 32) >> 6);
 }
 
+/* The two blocks between whose centres a pixel lies, and its distance from the first, in 64ths. */
+struct cell {
+    int32_t before, after;
+    int32_t part;
+};
+
+static struct cell cell_of(int32_t pixel, int32_t blocks)
+{
+    const uint32_t offset = twice_offset(pixel, blocks);
+    const int32_t before = (int32_t)(offset / (2 * IH_NOISE_BLOCK));
+    return (struct cell){
+        .before = before,
+        .after = ih_min_s32(before + 1, blocks - 1),
+        .part = (int32_t)(offset % (2 * IH_NOISE_BLOCK)),
+    };
+}
+
 static bool is_any_subtracted(const struct ih_noise *noise, int32_t above, int32_t below)
 {
     uint32_t any = 0;
@@ -66,18 +83,15 @@ static void subtract_span(const uint16_t *ambient_q4, uint16_t *grey_q4, int32_t
 void ih_noise_subtract(const struct ih_noise *noise, int32_t v, int32_t width,
                        const uint16_t *ambient_q4, uint16_t *grey_q4)
 {
-    const uint32_t offset_v = twice_offset(v, noise->rows);
-    const int32_t above = (int32_t)(offset_v / (2 * IH_NOISE_BLOCK));
-    const int32_t below = ih_min_s32(above + 1, noise->rows - 1);
-    if (!is_any_subtracted(noise, above, below)) {
+    const struct cell cell = cell_of(v, noise->rows);
+    if (!is_any_subtracted(noise, cell.before, cell.after)) {
         return;
     }
     int32_t before_q12 = 0;
     int32_t first = 0;
     for (int32_t column = 0; column < noise->columns; column++) {
-        int32_t here_q12 = between(block_fraction_q12(noise, above, column),
-                                   block_fraction_q12(noise, below, column),
-                                   (int32_t)(offset_v % (2 * IH_NOISE_BLOCK)));
+        int32_t here_q12 = between(block_fraction_q12(noise, cell.before, column),
+                                   block_fraction_q12(noise, cell.after, column), cell.part);
         int32_t end = ih_min_s32(width, column * IH_NOISE_BLOCK + IH_NOISE_BLOCK / 2);
         subtract_span(ambient_q4, grey_q4, first, end, column == 0 ? here_q12 : before_q12,
                       here_q12, 1);
@@ -253,23 +267,6 @@ void ih_noise_measure(const struct ih_frame *frame, const struct ih_frame *ambie
     for (int32_t column = 0; column < out->columns; column++) {
         smooth(&out->median[0][column], out->rows, IH_NOISE_BLOCKS_X);
     }
-}
-
-/* The two blocks between whose centres a pixel lies, and its distance from the first, in 64ths. */
-struct cell {
-    int32_t before, after;
-    int32_t part;
-};
-
-static struct cell cell_of(int32_t pixel, int32_t blocks)
-{
-    const uint32_t offset = twice_offset(pixel, blocks);
-    const int32_t before = (int32_t)(offset / (2 * IH_NOISE_BLOCK));
-    return (struct cell){
-        .before = before,
-        .after = ih_min_s32(before + 1, blocks - 1),
-        .part = (int32_t)(offset % (2 * IH_NOISE_BLOCK)),
-    };
 }
 
 struct ih_noise_row ih_noise_row(const struct ih_noise *noise, int32_t v)

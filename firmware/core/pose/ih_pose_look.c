@@ -4,6 +4,7 @@
 
 #include "base/ih_fix.h"
 #include "base/ih_range.h"
+#include "detect/ih_head_model.h"
 #include "pose/ih_pose_table.h"
 
 /* Standard deviation of a dot along its line, px in Q8; of a range image's depths, mm in Q8. */
@@ -15,9 +16,6 @@
 #define FEATURE_MAX_Q5 127
 /* Dots farther apart than this show nothing of a head. */
 #define SPACING_MAX_MM_Q8 (1 << 18)
-/* Middle sizes of a head, mm. */
-#define SEMI_X_MM 78
-#define SEMI_Y_MM 113
 
 /* A grid: its cells are 2^shift mm apart; depths are counted from `offset_mm` before the centre, in units of
  * 2^unit_shift mm. */
@@ -191,8 +189,8 @@ static void add_others(const struct ih_rig *rig, const struct ih_ellipsoid *head
         feature(ih_div_round((int64_t)head->centre_mm_q8[1] * 96, plane->distance_mm_q8)),
         feature(ih_shift_round(plane->distance_mm_q8, 13) - 32),
         feature(ih_div_round(64 * sigma, sigma + 8 * 256) - 32),
-        feature(ih_shift_round(head->semi_mm_q8[0] - SEMI_X_MM * 256, 7)),
-        feature(ih_shift_round(head->semi_mm_q8[1] - SEMI_Y_MM * 256, 7)),
+        feature(ih_shift_round(head->semi_mm_q8[0] - IH_HEAD_SEMI_X_MM * 256, 7)),
+        feature(ih_shift_round(head->semi_mm_q8[1] - IH_HEAD_SEMI_Y_MM * 256, 7)),
     };
     memcpy(scratch->feature_q5[0] + first, other_q5, sizeof other_q5);
     memcpy(scratch->feature_q5[1] + first, other_q5, sizeof other_q5);

@@ -8,7 +8,7 @@ struct vector_crossing {
     bool is_wild; /* slopes up to 4 and any semi-axes; else a head and slopes up to 0.5 */
     int32_t centre_mm_q8[3], semi_mm_q8[3], origin_mm_q8[3], slope_q20[2];
     bool in_reach;
-    double at[2], nearest[3], radius2, entry_mm;
+    double nearest[3], radius2, entry_mm;
 };
 
 #include "ellipsoid.inc"
@@ -67,10 +67,6 @@ static void crossings_match_float64(void)
         if (!v->in_reach) {
             continue;
         }
-        for (axis = 0; axis < 2; axis++) {
-            IH_TEST_WITHIN(0x1p-13, v->at[axis], ih_test_from_q(crossing.at_q14[axis], 14), "at",
-                           i);
-        }
         for (axis = 0; axis < 3; axis++) {
             IH_TEST_WITHIN(place, v->nearest[axis], ih_test_from_q(crossing.nearest_q14[axis], 14),
                            "nearest", i);
@@ -96,7 +92,6 @@ static void a_ball_straight_ahead(void)
         const double depth = x > -100 && x < 100 ? 1000 - sqrt(10000.0 - x * x) : 1000;
 
         TEST_ASSERT_TRUE(ih_test_cross(&at, zero, &ray, &crossing));
-        IH_TEST_WITHIN(1e-4, -x / 100.0, ih_test_from_q(crossing.at_q14[0], 14), "at", x);
         IH_TEST_WITHIN(1e-4, -x / 100.0, ih_test_from_q(crossing.nearest_q14[0], 14), "near", x);
         IH_TEST_EQUAL(0, crossing.nearest_q14[1], "up", x);
         IH_TEST_EQUAL(0, crossing.nearest_q14[2], "deep", x);
@@ -141,7 +136,6 @@ static void a_mirror_changes_the_sign_alone(void)
         mirrored.centre_mm_q8[0] = -at.centre_mm_q8[0];
         TEST_ASSERT_TRUE(ih_test_cross(&at, zero, &ray, &a));
         TEST_ASSERT_TRUE(ih_test_cross(&mirrored, zero, &back, &b));
-        IH_TEST_RANGE(-3, 3, a.at_q14[0] + b.at_q14[0], "at", i);
         IH_TEST_RANGE(-3, 3, a.nearest_q14[0] + b.nearest_q14[0], "nearest", i);
         IH_TEST_RANGE(-3, 3, a.nearest_q14[2] - b.nearest_q14[2], "deep", i);
         IH_TEST_RANGE(-8, 8, a.radius2_q14 - b.radius2_q14, "radius2", i);
@@ -213,7 +207,6 @@ static void the_extremes_do_not_overflow(void)
         }
         hits += crossing.radius2_q14 < 1 << 14;
         for (axis = 0; axis < 2; axis++) {
-            IH_TEST_RANGE(-(8 << 14), 8 << 14, crossing.at_q14[axis], "at", i);
             IH_TEST_RANGE(-(12 << 14), 12 << 14, crossing.nearest_q14[axis], "nearest", i);
         }
         /* |tau| <= |e| |g| / (1 + g^2) <= |e| / 2. */
