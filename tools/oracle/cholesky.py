@@ -4,7 +4,6 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 import emit
-import surface
 from rig import to_q, from_q
 
 DIAGONAL = 0.99
@@ -18,7 +17,7 @@ def packed(matrix):
 
 
 def scaled(matrix):
-    """Diagonal 0.99, as the surface scales it, and rounded to Q30."""
+    """Diagonal 0.99 and rounded to Q30."""
     scale = np.sqrt(DIAGONAL / np.diag(matrix))
     return to_q(matrix * scale[:, None] * scale, 30)
 
@@ -30,22 +29,14 @@ def random_matrix(random, n, condition):
     return scaled(basis * values @ basis.T)
 
 
-def surface_matrix(random, ridge):
-    """The normal equations of 300 dots on a 12x12 multiquadric basis."""
-    positions = random.uniform(-18, 18, (300, 2))
-    rows = surface.basis(positions)
-    normal = rows.T @ rows
-    return scaled(normal + ridge * np.diag(np.diag(normal)))
-
-
 def write_vectors(directory):
     random = np.random.default_rng(31)
     systems = [("one", random_matrix(random, 1, 1)),
                ("two", random_matrix(random, 2, 10)),
-               ("easy", random_matrix(random, 24, 10)),
-               ("usual", random_matrix(random, 40, 1e3)),
-               ("hard", random_matrix(random, 40, 1e5)),
-               ("surface", surface_matrix(random, 1e-5))]
+               ("easy", random_matrix(random, 5, 10)),
+               ("usual", random_matrix(random, 6, 1e3)),
+               ("hard", random_matrix(random, 6, 1e5)),
+               ("extreme", random_matrix(random, 6, 1e7))]
     inc = emit.Inc("Positive definite systems, their factors and solutions in float64.")
     rows = []
     for name, matrix_q30 in systems:

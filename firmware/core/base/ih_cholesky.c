@@ -6,8 +6,7 @@
 #include "base/ih_fix.h"
 #include "base/ih_range.h"
 
-/* Mantissas of a solution stay below this: 144 products with |L| <= 1 in Q30 then sum below
- * 2^(25 + 30 + 7.2) < 2^63. */
+/* Mantissas of a solution stay below this: six products with |L| <= 1 in Q30 then sum below 2^(25 + 30 + 2.6). */
 #define MANTISSA_BITS 25
 
 static const int32_t *row_of(const int32_t *l_q30, int32_t i)

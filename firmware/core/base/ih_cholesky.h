@@ -19,8 +19,8 @@
 #include "base/ih_config.h"
 #include "base/ih_types.h"
 
-/* Largest system. The packed triangle costs n (n + 1) / 2 * 4 bytes: 41,760 for 144. */
-#define IH_CHOLESKY_MAX 144
+/* Largest system: six unknowns of a head that is fitted. */
+#define IH_CHOLESKY_MAX 6
 #define IH_CHOLESKY_PACKED(n) ((n) * ((n) + 1) / 2)
 
 IH_BEGIN_DECLS
@@ -30,7 +30,7 @@ enum ih_err ih_cholesky_factor(int32_t *a_q30, int32_t n, int32_t *bad_pivot)
     __attribute__((warn_unused_result));
 
 /* Solve L L^T x = b. b: any common scale, |b_i| <= 2^31 - 1, and so small that |L^-1 b| stays
- * within int32 (see ih_surface; else it is saturated). x: mantissas below 2^25 with
+ * within int32; else it is saturated. x: mantissas below 2^25 with
  * x_i = mantissa_i * 2^exponent in b's unit, exponent >= 0 as small as that allows. b and x may be
  * the same array. */
 void ih_cholesky_solve(const int32_t *l_q30, int32_t n, const int32_t *b, int32_t *x_mantissa,

@@ -181,7 +181,7 @@ static void make_matrix(int32_t n, int32_t columns, int32_t ridge_q30)
 
 static void any_positive_matrix_has_its_factor(void)
 {
-    static const int32_t sizes[] = {1, 2, 3, 5, 12, 37, 100, 143, IH_CHOLESKY_MAX};
+    static const int32_t sizes[] = {1, 2, 3, 4, 5, IH_CHOLESKY_MAX};
     int i, j;
 
     for (i = 0; i < IH_TEST_COUNT(sizes); i++) {
@@ -222,12 +222,12 @@ static void a_diagonal_matrix_is_its_roots(void)
         for (j = 0; j <= i; j++) {
             IH_TEST_EQUAL(i == j ? 1 << 29 : 0, at(factor, i, j), "quarter", i);
         }
-        right[i] = 1000 * (i - 70);
+        right[i] = 1000 * (i - 3);
     }
     ih_cholesky_solve(factor, n, right, mantissa, &exponent);
     IH_TEST_EQUAL(0, exponent, "exponent", 0);
     for (i = 0; i < n; i++) {
-        IH_TEST_EQUAL(4000 * (i - 70), mantissa[i], "x", i);
+        IH_TEST_EQUAL(4000 * (i - 3), mantissa[i], "x", i);
     }
 }
 
@@ -312,24 +312,25 @@ static void the_bad_pivot_is_reported(void)
 /* Two equal rows: the second pivot is exactly zero. An indefinite pair: it is negative. */
 static void dependent_rows_are_found(void)
 {
+    const int32_t n = IH_CHOLESKY_MAX;
     int32_t k;
 
-    for (k = 0; k + 1 < 20; k++) {
+    for (k = 0; k + 1 < n; k++) {
         const int32_t below = (k + 1) * (k + 2) / 2 + k;
 
-        set_diagonal(20, DIAGONAL_Q30);
+        set_diagonal(n, DIAGONAL_Q30);
         matrix[below] = DIAGONAL_Q30; /* has no exact root: only rounding is left of the pivot */
-        expect_not_positive(20, k + 1, "equal rows of 0.99");
-        set_diagonal(20, 1 << 28);
+        expect_not_positive(n, k + 1, "equal rows of 0.99");
+        set_diagonal(n, 1 << 28);
         matrix[below] = 1 << 28;
-        expect_not_positive(20, k + 1, "equal rows");
+        expect_not_positive(n, k + 1, "equal rows");
         matrix[below] = (1 << 28) + 1000;
-        expect_not_positive(20, k + 1, "indefinite");
+        expect_not_positive(n, k + 1, "indefinite");
         matrix[below] = -(1 << 28) - 1000;
-        expect_not_positive(20, k + 1, "indefinite, negative");
+        expect_not_positive(n, k + 1, "indefinite, negative");
         matrix[below] = (1 << 28) - 1000;
         memcpy(factor, matrix, sizeof matrix);
-        TEST_ASSERT_EQUAL_INT(IH_OK, ih_cholesky_factor(factor, 20, &bad_pivot));
+        TEST_ASSERT_EQUAL_INT(IH_OK, ih_cholesky_factor(factor, n, &bad_pivot));
     }
 }
 
