@@ -106,7 +106,8 @@ static int compare_names(const void *left, const void *right)
     return strcmp(*(const char *const *)left, *(const char *const *)right);
 }
 
-/* The fields of one object alone; they are sorted, as there may be very many. of: the object's name and a point, or "". */
+/* The fields of one object alone; they are sorted, as there may be very many. of, point: the object's name and a
+ * point, or "". */
 static bool is_unique(const cJSON *object, const char *of, const char *point,
                       struct hal_error *error)
 {

@@ -128,7 +128,7 @@ static char **find_children(const char *path, DIR *stream, bool with_rig, size_t
     *count = 0;
     const char *name = NULL;
     while ((name = next_name(stream)) != NULL) {
-        if (name[0] == '.') {
+        if (name[0] == '.' || strcmp(name, "lost+found") == 0) {
             continue;
         }
         char *candidate = join(path, name);

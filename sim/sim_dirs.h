@@ -1,9 +1,9 @@
 /* sim_dirs - which frames directories the command line means.
  *
  * A DIR with a rig.json is one itself; any other stands for those of its subdirectories that have
- * one or cannot be looked into, in byte order of their names, hidden ones left out. With --rig frames do in place of a
- * rig.json. A DIR that is neither, or cannot be read to its end, is an error in
- * the report.
+ * one or cannot be looked into, in byte order of their names, hidden ones and a disk's lost+found left
+ * out. With --rig frames do in place of a rig.json. A DIR that is neither, or cannot be read to its end,
+ * is an error in the report.
  */
 #ifndef SIM_DIRS_H
 #define SIM_DIRS_H

@@ -1,8 +1,8 @@
 /* sim_trace - every stage's results of one frame as a JSON file, raw integers.
  *
  * File:  OUT/LABEL/FRAME.json, LABEL the last part of the frames directory's path, FRAME the
- *        frame's name without its suffix, if no other frame shares that. Folders are made as needed; files are overwritten, so that
- *        OUT/LABEL must not be a frames directory.
+ *        frame's name without its suffix, if no other frame shares that. Folders are made as needed;
+ *        files are overwritten, so that OUT/LABEL must not be a frames directory.
  * Keys:  the names of the core's struct members with unit and format; a key per stage.
  * Error: what could not be made or written, and why.
  */

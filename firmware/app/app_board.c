@@ -265,7 +265,9 @@ static enum app_exit run_loop(struct app_board *board, const struct app_config *
         .camera_fd = config->is_directory ? &board->directory.fd : &board->v4l2.fd,
         .interlock_fd = &board->gpio.interlock_fd,
         .signal_fd = &board->signals.fd,
-        .has_terminal = isatty(STDIN_FILENO) == 1 || isatty(STDERR_FILENO) == 1,
+        .terminal_fd = isatty(STDIN_FILENO) == 1    ? STDIN_FILENO
+                       : isatty(STDERR_FILENO) == 1 ? STDERR_FILENO
+                                                    : -1,
     };
     hal_events_init(&board->events, &events);
     board->state.config = config;

@@ -94,7 +94,9 @@ void app_rig_explain(const struct ih_calibration *calibration, enum ih_err err, 
             explain_ray(c, bad_slot, error);
             break;
         }
-        (void)hal_fail(error, "dot_rays: %s", ih_err_text(err));
+        (void)hal_fail(error,
+                       "dot_rays: dots closer than 2 mrad, or out of view with this up, expected a "
+                       "19x19 pattern");
         break;
     case IH_ERR_UP:
         explain_up(c, error);

@@ -131,9 +131,8 @@ enum ih_err isohead_frame(struct isohead *head, const struct ih_frame *frame,
  * head->dots and head->labels, leaves all other outputs empty and the tracks as they were; a range
  * rig is IH_ERR_KIND. It may be called again, with an ambient frame this time. Labels move the rig's
  * lines: before a second call, and after a frame that is not used, put back what head->rig and
- * head->align were before. isohead_find goes on
- * from there, once per frame that is used; without a dot rig it does nothing, and after isohead_init
- * or a refused frame it finds what is in an empty one. */
+ * head->align were before. isohead_find goes on from there, once per frame that is used; without a dot
+ * rig it does nothing, and after isohead_init or a refused frame it finds what is in an empty one. */
 enum ih_err isohead_label(struct isohead *head, const struct ih_frame *frame,
                           const struct ih_frame *ambient) __attribute__((warn_unused_result));
 void isohead_find(struct isohead *head, int64_t time_us);

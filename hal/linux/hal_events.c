@@ -13,7 +13,8 @@ static unsigned event_of(const struct hal_events_config *config, uint32_t signal
 {
     switch (signal) {
     case SIGHUP:
-        return config->has_terminal ? HAL_EVENT_STOP : HAL_EVENT_RELOAD;
+        return config->terminal_fd >= 0 && isatty(config->terminal_fd) != 1 ? HAL_EVENT_STOP
+                                                                            : HAL_EVENT_RELOAD;
     case SIGUSR1:
         return HAL_EVENT_RECORD;
     default:

@@ -9,7 +9,8 @@
  * Interlock: readable or in an error state: HAL_EVENT_INTERLOCK, until interlock() was asked. It fails
  *            on a line in an error state; the program closes the strobe, and the descriptor is -1.
  * Signals:   read here: SIGTERM and SIGINT are HAL_EVENT_STOP, SIGHUP is HAL_EVENT_RELOAD, SIGUSR1 HAL_EVENT_RECORD, once for
- *            any number of them. With a terminal SIGHUP says that it is gone, and with it whoever looked: HAL_EVENT_STOP.
+ *            any number of them. Where the terminal is gone, and with it whoever looked, SIGHUP is
+ *            HAL_EVENT_STOP.
  * Error:     what the system says of waiting or of the signals' descriptor. Not to be gone on with.
  */
 #ifndef HAL_EVENTS_H
@@ -22,7 +23,7 @@ struct hal_events_config {
     const int *camera_fd;
     const int *interlock_fd;
     const int *signal_fd;
-    bool has_terminal; /* at the start, for input or messages */
+    int terminal_fd; /* the terminal of the start, for input or messages; -1: there was none */
 };
 
 struct hal_event_source {

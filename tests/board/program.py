@@ -172,7 +172,7 @@ def check_terminal():
                           text=True, start_new_session=True,
                           preexec_fn=lambda: fcntl.ioctl(0, termios.TIOCSCTTY, 0)) as process:
         os.close(slave)
-        while "trying again" not in process.stderr.readline():
+        while (line := process.stderr.readline()) and "trying again" not in line:
             pass
         os.close(master)
         process.communicate(timeout=SOON_S)
@@ -372,8 +372,8 @@ def check_modes():
 def main():
     with ThreadPoolExecutor(1) as beside:
         dark = beside.submit(check_dark)  # it waits for most of its time
-        for part in (check_usage, check_outputs, check_laser, check_ends, check_terminal, check_check, check_directory, check_answers, check_record, check_up,
-                     check_modes):
+        for part in (check_usage, check_outputs, check_laser, check_ends, check_terminal, check_check, check_directory,
+                     check_answers, check_record, check_up, check_modes):
             part()
         dark.result()
     print(f"isohead_board without a board: {len(failures)} failures")

@@ -14,6 +14,10 @@ if ! grep -q 'set -- --config /run/isohead.conf;' tools/image/root/usr/lib/isohe
     echo "image_run: the firmware is not started with the settings that --laser-off goes by" >&2
     exit 1
 fi
+if ! grep -qx '    line_before' tools/image/root/usr/lib/isohead/run; then
+    echo "image_run: nobody looks for the line before the firmware is started" >&2
+    exit 1
+fi
 say() { :; }
 # By another file than that of the settings that the firmware was started with it says "wrong".
 isohead_board() { [ "$2" = "$work/conf" ] && echo off >>"$work/calls" || echo wrong >>"$work/calls"; return "$off_status"; }
@@ -23,8 +27,8 @@ sleep() { :; }
 . "$work/laser_off"
 
 failed=0
-# expect CALLS FED STATUS OFF_STATUS [BEFORE]: after the firmware's STATUS, where --laser-off ends with OFF_STATUS, and before its
-# start with BEFORE, 0 if not given
+# expect CALLS FED STATUS OFF_STATUS [BEFORE]: after the firmware's STATUS, where --laser-off ends with OFF_STATUS,
+# and before its start with BEFORE, 0 if not given
 expect() {
     : >"$dog"
     off_status=${5:-0}
@@ -52,5 +56,6 @@ expect "off " 0 1 3 3 # the wrong line in the settings
 expect "off " 0 0 3 3
 expect "off reset " 1 1 3 0 # the line was there, and is no more
 expect "off reset " 1 1 1 3
-echo "image_run: 11 ends of the firmware, $failed wrong"
+expect "off reset " 1 137 3 3 # killed: it may have found the line meanwhile
+echo "image_run: 12 ends of the firmware, $failed wrong"
 exit $failed

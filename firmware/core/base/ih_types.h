@@ -17,7 +17,7 @@ enum ih_err {
     IH_ERR_DISTORTION = -4,   /* distortion that cannot be undone everywhere in the frame */
     IH_ERR_RANGE = -5,        /* near and far out of order or out of bounds */
     IH_ERR_BASELINE = -6,     /* projector origin on the camera's centre, or too far away */
-    IH_ERR_RAY = -7,          /* a dot ray that is not a unit vector or does not point forward */
+    IH_ERR_RAY = -7,          /* a dot ray that is no unit vector or not forward; dots too close */
     IH_ERR_KIND = -8,         /* a range frame for a dot rig, or the other way round */
     IH_ERR_NOT_POSITIVE = -9, /* Cholesky met a pivot that is not positive */
     /* A rig as bytes (ih_rig_blob.h). */

@@ -32,6 +32,8 @@ static void add_priors(struct ih_fit_equations *equations, const struct ih_fit *
     }
 }
 
+_Static_assert(IH_FIT_UNKNOWNS <= IH_CHOLESKY_MAX, "the solver has room for all of them");
+
 /* Solve for the step, mm and hundredths of ln in Q16. */
 static void solve(const struct ih_fit_equations *equations, int32_t step_q16[IH_FIT_UNKNOWNS])
 {

@@ -16,7 +16,7 @@
  *           is missing; the exposure only while hardly any is lost.
  *        4. Strong dots above strong_grey, weak ones high enough: less duty, at its limit less
  *           exposure, by half of what is too much.
- *        A step is at least 0.8 and at most 1.25. Between raising and lowering there is a
+ *        A step is at least 0.8 and at most 1.25, or one more where that is greater. Between raising and lowering there is a
  *        gap (an eighth of either aim), and a raise that loses dots is not tried again at once:
  *        in a still scene the values come to rest.
  * Cost:  361 slots, and each block of the dots' bright areas: 16,000 of 1280x800 pixels.

@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include "ih_test.h"
+#include "../app/app_terminal.h"
 #include "linux/hal_clock.h"
 #include "linux/hal_events.h"
 
@@ -16,8 +17,10 @@ static struct hal_error error;
 
 void setUp(void)
 {
-    const struct hal_events_config config = {
-        .camera_fd = &camera_fd, .interlock_fd = &interlock_fd, .signal_fd = &signal_fd};
+    const struct hal_events_config config = {.camera_fd = &camera_fd,
+                                             .interlock_fd = &interlock_fd,
+                                             .signal_fd = &signal_fd,
+                                             .terminal_fd = -1};
     sigset_t set;
 
     sigemptyset(&set);
@@ -105,11 +108,20 @@ static void each_thing_is_its_event(void)
     TEST_ASSERT_EQUAL_UINT(0, wait_us(0));
 }
 
+/* SIGHUP of a terminal that is there is somebody's request; of one that is gone it says so. */
 static void a_lost_terminal_stops(void)
 {
-    source.config.has_terminal = true;
+    int master = terminal_open();
+    int terminal = open(ptsname(master), O_RDWR | O_NOCTTY);
+
+    TEST_ASSERT_GREATER_OR_EQUAL_INT(0, terminal);
+    source.config.terminal_fd = terminal;
+    kill(getpid(), SIGHUP);
+    TEST_ASSERT_EQUAL_UINT(HAL_EVENT_RELOAD, wait_us(0));
+    close(master);
     kill(getpid(), SIGHUP);
     TEST_ASSERT_EQUAL_UINT(HAL_EVENT_STOP, wait_us(0));
+    close(terminal);
 }
 
 static void all_at_once_are_reported_at_once(void)

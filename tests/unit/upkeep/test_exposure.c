@@ -230,7 +230,6 @@ static void a_small_duty_grows_by_one(void)
     TEST_ASSERT_GREATER_THAN_INT32(2000, state.exposure_us);
 }
 
-/* Fewer than 24 labels say nothing about how high dots are. */
 /* Once the duty is at its limit: 1 us times 1.25 would be 1 us again. */
 static void a_small_exposure_grows_by_one(void)
 {
@@ -248,6 +247,7 @@ static void a_small_exposure_grows_by_one(void)
     }
 }
 
+/* Fewer than 24 labels say nothing about how high dots are. */
 static void twenty_four_labels_say_something(void)
 {
     const int32_t weak_aim = params.weak_grey_q4 * IH_BANDPASS_UNIT / 16;
