@@ -9,7 +9,7 @@
 
 #define WIDTH 320
 #define HEIGHT 240
-/* Words: 2.4 kB of the core, and what the calls above it and the interrupts need. */
+/* Words: 2.3 kB of the core, and what the calls above it and the interrupts need. */
 #define STACK_WORDS 1024
 /* As laser-cap in docs/safety.md. */
 #define LASER_CAP_MS 200
