@@ -372,6 +372,16 @@ field dot_rays "$(matrix 361 3 "$(rays 360 0 0 -1)")" 'dot_rays\[360\]: \(0, 0, 
 field dot_rays "$(matrix 361 3 "$(rays 5 1 0 0)")" 'dot_rays\[5\]: \(1, 0, 0\)'
 field dot_rays "$(matrix 361 3 "$(rays 5 7 0 0)")" 'dot_rays\[5\] x: 7, expected less than 2'
 field dot_rays "$(matrix 361 3 "$(rays 5 0 1e999 0)")" 'dot_rays\[5\]\[1\]: inf'
+# A pattern of half a degree: dots 0.5 mrad apart.
+narrow=$(awk 'BEGIN {
+    for (i = 0; i < 361; i++) {
+        x = (i % 19 - 9) * 5e-4
+        y = (int(i / 19) - 9) * 5e-4
+        length_ = sqrt(x * x + y * y + 1)
+        printf "%s%.12f,%.12f,%.12f", i ? "," : "", x / length_, y / length_, 1 / length_
+    }
+}')
+field dot_rays "$(matrix 361 3 "$narrow")" 'dot_rays: dots closer than 2 mrad'
 
 field near_mm 3000 'near_mm, far_mm: 3000 and 2600, expected'
 field near_mm 2600 'near_mm, far_mm: 2600 and 2600, expected'
@@ -751,6 +761,10 @@ check 'directory: a broken rig beside a good one' 1 2 1 'many/one/rig\.json: .*n
 rm -rf many/one/rig.json
 run --json many
 check 'directory: one without a rig is passed over' 1 2 1 'many/two/a\.pgm: '
+mkdir many/lost+found && echo broken >many/lost+found/rig.json
+run --json many
+check 'directory: that of a file system is passed over' 1 2 1 'many/two/a\.pgm: '
+rm -r many/lost+found
 if [ "$(id -u)" -ne 0 ]; then # root may read everything
     cp -R base many/shut && chmod 000 many/shut
     run --json many
