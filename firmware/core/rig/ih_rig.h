@@ -95,8 +95,8 @@ struct ih_rig_motion {
     int32_t shift_px_q12[2];
 };
 
-/* The lines where they are now; ray_q30: of the rig's file. A line that would leave the bounds of a rig stays. Dots are to
- * be put where the file's camera would see them (ih_dot_rows). */
+/* The lines where they are now; ray_q30: of the rig's file. A line that would leave the bounds of a rig stays, and so does
+ * the field of a pattern that would. Dots are to be put where the file's camera would see them (ih_dot_rows). */
 void ih_rig_move(struct ih_rig *rig, const int32_t ray_q30[IH_SLOTS][3],
                  const struct ih_rig_motion *motion);
 
