@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """Learn the score (ih_score_weights.h and ih_surroundings_map.h of firmware/core/detect) from rendered scenes.
 
-learn.py --render PROGRAM --host-sim PROGRAM --work DIR [--seeds A-B] [--depth-seeds A-B] [--people DIR...] [--out DIR] [--also DIR...]
+learn.py --render PROGRAM --host-sim PROGRAM --work DIR [--seeds A-B] [--depth-seeds A-B] [--clutter-seeds A-B]
+    [--people DIR...] [--out DIR] [--also DIR...]
 
 Renders every scene of scenes.py for every seed into DIR (those already there are kept), runs the firmware over them and
 over the frames of people that tools/people has made, and learns the maps of the surroundings (ray_map.py); then a
@@ -37,6 +38,8 @@ FAR_MM = 2900
 FRAME_WEIGHT, SEQUENCE_WEIGHT = 2.0, 6.0
 # Of a detection in a view that ends nearer, against the one in the whole view.
 ENDING_WEIGHT = 0.5
+# Log-odds: things that look like heads are as many as they are to be known, not because a camera sees so many.
+PRIOR = 0.44
 
 
 def label(frame):
@@ -79,9 +82,11 @@ class Score:
     """The maps, then curves and trees, of which the last kinds are the maps'."""
 
     def __init__(self, evidence, place, weight_q12, labels, weights):
+        labels = ray_map.taught(evidence[:, :-ray_map.MAPS], place, weight_q12, labels, weights)
         self.maps = ray_map.fit(evidence[:, :-ray_map.MAPS], place, weight_q12, labels, weights)
         known = self.with_maps(evidence, place, weight_q12)
         self.curves = trees.add_trees(model.fit(known, labels, weights), known, labels, weights)
+        self.curves.bias_q10 += round(PRIOR * 1024)
 
     def with_maps(self, evidence, place, weight_q12):
         return numpy.concatenate([evidence[:, :-ray_map.MAPS], ray_map.answers(self.maps, place, weight_q12)], axis=1)
@@ -120,6 +125,7 @@ def parse():
     parser.add_argument("--work", required=True)
     parser.add_argument("--seeds", default="5001-5020", help="learnt from (default 5001-5020)")
     parser.add_argument("--depth-seeds", default="5001-5060", help="the same of depth images (default 5001-5060)")
+    parser.add_argument("--clutter-seeds", default="20001-22400", help="of things that look like heads alone (default 20001-22400)")
     parser.add_argument("--check-seeds", default="6001-6006",
                         help="reported on, not learnt from (default 6001-6006)")
     parser.add_argument("--people", nargs="*", default=[], help="folders of frames directories of tools/people to learn from")
@@ -141,9 +147,10 @@ def rendered(arguments, seeds, scenes_of_seed):
     return made
 
 
-def directories_of(arguments, seeds, depth_seeds):
+def directories_of(arguments, seeds, depth_seeds, clutter_seeds):
     return (rendered(arguments, seeds, scenes.scenes_of_seed)
-            + rendered(arguments, depth_seeds, scenes.depth_scenes_of_seed))
+            + rendered(arguments, depth_seeds, scenes.depth_scenes_of_seed)
+            + rendered(arguments, clutter_seeds, scenes.clutter_of_seed))
 
 
 def main():
@@ -155,17 +162,18 @@ def main():
 
     people = sorted(os.path.dirname(path) for folder in arguments.people
                     for path in glob.glob(os.path.join(folder, "**", "rig.json"), recursive=True))
-    seen = see(directories_of(arguments, arguments.seeds, arguments.depth_seeds) + people)
+    seen = see(directories_of(arguments, arguments.seeds, arguments.depth_seeds, arguments.clutter_seeds) + people)
     kinds = seen[0]["kinds"]
     rows = gather(seen, set(people))
     print("%d frames, %d detections, %d heads" % (len(seen), len(rows[3]), rows[3].sum()))
     learnt = Score(*and_in_ending_views(*rows))
-    command = "tools/learn/learn.py --seeds %s --depth-seeds %s --people %s" % (
-        arguments.seeds, arguments.depth_seeds, " ".join(os.path.basename(os.path.normpath(folder)) for folder in arguments.people))
+    command = "tools/learn/learn.py --seeds %s --depth-seeds %s --clutter-seeds %s --people %s" % (
+        arguments.seeds, arguments.depth_seeds, arguments.clutter_seeds,
+        " ".join(os.path.basename(os.path.normpath(folder)) for folder in arguments.people))
     model.write(os.path.join(arguments.out, "ih_score_weights.h"), learnt.curves, kinds, command)
     ray_map.write(os.path.join(arguments.out, "ih_surroundings_map.h"), learnt.maps, command)
     report(learnt, seen, arguments.limit)
-    report(learnt, see(directories_of(arguments, arguments.check_seeds, arguments.check_seeds)), arguments.limit)
+    report(learnt, see(directories_of(arguments, *3 * [arguments.check_seeds])), arguments.limit)
     if arguments.also:
         report(learnt, see(arguments.also), arguments.limit)
 

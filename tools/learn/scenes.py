@@ -9,6 +9,7 @@ BACKGROUNDS = ("varied", "none", "far", "near")
 AMBIENTS = ("varied", "normal", "bright", "dim", "varied", "sunlight")
 PERSONS = ("varied", "child", "hat", "mask", "beard", "long-hair", "bald", "glasses", "headphones")
 ACTS = ("phone", "face", "back", "none")
+CLUTTER_RIGS = ("paper", "wide", "range")
 AWAY_MM = (0, 300, 700, 1200, 2000)
 
 
@@ -73,3 +74,9 @@ def depth_scenes_of_seed(seed):
     return [("depth-" + name, ["--rig", "range", "--scene", kind, "--frames", str(frames),
                                "--away", str(AWAY_MM[(3 * seed + number) % len(AWAY_MM)]), *more])
             for number, (name, kind, frames, *more) in enumerate(scenes)]
+
+
+def clutter_of_seed(seed):
+    """One more arrangement of things that look like heads: of these there cannot be enough, and two frames show one."""
+    rig = CLUTTER_RIGS[seed % len(CLUTTER_RIGS)]
+    return [("clutter-" + rig, ["--rig", rig, "--scene", "clutter", "--frames", "2"])]
