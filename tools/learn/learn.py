@@ -82,7 +82,6 @@ class Score:
     """The maps, then curves and trees, of which the last kinds are the maps'."""
 
     def __init__(self, evidence, place, weight_q12, labels, weights):
-        labels = ray_map.taught(evidence[:, :-ray_map.MAPS], place, weight_q12, labels, weights)
         self.maps = ray_map.fit(evidence[:, :-ray_map.MAPS], place, weight_q12, labels, weights)
         known = self.with_maps(evidence, place, weight_q12)
         self.curves = trees.add_trees(model.fit(known, labels, weights), known, labels, weights)
