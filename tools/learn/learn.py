@@ -38,7 +38,7 @@ FAR_MM = 2900
 FRAME_WEIGHT, SEQUENCE_WEIGHT = 2.0, 6.0
 # Of a detection in a view that ends nearer, against the one in the whole view.
 ENDING_WEIGHT = 0.5
-# Log-odds: things that look like heads are as many as they are to be known, not because a camera sees so many.
+# Log-odds that are added to every score: far more clutter is learnt from than cameras see.
 PRIOR = 0.44
 
 
@@ -124,7 +124,7 @@ def parse():
     parser.add_argument("--work", required=True)
     parser.add_argument("--seeds", default="5001-5020", help="learnt from (default 5001-5020)")
     parser.add_argument("--depth-seeds", default="5001-5060", help="the same of depth images (default 5001-5060)")
-    parser.add_argument("--clutter-seeds", default="20001-22400", help="of things that look like heads alone (default 20001-22400)")
+    parser.add_argument("--clutter-seeds", default="20001-22400", help="arrangements of things that look like heads (default 20001-22400)")
     parser.add_argument("--check-seeds", default="6001-6006",
                         help="reported on, not learnt from (default 6001-6006)")
     parser.add_argument("--people", nargs="*", default=[], help="folders of frames directories of tools/people to learn from")
@@ -172,7 +172,8 @@ def main():
     model.write(os.path.join(arguments.out, "ih_score_weights.h"), learnt.curves, kinds, command)
     ray_map.write(os.path.join(arguments.out, "ih_surroundings_map.h"), learnt.maps, command)
     report(learnt, seen, arguments.limit)
-    report(learnt, see(directories_of(arguments, *3 * [arguments.check_seeds])), arguments.limit)
+    check = arguments.check_seeds
+    report(learnt, see(directories_of(arguments, check, check, check)), arguments.limit)
     if arguments.also:
         report(learnt, see(arguments.also), arguments.limit)
 

@@ -9,7 +9,6 @@ BACKGROUNDS = ("varied", "none", "far", "near")
 AMBIENTS = ("varied", "normal", "bright", "dim", "varied", "sunlight")
 PERSONS = ("varied", "child", "hat", "mask", "beard", "long-hair", "bald", "glasses", "headphones")
 ACTS = ("phone", "face", "back", "none")
-CLUTTER_RIGS = ("paper", "wide", "range")
 AWAY_MM = (0, 300, 700, 1200, 2000)
 
 
@@ -77,6 +76,7 @@ def depth_scenes_of_seed(seed):
 
 
 def clutter_of_seed(seed):
-    """One more arrangement of things that look like heads: of these there cannot be enough, and two frames show one."""
-    rig = CLUTTER_RIGS[seed % len(CLUTTER_RIGS)]
+    """One more arrangement of things that look like heads: two frames show it, and there are many."""
+    rigs = (*RIGS, "range")
+    rig = rigs[seed % len(rigs)]
     return [("clutter-" + rig, ["--rig", rig, "--scene", "clutter", "--frames", "2"])]
