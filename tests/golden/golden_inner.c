@@ -84,14 +84,16 @@ static void hash_start(struct isohead *head, const int32_t centre_mm_q8[3],
                        uint64_t hash[GOLDEN_INNERS])
 {
     const struct ih_rays *rays = &head->scratch.detections.rays;
-    struct ih_ellipsoid start = ih_ellipsoid_mean(centre_mm_q8), fitted;
+    const struct ih_fit_params *params = &head->params.detections.fit;
+    const struct ih_ellipsoid start = ih_ellipsoid_mean(centre_mm_q8);
+    struct ih_fit fit;
     struct ih_evidence evidence;
     struct ih_score score;
-    ih_fit_ellipsoid(rays, &head->params.detections.fit, &start, &head->scratch.detections.fit,
-                     &fitted);
-    ih_evidence_collect(rays, &fitted, centre_mm_q8, &evidence);
+    ih_fit_begin(&start, &fit);
+    ih_fit_continue(rays, params, params->step_count, &head->scratch.detections.fit, &fit);
+    ih_evidence_collect(rays, &fit.ellipsoid, centre_mm_q8, &evidence);
     ih_score_rate(&evidence, &score);
-    hash[GOLDEN_FIT] = golden_add_words(hash[GOLDEN_FIT], &fitted, sizeof fitted);
+    hash[GOLDEN_FIT] = golden_add_words(hash[GOLDEN_FIT], &fit.ellipsoid, sizeof fit.ellipsoid);
     hash[GOLDEN_EVIDENCE] = golden_add_words(hash[GOLDEN_EVIDENCE], &evidence, sizeof evidence);
     hash[GOLDEN_SCORE] = golden_add_words(hash[GOLDEN_SCORE], &score, sizeof score);
 }

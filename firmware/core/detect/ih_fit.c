@@ -103,13 +103,3 @@ void ih_fit_continue(const struct ih_rays *rays, const struct ih_fit_params *par
         take_step(fit, step_q16);
     }
 }
-
-void ih_fit_ellipsoid(const struct ih_rays *rays, const struct ih_fit_params *params,
-                      const struct ih_ellipsoid *start, struct ih_fit_scratch *scratch,
-                      struct ih_ellipsoid *out)
-{
-    struct ih_fit fit;
-    ih_fit_begin(start, &fit);
-    ih_fit_continue(rays, params, params->step_count, scratch, &fit);
-    *out = fit.ellipsoid;
-}

@@ -67,11 +67,6 @@ void ih_fit_begin(const struct ih_ellipsoid *start, struct ih_fit *out);
 void ih_fit_continue(const struct ih_rays *rays, const struct ih_fit_params *params,
                      int32_t step_count, struct ih_fit_scratch *scratch, struct ih_fit *fit);
 
-/* All steps. */
-void ih_fit_ellipsoid(const struct ih_rays *rays, const struct ih_fit_params *params,
-                      const struct ih_ellipsoid *start, struct ih_fit_scratch *scratch,
-                      struct ih_ellipsoid *out);
-
 IH_END_DECLS
 
 #endif

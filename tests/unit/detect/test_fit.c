@@ -40,8 +40,12 @@ void tearDown(void)
 
 static void fit(const struct ih_ellipsoid *start)
 {
+    struct ih_fit whole;
+
     ih_rays_fill_table(&rays);
-    ih_fit_ellipsoid(&rays, &params, start, &scratch, &found);
+    ih_fit_begin(start, &whole);
+    ih_fit_continue(&rays, &params, params.step_count, &scratch, &whole);
+    found = whole.ellipsoid;
 }
 
 /* A mean head beside the true one. */
