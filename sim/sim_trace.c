@@ -292,8 +292,10 @@ static void write_surroundings(struct app_write *write, const struct ih_rays *ra
  * have moved since. */
 static bool is_of(const struct ih_rays *rays, const struct ih_detection *detection)
 {
+    struct ih_surroundings surroundings;
     int32_t answer_q8[IH_SURROUNDINGS_MAPS];
-    ih_surroundings_ask(rays, &detection->head, answer_q8);
+    ih_surroundings_find(rays, &detection->head, &surroundings);
+    ih_surroundings_ask(&surroundings, answer_q8);
     return memcmp(answer_q8, &detection->evidence.value_q8[IH_EVIDENCE_MAP_0], sizeof answer_q8) ==
            0;
 }
@@ -360,6 +362,14 @@ static void write_detection(struct app_write *write, const struct ih_rays *rays,
     app_write_close(write, '}');
 }
 
+static const char *const evidence_name[] = {
+    "on",    "rough", "bulge", "tall",  "moved", "bend_down", "bend_across", "distance",
+    "map_0", "map_1", "map_2", "map_3", "map_4", "map_5",     "map_6",       "map_7",
+};
+
+_Static_assert(sizeof evidence_name / sizeof evidence_name[0] == IH_EVIDENCE_COUNT,
+               "every kind has a name");
+
 static void write_detections(struct app_write *write, const struct isohead *head,
                              const struct ih_frame *view)
 {
@@ -369,7 +379,7 @@ static void write_detections(struct app_write *write, const struct isohead *head
     app_write_key(write, "evidence");
     app_write_open(write, '[');
     for (int kind = 0; kind < IH_EVIDENCE_COUNT; kind++) {
-        app_write_string(write, ih_evidence_text((enum ih_evidence_kind)kind));
+        app_write_string(write, evidence_name[kind]);
     }
     app_write_close(write, ']');
     app_write_key(write, "findings");

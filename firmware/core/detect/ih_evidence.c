@@ -42,15 +42,6 @@ struct sums {
     int64_t sum_q4[3], product_q8[3][3];
 };
 
-const char *ih_evidence_text(enum ih_evidence_kind kind)
-{
-    static const char *const text[IH_EVIDENCE_COUNT] = {
-        "on",    "rough", "bulge", "tall",  "moved", "bend_down", "bend_across", "distance",
-        "map_0", "map_1", "map_2", "map_3", "map_4", "map_5",     "map_6",       "map_7",
-    };
-    return (uint32_t)kind < IH_EVIDENCE_COUNT ? text[kind] : NULL;
-}
-
 /* Does a ray pass near enough to go through the head? */
 static bool may_hit(const struct candidate *candidate, const struct ih_ray *ray)
 {
@@ -285,5 +276,7 @@ void ih_evidence_collect(const struct ih_rays *rays, const struct ih_ellipsoid *
     out->value_q8[IH_EVIDENCE_TALL] = taller_q8(ellipsoid);
     out->value_q8[IH_EVIDENCE_MOVED] = moved_mm_q8(ellipsoid, start_mm_q8);
     out->value_q8[IH_EVIDENCE_DISTANCE] = ellipsoid->centre_mm_q8[2];
-    ih_surroundings_ask(rays, ellipsoid, &out->value_q8[IH_EVIDENCE_MAP_0]);
+    struct ih_surroundings surroundings;
+    ih_surroundings_find(rays, ellipsoid, &surroundings);
+    ih_surroundings_ask(&surroundings, &out->value_q8[IH_EVIDENCE_MAP_0]);
 }

@@ -68,9 +68,6 @@ void ih_evidence_collect(const struct ih_rays *rays, const struct ih_ellipsoid *
 /* The view alone, for half of the cost. */
 struct ih_view ih_evidence_view(const struct ih_rays *rays, const struct ih_ellipsoid *ellipsoid);
 
-/* Name of a kind, for tables and traces. */
-const char *ih_evidence_text(enum ih_evidence_kind kind);
-
 IH_END_DECLS
 
 #endif

@@ -37,8 +37,8 @@ static const uint8_t depth_of_step[STEPS] = {
 
 /* The candidate, as every ray needs it. */
 struct head_from_rays {
-    int64_t depth_mm_q8; /* of its centre, from where rays start */
-    int64_t away_mm_q8[2];
+    int32_t depth_mm_q8; /* of its centre, from where rays start */
+    int32_t away_mm_q8[2];
     int32_t centre_mm_q8; /* its depth in the level frame */
 };
 
@@ -46,9 +46,9 @@ static struct head_from_rays candidate_of(const struct ih_rays *rays,
                                           const struct ih_ellipsoid *ellipsoid)
 {
     return (struct head_from_rays){
-        .depth_mm_q8 = (int64_t)ellipsoid->centre_mm_q8[2] - rays->origin_mm_q8[2],
-        .away_mm_q8 = {(int64_t)rays->origin_mm_q8[0] - ellipsoid->centre_mm_q8[0],
-                       (int64_t)rays->origin_mm_q8[1] - ellipsoid->centre_mm_q8[1]},
+        .depth_mm_q8 = ellipsoid->centre_mm_q8[2] - rays->origin_mm_q8[2],
+        .away_mm_q8 = {rays->origin_mm_q8[0] - ellipsoid->centre_mm_q8[0],
+                       rays->origin_mm_q8[1] - ellipsoid->centre_mm_q8[1]},
         .centre_mm_q8 = ellipsoid->centre_mm_q8[2],
     };
 }
@@ -58,12 +58,16 @@ static int32_t depth_of(const struct head_from_rays *candidate, const struct ih_
     if (ray->state == IH_RAY_EMPTY) {
         return EMPTY;
     }
-    const int64_t behind_mm =
-        ih_shift_round((int64_t)ray->point_mm_q8[2] - candidate->centre_mm_q8, 8) - NEAREST_MM;
-    if (behind_mm < 0) {
-        return 0;
-    }
-    return depth_of_step[ih_min_s64(behind_mm >> STEP_BITS, STEPS - 1)];
+    const int32_t behind_mm_q8 = ray->point_mm_q8[2] - candidate->centre_mm_q8;
+    const int32_t step = (((behind_mm_q8 + (1 << 7)) >> 8) - NEAREST_MM) >> STEP_BITS;
+    return step < 0 ? 0 : depth_of_step[ih_min_s32(step, STEPS - 1)];
+}
+
+/* How far from the centre a ray passes at its depth. */
+static int32_t across_mm_q8(const struct head_from_rays *candidate, int32_t slope_q20, int axis)
+{
+    return candidate->away_mm_q8[axis] +
+           (int32_t)ih_mul_shift(candidate->depth_mm_q8, slope_q20, 20);
 }
 
 /* Or IH_NONE. */
@@ -72,17 +76,11 @@ static int32_t place_of(const struct head_from_rays *candidate, const struct ih_
     if (ray->state == IH_RAY_UNKNOWN) {
         return IH_NONE;
     }
-    const int64_t aside_mm_q8 = ih_abs_s64(
-        candidate->away_mm_q8[0] + ih_mul_shift(candidate->depth_mm_q8, ray->slope_x_q20, 20));
-    const int64_t down_mm_q8 =
-        candidate->away_mm_q8[1] + ih_mul_shift(candidate->depth_mm_q8, ray->slope_y_q20, 20);
-    const int64_t from_top_mm_q8 = down_mm_q8 + TOP_MM_Q8;
-    if (aside_mm_q8 >= IH_SURROUNDINGS_COLUMNS * CELL_MM_Q8 || from_top_mm_q8 < 0 ||
-        from_top_mm_q8 >= IH_SURROUNDINGS_ROWS * CELL_MM_Q8) {
+    const int32_t column = ih_abs_s32(across_mm_q8(candidate, ray->slope_x_q20, 0)) >> CELL_BITS;
+    const int32_t row = (across_mm_q8(candidate, ray->slope_y_q20, 1) + TOP_MM_Q8) >> CELL_BITS;
+    if (column >= IH_SURROUNDINGS_COLUMNS || row < 0 || row >= IH_SURROUNDINGS_ROWS) {
         return IH_NONE;
     }
-    const int32_t column = (int32_t)(aside_mm_q8 >> CELL_BITS);
-    const int32_t row = (int32_t)(from_top_mm_q8 >> CELL_BITS);
     return (row * IH_SURROUNDINGS_COLUMNS + column) * IH_SURROUNDINGS_DEPTHS +
            depth_of(candidate, ray);
 }
@@ -105,16 +103,24 @@ static int32_t weight_q12(const struct ih_rays *rays, int64_t depth_mm_q8)
     return (int32_t)ih_shift_round(spacing_mm_q8 * spacing_mm_q8, 2 * CELL_BITS - 12);
 }
 
-void ih_surroundings_ask_maps(const uint32_t maps[IH_SURROUNDINGS_PLACES],
-                              const struct ih_rays *rays, const struct ih_ellipsoid *ellipsoid,
-                              int32_t answer_q8[IH_SURROUNDINGS_MAPS])
+void ih_surroundings_find(const struct ih_rays *rays, const struct ih_ellipsoid *ellipsoid,
+                          struct ih_surroundings *out)
 {
     const struct head_from_rays candidate = candidate_of(rays, ellipsoid);
-    const int32_t weight = weight_q12(rays, candidate.depth_mm_q8);
+    out->weight_q12 = weight_q12(rays, candidate.depth_mm_q8);
+    for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
+        out->place[slot] = (int16_t)place_of(&candidate, &rays->ray[slot]);
+    }
+}
+
+void ih_surroundings_ask_maps(const uint32_t maps[IH_SURROUNDINGS_PLACES],
+                              const struct ih_surroundings *found,
+                              int32_t answer_q8[IH_SURROUNDINGS_MAPS])
+{
     uint32_t pair[PAIRS] = {0}; /* sums of two maps each, in 16 bits */
     int32_t count = 0;
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
-        const int32_t place = place_of(&candidate, &rays->ray[slot]);
+        const int32_t place = found->place[slot];
         if (place == IH_NONE) {
             continue;
         }
@@ -127,22 +133,12 @@ void ih_surroundings_ask_maps(const uint32_t maps[IH_SURROUNDINGS_PLACES],
         const int32_t sum = (int32_t)(pair[map % PAIRS] >> (map < PAIRS ? 0 : 16) & UINT16_MAX) -
                             count * IH_SURROUNDINGS_ZERO;
         IH_IN_RANGE(sum, -IH_RANGE_MAP_SUM, IH_RANGE_MAP_SUM);
-        answer_q8[map] = (int32_t)ih_mul_shift(sum, weight, 12 - 8);
+        answer_q8[map] = (int32_t)ih_mul_shift(sum, found->weight_q12, 12 - 8);
     }
 }
 
-void ih_surroundings_ask(const struct ih_rays *rays, const struct ih_ellipsoid *ellipsoid,
+void ih_surroundings_ask(const struct ih_surroundings *found,
                          int32_t answer_q8[IH_SURROUNDINGS_MAPS])
 {
-    ih_surroundings_ask_maps(surroundings_maps, rays, ellipsoid, answer_q8);
-}
-
-void ih_surroundings_find(const struct ih_rays *rays, const struct ih_ellipsoid *ellipsoid,
-                          struct ih_surroundings *out)
-{
-    const struct head_from_rays candidate = candidate_of(rays, ellipsoid);
-    out->weight_q12 = weight_q12(rays, candidate.depth_mm_q8);
-    for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
-        out->place[slot] = (int16_t)place_of(&candidate, &rays->ray[slot]);
-    }
+    ih_surroundings_ask_maps(surroundings_maps, found, answer_q8);
 }

@@ -1,7 +1,7 @@
 /* ih_surroundings - what the rays at and around a candidate say by several learnt maps (ours).
  *
  * In:     rays and points, an ellipsoid, the maps.
- * Out:    an answer by each map; or, by slot, the place in the maps that the ray asks.
+ * Out:    by slot, the place in the maps that the ray asks; an answer by each map.
  * Method: the plane at the centre's depth has cells of 64 mm, to 384 mm aside and above and 448 mm below the
  *         centre, those on the left and on the right alike. A ray asks the cell that it passes, and there one of
  *         nine ranges of depth, in which its point lies against the centre, or the tenth place when it is empty.
@@ -45,18 +45,18 @@ struct ih_surroundings {
 
 IH_BEGIN_DECLS
 
+/* What is asked where. */
+void ih_surroundings_find(const struct ih_rays *rays, const struct ih_ellipsoid *ellipsoid,
+                          struct ih_surroundings *out);
+
 /* By the learnt maps. */
-void ih_surroundings_ask(const struct ih_rays *rays, const struct ih_ellipsoid *ellipsoid,
+void ih_surroundings_ask(const struct ih_surroundings *found,
                          int32_t answer_q8[IH_SURROUNDINGS_MAPS]);
 
 /* By other maps. */
 void ih_surroundings_ask_maps(const uint32_t maps[IH_SURROUNDINGS_PLACES],
-                              const struct ih_rays *rays, const struct ih_ellipsoid *ellipsoid,
+                              const struct ih_surroundings *found,
                               int32_t answer_q8[IH_SURROUNDINGS_MAPS]);
-
-/* What is asked, for learning and for pictures. */
-void ih_surroundings_find(const struct ih_rays *rays, const struct ih_ellipsoid *ellipsoid,
-                          struct ih_surroundings *out);
 
 IH_END_DECLS
 

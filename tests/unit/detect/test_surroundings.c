@@ -85,7 +85,7 @@ static void scenes_match_float64(void)
             IH_TEST_EQUAL(scene->ray[slot].place, found.place[slot], scene->name, slot);
         }
         IH_TEST_WITHIN(error, scene->weight, ih_test_from_q(found.weight_q12, 12), scene->name, i);
-        ih_surroundings_ask_maps(vector_maps, &rays, &head, answer_q8);
+        ih_surroundings_ask_maps(vector_maps, &found, answer_q8);
         for (map = 0; map < IH_SURROUNDINGS_MAPS; map++) {
             IH_TEST_WITHIN(fabs(scene->answer[map]) * error / scene->weight + 1.0 / 256,
                            scene->answer[map], ih_test_from_q(answer_q8[map], 8), scene->name,
@@ -194,7 +194,8 @@ static void rays_of_known_state_add_up(void)
         *ray = (struct ih_ray){.point_mm_q8 = {0, 0, head.centre_mm_q8[2]},
                                .state = i == 2 ? IH_RAY_UNKNOWN : IH_RAY_SEEN};
     }
-    ih_surroundings_ask_maps(maps, &rays, &head, answer_q8);
+    ih_surroundings_find(&rays, &head, &found);
+    ih_surroundings_ask_maps(maps, &found, answer_q8);
     for (map = 0; map < IH_SURROUNDINGS_MAPS; map++) {
         IH_TEST_EQUAL(3 * (map - 3) * 256, answer_q8[map], "answer", map);
     }
@@ -215,7 +216,8 @@ static void sums_of_two_maps_stay_apart(void)
         for (slot = 0; slot < IH_SURROUNDINGS_PLACES; slot++) {
             maps[slot] = words[i];
         }
-        ih_surroundings_ask_maps(maps, &rays, &head, answer_q8);
+        ih_surroundings_find(&rays, &head, &found);
+        ih_surroundings_ask_maps(maps, &found, answer_q8);
         for (map = 0; map < IH_SURROUNDINGS_MAPS; map++) {
             const int32_t each = (words[i] >> 4 * map & 15) == 15 ? 7 : -8;
 
@@ -251,8 +253,8 @@ static void extremes_do_not_overflow(void)
                 .point_mm_q8 = {0, 0, (int32_t)ih_test_between(&random, -(1 << 25), 1 << 25)},
                 .state = (int32_t)ih_test_between(&random, 0, 2)};
         }
-        ih_surroundings_ask_maps(maps, &rays, &head, answer_q8);
         ih_surroundings_find(&rays, &head, &found);
+        ih_surroundings_ask_maps(maps, &found, answer_q8);
         IH_TEST_RANGE(0, 4096, found.weight_q12, "weight", pass);
         for (slot = 0; slot < IH_SLOTS; slot++) {
             IH_TEST_RANGE(IH_NONE, IH_SURROUNDINGS_PLACES - 1, found.place[slot], "place", slot);
