@@ -25,6 +25,11 @@ static void without_fit(struct ih_params *params)
     params->detections.fit.step_count = 0;
 }
 
+static void without_move(struct ih_params *params)
+{
+    params->detections.move_max_mm = 0;
+}
+
 static void without_tracks(struct ih_params *params)
 {
     params->tracks.gap_us = -1;
@@ -52,6 +57,7 @@ static const struct {
     {"nests", without_nests},
     {"expected", without_expected},
     {"fit", without_fit},
+    {"move", without_move},
     {"tracks", without_tracks},
     {"windows", without_windows},
     {"missing", without_missing},
@@ -230,6 +236,7 @@ void sim_options_help(void)
           "                 nests     no candidates from the paper's nests, only evidence\n"
           "                 expected  no candidates from tracks\n"
           "                 fit       candidates are not fitted: mean heads instead\n"
+          "                 move      fitted centres stay where they are\n"
           "                 tracks    every frame on its own\n"
           "                 windows   of a depth image only the best window\n"
           "                 missing   dots that are not seen are not entered as far points\n"

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""tools/eval: its scores of records that were made by hand, and a short run with the programs.
+"""tools/eval: its scores of records that were made by hand, and a short run with the programs; tools/learn: its moves.
 
 eval.py HOST_SIM RENDER
 """
@@ -10,6 +10,9 @@ import subprocess
 import sys
 import tempfile
 import unittest
+import unittest.mock
+
+import numpy
 
 TOOLS = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "tools", "eval")
 sys.path.insert(0, TOOLS)
@@ -19,6 +22,9 @@ import report
 import runs
 import scenes
 import score
+
+sys.path.insert(0, os.path.join(TOOLS, "..", "learn"))
+import ray_map
 
 CENTRE = [10.0, -20.0, 800.0]
 OTHER = [-400.0, 0.0, 900.0]
@@ -288,6 +294,32 @@ class Programs(unittest.TestCase):
             self.assertIn(heading, text)
         for seeds in ("7005 to 7048", scenes.learnt_seeds(), "6001-6006"):
             self.assertIn(seeds, text)
+
+
+class Moves(unittest.TestCase):
+    def test_how_far_off_a_centre_is_is_learnt_by_place(self):
+        """Of heads whose rays say it, and a few that are elsewhere: a slope from row to row, other in each direction."""
+        random = numpy.random.default_rng(5)
+        row = numpy.arange(ray_map.MOVE_PLACES) // (ray_map.MOVE_COLUMNS * ray_map.DEPTHS)
+        true_mm = numpy.stack([(row - 6) / 6.0, (4 - row) / 8.0], axis=1)
+        place = random.integers(-1, ray_map.PLACES, (6000, 120)).astype(numpy.int16)
+        weight_q12 = random.integers(1000, 4097, len(place))
+        steps_mm = numpy.where((place >= 0)[..., None], true_mm[ray_map.move_places()[place]], 0.0)
+        off_mm = weight_q12[:, None] / 4096 * steps_mm.sum(axis=1)
+        off_mm[::300] += 80.0
+        with unittest.mock.patch.multiple(ray_map, MOVE_RIDGE=3.0, MOVE_SMOOTH=30.0):  # few heads, little noise
+            steps, step_mm_q8 = ray_map.fit_moves(place, weight_q12, off_mm)
+        error_mm = abs(steps * numpy.array(step_mm_q8) / 256 - true_mm)
+        # Half a step, and less for the penalties, which pull towards zero and the neighbours.
+        self.assertLess(numpy.median(error_mm), 1.0 / 14)
+        self.assertLess(error_mm.max(), 2.0 / 14 + 0.1)
+
+    def test_neighbours_are_those_beside_and_not_nothing(self):
+        rough = ray_map.move_roughness()
+        self.assertTrue(numpy.allclose(rough.sum(axis=0), 0.0))
+        # Inside four neighbours aside and by row, two by range; the last place, nothing, has none of those.
+        inside = (6 * ray_map.MOVE_COLUMNS + 1) * ray_map.DEPTHS
+        self.assertEqual([rough[inside + depth, inside + depth] for depth in (0, 4, 8, 9)], [5.0, 6.0, 5.0, 4.0])
 
 
 if __name__ == "__main__":

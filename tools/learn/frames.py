@@ -54,12 +54,12 @@ def read_trace(path):
     }
 
 
-def look(program, directory, scratch):
+def look(program, options, directory, scratch):
     """Every frame of a directory through the firmware."""
     name = os.path.relpath(directory, "/").replace(os.sep, "_")
     out = os.path.join(scratch, name[-200:])
     shutil.rmtree(out, ignore_errors=True)
-    subprocess.run([program, "--trace", out, directory], check=True, stdout=subprocess.DEVNULL)
+    subprocess.run([program, *options, "--trace", out, directory], check=True, stdout=subprocess.DEVNULL)
     truth = read_truth(directory)
     frames = []
     for path in sorted(glob.glob(os.path.join(out, "**", "*.json"), recursive=True)):
@@ -72,7 +72,7 @@ def look(program, directory, scratch):
     return frames
 
 
-def look_at_all(program, directories, scratch, jobs):
+def look_at_all(program, directories, scratch, jobs, options=()):
     with concurrent.futures.ProcessPoolExecutor(jobs) as pool:
-        work = [pool.submit(look, program, directory, scratch) for directory in directories]
+        work = [pool.submit(look, program, options, directory, scratch) for directory in directories]
         return [frame for one in work for frame in one.result()]

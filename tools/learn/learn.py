@@ -10,7 +10,8 @@ logistic model: log-odds = bias + one piecewise linear curve per kind of evidenc
 curves that bend; then trees for what the curves leave. A detection within 55 mm of a head is one, beyond 100 mm it is none,
 between it is not used, and neither is one within 150 mm of a head that is hardly seen. A sequence of tools/people counts
 as three frames of tools/render. Every detection is learnt from once more, for half as much, as if the view ended nearer.
-Run it twice: which detections remain depends a little on the score that rated them.
+How far off a fitted centre is (the moves of ih_surroundings.h) is learnt from the same frames without moves.
+Run it twice: where detections are depends on the moves, and which remain a little on the score that rated them.
 """
 
 import argparse
@@ -39,7 +40,7 @@ FRAME_WEIGHT, SEQUENCE_WEIGHT = 2.0, 6.0
 # Of a detection in a view that ends nearer, against the one in the whole view.
 ENDING_WEIGHT = 0.5
 # Log-odds that are added to every score: far more clutter is learnt from than cameras see.
-PRIOR = 0.44
+PRIOR = 0.25
 
 
 def label(frame):
@@ -69,6 +70,20 @@ def gather(seen, people):
     columns = [numpy.concatenate(column) for column in zip(*parts)]
     usable = ~numpy.isnan(columns[3])
     return [column[usable] for column in columns]
+
+
+def moves_of(seen):
+    """Of heads where the fit alone put them: how far below and behind that they are."""
+    parts = []
+    for frame in seen:
+        if len(frame["centre_mm"]) == 0 or len(frame["heads"]) == 0:
+            continue
+        off_mm = frame["heads"][None] - frame["centre_mm"][:, None]
+        nearest = numpy.linalg.norm(off_mm, axis=2).argmin(axis=1)
+        off_mm = off_mm[numpy.arange(len(nearest)), nearest]
+        near = numpy.linalg.norm(off_mm, axis=1) < NO_HEAD_MM
+        parts.append((frame["place"][near], frame["weight_q12"][near], off_mm[near, 1:]))
+    return ray_map.fit_moves(*(numpy.concatenate(column) for column in zip(*parts)))
 
 
 def and_in_ending_views(evidence, place, weight_q12, labels, importances):
@@ -156,12 +171,14 @@ def main():
     arguments = parse()
     scratch = os.path.join(arguments.work, "trace")
 
-    def see(directories):
-        return frames.look_at_all(arguments.host_sim, directories, scratch, arguments.jobs)
+    def see(directories, options=()):
+        return frames.look_at_all(arguments.host_sim, directories, scratch, arguments.jobs, options)
 
     people = sorted(os.path.dirname(path) for folder in arguments.people
                     for path in glob.glob(os.path.join(folder, "**", "rig.json"), recursive=True))
-    seen = see(directories_of(arguments, arguments.seeds, arguments.depth_seeds, arguments.clutter_seeds) + people)
+    directories = directories_of(arguments, arguments.seeds, arguments.depth_seeds, arguments.clutter_seeds) + people
+    moves = moves_of(see(directories, ("--without", "move")))
+    seen = see(directories)
     kinds = seen[0]["kinds"]
     rows = gather(seen, set(people))
     print("%d frames, %d detections, %d heads" % (len(seen), len(rows[3]), rows[3].sum()))
@@ -170,7 +187,7 @@ def main():
         arguments.seeds, arguments.depth_seeds, arguments.clutter_seeds,
         " ".join(os.path.basename(os.path.normpath(folder)) for folder in arguments.people))
     model.write(os.path.join(arguments.out, "ih_score_weights.h"), learnt.curves, kinds, command)
-    ray_map.write(os.path.join(arguments.out, "ih_surroundings_map.h"), learnt.maps, command)
+    ray_map.write(os.path.join(arguments.out, "ih_surroundings_map.h"), learnt.maps, moves, command)
     report(learnt, seen, arguments.limit)
     check = arguments.check_seeds
     report(learnt, see(directories_of(arguments, check, check, check)), arguments.limit)

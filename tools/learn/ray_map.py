@@ -1,7 +1,9 @@
 """The maps of ih_surroundings: what a ray says at its place around a head.
 
 All maps are learnt at once, as a part of the first layer of a small network, which has their answers and the other
-evidence before it. The rest of the network is thrown away: curves and trees are learnt behind the maps."""
+evidence before it. The rest of the network is thrown away: curves and trees are learnt behind the maps.
+
+And the moves: how far below and behind a fitted centre the head's is, by what is seen at each place; by least squares."""
 
 import numpy
 import scipy.sparse
@@ -20,8 +22,14 @@ MEAN, SQUARE = 0.9, 0.999  # memories of the steps (Adam)
 ENDS_BELOW, ENDS_ASIDE, ENDS_ABOVE, ENDS_BEHIND = 0.75, 0.5, 0.4, 0.4
 ROWS_KEPT, COLUMNS_KEPT, ROWS_LOST, DEPTHS_KEPT = (8, ROWS), (2, COLUMNS), (0, 5), (7, 8)
 ENDS_SEED = 5
+MOVE_COLUMNS = 3  # the last one is all that are farther aside
+MOVE_PLACES = MOVE_COLUMNS * ROWS * DEPTHS
+MOVE_RIDGE, MOVE_PASSES, MOVE_ROBUST_MM = 300.0, 5, 20.0
+# Against differences of neighbours: how many rays fall into a cell is a matter of chance, and a head that moves by half a
+# dot's distance should not be moved otherwise.
+MOVE_SMOOTH = 8000.0
 QUANTILES = 65  # evidence is given to the network by its rank
-SEED = 18
+SEED = 9
 
 
 def ending_views(place):
@@ -127,23 +135,57 @@ def answers(maps, place, weight_q12):
     return ((counts_of(place) @ maps * weight_q12[:, None] + (1 << 3)) >> 4) / 256
 
 
+def move_places():
+    """Of each place of the maps that of the moves."""
+    place = numpy.arange(PLACES)
+    column = numpy.minimum(place // DEPTHS % COLUMNS, MOVE_COLUMNS - 1)
+    return (place // (COLUMNS * DEPTHS) * MOVE_COLUMNS + column) * DEPTHS + place % DEPTHS
+
+
+def move_roughness():
+    """Of moves by place: a form whose value is the sum of squared differences of neighbours. Nothing has none in depth."""
+    index = numpy.arange(MOVE_PLACES).reshape(ROWS, MOVE_COLUMNS, DEPTHS)
+    pairs = ((index[1:], index[:-1]), (index[:, 1:], index[:, :-1]), (index[..., 1:-1], index[..., :-2]))
+    one, other = (numpy.concatenate([pair[side].ravel() for pair in pairs]) for side in (0, 1))
+    difference = numpy.eye(MOVE_PLACES)[one] - numpy.eye(MOVE_PLACES)[other]
+    return difference.T @ difference
+
+
+def fit_moves(place, weight_q12, off_mm):
+    """Steps down and away at each place of the moves, and a step's mm in Q8; off_mm: of every fitted centre, how far
+    below and behind it the head's is. Few that are far off do not decide: after a pass they weigh less."""
+    gathered = scipy.sparse.coo_matrix((numpy.ones(PLACES), (numpy.arange(PLACES), move_places()))).tocsr()
+    needed = (needed_of(place, weight_q12).astype(float) @ gathered).tocsr()
+    penalty = MOVE_RIDGE * numpy.eye(MOVE_PLACES) + MOVE_SMOOTH * move_roughness()
+    weight = numpy.ones(len(off_mm))
+    for _ in range(MOVE_PASSES):
+        weighed = scipy.sparse.diags(weight) @ needed
+        by_place_mm = numpy.linalg.solve((weighed.T @ needed).toarray() + penalty, weighed.T @ off_mm)
+        left_mm = numpy.linalg.norm(off_mm - needed @ by_place_mm, axis=1)
+        weight = numpy.minimum(1.0, MOVE_ROBUST_MM / numpy.maximum(left_mm, 1e-6))
+    step_mm_q8 = numpy.round(numpy.quantile(numpy.abs(by_place_mm), CLIPPED, axis=0) / (ZERO - 1) * 256).astype(int)
+    return numpy.clip(numpy.round(by_place_mm * 256 / step_mm_q8), -ZERO, ZERO - 1).astype(int), step_mm_q8
+
+
 def packed(maps):
     """A word for each place, the first map's number lowest."""
-    return ((maps + ZERO) << BITS * numpy.arange(MAPS)).sum(axis=1)
+    return ((maps + ZERO) << BITS * numpy.arange(maps.shape[1])).sum(axis=1)
 
 
-def unpacked(words):
-    return (numpy.array(words)[:, None] >> BITS * numpy.arange(MAPS) & (1 << BITS) - 1) - ZERO
+def unpacked(words, count=MAPS):
+    return (numpy.array(words)[:, None] >> BITS * numpy.arange(count) & (1 << BITS) - 1) - ZERO
 
 
-def write(path, maps, command):
+def write(path, maps, moves, command):
     """The header that ih_surroundings.c includes: a line for a cell, its ranges of depth from near to far, then nothing."""
+    steps, step_mm_q8 = moves
+    move_lines = ["        %s," % ", ".join("0x%02x" % byte for byte in cell) for cell in packed(steps).reshape(-1, DEPTHS)]
     lines = []
     for row, cells in enumerate(packed(maps).reshape(ROWS, COLUMNS, DEPTHS)):
         lines.append("    /* row %d */" % row)
         lines += ["    %s," % ", ".join("0x%08xu" % word for word in cell) for cell in cells]
     with open(path, "w", encoding="utf-8") as file:
-        file.write("""/* ih_surroundings_map - the maps of ih_surroundings, written by
+        file.write("""/* ih_surroundings_map - the maps of ih_surroundings, and its moves, written by
  *     %s
  * Do not edit. A line is a cell: its nine ranges of depth, the nearest first, then an empty ray. */
 #ifndef IH_SURROUNDINGS_MAP_H
@@ -157,7 +199,14 @@ def write(path, maps, command):
 static const uint32_t surroundings_maps[IH_SURROUNDINGS_PLACES] = {
 %s
 };
+
+static const struct ih_surroundings_moves surroundings_moves = {
+    {%d, %d},
+    {
+%s
+    },
+};
 /* clang-format on */
 
 #endif
-""" % (command, "\n".join(lines)))
+""" % (command, "\n".join(lines), *step_mm_q8, "\n".join(move_lines)))

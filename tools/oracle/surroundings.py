@@ -1,4 +1,4 @@
-"""Float64 reference of the maps of the surroundings, over the scenes of evidence.py and patterns of other pitch.
+"""Float64 reference of the maps of the surroundings and of the moves, over the scenes of evidence.py and patterns of other pitch.
 
 Rays whose place is a matter of rounding are made unknown ones.
 """
@@ -10,6 +10,8 @@ import evidence
 from rig import GRID, from_q, to_q
 
 COLUMNS, ROWS, DEPTHS, MAPS = 6, 13, 10, 8
+MOVE_COLUMNS = 3  # the last one is all that are farther aside
+STEP_MM = (0.90625, 7.5)  # down, away
 CELL_MM, TOP_MM = 64.0, 384.0
 LIMITS_MM = np.array([-256, -176, -96, -40, 40, 128, 200, 304])
 EMPTY_PLACE, NONE = DEPTHS - 1, -1
@@ -43,6 +45,12 @@ def places(slope_q20, depth_q8, state, centre):
     return place, np.minimum(np.minimum(edge(x), edge(y)), np.where(state == evidence.SEEN, beside, np.inf))
 
 
+def moves_mm(steps, place, weight):
+    """Down and away, of the steps by row, column, range of depth."""
+    row, column, depth = place // (COLUMNS * DEPTHS), place // DEPTHS % COLUMNS, place % DEPTHS
+    return weight * steps[row, np.minimum(column, MOVE_COLUMNS - 1), depth].sum(axis=0) * STEP_MM
+
+
 def write_vectors(directory):
     random = np.random.default_rng(83)
     maps = random.integers(-8, 8, (COLUMNS * ROWS * DEPTHS, MAPS))
@@ -50,10 +58,14 @@ def write_vectors(directory):
     inc.raw("\nstatic const int32_t vector_origin_mm_q8[] = {%d, %d, %d};\n" % tuple(to_q(evidence.ORIGIN, 8)))
     words = [sum((int(value) + 8) << 4 * map for map, value in enumerate(row)) for row in maps]
     inc.raw("\nstatic const uint32_t vector_maps[] = {\n%s};\n" % emit.wrap(["0x%08x" % word for word in words]))
+    steps = np.random.default_rng(84).integers(-8, 8, (ROWS, MOVE_COLUMNS, DEPTHS, 2))
+    inc.raw("\nstatic const struct ih_surroundings_moves vector_moves = {\n    {%d, %d},\n    {\n%s    },\n};\n" % (
+        *to_q(np.array(STEP_MM), 8),
+        emit.wrap(["0x%02x" % (down + 8 | away + 8 << 4) for down, away in steps.reshape(-1, 2)])))
     rows = []
-    for name, widen, move in CASES:
+    for name, widen, farther in CASES:
         slope_q20 = np.rint(evidence.lattice() * widen).astype(np.int64)
-        centre_q8 = to_q(evidence.CENTRE + [0, 0, move], 8)
+        centre_q8 = to_q(evidence.CENTRE + [0, 0, farther], 8)
         depth_q8, state = evidence.make_scene(name, slope_q20, random)
         _, margin = places(slope_q20, depth_q8, state, from_q(centre_q8, 8))
         state = np.where(margin < 0.02, evidence.UNKNOWN, state)
@@ -62,9 +74,11 @@ def write_vectors(directory):
         spacing = spacing_mm(from_q(slope_q20, 20), from_q(centre_q8[2], 8) - evidence.ORIGIN[2])
         weight = min(1.0, spacing / CELL_MM)**2
         answer = weight * maps[place[place != NONE]].sum(axis=0)
+        move = moves_mm(steps, place[place != NONE], weight)
         inc.raw("\nstatic const struct vector_ray vector_%s_rays[] = {\n%s};\n" % (
             name, emit.wrap(["{%d, %d, %d, %d, %d}" % r for r in zip(*slope_q20.T, depth_q8, state, place)])))
-        rows.append('"%s", vector_%s_rays, {%d, %d, %d}, %s, {%s}' % (
-            name, name, *centre_q8, emit.number(weight, 7), ", ".join(emit.numbers(answer, 5))))
+        rows.append('"%s", vector_%s_rays, {%d, %d, %d}, %s, {%s}, {%s}' % (
+            name, name, *centre_q8, emit.number(weight, 7), ", ".join(emit.numbers(answer, 5)),
+            ", ".join(emit.numbers(move, 4))))
     inc.struct_array("vector_scene", "vector_scenes", rows)
     return inc.write(directory, "surroundings.inc")

@@ -6,6 +6,7 @@
 #include "detect/ih_candidates.h"
 #include "detect/ih_prescreen.h"
 #include "detect/ih_score.h"
+#include "detect/ih_surroundings.h"
 #include "rig/ih_level.h"
 
 /* A hopeless candidate is not fitted beyond these. */
@@ -18,11 +19,12 @@ void ih_detections_params_default(struct ih_detections_params *params)
     ih_fit_params_default(&params->fit);
     params->promise_min_q8 = 256;
     params->apart_mm = 20;
-    params->hopeless_logit_q10 = -5632;
+    params->hopeless_logit_q10 = -5120;
     params->spacing_mm = 80;
     params->nest_max = IH_NESTS_MAX;
     params->expected_max = IH_DETECTIONS_EXPECTED_MAX;
     params->front_min_mm = 150;
+    params->move_max_mm = 40;
 }
 
 void ih_detections_begin(struct ih_detections *out)
@@ -97,12 +99,11 @@ struct context {
     struct ih_detections *out;
 };
 
-/* How probable a candidate is where its fit is now. */
-static void score_fit(const struct context *context, const struct ih_fit *fit,
-                      struct ih_detection *detection)
+/* How probable a candidate is where it is now. */
+static void rate(const struct context *context, const struct ih_fit *fit,
+                 struct ih_detection *detection)
 {
     struct ih_score score;
-    detection->head = fit->ellipsoid;
     ih_evidence_collect(context->rays, &detection->head, fit->start_mm_q8, &detection->evidence);
     ih_score_rate(&detection->evidence, &score);
     detection->logit_q10 = score.logit_q10;
@@ -125,12 +126,15 @@ static void try_start(const struct context *context, const struct ih_ellipsoid *
     }
     ih_fit_begin(start, &fit);
     ih_fit_continue(context->rays, &params->fit, FIRST_LOOK_STEPS, &context->scratch->fit, &fit);
-    score_fit(context, &fit, &detection);
+    detection.head = fit.ellipsoid;
+    rate(context, &fit, &detection);
     if (detection.logit_q10 >= params->hopeless_logit_q10 &&
         fit.step_index < params->fit.step_count) {
         ih_fit_continue(context->rays, &params->fit, params->fit.step_count, &context->scratch->fit,
                         &fit);
-        score_fit(context, &fit, &detection);
+        detection.head = fit.ellipsoid;
+        ih_surroundings_move(context->rays, params->move_max_mm, &detection.head);
+        rate(context, &fit, &detection);
     }
     if (is_too_near(context, &detection.head)) {
         return;

@@ -6,9 +6,9 @@
  * Method: candidates are the nests' centres, those of the model scan, the expected heads, and the last sure places
  *         of heads that the frame before left in doubt, in this order. Nests and scan candidates that a coarse
  *         pre-filter rejects (ih_prescreen), and starts within apart_mm of one before, are passed over. Each
- *         other one is fitted for a step (ih_fit),
- *         measured (ih_evidence) and scored (ih_score); those that are not hopeless are fitted to the end,
- *         measured and scored again. Tracks take no detection below log-odds -3: hopeless is 2.5 below
+ *         other one is fitted for a step (ih_fit), measured (ih_evidence) and scored (ih_score). Those that are not
+ *         hopeless are fitted to the end, moved to where their surroundings say that the centre is
+ *         (ih_surroundings), measured and scored again. Tracks take no detection below log-odds -3: hopeless is 2 below
  *         that after a step. A range frame has several windows: begin once a frame, add once a window.
  *         For an expected head that is not found there is what its rays met (views): whether it is
  *         hidden, or gone.
@@ -16,7 +16,7 @@
  *         are near it.
  * Full table: the less probable drop and count in dropped_count.
  * Overflow: points are below 2^25 in Q8 (16 m, slopes up to 8), nests' centres below 2^26.01, expected
- *         ones at most 2^26, last sure ones 2^26.01; a fit moves 240 mm: centres below 2^27, squares of
+ *         ones at most 2^26, last sure ones 2^26.01; a fit moves 240 mm, its surroundings 1000: centres below 2^27, squares of
  *         differences 2^57.6.
  * Cost:   up to IH_DETECTIONS_STARTS_MAX = 40 fits a window. Usually 12 candidates, of which 6 are fitted for a step
  *         and 3 to the end; one more for a head that is hidden.
@@ -60,6 +60,7 @@ struct ih_detections_params {
     int32_t nest_max;           /* of them this many are candidates themselves */
     int32_t expected_max; /* of the expected heads, and of the last sure places, this many are */
     int32_t front_min_mm; /* no head is nearer than this: the lens is there */
+    int32_t move_max_mm;  /* by this at most a fitted centre is moved: up to 1000 */
 };
 
 struct ih_detection {

@@ -21,6 +21,7 @@
 /* Two maps, half a word apart, are summed at once: 361 numbers below 16 do not overflow 16 bits. */
 #define PAIRS (IH_SURROUNDINGS_MAPS / 2)
 #define PAIR_MASK 0x000f000fu
+#define MOVE_MASK 0xfu
 _Static_assert(IH_SURROUNDINGS_MAPS == 8 && IH_SURROUNDINGS_BITS == 4,
                "a word has a number by each map");
 
@@ -141,4 +142,43 @@ void ih_surroundings_ask(const struct ih_surroundings *found,
                          int32_t answer_q8[IH_SURROUNDINGS_MAPS])
 {
     ih_surroundings_ask_maps(surroundings_maps, found, answer_q8);
+}
+
+static int32_t move_place_of(int32_t place)
+{
+    const int32_t cell = place / IH_SURROUNDINGS_DEPTHS;
+    const int32_t row = cell / IH_SURROUNDINGS_COLUMNS;
+    const int32_t farther =
+        ih_max_s32(cell - row * IH_SURROUNDINGS_COLUMNS - (IH_SURROUNDINGS_MOVE_COLUMNS - 1), 0);
+    return place - (row * (IH_SURROUNDINGS_COLUMNS - IH_SURROUNDINGS_MOVE_COLUMNS) + farther) *
+                       IH_SURROUNDINGS_DEPTHS;
+}
+
+void ih_surroundings_move_by(const struct ih_surroundings_moves *moves,
+                             const struct ih_surroundings *found, int32_t max_mm,
+                             struct ih_ellipsoid *ellipsoid)
+{
+    int32_t steps[2] = {0, 0}; /* down, away */
+    for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
+        if (found->place[slot] == IH_NONE) {
+            continue;
+        }
+        const uint32_t both = moves->steps[move_place_of(found->place[slot])];
+        steps[0] += (int32_t)(both & MOVE_MASK) - IH_SURROUNDINGS_ZERO;
+        steps[1] += (int32_t)(both >> IH_SURROUNDINGS_BITS) - IH_SURROUNDINGS_ZERO;
+    }
+    for (int i = 0; i < 2; i++) {
+        IH_IN_RANGE(steps[i], -IH_RANGE_MAP_SUM, IH_RANGE_MAP_SUM);
+        const int32_t move_mm_q8 =
+            (int32_t)ih_mul_shift(steps[i] * moves->step_mm_q8[i], found->weight_q12, 12);
+        ellipsoid->centre_mm_q8[1 + i] += ih_clamp_s32(move_mm_q8, -max_mm * 256, max_mm * 256);
+    }
+}
+
+void ih_surroundings_move(const struct ih_rays *rays, int32_t max_mm,
+                          struct ih_ellipsoid *ellipsoid)
+{
+    struct ih_surroundings found;
+    ih_surroundings_find(rays, ellipsoid, &found);
+    ih_surroundings_move_by(&surroundings_moves, &found, max_mm, ellipsoid);
 }

@@ -1,7 +1,8 @@
-/* ih_surroundings - what the rays at and around a candidate say by several learnt maps (ours).
+/* ih_surroundings - what the rays at and around a candidate say by several learnt maps, and where they say that the
+ * head's centre is (ours).
  *
  * In:     rays and points, an ellipsoid, the maps.
- * Out:    by slot, the place in the maps that the ray asks; an answer by each map.
+ * Out:    by slot, the place in the maps that the ray asks; an answer by each map; the ellipsoid moved.
  * Method: the plane at the centre's depth has cells of 64 mm, to 384 mm aside and above and 448 mm below the
  *         centre, those on the left and on the right alike. A ray asks the cell that it passes, and there one of
  *         nine ranges of depth, in which its point lies against the centre, or the tenth place when it is empty.
@@ -13,11 +14,17 @@
  *         One map can say that there is body below; two, with the trees of ih_score that ask both, that it belongs to this
  *         head. tools/learn learns all of them at once (ray_map.py): what a map is about is not given to it. Their
  *         unit means nothing, for trees and curves are learnt behind them. ih_surroundings_map.h has them.
+ *         A fit does not know hair from skull, nor where a head ends that bends over its chest: it is off where a model cannot
+ *         tell, mostly up or down. So two more maps say, in mm, how far below and behind the fitted centre the head's is. They
+ *         are learnt from heads alone (tools/learn), by least squares, and have the same cells, but of all columns from 128 mm
+ *         outwards one. Aside the maps know nothing, for left and right are alike to them.
  * Overflow: a depth is below 2^27 in Q8, a slope at most 2^22: 2^49. A spacing is limited to 2^14 in Q8. A sum of 361
- *         numbers, -8 to 7 each, is below 2^11.5, times a weight of 2^12 2^23.5.
+ *         numbers, -8 to 7 each, is below 2^11.5, times a weight of 2^12 2^23.5; times a step of the moves, 8 mm at most,
+ *         2^22.5, times a weight 2^34.5.
  * Error:  a ray that passes within 1/128 mm of a cell's edge, or a depth within half a mm of a range's, may
- *         be counted on either side. The weight 2 %, at 25 mm of spacing 0.2 %: a square of Q8.
- * Cost:   two products for each ray of known state, and four sums of two maps each: 22,000 instructions (x86-64, -O3).
+ *         be counted on either side. The weight 2 %, at 25 mm of spacing 0.2 %: a square of Q8. A move as the weight.
+ * Cost:   two products for each ray of known state, and four sums of two maps each: 22,000 instructions (x86-64, -O3); a move
+ *         as much again, and 4,000.
  */
 #ifndef IH_SURROUNDINGS_H
 #define IH_SURROUNDINGS_H
@@ -38,9 +45,20 @@
 #define IH_SURROUNDINGS_PLACES \
     (IH_SURROUNDINGS_COLUMNS * IH_SURROUNDINGS_ROWS * IH_SURROUNDINGS_DEPTHS)
 
+#define IH_SURROUNDINGS_MOVE_COLUMNS 3 /* the last one is all that are farther aside */
+#define IH_SURROUNDINGS_MOVE_PLACES \
+    (IH_SURROUNDINGS_MOVE_COLUMNS * IH_SURROUNDINGS_ROWS * IH_SURROUNDINGS_DEPTHS)
+
 struct ih_surroundings {
     int32_t weight_q12;      /* of a ray */
     int16_t place[IH_SLOTS]; /* (row * COLUMNS + column) * DEPTHS + depth, or IH_NONE */
+};
+
+/* How far off a fitted centre is: at each place the steps down in the low bits, those away from the camera in the high
+ * ones, all less IH_SURROUNDINGS_ZERO. */
+struct ih_surroundings_moves {
+    int32_t step_mm_q8[2]; /* 0 to 8 mm */
+    uint8_t steps[IH_SURROUNDINGS_MOVE_PLACES];
 };
 
 IH_BEGIN_DECLS
@@ -57,6 +75,15 @@ void ih_surroundings_ask(const struct ih_surroundings *found,
 void ih_surroundings_ask_maps(const uint32_t maps[IH_SURROUNDINGS_PLACES],
                               const struct ih_surroundings *found,
                               int32_t answer_q8[IH_SURROUNDINGS_MAPS]);
+
+/* Moved down and away as learnt, by max_mm (up to 1000) at most each. */
+void ih_surroundings_move(const struct ih_rays *rays, int32_t max_mm,
+                          struct ih_ellipsoid *ellipsoid);
+
+/* The ellipsoid that was asked about, by other moves. */
+void ih_surroundings_move_by(const struct ih_surroundings_moves *moves,
+                             const struct ih_surroundings *found, int32_t max_mm,
+                             struct ih_ellipsoid *ellipsoid);
 
 IH_END_DECLS
 

@@ -13,6 +13,7 @@
 #include "detect/ih_fit.h"
 #include "detect/ih_fit_equations.h"
 #include "detect/ih_score.h"
+#include "detect/ih_surroundings.h"
 #include "dots/ih_dots.h"
 #include "nests/ih_hypotheses.h"
 #include "points/ih_points.h"
@@ -577,6 +578,15 @@ static void outlines_end_a_millimetre_before_the_lens(void)
     }
 }
 
+/* A fitted head is moved by what is around it, as far as is allowed. */
+static void expect_moved(const struct ih_ellipsoid *fitted, const struct ih_ellipsoid *head)
+{
+    struct ih_ellipsoid moved = *fitted;
+
+    ih_surroundings_move(&scratch.rays, params.move_max_mm, &moved);
+    TEST_ASSERT_EQUAL_MEMORY(&moved, head, sizeof moved);
+}
+
 /* Hopeless after a step: left there. Not hopeless: as if it had been fitted at once. */
 static void what_is_hopeless_is_fitted_for_a_step(void)
 {
@@ -606,12 +616,21 @@ static void what_is_hopeless_is_fitted_for_a_step(void)
                       memcmp(&once.detection[0].head, &detections.detection[0].head,
                              sizeof once.detection[0].head) == 0,
                       "left after a step", pass);
-        if (pass == 1) { /* six steps are nearer than one */
+        if (pass == 1) { /* and then moved */
             struct ih_fit whole;
 
             ih_fit_begin(&expected.head[0], &whole);
             ih_fit_continue(&scratch.rays, &params.fit, IH_FIT_STEPS, &scratch.fit, &whole);
-            TEST_ASSERT_EQUAL_MEMORY(&whole.ellipsoid, &once.detection[0].head,
+            expect_moved(&whole.ellipsoid, &once.detection[0].head);
+            params.hopeless_logit_q10 = hopeless_q10[pass];
+            params.move_max_mm = 1;
+            ih_detections_begin(&detections);
+            look();
+            expect_moved(&whole.ellipsoid, &detections.detection[0].head);
+            params.move_max_mm = 0;
+            ih_detections_begin(&detections);
+            look();
+            TEST_ASSERT_EQUAL_MEMORY(&whole.ellipsoid, &detections.detection[0].head,
                                      sizeof whole.ellipsoid);
         }
     }

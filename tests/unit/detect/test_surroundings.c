@@ -1,4 +1,4 @@
-/* ih_surroundings against a float64 reference, with maps of the test's own: the learnt ones may change. And cells,
+/* ih_surroundings against a float64 reference, with maps and moves of the test's own: the learnt ones may change. And cells,
  * ranges and weights at their limits. */
 #include "base/ih_config.h"
 #include "detect/ih_ellipsoid.h"
@@ -15,7 +15,7 @@ struct vector_scene {
     const char *name;
     const struct vector_ray *ray;
     int32_t centre_mm_q8[3];
-    double weight, answer[IH_SURROUNDINGS_MAPS];
+    double weight, answer[IH_SURROUNDINGS_MAPS], move_mm[2]; /* down, away */
 };
 
 #include "surroundings.inc"
@@ -32,6 +32,10 @@ static struct ih_ellipsoid head;
 static struct ih_surroundings found;
 static uint32_t maps[IH_SURROUNDINGS_PLACES];
 static int32_t answer_q8[IH_SURROUNDINGS_MAPS];
+static struct ih_surroundings_moves moves;
+
+/* More than any of the scenes moves. */
+#define FAR_MM 20000
 
 void setUp(void)
 {
@@ -40,6 +44,9 @@ void setUp(void)
     memset(&rays, 0, sizeof rays);
     memset(maps, 0x88, sizeof maps);
     memset(answer_q8, IH_TEST_FILL, sizeof answer_q8);
+    memset(&moves, 0x88, sizeof moves);
+    moves.step_mm_q8[0] = 1 << 8;
+    moves.step_mm_q8[1] = 1 << 8;
     memset(&found, IH_TEST_FILL, sizeof found);
     head = (struct ih_ellipsoid){.centre_mm_q8 = {0, 0, DEPTH_MM << 8},
                                  .semi_mm_q8 = {SEMI_MM_Q8, SEMI_MM_Q8, SEMI_MM_Q8}};
@@ -73,7 +80,8 @@ static void use_scene(const struct vector_scene *scene)
 /* The weight is a square of a spacing in steps of 1/256 mm, known to 2: an isqrt's and its own. */
 static void scenes_match_float64(void)
 {
-    int i, slot, map;
+    struct ih_ellipsoid moved;
+    int i, slot, map, axis;
 
     for (i = 0; i < IH_TEST_COUNT(vector_scenes); i++) {
         const struct vector_scene *scene = &vector_scenes[i];
@@ -90,6 +98,16 @@ static void scenes_match_float64(void)
             IH_TEST_WITHIN(fabs(scene->answer[map]) * error / scene->weight + 1.0 / 256,
                            scene->answer[map], ih_test_from_q(answer_q8[map], 8), scene->name,
                            100 + map);
+        }
+        moved = head;
+        ih_surroundings_move_by(&vector_moves, &found, FAR_MM, &moved);
+        TEST_ASSERT_EQUAL_INT32(head.centre_mm_q8[0], moved.centre_mm_q8[0]);
+        for (axis = 0; axis < 2; axis++) {
+            const double move_mm =
+                ih_test_from_q(moved.centre_mm_q8[1 + axis] - head.centre_mm_q8[1 + axis], 8);
+
+            IH_TEST_WITHIN(fabs(scene->move_mm[axis]) * (error / scene->weight + 1e-5) + 1.0 / 256,
+                           scene->move_mm[axis], move_mm, scene->name, 200 + axis);
         }
     }
 }
@@ -228,10 +246,50 @@ static void sums_of_two_maps_stay_apart(void)
     }
 }
 
+/* Three rays, of which one is of unknown state; the same steps left and right, and from the third column outwards. */
+static void moves_add_up_by_columns(void)
+{
+    static const struct {
+        int32_t x_mm, column;
+    } cases[] = {{10, 0}, {-10, 0}, {70, 1}, {-70, 1}, {130, 2}, {200, 2}, {-370, 2}};
+    int i, k;
+
+    moves.step_mm_q8[0] = 3 << 7; /* 1.5 mm */
+    for (k = 0; k < IH_SURROUNDINGS_MOVE_COLUMNS; k++) {
+        /* 2 + k down, 3 + k towards the camera */
+        moves.steps[(6 * IH_SURROUNDINGS_MOVE_COLUMNS + k) * IH_SURROUNDINGS_DEPTHS + 4] =
+            (uint8_t)((8 - 3 - k) << 4 | (8 + 2 + k));
+    }
+    for (i = 0; i < IH_TEST_COUNT(cases); i++) {
+        struct ih_ellipsoid moved = head;
+
+        for (k = 0; k < 3; k++) {
+            rays.ray[k] = (struct ih_ray){.slope_x_q20 = 4 * 256 * cases[i].x_mm,
+                                          .point_mm_q8 = {0, 0, head.centre_mm_q8[2]},
+                                          .state = k == 1 ? IH_RAY_UNKNOWN : IH_RAY_SEEN};
+        }
+        ih_surroundings_find(&rays, &head, &found);
+        ih_surroundings_move_by(&moves, &found, FAR_MM, &moved);
+        IH_TEST_EQUAL(head.centre_mm_q8[0], moved.centre_mm_q8[0], "aside", i);
+        IH_TEST_EQUAL(head.centre_mm_q8[1] + 2 * (2 + cases[i].column) * 384, moved.centre_mm_q8[1],
+                      "down", i);
+        IH_TEST_EQUAL(head.centre_mm_q8[2] - 2 * (3 + cases[i].column) * 256, moved.centre_mm_q8[2],
+                      "away", i);
+        moved = head;
+        ih_surroundings_move_by(&moves, &found, 5, &moved);
+        IH_TEST_EQUAL(head.centre_mm_q8[1] + (5 << 8), moved.centre_mm_q8[1], "at most down", i);
+        IH_TEST_EQUAL(head.centre_mm_q8[2] - (5 << 8), moved.centre_mm_q8[2], "at most towards", i);
+        moved = head;
+        ih_surroundings_move_by(&moves, &found, 0, &moved);
+        TEST_ASSERT_EQUAL_MEMORY(&head, &moved, sizeof head);
+    }
+}
+
 /* As far as rays, points and fits can be; the largest sum. The sanitizers watch. */
 static void extremes_do_not_overflow(void)
 {
     struct ih_test_random random = {31};
+    struct ih_ellipsoid moved;
     int pass, slot, axis, map;
 
     for (pass = 0; pass < 400; pass++) {
@@ -264,6 +322,14 @@ static void extremes_do_not_overflow(void)
             IH_TEST_EQUAL((int32_t)floor(ldexp(known * each * found.weight_q12, -4) + 0.5),
                           answer_q8[map], "answer", pass);
         }
+        memset(moves.steps, pass % 2 == 0 ? 0 : UINT8_MAX, sizeof moves.steps);
+        moves.step_mm_q8[0] = 8 << 8;
+        moved = head;
+        ih_surroundings_move_by(&moves, &found, 1000, &moved);
+        IH_TEST_EQUAL(
+            (int32_t)fmax(fmin(floor(ldexp(known * each * found.weight_q12, -1) + 0.5), 256000),
+                          -256000),
+            moved.centre_mm_q8[1] - head.centre_mm_q8[1], "move", pass);
     }
 }
 
@@ -276,6 +342,7 @@ int main(void)
     RUN_TEST(dense_rays_have_small_weights);
     RUN_TEST(rays_of_known_state_add_up);
     RUN_TEST(sums_of_two_maps_stay_apart);
+    RUN_TEST(moves_add_up_by_columns);
     RUN_TEST(extremes_do_not_overflow);
     return UNITY_END();
 }
