@@ -10,7 +10,7 @@
 #include "ih_test.h"
 
 /* What the model of a head does not know, in quadrature; at most MAX_MM in all. */
-#define MODEL_MM 28
+#define MODEL_MM 30
 #define MAX_MM 500
 
 static struct ih_hypotheses hypotheses;
