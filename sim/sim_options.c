@@ -236,7 +236,7 @@ void sim_options_help(void)
           "                 nests     no candidates from the paper's nests, only evidence\n"
           "                 expected  no candidates from tracks\n"
           "                 fit       candidates are not fitted: mean heads instead\n"
-          "                 move      fitted centres stay where they are\n"
+          "                 move      fitted centres are not moved by what is around them\n"
           "                 tracks    every frame on its own\n"
           "                 windows   of a depth image only the best window\n"
           "                 missing   dots that are not seen are not entered as far points\n"

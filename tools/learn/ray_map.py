@@ -28,6 +28,7 @@ MOVE_RIDGE, MOVE_PASSES, MOVE_ROBUST_MM = 300.0, 5, 20.0
 # Against differences of neighbours: how many rays fall into a cell is a matter of chance, and a head that moves by half a
 # dot's distance should not be moved otherwise.
 MOVE_SMOOTH = 8000.0
+STEP_MAX_MM = 8  # as ih_surroundings.h has it
 QUANTILES = 65  # evidence is given to the network by its rank
 SEED = 9
 
@@ -164,6 +165,8 @@ def fit_moves(place, weight_q12, off_mm):
         left_mm = numpy.linalg.norm(off_mm - needed @ by_place_mm, axis=1)
         weight = numpy.minimum(1.0, MOVE_ROBUST_MM / numpy.maximum(left_mm, 1e-6))
     step_mm_q8 = numpy.round(numpy.quantile(numpy.abs(by_place_mm), CLIPPED, axis=0) / (ZERO - 1) * 256).astype(int)
+    if not ((step_mm_q8 > 0) & (step_mm_q8 <= STEP_MAX_MM << 8)).all():
+        raise ValueError("steps of %s / 256 mm: expected more than 0, at most %d mm" % (step_mm_q8, STEP_MAX_MM))
     return numpy.clip(numpy.round(by_place_mm * 256 / step_mm_q8), -ZERO, ZERO - 1).astype(int), step_mm_q8
 
 

@@ -8,8 +8,8 @@
  *         pre-filter rejects (ih_prescreen), and starts within apart_mm of one before, are passed over. Each
  *         other one is fitted for a step (ih_fit), measured (ih_evidence) and scored (ih_score). Those that are not
  *         hopeless are fitted to the end, moved to where their surroundings say that the centre is
- *         (ih_surroundings), measured and scored again. Tracks take no detection below log-odds -3: hopeless is 2 below
- *         that after a step. A range frame has several windows: begin once a frame, add once a window.
+ *         (ih_surroundings), measured and scored again; with a step_count of 0 or 1 none is moved.
+ *         Tracks take no detection below log-odds -3: hopeless is 2 below that after a step. A range frame has several windows: begin once a frame, add once a window.
  *         For an expected head that is not found there is what its rays met (views): whether it is
  *         hidden, or gone.
  *         Of two within spacing_mm the more probable stays, of equals the first; it replaces all that
@@ -60,7 +60,7 @@ struct ih_detections_params {
     int32_t nest_max;           /* of them this many are candidates themselves */
     int32_t expected_max; /* of the expected heads, and of the last sure places, this many are */
     int32_t front_min_mm; /* no head is nearer than this: the lens is there */
-    int32_t move_max_mm;  /* by this at most a fitted centre is moved: up to 1000 */
+    int32_t move_max_mm;  /* of a centre fitted to the end, down and away each: 0 (none) to 1000 */
 };
 
 struct ih_detection {

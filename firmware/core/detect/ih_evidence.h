@@ -1,7 +1,7 @@
 /* ih_evidence - measurements of a fitted head's surface and surroundings, which the score weighs (ours; the
  * paper's limits on size and curvature are among them).
  *
- * In:     rays and points, the fitted ellipsoid, where the fit began.
+ * In:     rays and points, the ellipsoid, fitted and moved, where the fit began.
  * Out:    IH_EVIDENCE_COUNT numbers, each with its meaning and unit below, all in Q8.
  * Method: the surface: "on" are points of rays through the ellipsoid (radius2 below 0.9): without its edge,
  *         where depths are uncertain. What is around it is left to the learnt maps of ih_surroundings.
@@ -34,7 +34,7 @@ enum ih_evidence_kind {
     IH_EVIDENCE_ROUGH,       /* their root mean square distance: mm */
     IH_EVIDENCE_BULGE,       /* that of their best plane, minus ROUGH: mm; a board has none */
     IH_EVIDENCE_TALL,        /* semi-axis up, above the mean head's: % */
-    IH_EVIDENCE_MOVED,       /* from the start of the fit: mm */
+    IH_EVIDENCE_MOVED,       /* from the start of the fit, with the move by its surroundings: mm */
     IH_EVIDENCE_BEND_DOWN,   /* how uneven the surface is from dot to dot, downwards: mm */
     IH_EVIDENCE_BEND_ACROSS, /* and across */
     IH_EVIDENCE_DISTANCE, /* depth of the centre: mm; near and far heads show themselves otherwise */

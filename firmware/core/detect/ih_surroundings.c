@@ -21,9 +21,10 @@
 /* Two maps, half a word apart, are summed at once: 361 numbers below 16 do not overflow 16 bits. */
 #define PAIRS (IH_SURROUNDINGS_MAPS / 2)
 #define PAIR_MASK 0x000f000fu
-#define MOVE_MASK 0xfu
 _Static_assert(IH_SURROUNDINGS_MAPS == 8 && IH_SURROUNDINGS_BITS == 4,
                "a word has a number by each map");
+
+#define MOVE_MASK 0xfu /* the steps down; those away are above */
 
 static const uint8_t depth_of_step[STEPS] = {
     1, 1, 1, 1, 1, 1, 1, 1, 1, 1,          /* -256 */

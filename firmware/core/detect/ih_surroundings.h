@@ -80,7 +80,7 @@ void ih_surroundings_ask_maps(const uint32_t maps[IH_SURROUNDINGS_PLACES],
 void ih_surroundings_move(const struct ih_rays *rays, int32_t max_mm,
                           struct ih_ellipsoid *ellipsoid);
 
-/* The ellipsoid that was asked about, by other moves. */
+/* The ellipsoid that found is of, by other moves. */
 void ih_surroundings_move_by(const struct ih_surroundings_moves *moves,
                              const struct ih_surroundings *found, int32_t max_mm,
                              struct ih_ellipsoid *ellipsoid);

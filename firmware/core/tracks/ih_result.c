@@ -8,7 +8,7 @@
 
 /* What the filter does not know, as it is the same in every frame: hair, helmets, a tilted head, which part of it is seen.
  * 90 % of the centres lie within twice the filter's 12 mm and 30 mm together, of people of true anatomy before each of
- * three rigs, before cameras that do not hang level, and with half of the dots missing (experiment 027). */
+ * three rigs, before cameras that do not hang level, and with half of the dots missing (experiments 027, 033). */
 #define MODEL_MM_Q8 (30 << 8)
 /* Of the filter, too. */
 #define SIGMA_MAX_MM_Q8 (500 << 8)

@@ -584,10 +584,11 @@ static void expect_moved(const struct ih_ellipsoid *fitted, const struct ih_elli
     struct ih_ellipsoid moved = *fitted;
 
     ih_surroundings_move(&scratch.rays, params.move_max_mm, &moved);
+    TEST_ASSERT_TRUE(memcmp(&moved, fitted, sizeof moved) != 0);
     TEST_ASSERT_EQUAL_MEMORY(&moved, head, sizeof moved);
 }
 
-/* Hopeless after a step: left there. Not hopeless: as if it had been fitted at once. */
+/* Hopeless after a step: left there. Not hopeless: as if it had been fitted at once, then moved and measured there. */
 static void what_is_hopeless_is_fitted_for_a_step(void)
 {
     static const int32_t hopeless_q10[] = {1 << 20, -(1 << 20)};
@@ -617,11 +618,15 @@ static void what_is_hopeless_is_fitted_for_a_step(void)
                              sizeof once.detection[0].head) == 0,
                       "left after a step", pass);
         if (pass == 1) { /* and then moved */
+            struct ih_evidence evidence;
             struct ih_fit whole;
 
             ih_fit_begin(&expected.head[0], &whole);
             ih_fit_continue(&scratch.rays, &params.fit, IH_FIT_STEPS, &scratch.fit, &whole);
             expect_moved(&whole.ellipsoid, &once.detection[0].head);
+            ih_evidence_collect(&scratch.rays, &once.detection[0].head, whole.start_mm_q8,
+                                &evidence);
+            TEST_ASSERT_EQUAL_MEMORY(&evidence, &once.detection[0].evidence, sizeof evidence);
             params.hopeless_logit_q10 = hopeless_q10[pass];
             params.move_max_mm = 1;
             ih_detections_begin(&detections);
