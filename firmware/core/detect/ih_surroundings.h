@@ -24,7 +24,7 @@
  * Error:  a ray that passes within 1/128 mm of a cell's edge, or a depth within half a mm of a range's, may
  *         be counted on either side. The weight 2 %, at 25 mm of spacing 0.2 %: a square of Q8. A move as the weight.
  * Cost:   two products for each ray of known state, and four sums of two maps each: 22,000 instructions (x86-64, -O3); a move
- *         as much again, and 4,000.
+ *         30,000.
  */
 #ifndef IH_SURROUNDINGS_H
 #define IH_SURROUNDINGS_H
