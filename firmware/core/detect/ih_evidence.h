@@ -10,8 +10,8 @@
  *         within 1.4 semi-axes of it; their mean is with one more of 12 mm, so that few change little. A face and hair
  *         bend more than a limb, a bag or a ball, above all from brow to chin.
  *         Rays of unknown state count nowhere.
- * Overflow: points and centres below 2^26 in Q8. Moments are of points on the ellipsoid, 220 mm at
- *         most from its centre: products 2^23.6 in Q8, 361 of them 2^32.1, squared sums 2^40.6;
+ * Overflow: points are below 2^25 in Q8, centres below 2^27: squares of differences 2^57.6. Moments are of points on
+ *         the ellipsoid, 220 mm at most from its centre: products 2^23.6 in Q8, 361 of them 2^32.1, squared sums 2^40.6;
  *         central ones 2^23.6, their determinants 2^48.2, times 2^12 2^60.2. Heights are within half of the longest
  *         semi-axis, 16 bits.
  * Error:  counts are exact but where a ray passes within 2^-10 of a limit; rough within 0.03 mm, bulge
