@@ -310,7 +310,8 @@ class Moves(unittest.TestCase):
         with unittest.mock.patch.multiple(ray_map, MOVE_RIDGE=3.0, MOVE_SMOOTH=30.0):  # few heads, little noise
             steps, step_mm_q8 = ray_map.fit_moves(place, weight_q12, off_mm)
         error_mm = abs(steps * numpy.array(step_mm_q8) / 256 - true_mm)
-        # Half a step, and less for the penalties, which pull towards zero and the neighbours.
+        # A step is a seventh of the largest, 1 mm: half of one. At the ends a step, and a tenth for the penalties, which
+        # pull towards zero and towards neighbours that are all on one side.
         self.assertLess(numpy.median(error_mm), 1.0 / 14)
         self.assertLess(error_mm.max(), 2.0 / 14 + 0.1)
 

@@ -3,7 +3,6 @@
 #include <string.h>
 
 #include "base/ih_fix.h"
-#include "base/ih_range.h"
 #include "detect/ih_candidates.h"
 #include "detect/ih_prescreen.h"
 #include "detect/ih_score.h"
@@ -135,10 +134,6 @@ static void try_start(const struct context *context, const struct ih_ellipsoid *
                         &fit);
         detection.head = fit.ellipsoid;
         ih_surroundings_move(context->rays, params->move_max_mm, &detection.head);
-        for (int axis = 1; axis < 3; axis++) {
-            IH_IN_RANGE(detection.head.centre_mm_q8[axis], -IH_RANGE_CENTRE_MM_Q8,
-                        IH_RANGE_CENTRE_MM_Q8);
-        }
         rate(context, &fit, &detection);
     }
     if (is_too_near(context, &detection.head)) {

@@ -9,15 +9,16 @@
  *         other one is fitted for a step (ih_fit), measured (ih_evidence) and scored (ih_score). Those that are not
  *         hopeless are fitted to the end, moved to where their surroundings say that the centre is
  *         (ih_surroundings), measured and scored again; with a step_count of 0 or 1 none is moved.
- *         Tracks take no detection below log-odds -3: hopeless is 2 below that after a step. A range frame has several windows: begin once a frame, add once a window.
+ *         Tracks take no detection below log-odds -3: hopeless is 2 below that after a step. A range frame
+ *         has several windows: begin once a frame, add once a window.
  *         For an expected head that is not found there is what its rays met (views): whether it is
  *         hidden, or gone.
  *         Of two within spacing_mm the more probable stays, of equals the first; it replaces all that
  *         are near it.
  * Full table: the less probable drop and count in dropped_count.
  * Overflow: points are below 2^25 in Q8 (16 m, slopes up to 8), nests' centres below 2^26.01, expected
- *         ones at most 2^26, last sure ones 2^26.01; a fit moves 240 mm, its surroundings 1000: centres below 2^27, squares of
- *         differences 2^57.6.
+ *         ones at most 2^26, last sure ones 2^26.01; a fit moves 240 mm, its surroundings 1000:
+ *         centres below 2^27, squares of differences 2^57.6.
  * Cost:   up to IH_DETECTIONS_STARTS_MAX = 40 fits a window. Usually 12 candidates, of which 6 are fitted for a step
  *         and 3 to the end; one more for a head that is hidden.
  */

@@ -173,6 +173,7 @@ void ih_surroundings_move_by(const struct ih_surroundings_moves *moves,
         const int32_t move_mm_q8 =
             (int32_t)ih_mul_shift(steps[i] * moves->step_mm_q8[i], found->weight_q12, 12);
         ellipsoid->centre_mm_q8[1 + i] += ih_clamp_s32(move_mm_q8, -max_mm * 256, max_mm * 256);
+        IH_IN_RANGE(ellipsoid->centre_mm_q8[1 + i], -IH_RANGE_CENTRE_MM_Q8, IH_RANGE_CENTRE_MM_Q8);
     }
 }
 

@@ -57,7 +57,7 @@ struct ih_surroundings {
 /* How far off a fitted centre is: at each place the steps down in the low bits, those away from the camera in the high
  * ones, all less IH_SURROUNDINGS_ZERO. */
 struct ih_surroundings_moves {
-    int32_t step_mm_q8[2]; /* 0 to 8 mm */
+    int32_t step_mm_q8[2]; /* above 0, at most 8 mm */
     uint8_t steps[IH_SURROUNDINGS_MOVE_PLACES];
 };
 
