@@ -370,12 +370,33 @@ static const char *const evidence_name[] = {
 _Static_assert(sizeof evidence_name / sizeof evidence_name[0] == IH_EVIDENCE_COUNT,
                "every kind has a name");
 
+static void write_rays(struct app_write *write, const struct ih_rays *rays)
+{
+    const struct ih_ray *ray = rays->ray;
+    app_write_open(write, '{');
+    write_column(write, "origin_mm_q8", rays->origin_mm_q8, 3, sizeof(int32_t));
+    app_write_int_field(write, "pitch_q20", rays->table.pitch_q20);
+    write_column(write, "slope_x_q20", &ray->slope_x_q20, IH_SLOTS, sizeof *ray);
+    write_column(write, "slope_y_q20", &ray->slope_y_q20, IH_SLOTS, sizeof *ray);
+    write_column(write, "x_mm_q8", &ray->point_mm_q8[0], IH_SLOTS, sizeof *ray);
+    write_column(write, "y_mm_q8", &ray->point_mm_q8[1], IH_SLOTS, sizeof *ray);
+    write_column(write, "z_mm_q8", &ray->point_mm_q8[2], IH_SLOTS, sizeof *ray);
+    write_column(write, "state", &ray->state, IH_SLOTS, sizeof *ray);
+    app_write_close(write, '}');
+}
+
 static void write_detections(struct app_write *write, const struct isohead *head,
                              const struct ih_frame *view)
 {
     const int32_t count = head->detections.detection_count;
     struct ih_rays rays[IH_WINDOWS_MAX];
     const int32_t rays_count = make_rays(head, view, rays);
+    app_write_key(write, "rays");
+    app_write_open(write, '[');
+    for (int32_t i = 0; i < rays_count; i++) {
+        write_rays(write, &rays[i]);
+    }
+    app_write_close(write, ']');
     app_write_key(write, "evidence");
     app_write_open(write, '[');
     for (int kind = 0; kind < IH_EVIDENCE_COUNT; kind++) {

@@ -41,8 +41,8 @@ VECTORS = {"ih_scanline.c", "ih_bandpass.c", "ih_bandpass_respond.c", "ih_bandpa
            "ih_normal_equations.c", "ih_normal_solve.c", "ih_multiquadric.c", "ih_surface.c",
            "ih_surface_rows.c", "ih_surface_grid.c",
            "ih_contours.c", "ih_arcs.c", "ih_arc_fans.c", "ih_ellipse.c",
-           "ih_template.c", "ih_scan.c", "ih_fit_weights.c", "ih_fit_equations.c",
-           "ih_prescreen.c", "ih_align_fit.c", "ih_label_seeds.c",
+           "ih_scan.c", "ih_fit_weights.c", "ih_fit_equations.c",
+           "ih_align_fit.c", "ih_label_seeds.c",
            "ih_ellipsoid.c", "ih_evidence.c", "ih_surroundings.c", "ih_pose_look.c"}
 OUTSIDE = {name: 64 for name in SYMBOLS_ALLOWED}
 ENTRIES = ("isohead_init", "isohead_frame", "isohead_label", "isohead_find", "ih_cloud_draw")

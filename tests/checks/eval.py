@@ -300,11 +300,11 @@ class Moves(unittest.TestCase):
     def test_how_far_off_a_centre_is_is_learnt_by_place(self):
         """Of heads whose rays say it, and a few that are elsewhere: a slope from row to row, other in each direction."""
         random = numpy.random.default_rng(5)
-        row = numpy.arange(ray_map.MOVE_PLACES) // (ray_map.MOVE_COLUMNS * ray_map.DEPTHS)
+        row = numpy.arange(ray_map.COARSE_PLACES) // (ray_map.COARSE_COLUMNS * ray_map.DEPTHS)
         true_mm = numpy.stack([(row - 6) / 6.0, (4 - row) / 8.0], axis=1)
         place = random.integers(-1, ray_map.PLACES, (6000, 120)).astype(numpy.int16)
         weight_q12 = random.integers(1000, 4097, len(place))
-        steps_mm = numpy.where((place >= 0)[..., None], true_mm[ray_map.move_places()[place]], 0.0)
+        steps_mm = numpy.where((place >= 0)[..., None], true_mm[ray_map.coarse_places()[place]], 0.0)
         off_mm = weight_q12[:, None] / 4096 * steps_mm.sum(axis=1)
         off_mm[::300] += 80.0
         with unittest.mock.patch.multiple(ray_map, MOVE_RIDGE=3.0, MOVE_SMOOTH=30.0):  # few heads, little noise
@@ -319,7 +319,7 @@ class Moves(unittest.TestCase):
         rough = ray_map.move_roughness()
         self.assertTrue(numpy.allclose(rough.sum(axis=0), 0.0))
         # Inside four neighbours aside and by row, two by range; the last place, nothing, has none of those.
-        inside = (6 * ray_map.MOVE_COLUMNS + 1) * ray_map.DEPTHS
+        inside = (6 * ray_map.COARSE_COLUMNS + 1) * ray_map.DEPTHS
         self.assertEqual([rough[inside + depth, inside + depth] for depth in (0, 4, 8, 9)], [5.0, 6.0, 5.0, 4.0])
 
 

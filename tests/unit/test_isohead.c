@@ -801,7 +801,7 @@ static void defaults_are_those_of_the_references(void)
     TEST_ASSERT_EQUAL_INT32(lround(0.42 * 65536), params.nests.ellipse.chord_max_q16);
     TEST_ASSERT_EQUAL_INT32(100, params.detections.rays.probe_mm);
     TEST_ASSERT_EQUAL_INT32(98, params.detections.scan.deep_mm);
-    TEST_ASSERT_EQUAL_INT32(80, params.detections.scan.spacing_mm);
+    TEST_ASSERT_EQUAL_INT32(60, params.detections.scan.spacing_mm);
     TEST_ASSERT_EQUAL_INT32(60, params.detections.fit.see_through_mm);
 }
 

@@ -9,7 +9,14 @@ import subprocess
 
 import numpy
 
+import ray_map
+
 SLOTS = 361
+GRID = 19
+DEEP_MM = 98  # behind a point, where ih_scan tries a head
+# Of a directory every so many frames are learnt the promise from: a frame has 90 centres.
+TRIED_EVERY = 8
+ASKED = numpy.arange(SLOTS).reshape(GRID, GRID)[::2, ::2].ravel()  # rays, as in ih_surroundings.c
 
 
 def render(program, directory, seed, options):
@@ -37,11 +44,45 @@ def read_truth(directory):
     return truth
 
 
-def read_trace(path):
+def read_rays(columns):
+    """Of a view: where the rays start, their pitch, and of each its slope, its point, its state."""
+    def of(names, bits):
+        return numpy.stack([numpy.array(columns[name]) for name in names], axis=-1) / (1 << bits)
+
+    return {"origin_mm": numpy.array(columns["origin_mm_q8"]) / 256, "pitch": columns["pitch_q20"] / (1 << 20),
+            "slope": of(("slope_x_q20", "slope_y_q20"), 20), "point_mm": of(("x_mm_q8", "y_mm_q8", "z_mm_q8"), 8),
+            "state": numpy.array(columns["state"])}
+
+
+def tried(rays):
+    """Centres that ih_scan tries: behind the first seen point of each block of two by two slots."""
+    slots = numpy.flatnonzero(rays["state"] == ray_map.SEEN)
+    block = slots // GRID // 2 * GRID + slots % GRID // 2
+    slots = slots[numpy.unique(block, return_index=True)[1]]
+    ahead = numpy.column_stack([rays["slope"][slots], numpy.ones(len(slots))])
+    return rays["point_mm"][slots] + DEEP_MM * ahead / numpy.linalg.norm(ahead, axis=1)[:, None]
+
+
+def read_tried(trace):
+    """All centres that are tried in a frame, where the rays that are asked are in the map, and a ray's weight."""
+    parts = [(numpy.zeros((0, 3)), numpy.zeros((0, len(ASKED)), numpy.int16), numpy.zeros(0))]
+    for view in trace["rays"]:
+        rays = read_rays(view)
+        centre_mm = tried(rays)
+        away_mm = centre_mm[:, 2] - rays["origin_mm"][2]
+        weight = numpy.minimum(numpy.maximum(away_mm, 0) * rays["pitch"] / ray_map.CELL_MM, 1)**2
+        asked = {**rays, **{key: rays[key][ASKED] for key in ("slope", "point_mm", "state")}}
+        parts.append((centre_mm, ray_map.coarse_places_around(asked, centre_mm), weight))
+    centre_mm, place, weight = (numpy.concatenate(column) for column in zip(*parts))
+    return {"centre_mm": centre_mm, "place": place, "weight": weight}
+
+
+def read_trace(path, with_tried):
     with open(path, encoding="utf-8") as file:
         trace = json.load(file)
+    more = {"tried": read_tried(trace)} if with_tried else {}
     found = [f for f in trace["findings"] if "surroundings" in f]
-    return {
+    return more | {
         "file": trace["file"],
         "kinds": trace["evidence"],
         # To the level frame, in which detections are; a camera that hangs level has none.
@@ -62,8 +103,8 @@ def look(program, options, directory, scratch):
     subprocess.run([program, *options, "--trace", out, directory], check=True, stdout=subprocess.DEVNULL)
     truth = read_truth(directory)
     frames = []
-    for path in sorted(glob.glob(os.path.join(out, "**", "*.json"), recursive=True)):
-        frame = read_trace(path)
+    for index, path in enumerate(sorted(glob.glob(os.path.join(out, "**", "*.json"), recursive=True))):
+        frame = read_trace(path, with_tried=index % TRIED_EVERY == 0)
         if frame["file"] in truth:
             frame["heads"], frame["unclear"] = (heads @ frame["level"].T for heads in truth[frame["file"]])
             frame["directory"] = directory

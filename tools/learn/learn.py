@@ -10,8 +10,9 @@ logistic model: log-odds = bias + one piecewise linear curve per kind of evidenc
 curves that bend; then trees for what the curves leave. A detection within 55 mm of a head is one, beyond 100 mm it is none,
 between it is not used, and neither is one within 150 mm of a head that is hardly seen. A sequence of tools/people counts
 as three frames of tools/render. Every detection is learnt from once more, for half as much, as if the view ended nearer.
-How far off a fitted centre is (the moves of ih_surroundings.h) is learnt from the same frames without moves.
-Run it twice: where detections are depends on the moves, and which remain a little on the score that rated them.
+How far off a fitted centre is (the moves of ih_surroundings.h) is learnt from the same frames without moves; whether a
+centre is worth a fit (its promise), from what ih_scan tries in every eighth frame, which depends on nothing that is learnt.
+Run it twice: where detections are depends on the moves, and which remain a little on the promise and the score.
 """
 
 import argparse
@@ -33,6 +34,7 @@ ROOT = os.path.dirname(os.path.dirname(HERE))
 HEAD_MM = 55
 NO_HEAD_MM = 100
 UNCLEAR_MM = 150
+PROMISED_MM = 90
 # Hardly a head is farther away in the scenes: what is would teach that far things are no heads.
 FAR_MM = 2900
 # Of a rendered frame, and of a whole sequence of people.
@@ -43,15 +45,17 @@ ENDING_WEIGHT = 0.5
 PRIOR = 0.25
 
 
+def nearest(centre_mm, heads):
+    """Of every centre the distance to the nearest of the heads."""
+    if len(heads) == 0:
+        return numpy.full(len(centre_mm), numpy.inf)
+    return numpy.linalg.norm(centre_mm[:, None] - heads[None], axis=2).min(axis=1)
+
+
 def label(frame):
     """Of every detection: 1 a head, 0 none, nan not to be used."""
-    def nearest(heads):
-        if len(heads) == 0:
-            return numpy.full(len(frame["centre_mm"]), numpy.inf)
-        return numpy.linalg.norm(frame["centre_mm"][:, None] - heads[None], axis=2).min(axis=1)
-
-    distance = nearest(frame["heads"])
-    none = (distance > NO_HEAD_MM) & (nearest(frame["unclear"]) > UNCLEAR_MM)
+    distance = nearest(frame["centre_mm"], frame["heads"])
+    none = (distance > NO_HEAD_MM) & (nearest(frame["centre_mm"], frame["unclear"]) > UNCLEAR_MM)
     none &= frame["centre_mm"][:, 2] < FAR_MM
     return numpy.where(distance < HEAD_MM, 1.0, numpy.where(none, 0.0, numpy.nan))
 
@@ -84,6 +88,18 @@ def moves_of(seen):
         near = numpy.linalg.norm(off_mm, axis=1) < NO_HEAD_MM
         parts.append((frame["place"][near], frame["weight_q12"][near], off_mm[near, 1:]))
     return ray_map.fit_moves(*(numpy.concatenate(column) for column in zip(*parts)))
+
+
+def promise_of(seen):
+    """Is a head near the centres that the scan tries? One near a head that is hardly seen is not used."""
+    parts = []
+    for frame in seen:
+        if "tried" not in frame:
+            continue
+        centre_mm, place, weight = (frame["tried"][key] for key in ("centre_mm", "place", "weight"))
+        used = nearest(centre_mm, frame["unclear"]) > UNCLEAR_MM
+        parts.append((place[used], weight[used], nearest(centre_mm, frame["heads"])[used] < PROMISED_MM))
+    return ray_map.fit_promise(*(numpy.concatenate(column) for column in zip(*parts)))
 
 
 def and_in_ending_views(evidence, place, weight_q12, labels, importances):
@@ -179,6 +195,7 @@ def main():
     directories = directories_of(arguments, arguments.seeds, arguments.depth_seeds, arguments.clutter_seeds) + people
     moves = moves_of(see(directories, ("--without", "move")))
     seen = see(directories)
+    promise = promise_of(seen)
     kinds = seen[0]["kinds"]
     rows = gather(seen, set(people))
     print("%d frames, %d detections, %d heads" % (len(seen), len(rows[3]), rows[3].sum()))
@@ -187,7 +204,7 @@ def main():
         arguments.seeds, arguments.depth_seeds, arguments.clutter_seeds,
         " ".join(os.path.basename(os.path.normpath(folder)) for folder in arguments.people))
     model.write(os.path.join(arguments.out, "ih_score_weights.h"), learnt.curves, kinds, command)
-    ray_map.write(os.path.join(arguments.out, "ih_surroundings_map.h"), learnt.maps, moves, command)
+    ray_map.write(os.path.join(arguments.out, "ih_surroundings_map.h"), learnt.maps, moves, promise, command)
     report(learnt, seen, arguments.limit)
     check = arguments.check_seeds
     report(learnt, see(directories_of(arguments, check, check, check)), arguments.limit)

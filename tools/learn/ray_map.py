@@ -3,12 +3,14 @@
 All maps are learnt at once, as a part of the first layer of a small network, which has their answers and the other
 evidence before it. The rest of the network is thrown away: curves and trees are learnt behind the maps.
 
-And the moves: how far below and behind a fitted centre the head's is, by what is seen at each place; by least squares."""
+And the moves: how far below and behind a fitted centre the head's is, by what is seen at each place; by least squares.
+And the promise: is there a head where none was fitted yet, by logistic regression."""
 
 import numpy
 import scipy.sparse
 
 COLUMNS, ROWS, DEPTHS, MAPS = 6, 13, 10, 8  # as in ih_surroundings.h
+UNKNOWN, SEEN, EMPTY = range(3)  # of a ray, as in ih_rays.h
 PLACES = COLUMNS * ROWS * DEPTHS
 BITS, ZERO = 4, 8
 CLIPPED = 0.98  # this fraction of a map's numbers is within its range
@@ -22,8 +24,11 @@ MEAN, SQUARE = 0.9, 0.999  # memories of the steps (Adam)
 ENDS_BELOW, ENDS_ASIDE, ENDS_ABOVE, ENDS_BEHIND = 0.75, 0.5, 0.4, 0.4
 ROWS_KEPT, COLUMNS_KEPT, ROWS_LOST, DEPTHS_KEPT = (8, ROWS), (2, COLUMNS), (0, 5), (7, 8)
 ENDS_SEED = 5
-MOVE_COLUMNS = 3  # the last one is all that are farther aside
-MOVE_PLACES = MOVE_COLUMNS * ROWS * DEPTHS
+COARSE_COLUMNS = 3  # the last one is all that are farther aside
+COARSE_PLACES = COARSE_COLUMNS * ROWS * DEPTHS
+CELL_MM, TOP_MM = 64.0, 384.0
+LIMITS_MM = numpy.array([-256, -176, -96, -40, 40, 128, 200, 304]) - 0.5
+PROMISE_RIDGE, PROMISE_PASSES = 100.0, 12
 MOVE_RIDGE, MOVE_PASSES, MOVE_ROBUST_MM = 300.0, 5, 20.0
 # Against differences of neighbours: how many rays fall into a cell is a matter of chance, and a head that moves by half a
 # dot's distance should not be moved otherwise.
@@ -136,28 +141,28 @@ def answers(maps, place, weight_q12):
     return ((counts_of(place) @ maps * weight_q12[:, None] + (1 << 3)) >> 4) / 256
 
 
-def move_places():
-    """Of each place of the maps that of the moves."""
+def coarse_places():
+    """Of each place of the maps that of the coarse ones."""
     place = numpy.arange(PLACES)
-    column = numpy.minimum(place // DEPTHS % COLUMNS, MOVE_COLUMNS - 1)
-    return (place // (COLUMNS * DEPTHS) * MOVE_COLUMNS + column) * DEPTHS + place % DEPTHS
+    column = numpy.minimum(place // DEPTHS % COLUMNS, COARSE_COLUMNS - 1)
+    return (place // (COLUMNS * DEPTHS) * COARSE_COLUMNS + column) * DEPTHS + place % DEPTHS
 
 
 def move_roughness():
     """Of moves by place: a form whose value is the sum of squared differences of neighbours. Nothing has none in depth."""
-    index = numpy.arange(MOVE_PLACES).reshape(ROWS, MOVE_COLUMNS, DEPTHS)
+    index = numpy.arange(COARSE_PLACES).reshape(ROWS, COARSE_COLUMNS, DEPTHS)
     pairs = ((index[1:], index[:-1]), (index[:, 1:], index[:, :-1]), (index[..., 1:-1], index[..., :-2]))
     one, other = (numpy.concatenate([pair[side].ravel() for pair in pairs]) for side in (0, 1))
-    difference = numpy.eye(MOVE_PLACES)[one] - numpy.eye(MOVE_PLACES)[other]
+    difference = numpy.eye(COARSE_PLACES)[one] - numpy.eye(COARSE_PLACES)[other]
     return difference.T @ difference
 
 
 def fit_moves(place, weight_q12, off_mm):
     """Steps down and away at each place of the moves, and a step's mm in Q8; off_mm: of every fitted centre, how far
     below and behind it the head's is. Few that are far off do not decide: after a pass they weigh less."""
-    gathered = scipy.sparse.coo_matrix((numpy.ones(PLACES), (numpy.arange(PLACES), move_places()))).tocsr()
+    gathered = scipy.sparse.coo_matrix((numpy.ones(PLACES), (numpy.arange(PLACES), coarse_places()))).tocsr()
     needed = (needed_of(place, weight_q12).astype(float) @ gathered).tocsr()
-    penalty = MOVE_RIDGE * numpy.eye(MOVE_PLACES) + MOVE_SMOOTH * move_roughness()
+    penalty = MOVE_RIDGE * numpy.eye(COARSE_PLACES) + MOVE_SMOOTH * move_roughness()
     weight = numpy.ones(len(off_mm))
     for _ in range(MOVE_PASSES):
         weighed = scipy.sparse.diags(weight) @ needed
@@ -170,6 +175,33 @@ def fit_moves(place, weight_q12, off_mm):
     return numpy.clip(numpy.round(by_place_mm * 256 / step_mm_q8), -ZERO, ZERO - 1).astype(int), step_mm_q8
 
 
+def coarse_places_around(rays, centre_mm):
+    """A row for each centre: where each ray of a trace (frames.read_rays) is in the coarse maps, -1 where it asks nothing."""
+    away_mm = rays["origin_mm"] - centre_mm
+    passes_mm = away_mm[:, None, :2] - away_mm[:, 2, None, None] * rays["slope"]
+    column, row = abs(passes_mm[..., 0]) // CELL_MM, (passes_mm[..., 1] + TOP_MM) // CELL_MM
+    depth = numpy.searchsorted(LIMITS_MM, rays["point_mm"][:, 2] - centre_mm[:, 2, None], side="right")
+    depth = numpy.where(rays["state"] == EMPTY, DEPTHS - 1, depth)
+    asked = (column < COLUMNS) & (row >= 0) & (row < ROWS) & (rays["state"] != UNKNOWN)
+    place = (row * COARSE_COLUMNS + numpy.minimum(column, COARSE_COLUMNS - 1)) * DEPTHS + depth
+    return numpy.where(asked, place, -1).astype(numpy.int16)
+
+
+def fit_promise(place, weight, labels):
+    """The bias and the part of each place, in Q5: log-odds of a label of 1. Newton's steps."""
+    row, ray = numpy.nonzero(place >= 0)
+    needed = scipy.sparse.coo_matrix((weight[row], (row, place[row, ray])), shape=(len(place), COARSE_PLACES)).tocsr()
+    needed = scipy.sparse.hstack([needed, numpy.ones((len(place), 1))]).tocsr()
+    penalty = numpy.append(numpy.full(COARSE_PLACES, PROMISE_RIDGE), 0.0)
+    parts = numpy.zeros(COARSE_PLACES + 1)
+    for _ in range(PROMISE_PASSES):
+        probability = 1 / (1 + numpy.exp(-numpy.clip(needed @ parts, -30, 30)))
+        curvature = needed.T @ scipy.sparse.diags(probability * (1 - probability)) @ needed
+        slope = needed.T @ (labels - probability) - penalty * parts
+        parts += numpy.linalg.solve(curvature.toarray() + numpy.diag(penalty), slope)
+    return int(round(parts[-1] * 32)), numpy.clip(numpy.round(parts[:-1] * 32), -127, 127).astype(int)
+
+
 def packed(maps):
     """A word for each place, the first map's number lowest."""
     return ((maps + ZERO) << BITS * numpy.arange(maps.shape[1])).sum(axis=1)
@@ -179,16 +211,18 @@ def unpacked(words, count=MAPS):
     return (numpy.array(words)[:, None] >> BITS * numpy.arange(count) & (1 << BITS) - 1) - ZERO
 
 
-def write(path, maps, moves, command):
+def write(path, maps, moves, promise, command):
     """The header that ih_surroundings.c includes: a line for a cell, its ranges of depth from near to far, then nothing."""
     steps, step_mm_q8 = moves
+    bias_q5, parts_q5 = promise
+    promise_lines = ["        %s," % ", ".join("%d" % part for part in cell) for cell in parts_q5.reshape(-1, DEPTHS)]
     move_lines = ["        %s," % ", ".join("0x%02x" % byte for byte in cell) for cell in packed(steps).reshape(-1, DEPTHS)]
     lines = []
     for row, cells in enumerate(packed(maps).reshape(ROWS, COLUMNS, DEPTHS)):
         lines.append("    /* row %d */" % row)
         lines += ["    %s," % ", ".join("0x%08xu" % word for word in cell) for cell in cells]
     with open(path, "w", encoding="utf-8") as file:
-        file.write("""/* ih_surroundings_map - the maps of ih_surroundings, and its moves, written by
+        file.write("""/* ih_surroundings_map - the maps of ih_surroundings, its moves and its promise, written by
  *     %s
  * Do not edit. A line is a cell: its nine ranges of depth, the nearest first, then an empty ray. */
 #ifndef IH_SURROUNDINGS_MAP_H
@@ -209,7 +243,14 @@ static const struct ih_surroundings_moves surroundings_moves = {
 %s
     },
 };
+
+static const struct ih_surroundings_promise surroundings_promise = {
+    %d,
+    {
+%s
+    },
+};
 /* clang-format on */
 
 #endif
-""" % (command, "\n".join(lines), *step_mm_q8, "\n".join(move_lines)))
+""" % (command, "\n".join(lines), *step_mm_q8, "\n".join(move_lines), bias_q5, "\n".join(promise_lines)))

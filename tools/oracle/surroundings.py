@@ -1,4 +1,4 @@
-"""Float64 reference of the maps of the surroundings and of the moves, over the scenes of evidence.py and patterns of other pitch.
+"""Float64 reference of the maps of the surroundings, of the moves and the promise, over the scenes of evidence.py and patterns of other pitch.
 
 Rays whose place is a matter of rounding are made unknown ones.
 """
@@ -10,8 +10,9 @@ import evidence
 from rig import GRID, from_q, to_q
 
 COLUMNS, ROWS, DEPTHS, MAPS = 6, 13, 10, 8
-MOVE_COLUMNS = 3  # the last one is all that are farther aside
+COARSE_COLUMNS = 3  # the last one is all that are farther aside
 STEP_MM = (0.90625, 7.5)  # down, away
+BIAS_Q5 = -91
 CELL_MM, TOP_MM = 64.0, 384.0
 LIMITS_MM = np.array([-256, -176, -96, -40, 40, 128, 200, 304])
 EMPTY_PLACE, NONE = DEPTHS - 1, -1
@@ -45,10 +46,16 @@ def places(slope_q20, depth_q8, state, centre):
     return place, np.minimum(np.minimum(edge(x), edge(y)), np.where(state == evidence.SEEN, beside, np.inf))
 
 
-def moves_mm(steps, place, weight):
-    """Down and away, of the steps by row, column, range of depth."""
+def of_coarse(table, place):
+    """What a table by row, column and range of depth has for each place of a map."""
     row, column, depth = place // (COLUMNS * DEPTHS), place // DEPTHS % COLUMNS, place % DEPTHS
-    return weight * steps[row, np.minimum(column, MOVE_COLUMNS - 1), depth].sum(axis=0) * STEP_MM
+    return table[row, np.minimum(column, COARSE_COLUMNS - 1), depth]
+
+
+def promise(parts, place, weight):
+    """Log-odds, of the rays of every other line and column."""
+    asked = place.reshape(GRID, GRID)[::2, ::2].ravel()
+    return (BIAS_Q5 + weight * of_coarse(parts, asked[asked != NONE]).sum()) / 32
 
 
 def write_vectors(directory):
@@ -58,10 +65,13 @@ def write_vectors(directory):
     inc.raw("\nstatic const int32_t vector_origin_mm_q8[] = {%d, %d, %d};\n" % tuple(to_q(evidence.ORIGIN, 8)))
     words = [sum((int(value) + 8) << 4 * map for map, value in enumerate(row)) for row in maps]
     inc.raw("\nstatic const uint32_t vector_maps[] = {\n%s};\n" % emit.wrap(["0x%08x" % word for word in words]))
-    steps = np.random.default_rng(84).integers(-8, 8, (ROWS, MOVE_COLUMNS, DEPTHS, 2))
+    steps = np.random.default_rng(84).integers(-8, 8, (ROWS, COARSE_COLUMNS, DEPTHS, 2))
     inc.raw("\nstatic const struct ih_surroundings_moves vector_moves = {\n    {%d, %d},\n    {\n%s    },\n};\n" % (
         *to_q(np.array(STEP_MM), 8),
         emit.wrap(["0x%02x" % (down + 8 | away + 8 << 4) for down, away in steps.reshape(-1, 2)])))
+    parts = np.random.default_rng(85).integers(-127, 128, (ROWS, COARSE_COLUMNS, DEPTHS))
+    inc.raw("\nstatic const struct ih_surroundings_promise vector_promise = {\n    %d,\n    {\n%s    },\n};\n" % (
+        BIAS_Q5, emit.wrap(["%d" % part for part in parts.ravel()])))
     rows = []
     for name, widen, farther in CASES:
         slope_q20 = np.rint(evidence.lattice() * widen).astype(np.int64)
@@ -74,11 +84,11 @@ def write_vectors(directory):
         spacing = spacing_mm(from_q(slope_q20, 20), from_q(centre_q8[2], 8) - evidence.ORIGIN[2])
         weight = min(1.0, spacing / CELL_MM)**2
         answer = weight * maps[place[place != NONE]].sum(axis=0)
-        move = moves_mm(steps, place[place != NONE], weight)
+        move = weight * of_coarse(steps, place[place != NONE]).sum(axis=0) * STEP_MM
         inc.raw("\nstatic const struct vector_ray vector_%s_rays[] = {\n%s};\n" % (
             name, emit.wrap(["{%d, %d, %d, %d, %d}" % r for r in zip(*slope_q20.T, depth_q8, state, place)])))
-        rows.append('"%s", vector_%s_rays, {%d, %d, %d}, %s, {%s}, {%s}' % (
+        rows.append('"%s", vector_%s_rays, {%d, %d, %d}, %s, {%s}, {%s}, %s' % (
             name, name, *centre_q8, emit.number(weight, 7), ", ".join(emit.numbers(answer, 5)),
-            ", ".join(emit.numbers(move, 4))))
+            ", ".join(emit.numbers(move, 4)), emit.number(promise(parts, place, weight), 5)))
     inc.struct_array("vector_scene", "vector_scenes", rows)
     return inc.write(directory, "surroundings.inc")

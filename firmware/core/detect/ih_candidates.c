@@ -25,6 +25,20 @@ bool ih_candidates_add_start(struct ih_detections_starts *starts, const int32_t 
     return true;
 }
 
+bool ih_candidates_is_found(const struct ih_detections *detections, const int32_t centre_mm_q8[3],
+                            int32_t near_mm, int32_t logit_min_q10)
+{
+    const int64_t near2 = square_q16(near_mm);
+    for (int32_t i = 0; i < detections->detection_count; i++) {
+        const struct ih_detection *detection = &detections->detection[i];
+        if (detection->logit_q10 >= logit_min_q10 &&
+            ih_distance2_s32(detection->head.centre_mm_q8, centre_mm_q8) < near2) {
+            return true;
+        }
+    }
+    return false;
+}
+
 void ih_candidates_insert(struct ih_detections *out, const struct ih_detection *detection,
                           int32_t spacing_mm)
 {

@@ -4,7 +4,6 @@
 
 #include "base/ih_fix.h"
 #include "detect/ih_candidates.h"
-#include "detect/ih_prescreen.h"
 #include "detect/ih_score.h"
 #include "detect/ih_surroundings.h"
 #include "rig/ih_level.h"
@@ -17,8 +16,9 @@ void ih_detections_params_default(struct ih_detections_params *params)
     ih_rays_params_default(&params->rays);
     ih_scan_params_default(&params->scan);
     ih_fit_params_default(&params->fit);
-    params->promise_min_q8 = 256;
     params->apart_mm = 20;
+    params->found_mm = 130;
+    params->found_logit_q10 = 3072;
     params->hopeless_logit_q10 = -5120;
     params->spacing_mm = 80;
     params->nest_max = IH_NESTS_MAX;
@@ -144,14 +144,24 @@ static void try_start(const struct context *context, const struct ih_ellipsoid *
     ih_candidates_insert(context->out, &detection, params->spacing_mm);
 }
 
+/* A mean head at a centre that nothing is known of. */
 static void try_centre(const struct context *context, const int32_t centre_mm_q8[3],
                        enum ih_source source)
 {
+    const struct ih_detections_params *params = context->params;
     const struct ih_ellipsoid start = ih_ellipsoid_mean(centre_mm_q8);
-    if (ih_prescreen_score_q8(context->rays, centre_mm_q8) < context->params->promise_min_q8) {
-        return;
+    if (!ih_candidates_is_found(context->out, centre_mm_q8, params->found_mm,
+                                params->found_logit_q10)) {
+        try_start(context, &start, source);
     }
-    try_start(context, &start, source);
+}
+
+static void try_nest(const struct context *context, const int32_t centre_mm_q8[3])
+{
+    if (ih_surroundings_promise_q5(context->rays, centre_mm_q8) >=
+        context->params->scan.promise_min_q5) {
+        try_centre(context, centre_mm_q8, IH_SOURCE_NEST);
+    }
 }
 
 static void view_expected(const struct context *context, const struct ih_ellipsoid *head,
@@ -176,11 +186,11 @@ void ih_detections_add(const struct ih_points *points, const struct ih_dots *dot
     ih_rays_make(points, dots, rig, &params->rays, &scratch->rays);
     ih_scan_find(&scratch->rays, &params->scan, &scratch->scan_scratch, &scratch->scan);
     scratch->starts.count = 0;
-    for (int32_t i = 0; i < ih_min_s32(hypotheses->hypothesis_count, params->nest_max); i++) {
-        try_centre(&context, hypotheses->hypothesis[i].centre_mm_q8, IH_SOURCE_NEST);
-    }
     for (int32_t i = 0; i < scratch->scan.candidate_count; i++) {
         try_centre(&context, scratch->scan.candidate[i].centre_mm_q8, IH_SOURCE_SCAN);
+    }
+    for (int32_t i = 0; i < ih_min_s32(hypotheses->hypothesis_count, params->nest_max); i++) {
+        try_nest(&context, hypotheses->hypothesis[i].centre_mm_q8);
     }
     for (int32_t i = 0; i < expected->count; i++) {
         if (i < params->expected_max) {

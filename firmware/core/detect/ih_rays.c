@@ -9,6 +9,11 @@
 #include "points/ih_near_depth.h"
 #include "rig/ih_level.h"
 
+/* Slots whose rays span a part of the pattern that is nearly even, so many steps wide and high. */
+#define FIRST_LINE 4
+#define LAST_LINE 14
+#define SPAN (LAST_LINE - FIRST_LINE)
+
 void ih_rays_params_default(struct ih_rays_params *params)
 {
     *params = (struct ih_rays_params){.probe_mm = 100};
@@ -49,10 +54,26 @@ static void fill_slot(const struct ih_ray *ray, int32_t slot, struct ih_ray_tabl
     }
 }
 
+/* The area of a quadrilateral is half the cross product of its diagonals. */
+static int32_t pitch_q20(const struct ih_ray ray[IH_SLOTS])
+{
+    const struct ih_ray *a = &ray[FIRST_LINE * IH_GRID + FIRST_LINE];
+    const struct ih_ray *b = &ray[FIRST_LINE * IH_GRID + LAST_LINE];
+    const struct ih_ray *c = &ray[LAST_LINE * IH_GRID + LAST_LINE];
+    const struct ih_ray *d = &ray[LAST_LINE * IH_GRID + FIRST_LINE];
+    const int64_t across_q20[2] = {(int64_t)c->slope_x_q20 - a->slope_x_q20,
+                                   (int64_t)d->slope_x_q20 - b->slope_x_q20};
+    const int64_t down_q20[2] = {(int64_t)c->slope_y_q20 - a->slope_y_q20,
+                                 (int64_t)d->slope_y_q20 - b->slope_y_q20};
+    const int64_t twice_q40 = ih_abs_s64(across_q20[0] * down_q20[1] - across_q20[1] * down_q20[0]);
+    return (int32_t)ih_isqrt_u64((uint64_t)twice_q40 / (2 * SPAN * SPAN));
+}
+
 void ih_rays_fill_table(struct ih_rays *rays)
 {
     struct ih_ray_table *table = &rays->table;
     memset(table, 0, sizeof *table);
+    table->pitch_q20 = pitch_q20(rays->ray);
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
         fill_slot(&rays->ray[slot], slot, table);
     }

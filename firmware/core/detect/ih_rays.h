@@ -9,8 +9,9 @@
  *         "empty" when a surface near by would have shown it: its image, probe_mm behind the 8th
  *         percentile of the seen depths (ih_near_depth; 0 when nothing was seen), is inside the picture and not
  *         over-exposed. A missing point of a range image is always "empty": ih_points says
- *         "unknown" where it may only be outside.
- * Overflow: a slope is 2^22, a depth 2^22 in Q8 and a direction 2^31 in Q28: points below 2^25.
+ *         "unknown" where it may only be outside. The spacing is the root of the area that a ray has, of the
+ *         quadrilateral that four rays of the middle span.
+ * Overflow: cross products of slopes' differences are below 2^48. A slope is 2^22, a depth 2^22 in Q8 and a direction 2^31 in Q28: points below 2^25.
  * Error:  half a step of each format (docs/numerics.md); columns are rounded down and clamped.
  * Cost:   361 products, 4 divisions and the lens for a missing dot, one selection of 361 depths.
  */
@@ -51,6 +52,7 @@ struct ih_ray_table {
     int16_t point_mm_q1[3][IH_RAYS_COLUMN];
     int16_t seen[IH_RAYS_COLUMN]; /* all bits or none */
     int32_t slope_max_q20[2];     /* maximum |slope| of all rays, x and y */
+    int32_t pitch_q20; /* the spacing of rays at a depth, over it; of the pattern's middle */
 };
 
 struct ih_rays {

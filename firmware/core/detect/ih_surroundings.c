@@ -13,16 +13,14 @@
 #define STEP_BITS 3
 #define STEPS 71
 #define EMPTY (IH_SURROUNDINGS_DEPTHS - 1)
-/* Slots whose rays span a part of the pattern that is nearly even, so many steps wide and high. */
-#define FIRST_LINE 4
-#define LAST_LINE 14
-#define SPAN (LAST_LINE - FIRST_LINE)
-
 /* Two maps, half a word apart, are summed at once: 361 numbers below 16 do not overflow 16 bits. */
 #define PAIRS (IH_SURROUNDINGS_MAPS / 2)
 #define PAIR_MASK 0x000f000fu
 _Static_assert(IH_SURROUNDINGS_MAPS == 8 && IH_SURROUNDINGS_BITS == 4,
                "a word has a number by each map");
+
+/* Every other ray of every other line is asked for the promise. */
+#define PROMISE_STRIDE 2
 
 #define MOVE_MASK 0xfu /* the steps down; those away are above */
 
@@ -44,14 +42,13 @@ struct head_from_rays {
     int32_t centre_mm_q8; /* its depth in the level frame */
 };
 
-static struct head_from_rays candidate_of(const struct ih_rays *rays,
-                                          const struct ih_ellipsoid *ellipsoid)
+static struct head_from_rays candidate_of(const struct ih_rays *rays, const int32_t centre_mm_q8[3])
 {
     return (struct head_from_rays){
-        .depth_mm_q8 = ellipsoid->centre_mm_q8[2] - rays->origin_mm_q8[2],
-        .away_mm_q8 = {rays->origin_mm_q8[0] - ellipsoid->centre_mm_q8[0],
-                       rays->origin_mm_q8[1] - ellipsoid->centre_mm_q8[1]},
-        .centre_mm_q8 = ellipsoid->centre_mm_q8[2],
+        .depth_mm_q8 = centre_mm_q8[2] - rays->origin_mm_q8[2],
+        .away_mm_q8 = {rays->origin_mm_q8[0] - centre_mm_q8[0],
+                       rays->origin_mm_q8[1] - centre_mm_q8[1]},
+        .centre_mm_q8 = centre_mm_q8[2],
     };
 }
 
@@ -72,8 +69,9 @@ static int32_t across_mm_q8(const struct head_from_rays *candidate, int32_t slop
            (int32_t)ih_mul_shift(candidate->depth_mm_q8, slope_q20, 20);
 }
 
-/* Or IH_NONE. */
-static int32_t place_of(const struct head_from_rays *candidate, const struct ih_ray *ray)
+/* In maps of so many columns, the last of which is all that are farther aside; or IH_NONE. */
+static int32_t place_of(const struct head_from_rays *candidate, const struct ih_ray *ray,
+                        int32_t columns)
 {
     if (ray->state == IH_RAY_UNKNOWN) {
         return IH_NONE;
@@ -83,35 +81,25 @@ static int32_t place_of(const struct head_from_rays *candidate, const struct ih_
     if (column >= IH_SURROUNDINGS_COLUMNS || row < 0 || row >= IH_SURROUNDINGS_ROWS) {
         return IH_NONE;
     }
-    return (row * IH_SURROUNDINGS_COLUMNS + column) * IH_SURROUNDINGS_DEPTHS +
+    return (row * columns + ih_min_s32(column, columns - 1)) * IH_SURROUNDINGS_DEPTHS +
            depth_of(candidate, ray);
 }
 
-/* Spacing^2 / cell^2. The rays of four slots span a quadrilateral: half the cross product of its diagonals. */
+/* Spacing^2 / cell^2. */
 static int32_t weight_q12(const struct ih_rays *rays, int64_t depth_mm_q8)
 {
-    const struct ih_ray *a = &rays->ray[FIRST_LINE * IH_GRID + FIRST_LINE];
-    const struct ih_ray *b = &rays->ray[FIRST_LINE * IH_GRID + LAST_LINE];
-    const struct ih_ray *c = &rays->ray[LAST_LINE * IH_GRID + LAST_LINE];
-    const struct ih_ray *d = &rays->ray[LAST_LINE * IH_GRID + FIRST_LINE];
-    const int64_t across_q20[2] = {(int64_t)c->slope_x_q20 - a->slope_x_q20,
-                                   (int64_t)d->slope_x_q20 - b->slope_x_q20};
-    const int64_t down_q20[2] = {(int64_t)c->slope_y_q20 - a->slope_y_q20,
-                                 (int64_t)d->slope_y_q20 - b->slope_y_q20};
-    const int64_t twice_q40 = ih_abs_s64(across_q20[0] * down_q20[1] - across_q20[1] * down_q20[0]);
-    const int64_t pitch_q20 = ih_isqrt_u64((uint64_t)twice_q40 / (2 * SPAN * SPAN));
     const int64_t spacing_mm_q8 =
-        ih_min_s64(ih_mul_shift(ih_max_s64(depth_mm_q8, 0), pitch_q20, 20), CELL_MM_Q8);
+        ih_min_s64(ih_mul_shift(ih_max_s64(depth_mm_q8, 0), rays->table.pitch_q20, 20), CELL_MM_Q8);
     return (int32_t)ih_shift_round(spacing_mm_q8 * spacing_mm_q8, 2 * CELL_BITS - 12);
 }
 
 void ih_surroundings_find(const struct ih_rays *rays, const struct ih_ellipsoid *ellipsoid,
                           struct ih_surroundings *out)
 {
-    const struct head_from_rays candidate = candidate_of(rays, ellipsoid);
+    const struct head_from_rays candidate = candidate_of(rays, ellipsoid->centre_mm_q8);
     out->weight_q12 = weight_q12(rays, candidate.depth_mm_q8);
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
-        out->place[slot] = (int16_t)place_of(&candidate, &rays->ray[slot]);
+        out->place[slot] = (int16_t)place_of(&candidate, &rays->ray[slot], IH_SURROUNDINGS_COLUMNS);
     }
 }
 
@@ -145,13 +133,13 @@ void ih_surroundings_ask(const struct ih_surroundings *found,
     ih_surroundings_ask_maps(surroundings_maps, found, answer_q8);
 }
 
-static int32_t move_place_of(int32_t place)
+static int32_t coarse_place_of(int32_t place)
 {
     const int32_t cell = place / IH_SURROUNDINGS_DEPTHS;
     const int32_t row = cell / IH_SURROUNDINGS_COLUMNS;
     const int32_t farther =
-        ih_max_s32(cell - row * IH_SURROUNDINGS_COLUMNS - (IH_SURROUNDINGS_MOVE_COLUMNS - 1), 0);
-    return place - (row * (IH_SURROUNDINGS_COLUMNS - IH_SURROUNDINGS_MOVE_COLUMNS) + farther) *
+        ih_max_s32(cell - row * IH_SURROUNDINGS_COLUMNS - (IH_SURROUNDINGS_COARSE_COLUMNS - 1), 0);
+    return place - (row * (IH_SURROUNDINGS_COLUMNS - IH_SURROUNDINGS_COARSE_COLUMNS) + farther) *
                        IH_SURROUNDINGS_DEPTHS;
 }
 
@@ -164,7 +152,7 @@ void ih_surroundings_move_by(const struct ih_surroundings_moves *moves,
         if (found->place[slot] == IH_NONE) {
             continue;
         }
-        const uint32_t both = moves->steps[move_place_of(found->place[slot])];
+        const uint32_t both = moves->steps[coarse_place_of(found->place[slot])];
         steps[0] += (int32_t)(both & MOVE_MASK) - IH_SURROUNDINGS_ZERO;
         steps[1] += (int32_t)(both >> IH_SURROUNDINGS_BITS) - IH_SURROUNDINGS_ZERO;
     }
@@ -183,4 +171,25 @@ void ih_surroundings_move(const struct ih_rays *rays, int32_t max_mm,
     struct ih_surroundings found;
     ih_surroundings_find(rays, ellipsoid, &found);
     ih_surroundings_move_by(&surroundings_moves, &found, max_mm, ellipsoid);
+}
+
+int32_t ih_surroundings_promise_by_q5(const struct ih_surroundings_promise *promise,
+                                      const struct ih_rays *rays, const int32_t centre_mm_q8[3])
+{
+    const struct head_from_rays candidate = candidate_of(rays, centre_mm_q8);
+    int32_t sum_q5 = 0;
+    for (int32_t line = 0; line < IH_GRID; line += PROMISE_STRIDE) {
+        for (int32_t i = 0; i < IH_GRID; i += PROMISE_STRIDE) {
+            const int32_t place = place_of(&candidate, &rays->ray[line * IH_GRID + i],
+                                           IH_SURROUNDINGS_COARSE_COLUMNS);
+            sum_q5 += place == IH_NONE ? 0 : promise->part_q5[place];
+        }
+    }
+    return (int32_t)ih_mul_shift(sum_q5, weight_q12(rays, candidate.depth_mm_q8), 12) +
+           promise->bias_q5;
+}
+
+int32_t ih_surroundings_promise_q5(const struct ih_rays *rays, const int32_t centre_mm_q8[3])
+{
+    return ih_surroundings_promise_by_q5(&surroundings_promise, rays, centre_mm_q8);
 }

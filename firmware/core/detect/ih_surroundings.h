@@ -1,8 +1,9 @@
-/* ih_surroundings - what the rays at and around a candidate say by several learnt maps, and where they say that the
- * head's centre is (ours).
+/* ih_surroundings - what the rays at and around a candidate say by several learnt maps: is a fit worth its while, is it a
+ * head, and where is the head's centre (ours).
  *
- * In:     rays and points, an ellipsoid, the maps.
- * Out:    by slot, the place in the maps that the ray asks; an answer by each map; the ellipsoid moved.
+ * In:     rays and points, a centre or an ellipsoid, the maps.
+ * Out:    the promise of a centre; by slot, the place in the maps that the ray asks; an answer by each map; the ellipsoid
+ *         moved.
  * Method: the plane at the centre's depth has cells of 64 mm, to 384 mm aside and above and 448 mm below the
  *         centre, those on the left and on the right alike. A ray asks the cell that it passes, and there one of
  *         nine ranges of depth, in which its point lies against the centre, or the tenth place when it is empty.
@@ -18,13 +19,16 @@
  *         tell, mostly up or down. So two more maps say, in mm, how far below and behind the fitted centre the head's is. They
  *         are learnt from heads alone (tools/learn), by least squares, and have the same cells, but of all columns from 128 mm
  *         outwards one. Aside the maps know nothing, for left and right are alike to them.
+ *         Before anything is fitted, one more map with these cells says how much a centre promises, by a quarter of the
+ *         rays: all of them, and all columns, rank centres no better. It is learnt by logistic regression from the centres
+ *         that ih_scan tries, whether a head's is within 90 mm.
  * Overflow: a depth is below 2^27 in Q8, a slope at most 2^22: 2^49. A spacing is limited to 2^14 in Q8. A sum of 361
  *         numbers, -8 to 7 each, is below 2^11.5, times a weight of 2^12 2^23.5; times a step of the moves, 8 mm at most,
- *         2^22.5, times a weight 2^34.5.
+ *         2^22.5, times a weight 2^34.5. A promise is 100 numbers of 8 bits, 2^13.7, times a weight 2^25.7.
  * Error:  a ray that passes within 1/128 mm of a cell's edge, or a depth within half a mm of a range's, may
  *         be counted on either side. The weight 2 %, at 25 mm of spacing 0.2 %: a square of Q8. A move as the weight.
  * Cost:   two products for each ray of known state, and four sums of two maps each: 22,000 instructions (x86-64, -O3); a move
- *         30,000.
+ *         30,000; a promise 4,300.
  */
 #ifndef IH_SURROUNDINGS_H
 #define IH_SURROUNDINGS_H
@@ -45,9 +49,9 @@
 #define IH_SURROUNDINGS_PLACES \
     (IH_SURROUNDINGS_COLUMNS * IH_SURROUNDINGS_ROWS * IH_SURROUNDINGS_DEPTHS)
 
-#define IH_SURROUNDINGS_MOVE_COLUMNS 3 /* the last one is all that are farther aside */
-#define IH_SURROUNDINGS_MOVE_PLACES \
-    (IH_SURROUNDINGS_MOVE_COLUMNS * IH_SURROUNDINGS_ROWS * IH_SURROUNDINGS_DEPTHS)
+#define IH_SURROUNDINGS_COARSE_COLUMNS 3 /* the last one is all that are farther aside */
+#define IH_SURROUNDINGS_COARSE_PLACES \
+    (IH_SURROUNDINGS_COARSE_COLUMNS * IH_SURROUNDINGS_ROWS * IH_SURROUNDINGS_DEPTHS)
 
 struct ih_surroundings {
     int32_t weight_q12;      /* of a ray */
@@ -58,10 +62,23 @@ struct ih_surroundings {
  * ones, all less IH_SURROUNDINGS_ZERO. */
 struct ih_surroundings_moves {
     int32_t step_mm_q8[2]; /* above 0, at most 8 mm */
-    uint8_t steps[IH_SURROUNDINGS_MOVE_PLACES];
+    uint8_t steps[IH_SURROUNDINGS_COARSE_PLACES];
+};
+
+/* What the promise is made of: log-odds of a head anywhere, and the part of each place. */
+struct ih_surroundings_promise {
+    int32_t bias_q5;
+    int8_t part_q5[IH_SURROUNDINGS_COARSE_PLACES];
 };
 
 IH_BEGIN_DECLS
+
+/* Log-odds that a head's centre is within 90 mm, as far as every other ray of every other line can tell. */
+int32_t ih_surroundings_promise_q5(const struct ih_rays *rays, const int32_t centre_mm_q8[3]);
+
+/* By another map. */
+int32_t ih_surroundings_promise_by_q5(const struct ih_surroundings_promise *promise,
+                                      const struct ih_rays *rays, const int32_t centre_mm_q8[3]);
 
 /* What is asked where. */
 void ih_surroundings_find(const struct ih_rays *rays, const struct ih_ellipsoid *ellipsoid,

@@ -681,7 +681,8 @@ static void what_promises_nothing_is_passed_over(void)
     for (pass = 0; pass < 2; pass++) {
         int32_t count[3] = {0, 0, 0};
 
-        params.promise_min_q8 = pass == 0 ? -4 * 256 : 5 * 256 + 1;
+        params.scan.promise_min_q5 = pass == 0 ? INT16_MIN : INT16_MAX;
+        params.found_logit_q10 = INT32_MAX;
         ih_detections_begin(&detections);
         look();
         for (i = 0; i < detections.detection_count; i++) {
@@ -691,6 +692,66 @@ static void what_promises_nothing_is_passed_over(void)
         IH_TEST_EQUAL(pass == 0, count[IH_SOURCE_NEST], "nest", pass);
         IH_TEST_EQUAL(1, count[IH_SOURCE_EXPECTED], "expected", pass);
     }
+}
+
+/* With a head that is sure to be found, places about it are not tried again; one just as far as the limit is, and one
+ * about what is less sure. */
+static void what_is_found_is_not_tried_again(void)
+{
+    static const struct {
+        int32_t off_mm_q8, logit_q10;
+        bool is_found;
+    } cases[] = {{0, 3072, true},  {(130 << 8) - 1, 3072, true},  {130 << 8, 3072, false},
+                 {0, 3071, false}, {-(130 << 8) + 1, 9000, true}, {-(130 << 8), 9000, false}};
+    int i, axis;
+
+    for (i = 0; i < IH_TEST_COUNT(cases); i++) {
+        for (axis = 0; axis < 3; axis++) {
+            const int32_t centre_mm_q8[3] = {1000, -2000, 256000};
+
+            ih_detections_begin(&detections);
+            detections.detection_count = 1;
+            detections.detection[0] = (struct ih_detection){.logit_q10 = cases[i].logit_q10};
+            memcpy(detections.detection[0].head.centre_mm_q8, centre_mm_q8, sizeof centre_mm_q8);
+            detections.detection[0].head.centre_mm_q8[axis] += cases[i].off_mm_q8;
+            IH_TEST_EQUAL(cases[i].is_found,
+                          ih_candidates_is_found(&detections, centre_mm_q8, params.found_mm,
+                                                 params.found_logit_q10),
+                          "found", i);
+        }
+    }
+}
+
+/* Nests and places of the scan that are near a head are left out, expected heads are not. */
+static void a_found_head_leaves_out_nests_and_places(void)
+{
+    int32_t count[2][3] = {{0}};
+    int pass, i;
+
+    make_points(true, false);
+    hypotheses.hypothesis_count = 1;
+    for (i = 0; i < 3; i++) {
+        hypotheses.hypothesis[0].centre_mm_q8[i] = (int32_t)(head_mm[i] * 256);
+    }
+    expect_head();
+    expected.head[0].centre_mm_q8[0] += 25 << 8;
+    params.spacing_mm = 0;
+    params.apart_mm = 0;
+    params.scan.promise_min_q5 = INT16_MIN;
+    params.found_mm = 100000;
+    for (pass = 0; pass < 2; pass++) {
+        params.found_logit_q10 = pass == 0 ? INT32_MIN : INT32_MAX;
+        ih_detections_begin(&detections);
+        look();
+        for (i = 0; i < detections.detection_count; i++) {
+            count[pass][detections.detection[i].source]++;
+        }
+    }
+    TEST_ASSERT_EQUAL_INT32(1, count[0][IH_SOURCE_SCAN]);
+    TEST_ASSERT_EQUAL_INT32(0, count[0][IH_SOURCE_NEST]);
+    TEST_ASSERT_EQUAL_INT32(1, count[0][IH_SOURCE_EXPECTED]);
+    TEST_ASSERT_TRUE(count[1][IH_SOURCE_SCAN] > 1);
+    TEST_ASSERT_EQUAL_INT32(1, count[1][IH_SOURCE_NEST]);
 }
 
 static void no_points_give_no_detections(void)
@@ -726,6 +787,8 @@ int main(void)
     RUN_TEST(what_is_hopeless_is_fitted_for_a_step);
     RUN_TEST(near_starts_are_tried_once);
     RUN_TEST(what_promises_nothing_is_passed_over);
+    RUN_TEST(what_is_found_is_not_tried_again);
+    RUN_TEST(a_found_head_leaves_out_nests_and_places);
     RUN_TEST(no_points_give_no_detections);
     return UNITY_END();
 }

@@ -16,6 +16,7 @@ struct vector_scene {
     const struct vector_ray *ray;
     int32_t centre_mm_q8[3];
     double weight, answer[IH_SURROUNDINGS_MAPS], move_mm[2]; /* down, away */
+    double promise;
 };
 
 #include "surroundings.inc"
@@ -55,6 +56,7 @@ void setUp(void)
                                          .slope_y_q20 = (slot / IH_GRID - 9) * PITCH_Q20,
                                          .state = IH_RAY_UNKNOWN};
     }
+    ih_rays_fill_table(&rays);
 }
 
 void tearDown(void)
@@ -75,6 +77,7 @@ static void use_scene(const struct vector_scene *scene)
                                          .point_mm_q8 = {0, 0, ray->depth_mm_q8},
                                          .state = ray->state};
     }
+    ih_rays_fill_table(&rays);
 }
 
 /* The weight is a square of a spacing in steps of 1/256 mm, known to 2: an isqrt's and its own. */
@@ -93,6 +96,12 @@ static void scenes_match_float64(void)
             IH_TEST_EQUAL(scene->ray[slot].place, found.place[slot], scene->name, slot);
         }
         IH_TEST_WITHIN(error, scene->weight, ih_test_from_q(found.weight_q12, 12), scene->name, i);
+        /* Besides, half a step. */
+        IH_TEST_WITHIN(
+            fabs(scene->promise - vector_promise.bias_q5 / 32.0) * error / scene->weight + 1.0 / 64,
+            scene->promise,
+            ih_surroundings_promise_by_q5(&vector_promise, &rays, head.centre_mm_q8) / 32.0,
+            scene->name, 300);
         ih_surroundings_ask_maps(vector_maps, &found, answer_q8);
         for (map = 0; map < IH_SURROUNDINGS_MAPS; map++) {
             IH_TEST_WITHIN(fabs(scene->answer[map]) * error / scene->weight + 1.0 / 256,
@@ -192,6 +201,7 @@ static void dense_rays_have_small_weights(void)
             rays.ray[slot].slope_x_q20 = (slot % IH_GRID - 9) * cases[i].pitch_q20;
             rays.ray[slot].slope_y_q20 = (slot / IH_GRID - 9) * cases[i].pitch_q20;
         }
+        ih_rays_fill_table(&rays);
         head.centre_mm_q8[2] = cases[i].depth_mm * 256;
         ih_surroundings_find(&rays, &head, &found);
         IH_TEST_EQUAL(cases[i].weight_q12, found.weight_q12, "weight", i);
@@ -255,9 +265,9 @@ static void moves_add_up_by_columns(void)
     int i, k;
 
     moves.step_mm_q8[0] = 3 << 7; /* 1.5 mm */
-    for (k = 0; k < IH_SURROUNDINGS_MOVE_COLUMNS; k++) {
+    for (k = 0; k < IH_SURROUNDINGS_COARSE_COLUMNS; k++) {
         /* 2 + k down, 3 + k towards the camera */
-        moves.steps[(6 * IH_SURROUNDINGS_MOVE_COLUMNS + k) * IH_SURROUNDINGS_DEPTHS + 4] =
+        moves.steps[(6 * IH_SURROUNDINGS_COARSE_COLUMNS + k) * IH_SURROUNDINGS_DEPTHS + 4] =
             (uint8_t)((8 - 3 - k) << 4 | (8 + 2 + k));
     }
     for (i = 0; i < IH_TEST_COUNT(cases); i++) {
@@ -282,6 +292,48 @@ static void moves_add_up_by_columns(void)
         moved = head;
         ih_surroundings_move_by(&moves, &found, 0, &moved);
         TEST_ASSERT_EQUAL_MEMORY(&head, &moved, sizeof head);
+    }
+}
+
+/* The same part at every place: of every other ray of every other line that has a place. */
+static void check_promise(int32_t part_q5, int32_t pass)
+{
+    static struct ih_surroundings_promise promise;
+    int32_t slot, asked = 0;
+
+    promise.bias_q5 = pass - 200;
+    memset(promise.part_q5, part_q5, sizeof promise.part_q5);
+    for (slot = 0; slot < IH_SLOTS; slot++) {
+        asked += found.place[slot] != IH_NONE && slot / IH_GRID % 2 == 0 && slot % IH_GRID % 2 == 0;
+    }
+    IH_TEST_EQUAL(promise.bias_q5 +
+                      (int32_t)floor(ldexp(asked * part_q5 * (double)found.weight_q12, -12) + 0.5),
+                  ih_surroundings_promise_by_q5(&promise, &rays, head.centre_mm_q8), "promise",
+                  pass);
+}
+
+/* By columns as moves: a part left and right of the centre, and in every column from the third outwards. */
+static void parts_of_a_promise_add_up_by_columns(void)
+{
+    static const struct {
+        int32_t x_mm, column;
+    } cases[] = {{10, 0}, {-10, 0}, {70, 1}, {-70, 1}, {130, 2}, {-200, 2}, {370, 2}};
+    struct ih_surroundings_promise promise = {.bias_q5 = -90};
+    int32_t i, k;
+
+    for (k = 0; k < IH_SURROUNDINGS_COARSE_COLUMNS; k++) {
+        promise.part_q5[(6 * IH_SURROUNDINGS_COARSE_COLUMNS + k) * IH_SURROUNDINGS_DEPTHS + 4] =
+            (int8_t)(5 + 20 * k);
+    }
+    for (i = 0; i < IH_TEST_COUNT(cases); i++) {
+        for (k = 0; k < 5; k++) { /* two of them are between those that are asked, one is unknown */
+            rays.ray[k] = (struct ih_ray){.slope_x_q20 = 4 * 256 * cases[i].x_mm,
+                                          .point_mm_q8 = {0, 0, head.centre_mm_q8[2]},
+                                          .state = k == 2 ? IH_RAY_UNKNOWN : IH_RAY_SEEN};
+        }
+        IH_TEST_EQUAL(-90 + 2 * (5 + 20 * cases[i].column),
+                      ih_surroundings_promise_by_q5(&promise, &rays, head.centre_mm_q8), "promise",
+                      i);
     }
 }
 
@@ -311,7 +363,9 @@ static void extremes_do_not_overflow(void)
                 .point_mm_q8 = {0, 0, (int32_t)ih_test_between(&random, -(1 << 25), 1 << 25)},
                 .state = (int32_t)ih_test_between(&random, 0, 2)};
         }
+        ih_rays_fill_table(&rays);
         ih_surroundings_find(&rays, &head, &found);
+        check_promise(each < 0 ? -127 : 127, pass);
         ih_surroundings_ask_maps(maps, &found, answer_q8);
         IH_TEST_RANGE(0, 4096, found.weight_q12, "weight", pass);
         for (slot = 0; slot < IH_SLOTS; slot++) {
@@ -343,6 +397,7 @@ int main(void)
     RUN_TEST(rays_of_known_state_add_up);
     RUN_TEST(sums_of_two_maps_stay_apart);
     RUN_TEST(moves_add_up_by_columns);
+    RUN_TEST(parts_of_a_promise_add_up_by_columns);
     RUN_TEST(extremes_do_not_overflow);
     return UNITY_END();
 }
