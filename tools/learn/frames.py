@@ -16,7 +16,7 @@ GRID = 19
 DEEP_MM = 98  # behind a point, where ih_scan tries a head
 # Of a directory every so many frames are learnt the promise from: a frame has 90 centres.
 TRIED_EVERY = 8
-ASKED = numpy.arange(SLOTS).reshape(GRID, GRID)[::2, ::2].ravel()  # rays, as in ih_surroundings.c
+COUNTED = numpy.arange(SLOTS).reshape(GRID, GRID)[::2, ::2].ravel()  # rays, as in ih_surroundings.c
 
 
 def render(program, directory, seed, options):
@@ -64,15 +64,15 @@ def tried(rays):
 
 
 def read_tried(trace):
-    """All centres that are tried in a frame, where the rays that are asked are in the map, and a ray's weight."""
-    parts = [(numpy.zeros((0, 3)), numpy.zeros((0, len(ASKED)), numpy.int16), numpy.zeros(0))]
+    """All centres that are tried in a frame, where the rays that are counted are in the map, and a ray's weight."""
+    parts = [(numpy.zeros((0, 3)), numpy.zeros((0, len(COUNTED)), numpy.int16), numpy.zeros(0))]
     for view in trace["rays"]:
         rays = read_rays(view)
         centre_mm = tried(rays)
         away_mm = centre_mm[:, 2] - rays["origin_mm"][2]
         weight = numpy.minimum(numpy.maximum(away_mm, 0) * rays["pitch"] / ray_map.CELL_MM, 1)**2
-        asked = {**rays, **{key: rays[key][ASKED] for key in ("slope", "point_mm", "state")}}
-        parts.append((centre_mm, ray_map.coarse_places_around(asked, centre_mm), weight))
+        counted = {**rays, **{key: rays[key][COUNTED] for key in ("slope", "point_mm", "state")}}
+        parts.append((centre_mm, ray_map.coarse_places_around(counted, centre_mm), weight))
     centre_mm, place, weight = (numpy.concatenate(column) for column in zip(*parts))
     return {"centre_mm": centre_mm, "place": place, "weight": weight}
 

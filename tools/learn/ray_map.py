@@ -182,9 +182,9 @@ def coarse_places_around(rays, centre_mm):
     column, row = abs(passes_mm[..., 0]) // CELL_MM, (passes_mm[..., 1] + TOP_MM) // CELL_MM
     depth = numpy.searchsorted(LIMITS_MM, rays["point_mm"][:, 2] - centre_mm[:, 2, None], side="right")
     depth = numpy.where(rays["state"] == EMPTY, DEPTHS - 1, depth)
-    asked = (column < COLUMNS) & (row >= 0) & (row < ROWS) & (rays["state"] != UNKNOWN)
+    counted = (column < COLUMNS) & (row >= 0) & (row < ROWS) & (rays["state"] != UNKNOWN)
     place = (row * COARSE_COLUMNS + numpy.minimum(column, COARSE_COLUMNS - 1)) * DEPTHS + depth
-    return numpy.where(asked, place, -1).astype(numpy.int16)
+    return numpy.where(counted, place, -1).astype(numpy.int16)
 
 
 def fit_promise(place, weight, labels):

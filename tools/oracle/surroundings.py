@@ -54,8 +54,8 @@ def of_coarse(table, place):
 
 def promise(parts, place, weight):
     """Log-odds, of the rays of every other line and column."""
-    asked = place.reshape(GRID, GRID)[::2, ::2].ravel()
-    return (BIAS_Q5 + weight * of_coarse(parts, asked[asked != NONE]).sum()) / 32
+    counted = place.reshape(GRID, GRID)[::2, ::2].ravel()
+    return (BIAS_Q5 + weight * of_coarse(parts, counted[counted != NONE]).sum()) / 32
 
 
 def write_vectors(directory):

@@ -85,8 +85,7 @@ IH_END_DECLS
 /* Rays, ellipsoid, scan, fit. */
 #define IH_RANGE_POINT_MM_Q8 32768000
 #define IH_RANGE_PASS_Q14 185400 /* of a ray's nearest point, from the centre */
-#define IH_RANGE_TEMPLATE_SCORE_MIN_Q12 (-5555)
-#define IH_RANGE_TEMPLATE_SCORE_MAX_Q12 6553
+#define IH_RANGE_PROMISE_SUM_Q5 12800
 #define IH_RANGE_SLOPE_Q13 29491         /* derivative by ln of what has a weight */
 #define IH_RANGE_FIT_NORMAL_Q16 95000000 /* diagonal of the fit's equations */
 

@@ -185,6 +185,7 @@ int32_t ih_surroundings_promise_by_q5(const struct ih_surroundings_promise *prom
             sum_q5 += place == IH_NONE ? 0 : promise->part_q5[place];
         }
     }
+    IH_IN_RANGE(sum_q5, -IH_RANGE_PROMISE_SUM_Q5, IH_RANGE_PROMISE_SUM_Q5);
     return (int32_t)ih_mul_shift(sum_q5, weight_q12(rays, candidate.depth_mm_q8), 12) +
            promise->bias_q5;
 }

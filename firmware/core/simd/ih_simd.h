@@ -135,16 +135,6 @@ static inline ih_i16 ih_i16_negate(ih_i16 a)
     return ih_i16_sub(ih_i16_all(0), a);
 }
 
-static inline ih_i16 ih_i16_mul(ih_i16 a, ih_i16 b)
-{
-    return (ih_i16)((ih_u16)a * (ih_u16)b);
-}
-
-static inline ih_i16 ih_i16_shift_left(ih_i16 a, int bits)
-{
-    return (ih_i16)((ih_u16)a << bits);
-}
-
 /* 32 bits */
 
 static inline ih_i32 ih_i32_load(const int32_t *from)
@@ -325,12 +315,6 @@ static inline ih_i16 ih_u16_32_max(struct ih_u16_32 a)
         max = ih_i16_max(max, (ih_i16)a.part[k]);
     }
     return max;
-}
-
-/* value, or the limit nearer to it: -limit .. limit. */
-static inline ih_i16 ih_i16_clamp(ih_i16 value, int16_t limit)
-{
-    return ih_i16_max(ih_i16_min(value, ih_i16_all(limit)), ih_i16_all((int16_t)-limit));
 }
 
 /* a * b / 2^bits, rounded down; then half up. The lower 32 bits of the quotient. */

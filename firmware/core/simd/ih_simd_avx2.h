@@ -14,12 +14,6 @@ static inline ih_i16 ih_i16_max(ih_i16 a, ih_i16 b)
     return (ih_i16)_mm256_max_epi16((__m256i)a, (__m256i)b);
 }
 
-/* The upper halves of the products. */
-static inline ih_i16 ih_i16_mul_high(ih_i16 a, ih_i16 b)
-{
-    return (ih_i16)_mm256_mulhi_epi16((__m256i)a, (__m256i)b);
-}
-
 /* |a|. */
 static inline ih_i16 ih_i16_abs(ih_i16 a)
 {
@@ -176,11 +170,6 @@ static inline int64_t ih_i32_total_wide(ih_i32 a)
     const __m128i two =
         _mm_add_epi64(_mm256_castsi256_si128(four), _mm256_extracti128_si256(four, 1));
     return _mm_cvtsi128_si64(_mm_add_epi64(two, _mm_unpackhi_epi64(two, two)));
-}
-
-static inline int32_t ih_i16_total(ih_i16 a)
-{
-    return ih_i32_total(ih_i16_madd_pairs(a, ih_i16_all(1)));
 }
 
 /* Shifts of each lane by its own count and look-ups are instructions. */

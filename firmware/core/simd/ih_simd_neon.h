@@ -100,12 +100,6 @@ static inline ih_i16 ih_i16_max(ih_i16 a, ih_i16 b)
     return (ih_i16)vmaxq_s16((int16x8_t)a, (int16x8_t)b);
 }
 
-/* Half of the upper half of the doubled product; only INT16_MIN squared would saturate, which no kernel has. */
-static inline ih_i16 ih_i16_mul_high(ih_i16 a, ih_i16 b)
-{
-    return (ih_i16)vshrq_n_s16(vqdmulhq_s16((int16x8_t)a, (int16x8_t)b), 1);
-}
-
 static inline ih_i16 ih_i16_abs(ih_i16 a)
 {
     return (ih_i16)vabsq_s16((int16x8_t)a);
@@ -332,11 +326,6 @@ static inline int64_t ih_i32_total_wide(ih_i32 a)
 {
     const int64x2_t sums = vpaddlq_s32((int32x4_t)a);
     return vgetq_lane_s64(sums, 0) + vgetq_lane_s64(sums, 1);
-}
-
-static inline int32_t ih_i16_total(ih_i16 a)
-{
-    return ih_i32_total((ih_i32)vpaddlq_s16((int16x8_t)a));
 }
 
 #define IH_SIMD_LANE_SHIFTS 1

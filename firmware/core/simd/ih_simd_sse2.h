@@ -14,11 +14,6 @@ static inline ih_i16 ih_i16_max(ih_i16 a, ih_i16 b)
     return (ih_i16)_mm_max_epi16((__m128i)a, (__m128i)b);
 }
 
-static inline ih_i16 ih_i16_mul_high(ih_i16 a, ih_i16 b)
-{
-    return (ih_i16)_mm_mulhi_epi16((__m128i)a, (__m128i)b);
-}
-
 static inline ih_i16 ih_i16_abs(ih_i16 a)
 {
     return ih_i16_max(a, ih_i16_sub((ih_i16){0}, a));
@@ -158,11 +153,6 @@ static inline int64_t ih_i32_total_wide(ih_i32 a)
     int64_t lane[2];
     __builtin_memcpy(lane, &two, sizeof lane);
     return lane[0] + lane[1];
-}
-
-static inline int32_t ih_i16_total(ih_i16 a)
-{
-    return ih_i32_total(ih_i16_madd_pairs(a, ih_i16_all(1)));
 }
 
 #define IH_SIMD_LANE_SHIFTS 0

@@ -299,17 +299,18 @@ static void moves_add_up_by_columns(void)
 static void check_promise(int32_t part_q5, int32_t pass)
 {
     static struct ih_surroundings_promise promise;
-    int32_t slot, asked = 0;
+    int32_t slot, counted = 0;
 
     promise.bias_q5 = pass - 200;
     memset(promise.part_q5, part_q5, sizeof promise.part_q5);
     for (slot = 0; slot < IH_SLOTS; slot++) {
-        asked += found.place[slot] != IH_NONE && slot / IH_GRID % 2 == 0 && slot % IH_GRID % 2 == 0;
+        counted +=
+            found.place[slot] != IH_NONE && slot / IH_GRID % 2 == 0 && slot % IH_GRID % 2 == 0;
     }
-    IH_TEST_EQUAL(promise.bias_q5 +
-                      (int32_t)floor(ldexp(asked * part_q5 * (double)found.weight_q12, -12) + 0.5),
-                  ih_surroundings_promise_by_q5(&promise, &rays, head.centre_mm_q8), "promise",
-                  pass);
+    IH_TEST_EQUAL(
+        promise.bias_q5 +
+            (int32_t)floor(ldexp(counted * part_q5 * (double)found.weight_q12, -12) + 0.5),
+        ih_surroundings_promise_by_q5(&promise, &rays, head.centre_mm_q8), "promise", pass);
 }
 
 /* By columns as moves: a part left and right of the centre, and in every column from the third outwards. */
@@ -326,7 +327,8 @@ static void parts_of_a_promise_add_up_by_columns(void)
             (int8_t)(5 + 20 * k);
     }
     for (i = 0; i < IH_TEST_COUNT(cases); i++) {
-        for (k = 0; k < 5; k++) { /* two of them are between those that are asked, one is unknown */
+        for (k = 0; k < 5;
+             k++) { /* two of them are between those that are counted, one is unknown */
             rays.ray[k] = (struct ih_ray){.slope_x_q20 = 4 * 256 * cases[i].x_mm,
                                           .point_mm_q8 = {0, 0, head.centre_mm_q8[2]},
                                           .state = k == 2 ? IH_RAY_UNKNOWN : IH_RAY_SEEN};
