@@ -28,7 +28,7 @@ COARSE_COLUMNS = 3  # the last one is all that are farther aside
 COARSE_PLACES = COARSE_COLUMNS * ROWS * DEPTHS
 CELL_MM, TOP_MM = 64.0, 384.0
 LIMITS_MM = numpy.array([-256, -176, -96, -40, 40, 128, 200, 304]) - 0.5
-PROMISE_RIDGE, PROMISE_PASSES = 100.0, 12
+PROMISE_RIDGE, PROMISE_PASSES = 100.0, 8
 MOVE_RIDGE, MOVE_PASSES, MOVE_ROBUST_MM = 300.0, 5, 20.0
 # Against differences of neighbours: how many rays fall into a cell is a matter of chance, and a head that moves by half a
 # dot's distance should not be moved otherwise.

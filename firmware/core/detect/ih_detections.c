@@ -8,7 +8,7 @@
 #include "detect/ih_surroundings.h"
 #include "rig/ih_level.h"
 
-/* A hopeless candidate is not fitted beyond these. */
+/* A hopeless candidate is not fitted beyond these. One that is expected is no candidate of chance: it is fitted to the end. */
 #define FIRST_LOOK_STEPS 1
 
 void ih_detections_params_default(struct ih_detections_params *params)
@@ -19,7 +19,7 @@ void ih_detections_params_default(struct ih_detections_params *params)
     params->apart_mm = 20;
     params->found_mm = 130;
     params->found_logit_q10 = 3072;
-    params->hopeless_logit_q10 = -5120;
+    params->hopeless_logit_q10 = -3072;
     params->spacing_mm = 80;
     params->nest_max = IH_NESTS_MAX;
     params->expected_max = IH_DETECTIONS_EXPECTED_MAX;
@@ -128,8 +128,9 @@ static void try_start(const struct context *context, const struct ih_ellipsoid *
     ih_fit_continue(context->rays, &params->fit, FIRST_LOOK_STEPS, &context->scratch->fit, &fit);
     detection.head = fit.ellipsoid;
     rate(context, &fit, &detection);
-    if (detection.logit_q10 >= params->hopeless_logit_q10 &&
-        fit.step_index < params->fit.step_count) {
+    const bool is_worth_it =
+        source == IH_SOURCE_EXPECTED || detection.logit_q10 >= params->hopeless_logit_q10;
+    if (is_worth_it && fit.step_index < params->fit.step_count) {
         ih_fit_continue(context->rays, &params->fit, params->fit.step_count, &context->scratch->fit,
                         &fit);
         detection.head = fit.ellipsoid;

@@ -7,9 +7,9 @@
  *         of heads that the frame before left in doubt, in this order. Nests that promise too little (ih_surroundings),
  *         centres near a head that is found, and starts within apart_mm of one before, are passed over. Each
  *         other one is fitted for a step (ih_fit), measured (ih_evidence) and scored (ih_score). Those that are not
- *         hopeless are fitted to the end, moved to where their surroundings say that the centre is
+ *         hopeless, and all expected ones, are fitted to the end, moved to where their surroundings say that the centre is
  *         (ih_surroundings), measured and scored again; with a step_count of 0 or 1 none is moved.
- *         Tracks take no detection below log-odds -3: hopeless is 2 below that after a step. A range frame
+ *         Tracks take no detection below log-odds -3: what is there after a step is hopeless. A range frame
  *         has several windows: begin once a frame, add once a window.
  *         For an expected head that is not found there is what its rays met (views): whether it is
  *         hidden, or gone.
@@ -19,7 +19,7 @@
  * Overflow: points are below 2^25 in Q8 (16 m, slopes up to 8), nests' centres below 2^26.01, expected
  *         ones at most 2^26, last sure ones 2^26.01; a fit moves 240 mm, its surroundings 1000:
  *         centres below 2^27, squares of differences 2^57.6.
- * Cost:   up to IH_DETECTIONS_STARTS_MAX = 38 fits a window. Usually 12 candidates, of which 6 are fitted for a step
+ * Cost:   up to IH_DETECTIONS_STARTS_MAX = 38 fits a window. Usually 6 candidates are fitted for a step
  *         and 3 to the end; one more for a head that is hidden.
  */
 #ifndef IH_DETECTIONS_H
@@ -57,7 +57,7 @@ struct ih_detections_params {
     int32_t apart_mm;           /* a start nearer than this to one before is not tried */
     int32_t found_mm;           /* nor is a centre nearer than this to a detection */
     int32_t found_logit_q10;    /* of at least these log-odds */
-    int32_t hopeless_logit_q10; /* minimum after the first step */
+    int32_t hopeless_logit_q10; /* minimum after the first step, of what is not expected */
     int32_t spacing_mm;         /* of two detections */
     int32_t nest_max;           /* of them this many are candidates themselves */
     int32_t expected_max; /* of the expected heads, and of the last sure places, this many are */

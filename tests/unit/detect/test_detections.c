@@ -588,27 +588,38 @@ static void expect_moved(const struct ih_ellipsoid *fitted, const struct ih_elli
     TEST_ASSERT_EQUAL_MEMORY(&moved, head, sizeof moved);
 }
 
-/* Hopeless after a step: left there. Not hopeless: as if it had been fitted at once, then moved and measured there. */
+/* Hopeless after a step: left there. Not hopeless: as if it had been fitted at once, then moved and measured there, as is
+ * what is expected, hopeless or not. */
 static void what_is_hopeless_is_fitted_for_a_step(void)
 {
-    static const int32_t hopeless_q10[] = {1 << 20, -(1 << 20)};
+    static const int32_t hopeless_q10[] = {1 << 20, -(1 << 20), 1 << 20};
     int pass;
 
+    struct ih_ellipsoid start;
+
     make_points(true, false);
-    for (pass = 0; pass < 2; pass++) {
+    expect_head();
+    expected.head[0].centre_mm_q8[0] += 30 << 8;
+    start = expected.head[0];
+    params.scan.promise_min_q5 = INT16_MIN;
+    params.scan.candidate_max = 0;
+    for (pass = 0; pass < 3; pass++) {
         struct ih_detections once;
 
-        expected.count = 0;
-        expect_head();
-        expected.head[0].centre_mm_q8[0] += 30 << 8;
-        params.scan.candidate_max = 0;
+        expected.count = pass == 2;
+        hypotheses.hypothesis_count = pass < 2;
+        memcpy(hypotheses.hypothesis[0].centre_mm_q8, start.centre_mm_q8,
+               sizeof start.centre_mm_q8);
+        params.move_max_mm = 40;
         params.hopeless_logit_q10 = hopeless_q10[pass];
         params.fit.step_count = IH_FIT_STEPS;
         ih_detections_begin(&detections);
         look();
         once = detections;
         params.hopeless_logit_q10 = hopeless_q10[0];
-        params.fit.step_count = pass == 0 ? 1 : IH_FIT_STEPS;
+        params.fit.step_count = 1;
+        expected.count = 0;
+        hypotheses.hypothesis_count = 1;
         ih_detections_begin(&detections);
         look();
         TEST_ASSERT_EQUAL_INT32(1, detections.detection_count);
@@ -617,11 +628,14 @@ static void what_is_hopeless_is_fitted_for_a_step(void)
                       memcmp(&once.detection[0].head, &detections.detection[0].head,
                              sizeof once.detection[0].head) == 0,
                       "left after a step", pass);
-        if (pass == 1) { /* and then moved */
+        params.fit.step_count = IH_FIT_STEPS;
+        expected.count = pass == 2;
+        hypotheses.hypothesis_count = pass < 2;
+        if (pass > 0) { /* and then moved */
             struct ih_evidence evidence;
             struct ih_fit whole;
 
-            ih_fit_begin(&expected.head[0], &whole);
+            ih_fit_begin(&start, &whole);
             ih_fit_continue(&scratch.rays, &params.fit, IH_FIT_STEPS, &scratch.fit, &whole);
             expect_moved(&whole.ellipsoid, &once.detection[0].head);
             ih_evidence_collect(&scratch.rays, &once.detection[0].head, whole.start_mm_q8,
