@@ -60,7 +60,7 @@ def write_depth_image(folder):
 
 
 def main():
-    maps, _, _ = score.read_map(os.path.join(ROOT, "firmware/core/detect/ih_surroundings_map.h"))
+    maps, *_ = score.read_map(os.path.join(ROOT, "firmware/core/detect/ih_surroundings_map.h"))
     with tempfile.TemporaryDirectory() as work:
         depth = os.path.join(work, "depth")
         os.mkdir(depth)

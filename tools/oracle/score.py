@@ -89,14 +89,15 @@ def kinds_of_firmware():
 
 
 def read_map(path):
-    """The maps, the moves, and the command that made them."""
+    """The maps, the moves, the promise, and the command that made them."""
     with open(path, encoding="utf-8") as file:
         text = file.read()
     bodies = [re.sub(r"/\*.*?\*/", "", part.split("};")[0]) for part in text.split("= {")[1:]]
-    words, steps = ([int(word, 16) for word in re.findall(r"0x[0-9a-f]+", body)] for body in bodies)
+    words, steps = ([int(word, 16) for word in re.findall(r"0x[0-9a-f]+", body)] for body in bodies[:2])
     step_mm_q8 = [int(number) for number in re.search(r"\{(\d+), (\d+)\}", bodies[1]).groups()]
     moves = ray_map.unpacked(steps, 2), step_mm_q8
-    return ray_map.unpacked(words), moves, re.search(r"written by\n \* +(.*)", text)[1]
+    bias, *parts = (int(number) for number in re.findall(r"-?\d+", bodies[2]))
+    return ray_map.unpacked(words), moves, (bias, np.array(parts)), re.search(r"written by\n \* +(.*)", text)[1]
 
 
 def is_written_by(write, path):
@@ -113,9 +114,9 @@ def is_written_by(write, path):
 def check(folder):
     path, map_path = (os.path.join(folder, name) for name in ("ih_score_weights.h", "ih_surroundings_map.h"))
     kinds, curves, command = read_header(path)
-    maps, moves, map_command = read_map(map_path)
+    maps, moves, promise, map_command = read_map(map_path)
     same = (is_written_by(lambda again: model.write(again, curves, kinds, command), path)
-            and is_written_by(lambda again: ray_map.write(again, maps, moves, map_command), map_path))
+            and is_written_by(lambda again: ray_map.write(again, maps, moves, promise, map_command), map_path))
     if command != map_command:
         print("%s: learnt at another time than %s" % (path, map_path))
         same = False

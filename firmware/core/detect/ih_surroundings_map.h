@@ -1,4 +1,4 @@
-/* ih_surroundings_map - the maps of ih_surroundings, and its moves, written by
+/* ih_surroundings_map - the maps of ih_surroundings, its moves and its promise, written by
  *     tools/learn/learn.py --seeds 5001-5020 --depth-seeds 5001-5060 --clutter-seeds 20001-22400 --people level mounted missing mounted_missing
  * Do not edit. A line is a cell: its nine ranges of depth, the nearest first, then an empty ray. */
 #ifndef IH_SURROUNDINGS_MAP_H
@@ -147,6 +147,7 @@ static const struct ih_surroundings_moves surroundings_moves = {
         0x79, 0x79, 0x7a, 0x9a, 0xaa, 0xa9, 0x99, 0x98, 0xa7, 0x77,
     },
 };
+
 static const struct ih_surroundings_promise surroundings_promise = {
     -98,
     {
