@@ -323,6 +323,24 @@ class Moves(unittest.TestCase):
         self.assertEqual([rough[inside + depth, inside + depth] for depth in (0, 4, 8, 9)], [5.0, 6.0, 5.0, 4.0])
 
 
+class Promise(unittest.TestCase):
+    def test_parts_are_learnt_from_what_was_near_a_head(self):
+        """Centres of which some are near a head, as a bias and parts by row say; as many as make chance small."""
+        random = numpy.random.default_rng(6)
+        row = numpy.arange(ray_map.COARSE_PLACES) // (ray_map.COARSE_COLUMNS * ray_map.DEPTHS)
+        true_part = (row - 6) / 12.0
+        place = random.integers(-1, ray_map.COARSE_PLACES, (40000, 40)).astype(numpy.int16)
+        weight = random.uniform(0.3, 1.0, len(place))
+        log_odds = -1.0 + weight * numpy.where(place >= 0, true_part[place], 0.0).sum(axis=1)
+        labels = random.random(len(place)) < 1 / (1 + numpy.exp(-log_odds))
+        with unittest.mock.patch.object(ray_map, "PROMISE_RIDGE", 1.0):
+            bias_q5, part_q5 = ray_map.fit_promise(place, weight, labels)
+        # A part's standard error is 0.04 or so of log-odds (4,000 rays each): the mean of a row has 30 of them.
+        self.assertLess(abs(bias_q5 / 32 + 1.0), 0.15)
+        by_row = numpy.array([part_q5[row == k].mean() / 32 for k in range(ray_map.ROWS)])
+        self.assertLess(abs(by_row - (numpy.arange(ray_map.ROWS) - 6) / 12.0).max(), 0.08)
+
+
 if __name__ == "__main__":
     if len(sys.argv) != 3:
         print("usage: eval.py HOST_SIM RENDER", file=sys.stderr)

@@ -17,6 +17,7 @@ import numpy
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 sys.path[:0] = [os.path.join(ROOT, "tools", part) for part in ("learn", "oracle")]
+import frames  # pylint: disable=wrong-import-position
 import ray_map  # pylint: disable=wrong-import-position
 import score  # pylint: disable=wrong-import-position
 
@@ -35,6 +36,13 @@ def complaints(trace, maps):
             continue
         answers = ray_map.answers(maps, numpy.array([rays["place"]]), numpy.array([rays["weight_q12"]]))[0]
         given_q8 = detection["evidence_q8"][first:first + ray_map.MAPS]
+        centre_mm = numpy.array([detection["centre_mm_q8"]]) / 256
+        place = numpy.array(rays["place"])
+        expected = numpy.where(place >= 0, ray_map.coarse_places()[place], -1)
+        # Of another view, or of a ray at a cell's edge, which is rounded otherwise.
+        if min((ray_map.coarse_places_around(frames.read_rays(view), centre_mm)[0] != expected).sum()
+               for view in trace["rays"]) > 3:
+            yield "%s: rays of the trace are elsewhere in the maps" % trace["file"]
         if [round(256 * answer) for answer in answers] != given_q8:
             yield "%s: rays say %s, the evidence %s in Q8" % (trace["file"], answers, given_q8)
 

@@ -25,8 +25,7 @@
  * step of an ellipsoid and its score, then five more steps and a score for what is not hopeless.
  * What isohead does and here brings nothing: asking only samples that were far off for their new weight
  * (A works out what samples are off for that alone, a hundredth of the surface, and B has it from its
- * corrections); a bound before the scan's scores (isohead's has lanes of 16 bits; in B's vectors of float a
- * bound would cross the rays as the score itself does, and A is what is written first).
+ * corrections). Places are ranked by the template and the pre-filter that isohead had before a learnt map did it (E034).
  * What they do not do, which is in their favour: a threshold that follows the local noise (one
  * for the frame instead), tests for edges and hot pixels, over-exposed plateaus, the paper's tests of
  * heads (area, curvature, shape, outline), evidence, learnt score, tracks: the scan's own score after a step

@@ -11,7 +11,7 @@ curves that bend; then trees for what the curves leave. A detection within 55 mm
 between it is not used, and neither is one within 150 mm of a head that is hardly seen. A sequence of tools/people counts
 as three frames of tools/render. Every detection is learnt from once more, for half as much, as if the view ended nearer.
 How far off a fitted centre is (the moves of ih_surroundings.h) is learnt from the same frames without moves; whether a
-centre is worth a fit (its promise), from what ih_scan tries in every eighth frame, which depends on nothing that is learnt.
+centre is worth a fit (its promise), from what ih_scan tries in the first and every eighth frame after it of a directory, which depends on nothing that is learnt.
 Run it twice: where detections are depends on the moves, and which remain a little on the promise and the score.
 """
 

@@ -1,4 +1,4 @@
-"""Float64 reference of where the scan tries a mean head: behind every point."""
+"""Float64 reference of centres behind every seen point; the scan tries one of each block."""
 
 import numpy as np
 

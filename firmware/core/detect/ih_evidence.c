@@ -6,7 +6,6 @@
 
 #include "base/ih_fix.h"
 #include "base/ih_range.h"
-#include "detect/ih_head_model.h"
 #include "detect/ih_surroundings.h"
 
 #define ONE_Q28 ((int64_t)1 << 28)
@@ -15,8 +14,8 @@
 #define THROUGH_MM_Q8 (50 << 8)
 #define FRONT_MM_Q8 (30 << 8)
 #define PLANE_POINTS_MIN 6
-/* Hair, nose and chin lie outside of the ellipsoid. */
-#define FACE2_Q28 IH_HEAD_SQUARE(140, 28)
+/* Hair, nose and chin lie outside of the ellipsoid: 1.4 of its radii, squared. */
+#define FACE2_Q28 ((196 * ONE_Q28 + 50) / 100)
 /* So that one step, as from a nose to the cheek behind it, is not the whole mean. */
 #define BEND_MAX_MM_Q8 (20 << 8)
 /* Says neither way: about between the medians of heads and of what is taken for one (E025). */

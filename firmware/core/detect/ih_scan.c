@@ -49,7 +49,7 @@ static bool is_near(const int32_t a_mm_q8[3], const int32_t b_mm_q8[3], int32_t 
     return ih_distance2_s32(a_mm_q8, b_mm_q8) <= limit * limit;
 }
 
-/* A score and a slot in one, so that the maximum is the best, the first of equals. */
+/* A promise and a slot in one, so that the maximum is the best, the first of equals. */
 static int32_t rank_of(int32_t promise_q5, int32_t slot)
 {
     return promise_q5 * RANK_SLOTS + RANK_SLOTS - 1 - slot;

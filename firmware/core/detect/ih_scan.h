@@ -3,7 +3,7 @@
  * In:     rays and points.
  * Out:    up to IH_SCAN_MAX candidate centres of a head, the most promising first, each more than spacing_mm from all
  *         before it; of equally good ones the one of the lower slot comes first.
- * Method: a mean head is tried behind the first seen point of each block of two by two slots: its centre deep_mm behind the
+ * Method: a centre is tried behind the first seen point of each block of two by two slots: deep_mm behind the
  *         point along the ray. What promises less than promise_min_q5 by the learnt map of ih_surroundings is dropped. A fit
  *         ends at the head from 100 mm and more away, so that a finer search finds no more.
  * Overflow: a centre is a point plus at most deep_mm on an axis; squares of distances 2^53.6. Promises are below 2^14, times
@@ -46,8 +46,8 @@ struct ih_scan {
 struct ih_scan_scratch {
     int32_t centre_mm_q8[IH_SLOTS][3]; /* by slot, of a centre that was tried */
     int32_t rank_count;
-    int32_t rank
-        [IH_SCAN_TRIED_MAX]; /* promising and not too near, in no order: promise and slot in one */
+    /* Promising enough and not near a kept one, in no order: promise and slot in one. */
+    int32_t rank[IH_SCAN_TRIED_MAX];
 };
 
 IH_BEGIN_DECLS

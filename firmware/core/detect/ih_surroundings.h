@@ -9,7 +9,7 @@
  *         nine ranges of depth, in which its point lies against the centre, or the tenth place when it is empty.
  *         A ray of unknown state asks nothing: what is outside of the picture, the pattern or the range
  *         speaks neither way.
- *         A map's answer = sum of what it says to all rays, times the part of a cell that a ray stands for: the
+ *         A map's answer = sum of what it says of all rays, times the part of a cell that a ray stands for: the
  *         square of (spacing of the rays at this depth / 64 mm), at most 1. So a dense pattern or a near head
  *         has more rays, each of which counts less.
  *         One map can say that there is body below; two, with the trees of ih_score that ask both, that it belongs to this

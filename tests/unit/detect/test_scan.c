@@ -134,14 +134,14 @@ static void the_most_promising_place_is_the_head(void)
 {
     static const char *const cases[] = {"head", "person",       "person_wide", "side",
                                         "far",  "person_range", "near"};
-    int32_t wall_q5 = INT16_MIN;
+    int32_t wall_q5;
     int i;
 
+    params.promise_min_q5 = INT16_MIN;
     use_scene(scene_named("wall"));
     find();
-    if (scan.candidate_count > 0) {
-        wall_q5 = scan.candidate[0].promise_q5;
-    }
+    TEST_ASSERT_TRUE(scan.candidate_count > 0);
+    wall_q5 = scan.candidate[0].promise_q5;
     for (i = 0; i < IH_TEST_COUNT(cases); i++) {
         const struct vector_scene *scene = scene_named(cases[i]);
 
