@@ -95,8 +95,8 @@ def read_trace(path, with_tried):
     }
 
 
-def look(program, options, directory, scratch):
-    """Every frame of a directory through the firmware."""
+def look(program, options, with_tried, directory, scratch):
+    """Every frame of a directory through the firmware; of some of them what the scan tries, too."""
     name = os.path.relpath(directory, "/").replace(os.sep, "_")
     out = os.path.join(scratch, name[-200:])
     shutil.rmtree(out, ignore_errors=True)
@@ -104,7 +104,7 @@ def look(program, options, directory, scratch):
     truth = read_truth(directory)
     frames = []
     for index, path in enumerate(sorted(glob.glob(os.path.join(out, "**", "*.json"), recursive=True))):
-        frame = read_trace(path, with_tried=index % TRIED_EVERY == 0)
+        frame = read_trace(path, with_tried and index % TRIED_EVERY == 0)
         if frame["file"] in truth:
             frame["heads"], frame["unclear"] = (heads @ frame["level"].T for heads in truth[frame["file"]])
             frame["directory"] = directory
@@ -113,7 +113,7 @@ def look(program, options, directory, scratch):
     return frames
 
 
-def look_at_all(program, directories, scratch, jobs, options=()):
+def look_at_all(program, directories, scratch, jobs, options=(), with_tried=False):
     with concurrent.futures.ProcessPoolExecutor(jobs) as pool:
-        work = [pool.submit(look, program, options, directory, scratch) for directory in directories]
+        work = [pool.submit(look, program, options, with_tried, directory, scratch) for directory in directories]
         return [frame for one in work for frame in one.result()]

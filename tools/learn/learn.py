@@ -187,14 +187,14 @@ def main():
     arguments = parse()
     scratch = os.path.join(arguments.work, "trace")
 
-    def see(directories, options=()):
-        return frames.look_at_all(arguments.host_sim, directories, scratch, arguments.jobs, options)
+    def see(directories, options=(), with_tried=False):
+        return frames.look_at_all(arguments.host_sim, directories, scratch, arguments.jobs, options, with_tried)
 
     people = sorted(os.path.dirname(path) for folder in arguments.people
                     for path in glob.glob(os.path.join(folder, "**", "rig.json"), recursive=True))
     directories = directories_of(arguments, arguments.seeds, arguments.depth_seeds, arguments.clutter_seeds) + people
     moves = moves_of(see(directories, ("--without", "move")))
-    seen = see(directories)
+    seen = see(directories, with_tried=True)
     promise = promise_of(seen)
     kinds = seen[0]["kinds"]
     rows = gather(seen, set(people))

@@ -84,8 +84,8 @@ IH_END_DECLS
 
 /* Rays, ellipsoid, scan, fit. */
 #define IH_RANGE_POINT_MM_Q8 32768000
-#define IH_RANGE_PASS_Q14 185400 /* of a ray's nearest point, from the centre */
-#define IH_RANGE_PROMISE_SUM_Q5 12800
+#define IH_RANGE_PASS_Q14 185400         /* of a ray's nearest point, from the centre */
+#define IH_RANGE_PROMISE_SUM_Q5 12800    /* 100 numbers of 8 bits */
 #define IH_RANGE_SLOPE_Q13 29491         /* derivative by ln of what has a weight */
 #define IH_RANGE_FIT_NORMAL_Q16 95000000 /* diagonal of the fit's equations */
 

@@ -1,7 +1,8 @@
 /* ih_candidates - distances among the candidates of ih_detections: of starts and detections (ours).
  *
  * In:     centres in the level frame.
- * Out:    starts that are new, whether a head is found already, detections in their order, and which of them is the body to another one's head.
+ * Out:    starts that are new, whether a head is found already, detections in their order, and which of them is the body
+ *         to another one's head.
  * Overflow: centres are below 2^27 in Q8, their differences below 2^28.
  */
 #ifndef IH_CANDIDATES_H

@@ -114,28 +114,41 @@ static bool is_too_near(const struct context *context, const struct ih_ellipsoid
     return head->centre_mm_q8[2] - head->semi_mm_q8[2] < context->params->front_min_mm << 8;
 }
 
+static void fit_to_the_end(const struct context *context, struct ih_fit *fit,
+                           struct ih_detection *detection)
+{
+    const struct ih_detections_params *params = context->params;
+    ih_fit_continue(context->rays, &params->fit, params->fit.step_count, &context->scratch->fit,
+                    fit);
+    detection->head = fit->ellipsoid;
+    if (params->fit.step_count > FIRST_LOOK_STEPS) {
+        ih_surroundings_move(context->rays, params->move_max_mm, &detection->head);
+    }
+    rate(context, fit, detection);
+}
+
 static void try_start(const struct context *context, const struct ih_ellipsoid *start,
                       enum ih_source source)
 {
     const struct ih_detections_params *params = context->params;
     struct ih_detection detection = {.source = (int32_t)source};
     struct ih_fit fit;
+    bool is_worth_it = true;
     if (!ih_candidates_add_start(&context->scratch->starts, start->centre_mm_q8,
                                  params->apart_mm)) {
         return;
     }
     ih_fit_begin(start, &fit);
-    ih_fit_continue(context->rays, &params->fit, FIRST_LOOK_STEPS, &context->scratch->fit, &fit);
-    detection.head = fit.ellipsoid;
-    rate(context, &fit, &detection);
-    const bool is_worth_it =
-        source == IH_SOURCE_EXPECTED || detection.logit_q10 >= params->hopeless_logit_q10;
-    if (is_worth_it && fit.step_index < params->fit.step_count) {
-        ih_fit_continue(context->rays, &params->fit, params->fit.step_count, &context->scratch->fit,
+    if (source != IH_SOURCE_EXPECTED) {
+        ih_fit_continue(context->rays, &params->fit, FIRST_LOOK_STEPS, &context->scratch->fit,
                         &fit);
         detection.head = fit.ellipsoid;
-        ih_surroundings_move(context->rays, params->move_max_mm, &detection.head);
         rate(context, &fit, &detection);
+        is_worth_it = detection.logit_q10 >= params->hopeless_logit_q10 &&
+                      fit.step_index < params->fit.step_count;
+    }
+    if (is_worth_it) {
+        fit_to_the_end(context, &fit, &detection);
     }
     if (is_too_near(context, &detection.head)) {
         return;

@@ -7,8 +7,8 @@
  *         of heads that the frame before left in doubt, in this order. Nests that promise too little (ih_surroundings),
  *         centres near a head that is found, and starts within apart_mm of one before, are passed over. Each
  *         other one is fitted for a step (ih_fit), measured (ih_evidence) and scored (ih_score). Those that are not
- *         hopeless, and all expected and last sure ones, are fitted to the end, moved to where their surroundings say that the centre is
- *         (ih_surroundings), measured and scored again; with a step_count of 0 or 1 none is moved.
+ *         hopeless are fitted to the end, moved to where their surroundings say that the centre is (ih_surroundings),
+ *         measured and scored again, expected and last sure ones at once; with a step_count of 0 or 1 none is moved.
  *         Tracks take no detection below log-odds -3: so what is below that after a step is hopeless. A range frame
  *         has several windows: begin once a frame, add once a window.
  *         For an expected head that is not found there is what its rays met (views): whether it is

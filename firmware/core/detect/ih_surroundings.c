@@ -13,6 +13,7 @@
 #define STEP_BITS 3
 #define STEPS 71
 #define EMPTY (IH_SURROUNDINGS_DEPTHS - 1)
+
 /* Two maps, half a word apart, are summed at once: 361 numbers below 16 do not overflow 16 bits. */
 #define PAIRS (IH_SURROUNDINGS_MAPS / 2)
 #define PAIR_MASK 0x000f000fu
@@ -133,33 +134,26 @@ void ih_surroundings_ask(const struct ih_surroundings *found,
     ih_surroundings_ask_maps(surroundings_maps, found, answer_q8);
 }
 
-static int32_t coarse_place_of(int32_t place)
+void ih_surroundings_move_by(const struct ih_surroundings_moves *moves, const struct ih_rays *rays,
+                             int32_t max_mm, struct ih_ellipsoid *ellipsoid)
 {
-    const int32_t cell = place / IH_SURROUNDINGS_DEPTHS;
-    const int32_t row = cell / IH_SURROUNDINGS_COLUMNS;
-    const int32_t farther =
-        ih_max_s32(cell - row * IH_SURROUNDINGS_COLUMNS - (IH_SURROUNDINGS_COARSE_COLUMNS - 1), 0);
-    return place - (row * (IH_SURROUNDINGS_COLUMNS - IH_SURROUNDINGS_COARSE_COLUMNS) + farther) *
-                       IH_SURROUNDINGS_DEPTHS;
-}
-
-void ih_surroundings_move_by(const struct ih_surroundings_moves *moves,
-                             const struct ih_surroundings *found, int32_t max_mm,
-                             struct ih_ellipsoid *ellipsoid)
-{
+    const struct head_from_rays candidate = candidate_of(rays, ellipsoid->centre_mm_q8);
     int32_t steps[2] = {0, 0}; /* down, away */
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
-        if (found->place[slot] == IH_NONE) {
+        const int32_t place =
+            place_of(&candidate, &rays->ray[slot], IH_SURROUNDINGS_COARSE_COLUMNS);
+        if (place == IH_NONE) {
             continue;
         }
-        const uint32_t both = moves->steps[coarse_place_of(found->place[slot])];
+        const uint32_t both = moves->steps[place];
         steps[0] += (int32_t)(both & MOVE_MASK) - IH_SURROUNDINGS_ZERO;
         steps[1] += (int32_t)(both >> IH_SURROUNDINGS_BITS) - IH_SURROUNDINGS_ZERO;
     }
+    const int32_t ray_weight_q12 = weight_q12(rays, candidate.depth_mm_q8);
     for (int i = 0; i < 2; i++) {
         IH_IN_RANGE(steps[i], -IH_RANGE_MAP_SUM, IH_RANGE_MAP_SUM);
         const int32_t move_mm_q8 =
-            (int32_t)ih_mul_shift(steps[i] * moves->step_mm_q8[i], found->weight_q12, 12);
+            (int32_t)ih_mul_shift(steps[i] * moves->step_mm_q8[i], ray_weight_q12, 12);
         ellipsoid->centre_mm_q8[1 + i] += ih_clamp_s32(move_mm_q8, -max_mm * 256, max_mm * 256);
         IH_IN_RANGE(ellipsoid->centre_mm_q8[1 + i], -IH_RANGE_CENTRE_MM_Q8, IH_RANGE_CENTRE_MM_Q8);
     }
@@ -168,9 +162,7 @@ void ih_surroundings_move_by(const struct ih_surroundings_moves *moves,
 void ih_surroundings_move(const struct ih_rays *rays, int32_t max_mm,
                           struct ih_ellipsoid *ellipsoid)
 {
-    struct ih_surroundings found;
-    ih_surroundings_find(rays, ellipsoid, &found);
-    ih_surroundings_move_by(&surroundings_moves, &found, max_mm, ellipsoid);
+    ih_surroundings_move_by(&surroundings_moves, rays, max_mm, ellipsoid);
 }
 
 int32_t ih_surroundings_promise_by_q5(const struct ih_surroundings_promise *promise,

@@ -28,7 +28,7 @@
  * Error:  a ray that passes within 1/128 mm of a cell's edge, or a depth within half a mm of a range's, may
  *         be counted on either side. The weight 2 %, at 25 mm of spacing 0.2 %: a square of Q8. A move as the weight.
  * Cost:   two products for each ray of known state, and four sums of two maps each: 22,000 instructions (x86-64, -O3); a move
- *         30,000; a promise 4,300.
+ *         20,000; a promise 4,300.
  */
 #ifndef IH_SURROUNDINGS_H
 #define IH_SURROUNDINGS_H
@@ -97,10 +97,9 @@ void ih_surroundings_ask_maps(const uint32_t maps[IH_SURROUNDINGS_PLACES],
 void ih_surroundings_move(const struct ih_rays *rays, int32_t max_mm,
                           struct ih_ellipsoid *ellipsoid);
 
-/* The ellipsoid that found is of, by other moves. */
-void ih_surroundings_move_by(const struct ih_surroundings_moves *moves,
-                             const struct ih_surroundings *found, int32_t max_mm,
-                             struct ih_ellipsoid *ellipsoid);
+/* By other moves. */
+void ih_surroundings_move_by(const struct ih_surroundings_moves *moves, const struct ih_rays *rays,
+                             int32_t max_mm, struct ih_ellipsoid *ellipsoid);
 
 IH_END_DECLS
 

@@ -375,6 +375,30 @@ static void expect_head(void)
     expected.head[expected.count++] = ih_ellipsoid_mean(centre);
 }
 
+/* A nest in the middle of the head. */
+static void make_nest(void)
+{
+    int axis;
+
+    hypotheses.hypothesis_count = 1;
+    for (axis = 0; axis < 3; axis++) {
+        hypotheses.hypothesis[0].centre_mm_q8[axis] = (int32_t)(head_mm[axis] * 256);
+    }
+}
+
+/* Look anew: how many detections are of each source? */
+static void count_sources(int32_t count[3])
+{
+    int32_t i;
+
+    memset(count, 0, 3 * sizeof *count);
+    ih_detections_begin(&detections);
+    look();
+    for (i = 0; i < detections.detection_count; i++) {
+        count[detections.detection[i].source]++;
+    }
+}
+
 static void a_head_is_among_the_detections(void)
 {
     make_points(true, false);
@@ -682,26 +706,19 @@ static void near_starts_are_tried_once(void)
 /* Nests and places of the scan must promise something, expected heads need not. */
 static void what_promises_nothing_is_passed_over(void)
 {
-    int pass, i;
+    int pass;
 
     make_points(true, false);
-    hypotheses.hypothesis_count = 1;
-    for (i = 0; i < 3; i++) {
-        hypotheses.hypothesis[0].centre_mm_q8[i] = (int32_t)(head_mm[i] * 256);
-    }
+    make_nest();
     expect_head();
     expected.head[0].centre_mm_q8[0] += 60 << 8;
     params.spacing_mm = 0;
+    params.found_logit_q10 = INT32_MAX;
     for (pass = 0; pass < 2; pass++) {
-        int32_t count[3] = {0, 0, 0};
+        int32_t count[3];
 
         params.scan.promise_min_q5 = pass == 0 ? INT16_MIN : INT16_MAX;
-        params.found_logit_q10 = INT32_MAX;
-        ih_detections_begin(&detections);
-        look();
-        for (i = 0; i < detections.detection_count; i++) {
-            count[detections.detection[i].source]++;
-        }
+        count_sources(count);
         IH_TEST_EQUAL(pass == 0, count[IH_SOURCE_SCAN] > 0, "scan", pass);
         IH_TEST_EQUAL(pass == 0, count[IH_SOURCE_NEST], "nest", pass);
         IH_TEST_EQUAL(1, count[IH_SOURCE_EXPECTED], "expected", pass);
@@ -729,9 +746,7 @@ static void what_is_found_is_not_tried_again(void)
             memcpy(detections.detection[0].head.centre_mm_q8, centre_mm_q8, sizeof centre_mm_q8);
             detections.detection[0].head.centre_mm_q8[axis] += cases[i].off_mm_q8;
             IH_TEST_EQUAL(cases[i].is_found,
-                          ih_candidates_is_found(&detections, centre_mm_q8, params.found_mm,
-                                                 params.found_logit_q10),
-                          "found", i);
+                          ih_candidates_is_found(&detections, centre_mm_q8, 130, 3072), "found", i);
         }
     }
 }
@@ -739,14 +754,11 @@ static void what_is_found_is_not_tried_again(void)
 /* Nests and places of the scan that are near a head are left out, expected heads are not. */
 static void a_found_head_leaves_out_nests_and_places(void)
 {
-    int32_t count[2][3] = {{0}};
-    int pass, i;
+    int32_t count[2][3];
+    int pass;
 
     make_points(true, false);
-    hypotheses.hypothesis_count = 1;
-    for (i = 0; i < 3; i++) {
-        hypotheses.hypothesis[0].centre_mm_q8[i] = (int32_t)(head_mm[i] * 256);
-    }
+    make_nest();
     expect_head();
     expected.head[0].centre_mm_q8[0] += 25 << 8;
     params.spacing_mm = 0;
@@ -755,11 +767,7 @@ static void a_found_head_leaves_out_nests_and_places(void)
     params.found_mm = 100000;
     for (pass = 0; pass < 2; pass++) {
         params.found_logit_q10 = pass == 0 ? INT32_MIN : INT32_MAX;
-        ih_detections_begin(&detections);
-        look();
-        for (i = 0; i < detections.detection_count; i++) {
-            count[pass][detections.detection[i].source]++;
-        }
+        count_sources(count[pass]);
     }
     TEST_ASSERT_EQUAL_INT32(1, count[0][IH_SOURCE_SCAN]);
     TEST_ASSERT_EQUAL_INT32(0, count[0][IH_SOURCE_NEST]);

@@ -109,7 +109,7 @@ static void scenes_match_float64(void)
                            100 + map);
         }
         moved = head;
-        ih_surroundings_move_by(&vector_moves, &found, FAR_MM, &moved);
+        ih_surroundings_move_by(&vector_moves, &rays, FAR_MM, &moved);
         TEST_ASSERT_EQUAL_INT32(head.centre_mm_q8[0], moved.centre_mm_q8[0]);
         for (axis = 0; axis < 2; axis++) {
             const double move_mm =
@@ -279,18 +279,18 @@ static void moves_add_up_by_columns(void)
                                           .state = k == 1 ? IH_RAY_UNKNOWN : IH_RAY_SEEN};
         }
         ih_surroundings_find(&rays, &head, &found);
-        ih_surroundings_move_by(&moves, &found, FAR_MM, &moved);
+        ih_surroundings_move_by(&moves, &rays, FAR_MM, &moved);
         IH_TEST_EQUAL(head.centre_mm_q8[0], moved.centre_mm_q8[0], "aside", i);
         IH_TEST_EQUAL(head.centre_mm_q8[1] + 2 * (2 + cases[i].column) * 384, moved.centre_mm_q8[1],
                       "down", i);
         IH_TEST_EQUAL(head.centre_mm_q8[2] - 2 * (3 + cases[i].column) * 256, moved.centre_mm_q8[2],
                       "away", i);
         moved = head;
-        ih_surroundings_move_by(&moves, &found, 5, &moved);
+        ih_surroundings_move_by(&moves, &rays, 5, &moved);
         IH_TEST_EQUAL(head.centre_mm_q8[1] + (5 << 8), moved.centre_mm_q8[1], "at most down", i);
         IH_TEST_EQUAL(head.centre_mm_q8[2] - (5 << 8), moved.centre_mm_q8[2], "at most towards", i);
         moved = head;
-        ih_surroundings_move_by(&moves, &found, 0, &moved);
+        ih_surroundings_move_by(&moves, &rays, 0, &moved);
         TEST_ASSERT_EQUAL_MEMORY(&head, &moved, sizeof head);
     }
 }
@@ -381,7 +381,7 @@ static void extremes_do_not_overflow(void)
         memset(moves.steps, pass % 2 == 0 ? 0 : UINT8_MAX, sizeof moves.steps);
         moves.step_mm_q8[0] = 8 << 8;
         moved = head;
-        ih_surroundings_move_by(&moves, &found, 1000, &moved);
+        ih_surroundings_move_by(&moves, &rays, 1000, &moved);
         IH_TEST_EQUAL(
             (int32_t)fmax(fmin(floor(ldexp(known * each * found.weight_q12, -1) + 0.5), 256000),
                           -256000),
