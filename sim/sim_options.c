@@ -40,6 +40,12 @@ static void without_windows(struct ih_params *params)
     params->windows.window_max = 1;
 }
 
+static void without_skips(struct ih_params *params)
+{
+    params->detections.found_mm = 0;
+    params->detections.hopeless_logit_q10 = INT32_MIN;
+}
+
 static void without_missing(struct ih_params *params)
 {
     params->samples.fill_root_weight_q15 = 0;
@@ -52,15 +58,11 @@ static const struct {
     const char *name;
     void (*apply)(struct ih_params *params); /* NULL: none */
 } part[] = {
-    {"ambient", NULL},
-    {"scan", without_scan},
-    {"nests", without_nests},
-    {"expected", without_expected},
-    {"fit", without_fit},
-    {"move", without_move},
-    {"tracks", without_tracks},
-    {"windows", without_windows},
-    {"missing", without_missing},
+    {"ambient", NULL},          {"scan", without_scan},
+    {"nests", without_nests},   {"expected", without_expected},
+    {"fit", without_fit},       {"move", without_move},
+    {"tracks", without_tracks}, {"windows", without_windows},
+    {"skips", without_skips},   {"missing", without_missing},
 };
 
 #define PART_COUNT (sizeof part / sizeof part[0])
@@ -239,6 +241,8 @@ void sim_options_help(void)
           "                 move      fitted centres are not moved by what is around them\n"
           "                 tracks    every frame on its own\n"
           "                 windows   of a depth image only the best window\n"
+          "                 skips     beside a head, and of what is hopeless, fits are made all "
+          "the same\n"
           "                 missing   dots that are not seen are not entered as far points\n"
           "  -h, --help     this text\n"
           "  --version      the version\n"

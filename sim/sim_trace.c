@@ -270,34 +270,50 @@ static void write_heads(struct app_write *write, const struct ih_hypotheses *hyp
     app_write_close(write, '}');
 }
 
-/* What the rays ask of the learnt maps. */
-static void write_surroundings(struct app_write *write, const struct ih_rays *rays,
-                               const struct ih_ellipsoid *ellipsoid)
-{
+/* Why a detection has its log-odds. */
+struct reasons {
     struct ih_surroundings surroundings;
-    ih_surroundings_find(rays, ellipsoid, &surroundings);
+    int32_t answer_q8[IH_SURROUNDINGS_MAPS];
+    struct ih_score score;
+};
+
+static struct reasons reasons_of(const struct ih_rays *rays, const struct ih_detection *detection)
+{
+    struct reasons reasons;
+    ih_surroundings_find(rays, &detection->head, &reasons.surroundings);
+    ih_surroundings_ask(&reasons.surroundings, reasons.answer_q8);
+    ih_score_rate(&detection->evidence, reasons.answer_q8, &reasons.score);
+    return reasons;
+}
+
+/* By the rays that it was measured by, which give its log-odds: not those of another window of a depth image, nor of lines
+ * that have moved since. False where there are none. */
+static bool find_reasons(const struct ih_rays *rays, int32_t rays_count,
+                         const struct ih_detection *detection, struct reasons *out)
+{
+    for (int32_t i = 0; i < rays_count; i++) {
+        *out = reasons_of(&rays[i], detection);
+        if (out->score.logit_q10 == detection->logit_q10) {
+            return true;
+        }
+    }
+    return false;
+}
+
+static void write_reasons(struct app_write *write, const struct reasons *reasons)
+{
+    write_column(write, "part_q10", reasons->score.part_q10, IH_SCORE_PARTS, sizeof(int32_t));
+    write_column(write, "answer_q8", reasons->answer_q8, IH_SURROUNDINGS_MAPS, sizeof(int32_t));
     app_write_key(write, "surroundings");
     app_write_open(write, '{');
-    app_write_int_field(write, "weight_q12", surroundings.weight_q12);
+    app_write_int_field(write, "weight_q12", reasons->surroundings.weight_q12);
     app_write_key(write, "place");
     app_write_open(write, '[');
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
-        app_write_int(write, surroundings.place[slot]);
+        app_write_int(write, reasons->surroundings.place[slot]);
     }
     app_write_close(write, ']');
     app_write_close(write, '}');
-}
-
-/* The rays are those that it was measured by: not those of another window of a depth image, or of lines that
- * have moved since. */
-static bool is_of(const struct ih_rays *rays, const struct ih_detection *detection)
-{
-    struct ih_surroundings surroundings;
-    int32_t answer_q8[IH_SURROUNDINGS_MAPS];
-    ih_surroundings_find(rays, &detection->head, &surroundings);
-    ih_surroundings_ask(&surroundings, answer_q8);
-    return memcmp(answer_q8, &detection->evidence.value_q8[IH_EVIDENCE_MAP_0], sizeof answer_q8) ==
-           0;
 }
 
 /* The rays of each view of the frame: of the dots, or of each window of a depth image. They are made anew, for later
@@ -325,8 +341,7 @@ static void write_detection(struct app_write *write, const struct ih_rays *rays,
                             const struct ih_detection *detection, const struct ih_verdict *verdict,
                             bool is_predicted)
 {
-    struct ih_score score;
-    ih_score_rate(&detection->evidence, &score);
+    struct reasons reasons;
     app_write_open(write, '{');
     write_column(write, "centre_mm_q8", detection->head.centre_mm_q8, 3, sizeof(int32_t));
     write_column(write, "semi_mm_q8", detection->head.semi_mm_q8, 3, sizeof(int32_t));
@@ -340,8 +355,6 @@ static void write_detection(struct app_write *write, const struct ih_rays *rays,
     app_write_int_field(write, "probability_q16", verdict->probability_q16);
     write_column(write, "evidence_q8", detection->evidence.value_q8, IH_EVIDENCE_COUNT,
                  sizeof(int32_t));
-    write_column(write, "part_q10", score.part_q10, IH_EVIDENCE_COUNT, sizeof(int32_t));
-    app_write_int_field(write, "together_q10", score.together_q10);
     app_write_int_field(write, "through_count", detection->evidence.view.through);
     app_write_int_field(write, "hit_count", detection->evidence.view.hit);
     app_write_int_field(write, "front_count", detection->evidence.view.front);
@@ -352,19 +365,14 @@ static void write_detection(struct app_write *write, const struct ih_rays *rays,
     app_write_int_field(write, "b_px_q12", detection->b_px_q12);
     app_write_int_field(write, "angle_mdeg", detection->angle_mdeg);
     app_write_int_field(write, "distance_mm_q8", detection->distance_mm_q8);
-    int32_t of = 0;
-    while (of < rays_count && !is_of(&rays[of], detection)) {
-        of++;
-    }
-    if (!is_predicted && of < rays_count) {
-        write_surroundings(write, &rays[of], &detection->head);
+    if (!is_predicted && find_reasons(rays, rays_count, detection, &reasons)) {
+        write_reasons(write, &reasons);
     }
     app_write_close(write, '}');
 }
 
 static const char *const evidence_name[] = {
-    "on",    "rough", "bulge", "tall",  "moved", "bend_down", "bend_across", "distance",
-    "map_0", "map_1", "map_2", "map_3", "map_4", "map_5",     "map_6",       "map_7",
+    "on", "rough", "bulge", "tall", "moved", "bend_down", "bend_across", "distance",
 };
 
 _Static_assert(sizeof evidence_name / sizeof evidence_name[0] == IH_EVIDENCE_COUNT,

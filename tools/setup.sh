@@ -352,7 +352,6 @@ people)
 learn)
     need_python numpy python3-numpy
     need_python scipy python3-scipy
-    need_python xgboost python3-xgboost
     ;;
 accept | vectors)
     need_python numpy python3-numpy

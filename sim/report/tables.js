@@ -115,14 +115,13 @@ const Tables = (() => {
   /* The log-odds before any evidence, the same for all of a frame: read from one without a track, whose
    * log-odds are no mean over frames. null where there is none. */
   function baseOf(trace) {
-    const free = trace.findings.find((f) => f.track === 0 && !f.predicted);
-    return free ? (free.logit_q10 - free.together_q10 - free.part_q10.reduce((sum, p) => sum + p, 0)) / 1024 : null;
+    const free = trace.findings.find((f) => f.track === 0 && f.part_q10);
+    return free ? (free.logit_q10 - free.part_q10.reduce((sum, p) => sum + p, 0)) / 1024 : null;
   }
 
   /* What was there before has no bar: it is larger than all others, which would be too short to be distinguished. */
   function evidenceRow(name, value, part, largest) {
-    const map = /^map_(\d)$/.exec(name);
-    const [text, unit, decimals] = map ? [`what all dots there say by learnt map ${map[1]}`, "", 2] : KINDS[name] || [name, "", 2];
+    const [text, unit, decimals] = KINDS[name] || [name, "", 2];
     const bar = largest === null ? null : element("i", { class: part >= 0 ? "for" : "against", style: `width:${(Math.abs(part) / largest * 48).toFixed(1)}%` });
     return element("tr", {}, element("th", { scope: "row" }, text),
       element("td", {}, value === null ? "" : `${value.toFixed(decimals)}${unit ? `\u202f${unit}` : ""}`),
@@ -130,7 +129,21 @@ const Tables = (() => {
       element("td", { "aria-hidden": "true" }, bar && element("div", { class: "bar" }, bar)));
   }
 
-  /* Why a hypothesis has its score: each kind's part of the log-odds, the largest first. */
+  /* Parts of the log-odds: of each measure, and of the learnt maps those that say most; what the others say is one row. */
+  const MAPS_SHOWN = 6;
+
+  function partsOf(trace, detection) {
+    if (!detection.part_q10) return [];
+    const measures = trace.evidence.length;
+    const all = detection.part_q10.map((p, i) => i < measures ? { name: trace.evidence[i], value: detection.evidence_q8[i] / 256, part: p / 1024 }
+      : { name: `what all dots there say by learnt map ${i - measures}`, value: detection.answer_q8[i - measures] / 256, part: p / 1024 });
+    const bySize = (parts) => parts.sort((a, b) => Math.abs(b.part) - Math.abs(a.part));
+    const maps = bySize(all.slice(measures));
+    const rest = maps.splice(MAPS_SHOWN).reduce((sum, p) => sum + p.part, 0);
+    return bySize([...all.slice(0, measures), ...maps, { name: "by the other maps", value: null, part: rest }]);
+  }
+
+  /* Why a hypothesis has its score: each part of the log-odds, the largest first. */
   function fillEvidence(frame, trace, chosen) {
     const into = document.getElementById("evidence");
     const detection = trace && !Data.dirs[frame.dir].paper ? trace.findings[chosen] : null;
@@ -138,17 +151,15 @@ const Tables = (() => {
       into.replaceChildren();
       return;
     }
-    const parts = detection.part_q10.map((p) => p / 1024);
-    const order = parts.map((_, i) => i).sort((a, b) => Math.abs(parts[b]) - Math.abs(parts[a]));
+    const parts = partsOf(trace, detection);
     const base = baseOf(trace);
-    const together = detection.together_q10 / 1024;
-    const largest = Math.max(...parts.map(Math.abs), Math.abs(together), 0.01);
+    const largest = Math.max(...parts.map((p) => Math.abs(p.part)), 0.01);
     const h = frame.record.hypotheses[chosen];
     const title = h.predicted ? `Hypothesis ${chosen} is predicted by its track: it was not seen, so there is no evidence of this frame`
+      : parts.length === 0 ? `Hypothesis ${chosen}: what it was measured by is not known any more`
       : `Evidence for (right, green) and against (left) hypothesis ${chosen}: log-odds ${(detection.logit_q10 / 1024).toFixed(2)}` +
         `${detection.track === 0 ? "" : ", a mean over the frames of its track"}`;
-    const rows = h.predicted ? [] : order.map((i) => evidenceRow(trace.evidence[i], detection.evidence_q8[i] / 256, parts[i], largest));
-    if (rows.length > 0) rows.push(evidenceRow("what they say together", null, together, largest));
+    const rows = parts.map((p) => evidenceRow(p.name, p.value, p.part, largest));
     if (base !== null && rows.length > 0) rows.unshift(evidenceRow("before any evidence", null, base, null));
     const head = ["Evidence", "Value", "Log-odds", ""];
     const open = into.querySelector("details") ? into.querySelector("details").open : true;

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""tools/eval: its scores of records that were made by hand, and a short run with the programs; tools/learn: its moves.
+"""tools/eval: its scores of records that were made by hand, and a short run with the programs; tools/learn: its score, moves and promise.
 
 eval.py HOST_SIM RENDER
 """
@@ -24,6 +24,7 @@ import scenes
 import score
 
 sys.path.insert(0, os.path.join(TOOLS, "..", "learn"))
+import model
 import ray_map
 
 CENTRE = [10.0, -20.0, 800.0]
@@ -296,15 +297,45 @@ class Programs(unittest.TestCase):
             self.assertIn(seeds, text)
 
 
+def drawn_detections(random, count):
+    """Measures, places, a ray's weight, and true log-odds: a valley of a weighted sum, which no sum of curves of its parts is."""
+    measure_q8 = random.integers(0, 25600, (count, 2))
+    place = random.integers(-1, ray_map.PLACES, (count, 30)).astype(numpy.int16)
+    weight_q12 = random.integers(1000, 4097, count)
+    row = numpy.arange(ray_map.PLACES) // (ray_map.COLUMNS * ray_map.DEPTHS)
+    said = weight_q12 / 4096 * numpy.where(place >= 0, (row - 4.5)[place], 0.0).sum(axis=1)
+    return measure_q8, place, weight_q12, abs(said / 4 + measure_q8[:, 0] / 25600 * 6 - 3) * 3 - 4
+
+
+class Score(unittest.TestCase):
+    def test_a_valley_of_a_weighted_sum_is_learnt(self):
+        """On detections that nothing was learnt from, with all numbers rounded, against the true log-odds."""
+        random = numpy.random.default_rng(8)
+        with unittest.mock.patch.multiple(ray_map, MAPS=8), unittest.mock.patch.multiple(model, EPOCHS=8, BATCH=128, DROPPED=0.0):
+            *known, log_odds = drawn_detections(random, 30000)
+            labels = (random.random(len(log_odds)) < 1 / (1 + numpy.exp(-log_odds))).astype(float)
+            learnt = model.fit(*known, labels, numpy.ones(len(labels)))
+            measure_q8, place, weight_q12, log_odds = drawn_detections(random, 10000)
+            said = learnt.logits(measure_q8, 256 * ray_map.answers(learnt.maps, place, weight_q12))
+        probability = 1 / (1 + numpy.exp(-log_odds))
+        entropy, learnt_entropy = (numpy.mean(probability * numpy.logaddexp(0, -x) + (1 - probability) * numpy.logaddexp(0, x)) for x in (log_odds, said))
+        without = -numpy.mean(probability) * numpy.log(numpy.mean(probability)) - numpy.mean(1 - probability) * numpy.log(numpy.mean(1 - probability))
+        # Nine tenths of what can be known.
+        self.assertLess(learnt_entropy - entropy, (without - entropy) / 10)
+        self.assertGreaterEqual(learnt.maps.min(), -ray_map.ZERO)
+        self.assertLess(learnt.maps.max(), ray_map.ZERO)
+        self.assertLessEqual(abs(learnt.weight_q2).max(), model.WEIGHT_MAX)
+
+
 class Moves(unittest.TestCase):
     def test_how_far_off_a_centre_is_is_learnt_by_place(self):
         """Of heads whose rays say it, and a few that are elsewhere: a slope from row to row, other in each direction."""
         random = numpy.random.default_rng(5)
-        row = numpy.arange(ray_map.COARSE_PLACES) // (ray_map.COARSE_COLUMNS * ray_map.DEPTHS)
-        true_mm = numpy.stack([(row - 6) / 6.0, (4 - row) / 8.0], axis=1)
+        row = numpy.arange(ray_map.PLACES) // (ray_map.COLUMNS * ray_map.DEPTHS)
+        true_mm = numpy.stack([(row - 5) / 5.0, (4 - row) / 8.0], axis=1)
         place = random.integers(-1, ray_map.PLACES, (6000, 120)).astype(numpy.int16)
         weight_q12 = random.integers(1000, 4097, len(place))
-        steps_mm = numpy.where((place >= 0)[..., None], true_mm[ray_map.coarse_places()[place]], 0.0)
+        steps_mm = numpy.where((place >= 0)[..., None], true_mm[place], 0.0)
         off_mm = weight_q12[:, None] / 4096 * steps_mm.sum(axis=1)
         off_mm[::300] += 80.0
         with unittest.mock.patch.multiple(ray_map, MOVE_RIDGE=3.0, MOVE_SMOOTH=30.0):  # few heads, little noise
@@ -319,26 +350,26 @@ class Moves(unittest.TestCase):
         rough = ray_map.move_roughness()
         self.assertTrue(numpy.allclose(rough.sum(axis=0), 0.0))
         # Inside four neighbours aside and by row, two by range; the last place, nothing, has none of those.
-        inside = (6 * ray_map.COARSE_COLUMNS + 1) * ray_map.DEPTHS
-        self.assertEqual([rough[inside + depth, inside + depth] for depth in (0, 4, 8, 9)], [5.0, 6.0, 5.0, 4.0])
+        inside = (5 * ray_map.COLUMNS + 1) * ray_map.DEPTHS
+        self.assertEqual([rough[inside + depth, inside + depth] for depth in (0, 3, 6, 7)], [5.0, 6.0, 5.0, 4.0])
 
 
 class Promise(unittest.TestCase):
     def test_parts_are_learnt_from_what_was_near_a_head(self):
         """Centres of which some are near a head, as a bias and parts by row say; as many as make chance small."""
         random = numpy.random.default_rng(6)
-        row = numpy.arange(ray_map.COARSE_PLACES) // (ray_map.COARSE_COLUMNS * ray_map.DEPTHS)
-        true_part = (row - 6) / 12.0
-        place = random.integers(-1, ray_map.COARSE_PLACES, (40000, 40)).astype(numpy.int16)
+        row = numpy.arange(ray_map.PLACES) // (ray_map.COLUMNS * ray_map.DEPTHS)
+        true_part = (row - 5) / 12.0
+        place = random.integers(-1, ray_map.PLACES, (40000, 40)).astype(numpy.int16)
         weight = random.uniform(0.3, 1.0, len(place))
         log_odds = -1.0 + weight * numpy.where(place >= 0, true_part[place], 0.0).sum(axis=1)
         labels = random.random(len(place)) < 1 / (1 + numpy.exp(-log_odds))
         with unittest.mock.patch.object(ray_map, "PROMISE_RIDGE", 1.0):
             bias_q5, part_q5 = ray_map.fit_promise(place, weight, labels)
-        # A part's standard error is 0.04 or so of log-odds (4,000 rays each): the mean of a row has 30 of them.
+        # A part's standard error is 0.04 or so of log-odds (4,000 rays each): the mean of a row has 24 of them.
         self.assertLess(abs(bias_q5 / 32 + 1.0), 0.15)
         by_row = numpy.array([part_q5[row == k].mean() / 32 for k in range(ray_map.ROWS)])
-        self.assertLess(abs(by_row - (numpy.arange(ray_map.ROWS) - 6) / 12.0).max(), 0.08)
+        self.assertLess(abs(by_row - (numpy.arange(ray_map.ROWS) - 5) / 12.0).max(), 0.08)
 
 
 if __name__ == "__main__":

@@ -88,11 +88,15 @@ static void hash_start(struct isohead *head, const int32_t centre_mm_q8[3],
     const struct ih_ellipsoid start = ih_ellipsoid_mean(centre_mm_q8);
     struct ih_fit fit;
     struct ih_evidence evidence;
+    struct ih_surroundings surroundings;
+    int32_t answer_q8[IH_SURROUNDINGS_MAPS];
     struct ih_score score;
     ih_fit_begin(&start, &fit);
     ih_fit_continue(rays, params, params->step_count, &head->scratch.detections.fit, &fit);
     ih_evidence_collect(rays, &fit.ellipsoid, centre_mm_q8, &evidence);
-    ih_score_rate(&evidence, &score);
+    ih_surroundings_find(rays, &fit.ellipsoid, &surroundings);
+    ih_surroundings_ask(&surroundings, answer_q8);
+    ih_score_rate(&evidence, answer_q8, &score);
     hash[GOLDEN_FIT] = golden_add_words(hash[GOLDEN_FIT], &fit.ellipsoid, sizeof fit.ellipsoid);
     hash[GOLDEN_EVIDENCE] = golden_add_words(hash[GOLDEN_EVIDENCE], &evidence, sizeof evidence);
     hash[GOLDEN_SCORE] = golden_add_words(hash[GOLDEN_SCORE], &score, sizeof score);
@@ -151,7 +155,7 @@ _Static_assert(sizeof(struct ih_exposure) == WORDS(4), "ih_exposure");
 _Static_assert(sizeof(struct ih_ellipse) == WORDS(9), "ih_ellipse");
 _Static_assert(offsetof(struct ih_rays, table) == WORDS(3 + 6 * IH_SLOTS), "ih_rays");
 _Static_assert(sizeof(struct ih_scan_candidate) == WORDS(4), "ih_scan_candidate");
-_Static_assert(sizeof(struct ih_score) == WORDS(3 + IH_EVIDENCE_COUNT), "ih_score");
+_Static_assert(sizeof(struct ih_score) == WORDS(2 + IH_SCORE_PARTS), "ih_score");
 
 const char *const golden_inner_name[GOLDEN_INNERS] = {
     "noise", "exposure", "cuts", "ellipses", "space", "scan", "fit", "evidence", "score", "paper"};

@@ -809,7 +809,7 @@ scan,,fit:
 sca:sca
 scans:scans
 END
-run --json --without scan --without fit,tracks --without nests,expected,move,windows,missing,ambient d
+run --json --without scan --without fit,tracks --without nests,expected,move,windows,skips,missing,ambient d
 check 'usage: --without all parts' 0 3 0 -
 run --help
 reason='no help'

@@ -22,11 +22,11 @@ import ray_map  # pylint: disable=wrong-import-position
 import score  # pylint: disable=wrong-import-position
 
 
+LOGIT_ERROR = 0.03  # each of 56 parts is rounded to 1/1024
 BALLS_MM = ((-400.0, 1000.0), (0.0, 1500.0), (600.0, 1900.0))
 
 
-def complaints(trace, maps):
-    first = trace["evidence"].index("map_0")
+def complaints(trace, maps, learnt):
     for detection in trace["findings"]:
         rays = detection.get("surroundings")
         if detection["predicted"]:
@@ -35,16 +35,18 @@ def complaints(trace, maps):
             yield "%s: a detection without its rays" % trace["file"]
             continue
         answers = ray_map.answers(maps, numpy.array([rays["place"]]), numpy.array([rays["weight_q12"]]))[0]
-        given_q8 = detection["evidence_q8"][first:first + ray_map.MAPS]
+        given_q8 = detection["answer_q8"]
         centre_mm = numpy.array([detection["centre_mm_q8"]]) / 256
-        place = numpy.array(rays["place"])
-        expected = numpy.where(place >= 0, ray_map.coarse_places()[place], -1)
         # Of another view, or of a ray at a cell's edge, which is rounded otherwise.
-        if min((ray_map.coarse_places_around(frames.read_rays(view), centre_mm)[0] != expected).sum()
+        if min((ray_map.places_around(frames.read_rays(view), centre_mm)[0] != rays["place"]).sum()
                for view in trace["rays"]) > 3:
             yield "%s: rays of the trace are elsewhere in the maps" % trace["file"]
         if [round(256 * answer) for answer in answers] != given_q8:
-            yield "%s: rays say %s, the evidence %s in Q8" % (trace["file"], answers, given_q8)
+            yield "%s: rays say %s, the trace %s in Q8" % (trace["file"], answers, given_q8)
+        expected = learnt.logits(numpy.array([detection["evidence_q8"]]), numpy.array([given_q8]))[0]
+        logit = (learnt.bias_q10 + sum(detection["part_q10"])) / 1024
+        if abs(logit - expected) > LOGIT_ERROR:
+            yield "%s: log-odds of %.4f, of this evidence %.4f are expected" % (trace["file"], logit, expected)
 
 
 def write_depth_image(folder):
@@ -79,7 +81,8 @@ def main():
         for path in sorted(glob.glob(os.path.join(out, "*", "*.json"))):
             with open(path, encoding="utf-8") as file:
                 traces.append(json.load(file))
-    bad = [text for trace in traces for text in complaints(trace, maps)]
+    _, learnt, _ = score.read_header(os.path.join(ROOT, "firmware/core/detect/ih_score_weights.h"))
+    bad = [text for trace in traces for text in complaints(trace, maps, learnt)]
     depths = [detection["centre_mm_q8"][2] / 256 for detection in traces[0]["findings"]]
     bad += ["depth image: no detection at %g mm" % ball for _, ball in BALLS_MM
             if not any(abs(depth - ball) < 100.0 for depth in depths)]

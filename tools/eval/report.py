@@ -150,7 +150,7 @@ def scene_list(results):
 def seeds(results):
     used = sorted(scene.seed for scene in results if scene.seed)
     return ("%d scenes are rendered or cast, seeds %d to %d: reported on, nothing is tuned on them. The "
-            "score's curves are learnt\nfrom seeds %s and were looked at with %s (tools/learn). The data sets "
+            "score's maps and curves are learnt\nfrom seeds %s and were looked at with %s (tools/learn). The data sets "
             "(six, real, range) were looked at\nwhile parameters were chosen.\n"
             % (len(used), used[0], used[-1], scenes.learnt_seeds(), scenes.CHECK_SEEDS))
 

@@ -11,7 +11,7 @@ import subprocess
 
 import score
 
-PARTS = ("ambient", "scan", "nests", "expected", "fit", "move", "tracks", "windows", "missing")
+PARTS = ("ambient", "scan", "nests", "expected", "fit", "move", "tracks", "windows", "skips", "missing")
 FULL = "full"
 PAPER = "paper"
 PAPER_PLAIN = "paper, without missing"

@@ -72,7 +72,7 @@ def read_tried(trace):
         away_mm = centre_mm[:, 2] - rays["origin_mm"][2]
         weight = numpy.minimum(numpy.maximum(away_mm, 0) * rays["pitch"] / ray_map.CELL_MM, 1)**2
         counted = {**rays, **{key: rays[key][COUNTED] for key in ("slope", "point_mm", "state")}}
-        parts.append((centre_mm, ray_map.coarse_places_around(counted, centre_mm), weight))
+        parts.append((centre_mm, ray_map.places_around(counted, centre_mm), weight))
     centre_mm, place, weight = (numpy.concatenate(column) for column in zip(*parts))
     return {"centre_mm": centre_mm, "place": place, "weight": weight}
 
@@ -88,8 +88,8 @@ def read_trace(path, with_tried):
         # To the level frame, in which detections are; a camera that hangs level has none.
         "level": numpy.array(trace.get("level_q30", (1 << 30) * numpy.eye(3))).reshape(3, 3) / (1 << 30),
         "centre_mm": numpy.array([f["centre_mm_q8"] for f in found]).reshape(-1, 3) / 256,
-        "evidence_q8": numpy.array([f["evidence_q8"] for f in found],
-                                   dtype=numpy.int64).reshape(len(found), len(trace["evidence"])),
+        "measure_q8": numpy.array([f["evidence_q8"] for f in found],
+                                  dtype=numpy.int64).reshape(len(found), len(trace["evidence"])),
         "weight_q12": numpy.array([f["surroundings"]["weight_q12"] for f in found], dtype=int),
         "place": numpy.array([f["surroundings"]["place"] for f in found], dtype=numpy.int16).reshape(len(found), SLOTS),
     }

@@ -5,13 +5,13 @@ learn.py --render PROGRAM --host-sim PROGRAM --work DIR [--seeds A-B] [--depth-s
     [--people DIR...] [--out DIR] [--also DIR...]
 
 Renders every scene of scenes.py for every seed into DIR (those already there are kept), runs the firmware over them and
-over the frames of people that tools/people has made, and learns the maps of the surroundings (ray_map.py); then a
-logistic model: log-odds = bias + one piecewise linear curve per kind of evidence, the maps' among them, with a penalty on
-curves that bend; then trees for what the curves leave. A detection within 55 mm of a head is one, beyond 100 mm it is none,
-between it is not used, and neither is one within 150 mm of a head that is hardly seen. A sequence of tools/people counts
-as three frames of tools/render. Every detection is learnt from once more, for half as much, as if the view ended nearer.
-How far off a fitted centre is (the moves of ih_surroundings.h) is learnt from the same frames without moves; whether a
-centre is worth a fit (its promise), from what ih_scan tries in the first and every eighth frame after it of a directory, which depends on nothing that is learnt.
+over the frames of people that tools/people has made, and learns the maps of the surroundings and the score behind them
+(model.py). A detection within 55 mm of a head is one, beyond 100 mm it is none, between it is not used, and
+neither is one within 150 mm of a head that is hardly seen. A sequence of tools/people counts as three frames of tools/render. Every detection is learnt from once more, for half as much, as if the view ended nearer.
+What the firmware skips, as it has found a head there, or as it is hopeless, is learnt from, too. How far off a fitted centre
+is (the moves of ih_surroundings.h) is learnt from some of the same frames without moves; whether a centre is worth a fit (its
+promise), from what ih_scan tries in the first and every eighth frame after it of a directory, which depends on nothing that is
+learnt.
 Run it twice: where detections are depends on the moves, and which remain a little on the promise and the score.
 """
 
@@ -27,7 +27,6 @@ import frames
 import model
 import ray_map
 import scenes
-import trees
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 ROOT = os.path.dirname(os.path.dirname(HERE))
@@ -41,8 +40,11 @@ FAR_MM = 2900
 FRAME_WEIGHT, SEQUENCE_WEIGHT = 2.0, 6.0
 # Of a detection in a view that ends nearer, against the one in the whole view.
 ENDING_WEIGHT = 0.5
+# Of so many directories one says how far off fits are: a few numbers, from many heads. No divisor of how many scenes a seed
+# has, or kinds a round: some would never be asked.
+MOVES_STEP = 7
 # Log-odds that are added to every score: far more clutter is learnt from than cameras see.
-PRIOR = 0.25
+PRIOR = 0.5
 
 
 def nearest(centre_mm, heads):
@@ -67,9 +69,9 @@ def importance(seen, people):
 
 
 def gather(seen, people):
-    """Evidence, places, their weights, labels, importance."""
+    """Measures, places, their weights, labels, importance."""
     weights = importance(seen, people)
-    parts = [(f["evidence_q8"] / 256, f["place"], f["weight_q12"], label(f), numpy.full(len(f["place"]), w))
+    parts = [(f["measure_q8"], f["place"], f["weight_q12"], label(f), numpy.full(len(f["place"]), w))
              for f, w in zip(seen, weights) if len(f["place"])]
     columns = [numpy.concatenate(column) for column in zip(*parts)]
     usable = ~numpy.isnan(columns[3])
@@ -102,27 +104,15 @@ def promise_of(seen):
     return ray_map.fit_promise(*(numpy.concatenate(column) for column in zip(*parts)))
 
 
-def and_in_ending_views(evidence, place, weight_q12, labels, importances):
+def and_in_ending_views(measure_q8, place, weight_q12, labels, importances):
     """The same, then all once more in views that end nearer."""
     return [numpy.concatenate(pair) for pair in (
-        (evidence, evidence), (place, ray_map.ending_views(place)), (weight_q12, weight_q12), (labels, labels),
+        (measure_q8, measure_q8), (place, ray_map.ending_views(place)), (weight_q12, weight_q12), (labels, labels),
         (importances, ENDING_WEIGHT * importances))]
 
 
-class Score:
-    """The maps, then curves and trees, of which the last kinds are the maps'."""
-
-    def __init__(self, evidence, place, weight_q12, labels, weights):
-        self.maps = ray_map.fit(evidence[:, :-ray_map.MAPS], place, weight_q12, labels, weights)
-        known = self.with_maps(evidence, place, weight_q12)
-        self.curves = trees.add_trees(model.fit(known, labels, weights), known, labels, weights)
-        self.curves.bias_q10 += round(PRIOR * 1024)
-
-    def with_maps(self, evidence, place, weight_q12):
-        return numpy.concatenate([evidence[:, :-ray_map.MAPS], ray_map.answers(self.maps, place, weight_q12)], axis=1)
-
-    def logits(self, frame):
-        return self.curves.logits(self.with_maps(frame["evidence_q8"] / 256, frame["place"], frame["weight_q12"]))
+def logits(learnt, frame):
+    return learnt.logits(frame["measure_q8"], 256 * ray_map.answers(learnt.maps, frame["place"], frame["weight_q12"]))
 
 
 def report(learnt, seen, limit):
@@ -130,9 +120,9 @@ def report(learnt, seen, limit):
     table = {}
     for frame in seen:
         row = table.setdefault(os.path.basename(frame["directory"]).rsplit("-", 1)[0], [0] * 5)
-        logits = learnt.logits(frame) if len(frame["centre_mm"]) else []
-        best = int(numpy.argmax(logits)) if len(logits) else -1
-        accepted = best >= 0 and logits[best] > limit
+        log_odds = logits(learnt, frame) if len(frame["centre_mm"]) else []
+        best = int(numpy.argmax(log_odds)) if len(log_odds) else -1
+        accepted = best >= 0 and log_odds[best] > limit
         if len(frame["heads"]) > 0:
             distance = (numpy.linalg.norm(frame["heads"] - frame["centre_mm"][best], axis=1).min()
                         if accepted else numpy.inf)
@@ -193,17 +183,18 @@ def main():
     people = sorted(os.path.dirname(path) for folder in arguments.people
                     for path in glob.glob(os.path.join(folder, "**", "rig.json"), recursive=True))
     directories = directories_of(arguments, arguments.seeds, arguments.depth_seeds, arguments.clutter_seeds) + people
-    moves = moves_of(see(directories, ("--without", "move")))
-    seen = see(directories, with_tried=True)
+    moves = moves_of(see(directories[::MOVES_STEP], ("--without", "move,skips")))
+    seen = see(directories, ("--without", "skips"), with_tried=True)
     promise = promise_of(seen)
     kinds = seen[0]["kinds"]
     rows = gather(seen, set(people))
     print("%d frames, %d detections, %d heads" % (len(seen), len(rows[3]), rows[3].sum()))
-    learnt = Score(*and_in_ending_views(*rows))
+    learnt = model.fit(*and_in_ending_views(*rows))
+    learnt.bias_q10 += round(PRIOR * 1024)
     command = "tools/learn/learn.py --seeds %s --depth-seeds %s --clutter-seeds %s --people %s" % (
         arguments.seeds, arguments.depth_seeds, arguments.clutter_seeds,
         " ".join(os.path.basename(os.path.normpath(folder)) for folder in arguments.people))
-    model.write(os.path.join(arguments.out, "ih_score_weights.h"), learnt.curves, kinds, command)
+    model.write(os.path.join(arguments.out, "ih_score_weights.h"), learnt, kinds, command)
     ray_map.write(os.path.join(arguments.out, "ih_surroundings_map.h"), learnt.maps, moves, promise, command)
     report(learnt, seen, arguments.limit)
     check = arguments.check_seeds

@@ -9,12 +9,14 @@ import emit
 import evidence
 from rig import GRID, from_q, to_q
 
-COLUMNS, ROWS, DEPTHS, MAPS = 6, 13, 10, 8
-COARSE_COLUMNS = 3  # the last one is all that are farther aside
+COLUMNS, ROWS, DEPTHS, MAPS = 3, 10, 8, 48
+CELLS_ASIDE = 6  # the last column has all from the third on
+# Cells above each other that are one row, by the first of each.
+FIRST_CELLS, CELLS_DOWN = np.array([0, 2, 3, 4, 5, 6, 7, 8, 9, 11]), 13
 STEP_MM = (0.90625, 7.5)  # down, away
 BIAS_Q5 = -91
 CELL_MM, TOP_MM = 64.0, 384.0
-LIMITS_MM = np.array([-256, -176, -96, -40, 40, 128, 200, 304])
+LIMITS_MM = np.array([-176, -96, -40, 40, 128, 200])
 EMPTY_PLACE, NONE = DEPTHS - 1, -1
 # Slopes that the pattern's own are multiplied by, and the centre moved by: dense, as it is, so far that a ray has a cell of its own.
 CASES = (("head", 1.0, 0), ("hand", 0.4, 0), ("table", 1.7, 0), ("before_nothing", 3.0, 0), ("unknown", 1.0, 0),
@@ -34,10 +36,11 @@ def places(slope_q20, depth_q8, state, centre):
     slope = from_q(slope_q20, 20)
     x, y = (evidence.ORIGIN[:2] + (centre[2] - evidence.ORIGIN[2]) * slope - centre[:2]).T
     dz = from_q(depth_q8, 8) - centre[2]
-    column, row = np.abs(x) // CELL_MM, (y + TOP_MM) // CELL_MM
+    column, cell = np.abs(x) // CELL_MM, (y + TOP_MM) // CELL_MM
+    row = np.searchsorted(FIRST_CELLS, cell, side="right") - 1
     depth = np.where(state == evidence.EMPTY, EMPTY_PLACE, (dz[:, None] >= LIMITS_MM - 0.5).sum(1))
-    inside = (column < COLUMNS) & (row >= 0) & (row < ROWS) & (state != evidence.UNKNOWN)
-    place = np.where(inside, (row * COLUMNS + column) * DEPTHS + depth, NONE).astype(int)
+    inside = (column < CELLS_ASIDE) & (cell >= 0) & (cell < CELLS_DOWN) & (state != evidence.UNKNOWN)
+    place = np.where(inside, (row * COLUMNS + np.minimum(column, COLUMNS - 1)) * DEPTHS + depth, NONE).astype(int)
 
     def edge(value):
         return np.abs(value - CELL_MM * np.round(value / CELL_MM))
@@ -46,16 +49,10 @@ def places(slope_q20, depth_q8, state, centre):
     return place, np.minimum(np.minimum(edge(x), edge(y)), np.where(state == evidence.SEEN, beside, np.inf))
 
 
-def of_coarse(table, place):
-    """What a table by row, column and range of depth has for each place of a map."""
-    row, column, depth = place // (COLUMNS * DEPTHS), place // DEPTHS % COLUMNS, place % DEPTHS
-    return table[row, np.minimum(column, COARSE_COLUMNS - 1), depth]
-
-
 def promise(parts, place, weight):
     """Log-odds, of the rays of every other line and column."""
     counted = place.reshape(GRID, GRID)[::2, ::2].ravel()
-    return (BIAS_Q5 + weight * of_coarse(parts, counted[counted != NONE]).sum()) / 32
+    return (BIAS_Q5 + weight * parts.ravel()[counted[counted != NONE]].sum()) / 32
 
 
 def write_vectors(directory):
@@ -63,13 +60,13 @@ def write_vectors(directory):
     maps = random.integers(-8, 8, (COLUMNS * ROWS * DEPTHS, MAPS))
     inc = emit.Inc("Scenes of simple bodies, where their rays are on the maps, and what maps of random numbers say.")
     inc.raw("\nstatic const int32_t vector_origin_mm_q8[] = {%d, %d, %d};\n" % tuple(to_q(evidence.ORIGIN, 8)))
-    words = [sum((int(value) + 8) << 4 * map for map, value in enumerate(row)) for row in maps]
-    inc.raw("\nstatic const uint32_t vector_maps[] = {\n%s};\n" % emit.wrap(["0x%08x" % word for word in words]))
-    steps = np.random.default_rng(84).integers(-8, 8, (ROWS, COARSE_COLUMNS, DEPTHS, 2))
+    words = [["0x%08xu" % sum(int(value) + 8 << 4 * i for i, value in enumerate(word)) for word in row.reshape(-1, 8)] for row in maps]
+    inc.raw("\nstatic const uint32_t vector_maps[][%d] = {\n%s};\n" % (MAPS // 8, emit.wrap(["{%s}" % ", ".join(row) for row in words])))
+    steps = np.random.default_rng(84).integers(-8, 8, (ROWS, COLUMNS, DEPTHS, 2))
     inc.raw("\nstatic const struct ih_surroundings_moves vector_moves = {\n    {%d, %d},\n    {\n%s    },\n};\n" % (
         *to_q(np.array(STEP_MM), 8),
         emit.wrap(["0x%02x" % (down + 8 | away + 8 << 4) for down, away in steps.reshape(-1, 2)])))
-    parts = np.random.default_rng(85).integers(-127, 128, (ROWS, COARSE_COLUMNS, DEPTHS))
+    parts = np.random.default_rng(85).integers(-127, 128, (ROWS, COLUMNS, DEPTHS))
     inc.raw("\nstatic const struct ih_surroundings_promise vector_promise = {\n    %d,\n    {\n%s    },\n};\n" % (
         BIAS_Q5, emit.wrap(["%d" % part for part in parts.ravel()])))
     rows = []
@@ -84,7 +81,7 @@ def write_vectors(directory):
         spacing = spacing_mm(from_q(slope_q20, 20), from_q(centre_q8[2], 8) - evidence.ORIGIN[2])
         weight = min(1.0, spacing / CELL_MM)**2
         answer = weight * maps[place[place != NONE]].sum(axis=0)
-        move = weight * of_coarse(steps, place[place != NONE]).sum(axis=0) * STEP_MM
+        move = weight * steps.reshape(-1, 2)[place[place != NONE]].sum(axis=0) * STEP_MM
         inc.raw("\nstatic const struct vector_ray vector_%s_rays[] = {\n%s};\n" % (
             name, emit.wrap(["{%d, %d, %d, %d, %d}" % r for r in zip(*slope_q20.T, depth_q8, state, place)])))
         rows.append('"%s", vector_%s_rays, {%d, %d, %d}, %s, {%s}, {%s}, %s' % (

@@ -14,7 +14,7 @@ from scene import KINDS
 
 # set: first seed, rounds of all kinds, frames a sequence, empty rooms beside them (of sets to learn from, in each round)
 SETS = {
-    "learn": (410000, 80, 24, 3),
+    "learn": (410000, 66, 24, 3),
     "mounted_learn": (340000, 60, 24, 2),
     "judge": (70000, 2, 24, 8),
     "rigs": (80000, 1, 20, 0),
@@ -31,7 +31,7 @@ EMPTY_FRAMES = 30
 # More people teach more than more frames of the same: of each sequence to learn from every fourth frame is made. What
 # follows the people of the level set: kind, first seed after the people's, sequences.
 LEARN_STEP = 4
-LEARN_MORE = (("above", 60000, 80), ("seat", 70000, 180), ("ground", 80000, 250), ("far", 90000, 200), ("hands", 100000, 120))
+LEARN_MORE = (("above", 60000, 50), ("seat", 70000, 110), ("ground", 80000, 150), ("far", 90000, 120), ("hands", 100000, 70))
 # Of these fractions of the dots, drawn anew in each frame, none is seen; where weak dots are missed they are the same in
 # each. To learn from there are the people of another set again, of every fifth sequence.
 MISSING = (0.15, 0.6)

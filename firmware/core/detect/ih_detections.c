@@ -5,7 +5,6 @@
 #include "base/ih_fix.h"
 #include "detect/ih_candidates.h"
 #include "detect/ih_score.h"
-#include "detect/ih_surroundings.h"
 #include "rig/ih_level.h"
 
 /* A hopeless candidate is not fitted beyond these. One that is expected is no candidate of chance: it is fitted to the end. */
@@ -19,7 +18,7 @@ void ih_detections_params_default(struct ih_detections_params *params)
     params->apart_mm = 20;
     params->found_mm = 130;
     params->found_logit_q10 = 3072;
-    params->hopeless_logit_q10 = -3072;
+    params->hopeless_logit_q10 = -6656;
     params->spacing_mm = 80;
     params->nest_max = IH_NESTS_MAX;
     params->expected_max = IH_DETECTIONS_EXPECTED_MAX;
@@ -103,9 +102,13 @@ struct context {
 static void rate(const struct context *context, const struct ih_fit *fit,
                  struct ih_detection *detection)
 {
+    struct ih_surroundings *surroundings = &context->scratch->surroundings;
+    int32_t answer_q8[IH_SURROUNDINGS_MAPS];
     struct ih_score score;
     ih_evidence_collect(context->rays, &detection->head, fit->start_mm_q8, &detection->evidence);
-    ih_score_rate(&detection->evidence, &score);
+    ih_surroundings_find(context->rays, &detection->head, surroundings);
+    ih_surroundings_ask(surroundings, answer_q8);
+    ih_score_rate(&detection->evidence, answer_q8, &score);
     detection->logit_q10 = score.logit_q10;
 }
 

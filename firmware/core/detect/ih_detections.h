@@ -9,7 +9,8 @@
  *         other one is fitted for a step (ih_fit), measured (ih_evidence) and scored (ih_score). Those that are not
  *         hopeless are fitted to the end, moved to where their surroundings say that the centre is (ih_surroundings),
  *         measured and scored again, expected and last sure ones at once; with a step_count of 0 or 1 none is moved.
- *         Tracks take no detection below log-odds -3: so what is below that after a step is hopeless. A range frame
+ *         After a step they are below those at the end: what is below -6.5 then is hopeless, for tracks take no detection
+ *         below -3. A range frame
  *         has several windows: begin once a frame, add once a window.
  *         For an expected head that is not found there is what its rays met (views): whether it is
  *         hidden, or gone.
@@ -35,6 +36,7 @@
 #include "detect/ih_fit_equations.h"
 #include "detect/ih_rays.h"
 #include "detect/ih_scan.h"
+#include "detect/ih_surroundings.h"
 #include "dots/ih_dots.h"
 #include "nests/ih_hypotheses.h"
 #include "nests/ih_nests.h"
@@ -106,6 +108,7 @@ struct ih_detections_scratch {
     struct ih_scan scan;
     struct ih_scan_scratch scan_scratch;
     struct ih_fit_scratch fit;
+    struct ih_surroundings surroundings;
 };
 
 IH_BEGIN_DECLS

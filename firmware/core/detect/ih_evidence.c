@@ -6,7 +6,6 @@
 
 #include "base/ih_fix.h"
 #include "base/ih_range.h"
-#include "detect/ih_surroundings.h"
 
 #define ONE_Q28 ((int64_t)1 << 28)
 #define INSIDE_Q14 14746 /* radius2 below 0.9: through the head, not along its edge */
@@ -20,9 +19,6 @@
 #define BEND_MAX_MM_Q8 (20 << 8)
 /* Says neither way: about between the medians of heads and of what is taken for one (E025). */
 #define BEND_MIDDLE_MM_Q8 (12 << 8)
-
-_Static_assert(IH_EVIDENCE_COUNT - IH_EVIDENCE_MAP_0 == IH_SURROUNDINGS_MAPS,
-               "the maps are the last kinds");
 
 /* The candidate, and what is the same for all rays. */
 struct candidate {
@@ -275,7 +271,4 @@ void ih_evidence_collect(const struct ih_rays *rays, const struct ih_ellipsoid *
     out->value_q8[IH_EVIDENCE_TALL] = taller_q8(ellipsoid);
     out->value_q8[IH_EVIDENCE_MOVED] = moved_mm_q8(ellipsoid, start_mm_q8);
     out->value_q8[IH_EVIDENCE_DISTANCE] = ellipsoid->centre_mm_q8[2];
-    struct ih_surroundings surroundings;
-    ih_surroundings_find(rays, ellipsoid, &surroundings);
-    ih_surroundings_ask(&surroundings, &out->value_q8[IH_EVIDENCE_MAP_0]);
 }

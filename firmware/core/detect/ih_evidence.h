@@ -1,5 +1,5 @@
-/* ih_evidence - measurements of a fitted head's surface and surroundings, which the score weighs (ours; the
- * paper's limits on size and curvature are among them).
+/* ih_evidence - measures of a fitted head's surface, which the score weighs (ours; the paper's limits on size and curvature
+ * are among them).
  *
  * In:     rays and points, the ellipsoid, fitted and moved, where the fit began.
  * Out:    IH_EVIDENCE_COUNT numbers, each with its meaning and unit below, all in Q8.
@@ -17,7 +17,7 @@
  * Error:  counts are exact but where a ray passes within 2^-10 of a limit; rough within 0.03 mm, bulge
  *         within 0.06 mm.
  * Cost:   two products for each ray, a crossing for those that may hit the ellipsoid (90 of a head at 0.7 m), a position
- *         for each point before it (150), and the maps: 92,000 instructions (x86-64, -O3), a quarter of them the maps'.
+ *         for each point before it (150): 63,000 instructions (x86-64, -O3).
  */
 #ifndef IH_EVIDENCE_H
 #define IH_EVIDENCE_H
@@ -27,7 +27,6 @@
 #include "base/ih_config.h"
 #include "detect/ih_ellipsoid.h"
 #include "detect/ih_rays.h"
-#include "detect/ih_surroundings.h"
 
 enum ih_evidence_kind {
     IH_EVIDENCE_ON,          /* points within 20 mm of the ellipsoid: count */
@@ -38,14 +37,6 @@ enum ih_evidence_kind {
     IH_EVIDENCE_BEND_DOWN,   /* how uneven the surface is from dot to dot, downwards: mm */
     IH_EVIDENCE_BEND_ACROSS, /* and across */
     IH_EVIDENCE_DISTANCE, /* depth of the centre: mm; near and far heads show themselves otherwise */
-    IH_EVIDENCE_MAP_0,    /* what the rays there say by each learnt map (ih_surroundings) */
-    IH_EVIDENCE_MAP_1,
-    IH_EVIDENCE_MAP_2,
-    IH_EVIDENCE_MAP_3,
-    IH_EVIDENCE_MAP_4,
-    IH_EVIDENCE_MAP_5,
-    IH_EVIDENCE_MAP_6,
-    IH_EVIDENCE_MAP_7,
     IH_EVIDENCE_COUNT
 };
 

@@ -8,32 +8,35 @@
 #define CELL_BITS 14 /* 64 mm in Q8 */
 #define CELL_MM_Q8 (1 << CELL_BITS)
 #define TOP_MM_Q8 (6 * CELL_MM_Q8) /* above the centre */
-/* Depths against the centre's, by steps of 8 mm; the map's limits are -256, -176, -96, -40, 40, 128, 200 and 304 mm. */
-#define NEAREST_MM (-256)
+#define ASIDE_CELLS 6              /* the last column has four of them */
+#define CELLS 13
+/* Depths against the centre's, by steps of 8 mm; the maps' limits are -176, -96, -40, 40, 128 and 200 mm. */
+#define NEAREST_MM (-176)
 #define STEP_BITS 3
-#define STEPS 71
+#define STEPS 48
 #define EMPTY (IH_SURROUNDINGS_DEPTHS - 1)
 
 /* Two maps, half a word apart, are summed at once: 361 numbers below 16 do not overflow 16 bits. */
-#define PAIRS (IH_SURROUNDINGS_MAPS / 2)
+#define WORD_MAPS (IH_SURROUNDINGS_MAPS / IH_SURROUNDINGS_WORDS)
+#define PAIRS (WORD_MAPS / 2)
 #define PAIR_MASK 0x000f000fu
-_Static_assert(IH_SURROUNDINGS_MAPS == 8 && IH_SURROUNDINGS_BITS == 4,
-               "a word has a number by each map");
+_Static_assert(WORD_MAPS == 8 && IH_SURROUNDINGS_BITS == 4,
+               "a word has a number by each of 8 maps");
 
 /* Every other ray of every other line is asked for the promise. */
 #define PROMISE_STRIDE 2
 
 #define MOVE_MASK 0xfu /* the steps down; those away are above */
 
+static const uint8_t row_of_cell[CELLS] = {0, 0, 1, 2, 3, 4, 5, 6, 7, 8, 8, 9, 9};
+
 static const uint8_t depth_of_step[STEPS] = {
-    1, 1, 1, 1, 1, 1, 1, 1, 1, 1,          /* -256 */
-    2, 2, 2, 2, 2, 2, 2, 2, 2, 2,          /* -176 */
-    3, 3, 3, 3, 3, 3, 3,                   /* -96 */
-    4, 4, 4, 4, 4, 4, 4, 4, 4, 4,          /* -40 */
-    5, 5, 5, 5, 5, 5, 5, 5, 5, 5, 5,       /* 40 */
-    6, 6, 6, 6, 6, 6, 6, 6, 6,             /* 128 */
-    7, 7, 7, 7, 7, 7, 7, 7, 7, 7, 7, 7, 7, /* 200 */
-    8,                                     /* 304 and more */
+    1, 1, 1, 1, 1, 1, 1, 1, 1, 1,    /* -176 */
+    2, 2, 2, 2, 2, 2, 2,             /* -96 */
+    3, 3, 3, 3, 3, 3, 3, 3, 3, 3,    /* -40 */
+    4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, /* 40 */
+    5, 5, 5, 5, 5, 5, 5, 5, 5,       /* 128 */
+    6,                               /* 200 and more */
 };
 
 /* The candidate, as every ray needs it. */
@@ -70,20 +73,20 @@ static int32_t across_mm_q8(const struct head_from_rays *candidate, int32_t slop
            (int32_t)ih_mul_shift(candidate->depth_mm_q8, slope_q20, 20);
 }
 
-/* In maps of so many columns, the last of which is all that are farther aside; or IH_NONE. */
-static int32_t place_of(const struct head_from_rays *candidate, const struct ih_ray *ray,
-                        int32_t columns)
+/* In the maps, or IH_NONE. */
+static int32_t place_of(const struct head_from_rays *candidate, const struct ih_ray *ray)
 {
     if (ray->state == IH_RAY_UNKNOWN) {
         return IH_NONE;
     }
     const int32_t column = ih_abs_s32(across_mm_q8(candidate, ray->slope_x_q20, 0)) >> CELL_BITS;
-    const int32_t row = (across_mm_q8(candidate, ray->slope_y_q20, 1) + TOP_MM_Q8) >> CELL_BITS;
-    if (column >= IH_SURROUNDINGS_COLUMNS || row < 0 || row >= IH_SURROUNDINGS_ROWS) {
+    const int32_t cell = (across_mm_q8(candidate, ray->slope_y_q20, 1) + TOP_MM_Q8) >> CELL_BITS;
+    if (column >= ASIDE_CELLS || cell < 0 || cell >= CELLS) {
         return IH_NONE;
     }
-    return (row * columns + ih_min_s32(column, columns - 1)) * IH_SURROUNDINGS_DEPTHS +
-           depth_of(candidate, ray);
+    const int32_t row_and_column = row_of_cell[cell] * IH_SURROUNDINGS_COLUMNS +
+                                   ih_min_s32(column, IH_SURROUNDINGS_COLUMNS - 1);
+    return row_and_column * IH_SURROUNDINGS_DEPTHS + depth_of(candidate, ray);
 }
 
 /* Spacing^2 / cell^2. */
@@ -100,28 +103,31 @@ void ih_surroundings_find(const struct ih_rays *rays, const struct ih_ellipsoid 
     const struct head_from_rays candidate = candidate_of(rays, ellipsoid->centre_mm_q8);
     out->weight_q12 = weight_q12(rays, candidate.depth_mm_q8);
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
-        out->place[slot] = (int16_t)place_of(&candidate, &rays->ray[slot], IH_SURROUNDINGS_COLUMNS);
+        out->place[slot] = (int16_t)place_of(&candidate, &rays->ray[slot]);
     }
 }
 
-void ih_surroundings_ask_maps(const uint32_t maps[IH_SURROUNDINGS_PLACES],
+void ih_surroundings_ask_maps(const uint32_t maps[IH_SURROUNDINGS_PLACES][IH_SURROUNDINGS_WORDS],
                               const struct ih_surroundings *found,
                               int32_t answer_q8[IH_SURROUNDINGS_MAPS])
 {
-    uint32_t pair[PAIRS] = {0}; /* sums of two maps each, in 16 bits */
+    uint32_t pair[IH_SURROUNDINGS_WORDS][PAIRS] = {{0}}; /* sums of two maps each, in 16 bits */
     int32_t count = 0;
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
         const int32_t place = found->place[slot];
         if (place == IH_NONE) {
             continue;
         }
-        for (int i = 0; i < PAIRS; i++) {
-            pair[i] += maps[place] >> IH_SURROUNDINGS_BITS * i & PAIR_MASK;
+        for (int word = 0; word < IH_SURROUNDINGS_WORDS; word++) {
+            for (int i = 0; i < PAIRS; i++) {
+                pair[word][i] += maps[place][word] >> IH_SURROUNDINGS_BITS * i & PAIR_MASK;
+            }
         }
         count++;
     }
     for (int map = 0; map < IH_SURROUNDINGS_MAPS; map++) {
-        const int32_t sum = (int32_t)(pair[map % PAIRS] >> (map < PAIRS ? 0 : 16) & UINT16_MAX) -
+        const uint32_t both = pair[map / WORD_MAPS][map % PAIRS];
+        const int32_t sum = (int32_t)(both >> (map % WORD_MAPS < PAIRS ? 0 : 16) & UINT16_MAX) -
                             count * IH_SURROUNDINGS_ZERO;
         IH_IN_RANGE(sum, -IH_RANGE_MAP_SUM, IH_RANGE_MAP_SUM);
         answer_q8[map] = (int32_t)ih_mul_shift(sum, found->weight_q12, 12 - 8);
@@ -140,8 +146,7 @@ void ih_surroundings_move_by(const struct ih_surroundings_moves *moves, const st
     const struct head_from_rays candidate = candidate_of(rays, ellipsoid->centre_mm_q8);
     int32_t steps[2] = {0, 0}; /* down, away */
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
-        const int32_t place =
-            place_of(&candidate, &rays->ray[slot], IH_SURROUNDINGS_COARSE_COLUMNS);
+        const int32_t place = place_of(&candidate, &rays->ray[slot]);
         if (place == IH_NONE) {
             continue;
         }
@@ -172,8 +177,7 @@ int32_t ih_surroundings_promise_by_q5(const struct ih_surroundings_promise *prom
     int32_t sum_q5 = 0;
     for (int32_t line = 0; line < IH_GRID; line += PROMISE_STRIDE) {
         for (int32_t i = 0; i < IH_GRID; i += PROMISE_STRIDE) {
-            const int32_t place = place_of(&candidate, &rays->ray[line * IH_GRID + i],
-                                           IH_SURROUNDINGS_COARSE_COLUMNS);
+            const int32_t place = place_of(&candidate, &rays->ray[line * IH_GRID + i]);
             sum_q5 += place == IH_NONE ? 0 : promise->part_q5[place];
         }
     }

@@ -4,31 +4,31 @@
  * In:     rays and points, a centre or an ellipsoid, the maps.
  * Out:    the promise of a centre; by slot, the place in the maps that the ray asks; an answer by each map; the ellipsoid
  *         moved.
- * Method: the plane at the centre's depth has cells of 64 mm, to 384 mm aside and above and 448 mm below the
- *         centre, those on the left and on the right alike. A ray asks the cell that it passes, and there one of
- *         nine ranges of depth, in which its point lies against the centre, or the tenth place when it is empty.
+ * Method: the plane at the centre's depth has cells of 64 mm, from 384 mm above the centre to 448 mm below it and to 384 mm
+ *         aside, those on the left and on the right alike. Far from the head some are one: the two highest, the four
+ *         lowest in pairs, and all from 128 mm outwards. A ray asks the cell that it passes, and there one of
+ *         seven ranges of depth, in which its point lies against the centre, or the eighth place when it is empty.
  *         A ray of unknown state asks nothing: what is outside of the picture, the pattern or the range
  *         speaks neither way.
  *         A map's answer = sum of what it says of all rays, times the part of a cell that a ray stands for: the
  *         square of (spacing of the rays at this depth / 64 mm), at most 1. So a dense pattern or a near head
  *         has more rays, each of which counts less.
- *         One map can say that there is body below; two, with the trees of ih_score that ask both, that it belongs to this
- *         head. tools/learn learns all of them at once (ray_map.py): what a map is about is not given to it. Their
- *         unit means nothing, for trees and curves are learnt behind them. ih_surroundings_map.h has them.
+ *         tools/learn learns all of them at once with the curves of ih_score behind them: what a map is about is not given
+ *         to it, and its unit means nothing. ih_surroundings_map.h has them.
  *         A fit does not know hair from skull, nor where a head ends that bends over its chest: it is off where a model cannot
  *         tell, mostly up or down. So two more maps say, in mm, how far below and behind the fitted centre the head's is. They
- *         are learnt from heads alone (tools/learn), by least squares, and have the same cells, but of all columns from 128 mm
- *         outwards one. Aside the maps know nothing, for left and right are alike to them.
- *         Before anything is fitted, one more map with these cells says how much a centre promises, by a quarter of the
- *         rays: all of them, and all columns, rank centres no better. It is learnt by logistic regression from the centres
- *         that ih_scan tries, whether a head's is within 90 mm.
+ *         are learnt from heads alone (tools/learn), by least squares. Aside the maps know nothing, for left and right are
+ *         alike to them.
+ *         Before anything is fitted, one more map says how much a centre promises, by a quarter of the rays: all of them
+ *         rank centres no better. It is learnt by logistic regression from the centres that ih_scan tries, whether a head's
+ *         is within 90 mm.
  * Overflow: a depth is below 2^27 in Q8, a slope at most 2^22: 2^49. A spacing is limited to 2^14 in Q8. A sum of 361
  *         numbers, -8 to 7 each, is below 2^11.5, times a weight of 2^12 2^23.5; times a step of the moves, 8 mm at most,
  *         2^22.5, times a weight 2^34.5. A promise is 100 numbers of 8 bits, 2^13.7, times a weight 2^25.7.
  * Error:  a ray that passes within 1/128 mm of a cell's edge, or a depth within half a mm of a range's, may
  *         be counted on either side. The weight 2 %, at 25 mm of spacing 0.2 %: a square of Q8. A move as the weight.
- * Cost:   two products for each ray of known state, and four sums of two maps each: 22,000 instructions (x86-64, -O3); a move
- *         20,000; a promise 4,300.
+ * Cost:   two products for each ray of known state, and 24 sums of two maps each: 18,000 and 37,000 instructions (x86-64,
+ *         -O3); a move 20,000; a promise 4,300.
  */
 #ifndef IH_SURROUNDINGS_H
 #define IH_SURROUNDINGS_H
@@ -39,19 +39,16 @@
 #include "detect/ih_ellipsoid.h"
 #include "detect/ih_rays.h"
 
-#define IH_SURROUNDINGS_MAPS 8
-/* A place of all maps is a word: of each map a number of so many bits, the first map's lowest, less this zero. */
+#define IH_SURROUNDINGS_MAPS 48
+/* A place of all maps is six words: of each map a number of so many bits, the first map's lowest, less this zero. */
 #define IH_SURROUNDINGS_BITS 4
 #define IH_SURROUNDINGS_ZERO 8
-#define IH_SURROUNDINGS_COLUMNS 6
-#define IH_SURROUNDINGS_ROWS 13
-#define IH_SURROUNDINGS_DEPTHS 10 /* nine ranges, and nothing */
+#define IH_SURROUNDINGS_WORDS (IH_SURROUNDINGS_MAPS * IH_SURROUNDINGS_BITS / 32)
+#define IH_SURROUNDINGS_COLUMNS 3
+#define IH_SURROUNDINGS_ROWS 10
+#define IH_SURROUNDINGS_DEPTHS 8 /* seven ranges, and nothing */
 #define IH_SURROUNDINGS_PLACES \
     (IH_SURROUNDINGS_COLUMNS * IH_SURROUNDINGS_ROWS * IH_SURROUNDINGS_DEPTHS)
-
-#define IH_SURROUNDINGS_COARSE_COLUMNS 3 /* the last one is all that are farther aside */
-#define IH_SURROUNDINGS_COARSE_PLACES \
-    (IH_SURROUNDINGS_COARSE_COLUMNS * IH_SURROUNDINGS_ROWS * IH_SURROUNDINGS_DEPTHS)
 
 struct ih_surroundings {
     int32_t weight_q12;      /* of a ray */
@@ -62,13 +59,13 @@ struct ih_surroundings {
  * ones, all less IH_SURROUNDINGS_ZERO. */
 struct ih_surroundings_moves {
     int32_t step_mm_q8[2]; /* above 0, at most 8 mm */
-    uint8_t steps[IH_SURROUNDINGS_COARSE_PLACES];
+    uint8_t steps[IH_SURROUNDINGS_PLACES];
 };
 
 /* What the promise is made of: log-odds of a head anywhere, and the part of each place. */
 struct ih_surroundings_promise {
     int32_t bias_q5;
-    int8_t part_q5[IH_SURROUNDINGS_COARSE_PLACES];
+    int8_t part_q5[IH_SURROUNDINGS_PLACES];
 };
 
 IH_BEGIN_DECLS
@@ -89,7 +86,7 @@ void ih_surroundings_ask(const struct ih_surroundings *found,
                          int32_t answer_q8[IH_SURROUNDINGS_MAPS]);
 
 /* By other maps. */
-void ih_surroundings_ask_maps(const uint32_t maps[IH_SURROUNDINGS_PLACES],
+void ih_surroundings_ask_maps(const uint32_t maps[IH_SURROUNDINGS_PLACES][IH_SURROUNDINGS_WORDS],
                               const struct ih_surroundings *found,
                               int32_t answer_q8[IH_SURROUNDINGS_MAPS]);
 

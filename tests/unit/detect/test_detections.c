@@ -543,7 +543,7 @@ static void nothing_at_the_lens_is_a_head(void)
     TEST_ASSERT_TRUE(detections.view[0].hit > 15); /* its rays are looked at all the same */
 }
 
-/* Log-odds are those of its evidence, whatever the rig is; the probability is theirs. */
+/* Log-odds are those of its evidence and of what is around it, whatever the rig is; the probability is theirs. */
 static void detections_are_rated_by_their_evidence(void)
 {
     static struct ih_dots dots;
@@ -560,9 +560,13 @@ static void detections_are_rated_by_their_evidence(void)
         IH_TEST_RANGE(1, IH_DETECTIONS_MAX, detections.detection_count, "findings", pass);
         for (i = 0; i < detections.detection_count; i++) {
             const struct ih_detection *detection = &detections.detection[i];
+            struct ih_surroundings surroundings;
+            int32_t answer_q8[IH_SURROUNDINGS_MAPS];
             struct ih_score score;
 
-            ih_score_rate(&detection->evidence, &score);
+            ih_surroundings_find(&scratch.rays, &detection->head, &surroundings);
+            ih_surroundings_ask(&surroundings, answer_q8);
+            ih_score_rate(&detection->evidence, answer_q8, &score);
             IH_TEST_EQUAL(score.logit_q10, detection->logit_q10, "log-odds", pass);
             IH_TEST_WITHIN(0.002, 1 / (1 + exp(-detection->logit_q10 / 1024.0)),
                            detection->probability_q16 / 65536.0, "probability", pass);

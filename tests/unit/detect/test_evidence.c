@@ -171,17 +171,12 @@ static void rays_through_a_head_tell_seen_hidden_and_gone(void)
 /* Nothing seen: every number says that it knows nothing. */
 static void without_rays_nothing_is_known(void)
 {
-    int map;
-
     value_of("unknown", 0);
     IH_TEST_EQUAL(0, evidence.value_q8[IH_EVIDENCE_ON], "on", 0);
     IH_TEST_EQUAL(0, evidence.value_q8[IH_EVIDENCE_ROUGH], "rough", 0);
     IH_TEST_EQUAL(0, evidence.value_q8[IH_EVIDENCE_BULGE], "bulge", 0);
     IH_TEST_EQUAL(12 << 8, evidence.value_q8[IH_EVIDENCE_BEND_DOWN], "bend down", 0);
     IH_TEST_EQUAL(12 << 8, evidence.value_q8[IH_EVIDENCE_BEND_ACROSS], "bend across", 0);
-    for (map = 0; map < IH_SURROUNDINGS_MAPS; map++) {
-        IH_TEST_EQUAL(0, evidence.value_q8[IH_EVIDENCE_MAP_0 + map], "map", map);
-    }
 }
 
 /* --- the plane -----------------------------------------------------------------------------------
@@ -540,19 +535,6 @@ static void extremes_do_not_overflow(void)
     }
 }
 
-/* Learnt maps may change; whatever they say is passed on, each at its place. */
-static void answers_of_the_maps_are_passed_on(void)
-{
-    struct ih_surroundings surroundings;
-    int32_t answer_q8[IH_SURROUNDINGS_MAPS];
-
-    value_of("head", 0);
-    ih_surroundings_find(&rays, &vector_scenes[0].head, &surroundings);
-    ih_surroundings_ask(&surroundings, answer_q8);
-    TEST_ASSERT_EQUAL_INT32_ARRAY(answer_q8, &evidence.value_q8[IH_EVIDENCE_MAP_0],
-                                  IH_SURROUNDINGS_MAPS);
-}
-
 int main(void)
 {
     UNITY_BEGIN();
@@ -567,6 +549,5 @@ int main(void)
     RUN_TEST(tallness_is_in_hundredths_of_the_mean);
     RUN_TEST(rays_through_the_middle_have_their_limits);
     RUN_TEST(extremes_do_not_overflow);
-    RUN_TEST(answers_of_the_maps_are_passed_on);
     return UNITY_END();
 }

@@ -1,33 +1,37 @@
-/* ih_score with tables of the test's own: the learnt ones may change. Curves, trees and their sum against
+/* ih_score with tables of the test's own: the learnt ones may change. Curves, weighted sums and all together against
  * tools/learn, the probability against 1 / (1 + exp(-x)). */
 #include "detect/ih_evidence.h"
 #include "detect/ih_score.h"
+#include "detect/ih_surroundings.h"
 
 #include "ih_test.h"
 
 static struct ih_score_tables tables;
 
 struct vector_case {
-    int32_t value_q8[12];
-    double logit, together;
+    int32_t value_q8[IH_EVIDENCE_COUNT], answer_q8[IH_SURROUNDINGS_MAPS];
+    double logit;
 };
 
 #include "score.inc"
 
-_Static_assert(VECTOR_KINDS == 12 && VECTOR_KINDS <= IH_EVIDENCE_COUNT, "vector_case has 12");
+_Static_assert(sizeof vector_curves == sizeof tables.curve, "a curve for each part");
+_Static_assert(sizeof vector_weights == sizeof tables.weight_q2, "weights of each map");
 
 static struct ih_evidence evidence;
+static int32_t answer_q8[IH_SURROUNDINGS_MAPS];
 static struct ih_score score;
 
 void setUp(void)
 {
-    int kind;
+    int part;
 
     memset(&tables, 0, sizeof tables);
-    for (kind = 0; kind < IH_EVIDENCE_COUNT; kind++) {
-        tables.curve[kind].step_q8 = 256;
+    for (part = 0; part < IH_SCORE_PARTS; part++) {
+        tables.curve[part].step_q8 = 256;
     }
     memset(&evidence, 0, sizeof evidence);
+    memset(answer_q8, 0, sizeof answer_q8);
     memset(&score, IH_TEST_FILL, sizeof score);
 }
 
@@ -35,33 +39,38 @@ void tearDown(void)
 {
 }
 
-/* Half a unit of Q10 for each curve that is between knots. */
+/* Half a unit of Q10 for each curve that is between knots. A place between two knots has 16 bits, on a rise of 2^16 another
+ * unit; what measures add to an answer, 8 such places times 2^7 and a rounding to Q8, is off by a unit of Q8 at most, of a
+ * step. */
 static void log_odds_match_what_was_learnt(void)
 {
-    int i, kind;
+    int i, part;
+    double error = 2 + IH_SCORE_PARTS * 0.5;
 
     tables.bias_q10 = VECTOR_BIAS_Q10;
-    for (kind = 0; kind < VECTOR_KINDS; kind++) {
-        tables.curve[kind] = vector_curves[kind];
+    memcpy(tables.curve, vector_curves, sizeof tables.curve);
+    memcpy(tables.weight_q2, vector_weights, sizeof tables.weight_q2);
+    for (part = IH_EVIDENCE_COUNT; part < IH_SCORE_PARTS; part++) {
+        const struct ih_score_curve *curve = &tables.curve[part];
+        int32_t steepest = 0;
+        int k;
+
+        for (k = 1; k < IH_SCORE_KNOTS; k++) {
+            steepest =
+                (int32_t)fmax(steepest, fabs((double)curve->at_q10[k] - curve->at_q10[k - 1]));
+        }
+        error += (double)steepest / curve->step_q8;
     }
-    memcpy(tables.question, vector_questions, sizeof tables.question);
-    memcpy(tables.tree, vector_trees, sizeof tables.tree);
     for (i = 0; i < IH_TEST_COUNT(vector_cases); i++) {
         int32_t sum = tables.bias_q10;
 
-        for (kind = 0; kind < VECTOR_KINDS; kind++) {
-            evidence.value_q8[kind] = vector_cases[i].value_q8[kind];
+        memcpy(evidence.value_q8, vector_cases[i].value_q8, sizeof evidence.value_q8);
+        ih_score_rate_by_tables(&tables, &evidence, vector_cases[i].answer_q8, &score);
+        IH_TEST_WITHIN(error / 1024, vector_cases[i].logit, ih_test_from_q(score.logit_q10, 10),
+                       "logit", i);
+        for (part = 0; part < IH_SCORE_PARTS; part++) {
+            sum += score.part_q10[part];
         }
-        ih_score_rate_by_tables(&tables, &evidence, &score);
-        /* The place between two knots has 16 bits: on a rise of 2^16 another unit. */
-        IH_TEST_WITHIN((VECTOR_KINDS + 2) * 0.5 / 1024, vector_cases[i].logit,
-                       ih_test_from_q(score.logit_q10, 10), "logit", i);
-        IH_TEST_WITHIN(0, vector_cases[i].together, ih_test_from_q(score.together_q10, 10),
-                       "together", i);
-        for (kind = 0; kind < IH_EVIDENCE_COUNT; kind++) {
-            sum += score.part_q10[kind];
-        }
-        sum += score.together_q10;
         IH_TEST_EQUAL(sum, score.logit_q10, "sum of the parts", i);
         IH_TEST_EQUAL(ih_score_probability_q16(score.logit_q10), score.probability_q16,
                       "probability", i);
@@ -71,7 +80,7 @@ static void log_odds_match_what_was_learnt(void)
 static int32_t part_at(int32_t value_q8)
 {
     evidence.value_q8[3] = value_q8;
-    ih_score_rate_by_tables(&tables, &evidence, &score);
+    ih_score_rate_by_tables(&tables, &evidence, answer_q8, &score);
     return score.part_q10[3];
 }
 
@@ -99,58 +108,75 @@ static void a_curve_goes_through_its_knots_and_is_constant_beyond(void)
     IH_TEST_EQUAL(-32768, part_at(INT32_MIN), "farthest", 0);
 }
 
-/* Every way through a tree ends at its own leaf, and what lies on a limit is beyond it. */
-static void a_tree_asks_three_questions(void)
+/* Measures at a knot, half a knot farther, before the first and beyond the last one: each adds its weight times its place to
+ * the map that has the weight, and nothing to others. */
+static void measures_are_weighed_before_the_curve_of_a_map(void)
 {
-    static const struct ih_score_question of_branch[IH_SCORE_BRANCHES] = {
-        {1, 1}, {2, 192}, {3, 40}, {4, 7}, {5, 8}, {6, 9}, {7, 10}};
-    static const struct ih_score_tree tree = {{255, 0, 77, 254, 13, 128, 9},
-                                              {1, 2, -3, 4, 5, -128, 127, 8}};
-    int leaf, beside, branch;
+    static const struct {
+        int32_t value_q8, place_q1;
+    } cases[] = {{0, 0},         {256, 2},      {384, 3},       {-5000, 0},
+                 {INT32_MIN, 0}, {6 * 256, 12}, {INT32_MAX, 12}};
+    static const int8_t weights[] = {-128, -1, 1, 127};
+    static const struct {
+        int map, kind;
+    } pairs[] = {{0, 0}, {5, 2}, {IH_SURROUNDINGS_MAPS - 1, IH_EVIDENCE_COUNT - 1}};
+    int i, k, pair, map;
 
-    for (branch = 0; branch < IH_SCORE_BRANCHES; branch++) {
-        tables.question[tree.question[branch]] = of_branch[branch];
+    /* A straight line through 0: a unit of Q10 for 64 in Q8, knots 64,000 apart. */
+    for (map = 0; map < IH_SURROUNDINGS_MAPS; map++) {
+        tables.curve[IH_EVIDENCE_COUNT + map] =
+            (struct ih_score_curve){-3 * 64000, 64000, {-3000, -2000, -1000, 0, 1000, 2000, 3000}};
+        answer_q8[map] = 64 * map;
     }
-    tables.tree[9] = tree;
-    for (leaf = 0; leaf < IH_SCORE_LEAVES; leaf++) {
-        for (beside = 0; beside < 2; beside++) {
-            int level, at = 0;
+    for (pair = 0; pair < IH_TEST_COUNT(pairs); pair++) {
+        for (i = 0; i < IH_TEST_COUNT(cases); i++) {
+            for (k = 0; k < IH_TEST_COUNT(weights); k++) {
+                memset(tables.weight_q2, 0, sizeof tables.weight_q2);
+                memset(&evidence, 0, sizeof evidence);
+                tables.weight_q2[pairs[pair].map][pairs[pair].kind] = weights[k];
+                evidence.value_q8[pairs[pair].kind] = cases[i].value_q8;
+                ih_score_rate_by_tables(&tables, &evidence, answer_q8, &score);
+                for (map = 0; map < IH_SURROUNDINGS_MAPS; map++) {
+                    /* Q2 times half a knot is Q3, of which a unit is 32 in Q8. */
+                    const double beside =
+                        map == pairs[pair].map ? weights[k] * cases[i].place_q1 / 2.0 : 0;
 
-            memset(&evidence, 0, sizeof evidence);
-            for (level = 2; level >= 0; level--) {
-                const int yes = leaf >> level & 1;
-                /* 8 in Q8 a place; one less is not beyond the limit. */
-                evidence.value_q8[of_branch[at].kind] =
-                    yes ? 8 * of_branch[at].limit + 7 * beside
-                        : 8 * of_branch[at].limit - 1 - 7 * beside;
-                at = 2 * at + 1 + yes;
+                    IH_TEST_WITHIN(0.51, map + beside, score.part_q10[IH_EVIDENCE_COUNT + map],
+                                   "part", 100 * pair + 10 * i + k);
+                }
             }
-            ih_score_rate_by_tables(&tables, &evidence, &score);
-            IH_TEST_EQUAL(4 * tree.leaf_q8[leaf], score.together_q10, "leaf", leaf);
-            IH_TEST_EQUAL(score.together_q10, score.logit_q10, "log-odds", leaf);
         }
     }
 }
 
-/* All curves and leaves at an end, and a bias beyond them. */
+/* All curves at an end, and a bias beyond them; sums as large as they can be. */
 static void the_largest_sums_fit(void)
 {
-    int kind, k;
+    int part, k, sign;
 
-    for (kind = 0; kind < IH_EVIDENCE_COUNT; kind++) {
+    for (part = 0; part < IH_SCORE_PARTS; part++) {
         for (k = 0; k < IH_SCORE_KNOTS; k++) {
-            tables.curve[kind].at_q10[k] = INT16_MIN;
+            tables.curve[part].at_q10[k] = (int16_t)(k == 0 ? INT16_MIN : INT16_MAX);
         }
+        tables.curve[part].step_q8 = 1;
     }
-    memset(tables.tree, 0, sizeof tables.tree);
-    for (k = 0; k < IH_SCORE_TREES; k++) {
-        memset(tables.tree[k].leaf_q8, INT8_MIN, sizeof tables.tree[k].leaf_q8);
+    for (sign = -1; sign <= 1; sign += 2) {
+        memset(tables.weight_q2, sign < 0 ? INT8_MIN : INT8_MAX, sizeof tables.weight_q2);
+        tables.bias_q10 = sign * (1 << 18);
+        for (k = 0; k < IH_EVIDENCE_COUNT; k++) {
+            /* so that all measures are at their last knot: the weights count whole */
+            tables.curve[k].at_q10[IH_SCORE_KNOTS - 1] =
+                (int16_t)(sign < 0 ? INT16_MIN : INT16_MAX);
+            evidence.value_q8[k] = INT32_MAX;
+        }
+        for (k = 0; k < IH_SURROUNDINGS_MAPS; k++) {
+            answer_q8[k] = sign < 0 ? INT32_MIN : INT32_MAX;
+        }
+        ih_score_rate_by_tables(&tables, &evidence, answer_q8, &score);
+        IH_TEST_EQUAL(sign * (1 << 18) + IH_SCORE_PARTS * (sign < 0 ? INT16_MIN : INT16_MAX),
+                      score.logit_q10, "sum", sign);
+        IH_TEST_EQUAL(sign < 0 ? 0 : 65536, score.probability_q16, "probability", sign);
     }
-    tables.bias_q10 = -(1 << 19);
-    ih_score_rate_by_tables(&tables, &evidence, &score);
-    IH_TEST_EQUAL(-(1 << 19) - IH_EVIDENCE_COUNT * 32768 - IH_SCORE_TREES * 512, score.logit_q10,
-                  "sum", 0);
-    IH_TEST_EQUAL(0, score.probability_q16, "probability", 0);
 }
 
 /* Every log-odds from -40 to 40; beyond that all digits are those of 0 or 1. */
@@ -193,16 +219,19 @@ static void the_learnt_tables_are_used(void)
 {
     static const int32_t value_q8[] = {0, 25600, -25600};
     int32_t bias[IH_TEST_COUNT(value_q8)];
-    int i, kind;
+    int i, k;
 
     for (i = 0; i < IH_TEST_COUNT(value_q8); i++) {
-        for (kind = 0; kind < IH_EVIDENCE_COUNT; kind++) {
-            evidence.value_q8[kind] = value_q8[i];
+        for (k = 0; k < IH_EVIDENCE_COUNT; k++) {
+            evidence.value_q8[k] = value_q8[i];
         }
-        ih_score_rate(&evidence, &score);
-        bias[i] = score.logit_q10 - score.together_q10;
-        for (kind = 0; kind < IH_EVIDENCE_COUNT; kind++) {
-            bias[i] -= score.part_q10[kind];
+        for (k = 0; k < IH_SURROUNDINGS_MAPS; k++) {
+            answer_q8[k] = value_q8[i];
+        }
+        ih_score_rate(&evidence, answer_q8, &score);
+        bias[i] = score.logit_q10;
+        for (k = 0; k < IH_SCORE_PARTS; k++) {
+            bias[i] -= score.part_q10[k];
         }
         IH_TEST_EQUAL(bias[0], bias[i], "bias", i);
     }
@@ -217,7 +246,7 @@ int main(void)
     RUN_TEST(the_largest_sums_fit);
     RUN_TEST(probabilities_match_the_closed_form);
     RUN_TEST(probabilities_are_monotone_to_the_ends);
-    RUN_TEST(a_tree_asks_three_questions);
+    RUN_TEST(measures_are_weighed_before_the_curve_of_a_map);
     RUN_TEST(the_learnt_tables_are_used);
     return UNITY_END();
 }

@@ -21,7 +21,9 @@ struct vector_scene {
 
 #include "surroundings.inc"
 
-_Static_assert(IH_TEST_COUNT(vector_maps) == IH_SURROUNDINGS_PLACES, "other maps");
+_Static_assert(sizeof vector_maps ==
+                   sizeof(uint32_t[IH_SURROUNDINGS_PLACES][IH_SURROUNDINGS_WORDS]),
+               "other maps");
 
 /* A ray every 64 mm at 1024 mm: slopes of 1/16, and each ray stands for one cell. */
 #define PITCH_Q20 (1 << 16)
@@ -31,7 +33,7 @@ _Static_assert(IH_TEST_COUNT(vector_maps) == IH_SURROUNDINGS_PLACES, "other maps
 static struct ih_rays rays;
 static struct ih_ellipsoid head;
 static struct ih_surroundings found;
-static uint32_t maps[IH_SURROUNDINGS_PLACES];
+static uint32_t maps[IH_SURROUNDINGS_PLACES][IH_SURROUNDINGS_WORDS];
 static int32_t answer_q8[IH_SURROUNDINGS_MAPS];
 static struct ih_surroundings_moves moves;
 
@@ -142,47 +144,46 @@ static void cells_begin_and_end_at_their_limits(void)
     enum { MM = 256 };
     static const struct {
         int32_t x_mm_q8, y_mm_q8, row, column;
-    } cases[] = {{0, 0, 6, 0},
-                 {64 * MM - 1, 0, 6, 0},
-                 {64 * MM, 0, 6, 1},
-                 {-64 * MM + 1, 0, 6, 0},
-                 {-64 * MM, 0, 6, 1},
-                 {384 * MM - 1, 0, 6, 5},
-                 {384 * MM, 0, -1, 0},
-                 {-384 * MM, 0, -1, 0},
-                 {0, -1, 5, 0},
-                 {0, 64 * MM - 1, 6, 0},
-                 {0, 64 * MM, 7, 0},
-                 {0, -384 * MM, 0, 0},
-                 {0, -384 * MM - 1, -1, 0},
-                 {0, 448 * MM - 1, 12, 0},
-                 {0, 448 * MM, -1, 0}};
+    } cases[] = {
+        {0, 0, 5, 0},         {64 * MM - 1, 0, 5, 0},  {64 * MM, 0, 5, 1},  {-64 * MM + 1, 0, 5, 0},
+        {-64 * MM, 0, 5, 1},  {128 * MM - 1, 0, 5, 1}, {128 * MM, 0, 5, 2}, {384 * MM - 1, 0, 5, 2},
+        {384 * MM, 0, -1, 0}, {-384 * MM, 0, -1, 0}};
+    /* Where rows end, in mm below the centre. */
+    static const int32_t end_mm[IH_SURROUNDINGS_ROWS] = {-256, -192, -128, -64, 0,
+                                                         64,   128,  192,  320, 448};
     int i;
 
     for (i = 0; i < IH_TEST_COUNT(cases); i++) {
         const int32_t expected =
-            cases[i].row < 0 ? IH_NONE : place_at(cases[i].row, cases[i].column, 4);
+            cases[i].row < 0 ? IH_NONE : place_at(cases[i].row, cases[i].column, 3);
 
         IH_TEST_EQUAL(expected, place_of(cases[i].x_mm_q8, cases[i].y_mm_q8, IH_RAY_SEEN, 0),
                       "place", i);
+    }
+    IH_TEST_EQUAL(IH_NONE, place_of(0, -384 * MM - 1, IH_RAY_SEEN, 0), "above", 0);
+    IH_TEST_EQUAL(place_at(0, 0, 3), place_of(0, -384 * MM, IH_RAY_SEEN, 0), "highest", 0);
+    for (i = 0; i < IH_SURROUNDINGS_ROWS; i++) {
+        IH_TEST_EQUAL(place_at(i, 0, 3), place_of(0, end_mm[i] * MM - 1, IH_RAY_SEEN, 0), "row", i);
+        IH_TEST_EQUAL(i + 1 < IH_SURROUNDINGS_ROWS ? place_at(i + 1, 0, 3) : IH_NONE,
+                      place_of(0, end_mm[i] * MM, IH_RAY_SEEN, 0), "behind row", i);
     }
 }
 
 /* Rounded to whole mm, halves upwards. */
 static void ranges_begin_at_their_limits(void)
 {
-    static const int32_t limit_mm[] = {-256, -176, -96, -40, 40, 128, 200, 304};
+    static const int32_t limit_mm[] = {-176, -96, -40, 40, 128, 200};
     int i;
 
     for (i = 0; i < IH_TEST_COUNT(limit_mm); i++) {
         const int32_t limit_q8 = limit_mm[i] * 256 - 128;
 
-        IH_TEST_EQUAL(place_at(6, 0, i), place_of(0, 0, IH_RAY_SEEN, limit_q8 - 1), "before", i);
-        IH_TEST_EQUAL(place_at(6, 0, i + 1), place_of(0, 0, IH_RAY_SEEN, limit_q8), "at", i);
+        IH_TEST_EQUAL(place_at(5, 0, i), place_of(0, 0, IH_RAY_SEEN, limit_q8 - 1), "before", i);
+        IH_TEST_EQUAL(place_at(5, 0, i + 1), place_of(0, 0, IH_RAY_SEEN, limit_q8), "at", i);
     }
-    IH_TEST_EQUAL(place_at(6, 0, 0), place_of(0, 0, IH_RAY_SEEN, -head.centre_mm_q8[2]), "near", 0);
-    IH_TEST_EQUAL(place_at(6, 0, 8), place_of(0, 0, IH_RAY_SEEN, 1 << 25), "far", 0);
-    IH_TEST_EQUAL(place_at(6, 0, 9), place_of(0, 0, IH_RAY_EMPTY, 0), "empty", 0);
+    IH_TEST_EQUAL(place_at(5, 0, 0), place_of(0, 0, IH_RAY_SEEN, -head.centre_mm_q8[2]), "near", 0);
+    IH_TEST_EQUAL(place_at(5, 0, 6), place_of(0, 0, IH_RAY_SEEN, 1 << 25), "far", 0);
+    IH_TEST_EQUAL(place_at(5, 0, 7), place_of(0, 0, IH_RAY_EMPTY, 0), "empty", 0);
     IH_TEST_EQUAL(IH_NONE, place_of(0, 0, IH_RAY_UNKNOWN, 0), "unknown", 0);
 }
 
@@ -214,7 +215,7 @@ static void rays_of_known_state_add_up(void)
     int i, map;
 
     for (map = 0; map < IH_SURROUNDINGS_MAPS; map++) {
-        maps[place_at(6, 0, 4)] += (uint32_t)(map - 3) << 4 * map;
+        maps[place_at(5, 0, 3)][map / 8] += (uint32_t)(map % 15 - 7) << 4 * (map % 8);
     }
     for (i = 0; i < 4; i++) {
         struct ih_ray *ray = &rays.ray[180 + i];
@@ -225,7 +226,7 @@ static void rays_of_known_state_add_up(void)
     ih_surroundings_find(&rays, &head, &found);
     ih_surroundings_ask_maps(maps, &found, answer_q8);
     for (map = 0; map < IH_SURROUNDINGS_MAPS; map++) {
-        IH_TEST_EQUAL(3 * (map - 3) * 256, answer_q8[map], "answer", map);
+        IH_TEST_EQUAL(3 * (map % 15 - 7) * 256, answer_q8[map], "answer", map);
     }
 }
 
@@ -241,13 +242,15 @@ static void sums_of_two_maps_stay_apart(void)
         rays.ray[slot].state = IH_RAY_EMPTY;
     }
     for (i = 0; i < IH_TEST_COUNT(words); i++) {
-        for (slot = 0; slot < IH_SURROUNDINGS_PLACES; slot++) {
-            maps[slot] = words[i];
+        for (slot = 0; slot < IH_SURROUNDINGS_PLACES * IH_SURROUNDINGS_WORDS; slot++) {
+            maps[slot / IH_SURROUNDINGS_WORDS][slot % IH_SURROUNDINGS_WORDS] =
+                words[(i + slot % IH_SURROUNDINGS_WORDS) % IH_TEST_COUNT(words)];
         }
         ih_surroundings_find(&rays, &head, &found);
         ih_surroundings_ask_maps(maps, &found, answer_q8);
         for (map = 0; map < IH_SURROUNDINGS_MAPS; map++) {
-            const int32_t each = (words[i] >> 4 * map & 15) == 15 ? 7 : -8;
+            const int32_t each =
+                (words[(i + map / 8) % IH_TEST_COUNT(words)] >> 4 * (map % 8) & 15) == 15 ? 7 : -8;
 
             /* (25 / 64)^2 of a cell each, in Q12 625. */
             IH_TEST_EQUAL((int32_t)floor(ldexp(IH_SLOTS * each * 625, -4) + 0.5), answer_q8[map],
@@ -265,10 +268,9 @@ static void moves_add_up_by_columns(void)
     int i, k;
 
     moves.step_mm_q8[0] = 3 << 7; /* 1.5 mm */
-    for (k = 0; k < IH_SURROUNDINGS_COARSE_COLUMNS; k++) {
+    for (k = 0; k < IH_SURROUNDINGS_COLUMNS; k++) {
         /* 2 + k down, 3 + k towards the camera */
-        moves.steps[(6 * IH_SURROUNDINGS_COARSE_COLUMNS + k) * IH_SURROUNDINGS_DEPTHS + 4] =
-            (uint8_t)((8 - 3 - k) << 4 | (8 + 2 + k));
+        moves.steps[place_at(5, k, 3)] = (uint8_t)((8 - 3 - k) << 4 | (8 + 2 + k));
     }
     for (i = 0; i < IH_TEST_COUNT(cases); i++) {
         struct ih_ellipsoid moved = head;
@@ -322,9 +324,8 @@ static void parts_of_a_promise_add_up_by_columns(void)
     struct ih_surroundings_promise promise = {.bias_q5 = -90};
     int32_t i, k;
 
-    for (k = 0; k < IH_SURROUNDINGS_COARSE_COLUMNS; k++) {
-        promise.part_q5[(6 * IH_SURROUNDINGS_COARSE_COLUMNS + k) * IH_SURROUNDINGS_DEPTHS + 4] =
-            (int8_t)(5 + 20 * k);
+    for (k = 0; k < IH_SURROUNDINGS_COLUMNS; k++) {
+        promise.part_q5[place_at(5, k, 3)] = (int8_t)(5 + 20 * k);
     }
     for (i = 0; i < IH_TEST_COUNT(cases); i++) {
         for (k = 0; k < 5;
