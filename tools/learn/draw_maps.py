@@ -18,13 +18,11 @@ HEAD_MM, CELL_MM = (78, 113), 64
 
 
 def read():
-    """Cells down, cells aside, depths, maps."""
+    """Rows, columns, depths, maps."""
     with open(HEADER, encoding="utf-8") as file:
         words = [int(word, 16) for word in re.findall(r"0x[0-9a-f]{8}", file.read())]
     words = numpy.array(words).reshape(ray_map.PLACES, -1)
-    maps = ray_map.unpacked(words).reshape(ray_map.ROWS, ray_map.COLUMNS, ray_map.DEPTHS, ray_map.MAPS)
-    cell = numpy.arange(ray_map.ASIDE_CELLS)
-    return maps[ray_map.ROW_OF_CELL][:, numpy.minimum(cell, ray_map.COLUMNS - 1)]
+    return ray_map.unpacked(words).reshape(ray_map.ROWS, ray_map.COLUMNS, ray_map.DEPTHS, ray_map.MAPS)
 
 
 def colour(level):
@@ -40,14 +38,17 @@ def cells_of(values, at):
     for level in sorted(set(levels.ravel()) - {0}):
         path = ""
         for row, column in zip(*numpy.nonzero(levels == level)):
-            for side in (column, -1 - column):
-                path += "M%d %dh%dv%dh-%dz" % (at[0] + (ray_map.ASIDE_CELLS + side) * CELL, at[1] + row * CELL, CELL, CELL, CELL)
+            first, last = (numpy.searchsorted(ray_map.ROW_OF_CELL, row, side=side) for side in ("left", "right"))
+            width = ray_map.ASIDE_CELLS - column if column == ray_map.COLUMNS - 1 else 1
+            for side in (column, -width - column):
+                path += "M%d %dh%dv%dh-%dz" % (at[0] + (ray_map.ASIDE_CELLS + side) * CELL, at[1] + first * CELL, width * CELL,
+                                               (last - first) * CELL, width * CELL)
         yield '<path fill="%s" d="%s"/>' % (colour(level), path)
 
 
 def draw():
     maps = read()
-    wide, high = 2 * ray_map.ASIDE_CELLS * CELL, maps.shape[0] * CELL
+    wide, high = 2 * ray_map.ASIDE_CELLS * CELL, len(ray_map.ROW_OF_CELL) * CELL
     in_band = ray_map.MAPS // BANDS
     band = len(SHOWN) * (high + 2) + 26
     size = LEFT + in_band * (wide + GAP), TOP + BANDS * band
