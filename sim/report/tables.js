@@ -139,8 +139,8 @@ const Tables = (() => {
       : { name: `what all dots there say by learnt map ${i - measures}`, value: detection.answer_q8[i - measures] / 256, part: p / 1024 });
     const bySize = (parts) => parts.sort((a, b) => Math.abs(b.part) - Math.abs(a.part));
     const maps = bySize(all.slice(measures));
-    const rest = maps.splice(MAPS_SHOWN).reduce((sum, p) => sum + p.part, 0);
-    return bySize([...all.slice(0, measures), ...maps, { name: "by the other maps", value: null, part: rest }]);
+    const others = maps.splice(MAPS_SHOWN).reduce((sum, p) => sum + p.part, 0);
+    return bySize([...all.slice(0, measures), ...maps, { name: "by the other maps", value: null, part: others }]);
   }
 
   /* Why a hypothesis has its score: each part of the log-odds, the largest first. */
