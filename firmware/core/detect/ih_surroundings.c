@@ -111,7 +111,7 @@ void ih_surroundings_ask_maps(const uint32_t maps[IH_SURROUNDINGS_PLACES][IH_SUR
                               const struct ih_surroundings *found,
                               int32_t answer_q8[IH_SURROUNDINGS_MAPS])
 {
-    uint32_t pair[IH_SURROUNDINGS_WORDS][PAIRS] = {{0}}; /* sums of two maps each, in 16 bits */
+    uint32_t pair[IH_SURROUNDINGS_WORDS * PAIRS] = {0}; /* sums of two maps each, in 16 bits */
     int32_t count = 0;
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
         const int32_t place = found->place[slot];
@@ -120,13 +120,13 @@ void ih_surroundings_ask_maps(const uint32_t maps[IH_SURROUNDINGS_PLACES][IH_SUR
         }
         for (int word = 0; word < IH_SURROUNDINGS_WORDS; word++) {
             for (int i = 0; i < PAIRS; i++) {
-                pair[word][i] += maps[place][word] >> IH_SURROUNDINGS_BITS * i & PAIR_MASK;
+                pair[word * PAIRS + i] += maps[place][word] >> IH_SURROUNDINGS_BITS * i & PAIR_MASK;
             }
         }
         count++;
     }
     for (int map = 0; map < IH_SURROUNDINGS_MAPS; map++) {
-        const uint32_t both = pair[map / WORD_MAPS][map % PAIRS];
+        const uint32_t both = pair[map / WORD_MAPS * PAIRS + map % PAIRS];
         const int32_t sum = (int32_t)(both >> (map % WORD_MAPS < PAIRS ? 0 : 16) & UINT16_MAX) -
                             count * IH_SURROUNDINGS_ZERO;
         IH_IN_RANGE(sum, -IH_RANGE_MAP_SUM, IH_RANGE_MAP_SUM);
