@@ -6,8 +6,9 @@ learn.py --render PROGRAM --host-sim PROGRAM --work DIR [--seeds A-B] [--depth-s
 
 Renders every scene of scenes.py for every seed into DIR (those already there are kept), runs the firmware over them and
 over the frames of people that tools/people has made, and learns the maps of the surroundings and the score behind them
-(model.py). A detection within 55 mm of a head is one, beyond 100 mm it is none, between it is not used, and
-neither is one within 150 mm of a head that is hardly seen. A sequence of tools/people counts as three frames of tools/render. Every detection is learnt from once more, for half as much, as if the view ended nearer.
+(model.py). A detection within 55 mm of a head is one, beyond 100 mm it is none, between it is not used, and neither is
+one within 150 mm of a head that is hardly seen. A sequence of tools/people counts as three frames of tools/render. Every
+detection is learnt from once more, for half as much, as if the view ended nearer.
 What the firmware skips, as it has found a head there, or as it is hopeless, is learnt from, too. How far off a fitted centre
 is (the moves of ih_surroundings.h) is learnt from some of the same frames without moves; whether a centre is worth a fit (its
 promise), from what ih_scan tries in the first and every eighth frame after it of a directory, which depends on nothing that is
@@ -40,8 +41,8 @@ FAR_MM = 2900
 FRAME_WEIGHT, SEQUENCE_WEIGHT = 2.0, 6.0
 # Of a detection in a view that ends nearer, against the one in the whole view.
 ENDING_WEIGHT = 0.5
-# Of so many directories one says how far off fits are: a few numbers, from many heads. No divisor of how many scenes a seed
-# has, or kinds a round: some would never be asked.
+# Of so many directories one says how far off fits are: a few numbers, from many heads. Without a common divisor with the
+# scenes of a seed or the kinds of a round: otherwise some would never be asked.
 MOVES_STEP = 7
 # Log-odds that are added to every score: far more clutter is learnt from than cameras see.
 PRIOR = 0.5
