@@ -10,12 +10,13 @@ import numpy
 import make
 import rig as rigs
 from body import Model
-from scene import KINDS
+from scene import KINDS, ROOMS
 
 # set: first seed, rounds of all kinds, frames a sequence, empty rooms beside them (of sets to learn from, in each round)
 SETS = {
     "learn": (410000, 66, 24, 3),
     "mounted_learn": (340000, 60, 24, 2),
+    "anywhere_learn": (1500000, 80, 24, 1),
     "judge": (70000, 2, 24, 8),
     "rigs": (80000, 1, 20, 0),
     "sample": (90000, 1, 5, 0),
@@ -27,6 +28,8 @@ SETS = {
 MOUNTS = ((45.0, 0.0), (30.0, 90.0), (60.0, 0.0), (-20.0, 180.0), (0.0, -90.0), (50.0, 30.0), (20.0, -15.0))
 LEARN_TILTS = (45.0, 30.0, 60.0, -20.0, 50.0, 20.0, 40.0)
 LEARN_ROLLS = (0.0, 90.0, 0.0, 180.0, -30.0, 15.0)
+# And those of "anywhere" by cameras that hang by chance, within these tilts, about one of the four sides or in between.
+ANYWHERE_TILTS, ANYWHERE_SIDES, ANYWHERE_SIGMA = (-20.0, 62.0), (0.0, 0.0, 90.0, -90.0, 180.0), 15.0
 EMPTY_FRAMES = 30
 # More people teach more than more frames of the same: of each sequence to learn from every fourth frame is made. What
 # follows the people of the level set: kind, first seed after the people's, sequences.
@@ -48,6 +51,9 @@ def is_learnt(name):
 
 def mount_of(name, seed):
     """How the camera hangs, tilt and roll; None: level."""
+    if name.startswith("anywhere"):
+        rng = numpy.random.default_rng([seed, 8])
+        return rng.uniform(*ANYWHERE_TILTS), rng.choice(ANYWHERE_SIDES) + rng.normal(0.0, ANYWHERE_SIGMA)
     if not name.startswith("mounted"):
         return None
     if is_learnt(name):
@@ -70,9 +76,10 @@ def sequences(name, rig_kind):
     if name != SAME_PEOPLE:
         first += (2000 if is_learnt(name) else 1000) * ALL_RIGS.index(rig_kind)
     if is_learnt(name):
-        people = [(kind, first + i) for i, kind in enumerate(([*KINDS] + ["empty"] * empty) * rounds)]
+        rooms = ROOMS if name.startswith("anywhere") else ()
+        people = [(kind, first + i) for i, kind in enumerate([*KINDS, *["empty"] * empty, *rooms] * rounds)]
         more = [(kind, first + seed + i) for kind, seed, count in LEARN_MORE for i in range(count)]
-        listed = people if name.startswith("mounted") else people + more
+        listed = people if name != "learn" else people + more
         return [("%04d_%s" % (i, kind), kind, seed, frames) for i, (kind, seed) in enumerate(listed)]
     listed = [(kind, frames) for _ in range(rounds) for kind in KINDS]
     every = max(1, len(listed) // max(1, empty))
