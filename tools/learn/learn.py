@@ -37,15 +37,16 @@ UNCLEAR_MM = 150
 PROMISED_MM = 90
 # Hardly a head is farther away in the scenes: what is would teach that far things are no heads.
 FAR_MM = 2900
-# Of a rendered frame, and of a whole sequence of people.
-FRAME_WEIGHT, SEQUENCE_WEIGHT = 2.0, 6.0
+# Of a rendered frame, and of a whole sequence of people: what scenes teach of clutter takes something from people
+# (docs/experiments/036).
+FRAME_WEIGHT, SEQUENCE_WEIGHT = 1.0, 6.0
 # Of a detection in a view that ends nearer, against the one in the whole view.
 ENDING_WEIGHT = 0.5
 # Of so many directories one says how far off fits are: a few numbers, from many heads. Without a common divisor with the
 # scenes of a seed or the kinds of a round: otherwise some would never be asked.
 MOVES_STEP = 7
 # Log-odds that are added to every score: far more clutter is learnt from than cameras see.
-PRIOR = 0.5
+PRIOR = 1.0
 
 
 def nearest(centre_mm, heads):

@@ -18,7 +18,7 @@ void ih_detections_params_default(struct ih_detections_params *params)
     params->apart_mm = 20;
     params->found_mm = 130;
     params->found_logit_q10 = 3072;
-    params->hopeless_logit_q10 = -6656;
+    params->hopeless_logit_q10 = -2816;
     params->spacing_mm = 80;
     params->nest_max = IH_NESTS_MAX;
     params->expected_max = IH_DETECTIONS_EXPECTED_MAX;

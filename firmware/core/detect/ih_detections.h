@@ -9,9 +9,8 @@
  *         other one is fitted for a step (ih_fit), measured (ih_evidence) and scored (ih_score). Those that are not
  *         hopeless are fitted to the end, moved to where their surroundings say that the centre is (ih_surroundings),
  *         measured and scored again, expected and last sure ones at once; with a step_count of 0 or 1 none is moved.
- *         After a step they are below those at the end: what is below -6.5 then is hopeless, for tracks take no detection
- *         below -3. A range frame
- *         has several windows: begin once a frame, add once a window.
+ *         Log-odds of less than -2.75 after a step are hopeless: a few of these would be heads at the end. A range
+ *         frame has several windows: begin once a frame, add once a window.
  *         For an expected head that is not found there is what its rays met (views): whether it is
  *         hidden, or gone.
  *         Of two within spacing_mm the more probable stays, of equals the first; it replaces all that

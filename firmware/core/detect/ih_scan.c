@@ -16,7 +16,7 @@ void ih_scan_params_default(struct ih_scan_params *params)
 {
     *params = (struct ih_scan_params){
         .deep_mm = IH_HEAD_SEMI_Z_MM,
-        .promise_min_q5 = -128,
+        .promise_min_q5 = -96,
         .spacing_mm = 60,
         .candidate_max = IH_SCAN_MAX,
     };
