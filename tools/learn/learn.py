@@ -43,7 +43,8 @@ FRAME_WEIGHT, SEQUENCE_WEIGHT = 1.0, 6.0
 # Of a detection in a view that ends nearer, against the one in the whole view.
 ENDING_WEIGHT = 0.5
 # Of so many directories one says how far off fits are: a few numbers, from many heads. Without a common divisor with the
-# scenes of a seed or the kinds of a round: otherwise some would never be asked.
+# scenes of a seed or the kinds of a round: otherwise some would never be asked. A round of anywhere_learn has 21, so that of
+# it only people who lean and those of a tilted camera are; all kinds of the other sets.
 MOVES_STEP = 7
 # Log-odds that are added to every score: far more clutter is learnt from than cameras see.
 PRIOR = 1.0
