@@ -12,11 +12,12 @@ import rig as rigs
 from body import Model
 from scene import KINDS, ROOMS
 
-# set: first seed, rounds of all kinds, frames a sequence, empty rooms beside them (of sets to learn from, in each round)
+# set: first seed, rounds of all kinds, frames a sequence, and beside them so many empty rooms, or, to learn from, these rooms
+# in each round
 SETS = {
-    "learn": (410000, 66, 24, 3),
-    "mounted_learn": (340000, 60, 24, 2),
-    "anywhere_learn": (1500000, 80, 24, 1),
+    "learn": (410000, 66, 24, ("empty",) * 3),
+    "mounted_learn": (340000, 60, 24, ("empty",) * 2),
+    "anywhere_learn": (1500000, 80, 24, ("empty", *ROOMS)),
     "judge": (70000, 2, 24, 8),
     "rigs": (80000, 1, 20, 0),
     "sample": (90000, 1, 5, 0),
@@ -72,21 +73,20 @@ def sequences(name, rig_kind):
     """(directory, kind, seed, frames) of every sequence, kinds mixed so that a part is balanced."""
     if name in AGAIN:
         return sequences(AGAIN[name], rig_kind)[AGAIN_FIRST::AGAIN_STEP]
-    first, rounds, frames, empty = SETS[name]
+    first, rounds, frames, rooms = SETS[name]
     if name != SAME_PEOPLE:
         first += (2000 if is_learnt(name) else 1000) * ALL_RIGS.index(rig_kind)
     if is_learnt(name):
-        rooms = ROOMS if name.startswith("anywhere") else ()
-        people = [(kind, first + i) for i, kind in enumerate([*KINDS, *["empty"] * empty, *rooms] * rounds)]
-        more = [(kind, first + seed + i) for kind, seed, count in LEARN_MORE for i in range(count)]
-        listed = people if name != "learn" else people + more
+        listed = [(kind, first + i) for i, kind in enumerate([*KINDS, *rooms] * rounds)]
+        if name == "learn":
+            listed += [(kind, first + seed + i) for kind, seed, count in LEARN_MORE for i in range(count)]
         return [("%04d_%s" % (i, kind), kind, seed, frames) for i, (kind, seed) in enumerate(listed)]
     listed = [(kind, frames) for _ in range(rounds) for kind in KINDS]
-    every = max(1, len(listed) // max(1, empty))
+    every = max(1, len(listed) // max(1, rooms))
     mixed = []
     for i, item in enumerate(listed):
         mixed.append(item)
-        if empty and i % every == every - 1 and i // every < empty:
+        if rooms and i % every == every - 1 and i // every < rooms:
             mixed.append(("empty", EMPTY_FRAMES))
     return [("%03d_%s" % (i, kind), kind, first + i, count) for i, (kind, count) in enumerate(mixed)]
 

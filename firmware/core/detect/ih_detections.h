@@ -9,8 +9,8 @@
  *         other one is fitted for a step (ih_fit), measured (ih_evidence) and scored (ih_score). Those that are not
  *         hopeless are fitted to the end, moved to where their surroundings say that the centre is (ih_surroundings),
  *         measured and scored again, expected and last sure ones at once; with a step_count of 0 or 1 none is moved.
- *         Log-odds of less than -2.75 after a step are hopeless: a few of these would be heads at the end. A range
- *         frame has several windows: begin once a frame, add once a window.
+ *         What is hopeless after a step stays there; a few of these would be heads at the end, and a track may keep on
+ *         one that is just below. A range frame has several windows: begin once a frame, add once a window.
  *         For an expected head that is not found there is what its rays met (views): whether it is
  *         hidden, or gone.
  *         Of two within spacing_mm the more probable stays, of equals the first; it replaces all that
@@ -19,8 +19,8 @@
  * Overflow: points are below 2^25 in Q8 (16 m, slopes up to 8), nests' centres below 2^26.01, expected
  *         ones at most 2^26, last sure ones 2^26.01; a fit moves 240 mm, its surroundings 1000:
  *         centres below 2^27, squares of differences 2^57.6.
- * Cost:   up to IH_DETECTIONS_STARTS_MAX = 38 fits a window. Usually 6 candidates are fitted for a step
- *         and 3 to the end; one more for a head that is hidden.
+ * Cost:   up to IH_DETECTIONS_STARTS_MAX = 38 fits a window. Usually 2 to 4 candidates are fitted,
+ *         1 or 2 of them to the end; one more for a head that is hidden.
  */
 #ifndef IH_DETECTIONS_H
 #define IH_DETECTIONS_H
