@@ -18,6 +18,7 @@ SETS = {
     "learn": (410000, 66, 24, ("empty",) * 3),
     "mounted_learn": (340000, 60, 24, ("empty",) * 2),
     "anywhere_learn": (1500000, 80, 24, ("empty", *ROOMS)),
+    "more_learn": (1600000, 100, 24, ("empty", *ROOMS)),
     "judge": (70000, 2, 24, 8),
     "rigs": (80000, 1, 20, 0),
     "sample": (90000, 1, 5, 0),
@@ -29,18 +30,22 @@ SETS = {
 MOUNTS = ((45.0, 0.0), (30.0, 90.0), (60.0, 0.0), (-20.0, 180.0), (0.0, -90.0), (50.0, 30.0), (20.0, -15.0))
 LEARN_TILTS = (45.0, 30.0, 60.0, -20.0, 50.0, 20.0, 40.0)
 LEARN_ROLLS = (0.0, 90.0, 0.0, 180.0, -30.0, 15.0)
-# And those of "anywhere" by cameras that hang by chance, within these tilts, about one of the four sides or in between.
+# And those of "anywhere", and every second one of "more", by cameras that hang by chance, within these tilts, about one of the
+# four sides or in between.
 ANYWHERE_TILTS, ANYWHERE_SIDES, ANYWHERE_SIGMA = (-20.0, 62.0), (0.0, 0.0, 90.0, -90.0, 180.0), 15.0
 EMPTY_FRAMES = 30
 # More people teach more than more frames of the same: of each sequence to learn from every fourth frame is made. What
 # follows the people of the level set: kind, first seed after the people's, sequences.
 LEARN_STEP = 4
+# Of pictures of dots, which take longer than a depth image, two frames of three times as many people teach more yet.
+MORE_STEP = 12
 LEARN_MORE = (("above", 60000, 50), ("seat", 70000, 110), ("ground", 80000, 150), ("far", 90000, 120), ("hands", 100000, 70))
 # Of these fractions of the dots, drawn anew in each frame, none is seen; where weak dots are missed they are the same in
 # each. To learn from there are the people of another set again, of every fifth sequence.
 MISSING = (0.15, 0.6)
 AGAIN = {"missing_learn": "learn", "mounted_missing_learn": "mounted_learn"}
 AGAIN_STEP, AGAIN_FIRST = 5, 2
+SEEDS_OF_A_RIG = {"more_learn": 4000}
 # All rigs of this set see the same people.
 SAME_PEOPLE = "rigs"
 ALL_RIGS = [*rigs.KINDS, "range"]
@@ -52,7 +57,7 @@ def is_learnt(name):
 
 def mount_of(name, seed):
     """How the camera hangs, tilt and roll; None: level."""
-    if name.startswith("anywhere"):
+    if name.startswith("anywhere") or (name.startswith("more") and seed % 2):
         rng = numpy.random.default_rng([seed, 8])
         return rng.uniform(*ANYWHERE_TILTS), rng.choice(ANYWHERE_SIDES) + rng.normal(0.0, ANYWHERE_SIGMA)
     if not name.startswith("mounted"):
@@ -60,6 +65,13 @@ def mount_of(name, seed):
     if is_learnt(name):
         return LEARN_TILTS[seed % len(LEARN_TILTS)], LEARN_ROLLS[seed // len(LEARN_TILTS) % len(LEARN_ROLLS)]
     return MOUNTS[seed % len(MOUNTS)]
+
+
+def step_of(name, rig_kind):
+    """Every so many frames are made."""
+    if name.startswith("more") and rig_kind != "range":
+        return MORE_STEP
+    return LEARN_STEP if is_learnt(name) else 1
 
 
 def missing_of(name, seed):
@@ -75,7 +87,7 @@ def sequences(name, rig_kind):
         return sequences(AGAIN[name], rig_kind)[AGAIN_FIRST::AGAIN_STEP]
     first, rounds, frames, rooms = SETS[name]
     if name != SAME_PEOPLE:
-        first += (2000 if is_learnt(name) else 1000) * ALL_RIGS.index(rig_kind)
+        first += SEEDS_OF_A_RIG.get(name, 2000 if is_learnt(name) else 1000) * ALL_RIGS.index(rig_kind)
     if is_learnt(name):
         listed = [(kind, first + i) for i, kind in enumerate([*KINDS, *rooms] * rounds)]
         if name == "learn":
@@ -98,7 +110,7 @@ def bodies():
 
 
 def make_one(name, out, rig_kind, kind, seed, frames):
-    make.make(bodies(), out, rig_kind, kind, seed, frames, step=LEARN_STEP if is_learnt(name) else 1,
+    make.make(bodies(), out, rig_kind, kind, seed, frames, step=step_of(name, rig_kind),
               mount=mount_of(name, seed), missing=missing_of(name, seed))
 
 
