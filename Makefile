@@ -212,16 +212,17 @@ vectors: ## write tests/vectors anew with the float64 reference; STAGES=dots: of
 	@tools/setup.sh vectors
 	@/usr/bin/python3 tools/oracle/make_vectors.py --out tests/vectors $(STAGES)
 
-learn: sim ## learn the score anew from rendered scenes and people; three hours
+learn: sim ## learn the score anew from rendered scenes and people; four hours
 	@tools/setup.sh learn
 	@tools/setup.sh people
 	@/usr/bin/python3 tools/people/sets.py learn $(BUILD)/learn/people/level
 	@/usr/bin/python3 tools/people/sets.py mounted_learn $(BUILD)/learn/people/mounted
 	@/usr/bin/python3 tools/people/sets.py anywhere_learn $(BUILD)/learn/people/anywhere
+	@/usr/bin/python3 tools/people/sets.py more_learn $(BUILD)/learn/people/more
 	@/usr/bin/python3 tools/people/sets.py missing_learn $(BUILD)/learn/people/missing --rigs paper wide
 	@/usr/bin/python3 tools/people/sets.py mounted_missing_learn $(BUILD)/learn/people/mounted_missing --rigs paper wide
 	@OPENBLAS_NUM_THREADS=1 /usr/bin/python3 tools/learn/learn.py --render $(BUILD)/host/tools/render/render \
-	  --host-sim $(BUILD)/host/sim/host_sim --work $(BUILD)/learn --people $(addprefix $(BUILD)/learn/people/,level mounted anywhere missing mounted_missing)
+	  --host-sim $(BUILD)/host/sim/host_sim --work $(BUILD)/learn --people $(addprefix $(BUILD)/learn/people/,level mounted anywhere more missing mounted_missing)
 	@/usr/bin/python3 tools/learn/draw_maps.py docs/pictures/maps.svg
 
 learn-pose: ## learn anew where heads look, from people that dots are cast on; half an hour

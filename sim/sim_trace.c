@@ -272,15 +272,18 @@ static void write_heads(struct app_write *write, const struct ih_hypotheses *hyp
 
 /* Why a detection has its log-odds. */
 struct reasons {
+    int32_t view; /* whose rays */
     struct ih_surroundings surroundings;
     int32_t answer_q8[IH_SURROUNDINGS_MAPS];
     struct ih_score score;
 };
 
-static struct reasons reasons_of(const struct ih_rays *rays, const struct ih_detection *detection)
+static struct reasons reasons_of(const struct ih_rays *rays, int32_t view,
+                                 const struct ih_detection *detection)
 {
     struct reasons reasons;
-    ih_surroundings_find(rays, &detection->head, &reasons.surroundings);
+    reasons.view = view;
+    ih_surroundings_find(&rays[view], &detection->head, &reasons.surroundings);
     ih_surroundings_ask(&reasons.surroundings, reasons.answer_q8);
     ih_score_rate(&detection->evidence, reasons.answer_q8, &reasons.score);
     return reasons;
@@ -292,7 +295,7 @@ static bool find_reasons(const struct ih_rays *rays, int32_t rays_count,
                          const struct ih_detection *detection, struct reasons *out)
 {
     for (int32_t i = 0; i < rays_count; i++) {
-        *out = reasons_of(&rays[i], detection);
+        *out = reasons_of(rays, i, detection);
         if (out->score.logit_q10 == detection->logit_q10) {
             return true;
         }
@@ -306,6 +309,7 @@ static void write_reasons(struct app_write *write, const struct reasons *reasons
     write_column(write, "answer_q8", reasons->answer_q8, IH_SURROUNDINGS_MAPS, sizeof(int32_t));
     app_write_key(write, "surroundings");
     app_write_open(write, '{');
+    app_write_int_field(write, "view", reasons->view);
     app_write_int_field(write, "weight_q12", reasons->surroundings.weight_q12);
     app_write_key(write, "place");
     app_write_open(write, '[');

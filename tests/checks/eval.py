@@ -332,26 +332,22 @@ class Moves(unittest.TestCase):
         """Of heads whose rays say it, and a few that are elsewhere: a slope from row to row, other in each direction."""
         random = numpy.random.default_rng(5)
         row = numpy.arange(ray_map.PLACES) // (ray_map.COLUMNS * ray_map.DEPTHS)
-        true_mm = numpy.stack([(row - 5) / 5.0, (4 - row) / 8.0], axis=1)
+        true_mm = numpy.stack([(row - 6) / 7.0, (row - 5) / 5.0, (4 - row) / 8.0], axis=1)
         place = random.integers(-1, ray_map.PLACES, (6000, 120)).astype(numpy.int16)
+        side = random.choice([-1, 1], place.shape)
         weight_q12 = random.integers(1000, 4097, len(place))
         steps_mm = numpy.where((place >= 0)[..., None], true_mm[place], 0.0)
+        steps_mm[..., 0] *= side
         off_mm = weight_q12[:, None] / 4096 * steps_mm.sum(axis=1)
         off_mm[::300] += 80.0
-        with unittest.mock.patch.multiple(ray_map, MOVE_RIDGE=3.0, MOVE_SMOOTH=30.0):  # few heads, little noise
-            steps, step_mm_q8 = ray_map.fit_moves(place, weight_q12, off_mm)
-        error_mm = abs(steps * numpy.array(step_mm_q8) / 256 - true_mm)
-        # A step is a seventh of the largest, 1 mm: half of one. At the ends a step, and a tenth for the penalties, which
-        # pull towards zero and towards neighbours that are all on one side.
-        self.assertLess(numpy.median(error_mm), 1.0 / 14)
-        self.assertLess(error_mm.max(), 2.0 / 14 + 0.1)
-
-    def test_neighbours_are_those_beside_and_not_nothing(self):
-        rough = ray_map.move_roughness()
-        self.assertTrue(numpy.allclose(rough.sum(axis=0), 0.0))
-        # Inside four neighbours aside and by row, two by range; the last place, nothing, has none of those.
-        inside = (5 * ray_map.COLUMNS + 1) * ray_map.DEPTHS
-        self.assertEqual([rough[inside + depth, inside + depth] for depth in (0, 3, 6, 7)], [5.0, 6.0, 5.0, 4.0])
+        with unittest.mock.patch.multiple(ray_map, MOVE_RIDGE=3.0):  # few heads, little noise
+            steps, step_mm_q12 = ray_map.fit_moves(place, side, weight_q12, off_mm, numpy.ones(len(place)))
+        error_mm = abs(steps * step_mm_q12 / 4096 - true_mm)
+        self.assertLessEqual(abs(steps).max(), 127)
+        # A step is below a hundredth mm. One head of 300 pulls with up to 20 mm, 1.2 mm a head, and a place is met 3,000 times,
+        # with a mean squared weight of 0.4: by 0.034 mm, within which the median is, and within four times that all 720 numbers.
+        self.assertLess(numpy.median(error_mm), 0.034)
+        self.assertLess(error_mm.max(), 4 * 0.034)
 
 
 class Promise(unittest.TestCase):

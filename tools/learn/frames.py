@@ -77,12 +77,20 @@ def read_tried(trace):
     return {"centre_mm": centre_mm, "place": place, "weight": weight}
 
 
+def read_sides(trace, found):
+    """Of each detection, by slot: on which side of its centre a ray passes, -1 left, 1 right."""
+    sides = [ray_map.sides_around(read_rays(trace["rays"][f["surroundings"]["view"]]), numpy.array(f["centre_mm_q8"]) / 256)
+             for f in found]
+    return numpy.array(sides, dtype=numpy.int8).reshape(len(found), SLOTS)
+
+
 def read_trace(path, with_tried):
     with open(path, encoding="utf-8") as file:
         trace = json.load(file)
     more = {"tried": read_tried(trace)} if with_tried else {}
     found = [f for f in trace["findings"] if "surroundings" in f]
     return more | {
+        "side": read_sides(trace, found),
         "file": trace["file"],
         "kinds": trace["evidence"],
         # To the level frame, in which detections are; a camera that hangs level has none.

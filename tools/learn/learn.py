@@ -43,11 +43,12 @@ FRAME_WEIGHT, SEQUENCE_WEIGHT = 1.0, 6.0
 # Of a detection in a view that ends nearer, against the one in the whole view.
 ENDING_WEIGHT = 0.5
 # Of so many directories one says how far off fits are: a few numbers, from many heads. Without a common divisor with the
-# scenes of a seed or the kinds of a round: otherwise some would never be asked. A round of anywhere_learn has 21, so that of
-# it only people who lean and those of a tilted camera are; all kinds of the other sets.
-MOVES_STEP = 7
+# scenes of a seed or the kinds of a round: otherwise some would never be asked.
+MOVES_STEP = 11
+# Of these a head of a rendered scene counts so often: they are few, and their heads' centres lie a little higher.
+MOVES_SCENE_WEIGHT = 6.0
 # Log-odds that are added to every score: far more clutter is learnt from than cameras see.
-PRIOR = 1.0
+PRIOR = 0.75
 
 
 def nearest(centre_mm, heads):
@@ -81,18 +82,18 @@ def gather(seen, people):
     return [column[usable] for column in columns]
 
 
-def moves_of(seen):
-    """Of heads where the fit alone put them: how far below and behind that they are."""
+def moves_of(seen, people):
+    """Of every head how far it is aside of, below and behind the nearest place where the fit alone put one: from others near it,
+    which are fitted badly, less is learnt."""
     parts = []
     for frame in seen:
-        if len(frame["centre_mm"]) == 0 or len(frame["heads"]) == 0:
-            continue
-        off_mm = frame["heads"][None] - frame["centre_mm"][:, None]
-        nearest = numpy.linalg.norm(off_mm, axis=2).argmin(axis=1)
-        off_mm = off_mm[numpy.arange(len(nearest)), nearest]
-        near = numpy.linalg.norm(off_mm, axis=1) < NO_HEAD_MM
-        parts.append((frame["place"][near], frame["weight_q12"][near], off_mm[near, 1:]))
-    return ray_map.fit_moves(*(numpy.concatenate(column) for column in zip(*parts)))
+        for head in frame["heads"] if len(frame["centre_mm"]) else []:
+            off_mm = head - frame["centre_mm"]
+            nearest = numpy.linalg.norm(off_mm, axis=1).argmin()
+            if numpy.linalg.norm(off_mm[nearest]) < NO_HEAD_MM:
+                weight = 1.0 if frame["directory"] in people else MOVES_SCENE_WEIGHT
+                parts.append((*(frame[key][nearest] for key in ("place", "side", "weight_q12")), off_mm[nearest], weight))
+    return ray_map.fit_moves(*(numpy.array(column) for column in zip(*parts)))
 
 
 def promise_of(seen):
@@ -186,7 +187,7 @@ def main():
     people = sorted(os.path.dirname(path) for folder in arguments.people
                     for path in glob.glob(os.path.join(folder, "**", "rig.json"), recursive=True))
     directories = directories_of(arguments, arguments.seeds, arguments.depth_seeds, arguments.clutter_seeds) + people
-    moves = moves_of(see(directories[::MOVES_STEP], ("--without", "move,skips")))
+    moves = moves_of(see(directories[::MOVES_STEP], ("--without", "move,skips")), set(people))
     seen = see(directories, ("--without", "skips"), with_tried=True)
     promise = promise_of(seen)
     kinds = seen[0]["kinds"]

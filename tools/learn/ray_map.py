@@ -1,5 +1,5 @@
-"""Where a ray is around a head, as in ih_surroundings; the moves: how far below and behind a fitted centre the head's is, by
-what is seen at each place, by least squares; and the promise: is there a head where none was fitted yet, by logistic
+"""Where a ray is around a head, as in ih_surroundings; the moves: how far aside, below and behind a fitted centre the head's
+is, by what is seen at each place, by least squares; and the promise: is there a head where none was fitted yet, by logistic
 regression. The maps themselves are learnt with the score (model.py)."""
 
 import numpy
@@ -19,12 +19,9 @@ ENDS_BELOW, ENDS_ASIDE, ENDS_ABOVE, ENDS_BEHIND = 0.6, 0.25, 0.33, 0.4
 ROWS_KEPT, COLUMNS_KEPT, ROWS_LOST, DEPTHS_KEPT = (7, 9), (2, 2), (1, 4), (6, 6)
 ENDS_SEED = 5
 PROMISE_RIDGE, PROMISE_PASSES = 100.0, 8
-MOVE_RIDGE, MOVE_PASSES, MOVE_ROBUST_MM = 300.0, 5, 20.0
-# Against differences of neighbours: how many rays fall into a cell is a matter of chance, and a head that moves by half a
-# dot's distance should not be moved otherwise.
-MOVE_SMOOTH = 8000.0
-MOVE_CLIPPED = 0.98  # this fraction of the moves is within their range
-STEP_MAX_MM = 8  # as ih_surroundings.h has it
+MOVE_RIDGE, MOVE_PASSES, MOVE_ROBUST_MM = 200.0, 5, 20.0
+MOVE_MAX = 127  # of a place, in steps
+STEP_MAX_MM = 1  # as ih_surroundings.h has it
 
 
 def ending_views(place):
@@ -61,30 +58,34 @@ def answers(maps, place, weight_q12):
     return ((counts_of(place) @ maps * weight_q12[:, None] + (1 << 3)) >> 4) / 256
 
 
-def move_roughness():
-    """Of moves by place: a form whose value is the sum of squared differences of neighbours. Nothing has none in depth."""
-    index = numpy.arange(PLACES).reshape(ROWS, COLUMNS, DEPTHS)
-    pairs = ((index[1:], index[:-1]), (index[:, 1:], index[:, :-1]), (index[..., 1:-1], index[..., :-2]))
-    one, other = (numpy.concatenate([pair[side].ravel() for pair in pairs]) for side in (0, 1))
-    difference = numpy.eye(PLACES)[one] - numpy.eye(PLACES)[other]
-    return difference.T @ difference
-
-
-def fit_moves(place, weight_q12, off_mm):
-    """Steps down and away at each place of the moves, and a step's mm in Q8; off_mm: of every fitted centre, how far
-    below and behind it the head's is. Few that are far off do not decide: after a pass they weigh less."""
-    needed = needed_of(place, weight_q12).astype(float)
-    penalty = MOVE_RIDGE * numpy.eye(PLACES) + MOVE_SMOOTH * move_roughness()
-    weight = numpy.ones(len(off_mm))
+def fit_moves(place, side, weight_q12, off_mm, importance):
+    """Steps aside, down and away at each place, and a step's mm in Q12; off_mm: of every fitted centre, how far right of it,
+    below and behind it the head's is; importance: how often each counts. What a ray says aside counts to its own side. Few that
+    are far off do not decide: after a pass they weigh less."""
+    row, slot = numpy.nonzero(place >= 0)
+    weight_of_ray = weight_q12[row] / 4096
+    to_both, to_side = (scipy.sparse.coo_matrix((values, (row, place[row, slot])), shape=(len(place), PLACES)).tocsr()
+                        for values in (weight_of_ray, weight_of_ray * side[row, slot]))
+    penalty = MOVE_RIDGE * numpy.eye(PLACES)
+    weight = importance
     for _ in range(MOVE_PASSES):
-        weighed = scipy.sparse.diags(weight) @ needed
-        by_place_mm = numpy.linalg.solve((weighed.T @ needed).toarray() + penalty, weighed.T @ off_mm)
-        left_mm = numpy.linalg.norm(off_mm - needed @ by_place_mm, axis=1)
-        weight = numpy.minimum(1.0, MOVE_ROBUST_MM / numpy.maximum(left_mm, 1e-6))
-    step_mm_q8 = numpy.round(numpy.quantile(numpy.abs(by_place_mm), MOVE_CLIPPED, axis=0) / (ZERO - 1) * 256).astype(int)
-    if not ((step_mm_q8 > 0) & (step_mm_q8 <= STEP_MAX_MM << 8)).all():
-        raise ValueError("steps of %s / 256 mm: expected more than 0, at most %d mm" % (step_mm_q8, STEP_MAX_MM))
-    return numpy.clip(numpy.round(by_place_mm * 256 / step_mm_q8), -ZERO, ZERO - 1).astype(int), step_mm_q8
+        by_place_mm = numpy.empty((PLACES, 3))
+        for needed, axes in ((to_side, slice(0, 1)), (to_both, slice(1, 3))):
+            weighed = scipy.sparse.diags(weight) @ needed
+            by_place_mm[:, axes] = numpy.linalg.solve((weighed.T @ needed).toarray() + penalty, weighed.T @ off_mm[:, axes])
+        moved_mm = numpy.column_stack([to_side @ by_place_mm[:, 0], to_both @ by_place_mm[:, 1:]])
+        far_mm = numpy.linalg.norm(off_mm - moved_mm, axis=1)
+        weight = importance * numpy.minimum(1.0, MOVE_ROBUST_MM / numpy.maximum(far_mm, 1e-6))
+    step_mm_q12 = numpy.ceil(abs(by_place_mm).max(axis=0) / MOVE_MAX * 4096).astype(int)
+    if not ((step_mm_q12 > 0) & (step_mm_q12 <= STEP_MAX_MM << 12)).all():
+        raise ValueError("steps of %s / 4096 mm: expected more than 0, at most %d mm" % (step_mm_q12, STEP_MAX_MM))
+    return numpy.round(by_place_mm * 4096 / step_mm_q12).astype(int), step_mm_q12
+
+
+def sides_around(rays, centre_mm):
+    """On which side of a centre each ray of a trace passes at its depth: -1 left, 1 right."""
+    away_mm = rays["origin_mm"] - centre_mm
+    return numpy.where(away_mm[0] - away_mm[2] * rays["slope"][:, 0] < 0, -1, 1)
 
 
 def places_around(rays, centre_mm):
@@ -129,10 +130,10 @@ def unpacked(words, count=WORD_MAPS):
 
 def write(path, maps, moves, promise, command):
     """The header that ih_surroundings.c includes."""
-    steps, step_mm_q8 = moves
+    steps, step_mm_q12 = moves
     bias_q5, parts_q5 = promise
     promise_lines = ["        %s," % ", ".join("%d" % part for part in cell) for cell in parts_q5.reshape(-1, DEPTHS)]
-    move_lines = ["        %s," % ", ".join("0x%02x" % byte for byte in cell) for cell in packed(steps).reshape(-1, DEPTHS)]
+    move_lines = ["        %s," % ", ".join("{%d, %d, %d}" % tuple(step) for step in cell) for cell in steps.reshape(-1, DEPTHS, 3)]
     lines = []
     for place, words in enumerate(packed(maps)):
         if place % DEPTHS == 0:
@@ -156,7 +157,7 @@ static const uint32_t surroundings_maps[IH_SURROUNDINGS_PLACES][IH_SURROUNDINGS_
 };
 
 static const struct ih_surroundings_moves surroundings_moves = {
-    {%d, %d},
+    {%d, %d, %d},
     {
 %s
     },
@@ -171,4 +172,4 @@ static const struct ih_surroundings_promise surroundings_promise = {
 /* clang-format on */
 
 #endif
-""" % (command, "\n".join(lines), *step_mm_q8, "\n".join(move_lines), bias_q5, "\n".join(promise_lines)))
+""" % (command, "\n".join(lines), *step_mm_q12, "\n".join(move_lines), bias_q5, "\n".join(promise_lines)))

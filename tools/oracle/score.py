@@ -88,9 +88,9 @@ def read_map(path):
     with open(path, encoding="utf-8") as file:
         text = file.read()
     bodies = [re.sub(r"/\*.*?\*/", "", part.split("};")[0]) for part in text.split("= {")[1:]]
-    words, steps = (np.array([int(word, 16) for word in re.findall(r"0x[0-9a-f]+", body)]) for body in bodies[:2])
-    step_mm_q8 = [int(number) for number in re.search(r"\{(\d+), (\d+)\}", bodies[1]).groups()]
-    moves = ray_map.unpacked(steps[:, None], 2), step_mm_q8
+    words = np.array([int(word, 16) for word in re.findall(r"0x[0-9a-f]+", bodies[0])])
+    step_mm_q12, steps = np.split(np.array([int(number) for number in re.findall(r"-?\d+", bodies[1])]), [3])
+    moves = steps.reshape(-1, 3), step_mm_q12
     bias, *parts = (int(number) for number in re.findall(r"-?\d+", bodies[2]))
     return ray_map.unpacked(words.reshape(ray_map.PLACES, -1)), moves, (bias, np.array(parts)), re.search(r"written by\n \* +(.*)", text)[1]
 

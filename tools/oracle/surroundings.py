@@ -13,7 +13,7 @@ COLUMNS, ROWS, DEPTHS, MAPS = 3, 10, 8, 48
 CELLS_ASIDE = 6  # the last column has all from the third on
 # Cells above each other that are one row, by the first of each.
 FIRST_CELLS, CELLS_DOWN = np.array([0, 2, 3, 4, 5, 6, 7, 8, 9, 11]), 13
-STEP_MM = (0.90625, 7.5)  # down, away
+STEP_MM = (0.0390625, 0.11328125, 0.9375)  # aside, down, away
 BIAS_Q5 = -91
 CELL_MM, TOP_MM = 64.0, 384.0
 LIMITS_MM = np.array([-176, -96, -40, 40, 128, 200])
@@ -31,10 +31,14 @@ def spacing_mm(slope, depth_mm):
     return np.sqrt(abs(across[0] * down[1] - across[1] * down[0]) / 2 / 100) * depth_mm
 
 
+def passes(slope_q20, centre):
+    """Where rays pass a centre at its depth: how far right of it and below it."""
+    return (evidence.ORIGIN[:2] + (centre[2] - evidence.ORIGIN[2]) * from_q(slope_q20, 20) - centre[:2]).T
+
+
 def places(slope_q20, depth_q8, state, centre):
     """By slot; and how far, in mm, each ray is from being elsewhere."""
-    slope = from_q(slope_q20, 20)
-    x, y = (evidence.ORIGIN[:2] + (centre[2] - evidence.ORIGIN[2]) * slope - centre[:2]).T
+    x, y = passes(slope_q20, centre)
     dz = from_q(depth_q8, 8) - centre[2]
     column, cell = np.abs(x) // CELL_MM, (y + TOP_MM) // CELL_MM
     row = np.searchsorted(FIRST_CELLS, cell, side="right") - 1
@@ -62,10 +66,9 @@ def write_vectors(directory):
     inc.raw("\nstatic const int32_t vector_origin_mm_q8[] = {%d, %d, %d};\n" % tuple(to_q(evidence.ORIGIN, 8)))
     words = [["0x%08xu" % sum(int(value) + 8 << 4 * i for i, value in enumerate(word)) for word in row.reshape(-1, 8)] for row in maps]
     inc.raw("\nstatic const uint32_t vector_maps[][%d] = {\n%s};\n" % (MAPS // 8, emit.wrap(["{%s}" % ", ".join(row) for row in words])))
-    steps = np.random.default_rng(84).integers(-8, 8, (ROWS, COLUMNS, DEPTHS, 2))
-    inc.raw("\nstatic const struct ih_surroundings_moves vector_moves = {\n    {%d, %d},\n    {\n%s    },\n};\n" % (
-        *to_q(np.array(STEP_MM), 8),
-        emit.wrap(["0x%02x" % (down + 8 | away + 8 << 4) for down, away in steps.reshape(-1, 2)])))
+    steps = np.random.default_rng(84).integers(-128, 128, (COLUMNS * ROWS * DEPTHS, 3))
+    inc.raw("\nstatic const struct ih_surroundings_moves vector_moves = {\n    {%d, %d, %d},\n    {\n%s    },\n};\n" % (
+        *to_q(np.array(STEP_MM), 12), emit.wrap(["{%d, %d, %d}" % tuple(step) for step in steps])))
     parts = np.random.default_rng(85).integers(-127, 128, (ROWS, COLUMNS, DEPTHS))
     inc.raw("\nstatic const struct ih_surroundings_promise vector_promise = {\n    %d,\n    {\n%s    },\n};\n" % (
         BIAS_Q5, emit.wrap(["%d" % part for part in parts.ravel()])))
@@ -81,7 +84,9 @@ def write_vectors(directory):
         spacing = spacing_mm(from_q(slope_q20, 20), from_q(centre_q8[2], 8) - evidence.ORIGIN[2])
         weight = min(1.0, spacing / CELL_MM)**2
         answer = weight * maps[place[place != NONE]].sum(axis=0)
-        move = weight * steps.reshape(-1, 2)[place[place != NONE]].sum(axis=0) * STEP_MM
+        side = np.where(passes(slope_q20, from_q(centre_q8, 8))[0] < 0, -1, 1)
+        by_ray = np.where((place != NONE)[:, None], steps[place], 0)
+        move = weight * np.array([side @ by_ray[:, 0], *by_ray[:, 1:].sum(axis=0)]) * STEP_MM
         inc.raw("\nstatic const struct vector_ray vector_%s_rays[] = {\n%s};\n" % (
             name, emit.wrap(["{%d, %d, %d, %d, %d}" % r for r in zip(*slope_q20.T, depth_q8, state, place)])))
         rows.append('"%s", vector_%s_rays, {%d, %d, %d}, %s, {%s}, {%s}, %s' % (

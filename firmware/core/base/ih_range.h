@@ -93,6 +93,7 @@ IH_END_DECLS
 #define IH_RANGE_ON_MM_Q4 3520       /* from the centre of an ellipsoid to a point on it */
 #define IH_RANGE_CENTRAL_Q8 12390400 /* central moments of such points */
 #define IH_RANGE_MAP_SUM 2888        /* 361 rays of 2^3 */
+#define IH_RANGE_MOVE_SUM 46208      /* 361 rays of 2^7 */
 #define IH_RANGE_LOGIT_Q10 (1 << 21)
 #define IH_RANGE_CROSS_Q8 384000001 /* of a track's covariance */
 

@@ -26,8 +26,6 @@ _Static_assert(WORD_MAPS == 8 && IH_SURROUNDINGS_BITS == 4,
 /* Every other ray of every other line is asked for the promise. */
 #define PROMISE_STRIDE 2
 
-#define MOVE_MASK 0xfu /* the steps down; those away are above */
-
 static const uint8_t row_of_cell[CELLS] = {0, 0, 1, 2, 3, 4, 5, 6, 7, 8, 8, 9, 9};
 
 static const uint8_t depth_of_step[STEPS] = {
@@ -144,23 +142,25 @@ void ih_surroundings_move_by(const struct ih_surroundings_moves *moves, const st
                              int32_t max_mm, struct ih_ellipsoid *ellipsoid)
 {
     const struct head_from_rays candidate = candidate_of(rays, ellipsoid->centre_mm_q8);
-    int32_t steps[2] = {0, 0}; /* down, away */
+    int32_t steps[3] = {0, 0, 0}; /* to the right, down, away */
     for (int32_t slot = 0; slot < IH_SLOTS; slot++) {
-        const int32_t place = place_of(&candidate, &rays->ray[slot]);
+        const struct ih_ray *ray = &rays->ray[slot];
+        const int32_t place = place_of(&candidate, ray);
         if (place == IH_NONE) {
             continue;
         }
-        const uint32_t both = moves->steps[place];
-        steps[0] += (int32_t)(both & MOVE_MASK) - IH_SURROUNDINGS_ZERO;
-        steps[1] += (int32_t)(both >> IH_SURROUNDINGS_BITS) - IH_SURROUNDINGS_ZERO;
+        const int8_t *by_ray = moves->steps[place];
+        steps[0] += across_mm_q8(&candidate, ray->slope_x_q20, 0) < 0 ? -by_ray[0] : by_ray[0];
+        steps[1] += by_ray[1];
+        steps[2] += by_ray[2];
     }
     const int32_t ray_weight_q12 = weight_q12(rays, candidate.depth_mm_q8);
-    for (int i = 0; i < 2; i++) {
-        IH_IN_RANGE(steps[i], -IH_RANGE_MAP_SUM, IH_RANGE_MAP_SUM);
+    for (int i = 0; i < 3; i++) {
+        IH_IN_RANGE(steps[i], -IH_RANGE_MOVE_SUM, IH_RANGE_MOVE_SUM);
         const int32_t move_mm_q8 =
-            (int32_t)ih_mul_shift(steps[i] * moves->step_mm_q8[i], ray_weight_q12, 12);
-        ellipsoid->centre_mm_q8[1 + i] += ih_clamp_s32(move_mm_q8, -max_mm * 256, max_mm * 256);
-        IH_IN_RANGE(ellipsoid->centre_mm_q8[1 + i], -IH_RANGE_CENTRE_MM_Q8, IH_RANGE_CENTRE_MM_Q8);
+            (int32_t)ih_mul_shift(steps[i] * moves->step_mm_q12[i], ray_weight_q12, 12 + 12 - 8);
+        ellipsoid->centre_mm_q8[i] += ih_clamp_s32(move_mm_q8, -max_mm * 256, max_mm * 256);
+        IH_IN_RANGE(ellipsoid->centre_mm_q8[i], -IH_RANGE_CENTRE_MM_Q8, IH_RANGE_CENTRE_MM_Q8);
     }
 }
 

@@ -15,16 +15,16 @@
  *         has more rays, each of which counts less.
  *         tools/learn learns all of them at once with the curves of ih_score behind them: what a map is about is not given
  *         to it, and its unit means nothing. ih_surroundings_map.h has them.
- *         A fit does not know hair from skull, nor where a head ends that bends over its chest: it is off where a model cannot
- *         tell, mostly up or down. So two more maps say, in mm, how far below and behind the fitted centre the head's is. They
- *         are learnt from heads alone (tools/learn), by least squares. Aside the maps know nothing, for left and right are
- *         alike to them.
+ *         A fit does not know hair from skull, nor where a head ends that bends over its chest or turns aside: it is off where
+ *         a model cannot tell. So three more maps say, in mm, how far aside, below and behind the fitted centre the head's is:
+ *         aside what a ray on the right says counts to the right, on the left to the left. They are learnt from heads alone
+ *         (tools/learn), by least squares.
  *         Before anything is fitted, one more map says how much a centre promises, by a quarter of the rays: all of them
  *         rank centres no better. It is learnt by logistic regression from the centres that ih_scan tries, whether a head's
  *         is within 90 mm.
  * Overflow: a depth is below 2^27 in Q8, a slope at most 2^22: 2^49. A spacing is limited to 2^14 in Q8. A sum of 361
- *         numbers, -8 to 7 each, is below 2^11.5, times a weight of 2^12 2^23.5; times a step of the moves, 8 mm at most,
- *         2^22.5, times a weight 2^34.5. A promise is 100 numbers of 8 bits, 2^13.7, times a weight 2^25.7.
+ *         numbers, -8 to 7 each, is below 2^11.5, times a weight of 2^12 2^23.5; of the moves, of 8 bits, 2^15.5, times a step,
+ *         1 mm at most, 2^27.5, times a weight 2^39.5. A promise is 100 numbers of 8 bits, 2^13.7, times a weight 2^25.7.
  * Error:  a ray that passes within 1/128 mm of a cell's edge, or a depth within half a mm of a range's, may
  *         be counted on either side. The weight 2 %, at 25 mm of spacing 0.2 %: a square of Q8. A move as the weight.
  * Cost:   two products for each ray of known state, and 24 sums of two maps each: 18,000 and 37,000 instructions (x86-64,
@@ -55,11 +55,11 @@ struct ih_surroundings {
     int16_t place[IH_SLOTS]; /* (row * COLUMNS + column) * DEPTHS + depth, or IH_NONE */
 };
 
-/* How far off a fitted centre is: at each place the steps down in the low bits, those away from the camera in the high
- * ones, all less IH_SURROUNDINGS_ZERO. */
+/* How far off a fitted centre is: at each place the steps aside, to the side on which the ray passes the centre, down, and away
+ * from the camera. */
 struct ih_surroundings_moves {
-    int32_t step_mm_q8[2]; /* above 0, at most 8 mm */
-    uint8_t steps[IH_SURROUNDINGS_PLACES];
+    int32_t step_mm_q12[3]; /* above 0, at most 1 mm */
+    int8_t steps[IH_SURROUNDINGS_PLACES][3];
 };
 
 /* What the promise is made of: log-odds of a head anywhere, and the part of each place. */
@@ -90,7 +90,7 @@ void ih_surroundings_ask_maps(const uint32_t maps[IH_SURROUNDINGS_PLACES][IH_SUR
                               const struct ih_surroundings *found,
                               int32_t answer_q8[IH_SURROUNDINGS_MAPS]);
 
-/* Moved down and away as learnt, by max_mm (up to 1000) at most each. */
+/* Moved aside, down and away as learnt, by max_mm (up to 1000) at most each. */
 void ih_surroundings_move(const struct ih_rays *rays, int32_t max_mm,
                           struct ih_ellipsoid *ellipsoid);
 

@@ -15,7 +15,7 @@ struct vector_scene {
     const char *name;
     const struct vector_ray *ray;
     int32_t centre_mm_q8[3];
-    double weight, answer[IH_SURROUNDINGS_MAPS], move_mm[2]; /* down, away */
+    double weight, answer[IH_SURROUNDINGS_MAPS], move_mm[3]; /* aside, down, away */
     double promise;
 };
 
@@ -47,9 +47,10 @@ void setUp(void)
     memset(&rays, 0, sizeof rays);
     memset(maps, 0x88, sizeof maps);
     memset(answer_q8, IH_TEST_FILL, sizeof answer_q8);
-    memset(&moves, 0x88, sizeof moves);
-    moves.step_mm_q8[0] = 1 << 8;
-    moves.step_mm_q8[1] = 1 << 8;
+    memset(&moves, 0, sizeof moves);
+    moves.step_mm_q12[0] = 1 << 10;
+    moves.step_mm_q12[1] = 1 << 11;
+    moves.step_mm_q12[2] = 1 << 12;
     memset(&found, IH_TEST_FILL, sizeof found);
     head = (struct ih_ellipsoid){.centre_mm_q8 = {0, 0, DEPTH_MM << 8},
                                  .semi_mm_q8 = {SEMI_MM_Q8, SEMI_MM_Q8, SEMI_MM_Q8}};
@@ -112,10 +113,9 @@ static void scenes_match_float64(void)
         }
         moved = head;
         ih_surroundings_move_by(&vector_moves, &rays, FAR_MM, &moved);
-        TEST_ASSERT_EQUAL_INT32(head.centre_mm_q8[0], moved.centre_mm_q8[0]);
-        for (axis = 0; axis < 2; axis++) {
+        for (axis = 0; axis < 3; axis++) {
             const double move_mm =
-                ih_test_from_q(moved.centre_mm_q8[1 + axis] - head.centre_mm_q8[1 + axis], 8);
+                ih_test_from_q(moved.centre_mm_q8[axis] - head.centre_mm_q8[axis], 8);
 
             IH_TEST_WITHIN(fabs(scene->move_mm[axis]) * (error / scene->weight + 1e-5) + 1.0 / 256,
                            scene->move_mm[axis], move_mm, scene->name, 200 + axis);
@@ -259,7 +259,8 @@ static void sums_of_two_maps_stay_apart(void)
     }
 }
 
-/* Three rays, of which one is of unknown state; the same steps left and right, and from the third column outwards. */
+/* Three rays, of which one is of unknown state: aside to their own side, all else the same left and right, and from the third
+ * column outwards. */
 static void moves_add_up_by_columns(void)
 {
     static const struct {
@@ -267,10 +268,12 @@ static void moves_add_up_by_columns(void)
     } cases[] = {{10, 0}, {-10, 0}, {70, 1}, {-70, 1}, {130, 2}, {200, 2}, {-370, 2}};
     int i, k;
 
-    moves.step_mm_q8[0] = 3 << 7; /* 1.5 mm */
     for (k = 0; k < IH_SURROUNDINGS_COLUMNS; k++) {
-        /* 2 + k down, 3 + k towards the camera */
-        moves.steps[place_at(5, k, 3)] = (uint8_t)((8 - 3 - k) << 4 | (8 + 2 + k));
+        int8_t *steps = moves.steps[place_at(5, k, 3)];
+
+        steps[0] = (int8_t)(100 - k);
+        steps[1] = (int8_t)(2 + k);
+        steps[2] = (int8_t)(-3 - k);
     }
     for (i = 0; i < IH_TEST_COUNT(cases); i++) {
         struct ih_ellipsoid moved = head;
@@ -282,15 +285,19 @@ static void moves_add_up_by_columns(void)
         }
         ih_surroundings_find(&rays, &head, &found);
         ih_surroundings_move_by(&moves, &rays, FAR_MM, &moved);
-        IH_TEST_EQUAL(head.centre_mm_q8[0], moved.centre_mm_q8[0], "aside", i);
-        IH_TEST_EQUAL(head.centre_mm_q8[1] + 2 * (2 + cases[i].column) * 384, moved.centre_mm_q8[1],
-                      "down", i);
+        IH_TEST_EQUAL(head.centre_mm_q8[0] +
+                          (cases[i].x_mm < 0 ? -2 : 2) * (100 - cases[i].column) * (256 / 4),
+                      moved.centre_mm_q8[0], "aside", i);
+        IH_TEST_EQUAL(head.centre_mm_q8[1] + 2 * (2 + cases[i].column) * (256 / 2),
+                      moved.centre_mm_q8[1], "down", i);
         IH_TEST_EQUAL(head.centre_mm_q8[2] - 2 * (3 + cases[i].column) * 256, moved.centre_mm_q8[2],
                       "away", i);
         moved = head;
-        ih_surroundings_move_by(&moves, &rays, 5, &moved);
-        IH_TEST_EQUAL(head.centre_mm_q8[1] + (5 << 8), moved.centre_mm_q8[1], "at most down", i);
-        IH_TEST_EQUAL(head.centre_mm_q8[2] - (5 << 8), moved.centre_mm_q8[2], "at most towards", i);
+        ih_surroundings_move_by(&moves, &rays, 1, &moved);
+        IH_TEST_EQUAL(head.centre_mm_q8[0] + (cases[i].x_mm < 0 ? -256 : 256),
+                      moved.centre_mm_q8[0], "at most aside", i);
+        IH_TEST_EQUAL(head.centre_mm_q8[1] + 256, moved.centre_mm_q8[1], "at most down", i);
+        IH_TEST_EQUAL(head.centre_mm_q8[2] - 256, moved.centre_mm_q8[2], "at most towards", i);
         moved = head;
         ih_surroundings_move_by(&moves, &rays, 0, &moved);
         TEST_ASSERT_EQUAL_MEMORY(&head, &moved, sizeof head);
@@ -340,11 +347,46 @@ static void parts_of_a_promise_add_up_by_columns(void)
     }
 }
 
+/* The same steps at every place, of the longest step: those aside to the side of each ray. */
+static void check_moves(int32_t each, int pass)
+{
+    int32_t counted[3] = {0, 0, 0};
+    struct ih_ellipsoid moved = head;
+    int slot, axis;
+
+    for (slot = 0; slot < IH_SLOTS; slot++) {
+        const double passes = (double)rays.origin_mm_q8[0] - head.centre_mm_q8[0] +
+                              ldexp((double)(head.centre_mm_q8[2] - rays.origin_mm_q8[2]) *
+                                        rays.ray[slot].slope_x_q20,
+                                    -20);
+
+        if (found.place[slot] != IH_NONE) {
+            TEST_ASSERT_TRUE(fabs(passes) > 1.0);
+            counted[0] += passes < 0 ? -1 : 1;
+            counted[1]++;
+            counted[2]++;
+        }
+    }
+    for (slot = 0; slot < IH_SURROUNDINGS_PLACES; slot++) {
+        memset(moves.steps[slot], each, sizeof moves.steps[slot]);
+    }
+    for (axis = 0; axis < 3; axis++) {
+        moves.step_mm_q12[axis] = 1 << 12;
+    }
+    ih_surroundings_move_by(&moves, &rays, 1000, &moved);
+    for (axis = 0; axis < 3; axis++) {
+        const double move_mm_q8 =
+            floor(ldexp(counted[axis] * each * (double)found.weight_q12, -4) + 0.5);
+
+        IH_TEST_EQUAL((int32_t)fmax(fmin(move_mm_q8, 256000), -256000),
+                      moved.centre_mm_q8[axis] - head.centre_mm_q8[axis], "move", 3 * pass + axis);
+    }
+}
+
 /* As far as rays, points and fits can be; the largest sum. The sanitizers watch. */
 static void extremes_do_not_overflow(void)
 {
     struct ih_test_random random = {31};
-    struct ih_ellipsoid moved;
     int pass, slot, axis, map;
 
     for (pass = 0; pass < 400; pass++) {
@@ -379,14 +421,7 @@ static void extremes_do_not_overflow(void)
             IH_TEST_EQUAL((int32_t)floor(ldexp(known * each * found.weight_q12, -4) + 0.5),
                           answer_q8[map], "answer", pass);
         }
-        memset(moves.steps, pass % 2 == 0 ? 0 : UINT8_MAX, sizeof moves.steps);
-        moves.step_mm_q8[0] = 8 << 8;
-        moved = head;
-        ih_surroundings_move_by(&moves, &rays, 1000, &moved);
-        IH_TEST_EQUAL(
-            (int32_t)fmax(fmin(floor(ldexp(known * each * found.weight_q12, -1) + 0.5), 256000),
-                          -256000),
-            moved.centre_mm_q8[1] - head.centre_mm_q8[1], "move", pass);
+        check_moves(each < 0 ? -128 : 127, pass);
     }
 }
 
