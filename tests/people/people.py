@@ -141,10 +141,10 @@ class People(unittest.TestCase):
         import scene
         import sets
         seeds = {}
-        for name in ("learn", "mounted_learn", "anywhere_learn", "judge", "mounted", "mounted_judge", "missing"):
+        for name in ("learn", "mounted_learn", "anywhere_learn", "more_learn", "judge", "mounted", "mounted_judge", "missing"):
             seeds[name] = {seed for rig in sets.ALL_RIGS for _, _, seed, _ in sets.sequences(name, rig)}
             seeds[name] |= {seed + scene.SECOND_SEED for seed in seeds[name]}
-        for learn in ("learn", "mounted_learn", "anywhere_learn", "mounted"):
+        for learn in ("learn", "mounted_learn", "anywhere_learn", "more_learn", "mounted"):
             for judge in ("judge", "mounted_judge", "missing"):
                 self.assertFalse(seeds[learn] & seeds[judge])
 

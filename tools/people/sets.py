@@ -45,6 +45,8 @@ LEARN_MORE = (("above", 60000, 50), ("seat", 70000, 110), ("ground", 80000, 150)
 MISSING = (0.15, 0.6)
 AGAIN = {"missing_learn": "learn", "mounted_missing_learn": "mounted_learn"}
 AGAIN_STEP, AGAIN_FIRST = 5, 2
+# A set's rigs see other people: their first seeds are so far apart, 2000 to learn from and 1000 to judge by where nothing else
+# is said.
 SEEDS_OF_A_RIG = {"more_learn": 4000}
 # All rigs of this set see the same people.
 SAME_PEOPLE = "rigs"
