@@ -340,7 +340,7 @@ class Moves(unittest.TestCase):
         steps_mm[..., 0] *= side
         off_mm = weight_q12[:, None] / 4096 * steps_mm.sum(axis=1)
         off_mm[::300] += 80.0
-        with unittest.mock.patch.multiple(ray_map, MOVE_RIDGE=3.0):  # few heads, little noise
+        with unittest.mock.patch.multiple(ray_map, MOVE_RIDGE=3.0, MOVE_SMOOTH=3.0):  # few heads, little noise
             steps, step_mm_q12 = ray_map.fit_moves(place, side, weight_q12, off_mm, numpy.ones(len(place)))
         error_mm = abs(steps * step_mm_q12 / 4096 - true_mm)
         self.assertLessEqual(abs(steps).max(), 127)
@@ -348,6 +348,14 @@ class Moves(unittest.TestCase):
         # with a mean squared weight of 0.4: by 0.034 mm, within which the median is, and within four times that all 720 numbers.
         self.assertLess(numpy.median(error_mm), 0.034)
         self.assertLess(error_mm.max(), 4 * 0.034)
+
+
+    def test_neighbours_are_those_beside_and_not_nothing(self):
+        rough = ray_map.move_roughness()
+        self.assertTrue(numpy.allclose(rough.sum(axis=0), 0.0))
+        # Inside four neighbours aside and by row, two by range; the last place, nothing, has none of those.
+        inside = (5 * ray_map.COLUMNS + 1) * ray_map.DEPTHS
+        self.assertEqual([rough[inside + depth, inside + depth] for depth in (0, 3, 6, 7)], [5.0, 6.0, 5.0, 4.0])
 
 
 class Promise(unittest.TestCase):

@@ -20,6 +20,9 @@ ROWS_KEPT, COLUMNS_KEPT, ROWS_LOST, DEPTHS_KEPT = (7, 9), (2, 2), (1, 4), (6, 6)
 ENDS_SEED = 5
 PROMISE_RIDGE, PROMISE_PASSES = 100.0, 8
 MOVE_RIDGE, MOVE_PASSES, MOVE_ROBUST_MM = 200.0, 5, 20.0
+# Against differences of neighbours: how many rays fall into a cell is a matter of chance, and a head that moves by half a
+# dot's distance should not be moved otherwise (tests/properties/prop_shift.c). Ten times as much would take most of the moves.
+MOVE_SMOOTH = 600.0
 MOVE_MAX = 127  # of a place, in steps
 STEP_MAX_MM = 1  # as ih_surroundings.h has it
 
@@ -58,6 +61,15 @@ def answers(maps, place, weight_q12):
     return ((counts_of(place) @ maps * weight_q12[:, None] + (1 << 3)) >> 4) / 256
 
 
+def move_roughness():
+    """Of moves by place: a form whose value is the sum of squared differences of neighbours. Nothing has none in depth."""
+    index = numpy.arange(PLACES).reshape(ROWS, COLUMNS, DEPTHS)
+    pairs = ((index[1:], index[:-1]), (index[:, 1:], index[:, :-1]), (index[..., 1:-1], index[..., :-2]))
+    one, other = (numpy.concatenate([pair[side].ravel() for pair in pairs]) for side in (0, 1))
+    difference = numpy.eye(PLACES)[one] - numpy.eye(PLACES)[other]
+    return difference.T @ difference
+
+
 def fit_moves(place, side, weight_q12, off_mm, importance):
     """Steps aside, down and away at each place, and a step's mm in Q12; off_mm: of every fitted centre, how far right of it,
     below and behind it the head's is; importance: how often each counts. What a ray says aside counts to its own side. Few that
@@ -66,7 +78,7 @@ def fit_moves(place, side, weight_q12, off_mm, importance):
     weight_of_ray = weight_q12[row] / 4096
     to_both, to_side = (scipy.sparse.coo_matrix((values, (row, place[row, slot])), shape=(len(place), PLACES)).tocsr()
                         for values in (weight_of_ray, weight_of_ray * side[row, slot]))
-    penalty = MOVE_RIDGE * numpy.eye(PLACES)
+    penalty = MOVE_RIDGE * numpy.eye(PLACES) + MOVE_SMOOTH * move_roughness()
     weight = importance
     for _ in range(MOVE_PASSES):
         by_place_mm = numpy.empty((PLACES, 3))
