@@ -79,8 +79,8 @@ def read_tried(trace):
 
 def read_sides(trace, found):
     """Of each detection, by slot: on which side of its centre a ray passes, -1 left, 1 right."""
-    sides = [ray_map.sides_around(read_rays(trace["rays"][f["surroundings"]["view"]]), numpy.array(f["centre_mm_q8"]) / 256)
-             for f in found]
+    views = [read_rays(view) for view in trace["rays"]]
+    sides = [ray_map.sides_around(views[f["surroundings"]["view"]], numpy.array(f["centre_mm_q8"]) / 256) for f in found]
     return numpy.array(sides, dtype=numpy.int8).reshape(len(found), SLOTS)
 
 

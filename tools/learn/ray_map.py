@@ -44,11 +44,11 @@ def ending_views(place):
     return numpy.where(beyond, -1, place).astype(place.dtype)
 
 
-def counts_of(place):
-    """A row for each detection: how many of its rays ask at each place of a map."""
+def counts_of(place, counting=None):
+    """A row for each detection: how many of its rays ask at each place of a map; counting: as what each ray counts, if not 1."""
     row, slot = numpy.nonzero(place >= 0)
-    ones = numpy.ones(len(row), dtype=numpy.int32)
-    return scipy.sparse.coo_matrix((ones, (row, place[row, slot])), shape=(len(place), PLACES)).tocsr()
+    each = numpy.ones(len(row), dtype=numpy.int32) if counting is None else counting[row, slot]
+    return scipy.sparse.coo_matrix((each, (row, place[row, slot])), shape=(len(place), PLACES), dtype=numpy.int32).tocsr()
 
 
 def needed_of(place, weight_q12):
@@ -74,10 +74,7 @@ def fit_moves(place, side, weight_q12, off_mm, importance):
     """Steps aside, down and away at each place, and a step's mm in Q12; off_mm: of every fitted centre, how far right of it,
     below and behind it the head's is; importance: how often each counts. What a ray says aside counts to its own side. Few that
     are far off do not decide: after a pass they weigh less."""
-    row, slot = numpy.nonzero(place >= 0)
-    weight_of_ray = weight_q12[row] / 4096
-    to_both, to_side = (scipy.sparse.coo_matrix((values, (row, place[row, slot])), shape=(len(place), PLACES)).tocsr()
-                        for values in (weight_of_ray, weight_of_ray * side[row, slot]))
+    to_both, to_side = (scipy.sparse.diags(weight_q12 / 4096) @ counts for counts in (counts_of(place), counts_of(place, side)))
     penalty = MOVE_RIDGE * numpy.eye(PLACES) + MOVE_SMOOTH * move_roughness()
     weight = importance
     for _ in range(MOVE_PASSES):
@@ -130,13 +127,13 @@ def fit_promise(place, weight, labels):
 
 def packed(maps):
     """Words for each place, of as many maps as fit in one, the first map's number lowest."""
-    by_word = (maps + ZERO).reshape(len(maps), -1, min(maps.shape[1], WORD_MAPS))
-    return (by_word << BITS * numpy.arange(by_word.shape[2])).sum(axis=2)
+    by_word = (maps + ZERO).reshape(len(maps), -1, WORD_MAPS)
+    return (by_word << BITS * numpy.arange(WORD_MAPS)).sum(axis=2)
 
 
-def unpacked(words, count=WORD_MAPS):
-    """A row for each row of words, of each of which count maps are asked."""
-    numbers = (numpy.array(words)[..., None] >> BITS * numpy.arange(count) & (1 << BITS) - 1) - ZERO
+def unpacked(words):
+    """A row for each row of words."""
+    numbers = (numpy.array(words)[..., None] >> BITS * numpy.arange(WORD_MAPS) & (1 << BITS) - 1) - ZERO
     return numbers.reshape(len(words), -1)
 
 

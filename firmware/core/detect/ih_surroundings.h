@@ -28,7 +28,7 @@
  * Error:  a ray that passes within 1/128 mm of a cell's edge, or a depth within half a mm of a range's, may
  *         be counted on either side. The weight 2 %, at 25 mm of spacing 0.2 %: a square of Q8. A move as the weight.
  * Cost:   two products for each ray of known state, and 24 sums of two maps each: 18,000 and 37,000 instructions (x86-64,
- *         -O3); a move 20,000; a promise 4,300.
+ *         -O3); a move 23,000; a promise 4,300.
  */
 #ifndef IH_SURROUNDINGS_H
 #define IH_SURROUNDINGS_H
