@@ -29,7 +29,7 @@ ENTRY
 board_esp() {
     mmd -i "$1" ::/EFI ::/EFI/BOOT ::/loader ::/loader/entries
     mcopy -i "$1" "$out/boot/systemd-bootaa64.efi" ::/EFI/BOOT/BOOTAA64.EFI
-    # The menu takes no key: the command line of an entry says what is checked.
+    # Nobody edits a command line in the menu: it says what is checked of the slot.
     printf 'timeout 0\neditor no\nauto-entries no\nauto-firmware no\n' | mcopy -i "$1" - ::/loader/loader.conf
     entry a 2 | mcopy -i "$1" - ::/loader/entries/slot-a+3.conf
     entry b 1 | mcopy -i "$1" - ::/loader/entries/slot-b+3.conf
