@@ -140,10 +140,16 @@ class People(unittest.TestCase):
     def test_learning_and_judging_share_nobody(self):
         import scene
         import sets
+
+        def seeds_of(name, rig):
+            first = {seed for _, _, seed, _ in sets.sequences(name, rig)}
+            return first | {seed + scene.SECOND_SEED for seed in first}
+
         seeds = {}
         for name in ("learn", "mounted_learn", "anywhere_learn", "more_learn", "judge", "mounted", "mounted_judge", "missing"):
-            seeds[name] = {seed for rig in sets.ALL_RIGS for _, _, seed, _ in sets.sequences(name, rig)}
-            seeds[name] |= {seed + scene.SECOND_SEED for seed in seeds[name]}
+            seeds[name] = set().union(*(seeds_of(name, rig) for rig in sets.ALL_RIGS))
+            paper, wide, depth = (seeds_of(name, rig) for rig in ("paper", "wide", "range"))
+            self.assertFalse(paper & wide | wide & depth | depth & paper, name)
         for learn in ("learn", "mounted_learn", "anywhere_learn", "more_learn", "mounted"):
             for judge in ("judge", "mounted_judge", "missing"):
                 self.assertFalse(seeds[learn] & seeds[judge])

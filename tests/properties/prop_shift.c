@@ -117,9 +117,9 @@ static void a_shifted_scene_shifts_the_head(void)
     struct ih_calibration range;
 
     prop_range_rig(&range, 640, 480, 525);
-    check(&vector_rigs[0], "12.5 mm baseline", 801, prop_seeds(20));
-    check(&vector_rigs[1], "125 mm baseline", 802, prop_seeds(20));
-    check(&range, "depth camera", 803, prop_seeds(20));
+    check(&vector_rigs[0], "12.5 mm baseline", 801, prop_seeds(80));
+    check(&vector_rigs[1], "125 mm baseline", 802, prop_seeds(80));
+    check(&range, "depth camera", 803, prop_seeds(80));
 }
 
 int main(void)

@@ -45,8 +45,8 @@ LEARN_MORE = (("above", 60000, 50), ("seat", 70000, 110), ("ground", 80000, 150)
 MISSING = (0.15, 0.6)
 AGAIN = {"missing_learn": "learn", "mounted_missing_learn": "mounted_learn"}
 AGAIN_STEP, AGAIN_FIRST = 5, 2
-# A set's rigs see other people: their first seeds are so far apart, 2000 to learn from and 1000 to judge by where nothing else
-# is said.
+# Paper, wide and range see other people in a set: the rigs' first seeds are so far apart, 2000 to learn from and 1000 to judge
+# by where nothing else is said. The further rigs of "learn" share some of the sets that follow with them.
 SEEDS_OF_A_RIG = {"more_learn": 4000}
 # All rigs of this set see the same people.
 SAME_PEOPLE = "rigs"

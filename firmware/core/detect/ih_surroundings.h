@@ -25,8 +25,9 @@
  * Overflow: a depth is below 2^27 in Q8, a slope at most 2^22: 2^49. A spacing is limited to 2^14 in Q8. A sum of 361
  *         numbers, -8 to 7 each, is below 2^11.5, times a weight of 2^12 2^23.5; of the moves, of 8 bits, 2^15.5, times a step,
  *         1 mm at most, 2^27.5, times a weight 2^39.5. A promise is 100 numbers of 8 bits, 2^13.7, times a weight 2^25.7.
- * Error:  a ray that passes within 1/128 mm of a cell's edge, or a depth within half a mm of a range's, may
- *         be counted on either side. The weight 2 %, at 25 mm of spacing 0.2 %: a square of Q8. A move as the weight.
+ * Error:  a ray that passes within 1/128 mm of a cell's edge, aside also of the centre, or a depth within half a mm of a
+ *         range's, may be counted on either side. The weight 2 %, at 25 mm of spacing 0.2 %: a square of Q8. A move as the
+ *         weight.
  * Cost:   two products for each ray of known state, and 24 sums of two maps each: 18,000 and 37,000 instructions (x86-64,
  *         -O3); a move 23,000; a promise 4,300.
  */

@@ -355,14 +355,14 @@ static void check_moves(int32_t each, int pass)
     int slot, axis;
 
     for (slot = 0; slot < IH_SLOTS; slot++) {
-        const double passes = (double)rays.origin_mm_q8[0] - head.centre_mm_q8[0] +
-                              ldexp((double)(head.centre_mm_q8[2] - rays.origin_mm_q8[2]) *
-                                        rays.ray[slot].slope_x_q20,
-                                    -20);
+        const double passes_mm_q8 = (double)rays.origin_mm_q8[0] - head.centre_mm_q8[0] +
+                                    ldexp((double)(head.centre_mm_q8[2] - rays.origin_mm_q8[2]) *
+                                              rays.ray[slot].slope_x_q20,
+                                          -20);
 
         if (found.place[slot] != IH_NONE) {
-            TEST_ASSERT_TRUE(fabs(passes) > 1.0);
-            counted[0] += passes < 0 ? -1 : 1;
+            TEST_ASSERT_TRUE(fabs(passes_mm_q8) > 1.0);
+            counted[0] += passes_mm_q8 < 0 ? -1 : 1;
             counted[1]++;
             counted[2]++;
         }
@@ -383,10 +383,34 @@ static void check_moves(int32_t each, int pass)
     }
 }
 
-/* As far as rays, points and fits can be; the largest sum. The sanitizers watch. */
+/* Every ray asks, on one side, and stands for a whole cell: each sum at its largest and smallest. */
+static void the_largest_sums_do_not_overflow(void)
+{
+    int slot, pass;
+
+    for (slot = 0; slot < IH_SLOTS; slot++) { /* 16 mm apart */
+        rays.ray[slot] = (struct ih_ray){.slope_x_q20 = (slot % IH_GRID + 1) * PITCH_Q20 / 4,
+                                         .slope_y_q20 = (slot / IH_GRID - 9) * PITCH_Q20 / 4,
+                                         .state = IH_RAY_EMPTY};
+    }
+    ih_rays_fill_table(&rays);
+    rays.table.pitch_q20 = PITCH_Q20;
+    ih_surroundings_find(&rays, &head, &found);
+    IH_TEST_EQUAL(4096, found.weight_q12, "weight", 0);
+    for (slot = 0; slot < IH_SLOTS; slot++) {
+        TEST_ASSERT_NOT_EQUAL(IH_NONE, found.place[slot]);
+    }
+    for (pass = 0; pass < 2; pass++) {
+        check_promise(pass == 0 ? -127 : 127, pass);
+        check_moves(pass == 0 ? -128 : 127, pass);
+    }
+}
+
+/* As far as rays, points and fits can be. The sanitizers watch. */
 static void extremes_do_not_overflow(void)
 {
     struct ih_test_random random = {31};
+    int32_t asked[2] = {0, 0};
     int pass, slot, axis, map;
 
     for (pass = 0; pass < 400; pass++) {
@@ -396,7 +420,7 @@ static void extremes_do_not_overflow(void)
         memset(maps, pass % 2 == 0 ? 0 : UINT8_MAX, sizeof maps);
 
         for (axis = 0; axis < 3; axis++) {
-            const int32_t far = pass % 4 == 0 ? 300 << 8 : 1 << 27;
+            const int32_t far = pass % 4 < 2 ? 300 << 8 : 1 << 27;
 
             head.centre_mm_q8[axis] = (int32_t)ih_test_between(&random, -far, far);
             rays.origin_mm_q8[axis] = (int32_t)ih_test_between(&random, -256000, 256000);
@@ -417,12 +441,15 @@ static void extremes_do_not_overflow(void)
             IH_TEST_RANGE(IH_NONE, IH_SURROUNDINGS_PLACES - 1, found.place[slot], "place", slot);
             known += found.place[slot] != IH_NONE;
         }
+        asked[pass % 2] += known;
         for (map = 0; map < IH_SURROUNDINGS_MAPS; map++) {
             IH_TEST_EQUAL((int32_t)floor(ldexp(known * each * found.weight_q12, -4) + 0.5),
                           answer_q8[map], "answer", pass);
         }
         check_moves(each < 0 ? -128 : 127, pass);
     }
+    TEST_ASSERT_GREATER_THAN(1000, asked[0]);
+    TEST_ASSERT_GREATER_THAN(1000, asked[1]);
 }
 
 int main(void)
@@ -436,6 +463,7 @@ int main(void)
     RUN_TEST(sums_of_two_maps_stay_apart);
     RUN_TEST(moves_add_up_by_columns);
     RUN_TEST(parts_of_a_promise_add_up_by_columns);
+    RUN_TEST(the_largest_sums_do_not_overflow);
     RUN_TEST(extremes_do_not_overflow);
     return UNITY_END();
 }
