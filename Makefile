@@ -35,6 +35,7 @@ KIND ?= hands
 RIG ?= paper
 SEED ?= 1
 OUT ?= $(BUILD)/people/$(RIG)_$(KIND)_$(SEED)
+SETS ?= judge
 # Frames of make longrun; make test takes a few hundred.
 LONGRUN_FRAMES ?= 100000
 # What the board's program is built for: arm64, armhf or host.
@@ -44,7 +45,7 @@ PREFIX ?= /usr/local
 DESTDIR ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help sim install frames sanitize test check unit kills fuzz coverage ranges exhaustive mutation accept eval misaligned \
+.PHONY: help sim install frames sanitize test check unit kills fuzz coverage ranges exhaustive mutation accept eval eval-people misaligned \
   bench bench-instructions bench-peers bench-grow bench-worst test-bench bits cortexm longrun size vectors learn learn-pose view figures \
   test-view test-report site live-pictures export python people board board-gpiod2 deb deb-tools image flash calibrate test-calibration \
   test-calibration-short test-deb test-board test-image format formatted words layout links lint clean
@@ -158,6 +159,11 @@ eval: sim ## everything measured: all data sets, fresh scenes, each part left ou
 	@tools/setup.sh eval
 	@/usr/bin/python3 tools/eval/evaluate.py --host-sim $(BUILD)/host/sim/host_sim \
 	  --render $(BUILD)/host/tools/render/render --work $(BUILD)/eval --data $(DATA)
+
+eval-people: sim ## which of the people of true anatomy are found that nothing was learnt from; SETS=judge (default), half an hour
+	@tools/setup.sh people
+	@for set in $(SETS); do /usr/bin/python3 tools/people/sets.py $$set $(BUILD)/people/$$set || exit 1; done
+	@/usr/bin/python3 tools/eval/people.py --host-sim $(BUILD)/host/sim/host_sim $(addprefix $(BUILD)/people/,$(SETS))
 
 misaligned: sim ## rig files that are wrong: what is found and labelled; seven minutes, with SHORT=1 one; OPTIONS="--rows X"
 	@tools/setup.sh eval

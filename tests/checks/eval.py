@@ -18,12 +18,14 @@ TOOLS = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "to
 sys.path.insert(0, TOOLS)
 import misaligned
 import misaligned_rows
+import people
 import report
 import runs
 import scenes
 import score
 
 sys.path.insert(0, os.path.join(TOOLS, "..", "learn"))
+import learn
 import model
 import ray_map
 
@@ -327,9 +329,54 @@ class Score(unittest.TestCase):
         self.assertLessEqual(abs(learnt.weight_q2).max(), model.WEIGHT_MAX)
 
 
+class TrueAnatomy(unittest.TestCase):
+    def frame(self, said, truth_of_it, *persons):
+        """Of a picture of these: centre, points, fraction of them."""
+        notes = [{"centre_mm": centre, "points": points, "visible": fraction} for centre, points, fraction in persons]
+        return people.looked_at(said, truth_of_it, {"kind": "calm", "people": notes}, "paper", "level")
+
+    def test_a_head_is_found_within_100_mm_of_one_that_is_there(self):
+        both = {**truth(CENTRE), "heads": [{"centre_mm": CENTRE}, {"centre_mm": OTHER}]}
+        persons = ((OTHER, 9, 0.3), (CENTRE, 40, 0.9))
+        frame = self.frame(record([off(0, 3, 4), OTHER], [0, 1], 1), both, *persons)
+        self.assertEqual((frame.there, frame.right, frame.both, frame.off_mm), (2, True, True, 0.0))
+        self.assertEqual((frame.points, frame.visible), (40, 0.9))
+        third = self.frame(record([off(0, 3, 4), OTHER, off(900)], [0, 1, 2], 0), both, *persons)
+        self.assertEqual((third.right, third.both, third.off_mm), (True, False, 5.0))
+        self.assertEqual(self.frame(record([off(101)], [0], 0), truth(CENTRE), (CENTRE, 9, 1.0)).right, False)
+        self.assertEqual(self.frame(record([off(0)], [], None), truth(CENTRE), (CENTRE, 9, 1.0)).right, False)
+
+    def test_nobody_must_be_found_where_none_is_and_what_is_unclear_does_not_count(self):
+        self.assertTrue(self.frame(record([off(0)], [], None), truth()).right)
+        self.assertFalse(self.frame(record([off(0)], [0], 0), truth()).right)
+        self.assertIsNone(self.frame(record([], [], None), {**truth(), "unclear": [{"centre_mm": CENTRE}]}, (CENTRE, 3, 0.1)))
+        self.assertIsNone(self.frame(record([], [], None), {"heads": [{"centre_mm": CENTRE}]}, (CENTRE, 3, 0.1)))
+
+    def test_every_row_has_its_frames(self):
+        near, far = ([10.0, -20.0, z] for z in (440.0, 2100.0))
+        frames = [self.frame(record([near], [0], 0), truth(near), (near, 61, 1.0)),
+                  self.frame(record([], [], None), truth(far), (far, 6, 0.1)),
+                  self.frame(record([OTHER], [0], 0), truth(far), (far, 17, 0.6)),
+                  self.frame(record([OTHER], [0], 0), truth())]
+        cells = [[cell.strip() for cell in line.split("|")[1:-1]] for line in people.text(frames).splitlines()]
+        for row in (["calm", "3", "1", "33.3", "1", "0", "0"], ["60 and more", "1", "1", "100.0", "0", "0", "0"],
+                    ["6 to 9", "1", "0", "0.0", "0", "-", "-"], ["12 to 18", "1", "0", "0.0", "1", "-", "-"],
+                    ["0 to 0.25", "1", "0", "0.0", "0", "-", "-"], ["450 to 600 mm", "1", "1", "100.0", "0", "0", "0"],
+                    ["2000 mm and more", "2", "0", "0.0", "1", "-", "-"], ["calm", "1", "1"], ["all", "1", "1"]):
+            self.assertIn(row, cells)
+
+    def test_a_camera_hangs_as_its_rig_says(self):
+        for tilt, roll, name in ((30, 90, "down 30, rolled 90"), (-20, 180, "up 20, rolled 180"), (45, 0, "down 45, rolled 0")):
+            t, r = numpy.radians([tilt, roll])
+            up = [numpy.cos(t) * numpy.sin(r), -numpy.cos(t) * numpy.cos(r), -numpy.sin(t)]
+            self.assertEqual(people.mount_of({"up": up}), name)
+        self.assertEqual(people.mount_of({}), "no up, level or little tilted")
+
+
 class Moves(unittest.TestCase):
     def test_how_far_off_a_centre_is_is_learnt_by_place(self):
-        """Of heads whose rays say it, and a few that are elsewhere: a slope from row to row, other in each direction."""
+        """Of heads whose rays say it, a few that are elsewhere, and some that weigh nothing and say the contrary: a slope from
+        row to row, other in each direction."""
         random = numpy.random.default_rng(5)
         row = numpy.arange(ray_map.PLACES) // (ray_map.COLUMNS * ray_map.DEPTHS)
         true_mm = numpy.stack([(row - 6) / 7.0, (row - 5) / 5.0, (4 - row) / 8.0], axis=1)
@@ -340,8 +387,11 @@ class Moves(unittest.TestCase):
         steps_mm[..., 0] *= side
         off_mm = weight_q12[:, None] / 4096 * steps_mm.sum(axis=1)
         off_mm[::300] += 80.0
+        importance = numpy.ones(len(place))
+        importance[1::10] = 0.0
+        off_mm[1::10] *= -1.0
         with unittest.mock.patch.multiple(ray_map, MOVE_RIDGE=3.0, MOVE_SMOOTH=3.0):  # few heads, little noise
-            steps, step_mm_q12 = ray_map.fit_moves(place, side, weight_q12, off_mm, numpy.ones(len(place)))
+            steps, step_mm_q12 = ray_map.fit_moves(place, side, weight_q12, off_mm, importance)
         error_mm = abs(steps * step_mm_q12 / 4096 - true_mm)
         self.assertLessEqual(abs(steps).max(), 127)
         # A step is below a hundredth mm. One head of 300 pulls with up to 20 mm, 1.2 mm a head, and a place is met 3,000 times,
@@ -349,10 +399,30 @@ class Moves(unittest.TestCase):
         self.assertLess(numpy.median(error_mm), 0.034)
         self.assertLess(error_mm.max(), 4 * 0.034)
 
+    def test_a_ray_counts_to_the_side_on_which_it_passes(self):
+        """Rays that start 100 mm on the right and pass 10 mm left and right of the axis at a depth of 1 m."""
+        rays = {"origin_mm": numpy.array([100.0, 0.0, 0.0]), "slope": numpy.array([[-0.11, 0.0], [-0.09, 0.0]])}
+        sides = ray_map.sides_around(rays, numpy.array([[0.0, 0.0, 1000.0], [30.0, 0.0, 1000.0], [-30.0, 0.0, 1000.0]]))
+        self.assertEqual(sides.tolist(), [[-1, 1], [-1, -1], [1, 1]])
+
+    def test_they_are_learnt_from_the_fit_nearest_to_each_head(self):
+        centre_mm = numpy.array([[200.0, 0.0, 1000.0], [30.0, 0.0, 1000.0], [-40.0, 0.0, 1000.0]])
+        frame = {"directory": "rendered", "heads": numpy.array([[0.0, 5.0, 1000.0]]), "centre_mm": centre_mm,
+                 "place": numpy.array([[1], [2], [3]]), "side": numpy.array([[1], [-1], [1]]), "weight_q12": numpy.array([4, 5, 6])}
+        alone = {**frame, **{key: frame[key][:1] for key in ("centre_mm", "place", "side", "weight_q12")}}
+        with unittest.mock.patch.object(ray_map, "fit_moves") as fit:
+            learn.moves_of([frame, alone, {**frame, "directory": "people"}], {"people"})
+        place, side, weight_q12, off_mm, importance = (column.tolist() for column in fit.call_args[0])
+        self.assertEqual((place, side, weight_q12), ([[2], [2]], [[-1], [-1]], [5, 5]))
+        self.assertEqual(off_mm, 2 * [[-30.0, 5.0, 0.0]])
+        self.assertEqual(importance, [learn.MOVES_SCENE_WEIGHT, 1.0])
 
     def test_neighbours_are_those_beside_and_not_nothing(self):
         rough = ray_map.move_roughness()
         self.assertTrue(numpy.allclose(rough.sum(axis=0), 0.0))
+        # Aside, the same at every place differs by twice as much at the centre of each of 240 / 3 places; one side has half.
+        aside = numpy.ones(ray_map.PLACES) @ ray_map.move_roughness(aside=True) @ numpy.ones(ray_map.PLACES)
+        self.assertAlmostEqual(aside, ray_map.PLACES / ray_map.COLUMNS * 2.0 ** 2 / 2)
         # Inside four neighbours aside and by row, two by range; the last place, nothing, has none of those.
         inside = (5 * ray_map.COLUMNS + 1) * ray_map.DEPTHS
         self.assertEqual([rough[inside + depth, inside + depth] for depth in (0, 3, 6, 7)], [5.0, 6.0, 5.0, 4.0])
