@@ -420,9 +420,6 @@ class Moves(unittest.TestCase):
     def test_neighbours_are_those_beside_and_not_nothing(self):
         rough = ray_map.move_roughness()
         self.assertTrue(numpy.allclose(rough.sum(axis=0), 0.0))
-        # Aside, the same at every place differs by twice as much at the centre of each of 240 / 3 places; one side has half.
-        aside = numpy.ones(ray_map.PLACES) @ ray_map.move_roughness(aside=True) @ numpy.ones(ray_map.PLACES)
-        self.assertAlmostEqual(aside, ray_map.PLACES / ray_map.COLUMNS * 2.0 ** 2 / 2)
         # Inside four neighbours aside and by row, two by range; the last place, nothing, has none of those.
         inside = (5 * ray_map.COLUMNS + 1) * ray_map.DEPTHS
         self.assertEqual([rough[inside + depth, inside + depth] for depth in (0, 3, 6, 7)], [5.0, 6.0, 5.0, 4.0])

@@ -63,11 +63,10 @@ def tried(rays):
     return rays["point_mm"][slots] + DEEP_MM * ahead / numpy.linalg.norm(ahead, axis=1)[:, None]
 
 
-def read_tried(trace):
+def read_tried(views):
     """All centres that are tried in a frame, where the rays that are counted are in the map, and a ray's weight."""
     parts = [(numpy.zeros((0, 3)), numpy.zeros((0, len(COUNTED)), numpy.int16), numpy.zeros(0))]
-    for view in trace["rays"]:
-        rays = read_rays(view)
+    for rays in views:
         centre_mm = tried(rays)
         away_mm = centre_mm[:, 2] - rays["origin_mm"][2]
         weight = numpy.minimum(numpy.maximum(away_mm, 0) * rays["pitch"] / ray_map.CELL_MM, 1)**2
@@ -77,25 +76,24 @@ def read_tried(trace):
     return {"centre_mm": centre_mm, "place": place, "weight": weight}
 
 
-def read_sides(trace, found):
-    """Of each detection, by slot: on which side of its centre a ray passes, -1 left, 1 right."""
-    views = [read_rays(view) for view in trace["rays"]]
-    sides = [ray_map.sides_around(views[f["surroundings"]["view"]], numpy.array(f["centre_mm_q8"]) / 256) for f in found]
-    return numpy.array(sides, dtype=numpy.int8).reshape(len(found), SLOTS)
-
-
-def read_trace(path, with_tried):
+def read_trace(path, also):
+    """What was seen in a frame, and also: "tried", "side" (of its centre on which each ray passes, by detection and slot)."""
     with open(path, encoding="utf-8") as file:
         trace = json.load(file)
-    more = {"tried": read_tried(trace)} if with_tried else {}
     found = [f for f in trace["findings"] if "surroundings" in f]
+    centre_mm = numpy.array([f["centre_mm_q8"] for f in found]).reshape(-1, 3) / 256
+    more, views = {}, [read_rays(view) for view in trace["rays"]] if also else []
+    if "tried" in also:
+        more["tried"] = read_tried(views)
+    if "side" in also:
+        sides = [ray_map.sides_around(views[f["surroundings"]["view"]], at[None]) for f, at in zip(found, centre_mm)]
+        more["side"] = numpy.array(sides, dtype=numpy.int8).reshape(len(found), SLOTS)
     return more | {
-        "side": read_sides(trace, found),
         "file": trace["file"],
         "kinds": trace["evidence"],
         # To the level frame, in which detections are; a camera that hangs level has none.
         "level": numpy.array(trace.get("level_q30", (1 << 30) * numpy.eye(3))).reshape(3, 3) / (1 << 30),
-        "centre_mm": numpy.array([f["centre_mm_q8"] for f in found]).reshape(-1, 3) / 256,
+        "centre_mm": centre_mm,
         "measure_q8": numpy.array([f["evidence_q8"] for f in found],
                                   dtype=numpy.int64).reshape(len(found), len(trace["evidence"])),
         "weight_q12": numpy.array([f["surroundings"]["weight_q12"] for f in found], dtype=int),
@@ -103,8 +101,8 @@ def read_trace(path, with_tried):
     }
 
 
-def look(program, options, with_tried, directory, scratch):
-    """Every frame of a directory through the firmware; of some of them what the scan tries, too."""
+def look(program, options, also, directory, scratch):
+    """Every frame of a directory through the firmware, and also what read_trace gives; what the scan tries of some of them."""
     name = os.path.relpath(directory, "/").replace(os.sep, "_")
     out = os.path.join(scratch, name[-200:])
     shutil.rmtree(out, ignore_errors=True)
@@ -112,7 +110,7 @@ def look(program, options, with_tried, directory, scratch):
     truth = read_truth(directory)
     frames = []
     for index, path in enumerate(sorted(glob.glob(os.path.join(out, "**", "*.json"), recursive=True))):
-        frame = read_trace(path, with_tried and index % TRIED_EVERY == 0)
+        frame = read_trace(path, [name for name in also if name != "tried" or index % TRIED_EVERY == 0])
         if frame["file"] in truth:
             frame["heads"], frame["unclear"] = (heads @ frame["level"].T for heads in truth[frame["file"]])
             frame["directory"] = directory
@@ -121,7 +119,7 @@ def look(program, options, with_tried, directory, scratch):
     return frames
 
 
-def look_at_all(program, directories, scratch, jobs, options=(), with_tried=False):
+def look_at_all(program, directories, scratch, jobs, options=(), also=()):
     with concurrent.futures.ProcessPoolExecutor(jobs) as pool:
-        work = [pool.submit(look, program, options, with_tried, directory, scratch) for directory in directories]
+        work = [pool.submit(look, program, options, also, directory, scratch) for directory in directories]
         return [frame for one in work for frame in one.result()]

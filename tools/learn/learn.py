@@ -7,7 +7,7 @@ learn.py --render PROGRAM --host-sim PROGRAM --work DIR [--seeds A-B] [--depth-s
 Renders every scene of scenes.py for every seed into DIR (those already there are kept), runs the firmware over them and
 over the frames of people that tools/people has made, and learns the maps of the surroundings and the score behind them
 (model.py). A detection within 55 mm of a head is one, beyond 100 mm it is none, between it is not used, and neither is
-one within 150 mm of a head that is hardly seen. A sequence of tools/people counts as three frames of tools/render. Every
+one within 150 mm of a head that is hardly seen. A sequence of tools/people counts as six frames of tools/render. Every
 detection is learnt from once more, for half as much, as if the view ended nearer.
 What the firmware skips, as it has found a head there, or as it is hopeless, is learnt from, too. How far off a fitted centre
 is (the moves of ih_surroundings.h) is learnt from some of the same frames without moves; whether a centre is worth a fit (its
@@ -83,16 +83,16 @@ def gather(seen, people):
 
 
 def moves_of(seen, people):
-    """Of every head how far it is aside of, below and behind the nearest place where the fit alone put one: from others near it,
-    which are fitted badly, less is learnt."""
+    """Of every head how far it is aside of, below and behind the nearest place where the fit alone put one. Others near it are
+    fitted badly and not used."""
     parts = []
     for frame in seen:
         for head in frame["heads"] if len(frame["centre_mm"]) else []:
             off_mm = head - frame["centre_mm"]
-            nearest = numpy.linalg.norm(off_mm, axis=1).argmin()
-            if numpy.linalg.norm(off_mm[nearest]) < NO_HEAD_MM:
+            best = numpy.linalg.norm(off_mm, axis=1).argmin()
+            if numpy.linalg.norm(off_mm[best]) < NO_HEAD_MM:
                 weight = 1.0 if frame["directory"] in people else MOVES_SCENE_WEIGHT
-                parts.append((*(frame[key][nearest] for key in ("place", "side", "weight_q12")), off_mm[nearest], weight))
+                parts.append((*(frame[key][best] for key in ("place", "side", "weight_q12")), off_mm[best], weight))
     return ray_map.fit_moves(*(numpy.array(column) for column in zip(*parts)))
 
 
@@ -181,14 +181,14 @@ def main():
     arguments = parse()
     scratch = os.path.join(arguments.work, "trace")
 
-    def see(directories, options=(), with_tried=False):
-        return frames.look_at_all(arguments.host_sim, directories, scratch, arguments.jobs, options, with_tried)
+    def see(directories, options=(), also=()):
+        return frames.look_at_all(arguments.host_sim, directories, scratch, arguments.jobs, options, also)
 
     people = sorted(os.path.dirname(path) for folder in arguments.people
                     for path in glob.glob(os.path.join(folder, "**", "rig.json"), recursive=True))
     directories = directories_of(arguments, arguments.seeds, arguments.depth_seeds, arguments.clutter_seeds) + people
-    moves = moves_of(see(directories[::MOVES_STEP], ("--without", "move,skips")), set(people))
-    seen = see(directories, ("--without", "skips"), with_tried=True)
+    moves = moves_of(see(directories[::MOVES_STEP], ("--without", "move,skips"), ("side",)), set(people))
+    seen = see(directories, ("--without", "skips"), ("tried",))
     promise = promise_of(seen)
     kinds = seen[0]["kinds"]
     rows = gather(seen, set(people))

@@ -22,6 +22,7 @@ PROMISE_RIDGE, PROMISE_PASSES = 100.0, 8
 MOVE_RIDGE, MOVE_PASSES, MOVE_ROBUST_MM = 200.0, 5, 20.0
 # Against differences of neighbours: how many rays fall into a cell is a matter of chance, and a head that moves by half a
 # dot's distance should not be moved otherwise (tests/properties/prop_shift.c). Ten times as much would take most of the moves.
+# What rays say aside of the centre, on its two sides, are no neighbours: a penalty there steadies little (experiment 038).
 MOVE_SMOOTH = 600.0
 MOVE_MAX = 127  # of a place, in steps
 STEP_MAX_MM = 1  # as ih_surroundings.h has it
@@ -51,9 +52,9 @@ def counts_of(place, counting=None):
     return scipy.sparse.coo_matrix((each, (row, place[row, slot])), shape=(len(place), PLACES), dtype=numpy.int32).tocsr()
 
 
-def needed_of(place, weight_q12):
+def needed_of(place, weight_q12, counting=None):
     """The same times the weight of each."""
-    return (scipy.sparse.diags(weight_q12 / 4096) @ counts_of(place)).astype(numpy.float32)
+    return (scipy.sparse.diags(weight_q12 / 4096) @ counts_of(place, counting)).astype(numpy.float32)
 
 
 def answers(maps, place, weight_q12):
@@ -74,7 +75,7 @@ def fit_moves(place, side, weight_q12, off_mm, importance):
     """Steps aside, down and away at each place, and a step's mm in Q12; off_mm: of every fitted centre, how far right of it,
     below and behind it the head's is; importance: how often each counts. What a ray says aside counts to its own side. Few that
     are far off do not decide: after a pass they weigh less."""
-    to_both, to_side = (scipy.sparse.diags(weight_q12 / 4096) @ counts for counts in (counts_of(place), counts_of(place, side)))
+    to_both, to_side = needed_of(place, weight_q12), needed_of(place, weight_q12, side)
     penalty = MOVE_RIDGE * numpy.eye(PLACES) + MOVE_SMOOTH * move_roughness()
     weight = importance
     for _ in range(MOVE_PASSES):
@@ -91,16 +92,20 @@ def fit_moves(place, side, weight_q12, off_mm, importance):
     return numpy.round(by_place_mm * 4096 / step_mm_q12).astype(int), step_mm_q12
 
 
-def sides_around(rays, centre_mm):
-    """On which side of a centre each ray of a trace passes at its depth: -1 left, 1 right."""
+def passes_around(rays, centre_mm):
+    """A row for each centre: how far right of it and below it each ray of a trace (frames.read_rays) passes, at its depth."""
     away_mm = rays["origin_mm"] - centre_mm
-    return numpy.where(away_mm[0] - away_mm[2] * rays["slope"][:, 0] < 0, -1, 1)
+    return away_mm[:, None, :2] - away_mm[:, 2, None, None] * rays["slope"]
+
+
+def sides_around(rays, centre_mm):
+    """On which side of each centre that is: -1 left, 1 right."""
+    return numpy.where(passes_around(rays, centre_mm)[..., 0] < 0, -1, 1)
 
 
 def places_around(rays, centre_mm):
-    """A row for each centre: where each ray of a trace (frames.read_rays) is in the maps, -1 where it asks nothing."""
-    away_mm = rays["origin_mm"] - centre_mm
-    passes_mm = away_mm[:, None, :2] - away_mm[:, 2, None, None] * rays["slope"]
+    """A row for each centre: where each ray of a trace is in the maps, -1 where it asks nothing."""
+    passes_mm = passes_around(rays, centre_mm)
     column, cell = abs(passes_mm[..., 0]) // CELL_MM, (passes_mm[..., 1] + TOP_MM) // CELL_MM
     depth = numpy.searchsorted(LIMITS_MM, rays["point_mm"][:, 2] - centre_mm[:, 2, None], side="right")
     depth = numpy.where(rays["state"] == EMPTY, DEPTHS - 1, depth)

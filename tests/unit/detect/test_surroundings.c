@@ -410,7 +410,7 @@ static void the_largest_sums_do_not_overflow(void)
 static void extremes_do_not_overflow(void)
 {
     struct ih_test_random random = {31};
-    int32_t asked[2] = {0, 0};
+    int32_t known_sum[2] = {0, 0};
     int pass, slot, axis, map;
 
     for (pass = 0; pass < 400; pass++) {
@@ -441,15 +441,15 @@ static void extremes_do_not_overflow(void)
             IH_TEST_RANGE(IH_NONE, IH_SURROUNDINGS_PLACES - 1, found.place[slot], "place", slot);
             known += found.place[slot] != IH_NONE;
         }
-        asked[pass % 2] += known;
+        known_sum[pass % 2] += known;
         for (map = 0; map < IH_SURROUNDINGS_MAPS; map++) {
             IH_TEST_EQUAL((int32_t)floor(ldexp(known * each * found.weight_q12, -4) + 0.5),
                           answer_q8[map], "answer", pass);
         }
         check_moves(each < 0 ? -128 : 127, pass);
     }
-    TEST_ASSERT_GREATER_THAN(1000, asked[0]);
-    TEST_ASSERT_GREATER_THAN(1000, asked[1]);
+    TEST_ASSERT_GREATER_THAN(1000, known_sum[0]);
+    TEST_ASSERT_GREATER_THAN(1000, known_sum[1]);
 }
 
 int main(void)
