@@ -160,7 +160,7 @@ eval: sim ## everything measured: all data sets, fresh scenes, each part left ou
 	@/usr/bin/python3 tools/eval/evaluate.py --host-sim $(BUILD)/host/sim/host_sim \
 	  --render $(BUILD)/host/tools/render/render --work $(BUILD)/eval --data $(DATA)
 
-eval-people: sim ## which of the people of true anatomy are found that nothing was learnt from; SETS=judge (default), half an hour
+eval-people: sim ## which of the people of true anatomy are found that nothing was learnt from; SETS=judge (default), ten minutes
 	@tools/setup.sh people
 	@for set in $(SETS); do /usr/bin/python3 tools/people/sets.py $$set $(BUILD)/people/$$set || exit 1; done
 	@/usr/bin/python3 tools/eval/people.py --host-sim $(BUILD)/host/sim/host_sim $(addprefix $(BUILD)/people/,$(SETS))
