@@ -34,7 +34,7 @@ FRAME_COUNT = 10
 TIME_0_US = 1000000
 # Longest times: a start takes 20 s when idle, and several may run at once.
 START_S, ANSWER_S = 300, 180
-MONITOR_S = 3
+MONITOR_S = 3  # for QEMU's monitor to answer
 
 CONFIG = """device = /dev/video0
 format = GREY

@@ -360,8 +360,8 @@ class TrueAnatomy(unittest.TestCase):
                   self.frame(record([OTHER], [0], 0), truth())]
         cells = [[cell.strip() for cell in line.split("|")[1:-1]] for line in people.text(frames).splitlines()]
         for row in (["calm", "3", "1", "33.3", "1", "0", "0"], ["60 and more", "1", "1", "100.0", "0", "0", "0"],
-                    ["6 to 9", "1", "0", "0.0", "0", "-", "-"], ["12 to 18", "1", "0", "0.0", "1", "-", "-"],
-                    ["0 to 0.25", "1", "0", "0.0", "0", "-", "-"], ["450 to 600 mm", "1", "1", "100.0", "0", "0", "0"],
+                    ["0 to below 9", "1", "0", "0.0", "0", "-", "-"], ["12 to below 18", "1", "0", "0.0", "1", "-", "-"],
+                    ["0 to below 0.25", "1", "0", "0.0", "0", "-", "-"], ["0 to below 600 mm", "1", "1", "100.0", "0", "0", "0"],
                     ["2000 mm and more", "2", "0", "0.0", "1", "-", "-"], ["calm", "1", "1"], ["all", "1", "1"]):
             self.assertIn(row, cells)
 

@@ -22,9 +22,10 @@ import report
 import runs
 import score
 
-POINTS = (6, 9, 12, 18, 24, 30, 40, 60)
+# From here to below the next, and the last and more.
+POINTS = (0, 9, 12, 18, 24, 30, 40, 60)
 VISIBLE = (0.0, 0.25, 0.5, 0.75)
-DISTANCE_MM = (450, 600, 800, 1000, 1300, 1600, 2000)
+DISTANCE_MM = (0, 600, 800, 1000, 1300, 1600, 2000)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -34,11 +35,11 @@ class Frame:
     rig: str
     mount: str
     kind: str
-    there: int      # heads
+    there: int  # heads
     right: bool
     selected: bool
-    both: bool      # all heads that are there are accepted, and no third
-    off_mm: float   # of the selected one from the nearest head that is there
+    both: bool = False  # all heads that are there are accepted, and no third
+    off_mm: float = math.nan  # of the selected one from the nearest head that is there
     distance_mm: float = 0.0
     points: int = 0
     visible: float = 0.0
@@ -60,7 +61,7 @@ def looked_at(record, truth, scene, rig, mount):
         return None
     kind, selected = scene["kind"], record["head"] is not None
     if not heads:
-        return Frame(rig, mount, kind, 0, not selected, selected, not record["heads"], math.nan)
+        return Frame(rig, mount, kind, 0, not selected, selected)
     centres_mm = [head["centre_mm"] for head in heads]
     found, nobody, right = score.people(record, centres_mm)
     off_mm = math.nan
@@ -72,9 +73,11 @@ def looked_at(record, truth, scene, rig, mount):
 
 
 def frames_of(program, directory):
-    rig = os.path.basename(os.path.dirname(directory))
     with open(os.path.join(directory, "rig.json"), encoding="utf-8") as file:
-        mount = mount_of(json.load(file))
+        calibration = json.load(file)
+    # Which rig with dots it is, only the folders of sets.py say.
+    rig = "range" if calibration.get("kind") == "range" else os.path.basename(os.path.dirname(directory))
+    mount = mount_of(calibration)
     truths, scenes = ({line["file"]: line for line in runs.read_lines(os.path.join(directory, name))}
                       for name in ("truth.jsonl", "scene.jsonl"))
     records = runs.host_sim(program, [], directory)
@@ -84,8 +87,8 @@ def frames_of(program, directory):
 
 def steps(limits, unit=""):
     """Of a value the range between limits that it is in, and all ranges."""
-    names = ["%g to %g%s" % (low, high, unit) for low, high in zip(limits, limits[1:])] + ["%g%s and more" % (limits[-1], unit)]
-    return lambda value: names[max(0, sum(value >= limit for limit in limits) - 1)], names
+    names = ["%g to below %g%s" % (low, high, unit) for low, high in zip(limits, limits[1:])] + ["%g%s and more" % (limits[-1], unit)]
+    return lambda value: names[sum(value >= limit for limit in limits) - 1], names
 
 
 def head_row(name, frames):
